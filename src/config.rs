@@ -1,0 +1,313 @@
+//! Settings: plain structs whose defaults are the documented ones. A file overrides a default, the command line a file.
+
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Everything that can be set, one section a stage.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    pub camera: Camera,
+    pub outline: Outline,
+    pub detect: Detect,
+    pub track: Track,
+    pub accumulate: Accumulate,
+    pub hierarchy: Hierarchy,
+    pub skeleton: Skeleton,
+    pub shape: Shape,
+    pub motion: Motion,
+    pub export: Export,
+}
+
+/// What is asked of a V4L2 camera.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Camera {
+    /// `auto` (MJPEG before YUYV), `mjpeg` or `yuyv`.
+    pub format: CameraFormat,
+    pub width: u32,
+    pub height: u32,
+    pub rate_hz: u32,
+    /// Silence after which the camera counts as hung, s.
+    pub timeout_s: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum CameraFormat {
+    Auto,
+    Mjpeg,
+    Yuyv,
+}
+
+/// Automatic outline: where motion energy concentrates.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Outline {
+    /// Time over which motion energy is gathered before the region is closed, s.
+    pub gather_s: f64,
+    /// Time after which the whole picture is taken for lack of motion, s.
+    pub give_up_s: f64,
+}
+
+/// Harris corners (000 appendix A, 003 section 5.3.2).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Detect {
+    /// Number of points to look for.
+    pub points: u32,
+    /// Least distance between two points, px at 640 px picture width; grows with the picture.
+    pub min_distance_px: f64,
+    /// Least corner response, as a share of the strongest corner's.
+    pub quality: f64,
+    /// Points nearer to the outline's border than this are not taken, px at 640 px picture width.
+    pub border_px: f64,
+}
+
+/// Pyramidal Lucas-Kanade with forward-backward check.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Track {
+    /// Side of the window, px, odd.
+    pub window_px: u32,
+    /// Pyramid levels above the picture itself.
+    pub levels: u32,
+    /// Largest distance between a point and itself tracked forward and back, px.
+    pub fb_limit_px: f64,
+    /// Every point is compared with the picture it was detected in once in so many frames; 0 never.
+    pub anchor_every: u32,
+    /// Least normalised cross-correlation with that picture for the point to be put back on it.
+    pub anchor_ncc: f64,
+    /// Frames for which a point that fails the check may ride on its neighbours before it is given up.
+    pub coast_frames: u32,
+}
+
+/// When enough motion has been seen to build.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Accumulate {
+    /// Tracks are remembered for so long, s.
+    pub window_s: f64,
+    /// The tree is not built before so much has been seen, s.
+    pub min_s: f64,
+    /// Measure from which on the tree is built, 0 to 1.
+    pub threshold: f64,
+    /// A point moves if its displacement is so many times the tracking noise.
+    pub moving_snr: f64,
+}
+
+/// Recursive normalised cuts (000 appendix A, 003 section 5.4.1).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Hierarchy {
+    /// Levels of the binary hierarchy, the whole tree included, 2 to 10; the papers take 5 to 7.
+    pub levels: u32,
+    /// Reach of the distance affinity, as a share of the cluster's own extent.
+    pub distance_scale: f64,
+    /// Power of the velocity correlation; 1 is the paper's.
+    pub correlation_power: f64,
+    /// Clusters of fewer points are not cut.
+    pub min_points: u32,
+}
+
+/// 2D skeleton (000 appendix A).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Skeleton {
+    /// Share of the way to its parent by which a node is folded.
+    pub fold: f64,
+}
+
+/// 3D skeleton (000 section 3).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Shape {
+    /// Planes about the trunk, the measured one included, 1 to 8.
+    pub planes: u32,
+    /// Points on the envelope that pull branches out.
+    pub attractors: u32,
+    /// Largest push, as a share of the tree's width.
+    pub push_range: f64,
+    /// Number of pushes tried for each node.
+    pub push_options: u32,
+}
+
+/// 3D pose (000 section 4).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Motion {
+    /// `probabilistic` (section 4.2) or `deterministic` (section 4.1).
+    pub method: MotionMethod,
+    /// Standard deviation of the observed positions, px (eq. 8).
+    pub sigma_track_px: f64,
+    /// Standard deviation of the branching angle at the root and at the tips, degrees (eq. 10).
+    pub sigma_shape_root_deg: f64,
+    pub sigma_shape_tip_deg: f64,
+    /// Largest rotation of a branch against its parent from one frame to the next, degrees.
+    pub max_step_deg: f64,
+    /// Largest accumulated rotation of a branch against its parent, degrees.
+    pub max_total_deg: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MotionMethod {
+    Probabilistic,
+    Deterministic,
+}
+
+/// Files.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Export {
+    /// Length of the animation in the model at most, s; the last so many seconds are taken.
+    pub animation_s: f64,
+    /// Metres in a pixel at the tree; 0 leaves the model in pixels.
+    pub metres_per_px: f64,
+}
+
+impl Default for Camera {
+    fn default() -> Self {
+        Self { format: CameraFormat::Auto, width: 1280, height: 720, rate_hz: 30, timeout_s: 3.0 }
+    }
+}
+impl Default for Outline {
+    fn default() -> Self {
+        Self { gather_s: 2.0, give_up_s: 20.0 }
+    }
+}
+impl Default for Detect {
+    fn default() -> Self {
+        Self { points: 400, min_distance_px: 5.0, quality: 0.001, border_px: 3.0 }
+    }
+}
+impl Default for Track {
+    fn default() -> Self {
+        Self { window_px: 15, levels: 3, fb_limit_px: 1.0, anchor_every: 4, anchor_ncc: 0.7, coast_frames: 8 }
+    }
+}
+impl Default for Accumulate {
+    fn default() -> Self {
+        Self { window_s: 20.0, min_s: 3.0, threshold: 0.8, moving_snr: 4.0 }
+    }
+}
+impl Default for Hierarchy {
+    fn default() -> Self {
+        Self { levels: 7, distance_scale: 0.25, correlation_power: 1.0, min_points: 4 }
+    }
+}
+impl Default for Skeleton {
+    fn default() -> Self {
+        Self { fold: 0.4 }
+    }
+}
+impl Default for Shape {
+    fn default() -> Self {
+        Self { planes: 3, attractors: 256, push_range: 0.2, push_options: 21 }
+    }
+}
+impl Default for Motion {
+    fn default() -> Self {
+        Self {
+            method: MotionMethod::Probabilistic,
+            sigma_track_px: 1.0,
+            sigma_shape_root_deg: 10.0,
+            sigma_shape_tip_deg: 30.0,
+            max_step_deg: 20.0,
+            max_total_deg: 70.0,
+        }
+    }
+}
+impl Default for Export {
+    fn default() -> Self {
+        Self { animation_s: 60.0, metres_per_px: 0.0 }
+    }
+}
+
+/// Why a configuration was not taken; the text names file, line and key.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    #[error("cannot read configuration {path}: {source}")]
+    Unreadable { path: String, source: std::io::Error },
+    #[error("configuration {path}, line {line}: {what}")]
+    BadEntry { path: String, line: usize, what: String },
+    #[error("configuration: {key} = {value} is out of range; {allowed}")]
+    OutOfRange { key: &'static str, value: f64, allowed: &'static str },
+}
+
+impl Config {
+    /// Reads a TOML file over the defaults.
+    ///
+    /// # Errors
+    /// The file cannot be read, is no TOML, has an unknown key or a value of the wrong kind or out of range.
+    pub fn load(path: &Path) -> Result<Self, ConfigError> {
+        let shown = path.display().to_string();
+        let text =
+            std::fs::read_to_string(path).map_err(|source| ConfigError::Unreadable { path: shown.clone(), source })?;
+        let config: Config = toml::from_str(&text).map_err(|e| {
+            let at = e.span().map_or(0, |s| s.start);
+            let line = text[..at.min(text.len())].matches('\n').count() + 1;
+            ConfigError::BadEntry { path: shown, line, what: e.message().replace('\n', " ") }
+        })?;
+        config.check()?;
+        Ok(config)
+    }
+
+    /// Refuses values with which a stage could not work.
+    ///
+    /// # Errors
+    /// The first value that is out of its range.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        let positive = (f64::MIN_POSITIVE, 1e9, "it must be greater than 0");
+        let share = (0.0, 1.0, "it must lie between 0 and 1");
+        let rules: [(&'static str, f64, (f64, f64, &'static str)); 27] = [
+            ("camera.width", self.camera.width.into(), (16.0, 16384.0, "16 to 16384")),
+            ("camera.height", self.camera.height.into(), (16.0, 16384.0, "16 to 16384")),
+            ("camera.rate_hz", self.camera.rate_hz.into(), (1.0, 1000.0, "1 to 1000")),
+            ("camera.timeout_s", self.camera.timeout_s, (0.05, 3600.0, "0.05 to 3600")),
+            ("outline.gather_s", self.outline.gather_s, (0.1, 60.0, "0.1 to 60")),
+            ("outline.give_up_s", self.outline.give_up_s, (0.1, 3600.0, "0.1 to 3600")),
+            ("detect.points", self.detect.points.into(), (16.0, 2000.0, "16 to 2000")),
+            ("detect.min_distance_px", self.detect.min_distance_px, (1.0, 100.0, "1 to 100")),
+            ("detect.quality", self.detect.quality, (1e-9, 1.0, "above 0, at most 1")),
+            ("detect.border_px", self.detect.border_px, (0.0, 100.0, "0 to 100")),
+            ("track.window_px", self.track.window_px.into(), (5.0, 61.0, "5 to 61")),
+            ("track.levels", self.track.levels.into(), (0.0, 6.0, "0 to 6")),
+            ("track.fb_limit_px", self.track.fb_limit_px, positive),
+            ("track.anchor_ncc", self.track.anchor_ncc, share),
+            ("accumulate.window_s", self.accumulate.window_s, (1.0, 120.0, "1 to 120")),
+            ("accumulate.min_s", self.accumulate.min_s, (0.2, 120.0, "0.2 to 120")),
+            ("accumulate.threshold", self.accumulate.threshold, share),
+            ("accumulate.moving_snr", self.accumulate.moving_snr, positive),
+            ("hierarchy.levels", self.hierarchy.levels.into(), (2.0, 10.0, "2 to 10")),
+            ("hierarchy.distance_scale", self.hierarchy.distance_scale, positive),
+            ("hierarchy.correlation_power", self.hierarchy.correlation_power, (0.1, 32.0, "0.1 to 32")),
+            ("hierarchy.min_points", self.hierarchy.min_points.into(), (2.0, 1000.0, "2 to 1000")),
+            ("skeleton.fold", self.skeleton.fold, (0.0, 0.95, "0 to 0.95")),
+            ("shape.planes", self.shape.planes.into(), (1.0, 8.0, "1 to 8")),
+            ("shape.attractors", self.shape.attractors.into(), (8.0, 5000.0, "8 to 5000")),
+            ("shape.push_options", self.shape.push_options.into(), (1.0, 1001.0, "1 to 1001")),
+            ("shape.push_range", self.shape.push_range, (0.0, 2.0, "0 to 2")),
+        ];
+        let motion = &self.motion;
+        let more = [
+            ("motion.sigma_track_px", motion.sigma_track_px, positive),
+            ("motion.sigma_shape_root_deg", motion.sigma_shape_root_deg, positive),
+            ("motion.sigma_shape_tip_deg", motion.sigma_shape_tip_deg, positive),
+            ("motion.max_step_deg", motion.max_step_deg, (0.01, 180.0, "0.01 to 180")),
+            ("motion.max_total_deg", motion.max_total_deg, (0.01, 180.0, "0.01 to 180")),
+            ("export.animation_s", self.export.animation_s, (0.1, 3600.0, "0.1 to 3600")),
+            ("export.metres_per_px", self.export.metres_per_px, (0.0, 1e6, "0 (pixels) or more")),
+        ];
+        for (key, value, (low, high, allowed)) in rules.into_iter().chain(more) {
+            if !(low..=high).contains(&value) {
+                return Err(ConfigError::OutOfRange { key, value, allowed });
+            }
+        }
+        if self.track.window_px % 2 == 0 {
+            let value = self.track.window_px.into();
+            return Err(ConfigError::OutOfRange { key: "track.window_px", value, allowed: "it must be odd" });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,4 @@
+//! arborcam films a swaying tree with an ordinary camera and turns it, while it films, into a 3D tree that moves.
+
+pub mod config;
+pub mod model;

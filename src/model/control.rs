@@ -1,0 +1,18 @@
+//! What a person at the terminal can ask of a running capture.
+
+/// One wish; it is honoured before the next frame is taken.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Control {
+    /// Use this polygon (px, at least three points) as the outline and start again from here.
+    SetOutline(Vec<[f64; 2]>),
+    /// Build the tree from the motion seen so far.
+    BuildNow,
+    /// Forget tracks and tree, keep the outline rule, start again.
+    Restart,
+    /// Write the capture as it is now, and go on.
+    Export,
+    /// Stop or go on taking frames; a camera goes on filming and its frames are dropped and counted.
+    Pause(bool),
+    /// Finish: write the capture and end.
+    Quit,
+}

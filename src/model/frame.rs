@@ -1,0 +1,104 @@
+//! Pictures, as the camera delivered them and as the tracker wants them.
+
+use std::sync::Arc;
+
+/// Width and height of a picture in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Size {
+    pub width: u32,
+    pub height: u32,
+}
+
+impl Size {
+    pub fn new(width: u32, height: u32) -> Self {
+        Self { width, height }
+    }
+
+    /// Number of pixels.
+    pub fn area(self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    /// Whether the pixel whose centre is nearest to (`u_px`, `v_px`) lies in the picture.
+    pub fn contains(self, u_px: f64, v_px: f64) -> bool {
+        u_px >= -0.5 && v_px >= -0.5 && u_px < self.width as f64 - 0.5 && v_px < self.height as f64 - 0.5
+    }
+}
+
+impl std::fmt::Display for Size {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}x{}", self.width, self.height)
+    }
+}
+
+/// How the bytes of a [`RawFrame`] are to be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PixelFormat {
+    /// One JPEG picture a frame.
+    Mjpeg,
+    /// Packed 4:2:2, bytes Y0 U Y1 V, no padding at the end of a line.
+    Yuyv,
+    /// One byte of luma a pixel.
+    Grey,
+    /// Three bytes a pixel, red first.
+    Rgb24,
+}
+
+impl std::fmt::Display for PixelFormat {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            PixelFormat::Mjpeg => "MJPG",
+            PixelFormat::Yuyv => "YUYV",
+            PixelFormat::Grey => "GREY",
+            PixelFormat::Rgb24 => "RGB3",
+        })
+    }
+}
+
+/// A frame as it left the camera or the file, not decoded.
+#[derive(Clone, Debug)]
+pub struct RawFrame {
+    /// The driver's own count, or the index in the file; a step of more than one is a loss before us.
+    pub sequence: u64,
+    /// The sensor's time in seconds; only differences mean something. Strictly growing within one source.
+    pub sensor_time_s: f64,
+    pub size: Size,
+    pub format: PixelFormat,
+    pub bytes: Vec<u8>,
+}
+
+/// Grey picture, row by row, no padding.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Luma {
+    pub size: Size,
+    pub pixels: Vec<u8>,
+}
+
+/// Colour picture, row by row, red green blue, no padding.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Rgb {
+    pub size: Size,
+    pub pixels: Vec<u8>,
+}
+
+impl Rgb {
+    /// The colour of the pixel at column `u` and row `v`; both must lie in the picture.
+    pub fn at(&self, u: u32, v: u32) -> [u8; 3] {
+        let i = 3 * (v as usize * self.size.width as usize + u as usize);
+        [self.pixels[i], self.pixels[i + 1], self.pixels[i + 2]]
+    }
+}
+
+/// A decoded frame on its way to the tracker.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Frames since the first one of this capture; a frame lost before us leaves a hole in the count.
+    pub index: u64,
+    /// Seconds since the first frame of this capture, by the sensor's clock.
+    pub time_s: f64,
+    /// When the program received the frame, for latency figures only.
+    pub received: std::time::Instant,
+    pub luma: Luma,
+    /// A smaller picture in colour for screen and bark, made for some frames only.
+    pub preview: Option<Arc<Rgb>>,
+}

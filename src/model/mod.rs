@@ -1,0 +1,22 @@
+//! The nouns that flow through arborcam: plain data, no I/O, no threads.
+//!
+//! `RawFrame -> Frame -> TrackSet -> MotionHierarchy -> Skeleton -> Pose`. Each carries the frame number and the
+//! sensor time of the picture that it comes from. Trees are flat arrays in which a parent stands before its children.
+
+mod control;
+mod frame;
+mod hierarchy;
+mod outline;
+mod pose;
+mod skeleton;
+mod snapshot;
+mod track;
+
+pub use control::Control;
+pub use frame::{Frame, Luma, PixelFormat, RawFrame, Rgb, Size};
+pub use hierarchy::{Cluster, ClusterId, MotionHierarchy};
+pub use outline::Outline;
+pub use pose::{JointPose, Pose};
+pub use skeleton::{Node, NodeId, Skeleton};
+pub use snapshot::{BranchRow, FormatNote, Phase, Snapshot};
+pub use track::{Observation, TrackId, TrackSet};

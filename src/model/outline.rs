@@ -1,0 +1,41 @@
+//! Which pixels are tree.
+
+use super::Size;
+
+/// The region of the picture in which the tree stands, as a mask.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Outline {
+    pub size: Size,
+    /// One byte a pixel, row by row: 255 inside, 0 outside.
+    pub mask: Vec<u8>,
+    /// The region's border in pixels, for drawing; closed, not repeating its first point.
+    pub polygon_px: Vec<[i32; 2]>,
+}
+
+impl Outline {
+    /// Whether the pixel nearest to (`u_px`, `v_px`) is tree; outside the picture nothing is.
+    pub fn contains(&self, u_px: f64, v_px: f64) -> bool {
+        self.size.contains(u_px, v_px) && {
+            let (u, v) = (u_px.round().max(0.0) as usize, v_px.round().max(0.0) as usize);
+            self.mask[v * self.size.width as usize + u] != 0
+        }
+    }
+
+    /// Smallest box `[u_min, v_min, u_max, v_max]` that holds the region, `None` if it is empty.
+    pub fn bounds_px(&self) -> Option<[u32; 4]> {
+        let w = self.size.width as usize;
+        let mut bounds: Option<[u32; 4]> = None;
+        for (v, row) in self.mask.chunks_exact(w).enumerate() {
+            let Some(first) = row.iter().position(|&m| m != 0) else { continue };
+            let last = row.iter().rposition(|&m| m != 0).unwrap_or(first);
+            let b = bounds.get_or_insert([first as u32, v as u32, last as u32, v as u32]);
+            *b = [b[0].min(first as u32), b[1], b[2].max(last as u32), v as u32];
+        }
+        bounds
+    }
+
+    /// Share of the picture that the region covers, 0 to 1.
+    pub fn coverage(&self) -> f64 {
+        self.mask.iter().filter(|&&m| m != 0).count() as f64 / self.mask.len().max(1) as f64
+    }
+}

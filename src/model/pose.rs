@@ -1,0 +1,21 @@
+//! The tree's posture in one frame.
+
+use nalgebra::{Point3, UnitQuaternion};
+
+/// Where one node is, and how the branch that ends in it has turned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointPose {
+    /// Model axes, px.
+    pub position: Point3<f64>,
+    /// Rotation of the branch from its rest direction, in model axes; the branch turns about its parent node, so
+    /// `position = parent.position + rotation * (rest - parent rest)`.
+    pub rotation: UnitQuaternion<f64>,
+}
+
+/// One posture: a [`JointPose`] for every node of the skeleton, in its order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pose {
+    pub frame: u64,
+    pub time_s: f64,
+    pub joints: Vec<JointPose>,
+}

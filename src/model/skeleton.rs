@@ -1,0 +1,65 @@
+//! The tree as joints and branches in 3D.
+
+use super::Size;
+use nalgebra::Point3;
+
+/// Index into [`Skeleton::nodes`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct NodeId(pub u32);
+
+impl NodeId {
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// The end of a branch. The branch itself runs from the parent node to this one; the first node is the trunk's foot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Node {
+    pub parent: Option<NodeId>,
+    /// 0 at the trunk's foot, 1 at the trunk's top, one more with every cut of the hierarchy.
+    pub level: u8,
+    /// Position at rest in model axes: x right, y up, z towards the viewer, px, the trunk's foot at the origin.
+    pub position: Point3<f64>,
+    /// Radius of the branch that ends here, px.
+    pub radius: f64,
+    /// Points that move with this node or one below it; 0 for a copy, which nothing was measured on.
+    pub n_tracks: u32,
+    /// The measured node that this one repeats on a plane turned about the trunk.
+    pub copy_of: Option<NodeId>,
+    /// Angle by which the copy's plane is turned about the y axis, radians; 0 for a measured node.
+    pub plane_angle: f64,
+}
+
+/// Nodes with parents before children, the foot first, all measured nodes before all copies.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Skeleton {
+    pub nodes: Vec<Node>,
+    /// The trunk's foot in the picture, px: the origin of the model.
+    pub foot_px: [f64; 2],
+    /// Size of the picture that the model was taken from.
+    pub image_size: Size,
+}
+
+impl Skeleton {
+    /// Number of nodes that were measured; they come first.
+    pub fn measured(&self) -> usize {
+        self.nodes.iter().take_while(|n| n.copy_of.is_none()).count()
+    }
+
+    /// Orthographic projection of a point in model axes to the picture, px.
+    pub fn image_from_model(&self, p: &Point3<f64>) -> [f64; 2] {
+        [self.foot_px[0] + p.x, self.foot_px[1] - p.y]
+    }
+
+    /// Children of every node, by node index.
+    pub fn children(&self) -> Vec<Vec<NodeId>> {
+        let mut out = vec![Vec::new(); self.nodes.len()];
+        for (i, node) in self.nodes.iter().enumerate() {
+            if let Some(p) = node.parent {
+                out[p.index()].push(NodeId(i as u32));
+            }
+        }
+        out
+    }
+}

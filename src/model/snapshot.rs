@@ -1,0 +1,98 @@
+//! What the screen shows of a running capture: one immutable picture of its state, replaced, never changed.
+
+use super::{Pose, Rgb, Size, Skeleton};
+use std::sync::Arc;
+
+/// How far the capture has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Phase {
+    /// Looking for the tree in the picture.
+    #[default]
+    Outline,
+    /// Looking for points in the outline.
+    Detect,
+    /// Following points until enough motion has been seen.
+    Accumulate,
+    /// Cutting the hierarchy and building the skeleton.
+    Build,
+    /// The tree stands and moves.
+    Live,
+}
+
+impl Phase {
+    pub const ALL: [Phase; 5] = [Phase::Outline, Phase::Detect, Phase::Accumulate, Phase::Build, Phase::Live];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Phase::Outline => "outline",
+            Phase::Detect => "detect",
+            Phase::Accumulate => "accumulate",
+            Phase::Build => "build",
+            Phase::Live => "live",
+        }
+    }
+}
+
+/// What was asked of the camera and what it gave, both ready to print, e.g. `MJPG 1280x720 @ 30`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FormatNote {
+    pub asked: String,
+    pub given: String,
+}
+
+/// One line of the table of branches.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BranchRow {
+    pub node: u32,
+    pub level: u8,
+    pub n_tracks: u32,
+    /// Root mean square of the node's displacement in the picture over the last seconds, px.
+    pub amplitude_px: f64,
+    /// Largest peak of the displacement's spectrum, Hz; `None` while too little has been seen.
+    pub frequency_hz: Option<f64>,
+}
+
+/// State of a capture after some frame.
+#[derive(Clone, Debug, Default)]
+pub struct Snapshot {
+    pub source: String,
+    pub format: FormatNote,
+    pub phase: Phase,
+    /// Progress of the phase, 0 to 1; in `Accumulate` the accumulation measure.
+    pub progress: f64,
+    /// What the program wants to tell, newest last; e.g. why nothing is built yet.
+    pub messages: Vec<String>,
+    pub frame: u64,
+    pub time_s: f64,
+    /// Frames that the source will deliver, where it knows.
+    pub frames_total: Option<u64>,
+    /// Rate by the sensor's clock over the last seconds, and rate at which frames are worked off, Hz.
+    pub sensor_rate_hz: f64,
+    pub work_rate_hz: f64,
+    /// Frames lost before us (gaps in the sequence), between camera and tracker, undecodable, and not shown.
+    pub lost_in_camera: u64,
+    pub dropped_before_tracker: u64,
+    pub undecodable: u64,
+    pub not_shown: u64,
+    /// Time from reception of a frame to its pose, ms.
+    pub latency_p50_ms: f64,
+    pub latency_p99_ms: f64,
+    pub tracks_alive: u32,
+    pub lost_per_s: f64,
+    /// Median forward-backward error of this frame, px, and its history, oldest first.
+    pub fb_error_px: f64,
+    pub fb_history_px: Vec<f64>,
+    pub image_size: Option<Size>,
+    pub preview: Option<Arc<Rgb>>,
+    pub outline_px: Vec<[i32; 2]>,
+    /// Points of this frame, px, each with the number of its main branch, `None` before the tree is built.
+    pub points: Vec<([f32; 2], Option<u8>)>,
+    pub skeleton: Option<Arc<Skeleton>>,
+    pub pose: Option<Arc<Pose>>,
+    /// Main branch of every node of the skeleton, by node index; the same numbers as in `points`.
+    pub node_colour: Arc<Vec<Option<u8>>>,
+    pub branches: Vec<BranchRow>,
+    pub paused: bool,
+    /// The source has ended or the user has quit: what is shown is the last state.
+    pub ended: bool,
+}
