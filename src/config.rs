@@ -106,6 +106,8 @@ pub struct Hierarchy {
     pub distance_scale: f64,
     /// Power of the velocity correlation; 1 is the paper's.
     pub correlation_power: f64,
+    /// Points whose motion correlates less than this with that of the points around them are left out, -1 to 1.
+    pub agreement: f64,
     /// Clusters of fewer points are not cut.
     pub min_points: u32,
 }
@@ -183,7 +185,7 @@ impl Default for Detect {
 }
 impl Default for Track {
     fn default() -> Self {
-        Self { window_px: 15, levels: 3, fb_limit_px: 1.0, anchor_every: 4, anchor_ncc: 0.7, coast_frames: 8 }
+        Self { window_px: 15, levels: 3, fb_limit_px: 1.0, anchor_every: 2, anchor_ncc: 0.6, coast_frames: 15 }
     }
 }
 impl Default for Accumulate {
@@ -193,7 +195,7 @@ impl Default for Accumulate {
 }
 impl Default for Hierarchy {
     fn default() -> Self {
-        Self { levels: 7, distance_scale: 0.25, correlation_power: 1.0, min_points: 4 }
+        Self { levels: 7, distance_scale: 1.0, correlation_power: 1.0, agreement: 0.7, min_points: 4 }
     }
 }
 impl Default for Skeleton {
@@ -260,7 +262,7 @@ impl Config {
     pub fn check(&self) -> Result<(), ConfigError> {
         let positive = (f64::MIN_POSITIVE, 1e9, "it must be greater than 0");
         let share = (0.0, 1.0, "it must lie between 0 and 1");
-        let rules: [(&'static str, f64, (f64, f64, &'static str)); 27] = [
+        let rules: [(&'static str, f64, (f64, f64, &'static str)); 28] = [
             ("camera.width", self.camera.width.into(), (16.0, 16384.0, "16 to 16384")),
             ("camera.height", self.camera.height.into(), (16.0, 16384.0, "16 to 16384")),
             ("camera.rate_hz", self.camera.rate_hz.into(), (1.0, 1000.0, "1 to 1000")),
@@ -282,6 +284,7 @@ impl Config {
             ("hierarchy.levels", self.hierarchy.levels.into(), (2.0, 10.0, "2 to 10")),
             ("hierarchy.distance_scale", self.hierarchy.distance_scale, positive),
             ("hierarchy.correlation_power", self.hierarchy.correlation_power, (0.1, 32.0, "0.1 to 32")),
+            ("hierarchy.agreement", self.hierarchy.agreement, (-1.0, 1.0, "-1 to 1")),
             ("hierarchy.min_points", self.hierarchy.min_points.into(), (2.0, 1000.0, "2 to 1000")),
             ("skeleton.fold", self.skeleton.fold, (0.0, 0.95, "0 to 0.95")),
             ("shape.planes", self.shape.planes.into(), (1.0, 8.0, "1 to 8")),
@@ -304,7 +307,7 @@ impl Config {
                 return Err(ConfigError::OutOfRange { key, value, allowed });
             }
         }
-        if self.track.window_px % 2 == 0 {
+        if self.track.window_px.is_multiple_of(2) {
             let value = self.track.window_px.into();
             return Err(ConfigError::OutOfRange { key: "track.window_px", value, allowed: "it must be odd" });
         }

@@ -1,4 +1,15 @@
-//! arborcam films a swaying tree with an ordinary camera and turns it, while it films, into a 3D tree that moves.
-
+//! arborcam
 pub mod config;
+pub mod dynamics;
+pub mod export;
+pub mod hierarchy;
 pub mod model;
+pub mod motion;
+pub mod outline;
+pub mod pipeline;
+pub mod recording;
+pub mod runtime;
+pub mod shape;
+pub mod skeleton;
+pub mod source;
+pub mod track;

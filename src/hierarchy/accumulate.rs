@@ -1,0 +1,93 @@
+//! When enough motion has been seen to build the tree, judged from the tracks alone.
+
+use super::affinity::Velocities;
+use crate::config::Accumulate;
+use crate::track::{TrackHistory, TrackTable};
+
+/// Rate at which tracks are compared, Hz: velocities over longer steps stand out better from tracking noise.
+pub const COMPARE_HZ: f64 = 15.0;
+/// Points that are compared with each other for stability; more say the same at a higher price.
+const COMPARED: usize = 48;
+/// Blocks that are dealt in turn to the two halves of the evidence, s.
+const BLOCK_S: f64 = 0.5;
+/// No track is taken to be better than this, px: the floor of sub-pixel tracking on clean pictures.
+const NOISE_FLOOR_PX: f64 = 0.1;
+/// Signal-to-noise ratio at which the motion term has reached 1 - 1/e.
+const SNR_SCALE: f64 = 8.0;
+/// Moving points below which the evidence counts for less.
+const ENOUGH_MOVING: f64 = 32.0;
+
+/// What has been seen so far.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Evidence {
+    /// The accumulation measure, 0 to 1: motion times stability times the share of [`ENOUGH_MOVING`] points.
+    pub measure: f64,
+    /// 1 - exp(-snr / 8), with snr the median over the moving points of displacement over tracking noise.
+    pub motion: f64,
+    /// Correlation between the affinities from one half of the time and from the other, 0 to 1: if the tree's
+    /// structure is in the tracks, both halves (blocks of half a second, dealt in turn) tell the same one.
+    pub stability: f64,
+    /// Rows of the table whose points move.
+    pub moving: Vec<usize>,
+}
+
+/// Judges the tracks of `table`.
+pub fn evidence(table: &TrackTable, settings: &Accumulate) -> Evidence {
+    let snr: Vec<f64> = (0..table.ids.len()).map(|i| displacement_px(table, i) / noise_px(table, i)).collect();
+    let moving: Vec<usize> = (0..snr.len()).filter(|&i| snr[i] > settings.moving_snr).collect();
+    if moving.len() < 3 {
+        return Evidence { moving, ..Evidence::default() };
+    }
+    let mut of_moving: Vec<f64> = moving.iter().map(|&i| snr[i]).collect();
+    of_moving.sort_unstable_by(f64::total_cmp);
+    let motion = 1.0 - (-of_moving[of_moving.len() / 2] / SNR_SCALE).exp();
+    let stability = stability(table, &moving);
+    let enough = (moving.len() as f64 / ENOUGH_MOVING).min(1.0);
+    Evidence { measure: motion * stability * enough, motion, stability, moving }
+}
+
+/// Evidence of a history, on frames at the rate at which tracks are compared.
+pub fn evidence_of(history: &TrackHistory, settings: &Accumulate) -> Evidence {
+    evidence(&history.table(1.0 / COMPARE_HZ), settings)
+}
+
+/// Root mean square distance of a track from its mean position, px.
+fn displacement_px(table: &TrackTable, row: usize) -> f64 {
+    let seen = || table.positions[row].iter().flatten();
+    let n = seen().count() as f64;
+    if n < 4.0 {
+        return 0.0;
+    }
+    let mean = |c: usize| seen().map(|p| f64::from(p[c])).sum::<f64>() / n;
+    let (mu, mv) = (mean(0), mean(1));
+    (seen().map(|p| (f64::from(p[0]) - mu).powi(2) + (f64::from(p[1]) - mv).powi(2)).sum::<f64>() / n).sqrt()
+}
+
+/// What tracking itself admits: the median forward-backward error, not less than the floor.
+fn noise_px(table: &TrackTable, row: usize) -> f64 {
+    f64::from(table.fb_errors_px[row]).max(NOISE_FLOOR_PX)
+}
+
+fn stability(table: &TrackTable, moving: &[usize]) -> f64 {
+    let stride = moving.len().div_ceil(COMPARED);
+    let some: Vec<usize> = moving.iter().copied().step_by(stride).collect();
+    let start_s = table.times_s.first().copied().unwrap_or(0.0);
+    let half = |k: usize| ((table.times_s[k] - start_s) / BLOCK_S) as u64 % 2 == 0;
+    let (even, odd) = (Velocities::new(table, &some, half), Velocities::new(table, &some, |k| !half(k)));
+    let pairs = (0..some.len()).flat_map(|a| (a + 1..some.len()).map(move |b| (a, b)));
+    let (x, y): (Vec<f64>, Vec<f64>) =
+        pairs.map(|(a, b)| (f64::from(even.correlation(a, b)), f64::from(odd.correlation(a, b)))).unzip();
+    pearson(&x, &y).max(0.0)
+}
+
+fn pearson(x: &[f64], y: &[f64]) -> f64 {
+    let n = x.len() as f64;
+    let (mx, my) = (x.iter().sum::<f64>() / n, y.iter().sum::<f64>() / n);
+    let (mut xy, mut xx, mut yy) = (0.0, 0.0, 0.0);
+    for (a, b) in x.iter().zip(y) {
+        xy += (a - mx) * (b - my);
+        xx += (a - mx).powi(2);
+        yy += (b - my).powi(2);
+    }
+    if xx > 0.0 && yy > 0.0 { xy / (xx * yy).sqrt() } else { 0.0 }
+}

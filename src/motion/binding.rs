@@ -1,0 +1,133 @@
+//! Which track moves which node, and where the tracks of a frame put every node in the picture.
+
+use crate::model::{MotionHierarchy, NodeId, Skeleton, TrackId, TrackSet};
+use std::collections::BTreeMap;
+
+/// A later track is given to the nearest tip only within so many times the mean distance between tips.
+const REACH: f64 = 2.0;
+/// Share of the displacements cut off at either end before the mean is taken: some tracks are always wrong.
+const TRIM: f64 = 0.2;
+
+/// A track's node and the place in the picture to which it belongs at rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Bound {
+    node: NodeId,
+    rest_px: [f64; 2],
+}
+
+/// Tracks bound to the measured nodes of a skeleton.
+pub struct Binding {
+    tracks: BTreeMap<TrackId, Bound>,
+    parents: Vec<Option<NodeId>>,
+    /// Projection of each measured node at rest, px.
+    rest_px: Vec<[f64; 2]>,
+    tips: Vec<NodeId>,
+    reach_px: f64,
+    /// Displacements of the present frame by node, kept for their memory.
+    collected: Vec<Vec<[f64; 2]>>,
+}
+
+impl Binding {
+    /// Binds the members of `hierarchy`, whose rest positions are `rest_px`, to the nodes of `skeleton`; node k + 1
+    /// belongs to cluster k.
+    pub fn new(hierarchy: &MotionHierarchy, rest_px: &BTreeMap<TrackId, [f64; 2]>, skeleton: &Skeleton) -> Self {
+        let nodes = &skeleton.nodes[..skeleton.measured()];
+        let mut tracks = BTreeMap::new();
+        // Deeper clusters come later and overwrite: each track ends at the deepest node that it belongs to.
+        for (k, cluster) in hierarchy.clusters.iter().enumerate() {
+            let node = NodeId(k as u32 + 1);
+            for id in &cluster.members {
+                if let Some(&rest_px) = rest_px.get(id) {
+                    tracks.insert(*id, Bound { node, rest_px });
+                }
+            }
+        }
+        let mut is_tip = vec![true; nodes.len()];
+        for parent in nodes.iter().filter_map(|n| n.parent) {
+            is_tip[parent.index()] = false;
+        }
+        let tips: Vec<NodeId> = (1..nodes.len()).filter(|&i| is_tip[i]).map(|i| NodeId(i as u32)).collect();
+        let rest: Vec<[f64; 2]> = nodes.iter().map(|n| skeleton.image_from_model(&n.position)).collect();
+        let at = |t: NodeId| rest[t.index()];
+        let nearest = |t: &NodeId| {
+            tips.iter().filter(|o| *o != t).map(|o| distance(at(*t), at(*o))).fold(f64::INFINITY, f64::min)
+        };
+        let gaps: Vec<f64> = tips.iter().map(nearest).filter(|d| d.is_finite()).collect();
+        let reach_px = REACH * gaps.iter().sum::<f64>() / gaps.len().max(1) as f64;
+        Self {
+            tracks,
+            parents: nodes.iter().map(|n| n.parent).collect(),
+            collected: vec![Vec::new(); nodes.len()],
+            rest_px: rest,
+            tips,
+            reach_px,
+        }
+    }
+
+    /// The deepest node that a track belongs to.
+    pub fn node_of(&self, track: TrackId) -> Option<NodeId> {
+        self.tracks.get(&track).map(|b| b.node)
+    }
+
+    /// Where the tracks put each measured node, px; `None` where none of its tracks was seen. The foot never moves.
+    ///
+    /// Tracks that are new are bound to the tip that is nearest to them in this frame.
+    pub fn targets_px(&mut self, set: &TrackSet) -> Vec<Option<[f64; 2]>> {
+        self.collect(set);
+        let mut targets: Vec<Option<[f64; 2]>> = self
+            .collected
+            .iter_mut()
+            .zip(&self.rest_px)
+            .map(|(d, rest)| trimmed_mean(d).map(|d| [rest[0] + d[0], rest[1] + d[1]]))
+            .collect();
+        let new = set.observations.iter().filter(|o| !self.tracks.contains_key(&o.id));
+        let born: Vec<(TrackId, Bound)> = new
+            .filter_map(|o| {
+                let at = [f64::from(o.u_px), f64::from(o.v_px)];
+                let placed = self.tips.iter().filter_map(|t| Some((*t, targets[t.index()]?)));
+                let (tip, target) = placed.min_by(|a, b| distance(at, a.1).total_cmp(&distance(at, b.1)))?;
+                let rest = self.rest_px[tip.index()];
+                let rest_px = [at[0] - target[0] + rest[0], at[1] - target[1] + rest[1]];
+                (distance(at, target) <= self.reach_px).then_some((o.id, Bound { node: tip, rest_px }))
+            })
+            .collect();
+        self.tracks.extend(born);
+        if let Some(foot) = targets.first_mut() {
+            *foot = self.rest_px.first().copied();
+        }
+        targets
+    }
+
+    /// Every track's displacement goes to its node and to all nodes above it.
+    fn collect(&mut self, set: &TrackSet) {
+        self.collected.iter_mut().for_each(Vec::clear);
+        for o in &set.observations {
+            let Some(bound) = self.tracks.get(&o.id) else { continue };
+            let d = [f64::from(o.u_px) - bound.rest_px[0], f64::from(o.v_px) - bound.rest_px[1]];
+            let mut at = Some(bound.node);
+            while let Some(node) = at {
+                self.collected[node.index()].push(d);
+                at = self.parents[node.index()];
+            }
+        }
+    }
+}
+
+/// Mean of the middle of the values, coordinate by coordinate; reorders them.
+fn trimmed_mean(values: &mut [[f64; 2]]) -> Option<[f64; 2]> {
+    if values.is_empty() {
+        return None;
+    }
+    let cut = (values.len() as f64 * TRIM) as usize;
+    let mut mean = [0.0; 2];
+    for (c, m) in mean.iter_mut().enumerate() {
+        values.sort_unstable_by(|a, b| a[c].total_cmp(&b[c]));
+        let kept = &values[cut..values.len() - cut];
+        *m = kept.iter().map(|v| v[c]).sum::<f64>() / kept.len() as f64;
+    }
+    Some(mean)
+}
+
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}

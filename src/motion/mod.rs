@@ -1,0 +1,139 @@
+//! From tracks to the 3D pose of every frame (Li et al. section 4): root to tip, each branch turns about its local root
+//! and carries all that hangs on it. Lengths never change, as only rotations are applied.
+
+mod binding;
+mod deterministic;
+mod probabilistic;
+
+pub use binding::Binding;
+pub use deterministic::direction as deterministic_direction;
+pub use probabilistic::Problem;
+
+use crate::config::{Motion, MotionMethod};
+use crate::model::{JointPose, NodeId, Pose, Skeleton};
+use nalgebra::{Unit, UnitQuaternion, UnitVector3, Vector3};
+use probabilistic::shortest_rotation;
+use std::sync::Arc;
+
+/// One branch at rest.
+struct Branch {
+    parent: usize,
+    /// From the parent node to this one, px.
+    vector: Vector3<f64>,
+    direction: UnitVector3<f64>,
+    length: f64,
+    /// Of the parent's own branch.
+    parent_direction: Option<UnitVector3<f64>>,
+    sigma_shape: f64,
+    copy: Option<(NodeId, UnitQuaternion<f64>)>,
+}
+
+/// Follows the pose of a skeleton from frame to frame.
+pub struct PoseEstimator {
+    skeleton: Arc<Skeleton>,
+    settings: Motion,
+    branches: Vec<Option<Branch>>,
+    /// Direction of each measured branch in the frame before, in the axes of its parent branch at rest; `None` before
+    /// the first frame, which may lie anywhere within the accumulated bound.
+    previous: Option<Vec<UnitVector3<f64>>>,
+}
+
+impl PoseEstimator {
+    pub fn new(skeleton: Arc<Skeleton>, settings: &Motion) -> Self {
+        let deepest = f64::from(skeleton.nodes.iter().map(|n| n.level).max().unwrap_or(1).max(2));
+        let vector_of = |i: usize| {
+            let node = &skeleton.nodes[i];
+            node.parent.map(|p| node.position - skeleton.nodes[p.index()].position)
+        };
+        let branches = (0..skeleton.nodes.len()).map(|i| {
+            let node = &skeleton.nodes[i];
+            let parent = node.parent?.index();
+            let vector = vector_of(i)?;
+            // A wider tolerance towards the tips, which bend more easily (eq. 10).
+            let depth = (f64::from(node.level) - 1.0) / (deepest - 1.0);
+            let (root, tip) = (settings.sigma_shape_root_deg, settings.sigma_shape_tip_deg);
+            Some(Branch {
+                parent,
+                vector,
+                direction: Unit::try_new(vector, 1e-9).unwrap_or(Vector3::y_axis()),
+                length: vector.norm(),
+                parent_direction: vector_of(parent).and_then(|v| Unit::try_new(v, 1e-9)),
+                sigma_shape: (root + depth * (tip - root)).to_radians(),
+                copy: node.copy_of.map(|o| (o, UnitQuaternion::from_axis_angle(&Vector3::y_axis(), node.plane_angle))),
+            })
+        });
+        let branches = branches.collect();
+        Self { skeleton, settings: settings.clone(), branches, previous: None }
+    }
+
+    /// The most probable pose, given where the tracks put each measured node (px in the picture).
+    pub fn step(&mut self, frame: u64, time_s: f64, targets_px: &[Option<[f64; 2]>]) -> Pose {
+        let rest = |n: &crate::model::Node| JointPose { position: n.position, rotation: UnitQuaternion::identity() };
+        let mut joints: Vec<JointPose> = self.skeleton.nodes.iter().map(rest).collect();
+        let mut directions: Vec<UnitVector3<f64>> = Vec::with_capacity(self.skeleton.nodes.len());
+        for i in 0..joints.len() {
+            let Some(branch) = &self.branches[i] else {
+                directions.push(Vector3::y_axis());
+                continue;
+            };
+            let parent = joints[branch.parent];
+            let own = match &branch.copy {
+                Some((original, turn)) => {
+                    // The copy turns in its plane as the original does in its own.
+                    let original = &joints[original.index()];
+                    let above = self.skeleton.nodes[branch.copy.as_ref().map_or(0, |c| c.0.index())].parent;
+                    let parent_rotation = above.map_or(UnitQuaternion::identity(), |p| joints[p.index()].rotation);
+                    directions.push(branch.direction);
+                    turn * (parent_rotation.inverse() * original.rotation) * turn.inverse()
+                }
+                None => {
+                    let d = self.direction(i, branch, &parent, targets_px.get(i).copied().flatten());
+                    directions.push(d);
+                    shortest_rotation(&branch.direction, &d)
+                }
+            };
+            let rotation = UnitQuaternion::new_normalize((parent.rotation * own).into_inner());
+            joints[i] = JointPose { position: parent.position + rotation * branch.vector, rotation };
+        }
+        self.previous = Some(directions);
+        Pose { frame, time_s, joints }
+    }
+
+    /// Direction of branch `i` in the axes of its parent branch at rest.
+    fn direction(
+        &self,
+        i: usize,
+        branch: &Branch,
+        parent: &JointPose,
+        target_px: Option<[f64; 2]>,
+    ) -> UnitVector3<f64> {
+        let previous = self.previous.as_ref().map(|p| p[i]);
+        let foot = self.skeleton.foot_px;
+        let target = target_px.map(|t| [t[0] - foot[0], foot[1] - t[1]]);
+        if branch.length < 1e-6 {
+            return branch.direction;
+        }
+        match self.settings.method {
+            MotionMethod::Probabilistic => Problem {
+                parent_rotation: parent.rotation,
+                length: branch.length,
+                target: target.map(|t| [t[0] - parent.position.x, t[1] - parent.position.y]),
+                parent_direction: branch.parent_direction,
+                rest_direction: branch.direction,
+                previous_direction: previous.unwrap_or(branch.direction),
+                sigma_track_px: self.settings.sigma_track_px,
+                sigma_shape: branch.sigma_shape,
+                max_step: previous.map_or(std::f64::consts::PI, |_| self.settings.max_step_deg.to_radians()),
+                max_total: self.settings.max_total_deg.to_radians(),
+            }
+            .solve(),
+            MotionMethod::Deterministic => {
+                let own = previous.unwrap_or(branch.direction);
+                let Some(target) = target else { return own };
+                let now = parent.position + parent.rotation * own.into_inner() * branch.length;
+                let d = deterministic_direction(&parent.position, branch.length, &now, target);
+                Unit::new_normalize(parent.rotation.inverse() * d.into_inner())
+            }
+        }
+    }
+}

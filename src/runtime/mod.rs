@@ -1,0 +1,155 @@
+//! The pipeline on threads: source, tracker, model. Queues between them are bounded.
+//!
+//! ```text
+//! source --(4 frames; live: newest kept)--> track --(64 track sets)--> model --(newest state only)--> screen
+//! ```
+//!
+//! A dropped sender ends the stream: when the source is done, the tracker works off its queue and ends, then the model
+//! does and writes the capture.
+
+mod finish;
+mod latest;
+mod meter;
+mod model_thread;
+mod shared;
+mod source_thread;
+mod status;
+mod track_thread;
+
+pub use finish::Written;
+pub use shared::{Failure, Gap};
+pub use source_thread::Pace;
+
+use crate::config::Config;
+use crate::model::{Control, Outline, Snapshot};
+use crate::pipeline::{FrontEnd, Tree};
+use crate::source::Source;
+use crossbeam_channel::{Sender, bounded, unbounded};
+use model_thread::ModelThread;
+use shared::Shared;
+use std::io::Write;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::thread::JoinHandle;
+use std::time::Duration;
+use track_thread::TrackThread;
+
+/// Frames that may wait for the tracker, and track sets that may wait for the model (two seconds at 30 a second, more
+/// than a build takes).
+const FRAME_QUEUE: usize = 4;
+const MODEL_QUEUE: usize = 64;
+
+/// What is to be done with a source.
+pub struct Job {
+    pub config: Config,
+    /// `None` finds it by motion.
+    pub outline: Option<Outline>,
+    pub pace: Pace,
+    /// Gets a JSON line per pose.
+    pub stream: Option<Box<dyn Write + Send>>,
+    /// Folder of the capture; must not exist.
+    pub out: Option<PathBuf>,
+    /// Time between two pictures for the screen.
+    pub preview_every: Duration,
+}
+
+/// What came out.
+#[derive(Clone, Debug)]
+pub struct Summary {
+    pub frames: u64,
+    pub tracks_total: u64,
+    /// Points that moved when evidence was last judged, and the accumulation measure then.
+    pub moving: usize,
+    pub accumulation: f64,
+    pub tree: Option<Arc<Tree>>,
+    pub written: Option<Written>,
+}
+
+/// A capture under way.
+pub struct Running {
+    shared: Arc<Shared>,
+    controls: Sender<Control>,
+    source: Option<JoinHandle<()>>,
+    track: Option<JoinHandle<()>>,
+    model: Option<JoinHandle<Summary>>,
+}
+
+/// Starts the threads.
+///
+/// # Errors
+/// A thread cannot be started, or there is no decoder.
+pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> {
+    let shared = Arc::new(Shared::default());
+    let info = source.describe();
+    let (frames_in, frames_out) = bounded(FRAME_QUEUE);
+    let (model_in, model_out) = bounded(MODEL_QUEUE);
+    // Wishes are typed by a person; they cannot pile up.
+    let (controls, wishes) = unbounded();
+    let front = FrontEnd::new(&job.config, job.outline.take());
+    let (pace, preview_every) = (job.pace, job.preview_every);
+
+    let thread = |name: &str| std::thread::Builder::new().name(name.into());
+    let failed = |e: std::io::Error| Failure::Spool(e);
+    let model = {
+        let model = ModelThread::new(job, info, shared.clone());
+        thread("model").spawn(move || model.run(&model_out)).map_err(failed)?
+    };
+    let track = {
+        let (shared, frames_out) = (shared.clone(), frames_out.clone());
+        let run = move || match TrackThread::new(front, model_in, preview_every, &shared) {
+            Ok(track) => track.run(&frames_out, &wishes),
+            Err(e) => shared.fail(Failure::Decode(e)),
+        };
+        thread("track").spawn(run).map_err(failed)?
+    };
+    let source = {
+        let shared = shared.clone();
+        let run = move || source_thread::run(source, pace, frames_in, frames_out, &shared);
+        thread("source").spawn(run).map_err(failed)?
+    };
+    Ok(Running { shared, controls, source: Some(source), track: Some(track), model: Some(model) })
+}
+
+impl Running {
+    /// Newest state for the screen, `None` if there is none newer than the last one taken.
+    pub fn latest(&self) -> Option<Arc<Snapshot>> {
+        self.shared.screen.take()
+    }
+
+    /// Passes a wish on; pausing and quitting take effect at once, whatever the tracker is busy with.
+    pub fn send(&self, wish: Control) {
+        match wish {
+            Control::Quit => self.stop(),
+            Control::Pause(on) => self.shared.paused.store(on, Ordering::Relaxed),
+            other => drop(self.controls.send(other)),
+        }
+    }
+
+    /// Take no more frames and finish.
+    pub fn stop(&self) {
+        self.shared.stop.store(true, Ordering::Relaxed);
+    }
+
+    /// The capture is over and written.
+    pub fn finished(&self) -> bool {
+        self.model.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+
+    /// What there is to be told so far.
+    pub fn warnings(&self) -> Vec<String> {
+        self.shared.warnings()
+    }
+
+    /// Waits for the end: the result, and what went wrong on the way, if anything did. What had been captured until
+    /// then is in the result all the same.
+    pub fn join(mut self) -> (Option<Summary>, Option<Failure>) {
+        let ends = [self.source.take(), self.track.take()];
+        let panicked = ends.into_iter().flatten().any(|handle| handle.join().is_err());
+        let summary = self.model.take().and_then(|handle| handle.join().ok());
+        if panicked || summary.is_none() {
+            self.shared.fail(Failure::Panicked);
+        }
+        (summary, self.shared.take_failure())
+    }
+}

@@ -1,0 +1,239 @@
+//! The model's thread: runs the back end, keeps the tracks, streams the poses, tells the screen, and writes the capture
+//! at the end.
+
+use super::finish::{self, CaptureJob, Quality};
+use super::shared::{Failure, Shared};
+use super::status::{Status, median_fb_error_px};
+use super::track_thread::ToModel;
+use super::{Job, Summary};
+use crate::model::{Pose, Rgb};
+use crate::pipeline::{BackEnd, Followed, Moved};
+use crate::recording::Spool;
+use crate::source::SourceInfo;
+use crossbeam_channel::Receiver;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// Time between two states for the screen.
+const SCREEN_EVERY: Duration = Duration::from_millis(40);
+
+/// State of the thread.
+pub struct ModelThread {
+    back: BackEnd,
+    job: Job,
+    info: SourceInfo,
+    shared: Arc<Shared>,
+    status: Status,
+    spool: Option<Spool>,
+    bark: Option<Arc<Rgb>>,
+    quality: Quality,
+    last_screen: Option<Instant>,
+    exports: Vec<std::thread::JoinHandle<()>>,
+    announced: bool,
+}
+
+impl ModelThread {
+    pub fn new(job: Job, info: SourceInfo, shared: Arc<Shared>) -> Self {
+        let status = Status::new(info.name.clone(), info.format.clone(), info.frames_total);
+        let back = BackEnd::new(&job.config);
+        let mut thread = Self {
+            back,
+            job,
+            info,
+            shared,
+            status,
+            spool: None,
+            bark: None,
+            quality: Quality::default(),
+            last_screen: None,
+            exports: Vec::new(),
+            announced: false,
+        };
+        thread.new_spool();
+        thread
+    }
+
+    /// Runs until the tracker is done, then writes the capture.
+    pub fn run(mut self, queue: &Receiver<ToModel>) -> Summary {
+        let mut last: Option<Moved> = None;
+        for message in queue {
+            match message {
+                ToModel::Followed(followed) => last = Some(self.step(followed)),
+                ToModel::Searching { progress, preview, size, frame, time_s } => {
+                    self.status.searching(progress, preview, size, (frame, time_s));
+                    self.show(None, false);
+                }
+                ToModel::Restart => {
+                    self.back.restart();
+                    self.status.restart();
+                    self.new_spool();
+                    (self.quality, self.announced, last) = (Quality::default(), false, None);
+                }
+                ToModel::BuildNow => {
+                    self.back.build_now();
+                    self.shared.warn("building the tree from what has been seen so far".into());
+                }
+                ToModel::Export => self.export_now(),
+            }
+        }
+        self.back.finish();
+        self.show(last.as_ref(), true);
+        let summary = self.finish();
+        self.shared.ended.store(true, Ordering::Relaxed);
+        summary
+    }
+
+    fn step(&mut self, followed: Followed) -> Moved {
+        let moved = self.back.step(followed);
+        if let Some(spool) = &mut self.spool
+            && let Err(e) = spool.push(&moved.tracks)
+        {
+            // What has been kept is still written; what follows is lost, and that ends the capture.
+            self.shared.fail(Failure::Spool(e));
+            self.shared.stop.store(true, Ordering::Relaxed);
+        }
+        self.quality.note(&moved.tracks, median_fb_error_px(&moved.tracks));
+        if self.bark.is_none() || self.back.tree().is_none() {
+            self.bark = moved.preview.clone().or(self.bark.take());
+        }
+        if let Some(pose) = &moved.pose {
+            self.stream(pose);
+        }
+        self.status.moved(&moved, &self.back);
+        self.announce();
+        self.show(Some(&moved), false);
+        moved
+    }
+
+    fn announce(&mut self) {
+        if let (Some(tree), false) = (self.back.tree(), self.announced) {
+            self.announced = true;
+            let (nodes, time_s) = (tree.skeleton.measured(), tree.time_s);
+            tracing::info!(
+                "tree built at {time_s:.1} s: {nodes} nodes from {} moving points",
+                tree.evidence.moving.len()
+            );
+        }
+    }
+
+    /// One line of JSON: `{"frame":…,"time_s":…,"nodes":[[id,x,y,z],…]}`, the measured nodes, model axes, px.
+    fn stream(&mut self, pose: &Pose) {
+        let Some(out) = &mut self.job.stream else { return };
+        let measured = self.back.tree().map_or(0, |t| t.skeleton.measured());
+        let mut line = format!("{{\"frame\":{},\"time_s\":{:.6},\"nodes\":[", pose.frame, pose.time_s);
+        for (i, joint) in pose.joints[..measured].iter().enumerate() {
+            let p = joint.position;
+            let comma = if i > 0 { "," } else { "" };
+            line.push_str(&format!("{comma}[{i},{:.3},{:.3},{:.3}]", p.x, p.y, p.z));
+        }
+        line.push_str("]}\n");
+        if let Err(e) = out.write_all(line.as_bytes()).and_then(|()| out.flush()) {
+            // The reader has gone (`| head`): nobody listens any more, and that ends the capture in good order.
+            if e.kind() != std::io::ErrorKind::BrokenPipe {
+                self.shared.warn(format!("the stream of poses has ended: {e}"));
+            }
+            self.job.stream = None;
+            self.shared.stop.store(true, Ordering::Relaxed);
+        }
+    }
+
+    fn show(&mut self, moved: Option<&Moved>, at_once: bool) {
+        if !at_once && self.last_screen.is_some_and(|t| t.elapsed() < SCREEN_EVERY) {
+            return;
+        }
+        self.last_screen = Some(Instant::now());
+        let snapshot = self.status.snapshot(moved, &self.back, &self.shared);
+        self.shared.screen.put(snapshot);
+    }
+
+    fn new_spool(&mut self) {
+        let folder = self.job.out.as_deref().and_then(nearest_folder).unwrap_or_else(std::env::temp_dir);
+        self.spool = match Spool::create(&folder) {
+            Ok(spool) => Some(spool),
+            Err(e) => {
+                self.shared.fail(Failure::Spool(e));
+                self.shared.stop.store(true, Ordering::Relaxed);
+                None
+            }
+        };
+    }
+
+    fn capture_job(&mut self) -> Result<CaptureJob, Failure> {
+        let Some(spool) = &mut self.spool else {
+            return Err(Failure::Spool(std::io::Error::other("it could not be created")));
+        };
+        Ok(CaptureJob {
+            tree: self.back.tree().cloned(),
+            tracks: spool.reader().map_err(Failure::Spool)?,
+            config: self.job.config.clone(),
+            info: self.info.clone(),
+            quality: self.quality.clone(),
+            accumulation: self.back.evidence().measure,
+            bark: self.bark.clone(),
+            shared: self.shared.clone(),
+        })
+    }
+
+    /// Writes the capture as it is now beside the final one, on a thread of its own: frames go on.
+    fn export_now(&mut self) {
+        let wanted = self.job.out.clone().unwrap_or_else(|| PathBuf::from("capture"));
+        let dir = free_name(&wanted);
+        match self.capture_job() {
+            Ok(job) => {
+                let shared = self.shared.clone();
+                let write = move || match finish::write(&job, &dir) {
+                    Ok(_) => shared.warn(format!("capture written to {}", dir.display())),
+                    Err(e) => shared.warn(e.to_string()),
+                };
+                match std::thread::Builder::new().name("export".into()).spawn(write) {
+                    Ok(handle) => self.exports.push(handle),
+                    Err(e) => self.shared.warn(format!("export: {e}")),
+                }
+            }
+            Err(e) => self.shared.warn(e.to_string()),
+        }
+    }
+
+    fn finish(&mut self) -> Summary {
+        for export in self.exports.drain(..) {
+            let _ = export.join();
+        }
+        let written = match (self.job.out.clone(), self.capture_job()) {
+            (Some(dir), Ok(job)) => match finish::write(&job, &dir) {
+                Ok(written) => Some(written),
+                Err(e) => {
+                    self.shared.fail(e);
+                    None
+                }
+            },
+            (Some(_), Err(e)) => {
+                self.shared.fail(e);
+                None
+            }
+            (None, _) => None,
+        };
+        Summary {
+            frames: self.shared.counts.seen.load(Ordering::Relaxed),
+            tracks_total: self.quality.tracks_total(),
+            moving: self.back.evidence().moving.len(),
+            accumulation: self.back.evidence().measure,
+            tree: self.back.tree().cloned(),
+            written,
+        }
+    }
+}
+
+/// The folder in which `path` will lie, if it is there already, else the nearest one above it that is.
+fn nearest_folder(path: &Path) -> Option<PathBuf> {
+    let absolute = std::path::absolute(path).ok()?;
+    absolute.ancestors().skip(1).find(|a| a.is_dir()).map(Path::to_path_buf)
+}
+
+/// `wanted-1`, `wanted-2`, ...: the first that is not there yet.
+fn free_name(wanted: &Path) -> PathBuf {
+    let numbered = |n: u32| PathBuf::from(format!("{}-{n}", wanted.display()));
+    (1..u32::MAX).map(numbered).find(|p| !p.exists()).unwrap_or_else(|| wanted.to_path_buf())
+}

@@ -1,0 +1,112 @@
+//! What the threads of a capture have in common: flags, counts, warnings and the first failure.
+
+use super::latest::Latest;
+use crate::export::ExportError;
+use crate::model::Snapshot;
+use crate::source::{DecodeError, SourceError};
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Gaps that are listed one by one; further ones are only counted.
+const GAPS_LISTED: usize = 100;
+/// Warnings that are kept; the oldest give way.
+const WARNINGS_KEPT: usize = 50;
+
+/// Why a capture did not end as it should.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    #[error(transparent)]
+    Source(SourceError),
+    #[error(transparent)]
+    Export(#[from] ExportError),
+    #[error("the working file for tracks: {0}; is the disk full?")]
+    Spool(std::io::Error),
+    /// The pictures changed their size, or there is no decoder.
+    #[error("{0}")]
+    Decode(DecodeError),
+    #[error("no frame could be decoded; the last error was: {0}")]
+    NothingDecoded(DecodeError),
+    #[error("a worker thread of the capture ended unexpectedly; please report this")]
+    Panicked,
+}
+
+/// Frames that the camera counted but did not deliver.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gap {
+    pub after_frame: u64,
+    pub time_s: f64,
+    pub missing: u64,
+}
+
+/// Monotonic counts.
+#[derive(Default)]
+pub struct Counts {
+    pub seen: AtomicU64,
+    pub lost_in_camera: AtomicU64,
+    pub dropped_before_tracker: AtomicU64,
+    pub undecodable: AtomicU64,
+    pub before_outline: AtomicU64,
+}
+
+/// Shared by all threads of one capture.
+#[derive(Default)]
+pub struct Shared {
+    /// Take no more frames, finish.
+    pub stop: AtomicBool,
+    pub paused: AtomicBool,
+    pub ended: AtomicBool,
+    pub counts: Counts,
+    pub screen: Latest<Arc<Snapshot>>,
+    gaps: Mutex<Vec<Gap>>,
+    warnings: Mutex<VecDeque<String>>,
+    failure: Mutex<Option<Failure>>,
+    last_time_s: Mutex<f64>,
+}
+
+impl Shared {
+    pub fn fail(&self, failure: Failure) {
+        self.failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(failure);
+    }
+
+    pub fn take_failure(&self) -> Option<Failure> {
+        self.failure.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+
+    pub fn warn(&self, warning: String) {
+        tracing::debug!("{warning}");
+        let mut warnings = self.warnings.lock().unwrap_or_else(PoisonError::into_inner);
+        if warnings.back() != Some(&warning) {
+            if warnings.len() == WARNINGS_KEPT {
+                warnings.pop_front();
+            }
+            warnings.push_back(warning);
+        }
+    }
+
+    pub fn warnings(&self) -> Vec<String> {
+        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned().collect()
+    }
+
+    pub fn gap(&self, after_frame: u64, time_s: f64, missing: u64) {
+        self.counts.lost_in_camera.fetch_add(missing, Ordering::Relaxed);
+        let mut gaps = self.gaps.lock().unwrap_or_else(PoisonError::into_inner);
+        if gaps.len() < GAPS_LISTED {
+            gaps.push(Gap { after_frame, time_s, missing });
+        }
+    }
+
+    pub fn gaps(&self) -> Vec<Gap> {
+        self.gaps.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    pub fn frame_seen(&self, time_s: f64) {
+        self.counts.seen.fetch_add(1, Ordering::Relaxed);
+        *self.last_time_s.lock().unwrap_or_else(PoisonError::into_inner) = time_s;
+    }
+
+    /// Sensor time of the newest frame, s since the first.
+    pub fn last_time_s(&self) -> f64 {
+        *self.last_time_s.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

@@ -1,0 +1,131 @@
+//! The source's own thread: takes frames, paces a replay, and hands them on. A camera is never made to wait: where the
+//! tracker is late, the oldest waiting frame is dropped and counted.
+
+use super::shared::{Failure, Shared};
+use crate::model::RawFrame;
+use crate::source::Source;
+use crossbeam_channel::{Receiver, Sender, TrySendError};
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// A raw frame with its place in this capture.
+pub struct Timed {
+    pub raw: RawFrame,
+    /// Frames since the first, losses before us included; seconds since the first, by the sensor.
+    pub index: u64,
+    pub time_s: f64,
+    pub received: Instant,
+}
+
+/// How a source is worked off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// A camera: frames come when they come, and the newest matter.
+    Live,
+    /// A recording at its own pace; nothing is dropped.
+    Recorded,
+    /// A recording as fast as the machine allows; nothing is dropped.
+    Fast,
+}
+
+/// A pause longer than this is waited for in pieces, so that a wish to stop is heard.
+const NAP: Duration = Duration::from_millis(20);
+
+/// Runs until the source ends or fails, or `shared.stop` is set. `queue_end` is the other end of `queue`, from which the
+/// oldest frame is taken when a live source finds it full.
+pub fn run(mut source: Box<dyn Source>, pace: Pace, queue: Sender<Timed>, queue_end: Receiver<Timed>, shared: &Shared) {
+    let mut clock = Clock::default();
+    while !shared.stop.load(Ordering::Relaxed) {
+        if pace != Pace::Live && shared.paused.load(Ordering::Relaxed) {
+            std::thread::sleep(NAP);
+            clock.pause();
+            continue;
+        }
+        let raw = match source.next_frame() {
+            Ok(Some(raw)) => raw,
+            Ok(None) => break,
+            Err(e) => {
+                shared.fail(Failure::Source(e));
+                break;
+            }
+        };
+        let timed = clock.stamp(raw, shared);
+        if pace == Pace::Recorded {
+            clock.wait_for(&timed, shared);
+        }
+        if pace == Pace::Live {
+            if shared.paused.load(Ordering::Relaxed) {
+                shared.counts.dropped_before_tracker.fetch_add(1, Ordering::Relaxed);
+                continue;
+            }
+            let mut timed = timed;
+            while let Err(TrySendError::Full(again)) = queue.try_send(timed) {
+                timed = again;
+                if queue_end.try_recv().is_ok() {
+                    shared.counts.dropped_before_tracker.fetch_add(1, Ordering::Relaxed);
+                }
+            }
+        } else if !send_blocking(&queue, timed, shared) {
+            break;
+        }
+    }
+    for warning in source.warnings() {
+        shared.warn(warning);
+    }
+}
+
+/// Waits for room, but not beyond a wish to stop; `false` when the frame could not be handed on.
+fn send_blocking(queue: &Sender<Timed>, mut timed: Timed, shared: &Shared) -> bool {
+    loop {
+        match queue.send_timeout(timed, NAP) {
+            Ok(()) => return true,
+            Err(e) if e.is_disconnected() || shared.stop.load(Ordering::Relaxed) => return false,
+            Err(e) => timed = e.into_inner(),
+        }
+    }
+}
+
+/// Sequence numbers and sensor times relative to the first frame, and the pace of a replay.
+#[derive(Default)]
+struct Clock {
+    first_time_s: Option<f64>,
+    last: Option<(u64, u64, f64)>,
+    /// Moment at which the time `time_s` was due.
+    pace: Option<(Instant, f64)>,
+}
+
+impl Clock {
+    fn stamp(&mut self, raw: RawFrame, shared: &Shared) -> Timed {
+        let time_s = raw.sensor_time_s - *self.first_time_s.get_or_insert(raw.sensor_time_s);
+        let index = match self.last {
+            None => 0,
+            Some((sequence, index, last_s)) => {
+                // Some drivers leave the sequence at 0 or set it back: then nothing is known but that this is the next.
+                let step = raw.sequence.saturating_sub(sequence).max(1);
+                if step > 1 {
+                    shared.gap(index, last_s, step - 1);
+                }
+                index + step
+            }
+        };
+        self.last = Some((raw.sequence, index, time_s));
+        shared.frame_seen(time_s);
+        Timed { raw, index, time_s, received: Instant::now() }
+    }
+
+    fn pause(&mut self) {
+        self.pace = None;
+    }
+
+    fn wait_for(&mut self, timed: &Timed, shared: &Shared) {
+        let (start, start_s) = *self.pace.get_or_insert((Instant::now(), timed.time_s));
+        let due = start + Duration::from_secs_f64((timed.time_s - start_s).clamp(0.0, 1e6));
+        while !shared.stop.load(Ordering::Relaxed) {
+            let left = due.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                break;
+            }
+            std::thread::sleep(left.min(NAP));
+        }
+    }
+}

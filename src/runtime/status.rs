@@ -1,0 +1,209 @@
+//! Gathers from the stream of poses what the screen shows.
+
+use super::meter::Recent;
+use super::shared::Shared;
+use crate::dynamics::dominant_frequency_hz;
+use crate::model::{BranchRow, FormatNote, Phase, Rgb, Size, Skeleton, Snapshot, TrackSet};
+use crate::pipeline::{BackEnd, Moved, Tree};
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+/// Level of the nodes by which points are coloured, and the deepest level in the table of branches.
+const MAIN_BRANCH_LEVEL: u8 = 4;
+const TABLE_LEVEL: u8 = 5;
+/// Time over which rates are taken, and over which amplitude and frequency of a branch are, s.
+const RATE_S: f64 = 5.0;
+const BRANCH_S: f64 = 10.0;
+/// Entries of the sparkline of errors, one for each quarter of a second.
+const HISTORY: usize = 120;
+const HISTORY_EVERY_S: f64 = 0.25;
+/// The table is made anew at this interval, s.
+const TABLE_EVERY_S: f64 = 1.0;
+
+/// Running state of what is shown.
+pub struct Status {
+    snapshot: Snapshot,
+    started: Instant,
+    sensor: Recent,
+    work: Recent,
+    latency_ms: Recent,
+    lost: Recent,
+    fb_history: VecDeque<f64>,
+    fb_noted_s: f64,
+    displacements: VecDeque<(f64, Vec<[f64; 2]>)>,
+    table_nodes: Vec<usize>,
+    table_made_s: f64,
+    skeleton: Option<Arc<Skeleton>>,
+}
+
+impl Status {
+    pub fn new(source: String, format: FormatNote, frames_total: Option<u64>) -> Self {
+        Self {
+            snapshot: Snapshot { source, format, frames_total, ..Snapshot::default() },
+            started: Instant::now(),
+            sensor: Recent::new(RATE_S),
+            work: Recent::new(RATE_S),
+            latency_ms: Recent::new(RATE_S),
+            lost: Recent::new(RATE_S),
+            fb_history: VecDeque::new(),
+            fb_noted_s: f64::NEG_INFINITY,
+            displacements: VecDeque::new(),
+            table_nodes: Vec::new(),
+            table_made_s: f64::NEG_INFINITY,
+            skeleton: None,
+        }
+    }
+
+    /// Forgets the tree.
+    pub fn restart(&mut self) {
+        let kept = std::mem::take(&mut self.snapshot);
+        *self = Self { started: self.started, ..Self::new(kept.source, kept.format, kept.frames_total) };
+    }
+
+    /// The outline is still looked for.
+    pub fn searching(&mut self, progress: f64, preview: Option<Arc<Rgb>>, size: Size, (frame, time_s): (u64, f64)) {
+        let s = &mut self.snapshot;
+        (s.phase, s.progress, s.frame, s.time_s) = (Phase::Outline, progress, frame, time_s);
+        self.sensor.push(time_s, 0.0);
+        self.work.push(self.started.elapsed().as_secs_f64(), 0.0);
+        s.image_size = Some(size);
+        if preview.is_some() {
+            s.preview = preview;
+        }
+    }
+
+    /// A frame is done.
+    pub fn moved(&mut self, moved: &Moved, back: &BackEnd) {
+        let now_s = self.started.elapsed().as_secs_f64();
+        let time_s = moved.tracks.time_s;
+        self.sensor.push(time_s, 0.0);
+        self.work.push(now_s, 0.0);
+        self.latency_ms.push(now_s, moved.received.elapsed().as_secs_f64() * 1e3);
+        self.lost.push(time_s, f64::from(moved.tracks.lost));
+        let error_px = median_fb_error_px(&moved.tracks);
+        if time_s - self.fb_noted_s >= HISTORY_EVERY_S {
+            self.fb_noted_s = time_s;
+            if self.fb_history.len() == HISTORY {
+                self.fb_history.pop_front();
+            }
+            self.fb_history.push_back(error_px);
+        }
+        if let Some(tree) = back.tree() {
+            self.follow_tree(tree, moved);
+        }
+        let s = &mut self.snapshot;
+        (s.phase, s.progress) = back.phase();
+        (s.frame, s.time_s, s.fb_error_px) = (moved.tracks.frame, time_s, error_px);
+        s.tracks_alive = moved.tracks.observations.len() as u32;
+        s.image_size = Some(moved.outline.size);
+        s.pose.clone_from(&moved.pose);
+        if let Some(preview) = &moved.preview {
+            s.preview = Some(preview.clone());
+        }
+    }
+
+    /// Everything that costs more than a few additions is done here, at the screen's rate and not at the camera's.
+    pub fn snapshot(&mut self, moved: Option<&Moved>, back: &BackEnd, shared: &Shared) -> Arc<Snapshot> {
+        let s = &mut self.snapshot;
+        if let Some(moved) = moved {
+            if s.outline_px != moved.outline.polygon_px {
+                s.outline_px.clone_from(&moved.outline.polygon_px);
+            }
+            let colour = |id| {
+                back.binding().and_then(|b| b.node_of(id)).and_then(|n| s.node_colour.get(n.index())?.as_ref().copied())
+            };
+            s.points = moved.tracks.observations.iter().map(|o| ([o.u_px, o.v_px], colour(o.id))).collect();
+        }
+        s.sensor_rate_hz = self.sensor.rate_hz();
+        s.work_rate_hz = self.work.rate_hz();
+        s.latency_p50_ms = self.latency_ms.percentile(0.5);
+        s.latency_p99_ms = self.latency_ms.percentile(0.99);
+        s.lost_per_s = self.lost.sum_per_s();
+        s.fb_history_px = self.fb_history.iter().copied().collect();
+        s.lost_in_camera = shared.counts.lost_in_camera.load(Ordering::Relaxed);
+        s.dropped_before_tracker = shared.counts.dropped_before_tracker.load(Ordering::Relaxed);
+        s.undecodable = shared.counts.undecodable.load(Ordering::Relaxed);
+        s.not_shown = shared.screen.replaced();
+        s.paused = shared.paused.load(Ordering::Relaxed);
+        s.ended = shared.ended.load(Ordering::Relaxed);
+        s.messages = shared.warnings();
+        Arc::new(s.clone())
+    }
+
+    fn follow_tree(&mut self, tree: &Tree, moved: &Moved) {
+        if self.skeleton.as_ref().is_none_or(|s| !Arc::ptr_eq(s, &tree.skeleton)) {
+            self.skeleton = Some(tree.skeleton.clone());
+            let nodes = &tree.skeleton.nodes;
+            self.table_nodes = (1..tree.skeleton.measured()).filter(|&i| nodes[i].level <= TABLE_LEVEL).collect();
+            self.displacements.clear();
+            self.table_made_s = f64::NEG_INFINITY;
+            self.snapshot.skeleton = Some(tree.skeleton.clone());
+            self.snapshot.node_colour = Arc::new(main_branches(&tree.skeleton));
+        }
+        let time_s = moved.tracks.time_s;
+        let before = self.displacements.back().map(|(_, d)| d);
+        let at = |k: usize, node: usize| {
+            // A node that no track saw stays where it was.
+            moved.targets_px.get(node).copied().flatten().or(before.map(|d| d[k])).unwrap_or([0.0; 2])
+        };
+        let row = self.table_nodes.iter().enumerate().map(|(k, &node)| at(k, node)).collect();
+        self.displacements.push_back((time_s, row));
+        while self.displacements.front().is_some_and(|(t, _)| *t < time_s - BRANCH_S) {
+            self.displacements.pop_front();
+        }
+        if time_s - self.table_made_s >= TABLE_EVERY_S {
+            self.table_made_s = time_s;
+            self.snapshot.branches = self.table(&tree.skeleton);
+        }
+    }
+
+    fn table(&self, skeleton: &Skeleton) -> Vec<BranchRow> {
+        let times: Vec<f64> = self.displacements.iter().map(|(t, _)| *t).collect();
+        let row = |(k, &node): (usize, &usize)| {
+            let path: Vec<[f64; 2]> = self.displacements.iter().map(|(_, d)| d[k]).collect();
+            let n = &skeleton.nodes[node];
+            BranchRow {
+                node: node as u32,
+                level: n.level,
+                n_tracks: n.n_tracks,
+                amplitude_px: rms_px(&path),
+                frequency_hz: dominant_frequency_hz(&times, &path),
+            }
+        };
+        self.table_nodes.iter().enumerate().map(row).collect()
+    }
+}
+
+/// Median forward-backward error of a frame's points, px; 0 if there are none.
+pub fn median_fb_error_px(tracks: &TrackSet) -> f64 {
+    let mut errors: Vec<f32> = tracks.observations.iter().map(|o| o.fb_error_px).collect();
+    errors.sort_unstable_by(f32::total_cmp);
+    errors.get(errors.len() / 2).copied().map_or(0.0, f64::from)
+}
+
+/// Number of the main branch of every node; `None` above the main branches. A copy has its original's.
+fn main_branches(skeleton: &Skeleton) -> Vec<Option<u8>> {
+    let mut colours: Vec<Option<u8>> = Vec::with_capacity(skeleton.nodes.len());
+    let mut next = 0u8;
+    for node in &skeleton.nodes {
+        let colour = match (node.copy_of, node.parent) {
+            (Some(original), _) => colours[original.index()],
+            (None, _) if node.level == MAIN_BRANCH_LEVEL => {
+                next = next.wrapping_add(1);
+                Some(next - 1)
+            }
+            (None, Some(parent)) => colours[parent.index()],
+            (None, None) => None,
+        };
+        colours.push(colour);
+    }
+    colours
+}
+
+fn rms_px(path: &[[f64; 2]]) -> f64 {
+    let n = path.len().max(1) as f64;
+    let mean = path.iter().fold([0.0; 2], |m, p| [m[0] + p[0] / n, m[1] + p[1] / n]);
+    (path.iter().map(|p| (p[0] - mean[0]).powi(2) + (p[1] - mean[1]).powi(2)).sum::<f64>() / n).sqrt()
+}

@@ -1,0 +1,180 @@
+//! The tracker's thread: decodes frames and runs the front end. Wishes of the user pass through here in their order.
+
+use super::shared::{Failure, Shared};
+use super::source_thread::Timed;
+use crate::model::{Control, Frame, Luma, Outline, Rgb, Size};
+use crate::outline;
+use crate::pipeline::{Followed, FrontEnd};
+use crate::source::{DecodeError, Decoder};
+use crossbeam_channel::{Receiver, Sender, select};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// Width of the pictures for the screen, px.
+const PREVIEW_WIDTH: u32 = 640;
+/// Damaged frames that are reported one by one; further ones are only counted.
+const DAMAGE_REPORTED: u64 = 5;
+
+/// What the model thread gets.
+pub enum ToModel {
+    Followed(Followed),
+    /// The outline is still looked for: how far, and a picture to look at.
+    Searching {
+        progress: f64,
+        preview: Option<Arc<Rgb>>,
+        size: Size,
+        frame: u64,
+        time_s: f64,
+    },
+    /// Start again.
+    Restart,
+    BuildNow,
+    Export,
+}
+
+/// Runs until the queue's other end is gone.
+pub struct TrackThread<'a> {
+    front: FrontEnd,
+    decoder: Decoder,
+    to_model: Sender<ToModel>,
+    shared: &'a Shared,
+    preview_every: Duration,
+    last_preview: Option<Instant>,
+    size: Option<Size>,
+    last_damage: Option<DecodeError>,
+}
+
+impl<'a> TrackThread<'a> {
+    /// # Errors
+    /// There is no decoder.
+    pub fn new(
+        front: FrontEnd,
+        to_model: Sender<ToModel>,
+        preview_every: Duration,
+        shared: &'a Shared,
+    ) -> Result<Self, DecodeError> {
+        let decoder = Decoder::new()?;
+        let (last_preview, size, last_damage) = (None, None, None);
+        Ok(Self { front, decoder, to_model, shared, preview_every, last_preview, size, last_damage })
+    }
+
+    /// Works off frames and wishes; a wish that has arrived is honoured before the next frame.
+    pub fn run(mut self, frames: &Receiver<Timed>, controls: &Receiver<Control>) {
+        loop {
+            while let Ok(wish) = controls.try_recv() {
+                self.honour(wish);
+            }
+            let alive = select! {
+                recv(frames) -> timed => timed.is_ok_and(|timed| self.work_off(&timed)),
+                recv(controls) -> wish => {
+                    match wish {
+                        Ok(wish) => self.honour(wish),
+                        // Nobody can ask for anything any more; the frames go on.
+                        Err(_) => match frames.recv() {
+                            Ok(timed) => if !self.work_off(&timed) { break },
+                            Err(_) => break,
+                        },
+                    }
+                    true
+                }
+            };
+            if !alive {
+                break;
+            }
+        }
+        for followed in self.front.flush() {
+            if self.to_model.send(ToModel::Followed(followed)).is_err() {
+                break;
+            }
+        }
+        self.report();
+    }
+
+    fn honour(&mut self, wish: Control) {
+        match wish {
+            Control::SetOutline(polygon_px) => match self.size.map(|size| outline::from_polygon(&polygon_px, size)) {
+                Some(Ok(outline)) => self.restart(Some(outline)),
+                Some(Err(e)) => self.shared.warn(e.to_string()),
+                None => self.shared.warn("no picture has arrived yet that an outline could be drawn on".into()),
+            },
+            Control::Restart => self.restart(None),
+            Control::BuildNow => drop(self.to_model.send(ToModel::BuildNow)),
+            Control::Export => drop(self.to_model.send(ToModel::Export)),
+            Control::Pause(on) => self.shared.paused.store(on, Ordering::Relaxed),
+            Control::Quit => self.shared.stop.store(true, Ordering::Relaxed),
+        }
+    }
+
+    fn restart(&mut self, outline: Option<Outline>) {
+        self.front.restart(outline);
+        let _ = self.to_model.send(ToModel::Restart);
+    }
+
+    /// `false` when nothing further can be done.
+    fn work_off(&mut self, timed: &Timed) -> bool {
+        let mut luma = self.front.spare().unwrap_or(Luma { size: timed.raw.size, pixels: Vec::new() });
+        let decoded = match self.size {
+            Some(expected) if expected != timed.raw.size => {
+                Err(DecodeError::SizeChanged { frame: timed.index, expected, found: timed.raw.size })
+            }
+            _ => self.decoder.luma(&timed.raw, &mut luma),
+        };
+        match decoded {
+            Ok(()) => self.size = Some(luma.size),
+            Err(e @ DecodeError::Damaged { .. }) => {
+                let n = self.shared.counts.undecodable.fetch_add(1, Ordering::Relaxed);
+                if n < DAMAGE_REPORTED {
+                    self.shared.warn(e.to_string());
+                }
+                self.last_damage = Some(e);
+                return true;
+            }
+            Err(e) => {
+                self.shared.fail(Failure::Decode(e));
+                self.shared.stop.store(true, Ordering::Relaxed);
+                return false;
+            }
+        }
+        let preview = self.preview(timed);
+        let frame = Frame {
+            index: timed.index,
+            time_s: timed.time_s,
+            received: timed.received,
+            luma,
+            preview: preview.clone(),
+        };
+        let done = self.front.step(frame);
+        self.report();
+        if let Some(progress) = self.front.searching() {
+            let (size, frame, time_s) = (timed.raw.size, timed.index, timed.time_s);
+            return self.to_model.send(ToModel::Searching { progress, preview, size, frame, time_s }).is_ok();
+        }
+        done.into_iter().all(|followed| self.to_model.send(ToModel::Followed(followed)).is_ok())
+    }
+
+    fn preview(&mut self, timed: &Timed) -> Option<Arc<Rgb>> {
+        if self.last_preview.is_some_and(|t| timed.received.saturating_duration_since(t) < self.preview_every) {
+            return None;
+        }
+        self.last_preview = Some(timed.received);
+        self.decoder.preview(&timed.raw, PREVIEW_WIDTH).ok().map(Arc::new)
+    }
+
+    fn report(&mut self) {
+        self.shared.counts.before_outline.store(self.front.let_go, Ordering::Relaxed);
+        if std::mem::take(&mut self.front.no_motion) {
+            self.shared.warn(
+                "nothing moved enough to find the tree by; the whole picture is taken: wait for wind, come nearer, \
+                 keep the camera still, or give an outline (--outline FILE, or key o)"
+                    .into(),
+            );
+        }
+        let decoded = self.size.is_some();
+        if let (false, Some(e)) = (decoded, &self.last_damage)
+            && self.shared.counts.undecodable.load(Ordering::Relaxed) > 0
+        {
+            self.shared.fail(Failure::NothingDecoded(e.clone()));
+        }
+    }
+}

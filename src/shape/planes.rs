@@ -1,0 +1,54 @@
+//! From the flat skeleton to a prototype in space: copies on planes turned about the trunk (Li et al. section 3).
+
+use super::envelope::Envelope;
+use crate::model::{Node, NodeId, Outline, Skeleton};
+use crate::skeleton::Node2d;
+use nalgebra::{Point3, Rotation3, Vector3};
+use std::f64::consts::PI;
+
+/// Stands the 2D skeleton in the plane z = 0 and repeats everything above the trunk's top on `planes - 1` further
+/// planes, turned about the vertical through the trunk's top by equal parts of a half turn. One trunk remains.
+/// Nodes that a turn brings out of the envelope are drawn in towards its axis.
+pub fn copy_to_planes(
+    flat: &[Node2d],
+    tracks: &[u32],
+    outline: &Outline,
+    envelope: &Envelope,
+    planes: u32,
+) -> Skeleton {
+    let foot_px = flat.first().map_or([0.0, 0.0], |n| n.position_px);
+    let model = |p: [f64; 2]| Point3::new(p[0] - foot_px[0], foot_px[1] - p[1], 0.0);
+    let mut nodes: Vec<Node> = flat
+        .iter()
+        .zip(tracks)
+        .enumerate()
+        .map(|(i, (n, &n_tracks))| Node {
+            parent: n.parent.map(|p| NodeId(p as u32)),
+            level: n.level,
+            position: if i == 0 { Point3::origin() } else { envelope.clamp(&model(n.position_px)) },
+            radius: 1.0,
+            n_tracks,
+            copy_of: None,
+            plane_angle: 0.0,
+        })
+        .collect();
+    let measured = nodes.len();
+    let axis = nodes.get(1).map_or(Vector3::zeros(), |top| Vector3::new(top.position.x, 0.0, 0.0));
+    for plane in 1..planes {
+        let angle = PI * f64::from(plane) / f64::from(planes);
+        let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), angle);
+        let mut copy_id: Vec<NodeId> = (0..measured as u32).map(NodeId).collect();
+        for original in 0..measured {
+            if nodes[original].level < 2 {
+                continue; // the trunk is one
+            }
+            copy_id[original] = NodeId(nodes.len() as u32);
+            let mut copy = nodes[original].clone();
+            copy.parent = copy.parent.map(|p| copy_id[p.index()]);
+            copy.position = envelope.clamp(&(turn * (copy.position - axis) + axis));
+            (copy.n_tracks, copy.copy_of, copy.plane_angle) = (0, Some(NodeId(original as u32)), angle);
+            nodes.push(copy);
+        }
+    }
+    Skeleton { nodes, foot_px, image_size: outline.size }
+}

@@ -1,0 +1,93 @@
+//! Harris corners inside the outline, none on its border (Li et al. appendix A, Zeng section 5.3.2).
+
+use crate::config::Detect;
+use crate::model::{Luma, Outline};
+use opencv::core::{Mat, Point, Point2f, Rect, Scalar, Size as CvSize, Vector};
+use opencv::imgproc::{MORPH_ELLIPSE, circle, erode, get_structuring_element, good_features_to_track_with_gradient};
+use opencv::prelude::*;
+
+/// Harris' constant k of det(A) - k trace(A)^2, with A the structure tensor (Zeng eq. 2.11).
+const HARRIS_K: f64 = 0.04;
+/// Side of the window over which the structure tensor is averaged, and of the Sobel derivative, px.
+const BLOCK_PX: i32 = 3;
+
+/// Finds corners in an outline.
+pub struct Detector {
+    settings: Detect,
+    /// The outline less its border, cut to `roi`; 255 where a corner may lie.
+    allowed: Mat,
+    roi: Rect,
+    min_distance_px: f64,
+}
+
+impl Detector {
+    /// Prepares detection in `outline`; distances in `settings` are for a picture 640 px wide and grow with it.
+    pub fn new(settings: &Detect, outline: &Outline) -> Self {
+        let scale = f64::from(outline.size.width) / 640.0;
+        let border_px = (settings.border_px * scale).round() as i32;
+        let (allowed, roi) = allowed_region(outline, border_px).unwrap_or_else(|e| {
+            tracing::error!("outline of {}: {e}", outline.size);
+            (Mat::default(), Rect::default())
+        });
+        let min_distance_px = (settings.min_distance_px * scale).max(1.0);
+        Self { settings: settings.clone(), allowed, roi, min_distance_px }
+    }
+
+    /// Least distance between two points, px.
+    pub fn min_distance_px(&self) -> f64 {
+        self.min_distance_px
+    }
+
+    /// At most `wanted` corners (px), strongest first, all at the minimum distance from each other and from `taken`.
+    pub fn detect(&self, luma: &Luma, taken: &[[f32; 2]], wanted: usize) -> Vec<[f32; 2]> {
+        if self.roi.area() == 0 || wanted == 0 {
+            return Vec::new();
+        }
+        self.corners(luma, taken, wanted).unwrap_or_else(|e| {
+            tracing::error!("corner detection in a {} picture: {e}", luma.size);
+            Vec::new()
+        })
+    }
+
+    fn corners(&self, luma: &Luma, taken: &[[f32; 2]], wanted: usize) -> opencv::Result<Vec<[f32; 2]>> {
+        let mut mask = self.allowed.clone();
+        for p in taken {
+            let centre = Point::new(p[0].round() as i32 - self.roi.x, p[1].round() as i32 - self.roi.y);
+            let radius = self.min_distance_px.round() as i32;
+            circle(&mut mask, centre, radius, Scalar::all(0.0), -1, opencv::imgproc::LINE_8, 0)?;
+        }
+        let picture = Mat::new_rows_cols_with_data(luma.size.height as i32, luma.size.width as i32, &luma.pixels)?;
+        let crop = Mat::roi(&picture, self.roi)?;
+        let mut corners: Vector<Point2f> = Vector::new();
+        good_features_to_track_with_gradient(
+            &crop,
+            &mut corners,
+            wanted as i32,
+            self.settings.quality,
+            self.min_distance_px,
+            &mask,
+            BLOCK_PX,
+            BLOCK_PX,
+            true,
+            HARRIS_K,
+        )?;
+        let (left, top) = (self.roi.x as f32, self.roi.y as f32);
+        Ok(corners.iter().map(|c| [c.x + left, c.y + top]).collect())
+    }
+}
+
+fn allowed_region(outline: &Outline, border_px: i32) -> opencv::Result<(Mat, Rect)> {
+    let Some([left, top, right, bottom]) = outline.bounds_px() else { return Ok((Mat::default(), Rect::default())) };
+    let roi = Rect::new(left as i32, top as i32, (right - left + 1) as i32, (bottom - top + 1) as i32);
+    let (rows, cols) = (outline.size.height as i32, outline.size.width as i32);
+    let mask = Mat::new_rows_cols_with_data(rows, cols, &outline.mask)?;
+    let mut eroded = mask.try_clone()?;
+    if border_px > 0 {
+        let side = 2 * border_px + 1;
+        let disc = get_structuring_element(MORPH_ELLIPSE, CvSize::new(side, side), Point::new(-1, -1))?;
+        let constant = opencv::core::BORDER_CONSTANT;
+        // Outside the picture counts as not tree, so that no window hangs over the picture's edge.
+        erode(&mask, &mut eroded, &disc, Point::new(-1, -1), 1, constant, Scalar::all(0.0))?;
+    }
+    Ok((Mat::roi(&eroded, roi)?.try_clone()?, roi))
+}

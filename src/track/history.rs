@@ -1,0 +1,96 @@
+//! The tracks of the last seconds, and their table as the hierarchy wants it.
+
+use crate::model::{TrackId, TrackSet};
+use std::collections::{BTreeMap, VecDeque};
+
+/// The track sets of the last so many seconds; memory is bounded by the window.
+pub struct TrackHistory {
+    window_s: f64,
+    sets: VecDeque<TrackSet>,
+}
+
+/// Positions of all tracks on common frames.
+#[derive(Clone, Debug, Default)]
+pub struct TrackTable {
+    pub ids: Vec<TrackId>,
+    /// Sensor time of each frame, s.
+    pub times_s: Vec<f64>,
+    /// `positions[track][frame]`, px; `None` where the track was not seen.
+    pub positions: Vec<Vec<Option<[f32; 2]>>>,
+    /// Median forward-backward error of each track, px.
+    pub fb_errors_px: Vec<f32>,
+}
+
+impl TrackHistory {
+    pub fn new(window_s: f64) -> Self {
+        Self { window_s, sets: VecDeque::new() }
+    }
+
+    pub fn push(&mut self, set: TrackSet) {
+        let oldest_s = set.time_s - self.window_s;
+        self.sets.push_back(set);
+        while self.sets.front().is_some_and(|s| s.time_s < oldest_s) {
+            self.sets.pop_front();
+        }
+    }
+
+    pub fn clear(&mut self) {
+        self.sets.clear();
+    }
+
+    pub fn last(&self) -> Option<&TrackSet> {
+        self.sets.back()
+    }
+
+    /// Number of frames held.
+    pub fn len(&self) -> usize {
+        self.sets.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.sets.is_empty()
+    }
+
+    /// Time between the first and the last frame held, s.
+    pub fn span_s(&self) -> f64 {
+        match (self.sets.front(), self.sets.back()) {
+            (Some(first), Some(last)) => last.time_s - first.time_s,
+            _ => 0.0,
+        }
+    }
+
+    /// Tracks seen in the newest frame, on frames at least `step_s` apart.
+    pub fn table(&self, step_s: f64) -> TrackTable {
+        let mut frames: Vec<&TrackSet> = Vec::new();
+        // From the newest backwards, so that the newest frame is always in.
+        for set in self.sets.iter().rev() {
+            // A tenth of tolerance: sensor times jitter, and a step of three frames is to stay one of three.
+            if frames.last().is_none_or(|next| next.time_s - set.time_s >= 0.9 * step_s) {
+                frames.push(set);
+            }
+        }
+        frames.reverse();
+        let Some(newest) = frames.last() else { return TrackTable::default() };
+        let row: BTreeMap<TrackId, usize> = newest.observations.iter().enumerate().map(|(i, o)| (o.id, i)).collect();
+        let mut positions = vec![vec![None; frames.len()]; row.len()];
+        let mut errors = vec![Vec::new(); row.len()];
+        for (f, set) in frames.iter().enumerate() {
+            for o in &set.observations {
+                if let Some(&i) = row.get(&o.id) {
+                    positions[i][f] = Some([o.u_px, o.v_px]);
+                    errors[i].push(o.fb_error_px);
+                }
+            }
+        }
+        let median = |mut e: Vec<f32>| {
+            e.sort_unstable_by(f32::total_cmp);
+            e[e.len() / 2]
+        };
+        TrackTable {
+            ids: row.into_keys().collect(),
+            times_s: frames.iter().map(|s| s.time_s).collect(),
+            positions,
+            fb_errors_px: errors.into_iter().map(median).collect(),
+        }
+    }
+}

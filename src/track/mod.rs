@@ -1,0 +1,222 @@
+//! Points inside the outline, followed from frame to frame.
+//!
+//! Each frame: flow forward and back; who does not come home rides on its neighbours for a while; a part of the points
+//! is put back on its first patch; who is lost is replaced. Ids are never used twice.
+
+mod anchor;
+mod detect;
+mod flow;
+mod history;
+mod neighbours;
+
+pub use detect::Detector;
+pub use flow::{Flow, OpticalFlow, Pyramid};
+pub use history::{TrackHistory, TrackTable};
+
+use crate::config::{Detect, Track};
+use crate::model::{Frame, Observation, Outline, TrackId, TrackSet};
+use anchor::{Anchoring, Candidate, Keyframe, distance};
+
+/// Pictures kept to put points back on; the oldest but the first gives way.
+const KEYFRAMES: usize = 4;
+/// New points are looked for when so great a share of the wanted ones is missing, and not more often than this.
+const REFILL_SHARE: f64 = 0.1;
+const REFILL_FRAMES: u64 = 15;
+
+/// One followed point.
+struct Point {
+    id: TrackId,
+    /// Number of the keyframe in which it was detected; the keyframe itself may be gone.
+    keyframe: u32,
+    born_px: [f32; 2],
+    now_px: [f32; 2],
+    fb_error_px: f32,
+    /// Frames since it was last seen; 0 when seen in this frame.
+    coasting: u32,
+    /// Points of the same keyframe nearest to it at birth.
+    neighbours: Vec<TrackId>,
+}
+
+/// Follows points through the frames of one capture; holds what must last from frame to frame.
+pub struct Tracker {
+    settings: Track,
+    wanted: usize,
+    detector: Detector,
+    flow: OpticalFlow,
+    anchoring: Anchoring,
+    previous: Pyramid,
+    present: Pyramid,
+    /// Number and picture; numbers grow.
+    keyframes: Vec<(u32, Keyframe)>,
+    /// Ordered by id.
+    points: Vec<Point>,
+    next_id: u32,
+    next_keyframe: u32,
+    frames: u64,
+    last_detection: u64,
+    buffers: Buffers,
+}
+
+#[derive(Default)]
+struct Buffers {
+    from: Vec<[f32; 2]>,
+    to: Vec<[f32; 2]>,
+    forward: Vec<Flow>,
+    backward: Vec<Flow>,
+}
+
+impl Tracker {
+    /// Starts with no points; the first frame is searched for them. Ids start at `first_id`.
+    pub fn new(detect: &Detect, track: &Track, outline: &Outline, first_id: u32) -> Self {
+        Self {
+            settings: track.clone(),
+            wanted: detect.points as usize,
+            detector: Detector::new(detect, outline),
+            flow: OpticalFlow::new(track.window_px),
+            anchoring: Anchoring::new(track),
+            previous: Pyramid::default(),
+            present: Pyramid::default(),
+            keyframes: Vec::new(),
+            points: Vec::new(),
+            next_id: first_id,
+            next_keyframe: 0,
+            frames: 0,
+            last_detection: 0,
+            buffers: Buffers::default(),
+        }
+    }
+
+    /// The id that the next new point will get.
+    pub fn next_id(&self) -> u32 {
+        self.next_id
+    }
+
+    /// Follows all points into `frame` and replaces the lost ones.
+    pub fn step(&mut self, frame: &Frame) -> TrackSet {
+        std::mem::swap(&mut self.previous, &mut self.present);
+        self.present.rebuild(&frame.luma, self.settings.window_px, self.settings.levels);
+        let before = self.points.len();
+        if self.frames > 0 {
+            self.follow();
+            self.undo_drift(frame);
+            let (size, patience) = (frame.luma.size, self.settings.coast_frames);
+            self.points
+                .retain(|p| p.coasting <= patience && size.contains(f64::from(p.now_px[0]), f64::from(p.now_px[1])));
+        }
+        let lost = (before - self.points.len()) as u32;
+        let born = if self.refill_due() { self.refill(frame) } else { 0 };
+        self.frames += 1;
+        let observations = self
+            .points
+            .iter()
+            .filter(|p| p.coasting == 0)
+            .map(|p| Observation { id: p.id, u_px: p.now_px[0], v_px: p.now_px[1], fb_error_px: p.fb_error_px })
+            .collect();
+        TrackSet { frame: frame.index, time_s: frame.time_s, observations, lost, born }
+    }
+
+    /// Lucas-Kanade forward and back; who misses its start by too much is moved with its neighbours.
+    fn follow(&mut self) {
+        let b = &mut self.buffers;
+        let pictures = (&self.previous, &self.present);
+        b.from.clear();
+        b.from.extend(self.points.iter().map(|p| p.now_px));
+        self.flow.track(pictures, &b.from, None, self.settings.levels, &mut b.forward);
+        b.to.clear();
+        b.to.extend(b.forward.iter().map(|f| f.to));
+        self.flow.track((pictures.1, pictures.0), &b.to, None, self.settings.levels, &mut b.backward);
+        let limit = self.settings.fb_limit_px as f32;
+        for (i, p) in self.points.iter_mut().enumerate() {
+            let (forward, backward) = (b.forward[i], b.backward[i]);
+            let error = distance(backward.to, b.from[i]);
+            if forward.found && backward.found && error < limit {
+                (p.now_px, p.fb_error_px, p.coasting) = (forward.to, error, 0);
+            } else {
+                p.coasting += 1;
+            }
+        }
+        let riding: Vec<usize> = (0..self.points.len()).filter(|&i| self.points[i].coasting > 0).collect();
+        for i in riding {
+            if let Some(at) = self.predicted(i) {
+                self.points[i].now_px = at;
+            }
+        }
+    }
+
+    /// Where the neighbours that are seen say that point `i` is, px.
+    fn predicted(&self, i: usize) -> Option<[f32; 2]> {
+        let p = &self.points[i];
+        let mut vouching = [([0.0; 2], [0.0; 2]); neighbours::NEIGHBOURS];
+        let mut n = 0;
+        for id in &p.neighbours {
+            let Ok(j) = self.points.binary_search_by_key(id, |q| q.id) else { continue };
+            let q = &self.points[j];
+            if q.coasting == 0 {
+                let minus = |a: [f32; 2], b: [f32; 2]| [f64::from(a[0] - b[0]), f64::from(a[1] - b[1])];
+                vouching[n] = (minus(q.born_px, p.born_px), minus(q.now_px, q.born_px));
+                n += 1;
+            }
+        }
+        let d = neighbours::predicted_displacement(&vouching[..n])?;
+        Some([p.born_px[0] + d[0] as f32, p.born_px[1] + d[1] as f32])
+    }
+
+    /// Puts a share of the points back on their first patches.
+    fn undo_drift(&mut self, frame: &Frame) {
+        let every = u64::from(self.settings.anchor_every);
+        if every == 0 {
+            return;
+        }
+        for (number, keyframe) in &self.keyframes {
+            let turn = |p: &Point| p.keyframe == *number && u64::from(p.id.0) % every == self.frames % every;
+            let (mut indices, mut candidates) = (Vec::new(), Vec::new());
+            for i in (0..self.points.len()).filter(|&i| turn(&self.points[i])) {
+                let p = &self.points[i];
+                let predicted_px = self.predicted(i).unwrap_or(p.now_px);
+                indices.push(i);
+                candidates.push(Candidate { born_px: p.born_px, now_px: p.now_px, predicted_px });
+            }
+            let found = self.anchoring.reanchor(keyframe, (&frame.luma, &self.present), &candidates);
+            for (i, at) in indices.into_iter().zip(found) {
+                if let Some(at) = at {
+                    (self.points[i].now_px, self.points[i].coasting) = (at, 0);
+                }
+            }
+        }
+    }
+
+    fn refill_due(&self) -> bool {
+        let missing = self.wanted.saturating_sub(self.points.len());
+        let rested = self.frames >= self.last_detection + REFILL_FRAMES;
+        self.frames == 0 || (rested && missing as f64 >= REFILL_SHARE * self.wanted as f64)
+    }
+
+    /// Detects points where there are none; returns how many.
+    fn refill(&mut self, frame: &Frame) -> u32 {
+        self.last_detection = self.frames;
+        let taken: Vec<[f32; 2]> = self.points.iter().map(|p| p.now_px).collect();
+        let found = self.detector.detect(&frame.luma, &taken, self.wanted - self.points.len());
+        if found.is_empty() {
+            return 0;
+        }
+        if self.keyframes.len() == KEYFRAMES {
+            self.keyframes.remove(1);
+        }
+        self.keyframes.push((self.next_keyframe, Keyframe::new(&frame.luma, &self.settings)));
+        let first = self.next_id;
+        for (at, near) in found.iter().zip(neighbours::nearest(&found)) {
+            self.points.push(Point {
+                id: TrackId(self.next_id),
+                keyframe: self.next_keyframe,
+                born_px: *at,
+                now_px: *at,
+                fb_error_px: 0.0,
+                coasting: 0,
+                neighbours: near.into_iter().map(|j| TrackId(first + j)).collect(),
+            });
+            self.next_id += 1;
+        }
+        self.next_keyframe += 1;
+        found.len() as u32
+    }
+}
