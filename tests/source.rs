@@ -367,7 +367,15 @@ fn a_jpeg_without_huffman_tables_decodes_as_webcams_send_it() {
         removed += 1;
     }
     assert!(removed > 0, "the test's picture had tables");
-    let stripped = RawFrame { bytes, ..frame };
+    let stripped = RawFrame { bytes, ..frame.clone() };
     // A decoder of its own: one that has seen tables before would remember them.
     assert_eq!(luma(&stripped).expect("without tables"), wanted);
+    // Wrong tables in one damaged picture spoil that one only.
+    let mut spoilt = frame.clone();
+    let at = spoilt.bytes.windows(2).position(|w| w == [0xFF, 0xC4]).expect("tables") + 5;
+    spoilt.bytes[at..at + 16].fill(7);
+    let (mut decoder, mut into) = (Decoder::new().expect("decoder"), empty_luma());
+    assert!(decoder.luma(&spoilt, &mut into).is_err());
+    decoder.luma(&stripped, &mut into).expect("the next picture is whole");
+    assert_eq!(into, wanted);
 }

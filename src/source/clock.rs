@@ -1,31 +1,19 @@
 //! The count and the time of a driver, as the rest of the program may rely on them.
 
-use v4l::buffer::{Flags, Metadata};
+use v4l::buffer::Metadata;
 
 /// Turns the driver's count and time into ours.
 #[derive(Debug, Default)]
 pub(super) struct Clock {
-    /// Monotonic time at which the stream was started, s.
-    started_s: f64,
     /// The driver's count, ours and the time of the last frame.
     last: Option<(u32, u64, f64)>,
 }
 
 impl Clock {
-    pub(super) fn started_now() -> Self {
-        Self { started_s: monotonic_s(), last: None }
-    }
-
-    /// Number and time of a frame; `None` for one that is older than what we already have.
+    /// Number and time of a frame; `None` for one that is not later than what we already have.
     pub(super) fn take(&mut self, meta: &Metadata) -> Option<(u64, f64)> {
         let time_s = meta.timestamp.sec as f64 + meta.timestamp.usec as f64 * 1e-6;
         let Some((last_raw, last_sequence, last_s)) = self.last else {
-            // Loopback devices may begin with a picture from before; the second frame is taken whatever its time.
-            self.last = Some((meta.sequence, u64::from(meta.sequence), f64::NEG_INFINITY));
-            let monotonic = meta.flags & Flags::TIMESTAMP_MASK == Flags::TIMESTAMP_MONOTONIC;
-            if monotonic && time_s < self.started_s {
-                return None;
-            }
             self.last = Some((meta.sequence, u64::from(meta.sequence), time_s));
             return Some((u64::from(meta.sequence), time_s));
         };
@@ -41,21 +29,13 @@ impl Clock {
     }
 }
 
-/// The clock that drivers stamp frames with, s.
-fn monotonic_s() -> f64 {
-    let mut now = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: the call only writes to the structure that it is given.
-    unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &mut now) };
-    now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn frame(sequence: u32, time_s: f64) -> Metadata {
         let timestamp = v4l::timestamp::Timestamp::new(time_s as i64, (time_s.fract() * 1e6).round() as i64);
-        Metadata { sequence, timestamp, flags: Flags::TIMESTAMP_MONOTONIC, ..Metadata::default() }
+        Metadata { sequence, timestamp, ..Metadata::default() }
     }
 
     #[test]
@@ -73,15 +53,11 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_from_before_the_start_is_left_out_once_and_time_only_grows() {
-        let mut clock = Clock { started_s: 100.0, last: None };
-        assert_eq!(clock.take(&frame(0, 40.0)), None);
-        assert_eq!(
-            clock.take(&frame(1, 50.0)),
-            Some((1, 50.0)),
-            "a device with a clock of its own is read all the same"
-        );
+    fn time_only_grows() {
+        let mut clock = Clock::default();
+        assert_eq!(clock.take(&frame(1, 50.0)), Some((1, 50.0)));
         assert_eq!(clock.take(&frame(2, 50.0)), None);
-        assert_eq!(clock.take(&frame(3, 50.5)), Some((3, 50.5)));
+        assert_eq!(clock.take(&frame(3, 49.0)), None);
+        assert_eq!(clock.take(&frame(4, 50.5)), Some((4, 50.5)));
     }
 }

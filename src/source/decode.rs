@@ -94,8 +94,7 @@ impl Decoder {
         let frame = raw.sequence;
         let bytes_per_pixel = match raw.format {
             PixelFormat::Mjpeg => {
-                let header = self.jpeg.read_header(&raw.bytes);
-                let header = header.map_err(|e| DecodeError::Damaged { frame, what: e.to_string() })?;
+                let header = self.jpeg.read_header(&raw.bytes).map_err(|e| self.damaged(raw, e.to_string()))?;
                 let found = Size::new(header.width as u32, header.height as u32);
                 if found != raw.size {
                     return Err(DecodeError::SizeChanged { frame, expected: raw.size, found });
@@ -126,9 +125,20 @@ impl Decoder {
         let output = Image { pixels, width, pitch: width * format.size(), height, format };
         let done = self.jpeg.set_scaling_factor(scale).and_then(|()| self.jpeg.decompress(&raw.bytes, output));
         // The library goes on after damage, fills the rest with grey and warns; the crate makes that an error.
-        done.map_err(|e| e.to_string())
-            .or_else(|what| if is_filling(&what) { Ok(()) } else { Err(what) })
-            .map_err(|what| DecodeError::Damaged { frame: raw.sequence, what })
+        match done.map_err(|e| e.to_string()) {
+            Err(what) if !is_filling(&what) => Err(self.damaged(raw, what)),
+            _ => Ok(()),
+        }
+    }
+
+    /// Begins with a new JPEG decoder: the old one keeps the Huffman tables of a damaged picture, and would read every
+    /// later one with them whose camera leaves its tables out.
+    fn damaged(&mut self, raw: &RawFrame, what: String) -> DecodeError {
+        match Decompressor::new() {
+            Ok(jpeg) => self.jpeg = jpeg,
+            Err(e) => return DecodeError::Unavailable { what: e.to_string() },
+        }
+        DecodeError::Damaged { frame: raw.sequence, what }
     }
 }
 

@@ -99,7 +99,7 @@ fn holder(path: &Path) -> Option<String> {
         let Ok(open) = std::fs::read_dir(process.path().join("fd")) else { continue };
         // Only what is named like a device is looked at: asking a dead network file system could hang.
         let holds = |fd: std::fs::DirEntry| {
-            std::fs::read_link(fd.path()).is_ok_and(|target| target.starts_with("/dev/video"))
+            std::fs::read_link(fd.path()).is_ok_and(|target| target.starts_with("/dev"))
                 && std::fs::metadata(fd.path()).is_ok_and(|m| m.rdev() == device)
         };
         if pid != own && open.flatten().any(holds) {
@@ -133,5 +133,14 @@ mod tests {
         for code in [libc::EBUSY, libc::ENODEV, libc::ENOTTY, libc::EINVAL, libc::EACCES] {
             assert!(!of(code).to_string().contains('\n'), "one line");
         }
+    }
+
+    #[test]
+    fn the_program_that_holds_a_device_is_named() {
+        let Ok(device) = std::fs::File::open("/dev/full") else { return };
+        let mut child = std::process::Command::new("sleep").arg("60").stdin(device).spawn().expect("sleep");
+        let found = holder(Path::new("/dev/full"));
+        child.kill().and_then(|()| child.wait()).expect("end of sleep");
+        assert_eq!(found, Some(format!("sleep (process {})", child.id())));
     }
 }

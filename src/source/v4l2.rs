@@ -18,6 +18,9 @@ use v4l::{Device, Format, FourCC};
 /// One is with us, one is being filled, and two wait in between for as long as the system has other things to do.
 const BUFFERS: u32 = 4;
 
+/// The first picture of this driver is what happens to lie in its buffer, with a fresh time on it.
+const LOOPBACK: &str = "v4l2 loopback";
+
 /// A camera that films.
 pub(super) struct Camera {
     path: PathBuf,
@@ -32,6 +35,8 @@ pub(super) struct Camera {
     stride: usize,
     timeout: Duration,
     clock: Clock,
+    /// Frames still to be left out at the beginning.
+    leave_out: u32,
     damaged: u64,
     stale: u64,
 }
@@ -74,7 +79,8 @@ impl Camera {
             format,
             stride: (granted.stride as usize).max(bytes_per_pixel * size.width as usize),
             timeout: Duration::from_secs_f64(config.timeout_s.clamp(0.001, 1e6)),
-            clock: Clock::started_now(),
+            clock: Clock::default(),
+            leave_out: u32::from(caps.driver == LOOPBACK),
             damaged: 0,
             stale: 0,
         };
@@ -132,6 +138,10 @@ impl Source for Camera {
                 }
                 Err(e) => return Err(SourceError::of_driver(&self.path, "taking a frame", &e)),
             };
+            if self.leave_out > 0 {
+                self.leave_out -= 1;
+                continue;
+            }
             let used = &buffer[..buffer.len().min(meta.bytesused as usize)];
             // A damaged frame's number is not taken in: it shows up as a gap in the count, which it is.
             let bytes = if meta.flags.contains(Flags::ERROR) {
@@ -165,11 +175,11 @@ impl Source for Camera {
 
     fn warnings(&mut self) -> Vec<String> {
         let name = self.path.display();
-        let kinds = [(&mut self.damaged, "damaged by the camera"), (&mut self.stale, "older than the one before")];
+        let kinds = [(&mut self.damaged, "damaged"), (&mut self.stale, "not later than the one before")];
         kinds
             .into_iter()
             .filter(|(count, _)| **count > 0)
-            .map(|(count, what)| format!("{name}: {} frames left out, {what}", std::mem::take(count)))
+            .map(|(count, what)| format!("{name}: frames left out because they were {what}: {}", std::mem::take(count)))
             .collect()
     }
 }
