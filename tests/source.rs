@@ -379,3 +379,24 @@ fn a_jpeg_without_huffman_tables_decodes_as_webcams_send_it() {
     decoder.luma(&stripped, &mut into).expect("the next picture is whole");
     assert_eq!(into, wanted);
 }
+
+#[test]
+fn no_damage_to_a_picture_reaches_the_next_one() {
+    let whole = mjpeg_frame(jpeg(160, 120), 160, 120);
+    let wanted = luma(&whole).expect("whole");
+    let mut decoder = Decoder::new().expect("decoder");
+    let mut refused = 0;
+    for at in 0..whole.bytes.len() {
+        for value in [0x00, 0x7F, 0xFF] {
+            let mut bytes = whole.bytes.clone();
+            let end = (at + 1 + at % 7).min(bytes.len());
+            bytes[at..end].fill(value);
+            let mut into = empty_luma();
+            refused += usize::from(decoder.luma(&mjpeg_frame(bytes, 160, 120), &mut into).is_err());
+            let mut next = empty_luma();
+            decoder.luma(&whole, &mut next).unwrap_or_else(|e| panic!("after damage at {at}: {e}"));
+            assert!(next == wanted, "after damage at {at}");
+        }
+    }
+    assert!(refused * 2 > whole.bytes.len(), "{refused} of {} damages noticed", 3 * whole.bytes.len());
+}

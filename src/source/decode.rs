@@ -32,7 +32,7 @@ impl Decoder {
     /// # Errors
     /// The JPEG library cannot be initialised.
     pub fn new() -> Result<Self, DecodeError> {
-        let jpeg = Decompressor::new().map_err(|e| DecodeError::Unavailable { what: e.to_string() })?;
+        let jpeg = new_jpeg()?;
         let mut scales = Decompressor::supported_scaling_factors();
         scales.retain(|s| s.num() <= s.denom());
         scales.sort_by_key(|s| std::cmp::Reverse(s.scale(1 << 20)));
@@ -97,6 +97,7 @@ impl Decoder {
                 let header = self.jpeg.read_header(&raw.bytes).map_err(|e| self.damaged(raw, e.to_string()))?;
                 let found = Size::new(header.width as u32, header.height as u32);
                 if found != raw.size {
+                    self.renew()?;
                     return Err(DecodeError::SizeChanged { frame, expected: raw.size, found });
                 }
                 return Ok(());
@@ -131,15 +132,20 @@ impl Decoder {
         }
     }
 
-    /// Begins with a new JPEG decoder: the old one keeps the Huffman tables of a damaged picture, and would read every
-    /// later one with them whose camera leaves its tables out.
     fn damaged(&mut self, raw: &RawFrame, what: String) -> DecodeError {
-        match Decompressor::new() {
-            Ok(jpeg) => self.jpeg = jpeg,
-            Err(e) => return DecodeError::Unavailable { what: e.to_string() },
-        }
-        DecodeError::Damaged { frame: raw.sequence, what }
+        self.renew().err().unwrap_or(DecodeError::Damaged { frame: raw.sequence, what })
     }
+
+    /// Takes a new JPEG decoder: the old one keeps the Huffman tables of a damaged picture, and would read every later
+    /// one with them whose camera leaves its tables out.
+    fn renew(&mut self) -> Result<(), DecodeError> {
+        self.jpeg = new_jpeg()?;
+        Ok(())
+    }
+}
+
+fn new_jpeg() -> Result<Decompressor, DecodeError> {
+    Decompressor::new().map_err(|e| DecodeError::Unavailable { what: e.to_string() })
 }
 
 /// Whether the library only complains about a few bytes before the end mark, after the whole picture.
