@@ -157,9 +157,8 @@ impl Video {
         }
     }
 
-    /// The first thing that ffmpeg complained about. Ends the child.
+    /// The first thing that ffmpeg complained about. Ends the child if it runs.
     fn complaint(&mut self) -> Option<String> {
-        // If it has ended by itself, this does nothing.
         let _ = self.child.kill();
         let _ = self.child.wait();
         let mut said = String::new();
@@ -189,8 +188,8 @@ impl Video {
             self.warnings.push(format!("{name}: parts of the clip are damaged (ffmpeg: {complaint})"));
         }
         if self.out_of_order > 0 {
-            let n = self.out_of_order;
-            self.warnings.push(format!("{name}: {n} frames whose time is not later than the one before were left out"));
+            let text = "frames left out because they were not later than the one before";
+            self.warnings.push(format!("{name}: {text}: {}", self.out_of_order));
         }
     }
 }
