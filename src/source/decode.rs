@@ -1,0 +1,189 @@
+//! Raw frames to pictures: luma for the tracker, a small one in colour for the screen.
+
+use crate::model::{Luma, PixelFormat, RawFrame, Rgb, Size};
+use turbojpeg::{Decompressor, Image, ScalingFactor};
+
+/// Some cheap cameras leave a few filling bytes before the end mark of every picture. They are harmless; more of them
+/// are what is left when a damaged picture has been read out of step.
+const FILLING_BYTES: u32 = 8;
+
+/// Why a frame could not be decoded; the source goes on, the next frame may be whole.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DecodeError {
+    /// The frame is damaged: leave it out and count it.
+    #[error("frame {frame} is damaged: {what}")]
+    Damaged { frame: u64, what: String },
+    /// The pictures became larger or smaller: start again, or stop.
+    #[error("frame {frame} is {found}, but {expected} is expected; the picture's size must not change")]
+    SizeChanged { frame: u64, expected: Size, found: Size },
+    /// The decoder itself does not work.
+    #[error("no JPEG decoder: {what}")]
+    Unavailable { what: String },
+}
+
+/// Decodes frame after frame and keeps what it needs for that.
+pub struct Decoder {
+    jpeg: Decompressor,
+    /// Sizes to which a JPEG can be decoded at once, as shares of the full one, largest first, none above 1.
+    scales: Vec<ScalingFactor>,
+}
+
+impl Decoder {
+    /// # Errors
+    /// The JPEG library cannot be initialised.
+    pub fn new() -> Result<Self, DecodeError> {
+        let jpeg = new_jpeg()?;
+        let mut scales = Decompressor::supported_scaling_factors();
+        scales.retain(|s| s.num() <= s.denom());
+        scales.sort_by_key(|s| std::cmp::Reverse(s.scale(1 << 20)));
+        Ok(Self { jpeg, scales })
+    }
+
+    /// Decodes the brightness into `into`. An empty `into` takes the frame's size, and is not allocated again as long
+    /// as that stays; after an error its content means nothing.
+    ///
+    /// # Errors
+    /// The frame is damaged, or its size is not that of `into` or not what the source said.
+    pub fn luma(&mut self, raw: &RawFrame, into: &mut Luma) -> Result<(), DecodeError> {
+        self.check(raw)?;
+        if !into.pixels.is_empty() && into.size != raw.size {
+            return Err(DecodeError::SizeChanged { frame: raw.sequence, expected: into.size, found: raw.size });
+        }
+        into.size = raw.size;
+        into.pixels.resize(raw.size.area(), 0);
+        let pixels = into.pixels.as_mut_slice();
+        match raw.format {
+            PixelFormat::Mjpeg => {
+                self.decompress(raw, ScalingFactor::ONE, raw.size, turbojpeg::PixelFormat::GRAY, pixels)?;
+            }
+            PixelFormat::Yuyv => pixels.iter_mut().zip(raw.bytes.chunks_exact(2)).for_each(|(y, pair)| *y = pair[0]),
+            PixelFormat::Grey => pixels.copy_from_slice(&raw.bytes[..raw.size.area()]),
+            PixelFormat::Rgb24 => pixels.iter_mut().zip(raw.bytes.chunks_exact(3)).for_each(|(y, p)| {
+                // BT.601, the weights that JPEG and YUYV are made with.
+                let [r, g, b] = [p[0], p[1], p[2]].map(u32::from);
+                *y = ((77 * r + 150 * g + 29 * b + 128) >> 8) as u8;
+            }),
+        }
+        Ok(())
+    }
+
+    /// A picture in colour, no wider than `max_width` and else as large as is cheap.
+    ///
+    /// # Errors
+    /// As for [`Decoder::luma`].
+    pub fn preview(&mut self, raw: &RawFrame, max_width: u32) -> Result<Rgb, DecodeError> {
+        self.check(raw)?;
+        let max_width = max_width.max(1);
+        if raw.format != PixelFormat::Mjpeg {
+            return Ok(thin_out(raw.size, max_width, colour_of(raw)));
+        }
+        let fitting = self.scales.iter().find(|s| s.scale(raw.size.width as usize) <= max_width as usize);
+        let scale = fitting.or(self.scales.last()).copied().unwrap_or(ScalingFactor::ONE);
+        let [width, height] = [raw.size.width, raw.size.height].map(|side| scale.scale(side as usize) as u32);
+        let mut rgb = Rgb { size: Size::new(width, height), pixels: vec![0; 3 * Size::new(width, height).area()] };
+        self.decompress(raw, scale, rgb.size, turbojpeg::PixelFormat::RGB, &mut rgb.pixels)?;
+        if width <= max_width {
+            return Ok(rgb);
+        }
+        let wide = rgb.size;
+        Ok(thin_out(wide, max_width, |u, v| rgb.at(u, v)))
+    }
+
+    /// Makes sure that the frame has the size that it says.
+    fn check(&mut self, raw: &RawFrame) -> Result<(), DecodeError> {
+        let frame = raw.sequence;
+        let bytes_per_pixel = match raw.format {
+            PixelFormat::Mjpeg => {
+                let header = self.jpeg.read_header(&raw.bytes).map_err(|e| self.damaged(raw, e.to_string()))?;
+                let found = Size::new(header.width as u32, header.height as u32);
+                if found != raw.size {
+                    self.renew()?;
+                    return Err(DecodeError::SizeChanged { frame, expected: raw.size, found });
+                }
+                return Ok(());
+            }
+            PixelFormat::Yuyv => 2,
+            PixelFormat::Grey => 1,
+            PixelFormat::Rgb24 => 3,
+        };
+        let (is, must) = (raw.bytes.len(), bytes_per_pixel * raw.size.area());
+        if is < must || raw.size.area() == 0 {
+            let what = format!("{is} bytes instead of the {must} of a {} picture", raw.size);
+            return Err(DecodeError::Damaged { frame, what });
+        }
+        Ok(())
+    }
+
+    fn decompress(
+        &mut self,
+        raw: &RawFrame,
+        scale: ScalingFactor,
+        size: Size,
+        format: turbojpeg::PixelFormat,
+        pixels: &mut [u8],
+    ) -> Result<(), DecodeError> {
+        let (width, height) = (size.width as usize, size.height as usize);
+        let output = Image { pixels, width, pitch: width * format.size(), height, format };
+        let done = self.jpeg.set_scaling_factor(scale).and_then(|()| self.jpeg.decompress(&raw.bytes, output));
+        // The library goes on after damage, fills the rest with grey and warns; the crate makes that an error.
+        match done.map_err(|e| e.to_string()) {
+            Err(what) if !is_filling(&what) => Err(self.damaged(raw, what)),
+            _ => Ok(()),
+        }
+    }
+
+    fn damaged(&mut self, raw: &RawFrame, what: String) -> DecodeError {
+        self.renew().err().unwrap_or(DecodeError::Damaged { frame: raw.sequence, what })
+    }
+
+    /// Takes a new JPEG decoder: the old one keeps the Huffman tables of a damaged picture, and would read every later
+    /// one with them whose camera leaves its tables out.
+    fn renew(&mut self) -> Result<(), DecodeError> {
+        self.jpeg = new_jpeg()?;
+        Ok(())
+    }
+}
+
+fn new_jpeg() -> Result<Decompressor, DecodeError> {
+    Decompressor::new().map_err(|e| DecodeError::Unavailable { what: e.to_string() })
+}
+
+/// Whether the library only complains about a few bytes before the end mark, after the whole picture.
+fn is_filling(what: &str) -> bool {
+    let Some((before, mark)) = what.split_once(" extraneous bytes before marker ") else { return false };
+    let count = before.rsplit(' ').next().and_then(|n| n.parse().ok());
+    mark.starts_with("0xd9") && count.is_some_and(|n: u32| n <= FILLING_BYTES)
+}
+
+/// Every n-th pixel of a picture, so that it is no wider than `max_width`.
+fn thin_out(size: Size, max_width: u32, colour: impl Fn(u32, u32) -> [u8; 3]) -> Rgb {
+    let step = size.width.div_ceil(max_width).max(1);
+    let small = Size::new(size.width.div_ceil(step), size.height.div_ceil(step));
+    let mut pixels = Vec::with_capacity(3 * small.area());
+    for v in (0..size.height).step_by(step as usize) {
+        for u in (0..size.width).step_by(step as usize) {
+            pixels.extend_from_slice(&colour(u, v));
+        }
+    }
+    Rgb { size: small, pixels }
+}
+
+/// Colour of a pixel of a frame that is not compressed.
+fn colour_of(raw: &RawFrame) -> impl Fn(u32, u32) -> [u8; 3] {
+    let (width, bytes, format) = (raw.size.width as usize, raw.bytes.as_slice(), raw.format);
+    move |u, v| {
+        let i = v as usize * width + u as usize;
+        match format {
+            PixelFormat::Rgb24 => [bytes[3 * i], bytes[3 * i + 1], bytes[3 * i + 2]],
+            PixelFormat::Yuyv => {
+                // A pair of pixels shares U and V. An odd width does not occur: source and ffmpeg see to it.
+                let pair = 4 * (i / 2);
+                let shift = |k: usize| f32::from(bytes.get(pair + k).copied().unwrap_or(128)) - 128.0;
+                let (y, cb, cr) = (1.164 * (f32::from(bytes[2 * i]) - 16.0), shift(1), shift(3));
+                // BT.601 with the limited range of video; `as u8` saturates.
+                [y + 1.596 * cr, y - 0.392 * cb - 0.813 * cr, y + 2.017 * cb].map(|c| (c + 0.5) as u8)
+            }
+            PixelFormat::Grey | PixelFormat::Mjpeg => [bytes[i]; 3],
+        }
+    }
+}
