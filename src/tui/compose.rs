@@ -20,6 +20,8 @@ pub fn image_size(snapshot: &Snapshot) -> Option<Size> {
 pub fn picture(snapshot: &Snapshot, drawing: Option<&Drawing>, placed: &Placed, theme: Theme) -> Option<Raster> {
     let mut raster = Raster::scaled(snapshot.preview.as_deref()?, placed.dots)?;
     let fine = (placed.dots.width / 320) as i64;
+    // In a coarse picture the points lie side by side and would hide the tree.
+    let cover = if placed.dots.width < 100 { 0.6 } else { 1.0 };
     let marked = !snapshot.points.is_empty() || drawing.is_some();
     if marked {
         // The points must stand out from a sunlit tree.
@@ -32,7 +34,11 @@ pub fn picture(snapshot: &Snapshot, drawing: Option<&Drawing>, placed: &Placed, 
             raster.line(placed.dot_from_pixel(a), placed.dot_from_pixel(b), fine, DRAWN);
         }
         for p in points {
-            mark(&mut raster, placed, *p, fine + 1, DRAWN);
+            // In a coarse picture a corner with a border would hide what it is set on.
+            if fine > 0 {
+                mark(&mut raster, placed, *p, fine + 1, DRAWN, 1.0);
+            }
+            mark(&mut raster, placed, *p, fine, CURSOR, 1.0);
         }
         if let Some(cursor) = drawing.cursor_px() {
             cross(&mut raster, placed, cursor, fine);
@@ -43,7 +49,7 @@ pub fn picture(snapshot: &Snapshot, drawing: Option<&Drawing>, placed: &Placed, 
         raster.line(placed.dot_from_pixel(a), placed.dot_from_pixel(b), fine / 2, OUTLINE);
     }
     for ([u, v], branch) in &snapshot.points {
-        mark(&mut raster, placed, [*u as f64, *v as f64], fine, theme.branch_rgb(*branch));
+        mark(&mut raster, placed, [*u as f64, *v as f64], fine, theme.branch_rgb(*branch), cover);
     }
     Some(raster)
 }
@@ -95,10 +101,13 @@ fn edges(points: &[[f64; 2]], closed: bool) -> impl Iterator<Item = ([f64; 2], [
     (0..n).map(|i| (points[i], points[(i + 1) % points.len()]))
 }
 
-fn mark(raster: &mut Raster, placed: &Placed, pixel: [f64; 2], radius: i64, colour: [u8; 3]) {
+fn mark(raster: &mut Raster, placed: &Placed, pixel: [f64; 2], radius: i64, colour: [u8; 3], cover: f64) {
     let [x, y] = placed.dot_from_pixel(pixel);
     if x.is_finite() && y.is_finite() {
-        raster.dot(x.floor() as i64, y.floor() as i64, radius, colour);
+        let (x, y) = (x.floor() as i64, y.floor() as i64);
+        let below = raster.at(x.max(0) as u32, y.max(0) as u32);
+        let mixed = [0, 1, 2].map(|c| (cover * colour[c] as f64 + (1.0 - cover) * below[c] as f64) as u8);
+        raster.dot(x, y, radius, mixed);
     }
 }
 

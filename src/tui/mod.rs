@@ -32,7 +32,8 @@ use ratatui::Terminal;
 use ratatui::backend::CrosstermBackend;
 use ratatui::crossterm::event;
 use state::State;
-use std::io::{IsTerminal, stdout};
+use std::io::{IsTerminal, Stdout, stdout};
+use std::mem::ManuallyDrop;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -100,7 +101,8 @@ pub fn run(session: &mut dyn Session, options: Options, stop: &AtomicBool) -> Re
     let mut guard = Guard::enter().map_err(TuiError::Unusable)?;
     let graphics = Graphics::ask(&tty, options.preview, options.depth, ASK).map_err(TuiError::Unusable)?;
     guard.set_farewell(graphics.farewell());
-    let terminal = Terminal::new(CrosstermBackend::new(stdout())).map_err(TuiError::Unusable)?;
+    // ratatui's own drop complains on standard error, which panics when the terminal has gone; the guard does its work.
+    let terminal = Terminal::new(CrosstermBackend::new(stdout())).map(ManuallyDrop::new).map_err(TuiError::Unusable)?;
     let deaf_until = Instant::now() + if graphics.late { DEAF } else { Duration::ZERO };
     let theme = Theme::new(options.depth);
     let mut screen =
@@ -120,7 +122,7 @@ pub fn run(session: &mut dyn Session, options: Options, stop: &AtomicBool) -> Re
 }
 
 struct Screen {
-    terminal: Terminal<CrosstermBackend<std::io::Stdout>>,
+    terminal: ManuallyDrop<Terminal<CrosstermBackend<Stdout>>>,
     guard: Guard,
     tty: Tty,
     theme: Theme,

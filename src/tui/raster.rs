@@ -28,13 +28,13 @@ impl Raster {
         for y in 0..size.height {
             let rows = span(y, size.height, from.size.height);
             for columns in &columns {
-                let mut sum = [0u32; 3];
+                let mut sum = [0u64; 3];
                 for row in rows.clone() {
                     for p in from.pixels[row * stride..][3 * columns.start..3 * columns.end].chunks_exact(3) {
-                        (0..3).for_each(|c| sum[c] += p[c] as u32);
+                        (0..3).for_each(|c| sum[c] += p[c] as u64);
                     }
                 }
-                let n = (rows.len() * columns.len()) as u32;
+                let n = (rows.len() * columns.len()) as u64;
                 pixels.extend(sum.map(|s| (s / n) as u8));
             }
         }
@@ -43,8 +43,7 @@ impl Raster {
 
     /// The colour of a dot; black outside.
     pub fn at(&self, x: u32, y: u32) -> [u8; 3] {
-        let i = self.index(x as i64, y as i64);
-        i.map_or([0; 3], |i| [self.pixels[i], self.pixels[i + 1], self.pixels[i + 2]])
+        self.index(x as i64, y as i64).map_or([0; 3], |i| [self.pixels[i], self.pixels[i + 1], self.pixels[i + 2]])
     }
 
     /// Makes every dot darker, by `share` of its brightness.

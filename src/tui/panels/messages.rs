@@ -11,7 +11,7 @@ use ratatui::widgets::Paragraph;
 
 /// The newest messages, whole as far as there is room; the newest brightest.
 pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
-    let room = area.width.saturating_sub(3) as usize;
+    let room = area.width.saturating_sub(4) as usize;
     // Collected from the newest back, last line first, as that is what must be kept.
     let mut lines: Vec<Line> = Vec::new();
     for (age, message) in state.messages().rev().enumerate() {
@@ -25,13 +25,15 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
             wrapped.truncate(left);
             wrapped.iter_mut().skip(left - 1).for_each(|line| line.push('…'));
         }
-        let (mark, style) = if age == 0 { ("▸ ", theme.strong()) } else { ("· ", theme.faint()) };
+        let (mark, style) = if age == 0 { (" ▸ ", theme.strong()) } else { (" · ", theme.faint()) };
         for (i, text) in wrapped.into_iter().enumerate().rev() {
-            lines.push(Line::styled(format!("{}{text}", if i == 0 { mark } else { "  " }), style));
+            lines.push(Line::styled(format!("{}{text}", if i == 0 { mark } else { "   " }), style));
         }
     }
     lines.reverse();
-    frame.render_widget(Paragraph::new(lines), area);
+    // At the bottom, so that the newest is always in the same place.
+    let height = (lines.len() as u16).min(area.height);
+    frame.render_widget(Paragraph::new(lines), Rect { y: area.bottom() - height, height, ..area });
 }
 
 /// Keys that mean something now.

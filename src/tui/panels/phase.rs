@@ -24,8 +24,9 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         Layout::horizontal([Constraint::Length(way.width() as u16 + 1), Constraint::Min(0)]).areas(area);
     frame.render_widget(way, left);
 
-    // A NaN counts as nothing done; the gauge refuses what lies outside 0 to 1.
-    let done = state.snapshot.progress.max(0.0).min(1.0);
+    // The gauge refuses what lies outside 0 to 1.
+    let progress = state.snapshot.progress;
+    let done = if progress.is_nan() { 0.0 } else { progress.clamp(0.0, 1.0) };
     let gauge = LineGauge::default()
         .ratio(done)
         .label(format!("{:3.0} %", 100.0 * done))

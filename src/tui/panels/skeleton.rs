@@ -6,10 +6,13 @@ use crate::tui::state::State;
 use crate::tui::theme::Theme;
 use nalgebra::Point3;
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::layout::{Constraint, Direction, Layout, Rect};
 use ratatui::style::Color;
 use ratatui::symbols::Marker;
 use ratatui::widgets::canvas::{Canvas, Line};
+
+/// A panel, and which coordinate it shows from left to right.
+type View = (Rect, fn(&Point3<f64>) -> f64);
 
 /// Both views in the same scale, or what they wait for.
 pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
@@ -19,13 +22,21 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         waiting(frame, inner, &reason(s), theme);
         return;
     };
-    let [left, right] = Layout::horizontal([Constraint::Fill(1), Constraint::Fill(1)]).spacing(1).areas(area);
-    let views: [(Rect, fn(&Point3<f64>) -> f64); 2] = [
-        (titled(frame, left, "Front", theme), |p: &Point3<f64>| p.x),
-        (titled(frame, right, "Side", theme), |p: &Point3<f64>| p.z),
-    ];
     let Some(bounds) = Bounds::of(skeleton) else { return };
-    let unit = views.iter().enumerate().map(|(i, (room, _))| bounds.unit(i, *room)).fold(0.0, f64::max);
+    // Side by side or one above the other, as the tree comes out larger.
+    let arrange = |direction: Direction| {
+        let layout = Layout::new(direction, [Constraint::Fill(1), Constraint::Fill(1)]).spacing(match direction {
+            Direction::Horizontal => 1,
+            Direction::Vertical => 0,
+        });
+        let areas: [Rect; 2] = layout.areas(area);
+        let unit = [0, 1].map(|i| bounds.unit(i, areas[i])).into_iter().fold(0.0, f64::max);
+        (areas, unit)
+    };
+    let (beside, above) = (arrange(Direction::Horizontal), arrange(Direction::Vertical));
+    let ([first, second], unit) = if above.1 < beside.1 { above } else { beside };
+    let views: [View; 2] =
+        [(titled(frame, first, "Front", theme), |p| p.x), (titled(frame, second, "Side", theme), |p| p.z)];
     let branches = branches(s, skeleton, theme);
     for (i, (room, across)) in views.into_iter().enumerate() {
         let ([x, y], [w, h]) = (bounds.middle(i), [room.width as f64 * 2.0 * unit, room.height as f64 * 4.0 * unit]);
@@ -95,11 +106,11 @@ impl Bounds {
         Some(Self { low, high })
     }
 
-    /// Least size of a dot in view `i` with which the tree fits into the room.
-    fn unit(&self, i: usize, room: Rect) -> f64 {
+    /// Least size of a dot in view `i` with which the tree fits into the panel below its title.
+    fn unit(&self, i: usize, panel: Rect) -> f64 {
         let axis = [0, 2][i];
-        let across = (self.high[axis] - self.low[axis]) / (2.0 * room.width.max(1) as f64);
-        let up = (self.high.y - self.low.y) / (4.0 * room.height.max(1) as f64);
+        let across = (self.high[axis] - self.low[axis]) / (2.0 * panel.width.max(1) as f64);
+        let up = (self.high.y - self.low.y) / (4.0 * panel.height.saturating_sub(1).max(1) as f64);
         let unit = Self::MARGIN * across.max(up);
         // A tree without extent is drawn as what it is, a dot.
         if unit.is_finite() && unit > 1e-9 { unit } else { 1.0 }

@@ -90,7 +90,8 @@ fn no_state_and_no_size_brings_it_down() {
 
 #[test]
 fn branches_are_coloured_alike_in_picture_table_and_tree() {
-    let screen = drawn(&state(snapshot(Phase::Live)), Depth::True, 200, 60);
+    // So wide that the points are not mixed with the picture.
+    let screen = drawn(&state(snapshot(Phase::Live)), Depth::True, 300, 100);
     let theme = Theme::new(Depth::True);
     for branch in 0..3 {
         let colour = theme.branch(Some(branch));
