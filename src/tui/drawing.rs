@@ -1,0 +1,118 @@
+//! An outline while the user draws it.
+
+/// Points set so far, in picture pixels, and the keyboard's cursor once an arrow key was used.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Drawing {
+    points_px: Vec<[f64; 2]>,
+    cursor_px: Option<[f64; 2]>,
+}
+
+impl Drawing {
+    /// The corners set so far.
+    pub fn points_px(&self) -> &[[f64; 2]] {
+        &self.points_px
+    }
+
+    /// Where the keyboard's cursor stands.
+    pub fn cursor_px(&self) -> Option<[f64; 2]> {
+        self.cursor_px
+    }
+
+    /// Puts the keyboard's cursor somewhere.
+    pub fn set_cursor(&mut self, pixel: [f64; 2]) {
+        self.cursor_px = Some(pixel);
+    }
+
+    /// Adds a corner; the same place twice running is one corner.
+    pub fn add(&mut self, pixel: [f64; 2]) {
+        if self.points_px.last() != Some(&pixel) {
+            self.points_px.push(pixel);
+        }
+    }
+
+    /// Takes the last corner back; whether there was one.
+    pub fn take_back(&mut self) -> bool {
+        self.points_px.pop().is_some()
+    }
+
+    /// The finished polygon, not repeating its first point.
+    ///
+    /// # Errors
+    /// What is wrong with it, for the user to read.
+    pub fn close(&self) -> Result<Vec<[f64; 2]>, &'static str> {
+        let mut polygon = self.points_px.clone();
+        // A click on the first corner is a natural way to say "closed".
+        if polygon.len() > 1 && polygon.first() == polygon.last() {
+            polygon.pop();
+        }
+        if polygon.len() < 3 {
+            return Err("An outline needs at least 3 points; go on, or leave with Esc.");
+        }
+        if crosses_itself(&polygon) {
+            return Err("The outline crosses itself; take points back with Backspace.");
+        }
+        Ok(polygon)
+    }
+}
+
+/// Whether two sides of the polygon meet elsewhere than in a common corner.
+fn crosses_itself(polygon: &[[f64; 2]]) -> bool {
+    let n = polygon.len();
+    let side = |i: usize| (polygon[i], polygon[(i + 1) % n]);
+    (0..n).any(|i| {
+        let (a, b) = side(i);
+        let (_, c) = side((i + 1) % n);
+        // A side that runs back over the one before it encloses nothing.
+        let back = turn(a, b, c) == 0.0 && (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1]) < 0.0;
+        back || (i + 2..n).filter(|j| (j + 1) % n != i).any(|j| meet(side(i), side(j)))
+    })
+}
+
+type Side = ([f64; 2], [f64; 2]);
+
+fn meet((a, b): Side, (c, d): Side) -> bool {
+    let (s1, s2, s3, s4) = (turn(a, b, c), turn(a, b, d), turn(c, d, a), turn(c, d, b));
+    let opposite = |x: f64, y: f64| (x > 0.0 && y < 0.0) || (x < 0.0 && y > 0.0);
+    (opposite(s1, s2) && opposite(s3, s4))
+        || (s1 == 0.0 && between(a, b, c))
+        || (s2 == 0.0 && between(a, b, d))
+        || (s3 == 0.0 && between(c, d, a))
+        || (s4 == 0.0 && between(c, d, b))
+}
+
+/// Twice the signed area of a triangle; clicks lie on a grid, so a straight run rounds to nearly zero.
+fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+    let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    if area.abs() < 1e-6 { 0.0 } else { area }
+}
+
+/// Whether `p`, known to lie on the line through `a` and `b`, lies between them.
+fn between(a: [f64; 2], b: [f64; 2], p: [f64; 2]) -> bool {
+    (0..2).all(|i| p[i] >= a[i].min(b[i]) - 1e-9 && p[i] <= a[i].max(b[i]) + 1e-9)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn closes_what_encloses_something() {
+        let cases: [(&str, &[[f64; 2]], bool); 9] = [
+            ("nothing", &[], false),
+            ("a line", &[[0.0, 0.0], [9.0, 9.0]], false),
+            ("a triangle", &[[0.0, 0.0], [9.0, 0.0], [0.0, 9.0]], true),
+            ("there and back", &[[0.0, 0.0], [9.0, 0.0], [4.0, 0.0]], false),
+            ("a bow tie", &[[0.0, 0.0], [9.0, 9.0], [9.0, 0.0], [0.0, 9.0]], false),
+            ("a straight run in a side", &[[0.0, 0.0], [4.0, 0.0], [9.0, 0.0], [9.0, 9.0], [0.0, 9.0]], true),
+            ("a notch", &[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [5.0, 2.0], [0.0, 9.0]], true),
+            ("a corner on a side", &[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [5.0, 0.0], [0.0, 9.0]], false),
+            ("closed by hand", &[[0.0, 0.0], [9.0, 0.0], [0.0, 9.0], [0.0, 0.0]], true),
+        ];
+        for (name, points, good) in cases {
+            let mut drawing = Drawing::default();
+            points.iter().for_each(|p| drawing.add(*p));
+            let closed = drawing.close();
+            assert_eq!(closed.is_ok(), good, "{name}: {closed:?}");
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! Where each panel lies.
+
+use crate::model::Size;
+use ratatui::layout::{Constraint, Layout, Rect};
+
+/// Smallest window in which the screen makes sense.
+pub const SMALLEST: (u16, u16) = (60, 16);
+
+/// The panels' places; none overlaps another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Areas {
+    pub header: Rect,
+    pub phase: Rect,
+    pub preview: Rect,
+    pub branches: Rect,
+    pub camera: Rect,
+    pub tracks: Rect,
+    pub skeleton: Rect,
+    pub messages: Rect,
+    pub keys: Rect,
+}
+
+impl Areas {
+    /// Divides the window, giving the picture the height that it needs; `None` for a window that is too small.
+    /// `cell_dots` are the dots of a cell in which the picture will be drawn, across and down.
+    pub fn new(window: Rect, image: Option<Size>, cell_dots: (u16, u16)) -> Option<Self> {
+        if window.width < SMALLEST.0 || window.height < SMALLEST.1 {
+            return None;
+        }
+        let roomy = window.height >= 32;
+        let [header, phase, body, messages, keys] = Layout::vertical([
+            Constraint::Length(1),
+            Constraint::Length(1),
+            Constraint::Min(1),
+            Constraint::Length(if roomy { 4 } else { 2 }),
+            Constraint::Length(1),
+        ])
+        .areas(window);
+        let left_width = (body.width as u32 * 58 / 100) as u16;
+        let [left, _, right] =
+            Layout::horizontal([Constraint::Length(left_width), Constraint::Length(1), Constraint::Min(1)]).areas(body);
+
+        // One line of title; at least the table's head and some rows must stay below the picture.
+        let table_least = if roomy { 8 } else { (body.height / 4).max(3) };
+        let wanted = image.map_or(body.height, |image| rows_needed(image, left.width, cell_dots)).saturating_add(1);
+        let preview_height = wanted.min(body.height.saturating_sub(table_least));
+        let [preview, branches] =
+            Layout::vertical([Constraint::Length(preview_height), Constraint::Min(1)]).areas(left);
+
+        let tracks_height = if roomy { 6 } else { 3 };
+        let [camera, tracks, skeleton] = Layout::vertical([
+            Constraint::Length(if body.height < 16 { 6 } else { 7 }),
+            Constraint::Length(tracks_height),
+            Constraint::Min(1),
+        ])
+        .areas(right);
+        Some(Self { header, phase, preview, branches, camera, tracks, skeleton, messages, keys })
+    }
+}
+
+/// Rows of cells that a picture takes when it is as wide as the column.
+fn rows_needed(image: Size, columns: u16, cell_dots: (u16, u16)) -> u16 {
+    let dots_wide = columns as f64 * cell_dots.0 as f64;
+    let rows = dots_wide * image.height as f64 / image.width.max(1) as f64 / cell_dots.1.max(1) as f64;
+    rows.ceil().min(10_000.0) as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn panels_fill_the_window_without_overlap() {
+        for (width, height) in [(60, 16), (80, 24), (81, 31), (120, 40), (200, 60), (400, 20), (65, 200)] {
+            for image in [None, Some(Size::new(640, 360)), Some(Size::new(1, 10_000)), Some(Size::new(10_000, 1))] {
+                let window = Rect::new(0, 0, width, height);
+                let a = Areas::new(window, image, (1, 2)).unwrap();
+                let all =
+                    [a.header, a.phase, a.preview, a.branches, a.camera, a.tracks, a.skeleton, a.messages, a.keys];
+                for (i, one) in all.iter().enumerate() {
+                    assert!(!one.is_empty() && window.union(*one) == window, "{i} at {width}x{height}: {one:?}");
+                    for other in &all[i + 1..] {
+                        assert!(!one.intersects(*other), "{one:?} and {other:?} at {width}x{height}");
+                    }
+                }
+            }
+        }
+        for (width, height) in [(0, 0), (1, 1), (59, 60), (200, 15)] {
+            assert_eq!(Areas::new(Rect::new(0, 0, width, height), None, (1, 2)), None);
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! The screen of a running capture: what is filmed, how well it goes, the tree as it moves, and keys to steer it.
+//!
+//! The screen reads immutable [`Snapshot`]s and sends [`Control`]s through a [`Session`]; it knows nothing of the
+//! pipeline and starts no thread. [`run`] blocks the calling thread until the capture has ended.
+
+mod compose;
+mod drawing;
+mod format;
+mod graphics;
+mod guard;
+mod input;
+mod layout;
+mod panels;
+mod placed;
+mod progress;
+mod raster;
+mod screen;
+mod state;
+#[cfg(test)]
+mod tests;
+mod theme;
+mod tty;
+
+pub use graphics::Preview;
+pub use progress::Progress;
+pub use theme::Depth;
+
+use crate::model::{Control, Snapshot};
+use graphics::Graphics;
+use guard::Guard;
+use ratatui::Terminal;
+use ratatui::backend::CrosstermBackend;
+use ratatui::crossterm::event;
+use state::State;
+use std::io::{IsTerminal, Stdout, stdout};
+use std::mem::ManuallyDrop;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use theme::Theme;
+use tty::{Input, Tty};
+
+/// Time between two redraws.
+const TICK: Duration = Duration::from_millis(50);
+/// Time that the terminal has to say what it can show; even a slow network answers within it.
+const ASK: Duration = Duration::from_millis(400);
+/// Time for which a terminal that did not answer is not listened to.
+const DEAF: Duration = Duration::from_millis(1500);
+
+/// The screen's side of a running capture.
+pub trait Session {
+    /// Newest state, `None` if none is newer than the last one taken.
+    fn latest(&mut self) -> Option<Arc<Snapshot>>;
+    /// Passes on what the user wants.
+    fn send(&mut self, wish: Control);
+    /// The capture has ended (source over and files written, or failed): the screen is left.
+    fn finished(&self) -> bool;
+}
+
+/// What the user may choose about the screen.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    pub preview: Preview,
+    pub depth: Depth,
+}
+
+impl Options {
+    /// `ARBORCAM_PREVIEW` is `halfblocks`, `kitty`, `sixel`, `iterm2` or anything else for automatic; colours follow
+    /// `NO_COLOR`, `COLORTERM` and `TERM`.
+    pub fn from_env() -> Self {
+        let preview = match std::env::var("ARBORCAM_PREVIEW").unwrap_or_default().to_lowercase().as_str() {
+            "halfblocks" => Preview::HalfBlocks,
+            "kitty" => Preview::Kitty,
+            "sixel" => Preview::Sixel,
+            "iterm2" => Preview::Iterm2,
+            _ => Preview::Auto,
+        };
+        Self { preview, depth: Depth::from_env() }
+    }
+}
+
+/// Why there is no screen.
+#[derive(Debug, thiserror::Error)]
+pub enum TuiError {
+    #[error("there is no terminal to draw on; use --headless")]
+    NoTerminal(#[source] Option<std::io::Error>),
+    #[error("cannot prepare the terminal: {0}; use --headless")]
+    Unusable(#[source] std::io::Error),
+}
+
+/// Shows the capture until it has ended, `stop` is set, the terminal has gone or some thread has panicked; in all but
+/// the first case [`Control::Quit`] is sent before. The terminal is then as it was.
+///
+/// # Errors
+/// There is no terminal, or it cannot be prepared. Nothing has been sent then.
+pub fn run(session: &mut dyn Session, options: Options, stop: &AtomicBool) -> Result<(), TuiError> {
+    if !stdout().is_terminal() {
+        return Err(TuiError::NoTerminal(None));
+    }
+    let tty = Tty::open().map_err(|e| TuiError::NoTerminal(Some(e)))?;
+    let mut guard = Guard::enter().map_err(TuiError::Unusable)?;
+    let graphics = Graphics::ask(&tty, options.preview, options.depth, ASK).map_err(TuiError::Unusable)?;
+    guard.set_farewell(graphics.farewell());
+    // ratatui's own drop complains on standard error, which panics when the terminal has gone; the guard does its work.
+    let terminal = Terminal::new(CrosstermBackend::new(stdout())).map(ManuallyDrop::new).map_err(TuiError::Unusable)?;
+    let deaf_until = Instant::now() + if graphics.late { DEAF } else { Duration::ZERO };
+    let theme = Theme::new(options.depth);
+    let mut screen =
+        Screen { terminal, guard, tty, theme, deaf_until, preview: panels::preview::Preview::new(graphics) };
+    let mut state = State::default();
+    while !session.finished() {
+        if let Some(snapshot) = session.latest() {
+            state.take(snapshot);
+        }
+        let gone = stop.load(Ordering::SeqCst) || screen.step(&mut state, session).is_none();
+        if gone {
+            session.send(Control::Quit);
+            break;
+        }
+    }
+    Ok(())
+}
+
+struct Screen {
+    terminal: ManuallyDrop<Terminal<CrosstermBackend<Stdout>>>,
+    guard: Guard,
+    tty: Tty,
+    theme: Theme,
+    deaf_until: Instant,
+    preview: panels::preview::Preview,
+}
+
+impl Screen {
+    /// Draws once and passes on what the user does until the next redraw is due; `None` when the terminal has gone.
+    fn step(&mut self, state: &mut State, session: &mut dyn Session) -> Option<()> {
+        let began = Instant::now();
+        {
+            let _lock = self.guard.writing()?;
+            self.terminal.draw(|frame| screen::render(frame, state, self.theme, &mut self.preview)).ok()?;
+        }
+        self.preview.drawn(began, Instant::now());
+        state.tick();
+        match self.tty.wait(TICK.saturating_sub(began.elapsed())) {
+            Input::Gone => return None,
+            Input::Quiet => {}
+            // crossterm may leave bytes unread until more come; without a pause that would be a busy loop.
+            Input::Ready if self.listen(state, session)? == 0 => std::thread::sleep(TICK / 5),
+            Input::Ready => {}
+        }
+        self.guard.set_mouse(state.drawing.is_some()).ok()
+    }
+
+    /// Handles every event that has come; how many there were.
+    fn listen(&mut self, state: &mut State, session: &mut dyn Session) -> Option<usize> {
+        let mut heard = 0;
+        while event::poll(Duration::ZERO).ok()? {
+            let event = event::read().ok()?;
+            heard += 1;
+            if Instant::now() < self.deaf_until {
+                continue;
+            }
+            if let Some(wish) = input::handle(&event, state, self.preview.placed.as_ref()) {
+                session.send(wish);
+            }
+        }
+        Some(heard)
+    }
+}

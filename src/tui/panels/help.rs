@@ -1,0 +1,35 @@
+//! The help, laid over everything else.
+
+use crate::tui::input::{DRAWING, WATCHING};
+use crate::tui::theme::Theme;
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Rect};
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Block, Clear, Padding, Paragraph};
+
+/// All keys, from the same tables that they are read with.
+pub fn render(frame: &mut Frame, area: Rect, theme: Theme) {
+    let row = |key: &'static str, help: &'static str| {
+        Line::from(vec![Span::styled(format!("{key:<10}"), theme.title()), Span::raw(help)])
+    };
+    let mut lines: Vec<Line> = WATCHING.iter().map(|b| row(b.shown, b.help)).collect();
+    lines.push(Line::styled("While an outline is drawn", theme.faint()));
+    lines.push(row("click", "sets a point"));
+    lines.extend(DRAWING.iter().filter(|b| !b.help.is_empty()).map(|b| row(b.shown, b.help)));
+    let (width, height) = (62, lines.len() as u16 + 2);
+    let area = area.centered(Constraint::Length(width), Constraint::Length(height));
+    let block = Block::bordered()
+        .title(" Keys ")
+        .title_style(theme.title())
+        .border_style(theme.title())
+        .padding(Padding::horizontal(1));
+    frame.render_widget(Clear, area);
+    frame.render_widget(Paragraph::new(lines).block(block), area);
+}
+
+/// What is said in a window in which nothing can be shown.
+pub fn too_small(frame: &mut Frame, (width, height): (u16, u16), area: Rect) {
+    let text = format!("arborcam needs {width}x{height} characters; enlarge the window. q ends.");
+    let lines: Vec<Line> = crate::tui::format::wrap(&text, area.width as usize).into_iter().map(Line::from).collect();
+    frame.render_widget(Paragraph::new(lines), area);
+}

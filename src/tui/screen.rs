@@ -1,0 +1,30 @@
+//! The whole screen: each panel in its place.
+
+use super::layout::{Areas, SMALLEST};
+use super::panels::preview::Preview;
+use super::panels::{branches, camera, header, help, messages, phase, preview, skeleton, tracks};
+use super::state::State;
+use super::theme::Theme;
+use ratatui::Frame;
+
+/// Draws everything.
+pub fn render(frame: &mut Frame, state: &State, theme: Theme, picture: &mut Preview) {
+    let window = frame.area();
+    let Some(areas) = Areas::new(window, Preview::image(state), picture.graphics.cell_dots) else {
+        picture.placed = None;
+        help::too_small(frame, SMALLEST, window);
+        return;
+    };
+    header::render(frame, state, areas.header, theme);
+    phase::render(frame, state, areas.phase, theme);
+    preview::render(frame, state, areas.preview, theme, picture);
+    branches::render(frame, state, areas.branches, theme);
+    camera::render(frame, state, areas.camera, theme);
+    tracks::render(frame, state, areas.tracks, theme);
+    skeleton::render(frame, state, areas.skeleton, theme);
+    messages::render(frame, state, areas.messages, theme);
+    messages::keys(frame, state, areas.keys, theme);
+    if state.help {
+        help::render(frame, window, theme);
+    }
+}

@@ -1,0 +1,158 @@
+//! What keys and clicks do.
+
+use super::made_up::snapshot;
+use crate::model::{Control, Phase, Size, Snapshot};
+use crate::tui::input::handle;
+use crate::tui::placed::Placed;
+use crate::tui::state::State;
+use ratatui::crossterm::event::{Event, KeyCode, KeyEvent, KeyModifiers, MouseButton, MouseEvent, MouseEventKind};
+use ratatui::layout::Rect;
+use std::sync::Arc;
+
+fn key(code: KeyCode) -> Event {
+    Event::Key(KeyEvent::new(code, KeyModifiers::NONE))
+}
+
+fn letter(c: char) -> Event {
+    key(KeyCode::Char(c))
+}
+
+fn ctrl(c: char) -> Event {
+    Event::Key(KeyEvent::new(KeyCode::Char(c), KeyModifiers::CONTROL))
+}
+
+fn click(column: u16, row: u16) -> Event {
+    let kind = MouseEventKind::Down(MouseButton::Left);
+    Event::Mouse(MouseEvent { kind, column, row, modifiers: KeyModifiers::NONE })
+}
+
+/// A 640x360 picture at ten pixels a dot: 64 columns from column 3 on, 18 rows from row 4 on, bars above and below.
+fn wide() -> Placed {
+    Placed::fit(Size::new(640, 360), Rect::new(3, 2, 64, 22), (1, 2)).unwrap()
+}
+
+/// The same at twenty pixels a dot with bars at the sides: 32 columns from column 13 on, 9 rows from row 1 on.
+fn narrow() -> Placed {
+    Placed::fit(Size::new(640, 360), Rect::new(5, 1, 48, 9), (1, 2)).unwrap()
+}
+
+struct Run {
+    state: State,
+    sent: Vec<Control>,
+}
+
+/// Plays events one after the other on a live capture.
+fn play(placed: Option<Placed>, events: &[Event]) -> Run {
+    let mut state = State::default();
+    state.take(Arc::new(snapshot(Phase::Live)));
+    let sent = events.iter().filter_map(|e| handle(e, &mut state, placed.as_ref())).collect();
+    Run { state, sent }
+}
+
+#[test]
+fn keys_send_what_they_say() {
+    use Control::{BuildNow, Export, Pause, Quit, Restart};
+    for (events, expected) in [
+        (vec![letter('q')], vec![Quit]),
+        (vec![ctrl('c')], vec![Quit]),
+        (vec![letter('q'), letter('q'), ctrl('c'), letter('b'), letter('o')], vec![Quit]),
+        (vec![letter(' ')], vec![Pause(true)]),
+        (vec![letter(' '), letter(' ')], vec![Pause(true), Pause(false)]),
+        (vec![letter('b'), letter('r'), letter('e')], vec![BuildNow, Restart, Export]),
+        (vec![letter('?'), letter('b')], vec![BuildNow]),
+        (vec![letter('x'), key(KeyCode::Esc), key(KeyCode::Enter), ctrl('q'), click(9, 9)], vec![]),
+        // While drawing, space sets a point and the other keys still work.
+        (vec![letter('o'), letter(' '), letter('e')], vec![Export]),
+    ] {
+        assert_eq!(play(Some(wide()), &events).sent, expected, "{events:?}");
+    }
+}
+
+#[test]
+fn clicks_make_a_polygon_of_the_pixels_below_them() {
+    for (placed, clicks, polygon) in [
+        (wide(), [(3, 4), (66, 4), (35, 21)], [[4.5, 9.5], [634.5, 9.5], [324.5, 349.5]]),
+        (narrow(), [(13, 1), (44, 1), (29, 9)], [[9.5, 19.5], [629.5, 19.5], [329.5, 339.5]]),
+    ] {
+        let mut events = vec![letter('o')];
+        events.extend(clicks.map(|(column, row)| click(column, row)));
+        events.push(key(KeyCode::Enter));
+        let run = play(Some(placed), &events);
+        assert_eq!(run.sent, [Control::SetOutline(polygon.to_vec())]);
+        assert_eq!(run.state.drawing, None);
+    }
+}
+
+#[test]
+fn drawing_stays_until_it_is_good_or_left() {
+    let (a, b, c) = (click(13, 1), click(44, 1), click(29, 9));
+    let (enter, esc, back) = (key(KeyCode::Enter), key(KeyCode::Esc), key(KeyCode::Backspace));
+    // Points left in the drawing (none: not drawing any more), outlines sent, and what the user is told last.
+    for (events, points, sent, told) in [
+        (vec![enter.clone()], Some(0), 0, "at least 3 points"),
+        (vec![a.clone(), b.clone(), enter.clone()], Some(2), 0, "at least 3 points"),
+        (vec![a.clone(), a.clone(), a.clone(), enter.clone()], Some(1), 0, "at least 3 points"),
+        (vec![a.clone(), b.clone(), c.clone(), back.clone(), enter.clone()], Some(2), 0, "at least 3 points"),
+        (vec![back.clone()], Some(0), 0, "No point is left"),
+        (vec![click(12, 5), click(45, 5), click(20, 0), click(20, 10)], Some(0), 0, "outside the picture"),
+        (vec![a.clone(), b.clone(), c.clone(), esc.clone()], None, 0, "Left drawing"),
+        (vec![a.clone(), c.clone(), b.clone(), click(20, 9), enter.clone()], Some(4), 0, "crosses itself"),
+        (vec![a.clone(), b.clone(), c.clone(), a.clone(), enter.clone()], None, 1, "outline of 3 points"),
+        (vec![a.clone(), letter('q')], None, 1, "writing"),
+    ] {
+        let events: Vec<Event> = std::iter::once(letter('o')).chain(events).collect();
+        let run = play(Some(narrow()), &events);
+        assert_eq!(run.state.drawing.as_ref().map(|d| d.points_px().len()), points, "{events:?}");
+        assert_eq!(run.sent.len(), sent, "{events:?}");
+        let last = run.state.messages().next_back().unwrap_or_default();
+        assert!(last.contains(told), "{last:?} after {events:?}");
+    }
+}
+
+#[test]
+fn the_keyboard_reaches_what_the_mouse_reaches() {
+    let arrow = |code| key(code);
+    let mut events = vec![letter('o'), letter(' ')];
+    let far = |c: char| std::iter::repeat_n(letter(c), 9);
+    for (across, down) in [('H', 'K'), ('L', 'K'), ('L', 'J')] {
+        events.extend(far(across).chain(far(down)));
+        events.push(letter(' '));
+    }
+    events.extend([arrow(KeyCode::Left), arrow(KeyCode::Up), letter(' '), key(KeyCode::Backspace)]);
+    events.push(key(KeyCode::Enter));
+    let run = play(Some(narrow()), &events);
+    assert_eq!(run.sent, [Control::SetOutline(vec![[9.5, 19.5], [629.5, 19.5], [629.5, 339.5]])]);
+}
+
+#[test]
+fn there_is_no_drawing_without_a_picture() {
+    let mut state = State::default();
+    assert_eq!(handle(&letter('o'), &mut state, None), None);
+    assert_eq!(state.drawing, None);
+    assert!(state.messages().any(|m| m.contains("no picture yet")));
+    // A picture that is there but not on the screen, as in too small a window.
+    let run = play(None, &[letter('o'), click(5, 5), letter(' '), key(KeyCode::Left)]);
+    assert!(run.sent.is_empty() && run.state.drawing.is_some_and(|d| d.points_px().is_empty()));
+}
+
+#[test]
+fn a_late_snapshot_does_not_undo_a_pause() {
+    let mut run = play(None, &[letter(' ')]);
+    run.state.take(Arc::new(snapshot(Phase::Live)));
+    assert!(run.state.paused);
+    run.state.take(Arc::new(Snapshot { paused: true, ..snapshot(Phase::Live) }));
+    run.state.take(Arc::new(snapshot(Phase::Live)));
+    assert!(!run.state.paused);
+}
+
+#[test]
+fn a_notice_goes_when_the_capture_speaks_or_with_time() {
+    let mut run = play(None, &[letter('e')]);
+    let newest = |state: &State| state.messages().next_back().unwrap_or_default().to_owned();
+    assert!(newest(&run.state).contains("export"));
+    (0..1000).for_each(|_| run.state.tick());
+    assert!(newest(&run.state).contains("Gathering"));
+    run.state.say("something");
+    run.state.take(Arc::new(Snapshot { messages: vec!["Exported.".to_owned()], ..snapshot(Phase::Live) }));
+    assert_eq!(newest(&run.state), "Exported.");
+}

@@ -1,0 +1,131 @@
+//! States of a capture that never was.
+
+use crate::model::{BranchRow, FormatNote, JointPose, Node, NodeId, Phase, Pose, Rgb, Size, Skeleton, Snapshot};
+use nalgebra::{Point3, UnitQuaternion, Vector3};
+use std::sync::Arc;
+
+/// A camera picture: bright sky above, dark ground below.
+pub fn picture(size: Size) -> Arc<Rgb> {
+    let pixels = (0..size.height).flat_map(|v| {
+        (0..size.width).flat_map(move |_| if v < size.height * 2 / 3 { [170, 200, 240] } else { [60, 70, 20] })
+    });
+    Arc::new(Rgb { size, pixels: pixels.collect() })
+}
+
+/// A trunk with three forks of two branches each, and a copy of the first fork turned by a right angle.
+pub fn skeleton() -> Skeleton {
+    let node = |parent: u32, level, x: f64, y: f64, z: f64, copy_of: Option<u32>| Node {
+        parent: (level > 0).then_some(NodeId(parent)),
+        level,
+        position: Point3::new(x, y, z),
+        radius: 8.0 / (1.0 + level as f64),
+        n_tracks: if copy_of.is_some() { 0 } else { 40 },
+        copy_of: copy_of.map(NodeId),
+        plane_angle: if copy_of.is_some() { 1.57 } else { 0.0 },
+    };
+    let mut nodes = vec![node(0, 0, 0.0, 0.0, 0.0, None), node(0, 1, 5.0, 150.0, 0.0, None)];
+    for (i, x) in [-70.0, 10.0, 80.0].into_iter().enumerate() {
+        let fork = nodes.len() as u32;
+        nodes.push(node(1, 2, x, 220.0 + 30.0 * i as f64, 20.0 * i as f64, None));
+        nodes.push(node(fork, 3, x - 30.0, 300.0, 40.0, None));
+        nodes.push(node(fork, 3, x + 30.0, 310.0, -30.0, None));
+    }
+    let copy = nodes.len() as u32;
+    nodes.push(node(1, 2, 0.0, 220.0, -70.0, Some(2)));
+    nodes.push(node(copy, 3, 40.0, 300.0, -100.0, Some(3)));
+    Skeleton { nodes, foot_px: [320.0, 350.0], image_size: Size::new(640, 360) }
+}
+
+/// The skeleton bent a little to the right.
+pub fn pose(skeleton: &Skeleton) -> Pose {
+    let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.0, -0.1));
+    let joints = skeleton.nodes.iter().map(|n| JointPose { position: rotation * n.position, rotation }).collect();
+    Pose { frame: 1234, time_s: 41.1, joints }
+}
+
+/// A state in this phase; what a phase has not reached yet is empty.
+pub fn snapshot(phase: Phase) -> Snapshot {
+    let reached = |p: Phase| Phase::ALL.iter().position(|q| *q == phase) >= Phase::ALL.iter().position(|q| *q == p);
+    let skeleton = skeleton();
+    let node_colour = [None, None, Some(0), Some(0), Some(0), Some(1), Some(1), Some(1), Some(2), Some(2), Some(2)];
+    let mut s = Snapshot {
+        source: "/dev/video0".to_owned(),
+        format: FormatNote { asked: "MJPG 1280x720 @ 30".to_owned(), given: "YUYV 640x360 @ 30".to_owned() },
+        phase,
+        progress: 0.62,
+        frame: 1234,
+        time_s: 41.1,
+        sensor_rate_hz: 29.97,
+        work_rate_hz: 29.93,
+        lost_in_camera: 3,
+        not_shown: 45,
+        latency_p50_ms: 21.4,
+        latency_p99_ms: 48.0,
+        image_size: Some(Size::new(640, 360)),
+        preview: Some(picture(Size::new(320, 180))),
+        messages: vec!["Camera opened.".to_owned(), "Gathering motion: 0.62 of 0.80.".to_owned()],
+        ..Snapshot::default()
+    };
+    if reached(Phase::Detect) {
+        s.outline_px = vec![[220, 340], [200, 60], [330, 20], [450, 80], [420, 340]];
+    }
+    if reached(Phase::Accumulate) {
+        s.tracks_alive = 312;
+        s.lost_per_s = 0.4;
+        s.fb_error_px = 0.12;
+        s.fb_history_px = (0..120).map(|i| 0.15 + 0.1 * (i as f64 * 0.3).sin()).collect();
+        let branch = |i: u32| reached(Phase::Live).then_some((i % 3) as u8);
+        s.points = (0..60).map(|i| ([240.0 + 3.0 * i as f32, 60.0 + (i * 37 % 250) as f32], branch(i))).collect();
+    }
+    if reached(Phase::Live) {
+        s.branches = (1..11)
+            .map(|node| BranchRow {
+                node,
+                level: skeleton.nodes[node as usize].level,
+                n_tracks: 312 / node,
+                amplitude_px: 0.4 * node as f64,
+                frequency_hz: (node != 4).then_some(0.31 + 0.07 * node as f64),
+            })
+            .collect();
+        s.pose = Some(Arc::new(pose(&skeleton)));
+        s.skeleton = Some(Arc::new(skeleton));
+        s.node_colour = Arc::new(node_colour.to_vec());
+        s.progress = 1.0;
+    }
+    s
+}
+
+/// A capture that has gone on for ages and whose every number is out of hand.
+pub fn huge() -> Snapshot {
+    let mut s = snapshot(Phase::Live);
+    s.source = "/media/field/recordings/2024-07-13/a very long name of a recording of an old oak.mcap".to_owned();
+    s.format.given = "YUYV 16384x16384 @ 1000 and then some more words".to_owned();
+    s.frame = u64::MAX;
+    s.frames_total = Some(u64::MAX);
+    s.time_s = 1e300;
+    (s.sensor_rate_hz, s.work_rate_hz) = (f64::INFINITY, 1e12);
+    (s.lost_in_camera, s.dropped_before_tracker, s.undecodable, s.not_shown) = (u64::MAX, 123_456, 99_999, 12_345_678);
+    (s.latency_p50_ms, s.latency_p99_ms) = (123_456.0, 1e99);
+    (s.tracks_alive, s.lost_per_s, s.fb_error_px) = (u32::MAX, 1e7, f64::NAN);
+    s.fb_history_px = vec![f64::NAN, 1e300, -1.0, f64::INFINITY, 3.0];
+    s.progress = f64::NAN;
+    s.points = vec![([f32::NAN, 1.0], Some(255)), ([1e30, -1e30], Some(7)), ([f32::INFINITY, 0.0], None)];
+    s.outline_px = vec![[i32::MIN, i32::MAX], [i32::MAX, i32::MAX], [0, i32::MIN]];
+    s.messages = vec!["word ".repeat(200), "x".repeat(500)];
+    s.branches = (0..5000)
+        .map(|node| BranchRow {
+            node: u32::MAX - node,
+            level: 255,
+            n_tracks: u32::MAX,
+            amplitude_px: 1e300,
+            frequency_hz: Some(f64::NAN),
+        })
+        .collect();
+    let mut skeleton = skeleton();
+    skeleton.nodes[3].position.x = f64::NAN;
+    skeleton.nodes[4].position.y = 1e300;
+    skeleton.nodes[5].parent = Some(NodeId(u32::MAX));
+    s.pose = Some(Arc::new(Pose { frame: 0, time_s: 0.0, joints: Vec::new() }));
+    s.skeleton = Some(Arc::new(skeleton));
+    s
+}

@@ -1,0 +1,5 @@
+//! The screen against made-up but realistic states.
+
+mod keys;
+mod made_up;
+mod screens;

@@ -1,0 +1,114 @@
+//! What the whole screen looks like, and that nothing brings it down.
+
+use super::made_up::{huge, snapshot};
+use crate::model::{Phase, Rgb, Size, Skeleton, Snapshot};
+use crate::tui::graphics::Graphics;
+use crate::tui::panels::preview::Preview;
+use crate::tui::screen;
+use crate::tui::state::State;
+use crate::tui::theme::{Depth, Theme};
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+use ratatui::style::Color;
+use std::sync::Arc;
+
+fn drawn(state: &State, depth: Depth, width: u16, height: u16) -> TestBackend {
+    let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
+    let mut preview = Preview::new(Graphics::characters(depth));
+    terminal.draw(|frame| screen::render(frame, state, Theme::new(depth), &mut preview)).unwrap();
+    terminal.backend().clone()
+}
+
+fn state(snapshot: Snapshot) -> State {
+    let mut state = State::default();
+    state.take(Arc::new(snapshot));
+    state
+}
+
+fn cases() -> Vec<(&'static str, State)> {
+    let mut cases: Vec<_> = Phase::ALL.into_iter().map(|phase| (phase.name(), state(snapshot(phase)))).collect();
+    cases.push(("empty", state(Snapshot::default())));
+    cases.push(("huge", state(huge())));
+    let replay = Snapshot { frames_total: Some(5000), source: "oak.mcap".to_owned(), ..snapshot(Phase::Live) };
+    cases.push(("replay", state(replay)));
+    let mut help = state(snapshot(Phase::Live));
+    help.help = true;
+    cases.push(("help", help));
+    let mut drawing = state(snapshot(Phase::Accumulate));
+    let polygon = drawing.drawing.get_or_insert_default();
+    [[100.0, 50.0], [500.0, 60.0], [300.0, 300.0]].into_iter().for_each(|p| polygon.add(p));
+    polygon.set_cursor([320.0, 180.0]);
+    drawing.say("That is outside the picture.");
+    cases.push(("drawing", drawing));
+    let mut quitting = state(Snapshot { paused: true, ..snapshot(Phase::Live) });
+    quitting.quitting = true;
+    quitting.say("Ending; writing the capture…");
+    cases.push(("quitting", quitting));
+    cases
+}
+
+#[test]
+fn looks_as_reviewed() {
+    for (name, state) in cases() {
+        for (width, height) in [(80, 24), (200, 60)] {
+            // Letters instead of half blocks, which without their colours would say nothing.
+            let screen = drawn(&state, Depth::None, width, height);
+            insta::assert_snapshot!(format!("{name}_{width}x{height}"), screen);
+        }
+    }
+}
+
+#[test]
+fn no_state_and_no_size_brings_it_down() {
+    let torn = Rgb { size: Size::new(640, 360), pixels: vec![1, 2, 3] };
+    let none = Rgb { size: Size::new(0, 0), pixels: Vec::new() };
+    let bare = Skeleton { nodes: Vec::new(), foot_px: [0.0; 2], image_size: Size::new(0, 0) };
+    let mut flat = super::made_up::skeleton();
+    flat.nodes.iter_mut().for_each(|n| n.position = nalgebra::Point3::origin());
+    let mut all: Vec<State> = cases().into_iter().map(|(_, state)| state).collect();
+    for change in [
+        Snapshot { preview: Some(Arc::new(torn)), ..snapshot(Phase::Live) },
+        Snapshot { preview: Some(Arc::new(none)), image_size: Some(Size::new(0, 7)), ..snapshot(Phase::Live) },
+        Snapshot { image_size: None, ..snapshot(Phase::Live) },
+        Snapshot { skeleton: Some(Arc::new(bare)), ..snapshot(Phase::Live) },
+        Snapshot { skeleton: Some(Arc::new(flat)), pose: None, ..snapshot(Phase::Live) },
+        Snapshot { image_size: Some(Size::new(u32::MAX, 1)), ..huge() },
+        Snapshot { progress: f64::NEG_INFINITY, ..huge() },
+    ] {
+        all.push(state(change));
+    }
+    let sizes = [(0, 0), (1, 1), (60, 16), (61, 17), (80, 24), (20, 200), (500, 3), (120, 40), (300, 100)];
+    for (i, state) in all.iter().enumerate() {
+        for (width, height) in sizes {
+            for depth in [Depth::None, Depth::Indexed, Depth::True] {
+                println!("case {i} at {width}x{height}");
+                drawn(state, depth, width, height);
+            }
+        }
+    }
+}
+
+#[test]
+fn branches_are_coloured_alike_in_picture_table_and_tree() {
+    // So wide that the points are not mixed with the picture.
+    let screen = drawn(&state(snapshot(Phase::Live)), Depth::True, 300, 100);
+    let theme = Theme::new(Depth::True);
+    for branch in 0..3 {
+        let colour = theme.branch(Some(branch));
+        let used = |pick: fn(&str) -> bool| {
+            screen.buffer().content.iter().any(|c| pick(c.symbol()) && (c.fg == colour || c.bg == colour))
+        };
+        assert!(used(|s| s == "▀"), "picture, branch {branch}");
+        assert!(used(|s| s == "●"), "table, branch {branch}");
+        assert!(used(|s| ("\u{2801}"..="\u{28ff}").contains(&s)), "tree, branch {branch}");
+    }
+}
+
+#[test]
+fn without_colour_no_cell_is_coloured() {
+    for (name, state) in cases() {
+        let screen = drawn(&state, Depth::None, 80, 24);
+        let plain = screen.buffer().content.iter().all(|c| c.fg == Color::Reset && c.bg == Color::Reset);
+        assert!(plain, "{name}");
+    }
+}

@@ -1,0 +1,149 @@
+//! Colours: few, of middle brightness so that they can be read on dark and on light, none at all under `NO_COLOR`.
+
+use ratatui::style::{Color, Modifier, Style};
+
+/// How many colours the terminal shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Depth {
+    /// The user wants no colour (`NO_COLOR`).
+    None,
+    /// The 256 colours that nearly every terminal knows.
+    Indexed,
+    /// Red, green and blue as they are.
+    True,
+}
+
+impl Depth {
+    /// What the environment says. `TMUX` counts as full colour because tmux itself reduces what the terminal lacks.
+    pub fn from_env() -> Self {
+        let set = |name: &str| std::env::var(name).is_ok_and(|v| !v.is_empty());
+        let holds = |name: &str, parts: &[&str]| {
+            std::env::var(name).is_ok_and(|v| parts.iter().any(|p| v.to_lowercase().contains(p)))
+        };
+        if set("NO_COLOR") {
+            Depth::None
+        } else if set("TMUX")
+            || holds("COLORTERM", &["truecolor", "24bit"])
+            || holds("TERM", &["direct", "kitty", "ghostty", "alacritty", "wezterm", "foot"])
+        {
+            Depth::True
+        } else {
+            Depth::Indexed
+        }
+    }
+}
+
+/// One colour for each main branch, taken again from the start after the last one.
+const BRANCHES: [[u8; 3]; 8] = [
+    [0x2f, 0x86, 0xff],
+    [0xe8, 0x70, 0x00],
+    [0x1f, 0xa2, 0x3e],
+    [0xe0, 0x35, 0x70],
+    [0xa0, 0x60, 0xf0],
+    [0x00, 0xa0, 0xa8],
+    [0xa8, 0x8e, 0x00],
+    [0xc2, 0x6e, 0x50],
+];
+const GREY: [u8; 3] = [0x80, 0x80, 0x80];
+const WARNING: [u8; 3] = [0xd8, 0x60, 0x00];
+
+/// Turns what a thing means into how it looks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Theme {
+    depth: Depth,
+}
+
+impl Theme {
+    /// A theme for a terminal of this colour depth.
+    pub fn new(depth: Depth) -> Self {
+        Self { depth }
+    }
+
+    /// The nearest colour that the terminal has.
+    pub fn colour(self, [r, g, b]: [u8; 3]) -> Color {
+        match self.depth {
+            Depth::None => Color::Reset,
+            Depth::Indexed => Color::Indexed(index_from_rgb([r, g, b])),
+            Depth::True => Color::Rgb(r, g, b),
+        }
+    }
+
+    /// Colour of a main branch as it is mixed into a picture; white where a point belongs to none yet.
+    pub fn branch_rgb(self, branch: Option<u8>) -> [u8; 3] {
+        branch.map_or([0xff; 3], |b| BRANCHES[b as usize % BRANCHES.len()])
+    }
+
+    /// Colour of a main branch on the terminal's own ground; the ground's text colour for the trunk.
+    pub fn branch(self, branch: Option<u8>) -> Color {
+        branch.map_or(Color::Reset, |b| self.colour(self.branch_rgb(Some(b))))
+    }
+
+    /// The same, half way to grey: what was not measured but repeated.
+    pub fn branch_faded(self, branch: Option<u8>) -> Color {
+        let full = branch.map_or(GREY, |b| self.branch_rgb(Some(b)));
+        let mix = |i: usize| ((full[i] as u16 + 2 * GREY[i] as u16) / 3) as u8;
+        self.colour([mix(0), mix(1), mix(2)])
+    }
+
+    /// Titles of panels.
+    pub fn title(self) -> Style {
+        Style::new().fg(self.colour(BRANCHES[5])).add_modifier(Modifier::BOLD)
+    }
+
+    /// Names beside values, rules, things of the second rank.
+    pub fn faint(self) -> Style {
+        Style::new().fg(self.colour(GREY))
+    }
+
+    /// What to look at first.
+    pub fn strong(self) -> Style {
+        Style::new().add_modifier(Modifier::BOLD)
+    }
+
+    /// What is going wrong.
+    pub fn warning(self) -> Style {
+        Style::new().fg(self.colour(WARNING)).add_modifier(Modifier::BOLD)
+    }
+
+    /// Where the program is now; reversed, so that it shows without colour as well.
+    pub fn here(self) -> Style {
+        Style::new().fg(self.colour(BRANCHES[5])).add_modifier(Modifier::BOLD | Modifier::REVERSED)
+    }
+}
+
+/// Nearest entry of the 6x6x6 cube or of the grey ramp of the 256 colours.
+fn index_from_rgb(rgb: [u8; 3]) -> u8 {
+    let level = |c: u8| if c < 48 { 0 } else { (((c as u16).saturating_sub(35)) / 40).min(5) as u8 };
+    let value = |l: u8| if l == 0 { 0i32 } else { 55 + 40 * l as i32 };
+    let distance = |to: [i32; 3]| (0..3).map(|i| (rgb[i] as i32 - to[i]).pow(2)).sum::<i32>();
+    let cube = rgb.map(level);
+    let mean = (rgb[0] as i32 + rgb[1] as i32 + rgb[2] as i32) / 3;
+    let step = ((mean - 3) / 10).clamp(0, 23);
+    if distance([8 + 10 * step; 3]) < distance(cube.map(value)) {
+        232 + step as u8
+    } else {
+        16 + 36 * cube[0] + 6 * cube[1] + cube[2]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn indexed_colours_are_near() {
+        for (rgb, index) in
+            [([0, 0, 0], 16), ([255, 255, 255], 231), ([128, 128, 128], 244), ([255, 0, 0], 196), ([0, 95, 175], 25)]
+        {
+            assert_eq!(index_from_rgb(rgb), index, "{rgb:?}");
+        }
+    }
+
+    #[test]
+    fn without_colour_nothing_is_coloured() {
+        let theme = Theme::new(Depth::None);
+        for branch in [None, Some(0), Some(255)] {
+            assert_eq!((theme.branch(branch), theme.branch_faded(branch)), (Color::Reset, Color::Reset));
+        }
+    }
+}
