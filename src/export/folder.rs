@@ -35,8 +35,11 @@ impl OutputFolder {
             Some(p) if !p.as_os_str().is_empty() => p.to_path_buf(),
             _ => PathBuf::from("."),
         };
-        let mut made: Vec<PathBuf> =
-            parent.ancestors().take_while(|a| !a.as_os_str().is_empty() && !a.exists()).map(Path::to_path_buf).collect();
+        let mut made: Vec<PathBuf> = parent
+            .ancestors()
+            .take_while(|a| !a.as_os_str().is_empty() && !a.exists())
+            .map(Path::to_path_buf)
+            .collect();
         made.reverse();
         // From here on a failure must take away what was made, which is what dropping does.
         let mut folder = Self { dir: dir.to_path_buf(), partial: PathBuf::new(), made, published: false };

@@ -58,6 +58,14 @@ impl Model<'_> {
 /// [`ExportError::Unfit`] if the skeleton is empty, out of order or has positions that are no numbers, if a pose
 /// belongs to another tree, or if there is more than the format can count.
 pub fn glb(model: &Model) -> Result<Vec<u8>, ExportError> {
+    glb_and_keys(model).map(|(bytes, _)| bytes)
+}
+
+/// The bytes of the GLB file, and how many rotation keys are in it.
+///
+/// # Errors
+/// As of [`glb`].
+pub fn glb_and_keys(model: &Model) -> Result<(Vec<u8>, u64), ExportError> {
     check(model)?;
     let keys = joints::keys(model.skeleton, model.poses, model.tolerance_px)?;
     let mut root = Root::default();
@@ -77,14 +85,15 @@ pub fn glb(model: &Model) -> Result<Vec<u8>, ExportError> {
     }
     let name = Some("arborcam".to_string());
     root.scene = Some(root.push(Scene { extensions: None, extras: None, name, nodes: scene_nodes }));
-    let bin = buffer.finish(&mut root).map(Cow::Owned);
+    let bin: Option<Cow<[u8]>> = buffer.finish(&mut root).map(Cow::Owned);
     let json: Cow<[u8]> = Cow::Owned(root.to_vec().map_err(|e| ExportError::unfit(e.to_string()))?);
     if json.len() + bin.as_ref().map_or(0, |b| b.len()) + 64 > u32::MAX as usize {
         return Err(ExportError::unfit("it is larger than the 4 GB that a GLB can hold; export a shorter animation"));
     }
     // The length in the header is computed when it is written.
     let header = gltf::binary::Header { magic: *b"glTF", version: 2, length: 0 };
-    gltf::binary::Glb { header, json, bin }.to_vec().map_err(|e| ExportError::unfit(e.to_string()))
+    let bytes = gltf::binary::Glb { header, json, bin }.to_vec().map_err(|e| ExportError::unfit(e.to_string()))?;
+    Ok((bytes, keys.iter().map(|k| k.times_s.len() as u64).sum()))
 }
 
 fn check(model: &Model) -> Result<(), ExportError> {
@@ -182,8 +191,7 @@ fn push_skinned_mesh(root: &mut Root, buffer: &mut BufferBuilder, model: &Model)
     };
     let name = || Some("tree".to_string());
     let primitives = vec![primitive];
-    let mesh =
-        root.push(gltf_json::Mesh { extensions: None, extras: None, name: name(), primitives, weights: None });
+    let mesh = root.push(gltf_json::Mesh { extensions: None, extras: None, name: name(), primitives, weights: None });
     let skin = push_skin(root, buffer, model);
     root.push(Node { mesh: Some(mesh), skin: Some(skin), name: name(), ..Node::default() })
 }

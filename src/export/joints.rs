@@ -7,7 +7,7 @@
 use super::ExportError;
 use super::thin_keys::{slerp, thin};
 use crate::model::{Pose, Skeleton};
-use nalgebra::UnitQuaternion;
+use nalgebra::{UnitQuaternion, Vector3};
 
 /// Keys of one joint's local rotation.
 pub(super) struct Keys {
@@ -20,9 +20,9 @@ pub(super) struct Keys {
 
 /// Keys of all joints that move, with every node within `tolerance_px` of its pose in every frame.
 ///
-/// A node's error is the sum of (branch length x error of its rotation) over the branches on its way from the foot.
-/// So a branch may be wrong by `tolerance / longest way from the foot to a tip through it`. Each joint's rotation is
-/// taken against its parent's thinned one, so that errors do not add up down the tree.
+/// Joints are thinned from the foot up, each against what its parent's kept keys show, so that a joint also makes good
+/// its parent's error. The tolerance grows towards the tips: a node may be wrong by `tolerance sqrt(depth / depth of
+/// the deepest tip above)`, of which its parent has used only a part.
 pub(super) fn keys(skeleton: &Skeleton, poses: &[Pose], tolerance_px: f64) -> Result<Vec<Keys>, ExportError> {
     let nodes = &skeleton.nodes;
     if let Some(p) = poses.iter().find(|p| p.joints.len() != nodes.len()) {
@@ -33,20 +33,39 @@ pub(super) fn keys(skeleton: &Skeleton, poses: &[Pose], tolerance_px: f64) -> Re
     if times.is_empty() {
         return Ok(Vec::new());
     }
-    let ways = longest_ways(skeleton);
-    let mut shown: Vec<Vec<UnitQuaternion<f64>>> = Vec::with_capacity(nodes.len());
+    let budget = budgets(skeleton);
+    let mut shown: Vec<Shown> = Vec::with_capacity(nodes.len());
     let mut out = Vec::new();
     for (i, node) in nodes.iter().enumerate() {
         let Some(parent) = node.parent.map(|p| p.index()) else {
-            shown.push(vec![UnitQuaternion::identity(); times.len()]);
+            shown.push(Shown::still(times.len()));
             continue;
         };
-        let local = local_rotations(&poses, i, &shown[parent]);
-        let tolerance_rad = (tolerance_px.max(0.0) / ways[i].max(1e-9)).min(0.1);
-        let kept = thin(&times, &local, tolerance_rad);
-        let still = kept.len() == 1 && local.iter().all(|q| q.angle() <= tolerance_rad);
-        let seen = if still { vec![UnitQuaternion::identity(); times.len()] } else { replay(&times, &local, &kept) };
-        shown.push(seen.iter().zip(&shown[parent]).map(|(l, p)| p * l).collect());
+        let wanted = rotations(&poses, i);
+        let base = &shown[parent];
+        let local: Vec<_> = wanted.iter().zip(&base.rotation).map(|(q, p)| p.inverse() * q).collect();
+        let way = node.position - nodes[parent].position;
+        let limit_px = (tolerance_px * budget[i]).max(1e-9);
+        let miss = |k: usize, turn: &UnitQuaternion<f64>| base.error_px[k] + (turn * way - wanted[k] * way);
+        let error = |k: usize, turn: &UnitQuaternion<f64>| {
+            let angle = turn.angle_to(&wanted[k]);
+            // Turning about its own axis moves no node, but the bark.
+            let at_bark = angle * node.radius.max(0.0) / tolerance_px.max(1e-9);
+            (miss(k, turn).norm() / limit_px).max(at_bark).max(angle / 0.1)
+        };
+        let between = |a: usize, b: usize, k: usize| {
+            let x = if a == b { 0.0 } else { (times[k] - times[a]) / (times[b] - times[a]) };
+            base.rotation[k] * slerp(&local[a], &local[b], x)
+        };
+        let still = (0..times.len()).all(|k| error(k, &base.rotation[k]) <= 1.0);
+        let kept = thin(times.len(), |a, b, k| error(k, &between(a, b, k)));
+        let rotation: Vec<_> = if still {
+            base.rotation.clone()
+        } else {
+            spans(&kept, times.len()).map(|(a, b, k)| between(a, b, k)).collect()
+        };
+        let error_px = rotation.iter().enumerate().map(|(k, turn)| miss(k, turn)).collect();
+        shown.push(Shown { rotation, error_px });
         if !still {
             out.push(Keys {
                 node: i,
@@ -56,6 +75,28 @@ pub(super) fn keys(skeleton: &Skeleton, poses: &[Pose], tolerance_px: f64) -> Re
         }
     }
     Ok(out)
+}
+
+/// What a viewer shows of one branch at the time of every pose.
+struct Shown {
+    /// In model axes.
+    rotation: Vec<UnitQuaternion<f64>>,
+    /// By how much the branch's end is off.
+    error_px: Vec<Vector3<f64>>,
+}
+
+impl Shown {
+    fn still(n: usize) -> Self {
+        Self { rotation: vec![UnitQuaternion::identity(); n], error_px: vec![Vector3::zeros(); n] }
+    }
+}
+
+/// For each of `n` frames the kept keys before and after it, and the frame.
+fn spans(kept: &[usize], n: usize) -> impl Iterator<Item = (usize, usize, usize)> {
+    (0..n).map(|k| {
+        let after = kept.partition_point(|&key| key < k).min(kept.len() - 1);
+        if kept[after] == k { (k, k, k) } else { (kept[after.saturating_sub(1)], kept[after], k) }
+    })
 }
 
 /// Poses whose time grows, also as `f32`, which is what the file holds; and their times from the first on.
@@ -72,34 +113,17 @@ fn usable(poses: &[Pose]) -> (Vec<&Pose>, Vec<f64>) {
     (kept, times)
 }
 
-/// Rotation of branch `i` against its parent as shown; where a pose has none, the branch keeps its last one.
-fn local_rotations(poses: &[&Pose], i: usize, parent: &[UnitQuaternion<f64>]) -> Vec<UnitQuaternion<f64>> {
+/// Rotations of branch `i` in model axes; where a pose has none, the branch keeps its last one.
+fn rotations(poses: &[&Pose], i: usize) -> Vec<UnitQuaternion<f64>> {
     let mut last = UnitQuaternion::identity();
-    let turn = |(pose, parent): (&&Pose, &UnitQuaternion<f64>)| {
+    let turn = |pose: &&Pose| {
         let q = pose.joints[i].rotation;
         if q.coords.iter().all(|c| c.is_finite()) && q.coords.norm() > 0.5 {
             last = UnitQuaternion::new_normalize(q.into_inner());
         }
-        parent.inverse() * last
+        last
     };
-    poses.iter().zip(parent).map(turn).collect()
-}
-
-/// What a viewer shows at every time, given only the kept keys.
-fn replay(times: &[f64], rotations: &[UnitQuaternion<f64>], kept: &[usize]) -> Vec<UnitQuaternion<f64>> {
-    let mut span = 0;
-    (0..times.len())
-        .map(|k| {
-            while span + 1 < kept.len() && k > kept[span + 1] {
-                span += 1;
-            }
-            let (a, b) = (kept[span], kept[(span + 1).min(kept.len() - 1)]);
-            if a == b {
-                return rotations[a];
-            }
-            slerp(&rotations[a], &rotations[b], (times[k] - times[a]) / (times[b] - times[a]))
-        })
-        .collect()
+    poses.iter().map(turn).collect()
 }
 
 /// q and -q are one rotation; a viewer that does not know takes the long way round between them.
@@ -113,20 +137,18 @@ fn one_hemisphere(rotations: impl Iterator<Item = UnitQuaternion<f64>>) -> Vec<[
         .collect()
 }
 
-/// For every branch, the length of the longest way from the foot to a tip that goes through it, px.
-fn longest_ways(skeleton: &Skeleton) -> Vec<f64> {
+/// Share of the tolerance that every node may use.
+fn budgets(skeleton: &Skeleton) -> Vec<f64> {
     let nodes = &skeleton.nodes;
-    let parent_of = |i: usize| nodes[i].parent.map(|p| p.index());
-    let length = |i: usize| parent_of(i).map_or(0.0, |p| (nodes[i].position - nodes[p].position).norm());
-    let mut from_foot = vec![0.0; nodes.len()];
-    for i in 0..nodes.len() {
-        from_foot[i] = length(i) + parent_of(i).map_or(0.0, |p| from_foot[p]);
+    let mut depth = vec![0_u32; nodes.len()];
+    for (i, node) in nodes.iter().enumerate() {
+        depth[i] = node.parent.map_or(0, |p| depth[p.index()] + 1);
     }
-    let mut ways = from_foot;
-    for i in (0..nodes.len()).rev() {
-        if let Some(p) = parent_of(i) {
-            ways[p] = ways[p].max(ways[i]);
+    let mut deepest = depth.clone();
+    for (i, node) in nodes.iter().enumerate().rev() {
+        if let Some(p) = node.parent {
+            deepest[p.index()] = deepest[p.index()].max(deepest[i]);
         }
     }
-    ways
+    depth.iter().zip(&deepest).map(|(&d, &of)| (f64::from(d) / f64::from(of.max(1))).sqrt()).collect()
 }

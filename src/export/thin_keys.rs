@@ -16,22 +16,20 @@ pub(super) fn slerp(a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>, x: f64) ->
     UnitQuaternion::new_normalize(Quaternion::from(a.coords * wa + end * wb))
 }
 
-/// Indices of the keys to keep, ascending, so that `slerp` between them stays within `tolerance_rad` of every key
-/// (Douglas and Peucker's method). One key where one will do. `times` grow strictly; both slices are equally long.
-pub(super) fn thin(times: &[f64], rotations: &[UnitQuaternion<f64>], tolerance_rad: f64) -> Vec<usize> {
-    let n = times.len().min(rotations.len());
-    let Some(first) = rotations.first() else { return Vec::new() };
-    if n < 2 || rotations.iter().all(|q| q.angle_to(first) <= tolerance_rad) {
-        return vec![0];
+/// Indices of the `n` keys to keep, ascending (Douglas and Peucker's method), so that nowhere `error(a, b, k)` exceeds
+/// 1: by how much key `k` is missed, in units of what is allowed, if between the kept keys `a` and `b` there is none.
+/// One key where one will do, which is asked as `error(0, 0, k)`.
+pub(super) fn thin(n: usize, error: impl Fn(usize, usize, usize) -> f64) -> Vec<usize> {
+    if (1..n).all(|k| error(0, 0, k) <= 1.0) {
+        return (0..n.min(1)).collect();
     }
     let mut keep = vec![false; n];
     (keep[0], keep[n - 1]) = (true, true);
     let mut spans = vec![(0, n - 1)];
     while let Some((a, b)) = spans.pop() {
-        let mut worst = (a, tolerance_rad);
+        let mut worst = (a, 1.0);
         for k in a + 1..b {
-            let x = (times[k] - times[a]) / (times[b] - times[a]);
-            let off = slerp(&rotations[a], &rotations[b], x).angle_to(&rotations[k]);
+            let off = error(a, b, k);
             if off > worst.1 {
                 worst = (k, off);
             }
@@ -49,29 +47,29 @@ mod tests {
     use super::*;
     use nalgebra::Vector3;
 
-    fn about_z(angles: impl Iterator<Item = f64>) -> Vec<UnitQuaternion<f64>> {
-        angles.map(|a| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), a)).collect()
+    fn thin_about_z(tolerance_rad: f64, angle: impl Fn(f64) -> f64) -> (Vec<usize>, f64) {
+        let turn = |k: usize| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle(k as f64 / 30.0));
+        let off = |a: usize, b: usize, k: usize| {
+            let x = if a == b { 0.0 } else { (k - a) as f64 / (b - a) as f64 };
+            slerp(&turn(a), &turn(b), x).angle_to(&turn(k)) / tolerance_rad
+        };
+        let keys = thin(330, off);
+        let spans = keys.windows(2).flat_map(|w| (w[0]..w[1]).map(move |k| (w[0], w[1], k)));
+        let worst = spans.map(|(a, b, k)| off(a, b, k)).fold(0.0, f64::max);
+        (keys, worst)
     }
 
     #[test]
     fn even_turning_needs_two_keys_and_rest_one() {
-        let times: Vec<f64> = (0..100).map(f64::from).collect();
-        assert_eq!(thin(&times, &about_z(times.iter().map(|t| 0.01 * t)), 1e-6), [0, 99]);
-        assert_eq!(thin(&times, &about_z(times.iter().map(|_| 0.3)), 1e-6), [0]);
-        assert_eq!(thin(&[], &[], 1e-6), [0; 0]);
+        assert_eq!(thin_about_z(1e-6, |t| 0.2 * t).0, [0, 329]);
+        assert_eq!(thin_about_z(1e-6, |_| 0.3).0, [0]);
+        assert_eq!(thin(0, |_, _, _| 0.0), [0; 0]);
+        assert_eq!(thin(1, |_, _, _| f64::INFINITY), [0]);
     }
 
     #[test]
-    fn a_sway_keeps_its_extremes_within_tolerance_and_loses_most_keys() {
-        let times: Vec<f64> = (0..330).map(|k| f64::from(k) / 30.0).collect();
-        let sway = about_z(times.iter().map(|t| 0.2 * (std::f64::consts::TAU * 0.7 * t).sin()));
-        let keys = thin(&times, &sway, 0.005);
-        assert!(keys.len() < 110, "{} keys", keys.len());
-        for pair in keys.windows(2) {
-            for k in pair[0]..pair[1] {
-                let x = (times[k] - times[pair[0]]) / (times[pair[1]] - times[pair[0]]);
-                assert!(slerp(&sway[pair[0]], &sway[pair[1]], x).angle_to(&sway[k]) <= 0.005);
-            }
-        }
+    fn a_sway_loses_most_keys_and_stays_within_tolerance() {
+        let (keys, worst) = thin_about_z(0.005, |t| 0.2 * (std::f64::consts::TAU * 0.7 * t).sin());
+        assert!(keys.len() < 110 && worst <= 1.0, "{} keys, {worst}", keys.len());
     }
 }

@@ -117,7 +117,11 @@ impl Tube {
     /// Even taper between forks; a tip stays round and closes.
     fn radius_at(&self, t: f64) -> f64 {
         let t = t.clamp(0.0, 1.0);
-        if self.end_radius > 0.0 { self.radius + (self.end_radius - self.radius) * t } else { self.radius * (1.0 - t * t) }
+        if self.end_radius > 0.0 {
+            self.radius + (self.end_radius - self.radius) * t
+        } else {
+            self.radius * (1.0 - t * t)
+        }
     }
 
     /// Share of the branch's own joint: none at the pivot, all from half its length on.
