@@ -27,6 +27,14 @@ fn model<'a>(
     Model { skeleton, mesh, poses, bark_rgb: [110, 86, 60], metres_per_px, tolerance_px, node_extras: &[], provenance }
 }
 
+/// With `ARBORCAM_GLB_DIR=DIR` the files stay, for `scripts/validate-glb.mjs` or a viewer.
+fn keep(name: &str, bytes: &[u8]) {
+    if let Some(dir) = std::env::var_os("ARBORCAM_GLB_DIR") {
+        std::fs::write(std::path::Path::new(&dir).join(format!("{}.glb", name.replace([' ', ','], "_"))), bytes)
+            .unwrap();
+    }
+}
+
 /// Rotation keys of the one animation, by node index.
 type Channels = HashMap<usize, (Vec<f32>, Vec<[f32; 4]>)>;
 
@@ -191,7 +199,9 @@ fn the_smallest_and_oddest_models_are_still_valid_files() {
         ("a pose that was lost", &full, &full_mesh, &lost),
     ];
     for (name, skeleton, mesh, poses) in cases {
-        let played = Played::parse(&write(skeleton, mesh, poses, KEY_TOLERANCE_PX, 0.0));
+        let bytes = write(skeleton, mesh, poses, KEY_TOLERANCE_PX, 0.0);
+        keep(name, &bytes);
+        let played = Played::parse(&bytes);
         assert!(played.document.accessors().all(|a| a.count() > 0), "{name}");
         assert_eq!(played.document.skins().len(), usize::from(!mesh.indices.is_empty()), "{name}");
         assert!(played.channels.values().flat_map(|c| &c.1).flatten().all(|x| x.is_finite()), "{name}");
@@ -251,7 +261,6 @@ fn names_and_extras_tell_what_was_measured_and_what_was_copied() {
     assert_eq!(told["frequency_hz"], json!(0.5));
 }
 
-/// `ARBORCAM_GLB=FILE cargo test --release --test glb realistic` keeps the file, for a validator or a viewer.
 #[test]
 fn a_realistic_tree_is_written_fast_and_small() {
     let skeleton = synthetic::tree(7, 3);
@@ -269,7 +278,5 @@ fn a_realistic_tree_is_written_fast_and_small() {
     assert!(took.as_secs_f64() < 5.0, "{took:?}");
     let played = Played::parse(&bytes);
     assert!(worst_error_px(&played, &skeleton, &poses, 1.0) < KEY_TOLERANCE_PX + 0.001);
-    if let Some(path) = std::env::var_os("ARBORCAM_GLB") {
-        std::fs::write(path, &bytes).unwrap();
-    }
+    keep("realistic", &bytes);
 }

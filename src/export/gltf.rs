@@ -1,21 +1,18 @@
 //! The moving tree as one GLB: core glTF 2.0, one skinned mesh, one animation of rotations.
 
 use super::ExportError;
-use super::gltf_buffer::{BufferBuilder, Layout, accessor, bounds, le_f32};
+use super::gltf_buffer::{BufferBuilder, Layout, accessor, le_f32};
+use super::gltf_mesh::push_skinned_mesh;
 use super::joints::{self, Keys};
 use crate::model::{Pose, Skeleton};
 use crate::shape::mesh::Mesh;
-use gltf_json::accessor::{ComponentType, Type};
+use gltf_json::accessor::Type;
 use gltf_json::animation::{Animation, Channel, Interpolation, Property, Sampler, Target};
-use gltf_json::buffer::Target::{ArrayBuffer, ElementArrayBuffer};
 use gltf_json::extras::RawValue;
-use gltf_json::material::{Material, PbrBaseColorFactor, PbrMetallicRoughness, StrengthFactor};
-use gltf_json::mesh::{Mode, Primitive, Semantic};
 use gltf_json::validation::Checked::Valid;
-use gltf_json::{Asset, Index, Node, Root, Scene, Skin};
+use gltf_json::{Asset, Index, Node, Root, Scene};
 use serde_json::{Value, json};
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 
 /// Keys are thinned so that no node is farther than this from its pose in any frame, px.
 pub const KEY_TOLERANCE_PX: f64 = 0.2;
@@ -41,12 +38,12 @@ pub struct Model<'a> {
 }
 
 impl Model<'_> {
-    fn scale(&self) -> f64 {
+    pub(super) fn scale(&self) -> f64 {
         if self.metres_per_px > 0.0 { self.metres_per_px } else { 1.0 }
     }
 
     /// Where the joint of node `i` rests, in the file's unit: at the parent node, about which the branch turns.
-    fn pivot(&self, i: usize) -> nalgebra::Vector3<f64> {
+    pub(super) fn pivot(&self, i: usize) -> nalgebra::Vector3<f64> {
         let nodes = &self.skeleton.nodes;
         nodes[nodes[i].parent.map_or(i, |p| p.index())].position.coords * self.scale()
     }
@@ -108,14 +105,19 @@ fn check(model: &Model) -> Result<(), ExportError> {
         if node.parent.map(|p| p.index()).is_some_and(|p| p >= i) || (i > 0) != node.parent.is_some() {
             return Err(ExportError::unfit(format!("node {i} does not come after its parent")));
         }
-        if !node.position.coords.iter().all(|x| x.is_finite()) {
+        if !node.position.coords.iter().all(|x| ((x * model.scale()) as f32).is_finite()) {
             return Err(ExportError::unfit(format!("the position of node {i} is no number")));
         }
     }
     let n = mesh.positions.len();
     let same = [mesh.normals.len(), mesh.uvs.len(), mesh.joints.len(), mesh.weights.len()].iter().all(|&m| m == n);
-    if !same || mesh.indices.len() % 3 != 0 || mesh.indices.iter().any(|&i| i as usize >= n) {
+    if !same || !mesh.indices.len().is_multiple_of(3) || mesh.indices.iter().any(|&i| i as usize >= n) {
         return Err(ExportError::unfit("its mesh has vectors of different lengths or indices beyond them"));
+    }
+    if !mesh.positions.iter().flatten().all(|x| ((f64::from(*x) * model.scale()) as f32).is_finite())
+        || !mesh.joints.iter().flatten().all(|&j| usize::from(j) < nodes.len())
+    {
+        return Err(ExportError::unfit("its mesh has positions that are no numbers or joints of another tree"));
     }
     Ok(())
 }
@@ -152,99 +154,6 @@ fn push_joints(root: &mut Root, model: &Model) -> Result<(), ExportError> {
         });
     }
     Ok(())
-}
-
-/// The mesh stands beside the joints, not below them: a skin is placed by its joints alone.
-fn push_skinned_mesh(root: &mut Root, buffer: &mut BufferBuilder, model: &Model) -> Index<Node> {
-    let mesh = model.mesh;
-    let n = mesh.positions.len();
-    let scale = model.scale();
-    let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|p| p.map(|x| (f64::from(x) * scale) as f32)).collect();
-    let (low, high) = bounds(&positions);
-    let vertices = Some(ArrayBuffer);
-    let position = buffer.accessor(root, Layout::f32(Type::Vec3), n, le_f32(&positions), vertices);
-    root.accessors[position.value()].min = Some(json!(low));
-    root.accessors[position.value()].max = Some(json!(high));
-    let normal = buffer.accessor(root, Layout::f32(Type::Vec3), n, le_f32(&mesh.normals), vertices);
-    let uv = buffer.accessor(root, Layout::f32(Type::Vec2), n, le_f32(&mesh.uvs), vertices);
-    let weights = buffer.accessor(root, Layout::f32(Type::Vec4), n, le_f32(&mesh.weights), vertices);
-    let joint_bytes = mesh.joints.iter().flatten().flat_map(|j| j.to_le_bytes());
-    let vec4_u16 = Layout { component: ComponentType::U16, shape: Type::Vec4 };
-    let joints = buffer.accessor(root, vec4_u16, n, joint_bytes, vertices);
-    let indices = push_indices(root, buffer, mesh);
-    let attributes = BTreeMap::from([
-        (Valid(Semantic::Positions), position),
-        (Valid(Semantic::Normals), normal),
-        (Valid(Semantic::TexCoords(0)), uv),
-        (Valid(Semantic::Joints(0)), joints),
-        (Valid(Semantic::Weights(0)), weights),
-    ]);
-    let material = root.push(bark(model.bark_rgb));
-    let primitive = Primitive {
-        attributes,
-        extensions: None,
-        extras: None,
-        indices: Some(indices),
-        material: Some(material),
-        mode: Valid(Mode::Triangles),
-        targets: None,
-    };
-    let name = || Some("tree".to_string());
-    let primitives = vec![primitive];
-    let mesh = root.push(gltf_json::Mesh { extensions: None, extras: None, name: name(), primitives, weights: None });
-    let skin = push_skin(root, buffer, model);
-    root.push(Node { mesh: Some(mesh), skin: Some(skin), name: name(), ..Node::default() })
-}
-
-/// Half the size where it fits; 65535 itself is reserved by the format.
-fn push_indices(root: &mut Root, buffer: &mut BufferBuilder, mesh: &Mesh) -> Index<gltf_json::Accessor> {
-    let target = Some(ElementArrayBuffer);
-    let count = mesh.indices.len();
-    if mesh.positions.len() <= usize::from(u16::MAX) {
-        let bytes = mesh.indices.iter().flat_map(|&i| (i as u16).to_le_bytes());
-        buffer.accessor(root, Layout { component: ComponentType::U16, shape: Type::Scalar }, count, bytes, target)
-    } else {
-        let bytes = mesh.indices.iter().flat_map(|i| i.to_le_bytes());
-        buffer.accessor(root, Layout { component: ComponentType::U32, shape: Type::Scalar }, count, bytes, target)
-    }
-}
-
-fn push_skin(root: &mut Root, buffer: &mut BufferBuilder, model: &Model) -> Index<Skin> {
-    let n = model.skeleton.nodes.len();
-    let bind: Vec<[f32; 16]> = (0..n)
-        .map(|i| {
-            let back = -model.pivot(i);
-            let (x, y, z) = (back.x as f32, back.y as f32, back.z as f32);
-            [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, x, y, z, 1.0]
-        })
-        .collect();
-    let inverse_bind = buffer.accessor(root, Layout::f32(Type::Mat4), n, le_f32(&bind), None);
-    root.push(Skin {
-        extensions: None,
-        extras: None,
-        inverse_bind_matrices: Some(inverse_bind),
-        joints: (0..n as u32).map(Index::new).collect(),
-        name: Some("tree".to_string()),
-        skeleton: Some(Index::new(0)),
-    })
-}
-
-fn bark(rgb: [u8; 3]) -> Material {
-    // glTF colours are linear, those of a picture are not (sRGB transfer function, IEC 61966-2-1).
-    let linear = rgb.map(|c| {
-        let c = f32::from(c) / 255.0;
-        if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
-    });
-    Material {
-        name: Some("bark".to_string()),
-        pbr_metallic_roughness: PbrMetallicRoughness {
-            base_color_factor: PbrBaseColorFactor([linear[0], linear[1], linear[2], 1.0]),
-            metallic_factor: StrengthFactor(0.0),
-            roughness_factor: StrengthFactor(0.9),
-            ..PbrMetallicRoughness::default()
-        },
-        ..Material::default()
-    }
 }
 
 /// All times lie in one view and all rotations in another.

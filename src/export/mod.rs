@@ -7,6 +7,7 @@ mod error;
 pub mod folder;
 pub mod gltf;
 mod gltf_buffer;
+mod gltf_mesh;
 mod joints;
 mod number;
 mod thin_keys;

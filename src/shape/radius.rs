@@ -17,13 +17,13 @@ pub fn pipe_model(skeleton: &mut Skeleton, trunk_radius_px: f64, tip_radius_px: 
     let pipes = pipes(skeleton);
     // The whole tree's pipes: those of every measured branch that leaves the foot.
     let total = pipes.first().copied().unwrap_or(1.0).max(1.0);
-    for i in 0..skeleton.nodes.len() {
+    for (i, &own_pipes) in pipes.iter().enumerate() {
         let node = &skeleton.nodes[i];
         let own = match node.copy_of {
             _ if node.level <= 1 => trunk,
             Some(original) if original.index() < i => skeleton.nodes[original.index()].radius,
             Some(_) => tip,
-            None => (trunk * (pipes[i] / total).powf(1.0 / PIPE_EXPONENT)).max(tip),
+            None => (trunk * (own_pipes / total).powf(1.0 / PIPE_EXPONENT)).max(tip),
         };
         let parent = node.parent.and_then(|p| skeleton.nodes.get(p.index())).map_or(trunk, |p| p.radius);
         skeleton.nodes[i].radius = own.min(parent);
