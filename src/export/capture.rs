@@ -1,0 +1,172 @@
+//! `capture.json`: what was filmed, with what, how well. No date of today, so that a replay gives the same file.
+
+use super::ExportError;
+use crate::config::Config;
+use serde::{Deserialize, Serialize};
+
+/// Grows when a reader of older files would misread a newer one.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// At most so many gaps are listed; the counts in [`Timing`] are complete.
+pub const MAX_GAPS: usize = 1000;
+
+/// The whole of `capture.json`. Numbers that are not known are `null`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Capture {
+    pub schema_version: u32,
+    pub software: Software,
+    /// When the capture began, RFC 3339, if the caller wants it in the file; a replay leaves it out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub captured_at: Option<String>,
+    pub source: Source,
+    pub timing: Timing,
+    /// The whole effective configuration: defaults, file and command line together.
+    pub config: Config,
+    /// `None` if the capture ended before the tree was built.
+    pub build: Option<Build>,
+    pub quality: Quality,
+    pub model: Option<ModelNote>,
+    pub animation: Option<AnimationNote>,
+    /// What the user should know before trusting the result, one sentence each.
+    pub warnings: Vec<String>,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Software {
+    pub name: String,
+    pub version: String,
+}
+
+impl Default for Software {
+    fn default() -> Self {
+        Self { name: "arborcam".into(), version: env!("CARGO_PKG_VERSION").into() }
+    }
+}
+
+/// Where the frames came from.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Source {
+    pub name: String,
+    /// E.g. `MJPG 1280x720 @ 30`.
+    pub format_asked: String,
+    pub format_given: String,
+    /// Size of the picture, px.
+    pub width: u32,
+    pub height: u32,
+}
+
+/// Frames and time, by the sensor's own clock.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Timing {
+    /// What the source says, and what its timestamps say, Hz.
+    pub nominal_rate_hz: Option<f64>,
+    pub measured_rate_hz: Option<f64>,
+    pub frames_seen: u64,
+    /// Lost before us: holes in the driver's count.
+    pub frames_dropped_camera: u64,
+    /// Not taken by the tracker, which was busy.
+    pub frames_dropped_tracker: u64,
+    pub frames_undecodable: u64,
+    /// Seen before there was an outline, and not tracked.
+    pub frames_before_outline: u64,
+    /// The first [`MAX_GAPS`] holes in the count of frames.
+    pub gaps: Vec<Gap>,
+    pub gaps_not_listed: u64,
+    /// From the first frame to the last, s.
+    pub duration_s: f64,
+}
+
+impl Timing {
+    /// Notes a hole; the list stays bounded however long the capture runs.
+    pub fn push_gap(&mut self, gap: Gap) {
+        if self.gaps.len() < MAX_GAPS {
+            self.gaps.push(gap);
+        } else {
+            self.gaps_not_listed += 1;
+        }
+    }
+}
+
+/// Frames missing from the sequence.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Gap {
+    /// The last frame before the hole, and its time, s.
+    pub after_frame: u64,
+    pub time_s: f64,
+    /// Number of frames missing.
+    pub missing: u64,
+}
+
+/// When and on what the tree was built.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Build {
+    pub frame: u64,
+    pub time_s: f64,
+    /// The accumulation measure at that time, 0 to 1.
+    pub accumulation: f64,
+    pub moving_points: u32,
+    /// Built by order of the user or by the end of the source, not because enough had been seen.
+    pub forced: bool,
+}
+
+/// How well the points were followed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Quality {
+    pub tracks_total: u64,
+    pub tracks_alive_end: u64,
+    /// Distance by which tracking forward and back misses the start, px.
+    pub median_fb_error_px: Option<f64>,
+    pub lost_per_s: Option<f64>,
+    /// Median distance between observed points and where the 3D pose puts them in the picture, px.
+    pub median_reprojection_px: Option<f64>,
+}
+
+/// The tree.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ModelNote {
+    pub nodes: u32,
+    /// Those of them that repeat a measured node on another plane.
+    pub copies: u32,
+    pub axes: String,
+    /// `px` or `m`.
+    pub unit: String,
+    /// 0 where the model is in pixels.
+    pub metres_per_px: f64,
+    /// The trunk's foot in the picture, px: the origin of the model.
+    pub foot_px: [f64; 2],
+}
+
+impl ModelNote {
+    /// The note for a skeleton that is written with this scale (0: pixels).
+    pub fn of(skeleton: &crate::model::Skeleton, metres_per_px: f64) -> Self {
+        let nodes = skeleton.nodes.len();
+        Self {
+            nodes: nodes as u32,
+            copies: (nodes - skeleton.measured()) as u32,
+            axes: "x right, y up, z towards the viewer, right-handed; origin at the trunk's foot".into(),
+            unit: if metres_per_px > 0.0 { "m" } else { "px" }.into(),
+            metres_per_px,
+            foot_px: skeleton.foot_px,
+        }
+    }
+}
+
+/// The animation in `tree.glb`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct AnimationNote {
+    /// Frame that stands at time 0 of the animation.
+    pub first_frame: u64,
+    pub frames: u64,
+    /// Rotation keys that were left after thinning.
+    pub keys: u64,
+}
+
+/// The text of `capture.json`.
+///
+/// # Errors
+/// None in practice: every field has a JSON form.
+pub fn json(capture: &Capture) -> Result<Vec<u8>, ExportError> {
+    let mut text = serde_json::to_vec_pretty(capture).map_err(|e| ExportError::unfit(e.to_string()))?;
+    text.push(b'\n');
+    Ok(text)
+}

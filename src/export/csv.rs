@@ -1,0 +1,228 @@
+//! `tracks.csv`, `nodes.csv` and `motion.csv` over any writer, row by row.
+//!
+//! Times are seconds with up to 6 decimals, pixels up to 3, lengths in the model up to 4. Unknown is an empty cell.
+
+use super::{ExportError, number};
+use crate::model::{NodeId, Pose, Skeleton, TrackId, TrackSet};
+use std::io::Write;
+
+pub const TRACKS_HEADER: &str = "track_id,frame,time_s,u_px,v_px,node_id";
+pub const NODES_HEADER: &str = "node_id,parent_id,level,n_tracks,u_px,v_px,x,y,z,radius,frequency_hz,\
+frequency_lo_hz,frequency_hi_hz,damping_ratio,damping_lo,damping_hi,identifiable";
+pub const MOTION_HEADER: &str = "frame,time_s,node_id,x,y,z,u_px,v_px";
+
+/// How one node sways, with 95 % intervals. A value that is no number stands for one that is not known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sway {
+    pub frequency_hz: f64,
+    pub frequency_lo_hz: f64,
+    pub frequency_hi_hz: f64,
+    /// Share of critical damping.
+    pub damping_ratio: f64,
+    pub damping_lo: f64,
+    pub damping_hi: f64,
+}
+
+impl Sway {
+    const UNKNOWN: Self = Self {
+        frequency_hz: f64::NAN,
+        frequency_lo_hz: f64::NAN,
+        frequency_hi_hz: f64::NAN,
+        damping_ratio: f64::NAN,
+        damping_lo: f64::NAN,
+        damping_hi: f64::NAN,
+    };
+
+    fn values(&self) -> [f64; 6] {
+        let damping = [self.damping_ratio, self.damping_lo, self.damping_hi];
+        let [d, lo, hi] = damping;
+        [self.frequency_hz, self.frequency_lo_hz, self.frequency_hi_hz, d, lo, hi]
+    }
+}
+
+/// One CSV file: a row is put together cell by cell.
+struct Table<W: Write> {
+    what: &'static str,
+    out: ::csv::Writer<W>,
+    row: ::csv::StringRecord,
+    cell: String,
+    /// Size of the file so far, for the message that the disk is full.
+    bytes: u64,
+}
+
+impl<W: Write> Table<W> {
+    fn new(what: &'static str, header: &str, out: W) -> Result<Self, ExportError> {
+        let out = ::csv::Writer::from_writer(out);
+        let mut table = Self { what, out, row: ::csv::StringRecord::new(), cell: String::new(), bytes: 0 };
+        header.split(',').for_each(|name| table.row.push_field(name));
+        table.end_row()?;
+        Ok(table)
+    }
+
+    fn number(&mut self, x: f64, decimals: usize) {
+        self.cell.clear();
+        number::push(&mut self.cell, x, decimals);
+        self.row.push_field(&self.cell);
+    }
+
+    fn count(&mut self, n: impl Into<u64>) {
+        use std::fmt::Write;
+        self.cell.clear();
+        let _ = write!(self.cell, "{}", n.into());
+        self.row.push_field(&self.cell);
+    }
+
+    fn id(&mut self, id: Option<NodeId>) {
+        match id {
+            Some(id) => self.count(id.0),
+            None => self.row.push_field(""),
+        }
+    }
+
+    fn end_row(&mut self) -> Result<(), ExportError> {
+        self.bytes += (self.row.as_slice().len() + self.row.len()) as u64;
+        let written = self.out.write_record(&self.row);
+        self.row.clear();
+        written.map_err(|e| match e.into_kind() {
+            ::csv::ErrorKind::Io(e) => ExportError::from_io(self.what, self.bytes, e),
+            other => ExportError::Io { what: self.what.into(), source: std::io::Error::other(format!("{other:?}")) },
+        })
+    }
+
+    fn finish(mut self) -> Result<W, ExportError> {
+        let (what, bytes) = (self.what, self.bytes);
+        self.out.flush().map_err(|e| ExportError::from_io(what, bytes, e))?;
+        self.out.into_inner().map_err(|e| ExportError::from_io(what, bytes, std::io::Error::other(e.to_string())))
+    }
+}
+
+/// Writes `tracks.csv`.
+pub struct TracksCsv<W: Write>(Table<W>);
+
+impl<W: Write> TracksCsv<W> {
+    /// # Errors
+    /// The header cannot be written.
+    pub fn new(out: W) -> Result<Self, ExportError> {
+        Table::new("tracks.csv", TRACKS_HEADER, out).map(Self)
+    }
+
+    /// One point in one frame; `node` is the deepest one that it belongs to.
+    ///
+    /// # Errors
+    /// The row cannot be written.
+    pub fn row(
+        &mut self,
+        track: TrackId,
+        frame: u64,
+        time_s: f64,
+        position_px: [f64; 2],
+        node: Option<NodeId>,
+    ) -> Result<(), ExportError> {
+        self.0.count(track.0);
+        self.0.count(frame);
+        self.0.number(time_s, 6);
+        position_px.into_iter().for_each(|x| self.0.number(x, 3));
+        self.0.id(node);
+        self.0.end_row()
+    }
+
+    /// All points of one frame.
+    ///
+    /// # Errors
+    /// A row cannot be written.
+    pub fn set(&mut self, set: &TrackSet, node_of: impl Fn(TrackId) -> Option<NodeId>) -> Result<(), ExportError> {
+        for o in &set.observations {
+            self.row(o.id, set.frame, set.time_s, [o.u_px.into(), o.v_px.into()], node_of(o.id))?;
+        }
+        Ok(())
+    }
+
+    /// Ends the file and gives the writer back; without this, errors of the last rows would be lost.
+    ///
+    /// # Errors
+    /// The last rows cannot be written.
+    pub fn finish(self) -> Result<W, ExportError> {
+        self.0.finish()
+    }
+}
+
+/// Writes `nodes.csv`. `sway` is by node index and may be shorter than the tree; `metres_per_px` 0 leaves pixels.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn nodes<W: Write>(
+    out: W,
+    skeleton: &Skeleton,
+    sway: &[Option<Sway>],
+    metres_per_px: f64,
+) -> Result<W, ExportError> {
+    let mut table = Table::new("nodes.csv", NODES_HEADER, out)?;
+    let (scale, more) = unit(metres_per_px);
+    for (i, node) in skeleton.nodes.iter().enumerate() {
+        let sway = sway.get(i).copied().flatten().unwrap_or(Sway::UNKNOWN).values();
+        table.count(i as u64);
+        table.id(node.parent);
+        table.count(node.level);
+        table.count(node.n_tracks);
+        skeleton.image_from_model(&node.position).into_iter().for_each(|x| table.number(x, 3));
+        node.position.iter().chain([&node.radius]).for_each(|x| table.number(x * scale, 4 + more));
+        sway.iter().for_each(|&x| table.number(x, 4));
+        table.row.push_field(if sway.iter().all(|x| x.is_finite()) { "true" } else { "false" });
+        table.end_row()?;
+    }
+    table.finish()
+}
+
+/// Writes `motion.csv`.
+pub struct MotionCsv<'a, W: Write> {
+    table: Table<W>,
+    skeleton: &'a Skeleton,
+    scale: f64,
+    decimals: usize,
+}
+
+impl<'a, W: Write> MotionCsv<'a, W> {
+    /// `metres_per_px` 0 leaves pixels.
+    ///
+    /// # Errors
+    /// The header cannot be written.
+    pub fn new(out: W, skeleton: &'a Skeleton, metres_per_px: f64) -> Result<Self, ExportError> {
+        let (scale, more) = unit(metres_per_px);
+        // One decimal more than other lengths: rounding must not stretch a branch of a few pixels by a thousandth.
+        let decimals = 5 + more;
+        Ok(Self { table: Table::new("motion.csv", MOTION_HEADER, out)?, skeleton, scale, decimals })
+    }
+
+    /// Every node in one frame.
+    ///
+    /// # Errors
+    /// A row cannot be written.
+    pub fn pose(&mut self, pose: &Pose) -> Result<(), ExportError> {
+        for (i, joint) in pose.joints.iter().enumerate() {
+            self.table.count(pose.frame);
+            self.table.number(pose.time_s, 6);
+            self.table.count(i as u64);
+            joint.position.iter().for_each(|x| self.table.number(x * self.scale, self.decimals));
+            self.skeleton.image_from_model(&joint.position).into_iter().for_each(|x| self.table.number(x, 3));
+            self.table.end_row()?;
+        }
+        Ok(())
+    }
+
+    /// Ends the file and gives the writer back; without this, errors of the last rows would be lost.
+    ///
+    /// # Errors
+    /// The last rows cannot be written.
+    pub fn finish(self) -> Result<W, ExportError> {
+        self.table.finish()
+    }
+}
+
+/// Length of a pixel in the file's unit, and how many decimals more it takes to say as much in that unit.
+fn unit(metres_per_px: f64) -> (f64, usize) {
+    if metres_per_px > 0.0 {
+        (metres_per_px, (-metres_per_px.log10()).ceil().clamp(0.0, 12.0) as usize)
+    } else {
+        (1.0, 0)
+    }
+}

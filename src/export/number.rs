@@ -1,0 +1,42 @@
+//! Numbers as text, the same on every machine.
+
+/// Appends `x` with at most `decimals` digits after the point, no trailing zeros, no exponent and no negative zero;
+/// nothing at all for what is no number.
+pub(super) fn push(out: &mut String, x: f64, decimals: usize) {
+    use std::fmt::Write;
+    if !x.is_finite() {
+        return;
+    }
+    let start = out.len();
+    // Writing to a string cannot fail.
+    let _ = write!(out, "{x:.decimals$}");
+    if decimals > 0 {
+        out.truncate(start + out[start..].trim_end_matches('0').trim_end_matches('.').len());
+    }
+    if &out[start..] == "-0" {
+        out.remove(start);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn numbers_are_compact_and_never_exponents() {
+        let cases = [
+            (1.0, 3, "1"),
+            (12.5, 3, "12.5"),
+            (-0.0001, 3, "0"),
+            (100.0, 0, "100"),
+            (1e-9, 6, "0"),
+            (1e15, 3, "1000000000000000"),
+            (2.0 / 3.0, 6, "0.666667"),
+            (f64::NAN, 3, ""),
+            (f64::INFINITY, 3, ""),
+        ];
+        for (x, decimals, text) in cases {
+            let mut out = String::new();
+            super::push(&mut out, x, decimals);
+            assert_eq!(out, text);
+        }
+    }
+}

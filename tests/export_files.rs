@@ -1,0 +1,203 @@
+//! CSV, capture.json and the folder that they go to.
+
+mod synthetic;
+
+use arborcam::config::Config;
+use arborcam::export::capture::{self, Capture, Gap, MAX_GAPS, ModelNote, Quality, SCHEMA_VERSION, Timing};
+use arborcam::export::csv::{MotionCsv, Sway, TracksCsv, nodes};
+use arborcam::export::{ExportError, OutputFolder};
+use arborcam::model::{NodeId, Observation, TrackId, TrackSet};
+use std::collections::HashMap;
+use std::fs;
+use std::path::Path;
+
+fn text(bytes: Vec<u8>) -> String {
+    String::from_utf8(bytes).unwrap()
+}
+
+#[test]
+fn tracks_have_the_agreed_columns_and_an_empty_cell_where_no_node_is() {
+    let mut csv = TracksCsv::new(Vec::new()).unwrap();
+    let o = |id, u_px| Observation { id: TrackId(id), u_px, v_px: 7.0, fb_error_px: 0.1 };
+    let set = TrackSet { frame: 3, time_s: 0.1, observations: vec![o(1, 10.25), o(2, 0.0)], lost: 0, born: 0 };
+    csv.set(&set, |id| (id == TrackId(1)).then_some(NodeId(5))).unwrap();
+    csv.row(TrackId(9), 4, 1.0 / 3.0, [f64::NAN, -0.0], None).unwrap();
+    let expected = "track_id,frame,time_s,u_px,v_px,node_id\n1,3,0.1,10.25,7,5\n2,3,0.1,0,7,\n9,4,0.333333,,0,\n";
+    assert_eq!(text(csv.finish().unwrap()), expected);
+}
+
+#[test]
+fn nodes_say_what_is_not_identifiable() {
+    let skeleton = synthetic::tree(2, 1);
+    let sway = Sway {
+        frequency_hz: 0.512_34,
+        frequency_lo_hz: 0.5,
+        frequency_hi_hz: 0.53,
+        damping_ratio: 0.04,
+        damping_lo: 0.02,
+        damping_hi: 0.07,
+    };
+    let half = Sway { damping_ratio: f64::NAN, damping_lo: f64::NAN, damping_hi: f64::NAN, ..sway };
+    let out = text(nodes(Vec::new(), &skeleton, &[None, Some(sway), Some(half)], 0.0).unwrap());
+    let lines: Vec<&str> = out.lines().collect();
+    let header = "node_id,parent_id,level,n_tracks,u_px,v_px,x,y,z,radius,frequency_hz,frequency_lo_hz,\
+                  frequency_hi_hz,damping_ratio,damping_lo,damping_hi,identifiable";
+    assert_eq!(lines[0], header);
+    assert_eq!(lines[1], "0,,0,400,640,700,0,0,0,14,,,,,,,false");
+    assert_eq!(lines[2], "1,0,1,200,644,540,4,160,0,14,0.5123,0.5,0.53,0.04,0.02,0.07,true");
+    assert!(lines[3].ends_with(",0.5123,0.5,0.53,,,,false"), "{}", lines[3]);
+    assert_eq!(lines.len(), 5);
+}
+
+/// Length of every branch in every frame, from the text.
+fn lengths(motion: &str, parents: &[Option<NodeId>]) -> HashMap<usize, Vec<f64>> {
+    let mut at: HashMap<(u64, usize), [f64; 3]> = HashMap::new();
+    for row in csv::Reader::from_reader(motion.as_bytes()).deserialize() {
+        let (frame, _, node, x, y, z, _, _): (u64, f64, usize, f64, f64, f64, f64, f64) = row.unwrap();
+        at.insert((frame, node), [x, y, z]);
+    }
+    let mut out: HashMap<usize, Vec<f64>> = HashMap::new();
+    for (&(frame, node), p) in &at {
+        if let Some(parent) = parents[node] {
+            let q = at[&(frame, parent.index())];
+            let squares: f64 = p.iter().zip(q).map(|(a, b)| (a - b).powi(2)).sum();
+            out.entry(node).or_default().push(squares.sqrt());
+        }
+    }
+    out
+}
+
+#[test]
+fn rounding_does_not_stretch_even_the_shortest_branch() {
+    let mut skeleton = synthetic::tree(4, 1);
+    // The last branch is a pixel long.
+    let last = skeleton.nodes.len() - 1;
+    let parent = skeleton.nodes[skeleton.nodes[last].parent.unwrap().index()].position;
+    skeleton.nodes[last].position = parent + (skeleton.nodes[last].position - parent).normalize();
+    let poses = synthetic::sway(&skeleton, 20);
+    let parents: Vec<_> = skeleton.nodes.iter().map(|n| n.parent).collect();
+    for metres_per_px in [0.0, 0.004, 1e-5] {
+        let mut csv = MotionCsv::new(Vec::new(), &skeleton, metres_per_px).unwrap();
+        poses.iter().for_each(|p| csv.pose(p).unwrap());
+        let out = text(csv.finish().unwrap());
+        assert!(out.starts_with("frame,time_s,node_id,x,y,z,u_px,v_px\n150,"));
+        assert_eq!(out.lines().count(), 1 + 20 * skeleton.nodes.len());
+        for (node, lengths) in lengths(&out, &parents) {
+            let (low, high) = lengths.iter().fold((f64::MAX, 0.0_f64), |(l, h), &x| (l.min(x), h.max(x)));
+            assert!(high / low - 1.0 < 1e-3, "branch {node}: {low} to {high} at {metres_per_px} m a pixel");
+        }
+    }
+}
+
+#[test]
+fn a_capture_reads_back_as_it_was_written_and_is_the_same_every_time() {
+    let skeleton = synthetic::tree(3, 2);
+    let mut timing = Timing { nominal_rate_hz: Some(30.0), ..Timing::default() };
+    for k in 0..MAX_GAPS as u64 + 5 {
+        timing.push_gap(Gap { after_frame: 2 * k, time_s: k as f64, missing: 1 });
+    }
+    assert_eq!((timing.gaps.len(), timing.gaps_not_listed), (MAX_GAPS, 5));
+    let capture = Capture {
+        schema_version: SCHEMA_VERSION,
+        software: Default::default(),
+        captured_at: None,
+        source: Default::default(),
+        timing,
+        config: Config::default(),
+        build: None,
+        quality: Quality { median_fb_error_px: Some(0.05), ..Quality::default() },
+        model: Some(ModelNote::of(&skeleton, 0.004)),
+        animation: None,
+        warnings: vec!["the camera dropped 3 frames".into()],
+    };
+    let bytes = capture::json(&capture).unwrap();
+    assert_eq!(bytes, capture::json(&capture).unwrap());
+    assert_eq!(serde_json::from_slice::<Capture>(&bytes).unwrap(), capture);
+    assert!(!text(bytes).contains("captured_at"));
+}
+
+fn names_in(dir: &Path) -> Vec<String> {
+    let mut names: Vec<_> = fs::read_dir(dir).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_folder_appears_only_when_it_is_complete() {
+    let home = tempfile::tempdir().unwrap();
+    let dir = home.path().join("new/deep/oak");
+    let folder = OutputFolder::create(&dir).unwrap();
+    let again = OutputFolder::create(&dir).unwrap();
+    folder.write("capture.json", b"{}").unwrap();
+    assert!(!dir.exists());
+    folder.publish().unwrap();
+    assert_eq!(fs::read(dir.join("capture.json")).unwrap(), b"{}");
+    // A second capture that began before the first was finished must not replace it.
+    again.write("capture.json", b"other").unwrap();
+    assert!(matches!(again.publish(), Err(ExportError::Exists { .. })));
+    assert_eq!(fs::read(dir.join("capture.json")).unwrap(), b"{}");
+    assert_eq!(names_in(&home.path().join("new/deep")), ["oak"]);
+}
+
+#[test]
+fn a_capture_that_is_given_up_leaves_nothing_behind() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = OutputFolder::create(&home.path().join("a/b/oak")).unwrap();
+    folder.write("tracks.csv", b"half").unwrap();
+    drop(folder);
+    assert_eq!(names_in(home.path()), [""; 0]);
+}
+
+#[test]
+fn what_exists_is_never_touched_and_the_message_says_what_to_do() {
+    let home = tempfile::tempdir().unwrap();
+    fs::write(home.path().join("file"), "mine").unwrap();
+    fs::create_dir(home.path().join("empty")).unwrap();
+    std::os::unix::fs::symlink("nowhere", home.path().join("link")).unwrap();
+    for taken in ["file", "empty", "link"] {
+        let error = OutputFolder::create(&home.path().join(taken)).unwrap_err();
+        assert!(matches!(error, ExportError::Exists { .. }), "{taken}: {error}");
+        let line = error.to_string();
+        assert!(line.contains("choose another") && !line.contains('\n'), "{line}");
+    }
+    let below_a_file = OutputFolder::create(&home.path().join("file/oak")).unwrap_err();
+    assert!(matches!(below_a_file, ExportError::NotAFolder { .. }), "{below_a_file}");
+    assert!(OutputFolder::create(Path::new("")).is_err());
+    assert_eq!(names_in(home.path()), ["empty", "file", "link"]);
+}
+
+#[test]
+fn a_full_disk_is_named_by_the_row_writers() {
+    let full = || fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let skeleton = synthetic::tree(5, 3);
+    let poses = synthetic::sway(&skeleton, 100);
+    let mut csv = MotionCsv::new(full(), &skeleton, 0.0).unwrap();
+    // Far more than any buffer: the error must come while writing, not at the end of an hour.
+    let error = poses.iter().find_map(|p| csv.pose(p).err()).expect("nothing fits on a full disk");
+    assert!(matches!(error, ExportError::DiskFull { .. }), "{error}");
+    let short = TracksCsv::new(full()).unwrap().finish().unwrap_err();
+    assert!(matches!(short, ExportError::DiskFull { .. }), "{short}");
+}
+
+/// Needs a small file system of its own, which only root can mount.
+#[test]
+fn a_full_disk_leaves_no_half_written_folder() {
+    let home = tempfile::tempdir().unwrap();
+    let mount = |command: &str, args: &[&str]| {
+        std::process::Command::new(command).args(args).output().is_ok_and(|o| o.status.success())
+    };
+    let at = home.path().to_str().unwrap().to_string();
+    if !mount("mount", &["-t", "tmpfs", "-o", "size=256k", "tmpfs", &at]) {
+        eprintln!("SKIPPED a_full_disk_leaves_no_half_written_folder: no right to mount a small file system");
+        return;
+    }
+    let folder = OutputFolder::create(&home.path().join("oak")).unwrap();
+    folder.write("capture.json", &[b' '; 100_000]).unwrap();
+    let error = folder.write("tree.glb", &vec![0; 1_000_000]).unwrap_err();
+    drop(folder);
+    let left = names_in(home.path());
+    assert!(mount("umount", &[&at]));
+    assert_eq!(left, [""; 0]);
+    assert!(matches!(error, ExportError::DiskFull { bytes: 1_100_000, .. }), "{error:?}");
+    assert!(error.to_string().contains("1.1 MB"), "{error}");
+}

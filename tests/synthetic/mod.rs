@@ -1,0 +1,89 @@
+//! A made-up tree that sways: binary, every branch on its own plane, copies turned about the trunk.
+
+// Every test file compiles this module for itself and uses a part of it.
+#![allow(dead_code)]
+
+use arborcam::model::{JointPose, Node, NodeId, Pose, Size, Skeleton};
+use arborcam::shape::radius::pipe_model;
+use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
+
+/// A number in -1..1 that is always the same for the same arguments.
+pub fn noise(a: usize, b: usize) -> f64 {
+    let mut x = (a as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ (b as u64).wrapping_mul(0xD1B5_4A32_D192_ED03);
+    for _ in 0..3 {
+        x = (x ^ (x >> 31)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    }
+    (x >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+}
+
+/// Foot, trunk, and a fork at every node up to level `levels`, on `planes` planes: 7 and 3 make 380 nodes.
+pub fn tree(levels: u8, planes: usize) -> Skeleton {
+    let node = |parent: Option<usize>, level, position| Node {
+        parent: parent.map(|p| NodeId(p as u32)),
+        level,
+        position,
+        radius: 0.0,
+        n_tracks: 400 >> level,
+        copy_of: None,
+        plane_angle: 0.0,
+    };
+    let mut nodes = vec![node(None, 0, Point3::origin()), node(Some(0), 1, Point3::new(4.0, 160.0, 0.0))];
+    let mut i = 1;
+    while i < nodes.len() {
+        let (level, at) = (nodes[i].level, nodes[i].position);
+        let way = at - nodes[nodes[i].parent.unwrap().index()].position;
+        let lean = way.x.atan2(way.y);
+        for side in [-1.0, 1.0].into_iter().filter(|_| level < levels) {
+            let turn = lean + side * 0.5 + 0.2 * noise(i, side as usize);
+            let length = 110.0 * 0.78_f64.powi(i32::from(level) - 1) * (1.0 + 0.2 * noise(i, 7));
+            let push = 0.35 * length * noise(i, 9 + side as usize);
+            let step = Vector3::new(length * turn.sin(), length * turn.cos(), push);
+            nodes.push(node(Some(i), level + 1, at + step));
+        }
+        i += 1;
+    }
+    let measured = nodes.len();
+    for plane in 1..planes {
+        let angle = std::f64::consts::PI * plane as f64 / planes as f64;
+        let about_trunk = Rotation3::from_axis_angle(&Vector3::y_axis(), angle);
+        let first = nodes.len();
+        for original in 2..measured {
+            let from = &nodes[original];
+            let parent = from.parent.unwrap().index();
+            let mut copy = node(Some(if parent < 2 { parent } else { first + parent - 2 }), from.level, from.position);
+            let pivot = nodes[1].position;
+            copy.position = pivot + about_trunk * (from.position - pivot);
+            (copy.n_tracks, copy.copy_of, copy.plane_angle) = (0, Some(NodeId(original as u32)), angle);
+            nodes.push(copy);
+        }
+    }
+    let mut skeleton = Skeleton { nodes, foot_px: [640.0, 700.0], image_size: Size::new(1280, 720) };
+    pipe_model(&mut skeleton, 14.0, 0.6);
+    skeleton
+}
+
+/// Poses at 30 frames a second; every branch swings against its parent, faster and farther towards the tips, with
+/// the jitter of a tracker.
+pub fn sway(skeleton: &Skeleton, frames: usize) -> Vec<Pose> {
+    let pose = |k: usize| {
+        let time_s = 5.0 + k as f64 / 30.0 + 1e-4 * noise(k, 1);
+        let mut joints: Vec<JointPose> = Vec::new();
+        for (i, node) in skeleton.nodes.iter().enumerate() {
+            let Some(parent) = node.parent else {
+                joints.push(JointPose { position: node.position, rotation: UnitQuaternion::identity() });
+                continue;
+            };
+            let level = f64::from(node.level);
+            let swing = |n: usize| (std::f64::consts::TAU * (0.3 + 0.25 * level) * time_s + 3.0 * noise(i, n)).sin();
+            let reach = 0.008 * level;
+            let jitter = 0.0005 * level * noise(i, 1000 + k);
+            let turn = Vector3::new(0.5 * reach * swing(1), 0.2 * reach * swing(2), reach * swing(3) + jitter);
+            let from = joints[parent.index()];
+            let rotation = from.rotation * UnitQuaternion::from_scaled_axis(turn);
+            let way = node.position - skeleton.nodes[parent.index()].position;
+            joints.push(JointPose { position: from.position + rotation * way, rotation });
+        }
+        Pose { frame: 150 + k as u64, time_s, joints }
+    };
+    (0..frames).map(pose).collect()
+}
