@@ -1,4 +1,31 @@
-//! arborcam
+//! arborcam films a swaying tree with an ordinary camera and turns it, while it films, into a 3D tree that moves as the
+//! real one does, after Li, Deussen, Song, Willis and Hall, "Modeling and Generating Moving Trees from Video" (2011),
+//! and Zeng's variant of it (2015).
+//!
+//! # The way of the data
+//!
+//! ```text
+//! source ──RawFrame──▶ decode ──Frame──▶ outline ─▶ track ──TrackSet──▶ hierarchy ──MotionHierarchy──┐
+//!                                                     │    once enough motion has accumulated         ▼
+//!                                                     │                          skeleton (2D) ─▶ shape (3D)
+//!                                                     │                                               │ Skeleton
+//!                                                     └──────TrackSet, every frame──────▶ motion ◀────┘
+//!                                                                                           │ Pose
+//!                                                     terminal UI, --stream, capture folder ◀
+//! ```
+//!
+//! [`pipeline`] is that picture as code: a front end (frame to tracks) and a back end (tracks to tree and pose).
+//! [`runtime`] runs the two on threads between a source and the screen.
+//!
+//! # The modules in reading order
+//!
+//! [`model`] the nouns · [`source`] where frames come from · [`outline`] which pixels are tree · [`track`] points
+//! followed · [`hierarchy`] who moves with whom · [`skeleton`] in the picture · [`shape`] in space · [`motion`] the pose
+//! of every frame · [`dynamics`] what the motion says · [`pipeline`] all of it · [`runtime`] on threads ·
+//! [`recording`] kept on disk · [`export`] files for others · [`tui`] the screen · [`cli`] the commands · [`config`]
+//! what can be set.
+
+pub mod cli;
 pub mod config;
 pub mod dynamics;
 pub mod export;
@@ -13,3 +40,4 @@ pub mod shape;
 pub mod skeleton;
 pub mod source;
 pub mod track;
+pub mod tui;

@@ -370,12 +370,13 @@ impl Retrace {
         Self { tree: tree.clone(), before: fresh(), after: fresh() }
     }
 
-    /// The pose in the next frame; frames must come in their order.
-    pub fn step(&mut self, tracks: &TrackSet) -> Pose {
+    /// The pose in the next frame, and where its tracks put the measured nodes (px); frames must come in their order.
+    pub fn step(&mut self, tracks: &TrackSet) -> (Pose, Vec<Option<[f64; 2]>>) {
         let live = tracks.frame >= self.tree.frame;
         let (binding, estimator) = if live { &mut self.after } else { &mut self.before };
         let targets = binding.targets_px(tracks);
-        estimator.step(tracks.frame, tracks.time_s, &targets)
+        let pose = estimator.step(tracks.frame, tracks.time_s, &targets);
+        (pose, targets)
     }
 
     /// The deepest node that a track belongs to, as known after the last step.

@@ -5,7 +5,7 @@ mod synthetic;
 use arborcam::export::ExportError;
 use arborcam::export::gltf::{KEY_TOLERANCE_PX, Model, glb, glb_and_keys};
 use arborcam::model::{Pose, Skeleton};
-use arborcam::shape::mesh::{Detail, Mesh, branches};
+use arborcam::shape::{Detail, Mesh, branches};
 use gltf::animation::util::ReadOutputs;
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde_json::{Value, json};

@@ -3,7 +3,7 @@
 mod synthetic;
 
 use arborcam::model::Skeleton;
-use arborcam::shape::mesh::{Detail, Mesh, branches};
+use arborcam::shape::{Detail, Mesh, branches};
 use nalgebra::{Point3, Vector3};
 
 fn vector(v: [f32; 3]) -> Vector3<f64> {

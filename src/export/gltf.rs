@@ -5,7 +5,7 @@ use super::gltf_buffer::{BufferBuilder, Layout, accessor, le_f32};
 use super::gltf_mesh::push_skinned_mesh;
 use super::joints::{self, Keys};
 use crate::model::{Pose, Skeleton};
-use crate::shape::mesh::Mesh;
+use crate::shape::Mesh;
 use gltf_json::accessor::Type;
 use gltf_json::animation::{Animation, Channel, Interpolation, Property, Sampler, Target};
 use gltf_json::extras::RawValue;

@@ -2,7 +2,7 @@
 
 use super::gltf::Model;
 use super::gltf_buffer::{BufferBuilder, Layout, bounds, le_f32};
-use crate::shape::mesh::Mesh;
+use crate::shape::Mesh;
 use gltf_json::accessor::{ComponentType, Type};
 use gltf_json::buffer::Target::{ArrayBuffer, ElementArrayBuffer};
 use gltf_json::material::{Material, PbrBaseColorFactor, PbrMetallicRoughness, StrengthFactor};

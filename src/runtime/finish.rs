@@ -1,75 +1,248 @@
-//! temp
+//! Writes a capture: the five files of the contract, from the tracks on disk and the tree.
+
+use super::meter::Histogram;
 use super::shared::{Failure, Shared};
 use crate::config::Config;
-use crate::model::{Rgb, TrackSet};
+use crate::export::capture::{AnimationNote, Build, Capture, Gap, ModelNote, Quality as QualityNote, Source, Timing};
+use crate::export::capture::{Software, json};
+use crate::export::csv::{MotionCsv, TracksCsv, nodes};
+use crate::export::gltf::{KEY_TOLERANCE_PX, Model, glb_and_keys};
+use crate::export::{ExportError, OutputFolder};
+use crate::model::{Pose, Rgb, TrackSet};
 use crate::pipeline::{Retrace, Tree};
 use crate::recording::SpoolReader;
+use crate::shape::{Detail, branches};
 use crate::source::SourceInfo;
-use std::io::Write as _;
-use std::path::Path;
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+/// Triangles of the model at most.
+const TRIANGLES: usize = 60_000;
+/// Colour where no picture has been seen.
+const PLAIN_BARK: [u8; 3] = [104, 84, 66];
+
+/// Figures of the tracking, gathered frame by frame.
 #[derive(Clone, Debug, Default)]
 pub struct Quality {
-    total: u64,
+    born: u64,
+    lost: u64,
+    alive: u64,
+    first_s: Option<f64>,
+    last_s: f64,
+    fb_error_px: Histogram,
 }
+
 impl Quality {
-    pub fn note(&mut self, t: &TrackSet, _e: f64) {
-        self.total += u64::from(t.born);
+    /// Takes the tracks of a frame and their median forward-backward error, px.
+    pub fn note(&mut self, tracks: &TrackSet, fb_error_px: f64) {
+        self.born += u64::from(tracks.born);
+        self.lost += u64::from(tracks.lost);
+        self.alive = tracks.observations.len() as u64;
+        self.first_s.get_or_insert(tracks.time_s);
+        self.last_s = tracks.time_s;
+        self.fb_error_px.add(fb_error_px);
     }
+
     pub fn tracks_total(&self) -> u64 {
-        self.total
+        self.born
     }
 }
-#[derive(Clone, Debug)]
-pub struct Written {}
+
+/// Everything that a capture is made of; owned, so that it can be written on any thread while frames go on.
 pub struct CaptureJob {
     pub tree: Option<Arc<Tree>>,
     pub tracks: SpoolReader,
     pub config: Config,
     pub info: SourceInfo,
     pub quality: Quality,
-    pub accumulation: f64,
     pub bark: Option<Arc<Rgb>>,
     pub shared: Arc<Shared>,
 }
+
+/// What was written, for the closing lines.
+#[derive(Clone, Debug)]
+pub struct Written {
+    pub dir: PathBuf,
+    /// Whether there is a model.
+    pub model: bool,
+}
+
+/// Writes the capture to `dir`, which appears only when it is complete.
+///
+/// # Errors
+/// `dir` is there already, the disk is full, or whatever else the file system says.
 pub fn write(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
-    std::fs::create_dir_all(dir).unwrap();
-    let mut t = std::io::BufWriter::new(std::fs::File::create(dir.join("tracks.csv")).unwrap());
-    let mut m = std::io::BufWriter::new(std::fs::File::create(dir.join("motion.csv")).unwrap());
-    let mut n = std::fs::File::create(dir.join("nodes.csv")).unwrap();
-    writeln!(t, "track_id,frame,time_s,u_px,v_px,node_id").unwrap();
-    writeln!(m, "frame,time_s,node_id,x,y,z,u_px,v_px").unwrap();
-    writeln!(n, "node_id,parent_id,level,n_tracks,u_px,v_px,x,y,z,radius,frequency_hz,frequency_lo_hz,frequency_hi_hz,damping_ratio,damping_lo,damping_hi,identifiable").unwrap();
-    let Some(tree) = &job.tree else { return Ok(Written {}) };
-    let mut r = Retrace::new(tree, &job.config);
-    for set in job.tracks.sets() {
-        let p = r.step(&set.unwrap());
-        for (i, j) in p.joints.iter().enumerate() {
-            let [u, v] = tree.skeleton.image_from_model(&j.position);
-            writeln!(
-                m,
-                "{},{:.6},{i},{:.5},{:.5},{:.5},{u:.3},{v:.3}",
-                p.frame, p.time_s, j.position.x, j.position.y, j.position.z
-            )
-            .unwrap();
+    let folder = OutputFolder::create(dir)?;
+    let metres_per_px = job.config.export.metres_per_px;
+    let (mut animation, mut model, mut reprojection_px) = (None, None, None);
+    match &job.tree {
+        Some(tree) => {
+            let mut retrace = Retrace::new(tree, &job.config);
+            let (poses, misses) = write_motion(job, tree, &mut retrace, &folder)?;
+            reprojection_px = misses.median();
+            write_tracks(job, Some(&retrace), &folder)?;
+            let skeleton = &tree.skeleton;
+            // Intervals that can be defended are a matter of their own; until then no branch claims a frequency.
+            let sway = vec![None; skeleton.nodes.len()];
+            nodes(folder.file("nodes.csv")?, skeleton, &sway, metres_per_px)?;
+            let (bytes, keys) = model_of(job, tree, &poses)?;
+            folder.write("tree.glb", &bytes)?;
+            let first_frame = poses.first().map_or(0, |p| p.frame);
+            animation = Some(AnimationNote { first_frame, frames: poses.len() as u64, keys });
+            model = Some(ModelNote::of(skeleton, metres_per_px));
+        }
+        None => {
+            write_tracks(job, None, &folder)?;
+            // Tables without rows and no model: a reader finds every table, and no tree that was never seen.
+            let foot_only = crate::model::Skeleton { nodes: Vec::new(), foot_px: [0.0; 2], image_size: job.info.size };
+            nodes(folder.file("nodes.csv")?, &foot_only, &[], metres_per_px)?;
+            MotionCsv::new(folder.file("motion.csv")?, &foot_only, metres_per_px)?.finish()?;
         }
     }
+    let capture = describe(job, model, animation, reprojection_px);
+    folder.write("capture.json", &json(&capture)?)?;
+    folder.publish()?;
+    Ok(Written { dir: dir.to_path_buf(), model: job.tree.is_some() })
+}
+
+/// `motion.csv`, the poses of the animation's time, and how far the projected nodes lie from their tracks.
+fn write_motion(
+    job: &CaptureJob,
+    tree: &Tree,
+    retrace: &mut Retrace,
+    folder: &OutputFolder,
+) -> Result<(Vec<Pose>, Histogram), Failure> {
+    let mut csv = MotionCsv::new(folder.file("motion.csv")?, &tree.skeleton, job.config.export.metres_per_px)?;
+    let (mut poses, mut misses) = (VecDeque::new(), Histogram::default());
     for set in job.tracks.sets() {
-        let set = set.unwrap();
-        for o in &set.observations {
-            let node = r.node_of(o.id).map_or(String::new(), |n| n.0.to_string());
-            writeln!(t, "{},{},{:.6},{:.3},{:.3},{node}", o.id.0, set.frame, set.time_s, o.u_px, o.v_px).unwrap();
+        let (pose, targets_px) = retrace.step(&set.map_err(Failure::Spool)?);
+        csv.pose(&pose)?;
+        for (joint, target) in pose.joints.iter().zip(&targets_px) {
+            if let Some(t) = target {
+                let [u, v] = tree.skeleton.image_from_model(&joint.position);
+                misses.add((u - t[0]).hypot(v - t[1]));
+            }
+        }
+        let oldest_s = pose.time_s - job.config.export.animation_s;
+        poses.push_back(pose);
+        while poses.front().is_some_and(|p: &Pose| p.time_s < oldest_s) {
+            poses.pop_front();
         }
     }
-    for (i, k) in tree.skeleton.nodes.iter().enumerate() {
-        let p = k.parent.map_or(String::new(), |n| n.0.to_string());
-        let [u, v] = tree.skeleton.image_from_model(&k.position);
-        writeln!(
-            n,
-            "{i},{p},{},{},{u},{v},{},{},{},{},,,,,,,false",
-            k.level, k.n_tracks, k.position.x, k.position.y, k.position.z, k.radius
-        )
-        .unwrap();
+    csv.finish()?;
+    Ok((poses.into(), misses))
+}
+
+fn write_tracks(job: &CaptureJob, retrace: Option<&Retrace>, folder: &OutputFolder) -> Result<(), Failure> {
+    let mut csv = TracksCsv::new(folder.file("tracks.csv")?)?;
+    for set in job.tracks.sets() {
+        csv.set(&set.map_err(Failure::Spool)?, |id| retrace?.node_of(id))?;
     }
-    Ok(Written {})
+    csv.finish()?;
+    Ok(())
+}
+
+fn model_of(job: &CaptureJob, tree: &Tree, poses: &[Pose]) -> Result<(Vec<u8>, u64), ExportError> {
+    let skeleton = &tree.skeleton;
+    let mesh = branches(skeleton, Detail::for_budget(skeleton.nodes.len(), TRIANGLES));
+    let provenance = serde_json::json!({
+        "software": Software::default(),
+        "source": job.info.name,
+        "first_frame": poses.first().map(|p| p.frame),
+        "frames": poses.len(),
+        "measured": "front view: tracked points; depth and copied planes: estimated (Li et al. 2011)",
+    });
+    glb_and_keys(&Model {
+        skeleton,
+        mesh: &mesh,
+        poses,
+        bark_rgb: job.bark.as_deref().map_or(PLAIN_BARK, |picture| bark_rgb(picture, tree)),
+        metres_per_px: job.config.export.metres_per_px,
+        tolerance_px: KEY_TOLERANCE_PX,
+        node_extras: &[],
+        provenance: &provenance,
+    })
+}
+
+/// Median colour of the picture along the lower trunk, between foot and trunk's top.
+fn bark_rgb(picture: &Rgb, tree: &Tree) -> [u8; 3] {
+    let skeleton = &tree.skeleton;
+    let Some(top) = skeleton.nodes.get(1) else { return PLAIN_BARK };
+    let scale = f64::from(picture.size.width) / f64::from(skeleton.image_size.width.max(1));
+    let (foot, top) = (skeleton.foot_px, skeleton.image_from_model(&top.position));
+    let mut channels: [Vec<u8>; 3] = Default::default();
+    // The lower half of the trunk: above it twigs and sky come before it.
+    for k in 1..=50 {
+        let s = f64::from(k) / 100.0;
+        let at = [foot[0] + s * (top[0] - foot[0]), foot[1] + s * (top[1] - foot[1])].map(|x| (x * scale).round());
+        if picture.size.contains(at[0], at[1]) {
+            let colour = picture.at(at[0].max(0.0) as u32, at[1].max(0.0) as u32);
+            channels.iter_mut().zip(colour).for_each(|(c, x)| c.push(x));
+        }
+    }
+    channels.map(|mut c| {
+        c.sort_unstable();
+        c.get(c.len() / 2).copied().unwrap_or(PLAIN_BARK[0])
+    })
+}
+
+fn describe(
+    job: &CaptureJob,
+    model: Option<ModelNote>,
+    animation: Option<AnimationNote>,
+    median_reprojection_px: Option<f64>,
+) -> Capture {
+    let counts = &job.shared.counts;
+    let count = |c: &std::sync::atomic::AtomicU64| c.load(Ordering::Relaxed);
+    let (seen, duration_s) = (count(&counts.seen), job.shared.last_time_s());
+    let mut timing = Timing {
+        nominal_rate_hz: job.info.nominal_rate_hz,
+        measured_rate_hz: (seen > 1 && duration_s > 0.0).then(|| (seen - 1) as f64 / duration_s),
+        frames_seen: seen,
+        frames_dropped_camera: count(&counts.lost_in_camera),
+        frames_dropped_tracker: count(&counts.dropped_before_tracker),
+        frames_undecodable: count(&counts.undecodable),
+        frames_before_outline: count(&counts.before_outline),
+        duration_s,
+        gaps_not_listed: job.shared.gaps_not_listed(),
+        ..Timing::default()
+    };
+    for gap in job.shared.gaps() {
+        timing.push_gap(Gap { after_frame: gap.after_frame, time_s: gap.time_s, missing: gap.missing });
+    }
+    let quality = &job.quality;
+    let tracked_s = quality.last_s - quality.first_s.unwrap_or(quality.last_s);
+    Capture {
+        schema_version: crate::export::capture::SCHEMA_VERSION,
+        software: Software::default(),
+        captured_at: None,
+        source: Source {
+            name: job.info.name.clone(),
+            format_asked: job.info.format.asked.clone(),
+            format_given: job.info.format.given.clone(),
+            width: job.info.size.width,
+            height: job.info.size.height,
+        },
+        timing,
+        config: job.config.clone(),
+        build: job.tree.as_ref().map(|tree| Build {
+            frame: tree.frame,
+            time_s: tree.time_s,
+            accumulation: tree.evidence.measure,
+            moving_points: tree.evidence.moving.len() as u32,
+            forced: tree.forced,
+        }),
+        quality: QualityNote {
+            tracks_total: quality.born,
+            tracks_alive_end: quality.alive,
+            median_fb_error_px: quality.fb_error_px.median(),
+            lost_per_s: (tracked_s > 0.0).then(|| quality.lost as f64 / tracked_s),
+            median_reprojection_px,
+        },
+        model,
+        animation,
+        warnings: job.shared.warnings(),
+    }
 }

@@ -43,9 +43,34 @@ impl Recent {
         let at = (share * (sorted.len().saturating_sub(1)) as f64).round() as usize;
         sorted.get(at).copied().unwrap_or(0.0)
     }
+}
 
-    /// The values, oldest first.
-    pub fn values(&self) -> Vec<f64> {
-        self.values.iter().map(|v| v.1).collect()
+/// Width of a bin of a [`Histogram`], px, and number of bins; larger values count into the last.
+const BIN_PX: f64 = 0.005;
+const BINS: usize = 4000;
+
+/// Distances counted in bins, for a median over a capture of any length.
+#[derive(Clone, Debug, Default)]
+pub struct Histogram {
+    bins: Vec<u64>,
+    count: u64,
+}
+
+impl Histogram {
+    pub fn add(&mut self, px: f64) {
+        self.bins.resize(BINS, 0);
+        self.bins[((px / BIN_PX) as usize).min(BINS - 1)] += 1;
+        self.count += 1;
+    }
+
+    /// Middle of the bin that holds the median, px; `None` if nothing was counted.
+    pub fn median(&self) -> Option<f64> {
+        let mut below = 0;
+        let holds = |n: &u64| {
+            below += n;
+            2 * below >= self.count
+        };
+        let bin = self.bins.iter().position(holds)?;
+        (self.count > 0).then_some((bin as f64 + 0.5) * BIN_PX)
     }
 }

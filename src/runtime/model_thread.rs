@@ -171,7 +171,6 @@ impl ModelThread {
             config: self.job.config.clone(),
             info: self.info.clone(),
             quality: self.quality.clone(),
-            accumulation: self.back.evidence().measure,
             bark: self.bark.clone(),
             shared: self.shared.clone(),
         })

@@ -59,6 +59,7 @@ pub struct Shared {
     pub counts: Counts,
     pub screen: Latest<Arc<Snapshot>>,
     gaps: Mutex<Vec<Gap>>,
+    gaps_not_listed: AtomicU64,
     warnings: Mutex<VecDeque<String>>,
     failure: Mutex<Option<Failure>>,
     last_time_s: Mutex<f64>,
@@ -93,7 +94,13 @@ impl Shared {
         let mut gaps = self.gaps.lock().unwrap_or_else(PoisonError::into_inner);
         if gaps.len() < GAPS_LISTED {
             gaps.push(Gap { after_frame, time_s, missing });
+        } else {
+            self.gaps_not_listed.fetch_add(1, Ordering::Relaxed);
         }
+    }
+
+    pub fn gaps_not_listed(&self) -> u64 {
+        self.gaps_not_listed.load(Ordering::Relaxed)
     }
 
     pub fn gaps(&self) -> Vec<Gap> {

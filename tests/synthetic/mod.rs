@@ -4,7 +4,7 @@
 #![allow(dead_code)]
 
 use arborcam::model::{JointPose, Node, NodeId, Pose, Size, Skeleton};
-use arborcam::shape::radius::pipe_model;
+use arborcam::shape::pipe_model;
 use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
 
 /// A number in -1..1 that is always the same for the same arguments.

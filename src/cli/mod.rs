@@ -1,0 +1,121 @@
+//! The commands: one file each. Here, what they have in common: arguments, exit status, messages.
+
+mod capture;
+mod devices;
+mod replay;
+mod session;
+
+use crate::config::{Config, ConfigError};
+use crate::outline::OutlineSpec;
+use crate::runtime::Failure;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Exit status of the contract.
+const FAILED: u8 = 1;
+const BAD_USAGE: u8 = 2;
+const NO_INPUT: u8 = 3;
+const STOPPED: u8 = 130;
+
+/// Films a swaying tree and turns it, while it films, into a moving 3D tree.
+#[derive(Debug, Parser)]
+#[command(name = "arborcam", version, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Film with a camera, live.
+    Capture(capture::CaptureArgs),
+    /// The same from a video file or a folder of pictures.
+    Replay(replay::ReplayArgs),
+    /// List the cameras that are plugged in.
+    Devices(devices::DevicesArgs),
+}
+
+/// What `capture` and `replay` share.
+#[derive(Debug, Args)]
+struct Common {
+    /// Where the tree is: a JSON polygon, a mask image (white = tree), or `auto` to find it by its motion.
+    #[arg(long, value_name = "FILE|auto", default_value = "auto")]
+    outline: OutlineSpec,
+    /// Folder for the result; it must not exist, and appears when it is complete.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Run without the terminal UI.
+    #[arg(long)]
+    headless: bool,
+    /// Print each pose on standard output, as a line of JSON; implies --headless.
+    #[arg(long, value_name = "FORMAT")]
+    stream: Option<Stream>,
+    /// Settings that differ from the defaults (TOML; see config/arborcam.toml).
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Metres in a pixel at the tree; the model is then in metres.
+    #[arg(long, value_name = "M")]
+    metres_per_px: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Stream {
+    Ndjson,
+}
+
+impl Common {
+    fn config(&self) -> Result<Config, ConfigError> {
+        let mut config = match &self.config {
+            Some(path) => Config::load(path)?,
+            None => Config::default(),
+        };
+        if let Some(metres) = self.metres_per_px {
+            config.export.metres_per_px = metres;
+        }
+        config.check()?;
+        Ok(config)
+    }
+}
+
+/// Why a command did not end well; decides the exit status.
+enum Ended {
+    Failed(anyhow::Error),
+    BadUsage(anyhow::Error),
+    NoInput(anyhow::Error),
+    Stopped,
+}
+
+impl From<Failure> for Ended {
+    fn from(failure: Failure) -> Self {
+        match failure {
+            Failure::NothingDecoded(_) => Ended::NoInput(failure.into()),
+            other => Ended::Failed(other.into()),
+        }
+    }
+}
+
+/// Runs the command line.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let result = match &cli.command {
+        Command::Capture(args) => capture::run(args),
+        Command::Replay(args) => replay::run(args),
+        Command::Devices(args) => devices::run(args),
+    };
+    let (status, error) = match result {
+        Ok(()) => return ExitCode::SUCCESS,
+        Err(Ended::Failed(e)) => (FAILED, e),
+        Err(Ended::BadUsage(e)) => (BAD_USAGE, e),
+        Err(Ended::NoInput(e)) => (NO_INPUT, e),
+        Err(Ended::Stopped) => return ExitCode::from(STOPPED),
+    };
+    say(&format!("arborcam: {error:#}"));
+    ExitCode::from(status)
+}
+
+/// A line on standard error; if nobody reads it any more, that is no reason to fail.
+fn say(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
+}

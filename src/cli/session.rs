@@ -1,0 +1,191 @@
+//! One capture or replay from the command line: open, run, show, report.
+
+use super::{Common, Ended, say};
+use crate::model::{Control, Snapshot};
+use crate::outline::{self, OutlineSpec};
+use crate::runtime::{self, Failure, Job, Pace, Running, Summary};
+use crate::source::{self, SourceError};
+use crate::tui;
+use anyhow::anyhow;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use std::io::IsTerminal;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// Time between two looks at a capture without a screen.
+const HEADLESS_TICK: Duration = Duration::from_millis(20);
+/// Time between two pictures, with and without a screen; without one only the bark's colour is taken from it.
+const PREVIEW_SCREEN: Duration = Duration::from_millis(80);
+const PREVIEW_HEADLESS: Duration = Duration::from_secs(2);
+
+/// What is worked off, and how.
+pub struct Plan<'a> {
+    pub input: &'a Path,
+    pub fps: Option<f64>,
+    /// `None`: live if the source is, else at its own pace.
+    pub pace: Option<Pace>,
+}
+
+/// Runs a capture from the first frame to the last line.
+pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
+    let config = common.config().map_err(|e| Ended::BadUsage(e.into()))?;
+    refuse_existing(common.out.as_deref())?;
+    let source = source::open(plan.input, &config.camera, plan.fps).map_err(no_input)?;
+    let info = source.describe();
+    let outline = match &common.outline {
+        OutlineSpec::Auto => None,
+        OutlineSpec::File(path) => Some(outline::load(path, info.size).map_err(|e| Ended::BadUsage(e.into()))?),
+    };
+    let headless = common.headless || common.stream.is_some();
+    let own_pace = if info.live { Pace::Live } else { Pace::Recorded };
+    let job = Job {
+        config,
+        outline,
+        pace: plan.pace.unwrap_or(own_pace),
+        stream: common.stream.map(|_| Box::new(std::io::stdout()) as _),
+        out: common.out.clone(),
+        preview_every: if headless { PREVIEW_HEADLESS } else { PREVIEW_SCREEN },
+    };
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM, SIGHUP] {
+        // Twice the same signal ends at once: a disk that hangs must not make the program immortal.
+        signal_hook::flag::register_conditional_shutdown(signal, i32::from(super::STOPPED), stop.clone())
+            .and_then(|_| signal_hook::flag::register(signal, stop.clone()))
+            .map_err(|e| Ended::Failed(e.into()))?;
+    }
+    if headless && info.format.asked != info.format.given && !info.format.asked.is_empty() {
+        say(&format!("arborcam: asked for {}, the camera gives {}", info.format.asked, info.format.given));
+    }
+    init_log(headless);
+    let running = runtime::start(source, job)?;
+    let watched = if headless { watch(&running, &stop) } else { show(&running, &stop) };
+    let warnings = running.warnings();
+    let (summary, failure) = running.join();
+    watched?;
+    for warning in warnings {
+        say(&format!("arborcam: {warning}"));
+    }
+    report(summary.as_ref(), failure, stop.load(Ordering::SeqCst))
+}
+
+fn no_input(e: SourceError) -> Ended {
+    Ended::NoInput(e.into())
+}
+
+/// Told before anything is filmed, not after.
+fn refuse_existing(out: Option<&Path>) -> Result<(), Ended> {
+    match out {
+        Some(dir) if dir.symlink_metadata().is_ok() => {
+            let kind = if dir.is_dir() { "folder" } else { "file" };
+            Err(Ended::Failed(anyhow!(
+                "the {kind} {} exists already; choose another name for --out, or remove it",
+                dir.display()
+            )))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn watch(running: &Running, stop: &AtomicBool) -> Result<(), Ended> {
+    let progress = tui::Progress::new();
+    while !running.finished() {
+        if stop.load(Ordering::SeqCst) {
+            running.stop();
+        }
+        if let Some(snapshot) = running.latest() {
+            progress.update(&snapshot);
+        }
+        std::thread::sleep(HEADLESS_TICK);
+    }
+    progress.finish();
+    Ok(())
+}
+
+fn show(running: &Running, stop: &AtomicBool) -> Result<(), Ended> {
+    let shown = tui::run(&mut Screen(running), tui::Options::from_env(), stop);
+    if shown.is_err() {
+        running.stop();
+    }
+    // The screen is gone; what is left is written without it.
+    while !running.finished() {
+        std::thread::sleep(HEADLESS_TICK);
+    }
+    shown.map_err(|e| Ended::BadUsage(e.into()))
+}
+
+struct Screen<'a>(&'a Running);
+
+impl tui::Session for Screen<'_> {
+    fn latest(&mut self) -> Option<Arc<Snapshot>> {
+        self.0.latest()
+    }
+
+    fn send(&mut self, wish: Control) {
+        self.0.send(wish);
+    }
+
+    fn finished(&self) -> bool {
+        self.0.finished()
+    }
+}
+
+/// Messages to standard error where there is no screen that they would spoil.
+fn init_log(headless: bool) {
+    if headless || !std::io::stderr().is_terminal() {
+        let filter = tracing_subscriber::EnvFilter::try_from_env("ARBORCAM_LOG")
+            .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn"));
+        let _ =
+            tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().try_init();
+    }
+}
+
+/// The closing lines, and the exit status.
+fn report(summary: Option<&Summary>, failure: Option<Failure>, stopped: bool) -> Result<(), Ended> {
+    if let Some(s) = summary {
+        for line in closing_lines(s) {
+            say(&line);
+        }
+    }
+    match failure {
+        Some(failure) => Err(failure.into()),
+        None if stopped => Err(Ended::Stopped),
+        // Tracks alone are not what was asked for; whoever looks for tree.glb is to learn it from the status.
+        None => match summary.filter(|s| s.tree.is_none()) {
+            Some(s) => Err(Ended::Failed(no_tree(s))),
+            None => Ok(()),
+        },
+    }
+}
+
+fn no_tree(s: &Summary) -> anyhow::Error {
+    anyhow!(
+        "no tree: {} points moved, and at least {} must; wait for wind, come nearer, keep the camera still, or draw the \
+         outline closer (--outline)",
+        s.moving,
+        crate::pipeline::LEAST_MOVING
+    )
+}
+
+fn closing_lines(s: &Summary) -> Vec<String> {
+    let mut lines = vec![format!("{} frames, {} points followed", s.frames, s.tracks_total)];
+    if let Some(tree) = &s.tree {
+        let (nodes, points) = (tree.skeleton.measured(), tree.evidence.moving.len());
+        let copies = tree.skeleton.nodes.len() - nodes;
+        let when = if tree.forced { "before enough motion was seen" } else { "built" };
+        lines.push(format!(
+            "tree: {nodes} nodes from {points} moving points and {copies} copied ones, {when} at {:.1} s (accumulation \
+             {:.2})",
+            tree.time_s, tree.evidence.measure
+        ));
+    }
+    if let Some(written) = &s.written {
+        let dir = written.dir.display();
+        lines.push(match written.model {
+            true => format!("capture: {dir}\nmodel:   {dir}/tree.glb"),
+            false => format!("capture: {dir} (tracks only)"),
+        });
+    }
+    lines
+}
