@@ -55,7 +55,7 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
             .and_then(|_| signal_hook::flag::register(signal, stop.clone()))
             .map_err(|e| Ended::Failed(e.into()))?;
     }
-    if headless && info.format.asked != info.format.given && !info.format.asked.is_empty() {
+    if headless && info.live && info.format.asked != info.format.given {
         say(&format!("arborcam: asked for {}, the camera gives {}", info.format.asked, info.format.given));
     }
     init_log(headless);
