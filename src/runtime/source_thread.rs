@@ -49,9 +49,10 @@ pub fn run(mut source: Box<dyn Source>, pace: Pace, queue: Sender<Timed>, queue_
                 break;
             }
         };
-        let timed = clock.stamp(raw, shared);
+        let mut timed = clock.stamp(raw, shared);
         if pace == Pace::Recorded {
             clock.wait_for(&timed, shared);
+            timed.received = Instant::now();
         }
         if pace == Pace::Live {
             if shared.paused.load(Ordering::Relaxed) {
