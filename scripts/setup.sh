@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-need_rust=88 # 1.88, as in Cargo.toml
+need_rust=90 # 1.90, as in Cargo.toml
 
 fail() {
     printf 'setup: %s\n' "$*" >&2
