@@ -145,6 +145,9 @@ pub struct Motion {
     /// Standard deviation of the branching angle at the root and at the tips, degrees (eq. 10).
     pub sigma_shape_root_deg: f64,
     pub sigma_shape_tip_deg: f64,
+    /// How fast a branch is expected to lean towards the viewer or away, degrees a second (standard deviation): the
+    /// picture hardly shows it, so tracking noise would else make the tree tremble in depth.
+    pub depth_rate_deg_s: f64,
     /// Largest rotation of a branch against its parent from one frame to the next, degrees.
     pub max_step_deg: f64,
     /// Largest accumulated rotation of a branch against its parent, degrees.
@@ -215,6 +218,7 @@ impl Default for Motion {
             sigma_track_px: 1.0,
             sigma_shape_root_deg: 10.0,
             sigma_shape_tip_deg: 30.0,
+            depth_rate_deg_s: 60.0,
             max_step_deg: 20.0,
             max_total_deg: 70.0,
         }
@@ -297,6 +301,7 @@ impl Config {
             ("motion.sigma_track_px", motion.sigma_track_px, positive),
             ("motion.sigma_shape_root_deg", motion.sigma_shape_root_deg, positive),
             ("motion.sigma_shape_tip_deg", motion.sigma_shape_tip_deg, positive),
+            ("motion.depth_rate_deg_s", motion.depth_rate_deg_s, positive),
             ("motion.max_step_deg", motion.max_step_deg, (0.01, 180.0, "0.01 to 180")),
             ("motion.max_total_deg", motion.max_total_deg, (0.01, 180.0, "0.01 to 180")),
             ("export.animation_s", self.export.animation_s, (0.1, 3600.0, "0.1 to 3600")),

@@ -341,6 +341,11 @@ impl BackEnd {
         self.live.as_ref().map(|l| &l.binding)
     }
 
+    /// The outline of the newest frame.
+    pub fn outline(&self) -> Option<&Arc<Outline>> {
+        self.outline.as_ref()
+    }
+
     pub fn evidence(&self) -> &Evidence {
         &self.evidence
     }

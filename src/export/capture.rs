@@ -22,6 +22,8 @@ pub struct Capture {
     pub timing: Timing,
     /// The whole effective configuration: defaults, file and command line together.
     pub config: Config,
+    /// The region that was tracked, in the form of an outline file, so that it can be used again.
+    pub outline: Option<OutlineNote>,
     /// `None` if the capture ended before the tree was built.
     pub build: Option<Build>,
     pub quality: Quality,
@@ -95,6 +97,16 @@ pub struct Gap {
     pub time_s: f64,
     /// Number of frames missing.
     pub missing: u64,
+}
+
+/// An outline file: `{"frame": 0, "width": W, "height": H, "polygon_px": [[u, v], ...]}`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct OutlineNote {
+    /// First frame that was tracked with it.
+    pub frame: u64,
+    pub width: u32,
+    pub height: u32,
+    pub polygon_px: Vec<[i32; 2]>,
 }
 
 /// When and on what the tree was built.

@@ -36,6 +36,7 @@ pub struct PoseEstimator {
     /// Direction of each measured branch in the frame before, in the axes of its parent branch at rest; `None` before
     /// the first frame, which may lie anywhere within the accumulated bound.
     previous: Option<Vec<UnitVector3<f64>>>,
+    previous_s: f64,
 }
 
 impl PoseEstimator {
@@ -63,11 +64,14 @@ impl PoseEstimator {
             })
         });
         let branches = branches.collect();
-        Self { skeleton, settings: settings.clone(), branches, previous: None }
+        Self { skeleton, settings: settings.clone(), branches, previous: None, previous_s: 0.0 }
     }
 
     /// The most probable pose, given where the tracks put each measured node (px in the picture).
     pub fn step(&mut self, frame: u64, time_s: f64, targets_px: &[Option<[f64; 2]>]) -> Pose {
+        // A clock that stands still must not forbid all motion.
+        let elapsed_s = (time_s - self.previous_s).max(1e-3);
+        self.previous_s = time_s;
         let rest = |n: &crate::model::Node| JointPose { position: n.position, rotation: UnitQuaternion::identity() };
         let mut joints: Vec<JointPose> = self.skeleton.nodes.iter().map(rest).collect();
         let mut directions: Vec<UnitVector3<f64>> = Vec::with_capacity(self.skeleton.nodes.len());
@@ -87,7 +91,8 @@ impl PoseEstimator {
                     turn * (parent_rotation.inverse() * original.rotation) * turn.inverse()
                 }
                 None => {
-                    let d = self.direction(i, branch, &parent, targets_px.get(i).copied().flatten());
+                    let target_px = targets_px.get(i).copied().flatten();
+                    let d = self.direction((i, branch), &parent, target_px, elapsed_s);
                     directions.push(d);
                     shortest_rotation(&branch.direction, &d)
                 }
@@ -102,10 +107,10 @@ impl PoseEstimator {
     /// Direction of branch `i` in the axes of its parent branch at rest.
     fn direction(
         &self,
-        i: usize,
-        branch: &Branch,
+        (i, branch): (usize, &Branch),
         parent: &JointPose,
         target_px: Option<[f64; 2]>,
+        elapsed_s: f64,
     ) -> UnitVector3<f64> {
         let previous = self.previous.as_ref().map(|p| p[i]);
         let foot = self.skeleton.foot_px;
@@ -123,6 +128,7 @@ impl PoseEstimator {
                 previous_direction: previous.unwrap_or(branch.direction),
                 sigma_track_px: self.settings.sigma_track_px,
                 sigma_shape: branch.sigma_shape,
+                sigma_depth: previous.map(|_| self.settings.depth_rate_deg_s.to_radians() * elapsed_s),
                 max_step: previous.map_or(std::f64::consts::PI, |_| self.settings.max_step_deg.to_radians()),
                 max_total: self.settings.max_total_deg.to_radians(),
             }

@@ -15,7 +15,9 @@ const CLOSE_SHARE: f64 = 0.03;
 /// Least share of the picture that a tree covers.
 const LEAST_COVERAGE: f64 = 0.005;
 
-/// Gathers motion energy: the variance of every pixel's brightness over time (Welford's running form).
+/// Gathers motion energy: the variance of every pixel's brightness over time (Welford's running form), less half the
+/// mean square of its change from frame to frame. Of white noise that leaves nothing; a sway, which takes many frames,
+/// keeps nearly all of its variance.
 pub struct AutoOutline {
     settings: config::Outline,
     start_s: Option<f64>,
@@ -24,6 +26,8 @@ pub struct AutoOutline {
     count: f32,
     mean: Vec<f32>,
     sum_sq: Vec<f32>,
+    last: Vec<f32>,
+    sum_change_sq: Vec<f32>,
 }
 
 /// What the gathering has come to.
@@ -47,6 +51,8 @@ impl AutoOutline {
             count: 0.0,
             mean: Vec::new(),
             sum_sq: Vec::new(),
+            last: Vec::new(),
+            sum_change_sq: Vec::new(),
         }
     }
 
@@ -55,7 +61,9 @@ impl AutoOutline {
         let start_s = *self.start_s.get_or_insert_with(|| {
             self.scale = (luma.size.width / REDUCED_WIDTH).max(1);
             self.reduced = Size::new(luma.size.width / self.scale, luma.size.height / self.scale);
-            (self.mean, self.sum_sq) = (vec![0.0; self.reduced.area()], vec![0.0; self.reduced.area()]);
+            let zero = vec![0.0; self.reduced.area()];
+            (self.mean, self.sum_sq) = (zero.clone(), zero.clone());
+            (self.last, self.sum_change_sq) = (zero.clone(), zero);
             time_s
         });
         self.add(luma);
@@ -75,7 +83,8 @@ impl AutoOutline {
         if self.count < 2.0 {
             return None;
         }
-        let deviation: Vec<f32> = self.sum_sq.iter().map(|s| (s / (self.count - 1.0)).sqrt()).collect();
+        let sway = |(s, c): (&f32, &f32)| ((s - 0.5 * c) / (self.count - 1.0)).max(0.0).sqrt();
+        let deviation: Vec<f32> = self.sum_sq.iter().zip(&self.sum_change_sq).map(sway).collect();
         let mut sorted = deviation.clone();
         sorted.sort_unstable_by(f32::total_cmp);
         let threshold = (ABOVE_MEDIAN * sorted[sorted.len() / 2]).max(ABOVE_GREY);
@@ -102,6 +111,10 @@ impl AutoOutline {
                 let before = x - self.mean[i];
                 self.mean[i] += before / self.count;
                 self.sum_sq[i] += before * (x - self.mean[i]);
+                if self.count > 1.0 {
+                    self.sum_change_sq[i] += (x - self.last[i]).powi(2);
+                }
+                self.last[i] = x;
             }
         }
     }

@@ -3,12 +3,13 @@
 use super::meter::Histogram;
 use super::shared::{Failure, Shared};
 use crate::config::Config;
-use crate::export::capture::{AnimationNote, Build, Capture, Gap, ModelNote, Quality as QualityNote, Source, Timing};
-use crate::export::capture::{Software, json};
+use crate::export::capture::{
+    AnimationNote, Build, Capture, Gap, ModelNote, OutlineNote, Quality as QualityNote, Software, Source, Timing, json,
+};
 use crate::export::csv::{MotionCsv, TracksCsv, nodes};
 use crate::export::gltf::{KEY_TOLERANCE_PX, Model, glb_and_keys};
 use crate::export::{ExportError, OutputFolder};
-use crate::model::{Pose, Rgb, TrackSet};
+use crate::model::{Outline, Pose, Rgb, TrackSet};
 use crate::pipeline::{Retrace, Tree};
 use crate::recording::SpoolReader;
 use crate::shape::{Detail, branches};
@@ -29,7 +30,7 @@ pub struct Quality {
     born: u64,
     lost: u64,
     alive: u64,
-    first_s: Option<f64>,
+    first: Option<(u64, f64)>,
     last_s: f64,
     fb_error_px: Histogram,
 }
@@ -40,7 +41,7 @@ impl Quality {
         self.born += u64::from(tracks.born);
         self.lost += u64::from(tracks.lost);
         self.alive = tracks.observations.len() as u64;
-        self.first_s.get_or_insert(tracks.time_s);
+        self.first.get_or_insert((tracks.frame, tracks.time_s));
         self.last_s = tracks.time_s;
         self.fb_error_px.add(fb_error_px);
     }
@@ -53,6 +54,7 @@ impl Quality {
 /// Everything that a capture is made of; owned, so that it can be written on any thread while frames go on.
 pub struct CaptureJob {
     pub tree: Option<Arc<Tree>>,
+    pub outline: Option<Arc<Outline>>,
     pub tracks: SpoolReader,
     pub config: Config,
     pub info: SourceInfo,
@@ -213,7 +215,7 @@ fn describe(
         timing.push_gap(Gap { after_frame: gap.after_frame, time_s: gap.time_s, missing: gap.missing });
     }
     let quality = &job.quality;
-    let tracked_s = quality.last_s - quality.first_s.unwrap_or(quality.last_s);
+    let tracked_s = quality.last_s - quality.first.map_or(quality.last_s, |(_, s)| s);
     Capture {
         schema_version: crate::export::capture::SCHEMA_VERSION,
         software: Software::default(),
@@ -227,6 +229,12 @@ fn describe(
         },
         timing,
         config: job.config.clone(),
+        outline: job.outline.as_ref().map(|o| OutlineNote {
+            frame: quality.first.map_or(0, |(frame, _)| frame),
+            width: o.size.width,
+            height: o.size.height,
+            polygon_px: o.polygon_px.clone(),
+        }),
         build: job.tree.as_ref().map(|tree| Build {
             frame: tree.frame,
             time_s: tree.time_s,

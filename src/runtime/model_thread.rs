@@ -167,6 +167,7 @@ impl ModelThread {
         };
         Ok(CaptureJob {
             tree: self.back.tree().cloned(),
+            outline: self.back.outline().cloned(),
             tracks: spool.reader().map_err(Failure::Spool)?,
             config: self.job.config.clone(),
             info: self.info.clone(),
