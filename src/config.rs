@@ -183,7 +183,7 @@ impl Default for Outline {
 }
 impl Default for Detect {
     fn default() -> Self {
-        Self { points: 400, min_distance_px: 5.0, quality: 0.001, border_px: 3.0 }
+        Self { points: 400, min_distance_px: 5.0, quality: 0.001, border_px: 5.0 }
     }
 }
 impl Default for Track {
@@ -193,7 +193,7 @@ impl Default for Track {
 }
 impl Default for Accumulate {
     fn default() -> Self {
-        Self { window_s: 20.0, min_s: 3.0, threshold: 0.8, moving_snr: 4.0 }
+        Self { window_s: 20.0, min_s: 5.0, threshold: 0.5, moving_snr: 4.0 }
     }
 }
 impl Default for Hierarchy {

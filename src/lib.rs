@@ -21,7 +21,7 @@
 //!
 //! [`model`] the nouns · [`source`] where frames come from · [`outline`] which pixels are tree · [`track`] points
 //! followed · [`hierarchy`] who moves with whom · [`skeleton`] in the picture · [`shape`] in space · [`motion`] the pose
-//! of every frame · [`dynamics`] what the motion says · [`pipeline`] all of it · [`runtime`] on threads ·
+//! of every frame · [`dynamics`] what the motion says · [`signal`] small common mathematics · [`pipeline`] all of it · [`runtime`] on threads ·
 //! [`recording`] kept on disk · [`export`] files for others · [`tui`] the screen · [`cli`] the commands · [`config`]
 //! what can be set.
 
@@ -37,6 +37,7 @@ pub mod pipeline;
 pub mod recording;
 pub mod runtime;
 pub mod shape;
+pub mod signal;
 pub mod skeleton;
 pub mod source;
 pub mod track;

@@ -171,7 +171,7 @@ impl FrontEnd {
 pub struct Tree {
     pub hierarchy: MotionHierarchy,
     pub skeleton: Arc<Skeleton>,
-    /// Rest position of every track of the hierarchy, px.
+    /// Rest position of every track that was there when the tree was built, px.
     pub rest_px: BTreeMap<TrackId, [f64; 2]>,
     pub outline: Arc<Outline>,
     /// Frame after which it was built, and its time.
@@ -213,9 +213,9 @@ pub fn build(
     let mut skeleton = shape::build(&flat, &tracks, outline, &config.shape);
     let trunk_px = TRUNK_SHARE * skeleton::foot_half_width_px(outline);
     shape::pipe_model(&mut skeleton, trunk_px.max(2.0 * TIP_RADIUS_PX), TIP_RADIUS_PX);
-    let rest = |&row: &usize| (table.ids[row], hierarchy::rest_position_px(table, row));
+    let rest = |row: usize| (table.ids[row], hierarchy::rest_position_px(table, row));
     Some(Tree {
-        rest_px: evidence.moving.iter().map(rest).collect(),
+        rest_px: (0..table.ids.len()).map(rest).collect(),
         hierarchy,
         skeleton: Arc::new(skeleton),
         outline: outline.clone(),
@@ -296,6 +296,8 @@ impl BackEnd {
         }
         self.judged_s = Some(time_s);
         self.evidence = hierarchy::evidence_of(&self.history, &self.config.accumulate);
+        let e = &self.evidence;
+        tracing::debug!(time_s, measure = e.measure, e.motion, e.stability, e.sway, moving = e.moving.len(), "evidence");
         let settings = &self.config.accumulate;
         let enough = self.evidence.measure >= settings.threshold && self.history.span_s() >= settings.min_s;
         if enough || self.build_now {

@@ -1,5 +1,6 @@
 //! Spectra of displacements.
 
+use crate::signal::along_principal_direction;
 use realfft::RealFftPlanner;
 
 /// Fewer samples or periods than this carry no answer.
@@ -46,17 +47,6 @@ pub fn dominant_frequency_hz(times_s: &[f64], displacement_px: &[[f64; 2]]) -> O
     let curve = a - 2.0 * b + c;
     let shift = if curve < 0.0 { 0.5 * (a - c) / curve } else { 0.0 };
     Some((peak as f64 + shift) * bin_hz)
-}
-
-/// Mean removed, projected on the direction of the largest variance.
-fn along_principal_direction(d: &[[f64; 2]]) -> Vec<f64> {
-    let n = d.len() as f64;
-    let mean = d.iter().fold([0.0; 2], |m, p| [m[0] + p[0] / n, m[1] + p[1] / n]);
-    let centred = || d.iter().map(|p| [p[0] - mean[0], p[1] - mean[1]]);
-    let (xx, xy, yy) =
-        centred().fold((0.0, 0.0, 0.0), |s, p| (s.0 + p[0] * p[0], s.1 + p[0] * p[1], s.2 + p[1] * p[1]));
-    let (sin, cos) = (0.5 * (2.0 * xy).atan2(xx - yy)).sin_cos();
-    centred().map(|p| cos * p[0] + sin * p[1]).collect()
 }
 
 /// Linear interpolation at as many evenly spaced times.

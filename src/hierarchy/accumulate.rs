@@ -2,6 +2,7 @@
 
 use super::affinity::Velocities;
 use crate::config::Accumulate;
+use crate::signal::along_principal_direction;
 use crate::track::{TrackHistory, TrackTable};
 
 /// Rate at which tracks are compared, Hz: velocities over longer steps stand out better from tracking noise.
@@ -14,19 +15,26 @@ const BLOCK_S: f64 = 0.5;
 const NOISE_FLOOR_PX: f64 = 0.1;
 /// Signal-to-noise ratio at which the motion term has reached 1 - 1/e.
 const SNR_SCALE: f64 = 8.0;
+/// Sways of the whole tree after which the sway term has reached 1 - 1/e.
+const SWAYS_SCALE: f64 = 1.0;
+/// A sway counts when it goes this share of the root mean square displacement beyond the middle, on both sides.
+const SWAY_HYSTERESIS: f64 = 0.2;
 /// Moving points below which the evidence counts for less.
 const ENOUGH_MOVING: f64 = 32.0;
 
 /// What has been seen so far.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Evidence {
-    /// The accumulation measure, 0 to 1: motion times stability times the share of [`ENOUGH_MOVING`] points.
+    /// The accumulation measure, 0 to 1: motion times stability times sway times the share of 32 points that move.
     pub measure: f64,
     /// 1 - exp(-snr / 8), with snr the median over the moving points of displacement over tracking noise.
     pub motion: f64,
     /// Correlation between the affinities from one half of the time and from the other, 0 to 1: if the tree's
     /// structure is in the tracks, both halves (blocks of half a second, dealt in turn) tell the same one.
     pub stability: f64,
+    /// 1 - exp(-n), with n the number of times that the tree as a whole has swayed to and fro: branches that swing
+    /// at different rates are apart for sure only after some periods of the slowest.
+    pub sway: f64,
     /// Rows of the table whose points move.
     pub moving: Vec<usize>,
 }
@@ -42,8 +50,9 @@ pub fn evidence(table: &TrackTable, settings: &Accumulate) -> Evidence {
     of_moving.sort_unstable_by(f64::total_cmp);
     let motion = 1.0 - (-of_moving[of_moving.len() / 2] / SNR_SCALE).exp();
     let stability = stability(table, &moving);
+    let sway = 1.0 - (-sways(table, &moving) / SWAYS_SCALE).exp();
     let enough = (moving.len() as f64 / ENOUGH_MOVING).min(1.0);
-    Evidence { measure: motion * stability * enough, motion, stability, moving }
+    Evidence { measure: motion * stability * sway * enough, motion, stability, sway, moving }
 }
 
 /// Evidence of a history, on frames at the rate at which tracks are compared.
@@ -66,6 +75,29 @@ fn displacement_px(table: &TrackTable, row: usize) -> f64 {
 /// What tracking itself admits: the median forward-backward error, not less than the floor.
 fn noise_px(table: &TrackTable, row: usize) -> f64 {
     f64::from(table.fb_errors_px[row]).max(NOISE_FLOOR_PX)
+}
+
+/// How often the mean of the moving points has swung to and fro along its principal direction.
+fn sways(table: &TrackTable, moving: &[usize]) -> f64 {
+    let steps = Velocities::new(table, moving, |_| true).mean();
+    let mut at = [0.0; 2];
+    let path: Vec<[f64; 2]> = steps
+        .iter()
+        .map(|v| {
+            at = [at[0] + v[0], at[1] + v[1]];
+            at
+        })
+        .collect();
+    let along = along_principal_direction(&path);
+    let rms = (along.iter().map(|x| x * x).sum::<f64>() / along.len().max(1) as f64).sqrt();
+    let (mut side, mut crossings) = (0.0, 0u32);
+    for x in along.iter().filter(|x| x.abs() > SWAY_HYSTERESIS * rms) {
+        if x.signum() != side {
+            crossings += u32::from(side != 0.0);
+            side = x.signum();
+        }
+    }
+    f64::from(crossings) / 2.0
 }
 
 fn stability(table: &TrackTable, moving: &[usize]) -> f64 {

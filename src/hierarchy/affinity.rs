@@ -42,6 +42,16 @@ impl Velocities {
         self.vu.len()
     }
 
+    /// Mean velocity of the points that were seen, step by step, px per step.
+    pub fn mean(&self) -> Vec<[f64; 2]> {
+        let of_step = |s: usize| {
+            let sum = |v: &[Vec<f32>]| v.iter().map(|row| f64::from(row[s])).sum::<f64>();
+            let n = sum(&self.seen).max(1.0);
+            [sum(&self.vu) / n, sum(&self.vv) / n]
+        };
+        (0..self.steps).map(of_step).collect()
+    }
+
     /// Real part of rho of Zeng eq. 2.20 for points `a` and `b`, over the steps in which both were seen, -1 to 1.
     ///
     /// The equation as printed multiplies the complex velocities without conjugating one of them, by which two equal

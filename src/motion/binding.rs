@@ -17,7 +17,7 @@ struct Bound {
 
 /// Tracks bound to the measured nodes of a skeleton.
 pub struct Binding {
-    tracks: BTreeMap<TrackId, Bound>,
+    tracks: BTreeMap<TrackId, Option<Bound>>,
     parents: Vec<Option<NodeId>>,
     /// Projection of each measured node at rest, px.
     rest_px: Vec<[f64; 2]>,
@@ -28,17 +28,18 @@ pub struct Binding {
 }
 
 impl Binding {
-    /// Binds the members of `hierarchy`, whose rest positions are `rest_px`, to the nodes of `skeleton`; node k + 1
-    /// belongs to cluster k.
+    /// Binds the members of `hierarchy` to the nodes of `skeleton`; node k + 1 belongs to cluster k. `rest_px` holds the
+    /// rest positions of all tracks that were there when the tree was built; those that are in no cluster did not move
+    /// or contradicted their neighbours, and stay unbound.
     pub fn new(hierarchy: &MotionHierarchy, rest_px: &BTreeMap<TrackId, [f64; 2]>, skeleton: &Skeleton) -> Self {
         let nodes = &skeleton.nodes[..skeleton.measured()];
-        let mut tracks = BTreeMap::new();
+        let mut tracks: BTreeMap<TrackId, Option<Bound>> = rest_px.keys().map(|id| (*id, None)).collect();
         // Deeper clusters come later and overwrite: each track ends at the deepest node that it belongs to.
         for (k, cluster) in hierarchy.clusters.iter().enumerate() {
             let node = NodeId(k as u32 + 1);
             for id in &cluster.members {
                 if let Some(&rest_px) = rest_px.get(id) {
-                    tracks.insert(*id, Bound { node, rest_px });
+                    tracks.insert(*id, Some(Bound { node, rest_px }));
                 }
             }
         }
@@ -66,7 +67,7 @@ impl Binding {
 
     /// The deepest node that a track belongs to.
     pub fn node_of(&self, track: TrackId) -> Option<NodeId> {
-        self.tracks.get(&track).map(|b| b.node)
+        self.tracks.get(&track)?.map(|b| b.node)
     }
 
     /// Where the tracks put each measured node, px; `None` where none of its tracks was seen. The foot never moves.
@@ -81,14 +82,14 @@ impl Binding {
             .map(|(d, rest)| trimmed_mean(d).map(|d| [rest[0] + d[0], rest[1] + d[1]]))
             .collect();
         let new = set.observations.iter().filter(|o| !self.tracks.contains_key(&o.id));
-        let born: Vec<(TrackId, Bound)> = new
+        let born: Vec<(TrackId, Option<Bound>)> = new
             .filter_map(|o| {
                 let at = [f64::from(o.u_px), f64::from(o.v_px)];
                 let placed = self.tips.iter().filter_map(|t| Some((*t, targets[t.index()]?)));
                 let (tip, target) = placed.min_by(|a, b| distance(at, a.1).total_cmp(&distance(at, b.1)))?;
                 let rest = self.rest_px[tip.index()];
                 let rest_px = [at[0] - target[0] + rest[0], at[1] - target[1] + rest[1]];
-                (distance(at, target) <= self.reach_px).then_some((o.id, Bound { node: tip, rest_px }))
+                (distance(at, target) <= self.reach_px).then_some((o.id, Some(Bound { node: tip, rest_px })))
             })
             .collect();
         self.tracks.extend(born);
@@ -102,7 +103,7 @@ impl Binding {
     fn collect(&mut self, set: &TrackSet) {
         self.collected.iter_mut().for_each(Vec::clear);
         for o in &set.observations {
-            let Some(bound) = self.tracks.get(&o.id) else { continue };
+            let Some(Some(bound)) = self.tracks.get(&o.id) else { continue };
             let d = [f64::from(o.u_px) - bound.rest_px[0], f64::from(o.v_px) - bound.rest_px[1]];
             let mut at = Some(bound.node);
             while let Some(node) = at {
