@@ -16,10 +16,10 @@ fn texture(u: f64, v: f64) -> f64 {
     let wave = |k: usize| {
         let share = |a: f64| (k as f64 * a).fract();
         // Structure of all sizes, as in a photograph: a pyramid of pictures needs the large ones, too.
-        let (angle, length) = (TAU * share(0.618), 7.0 * 1.12f64.powi(k as i32));
+        let (angle, length) = (TAU * share(0.618), 7.0 * 1.19f64.powi(k as i32));
         (TAU * (u * angle.cos() + v * angle.sin()) / length + TAU * share(0.569)).sin()
     };
-    128.0 + 13.0 * (1..=24).map(wave).sum::<f64>()
+    128.0 + 16.0 * (1..=16).map(wave).sum::<f64>()
 }
 
 /// Picture `k`, brightness by place.
@@ -53,8 +53,8 @@ fn shift(k: u64) -> [f64; 2] {
 fn a_known_motion_is_followed_to_a_tenth_of_a_pixel() {
     let mut tracker = tracker();
     let first = places(&tracker.step(&frame(0, texture)));
-    assert!(first.len() >= 100, "{} points", first.len());
-    for k in 1..60 {
+    assert!(first.len() >= 80, "{} points", first.len());
+    for k in 1..40 {
         let [du, dv] = shift(k);
         let now = places(&tracker.step(&frame(k, |u, v| texture(u - du, v - dv))));
         let mut errors: Vec<f64> = now
@@ -70,9 +70,10 @@ fn a_known_motion_is_followed_to_a_tenth_of_a_pixel() {
 #[test]
 fn a_static_picture_stays_where_it_is() {
     let mut tracker = tracker();
-    let first = places(&tracker.step(&frame(0, texture)));
+    let still = frame(0, texture);
+    let first = places(&tracker.step(&still));
     for k in 1..30 {
-        let now = places(&tracker.step(&frame(k, texture)));
+        let now = places(&tracker.step(&Frame { index: k, ..still.clone() }));
         assert_eq!(now.len(), first.len(), "none is lost in frame {k}");
         for (id, at) in &now {
             assert!((at[0] - first[id][0]).hypot(at[1] - first[id][1]) < 0.01, "{id:?} drifts");
@@ -84,8 +85,8 @@ fn a_static_picture_stays_where_it_is() {
 #[test]
 fn hidden_points_come_back_with_their_names_in_the_right_place() {
     let mut tracker = tracker();
-    let hidden = |u: f64, v: f64| (120.0..160.0).contains(&u) && (90.0..130.0).contains(&v);
-    let middle = |p: &[f64; 2]| (130.0..150.0).contains(&p[0]) && (100.0..120.0).contains(&p[1]);
+    let hidden = |u: f64, v: f64| (110.0..170.0).contains(&u) && (80.0..140.0).contains(&v);
+    let middle = |p: &[f64; 2]| (122.0..158.0).contains(&p[0]) && (92.0..128.0).contains(&p[1]);
     let mut first = BTreeMap::new();
     let mut seen_behind = 0;
     for k in 0..40 {
@@ -119,10 +120,11 @@ fn hidden_points_come_back_with_their_names_in_the_right_place() {
 #[test]
 fn names_are_never_given_twice() {
     let mut tracker = tracker();
+    let (clear, fog) = (frame(0, texture), frame(0, |_, _| 128.0));
     let (mut last, mut births) = (BTreeMap::new(), 0);
     for k in 0..150u64 {
-        let fog = k % 50 >= 25;
-        let set = tracker.step(&frame(k, |u, v| if fog { 128.0 } else { texture(u, v) }));
+        let picture = if k % 50 < 25 { &clear } else { &fog };
+        let set = tracker.step(&Frame { index: k, ..picture.clone() });
         births += u64::from(set.born);
         for id in places(&set).into_keys() {
             let before = last.insert(id, k).unwrap_or(k);
@@ -130,7 +132,7 @@ fn names_are_never_given_twice() {
         }
     }
     let lost = last.values().filter(|k| **k < 100).count();
-    assert!(lost >= 200, "only {lost} points were ever lost");
+    assert!(lost >= 160, "only {lost} points were ever lost");
     assert_eq!(births, u64::from(tracker.next_id()), "each birth takes one new name");
     assert_eq!(births, last.len() as u64);
 }

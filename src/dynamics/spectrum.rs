@@ -17,7 +17,7 @@ pub fn dominant_frequency_hz(times_s: &[f64], displacement_px: &[[f64; 2]]) -> O
         return None;
     }
     let span_s = times_s[n - 1] - times_s[0];
-    if !(span_s > 0.0) {
+    if span_s.is_nan() || span_s <= 0.0 {
         return None;
     }
     let principal = along_principal_direction(&displacement_px[..n]);

@@ -72,7 +72,7 @@ fn stability(table: &TrackTable, moving: &[usize]) -> f64 {
     let stride = moving.len().div_ceil(COMPARED);
     let some: Vec<usize> = moving.iter().copied().step_by(stride).collect();
     let start_s = table.times_s.first().copied().unwrap_or(0.0);
-    let half = |k: usize| ((table.times_s[k] - start_s) / BLOCK_S) as u64 % 2 == 0;
+    let half = |k: usize| (((table.times_s[k] - start_s) / BLOCK_S) as u64).is_multiple_of(2);
     let (even, odd) = (Velocities::new(table, &some, half), Velocities::new(table, &some, |k| !half(k)));
     let pairs = (0..some.len()).flat_map(|a| (a + 1..some.len()).map(move |b| (a, b)));
     let (x, y): (Vec<f64>, Vec<f64>) =

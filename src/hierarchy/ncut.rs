@@ -20,7 +20,7 @@ pub fn normalised_cut(w: &DMatrix<f32>, min_side: usize) -> Option<Cut> {
         return None;
     }
     let degree = DVector::from_fn(n, |i, _| w.row(i).iter().sum::<f32>() - w[(i, i)]);
-    if degree.iter().any(|&d| !(d > 0.0)) {
+    if !degree.iter().all(|&d| d > 0.0) {
         return None;
     }
     let root = degree.map(f32::sqrt);
