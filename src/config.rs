@@ -233,11 +233,11 @@ impl Default for Export {
 /// Why a configuration was not taken; the text names file, line and key.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
-    #[error("cannot read configuration {path}: {source}")]
+    #[error("cannot read configuration {path}: {source}; check the name")]
     Unreadable { path: String, source: std::io::Error },
     #[error("configuration {path}, line {line}: {what}")]
     BadEntry { path: String, line: usize, what: String },
-    #[error("configuration: {key} = {value} is out of range; {allowed}")]
+    #[error("configuration: {key} = {value} is out of range; allowed: {allowed}")]
     OutOfRange { key: &'static str, value: f64, allowed: &'static str },
 }
 
@@ -264,8 +264,8 @@ impl Config {
     /// # Errors
     /// The first value that is out of its range.
     pub fn check(&self) -> Result<(), ConfigError> {
-        let positive = (f64::MIN_POSITIVE, 1e9, "it must be greater than 0");
-        let share = (0.0, 1.0, "it must lie between 0 and 1");
+        let positive = (f64::MIN_POSITIVE, 1e9, "greater than 0");
+        let share = (0.0, 1.0, "0 to 1");
         let rules: [(&'static str, f64, (f64, f64, &'static str)); 28] = [
             ("camera.width", self.camera.width.into(), (16.0, 16384.0, "16 to 16384")),
             ("camera.height", self.camera.height.into(), (16.0, 16384.0, "16 to 16384")),
@@ -314,7 +314,7 @@ impl Config {
         }
         if self.track.window_px.is_multiple_of(2) {
             let value = self.track.window_px.into();
-            return Err(ConfigError::OutOfRange { key: "track.window_px", value, allowed: "it must be odd" });
+            return Err(ConfigError::OutOfRange { key: "track.window_px", value, allowed: "an odd number" });
         }
         Ok(())
     }

@@ -98,7 +98,10 @@ impl From<Failure> for Ended {
 
 /// Runs the command line.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(e) => return refused(&e),
+    };
     let result = match &cli.command {
         Command::Capture(args) => capture::run(args),
         Command::Replay(args) => replay::run(args),
@@ -111,8 +114,29 @@ pub fn main() -> ExitCode {
         Err(Ended::NoInput(e)) => (NO_INPUT, e),
         Err(Ended::Stopped) => return ExitCode::from(STOPPED),
     };
-    say(&format!("arborcam: {error:#}"));
+    say(&format!("arborcam: {}", one_line(&error)));
     ExitCode::from(status)
+}
+
+/// Arguments that clap does not take, in the form that all our errors have; or help and version, which were asked for.
+fn refused(e: &clap::Error) -> ExitCode {
+    let text = e.render().to_string();
+    match text.strip_prefix("error: ") {
+        Some(what) => say(&format!("arborcam: {}", what.trim_end())),
+        None => drop(e.print()),
+    }
+    if e.use_stderr() { ExitCode::from(BAD_USAGE) } else { ExitCode::SUCCESS }
+}
+
+/// The error with those of its causes that it does not quote already.
+fn one_line(error: &anyhow::Error) -> String {
+    let mut line = error.to_string();
+    for cause in error.chain().skip(1).map(ToString::to_string) {
+        if !line.contains(&cause) {
+            line = format!("{line}: {cause}");
+        }
+    }
+    line.replace('\n', " ")
 }
 
 /// A line on standard error; if nobody reads it any more, that is no reason to fail.

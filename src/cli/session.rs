@@ -1,6 +1,7 @@
 //! One capture or replay from the command line: open, run, show, report.
 
 use super::{Common, Ended, say};
+use crate::export::OutputFolder;
 use crate::model::{Control, Snapshot};
 use crate::outline::{self, OutlineSpec};
 use crate::runtime::{self, Failure, Job, Pace, Running, Summary};
@@ -31,14 +32,17 @@ pub struct Plan<'a> {
 /// Runs a capture from the first frame to the last line.
 pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
     let config = common.config().map_err(|e| Ended::BadUsage(e.into()))?;
-    refuse_existing(common.out.as_deref())?;
+    let headless = common.headless || common.stream.is_some();
+    if !headless && !std::io::stdout().is_terminal() {
+        return Err(Ended::BadUsage(tui::TuiError::NoTerminal(None).into()));
+    }
+    refuse_unfit_out(common.out.as_deref())?;
     let source = source::open(plan.input, &config.camera, plan.fps).map_err(no_input)?;
     let info = source.describe();
     let outline = match &common.outline {
         OutlineSpec::Auto => None,
         OutlineSpec::File(path) => Some(outline::load(path, info.size).map_err(|e| Ended::BadUsage(e.into()))?),
     };
-    let headless = common.headless || common.stream.is_some();
     let own_pace = if info.live { Pace::Live } else { Pace::Recorded };
     let job = Job {
         config,
@@ -65,7 +69,7 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
     let (summary, failure) = running.join();
     watched?;
     for warning in warnings {
-        say(&format!("arborcam: {warning}"));
+        say(&format!("arborcam: warning: {warning}"));
     }
     report(summary.as_ref(), failure, stop.load(Ordering::SeqCst))
 }
@@ -74,18 +78,10 @@ fn no_input(e: SourceError) -> Ended {
     Ended::NoInput(e.into())
 }
 
-/// Told before anything is filmed, not after.
-fn refuse_existing(out: Option<&Path>) -> Result<(), Ended> {
-    match out {
-        Some(dir) if dir.symlink_metadata().is_ok() => {
-            let kind = if dir.is_dir() { "folder" } else { "file" };
-            Err(Ended::Failed(anyhow!(
-                "the {kind} {} exists already; choose another name for --out, or remove it",
-                dir.display()
-            )))
-        }
-        _ => Ok(()),
-    }
+/// Told before anything is filmed, not after: that the folder exists, or may not be made.
+fn refuse_unfit_out(out: Option<&Path>) -> Result<(), Ended> {
+    // Made and dropped: nothing of it is left.
+    out.map_or(Ok(()), |dir| OutputFolder::create(dir).map(drop)).map_err(|e| Ended::Failed(e.into()))
 }
 
 fn watch(running: &Running, stop: &AtomicBool) -> Result<(), Ended> {

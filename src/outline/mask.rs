@@ -14,16 +14,17 @@ const MOST_GREY: f64 = 0.05;
 pub fn outline(path: &Path, size: Size) -> Result<Outline, OutlineError> {
     let name = path.display().to_string();
     let bad = |what: String| OutlineError::BadFile { name: name.clone(), what };
-    let picture = image::open(path).map_err(|e| bad(e.to_string()))?.into_luma8();
+    let picture =
+        image::open(path).map_err(|e| bad(format!("it is neither a JSON polygon nor a picture ({e})")))?.into_luma8();
     let found = Size::new(picture.width(), picture.height());
     if found != size {
         return Err(OutlineError::WrongSize { name, found, wanted: size });
     }
     let grey = picture.as_raw().iter().filter(|&&p| (64..192).contains(&p)).count();
     if grey as f64 > MOST_GREY * size.area() as f64 {
-        return Err(bad("it is not black and white; paint the tree white and everything else black".into()));
+        return Err(bad("it is not black and white, as a mask is (white = tree)".into()));
     }
     let mask: Vec<u8> = picture.as_raw().iter().map(|&p| if p >= 128 { 255 } else { 0 }).collect();
     let one = region::close_to_one(size, &mask, 0).map_err(|e| bad(e.to_string()))?;
-    one.ok_or_else(|| bad("nothing in it is white, so there is no tree in it".into()))
+    one.ok_or_else(|| bad("nothing in it is white, and white is tree".into()))
 }

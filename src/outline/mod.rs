@@ -14,9 +14,11 @@ use std::path::{Path, PathBuf};
 /// Why an outline was not taken.
 #[derive(Debug, thiserror::Error)]
 pub enum OutlineError {
-    #[error("cannot read outline {name}: {source}")]
+    #[error(
+        "cannot read outline {name}: {source}; check the name, or leave --outline out to find the tree by its motion"
+    )]
     Unreadable { name: String, source: std::io::Error },
-    #[error("outline {name}: {what}")]
+    #[error("outline {name}: {what}; draw it on a frame of this clip, or leave --outline out")]
     BadFile { name: String, what: String },
     #[error("outline {name} is for {found}, the picture is {wanted}; draw it on a frame of this clip")]
     WrongSize { name: String, found: Size, wanted: Size },
@@ -56,5 +58,8 @@ pub fn load(path: &Path, size: Size) -> Result<Outline, OutlineError> {
     if found != size {
         return Err(OutlineError::WrongSize { name, found, wanted: size });
     }
-    polygon::outline(&file.polygon_px, size)
+    polygon::outline(&file.polygon_px, size).map_err(|e| match e {
+        OutlineError::BadPolygon { what } => OutlineError::BadFile { name, what },
+        other => other,
+    })
 }

@@ -75,6 +75,16 @@ pub struct Running {
     model: Option<JoinHandle<Summary>>,
 }
 
+/// Stops the source when the tracker is done for, be it by a panic: the source holds both ends of its queue, and would
+/// never learn otherwise that nobody takes from it.
+struct StopAll<'a>(&'a Shared);
+
+impl Drop for StopAll<'_> {
+    fn drop(&mut self) {
+        self.0.stop.store(true, Ordering::Relaxed);
+    }
+}
+
 /// Starts the threads.
 ///
 /// # Errors
@@ -97,9 +107,12 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
     };
     let track = {
         let (shared, frames_out) = (shared.clone(), frames_out.clone());
-        let run = move || match TrackThread::new(front, model_in, preview_every, &shared) {
-            Ok(track) => track.run(&frames_out, &wishes),
-            Err(e) => shared.fail(Failure::Decode(e)),
+        let run = move || {
+            let _ends_all = StopAll(&shared);
+            match TrackThread::new(front, model_in, preview_every, &shared) {
+                Ok(track) => track.run(&frames_out, &wishes),
+                Err(e) => shared.fail(Failure::Decode(e)),
+            }
         };
         thread("track").spawn(run).map_err(failed)?
     };

@@ -20,7 +20,7 @@ pub enum Failure {
     Source(SourceError),
     #[error(transparent)]
     Export(#[from] ExportError),
-    #[error("the working file for tracks: {0}; is the disk full?")]
+    #[error("cannot keep the tracks: {0}; free some space, or choose another disk with --out")]
     Spool(std::io::Error),
     /// The pictures changed their size, or there is no decoder.
     #[error("{0}")]

@@ -9,7 +9,7 @@ use crate::source::{DecodeError, Decoder};
 use crossbeam_channel::{Receiver, Sender, select};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Width of the pictures for the screen, px.
 const PREVIEW_WIDTH: u32 = 640;
@@ -40,7 +40,8 @@ pub struct TrackThread<'a> {
     to_model: Sender<ToModel>,
     shared: &'a Shared,
     preview_every: Duration,
-    last_preview: Option<Instant>,
+    /// Sensor time of the last picture for the screen, s.
+    last_preview_s: Option<f64>,
     size: Option<Size>,
     last_damage: Option<DecodeError>,
 }
@@ -55,8 +56,8 @@ impl<'a> TrackThread<'a> {
         shared: &'a Shared,
     ) -> Result<Self, DecodeError> {
         let decoder = Decoder::new()?;
-        let (last_preview, size, last_damage) = (None, None, None);
-        Ok(Self { front, decoder, to_model, shared, preview_every, last_preview, size, last_damage })
+        let (last_preview_s, size, last_damage) = (None, None, None);
+        Ok(Self { front, decoder, to_model, shared, preview_every, last_preview_s, size, last_damage })
     }
 
     /// Works off frames and wishes; a wish that has arrived is honoured before the next frame.
@@ -153,11 +154,13 @@ impl<'a> TrackThread<'a> {
         done.into_iter().all(|followed| self.to_model.send(ToModel::Followed(followed)).is_ok())
     }
 
+    /// A picture for the screen, if one is due. By the sensor's clock: the bark's colour is taken from these pictures, and
+    /// must not depend on how fast this machine is.
     fn preview(&mut self, timed: &Timed) -> Option<Arc<Rgb>> {
-        if self.last_preview.is_some_and(|t| timed.received.saturating_duration_since(t) < self.preview_every) {
+        if self.last_preview_s.is_some_and(|s| timed.time_s - s < self.preview_every.as_secs_f64()) {
             return None;
         }
-        self.last_preview = Some(timed.received);
+        self.last_preview_s = Some(timed.time_s);
         self.decoder.preview(&timed.raw, PREVIEW_WIDTH).ok().map(Arc::new)
     }
 

@@ -30,6 +30,9 @@ pub enum SourceError {
     /// It is of the right kind and holds no frame.
     #[error("{input} is empty: {what}")]
     Empty { input: String, what: &'static str },
+    /// A still picture: there is nothing to follow.
+    #[error("{input} has one frame only, and motion is seen from the second one on; film for at least 5 s")]
+    SingleFrame { input: String },
     /// A program that we need is not installed.
     #[error("{tool} is not installed, and video files are read with it; run `sudo apt install ffmpeg`")]
     MissingTool { tool: String },

@@ -37,6 +37,9 @@ impl Images {
             });
         };
         let size = read(first, 0, 0.0)?.size;
+        if files.len() == 1 {
+            return Err(SourceError::SingleFrame { input });
+        }
         Ok(Self { folder: folder.to_owned(), files, next: 0, size, rate_hz })
     }
 }

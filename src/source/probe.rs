@@ -41,7 +41,7 @@ pub(super) fn probe(path: &Path, program: &str) -> Result<Probe, SourceError> {
     let bad = |what: String| SourceError::BadFormat { input: path.display().to_string(), what };
     let (length, cut) = look_into(path).map_err(|e| SourceError::of_file(path, &e))?;
     if length == 0 {
-        return Err(bad("the file has no content".to_owned()));
+        return Err(bad("the file has no content; film again, or name another file".to_owned()));
     }
     let mut command = Command::new(program);
     // Only V: a picture of a sleeve in a sound file is a video stream, too, but not one that moves.

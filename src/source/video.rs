@@ -9,6 +9,7 @@
 use super::probe::{Probe, file_url, probe, ratio, spawn_error};
 use super::{Source, SourceError, SourceInfo};
 use crate::model::{FormatNote, PixelFormat, RawFrame, Size};
+use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, PipeReader, Read, Seek};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
@@ -32,8 +33,8 @@ pub(super) struct Video {
     size: Size,
     format: PixelFormat,
     tick_s: f64,
-    /// The first frame is read when the file is opened: only then it is known that there is one.
-    pending: Option<RawFrame>,
+    /// The first two frames are read when the file is opened: only then it is known that there are any, and motion.
+    pending: VecDeque<RawFrame>,
     frames: u64,
     out_of_order: u64,
     first_time_s: f64,
@@ -83,7 +84,7 @@ impl Video {
             size: Size::new(0, 0),
             format,
             tick_s: 0.0,
-            pending: None,
+            pending: VecDeque::new(),
             frames: 0,
             out_of_order: 0,
             first_time_s: 0.0,
@@ -92,11 +93,13 @@ impl Video {
             ended: false,
             warnings: Vec::new(),
         };
-        video.pending = video.read_frame();
-        if video.pending.is_some() {
-            return Ok(video);
-        }
+        video.pending = std::iter::from_fn(|| video.read_frame()).take(2).collect();
         let input = path.display().to_string();
+        match video.pending.len() {
+            0 => {}
+            1 => return Err(SourceError::SingleFrame { input }),
+            _ => return Ok(video),
+        }
         Err(match video.complaint() {
             None => SourceError::Empty { input, what: "the video has no frame; film again, or name another file" },
             Some(what) => {
@@ -199,7 +202,7 @@ impl Source for Video {
         if self.ended {
             return Ok(None);
         }
-        let frame = self.pending.take().or_else(|| self.read_frame());
+        let frame = self.pending.pop_front().or_else(|| self.read_frame());
         if frame.is_none() {
             self.ended = true;
             self.finish();

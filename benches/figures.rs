@@ -1,0 +1,186 @@
+//! The figures that arborcam is held to: `cargo bench`, or `make bench`.
+//!
+//! Each is printed on a line of its own with its bound; criterion's statistics stand above them.
+
+#[path = "../tests/support/mod.rs"]
+mod support;
+
+use arborcam::config::{Config, Detect};
+use arborcam::hierarchy::{COMPARE_HZ, evidence_of};
+use arborcam::model::{Frame, Luma, Outline, TrackSet};
+use arborcam::outline::whole;
+use arborcam::pipeline::{self, Pipeline, Tree};
+use arborcam::source::{self, Decoder};
+use arborcam::track::{OpticalFlow, Pyramid, TrackHistory, Tracker};
+use criterion::Criterion;
+use opencv::boxed_ref::BoxedRef;
+use opencv::core::{Mat, Point2f, Size as CvSize, TermCriteria, Vector};
+use opencv::video::{OPTFLOW_USE_INITIAL_FLOW, calc_optical_flow_pyr_lk};
+use std::path::Path;
+use std::process::Command;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Frames of the 720p clip that tracking is measured on.
+const TRACKED: usize = 60;
+
+fn main() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let clip = dir.path().join("720p.mkv");
+    let scale = ["-v", "error", "-nostdin", "-i", support::CLIP, "-vf", "scale=1280:720", "-c:v", "mjpeg", "-q:v", "4"];
+    assert!(Command::new("ffmpeg").args(scale).arg(&clip).status().expect("ffmpeg").success());
+
+    let mut criterion = Criterion::default()
+        .without_plots()
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(300))
+        .measurement_time(Duration::from_secs(3));
+    let lines = [tracking(&clip), build(&mut criterion), pose(&mut criterion), replay(&clip, dir.path())];
+    println!();
+    lines.iter().for_each(|line| println!("{line}"));
+}
+
+fn frames(clip: &Path, n: usize) -> Vec<Frame> {
+    let mut source = source::open(clip, &Config::default().camera, None).expect("clip");
+    let mut decoder = Decoder::new().expect("decoder");
+    let frame = |index: usize| {
+        let raw = source.next_frame().expect("frame")?;
+        let mut luma = Luma { size: raw.size, pixels: Vec::new() };
+        decoder.luma(&raw, &mut luma).expect("picture");
+        let (time_s, received) = (raw.sensor_time_s, Instant::now());
+        Some(Frame { index: index as u64, time_s, received, luma, preview: None })
+    };
+    (0..n).map_while(frame).collect()
+}
+
+/// Forward and back as our tracker does it, each pyramid built once, against two plain calls of OpenCV on pictures, as
+/// anyone would write them; in turns on the same frames and points, so that whatever else the machine does is shared
+/// fairly. The medians are compared. The tracker's whole step, which also undoes drift, stands beside them.
+fn tracking(clip: &Path) -> String {
+    let frames = frames(clip, TRACKED);
+    let settings = Config::default();
+    let (window, levels) = (settings.track.window_px, settings.track.levels);
+    let outline = whole(frames[0].luma.size);
+    let detect = Detect { points: 400, ..settings.detect };
+    let (mut ours_ms, mut plain_ms, mut step_ms) = (Vec::new(), Vec::new(), Vec::new());
+    let mut flow = OpticalFlow::new(window);
+    let (mut forward, mut backward) = (Vec::new(), Vec::new());
+    for _ in 0..4 {
+        let mut tracker = Tracker::new(&detect, &settings.track, &outline, 0);
+        let mut set = tracker.step(&frames[0]);
+        let (mut previous, mut present) = (Pyramid::default(), Pyramid::default());
+        previous.rebuild(&frames[0].luma, window, levels);
+        for pair in frames.windows(2) {
+            let points: Vec<[f32; 2]> = set.observations.iter().map(|o| [o.u_px, o.v_px]).collect();
+            assert!(points.len() >= 300, "{} points", points.len());
+            let from: Vector<Point2f> = points.iter().map(|p| Point2f::new(p[0], p[1])).collect();
+            plain_ms.push(timed_ms(|| plain(&pair[0].luma, &pair[1].luma, &from)).0);
+            let ours = || {
+                present.rebuild(&pair[1].luma, window, levels);
+                flow.track((&previous, &present), &points, None, levels, &mut forward);
+                let to: Vec<[f32; 2]> = forward.iter().map(|f| f.to).collect();
+                flow.track((&present, &previous), &to, None, levels, &mut backward);
+            };
+            ours_ms.push(timed_ms(ours).0);
+            std::mem::swap(&mut previous, &mut present);
+            let (ms, next) = timed_ms(|| tracker.step(&pair[1]));
+            step_ms.push(ms);
+            set = next;
+        }
+    }
+    let (ours, plain, step) = (median(ours_ms), median(plain_ms), median(step_ms));
+    println!("a 720p frame, some 400 points, forward and back: {ours:.2} ms; plain OpenCV: {plain:.2} ms");
+    println!("the whole step, drift undone: {step:.2} ms");
+    format!("tracking: {:.2} of plain OpenCV (must be <= 0.85)", ours / plain)
+}
+
+fn plain(a: &Luma, b: &Luma, from: &Vector<Point2f>) -> Vector<Point2f> {
+    let (rows, cols) = (a.size.height as i32, a.size.width as i32);
+    let [a, b] = [a, b].map(|l| Mat::new_rows_cols_with_data(rows, cols, &l.pixels).expect("mat"));
+    let (mut status, mut error) = (Vector::<u8>::new(), Vector::<f32>::new());
+    let mut flow = |a: &BoxedRef<Mat>, b: &BoxedRef<Mat>, from: &Vector<Point2f>| {
+        let (mut to, window) = (from.clone(), CvSize::new(15, 15));
+        let criteria = TermCriteria::new(3, 30, 0.01).expect("criteria");
+        let flags = OPTFLOW_USE_INITIAL_FLOW;
+        calc_optical_flow_pyr_lk(a, b, from, &mut to, &mut status, &mut error, window, 3, criteria, flags, 1e-4)
+            .expect("flow");
+        to
+    };
+    let to = flow(&a, &b, from);
+    flow(&b, &a, &to)
+}
+
+/// What has been seen of the recording by the time the tree is built.
+fn gathered() -> (TrackHistory, Arc<Outline>, Vec<TrackSet>) {
+    let config = Config::default();
+    let outline = support::outline();
+    let mut pipeline = Pipeline::new(&config, Some(outline.clone()));
+    let mut decoder = Decoder::new().expect("decoder");
+    let (mut history, mut sets) = (TrackHistory::new(config.accumulate.window_s), Vec::new());
+    for k in 0..support::recording().len() {
+        for moved in pipeline.step(support::decoded(&mut decoder, k)) {
+            if pipeline.back.tree().is_none() || history.is_empty() {
+                history.push(moved.tracks.clone());
+            }
+            sets.push(moved.tracks);
+        }
+    }
+    (history, Arc::new(outline), sets)
+}
+
+fn built(history: &TrackHistory, outline: &Arc<Outline>) -> Tree {
+    let config = Config::default();
+    let evidence = evidence_of(history, &config.accumulate);
+    let table = history.table(1.0 / COMPARE_HZ);
+    pipeline::build(&table, evidence, outline, &config, (0, 0.0, false)).expect("a tree")
+}
+
+fn build(criterion: &mut Criterion) -> String {
+    let (history, outline, _) = gathered();
+    criterion.bench_function("build of the tree, 400 points", |b| b.iter(|| built(&history, &outline)));
+    let ms = median((0..10).map(|_| timed_ms(|| built(&history, &outline)).0).collect());
+    format!("build: {ms:.0} ms (must be <= 300)")
+}
+
+fn pose(criterion: &mut Criterion) -> String {
+    let (history, outline, sets) = gathered();
+    let tree = built(&history, &outline);
+    let all = || {
+        let (mut binding, mut estimator) = (tree.binding(), tree.estimator(&Config::default()));
+        for set in &sets {
+            std::hint::black_box(estimator.step(set.frame, set.time_s, &binding.targets_px(set)));
+        }
+    };
+    criterion.bench_function("poses of 330 frames", |b| b.iter(all));
+    let ms = median((0..5).map(|_| timed_ms(all).0 / sets.len() as f64).collect());
+    format!("pose: {ms:.3} ms a frame (must be <= 1)")
+}
+
+/// The program itself, everything included: ffmpeg, decoding, all stages, the capture folder.
+fn replay(clip: &Path, dir: &Path) -> String {
+    let outline = dir.join("720p.json");
+    let corners: Vec<[i32; 2]> = support::outline().polygon_px.iter().map(|p| [2 * p[0], 2 * p[1]]).collect();
+    std::fs::write(&outline, format!(r#"{{"width": 1280, "height": 720, "polygon_px": {corners:?}}}"#))
+        .expect("outline");
+    let run = |k: usize| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
+        command.args(["replay", "--fast", "--headless"]).arg(clip).arg("--outline").arg(&outline);
+        command.arg("--out").arg(dir.join(format!("out{k}"))).stderr(std::process::Stdio::null());
+        let (ms, status) = timed_ms(|| command.status().expect("arborcam"));
+        assert!(status.success());
+        ms
+    };
+    let ms = median((0..3).map(run).collect());
+    format!("replay: {:.0} frames/s at 1280x720 (must be >= 80)", support::recording().len() as f64 / ms * 1e3)
+}
+
+fn timed_ms<T>(work: impl FnOnce() -> T) -> (f64, T) {
+    let start = Instant::now();
+    let result = work();
+    (start.elapsed().as_secs_f64() * 1e3, result)
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}

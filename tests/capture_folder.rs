@@ -1,0 +1,295 @@
+//! The capture folder of the shipped recording, read as other programs read it.
+
+mod support;
+
+use arborcam::config::Config;
+use arborcam::outline::{AutoOutline, Found};
+use arborcam::source::Decoder;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::PathBuf;
+use std::process::Command;
+use std::sync::OnceLock;
+use support::{CLIP, OUTLINE, recording};
+use tempfile::TempDir;
+
+/// One replay and what came out of it.
+struct Replay {
+    dir: TempDir,
+    stream: String,
+}
+
+impl Replay {
+    fn out(&self) -> PathBuf {
+        self.dir.path().join("out")
+    }
+
+    fn text(&self, name: &str) -> String {
+        fs::read_to_string(self.out().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+    }
+
+    fn capture(&self) -> serde_json::Value {
+        serde_json::from_str(&self.text("capture.json")).expect("capture.json")
+    }
+
+    /// Rows of a table without its header, which must be `header`.
+    fn rows(&self, name: &str, header: &str) -> Vec<Vec<String>> {
+        let text = self.text(name);
+        let mut lines = text.lines();
+        assert_eq!(lines.next(), Some(header), "header of {name}");
+        lines.map(|l| l.split(',').map(str::to_owned).collect()).collect()
+    }
+
+    fn motion(&self) -> Vec<Moved> {
+        self.rows("motion.csv", "frame,time_s,node_id,x,y,z,u_px,v_px").iter().map(|r| Moved::of(r)).collect()
+    }
+
+    fn nodes(&self) -> Vec<Vec<String>> {
+        self.rows(
+            "nodes.csv",
+            "node_id,parent_id,level,n_tracks,u_px,v_px,x,y,z,radius,frequency_hz,frequency_lo_hz,frequency_hi_hz,\
+             damping_ratio,damping_lo,damping_hi,identifiable",
+        )
+    }
+
+    fn tracks(&self) -> Vec<Vec<String>> {
+        self.rows("tracks.csv", "track_id,frame,time_s,u_px,v_px,node_id")
+    }
+}
+
+/// A row of `motion.csv`.
+struct Moved {
+    frame: usize,
+    time_s: f64,
+    node: usize,
+    at: [f64; 3],
+    seen_px: [f64; 2],
+}
+
+impl Moved {
+    fn of(row: &[String]) -> Self {
+        let [time_s, x, y, z, u, v] = [1, 3, 4, 5, 6, 7].map(|c| number(&row[c]));
+        Self { frame: index(&row[0]), time_s, node: index(&row[2]), at: [x, y, z], seen_px: [u, v] }
+    }
+}
+
+fn number(cell: &str) -> f64 {
+    cell.parse().unwrap_or_else(|e| panic!("{cell:?}: {e}"))
+}
+
+fn index(cell: &str) -> usize {
+    cell.parse().unwrap_or_else(|e| panic!("{cell:?}: {e}"))
+}
+
+fn replay(before: &[&str], more: &[&str]) -> Replay {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let words = [before, &[env!("CARGO_BIN_EXE_arborcam"), "replay", CLIP, "--fast"], more].concat();
+    let output = Command::new(words[0]).args(&words[1..]).arg("--out").arg(dir.path().join("out")).output();
+    let output = output.unwrap_or_else(|e| panic!("{}: {e}", words[0]));
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    Replay { dir, stream: String::from_utf8(output.stdout).expect("text") }
+}
+
+/// The replay that most tests look at.
+fn made() -> &'static Replay {
+    static MADE: OnceLock<Replay> = OnceLock::new();
+    MADE.get_or_init(|| replay(&[], &["--outline", OUTLINE, "--stream", "ndjson"]))
+}
+
+#[test]
+fn the_tree_stands_on_its_foot_and_parents_come_first() {
+    let nodes = made().nodes();
+    assert!(nodes.len() > 100, "{} nodes", nodes.len());
+    assert_eq!(nodes[0][1], "", "the root has no parent");
+    assert_eq!([6, 7, 8].map(|c| number(&nodes[0][c])), [0.0; 3], "the foot is the origin");
+    for (i, node) in nodes.iter().enumerate() {
+        assert_eq!(index(&node[0]), i);
+        assert!(i == 0 || index(&node[1]) < i, "node {i} stands before its parent {}", node[1]);
+        assert!(i == 0 || index(&node[2]) == index(&nodes[index(&node[1])][2]) + 1, "level of node {i}");
+        assert!(number(&node[9]) > 0.0, "radius of node {i}");
+        // Nothing is claimed that has not been identified.
+        assert!(node[16] == "true" || (10..16).all(|c| node[c].is_empty()), "node {i} claims {:?}", &node[10..]);
+    }
+}
+
+#[test]
+fn every_node_is_posed_in_every_frame_those_before_the_build_among_them() {
+    let (motion, nodes) = (made().motion(), made().nodes().len());
+    assert_eq!(motion.len(), nodes * recording().len());
+    for (k, row) in motion.iter().enumerate() {
+        assert_eq!((row.frame, row.node), (k / nodes, k % nodes));
+    }
+    // The tree moves, also in the frames from before it was known.
+    let build = made().capture()["build"]["frame"].as_u64().expect("build.frame") as usize;
+    let sway = |frames: std::ops::Range<usize>| {
+        let of_node = |n: usize| frames.clone().map(move |f| f * nodes + n);
+        let reach = |n: usize| {
+            let us: Vec<f64> = of_node(n).map(|k| motion[k].seen_px[0]).collect();
+            us.iter().copied().fold(f64::MIN, f64::max) - us.iter().copied().fold(f64::MAX, f64::min)
+        };
+        (0..nodes).map(reach).fold(0.0, f64::max)
+    };
+    assert!(build > 0 && sway(0..build) > 5.0 && sway(build..recording().len()) > 5.0);
+}
+
+#[test]
+fn branches_keep_their_lengths() {
+    let (motion, nodes) = (made().motion(), made().nodes());
+    let mut reach: Vec<(f64, f64)> = vec![(f64::MAX, 0.0); nodes.len()];
+    for pose in motion.chunks(nodes.len()) {
+        for (i, node) in nodes.iter().enumerate().skip(1) {
+            let parent = pose[index(&node[1])].at;
+            let length = (0..3).map(|c| (pose[i].at[c] - parent[c]).powi(2)).sum::<f64>().sqrt();
+            reach[i] = (reach[i].0.min(length), reach[i].1.max(length));
+        }
+    }
+    for (i, (short, long)) in reach.iter().enumerate().skip(1) {
+        assert!(long - short <= 0.001 * long, "branch {i} is {short} to {long} px long");
+    }
+}
+
+#[test]
+fn the_projection_is_the_models_seen_from_the_front() {
+    let foot = &made().capture()["model"]["foot_px"];
+    let foot = [0, 1].map(|c| foot[c].as_f64().expect("foot_px"));
+    for row in made().motion() {
+        let expected = [foot[0] + row.at[0], foot[1] - row.at[1]];
+        let off = (0..2).map(|c| (row.seen_px[c] - expected[c]).abs()).fold(0.0, f64::max);
+        assert!(off < 0.002, "frame {} node {}: {:?} instead of {expected:?}", row.frame, row.node, row.seen_px);
+    }
+}
+
+#[test]
+fn times_are_the_files_own() {
+    let own: Vec<f64> = recording().iter().map(|f| f.sensor_time_s - recording()[0].sensor_time_s).collect();
+    assert!(own.windows(2).all(|w| w[0] < w[1]));
+    let steps: BTreeSet<i64> = own.windows(2).map(|w| ((w[1] - w[0]) * 1e6).round() as i64).collect();
+    assert!(steps.len() > 1, "the clip's times must differ from a nominal rate for this to show anything");
+    for row in made().motion() {
+        assert!((row.time_s - own[row.frame]).abs() < 1e-6, "frame {} is at {}", row.frame, row.time_s);
+    }
+    for row in made().tracks() {
+        assert!((number(&row[2]) - own[index(&row[1])]).abs() < 1e-6, "{row:?}");
+    }
+}
+
+#[test]
+fn tracks_belong_to_nodes_that_exist_and_keep_their_ids() {
+    let (measured, coast) = {
+        let capture = made().capture();
+        let model = |key: &str| capture["model"][key].as_u64().expect("count") as usize;
+        (model("nodes") - model("copies"), capture["config"]["track"]["coast_frames"].as_u64().expect("coast") as usize)
+    };
+    let mut last: BTreeMap<usize, usize> = BTreeMap::new();
+    let mut bound = 0;
+    let tracks = made().tracks();
+    for row in &tracks {
+        let (id, frame) = (index(&row[0]), index(&row[1]));
+        if let Some(before) = last.insert(id, frame) {
+            assert!(frame > before && frame - before <= coast + 1, "track {id} is back after {before} in {frame}");
+        }
+        assert!(row[5].is_empty() || index(&row[5]) < measured, "{row:?}");
+        bound += usize::from(!row[5].is_empty());
+    }
+    assert!(bound * 2 > tracks.len(), "{bound} of {} observations belong to a node", tracks.len());
+    assert_eq!(Some(last.len() as u64), made().capture()["quality"]["tracks_total"].as_u64());
+}
+
+#[test]
+fn the_model_opens_with_skin_and_animation() {
+    let bytes = fs::read(made().out().join("tree.glb")).expect("tree.glb");
+    let (document, buffers, _) = gltf::import_slice(bytes).expect("a valid GLB");
+    let (nodes, capture) = (made().nodes().len(), made().capture());
+    let joints = document.skins().next().expect("a skin").joints().count();
+    assert!(joints + 1 >= nodes, "{joints} joints for {nodes} nodes");
+    assert!(document.nodes().any(|n| n.mesh().is_some() && n.skin().is_some()), "the mesh hangs on the skin");
+    let animation = document.animations().next().expect("an animation");
+    let mut end_s = 0.0f32;
+    for channel in animation.channels() {
+        let reader = channel.reader(|b| Some(&buffers[b.index()]));
+        let times: Vec<f32> = reader.read_inputs().expect("times").collect();
+        assert!(times.windows(2).all(|w| w[0] < w[1]) && times[0] >= 0.0);
+        end_s = times.iter().copied().fold(end_s, f32::max);
+    }
+    let duration_s = capture["timing"]["duration_s"].as_f64().expect("duration_s");
+    assert!((f64::from(end_s) - duration_s).abs() < 0.05, "{end_s} s of {duration_s} s");
+}
+
+#[test]
+fn capture_json_says_what_was_seen() {
+    let capture = made().capture();
+    let frames = recording().len() as u64;
+    let says = |path: &str| capture.pointer(path).unwrap_or_else(|| panic!("{path} is missing")).clone();
+    assert_eq!((says("/source/width"), says("/source/height")), (640.into(), 360.into()));
+    assert_eq!(says("/source/name"), CLIP);
+    for count in ["camera", "tracker"] {
+        assert_eq!(says(&format!("/timing/frames_dropped_{count}")), 0);
+    }
+    assert_eq!((says("/timing/frames_seen"), says("/animation/frames")), (frames.into(), frames.into()));
+    let rate = says("/timing/measured_rate_hz").as_f64().expect("rate");
+    assert!((rate - 30.0).abs() < 0.1, "{rate} Hz");
+    assert_eq!(says("/model/nodes"), made().nodes().len());
+    assert_eq!(says("/build/forced"), false);
+    assert_eq!(says("/config"), serde_json::to_value(Config::default()).expect("config"));
+    assert!(says("/quality/median_fb_error_px").as_f64().expect("error") < 0.1);
+}
+
+#[test]
+fn the_stream_is_what_the_capture_says() {
+    let (motion, nodes) = (made().motion(), made().nodes().len());
+    let build = made().capture()["build"]["frame"].as_u64().expect("build.frame") as usize;
+    let lines: Vec<serde_json::Value> =
+        made().stream.lines().map(|l| serde_json::from_str(l).unwrap_or_else(|e| panic!("{l}: {e}"))).collect();
+    assert_eq!(lines.len(), recording().len() - build, "a line for each frame from the build on");
+    for (k, line) in lines.iter().enumerate() {
+        let frame = build + k;
+        assert_eq!(line["frame"], frame);
+        let streamed = line["nodes"].as_array().expect("nodes");
+        for node in streamed {
+            let id = node[0].as_u64().expect("id") as usize;
+            let kept = &motion[frame * nodes + id];
+            let off = (0..3).map(|c| (node[c + 1].as_f64().expect("number") - kept.at[c]).abs()).fold(0.0, f64::max);
+            assert!(off < 0.001, "frame {frame} node {id}: {node} and {:?}", kept.at);
+        }
+        assert!(streamed.len() > 50, "{} nodes", streamed.len());
+    }
+}
+
+/// The same clip gives the same bytes, however the threads happen to run.
+#[test]
+fn a_replay_is_reproducible_to_the_byte() {
+    let on_one_core = Command::new("taskset").args(["-c", "0", "true"]).status().is_ok_and(|s| s.success());
+    let again = replay(if on_one_core { &["taskset", "-c", "0"] } else { &[] }, &["--outline", OUTLINE, "--headless"]);
+    for name in ["capture.json", "tracks.csv", "nodes.csv", "motion.csv", "tree.glb"] {
+        let [a, b] = [made(), &again].map(|r| fs::read(r.out().join(name)).expect("file"));
+        assert!(a == b, "{name} differs from one run to the next");
+    }
+}
+
+/// Without an outline the tree is found by its motion.
+#[test]
+fn the_tree_is_found_without_an_outline() {
+    let found = replay(&[], &["--headless"]);
+    assert!(found.nodes().len() > 50, "{} nodes", found.nodes().len());
+    let given = support::outline();
+    let inside = |r: &Vec<String>| given.contains(number(&r[3]), number(&r[4]));
+    let bound: Vec<Vec<String>> = found.tracks().into_iter().filter(|r| r[1] == "0" && !r[5].is_empty()).collect();
+    let hits = bound.iter().filter(|r| inside(r)).count();
+    assert!(4 * hits >= 3 * bound.len() && hits > 50, "{hits} of {} points are on the tree", bound.len());
+
+    let (mut search, mut decoder) = (AutoOutline::new(&Config::default().outline), Decoder::new().expect("decoder"));
+    let frames = (0..recording().len()).map(|k| support::decoded(&mut decoder, k));
+    let outline = frames
+        .into_iter()
+        .find_map(|f| match search.step(&f.luma, f.time_s) {
+            Found::Tree(outline) => Some(outline),
+            _ => None,
+        })
+        .expect("an outline");
+    let count = |both: fn(bool, bool) -> bool| {
+        outline.mask.iter().zip(&given.mask).filter(|(a, b)| both(**a != 0, **b != 0)).count() as f64
+    };
+    let iou = count(|a, b| a && b) / count(|a, b| a || b);
+    println!("intersection over union of the outline that is found and the one that is drawn: {iou:.2}");
+    assert!(iou >= 0.3, "{iou:.2}");
+}

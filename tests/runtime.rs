@@ -1,0 +1,381 @@
+//! The pipeline on threads: the same result as without them, wishes honoured, losses counted, and an end in any case.
+
+mod support;
+
+use arborcam::config::Config;
+use arborcam::model::{Control, FormatNote, Outline, PixelFormat, RawFrame, Size};
+use arborcam::pipeline::Pipeline;
+use arborcam::runtime::{self, Failure, Job, Pace, Running, Summary};
+use arborcam::source::{Decoder, Source, SourceError, SourceInfo};
+use std::io::{self, Write};
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, mpsc};
+use std::time::Duration;
+use support::{SIZE, recording};
+
+/// A run that has not ended after so long hangs.
+const HANGS: Duration = Duration::from_secs(60);
+
+/// What a source does when it is asked for frame `n`.
+type Script = Box<dyn FnMut(u64) -> Result<Option<RawFrame>, SourceError> + Send>;
+
+struct Fake {
+    next: u64,
+    live: bool,
+    script: Script,
+}
+
+impl Source for Fake {
+    fn next_frame(&mut self) -> Result<Option<RawFrame>, SourceError> {
+        self.next += 1;
+        (self.script)(self.next - 1)
+    }
+
+    fn describe(&self) -> SourceInfo {
+        SourceInfo {
+            name: "fake".into(),
+            format: FormatNote::default(),
+            size: SIZE,
+            nominal_rate_hz: Some(30.0),
+            frames_total: None,
+            live: self.live,
+        }
+    }
+}
+
+fn frame(n: u64) -> Option<RawFrame> {
+    recording().get(n as usize).cloned()
+}
+
+fn fake(live: bool, script: impl FnMut(u64) -> Result<Option<RawFrame>, SourceError> + Send + 'static) -> Box<Fake> {
+    Box::new(Fake { next: 0, live, script: Box::new(script) })
+}
+
+/// The recording, waiting before frame `at` until it is let go on.
+fn gated(at: u64) -> (Box<Fake>, Gate) {
+    let (reached_in, reached) = mpsc::channel();
+    let (open, opened) = mpsc::channel::<()>();
+    let taken = Arc::new(AtomicU64::new(0));
+    let count = taken.clone();
+    let source = fake(false, move |n| {
+        count.store(n, Ordering::SeqCst);
+        if n == at {
+            let _ = reached_in.send(());
+            let _ = opened.recv();
+        }
+        Ok(frame(n))
+    });
+    (source, Gate { reached, open, taken })
+}
+
+struct Gate {
+    reached: mpsc::Receiver<()>,
+    open: mpsc::Sender<()>,
+    /// Number of the frame that was asked for last.
+    taken: Arc<AtomicU64>,
+}
+
+/// Standard output of a test.
+#[derive(Clone, Default)]
+struct Lines(Arc<Mutex<Vec<u8>>>);
+
+impl Write for Lines {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.lock().expect("lines").extend(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+fn job(outline: Option<Outline>, out: Option<&Path>) -> Job {
+    Job {
+        config: Config::default(),
+        outline,
+        pace: Pace::Fast,
+        stream: None,
+        out: out.map(Path::to_path_buf),
+        preview_every: Duration::from_secs(2),
+    }
+}
+
+/// How a run ended; fails if it does not.
+fn ended(running: Running) -> (Option<Summary>, Option<Failure>, Vec<String>) {
+    let (done, wait) = mpsc::channel();
+    std::thread::spawn(move || {
+        while !running.finished() {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let warnings = running.warnings();
+        let (summary, failure) = running.join();
+        let _ = done.send((summary, failure, warnings));
+    });
+    wait.recv_timeout(HANGS).expect("the run hangs")
+}
+
+fn run(source: Box<Fake>, job: Job) -> (Option<Summary>, Option<Failure>, Vec<String>) {
+    ended(runtime::start(source, job).expect("start"))
+}
+
+/// Sends `wishes` before frame `at` is taken, and waits for the end.
+fn wish(at: u64, wishes: &[Control], out: &Path) -> (Summary, Vec<String>) {
+    let (source, gate) = gated(at);
+    let running = runtime::start(source, job(Some(support::outline()), Some(out))).expect("start");
+    gate.reached.recv_timeout(HANGS).expect("the gate is reached");
+    wishes.iter().for_each(|w| running.send(w.clone()));
+    gate.open.send(()).expect("the source waits");
+    let (summary, failure, warnings) = ended(running);
+    assert!(failure.is_none(), "{failure:?}");
+    (summary.expect("a summary"), warnings)
+}
+
+/// Track id and frame of every row of `tracks.csv`.
+fn tracks(out: &Path) -> Vec<(u64, u64)> {
+    let text = std::fs::read_to_string(out.join("tracks.csv")).expect("tracks.csv");
+    let cell = |l: &str, c: usize| l.split(',').nth(c).and_then(|x| x.parse().ok()).expect("a number");
+    text.lines().skip(1).map(|l| (cell(l, 0), cell(l, 1))).collect()
+}
+
+/// What the program means is one synchronous step a frame; threads must not change it.
+#[test]
+fn threads_give_the_same_poses_as_none() {
+    for outline in [Some(support::outline()), None] {
+        let mut pipeline = Pipeline::new(&Config::default(), outline.clone());
+        let mut decoder = Decoder::new().expect("decoder");
+        let mut moved = Vec::new();
+        for k in 0..recording().len() {
+            moved.extend(pipeline.step(support::decoded(&mut decoder, k)));
+        }
+        moved.extend(pipeline.finish());
+        assert!(moved.iter().map(|m| m.tracks.frame).eq(0..recording().len() as u64), "every frame, in order");
+
+        let lines = Lines::default();
+        let streamed = Job { stream: Some(Box::new(lines.clone())), ..job(outline, None) };
+        let (summary, failure, _) = run(fake(false, |n| Ok(frame(n))), streamed);
+        assert!(failure.is_none(), "{failure:?}");
+        let (tree, threaded) = (pipeline.back.tree().expect("tree"), summary.and_then(|s| s.tree).expect("tree"));
+        assert_eq!(*tree.skeleton, *threaded.skeleton);
+        assert_eq!((tree.frame, &tree.evidence), (threaded.frame, &threaded.evidence));
+
+        let text = String::from_utf8(lines.0.lock().expect("lines").clone()).expect("text");
+        let mut lines = text.lines();
+        let mut poses = 0;
+        for pose in moved.iter().filter_map(|m| m.pose.as_ref()) {
+            let nodes: Vec<String> = pose.joints[..tree.skeleton.measured()]
+                .iter()
+                .enumerate()
+                .map(|(i, j)| format!("[{i},{:.3},{:.3},{:.3}]", j.position.x, j.position.y, j.position.z))
+                .collect();
+            let expected =
+                format!("{{\"frame\":{},\"time_s\":{:.6},\"nodes\":[{}]}}", pose.frame, pose.time_s, nodes.join(","));
+            assert_eq!(lines.next(), Some(expected.as_str()), "frame {}", pose.frame);
+            poses += 1;
+        }
+        assert!(poses > 100 && lines.next().is_none(), "{poses} poses");
+    }
+}
+
+#[test]
+fn build_now_builds_early() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let (summary, _) = wish(60, &[Control::BuildNow], &dir.path().join("out"));
+    let tree = summary.tree.expect("a tree");
+    assert!(tree.forced && (55..=62).contains(&tree.frame), "built after frame {}", tree.frame);
+}
+
+#[test]
+fn restart_starts_over_with_new_ids() {
+    let (dir, whole) = (tempfile::tempdir().expect("tempdir"), recording().len() as u64);
+    let out = dir.path().join("out");
+    let (summary, _) = wish(150, &[Control::Restart], &out);
+    let tracks = tracks(&out);
+    let first = tracks.iter().map(|t| t.1).min().expect("tracks");
+    assert!((140..=151).contains(&first), "tracks begin in frame {first}");
+    assert_eq!(tracks.iter().map(|t| t.1).max(), Some(whole - 1));
+    // Some 390 points were followed before; none of their names comes back.
+    let lowest = tracks.iter().map(|t| t.0).min().expect("tracks");
+    assert!(lowest >= 380, "id {lowest} was in use before");
+    assert!(summary.tree.expect("a tree").frame > first);
+}
+
+#[test]
+fn a_new_outline_is_used_and_a_bad_one_is_refused_in_words() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let bad = Control::SetOutline(vec![[10.0, 10.0], [90.0, 90.0]]);
+    let (summary, warnings) = wish(20, &[bad], &dir.path().join("bad"));
+    assert!(warnings.iter().any(|w| w.contains("at least 3")), "{warnings:?}");
+    assert_eq!(summary.tree.expect("a tree").outline.polygon_px, support::outline().polygon_px);
+    assert_eq!(tracks(&dir.path().join("bad")).first().map(|t| t.1), Some(0), "what was followed is kept");
+
+    let crown = vec![[240.0, 0.0], [480.0, 0.0], [480.0, 250.0], [240.0, 250.0]];
+    let (summary, warnings) = wish(20, &[Control::SetOutline(crown)], &dir.path().join("good"));
+    assert_eq!(warnings, Vec::<String>::new());
+    assert_eq!(summary.tree.expect("a tree").outline.bounds_px(), Some([240, 0, 480, 250]));
+}
+
+#[test]
+fn export_writes_a_capture_and_goes_on() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("capture");
+    let (summary, warnings) = wish(200, &[Control::Export], &out);
+    assert!(warnings.iter().any(|w| w.contains("capture-1")), "{warnings:?}");
+    let last = |dir: &Path| tracks(dir).iter().map(|t| t.1).max().expect("tracks");
+    let exported = last(&dir.path().join("capture-1"));
+    assert!((190..=201).contains(&exported), "exported up to frame {exported}");
+    assert!(dir.path().join("capture-1/tree.glb").exists());
+    assert_eq!((last(&out), summary.frames), (329, 330), "frames go on");
+}
+
+#[test]
+fn quit_ends_with_a_whole_capture() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("out");
+    let (summary, _) = wish(200, &[Control::Quit], &out);
+    assert!((200..=201).contains(&summary.frames), "{} frames", summary.frames);
+    assert!(summary.written.expect("written").model && out.join("tree.glb").exists());
+}
+
+#[test]
+fn pause_stops_a_replay_and_loses_nothing() {
+    let (source, gate) = gated(50);
+    let running = runtime::start(source, job(Some(support::outline()), None)).expect("start");
+    gate.reached.recv_timeout(HANGS).expect("the gate is reached");
+    running.send(Control::Pause(true));
+    gate.open.send(()).expect("the source waits");
+    // Time enough to take many frames for one that is not paused; a paused one takes none however long it waits.
+    std::thread::sleep(Duration::from_millis(400));
+    assert_eq!(gate.taken.load(Ordering::SeqCst), 50, "a paused replay goes on");
+    running.send(Control::Pause(false));
+    let (summary, failure, _) = ended(running);
+    assert!(failure.is_none());
+    assert_eq!(summary.expect("a summary").frames, 330);
+}
+
+/// A camera does not wait. What the tracker has no time for is dropped, the oldest first, and counted.
+#[test]
+fn a_camera_that_is_too_fast_loses_frames_and_says_how_many() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("out");
+    let live = Job { pace: Pace::Live, ..job(Some(support::outline()), Some(&out)) };
+    let (summary, failure, _) = run(fake(true, |n| Ok(frame(n))), live);
+    assert!(failure.is_none());
+    let capture: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(out.join("capture.json")).expect("capture.json")).expect("json");
+    let dropped = capture["timing"]["frames_dropped_tracker"].as_u64().expect("count");
+    let mut frames: Vec<u64> = tracks(&out).iter().map(|t| t.1).collect();
+    assert!(frames.is_sorted(), "never back in time");
+    frames.dedup();
+    assert!(dropped > 0, "without a loss this shows nothing");
+    assert_eq!(frames.len() as u64 + dropped, 330, "each frame is either followed or counted as lost");
+    assert!(frames.ends_with(&[327, 328, 329]), "the newest are kept: {:?}", frames.last());
+    assert_eq!(summary.expect("a summary").frames, 330);
+}
+
+/// Holes in the driver's count are losses before us.
+#[test]
+fn frames_that_the_camera_lost_are_counted_with_their_place() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("out");
+    let (_, failure, _) =
+        run(fake(false, |n| Ok(frame(if n < 40 { n } else { n + 5 }))), job(Some(support::outline()), Some(&out)));
+    assert!(failure.is_none());
+    let capture: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(out.join("capture.json")).expect("capture.json")).expect("json");
+    assert_eq!(capture["timing"]["frames_dropped_camera"], 5);
+    assert_eq!(capture["timing"]["gaps"][0]["after_frame"], 39);
+    assert_eq!(tracks(&out).last().map(|t| t.1), Some(329), "later frames keep their places in time");
+}
+
+fn unplugged() -> SourceError {
+    SourceError::Disconnected { input: "fake".into(), reason: "test".into() }
+}
+
+/// Ends that nobody wanted: each is reported as what it is, and what was captured until then is written.
+#[test]
+fn a_bad_end_is_reported_and_keeps_what_was_captured() {
+    let small = |n: u64| frame(n).map(|raw| RawFrame { size: Size::new(320, 180), ..raw });
+    let broken =
+        |n: u64| frame(n).map(|raw| RawFrame { bytes: b"not a picture".to_vec(), format: PixelFormat::Mjpeg, ..raw });
+    type End = (&'static str, Script, fn(&Failure) -> bool, u64);
+    let ends: [End; 4] = [
+        (
+            "unplugged",
+            Box::new(|n| if n < 150 { Ok(frame(n)) } else { Err(unplugged()) }),
+            |f| matches!(f, Failure::Source(SourceError::Disconnected { .. })),
+            150,
+        ),
+        (
+            "another size",
+            Box::new(move |n| Ok(if n < 150 { frame(n) } else { small(n) })),
+            |f| matches!(f, Failure::Decode(_)),
+            150,
+        ),
+        (
+            "a panic",
+            Box::new(|n| if n < 150 { Ok(frame(n)) } else { panic!("test") }),
+            |f| matches!(f, Failure::Panicked),
+            150,
+        ),
+        ("no picture at all", Box::new(move |n| Ok(broken(n))), |f| matches!(f, Failure::NothingDecoded(_)), 0),
+    ];
+    for (name, script, expected, frames) in ends {
+        let dir = tempfile::tempdir().expect("tempdir");
+        let out = dir.path().join("out");
+        let source = Box::new(Fake { next: 0, live: false, script });
+        let (summary, failure, _) = run(source, job(Some(support::outline()), Some(&out)));
+        assert!(failure.as_ref().is_some_and(expected), "{name}: {failure:?}");
+        assert!(summary.is_some_and(|s| s.written.is_some() && s.tree.is_some() == (frames > 0)), "{name}");
+        assert_eq!(tracks(&out).last().map_or(0, |t| t.1 + 1), frames, "{name}");
+    }
+}
+
+/// Damage in between costs the damaged frames and nothing else.
+#[test]
+fn damaged_frames_are_left_out_and_counted() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("out");
+    let source = fake(false, |n| {
+        Ok(frame(n).map(|mut raw| {
+            if n % 50 == 7 {
+                raw.bytes.truncate(raw.bytes.len() / 2);
+            }
+            raw
+        }))
+    });
+    let (summary, failure, warnings) = run(source, job(Some(support::outline()), Some(&out)));
+    assert!(failure.is_none() && summary.is_some_and(|s| s.tree.is_some()));
+    assert!(warnings.iter().any(|w| w.contains("frame 7 is damaged")), "{warnings:?}");
+    let text = std::fs::read_to_string(out.join("capture.json")).expect("capture.json");
+    assert!(text.contains("\"frames_undecodable\": 7"), "{text}");
+}
+
+/// A reader of the stream that fails, and one that brings its thread down: the run ends.
+#[test]
+fn a_worker_that_fails_does_not_make_the_run_hang() {
+    struct Failing(bool);
+    impl Write for Failing {
+        fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+            if self.0 { panic!("test") } else { Err(io::Error::other("no more room")) }
+        }
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+    for panics in [false, true] {
+        let stream: Box<dyn Write + Send> = Box::new(Failing(panics));
+        let job = Job { stream: Some(stream), ..job(Some(support::outline()), None) };
+        // A source without an end: only an ended run ends it.
+        let endless = fake(true, |n| {
+            let mut raw = frame(n % 330);
+            raw.iter_mut().for_each(|f| (f.sequence, f.sensor_time_s) = (n, n as f64 / 30.0));
+            Ok(raw)
+        });
+        let (summary, failure, warnings) = run(endless, job);
+        assert_eq!(matches!(failure, Some(Failure::Panicked)), panics, "{failure:?}");
+        assert_eq!(summary.is_none(), panics);
+        assert_eq!(warnings.iter().any(|w| w.contains("stream of poses has ended")), !panics, "{warnings:?}");
+    }
+}

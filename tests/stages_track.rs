@@ -1,0 +1,172 @@
+//! Following points, on pictures whose motion is known.
+
+use arborcam::config::{Accumulate, Detect, Track};
+use arborcam::hierarchy::evidence_of;
+use arborcam::model::{Frame, Luma, Observation, Size, TrackId, TrackSet};
+use arborcam::outline::whole;
+use arborcam::track::{TrackHistory, Tracker};
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+use std::time::Instant;
+
+const SIZE: Size = Size { width: 320, height: 240 };
+
+/// Brightness of a smooth random texture anywhere, also between pixels.
+fn texture(u: f64, v: f64) -> f64 {
+    let wave = |k: usize| {
+        let share = |a: f64| (k as f64 * a).fract();
+        // Structure of all sizes, as in a photograph: a pyramid of pictures needs the large ones, too.
+        let (angle, length) = (TAU * share(0.618), 7.0 * 1.19f64.powi(k as i32));
+        (TAU * (u * angle.cos() + v * angle.sin()) / length + TAU * share(0.569)).sin()
+    };
+    128.0 + 16.0 * (1..=16).map(wave).sum::<f64>()
+}
+
+/// Picture `k`, brightness by place.
+fn frame(k: u64, at: impl Fn(f64, f64) -> f64) -> Frame {
+    let pixel = |i: u32| at(f64::from(i % SIZE.width), f64::from(i / SIZE.width)).round().clamp(0.0, 255.0) as u8;
+    let pixels = (0..SIZE.width * SIZE.height).map(pixel).collect();
+    let luma = Luma { size: SIZE, pixels };
+    Frame { index: k, time_s: k as f64 / 30.0, received: Instant::now(), luma, preview: None }
+}
+
+fn tracker() -> Tracker {
+    Tracker::new(
+        &Detect { points: 300, min_distance_px: 20.0, ..Detect::default() },
+        &Track::default(),
+        &whole(SIZE),
+        0,
+    )
+}
+
+fn places(set: &TrackSet) -> BTreeMap<TrackId, [f64; 2]> {
+    set.observations.iter().map(|o| (o.id, [f64::from(o.u_px), f64::from(o.v_px)])).collect()
+}
+
+/// Shift of the picture in frame `k`, px: a sway of a few pixels.
+fn shift(k: u64) -> [f64; 2] {
+    let phase = TAU * k as f64 / 40.0;
+    [6.3 * phase.sin(), 2.1 * (1.7 * phase).sin()]
+}
+
+#[test]
+fn a_known_motion_is_followed_to_a_tenth_of_a_pixel() {
+    let mut tracker = tracker();
+    let first = places(&tracker.step(&frame(0, texture)));
+    assert!(first.len() >= 80, "{} points", first.len());
+    for k in 1..40 {
+        let [du, dv] = shift(k);
+        let now = places(&tracker.step(&frame(k, |u, v| texture(u - du, v - dv))));
+        let mut errors: Vec<f64> = now
+            .iter()
+            .filter_map(|(id, at)| first.get(id).map(|from| (at[0] - from[0] - du).hypot(at[1] - from[1] - dv)))
+            .collect();
+        errors.sort_by(f64::total_cmp);
+        assert!(errors.len() * 10 >= first.len() * 8, "frame {k}: {} points are left", errors.len());
+        assert!(errors[errors.len() * 95 / 100] < 0.1, "frame {k}: {:?}", &errors[errors.len() - 5..]);
+    }
+}
+
+#[test]
+fn a_static_picture_stays_where_it_is() {
+    let mut tracker = tracker();
+    let still = frame(0, texture);
+    let first = places(&tracker.step(&still));
+    for k in 1..30 {
+        let now = places(&tracker.step(&Frame { index: k, ..still.clone() }));
+        assert_eq!(now.len(), first.len(), "none is lost in frame {k}");
+        for (id, at) in &now {
+            assert!((at[0] - first[id][0]).hypot(at[1] - first[id][1]) < 0.01, "{id:?} drifts");
+        }
+    }
+}
+
+/// A bird flies by: who is behind it is not reported, and has its old name afterwards.
+#[test]
+fn hidden_points_come_back_with_their_names_in_the_right_place() {
+    let mut tracker = tracker();
+    let hidden = |u: f64, v: f64| (110.0..170.0).contains(&u) && (80.0..140.0).contains(&v);
+    let middle = |p: &[f64; 2]| (122.0..158.0).contains(&p[0]) && (92.0..128.0).contains(&p[1]);
+    let mut first = BTreeMap::new();
+    let mut seen_behind = 0;
+    for k in 0..40 {
+        let [du, dv] = shift(k);
+        let covered = (10..16).contains(&k);
+        let at = |u: f64, v: f64| match covered && hidden(u, v) {
+            true => 40.0,
+            false => texture(u - du, v - dv),
+        };
+        let now = places(&tracker.step(&frame(k, at)));
+        if k == 0 {
+            first.clone_from(&now);
+        }
+        if k == 13 {
+            seen_behind = now.values().filter(|p| middle(p)).count();
+        }
+        if k == 39 {
+            let behind: Vec<_> = first.iter().filter(|(_, p)| middle(p)).collect();
+            let back = |(id, from): &&(&TrackId, &[f64; 2])| {
+                now.get(id).is_some_and(|at| (at[0] - from[0] - du).hypot(at[1] - from[1] - dv) < 0.3)
+            };
+            let n = behind.iter().filter(back).count();
+            assert!(behind.len() >= 2 && 2 * n >= behind.len(), "{n} of {} points came back", behind.len());
+            assert!(seen_behind < behind.len(), "{seen_behind} of {} were reported behind the bird", behind.len());
+        }
+    }
+}
+
+/// Now and then there is nothing to be seen at all, and every point is lost: names are never given twice.
+#[test]
+fn names_are_never_given_twice() {
+    let mut tracker = tracker();
+    let (clear, fog) = (frame(0, texture), frame(0, |_, _| 128.0));
+    let (mut last, mut births) = (BTreeMap::new(), 0);
+    for k in 0..150u64 {
+        let picture = if k % 50 < 25 { &clear } else { &fog };
+        let set = tracker.step(&Frame { index: k, ..picture.clone() });
+        births += u64::from(set.born);
+        for id in places(&set).into_keys() {
+            let before = last.insert(id, k).unwrap_or(k);
+            assert!(k - before <= 16, "{id:?} is back in frame {k}, last seen in {before}");
+        }
+    }
+    let lost = last.values().filter(|k| **k < 100).count();
+    assert!(lost >= 160, "only {lost} points were ever lost");
+    assert_eq!(births, u64::from(tracker.next_id()), "each birth takes one new name");
+    assert_eq!(births, last.len() as u64);
+}
+
+/// A history of 60 points that sway by `amplitude_px`, each measured with an error of about 0.05 px.
+fn history(amplitude_px: f64, seconds: f64) -> TrackHistory {
+    let mut history = TrackHistory::new(20.0);
+    for k in 0..(30.0 * seconds) as u64 {
+        let time_s = k as f64 / 30.0;
+        let at = |i: u32| {
+            let noise = |a: f64| 0.1 * ((f64::from(i) * 12.9898 + k as f64 * a).sin() * 43758.5453).fract();
+            // Higher points sway more, and each row a little later.
+            let (row, column) = (i / 6, i % 6);
+            let sway = amplitude_px * (0.3 + f64::from(row) / 9.0) * (TAU * time_s / 1.7 + 0.4 * f64::from(row)).sin();
+            Observation {
+                id: TrackId(i),
+                u_px: (40.0 * f64::from(column) + sway + noise(78.233)) as f32,
+                v_px: (20.0 * f64::from(row) + noise(39.425)) as f32,
+                fb_error_px: 0.05,
+            }
+        };
+        let observations = (0..60).map(at).collect();
+        history.push(TrackSet { frame: k, time_s, observations, lost: 0, born: 0 });
+    }
+    history
+}
+
+#[test]
+fn the_accumulation_measure_grows_with_motion_and_stays_low_on_noise() {
+    let measure =
+        |amplitude_px: f64, seconds: f64| evidence_of(&history(amplitude_px, seconds), &Accumulate::default());
+    let noise = measure(0.0, 6.0);
+    assert!(noise.measure < 0.02 && noise.moving.is_empty(), "{noise:?}");
+    let growing: Vec<f64> = [0.5, 1.5, 4.0, 10.0].map(|a| measure(a, 6.0).measure).to_vec();
+    assert!(growing.windows(2).all(|w| w[0] < w[1] + 1e-6) && growing[0] < 0.5, "{growing:?}");
+    assert!(growing[3] > Accumulate::default().threshold && growing[3] <= 1.0, "{growing:?}");
+    assert_eq!(measure(10.0, 6.0).moving.len(), 60);
+}

@@ -1,0 +1,34 @@
+//! The shipped recording, read once for all tests of a file.
+#![allow(dead_code)] // not every test file needs all of it
+
+use arborcam::config;
+use arborcam::model::{Frame, Luma, Outline, RawFrame, Size};
+use arborcam::source::{self, Decoder};
+use std::path::Path;
+use std::sync::OnceLock;
+use std::time::Instant;
+
+pub const CLIP: &str = "recordings/sparse_winter.mkv";
+pub const OUTLINE: &str = "recordings/sparse_winter.outline.json";
+pub const SIZE: Size = Size { width: 640, height: 360 };
+
+pub fn recording() -> &'static [RawFrame] {
+    static FRAMES: OnceLock<Vec<RawFrame>> = OnceLock::new();
+    FRAMES.get_or_init(|| {
+        let mut clip = source::open(Path::new(CLIP), &config::Camera::default(), None).expect("clip");
+        std::iter::from_fn(|| clip.next_frame().expect("frame")).collect()
+    })
+}
+
+/// Frame `k` of the recording as the tracker gets it.
+pub fn decoded(decoder: &mut Decoder, k: usize) -> Frame {
+    let (raw, first) = (&recording()[k], &recording()[0]);
+    let mut luma = Luma { size: raw.size, pixels: Vec::new() };
+    decoder.luma(raw, &mut luma).expect("picture");
+    let time_s = raw.sensor_time_s - first.sensor_time_s;
+    Frame { index: k as u64, time_s, received: Instant::now(), luma, preview: None }
+}
+
+pub fn outline() -> Outline {
+    arborcam::outline::load(Path::new(OUTLINE), SIZE).expect("outline")
+}
