@@ -12,12 +12,13 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("outline", &["model", "config"]),
     ("track", &["model", "config"]),
     // The table of positions that the hierarchy is cut from is the tracker's.
-    ("hierarchy", &["model", "config", "track::TrackTable", "track::TrackHistory"]),
+    ("hierarchy", &["model", "config", "track::TrackTable", "track::TrackHistory", "signal"]),
     ("skeleton", &["model", "config"]),
     // The flat node that is stood up in space.
     ("shape", &["model", "config", "skeleton::Node2d"]),
     ("motion", &["model", "config"]),
-    ("dynamics", &["model", "config"]),
+    ("dynamics", &["model", "config", "signal"]),
+    ("signal", &[]),
     ("pipeline", &["model", "config", "outline", "track", "hierarchy", "skeleton", "shape", "motion"]),
     ("recording", &["model"]),
     // `capture.json` holds the whole configuration; the model's file holds the mesh.

@@ -104,6 +104,7 @@ fn a_capture_reads_back_as_it_was_written_and_is_the_same_every_time() {
         source: Default::default(),
         timing,
         config: Config::default(),
+        outline: None,
         build: None,
         quality: Quality { median_fb_error_px: Some(0.05), ..Quality::default() },
         model: Some(ModelNote::of(&skeleton, 0.004)),

@@ -174,7 +174,7 @@ fn threads_give_the_same_poses_as_none() {
             assert_eq!(lines.next(), Some(expected.as_str()), "frame {}", pose.frame);
             poses += 1;
         }
-        assert!(poses > 100 && lines.next().is_none(), "{poses} poses");
+        assert!(poses > 80 && lines.next().is_none(), "{poses} poses");
     }
 }
 
@@ -220,11 +220,11 @@ fn a_new_outline_is_used_and_a_bad_one_is_refused_in_words() {
 fn export_writes_a_capture_and_goes_on() {
     let dir = tempfile::tempdir().expect("tempdir");
     let out = dir.path().join("capture");
-    let (summary, warnings) = wish(200, &[Control::Export], &out);
-    assert!(warnings.iter().any(|w| w.contains("capture-1")), "{warnings:?}");
+    let (summary, warnings) = wish(280, &[Control::Export], &out);
+    assert_eq!(warnings, Vec::<String>::new(), "a notice is no warning");
     let last = |dir: &Path| tracks(dir).iter().map(|t| t.1).max().expect("tracks");
     let exported = last(&dir.path().join("capture-1"));
-    assert!((190..=201).contains(&exported), "exported up to frame {exported}");
+    assert!((270..=281).contains(&exported), "exported up to frame {exported}");
     assert!(dir.path().join("capture-1/tree.glb").exists());
     assert_eq!((last(&out), summary.frames), (329, 330), "frames go on");
 }

@@ -134,7 +134,7 @@ fn the_tree_in_space_stays_in_its_envelope_on_one_trunk() {
 
 #[test]
 fn attractors_lie_on_the_surface() {
-    let foot = skeleton::foot_px(&outline());
+    let foot = skeleton::Foot::of(&outline(), None).position_px;
     let envelope = Envelope::of_revolution(&outline(), foot);
     let points = envelope.attractors(256);
     assert_eq!(points.len(), 256);
@@ -154,7 +154,7 @@ fn attractors_lie_on_the_surface() {
 #[test]
 fn pushing_brings_the_tree_nearer_to_its_envelope() {
     let (settings, outline) = (config::Shape::default(), outline());
-    let envelope = Envelope::of_revolution(&outline, skeleton::foot_px(&outline));
+    let envelope = Envelope::of_revolution(&outline, skeleton::Foot::of(&outline, None).position_px);
     let prototype = shape::copy_to_planes(&flat(), &[2; 8], &outline, &envelope, settings.planes);
     let distance = |tree: &Skeleton| shape::envelope_distance(tree, &envelope, settings.attractors as usize);
     for terms in [Terms::Both, Terms::Global] {
@@ -247,6 +247,7 @@ fn problem(target: Option<[f64; 2]>) -> Problem {
         previous_direction: Vector3::y_axis(),
         sigma_track_px: 1.0,
         sigma_shape: 0.3,
+        sigma_depth: None,
         max_step: 0.2,
         max_total: 0.5,
     }

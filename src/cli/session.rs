@@ -33,6 +33,9 @@ pub struct Plan<'a> {
 pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
     let config = common.config().map_err(|e| Ended::BadUsage(e.into()))?;
     let headless = common.headless || common.stream.is_some();
+    if common.out.is_none() && common.stream.is_none() {
+        say("arborcam: warning: without --out nothing is written, but for what key e exports");
+    }
     if !headless && !std::io::stdout().is_terminal() {
         return Err(Ended::BadUsage(tui::TuiError::NoTerminal(None).into()));
     }
@@ -47,13 +50,15 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
     let job = Job {
         config,
         outline,
-        pace: plan.pace.unwrap_or(own_pace),
+        // A camera cannot be slowed down or hurried, whatever the command.
+        pace: plan.pace.filter(|_| !info.live).unwrap_or(own_pace),
         stream: common.stream.map(|_| Box::new(std::io::stdout()) as _),
         out: common.out.clone(),
         preview_every: if headless { PREVIEW_HEADLESS } else { PREVIEW_SCREEN },
     };
     let stop = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM, SIGHUP] {
+    let signals = [SIGINT, SIGTERM].into_iter().chain((!hangup_ignored()).then_some(SIGHUP));
+    for signal in signals {
         // Twice the same signal ends at once: a disk that hangs must not make the program immortal.
         signal_hook::flag::register_conditional_shutdown(signal, i32::from(super::STOPPED), stop.clone())
             .and_then(|_| signal_hook::flag::register(signal, stop.clone()))
@@ -72,6 +77,14 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
         say(&format!("arborcam: warning: {warning}"));
     }
     report(summary.as_ref(), failure, stop.load(Ordering::SeqCst))
+}
+
+/// Whether whoever started us, `nohup` for one, wants us to outlive the terminal.
+fn hangup_ignored() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let bits = mask.and_then(|m| u64::from_str_radix(m.trim(), 16).ok()).unwrap_or(0);
+    bits & (1 << (SIGHUP - 1)) != 0
 }
 
 fn no_input(e: SourceError) -> Ended {
@@ -132,8 +145,12 @@ fn init_log(headless: bool) {
     if headless || !std::io::stderr().is_terminal() {
         let filter = tracing_subscriber::EnvFilter::try_from_env("ARBORCAM_LOG")
             .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn"));
-        let _ =
-            tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().try_init();
+        let _ = tracing_subscriber::fmt()
+            .with_env_filter(filter)
+            .with_writer(std::io::stderr)
+            .with_ansi(std::io::stderr().is_terminal())
+            .without_time()
+            .try_init();
     }
 }
 
@@ -145,6 +162,8 @@ fn report(summary: Option<&Summary>, failure: Option<Failure>, stopped: bool) ->
         }
     }
     match failure {
+        // Not one frame: there was no usable camera, whatever it said when it was opened.
+        Some(Failure::Source(e)) if summary.is_none_or(|s| s.frames == 0) => Err(no_input(e)),
         Some(failure) => Err(failure.into()),
         None if stopped => Err(Ended::Stopped),
         // Tracks alone are not what was asked for; whoever looks for tree.glb is to learn it from the status.
@@ -156,6 +175,14 @@ fn report(summary: Option<&Summary>, failure: Option<Failure>, stopped: bool) ->
 }
 
 fn no_tree(s: &Summary) -> anyhow::Error {
+    if s.moving >= crate::pipeline::LEAST_MOVING {
+        return anyhow!(
+            "no tree: {} points moved, but not enough to tell branches apart (accumulation {:.2}); film for longer, at \
+             least ten seconds, or in more wind",
+            s.moving,
+            s.accumulation
+        );
+    }
     anyhow!(
         "no tree: {} points moved, and at least {} must; wait for wind, come nearer, keep the camera still, or draw the \
          outline closer (--outline)",
@@ -167,9 +194,9 @@ fn no_tree(s: &Summary) -> anyhow::Error {
 fn closing_lines(s: &Summary) -> Vec<String> {
     let mut lines = vec![format!("{} frames, {} points followed", s.frames, s.tracks_total)];
     if let Some(tree) = &s.tree {
-        let (nodes, points) = (tree.skeleton.measured(), tree.evidence.moving.len());
+        let (nodes, points) = (tree.skeleton.measured(), tree.skeleton.nodes[0].n_tracks);
         let copies = tree.skeleton.nodes.len() - nodes;
-        let when = if tree.forced { "before enough motion was seen" } else { "built" };
+        let when = if tree.forced { "built before enough motion was seen," } else { "built" };
         lines.push(format!(
             "tree: {nodes} nodes from {points} moving points and {copies} copied ones, {when} at {:.1} s (accumulation \
              {:.2})",

@@ -53,6 +53,9 @@ impl ModelThread {
             announced: false,
         };
         thread.new_spool();
+        if thread.job.out.is_none() {
+            thread.shared.tell("no --out: nothing is written unless you press e".into());
+        }
         thread
     }
 
@@ -74,12 +77,13 @@ impl ModelThread {
                 }
                 ToModel::BuildNow => {
                     self.back.build_now();
-                    self.shared.warn("building the tree from what has been seen so far".into());
+                    self.shared.tell("building the tree from what has been seen so far".into());
                 }
                 ToModel::Export => self.export_now(),
             }
         }
         self.back.finish();
+        self.note_thin_evidence();
         self.show(last.as_ref(), true);
         let summary = self.finish();
         self.shared.ended.store(true, Ordering::Relaxed);
@@ -119,13 +123,27 @@ impl ModelThread {
         }
     }
 
-    /// One line of JSON: `{"frame":…,"time_s":…,"nodes":[[id,x,y,z],…]}`, the measured nodes, model axes, px.
+    /// A tree built early is worth less, and the capture is to say so.
+    fn note_thin_evidence(&self) {
+        let threshold = self.job.config.accumulate.threshold;
+        if let Some(tree) = self.back.tree().filter(|t| t.forced && t.evidence.measure < threshold) {
+            self.shared.warn(format!(
+                "the tree was built from little motion (accumulation {:.2} of {threshold}); branches may be wrong: film \
+                 longer, or in more wind",
+                tree.evidence.measure
+            ));
+        }
+    }
+
+    /// One line of JSON: `{"frame":…,"time_s":…,"nodes":[[id,x,y,z],…]}`, the measured nodes, model axes, in px
+    /// or metres as in the capture.
     fn stream(&mut self, pose: &Pose) {
         let Some(out) = &mut self.job.stream else { return };
         let measured = self.back.tree().map_or(0, |t| t.skeleton.measured());
+        let scale = if self.job.config.export.metres_per_px > 0.0 { self.job.config.export.metres_per_px } else { 1.0 };
         let mut line = format!("{{\"frame\":{},\"time_s\":{:.6},\"nodes\":[", pose.frame, pose.time_s);
         for (i, joint) in pose.joints[..measured].iter().enumerate() {
-            let p = joint.position;
+            let p = joint.position * scale;
             let comma = if i > 0 { "," } else { "" };
             line.push_str(&format!("{comma}[{i},{:.3},{:.3},{:.3}]", p.x, p.y, p.z));
         }
@@ -185,7 +203,7 @@ impl ModelThread {
             Ok(job) => {
                 let shared = self.shared.clone();
                 let write = move || match finish::write(&job, &dir) {
-                    Ok(_) => shared.warn(format!("capture written to {}", dir.display())),
+                    Ok(_) => shared.tell(format!("capture written to {}", dir.display())),
                     Err(e) => shared.warn(e.to_string()),
                 };
                 match std::thread::Builder::new().name("export".into()).spawn(write) {
@@ -201,7 +219,9 @@ impl ModelThread {
         for export in self.exports.drain(..) {
             let _ = export.join();
         }
-        let written = match (self.job.out.clone(), self.capture_job()) {
+        // Without a single frame there is nothing to keep.
+        let seen = self.shared.counts.seen.load(Ordering::Relaxed);
+        let written = match (self.job.out.clone().filter(|_| seen > 0), self.capture_job()) {
             (Some(dir), Ok(job)) => match finish::write(&job, &dir) {
                 Ok(written) => Some(written),
                 Err(e) => {

@@ -53,7 +53,7 @@ pub struct Counts {
 #[derive(Default)]
 pub struct Shared {
     /// Take no more frames, finish.
-    pub stop: AtomicBool,
+    pub stop: Arc<AtomicBool>,
     pub paused: AtomicBool,
     pub ended: AtomicBool,
     pub counts: Counts,
@@ -61,6 +61,7 @@ pub struct Shared {
     gaps: Mutex<Vec<Gap>>,
     gaps_not_listed: AtomicU64,
     warnings: Mutex<VecDeque<String>>,
+    notice: Mutex<Option<String>>,
     failure: Mutex<Option<Failure>>,
     last_time_s: Mutex<f64>,
 }
@@ -83,6 +84,17 @@ impl Shared {
             }
             warnings.push_back(warning);
         }
+    }
+
+    /// Shows a line on the screen that is no warning and does not go into the capture.
+    pub fn tell(&self, line: String) {
+        *self.notice.lock().unwrap_or_else(PoisonError::into_inner) = Some(line);
+    }
+
+    /// What the screen is to show: the warnings and the newest notice.
+    pub fn messages(&self) -> Vec<String> {
+        let notice = self.notice.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        self.warnings().into_iter().chain(notice).collect()
     }
 
     pub fn warnings(&self) -> Vec<String> {

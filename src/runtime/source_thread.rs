@@ -35,6 +35,7 @@ const NAP: Duration = Duration::from_millis(20);
 /// oldest frame is taken when a live source finds it full.
 pub fn run(mut source: Box<dyn Source>, pace: Pace, queue: Sender<Timed>, queue_end: Receiver<Timed>, shared: &Shared) {
     let mut clock = Clock::default();
+    source.stop_when(shared.stop.clone());
     while !shared.stop.load(Ordering::Relaxed) {
         if pace != Pace::Live && shared.paused.load(Ordering::Relaxed) {
             std::thread::sleep(NAP);
@@ -45,7 +46,10 @@ pub fn run(mut source: Box<dyn Source>, pace: Pace, queue: Sender<Timed>, queue_
             Ok(Some(raw)) => raw,
             Ok(None) => break,
             Err(e) => {
-                shared.fail(Failure::Source(e));
+                // Asked to stop meanwhile: that is the reason for the end, not a camera that fell silent.
+                if !shared.stop.load(Ordering::Relaxed) {
+                    shared.fail(Failure::Source(e));
+                }
                 break;
             }
         };

@@ -26,6 +26,7 @@ const TABLE_EVERY_S: f64 = 1.0;
 pub struct Status {
     snapshot: Snapshot,
     started: Instant,
+    newest_s: Option<f64>,
     sensor: Recent,
     work: Recent,
     latency_ms: Recent,
@@ -43,6 +44,7 @@ impl Status {
         Self {
             snapshot: Snapshot { source, format, frames_total, ..Snapshot::default() },
             started: Instant::now(),
+            newest_s: None,
             sensor: Recent::new(RATE_S),
             work: Recent::new(RATE_S),
             latency_ms: Recent::new(RATE_S),
@@ -64,13 +66,21 @@ impl Status {
 
     /// The outline is still looked for.
     pub fn searching(&mut self, progress: f64, preview: Option<Arc<Rgb>>, size: Size, (frame, time_s): (u64, f64)) {
+        self.arrived(time_s);
         let s = &mut self.snapshot;
         (s.phase, s.progress, s.frame, s.time_s) = (Phase::Outline, progress, frame, time_s);
-        self.sensor.push(time_s, 0.0);
-        self.work.push(self.started.elapsed().as_secs_f64(), 0.0);
         s.image_size = Some(size);
         if preview.is_some() {
             s.preview = preview;
+        }
+    }
+
+    /// Counts a frame for the rates, but not again when it was held back while the outline was sought.
+    fn arrived(&mut self, time_s: f64) {
+        if self.newest_s.is_none_or(|newest| time_s > newest) {
+            self.newest_s = Some(time_s);
+            self.sensor.push(time_s, 0.0);
+            self.work.push(self.started.elapsed().as_secs_f64(), 0.0);
         }
     }
 
@@ -78,8 +88,7 @@ impl Status {
     pub fn moved(&mut self, moved: &Moved, back: &BackEnd) {
         let now_s = self.started.elapsed().as_secs_f64();
         let time_s = moved.tracks.time_s;
-        self.sensor.push(time_s, 0.0);
-        self.work.push(now_s, 0.0);
+        self.arrived(time_s);
         self.latency_ms.push(now_s, moved.received.elapsed().as_secs_f64() * 1e3);
         self.lost.push(time_s, f64::from(moved.tracks.lost));
         let error_px = median_fb_error_px(&moved.tracks);
@@ -128,7 +137,7 @@ impl Status {
         s.not_shown = shared.screen.replaced();
         s.paused = shared.paused.load(Ordering::Relaxed);
         s.ended = shared.ended.load(Ordering::Relaxed);
-        s.messages = shared.warnings();
+        s.messages = shared.messages();
         Arc::new(s.clone())
     }
 

@@ -17,7 +17,8 @@ pub struct Node2d {
 
 /// The 2D skeleton T' of the paper: cluster centroids, folded. Node 0 is the foot, node k + 1 belongs to cluster k.
 pub fn build(hierarchy: &MotionHierarchy, outline: &Outline, settings: &config::Skeleton) -> Vec<Node2d> {
-    let foot = Node2d { parent: None, level: 0, cluster: None, position_px: foot_px(outline) };
+    let crown_u = hierarchy.clusters.first().map(|all| all.centroid_px[0]);
+    let foot = Node2d { parent: None, level: 0, cluster: None, position_px: Foot::of(outline, crown_u).position_px };
     let mut nodes = vec![foot];
     for (k, c) in hierarchy.clusters.iter().enumerate() {
         nodes.push(Node2d {
@@ -42,23 +43,44 @@ pub fn build(hierarchy: &MotionHierarchy, outline: &Outline, settings: &config::
     nodes
 }
 
-/// Where the trunk leaves the ground: the middle of the outline's lowest rows, px.
-pub fn foot_px(outline: &Outline) -> [f64; 2] {
-    let Some([_, top, _, bottom]) = outline.bounds_px() else { return [0.0, 0.0] };
-    let width = outline.size.width as usize;
-    let from = bottom - (bottom - top) / 30;
-    let rows = outline.mask.chunks_exact(width).enumerate().skip(from as usize);
-    let inside = rows.flat_map(|(_, row)| row.iter().enumerate().filter(|(_, m)| **m != 0).map(|(u, _)| u as f64));
-    let (sum, n) = inside.fold((0.0, 0.0), |(s, n), u| (s + u, n + 1.0));
-    [sum / f64::max(n, 1.0), f64::from(bottom)]
+/// No trunk is thicker than this share of the tree's height.
+const THICKEST_TRUNK: f64 = 0.12;
+/// Lowest share of the outline's height in which the foot is looked for.
+const FOOT_ROWS: f64 = 1.0 / 30.0;
+
+/// Where the trunk leaves the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Foot {
+    pub position_px: [f64; 2],
+    /// Half the outline's width there, px: an upper bound of the trunk's radius, as outlines are drawn wide.
+    pub half_width_px: f64,
 }
 
-/// Half the outline's width at the foot, px: an upper bound of the trunk's radius, as outlines are drawn wide.
-pub fn foot_half_width_px(outline: &Outline) -> f64 {
-    let Some([_, top, _, bottom]) = outline.bounds_px() else { return 1.0 };
-    let width = outline.size.width as usize;
-    let from = (bottom - (bottom - top) / 12) as usize;
-    let rows = outline.mask.chunks_exact(width).take(bottom as usize + 1).skip(from);
-    let narrowest = rows.map(|row| row.iter().filter(|m| **m != 0).count()).filter(|&n| n > 0).max();
-    narrowest.unwrap_or(2) as f64 / 2.0
+impl Foot {
+    /// The foot of the tree in `outline`: the middle of its lowest rows, where these are no wider than a trunk can be.
+    /// Wider ones are more than trunk (a shadow on the ground that moved, a crown without a trunk, a whole picture):
+    /// there the foot is what lies below the middle of the crown, `crown_u` px from the left.
+    pub fn of(outline: &Outline, crown_u: Option<f64>) -> Self {
+        let Some([left, top, right, bottom]) = outline.bounds_px() else {
+            return Self { position_px: [0.0, 0.0], half_width_px: 1.0 };
+        };
+        let height = f64::from(bottom - top + 1);
+        let rows = (FOOT_ROWS * height) as u32;
+        let width = outline.size.width as usize;
+        let lowest = || outline.mask.chunks_exact(width).take(bottom as usize + 1).skip((bottom - rows) as usize);
+        let inside = |u: u32| lowest().any(|row| row[u as usize] != 0);
+        let columns: Vec<u32> = (left..=right).filter(|&u| inside(u)).collect();
+        let (Some(&first), Some(&last)) = (columns.first(), columns.last()) else {
+            return Self { position_px: [0.0, 0.0], half_width_px: 1.0 };
+        };
+        let half_width_px = f64::from(last - first + 1) / 2.0;
+        let thickest_px = THICKEST_TRUNK * height / 2.0;
+        let middle = f64::from(first + last) / 2.0;
+        let u = if half_width_px <= thickest_px {
+            middle
+        } else {
+            crown_u.unwrap_or(middle).clamp(f64::from(first), f64::from(last))
+        };
+        Self { position_px: [u, f64::from(bottom)], half_width_px: half_width_px.min(thickest_px) }
+    }
 }

@@ -80,6 +80,11 @@ fn remedy(path: &Path) -> String {
     if !path.starts_with("/dev") {
         return format!("run `chmod +r {}`, or ask its owner to", path.display());
     }
+    let group_may = meta.mode() & 0o060 == 0o060;
+    if !group_may || meta.gid() == 0 {
+        let shown = path.display();
+        return format!("run `sudo chgrp video {shown} && sudo chmod 660 {shown}`, and be in the group video");
+    }
     let group = group_name(meta.gid()).unwrap_or_else(|| meta.gid().to_string());
     format!("run `sudo usermod -aG {group} $USER`, log out and log in again")
 }
@@ -122,7 +127,8 @@ mod tests {
         assert_eq!(group_name(0).as_deref(), Some("root"));
         let error = SourceError::of_file(Path::new("/dev/null"), &std::io::Error::from_raw_os_error(libc::EACCES));
         assert!(matches!(error, SourceError::Denied { .. }));
-        assert!(error.to_string().contains("sudo usermod -aG root $USER"), "{error}");
+        // Root's group is nothing to join.
+        assert!(error.to_string().contains("sudo chgrp video /dev/null"), "{error}");
     }
 
     #[test]

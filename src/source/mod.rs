@@ -20,6 +20,8 @@ use crate::config;
 use crate::model::{FormatNote, RawFrame, Size};
 use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// What was opened and what is to be expected of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,6 +46,9 @@ pub trait Source: Send {
     fn next_frame(&mut self) -> Result<Option<RawFrame>, SourceError>;
 
     fn describe(&self) -> SourceInfo;
+
+    /// A source that may wait long gives up, and returns `None`, soon after this has been set.
+    fn stop_when(&mut self, _stop: Arc<AtomicBool>) {}
 
     /// Lines to show to the user since the last call, e.g. that a clip ends early; complete after the end.
     fn warnings(&mut self) -> Vec<String> {

@@ -7,6 +7,8 @@ use crate::model::{FormatNote, PixelFormat, RawFrame, Size};
 use std::io;
 use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use v4l::buffer::{Flags, Type};
 use v4l::capability::Flags as Caps;
@@ -17,6 +19,8 @@ use v4l::{Device, Format, FourCC};
 
 /// One is with us, one is being filled, and two wait in between for as long as the system has other things to do.
 const BUFFERS: u32 = 4;
+/// Longest wait after which a wish to stop is heard, ms.
+const NAP_MS: i32 = 50;
 
 /// The first picture of this driver is what happens to lie in its buffer, with a fresh time on it.
 const LOOPBACK: &str = "v4l2 loopback";
@@ -37,6 +41,7 @@ pub(super) struct Camera {
     clock: Clock,
     /// Frames still to be left out at the beginning.
     leave_out: u32,
+    stop: Arc<AtomicBool>,
     damaged: u64,
     stale: u64,
 }
@@ -81,6 +86,7 @@ impl Camera {
             timeout: Duration::from_secs_f64(config.timeout_s.clamp(0.001, 1e6)),
             clock: Clock::default(),
             leave_out: u32::from(caps.driver == LOOPBACK),
+            stop: Arc::default(),
             damaged: 0,
             stale: 0,
         };
@@ -102,18 +108,22 @@ impl Camera {
     }
 
     /// Waits until a frame is there; after a time-out inside the crate's `next` the stream could not go on.
-    fn wait(&self, until: Instant) -> Result<(), SourceError> {
+    /// `false` when asked to stop meanwhile.
+    fn wait(&self, until: Instant) -> Result<bool, SourceError> {
         let handle = self.stream.handle();
         loop {
+            if self.stop.load(Ordering::Relaxed) {
+                return Ok(false);
+            }
             let left = until.saturating_duration_since(Instant::now());
-            let left_ms = i32::try_from(left.as_millis()).unwrap_or(i32::MAX);
+            let left_ms = i32::try_from(left.as_millis()).unwrap_or(i32::MAX).min(NAP_MS);
             match handle.poll(libc::POLLIN, left_ms) {
                 Ok(0) if until <= Instant::now() + Duration::from_millis(1) => {
                     let seconds = self.timeout.as_secs_f64();
                     return Err(SourceError::Timeout { input: self.path.display().to_string(), seconds });
                 }
                 Ok(0) => {}
-                Ok(_) => return Ok(()),
+                Ok(_) => return Ok(true),
                 Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
                 Err(e) => return Err(SourceError::of_driver(&self.path, "waiting for a frame", &e)),
             }
@@ -125,13 +135,17 @@ impl Source for Camera {
     fn next_frame(&mut self) -> Result<Option<RawFrame>, SourceError> {
         let until = Instant::now() + self.timeout;
         loop {
-            self.wait(until)?;
+            if !self.wait(until)? {
+                return Ok(None);
+            }
             let taken = CaptureStream::next(&mut *self.stream);
             let (buffer, meta) = match taken {
                 Ok(taken) => taken,
                 // Woken for nothing. `next` has queued its buffer and would queue it again: take one out without it.
                 Err(e) if e.kind() == io::ErrorKind::WouldBlock => {
-                    self.wait(until)?;
+                    if !self.wait(until)? {
+                        return Ok(None);
+                    }
                     let taken = CaptureStream::dequeue(&mut *self.stream);
                     taken.map_err(|e| SourceError::of_driver(&self.path, "taking a frame", &e))?;
                     continue;
@@ -159,6 +173,10 @@ impl Source for Camera {
             };
             return Ok(Some(RawFrame { sequence, sensor_time_s, size: self.size, format: self.format, bytes }));
         }
+    }
+
+    fn stop_when(&mut self, stop: Arc<AtomicBool>) {
+        self.stop = stop;
     }
 
     fn describe(&self) -> SourceInfo {

@@ -218,7 +218,7 @@ impl Source for Video {
         };
         SourceInfo {
             name: self.path.display().to_string(),
-            format: FormatNote { asked: "as in the file".to_owned(), given },
+            format: FormatNote { asked: given.clone(), given },
             size: self.size,
             nominal_rate_hz: self.probe.rate_hz,
             frames_total: self.probe.frames,

@@ -38,6 +38,15 @@ impl TrackHistory {
         self.sets.clear();
     }
 
+    pub fn first(&self) -> Option<&TrackSet> {
+        self.sets.front()
+    }
+
+    /// The sets, oldest first.
+    pub fn sets(&self) -> impl Iterator<Item = &TrackSet> {
+        self.sets.iter()
+    }
+
     pub fn last(&self) -> Option<&TrackSet> {
         self.sets.back()
     }

@@ -1,0 +1,171 @@
+//! The back end: tracks to tree and poses.
+
+use super::{Followed, Tree, build};
+use crate::config::Config;
+use crate::hierarchy::{self, Evidence};
+use crate::model::{Outline, Phase, Pose, Rgb, TrackSet};
+use crate::motion::{Binding, PoseEstimator};
+use crate::track::TrackHistory;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Time between two judgements of the evidence, s.
+const JUDGE_EVERY_S: f64 = 0.5;
+/// At the end of the frames no tree is built from less evidence than this (accumulation measure).
+pub const LEAST_MEASURE: f64 = 0.1;
+
+/// A frame that has been through the back end.
+#[derive(Clone, Debug)]
+pub struct Moved {
+    pub tracks: TrackSet,
+    pub outline: Arc<Outline>,
+    pub preview: Option<Arc<Rgb>>,
+    pub received: Instant,
+    /// Where the tracks put each measured node, px; empty before the tree is built.
+    pub targets_px: Vec<Option<[f64; 2]>>,
+    /// The posture in this frame, once there is a tree.
+    pub pose: Option<Arc<Pose>>,
+}
+
+/// Tracks to poses: gathers motion, builds the tree, then poses it in every frame.
+pub struct BackEnd {
+    config: Config,
+    history: TrackHistory,
+    evidence: Evidence,
+    judged_s: Option<f64>,
+    outline: Option<Arc<Outline>>,
+    live: Option<Live>,
+    build_now: bool,
+}
+
+struct Live {
+    tree: Arc<Tree>,
+    binding: Binding,
+    estimator: PoseEstimator,
+}
+
+impl BackEnd {
+    pub fn new(config: &Config) -> Self {
+        Self {
+            config: config.clone(),
+            history: TrackHistory::new(config.accumulate.window_s),
+            evidence: Evidence::default(),
+            judged_s: None,
+            outline: None,
+            live: None,
+            build_now: false,
+        }
+    }
+
+    /// Takes the tracks of a frame; gives its pose, once there is a tree.
+    pub fn step(&mut self, followed: Followed) -> Moved {
+        let Followed { tracks, outline, preview, received } = followed;
+        self.outline = Some(outline.clone());
+        if self.live.is_none() {
+            self.history.push(tracks.clone());
+            self.accumulate(tracks.time_s);
+        }
+        let (targets_px, pose) = match &mut self.live {
+            Some(live) => {
+                let targets = live.binding.targets_px(&tracks);
+                let pose = live.estimator.step(tracks.frame, tracks.time_s, &targets);
+                (targets, Some(Arc::new(pose)))
+            }
+            None => (Vec::new(), None),
+        };
+        Moved { tracks, outline, preview, received, targets_px, pose }
+    }
+
+    /// Judges the evidence now and then, and builds when it suffices or when asked.
+    fn accumulate(&mut self, time_s: f64) {
+        let due = self.judged_s.is_none_or(|t| time_s - t >= JUDGE_EVERY_S);
+        if !due && !self.build_now {
+            return;
+        }
+        self.judged_s = Some(time_s);
+        self.evidence = hierarchy::evidence_of(&self.history, &self.config.accumulate);
+        let e = &self.evidence;
+        tracing::debug!(
+            time_s,
+            measure = e.measure,
+            e.motion,
+            e.stability,
+            e.sway,
+            moving = e.moving.len(),
+            "evidence"
+        );
+        let settings = &self.config.accumulate;
+        let enough = self.evidence.measure >= settings.threshold && self.history.span_s() >= settings.min_s;
+        if enough || self.build_now {
+            self.build(!enough);
+        }
+        self.build_now = false;
+    }
+
+    fn build(&mut self, forced: bool) {
+        let (Some(outline), Some(first), Some(last)) = (&self.outline, self.history.first(), self.history.last())
+        else {
+            return;
+        };
+        let moment = (first.frame, last, forced);
+        let table = self.history.table(1.0 / hierarchy::COMPARE_HZ);
+        let Some(tree) = build(&table, self.evidence.clone(), outline, &self.config, moment) else { return };
+        let mut live = Live { binding: tree.binding(), estimator: tree.estimator(&self.config), tree: Arc::new(tree) };
+        // The pose is followed from the first remembered frame, so that it does not jump where the tree was built. The
+        // newest frame is left out: it is about to be worked off as every later one is.
+        for tracks in self.history.sets().take(self.history.len() - 1) {
+            let targets = live.binding.targets_px(tracks);
+            live.estimator.step(tracks.frame, tracks.time_s, &targets);
+        }
+        self.live = Some(live);
+        self.history.clear();
+    }
+
+    /// Build with the next frame, whatever the measure says.
+    pub fn build_now(&mut self) {
+        self.build_now = true;
+    }
+
+    /// No more frames: if nothing has been built, builds from what there is, unless that is next to nothing.
+    pub fn finish(&mut self) {
+        if self.live.is_none() && !self.history.is_empty() {
+            self.evidence = hierarchy::evidence_of(&self.history, &self.config.accumulate);
+            if self.evidence.measure >= LEAST_MEASURE {
+                self.build(true);
+            }
+        }
+    }
+
+    /// Forgets tracks and tree.
+    pub fn restart(&mut self) {
+        *self = Self::new(&self.config);
+    }
+
+    pub fn tree(&self) -> Option<&Arc<Tree>> {
+        self.live.as_ref().map(|l| &l.tree)
+    }
+
+    /// The binding of tracks to nodes, later tracks included.
+    pub fn binding(&self) -> Option<&Binding> {
+        self.live.as_ref().map(|l| &l.binding)
+    }
+
+    /// The outline of the newest frame.
+    pub fn outline(&self) -> Option<&Arc<Outline>> {
+        self.outline.as_ref()
+    }
+
+    pub fn evidence(&self) -> &Evidence {
+        &self.evidence
+    }
+
+    /// What is being done, and how far it is, 0 to 1.
+    pub fn phase(&self) -> (Phase, f64) {
+        match &self.live {
+            Some(_) => (Phase::Live, 1.0),
+            None if self.history.len() < 2 => (Phase::Detect, 0.0),
+            None if self.build_now => (Phase::Build, 1.0),
+            None => (Phase::Accumulate, self.evidence.measure),
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! The front end: frame to tracks.
+
+use crate::config::Config;
+use crate::model::{Frame, Luma, Outline, Rgb, TrackSet};
+use crate::outline::{AutoOutline, Found};
+use crate::track::Tracker;
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Frames kept while the outline is not known yet take at most so many bytes; beyond that the oldest is let go.
+const HELD_BYTES: usize = 48 << 20;
+/// Frames worked off in one step while held ones remain: catches up without a long pause.
+const FRAMES_PER_STEP: usize = 3;
+
+/// A frame that has been through the front end.
+#[derive(Clone, Debug)]
+pub struct Followed {
+    pub tracks: TrackSet,
+    pub outline: Arc<Outline>,
+    pub preview: Option<Arc<Rgb>>,
+    pub received: Instant,
+}
+
+/// Frame to tracks: outline, detection, tracking.
+pub struct FrontEnd {
+    config: Config,
+    /// What the user gave; `None` finds it by motion.
+    given: Option<Arc<Outline>>,
+    search: AutoOutline,
+    found: Option<(Arc<Outline>, Tracker)>,
+    held: VecDeque<Frame>,
+    next_id: u32,
+    spare: Option<Luma>,
+    progress: f64,
+    /// Frames that went by before there was an outline.
+    pub let_go: u64,
+    pub no_motion: bool,
+}
+
+impl FrontEnd {
+    pub fn new(config: &Config, outline: Option<Outline>) -> Self {
+        Self {
+            config: config.clone(),
+            given: outline.map(Arc::new),
+            search: AutoOutline::new(&config.outline),
+            found: None,
+            held: VecDeque::new(),
+            next_id: 0,
+            spare: None,
+            progress: 0.0,
+            let_go: 0,
+            no_motion: false,
+        }
+    }
+
+    /// Takes a frame; gives back up to three that are done, none while the outline is being looked for.
+    pub fn step(&mut self, frame: Frame) -> Vec<Followed> {
+        if self.found.is_none() {
+            match &self.given {
+                Some(outline) => self.settle(outline.clone()),
+                None => match self.search.step(&frame.luma, frame.time_s) {
+                    Found::NotYet(progress) => self.progress = progress,
+                    Found::Tree(outline) => self.settle(Arc::new(outline)),
+                    Found::NoMotion(outline) => {
+                        self.no_motion = true;
+                        self.settle(Arc::new(outline));
+                    }
+                },
+            }
+        }
+        self.held.push_back(frame);
+        if self.found.is_none() {
+            while self.held.iter().map(|f| f.luma.pixels.len()).sum::<usize>() > HELD_BYTES {
+                self.held.pop_front();
+                self.let_go += 1;
+            }
+            return Vec::new();
+        }
+        let n = self.held.len().min(FRAMES_PER_STEP);
+        (0..n).filter_map(|_| self.follow_next()).collect()
+    }
+
+    /// Works off all held frames; an outline that was still looked for is what the frames so far show.
+    pub fn flush(&mut self) -> Vec<Followed> {
+        if self.found.is_none()
+            && let Some(size) = self.held.back().map(|f| f.luma.size)
+        {
+            let outline = self.search.conclude(size);
+            self.no_motion = outline.is_none();
+            self.settle(Arc::new(outline.unwrap_or_else(|| crate::outline::whole(size))));
+        }
+        std::iter::from_fn(|| self.follow_next()).collect()
+    }
+
+    /// Starts again, with a new outline if one is given. Track ids go on.
+    pub fn restart(&mut self, outline: Option<Outline>) {
+        if let Some((_, tracker)) = self.found.take() {
+            self.next_id = tracker.next_id();
+        }
+        self.given = outline.map(Arc::new).or(self.given.take());
+        self.search = AutoOutline::new(&self.config.outline);
+        self.held.clear();
+        (self.progress, self.no_motion) = (0.0, false);
+    }
+
+    /// How far the search for the outline is, 0 to 1; `None` when it is over.
+    pub fn searching(&self) -> Option<f64> {
+        self.found.is_none().then_some(self.progress)
+    }
+
+    /// A picture buffer that is no longer needed, to decode the next frame into.
+    pub fn spare(&mut self) -> Option<Luma> {
+        self.spare.take()
+    }
+
+    fn settle(&mut self, outline: Arc<Outline>) {
+        let tracker = Tracker::new(&self.config.detect, &self.config.track, &outline, self.next_id);
+        self.found = Some((outline, tracker));
+    }
+
+    fn follow_next(&mut self) -> Option<Followed> {
+        let (outline, tracker) = self.found.as_mut()?;
+        let frame = self.held.pop_front()?;
+        let tracks = tracker.step(&frame);
+        self.spare = Some(frame.luma);
+        Some(Followed { tracks, outline: outline.clone(), preview: frame.preview, received: frame.received })
+    }
+}
