@@ -132,7 +132,7 @@ fn built(history: &TrackHistory, outline: &Arc<Outline>) -> Tree {
     let config = Config::default();
     let evidence = evidence_of(history, &config.accumulate);
     let table = history.table(1.0 / COMPARE_HZ);
-    pipeline::build(&table, evidence, outline, &config, (0, 0.0, false)).expect("a tree")
+    pipeline::build(&table, evidence, outline, &config, (0, &Default::default(), false)).expect("a tree")
 }
 
 fn build(criterion: &mut Criterion) -> String {
