@@ -7,7 +7,7 @@ mod back;
 mod front;
 mod retrace;
 
-pub use back::{BackEnd, Moved};
+pub use back::{BackEnd, Moved, Targets};
 pub use front::{Followed, FrontEnd};
 pub use retrace::Retrace;
 

@@ -22,10 +22,15 @@ pub struct Moved {
     pub preview: Option<Arc<Rgb>>,
     pub received: Instant,
     /// Where the tracks put each measured node, px; empty before the tree is built.
-    pub targets_px: Vec<Option<[f64; 2]>>,
+    pub targets_px: Targets,
     /// The posture in this frame, once there is a tree.
     pub pose: Option<Arc<Pose>>,
+    /// In the frame in which the tree was built: time and targets of the frames remembered from before, oldest first.
+    pub before: Vec<(f64, Targets)>,
 }
+
+/// Where the tracks put each measured node, px; `None` for a node none of whose tracks was seen.
+pub type Targets = Vec<Option<[f64; 2]>>;
 
 /// Tracks to poses: gathers motion, builds the tree, then poses it in every frame.
 pub struct BackEnd {
@@ -61,9 +66,10 @@ impl BackEnd {
     pub fn step(&mut self, followed: Followed) -> Moved {
         let Followed { tracks, outline, preview, received } = followed;
         self.outline = Some(outline.clone());
+        let mut before = Vec::new();
         if self.live.is_none() {
             self.history.push(tracks.clone());
-            self.accumulate(tracks.time_s);
+            before = self.accumulate(tracks.time_s);
         }
         let (targets_px, pose) = match &mut self.live {
             Some(live) => {
@@ -73,14 +79,14 @@ impl BackEnd {
             }
             None => (Vec::new(), None),
         };
-        Moved { tracks, outline, preview, received, targets_px, pose }
+        Moved { tracks, outline, preview, received, targets_px, pose, before }
     }
 
     /// Judges the evidence now and then, and builds when it suffices or when asked.
-    fn accumulate(&mut self, time_s: f64) {
+    fn accumulate(&mut self, time_s: f64) -> Vec<(f64, Targets)> {
         let due = self.judged_s.is_none_or(|t| time_s - t >= JUDGE_EVERY_S);
         if !due && !self.build_now {
-            return;
+            return Vec::new();
         }
         self.judged_s = Some(time_s);
         self.evidence = hierarchy::evidence_of(&self.history, &self.config.accumulate);
@@ -96,29 +102,33 @@ impl BackEnd {
         );
         let settings = &self.config.accumulate;
         let enough = self.evidence.measure >= settings.threshold && self.history.span_s() >= settings.min_s;
-        if enough || self.build_now {
-            self.build(!enough);
-        }
-        self.build_now = false;
+        let asked = std::mem::take(&mut self.build_now);
+        if enough || asked { self.build(!enough) } else { Vec::new() }
     }
 
-    fn build(&mut self, forced: bool) {
+    /// Builds, and follows the pose through the remembered frames; gives their times and targets.
+    fn build(&mut self, forced: bool) -> Vec<(f64, Targets)> {
         let (Some(outline), Some(first), Some(last)) = (&self.outline, self.history.first(), self.history.last())
         else {
-            return;
+            return Vec::new();
         };
         let moment = (first.frame, last, forced);
         let table = self.history.table(1.0 / hierarchy::COMPARE_HZ);
-        let Some(tree) = build(&table, self.evidence.clone(), outline, &self.config, moment) else { return };
+        let Some(tree) = build(&table, self.evidence.clone(), outline, &self.config, moment) else {
+            return Vec::new();
+        };
         let mut live = Live { binding: tree.binding(), estimator: tree.estimator(&self.config), tree: Arc::new(tree) };
         // The pose is followed from the first remembered frame, so that it does not jump where the tree was built. The
         // newest frame is left out: it is about to be worked off as every later one is.
+        let mut before = Vec::with_capacity(self.history.len());
         for tracks in self.history.sets().take(self.history.len() - 1) {
             let targets = live.binding.targets_px(tracks);
             live.estimator.step(tracks.frame, tracks.time_s, &targets);
+            before.push((tracks.time_s, targets));
         }
         self.live = Some(live);
         self.history.clear();
+        before
     }
 
     /// Build with the next frame, whatever the measure says.

@@ -4,7 +4,7 @@ use super::meter::Recent;
 use super::shared::Shared;
 use crate::dynamics::dominant_frequency_hz;
 use crate::model::{BranchRow, FormatNote, Phase, Rgb, Size, Skeleton, Snapshot, TrackSet};
-use crate::pipeline::{BackEnd, Moved, Tree};
+use crate::pipeline::{BackEnd, Moved, Targets, Tree};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -151,20 +151,28 @@ impl Status {
             self.snapshot.skeleton = Some(tree.skeleton.clone());
             self.snapshot.node_colour = Arc::new(main_branches(&tree.skeleton));
         }
+        for (time_s, targets_px) in &moved.before {
+            self.displaced(*time_s, targets_px);
+        }
         let time_s = moved.tracks.time_s;
+        self.displaced(time_s, &moved.targets_px);
+        if time_s - self.table_made_s >= TABLE_EVERY_S {
+            self.table_made_s = time_s;
+            self.snapshot.branches = self.table(&tree.skeleton);
+        }
+    }
+
+    /// Remembers where the nodes of the table are.
+    fn displaced(&mut self, time_s: f64, targets_px: &Targets) {
         let before = self.displacements.back().map(|(_, d)| d);
         let at = |k: usize, node: usize| {
             // A node that no track saw stays where it was.
-            moved.targets_px.get(node).copied().flatten().or(before.map(|d| d[k])).unwrap_or([0.0; 2])
+            targets_px.get(node).copied().flatten().or(before.map(|d| d[k])).unwrap_or([0.0; 2])
         };
         let row = self.table_nodes.iter().enumerate().map(|(k, &node)| at(k, node)).collect();
         self.displacements.push_back((time_s, row));
         while self.displacements.front().is_some_and(|(t, _)| *t < time_s - BRANCH_S) {
             self.displacements.pop_front();
-        }
-        if time_s - self.table_made_s >= TABLE_EVERY_S {
-            self.table_made_s = time_s;
-            self.snapshot.branches = self.table(&tree.skeleton);
         }
     }
 
