@@ -282,7 +282,7 @@ impl Config {
             ("track.fb_limit_px", self.track.fb_limit_px, positive),
             ("track.anchor_ncc", self.track.anchor_ncc, share),
             ("accumulate.window_s", self.accumulate.window_s, (1.0, 120.0, "1 to 120")),
-            ("accumulate.min_s", self.accumulate.min_s, (0.2, 120.0, "0.2 to 120")),
+            ("accumulate.min_s", self.accumulate.min_s, (0.2, 100.0, "0.2 to 100")),
             ("accumulate.threshold", self.accumulate.threshold, share),
             ("accumulate.moving_snr", self.accumulate.moving_snr, positive),
             ("hierarchy.levels", self.hierarchy.levels.into(), (2.0, 10.0, "2 to 10")),
@@ -311,6 +311,12 @@ impl Config {
             if !(low..=high).contains(&value) {
                 return Err(ConfigError::OutOfRange { key, value, allowed });
             }
+        }
+        if self.accumulate.min_s > 0.9 * self.accumulate.window_s {
+            // The memory would never span that time, and the tree never be built.
+            let value = self.accumulate.min_s;
+            let allowed = "at most nine tenths of accumulate.window_s";
+            return Err(ConfigError::OutOfRange { key: "accumulate.min_s", value, allowed });
         }
         if self.track.window_px.is_multiple_of(2) {
             let value = self.track.window_px.into();

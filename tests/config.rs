@@ -53,7 +53,14 @@ fn the_ranges_that_are_told_are_the_ranges_that_hold() {
                 if key == "window_px" && value == 4.0 || whole && value < 0.0 {
                     continue; // refused for other reasons
                 }
-                let config: Config = toml::from_str(&format!("[{section}]\n{key} = {}\n", shown(value))).expect("TOML");
+                // These two bound each other as well: the other one stands where it leaves the whole range.
+                let other = match (section.as_str(), key) {
+                    ("accumulate", "window_s") => "min_s = 0.2\n",
+                    ("accumulate", "min_s") => "window_s = 120.0\n",
+                    _ => "",
+                };
+                let text = format!("[{section}]\n{key} = {}\n{other}", shown(value));
+                let config: Config = toml::from_str(&text).expect("TOML");
                 assert_eq!(config.check().is_ok(), taken, "{section}.{key} = {value}, told: {low} to {high}");
             }
             checked += 1;
@@ -70,4 +77,12 @@ fn told_range(comment: &str) -> Option<(f64, f64)> {
         words.windows(3).find_map(|w| Some((number(&w[0])?, w[1], number(&w[2])?)).filter(|(_, to, _)| *to == "to"));
     // "300 to 400" is what the papers take.
     at.filter(|_| !comment.contains("above 0 to")).map(|(low, _, high)| (low, high))
+}
+
+/// Memory that is shorter than the wait would never see enough: no tree would ever be built, and nothing say why.
+#[test]
+fn a_wait_longer_than_the_memory_is_refused() {
+    let config: Config = toml::from_str("[accumulate]\nwindow_s = 5.0\n").expect("TOML");
+    let message = config.check().expect_err("8 s of 5 s").to_string();
+    assert!(message.contains("accumulate.min_s") && message.contains("accumulate.window_s"), "{message}");
 }

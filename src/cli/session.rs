@@ -33,9 +33,6 @@ pub struct Plan<'a> {
 pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
     let config = common.config().map_err(|e| Ended::BadUsage(e.into()))?;
     let headless = common.headless || common.stream.is_some();
-    if common.out.is_none() && common.stream.is_none() {
-        say("arborcam: warning: without --out nothing is written, but for what key e exports");
-    }
     if !headless && !std::io::stdout().is_terminal() {
         return Err(Ended::BadUsage(tui::TuiError::NoTerminal(None).into()));
     }
@@ -59,13 +56,17 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
     let stop = Arc::new(AtomicBool::new(false));
     let signals = [SIGINT, SIGTERM].into_iter().chain((!hangup_ignored()).then_some(SIGHUP));
     for signal in signals {
-        // Twice the same signal ends at once: a disk that hangs must not make the program immortal.
-        signal_hook::flag::register_conditional_shutdown(signal, i32::from(super::STOPPED), stop.clone())
+        // Twice the same signal ends at once, without a capture: a disk that hangs must not make the program immortal.
+        signal_hook::flag::register_conditional_shutdown(signal, i32::from(super::FAILED), stop.clone())
             .and_then(|_| signal_hook::flag::register(signal, stop.clone()))
             .map_err(|e| Ended::Failed(e.into()))?;
     }
     if headless && info.live && info.format.asked != info.format.given {
         say(&format!("arborcam: asked for {}, the camera gives {}", info.format.asked, info.format.given));
+    }
+    if common.out.is_none() && common.stream.is_none() {
+        let but = if headless { "" } else { " but what key e exports" };
+        say(&format!("arborcam: warning: without --out nothing is written{but}"));
     }
     init_log(headless);
     let running = runtime::start(source, job)?;
@@ -196,7 +197,7 @@ fn closing_lines(s: &Summary) -> Vec<String> {
     if let Some(tree) = &s.tree {
         let (nodes, points) = (tree.skeleton.measured(), tree.skeleton.nodes[0].n_tracks);
         let copies = tree.skeleton.nodes.len() - nodes;
-        let when = if tree.forced { "built before enough motion was seen," } else { "built" };
+        let when = if tree.forced { "built early," } else { "built" };
         lines.push(format!(
             "tree: {nodes} nodes from {points} moving points and {copies} copied ones, {when} at {:.1} s (accumulation \
              {:.2})",

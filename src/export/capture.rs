@@ -129,7 +129,7 @@ pub struct Quality {
     /// Distance by which tracking forward and back misses the start, px.
     pub median_fb_error_px: Option<f64>,
     pub lost_per_s: Option<f64>,
-    /// Median distance between observed points and where the 3D pose puts them in the picture, px.
+    /// Median distance between where the points put a node in the picture and where the 3D pose does, px.
     pub median_reprojection_px: Option<f64>,
 }
 

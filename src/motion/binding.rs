@@ -72,7 +72,7 @@ impl Binding {
 
     /// Where the tracks put each measured node, px; `None` where none of its tracks was seen. The foot never moves.
     ///
-    /// Tracks that are new are bound to the tip that is nearest to them in this frame.
+    /// Tracks that are new are bound to the tip that is nearest to them in this frame, if one is near enough.
     pub fn targets_px(&mut self, set: &TrackSet) -> Vec<Option<[f64; 2]>> {
         self.collect(set);
         let mut targets: Vec<Option<[f64; 2]>> = self
@@ -82,14 +82,24 @@ impl Binding {
             .map(|(d, rest)| trimmed_mean(d).map(|d| [rest[0] + d[0], rest[1] + d[1]]))
             .collect();
         let new = set.observations.iter().filter(|o| !self.tracks.contains_key(&o.id));
+        // A tip that has lost all its tracks is where the nearest branch below it that is seen would carry it.
+        let expected = |tip: NodeId| {
+            let seen = |n: &NodeId| targets[n.index()].is_some();
+            let carrier = std::iter::successors(Some(tip), |n| self.parents[n.index()]).find(seen)?;
+            let (target, rest, own) =
+                (targets[carrier.index()]?, self.rest_px[carrier.index()], self.rest_px[tip.index()]);
+            Some([own[0] + target[0] - rest[0], own[1] + target[1] - rest[1]])
+        };
+        // Decided once: a point of the background stays unbound when a branch swings near it later.
         let born: Vec<(TrackId, Option<Bound>)> = new
             .filter_map(|o| {
                 let at = [f64::from(o.u_px), f64::from(o.v_px)];
-                let placed = self.tips.iter().filter_map(|t| Some((*t, targets[t.index()]?)));
+                let placed = self.tips.iter().filter_map(|t| Some((*t, expected(*t)?)));
                 let (tip, target) = placed.min_by(|a, b| distance(at, a.1).total_cmp(&distance(at, b.1)))?;
                 let rest = self.rest_px[tip.index()];
                 let rest_px = [at[0] - target[0] + rest[0], at[1] - target[1] + rest[1]];
-                (distance(at, target) <= self.reach_px).then_some((o.id, Some(Bound { node: tip, rest_px })))
+                let bound = (distance(at, target) <= self.reach_px).then_some(Bound { node: tip, rest_px });
+                Some((o.id, bound))
             })
             .collect();
         self.tracks.extend(born);

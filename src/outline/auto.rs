@@ -60,7 +60,7 @@ impl AutoOutline {
     pub fn step(&mut self, luma: &Luma, time_s: f64) -> Found {
         let start_s = *self.start_s.get_or_insert_with(|| {
             self.scale = (luma.size.width / REDUCED_WIDTH).max(1);
-            self.reduced = Size::new(luma.size.width / self.scale, luma.size.height / self.scale);
+            self.reduced = Size::new(luma.size.width / self.scale, (luma.size.height / self.scale).max(1));
             let zero = vec![0.0; self.reduced.area()];
             (self.mean, self.sum_sq) = (zero.clone(), zero.clone());
             (self.last, self.sum_change_sq) = (zero.clone(), zero);
@@ -95,7 +95,14 @@ impl AutoOutline {
             tracing::error!("automatic outline: {e}");
             None
         })?;
-        (small.coverage() >= LEAST_COVERAGE).then(|| enlarged(&small, size, self.scale))
+        if small.coverage() < LEAST_COVERAGE {
+            return None;
+        }
+        // The border is traced anew at full size, so that it encloses just the pixels of the mask.
+        region::close_to_one(size, &enlarged(&small, size, self.scale), 0).unwrap_or_else(|e| {
+            tracing::error!("automatic outline: {e}");
+            None
+        })
     }
 
     fn add(&mut self, luma: &Luma) {
@@ -126,7 +133,8 @@ pub fn whole(size: Size) -> Outline {
     Outline { size, mask: vec![255; size.area()], polygon_px: vec![[0, 0], [w, 0], [w, h], [0, h]] }
 }
 
-fn enlarged(small: &Outline, size: Size, scale: u32) -> Outline {
+/// The mask at full size.
+fn enlarged(small: &Outline, size: Size, scale: u32) -> Vec<u8> {
     let mut mask = vec![0; size.area()];
     for (v, row) in mask.chunks_exact_mut(size.width as usize).enumerate() {
         for (u, m) in row.iter_mut().enumerate() {
@@ -136,6 +144,5 @@ fn enlarged(small: &Outline, size: Size, scale: u32) -> Outline {
             }
         }
     }
-    let s = scale as i32;
-    Outline { size, mask, polygon_px: small.polygon_px.iter().map(|p| [p[0] * s, p[1] * s]).collect() }
+    mask
 }

@@ -50,30 +50,22 @@ pub fn outline(polygon_px: &[[f64; 2]], size: Size) -> Result<Outline, OutlineEr
     region::fill(size, &corners).map_err(|e| OutlineError::BadPolygon { what: e.to_string() })
 }
 
-/// The first two edges (numbered from their first corner) that meet anywhere but in a shared corner.
+/// The first two edges (numbered from their first corner) that cross each other.
 pub fn crossing(corners: &[[f64; 2]]) -> Option<(usize, usize)> {
     let n = corners.len();
     let edge = |i: usize| (corners[i], corners[(i + 1) % n]);
     (0..n).find_map(|i| {
         let others = (i + 1..n).filter(|&j| j != i + 1 && (j + 1) % n != i);
-        others.into_iter().find(|&j| edges_meet(edge(i), edge(j))).map(|j| (i, j))
+        others.into_iter().find(|&j| edges_cross(edge(i), edge(j))).map(|j| (i, j))
     })
 }
 
 type Edge = ([f64; 2], [f64; 2]);
 
-fn edges_meet((a, b): Edge, (c, d): Edge) -> bool {
+fn edges_cross((a, b): Edge, (c, d): Edge) -> bool {
+    // Edges that only touch are no harm: the pixels inside are the same whichever way one goes round.
     let side = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
-    let in_box =
-        |p: [f64; 2], q: [f64; 2], r: [f64; 2]| (0..2).all(|k| r[k] >= p[k].min(q[k]) && r[k] <= p[k].max(q[k]));
-    let (s1, s2, s3, s4) = (side(a, b, c), side(a, b, d), side(c, d, a), side(c, d, b));
-    if s1 * s2 < 0.0 && s3 * s4 < 0.0 {
-        return true;
-    }
-    (s1 == 0.0 && in_box(a, b, c))
-        || (s2 == 0.0 && in_box(a, b, d))
-        || (s3 == 0.0 && in_box(c, d, a))
-        || (s4 == 0.0 && in_box(c, d, b))
+    side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0
 }
 
 fn area(corners: &[[f64; 2]]) -> f64 {

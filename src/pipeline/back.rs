@@ -41,6 +41,8 @@ pub struct BackEnd {
     outline: Option<Arc<Outline>>,
     live: Option<Live>,
     build_now: bool,
+    /// A build was asked for, and there was too little to build from.
+    refused: bool,
 }
 
 struct Live {
@@ -59,6 +61,7 @@ impl BackEnd {
             outline: None,
             live: None,
             build_now: false,
+            refused: false,
         }
     }
 
@@ -103,7 +106,12 @@ impl BackEnd {
         let settings = &self.config.accumulate;
         let enough = self.evidence.measure >= settings.threshold && self.history.span_s() >= settings.min_s;
         let asked = std::mem::take(&mut self.build_now);
-        if enough || asked { self.build(!enough) } else { Vec::new() }
+        if !enough && !asked {
+            return Vec::new();
+        }
+        let before = self.build(!enough);
+        self.refused = asked && self.live.is_none();
+        before
     }
 
     /// Builds, and follows the pose through the remembered frames; gives their times and targets.
@@ -136,11 +144,16 @@ impl BackEnd {
         self.build_now = true;
     }
 
+    /// Whether a build was asked for since the last call and there was too little to build from.
+    pub fn take_refusal(&mut self) -> bool {
+        std::mem::take(&mut self.refused)
+    }
+
     /// No more frames: if nothing has been built, builds from what there is, unless that is next to nothing.
     pub fn finish(&mut self) {
         if self.live.is_none() && !self.history.is_empty() {
             self.evidence = hierarchy::evidence_of(&self.history, &self.config.accumulate);
-            if self.evidence.measure >= LEAST_MEASURE {
+            if std::mem::take(&mut self.build_now) || self.evidence.measure >= LEAST_MEASURE {
                 self.build(true);
             }
         }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 /// Frames kept while the outline is not known yet take at most so many bytes; beyond that the oldest is let go.
-const HELD_BYTES: usize = 48 << 20;
+const HELD_BYTES: usize = 80 << 20;
 /// Frames worked off in one step while held ones remain: catches up without a long pause.
 const FRAMES_PER_STEP: usize = 3;
 
@@ -71,7 +71,8 @@ impl FrontEnd {
         }
         self.held.push_back(frame);
         if self.found.is_none() {
-            while self.held.iter().map(|f| f.luma.pixels.len()).sum::<usize>() > HELD_BYTES {
+            let bytes = |f: &Frame| f.luma.pixels.len() + f.preview.as_ref().map_or(0, |p| p.pixels.len());
+            while self.held.iter().map(bytes).sum::<usize>() > HELD_BYTES {
                 self.held.pop_front();
                 self.let_go += 1;
             }

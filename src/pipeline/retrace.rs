@@ -31,6 +31,6 @@ impl Retrace {
 
     /// The deepest node that a track belongs to, as known after the last step.
     pub fn node_of(&self, track: TrackId) -> Option<NodeId> {
-        self.after.0.node_of(track)
+        self.after.0.node_of(track).or_else(|| self.before.0.node_of(track))
     }
 }

@@ -121,7 +121,8 @@ fn write_motion(
     for set in job.tracks.sets() {
         let (pose, targets_px) = retrace.step(&set.map_err(Failure::Spool)?);
         csv.pose(&pose)?;
-        for (joint, target) in pose.joints.iter().zip(&targets_px) {
+        // The foot is where it is by definition.
+        for (joint, target) in pose.joints.iter().zip(&targets_px).skip(1) {
             if let Some(t) = target {
                 let [u, v] = tree.skeleton.image_from_model(&joint.position);
                 misses.add((u - t[0]).hypot(v - t[1]));

@@ -75,7 +75,7 @@ pub struct Running {
     model: Option<JoinHandle<Summary>>,
 }
 
-/// Stops the source when the tracker is done for, be it by a panic: the source holds both ends of its queue, and would
+/// Stops the source when the tracker or the model is done for, be it by a panic: the source holds both ends of its queue, and would
 /// never learn otherwise that nobody takes from it.
 struct StopAll<'a>(&'a Shared);
 
@@ -103,7 +103,12 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
     let failed = |e: std::io::Error| Failure::Spool(e);
     let model = {
         let model = ModelThread::new(job, info, shared.clone());
-        thread("model").spawn(move || model.run(&model_out)).map_err(failed)?
+        let on_end = shared.clone();
+        let run = move || {
+            let _ends_all = StopAll(&on_end);
+            model.run(&model_out)
+        };
+        thread("model").spawn(run).map_err(failed)?
     };
     let track = {
         let (shared, frames_out) = (shared.clone(), frames_out.clone());

@@ -7,7 +7,7 @@ use super::status::{Status, median_fb_error_px};
 use super::track_thread::ToModel;
 use super::{Job, Summary};
 use crate::model::{Pose, Rgb};
-use crate::pipeline::{BackEnd, Followed, Moved};
+use crate::pipeline::{BackEnd, Followed, LEAST_MOVING, Moved};
 use crate::recording::Spool;
 use crate::source::SourceInfo;
 use crossbeam_channel::Receiver;
@@ -32,6 +32,8 @@ pub struct ModelThread {
     quality: Quality,
     last_screen: Option<Instant>,
     exports: Vec<std::thread::JoinHandle<()>>,
+    /// Number of the last export; its folder may not be there yet.
+    exported: u32,
     announced: bool,
 }
 
@@ -50,6 +52,7 @@ impl ModelThread {
             quality: Quality::default(),
             last_screen: None,
             exports: Vec::new(),
+            exported: 0,
             announced: false,
         };
         thread.new_spool();
@@ -75,6 +78,9 @@ impl ModelThread {
                     self.new_spool();
                     (self.quality, self.announced, last) = (Quality::default(), false, None);
                 }
+                ToModel::BuildNow if self.back.tree().is_some() => {
+                    self.shared.tell("the tree is built already; r starts again".into());
+                }
                 ToModel::BuildNow => {
                     self.back.build_now();
                     self.shared.tell("building the tree from what has been seen so far".into());
@@ -83,11 +89,11 @@ impl ModelThread {
             }
         }
         self.back.finish();
-        self.note_thin_evidence();
-        self.show(last.as_ref(), true);
-        let summary = self.finish();
+        self.announce();
+        // Shown while the capture is written.
         self.shared.ended.store(true, Ordering::Relaxed);
-        summary
+        self.show(last.as_ref(), true);
+        self.finish()
     }
 
     fn step(&mut self, followed: Followed) -> Moved {
@@ -95,7 +101,7 @@ impl ModelThread {
         if let Some(spool) = &mut self.spool
             && let Err(e) = spool.push(&moved.tracks)
         {
-            // What has been kept is still written; what follows is lost, and that ends the capture.
+            // What follows would be lost, and that ends the capture.
             self.shared.fail(Failure::Spool(e));
             self.shared.stop.store(true, Ordering::Relaxed);
         }
@@ -106,32 +112,33 @@ impl ModelThread {
         if let Some(pose) = &moved.pose {
             self.stream(pose);
         }
+        if self.back.take_refusal() {
+            let moving = self.back.evidence().moving.len();
+            self.shared.tell(format!("no tree yet: {moving} points move, and {LEAST_MOVING} that agree must"));
+        }
         self.status.moved(&moved, &self.back);
         self.announce();
         self.show(Some(&moved), false);
         moved
     }
 
+    /// Tells of a new tree; one built early is worth less, and the capture is to say so.
     fn announce(&mut self) {
         if let (Some(tree), false) = (self.back.tree(), self.announced) {
             self.announced = true;
+            let threshold = self.job.config.accumulate.threshold;
+            if tree.forced && tree.evidence.measure < threshold {
+                self.shared.warn(format!(
+                    "the tree was built from little motion (accumulation {:.2} of {threshold}); branches may be wrong: \
+                     film longer, or in more wind",
+                    tree.evidence.measure
+                ));
+            }
             let (nodes, time_s) = (tree.skeleton.measured(), tree.time_s);
             tracing::info!(
                 "tree built at {time_s:.1} s: {nodes} nodes from {} moving points",
                 tree.evidence.moving.len()
             );
-        }
-    }
-
-    /// A tree built early is worth less, and the capture is to say so.
-    fn note_thin_evidence(&self) {
-        let threshold = self.job.config.accumulate.threshold;
-        if let Some(tree) = self.back.tree().filter(|t| t.forced && t.evidence.measure < threshold) {
-            self.shared.warn(format!(
-                "the tree was built from little motion (accumulation {:.2} of {threshold}); branches may be wrong: film \
-                 longer, or in more wind",
-                tree.evidence.measure
-            ));
         }
     }
 
@@ -198,7 +205,7 @@ impl ModelThread {
     /// Writes the capture as it is now beside the final one, on a thread of its own: frames go on.
     fn export_now(&mut self) {
         let wanted = self.job.out.clone().unwrap_or_else(|| PathBuf::from("capture"));
-        let dir = free_name(&wanted);
+        let dir = free_name(&wanted, &mut self.exported);
         match self.capture_job() {
             Ok(job) => {
                 let shared = self.shared.clone();
@@ -252,8 +259,13 @@ fn nearest_folder(path: &Path) -> Option<PathBuf> {
     absolute.ancestors().skip(1).find(|a| a.is_dir()).map(Path::to_path_buf)
 }
 
-/// `wanted-1`, `wanted-2`, ...: the first that is not there yet.
-fn free_name(wanted: &Path) -> PathBuf {
-    let numbered = |n: u32| PathBuf::from(format!("{}-{n}", wanted.display()));
-    (1..u32::MAX).map(numbered).find(|p| !p.exists()).unwrap_or_else(|| wanted.to_path_buf())
+/// `wanted-1`, `wanted-2`, ...: the first after number `last` that is not there yet; `last` becomes its number.
+fn free_name(wanted: &Path, last: &mut u32) -> PathBuf {
+    loop {
+        *last += 1;
+        let numbered = PathBuf::from(format!("{}-{last}", wanted.display()));
+        if !numbered.exists() {
+            return numbered;
+        }
+    }
 }

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Gaps that are listed one by one; further ones are only counted.
-const GAPS_LISTED: usize = 100;
+const GAPS_LISTED: usize = crate::export::capture::MAX_GAPS;
 /// Warnings that are kept; the oldest give way.
 const WARNINGS_KEPT: usize = 50;
 

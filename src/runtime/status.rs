@@ -35,6 +35,7 @@ pub struct Status {
     fb_noted_s: f64,
     displacements: VecDeque<(f64, Vec<[f64; 2]>)>,
     table_nodes: Vec<usize>,
+    table_rest_px: Vec<[f64; 2]>,
     table_made_s: f64,
     skeleton: Option<Arc<Skeleton>>,
 }
@@ -53,6 +54,7 @@ impl Status {
             fb_noted_s: f64::NEG_INFINITY,
             displacements: VecDeque::new(),
             table_nodes: Vec::new(),
+            table_rest_px: Vec::new(),
             table_made_s: f64::NEG_INFINITY,
             skeleton: None,
         }
@@ -146,6 +148,8 @@ impl Status {
             self.skeleton = Some(tree.skeleton.clone());
             let nodes = &tree.skeleton.nodes;
             self.table_nodes = (1..tree.skeleton.measured()).filter(|&i| nodes[i].level <= TABLE_LEVEL).collect();
+            let at_rest = |&i: &usize| tree.skeleton.image_from_model(&nodes[i].position);
+            self.table_rest_px = self.table_nodes.iter().map(at_rest).collect();
             self.displacements.clear();
             self.table_made_s = f64::NEG_INFINITY;
             self.snapshot.skeleton = Some(tree.skeleton.clone());
@@ -166,8 +170,8 @@ impl Status {
     fn displaced(&mut self, time_s: f64, targets_px: &Targets) {
         let before = self.displacements.back().map(|(_, d)| d);
         let at = |k: usize, node: usize| {
-            // A node that no track saw stays where it was.
-            targets_px.get(node).copied().flatten().or(before.map(|d| d[k])).unwrap_or([0.0; 2])
+            // A node that no track saw stays where it was, and before that is at rest.
+            targets_px.get(node).copied().flatten().or(before.map(|d| d[k])).unwrap_or(self.table_rest_px[k])
         };
         let row = self.table_nodes.iter().enumerate().map(|(k, &node)| at(k, node)).collect();
         self.displacements.push_back((time_s, row));
