@@ -41,8 +41,19 @@ pub struct BackEnd {
     outline: Option<Arc<Outline>>,
     live: Option<Live>,
     build_now: bool,
+    /// The tree is built with the next frame.
+    building: Option<Why>,
     /// A build was asked for, and there was too little to build from.
     refused: bool,
+}
+
+/// What a build is due to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Why {
+    /// The measure has reached its threshold.
+    Enough,
+    /// The user asked.
+    Asked,
 }
 
 struct Live {
@@ -61,6 +72,7 @@ impl BackEnd {
             outline: None,
             live: None,
             build_now: false,
+            building: None,
             refused: false,
         }
     }
@@ -85,33 +97,30 @@ impl BackEnd {
         Moved { tracks, outline, preview, received, targets_px, pose, before }
     }
 
-    /// Judges the evidence now and then, and builds when it suffices or when asked.
+    /// Judges the evidence now and then. Where it suffices, or a build is asked for, the tree is built with the frame
+    /// after this one, so that the screen can say that it is being built.
     fn accumulate(&mut self, time_s: f64) -> Vec<(f64, Targets)> {
         let due = self.judged_s.is_none_or(|t| time_s - t >= JUDGE_EVERY_S);
-        if !due && !self.build_now {
+        if !due && self.building.is_none() && !self.build_now {
             return Vec::new();
         }
         self.judged_s = Some(time_s);
         self.evidence = hierarchy::evidence_of(&self.history, &self.config.accumulate);
         let e = &self.evidence;
-        tracing::debug!(
-            time_s,
-            measure = e.measure,
-            e.motion,
-            e.stability,
-            e.sway,
-            moving = e.moving.len(),
-            "evidence"
-        );
-        let settings = &self.config.accumulate;
-        let enough = self.evidence.measure >= settings.threshold && self.history.span_s() >= settings.min_s;
-        let asked = std::mem::take(&mut self.build_now);
-        if !enough && !asked {
-            return Vec::new();
+        let moving = e.moving.len();
+        tracing::debug!(time_s, measure = e.measure, e.motion, e.stability, e.sway, moving, "evidence");
+        if let Some(why) = self.building.take() {
+            let before = self.build(why == Why::Asked);
+            self.refused = why == Why::Asked && self.live.is_none();
+            return before;
         }
-        let before = self.build(!enough);
-        self.refused = asked && self.live.is_none();
-        before
+        let settings = &self.config.accumulate;
+        if e.measure >= settings.threshold && self.history.span_s() >= settings.min_s {
+            self.building = Some(Why::Enough);
+        } else if std::mem::take(&mut self.build_now) {
+            self.building = Some(Why::Asked);
+        }
+        Vec::new()
     }
 
     /// Builds, and follows the pose through the remembered frames; gives their times and targets.
@@ -153,7 +162,8 @@ impl BackEnd {
     pub fn finish(&mut self) {
         if self.live.is_none() && !self.history.is_empty() {
             self.evidence = hierarchy::evidence_of(&self.history, &self.config.accumulate);
-            if std::mem::take(&mut self.build_now) || self.evidence.measure >= LEAST_MEASURE {
+            let asked = self.build_now || self.building.is_some();
+            if asked || self.evidence.measure >= LEAST_MEASURE {
                 self.build(true);
             }
         }
@@ -187,7 +197,7 @@ impl BackEnd {
         match &self.live {
             Some(_) => (Phase::Live, 1.0),
             None if self.history.len() < 2 => (Phase::Detect, 0.0),
-            None if self.build_now => (Phase::Build, 1.0),
+            None if self.building.is_some() => (Phase::Build, 1.0),
             None => (Phase::Accumulate, self.evidence.measure),
         }
     }

@@ -6,7 +6,7 @@ use super::shared::{Failure, Shared};
 use super::status::{Status, median_fb_error_px};
 use super::track_thread::ToModel;
 use super::{Job, Summary};
-use crate::model::{Pose, Rgb};
+use crate::model::{Phase, Pose, Rgb};
 use crate::pipeline::{BackEnd, Followed, LEAST_MOVING, Moved};
 use crate::recording::Spool;
 use crate::source::SourceInfo;
@@ -118,7 +118,7 @@ impl ModelThread {
         }
         self.status.moved(&moved, &self.back);
         self.announce();
-        self.show(Some(&moved), false);
+        self.show(Some(&moved), self.back.phase().0 == Phase::Build);
         moved
     }
 
