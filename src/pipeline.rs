@@ -7,13 +7,13 @@ mod back;
 mod front;
 mod retrace;
 
-pub use back::{BackEnd, Moved, Targets};
+pub use back::{BackEnd, Moved};
 pub use front::{Followed, FrontEnd};
 pub use retrace::Retrace;
 
 use crate::config::Config;
 use crate::hierarchy::{self, Evidence};
-use crate::model::{Frame, MotionHierarchy, Outline, Skeleton, TrackId, TrackSet};
+use crate::model::{Frame, MotionHierarchy, Outline, Pose, Skeleton, TrackId, TrackSet};
 use crate::motion::{Binding, PoseEstimator};
 use crate::track::TrackTable;
 use crate::{shape, skeleton};
@@ -76,6 +76,29 @@ impl Tree {
 
     pub fn estimator(&self, config: &Config) -> PoseEstimator {
         PoseEstimator::new(self.skeleton.clone(), &config.motion)
+    }
+
+    /// Tracks to poses, from the rest pose on.
+    fn poser(&self, config: &Config) -> Poser {
+        Poser { binding: self.binding(), estimator: self.estimator(config) }
+    }
+}
+
+/// Where the tracks put each measured node, px; `None` for a node none of whose tracks was seen.
+pub type Targets = Vec<Option<[f64; 2]>>;
+
+/// Follows a tree's pose from frame to frame.
+struct Poser {
+    binding: Binding,
+    estimator: PoseEstimator,
+}
+
+impl Poser {
+    /// The pose in the next frame, and where its tracks put the measured nodes.
+    fn step(&mut self, tracks: &TrackSet) -> (Pose, Targets) {
+        let targets_px = self.binding.targets_px(tracks);
+        let pose = self.estimator.step(tracks.frame, tracks.time_s, &targets_px);
+        (pose, targets_px)
     }
 }
 

@@ -84,11 +84,10 @@ impl PoseEstimator {
             let own = match &branch.copy {
                 Some((original, turn)) => {
                     // The copy turns in its plane as the original does in its own.
-                    let original = &joints[original.index()];
-                    let above = self.skeleton.nodes[branch.copy.as_ref().map_or(0, |c| c.0.index())].parent;
+                    let above = self.skeleton.nodes[original.index()].parent;
                     let parent_rotation = above.map_or(UnitQuaternion::identity(), |p| joints[p.index()].rotation);
                     directions.push(branch.direction);
-                    turn * (parent_rotation.inverse() * original.rotation) * turn.inverse()
+                    turn * (parent_rotation.inverse() * joints[original.index()].rotation) * turn.inverse()
                 }
                 None => {
                     let target_px = targets_px.get(i).copied().flatten();

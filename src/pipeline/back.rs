@@ -1,11 +1,11 @@
 //! The back end: tracks to tree and poses.
 
-use super::{Followed, Tree, build};
+use super::{Followed, Poser, Targets, Tree, build};
 use crate::config::Config;
 use crate::hierarchy::{self, Evidence};
 use crate::model::{Outline, Phase, Pose, Rgb, TrackSet};
-use crate::motion::{Binding, PoseEstimator};
-use crate::track::TrackHistory;
+use crate::motion::Binding;
+use crate::track::{TrackHistory, TrackTable};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -28,9 +28,6 @@ pub struct Moved {
     /// In the frame in which the tree was built: time and targets of the frames remembered from before, oldest first.
     pub before: Vec<(f64, Targets)>,
 }
-
-/// Where the tracks put each measured node, px; `None` for a node none of whose tracks was seen.
-pub type Targets = Vec<Option<[f64; 2]>>;
 
 /// Tracks to poses: gathers motion, builds the tree, then poses it in every frame.
 pub struct BackEnd {
@@ -58,8 +55,7 @@ enum Why {
 
 struct Live {
     tree: Arc<Tree>,
-    binding: Binding,
-    estimator: PoseEstimator,
+    poser: Poser,
 }
 
 impl BackEnd {
@@ -88,9 +84,8 @@ impl BackEnd {
         }
         let (targets_px, pose) = match &mut self.live {
             Some(live) => {
-                let targets = live.binding.targets_px(&tracks);
-                let pose = live.estimator.step(tracks.frame, tracks.time_s, &targets);
-                (targets, Some(Arc::new(pose)))
+                let (pose, targets_px) = live.poser.step(&tracks);
+                (targets_px, Some(Arc::new(pose)))
             }
             None => (Vec::new(), None),
         };
@@ -105,12 +100,12 @@ impl BackEnd {
             return Vec::new();
         }
         self.judged_s = Some(time_s);
-        self.evidence = hierarchy::evidence_of(&self.history, &self.config.accumulate);
+        let table = self.judge();
         let e = &self.evidence;
         let moving = e.moving.len();
         tracing::debug!(time_s, measure = e.measure, e.motion, e.stability, e.sway, moving, "evidence");
         if let Some(why) = self.building.take() {
-            let before = self.build(why == Why::Asked);
+            let before = self.build(&table, why == Why::Asked);
             self.refused = why == Why::Asked && self.live.is_none();
             return before;
         }
@@ -123,25 +118,30 @@ impl BackEnd {
         Vec::new()
     }
 
+    /// Judges what is remembered; gives the table of tracks whose rows the evidence names.
+    fn judge(&mut self) -> TrackTable {
+        let table = self.history.table(1.0 / hierarchy::COMPARE_HZ);
+        self.evidence = hierarchy::evidence(&table, &self.config.accumulate);
+        table
+    }
+
     /// Builds, and follows the pose through the remembered frames; gives their times and targets.
-    fn build(&mut self, forced: bool) -> Vec<(f64, Targets)> {
+    fn build(&mut self, table: &TrackTable, forced: bool) -> Vec<(f64, Targets)> {
         let (Some(outline), Some(first), Some(last)) = (&self.outline, self.history.first(), self.history.last())
         else {
             return Vec::new();
         };
         let moment = (first.frame, last, forced);
-        let table = self.history.table(1.0 / hierarchy::COMPARE_HZ);
-        let Some(tree) = build(&table, self.evidence.clone(), outline, &self.config, moment) else {
+        let Some(tree) = build(table, self.evidence.clone(), outline, &self.config, moment) else {
             return Vec::new();
         };
-        let mut live = Live { binding: tree.binding(), estimator: tree.estimator(&self.config), tree: Arc::new(tree) };
+        let mut live = Live { poser: tree.poser(&self.config), tree: Arc::new(tree) };
         // The pose is followed from the first remembered frame, so that it does not jump where the tree was built. The
         // newest frame is left out: it is about to be worked off as every later one is.
         let mut before = Vec::with_capacity(self.history.len());
         for tracks in self.history.sets().take(self.history.len() - 1) {
-            let targets = live.binding.targets_px(tracks);
-            live.estimator.step(tracks.frame, tracks.time_s, &targets);
-            before.push((tracks.time_s, targets));
+            let (_, targets_px) = live.poser.step(tracks);
+            before.push((tracks.time_s, targets_px));
         }
         self.live = Some(live);
         self.history.clear();
@@ -161,10 +161,10 @@ impl BackEnd {
     /// No more frames: if nothing has been built, builds from what there is, unless that is next to nothing.
     pub fn finish(&mut self) {
         if self.live.is_none() && !self.history.is_empty() {
-            self.evidence = hierarchy::evidence_of(&self.history, &self.config.accumulate);
+            let table = self.judge();
             let asked = self.build_now || self.building.is_some();
             if asked || self.evidence.measure >= LEAST_MEASURE {
-                self.build(true);
+                self.build(&table, true);
             }
         }
     }
@@ -180,7 +180,7 @@ impl BackEnd {
 
     /// The binding of tracks to nodes, later tracks included.
     pub fn binding(&self) -> Option<&Binding> {
-        self.live.as_ref().map(|l| &l.binding)
+        self.live.as_ref().map(|l| &l.poser.binding)
     }
 
     /// The outline of the newest frame.

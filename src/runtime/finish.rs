@@ -4,7 +4,7 @@ use super::meter::Histogram;
 use super::shared::{Failure, Shared};
 use crate::config::Config;
 use crate::export::capture::{
-    AnimationNote, Build, Capture, Gap, ModelNote, OutlineNote, Quality as QualityNote, Software, Source, Timing, json,
+    AnimationNote, Build, Capture, ModelNote, OutlineNote, Quality as QualityNote, Software, Source, Timing, json,
 };
 use crate::export::csv::{MotionCsv, TracksCsv, nodes};
 use crate::export::gltf::{KEY_TOLERANCE_PX, Model, glb_and_keys};
@@ -200,7 +200,7 @@ fn describe(
     let counts = &job.shared.counts;
     let count = |c: &std::sync::atomic::AtomicU64| c.load(Ordering::Relaxed);
     let (seen, duration_s) = (count(&counts.seen), job.shared.last_time_s());
-    let mut timing = Timing {
+    let timing = Timing {
         nominal_rate_hz: job.info.nominal_rate_hz,
         measured_rate_hz: (seen > 1 && duration_s > 0.0).then(|| (seen - 1) as f64 / duration_s),
         frames_seen: seen,
@@ -209,12 +209,8 @@ fn describe(
         frames_undecodable: count(&counts.undecodable),
         frames_before_outline: count(&counts.before_outline),
         duration_s,
-        gaps_not_listed: job.shared.gaps_not_listed(),
-        ..Timing::default()
+        ..job.shared.gaps()
     };
-    for gap in job.shared.gaps() {
-        timing.push_gap(Gap { after_frame: gap.after_frame, time_s: gap.time_s, missing: gap.missing });
-    }
     let quality = &job.quality;
     let tracked_s = quality.last_s - quality.first.map_or(quality.last_s, |(_, s)| s);
     Capture {

@@ -17,7 +17,7 @@ mod status;
 mod track_thread;
 
 pub use finish::Written;
-pub use shared::{Failure, Gap};
+pub use shared::Failure;
 pub use source_thread::Pace;
 
 use crate::config::Config;

@@ -102,8 +102,7 @@ impl ModelThread {
             && let Err(e) = spool.push(&moved.tracks)
         {
             // What follows would be lost, and that ends the capture.
-            self.shared.fail(Failure::Spool(e));
-            self.shared.stop.store(true, Ordering::Relaxed);
+            self.shared.abort(Failure::Spool(e));
         }
         self.quality.note(&moved.tracks, median_fb_error_px(&moved.tracks));
         if self.bark.is_none() || self.back.tree().is_none() {
@@ -179,8 +178,7 @@ impl ModelThread {
         self.spool = match Spool::create(&folder) {
             Ok(spool) => Some(spool),
             Err(e) => {
-                self.shared.fail(Failure::Spool(e));
-                self.shared.stop.store(true, Ordering::Relaxed);
+                self.shared.abort(Failure::Spool(e));
                 None
             }
         };
@@ -243,7 +241,7 @@ impl ModelThread {
             (None, _) => None,
         };
         Summary {
-            frames: self.shared.counts.seen.load(Ordering::Relaxed),
+            frames: seen,
             tracks_total: self.quality.tracks_total(),
             moving: self.back.evidence().moving.len(),
             accumulation: self.back.evidence().measure,

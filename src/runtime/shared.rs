@@ -2,14 +2,13 @@
 
 use super::latest::Latest;
 use crate::export::ExportError;
+use crate::export::capture::{Gap, Timing};
 use crate::model::Snapshot;
 use crate::source::{DecodeError, SourceError};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Gaps that are listed one by one; further ones are only counted.
-const GAPS_LISTED: usize = crate::export::capture::MAX_GAPS;
 /// Warnings that are kept; the oldest give way.
 const WARNINGS_KEPT: usize = 50;
 
@@ -31,14 +30,6 @@ pub enum Failure {
     Panicked,
 }
 
-/// Frames that the camera counted but did not deliver.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gap {
-    pub after_frame: u64,
-    pub time_s: f64,
-    pub missing: u64,
-}
-
 /// Monotonic counts.
 #[derive(Default)]
 pub struct Counts {
@@ -58,8 +49,8 @@ pub struct Shared {
     pub ended: AtomicBool,
     pub counts: Counts,
     pub screen: Latest<Arc<Snapshot>>,
-    gaps: Mutex<Vec<Gap>>,
-    gaps_not_listed: AtomicU64,
+    /// Only the gaps in it are kept up to date; the rest is filled in when the capture is written.
+    timing: Mutex<Timing>,
     warnings: Mutex<VecDeque<String>>,
     notice: Mutex<Option<String>>,
     failure: Mutex<Option<Failure>>,
@@ -103,20 +94,19 @@ impl Shared {
 
     pub fn gap(&self, after_frame: u64, time_s: f64, missing: u64) {
         self.counts.lost_in_camera.fetch_add(missing, Ordering::Relaxed);
-        let mut gaps = self.gaps.lock().unwrap_or_else(PoisonError::into_inner);
-        if gaps.len() < GAPS_LISTED {
-            gaps.push(Gap { after_frame, time_s, missing });
-        } else {
-            self.gaps_not_listed.fetch_add(1, Ordering::Relaxed);
-        }
+        let mut timing = self.timing.lock().unwrap_or_else(PoisonError::into_inner);
+        timing.push_gap(Gap { after_frame, time_s, missing });
     }
 
-    pub fn gaps_not_listed(&self) -> u64 {
-        self.gaps_not_listed.load(Ordering::Relaxed)
+    /// The gaps so far, all else at its default.
+    pub fn gaps(&self) -> Timing {
+        self.timing.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    pub fn gaps(&self) -> Vec<Gap> {
-        self.gaps.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    /// Ends the capture for a reason; what has been captured until now is written.
+    pub fn abort(&self, failure: Failure) {
+        self.fail(failure);
+        self.stop.store(true, Ordering::Relaxed);
     }
 
     pub fn frame_seen(&self, time_s: f64) {

@@ -132,8 +132,7 @@ impl<'a> TrackThread<'a> {
                 return true;
             }
             Err(e) => {
-                self.shared.fail(Failure::Decode(e));
-                self.shared.stop.store(true, Ordering::Relaxed);
+                self.shared.abort(Failure::Decode(e));
                 return false;
             }
         }
