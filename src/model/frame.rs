@@ -38,28 +38,71 @@ pub enum PixelFormat {
     Mjpeg,
     /// Packed 4:2:2, bytes Y0 U Y1 V, no padding at the end of a line.
     Yuyv,
+    /// The same with the bytes U Y0 V Y1.
+    Uyvy,
+    /// A plane of luma, then one of U and V in turns at half the width and half the height (4:2:0).
+    Nv12,
     /// One byte of luma a pixel.
     Grey,
     /// Three bytes a pixel, red first.
     Rgb24,
 }
 
-impl std::fmt::Display for PixelFormat {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
+impl PixelFormat {
+    pub const ALL: [PixelFormat; 6] = [
+        PixelFormat::Mjpeg,
+        PixelFormat::Yuyv,
+        PixelFormat::Uyvy,
+        PixelFormat::Nv12,
+        PixelFormat::Grey,
+        PixelFormat::Rgb24,
+    ];
+
+    /// The name that V4L2 gives it, four letters.
+    pub fn fourcc(self) -> &'static str {
+        match self {
             PixelFormat::Mjpeg => "MJPG",
             PixelFormat::Yuyv => "YUYV",
+            PixelFormat::Uyvy => "UYVY",
+            PixelFormat::Nv12 => "NV12",
             PixelFormat::Grey => "GREY",
             PixelFormat::Rgb24 => "RGB3",
-        })
+        }
+    }
+
+    /// The format of that name; JPEG goes by two.
+    pub fn from_fourcc(name: &str) -> Option<Self> {
+        if name == "JPEG" {
+            return Some(PixelFormat::Mjpeg);
+        }
+        Self::ALL.into_iter().find(|format| format.fourcc() == name)
+    }
+
+    /// Bytes of a picture without padding; `None` where that depends on the picture.
+    pub fn picture_bytes(self, size: Size) -> Option<usize> {
+        let (width, height) = (size.width as usize, size.height as usize);
+        match self {
+            PixelFormat::Mjpeg => None,
+            PixelFormat::Yuyv | PixelFormat::Uyvy => Some(2 * width * height),
+            PixelFormat::Nv12 => Some(width * height + 2 * (width / 2) * (height / 2)),
+            PixelFormat::Grey => Some(width * height),
+            PixelFormat::Rgb24 => Some(3 * width * height),
+        }
+    }
+}
+
+impl std::fmt::Display for PixelFormat {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.fourcc())
     }
 }
 
 /// A frame as it left the camera or the file, not decoded.
 #[derive(Clone, Debug)]
 pub struct RawFrame {
-    /// The driver's own count, or the index in the file; a step of more than one is a loss before us.
-    pub sequence: u64,
+    /// The driver's own count with its wraps undone, or the index in the file; a step of more than one is a loss before
+    /// us. `None` where the driver does not count.
+    pub sequence: Option<u64>,
     /// The sensor's time in seconds; only differences mean something. Strictly growing within one source.
     pub sensor_time_s: f64,
     pub size: Size,

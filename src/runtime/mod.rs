@@ -116,7 +116,7 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
             let _ends_all = StopAll(&shared);
             match TrackThread::new(front, model_in, preview_every, &shared) {
                 Ok(track) => track.run(&frames_out, &wishes),
-                Err(e) => shared.fail(Failure::Decode(e)),
+                Err(e) => shared.fail(Failure::NoDecoder(e)),
             }
         };
         thread("track").spawn(run).map_err(failed)?

@@ -21,9 +21,11 @@ pub enum Failure {
     Export(#[from] ExportError),
     #[error("cannot keep the tracks: {0}; free some space, or choose another disk with --out")]
     Spool(std::io::Error),
-    /// The pictures changed their size, or there is no decoder.
     #[error("{0}")]
-    Decode(DecodeError),
+    NoDecoder(DecodeError),
+    /// The pictures changed their size.
+    #[error("frame {frame}: {error}")]
+    Frame { frame: u64, error: DecodeError },
     #[error("no frame could be decoded; the last error was: {0}")]
     NothingDecoded(DecodeError),
     #[error("a worker thread of the capture ended unexpectedly; please report this")]

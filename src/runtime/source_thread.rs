@@ -5,12 +5,13 @@ use super::shared::{Failure, Shared};
 use crate::model::RawFrame;
 use crate::source::Source;
 use crossbeam_channel::{Receiver, Sender, TrySendError};
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// A raw frame with its place in this capture.
 pub struct Timed {
-    pub raw: RawFrame,
+    pub raw: Arc<RawFrame>,
     /// Frames since the first, losses before us included; seconds since the first, by the sensor.
     pub index: u64,
     pub time_s: f64,
@@ -94,7 +95,7 @@ fn send_blocking(queue: &Sender<Timed>, mut timed: Timed, shared: &Shared) -> bo
 #[derive(Default)]
 struct Clock {
     first_time_s: Option<f64>,
-    last: Option<(u64, u64, f64)>,
+    last: Option<(Option<u64>, u64, f64)>,
     /// Moment at which the time `time_s` was due.
     pace: Option<(Instant, f64)>,
 }
@@ -105,8 +106,8 @@ impl Clock {
         let index = match self.last {
             None => 0,
             Some((sequence, index, last_s)) => {
-                // Some drivers leave the sequence at 0 or set it back: then nothing is known but that this is the next.
-                let step = raw.sequence.saturating_sub(sequence).max(1);
+                // Without a count nothing is known but that this is the next.
+                let step = raw.sequence.zip(sequence).map_or(1, |(now, before)| now.saturating_sub(before).max(1));
                 if step > 1 {
                     shared.gap(index, last_s, step - 1);
                 }
@@ -115,7 +116,7 @@ impl Clock {
         };
         self.last = Some((raw.sequence, index, time_s));
         shared.frame_seen(time_s);
-        Timed { raw, index, time_s, received: Instant::now() }
+        Timed { raw: Arc::new(raw), index, time_s, received: Instant::now() }
     }
 
     fn pause(&mut self) {

@@ -117,7 +117,7 @@ impl<'a> TrackThread<'a> {
         let mut luma = self.front.spare().unwrap_or(Luma { size: timed.raw.size, pixels: Vec::new() });
         let decoded = match self.size {
             Some(expected) if expected != timed.raw.size => {
-                Err(DecodeError::SizeChanged { frame: timed.index, expected, found: timed.raw.size })
+                Err(DecodeError::SizeChanged { expected, found: timed.raw.size })
             }
             _ => self.decoder.luma(&timed.raw, &mut luma),
         };
@@ -126,13 +126,13 @@ impl<'a> TrackThread<'a> {
             Err(e @ DecodeError::Damaged { .. }) => {
                 let n = self.shared.counts.undecodable.fetch_add(1, Ordering::Relaxed);
                 if n < DAMAGE_REPORTED {
-                    self.shared.warn(e.to_string());
+                    self.shared.warn(format!("frame {} is left out: {e}", timed.index));
                 }
                 self.last_damage = Some(e);
                 return true;
             }
             Err(e) => {
-                self.shared.abort(Failure::Decode(e));
+                self.shared.abort(Failure::Frame { frame: timed.index, error: e });
                 return false;
             }
         }

@@ -11,11 +11,11 @@ const FILLING_BYTES: u32 = 8;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DecodeError {
     /// The frame is damaged: leave it out and count it.
-    #[error("frame {frame} is damaged: {what}")]
-    Damaged { frame: u64, what: String },
+    #[error("the picture is damaged: {what}")]
+    Damaged { what: String },
     /// The pictures became larger or smaller: start again, or stop.
-    #[error("frame {frame} is {found}, but {expected} is expected; the picture's size must not change")]
-    SizeChanged { frame: u64, expected: Size, found: Size },
+    #[error("the picture is {found}, but {expected} is expected; its size must not change")]
+    SizeChanged { expected: Size, found: Size },
     /// The decoder itself does not work.
     #[error("no JPEG decoder: {what}")]
     Unavailable { what: String },
@@ -47,7 +47,7 @@ impl Decoder {
     pub fn luma(&mut self, raw: &RawFrame, into: &mut Luma) -> Result<(), DecodeError> {
         self.check(raw)?;
         if !into.pixels.is_empty() && into.size != raw.size {
-            return Err(DecodeError::SizeChanged { frame: raw.sequence, expected: into.size, found: raw.size });
+            return Err(DecodeError::SizeChanged { expected: into.size, found: raw.size });
         }
         into.size = raw.size;
         into.pixels.resize(raw.size.area(), 0);
@@ -57,7 +57,8 @@ impl Decoder {
                 self.decompress(raw, ScalingFactor::ONE, raw.size, turbojpeg::PixelFormat::GRAY, pixels)?;
             }
             PixelFormat::Yuyv => pixels.iter_mut().zip(raw.bytes.chunks_exact(2)).for_each(|(y, pair)| *y = pair[0]),
-            PixelFormat::Grey => pixels.copy_from_slice(&raw.bytes[..raw.size.area()]),
+            PixelFormat::Uyvy => pixels.iter_mut().zip(raw.bytes.chunks_exact(2)).for_each(|(y, pair)| *y = pair[1]),
+            PixelFormat::Grey | PixelFormat::Nv12 => pixels.copy_from_slice(&raw.bytes[..raw.size.area()]),
             PixelFormat::Rgb24 => pixels.iter_mut().zip(raw.bytes.chunks_exact(3)).for_each(|(y, p)| {
                 // BT.601, the weights that JPEG and YUYV are made with.
                 let [r, g, b] = [p[0], p[1], p[2]].map(u32::from);
@@ -91,25 +92,20 @@ impl Decoder {
 
     /// Makes sure that the frame has the size that it says.
     fn check(&mut self, raw: &RawFrame) -> Result<(), DecodeError> {
-        let frame = raw.sequence;
-        let bytes_per_pixel = match raw.format {
-            PixelFormat::Mjpeg => {
-                let header = self.jpeg.read_header(&raw.bytes).map_err(|e| self.damaged(raw, e.to_string()))?;
-                let found = Size::new(header.width as u32, header.height as u32);
-                if found != raw.size {
-                    self.renew()?;
-                    return Err(DecodeError::SizeChanged { frame, expected: raw.size, found });
-                }
-                return Ok(());
+        let Some(must) = raw.format.picture_bytes(raw.size) else {
+            let header = self.jpeg.read_header(&raw.bytes).map_err(|e| self.damaged(e.to_string()))?;
+            let found = Size::new(header.width as u32, header.height as u32);
+            if found != raw.size {
+                self.renew()?;
+                return Err(DecodeError::SizeChanged { expected: raw.size, found });
             }
-            PixelFormat::Yuyv => 2,
-            PixelFormat::Grey => 1,
-            PixelFormat::Rgb24 => 3,
+            return Ok(());
         };
-        let (is, must) = (raw.bytes.len(), bytes_per_pixel * raw.size.area());
+        let is = raw.bytes.len();
         if is < must || raw.size.area() == 0 {
-            let what = format!("{is} bytes instead of the {must} of a {} picture", raw.size);
-            return Err(DecodeError::Damaged { frame, what });
+            return Err(DecodeError::Damaged {
+                what: format!("{is} bytes instead of the {must} of a {} picture", raw.size),
+            });
         }
         Ok(())
     }
@@ -127,13 +123,13 @@ impl Decoder {
         let done = self.jpeg.set_scaling_factor(scale).and_then(|()| self.jpeg.decompress(&raw.bytes, output));
         // The library goes on after damage, fills the rest with grey and warns; the crate makes that an error.
         match done.map_err(|e| e.to_string()) {
-            Err(what) if !is_filling(&what) => Err(self.damaged(raw, what)),
+            Err(what) if !is_filling(&what) => Err(self.damaged(what)),
             _ => Ok(()),
         }
     }
 
-    fn damaged(&mut self, raw: &RawFrame, what: String) -> DecodeError {
-        self.renew().err().unwrap_or(DecodeError::Damaged { frame: raw.sequence, what })
+    fn damaged(&mut self, what: String) -> DecodeError {
+        self.renew().err().unwrap_or(DecodeError::Damaged { what })
     }
 
     /// Takes a new JPEG decoder: the old one keeps the Huffman tables of a damaged picture, and would read every later
@@ -170,20 +166,29 @@ fn thin_out(size: Size, max_width: u32, colour: impl Fn(u32, u32) -> [u8; 3]) ->
 
 /// Colour of a pixel of a frame that is not compressed.
 fn colour_of(raw: &RawFrame) -> impl Fn(u32, u32) -> [u8; 3] {
-    let (width, bytes, format) = (raw.size.width as usize, raw.bytes.as_slice(), raw.format);
+    let (width, height) = (raw.size.width as usize, raw.size.height as usize);
+    let (bytes, format) = (raw.bytes.as_slice(), raw.format);
     move |u, v| {
         let i = v as usize * width + u as usize;
         match format {
             PixelFormat::Rgb24 => [bytes[3 * i], bytes[3 * i + 1], bytes[3 * i + 2]],
-            PixelFormat::Yuyv => {
-                // A pair of pixels shares U and V. An odd width does not occur: source and ffmpeg see to it.
-                let pair = 4 * (i / 2);
-                let shift = |k: usize| f32::from(bytes.get(pair + k).copied().unwrap_or(128)) - 128.0;
-                let (y, cb, cr) = (1.164 * (f32::from(bytes[2 * i]) - 16.0), shift(1), shift(3));
-                // BT.601 with the limited range of video; `as u8` saturates.
-                [y + 1.596 * cr, y - 0.392 * cb - 0.813 * cr, y + 2.017 * cb].map(|c| (c + 0.5) as u8)
+            // A pair of pixels shares U and V. An odd width does not occur: source and ffmpeg see to it.
+            PixelFormat::Yuyv => rgb_of(bytes[2 * i], bytes.get(4 * (i / 2) + 1), bytes.get(4 * (i / 2) + 3)),
+            PixelFormat::Uyvy => rgb_of(bytes[2 * i + 1], bytes.get(4 * (i / 2)), bytes.get(4 * (i / 2) + 2)),
+            PixelFormat::Nv12 => {
+                // Two by two pixels share theirs; a last odd row or column has none.
+                let pair = height * width + (v as usize / 2) * 2 * (width / 2) + 2 * (u as usize / 2);
+                rgb_of(bytes[i], bytes.get(pair), bytes.get(pair + 1))
             }
             PixelFormat::Grey | PixelFormat::Mjpeg => [bytes[i]; 3],
         }
     }
+}
+
+/// BT.601 with the limited range of video.
+fn rgb_of(luma: u8, cb: Option<&u8>, cr: Option<&u8>) -> [u8; 3] {
+    let shift = |c: Option<&u8>| c.map_or(0.0, |&c| f32::from(c) - 128.0);
+    let (y, cb, cr) = (1.164 * (f32::from(luma) - 16.0), shift(cb), shift(cr));
+    // `as u8` saturates.
+    [y + 1.596 * cr, y - 0.392 * cb - 0.813 * cr, y + 2.017 * cb].map(|c| (c + 0.5) as u8)
 }

@@ -91,7 +91,7 @@ fn read(path: &Path, sequence: u64, sensor_time_s: f64) -> Result<RawFrame, Sour
     if kind == image::ImageFormat::Jpeg {
         let header = turbojpeg::read_header(&bytes).map_err(|e| bad(&e))?;
         let size = Size::new(header.width as u32, header.height as u32);
-        return Ok(RawFrame { sequence, sensor_time_s, size, format: PixelFormat::Mjpeg, bytes });
+        return Ok(RawFrame { sequence: Some(sequence), sensor_time_s, size, format: PixelFormat::Mjpeg, bytes });
     }
     let picture = image::load_from_memory_with_format(&bytes, kind).map_err(|e| bad(&e))?;
     let size = Size::new(picture.width(), picture.height());
@@ -100,7 +100,7 @@ fn read(path: &Path, sequence: u64, sensor_time_s: f64) -> Result<RawFrame, Sour
     } else {
         (PixelFormat::Grey, picture.into_luma8().into_raw())
     };
-    Ok(RawFrame { sequence, sensor_time_s, size, format, bytes })
+    Ok(RawFrame { sequence: Some(sequence), sensor_time_s, size, format, bytes })
 }
 
 /// Order of names in which `frame9` stands before `frame10`.

@@ -57,15 +57,10 @@ impl Camera {
             return Err(SourceError::BadFormat { input, what });
         }
         let (granted, asked) = negotiate(&device, config).map_err(failed("setting the picture format"))?;
-        let (format, bytes_per_pixel) = match &granted.fourcc.repr {
-            b"MJPG" | b"JPEG" => (PixelFormat::Mjpeg, 0),
-            b"YUYV" if granted.width % 2 == 0 => (PixelFormat::Yuyv, 2),
-            b"GREY" => (PixelFormat::Grey, 1),
-            b"RGB3" => (PixelFormat::Rgb24, 3),
-            _ => {
-                let what = format!("it delivers {} and neither MJPG nor YUYV", granted.fourcc);
-                return Err(SourceError::BadFormat { input, what });
-            }
+        let format = granted.fourcc.str().ok().and_then(PixelFormat::from_fourcc);
+        let Some(format) = format.filter(|_| granted.width % 2 == 0) else {
+            let what = format!("it delivers {}, which is none of the formats that can be read", granted.fourcc);
+            return Err(SourceError::BadFormat { input, what });
         };
         // Many devices have no rate to set; the frames' own times tell what it is.
         let _ = device.set_params(&Parameters::with_fps(config.rate_hz));
@@ -82,7 +77,7 @@ impl Camera {
             stream: ManuallyDrop::new(stream),
             size,
             format,
-            stride: (granted.stride as usize).max(bytes_per_pixel * size.width as usize),
+            stride: (granted.stride as usize).max(line_bytes(format, size)),
             timeout: Duration::from_secs_f64(config.timeout_s.clamp(0.001, 1e6)),
             clock: Clock::default(),
             leave_out: u32::from(caps.driver == LOOPBACK),
@@ -171,7 +166,13 @@ impl Source for Camera {
                 self.stale += 1;
                 continue;
             };
-            return Ok(Some(RawFrame { sequence, sensor_time_s, size: self.size, format: self.format, bytes }));
+            return Ok(Some(RawFrame {
+                sequence: Some(sequence),
+                sensor_time_s,
+                size: self.size,
+                format: self.format,
+                bytes,
+            }));
         }
     }
 
@@ -231,14 +232,12 @@ fn negotiate(device: &Device, config: &config::Camera) -> io::Result<(Format, &'
 
 /// The picture without what the driver puts at the end of each line; `None` if there is too little of it.
 fn without_padding(used: &[u8], format: PixelFormat, size: Size, stride: usize) -> Option<Vec<u8>> {
-    let line = size.width as usize
-        * match format {
-            PixelFormat::Mjpeg => return (!used.is_empty()).then(|| used.to_vec()),
-            PixelFormat::Yuyv => 2,
-            PixelFormat::Grey => 1,
-            PixelFormat::Rgb24 => 3,
-        };
-    let height = size.height as usize;
+    if format == PixelFormat::Mjpeg {
+        return (!used.is_empty()).then(|| used.to_vec());
+    }
+    let line = line_bytes(format, size);
+    let rows = size.height as usize;
+    let height = if format == PixelFormat::Nv12 { rows + rows / 2 } else { rows };
     // The last line's padding need not be there.
     if height == 0 || used.len() < stride * (height - 1) + line {
         return None;
@@ -249,6 +248,17 @@ fn without_padding(used: &[u8], format: PixelFormat, size: Size, stride: usize) 
     let mut bytes = Vec::with_capacity(line * height);
     used.chunks(stride).take(height).for_each(|padded| bytes.extend_from_slice(&padded[..line]));
     Some(bytes)
+}
+
+/// Bytes of a line without padding, 0 where there are no lines.
+fn line_bytes(format: PixelFormat, size: Size) -> usize {
+    let bytes_per_pixel = match format {
+        PixelFormat::Mjpeg => 0,
+        PixelFormat::Yuyv | PixelFormat::Uyvy => 2,
+        PixelFormat::Grey | PixelFormat::Nv12 => 1,
+        PixelFormat::Rgb24 => 3,
+    };
+    bytes_per_pixel * size.width as usize
 }
 
 #[cfg(test)]

@@ -129,7 +129,13 @@ impl Video {
                 self.first_time_s = sensor_time_s;
             }
             self.last_time_s = sensor_time_s;
-            return Some(RawFrame { sequence, sensor_time_s, size: self.size, format: self.format, bytes });
+            return Some(RawFrame {
+                sequence: Some(sequence),
+                sensor_time_s,
+                size: self.size,
+                format: self.format,
+                bytes,
+            });
         }
         None
     }
