@@ -2,7 +2,9 @@
 
 mod capture;
 mod devices;
+mod hangup;
 mod replay;
+mod service;
 mod session;
 
 use crate::config::{Config, ConfigError};
@@ -55,6 +57,9 @@ struct Common {
     /// Settings that differ from the defaults (TOML; see config/arborcam.toml).
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    /// End by itself after so many seconds of film.
+    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
+    for_s: Option<f64>,
     /// Metres in a pixel at the tree; the model is then in metres.
     #[arg(long, value_name = "M")]
     metres_per_px: Option<f64>,
@@ -77,6 +82,11 @@ impl Common {
         config.check()?;
         Ok(config)
     }
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let seconds = text.parse().ok().filter(|s: &f64| s.is_finite() && *s > 0.0);
+    seconds.ok_or_else(|| "give a number of seconds above 0".to_owned())
 }
 
 /// Why a command did not end well; decides the exit status.

@@ -11,12 +11,14 @@ mod finish;
 mod latest;
 mod meter;
 mod model_thread;
+mod pulse;
 mod shared;
 mod source_thread;
 mod status;
 mod track_thread;
 
 pub use finish::Written;
+pub use pulse::{Marks, Sign, Vigil};
 pub use shared::Failure;
 pub use source_thread::Pace;
 
@@ -144,6 +146,12 @@ impl Running {
         }
     }
 
+    /// Goes on with other settings; they may differ from the former ones in what can be changed while frames flow
+    /// ([`Config::reload`] sees to that).
+    pub fn reload(&self, config: Config) {
+        self.shared.reload(config);
+    }
+
     /// Take no more frames and finish.
     pub fn stop(&self) {
         self.shared.stop.store(true, Ordering::Relaxed);
@@ -152,6 +160,13 @@ impl Running {
     /// The capture is over and written.
     pub fn finished(&self) -> bool {
         self.model.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+
+    /// How far every thread has come, for a [`Vigil`].
+    pub fn marks(&self) -> Marks {
+        let over = self.source.as_ref().is_none_or(JoinHandle::is_finished);
+        let ending = over || self.shared.stop.load(Ordering::Relaxed);
+        self.shared.pulse.marks(self.shared.counts.seen.load(Ordering::Relaxed), ending)
     }
 
     /// What there is to be told so far.
