@@ -2,6 +2,7 @@
 
 mod capture;
 mod devices;
+mod doctor;
 mod hangup;
 mod replay;
 mod service;
@@ -37,6 +38,8 @@ enum Command {
     Replay(replay::ReplayArgs),
     /// List the cameras that are plugged in.
     Devices(devices::DevicesArgs),
+    /// Find out what is wrong with this machine, and what to do about it.
+    Doctor(doctor::DoctorArgs),
 }
 
 /// What `capture` and `replay` share.
@@ -116,6 +119,7 @@ pub fn main() -> ExitCode {
         Command::Capture(args) => capture::run(args),
         Command::Replay(args) => replay::run(args),
         Command::Devices(args) => devices::run(args),
+        Command::Doctor(args) => doctor::run(args),
     };
     let (status, error) = match result {
         Ok(()) => return ExitCode::SUCCESS,
