@@ -1,5 +1,9 @@
 //! Settings: plain structs whose defaults are the documented ones. A file overrides a default, the command line a file.
 
+mod reload;
+
+pub use reload::{Change, EFFECTS, Effect, effect};
+
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

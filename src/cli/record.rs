@@ -1,5 +1,6 @@
 //! `arborcam record DEVICE FILE.mcap`: frames into a file, and nothing else.
 
+use super::hangup::Hangup;
 use super::recording::{self, LimitArgs, parse_time_ns};
 use super::session::{init_log, no_input, stop_on_signals};
 use super::{Ended, say};
@@ -38,7 +39,8 @@ pub fn run(args: &RecordArgs) -> Result<(), Ended> {
     recording::refuse_unfit(&args.file)?;
     let source = source::open(&args.device, &config.camera, None).map_err(no_input)?;
     let info = source.describe();
-    let stop = stop_on_signals()?;
+    // There are no settings to read again: whoever hangs up on it wants it to end.
+    let stop = stop_on_signals(Hangup::of_this_process() != Hangup::Ignored)?;
     init_log(true);
     if info.live && info.format.asked != info.format.given {
         say(&format!("arborcam: asked for {}, the camera gives {}", info.format.asked, info.format.given));

@@ -121,6 +121,7 @@ fn write_motion(
     for set in job.tracks.sets() {
         let (pose, targets_px) = retrace.step(&set.map_err(Failure::Spool)?);
         csv.pose(&pose)?;
+        job.shared.pulse.wrote();
         // The foot is where it is by definition.
         for (joint, target) in pose.joints.iter().zip(&targets_px).skip(1) {
             if let Some(t) = target {
@@ -142,6 +143,7 @@ fn write_tracks(job: &CaptureJob, retrace: Option<&Retrace>, folder: &OutputFold
     let mut csv = TracksCsv::new(folder.file("tracks.csv")?)?;
     for set in job.tracks.sets() {
         csv.set(&set.map_err(Failure::Spool)?, |id| retrace?.node_of(id))?;
+        job.shared.pulse.wrote();
     }
     csv.finish()?;
     Ok(())

@@ -13,6 +13,7 @@ mod latest;
 mod meter;
 mod model_thread;
 mod play;
+mod pulse;
 mod record;
 mod recorder_thread;
 mod shared;
@@ -22,6 +23,7 @@ mod track_thread;
 
 pub use finish::Written;
 pub use play::{Played, play};
+pub use pulse::{Marks, Sign, Vigil};
 pub use record::{RecordJob, RunningRecord, record};
 pub use recorder_thread::{RecordTo, Recorded};
 pub use shared::Failure;
@@ -164,6 +166,12 @@ impl Running {
         }
     }
 
+    /// Goes on with other settings; they may differ from the former ones in what can be changed while frames flow
+    /// ([`Config::reload`] sees to that).
+    pub fn reload(&self, config: Config) {
+        self.shared.reload(config);
+    }
+
     /// Take no more frames and finish.
     pub fn stop(&self) {
         self.shared.stop.store(true, Ordering::Relaxed);
@@ -172,6 +180,13 @@ impl Running {
     /// The capture is over and written.
     pub fn finished(&self) -> bool {
         self.model.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+
+    /// How far every thread has come, for a [`Vigil`].
+    pub fn marks(&self) -> Marks {
+        let over = self.source.as_ref().is_none_or(JoinHandle::is_finished);
+        let ending = over || self.shared.stop.load(Ordering::Relaxed);
+        self.shared.pulse.marks(self.shared.counts.seen.load(Ordering::Relaxed), ending)
     }
 
     /// What there is to be told so far.

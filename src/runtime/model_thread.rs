@@ -2,6 +2,7 @@
 //! at the end.
 
 use super::finish::{self, CaptureJob, Quality};
+use super::pulse::Worker;
 use super::recorder_thread::{Found, Recorded, Recorder};
 use super::shared::{Failure, Shared};
 use super::status::{Status, median_fb_error_px};
@@ -96,6 +97,7 @@ impl ModelThread {
                 }
                 ToModel::Export => self.export_now(),
             }
+            self.shared.pulse.done(Worker::Model);
         }
         self.back.finish();
         self.announce();
@@ -208,7 +210,7 @@ impl ModelThread {
             tree: self.back.tree().cloned(),
             outline: self.back.outline().cloned(),
             tracks: spool.reader().map_err(Failure::Spool)?,
-            config: self.job.config.clone(),
+            config: self.shared.reloaded().unwrap_or_else(|| self.job.config.clone()),
             info: self.info.clone(),
             quality: self.quality.clone(),
             bark: self.bark.clone(),

@@ -1,6 +1,8 @@
 //! What the threads of a capture have in common: flags, counts, warnings and the first failure.
 
 use super::latest::Latest;
+use super::pulse::Pulse;
+use crate::config::Config;
 use crate::export::ExportError;
 use crate::export::capture::{Gap, Timing};
 use crate::model::Snapshot;
@@ -62,6 +64,7 @@ pub struct Shared {
     /// It can write no more; frames are counted as missing from here on.
     pub recording_ended: AtomicBool,
     pub counts: Counts,
+    pub pulse: Pulse,
     pub screen: Latest<Arc<Snapshot>>,
     /// Only the gaps in it are kept up to date; the rest is filled in when the capture is written.
     timing: Mutex<Timing>,
@@ -69,9 +72,33 @@ pub struct Shared {
     notice: Mutex<Option<String>>,
     failure: Mutex<Option<Failure>>,
     last_time_s: Mutex<f64>,
+    reloaded: Mutex<Reloaded>,
+}
+
+/// Settings that came while the capture ran.
+#[derive(Default)]
+struct Reloaded {
+    config: Option<Config>,
+    /// The source has not taken them yet.
+    is_new: bool,
 }
 
 impl Shared {
+    pub fn reload(&self, config: Config) {
+        *self.reloaded.lock().unwrap_or_else(PoisonError::into_inner) = Reloaded { config: Some(config), is_new: true };
+    }
+
+    /// The settings as they are now, where they are not those of the start.
+    pub fn reloaded(&self) -> Option<Config> {
+        self.reloaded.lock().unwrap_or_else(PoisonError::into_inner).config.clone()
+    }
+
+    /// The same, once, for the source.
+    pub fn newly_reloaded(&self) -> Option<Config> {
+        let mut reloaded = self.reloaded.lock().unwrap_or_else(PoisonError::into_inner);
+        std::mem::take(&mut reloaded.is_new).then(|| reloaded.config.clone()).flatten()
+    }
+
     pub fn fail(&self, failure: Failure) {
         self.failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(failure);
     }

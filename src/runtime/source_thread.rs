@@ -1,6 +1,7 @@
 //! The source's own thread: takes frames, paces a replay, and hands them on. A camera is never made to wait: where the
 //! tracker is late, the oldest waiting frame is dropped and counted.
 
+use super::pulse::Worker;
 use super::recorder_thread::Recorder;
 use super::shared::{Failure, Shared};
 use crate::model::{RawFrame, nanoseconds, seconds};
@@ -45,9 +46,13 @@ pub fn run(
     let mut clock = Clock::default();
     source.stop_when(shared.stop.clone());
     while !shared.stop.load(Ordering::Relaxed) {
+        if let Some(config) = shared.newly_reloaded() {
+            source.adopt(&config.camera);
+        }
         if pace != Pace::Live && shared.paused.load(Ordering::Relaxed) {
             std::thread::sleep(NAP);
             clock.pause();
+            shared.pulse.waits();
             continue;
         }
         let raw = match source.next_frame() {
@@ -73,9 +78,11 @@ pub fn run(
                 continue;
             }
             let mut timed = timed;
+            shared.pulse.give(Worker::Track);
             while let Err(TrySendError::Full(again)) = queue.try_send(timed) {
                 timed = again;
                 if queue_end.try_recv().is_ok() {
+                    shared.pulse.take_back(Worker::Track);
                     shared.counts.dropped_before_tracker.fetch_add(1, Ordering::Relaxed);
                 }
             }
@@ -90,6 +97,7 @@ pub fn run(
 
 /// Waits for room, but not beyond a wish to stop; `false` when the frame could not be handed on.
 fn send_blocking(queue: &Sender<Timed>, mut timed: Timed, shared: &Shared) -> bool {
+    shared.pulse.give(Worker::Track);
     loop {
         match queue.send_timeout(timed, NAP) {
             Ok(()) => return true,

@@ -53,6 +53,9 @@ pub trait Source: Send {
     /// A source that may wait long gives up, and returns `None`, soon after this has been set.
     fn stop_when(&mut self, _stop: Arc<AtomicBool>) {}
 
+    /// Takes over what can be changed of `config` while frames flow: the limits of time.
+    fn adopt(&mut self, _config: &config::Camera) {}
+
     /// Lines to show to the user since the last call, e.g. that a clip ends early; complete after the end.
     fn warnings(&mut self) -> Vec<String> {
         Vec::new()

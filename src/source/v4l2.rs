@@ -78,7 +78,7 @@ impl Camera {
             size,
             format,
             stride: (granted.stride as usize).max(line_bytes(format, size)),
-            timeout: Duration::from_secs_f64(config.timeout_s.clamp(0.001, 1e6)),
+            timeout: time_limit(config),
             clock: Clock::default(),
             leave_out: u32::from(caps.driver == LOOPBACK),
             stop: Arc::default(),
@@ -180,6 +180,10 @@ impl Source for Camera {
         self.stop = stop;
     }
 
+    fn adopt(&mut self, config: &config::Camera) {
+        self.timeout = time_limit(config);
+    }
+
     fn describe(&self) -> SourceInfo {
         let rate = self.rate_hz.map_or(String::new(), |hz| format!(" @ {}", (hz * 100.0).round() / 100.0));
         SourceInfo {
@@ -228,6 +232,10 @@ fn negotiate(device: &Device, config: &config::Camera) -> io::Result<(Format, &'
             first => Ok((ask(b"YUYV").or(first)?, "MJPG or YUYV")),
         },
     }
+}
+
+fn time_limit(config: &config::Camera) -> Duration {
+    Duration::from_secs_f64(config.timeout_s.clamp(0.001, 1e6))
 }
 
 /// The picture without what the driver puts at the end of each line; `None` if there is too little of it.
