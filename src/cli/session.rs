@@ -1,6 +1,7 @@
 //! One capture or replay from the command line: open, run, show, report.
 
 use super::{Common, Ended, say};
+use crate::config::Config;
 use crate::export::OutputFolder;
 use crate::model::{Control, Snapshot};
 use crate::outline::{self, OutlineSpec};
@@ -27,11 +28,13 @@ pub struct Plan<'a> {
     pub fps: Option<f64>,
     /// `None`: live if the source is, else at its own pace.
     pub pace: Option<Pace>,
+    /// What the command's own arguments change of the settings.
+    pub set: &'a dyn Fn(&mut Config),
 }
 
 /// Runs a capture from the first frame to the last line.
 pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
-    let config = common.config().map_err(|e| Ended::BadUsage(e.into()))?;
+    let config = common.config(plan.set).map_err(|e| Ended::BadUsage(e.into()))?;
     let headless = common.headless || common.stream.is_some();
     if !headless && !std::io::stdout().is_terminal() {
         return Err(Ended::BadUsage(tui::TuiError::NoTerminal(None).into()));
@@ -103,6 +106,9 @@ fn watch(running: &Running, stop: &AtomicBool) -> Result<(), Ended> {
     while !running.finished() {
         if stop.load(Ordering::SeqCst) {
             running.stop();
+        }
+        for line in running.news() {
+            progress.tell(&format!("arborcam: {line}"));
         }
         if let Some(snapshot) = running.latest() {
             progress.update(&snapshot);

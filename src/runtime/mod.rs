@@ -9,8 +9,11 @@
 
 mod finish;
 mod latest;
+mod losses;
 mod meter;
 mod model_thread;
+mod rate;
+mod reconnect;
 mod shared;
 mod source_thread;
 mod status;
@@ -97,7 +100,7 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
     // Wishes are typed by a person; they cannot pile up.
     let (controls, wishes) = unbounded();
     let front = FrontEnd::new(&job.config, job.outline.take());
-    let (pace, preview_every) = (job.pace, job.preview_every);
+    let (pace, preview_every, camera) = (job.pace, job.preview_every, job.config.camera.clone());
 
     let thread = |name: &str| std::thread::Builder::new().name(name.into());
     let failed = |e: std::io::Error| Failure::Spool(e);
@@ -123,7 +126,8 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
     };
     let source = {
         let shared = shared.clone();
-        let run = move || source_thread::run(source, pace, frames_in, frames_out, &shared);
+        let queue = source_thread::Queue { into: frames_in, out_of: frames_out };
+        let run = move || source_thread::run(source, pace, &camera, queue, &shared);
         thread("source").spawn(run).map_err(failed)?
     };
     Ok(Running { shared, controls, source: Some(source), track: Some(track), model: Some(model) })
@@ -152,6 +156,12 @@ impl Running {
     /// The capture is over and written.
     pub fn finished(&self) -> bool {
         self.model.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+
+    /// Lines that cannot wait for the end, e.g. that the camera is gone, since the last call. The screen shows them by
+    /// itself.
+    pub fn news(&self) -> Vec<String> {
+        self.shared.take_news()
     }
 
     /// What there is to be told so far.

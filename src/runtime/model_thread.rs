@@ -10,7 +10,7 @@ use crate::model::{Phase, Pose, Rgb};
 use crate::pipeline::{BackEnd, Followed, LEAST_MOVING, Moved};
 use crate::recording::Spool;
 use crate::source::SourceInfo;
-use crossbeam_channel::Receiver;
+use crossbeam_channel::{Receiver, RecvTimeoutError};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -19,6 +19,8 @@ use std::time::{Duration, Instant};
 
 /// Time between two states for the screen.
 const SCREEN_EVERY: Duration = Duration::from_millis(40);
+/// Without frames the screen is shown a new state at this interval: a camera that is gone must be seen to be.
+const IDLE_EVERY: Duration = Duration::from_millis(200);
 
 /// State of the thread.
 pub struct ModelThread {
@@ -65,7 +67,15 @@ impl ModelThread {
     /// Runs until the tracker is done, then writes the capture.
     pub fn run(mut self, queue: &Receiver<ToModel>) -> Summary {
         let mut last: Option<Moved> = None;
-        for message in queue {
+        loop {
+            let message = match queue.recv_timeout(IDLE_EVERY) {
+                Ok(message) => message,
+                Err(RecvTimeoutError::Timeout) => {
+                    self.show(last.as_ref(), false);
+                    continue;
+                }
+                Err(RecvTimeoutError::Disconnected) => break,
+            };
             match message {
                 ToModel::Followed(followed) => last = Some(self.step(followed)),
                 ToModel::Searching { progress, preview, size, frame, time_s } => {

@@ -3,7 +3,7 @@
 use super::latest::Latest;
 use crate::export::ExportError;
 use crate::export::capture::{Gap, Timing};
-use crate::model::Snapshot;
+use crate::model::{CameraState, Snapshot};
 use crate::source::{DecodeError, SourceError};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -57,6 +57,8 @@ pub struct Shared {
     notice: Mutex<Option<String>>,
     failure: Mutex<Option<Failure>>,
     last_time_s: Mutex<f64>,
+    camera: Mutex<CameraState>,
+    news: Mutex<Vec<String>>,
 }
 
 impl Shared {
@@ -94,10 +96,35 @@ impl Shared {
         self.warnings.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned().collect()
     }
 
-    pub fn gap(&self, after_frame: u64, time_s: f64, missing: u64) {
-        self.counts.lost_in_camera.fetch_add(missing, Ordering::Relaxed);
-        let mut timing = self.timing.lock().unwrap_or_else(PoisonError::into_inner);
-        timing.push_gap(Gap { after_frame, time_s, missing });
+    pub fn gap(&self, gap: Gap) {
+        self.timing.lock().unwrap_or_else(PoisonError::into_inner).push_gap(gap);
+    }
+
+    /// Changes what is known of the camera.
+    pub fn camera(&self, change: impl FnOnce(&mut CameraState)) {
+        change(&mut self.camera.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+
+    pub fn camera_state(&self) -> CameraState {
+        self.camera.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Tells at once, on the screen or without one, what cannot wait for the end.
+    pub fn news(&self, line: String) {
+        self.tell(line.clone());
+        let mut news = self.news.lock().unwrap_or_else(PoisonError::into_inner);
+        if news.len() < WARNINGS_KEPT {
+            news.push(line);
+        }
+    }
+
+    pub fn take_news(&self) -> Vec<String> {
+        std::mem::take(&mut self.news.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Whether no more frames are wanted.
+    pub fn stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
     }
 
     /// The gaps so far, all else at its default.

@@ -136,6 +136,7 @@ impl Status {
         s.lost_in_camera = shared.counts.lost_in_camera.load(Ordering::Relaxed);
         s.dropped_before_tracker = shared.counts.dropped_before_tracker.load(Ordering::Relaxed);
         s.undecodable = shared.counts.undecodable.load(Ordering::Relaxed);
+        s.camera = shared.camera_state();
         s.not_shown = shared.screen.replaced();
         s.paused = shared.paused.load(Ordering::Relaxed);
         s.ended = shared.ended.load(Ordering::Relaxed);

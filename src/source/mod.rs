@@ -3,18 +3,23 @@
 //! A source hands frames out as they left the camera or the file, with their own number and time; [`Decoder`] turns
 //! them into the pictures that the tracker and the screen want.
 
+mod choice;
 mod clock;
 mod decode;
 mod devices;
 mod error;
+mod identity;
 mod images;
 mod probe;
 mod v4l2;
 mod video;
 
+pub use choice::Mode;
+pub use clock::ClockKind;
 pub use decode::{DecodeError, Decoder};
 pub use devices::{Device, list};
 pub use error::SourceError;
+pub use identity::{Identity, Places};
 
 use crate::config;
 use crate::model::{FormatNote, RawFrame, Size};
@@ -37,18 +42,47 @@ pub struct SourceInfo {
     pub live: bool,
 }
 
+/// What a source knows beyond its frames. The counts only ever grow.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Health {
+    /// Frames that came damaged, short or with the driver's error flag, and were left out.
+    pub damaged: u64,
+    /// Frames that were not later than the one before, and were left out.
+    pub stale: u64,
+    /// What the frames' times are by.
+    pub clock: ClockKind,
+}
+
 /// A sequence of frames.
 pub trait Source: Send {
     /// Waits for the next frame; `None` is the end, and stays it.
     ///
     /// # Errors
-    /// The source has failed and will not deliver again; open it anew.
+    /// The source has failed and will not deliver again, unless it [`returns`](Self::returns) and is opened anew.
     fn next_frame(&mut self) -> Result<Option<RawFrame>, SourceError>;
 
     fn describe(&self) -> SourceInfo;
 
     /// A source that may wait long gives up, and returns `None`, soon after this has been set.
     fn stop_when(&mut self, _stop: Arc<AtomicBool>) {}
+
+    /// Whether it may come back after a failure, as a camera does that is plugged in again.
+    fn returns(&self) -> bool {
+        false
+    }
+
+    /// One attempt to go on after a failure: the same camera, the same format. Whoever calls decides when to try again;
+    /// the source only says why it is not yet. Its frames go on with times that fit those before.
+    ///
+    /// # Errors
+    /// It is not back: `Absent` where it is not even there, which costs next to nothing to find out.
+    fn reopen(&mut self) -> Result<(), SourceError> {
+        Err(SourceError::Absent { input: self.describe().name, hint: "it cannot be opened again" })
+    }
+
+    fn health(&self) -> Health {
+        Health::default()
+    }
 
     /// Lines to show to the user since the last call, e.g. that a clip ends early; complete after the end.
     fn warnings(&mut self) -> Vec<String> {
