@@ -18,6 +18,7 @@ mod shared;
 mod source_thread;
 mod status;
 mod track_thread;
+mod watched;
 
 pub use finish::Written;
 pub use shared::Failure;
@@ -37,6 +38,7 @@ use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
 use std::time::Duration;
 use track_thread::TrackThread;
+use watched::Watched;
 
 /// Frames that may wait for the tracker, and track sets that may wait for the model (two seconds at 30 a second, more
 /// than a build takes).
@@ -93,6 +95,10 @@ impl Drop for StopAll<'_> {
 /// # Errors
 /// A thread cannot be started, or there is no decoder.
 pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> {
+    let source = match source.waits_without_limit() {
+        Some(limit) => Box::new(Watched::start(source, limit).map_err(Failure::Thread)?) as Box<dyn Source>,
+        None => source,
+    };
     let shared = Arc::new(Shared::default());
     let info = source.describe();
     let (frames_in, frames_out) = bounded(FRAME_QUEUE);
@@ -103,7 +109,7 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
     let (pace, preview_every, camera) = (job.pace, job.preview_every, job.config.camera.clone());
 
     let thread = |name: &str| std::thread::Builder::new().name(name.into());
-    let failed = |e: std::io::Error| Failure::Spool(e);
+    let failed = Failure::Thread;
     let model = {
         let model = ModelThread::new(job, info, shared.clone());
         let on_end = shared.clone();

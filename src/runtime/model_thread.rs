@@ -151,7 +151,7 @@ impl ModelThread {
         }
     }
 
-    /// One line of JSON: `{"frame":…,"time_s":…,"nodes":[[id,x,y,z],…]}`, the measured nodes, model axes, in px
+    /// One line of JSON: `{"frame":…,"time_s":…,"nodes":[[id,x,y,z],…]}`, with the losses so far behind it if live; the measured nodes, model axes, in px
     /// or metres as in the capture.
     fn stream(&mut self, pose: &Pose) {
         let Some(out) = &mut self.job.stream else { return };
@@ -163,7 +163,11 @@ impl ModelThread {
             let comma = if i > 0 { "," } else { "" };
             line.push_str(&format!("{comma}[{i},{:.3},{:.3},{:.3}]", p.x, p.y, p.z));
         }
-        line.push_str("]}\n");
+        line.push(']');
+        if self.info.live {
+            line.push_str(&counts(&self.shared));
+        }
+        line.push_str("}\n");
         if let Err(e) = out.write_all(line.as_bytes()).and_then(|()| out.flush()) {
             // The reader has gone (`| head`): nobody listens any more, and that ends the capture in good order.
             if e.kind() != std::io::ErrorKind::BrokenPipe {
@@ -259,6 +263,19 @@ impl ModelThread {
             written,
         }
     }
+}
+
+/// What was lost until now, for the stream of a camera. A file's stream has none, so that two replays give the same.
+fn counts(shared: &Shared) -> String {
+    let c = shared.camera_state();
+    let by_sequence = c.lost_by_sequence.map_or_else(|| "null".to_owned(), |n| n.to_string());
+    format!(
+        ",\"dropped\":{},\"dropped_by_sequence\":{by_sequence},\"dropped_by_time\":{},\"broken\":{},\"reconnects\":{}",
+        shared.counts.lost_in_camera.load(Ordering::Relaxed),
+        c.lost_by_time,
+        c.damaged + c.stale + shared.counts.undecodable.load(Ordering::Relaxed),
+        c.reconnects
+    )
 }
 
 /// The folder in which `path` will lie, if it is there already, else the nearest one above it that is.

@@ -21,6 +21,8 @@ pub enum Failure {
     Export(#[from] ExportError),
     #[error("cannot keep the tracks: {0}; free some space, or choose another disk with --out")]
     Spool(std::io::Error),
+    #[error("a thread cannot be started: {0}; close other programs")]
+    Thread(std::io::Error),
     #[error("{0}")]
     NoDecoder(DecodeError),
     /// The pictures changed their size.

@@ -187,7 +187,8 @@ mod tests {
         let both = vec![mode(Yuyv, 1280, 720, &[30.0]), mode(Mjpeg, 1280, 720, &[30.0])];
         let fast = vec![mode(Mjpeg, 1280, 720, &[120.0, 60.0])];
         // Modes, format and size asked for, over USB, and what is chosen.
-        let cases: [(&str, Vec<Mode>, Option<PixelFormat>, (u32, u32), bool, &str); 9] = [
+        type Case = (&'static str, Vec<Mode>, Option<PixelFormat>, (u32, u32), bool, &'static str);
+        let cases: [Case; 9] = [
             ("the rate decides", webcam(), None, (1280, 720), true, "MJPG 1280x720 @ 30"),
             ("18 MB/s are no burden", webcam(), None, (640, 480), true, "YUYV 640x480 @ 30"),
             ("55 MB/s are", both.clone(), None, (1280, 720), true, "MJPG 1280x720 @ 30"),

@@ -11,13 +11,14 @@ mod error;
 mod identity;
 mod images;
 mod probe;
+mod through_nokhwa;
 mod v4l2;
 mod video;
 
 pub use choice::Mode;
 pub use clock::ClockKind;
 pub use decode::{DecodeError, Decoder};
-pub use devices::{Device, list};
+pub use devices::{Device, list, list_for};
 pub use error::SourceError;
 pub use identity::{Identity, Places};
 
@@ -27,6 +28,7 @@ use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 /// What was opened and what is to be expected of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,6 +82,14 @@ pub trait Source: Send {
         Err(SourceError::Absent { input: self.describe().name, hint: "it cannot be opened again" })
     }
 
+    /// The time after which silence is a failure, of a source that cannot keep to it by itself: [`next_frame`] may then
+    /// wait for ever, and belongs on a thread of its own.
+    ///
+    /// [`next_frame`]: Self::next_frame
+    fn waits_without_limit(&self) -> Option<Duration> {
+        None
+    }
+
     fn health(&self) -> Health {
         Health::default()
     }
@@ -90,15 +100,25 @@ pub trait Source: Send {
     }
 }
 
-/// Opens whatever `input` is; `fps` is the rate of a folder of pictures (30 if not given), nothing else needs it.
+/// Opens whatever `input` is, a path or the identity of a camera; `fps` is the rate of a folder of pictures (30 if not given), nothing else needs it.
 ///
 /// # Errors
 /// There is nothing that can be read as frames; the error says why and what to do.
 pub fn open(input: &Path, config: &config::Camera, fps: Option<f64>) -> Result<Box<dyn Source>, SourceError> {
     let name = input.display().to_string();
+    let named;
+    let input = if devices::is_identity(&name) && !input.exists() {
+        named = devices::by_identity(&name, &Places::default())?;
+        &named
+    } else {
+        input
+    };
     let kind = std::fs::metadata(input).map_err(|e| SourceError::of_file(input, &e))?.file_type();
     if kind.is_char_device() {
-        Ok(Box::new(v4l2::Camera::open(input, config)?))
+        Ok(match config.backend {
+            config::Backend::V4l2 => Box::new(v4l2::Camera::open(input, config)?),
+            config::Backend::Nokhwa => Box::new(through_nokhwa::NokhwaCamera::open(input, config)?),
+        })
     } else if kind.is_dir() {
         Ok(Box::new(images::Images::open(input, fps.unwrap_or(30.0))?))
     } else if !kind.is_file() {

@@ -48,7 +48,7 @@ fn each_count_stands_where_the_other_falls() {
     let late = |n: u64| if n % 10 == 3 { 1.4 } else { 0.0 };
     let none = |_: u64, _: u64| None;
     let delivered_only = |_: u64, m: u64| Some(m);
-    let reset = |n: u64, _: u64| if n % 100 == 0 { None } else { Some(n) };
+    let reset = |n: u64, _: u64| if n.is_multiple_of(100) { None } else { Some(n) };
     let cases: [(&str, Camera, [bool; 2]); 6] = [
         ("steady", Camera { ..STEADY }, [true, true]),
         ("losses", Camera { lost: &some, ..STEADY }, [true, true]),

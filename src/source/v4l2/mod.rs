@@ -253,7 +253,7 @@ pub(super) struct Prospect {
     pub bus: String,
     pub films: bool,
     pub modes: Vec<Mode>,
-    pub chosen: Option<(String, String)>,
+    pub chosen: Option<(Granted, String)>,
 }
 
 /// Asks the device without changing anything about it.
@@ -264,7 +264,7 @@ pub(super) fn prospect(path: &Path, config: &config::Camera) -> Result<Prospect,
     let films = caps.capabilities.contains(Caps::VIDEO_CAPTURE | Caps::STREAMING);
     let wish = Wish::of(config);
     let modes = if films { offers::modes(&device, &wish) } else { Vec::new() };
-    let chosen = choose(&modes, &wish, is_usb(&caps)).map(|(granted, why)| (granted.to_string(), why));
+    let chosen = choose(&modes, &wish, is_usb(&caps));
     let text = |s: &str| s.trim().to_owned();
     Ok(Prospect { card: text(&caps.card), driver: text(&caps.driver), bus: text(&caps.bus), films, modes, chosen })
 }
