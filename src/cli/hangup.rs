@@ -42,6 +42,7 @@ impl Hangup {
 /// Waits for the wish to read the settings again, and fulfils it.
 pub struct Reload<'a> {
     common: &'a Common,
+    set: &'a dyn Fn(&mut Config),
     wanted: Arc<AtomicBool>,
     current: Config,
 }
@@ -51,12 +52,16 @@ impl<'a> Reload<'a> {
     ///
     /// # Errors
     /// The signal cannot be caught.
-    pub fn new(common: &'a Common, current: &Config, hangup: Hangup) -> std::io::Result<Self> {
+    pub fn new(
+        (common, set): (&'a Common, &'a dyn Fn(&mut Config)),
+        current: &Config,
+        hangup: Hangup,
+    ) -> std::io::Result<Self> {
         let wanted = Arc::<AtomicBool>::default();
         if hangup == Hangup::Reload {
             signal_hook::flag::register(SIGHUP, wanted.clone())?;
         }
-        Ok(Self { common, wanted, current: current.clone() })
+        Ok(Self { common, set, wanted, current: current.clone() })
     }
 
     /// Whether somebody asks.
@@ -76,7 +81,7 @@ impl<'a> Reload<'a> {
         if self.common.config.is_none() {
             return vec!["there is no --config file to read again; nothing is changed".to_owned()];
         }
-        let wanted = match self.common.config() {
+        let wanted = match self.common.config(self.set) {
             Ok(wanted) => wanted,
             Err(e) => return vec![format!("{e}; nothing is changed")],
         };

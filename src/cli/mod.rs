@@ -1,5 +1,6 @@
 //! The commands: one file each. Here, what they have in common: arguments, exit status, messages.
 
+mod camera;
 mod capture;
 mod devices;
 mod doctor;
@@ -81,7 +82,8 @@ enum Stream {
 }
 
 impl Common {
-    fn config(&self) -> Result<Config, ConfigError> {
+    /// The file over the defaults, and over both what the command line says; `set` is for the command's own arguments.
+    fn config(&self, set: &dyn Fn(&mut Config)) -> Result<Config, ConfigError> {
         let mut config = match &self.config {
             Some(path) => Config::load(path)?,
             None => Config::default(),
@@ -89,6 +91,7 @@ impl Common {
         if let Some(metres) = self.metres_per_px {
             config.export.metres_per_px = metres;
         }
+        set(&mut config);
         config.check()?;
         Ok(config)
     }

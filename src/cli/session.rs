@@ -4,6 +4,7 @@ use super::hangup::{Hangup, Reload};
 use super::recording::{self, RecordOption};
 use super::service::Service;
 use super::{Common, Ended, say};
+use crate::config::Config;
 use crate::export::OutputFolder;
 use crate::model::{Control, Snapshot};
 use crate::outline::{self, OutlineSpec};
@@ -31,11 +32,13 @@ pub struct Plan<'a> {
     /// `None`: live if the source is, else at its own pace.
     pub pace: Option<Pace>,
     pub record: &'a RecordOption,
+    /// What the command's own arguments change of the settings.
+    pub set: &'a dyn Fn(&mut Config),
 }
 
 /// Runs a capture from the first frame to the last line.
 pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
-    let config = common.config().map_err(|e| Ended::BadUsage(e.into()))?;
+    let config = common.config(plan.set).map_err(|e| Ended::BadUsage(e.into()))?;
     let headless = common.headless || common.stream.is_some();
     if !headless && !std::io::stdout().is_terminal() {
         return Err(Ended::BadUsage(tui::TuiError::NoTerminal(None).into()));
@@ -69,7 +72,7 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
         say(&format!("arborcam: warning: without --out nothing is written{but}"));
     }
     init_log(headless);
-    let reload = Reload::new(common, &job.config, hangup).map_err(|e| Ended::Failed(e.into()))?;
+    let reload = Reload::new((common, plan.set), &job.config, hangup).map_err(|e| Ended::Failed(e.into()))?;
     let service = Service::from_env(job.config.camera.timeout_s);
     let running = runtime::start(source, job)?;
     let mut warden = Warden { running: &running, reload, service, end_s: common.for_s.unwrap_or(f64::INFINITY) };
@@ -139,6 +142,9 @@ fn watch(warden: &mut Warden, stop: &AtomicBool) -> Result<(), Ended> {
     while !warden.running.finished() {
         if stop.load(Ordering::SeqCst) {
             warden.running.stop();
+        }
+        for line in warden.running.news() {
+            progress.tell(&format!("arborcam: {line}"));
         }
         if let Some(snapshot) = warden.look() {
             progress.update(&snapshot);

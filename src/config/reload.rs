@@ -23,6 +23,8 @@ const POSES: Effect = NextStart("the poses before and after would not fit togeth
 pub const EFFECTS: &[(&str, Effect)] = &[
     ("camera", CAMERA),
     ("camera.timeout_s", Now),
+    ("camera.retry_delay_s", Now),
+    ("camera.reconnect", Now),
     ("outline", NextStart("the outline is looked for once, at the start")),
     ("detect", POINTS),
     ("track", POINTS),
