@@ -291,10 +291,18 @@ impl Config {
         let shown = path.display().to_string();
         let text =
             std::fs::read_to_string(path).map_err(|source| ConfigError::Unreadable { path: shown.clone(), source })?;
-        let config: Config = toml::from_str(&text).map_err(|e| {
+        Self::parse(&text, &shown)
+    }
+
+    /// Takes the text of a TOML file over the defaults; `name` is for messages.
+    ///
+    /// # Errors
+    /// As for [`Config::load`].
+    pub fn parse(text: &str, name: &str) -> Result<Self, ConfigError> {
+        let config: Config = toml::from_str(text).map_err(|e| {
             let at = e.span().map_or(0, |s| s.start);
             let line = text[..at.min(text.len())].matches('\n').count() + 1;
-            ConfigError::BadEntry { path: shown, line, what: e.message().replace('\n', " ") }
+            ConfigError::BadEntry { path: name.into(), line, what: e.message().replace('\n', " ") }
         })?;
         config.check()?;
         Ok(config)
