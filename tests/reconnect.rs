@@ -3,9 +3,11 @@
 mod support;
 
 use arborcam::config::Config;
-use arborcam::model::{Control, FormatNote, RawFrame};
+use arborcam::model::{Control, FormatNote, RawFrame, TrackId, TrackSet};
 use arborcam::runtime::{self, Failure, Job, Pace, Running, Summary};
-use arborcam::source::{Health, Source, SourceError, SourceInfo};
+use arborcam::source::{Decoder, Health, Source, SourceError, SourceInfo};
+use arborcam::track::Tracker;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -290,4 +292,59 @@ fn a_camera_that_never_filmed_is_not_waited_for() {
     assert!(matches!(failure, Some(Failure::Source(SourceError::Timeout { .. }))), "{failure:?}");
     assert_eq!(summary.frames, 0);
     assert!(log.lock().expect("log").reopened.is_empty());
+}
+
+/// Follows the frames, `skipped` left out, and gives the places of the points in each of the last 40.
+fn followed(skipped: std::ops::Range<usize>, adjust: &dyn Fn(usize, &mut arborcam::model::Frame)) -> Vec<TrackSet> {
+    let config = Config::default();
+    let mut tracker = Tracker::new(&config.detect, &config.track, &support::outline(), 0);
+    let mut decoder = Decoder::new().expect("decoder");
+    let mut sets = Vec::new();
+    for k in (0..recording().len()).filter(|k| !skipped.contains(k)) {
+        let mut frame = support::decoded(&mut decoder, k);
+        adjust(k, &mut frame);
+        sets.push(tracker.step(&frame));
+    }
+    sets
+}
+
+/// While a camera is away the tree goes on swaying, and a camera that starts takes a moment to find its exposure.
+#[test]
+fn points_are_found_again_after_a_gap_under_their_names_and_in_their_places() {
+    let whole = followed(0..0, &|_, _| {});
+    for (gap, dark) in [(150..153, 0), (150..195, 0), (150..240, 0), (150..240, 10), (150..240, 30)] {
+        let back = gap.end;
+        let with_gap = followed(gap.clone(), &|k, frame| {
+            // The first pictures are too dark by half, less and less so.
+            if k >= back && k < back + dark {
+                let gain = 0.3 + 0.7 * (k - back) as f64 / dark as f64;
+                frame.luma.pixels.iter_mut().for_each(|p| *p = (f64::from(*p) * gain) as u8);
+            }
+        });
+        let before: BTreeSet<TrackId> = with_gap[gap.start - 1].observations.iter().map(|o| o.id).collect();
+        for after in [0, 5, 15, 40, 80] {
+            let k = back + after;
+            let set = &with_gap[k - gap.len()];
+            let truth: BTreeMap<TrackId, [f32; 2]> =
+                whole[k].observations.iter().map(|o| (o.id, [o.u_px, o.v_px])).collect();
+            let mut off: Vec<f32> = Vec::new();
+            let mut kept = 0;
+            for o in set.observations.iter().filter(|o| before.contains(&o.id)) {
+                kept += 1;
+                if let Some(t) = truth.get(&o.id) {
+                    off.push((o.u_px - t[0]).hypot(o.v_px - t[1]));
+                }
+            }
+            off.sort_by(f32::total_cmp);
+            let could = before.iter().filter(|id| truth.contains_key(id)).count();
+            eprintln!(
+                "gap {gap:?} dark {dark} +{after}: {kept} of {} kept ({could} without), right {} median {:?} p90 {:?} new {}",
+                before.len(),
+                off.iter().filter(|d| **d < 2.0).count(),
+                off.get(off.len() / 2),
+                off.get(off.len() * 9 / 10),
+                set.observations.len() - kept
+            );
+        }
+    }
 }
