@@ -2,9 +2,10 @@
 //! kernel sees it as plugged into a port, with vendor, product and serial number; `uvcvideo` makes the /dev/video
 //! device. Ending this process pulls the plug.
 //!
-//!     usb-camera CLIP.mjpg WIDTH HEIGHT FPS SERIAL [PORT]
+//!     usb-camera CLIP.mjpg WIDTH HEIGHT FPS SERIAL PORT GATE
 //!
-//! It delivers the pictures of CLIP over and over, as they are. Stopped by a signal (STOP), it is a camera that hangs.
+//! It delivers the pictures of CLIP over and over, as they are, while the file GATE is there; without it, it is a camera
+//! that answers and films nothing.
 
 mod descriptors;
 mod usbip;
@@ -13,6 +14,7 @@ use std::collections::VecDeque;
 use std::io;
 use std::os::fd::AsRawFd;
 use std::os::unix::net::UnixStream;
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 use usbip::{Request, Submit};
@@ -20,6 +22,8 @@ use usbip::{Request, Submit};
 /// What a transfer of pictures may hold, with its header of two bytes: what `uvcvideo` asks for at once.
 const PAYLOAD: usize = 16 * 1024;
 const HEADER: usize = 2;
+/// Time between two looks while nothing is to be sent.
+const IDLE: Duration = Duration::from_millis(50);
 
 /// What is filmed.
 pub struct Mode {
@@ -52,8 +56,8 @@ pub fn main(args: &[String]) -> ExitCode {
 }
 
 fn plug_in(args: &[String]) -> io::Result<()> {
-    let [clip, width, height, fps, serial, rest @ ..] = args else {
-        return Err(io::Error::other("usb-camera CLIP.mjpg WIDTH HEIGHT FPS SERIAL [PORT]"));
+    let [clip, width, height, fps, serial, port, gate] = args else {
+        return Err(io::Error::other("usb-camera CLIP.mjpg WIDTH HEIGHT FPS SERIAL PORT GATE"));
     };
     let number = |text: &str| text.parse::<u16>().map_err(|_| io::Error::other(format!("{text} is no number")));
     let mode = Mode {
@@ -62,7 +66,7 @@ fn plug_in(args: &[String]) -> io::Result<()> {
         fps: u32::from(number(fps)?).max(1),
         serial: serial.clone(),
     };
-    let port = rest.first().map_or(Ok(0), |p| number(p))?;
+    let port = number(port)?;
     let pictures = pictures(&std::fs::read(clip)?);
     if pictures.is_empty() {
         return Err(io::Error::other("no picture in the clip"));
@@ -70,9 +74,17 @@ fn plug_in(args: &[String]) -> io::Result<()> {
     let (ours, kernels) = UnixStream::pair()?;
     // Port, socket, bus and device number of the other side, speed (3: high).
     let attach = format!("{port} {} {} 3", kernels.as_raw_fd(), 0x0001_0002);
-    std::fs::write("/sys/devices/platform/vhci_hcd.0/attach", attach)?;
+    // Just after another one was pulled out, the port is not free yet.
+    let until = Instant::now() + Duration::from_secs(2);
+    while let Err(e) = std::fs::write("/sys/devices/platform/vhci_hcd.0/attach", &attach) {
+        if Instant::now() > until {
+            return Err(io::Error::other(format!("port {port}: {e}")));
+        }
+        std::thread::sleep(IDLE);
+    }
     drop(kernels);
-    Camera { socket: ours, mode, pictures, waiting: VecDeque::new(), probe: [0; 26], filming: None }.run()
+    let gate = PathBuf::from(gate);
+    Camera { socket: ours, mode, pictures, gate, waiting: VecDeque::new(), probe: [0; 26], filming: None }.run()
 }
 
 /// The JPEG pictures of a file that holds nothing else, one after the other.
@@ -98,6 +110,7 @@ struct Camera {
     socket: UnixStream,
     mode: Mode,
     pictures: Vec<Vec<u8>>,
+    gate: PathBuf,
     /// Transfers of pictures that the kernel waits for.
     waiting: VecDeque<Submit>,
     /// The format as it was last negotiated.
@@ -110,7 +123,7 @@ impl Camera {
         self.probe = descriptors::probe(&self.mode);
         loop {
             self.deliver()?;
-            let nap = self.filming.as_ref().map_or(Duration::from_millis(200), |f| self.due(f));
+            let nap = self.filming.as_ref().map_or(IDLE, |f| self.due(f));
             self.socket.set_read_timeout(Some(nap.max(Duration::from_millis(1))))?;
             let request = match usbip::read(&mut self.socket) {
                 Ok(request) => request,
@@ -131,7 +144,7 @@ impl Camera {
     fn due(&self, filming: &Filming) -> Duration {
         let at = Duration::from_secs(filming.picture) / self.mode.fps;
         if self.waiting.is_empty() {
-            return Duration::from_millis(200);
+            return IDLE;
         }
         (filming.started + at).saturating_duration_since(Instant::now())
     }
@@ -139,6 +152,10 @@ impl Camera {
     /// Sends what is due into the transfers that wait. A camera whose host is late leaves pictures out.
     fn deliver(&mut self) -> io::Result<()> {
         if self.waiting.is_empty() {
+            return Ok(());
+        }
+        if !self.gate.exists() {
+            self.filming = None;
             return Ok(());
         }
         let filming = self.filming.get_or_insert_with(|| Filming { started: Instant::now(), picture: 0, sent: 0 });

@@ -1,5 +1,8 @@
 //! The virtual machine: made once, booted once a group, its results read from a folder.
 
+use arborcam::config::Camera;
+use arborcam::model::RawFrame;
+use arborcam::source;
 use serde_json::Value;
 use std::fs;
 use std::io::Write;
@@ -77,10 +80,12 @@ impl Guest {
         fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
         (group.provide)(&folder)?;
         let script = fs::canonicalize(Path::new("tests/vm/guest").join(group.script)).map_err(|e| e.to_string())?;
+        // Another build may be put to the test, to find out which one brought a fault.
+        let program = std::env::var_os("ARBORCAM_VM_PROGRAM").unwrap_or_else(|| env!("CARGO_BIN_EXE_arborcam").into());
         let own = std::env::current_exe().map_err(|e| e.to_string())?;
         let ran = Command::new(RUN)
             .args(["-i", group.first, "-t", &group.limit_s.to_string()])
-            .args([&folder, &script, &PathBuf::from(env!("CARGO_BIN_EXE_arborcam")), &own])
+            .args([&folder, &script, &PathBuf::from(program), &own])
             .stdin(Stdio::null())
             .output()
             .map_err(|e| format!("{RUN}: {e}"))?;
@@ -139,6 +144,37 @@ impl Results {
         let capture = self.capture(case)?;
         capture["timing"][name].as_u64().ok_or_else(|| format!("{case}: no count {name} in {}", capture["timing"]))
     }
+}
+
+/// The shipped recording, small enough for an emulated processor: `clip.mjpg`, pictures one after the other, and the
+/// same in `clip.mkv`.
+pub fn clip(folder: &Path) -> Result<(), String> {
+    let film = |input: &Path, output: &Path, how: &[&str]| -> Result<(), String> {
+        let run = Command::new("ffmpeg")
+            .args(["-v", "error", "-y", "-i"])
+            .arg(input)
+            .args(how)
+            .arg(output)
+            .stdin(Stdio::null())
+            .output()
+            .map_err(|e| format!("ffmpeg: {e}"))?;
+        claim(run.status.success(), || String::from_utf8_lossy(&run.stderr).into_owned())
+    };
+    let pictures = folder.join("clip.mjpg");
+    // Tables as every camera sends them.
+    let small = ["-vf", "scale=320:180", "-c:v", "mjpeg", "-q:v", "3", "-huffman", "default", "-f", "mjpeg"];
+    film(Path::new("recordings/sparse_winter.mkv"), &pictures, &small)?;
+    film(&pictures, &folder.join("clip.mkv"), &["-c", "copy"])
+}
+
+/// The frames of a recording or a video file.
+pub fn frames_of(path: &Path) -> Result<Vec<RawFrame>, String> {
+    let mut source = source::open(path, &Camera::default(), None).map_err(|e| e.to_string())?;
+    let mut frames = Vec::new();
+    while let Some(frame) = source.next_frame().map_err(|e| e.to_string())? {
+        frames.push(frame);
+    }
+    Ok(frames)
 }
 
 /// Fails with what was found, unless `holds`.

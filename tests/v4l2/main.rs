@@ -7,6 +7,10 @@
 mod camera;
 mod faults;
 mod guest;
+mod live;
+mod parity;
+mod replug;
+mod service;
 
 use guest::{Group, Guest};
 use libtest_mimic::{Arguments, Trial};
@@ -16,7 +20,7 @@ use std::sync::Arc;
 /// A named judgement on what a group left behind.
 pub type Case = (&'static str, fn(&guest::Results) -> Result<(), String>);
 
-const GROUPS: &[Group] = &[faults::GROUP];
+const GROUPS: &[Group] = &[parity::GROUP, live::GROUP, faults::GROUP, replug::GROUP, service::GROUP];
 
 fn main() -> ExitCode {
     // The same binary plays the USB camera in the guest.

@@ -18,10 +18,8 @@ printf '{"frame":0,"width":320,"height":180,"polygon_px":[[8,8],[311,8],[311,171
 
 # Begins a capture NAME with the settings FILE and further arguments, and waits until it films.
 film() {
-    local name=$1 file=$2
-    shift 2
-    begin "$name" capture $device --headless --config "$work/$file.toml" --outline "$work/outline.json" \
-        --out "$work/$name" "$@"
+    begin "$1" capture $device --headless --config "$work/$2.toml" --outline "$work/outline.json" --out "$work/$1" \
+        "${@:3}"
     until_ok 5 filming "$pid"
 }
 

@@ -44,7 +44,7 @@ end() {
     now >"/vm/$name/ended"
     echo "$status" >"/vm/$name/status"
     [[ ! -d $work/$name ]] || cp -r "$work/$name" "/vm/$name/capture"
-    rm -rf "${work:?}/$name"
+    rm -rf "${work:?}/${name:?}"
 }
 
 # Asks the case begun last to stop, as from the keyboard, and waits for its end.
@@ -55,6 +55,28 @@ stop() {
 }
 
 running() { kill -0 "$pid" 2>/dev/null; }
+
+# A USB camera with the serial number $1, in port $2 (0), that delivers the clip at 15 Hz while $gate is there.
+gate=$work/gate
+plug_in() {
+    "$helper" usb-camera "$work/clip.mjpg" 320 180 15 "$1" "${2:-0}" "$gate" &
+    camera=$!
+}
+pull_out() {
+    kill "$camera"
+    wait "$camera" 2>/dev/null
+}
+
+# What the captures of that camera are asked for with.
+usb_camera_settings() {
+    modprobe vhci-hcd
+    modprobe uvcvideo
+    cp $clip "$work/clip.mjpg"
+    touch "$gate"
+    printf '[camera]\nformat = "mjpeg"\nwidth = 320\nheight = 180\nrate_hz = 15\n' >"$work/camera.toml"
+    printf '{"frame":0,"width":320,"height":180,"polygon_px":[[8,8],[311,8],[311,171],[8,171]]}' >"$work/outline.json"
+    usb_settings=(--config "$work/camera.toml" --outline "$work/outline.json")
+}
 
 # Until the program has mapped its buffers, which is when it starts to film.
 filming() { grep -q '/dev/video' "/proc/$1/maps"; }
