@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 const MAY_USE: &[(&str, &[&str])] = &[
     ("model", &[]),
     ("config", &[]),
-    ("source", &["model", "config"]),
+    // A recording is a source.
+    ("source", &["model", "config", "recording"]),
     ("outline", &["model", "config"]),
     ("track", &["model", "config"]),
     // The table of positions that the hierarchy is cut from is the tracker's.
@@ -26,7 +27,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     // The screen draws outlines, and refuses the crossing ones as a file would be.
     ("tui", &["model", "outline::crossing"]),
     ("runtime", &["model", "config", "source", "outline", "shape", "dynamics", "pipeline", "recording", "export"]),
-    ("cli", &["model", "config", "source", "outline", "pipeline", "runtime", "export", "tui"]),
+    ("cli", &["model", "config", "source", "outline", "pipeline", "recording", "runtime", "export", "tui"]),
     ("main.rs", &["cli"]),
 ];
 
@@ -39,6 +40,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("gltf_json::", &["export"]),
     ("opencv::", &["track", "outline"]),
     ("turbojpeg::", &["source"]),
+    ("mcap::", &["recording"]),
     ("clap::", &["cli"]),
     ("anyhow::", &["cli"]),
     ("crossbeam_channel::", &["runtime"]),
@@ -51,7 +53,8 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("File::create", &["export"]),
     // Stages know no clock; the pipeline passes one on that it does not look at.
     ("Instant::now", &["runtime", "tui", "source"]),
-    ("SystemTime", &[]),
+    // When a recording began, for those who look for it in a calendar.
+    ("SystemTime", &["runtime"]),
 ];
 
 /// A source file without its tests and its comments.

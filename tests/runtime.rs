@@ -98,6 +98,7 @@ fn job(outline: Option<Outline>, out: Option<&Path>) -> Job {
         pace: Pace::Fast,
         stream: None,
         out: out.map(Path::to_path_buf),
+        record: None,
         preview_every: Duration::from_secs(2),
     }
 }

@@ -1,5 +1,6 @@
 //! `arborcam capture DEVICE`: the whole way, live.
 
+use super::recording::RecordOption;
 use super::session::{self, Plan};
 use super::{Common, Ended};
 use clap::Args;
@@ -11,8 +12,10 @@ pub struct CaptureArgs {
     device: PathBuf,
     #[command(flatten)]
     common: Common,
+    #[command(flatten)]
+    record: RecordOption,
 }
 
 pub fn run(args: &CaptureArgs) -> Result<(), Ended> {
-    session::run(&args.common, Plan { input: &args.device, fps: None, pace: None })
+    session::run(&args.common, Plan { input: &args.device, fps: None, pace: None, record: &args.record })
 }

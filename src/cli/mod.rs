@@ -2,6 +2,9 @@
 
 mod capture;
 mod devices;
+mod play;
+mod record;
+mod recording;
 mod replay;
 mod session;
 
@@ -31,8 +34,12 @@ struct Cli {
 enum Command {
     /// Film with a camera, live.
     Capture(capture::CaptureArgs),
-    /// The same from a video file or a folder of pictures.
+    /// The same from a recording, a video file or a folder of pictures.
     Replay(replay::ReplayArgs),
+    /// Film into a recording (.mcap), frames only.
+    Record(record::RecordArgs),
+    /// Feed a v4l2loopback device from a recording or a video file; other programs see it as a camera.
+    Play(play::PlayArgs),
     /// List the cameras that are plugged in.
     Devices(devices::DevicesArgs),
 }
@@ -91,6 +98,7 @@ impl From<Failure> for Ended {
     fn from(failure: Failure) -> Self {
         match failure {
             Failure::NothingDecoded(_) => Ended::NoInput(failure.into()),
+            Failure::Recording(e) => recording::refused(e),
             other => Ended::Failed(other.into()),
         }
     }
@@ -105,6 +113,8 @@ pub fn main() -> ExitCode {
     let result = match &cli.command {
         Command::Capture(args) => capture::run(args),
         Command::Replay(args) => replay::run(args),
+        Command::Record(args) => record::run(args),
+        Command::Play(args) => play::run(args),
         Command::Devices(args) => devices::run(args),
     };
     let (status, error) = match result {

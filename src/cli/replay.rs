@@ -1,5 +1,6 @@
 //! `arborcam replay INPUT`: the whole way from a recording.
 
+use super::recording::RecordOption;
 use super::session::{self, Plan};
 use super::{Common, Ended};
 use crate::runtime::Pace;
@@ -8,7 +9,7 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub struct ReplayArgs {
-    /// A video file (.mkv .avi .mp4) or a folder of pictures (.png .jpg .bmp, in name order).
+    /// A recording (.mcap), a video file (.mkv .avi .mp4) or a folder of pictures (.png .jpg .bmp, in name order).
     input: PathBuf,
     /// As fast as the machine allows; nothing is dropped. Without it the recording's own pace is kept.
     #[arg(long)]
@@ -18,6 +19,8 @@ pub struct ReplayArgs {
     fps: f64,
     #[command(flatten)]
     common: Common,
+    #[command(flatten)]
+    record: RecordOption,
 }
 
 pub fn run(args: &ReplayArgs) -> Result<(), Ended> {
@@ -25,5 +28,5 @@ pub fn run(args: &ReplayArgs) -> Result<(), Ended> {
         return Err(Ended::BadUsage(anyhow::anyhow!("--fps {} is no rate; give a number above 0", args.fps)));
     }
     let pace = if args.fast { Pace::Fast } else { Pace::Recorded };
-    session::run(&args.common, Plan { input: &args.input, fps: Some(args.fps), pace: Some(pace) })
+    session::run(&args.common, Plan { input: &args.input, fps: Some(args.fps), pace: Some(pace), record: &args.record })
 }

@@ -1,5 +1,6 @@
 //! One capture or replay from the command line: open, run, show, report.
 
+use super::recording::{self, RecordOption};
 use super::{Common, Ended, say};
 use crate::export::OutputFolder;
 use crate::model::{Control, Snapshot};
@@ -27,6 +28,7 @@ pub struct Plan<'a> {
     pub fps: Option<f64>,
     /// `None`: live if the source is, else at its own pace.
     pub pace: Option<Pace>,
+    pub record: &'a RecordOption,
 }
 
 /// Runs a capture from the first frame to the last line.
@@ -37,6 +39,7 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
         return Err(Ended::BadUsage(tui::TuiError::NoTerminal(None).into()));
     }
     refuse_unfit_out(common.out.as_deref())?;
+    plan.record.refuse_unfit()?;
     let source = source::open(plan.input, &config.camera, plan.fps).map_err(no_input)?;
     let info = source.describe();
     let outline = match &common.outline {
@@ -51,16 +54,10 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
         pace: plan.pace.filter(|_| !info.live).unwrap_or(own_pace),
         stream: common.stream.map(|_| Box::new(std::io::stdout()) as _),
         out: common.out.clone(),
+        record: plan.record.target(&info),
         preview_every: if headless { PREVIEW_HEADLESS } else { PREVIEW_SCREEN },
     };
-    let stop = Arc::new(AtomicBool::new(false));
-    let signals = [SIGINT, SIGTERM].into_iter().chain((!hangup_ignored()).then_some(SIGHUP));
-    for signal in signals {
-        // Twice the same signal ends at once, without a capture: a disk that hangs must not make the program immortal.
-        signal_hook::flag::register_conditional_shutdown(signal, i32::from(super::FAILED), stop.clone())
-            .and_then(|_| signal_hook::flag::register(signal, stop.clone()))
-            .map_err(|e| Ended::Failed(e.into()))?;
-    }
+    let stop = stop_on_signals()?;
     if headless && info.live && info.format.asked != info.format.given {
         say(&format!("arborcam: asked for {}, the camera gives {}", info.format.asked, info.format.given));
     }
@@ -80,6 +77,18 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
     report(summary.as_ref(), failure, stop.load(Ordering::SeqCst))
 }
 
+/// Set when the user or the system asks us to end.
+pub fn stop_on_signals() -> Result<Arc<AtomicBool>, Ended> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM].into_iter().chain((!hangup_ignored()).then_some(SIGHUP)) {
+        // Twice the same signal ends at once, without a capture: a disk that hangs must not make the program immortal.
+        signal_hook::flag::register_conditional_shutdown(signal, i32::from(super::FAILED), stop.clone())
+            .and_then(|_| signal_hook::flag::register(signal, stop.clone()))
+            .map_err(|e| Ended::Failed(e.into()))?;
+    }
+    Ok(stop)
+}
+
 /// Whether whoever started us, `nohup` for one, wants us to outlive the terminal.
 fn hangup_ignored() -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -88,7 +97,7 @@ fn hangup_ignored() -> bool {
     bits & (1 << (SIGHUP - 1)) != 0
 }
 
-fn no_input(e: SourceError) -> Ended {
+pub fn no_input(e: SourceError) -> Ended {
     Ended::NoInput(e.into())
 }
 
@@ -142,7 +151,7 @@ impl tui::Session for Screen<'_> {
 }
 
 /// Messages to standard error where there is no screen that they would spoil.
-fn init_log(headless: bool) {
+pub fn init_log(headless: bool) {
     if headless || !std::io::stderr().is_terminal() {
         let filter = tracing_subscriber::EnvFilter::try_from_env("ARBORCAM_LOG")
             .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn"));
@@ -161,6 +170,7 @@ fn report(summary: Option<&Summary>, failure: Option<Failure>, stopped: bool) ->
         for line in closing_lines(s) {
             say(&line);
         }
+        s.recorded.iter().for_each(|recorded| say(&recording::closing_line(recorded, s.not_recorded)));
     }
     match failure {
         // Not one frame: there was no usable camera, whatever it said when it was opened.

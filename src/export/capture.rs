@@ -71,6 +71,9 @@ pub struct Timing {
     pub frames_undecodable: u64,
     /// Seen before there was an outline, and not tracked.
     pub frames_before_outline: u64,
+    /// Missing in the recording that was made meanwhile; 0 where none was.
+    #[serde(default)]
+    pub frames_not_recorded: u64,
     /// The first [`MAX_GAPS`] holes in the count of frames.
     pub gaps: Vec<Gap>,
     pub gaps_not_listed: u64,

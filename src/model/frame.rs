@@ -103,11 +103,26 @@ pub struct RawFrame {
     /// The driver's own count with its wraps undone, or the index in the file; a step of more than one is a loss before
     /// us. `None` where the driver does not count.
     pub sequence: Option<u64>,
-    /// The sensor's time in seconds; only differences mean something. Strictly growing within one source.
+    /// The sensor's time in seconds, a whole number of nanoseconds ([`seconds`]); only differences mean something.
+    /// Strictly growing within one source.
     pub sensor_time_s: f64,
     pub size: Size,
     pub format: PixelFormat,
     pub bytes: Vec<u8>,
+}
+
+/// Whole nanoseconds of a time in seconds: what a recording keeps of it. Times beyond 292 years are cut to that.
+pub fn nanoseconds(time_s: f64) -> i64 {
+    let whole = time_s.floor();
+    // The fraction of a double is exact, so nothing is lost by taking it off first.
+    let part = ((time_s - whole) * 1e9).round();
+    (whole as i64).saturating_mul(1_000_000_000).saturating_add(part as i64)
+}
+
+/// The same back again; `seconds(nanoseconds(t))` is `t` for every `t` that came out of here, to the last bit.
+pub fn seconds(time_ns: i64) -> f64 {
+    let (whole, part) = (time_ns.div_euclid(1_000_000_000), time_ns.rem_euclid(1_000_000_000));
+    whole as f64 + part as f64 / 1e9
 }
 
 /// Grey picture, row by row, no padding.
@@ -144,4 +159,24 @@ pub struct Frame {
     pub luma: Luma,
     /// A smaller picture in colour for screen and bark, made for some frames only.
     pub preview: Option<Arc<Rgb>>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A replay must see the times of the run that recorded it, whatever clock they came from: uptime, the epoch, a
+    /// file's ticks, or before zero.
+    #[test]
+    fn a_time_survives_the_way_through_nanoseconds() {
+        for start_s in [0.0, -0.25, 12.345_678, 86_400.0 * 300.0, 1.7e9] {
+            for k in 0..20_000 {
+                let time_s = seconds(nanoseconds(start_s + f64::from(k) / 29.97));
+                assert_eq!(seconds(nanoseconds(time_s)), time_s);
+                assert!((time_s - start_s - f64::from(k) / 29.97).abs() < 3e-7);
+            }
+        }
+        assert_eq!((nanoseconds(-0.25), seconds(-250_000_000)), (-250_000_000, -0.25));
+        assert_eq!(nanoseconds(f64::INFINITY), i64::MAX);
+    }
 }

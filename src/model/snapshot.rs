@@ -74,6 +74,8 @@ pub struct Snapshot {
     pub dropped_before_tracker: u64,
     pub undecodable: u64,
     pub not_shown: u64,
+    /// Frames in the recording and frames missing in it; `None` where none is made.
+    pub recorded: Option<(u64, u64)>,
     /// Time from reception of a frame to its pose, ms.
     pub latency_p50_ms: f64,
     pub latency_p99_ms: f64,

@@ -1,5 +1,23 @@
-//! What is kept while a capture runs.
+//! What is kept: the tracks of a running capture ([`Spool`]), and recordings of what the camera delivered (MCAP).
+//!
+//! A recording is written by [`Series`], which makes one file after another where a limit is set, and read by
+//! [`Reader`]. `docs/recordings.md` says what is in the files.
 
+mod cursor;
+mod disk;
+mod error;
+mod image;
+mod reader;
+mod scene;
+mod schema;
+mod series;
 mod spool;
+mod walk;
+mod wire;
+mod writer;
 
+pub use error::RecordingError;
+pub use image::{Encoding, Picture};
+pub use reader::{About, Reader};
+pub use series::{Head, Limits, Series};
 pub use spool::{Spool, SpoolReader};

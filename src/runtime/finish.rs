@@ -208,6 +208,7 @@ fn describe(
         frames_dropped_tracker: count(&counts.dropped_before_tracker),
         frames_undecodable: count(&counts.undecodable),
         frames_before_outline: count(&counts.before_outline),
+        frames_not_recorded: count(&counts.not_recorded),
         duration_s,
         ..job.shared.gaps()
     };

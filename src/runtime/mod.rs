@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! source --(4 frames; live: newest kept)--> track --(64 track sets)--> model --(newest state only)--> screen
+//!        \--(512 entries, 96 MB; live: what does not fit is counted)--> record <--/
 //! ```
 //!
 //! A dropped sender ends the stream: when the source is done, the tracker works off its queue and ends, then the model
@@ -11,12 +12,18 @@ mod finish;
 mod latest;
 mod meter;
 mod model_thread;
+mod play;
+mod record;
+mod recorder_thread;
 mod shared;
 mod source_thread;
 mod status;
 mod track_thread;
 
 pub use finish::Written;
+pub use play::{Played, play};
+pub use record::{RecordJob, RunningRecord, record};
+pub use recorder_thread::{RecordTo, Recorded};
 pub use shared::Failure;
 pub use source_thread::Pace;
 
@@ -50,6 +57,8 @@ pub struct Job {
     pub stream: Option<Box<dyn Write + Send>>,
     /// Folder of the capture; must not exist.
     pub out: Option<PathBuf>,
+    /// Recording of the frames and of what is found in them.
+    pub record: Option<RecordTo>,
     /// Time between two pictures for the screen.
     pub preview_every: Duration,
 }
@@ -64,6 +73,9 @@ pub struct Summary {
     pub accumulation: f64,
     pub tree: Option<Arc<Tree>>,
     pub written: Option<Written>,
+    pub recorded: Option<Recorded>,
+    /// Frames that should have been recorded and were not.
+    pub not_recorded: u64,
 }
 
 /// A capture under way.
@@ -88,7 +100,7 @@ impl Drop for StopAll<'_> {
 /// Starts the threads.
 ///
 /// # Errors
-/// A thread cannot be started, or there is no decoder.
+/// A thread cannot be started, there is no decoder, or the recording cannot be made.
 pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> {
     let shared = Arc::new(Shared::default());
     let info = source.describe();
@@ -99,10 +111,18 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
     let front = FrontEnd::new(&job.config, job.outline.take());
     let (pace, preview_every) = (job.pace, job.preview_every);
 
+    let (recorder, recording) = match job.record.take() {
+        Some(to) => {
+            let (recorder, handle) = recorder_thread::start(to, info.live, &shared)?;
+            (Some(recorder), Some(handle))
+        }
+        None => (None, None),
+    };
+
     let thread = |name: &str| std::thread::Builder::new().name(name.into());
     let failed = |e: std::io::Error| Failure::Spool(e);
     let model = {
-        let model = ModelThread::new(job, info, shared.clone());
+        let model = ModelThread::new(job, info, shared.clone(), recorder.clone().zip(recording));
         let on_end = shared.clone();
         let run = move || {
             let _ends_all = StopAll(&on_end);
@@ -123,7 +143,7 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
     };
     let source = {
         let shared = shared.clone();
-        let run = move || source_thread::run(source, pace, frames_in, frames_out, &shared);
+        let run = move || source_thread::run(source, pace, (frames_in, frames_out), recorder, &shared);
         thread("source").spawn(run).map_err(failed)?
     };
     Ok(Running { shared, controls, source: Some(source), track: Some(track), model: Some(model) })

@@ -2,6 +2,7 @@
 //! at the end.
 
 use super::finish::{self, CaptureJob, Quality};
+use super::recorder_thread::{Found, Recorded, Recorder};
 use super::shared::{Failure, Shared};
 use super::status::{Status, median_fb_error_px};
 use super::track_thread::ToModel;
@@ -15,6 +16,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// Time between two states for the screen.
@@ -31,14 +33,20 @@ pub struct ModelThread {
     bark: Option<Arc<Rgb>>,
     quality: Quality,
     last_screen: Option<Instant>,
-    exports: Vec<std::thread::JoinHandle<()>>,
+    exports: Vec<JoinHandle<()>>,
     /// Number of the last export; its folder may not be there yet.
     exported: u32,
     announced: bool,
+    recorder: Option<(Recorder, JoinHandle<Recorded>)>,
 }
 
 impl ModelThread {
-    pub fn new(job: Job, info: SourceInfo, shared: Arc<Shared>) -> Self {
+    pub fn new(
+        job: Job,
+        info: SourceInfo,
+        shared: Arc<Shared>,
+        recorder: Option<(Recorder, JoinHandle<Recorded>)>,
+    ) -> Self {
         let status = Status::new(info.name.clone(), info.format.clone(), info.frames_total);
         let back = BackEnd::new(&job.config);
         let mut thread = Self {
@@ -54,6 +62,7 @@ impl ModelThread {
             exports: Vec::new(),
             exported: 0,
             announced: false,
+            recorder,
         };
         thread.new_spool();
         if thread.job.out.is_none() {
@@ -107,6 +116,13 @@ impl ModelThread {
         self.quality.note(&moved.tracks, median_fb_error_px(&moved.tracks));
         if self.bark.is_none() || self.back.tree().is_none() {
             self.bark = moved.preview.clone().or(self.bark.take());
+        }
+        if let Some((recorder, _)) = &self.recorder {
+            recorder.found(|| Found {
+                tracks: moved.tracks.clone(),
+                outline: moved.outline.clone(),
+                pose: moved.pose.clone().zip(self.back.tree().map(|tree| tree.skeleton.clone())),
+            });
         }
         if let Some(pose) = &moved.pose {
             self.stream(pose);
@@ -221,6 +237,12 @@ impl ModelThread {
     }
 
     fn finish(&mut self) -> Summary {
+        // The source has gone; with this end of the queue the recorder works off what is left and ends its file. Only
+        // then it is known what is missing in it.
+        let recorded = self.recorder.take().and_then(|(recorder, thread)| {
+            drop(recorder);
+            thread.join().ok()
+        });
         for export in self.exports.drain(..) {
             let _ = export.join();
         }
@@ -247,6 +269,8 @@ impl ModelThread {
             accumulation: self.back.evidence().measure,
             tree: self.back.tree().cloned(),
             written,
+            recorded,
+            not_recorded: self.shared.counts.not_recorded.load(Ordering::Relaxed),
         }
     }
 }

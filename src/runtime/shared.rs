@@ -4,6 +4,7 @@ use super::latest::Latest;
 use crate::export::ExportError;
 use crate::export::capture::{Gap, Timing};
 use crate::model::Snapshot;
+use crate::recording::RecordingError;
 use crate::source::{DecodeError, SourceError};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -21,6 +22,9 @@ pub enum Failure {
     Export(#[from] ExportError),
     #[error("cannot keep the tracks: {0}; free some space, or choose another disk with --out")]
     Spool(std::io::Error),
+    /// The recording could not be begun; one that breaks off later is a warning.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
     #[error("{0}")]
     NoDecoder(DecodeError),
     /// The pictures changed their size.
@@ -40,6 +44,10 @@ pub struct Counts {
     pub dropped_before_tracker: AtomicU64,
     pub undecodable: AtomicU64,
     pub before_outline: AtomicU64,
+    /// Frames in the recording, frames that should be in it and are not, and results of frames that are not.
+    pub recorded: AtomicU64,
+    pub not_recorded: AtomicU64,
+    pub results_not_recorded: AtomicU64,
 }
 
 /// Shared by all threads of one capture.
@@ -49,6 +57,10 @@ pub struct Shared {
     pub stop: Arc<AtomicBool>,
     pub paused: AtomicBool,
     pub ended: AtomicBool,
+    /// There is a recorder.
+    pub recording: AtomicBool,
+    /// It can write no more; frames are counted as missing from here on.
+    pub recording_ended: AtomicBool,
     pub counts: Counts,
     pub screen: Latest<Arc<Snapshot>>,
     /// Only the gaps in it are kept up to date; the rest is filled in when the capture is written.

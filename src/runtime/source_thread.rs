@@ -1,8 +1,9 @@
 //! The source's own thread: takes frames, paces a replay, and hands them on. A camera is never made to wait: where the
 //! tracker is late, the oldest waiting frame is dropped and counted.
 
+use super::recorder_thread::Recorder;
 use super::shared::{Failure, Shared};
-use crate::model::RawFrame;
+use crate::model::{RawFrame, nanoseconds, seconds};
 use crate::source::Source;
 use crossbeam_channel::{Receiver, Sender, TrySendError};
 use std::sync::Arc;
@@ -34,7 +35,13 @@ const NAP: Duration = Duration::from_millis(20);
 
 /// Runs until the source ends or fails, or `shared.stop` is set. `queue_end` is the other end of `queue`, from which the
 /// oldest frame is taken when a live source finds it full.
-pub fn run(mut source: Box<dyn Source>, pace: Pace, queue: Sender<Timed>, queue_end: Receiver<Timed>, shared: &Shared) {
+pub fn run(
+    mut source: Box<dyn Source>,
+    pace: Pace,
+    (queue, queue_end): (Sender<Timed>, Receiver<Timed>),
+    recorder: Option<Recorder>,
+    shared: &Shared,
+) {
     let mut clock = Clock::default();
     source.stop_when(shared.stop.clone());
     while !shared.stop.load(Ordering::Relaxed) {
@@ -55,6 +62,7 @@ pub fn run(mut source: Box<dyn Source>, pace: Pace, queue: Sender<Timed>, queue_
             }
         };
         let mut timed = clock.stamp(raw, shared);
+        recorder.iter().for_each(|recorder| recorder.offer(&timed.raw, timed.index));
         if pace == Pace::Recorded {
             clock.wait_for(&timed, shared);
             timed.received = Instant::now();
@@ -101,7 +109,9 @@ struct Clock {
 }
 
 impl Clock {
-    fn stamp(&mut self, raw: RawFrame, shared: &Shared) -> Timed {
+    fn stamp(&mut self, mut raw: RawFrame, shared: &Shared) -> Timed {
+        // A recording keeps whole nanoseconds; what is worked with must be what is kept, whatever the source gave.
+        raw.sensor_time_s = seconds(nanoseconds(raw.sensor_time_s));
         let time_s = raw.sensor_time_s - *self.first_time_s.get_or_insert(raw.sensor_time_s);
         let index = match self.last {
             None => 0,

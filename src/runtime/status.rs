@@ -137,6 +137,9 @@ impl Status {
         s.dropped_before_tracker = shared.counts.dropped_before_tracker.load(Ordering::Relaxed);
         s.undecodable = shared.counts.undecodable.load(Ordering::Relaxed);
         s.not_shown = shared.screen.replaced();
+        let (recorded, missing) = (&shared.counts.recorded, &shared.counts.not_recorded);
+        let recording = shared.recording.load(Ordering::Relaxed);
+        s.recorded = recording.then(|| (recorded.load(Ordering::Relaxed), missing.load(Ordering::Relaxed)));
         s.paused = shared.paused.load(Ordering::Relaxed);
         s.ended = shared.ended.load(Ordering::Relaxed);
         s.messages = shared.messages();

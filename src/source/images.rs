@@ -1,7 +1,7 @@
 //! A folder of consecutive pictures, in the order of their names.
 
 use super::{Source, SourceError, SourceInfo};
-use crate::model::{FormatNote, PixelFormat, RawFrame, Size};
+use crate::model::{FormatNote, PixelFormat, RawFrame, Size, nanoseconds, seconds};
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
@@ -47,7 +47,7 @@ impl Images {
 impl Source for Images {
     fn next_frame(&mut self) -> Result<Option<RawFrame>, SourceError> {
         let Some(path) = self.files.get(self.next) else { return Ok(None) };
-        let frame = read(path, self.next as u64, self.next as f64 / self.rate_hz)?;
+        let frame = read(path, self.next as u64, seconds(nanoseconds(self.next as f64 / self.rate_hz)))?;
         if frame.size != self.size {
             let (is, was) = (frame.size, self.size);
             let what = format!("the picture is {is}, those before it are {was}; make all of one size");
@@ -82,25 +82,30 @@ fn is_picture(path: &Path) -> bool {
 /// Reads one picture; a JPEG stays one and is decoded where those of a camera are.
 fn read(path: &Path, sequence: u64, sensor_time_s: f64) -> Result<RawFrame, SourceError> {
     let bytes = std::fs::read(path).map_err(|e| SourceError::of_file(path, &e))?;
-    let bad = |e: &dyn std::fmt::Display| SourceError::BadFormat {
+    let (size, format, bytes) = picture(bytes).map_err(|e| SourceError::BadFormat {
         input: path.display().to_string(),
         what: format!("it is no readable picture ({e}); replace it, or take it out of the folder"),
-    };
+    })?;
+    Ok(RawFrame { sequence: Some(sequence), sensor_time_s, size, format, bytes })
+}
+
+/// The picture in the bytes of a picture file, or why it is none.
+pub(super) fn picture(bytes: Vec<u8>) -> Result<(Size, PixelFormat, Vec<u8>), String> {
     // By its content: the ending is only a promise.
-    let kind = image::guess_format(&bytes).map_err(|e| bad(&e))?;
+    let kind = image::guess_format(&bytes).map_err(|e| e.to_string())?;
     if kind == image::ImageFormat::Jpeg {
-        let header = turbojpeg::read_header(&bytes).map_err(|e| bad(&e))?;
+        let header = turbojpeg::read_header(&bytes).map_err(|e| e.to_string())?;
         let size = Size::new(header.width as u32, header.height as u32);
-        return Ok(RawFrame { sequence: Some(sequence), sensor_time_s, size, format: PixelFormat::Mjpeg, bytes });
+        return Ok((size, PixelFormat::Mjpeg, bytes));
     }
-    let picture = image::load_from_memory_with_format(&bytes, kind).map_err(|e| bad(&e))?;
+    let picture = image::load_from_memory_with_format(&bytes, kind).map_err(|e| e.to_string())?;
     let size = Size::new(picture.width(), picture.height());
     let (format, bytes) = if picture.color().has_color() {
         (PixelFormat::Rgb24, picture.into_rgb8().into_raw())
     } else {
         (PixelFormat::Grey, picture.into_luma8().into_raw())
     };
-    Ok(RawFrame { sequence: Some(sequence), sensor_time_s, size, format, bytes })
+    Ok((size, format, bytes))
 }
 
 /// Order of names in which `frame9` stands before `frame10`.

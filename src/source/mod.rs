@@ -1,4 +1,4 @@
-//! Where frames come from: a camera, a video file or a folder of pictures, all behind one trait.
+//! Where frames come from: a camera, a recording, a video file or a folder of pictures, all behind one trait.
 //!
 //! A source hands frames out as they left the camera or the file, with their own number and time; [`Decoder`] turns
 //! them into the pictures that the tracker and the screen want.
@@ -8,13 +8,16 @@ mod decode;
 mod devices;
 mod error;
 mod images;
+mod loopback;
 mod probe;
+mod recording;
 mod v4l2;
 mod video;
 
 pub use decode::{DecodeError, Decoder};
 pub use devices::{Device, list};
 pub use error::SourceError;
+pub use loopback::Loopback;
 
 use crate::config;
 use crate::model::{FormatNote, RawFrame, Size};
@@ -71,8 +74,7 @@ pub fn open(input: &Path, config: &config::Camera, fps: Option<f64>) -> Result<B
         let what = "it is neither a camera, nor a video file, nor a folder of pictures".to_owned();
         Err(SourceError::BadFormat { input: name, what })
     } else if input.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
-        let what = "recordings (.mcap) come in a later version; give a video file or a folder of pictures".to_owned();
-        Err(SourceError::BadFormat { input: name, what })
+        Ok(Box::new(recording::Recording::open(input)?))
     } else {
         Ok(Box::new(video::Video::open(input)?))
     }

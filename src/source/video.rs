@@ -8,7 +8,7 @@
 
 use super::probe::{Probe, file_url, probe, ratio, spawn_error};
 use super::{Source, SourceError, SourceInfo};
-use crate::model::{FormatNote, PixelFormat, RawFrame, Size};
+use crate::model::{FormatNote, PixelFormat, RawFrame, Size, nanoseconds, seconds};
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, PipeReader, Read, Seek};
 use std::os::unix::process::CommandExt;
@@ -118,7 +118,7 @@ impl Video {
             }
             let sequence = self.frames;
             self.frames += 1;
-            let sensor_time_s = ticks as f64 * self.tick_s;
+            let sensor_time_s = seconds(nanoseconds(ticks as f64 * self.tick_s));
             if sensor_time_s <= self.last_time_s {
                 self.out_of_order += 1;
                 continue;

@@ -20,7 +20,13 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         Some(total) => format!("frame {} of {}", format::count(s.frame), format::count(total)),
         None => format!("frame {}", format::count(s.frame)),
     };
-    let mut right = vec![Span::raw(format!(" {count}  {} ", format::clock(s.time_s)))];
+    let recorded = match s.recorded {
+        Some((_, 0)) => Some(Span::styled(" REC ", theme.here())),
+        Some((_, missing)) => Some(Span::styled(format!(" REC, {} missing ", format::count(missing)), theme.warning())),
+        None => None,
+    };
+    let mut right: Vec<Span> = recorded.into_iter().collect();
+    right.push(Span::raw(format!(" {count}  {} ", format::clock(s.time_s))));
     right.extend(word.map(|w| Span::styled(w, theme.here())));
     let right = Line::from(right);
 

@@ -1,0 +1,279 @@
+//! Reads the frames of a recording, its own or another program's, in their order.
+
+use super::cursor::Cursor;
+use super::error::RecordingError;
+use super::image::{Picture, decode};
+use super::schema::{ABOUT, COMPRESSED_IMAGE, COUNTED, FIRST_SEQUENCE, RAW_IMAGE, SEQUENCE, SHIFT_NS};
+use super::walk::{Walk, read_up_to};
+use mcap::records::op;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+/// Bytes of the footer with its head and the mark behind it.
+const FOOTER: u64 = 9 + 20 + 8;
+/// A summary beyond this is not read; the file can be without.
+const MAX_SUMMARY: u64 = 1 << 28;
+
+/// What a recording says of itself, by the keys of `docs/recordings.md`; empty for another program's.
+pub type About = BTreeMap<String, String>;
+
+struct Channel {
+    topic: String,
+    schema: String,
+    /// It is one of ours, and whether its numbers are the driver's.
+    counted: Option<bool>,
+}
+
+/// A recording that is being read.
+pub struct Reader<R = File> {
+    path: PathBuf,
+    walk: Walk<R>,
+    schemas: BTreeMap<u16, String>,
+    channels: BTreeMap<u16, Channel>,
+    about: About,
+    /// The topic of another program's file whose pictures are taken.
+    chosen: Option<String>,
+    others: BTreeSet<String>,
+    counts: BTreeMap<u16, u64>,
+    sequence: Option<u64>,
+    unreadable: u64,
+    broken: Option<String>,
+}
+
+impl Reader {
+    /// Opens a file.
+    ///
+    /// # Errors
+    /// It cannot be read, is no recording, or holds several series of pictures.
+    pub fn open(path: &Path) -> Result<Self, RecordingError> {
+        let file = File::open(path).map_err(|source| RecordingError::Unreadable { path: path.to_owned(), source })?;
+        Self::new(path, file)
+    }
+}
+
+impl<R: Read + Seek> Reader<R> {
+    /// Reads what begins in `file`; `path` is for messages.
+    ///
+    /// # Errors
+    /// As for [`Reader::open`].
+    pub fn new(path: &Path, mut file: R) -> Result<Self, RecordingError> {
+        let unreadable = |source| RecordingError::Unreadable { path: path.to_owned(), source };
+        let unusable = |what: String| RecordingError::Unusable { path: path.to_owned(), what };
+        // What is told at the end is a help, not a condition.
+        let summary = summary(&mut file).map_err(unreadable)?.unwrap_or_default();
+        let Some(walk) = Walk::new(file).map_err(unreadable)? else {
+            return Err(unusable(
+                "it does not begin as a recording (MCAP) does; give a file that `record` made".into(),
+            ));
+        };
+        let mut reader = Self {
+            path: path.to_owned(),
+            walk,
+            schemas: BTreeMap::new(),
+            channels: BTreeMap::new(),
+            about: About::new(),
+            chosen: None,
+            others: BTreeSet::new(),
+            counts: BTreeMap::new(),
+            sequence: None,
+            unreadable: 0,
+            broken: None,
+        };
+        let mut rest = Cursor(&summary);
+        while let Some((kind, body)) = record(&mut rest) {
+            reader.note(kind, body);
+        }
+        let foreign: BTreeSet<&str> = reader
+            .channels
+            .values()
+            .filter(|c| c.is_picture() && c.counted.is_none())
+            .map(|c| c.topic.as_str())
+            .collect();
+        if foreign.len() > 1 {
+            let topics = foreign.into_iter().collect::<Vec<_>>().join(", ");
+            return Err(unusable(format!(
+                "it has several series of pictures ({topics}); keep one, e.g. with `mcap filter -y TOPIC`"
+            )));
+        }
+        Ok(reader)
+    }
+
+    /// What the recording says of itself; complete from the first picture on.
+    pub fn about(&self) -> &About {
+        &self.about
+    }
+
+    /// Pictures in the file, if it was ended properly.
+    pub fn pictures_total(&self) -> Option<u64> {
+        let of = |(id, count): (&u16, &u64)| self.channels.get(id).filter(|c| c.is_picture()).map(|_| *count);
+        let total: u64 = self.counts.iter().filter_map(of).sum();
+        (total > 0).then_some(total)
+    }
+
+    /// Channels seen so far, `topic (schema)`, for saying what there is instead of pictures.
+    pub fn topics(&self) -> Vec<String> {
+        self.channels.values().map(|c| format!("{} ({})", c.topic, c.schema)).collect()
+    }
+
+    /// The next picture; `None` at the end, and after an error of the disk, which the warnings then name.
+    pub fn next_picture(&mut self) -> Option<Picture> {
+        loop {
+            let kind = match self.walk.next() {
+                Ok(kind) => kind?,
+                Err(e) => {
+                    self.broken = Some(e.to_string());
+                    return None;
+                }
+            };
+            if kind == op::MESSAGE {
+                if let Some(picture) = self.picture() {
+                    return Some(picture);
+                }
+            } else {
+                let body = self.walk.body().to_vec();
+                self.note(kind, &body);
+            }
+        }
+    }
+
+    /// The picture in the message that was just found, if it is one and wanted.
+    fn picture(&mut self) -> Option<Picture> {
+        let mut body = Cursor(self.walk.body());
+        let (id, number, log_ns, publish_ns) = (body.u16()?, body.u32()?, body.u64()?, body.u64()?);
+        let channel = self.channels.get(&id).filter(|c| c.is_picture())?;
+        if channel.counted.is_none() && *self.chosen.get_or_insert_with(|| channel.topic.clone()) != channel.topic {
+            self.others.insert(channel.topic.clone());
+            return None;
+        }
+        let Some((encoding, own_ns, bytes)) = decode(&channel.schema, body.0) else {
+            self.unreadable += 1;
+            return None;
+        };
+        let shift_ns: i64 = self.about.get(SHIFT_NS).and_then(|n| n.parse().ok()).unwrap_or(0);
+        let sensor_time_ns = match channel.counted {
+            Some(_) => i64::try_from(publish_ns).ok()?.checked_sub(shift_ns)?,
+            // What other programs mean by their times differs; the picture's own is the nearest to the sensor's.
+            None => own_ns.filter(|ns| *ns != 0).or(i64::try_from(log_ns).ok())?,
+        };
+        let sequence = (channel.counted == Some(true)).then(|| {
+            // 32 bits are in the file.
+            let first = || self.about.get(FIRST_SEQUENCE).and_then(|n| n.parse().ok()).unwrap_or(u64::from(number));
+            let before = self.sequence.unwrap_or_else(first);
+            before.saturating_add(u64::from(number.wrapping_sub(before as u32)))
+        });
+        self.sequence = sequence.or(self.sequence);
+        Some(Picture { sequence, sensor_time_ns, encoding, bytes })
+    }
+
+    /// Takes in a record that is no message.
+    fn note(&mut self, kind: u8, body: &[u8]) {
+        // A damaged one is as good as none.
+        let _ = match kind {
+            op::SCHEMA => self.note_schema(body),
+            op::CHANNEL => self.note_channel(body),
+            op::METADATA => self.note_metadata(body),
+            op::STATISTICS => self.note_statistics(body),
+            _ => None,
+        };
+    }
+
+    fn note_schema(&mut self, body: &[u8]) -> Option<()> {
+        let mut body = Cursor(body);
+        let (id, name) = (body.u16()?, body.text()?);
+        self.schemas.insert(id, name.to_owned());
+        Some(())
+    }
+
+    fn note_channel(&mut self, body: &[u8]) -> Option<()> {
+        let mut body = Cursor(body);
+        let (id, schema_id, topic, encoding) = (body.u16()?, body.u16()?, body.text()?, body.text()?);
+        let metadata = body.map()?;
+        let known = if encoding == "protobuf" { self.schemas.get(&schema_id).cloned() } else { None };
+        let counted = metadata.iter().find(|(key, _)| *key == SEQUENCE).map(|(_, value)| *value == COUNTED);
+        let schema = known.unwrap_or_else(|| encoding.to_owned());
+        self.channels.insert(id, Channel { topic: topic.to_owned(), schema, counted });
+        Some(())
+    }
+
+    fn note_metadata(&mut self, body: &[u8]) -> Option<()> {
+        let mut body = Cursor(body);
+        if body.text()? == ABOUT {
+            self.about.extend(body.map()?.into_iter().map(|(key, value)| (key.to_owned(), value.to_owned())));
+        }
+        Some(())
+    }
+
+    fn note_statistics(&mut self, body: &[u8]) -> Option<()> {
+        let mut body = Cursor(body);
+        body.take(8 + 2 + 4 * 4 + 2 * 8)?;
+        let mut counts = Cursor(body.counted()?);
+        while let (Some(id), Some(count)) = (counts.u16(), counts.u64()) {
+            self.counts.insert(id, count);
+        }
+        Some(())
+    }
+
+    /// What could not be read, a line each; complete after the end.
+    pub fn warnings(&self) -> Vec<String> {
+        let (name, damage) = (self.path.display(), self.walk.damage);
+        let mut lines = Vec::new();
+        if damage.parts > 0 {
+            let (parts, bytes) = (damage.parts, damage.bytes);
+            lines.push(format!("{name}: damaged parts left out: {parts} ({bytes} bytes); the rest is used"));
+        }
+        if let Some(tail) = damage.tail {
+            lines.push(format!(
+                "{name}: it was not ended properly; all whole chunks are used, {tail} bytes behind them are not"
+            ));
+        }
+        if self.unreadable > 0 {
+            lines.push(format!("{name}: messages left out because they hold no picture: {}", self.unreadable));
+        }
+        if !self.others.is_empty() {
+            let others = self.others.iter().map(String::as_str).collect::<Vec<_>>().join(", ");
+            let chosen = self.chosen.as_deref().unwrap_or_default();
+            lines.push(format!("{name}: the pictures of {chosen} are used, those of {others} are not"));
+        }
+        if let Some(e) = &self.broken {
+            lines.push(format!("{name}: reading it fails ({e}); what came before is used"));
+        }
+        lines
+    }
+}
+
+impl Channel {
+    fn is_picture(&self) -> bool {
+        self.schema == COMPRESSED_IMAGE || self.schema == RAW_IMAGE
+    }
+}
+
+/// The next record of a summary.
+fn record<'a>(rest: &mut Cursor<'a>) -> Option<(u8, &'a [u8])> {
+    let kind = *rest.take(1)?.first()?;
+    let length = usize::try_from(rest.u64()?).ok()?;
+    Some((kind, rest.take(length)?))
+}
+
+/// The records at the end of a file that was ended properly.
+fn summary(file: &mut (impl Read + Seek)) -> io::Result<Option<Vec<u8>>> {
+    let length = file.seek(SeekFrom::End(0))?;
+    let Some(footer_at) = length.checked_sub(FOOTER) else { return Ok(None) };
+    file.seek(SeekFrom::Start(footer_at))?;
+    let mut footer = [0; FOOTER as usize];
+    let read = read_up_to(file, &mut footer)?;
+    let mut cursor = Cursor(&footer[..read]);
+    let Some((op::FOOTER, mut body)) = record(&mut cursor).map(|(kind, body)| (kind, Cursor(body))) else {
+        return Ok(None);
+    };
+    let start = body.u64().filter(|start| *start > 0 && *start < footer_at);
+    let Some(start) = start.filter(|start| cursor.0 == mcap::MAGIC && footer_at - start <= MAX_SUMMARY) else {
+        return Ok(None);
+    };
+    file.seek(SeekFrom::Start(start))?;
+    let mut bytes = vec![0; (footer_at - start) as usize];
+    let read = read_up_to(file, &mut bytes)?;
+    bytes.truncate(read);
+    Ok(Some(bytes))
+}

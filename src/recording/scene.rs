@@ -1,0 +1,168 @@
+//! Outline, points, tree and poses as messages that viewers know how to draw.
+
+use super::wire::Message;
+use crate::model::{Outline, Pose, Skeleton, TrackSet};
+use serde::Serialize;
+
+/// Frames of reference: what viewers stand on (z up), and the tree's own axes (y up).
+const WORLD: &str = "world";
+const TREE: &str = "tree";
+/// Red, green, blue, opacity.
+const OUTLINE_COLOUR: [f64; 4] = [1.0, 0.8, 0.2, 1.0];
+const POINT_COLOUR: [f64; 4] = [0.2, 0.9, 0.4, 1.0];
+const BRANCH_COLOUR: [f64; 4] = [0.55, 0.4, 0.25, 1.0];
+/// Values of the schemas' enumerations.
+const POINTS: i64 = 1;
+const LINE_LOOP: i64 = 2;
+const LINE_LIST: i64 = 2;
+
+pub(super) fn outline(outline: &Outline, time_ns: u64, into: &mut Vec<u8>) {
+    let corners = outline.polygon_px.iter().map(|p| p.map(f64::from));
+    annotation(LINE_LOOP, corners, OUTLINE_COLOUR, 2.0, time_ns, into);
+}
+
+pub(super) fn points(tracks: &TrackSet, time_ns: u64, into: &mut Vec<u8>) {
+    let points = tracks.observations.iter().map(|o| [f64::from(o.u_px), f64::from(o.v_px)]);
+    annotation(POINTS, points, POINT_COLOUR, 4.0, time_ns, into);
+}
+
+fn annotation(
+    kind: i64,
+    points: impl Iterator<Item = [f64; 2]>,
+    colour: [f64; 4],
+    thickness: f64,
+    time_ns: u64,
+    into: &mut Vec<u8>,
+) {
+    into.clear();
+    let mut message = Message(into);
+    message.timestamp(5, time_ns);
+    message.sub(2, |a| {
+        a.timestamp(1, time_ns);
+        a.int(2, kind);
+        points.for_each(|p| a.doubles(3, &p));
+        a.doubles(4, &colour);
+        a.double(7, thickness);
+    });
+}
+
+/// The tree as it stands in this frame: a line for each measured branch.
+pub(super) fn scene(skeleton: &Skeleton, pose: &Pose, time_ns: u64, into: &mut Vec<u8>) {
+    into.clear();
+    let measured = skeleton.measured().min(pose.joints.len());
+    Message(into).sub(2, |entity| {
+        entity.timestamp(1, time_ns);
+        entity.text(2, TREE);
+        entity.text(3, TREE);
+        entity.sub(11, |lines| {
+            lines.int(1, LINE_LIST);
+            lines.double(3, 2.0);
+            lines.int(4, 1); // as wide on the screen however far away
+            pose.joints[..measured].iter().for_each(|j| lines.doubles(5, j.position.coords.as_slice()));
+            lines.doubles(6, &BRANCH_COLOUR);
+            let ends = skeleton.nodes[..measured].iter().enumerate();
+            let pairs: Vec<u32> = ends.flat_map(|(i, n)| n.parent.map(|p| [p.0, i as u32])).flatten().collect();
+            lines.packed_fixed32(8, &pairs);
+        });
+    });
+}
+
+/// Position and rotation of every measured node, exactly.
+pub(super) fn transforms(skeleton: &Skeleton, pose: &Pose, time_ns: u64, into: &mut Vec<u8>) {
+    into.clear();
+    let mut message = Message(into);
+    // A quarter turn about x: the tree's y is the world's z.
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    transform(&mut message, (WORLD, TREE), time_ns, [0.0; 3], [half, 0.0, 0.0, half]);
+    for (i, joint) in pose.joints.iter().take(skeleton.measured()).enumerate() {
+        let q = joint.rotation.coords;
+        let name = format!("node_{i}");
+        transform(&mut message, (TREE, &name), time_ns, joint.position.coords.into(), [q.x, q.y, q.z, q.w]);
+    }
+}
+
+fn transform(
+    message: &mut Message,
+    (parent, child): (&str, &str),
+    time_ns: u64,
+    translation: [f64; 3],
+    rotation: [f64; 4],
+) {
+    message.sub(1, |t| {
+        t.timestamp(1, time_ns);
+        t.text(2, parent);
+        t.text(3, child);
+        t.doubles(4, &translation);
+        t.doubles(5, &rotation);
+    });
+}
+
+#[derive(Serialize)]
+struct TracksJson {
+    frame: u64,
+    time_s: f64,
+    lost: u32,
+    born: u32,
+    id: Vec<u32>,
+    u_px: Vec<f32>,
+    v_px: Vec<f32>,
+    fb_error_px: Vec<f32>,
+}
+
+/// The points with their names: annotations have none.
+pub(super) fn tracks_json(tracks: &TrackSet, into: &mut Vec<u8>) -> Result<(), serde_json::Error> {
+    let o = &tracks.observations;
+    into.clear();
+    serde_json::to_writer(
+        into,
+        &TracksJson {
+            frame: tracks.frame,
+            time_s: tracks.time_s,
+            lost: tracks.lost,
+            born: tracks.born,
+            id: o.iter().map(|o| o.id.0).collect(),
+            u_px: o.iter().map(|o| o.u_px).collect(),
+            v_px: o.iter().map(|o| o.v_px).collect(),
+            fb_error_px: o.iter().map(|o| o.fb_error_px).collect(),
+        },
+    )
+}
+
+#[derive(Serialize)]
+struct SkeletonJson {
+    frame: u64,
+    time_s: f64,
+    foot_px: [f64; 2],
+    width: u32,
+    height: u32,
+    nodes: Vec<NodeJson>,
+}
+
+#[derive(Serialize)]
+struct NodeJson {
+    parent: Option<u32>,
+    level: u8,
+    x: f64,
+    y: f64,
+    z: f64,
+    radius: f64,
+    n_tracks: u32,
+    copy_of: Option<u32>,
+}
+
+/// The tree at rest with all that is known of its nodes.
+pub(super) fn skeleton_json(
+    skeleton: &Skeleton,
+    (frame, time_s): (u64, f64),
+    into: &mut Vec<u8>,
+) -> Result<(), serde_json::Error> {
+    let nodes = skeleton.nodes.iter().map(|n| {
+        let (parent, copy_of, p) = (n.parent.map(|p| p.0), n.copy_of.map(|c| c.0), n.position);
+        NodeJson { parent, level: n.level, x: p.x, y: p.y, z: p.z, radius: n.radius, n_tracks: n.n_tracks, copy_of }
+    });
+    let size = skeleton.image_size;
+    let foot_px = skeleton.foot_px;
+    let all = SkeletonJson { frame, time_s, foot_px, width: size.width, height: size.height, nodes: nodes.collect() };
+    into.clear();
+    serde_json::to_writer(into, &all)
+}

@@ -1,0 +1,117 @@
+//! The channels of a recording: topic, published schema, encoding. The protobuf schemas are Foxglove's
+//! (<https://github.com/foxglove/foxglove-sdk>, MIT), made by `scripts/foxglove-schemas.py`.
+
+/// One kind of message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) enum Topic {
+    /// Frames that are compressed, and frames that are not; with the driver's number, and without one.
+    Image,
+    ImageUncounted,
+    RawImage,
+    RawImageUncounted,
+    Outline,
+    Points,
+    Tracks,
+    Skeleton,
+    Scene,
+    Transforms,
+}
+
+/// What a file says of a channel.
+pub(super) struct Channel {
+    pub topic: &'static str,
+    pub schema: &'static str,
+    pub schema_encoding: &'static str,
+    pub definition: &'static [u8],
+    pub message_encoding: &'static str,
+}
+
+pub(super) const COMPRESSED_IMAGE: &str = "foxglove.CompressedImage";
+pub(super) const RAW_IMAGE: &str = "foxglove.RawImage";
+
+/// Keys of a channel's metadata: what the header's `sequence` is, see [`COUNTED`] and [`UNCOUNTED`].
+pub(super) const SEQUENCE: &str = "sequence";
+pub(super) const COUNTED: &str = "driver";
+pub(super) const UNCOUNTED: &str = "none";
+
+/// The record of metadata at the head of a recording, and its keys.
+pub(super) const ABOUT: &str = "arborcam";
+pub(super) const SHIFT_NS: &str = "publish_time_minus_sensor_time_ns";
+pub(super) const FIRST_SEQUENCE: &str = "first_sequence";
+
+impl Topic {
+    pub fn channel(self) -> Channel {
+        let protobuf = |topic, schema, definition| Channel {
+            topic,
+            schema,
+            schema_encoding: "protobuf",
+            definition,
+            message_encoding: "protobuf",
+        };
+        let json = |topic, schema, definition: &'static str| Channel {
+            topic,
+            schema,
+            schema_encoding: "jsonschema",
+            definition: definition.as_bytes(),
+            message_encoding: "json",
+        };
+        match self {
+            Topic::Image | Topic::ImageUncounted => {
+                protobuf("/camera/image", COMPRESSED_IMAGE, include_bytes!("foxglove/CompressedImage.bin"))
+            }
+            Topic::RawImage | Topic::RawImageUncounted => {
+                protobuf("/camera/image_raw", RAW_IMAGE, include_bytes!("foxglove/RawImage.bin"))
+            }
+            Topic::Outline => {
+                protobuf("/tree/outline", "foxglove.ImageAnnotations", include_bytes!("foxglove/ImageAnnotations.bin"))
+            }
+            Topic::Points => {
+                protobuf("/tree/points", "foxglove.ImageAnnotations", include_bytes!("foxglove/ImageAnnotations.bin"))
+            }
+            Topic::Tracks => json("/tree/tracks", "arborcam.Tracks", TRACKS),
+            Topic::Skeleton => json("/tree/skeleton", "arborcam.Skeleton", SKELETON),
+            Topic::Scene => protobuf("/tree/scene", "foxglove.SceneUpdate", include_bytes!("foxglove/SceneUpdate.bin")),
+            Topic::Transforms => {
+                protobuf("/tree/poses", "foxglove.FrameTransforms", include_bytes!("foxglove/FrameTransforms.bin"))
+            }
+        }
+    }
+
+    /// `None` for a channel that holds no frames.
+    pub fn sequence(self) -> Option<&'static str> {
+        match self {
+            Topic::Image | Topic::RawImage => Some(COUNTED),
+            Topic::ImageUncounted | Topic::RawImageUncounted => Some(UNCOUNTED),
+            _ => None,
+        }
+    }
+}
+
+const TRACKS: &str = r#"{
+  "title": "arborcam.Tracks", "type": "object",
+  "description": "Points followed in one frame. The arrays go together, ordered by id.",
+  "properties": {
+    "frame": {"type": "integer", "description": "frames since the first one of the capture, losses included"},
+    "time_s": {"type": "number", "description": "seconds since the first frame, by the sensor"},
+    "lost": {"type": "integer"}, "born": {"type": "integer"},
+    "id": {"type": "array", "items": {"type": "integer"}},
+    "u_px": {"type": "array", "items": {"type": "number"}},
+    "v_px": {"type": "array", "items": {"type": "number"}},
+    "fb_error_px": {"type": "array", "items": {"type": "number"}}
+  }
+}"#;
+
+const SKELETON: &str = r#"{
+  "title": "arborcam.Skeleton", "type": "object",
+  "description": "The tree at rest: parents before children, axes x right, y up, z towards the viewer, px, the trunk's foot at the origin.",
+  "properties": {
+    "frame": {"type": "integer"}, "time_s": {"type": "number"},
+    "foot_px": {"type": "array", "items": {"type": "number"}},
+    "width": {"type": "integer"}, "height": {"type": "integer"},
+    "nodes": {"type": "array", "items": {"type": "object", "properties": {
+      "parent": {"type": ["integer", "null"]}, "level": {"type": "integer"},
+      "x": {"type": "number"}, "y": {"type": "number"}, "z": {"type": "number"},
+      "radius": {"type": "number"}, "n_tracks": {"type": "integer"}, "copy_of": {"type": ["integer", "null"]}
+    }}}
+  }
+}"#;

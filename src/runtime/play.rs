@@ -1,0 +1,67 @@
+//! Frames of any source into a loopback device, at the pace at which they were taken.
+
+use crate::source::{Loopback, Source, SourceError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// A wait is taken in pieces, so that a wish to stop is heard.
+const NAP: Duration = Duration::from_millis(20);
+
+/// What was played.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Played {
+    pub frames: u64,
+    /// Ended by `stop` rather than by the end of the frames.
+    pub stopped: bool,
+}
+
+/// Plays `source` once; `open` makes the output for the first frame, or gives the one that is open already.
+///
+/// # Errors
+/// The source fails, or the device.
+pub fn play(
+    source: &mut dyn Source,
+    output: &mut Option<Loopback>,
+    open: impl FnOnce(&crate::model::RawFrame) -> Result<Loopback, SourceError>,
+    stop: &AtomicBool,
+) -> Result<Played, SourceError> {
+    let mut played = Played::default();
+    let Some(mut waiting) = source.next_frame()? else { return Ok(played) };
+    let output = match output {
+        Some(open) => open,
+        None => output.insert(open(&waiting)?),
+    };
+    let (start, start_s) = (Instant::now(), waiting.sensor_time_s);
+    output.put(&waiting)?;
+    loop {
+        // Read before the one in front of it is due: reading takes its own time.
+        let next = source.next_frame()?;
+        let due = start + Duration::from_secs_f64((waiting.sensor_time_s - start_s).clamp(0.0, 1e6));
+        if !wait_until(due, stop) {
+            return Ok(Played { stopped: true, ..played });
+        }
+        played.frames += 1;
+        match next {
+            Some(raw) => {
+                output.put(&raw)?;
+                waiting = raw;
+            }
+            None => {
+                output.finish()?;
+                return Ok(played);
+            }
+        }
+    }
+}
+
+/// `false` when asked to stop meanwhile.
+fn wait_until(due: Instant, stop: &AtomicBool) -> bool {
+    while !stop.load(Ordering::Relaxed) {
+        let left = due.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return true;
+        }
+        std::thread::sleep(left.min(NAP));
+    }
+    false
+}

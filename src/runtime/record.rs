@@ -1,0 +1,89 @@
+//! Frames into a file and nothing else: source and recorder, without tracker and model.
+
+use super::recorder_thread::{self, RecordTo, Recorded};
+use super::shared::{Failure, Shared};
+use super::source_thread::{self, Pace};
+use super::{FRAME_QUEUE, StopAll};
+use crate::source::Source;
+use crossbeam_channel::bounded;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::thread::JoinHandle;
+
+/// What is to be recorded.
+pub struct RecordJob {
+    pub to: RecordTo,
+    pub pace: Pace,
+}
+
+/// A recording under way.
+pub struct RunningRecord {
+    shared: Arc<Shared>,
+    source: JoinHandle<()>,
+    drain: JoinHandle<()>,
+    recording: JoinHandle<Recorded>,
+}
+
+/// Starts the threads.
+///
+/// # Errors
+/// The file cannot be made, or a thread cannot be started.
+pub fn record(source: Box<dyn Source>, job: RecordJob) -> Result<RunningRecord, Failure> {
+    let shared = Arc::new(Shared::default());
+    let (recorder, recording) = recorder_thread::start(job.to, source.describe().live, &shared)?;
+    let (frames_in, frames_out) = bounded::<source_thread::Timed>(FRAME_QUEUE);
+    let thread = |name: &str| std::thread::Builder::new().name(name.into());
+    // Nobody looks at the frames; the source hands them on as ever.
+    let drain = {
+        let frames = frames_out.clone();
+        thread("drain").spawn(move || frames.iter().for_each(drop)).map_err(Failure::Spool)?
+    };
+    let source = {
+        let shared = shared.clone();
+        let run = move || {
+            let _ends_all = StopAll(&shared);
+            source_thread::run(source, job.pace, (frames_in, frames_out), Some(recorder), &shared);
+        };
+        thread("source").spawn(run).map_err(Failure::Spool)?
+    };
+    Ok(RunningRecord { shared, source, drain, recording })
+}
+
+impl RunningRecord {
+    /// Take no more frames and end the file.
+    pub fn stop(&self) {
+        self.shared.stop.store(true, Ordering::Relaxed);
+    }
+
+    /// Nothing more can be written; there is no use in taking more frames.
+    pub fn broken(&self) -> bool {
+        self.shared.recording_ended.load(Ordering::Relaxed)
+    }
+
+    /// All is over.
+    pub fn finished(&self) -> bool {
+        self.recording.is_finished()
+    }
+
+    /// Frames seen and lost before us, sensor time from the first to the last, s, and frames missing in the recording.
+    pub fn counts(&self) -> (u64, u64, f64, u64) {
+        let counts = &self.shared.counts;
+        let load = |c: &std::sync::atomic::AtomicU64| c.load(Ordering::Relaxed);
+        (load(&counts.seen), load(&counts.lost_in_camera), self.shared.last_time_s(), load(&counts.not_recorded))
+    }
+
+    /// What there is to be told so far.
+    pub fn warnings(&self) -> Vec<String> {
+        self.shared.warnings()
+    }
+
+    /// Waits for the end: what was recorded, and why it ended early if it did.
+    pub fn join(self) -> (Option<Recorded>, Option<Failure>) {
+        let ends = [self.source.join(), self.drain.join()];
+        let recorded = self.recording.join().ok();
+        if ends.iter().any(Result::is_err) || recorded.is_none() {
+            self.shared.fail(Failure::Panicked);
+        }
+        (recorded, self.shared.take_failure())
+    }
+}

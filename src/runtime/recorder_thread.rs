@@ -1,0 +1,188 @@
+//! The recorder's thread. It takes what it is offered out of a bounded queue; who offers never waits for the disk while a
+//! camera films. What does not fit is counted, and the count is told.
+
+use super::shared::Shared;
+use crate::model::{Outline, Pose, RawFrame, Skeleton, TrackSet};
+use crate::recording::{Head, Limits, RecordingError, Series};
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+/// What may wait for the disk: as many entries, and as many bytes of pictures (some seconds of a fast camera).
+const QUEUE: usize = 512;
+const QUEUE_BYTES: usize = 96 << 20;
+/// What has been written for longer than this is in the hands of the system: half of what may be lost at most.
+const FLUSH_EVERY: Duration = Duration::from_millis(500);
+
+/// What is to be recorded, and where.
+#[derive(Clone, Debug)]
+pub struct RecordTo {
+    /// First file; must not exist.
+    pub path: PathBuf,
+    pub limits: Limits,
+    pub head: Head,
+}
+
+enum Item {
+    Frame(Arc<RawFrame>, u64),
+    Result(Box<Found>),
+}
+
+/// What was found in a frame.
+pub struct Found {
+    pub tracks: TrackSet,
+    pub outline: Arc<Outline>,
+    pub pose: Option<(Arc<Pose>, Arc<Skeleton>)>,
+}
+
+/// The end of the queue into which frames and results are put.
+#[derive(Clone)]
+pub struct Recorder {
+    queue: Sender<Item>,
+    waiting: Arc<AtomicUsize>,
+    shared: Arc<Shared>,
+    /// A camera is not made to wait; a file is, and loses nothing.
+    live: bool,
+}
+
+/// What was recorded.
+#[derive(Clone, Debug, Default)]
+pub struct Recorded {
+    pub frames: u64,
+    pub files: u32,
+    pub bytes: u64,
+    pub last: PathBuf,
+    /// It ended before the frames did, e.g. on a full disk.
+    pub stopped: bool,
+}
+
+/// Makes the file and starts the thread.
+///
+/// # Errors
+/// There is a file of that name already, none can be made, or no thread can be started.
+pub fn start(
+    to: RecordTo,
+    live: bool,
+    shared: &Arc<Shared>,
+) -> Result<(Recorder, JoinHandle<Recorded>), RecordingError> {
+    let series = Series::create(&to.path, to.head, to.limits, now_ns)?;
+    let (queue, items) = bounded(QUEUE);
+    let waiting = Arc::new(AtomicUsize::new(0));
+    let recorder = Recorder { queue, waiting: waiting.clone(), shared: shared.clone(), live };
+    shared.recording.store(true, Ordering::Relaxed);
+    let shared = shared.clone();
+    let run = move || Thread { series, waiting, shared, broken: false, oldest: None }.run(&items);
+    let handle = std::thread::Builder::new()
+        .name("record".into())
+        .spawn(run)
+        .map_err(|source| RecordingError::Place { path: to.path, source })?;
+    Ok((recorder, handle))
+}
+
+fn now_ns() -> u64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
+}
+
+impl Recorder {
+    /// Offers a frame with its place in the capture.
+    pub fn offer(&self, raw: &Arc<RawFrame>, index: u64) {
+        let bytes = raw.bytes.len();
+        let fits = self.waiting.fetch_add(bytes, Ordering::Relaxed) + bytes <= QUEUE_BYTES;
+        // One that is larger than the queue is let in alone.
+        let fits = fits || self.queue.is_empty();
+        if !(fits || !self.live) || !self.put(Item::Frame(raw.clone(), index)) {
+            self.waiting.fetch_sub(bytes, Ordering::Relaxed);
+            if self.shared.counts.not_recorded.fetch_add(1, Ordering::Relaxed) == 0 {
+                self.shared.warn("the recording does not keep up, frames are missing in it; see the count".into());
+            }
+        }
+    }
+
+    /// Offers what was found in a frame. It can be computed again; frames cannot, and go first.
+    pub fn found(&self, found: impl FnOnce() -> Found) {
+        if (self.live && self.queue.len() > QUEUE / 2) || !self.put(Item::Result(Box::new(found()))) {
+            self.shared.counts.results_not_recorded.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    fn put(&self, item: Item) -> bool {
+        if self.live { self.queue.try_send(item).is_ok() } else { self.queue.send(item).is_ok() }
+    }
+}
+
+struct Thread {
+    series: Series,
+    waiting: Arc<AtomicUsize>,
+    shared: Arc<Shared>,
+    /// Nothing can be written any more. Frames are taken and counted all the same, until the capture ends.
+    broken: bool,
+    /// When the oldest thing was written that has not been handed to the system.
+    oldest: Option<Instant>,
+}
+
+impl Thread {
+    fn run(mut self, items: &Receiver<Item>) -> Recorded {
+        loop {
+            let wait = self.oldest.map_or(FLUSH_EVERY, |since| FLUSH_EVERY.saturating_sub(since.elapsed()));
+            match items.recv_timeout(wait) {
+                Ok(item) => self.take(item),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+            if self.series.unflushed() == 0 {
+                self.oldest = None;
+            } else if self.oldest.is_some_and(|since| since.elapsed() >= FLUSH_EVERY) {
+                let done = self.series.flush();
+                self.note(done);
+                self.oldest = None;
+            }
+        }
+        let stopped = self.broken;
+        if !self.broken {
+            let done = self.series.close();
+            self.note(done);
+        }
+        let last = self.series.path().to_owned();
+        Recorded { frames: self.series.frames(), files: self.series.files(), bytes: self.series.bytes(), last, stopped }
+    }
+
+    fn take(&mut self, item: Item) {
+        self.oldest.get_or_insert_with(Instant::now);
+        match item {
+            Item::Frame(raw, index) => {
+                let done = if self.broken { Ok(()) } else { self.series.frame(&raw, index) };
+                let failed = self.broken || done.is_err();
+                self.note(done);
+                self.waiting.fetch_sub(raw.bytes.len(), Ordering::Relaxed);
+                let counts = &self.shared.counts;
+                let count = if failed { &counts.not_recorded } else { &counts.recorded };
+                count.fetch_add(1, Ordering::Relaxed);
+            }
+            Item::Result(_) if self.broken => {
+                self.shared.counts.results_not_recorded.fetch_add(1, Ordering::Relaxed);
+            }
+            Item::Result(found) => {
+                let Found { tracks, outline, pose } = *found;
+                let mut done = self.series.tracks(&tracks, &outline);
+                if let (Ok(()), Some((pose, skeleton))) = (&done, pose) {
+                    done = self.series.pose(&pose, &skeleton);
+                }
+                self.note(done);
+            }
+        }
+    }
+
+    /// The first failure ends the recording, and is told; the capture goes on.
+    fn note(&mut self, done: Result<(), RecordingError>) {
+        if let Err(e) = done
+            && !std::mem::replace(&mut self.broken, true)
+        {
+            self.shared.recording_ended.store(true, Ordering::Relaxed);
+            self.shared.warn(e.to_string());
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! A recording as a source: its own frames, numbers and times.
+
+use super::images::picture;
+use super::{Source, SourceError, SourceInfo};
+use crate::model::{FormatNote, PixelFormat, RawFrame, Size, seconds};
+use crate::recording::{Encoding, Picture, Reader, RecordingError};
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+
+/// A recording that is being read.
+pub(super) struct Recording {
+    path: PathBuf,
+    reader: Reader,
+    /// The first two frames are read when the file is opened: only then it is known that there are any, and motion.
+    pending: VecDeque<RawFrame>,
+    size: Option<Size>,
+    frames: u64,
+    last_ns: Option<i64>,
+    out_of_order: u64,
+    unreadable: u64,
+    ended: bool,
+}
+
+impl Recording {
+    pub(super) fn open(path: &Path) -> Result<Self, SourceError> {
+        let input = path.display().to_string();
+        let reader = Reader::open(path).map_err(|e| match e {
+            RecordingError::Unreadable { source, .. } => SourceError::of_file(path, &source),
+            RecordingError::Unusable { what, .. } => SourceError::BadFormat { input: input.clone(), what },
+            other => SourceError::BadFormat { input: input.clone(), what: other.to_string() },
+        })?;
+        let mut recording = Self {
+            path: path.to_owned(),
+            reader,
+            pending: VecDeque::new(),
+            size: None,
+            frames: 0,
+            last_ns: None,
+            out_of_order: 0,
+            unreadable: 0,
+            ended: false,
+        };
+        while recording.pending.len() < 2
+            && let Some(frame) = recording.read_frame()
+        {
+            recording.pending.push_back(frame);
+        }
+        match recording.pending.len() {
+            0 => {}
+            1 => return Err(SourceError::SingleFrame { input }),
+            _ => return Ok(recording),
+        }
+        let mut what = "no picture in it can be read".to_owned();
+        let topics = recording.reader.topics();
+        if !topics.is_empty() {
+            what = format!("{what}; it holds {}", topics.join(", "));
+        }
+        for warning in recording.reader.warnings() {
+            what = format!("{what}; {}", warning.trim_start_matches(&format!("{input}: ")));
+        }
+        Err(SourceError::BadFormat { input, what })
+    }
+
+    /// The next frame whose time is later than the last one's.
+    fn read_frame(&mut self) -> Option<RawFrame> {
+        loop {
+            let Picture { sequence, sensor_time_ns, encoding, bytes } = self.reader.next_picture()?;
+            if self.last_ns.is_some_and(|last| sensor_time_ns <= last) {
+                self.out_of_order += 1;
+                continue;
+            }
+            let Some((size, format, bytes)) = self.unpack(encoding, bytes) else {
+                self.unreadable += 1;
+                continue;
+            };
+            self.last_ns = Some(sensor_time_ns);
+            self.size = Some(size);
+            self.frames += 1;
+            return Some(RawFrame { sequence, sensor_time_s: seconds(sensor_time_ns), size, format, bytes });
+        }
+    }
+
+    /// Size, format and bytes as a camera gives them.
+    fn unpack(&self, encoding: Encoding, bytes: Vec<u8>) -> Option<(Size, PixelFormat, Vec<u8>)> {
+        if let Encoding::Pixels(format, size) = encoding {
+            return Some((size, format, bytes));
+        }
+        // A picture that was damaged before it was recorded is counted where a camera's is: by the decoder.
+        let told = |key: &str| self.reader.about().get(key).and_then(|n| n.parse().ok());
+        let known = told("width").zip(told("height")).map(|(w, h)| Size::new(w, h)).or(self.size);
+        match known {
+            Some(size) if bytes.starts_with(&[0xff, 0xd8]) => Some((size, PixelFormat::Mjpeg, bytes)),
+            _ => picture(bytes).ok(),
+        }
+    }
+}
+
+impl Source for Recording {
+    fn next_frame(&mut self) -> Result<Option<RawFrame>, SourceError> {
+        if self.ended {
+            return Ok(None);
+        }
+        let frame = self.pending.pop_front().or_else(|| self.read_frame());
+        self.ended = frame.is_none();
+        Ok(frame)
+    }
+
+    fn describe(&self) -> SourceInfo {
+        let about = self.reader.about();
+        let told = |key: &str| about.get(key).cloned().unwrap_or_default();
+        let size = self.size.unwrap_or(Size::new(0, 0));
+        let first = self.pending.front().map_or(PixelFormat::Mjpeg, |f| f.format);
+        let given = Some(told("format_given")).filter(|f| !f.is_empty()).unwrap_or(format!("{first} {size}"));
+        SourceInfo {
+            name: self.path.display().to_string(),
+            format: FormatNote { asked: given.clone(), given },
+            size,
+            nominal_rate_hz: about.get("nominal_rate_hz").and_then(|hz| hz.parse().ok()).filter(|hz: &f64| *hz > 0.0),
+            frames_total: self.reader.pictures_total(),
+            live: false,
+        }
+    }
+
+    fn warnings(&mut self) -> Vec<String> {
+        if !self.ended {
+            return Vec::new();
+        }
+        let name = self.path.display();
+        let kinds = [
+            (&mut self.out_of_order, "were not later than the one before"),
+            (&mut self.unreadable, "are no picture that can be read"),
+        ];
+        let mut lines: Vec<String> = kinds
+            .into_iter()
+            .filter(|(count, _)| **count > 0)
+            .map(|(count, what)| format!("{name}: frames left out because they {what}: {}", std::mem::take(count)))
+            .collect();
+        lines.extend(self.reader.warnings());
+        lines
+    }
+}
