@@ -1,0 +1,111 @@
+//! Faults that vivid injects: for each the count, the message, the exit status or the recovery.
+
+use crate::guest::{Group, Results, claim};
+
+pub const GROUP: Group = Group {
+    name: "faults",
+    script: "faults.sh",
+    first: "script",
+    limit_s: 240,
+    provide: |_| Ok(()),
+    cases: &[
+        ("a_camera_without_faults_loses_nothing", clean),
+        ("a_tenth_of_the_buffers_dropped_is_counted", |r| dropped(r, "dropped-10", 0.03..=0.20)),
+        ("two_fifths_of_the_buffers_dropped_are_counted", |r| dropped(r, "dropped-40", 0.30..=0.50)),
+        ("frames_with_the_error_flag_are_counted_and_left_out", flagged),
+        ("no_buffers_ends_with_status_3", |r| refused(r, "reqbufs", "asking for buffers")),
+        ("no_stream_ends_with_status_3", |r| refused(r, "streamon", "starting")),
+        ("a_fatal_error_is_recovered_from", |r| recovered(r, "fatal")),
+        ("a_fatal_error_ends_a_capture_that_is_to_end_with_it", |r| ended_at_once(r, "fatal-once")),
+        ("a_disconnected_camera_is_taken_again", |r| recovered(r, "disconnect")),
+        ("a_disconnected_camera_ends_a_capture_that_is_to_end_with_it", |r| ended_at_once(r, "disconnect-once")),
+        ("a_count_that_wraps_is_no_loss", |r| wrapped(r, "wrapped-count")),
+        ("a_clock_that_wraps_is_no_loss", |r| wrapped(r, "wrapped-clock")),
+        ("a_size_that_the_driver_lacks_is_refused", |r| refused(r, "size", "--accept-format")),
+        ("a_size_that_the_driver_lacks_can_be_accepted", accepted),
+        ("a_camera_in_use_is_said_to_be", |r| refused(r, "busy", "in use by v4l2-ctl")),
+        ("a_camera_that_is_not_there_is_said_to_be", |r| refused(r, "absent", "is not there")),
+    ],
+};
+
+/// Stopped by the user, in good time, with a whole capture.
+fn stopped(r: &Results, case: &str) -> Result<(), String> {
+    let status = r.status(case)?;
+    claim(status == "130", || format!("{case}: status {status}: {}", r.messages(case).unwrap_or_default()))?;
+    let took = r.seconds(case, "asked", "ended")?;
+    claim(took < 5.0, || format!("{case}: stopped after {took} s"))?;
+    let seen = r.count(case, "frames_seen")?;
+    claim(seen >= 15, || format!("{case}: {seen} frames"))
+}
+
+fn clean(r: &Results) -> Result<(), String> {
+    stopped(r, "clean")?;
+    let (seen, lost) = (r.count("clean", "frames_seen")?, r.count("clean", "frames_dropped_camera")?);
+    // An emulated machine with other things to do may lose one.
+    claim(lost <= 1, || format!("{lost} of {seen} frames lost"))?;
+    let rate = r.capture("clean")?["timing"]["measured_rate_hz"].as_f64().unwrap_or(0.0);
+    claim((14.0..16.0).contains(&rate), || format!("{rate} Hz instead of 15"))
+}
+
+fn dropped(r: &Results, case: &str, share: std::ops::RangeInclusive<f64>) -> Result<(), String> {
+    stopped(r, case)?;
+    let (seen, lost) = (r.count(case, "frames_seen")? as f64, r.count(case, "frames_dropped_camera")? as f64);
+    let found = lost / (seen + lost);
+    claim(share.contains(&found), || format!("{case}: {lost} lost beside {seen} seen: {found:.2}"))?;
+    let gaps = r.capture(case)?["timing"]["gaps"].as_array().map_or(0, Vec::len);
+    claim(gaps > 0, || format!("{case}: no gap is named"))
+}
+
+fn flagged(r: &Results) -> Result<(), String> {
+    stopped(r, "flagged")?;
+    let broken = r.count("flagged", "frames_broken")?;
+    claim((1..=4).contains(&broken), || format!("{broken} counted as broken of 4"))
+}
+
+/// One line that says what and what to do, and status 3.
+fn refused(r: &Results, case: &str, word: &str) -> Result<(), String> {
+    let (status, said) = (r.status(case)?, r.messages(case)?);
+    claim(status == "3", || format!("{case}: status {status}: {said}"))?;
+    let lines: Vec<&str> = said.lines().filter(|l| !l.starts_with("arborcam: warning:")).collect();
+    claim(lines.len() == 1 && lines[0].contains(word), || format!("{case}: {said}"))
+}
+
+/// Said at once, waited for, and gone on with, the hole marked.
+fn recovered(r: &Results, case: &str) -> Result<(), String> {
+    stopped(r, case)?;
+    let capture = r.capture(case)?;
+    let gaps = capture["timing"]["gaps"].as_array().cloned().unwrap_or_default();
+    let longest = gaps.iter().filter_map(|g| g["missing"].as_u64()).max().unwrap_or(0);
+    claim(longest >= 1, || format!("{case}: no gap in {}", capture["timing"]))?;
+    let length = capture["timing"]["duration_s"].as_f64().unwrap_or(0.0);
+    claim(length > 4.5, || format!("{case}: nothing after the fault, {length} s in all"))?;
+    let said = r.messages(case)?;
+    claim(said.contains("disconnected"), || format!("{case}: nothing was said: {said}"))
+}
+
+/// `--once`: the shorter capture is whole, and the status says that it is shorter.
+fn ended_at_once(r: &Results, case: &str) -> Result<(), String> {
+    let (status, said) = (r.status(case)?, r.messages(case)?);
+    claim(status == "1" && said.contains("disconnected"), || format!("{case}: status {status}: {said}"))?;
+    let seen = r.count(case, "frames_seen")?;
+    claim(seen >= 15, || format!("{case}: {seen} frames"))
+}
+
+fn wrapped(r: &Results, case: &str) -> Result<(), String> {
+    stopped(r, case)?;
+    let (seen, lost) = (r.count(case, "frames_seen")?, r.count(case, "frames_dropped_camera")?);
+    claim(lost * 10 <= seen, || format!("{case}: {lost} counted as lost beside {seen} seen"))?;
+    // The capture's time goes on as the guest's own did.
+    let length = r.capture(case)?["timing"]["duration_s"].as_f64().unwrap_or(0.0);
+    let wall = r.seconds(case, "begun", "asked")?;
+    claim((wall - 2.5..=wall + 0.5).contains(&length), || format!("{case}: {length} s of time in {wall} s"))
+}
+
+fn accepted(r: &Results) -> Result<(), String> {
+    stopped(r, "size-accepted")?;
+    let source = r.capture("size-accepted")?["source"].clone();
+    let (asked, given) = (source["format_asked"].to_string(), source["format_given"].to_string());
+    claim(asked.contains("1000x700") && !given.contains("1000x700"), || format!("asked {asked}, given {given}"))?;
+    let said = r.messages("size-accepted")?;
+    claim(said.contains("1000x700"), || format!("the substitute is not shown: {said}"))
+}

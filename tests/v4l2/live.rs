@@ -1,0 +1,97 @@
+//! A capture in a real terminal: what it shows, what its keys do, and what it leaves of the terminal.
+
+use crate::guest::{Group, Results, claim, clip};
+
+pub const GROUP: Group = Group {
+    name: "live",
+    script: "live.sh",
+    first: "script",
+    limit_s: 180,
+    provide: clip,
+    cases: &[
+        ("the_screen_while_it_gathers_motion", |r| shows(r, "watching")),
+        ("the_help", |r| shows(r, "help")),
+        ("the_screen_after_the_build", |r| shows(r, "built")),
+        ("the_message_of_an_export", |r| shows(r, "exported")),
+        ("an_export_is_written_while_filming", exported),
+        ("q_ends_with_a_whole_capture", quit),
+        ("the_terminal_is_given_back", given_back),
+        ("poses_are_streamed", streamed),
+    ],
+};
+
+/// The screen without what changes from run to run: digits, and the drawings in the panels of pictures and curves.
+fn still(screen: &str) -> String {
+    let masked = screen.chars().map(|c| match c {
+        '0'..='9' => '#',
+        // Half blocks, blocks and braille.
+        '\u{2580}'..='\u{259f}' | '\u{2800}'..='\u{28ff}' => ' ',
+        c => c,
+    });
+    let masked: String = masked.collect();
+    let squeeze = |line: &str| {
+        // A number of one digit more must not move what follows it.
+        let mut out = String::new();
+        for word in line.split_whitespace() {
+            let word: String = word.split('#').filter(|p| !p.is_empty()).collect::<Vec<_>>().join("#");
+            if !word.is_empty() && word.chars().any(char::is_alphabetic) {
+                out.push_str(&word);
+                out.push(' ');
+            }
+        }
+        out.trim_end().to_owned()
+    };
+    masked.lines().map(squeeze).filter(|l| !l.is_empty()).collect::<Vec<_>>().join("\n")
+}
+
+fn shows(r: &Results, name: &str) -> Result<(), String> {
+    let found = still(&r.text(&format!("{name}.screen"))?);
+    let path = format!("tests/v4l2/screens/{name}.txt");
+    if std::env::var_os("INSTA_UPDATE").is_some_and(|v| v == "always") {
+        return std::fs::write(&path, found + "\n").map_err(|e| format!("{path}: {e}"));
+    }
+    let wanted = std::fs::read_to_string(&path).map_err(|e| format!("{path}: {e}"))?;
+    claim(found.trim() == wanted.trim(), || format!("{path}:\n--- wanted\n{wanted}\n--- found\n{found}"))
+}
+
+fn exported(r: &Results) -> Result<(), String> {
+    for file in ["capture.json", "tracks.csv", "nodes.csv", "motion.csv", "tree.glb"] {
+        claim(r.path("live/exported").join(file).exists(), || format!("{file} is missing"))?;
+    }
+    let last = |dir: &str| -> Result<u64, String> {
+        let text = r.text(&format!("live/{dir}/tracks.csv"))?;
+        Ok(text.lines().skip(1).filter_map(|l| l.split(',').nth(1)?.parse().ok()).max().unwrap_or(0))
+    };
+    let (then, at_the_end) = (last("exported")?, last("capture")?);
+    claim(then < at_the_end, || format!("exported up to frame {then}, ended at {at_the_end}"))
+}
+
+fn quit(r: &Results) -> Result<(), String> {
+    let (status, took) = (r.status("live")?, r.seconds("live", "asked", "ended")?);
+    claim(status == "0", || format!("status {status}: {}", r.text("after.screen").unwrap_or_default()))?;
+    claim(took < 10.0, || format!("{took} s from q to the end"))?;
+    claim(r.path("live/capture/tree.glb").exists(), || "no model".into())
+}
+
+fn given_back(r: &Results) -> Result<(), String> {
+    let (modes, screen) = (r.text("live/terminal")?, r.text("after.screen")?);
+    claim(modes.contains("echo") && !modes.contains("-echo") && modes.contains("icanon"), || modes.clone())?;
+    claim(screen.contains("after>") && screen.contains("capture: "), || screen.clone())?;
+    claim(!screen.contains("Camera ─"), || format!("the program's screen is still there:\n{screen}"))
+}
+
+fn streamed(r: &Results) -> Result<(), String> {
+    let text = r.text("stream/stdout")?;
+    let mut last = None;
+    let mut poses = 0;
+    // A line that was cut by the end is none.
+    for line in text.lines() {
+        let pose: serde_json::Value = serde_json::from_str(line).map_err(|e| format!("{e}: {line}"))?;
+        let Some(frame) = pose["frame"].as_u64() else { continue };
+        claim(last.is_none_or(|l| frame > l), || format!("frame {frame} after {last:?}"))?;
+        claim(pose["nodes"].as_array().is_some_and(|n| n.len() > 3), || format!("few nodes: {line}"))?;
+        last = Some(frame);
+        poses += 1;
+    }
+    claim(poses >= 10, || format!("{poses} poses: {}", r.messages("stream").unwrap_or_default()))
+}

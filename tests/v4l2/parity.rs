@@ -1,0 +1,92 @@
+//! A clip through a real device gives what the file gives: the same luma, and from it the same tracks and tree.
+
+use crate::guest::{Group, Results, claim, clip, frames_of};
+use arborcam::model::{Luma, PixelFormat, RawFrame, Size};
+use arborcam::source::Decoder;
+use std::path::Path;
+
+pub const GROUP: Group = Group {
+    name: "parity",
+    script: "parity.sh",
+    first: "script",
+    limit_s: 240,
+    provide,
+    cases: &[
+        ("mjpeg_has_the_luma_of_the_file", |r| luma(r, "mjpeg")),
+        ("yuyv_has_the_luma_of_the_file", |r| luma(r, "yuyv")),
+        ("mjpeg_gives_the_tracks_and_the_tree_of_its_replay", |r| replay(r, "mjpeg")),
+        ("yuyv_gives_the_tracks_and_the_tree_of_its_replay", |r| replay(r, "yuyv")),
+    ],
+};
+
+/// Rate at which the clip is played: what an emulated processor follows without dropping a frame, Hz.
+const RATE_HZ: f64 = 10.0;
+
+/// Decoded pictures, one after the other.
+fn lumas(frames: &[RawFrame]) -> Result<Vec<Vec<u8>>, String> {
+    let mut decoder = Decoder::new().map_err(|e| e.to_string())?;
+    let decoded = frames.iter().map(|raw| {
+        let mut luma = Luma { size: raw.size, pixels: Vec::new() };
+        decoder.luma(raw, &mut luma).map_err(|e| e.to_string())?;
+        Ok(luma.pixels)
+    });
+    decoded.collect()
+}
+
+/// The clip as recordings, in both formats, at the rate at which it is to be played.
+fn provide(folder: &Path) -> Result<(), String> {
+    clip(folder)?;
+    let mut frames = frames_of(&folder.join("clip.mkv"))?;
+    for (n, frame) in frames.iter_mut().enumerate() {
+        frame.sensor_time_s = n as f64 / RATE_HZ;
+        frame.sequence = Some(n as u64);
+    }
+    crate::guest::record(&folder.join("clip-mjpeg.mcap"), &frames)?;
+    for (frame, luma) in frames.iter_mut().zip(lumas(&frames.clone())?) {
+        frame.format = PixelFormat::Yuyv;
+        // Without colour.
+        frame.bytes = luma.iter().flat_map(|y| [*y, 128]).collect();
+    }
+    crate::guest::record(&folder.join("clip-yuyv.mcap"), &frames)
+}
+
+/// Each filmed frame is the clip's next, from wherever the filming began.
+fn luma(r: &Results, format: &str) -> Result<(), String> {
+    let clip = lumas(&frames_of(&r.path(&format!("clip-{format}.mcap")))?)?;
+    let filmed = frames_of(&r.path(&format!("live-{format}.mcap")))?;
+    claim(filmed.len() > 100, || format!("{} frames filmed: {}", filmed.len(), said(r, format)))?;
+    let right = PixelFormat::from_fourcc(if format == "mjpeg" { "MJPG" } else { "YUYV" });
+    claim(filmed.iter().all(|f| Some(f.format) == right && f.size == Size::new(320, 180)), || "another format".into())?;
+    let filmed = lumas(&filmed)?;
+    let first = clip.iter().position(|l| *l == filmed[0]).ok_or("the first frame is none of the clip's")?;
+    for (n, luma) in filmed.iter().enumerate() {
+        let wanted = &clip[(first + n) % clip.len()];
+        claim(luma == wanted, || {
+            let is = clip.iter().position(|l| l == luma);
+            format!("filmed frame {n} is the clip's {is:?} instead of {}", (first + n) % clip.len())
+        })?;
+    }
+    Ok(())
+}
+
+fn said(r: &Results, format: &str) -> String {
+    let of = |name: String| r.messages(&name).unwrap_or_default();
+    format!("{}{}", of(format!("live-{format}")), of(format!("replay-{format}")))
+}
+
+fn replay(r: &Results, format: &str) -> Result<(), String> {
+    let (live, again) = (format!("live-{format}"), format!("replay-{format}"));
+    let statuses = (r.status(&live)?, r.status(&again)?);
+    claim(statuses == ("130".into(), "0".into()), || format!("{statuses:?}: {}", said(r, format)))?;
+    // A frame that the tracker had no time for would be a difference of its own.
+    let dropped = r.count(&live, "frames_dropped_tracker")?;
+    claim(dropped == 0, || format!("the guest was too slow: {dropped} frames dropped"))?;
+    for file in ["tracks.csv", "nodes.csv", "motion.csv"] {
+        let [a, b] = [&live, &again].map(|name| r.text(&format!("{name}/capture/{file}")));
+        let (a, b) = (a?, b?);
+        claim(a.lines().count() > 10, || format!("{live}: {file} has {} lines", a.lines().count()))?;
+        let differ = a.lines().zip(b.lines()).find(|(a, b)| a != b);
+        claim(differ.is_none() && a.len() == b.len(), || format!("{file}: live and replay differ: {differ:?}"))?;
+    }
+    Ok(())
+}

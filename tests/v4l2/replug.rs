@@ -1,0 +1,96 @@
+//! A USB camera with a serial number, pulled out and plugged in again under a running capture.
+
+use crate::guest::{Group, Results, claim, clip};
+
+/// Times that the script unplugs it.
+const CYCLES: usize = 20;
+/// From the device's return to the next pose, s.
+const RECOVERY_S: f64 = 2.0;
+
+pub const GROUP: Group = Group {
+    name: "replug",
+    script: "replug.sh",
+    first: "script",
+    limit_s: 240,
+    provide: clip,
+    cases: &[
+        ("each_of_twenty_returns_is_taken_within_two_seconds", recovered),
+        ("tree_and_tracks_outlive_the_gaps", one_tree),
+        ("another_camera_is_not_taken_for_the_one_that_is_awaited", not_another),
+        ("a_camera_that_hangs_is_waited_for", hang),
+        ("a_camera_that_hangs_ends_a_capture_that_is_to_end_with_it", hang_once),
+        ("a_camera_is_known_by_its_serial_number", identity),
+    ],
+};
+
+/// Seconds of each cycle: pulled, back, frames again; and the count of poses before and after.
+fn cycles(r: &Results) -> Result<Vec<Vec<f64>>, String> {
+    let text = r.text("cycles")?;
+    let line = |l: &str| l.split_whitespace().take(5).filter_map(|w| w.parse().ok()).collect();
+    Ok(text.lines().map(line).collect())
+}
+
+fn recovered(r: &Results) -> Result<(), String> {
+    let cycles = cycles(r)?;
+    claim(cycles.len() == CYCLES, || format!("{} cycles of {CYCLES}: {}", cycles.len(), said(r)))?;
+    for (n, cycle) in cycles.iter().enumerate() {
+        let [_, back, again, before, after] = cycle[..] else { return Err(format!("cycle {n}: {cycle:?}")) };
+        claim(after > before, || format!("cycle {n}: no pose after the return: {}", said(r)))?;
+        claim(again - back <= RECOVERY_S, || format!("cycle {n}: {:.2} s until the next pose", again - back))?;
+    }
+    let status = r.status("replug")?;
+    claim(status == "130", || format!("status {status}: {}", said(r)))
+}
+
+fn said(r: &Results) -> String {
+    r.messages("replug").unwrap_or_default()
+}
+
+fn one_tree(r: &Results) -> Result<(), String> {
+    let capture = r.capture("replug")?;
+    let built = capture["build"]["time_s"].as_f64().ok_or("no tree")?;
+    let first = cycles(r)?.first().and_then(|c| c.first().copied()).ok_or("no cycle")?;
+    let begun = r.number("replug/begun")?;
+    claim(built < first - begun, || format!("built at {built} s, unplugged at {} s", first - begun))?;
+    // Marked: each is a gap of at least the time that the camera was away.
+    let gaps = capture["timing"]["gaps"].as_array().cloned().unwrap_or_default();
+    let long = gaps.iter().filter(|g| g["missing"].as_u64().is_some_and(|n| n >= 3)).count();
+    claim(long >= CYCLES, || format!("{long} gaps for {CYCLES} cycles: {gaps:?}"))?;
+    // Points that were followed before the first are followed after the last.
+    let tracks = r.text("replug/capture/tracks.csv")?;
+    let cell = |l: &str, n: usize| l.split(',').nth(n).and_then(|c| c.parse::<f64>().ok()).unwrap_or(f64::NAN);
+    let last = tracks.lines().skip(1).map(|l| cell(l, 2)).fold(0.0, f64::max);
+    let ids = |from: f64, to: f64| -> std::collections::BTreeSet<u64> {
+        let within = |l: &&str| (from..=to).contains(&cell(l, 2));
+        tracks.lines().skip(1).filter(within).map(|l| cell(l, 0) as u64).collect()
+    };
+    let (before, after) = (ids(built - 1.0, built), ids(last - 0.5, last));
+    let kept = before.intersection(&after).count();
+    claim(2 * kept > before.len(), || format!("{kept} of {} points are left", before.len()))
+}
+
+fn not_another(r: &Results) -> Result<(), String> {
+    let text = r.text("another")?;
+    let counts: Vec<u64> = text.split_whitespace().filter_map(|w| w.parse().ok()).collect();
+    claim(counts.len() == 2 && counts[0] == counts[1], || format!("poses went on with another camera: {counts:?}"))
+}
+
+fn hang(r: &Results) -> Result<(), String> {
+    let status = r.status("hang")?;
+    let said = r.messages("hang")?;
+    claim(status == "130" && said.contains("no frame for 1 s"), || format!("status {status}: {said}"))?;
+    let length = r.capture("hang")?["timing"]["duration_s"].as_f64().unwrap_or(0.0);
+    claim(length > 5.0, || format!("not taken up again: {length} s"))
+}
+
+fn hang_once(r: &Results) -> Result<(), String> {
+    let (status, said) = (r.status("hang-once")?, r.messages("hang-once")?);
+    claim(status == "1" && said.contains("no frame for 1 s"), || format!("status {status}: {said}"))?;
+    r.capture("hang-once").map(drop)
+}
+
+fn identity(r: &Results) -> Result<(), String> {
+    let text = r.text("devices.json")?;
+    claim(text.contains("\"one\"") || text.contains(":one\"") || text.contains("one"), || text.clone())?;
+    claim(text.contains("1209"), || text.clone())
+}

@@ -1,0 +1,82 @@
+# What the guest scripts have in common. Arguments of each: the program under test, and this test's own binary, which
+# plays the USB camera.
+bin=$1 helper=$2 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+clip=/vm/clip.mjpg
+work=/tmp/arborcam-vm
+rm -rf "$work"
+mkdir -p "$work"
+
+now() { cut -d' ' -f1 /proc/uptime; }
+
+# until SECONDS COMMAND...: waits until it succeeds.
+until_ok() {
+    local left=$(($1 * 20))
+    shift
+    until "$@" >/dev/null 2>&1; do
+        ((left-- > 0)) || { echo "waited in vain: $*" >&2; return 1; }
+        sleep 0.05
+    done
+}
+
+# Runs the program in the background as case NAME: its output, and afterwards its status, go to /vm/NAME/.
+begin() {
+    name=$1
+    shift
+    mkdir -p "/vm/$name"
+    now >"/vm/$name/begun"
+    "$bin" "$@" >"/vm/$name/stdout" 2>"/vm/$name/stderr" </dev/null &
+    pid=$!
+}
+
+# Waits up to SECONDS for the case begun last; what does not end then is killed and has status `hung`.
+end() {
+    local left=$(($1 * 20)) status=0
+    while kill -0 "$pid" 2>/dev/null; do
+        if ((left-- <= 0)); then
+            kill -KILL "$pid"
+            wait "$pid" 2>/dev/null
+            echo hung >"/vm/$name/status"
+            return
+        fi
+        sleep 0.05
+    done
+    wait "$pid" || status=$?
+    now >"/vm/$name/ended"
+    echo "$status" >"/vm/$name/status"
+    [[ ! -d $work/$name ]] || cp -r "$work/$name" "/vm/$name/capture"
+    rm -rf "${work:?}/${name:?}"
+}
+
+# Asks the case begun last to stop, as from the keyboard, and waits for its end.
+stop() {
+    now >"/vm/$name/asked"
+    kill -INT "$pid" 2>/dev/null
+    end 20
+}
+
+running() { kill -0 "$pid" 2>/dev/null; }
+
+# A USB camera with the serial number $1, in port $2 (0), that delivers the clip at 15 Hz while $gate is there.
+gate=$work/gate
+plug_in() {
+    "$helper" usb-camera "$work/clip.mjpg" 320 180 15 "$1" "${2:-0}" "$gate" &
+    camera=$!
+}
+pull_out() {
+    kill "$camera"
+    wait "$camera" 2>/dev/null
+}
+
+# What the captures of that camera are asked for with.
+usb_camera_settings() {
+    modprobe vhci-hcd
+    modprobe uvcvideo
+    cp $clip "$work/clip.mjpg"
+    touch "$gate"
+    printf '[camera]\nformat = "mjpeg"\nwidth = 320\nheight = 180\nrate_hz = 15\n' >"$work/camera.toml"
+    printf '{"frame":0,"width":320,"height":180,"polygon_px":[[8,8],[311,8],[311,171],[8,171]]}' >"$work/outline.json"
+    usb_settings=(--config "$work/camera.toml" --outline "$work/outline.json")
+}
+
+# Until the program has mapped its buffers, which is when it starts to film.
+filming() { grep -q '/dev/video' "/proc/$1/maps"; }
