@@ -353,7 +353,8 @@ fn what_the_recorder_cannot_keep_up_with_is_counted() {
     let dir = tempfile::tempdir().expect("tempdir");
     let path = dir.path().join("flood.mcap");
     let source = Box::new(Replayed { next: 0, live: true, name: "flood".into(), flood: Some(4 << 20) });
-    let job = RecordJob { to: RecordTo { head: head(), ..record_to(&path) }, pace: Pace::Live, camera: Default::default() };
+    let job =
+        RecordJob { to: RecordTo { head: head(), ..record_to(&path) }, pace: Pace::Live, camera: Default::default() };
     let running = runtime::record(source, job).expect("start");
     while !running.finished() {
         std::thread::sleep(Duration::from_millis(5));
