@@ -8,6 +8,7 @@
 //! A dropped sender ends the stream: when the source is done, the tracker works off its queue and ends, then the model
 //! does and writes the capture.
 
+mod capture_tables;
 mod finish;
 mod latest;
 mod losses;
