@@ -17,6 +17,9 @@ const QUEUE_BYTES: usize = 96 << 20;
 /// What has been written for longer than this is in the hands of the system: half of what may be lost at most.
 const FLUSH_EVERY: Duration = Duration::from_millis(500);
 
+/// A source that can wait looks again after so long.
+const NAP: Duration = Duration::from_millis(2);
+
 /// What is to be recorded, and where.
 #[derive(Clone, Debug)]
 pub struct RecordTo {
@@ -91,10 +94,14 @@ impl Recorder {
     /// Offers a frame with its place in the capture.
     pub fn offer(&self, raw: &Arc<RawFrame>, index: u64) {
         let bytes = raw.bytes.len();
-        let fits = self.waiting.fetch_add(bytes, Ordering::Relaxed) + bytes <= QUEUE_BYTES;
-        // One that is larger than the queue is let in alone.
-        let fits = fits || self.queue.is_empty();
-        if (self.live && !fits) || !self.put(Item::Frame(raw.clone(), index)) {
+        // One that is larger than the whole queue is let in alone.
+        let full = || self.waiting.load(Ordering::Relaxed) + bytes > QUEUE_BYTES && !self.queue.is_empty();
+        while !self.live && full() {
+            std::thread::sleep(NAP);
+        }
+        let refused = self.live && full();
+        self.waiting.fetch_add(bytes, Ordering::Relaxed);
+        if refused || !self.put(Item::Frame(raw.clone(), index)) {
             self.waiting.fetch_sub(bytes, Ordering::Relaxed);
             if self.shared.counts.not_recorded.fetch_add(1, Ordering::Relaxed) == 0 {
                 self.shared.warn("the recording does not keep up, frames are missing in it; see the count".into());
