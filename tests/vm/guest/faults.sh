@@ -9,7 +9,8 @@ v4l2-ctl -d $device -i 0 >/dev/null
 set_control horizontal_movement=4
 
 settings() {
-    printf '[camera]\nformat = "yuyv"\nwidth = %s\nheight = %s\nrate_hz = %s\n' "$1" "$2" "$3" >"$work/$4.toml"
+    printf '[camera]\nformat = "yuyv"\nwidth = %s\nheight = %s\nrate_hz = %s\n[detect]\npoints = 60\n' \
+        "$1" "$2" "$3" >"$work/$4.toml"
 }
 settings 320 180 15 small
 settings 320 180 60 fast
