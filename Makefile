@@ -1,5 +1,6 @@
 # make demo: from a fresh machine to a moving tree in out/demo. make test: every test. make bench: the figures.
-.PHONY: demo build test bench lint setup
+# make install, make uninstall: program and service, below DESTDIR (for packages) and PREFIX.
+.PHONY: demo build test bench lint setup install uninstall
 
 demo: setup build
 	@scripts/demo.sh
@@ -19,3 +20,39 @@ bench:
 lint:
 	cargo fmt --check
 	cargo clippy --locked --all-targets -- -D warnings
+
+PREFIX ?= /usr/local
+# Where the system looks for its parts; below /usr/local it reads neither udev rules nor all of the others.
+SYSTEM ?= /usr/lib
+BINARY ?= target/release/arborcam
+put = install -D -m
+with_prefix = sed 's|@PREFIX@|$(PREFIX)|g'
+DOCS = README.md docs/using.md docs/camera.md docs/files.md docs/settings.md docs/service.md
+INSTALLED = $(PREFIX)/bin/arborcam $(PREFIX)/lib/arborcam/arborcam-service \
+	$(addprefix $(PREFIX)/share/arborcam/, arborcam.toml sbc.toml) \
+	$(addprefix $(PREFIX)/share/doc/arborcam/, $(notdir $(DOCS))) \
+	$(SYSTEM)/systemd/system/arborcam@.service $(SYSTEM)/udev/rules.d/70-arborcam.rules \
+	$(SYSTEM)/sysusers.d/arborcam.conf $(SYSTEM)/tmpfiles.d/arborcam.conf
+
+# Builds nothing: `make build` first, as the user that has Rust.
+install:
+	@test -x $(BINARY) || { echo "install: $(BINARY) is not there; run \`make build\` first" >&2; exit 1; }
+	$(put) 755 $(BINARY) $(DESTDIR)$(PREFIX)/bin/arborcam
+	install -d $(DESTDIR)$(PREFIX)/lib/arborcam $(DESTDIR)$(SYSTEM)/systemd/system
+	$(with_prefix) systemd/arborcam-service > $(DESTDIR)$(PREFIX)/lib/arborcam/arborcam-service
+	chmod 755 $(DESTDIR)$(PREFIX)/lib/arborcam/arborcam-service
+	$(with_prefix) systemd/arborcam@.service > $(DESTDIR)$(SYSTEM)/systemd/system/arborcam@.service
+	chmod 644 $(DESTDIR)$(SYSTEM)/systemd/system/arborcam@.service
+	$(put) 644 systemd/70-arborcam.rules $(DESTDIR)$(SYSTEM)/udev/rules.d/70-arborcam.rules
+	$(put) 644 systemd/arborcam.sysusers $(DESTDIR)$(SYSTEM)/sysusers.d/arborcam.conf
+	$(put) 644 systemd/arborcam.tmpfiles $(DESTDIR)$(SYSTEM)/tmpfiles.d/arborcam.conf
+	install -d $(DESTDIR)$(PREFIX)/share/arborcam $(DESTDIR)$(PREFIX)/share/doc/arborcam
+	install -m 644 config/arborcam.toml config/sbc.toml $(DESTDIR)$(PREFIX)/share/arborcam
+	install -m 644 $(DOCS) $(DESTDIR)$(PREFIX)/share/doc/arborcam
+	@test -n "$(DESTDIR)" || scripts/activate.sh
+
+# Captures and /etc/arborcam are the user's and stay.
+uninstall:
+	rm -f $(addprefix $(DESTDIR), $(INSTALLED))
+	-rmdir $(addprefix $(DESTDIR)$(PREFIX)/, lib/arborcam share/arborcam share/doc/arborcam) 2>/dev/null
+	@test -n "$(DESTDIR)" || scripts/activate.sh

@@ -1,7 +1,12 @@
 //! Settings: plain structs whose defaults are the documented ones. A file overrides a default, the command line a file.
 
+mod reload;
+
+pub use reload::{Change, EFFECTS, Effect, effect};
+
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use std::time::Duration;
 
 /// Everything that can be set, one section a stage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -23,13 +28,35 @@ pub struct Config {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Camera {
-    /// `auto` (MJPEG before YUYV), `mjpeg` or `yuyv`.
+    /// `auto` (the best that the camera lists at that size and rate), or one of the formats.
     pub format: CameraFormat,
     pub width: u32,
     pub height: u32,
     pub rate_hz: u32,
+    /// Take what the camera gives instead of what was asked for.
+    pub accept_format: bool,
     /// Silence after which the camera counts as hung, s.
     pub timeout_s: f64,
+    /// Wait for a camera that was lost and go on; else the capture ends.
+    pub reconnect: bool,
+    /// Time between two attempts to start a lost camera that is there again, s.
+    pub retry_delay_s: f64,
+    /// What the camera is read through.
+    pub backend: Backend,
+}
+
+impl Camera {
+    /// [`timeout_s`](Self::timeout_s) as a duration.
+    pub fn time_limit(&self) -> Duration {
+        Duration::from_secs_f64(self.timeout_s.clamp(0.001, 1e6))
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Backend {
+    V4l2,
+    Nokhwa,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -38,6 +65,10 @@ pub enum CameraFormat {
     Auto,
     Mjpeg,
     Yuyv,
+    Uyvy,
+    Nv12,
+    Grey,
+    Rgb24,
 }
 
 /// Automatic outline: where motion energy concentrates.
@@ -173,7 +204,17 @@ pub struct Export {
 
 impl Default for Camera {
     fn default() -> Self {
-        Self { format: CameraFormat::Auto, width: 1280, height: 720, rate_hz: 30, timeout_s: 3.0 }
+        Self {
+            format: CameraFormat::Auto,
+            width: 1280,
+            height: 720,
+            rate_hz: 30,
+            accept_format: false,
+            timeout_s: 3.0,
+            reconnect: true,
+            retry_delay_s: 0.5,
+            backend: Backend::V4l2,
+        }
     }
 }
 impl Default for Outline {
@@ -250,10 +291,18 @@ impl Config {
         let shown = path.display().to_string();
         let text =
             std::fs::read_to_string(path).map_err(|source| ConfigError::Unreadable { path: shown.clone(), source })?;
-        let config: Config = toml::from_str(&text).map_err(|e| {
+        Self::parse(&text, &shown)
+    }
+
+    /// Takes the text of a TOML file over the defaults; `name` is for messages.
+    ///
+    /// # Errors
+    /// As for [`Config::load`].
+    pub fn parse(text: &str, name: &str) -> Result<Self, ConfigError> {
+        let config: Config = toml::from_str(text).map_err(|e| {
             let at = e.span().map_or(0, |s| s.start);
             let line = text[..at.min(text.len())].matches('\n').count() + 1;
-            ConfigError::BadEntry { path: shown, line, what: e.message().replace('\n', " ") }
+            ConfigError::BadEntry { path: name.into(), line, what: e.message().replace('\n', " ") }
         })?;
         config.check()?;
         Ok(config)
@@ -266,11 +315,12 @@ impl Config {
     pub fn check(&self) -> Result<(), ConfigError> {
         let positive = (f64::MIN_POSITIVE, 1e9, "greater than 0");
         let share = (0.0, 1.0, "0 to 1");
-        let rules: [(&'static str, f64, (f64, f64, &'static str)); 28] = [
+        let rules: [(&'static str, f64, (f64, f64, &'static str)); 29] = [
             ("camera.width", self.camera.width.into(), (16.0, 16384.0, "16 to 16384")),
             ("camera.height", self.camera.height.into(), (16.0, 16384.0, "16 to 16384")),
             ("camera.rate_hz", self.camera.rate_hz.into(), (1.0, 1000.0, "1 to 1000")),
             ("camera.timeout_s", self.camera.timeout_s, (0.05, 3600.0, "0.05 to 3600")),
+            ("camera.retry_delay_s", self.camera.retry_delay_s, (0.05, 3600.0, "0.05 to 3600")),
             ("outline.gather_s", self.outline.gather_s, (0.1, 60.0, "0.1 to 60")),
             ("outline.give_up_s", self.outline.give_up_s, (0.1, 3600.0, "0.1 to 3600")),
             ("detect.points", self.detect.points.into(), (16.0, 2000.0, "16 to 2000")),

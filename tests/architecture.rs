@@ -27,7 +27,9 @@ const MAY_USE: &[(&str, &[&str])] = &[
     // The screen draws outlines, and refuses the crossing ones as a file would be.
     ("tui", &["model", "outline::crossing"]),
     ("runtime", &["model", "config", "source", "outline", "shape", "dynamics", "pipeline", "recording", "export"]),
-    ("cli", &["model", "config", "source", "outline", "pipeline", "recording", "runtime", "export", "tui"]),
+    // It tries what a capture would use: a camera, the decoder, the front end; the rest of the machine it reads itself.
+    ("doctor", &["model", "config", "source", "outline::whole", "pipeline::FrontEnd"]),
+    ("cli", &["model", "config", "source", "outline", "pipeline", "recording", "runtime", "export", "tui", "doctor"]),
     ("main.rs", &["cli"]),
 ];
 
@@ -43,16 +45,19 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("mcap::", &["recording"]),
     ("clap::", &["cli"]),
     ("anyhow::", &["cli"]),
+    ("sd_notify::", &["cli"]),
     ("crossbeam_channel::", &["runtime"]),
     ("thread::Builder", &["runtime"]),
     ("thread::spawn", &["runtime"]),
     ("thread::scope", &["runtime"]),
     ("mpsc::", &["runtime"]),
-    ("tempfile::", &["source", "recording"]),
+    // The doctor writes a nameless file to see how fast the disk is.
+    ("tempfile::", &["source", "recording", "doctor"]),
     ("fs::write", &["export"]),
     ("File::create", &["export"]),
     // Stages know no clock; the pipeline passes one on that it does not look at.
-    ("Instant::now", &["runtime", "tui", "source"]),
+    // The line to the service manager keeps its beat; the doctor measures.
+    ("Instant::now", &["runtime", "tui", "source", "cli", "doctor"]),
     // When a recording began, for those who look for it in a calendar.
     ("SystemTime", &["runtime"]),
 ];

@@ -1,6 +1,6 @@
 //! The shipped configuration file is the documentation of the settings: it must name all of them, and as they are.
 
-use arborcam::config::Config;
+use arborcam::config::{self, Config};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -85,4 +85,79 @@ fn a_wait_longer_than_the_memory_is_refused() {
     let config: Config = toml::from_str("[accumulate]\nwindow_s = 5.0\n").expect("TOML");
     let message = config.check().expect_err("8 s of 5 s").to_string();
     assert!(message.contains("accumulate.min_s") && message.contains("accumulate.window_s"), "{message}");
+}
+
+/// `section.key = value` of every setting, as JSON.
+fn flat(config: &Config) -> std::collections::BTreeMap<String, serde_json::Value> {
+    let value = serde_json::to_value(config).expect("JSON");
+    let of_section = |(section, settings): (&String, &serde_json::Value)| -> Vec<(String, serde_json::Value)> {
+        let settings = settings.as_object().expect("a section");
+        settings.iter().map(|(key, value)| (format!("{section}.{key}"), value.clone())).collect()
+    };
+    value.as_object().expect("sections").iter().flat_map(of_section).collect()
+}
+
+/// The profile for a small board differs in exactly this; whoever changes a default must look here whether the profile
+/// still makes sense. It names nothing that is not different, and gives a reason for everything that is.
+#[test]
+fn the_small_board_s_profile_differs_where_it_says() {
+    const DIFFERENT: &[(&str, f64, f64)] = &[
+        ("camera.height", 720.0, 480.0),
+        ("camera.width", 1280.0, 640.0),
+        ("detect.points", 400.0, 200.0),
+        ("export.animation_s", 60.0, 30.0),
+        ("hierarchy.levels", 7.0, 6.0),
+        ("shape.attractors", 256.0, 128.0),
+        ("shape.planes", 3.0, 2.0),
+        ("track.anchor_every", 2.0, 4.0),
+        ("track.levels", 3.0, 2.0),
+    ];
+    let path = Path::new("config/sbc.toml");
+    let (profile, default) = (flat(&Config::load(path).expect("it loads")), flat(&Config::default()));
+    let number = |v: &serde_json::Value| v.as_f64().unwrap_or(f64::NAN);
+    let differs = |(key, from): (&String, &serde_json::Value)| {
+        (profile[key] != *from).then(|| (key.clone(), number(from), number(&profile[key])))
+    };
+    let found: Vec<_> = default.iter().filter_map(differs).collect();
+    let stated: Vec<_> = DIFFERENT.iter().map(|(k, a, b)| ((*k).to_owned(), *a, *b)).collect();
+    assert_eq!(found, stated);
+    let text = std::fs::read_to_string(path).expect("file");
+    let named = keys(&text.parse().expect("TOML"));
+    assert_eq!(named, stated.into_iter().map(|(key, ..)| key).collect());
+    let lines: Vec<&str> = text.lines().collect();
+    for (i, line) in lines.iter().enumerate().filter(|(_, l)| l.contains(" = ")) {
+        let above = lines[..i].iter().rev().find(|l| !l.contains(" = ")).expect("a line above");
+        assert!(above.starts_with("# ") && above.len() > 20, "line {}: {line} has no reason", i + 1);
+    }
+}
+
+/// A reload must have an answer for every setting, and name none that is not there.
+#[test]
+fn every_setting_says_when_a_change_counts() {
+    let all = flat(&Config::default());
+    for key in all.keys() {
+        assert!(config::effect(key).is_some(), "{key}");
+    }
+    for (name, _) in config::EFFECTS {
+        let known = all.keys().any(|key| key == name || key.starts_with(&format!("{name}.")));
+        assert!(known, "{name} is no setting");
+    }
+}
+
+#[test]
+fn a_reload_takes_what_loses_nothing_and_names_the_rest() {
+    let (before, mut wanted) = (Config::default(), Config::default());
+    (wanted.camera.timeout_s, wanted.camera.width, wanted.hierarchy.levels) = (9.0, 640, 5);
+    let (after, changes) = before.reload(&wanted);
+    let mut expected = before.clone();
+    expected.camera.timeout_s = 9.0;
+    assert_eq!(after, expected);
+    let lines: Vec<String> = changes.iter().map(ToString::to_string).collect();
+    assert_eq!(lines[0], "camera.timeout_s is now 9.0 (was 3.0)");
+    assert!(lines[1].starts_with("camera.width stays 1280; 640 counts from the next start: "), "{}", lines[1]);
+    assert!(lines[2].starts_with("hierarchy.levels stays 7; 5 counts from the next start: "), "{}", lines[2]);
+    assert_eq!(lines.len(), 3);
+    // What had to wait is still not what the file says, and is told again.
+    assert_eq!(after.reload(&wanted).1.len(), 2);
+    assert_eq!(before.reload(&before), (before.clone(), Vec::new()));
 }

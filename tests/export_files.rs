@@ -94,7 +94,7 @@ fn a_capture_reads_back_as_it_was_written_and_is_the_same_every_time() {
     let skeleton = synthetic::tree(3, 2);
     let mut timing = Timing { nominal_rate_hz: Some(30.0), ..Timing::default() };
     for k in 0..MAX_GAPS as u64 + 5 {
-        timing.push_gap(Gap { after_frame: 2 * k, time_s: k as f64, missing: 1 });
+        timing.push_gap(Gap { after_frame: 2 * k, time_s: k as f64, missing: 1, ..Gap::default() });
     }
     assert_eq!((timing.gaps.len(), timing.gaps_not_listed), (MAX_GAPS, 5));
     let capture = Capture {

@@ -264,6 +264,7 @@ fn other_programs_files_are_read_or_refused_with_their_topics() {
 struct Replayed {
     next: usize,
     live: bool,
+    name: String,
     /// Frames come as fast as they are taken, each with so many bytes.
     flood: Option<usize>,
 }
@@ -283,7 +284,7 @@ impl Source for Replayed {
 
     fn describe(&self) -> SourceInfo {
         SourceInfo {
-            name: "replayed".into(),
+            name: self.name.clone(),
             format: FormatNote::default(),
             size: if self.flood.is_some() { SMALL } else { support::SIZE },
             nominal_rate_hz: Some(30.0),
@@ -319,7 +320,7 @@ fn run(source: Box<dyn Source>, out: &Path, record: Option<RecordTo>) -> runtime
 fn a_replay_of_a_recording_is_the_run_that_made_it() {
     let dir = tempfile::tempdir().expect("tempdir");
     let (path, first, second) = (dir.path().join("run.mcap"), dir.path().join("first"), dir.path().join("second"));
-    let live = Box::new(Replayed { next: 0, live: false, flood: None });
+    let live = Box::new(Replayed { next: 0, live: false, name: path.display().to_string(), flood: None });
     let recorded = run(live, &first, Some(record_to(&path))).recorded.expect("recorded");
     assert_eq!((recorded.frames, recorded.files), (330, 1));
     run(source::open(&path, &config::Camera::default(), None).expect("opened"), &second, None);
@@ -351,8 +352,9 @@ fn a_replay_of_a_recording_is_the_run_that_made_it() {
 fn what_the_recorder_cannot_keep_up_with_is_counted() {
     let dir = tempfile::tempdir().expect("tempdir");
     let path = dir.path().join("flood.mcap");
-    let source = Box::new(Replayed { next: 0, live: true, flood: Some(4 << 20) });
-    let job = RecordJob { to: RecordTo { head: head(), ..record_to(&path) }, pace: Pace::Live };
+    let source = Box::new(Replayed { next: 0, live: true, name: "flood".into(), flood: Some(4 << 20) });
+    let job =
+        RecordJob { to: RecordTo { head: head(), ..record_to(&path) }, pace: Pace::Live, camera: Default::default() };
     let running = runtime::record(source, job).expect("start");
     while !running.finished() {
         std::thread::sleep(Duration::from_millis(5));

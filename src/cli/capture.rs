@@ -1,15 +1,20 @@
 //! `arborcam capture DEVICE`: the whole way, live.
 
+use super::camera::CameraArgs;
 use super::recording::RecordOption;
 use super::session::{self, Plan};
 use super::{Common, Ended};
+use crate::config::Config;
 use clap::Args;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub struct CaptureArgs {
-    /// The camera, e.g. /dev/video0; `arborcam devices` lists them. A recording is taken at its own pace.
+    /// The camera: /dev/video0, a link to it, or the name that stays, all as `arborcam devices` lists them. A recording is
+    /// taken at its own pace.
     device: PathBuf,
+    #[command(flatten)]
+    camera: CameraArgs,
     #[command(flatten)]
     common: Common,
     #[command(flatten)]
@@ -17,5 +22,6 @@ pub struct CaptureArgs {
 }
 
 pub fn run(args: &CaptureArgs) -> Result<(), Ended> {
-    session::run(&args.common, Plan { input: &args.device, fps: None, pace: None, record: &args.record })
+    let set = |config: &mut Config| args.camera.set(&mut config.camera);
+    session::run(&args.common, Plan { input: &args.device, fps: None, pace: None, set: &set, record: &args.record })
 }

@@ -1,31 +1,33 @@
 //! `arborcam devices`: the cameras that are plugged in.
 
 use super::Ended;
-use crate::source;
+use crate::config::Config;
+use crate::source::{self, Device, Mode, Places};
 use clap::Args;
 use std::io::Write;
+use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub struct DevicesArgs {
     /// Print JSON.
     #[arg(long)]
     json: bool,
+    /// Settings that differ from the defaults: they decide what would be filmed.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
 }
 
 pub fn run(args: &DevicesArgs) -> Result<(), Ended> {
-    let devices = source::list();
-    let mut text = String::new();
-    if args.json {
-        let list: Vec<_> = devices
-            .iter()
-            .map(|d| serde_json::json!({ "path": d.path, "name": d.name, "description": d.description }))
-            .collect();
-        text = format!("{}\n", serde_json::Value::from(list));
+    let config = match &args.config {
+        Some(path) => Config::load(path).map_err(|e| Ended::BadUsage(e.into()))?,
+        None => Config::default(),
+    };
+    let devices = source::list_for(&config.camera, &Places::default());
+    let text = if args.json {
+        format!("{}\n", devices.iter().map(json).collect::<serde_json::Value>())
     } else {
-        for d in &devices {
-            text.push_str(&format!("{:<14} {}  ({})\n", d.path.display().to_string(), d.name, d.description));
-        }
-    }
+        devices.iter().map(shown).collect()
+    };
     let written = std::io::stdout().lock().write_all(text.as_bytes());
     if devices.is_empty() {
         return Err(Ended::NoInput(anyhow::anyhow!(
@@ -36,4 +38,114 @@ pub fn run(args: &DevicesArgs) -> Result<(), Ended> {
     written
         .or_else(|e| if e.kind() == std::io::ErrorKind::BrokenPipe { Ok(()) } else { Err(e) })
         .map_err(|e| Ended::Failed(e.into()))
+}
+
+fn json(d: &Device) -> serde_json::Value {
+    let mode = |m: &Mode| {
+        serde_json::json!({
+            "format": m.format.fourcc(), "width": m.size.width, "height": m.size.height, "rates_hz": m.rates_hz,
+        })
+    };
+    let identity = d.identity.as_ref();
+    serde_json::json!({
+        "path": d.path,
+        "name": d.name,
+        "description": d.description,
+        "identity": identity.map(|i| &i.id),
+        "port": identity.map(|i| &i.port),
+        "product": identity.and_then(|i| i.product.as_ref()),
+        "serial": identity.and_then(|i| i.serial.as_ref()),
+        "link": d.link,
+        "films": d.films,
+        "modes": d.modes.iter().map(mode).collect::<Vec<_>>(),
+        "chosen": d.chosen.as_ref().map(|(mode, why)| serde_json::json!({ "mode": mode, "why": why })),
+        "closed": d.closed,
+    })
+}
+
+/// One line for the camera, below it what stays of it, what it can do and what would be filmed.
+fn shown(d: &Device) -> String {
+    let mut text = format!("{:<14} {}  ({})\n", d.path.display().to_string(), d.name, d.description);
+    let mut line = |name: &str, what: &str| text.push_str(&format!("    {name:<9} {what}\n"));
+    if let Some(identity) = &d.identity {
+        let serial = identity.serial.as_ref().map_or(String::new(), |s| format!(", serial number {s}"));
+        line("identity", &format!("{} ({}{serial})", identity.id, identity.port));
+    }
+    if let Some(link) = &d.link {
+        line("link", &link.display().to_string());
+    }
+    for row in rows(&d.modes) {
+        line("offers", &row);
+    }
+    if let Some((mode, why)) = &d.chosen {
+        line("would be", &format!("{mode}: {why}"));
+    }
+    if let Some(closed) = &d.closed {
+        line("closed", closed);
+    }
+    text
+}
+
+/// `MJPG 1280x720 @ 60 30, 640x480 @ 30`: one row a format.
+fn rows(modes: &[Mode]) -> Vec<String> {
+    let mut rows: Vec<(&str, String)> = Vec::new();
+    for mode in modes {
+        let rates: String = mode.rates_hz.iter().map(|hz| format!(" {}", (hz * 100.0).round() / 100.0)).collect();
+        let at = if rates.is_empty() { "" } else { " @" };
+        let size = format!("{}{at}{rates}", mode.size);
+        match rows.iter_mut().find(|(format, _)| *format == mode.format.fourcc()) {
+            Some((_, row)) => row.push_str(&format!(", {size}")),
+            None => rows.push((mode.format.fourcc(), size)),
+        }
+    }
+    rows.into_iter().map(|(format, row)| format!("{format} {row}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{PixelFormat, Size};
+
+    #[test]
+    fn a_camera_is_shown_with_all_that_is_needed_to_name_and_to_choose_it() {
+        let mode = |format, width, height, rates_hz: &[f64]| Mode {
+            format,
+            size: Size::new(width, height),
+            rates_hz: rates_hz.to_vec(),
+        };
+        let modes = vec![
+            mode(PixelFormat::Mjpeg, 1280, 720, &[30.0, 29.97]),
+            mode(PixelFormat::Yuyv, 640, 480, &[]),
+            mode(PixelFormat::Mjpeg, 640, 480, &[60.0]),
+        ];
+        assert_eq!(rows(&modes), ["MJPG 1280x720 @ 30 29.97, 640x480 @ 60", "YUYV 640x480"]);
+        let device = Device {
+            path: "/dev/video2".into(),
+            name: "Cam".into(),
+            description: "uvcvideo at usb-1".into(),
+            identity: Some(source::Identity {
+                id: "usb-046d:0825-A1-0.0".into(),
+                port: "usb 1-1".into(),
+                product: Some("046d:0825".into()),
+                serial: Some("A1".into()),
+            }),
+            link: None,
+            films: true,
+            modes,
+            chosen: Some(("MJPG 1280x720 @ 30".into(), "why".into())),
+            closed: None,
+        };
+        let text = shown(&device);
+        for what in
+            ["/dev/video2", "usb-046d:0825-A1-0.0 (usb 1-1, serial number A1)", "would be  MJPG 1280x720 @ 30: why"]
+        {
+            assert!(text.contains(what), "{text}");
+        }
+        let json = json(&device);
+        assert_eq!((&json["identity"], &json["serial"]), (&"usb-046d:0825-A1-0.0".into(), &"A1".into()));
+        assert_eq!(
+            (json["modes"][0]["width"].as_u64(), json["chosen"]["mode"].as_str()),
+            (Some(1280), Some("MJPG 1280x720 @ 30"))
+        );
+    }
 }

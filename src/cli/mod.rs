@@ -1,11 +1,15 @@
 //! The commands: one file each. Here, what they have in common: arguments, exit status, messages.
 
+mod camera;
 mod capture;
 mod devices;
+mod doctor;
+mod hangup;
 mod play;
 mod record;
 mod recording;
 mod replay;
+mod service;
 mod session;
 
 use crate::config::{Config, ConfigError};
@@ -42,6 +46,8 @@ enum Command {
     Play(play::PlayArgs),
     /// List the cameras that are plugged in.
     Devices(devices::DevicesArgs),
+    /// Find out what is wrong with this machine, and what to do about it.
+    Doctor(doctor::DoctorArgs),
 }
 
 /// What `capture` and `replay` share.
@@ -62,6 +68,9 @@ struct Common {
     /// Settings that differ from the defaults (TOML; see config/arborcam.toml).
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    /// End by itself after so many seconds of film.
+    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
+    for_s: Option<f64>,
     /// Metres in a pixel at the tree; the model is then in metres.
     #[arg(long, value_name = "M")]
     metres_per_px: Option<f64>,
@@ -73,7 +82,8 @@ enum Stream {
 }
 
 impl Common {
-    fn config(&self) -> Result<Config, ConfigError> {
+    /// The file over the defaults, and over both what the command line says; `set` is for the command's own arguments.
+    fn config(&self, set: &dyn Fn(&mut Config)) -> Result<Config, ConfigError> {
         let mut config = match &self.config {
             Some(path) => Config::load(path)?,
             None => Config::default(),
@@ -81,9 +91,15 @@ impl Common {
         if let Some(metres) = self.metres_per_px {
             config.export.metres_per_px = metres;
         }
+        set(&mut config);
         config.check()?;
         Ok(config)
     }
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let seconds = text.parse().ok().filter(|s: &f64| s.is_finite() && *s > 0.0);
+    seconds.ok_or_else(|| "give a number of seconds above 0".to_owned())
 }
 
 /// Why a command did not end well; decides the exit status.
@@ -116,6 +132,7 @@ pub fn main() -> ExitCode {
         Command::Record(args) => record::run(args),
         Command::Play(args) => play::run(args),
         Command::Devices(args) => devices::run(args),
+        Command::Doctor(args) => doctor::run(args),
     };
     let (status, error) = match result {
         Ok(()) => return ExitCode::SUCCESS,

@@ -1,5 +1,6 @@
 //! `arborcam play INPUT --to /dev/videoN`: a recording becomes a camera.
 
+use super::hangup::Hangup;
 use super::session::{init_log, no_input, stop_on_signals};
 use super::{Ended, say};
 use crate::config;
@@ -27,7 +28,8 @@ pub fn run(args: &PlayArgs) -> Result<(), Ended> {
     if !(args.fps.is_finite() && args.fps > 0.0) {
         return Err(Ended::BadUsage(anyhow::anyhow!("--fps {} is no rate; give a number above 0", args.fps)));
     }
-    let stop = stop_on_signals()?;
+    // There are no settings to read again: whoever hangs up on it wants it to end.
+    let stop = stop_on_signals(Hangup::of_this_process() != Hangup::Ignored)?;
     init_log(true);
     let mut output = None;
     let mut frames = 0;

@@ -1,5 +1,7 @@
 //! `arborcam record DEVICE FILE.mcap`: frames into a file, and nothing else.
 
+use super::camera::CameraArgs;
+use super::hangup::Hangup;
 use super::recording::{self, LimitArgs, parse_time_ns};
 use super::session::{init_log, no_input, stop_on_signals};
 use super::{Ended, say};
@@ -24,6 +26,8 @@ pub struct RecordArgs {
     #[arg(long, value_name = "TIME", value_parser = parse_time_ns)]
     duration: Option<u64>,
     #[command(flatten)]
+    camera: CameraArgs,
+    #[command(flatten)]
     limits: LimitArgs,
     /// Settings that differ from the defaults (TOML; see config/arborcam.toml); only `[camera]` is used.
     #[arg(long, value_name = "FILE")]
@@ -31,20 +35,23 @@ pub struct RecordArgs {
 }
 
 pub fn run(args: &RecordArgs) -> Result<(), Ended> {
-    let config = match &args.config {
+    let mut config = match &args.config {
         Some(path) => Config::load(path).map_err(|e| Ended::BadUsage(e.into()))?,
         None => Config::default(),
     };
+    args.camera.set(&mut config.camera);
+    config.check().map_err(|e| Ended::BadUsage(e.into()))?;
     recording::refuse_unfit(&args.file)?;
     let source = source::open(&args.device, &config.camera, None).map_err(no_input)?;
     let info = source.describe();
-    let stop = stop_on_signals()?;
+    // There are no settings to read again: whoever hangs up on it wants it to end.
+    let stop = stop_on_signals(Hangup::of_this_process() != Hangup::Ignored)?;
     init_log(true);
     if info.live && info.format.asked != info.format.given {
         say(&format!("arborcam: asked for {}, the camera gives {}", info.format.asked, info.format.given));
     }
     let pace = if info.live { Pace::Live } else { Pace::Recorded };
-    let job = RecordJob { to: recording::target(&args.file, args.limits.limits(), &info), pace };
+    let job = RecordJob { to: recording::target(&args.file, args.limits.limits(), &info), pace, camera: config.camera };
     let running = runtime::record(source, job)?;
     let mut told = 0;
     while !running.finished() {
@@ -52,6 +59,9 @@ pub fn run(args: &RecordArgs) -> Result<(), Ended> {
         let over = args.duration.is_some_and(|limit| time_s * 1e9 >= limit as f64);
         if over || running.broken() || stop.load(Ordering::SeqCst) {
             running.stop();
+        }
+        for line in running.news() {
+            say(&format!("arborcam: {line}"));
         }
         // At once: whoever films in a field is to hear of a full disk while it can still be helped.
         for warning in running.warnings().into_iter().skip(told) {

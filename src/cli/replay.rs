@@ -28,5 +28,8 @@ pub fn run(args: &ReplayArgs) -> Result<(), Ended> {
         return Err(Ended::BadUsage(anyhow::anyhow!("--fps {} is no rate; give a number above 0", args.fps)));
     }
     let pace = if args.fast { Pace::Fast } else { Pace::Recorded };
-    session::run(&args.common, Plan { input: &args.input, fps: Some(args.fps), pace: Some(pace), record: &args.record })
+    session::run(
+        &args.common,
+        Plan { input: &args.input, fps: Some(args.fps), pace: Some(pace), set: &|_| {}, record: &args.record },
+    )
 }

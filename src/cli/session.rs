@@ -1,7 +1,10 @@
 //! One capture or replay from the command line: open, run, show, report.
 
+use super::hangup::{Hangup, Reload};
 use super::recording::{self, RecordOption};
+use super::service::Service;
 use super::{Common, Ended, say};
+use crate::config::Config;
 use crate::export::OutputFolder;
 use crate::model::{Control, Snapshot};
 use crate::outline::{self, OutlineSpec};
@@ -29,11 +32,13 @@ pub struct Plan<'a> {
     /// `None`: live if the source is, else at its own pace.
     pub pace: Option<Pace>,
     pub record: &'a RecordOption,
+    /// What the command's own arguments change of the settings.
+    pub set: &'a dyn Fn(&mut Config),
 }
 
 /// Runs a capture from the first frame to the last line.
 pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
-    let config = common.config().map_err(|e| Ended::BadUsage(e.into()))?;
+    let config = common.config(plan.set).map_err(|e| Ended::BadUsage(e.into()))?;
     let headless = common.headless || common.stream.is_some();
     if !headless && !std::io::stdout().is_terminal() {
         return Err(Ended::BadUsage(tui::TuiError::NoTerminal(None).into()));
@@ -57,7 +62,8 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
         record: plan.record.target(&info),
         preview_every: if headless { PREVIEW_HEADLESS } else { PREVIEW_SCREEN },
     };
-    let stop = stop_on_signals()?;
+    let hangup = Hangup::of_this_process();
+    let stop = stop_on_signals(hangup == Hangup::Stop)?;
     if headless && info.live && info.format.asked != info.format.given {
         say(&format!("arborcam: asked for {}, the camera gives {}", info.format.asked, info.format.given));
     }
@@ -66,8 +72,11 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
         say(&format!("arborcam: warning: without --out nothing is written{but}"));
     }
     init_log(headless);
+    let reload = Reload::new((common, plan.set), &job.config, hangup).map_err(|e| Ended::Failed(e.into()))?;
+    let service = Service::from_env(job.config.camera.timeout_s);
     let running = runtime::start(source, job)?;
-    let watched = if headless { watch(&running, &stop) } else { show(&running, &stop) };
+    let mut warden = Warden { running: &running, reload, service, end_s: common.for_s.unwrap_or(f64::INFINITY) };
+    let watched = if headless { watch(&mut warden, &stop) } else { show(&mut warden, &stop) };
     let warnings = running.warnings();
     let (summary, failure) = running.join();
     watched?;
@@ -77,24 +86,16 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
     report(summary.as_ref(), failure, stop.load(Ordering::SeqCst))
 }
 
-/// Set when the user or the system asks us to end.
-pub fn stop_on_signals() -> Result<Arc<AtomicBool>, Ended> {
+/// Set when the user or the system asks us to end; by a hang-up as well, if so wanted.
+pub fn stop_on_signals(by_hangup: bool) -> Result<Arc<AtomicBool>, Ended> {
     let stop = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM].into_iter().chain((!hangup_ignored()).then_some(SIGHUP)) {
+    for signal in [SIGINT, SIGTERM].into_iter().chain(by_hangup.then_some(SIGHUP)) {
         // Twice the same signal ends at once, without a capture: a disk that hangs must not make the program immortal.
         signal_hook::flag::register_conditional_shutdown(signal, i32::from(super::FAILED), stop.clone())
             .and_then(|_| signal_hook::flag::register(signal, stop.clone()))
             .map_err(|e| Ended::Failed(e.into()))?;
     }
     Ok(stop)
-}
-
-/// Whether whoever started us, `nohup` for one, wants us to outlive the terminal.
-fn hangup_ignored() -> bool {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    let bits = mask.and_then(|m| u64::from_str_radix(m.trim(), 16).ok()).unwrap_or(0);
-    bits & (1 << (SIGHUP - 1)) != 0
 }
 
 pub fn no_input(e: SourceError) -> Ended {
@@ -107,13 +108,45 @@ fn refuse_unfit_out(out: Option<&Path>) -> Result<(), Ended> {
     out.map_or(Ok(()), |dir| OutputFolder::create(dir).map(drop)).map_err(|e| Ended::Failed(e.into()))
 }
 
-fn watch(running: &Running, stop: &AtomicBool) -> Result<(), Ended> {
-    let progress = tui::Progress::new();
-    while !running.finished() {
-        if stop.load(Ordering::SeqCst) {
-            running.stop();
+/// Looks after a capture from outside, with and without a screen: its length, its settings, its service manager.
+struct Warden<'a> {
+    running: &'a Running,
+    reload: Reload<'a>,
+    service: Option<Service>,
+    /// Sensor time of the capture at which it ends, s.
+    end_s: f64,
+}
+
+impl Warden<'_> {
+    /// Newest state, if there is a new one.
+    fn look(&mut self) -> Option<Arc<Snapshot>> {
+        let snapshot = self.running.latest();
+        if snapshot.as_ref().is_some_and(|s| s.time_s >= self.end_s) {
+            self.running.stop();
         }
-        if let Some(snapshot) = running.latest() {
+        if self.reload.is_wanted() {
+            match &self.service {
+                Some(service) => service.reloading(|| self.reload.fulfil(self.running)),
+                None => self.reload.fulfil(self.running),
+            }
+        }
+        if let Some(service) = &mut self.service {
+            service.tick(self.running, snapshot.as_deref());
+        }
+        snapshot
+    }
+}
+
+fn watch(warden: &mut Warden, stop: &AtomicBool) -> Result<(), Ended> {
+    let progress = tui::Progress::new();
+    while !warden.running.finished() {
+        if stop.load(Ordering::SeqCst) {
+            warden.running.stop();
+        }
+        for line in warden.running.news() {
+            progress.tell(&format!("arborcam: {line}"));
+        }
+        if let Some(snapshot) = warden.look() {
             progress.update(&snapshot);
         }
         std::thread::sleep(HEADLESS_TICK);
@@ -122,31 +155,30 @@ fn watch(running: &Running, stop: &AtomicBool) -> Result<(), Ended> {
     Ok(())
 }
 
-fn show(running: &Running, stop: &AtomicBool) -> Result<(), Ended> {
-    let shown = tui::run(&mut Screen(running), tui::Options::from_env(), stop);
+fn show(warden: &mut Warden, stop: &AtomicBool) -> Result<(), Ended> {
+    let shown = tui::run(warden, tui::Options::from_env(), stop);
     if shown.is_err() {
-        running.stop();
+        warden.running.stop();
     }
     // The screen is gone; what is left is written without it.
-    while !running.finished() {
+    while !warden.running.finished() {
+        warden.look();
         std::thread::sleep(HEADLESS_TICK);
     }
     shown.map_err(|e| Ended::BadUsage(e.into()))
 }
 
-struct Screen<'a>(&'a Running);
-
-impl tui::Session for Screen<'_> {
+impl tui::Session for Warden<'_> {
     fn latest(&mut self) -> Option<Arc<Snapshot>> {
-        self.0.latest()
+        self.look()
     }
 
     fn send(&mut self, wish: Control) {
-        self.0.send(wish);
+        self.running.send(wish);
     }
 
     fn finished(&self) -> bool {
-        self.0.finished()
+        self.running.finished()
     }
 }
 

@@ -64,8 +64,30 @@ pub struct Timing {
     pub nominal_rate_hz: Option<f64>,
     pub measured_rate_hz: Option<f64>,
     pub frames_seen: u64,
-    /// Lost before us: holes in the driver's count.
+    /// Lost before us: what is to be believed of the two counts that follow. The driver's numbers where it numbers its
+    /// frames; the times where it does not, starts anew, or numbers only what it delivers.
     pub frames_dropped_camera: u64,
+    /// Holes in the driver's numbers; `None` where it does not number its frames.
+    #[serde(default)]
+    pub frames_dropped_by_sequence: Option<u64>,
+    /// Holes in the frames' times, jitter and changes of the rate left out.
+    #[serde(default)]
+    pub frames_dropped_by_time: u64,
+    /// Came damaged, short or with the driver's error flag, and were left out.
+    #[serde(default)]
+    pub frames_damaged: u64,
+    /// Came with a time that was not later than the one before, and were left out.
+    #[serde(default)]
+    pub frames_stale: u64,
+    /// What the times are by: `file`, `monotonic` (the system's clock, read by the driver), `copied` (from whoever feeds
+    /// the device), `unknown`, or `received` (the moment of reception).
+    #[serde(default)]
+    pub clock: String,
+    /// How often the camera was lost and came back, and for how long it was away, s.
+    #[serde(default)]
+    pub reconnects: u64,
+    #[serde(default)]
+    pub away_s: f64,
     /// Not taken by the tracker, which was busy.
     pub frames_dropped_tracker: u64,
     pub frames_undecodable: u64,
@@ -74,7 +96,7 @@ pub struct Timing {
     /// Missing in the recording that was made meanwhile; 0 where none was.
     #[serde(default)]
     pub frames_not_recorded: u64,
-    /// The first [`MAX_GAPS`] holes in the count of frames.
+    /// The first [`MAX_GAPS`] holes, in the order in which they were found.
     pub gaps: Vec<Gap>,
     pub gaps_not_listed: u64,
     /// From the first frame to the last, s.
@@ -92,14 +114,32 @@ impl Timing {
     }
 }
 
-/// Frames missing from the sequence.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// A time from which there are no frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Gap {
     /// The last frame before the hole, and its time, s.
     pub after_frame: u64,
     pub time_s: f64,
-    /// Number of frames missing.
+    /// Number of frames missing; where the camera was away, as many as it would have delivered.
     pub missing: u64,
+    #[serde(default)]
+    pub cause: GapCause,
+    /// From the last frame before the hole to the first after it, s.
+    #[serde(default)]
+    pub length_s: f64,
+}
+
+/// Why frames are missing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum GapCause {
+    /// Lost on the way from the sensor to us.
+    #[default]
+    Dropped,
+    /// The camera was unplugged or its driver failed.
+    Disconnected,
+    /// The camera was there and delivered nothing.
+    Silent,
 }
 
 /// An outline file: `{"frame": 0, "width": W, "height": H, "polygon_px": [[u, v], ...]}`.

@@ -18,5 +18,5 @@ pub use hierarchy::{Cluster, ClusterId, MotionHierarchy};
 pub use outline::Outline;
 pub use pose::{JointPose, Pose};
 pub use skeleton::{Node, NodeId, Skeleton};
-pub use snapshot::{BranchRow, FormatNote, Phase, Snapshot};
+pub use snapshot::{BranchRow, CameraState, FormatNote, Phase, Snapshot};
 pub use track::{Observation, TrackId, TrackSet};

@@ -40,6 +40,26 @@ pub struct FormatNote {
     pub given: String,
 }
 
+/// How the camera does, apart from its frames. The counts only ever grow.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CameraState {
+    /// Why it is gone, while it is waited for.
+    pub away: Option<String>,
+    /// How often it has come back, and for how long it was away, s.
+    pub reconnects: u64,
+    pub away_s: f64,
+    /// Frames lost before us by the driver's numbers (`None` where it has none) and by the times.
+    pub lost_by_sequence: Option<u64>,
+    pub lost_by_time: u64,
+    /// Frames that came and were of no use: damaged, and not later than the one before.
+    pub damaged: u64,
+    pub stale: u64,
+    /// What the times are by, one word.
+    pub clock: &'static str,
+    /// It has delivered at another rate than it promised for seconds.
+    pub rate_off: bool,
+}
+
 /// One line of the table of branches.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BranchRow {
@@ -69,7 +89,8 @@ pub struct Snapshot {
     /// Rate by the sensor's clock over the last seconds, and rate at which frames are worked off, Hz.
     pub sensor_rate_hz: f64,
     pub work_rate_hz: f64,
-    /// Frames lost before us (gaps in the sequence), between camera and tracker, undecodable, and not shown.
+    pub camera: CameraState,
+    /// Frames lost before us (what is to be believed of both counts), between camera and tracker, undecodable, and not shown.
     pub lost_in_camera: u64,
     pub dropped_before_tracker: u64,
     pub undecodable: u64,

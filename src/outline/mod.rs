@@ -53,7 +53,15 @@ pub fn load(path: &Path, size: Size) -> Result<Outline, OutlineError> {
     if bytes.iter().find(|b| !b.is_ascii_whitespace()) != Some(&b'{') {
         return mask::outline(path, size);
     }
-    let file = polygon::parse(&String::from_utf8_lossy(&bytes), &name)?;
+    parse(&String::from_utf8_lossy(&bytes), name, size)
+}
+
+/// Reads the text of an outline file for pictures of `size`; `name` is for messages.
+///
+/// # Errors
+/// As for [`load`].
+pub fn parse(text: &str, name: String, size: Size) -> Result<Outline, OutlineError> {
+    let file = polygon::parse(text, &name)?;
     let found = Size::new(file.width, file.height);
     if found != size {
         return Err(OutlineError::WrongSize { name, found, wanted: size });

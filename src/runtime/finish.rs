@@ -121,6 +121,7 @@ fn write_motion(
     for set in job.tracks.sets() {
         let (pose, targets_px) = retrace.step(&set.map_err(Failure::Spool)?);
         csv.pose(&pose)?;
+        job.shared.pulse.wrote();
         // The foot is where it is by definition.
         for (joint, target) in pose.joints.iter().zip(&targets_px).skip(1) {
             if let Some(t) = target {
@@ -142,6 +143,7 @@ fn write_tracks(job: &CaptureJob, retrace: Option<&Retrace>, folder: &OutputFold
     let mut csv = TracksCsv::new(folder.file("tracks.csv")?)?;
     for set in job.tracks.sets() {
         csv.set(&set.map_err(Failure::Spool)?, |id| retrace?.node_of(id))?;
+        job.shared.pulse.wrote();
     }
     csv.finish()?;
     Ok(())
@@ -200,11 +202,19 @@ fn describe(
     let counts = &job.shared.counts;
     let count = |c: &std::sync::atomic::AtomicU64| c.load(Ordering::Relaxed);
     let (seen, duration_s) = (count(&counts.seen), job.shared.last_time_s());
+    let camera = job.shared.camera_state();
     let timing = Timing {
         nominal_rate_hz: job.info.nominal_rate_hz,
         measured_rate_hz: (seen > 1 && duration_s > 0.0).then(|| (seen - 1) as f64 / duration_s),
         frames_seen: seen,
         frames_dropped_camera: count(&counts.lost_in_camera),
+        frames_dropped_by_sequence: camera.lost_by_sequence,
+        frames_dropped_by_time: camera.lost_by_time,
+        frames_damaged: camera.damaged,
+        frames_stale: camera.stale,
+        clock: camera.clock.into(),
+        reconnects: camera.reconnects,
+        away_s: camera.away_s,
         frames_dropped_tracker: count(&counts.dropped_before_tracker),
         frames_undecodable: count(&counts.undecodable),
         frames_before_outline: count(&counts.before_outline),

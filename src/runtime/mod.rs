@@ -10,18 +10,24 @@
 
 mod finish;
 mod latest;
+mod losses;
 mod meter;
 mod model_thread;
 mod play;
+mod pulse;
+mod rate;
+mod reconnect;
 mod record;
 mod recorder_thread;
 mod shared;
 mod source_thread;
 mod status;
 mod track_thread;
+mod watched;
 
 pub use finish::Written;
 pub use play::{Played, play};
+pub use pulse::{Marks, Sign, Vigil};
 pub use record::{RecordJob, RunningRecord, record};
 pub use recorder_thread::{RecordTo, Recorded};
 pub use shared::Failure;
@@ -41,6 +47,7 @@ use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
 use std::time::Duration;
 use track_thread::TrackThread;
+use watched::Watched;
 
 /// Frames that may wait for the tracker, and track sets that may wait for the model (two seconds at 30 a second, more
 /// than a build takes).
@@ -102,6 +109,10 @@ impl Drop for StopAll<'_> {
 /// # Errors
 /// A thread cannot be started, there is no decoder, or the recording cannot be made.
 pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> {
+    let source = match source.waits_without_limit() {
+        Some(limit) => Box::new(Watched::start(source, limit).map_err(Failure::Thread)?) as Box<dyn Source>,
+        None => source,
+    };
     let shared = Arc::new(Shared::default());
     let info = source.describe();
     let (frames_in, frames_out) = bounded(FRAME_QUEUE);
@@ -109,7 +120,7 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
     // Wishes are typed by a person; they cannot pile up.
     let (controls, wishes) = unbounded();
     let front = FrontEnd::new(&job.config, job.outline.take());
-    let (pace, preview_every) = (job.pace, job.preview_every);
+    let (pace, preview_every, camera) = (job.pace, job.preview_every, job.config.camera.clone());
 
     let (recorder, recording) = match job.record.take() {
         Some(to) => {
@@ -120,7 +131,7 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
     };
 
     let thread = |name: &str| std::thread::Builder::new().name(name.into());
-    let failed = |e: std::io::Error| Failure::Spool(e);
+    let failed = Failure::Thread;
     let model = {
         let model = ModelThread::new(job, info, shared.clone(), recorder.clone().zip(recording));
         let on_end = shared.clone();
@@ -143,7 +154,8 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
     };
     let source = {
         let shared = shared.clone();
-        let run = move || source_thread::run(source, pace, (frames_in, frames_out), recorder, &shared);
+        let queue = source_thread::Queue { into: frames_in, out_of: frames_out };
+        let run = move || source_thread::run(source, pace, camera, queue, recorder, &shared);
         thread("source").spawn(run).map_err(failed)?
     };
     Ok(Running { shared, controls, source: Some(source), track: Some(track), model: Some(model) })
@@ -164,6 +176,12 @@ impl Running {
         }
     }
 
+    /// Goes on with other settings; they may differ from the former ones in what can be changed while frames flow
+    /// ([`Config::reload`] sees to that).
+    pub fn reload(&self, config: Config) {
+        self.shared.reload(config);
+    }
+
     /// Take no more frames and finish.
     pub fn stop(&self) {
         self.shared.stop.store(true, Ordering::Relaxed);
@@ -172,6 +190,19 @@ impl Running {
     /// The capture is over and written.
     pub fn finished(&self) -> bool {
         self.model.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+
+    /// How far every thread has come, for a [`Vigil`].
+    pub fn marks(&self) -> Marks {
+        let over = self.source.as_ref().is_none_or(JoinHandle::is_finished);
+        let ending = over || self.shared.stop.load(Ordering::Relaxed);
+        self.shared.pulse.marks(self.shared.counts.seen.load(Ordering::Relaxed), ending)
+    }
+
+    /// Lines that cannot wait for the end, e.g. that the camera is gone, since the last call. The screen shows them by
+    /// itself.
+    pub fn news(&self) -> Vec<String> {
+        self.shared.take_news()
     }
 
     /// What there is to be told so far.

@@ -2,6 +2,7 @@
 //! at the end.
 
 use super::finish::{self, CaptureJob, Quality};
+use super::pulse::Worker;
 use super::recorder_thread::{Found, Recorded, Recorder};
 use super::shared::{Failure, Shared};
 use super::status::{Status, median_fb_error_px};
@@ -11,7 +12,7 @@ use crate::model::{Phase, Pose, Rgb};
 use crate::pipeline::{BackEnd, Followed, LEAST_MOVING, Moved};
 use crate::recording::Spool;
 use crate::source::SourceInfo;
-use crossbeam_channel::Receiver;
+use crossbeam_channel::{Receiver, RecvTimeoutError};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -21,6 +22,8 @@ use std::time::{Duration, Instant};
 
 /// Time between two states for the screen.
 const SCREEN_EVERY: Duration = Duration::from_millis(40);
+/// Without frames the screen is shown a new state at this interval: a camera that is gone must be seen to be.
+const IDLE_EVERY: Duration = Duration::from_millis(200);
 
 /// State of the thread.
 pub struct ModelThread {
@@ -74,7 +77,15 @@ impl ModelThread {
     /// Runs until the tracker is done, then writes the capture.
     pub fn run(mut self, queue: &Receiver<ToModel>) -> Summary {
         let mut last: Option<Moved> = None;
-        for message in queue {
+        loop {
+            let message = match queue.recv_timeout(IDLE_EVERY) {
+                Ok(message) => message,
+                Err(RecvTimeoutError::Timeout) => {
+                    self.show(last.as_ref(), false);
+                    continue;
+                }
+                Err(RecvTimeoutError::Disconnected) => break,
+            };
             match message {
                 ToModel::Followed(followed) => last = Some(self.step(followed)),
                 ToModel::Searching { progress, preview, size, frame, time_s } => {
@@ -96,6 +107,7 @@ impl ModelThread {
                 }
                 ToModel::Export => self.export_now(),
             }
+            self.shared.pulse.done(Worker::Model);
         }
         self.back.finish();
         self.announce();
@@ -157,7 +169,7 @@ impl ModelThread {
         }
     }
 
-    /// One line of JSON: `{"frame":…,"time_s":…,"nodes":[[id,x,y,z],…]}`, the measured nodes, model axes, in px
+    /// One line of JSON: `{"frame":…,"time_s":…,"nodes":[[id,x,y,z],…]}`, with the losses so far behind it if live; the measured nodes, model axes, in px
     /// or metres as in the capture.
     fn stream(&mut self, pose: &Pose) {
         let Some(out) = &mut self.job.stream else { return };
@@ -169,7 +181,11 @@ impl ModelThread {
             let comma = if i > 0 { "," } else { "" };
             line.push_str(&format!("{comma}[{i},{:.3},{:.3},{:.3}]", p.x, p.y, p.z));
         }
-        line.push_str("]}\n");
+        line.push(']');
+        if self.info.live {
+            line.push_str(&counts(&self.shared));
+        }
+        line.push_str("}\n");
         if let Err(e) = out.write_all(line.as_bytes()).and_then(|()| out.flush()) {
             // The reader has gone (`| head`): nobody listens any more, and that ends the capture in good order.
             if e.kind() != std::io::ErrorKind::BrokenPipe {
@@ -208,7 +224,7 @@ impl ModelThread {
             tree: self.back.tree().cloned(),
             outline: self.back.outline().cloned(),
             tracks: spool.reader().map_err(Failure::Spool)?,
-            config: self.job.config.clone(),
+            config: self.shared.reloaded().unwrap_or_else(|| self.job.config.clone()),
             info: self.info.clone(),
             quality: self.quality.clone(),
             bark: self.bark.clone(),
@@ -273,6 +289,19 @@ impl ModelThread {
             not_recorded: self.shared.counts.not_recorded.load(Ordering::Relaxed),
         }
     }
+}
+
+/// What was lost until now, for the stream of a camera. A file's stream has none, so that two replays give the same.
+fn counts(shared: &Shared) -> String {
+    let c = shared.camera_state();
+    let by_sequence = c.lost_by_sequence.map_or_else(|| "null".to_owned(), |n| n.to_string());
+    format!(
+        ",\"dropped\":{},\"dropped_by_sequence\":{by_sequence},\"dropped_by_time\":{},\"broken\":{},\"reconnects\":{}",
+        shared.counts.lost_in_camera.load(Ordering::Relaxed),
+        c.lost_by_time,
+        c.damaged + c.stale + shared.counts.undecodable.load(Ordering::Relaxed),
+        c.reconnects
+    )
 }
 
 /// The folder in which `path` will lie, if it is there already, else the nearest one above it that is.

@@ -4,6 +4,7 @@ use super::recorder_thread::{self, RecordTo, Recorded};
 use super::shared::{Failure, Shared};
 use super::source_thread::{self, Pace};
 use super::{FRAME_QUEUE, StopAll};
+use crate::config;
 use crate::source::Source;
 use crossbeam_channel::bounded;
 use std::sync::Arc;
@@ -14,6 +15,7 @@ use std::thread::JoinHandle;
 pub struct RecordJob {
     pub to: RecordTo,
     pub pace: Pace,
+    pub camera: config::Camera,
 }
 
 /// A recording under way.
@@ -42,7 +44,8 @@ pub fn record(source: Box<dyn Source>, job: RecordJob) -> Result<RunningRecord, 
         let shared = shared.clone();
         let run = move || {
             let _ends_all = StopAll(&shared);
-            source_thread::run(source, job.pace, (frames_in, frames_out), Some(recorder), &shared);
+            let queue = source_thread::Queue { into: frames_in, out_of: frames_out };
+            source_thread::run(source, job.pace, job.camera, queue, Some(recorder), &shared);
         };
         thread("source").spawn(run).map_err(Failure::Spool)?
     };
@@ -53,6 +56,11 @@ impl RunningRecord {
     /// Take no more frames and end the file.
     pub fn stop(&self) {
         self.shared.stop.store(true, Ordering::Relaxed);
+    }
+
+    /// Lines that cannot wait for the end, since the last call.
+    pub fn news(&self) -> Vec<String> {
+        self.shared.take_news()
     }
 
     /// Nothing more can be written; there is no use in taking more frames.

@@ -94,7 +94,7 @@ impl Recorder {
         let fits = self.waiting.fetch_add(bytes, Ordering::Relaxed) + bytes <= QUEUE_BYTES;
         // One that is larger than the queue is let in alone.
         let fits = fits || self.queue.is_empty();
-        if !(fits || !self.live) || !self.put(Item::Frame(raw.clone(), index)) {
+        if (self.live && !fits) || !self.put(Item::Frame(raw.clone(), index)) {
             self.waiting.fetch_sub(bytes, Ordering::Relaxed);
             if self.shared.counts.not_recorded.fetch_add(1, Ordering::Relaxed) == 0 {
                 self.shared.warn("the recording does not keep up, frames are missing in it; see the count".into());

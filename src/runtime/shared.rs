@@ -1,9 +1,11 @@
 //! What the threads of a capture have in common: flags, counts, warnings and the first failure.
 
 use super::latest::Latest;
+use super::pulse::Pulse;
+use crate::config::Config;
 use crate::export::ExportError;
 use crate::export::capture::{Gap, Timing};
-use crate::model::Snapshot;
+use crate::model::{CameraState, Snapshot};
 use crate::recording::RecordingError;
 use crate::source::{DecodeError, SourceError};
 use std::collections::VecDeque;
@@ -25,6 +27,8 @@ pub enum Failure {
     /// The recording could not be begun; one that breaks off later is a warning.
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    #[error("a thread cannot be started: {0}; close other programs")]
+    Thread(std::io::Error),
     #[error("{0}")]
     NoDecoder(DecodeError),
     /// The pictures changed their size.
@@ -62,6 +66,7 @@ pub struct Shared {
     /// It can write no more; frames are counted as missing from here on.
     pub recording_ended: AtomicBool,
     pub counts: Counts,
+    pub pulse: Pulse,
     pub screen: Latest<Arc<Snapshot>>,
     /// Only the gaps in it are kept up to date; the rest is filled in when the capture is written.
     timing: Mutex<Timing>,
@@ -69,9 +74,35 @@ pub struct Shared {
     notice: Mutex<Option<String>>,
     failure: Mutex<Option<Failure>>,
     last_time_s: Mutex<f64>,
+    reloaded: Mutex<Reloaded>,
+    camera: Mutex<CameraState>,
+    news: Mutex<Vec<String>>,
+}
+
+/// Settings that came while the capture ran.
+#[derive(Default)]
+struct Reloaded {
+    config: Option<Config>,
+    /// The source has not taken them yet.
+    is_new: bool,
 }
 
 impl Shared {
+    pub fn reload(&self, config: Config) {
+        *self.reloaded.lock().unwrap_or_else(PoisonError::into_inner) = Reloaded { config: Some(config), is_new: true };
+    }
+
+    /// The settings as they are now, where they are not those of the start.
+    pub fn reloaded(&self) -> Option<Config> {
+        self.reloaded.lock().unwrap_or_else(PoisonError::into_inner).config.clone()
+    }
+
+    /// The same, once, for the source.
+    pub fn newly_reloaded(&self) -> Option<Config> {
+        let mut reloaded = self.reloaded.lock().unwrap_or_else(PoisonError::into_inner);
+        std::mem::take(&mut reloaded.is_new).then(|| reloaded.config.clone()).flatten()
+    }
+
     pub fn fail(&self, failure: Failure) {
         self.failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(failure);
     }
@@ -106,10 +137,35 @@ impl Shared {
         self.warnings.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned().collect()
     }
 
-    pub fn gap(&self, after_frame: u64, time_s: f64, missing: u64) {
-        self.counts.lost_in_camera.fetch_add(missing, Ordering::Relaxed);
-        let mut timing = self.timing.lock().unwrap_or_else(PoisonError::into_inner);
-        timing.push_gap(Gap { after_frame, time_s, missing });
+    pub fn gap(&self, gap: Gap) {
+        self.timing.lock().unwrap_or_else(PoisonError::into_inner).push_gap(gap);
+    }
+
+    /// Changes what is known of the camera.
+    pub fn camera(&self, change: impl FnOnce(&mut CameraState)) {
+        change(&mut self.camera.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+
+    pub fn camera_state(&self) -> CameraState {
+        self.camera.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Tells at once, on the screen or without one, what cannot wait for the end.
+    pub fn news(&self, line: String) {
+        self.tell(line.clone());
+        let mut news = self.news.lock().unwrap_or_else(PoisonError::into_inner);
+        if news.len() < WARNINGS_KEPT {
+            news.push(line);
+        }
+    }
+
+    pub fn take_news(&self) -> Vec<String> {
+        std::mem::take(&mut self.news.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Whether no more frames are wanted.
+    pub fn stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
     }
 
     /// The gaps so far, all else at its default.

@@ -1,10 +1,16 @@
 //! The source's own thread: takes frames, paces a replay, and hands them on. A camera is never made to wait: where the
-//! tracker is late, the oldest waiting frame is dropped and counted.
+//! tracker is late, the oldest waiting frame is dropped and counted. A camera that is lost is waited for.
 
+use super::losses::Losses;
+use super::pulse::Worker;
+use super::rate::RateWatch;
+use super::reconnect;
 use super::recorder_thread::Recorder;
 use super::shared::{Failure, Shared};
+use crate::config;
+use crate::export::capture::{Gap, GapCause};
 use crate::model::{RawFrame, nanoseconds, seconds};
-use crate::source::Source;
+use crate::source::{Source, SourceError};
 use crossbeam_channel::{Receiver, Sender, TrySendError};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -33,115 +39,187 @@ pub enum Pace {
 /// A pause longer than this is waited for in pieces, so that a wish to stop is heard.
 const NAP: Duration = Duration::from_millis(20);
 
-/// Runs until the source ends or fails, or `shared.stop` is set. `queue_end` is the other end of `queue`, from which the
-/// oldest frame is taken when a live source finds it full.
+/// Both ends of the queue to the tracker: where a live source finds it full, the oldest frame is taken out again.
+pub struct Queue {
+    pub into: Sender<Timed>,
+    pub out_of: Receiver<Timed>,
+}
+
+/// Runs until the source ends or fails for good, or `shared.stop` is set.
 pub fn run(
     mut source: Box<dyn Source>,
     pace: Pace,
-    (queue, queue_end): (Sender<Timed>, Receiver<Timed>),
+    mut camera: config::Camera,
+    queue: Queue,
     recorder: Option<Recorder>,
     shared: &Shared,
 ) {
-    let mut clock = Clock::default();
+    let info = source.describe();
     source.stop_when(shared.stop.clone());
-    while !shared.stop.load(Ordering::Relaxed) {
-        if pace != Pace::Live && shared.paused.load(Ordering::Relaxed) {
-            std::thread::sleep(NAP);
-            clock.pause();
-            continue;
-        }
-        let raw = match source.next_frame() {
-            Ok(Some(raw)) => raw,
-            Ok(None) => break,
-            Err(e) => {
-                // Asked to stop meanwhile: that is the reason for the end, not a camera that fell silent.
-                if !shared.stop.load(Ordering::Relaxed) {
-                    shared.fail(Failure::Source(e));
-                }
-                break;
-            }
-        };
-        let mut timed = clock.stamp(raw, shared);
-        recorder.iter().for_each(|recorder| recorder.offer(&timed.raw, timed.index));
-        if pace == Pace::Recorded {
-            clock.wait_for(&timed, shared);
-            timed.received = Instant::now();
-        }
-        if pace == Pace::Live {
-            if shared.paused.load(Ordering::Relaxed) {
-                shared.counts.dropped_before_tracker.fetch_add(1, Ordering::Relaxed);
-                continue;
-            }
-            let mut timed = timed;
-            while let Err(TrySendError::Full(again)) = queue.try_send(timed) {
-                timed = again;
-                if queue_end.try_recv().is_ok() {
-                    shared.counts.dropped_before_tracker.fetch_add(1, Ordering::Relaxed);
-                }
-            }
-        } else if !send_blocking(&queue, timed, shared) {
+    let live = pace == Pace::Live;
+    let mut feed = Feed {
+        pace,
+        queue,
+        recorder,
+        shared,
+        losses: Losses::new(live, info.nominal_rate_hz),
+        rate: RateWatch::new(info.nominal_rate_hz.filter(|_| live)),
+        first_time_s: None,
+        broken: 0,
+        due: None,
+    };
+    while let Err(lost) = feed.run_once(&mut *source, &mut camera) {
+        if shared.stopped() {
+            // Asked to stop meanwhile: that is the reason for the end, not a camera that fell silent.
             break;
         }
+        // One that never delivered is no camera that could come back.
+        if !(live && camera.reconnect && source.returns() && feed.first_time_s.is_some()) {
+            shared.fail(Failure::Source(lost));
+            break;
+        }
+        feed.away(reconnect::cause(&lost));
+        let Some(first) = reconnect::wait(&mut *source, &lost, &mut camera, shared) else { break };
+        feed.back(first, &*source, &lost);
     }
+    feed.end();
     for warning in source.warnings() {
         shared.warn(warning);
     }
 }
 
-/// Waits for room, but not beyond a wish to stop; `false` when the frame could not be handed on.
-fn send_blocking(queue: &Sender<Timed>, mut timed: Timed, shared: &Shared) -> bool {
-    loop {
-        match queue.send_timeout(timed, NAP) {
-            Ok(()) => return true,
-            Err(e) if e.is_disconnected() || shared.stop.load(Ordering::Relaxed) => return false,
-            Err(e) => timed = e.into_inner(),
-        }
-    }
-}
-
-/// Sequence numbers and sensor times relative to the first frame, and the pace of a replay.
-#[derive(Default)]
-struct Clock {
+/// Frames on their way from the source to the tracker.
+struct Feed<'a> {
+    pace: Pace,
+    queue: Queue,
+    recorder: Option<Recorder>,
+    shared: &'a Shared,
+    losses: Losses,
+    rate: RateWatch,
     first_time_s: Option<f64>,
-    last: Option<(Option<u64>, u64, f64)>,
-    /// Moment at which the time `time_s` was due.
-    pace: Option<(Instant, f64)>,
+    /// Frames of no use so far.
+    broken: u64,
+    /// Moment at which a time of the recording was due, and that time.
+    due: Option<(Instant, f64)>,
 }
 
-impl Clock {
-    fn stamp(&mut self, mut raw: RawFrame, shared: &Shared) -> Timed {
+impl Feed<'_> {
+    /// Hands on what the source delivers until it ends or fails, or nothing further is wanted.
+    fn run_once(&mut self, source: &mut dyn Source, camera: &mut config::Camera) -> Result<(), SourceError> {
+        while !self.shared.stopped() {
+            reconnect::adopt_new_settings(source, camera, self.shared);
+            if self.pace != Pace::Live && self.shared.paused.load(Ordering::Relaxed) {
+                std::thread::sleep(NAP);
+                self.due = None;
+                self.shared.pulse.waits();
+                continue;
+            }
+            let next = source.next_frame();
+            let Some(raw) = next? else { break };
+            let timed = self.stamp(raw, source);
+            if !self.hand_on(timed) {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Gives a frame its place in the capture and counts what was lost before it.
+    fn stamp(&mut self, mut raw: RawFrame, source: &dyn Source) -> Timed {
         // A recording keeps whole nanoseconds; what is worked with must be what is kept, whatever the source gave.
         raw.sensor_time_s = seconds(nanoseconds(raw.sensor_time_s));
         let time_s = raw.sensor_time_s - *self.first_time_s.get_or_insert(raw.sensor_time_s);
-        let index = match self.last {
-            None => 0,
-            Some((sequence, index, last_s)) => {
-                // Without a count nothing is known but that this is the next.
-                let step = raw.sequence.zip(sequence).map_or(1, |(now, before)| now.saturating_sub(before).max(1));
-                if step > 1 {
-                    shared.gap(index, last_s, step - 1);
-                }
-                index + step
+        let health = source.health();
+        let broken = (health.damaged + health.stale).saturating_sub(self.broken);
+        self.broken += broken;
+        let arrival = self.losses.arrived(raw.sequence, time_s, broken);
+        self.note(&arrival.gaps);
+        if let Some(line) = self.rate.look(time_s, self.losses.interval_s()) {
+            self.shared.warn(line);
+        }
+        let rate_off = self.rate.is_off();
+        self.shared.camera(|c| {
+            (c.damaged, c.stale, c.clock, c.rate_off) = (health.damaged, health.stale, health.clock.name(), rate_off);
+        });
+        self.shared.frame_seen(time_s);
+        let raw = Arc::new(raw);
+        self.recorder.iter().for_each(|recorder| recorder.offer(&raw, arrival.index));
+        Timed { raw, index: arrival.index, time_s, received: Instant::now() }
+    }
+
+    /// `false` when nobody takes frames any more.
+    fn hand_on(&mut self, mut timed: Timed) -> bool {
+        if self.pace == Pace::Recorded {
+            self.wait_for(&timed);
+            timed.received = Instant::now();
+        }
+        if self.pace != Pace::Live {
+            return self.send_blocking(timed);
+        }
+        let dropped = &self.shared.counts.dropped_before_tracker;
+        if self.shared.paused.load(Ordering::Relaxed) {
+            dropped.fetch_add(1, Ordering::Relaxed);
+            return true;
+        }
+        self.shared.pulse.give(Worker::Track);
+        while let Err(TrySendError::Full(again)) = self.queue.into.try_send(timed) {
+            timed = again;
+            if self.queue.out_of.try_recv().is_ok() {
+                self.shared.pulse.take_back(Worker::Track);
+                dropped.fetch_add(1, Ordering::Relaxed);
             }
-        };
-        self.last = Some((raw.sequence, index, time_s));
-        shared.frame_seen(time_s);
-        Timed { raw: Arc::new(raw), index, time_s, received: Instant::now() }
+        }
+        true
     }
 
-    fn pause(&mut self) {
-        self.pace = None;
+    /// Waits for room, but not beyond a wish to stop; `false` when the frame could not be handed on.
+    fn send_blocking(&self, mut timed: Timed) -> bool {
+        self.shared.pulse.give(Worker::Track);
+        loop {
+            match self.queue.into.send_timeout(timed, NAP) {
+                Ok(()) => return true,
+                Err(e) if e.is_disconnected() || self.shared.stopped() => return false,
+                Err(e) => timed = e.into_inner(),
+            }
+        }
     }
 
-    fn wait_for(&mut self, timed: &Timed, shared: &Shared) {
-        let (start, start_s) = *self.pace.get_or_insert((Instant::now(), timed.time_s));
+    fn wait_for(&mut self, timed: &Timed) {
+        let (start, start_s) = *self.due.get_or_insert((Instant::now(), timed.time_s));
         let due = start + Duration::from_secs_f64((timed.time_s - start_s).clamp(0.0, 1e6));
-        while !shared.stop.load(Ordering::Relaxed) {
+        while !self.shared.stopped() {
             let left = due.saturating_duration_since(Instant::now());
             if left.is_zero() {
                 break;
             }
             std::thread::sleep(left.min(NAP));
         }
+    }
+
+    fn away(&mut self, cause: GapCause) {
+        let gaps = self.losses.away(cause);
+        self.note(&gaps);
+    }
+
+    /// The first frame after an absence, which is kept as a warning as well: the result shows nothing of that time.
+    fn back(&mut self, first: RawFrame, source: &dyn Source, lost: &SourceError) {
+        let before_s = self.shared.last_time_s();
+        let timed = self.stamp(first, source);
+        let away_s = timed.time_s - before_s;
+        self.shared.camera(|c| c.away_s += away_s);
+        self.shared.warn(format!("the camera was away for {away_s:.1} s from {before_s:.1} s on ({})", lost.brief()));
+        self.hand_on(timed);
+    }
+
+    fn end(&mut self) {
+        let gaps = self.losses.finish();
+        self.note(&gaps);
+    }
+
+    fn note(&self, gaps: &[Gap]) {
+        gaps.iter().for_each(|gap| self.shared.gap(*gap));
+        let totals = self.losses.totals();
+        self.shared.counts.lost_in_camera.store(totals.reconciled, Ordering::Relaxed);
+        self.shared.camera(|c| (c.lost_by_sequence, c.lost_by_time) = (totals.by_sequence, totals.by_time));
     }
 }

@@ -136,6 +136,7 @@ impl Status {
         s.lost_in_camera = shared.counts.lost_in_camera.load(Ordering::Relaxed);
         s.dropped_before_tracker = shared.counts.dropped_before_tracker.load(Ordering::Relaxed);
         s.undecodable = shared.counts.undecodable.load(Ordering::Relaxed);
+        s.camera = shared.camera_state();
         s.not_shown = shared.screen.replaced();
         let (recorded, missing) = (&shared.counts.recorded, &shared.counts.not_recorded);
         let recording = shared.recording.load(Ordering::Relaxed);

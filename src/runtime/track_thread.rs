@@ -1,5 +1,6 @@
 //! The tracker's thread: decodes frames and runs the front end. Wishes of the user pass through here in their order.
 
+use super::pulse::Worker;
 use super::shared::{Failure, Shared};
 use super::source_thread::Timed;
 use crate::model::{Control, Frame, Luma, Outline, Rgb, Size};
@@ -85,7 +86,7 @@ impl<'a> TrackThread<'a> {
             }
         }
         for followed in self.front.flush() {
-            if self.to_model.send(ToModel::Followed(followed)).is_err() {
+            if !self.pass_on(ToModel::Followed(followed)) {
                 break;
             }
         }
@@ -100,8 +101,8 @@ impl<'a> TrackThread<'a> {
                 None => self.shared.warn("no picture has arrived yet that an outline could be drawn on".into()),
             },
             Control::Restart => self.restart(None),
-            Control::BuildNow => drop(self.to_model.send(ToModel::BuildNow)),
-            Control::Export => drop(self.to_model.send(ToModel::Export)),
+            Control::BuildNow => drop(self.pass_on(ToModel::BuildNow)),
+            Control::Export => drop(self.pass_on(ToModel::Export)),
             Control::Pause(on) => self.shared.paused.store(on, Ordering::Relaxed),
             Control::Quit => self.shared.stop.store(true, Ordering::Relaxed),
         }
@@ -109,11 +110,23 @@ impl<'a> TrackThread<'a> {
 
     fn restart(&mut self, outline: Option<Outline>) {
         self.front.restart(outline);
-        let _ = self.to_model.send(ToModel::Restart);
+        self.pass_on(ToModel::Restart);
+    }
+
+    /// `false` when there is no model any more.
+    fn pass_on(&self, message: ToModel) -> bool {
+        self.shared.pulse.give(Worker::Model);
+        self.to_model.send(message).is_ok()
     }
 
     /// `false` when nothing further can be done.
     fn work_off(&mut self, timed: &Timed) -> bool {
+        let go_on = self.follow(timed);
+        self.shared.pulse.done(Worker::Track);
+        go_on
+    }
+
+    fn follow(&mut self, timed: &Timed) -> bool {
         let mut luma = self.front.spare().unwrap_or(Luma { size: timed.raw.size, pixels: Vec::new() });
         let decoded = match self.size {
             Some(expected) if expected != timed.raw.size => {
@@ -148,9 +161,9 @@ impl<'a> TrackThread<'a> {
         self.report();
         if let Some(progress) = self.front.searching() {
             let (size, frame, time_s) = (timed.raw.size, timed.index, timed.time_s);
-            return self.to_model.send(ToModel::Searching { progress, preview, size, frame, time_s }).is_ok();
+            return self.pass_on(ToModel::Searching { progress, preview, size, frame, time_s });
         }
-        done.into_iter().all(|followed| self.to_model.send(ToModel::Followed(followed)).is_ok())
+        done.into_iter().all(|followed| self.pass_on(ToModel::Followed(followed)))
     }
 
     /// A picture for the screen, if one is due. By the sensor's clock: the bark's colour is taken from these pictures, and

@@ -1,38 +1,89 @@
-//! Cameras that are plugged in.
+//! Cameras that are plugged in: which they are, what they can do, and what would be filmed with them.
 
-use nokhwa::utils::{ApiBackend, CameraIndex};
+use super::SourceError;
+use super::choice::Mode;
+use super::identity::{Identity, Places, link, nodes};
+use super::v4l2::prospect;
+use crate::config;
 use std::path::PathBuf;
 
 /// A video device of this machine; not every one of them films.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Device {
     pub path: PathBuf,
     /// What the driver calls it.
     pub name: String,
     /// Driver and bus where they can be asked, e.g. `uvcvideo at usb-0000:00:14.0-1`, else what is known.
     pub description: String,
+    /// Which it is, whatever its number; `None` where the system does not tell.
+    pub identity: Option<Identity>,
+    /// Its name under `/dev/v4l`, where there is one.
+    pub link: Option<PathBuf>,
+    /// Whether it delivers pictures at all.
+    pub films: bool,
+    /// What it says it can do, of what we can read.
+    pub modes: Vec<Mode>,
+    /// What would be filmed, e.g. `MJPG 1280x720 @ 30`, and why.
+    pub chosen: Option<(String, String)>,
+    /// Why it cannot be opened, and what to do.
+    pub closed: Option<String>,
 }
 
-/// All video devices, by number; none is no error.
+/// All video devices, by number, and what would be filmed with the default settings; none is no error.
 pub fn list() -> Vec<Device> {
-    // An error means that there is nothing to list: no V4L2 in the kernel, or a sandbox without /dev.
-    let mut found: Vec<(u32, Device)> = nokhwa::query(ApiBackend::Video4Linux)
-        .unwrap_or_default()
-        .into_iter()
-        .filter_map(|camera| {
-            let CameraIndex::Index(number) = camera.index() else { return None };
-            let path = PathBuf::from(format!("/dev/video{number}"));
-            let description = describe(&path).unwrap_or_else(|| camera.description().to_owned());
-            Some((*number, Device { path, name: camera.human_name().trim().to_owned(), description }))
-        })
-        .collect();
-    found.sort_by_key(|(number, _)| *number);
-    found.into_iter().map(|(_, device)| device).collect()
+    list_for(&config::Camera::default(), &Places::default())
 }
 
-fn describe(path: &std::path::Path) -> Option<String> {
-    let caps = v4l::Device::with_path(path).ok()?.query_caps().ok()?;
-    let films = caps.capabilities.contains(v4l::capability::Flags::VIDEO_CAPTURE);
-    let kind = if films { "" } else { ", does not film" };
-    Some(format!("{} at {}{kind}", caps.driver, caps.bus))
+/// The same with these settings, on a system whose `/sys` and `/dev` are at `places`.
+pub fn list_for(config: &config::Camera, places: &Places) -> Vec<Device> {
+    let device = |node: super::identity::Node| {
+        let link = link(places, &node.path);
+        let (path, identity) = (node.path, node.identity);
+        let port = identity.as_ref().map_or_else(|| "nothing is known of it".to_owned(), |i| i.port.clone());
+        match prospect(&path, config) {
+            Ok(p) => {
+                let kind = if p.films { "" } else { ", does not film" };
+                Device {
+                    name: p.card,
+                    description: format!("{} at {}{kind}", p.driver, p.bus),
+                    films: p.films,
+                    modes: p.modes,
+                    chosen: p.chosen.map(|(granted, why)| (granted.to_string(), why)),
+                    closed: None,
+                    path,
+                    identity,
+                    link,
+                }
+            }
+            Err(e) => Device {
+                name: if node.name.is_empty() { "?".into() } else { node.name },
+                description: port,
+                // Nobody can know; whoever may open it will see.
+                films: true,
+                modes: Vec::new(),
+                chosen: None,
+                closed: Some(e.to_string()),
+                path,
+                identity,
+                link,
+            },
+        }
+    };
+    nodes(places).into_iter().map(device).collect()
+}
+
+/// Where the camera of this identity is now.
+///
+/// # Errors
+/// It is not plugged in.
+pub(super) fn by_identity(id: &str, places: &Places) -> Result<PathBuf, SourceError> {
+    let is_it = |n: &super::identity::Node| n.identity.as_ref().is_some_and(|i| i.id == id);
+    let hint = "plug the camera in; `arborcam devices` lists those that are there";
+    nodes(places).into_iter().find(is_it).map(|n| n.path).ok_or(SourceError::Absent { input: id.to_owned(), hint })
+}
+
+/// Whether the name is of the kind that [`Identity::id`] has.
+pub(super) fn is_identity(name: &str) -> bool {
+    let kinds = ["usb-", "virtual-", "platform-", "pci-", "bus-"];
+    !name.contains('/') && kinds.iter().any(|kind| name.starts_with(kind))
 }

@@ -16,7 +16,7 @@ pub enum SourceError {
     #[error("no permission to read {input}; {remedy}")]
     Denied { input: String, remedy: String },
     /// It was there and is no more: wait for it to come back.
-    #[error("{input} was disconnected ({reason}); check the cable, plug it in again and start anew")]
+    #[error("{input} was disconnected ({reason}); check the cable and plug it in again")]
     Disconnected { input: String, reason: String },
     /// It is there but silent.
     #[error(
@@ -51,6 +51,17 @@ impl SourceError {
             }
             Some(libc::EACCES | libc::EPERM) => SourceError::Denied { input, remedy: remedy(path) },
             _ => SourceError::BadFormat { input, what: format!("reading it fails: {e}") },
+        }
+    }
+
+    /// The reason alone, for whoever knows already which camera it is and waits for it.
+    pub fn brief(&self) -> String {
+        match self {
+            SourceError::Timeout { seconds, .. } => format!("no frame for {seconds} s"),
+            SourceError::Disconnected { reason, .. } => reason.clone(),
+            SourceError::BadFormat { what, .. } => what.clone(),
+            SourceError::Absent { .. } => "it is not there".to_owned(),
+            other => other.to_string(),
         }
     }
 

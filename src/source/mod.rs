@@ -3,20 +3,26 @@
 //! A source hands frames out as they left the camera or the file, with their own number and time; [`Decoder`] turns
 //! them into the pictures that the tracker and the screen want.
 
+mod choice;
 mod clock;
 mod decode;
 mod devices;
 mod error;
+mod identity;
 mod images;
 mod loopback;
 mod probe;
 mod recording;
+mod through_nokhwa;
 mod v4l2;
 mod video;
 
+pub use choice::Mode;
+pub use clock::ClockKind;
 pub use decode::{DecodeError, Decoder};
-pub use devices::{Device, list};
+pub use devices::{Device, list, list_for};
 pub use error::SourceError;
+pub use identity::{Identity, Places};
 pub use loopback::Loopback;
 
 use crate::config;
@@ -25,6 +31,7 @@ use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 /// What was opened and what is to be expected of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,12 +47,23 @@ pub struct SourceInfo {
     pub live: bool,
 }
 
+/// What a source knows beyond its frames. The counts only ever grow.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Health {
+    /// Frames that came damaged, short or with the driver's error flag, and were left out.
+    pub damaged: u64,
+    /// Frames that were not later than the one before, and were left out.
+    pub stale: u64,
+    /// What the frames' times are by.
+    pub clock: ClockKind,
+}
+
 /// A sequence of frames.
 pub trait Source: Send {
     /// Waits for the next frame; `None` is the end, and stays it.
     ///
     /// # Errors
-    /// The source has failed and will not deliver again; open it anew.
+    /// The source has failed and will not deliver again, unless it [`returns`](Self::returns) and is opened anew.
     fn next_frame(&mut self) -> Result<Option<RawFrame>, SourceError>;
 
     fn describe(&self) -> SourceInfo;
@@ -53,21 +71,60 @@ pub trait Source: Send {
     /// A source that may wait long gives up, and returns `None`, soon after this has been set.
     fn stop_when(&mut self, _stop: Arc<AtomicBool>) {}
 
+    /// Takes over what can be changed of `config` while frames flow: the limits of time.
+    fn adopt(&mut self, _config: &config::Camera) {}
+
+    /// Whether it may come back after a failure, as a camera does that is plugged in again.
+    fn returns(&self) -> bool {
+        false
+    }
+
+    /// One attempt to go on after a failure: the same camera, the same format. Whoever calls decides when to try again;
+    /// the source only says why it is not yet. Its frames go on with times that fit those before.
+    ///
+    /// # Errors
+    /// It is not back: `Absent` where it is not even there, which costs next to nothing to find out.
+    fn reopen(&mut self) -> Result<(), SourceError> {
+        Err(SourceError::Absent { input: self.describe().name, hint: "it cannot be opened again" })
+    }
+
+    /// The time after which silence is a failure, of a source that cannot keep to it by itself: [`next_frame`] may then
+    /// wait for ever, and belongs on a thread of its own.
+    ///
+    /// [`next_frame`]: Self::next_frame
+    fn waits_without_limit(&self) -> Option<Duration> {
+        None
+    }
+
+    fn health(&self) -> Health {
+        Health::default()
+    }
+
     /// Lines to show to the user since the last call, e.g. that a clip ends early; complete after the end.
     fn warnings(&mut self) -> Vec<String> {
         Vec::new()
     }
 }
 
-/// Opens whatever `input` is; `fps` is the rate of a folder of pictures (30 if not given), nothing else needs it.
+/// Opens whatever `input` is, a path or the identity of a camera; `fps` is the rate of a folder of pictures (30 if not given), nothing else needs it.
 ///
 /// # Errors
 /// There is nothing that can be read as frames; the error says why and what to do.
 pub fn open(input: &Path, config: &config::Camera, fps: Option<f64>) -> Result<Box<dyn Source>, SourceError> {
     let name = input.display().to_string();
+    let named;
+    let input = if devices::is_identity(&name) && !input.exists() {
+        named = devices::by_identity(&name, &Places::default())?;
+        &named
+    } else {
+        input
+    };
     let kind = std::fs::metadata(input).map_err(|e| SourceError::of_file(input, &e))?.file_type();
     if kind.is_char_device() {
-        Ok(Box::new(v4l2::Camera::open(input, config)?))
+        Ok(match config.backend {
+            config::Backend::V4l2 => Box::new(v4l2::Camera::open(input, config)?),
+            config::Backend::Nokhwa => Box::new(through_nokhwa::NokhwaCamera::open(input, config)?),
+        })
     } else if kind.is_dir() {
         Ok(Box::new(images::Images::open(input, fps.unwrap_or(30.0))?))
     } else if !kind.is_file() {

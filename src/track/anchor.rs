@@ -23,7 +23,8 @@ pub struct Keyframe {
 impl Keyframe {
     pub fn new(luma: &Luma, settings: &Track) -> Self {
         let mut pyramid = Pyramid::default();
-        pyramid.rebuild(luma, settings.window_px, 0);
+        // All levels: after a gap a point may be far from where it was.
+        pyramid.rebuild(luma, settings.window_px, settings.levels);
         Self { luma: luma.clone(), pyramid }
     }
 }
@@ -55,6 +56,27 @@ impl Anchoring {
             backward: Vec::new(),
             min_ncc: settings.anchor_ncc as f32,
         }
+    }
+
+    /// Looks for the first patches of points far around their first places, on all `levels`. `None` where what is found
+    /// does not lead back or does not look alike.
+    pub fn search(
+        &mut self,
+        keyframe: &Keyframe,
+        (luma, pyramid): (&Luma, &Pyramid),
+        born: &[[f32; 2]],
+        levels: u32,
+    ) -> Vec<Option<[f32; 2]>> {
+        self.flow.track((&keyframe.pyramid, pyramid), born, None, levels, &mut self.forward);
+        let found: Vec<[f32; 2]> = self.forward.iter().map(|f| f.to).collect();
+        self.flow.track((pyramid, &keyframe.pyramid), &found, None, levels, &mut self.backward);
+        let accepted = |(i, b): (usize, &[f32; 2])| {
+            let (forward, backward) = (self.forward[i], self.backward[i]);
+            let closed = forward.found && backward.found && distance(backward.to, *b) < FB_LIMIT_PX;
+            let alike = || ncc((&keyframe.luma, *b), (luma, forward.to)) > self.min_ncc;
+            (closed && alike()).then_some(forward.to)
+        };
+        born.iter().enumerate().map(accepted).collect()
     }
 
     /// Looks for each candidate's first patch in the present picture, starting where tracking has it and where its

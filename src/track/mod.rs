@@ -8,6 +8,7 @@ mod detect;
 mod flow;
 mod history;
 mod neighbours;
+mod regain;
 
 pub use detect::Detector;
 pub use flow::{Flow, OpticalFlow, Pyramid};
@@ -54,6 +55,7 @@ pub struct Tracker {
     next_keyframe: u32,
     frames: u64,
     last_detection: u64,
+    gaps: regain::Gaps,
     buffers: Buffers,
 }
 
@@ -82,6 +84,7 @@ impl Tracker {
             next_keyframe: 0,
             frames: 0,
             last_detection: 0,
+            gaps: regain::Gaps::default(),
             buffers: Buffers::default(),
         }
     }
@@ -96,10 +99,15 @@ impl Tracker {
         std::mem::swap(&mut self.previous, &mut self.present);
         self.present.rebuild(&frame.luma, self.settings.window_px, self.settings.levels);
         let before = self.points.len();
+        let regaining = self.gaps.regaining(frame.time_s);
         if self.frames > 0 {
-            self.follow();
-            self.undo_drift(frame);
-            let (size, patience) = (frame.luma.size, self.settings.coast_frames);
+            if regaining {
+                self.regain(frame);
+            } else {
+                self.follow();
+                self.undo_drift(frame);
+            }
+            let (size, patience) = (frame.luma.size, self.settings.coast_frames.max(u32::from(regaining)));
             self.points
                 .retain(|p| p.coasting <= patience && size.contains(f64::from(p.now_px[0]), f64::from(p.now_px[1])));
         }
@@ -135,6 +143,11 @@ impl Tracker {
                 p.coasting += 1;
             }
         }
+        self.ride();
+    }
+
+    /// Moves the points that are not seen with those around them that are.
+    fn ride(&mut self) {
         let riding: Vec<usize> = (0..self.points.len()).filter(|&i| self.points[i].coasting > 0).collect();
         for i in riding {
             if let Some(at) = self.predicted(i) {

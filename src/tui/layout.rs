@@ -49,7 +49,7 @@ impl Areas {
 
         let tracks_height = if roomy { 6 } else { 3 };
         let [camera, tracks, skeleton] = Layout::vertical([
-            Constraint::Length(if body.height < 16 { 6 } else { 7 }),
+            Constraint::Length(if body.height < 16 { 6 } else { 8 }),
             Constraint::Length(tracks_height),
             Constraint::Min(1),
         ])

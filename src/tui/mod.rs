@@ -3,6 +3,7 @@
 //! The screen reads immutable [`Snapshot`]s and sends [`Control`]s through a [`Session`]; it knows nothing of the
 //! pipeline and starts no thread. [`run`] blocks the calling thread until the capture has ended.
 
+mod abilities;
 mod compose;
 mod drawing;
 mod format;
@@ -21,6 +22,7 @@ mod tests;
 mod theme;
 mod tty;
 
+pub use abilities::{Abilities, abilities};
 pub use graphics::Preview;
 pub use progress::Progress;
 pub use theme::Depth;

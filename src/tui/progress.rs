@@ -3,7 +3,7 @@
 use super::format;
 use crate::model::Snapshot;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 
 /// A line that shows how far the work has come; nothing where standard error is no terminal.
 #[derive(Debug)]
@@ -29,6 +29,12 @@ impl Progress {
         }
         self.bar.set_message(text(snapshot));
         self.bar.set_position(snapshot.frame);
+    }
+
+    /// Prints a line of text on standard error, above the line that shows the progress.
+    pub fn tell(&self, line: &str) {
+        // Where nobody reads it any more, that is no reason to fail.
+        self.bar.suspend(|| drop(writeln!(std::io::stderr(), "{line}")));
     }
 
     /// Takes the line away.

@@ -9,7 +9,7 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-/// Six lines, the last of which tells only of losses that seldom happen.
+/// Seven lines; where there is no room for all, the last ones tell only of losses that seldom happen.
 pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
     let s = &state.snapshot;
     let inner = titled(frame, area, "Camera", theme);
@@ -23,25 +23,30 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         let style = if n > 0 { theme.warning() } else { theme.faint() };
         [Span::raw(format!("{name} ")), Span::styled(count(n), style)]
     };
-    let pair = |a: [Span<'static>; 2], b: [Span<'static>; 2]| {
-        let mut spans: Vec<_> = a.into();
-        spans.push(Span::raw("  "));
-        spans.extend(b);
+    let joined = |parts: &[[Span<'static>; 2]]| {
+        let mut spans: Vec<_> = parts.iter().flat_map(|part| [part.as_slice(), &[Span::raw("  ")]].concat()).collect();
+        spans.pop();
         spans
     };
+    let rate = || format!("{} Hz", value(s.sensor_rate_hz));
+    let rate = match &s.camera.away {
+        Some(reason) => vec![Span::styled(format!("gone: {reason}"), theme.warning())],
+        None if s.camera.rate_off => vec![Span::styled(format!("{}  not as given", rate()), theme.warning())],
+        None => vec![Span::styled(rate(), theme.strong()), Span::raw(format!("  worked {}", value(s.work_rate_hz)))],
+    };
+    // Both counts of what was lost before us: by the driver's numbers, where it has them, and by the times.
+    let by_number = match s.camera.lost_by_sequence {
+        Some(n) => loss("numbers", n),
+        None => [Span::raw("numbers "), Span::styled("–", theme.faint())],
+    };
+    let broken = s.undecodable.saturating_add(s.camera.damaged).saturating_add(s.camera.stale);
     // A file is asked for nothing.
     let other = !s.format.asked.is_empty() && s.format.asked != s.format.given;
     let given_style = if other { theme.warning() } else { theme.strong() };
     let lines = vec![
         row("asked", vec![or_dash(&s.format.asked)]),
         row("given", vec![or_dash(&s.format.given).style(given_style)]),
-        row(
-            "rate",
-            vec![
-                Span::styled(format!("{} Hz", value(s.sensor_rate_hz)), theme.strong()),
-                Span::raw(format!("  worked {}", value(s.work_rate_hz))),
-            ],
-        ),
+        row("rate", rate),
         row(
             "delay",
             vec![
@@ -49,8 +54,9 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
                 Span::raw(format!("  p99 {}", millis(s.latency_p99_ms))),
             ],
         ),
-        row("lost", pair(loss("camera", s.lost_in_camera), loss("queue", s.dropped_before_tracker))),
-        row("", pair(loss("broken", s.undecodable), loss("unshown", s.not_shown))),
+        row("lost", joined(&[loss("camera", s.lost_in_camera), loss("queue", s.dropped_before_tracker)])),
+        row("", joined(&[loss("broken", broken), loss("unshown", s.not_shown)])),
+        row("", joined(&[by_number, loss("times", s.camera.lost_by_time)])),
     ];
     frame.render_widget(Paragraph::new(lines), inner);
 }

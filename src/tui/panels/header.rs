@@ -13,6 +13,7 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
     let word = match (state.quitting, s.ended, state.paused) {
         (true, ..) => Some(" WRITING "),
         (_, true, _) => Some(" ENDED "),
+        _ if s.camera.away.is_some() => Some(" CAMERA GONE "),
         (.., true) => Some(" PAUSED "),
         _ => None,
     };

@@ -105,6 +105,7 @@ pub fn huge() -> Snapshot {
     s.time_s = 1e300;
     (s.sensor_rate_hz, s.work_rate_hz) = (f64::INFINITY, 1e12);
     (s.lost_in_camera, s.dropped_before_tracker, s.undecodable, s.not_shown) = (u64::MAX, 123_456, 99_999, 12_345_678);
+    (s.camera.damaged, s.camera.lost_by_sequence, s.camera.lost_by_time) = (u64::MAX, Some(u64::MAX), u64::MAX);
     (s.latency_p50_ms, s.latency_p99_ms) = (123_456.0, 1e99);
     (s.tracks_alive, s.lost_per_s, s.fb_error_px) = (u32::MAX, 1e7, f64::NAN);
     s.fb_history_px = vec![f64::NAN, 1e300, -1.0, f64::INFINITY, 3.0];

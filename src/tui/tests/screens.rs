@@ -1,7 +1,7 @@
 //! What the whole screen looks like, and that nothing brings it down.
 
 use super::made_up::{huge, snapshot};
-use crate::model::{Phase, Rgb, Size, Skeleton, Snapshot};
+use crate::model::{CameraState, Phase, Rgb, Size, Skeleton, Snapshot};
 use crate::tui::graphics::Graphics;
 use crate::tui::panels::preview::Preview;
 use crate::tui::screen;
@@ -40,6 +40,16 @@ fn cases() -> Vec<(&'static str, State)> {
     polygon.set_cursor([320.0, 180.0]);
     drawing.say("That is outside the picture.");
     cases.push(("drawing", drawing));
+    let camera = CameraState {
+        away: Some("no frame for 3 s".to_owned()),
+        lost_by_sequence: Some(3),
+        lost_by_time: 2,
+        damaged: 4,
+        ..CameraState::default()
+    };
+    cases.push(("away", state(Snapshot { camera, ..snapshot(Phase::Live) })));
+    let slow = CameraState { rate_off: true, ..CameraState::default() };
+    cases.push(("slow", state(Snapshot { camera: slow, sensor_rate_hz: 15.0, ..snapshot(Phase::Live) })));
     let mut quitting = state(Snapshot { paused: true, ..snapshot(Phase::Live) });
     quitting.quitting = true;
     quitting.say("Ending; writing the capture…");

@@ -1,0 +1,350 @@
+//! A camera that is unplugged, hangs and comes back: the capture goes on, and every frame that there was is accounted for.
+
+mod support;
+
+use arborcam::config::Config;
+use arborcam::model::{Control, FormatNote, RawFrame, TrackId, TrackSet};
+use arborcam::runtime::{self, Failure, Job, Pace, Running, Summary};
+use arborcam::source::{Decoder, Health, Source, SourceError, SourceInfo};
+use arborcam::track::Tracker;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+use support::{SIZE, recording};
+
+const HANGS: Duration = Duration::from_secs(60);
+/// The made-up camera is that much faster than one of 30 frames a second.
+const HURRY: u64 = 3;
+
+fn unplugged() -> SourceError {
+    SourceError::Disconnected { input: "fake".into(), reason: "test".into() }
+}
+
+fn silent() -> SourceError {
+    SourceError::Timeout { input: "fake".into(), seconds: 3.0 }
+}
+
+fn absent() -> SourceError {
+    SourceError::Absent { input: "fake".into(), hint: "test" }
+}
+
+/// What happens to a camera at some frame.
+#[derive(Clone, Copy)]
+struct Loss {
+    at: u64,
+    /// How it fails.
+    how: fn() -> SourceError,
+    /// What the attempts to open it again come to before one succeeds.
+    attempts: u64,
+    refusal: fn() -> SourceError,
+    /// How long it was away by its own clock, s.
+    away_s: f64,
+    /// It starts, and fails once more before the first frame.
+    false_start: bool,
+}
+
+const UNPLUGGED: Loss = Loss { at: 100, how: unplugged, attempts: 2, refusal: absent, away_s: 2.0, false_start: false };
+
+#[derive(Default)]
+struct Log {
+    reopened: Vec<Instant>,
+}
+
+/// Plays the recording over and over as a camera of 30 frames a second would.
+struct Camera {
+    losses: Vec<Loss>,
+    frames: u64,
+    next: u64,
+    away_s: f64,
+    refused: u64,
+    /// It is gone, and the frame at which it went.
+    gone: bool,
+    stop: Arc<AtomicBool>,
+    log: Arc<Mutex<Log>>,
+}
+
+impl Camera {
+    fn new(losses: &[Loss], frames: u64) -> (Box<Self>, Arc<Mutex<Log>>) {
+        let log = Arc::new(Mutex::new(Log::default()));
+        let (losses, stop) = (losses.to_vec(), Arc::default());
+        (Box::new(Self { losses, frames, next: 0, away_s: 0.0, refused: 0, gone: false, stop, log: log.clone() }), log)
+    }
+}
+
+impl Source for Camera {
+    fn next_frame(&mut self) -> Result<Option<RawFrame>, SourceError> {
+        if self.next == self.frames || self.stop.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
+        if let Some(loss) = self.losses.first().copied()
+            && loss.at == self.next
+        {
+            if !self.gone || self.losses[0].false_start && self.refused == loss.attempts {
+                self.refused += u64::from(self.gone);
+                self.gone = true;
+                return Err((loss.how)());
+            }
+            self.losses.remove(0);
+            (self.gone, self.refused) = (false, 0);
+        }
+        std::thread::sleep(Duration::from_millis(33 / HURRY));
+        let n = self.next;
+        self.next += 1;
+        let clip = recording();
+        let mut raw = clip[(n % clip.len() as u64) as usize].clone();
+        (raw.sequence, raw.sensor_time_s) = (Some(n), 1000.0 + n as f64 / 30.0 + self.away_s);
+        Ok(Some(raw))
+    }
+
+    fn describe(&self) -> SourceInfo {
+        SourceInfo {
+            name: "fake".into(),
+            format: FormatNote::default(),
+            size: SIZE,
+            nominal_rate_hz: Some(30.0),
+            frames_total: None,
+            live: true,
+        }
+    }
+
+    fn returns(&self) -> bool {
+        true
+    }
+
+    fn reopen(&mut self) -> Result<(), SourceError> {
+        self.log.lock().expect("log").reopened.push(Instant::now());
+        let loss = self.losses[0];
+        if self.refused < loss.attempts {
+            self.refused += 1;
+            return Err((loss.refusal)());
+        }
+        if self.refused == loss.attempts {
+            self.away_s += loss.away_s;
+        }
+        Ok(())
+    }
+
+    fn stop_when(&mut self, stop: Arc<AtomicBool>) {
+        self.stop = stop;
+    }
+
+    fn health(&self) -> Health {
+        Health::default()
+    }
+}
+
+fn job(out: Option<&Path>) -> Job {
+    Job {
+        config: Config::default(),
+        outline: Some(support::outline()),
+        pace: Pace::Live,
+        stream: None,
+        out: out.map(Path::to_path_buf),
+        record: None,
+        preview_every: Duration::from_secs(2),
+    }
+}
+
+/// Waits for the end of a run: how it ended, and all that was told on the way.
+fn ended(running: Running) -> (Summary, Option<Failure>, Vec<String>) {
+    let (since, mut news) = (Instant::now(), Vec::new());
+    while !running.finished() {
+        assert!(since.elapsed() < HANGS, "the run hangs; told so far: {news:?}");
+        news.extend(running.news());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    news.extend(running.news());
+    let (summary, failure) = running.join();
+    (summary.expect("a summary"), failure, news)
+}
+
+fn capture(out: &Path) -> serde_json::Value {
+    serde_json::from_slice(&std::fs::read(out.join("capture.json")).expect("capture.json")).expect("JSON")
+}
+
+/// Runs a camera with these losses; the capture's `timing`, and what was told.
+fn run(losses: &[Loss], frames: u64) -> (serde_json::Value, Summary, Vec<String>) {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("out");
+    let (camera, _) = Camera::new(losses, frames);
+    let (summary, failure, news) = ended(runtime::start(camera, job(Some(&out))).expect("start"));
+    assert!(failure.is_none(), "{failure:?}");
+    (capture(&out)["timing"].clone(), summary, news)
+}
+
+#[test]
+fn an_unplugged_camera_is_waited_for_and_the_gap_has_its_true_length() {
+    let (timing, summary, news) = run(&[UNPLUGGED], 300);
+    assert_eq!((summary.frames, timing["reconnects"].as_u64()), (300, Some(1)));
+    let gap = &timing["gaps"][0];
+    assert_eq!((gap["after_frame"].as_u64(), gap["cause"].as_str()), (Some(99), Some("disconnected")));
+    assert_eq!(gap["missing"], 60, "two seconds of frames");
+    assert!((gap["length_s"].as_f64().expect("length") - (2.0 + 1.0 / 30.0)).abs() < 1e-3, "{gap}");
+    assert!((timing["away_s"].as_f64().expect("time") - (2.0 + 1.0 / 30.0)).abs() < 1e-3);
+    assert_eq!(timing["frames_dropped_camera"], 0, "what was never filmed was not dropped");
+    assert!((timing["duration_s"].as_f64().expect("time") - (299.0 / 30.0 + 2.0)).abs() < 1e-3);
+    let told = |what: &str| news.iter().filter(|l| l.contains(what)).count();
+    assert_eq!((told("was lost at 3.3 s (test)"), told("the camera is back after")), (1, 1), "{news:?}");
+    assert!(summary.tree.is_some(), "a tree is built all the same");
+}
+
+#[test]
+fn twenty_times_unplugged_is_twenty_times_back_with_the_same_tree_and_points() {
+    let losses: Vec<Loss> = (0..20)
+        .map(|k| Loss { at: 330 + 15 * k, away_s: 0.5, attempts: k % 2, false_start: k % 3 == 0, ..UNPLUGGED })
+        .collect();
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("out");
+    let (camera, _) = Camera::new(&losses, 330 + 20 * 15 + 30);
+    let (summary, failure, news) = ended(runtime::start(camera, job(Some(&out))).expect("start"));
+    assert!(failure.is_none(), "{failure:?}");
+    let capture = capture(&out);
+    let timing = &capture["timing"];
+    assert_eq!((timing["reconnects"].as_u64(), summary.frames), (Some(20), 660), "{news:?}");
+    assert_eq!(timing["gaps"].as_array().map(Vec::len), Some(20));
+    assert!((timing["away_s"].as_f64().expect("time") - 20.0 * (0.5 + 1.0 / 30.0)).abs() < 1e-2);
+    let tree = summary.tree.expect("a tree");
+    assert!(tree.frame < 330, "built before the first loss, and not again");
+    // The points that made the tree are still the ones that move it.
+    let text = std::fs::read_to_string(out.join("tracks.csv")).expect("tracks.csv");
+    let row = |l: &str| Some((l.split(',').next()?.parse::<u32>().ok()?, l.split(',').nth(1)?.parse::<u64>().ok()?));
+    let rows: Vec<(u32, u64)> = text.lines().skip(1).filter_map(row).collect();
+    let last = rows.iter().map(|r| r.1).max().expect("tracks");
+    assert!(last > 800, "frames keep their places in time: {last}");
+    let at_end: Vec<u32> = rows.iter().filter(|r| r.1 == last).map(|r| r.0).collect();
+    let kept = at_end.iter().filter(|id| tree.rest_px.keys().any(|t| t.0 == **id)).count();
+    assert!(kept * 10 >= tree.rest_px.len() * 6, "{kept} of {} points are left", tree.rest_px.len());
+}
+
+#[test]
+fn why_it_cannot_go_on_yet_is_told_once_and_attempts_do_not_crowd() {
+    fn other_size() -> SourceError {
+        SourceError::BadFormat { input: "fake".into(), what: "it came back with another size".into() }
+    }
+    let (camera, log) = Camera::new(&[Loss { how: silent, attempts: 4, refusal: other_size, ..UNPLUGGED }], 120);
+    let (summary, failure, news) = ended(runtime::start(camera, job(None)).expect("start"));
+    assert!(failure.is_none() && summary.frames == 120);
+    let told = |what: &str| news.iter().filter(|l| l.contains(what)).count();
+    assert_eq!((told("no frame for 3 s"), told("came back with another size")), (1, 1), "{news:?}");
+    let times = log.lock().expect("log").reopened.clone();
+    assert_eq!(times.len(), 5);
+    let least = times.windows(2).map(|w| w[1] - w[0]).min().expect("attempts");
+    assert!(least >= Duration::from_millis(500), "camera.retry_delay_s is kept: {least:?}");
+}
+
+#[test]
+fn a_camera_that_is_not_there_is_looked_for_often_enough() {
+    let mut config = Config::default();
+    config.camera.retry_delay_s = 3600.0;
+    let (camera, log) = Camera::new(&[Loss { attempts: 5, ..UNPLUGGED }], 120);
+    let (summary, ..) = ended(runtime::start(camera, Job { config, ..job(None) }).expect("start"));
+    let times = log.lock().expect("log").reopened.clone();
+    assert_eq!((summary.frames, times.len()), (120, 6));
+    let longest = times.windows(2).map(|w| w[1] - w[0]).max().expect("attempts");
+    assert!(longest < Duration::from_secs(1), "a camera that comes back is seen: {longest:?}");
+}
+
+#[test]
+fn a_wish_to_stop_is_heard_while_waiting() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("out");
+    let mut config = Config::default();
+    config.camera.retry_delay_s = 3600.0;
+    let (camera, log) = Camera::new(&[Loss { attempts: u64::MAX, refusal: silent, at: 150, ..UNPLUGGED }], 300);
+    let running = runtime::start(camera, Job { config, ..job(Some(&out)) }).expect("start");
+    let since = Instant::now();
+    while log.lock().expect("log").reopened.is_empty() {
+        assert!(since.elapsed() < HANGS, "it is never tried");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    // The screen says so though no frame comes.
+    let away = |r: &Running| r.latest().is_some_and(|s| s.camera.away.is_some());
+    while !away(&running) {
+        assert!(since.elapsed() < HANGS, "the screen does not say it");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    running.send(Control::Quit);
+    let (summary, failure, _) = ended(running);
+    assert!(failure.is_none(), "{failure:?}");
+    assert_eq!((summary.frames, summary.written.is_some()), (150, true), "what was captured is kept");
+}
+
+#[test]
+fn without_reconnecting_the_first_loss_ends_the_capture() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("out");
+    let mut config = Config::default();
+    config.camera.reconnect = false;
+    let (camera, log) = Camera::new(&[Loss { at: 150, ..UNPLUGGED }], 300);
+    let (summary, failure, _) = ended(runtime::start(camera, Job { config, ..job(Some(&out)) }).expect("start"));
+    assert!(matches!(failure, Some(Failure::Source(SourceError::Disconnected { .. }))), "{failure:?}");
+    assert_eq!((summary.frames, out.join("capture.json").exists()), (150, true));
+    assert!(log.lock().expect("log").reopened.is_empty());
+}
+
+/// A camera that never gave a frame is not one to wait for: most likely it is the wrong one.
+#[test]
+fn a_camera_that_never_filmed_is_not_waited_for() {
+    let (camera, log) = Camera::new(&[Loss { at: 0, how: silent, ..UNPLUGGED }], 300);
+    let (summary, failure, _) = ended(runtime::start(camera, job(None)).expect("start"));
+    assert!(matches!(failure, Some(Failure::Source(SourceError::Timeout { .. }))), "{failure:?}");
+    assert_eq!(summary.frames, 0);
+    assert!(log.lock().expect("log").reopened.is_empty());
+}
+
+/// Follows the frames, `skipped` left out, and gives the places of the points in each of the last 40.
+fn followed(skipped: std::ops::Range<usize>, adjust: &dyn Fn(usize, &mut arborcam::model::Frame)) -> Vec<TrackSet> {
+    let config = Config::default();
+    let mut tracker = Tracker::new(&config.detect, &config.track, &support::outline(), 0);
+    let mut decoder = Decoder::new().expect("decoder");
+    let mut sets = Vec::new();
+    for k in (0..recording().len()).filter(|k| !skipped.contains(k)) {
+        let mut frame = support::decoded(&mut decoder, k);
+        adjust(k, &mut frame);
+        sets.push(tracker.step(&frame));
+    }
+    sets
+}
+
+/// While a camera is away the tree goes on swaying, and a camera that starts takes a moment to find its exposure.
+#[test]
+fn points_are_found_again_after_a_gap_under_their_names_and_in_their_places() {
+    let whole = followed(0..0, &|_, _| {});
+    for (gap, dark) in [(150..153, 0), (150..195, 0), (150..240, 0), (150..240, 10), (150..240, 30)] {
+        let back = gap.end;
+        let with_gap = followed(gap.clone(), &|k, frame| {
+            // The first pictures are too dark by half, less and less so.
+            if k >= back && k < back + dark {
+                let gain = 0.3 + 0.7 * (k - back) as f64 / dark as f64;
+                frame.luma.pixels.iter_mut().for_each(|p| *p = (f64::from(*p) * gain) as u8);
+            }
+        });
+        let before: BTreeSet<TrackId> = with_gap[gap.start - 1].observations.iter().map(|o| o.id).collect();
+        for after in [0, 5, 15, 40, 80] {
+            let k = back + after;
+            let set = &with_gap[k - gap.len()];
+            let truth: BTreeMap<TrackId, [f32; 2]> =
+                whole[k].observations.iter().map(|o| (o.id, [o.u_px, o.v_px])).collect();
+            let mut off: Vec<f32> = Vec::new();
+            let mut kept = 0;
+            for o in set.observations.iter().filter(|o| before.contains(&o.id)) {
+                kept += 1;
+                if let Some(t) = truth.get(&o.id) {
+                    off.push((o.u_px - t[0]).hypot(o.v_px - t[1]));
+                }
+            }
+            off.sort_by(f32::total_cmp);
+            let could = before.iter().filter(|id| truth.contains_key(id)).count();
+            eprintln!(
+                "gap {gap:?} dark {dark} +{after}: {kept} of {} kept ({could} without), right {} median {:?} p90 {:?} new {}",
+                before.len(),
+                off.iter().filter(|d| **d < 2.0).count(),
+                off.get(off.len() / 2),
+                off.get(off.len() * 9 / 10),
+                set.observations.len() - kept
+            );
+        }
+    }
+}
