@@ -19,8 +19,8 @@ pub const GROUP: Group = Group {
         ("a_fatal_error_ends_a_capture_that_is_to_end_with_it", |r| ended_at_once(r, "fatal-once")),
         ("a_disconnected_camera_is_taken_again", |r| recovered(r, "disconnect")),
         ("a_disconnected_camera_ends_a_capture_that_is_to_end_with_it", |r| ended_at_once(r, "disconnect-once")),
-        ("a_count_that_wraps_is_no_loss", |r| wrapped(r, "wrapped-count")),
-        ("a_clock_that_wraps_is_no_loss", |r| wrapped(r, "wrapped-clock")),
+        ("a_count_that_wraps_is_no_loss", |r| wrapped(r, "wrapped-count", 30.0)),
+        ("a_clock_that_wraps_is_no_loss", |r| wrapped(r, "wrapped-clock", 15.0)),
         ("a_size_that_the_driver_lacks_is_refused", |r| refused(r, "size", "--accept-format")),
         ("a_size_that_the_driver_lacks_can_be_accepted", accepted),
         ("a_camera_in_use_is_said_to_be", |r| refused(r, "busy", "in use by v4l2-ctl")),
@@ -33,7 +33,8 @@ fn stopped(r: &Results, case: &str) -> Result<(), String> {
     let status = r.status(case)?;
     claim(status == "130", || format!("{case}: status {status}: {}", r.messages(case).unwrap_or_default()))?;
     let took = r.seconds(case, "asked", "ended")?;
-    claim(took < 5.0, || format!("{case}: stopped after {took} s"))?;
+    // Decoding and writing are slow on an emulated processor; what hangs takes twenty.
+    claim(took < 10.0, || format!("{case}: stopped after {took} s"))?;
     let seen = r.count(case, "frames_seen")?;
     claim(seen >= 15, || format!("{case}: {seen} frames"))
 }
@@ -58,7 +59,7 @@ fn dropped(r: &Results, case: &str, share: std::ops::RangeInclusive<f64>) -> Res
 
 fn flagged(r: &Results) -> Result<(), String> {
     stopped(r, "flagged")?;
-    let broken = r.count("flagged", "frames_broken")?;
+    let broken = r.count("flagged", "frames_damaged")?;
     claim((1..=4).contains(&broken), || format!("{broken} counted as broken of 4"))
 }
 
@@ -73,14 +74,13 @@ fn refused(r: &Results, case: &str, word: &str) -> Result<(), String> {
 /// Said at once, waited for, and gone on with, the hole marked.
 fn recovered(r: &Results, case: &str) -> Result<(), String> {
     stopped(r, case)?;
-    let capture = r.capture(case)?;
-    let gaps = capture["timing"]["gaps"].as_array().cloned().unwrap_or_default();
-    let longest = gaps.iter().filter_map(|g| g["missing"].as_u64()).max().unwrap_or(0);
-    claim(longest >= 1, || format!("{case}: no gap in {}", capture["timing"]))?;
-    let length = capture["timing"]["duration_s"].as_f64().unwrap_or(0.0);
+    let timing = r.capture(case)?["timing"].clone();
+    claim(timing["reconnects"] == 1, || format!("{case}: {timing}"))?;
+    claim(timing["gaps"].to_string().contains("disconnected"), || format!("{case}: no gap in {timing}"))?;
+    let length = timing["duration_s"].as_f64().unwrap_or(0.0);
     claim(length > 4.5, || format!("{case}: nothing after the fault, {length} s in all"))?;
     let said = r.messages(case)?;
-    claim(said.contains("disconnected"), || format!("{case}: nothing was said: {said}"))
+    claim(said.contains("was lost") && said.contains("is back"), || format!("{case}: not told: {said}"))
 }
 
 /// `--once`: the shorter capture is whole, and the status says that it is shorter.
@@ -91,14 +91,18 @@ fn ended_at_once(r: &Results, case: &str) -> Result<(), String> {
     claim(seen >= 15, || format!("{case}: {seen} frames"))
 }
 
-fn wrapped(r: &Results, case: &str) -> Result<(), String> {
+fn wrapped(r: &Results, case: &str, rate_hz: f64) -> Result<(), String> {
     stopped(r, case)?;
+    // What was seen and what was lost fill the time: the wrap is neither a loss nor does it hide one.
     let (seen, lost) = (r.count(case, "frames_seen")?, r.count(case, "frames_dropped_camera")?);
-    claim(lost * 10 <= seen, || format!("{case}: {lost} counted as lost beside {seen} seen"))?;
-    // The capture's time goes on as the guest's own did.
     let length = r.capture(case)?["timing"]["duration_s"].as_f64().unwrap_or(0.0);
+    let filled = (seen + lost) as f64 / (length * rate_hz + 1.0);
+    claim((0.93..=1.07).contains(&filled), || {
+        format!("{case}: {seen} seen and {lost} lost in {length} s at {rate_hz} Hz")
+    })?;
+    // The capture's time goes on as the guest's own did.
     let wall = r.seconds(case, "begun", "asked")?;
-    claim((wall - 2.5..=wall + 0.5).contains(&length), || format!("{case}: {length} s of time in {wall} s"))
+    claim((wall - 4.0..=wall + 0.5).contains(&length), || format!("{case}: {length} s of time in {wall} s"))
 }
 
 fn accepted(r: &Results) -> Result<(), String> {

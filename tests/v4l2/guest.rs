@@ -2,6 +2,7 @@
 
 use arborcam::config::Camera;
 use arborcam::model::RawFrame;
+use arborcam::recording::{Head, Limits, Series};
 use arborcam::source;
 use serde_json::Value;
 use std::fs;
@@ -173,6 +174,15 @@ pub fn frames_of(path: &Path) -> Result<Vec<RawFrame>, String> {
         frames.push(frame);
     }
     Ok(frames)
+}
+
+/// Makes a recording of `frames`.
+pub fn record(path: &Path, frames: &[RawFrame]) -> Result<(), String> {
+    let mut series = Series::create(path, Head::default(), Limits::default(), || 0).map_err(|e| e.to_string())?;
+    for (raw, index) in frames.iter().zip(0..) {
+        series.frame(raw, index).map_err(|e| e.to_string())?;
+    }
+    series.close().map_err(|e| e.to_string())
 }
 
 /// Fails with what was found, unless `holds`.

@@ -42,7 +42,8 @@ fn provide(folder: &Path) -> Result<(), String> {
         frame.sequence = Some(n as u64);
     }
     crate::guest::record(&folder.join("clip-mjpeg.mcap"), &frames)?;
-    for (frame, luma) in frames.iter_mut().zip(lumas(&frames.clone())?) {
+    let lumas = lumas(&frames)?;
+    for (frame, luma) in frames.iter_mut().zip(lumas) {
         frame.format = PixelFormat::Yuyv;
         // Without colour.
         frame.bytes = luma.iter().flat_map(|y| [*y, 128]).collect();

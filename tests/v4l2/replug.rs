@@ -15,7 +15,7 @@ pub const GROUP: Group = Group {
     provide: clip,
     cases: &[
         ("each_of_twenty_returns_is_taken_within_two_seconds", recovered),
-        ("tree_and_tracks_outlive_the_gaps", one_tree),
+        ("tree_and_tracks_last_through_the_gaps", one_tree),
         ("another_camera_is_not_taken_for_the_one_that_is_awaited", not_another),
         ("a_camera_that_hangs_is_waited_for", hang),
         ("a_camera_that_hangs_ends_a_capture_that_is_to_end_with_it", hang_once),

@@ -9,10 +9,11 @@ v4l2-ctl -d $device -i 0 >/dev/null
 set_control horizontal_movement=4
 
 settings() {
-    printf '[camera]\nformat = "yuyv"\nwidth = %s\nheight = %s\nrate_hz = %s\n' "$1" "$2" "$3" >"$work/$4.toml"
+    printf '[camera]\nformat = "yuyv"\nwidth = %s\nheight = %s\nrate_hz = %s\n[detect]\npoints = 60\n' \
+        "$1" "$2" "$3" >"$work/$4.toml"
 }
 settings 320 180 15 small
-settings 320 180 60 fast
+settings 320 180 30 fast
 settings 1000 700 15 odd
 printf '{"frame":0,"width":320,"height":180,"polygon_px":[[8,8],[311,8],[311,171],[8,171]]}' >"$work/outline.json"
 
@@ -73,7 +74,7 @@ end 20
 # The count starts 128 frames before its end.
 set_control wrap_sequence_number=1
 film wrapped-count fast
-sleep 4
+sleep 7
 stop
 set_control wrap_sequence_number=0
 # The clock starts 16 s before its end.

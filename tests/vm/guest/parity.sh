@@ -3,22 +3,22 @@
 modprobe v4l2loopback devices=1 video_nr=0 card_label=replay exclusive_caps=1
 printf '{"frame":0,"width":320,"height":180,"polygon_px":[[8,8],[311,8],[311,171],[8,171]]}' >"$work/outline.json"
 cp /vm/clip-*.mcap "$work/"
-films() { v4l2-ctl -d /dev/video0 -D | grep -q 'Video Capture'; }
+
+fed() { v4l2-ctl -d /dev/video0 -D | grep -q "Video Capture"; }
 
 for format in mjpeg yuyv; do
     "$bin" play "$work/clip-$format.mcap" --to /dev/video0 --loop 2>"/vm/play-$format" &
     player=$!
-    until_ok 10 films
-    printf '[camera]\nformat = "%s"\nwidth = 320\nheight = 180\nrate_hz = 10\n' $format >"$work/camera.toml"
+    until_ok 10 fed
+    printf '[camera]\nformat = "%s"\nwidth = 320\nheight = 180\nrate_hz = 10\n[detect]\npoints = 120\n' $format >"$work/camera.toml"
     begin "live-$format" capture /dev/video0 --headless --config "$work/camera.toml" --outline "$work/outline.json" \
         --record "$work/live-$format.mcap" --out "$work/live-$format"
     sleep 16
     stop
     kill -INT $player
-    wait $player
+    wait $player || true
     cp "$work/live-$format.mcap" /vm/
-    # One made by replay, not the program's own settings for another camera.
-    begin "replay-$format" replay "$work/live-$format.mcap" --headless --fast --outline "$work/outline.json" \
-        --out "$work/replay-$format"
+    begin "replay-$format" replay "$work/live-$format.mcap" --headless --fast --config "$work/camera.toml" \
+        --outline "$work/outline.json" --out "$work/replay-$format"
     end 90
 done
