@@ -1,6 +1,7 @@
 //! The recorder's thread. It takes what it is offered out of a bounded queue; who offers never waits for the disk while a
 //! camera films. What does not fit is counted, and the count is told.
 
+use super::pulse::Worker;
 use super::shared::Shared;
 use crate::model::{Outline, Pose, RawFrame, Skeleton, TrackSet};
 use crate::recording::{Head, Limits, RecordingError, Series};
@@ -101,7 +102,9 @@ impl Recorder {
         }
         let refused = self.live && full();
         self.waiting.fetch_add(bytes, Ordering::Relaxed);
+        self.shared.pulse.give(Worker::Record);
         if refused || !self.put(Item::Frame(raw.clone(), index)) {
+            self.shared.pulse.take_back(Worker::Record);
             self.waiting.fetch_sub(bytes, Ordering::Relaxed);
             if self.shared.counts.not_recorded.fetch_add(1, Ordering::Relaxed) == 0 {
                 self.shared.warn("the recording does not keep up, frames are missing in it; see the count".into());
@@ -168,6 +171,7 @@ impl Thread {
                 let counts = &self.shared.counts;
                 let count = if failed { &counts.not_recorded } else { &counts.recorded };
                 count.fetch_add(1, Ordering::Relaxed);
+                self.shared.pulse.done(Worker::Record);
             }
             Item::Result(_) if self.broken => {
                 self.shared.counts.results_not_recorded.fetch_add(1, Ordering::Relaxed);
