@@ -41,6 +41,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("opencv::", &["track", "outline"]),
     ("turbojpeg::", &["source"]),
     ("mcap::", &["recording"]),
+    ("crc32fast::", &["recording"]),
     ("clap::", &["cli"]),
     ("anyhow::", &["cli"]),
     ("crossbeam_channel::", &["runtime"]),
