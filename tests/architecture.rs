@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 const MAY_USE: &[(&str, &[&str])] = &[
     ("model", &[]),
     ("config", &[]),
-    // A recording is a source.
+    // A recording is a source, read where its format is known.
     ("source", &["model", "config", "recording"]),
     ("outline", &["model", "config"]),
     ("track", &["model", "config"]),

@@ -77,7 +77,7 @@ fn rounding_does_not_stretch_even_the_shortest_branch() {
     let poses = synthetic::sway(&skeleton, 20);
     let parents: Vec<_> = skeleton.nodes.iter().map(|n| n.parent).collect();
     for metres_per_px in [0.0, 0.004, 1e-5] {
-        let mut csv = MotionCsv::new(Vec::new(), &skeleton, metres_per_px).unwrap();
+        let mut csv = MotionCsv::new(Vec::new(), &skeleton.clone().into(), metres_per_px).unwrap();
         poses.iter().for_each(|p| csv.pose(p).unwrap());
         let out = text(csv.finish().unwrap());
         assert!(out.starts_with("frame,time_s,node_id,x,y,z,u_px,v_px\n150,"));
@@ -172,7 +172,7 @@ fn a_full_disk_is_named_by_the_row_writers() {
     let full = || fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     let skeleton = synthetic::tree(5, 3);
     let poses = synthetic::sway(&skeleton, 100);
-    let mut csv = MotionCsv::new(full(), &skeleton, 0.0).unwrap();
+    let mut csv = MotionCsv::new(full(), &skeleton.clone().into(), 0.0).unwrap();
     // Far more than any buffer: the error must come while writing, not at the end of an hour.
     let error = poses.iter().find_map(|p| csv.pose(p).err()).expect("nothing fits on a full disk");
     assert!(matches!(error, ExportError::DiskFull { .. }), "{error}");

@@ -128,7 +128,7 @@ fn a_file_cut_anywhere_is_readable_up_to_its_last_whole_chunk() {
         let (read, warnings) = pictures(&bytes[..cut]);
         // A chunk's own index stands behind it, and is not needed.
         let whole = 4 * ends.iter().filter(|end| **end <= cut as u64).count();
-        assert!(read.len() == whole || read.len() == whole + 4, "cut at {cut}: {} of {whole}", read.len());
+        assert!((whole..=whole + 4).contains(&read.len()), "cut at {cut}: {} of {whole}", read.len());
         assert!(read.iter().zip(&frames).all(|(p, raw)| same(p, raw)), "cut at {cut}");
         let told = !warnings.is_empty() || read.is_empty();
         assert!(told || cut > *ends.last().expect("chunks") as usize, "cut at {cut} and not a word: {warnings:?}");

@@ -53,26 +53,21 @@ pub fn run(args: &RecordArgs) -> Result<(), Ended> {
     let pace = if info.live { Pace::Live } else { Pace::Recorded };
     let job = RecordJob { to: recording::target(&args.file, args.limits.limits(), &info), pace, camera: config.camera };
     let running = runtime::record(source, job)?;
-    let mut told = 0;
     while !running.finished() {
         let (_, _, time_s, _) = running.counts();
         let over = args.duration.is_some_and(|limit| time_s * 1e9 >= limit as f64);
         if over || running.broken() || stop.load(Ordering::SeqCst) {
             running.stop();
         }
+        // At once: whoever films in a field is to hear of a full disk while it can still be helped.
         for line in running.news() {
             say(&format!("arborcam: {line}"));
-        }
-        // At once: whoever films in a field is to hear of a full disk while it can still be helped.
-        for warning in running.warnings().into_iter().skip(told) {
-            say(&format!("arborcam: warning: {warning}"));
-            told += 1;
         }
         std::thread::sleep(TICK);
     }
     let (seen, lost, time_s, missing) = running.counts();
-    for warning in running.warnings().into_iter().skip(told) {
-        say(&format!("arborcam: warning: {warning}"));
+    for line in running.news() {
+        say(&format!("arborcam: {line}"));
     }
     let (recorded, failure) = running.join();
     let lost = if lost > 0 { format!(", {lost} lost in the camera") } else { String::new() };

@@ -77,11 +77,13 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
     let running = runtime::start(source, job)?;
     let mut warden = Warden { running: &running, reload, service, end_s: common.for_s.unwrap_or(f64::INFINITY) };
     let watched = if headless { watch(&mut warden, &stop) } else { show(&mut warden, &stop) };
-    let warnings = running.warnings();
+    // A screen has shown its messages only as long as it was there.
+    let left =
+        if headless { running.news() } else { running.warnings().iter().map(|w| format!("warning: {w}")).collect() };
     let (summary, failure) = running.join();
     watched?;
-    for warning in warnings {
-        say(&format!("arborcam: warning: {warning}"));
+    for line in left {
+        say(&format!("arborcam: {line}"));
     }
     report(summary.as_ref(), failure, stop.load(Ordering::SeqCst))
 }

@@ -5,6 +5,7 @@
 use super::{ExportError, number};
 use crate::model::{NodeId, Pose, Skeleton, TrackId, TrackSet};
 use std::io::Write;
+use std::sync::Arc;
 
 pub const TRACKS_HEADER: &str = "track_id,frame,time_s,u_px,v_px,node_id";
 pub const NODES_HEADER: &str = "node_id,parent_id,level,n_tracks,u_px,v_px,x,y,z,radius,frequency_hz,\
@@ -174,23 +175,23 @@ pub fn nodes<W: Write>(
 }
 
 /// Writes `motion.csv`.
-pub struct MotionCsv<'a, W: Write> {
+pub struct MotionCsv<W: Write> {
     table: Table<W>,
-    skeleton: &'a Skeleton,
+    skeleton: Arc<Skeleton>,
     scale: f64,
     decimals: usize,
 }
 
-impl<'a, W: Write> MotionCsv<'a, W> {
+impl<W: Write> MotionCsv<W> {
     /// `metres_per_px` 0 leaves pixels.
     ///
     /// # Errors
     /// The header cannot be written.
-    pub fn new(out: W, skeleton: &'a Skeleton, metres_per_px: f64) -> Result<Self, ExportError> {
+    pub fn new(out: W, skeleton: &Arc<Skeleton>, metres_per_px: f64) -> Result<Self, ExportError> {
         let (scale, more) = unit(metres_per_px);
         // One decimal more than other lengths: rounding must not stretch a branch of a few pixels by a thousandth.
         let decimals = 5 + more;
-        Ok(Self { table: Table::new("motion.csv", MOTION_HEADER, out)?, skeleton, scale, decimals })
+        Ok(Self { table: Table::new("motion.csv", MOTION_HEADER, out)?, skeleton: skeleton.clone(), scale, decimals })
     }
 
     /// Every node in one frame.

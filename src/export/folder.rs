@@ -74,11 +74,11 @@ impl OutputFolder {
         write().map_err(|e| self.explain(name, bytes.len() as u64, e))
     }
 
-    /// Puts everything on the disk and gives the folder its name.
+    /// Puts everything on the disk and gives the folder its name, which it returns.
     ///
     /// # Errors
     /// The disk is full, or something else has taken the name meanwhile; then nothing is left of the folder.
-    pub fn publish(mut self) -> Result<(), ExportError> {
+    pub fn publish(mut self) -> Result<PathBuf, ExportError> {
         let entries = fs::read_dir(&self.partial).map_err(|e| self.explain("the folder", 0, e))?;
         for entry in entries {
             let entry = entry.map_err(|e| self.explain("the folder", 0, e))?;
@@ -101,7 +101,7 @@ impl OutputFolder {
         for folder in [Some(self.dir.as_path()), self.dir.parent().filter(|p| !p.as_os_str().is_empty())] {
             let _ = File::open(folder.unwrap_or(Path::new("."))).and_then(|f| f.sync_all());
         }
-        Ok(())
+        Ok(self.dir.clone())
     }
 
     /// Adds what is written already, because all of it is what the disk must have room for.

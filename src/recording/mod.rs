@@ -20,4 +20,4 @@ pub use error::RecordingError;
 pub use image::{Encoding, Picture};
 pub use reader::{About, Reader};
 pub use series::{Head, Limits, Series};
-pub use spool::{Spool, SpoolReader};
+pub use spool::{Sets, Spool, SpoolReader};

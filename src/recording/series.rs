@@ -147,6 +147,10 @@ impl Series {
         image::encode(raw, times.log, &mut self.buffer);
         let number = raw.sequence.unwrap_or(self.frames) as u32;
         self.writer.message(image::topic(raw), number, times, &self.buffer)?;
+        if self.frames == 0 {
+            // Whatever happens now, there is a picture.
+            self.writer.flush()?;
+        }
         self.frames += 1;
         if self.recent.len() == REMEMBERED {
             self.recent.pop_front();

@@ -100,9 +100,35 @@ impl SpoolReader {
     }
 
     /// The sets in their order.
-    pub fn sets(&self) -> impl Iterator<Item = io::Result<TrackSet>> + use<> {
-        let mut reader = io::BufReader::with_capacity(1 << 16, At { file: self.file.clone(), at: 0 });
-        (0..self.sets).map(move |_| read_set(&mut reader))
+    pub fn sets(&self) -> Sets {
+        let reader = io::BufReader::with_capacity(1 << 16, At { file: self.file.clone(), at: 0 });
+        Sets { reader, next: 0, end: self.sets }
+    }
+}
+
+/// The sets of a spool, from the first on.
+pub struct Sets {
+    reader: io::BufReader<At>,
+    next: u64,
+    end: u64,
+}
+
+impl Sets {
+    /// Goes on to the end of a later reader of the same spool.
+    pub fn until(&mut self, later: &SpoolReader) {
+        self.end = later.sets;
+    }
+}
+
+impl Iterator for Sets {
+    type Item = io::Result<TrackSet>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.next >= self.end {
+            return None;
+        }
+        self.next += 1;
+        Some(read_set(&mut self.reader))
     }
 }
 
@@ -174,8 +200,14 @@ mod tests {
         let half = spool.reader().unwrap();
         sets[1000..1500].iter().for_each(|s| spool.push(s).unwrap());
         check(half.clone(), 1000);
+        // One who reads along goes on where they were.
+        let mut along = half.sets();
+        assert_eq!(along.by_ref().count(), 1000);
         sets[1500..].iter().for_each(|s| spool.push(s).unwrap());
-        check(spool.reader().unwrap(), 2000);
+        let all = spool.reader().unwrap();
+        along.until(&all);
+        assert!(along.map(Result::unwrap).zip(&sets[1000..]).all(|(a, b)| same(&a, b)));
+        check(all, 2000);
         check(half, 1000);
     }
 }

@@ -118,6 +118,8 @@ impl<R: Read + Seek> Walk<R> {
         }
         let (kind, length) = (head[0], little(&head[1..]));
         let fits = length <= self.length.saturating_sub(start + HEAD);
+        // A chunk has a checksum; of all else, a length that lies could lead past whole chunks.
+        let fits = fits && (kind == op::CHUNK || self.leads_to_a_record(length)?);
         match kind {
             op::CHUNK if fits && length >= CHUNK_HEAD => {
                 let mut reader = LinearReader::new_with_options(
@@ -147,6 +149,18 @@ impl<R: Read + Seek> Walk<R> {
             _ => self.find_chunk(start)?,
         }
         Ok(None)
+    }
+
+    /// Whether there is the head of a record, or the end, `length` bytes from here.
+    fn leads_to_a_record(&mut self, length: u64) -> io::Result<bool> {
+        let mut head = [0; HEAD as usize];
+        self.file.seek_relative(length as i64)?;
+        let read = read_up_to(&mut self.file, &mut head)?;
+        self.file.seek_relative(-((length + read as u64) as i64))?;
+        let (kind, length) = (head[0], little(&head[1..]));
+        // A chunk that was not closed has the greatest length of all.
+        let known = (op::HEADER..=op::DATA_END).contains(&kind) || kind >= 0x80;
+        Ok(read < head.len() || known && (length <= MAX_RECORD || (kind == op::CHUNK && length == !0)))
     }
 
     /// Goes to the next chunk behind `from` whose head makes sense; all before it is damaged.

@@ -58,7 +58,10 @@ impl Writer {
         let mcap = options.create(buffered).map_err(|e| RecordingError::of_write(path, &e))?;
         let (channels, path) = (BTreeMap::new(), path.to_owned());
         let (chunks, open_bytes, open_messages, whole) = (0, 0, 0, 0);
-        Ok(Self { path, mcap: Some(mcap), room, channels, chunks, open_bytes, open_messages, whole })
+        let mut writer = Self { path, mcap: Some(mcap), room, channels, chunks, open_bytes, open_messages, whole };
+        // From the first moment on it is a recording, if an empty one.
+        writer.flush()?;
+        Ok(writer)
     }
 
     pub fn path(&self) -> &Path {

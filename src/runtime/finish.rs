@@ -1,5 +1,6 @@
 //! Writes a capture: the five files of the contract, from the tracks on disk and the tree.
 
+use super::capture_tables::{CaptureTables, Done};
 use super::meter::Histogram;
 use super::shared::{Failure, Shared};
 use crate::config::Config;
@@ -9,12 +10,11 @@ use crate::export::capture::{
 use crate::export::csv::{MotionCsv, TracksCsv, nodes};
 use crate::export::gltf::{KEY_TOLERANCE_PX, Model, glb_and_keys};
 use crate::export::{ExportError, OutputFolder};
-use crate::model::{Outline, Pose, Rgb, TrackSet};
-use crate::pipeline::{Retrace, Tree};
+use crate::model::{Outline, Pose, Rgb, Skeleton, TrackSet};
+use crate::pipeline::Tree;
 use crate::recording::SpoolReader;
 use crate::shape::{Detail, branches};
 use crate::source::SourceInfo;
-use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -76,77 +76,51 @@ pub struct Written {
 /// # Errors
 /// `dir` is there already, the disk is full, or whatever else the file system says.
 pub fn write(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
+    match &job.tree {
+        Some(tree) => complete(job, CaptureTables::create(dir, tree, &job.config)?),
+        None => without_tree(job, dir),
+    }
+}
+
+/// Writes what the tables lack, and all other files.
+///
+/// # Errors
+/// As for [`write`].
+pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, Failure> {
+    tables.catch_up(&job.tracks, job.config.export.animation_s, || job.shared.pulse.wrote())?;
+    let Done { folder, tree, poses, misses } = tables.finish(&job.tracks)?;
+    let metres_per_px = job.config.export.metres_per_px;
+    // Intervals that can be defended are a matter of their own; until then no branch claims a frequency.
+    let sway = vec![None; tree.skeleton.nodes.len()];
+    nodes(folder.file("nodes.csv")?, &tree.skeleton, &sway, metres_per_px)?;
+    let (bytes, keys) = model_of(job, &tree, &poses)?;
+    folder.write("tree.glb", &bytes)?;
+    let first_frame = poses.first().map_or(0, |p| p.frame);
+    let animation = AnimationNote { first_frame, frames: poses.len() as u64, keys };
+    let model = ModelNote::of(&tree.skeleton, metres_per_px);
+    publish(job, folder, describe(job, Some(model), Some(animation), misses.median()))
+}
+
+/// Tables without rows and no model: a reader finds every table, and no tree that was never seen.
+fn without_tree(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
     let folder = OutputFolder::create(dir)?;
     let metres_per_px = job.config.export.metres_per_px;
-    let (mut animation, mut model, mut reprojection_px) = (None, None, None);
-    match &job.tree {
-        Some(tree) => {
-            let mut retrace = Retrace::new(tree, &job.config);
-            let (poses, misses) = write_motion(job, tree, &mut retrace, &folder)?;
-            reprojection_px = misses.median();
-            write_tracks(job, Some(&retrace), &folder)?;
-            let skeleton = &tree.skeleton;
-            // Intervals that can be defended are a matter of their own; until then no branch claims a frequency.
-            let sway = vec![None; skeleton.nodes.len()];
-            nodes(folder.file("nodes.csv")?, skeleton, &sway, metres_per_px)?;
-            let (bytes, keys) = model_of(job, tree, &poses)?;
-            folder.write("tree.glb", &bytes)?;
-            let first_frame = poses.first().map_or(0, |p| p.frame);
-            animation = Some(AnimationNote { first_frame, frames: poses.len() as u64, keys });
-            model = Some(ModelNote::of(skeleton, metres_per_px));
-        }
-        None => {
-            write_tracks(job, None, &folder)?;
-            // Tables without rows and no model: a reader finds every table, and no tree that was never seen.
-            let foot_only = crate::model::Skeleton { nodes: Vec::new(), foot_px: [0.0; 2], image_size: job.info.size };
-            nodes(folder.file("nodes.csv")?, &foot_only, &[], metres_per_px)?;
-            MotionCsv::new(folder.file("motion.csv")?, &foot_only, metres_per_px)?.finish()?;
-        }
+    let mut tracks = TracksCsv::new(folder.file("tracks.csv")?)?;
+    for set in job.tracks.sets() {
+        tracks.set(&set.map_err(Failure::Spool)?, |_| None)?;
+        job.shared.pulse.wrote();
     }
-    let capture = describe(job, model, animation, reprojection_px);
+    tracks.finish()?;
+    let foot_only = Arc::new(Skeleton { nodes: Vec::new(), foot_px: [0.0; 2], image_size: job.info.size });
+    nodes(folder.file("nodes.csv")?, &foot_only, &[], metres_per_px)?;
+    MotionCsv::new(folder.file("motion.csv")?, &foot_only, metres_per_px)?.finish()?;
+    publish(job, folder, describe(job, None, None, None))
+}
+
+fn publish(job: &CaptureJob, folder: OutputFolder, capture: Capture) -> Result<Written, Failure> {
     folder.write("capture.json", &json(&capture)?)?;
-    folder.publish()?;
-    Ok(Written { dir: dir.to_path_buf(), model: job.tree.is_some() })
-}
-
-/// `motion.csv`, the poses of the animation's time, and how far the projected nodes lie from their tracks.
-fn write_motion(
-    job: &CaptureJob,
-    tree: &Tree,
-    retrace: &mut Retrace,
-    folder: &OutputFolder,
-) -> Result<(Vec<Pose>, Histogram), Failure> {
-    let mut csv = MotionCsv::new(folder.file("motion.csv")?, &tree.skeleton, job.config.export.metres_per_px)?;
-    let (mut poses, mut misses) = (VecDeque::new(), Histogram::default());
-    for set in job.tracks.sets() {
-        let (pose, targets_px) = retrace.step(&set.map_err(Failure::Spool)?);
-        csv.pose(&pose)?;
-        job.shared.pulse.wrote();
-        // The foot is where it is by definition.
-        for (joint, target) in pose.joints.iter().zip(&targets_px).skip(1) {
-            if let Some(t) = target {
-                let [u, v] = tree.skeleton.image_from_model(&joint.position);
-                misses.add((u - t[0]).hypot(v - t[1]));
-            }
-        }
-        let oldest_s = pose.time_s - job.config.export.animation_s;
-        poses.push_back(pose);
-        while poses.front().is_some_and(|p: &Pose| p.time_s < oldest_s) {
-            poses.pop_front();
-        }
-    }
-    csv.finish()?;
-    Ok((poses.into(), misses))
-}
-
-fn write_tracks(job: &CaptureJob, retrace: Option<&Retrace>, folder: &OutputFolder) -> Result<(), Failure> {
-    let mut csv = TracksCsv::new(folder.file("tracks.csv")?)?;
-    for set in job.tracks.sets() {
-        csv.set(&set.map_err(Failure::Spool)?, |id| retrace?.node_of(id))?;
-        job.shared.pulse.wrote();
-    }
-    csv.finish()?;
-    Ok(())
+    let dir = folder.publish()?;
+    Ok(Written { dir, model: job.tree.is_some() })
 }
 
 fn model_of(job: &CaptureJob, tree: &Tree, poses: &[Pose]) -> Result<(Vec<u8>, u64), ExportError> {

@@ -8,6 +8,7 @@
 //! A dropped sender ends the stream: when the source is done, the tracker works off its queue and ends, then the model
 //! does and writes the capture.
 
+mod capture_tables;
 mod finish;
 mod latest;
 mod losses;
@@ -199,8 +200,7 @@ impl Running {
         self.shared.pulse.marks(self.shared.counts.seen.load(Ordering::Relaxed), ending)
     }
 
-    /// Lines that cannot wait for the end, e.g. that the camera is gone, since the last call. The screen shows them by
-    /// itself.
+    /// What there is to be told since the last call, warnings among it. The screen shows it by itself.
     pub fn news(&self) -> Vec<String> {
         self.shared.take_news()
     }

@@ -1,6 +1,7 @@
 //! The model's thread: runs the back end, keeps the tracks, streams the poses, tells the screen, and writes the capture
 //! at the end.
 
+use super::capture_tables::{Behind, CaptureTables};
 use super::finish::{self, CaptureJob, Quality};
 use super::pulse::Worker;
 use super::recorder_thread::{Found, Recorded, Recorder};
@@ -24,6 +25,8 @@ use std::time::{Duration, Instant};
 const SCREEN_EVERY: Duration = Duration::from_millis(40);
 /// Without frames the screen is shown a new state at this interval: a camera that is gone must be seen to be.
 const IDLE_EVERY: Duration = Duration::from_millis(200);
+/// Film after which the tables of the capture are brought up to date, s.
+const BEHIND_EVERY_S: f64 = 1.0;
 
 /// State of the thread.
 pub struct ModelThread {
@@ -33,6 +36,9 @@ pub struct ModelThread {
     shared: Arc<Shared>,
     status: Status,
     spool: Option<Spool>,
+    behind: Option<Behind>,
+    /// Sensor time up to which the tables have been asked for, s.
+    behind_s: f64,
     bark: Option<Arc<Rgb>>,
     quality: Quality,
     last_screen: Option<Instant>,
@@ -59,6 +65,8 @@ impl ModelThread {
             shared,
             status,
             spool: None,
+            behind: None,
+            behind_s: f64::NEG_INFINITY,
             bark: None,
             quality: Quality::default(),
             last_screen: None,
@@ -95,6 +103,8 @@ impl ModelThread {
                 ToModel::Restart => {
                     self.back.restart();
                     self.status.restart();
+                    self.behind = None;
+                    self.behind_s = f64::NEG_INFINITY;
                     self.new_spool();
                     (self.quality, self.announced, last) = (Quality::default(), false, None);
                 }
@@ -125,6 +135,7 @@ impl ModelThread {
             // What follows would be lost, and that ends the capture.
             self.shared.abort(Failure::Spool(e));
         }
+        self.write_behind(moved.tracks.time_s);
         self.quality.note(&moved.tracks, median_fb_error_px(&moved.tracks));
         if self.bark.is_none() || self.back.tree().is_none() {
             self.bark = moved.preview.clone().or(self.bark.take());
@@ -147,6 +158,24 @@ impl ModelThread {
         self.announce();
         self.show(Some(&moved), self.back.phase().0 == Phase::Build);
         moved
+    }
+
+    /// Has the tables of the capture written up to here, now and then.
+    fn write_behind(&mut self, time_s: f64) {
+        if time_s - self.behind_s < BEHIND_EVERY_S {
+            return;
+        }
+        self.behind_s = time_s;
+        let (Some(tree), Some(dir), Some(spool)) = (self.back.tree(), &self.job.out, &mut self.spool) else { return };
+        if self.behind.is_none() {
+            // Where it cannot be begun, the end will say why.
+            self.behind = CaptureTables::create(dir, tree, &self.job.config)
+                .ok()
+                .and_then(|tables| Behind::start(tables, &self.job.config, self.shared.clone()).ok());
+        }
+        if let (Some(behind), Ok(reader)) = (&self.behind, spool.reader()) {
+            behind.catch_up(reader);
+        }
     }
 
     /// Tells of a new tree; one built early is worth less, and the capture is to say so.
@@ -265,7 +294,12 @@ impl ModelThread {
         // Without a single frame there is nothing to keep.
         let seen = self.shared.counts.seen.load(Ordering::Relaxed);
         let written = match (self.job.out.clone().filter(|_| seen > 0), self.capture_job()) {
-            (Some(dir), Ok(job)) => match finish::write(&job, &dir) {
+            (Some(dir), Ok(job)) => match self
+                .behind
+                .take()
+                .and_then(Behind::join)
+                .map_or_else(|| finish::write(&job, &dir), |tables| finish::complete(&job, tables))
+            {
                 Ok(written) => Some(written),
                 Err(e) => {
                     self.shared.fail(e);

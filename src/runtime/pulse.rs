@@ -10,15 +10,18 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub enum Worker {
     Track,
     Model,
+    /// Works only where a recording is made.
+    Record,
 }
 
 impl Worker {
-    const ALL: [Worker; 2] = [Worker::Track, Worker::Model];
+    const ALL: [Worker; 3] = [Worker::Track, Worker::Model, Worker::Record];
 
     fn name(self) -> &'static str {
         match self {
             Worker::Track => "track",
             Worker::Model => "model",
+            Worker::Record => "record",
         }
     }
 }
@@ -165,7 +168,7 @@ mod tests {
     /// A camera goes on delivering while a thread hangs: what it drops must not look like work.
     #[test]
     fn a_thread_that_hangs_is_named_although_frames_come() {
-        for (hangs, name) in [(Worker::Track, "track"), (Worker::Model, "model")] {
+        for (hangs, name) in [(Worker::Track, "track"), (Worker::Model, "model"), (Worker::Record, "record")] {
             let (pulse, mut vigil) = (Pulse::default(), Vigil::default());
             flow(&pulse);
             assert_eq!(vigil.look(pulse.marks(1, false)), Sign::Flows);

@@ -1,6 +1,7 @@
 //! The recorder's thread. It takes what it is offered out of a bounded queue; who offers never waits for the disk while a
 //! camera films. What does not fit is counted, and the count is told.
 
+use super::pulse::Worker;
 use super::shared::Shared;
 use crate::model::{Outline, Pose, RawFrame, Skeleton, TrackSet};
 use crate::recording::{Head, Limits, RecordingError, Series};
@@ -16,6 +17,9 @@ const QUEUE: usize = 512;
 const QUEUE_BYTES: usize = 96 << 20;
 /// What has been written for longer than this is in the hands of the system: half of what may be lost at most.
 const FLUSH_EVERY: Duration = Duration::from_millis(500);
+
+/// A source that can wait looks again after so long.
+const NAP: Duration = Duration::from_millis(2);
 
 /// What is to be recorded, and where.
 #[derive(Clone, Debug)]
@@ -91,10 +95,16 @@ impl Recorder {
     /// Offers a frame with its place in the capture.
     pub fn offer(&self, raw: &Arc<RawFrame>, index: u64) {
         let bytes = raw.bytes.len();
-        let fits = self.waiting.fetch_add(bytes, Ordering::Relaxed) + bytes <= QUEUE_BYTES;
-        // One that is larger than the queue is let in alone.
-        let fits = fits || self.queue.is_empty();
-        if (self.live && !fits) || !self.put(Item::Frame(raw.clone(), index)) {
+        // One that is larger than the whole queue is let in alone.
+        let full = || self.waiting.load(Ordering::Relaxed) + bytes > QUEUE_BYTES && !self.queue.is_empty();
+        while !self.live && full() {
+            std::thread::sleep(NAP);
+        }
+        let refused = self.live && full();
+        self.waiting.fetch_add(bytes, Ordering::Relaxed);
+        self.shared.pulse.give(Worker::Record);
+        if refused || !self.put(Item::Frame(raw.clone(), index)) {
+            self.shared.pulse.take_back(Worker::Record);
             self.waiting.fetch_sub(bytes, Ordering::Relaxed);
             if self.shared.counts.not_recorded.fetch_add(1, Ordering::Relaxed) == 0 {
                 self.shared.warn("the recording does not keep up, frames are missing in it; see the count".into());
@@ -161,6 +171,7 @@ impl Thread {
                 let counts = &self.shared.counts;
                 let count = if failed { &counts.not_recorded } else { &counts.recorded };
                 count.fetch_add(1, Ordering::Relaxed);
+                self.shared.pulse.done(Worker::Record);
             }
             Item::Result(_) if self.broken => {
                 self.shared.counts.results_not_recorded.fetch_add(1, Ordering::Relaxed);

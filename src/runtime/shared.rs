@@ -115,6 +115,7 @@ impl Shared {
         tracing::debug!("{warning}");
         let mut warnings = self.warnings.lock().unwrap_or_else(PoisonError::into_inner);
         if warnings.back() != Some(&warning) {
+            self.push_news(format!("warning: {warning}"));
             if warnings.len() == WARNINGS_KEPT {
                 warnings.pop_front();
             }
@@ -153,6 +154,10 @@ impl Shared {
     /// Tells at once, on the screen or without one, what cannot wait for the end.
     pub fn news(&self, line: String) {
         self.tell(line.clone());
+        self.push_news(line);
+    }
+
+    fn push_news(&self, line: String) {
         let mut news = self.news.lock().unwrap_or_else(PoisonError::into_inner);
         if news.len() < WARNINGS_KEPT {
             news.push(line);

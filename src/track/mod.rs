@@ -34,6 +34,8 @@ struct Point {
     fb_error_px: f32,
     /// Frames since it was last seen; 0 when seen in this frame.
     coasting: u32,
+    /// Not seen since a gap: whatever flow finds where it is thought to be may be another point.
+    unsure: bool,
     /// Points of the same keyframe nearest to it at birth.
     neighbours: Vec<TrackId>,
 }
@@ -107,9 +109,11 @@ impl Tracker {
                 self.follow();
                 self.undo_drift(frame);
             }
-            let (size, patience) = (frame.luma.size, self.settings.coast_frames.max(u32::from(regaining)));
-            self.points
-                .retain(|p| p.coasting <= patience && size.contains(f64::from(p.now_px[0]), f64::from(p.now_px[1])));
+            let size = frame.luma.size;
+            self.points.retain(|p| {
+                p.coasting <= self.settings.coast_frames.max(if p.unsure { regain::UNSURE_FRAMES } else { 0 })
+                    && size.contains(f64::from(p.now_px[0]), f64::from(p.now_px[1]))
+            });
         }
         let lost = (before - self.points.len()) as u32;
         let born = if self.refill_due() { self.refill(frame) } else { 0 };
@@ -137,7 +141,7 @@ impl Tracker {
         for (i, p) in self.points.iter_mut().enumerate() {
             let (forward, backward) = (b.forward[i], b.backward[i]);
             let error = distance(backward.to, b.from[i]);
-            if forward.found && backward.found && error < limit {
+            if !p.unsure && forward.found && backward.found && error < limit {
                 (p.now_px, p.fb_error_px, p.coasting) = (forward.to, error, 0);
             } else {
                 p.coasting += 1;
@@ -192,7 +196,8 @@ impl Tracker {
             let found = self.anchoring.reanchor(keyframe, (&frame.luma, &self.present), &candidates);
             for (i, at) in indices.into_iter().zip(found) {
                 if let Some(at) = at {
-                    (self.points[i].now_px, self.points[i].coasting) = (at, 0);
+                    let p = &mut self.points[i];
+                    (p.now_px, p.coasting, p.unsure) = (at, 0, false);
                 }
             }
         }
@@ -225,6 +230,7 @@ impl Tracker {
                 now_px: *at,
                 fb_error_px: 0.0,
                 coasting: 0,
+                unsure: false,
                 neighbours: near.into_iter().map(|j| TrackId(first + j)).collect(),
             });
             self.next_id += 1;

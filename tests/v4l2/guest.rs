@@ -63,10 +63,8 @@ impl Guest {
     pub fn say_absent(&self) {
         if let Some(why) = &self.absent {
             let line = "=".repeat(80);
-            let _ = writeln!(
-                std::io::stderr(),
-                "{line}\nTHE V4L2 TESTS WERE NOT RUN: no virtual machine.\n{why}\n{line}"
-            );
+            let _ =
+                writeln!(std::io::stderr(), "{line}\nTHE V4L2 TESTS WERE NOT RUN: no virtual machine.\n{why}\n{line}");
         }
     }
 

@@ -12,7 +12,10 @@ const HEADER: usize = 48;
 pub enum Request {
     Submit(Submit),
     /// Forget the transfer `of`.
-    Unlink { sequence: u32, of: u32 },
+    Unlink {
+        sequence: u32,
+        of: u32,
+    },
 }
 
 /// A transfer.

@@ -1,0 +1,161 @@
+//! `tracks.csv` and `motion.csv`, written behind the capture while it runs, so that little is left to do at its end: a
+//! service is given two seconds to stop.
+
+use super::meter::Histogram;
+use super::shared::{Failure, Shared};
+use crate::config::Config;
+use crate::export::OutputFolder;
+use crate::export::csv::{MotionCsv, TracksCsv};
+use crate::model::{Pose, TrackSet};
+use crate::pipeline::{Retrace, Tree};
+use crate::recording::{Sets, SpoolReader};
+use crossbeam_channel::{Sender, bounded};
+use std::collections::VecDeque;
+use std::fs::File;
+use std::io::{self, BufWriter};
+use std::path::Path;
+use std::sync::Arc;
+use std::thread::JoinHandle;
+
+/// Both tables as far as they are written. What is in them does not depend on when and in how many pieces that is done.
+pub struct CaptureTables {
+    folder: OutputFolder,
+    tree: Arc<Tree>,
+    retrace: Retrace,
+    motion: MotionCsv<BufWriter<File>>,
+    tracks: TracksCsv<BufWriter<File>>,
+    sets: Option<Sets>,
+    /// Whether the tracks from before the tree was built have their rows.
+    early: bool,
+    /// Poses of the last so many seconds, for the animation.
+    poses: VecDeque<Pose>,
+    misses: Histogram,
+}
+
+/// What is left when both tables are complete.
+pub struct Done {
+    pub folder: OutputFolder,
+    pub tree: Arc<Tree>,
+    pub poses: Vec<Pose>,
+    /// How far the projected nodes lie from where their tracks put them, px.
+    pub misses: Histogram,
+}
+
+impl CaptureTables {
+    /// Begins both files in what becomes the folder `dir`.
+    ///
+    /// # Errors
+    /// `dir` is there already, or whatever the file system says.
+    pub fn create(dir: &Path, tree: &Arc<Tree>, config: &Config) -> Result<Self, Failure> {
+        let folder = OutputFolder::create(dir)?;
+        let motion = MotionCsv::new(folder.file("motion.csv")?, &tree.skeleton, config.export.metres_per_px)?;
+        let tracks = TracksCsv::new(folder.file("tracks.csv")?)?;
+        let (retrace, tree) = (Retrace::new(tree, config), tree.clone());
+        let (poses, misses) = (VecDeque::new(), Histogram::default());
+        Ok(Self { folder, tree, retrace, motion, tracks, sets: None, early: false, poses, misses })
+    }
+
+    /// Writes all rows up to where `spool` ends; each set calls `wrote`. Poses older than `animation_s` are let go.
+    ///
+    /// # Errors
+    /// Whatever the file system says, a full disk among it.
+    pub fn catch_up(&mut self, spool: &SpoolReader, animation_s: f64, wrote: impl Fn()) -> Result<(), Failure> {
+        let mut sets = self.sets.take().unwrap_or_else(|| spool.sets());
+        sets.until(spool);
+        for set in sets.by_ref() {
+            let set = set.map_err(Failure::Spool)?;
+            self.pose(&set, animation_s)?;
+            // A track's node is decided when it is first seen; of those that were there when the tree was built, then.
+            if set.frame > self.tree.frame {
+                self.early_rows(spool)?;
+                self.tracks.set(&set, |id| self.retrace.node_of(id))?;
+            }
+            wrote();
+        }
+        self.sets = Some(sets);
+        Ok(())
+    }
+
+    /// Ends both tables, the last rows of which are those that [`catch_up`](Self::catch_up) has written.
+    ///
+    /// # Errors
+    /// Whatever the file system says.
+    pub fn finish(mut self, spool: &SpoolReader) -> Result<Done, Failure> {
+        self.early_rows(spool)?;
+        self.tracks.finish()?;
+        self.motion.finish()?;
+        Ok(Done { folder: self.folder, tree: self.tree, poses: self.poses.into(), misses: self.misses })
+    }
+
+    fn pose(&mut self, set: &TrackSet, animation_s: f64) -> Result<(), Failure> {
+        let (pose, targets_px) = self.retrace.step(set);
+        self.motion.pose(&pose)?;
+        // The foot is where it is by definition.
+        for (joint, target) in pose.joints.iter().zip(&targets_px).skip(1) {
+            if let Some(t) = target {
+                let [u, v] = self.tree.skeleton.image_from_model(&joint.position);
+                self.misses.add((u - t[0]).hypot(v - t[1]));
+            }
+        }
+        let oldest_s = pose.time_s - animation_s;
+        self.poses.push_back(pose);
+        while self.poses.front().is_some_and(|p| p.time_s < oldest_s) {
+            self.poses.pop_front();
+        }
+        Ok(())
+    }
+
+    /// The rows of the frames up to the one in which the tree was built, once that has been gone through.
+    fn early_rows(&mut self, spool: &SpoolReader) -> Result<(), Failure> {
+        if std::mem::replace(&mut self.early, true) {
+            return Ok(());
+        }
+        for set in spool.sets() {
+            let set = set.map_err(Failure::Spool)?;
+            if set.frame > self.tree.frame {
+                break;
+            }
+            self.tracks.set(&set, |id| self.retrace.node_of(id))?;
+        }
+        Ok(())
+    }
+}
+
+/// Tables on a thread of their own.
+pub struct Behind {
+    spool: Sender<SpoolReader>,
+    thread: JoinHandle<Result<CaptureTables, Failure>>,
+}
+
+impl Behind {
+    /// # Errors
+    /// The thread cannot be started.
+    pub fn start(mut tables: CaptureTables, config: &Config, shared: Arc<Shared>) -> io::Result<Self> {
+        let (spool, readers) = bounded::<SpoolReader>(1);
+        let at_start = config.export.animation_s;
+        let run = move || {
+            for spool in readers {
+                let animation_s = shared.reloaded().map_or(at_start, |c| c.export.animation_s);
+                if let Err(e) = tables.catch_up(&spool, animation_s, || {}) {
+                    // Said while something can be done about it; at the end all is tried again.
+                    shared.news(format!("the capture cannot be written at present: {e}"));
+                    return Err(e);
+                }
+            }
+            Ok(tables)
+        };
+        let thread = std::thread::Builder::new().name("behind".into()).spawn(run)?;
+        Ok(Self { spool, thread })
+    }
+
+    /// There is more to be written. What comes while the thread is busy is left for the next time.
+    pub fn catch_up(&self, spool: SpoolReader) {
+        let _ = self.spool.try_send(spool);
+    }
+
+    /// The tables as far as they are; `None` if they could not be written.
+    pub fn join(self) -> Option<CaptureTables> {
+        drop(self.spool);
+        self.thread.join().ok()?.ok()
+    }
+}
