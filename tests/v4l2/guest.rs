@@ -89,8 +89,13 @@ impl Guest {
             .output()
             .map_err(|e| format!("{RUN}: {e}"))?;
         let said = format!("{}{}", String::from_utf8_lossy(&ran.stdout), String::from_utf8_lossy(&ran.stderr));
-        let _ = write!(std::io::stderr(), "{}", String::from_utf8_lossy(&ran.stdout));
-        if ran.status.success() { Ok(Results { folder }) } else { Err(format!("the guest's script failed: {said}")) }
+        if ran.status.success() {
+            let _ = write!(std::io::stderr(), "{}", String::from_utf8_lossy(&ran.stdout));
+            return Ok(Results { folder });
+        }
+        // Once, not with every case.
+        let _ = writeln!(std::io::stderr(), "{said}");
+        Err(format!("the guest's script failed; what it left is in {}", folder.display()))
     }
 }
 
