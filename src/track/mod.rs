@@ -8,7 +8,9 @@ mod detect;
 mod flow;
 mod history;
 mod neighbours;
+mod point;
 mod regain;
+mod register;
 
 pub use detect::Detector;
 pub use flow::{Flow, OpticalFlow, Pyramid};
@@ -16,29 +18,15 @@ pub use history::{TrackHistory, TrackTable};
 
 use crate::config::{Detect, Track};
 use crate::model::{Frame, Observation, Outline, TrackId, TrackSet};
-use anchor::{Anchoring, Candidate, Keyframe, distance};
+use anchor::{Anchoring, Keyframe, distance};
+use neighbours::Fit;
+use point::Point;
 
 /// Pictures kept to put points back on; the oldest but the first gives way.
 const KEYFRAMES: usize = 4;
 /// New points are looked for when so great a share of the wanted ones is missing, and not more often than this.
 const REFILL_SHARE: f64 = 0.1;
 const REFILL_FRAMES: u64 = 15;
-
-/// One followed point.
-struct Point {
-    id: TrackId,
-    /// Number of the keyframe in which it was detected; the keyframe itself may be gone.
-    keyframe: u32,
-    born_px: [f32; 2],
-    now_px: [f32; 2],
-    fb_error_px: f32,
-    /// Frames since it was last seen; 0 when seen in this frame.
-    coasting: u32,
-    /// Not seen since a gap: whatever flow finds where it is thought to be may be another point.
-    unsure: bool,
-    /// Points of the same keyframe nearest to it at birth.
-    neighbours: Vec<TrackId>,
-}
 
 /// Follows points through the frames of one capture; holds what must last from frame to frame.
 pub struct Tracker {
@@ -58,6 +46,8 @@ pub struct Tracker {
     frames: u64,
     last_detection: u64,
     gaps: regain::Gaps,
+    /// What the neighbours of each point say in this frame.
+    fits: Vec<Option<Fit>>,
     buffers: Buffers,
 }
 
@@ -87,6 +77,7 @@ impl Tracker {
             frames: 0,
             last_detection: 0,
             gaps: regain::Gaps::default(),
+            fits: Vec::new(),
             buffers: Buffers::default(),
         }
     }
@@ -107,7 +98,7 @@ impl Tracker {
                 self.regain(frame);
             } else {
                 self.follow();
-                self.undo_drift(frame);
+                self.undo_drift(&frame.luma);
             }
             let size = frame.luma.size;
             self.points.retain(|p| {
@@ -147,60 +138,8 @@ impl Tracker {
                 p.coasting += 1;
             }
         }
+        self.ask_neighbours();
         self.ride();
-    }
-
-    /// Moves the points that are not seen with those around them that are.
-    fn ride(&mut self) {
-        let riding: Vec<usize> = (0..self.points.len()).filter(|&i| self.points[i].coasting > 0).collect();
-        for i in riding {
-            if let Some(at) = self.predicted(i) {
-                self.points[i].now_px = at;
-            }
-        }
-    }
-
-    /// Where the neighbours that are seen say that point `i` is, px.
-    fn predicted(&self, i: usize) -> Option<[f32; 2]> {
-        let p = &self.points[i];
-        let mut vouching = [([0.0; 2], [0.0; 2]); neighbours::NEIGHBOURS];
-        let mut n = 0;
-        for id in &p.neighbours {
-            let Ok(j) = self.points.binary_search_by_key(id, |q| q.id) else { continue };
-            let q = &self.points[j];
-            if q.coasting == 0 {
-                let minus = |a: [f32; 2], b: [f32; 2]| [f64::from(a[0] - b[0]), f64::from(a[1] - b[1])];
-                vouching[n] = (minus(q.born_px, p.born_px), minus(q.now_px, q.born_px));
-                n += 1;
-            }
-        }
-        let d = neighbours::predicted_displacement(&vouching[..n])?;
-        Some([p.born_px[0] + d[0] as f32, p.born_px[1] + d[1] as f32])
-    }
-
-    /// Puts a share of the points back on their first patches.
-    fn undo_drift(&mut self, frame: &Frame) {
-        let every = u64::from(self.settings.anchor_every);
-        if every == 0 {
-            return;
-        }
-        for (number, keyframe) in &self.keyframes {
-            let turn = |p: &Point| p.keyframe == *number && u64::from(p.id.0) % every == self.frames % every;
-            let (mut indices, mut candidates) = (Vec::new(), Vec::new());
-            for i in (0..self.points.len()).filter(|&i| turn(&self.points[i])) {
-                let p = &self.points[i];
-                let predicted_px = self.predicted(i).unwrap_or(p.now_px);
-                indices.push(i);
-                candidates.push(Candidate { born_px: p.born_px, now_px: p.now_px, predicted_px });
-            }
-            let found = self.anchoring.reanchor(keyframe, (&frame.luma, &self.present), &candidates);
-            for (i, at) in indices.into_iter().zip(found) {
-                if let Some(at) = at {
-                    let p = &mut self.points[i];
-                    (p.now_px, p.coasting, p.unsure) = (at, 0, false);
-                }
-            }
-        }
     }
 
     fn refill_due(&self) -> bool {
@@ -221,17 +160,24 @@ impl Tracker {
             self.keyframes.remove(1);
         }
         self.keyframes.push((self.next_keyframe, Keyframe::new(&frame.luma, &self.settings)));
-        let first = self.next_id;
-        for (at, near) in found.iter().zip(neighbours::nearest(&found)) {
+        let known_ids: Vec<TrackId> = (self.points.iter().filter(|p| p.coasting == 0).map(|p| p.id))
+            .chain((0..found.len() as u32).map(|k| TrackId(self.next_id + k)))
+            .collect();
+        let known_px: Vec<[f32; 2]> = (self.points.iter().filter(|p| p.coasting == 0).map(|p| p.now_px))
+            .chain(found.iter().copied())
+            .collect();
+        for (at, near) in found.iter().zip(neighbours::nearest(&found, &known_px)) {
             self.points.push(Point {
                 id: TrackId(self.next_id),
                 keyframe: self.next_keyframe,
                 born_px: *at,
                 now_px: *at,
+                patch: self.anchoring.registration.patch(&frame.luma, *at),
                 fb_error_px: 0.0,
                 coasting: 0,
                 unsure: false,
-                neighbours: near.into_iter().map(|j| TrackId(first + j)).collect(),
+                neighbours: near.into_iter().map(|j| (known_ids[j as usize], known_px[j as usize])).collect(),
+                likeness: 1.0,
             });
             self.next_id += 1;
         }

@@ -4,6 +4,7 @@
 //! that look alike; a camera that has just started shows pictures that are too dark or too bright to be compared at all.
 
 use super::Tracker;
+use super::point::Point;
 use crate::model::Frame;
 
 /// A step is a gap when it is longer than this, s, and than so many of the steps before.
@@ -46,8 +47,8 @@ impl Tracker {
         self.points.iter_mut().for_each(|p| (p.coasting, p.unsure) = (1, true));
         for (number, keyframe) in &self.keyframes {
             let indices: Vec<usize> = (0..self.points.len()).filter(|&i| self.points[i].keyframe == *number).collect();
-            let born: Vec<[f32; 2]> = indices.iter().map(|&i| self.points[i].born_px).collect();
-            let found = self.anchoring.search(keyframe, (&frame.luma, &self.present), &born, self.settings.levels);
+            let points: Vec<&Point> = indices.iter().map(|&i| &self.points[i]).collect();
+            let found = self.anchoring.search(keyframe, (&frame.luma, &self.present), &points, self.settings.levels);
             for (i, at) in indices.into_iter().zip(found) {
                 if let Some(at) = at {
                     let p = &mut self.points[i];
@@ -55,6 +56,7 @@ impl Tracker {
                 }
             }
         }
+        self.ask_neighbours();
         self.ride();
         let seen = self.points.iter().filter(|p| p.coasting == 0).count();
         if seen as f64 >= ENOUGH * self.points.len() as f64 {
