@@ -21,8 +21,8 @@ use std::process::Command;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Frames of the 720p clip that tracking is measured on.
-const TRACKED: usize = 60;
+/// Frames of the 720p clip that tracking is measured on: in the first 6 s all points are on trial.
+const TRACKED: usize = 230;
 
 fn main() {
     let dir = tempfile::tempdir().expect("tempdir");
@@ -35,9 +35,9 @@ fn main() {
         .sample_size(10)
         .warm_up_time(Duration::from_millis(300))
         .measurement_time(Duration::from_secs(3));
-    let lines = [tracking(&clip), build(&mut criterion), pose(&mut criterion), replay(&clip, dir.path())];
+    let lines = [build(&mut criterion), pose(&mut criterion), replay(&clip, dir.path())];
     println!();
-    lines.iter().for_each(|line| println!("{line}"));
+    tracking(&clip).iter().chain(&lines).for_each(|line| println!("{line}"));
 }
 
 fn frames(clip: &Path, n: usize) -> Vec<Frame> {
@@ -55,17 +55,18 @@ fn frames(clip: &Path, n: usize) -> Vec<Frame> {
 
 /// Forward and back as our tracker does it, each pyramid built once, against two plain calls of OpenCV on pictures, as
 /// anyone would write them; in turns on the same frames and points, so that whatever else the machine does is shared
-/// fairly. The medians are compared. The tracker's whole step, which also undoes drift, stands beside them.
-fn tracking(clip: &Path) -> String {
+/// fairly. The medians are compared, those of the tracker's whole step, which also undoes drift, among them. While points
+/// are on trial there are twice as many.
+fn tracking(clip: &Path) -> [String; 2] {
     let frames = frames(clip, TRACKED);
     let settings = Config::default();
     let (window, levels) = (settings.track.window_px, settings.track.levels);
     let outline = whole(frames[0].luma.size);
     let detect = Detect { points: 400, ..settings.detect };
-    let (mut ours_ms, mut plain_ms, mut step_ms) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut ours_ms, mut plain_ms, mut step_ms, mut trial_ms) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let mut flow = OpticalFlow::new(window);
     let (mut forward, mut backward) = (Vec::new(), Vec::new());
-    for _ in 0..4 {
+    for _ in 0..2 {
         let mut tracker = Tracker::new(&detect, &settings.track, &outline, 0);
         let mut set = tracker.step(&frames[0]);
         let (mut previous, mut present) = (Pyramid::default(), Pyramid::default());
@@ -73,6 +74,15 @@ fn tracking(clip: &Path) -> String {
         for pair in frames.windows(2) {
             let points: Vec<[f32; 2]> = set.observations.iter().map(|o| [o.u_px, o.v_px]).collect();
             assert!(points.len() >= 300, "{} points", points.len());
+            let on_trial = set.observations.iter().any(|o| !o.confirmed);
+            if on_trial {
+                let (ms, next) = timed_ms(|| tracker.step(&pair[1]));
+                trial_ms.push(ms);
+                std::mem::swap(&mut previous, &mut present);
+                previous.rebuild(&pair[1].luma, window, levels);
+                set = next;
+                continue;
+            }
             let from: Vector<Point2f> = points.iter().map(|p| Point2f::new(p[0], p[1])).collect();
             plain_ms.push(timed_ms(|| plain(&pair[0].luma, &pair[1].luma, &from)).0);
             let ours = || {
@@ -88,10 +98,13 @@ fn tracking(clip: &Path) -> String {
             set = next;
         }
     }
-    let (ours, plain, step) = (median(ours_ms), median(plain_ms), median(step_ms));
+    let (ours, plain, step, trial) = (median(ours_ms), median(plain_ms), median(step_ms), median(trial_ms));
     println!("a 720p frame, some 400 points, forward and back: {ours:.2} ms; plain OpenCV: {plain:.2} ms");
-    println!("the whole step, drift undone: {step:.2} ms");
-    format!("tracking: {:.2} of plain OpenCV (must be <= 0.85)", ours / plain)
+    println!("the whole step, drift undone: {step:.2} ms; with some 800 points on trial: {trial:.2} ms");
+    [
+        format!("forward and back: {:.2} of plain OpenCV (must be <= 0.85)", ours / plain),
+        format!("all of tracking: {:.2} of plain OpenCV (must be <= 1.5)", step / plain),
+    ]
 }
 
 fn plain(a: &Luma, b: &Luma, from: &Vector<Point2f>) -> Vector<Point2f> {

@@ -224,7 +224,7 @@ impl Default for Outline {
 }
 impl Default for Detect {
     fn default() -> Self {
-        Self { points: 400, min_distance_px: 5.0, quality: 0.001, border_px: 5.0 }
+        Self { points: 400, min_distance_px: 5.0, quality: 0.0005, border_px: 5.0 }
     }
 }
 impl Default for Track {

@@ -18,8 +18,9 @@ fn text(bytes: Vec<u8>) -> String {
 #[test]
 fn tracks_have_the_agreed_columns_and_an_empty_cell_where_no_node_is() {
     let mut csv = TracksCsv::new(Vec::new()).unwrap();
-    let o = |id, u_px| Observation { id: TrackId(id), u_px, v_px: 7.0, fb_error_px: 0.1 };
-    let set = TrackSet { frame: 3, time_s: 0.1, observations: vec![o(1, 10.25), o(2, 0.0)], lost: 0, born: 0 };
+    let o =
+        |id, u_px| Observation { id: TrackId(id), u_px, v_px: 7.0, fb_error_px: 0.1, error_px: None, confirmed: true };
+    let set = TrackSet { frame: 3, time_s: 0.1, observations: vec![o(1, 10.25), o(2, 0.0)], ..TrackSet::default() };
     csv.set(&set, |id| (id == TrackId(1)).then_some(NodeId(5))).unwrap();
     csv.row(TrackId(9), 4, 1.0 / 3.0, [f64::NAN, -0.0], None).unwrap();
     let expected = "track_id,frame,time_s,u_px,v_px,node_id\n1,3,0.1,10.25,7,5\n2,3,0.1,0,7,\n9,4,0.333333,,0,\n";

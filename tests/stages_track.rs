@@ -2,10 +2,10 @@
 
 use arborcam::config::{Accumulate, Detect, Track};
 use arborcam::hierarchy::evidence_of;
-use arborcam::model::{Frame, Luma, Observation, Size, TrackId, TrackSet};
+use arborcam::model::{Frame, LONGEST_TRIAL_S, Luma, Observation, Size, TrackId, TrackSet};
 use arborcam::outline::whole;
 use arborcam::track::{TrackHistory, Tracker};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use std::time::Instant;
 
@@ -81,6 +81,29 @@ fn a_static_picture_stays_where_it_is() {
     }
 }
 
+/// Without wind nothing tells good points from bad ones; the program must go on all the same.
+#[test]
+fn points_that_never_move_pass_their_trial_by_time() {
+    let mut tracker = tracker();
+    let still = frame(0, texture);
+    let (mut first, mut rejected) = (BTreeSet::new(), BTreeSet::new());
+    for k in 0..40 {
+        let time_s = k as f64 / 5.0;
+        let set = tracker.step(&Frame { index: k, time_s, ..still.clone() });
+        rejected.extend(set.rejected.iter().copied());
+        let ids: BTreeSet<TrackId> = places(&set).into_keys().collect();
+        if k == 0 {
+            first = ids;
+        } else if time_s < LONGEST_TRIAL_S {
+            assert!(ids == first && set.observations.iter().all(|o| !o.confirmed), "{time_s} s");
+        } else {
+            assert!(set.observations.iter().all(|o| o.confirmed && o.error_px.is_some()), "{time_s} s");
+            assert!(2 * ids.len() >= first.len(), "{} of {} are left", ids.len(), first.len());
+            assert_eq!(first.difference(&ids).copied().collect::<BTreeSet<_>>(), rejected, "who is gone is named");
+        }
+    }
+}
+
 /// A bird flies by: who is behind it is not reported, and has its old name afterwards.
 #[test]
 fn hidden_points_come_back_with_their_names_in_the_right_place() {
@@ -151,10 +174,12 @@ fn history(amplitude_px: f64, seconds: f64) -> TrackHistory {
                 u_px: (40.0 * f64::from(column) + sway + noise(78.233)) as f32,
                 v_px: (20.0 * f64::from(row) + noise(39.425)) as f32,
                 fb_error_px: 0.05,
+                error_px: Some(0.1),
+                confirmed: true,
             }
         };
         let observations = (0..60).map(at).collect();
-        history.push(TrackSet { frame: k, time_s, observations, lost: 0, born: 0 });
+        history.push(TrackSet { frame: k, time_s, observations, lost: 0, born: 0, rejected: Vec::new() });
     }
     history
 }

@@ -168,9 +168,16 @@ pub struct Build {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
     pub tracks_total: u64,
+    /// Candidates that turned out not to be points that can be followed; they are not in the tables.
+    #[serde(default)]
+    pub tracks_rejected: u64,
     pub tracks_alive_end: u64,
     /// Distance by which tracking forward and back misses the start, px.
     pub median_fb_error_px: Option<f64>,
+    /// How far a point is expected to be from the one that it was when it was found, by its likeness to that and by what
+    /// its neighbours say, px: the median over the frames of the median over the points.
+    #[serde(default)]
+    pub median_error_px: Option<f64>,
     pub lost_per_s: Option<f64>,
     /// Median distance between where the points put a node in the picture and where the 3D pose does, px.
     pub median_reprojection_px: Option<f64>,

@@ -19,4 +19,4 @@ pub use outline::Outline;
 pub use pose::{JointPose, Pose};
 pub use skeleton::{Node, NodeId, Skeleton};
 pub use snapshot::{BranchRow, CameraState, FormatNote, Phase, Snapshot};
-pub use track::{Observation, TrackId, TrackSet};
+pub use track::{LONGEST_TRIAL_S, Observation, TrackId, TrackSet};

@@ -105,11 +105,15 @@ pub struct Snapshot {
     /// Median forward-backward error of this frame, px, and its history, oldest first.
     pub fb_error_px: f64,
     pub fb_history_px: Vec<f64>,
+    /// Median distance at which the points are expected to be from those that they were when they were found, px.
+    pub error_px: Option<f64>,
     pub image_size: Option<Size>,
     pub preview: Option<Arc<Rgb>>,
     pub outline_px: Vec<[i32; 2]>,
     /// Points of this frame, px, each with the number of its main branch, `None` before the tree is built.
     pub points: Vec<([f32; 2], Option<u8>)>,
+    /// Points on trial, px.
+    pub candidates_px: Vec<[f32; 2]>,
     pub skeleton: Option<Arc<Skeleton>>,
     pub pose: Option<Arc<Pose>>,
     /// Main branch of every node of the skeleton, by node index; the same numbers as in `points`.

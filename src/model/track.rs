@@ -4,6 +4,9 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct TrackId(pub u32);
 
+/// Within this time of its birth it is decided whether a point is kept, s.
+pub const LONGEST_TRIAL_S: f64 = 6.0;
+
 /// One point as seen in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
@@ -12,6 +15,11 @@ pub struct Observation {
     pub v_px: f32,
     /// Distance by which tracking forward and back again missed the start, px; 0 in the frame of birth.
     pub fb_error_px: f32,
+    /// How far it is expected to be from the point that it was when it was found (median), px; `None` where it was never
+    /// compared with that.
+    pub error_px: Option<f32>,
+    /// Its trial is over; of those on trial about half will be dropped.
+    pub confirmed: bool,
 }
 
 /// All points seen in one frame, ordered by id.
@@ -24,4 +32,14 @@ pub struct TrackSet {
     /// Points given up in this frame, and points newly detected in it.
     pub lost: u32,
     pub born: u32,
+    /// Points that did not pass their trial: whatever was seen of them before is void.
+    pub rejected: Vec<TrackId>,
+}
+
+impl TrackSet {
+    /// The points that count: those that have passed their trial, or all while none has.
+    pub fn counted(&self) -> impl Iterator<Item = &Observation> {
+        let passed = self.observations.iter().any(|o| o.confirmed);
+        self.observations.iter().filter(move |o| o.confirmed || !passed)
+    }
 }

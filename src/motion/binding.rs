@@ -72,7 +72,7 @@ impl Binding {
 
     /// Where the tracks put each measured node, px; `None` where none of its tracks was seen. The foot never moves.
     ///
-    /// Tracks that are new are bound to the tip that is nearest to them in this frame, if one is near enough.
+    /// Tracks that are new and confirmed are bound to the tip that is nearest to them in this frame, if one is near enough.
     pub fn targets_px(&mut self, set: &TrackSet) -> Vec<Option<[f64; 2]>> {
         self.collect(set);
         let mut targets: Vec<Option<[f64; 2]>> = self
@@ -81,7 +81,7 @@ impl Binding {
             .zip(&self.rest_px)
             .map(|(d, rest)| trimmed_mean(d).map(|d| [rest[0] + d[0], rest[1] + d[1]]))
             .collect();
-        let new = set.observations.iter().filter(|o| !self.tracks.contains_key(&o.id));
+        let new = set.observations.iter().filter(|o| o.confirmed && !self.tracks.contains_key(&o.id));
         // A tip that has lost all its tracks is where the nearest branch below it that is seen would carry it.
         let expected = |tip: NodeId| {
             let seen = |n: &NodeId| targets[n.index()].is_some();

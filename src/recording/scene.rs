@@ -107,6 +107,9 @@ struct TracksJson {
     u_px: Vec<f32>,
     v_px: Vec<f32>,
     fb_error_px: Vec<f32>,
+    error_px: Vec<Option<f32>>,
+    confirmed: Vec<bool>,
+    rejected: Vec<u32>,
 }
 
 /// The points with their names: annotations have none.
@@ -124,6 +127,9 @@ pub(super) fn tracks_json(tracks: &TrackSet, into: &mut Vec<u8>) -> Result<(), s
             u_px: o.iter().map(|o| o.u_px).collect(),
             v_px: o.iter().map(|o| o.v_px).collect(),
             fb_error_px: o.iter().map(|o| o.fb_error_px).collect(),
+            error_px: o.iter().map(|o| o.error_px).collect(),
+            confirmed: o.iter().map(|o| o.confirmed).collect(),
+            rejected: tracks.rejected.iter().map(|id| id.0).collect(),
         },
     )
 }

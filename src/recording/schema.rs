@@ -97,7 +97,10 @@ const TRACKS: &str = r#"{
     "id": {"type": "array", "items": {"type": "integer"}},
     "u_px": {"type": "array", "items": {"type": "number"}},
     "v_px": {"type": "array", "items": {"type": "number"}},
-    "fb_error_px": {"type": "array", "items": {"type": "number"}}
+    "fb_error_px": {"type": "array", "items": {"type": "number"}},
+    "error_px": {"type": "array", "items": {"type": ["number", "null"]}, "description": "expected distance from the point that it was when it was found"},
+    "confirmed": {"type": "array", "items": {"type": "boolean"}, "description": "false while the point is on trial"},
+    "rejected": {"type": "array", "items": {"type": "integer"}, "description": "ids that did not pass their trial: what was seen of them is void"}
   }
 }"#;
 

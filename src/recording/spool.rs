@@ -8,9 +8,9 @@ use std::os::unix::fs::FileExt;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Bytes of the head of a set (frame, time, lost, born, count) and of one observation.
-const HEAD: usize = 8 + 8 + 4 + 4 + 4;
-const OBSERVATION: usize = 16;
+/// Bytes of the head of a set (frame, time, lost, born, two counts) and of one observation.
+const HEAD: usize = 8 + 8 + 4 + 4 + 4 + 4;
+const OBSERVATION: usize = 21;
 
 /// Writing end.
 pub struct Spool {
@@ -61,12 +61,15 @@ impl Spool {
         b.extend(set.lost.to_le_bytes());
         b.extend(set.born.to_le_bytes());
         b.extend((set.observations.len() as u32).to_le_bytes());
+        b.extend((set.rejected.len() as u32).to_le_bytes());
         for o in &set.observations {
             b.extend(o.id.0.to_le_bytes());
-            for x in [o.u_px, o.v_px, o.fb_error_px] {
+            for x in [o.u_px, o.v_px, o.fb_error_px, o.error_px.unwrap_or(f32::NAN)] {
                 b.extend(x.to_le_bytes());
             }
+            b.push(u8::from(o.confirmed));
         }
+        set.rejected.iter().for_each(|id| b.extend(id.0.to_le_bytes()));
         self.writer.write_all(b)?;
         self.sets += 1;
         Ok(())
@@ -153,10 +156,13 @@ fn read_set(reader: &mut impl Read) -> io::Result<TrackSet> {
     let n = u32_at(24) as usize;
     let mut bytes = vec![0u8; n * OBSERVATION];
     reader.read_exact(&mut bytes)?;
+    let mut rejected = vec![0u8; u32_at(28) as usize * 4];
+    reader.read_exact(&mut rejected)?;
     let observation = |o: &[u8]| {
         let word = |i: usize| u32::from_le_bytes(std::array::from_fn(|k| o[4 * i + k]));
-        let [u_px, v_px, fb_error_px] = [1, 2, 3].map(|i| f32::from_bits(word(i)));
-        Observation { id: TrackId(word(0)), u_px, v_px, fb_error_px }
+        let [u_px, v_px, fb_error_px, error_px] = [1, 2, 3, 4].map(|i| f32::from_bits(word(i)));
+        let error_px = (!error_px.is_nan()).then_some(error_px);
+        Observation { id: TrackId(word(0)), u_px, v_px, fb_error_px, error_px, confirmed: o[20] != 0 }
     };
     Ok(TrackSet {
         frame: u64_at(0),
@@ -164,6 +170,7 @@ fn read_set(reader: &mut impl Read) -> io::Result<TrackSet> {
         lost: u32_at(16),
         born: u32_at(20),
         observations: bytes.chunks_exact(OBSERVATION).map(observation).collect(),
+        rejected: rejected.as_chunks().0.iter().map(|id| TrackId(u32::from_le_bytes(*id))).collect(),
     })
 }
 
@@ -177,9 +184,12 @@ mod tests {
             u_px: k as f32 * 1.25,
             v_px: -(frame as f32) / 3.0,
             fb_error_px: 0.125,
+            error_px: (k > 20).then_some(k as f32),
+            confirmed: k.is_multiple_of(2),
         };
         let observations = (0..n).map(at).collect();
-        TrackSet { frame, time_s: frame as f64 / 30.0, observations, lost: 2, born: n }
+        let rejected = (0..n / 20).map(TrackId).collect();
+        TrackSet { frame, time_s: frame as f64 / 30.0, observations, lost: 2, born: n, rejected }
     }
 
     /// An export in the middle of a capture reads what was there and does not disturb what comes after.
@@ -189,7 +199,7 @@ mod tests {
         let sets: Vec<TrackSet> = (0..2000).map(|f| set(f, (f % 7) as u32 * 10)).collect();
         let same = |a: &TrackSet, b: &TrackSet| {
             (a.frame, a.time_s, a.lost, a.born) == (b.frame, b.time_s, b.lost, b.born)
-                && a.observations == b.observations
+                && (&a.observations, &a.rejected) == (&b.observations, &b.rejected)
         };
         let check = |reader: SpoolReader, n: usize| {
             let read: Vec<TrackSet> = reader.sets().map(Result::unwrap).collect();

@@ -1,6 +1,7 @@
 //! `tracks.csv` and `motion.csv`, written behind the capture while it runs, so that little is left to do at its end: a
 //! service is given two seconds to stop.
 
+use super::held_sets::HeldSets;
 use super::meter::Histogram;
 use super::shared::{Failure, Shared};
 use crate::config::Config;
@@ -25,6 +26,8 @@ pub struct CaptureTables {
     motion: MotionCsv<BufWriter<File>>,
     tracks: TracksCsv<BufWriter<File>>,
     sets: Option<Sets>,
+    /// Sets whose poses are written and whose points are not yet: some of those may still be on trial.
+    held: HeldSets,
     /// Whether the tracks from before the tree was built have their rows.
     early: bool,
     /// Poses of the last so many seconds, for the animation.
@@ -52,7 +55,18 @@ impl CaptureTables {
         let tracks = TracksCsv::new(folder.file("tracks.csv")?)?;
         let (retrace, tree) = (Retrace::new(tree, config), tree.clone());
         let (poses, misses) = (VecDeque::new(), Histogram::default());
-        Ok(Self { folder, tree, retrace, motion, tracks, sets: None, early: false, poses, misses })
+        Ok(Self {
+            folder,
+            tree,
+            retrace,
+            motion,
+            tracks,
+            sets: None,
+            held: HeldSets::default(),
+            early: false,
+            poses,
+            misses,
+        })
     }
 
     /// Writes all rows up to where `spool` ends; each set calls `wrote`. Poses older than `animation_s` are let go.
@@ -65,8 +79,13 @@ impl CaptureTables {
         for set in sets.by_ref() {
             let set = set.map_err(Failure::Spool)?;
             self.pose(&set, animation_s)?;
-            // A track's node is decided when it is first seen; of those that were there when the tree was built, then.
+            // A track's node is decided when it has passed its trial; of those that were there when the tree was built, then.
             if set.frame > self.tree.frame {
+                self.held.push(set);
+            } else {
+                self.held.note(&set);
+            }
+            while let Some(set) = self.held.decided() {
                 self.early_rows(spool)?;
                 self.tracks.set(&set, |id| self.retrace.node_of(id))?;
             }
@@ -82,6 +101,9 @@ impl CaptureTables {
     /// Whatever the file system says.
     pub fn finish(mut self, spool: &SpoolReader) -> Result<Done, Failure> {
         self.early_rows(spool)?;
+        while let Some(set) = self.held.next() {
+            self.tracks.set(&set, |id| self.retrace.node_of(id))?;
+        }
         self.tracks.finish()?;
         self.motion.finish()?;
         Ok(Done { folder: self.folder, tree: self.tree, poses: self.poses.into(), misses: self.misses })
@@ -111,10 +133,11 @@ impl CaptureTables {
             return Ok(());
         }
         for set in spool.sets() {
-            let set = set.map_err(Failure::Spool)?;
+            let mut set = set.map_err(Failure::Spool)?;
             if set.frame > self.tree.frame {
                 break;
             }
+            self.held.clean(&mut set);
             self.tracks.set(&set, |id| self.retrace.node_of(id))?;
         }
         Ok(())

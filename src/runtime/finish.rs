@@ -1,6 +1,7 @@
 //! Writes a capture: the five files of the contract, from the tracks on disk and the tree.
 
 use super::capture_tables::{CaptureTables, Done};
+use super::held_sets::HeldSets;
 use super::meter::Histogram;
 use super::shared::{Failure, Shared};
 use crate::config::Config;
@@ -28,26 +29,33 @@ const PLAIN_BARK: [u8; 3] = [104, 84, 66];
 #[derive(Clone, Debug, Default)]
 pub struct Quality {
     born: u64,
+    rejected: u64,
     lost: u64,
     alive: u64,
     first: Option<(u64, f64)>,
     last_s: f64,
     fb_error_px: Histogram,
+    error_px: Histogram,
 }
 
 impl Quality {
-    /// Takes the tracks of a frame and their median forward-backward error, px.
-    pub fn note(&mut self, tracks: &TrackSet, fb_error_px: f64) {
+    /// Takes the tracks of a frame and the medians of their forward-backward and of their expected error, px.
+    pub fn note(&mut self, tracks: &TrackSet, fb_error_px: f64, error_px: Option<f64>) {
+        self.rejected += tracks.rejected.len() as u64;
         self.born += u64::from(tracks.born);
         self.lost += u64::from(tracks.lost);
         self.alive = tracks.observations.len() as u64;
         self.first.get_or_insert((tracks.frame, tracks.time_s));
         self.last_s = tracks.time_s;
         self.fb_error_px.add(fb_error_px);
+        if let Some(error_px) = error_px {
+            self.error_px.add(error_px);
+        }
     }
 
+    /// Points followed, less those that did not pass their trial.
     pub fn tracks_total(&self) -> u64 {
-        self.born
+        self.born.saturating_sub(self.rejected)
     }
 }
 
@@ -106,9 +114,16 @@ fn without_tree(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
     let folder = OutputFolder::create(dir)?;
     let metres_per_px = job.config.export.metres_per_px;
     let mut tracks = TracksCsv::new(folder.file("tracks.csv")?)?;
+    let mut held = HeldSets::default();
     for set in job.tracks.sets() {
-        tracks.set(&set.map_err(Failure::Spool)?, |_| None)?;
+        held.push(set.map_err(Failure::Spool)?);
+        while let Some(set) = held.decided() {
+            tracks.set(&set, |_| None)?;
+        }
         job.shared.pulse.wrote();
+    }
+    while let Some(set) = held.next() {
+        tracks.set(&set, |_| None)?;
     }
     tracks.finish()?;
     let foot_only = Arc::new(Skeleton { nodes: Vec::new(), foot_px: [0.0; 2], image_size: job.info.size });
@@ -225,9 +240,11 @@ fn describe(
             forced: tree.forced,
         }),
         quality: QualityNote {
-            tracks_total: quality.born,
+            tracks_total: quality.tracks_total(),
+            tracks_rejected: quality.rejected,
             tracks_alive_end: quality.alive,
             median_fb_error_px: quality.fb_error_px.median(),
+            median_error_px: quality.error_px.median(),
             lost_per_s: (tracked_s > 0.0).then(|| quality.lost as f64 / tracked_s),
             median_reprojection_px,
         },

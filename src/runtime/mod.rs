@@ -10,6 +10,7 @@
 
 mod capture_tables;
 mod finish;
+mod held_sets;
 mod latest;
 mod losses;
 mod meter;

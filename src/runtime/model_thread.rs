@@ -6,7 +6,7 @@ use super::finish::{self, CaptureJob, Quality};
 use super::pulse::Worker;
 use super::recorder_thread::{Found, Recorded, Recorder};
 use super::shared::{Failure, Shared};
-use super::status::{Status, median_fb_error_px};
+use super::status::{Status, median_error_px, median_fb_error_px};
 use super::track_thread::ToModel;
 use super::{Job, Summary};
 use crate::model::{Phase, Pose, Rgb};
@@ -136,7 +136,8 @@ impl ModelThread {
             self.shared.abort(Failure::Spool(e));
         }
         self.write_behind(moved.tracks.time_s);
-        self.quality.note(&moved.tracks, median_fb_error_px(&moved.tracks));
+        let tracks = &moved.tracks;
+        self.quality.note(tracks, median_fb_error_px(tracks), median_error_px(tracks));
         if self.bark.is_none() || self.back.tree().is_none() {
             self.bark = moved.preview.clone().or(self.bark.take());
         }

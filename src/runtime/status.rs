@@ -3,7 +3,7 @@
 use super::meter::Recent;
 use super::shared::Shared;
 use crate::dynamics::dominant_frequency_hz;
-use crate::model::{BranchRow, FormatNote, Phase, Rgb, Size, Skeleton, Snapshot, TrackSet};
+use crate::model::{BranchRow, FormatNote, Observation, Phase, Rgb, Size, Skeleton, Snapshot, TrackSet};
 use crate::pipeline::{BackEnd, Moved, Targets, Tree};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -107,7 +107,8 @@ impl Status {
         let s = &mut self.snapshot;
         (s.phase, s.progress) = back.phase();
         (s.frame, s.time_s, s.fb_error_px) = (moved.tracks.frame, time_s, error_px);
-        s.tracks_alive = moved.tracks.observations.len() as u32;
+        s.error_px = median_error_px(&moved.tracks);
+        s.tracks_alive = moved.tracks.counted().count() as u32;
         s.image_size = Some(moved.outline.size);
         s.pose.clone_from(&moved.pose);
         if let Some(preview) = &moved.preview {
@@ -125,7 +126,10 @@ impl Status {
             let colour = |id| {
                 back.binding().and_then(|b| b.node_of(id)).and_then(|n| s.node_colour.get(n.index())?.as_ref().copied())
             };
-            s.points = moved.tracks.observations.iter().map(|o| ([o.u_px, o.v_px], colour(o.id))).collect();
+            let (passed, on_trial): (Vec<&Observation>, Vec<&Observation>) =
+                moved.tracks.observations.iter().partition(|o| o.confirmed);
+            s.points = passed.into_iter().map(|o| ([o.u_px, o.v_px], colour(o.id))).collect();
+            s.candidates_px = on_trial.into_iter().map(|o| [o.u_px, o.v_px]).collect();
         }
         s.sensor_rate_hz = self.sensor.rate_hz();
         s.work_rate_hz = self.work.rate_hz();
@@ -203,9 +207,18 @@ impl Status {
 
 /// Median forward-backward error of a frame's points, px; 0 if there are none.
 pub fn median_fb_error_px(tracks: &TrackSet) -> f64 {
-    let mut errors: Vec<f32> = tracks.observations.iter().map(|o| o.fb_error_px).collect();
-    errors.sort_unstable_by(f32::total_cmp);
-    errors.get(errors.len() / 2).copied().map_or(0.0, f64::from)
+    median(tracks.counted().map(|o| o.fb_error_px)).unwrap_or(0.0)
+}
+
+/// Median of the errors that are expected of a frame's points, px.
+pub fn median_error_px(tracks: &TrackSet) -> Option<f64> {
+    median(tracks.counted().filter_map(|o| o.error_px))
+}
+
+fn median(values: impl Iterator<Item = f32>) -> Option<f64> {
+    let mut values: Vec<f32> = values.collect();
+    values.sort_unstable_by(f32::total_cmp);
+    values.get(values.len() / 2).copied().map(f64::from)
 }
 
 /// Number of the main branch of every node; `None` above the main branches. A copy has its original's.

@@ -152,7 +152,7 @@ impl Tracker {
             if let Some(at) = found {
                 (p.now_px, p.coasting, p.unsure) = (at, 0, false);
             }
-            p.compared(likeness);
+            p.compared(likeness, fit.as_ref());
         }
     }
 }

@@ -38,7 +38,8 @@ impl Detector {
         self.min_distance_px
     }
 
-    /// At most `wanted` corners (px), strongest first, all at the minimum distance from each other and from `taken`.
+    /// At most `wanted` corners (px), strongest first, at the minimum distance from `taken`; as they are candidates, of
+    /// which the better half is kept, twice as many find place side by side.
     pub fn detect(&self, luma: &Luma, taken: &[[f32; 2]], wanted: usize) -> Vec<[f32; 2]> {
         if self.roi.area() == 0 || wanted == 0 {
             return Vec::new();
@@ -47,6 +48,10 @@ impl Detector {
             tracing::error!("corner detection in a {} picture: {e}", luma.size);
             Vec::new()
         })
+    }
+
+    fn candidate_distance_px(&self) -> f64 {
+        (self.min_distance_px * std::f64::consts::FRAC_1_SQRT_2).max(1.0)
     }
 
     fn corners(&self, luma: &Luma, taken: &[[f32; 2]], wanted: usize) -> opencv::Result<Vec<[f32; 2]>> {
@@ -64,7 +69,7 @@ impl Detector {
             &mut corners,
             wanted as i32,
             self.settings.quality,
-            self.min_distance_px,
+            self.candidate_distance_px(),
             &mask,
             BLOCK_PX,
             BLOCK_PX,

@@ -68,7 +68,7 @@ impl TrackHistory {
         }
     }
 
-    /// Tracks seen in the newest frame, on frames at least `step_s` apart.
+    /// Confirmed tracks seen in the newest frame, also from before they were confirmed, on frames at least `step_s` apart.
     pub fn table(&self, step_s: f64) -> TrackTable {
         let mut frames: Vec<&TrackSet> = Vec::new();
         // From the newest backwards, so that the newest frame is always in.
@@ -80,7 +80,7 @@ impl TrackHistory {
         }
         frames.reverse();
         let Some(newest) = frames.last() else { return TrackTable::default() };
-        let row: BTreeMap<TrackId, usize> = newest.observations.iter().enumerate().map(|(i, o)| (o.id, i)).collect();
+        let row: BTreeMap<TrackId, usize> = newest.counted().enumerate().map(|(i, o)| (o.id, i)).collect();
         let mut positions = vec![vec![None; frames.len()]; row.len()];
         let mut errors = vec![Vec::new(); row.len()];
         for (f, set) in frames.iter().enumerate() {

@@ -11,22 +11,26 @@ mod neighbours;
 mod point;
 mod regain;
 mod register;
+mod trial;
 
 pub use detect::Detector;
 pub use flow::{Flow, OpticalFlow, Pyramid};
 pub use history::{TrackHistory, TrackTable};
 
 use crate::config::{Detect, Track};
-use crate::model::{Frame, Observation, Outline, TrackId, TrackSet};
+use crate::model::{Frame, Observation, Outline, Size, TrackId, TrackSet};
 use anchor::{Anchoring, Keyframe, distance};
 use neighbours::Fit;
-use point::Point;
+use point::{Point, Record};
+use trial::{Trial, Trials};
 
 /// Pictures kept to put points back on; the oldest but the first gives way.
 const KEYFRAMES: usize = 4;
 /// New points are looked for when so great a share of the wanted ones is missing, and not more often than this.
 const REFILL_SHARE: f64 = 0.1;
 const REFILL_FRAMES: u64 = 15;
+/// Where there were not enough good points to be found, they are looked for again after so long, s.
+const TRY_AGAIN_S: f64 = 10.0;
 
 /// Follows points through the frames of one capture; holds what must last from frame to frame.
 pub struct Tracker {
@@ -45,7 +49,13 @@ pub struct Tracker {
     next_keyframe: u32,
     frames: u64,
     last_detection: u64,
+    detected_s: f64,
     gaps: regain::Gaps,
+    trials: Option<Trials>,
+    /// Expected error that points of later trials must not exceed, px; known after the first.
+    bar_px: Option<f32>,
+    /// Number of points after the last trial.
+    settled: usize,
     /// What the neighbours of each point say in this frame.
     fits: Vec<Option<Fit>>,
     buffers: Buffers,
@@ -77,6 +87,10 @@ impl Tracker {
             frames: 0,
             last_detection: 0,
             gaps: regain::Gaps::default(),
+            trials: None,
+            bar_px: None,
+            settled: 0,
+            detected_s: 0.0,
             fits: Vec::new(),
             buffers: Buffers::default(),
         }
@@ -92,6 +106,7 @@ impl Tracker {
         std::mem::swap(&mut self.previous, &mut self.present);
         self.present.rebuild(&frame.luma, self.settings.window_px, self.settings.levels);
         let before = self.points.len();
+        let mut rejected = Vec::new();
         let regaining = self.gaps.regaining(frame.time_s);
         if self.frames > 0 {
             if regaining {
@@ -100,22 +115,39 @@ impl Tracker {
                 self.follow();
                 self.undo_drift(&frame.luma);
             }
-            let size = frame.luma.size;
-            self.points.retain(|p| {
-                p.coasting <= self.settings.coast_frames.max(if p.unsure { regain::UNSURE_FRAMES } else { 0 })
-                    && size.contains(f64::from(p.now_px[0]), f64::from(p.now_px[1]))
-            });
+            self.give_up(frame.luma.size, &mut rejected);
         }
-        let lost = (before - self.points.len()) as u32;
-        let born = if self.refill_due() { self.refill(frame) } else { 0 };
+        let lost = (before - self.points.len() - rejected.len()) as u32;
+        rejected.extend(self.judge(frame.time_s));
+        let born = if self.refill_due(frame.time_s) { self.refill(frame) } else { 0 };
         self.frames += 1;
         let observations = self
             .points
             .iter()
             .filter(|p| p.coasting == 0)
-            .map(|p| Observation { id: p.id, u_px: p.now_px[0], v_px: p.now_px[1], fb_error_px: p.fb_error_px })
+            .map(|p| Observation {
+                id: p.id,
+                u_px: p.now_px[0],
+                v_px: p.now_px[1],
+                fb_error_px: p.fb_error_px,
+                error_px: p.record.error_px(),
+                confirmed: p.trial.is_none(),
+            })
             .collect();
-        TrackSet { frame: frame.index, time_s: frame.time_s, observations, lost, born }
+        TrackSet { frame: frame.index, time_s: frame.time_s, observations, lost, born, rejected }
+    }
+
+    /// Drops the points that were not seen for too long or have left the picture; those on trial have not passed it.
+    fn give_up(&mut self, size: Size, rejected: &mut Vec<TrackId>) {
+        let patience = self.settings.coast_frames;
+        self.points.retain(|p| {
+            let keep = p.coasting <= patience.max(if p.unsure { regain::UNSURE_FRAMES } else { 0 })
+                && size.contains(f64::from(p.now_px[0]), f64::from(p.now_px[1]));
+            if !keep && p.trial.is_some() {
+                rejected.push(p.id);
+            }
+            keep
+        });
     }
 
     /// Lucas-Kanade forward and back; who misses its start by too much is moved with its neighbours.
@@ -142,17 +174,23 @@ impl Tracker {
         self.ride();
     }
 
-    fn refill_due(&self) -> bool {
-        let missing = self.wanted.saturating_sub(self.points.len());
+    /// Whether points are to be looked for: so many of those that there were are lost, or it is worth another try.
+    fn refill_due(&self, time_s: f64) -> bool {
+        let few = |of: usize| of.saturating_sub(self.points.len()) as f64 >= REFILL_SHARE * self.wanted as f64;
         let rested = self.frames >= self.last_detection + REFILL_FRAMES;
-        self.frames == 0 || (rested && missing as f64 >= REFILL_SHARE * self.wanted as f64)
+        let again = few(self.wanted) && time_s >= self.detected_s + TRY_AGAIN_S;
+        self.frames == 0 || (self.trials.is_none() && rested && (few(self.settled) || again))
     }
 
     /// Detects points where there are none; returns how many.
     fn refill(&mut self, frame: &Frame) -> u32 {
-        self.last_detection = self.frames;
+        (self.last_detection, self.detected_s) = (self.frames, frame.time_s);
         let taken: Vec<[f32; 2]> = self.points.iter().map(|p| p.now_px).collect();
-        let found = self.detector.detect(&frame.luma, &taken, self.wanted - self.points.len());
+        // Without comparisons nothing would be known of them at the end of a trial.
+        let on_trial = self.settings.anchor_every > 0;
+        let share = if on_trial { trial::CANDIDATES } else { 1 };
+        let missing = self.wanted.saturating_sub(self.points.len());
+        let found = self.detector.detect(&frame.luma, &taken, share * missing);
         if found.is_empty() {
             return 0;
         }
@@ -163,9 +201,8 @@ impl Tracker {
         let known_ids: Vec<TrackId> = (self.points.iter().filter(|p| p.coasting == 0).map(|p| p.id))
             .chain((0..found.len() as u32).map(|k| TrackId(self.next_id + k)))
             .collect();
-        let known_px: Vec<[f32; 2]> = (self.points.iter().filter(|p| p.coasting == 0).map(|p| p.now_px))
-            .chain(found.iter().copied())
-            .collect();
+        let known_px: Vec<[f32; 2]> =
+            (self.points.iter().filter(|p| p.coasting == 0).map(|p| p.now_px)).chain(found.iter().copied()).collect();
         for (at, near) in found.iter().zip(neighbours::nearest(&found, &known_px)) {
             self.points.push(Point {
                 id: TrackId(self.next_id),
@@ -177,11 +214,14 @@ impl Tracker {
                 coasting: 0,
                 unsure: false,
                 neighbours: near.into_iter().map(|j| (known_ids[j as usize], known_px[j as usize])).collect(),
-                likeness: 1.0,
+                record: Record::default(),
+                trial: on_trial.then(Trial::default),
             });
             self.next_id += 1;
         }
         self.next_keyframe += 1;
+        self.trials = on_trial.then(|| Trials::new(frame.time_s));
+        self.settled = self.settled.max(self.points.len().min(self.wanted));
         found.len() as u32
     }
 }

@@ -22,9 +22,8 @@ pub fn nearest(points: &[[f32; 2]], known: &[[f32; 2]]) -> Vec<Vec<u32>> {
         .map(|(i, p)| {
             order.clear();
             order.extend((0..known.len() as u32).filter(|&j| j as usize != before + i));
-            let by_distance = |a: &u32, b: &u32| {
-                distance_sq(p, &known[*a as usize]).total_cmp(&distance_sq(p, &known[*b as usize]))
-            };
+            let by_distance =
+                |a: &u32, b: &u32| distance_sq(p, &known[*a as usize]).total_cmp(&distance_sq(p, &known[*b as usize]));
             if order.len() > REMEMBERED {
                 order.select_nth_unstable_by(REMEMBERED - 1, by_distance);
                 order.truncate(REMEMBERED);

@@ -1,13 +1,21 @@
 //! One followed point and what is known of it.
 
+use super::anchor::distance;
 use super::neighbours::Fit;
 use super::register::Patch;
+use super::trial::Trial;
 use crate::model::TrackId;
 
-/// Share that one more comparison has in the running likeness.
+/// Share that one more comparison has at least in a [`Record`].
 const NEWEST: f32 = 0.1;
 /// Likeness below which a neighbour is hardly believed.
 const DOUBTFUL: f32 = 0.5;
+/// Expected error = 6.6 px exp(-1.9 likeness) sqrt(distance from the neighbours' place + 0.2 px): least squares on the
+/// logarithms of true errors of 852 points on two rendered clips of known motion. In five classes of expected error, from
+/// 0.8 to 7 px, the true medians are within a third of it.
+const ERROR_PX: f32 = 6.6;
+const PER_LIKENESS: f32 = -1.9;
+const APART_FLOOR_PX: f32 = 0.2;
 
 /// One followed point.
 pub struct Point {
@@ -25,14 +33,17 @@ pub struct Point {
     pub unsure: bool,
     /// Points nearest to it at birth, and where they were then.
     pub neighbours: Vec<(TrackId, [f32; 2])>,
-    /// Running mean of its likeness to its first patch, -1 to 1.
-    pub likeness: f32,
+    /// How it did lately.
+    pub record: Record,
+    /// While it is not decided whether it is kept.
+    pub trial: Option<Trial>,
 }
 
 impl Point {
     /// How far its motion is believed when it is asked about a neighbour's, above 0 to 1.
     pub fn trust(&self) -> f64 {
-        f64::from(((self.likeness - DOUBTFUL) / (1.0 - DOUBTFUL)).clamp(0.02, 1.0))
+        let likeness = if self.record.comparisons == 0 { 1.0 } else { self.record.likeness };
+        f64::from(((likeness - DOUBTFUL) / (1.0 - DOUBTFUL)).clamp(0.02, 1.0))
     }
 
     /// Where its neighbours say that it is, px.
@@ -41,7 +52,36 @@ impl Point {
     }
 
     /// Takes note of a comparison with its first patch.
-    pub fn compared(&mut self, likeness: f32) {
-        self.likeness += NEWEST * (likeness - self.likeness);
+    pub fn compared(&mut self, likeness: f32, fit: Option<&Fit>) {
+        let apart_px = fit.map_or(0.0, |fit| distance(self.now_px, self.predicted_px(fit)));
+        self.record.note(likeness, apart_px, NEWEST);
+        if let Some(trial) = &mut self.trial {
+            trial.record.note(likeness, apart_px, 0.0);
+        }
+    }
+}
+
+/// How a point compared with its first patch and with its neighbours.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Record {
+    comparisons: u32,
+    /// Mean correlation with its first patch, -1 to 1.
+    likeness: f32,
+    /// Mean logarithm of its distance from where the neighbours say that it is.
+    ln_apart: f32,
+}
+
+impl Record {
+    /// Adds a comparison; it counts as much as each of the others, but at least `newest`.
+    fn note(&mut self, likeness: f32, apart_px: f32, newest: f32) {
+        self.comparisons = self.comparisons.saturating_add(1);
+        let share = (1.0 / self.comparisons as f32).max(newest);
+        self.likeness += share * (likeness - self.likeness);
+        self.ln_apart += share * ((apart_px + APART_FLOOR_PX).ln() - self.ln_apart);
+    }
+
+    /// How far the point is expected to be from the one that it was (median), px; `None` before the first comparison.
+    pub fn error_px(&self) -> Option<f32> {
+        (self.comparisons > 0).then(|| ERROR_PX * (PER_LIKENESS * self.likeness + 0.5 * self.ln_apart).exp())
     }
 }

@@ -9,6 +9,8 @@ use crate::model::{Size, Snapshot};
 const OUTLINE: [u8; 3] = [0xff, 0xd8, 0x30];
 const DRAWN: [u8; 3] = [0xff, 0x40, 0xff];
 const CURSOR: [u8; 3] = [0xff, 0xff, 0xff];
+/// How far points on trial cover the picture, as a share of the others.
+const FAINT: f64 = 0.4;
 
 /// Size of the picture in which outline and points are given; the preview itself may be smaller.
 pub fn image_size(snapshot: &Snapshot) -> Option<Size> {
@@ -48,6 +50,9 @@ pub fn picture(snapshot: &Snapshot, drawing: Option<&Drawing>, placed: &Placed, 
     for (a, b) in edges(&outline(snapshot), true) {
         raster.line(placed.dot_from_pixel(a), placed.dot_from_pixel(b), fine / 2, OUTLINE);
     }
+    for [u, v] in &snapshot.candidates_px {
+        mark(&mut raster, placed, [*u as f64, *v as f64], fine, theme.branch_rgb(None), FAINT * cover);
+    }
     for ([u, v], branch) in &snapshot.points {
         mark(&mut raster, placed, [*u as f64, *v as f64], fine, theme.branch_rgb(*branch), cover);
     }
@@ -82,6 +87,7 @@ pub fn letters(snapshot: &Snapshot, drawing: Option<&Drawing>, placed: &Placed) 
             drawing.cursor_px().into_iter().for_each(|p| point(p, 'X'));
         }
         None => {
+            snapshot.candidates_px.iter().for_each(|p| point(p.map(f64::from), ','));
             for ([u, v], branch) in &snapshot.points {
                 let c = branch.map_or('o', |b| (b'0' + b % 8) as char);
                 point([*u as f64, *v as f64], c);

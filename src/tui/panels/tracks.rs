@@ -23,7 +23,8 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
     );
     let error = Line::from(vec![
         Span::styled(" error ", theme.faint()),
-        Span::styled(format!("{} px ", value(s.fb_error_px)), theme.strong()),
+        Span::styled(format!("{} px ", value(s.error_px.unwrap_or(f64::NAN))), theme.strong()),
+        Span::styled(format!("fb {} ", value(s.fb_error_px)), theme.faint()),
     ]);
     let used = (error.width() as u16).min(second.width);
     frame.render_widget(error, second);

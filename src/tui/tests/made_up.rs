@@ -73,6 +73,8 @@ pub fn snapshot(phase: Phase) -> Snapshot {
         s.tracks_alive = 312;
         s.lost_per_s = 0.4;
         s.fb_error_px = 0.12;
+        s.error_px = Some(0.94);
+        s.candidates_px = (0..12).map(|i| [230.0 + 17.0 * i as f32, 70.0 + (i * 53 % 230) as f32]).collect();
         s.fb_history_px = (0..120).map(|i| 0.15 + 0.1 * (i as f64 * 0.3).sin()).collect();
         let branch = |i: u32| reached(Phase::Live).then_some((i % 3) as u8);
         s.points = (0..60).map(|i| ([240.0 + 3.0 * i as f32, 60.0 + (i * 37 % 250) as f32], branch(i))).collect();
@@ -108,6 +110,8 @@ pub fn huge() -> Snapshot {
     (s.camera.damaged, s.camera.lost_by_sequence, s.camera.lost_by_time) = (u64::MAX, Some(u64::MAX), u64::MAX);
     (s.latency_p50_ms, s.latency_p99_ms) = (123_456.0, 1e99);
     (s.tracks_alive, s.lost_per_s, s.fb_error_px) = (u32::MAX, 1e7, f64::NAN);
+    s.error_px = Some(f64::INFINITY);
+    s.candidates_px = vec![[f32::NAN, f32::INFINITY], [-1e30, 1e30]];
     s.fb_history_px = vec![f64::NAN, 1e300, -1.0, f64::INFINITY, 3.0];
     s.progress = f64::NAN;
     s.points = vec![([f32::NAN, 1.0], Some(255)), ([1e30, -1e30], Some(7)), ([f32::INFINITY, 0.0], None)];
