@@ -100,6 +100,7 @@ impl CaptureTables {
     /// # Errors
     /// Whatever the file system says.
     pub fn finish(mut self, spool: &SpoolReader) -> Result<Done, Failure> {
+        self.held.close();
         self.early_rows(spool)?;
         while let Some(set) = self.held.next() {
             self.tracks.set(&set, |id| self.retrace.node_of(id))?;

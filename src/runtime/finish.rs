@@ -1,7 +1,7 @@
 //! Writes a capture: the five files of the contract, from the tracks on disk and the tree.
 
 use super::capture_tables::{CaptureTables, Done};
-use super::held_sets::HeldSets;
+use super::held_sets::{HeldSets, OnTrial};
 use super::meter::Histogram;
 use super::shared::{Failure, Shared};
 use crate::config::Config;
@@ -30,6 +30,7 @@ const PLAIN_BARK: [u8; 3] = [104, 84, 66];
 pub struct Quality {
     born: u64,
     rejected: u64,
+    on_trial: OnTrial,
     lost: u64,
     alive: u64,
     first: Option<(u64, f64)>,
@@ -42,9 +43,10 @@ impl Quality {
     /// Takes the tracks of a frame and the medians of their forward-backward and of their expected error, px.
     pub fn note(&mut self, tracks: &TrackSet, fb_error_px: f64, error_px: Option<f64>) {
         self.rejected += tracks.rejected.len() as u64;
+        self.on_trial.note(tracks);
         self.born += u64::from(tracks.born);
         self.lost += u64::from(tracks.lost);
-        self.alive = tracks.observations.len() as u64;
+        self.alive = tracks.counted().count() as u64;
         self.first.get_or_insert((tracks.frame, tracks.time_s));
         self.last_s = tracks.time_s;
         self.fb_error_px.add(fb_error_px);
@@ -53,9 +55,9 @@ impl Quality {
         }
     }
 
-    /// Points followed, less those that did not pass their trial.
+    /// Points followed that count: those that have passed their trial, or all while none has.
     pub fn tracks_total(&self) -> u64 {
-        self.born.saturating_sub(self.rejected)
+        self.born.saturating_sub(self.rejected + self.on_trial.void().count() as u64)
     }
 }
 
@@ -122,6 +124,7 @@ fn without_tree(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
         }
         job.shared.pulse.wrote();
     }
+    held.close();
     while let Some(set) = held.next() {
         tracks.set(&set, |_| None)?;
     }
