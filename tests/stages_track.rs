@@ -81,6 +81,19 @@ fn a_static_picture_stays_where_it_is() {
     }
 }
 
+/// A camera's first pictures may be black.
+#[test]
+fn points_are_found_as_soon_as_there_is_something_to_be_seen() {
+    let mut tracker = tracker();
+    for k in 0..10 {
+        assert!(tracker.step(&frame(k, |_, _| 2.0)).observations.is_empty());
+    }
+    let light = frame(10, texture);
+    let seen = (10..30).map(|k| tracker.step(&Frame { index: k, time_s: k as f64 / 30.0, ..light.clone() }));
+    let n = seen.last().map_or(0, |set| set.observations.len());
+    assert!(n >= 80, "{n} points");
+}
+
 /// Without wind nothing tells good points from bad ones; the program must go on all the same.
 #[test]
 fn points_that_never_move_pass_their_trial_by_time() {

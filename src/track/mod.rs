@@ -54,7 +54,7 @@ pub struct Tracker {
     trials: Option<Trials>,
     /// Expected error that points of later trials must not exceed, px; known after the first.
     bar_px: Option<f32>,
-    /// Number of points after the last trial.
+    /// Number of points after the last trial, the wanted number before.
     settled: usize,
     /// What the neighbours of each point say in this frame.
     fits: Vec<Option<Fit>>,
@@ -89,7 +89,7 @@ impl Tracker {
             gaps: regain::Gaps::default(),
             trials: None,
             bar_px: None,
-            settled: 0,
+            settled: detect.points as usize,
             detected_s: 0.0,
             fits: Vec::new(),
             buffers: Buffers::default(),
@@ -221,7 +221,6 @@ impl Tracker {
         }
         self.next_keyframe += 1;
         self.trials = on_trial.then(|| Trials::new(frame.time_s));
-        self.settled = self.settled.max(self.points.len().min(self.wanted));
         found.len() as u32
     }
 }
