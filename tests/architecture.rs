@@ -43,6 +43,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("opencv::", &["track", "outline"]),
     ("turbojpeg::", &["source"]),
     ("mcap::", &["recording"]),
+    ("crc32fast::", &["recording"]),
     ("clap::", &["cli"]),
     ("anyhow::", &["cli"]),
     ("sd_notify::", &["cli"]),

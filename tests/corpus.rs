@@ -81,15 +81,15 @@ fn written_now() -> Vec<u8> {
 #[test]
 fn no_recording_brings_the_reader_down() {
     let now = written_now();
+    let mut read = Vec::new();
     for seed in seeds("recording").into_iter().chain([now]) {
-        let mut read = Vec::new();
         each(&seed, |bytes| {
             let Ok(mut reader) = Reader::new(Path::new("seed.mcap"), Cursor::new(bytes)) else { return };
             read.push(std::iter::from_fn(|| reader.next_picture()).count());
             assert!(reader.warnings().iter().all(|w| !w.contains('\n')));
         });
-        assert!(read.iter().sum::<usize>() > 0, "nothing was ever read: this shows nothing");
     }
+    assert!(read.iter().sum::<usize>() > 1000, "hardly anything was ever read: this shows nothing");
 }
 
 #[test]

@@ -368,3 +368,47 @@ fn what_the_recorder_cannot_keep_up_with_is_counted() {
     let mut reader = Reader::open(&path).expect("opened");
     assert_eq!(std::iter::from_fn(|| reader.next_picture()).count() as u64, recorded.frames);
 }
+
+/// The largest file that is allowed stands for a disk without room: one line that says it, and a file that reads.
+#[test]
+fn a_disk_without_room_ends_the_recording_in_words_and_leaves_it_readable() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let path = dir.path().join("full.mcap");
+    let limited = "trap '' XFSZ; ulimit -f 3000; exec \"$0\" record \"$1\" \"$2\"";
+    let mut command = std::process::Command::new("sh");
+    command.args(["-c", limited, env!("CARGO_BIN_EXE_arborcam"), support::CLIP]).arg(&path);
+    let output = command.output().expect("sh");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("disk is full") && said.contains("readable"), "{said}");
+    let (read, _) = pictures(&std::fs::read(&path).expect("file"));
+    assert!(read.len() > 10 && read.len() < 330, "{} frames", read.len());
+    assert!(read.iter().zip(support::recording()).all(|(p, raw)| p.bytes == raw.bytes));
+}
+
+#[test]
+fn what_cannot_be_recorded_or_played_is_refused_before_anything_is_done() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let taken = dir.path().join("taken.mcap");
+    std::fs::write(&taken, b"mine").expect("write");
+    let taken = taken.to_str().expect("path");
+    let new = dir.path().join("new.mcap");
+    let new = new.to_str().expect("path");
+    let cases: [(&[&str], i32, &str); 7] = [
+        (&["record", support::CLIP, taken], 2, "exists already"),
+        (&["replay", support::CLIP, "--headless", "--record", taken], 2, "exists already"),
+        (&["record", support::CLIP, "film.mkv"], 2, ".mcap"),
+        (&["record", support::CLIP, new, "--max-size", "much"], 2, "2GB"),
+        (&["record", support::CLIP, "/no/such/place.mcap"], 1, "name a place"),
+        (&["record", "/dev/video987", new], 3, "not there"),
+        (&["play", support::CLIP, "--to", "/dev/video987"], 3, "modprobe v4l2loopback"),
+    ];
+    for (arguments, status, word) in cases {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_arborcam")).args(arguments).output().expect("run");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(status), "{arguments:?}: {said}");
+        assert!(said.contains(word), "{arguments:?}: {said}");
+    }
+    assert_eq!(std::fs::read(taken).expect("file"), b"mine");
+    assert!(!Path::new(new).exists());
+}

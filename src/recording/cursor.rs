@@ -23,6 +23,13 @@ impl<'a> Cursor<'a> {
         Some(u64::from_le_bytes(self.take(8)?.try_into().ok()?))
     }
 
+    /// Kind and content of a record.
+    pub fn record(&mut self) -> Option<(u8, &'a [u8])> {
+        let kind = *self.take(1)?.first()?;
+        let length = usize::try_from(self.u64()?).ok()?;
+        Some((kind, self.take(length)?))
+    }
+
     /// Bytes with their count in front.
     pub fn counted(&mut self) -> Option<&'a [u8]> {
         let count = self.u32()?;

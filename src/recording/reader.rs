@@ -82,7 +82,7 @@ impl<R: Read + Seek> Reader<R> {
             broken: None,
         };
         let mut rest = Cursor(&summary);
-        while let Some((kind, body)) = record(&mut rest) {
+        while let Some((kind, body)) = rest.record() {
             reader.note(kind, body);
         }
         let foreign: BTreeSet<&str> = reader
@@ -249,13 +249,6 @@ impl Channel {
     }
 }
 
-/// The next record of a summary.
-fn record<'a>(rest: &mut Cursor<'a>) -> Option<(u8, &'a [u8])> {
-    let kind = *rest.take(1)?.first()?;
-    let length = usize::try_from(rest.u64()?).ok()?;
-    Some((kind, rest.take(length)?))
-}
-
 /// The records at the end of a file that was ended properly.
 fn summary(file: &mut (impl Read + Seek)) -> io::Result<Option<Vec<u8>>> {
     let length = file.seek(SeekFrom::End(0))?;
@@ -264,7 +257,7 @@ fn summary(file: &mut (impl Read + Seek)) -> io::Result<Option<Vec<u8>>> {
     let mut footer = [0; FOOTER as usize];
     let read = read_up_to(file, &mut footer)?;
     let mut cursor = Cursor(&footer[..read]);
-    let Some((op::FOOTER, mut body)) = record(&mut cursor).map(|(kind, body)| (kind, Cursor(body))) else {
+    let Some((op::FOOTER, mut body)) = cursor.record().map(|(kind, body)| (kind, Cursor(body))) else {
         return Ok(None);
     };
     let start = body.u64().filter(|start| *start > 0 && *start < footer_at);

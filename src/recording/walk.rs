@@ -39,10 +39,15 @@ pub(super) struct Walk<R> {
 }
 
 struct Chunk {
-    reader: LinearReader,
     start: u64,
-    /// Bytes of it that have not been read from the file.
-    left: u64,
+    content: Content,
+}
+
+enum Content {
+    /// Not compressed: its records, and how far they have been given out. The crate's reader would trust their lengths.
+    Plain(Vec<u8>, usize),
+    /// The crate unpacks it; bytes of it that have not been read from the file.
+    Packed(Box<LinearReader>, u64),
 }
 
 impl<R: Read + Seek> Walk<R> {
@@ -82,18 +87,39 @@ impl<R: Read + Seek> Walk<R> {
 
     fn in_chunk(&mut self) -> io::Result<Option<u8>> {
         let Some(chunk) = &mut self.chunk else { return Ok(None) };
-        match chunk.reader.next_event() {
+        let (reader, left) = match &mut chunk.content {
+            Content::Packed(reader, left) => (reader, left),
+            Content::Plain(bytes, given) => {
+                let mut rest = Cursor(bytes.get(*given..).unwrap_or_default());
+                if rest.0.is_empty() {
+                    self.chunk = None;
+                    return Ok(None);
+                }
+                let record = rest.record();
+                let Some((kind, body)) = record else {
+                    let start = chunk.start;
+                    self.chunk = None;
+                    self.find_chunk(start)?;
+                    return Ok(None);
+                };
+                self.body.clear();
+                self.body.extend_from_slice(body);
+                *given += HEAD as usize + body.len();
+                return Ok(Some(kind));
+            }
+        };
+        match reader.next_event() {
             Some(Ok(LinearReadEvent::Record { opcode, data })) => {
                 self.body.clear();
                 self.body.extend_from_slice(data);
                 return Ok(Some(opcode));
             }
             Some(Ok(LinearReadEvent::ReadRequest(wanted))) => {
-                let count = chunk.left.min(wanted as u64);
-                let read = read_up_to(&mut self.file, chunk.reader.insert(count as usize))?;
+                let count = (*left).min(wanted as u64);
+                let read = read_up_to(&mut self.file, reader.insert(count as usize))?;
                 // Nothing left means the end to the reader, which then says whether the chunk was whole.
-                chunk.reader.notify_read(read);
-                chunk.left = if read as u64 == count { chunk.left - count } else { 0 };
+                reader.notify_read(read);
+                *left = if read as u64 == count { *left - count } else { 0 };
             }
             Some(Err(_)) => {
                 let start = chunk.start;
@@ -121,19 +147,7 @@ impl<R: Read + Seek> Walk<R> {
         // A chunk has a checksum; of all else, a length that lies could lead past whole chunks.
         let fits = fits && (kind == op::CHUNK || self.leads_to_a_record(length)?);
         match kind {
-            op::CHUNK if fits && length >= CHUNK_HEAD => {
-                let mut reader = LinearReader::new_with_options(
-                    LinearReaderOptions::default()
-                        .with_skip_start_magic(true)
-                        .with_skip_end_magic(true)
-                        .with_prevalidate_chunk_crcs(true)
-                        .with_record_length_limit(MAX_RECORD as usize),
-                );
-                reader.insert(head.len()).copy_from_slice(&head);
-                reader.notify_read(head.len());
-                self.chunk = Some(Chunk { reader, start, left: length });
-                self.at = start + HEAD + length;
-            }
+            op::CHUNK if fits && length >= CHUNK_HEAD => self.open_chunk(start, &head, length)?,
             op::DATA_END if length == 4 => self.ended = true,
             op::FOOTER if length == 20 => self.ended = true,
             op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA if fits && length <= MAX_RECORD => {
@@ -149,6 +163,40 @@ impl<R: Read + Seek> Walk<R> {
             _ => self.find_chunk(start)?,
         }
         Ok(None)
+    }
+
+    /// Begins the chunk of this length whose head has just been read.
+    fn open_chunk(&mut self, start: u64, head: &[u8], length: u64) -> io::Result<()> {
+        self.at = start + HEAD + length;
+        let mut fields = [0; CHUNK_HEAD as usize];
+        self.file.read_exact(&mut fields)?;
+        let mut cursor = Cursor(&fields[2 * 8..]);
+        let (size, checksum, name) = (cursor.u64(), cursor.u32(), cursor.u32());
+        if name == Some(0) {
+            let (packed, records) = (cursor.u64(), length - CHUNK_HEAD);
+            if packed != Some(records) || size != packed || records > MAX_RECORD {
+                return self.find_chunk(start);
+            }
+            let mut bytes = vec![0; records as usize];
+            self.file.read_exact(&mut bytes)?;
+            if checksum.is_some_and(|saved| saved != 0 && saved != crc32fast::hash(&bytes)) {
+                return self.find_chunk(start);
+            }
+            self.chunk = Some(Chunk { start, content: Content::Plain(bytes, 0) });
+            return Ok(());
+        }
+        let options = LinearReaderOptions::default()
+            .with_skip_start_magic(true)
+            .with_skip_end_magic(true)
+            .with_prevalidate_chunk_crcs(true)
+            .with_record_length_limit(MAX_RECORD as usize);
+        let mut reader = LinearReader::new_with_options(options);
+        for part in [head, &fields] {
+            reader.insert(part.len()).copy_from_slice(part);
+            reader.notify_read(part.len());
+        }
+        self.chunk = Some(Chunk { start, content: Content::Packed(Box::new(reader), length - CHUNK_HEAD) });
+        Ok(())
     }
 
     /// Whether there is the head of a record, or the end, `length` bytes from here.

@@ -32,24 +32,16 @@ pub fn play(
         None => output.insert(open(&waiting)?),
     };
     let (start, start_s) = (Instant::now(), waiting.sensor_time_s);
-    output.put(&waiting)?;
     loop {
-        // Read before the one in front of it is due: reading takes its own time.
-        let next = source.next_frame()?;
         let due = start + Duration::from_secs_f64((waiting.sensor_time_s - start_s).clamp(0.0, 1e6));
         if !wait_until(due, stop) {
             return Ok(Played { stopped: true, ..played });
         }
+        output.put(&waiting)?;
         played.frames += 1;
-        match next {
-            Some(raw) => {
-                output.put(&raw)?;
-                waiting = raw;
-            }
-            None => {
-                output.finish()?;
-                return Ok(played);
-            }
+        match source.next_frame()? {
+            Some(raw) => waiting = raw,
+            None => return Ok(played),
         }
     }
 }

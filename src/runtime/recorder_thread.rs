@@ -15,8 +15,8 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 /// What may wait for the disk: as many entries, and as many bytes of pictures (some seconds of a fast camera).
 const QUEUE: usize = 512;
 const QUEUE_BYTES: usize = 96 << 20;
-/// What has been written for longer than this is in the hands of the system: half of what may be lost at most.
-const FLUSH_EVERY: Duration = Duration::from_millis(500);
+/// What has been written for longer than this is handed to the system: a quarter of the second that may be lost, the rest is for a machine that is busy.
+const FLUSH_EVERY: Duration = Duration::from_millis(250);
 
 /// A source that can wait looks again after so long.
 const NAP: Duration = Duration::from_millis(2);

@@ -207,7 +207,7 @@ impl Feed<'_> {
         let timed = self.stamp(first, source);
         let away_s = timed.time_s - before_s;
         self.shared.camera(|c| c.away_s += away_s);
-        self.shared.warn(format!("the camera was away for {away_s:.1} s from {before_s:.1} s on ({})", lost.brief()));
+        self.shared.note(format!("the camera was away for {away_s:.1} s from {before_s:.1} s on ({})", lost.brief()));
         self.hand_on(timed);
     }
 
