@@ -22,7 +22,7 @@ pub const GROUP: Group = Group {
 
 fn provide(folder: &Path) -> Result<(), String> {
     clip(folder)?;
-    let root = std::path::absolute(folder.join("root")).map_err(|e| e.to_string())?;
+    let root = std::path::absolute(folder.join("installed")).map_err(|e| e.to_string())?;
     let binary = format!("BINARY={}", env!("CARGO_BIN_EXE_arborcam"));
     let make = Command::new("make")
         .args(["-s", "install", "PREFIX=/usr", &binary])
