@@ -20,7 +20,7 @@ pub const GROUP: Group = Group {
 };
 
 /// Rate at which the clip is played: what an emulated processor follows without dropping a frame, Hz.
-const RATE_HZ: f64 = 10.0;
+const RATE_HZ: f64 = 8.0;
 
 /// Decoded pictures, one after the other.
 fn lumas(frames: &[RawFrame]) -> Result<Vec<Vec<u8>>, String> {

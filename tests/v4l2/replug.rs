@@ -91,6 +91,11 @@ fn hang_once(r: &Results) -> Result<(), String> {
 
 fn identity(r: &Results) -> Result<(), String> {
     let text = r.text("devices.json")?;
-    claim(text.contains("\"one\"") || text.contains(":one\"") || text.contains("one"), || text.clone())?;
-    claim(text.contains("1209"), || text.clone())
+    let devices: serde_json::Value = serde_json::from_str(&text).map_err(|e| format!("{e}: {text}"))?;
+    let films = devices.as_array().and_then(|all| all.iter().find(|d| d["films"] == true)).cloned();
+    let films = films.ok_or("no camera is listed")?;
+    claim(films["serial"] == "one" && films["product"] == "1209:a4b0", || films.to_string())?;
+    claim(films["identity"].as_str().is_some_and(|i| i.contains("one")), || films.to_string())?;
+    let mode = &films["modes"][0];
+    claim(mode["format"] == "MJPG" && mode["width"] == 320 && mode["rates_hz"][0] == 15.0, || films.to_string())
 }

@@ -10,10 +10,10 @@ for format in mjpeg yuyv; do
     "$bin" play "$work/clip-$format.mcap" --to /dev/video0 --loop 2>"/vm/play-$format" &
     player=$!
     until_ok 10 fed
-    printf '[camera]\nformat = "%s"\nwidth = 320\nheight = 180\nrate_hz = 10\n[detect]\npoints = 120\n' $format >"$work/camera.toml"
+    printf '[camera]\nformat = "%s"\nwidth = 320\nheight = 180\nrate_hz = 8\n[detect]\npoints = 120\n' $format >"$work/camera.toml"
     begin "live-$format" capture /dev/video0 --headless --config "$work/camera.toml" --outline "$work/outline.json" \
         --record "$work/live-$format.mcap" --out "$work/live-$format"
-    sleep 16
+    sleep 20
     stop
     kill -INT $player
     wait $player || true
