@@ -87,7 +87,10 @@ pub fn write(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
 /// # Errors
 /// As for [`write`].
 pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, Failure> {
-    tables.catch_up(&job.tracks, job.config.export.animation_s, || job.shared.pulse.wrote())?;
+    tables.catch_up(&job.tracks, || {
+        job.shared.pulse.wrote();
+        true
+    })?;
     let Done { folder, tree, poses, misses } = tables.finish(&job.tracks)?;
     let metres_per_px = job.config.export.metres_per_px;
     // Intervals that can be defended are a matter of their own; until then no branch claims a frequency.
