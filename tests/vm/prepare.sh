@@ -184,6 +184,7 @@ make_initramfs
 cp "$work/kernel/boot/vmlinuz-$release" "$work/vmlinuz"
 record_versions >"$work/versions.txt"
 rm -rf "$work"/{debs,kernel,v4l2loopback,initramfs,tools}
+rm -f "$work"/*.log
 echo "$want" >"$work/ready"
 rm -rf "$vm"
 mv "$work" "$vm"
