@@ -193,6 +193,13 @@ pub fn record(path: &Path, frames: &[RawFrame]) -> Result<(), String> {
     series.close().map_err(|e| e.to_string())
 }
 
+/// By how much a time that holds for a real machine may be exceeded: an emulated processor is many times slower, and
+/// shares the host with whatever else runs there.
+pub fn slack() -> f64 {
+    let emulated = fs::read_to_string("target/vm/accelerator").is_ok_and(|text| text.contains("tcg"));
+    if emulated { 2.0 } else { 1.0 }
+}
+
 /// Fails with what was found, unless `holds`.
 pub fn claim(holds: bool, otherwise: impl FnOnce() -> String) -> Result<(), String> {
     if holds { Ok(()) } else { Err(otherwise()) }
