@@ -180,9 +180,11 @@ fn describe(
     let count = |c: &std::sync::atomic::AtomicU64| c.load(Ordering::Relaxed);
     let (seen, duration_s) = (count(&counts.seen), job.shared.last_time_s());
     let camera = job.shared.camera_state();
+    // Each absence is one of the steps from frame to frame.
+    let (steps, filmed_s) = (seen.saturating_sub(1 + camera.reconnects), duration_s - camera.away_s);
     let timing = Timing {
         nominal_rate_hz: job.info.nominal_rate_hz,
-        measured_rate_hz: (seen > 1 && duration_s > 0.0).then(|| (seen - 1) as f64 / duration_s),
+        measured_rate_hz: (steps > 0 && filmed_s > 0.0).then(|| steps as f64 / filmed_s),
         frames_seen: seen,
         frames_dropped_camera: count(&counts.lost_in_camera),
         frames_dropped_by_sequence: camera.lost_by_sequence,
@@ -191,7 +193,7 @@ fn describe(
         frames_stale: camera.stale,
         clock: camera.clock.into(),
         reconnects: camera.reconnects,
-        away_s: camera.away_s,
+        away_s: camera.away_s + camera.away_at_end_s,
         frames_dropped_tracker: count(&counts.dropped_before_tracker),
         frames_undecodable: count(&counts.undecodable),
         frames_before_outline: count(&counts.before_outline),

@@ -110,10 +110,7 @@ impl Drop for StopAll<'_> {
 /// # Errors
 /// A thread cannot be started, there is no decoder, or the recording cannot be made.
 pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> {
-    let source = match source.waits_without_limit() {
-        Some(limit) => Box::new(Watched::start(source, limit).map_err(Failure::Thread)?) as Box<dyn Source>,
-        None => source,
-    };
+    let source = Watched::if_needed(source).map_err(Failure::Thread)?;
     let shared = Arc::new(Shared::default());
     let info = source.describe();
     let live = info.live;

@@ -3,6 +3,7 @@
 use super::recorder_thread::{self, RecordTo, Recorded};
 use super::shared::{Failure, Shared};
 use super::source_thread::{self, Pace};
+use super::watched::Watched;
 use super::{FRAME_QUEUE, StopAll};
 use crate::config;
 use crate::source::Source;
@@ -31,6 +32,7 @@ pub struct RunningRecord {
 /// # Errors
 /// The file cannot be made, or a thread cannot be started.
 pub fn record(source: Box<dyn Source>, job: RecordJob) -> Result<RunningRecord, Failure> {
+    let source = Watched::if_needed(source).map_err(Failure::Thread)?;
     let shared = Arc::new(Shared::default());
     let (recorder, recording) = recorder_thread::start(job.to, source.describe().live, &shared)?;
     let (frames_in, frames_out) = bounded::<source_thread::Timed>(FRAME_QUEUE);

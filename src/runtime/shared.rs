@@ -103,6 +103,11 @@ impl Shared {
         std::mem::take(&mut reloaded.is_new).then(|| reloaded.config.clone()).flatten()
     }
 
+    /// Whether [`newly_reloaded`](Self::newly_reloaded) has something to give.
+    pub fn has_new_settings(&self) -> bool {
+        self.reloaded.lock().unwrap_or_else(PoisonError::into_inner).is_new
+    }
+
     pub fn fail(&self, failure: Failure) {
         self.failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(failure);
     }
