@@ -5,7 +5,7 @@ mod support;
 use arborcam::config::Config;
 use arborcam::model::{Control, FormatNote, Observation, RawFrame, Snapshot, TrackId, TrackSet};
 use arborcam::recording::{Head, Limits};
-use arborcam::runtime::{self, Failure, Job, Pace, RecordJob, RecordTo, Running, Summary};
+use arborcam::runtime::{self, Failure, Job, Pace, QUEUE_BYTES, RecordJob, RecordTo, Running, Summary};
 use arborcam::source::{Decoder, Health, Source, SourceError, SourceInfo};
 use arborcam::track::Tracker;
 use std::collections::{BTreeMap, BTreeSet};
@@ -453,7 +453,12 @@ fn a_camera_whose_thread_has_ended_is_not_waited_for() {
 #[test]
 fn recording_alone_gives_up_a_camera_that_hangs() {
     let dir = tempfile::tempdir().expect("tempdir");
-    let to = RecordTo { path: dir.path().join("a.mcap"), limits: Limits::default(), head: Head::default() };
+    let to = RecordTo {
+        path: dir.path().join("a.mcap"),
+        limits: Limits::default(),
+        head: Head::default(),
+        queue_bytes: QUEUE_BYTES,
+    };
     let (camera, _) = Camera::new(&[], 300);
     let job = RecordJob { to, pace: Pace::Live, camera: Config::default().camera };
     let running = runtime::record(Box::new(Careless { camera, hangs: true }), job).expect("start");
