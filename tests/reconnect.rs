@@ -185,11 +185,14 @@ fn look(running: &Running, log: &Mutex<Log>) -> Option<Arc<Snapshot>> {
 
 /// Waits for the end of a run: how it ended, and all that was told on the way.
 fn ended(running: Running, log: &Mutex<Log>) -> (Summary, Option<Failure>, Vec<String>) {
-    let (since, mut news) = (Instant::now(), Vec::new());
+    let (mut since, mut followed_s, mut news) = (Instant::now(), 0.0, Vec::new());
     while !running.finished() {
         assert!(since.elapsed() < HANGS, "the run hangs; told so far: {news:?}");
         news.extend(running.news());
-        look(&running, log);
+        // Slow is not hung.
+        if let Some(shown) = look(&running, log).filter(|s| s.time_s > followed_s) {
+            (since, followed_s) = (Instant::now(), shown.time_s);
+        }
         std::thread::sleep(Duration::from_millis(2));
     }
     news.extend(running.news());
