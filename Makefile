@@ -1,6 +1,6 @@
 # make demo: from a fresh machine to a moving tree in out/demo. make test: every test. make bench: the figures.
 # make install, make uninstall: program and service, below DESTDIR (for packages) and PREFIX.
-.PHONY: demo build test bench lint setup install uninstall
+.PHONY: demo build test test-v4l2 bench lint setup install uninstall
 
 demo: setup build
 	@scripts/demo.sh
@@ -11,8 +11,14 @@ setup:
 build:
 	cargo build --release --locked
 
+# The V4L2 tests take a virtual machine (tests/vm); what could not be run is said at the end.
 test:
+	@rm -f target/vm-runs/absent
 	cargo test --release --locked
+	@! test -s target/vm-runs/absent || cat target/vm-runs/absent >&2
+
+test-v4l2:
+	ARBORCAM_REQUIRE_VM=1 cargo test --release --locked --test v4l2
 
 bench:
 	cargo bench --locked
@@ -27,7 +33,7 @@ SYSTEM ?= /usr/lib
 BINARY ?= target/release/arborcam
 put = install -D -m
 with_prefix = sed 's|@PREFIX@|$(PREFIX)|g'
-DOCS = README.md docs/using.md docs/camera.md docs/files.md docs/settings.md docs/service.md
+DOCS = README.md docs/using.md docs/camera.md docs/recordings.md docs/files.md docs/settings.md docs/service.md
 INSTALLED = $(PREFIX)/bin/arborcam $(PREFIX)/lib/arborcam/arborcam-service \
 	$(addprefix $(PREFIX)/share/arborcam/, arborcam.toml sbc.toml) \
 	$(addprefix $(PREFIX)/share/doc/arborcam/, $(notdir $(DOCS))) \

@@ -8,8 +8,10 @@ use std::path::{Path, PathBuf};
 const MAY_USE: &[(&str, &[&str])] = &[
     ("model", &[]),
     ("config", &[]),
+    // The crates that read cameras panic; the hook that gives the terminal back must know what is caught.
+    ("caught", &[]),
     // A recording is a source, read where its format is known.
-    ("source", &["model", "config", "recording"]),
+    ("source", &["model", "config", "recording", "caught"]),
     ("outline", &["model", "config"]),
     ("track", &["model", "config"]),
     // The table of positions that the hierarchy is cut from is the tracker's.
@@ -25,7 +27,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     // `capture.json` holds the whole configuration; the model's file holds the mesh.
     ("export", &["model", "config", "shape::Mesh"]),
     // The screen draws outlines, and refuses the crossing ones as a file would be.
-    ("tui", &["model", "outline::crossing"]),
+    ("tui", &["model", "outline::crossing", "caught"]),
     ("runtime", &["model", "config", "source", "outline", "shape", "dynamics", "pipeline", "recording", "export"]),
     // It tries what a capture would use: a camera, the decoder, the front end; the rest of the machine it reads itself.
     ("doctor", &["model", "config", "source", "outline::whole", "pipeline::FrontEnd"]),

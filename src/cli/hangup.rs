@@ -64,6 +64,11 @@ impl<'a> Reload<'a> {
         Ok(Self { common, set, wanted, current: current.clone() })
     }
 
+    /// What holds for the camera now.
+    pub fn camera(&self) -> &crate::config::Camera {
+        &self.current.camera
+    }
+
     /// Whether somebody asks.
     pub fn is_wanted(&self) -> bool {
         self.wanted.load(Ordering::SeqCst)

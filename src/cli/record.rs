@@ -51,7 +51,8 @@ pub fn run(args: &RecordArgs) -> Result<(), Ended> {
         say(&format!("arborcam: asked for {}, the camera gives {}", info.format.asked, info.format.given));
     }
     let pace = if info.live { Pace::Live } else { Pace::Recorded };
-    let job = RecordJob { to: recording::target(&args.file, args.limits.limits(), &info), pace, camera: config.camera };
+    let job =
+        RecordJob { to: recording::target(&args.file, args.limits.limits(), &*source), pace, camera: config.camera };
     let running = runtime::record(source, job)?;
     while !running.finished() {
         let (_, _, time_s, _) = running.counts();

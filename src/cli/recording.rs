@@ -2,8 +2,8 @@
 
 use super::Ended;
 use crate::recording::{Head, Limits, RecordingError};
-use crate::runtime::{RecordTo, Recorded};
-use crate::source::SourceInfo;
+use crate::runtime::{QUEUE_BYTES, RecordTo, Recorded};
+use crate::source::Source;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -44,21 +44,22 @@ impl RecordOption {
         }
     }
 
-    pub fn target(&self, info: &SourceInfo) -> Option<RecordTo> {
-        self.record.as_ref().map(|path| target(path, self.limits.limits(), info))
+    pub fn target(&self, source: &dyn Source) -> Option<RecordTo> {
+        self.record.as_ref().map(|path| target(path, self.limits.limits(), source))
     }
 }
 
 /// The head of the recording of this source.
-pub fn target(path: &Path, limits: Limits, info: &SourceInfo) -> RecordTo {
+pub fn target(path: &Path, limits: Limits, source: &dyn Source) -> RecordTo {
+    let info = source.describe();
     let head = Head {
-        source: info.name.clone(),
-        format: info.format.clone(),
+        source: info.name,
+        format: info.format,
         size: Some(info.size),
         nominal_rate_hz: info.nominal_rate_hz,
-        clock: if info.live { "sensor" } else { "file" }.into(),
+        clock: source.health().clock.name().into(),
     };
-    RecordTo { path: path.to_owned(), limits, head }
+    RecordTo { path: path.to_owned(), limits, head, queue_bytes: QUEUE_BYTES }
 }
 
 /// Nothing is ever overwritten, and another ending would not be known again.

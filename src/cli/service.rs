@@ -15,6 +15,7 @@ const PUT_OFF: Duration = Duration::from_secs(30);
 
 /// The line to the service manager.
 pub struct Service {
+    watchdog: Option<Duration>,
     every: Duration,
     next: Instant,
     vigil: Vigil,
@@ -29,15 +30,9 @@ impl Service {
     pub fn from_env(timeout_s: f64) -> Option<Self> {
         std::env::var_os("NOTIFY_SOCKET")?;
         let watchdog = sd_notify::watchdog_enabled();
-        if let Some(limit) = watchdog.filter(|limit| limit.as_secs_f64() <= timeout_s) {
-            say(&format!(
-                "arborcam: warning: the watchdog's limit of {} s is not above camera.timeout_s = {timeout_s}; a silent \
-                 camera will look like a hung program: raise WatchdogSec, or lower camera.timeout_s",
-                limit.as_secs_f64()
-            ));
-        }
         let every = watchdog.map_or(LOOK_EVERY, |limit| LOOK_EVERY.min(limit / 4));
-        Some(Self {
+        let service = Self {
+            watchdog,
             every,
             next: Instant::now(),
             vigil: Vigil::default(),
@@ -45,7 +40,20 @@ impl Service {
             stopping: false,
             stalled: false,
             status: "opening the camera".to_owned(),
-        })
+        };
+        service.warn_of_limit(timeout_s);
+        Some(service)
+    }
+
+    /// Says so if the manager takes a camera that is silent for as long as it may be for a program that hangs.
+    pub fn warn_of_limit(&self, timeout_s: f64) {
+        if let Some(limit) = self.watchdog.filter(|limit| limit.as_secs_f64() <= timeout_s) {
+            say(&format!(
+                "arborcam: warning: the watchdog's limit of {} s is not above camera.timeout_s = {timeout_s}; a silent \
+                 camera will look like a hung program: raise WatchdogSec, or lower camera.timeout_s",
+                limit.as_secs_f64()
+            ));
+        }
     }
 
     /// To be called again and again; looks after the capture when it is time to.

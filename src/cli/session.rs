@@ -59,7 +59,7 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
         pace: plan.pace.filter(|_| !info.live).unwrap_or(own_pace),
         stream: common.stream.map(|_| Box::new(std::io::stdout()) as _),
         out: common.out.clone(),
-        record: plan.record.target(&info),
+        record: plan.record.target(&*source),
         preview_every: if headless { PREVIEW_HEADLESS } else { PREVIEW_SCREEN },
     };
     let hangup = Hangup::of_this_process();
@@ -130,6 +130,9 @@ impl Warden<'_> {
             match &self.service {
                 Some(service) => service.reloading(|| self.reload.fulfil(self.running)),
                 None => self.reload.fulfil(self.running),
+            }
+            if let Some(service) = &self.service {
+                service.warn_of_limit(self.reload.camera().timeout_s);
             }
         }
         if let Some(service) = &mut self.service {

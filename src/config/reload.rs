@@ -33,7 +33,7 @@ pub const EFFECTS: &[(&str, Effect)] = &[
     ("skeleton", TREE),
     ("shape", TREE),
     ("motion", POSES),
-    ("export.animation_s", Now),
+    ("export.animation_s", NextStart("older poses have been let go already")),
     ("export.metres_per_px", NextStart("one capture has one scale")),
 ];
 

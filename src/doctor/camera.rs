@@ -50,11 +50,8 @@ pub enum Film {
 }
 
 pub fn seen(device: Option<&Path>) -> Seen {
-    let films: Vec<(PathBuf, String)> = source::list()
-        .into_iter()
-        .filter(|d| !d.description.contains("does not film"))
-        .map(|d| (d.path, d.name))
-        .collect();
+    let films: Vec<(PathBuf, String)> =
+        source::list().into_iter().filter(|d| d.films).map(|d| (d.path, d.name)).collect();
     let chosen = device.map(Path::to_path_buf).or_else(|| films.first().map(|(path, _)| path.clone()));
     Seen { films, chosen }
 }
@@ -71,16 +68,13 @@ pub fn node(device: &Path) -> Node {
 fn group(device: &Path) -> Option<String> {
     use std::os::unix::fs::MetadataExt;
     let gid = std::fs::metadata(device).ok().filter(|m| m.mode() & 0o060 == 0o060 && m.gid() != 0)?.gid();
-    let groups = std::fs::read_to_string("/etc/group").ok()?;
-    groups.lines().find_map(|line| {
-        let mut fields = line.split(':');
-        let name = fields.next()?;
-        (fields.nth(1)?.parse() == Ok(gid)).then(|| name.to_owned())
-    })
+    source::group_name(gid)
 }
 
 pub fn film(device: &Path, settings: &config::Camera) -> Film {
-    let settings = config::Camera { timeout_s: settings.timeout_s.min(SILENCE_S), ..settings.clone() };
+    // Never through nokhwa, which may wait for ever; what is looked at here is the same either way.
+    let (timeout_s, backend) = (settings.timeout_s.min(SILENCE_S), config::Backend::V4l2);
+    let settings = config::Camera { timeout_s, backend, ..settings.clone() };
     match sample(device, &settings) {
         Ok(film) => film,
         Err(e @ SourceError::Busy { .. }) => Film::Busy(e.to_string()),

@@ -60,7 +60,7 @@ pub struct Source {
 /// Frames and time, by the sensor's own clock.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Timing {
-    /// What the source says, and what its timestamps say, Hz.
+    /// What the source says, and what its timestamps say of the time in which it filmed, Hz.
     pub nominal_rate_hz: Option<f64>,
     pub measured_rate_hz: Option<f64>,
     pub frames_seen: u64,
@@ -120,11 +120,11 @@ pub struct Gap {
     /// The last frame before the hole, and its time, s.
     pub after_frame: u64,
     pub time_s: f64,
-    /// Number of frames missing; where the camera was away, as many as it would have delivered.
+    /// Number of frames missing; where the camera was away, as many as it would have delivered, and 0 where it did not come back.
     pub missing: u64,
     #[serde(default)]
     pub cause: GapCause,
-    /// From the last frame before the hole to the first after it, s.
+    /// From the last frame before the hole to the first after it, or to the end of the capture, s.
     #[serde(default)]
     pub length_s: f64,
 }

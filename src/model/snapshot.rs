@@ -48,6 +48,8 @@ pub struct CameraState {
     /// How often it has come back, and for how long it was away, s.
     pub reconnects: u64,
     pub away_s: f64,
+    /// For how long it was away when the capture ended while it was waited for, s.
+    pub away_at_end_s: f64,
     /// Frames lost before us by the driver's numbers (`None` where it has none) and by the times.
     pub lost_by_sequence: Option<u64>,
     pub lost_by_time: u64,

@@ -61,6 +61,9 @@ pub struct Series {
     /// Number of the file, and the time of its first frame.
     part: u32,
     part_start_ns: Option<i64>,
+    files: u32,
+    /// Frames in the chunk that is open, which a failure takes with it.
+    open_frames: u64,
     closed_bytes: u64,
     frames: u64,
     recent: VecDeque<(u64, i64)>,
@@ -84,6 +87,8 @@ impl Series {
             clock: None,
             part: 0,
             part_start_ns: None,
+            files: 1,
+            open_frames: 0,
             closed_bytes: 0,
             frames: 0,
             recent: VecDeque::new(),
@@ -100,7 +105,12 @@ impl Series {
 
     /// Files begun.
     pub fn files(&self) -> u32 {
-        self.part + 1
+        self.files
+    }
+
+    /// Frames that were written since the last chunk was closed: where writing fails, they are lost.
+    pub fn open_frames(&self) -> u64 {
+        self.open_frames
     }
 
     /// Bytes of all files so far.
@@ -150,6 +160,8 @@ impl Series {
         if self.frames == 0 {
             // Whatever happens now, there is a picture.
             self.writer.flush()?;
+        } else {
+            self.open_frames += 1;
         }
         self.frames += 1;
         if self.recent.len() == REMEMBERED {
@@ -200,9 +212,8 @@ impl Series {
     }
 
     fn next_file(&mut self) -> Result<(), RecordingError> {
-        self.writer.close()?;
-        self.closed_bytes += self.writer.bytes();
-        self.writer = loop {
+        self.close()?;
+        let next = loop {
             self.part += 1;
             match Writer::create(&numbered(&self.base, self.part)) {
                 // Somebody else's file is left alone.
@@ -210,6 +221,9 @@ impl Series {
                 other => break other?,
             }
         };
+        self.closed_bytes += self.writer.bytes();
+        self.writer = next;
+        self.files += 1;
         self.part_start_ns = None;
         Ok(())
     }
@@ -271,7 +285,9 @@ impl Series {
     /// # Errors
     /// As for [`Series::frame`].
     pub fn flush(&mut self) -> Result<(), RecordingError> {
-        self.writer.flush()
+        self.writer.flush()?;
+        self.open_frames = 0;
+        Ok(())
     }
 
     /// Ends the last file.
@@ -279,7 +295,9 @@ impl Series {
     /// # Errors
     /// As for [`Series::frame`].
     pub fn close(&mut self) -> Result<(), RecordingError> {
-        self.writer.close()
+        self.writer.close()?;
+        self.open_frames = 0;
+        Ok(())
     }
 }
 

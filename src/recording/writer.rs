@@ -45,7 +45,12 @@ pub(super) struct Writer {
 impl Writer {
     /// Makes the file; there must be none of that name.
     pub fn create(path: &Path) -> Result<Self, RecordingError> {
-        let (disk, mut room) = disk::create(path).map_err(|e| RecordingError::of_place(path, e))?;
+        let (disk, room) = disk::create(path).map_err(|e| RecordingError::of_place(path, e))?;
+        // An empty file is no recording, and would be in the way of the next try.
+        Self::begin(path, disk, room).inspect_err(|_| drop(std::fs::remove_file(path)))
+    }
+
+    fn begin(path: &Path, disk: Disk, mut room: Room) -> Result<Self, RecordingError> {
         room.reserve(END_BYTES).map_err(|e| RecordingError::of_place(path, e))?;
         let options = mcap::WriteOptions::new()
             .compression(None)

@@ -16,6 +16,7 @@ use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
 /// Both tables as far as they are written. What is in them does not depend on when and in how many pieces that is done.
@@ -30,8 +31,9 @@ pub struct CaptureTables {
     held: HeldSets,
     /// Whether the tracks from before the tree was built have their rows.
     early: bool,
-    /// Poses of the last so many seconds, for the animation.
+    /// Poses of the last [`animation_s`](Self::animation_s), for the animation.
     poses: VecDeque<Pose>,
+    animation_s: f64,
     misses: Histogram,
 }
 
@@ -55,30 +57,20 @@ impl CaptureTables {
         let tracks = TracksCsv::new(folder.file("tracks.csv")?)?;
         let (retrace, tree) = (Retrace::new(tree, config), tree.clone());
         let (poses, misses) = (VecDeque::new(), Histogram::default());
-        Ok(Self {
-            folder,
-            tree,
-            retrace,
-            motion,
-            tracks,
-            sets: None,
-            held: HeldSets::default(),
-            early: false,
-            poses,
-            misses,
-        })
+        let (animation_s, held) = (config.export.animation_s, HeldSets::default());
+        Ok(Self { folder, tree, retrace, motion, tracks, sets: None, held, early: false, poses, animation_s, misses })
     }
 
-    /// Writes all rows up to where `spool` ends; each set calls `wrote`. Poses older than `animation_s` are let go.
+    /// Writes all rows up to where `spool` ends; each set calls `wrote`, which may answer `false` to have it given up.
     ///
     /// # Errors
     /// Whatever the file system says, a full disk among it.
-    pub fn catch_up(&mut self, spool: &SpoolReader, animation_s: f64, wrote: impl Fn()) -> Result<(), Failure> {
+    pub fn catch_up(&mut self, spool: &SpoolReader, wrote: impl Fn() -> bool) -> Result<(), Failure> {
         let mut sets = self.sets.take().unwrap_or_else(|| spool.sets());
         sets.until(spool);
         for set in sets.by_ref() {
             let set = set.map_err(Failure::Spool)?;
-            self.pose(&set, animation_s)?;
+            self.pose(&set)?;
             // A track's node is decided when it has passed its trial; of those that were there when the tree was built, then.
             if set.frame > self.tree.frame {
                 self.held.push(set);
@@ -86,10 +78,12 @@ impl CaptureTables {
                 self.held.note(&set);
             }
             while let Some(set) = self.held.decided() {
-                self.early_rows(spool)?;
+                self.early_rows(spool, &wrote)?;
                 self.tracks.set(&set, |id| self.retrace.node_of(id))?;
             }
-            wrote();
+            if !wrote() {
+                break;
+            }
         }
         self.sets = Some(sets);
         Ok(())
@@ -101,7 +95,7 @@ impl CaptureTables {
     /// Whatever the file system says.
     pub fn finish(mut self, spool: &SpoolReader) -> Result<Done, Failure> {
         self.held.close();
-        self.early_rows(spool)?;
+        self.early_rows(spool, &|| true)?;
         while let Some(set) = self.held.next() {
             self.tracks.set(&set, |id| self.retrace.node_of(id))?;
         }
@@ -110,7 +104,7 @@ impl CaptureTables {
         Ok(Done { folder: self.folder, tree: self.tree, poses: self.poses.into(), misses: self.misses })
     }
 
-    fn pose(&mut self, set: &TrackSet, animation_s: f64) -> Result<(), Failure> {
+    fn pose(&mut self, set: &TrackSet) -> Result<(), Failure> {
         let (pose, targets_px) = self.retrace.step(set);
         self.motion.pose(&pose)?;
         // The foot is where it is by definition.
@@ -120,7 +114,7 @@ impl CaptureTables {
                 self.misses.add((u - t[0]).hypot(v - t[1]));
             }
         }
-        let oldest_s = pose.time_s - animation_s;
+        let oldest_s = pose.time_s - self.animation_s;
         self.poses.push_back(pose);
         while self.poses.front().is_some_and(|p| p.time_s < oldest_s) {
             self.poses.pop_front();
@@ -129,13 +123,13 @@ impl CaptureTables {
     }
 
     /// The rows of the frames up to the one in which the tree was built, once that has been gone through.
-    fn early_rows(&mut self, spool: &SpoolReader) -> Result<(), Failure> {
+    fn early_rows(&mut self, spool: &SpoolReader, wrote: &impl Fn() -> bool) -> Result<(), Failure> {
         if std::mem::replace(&mut self.early, true) {
             return Ok(());
         }
         for set in spool.sets() {
             let mut set = set.map_err(Failure::Spool)?;
-            if set.frame > self.tree.frame {
+            if set.frame > self.tree.frame || !wrote() {
                 break;
             }
             self.held.clean(&mut set);
@@ -148,19 +142,25 @@ impl CaptureTables {
 /// Tables on a thread of their own.
 pub struct Behind {
     spool: Sender<SpoolReader>,
+    given_up: Arc<AtomicBool>,
     thread: JoinHandle<Result<CaptureTables, Failure>>,
 }
 
 impl Behind {
     /// # Errors
     /// The thread cannot be started.
-    pub fn start(mut tables: CaptureTables, config: &Config, shared: Arc<Shared>) -> io::Result<Self> {
+    pub fn start(mut tables: CaptureTables, shared: Arc<Shared>) -> io::Result<Self> {
         let (spool, readers) = bounded::<SpoolReader>(1);
-        let at_start = config.export.animation_s;
+        let given_up = Arc::<AtomicBool>::default();
+        let over = given_up.clone();
         let run = move || {
+            // A sign of life when the end waits for it.
+            let wrote = || {
+                shared.pulse.wrote();
+                !over.load(Ordering::Relaxed)
+            };
             for spool in readers {
-                let animation_s = shared.reloaded().map_or(at_start, |c| c.export.animation_s);
-                if let Err(e) = tables.catch_up(&spool, animation_s, || {}) {
+                if let Err(e) = tables.catch_up(&spool, wrote) {
                     // Said while something can be done about it; at the end all is tried again.
                     shared.news(format!("the capture cannot be written at present: {e}"));
                     return Err(e);
@@ -169,12 +169,18 @@ impl Behind {
             Ok(tables)
         };
         let thread = std::thread::Builder::new().name("behind".into()).spawn(run)?;
-        Ok(Self { spool, thread })
+        Ok(Self { spool, given_up, thread })
     }
 
     /// There is more to be written. What comes while the thread is busy is left for the next time.
     pub fn catch_up(&self, spool: SpoolReader) {
         let _ = self.spool.try_send(spool);
+    }
+
+    /// Nobody wants the tables any more; nothing is left of them.
+    pub fn give_up(self) {
+        self.given_up.store(true, Ordering::Relaxed);
+        drop(self.join());
     }
 
     /// The tables as far as they are; `None` if they could not be written.

@@ -97,7 +97,10 @@ pub fn write(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
 /// # Errors
 /// As for [`write`].
 pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, Failure> {
-    tables.catch_up(&job.tracks, job.config.export.animation_s, || job.shared.pulse.wrote())?;
+    tables.catch_up(&job.tracks, || {
+        job.shared.pulse.wrote();
+        true
+    })?;
     let Done { folder, tree, poses, misses } = tables.finish(&job.tracks)?;
     let metres_per_px = job.config.export.metres_per_px;
     // Intervals that can be defended are a matter of their own; until then no branch claims a frequency.
@@ -195,9 +198,11 @@ fn describe(
     let count = |c: &std::sync::atomic::AtomicU64| c.load(Ordering::Relaxed);
     let (seen, duration_s) = (count(&counts.seen), job.shared.last_time_s());
     let camera = job.shared.camera_state();
+    // Each absence is one of the steps from frame to frame.
+    let (steps, filmed_s) = (seen.saturating_sub(1 + camera.reconnects), duration_s - camera.away_s);
     let timing = Timing {
         nominal_rate_hz: job.info.nominal_rate_hz,
-        measured_rate_hz: (seen > 1 && duration_s > 0.0).then(|| (seen - 1) as f64 / duration_s),
+        measured_rate_hz: (steps > 0 && filmed_s > 0.0).then(|| steps as f64 / filmed_s),
         frames_seen: seen,
         frames_dropped_camera: count(&counts.lost_in_camera),
         frames_dropped_by_sequence: camera.lost_by_sequence,
@@ -206,7 +211,7 @@ fn describe(
         frames_stale: camera.stale,
         clock: camera.clock.into(),
         reconnects: camera.reconnects,
-        away_s: camera.away_s,
+        away_s: camera.away_s + camera.away_at_end_s,
         frames_dropped_tracker: count(&counts.dropped_before_tracker),
         frames_undecodable: count(&counts.undecodable),
         frames_before_outline: count(&counts.before_outline),

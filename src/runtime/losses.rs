@@ -155,6 +155,12 @@ impl Losses {
         gaps
     }
 
+    /// Nothing more comes, `length_s` after the last frame; gives the gap if the source was still away.
+    pub fn ended_away(&mut self, length_s: f64) -> Option<Gap> {
+        let (last, cause) = self.before_away.take()?;
+        Some(Gap { after_frame: last.index, time_s: last.time_s, missing: 0, cause, length_s })
+    }
+
     /// Judges the steps that still wait for more frames.
     pub fn finish(&mut self) -> Vec<Gap> {
         let mut gaps = Vec::new();

@@ -31,7 +31,7 @@ pub use finish::Written;
 pub use play::{Played, play};
 pub use pulse::{Marks, Sign, Vigil};
 pub use record::{RecordJob, RunningRecord, record};
-pub use recorder_thread::{RecordTo, Recorded};
+pub use recorder_thread::{QUEUE_BYTES, RecordTo, Recorded};
 pub use shared::Failure;
 pub use source_thread::Pace;
 
@@ -111,12 +111,10 @@ impl Drop for StopAll<'_> {
 /// # Errors
 /// A thread cannot be started, there is no decoder, or the recording cannot be made.
 pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> {
-    let source = match source.waits_without_limit() {
-        Some(limit) => Box::new(Watched::start(source, limit).map_err(Failure::Thread)?) as Box<dyn Source>,
-        None => source,
-    };
+    let source = Watched::if_needed(source).map_err(Failure::Thread)?;
     let shared = Arc::new(Shared::default());
     let info = source.describe();
+    let live = info.live;
     let (frames_in, frames_out) = bounded(FRAME_QUEUE);
     let (model_in, model_out) = bounded(MODEL_QUEUE);
     // Wishes are typed by a person; they cannot pile up.
@@ -147,7 +145,7 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
         let (shared, frames_out) = (shared.clone(), frames_out.clone());
         let run = move || {
             let _ends_all = StopAll(&shared);
-            match TrackThread::new(front, model_in, preview_every, &shared) {
+            match TrackThread::new(front, model_in, preview_every, live, &shared) {
                 Ok(track) => track.run(&frames_out, &wishes),
                 Err(e) => shared.fail(Failure::NoDecoder(e)),
             }

@@ -103,7 +103,7 @@ impl ModelThread {
                 ToModel::Restart => {
                     self.back.restart();
                     self.status.restart();
-                    self.behind = None;
+                    self.behind.take().into_iter().for_each(Behind::give_up);
                     self.behind_s = f64::NEG_INFINITY;
                     self.new_spool();
                     (self.quality, self.announced, last) = (Quality::default(), false, None);
@@ -172,7 +172,7 @@ impl ModelThread {
             // Where it cannot be begun, the end will say why.
             self.behind = CaptureTables::create(dir, tree, &self.job.config)
                 .ok()
-                .and_then(|tables| Behind::start(tables, &self.job.config, self.shared.clone()).ok());
+                .and_then(|tables| Behind::start(tables, self.shared.clone()).ok());
         }
         if let (Some(behind), Ok(reader)) = (&self.behind, spool.reader()) {
             behind.catch_up(reader);

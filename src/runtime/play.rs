@@ -32,6 +32,7 @@ pub fn play(
         None => output.insert(open(&waiting)?),
     };
     let (start, start_s) = (Instant::now(), waiting.sensor_time_s);
+    let mut interval = Duration::ZERO;
     loop {
         let due = start + Duration::from_secs_f64((waiting.sensor_time_s - start_s).clamp(0.0, 1e6));
         if !wait_until(due, stop) {
@@ -40,8 +41,12 @@ pub fn play(
         output.put(&waiting)?;
         played.frames += 1;
         match source.next_frame()? {
-            Some(raw) => waiting = raw,
-            None => return Ok(played),
+            Some(raw) => {
+                interval = Duration::from_secs_f64((raw.sensor_time_s - waiting.sensor_time_s).clamp(0.0, 1e6));
+                waiting = raw;
+            }
+            // The last frame has its time as well, before another round begins.
+            None => return Ok(Played { stopped: !wait_until(due + interval, stop), ..played }),
         }
     }
 }

@@ -10,6 +10,8 @@ use std::time::{Duration, Instant};
 /// Time between two looks whether the camera is there. It costs next to nothing, and is a small part of the two seconds
 /// within which a capture has to go on.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
+/// A node belongs to root alone until udev has given it its group, a moment after it has appeared.
+const SETTLES: Duration = Duration::from_secs(2);
 /// Longest sleep after which a wish to stop is heard.
 const NAP: Duration = Duration::from_millis(20);
 
@@ -21,49 +23,84 @@ pub fn cause(e: &SourceError) -> GapCause {
     }
 }
 
-/// Tries until the source delivers again; gives its first frame. `None` when asked to stop.
+/// How a wait ended.
+pub enum Waited {
+    /// With the first frame of the source, which delivers again.
+    Back(RawFrame),
+    /// Asked to stop.
+    Stopped,
+    /// Waiting was switched off meanwhile.
+    Unwanted,
+    /// It will never be back.
+    Hopeless(SourceError),
+}
+
+/// Tries until the source delivers again; `returned` is when it did so the last time.
 pub fn wait(
     source: &mut dyn Source,
     lost: &SourceError,
     camera: &mut config::Camera,
+    returned: Option<Instant>,
     shared: &Shared,
-) -> Option<RawFrame> {
+) -> Waited {
     let since = Instant::now();
     let at_s = shared.last_time_s();
     let reason = lost.brief();
     shared.news(format!("the camera was lost at {at_s:.1} s ({reason}); waiting for it, what was captured is kept"));
     shared.camera(|c| c.away = Some(reason.clone()));
-    let mut said = reason.clone();
-    let first = loop {
+    let mut said = reason;
+    let mut denied_since = None;
+    // One that delivers a frame and fails, over and over, is not opened more often than one that never delivers.
+    let mut pause = returned.map_or(Duration::ZERO, |at| retry_delay(camera).saturating_sub(at.elapsed()));
+    let waited = loop {
+        if !sleep(pause, shared) {
+            break Waited::Stopped;
+        }
         adopt_new_settings(source, camera, shared);
+        if !camera.reconnect {
+            break Waited::Unwanted;
+        }
         // It is back when it delivers: one that starts and falls silent again is not.
-        let attempt = source.reopen().and_then(|()| source.next_frame());
-        let e = match attempt {
-            Ok(first) => break first,
+        let e = match source.reopen().and_then(|()| source.next_frame()) {
+            Ok(Some(first)) => break Waited::Back(first),
+            Ok(None) => break Waited::Stopped,
             Err(e) => e,
         };
-        let absent = matches!(e, SourceError::Absent { .. });
+        if !source.returns() {
+            break Waited::Hopeless(e);
+        }
+        let unsettled = match e {
+            SourceError::Denied { .. } => denied_since.get_or_insert_with(Instant::now).elapsed() < SETTLES,
+            _ => {
+                denied_since = None;
+                false
+            }
+        };
+        if unsettled || matches!(e, SourceError::Absent { .. }) {
+            pause = LOOK_EVERY;
+            continue;
+        }
+        pause = retry_delay(camera);
         let why = e.brief();
-        if !absent && why != said {
+        if why != said {
             shared.news(format!("the camera cannot go on yet: {why}"));
             said = why;
         }
-        if !sleep(
-            if absent { LOOK_EVERY } else { Duration::from_secs_f64(camera.retry_delay_s.clamp(0.05, 3600.0)) },
-            shared,
-        ) {
-            break None;
-        }
     };
+    let is_back = matches!(waited, Waited::Back(_));
     shared.camera(|c| {
         c.away = None;
-        c.reconnects += u64::from(first.is_some());
+        c.reconnects += u64::from(is_back);
     });
-    if first.is_some() {
+    if is_back {
         let away_s = since.elapsed().as_secs_f64();
         shared.news(format!("the camera is back after {away_s:.1} s; the capture goes on"));
     }
-    first
+    waited
+}
+
+fn retry_delay(camera: &config::Camera) -> Duration {
+    Duration::from_secs_f64(camera.retry_delay_s.clamp(0.05, 3600.0))
 }
 
 /// Takes over settings that were read again while the capture runs.
@@ -74,12 +111,12 @@ pub fn adopt_new_settings(source: &mut dyn Source, camera: &mut config::Camera, 
     }
 }
 
-/// `false` when asked to stop meanwhile.
+/// `false` when asked to stop meanwhile. New settings end it early: they may shorten or forbid the wait.
 fn sleep(length: Duration, shared: &Shared) -> bool {
     let until = Instant::now() + length;
     while !shared.stopped() {
         let left = until.saturating_duration_since(Instant::now());
-        if left.is_zero() {
+        if left.is_zero() || shared.has_new_settings() {
             return true;
         }
         std::thread::sleep(left.min(NAP));

@@ -3,6 +3,7 @@
 use super::recorder_thread::{self, RecordTo, Recorded};
 use super::shared::{Failure, Shared};
 use super::source_thread::{self, Pace};
+use super::watched::Watched;
 use super::{FRAME_QUEUE, StopAll};
 use crate::config;
 use crate::source::Source;
@@ -31,6 +32,7 @@ pub struct RunningRecord {
 /// # Errors
 /// The file cannot be made, or a thread cannot be started.
 pub fn record(source: Box<dyn Source>, job: RecordJob) -> Result<RunningRecord, Failure> {
+    let source = Watched::if_needed(source).map_err(Failure::Thread)?;
     let shared = Arc::new(Shared::default());
     let (recorder, recording) = recorder_thread::start(job.to, source.describe().live, &shared)?;
     let (frames_in, frames_out) = bounded::<source_thread::Timed>(FRAME_QUEUE);
@@ -38,7 +40,7 @@ pub fn record(source: Box<dyn Source>, job: RecordJob) -> Result<RunningRecord, 
     // Nobody looks at the frames; the source hands them on as ever.
     let drain = {
         let frames = frames_out.clone();
-        thread("drain").spawn(move || frames.iter().for_each(drop)).map_err(Failure::Spool)?
+        thread("drain").spawn(move || frames.iter().for_each(drop)).map_err(Failure::Thread)?
     };
     let source = {
         let shared = shared.clone();
@@ -47,7 +49,7 @@ pub fn record(source: Box<dyn Source>, job: RecordJob) -> Result<RunningRecord, 
             let queue = source_thread::Queue { into: frames_in, out_of: frames_out };
             source_thread::run(source, job.pace, job.camera, queue, Some(recorder), &shared);
         };
-        thread("source").spawn(run).map_err(Failure::Spool)?
+        thread("source").spawn(run).map_err(Failure::Thread)?
     };
     Ok(RunningRecord { shared, source, drain, recording })
 }
@@ -87,6 +89,8 @@ impl RunningRecord {
 
     /// Waits for the end: what was recorded, and why it ended early if it did.
     pub fn join(self) -> (Option<Recorded>, Option<Failure>) {
+        // A recorder that has died takes nothing more, and the source would go on for ever.
+        self.stop();
         let ends = [self.source.join(), self.drain.join()];
         let recorded = self.recording.join().ok();
         if ends.iter().any(Result::is_err) || recorded.is_none() {

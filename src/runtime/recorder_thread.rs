@@ -14,7 +14,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// What may wait for the disk: as many entries, and as many bytes of pictures (some seconds of a fast camera).
 const QUEUE: usize = 512;
-const QUEUE_BYTES: usize = 96 << 20;
+pub const QUEUE_BYTES: usize = 96 << 20;
 /// What has been written for longer than this is handed to the system: a quarter of the second that may be lost, the rest is for a machine that is busy.
 const FLUSH_EVERY: Duration = Duration::from_millis(250);
 
@@ -28,6 +28,8 @@ pub struct RecordTo {
     pub path: PathBuf,
     pub limits: Limits,
     pub head: Head,
+    /// Pictures that may wait for the disk, bytes; usually [`QUEUE_BYTES`].
+    pub queue_bytes: usize,
 }
 
 enum Item {
@@ -47,6 +49,7 @@ pub struct Found {
 pub struct Recorder {
     queue: Sender<Item>,
     waiting: Arc<AtomicUsize>,
+    queue_bytes: usize,
     shared: Arc<Shared>,
     /// A camera is not made to wait; a file is, and loses nothing.
     live: bool,
@@ -75,7 +78,8 @@ pub fn start(
     let series = Series::create(&to.path, to.head, to.limits, now_ns)?;
     let (queue, items) = bounded(QUEUE);
     let waiting = Arc::new(AtomicUsize::new(0));
-    let recorder = Recorder { queue, waiting: waiting.clone(), shared: shared.clone(), live };
+    let queue_bytes = to.queue_bytes;
+    let recorder = Recorder { queue, waiting: waiting.clone(), queue_bytes, shared: shared.clone(), live };
     shared.recording.store(true, Ordering::Relaxed);
     let shared = shared.clone();
     let run = move || Thread { series, waiting, shared, broken: false, oldest: None }.run(&items);
@@ -96,8 +100,8 @@ impl Recorder {
     pub fn offer(&self, raw: &Arc<RawFrame>, index: u64) {
         let bytes = raw.bytes.len();
         // One that is larger than the whole queue is let in alone.
-        let full = || self.waiting.load(Ordering::Relaxed) + bytes > QUEUE_BYTES && !self.queue.is_empty();
-        while !self.live && full() {
+        let full = || self.waiting.load(Ordering::Relaxed) + bytes > self.queue_bytes && !self.queue.is_empty();
+        while !self.live && full() && !self.shared.stopped() {
             std::thread::sleep(NAP);
         }
         let refused = self.live && full();
@@ -120,7 +124,17 @@ impl Recorder {
     }
 
     fn put(&self, item: Item) -> bool {
-        if self.live { self.queue.try_send(item).is_ok() } else { self.queue.send(item).is_ok() }
+        if self.live {
+            return self.queue.try_send(item).is_ok();
+        }
+        let mut item = item;
+        loop {
+            match self.queue.send_timeout(item, NAP) {
+                Ok(()) => return true,
+                Err(e) if e.is_disconnected() || self.shared.stopped() => return false,
+                Err(e) => item = e.into_inner(),
+            }
+        }
     }
 }
 
@@ -157,7 +171,8 @@ impl Thread {
             self.note(done);
         }
         let last = self.series.path().to_owned();
-        Recorded { frames: self.series.frames(), files: self.series.files(), bytes: self.series.bytes(), last, stopped }
+        let frames = self.series.frames() - if stopped { self.series.open_frames() } else { 0 };
+        Recorded { frames, files: self.series.files(), bytes: self.series.bytes(), last, stopped }
     }
 
     fn take(&mut self, item: Item) {
@@ -193,6 +208,10 @@ impl Thread {
             && !std::mem::replace(&mut self.broken, true)
         {
             self.shared.recording_ended.store(true, Ordering::Relaxed);
+            // What stood in the open chunk is cut off with it.
+            let counts = &self.shared.counts;
+            counts.recorded.fetch_sub(self.series.open_frames(), Ordering::Relaxed);
+            counts.not_recorded.fetch_add(self.series.open_frames(), Ordering::Relaxed);
             self.shared.warn(e.to_string());
         }
     }

@@ -103,6 +103,11 @@ impl Shared {
         std::mem::take(&mut reloaded.is_new).then(|| reloaded.config.clone()).flatten()
     }
 
+    /// Whether [`newly_reloaded`](Self::newly_reloaded) has something to give.
+    pub fn has_new_settings(&self) -> bool {
+        self.reloaded.lock().unwrap_or_else(PoisonError::into_inner).is_new
+    }
+
     pub fn fail(&self, failure: Failure) {
         self.failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(failure);
     }
@@ -111,11 +116,19 @@ impl Shared {
         self.failure.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
+    /// Tells at once, and keeps it for the capture.
     pub fn warn(&self, warning: String) {
+        if self.warnings.lock().unwrap_or_else(PoisonError::into_inner).back() != Some(&warning) {
+            self.push_news(format!("warning: {warning}"));
+        }
+        self.note(warning);
+    }
+
+    /// Keeps for the capture what has been told already.
+    pub fn note(&self, warning: String) {
         tracing::debug!("{warning}");
         let mut warnings = self.warnings.lock().unwrap_or_else(PoisonError::into_inner);
         if warnings.back() != Some(&warning) {
-            self.push_news(format!("warning: {warning}"));
             if warnings.len() == WARNINGS_KEPT {
                 warnings.pop_front();
             }

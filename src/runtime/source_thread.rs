@@ -4,7 +4,7 @@
 use super::losses::Losses;
 use super::pulse::Worker;
 use super::rate::RateWatch;
-use super::reconnect;
+use super::reconnect::{self, Waited};
 use super::recorder_thread::Recorder;
 use super::shared::{Failure, Shared};
 use crate::config;
@@ -65,6 +65,8 @@ pub fn run(
         losses: Losses::new(live, info.nominal_rate_hz),
         rate: RateWatch::new(info.nominal_rate_hz.filter(|_| live)),
         first_time_s: None,
+        last_frame: None,
+        returned: None,
         broken: 0,
         due: None,
     };
@@ -79,8 +81,17 @@ pub fn run(
             break;
         }
         feed.away(reconnect::cause(&lost));
-        let Some(first) = reconnect::wait(&mut *source, &lost, &mut camera, shared) else { break };
-        feed.back(first, &*source, &lost);
+        let failure = match reconnect::wait(&mut *source, &lost, &mut camera, feed.returned, shared) {
+            Waited::Back(first) => {
+                feed.back(first, &*source, &lost);
+                continue;
+            }
+            Waited::Stopped => break,
+            Waited::Unwanted => lost,
+            Waited::Hopeless(e) => e,
+        };
+        shared.fail(Failure::Source(failure));
+        break;
     }
     feed.end();
     for warning in source.warnings() {
@@ -97,6 +108,9 @@ struct Feed<'a> {
     losses: Losses,
     rate: RateWatch,
     first_time_s: Option<f64>,
+    /// When the last frame came, and when a source that was lost last came back.
+    last_frame: Option<Instant>,
+    returned: Option<Instant>,
     /// Frames of no use so far.
     broken: u64,
     /// Moment at which a time of the recording was due, and that time.
@@ -144,7 +158,9 @@ impl Feed<'_> {
         self.shared.frame_seen(time_s);
         let raw = Arc::new(raw);
         self.recorder.iter().for_each(|recorder| recorder.offer(&raw, arrival.index));
-        Timed { raw, index: arrival.index, time_s, received: Instant::now() }
+        let received = Instant::now();
+        self.last_frame = Some(received);
+        Timed { raw, index: arrival.index, time_s, received }
     }
 
     /// `false` when nobody takes frames any more.
@@ -204,15 +220,22 @@ impl Feed<'_> {
     /// The first frame after an absence, which is kept as a warning as well: the result shows nothing of that time.
     fn back(&mut self, first: RawFrame, source: &dyn Source, lost: &SourceError) {
         let before_s = self.shared.last_time_s();
+        self.returned = Some(Instant::now());
         let timed = self.stamp(first, source);
         let away_s = timed.time_s - before_s;
         self.shared.camera(|c| c.away_s += away_s);
-        self.shared.warn(format!("the camera was away for {away_s:.1} s from {before_s:.1} s on ({})", lost.brief()));
+        self.shared.note(format!("the camera was away for {away_s:.1} s from {before_s:.1} s on ({})", lost.brief()));
         self.hand_on(timed);
     }
 
     fn end(&mut self) {
-        let gaps = self.losses.finish();
+        let mut gaps = self.losses.finish();
+        // No frame says when an absence ended that lasts to the end: our own clock does.
+        let away_s = self.last_frame.map_or(0.0, |at| at.elapsed().as_secs_f64());
+        if let Some(gap) = self.losses.ended_away(away_s) {
+            self.shared.camera(|c| c.away_at_end_s = away_s);
+            gaps.push(gap);
+        }
         self.note(&gaps);
     }
 

@@ -16,6 +16,8 @@ use std::time::Duration;
 const PREVIEW_WIDTH: u32 = 640;
 /// Damaged frames that are reported one by one; further ones are only counted.
 const DAMAGE_REPORTED: u64 = 5;
+/// Pictures of another size in a row that are taken for damage when a camera films.
+const OTHER_SIZES: u32 = 5;
 
 /// What the model thread gets.
 pub enum ToModel {
@@ -45,6 +47,8 @@ pub struct TrackThread<'a> {
     last_preview_s: Option<f64>,
     size: Option<Size>,
     last_damage: Option<DecodeError>,
+    live: bool,
+    other_sizes: u32,
 }
 
 impl<'a> TrackThread<'a> {
@@ -54,11 +58,23 @@ impl<'a> TrackThread<'a> {
         front: FrontEnd,
         to_model: Sender<ToModel>,
         preview_every: Duration,
+        live: bool,
         shared: &'a Shared,
     ) -> Result<Self, DecodeError> {
         let decoder = Decoder::new()?;
-        let (last_preview_s, size, last_damage) = (None, None, None);
-        Ok(Self { front, decoder, to_model, shared, preview_every, last_preview_s, size, last_damage })
+        let (last_preview_s, size, last_damage, other_sizes) = (None, None, None, 0);
+        Ok(Self {
+            front,
+            decoder,
+            to_model,
+            shared,
+            preview_every,
+            last_preview_s,
+            size,
+            last_damage,
+            live,
+            other_sizes,
+        })
     }
 
     /// Works off frames and wishes; a wish that has arrived is honoured before the next frame.
@@ -135,13 +151,15 @@ impl<'a> TrackThread<'a> {
             _ => self.decoder.luma(&timed.raw, &mut luma),
         };
         match decoded {
-            Ok(()) => self.size = Some(luma.size),
+            Ok(()) => (self.size, self.other_sizes) = (Some(luma.size), 0),
+            // Damage can hit the size that a picture gives itself; a camera that really changes it keeps to that.
+            Err(e @ DecodeError::SizeChanged { .. }) if self.live && self.other_sizes < OTHER_SIZES => {
+                self.other_sizes += 1;
+                self.leave_out(timed, e);
+                return true;
+            }
             Err(e @ DecodeError::Damaged { .. }) => {
-                let n = self.shared.counts.undecodable.fetch_add(1, Ordering::Relaxed);
-                if n < DAMAGE_REPORTED {
-                    self.shared.warn(format!("frame {} is left out: {e}", timed.index));
-                }
-                self.last_damage = Some(e);
+                self.leave_out(timed, e);
                 return true;
             }
             Err(e) => {
@@ -174,6 +192,14 @@ impl<'a> TrackThread<'a> {
         }
         self.last_preview_s = Some(timed.time_s);
         self.decoder.preview(&timed.raw, PREVIEW_WIDTH).ok().map(Arc::new)
+    }
+
+    fn leave_out(&mut self, timed: &Timed, e: DecodeError) {
+        let n = self.shared.counts.undecodable.fetch_add(1, Ordering::Relaxed);
+        if n < DAMAGE_REPORTED {
+            self.shared.warn(format!("frame {} is left out: {e}", timed.index));
+        }
+        self.last_damage = Some(e);
     }
 
     fn report(&mut self) {

@@ -27,6 +27,8 @@ pub struct Watched {
     answers: Receiver<Answer>,
     /// A question has not been answered yet.
     hanging: bool,
+    /// The thread has ended, and nothing will ever answer.
+    ended: bool,
     info: SourceInfo,
     health: Health,
     limit: Duration,
@@ -34,6 +36,17 @@ pub struct Watched {
 }
 
 impl Watched {
+    /// The source itself where it keeps to its own limits of time, else behind one that does.
+    ///
+    /// # Errors
+    /// The thread cannot be started.
+    pub fn if_needed(source: Box<dyn Source>) -> std::io::Result<Box<dyn Source>> {
+        Ok(match source.waits_without_limit() {
+            Some(limit) => Box::new(Self::start(source, limit)?),
+            None => source,
+        })
+    }
+
     /// Takes the source to a thread of its own, which ends with this value, or with the call that it hangs in.
     ///
     /// # Errors
@@ -57,14 +70,15 @@ impl Watched {
             }
         };
         std::thread::Builder::new().name("camera".into()).spawn(run)?;
-        Ok(Self { ask, answers, hanging: false, info, health, limit, stop: Arc::default() })
+        Ok(Self { ask, answers, hanging: false, ended: false, info, health, limit, stop: Arc::default() })
     }
 
     fn silent(&self) -> SourceError {
         SourceError::Timeout { input: self.info.name.clone(), seconds: self.limit.as_secs_f64() }
     }
 
-    fn ended(&self) -> SourceError {
+    fn ended(&mut self) -> SourceError {
+        self.ended = true;
         SourceError::Disconnected { input: self.info.name.clone(), reason: "its thread has ended".into() }
     }
 
@@ -118,7 +132,7 @@ impl Source for Watched {
     }
 
     fn returns(&self) -> bool {
-        true
+        !self.ended
     }
 
     fn reopen(&mut self) -> Result<(), SourceError> {

@@ -38,6 +38,9 @@ impl ClockKind {
 const SLACK_S: f64 = 2.0;
 /// After so many frames without progress the clock counts as broken, not the frames.
 const STANDS_STILL: u32 = 5;
+/// A clock that begins beyond this, s, is counted from our own zero: 64 bits of nanoseconds end at 9.2e9 s, and a time
+/// that goes on past them would stand still in every file that counts so.
+const FAR_S: f64 = 4e9;
 /// Least step where the times of reception cannot tell two frames apart, s.
 const LEAST_STEP_S: f64 = 1e-4;
 
@@ -129,8 +132,8 @@ impl Clock {
 
     fn time(&mut self, raw_s: f64, received_s: f64) -> Option<f64> {
         let Some(last) = self.last else {
-            self.offset_s = 0.0;
-            return Some(raw_s);
+            self.offset_s = if raw_s.abs() < FAR_S { 0.0 } else { received_s - raw_s };
+            return Some(raw_s + self.offset_s);
         };
         let (by_driver_s, by_us_s) = (raw_s - last.raw_s, received_s - last.received_s);
         if self.kind == ClockKind::Received {
@@ -244,6 +247,10 @@ mod tests {
             (-5e6 + 40.0, 100.0, 5e6 + 106.0),
         ];
         check("a wrap", monotonic, &wrapped, ClockKind::Monotonic);
+        // Milliseconds before 64 bits of nanoseconds end, and after it.
+        let end = 9_223_372_036_000.0;
+        let far = [(end, 5.0, 5.0), (end + 40.0, 45.0, 45.0), (-end, 90.0, 90.0), (-end + 40.0, 130.0, 130.0)];
+        check("a wrap of 64 bits", monotonic, &far, ClockKind::Monotonic);
         check(
             "a jump ahead",
             monotonic,

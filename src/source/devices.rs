@@ -2,7 +2,7 @@
 
 use super::SourceError;
 use super::choice::Mode;
-use super::identity::{Identity, Places, link, nodes};
+use super::identity::{Identity, Node, Places, link, link_by_path, nodes};
 use super::v4l2::prospect;
 use crate::config;
 use std::path::PathBuf;
@@ -36,7 +36,7 @@ pub fn list() -> Vec<Device> {
 
 /// The same with these settings, on a system whose `/sys` and `/dev` are at `places`.
 pub fn list_for(config: &config::Camera, places: &Places) -> Vec<Device> {
-    let device = |node: super::identity::Node| {
+    let device = |node: Node| {
         let link = link(places, &node.path);
         let (path, identity) = (node.path, node.identity);
         let port = identity.as_ref().map_or_else(|| "nothing is known of it".to_owned(), |i| i.port.clone());
@@ -75,11 +75,28 @@ pub fn list_for(config: &config::Camera, places: &Places) -> Vec<Device> {
 /// Where the camera of this identity is now.
 ///
 /// # Errors
-/// It is not plugged in.
+/// It is not plugged in, or there are several that share a serial number and with it the identity.
 pub(super) fn by_identity(id: &str, places: &Places) -> Result<PathBuf, SourceError> {
-    let is_it = |n: &super::identity::Node| n.identity.as_ref().is_some_and(|i| i.id == id);
-    let hint = "plug the camera in; `arborcam devices` lists those that are there";
-    nodes(places).into_iter().find(is_it).map(|n| n.path).ok_or(SourceError::Absent { input: id.to_owned(), hint })
+    let mut found = nodes(places);
+    found.retain(|n| n.identity.as_ref().is_some_and(|i| i.id == id));
+    let input = id.to_owned();
+    match found.as_slice() {
+        [] => {
+            let hint = "plug the camera in; `arborcam devices` lists those that are there";
+            Err(SourceError::Absent { input, hint })
+        }
+        [only] => Ok(only.path.clone()),
+        twins => {
+            let other_name = |n: &Node| {
+                let port = n.identity.as_ref().map_or(String::new(), |i| format!(" ({})", i.port));
+                format!("{}{port}", link_by_path(places, &n.path).unwrap_or_else(|| n.path.clone()).display())
+            };
+            let names: Vec<String> = twins.iter().map(other_name).collect();
+            let what =
+                format!("{} cameras go by this name; name the one that is meant: {}", twins.len(), names.join(", "));
+            Err(SourceError::BadFormat { input, what })
+        }
+    }
 }
 
 /// Whether the name is of the kind that [`Identity::id`] has.

@@ -100,7 +100,8 @@ fn remedy(path: &Path) -> String {
     format!("run `sudo usermod -aG {group} $USER`, log out and log in again")
 }
 
-fn group_name(gid: u32) -> Option<String> {
+/// What `/etc/group` calls the group of this number.
+pub fn group_name(gid: u32) -> Option<String> {
     let groups = std::fs::read_to_string("/etc/group").ok()?;
     groups.lines().find_map(|line| {
         let mut fields = line.split(':');

@@ -95,8 +95,17 @@ fn plain(text: &str) -> String {
 
 /// The name under `/dev/v4l/by-id` (else `by-path`) that leads to `path`.
 pub(super) fn link(places: &Places, path: &Path) -> Option<PathBuf> {
+    link_in(places, path, &["v4l/by-id", "v4l/by-path"])
+}
+
+/// The name by the socket alone, which no two cameras share.
+pub(super) fn link_by_path(places: &Places, path: &Path) -> Option<PathBuf> {
+    link_in(places, path, &["v4l/by-path"])
+}
+
+fn link_in(places: &Places, path: &Path, folders: &[&str]) -> Option<PathBuf> {
     let target = std::fs::canonicalize(path).ok()?;
-    ["v4l/by-id", "v4l/by-path"].iter().find_map(|folder| {
+    folders.iter().find_map(|folder| {
         let entries = std::fs::read_dir(places.dev.join(folder)).ok()?.flatten();
         let mut links: Vec<PathBuf> = entries.map(|e| e.path()).collect();
         links.sort();
@@ -254,6 +263,26 @@ mod tests {
         assert_eq!(known.find(), None, "the twin was there all the time");
         system.usb("1-3", 2, Some("SN0001"));
         assert_eq!(known.find(), Some(system.dev(2)));
+    }
+
+    #[test]
+    fn a_name_that_two_cameras_share_is_refused_with_the_names_that_they_do_not() {
+        let system = System::new();
+        system.usb("1-1", 0, Some("SN0001"));
+        let id = system.id(0);
+        let named = || crate::source::devices::by_identity(&id, &system.places);
+        assert_eq!(named().ok(), Some(system.dev(0)));
+        system.usb("1-2", 1, Some("SN0001"));
+        let by_path = system.places.dev.join("v4l/by-path/pci-usb-1-2-video-index0");
+        fs::create_dir_all(system.places.dev.join("v4l/by-path")).expect("dev");
+        symlink(system.dev(1), &by_path).expect("link");
+        let said = named().expect_err("either might be meant").to_string();
+        for what in [&id, "2 cameras", "usb 1-1", "usb 1-2"] {
+            assert!(said.contains(what), "{said}");
+        }
+        assert!(said.contains(&by_path.display().to_string()) && !said.contains('\n'), "{said}");
+        system.unplug(0);
+        assert_eq!(named().ok(), Some(system.dev(1)), "alone it is the one");
     }
 
     #[test]

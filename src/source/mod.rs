@@ -11,6 +11,7 @@ mod error;
 mod identity;
 mod images;
 mod loopback;
+mod opened;
 mod probe;
 mod recording;
 mod through_nokhwa;
@@ -21,7 +22,7 @@ pub use choice::Mode;
 pub use clock::ClockKind;
 pub use decode::{DecodeError, Decoder};
 pub use devices::{Device, list, list_for};
-pub use error::SourceError;
+pub use error::{SourceError, group_name};
 pub use identity::{Identity, Places};
 pub use loopback::Loopback;
 

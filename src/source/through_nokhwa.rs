@@ -4,14 +4,16 @@
 use super::choice::{Granted, Wish};
 use super::clock::ClockKind;
 use super::identity::{Known, Places};
+use super::opened::{describe, same_again};
 use super::v4l2::prospect;
 use super::{Health, Source, SourceError, SourceInfo};
+use crate::caught::caught;
 use crate::config;
-use crate::model::{FormatNote, PixelFormat, RawFrame, Size};
+use crate::model::{PixelFormat, RawFrame, Size};
 use nokhwa::utils::{
     ApiBackend, CameraFormat, CameraIndex, FrameFormat, RequestedFormat, RequestedFormatType, Resolution,
 };
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -22,8 +24,7 @@ pub(super) struct NokhwaCamera {
     name: String,
     asked: Wish,
     granted: Granted,
-    substitute: bool,
-    camera: Option<nokhwa::Camera>,
+    camera: Opened,
     timeout: Duration,
     opened: Instant,
     last_s: f64,
@@ -41,20 +42,24 @@ impl NokhwaCamera {
             size: asked.size,
             rate_hz: Some(asked.rate_hz),
         });
-        if !asked.is_met_by(&wanted) && !config.accept_format {
-            let what = format!("asked for {asked}, it offers {wanted}; take that with --accept-format");
-            return Err(SourceError::BadFormat { input: path.display().to_string(), what });
-        }
+        let accept = |offered: &Granted| {
+            if asked.is_met_by(offered) || config.accept_format {
+                return Ok(());
+            }
+            let what = format!("asked for {asked}, it offers {offered}; take that with --accept-format");
+            Err(SourceError::BadFormat { input: path.display().to_string(), what })
+        };
+        accept(&wanted)?;
         let known = Known::new(Places::default(), path);
         let (camera, granted) = start(path, &wanted, asked.rate_hz)?;
+        accept(&granted)?;
         Ok(Self {
             known,
             path: path.to_owned(),
             name: prospect.card,
             asked,
             granted,
-            substitute: !asked.is_met_by(&granted),
-            camera: Some(camera),
+            camera,
             timeout: config.time_limit(),
             opened: Instant::now(),
             last_s: 0.0,
@@ -63,43 +68,46 @@ impl NokhwaCamera {
     }
 }
 
+/// The crate panics, too, where a driver does not take back what it gave, as one does that is gone.
+struct Opened(Option<nokhwa::Camera>);
+
+impl Opened {
+    fn close(&mut self) {
+        let camera = self.0.take();
+        let _ = caught(|| drop(camera));
+    }
+}
+
+impl Drop for Opened {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
 impl Source for NokhwaCamera {
     fn next_frame(&mut self) -> Result<Option<RawFrame>, SourceError> {
         let Granted { format, size, .. } = self.granted;
         let shown = self.path.display().to_string();
-        loop {
-            let Some(camera) = &mut self.camera else {
-                return Err(SourceError::Disconnected { input: shown, reason: "it is closed".into() });
-            };
-            let taken = guarded(|| camera.frame_raw().map(|bytes| picture(&bytes, format, size)));
-            let bytes = match taken {
-                Ok(bytes) => bytes,
-                Err(reason) => {
-                    self.camera = None;
-                    return Err(SourceError::Disconnected { input: shown, reason });
-                }
-            };
-            let Some(bytes) = bytes else {
-                self.damaged += 1;
-                continue;
-            };
-            // Two frames that come at once are told apart by the least step.
-            self.last_s = self.opened.elapsed().as_secs_f64().max(self.last_s + 1e-4);
-            return Ok(Some(RawFrame { sequence: None, sensor_time_s: self.last_s, size, format, bytes }));
-        }
+        let Some(camera) = &mut self.camera.0 else {
+            return Err(SourceError::Disconnected { input: shown, reason: "it is closed".into() });
+        };
+        let take = || guarded(|| camera.frame_raw().map(|bytes| picture(&bytes, format, size)));
+        let failed = match first_usable(take, self.timeout, &mut self.damaged) {
+            Ok(Some(bytes)) => {
+                // Two frames that come at once are told apart by the least step.
+                self.last_s = self.opened.elapsed().as_secs_f64().max(self.last_s + 1e-4);
+                return Ok(Some(RawFrame { sequence: None, sensor_time_s: self.last_s, size, format, bytes }));
+            }
+            Ok(None) => SourceError::Timeout { input: shown, seconds: self.timeout.as_secs_f64() },
+            Err(reason) => SourceError::Disconnected { input: shown, reason },
+        };
+        self.camera.close();
+        Err(failed)
     }
 
     fn describe(&self) -> SourceInfo {
-        let identity = self.known.identity().map_or(String::new(), |i| format!(", {}", i.id));
-        let given = self.granted.to_string();
-        SourceInfo {
-            name: format!("{} ({}{identity}, through nokhwa)", self.path.display(), self.name),
-            format: FormatNote { asked: if self.substitute { self.asked.to_string() } else { given.clone() }, given },
-            size: self.granted.size,
-            nominal_rate_hz: self.granted.rate_hz,
-            frames_total: None,
-            live: true,
-        }
+        let name = format!("{}, through nokhwa", self.name);
+        describe(&self.path, &name, &self.known, &self.asked, &self.granted)
     }
 
     fn returns(&self) -> bool {
@@ -107,15 +115,12 @@ impl Source for NokhwaCamera {
     }
 
     fn reopen(&mut self) -> Result<(), SourceError> {
-        self.camera = None;
+        self.camera.close();
         let absent = || SourceError::Absent { input: self.path.display().to_string(), hint: "plug it in again" };
         let path = self.known.find().ok_or_else(absent)?;
         let (camera, granted) = start(&path, &self.granted, self.asked.rate_hz)?;
-        if granted != self.granted {
-            let what = format!("it came back with {granted} instead of {}; set it back, or start anew", self.granted);
-            return Err(SourceError::BadFormat { input: path.display().to_string(), what });
-        }
-        (self.camera, self.path) = (Some(camera), path);
+        same_again(&path, &self.granted, &granted)?;
+        (self.camera, self.path) = (camera, path);
         Ok(())
     }
 
@@ -130,18 +135,21 @@ impl Source for NokhwaCamera {
 
 /// The crate divides by what drivers tell it and steps by it, which may be zero.
 fn guarded<T>(call: impl FnOnce() -> Result<T, nokhwa::NokhwaError>) -> Result<T, String> {
-    match catch_unwind(AssertUnwindSafe(call)) {
-        Ok(done) => done.map_err(|e| e.to_string().replace('\n', " ")),
-        Err(_) => Err("nokhwa cannot cope with this camera; use --backend v4l2".into()),
+    match caught(call) {
+        Some(done) => done.map_err(|e| e.to_string().replace('\n', " ")),
+        None => Err("nokhwa cannot cope with this camera; use --backend v4l2".into()),
     }
 }
 
-fn start(path: &Path, wanted: &Granted, rate_hz: f64) -> Result<(nokhwa::Camera, Granted), SourceError> {
+fn start(path: &Path, wanted: &Granted, rate_hz: f64) -> Result<(Opened, Granted), SourceError> {
     let input = path.display().to_string();
     let bad = |what: String| SourceError::BadFormat { input: input.clone(), what };
     let target = std::fs::canonicalize(path).map_err(|e| SourceError::of_file(path, &e))?;
     let number = target.file_name().and_then(|n| n.to_str()?.strip_prefix("video")?.parse().ok());
     let number = number.ok_or_else(|| bad("nokhwa takes /dev/videoN only".into()))?;
+    // nokhwa gives no reason that could be told from another: one that may not be opened yet is to be looked at again.
+    let may_open = OpenOptions::new().read(true).write(true).open(&target);
+    may_open.map_err(|e| SourceError::of_driver(path, "opening it", &e))?;
     let format = frame_format(wanted.format).ok_or_else(|| {
         bad(format!("nokhwa does not read {}; set camera.format, or use --backend v4l2", wanted.format))
     })?;
@@ -154,8 +162,8 @@ fn start(path: &Path, wanted: &Granted, rate_hz: f64) -> Result<(nokhwa::Camera,
         camera.open_stream()?;
         Ok(camera)
     });
-    let camera = opened.map_err(|e| bad(format!("nokhwa: {e}; try --backend v4l2")))?;
-    let given = camera.camera_format();
+    let camera = Opened(Some(opened.map_err(|e| bad(format!("nokhwa: {e}; try --backend v4l2")))?));
+    let given = camera.0.as_ref().map_or(exact, nokhwa::Camera::camera_format);
     let granted = Granted {
         format: wanted.format,
         size: Size::new(given.width(), given.height()),
@@ -175,6 +183,24 @@ fn frame_format(format: PixelFormat) -> Option<FrameFormat> {
         PixelFormat::Nv12 => Some(FrameFormat::NV12),
         PixelFormat::Rgb24 => Some(FrameFormat::RAWRGB),
         PixelFormat::Uyvy | PixelFormat::Grey => None,
+    }
+}
+
+/// The first picture of any use among those that `take` gives; `None` if there is none within the limit.
+fn first_usable(
+    mut take: impl FnMut() -> Result<Option<Vec<u8>>, String>,
+    limit: Duration,
+    damaged: &mut u64,
+) -> Result<Option<Vec<u8>>, String> {
+    let until = Instant::now() + limit;
+    loop {
+        if let Some(bytes) = take()? {
+            return Ok(Some(bytes));
+        }
+        *damaged += 1;
+        if Instant::now() >= until {
+            return Ok(None);
+        }
     }
 }
 
@@ -211,6 +237,23 @@ fn jpeg_length(buffer: &[u8]) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pictures_of_no_use_are_counted_and_end_in_time() {
+        let (mut taken, mut damaged) = (0, 0);
+        let third = || {
+            taken += 1;
+            Ok((taken == 3).then(|| vec![7]))
+        };
+        assert_eq!(first_usable(third, Duration::from_secs(60), &mut damaged), Ok(Some(vec![7])));
+        assert_eq!(damaged, 2);
+        let never = || {
+            std::thread::sleep(Duration::from_millis(1));
+            Ok(None)
+        };
+        assert_eq!(first_usable(never, Duration::from_millis(20), &mut damaged), Ok(None));
+        assert!(damaged > 2);
+    }
 
     #[test]
     fn a_jpeg_ends_at_its_own_end_mark() {

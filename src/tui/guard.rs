@@ -1,5 +1,6 @@
 //! The terminal is as it was after any end: this guard's, or a panic's on any thread.
 
+use crate::caught;
 use ratatui::crossterm::cursor::Show;
 use ratatui::crossterm::execute;
 use ratatui::crossterm::style::ResetColor;
@@ -30,13 +31,7 @@ impl Guard {
     /// # Errors
     /// Standard output is no terminal, or cannot be written to.
     pub fn enter() -> io::Result<Self> {
-        HOOK.call_once(|| {
-            let print = std::panic::take_hook();
-            std::panic::set_hook(Box::new(move |panic| {
-                restore("");
-                print(panic);
-            }));
-        });
+        HOOK.call_once(hook_panics);
         enable_raw_mode()?;
         ACTIVE.store(true, Ordering::SeqCst);
         let guard = Self { mouse: false, farewell: String::new() };
@@ -71,6 +66,18 @@ impl Guard {
     }
 }
 
+fn hook_panics() {
+    let print = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        // Whoever catches it goes on, and so does the screen.
+        if caught::catching() {
+            return;
+        }
+        restore("");
+        print(panic);
+    }));
+}
+
 impl Drop for Guard {
     fn drop(&mut self) {
         restore(&self.farewell);
@@ -96,4 +103,19 @@ fn restore(farewell: &str) {
     let _ = out.write_all(MOUSE_OFF.as_bytes());
     let _ = execute!(out, ResetColor, LeaveAlternateScreen, Show);
     let _ = disable_raw_mode();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_screen_outlives_a_panic_that_is_caught() {
+        HOOK.call_once(hook_panics);
+        ACTIVE.store(true, Ordering::SeqCst);
+        let caught = caught::caught(|| panic!("a driver"));
+        // What `Guard::enter` did not do must not be undone.
+        let active = ACTIVE.swap(false, Ordering::SeqCst);
+        assert_eq!((caught, active, caught::catching()), (None::<()>, true, false));
+    }
 }

@@ -20,7 +20,8 @@ pub const GROUP: Group = Group {
         ("a_disconnected_camera_is_taken_again", |r| recovered(r, "disconnect")),
         ("a_disconnected_camera_ends_a_capture_that_is_to_end_with_it", |r| ended_at_once(r, "disconnect-once")),
         ("a_count_that_wraps_is_no_loss", |r| wrapped(r, "wrapped-count", 30.0)),
-        ("a_clock_that_wraps_is_no_loss", |r| wrapped(r, "wrapped-clock", 15.0)),
+        ("a_clock_of_64_bits_that_wraps_is_no_loss", |r| wrapped(r, "wrapped-clock-64", 15.0)),
+        ("a_clock_of_32_bits_that_wraps_is_no_loss", |r| wrapped(r, "wrapped-clock-32", 15.0)),
         ("a_size_that_the_driver_lacks_is_refused", |r| refused(r, "size", "--accept-format")),
         ("a_size_that_the_driver_lacks_can_be_accepted", accepted),
         ("a_camera_in_use_is_said_to_be", |r| refused(r, "busy", "in use by v4l2-ctl")),
@@ -42,8 +43,8 @@ fn stopped(r: &Results, case: &str) -> Result<(), String> {
 fn clean(r: &Results) -> Result<(), String> {
     stopped(r, "clean")?;
     let (seen, lost) = (r.count("clean", "frames_seen")?, r.count("clean", "frames_dropped_camera")?);
-    // An emulated machine with other things to do may lose one.
-    claim(lost <= 1, || format!("{lost} of {seen} frames lost"))?;
+    // An emulated machine with other things to do may lose some.
+    claim(lost * 10 <= seen, || format!("{lost} of {seen} frames lost"))?;
     let rate = r.capture("clean")?["timing"]["measured_rate_hz"].as_f64().unwrap_or(0.0);
     claim((14.0..16.0).contains(&rate), || format!("{rate} Hz instead of 15"))
 }

@@ -6,7 +6,7 @@ pub const GROUP: Group = Group {
     name: "live",
     script: "live.sh",
     first: "script",
-    limit_s: 180,
+    limit_s: 240,
     provide: clip,
     cases: &[
         ("the_screen_while_it_gathers_motion", |r| shows(r, "watching")),

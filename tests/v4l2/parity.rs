@@ -9,7 +9,7 @@ pub const GROUP: Group = Group {
     name: "parity",
     script: "parity.sh",
     first: "script",
-    limit_s: 240,
+    limit_s: 300,
     provide,
     cases: &[
         ("mjpeg_has_the_luma_of_the_file", |r| luma(r, "mjpeg")),
@@ -20,7 +20,10 @@ pub const GROUP: Group = Group {
 };
 
 /// Rate at which the clip is played: what an emulated processor follows without dropping a frame, Hz.
-const RATE_HZ: f64 = 10.0;
+const RATE_HZ: f64 = 8.0;
+
+/// Frames that may be passed over at once.
+const LATE: usize = 4;
 
 /// Decoded pictures, one after the other.
 fn lumas(frames: &[RawFrame]) -> Result<Vec<Vec<u8>>, String> {
@@ -51,7 +54,8 @@ fn provide(folder: &Path) -> Result<(), String> {
     crate::guest::record(&folder.join("clip-yuyv.mcap"), &frames)
 }
 
-/// Each filmed frame is the clip's next, from wherever the filming began.
+/// Each filmed frame is the clip's next, from wherever the filming began. The device does not wait for a reader that is
+/// late: where the whole machine stood still, it has gone on by a few frames.
 fn luma(r: &Results, format: &str) -> Result<(), String> {
     let clip = lumas(&frames_of(&r.path(&format!("clip-{format}.mcap")))?)?;
     let filmed = frames_of(&r.path(&format!("live-{format}.mcap")))?;
@@ -60,14 +64,15 @@ fn luma(r: &Results, format: &str) -> Result<(), String> {
     claim(filmed.iter().all(|f| Some(f.format) == right && f.size == Size::new(320, 180)), || "another format".into())?;
     let filmed = lumas(&filmed)?;
     let first = clip.iter().position(|l| *l == filmed[0]).ok_or("the first frame is none of the clip's")?;
-    for (n, luma) in filmed.iter().enumerate() {
-        let wanted = &clip[(first + n) % clip.len()];
-        claim(luma == wanted, || {
+    let (mut at, mut passed_over) = (first, 0);
+    for (n, luma) in filmed.iter().enumerate().skip(1) {
+        let step = (1..=LATE).find(|step| clip[(at + step) % clip.len()] == *luma).ok_or_else(|| {
             let is = clip.iter().position(|l| l == luma);
-            format!("filmed frame {n} is the clip's {is:?} instead of {}", (first + n) % clip.len())
+            format!("filmed frame {n} is the clip's {is:?} instead of {}", (at + 1) % clip.len())
         })?;
+        (at, passed_over) = (at + step, passed_over + step - 1);
     }
-    Ok(())
+    claim(20 * passed_over <= filmed.len(), || format!("{passed_over} passed over beside {} filmed", filmed.len()))
 }
 
 fn said(r: &Results, format: &str) -> String {

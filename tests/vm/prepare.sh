@@ -87,7 +87,6 @@ download_kernel() {
     release=${image#linux-image-}
     common=linux-headers-${release%-amd64}-common
     # The unsigned twin holds the same kernel, where the signed one is not to be had.
-    local build
     build=$(apt-cache depends "linux-headers-$release" | sed -n 's/^ *Depends: \(linux-kbuild.*\|linux-compiler.*\)/\1/p')
     # shellcheck disable=SC2086 # one word a package
     download kernel "$image" "linux-headers-$release" "$common" $build v4l2loopback-dkms
@@ -100,7 +99,8 @@ build_loopback() {
     # The headers name each other by where they would be installed.
     grep -rlIs '/usr/src\|/usr/lib/linux-kbuild' "$headers" --include=Makefile --include=.kernelvariables |
         xargs -r sed -i "s#/usr/src/#$work/kernel/usr/src/#g; s#/usr/lib/linux-kbuild#$work/kernel/usr/lib/linux-kbuild#g"
-    make -s -C "$headers" M="$source" KERNELRELEASE="$release" modules >"$work/v4l2loopback.log" 2>&1 ||
+    # The headers' own programs may need a library that is only among the tools.
+    LD_LIBRARY_PATH=$work/tools/usr/lib/x86_64-linux-gnu make -s -C "$headers" M="$source" KERNELRELEASE="$release" modules >"$work/v4l2loopback.log" 2>&1 ||
         { tail -20 "$work/v4l2loopback.log" >&2; fail "v4l2loopback cannot be built for $release"; }
     install -D "$source/v4l2loopback.ko" "$work/kernel/usr/lib/modules/$release/extra/v4l2loopback.ko"
 }
@@ -163,13 +163,13 @@ work=$vm.new
 trap 'rm -rf "$work"' EXIT
 rm -rf "$work"
 mkdir -p "$work"
-release=
+release= build=
 echo "vm: downloading and unpacking Debian packages (once, some 150 MB)"
 # shellcheck disable=SC2046 # one word a package
 {
     download_kernel
     download qemu "${qemu_packages[@]}" $(missing_of "${qemu_packages[@]}")
-    download tools "${tool_packages[@]}" $(missing_of "${tool_packages[@]}")
+    download tools "${tool_packages[@]}" $(missing_of "${tool_packages[@]}" $(tr ' ' '\n' <<<$build | grep kbuild))
     download guest "${guest_whole[@]}" $(missing_of "${guest_packages[@]}")
 }
 unpack qemu "$work/qemu"
@@ -184,6 +184,7 @@ make_initramfs
 cp "$work/kernel/boot/vmlinuz-$release" "$work/vmlinuz"
 record_versions >"$work/versions.txt"
 rm -rf "$work"/{debs,kernel,v4l2loopback,initramfs,tools}
+rm -f "$work"/*.log
 echo "$want" >"$work/ready"
 rm -rf "$vm"
 mv "$work" "$vm"

@@ -4,12 +4,13 @@
 mod offers;
 mod session;
 
-use super::choice::{Granted, Mode, Wish, choose, is_same_rate};
+use super::choice::{Granted, Mode, Wish, choose};
 use super::clock::Clock;
 use super::identity::{Known, Places};
+use super::opened::{describe, same_again};
 use super::{Health, Source, SourceError, SourceInfo};
 use crate::config;
-use crate::model::{FormatNote, PixelFormat, RawFrame, Size};
+use crate::model::{PixelFormat, RawFrame, Size};
 use offers::{Negotiated, negotiate};
 use session::{Session, Taken, Waited};
 use std::io;
@@ -30,7 +31,6 @@ pub(super) struct Camera {
     name: String,
     asked: Wish,
     granted: Granted,
-    substitute: bool,
     stride: usize,
     /// `None` between a failure and the next attempt to open it.
     session: Option<Session>,
@@ -57,8 +57,7 @@ impl Camera {
         let asked = Wish::of(config);
         let Opened { caps, negotiated, device } = open(path, &asked)?;
         let Negotiated { granted, stride, modes } = negotiated;
-        let substitute = !asked.is_met_by(&granted);
-        if substitute && !config.accept_format {
+        if !asked.is_met_by(&granted) && !config.accept_format {
             let what = refusal(&asked, &granted, &modes);
             return Err(SourceError::BadFormat { input: path.display().to_string(), what });
         }
@@ -70,7 +69,6 @@ impl Camera {
             name: caps.card.trim().to_owned(),
             asked,
             granted,
-            substitute,
             stride: stride.max(line_bytes(granted.format, granted.size)),
             session: Some(session),
             timeout: config.time_limit(),
@@ -163,12 +161,7 @@ impl Source for Camera {
         let Granted { format, size, rate_hz } = self.granted;
         let wish = Wish { format: Some(format), size, rate_hz: rate_hz.unwrap_or(self.asked.rate_hz) };
         let Opened { negotiated, device, .. } = open(&path, &wish)?;
-        let now = negotiated.granted;
-        let same_rate = rate_hz.zip(now.rate_hz).is_none_or(|(a, b)| is_same_rate(a, b));
-        if (now.format, now.size) != (format, size) || !same_rate {
-            let what = format!("it came back with {now} instead of {}; set it back, or start anew", self.granted);
-            return Err(SourceError::BadFormat { input: path.display().to_string(), what });
-        }
+        same_again(&path, &self.granted, &negotiated.granted)?;
         self.stride = negotiated.stride.max(line_bytes(format, size));
         self.session = Some(start(&path, &device)?);
         self.path = path;
@@ -186,16 +179,7 @@ impl Source for Camera {
     }
 
     fn describe(&self) -> SourceInfo {
-        let identity = self.known.identity().map_or(String::new(), |i| format!(", {}", i.id));
-        let given = self.granted.to_string();
-        SourceInfo {
-            name: format!("{} ({}{identity})", self.path.display(), self.name),
-            format: FormatNote { asked: if self.substitute { self.asked.to_string() } else { given.clone() }, given },
-            size: self.granted.size,
-            nominal_rate_hz: self.granted.rate_hz,
-            frames_total: None,
-            live: true,
-        }
+        describe(&self.path, &self.name, &self.known, &self.asked, &self.granted)
     }
 
     fn health(&self) -> Health {

@@ -1,5 +1,6 @@
 //! A device that is open and streams: buffers mapped once, frames taken out with a time limit.
 
+use crate::caught::caught;
 use std::io;
 use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -100,7 +101,7 @@ impl Drop for Session {
             let stream = &mut self.stream;
             // The crate panics as well where the driver does not take its buffers back; the device is closed all the same.
             // SAFETY: `stream` is not touched again: this is the end of the value that holds it.
-            let _ = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| unsafe { ManuallyDrop::drop(stream) }));
+            let _ = caught(|| unsafe { ManuallyDrop::drop(stream) });
         }
     }
 }

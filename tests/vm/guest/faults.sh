@@ -77,11 +77,13 @@ film wrapped-count fast
 sleep 7
 stop
 set_control wrap_sequence_number=0
-# The clock starts 16 s before its end.
-set_control wrap_timestamp=2
-film wrapped-clock small
-sleep 19
-stop
+# The clock starts 16 s before its end: that of nanoseconds in 64 bits (1), that of seconds in 32 bits (2).
+for wrap in 1:64 2:32; do
+    set_control wrap_timestamp=${wrap%:*}
+    film "wrapped-clock-${wrap#*:}" small
+    sleep 19
+    stop
+done
 set_control wrap_timestamp=0
 
 begin size capture $device --headless --config "$work/odd.toml"

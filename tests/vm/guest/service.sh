@@ -1,7 +1,7 @@
-# The service under systemd, installed as `make install` does it. /vm/root is what that wrote.
+# The service under systemd, installed as `make install` does it. /vm/installed is what that wrote.
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 unit=arborcam@video0.service
-cp -r /vm/root/. /
+cp -r /vm/installed/. /
 systemd-sysusers
 systemd-tmpfiles --create arborcam.conf
 usb_camera_settings
