@@ -14,6 +14,7 @@ mod latest;
 mod losses;
 mod meter;
 mod model_thread;
+mod nap;
 mod play;
 mod pulse;
 mod rate;
