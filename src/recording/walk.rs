@@ -2,6 +2,7 @@
 //! not is left out and counted. Memory holds one chunk.
 
 use super::cursor::Cursor;
+use super::wire::little;
 use mcap::records::op;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
@@ -269,8 +270,4 @@ pub(super) fn read_up_to(file: &mut impl Read, into: &mut [u8]) -> io::Result<us
         }
     }
     Ok(done)
-}
-
-fn little(bytes: &[u8]) -> u64 {
-    bytes.iter().rev().fold(0, |n, b| n << 8 | u64::from(*b))
 }

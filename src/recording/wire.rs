@@ -114,7 +114,6 @@ impl<'a> Iterator for Fields<'a> {
 
     fn next(&mut self) -> Option<Self::Item> {
         let tag = self.varint()?;
-        let little = |bytes: &[u8]| bytes.iter().rev().fold(0, |n, b| n << 8 | u64::from(*b));
         let value = match (tag & 7) as u32 {
             VARINT => Value::Number(self.varint()?),
             FIXED64 => Value::Number(little(self.take(8)?)),
@@ -127,4 +126,9 @@ impl<'a> Iterator for Fields<'a> {
         };
         Some((tag >> 3, value))
     }
+}
+
+/// A number whose lowest byte comes first, of up to eight.
+pub(super) fn little(bytes: &[u8]) -> u64 {
+    bytes.iter().rev().fold(0, |n, b| n << 8 | u64::from(*b))
 }

@@ -15,6 +15,7 @@ mod latest;
 mod losses;
 mod meter;
 mod model_thread;
+mod nap;
 mod play;
 mod pulse;
 mod rate;

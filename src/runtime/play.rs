@@ -1,11 +1,9 @@
 //! Frames of any source into a loopback device, at the pace at which they were taken.
 
+use super::nap;
 use crate::source::{Loopback, Source, SourceError};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
-
-/// A wait is taken in pieces, so that a wish to stop is heard.
-const NAP: Duration = Duration::from_millis(20);
 
 /// What was played.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -35,7 +33,7 @@ pub fn play(
     let mut interval = Duration::ZERO;
     loop {
         let due = start + Duration::from_secs_f64((waiting.sensor_time_s - start_s).clamp(0.0, 1e6));
-        if !wait_until(due, stop) {
+        if !nap::until(due, stop) {
             return Ok(Played { stopped: true, ..played });
         }
         output.put(&waiting)?;
@@ -46,19 +44,7 @@ pub fn play(
                 waiting = raw;
             }
             // The last frame has its time as well, before another round begins.
-            None => return Ok(Played { stopped: !wait_until(due + interval, stop), ..played }),
+            None => return Ok(Played { stopped: !nap::until(due + interval, stop), ..played }),
         }
     }
-}
-
-/// `false` when asked to stop meanwhile.
-fn wait_until(due: Instant, stop: &AtomicBool) -> bool {
-    while !stop.load(Ordering::Relaxed) {
-        let left = due.saturating_duration_since(Instant::now());
-        if left.is_zero() {
-            return true;
-        }
-        std::thread::sleep(left.min(NAP));
-    }
-    false
 }

@@ -1,5 +1,6 @@
 //! Waits for a camera that was lost, and goes on with it.
 
+use super::nap::NAP;
 use super::shared::Shared;
 use crate::config;
 use crate::export::capture::GapCause;
@@ -12,8 +13,6 @@ use std::time::{Duration, Instant};
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 /// A node belongs to root alone until udev has given it its group, a moment after it has appeared.
 const SETTLES: Duration = Duration::from_secs(2);
-/// Longest sleep after which a wish to stop is heard.
-const NAP: Duration = Duration::from_millis(20);
 
 /// What the loss is called in `capture.json`.
 pub fn cause(e: &SourceError) -> GapCause {

@@ -2,6 +2,7 @@
 //! tracker is late, the oldest waiting frame is dropped and counted. A camera that is lost is waited for.
 
 use super::losses::Losses;
+use super::nap::{self, NAP};
 use super::pulse::Worker;
 use super::rate::RateWatch;
 use super::reconnect::{self, Waited};
@@ -35,9 +36,6 @@ pub enum Pace {
     /// A recording as fast as the machine allows; nothing is dropped.
     Fast,
 }
-
-/// A pause longer than this is waited for in pieces, so that a wish to stop is heard.
-const NAP: Duration = Duration::from_millis(20);
 
 /// Both ends of the queue to the tracker: where a live source finds it full, the oldest frame is taken out again.
 pub struct Queue {
@@ -203,13 +201,7 @@ impl Feed<'_> {
     fn wait_for(&mut self, timed: &Timed) {
         let (start, start_s) = *self.due.get_or_insert((Instant::now(), timed.time_s));
         let due = start + Duration::from_secs_f64((timed.time_s - start_s).clamp(0.0, 1e6));
-        while !self.shared.stopped() {
-            let left = due.saturating_duration_since(Instant::now());
-            if left.is_zero() {
-                break;
-            }
-            std::thread::sleep(left.min(NAP));
-        }
+        nap::until(due, &self.shared.stop);
     }
 
     fn away(&mut self, cause: GapCause) {

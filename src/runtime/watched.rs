@@ -1,5 +1,6 @@
 //! A source that may wait for ever, on a thread of its own, behind one that gives up in time.
 
+use super::nap::NAP;
 use crate::config;
 use crate::model::RawFrame;
 use crate::source::{Health, Source, SourceError, SourceInfo};
@@ -7,9 +8,6 @@ use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-
-/// Longest wait after which a wish to stop is heard.
-const NAP: Duration = Duration::from_millis(20);
 
 enum Ask {
     Next,
