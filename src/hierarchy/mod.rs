@@ -27,6 +27,7 @@ pub fn build(table: &TrackTable, moving: &[usize], settings: &Hierarchy) -> Moti
         level,
         members: members.iter().map(|&i| table.ids[moving[i]]).collect(),
         centroid_px: centroid(&rest_px, members),
+        certainty: 0.0,
     };
     // Breadth first, so that a parent stands before its children and levels follow each other.
     let all = in_agreement(&rho, &rest_px, settings.agreement);
@@ -44,6 +45,8 @@ pub fn build(table: &TrackTable, moving: &[usize], settings: &Hierarchy) -> Moti
             let w = affinity(&rho, &rest_px, points, settings.distance_scale, settings.correlation_power);
             if let Some(cut) = normalised_cut(&w, MIN_SIDE) {
                 let side = |first: bool| points.iter().zip(&cut.first_side).filter(move |(_, s)| **s == first);
+                // Ncut of two parts as good as unrelated is 0, of one part cut at random about 1.
+                clusters[next].certainty = (1.0 - cut.ncut).clamp(0.0, 1.0) as f32;
                 parts = [true, false].map(|first| side(first).map(|(&i, _)| i).collect()).into();
             }
         }
