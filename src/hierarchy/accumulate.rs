@@ -1,6 +1,6 @@
 //! When enough motion has been seen to build the tree, judged from the tracks alone.
 
-use super::affinity::Velocities;
+use super::signals::Signals;
 use crate::config::Accumulate;
 use crate::signal::along_principal_direction;
 use crate::track::{TrackHistory, TrackTable};
@@ -79,7 +79,7 @@ fn noise_px(table: &TrackTable, row: usize) -> f64 {
 
 /// How often the mean of the moving points has swung to and fro along its principal direction.
 fn sways(table: &TrackTable, moving: &[usize]) -> f64 {
-    let steps = Velocities::new(table, moving, |_| true).mean();
+    let steps = Signals::velocities(table, moving, |_| true).mean();
     let mut at = [0.0; 2];
     let path: Vec<[f64; 2]> = steps
         .iter()
@@ -105,7 +105,7 @@ fn stability(table: &TrackTable, moving: &[usize]) -> f64 {
     let some: Vec<usize> = moving.iter().copied().step_by(stride).collect();
     let start_s = table.times_s.first().copied().unwrap_or(0.0);
     let half = |k: usize| (((table.times_s[k] - start_s) / BLOCK_S) as u64).is_multiple_of(2);
-    let (even, odd) = (Velocities::new(table, &some, half), Velocities::new(table, &some, |k| !half(k)));
+    let (even, odd) = (Signals::velocities(table, &some, half), Signals::velocities(table, &some, |k| !half(k)));
     let pairs = (0..some.len()).flat_map(|a| (a + 1..some.len()).map(move |b| (a, b)));
     let (x, y): (Vec<f64>, Vec<f64>) =
         pairs.map(|(a, b)| (f64::from(even.correlation(a, b)), f64::from(odd.correlation(a, b)))).unzip();
