@@ -220,7 +220,7 @@ impl Default for Track {
 }
 impl Default for Accumulate {
     fn default() -> Self {
-        Self { window_s: 20.0, min_s: 8.0, threshold: 0.5, moving_snr: 4.0 }
+        Self { window_s: 20.0, min_s: 8.0, threshold: 0.4, moving_snr: 4.0 }
     }
 }
 impl Default for Skeleton {

@@ -16,7 +16,7 @@ const NOISE_FLOOR_PX: f64 = 0.1;
 /// Signal-to-noise ratio at which the motion term has reached 1 - 1/e.
 const SNR_SCALE: f64 = 8.0;
 /// Sways of the whole tree after which the sway term has reached 1 - 1/e.
-const SWAYS_SCALE: f64 = 1.0;
+const SWAYS_SCALE: f64 = 2.0;
 /// A sway counts when it goes this share of the root mean square displacement beyond the middle, on both sides.
 const SWAY_HYSTERESIS: f64 = 0.2;
 /// Moving points below which the evidence counts for less.
@@ -32,7 +32,7 @@ pub struct Evidence {
     /// Correlation between the affinities from one half of the time and from the other, 0 to 1: if the tree's
     /// structure is in the tracks, both halves (blocks of half a second, dealt in turn) tell the same one.
     pub stability: f64,
-    /// 1 - exp(-n), with n the number of times that the tree as a whole has swayed to and fro: branches that swing
+    /// 1 - exp(-n / 2), with n the number of times that the tree as a whole has swayed to and fro: branches that swing
     /// at different rates are apart for sure only after some periods of the slowest.
     pub sway: f64,
     /// Rows of the table whose points move.

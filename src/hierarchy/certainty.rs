@@ -17,8 +17,7 @@ const CHANCE_ERRORS: f64 = 3.0;
 /// give the same, 0.8 at twice as many standard errors.
 pub fn certainties(tree: &Binary, signals: &Signals, times_s: &[f64]) -> Vec<f32> {
     let votes = Votes::new(times_s, signals.steps());
-    // Sum of the motion of a part's points, and of their energy vote by vote.
-    let mut sums: Vec<Option<(Vec<[f32; 2]>, Vec<f32>)>> = vec![None; tree.parts.len()];
+    let mut sums: Vec<Option<Sums>> = vec![None; tree.parts.len()];
     let mut certain = vec![0.0; tree.parts.len()];
     for (k, part) in tree.parts.iter().enumerate().rev() {
         let Some(halves) = part.halves else {
@@ -54,6 +53,9 @@ pub fn certainties(tree: &Binary, signals: &Signals, times_s: &[f64]) -> Vec<f32
     }
     certain
 }
+
+/// Sum of the motion of a part's points, step by step, and of their energies, vote by vote.
+type Sums = (Vec<[f32; 2]>, Vec<f32>);
 
 fn certainty(contrast: &[f64]) -> f32 {
     let n = contrast.len() as f64;

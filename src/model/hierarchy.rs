@@ -27,3 +27,14 @@ pub struct Cluster {
 pub struct MotionHierarchy {
     pub clusters: Vec<Cluster>,
 }
+
+impl MotionHierarchy {
+    /// How sure the splits are, 0 to 1: the median over the clusters that have children.
+    pub fn median_certainty(&self) -> Option<f64> {
+        let mut parted: Vec<u32> = self.clusters.iter().filter_map(|c| c.parent).map(|p| p.0).collect();
+        parted.dedup();
+        let mut certain: Vec<f32> = parted.iter().map(|&p| self.clusters[p as usize].certainty).collect();
+        certain.sort_unstable_by(f32::total_cmp);
+        certain.get(certain.len() / 2).copied().map(f64::from)
+    }
+}

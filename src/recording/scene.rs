@@ -153,6 +153,7 @@ struct NodeJson {
     z: f64,
     radius: f64,
     n_tracks: u32,
+    certainty: f32,
     copy_of: Option<u32>,
 }
 
@@ -164,7 +165,8 @@ pub(super) fn skeleton_json(
 ) -> Result<(), serde_json::Error> {
     let nodes = skeleton.nodes.iter().map(|n| {
         let (parent, copy_of, p) = (n.parent.map(|p| p.0), n.copy_of.map(|c| c.0), n.position);
-        NodeJson { parent, level: n.level, x: p.x, y: p.y, z: p.z, radius: n.radius, n_tracks: n.n_tracks, copy_of }
+        let (n_tracks, certainty) = (n.n_tracks, n.certainty);
+        NodeJson { parent, level: n.level, x: p.x, y: p.y, z: p.z, radius: n.radius, n_tracks, certainty, copy_of }
     });
     let size = skeleton.image_size;
     let foot_px = skeleton.foot_px;
