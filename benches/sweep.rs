@@ -27,6 +27,8 @@ struct Gathered {
 fn gathered(clip: &Path, outline: &Path, points: u32, every: usize) -> (Gathered, Arc<arborcam::model::Outline>) {
     let mut config = Config::default();
     config.detect.points = points;
+    // More points find room only if they may stand closer.
+    config.detect.min_distance_px *= (400.0 / f64::from(points)).sqrt().min(1.0);
     let mut source = source::open(clip, &config.camera, None).expect("clip");
     let mut decoder = Decoder::new().expect("decoder");
     let outline = arborcam::outline::load(outline, source.describe().size).expect("outline");
