@@ -296,7 +296,7 @@ impl Config {
     pub fn check(&self) -> Result<(), ConfigError> {
         let positive = (f64::MIN_POSITIVE, 1e9, "greater than 0");
         let share = (0.0, 1.0, "0 to 1");
-        let rules: [(&'static str, f64, (f64, f64, &'static str)); 34] = [
+        let rules: [(&'static str, f64, (f64, f64, &'static str)); 33] = [
             ("camera.width", self.camera.width.into(), (16.0, 16384.0, "16 to 16384")),
             ("camera.height", self.camera.height.into(), (16.0, 16384.0, "16 to 16384")),
             ("camera.rate_hz", self.camera.rate_hz.into(), (1.0, 1000.0, "1 to 1000")),
@@ -318,8 +318,7 @@ impl Config {
             ("accumulate.moving_snr", self.accumulate.moving_snr, positive),
             ("hierarchy.levels", self.hierarchy.levels.into(), (2.0, 10.0, "2 to 10")),
             ("hierarchy.motion_power", self.hierarchy.motion_power, (0.1, 32.0, "0.1 to 32")),
-            ("hierarchy.path_weight", self.hierarchy.path_weight, (0.0, 10.0, "0 to 10")),
-            ("hierarchy.distance_weight", self.hierarchy.distance_weight, (0.0, 10.0, "0 to 10")),
+            ("hierarchy.path_weight", self.hierarchy.path_weight, (0.0, 100.0, "0 to 100")),
             ("hierarchy.max_children", self.hierarchy.max_children.into(), (2.0, 64.0, "2 to 64")),
             ("hierarchy.min_certainty", self.hierarchy.min_certainty, share),
             ("hierarchy.distance_scale", self.hierarchy.distance_scale, positive),

@@ -12,10 +12,8 @@ pub struct Hierarchy {
     pub affinity: Affinity,
     /// `path`: power of the likeness of motion.
     pub motion_power: f64,
-    /// `path`: weight of the way from the foot that two points would share.
+    /// `path`: weight of the way from the foot that two points share.
     pub path_weight: f64,
-    /// `path`: weight of the squared distance, in extents of all points.
-    pub distance_weight: f64,
     /// `zeng`: reach of the distance affinity, as a share of the cluster's own extent.
     pub distance_scale: f64,
     /// `zeng`: power of the velocity correlation; 1 is the paper's.
@@ -44,8 +42,7 @@ impl Default for Hierarchy {
             levels: 7,
             affinity: Affinity::Path,
             motion_power: 4.0,
-            path_weight: 0.3,
-            distance_weight: 0.1,
+            path_weight: 4.0,
             distance_scale: 1.0,
             correlation_power: 1.0,
             max_children: 4,

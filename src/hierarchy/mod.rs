@@ -8,6 +8,7 @@ mod agreement;
 mod arrange;
 mod binary;
 mod certainty;
+mod common_way;
 mod lanczos;
 mod linkage;
 mod ncut;
@@ -47,7 +48,7 @@ pub fn build(table: &TrackTable, moving: &[usize], foot_px: [f64; 2], settings: 
     let displacements = Signals::displacements(table, &rows);
     let tree = match settings.affinity {
         Affinity::Path => {
-            let likeness = path::likeness(&displacements.correlations(), &rest_px, foot_px, settings);
+            let likeness = path::likeness(&displacements, &rest_px, foot_px, settings);
             Binary::merged(rows.len(), &linkage::average_linkage(likeness))
         }
         Affinity::Zeng => cut_in_two(&Signals::velocities(table, &rows, |_| true), &rest_px, settings),

@@ -7,9 +7,10 @@ use nalgebra::DMatrix;
 /// Steps on either side over which a displacement is averaged: tracking noise is not to decide who belongs to whom.
 const SMOOTH_STEPS: usize = 1;
 /// Time over which the liveliness of a moment is taken, s: about a period of what sways.
-const LIVELINESS_S: f64 = 1.5;
-/// Moments livelier than this share of the liveliest count in full; quieter ones less, as noise is most of them.
-const LIVELINESS_FLOOR: f32 = 0.02;
+const LIVELINESS_S: f64 = 1.0;
+/// Mean square displacement that tracking alone may show, px^2: quieter moments than this count less, as noise is most
+/// of them.
+const LIVELINESS_FLOOR: f32 = 0.09;
 /// Independent sums per lane let the compiler use vector instructions, and fix the order of addition.
 const LANES: usize = 8;
 
@@ -90,9 +91,8 @@ impl Signals {
                 sum / n.max(1.0)
             })
             .collect();
-        let floor = LIVELINESS_FLOOR * lively.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
         for (s, e) in lively.iter().enumerate() {
-            let weight = 1.0 / (e + floor).sqrt();
+            let weight = 1.0 / (e + LIVELINESS_FLOOR).sqrt();
             self.u.row_mut(s).scale_mut(weight);
             self.v.row_mut(s).scale_mut(weight);
         }
@@ -165,6 +165,18 @@ impl Signals {
             rho[(b, b)] = 1.0;
         }
         rho
+    }
+
+    /// Root mean square difference of all pairs over the steps in which both were seen, and on the diagonal that of each
+    /// point from rest; infinite for two that never were seen together.
+    pub fn differences(&self) -> DMatrix<f32> {
+        let product = self.u.tr_mul(&self.u) + self.v.tr_mul(&self.v);
+        let energy = (self.u.component_mul(&self.u) + self.v.component_mul(&self.v)).tr_mul(&self.seen);
+        let both = self.seen.tr_mul(&self.seen);
+        DMatrix::from_fn(self.len(), self.len(), |a, b| {
+            let sum = if a == b { product[(a, a)] } else { energy[(a, b)] + energy[(b, a)] - 2.0 * product[(a, b)] };
+            if both[(a, b)] > 0.0 { (sum.max(0.0) / both[(a, b)]).sqrt() } else { f32::INFINITY }
+        })
     }
 }
 

@@ -1,0 +1,187 @@
+//! How much of the way from the foot two points have in common: the affinity of the default method.
+//!
+//! Two points of a tree are as near kin as their ways from the foot part late. The ways are not seen, but steps between
+//! points that are near each other and move alike are likely to lie on them: a minimum spanning tree, rooted at the
+//! foot, joins all points by such steps. One false step takes a whole branch along, so the tree is drawn many times from
+//! part of the points with costs that are off by chance, and what the trees say is averaged (Felsenstein's bootstrap of
+//! 1985 for trees of descent).
+//!
+//! Chosen by measurement, see `docs/sweep.md`: normalised cuts, average linkage of correlations and shortest paths in
+//! place of the spanning tree all did worse on trees whose branches leave one trunk.
+
+use super::rest::distance_sq;
+use nalgebra::DMatrix;
+
+/// Trees drawn; the first from all points.
+const TREES: u32 = 20;
+/// Share of the points that each of the others is drawn from.
+const SHARE: f64 = 0.7;
+/// Standard deviation of the logarithm of what a cost is off by.
+const COST_DEVIATION: f64 = 0.3;
+
+/// Mean common way of all pairs, in px of cost; on the diagonal the whole way from the foot.
+///
+/// `apart` holds the root mean square difference of the motion of all pairs, and on the diagonal that of a point's own
+/// motion, in whatever unit. Going between two points costs sqrt(d^2 + (h m)^2), with d their
+/// distance, h the way from the foot to the farthest point and m their difference over the median of the diagonal.
+pub fn common_way(apart: &DMatrix<f32>, rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> DMatrix<f32> {
+    let n = rest_px.len();
+    let costs = costs(apart, rest_px, foot_px);
+    let off_by = off_by_table();
+    let (mut sum, mut count) = (DMatrix::<f32>::zeros(n, n), DMatrix::<f32>::zeros(n, n));
+    for tree in 0..TREES {
+        let drawn: Vec<usize> = (0..n).filter(|&i| tree == 0 || below(hash(tree, i, i), SHARE)).collect();
+        let cost = |a: usize, b: usize| {
+            let chance = hash(tree, a.min(b), a.max(b)) as usize % off_by.len();
+            costs[(a, b)] * off_by[chance]
+        };
+        let common = common_ways(&spanning_tree(&drawn, n, cost));
+        for (k, &b) in drawn.iter().enumerate() {
+            for (j, &a) in drawn.iter().enumerate() {
+                sum[(a, b)] += common[(j, k)];
+                count[(a, b)] += 1.0;
+            }
+        }
+    }
+    sum.component_div(&count)
+}
+
+/// Costs of all steps; the last row and column are the foot, which rests.
+fn costs(apart: &DMatrix<f32>, rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> DMatrix<f32> {
+    let n = rest_px.len();
+    let mut own: Vec<f32> = (0..n).map(|i| apart[(i, i)]).collect();
+    own.sort_unstable_by(f32::total_cmp);
+    let median = f64::from(own.get(n / 2).copied().unwrap_or(0.0)).max(f64::MIN_POSITIVE);
+    let height = rest_px.iter().map(|&p| distance_sq(p, foot_px).sqrt()).fold(1.0, f64::max);
+    let px_of = height / median;
+    DMatrix::from_fn(n + 1, n + 1, |a, b| {
+        let at = |i: usize| rest_px.get(i).copied().unwrap_or(foot_px);
+        let motion = match (a < n, b < n) {
+            (true, true) => apart[(a, b)],
+            (true, false) => apart[(a, a)],
+            (false, true) => apart[(b, b)],
+            (false, false) => 0.0,
+        };
+        let cost = (distance_sq(at(a), at(b)) + (px_of * f64::from(motion)).powi(2)).sqrt() as f32;
+        // What is no number would end the tree early; it is a step that nobody would take.
+        if cost.is_finite() { cost } else { f32::MAX.sqrt() }
+    })
+}
+
+/// A point of the tree: its index among those drawn, the position of its parent in the list (`None`: the foot), and the
+/// way from the foot.
+struct Reached {
+    drawn: usize,
+    parent: Option<usize>,
+    way: f32,
+}
+
+/// The minimum spanning tree of the points `drawn` and the root (Prim), in the order in which they are reached.
+fn spanning_tree(drawn: &[usize], root: usize, cost: impl Fn(usize, usize) -> f32) -> Vec<Reached> {
+    let mut reached: Vec<Reached> = Vec::with_capacity(drawn.len());
+    // For every point that is left: the cheapest step to it, and from where.
+    let mut left: Vec<(usize, f32, Option<usize>)> =
+        drawn.iter().enumerate().map(|(k, &i)| (k, cost(root, i), None)).collect();
+    while let Some(cheapest) = (0..left.len()).min_by(|&a, &b| left[a].1.total_cmp(&left[b].1)) {
+        let (point, step, parent) = left.swap_remove(cheapest);
+        let way = step + parent.map_or(0.0, |p: usize| reached[p].way);
+        let at = Some(reached.len());
+        reached.push(Reached { drawn: point, parent, way });
+        for (k, best, from) in &mut left {
+            let through = cost(drawn[point], drawn[*k]);
+            if through < *best {
+                (*best, *from) = (through, at);
+            }
+        }
+    }
+    reached
+}
+
+/// The way from the foot that each pair has in common; rows and columns as the points were drawn.
+fn common_ways(tree: &[Reached]) -> DMatrix<f32> {
+    let mut common = DMatrix::zeros(tree.len(), tree.len());
+    for (k, point) in tree.iter().enumerate() {
+        let i = point.drawn;
+        // A point parts from all that were reached before it where its parent does.
+        if let Some(parent) = point.parent {
+            for other in &tree[..k] {
+                let shared = common[(other.drawn, tree[parent].drawn)];
+                common[(other.drawn, i)] = shared;
+                common[(i, other.drawn)] = shared;
+            }
+        }
+        common[(i, i)] = point.way;
+    }
+    common
+}
+
+/// Quantiles of what costs are multiplied by.
+fn off_by_table() -> Vec<f32> {
+    // Sums of three evenly spread numbers are near enough to a normal distribution: variance 3/12.
+    const SIDE: usize = 10;
+    let evenly = |k: usize| (k as f64 + 0.5) / SIDE as f64 - 0.5;
+    let normal = |k: usize| 2.0 * (evenly(k % SIDE) + evenly(k / SIDE % SIDE) + evenly(k / SIDE / SIDE));
+    (0..SIDE * SIDE * SIDE).map(|k| (COST_DEVIATION * normal(k)).exp() as f32).collect()
+}
+
+fn below(hash: u64, share: f64) -> bool {
+    (hash as f64) < share * u64::MAX as f64
+}
+
+/// Chance that is the same at every run and in any order: the finaliser of splitmix64.
+fn hash(tree: u32, a: usize, b: usize) -> u64 {
+    let mut x = (u64::from(tree) << 48) ^ ((a as u64) << 24) ^ b as u64;
+    x = (x ^ (x >> 30)).wrapping_add(0x9e37_79b9_7f4a_7c15).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A trunk with a branch to each side whose tips come near each other again; the branches move differently.
+    fn two_branches() -> (DMatrix<f32>, Vec<[f64; 2]>) {
+        let trunk = (1..8).map(|k| ([0.0, -10.0 * f64::from(k)], [0.1f32, 0.0]));
+        let branch = |side: f64| {
+            let motion = if side < 0.0 { [1.0f32, 0.0] } else { [0.0, 1.0] };
+            (1..12).map(move |k| {
+                let out = f64::from(if k < 6 { k } else { 11 - k });
+                ([side * (8.0 * out + 3.0), -70.0 - 8.0 * f64::from(k)], motion)
+            })
+        };
+        let points: Vec<([f64; 2], [f32; 2])> = trunk.chain(branch(-1.0)).chain(branch(1.0)).collect();
+        let apart = DMatrix::from_fn(points.len(), points.len(), |a, b| {
+            let (p, q) = (points[a].1, if a == b { [0.0; 2] } else { points[b].1 });
+            ((p[0] - q[0]).powi(2) + (p[1] - q[1]).powi(2)).sqrt()
+        });
+        (apart, points.iter().map(|p| p.0).collect())
+    }
+
+    #[test]
+    fn tips_that_touch_are_no_kin_if_they_move_differently() {
+        let (apart, rest_px) = two_branches();
+        let common = common_way(&apart, &rest_px, [0.0, 0.0]);
+        let (left_tip, right_tip, left_base) = (7 + 10, 7 + 11 + 10, 7 + 1);
+        assert!(common[(left_tip, left_base)] > 1.2 * common[(left_tip, right_tip)]);
+        // Everything on the branches has the trunk in common, which its own lower points have not.
+        assert!(common[(left_tip, right_tip)] > common[(0, right_tip)]);
+    }
+
+    #[test]
+    fn the_same_points_give_the_same_numbers() {
+        let (apart, rest_px) = two_branches();
+        assert_eq!(common_way(&apart, &rest_px, [0.0, 0.0]), common_way(&apart, &rest_px, [0.0, 0.0]));
+    }
+
+    /// Points that rest, coincide or were never seen together must neither hang it nor come out as no numbers.
+    #[test]
+    fn useless_motion_still_gives_numbers() {
+        for value in [0.0, f32::NAN, f32::INFINITY] {
+            for n in 0..4 {
+                let common = common_way(&DMatrix::from_element(n, n, value), &vec![[5.0, 5.0]; n], [5.0, 9.0]);
+                assert!(common.iter().all(|c| c.is_finite()), "{n} points of {value}");
+            }
+        }
+    }
+}
