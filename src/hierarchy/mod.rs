@@ -5,9 +5,13 @@ mod accumulate;
 mod affinity;
 mod lanczos;
 mod ncut;
+mod persist;
+mod support;
 
 pub use accumulate::{COMPARE_HZ, Evidence, evidence, evidence_of};
 pub use ncut::{Cut, normalised_cut};
+pub use persist::persisting;
+pub use support::{Gain, OnBoth, gain};
 
 use crate::config::Hierarchy;
 use crate::model::{Cluster, ClusterId, MotionHierarchy};
