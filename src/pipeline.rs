@@ -96,7 +96,7 @@ pub struct First {
 }
 
 /// When a tree is built: the first frame that is remembered, the newest, its time, and whether the build was asked for.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Moment {
     pub followed_from: u64,
     pub frame: u64,

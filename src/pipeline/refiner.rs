@@ -32,7 +32,7 @@ enum Stage {
     /// Until there is more film, s.
     Waiting(f64),
     /// Until it is due, s; with the result where somebody has worked it out before.
-    Building(Arc<Refinement>, f64, Option<Option<Tree>>),
+    Building(Arc<Refinement>, f64, Option<Box<Option<Tree>>>),
     Following(Box<Following>),
     Over,
 }
@@ -84,7 +84,8 @@ impl Refiner {
                 let ready_s = READY_S * (work.points() as f64 / POINTS).powi(2).max(1.0);
                 self.stage = Stage::Building(Arc::new(work), now_s + ready_s, None);
             }
-            Stage::Building(work, due_s, done) if now_s >= due_s => match done.unwrap_or_else(|| work.run()) {
+            Stage::Building(work, due_s, done) if now_s >= due_s => match done.map_or_else(|| work.run(), |tree| *tree)
+            {
                 Some(mut tree) => {
                     // What has been forgotten meanwhile cannot be followed.
                     tree.followed_from = tree.followed_from.max(first.frame);
@@ -134,7 +135,7 @@ impl Refiner {
     /// The result of [`work`](Self::work).
     pub fn put(&mut self, tree: Option<Tree>) {
         if let Stage::Building(_, _, done) = &mut self.stage {
-            *done = Some(tree);
+            *done = Some(Box::new(tree));
         }
     }
 }
