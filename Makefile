@@ -1,6 +1,6 @@
 # make demo: from a fresh machine to a moving tree in out/demo. make test: every test. make bench: the figures.
 # make install, make uninstall: program and service, below DESTDIR (for packages) and PREFIX.
-.PHONY: demo build test test-v4l2 bench lint setup install uninstall
+.PHONY: demo build test test-v4l2 bench sweep lint setup install uninstall
 
 demo: setup build
 	@scripts/demo.sh
@@ -21,7 +21,11 @@ test-v4l2:
 	ARBORCAM_REQUIRE_VM=1 cargo test --release --locked --test v4l2
 
 bench:
-	cargo bench --locked
+	cargo bench --locked --bench figures
+
+# The tree over the ranges of its settings; CLIP="film outline branches" for another clip than the shipped one.
+sweep:
+	cargo bench --locked --bench sweep -- $(CLIP)
 
 lint:
 	cargo fmt --check

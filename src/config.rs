@@ -1,7 +1,9 @@
 //! Settings: plain structs whose defaults are the documented ones. A file overrides a default, the command line a file.
 
+mod hierarchy;
 mod reload;
 
+pub use hierarchy::{Affinity, Hierarchy};
 pub use reload::{Change, EFFECTS, Effect, effect};
 
 use serde::{Deserialize, Serialize};
@@ -129,22 +131,6 @@ pub struct Accumulate {
     pub refine_s: f64,
 }
 
-/// Recursive normalised cuts (000 appendix A, 003 section 5.4.1).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Hierarchy {
-    /// Levels of the binary hierarchy, the whole tree included, 2 to 10; the papers take 5 to 7.
-    pub levels: u32,
-    /// Reach of the distance affinity, as a share of the cluster's own extent.
-    pub distance_scale: f64,
-    /// Power of the velocity correlation; 1 is the paper's.
-    pub correlation_power: f64,
-    /// Points whose motion correlates less than this with that of the points around them are left out, -1 to 1.
-    pub agreement: f64,
-    /// Clusters of fewer points are not cut.
-    pub min_points: u32,
-}
-
 /// 2D skeleton (000 appendix A).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -236,12 +222,7 @@ impl Default for Track {
 }
 impl Default for Accumulate {
     fn default() -> Self {
-        Self { window_s: 20.0, min_s: 8.0, threshold: 0.5, moving_snr: 4.0, refine_s: 120.0 }
-    }
-}
-impl Default for Hierarchy {
-    fn default() -> Self {
-        Self { levels: 7, distance_scale: 1.0, correlation_power: 1.0, agreement: 0.7, min_points: 4 }
+        Self { window_s: 20.0, min_s: 8.0, threshold: 0.4, moving_snr: 4.0, refine_s: 120.0 }
     }
 }
 impl Default for Skeleton {
@@ -317,7 +298,7 @@ impl Config {
     pub fn check(&self) -> Result<(), ConfigError> {
         let positive = (f64::MIN_POSITIVE, 1e9, "greater than 0");
         let share = (0.0, 1.0, "0 to 1");
-        let rules: [(&'static str, f64, (f64, f64, &'static str)); 30] = [
+        let rules: [(&'static str, f64, (f64, f64, &'static str)); 35] = [
             ("camera.width", self.camera.width.into(), (16.0, 16384.0, "16 to 16384")),
             ("camera.height", self.camera.height.into(), (16.0, 16384.0, "16 to 16384")),
             ("camera.rate_hz", self.camera.rate_hz.into(), (1.0, 1000.0, "1 to 1000")),
@@ -339,6 +320,11 @@ impl Config {
             ("accumulate.moving_snr", self.accumulate.moving_snr, positive),
             ("accumulate.refine_s", self.accumulate.refine_s, (0.0, 3600.0, "0 (never) to 3600")),
             ("hierarchy.levels", self.hierarchy.levels.into(), (2.0, 10.0, "2 to 10")),
+            ("hierarchy.motion_power", self.hierarchy.motion_power, (0.1, 32.0, "0.1 to 32")),
+            ("hierarchy.path_weight", self.hierarchy.path_weight, (0.0, 10.0, "0 to 10")),
+            ("hierarchy.distance_weight", self.hierarchy.distance_weight, (0.0, 10.0, "0 to 10")),
+            ("hierarchy.max_children", self.hierarchy.max_children.into(), (2.0, 64.0, "2 to 64")),
+            ("hierarchy.min_certainty", self.hierarchy.min_certainty, share),
             ("hierarchy.distance_scale", self.hierarchy.distance_scale, positive),
             ("hierarchy.correlation_power", self.hierarchy.correlation_power, (0.1, 32.0, "0.1 to 32")),
             ("hierarchy.agreement", self.hierarchy.agreement, (-1.0, 1.0, "-1 to 1")),

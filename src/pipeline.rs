@@ -139,6 +139,12 @@ impl Poser {
     }
 }
 
+/// Where the crown is, from the left, px: the mean of the points that move.
+fn crown_u(table: &TrackTable, moving: &[usize]) -> Option<f64> {
+    let sum: f64 = moving.iter().map(|&row| hierarchy::rest_position_px(table, row)[0]).sum();
+    (!moving.is_empty()).then(|| sum / moving.len() as f64)
+}
+
 /// Tracks to tree: evidence, hierarchy, 2D skeleton, 3D skeleton. `None` if too few points move.
 pub fn build(
     table: &Arc<TrackTable>,
@@ -150,7 +156,8 @@ pub fn build(
     if evidence.moving.len() < LEAST_MOVING {
         return None;
     }
-    let hierarchy = hierarchy::build(table, &evidence.moving, &config.hierarchy);
+    let foot_px = skeleton::Foot::of(outline, crown_u(table, &evidence.moving)).position_px;
+    let hierarchy = hierarchy::build(table, &evidence.moving, foot_px, &config.hierarchy);
     if hierarchy.clusters.first().is_none_or(|all| all.members.len() < LEAST_MOVING) {
         return None;
     }

@@ -56,7 +56,7 @@ fn what_moves_differently_is_cut_apart_and_what_stands_still_takes_no_part() {
     let table = pendulums();
     let evidence = hierarchy::evidence(&table, &config::Accumulate::default());
     assert_eq!(evidence.moving, (0..40).collect::<Vec<usize>>(), "the still points are told apart");
-    let tree = hierarchy::build(&table, &evidence.moving, &config::Hierarchy::default());
+    let tree = hierarchy::build(&table, &evidence.moving, [100.0, 230.0], &config::Hierarchy::default());
     let side = |c: &Cluster| c.members.iter().map(|id| id.0 / 20).collect::<BTreeSet<u32>>();
     let first: Vec<&Cluster> = tree.clusters.iter().filter(|c| c.level == 1).collect();
     assert_eq!(first.len(), 2);
@@ -69,7 +69,7 @@ fn what_moves_differently_is_cut_apart_and_what_stands_still_takes_no_part() {
 }
 
 fn cluster(parent: Option<u32>, level: u8, centroid_px: [f64; 2]) -> Cluster {
-    Cluster { parent: parent.map(ClusterId), level, members: vec![TrackId(0), TrackId(1)], centroid_px }
+    Cluster { parent: parent.map(ClusterId), level, members: vec![TrackId(0), TrackId(1)], centroid_px, certainty: 1.0 }
 }
 
 /// Trunk, two main branches, two twigs on each.

@@ -198,6 +198,9 @@ pub struct Quality {
     #[serde(default)]
     pub median_error_px: Option<f64>,
     pub lost_per_s: Option<f64>,
+    /// How sure the forks of the tree are, 0 to 1: the median over the forks.
+    #[serde(default)]
+    pub median_certainty: Option<f64>,
     /// Median distance between where the points put a node in the picture and where the 3D pose does, px.
     pub median_reprojection_px: Option<f64>,
 }

@@ -138,6 +138,7 @@ fn push_joints(root: &mut Root, model: &Model) -> Result<(), ExportError> {
         let mut extras = json!({
             "level": node.level,
             "n_tracks": node.n_tracks,
+            "certainty": node.certainty,
             "copy_of": original.map(|c| c.0),
         });
         if let (Some(all), Some(Value::Object(more))) = (extras.as_object_mut(), model.node_extras.get(i)) {

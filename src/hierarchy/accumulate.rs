@@ -1,6 +1,6 @@
 //! When enough motion has been seen to build the tree, judged from the tracks alone.
 
-use super::affinity::Velocities;
+use super::signals::Signals;
 use crate::config::Accumulate;
 use crate::signal::along_principal_direction;
 use crate::track::{TrackHistory, TrackTable};
@@ -16,7 +16,7 @@ const NOISE_FLOOR_PX: f64 = 0.1;
 /// Signal-to-noise ratio at which the motion term has reached 1 - 1/e.
 const SNR_SCALE: f64 = 8.0;
 /// Sways of the whole tree after which the sway term has reached 1 - 1/e.
-const SWAYS_SCALE: f64 = 1.0;
+const SWAYS_SCALE: f64 = 2.0;
 /// A sway counts when it goes this share of the root mean square displacement beyond the middle, on both sides.
 const SWAY_HYSTERESIS: f64 = 0.2;
 /// Moving points below which the evidence counts for less.
@@ -32,7 +32,7 @@ pub struct Evidence {
     /// Correlation between the affinities from one half of the time and from the other, 0 to 1: if the tree's
     /// structure is in the tracks, both halves (blocks of half a second, dealt in turn) tell the same one.
     pub stability: f64,
-    /// 1 - exp(-n), with n the number of times that the tree as a whole has swayed to and fro: branches that swing
+    /// 1 - exp(-n / 2), with n the number of times that the tree as a whole has swayed to and fro: branches that swing
     /// at different rates are apart for sure only after some periods of the slowest.
     pub sway: f64,
     /// Rows of the table whose points move.
@@ -79,7 +79,7 @@ fn noise_px(table: &TrackTable, row: usize) -> f64 {
 
 /// How often the mean of the moving points has swung to and fro along its principal direction.
 fn sways(table: &TrackTable, moving: &[usize]) -> f64 {
-    let steps = Velocities::new(table, moving, |_| true).mean();
+    let steps = Signals::velocities(table, moving, |_| true).mean();
     let mut at = [0.0; 2];
     let path: Vec<[f64; 2]> = steps
         .iter()
@@ -105,7 +105,7 @@ fn stability(table: &TrackTable, moving: &[usize]) -> f64 {
     let some: Vec<usize> = moving.iter().copied().step_by(stride).collect();
     let start_s = table.times_s.first().copied().unwrap_or(0.0);
     let half = |k: usize| (((table.times_s[k] - start_s) / BLOCK_S) as u64).is_multiple_of(2);
-    let (even, odd) = (Velocities::new(table, &some, half), Velocities::new(table, &some, |k| !half(k)));
+    let (even, odd) = (Signals::velocities(table, &some, half), Signals::velocities(table, &some, |k| !half(k)));
     let pairs = (0..some.len()).flat_map(|a| (a + 1..some.len()).map(move |b| (a, b)));
     let (x, y): (Vec<f64>, Vec<f64>) =
         pairs.map(|(a, b)| (f64::from(even.correlation(a, b)), f64::from(odd.correlation(a, b)))).unzip();

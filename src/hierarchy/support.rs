@@ -1,6 +1,6 @@
 //! Which of two trees is better borne out by the motion of their points.
 
-use super::affinity::Velocities;
+use super::signals::Signals;
 use crate::track::TrackTable;
 
 /// Points that are compared in threes; more say the same at a higher price (64 make 41,664 triplets).
@@ -27,13 +27,13 @@ pub struct Gain {
 /// most alike.
 ///
 /// A triplet counts by how clearly the motion tells its nearest pair from the next; pairs that a tree holds equally near
-/// share the point. It is the measure by which trees are held against a known truth, with the correlation of velocities
+/// share the point. It is the measure by which trees are held against a known truth, with the correlation of displacements
 /// in the truth's place, so it speaks of all levels alike and does not care how many splits a tree has. The error is the
 /// jackknife's over points, to first order.
 pub fn gain(table: &TrackTable, points: &[OnBoth]) -> Gain {
     let some: Vec<&OnBoth> = points.iter().step_by(points.len().div_ceil(COMPARED).max(1)).collect();
     let rows: Vec<usize> = some.iter().map(|p| p.row).collect();
-    let alike = Velocities::new(table, &rows, |_| true).correlations();
+    let alike = Signals::displacements(table, &rows).correlations();
     let n = some.len();
     let depths = |chain: fn(&OnBoth) -> &[u32]| -> Vec<Vec<usize>> {
         let shared = |a: &OnBoth, b: &OnBoth| chain(a).iter().zip(chain(b)).take_while(|(p, q)| p == q).count();

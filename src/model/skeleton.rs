@@ -31,6 +31,8 @@ pub struct Node {
     pub radius: f64,
     /// Points that move with this node or one below it; 0 for a copy, which nothing was measured on.
     pub n_tracks: u32,
+    /// How sure it is that the branches above part here, 0 to 1; 0 at a tip, and at the foot, which nothing parts from.
+    pub certainty: f32,
     /// The measured node that this one repeats on a plane turned about the trunk.
     pub copy_of: Option<NodeId>,
     /// Angle by which the copy's plane is turned about the y axis, radians; 0 for a measured node.

@@ -154,6 +154,7 @@ struct NodeJson {
     z: f64,
     radius: f64,
     n_tracks: u32,
+    certainty: f32,
     copy_of: Option<u32>,
 }
 
@@ -166,7 +167,8 @@ pub(super) fn skeleton_json(
     let nodes = skeleton.nodes.iter().map(|n| {
         let id_of = |n: Option<NodeId>| n.and_then(|n| skeleton.name_of(n)).map(|name| name.0);
         let (id, parent, copy_of, p) = (n.name.0, id_of(n.parent), id_of(n.copy_of), n.position);
-        NodeJson { id, parent, level: n.level, x: p.x, y: p.y, z: p.z, radius: n.radius, n_tracks: n.n_tracks, copy_of }
+        let (n_tracks, certainty) = (n.n_tracks, n.certainty);
+        NodeJson { id, parent, level: n.level, x: p.x, y: p.y, z: p.z, radius: n.radius, n_tracks, certainty, copy_of }
     });
     let size = skeleton.image_size;
     let foot_px = skeleton.foot_px;

@@ -114,7 +114,9 @@ const SKELETON: &str = r#"{
     "nodes": {"type": "array", "items": {"type": "object", "properties": {
       "parent": {"type": ["integer", "null"]}, "level": {"type": "integer"},
       "x": {"type": "number"}, "y": {"type": "number"}, "z": {"type": "number"},
-      "radius": {"type": "number"}, "n_tracks": {"type": "integer"}, "copy_of": {"type": ["integer", "null"]}
+      "radius": {"type": "number"}, "n_tracks": {"type": "integer"},
+      "certainty": {"type": "number", "description": "how sure it is that the branches above part here, 0 to 1; 0 at a tip"},
+      "copy_of": {"type": ["integer", "null"]}
     }}}
   }
 }"#;

@@ -265,6 +265,7 @@ fn describe(
             median_fb_error_px: quality.fb_error_px.median(),
             median_error_px: quality.error_px.median(),
             lost_per_s: (tracked_s > 0.0).then(|| quality.lost as f64 / tracked_s),
+            median_certainty: job.tree.as_ref().and_then(|tree| tree.hierarchy.median_certainty()),
             median_reprojection_px,
         },
         model,

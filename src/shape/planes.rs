@@ -29,6 +29,7 @@ pub fn copy_to_planes(
             position: if i == 0 { Point3::origin() } else { envelope.clamp(&model(n.position_px)) },
             radius: 1.0,
             n_tracks,
+            certainty: n.certainty,
             copy_of: None,
             plane_angle: 0.0,
         })

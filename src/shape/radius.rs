@@ -59,6 +59,7 @@ mod tests {
             position: Point3::origin(),
             radius: 0.0,
             n_tracks: 0,
+            certainty: 0.0,
             copy_of: copy_of.map(NodeId),
             plane_angle: 0.0,
         }

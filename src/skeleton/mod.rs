@@ -13,12 +13,15 @@ pub struct Node2d {
     /// The cluster that moves the node; `None` for the foot, which stands still.
     pub cluster: Option<ClusterId>,
     pub position_px: [f64; 2],
+    /// As [`Cluster::certainty`](crate::model::Cluster::certainty).
+    pub certainty: f32,
 }
 
 /// The 2D skeleton T' of the paper: cluster centroids, folded. Node 0 is the foot, node k + 1 belongs to cluster k.
 pub fn build(hierarchy: &MotionHierarchy, outline: &Outline, settings: &config::Skeleton) -> Vec<Node2d> {
     let crown_u = hierarchy.clusters.first().map(|all| all.centroid_px[0]);
-    let foot = Node2d { parent: None, level: 0, cluster: None, position_px: Foot::of(outline, crown_u).position_px };
+    let position_px = Foot::of(outline, crown_u).position_px;
+    let foot = Node2d { parent: None, level: 0, cluster: None, position_px, certainty: 0.0 };
     let mut nodes = vec![foot];
     for (k, c) in hierarchy.clusters.iter().enumerate() {
         nodes.push(Node2d {
@@ -26,6 +29,7 @@ pub fn build(hierarchy: &MotionHierarchy, outline: &Outline, settings: &config::
             level: c.level + 1,
             cluster: Some(ClusterId(k as u32)),
             position_px: c.centroid_px,
+            certainty: c.certainty,
         });
     }
     let mut has_children = vec![false; nodes.len()];

@@ -25,6 +25,7 @@ pub fn tree(levels: u8, planes: usize) -> Skeleton {
         position,
         radius: 0.0,
         n_tracks: 400 >> level,
+        certainty: 0.75,
         copy_of: None,
         plane_angle: 0.0,
     };

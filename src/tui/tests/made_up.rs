@@ -23,6 +23,7 @@ pub fn skeleton() -> Skeleton {
         position: Point3::new(x, y, z),
         radius: 8.0 / (1.0 + level as f64),
         n_tracks: if copy_of.is_some() { 0 } else { 40 },
+        certainty: 0.75,
         copy_of: copy_of.map(NodeId),
         plane_angle: if copy_of.is_some() { 1.57 } else { 0.0 },
     };

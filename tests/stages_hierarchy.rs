@@ -1,0 +1,242 @@
+//! The hierarchy on made-up trees whose branches and motion are known.
+
+use arborcam::config::{Accumulate, Affinity, Hierarchy};
+use arborcam::hierarchy;
+use arborcam::model::{Cluster, MotionHierarchy, TrackId};
+use arborcam::track::TrackTable;
+use std::collections::BTreeSet;
+use std::f64::consts::TAU;
+
+const FOOT: [f64; 2] = [150.0, 300.0];
+
+/// What the wind or a release does to a branch: an angle in radians at a time in seconds.
+type Sway = fn(usize, f64) -> f64;
+
+/// Pulled and released: every branch swings on at its own rate.
+fn released(branch: usize, t: f64) -> f64 {
+    let hz = [0.6, 0.8, 1.1, 0.95, 1.3][branch];
+    0.06 * (-0.04 * TAU * hz * t).exp() * (TAU * hz * t).cos()
+}
+
+/// Gusts that all share, and turbulence of each branch's own.
+fn blown(branch: usize, t: f64) -> f64 {
+    let gust: f64 = (1..6).map(|k| (TAU * 0.13 * f64::from(k) * t + f64::from(k * k)).sin()).sum();
+    let own: f64 =
+        (1..9).map(|k| (TAU * 0.21 * f64::from(k) * t + f64::from(k * k) * (1.3 + branch as f64)).sin()).sum();
+    0.012 * gust + 0.02 * own
+}
+
+fn still_on_the_trunk(branch: usize, t: f64) -> f64 {
+    if branch == 0 { released(0, t) } else { 0.0 }
+}
+
+/// -1 to 1, the same every time.
+fn noise(seed: usize) -> f64 {
+    let mut x = (seed as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0xdead_beef;
+    for _ in 0..3 {
+        x ^= x << 13;
+        x ^= x >> 7;
+        x ^= x << 17;
+    }
+    (x >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+}
+
+/// A trunk (0) with three branches, leaving at three heights, to the left, right and left; the right one (2) has two
+/// of its own (3, 4). The points lie along the branches; every point of a branch turns about its joint, on top of what
+/// its parent does. `of` holds each row's branch.
+fn tree(points: usize, sway: Sway, noise_px: f64) -> (TrackTable, Vec<usize>) {
+    // Parent, joint, tip.
+    const BRANCHES: [(usize, [f64; 2], [f64; 2]); 5] = [
+        (0, FOOT, [150.0, 60.0]),
+        (0, [150.0, 220.0], [60.0, 150.0]),
+        (0, [150.0, 170.0], [215.0, 120.0]),
+        (2, [215.0, 120.0], [215.0, 40.0]),
+        (2, [215.0, 120.0], [280.0, 110.0]),
+    ];
+    let times_s: Vec<f64> = (0..150).map(|k| f64::from(k) / 15.0).collect();
+    let of: Vec<usize> = (0..points).map(|i| i % 5).collect();
+    let path = |i: usize| {
+        let along = 0.15 + 0.85 * ((i / 5) as f64 * 0.618_034).fract();
+        let (_, joint, tip) = BRANCHES[of[i]];
+        let aside = 3.0 * noise(i);
+        let rest = [joint[0] + along * (tip[0] - joint[0]) + aside, joint[1] + along * (tip[1] - joint[1])];
+        let place = |(k, &t): (usize, &f64)| {
+            let (mut at, mut branch) = (rest, of[i]);
+            loop {
+                let (parent, joint, _) = BRANCHES[branch];
+                let (sin, cos) = sway(branch, t).sin_cos();
+                let d = [at[0] - joint[0], at[1] - joint[1]];
+                if branch == 0 {
+                    // A trunk bends: what is higher moves farther, and all to the same side.
+                    at[0] -= sin * d[1];
+                    break;
+                }
+                at = [joint[0] + cos * d[0] - sin * d[1], joint[1] + sin * d[0] + cos * d[1]];
+                branch = parent;
+            }
+            let shake = |c: usize| noise_px * noise(2 * (i * 1000 + k) + c);
+            // Now and then a point is not seen.
+            let seen = !(i * 31 + k).is_multiple_of(37);
+            seen.then(|| [(at[0] + shake(0)) as f32, (at[1] + shake(1)) as f32])
+        };
+        times_s.iter().enumerate().map(place).collect()
+    };
+    let table = TrackTable {
+        ids: (0..points as u32).map(TrackId).collect(),
+        positions: (0..points).map(path).collect(),
+        fb_errors_px: vec![noise_px.max(0.01) as f32; points],
+        times_s: times_s.clone(),
+    };
+    (table, of)
+}
+
+fn built(table: &TrackTable, settings: &Hierarchy) -> MotionHierarchy {
+    let moving = hierarchy::evidence(table, &Accumulate::default()).moving;
+    hierarchy::build(table, &moving, FOOT, settings)
+}
+
+/// What everything after the hierarchy takes for granted.
+fn assert_sound(tree: &MotionHierarchy, settings: &Hierarchy) {
+    for (k, c) in tree.clusters.iter().enumerate() {
+        assert!(c.members.windows(2).all(|m| m[0] < m[1]), "members of {k} are ordered");
+        assert!((0.0..=1.0).contains(&c.certainty), "certainty of {k}: {}", c.certainty);
+        assert!(u32::from(c.level) < settings.levels, "level of {k}");
+        let of_k = |c: &&Cluster| c.parent.is_some_and(|p| p.0 as usize == k);
+        let children: Vec<_> = tree.clusters.iter().filter(of_k).collect();
+        let most = if settings.affinity == Affinity::Zeng { 64 } else { settings.max_children as usize };
+        assert!(children.is_empty() || (2..=most).contains(&children.len()), "{} children of {k}", children.len());
+        let mut seen = BTreeSet::new();
+        for child in children {
+            assert!(child.level == c.level + 1);
+            assert!(child.members.len() >= 2, "a branch has more than one point");
+            assert!(
+                child.members.iter().all(|id| c.members.contains(id) && seen.insert(*id)),
+                "children share no point"
+            );
+        }
+        match c.parent {
+            Some(p) => assert!((p.0 as usize) < k),
+            None => assert!(k == 0 && c.level == 0),
+        }
+    }
+}
+
+/// Share of the pairs on one branch that part later than either does from a point of another branch.
+fn kept_together(tree: &MotionHierarchy, of: &[usize]) -> f64 {
+    let mut clusters: Vec<Vec<usize>> = vec![Vec::new(); of.len()];
+    for (k, c) in tree.clusters.iter().enumerate() {
+        c.members.iter().for_each(|id| clusters[id.0 as usize].push(k));
+    }
+    let depth = |a: usize, b: usize| clusters[a].iter().zip(&clusters[b]).take_while(|(x, y)| x == y).count();
+    let placed: Vec<usize> = tree.clusters[0].members.iter().map(|id| id.0 as usize).collect();
+    let (mut good, mut all) = (0.0, 0.0);
+    for (n, &a) in placed.iter().enumerate() {
+        for &b in &placed[n + 1..] {
+            for k in 0..4 {
+                let c = placed[(n * 7 + b * 13 + k) % placed.len()];
+                // Points of the trunk ride with whatever is near them.
+                if of[a] != of[b] || of[c] == of[a] || of[a] == 0 || of[c] == 0 {
+                    continue;
+                }
+                all += 1.0;
+                good += f64::from(u8::from(depth(a, b) > depth(a, c).max(depth(b, c))));
+            }
+        }
+    }
+    good / all
+}
+
+#[test]
+fn points_of_a_branch_come_together_after_a_release_and_in_wind() {
+    for (name, sway) in [("released", released as Sway), ("blown", blown)] {
+        let (table, of) = tree(200, sway, 0.1);
+        let settings = Hierarchy::default();
+        let tree = built(&table, &settings);
+        assert_sound(&tree, &settings);
+        let share = kept_together(&tree, &of);
+        assert!(share > 0.9, "{name}: {share:.3} of the pairs, {} clusters", tree.clusters.len());
+        // The twigs of the right branch part from each other later than from the left one.
+        let side = |c: &Cluster| {
+            let mut count = [0usize; 5];
+            c.members.iter().for_each(|id| count[of[id.0 as usize]] += 1);
+            count
+        };
+        let right = tree.clusters.iter().skip(1).map(side).any(|n| n[3] > 20 && n[4] > 20 && n[1] == 0);
+        assert!(right, "{name}: {:?}", tree.clusters.iter().map(side).collect::<Vec<_>>());
+    }
+}
+
+/// A tree that sways as one piece has no branches to be told apart; whatever comes out is made of noise.
+#[test]
+fn a_tree_that_sways_as_one_piece_is_not_taken_apart() {
+    let all_made = Hierarchy { min_certainty: 0.0, ..Hierarchy::default() };
+    for noise_px in [0.05, 0.3] {
+        let (table, _) = tree(200, still_on_the_trunk, noise_px);
+        let (careful, careless) = (built(&table, &Hierarchy::default()), built(&table, &all_made));
+        let sure = careful.clusters.iter().filter(|c| c.certainty >= 0.5).count();
+        println!("{noise_px} px: {} clusters, {} if all are made", careful.clusters.len(), careless.clusters.len());
+        assert!(3 * careful.clusters.len() < careless.clusters.len(), "{noise_px} px: {sure} sure splits");
+    }
+    let (table, _) = tree(200, released, 0.1);
+    let swaying = built(&table, &Hierarchy::default());
+    let sure = swaying.clusters.iter().filter(|c| c.certainty >= 0.5).count();
+    assert!(sure >= 4, "a tree with five branches has {sure} sure splits");
+    assert!(swaying.median_certainty().expect("splits") > 0.5);
+}
+
+/// The published parameters: levels 4 to 7, 100 to 2,000 points, and both ways of putting points together.
+#[test]
+fn every_published_setting_gives_a_sound_tree() {
+    for points in [100, 400, 2000] {
+        let (table, of) = tree(points, released, 0.1);
+        for affinity in [Affinity::Path, Affinity::Zeng] {
+            for levels in if points > 400 { 7..=7 } else { 4..=7 } {
+                let max_children = if affinity == Affinity::Zeng { 2 } else { 4 };
+                let settings = Hierarchy { levels, affinity, max_children, ..Hierarchy::default() };
+                let tree = built(&table, &settings);
+                assert_sound(&tree, &settings);
+                let share = kept_together(&tree, &of);
+                // Few levels leave several branches in one cluster.
+                let least = if affinity == Affinity::Zeng { 0.6 } else { [0.7, 0.85][usize::from(levels > 5)] };
+                assert!(share > least, "{points} points, {levels} levels, {affinity:?}: {share:.3}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_same_tracks_give_the_same_tree() {
+    let (table, _) = tree(150, blown, 0.2);
+    let settings = Hierarchy::default();
+    assert_eq!(built(&table, &settings), built(&table, &settings));
+}
+
+/// Whatever a tracker may hand over: nothing, one point, points never seen, all in one place, far outside the picture.
+#[test]
+fn useless_tracks_give_a_small_tree_or_none_and_no_failure() {
+    let times_s: Vec<f64> = (0..30).map(|k| f64::from(k) / 15.0).collect();
+    let place = |kind: usize, i: usize, k: usize| match kind {
+        0 => None,
+        1 => Some([5.0, 5.0]),
+        2 => (k == i).then_some([1.0, 2.0]),
+        3 => Some([1e7 + i as f32, k as f32 * 1e6]),
+        _ => Some([f32::NAN, f32::INFINITY]),
+    };
+    for affinity in [Affinity::Path, Affinity::Zeng] {
+        let settings = Hierarchy { affinity, agreement: -1.0, min_certainty: 0.0, ..Hierarchy::default() };
+        for kind in 0..5 {
+            for n in [0usize, 1, 2, 3, 20] {
+                for times in [0, 1, 2, 30] {
+                    let table = TrackTable {
+                        ids: (0..n as u32).map(TrackId).collect(),
+                        times_s: times_s[..times].to_vec(),
+                        positions: (0..n).map(|i| (0..times).map(|k| place(kind, i, k)).collect()).collect(),
+                        fb_errors_px: vec![0.0; n],
+                    };
+                    let rows: Vec<usize> = (0..n).collect();
+                    assert_sound(&hierarchy::build(&table, &rows, FOOT, &settings), &settings);
+                }
+            }
+        }
+    }
+}
