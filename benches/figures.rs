@@ -9,7 +9,7 @@ use arborcam::config::{Config, Detect};
 use arborcam::hierarchy::{self, COMPARE_HZ, Evidence, evidence, evidence_of};
 use arborcam::model::{Frame, Luma, Outline, TrackId, TrackSet};
 use arborcam::outline::whole;
-use arborcam::pipeline::{self, Pipeline, Tree};
+use arborcam::pipeline::{self, Moment, Pipeline, Tree};
 use arborcam::source::{self, Decoder};
 use arborcam::track::{OpticalFlow, Pyramid, TrackHistory, TrackTable, Tracker};
 use criterion::Criterion;
@@ -146,8 +146,8 @@ fn gathered() -> (TrackHistory, Arc<Outline>, Vec<TrackSet>) {
 fn built(history: &TrackHistory, outline: &Arc<Outline>) -> Tree {
     let config = Config::default();
     let evidence = evidence_of(history, &config.accumulate);
-    let table = history.table(1.0 / COMPARE_HZ);
-    pipeline::build(&table, evidence, outline, &config, (0, &Default::default(), false)).expect("a tree")
+    let table = Arc::new(history.table(1.0 / COMPARE_HZ));
+    pipeline::build(&table, evidence, outline, &config, Moment::default()).expect("a tree")
 }
 
 /// The recording's tracks over and over until there are `points` that move, each some pixels beside its model.

@@ -127,6 +127,8 @@ pub struct Accumulate {
     pub threshold: f64,
     /// A point moves if its displacement is so many times the tracking noise.
     pub moving_snr: f64,
+    /// For so long after it was built the tree is refined as more is seen, s; 0 never.
+    pub refine_s: f64,
 }
 
 /// 2D skeleton (000 appendix A).
@@ -220,7 +222,7 @@ impl Default for Track {
 }
 impl Default for Accumulate {
     fn default() -> Self {
-        Self { window_s: 20.0, min_s: 8.0, threshold: 0.4, moving_snr: 4.0 }
+        Self { window_s: 20.0, min_s: 8.0, threshold: 0.4, moving_snr: 4.0, refine_s: 120.0 }
     }
 }
 impl Default for Skeleton {
@@ -296,7 +298,7 @@ impl Config {
     pub fn check(&self) -> Result<(), ConfigError> {
         let positive = (f64::MIN_POSITIVE, 1e9, "greater than 0");
         let share = (0.0, 1.0, "0 to 1");
-        let rules: [(&'static str, f64, (f64, f64, &'static str)); 33] = [
+        let rules = vec![
             ("camera.width", self.camera.width.into(), (16.0, 16384.0, "16 to 16384")),
             ("camera.height", self.camera.height.into(), (16.0, 16384.0, "16 to 16384")),
             ("camera.rate_hz", self.camera.rate_hz.into(), (1.0, 1000.0, "1 to 1000")),
@@ -316,6 +318,7 @@ impl Config {
             ("accumulate.min_s", self.accumulate.min_s, (0.2, 100.0, "0.2 to 100")),
             ("accumulate.threshold", self.accumulate.threshold, share),
             ("accumulate.moving_snr", self.accumulate.moving_snr, positive),
+            ("accumulate.refine_s", self.accumulate.refine_s, (0.0, 3600.0, "0 (never) to 3600")),
             ("hierarchy.levels", self.hierarchy.levels.into(), (2.0, 10.0, "2 to 10")),
             ("hierarchy.motion_power", self.hierarchy.motion_power, (0.1, 32.0, "0.1 to 32")),
             ("hierarchy.path_weight", self.hierarchy.path_weight, (0.0, 100.0, "0 to 100")),

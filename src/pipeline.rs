@@ -1,19 +1,22 @@
 //! The whole algorithm on one screen: what arborcam means, one synchronous step per frame.
 //!
-//! The front end finds the outline and follows points; the back end gathers their motion, builds the tree once, and
-//! from then on poses it. `runtime` runs the same two halves on threads of their own.
+//! The front end finds the outline and follows points; the back end gathers their motion, builds the tree, and
+//! from then on poses it and now and then builds it anew. `runtime` runs the same two halves on threads of their own.
 
 mod back;
 mod front;
+mod refine;
+mod refiner;
 mod retrace;
 
 pub use back::{BackEnd, Moved};
 pub use front::{Followed, FrontEnd};
+pub use refine::Refinement;
 pub use retrace::Retrace;
 
 use crate::config::Config;
 use crate::hierarchy::{self, Evidence};
-use crate::model::{Frame, MotionHierarchy, Outline, Pose, Skeleton, TrackId, TrackSet};
+use crate::model::{Frame, MotionHierarchy, NodeId, Outline, Pose, Skeleton, TrackId, TrackSet};
 use crate::motion::{Binding, PoseEstimator};
 use crate::track::TrackTable;
 use crate::{shape, skeleton};
@@ -64,14 +67,48 @@ pub struct Tree {
     /// Frame after which it was built, and its time.
     pub frame: u64,
     pub time_s: f64,
+    /// First frame that was posed by it live.
+    pub shown_from: u64,
     pub evidence: Evidence,
+    /// The tracks that it was built from.
+    pub table: Arc<TrackTable>,
     /// Built before the measure reached its threshold: asked for, or at the end of the frames.
+    pub forced: bool,
+    /// How the first tree of the capture came about: this one, unless it is refined.
+    pub first: First,
+    /// How often the tree was built anew, the names that have been given so far, and how many of the measured nodes have
+    /// one from the tree before.
+    pub refinements: u32,
+    pub names: u32,
+    pub kept: usize,
+    /// Tracks that older trees knew and this one was not built from, with node and rest place, px.
+    pub inherited: BTreeMap<TrackId, (NodeId, [f64; 2])>,
+}
+
+/// How the first tree of a capture came about.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct First {
+    pub frame: u64,
+    pub time_s: f64,
+    pub measure: f64,
+    pub moving: usize,
+    pub forced: bool,
+}
+
+/// When a tree is built: the first frame that is remembered, the newest, its time, and whether the build was asked for.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Moment {
+    pub followed_from: u64,
+    pub frame: u64,
+    pub time_s: f64,
     pub forced: bool,
 }
 
 impl Tree {
     pub fn binding(&self) -> Binding {
-        Binding::new(&self.hierarchy, &self.rest_px, &self.skeleton)
+        let mut binding = Binding::new(&self.hierarchy, &self.rest_px, &self.skeleton);
+        binding.inherit(&self.inherited);
+        binding
     }
 
     pub fn estimator(&self, config: &Config) -> PoseEstimator {
@@ -110,11 +147,11 @@ fn crown_u(table: &TrackTable, moving: &[usize]) -> Option<f64> {
 
 /// Tracks to tree: evidence, hierarchy, 2D skeleton, 3D skeleton. `None` if too few points move.
 pub fn build(
-    table: &TrackTable,
+    table: &Arc<TrackTable>,
     evidence: Evidence,
     outline: &Arc<Outline>,
     config: &Config,
-    (followed_from, last, forced): (u64, &TrackSet, bool),
+    Moment { followed_from, frame, time_s, forced }: Moment,
 ) -> Option<Tree> {
     if evidence.moving.len() < LEAST_MOVING {
         return None;
@@ -131,14 +168,22 @@ pub fn build(
     let trunk_px = TRUNK_SHARE * skeleton::Foot::of(outline, None).half_width_px;
     shape::pipe_model(&mut skeleton, trunk_px.max(2.0 * TIP_RADIUS_PX), TIP_RADIUS_PX);
     let rest = |row: usize| (table.ids[row], hierarchy::rest_position_px(table, row));
+    let first = First { frame, time_s, measure: evidence.measure, moving: evidence.moving.len(), forced };
     Some(Tree {
         rest_px: (0..table.ids.len()).map(rest).collect(),
         hierarchy,
+        table: table.clone(),
+        first,
+        refinements: 0,
+        names: skeleton.nodes.len() as u32,
+        kept: 0,
+        inherited: BTreeMap::new(),
         skeleton: Arc::new(skeleton),
         outline: outline.clone(),
         followed_from,
-        frame: last.frame,
-        time_s: last.time_s,
+        frame,
+        time_s,
+        shown_from: frame,
         evidence,
         forced,
     })

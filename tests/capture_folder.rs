@@ -96,16 +96,24 @@ fn made() -> &'static Replay {
     MADE.get_or_init(|| replay(&[], &["--outline", OUTLINE, "--stream", "ndjson"]))
 }
 
+/// Row of the node that is called `id`.
+fn place(nodes: &[Vec<String>], id: &str) -> usize {
+    nodes.iter().position(|n| n[0] == id).unwrap_or_else(|| panic!("no node is called {id:?}"))
+}
+
 #[test]
 fn the_tree_stands_on_its_foot_and_parents_come_first() {
     let nodes = made().nodes();
     assert!(nodes.len() > 100, "{} nodes", nodes.len());
     assert_eq!(nodes[0][1], "", "the root has no parent");
     assert_eq!([6, 7, 8].map(|c| number(&nodes[0][c])), [0.0; 3], "the foot is the origin");
+    assert_eq!([0, 1].map(|i| index(&nodes[i][0])), [0, 1], "foot and trunk are 0 and 1");
     for (i, node) in nodes.iter().enumerate() {
-        assert_eq!(index(&node[0]), i);
-        assert!(i == 0 || index(&node[1]) < i, "node {i} stands before its parent {}", node[1]);
-        assert!(i == 0 || index(&node[2]) == index(&nodes[index(&node[1])][2]) + 1, "level of node {i}");
+        let place = |id: &str| nodes[..i].iter().position(|n| n[0] == id);
+        assert!(place(&node[0]).is_none(), "two nodes are called {}", node[0]);
+        let parent = place(&node[1]);
+        assert!(i == 0 || parent.is_some(), "node {i} stands before its parent {}", node[1]);
+        assert!(parent.is_none_or(|p| index(&node[2]) == index(&nodes[p][2]) + 1), "level of node {i}");
         assert!(number(&node[9]) > 0.0, "radius of node {i}");
         // Nothing is claimed that has not been identified.
         assert!(node[16] == "true" || (10..16).all(|c| node[c].is_empty()), "node {i} claims {:?}", &node[10..]);
@@ -114,10 +122,11 @@ fn the_tree_stands_on_its_foot_and_parents_come_first() {
 
 #[test]
 fn every_node_is_posed_in_every_frame_those_before_the_build_among_them() {
-    let (motion, nodes) = (made().motion(), made().nodes().len());
+    let (motion, names) = (made().motion(), made().nodes());
+    let nodes = names.len();
     assert_eq!(motion.len(), nodes * recording().len());
     for (k, row) in motion.iter().enumerate() {
-        assert_eq!((row.frame, row.node), (k / nodes, k % nodes));
+        assert_eq!((row.frame, row.node), (k / nodes, index(&names[k % nodes][0])));
     }
     // The tree moves, also in the frames from before it was known.
     let build = made().capture()["build"]["frame"].as_u64().expect("build.frame") as usize;
@@ -138,7 +147,7 @@ fn branches_keep_their_lengths() {
     let mut reach: Vec<(f64, f64)> = vec![(f64::MAX, 0.0); nodes.len()];
     for pose in motion.chunks(nodes.len()) {
         for (i, node) in nodes.iter().enumerate().skip(1) {
-            let parent = pose[index(&node[1])].at;
+            let parent = pose[place(&nodes, &node[1])].at;
             let length = (0..3).map(|c| (pose[i].at[c] - parent[c]).powi(2)).sum::<f64>().sqrt();
             reach[i] = (reach[i].0.min(length), reach[i].1.max(length));
         }
@@ -175,11 +184,10 @@ fn times_are_the_files_own() {
 
 #[test]
 fn tracks_belong_to_nodes_that_exist_and_keep_their_ids() {
-    let (measured, coast) = {
-        let capture = made().capture();
-        let model = |key: &str| capture["model"][key].as_u64().expect("count") as usize;
-        (model("nodes") - model("copies"), capture["config"]["track"]["coast_frames"].as_u64().expect("coast") as usize)
-    };
+    let (capture, nodes) = (made().capture(), made().nodes());
+    let model = |key: &str| capture["model"][key].as_u64().expect("count") as usize;
+    let measured: BTreeSet<&str> = nodes[..model("nodes") - model("copies")].iter().map(|n| n[0].as_str()).collect();
+    let coast = capture["config"]["track"]["coast_frames"].as_u64().expect("coast") as usize;
     let mut last: BTreeMap<usize, usize> = BTreeMap::new();
     let mut bound = 0;
     let tracks = made().tracks();
@@ -188,7 +196,7 @@ fn tracks_belong_to_nodes_that_exist_and_keep_their_ids() {
         if let Some(before) = last.insert(id, frame) {
             assert!(frame > before && frame - before <= coast + 1, "track {id} is back after {before} in {frame}");
         }
-        assert!(row[5].is_empty() || index(&row[5]) < measured, "{row:?}");
+        assert!(row[5].is_empty() || measured.contains(row[5].as_str()), "{row:?}");
         bound += usize::from(!row[5].is_empty());
     }
     assert!(bound * 2 > tracks.len(), "{bound} of {} observations belong to a node", tracks.len());
@@ -236,8 +244,14 @@ fn capture_json_says_what_was_seen() {
 
 #[test]
 fn the_stream_is_what_the_capture_says() {
-    let (motion, nodes) = (made().motion(), made().nodes().len());
-    let build = made().capture()["build"]["frame"].as_u64().expect("build.frame") as usize;
+    let (motion, names, capture) = (made().motion(), made().nodes(), made().capture());
+    let nodes = names.len();
+    let frame =
+        |key: &str| capture.pointer(key).and_then(|f| f.as_u64()).unwrap_or_else(|| panic!("no {key}")) as usize;
+    let (build, refined) = (frame("/build/frame"), frame("/refinement/shown_from"));
+    assert!(build < refined && refined < recording().len(), "built in {build}, refined in {refined}");
+    assert_eq!(capture["refinement"]["count"], 1);
+    let (mut kept_names, mut measured_names) = (0, 0);
     let lines: Vec<serde_json::Value> =
         made().stream.lines().map(|l| serde_json::from_str(l).unwrap_or_else(|e| panic!("{l}: {e}"))).collect();
     assert_eq!(lines.len(), recording().len() - build, "a line for each frame from the build on");
@@ -246,13 +260,20 @@ fn the_stream_is_what_the_capture_says() {
         assert_eq!(line["frame"], frame);
         let streamed = line["nodes"].as_array().expect("nodes");
         for node in streamed {
-            let id = node[0].as_u64().expect("id") as usize;
-            let kept = &motion[frame * nodes + id];
+            let id = node[0].as_u64().expect("id").to_string();
+            if frame < refined {
+                // The tree as it was then: most of its nodes are in the files, and are the same branches.
+                kept_names += usize::from(frame + 1 == refined && names.iter().any(|n| n[0] == id));
+                measured_names += usize::from(frame + 1 == refined);
+                continue;
+            }
+            let kept = &motion[frame * nodes + place(&names, &id)];
             let off = (0..3).map(|c| (node[c + 1].as_f64().expect("number") - kept.at[c]).abs()).fold(0.0, f64::max);
             assert!(off < 0.001, "frame {frame} node {id}: {node} and {:?}", kept.at);
         }
         assert!(streamed.len() > 50, "{} nodes", streamed.len());
     }
+    assert!(4 * kept_names >= 3 * measured_names, "{kept_names} of {measured_names} nodes keep their numbers");
 }
 
 /// The same clip gives the same bytes, however the threads happen to run.

@@ -6,7 +6,7 @@ use arborcam::config::Config;
 use arborcam::export::capture::{self, Capture, Gap, MAX_GAPS, ModelNote, Quality, SCHEMA_VERSION, Timing};
 use arborcam::export::csv::{MotionCsv, Sway, TracksCsv, nodes};
 use arborcam::export::{ExportError, OutputFolder};
-use arborcam::model::{NodeId, Observation, TrackId, TrackSet};
+use arborcam::model::{NodeId, NodeName, Observation, TrackId, TrackSet};
 use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
@@ -21,7 +21,7 @@ fn tracks_have_the_agreed_columns_and_an_empty_cell_where_no_node_is() {
     let o =
         |id, u_px| Observation { id: TrackId(id), u_px, v_px: 7.0, fb_error_px: 0.1, error_px: None, confirmed: true };
     let set = TrackSet { frame: 3, time_s: 0.1, observations: vec![o(1, 10.25), o(2, 0.0)], ..TrackSet::default() };
-    csv.set(&set, |id| (id == TrackId(1)).then_some(NodeId(5))).unwrap();
+    csv.set(&set, |id| (id == TrackId(1)).then_some(NodeName(5))).unwrap();
     csv.row(TrackId(9), 4, 1.0 / 3.0, [f64::NAN, -0.0], None).unwrap();
     let expected = "track_id,frame,time_s,u_px,v_px,node_id\n1,3,0.1,10.25,7,5\n2,3,0.1,0,7,\n9,4,0.333333,,0,\n";
     assert_eq!(text(csv.finish().unwrap()), expected);
@@ -107,6 +107,7 @@ fn a_capture_reads_back_as_it_was_written_and_is_the_same_every_time() {
         config: Config::default(),
         outline: None,
         build: None,
+        refinement: None,
         quality: Quality { median_fb_error_px: Some(0.05), ..Quality::default() },
         model: Some(ModelNote::of(&skeleton, 0.004)),
         animation: None,

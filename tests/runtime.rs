@@ -146,11 +146,14 @@ fn threads_give_the_same_poses_as_none() {
     for outline in [Some(support::outline()), None] {
         let mut pipeline = Pipeline::new(&Config::default(), outline.clone());
         let mut decoder = Decoder::new().expect("decoder");
-        let mut moved = Vec::new();
+        let (mut moved, mut trees) = (Vec::new(), Vec::new());
         for k in 0..recording().len() {
-            moved.extend(pipeline.step(support::decoded(&mut decoder, k)));
+            let done = pipeline.step(support::decoded(&mut decoder, k));
+            trees.extend(done.iter().map(|_| pipeline.back.tree().cloned()));
+            moved.extend(done);
         }
         moved.extend(pipeline.finish());
+        trees.resize(moved.len(), pipeline.back.tree().cloned());
         assert!(moved.iter().map(|m| m.tracks.frame).eq(0..recording().len() as u64), "every frame, in order");
 
         let lines = Lines::default();
@@ -160,15 +163,16 @@ fn threads_give_the_same_poses_as_none() {
         let (tree, threaded) = (pipeline.back.tree().expect("tree"), summary.and_then(|s| s.tree).expect("tree"));
         assert_eq!(*tree.skeleton, *threaded.skeleton);
         assert_eq!((tree.frame, &tree.evidence), (threaded.frame, &threaded.evidence));
+        assert!(tree.refinements > 0 && tree.refinements == threaded.refinements, "{} refinements", tree.refinements);
 
         let text = String::from_utf8(lines.0.lock().expect("lines").clone()).expect("text");
         let mut lines = text.lines();
         let mut poses = 0;
-        for pose in moved.iter().filter_map(|m| m.pose.as_ref()) {
-            let nodes: Vec<String> = pose.joints[..tree.skeleton.measured()]
+        for (pose, tree) in moved.iter().zip(&trees).filter_map(|(m, tree)| m.pose.as_ref().zip(tree.as_ref())) {
+            let nodes: Vec<String> = tree.skeleton.nodes[..tree.skeleton.measured()]
                 .iter()
-                .enumerate()
-                .map(|(i, j)| format!("[{i},{:.3},{:.3},{:.3}]", j.position.x, j.position.y, j.position.z))
+                .zip(&pose.joints)
+                .map(|(n, j)| format!("[{},{:.3},{:.3},{:.3}]", n.name.0, j.position.x, j.position.y, j.position.z))
                 .collect();
             let expected =
                 format!("{{\"frame\":{},\"time_s\":{:.6},\"nodes\":[{}]}}", pose.frame, pose.time_s, nodes.join(","));
@@ -184,7 +188,7 @@ fn build_now_builds_early() {
     let dir = tempfile::tempdir().expect("tempdir");
     let (summary, _) = wish(60, &[Control::BuildNow], &dir.path().join("out"));
     let tree = summary.tree.expect("a tree");
-    assert!(tree.forced && (55..=62).contains(&tree.frame), "built after frame {}", tree.frame);
+    assert!(tree.first.forced && (55..=62).contains(&tree.first.frame), "built after frame {}", tree.first.frame);
 }
 
 #[test]

@@ -244,11 +244,17 @@ fn closing_lines(s: &Summary) -> Vec<String> {
     if let Some(tree) = &s.tree {
         let (nodes, points) = (tree.skeleton.measured(), tree.skeleton.nodes[0].n_tracks);
         let copies = tree.skeleton.nodes.len() - nodes;
-        let when = if tree.forced { "built early," } else { "built" };
+        let first = &tree.first;
+        let when = if first.forced { "built early," } else { "built" };
+        let refined = match tree.refinements {
+            0 => String::new(),
+            1 => format!(", refined at {:.1} s", tree.time_s),
+            n => format!(", refined {n} times until {:.1} s", tree.time_s),
+        };
         lines.push(format!(
             "tree: {nodes} nodes from {points} moving points and {copies} copied ones, {when} at {:.1} s (accumulation \
-             {:.2})",
-            tree.time_s, tree.evidence.measure
+             {:.2}){refined}",
+            first.time_s, first.measure
         ));
     }
     if let Some(written) = &s.written {

@@ -26,6 +26,9 @@ pub struct Capture {
     pub outline: Option<OutlineNote>,
     /// `None` if the capture ended before the tree was built.
     pub build: Option<Build>,
+    /// `None` if the tree is the one that was built first.
+    #[serde(default)]
+    pub refinement: Option<Refinement>,
     pub quality: Quality,
     pub model: Option<ModelNote>,
     pub animation: Option<AnimationNote>,
@@ -152,7 +155,7 @@ pub struct OutlineNote {
     pub polygon_px: Vec<[i32; 2]>,
 }
 
-/// When and on what the tree was built.
+/// When and on what the tree was first built.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Build {
     pub frame: u64,
@@ -162,6 +165,22 @@ pub struct Build {
     pub moving_points: u32,
     /// Built by order of the user or by the end of the source, not because enough had been seen.
     pub forced: bool,
+}
+
+/// How the tree was built anew as more was seen: what the tree in the files was built on.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Refinement {
+    /// How often, and when last.
+    pub count: u32,
+    pub frame: u64,
+    pub time_s: f64,
+    /// The accumulation measure at that time, 0 to 1.
+    pub accumulation: f64,
+    pub moving_points: u32,
+    /// First frame in which the screen and the stream showed this tree; the tables have it in all frames.
+    pub shown_from: u64,
+    /// Measured nodes that were in the tree before, and kept their numbers.
+    pub nodes_kept: u32,
 }
 
 /// How well the points were followed.

@@ -3,7 +3,7 @@
 //! Times are seconds with up to 6 decimals, pixels up to 3, lengths in the model up to 4. Unknown is an empty cell.
 
 use super::{ExportError, number};
-use crate::model::{NodeId, Pose, Skeleton, TrackId, TrackSet};
+use crate::model::{NodeName, Pose, Skeleton, TrackId, TrackSet};
 use std::io::Write;
 use std::sync::Arc;
 
@@ -73,7 +73,7 @@ impl<W: Write> Table<W> {
         self.row.push_field(&self.cell);
     }
 
-    fn id(&mut self, id: Option<NodeId>) {
+    fn id(&mut self, id: Option<NodeName>) {
         match id {
             Some(id) => self.count(id.0),
             None => self.row.push_field(""),
@@ -117,7 +117,7 @@ impl<W: Write> TracksCsv<W> {
         frame: u64,
         time_s: f64,
         position_px: [f64; 2],
-        node: Option<NodeId>,
+        node: Option<NodeName>,
     ) -> Result<(), ExportError> {
         self.0.count(track.0);
         self.0.count(frame);
@@ -131,7 +131,7 @@ impl<W: Write> TracksCsv<W> {
     ///
     /// # Errors
     /// A row cannot be written.
-    pub fn set(&mut self, set: &TrackSet, node_of: impl Fn(TrackId) -> Option<NodeId>) -> Result<(), ExportError> {
+    pub fn set(&mut self, set: &TrackSet, node_of: impl Fn(TrackId) -> Option<NodeName>) -> Result<(), ExportError> {
         for o in &set.observations {
             self.row(o.id, set.frame, set.time_s, [o.u_px.into(), o.v_px.into()], node_of(o.id))?;
         }
@@ -161,8 +161,8 @@ pub fn nodes<W: Write>(
     let (scale, more) = unit(metres_per_px);
     for (i, node) in skeleton.nodes.iter().enumerate() {
         let sway = sway.get(i).copied().flatten().unwrap_or(Sway::UNKNOWN).values();
-        table.count(i as u64);
-        table.id(node.parent);
+        table.count(node.name.0);
+        table.id(node.parent.and_then(|p| skeleton.name_of(p)));
         table.count(node.level);
         table.count(node.n_tracks);
         skeleton.image_from_model(&node.position).into_iter().for_each(|x| table.number(x, 3));
@@ -199,10 +199,10 @@ impl<W: Write> MotionCsv<W> {
     /// # Errors
     /// A row cannot be written.
     pub fn pose(&mut self, pose: &Pose) -> Result<(), ExportError> {
-        for (i, joint) in pose.joints.iter().enumerate() {
+        for (joint, node) in pose.joints.iter().zip(&self.skeleton.nodes) {
             self.table.count(pose.frame);
             self.table.number(pose.time_s, 6);
-            self.table.count(i as u64);
+            self.table.count(node.name.0);
             joint.position.iter().for_each(|x| self.table.number(x * self.scale, self.decimals));
             self.skeleton.image_from_model(&joint.position).into_iter().for_each(|x| self.table.number(x, 3));
             self.table.end_row()?;

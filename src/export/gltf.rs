@@ -134,11 +134,12 @@ fn push_joints(root: &mut Root, model: &Model) -> Result<(), ExportError> {
     for (i, node) in model.skeleton.nodes.iter().enumerate() {
         let parent_pivot = node.parent.map_or_else(nalgebra::Vector3::zeros, |p| model.pivot(p.index()));
         let t = model.pivot(i) - parent_pivot;
+        let (name, original) = (node.name.0, node.copy_of.and_then(|o| model.skeleton.name_of(o)));
         let mut extras = json!({
             "level": node.level,
             "n_tracks": node.n_tracks,
             "certainty": node.certainty,
-            "copy_of": node.copy_of.map(|c| c.0),
+            "copy_of": original.map(|c| c.0),
         });
         if let (Some(all), Some(Value::Object(more))) = (extras.as_object_mut(), model.node_extras.get(i)) {
             all.extend(more.clone());
@@ -146,9 +147,9 @@ fn push_joints(root: &mut Root, model: &Model) -> Result<(), ExportError> {
         root.nodes.push(Node {
             children: (!children[i].is_empty()).then(|| children[i].iter().map(|c| Index::new(c.0)).collect()),
             extras: raw(&extras)?,
-            name: Some(match node.copy_of {
-                Some(original) => format!("node_{i}_copy_of_{}", original.0),
-                None => format!("node_{i}"),
+            name: Some(match original {
+                Some(original) => format!("node_{name}_copy_of_{}", original.0),
+                None => format!("node_{name}"),
             }),
             translation: Some([t.x as f32, t.y as f32, t.z as f32]),
             ..Node::default()

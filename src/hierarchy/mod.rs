@@ -13,13 +13,17 @@ mod lanczos;
 mod linkage;
 mod ncut;
 mod path;
+mod persist;
 mod rest;
 mod signals;
+mod support;
 mod zeng;
 
 pub use accumulate::{COMPARE_HZ, Evidence, evidence, evidence_of};
 pub use ncut::{Cut, normalised_cut};
+pub use persist::persisting;
 pub use rest::rest_position_px;
+pub use support::{Gain, OnBoth, gain};
 
 use crate::config::{Affinity, Hierarchy};
 use crate::model::{Cluster, ClusterId, MotionHierarchy};

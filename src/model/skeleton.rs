@@ -13,9 +13,15 @@ impl NodeId {
     }
 }
 
+/// Names one node for good: it keeps its name when the tree is refined, and no other node of the capture ever gets it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct NodeName(pub u32);
+
 /// The end of a branch. The branch itself runs from the parent node to this one; the first node is the trunk's foot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
+    /// What it is called outside, in every file and on the screen; its place in the array changes with a refinement.
+    pub name: NodeName,
     pub parent: Option<NodeId>,
     /// 0 at the trunk's foot, 1 at the trunk's top, one more with every cut of the hierarchy.
     pub level: u8,
@@ -52,6 +58,11 @@ impl Skeleton {
     /// Orthographic projection of a point in model axes to the picture, px.
     pub fn image_from_model(&self, p: &Point3<f64>) -> [f64; 2] {
         [self.foot_px[0] + p.x, self.foot_px[1] - p.y]
+    }
+
+    /// The name of a node of this skeleton.
+    pub fn name_of(&self, node: NodeId) -> Option<NodeName> {
+        self.nodes.get(node.index()).map(|n| n.name)
     }
 
     /// Children of every node, by node index.

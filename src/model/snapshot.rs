@@ -1,6 +1,6 @@
 //! What the screen shows of a running capture: one immutable picture of its state, replaced, never changed.
 
-use super::{Pose, Rgb, Size, Skeleton};
+use super::{NodeName, Pose, Rgb, Size, Skeleton};
 use std::sync::Arc;
 
 /// How far the capture has come.
@@ -65,7 +65,9 @@ pub struct CameraState {
 /// One line of the table of branches.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BranchRow {
-    pub node: u32,
+    pub node: NodeName,
+    /// The number of its main branch, as in [`Snapshot::node_colour`].
+    pub colour: Option<u8>,
     pub level: u8,
     pub n_tracks: u32,
     /// Root mean square of the node's displacement in the picture over the last seconds, px.

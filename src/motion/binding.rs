@@ -65,6 +65,19 @@ impl Binding {
         }
     }
 
+    /// Takes over tracks that an older tree knew, with the node and the rest place (px) that each has here.
+    pub fn inherit(&mut self, tracks: &BTreeMap<TrackId, (NodeId, [f64; 2])>) {
+        let bound = |(id, (node, rest_px)): (&TrackId, &(NodeId, [f64; 2]))| {
+            (*id, Some(Bound { node: *node, rest_px: *rest_px }))
+        };
+        self.tracks.extend(tracks.iter().map(bound));
+    }
+
+    /// Every bound track with its deepest node and its rest place, px; those that have been lost among them.
+    pub fn bound(&self) -> impl Iterator<Item = (TrackId, NodeId, [f64; 2])> {
+        self.tracks.iter().filter_map(|(id, bound)| bound.map(|b| (*id, b.node, b.rest_px)))
+    }
+
     /// The deepest node that a track belongs to.
     pub fn node_of(&self, track: TrackId) -> Option<NodeId> {
         self.tracks.get(&track)?.map(|b| b.node)

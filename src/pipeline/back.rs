@@ -1,6 +1,7 @@
 //! The back end: tracks to tree and poses.
 
-use super::{Followed, Poser, Targets, Tree, build};
+use super::refiner::Refiner;
+use super::{Followed, Moment, Poser, Refinement, Targets, Tree, build};
 use crate::config::Config;
 use crate::hierarchy::{self, Evidence};
 use crate::model::{Outline, Phase, Pose, Rgb, TrackSet};
@@ -25,11 +26,11 @@ pub struct Moved {
     pub targets_px: Targets,
     /// The posture in this frame, once there is a tree.
     pub pose: Option<Arc<Pose>>,
-    /// In the frame in which the tree was built: time and targets of the frames remembered from before, oldest first.
+    /// In the frame with which a tree, or a refined one, comes into effect: time and targets of the frames remembered from before, oldest first.
     pub before: Vec<(f64, Targets)>,
 }
 
-/// Tracks to poses: gathers motion, builds the tree, then poses it in every frame.
+/// Tracks to poses: gathers motion, builds the tree, then poses it in every frame and refines it as motion goes on.
 pub struct BackEnd {
     config: Config,
     history: TrackHistory,
@@ -37,6 +38,7 @@ pub struct BackEnd {
     judged_s: Option<f64>,
     outline: Option<Arc<Outline>>,
     live: Option<Live>,
+    refiner: Option<Refiner>,
     build_now: bool,
     /// The tree is built with the next frame.
     building: Option<Why>,
@@ -53,9 +55,10 @@ enum Why {
     Asked,
 }
 
-struct Live {
-    tree: Arc<Tree>,
-    poser: Poser,
+/// A tree and the pose that it has come to.
+pub(super) struct Live {
+    pub tree: Arc<Tree>,
+    pub poser: Poser,
 }
 
 impl BackEnd {
@@ -67,6 +70,7 @@ impl BackEnd {
             judged_s: None,
             outline: None,
             live: None,
+            refiner: None,
             build_now: false,
             building: None,
             refused: false,
@@ -81,6 +85,9 @@ impl BackEnd {
         if self.live.is_none() {
             self.history.push(tracks.clone());
             before = self.accumulate(tracks.time_s);
+        } else if self.refiner.is_some() {
+            self.history.push(tracks.clone());
+            before = self.refine();
         }
         let (targets_px, pose) = match &mut self.live {
             Some(live) => {
@@ -119,19 +126,19 @@ impl BackEnd {
     }
 
     /// Judges what is remembered; gives the table of tracks whose rows the evidence names.
-    fn judge(&mut self) -> TrackTable {
-        let table = self.history.table(1.0 / hierarchy::COMPARE_HZ);
+    fn judge(&mut self) -> Arc<TrackTable> {
+        let table = Arc::new(self.history.table(1.0 / hierarchy::COMPARE_HZ));
         self.evidence = hierarchy::evidence(&table, &self.config.accumulate);
         table
     }
 
     /// Builds, and follows the pose through the remembered frames; gives their times and targets.
-    fn build(&mut self, table: &TrackTable, forced: bool) -> Vec<(f64, Targets)> {
+    fn build(&mut self, table: &Arc<TrackTable>, forced: bool) -> Vec<(f64, Targets)> {
         let (Some(outline), Some(first), Some(last)) = (&self.outline, self.history.first(), self.history.last())
         else {
             return Vec::new();
         };
-        let moment = (first.frame, last, forced);
+        let moment = Moment { followed_from: first.frame, frame: last.frame, time_s: last.time_s, forced };
         let Some(tree) = build(table, self.evidence.clone(), outline, &self.config, moment) else {
             return Vec::new();
         };
@@ -144,8 +151,48 @@ impl BackEnd {
             before.push((tracks.time_s, targets_px));
         }
         self.live = Some(live);
-        self.history.clear();
+        let refiner = Refiner::new(moment.time_s, self.history.span_s(), &self.config);
+        self.keep_on(refiner);
         before
+    }
+
+    /// Goes on with `refiner`, and remembers for as long as it is not over.
+    fn keep_on(&mut self, refiner: Refiner) {
+        self.refiner = Some(refiner).filter(|r| !r.is_over());
+        if self.refiner.is_none() {
+            self.history.clear();
+        }
+    }
+
+    /// Refines the tree where it is time to; in the frame with which a new one takes the old one's place gives times and
+    /// targets of the frames that it was followed through.
+    fn refine(&mut self) -> Vec<(f64, Targets)> {
+        let (Some(mut refiner), Some(live)) = (self.refiner.take(), &self.live) else { return Vec::new() };
+        let taken = refiner.step(&self.history, live, &self.config);
+        self.keep_on(refiner);
+        let Some((live, before)) = taken else { return Vec::new() };
+        self.evidence = live.tree.evidence.clone();
+        self.live = Some(live);
+        before
+    }
+
+    /// A refinement that has to be worked out by the time that [`needs_refinement`](Self::needs_refinement) tells. Who
+    /// can do so meanwhile hands it in with [`put_refinement`](Self::put_refinement); else it is done in that frame.
+    /// The result is the same.
+    pub fn refinement(&self) -> Option<&Arc<Refinement>> {
+        self.refiner.as_ref()?.work()
+    }
+
+    /// Whether a frame of this time needs the result of the refinement.
+    pub fn needs_refinement(&self, time_s: f64) -> bool {
+        self.refiner.as_ref().is_some_and(|r| r.is_due(time_s))
+    }
+
+    /// Takes the result of [`refinement`](Self::refinement).
+    pub fn put_refinement(&mut self, tree: Option<Tree>) {
+        if let Some(refiner) = &mut self.refiner {
+            refiner.put(tree);
+        }
     }
 
     /// Build with the next frame, whatever the measure says.

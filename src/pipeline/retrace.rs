@@ -2,7 +2,7 @@
 
 use super::{Poser, Targets, Tree};
 use crate::config::Config;
-use crate::model::{NodeId, Pose, TrackId, TrackSet};
+use crate::model::{NodeName, Pose, TrackId, TrackSet};
 use std::sync::Arc;
 
 /// Poses of frames that are over, as they were or would have been live: followed from the frame that was the first one
@@ -24,8 +24,9 @@ impl Retrace {
         if live { self.after.step(tracks) } else { self.before.step(tracks) }
     }
 
-    /// The deepest node that a track belongs to, as known after the last step.
-    pub fn node_of(&self, track: TrackId) -> Option<NodeId> {
-        self.after.binding.node_of(track).or_else(|| self.before.binding.node_of(track))
+    /// The name of the deepest node that a track belongs to, as known after the last step.
+    pub fn node_of(&self, track: TrackId) -> Option<NodeName> {
+        let node = self.after.binding.node_of(track).or_else(|| self.before.binding.node_of(track))?;
+        self.tree.skeleton.name_of(node)
     }
 }

@@ -1,7 +1,7 @@
 //! Outline, points, tree and poses as messages that viewers know how to draw.
 
 use super::wire::Message;
-use crate::model::{Outline, Pose, Skeleton, TrackSet};
+use crate::model::{NodeId, Outline, Pose, Skeleton, TrackSet};
 use serde::Serialize;
 
 /// Frames of reference: what viewers stand on (z up), and the tree's own axes (y up).
@@ -74,9 +74,9 @@ pub(super) fn transforms(skeleton: &Skeleton, pose: &Pose, time_ns: u64, into: &
     // A quarter turn about x: the tree's y is the world's z.
     let half = std::f64::consts::FRAC_1_SQRT_2;
     transform(&mut message, (WORLD, TREE), time_ns, [0.0; 3], [half, 0.0, 0.0, half]);
-    for (i, joint) in pose.joints.iter().take(skeleton.measured()).enumerate() {
+    for (node, joint) in skeleton.nodes[..skeleton.measured()].iter().zip(&pose.joints) {
         let q = joint.rotation.coords;
-        let name = format!("node_{i}");
+        let name = format!("node_{}", node.name.0);
         transform(&mut message, (TREE, &name), time_ns, joint.position.coords.into(), [q.x, q.y, q.z, q.w]);
     }
 }
@@ -146,6 +146,7 @@ struct SkeletonJson {
 
 #[derive(Serialize)]
 struct NodeJson {
+    id: u32,
     parent: Option<u32>,
     level: u8,
     x: f64,
@@ -164,9 +165,10 @@ pub(super) fn skeleton_json(
     into: &mut Vec<u8>,
 ) -> Result<(), serde_json::Error> {
     let nodes = skeleton.nodes.iter().map(|n| {
-        let (parent, copy_of, p) = (n.parent.map(|p| p.0), n.copy_of.map(|c| c.0), n.position);
+        let id_of = |n: Option<NodeId>| n.and_then(|n| skeleton.name_of(n)).map(|name| name.0);
+        let (id, parent, copy_of, p) = (n.name.0, id_of(n.parent), id_of(n.copy_of), n.position);
         let (n_tracks, certainty) = (n.n_tracks, n.certainty);
-        NodeJson { parent, level: n.level, x: p.x, y: p.y, z: p.z, radius: n.radius, n_tracks, certainty, copy_of }
+        NodeJson { id, parent, level: n.level, x: p.x, y: p.y, z: p.z, radius: n.radius, n_tracks, certainty, copy_of }
     });
     let size = skeleton.image_size;
     let foot_px = skeleton.foot_px;

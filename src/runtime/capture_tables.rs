@@ -3,21 +3,18 @@
 
 use super::held_sets::HeldSets;
 use super::meter::Histogram;
-use super::shared::{Failure, Shared};
+use super::shared::Failure;
 use crate::config::Config;
 use crate::export::OutputFolder;
 use crate::export::csv::{MotionCsv, TracksCsv};
 use crate::model::{Pose, TrackSet};
 use crate::pipeline::{Retrace, Tree};
 use crate::recording::{Sets, SpoolReader};
-use crossbeam_channel::{Sender, bounded};
 use std::collections::VecDeque;
 use std::fs::File;
-use std::io::{self, BufWriter};
+use std::io::BufWriter;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
 
 /// Both tables as far as they are written. What is in them does not depend on when and in how many pieces that is done.
 pub struct CaptureTables {
@@ -136,56 +133,5 @@ impl CaptureTables {
             self.tracks.set(&set, |id| self.retrace.node_of(id))?;
         }
         Ok(())
-    }
-}
-
-/// Tables on a thread of their own.
-pub struct Behind {
-    spool: Sender<SpoolReader>,
-    given_up: Arc<AtomicBool>,
-    thread: JoinHandle<Result<CaptureTables, Failure>>,
-}
-
-impl Behind {
-    /// # Errors
-    /// The thread cannot be started.
-    pub fn start(mut tables: CaptureTables, shared: Arc<Shared>) -> io::Result<Self> {
-        let (spool, readers) = bounded::<SpoolReader>(1);
-        let given_up = Arc::<AtomicBool>::default();
-        let over = given_up.clone();
-        let run = move || {
-            // A sign of life when the end waits for it.
-            let wrote = || {
-                shared.pulse.wrote();
-                !over.load(Ordering::Relaxed)
-            };
-            for spool in readers {
-                if let Err(e) = tables.catch_up(&spool, wrote) {
-                    // Said while something can be done about it; at the end all is tried again.
-                    shared.news(format!("the capture cannot be written at present: {e}"));
-                    return Err(e);
-                }
-            }
-            Ok(tables)
-        };
-        let thread = std::thread::Builder::new().name("behind".into()).spawn(run)?;
-        Ok(Self { spool, given_up, thread })
-    }
-
-    /// There is more to be written. What comes while the thread is busy is left for the next time.
-    pub fn catch_up(&self, spool: SpoolReader) {
-        let _ = self.spool.try_send(spool);
-    }
-
-    /// Nobody wants the tables any more; nothing is left of them.
-    pub fn give_up(self) {
-        self.given_up.store(true, Ordering::Relaxed);
-        drop(self.join());
-    }
-
-    /// The tables as far as they are; `None` if they could not be written.
-    pub fn join(self) -> Option<CaptureTables> {
-        drop(self.spool);
-        self.thread.join().ok()?.ok()
     }
 }

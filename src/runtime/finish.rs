@@ -6,7 +6,8 @@ use super::meter::Histogram;
 use super::shared::{Failure, Shared};
 use crate::config::Config;
 use crate::export::capture::{
-    AnimationNote, Build, Capture, ModelNote, OutlineNote, Quality as QualityNote, Software, Source, Timing, json,
+    AnimationNote, Build, Capture, ModelNote, OutlineNote, Quality as QualityNote, Refinement, Software, Source,
+    Timing, json,
 };
 use crate::export::csv::{MotionCsv, TracksCsv, nodes};
 use crate::export::gltf::{KEY_TOLERANCE_PX, Model, glb_and_keys};
@@ -111,7 +112,7 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
     let first_frame = poses.first().map_or(0, |p| p.frame);
     let animation = AnimationNote { first_frame, frames: poses.len() as u64, keys };
     let model = ModelNote::of(&tree.skeleton, metres_per_px);
-    publish(job, folder, describe(job, Some(model), Some(animation), misses.median()))
+    publish(job, folder, describe(job, Some(&tree), Some((model, animation)), misses.median()))
 }
 
 /// Tables without rows and no model: a reader finds every table, and no tree that was never seen.
@@ -190,10 +191,11 @@ fn bark_rgb(picture: &Rgb, tree: &Tree) -> [u8; 3] {
 
 fn describe(
     job: &CaptureJob,
-    model: Option<ModelNote>,
-    animation: Option<AnimationNote>,
+    tree: Option<&Tree>,
+    notes: Option<(ModelNote, AnimationNote)>,
     median_reprojection_px: Option<f64>,
 ) -> Capture {
+    let (model, animation) = notes.unzip();
     let counts = &job.shared.counts;
     let count = |c: &std::sync::atomic::AtomicU64| c.load(Ordering::Relaxed);
     let (seen, duration_s) = (count(&counts.seen), job.shared.last_time_s());
@@ -240,12 +242,21 @@ fn describe(
             height: o.size.height,
             polygon_px: o.polygon_px.clone(),
         }),
-        build: job.tree.as_ref().map(|tree| Build {
+        build: tree.map(|tree| Build {
+            frame: tree.first.frame,
+            time_s: tree.first.time_s,
+            accumulation: tree.first.measure,
+            moving_points: tree.first.moving as u32,
+            forced: tree.first.forced,
+        }),
+        refinement: tree.filter(|tree| tree.refinements > 0).map(|tree| Refinement {
+            count: tree.refinements,
             frame: tree.frame,
             time_s: tree.time_s,
             accumulation: tree.evidence.measure,
             moving_points: tree.evidence.moving.len() as u32,
-            forced: tree.forced,
+            shown_from: tree.shown_from,
+            nodes_kept: tree.kept as u32,
         }),
         quality: QualityNote {
             tracks_total: quality.tracks_total(),

@@ -8,6 +8,7 @@
 //! A dropped sender ends the stream: when the source is done, the tracker works off its queue and ends, then the model
 //! does and writes the capture.
 
+mod behind;
 mod capture_tables;
 mod finish;
 mod held_sets;
@@ -185,7 +186,7 @@ impl Running {
 
     /// Take no more frames and finish.
     pub fn stop(&self) {
-        self.shared.stop.store(true, Ordering::Relaxed);
+        self.shared.stop_at_once();
     }
 
     /// The capture is over and written.

@@ -1,7 +1,7 @@
 //! The model's thread: runs the back end, keeps the tracks, streams the poses, tells the screen, and writes the capture
 //! at the end.
 
-use super::capture_tables::{Behind, CaptureTables};
+use super::behind::BehindTree;
 use super::finish::{self, CaptureJob, Quality};
 use super::pulse::Worker;
 use super::recorder_thread::{Found, Recorded, Recorder};
@@ -10,7 +10,7 @@ use super::status::{Status, median_error_px, median_fb_error_px};
 use super::track_thread::ToModel;
 use super::{Job, Summary};
 use crate::model::{Phase, Pose, Rgb};
-use crate::pipeline::{BackEnd, Followed, LEAST_MOVING, Moved};
+use crate::pipeline::{BackEnd, Followed, LEAST_MOVING, Moved, Tree};
 use crate::recording::Spool;
 use crate::source::SourceInfo;
 use crossbeam_channel::{Receiver, RecvTimeoutError};
@@ -36,7 +36,9 @@ pub struct ModelThread {
     shared: Arc<Shared>,
     status: Status,
     spool: Option<Spool>,
-    behind: Option<Behind>,
+    behind: BehindTree,
+    /// A refinement of the tree that is being worked out.
+    refining: Option<JoinHandle<Option<Tree>>>,
     /// Sensor time up to which the tables have been asked for, s.
     behind_s: f64,
     bark: Option<Arc<Rgb>>,
@@ -45,7 +47,8 @@ pub struct ModelThread {
     exports: Vec<JoinHandle<()>>,
     /// Number of the last export; its folder may not be there yet.
     exported: u32,
-    announced: bool,
+    /// The tree that was last told of.
+    announced: Option<Arc<Tree>>,
     recorder: Option<(Recorder, JoinHandle<Recorded>)>,
 }
 
@@ -65,14 +68,15 @@ impl ModelThread {
             shared,
             status,
             spool: None,
-            behind: None,
+            behind: BehindTree::default(),
+            refining: None,
             behind_s: f64::NEG_INFINITY,
             bark: None,
             quality: Quality::default(),
             last_screen: None,
             exports: Vec::new(),
             exported: 0,
-            announced: false,
+            announced: None,
             recorder,
         };
         thread.new_spool();
@@ -103,10 +107,11 @@ impl ModelThread {
                 ToModel::Restart => {
                     self.back.restart();
                     self.status.restart();
-                    self.behind.take().into_iter().for_each(Behind::give_up);
+                    std::mem::take(&mut self.behind).give_up();
+                    self.refining = None;
                     self.behind_s = f64::NEG_INFINITY;
                     self.new_spool();
-                    (self.quality, self.announced, last) = (Quality::default(), false, None);
+                    (self.quality, self.announced, last) = (Quality::default(), None, None);
                 }
                 ToModel::BuildNow if self.back.tree().is_some() => {
                     self.shared.tell("the tree is built already; r starts again".into());
@@ -128,7 +133,9 @@ impl ModelThread {
     }
 
     fn step(&mut self, followed: Followed) -> Moved {
+        self.refinement_due(followed.tracks.time_s);
         let moved = self.back.step(followed);
+        self.refine_meanwhile();
         if let Some(spool) = &mut self.spool
             && let Err(e) = spool.push(&moved.tracks)
         {
@@ -168,21 +175,43 @@ impl ModelThread {
         }
         self.behind_s = time_s;
         let (Some(tree), Some(dir), Some(spool)) = (self.back.tree(), &self.job.out, &mut self.spool) else { return };
-        if self.behind.is_none() {
-            // Where it cannot be begun, the end will say why.
-            self.behind = CaptureTables::create(dir, tree, &self.job.config)
-                .ok()
-                .and_then(|tables| Behind::start(tables, self.shared.clone()).ok());
+        if let Ok(reader) = spool.reader() {
+            self.behind.catch_up(tree, reader, (dir, &self.job.config), &self.shared);
         }
-        if let (Some(behind), Ok(reader)) = (&self.behind, spool.reader()) {
-            behind.catch_up(reader);
+    }
+
+    /// Poses go on while the tree is built anew, on a thread of its own; without one it is done when it is due.
+    fn refine_meanwhile(&mut self) {
+        if let (Some(work), None) = (self.back.refinement(), &self.refining) {
+            let work = work.clone();
+            self.refining = std::thread::Builder::new().name("refine".into()).spawn(move || work.run()).ok();
+        }
+    }
+
+    /// Hands in the result before the frame that needs it.
+    fn refinement_due(&mut self, time_s: f64) {
+        if self.back.needs_refinement(time_s)
+            && let Some(Ok(tree)) = self.refining.take().map(JoinHandle::join)
+        {
+            self.back.put_refinement(tree);
         }
     }
 
     /// Tells of a new tree; one built early is worth less, and the capture is to say so.
     fn announce(&mut self) {
-        if let (Some(tree), false) = (self.back.tree(), self.announced) {
-            self.announced = true;
+        let Some(tree) = self.back.tree() else { return };
+        if self.announced.as_ref().is_some_and(|known| Arc::ptr_eq(known, tree)) {
+            return;
+        }
+        let first = self.announced.replace(tree.clone()).is_none();
+        if tree.refinements > 0 {
+            let (kept, nodes) = (tree.kept, tree.skeleton.measured());
+            self.shared.tell(format!(
+                "the tree was refined from {:.0} s on: {kept} of {nodes} nodes are those of before",
+                tree.time_s
+            ));
+            tracing::info!("tree refined at {:.1} s: {kept} of {nodes} nodes go on", tree.time_s);
+        } else if first {
             let threshold = self.job.config.accumulate.threshold;
             if tree.forced && tree.evidence.measure < threshold {
                 self.shared.warn(format!(
@@ -203,13 +232,14 @@ impl ModelThread {
     /// or metres as in the capture.
     fn stream(&mut self, pose: &Pose) {
         let Some(out) = &mut self.job.stream else { return };
-        let measured = self.back.tree().map_or(0, |t| t.skeleton.measured());
+        let Some(tree) = self.back.tree() else { return };
+        let measured = &tree.skeleton.nodes[..tree.skeleton.measured()];
         let scale = if self.job.config.export.metres_per_px > 0.0 { self.job.config.export.metres_per_px } else { 1.0 };
         let mut line = format!("{{\"frame\":{},\"time_s\":{:.6},\"nodes\":[", pose.frame, pose.time_s);
-        for (i, joint) in pose.joints[..measured].iter().enumerate() {
+        for (i, (joint, node)) in pose.joints.iter().zip(measured).enumerate() {
             let p = joint.position * scale;
             let comma = if i > 0 { "," } else { "" };
-            line.push_str(&format!("{comma}[{i},{:.3},{:.3},{:.3}]", p.x, p.y, p.z));
+            line.push_str(&format!("{comma}[{},{:.3},{:.3},{:.3}]", node.name.0, p.x, p.y, p.z));
         }
         line.push(']');
         if self.info.live {
@@ -294,11 +324,15 @@ impl ModelThread {
         }
         // Without a single frame there is nothing to keep.
         let seen = self.shared.counts.seen.load(Ordering::Relaxed);
+        let hurry = self.shared.hurry.load(Ordering::Relaxed);
+        if !hurry {
+            // A tree that was refined in the last second counts.
+            self.write_behind(f64::INFINITY);
+        }
+        let behind = std::mem::take(&mut self.behind);
         let written = match (self.job.out.clone().filter(|_| seen > 0), self.capture_job()) {
-            (Some(dir), Ok(job)) => match self
-                .behind
-                .take()
-                .and_then(Behind::join)
+            (Some(dir), Ok(job)) => match behind
+                .join(hurry)
                 .map_or_else(|| finish::write(&job, &dir), |tables| finish::complete(&job, tables))
             {
                 Ok(written) => Some(written),

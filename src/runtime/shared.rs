@@ -59,6 +59,8 @@ pub struct Counts {
 pub struct Shared {
     /// Take no more frames, finish.
     pub stop: Arc<AtomicBool>,
+    /// The user, or whoever speaks for him, wants it over: what is not needed is not waited for.
+    pub hurry: AtomicBool,
     pub paused: AtomicBool,
     pub ended: AtomicBool,
     /// There is a recorder.
@@ -184,6 +186,12 @@ impl Shared {
     /// Whether no more frames are wanted.
     pub fn stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Ends the capture because somebody wants it.
+    pub fn stop_at_once(&self) {
+        self.hurry.store(true, Ordering::Relaxed);
+        self.stop.store(true, Ordering::Relaxed);
     }
 
     /// The gaps so far, all else at its default.

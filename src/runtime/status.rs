@@ -3,9 +3,9 @@
 use super::meter::Recent;
 use super::shared::Shared;
 use crate::dynamics::dominant_frequency_hz;
-use crate::model::{BranchRow, FormatNote, Observation, Phase, Rgb, Size, Skeleton, Snapshot, TrackSet};
+use crate::model::{BranchRow, FormatNote, NodeName, Observation, Phase, Rgb, Size, Skeleton, Snapshot, TrackSet};
 use crate::pipeline::{BackEnd, Moved, Targets, Tree};
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -38,6 +38,8 @@ pub struct Status {
     table_rest_px: Vec<[f64; 2]>,
     table_made_s: f64,
     skeleton: Option<Arc<Skeleton>>,
+    /// Colours that main branches have been given: they keep them when the tree is refined.
+    colours: BTreeMap<NodeName, u8>,
 }
 
 impl Status {
@@ -57,6 +59,7 @@ impl Status {
             table_rest_px: Vec::new(),
             table_made_s: f64::NEG_INFINITY,
             skeleton: None,
+            colours: BTreeMap::new(),
         }
     }
 
@@ -161,7 +164,7 @@ impl Status {
             self.displacements.clear();
             self.table_made_s = f64::NEG_INFINITY;
             self.snapshot.skeleton = Some(tree.skeleton.clone());
-            self.snapshot.node_colour = Arc::new(main_branches(&tree.skeleton));
+            self.snapshot.node_colour = Arc::new(main_branches(&tree.skeleton, &mut self.colours));
         }
         for (time_s, targets_px) in &moved.before {
             self.displaced(*time_s, targets_px);
@@ -194,7 +197,8 @@ impl Status {
             let path: Vec<[f64; 2]> = self.displacements.iter().map(|(_, d)| d[k]).collect();
             let n = &skeleton.nodes[node];
             BranchRow {
-                node: node as u32,
+                node: n.name,
+                colour: self.snapshot.node_colour.get(node).copied().flatten(),
                 level: n.level,
                 n_tracks: n.n_tracks,
                 amplitude_px: rms_px(&path),
@@ -221,16 +225,16 @@ fn median(values: impl Iterator<Item = f32>) -> Option<f64> {
     values.get(values.len() / 2).copied().map(f64::from)
 }
 
-/// Number of the main branch of every node; `None` above the main branches. A copy has its original's.
-fn main_branches(skeleton: &Skeleton) -> Vec<Option<u8>> {
+/// Number of the main branch of every node; `None` above the main branches. A copy has its original's, and a branch the
+/// one that `given` knows.
+fn main_branches(skeleton: &Skeleton, given: &mut BTreeMap<NodeName, u8>) -> Vec<Option<u8>> {
     let mut colours: Vec<Option<u8>> = Vec::with_capacity(skeleton.nodes.len());
-    let mut next = 0u8;
     for node in &skeleton.nodes {
         let colour = match (node.copy_of, node.parent) {
             (Some(original), _) => colours[original.index()],
             (None, _) if node.level == MAIN_BRANCH_LEVEL => {
-                next = next.wrapping_add(1);
-                Some(next - 1)
+                let next = given.len() as u8;
+                Some(*given.entry(node.name).or_insert(next))
             }
             (None, Some(parent)) => colours[parent.index()],
             (None, None) => None,

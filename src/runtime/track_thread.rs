@@ -120,7 +120,7 @@ impl<'a> TrackThread<'a> {
             Control::BuildNow => drop(self.pass_on(ToModel::BuildNow)),
             Control::Export => drop(self.pass_on(ToModel::Export)),
             Control::Pause(on) => self.shared.paused.store(on, Ordering::Relaxed),
-            Control::Quit => self.shared.stop.store(true, Ordering::Relaxed),
+            Control::Quit => self.shared.stop_at_once(),
         }
     }
 

@@ -1,6 +1,7 @@
 //! From the flat skeleton to a tree in space (Li et al. section 3).
 
 mod envelope;
+mod keep;
 mod mesh;
 mod planes;
 mod push;
@@ -8,6 +9,7 @@ mod radius;
 mod tube;
 
 pub use envelope::Envelope;
+pub use keep::{Twin, stand_as_before, twins};
 pub use mesh::{Detail, Mesh, branches};
 pub use planes::copy_to_planes;
 pub use push::{Terms, envelope_distance, mean_branching_angle, push};

@@ -1,7 +1,7 @@
 //! From the flat skeleton to a prototype in space: copies on planes turned about the trunk (Li et al. section 3).
 
 use super::envelope::Envelope;
-use crate::model::{Node, NodeId, Outline, Skeleton};
+use crate::model::{Node, NodeId, NodeName, Outline, Skeleton};
 use crate::skeleton::Node2d;
 use nalgebra::{Point3, Rotation3, Vector3};
 use std::f64::consts::PI;
@@ -23,6 +23,7 @@ pub fn copy_to_planes(
         .zip(tracks)
         .enumerate()
         .map(|(i, (n, &n_tracks))| Node {
+            name: NodeName(i as u32),
             parent: n.parent.map(|p| NodeId(p as u32)),
             level: n.level,
             position: if i == 0 { Point3::origin() } else { envelope.clamp(&model(n.position_px)) },
@@ -45,6 +46,7 @@ pub fn copy_to_planes(
             }
             copy_id[original] = NodeId(nodes.len() as u32);
             let mut copy = nodes[original].clone();
+            copy.name = NodeName(nodes.len() as u32);
             copy.parent = copy.parent.map(|p| copy_id[p.index()]);
             copy.position = envelope.clamp(&(turn * (copy.position - axis) + axis));
             (copy.n_tracks, copy.copy_of, copy.plane_angle) = (0, Some(NodeId(original as u32)), angle);

@@ -48,11 +48,12 @@ fn pipes(skeleton: &Skeleton) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Node, NodeId, Size};
+    use crate::model::{Node, NodeId, NodeName, Size};
     use nalgebra::Point3;
 
     fn node(parent: Option<u32>, level: u8, copy_of: Option<u32>) -> Node {
         Node {
+            name: NodeName(0),
             parent: parent.map(NodeId),
             level,
             position: Point3::origin(),

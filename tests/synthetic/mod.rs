@@ -3,7 +3,7 @@
 // Every test file compiles this module for itself and uses a part of it.
 #![allow(dead_code)]
 
-use arborcam::model::{JointPose, Node, NodeId, Pose, Size, Skeleton};
+use arborcam::model::{JointPose, Node, NodeId, NodeName, Pose, Size, Skeleton};
 use arborcam::shape::pipe_model;
 use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
 
@@ -19,6 +19,7 @@ pub fn noise(a: usize, b: usize) -> f64 {
 /// Foot, trunk, and a fork at every node up to level `levels`, on `planes` planes: 7 and 3 make 380 nodes.
 pub fn tree(levels: u8, planes: usize) -> Skeleton {
     let node = |parent: Option<usize>, level, position| Node {
+        name: NodeName(0),
         parent: parent.map(|p| NodeId(p as u32)),
         level,
         position,
@@ -58,6 +59,7 @@ pub fn tree(levels: u8, planes: usize) -> Skeleton {
             nodes.push(copy);
         }
     }
+    (0..).zip(&mut nodes).for_each(|(i, n)| n.name = NodeName(i));
     let mut skeleton = Skeleton { nodes, foot_px: [640.0, 700.0], image_size: Size::new(1280, 720) };
     pipe_model(&mut skeleton, 14.0, 0.6);
     skeleton

@@ -39,17 +39,16 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         let place = Rect { x, width: (below.right() - x).min(WIDEST), ..below };
         let taken = if i == 0 { title.chars().count() as u16 + 3 } else { 0 };
         names(frame, Rect { y: area.y, height: 1, ..place }, taken, theme);
-        table(frame, state, rows, place, theme);
+        table(frame, rows, place, theme);
     }
 }
 
-fn table(frame: &mut Frame, state: &State, rows: &[BranchRow], area: Rect, theme: Theme) {
-    let colours = &state.snapshot.node_colour;
+fn table(frame: &mut Frame, rows: &[BranchRow], area: Rect, theme: Theme) {
     let right = |text: String| Line::from(text).right_aligned();
     let rows = rows.iter().map(|b| {
-        let colour = theme.branch(colours.get(b.node as usize).copied().flatten());
+        let colour = theme.branch(b.colour);
         Row::new([
-            Line::from(vec![Span::styled(" ● ", colour), Span::raw(b.node.to_string())]),
+            Line::from(vec![Span::styled(" ● ", colour), Span::raw(b.node.0.to_string())]),
             right(b.level.to_string()),
             right(count(b.n_tracks.into())),
             right(value(b.amplitude_px)),

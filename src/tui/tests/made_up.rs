@@ -1,6 +1,8 @@
 //! States of a capture that never was.
 
-use crate::model::{BranchRow, FormatNote, JointPose, Node, NodeId, Phase, Pose, Rgb, Size, Skeleton, Snapshot};
+use crate::model::{
+    BranchRow, FormatNote, JointPose, Node, NodeId, NodeName, Phase, Pose, Rgb, Size, Skeleton, Snapshot,
+};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
@@ -15,6 +17,7 @@ pub fn picture(size: Size) -> Arc<Rgb> {
 /// A trunk with three forks of two branches each, and a copy of the first fork turned by a right angle.
 pub fn skeleton() -> Skeleton {
     let node = |parent: u32, level, x: f64, y: f64, z: f64, copy_of: Option<u32>| Node {
+        name: NodeName(0),
         parent: (level > 0).then_some(NodeId(parent)),
         level,
         position: Point3::new(x, y, z),
@@ -34,6 +37,7 @@ pub fn skeleton() -> Skeleton {
     let copy = nodes.len() as u32;
     nodes.push(node(1, 2, 0.0, 220.0, -70.0, Some(2)));
     nodes.push(node(copy, 3, 40.0, 300.0, -100.0, Some(3)));
+    (0..).zip(&mut nodes).for_each(|(i, n)| n.name = NodeName(i));
     Skeleton { nodes, foot_px: [320.0, 350.0], image_size: Size::new(640, 360) }
 }
 
@@ -83,7 +87,8 @@ pub fn snapshot(phase: Phase) -> Snapshot {
     if reached(Phase::Live) {
         s.branches = (1..11)
             .map(|node| BranchRow {
-                node,
+                node: NodeName(node),
+                colour: node_colour[node as usize],
                 level: skeleton.nodes[node as usize].level,
                 n_tracks: 312 / node,
                 amplitude_px: 0.4 * node as f64,
@@ -120,7 +125,8 @@ pub fn huge() -> Snapshot {
     s.messages = vec!["word ".repeat(200), "x".repeat(500)];
     s.branches = (0..5000)
         .map(|node| BranchRow {
-            node: u32::MAX - node,
+            node: NodeName(u32::MAX - node),
+            colour: None,
             level: 255,
             n_tracks: u32::MAX,
             amplitude_px: 1e300,

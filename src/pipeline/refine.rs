@@ -1,0 +1,190 @@
+//! The tree once more, from what has been seen since: who is who, and whether it is better.
+
+use super::{Moment, Tree, build};
+use crate::config::Config;
+use crate::hierarchy::{self, Gain, OnBoth};
+use crate::model::{MotionHierarchy, NodeId, NodeName, Skeleton, TrackId};
+use crate::motion::Binding;
+use crate::shape::{Envelope, Twin, stand_as_before, twins};
+use crate::track::TrackTable;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// A point seen in less than this share of the remembered frames stays with the branch that it was found on: it has
+/// been seen too briefly to be judged by its own motion.
+const SEEN_SHARE: f64 = 0.5;
+/// A tree that is worse by more than so many standard errors is not taken. One that only seems worse is, as it has
+/// seen more.
+const ERRORS: f64 = 2.0;
+
+/// All that a refinement needs, apart from everything that goes on meanwhile: it can be done on any thread.
+pub struct Refinement {
+    table: Arc<TrackTable>,
+    standing: Arc<Tree>,
+    /// Every track that the standing tree knows, with its deepest node and its rest place, px.
+    bound: BTreeMap<TrackId, (NodeId, [f64; 2])>,
+    config: Config,
+    moment: Moment,
+}
+
+impl Refinement {
+    pub(super) fn new(
+        table: Arc<TrackTable>,
+        standing: &Arc<Tree>,
+        binding: &Binding,
+        config: &Config,
+        moment: Moment,
+    ) -> Self {
+        let bound = binding.bound().map(|(id, node, rest_px)| (id, (node, rest_px))).collect();
+        Self { table, standing: standing.clone(), bound, config: config.clone(), moment }
+    }
+
+    /// Number of points that it is made from: its time grows with their square.
+    pub fn points(&self) -> usize {
+        self.table.ids.len()
+    }
+
+    /// The new tree in the old one's names and place, if it is the better one.
+    ///
+    /// It is taken if the motion seen is enough for a build of its own (else a calm spell would undo what wind has
+    /// shown), and if it is not worse than the old one by more than chance. Each of them is held against what both were
+    /// built from: on its own evidence any tree looks good.
+    pub fn run(&self) -> Option<Tree> {
+        let evidence = hierarchy::evidence(&self.table, &self.config.accumulate);
+        let enough = self.config.accumulate.threshold.min(self.standing.evidence.measure);
+        let (frame, measure) = (self.moment.frame, evidence.measure);
+        if measure < enough {
+            tracing::debug!(frame, measure, enough, "no refinement: too little motion");
+            return None;
+        }
+        let mut tree = build(&self.table, evidence, &self.standing.outline, &self.config, self.moment)?;
+        let (before, since) = (self.gain(&self.standing.table, &tree), self.gain(&self.table, &tree));
+        let (gain, error) = (before.gain + since.gain, before.error.hypot(since.error));
+        let taken = gain >= -ERRORS * error;
+        tracing::debug!(frame, measure, before.gain, since.gain, error, taken, "refinement");
+        if !taken {
+            return None;
+        }
+        self.adopt(&mut tree);
+        Some(tree)
+    }
+
+    /// How much better `new` is borne out by the motion in `table`, by the points that both trees know.
+    fn gain(&self, table: &TrackTable, new: &Tree) -> Gain {
+        let known = members(&new.hierarchy, 0);
+        let on_both = |(row, id): (usize, &TrackId)| {
+            let (node, _) = self.bound.get(id).filter(|_| known.contains(id))?;
+            Some(OnBoth { row, old: upwards(&self.standing.skeleton, *node), new: chain_of(new, *id) })
+        };
+        let points: Vec<OnBoth> = table.ids.iter().enumerate().filter_map(on_both).collect();
+        hierarchy::gain(table, &points)
+    }
+
+    /// Names, places and lost tracks go over from the standing tree.
+    fn adopt(&self, tree: &mut Tree) {
+        let old = &self.standing.skeleton;
+        let measured = self.measured_twins(tree);
+        let mut skeleton = (*tree.skeleton).clone();
+        let twins = twins(&skeleton, old, &measured);
+        let envelope = Envelope::of_revolution(&tree.outline, old.foot_px);
+        stand_as_before(&mut skeleton, old, &twins, &envelope);
+        let mut names = self.standing.names;
+        for (node, twin) in skeleton.nodes.iter_mut().zip(&twins) {
+            node.name = twin.and_then(|t| old.name_of(t.old)).unwrap_or_else(|| {
+                names += 1;
+                NodeName(names - 1)
+            });
+        }
+        tree.names = names;
+        tree.kept = measured.iter().flatten().count();
+        tree.inherited = self.inherited(tree, &measured);
+        tree.skeleton = Arc::new(skeleton);
+        (tree.first, tree.refinements) = (self.standing.first, self.standing.refinements + 1);
+    }
+
+    /// The twin of every measured node: foot and trunk go on in any case, the others as most of their points do.
+    fn measured_twins(&self, tree: &Tree) -> Vec<Option<Twin>> {
+        let skeleton = &self.standing.skeleton;
+        let mut old: Vec<Vec<TrackId>> = vec![Vec::new(); skeleton.measured()];
+        for (id, (node, _)) in &self.bound {
+            upwards(skeleton, *node).into_iter().for_each(|n| old[n as usize].push(*id));
+        }
+        let new: Vec<&Vec<TrackId>> = tree.hierarchy.clusters.iter().map(|c| &c.members).collect();
+        let above = |groups: &[Vec<TrackId>]| groups.iter().skip(1).cloned().collect::<Vec<_>>();
+        let of = hierarchy::persisting(
+            &above(&old[1..]),
+            &new.iter().skip(1).map(|members| (*members).clone()).collect::<Vec<_>>(),
+        );
+        let foot = Twin { old: NodeId(0), moved_px: [0.0; 2] };
+        let trunk = [(1usize, 0usize)].into_iter();
+        let others = of.iter().enumerate().filter_map(|(k, i)| Some((i.as_ref()? + 2, k + 1)));
+        let mut twins: Vec<Option<Twin>> = vec![None; new.len() + 1];
+        twins[0] = Some(foot);
+        for (i, k) in trunk.chain(others).filter(|(i, _)| *i < old.len()) {
+            twins[k + 1] = Some(Twin { old: NodeId(i as u32), moved_px: self.moved_px(tree, &old[i], new[k]) });
+        }
+        twins
+    }
+
+    /// By how much the rest places of the points that `old` and `new` share have moved, px.
+    fn moved_px(&self, tree: &Tree, old: &[TrackId], new: &[TrackId]) -> [f64; 2] {
+        let old: BTreeSet<TrackId> = old.iter().copied().collect();
+        let moved: Vec<[f64; 2]> = new
+            .iter()
+            .filter(|id| old.contains(id))
+            .filter_map(|id| {
+                let (was, is) = (self.bound.get(id)?.1, tree.rest_px.get(id)?);
+                Some([is[0] - was[0], is[1] - was[1]])
+            })
+            .collect();
+        [0, 1].map(|c| median(moved.iter().map(|m| m[c])))
+    }
+
+    /// Tracks that the new tree was not built from, on the branch that theirs has become or grows from: lost ones, whose
+    /// frames keep their rows, and young ones.
+    fn inherited(&self, tree: &Tree, measured: &[Option<Twin>]) -> BTreeMap<TrackId, (NodeId, [f64; 2])> {
+        let old = &self.standing.skeleton;
+        let mut goes_on = vec![None; old.measured()];
+        for (k, twin) in measured.iter().enumerate() {
+            if let Some(twin) = twin {
+                goes_on[twin.old.index()] = Some(NodeId(k as u32));
+            }
+        }
+        let in_tree = members(&tree.hierarchy, 0);
+        let frames = self.table.times_s.len() as f64;
+        let judged: BTreeSet<TrackId> = (0..self.table.ids.len())
+            .filter(|&row| self.table.positions[row].iter().flatten().count() as f64 >= SEEN_SHARE * frames)
+            .map(|row| self.table.ids[row])
+            .collect();
+        let others = self.bound.iter().filter(|(id, _)| !in_tree.contains(id) && !judged.contains(id));
+        let place = |(id, (node, rest_px)): (&TrackId, &(NodeId, [f64; 2]))| {
+            let node = upwards(old, *node).into_iter().rev().find_map(|n| goes_on[n as usize])?;
+            Some((*id, (node, *rest_px)))
+        };
+        others.filter_map(place).collect()
+    }
+}
+
+fn members(hierarchy: &MotionHierarchy, cluster: usize) -> BTreeSet<TrackId> {
+    hierarchy.clusters.get(cluster).into_iter().flat_map(|c| c.members.iter().copied()).collect()
+}
+
+/// The node and those below it down to the trunk's top, from there up; the foot carries all and says nothing.
+fn upwards(skeleton: &Skeleton, node: NodeId) -> Vec<u32> {
+    let below = |n: &NodeId| skeleton.nodes.get(n.index()).and_then(|n| n.parent).filter(|p| p.0 > 0);
+    let mut chain: Vec<u32> = std::iter::successors(Some(node), below).map(|n| n.0).collect();
+    chain.reverse();
+    chain
+}
+
+/// Nodes from the trunk up to the one that a track is on, in a tree that was just built.
+fn chain_of(tree: &Tree, id: TrackId) -> Vec<u32> {
+    let clusters = tree.hierarchy.clusters.iter().enumerate();
+    clusters.filter(|(_, c)| c.members.binary_search(&id).is_ok()).map(|(k, _)| k as u32).collect()
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}

@@ -1,0 +1,149 @@
+//! The tree is refined while filming goes on, and nobody who looks on is thrown off by it.
+
+mod support;
+
+use arborcam::config::Config;
+use arborcam::model::{NodeName, Pose};
+use arborcam::pipeline::{Pipeline, Retrace, Tree};
+use arborcam::source::Decoder;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Arc, OnceLock};
+
+/// A run on the recording in which the tree is built after 4 s, as if there had been a gust, and refined from then on.
+struct Run {
+    /// Tree and pose after each frame.
+    frames: Vec<(Arc<Tree>, Arc<Pose>)>,
+    sets: Vec<arborcam::model::TrackSet>,
+    config: Config,
+}
+
+fn run() -> &'static Run {
+    static RUN: OnceLock<Run> = OnceLock::new();
+    RUN.get_or_init(|| {
+        let mut config = Config::default();
+        (config.accumulate.min_s, config.accumulate.threshold) = (4.0, 0.2);
+        let mut pipeline = Pipeline::new(&config, Some(support::outline()));
+        let mut decoder = Decoder::new().expect("decoder");
+        let (mut frames, mut sets) = (Vec::new(), Vec::new());
+        for k in 0..support::recording().len() {
+            for moved in pipeline.step(support::decoded(&mut decoder, k)) {
+                sets.push(moved.tracks);
+                frames.extend(pipeline.back.tree().cloned().zip(moved.pose));
+            }
+        }
+        Run { frames, sets, config }
+    })
+}
+
+/// Pairs of frames with a refinement between them.
+fn seams(run: &Run) -> impl Iterator<Item = &[(Arc<Tree>, Arc<Pose>)]> {
+    run.frames.windows(2).filter(|pair| !Arc::ptr_eq(&pair[0].0, &pair[1].0))
+}
+
+fn names(tree: &Tree) -> BTreeSet<NodeName> {
+    tree.skeleton.nodes.iter().map(|n| n.name).collect()
+}
+
+/// Places of all nodes in the picture and in depth, px.
+fn places(tree: &Tree, pose: &Pose) -> BTreeMap<NodeName, [f64; 3]> {
+    let skeleton = &tree.skeleton;
+    let place = |(n, j): (&arborcam::model::Node, &arborcam::model::JointPose)| {
+        let [u, v] = skeleton.image_from_model(&j.position);
+        (n.name, [u, v, j.position.z])
+    };
+    skeleton.nodes.iter().zip(&pose.joints).map(place).collect()
+}
+
+/// Whoever notes a number, in a script or by eye, finds the same branch under it later, or none.
+#[test]
+fn branches_keep_their_numbers_and_no_number_is_given_twice() {
+    let run = run();
+    let mut gone = BTreeSet::new();
+    let mut refined = 0;
+    for pair in seams(run) {
+        let (old, new) = (&pair[0].0, &pair[1].0);
+        refined += 1;
+        assert_eq!((new.refinements, new.first), (refined, old.first));
+        let (before, after) = (names(old), names(new));
+        assert_eq!(after.len(), new.skeleton.nodes.len(), "every node has a name of its own");
+        gone.extend(before.difference(&after).copied());
+        assert!(after.is_disjoint(&gone), "a name came back");
+        assert!((0..2).all(|i| new.skeleton.nodes[i].name == NodeName(i as u32)), "foot and trunk are what they were");
+        let kept = before.intersection(&after).count();
+        println!("{:.1} s: {kept} of {} nodes go on in {}", pair[1].1.time_s, before.len(), after.len());
+        assert!(5 * kept >= 3 * before.len(), "{kept} of {} nodes go on", before.len());
+        // A branch goes on where most of its points are.
+        let points = |tree: &Tree, name: NodeName| -> BTreeSet<_> {
+            let node = tree.skeleton.nodes.iter().position(|n| n.name == name).expect("node");
+            tree.hierarchy
+                .clusters
+                .get(node.wrapping_sub(1))
+                .map_or_else(BTreeSet::new, |c| c.members.iter().copied().collect())
+        };
+        for name in before.intersection(&after).filter(|n| n.0 > 1) {
+            let (was, is) = (points(old, *name), points(new, *name));
+            let known: BTreeSet<_> = was.intersection(&points(new, NodeName(1))).copied().collect();
+            assert!(2 * known.intersection(&is).count() >= known.len(), "{name:?}: {known:?} became {is:?}");
+        }
+    }
+    assert!(refined >= 3, "{refined} refinements show little");
+}
+
+/// The screen shows the picture and the tree from the side: in neither does a branch jump or change sides. A measured
+/// node moves no farther than in an ordinary frame of this swing; copies of short branches may turn more.
+#[test]
+fn branches_that_go_on_do_not_jump() {
+    let run = run();
+    // In the picture and in depth, px, and whether it is a measured node.
+    let steps = |pair: &[(Arc<Tree>, Arc<Pose>)]| -> Vec<(f64, f64, bool)> {
+        let (was, is) = (places(&pair[0].0, &pair[0].1), places(&pair[1].0, &pair[1].1));
+        let measured: BTreeSet<NodeName> =
+            pair[1].0.skeleton.nodes[..pair[1].0.skeleton.measured()].iter().map(|n| n.name).collect();
+        let step = |(name, a): (&NodeName, &[f64; 3])| {
+            let b = is.get(name)?;
+            Some(((a[0] - b[0]).hypot(a[1] - b[1]), (a[2] - b[2]).abs(), measured.contains(name)))
+        };
+        was.iter().filter_map(step).collect()
+    };
+    let largest = |steps: &[(f64, f64, bool)]| {
+        steps.iter().filter(|s| s.2).fold([0.0f64; 2], |m, s| [m[0].max(s.0), m[1].max(s.1)])
+    };
+    let ordinary = run.frames.windows(2).filter(|pair| Arc::ptr_eq(&pair[0].0, &pair[1].0));
+    let ordinary = largest(&ordinary.flat_map(steps).collect::<Vec<_>>());
+    for pair in seams(run) {
+        let mut jumps = steps(pair);
+        jumps.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let ([u, z], n) = (largest(&jumps), jumps.len());
+        let (median, most, all) = (jumps[n / 2].0, jumps[n * 95 / 100].0, jumps[n - 1].0);
+        println!(
+            "{:.1} s: {n} nodes, median {median:.2} px, 95 % {most:.2} px, all {all:.2} px; measured at most {u:.2} px, in \
+             depth {z:.2} px (ordinary frames {:.2} px, {:.2} px)",
+            pair[1].1.time_s, ordinary[0], ordinary[1]
+        );
+        assert!(u <= ordinary[0] && z <= 2.0 * ordinary[1], "a measured node jumps by {u:.2} px, {z:.2} px in depth");
+        assert!(median <= 1.5 && most <= 10.0, "in the median {median:.2} px, 95 % {most:.2} px");
+    }
+}
+
+/// What is written is what was shown: from the last refinement on the same poses, and every node in every frame before.
+#[test]
+fn the_last_tree_has_a_pose_in_every_frame() {
+    let run = run();
+    let (tree, _) = run.frames.last().expect("frames");
+    assert!(tree.refinements > 0);
+    let mut retrace = Retrace::new(tree, &run.config);
+    let poses: Vec<Pose> = run.sets.iter().map(|set| retrace.step(set).0).collect();
+    let shown = run.frames.iter().filter(|(t, _)| Arc::ptr_eq(t, tree));
+    let mut compared = 0;
+    for (_, pose) in shown {
+        assert_eq!(**pose, poses[pose.frame as usize], "frame {}", pose.frame);
+        compared += 1;
+    }
+    assert!(compared > 5, "{compared} frames");
+    // Points that the last tree was not built from, as they were lost before, keep a branch.
+    let born_early: BTreeSet<_> = run.sets[..100].iter().flat_map(|s| s.counted().map(|o| o.id)).collect();
+    let alive: BTreeSet<_> = run.sets.last().expect("sets").observations.iter().map(|o| o.id).collect();
+    let lost: Vec<_> = born_early.difference(&alive).filter(|id| tree.inherited.contains_key(id)).collect();
+    println!("{} lost points inherited", lost.len());
+    assert!(lost.iter().all(|id| retrace.node_of(**id).is_some()));
+}
