@@ -43,9 +43,9 @@ impl Default for Hierarchy {
         Self {
             levels: 7,
             affinity: Affinity::Path,
-            motion_power: 4.0,
+            motion_power: 3.0,
             path_weight: 0.3,
-            distance_weight: 0.1,
+            distance_weight: 0.05,
             distance_scale: 1.0,
             correlation_power: 1.0,
             max_children: 4,
