@@ -271,7 +271,7 @@ fn the_stream_is_what_the_capture_says() {
             let off = (0..3).map(|c| (node[c + 1].as_f64().expect("number") - kept.at[c]).abs()).fold(0.0, f64::max);
             assert!(off < 0.001, "frame {frame} node {id}: {node} and {:?}", kept.at);
         }
-        assert!(streamed.len() > 50, "{} nodes", streamed.len());
+        assert!(streamed.len() > 30, "{} nodes", streamed.len());
     }
     assert!(4 * kept_names >= 3 * measured_names, "{kept_names} of {measured_names} nodes keep their numbers");
 }
