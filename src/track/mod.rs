@@ -179,7 +179,9 @@ impl Tracker {
         let few = |of: usize| of.saturating_sub(self.points.len()) as f64 >= REFILL_SHARE * self.wanted as f64;
         let rested = self.frames >= self.last_detection + REFILL_FRAMES;
         let again = few(self.wanted) && time_s >= self.detected_s + TRY_AGAIN_S;
-        self.frames == 0 || (self.trials.is_none() && rested && (few(self.settled) || again))
+        // While the tree rests, a trial may be long, and the light may take points away.
+        let free = self.trials.as_ref().is_none_or(Trials::at_rest);
+        self.frames == 0 || (free && rested && (few(self.settled) || again))
     }
 
     /// Detects points where there are none; returns how many.
@@ -220,7 +222,9 @@ impl Tracker {
             self.next_id += 1;
         }
         self.next_keyframe += 1;
-        self.trials = on_trial.then(|| Trials::new(frame.time_s));
+        if on_trial && self.trials.is_none() {
+            self.trials = Some(Trials::new(frame.time_s, self.bar_px.is_none()));
+        }
         found.len() as u32
     }
 }
