@@ -46,13 +46,15 @@ pub struct Trials {
     since_s: Option<f64>,
     last_s: f64,
     moved_s: f64,
+    /// Number of points with which it began.
+    started: usize,
 }
 
 impl Trials {
     /// The first points of a capture wait for the tree to move, however long that takes: until then there is nothing
     /// to be decided, and no tree to which they belong. Later ones have [`LONGEST_TRIAL_S`] in any case.
-    pub fn new(time_s: f64, first: bool) -> Self {
-        Self { since_s: (!first).then_some(time_s), last_s: time_s, moved_s: 0.0 }
+    pub fn new(time_s: f64, first: bool, started: usize) -> Self {
+        Self { started, since_s: (!first).then_some(time_s), last_s: time_s, moved_s: 0.0 }
     }
 
     /// Nothing has stirred yet.
@@ -107,6 +109,7 @@ impl Tracker {
         if !trials.over(time_s, &away_px) {
             return Vec::new();
         }
+        let on_trial = trials.started;
         self.trials = None;
         let candidate = |p: &Point| {
             let trial = p.trial.as_ref().filter(|_| p.coasting == 0)?;
@@ -116,7 +119,7 @@ impl Tracker {
         let there = self.points.iter().filter(|p| p.trial.is_none()).count();
         let kept = match self.bar_px {
             None => {
-                let (kept, bar_px) = better_half(&mut candidates);
+                let (kept, bar_px) = best(&mut candidates, on_trial.div_ceil(CANDIDATES));
                 self.bar_px = bar_px;
                 kept
             }
@@ -142,14 +145,16 @@ impl Tracker {
     }
 }
 
-/// The half of each class of reach that is expected to err least, and the error that [`BAR`] of them keep below, px.
-fn better_half(candidates: &mut [Candidate]) -> (BTreeSet<TrackId>, Option<f32>) {
+/// So many, the same share of each class of reach, that are expected to err least, and the error that [`BAR`] of them
+/// keep below, px.
+fn best(candidates: &mut [Candidate], wanted: usize) -> (BTreeSet<TrackId>, Option<f32>) {
+    let share = (wanted as f64 / candidates.len().max(1) as f64).min(1.0);
     candidates.sort_by(|a, b| a.reach_px.total_cmp(&b.reach_px));
     let class = candidates.len().div_ceil(CLASSES).max(1);
     let (mut kept, mut errors) = (BTreeSet::new(), Vec::new());
     for class in candidates.chunks_mut(class) {
         class.sort_by(|a, b| a.error_px.total_cmp(&b.error_px));
-        let best = &class[..class.len().div_ceil(CANDIDATES)];
+        let best = &class[..(share * class.len() as f64).ceil() as usize];
         kept.extend(best.iter().map(|c| c.id));
         errors.extend(best.iter().map(|c| c.error_px));
     }
@@ -194,7 +199,7 @@ mod tests {
             reach_px: k as f32,
             error_px: 0.1 * k as f32 + if k.is_multiple_of(2) { 0.0 } else { 5.0 },
         };
-        let (kept, bar_px) = better_half(&mut (0..80).map(candidate).collect::<Vec<_>>());
+        let (kept, bar_px) = best(&mut (0..80).map(candidate).collect::<Vec<_>>(), 40);
         let even: BTreeSet<TrackId> = (0..80).step_by(2).map(TrackId).collect();
         assert_eq!(kept, even);
         assert!(bar_px.is_some_and(|b| (b - 6.0).abs() < 0.5), "{bar_px:?}");
@@ -210,7 +215,7 @@ mod tests {
         };
         let mut few: Vec<Candidate> = (0..240).map(candidate).collect();
         let moving: BTreeSet<TrackId> = (0..240).step_by(6).map(TrackId).collect();
-        let (half, _) = better_half(&mut few);
+        let (half, _) = best(&mut few, 120);
         assert!(half.intersection(&moving).count() < 35, "the half alone has too few");
         let kept = fill_up(half, few, (64, 120));
         assert_eq!(
@@ -226,12 +231,12 @@ mod tests {
     /// Whoever starts the camera, goes out and pulls at the tree must get the same choice as one who was quick.
     #[test]
     fn while_the_tree_rests_nothing_is_decided() {
-        let mut first = Trials::new(0.0, true);
+        let mut first = Trials::new(0.0, true, 40);
         let (still, swaying) = ([0.05; 40], [0.1, 0.2, 3.0, 5.0]);
         assert!((1..400).all(|k| !first.over(f64::from(k) * 0.1, &still) && first.at_rest()));
         let over_s = (400..).map(|k| f64::from(k) * 0.1).find(|t| first.over(*t, &swaying));
         assert!(over_s.is_some_and(|s| (41.8..42.2).contains(&s)), "{over_s:?}");
-        let mut later = Trials::new(0.0, false);
+        let mut later = Trials::new(0.0, false, 40);
         let over_s = (1..).map(|k| f64::from(k) * 0.1).find(|t| later.over(*t, &still));
         assert!(over_s.is_some_and(|s| (s - LONGEST_TRIAL_S).abs() < 0.15), "later ones have a limit: {over_s:?}");
     }
