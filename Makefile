@@ -1,6 +1,6 @@
 # make demo: from a fresh machine to a moving tree in out/demo. make test: every test. make bench: the figures.
 # make install, make uninstall: program and service, below DESTDIR (for packages) and PREFIX.
-.PHONY: demo build test test-v4l2 bench sweep lint setup install uninstall
+.PHONY: demo build test test-v4l2 test-real bench sweep lint setup install uninstall
 
 demo: setup build
 	@scripts/demo.sh
@@ -19,6 +19,11 @@ test:
 
 test-v4l2:
 	ARBORCAM_REQUIRE_VM=1 cargo test --release --locked --test v4l2
+
+# A real tree, and a hand before it; fetches 96 MB once.
+test-real:
+	scripts/fetch-real-clip.sh
+	cargo test --release --locked --test real_clip -- --ignored --nocapture
 
 bench:
 	cargo bench --locked --bench figures

@@ -111,8 +111,8 @@ pub struct Track {
     pub anchor_every: u32,
     /// Least normalised cross-correlation with that picture for the point to be put back on it.
     pub anchor_ncc: f64,
-    /// Frames for which a point that fails the check may ride on its neighbours before it is given up.
-    pub coast_frames: u32,
+    /// Time for which a point that is not seen may ride on its neighbours before it is given up, s.
+    pub coast_s: f64,
 }
 
 /// When enough motion has been seen to build.
@@ -217,7 +217,7 @@ impl Default for Detect {
 }
 impl Default for Track {
     fn default() -> Self {
-        Self { window_px: 15, levels: 3, fb_limit_px: 1.0, anchor_every: 2, anchor_ncc: 0.6, coast_frames: 15 }
+        Self { window_px: 15, levels: 3, fb_limit_px: 1.0, anchor_every: 2, anchor_ncc: 0.6, coast_s: 5.0 }
     }
 }
 impl Default for Accumulate {
@@ -314,6 +314,7 @@ impl Config {
             ("track.levels", self.track.levels.into(), (0.0, 6.0, "0 to 6")),
             ("track.fb_limit_px", self.track.fb_limit_px, positive),
             ("track.anchor_ncc", self.track.anchor_ncc, share),
+            ("track.coast_s", self.track.coast_s, (0.0, 60.0, "0 to 60")),
             ("accumulate.window_s", self.accumulate.window_s, (1.0, 120.0, "1 to 120")),
             ("accumulate.min_s", self.accumulate.min_s, (0.2, 100.0, "0.2 to 100")),
             ("accumulate.threshold", self.accumulate.threshold, share),

@@ -187,14 +187,15 @@ fn tracks_belong_to_nodes_that_exist_and_keep_their_ids() {
     let (capture, nodes) = (made().capture(), made().nodes());
     let model = |key: &str| capture["model"][key].as_u64().expect("count") as usize;
     let measured: BTreeSet<&str> = nodes[..model("nodes") - model("copies")].iter().map(|n| n[0].as_str()).collect();
-    let coast = capture["config"]["track"]["coast_frames"].as_u64().expect("coast") as usize;
-    let mut last: BTreeMap<usize, usize> = BTreeMap::new();
+    let coast_s = capture["config"]["track"]["coast_s"].as_f64().expect("coast");
+    let mut last: BTreeMap<usize, f64> = BTreeMap::new();
     let mut bound = 0;
     let tracks = made().tracks();
     for row in &tracks {
-        let (id, frame) = (index(&row[0]), index(&row[1]));
-        if let Some(before) = last.insert(id, frame) {
-            assert!(frame > before && frame - before <= coast + 1, "track {id} is back after {before} in {frame}");
+        let (id, time_s) = (index(&row[0]), number(&row[2]));
+        if let Some(before_s) = last.insert(id, time_s) {
+            let away = before_s..before_s + coast_s + 0.1;
+            assert!(time_s > before_s && away.contains(&time_s), "track {id} is back after {before_s} s at {time_s} s");
         }
         assert!(row[5].is_empty() || measured.contains(row[5].as_str()), "{row:?}");
         bound += usize::from(!row[5].is_empty());

@@ -120,17 +120,18 @@ fn without_tree(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
     let folder = OutputFolder::create(dir)?;
     let metres_per_px = job.config.export.metres_per_px;
     let mut tracks = TracksCsv::new(folder.file("tracks.csv")?)?;
+    // Which points are void is known for sure only at the end: where the tree did not move, a trial may last for long.
     let mut held = HeldSets::default();
     for set in job.tracks.sets() {
-        held.push(set.map_err(Failure::Spool)?);
-        while let Some(set) = held.decided() {
-            tracks.set(&set, |_| None)?;
-        }
+        held.note(&set.map_err(Failure::Spool)?);
         job.shared.pulse.wrote();
     }
     held.close();
-    while let Some(set) = held.next() {
+    for set in job.tracks.sets() {
+        let mut set = set.map_err(Failure::Spool)?;
+        held.clean(&mut set);
         tracks.set(&set, |_| None)?;
+        job.shared.pulse.wrote();
     }
     tracks.finish()?;
     let foot_only = Arc::new(Skeleton { nodes: Vec::new(), foot_px: [0.0; 2], image_size: job.info.size });

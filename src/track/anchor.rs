@@ -15,6 +15,11 @@ use crate::model::Luma;
 const FB_LIMIT_PX: f32 = 0.7;
 /// A match may lie so far from where the neighbours say, px.
 const NEIGHBOUR_LIMIT_PX: f32 = 4.0;
+/// Where it looks like another and is so far from where its neighbours say, px, it is another: flow goes along with
+/// whatever comes before a point.
+const ASTRAY_PX: f32 = 8.0;
+/// So far from there it is another, whatever it looks like, px: there are many edges like the edge of a branch.
+const FAR_ASTRAY_PX: f32 = 16.0;
 /// A match is taken for less like by so much for every px between it and where the neighbours say.
 const LESS_LIKE_PER_PX: f32 = 0.05;
 /// From the neighbours' place, too, the search starts where it lies so far from the point's own, px.
@@ -81,6 +86,7 @@ impl Anchoring {
     fn reanchor(&self, luma: &Luma, p: &Point, fit: Option<&Fit>) -> (Option<[f32; 2]>, f32) {
         let predicted_px = fit.map_or(p.now_px, |fit| p.predicted_px(fit));
         let warp = fit.map_or(UPRIGHT, |fit| fit.warp);
+        let enough = p.found_above(self.min_ncc, fit.is_some());
         let less = |at: [f32; 2]| LESS_LIKE_PER_PX * distance(at, predicted_px);
         let mut best: Option<[f32; 2]> = None;
         let (mut best_score, mut likeness) = (0.0, 0.0);
@@ -90,15 +96,22 @@ impl Anchoring {
             let found = self.registration.find(&p.patch, luma, start, &warp);
             if k == 0 {
                 likeness = found.likeness_at_start;
-                best_score = likeness - less(start);
+                // A hidden point is nowhere: any place where it is found is better.
+                best_score = if p.coasting == 0 { likeness - less(start) } else { f32::MIN };
             }
             let score = found.likeness - less(found.at_px);
             let near = distance(found.at_px, predicted_px) < NEIGHBOUR_LIMIT_PX;
-            if found.converged && near && found.likeness > self.min_ncc && score > best_score {
+            if found.converged && near && found.likeness > enough && score > best_score {
                 (best, best_score, likeness) = (Some(found.at_px), score, found.likeness);
             }
         }
         (best, likeness)
+    }
+
+    /// Whether something else is seen where tracking has a point, from its likeness with its first patch there.
+    fn covered(&self, p: &Point, likeness: f32, predicted_px: Option<[f32; 2]>) -> bool {
+        let astray = |limit_px| predicted_px.is_some_and(|at| distance(p.now_px, at) > limit_px);
+        likeness < p.hidden_below() || (likeness < self.min_ncc && astray(ASTRAY_PX)) || astray(FAR_ASTRAY_PX)
     }
 }
 
@@ -145,14 +158,20 @@ impl Tracker {
             return;
         }
         for (p, fit) in self.points.iter_mut().zip(&self.fits) {
-            if u64::from(p.id.0) % every != self.frames % every {
+            let hidden = p.coasting > 0;
+            if !hidden && u64::from(p.id.0) % every != self.frames % every {
                 continue;
             }
             let (found, likeness) = self.anchoring.reanchor(luma, p, fit.as_ref());
+            let predicted_px = fit.as_ref().map(|fit| p.predicted_px(fit));
             if let Some(at) = found {
-                (p.now_px, p.coasting, p.unsure) = (at, 0, false);
+                (p.now_px, p.coasting) = (at, 0);
+            } else if !hidden && self.anchoring.covered(p, likeness, predicted_px) {
+                (p.now_px, p.coasting) = (predicted_px.unwrap_or(p.now_px), 1);
             }
-            p.compared(likeness, fit.as_ref());
+            if p.coasting == 0 {
+                p.compared(likeness, fit.as_ref());
+            }
         }
     }
 }

@@ -18,7 +18,7 @@ pub use flow::{Flow, OpticalFlow, Pyramid};
 pub use history::{TrackHistory, TrackTable};
 
 use crate::config::{Detect, Track};
-use crate::model::{Frame, Observation, Outline, Size, TrackId, TrackSet};
+use crate::model::{Frame, Observation, Outline, TrackId, TrackSet};
 use anchor::{Anchoring, Keyframe, distance};
 use neighbours::Fit;
 use point::{Point, Record};
@@ -28,7 +28,7 @@ use trial::{Trial, Trials};
 const KEYFRAMES: usize = 4;
 /// New points are looked for when so great a share of the wanted ones is missing, and not more often than this.
 const REFILL_SHARE: f64 = 0.1;
-const REFILL_FRAMES: u64 = 15;
+const REFILL_S: f64 = 0.5;
 /// Where there were not enough good points to be found, they are looked for again after so long, s.
 const TRY_AGAIN_S: f64 = 10.0;
 
@@ -48,7 +48,6 @@ pub struct Tracker {
     next_id: u32,
     next_keyframe: u32,
     frames: u64,
-    last_detection: u64,
     detected_s: f64,
     gaps: regain::Gaps,
     trials: Option<Trials>,
@@ -85,7 +84,6 @@ impl Tracker {
             next_id: first_id,
             next_keyframe: 0,
             frames: 0,
-            last_detection: 0,
             gaps: regain::Gaps::default(),
             trials: None,
             bar_px: None,
@@ -115,7 +113,7 @@ impl Tracker {
                 self.follow();
                 self.undo_drift(&frame.luma);
             }
-            self.give_up(frame.luma.size, &mut rejected);
+            self.give_up(frame, &mut rejected);
         }
         let lost = (before - self.points.len() - rejected.len()) as u32;
         rejected.extend(self.judge(frame.time_s));
@@ -138,11 +136,13 @@ impl Tracker {
     }
 
     /// Drops the points that were not seen for too long or have left the picture; those on trial have not passed it.
-    fn give_up(&mut self, size: Size, rejected: &mut Vec<TrackId>) {
-        let patience = self.settings.coast_frames;
-        self.points.retain(|p| {
-            let keep = p.coasting <= patience.max(if p.unsure { regain::UNSURE_FRAMES } else { 0 })
-                && size.contains(f64::from(p.now_px[0]), f64::from(p.now_px[1]));
+    fn give_up(&mut self, frame: &Frame, rejected: &mut Vec<TrackId>) {
+        let (size, time_s, patience_s) = (frame.luma.size, frame.time_s, self.settings.coast_s);
+        self.points.retain_mut(|p| {
+            if p.coasting == 0 {
+                p.seen_s = time_s;
+            }
+            let keep = time_s - p.seen_s <= patience_s && size.contains(f64::from(p.now_px[0]), f64::from(p.now_px[1]));
             if !keep && p.trial.is_some() {
                 rejected.push(p.id);
             }
@@ -161,10 +161,13 @@ impl Tracker {
         b.to.extend(b.forward.iter().map(|f| f.to));
         self.flow.track((pictures.1, pictures.0), &b.to, None, self.settings.levels, &mut b.backward);
         let limit = self.settings.fb_limit_px as f32;
+        // What flow finds where a hidden point is thought to be may be whatever hides it: that it is the point its first patch
+        // must tell.
+        let blind = self.settings.anchor_every == 0;
         for (i, p) in self.points.iter_mut().enumerate() {
             let (forward, backward) = (b.forward[i], b.backward[i]);
             let error = distance(backward.to, b.from[i]);
-            if !p.unsure && forward.found && backward.found && error < limit {
+            if (p.coasting == 0 || blind) && forward.found && backward.found && error < limit {
                 (p.now_px, p.fb_error_px, p.coasting) = (forward.to, error, 0);
             } else {
                 p.coasting += 1;
@@ -177,14 +180,16 @@ impl Tracker {
     /// Whether points are to be looked for: so many of those that there were are lost, or it is worth another try.
     fn refill_due(&self, time_s: f64) -> bool {
         let few = |of: usize| of.saturating_sub(self.points.len()) as f64 >= REFILL_SHARE * self.wanted as f64;
-        let rested = self.frames >= self.last_detection + REFILL_FRAMES;
+        let rested = time_s >= self.detected_s + REFILL_S;
         let again = few(self.wanted) && time_s >= self.detected_s + TRY_AGAIN_S;
-        self.frames == 0 || (self.trials.is_none() && rested && (few(self.settled) || again))
+        // While the tree rests, a trial may be long, and the light may take points away.
+        let free = self.trials.as_ref().is_none_or(Trials::at_rest);
+        self.frames == 0 || (free && rested && (few(self.settled) || again))
     }
 
     /// Detects points where there are none; returns how many.
     fn refill(&mut self, frame: &Frame) -> u32 {
-        (self.last_detection, self.detected_s) = (self.frames, frame.time_s);
+        self.detected_s = frame.time_s;
         let taken: Vec<[f32; 2]> = self.points.iter().map(|p| p.now_px).collect();
         // Without comparisons nothing would be known of them at the end of a trial.
         let on_trial = self.settings.anchor_every > 0;
@@ -212,7 +217,7 @@ impl Tracker {
                 patch: self.anchoring.registration.patch(&frame.luma, *at),
                 fb_error_px: 0.0,
                 coasting: 0,
-                unsure: false,
+                seen_s: frame.time_s,
                 neighbours: near.into_iter().map(|j| (known_ids[j as usize], known_px[j as usize])).collect(),
                 record: Record::default(),
                 trial: on_trial.then(Trial::default),
@@ -220,7 +225,9 @@ impl Tracker {
             self.next_id += 1;
         }
         self.next_keyframe += 1;
-        self.trials = on_trial.then(|| Trials::new(frame.time_s));
+        if on_trial && self.trials.is_none() {
+            self.trials = Some(Trials::new(frame.time_s, self.bar_px.is_none(), found.len()));
+        }
         found.len() as u32
     }
 }

@@ -10,10 +10,16 @@ use crate::model::TrackId;
 const NEWEST: f32 = 0.1;
 /// Likeness below which a neighbour is hardly believed.
 const DOUBTFUL: f32 = 0.5;
-/// Expected error = 6.6 px exp(-1.9 likeness) sqrt(distance from the neighbours' place + 0.2 px): least squares on the
-/// logarithms of true errors of 852 points on two rendered clips of known motion. In five classes of expected error, from
-/// 0.8 to 7 px, the true medians are within a third of it.
-const ERROR_PX: f32 = 6.6;
+/// A point is hidden where it looks less like its first patch than this share of what is usual for it, and there again
+/// from that share on.
+const HIDDEN: f32 = 0.2;
+const THERE_AGAIN: f32 = 0.8;
+/// The same where no neighbour vouches for the place: the share of what is usual, and not less than is asked of all.
+const SURELY_THERE: f32 = 0.9;
+/// Expected error = 4.7 px exp(-1.9 likeness) sqrt(distance from the neighbours' place + 0.2 px): least squares on the
+/// logarithms of true errors on two rendered clips of known motion, all points that were tried. Of those kept it tells
+/// good from bad only roughly (docs/method.md).
+const ERROR_PX: f32 = 4.7;
 const PER_LIKENESS: f32 = -1.9;
 const APART_FLOOR_PX: f32 = 0.2;
 
@@ -29,8 +35,8 @@ pub struct Point {
     pub fb_error_px: f32,
     /// Frames since it was last seen; 0 when seen in this frame.
     pub coasting: u32,
-    /// Not seen since a gap: whatever flow finds where it is thought to be may be another point.
-    pub unsure: bool,
+    /// When it was last seen, s; moved on while there is nothing to be seen at all.
+    pub seen_s: f64,
     /// Points nearest to it at birth, and where they were then.
     pub neighbours: Vec<(TrackId, [f32; 2])>,
     /// How it did lately.
@@ -42,8 +48,23 @@ pub struct Point {
 impl Point {
     /// How far its motion is believed when it is asked about a neighbour's, above 0 to 1.
     pub fn trust(&self) -> f64 {
-        let likeness = if self.record.comparisons == 0 { 1.0 } else { self.record.likeness };
-        f64::from(((likeness - DOUBTFUL) / (1.0 - DOUBTFUL)).clamp(0.02, 1.0))
+        f64::from(((self.usual_likeness() - DOUBTFUL) / (1.0 - DOUBTFUL)).clamp(0.02, 1.0))
+    }
+
+    /// Likeness below which something else is before it.
+    pub fn hidden_below(&self) -> f32 {
+        HIDDEN * self.usual_likeness()
+    }
+
+    /// Likeness above which it is found again. Not more than `enough`, for foliage never looks the same twice; but not less
+    /// than nearly usual where it is hidden and no neighbour vouches for the place.
+    pub fn found_above(&self, enough: f32, vouched: bool) -> f32 {
+        let usual = self.usual_likeness();
+        if self.coasting > 0 && !vouched { enough.max(SURELY_THERE * usual) } else { enough.min(THERE_AGAIN * usual) }
+    }
+
+    fn usual_likeness(&self) -> f32 {
+        if self.record.comparisons == 0 { 1.0 } else { self.record.likeness }
     }
 
     /// Where its neighbours say that it is, px.

@@ -13,8 +13,6 @@ const GAP_STEPS: f64 = 5.0;
 /// Points are looked for in this way until so great a share of them is found, or for so long, s.
 const ENOUGH: f64 = 0.5;
 const PATIENCE_S: f64 = 5.0;
-/// A point that was not among them is looked for beside its neighbours for so many frames.
-pub const UNSURE_FRAMES: u32 = 90;
 
 /// Notices gaps by the frames' times.
 #[derive(Debug, Default)]
@@ -44,7 +42,7 @@ impl Tracker {
     /// Looks for every point by its first picture; those that are not found ride on those that are.
     pub(super) fn regain(&mut self, frame: &Frame) {
         // One that was not seen for a while is not given up for it: it had no chance.
-        self.points.iter_mut().for_each(|p| (p.coasting, p.unsure) = (1, true));
+        self.points.iter_mut().for_each(|p| (p.coasting, p.seen_s) = (1, frame.time_s));
         for (number, keyframe) in &self.keyframes {
             let indices: Vec<usize> = (0..self.points.len()).filter(|&i| self.points[i].keyframe == *number).collect();
             let points: Vec<&Point> = indices.iter().map(|&i| &self.points[i]).collect();
@@ -52,7 +50,7 @@ impl Tracker {
             for (i, at) in indices.into_iter().zip(found) {
                 if let Some(at) = at {
                     let p = &mut self.points[i];
-                    (p.now_px, p.coasting, p.unsure, p.fb_error_px) = (at, 0, false, 0.0);
+                    (p.now_px, p.coasting, p.fb_error_px) = (at, 0, 0.0);
                 }
             }
         }

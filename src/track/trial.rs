@@ -7,22 +7,29 @@
 use super::Tracker;
 use super::anchor::distance;
 use super::point::{Point, Record};
-use crate::model::TrackId;
+use crate::model::{LONGEST_TRIAL_S, TrackId};
 use std::collections::BTreeSet;
 
 /// So many candidates are followed for each point that is wanted.
 pub const CANDIDATES: usize = 2;
-/// A trial lasts until the points have moved for so long, s, and not longer than [`crate::model::LONGEST_TRIAL_S`],
-/// whether they move or not.
+/// A trial lasts until the points have moved for so long, s, and not longer than [`LONGEST_TRIAL_S`] from when the first
+/// of them have stirred.
 const MOVED_S: f64 = 2.0;
-/// Points count as moving while half of them are so far from where they were found, px.
+/// Points count as moving while so great a share of them is so far from where they were found, px. An outline may be
+/// wide, and more wall than tree.
+const MOVING_SHARE: f64 = 0.25;
 const MOVED_PX: f32 = 1.0;
+/// They have stirred when so great a share is so far from there, px: what less than that moves makes no tree.
+const STIRRED_SHARE: f64 = 0.1;
+const STIRRED_PX: f32 = 0.3;
 /// More than this between two frames is a gap, in which nobody saw them move, s.
 const STEP_S: f64 = 0.2;
 /// Points that move alike far compete with each other: else those of the trunk, which are easy, would drive out the twigs.
 const CLASSES: usize = 4;
 /// Later points must be as good as so great a share of those that were kept first.
 const BAR: f64 = 0.75;
+/// So many are kept that move, good or not, if so many are wanted: twice what evidence of motion needs to count in full.
+const NEEDED: usize = 64;
 
 /// What is known of one point on trial.
 #[derive(Debug, Default)]
@@ -35,23 +42,40 @@ pub struct Trial {
 /// The trial that is going on.
 #[derive(Debug)]
 pub struct Trials {
-    since_s: f64,
+    /// From when on its length counts; `None` while everything is at rest, where nothing can be told.
+    since_s: Option<f64>,
     last_s: f64,
     moved_s: f64,
+    /// Number of points with which it began.
+    started: usize,
 }
 
 impl Trials {
-    pub fn new(time_s: f64) -> Self {
-        Self { since_s: time_s, last_s: time_s, moved_s: 0.0 }
+    /// The first points of a capture wait for the tree to move, however long that takes: until then there is nothing
+    /// to be decided, and no tree to which they belong. Later ones have [`LONGEST_TRIAL_S`] in any case.
+    pub fn new(time_s: f64, first: bool, started: usize) -> Self {
+        Self { started, since_s: (!first).then_some(time_s), last_s: time_s, moved_s: 0.0 }
     }
 
-    /// Takes the time of a frame and whether the points were away from where they were found; whether the trial is over.
-    fn over(&mut self, time_s: f64, moving: bool) -> bool {
-        if moving {
+    /// Nothing has stirred yet.
+    pub fn at_rest(&self) -> bool {
+        self.since_s.is_none()
+    }
+
+    /// Takes the time of a frame and how far points are from where they were found, sorted; whether the trial is over.
+    fn over(&mut self, time_s: f64, away_px: &[f32]) -> bool {
+        let beyond = |px: f32, share: f64| {
+            let n = away_px.len() - away_px.partition_point(|d| *d <= px);
+            n > 0 && n as f64 >= share * away_px.len() as f64
+        };
+        if self.since_s.is_none() && beyond(STIRRED_PX, STIRRED_SHARE) {
+            self.since_s = Some(time_s);
+        }
+        if beyond(MOVED_PX, MOVING_SHARE) {
             self.moved_s += (time_s - self.last_s).clamp(0.0, STEP_S);
         }
         self.last_s = time_s;
-        self.moved_s >= MOVED_S || time_s - self.since_s >= crate::model::LONGEST_TRIAL_S
+        self.moved_s >= MOVED_S || self.since_s.is_some_and(|since_s| time_s - since_s >= LONGEST_TRIAL_S)
     }
 }
 
@@ -63,37 +87,50 @@ struct Candidate {
     error_px: f32,
 }
 
+impl Candidate {
+    fn moves(&self) -> bool {
+        self.reach_px > MOVED_PX
+    }
+}
+
 impl Tracker {
     /// Ends the trial if it is time; gives the points that are dropped for it, by id.
     pub(super) fn judge(&mut self, time_s: f64) -> Vec<TrackId> {
         let Some(trials) = &mut self.trials else { return Vec::new() };
-        let mut moves: Vec<f32> = Vec::new();
+        let mut away_px: Vec<f32> = Vec::new();
         for p in &mut self.points {
             if let Some(trial) = &mut p.trial {
                 let reach_px = distance(p.now_px, p.born_px);
                 trial.reach_px = trial.reach_px.max(reach_px);
-                moves.push(reach_px);
+                away_px.push(reach_px);
             }
         }
-        moves.sort_unstable_by(f32::total_cmp);
-        let moving = moves.get(moves.len() / 2).is_some_and(|d| *d > MOVED_PX);
-        if !trials.over(time_s, moving) {
+        away_px.sort_unstable_by(f32::total_cmp);
+        if !trials.over(time_s, &away_px) {
             return Vec::new();
         }
+        let on_trial = trials.started;
         self.trials = None;
         let candidate = |p: &Point| {
             let trial = p.trial.as_ref().filter(|_| p.coasting == 0)?;
             Some(Candidate { id: p.id, reach_px: trial.reach_px, error_px: trial.record.error_px()? })
         };
-        let candidates: Vec<Candidate> = self.points.iter().filter_map(candidate).collect();
+        let mut candidates: Vec<Candidate> = self.points.iter().filter_map(candidate).collect();
+        let there = self.points.iter().filter(|p| p.trial.is_none()).count();
         let kept = match self.bar_px {
             None => {
-                let (kept, bar_px) = better_half(candidates);
+                let (kept, bar_px) = best(&mut candidates, on_trial.div_ceil(CANDIDATES));
                 self.bar_px = bar_px;
                 kept
             }
-            Some(bar_px) => candidates.iter().filter(|c| c.error_px <= bar_px).map(|c| c.id).collect(),
+            Some(bar_px) => {
+                candidates.sort_by(|a, b| a.error_px.total_cmp(&b.error_px));
+                let good = candidates.iter().take_while(|c| c.error_px <= bar_px);
+                good.take(self.wanted.saturating_sub(there)).map(|c| c.id).collect()
+            }
         };
+        let needed = NEEDED.min(self.wanted).saturating_sub(there);
+        let kept = fill_up(kept, candidates, (needed, self.wanted.saturating_sub(there)));
         let mut dropped = Vec::new();
         self.points.retain_mut(|p| {
             let keep = p.trial.is_none() || kept.contains(&p.id);
@@ -108,20 +145,46 @@ impl Tracker {
     }
 }
 
-/// The half of each class of reach that is expected to err least, and the error that [`BAR`] of them keep below, px.
-fn better_half(mut candidates: Vec<Candidate>) -> (BTreeSet<TrackId>, Option<f32>) {
+/// So many, the same share of each class of reach, that are expected to err least, and the error that [`BAR`] of them
+/// keep below, px.
+fn best(candidates: &mut [Candidate], wanted: usize) -> (BTreeSet<TrackId>, Option<f32>) {
+    let share = (wanted as f64 / candidates.len().max(1) as f64).min(1.0);
     candidates.sort_by(|a, b| a.reach_px.total_cmp(&b.reach_px));
     let class = candidates.len().div_ceil(CLASSES).max(1);
     let (mut kept, mut errors) = (BTreeSet::new(), Vec::new());
     for class in candidates.chunks_mut(class) {
         class.sort_by(|a, b| a.error_px.total_cmp(&b.error_px));
-        let best = &class[..class.len().div_ceil(CANDIDATES)];
+        let best = &class[..(share * class.len() as f64).ceil() as usize];
         kept.extend(best.iter().map(|c| c.id));
         errors.extend(best.iter().map(|c| c.error_px));
     }
     errors.sort_unstable_by(f32::total_cmp);
     let bar_px = errors.get((errors.len() as f64 * BAR) as usize).copied();
     (kept, bar_px)
+}
+
+/// Adds the best of those that were not kept until `needed` are that move, and failing those, until so many are at all:
+/// a tree from doubtful points is better than none. More than `wanted` are not kept for it: the worst that rest go.
+fn fill_up(
+    mut kept: BTreeSet<TrackId>,
+    mut candidates: Vec<Candidate>,
+    (needed, wanted): (usize, usize),
+) -> BTreeSet<TrackId> {
+    candidates.sort_by(|a, b| a.error_px.total_cmp(&b.error_px));
+    let moving = candidates.iter().filter(|c| c.moves());
+    let missing = needed.saturating_sub(moving.clone().filter(|c| kept.contains(&c.id)).count());
+    let more: Vec<TrackId> = moving.map(|c| c.id).filter(|id| !kept.contains(id)).take(missing).collect();
+    kept.extend(more);
+    for worst in candidates.iter().rev().filter(|c| !c.moves()) {
+        if kept.len() <= wanted {
+            break;
+        }
+        kept.remove(&worst.id);
+    }
+    let missing = needed.saturating_sub(kept.len());
+    let more: Vec<TrackId> = candidates.iter().map(|c| c.id).filter(|id| !kept.contains(id)).take(missing).collect();
+    kept.extend(more);
+    kept
 }
 
 #[cfg(test)]
@@ -136,9 +199,45 @@ mod tests {
             reach_px: k as f32,
             error_px: 0.1 * k as f32 + if k.is_multiple_of(2) { 0.0 } else { 5.0 },
         };
-        let (kept, bar_px) = better_half((0..80).map(candidate).collect());
+        let (kept, bar_px) = best(&mut (0..80).map(candidate).collect::<Vec<_>>(), 40);
         let even: BTreeSet<TrackId> = (0..80).step_by(2).map(TrackId).collect();
         assert_eq!(kept, even);
         assert!(bar_px.is_some_and(|b| (b - 6.0).abs() < 0.5), "{bar_px:?}");
+    }
+
+    /// Half of few would be too few to build from.
+    #[test]
+    fn as_many_are_kept_as_a_tree_needs() {
+        let candidate = |k: u32| Candidate {
+            id: TrackId(k),
+            reach_px: if k.is_multiple_of(6) { 3.0 } else { 0.1 },
+            error_px: 1.0 + 0.01 * k as f32,
+        };
+        let mut few: Vec<Candidate> = (0..240).map(candidate).collect();
+        let moving: BTreeSet<TrackId> = (0..240).step_by(6).map(TrackId).collect();
+        let (half, _) = best(&mut few, 120);
+        assert!(half.intersection(&moving).count() < 35, "the half alone has too few");
+        let kept = fill_up(half, few, (64, 120));
+        assert_eq!(
+            (kept.intersection(&moving).count(), kept.len()),
+            (40, 120),
+            "all that move, and not more than wanted"
+        );
+        let still: Vec<Candidate> = (0..100).map(|k| Candidate { reach_px: 0.0, ..candidate(k) }).collect();
+        let best: BTreeSet<TrackId> = (0..64).map(TrackId).collect();
+        assert_eq!(fill_up(BTreeSet::new(), still, (64, 120)), best, "where nothing moves, the best");
+    }
+
+    /// Whoever starts the camera, goes out and pulls at the tree must get the same choice as one who was quick.
+    #[test]
+    fn while_the_tree_rests_nothing_is_decided() {
+        let mut first = Trials::new(0.0, true, 40);
+        let (still, swaying) = ([0.05; 40], [0.1, 0.2, 3.0, 5.0]);
+        assert!((1..400).all(|k| !first.over(f64::from(k) * 0.1, &still) && first.at_rest()));
+        let over_s = (400..).map(|k| f64::from(k) * 0.1).find(|t| first.over(*t, &swaying));
+        assert!(over_s.is_some_and(|s| (41.8..42.2).contains(&s)), "{over_s:?}");
+        let mut later = Trials::new(0.0, false, 40);
+        let over_s = (1..).map(|k| f64::from(k) * 0.1).find(|t| later.over(*t, &still));
+        assert!(over_s.is_some_and(|s| (s - LONGEST_TRIAL_S).abs() < 0.15), "later ones have a limit: {over_s:?}");
     }
 }

@@ -1,7 +1,10 @@
 # The clip through v4l2loopback, filmed, recorded and then replayed from that recording. Once in each format.
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 modprobe v4l2loopback devices=1 video_nr=0 card_label=replay exclusive_caps=1
-printf '{"frame":0,"width":320,"height":180,"polygon_px":[[8,8],[311,8],[311,171],[8,171]]}' >"$work/outline.json"
+# The recording's outline at half its size, every other corner.
+printf '{"frame":0,"width":320,"height":180,"polygon_px":%s}' '[[126,0],[120,10],[126,52],[122,74],[107,68],[102,58],[93,71],[109,101],
+[105,115],[136,122],[149,130],[153,165],[170,168],[172,149],[198,116],[233,91],[230,69],[238,51],[222,44],[224,26],
+[207,10],[197,31],[177,58],[158,64],[151,34],[142,16],[135,0]]' >"$work/outline.json"
 cp /vm/clip-*.mcap "$work/"
 
 fed() { v4l2-ctl -d /dev/video0 -D | grep -q "Video Capture"; }
