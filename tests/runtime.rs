@@ -4,6 +4,7 @@ mod support;
 
 use arborcam::config::Config;
 use arborcam::model::{Control, FormatNote, Outline, PixelFormat, RawFrame, Size};
+use arborcam::outline::Given;
 use arborcam::pipeline::Pipeline;
 use arborcam::runtime::{self, Failure, Job, Pace, Running, Summary};
 use arborcam::source::{Decoder, Source, SourceError, SourceInfo};
@@ -94,7 +95,7 @@ impl Write for Lines {
 fn job(outline: Option<Outline>, out: Option<&Path>) -> Job {
     Job {
         config: Config::default(),
-        outline,
+        outline: outline.map(Given::Region),
         pace: Pace::Fast,
         stream: None,
         out: out.map(Path::to_path_buf),
