@@ -7,8 +7,8 @@ mod support;
 
 use arborcam::config::{Config, Detect};
 use arborcam::hierarchy::{COMPARE_HZ, evidence_of};
-use arborcam::model::{Frame, Luma, Outline, TrackSet};
-use arborcam::outline::whole;
+use arborcam::model::{Frame, Luma, Outline, Rgb, Size, TrackSet};
+use arborcam::outline::{self, Mark, Scribbles, whole};
 use arborcam::pipeline::{self, Pipeline, Tree};
 use arborcam::source::{self, Decoder};
 use arborcam::track::{OpticalFlow, Pyramid, TrackHistory, Tracker};
@@ -35,7 +35,7 @@ fn main() {
         .sample_size(10)
         .warm_up_time(Duration::from_millis(300))
         .measurement_time(Duration::from_secs(3));
-    let lines = [build(&mut criterion), pose(&mut criterion), replay(&clip, dir.path())];
+    let lines = [build(&mut criterion), pose(&mut criterion), matting(), replay(&clip, dir.path())];
     println!();
     tracking(&clip).iter().chain(&lines).for_each(|line| println!("{line}"));
 }
@@ -185,6 +185,25 @@ fn replay(clip: &Path, dir: &Path) -> String {
     };
     let ms = median((0..3).map(run).collect());
     format!("replay: {:.0} frames/s at 1280x720 (must be >= 80)", support::recording().len() as f64 / ms * 1e3)
+}
+
+/// The test's picture and scribbles at 640x480, as large as the figure asks.
+fn matting() -> String {
+    let load = |name: &str| image::open(Path::new("tests/matting").join(name)).expect("picture");
+    let (picture, strokes) = (load("picture.png"), load("scribbles.png"));
+    let size = Size::new(640, 480);
+    let pixels = picture.resize_exact(640, 480, image::imageops::FilterType::CatmullRom).into_rgb8().into_raw();
+    let mark = |&shade: &u8| match shade {
+        0 => Mark::Background,
+        255 => Mark::Tree,
+        _ => Mark::Undecided,
+    };
+    let strokes = strokes.resize_exact(640, 480, image::imageops::FilterType::Nearest).into_luma8();
+    let scribbles = Scribbles { name: String::new(), size, marks: strokes.as_raw().iter().map(mark).collect() };
+    let picture = Rgb { size, pixels };
+    let ms =
+        (0..5).map(|_| timed_ms(|| outline::alpha(&picture, &scribbles).expect("a matte")).0).fold(f64::MAX, f64::min);
+    format!("scribbles on a 640x480 picture solved: {ms:.0} ms (must be <= 1500)")
 }
 
 fn timed_ms<T>(work: impl FnOnce() -> T) -> (f64, T) {

@@ -17,6 +17,10 @@ const ABOVE_GREY: f32 = 3.0;
 const OFF_MEDIAN: u8 = 6;
 /// Gaps up to this share of the picture's width are closed: between branches there is sky that does not move.
 const CLOSE_SHARE: f64 = 0.045;
+/// Limbs whose fork hardly moves lie farther apart: up to this share is closed if one piece then has nearly all.
+const CLOSE_MOST: f64 = 0.08;
+const CLOSE_STEP: f64 = 0.01;
+const NEARLY_ALL: f64 = 0.9;
 /// The region is drawn so much wider than what moves, as a share of the picture's width; the trunk is not.
 const MARGIN_SHARE: f64 = 0.006;
 /// Pieces smaller than this share of all that moves are noise; gaps of two pixels do not make two pieces.
@@ -128,7 +132,15 @@ impl AutoOutline {
         let step = self.kept.len().div_ceil(COMPARED);
         let compared: Vec<&Luma> = self.kept.iter().step_by(step).map(|(_, picture)| picture).collect();
         let stands = trunk::stand(size, &mut mask, &steadiness(&compared));
-        let Some(one) = region::close_to_one(size, &mask, px(CLOSE_SHARE))? else { return Ok(None) };
+        let Some(mut one) = region::close_to_one(size, &mask, px(CLOSE_SHARE))? else { return Ok(None) };
+        let mut share = CLOSE_SHARE + CLOSE_STEP;
+        while share <= CLOSE_MOST && held(&mask, &one) < NEARLY_ALL {
+            if let Some(joined) = region::close_to_one(size, &mask, px(share))?.filter(|o| held(&mask, o) >= NEARLY_ALL)
+            {
+                one = joined;
+            }
+            share += CLOSE_STEP;
+        }
         let mut wide = region::grown(size, &one.mask, px(MARGIN_SHARE))?;
         if let Some(trunk) = stands {
             let below = trunk.waist * size.width as usize;
@@ -203,6 +215,13 @@ impl AutoOutline {
 pub fn whole(size: Size) -> Outline {
     let (w, h) = (size.width as i32 - 1, size.height as i32 - 1);
     Outline { size, mask: vec![255; size.area()], polygon_px: vec![[0, 0], [w, 0], [w, h], [0, h]], matte: None }
+}
+
+/// Share of a mask that an outline holds.
+fn held(mask: &[u8], outline: &Outline) -> f64 {
+    let of = mask.iter().filter(|m| **m != 0).count();
+    let inside = mask.iter().zip(&outline.mask).filter(|(m, o)| **m != 0 && **o != 0).count();
+    inside as f64 / of.max(1) as f64
 }
 
 /// The mask at full size.

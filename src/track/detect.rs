@@ -125,7 +125,8 @@ fn within_matte(matte: &impl ToInputArray, border_px: i32, allowed: &mut Mat) ->
     // Holes of a pixel or two are doubts of the matte.
     let tree = morph(&tree, MORPH_CLOSE, 1)?;
     let inside = morph(&tree, MORPH_ERODE, border_px)?;
-    let wide = morph(&inside, MORPH_DILATE, border_px)?;
+    // Half a border more: what is left of the wide part's own corners is no twig.
+    let wide = morph(&inside, MORPH_DILATE, border_px + border_px / 2)?;
     let mut twigs = Mat::default();
     subtract(&tree, &wide, &mut twigs, &no_array(), -1)?;
     let twigs = morph(&twigs, MORPH_DILATE, 1)?;
