@@ -83,6 +83,15 @@ fn fixtures() -> &'static Path {
         mask("small.png", [64, 36], 255);
         mask("black.png", [640, 360], 0);
         mask("grey.png", [640, 360], 128);
+        let scribbles = |name: &str, shades: &[u8]| {
+            let shade = |u: u32| shades.get(u as usize / 40).copied().unwrap_or(128);
+            image::GrayImage::from_fn(640, 360, |u, _| image::Luma([shade(u)])).save(at(name)).expect("scribbles");
+        };
+        scribbles("only-tree.png", &[255]);
+        scribbles("only-background.png", &[128, 0]);
+        image::DynamicImage::new_rgba8(640, 360).save(at("clear.png")).expect("picture");
+        let slope = |u: u32, v: u32| image::Luma([(u * 255 / 640) as u8 ^ (v as u8 & 1)]);
+        image::GrayImage::from_fn(640, 360, slope).save(at("photo.png")).expect("picture");
 
         write("unknown.toml", b"[track]\nwindow_px = 15\nwindw_px = 17\n");
         write("section.toml", b"[trak]\nwindow_px = 15\n");
@@ -223,7 +232,21 @@ const CASES: &[Case] = &[
     ("replay {f}/clip.mkv --outline {f}/none.json", BAD_USAGE, &["none.json", "check the name"], Nothing),
     ("replay {f}/clip.mkv --outline {f}/small.png", BAD_USAGE, &["small.png", "64x36", "640x360", "draw it"], Nothing),
     ("replay {f}/clip.mkv --outline {f}/black.png", BAD_USAGE, &["black.png", "nothing in it is white"], Nothing),
-    ("replay {f}/clip.mkv --outline {f}/grey.png", BAD_USAGE, &["grey.png", "not black and white"], Nothing),
+    (
+        "replay {f}/clip.mkv --outline {f}/grey.png",
+        BAD_USAGE,
+        &["grey.png", "has no scribbles", "white strokes"],
+        Nothing,
+    ),
+    ("replay {f}/clip.mkv --outline {f}/clear.png", BAD_USAGE, &["clear.png", "has no scribbles"], Nothing),
+    ("replay {f}/clip.mkv --outline {f}/only-tree.png", BAD_USAGE, &["only-tree.png", "black strokes"], Nothing),
+    (
+        "replay {f}/clip.mkv --outline {f}/only-background.png",
+        BAD_USAGE,
+        &["only-background", "white strokes"],
+        Nothing,
+    ),
+    ("replay {f}/clip.mkv --outline {f}/photo.png", BAD_USAGE, &["photo.png", "neither a mask", "scribbles"], Nothing),
     // Configuration.
     (
         "replay {f}/clip.mkv --config {f}/unknown.toml",

@@ -313,5 +313,5 @@ fn the_tree_is_found_without_an_outline() {
     };
     let iou = count(|a, b| a && b) / count(|a, b| a || b);
     println!("intersection over union of the outline that is found and the one that is drawn: {iou:.2}");
-    assert!(iou >= 0.3, "{iou:.2}");
+    assert!(iou >= 0.8, "{iou:.2}");
 }

@@ -167,7 +167,7 @@ impl Source for Camera {
 fn job(out: Option<&Path>) -> Job {
     Job {
         config: Config::default(),
-        outline: Some(support::outline()),
+        outline: Some(support::outline().into()),
         pace: Pace::Live,
         stream: None,
         out: out.map(Path::to_path_buf),

@@ -303,7 +303,7 @@ fn record_to(path: &Path) -> RecordTo {
 fn run(source: Box<dyn Source>, out: &Path, record: Option<RecordTo>) -> runtime::Summary {
     let job = Job {
         config: Config::default(),
-        outline: Some(support::outline()),
+        outline: Some(support::outline().into()),
         pace: Pace::Fast,
         stream: None,
         out: Some(out.to_owned()),

@@ -4,6 +4,7 @@ mod support;
 
 use arborcam::config::Config;
 use arborcam::model::{Control, FormatNote, Outline, PixelFormat, RawFrame, Size};
+use arborcam::outline::{Given, Mark, Scribbles};
 use arborcam::pipeline::Pipeline;
 use arborcam::runtime::{self, Failure, Job, Pace, Running, Summary};
 use arborcam::source::{Decoder, Source, SourceError, SourceInfo};
@@ -94,7 +95,7 @@ impl Write for Lines {
 fn job(outline: Option<Outline>, out: Option<&Path>) -> Job {
     Job {
         config: Config::default(),
-        outline,
+        outline: outline.map(Given::Region),
         pace: Pace::Fast,
         stream: None,
         out: out.map(Path::to_path_buf),
@@ -219,6 +220,38 @@ fn a_new_outline_is_used_and_a_bad_one_is_refused_in_words() {
     let (summary, warnings) = wish(20, &[Control::SetOutline(crown)], &dir.path().join("good"));
     assert_eq!(warnings, Vec::<String>::new());
     assert_eq!(summary.tree.expect("a tree").outline.bounds_px(), Some([240, 0, 480, 250]));
+}
+
+/// The strokes of `tests/matting` lie on a part of the first frame; from the first frame on the tree is followed, in the
+/// region and off the sky between its branches.
+#[test]
+fn scribbles_are_solved_on_the_first_picture() {
+    let strokes = image::open("tests/matting/scribbles.png").expect("scribbles").into_luma8();
+    let mut marks = vec![Mark::Undecided; support::SIZE.area()];
+    for (u, v, shade) in strokes.enumerate_pixels() {
+        marks[((v + 60) * support::SIZE.width + u + 180) as usize] = match shade.0[0] {
+            0 => Mark::Background,
+            255 => Mark::Tree,
+            _ => Mark::Undecided,
+        };
+    }
+    let scribbles = Scribbles { name: "strokes".into(), size: support::SIZE, marks: marks.clone() };
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("out");
+    let given = Some(Given::Scribbles(scribbles));
+    let (summary, failure, warnings) =
+        run(fake(false, |n| Ok(frame(n))), Job { outline: given, ..job(None, Some(&out)) });
+    assert!(failure.is_none() && !warnings.iter().any(|w| w.contains("strokes")), "{failure:?} {warnings:?}");
+    assert_eq!(tracks(&out).first().map(|t| t.1), Some(0), "from the first frame on");
+    let outline = summary.expect("a summary").tree.expect("a tree").outline.clone();
+    let matte = outline.matte.as_ref().expect("a matte");
+    assert!(marks.iter().zip(matte).all(|(mark, alpha)| *mark != Mark::Tree || *alpha == 255));
+    let drawn = support::outline();
+    let count = |both: fn(bool, bool) -> bool| {
+        outline.mask.iter().zip(&drawn.mask).filter(|(a, b)| both(**a != 0, **b != 0)).count() as f64
+    };
+    let iou = count(|a, b| a && b) / count(|a, b| a || b);
+    assert!(iou >= 0.5, "{iou:.2} with the outline that a person drew, which is wider");
 }
 
 #[test]

@@ -53,7 +53,8 @@ enum Command {
 /// What `capture` and `replay` share.
 #[derive(Debug, Args)]
 struct Common {
-    /// Where the tree is: a JSON polygon, a mask image (white = tree), or `auto` to find it by its motion.
+    /// Where the tree is: a JSON polygon, a mask image (white = tree), a scribble image (white = tree, black = background,
+    /// rest grey or transparent), or `auto` to find it by its motion.
     #[arg(long, value_name = "FILE|auto", default_value = "auto")]
     outline: OutlineSpec,
     /// Folder for the result; it must not exist, and appears when it is complete.

@@ -10,6 +10,9 @@ pub struct Outline {
     pub mask: Vec<u8>,
     /// The region's border in pixels, for drawing; closed, not repeating its first point.
     pub polygon_px: Vec<[i32; 2]>,
+    /// Opacity of the tree, 0 to 255, row by row, where the region was solved from scribbles: the sky between its
+    /// branches has none, though it is inside.
+    pub matte: Option<Vec<u8>>,
 }
 
 impl Outline {

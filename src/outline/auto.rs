@@ -1,17 +1,36 @@
-//! The outline found by itself: where motion energy concentrates over the first seconds, closed to one region.
+//! The outline found by itself: what moves over the first seconds and was elsewhere in the first picture, without the
+//! shadow, closed to one region.
 
-use super::region;
+use super::steady::steadiness;
+use super::{region, trunk};
 use crate::config;
 use crate::model::{Luma, Outline, Size};
 
 /// Width to which pictures are reduced, px: sway of a pixel or two is then still seen, single-pixel noise is not.
 const REDUCED_WIDTH: u32 = 320;
-/// Motion must stand out so many times above the picture's median standard deviation, and above this in grey levels:
-/// sensor noise and compression stay below.
-const ABOVE_MEDIAN: f32 = 4.0;
+/// Motion must stand out so many times above the standard deviation of the picture's quietest quarter, which is no tree,
+/// and above this in grey levels: sensor noise and compression stay below.
+const ABOVE_QUIET: f32 = 4.0;
 const ABOVE_GREY: f32 = 3.0;
+/// What moves was tree in the first picture if it was so many grey levels off its median over time there: the pixel that
+/// the tree only swept over later shows its background at first, as it does most of the time.
+const OFF_MEDIAN: u8 = 6;
 /// Gaps up to this share of the picture's width are closed: between branches there is sky that does not move.
-const CLOSE_SHARE: f64 = 0.03;
+const CLOSE_SHARE: f64 = 0.045;
+/// Limbs whose fork hardly moves lie farther apart: up to this share is closed if one piece then has nearly all.
+const CLOSE_MOST: f64 = 0.08;
+const CLOSE_STEP: f64 = 0.01;
+const NEARLY_ALL: f64 = 0.9;
+/// The region is drawn so much wider than what moves, as a share of the picture's width; the trunk is not.
+const MARGIN_SHARE: f64 = 0.006;
+/// Pieces smaller than this share of all that moves are noise; gaps of two pixels do not make two pieces.
+const SPECK_SHARE: f64 = 0.002;
+const SPECK_GAP_PX: u32 = 2;
+/// Pictures kept, and the least time between two of them at first, s; when there are too many, every other one goes.
+const MOST_KEPT: usize = 60;
+const KEEP_EVERY_S: f64 = 1.0 / 20.0;
+/// Pictures in which structure is compared.
+const COMPARED: usize = 20;
 /// Least share of the picture that a tree covers.
 const LEAST_COVERAGE: f64 = 0.005;
 
@@ -28,6 +47,9 @@ pub struct AutoOutline {
     sum_sq: Vec<f32>,
     last: Vec<f32>,
     sum_change_sq: Vec<f32>,
+    /// Reduced pictures with their times, s; the first is the one that the outline is for.
+    kept: Vec<(f64, Luma)>,
+    keep_every_s: f64,
 }
 
 /// What the gathering has come to.
@@ -53,7 +75,15 @@ impl AutoOutline {
             sum_sq: Vec::new(),
             last: Vec::new(),
             sum_change_sq: Vec::new(),
+            kept: Vec::new(),
+            keep_every_s: KEEP_EVERY_S,
         }
+    }
+
+    /// Tracking will begin at `time_s`, not at the first picture: the outline is to be that of then.
+    pub fn begin_at(&mut self, time_s: f64) {
+        let before = self.kept.partition_point(|(t, _)| *t < time_s);
+        self.kept.drain(..before.min(self.kept.len().saturating_sub(1)));
     }
 
     /// Takes the next picture, seen at `time_s`.
@@ -66,7 +96,8 @@ impl AutoOutline {
             (self.last, self.sum_change_sq) = (zero.clone(), zero);
             time_s
         });
-        self.add(luma);
+        let picture = self.add(luma);
+        self.keep(picture, time_s);
         let gathered_s = time_s - start_s;
         if gathered_s < self.settings.gather_s {
             return Found::NotYet(gathered_s / self.settings.gather_s);
@@ -80,24 +111,10 @@ impl AutoOutline {
 
     /// The region as far as the pictures so far show it; `None` if nothing moves.
     pub fn conclude(&self, size: Size) -> Option<Outline> {
-        if self.count < 2.0 {
-            return None;
-        }
-        let sway = |(s, c): (&f32, &f32)| ((s - 0.5 * c) / (self.count - 1.0)).max(0.0).sqrt();
-        let deviation: Vec<f32> = self.sum_sq.iter().zip(&self.sum_change_sq).map(sway).collect();
-        let mut sorted = deviation.clone();
-        sorted.sort_unstable_by(f32::total_cmp);
-        let threshold = (ABOVE_MEDIAN * sorted[sorted.len() / 2]).max(ABOVE_GREY);
-        let moving: Vec<u8> = deviation.iter().map(|&d| if d > threshold { 255 } else { 0 }).collect();
-        let close_px = (CLOSE_SHARE * f64::from(self.reduced.width)).round() as u32;
-        let found = region::close_to_one(self.reduced, &moving, close_px);
-        let small = found.unwrap_or_else(|e| {
+        let small = self.reduced_region().unwrap_or_else(|e| {
             tracing::error!("automatic outline: {e}");
             None
         })?;
-        if small.coverage() < LEAST_COVERAGE {
-            return None;
-        }
         // The border is traced anew at full size, so that it encloses just the pixels of the mask.
         region::close_to_one(size, &enlarged(&small, size, self.scale), 0).unwrap_or_else(|e| {
             tracing::error!("automatic outline: {e}");
@@ -105,7 +122,72 @@ impl AutoOutline {
         })
     }
 
-    fn add(&mut self, luma: &Luma) {
+    fn reduced_region(&self) -> opencv::Result<Option<Outline>> {
+        let (size, px) = (self.reduced, |share: f64| (share * f64::from(self.reduced.width)).round() as u32);
+        let Some((first, _)) = self.kept.split_first().filter(|_| self.count >= 2.0) else { return Ok(None) };
+        let median = self.median();
+        let was_tree = |(i, &moves): (usize, &bool)| moves && first.1.pixels[i].abs_diff(median[i]) >= OFF_MEDIAN;
+        let mut mask: Vec<u8> = self.moving().iter().enumerate().map(|m| if was_tree(m) { 255 } else { 0 }).collect();
+        region::without_specks(size, &mut mask, SPECK_GAP_PX, SPECK_SHARE)?;
+        let step = self.kept.len().div_ceil(COMPARED);
+        let compared: Vec<&Luma> = self.kept.iter().step_by(step).map(|(_, picture)| picture).collect();
+        let stands = trunk::stand(size, &mut mask, &steadiness(&compared));
+        let Some(mut one) = region::close_to_one(size, &mask, px(CLOSE_SHARE))? else { return Ok(None) };
+        let mut share = CLOSE_SHARE + CLOSE_STEP;
+        while share <= CLOSE_MOST && held(&mask, &one) < NEARLY_ALL {
+            if let Some(joined) = region::close_to_one(size, &mask, px(share))?.filter(|o| held(&mask, o) >= NEARLY_ALL)
+            {
+                one = joined;
+            }
+            share += CLOSE_STEP;
+        }
+        let mut wide = region::grown(size, &one.mask, px(MARGIN_SHARE))?;
+        if let Some(trunk) = stands {
+            let below = trunk.waist * size.width as usize;
+            wide[below..].copy_from_slice(&one.mask[below..]);
+        }
+        Ok(region::close_to_one(size, &wide, 0)?.filter(|o| o.coverage() >= LEAST_COVERAGE))
+    }
+
+    /// Which pixels change more than noise does.
+    fn moving(&self) -> Vec<bool> {
+        let sway = |(s, c): (&f32, &f32)| ((s - 0.5 * c) / (self.count - 1.0)).max(0.0).sqrt();
+        let deviation: Vec<f32> = self.sum_sq.iter().zip(&self.sum_change_sq).map(sway).collect();
+        let mut sorted = deviation.clone();
+        sorted.sort_unstable_by(f32::total_cmp);
+        let threshold = (ABOVE_QUIET * sorted[sorted.len() / 4]).max(ABOVE_GREY);
+        deviation.iter().map(|&d| d > threshold).collect()
+    }
+
+    /// Median of every pixel over time.
+    fn median(&self) -> Vec<u8> {
+        let mut values = vec![0; self.kept.len()];
+        let of = |i: usize| {
+            values.iter_mut().zip(&self.kept).for_each(|(value, (_, picture))| *value = picture.pixels[i]);
+            let middle = values.len() / 2;
+            *values.select_nth_unstable(middle).1
+        };
+        (0..self.reduced.area()).map(of).collect()
+    }
+
+    fn keep(&mut self, picture: Luma, time_s: f64) {
+        if self.kept.last().is_some_and(|(last_s, _)| time_s - last_s < self.keep_every_s) {
+            return;
+        }
+        self.kept.push((time_s, picture));
+        if self.kept.len() > MOST_KEPT {
+            let mut odd = false;
+            self.kept.retain(|_| {
+                odd = !odd;
+                odd
+            });
+            self.keep_every_s *= 2.0;
+        }
+    }
+
+    /// Adds a picture to the sums, and gives it back reduced.
+    fn add(&mut self, luma: &Luma) -> Luma {
+        let mut picture = Luma { size: self.reduced, pixels: Vec::with_capacity(self.reduced.area()) };
         self.count += 1.0;
         let (scale, width) = (self.scale as usize, luma.size.width as usize);
         let per_cell = (scale * scale) as f32;
@@ -122,15 +204,24 @@ impl AutoOutline {
                     self.sum_change_sq[i] += (x - self.last[i]).powi(2);
                 }
                 self.last[i] = x;
+                picture.pixels.push((x + 0.5) as u8);
             }
         }
+        picture
     }
 }
 
 /// The whole picture as an outline.
 pub fn whole(size: Size) -> Outline {
     let (w, h) = (size.width as i32 - 1, size.height as i32 - 1);
-    Outline { size, mask: vec![255; size.area()], polygon_px: vec![[0, 0], [w, 0], [w, h], [0, h]] }
+    Outline { size, mask: vec![255; size.area()], polygon_px: vec![[0, 0], [w, 0], [w, h], [0, h]], matte: None }
+}
+
+/// Share of a mask that an outline holds.
+fn held(mask: &[u8], outline: &Outline) -> f64 {
+    let of = mask.iter().filter(|m| **m != 0).count();
+    let inside = mask.iter().zip(&outline.mask).filter(|(m, o)| **m != 0 && **o != 0).count();
+    inside as f64 / of.max(1) as f64
 }
 
 /// The mask at full size.

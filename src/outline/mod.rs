@@ -1,12 +1,19 @@
-//! Which pixels are tree: a polygon, a mask image, or found by itself.
+//! Which pixels are tree: a polygon, a mask image, scribbles, or found by itself.
 
 mod auto;
-mod mask;
+mod laplacian;
+mod matting;
 mod polygon;
 mod region;
+mod scribbles;
+mod solve;
+mod steady;
+mod trunk;
 
 pub use auto::{AutoOutline, Found, whole};
+pub use matting::{alpha, outline as from_scribbles};
 pub use polygon::{PolygonFile, crossing, outline as from_polygon};
+pub use scribbles::{Mark, Scribbles};
 
 use crate::model::{Outline, Size};
 use std::path::{Path, PathBuf};
@@ -31,7 +38,7 @@ pub enum OutlineError {
 pub enum OutlineSpec {
     /// Where motion energy concentrates.
     Auto,
-    /// A polygon in a JSON file, or a mask image.
+    /// A polygon in a JSON file, a mask image, or scribbles.
     File(PathBuf),
 }
 
@@ -43,17 +50,33 @@ impl std::str::FromStr for OutlineSpec {
     }
 }
 
-/// Reads an outline for pictures of `size` from a JSON polygon or a mask image.
+/// An outline as a person gave it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Given {
+    /// The region itself.
+    Region(Outline),
+    /// What it is to be solved from, once the first picture is there ([`from_scribbles`]).
+    Scribbles(Scribbles),
+}
+
+impl From<Outline> for Given {
+    fn from(outline: Outline) -> Self {
+        Given::Region(outline)
+    }
+}
+
+/// Reads an outline for pictures of `size` from a JSON polygon, a mask image or scribbles.
 ///
 /// # Errors
-/// The file cannot be read, is neither of the two, is for another size, or the polygon encloses nothing usable.
-pub fn load(path: &Path, size: Size) -> Result<Outline, OutlineError> {
+/// The file cannot be read, is none of these, is for another size, the polygon encloses nothing usable, or the scribbles
+/// lack one of their colours.
+pub fn load(path: &Path, size: Size) -> Result<Given, OutlineError> {
     let name = path.display().to_string();
     let bytes = std::fs::read(path).map_err(|source| OutlineError::Unreadable { name: name.clone(), source })?;
     if bytes.iter().find(|b| !b.is_ascii_whitespace()) != Some(&b'{') {
-        return mask::outline(path, size);
+        return scribbles::read(path, size);
     }
-    parse(&String::from_utf8_lossy(&bytes), name, size)
+    parse(&String::from_utf8_lossy(&bytes), name, size).map(Given::Region)
 }
 
 /// Reads the text of an outline file for pictures of `size`; `name` is for messages.

@@ -76,6 +76,9 @@ impl FrontEnd {
                 self.held.pop_front();
                 self.let_go += 1;
             }
+            if let Some(first) = self.held.front() {
+                self.search.begin_at(first.time_s);
+            }
             return Vec::new();
         }
         let n = self.held.len().min(FRAMES_PER_STEP);

@@ -38,7 +38,8 @@ pub use shared::Failure;
 pub use source_thread::Pace;
 
 use crate::config::Config;
-use crate::model::{Control, Outline, Snapshot};
+use crate::model::{Control, Snapshot};
+use crate::outline::Given;
 use crate::pipeline::{FrontEnd, Tree};
 use crate::source::Source;
 use crossbeam_channel::{Sender, bounded, unbounded};
@@ -62,7 +63,7 @@ const MODEL_QUEUE: usize = 64;
 pub struct Job {
     pub config: Config,
     /// `None` finds it by motion.
-    pub outline: Option<Outline>,
+    pub outline: Option<Given>,
     pub pace: Pace,
     /// Gets a JSON line per pose.
     pub stream: Option<Box<dyn Write + Send>>,
@@ -121,7 +122,12 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
     let (model_in, model_out) = bounded(MODEL_QUEUE);
     // Wishes are typed by a person; they cannot pile up.
     let (controls, wishes) = unbounded();
-    let front = FrontEnd::new(&job.config, job.outline.take());
+    let (region, scribbles) = match job.outline.take() {
+        Some(Given::Region(region)) => (Some(region), None),
+        Some(Given::Scribbles(scribbles)) => (None, Some(scribbles)),
+        None => (None, None),
+    };
+    let front = FrontEnd::new(&job.config, region);
     let (pace, preview_every, camera) = (job.pace, job.preview_every, job.config.camera.clone());
 
     let (recorder, recording) = match job.record.take() {
@@ -147,7 +153,7 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
         let (shared, frames_out) = (shared.clone(), frames_out.clone());
         let run = move || {
             let _ends_all = StopAll(&shared);
-            match TrackThread::new(front, model_in, preview_every, live, &shared) {
+            match TrackThread::new((front, scribbles), model_in, preview_every, live, &shared) {
                 Ok(track) => track.run(&frames_out, &wishes),
                 Err(e) => shared.fail(Failure::NoDecoder(e)),
             }

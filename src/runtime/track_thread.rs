@@ -4,7 +4,7 @@ use super::pulse::Worker;
 use super::shared::{Failure, Shared};
 use super::source_thread::Timed;
 use crate::model::{Control, Frame, Luma, Outline, Rgb, Size};
-use crate::outline;
+use crate::outline::{self, Scribbles};
 use crate::pipeline::{Followed, FrontEnd};
 use crate::source::{DecodeError, Decoder};
 use crossbeam_channel::{Receiver, Sender, select};
@@ -14,6 +14,8 @@ use std::time::Duration;
 
 /// Width of the pictures for the screen, px.
 const PREVIEW_WIDTH: u32 = 640;
+/// Scribbles are solved on pictures no wider than this, px: a larger one would take seconds, and shows no more branches.
+const MATTING_WIDTH: u32 = 960;
 /// Damaged frames that are reported one by one; further ones are only counted.
 const DAMAGE_REPORTED: u64 = 5;
 /// Pictures of another size in a row that are taken for damage when a camera films.
@@ -39,6 +41,8 @@ pub enum ToModel {
 /// Runs until the queue's other end is gone.
 pub struct TrackThread<'a> {
     front: FrontEnd,
+    /// Waiting for the first picture.
+    scribbles: Option<Scribbles>,
     decoder: Decoder,
     to_model: Sender<ToModel>,
     shared: &'a Shared,
@@ -55,7 +59,7 @@ impl<'a> TrackThread<'a> {
     /// # Errors
     /// There is no decoder.
     pub fn new(
-        front: FrontEnd,
+        (front, scribbles): (FrontEnd, Option<Scribbles>),
         to_model: Sender<ToModel>,
         preview_every: Duration,
         live: bool,
@@ -65,6 +69,7 @@ impl<'a> TrackThread<'a> {
         let (last_preview_s, size, last_damage, other_sizes) = (None, None, None, 0);
         Ok(Self {
             front,
+            scribbles,
             decoder,
             to_model,
             shared,
@@ -125,6 +130,9 @@ impl<'a> TrackThread<'a> {
     }
 
     fn restart(&mut self, outline: Option<Outline>) {
+        if outline.is_some() {
+            self.scribbles = None;
+        }
         self.front.restart(outline);
         self.pass_on(ToModel::Restart);
     }
@@ -175,6 +183,7 @@ impl<'a> TrackThread<'a> {
             luma,
             preview: preview.clone(),
         };
+        self.solve_scribbles(timed, preview.clone());
         let done = self.front.step(frame);
         self.report();
         if let Some(progress) = self.front.searching() {
@@ -182,6 +191,23 @@ impl<'a> TrackThread<'a> {
             return self.pass_on(ToModel::Searching { progress, preview, size, frame, time_s });
         }
         done.into_iter().all(|followed| self.pass_on(ToModel::Followed(followed)))
+    }
+
+    /// Scribbles are drawn on the first picture, and solved as soon as it is there. That takes a second or two, in which the
+    /// screen shows the picture and what is going on; frames of a live camera that find no room meanwhile are counted.
+    fn solve_scribbles(&mut self, timed: &Timed, preview: Option<Arc<Rgb>>) {
+        if self.scribbles.is_none() {
+            return;
+        }
+        let Ok(picture) = self.decoder.preview(&timed.raw, MATTING_WIDTH) else { return };
+        let Some(scribbles) = self.scribbles.take() else { return };
+        self.shared.tell("the tree is cut out along the scribbles".into());
+        let (size, frame, time_s) = (timed.raw.size, timed.index, timed.time_s);
+        self.pass_on(ToModel::Searching { progress: 0.0, preview, size, frame, time_s });
+        match outline::from_scribbles(&scribbles, &picture) {
+            Ok(outline) => self.front.restart(Some(outline)),
+            Err(e) => self.shared.warn(format!("{e}; the tree is looked for by its motion")),
+        }
     }
 
     /// A picture for the screen, if one is due. By the sensor's clock: the bark's colour is taken from these pictures, and

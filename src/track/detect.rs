@@ -2,14 +2,23 @@
 
 use crate::config::Detect;
 use crate::model::{Luma, Outline};
-use opencv::core::{Mat, Point, Point2f, Rect, Scalar, Size as CvSize, Vector};
-use opencv::imgproc::{MORPH_ELLIPSE, circle, erode, get_structuring_element, good_features_to_track_with_gradient};
+use opencv::core::{
+    BORDER_CONSTANT, Mat, Point, Point2f, Rect, Scalar, Size as CvSize, ToInputArray, Vector, bitwise_or, no_array,
+    subtract,
+};
+use opencv::imgproc::{
+    MORPH_CLOSE, MORPH_DILATE, MORPH_ELLIPSE, MORPH_ERODE, THRESH_BINARY, circle, erode, get_structuring_element,
+    good_features_to_track_with_gradient, morphology_ex, threshold,
+};
 use opencv::prelude::*;
 
 /// Harris' constant k of det(A) - k trace(A)^2, with A the structure tensor (Zeng eq. 2.11).
 const HARRIS_K: f64 = 0.04;
 /// Side of the window over which the structure tensor is averaged, and of the Sobel derivative, px.
 const BLOCK_PX: i32 = 3;
+
+/// Above this a pixel of a matte is rather tree than background.
+const HALF: f64 = 127.0;
 
 /// Finds corners in an outline.
 pub struct Detector {
@@ -87,12 +96,39 @@ fn allowed_region(outline: &Outline, border_px: i32) -> opencv::Result<(Mat, Rec
     let (rows, cols) = (outline.size.height as i32, outline.size.width as i32);
     let mask = Mat::new_rows_cols_with_data(rows, cols, &outline.mask)?;
     let mut eroded = mask.try_clone()?;
-    if border_px > 0 {
+    if let Some(matte) = &outline.matte {
+        let matte = Mat::new_rows_cols_with_data(rows, cols, matte)?;
+        within_matte(&matte, border_px, &mut eroded)?;
+    } else if border_px > 0 {
         let side = 2 * border_px + 1;
         let disc = get_structuring_element(MORPH_ELLIPSE, CvSize::new(side, side), Point::new(-1, -1))?;
-        let constant = opencv::core::BORDER_CONSTANT;
         // Outside the picture counts as not tree, so that no window hangs over the picture's edge.
-        erode(&mask, &mut eroded, &disc, Point::new(-1, -1), 1, constant, Scalar::all(0.0))?;
+        erode(&mask, &mut eroded, &disc, Point::new(-1, -1), 1, BORDER_CONSTANT, Scalar::all(0.0))?;
     }
     Ok((Mat::roi(&eroded, roi)?.try_clone()?, roi))
+}
+
+/// Where the tree is wide, its pixels farther than `border_px` from the matte's border, as Zeng keeps points off it. A twig
+/// is all border: where the tree is narrower than two borders all of it is allowed, and the pixel beside it, on which the
+/// corner response of an edge may peak.
+fn within_matte(matte: &impl ToInputArray, border_px: i32, allowed: &mut Mat) -> opencv::Result<()> {
+    let disc = |radius: i32| {
+        get_structuring_element(MORPH_ELLIPSE, CvSize::new(2 * radius + 1, 2 * radius + 1), Point::new(-1, -1))
+    };
+    let morph = |from: &Mat, how: i32, radius: i32| {
+        let (mut to, anchor) = (Mat::default(), Point::new(-1, -1));
+        // Outside the picture counts as not tree.
+        morphology_ex(from, &mut to, how, &disc(radius)?, anchor, 1, BORDER_CONSTANT, Scalar::all(0.0)).map(|()| to)
+    };
+    let mut tree = Mat::default();
+    threshold(matte, &mut tree, HALF, 255.0, THRESH_BINARY)?;
+    // Holes of a pixel or two are doubts of the matte.
+    let tree = morph(&tree, MORPH_CLOSE, 1)?;
+    let inside = morph(&tree, MORPH_ERODE, border_px)?;
+    // Half a border more: what is left of the wide part's own corners is no twig.
+    let wide = morph(&inside, MORPH_DILATE, border_px + border_px / 2)?;
+    let mut twigs = Mat::default();
+    subtract(&tree, &wide, &mut twigs, &no_array(), -1)?;
+    let twigs = morph(&twigs, MORPH_DILATE, 1)?;
+    bitwise_or(&inside, &twigs, allowed, &no_array())
 }

@@ -3,6 +3,7 @@
 
 use arborcam::config;
 use arborcam::model::{Frame, Luma, Outline, RawFrame, Size};
+use arborcam::outline::Given;
 use arborcam::source::{self, Decoder};
 use std::path::Path;
 use std::sync::OnceLock;
@@ -30,5 +31,8 @@ pub fn decoded(decoder: &mut Decoder, k: usize) -> Frame {
 }
 
 pub fn outline() -> Outline {
-    arborcam::outline::load(Path::new(OUTLINE), SIZE).expect("outline")
+    match arborcam::outline::load(Path::new(OUTLINE), SIZE).expect("outline") {
+        Given::Region(outline) => outline,
+        Given::Scribbles(_) => panic!("a polygon"),
+    }
 }

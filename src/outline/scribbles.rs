@@ -1,0 +1,160 @@
+//! Outlines drawn as a picture: a mask, white on black, or scribbles, white and black strokes on undecided ground.
+
+use super::{Given, OutlineError, region};
+use crate::model::Size;
+use image::RgbaImage;
+use std::path::Path;
+
+/// Share of undecided pixels above which a picture holds scribbles: a mask has them at its soft edges only.
+const MOST_UNDECIDED: f64 = 0.05;
+/// Brightness up to which a stroke counts as black, and from which as white; JPEG leaves neither quite alone.
+const BLACK: u8 = 40;
+const WHITE: u8 = 215;
+/// In a scribble image the undecided rest is of one shade, so many grey levels wide; else it is a photograph, whose bright
+/// sky would be taken for tree.
+const ONE_SHADE: u8 = 24;
+/// Share of the undecided pixels that must be of that shade; the edges of strokes are not.
+const MOST_OF_REST: f64 = 0.8;
+
+/// What a stroke says about a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mark {
+    Undecided,
+    Background,
+    Tree,
+}
+
+/// Strokes of a person who marked some of the tree and some of the background in the first frame (Zeng section 5.3.1).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Scribbles {
+    /// Name of the file, for messages.
+    pub name: String,
+    pub size: Size,
+    /// One for each pixel, row by row.
+    pub marks: Vec<Mark>,
+}
+
+/// Reads a mask or scribbles (PNG, JPEG, BMP). They are told apart by what they hold: a mask is black and white, scribbles
+/// leave more than 5 % of the picture undecided, in one grey or transparent.
+///
+/// # Errors
+/// It cannot be read, is not of `size`, is neither of the two, or lacks white, or black in scribbles.
+pub fn read(path: &Path, size: Size) -> Result<Given, OutlineError> {
+    let name = path.display().to_string();
+    let bad = |what: String| OutlineError::BadFile { name: name.clone(), what };
+    let picture =
+        image::open(path).map_err(|e| bad(format!("it is neither a JSON polygon nor a picture ({e})")))?.into_rgba8();
+    let found = Size::new(picture.width(), picture.height());
+    if found != size {
+        return Err(OutlineError::WrongSize { name, found, wanted: size });
+    }
+    let shades: Vec<Option<u8>> = picture.pixels().map(|p| shade(p.0)).collect();
+    let marks: Vec<Mark> = shades.iter().map(|s| mark(*s)).collect();
+    let undecided = marks.iter().filter(|m| **m == Mark::Undecided).count();
+    if undecided as f64 <= MOST_UNDECIDED * size.area() as f64 {
+        let mask: Vec<u8> = shades.iter().map(|s| if s.is_some_and(|s| s >= 128) { 255 } else { 0 }).collect();
+        let one = region::close_to_one(size, &mask, 0).map_err(|e| bad(e.to_string()))?;
+        return one.map(Given::Region).ok_or_else(|| bad("nothing in it is white, and white is tree".into()));
+    }
+    check(&picture, &marks).map_err(|what| bad(what.into()))?;
+    Ok(Given::Scribbles(Scribbles { name, size, marks }))
+}
+
+/// Brightness of a pixel, `None` where it is more transparent than not.
+fn shade([r, g, b, opacity]: [u8; 4]) -> Option<u8> {
+    let [r, g, b] = [r, g, b].map(u32::from);
+    (opacity >= 128).then_some(((77 * r + 150 * g + 29 * b + 128) >> 8) as u8)
+}
+
+fn mark(shade: Option<u8>) -> Mark {
+    match shade {
+        Some(WHITE..) => Mark::Tree,
+        Some(..=BLACK) => Mark::Background,
+        _ => Mark::Undecided,
+    }
+}
+
+/// Why scribbles cannot be solved.
+fn check(picture: &RgbaImage, marks: &[Mark]) -> Result<(), &'static str> {
+    let rest: Vec<[u8; 4]> = picture
+        .pixels()
+        .zip(marks)
+        .filter(|(p, m)| **m == Mark::Undecided && p.0[3] >= 128)
+        .map(|(p, _)| p.0)
+        .collect();
+    let median = |channel: usize| {
+        let mut values: Vec<u8> = rest.iter().map(|p| p[channel]).collect();
+        values.sort_unstable();
+        values.get(values.len() / 2).copied().unwrap_or(0)
+    };
+    let middle = [median(0), median(1), median(2)];
+    let near = |p: &&[u8; 4]| (0..3).all(|c| p[c].abs_diff(middle[c]) <= ONE_SHADE);
+    if (rest.iter().filter(near).count() as f64) < MOST_OF_REST * rest.len() as f64 {
+        return Err(
+            "it is neither a mask (black and white) nor scribbles (white tree, black background, the rest one grey \
+                    or transparent)",
+        );
+    }
+    match (marks.contains(&Mark::Tree), marks.contains(&Mark::Background)) {
+        (true, true) => Ok(()),
+        (true, false) => Err("its scribbles mark no background; draw black strokes on some of it"),
+        (false, true) => Err("its scribbles mark no tree; draw white strokes on trunk and branches"),
+        (false, false) => Err("it has no scribbles; draw white strokes on the tree and black ones on the background"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: Size = Size { width: 60, height: 40 };
+
+    /// A picture of one colour with strokes, as a file.
+    fn given(ground: [u8; 4], strokes: &[([u8; 4], u32)]) -> Result<Given, String> {
+        let mut picture = RgbaImage::from_pixel(SIZE.width, SIZE.height, image::Rgba(ground));
+        for &(colour, left) in strokes {
+            (5..35).for_each(|v| (left..left + 6).for_each(|u| picture.put_pixel(u, v, image::Rgba(colour))));
+        }
+        let file = tempfile::Builder::new().suffix(".png").tempfile().expect("file");
+        picture.save(file.path()).expect("picture");
+        read(file.path(), SIZE).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn masks_and_scribbles_are_told_apart_by_what_they_hold() {
+        let (black, white, grey, clear) = ([0, 0, 0, 255], [255; 4], [128, 128, 128, 255], [255, 255, 255, 0]);
+        assert!(matches!(given(black, &[(white, 9)]), Ok(Given::Region(_))));
+        // The soft edge of a mask.
+        assert!(matches!(given(black, &[(white, 9), ([128, 128, 128, 255], 40)][..1]), Ok(Given::Region(_))));
+        for ground in [grey, clear, [200, 190, 210, 255]] {
+            let Ok(Given::Scribbles(s)) = given(ground, &[(white, 9), (black, 40)]) else { panic!("{ground:?}") };
+            let count = |mark| s.marks.iter().filter(|m| **m == mark).count();
+            assert_eq!((count(Mark::Tree), count(Mark::Background)), (180, 180), "{ground:?}");
+        }
+    }
+
+    /// Its black shadows and white sky are no scribbles.
+    #[test]
+    fn a_photograph_is_refused() {
+        let file = tempfile::Builder::new().suffix(".png").tempfile().expect("file");
+        let pixel = |u: u32, v: u32| image::Rgb([(4 * u) as u8, (6 * v) as u8, (4 * u) as u8]);
+        image::RgbImage::from_fn(SIZE.width, SIZE.height, pixel).save(file.path()).expect("picture");
+        let message = read(file.path(), SIZE).map(drop).expect_err("a photograph").to_string();
+        assert!(message.contains("neither a mask"), "{message}");
+    }
+
+    #[test]
+    fn scribbles_that_cannot_be_solved_are_refused_with_what_to_do() {
+        let (black, white, grey) = ([0, 0, 0, 255], [255; 4], [128, 128, 128, 255]);
+        let cases = [
+            (given(grey, &[(white, 9)]), "black strokes"),
+            (given(grey, &[(black, 9)]), "white strokes"),
+            (given(grey, &[]), "no scribbles"),
+            (given([0; 4], &[]), "no scribbles"),
+        ];
+        for (result, says) in cases {
+            let message = result.map(drop).expect_err(says);
+            assert!(message.contains(says) && message.contains("leave --outline out"), "{message}");
+        }
+    }
+}
