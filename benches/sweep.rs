@@ -9,9 +9,10 @@ mod branches;
 use arborcam::config::{Affinity, Config};
 use arborcam::hierarchy::{COMPARE_HZ, evidence};
 use arborcam::model::{Frame, Luma};
-use arborcam::pipeline::{self, Pipeline};
+use arborcam::outline::Given;
+use arborcam::pipeline::{self, Moment, Pipeline};
 use arborcam::source::{self, Decoder};
-use arborcam::track::{TrackHistory, TrackTable};
+use arborcam::track::TrackHistory;
 use branches::{Births, Truth, triplets};
 use std::path::Path;
 use std::sync::Arc;
@@ -31,7 +32,8 @@ fn gathered(clip: &Path, outline: &Path, points: u32, every: usize) -> (Gathered
     config.detect.min_distance_px *= (400.0 / f64::from(points)).sqrt().min(1.0);
     let mut source = source::open(clip, &config.camera, None).expect("clip");
     let mut decoder = Decoder::new().expect("decoder");
-    let outline = arborcam::outline::load(outline, source.describe().size).expect("outline");
+    let given = arborcam::outline::load(outline, source.describe().size).expect("outline");
+    let Given::Region(outline) = given else { panic!("the sweep takes a polygon or a mask, no scribbles") };
     let mut pipeline = Pipeline::new(&config, Some(outline.clone()));
     let mut gathered =
         Gathered { history: TrackHistory::new(config.accumulate.window_s), born: Births::default(), built_s: 0.0 };
@@ -59,13 +61,13 @@ fn gathered(clip: &Path, outline: &Path, points: u32, every: usize) -> (Gathered
 }
 
 fn row(gathered: &Gathered, outline: &Arc<arborcam::model::Outline>, truth: &Truth, what: &str, config: &Config) {
-    let table: TrackTable = gathered.history.table(1.0 / COMPARE_HZ);
+    let table = Arc::new(gathered.history.table(1.0 / COMPARE_HZ));
     let evidence = evidence(&table, &config.accumulate);
     let mut times = Vec::new();
     let mut tree = None;
     for _ in 0..5 {
         let start = Instant::now();
-        tree = pipeline::build(&table, evidence.clone(), outline, config, (0, &Default::default(), false));
+        tree = pipeline::build(&table, evidence.clone(), outline, config, Moment::default());
         times.push(start.elapsed().as_secs_f64() * 1e3);
     }
     times.sort_by(f64::total_cmp);
