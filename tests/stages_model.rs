@@ -69,7 +69,14 @@ fn what_moves_differently_is_cut_apart_and_what_stands_still_takes_no_part() {
 }
 
 fn cluster(parent: Option<u32>, level: u8, centroid_px: [f64; 2]) -> Cluster {
-    Cluster { parent: parent.map(ClusterId), level, members: vec![TrackId(0), TrackId(1)], centroid_px, certainty: 1.0 }
+    Cluster {
+        parent: parent.map(ClusterId),
+        level,
+        members: vec![TrackId(0), TrackId(1)],
+        centroid_px,
+        end_px: None,
+        certainty: 1.0,
+    }
 }
 
 /// Trunk, two main branches, two twigs on each.

@@ -17,15 +17,16 @@ pub struct Node {
 
 /// The nodes, level by level, each before its children, of which the largest comes first.
 ///
-/// - A few points that come off alone are no branch: they stay with the node and are in none of its children.
+/// - A few points that come off alone are no branch: they stay with the node and are in none of its children. So do
+///   those of its stem, `stems`.
 /// - A split that is not sure (`min_certainty`) and has no sure one under it is not made.
 /// - One that is not sure but leads to sure ones says only that it is not known which branch leaves first: they leave
 ///   together, up to `max_children`.
-pub fn arranged(tree: &Binary, certain: &[f32], settings: &Hierarchy) -> Vec<Node> {
+pub fn arranged(tree: &Binary, certain: &[f32], stems: &[bool], settings: &Hierarchy) -> Vec<Node> {
     if tree.parts.is_empty() {
         return Vec::new();
     }
-    let arranging = Arranging { tree, certain, settings, surest: surest_below(tree, certain) };
+    let arranging = Arranging { tree, certain, stems, settings, surest: surest_below(tree, certain, stems) };
     let mut nodes = vec![Node { parent: None, level: 0, part: 0, certainty: 0.0 }];
     let mut next = 0;
     while next < nodes.len() {
@@ -48,6 +49,7 @@ pub fn arranged(tree: &Binary, certain: &[f32], settings: &Hierarchy) -> Vec<Nod
 struct Arranging<'a> {
     tree: &'a Binary,
     certain: &'a [f32],
+    stems: &'a [bool],
     settings: &'a Hierarchy,
     surest: Vec<f32>,
 }
@@ -81,20 +83,24 @@ impl Arranging<'_> {
             if size(part) < self.settings.min_points as usize || size(a).max(size(b)) < MIN_SIDE {
                 return None;
             }
-            if size(a).min(size(b)) >= MIN_SIDE {
+            if size(a).min(size(b)) >= MIN_SIDE && !self.stems[a] && !self.stems[b] {
                 return (f64::from(self.surest[part]) >= self.settings.min_certainty).then_some((part, halves));
             }
-            part = if size(a) > size(b) { a } else { b };
+            part = if self.stems[b] || (size(a) > size(b) && !self.stems[a]) { a } else { b };
         }
     }
 }
 
-/// For every part the certainty of the surest split in it.
-fn surest_below(tree: &Binary, certain: &[f32]) -> Vec<f32> {
-    let mut surest = certain.to_vec();
+/// For every part the certainty of the surest split in it that can be made.
+fn surest_below(tree: &Binary, certain: &[f32], stems: &[bool]) -> Vec<f32> {
+    let mut surest = vec![0.0f32; tree.parts.len()];
     for (k, part) in tree.parts.iter().enumerate().rev() {
-        for half in part.halves.iter().flatten() {
-            surest[k] = surest[k].max(surest[*half]);
+        let Some(halves) = part.halves else { continue };
+        if halves.iter().all(|h| !stems[*h] && tree.parts[*h].len() >= MIN_SIDE) {
+            surest[k] = certain[k];
+        }
+        for half in halves.into_iter().filter(|h| !stems[*h]) {
+            surest[k] = surest[k].max(surest[half]);
         }
     }
     surest
@@ -110,6 +116,10 @@ mod tests {
         Binary::divided(points, |p, _| (p.len() > 2).then(|| (0..p.len()).map(|k| k < 2).collect()))
     }
 
+    fn arranged_all(tree: &Binary, certain: &[f32], settings: &Hierarchy) -> Vec<Node> {
+        arranged(tree, certain, &vec![false; tree.parts.len()], settings)
+    }
+
     fn sizes(nodes: &[Node], tree: &Binary) -> Vec<(u8, usize)> {
         nodes.iter().map(|n| (n.level, tree.parts[n.part].len())).collect()
     }
@@ -118,9 +128,9 @@ mod tests {
     fn sure_splits_are_made_one_after_the_other() {
         let tree = trunk(4);
         let settings = Hierarchy { levels: 10, min_points: 2, ..Hierarchy::default() };
-        let nodes = arranged(&tree, &vec![0.9; tree.parts.len()], &settings);
+        let nodes = arranged_all(&tree, &vec![0.9; tree.parts.len()], &settings);
         assert_eq!(sizes(&nodes, &tree), [(0, 8), (1, 6), (1, 2), (2, 4), (2, 2), (3, 2), (3, 2)]);
-        let few = arranged(&tree, &vec![0.9; tree.parts.len()], &Hierarchy { levels: 2, ..settings });
+        let few = arranged_all(&tree, &vec![0.9; tree.parts.len()], &Hierarchy { levels: 2, ..settings });
         assert_eq!(few.len(), 3, "no deeper than the levels");
     }
 
@@ -128,8 +138,8 @@ mod tests {
     fn splits_that_nothing_supports_are_not_made() {
         let tree = trunk(4);
         let settings = Hierarchy { levels: 10, min_points: 2, ..Hierarchy::default() };
-        assert_eq!(arranged(&tree, &vec![0.2; tree.parts.len()], &settings).len(), 1);
-        let all = arranged(&tree, &vec![0.2; tree.parts.len()], &Hierarchy { min_certainty: 0.0, ..settings });
+        assert_eq!(arranged_all(&tree, &vec![0.2; tree.parts.len()], &settings).len(), 1);
+        let all = arranged_all(&tree, &vec![0.2; tree.parts.len()], &Hierarchy { min_certainty: 0.0, ..settings });
         assert_eq!(all.len(), 7, "unless nothing is asked of them");
     }
 
@@ -142,10 +152,21 @@ mod tests {
         certain[last] = 0.9;
         let of = |max_children| {
             let settings = Hierarchy { levels: 10, min_points: 2, max_children, ..Hierarchy::default() };
-            sizes(&arranged(&tree, &certain, &settings), &tree)
+            sizes(&arranged_all(&tree, &certain, &settings), &tree)
         };
         assert_eq!(of(4), [(0, 8), (1, 2), (1, 2), (1, 2), (1, 2)]);
         assert_eq!(of(3), [(0, 8), (1, 4), (1, 2), (1, 2), (2, 2), (2, 2)]);
         assert_eq!(of(2).len(), 7, "in two as in the papers");
+    }
+
+    #[test]
+    fn points_of_the_stem_stay_with_the_node() {
+        let tree = trunk(4);
+        let settings = Hierarchy { levels: 10, min_points: 2, ..Hierarchy::default() };
+        let mut stems = vec![false; tree.parts.len()];
+        let [first, _] = tree.parts[0].halves.expect("halves");
+        stems[first] = true;
+        let nodes = arranged(&tree, &vec![0.9; tree.parts.len()], &stems, &settings);
+        assert_eq!(sizes(&nodes, &tree), [(0, 8), (1, 4), (1, 2), (2, 2), (2, 2)]);
     }
 }

@@ -9,6 +9,7 @@ mod arrange;
 mod binary;
 mod certainty;
 mod common_way;
+mod ends;
 mod lanczos;
 mod linkage;
 mod ncut;
@@ -16,6 +17,7 @@ mod path;
 mod persist;
 mod rest;
 mod signals;
+mod stems;
 mod support;
 mod zeng;
 
@@ -50,15 +52,26 @@ pub fn build(table: &TrackTable, moving: &[usize], foot_px: [f64; 2], settings: 
     let rows: Vec<usize> = kept.iter().map(|&i| moving[i]).collect();
     let rest_px: Vec<[f64; 2]> = kept.iter().map(|&i| rest_px[i]).collect();
     let displacements = Signals::displacements(table, &rows);
-    let tree = match settings.affinity {
+    let (tree, stems) = match settings.affinity {
         Affinity::Path => {
-            let likeness = path::likeness(&displacements, &rest_px, foot_px, settings);
-            Binary::merged(rows.len(), &linkage::average_linkage(likeness))
+            let (likeness, common) = path::likeness(&displacements, &rest_px, foot_px, settings);
+            let tree = Binary::merged(rows.len(), &linkage::average_linkage(likeness));
+            let stems = stems::stems(&tree, &common);
+            (tree, stems)
         }
-        Affinity::Zeng => cut_in_two(&Signals::velocities(table, &rows, |_| true), &rest_px, settings),
+        Affinity::Zeng => {
+            let tree = cut_in_two(&Signals::velocities(table, &rows, |_| true), &rest_px, settings);
+            let stems = vec![false; tree.parts.len()];
+            (tree, stems)
+        }
     };
     let certain = certainty::certainties(&tree, &displacements, &table.times_s);
-    let cluster = |node: arrange::Node| {
+    let nodes = arranged(&tree, &certain, &stems, settings);
+    let ends_px = match settings.affinity {
+        Affinity::Path => ends::ends_px(&nodes, &tree, &rest_px, foot_px).into_iter().map(Some).collect(),
+        Affinity::Zeng => vec![None; nodes.len()],
+    };
+    let cluster = |(node, end_px): (arrange::Node, Option<[f64; 2]>)| {
         let points = tree.points(node.part);
         let mut members: Vec<_> = points.iter().map(|&i| table.ids[rows[i]]).collect();
         members.sort_unstable();
@@ -67,10 +80,11 @@ pub fn build(table: &TrackTable, moving: &[usize], foot_px: [f64; 2], settings: 
             level: node.level,
             members,
             centroid_px: centroid(&rest_px, points),
+            end_px,
             certainty: node.certainty,
         }
     };
-    MotionHierarchy { clusters: arranged(&tree, &certain, settings).into_iter().map(cluster).collect() }
+    MotionHierarchy { clusters: nodes.into_iter().zip(ends_px).map(cluster).collect() }
 }
 
 /// The papers' recursive normalised cuts.

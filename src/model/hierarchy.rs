@@ -17,6 +17,9 @@ pub struct Cluster {
     pub members: Vec<TrackId>,
     /// Mean rest position of the members, px.
     pub centroid_px: [f64; 2],
+    /// Where the cluster's branch ends at rest, px: where its children part, or at its tip. `None` where all that is
+    /// known is the centroid.
+    pub end_px: Option<[f64; 2]>,
     /// How sure it is that the children part here, 0 (not at all) to 1; 0 for a cluster without children.
     pub certainty: f32,
 }

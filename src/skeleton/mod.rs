@@ -17,7 +17,9 @@ pub struct Node2d {
     pub certainty: f32,
 }
 
-/// The 2D skeleton T' of the paper: cluster centroids, folded. Node 0 is the foot, node k + 1 belongs to cluster k.
+/// The 2D skeleton T' of the paper. Node 0 is the foot, node k + 1 belongs to cluster k.
+///
+/// A node is where its cluster's branch ends; where that is not known, at the centroid, folded as in the paper.
 pub fn build(hierarchy: &MotionHierarchy, outline: &Outline, settings: &config::Skeleton) -> Vec<Node2d> {
     let crown_u = hierarchy.clusters.first().map(|all| all.centroid_px[0]);
     let position_px = Foot::of(outline, crown_u).position_px;
@@ -28,7 +30,7 @@ pub fn build(hierarchy: &MotionHierarchy, outline: &Outline, settings: &config::
             parent: Some(c.parent.map_or(0, |p| p.0 as usize + 1)),
             level: c.level + 1,
             cluster: Some(ClusterId(k as u32)),
-            position_px: c.centroid_px,
+            position_px: c.end_px.unwrap_or(c.centroid_px),
             certainty: c.certainty,
         });
     }
@@ -38,7 +40,8 @@ pub fn build(hierarchy: &MotionHierarchy, outline: &Outline, settings: &config::
     }
     // x' <- x' + alpha (parent - x'), root to tip, with the parent already folded; tips stay, lest the tree shrinks.
     for i in 1..nodes.len() {
-        if let Some(parent) = nodes[i].parent.filter(|_| has_children[i]) {
+        let at_centroid = hierarchy.clusters[i - 1].end_px.is_none();
+        if let Some(parent) = nodes[i].parent.filter(|_| has_children[i] && at_centroid) {
             let towards = nodes[parent].position_px;
             let p = &mut nodes[i].position_px;
             *p = [p[0] + settings.fold * (towards[0] - p[0]), p[1] + settings.fold * (towards[1] - p[1])];
