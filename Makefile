@@ -25,8 +25,9 @@ test-real:
 	scripts/fetch-real-clip.sh
 	cargo test --release --locked --test real_clip -- --ignored --nocapture
 
+# ONLY=tracking for the tracker alone.
 bench:
-	cargo bench --locked --bench figures
+	cargo bench --locked --bench figures -- $(ONLY)
 
 # The tree over the ranges of its settings; CLIP="film outline branches" for another clip than the shipped one.
 sweep:

@@ -4,32 +4,34 @@
 
 #[path = "../tests/support/mod.rs"]
 mod support;
+mod tracking;
+#[path = "../tests/support/truth.rs"]
+mod truth;
 
-use arborcam::config::{Config, Detect};
+use arborcam::config::Config;
 use arborcam::hierarchy::{self, COMPARE_HZ, Evidence, evidence, evidence_of};
-use arborcam::model::{Frame, Luma, Outline, Rgb, Size, TrackId, TrackSet};
-use arborcam::outline::{self, Mark, Scribbles, whole};
+use arborcam::model::{Outline, Rgb, Size, TrackId, TrackSet};
+use arborcam::outline::{self, Mark, Scribbles};
 use arborcam::pipeline::{self, Moment, Pipeline, Tree};
-use arborcam::source::{self, Decoder};
-use arborcam::track::{OpticalFlow, Pyramid, TrackHistory, TrackTable, Tracker};
+use arborcam::source::Decoder;
+use arborcam::track::{TrackHistory, TrackTable};
 use criterion::Criterion;
-use opencv::boxed_ref::BoxedRef;
-use opencv::core::{Mat, Point2f, Size as CvSize, TermCriteria, Vector};
-use opencv::video::{OPTFLOW_USE_INITIAL_FLOW, calc_optical_flow_pyr_lk};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
+use tracking::{median, timed_ms};
 
-/// Frames of the 720p clip that tracking is measured on: in the first 6 s all points are on trial.
-const TRACKED: usize = 230;
-
+/// With a word, `make bench ONLY=tracking`, only the figures of the tracker.
 fn main() {
     let dir = tempfile::tempdir().expect("tempdir");
-    let clip = dir.path().join("720p.mkv");
-    let scale = ["-v", "error", "-nostdin", "-i", support::CLIP, "-vf", "scale=1280:720", "-c:v", "mjpeg", "-q:v", "4"];
-    assert!(Command::new("ffmpeg").args(scale).arg(&clip).status().expect("ffmpeg").success());
-
+    let clip = scaled(dir.path(), "1280:720");
+    let large = scaled(dir.path(), "1920:1080");
+    let table = tracking::table(&clip, &large);
+    if std::env::args().any(|a| a == "tracking") {
+        table.iter().for_each(|line| println!("{line}"));
+        return;
+    }
     let mut criterion = Criterion::default()
         .without_plots()
         .sample_size(10)
@@ -41,90 +43,17 @@ fn main() {
         replay(&clip, dir.path()),
     ]);
     println!();
-    tracking(&clip).into_iter().chain(lines).for_each(|line| println!("{line}"));
+    table.into_iter().chain([String::new()]).chain(lines).for_each(|line| println!("{line}"));
 }
 
-fn frames(clip: &Path, n: usize) -> Vec<Frame> {
-    let mut source = source::open(clip, &Config::default().camera, None).expect("clip");
-    let mut decoder = Decoder::new().expect("decoder");
-    let frame = |index: usize| {
-        let raw = source.next_frame().expect("frame")?;
-        let mut luma = Luma { size: raw.size, pixels: Vec::new() };
-        decoder.luma(&raw, &mut luma).expect("picture");
-        let (time_s, received) = (raw.sensor_time_s, Instant::now());
-        Some(Frame { index: index as u64, time_s, received, luma, preview: None })
-    };
-    (0..n).map_while(frame).collect()
-}
-
-/// Forward and back as our tracker does it, each pyramid built once, against two plain calls of OpenCV on pictures, as
-/// anyone would write them; in turns on the same frames and points, so that whatever else the machine does is shared
-/// fairly. The medians are compared, those of the tracker's whole step, which also undoes drift, among them. While points
-/// are on trial there are twice as many.
-fn tracking(clip: &Path) -> [String; 2] {
-    let frames = frames(clip, TRACKED);
-    let settings = Config::default();
-    let (window, levels) = (settings.track.window_px, settings.track.levels);
-    let outline = whole(frames[0].luma.size);
-    let detect = Detect { points: 400, ..settings.detect };
-    let (mut ours_ms, mut plain_ms, mut step_ms, mut trial_ms) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    let mut flow = OpticalFlow::new(window);
-    let (mut forward, mut backward) = (Vec::new(), Vec::new());
-    for _ in 0..2 {
-        let mut tracker = Tracker::new(&detect, &settings.track, &outline, 0);
-        let mut set = tracker.step(&frames[0]);
-        let (mut previous, mut present) = (Pyramid::default(), Pyramid::default());
-        previous.rebuild(&frames[0].luma, window, levels);
-        for pair in frames.windows(2) {
-            let points: Vec<[f32; 2]> = set.observations.iter().map(|o| [o.u_px, o.v_px]).collect();
-            assert!(points.len() >= 300, "{} points", points.len());
-            let on_trial = set.observations.iter().any(|o| !o.confirmed);
-            if on_trial {
-                let (ms, next) = timed_ms(|| tracker.step(&pair[1]));
-                trial_ms.push(ms);
-                std::mem::swap(&mut previous, &mut present);
-                previous.rebuild(&pair[1].luma, window, levels);
-                set = next;
-                continue;
-            }
-            let from: Vector<Point2f> = points.iter().map(|p| Point2f::new(p[0], p[1])).collect();
-            plain_ms.push(timed_ms(|| plain(&pair[0].luma, &pair[1].luma, &from)).0);
-            let ours = || {
-                present.rebuild(&pair[1].luma, window, levels);
-                flow.track((&previous, &present), &points, None, levels, &mut forward);
-                let to: Vec<[f32; 2]> = forward.iter().map(|f| f.to).collect();
-                flow.track((&present, &previous), &to, None, levels, &mut backward);
-            };
-            ours_ms.push(timed_ms(ours).0);
-            std::mem::swap(&mut previous, &mut present);
-            let (ms, next) = timed_ms(|| tracker.step(&pair[1]));
-            step_ms.push(ms);
-            set = next;
-        }
-    }
-    let (ours, plain, step, trial) = (median(ours_ms), median(plain_ms), median(step_ms), median(trial_ms));
-    println!("a 720p frame, some 400 points, forward and back: {ours:.2} ms; plain OpenCV: {plain:.2} ms");
-    println!("the whole step, drift undone: {step:.2} ms; with some 800 points on trial: {trial:.2} ms");
-    [
-        format!("forward and back: {:.2} of plain OpenCV (must be <= 0.85)", ours / plain),
-        format!("all of tracking: {:.2} of plain OpenCV (must be <= 1.5)", step / plain),
-    ]
-}
-
-fn plain(a: &Luma, b: &Luma, from: &Vector<Point2f>) -> Vector<Point2f> {
-    let (rows, cols) = (a.size.height as i32, a.size.width as i32);
-    let [a, b] = [a, b].map(|l| Mat::new_rows_cols_with_data(rows, cols, &l.pixels).expect("mat"));
-    let (mut status, mut error) = (Vector::<u8>::new(), Vector::<f32>::new());
-    let mut flow = |a: &BoxedRef<Mat>, b: &BoxedRef<Mat>, from: &Vector<Point2f>| {
-        let (mut to, window) = (from.clone(), CvSize::new(15, 15));
-        let criteria = TermCriteria::new(3, 30, 0.01).expect("criteria");
-        let flags = OPTFLOW_USE_INITIAL_FLOW;
-        calc_optical_flow_pyr_lk(a, b, from, &mut to, &mut status, &mut error, window, 3, criteria, flags, 1e-4)
-            .expect("flow");
-        to
-    };
-    let to = flow(&a, &b, from);
-    flow(&b, &a, &to)
+/// The recording in another size.
+fn scaled(dir: &Path, size: &str) -> PathBuf {
+    let clip = dir.join(format!("{}.mkv", size.replace(':', "x")));
+    let (filter, quality) = (format!("scale={size}"), ["-c:v", "mjpeg", "-q:v", "4"]);
+    let mut ffmpeg = Command::new("ffmpeg");
+    ffmpeg.args(["-v", "error", "-nostdin", "-i", support::CLIP, "-vf", &filter]).args(quality).arg(&clip);
+    assert!(ffmpeg.status().expect("ffmpeg").success());
+    clip
 }
 
 /// What has been seen of the recording by the time the tree is built.
@@ -235,15 +164,4 @@ fn matting() -> String {
     let ms =
         (0..5).map(|_| timed_ms(|| outline::alpha(&picture, &scribbles).expect("a matte")).0).fold(f64::MAX, f64::min);
     format!("scribbles on a 640x480 picture solved: {ms:.0} ms (must be <= 1500)")
-}
-
-fn timed_ms<T>(work: impl FnOnce() -> T) -> (f64, T) {
-    let start = Instant::now();
-    let result = work();
-    (start.elapsed().as_secs_f64() * 1e3, result)
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }

@@ -1,103 +1,34 @@
 //! How near to the truth the tracks of the shipped recording end.
 
 mod support;
+#[path = "support/truth.rs"]
+mod truth;
 
-use arborcam::config::Config;
-use arborcam::model::TrackId;
-use arborcam::source::Decoder;
-use arborcam::track::Tracker;
-use std::collections::{BTreeMap, BTreeSet};
+use truth::{Score, Truth, tracks};
 
-const TRUTH: &str = "recordings/sparse_winter.truth";
-/// A track is one of the truth's points if it was born so near to it, px, and not later than in this frame.
-const SNAP_PX: f64 = 2.5;
-const LATEST_BIRTH: u64 = 5;
-
-/// Positions (px) of each point in the first and in the last second's frames.
-struct Truth {
-    frames: Vec<u64>,
-    positions: Vec<Vec<[f64; 2]>>,
-}
-
-fn truth() -> Truth {
-    let bytes = std::fs::read(TRUTH).expect("truth");
-    let word = |i: usize| u32::from_le_bytes(bytes[4 * i..4 * i + 4].try_into().expect("four bytes"));
-    let (points, frames) = (word(0) as usize, word(1) as usize);
-    let places: Vec<[f64; 2]> = bytes[4 * (2 + frames)..]
-        .as_chunks::<4>()
-        .0
-        .iter()
-        .map(|b| [[b[0], b[1]], [b[2], b[3]]].map(|b| f64::from(u16::from_le_bytes(b)) / 64.0))
-        .collect();
-    assert_eq!(places.len(), points * frames);
-    Truth {
-        frames: (0..frames).map(|k| word(2 + k).into()).collect(),
-        positions: places.chunks_exact(points).map(<[_]>::to_vec).collect(),
-    }
-}
-
-fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
-}
-
-type Places = BTreeMap<TrackId, BTreeMap<u64, [f64; 2]>>;
-
-/// All tracks that are kept, by frame, and the median of the errors that the tracker itself expects in the last frame.
-fn tracks() -> (Places, f64) {
-    let config = Config::default();
-    let mut tracker = Tracker::new(&config.detect, &config.track, &support::outline(), 0);
-    let mut decoder = Decoder::new().expect("decoder");
-    let (mut places, mut rejected, mut expected) = (Places::new(), BTreeSet::new(), Vec::new());
-    for k in 0..support::recording().len() {
-        let set = tracker.step(&support::decoded(&mut decoder, k));
-        for o in &set.observations {
-            places.entry(o.id).or_default().insert(set.frame, [o.u_px.into(), o.v_px.into()]);
-        }
-        rejected.extend(set.rejected.iter().copied());
-        expected = set.counted().filter_map(|o| o.error_px).map(f64::from).collect();
-    }
-    places.retain(|id, _| !rejected.contains(id));
-    (places, median(&mut expected))
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
-}
-
-/// Two pixels are a branch's width: tracks beyond that are on another branch. The textbook's way (the same corners,
-/// forward and backward Lucas-Kanade) keeps 0.36 of its points within them, with a median error of 2.1 px.
+/// `make bench` has the textbook's way beside it (the same corners, forward and backward Lucas-Kanade).
 #[test]
 fn the_tracks_end_where_the_points_truly_are() {
-    let truth = truth();
     let (tracks, expected_px) = tracks();
-    let (mut near, mut pairs, mut errors) = (0usize, 0usize, Vec::new());
-    let mut scored = 0;
-    for seen in tracks.values() {
-        let Some((_, &born)) = seen.first_key_value().filter(|(frame, _)| **frame <= LATEST_BIRTH) else { continue };
-        let nearest = |a: &usize, b: &usize| {
-            distance(truth.positions[0][*a], born).total_cmp(&distance(truth.positions[0][*b], born))
-        };
-        let point = (0..truth.positions[0].len()).min_by(nearest).expect("points");
-        let start = truth.positions[0][point];
-        if distance(start, born) > SNAP_PX {
-            continue;
-        }
-        scored += 1;
-        for (frame, positions) in truth.frames.iter().zip(&truth.positions).skip(1) {
-            let at = positions[point];
-            pairs += 1;
-            let Some(&there) = seen.get(frame) else { continue };
-            let error = distance(there, [at[0] + born[0] - start[0], at[1] + born[1] - start[1]]);
-            near += usize::from(error < 2.0);
-            errors.push(error);
-        }
-    }
-    let (within, median_px) = (near as f64 / pairs as f64, median(&mut errors));
-    println!("{scored} tracks, within 2 px: {within:.3}, median error {median_px:.2} px, expected {expected_px:.2} px");
+    let Score { tracks: scored, within_2px, median_end_px } = Truth::read().score(&tracks);
+    println!(
+        "{scored} tracks, within 2 px: {within_2px:.3}, median error {median_end_px:.2} px, expected {expected_px:.2} px"
+    );
     assert!(scored >= 100, "{scored} tracks can be held against the truth");
-    assert!(within >= 0.75, "within 2 px: {within:.3}");
-    assert!(median_px <= 1.0, "median error: {median_px:.2} px");
+    assert!(within_2px >= 0.75, "within 2 px: {within_2px:.3}");
+    assert!(median_end_px <= 1.0, "median error: {median_end_px:.2} px");
     // What the tracker says of itself means something.
-    assert!((0.5..2.0).contains(&(expected_px / median_px)), "expected {expected_px:.2} px, true {median_px:.2} px");
+    let as_said = (0.5..2.0).contains(&(expected_px / median_end_px));
+    assert!(as_said, "expected {expected_px:.2} px, true {median_end_px:.2} px");
+}
+
+/// The same film gives the same tracks on every machine, to the last bit.
+#[test]
+fn tracks_do_not_depend_on_how_many_cores_there_are() {
+    let with = |threads: i32| {
+        opencv::core::set_num_threads(threads).expect("threads");
+        tracks().0
+    };
+    let (one, three) = (with(1), with(3));
+    assert!(one == three, "tracks differ with the number of threads");
 }

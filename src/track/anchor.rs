@@ -9,7 +9,7 @@ use super::neighbours::{self, Fit, Witness};
 use super::point::Point;
 use super::register::{Registration, UPRIGHT};
 use crate::config::Track;
-use crate::model::Luma;
+use crate::model::{Luma, TrackId};
 
 /// Largest forward-backward error of a point found again without its neighbours, px.
 const FB_LIMIT_PX: f32 = 0.7;
@@ -116,30 +116,31 @@ impl Anchoring {
 }
 
 impl Tracker {
-    /// What the neighbours of every point say, by the places that they have now.
+    /// What the neighbours of a point say, by the places that they have now; of every point that needs it in this frame.
     pub(super) fn ask_neighbours(&mut self) {
+        // Apart from the points, which are large: each is asked two dozen times.
+        let ids: Vec<TrackId> = self.points.iter().map(|p| p.id).collect();
+        let seen: Vec<Option<([f32; 2], f64)>> =
+            self.points.iter().map(|p| (p.coasting == 0).then(|| (p.now_px, p.trust()))).collect();
         let fit = |p: &Point| {
+            if p.coasting == 0 && !p.in_turn(self.settings.anchor_every, self.frames) {
+                return None;
+            }
             let mut witnesses = [Witness::default(); neighbours::NEIGHBOURS];
             let mut n = 0;
             for (id, then_px) in &p.neighbours {
-                let Ok(j) = self.points.binary_search_by_key(id, |q| q.id) else { continue };
-                let q = &self.points[j];
+                let Some((now_px, weight)) = ids.binary_search(id).ok().and_then(|j| seen[j]) else { continue };
                 let minus = |a: [f32; 2], b: [f32; 2]| [f64::from(a[0] - b[0]), f64::from(a[1] - b[1])];
-                if q.coasting == 0 {
-                    let (offset, displacement) = (minus(*then_px, p.born_px), minus(q.now_px, *then_px));
-                    witnesses[n] = Witness { offset, displacement, weight: q.trust() };
-                    n += 1;
-                }
+                let (offset, displacement) = (minus(*then_px, p.born_px), minus(now_px, *then_px));
+                witnesses[n] = Witness { offset, displacement, weight };
+                n += 1;
                 if n == witnesses.len() {
                     break;
                 }
             }
             neighbours::fit(&witnesses[..n])
         };
-        let mut fits = std::mem::take(&mut self.fits);
-        fits.clear();
-        fits.extend(self.points.iter().map(fit));
-        self.fits = fits;
+        self.fits = self.points.iter().map(fit).collect();
     }
 
     /// Moves the points that are not seen with those around them that are.
@@ -151,15 +152,16 @@ impl Tracker {
         }
     }
 
-    /// Puts a share of the points back on their first patches.
+    /// Puts a share of the points back on their first patches. One that is just lost is looked for at once, and then in its
+    /// turn as all are.
     pub(super) fn undo_drift(&mut self, luma: &Luma) {
-        let every = u64::from(self.settings.anchor_every);
+        let every = self.settings.anchor_every;
         if every == 0 {
             return;
         }
         for (p, fit) in self.points.iter_mut().zip(&self.fits) {
             let hidden = p.coasting > 0;
-            if !hidden && u64::from(p.id.0) % every != self.frames % every {
+            if p.coasting != 1 && !p.in_turn(every, self.frames) {
                 continue;
             }
             let (found, likeness) = self.anchoring.reanchor(luma, p, fit.as_ref());
@@ -178,5 +180,6 @@ impl Tracker {
 
 /// Distance between two points, px.
 pub fn distance(a: [f32; 2], b: [f32; 2]) -> f32 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
+    let [u, v] = [a[0] - b[0], a[1] - b[1]];
+    (u * u + v * v).sqrt()
 }

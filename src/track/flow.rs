@@ -1,7 +1,7 @@
 //! Sparse optical flow: pyramidal Lucas-Kanade on pyramids that are built once a frame (OpenCV).
 
 use crate::model::Luma;
-use opencv::core::{Mat, Point2f, Size as CvSize, TermCriteria, TermCriteria_Type, Vector};
+use opencv::core::{Mat, Point2f, Size as CvSize, TermCriteria, TermCriteria_Type, Vector, no_array};
 use opencv::video::{OPTFLOW_USE_INITIAL_FLOW, build_optical_flow_pyramid, calc_optical_flow_pyr_lk};
 
 /// Smallest eigenvalue of the structure tensor, per window pixel, below which a window has too little texture.
@@ -46,13 +46,12 @@ pub struct OpticalFlow {
     from: Vector<Point2f>,
     to: Vector<Point2f>,
     status: Vector<u8>,
-    error: Vector<f32>,
 }
 
 impl OpticalFlow {
     /// `window_px` is the side of the window, odd.
     pub fn new(window_px: u32) -> Self {
-        Self { window_px, from: Vector::new(), to: Vector::new(), status: Vector::new(), error: Vector::new() }
+        Self { window_px, from: Vector::new(), to: Vector::new(), status: Vector::new() }
     }
 
     /// Follows `points` (px) from picture `a` to picture `b`, coarse to fine from pyramid level `levels` down.
@@ -82,7 +81,8 @@ impl OpticalFlow {
                 &self.from,
                 &mut self.to,
                 &mut self.status,
-                &mut self.error,
+                // How unlike the windows are is not asked for.
+                &mut no_array(),
                 square(self.window_px),
                 levels as i32,
                 criteria,

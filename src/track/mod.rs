@@ -154,23 +154,27 @@ impl Tracker {
     fn follow(&mut self) {
         let b = &mut self.buffers;
         let pictures = (&self.previous, &self.present);
+        // What flow finds where a hidden point is thought to be may be whatever hides it: that it is the point its first patch
+        // must tell.
+        let blind = self.settings.anchor_every == 0;
+        let followed = |p: &Point| p.coasting == 0 || blind;
         b.from.clear();
-        b.from.extend(self.points.iter().map(|p| p.now_px));
+        b.from.extend(self.points.iter().filter(|p| followed(p)).map(|p| p.now_px));
         self.flow.track(pictures, &b.from, None, self.settings.levels, &mut b.forward);
         b.to.clear();
         b.to.extend(b.forward.iter().map(|f| f.to));
         self.flow.track((pictures.1, pictures.0), &b.to, None, self.settings.levels, &mut b.backward);
         let limit = self.settings.fb_limit_px as f32;
-        // What flow finds where a hidden point is thought to be may be whatever hides it: that it is the point its first patch
-        // must tell.
-        let blind = self.settings.anchor_every == 0;
-        for (i, p) in self.points.iter_mut().enumerate() {
-            let (forward, backward) = (b.forward[i], b.backward[i]);
-            let error = distance(backward.to, b.from[i]);
-            if (p.coasting == 0 || blind) && forward.found && backward.found && error < limit {
-                (p.now_px, p.fb_error_px, p.coasting) = (forward.to, error, 0);
-            } else {
-                p.coasting += 1;
+        let mut flows = b.from.iter().zip(b.forward.iter().zip(&b.backward));
+        for p in &mut self.points {
+            let flow = if followed(p) { flows.next() } else { None };
+            let closed = flow.and_then(|(from, (forward, backward))| {
+                let error = distance(backward.to, *from);
+                (forward.found && backward.found && error < limit).then_some((forward.to, error))
+            });
+            match closed {
+                Some((to, error)) => (p.now_px, p.fb_error_px, p.coasting) = (to, error, 0),
+                None => p.coasting += 1,
             }
         }
         self.ask_neighbours();

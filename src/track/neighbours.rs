@@ -73,20 +73,20 @@ pub fn fit(witnesses: &[Witness]) -> Option<Fit> {
             right += w * row * nalgebra::RowVector2::new(displacement[0], displacement[1]);
         }
         fit = normal.cholesky()?.solve(&right);
-        let residual = |Witness { offset, displacement, .. }: &Witness| {
+        let square = |Witness { offset, displacement, .. }: &Witness| {
             let at = |c: usize| fit[(0, c)] + fit[(1, c)] * offset[0] + fit[(2, c)] * offset[1];
-            (displacement[0] - at(0)).hypot(displacement[1] - at(1))
+            (displacement[0] - at(0)).powi(2) + (displacement[1] - at(1)).powi(2)
         };
-        let mut residuals: [f64; NEIGHBOURS] = [0.0; NEIGHBOURS];
-        for (r, n) in residuals.iter_mut().zip(used) {
-            *r = residual(n);
+        let mut squares: [f64; NEIGHBOURS] = [0.0; NEIGHBOURS];
+        for (r, n) in squares.iter_mut().zip(used) {
+            *r = square(n);
         }
-        let mut sorted = residuals;
+        let mut sorted = squares;
         let sorted = &mut sorted[..used.len()];
         sorted.sort_unstable_by(f64::total_cmp);
-        let scale = (1.5 * sorted[used.len() / 2]).max(0.3);
-        for ((w, r), n) in weights.iter_mut().zip(&residuals).zip(used) {
-            *w = n.weight * (1.0 + (r / scale).powi(2)).powi(-2);
+        let scale_sq = (1.5 * 1.5 * sorted[used.len() / 2]).max(0.3 * 0.3);
+        for ((w, r), n) in weights.iter_mut().zip(&squares).zip(used) {
+            *w = n.weight * (1.0 + r / scale_sq).powi(-2);
         }
     }
     let slope = |of: usize, along: usize| fit[(1 + along, of)] as f32;

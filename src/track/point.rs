@@ -51,6 +51,11 @@ impl Point {
         f64::from(((self.usual_likeness() - DOUBTFUL) / (1.0 - DOUBTFUL)).clamp(0.02, 1.0))
     }
 
+    /// Whether it is compared with its first patch in frame `frame`, where each is in one of `every`; 0 is never.
+    pub fn in_turn(&self, every: u32, frame: u64) -> bool {
+        every > 0 && u64::from(self.id.0) % u64::from(every) == frame % u64::from(every)
+    }
+
     /// Likeness below which something else is before it.
     pub fn hidden_below(&self) -> f32 {
         HIDDEN * self.usual_likeness()

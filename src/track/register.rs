@@ -10,6 +10,14 @@ use crate::model::Luma;
 const HALF_PX: i32 = 5;
 const SIDE: usize = 2 * HALF_PX as usize + 1;
 const N: usize = SIDE * SIDE;
+/// Sums are added up in so many lanes, always in the same order; arrays are filled up with zeros to whole lanes.
+const LANES: usize = 8;
+const FILLED: usize = N.next_multiple_of(LANES);
+/// Places between pixels in fixed point: a pixel is 2^16, of whose bits 11 are used to mix brightness.
+const PIXEL_BITS: u32 = 16;
+const MIX_BITS: u32 = 11;
+/// Pictures as wide as this no longer fit, px.
+const WIDEST_PX: f32 = 32_000.0;
 /// Standard deviation of the Gaussian weights, as a share of half the side.
 const SIGMA: f32 = 0.6;
 /// The search ends when a step is shorter than this, px, or after so many; no step is longer than that, px.
@@ -24,11 +32,14 @@ pub type Warp = [[f32; 2]; 2];
 /// No turning, no bending.
 pub const UPRIGHT: Warp = [[1.0, 0.0], [0.0, 1.0]];
 
-/// What a point looked like when it was detected.
+/// What a point looked like when it was detected, made ready to be compared with it.
 pub struct Patch {
-    /// Brightness with zero mean and unit variance under the weights, and its slopes.
-    values: [f32; N],
-    slopes: [[f32; 2]; N],
+    /// Brightness with zero mean and unit variance under the weights, times the weights.
+    values: [f32; FILLED],
+    /// Its slopes along u and v less their means, times the weights.
+    slopes: [[f32; FILLED]; 2],
+    /// Weighted sum of its slopes times brightness.
+    at_home: [f32; 2],
     /// Inverse of the weighted sum of products of slopes: xx, xy, yy.
     inverse: [f32; 3],
 }
@@ -46,13 +57,13 @@ pub struct Match {
 /// Cuts out and finds patches.
 pub struct Registration {
     /// Sum 1.
-    weights: [f32; N],
+    weights: [f32; FILLED],
 }
 
 impl Default for Registration {
     fn default() -> Self {
         let sigma_px = SIGMA * HALF_PX as f32;
-        let mut weights = [0.0; N];
+        let mut weights = [0.0; FILLED];
         for (w, (x, y)) in weights.iter_mut().zip(offsets()) {
             *w = (-(x * x + y * y) / (2.0 * sigma_px * sigma_px)).exp();
         }
@@ -65,42 +76,51 @@ impl Default for Registration {
 impl Registration {
     /// The patch around `at` (px).
     pub fn patch(&self, luma: &Luma, at: [f32; 2]) -> Patch {
-        let (mut values, mut slopes) = ([0.0; N], [[0.0; 2]; N]);
-        let scale = 1.0 / self.normalise(&mut values, |v| sample(luma, at, &UPRIGHT, v));
-        for (s, (x, y)) in slopes.iter_mut().zip(offsets()) {
+        let (mut values, mut slopes) = ([0.0; FILLED], [[0.0; FILLED]; 2]);
+        sample(luma, at, &UPRIGHT, &mut values);
+        let mean = |of: &[f32; FILLED]| self.weights.iter().zip(of).map(|(w, v)| w * v).sum::<f32>();
+        let centre = |of: &mut [f32; FILLED]| {
+            let mean = mean(of);
+            of[..N].iter_mut().for_each(|v| *v -= mean);
+        };
+        centre(&mut values);
+        let scale = scale(mean(&values.map(|v| v * v)));
+        values.iter_mut().for_each(|v| *v *= scale);
+        for (k, (x, y)) in offsets().enumerate() {
             let at = |dx: f32, dy: f32| bilinear(luma, at[0] + x + dx, at[1] + y + dy);
             let half = 0.5 * scale;
-            *s = [half * (at(1.0, 0.0) - at(-1.0, 0.0)), half * (at(0.0, 1.0) - at(0.0, -1.0))];
+            slopes[0][k] = half * (at(1.0, 0.0) - at(-1.0, 0.0));
+            slopes[1][k] = half * (at(0.0, 1.0) - at(0.0, -1.0));
         }
         // Brightness is compared less its mean, so that its slopes count less their means, too.
-        let mean = |c: usize| self.weights.iter().zip(&slopes).map(|(w, s)| w * s[c]).sum::<f32>();
-        let means = [mean(0), mean(1)];
-        slopes.iter_mut().for_each(|s| *s = [s[0] - means[0], s[1] - means[1]]);
-        let sum = |a: usize, b: usize| self.weights.iter().zip(&slopes).map(|(w, s)| w * s[a] * s[b]).sum::<f32>();
-        let (xx, xy, yy) = (sum(0, 0) + 1e-4, sum(0, 1), sum(1, 1) + 1e-4);
+        slopes.iter_mut().for_each(centre);
+        let product = |a: &[f32; FILLED], b: &[f32; FILLED]| {
+            self.weights.iter().zip(a).zip(b).map(|((w, a), b)| w * a * b).sum::<f32>()
+        };
+        let [x, y] = &slopes;
+        let (xx, xy, yy) = (product(x, x) + 1e-4, product(x, y), product(y, y) + 1e-4);
         let determinant = (xx * yy - xy * xy).max(1e-8);
-        Patch { values, slopes, inverse: [yy / determinant, -xy / determinant, xx / determinant] }
+        let at_home = [product(x, &values), product(y, &values)];
+        for of in [&mut values].into_iter().chain(&mut slopes) {
+            of.iter_mut().zip(&self.weights).for_each(|(v, w)| *v *= w);
+        }
+        Patch { values, slopes, at_home, inverse: [yy / determinant, -xy / determinant, xx / determinant] }
     }
 
     /// How alike `patch` and the picture around `at` are, -1 to 1.
     pub fn likeness(&self, patch: &Patch, luma: &Luma, at: [f32; 2], warp: &Warp) -> f32 {
-        let mut values = [0.0; N];
-        self.normalise(&mut values, |v| sample(luma, at, warp, v));
-        self.weights.iter().zip(&values).zip(&patch.values).map(|((w, a), b)| w * a * b).sum()
+        let mut values = [0.0; FILLED];
+        sample(luma, at, warp, &mut values);
+        self.compare(patch, &values).0
     }
 
     /// Looks for `patch` in `luma` from `start` (px) on.
     pub fn find(&self, patch: &Patch, luma: &Luma, start: [f32; 2], warp: &Warp) -> Match {
-        let mut values = [0.0; N];
+        let mut values = [0.0; FILLED];
         let mut found = Match { at_px: start, likeness: 0.0, likeness_at_start: 0.0, converged: false };
         for k in 0..STEPS {
-            self.normalise(&mut values, |v| sample(luma, found.at_px, warp, v));
-            let (mut likeness, mut right) = (0.0f32, [0.0f32; 2]);
-            for (((w, a), b), s) in self.weights.iter().zip(&values).zip(&patch.values).zip(&patch.slopes) {
-                likeness += w * a * b;
-                let r = w * (b - a);
-                right = [right[0] + r * s[0], right[1] + r * s[1]];
-            }
+            sample(luma, found.at_px, warp, &mut values);
+            let (likeness, right) = self.compare(patch, &values);
             found.likeness = likeness;
             if k == 0 {
                 found.likeness_at_start = likeness;
@@ -108,7 +128,7 @@ impl Registration {
             let [xx, xy, yy] = patch.inverse;
             let shift = [xx * right[0] + xy * right[1], xy * right[0] + yy * right[1]];
             let mut step = [0, 1].map(|c| warp[c][0] * shift[0] + warp[c][1] * shift[1]);
-            let length = step[0].hypot(step[1]);
+            let length = (step[0] * step[0] + step[1] * step[1]).sqrt();
             if length > LONGEST_STEP_PX {
                 step = step.map(|x| x * LONGEST_STEP_PX / length);
             }
@@ -121,18 +141,35 @@ impl Registration {
         found
     }
 
-    /// Fills `values` and brings them to zero mean and unit variance; gives their standard deviation. Where there is no
-    /// texture they are all 0, which is like nothing.
-    fn normalise(&self, values: &mut [f32; N], fill: impl FnOnce(&mut [f32; N])) -> f32 {
-        fill(values);
-        let mean: f32 = self.weights.iter().zip(values.iter()).map(|(w, v)| w * v).sum();
-        values.iter_mut().for_each(|v| *v -= mean);
-        let variance: f32 = self.weights.iter().zip(values.iter()).map(|(w, v)| w * v * v).sum();
-        let deviation = variance.max(LEAST_VARIANCE).sqrt();
-        let scale = if variance < LEAST_VARIANCE { 0.0 } else { 1.0 / deviation };
-        values.iter_mut().for_each(|v| *v *= scale);
-        deviation
+    /// Correlation of patch and `values`, and the weighted sum of the patch's slopes times what it is brighter by, both at
+    /// zero mean and unit variance. Patch and slopes have no mean, so that those of `values` need not be taken out first:
+    /// all sums come from one pass.
+    fn compare(&self, patch: &Patch, values: &[f32; FILLED]) -> (f32, [f32; 2]) {
+        // From a value near the mean, or the variance would be lost in the digits.
+        let near = values[N / 2];
+        let mut sums = [[0.0f32; LANES]; 5];
+        let lanes = |of: &[f32; FILLED], k: usize| -> [f32; LANES] { std::array::from_fn(|l| of[k + l]) };
+        for k in (0..FILLED).step_by(LANES) {
+            let (w, v) = (lanes(&self.weights, k), lanes(values, k).map(|v| v - near));
+            let (p, x, y) = (lanes(&patch.values, k), lanes(&patch.slopes[0], k), lanes(&patch.slopes[1], k));
+            for l in 0..LANES {
+                let weighted = w[l] * v[l];
+                sums[0][l] += weighted;
+                sums[1][l] += weighted * v[l];
+                sums[2][l] += p[l] * v[l];
+                sums[3][l] += x[l] * v[l];
+                sums[4][l] += y[l] * v[l];
+            }
+        }
+        let [mean, square, alike, x, y] = sums.map(|s| s.iter().sum::<f32>());
+        let scale = scale(square - mean * mean);
+        (scale * alike, [patch.at_home[0] - scale * x, patch.at_home[1] - scale * y])
     }
+}
+
+/// What brings brightness to unit variance; 0 where there is no texture: that is like nothing.
+fn scale(variance: f32) -> f32 {
+    if variance < LEAST_VARIANCE { 0.0 } else { 1.0 / variance.sqrt() }
 }
 
 /// Offsets of a patch's pixels from its middle, row by row.
@@ -140,35 +177,36 @@ fn offsets() -> impl Iterator<Item = (f32, f32)> {
     (-HALF_PX..=HALF_PX).flat_map(|y| (-HALF_PX..=HALF_PX).map(move |x| (x as f32, y as f32)))
 }
 
-fn sample(luma: &Luma, at: [f32; 2], warp: &Warp, into: &mut [f32; N]) {
-    let (w, h) = (luma.size.width as usize, luma.size.height as usize);
+/// Brightness of the picture under the patch's pixels.
+fn sample(luma: &Luma, at: [f32; 2], warp: &Warp, into: &mut [f32; FILLED]) {
+    let size = [luma.size.width, luma.size.height].map(|s| s as f32);
     let half = HALF_PX as f32;
     let reach = [0, 1].map(|c| half * (warp[c][0].abs() + warp[c][1].abs()));
-    let inside = (0..2).all(|c| at[c] - reach[c] >= 0.0 && at[c] + reach[c] < ([w, h][c] as f32) - 1.0);
-    if !inside {
+    // Rounding may put the outermost a hair farther out.
+    let inside = |c: usize| at[c] - reach[c] >= 1.0 && at[c] + reach[c] < (size[c] - 2.0).min(WIDEST_PX);
+    if !(inside(0) && inside(1)) {
         for (value, (x, y)) in into.iter_mut().zip(offsets()) {
             let to = [0, 1].map(|c| at[c] + warp[c][0] * x + warp[c][1] * y);
             *value = bilinear(luma, to[0], to[1]);
         }
         return;
     }
-    for (row, y) in into.chunks_exact_mut(SIDE).zip(-HALF_PX..=HALF_PX) {
-        let y = y as f32;
-        let left = [0, 1].map(|c| at[c] + warp[c][1] * y - warp[c][0] * half);
-        for (value, x) in row.iter_mut().zip(0..SIDE) {
-            let (u, v) = (left[0] + warp[0][0] * x as f32, left[1] + warp[1][0] * x as f32);
-            // Rounding may put the outermost a hair outside.
-            let (i, j) = ((u as usize).min(w - 2), (v as usize).min(h - 2));
-            let (a, b) = (u - i as f32, v - j as f32);
-            let upper = j * w + i;
-            let (Some(&[p, q]), Some(&[r, s])) =
-                (luma.pixels[upper..].first_chunk::<2>(), luma.pixels[upper + w..].first_chunk::<2>())
-            else {
-                continue;
-            };
-            let [p, q, r, s] = [p, q, r, s].map(f32::from);
-            let (above, below) = (p + a * (q - p), r + a * (s - r));
-            *value = above + b * (below - above);
+    let fixed = |px: f32| (px * (1 << PIXEL_BITS) as f32) as i32;
+    let mix = |p: i32| (p >> (PIXEL_BITS - MIX_BITS)) & ((1 << MIX_BITS) - 1);
+    let (step, width) = ([0, 1].map(|c| fixed(warp[c][0])), luma.size.width as usize);
+    for (row, y) in into[..N].chunks_exact_mut(SIDE).zip(-HALF_PX..=HALF_PX) {
+        let [mut u, mut v] = [0, 1].map(|c| fixed(at[c] + warp[c][1] * y as f32 - warp[c][0] * half));
+        for value in row {
+            let upper = (v >> PIXEL_BITS) as usize * width + (u >> PIXEL_BITS) as usize;
+            let pair = |from: usize| luma.pixels.get(from..).and_then(|p| p.first_chunk::<2>());
+            let (Some(above), Some(below)) = (pair(upper), pair(upper + width)) else { continue };
+            let (a, b) = (mix(u), mix(v));
+            let [above, below] = [above, below].map(|p| {
+                let [left, right] = p.map(i32::from);
+                (left << MIX_BITS) + a * (right - left)
+            });
+            *value = ((above << MIX_BITS) + b * (below - above)) as f32 * (1.0 / (1 << (2 * MIX_BITS)) as f32);
+            (u, v) = (u + step[0], v + step[1]);
         }
     }
 }
