@@ -4,10 +4,11 @@ mod support;
 
 use arborcam::config::Config;
 use arborcam::model::{NodeName, Pose};
-use arborcam::pipeline::{Pipeline, Retrace, Tree};
+use arborcam::pipeline::{BackEnd, Followed, Pipeline, Retrace, Tree};
 use arborcam::source::Decoder;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};
+use std::time::Instant;
 
 /// A run on the recording in which the tree is built after 4 s, as if there had been a gust, and refined from then on.
 struct Run {
@@ -86,11 +87,13 @@ fn branches_keep_their_numbers_and_no_number_is_given_twice() {
             assert!(2 * known.intersection(&is).count() >= known.len(), "{name:?}: {known:?} became {is:?}");
         }
     }
-    assert!(refined >= 3, "{refined} refinements show little");
+    // The film is over after 11 s.
+    assert!(refined >= 2, "{refined} refinements show little");
 }
 
-/// The screen shows the picture and the tree from the side: in neither does a branch jump or change sides. A measured
-/// node moves no farther than in an ordinary frame of this swing; copies of short branches may turn more.
+/// The screen shows the picture and the tree from the side: in neither does a branch jump or change sides. No measured
+/// node moves farther than half as much again as in an ordinary frame of this swing, in depth twice as far, and of all nodes, copies among them, 95 % less
+/// than 3 px, half less than 1 px; copies of short branches may turn more.
 #[test]
 fn branches_that_go_on_do_not_jump() {
     let run = run();
@@ -120,8 +123,11 @@ fn branches_that_go_on_do_not_jump() {
              depth {z:.2} px (ordinary frames {:.2} px, {:.2} px)",
             pair[1].1.time_s, ordinary[0], ordinary[1]
         );
-        assert!(u <= ordinary[0] && z <= 2.0 * ordinary[1], "a measured node jumps by {u:.2} px, {z:.2} px in depth");
-        assert!(median <= 1.5 && most <= 10.0, "in the median {median:.2} px, 95 % {most:.2} px");
+        assert!(
+            u <= 1.5 * ordinary[0] && z <= 2.0 * ordinary[1],
+            "a measured node jumps by {u:.2} px, {z:.2} px in depth"
+        );
+        assert!(median <= 1.0 && most <= 3.0, "in the median {median:.2} px, 95 % {most:.2} px");
     }
 }
 
@@ -140,10 +146,52 @@ fn the_last_tree_has_a_pose_in_every_frame() {
         compared += 1;
     }
     assert!(compared > 5, "{compared} frames");
-    // Points that the last tree was not built from, as they were lost before, keep a branch.
-    let born_early: BTreeSet<_> = run.sets[..100].iter().flat_map(|s| s.counted().map(|o| o.id)).collect();
+    // Points of older trees that have been lost keep a branch, if it or one below it goes on: their rows are of use.
     let alive: BTreeSet<_> = run.sets.last().expect("sets").observations.iter().map(|o| o.id).collect();
-    let lost: Vec<_> = born_early.difference(&alive).filter(|id| tree.inherited.contains_key(id)).collect();
-    println!("{} lost points inherited", lost.len());
-    assert!(lost.iter().all(|id| retrace.node_of(**id).is_some()));
+    let older = seams(run).flat_map(|pair| pair[0].0.hierarchy.clusters[0].members.iter());
+    let lost: BTreeSet<_> = older.filter(|id| !alive.contains(id)).collect();
+    let kept = lost.iter().filter(|id| retrace.node_of(***id).is_some()).count();
+    println!("{kept} of {} lost points have a branch, {} by inheritance", lost.len(), tree.inherited.len());
+    assert!(!lost.is_empty() && 10 * kept >= 9 * lost.len(), "{kept} of {} lost points", lost.len());
+}
+
+/// Whoever plays `motion.csv` or the model sees the tree from the side as well: no branch jumps in depth where the film
+/// that the last refinement remembers begins, and none far where its pose takes over.
+#[test]
+fn the_written_motion_has_no_seam_in_the_middle() {
+    let run = run();
+    let mut tree = (*run.frames.last().expect("frames").0).clone();
+    // As in a film longer than what is remembered.
+    (tree.followed_from, tree.shown_from) = (150, 280);
+    let mut retrace = Retrace::new(&Arc::new(tree), &run.config);
+    let poses: Vec<Pose> = run.sets.iter().map(|set| retrace.step(set).0).collect();
+    let step = |k: usize| {
+        let steps = poses[k - 1].joints.iter().zip(&poses[k].joints).map(|(a, b)| (a.position.z - b.position.z).abs());
+        steps.fold(0.0, f64::max)
+    };
+    let ordinary = (1..poses.len()).filter(|k| ![150, 280].contains(k)).map(step).fold(0.0, f64::max);
+    println!("in depth {:.2} px and {:.2} px, elsewhere at most {ordinary:.2} px", step(150), step(280));
+    assert!(step(150) <= ordinary && step(280) <= 2.0 * ordinary);
+}
+
+/// The computer slept, or the camera was away: the new tree's pose cannot be led over to the present, and it would jump.
+#[test]
+fn a_tree_that_cannot_be_followed_to_the_present_is_not_taken() {
+    let run = run();
+    let mut back = BackEnd::new(&run.config);
+    let mut standing: Option<Arc<Tree>> = None;
+    for set in &run.sets {
+        let mut tracks = set.clone();
+        tracks.time_s += if standing.is_some() { 10.0 * run.config.accumulate.window_s } else { 0.0 };
+        let outline = run.frames[0].0.outline.clone();
+        back.step(Followed { tracks, outline, preview: None, received: Instant::now() });
+        if let Some(standing) = &standing {
+            assert!(back.tree().is_some_and(|tree| Arc::ptr_eq(tree, standing)), "another tree out of nothing");
+            return;
+        }
+        if back.refinement().is_some_and(|work| work.run().is_some()) {
+            standing = back.tree().cloned();
+        }
+    }
+    panic!("no refinement");
 }

@@ -12,7 +12,7 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use support::{SIZE, recording};
 
 /// A run that has not ended after so long hangs.
@@ -273,7 +273,52 @@ fn quit_ends_with_a_whole_capture() {
     let out = dir.path().join("out");
     let (summary, _) = wish(200, &[Control::Quit], &out);
     assert!((200..=201).contains(&summary.frames), "{} frames", summary.frames);
-    assert!(summary.written.expect("written").model && out.join("tree.glb").exists());
+    assert!(summary.written.expect("written").tree.is_some() && out.join("tree.glb").exists());
+}
+
+/// Whoever stops is not kept waiting while the whole film is written once more for a tree that is seconds old; a planned
+/// end has the time. Either way all files are of one tree, and the closing lines speak of that one.
+#[test]
+fn a_stop_right_after_a_refinement_is_written_by_the_tree_from_before_and_a_planned_end_by_the_newest() {
+    for planned in [false, true] {
+        let dir = tempfile::tempdir().expect("tempdir");
+        let out = dir.path().join("out");
+        // The refinement comes after 5.5 s; a trial may last until 6 s after it.
+        let (source, gate) = gated(240);
+        let mut job = job(Some(support::outline()), Some(&out));
+        (job.config.accumulate.min_s, job.config.accumulate.threshold) = (4.0, 0.2);
+        let running = runtime::start(source, job).expect("start");
+        gate.reached.recv_timeout(HANGS).expect("the gate is reached");
+        let begun = Instant::now();
+        let shown = loop {
+            assert!(begun.elapsed() < HANGS, "the model hangs");
+            std::thread::sleep(Duration::from_millis(5));
+            if let Some(shown) = running.latest().filter(|s| s.frame >= 239) {
+                break shown;
+            }
+        };
+        assert!(shown.messages.iter().any(|m| m.contains("the tree was refined")), "{:?}", shown.messages);
+        if planned {
+            running.end()
+        } else {
+            running.stop()
+        }
+        gate.open.send(()).expect("the source waits");
+        let (summary, failure, _) = ended(running);
+        assert!(failure.is_none(), "{failure:?}");
+        let tree = summary.expect("a summary").tree.expect("a tree");
+        assert_eq!(tree.refinements, u32::from(planned));
+        let capture: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(out.join("capture.json")).expect("capture.json")).expect("json");
+        assert_eq!(capture["refinement"]["count"].as_u64(), planned.then_some(1));
+        let certainty = tree.hierarchy.median_certainty().map(|c| format!("{c:.6}"));
+        assert_eq!(capture["quality"]["median_certainty"].as_f64().map(|c| format!("{c:.6}")), certainty);
+        let nodes = std::fs::read_to_string(out.join("nodes.csv")).expect("nodes.csv");
+        assert_eq!(nodes.lines().count(), 1 + tree.skeleton.nodes.len());
+        let mut frames: Vec<u64> = tracks(&out).iter().map(|t| t.1).collect();
+        frames.dedup();
+        assert!(frames.iter().copied().eq(0..frames.len() as u64) && frames.len() >= 240, "every frame has its rows");
+    }
 }
 
 #[test]

@@ -124,7 +124,7 @@ impl Warden<'_> {
     fn look(&mut self) -> Option<Arc<Snapshot>> {
         let snapshot = self.running.latest();
         if snapshot.as_ref().is_some_and(|s| s.time_s >= self.end_s) {
-            self.running.stop();
+            self.running.end();
         }
         if self.reload.is_wanted() {
             match &self.service {
@@ -259,7 +259,7 @@ fn closing_lines(s: &Summary) -> Vec<String> {
     }
     if let Some(written) = &s.written {
         let dir = written.dir.display();
-        lines.push(match written.model {
+        lines.push(match written.tree.is_some() {
             true => format!("capture: {dir}\nmodel:   {dir}/tree.glb"),
             false => format!("capture: {dir} (tracks only)"),
         });

@@ -127,7 +127,12 @@ impl PoseEstimator {
                 previous_direction: previous.unwrap_or(branch.direction),
                 sigma_track_px: self.settings.sigma_track_px,
                 sigma_shape: branch.sigma_shape,
-                sigma_depth: previous.map(|_| self.settings.depth_rate_deg_s.to_radians() * elapsed_s),
+                // The first frame has none before it: depth may then differ from the rest's as the branch's own angle may.
+                // Without that a branch and its mirror image in depth are all but equally probable (eq. 8 and 10 tell
+                // them apart by the parent's lean alone), and it would start on either side.
+                sigma_depth: Some(
+                    previous.map_or(branch.sigma_shape, |_| self.settings.depth_rate_deg_s.to_radians() * elapsed_s),
+                ),
                 max_step: previous.map_or(std::f64::consts::PI, |_| self.settings.max_step_deg.to_radians()),
                 max_total: self.settings.max_total_deg.to_radians(),
             }

@@ -22,7 +22,7 @@ pub struct Problem {
     pub sigma_track_px: f64,
     pub sigma_shape: f64,
     /// Standard deviation of the change of the direction's component along the line of sight since the frame before
-    /// (a sine, so without a unit); `None` in the first frame.
+    /// or, in the first frame, since the rest (a sine, so without a unit); `None`: as the paper has it, without this term.
     pub sigma_depth: Option<f64>,
     /// Largest angle from the previous direction, and from the rest direction, radians; outside the prior is 0.
     pub max_step: f64,

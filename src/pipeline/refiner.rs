@@ -86,6 +86,9 @@ impl Refiner {
             }
             Stage::Building(work, due_s, done) if now_s >= due_s => match done.map_or_else(|| work.run(), |tree| *tree)
             {
+                // After a long pause nothing is remembered by which its pose could be followed: it would jump. There will
+                // be a better one.
+                Some(tree) if first.frame > tree.frame => self.wait(now_s, config),
                 Some(mut tree) => {
                     // What has been forgotten meanwhile cannot be followed.
                     tree.followed_from = tree.followed_from.max(first.frame);

@@ -5,8 +5,8 @@ use crate::config::Config;
 use crate::model::{NodeName, Pose, TrackId, TrackSet};
 use std::sync::Arc;
 
-/// Poses of frames that are over, as they were or would have been live: followed from the frame that was the first one
-/// remembered when the tree was built, and, where there are earlier ones, apart from the capture's first.
+/// Poses of frames that are over, as they were or would have been live: from the frame in which the tree was first shown,
+/// followed from the first one that was remembered when it was built; before that, followed from the capture's first.
 pub struct Retrace {
     tree: Arc<Tree>,
     before: Poser,
@@ -20,8 +20,9 @@ impl Retrace {
 
     /// The pose in the next frame, and where its tracks put the measured nodes (px); frames must come in their order.
     pub fn step(&mut self, tracks: &TrackSet) -> (Pose, Targets) {
-        let live = tracks.frame >= self.tree.followed_from;
-        if live { self.after.step(tracks) } else { self.before.step(tracks) }
+        let after = (tracks.frame >= self.tree.followed_from).then(|| self.after.step(tracks));
+        // Where it is first followed, at rest, it would jump in depth in the middle of the film; by here it has settled.
+        after.filter(|_| tracks.frame >= self.tree.shown_from).unwrap_or_else(|| self.before.step(tracks))
     }
 
     /// The name of the deepest node that a track belongs to, as known after the last step.

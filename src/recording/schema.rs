@@ -106,17 +106,19 @@ const TRACKS: &str = r#"{
 
 const SKELETON: &str = r#"{
   "title": "arborcam.Skeleton", "type": "object",
-  "description": "The tree at rest: parents before children, axes x right, y up, z towards the viewer, px, the trunk's foot at the origin.",
+  "description": "The tree at rest: parents before children, axes x right, y up, z towards the viewer, px, the trunk's foot at the origin. Comes again when the tree is refined; a node that is not in the newest one is no longer there.",
   "properties": {
     "frame": {"type": "integer"}, "time_s": {"type": "number"},
     "foot_px": {"type": "array", "items": {"type": "number"}},
     "width": {"type": "integer"}, "height": {"type": "integer"},
     "nodes": {"type": "array", "items": {"type": "object", "properties": {
-      "parent": {"type": ["integer", "null"]}, "level": {"type": "integer"},
+      "id": {"type": "integer", "description": "number of the node, as in nodes.csv; it keeps it when the tree is refined, so numbers have gaps and no order"},
+      "parent": {"type": ["integer", "null"], "description": "id of the node below; null for the foot"},
+      "level": {"type": "integer"},
       "x": {"type": "number"}, "y": {"type": "number"}, "z": {"type": "number"},
       "radius": {"type": "number"}, "n_tracks": {"type": "integer"},
       "certainty": {"type": "number", "description": "how sure it is that the branches above part here, 0 to 1; 0 at a tip"},
-      "copy_of": {"type": ["integer", "null"]}
+      "copy_of": {"type": ["integer", "null"], "description": "id of the measured node that it is a copy of; null where it is measured"}
     }}}
   }
 }"#;

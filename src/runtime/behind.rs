@@ -52,6 +52,10 @@ impl BehindTree {
             self.older.take().into_iter().for_each(Behind::give_up);
         }
         self.asked = spool.len();
+        // The older ones are what a wish to stop gets: they go on until they are given up.
+        if let Some(older) = &self.older {
+            older.catch_up(spool.clone());
+        }
         if let Some(newest) = &self.newest {
             newest.catch_up(spool);
         }
@@ -78,7 +82,7 @@ impl BehindTree {
 struct Behind {
     tree: Arc<Tree>,
     spool: Sender<SpoolReader>,
-    /// Number of sets that have been gone through.
+    /// Number of sets of which all is written that can be; 0 until `tracks.csv` has begun.
     written: Arc<AtomicU64>,
     given_up: Arc<AtomicBool>,
     thread: JoinHandle<Result<CaptureTables, Failure>>,
@@ -104,7 +108,9 @@ impl Behind {
                     shared.news(format!("the capture cannot be written at present: {e}"));
                     return Err(e);
                 }
-                done.store(spool.len(), Ordering::Relaxed);
+                if tables.is_abreast() {
+                    done.store(spool.len(), Ordering::Relaxed);
+                }
             }
             Ok(tables)
         };

@@ -86,14 +86,22 @@ impl CaptureTables {
         Ok(())
     }
 
-    /// Ends both tables, the last rows of which are those that [`catch_up`](Self::catch_up) has written.
+    /// Whether nothing is left that grows with the length of the film: `tracks.csv` begins only when the last trial from
+    /// before the tree is over.
+    pub fn is_abreast(&self) -> bool {
+        self.early
+    }
+
+    /// Ends both tables, the last rows of which are those that [`catch_up`](Self::catch_up) has written; each set calls
+    /// `wrote` as there.
     ///
     /// # Errors
     /// Whatever the file system says.
-    pub fn finish(mut self, spool: &SpoolReader) -> Result<Done, Failure> {
+    pub fn finish(mut self, spool: &SpoolReader, wrote: impl Fn() -> bool) -> Result<Done, Failure> {
         self.held.close();
-        self.early_rows(spool, &|| true)?;
+        self.early_rows(spool, &wrote)?;
         while let Some(set) = self.held.next() {
+            wrote();
             self.tracks.set(&set, |id| self.retrace.node_of(id))?;
         }
         self.tracks.finish()?;

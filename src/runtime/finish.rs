@@ -1,5 +1,6 @@
 //! Writes a capture: the five files of the contract, from the tracks on disk and the tree.
 
+use super::announce::little_motion;
 use super::capture_tables::{CaptureTables, Done};
 use super::held_sets::{HeldSets, OnTrial};
 use super::meter::Histogram;
@@ -78,8 +79,8 @@ pub struct CaptureJob {
 #[derive(Clone, Debug)]
 pub struct Written {
     pub dir: PathBuf,
-    /// Whether there is a model.
-    pub model: bool,
+    /// The tree of its files. After a stop shortly after a refinement it is the one before.
+    pub tree: Option<Arc<Tree>>,
 }
 
 /// Writes the capture to `dir`, which appears only when it is complete.
@@ -98,11 +99,12 @@ pub fn write(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
 /// # Errors
 /// As for [`write`].
 pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, Failure> {
-    tables.catch_up(&job.tracks, || {
+    let wrote = || {
         job.shared.pulse.wrote();
         true
-    })?;
-    let Done { folder, tree, poses, misses } = tables.finish(&job.tracks)?;
+    };
+    tables.catch_up(&job.tracks, wrote)?;
+    let Done { folder, tree, poses, misses } = tables.finish(&job.tracks, wrote)?;
     let metres_per_px = job.config.export.metres_per_px;
     // Intervals that can be defended are a matter of their own; until then no branch claims a frequency.
     let sway = vec![None; tree.skeleton.nodes.len()];
@@ -112,7 +114,8 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
     let first_frame = poses.first().map_or(0, |p| p.frame);
     let animation = AnimationNote { first_frame, frames: poses.len() as u64, keys };
     let model = ModelNote::of(&tree.skeleton, metres_per_px);
-    publish(job, folder, describe(job, Some(&tree), Some((model, animation)), misses.median()))
+    let capture = describe(job, Some(&tree), Some((model, animation)), misses.median());
+    publish(folder, capture, Some(tree))
 }
 
 /// Tables without rows and no model: a reader finds every table, and no tree that was never seen.
@@ -137,13 +140,13 @@ fn without_tree(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
     let foot_only = Arc::new(Skeleton { nodes: Vec::new(), foot_px: [0.0; 2], image_size: job.info.size });
     nodes(folder.file("nodes.csv")?, &foot_only, &[], metres_per_px)?;
     MotionCsv::new(folder.file("motion.csv")?, &foot_only, metres_per_px)?.finish()?;
-    publish(job, folder, describe(job, None, None, None))
+    publish(folder, describe(job, None, None, None), None)
 }
 
-fn publish(job: &CaptureJob, folder: OutputFolder, capture: Capture) -> Result<Written, Failure> {
+fn publish(folder: OutputFolder, capture: Capture, tree: Option<Arc<Tree>>) -> Result<Written, Failure> {
     folder.write("capture.json", &json(&capture)?)?;
     let dir = folder.publish()?;
-    Ok(Written { dir, model: job.tree.is_some() })
+    Ok(Written { dir, tree })
 }
 
 fn model_of(job: &CaptureJob, tree: &Tree, poses: &[Pose]) -> Result<(Vec<u8>, u64), ExportError> {
@@ -223,6 +226,10 @@ fn describe(
         ..job.shared.gaps()
     };
     let quality = &job.quality;
+    let mut warnings = job.shared.warnings();
+    // Withdrawn when the tree was refined, and this may be the one before.
+    let little = tree.and_then(|tree| little_motion(tree, job.config.accumulate.threshold));
+    warnings.extend(little.filter(|w| !job.shared.warnings().contains(w)));
     let tracked_s = quality.last_s - quality.first.map_or(quality.last_s, |(_, s)| s);
     Capture {
         schema_version: crate::export::capture::SCHEMA_VERSION,
@@ -266,11 +273,11 @@ fn describe(
             median_fb_error_px: quality.fb_error_px.median(),
             median_error_px: quality.error_px.median(),
             lost_per_s: (tracked_s > 0.0).then(|| quality.lost as f64 / tracked_s),
-            median_certainty: job.tree.as_ref().and_then(|tree| tree.hierarchy.median_certainty()),
+            median_certainty: tree.and_then(|tree| tree.hierarchy.median_certainty()),
             median_reprojection_px,
         },
         model,
         animation,
-        warnings: job.shared.warnings(),
+        warnings,
     }
 }

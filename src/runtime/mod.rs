@@ -8,6 +8,7 @@
 //! A dropped sender ends the stream: when the source is done, the tracker works off its queue and ends, then the model
 //! does and writes the capture.
 
+mod announce;
 mod behind;
 mod capture_tables;
 mod finish;
@@ -23,6 +24,7 @@ mod rate;
 mod reconnect;
 mod record;
 mod recorder_thread;
+mod refining;
 mod shared;
 mod source_thread;
 mod status;
@@ -83,6 +85,7 @@ pub struct Summary {
     /// Points that moved when evidence was last judged, and the accumulation measure then.
     pub moving: usize,
     pub accumulation: f64,
+    /// The one that was written, or where nothing was, the last one.
     pub tree: Option<Arc<Tree>>,
     pub written: Option<Written>,
     pub recorded: Option<Recorded>,
@@ -190,9 +193,14 @@ impl Running {
         self.shared.reload(config);
     }
 
-    /// Take no more frames and finish.
+    /// Take no more frames and finish, without waiting for what is not needed.
     pub fn stop(&self) {
         self.shared.stop_at_once();
+    }
+
+    /// Take no more frames and finish, as at the end of a film: as much as was wanted has been filmed, and nobody waits.
+    pub fn end(&self) {
+        self.shared.stop.store(true, Ordering::Relaxed);
     }
 
     /// The capture is over and written.

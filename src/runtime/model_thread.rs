@@ -1,16 +1,18 @@
 //! The model's thread: runs the back end, keeps the tracks, streams the poses, tells the screen, and writes the capture
 //! at the end.
 
+use super::announce::Announced;
 use super::behind::BehindTree;
 use super::finish::{self, CaptureJob, Quality};
 use super::pulse::Worker;
 use super::recorder_thread::{Found, Recorded, Recorder};
+use super::refining::Refining;
 use super::shared::{Failure, Shared};
 use super::status::{Status, median_error_px, median_fb_error_px};
 use super::track_thread::ToModel;
 use super::{Job, Summary};
 use crate::model::{Phase, Pose, Rgb};
-use crate::pipeline::{BackEnd, Followed, LEAST_MOVING, Moved, Tree};
+use crate::pipeline::{BackEnd, Followed, LEAST_MOVING, Moved};
 use crate::recording::Spool;
 use crate::source::SourceInfo;
 use crossbeam_channel::{Receiver, RecvTimeoutError};
@@ -37,8 +39,7 @@ pub struct ModelThread {
     status: Status,
     spool: Option<Spool>,
     behind: BehindTree,
-    /// A refinement of the tree that is being worked out.
-    refining: Option<JoinHandle<Option<Tree>>>,
+    refining: Refining,
     /// Sensor time up to which the tables have been asked for, s.
     behind_s: f64,
     bark: Option<Arc<Rgb>>,
@@ -47,8 +48,7 @@ pub struct ModelThread {
     exports: Vec<JoinHandle<()>>,
     /// Number of the last export; its folder may not be there yet.
     exported: u32,
-    /// The tree that was last told of.
-    announced: Option<Arc<Tree>>,
+    announced: Announced,
     recorder: Option<(Recorder, JoinHandle<Recorded>)>,
 }
 
@@ -69,14 +69,14 @@ impl ModelThread {
             status,
             spool: None,
             behind: BehindTree::default(),
-            refining: None,
+            refining: Refining::default(),
             behind_s: f64::NEG_INFINITY,
             bark: None,
             quality: Quality::default(),
             last_screen: None,
             exports: Vec::new(),
             exported: 0,
-            announced: None,
+            announced: Announced::default(),
             recorder,
         };
         thread.new_spool();
@@ -108,10 +108,10 @@ impl ModelThread {
                     self.back.restart();
                     self.status.restart();
                     std::mem::take(&mut self.behind).give_up();
-                    self.refining = None;
+                    self.refining = Refining::default();
                     self.behind_s = f64::NEG_INFINITY;
                     self.new_spool();
-                    (self.quality, self.announced, last) = (Quality::default(), None, None);
+                    (self.quality, self.announced, last) = (Quality::default(), Announced::default(), None);
                 }
                 ToModel::BuildNow if self.back.tree().is_some() => {
                     self.shared.tell("the tree is built already; r starts again".into());
@@ -133,9 +133,12 @@ impl ModelThread {
     }
 
     fn step(&mut self, followed: Followed) -> Moved {
-        self.refinement_due(followed.tracks.time_s);
+        let hurry = self.shared.hurry.load(Ordering::Relaxed);
+        self.refining.hand_in(&mut self.back, followed.tracks.time_s, hurry);
         let moved = self.back.step(followed);
-        self.refine_meanwhile();
+        if !hurry {
+            self.refining.begin(&self.back);
+        }
         if let Some(spool) = &mut self.spool
             && let Err(e) = spool.push(&moved.tracks)
         {
@@ -180,51 +183,9 @@ impl ModelThread {
         }
     }
 
-    /// Poses go on while the tree is built anew, on a thread of its own; without one it is done when it is due.
-    fn refine_meanwhile(&mut self) {
-        if let (Some(work), None) = (self.back.refinement(), &self.refining) {
-            let work = work.clone();
-            self.refining = std::thread::Builder::new().name("refine".into()).spawn(move || work.run()).ok();
-        }
-    }
-
-    /// Hands in the result before the frame that needs it.
-    fn refinement_due(&mut self, time_s: f64) {
-        if self.back.needs_refinement(time_s)
-            && let Some(Ok(tree)) = self.refining.take().map(JoinHandle::join)
-        {
-            self.back.put_refinement(tree);
-        }
-    }
-
-    /// Tells of a new tree; one built early is worth less, and the capture is to say so.
     fn announce(&mut self) {
-        let Some(tree) = self.back.tree() else { return };
-        if self.announced.as_ref().is_some_and(|known| Arc::ptr_eq(known, tree)) {
-            return;
-        }
-        let first = self.announced.replace(tree.clone()).is_none();
-        if tree.refinements > 0 {
-            let (kept, nodes) = (tree.kept, tree.skeleton.measured());
-            self.shared.tell(format!(
-                "the tree was refined from {:.0} s on: {kept} of {nodes} nodes are those of before",
-                tree.time_s
-            ));
-            tracing::info!("tree refined at {:.1} s: {kept} of {nodes} nodes go on", tree.time_s);
-        } else if first {
-            let threshold = self.job.config.accumulate.threshold;
-            if tree.forced && tree.evidence.measure < threshold {
-                self.shared.warn(format!(
-                    "the tree was built from little motion (accumulation {:.2} of {threshold}); branches may be wrong: \
-                     film longer, or in more wind",
-                    tree.evidence.measure
-                ));
-            }
-            let (nodes, time_s) = (tree.skeleton.measured(), tree.time_s);
-            tracing::info!(
-                "tree built at {time_s:.1} s: {nodes} nodes from {} moving points",
-                tree.evidence.moving.len()
-            );
+        if let Some(tree) = self.back.tree() {
+            self.announced.tell(tree, self.job.config.accumulate.threshold, &self.shared);
         }
     }
 
@@ -352,7 +313,8 @@ impl ModelThread {
             tracks_total: self.quality.tracks_total(),
             moving: self.back.evidence().moving.len(),
             accumulation: self.back.evidence().measure,
-            tree: self.back.tree().cloned(),
+            // The one that is in the folder, where there is a folder.
+            tree: written.as_ref().map_or_else(|| self.back.tree().cloned(), |w| w.tree.clone()),
             written,
             recorded,
             not_recorded: self.shared.counts.not_recorded.load(Ordering::Relaxed),

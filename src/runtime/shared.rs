@@ -138,6 +138,11 @@ impl Shared {
         }
     }
 
+    /// What was warned of has been made up for.
+    pub fn withdraw(&self, warning: &str) {
+        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).retain(|w| w != warning);
+    }
+
     /// Shows a line on the screen that is no warning and does not go into the capture.
     pub fn tell(&self, line: String) {
         *self.notice.lock().unwrap_or_else(PoisonError::into_inner) = Some(line);
