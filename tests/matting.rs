@@ -95,9 +95,16 @@ fn no_point_is_looked_for_in_the_sky_or_on_the_border_of_a_wide_tree() {
     crown.iter_mut().enumerate().filter(|(i, _)| inside(*i)).for_each(|(_, m)| *m = 255);
     let on_border = |p: &[f32; 2]| p[0] < 68.0 || p[0] > 191.0 || p[1] < 58.0 || p[1] > 191.0;
     assert!(detect(&Outline { matte: None, ..outline.clone() }).iter().any(on_border), "there is something to reject");
-    let points = detect(&Outline { matte: Some(crown), ..outline });
+    let points = detect(&Outline { mask: crown.clone(), matte: Some(crown.clone()), ..outline.clone() });
     assert!(points.len() >= 20, "{} points", points.len());
     assert!(!points.iter().any(on_border), "{points:?}");
+
+    // The matte may hold a second piece, which the outline shown does not.
+    let left_half: Vec<u8> = crown.iter().enumerate().map(|(i, m)| if i % 320 < 130 { *m } else { 0 }).collect();
+    let two = crown.iter().enumerate().map(|(i, m)| if (130..136).contains(&(i % 320)) { 0 } else { *m }).collect();
+    let points = detect(&Outline { mask: left_half, matte: Some(two), ..outline });
+    assert!(points.len() >= 5, "{} points", points.len());
+    assert!(points.iter().all(|p| p[0] < 131.5), "none outside the outline that is shown: {points:?}");
 }
 
 #[test]

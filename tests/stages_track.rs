@@ -121,6 +121,33 @@ fn the_choice_of_points_waits_for_wind() {
     assert!(decided_s.is_some_and(|s| s <= LONGEST_TRIAL_S), "{decided_s:?}");
 }
 
+/// The whole picture for an outline, and a small tree: its points are few of all, but enough to build from, and the choice
+/// must not wait for the wall behind it to move.
+#[test]
+fn a_small_tree_in_a_wide_outline_stirs_too() {
+    let detect = Detect { points: 600, min_distance_px: 12.0, ..Detect::default() };
+    let mut tracker = Tracker::new(&detect, &Track::default(), &whole(SIZE), 0);
+    let tree = |u: f64, v: f64| (110.0..170.0).contains(&u) && (90.0..150.0).contains(&v);
+    let mut decided_s = None;
+    for k in 0..100u64 {
+        let time_s = k as f64 / 10.0;
+        let du = 5.0 * (TAU * time_s / 2.0).sin();
+        let at = |u: f64, v: f64| if tree(u, v) { texture(u - du, v) } else { texture(u, v) };
+        let set = tracker.step(&Frame { time_s, ..frame(k, at) });
+        let seen = places(&set);
+        if k == 0 {
+            let inside = seen.values().filter(|p| tree(p[0], p[1])).count();
+            assert!(inside >= 20 && 12 * inside < seen.len(), "{inside} of {}", seen.len());
+        }
+        if decided_s.is_none() && set.observations.iter().all(|o| o.confirmed) {
+            decided_s = Some(time_s);
+            let inside = seen.values().filter(|p| tree(p[0], p[1])).count();
+            assert!(inside >= 10, "{inside} of the tree's points are left");
+        }
+    }
+    assert!(decided_s.is_some_and(|s| s <= LONGEST_TRIAL_S + 0.5), "{decided_s:?}");
+}
+
 /// A light breeze moves points by less than would tell them apart: they pass by time.
 #[test]
 fn points_that_hardly_move_pass_their_trial_by_time() {

@@ -12,7 +12,7 @@ const CHANCE_ERRORS: f64 = 3.0;
 /// For every part of `tree` how sure it is that its halves move apart, 0 to 1; 0 for one without halves, or with a half
 /// of one point, of which nothing can be said.
 ///
-/// In every second the points of the halves are more like each other within the halves than across, or not. With t the
+/// In every second that was seen the points of the halves are more like each other within the halves than across, or not. With t the
 /// mean of that contrast over its standard error, it is t^2 / (t^2 + 9) for positive t: 0.5 where chance alone might
 /// give the same, 0.8 at twice as many standard errors.
 pub fn certainties(tree: &Binary, signals: &Signals, times_s: &[f64]) -> Vec<f32> {
@@ -80,13 +80,20 @@ struct Votes {
 }
 
 impl Votes {
+    /// The steps are those of `times_s`, from two seconds on in votes of a second or little more, so that none is a
+    /// remainder. When nothing was seen there is no vote, and of a slow camera every step is one.
     fn new(times_s: &[f64], steps: usize) -> Self {
-        let span_s = match (times_s.first(), times_s.last()) {
-            (Some(first), Some(last)) => last - first,
-            _ => 0.0,
+        let (start_s, end_s) = (times_s.first().copied().unwrap_or(0.0), times_s.last().copied().unwrap_or(0.0));
+        let span_s = end_s - start_s;
+        let spans = (span_s / VOTE_S).floor().max(2.0);
+        let (mut count, mut last) = (0, None);
+        let of = |&time_s: &f64| {
+            let span = ((time_s - start_s) * spans / span_s).clamp(0.0, spans - 1.0) as u64;
+            count += usize::from(last != Some(span));
+            last = Some(span);
+            count.max(1) - 1
         };
-        let count = ((span_s / VOTE_S) as usize).max(2);
-        Self { of_step: (0..steps).map(|s| s * count / steps.max(1)).collect(), count }
+        Self { of_step: times_s.iter().take(steps).map(of).collect(), count }
     }
 
     /// Sums of the products of two motions, vote by vote.
@@ -96,5 +103,47 @@ impl Votes {
             out[vote] += x[0] * y[0] + x[1] * y[1];
         }
         out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::TrackId;
+    use crate::track::TrackTable;
+
+    /// Two pairs of points that swing at different rates, seen at `times_s`, and how sure it is that they are two.
+    fn certain(times_s: Vec<f64>) -> f32 {
+        let at = |i: usize, t: f64| {
+            let noise = (((i * 7919) as f64 + t * 78.233).sin() * 43758.5453).fract();
+            let rate = if i < 2 { 0.3 } else { 0.7 };
+            Some([(100.0 * i as f64 + 5.0 * (rate * t).sin() + noise) as f32, 50.0])
+        };
+        let table = TrackTable {
+            ids: (0..4).map(TrackId).collect(),
+            positions: (0..4).map(|i| times_s.iter().map(|&t| at(i, t)).collect()).collect(),
+            times_s,
+            fb_errors_px: vec![0.1; 4],
+        };
+        let tree = Binary::divided((0..4).collect(), |_, depth| (depth == 0).then(|| vec![true, true, false, false]));
+        let signals = Signals::displacements(&table, &[0, 1, 2, 3]);
+        certainties(&tree, &signals, &table.times_s)[0]
+    }
+
+    /// A vote of which nothing was seen says nothing, neither for nor against.
+    #[test]
+    fn a_slow_camera_and_a_gap_give_no_empty_votes() {
+        let slow: Vec<f64> = (0..31).map(|k| 2.0 * f64::from(k)).collect();
+        let votes = Votes::new(&slow, slow.len());
+        assert_eq!((votes.count, votes.of_step), (31, (0..31).collect()), "each frame is a vote");
+        let certainty = certain(slow);
+        assert!(certainty > 0.8, "{certainty}");
+        let gap: Vec<f64> = (0..300).map(|k| f64::from(k) / 15.0 + if k < 150 { 0.0 } else { 30.0 }).collect();
+        let votes = Votes::new(&gap, gap.len());
+        let mut sizes = vec![0; votes.count];
+        votes.of_step.iter().for_each(|&v| sizes[v] += 1);
+        assert!((19..=22).contains(&votes.count) && sizes.iter().all(|n| *n > 0), "{sizes:?}");
+        let votes = Votes::new(&[3.0; 5], 5);
+        assert_eq!((votes.count, votes.of_step), (1, vec![0; 5]), "no time at all");
     }
 }

@@ -5,7 +5,7 @@
 pub struct TrackId(pub u32);
 
 /// Within this time of its birth it is decided whether a point is kept, s; for the first of a capture, within this time of
-/// the tree's first stirring. Nothing is built before that, and rows are written only after a build.
+/// the tree's first stirring. What has not stirred makes no tree, and rows are written only after a build.
 pub const LONGEST_TRIAL_S: f64 = 6.0;
 
 /// One point as seen in one frame.

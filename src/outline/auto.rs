@@ -8,6 +8,8 @@ use crate::model::{Luma, Outline, Size};
 
 /// Width to which pictures are reduced, px: sway of a pixel or two is then still seen, single-pixel noise is not.
 const REDUCED_WIDTH: u32 = 320;
+/// While nothing is found it is tried again after so long, s: one try takes as long as a frame or two.
+const TRY_EVERY_S: f64 = 0.5;
 /// Motion must stand out so many times above the standard deviation of the picture's quietest quarter, which is no tree,
 /// and above this in grey levels: sensor noise and compression stay below.
 const ABOVE_QUIET: f32 = 4.0;
@@ -33,6 +35,8 @@ const KEEP_EVERY_S: f64 = 1.0 / 20.0;
 const COMPARED: usize = 20;
 /// Least share of the picture that a tree covers.
 const LEAST_COVERAGE: f64 = 0.005;
+/// Where less than this share of it moves, closing does not make a tree of it.
+const LEAST_MOVING: f64 = LEAST_COVERAGE / 10.0;
 
 /// Gathers motion energy: the variance of every pixel's brightness over time (Welford's running form), less half the
 /// mean square of its change from frame to frame. Of white noise that leaves nothing; a sway, which takes many frames,
@@ -40,6 +44,7 @@ const LEAST_COVERAGE: f64 = 0.005;
 pub struct AutoOutline {
     settings: config::Outline,
     start_s: Option<f64>,
+    tried_s: Option<f64>,
     reduced: Size,
     scale: u32,
     count: f32,
@@ -68,6 +73,7 @@ impl AutoOutline {
         Self {
             settings: settings.clone(),
             start_s: None,
+            tried_s: None,
             reduced: Size::new(0, 0),
             scale: 1,
             count: 0.0,
@@ -89,7 +95,7 @@ impl AutoOutline {
     /// Takes the next picture, seen at `time_s`.
     pub fn step(&mut self, luma: &Luma, time_s: f64) -> Found {
         let start_s = *self.start_s.get_or_insert_with(|| {
-            self.scale = (luma.size.width / REDUCED_WIDTH).max(1);
+            self.scale = luma.size.width.div_ceil(REDUCED_WIDTH).max(1);
             self.reduced = Size::new(luma.size.width / self.scale, (luma.size.height / self.scale).max(1));
             let zero = vec![0.0; self.reduced.area()];
             (self.mean, self.sum_sq) = (zero.clone(), zero.clone());
@@ -102,9 +108,14 @@ impl AutoOutline {
         if gathered_s < self.settings.gather_s {
             return Found::NotYet(gathered_s / self.settings.gather_s);
         }
+        let over = gathered_s >= self.settings.give_up_s;
+        if !over && self.tried_s.is_some_and(|tried_s| time_s - tried_s < TRY_EVERY_S) {
+            return Found::NotYet(0.99);
+        }
+        self.tried_s = Some(time_s);
         match self.conclude(luma.size) {
             Some(outline) => Found::Tree(outline),
-            None if gathered_s >= self.settings.give_up_s => Found::NoMotion(whole(luma.size)),
+            None if over => Found::NoMotion(whole(luma.size)),
             None => Found::NotYet(0.99),
         }
     }
@@ -125,9 +136,13 @@ impl AutoOutline {
     fn reduced_region(&self) -> opencv::Result<Option<Outline>> {
         let (size, px) = (self.reduced, |share: f64| (share * f64::from(self.reduced.width)).round() as u32);
         let Some((first, _)) = self.kept.split_first().filter(|_| self.count >= 2.0) else { return Ok(None) };
+        let moving = self.moving();
+        if (moving.iter().filter(|m| **m).count() as f64) < LEAST_MOVING * size.area() as f64 {
+            return Ok(None);
+        }
         let median = self.median();
         let was_tree = |(i, &moves): (usize, &bool)| moves && first.1.pixels[i].abs_diff(median[i]) >= OFF_MEDIAN;
-        let mut mask: Vec<u8> = self.moving().iter().enumerate().map(|m| if was_tree(m) { 255 } else { 0 }).collect();
+        let mut mask: Vec<u8> = moving.iter().enumerate().map(|m| if was_tree(m) { 255 } else { 0 }).collect();
         region::without_specks(size, &mut mask, SPECK_GAP_PX, SPECK_SHARE)?;
         let step = self.kept.len().div_ceil(COMPARED);
         let compared: Vec<&Luma> = self.kept.iter().step_by(step).map(|(_, picture)| picture).collect();
@@ -154,8 +169,9 @@ impl AutoOutline {
         let sway = |(s, c): (&f32, &f32)| ((s - 0.5 * c) / (self.count - 1.0)).max(0.0).sqrt();
         let deviation: Vec<f32> = self.sum_sq.iter().zip(&self.sum_change_sq).map(sway).collect();
         let mut sorted = deviation.clone();
-        sorted.sort_unstable_by(f32::total_cmp);
-        let threshold = (ABOVE_QUIET * sorted[sorted.len() / 4]).max(ABOVE_GREY);
+        let quarter = sorted.len() / 4;
+        let quiet = *sorted.select_nth_unstable_by(quarter, f32::total_cmp).1;
+        let threshold = (ABOVE_QUIET * quiet).max(ABOVE_GREY);
         deviation.iter().map(|&d| d > threshold).collect()
     }
 

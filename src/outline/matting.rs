@@ -19,26 +19,39 @@ const ENOUGH: f64 = 5e-5;
 /// The picture is too small, or OpenCV fails.
 pub fn outline(scribbles: &Scribbles, picture: &Rgb) -> Result<Outline, OutlineError> {
     let bad = |what: String| OutlineError::BadFile { name: scribbles.name.clone(), what };
-    let size = scribbles.size;
-    let matte = alpha(picture, scribbles).ok_or_else(|| bad(format!("a {size} picture is too small for scribbles")))?;
-    let tree: Vec<u8> = matte.iter().map(|&a| if a >= 128 { 255 } else { 0 }).collect();
-    let close_px = (CLOSE_SHARE * f64::from(size.width)).round() as u32;
-    let one = region::close_to_one(size, &tree, close_px).map_err(|e| bad(e.to_string()))?;
-    let one = one.ok_or_else(|| bad("the scribbles leave no tree; draw more white strokes on it".into()))?;
-    Ok(Outline { matte: Some(matte), ..one })
+    let (small, size) = (picture.size, scribbles.size);
+    let solved =
+        solved(picture, scribbles).ok_or_else(|| bad(format!("a {small} picture is too small for scribbles")))?;
+    let tree: Vec<u8> = solved.iter().map(|&a| if a >= 0.5 { 255 } else { 0 }).collect();
+    let close_px = (CLOSE_SHARE * f64::from(small.width)).round() as u32;
+    // Closed where it was solved: the time of that grows with the fourth power of the picture's width.
+    let one = region::close_to_one(small, &tree, close_px).map_err(|e| bad(e.to_string()))?;
+    let none = || bad("the scribbles leave no tree; draw more white strokes on it".into());
+    let one = one.ok_or_else(none)?;
+    let inside: Vec<f64> = one.mask.iter().map(|&m| if m == 0 { 0.0 } else { 1.0 }).collect();
+    let mask: Vec<u8> = enlarged(&inside, small, size).iter().map(|&a| if a >= 0.5 { 255 } else { 0 }).collect();
+    let one = region::close_to_one(size, &mask, 0).map_err(|e| bad(e.to_string()))?.ok_or_else(none)?;
+    Ok(Outline { matte: Some(opacity(&enlarged(&solved, small, size))), ..one })
 }
 
 /// Opacity of the tree at every pixel of the scribbles, 0 to 255; `None` where the picture is too small.
 pub fn alpha(picture: &Rgb, scribbles: &Scribbles) -> Option<Vec<u8>> {
+    Some(opacity(&enlarged(&solved(picture, scribbles)?, picture.size, scribbles.size)))
+}
+
+fn opacity(alpha: &[f64]) -> Vec<u8> {
+    alpha.iter().map(|a| (a.clamp(0.0, 1.0) * 255.0).round() as u8).collect()
+}
+
+/// The solution at the picture's size.
+fn solved(picture: &Rgb, scribbles: &Scribbles) -> Option<Vec<f64>> {
     let size = picture.size;
     if (size.width.min(size.height) as usize) < solve::LEAST_SIDE || picture.pixels.len() != 3 * size.area() {
         return None;
     }
     let colours = picture.pixels.chunks_exact(3).map(|p| [p[0], p[1], p[2]].map(|c| f64::from(c) / 255.0)).collect();
     let marks = reduced(&scribbles.marks, scribbles.size, size);
-    let level = Level { size, colours, marks };
-    let solution = enlarged(&level.solve(ENOUGH), size, scribbles.size);
-    Some(solution.iter().map(|a| (a.clamp(0.0, 1.0) * 255.0).round() as u8).collect())
+    Some(Level { size, colours, marks }.solve(ENOUGH))
 }
 
 /// The problem at one size.
@@ -67,7 +80,10 @@ impl Level {
                 Mark::Undecided => {}
             }
         }
-        solve::conjugate_gradients(&matrix, &right, &mut x, width, tolerance);
+        // What the strokes say to the others; the rows of the strokes themselves are solved from the start.
+        let told =
+            right.iter().zip(&self.marks).filter(|(_, m)| **m == Mark::Undecided).map(|(b, _)| b * b).sum::<f64>();
+        solve::conjugate_gradients(&matrix, &right, &mut x, width, tolerance * told.sqrt().max(1.0));
         x
     }
 

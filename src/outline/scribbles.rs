@@ -10,6 +10,8 @@ const MOST_UNDECIDED: f64 = 0.05;
 /// Brightness up to which a stroke counts as black, and from which as white; JPEG leaves neither quite alone.
 const BLACK: u8 = 40;
 const WHITE: u8 = 215;
+/// From here to there it is neither, at the soft edge of a mask.
+const GREY: std::ops::RangeInclusive<u8> = 64..=192;
 /// In a scribble image the undecided rest is of one shade, so many grey levels wide; else it is a photograph, whose bright
 /// sky would be taken for tree.
 const ONE_SHADE: u8 = 24;
@@ -34,8 +36,8 @@ pub struct Scribbles {
     pub marks: Vec<Mark>,
 }
 
-/// Reads a mask or scribbles (PNG, JPEG, BMP). They are told apart by what they hold: a mask is black and white, scribbles
-/// leave more than 5 % of the picture undecided, in one grey or transparent.
+/// Reads a mask or scribbles (PNG, JPEG, BMP). They are told apart by what they hold: a mask is black and white, or white
+/// and transparent; scribbles leave more than 5 % of the picture undecided, in one grey or transparent, and have black.
 ///
 /// # Errors
 /// It cannot be read, is not of `size`, is neither of the two, or lacks white, or black in scribbles.
@@ -50,8 +52,10 @@ pub fn read(path: &Path, size: Size) -> Result<Given, OutlineError> {
     }
     let shades: Vec<Option<u8>> = picture.pixels().map(|p| shade(p.0)).collect();
     let marks: Vec<Mark> = shades.iter().map(|s| mark(*s)).collect();
-    let undecided = marks.iter().filter(|m| **m == Mark::Undecided).count();
-    if undecided as f64 <= MOST_UNDECIDED * size.area() as f64 {
+    if is_mask(&picture, &shades, &marks) {
+        if shades.contains(&None) && !marks.contains(&Mark::Background) {
+            tracing::warn!("outline {name}: taken for a mask, as it has white and no black; scribbles need both");
+        }
         let mask: Vec<u8> = shades.iter().map(|s| if s.is_some_and(|s| s >= 128) { 255 } else { 0 }).collect();
         let one = region::close_to_one(size, &mask, 0).map_err(|e| bad(e.to_string()))?;
         return one.map(Given::Region).ok_or_else(|| bad("nothing in it is white, and white is tree".into()));
@@ -74,8 +78,26 @@ fn mark(shade: Option<u8>) -> Mark {
     }
 }
 
-/// Why scribbles cannot be solved.
-fn check(picture: &RgbaImage, marks: &[Mark]) -> Result<(), &'static str> {
+/// Whether it is a mask, also one with soft edges, in grey or in opacity.
+fn is_mask(picture: &RgbaImage, shades: &[Option<u8>], marks: &[Mark]) -> bool {
+    let most = MOST_UNDECIDED * marks.len() as f64;
+    let few = |n: usize| n as f64 <= most;
+    let count = |mark: Mark| marks.iter().filter(|m| **m == mark).count();
+    if few(count(Mark::Undecided)) {
+        return true;
+    }
+    let grey = shades.iter().flatten().filter(|s| GREY.contains(s)).count();
+    if shades.iter().all(Option::is_some) {
+        // What is between black and white is of all shades at soft edges, and of one in scribbles.
+        return few(grey) && !one_shade(picture, marks);
+    }
+    // White on nothing, cut out elsewhere: scribbles have black.
+    let black = shades.iter().flatten().any(|s| *s < *GREY.start());
+    count(Mark::Tree) > 0 && !black && few(grey)
+}
+
+/// Whether what is undecided and opaque is of one shade, but for the edges of strokes.
+fn one_shade(picture: &RgbaImage, marks: &[Mark]) -> bool {
     let rest: Vec<[u8; 4]> = picture
         .pixels()
         .zip(marks)
@@ -89,7 +111,12 @@ fn check(picture: &RgbaImage, marks: &[Mark]) -> Result<(), &'static str> {
     };
     let middle = [median(0), median(1), median(2)];
     let near = |p: &&[u8; 4]| (0..3).all(|c| p[c].abs_diff(middle[c]) <= ONE_SHADE);
-    if (rest.iter().filter(near).count() as f64) < MOST_OF_REST * rest.len() as f64 {
+    rest.iter().filter(near).count() as f64 >= MOST_OF_REST * rest.len() as f64
+}
+
+/// Why scribbles cannot be solved.
+fn check(picture: &RgbaImage, marks: &[Mark]) -> Result<(), &'static str> {
+    if !one_shade(picture, marks) {
         return Err(
             "it is neither a mask (black and white) nor scribbles (white tree, black background, the rest one grey \
                     or transparent)",
@@ -97,7 +124,9 @@ fn check(picture: &RgbaImage, marks: &[Mark]) -> Result<(), &'static str> {
     }
     match (marks.contains(&Mark::Tree), marks.contains(&Mark::Background)) {
         (true, true) => Ok(()),
-        (true, false) => Err("its scribbles mark no background; draw black strokes on some of it"),
+        (true, false) => {
+            Err("its scribbles mark no background; draw black strokes on some of it, or fill the rest black for a mask")
+        }
         (false, true) => Err("its scribbles mark no tree; draw white strokes on trunk and branches"),
         (false, false) => Err("it has no scribbles; draw white strokes on the tree and black ones on the background"),
     }
@@ -123,13 +152,37 @@ mod tests {
     #[test]
     fn masks_and_scribbles_are_told_apart_by_what_they_hold() {
         let (black, white, grey, clear) = ([0, 0, 0, 255], [255; 4], [128, 128, 128, 255], [255, 255, 255, 0]);
-        assert!(matches!(given(black, &[(white, 9)]), Ok(Given::Region(_))));
-        // The soft edge of a mask.
-        assert!(matches!(given(black, &[(white, 9), ([128, 128, 128, 255], 40)][..1]), Ok(Given::Region(_))));
+        let masked = |given: Result<Given, String>| match given {
+            Ok(Given::Region(outline)) => outline.mask.iter().filter(|m| **m != 0).count(),
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(masked(given(black, &[(white, 9)])), 180);
+        // Saved without a ground.
+        assert_eq!(masked(given(clear, &[(white, 9)])), 180);
+        assert_eq!(masked(given([0; 4], &[(white, 9)])), 180);
         for ground in [grey, clear, [200, 190, 210, 255]] {
             let Ok(Given::Scribbles(s)) = given(ground, &[(white, 9), (black, 40)]) else { panic!("{ground:?}") };
             let count = |mark| s.marks.iter().filter(|m| **m == mark).count();
             assert_eq!((count(Mark::Tree), count(Mark::Background)), (180, 180), "{ground:?}");
+        }
+    }
+
+    /// A bare tree as a segmentation tool gives it is a lot of edge, fading in grey or in opacity.
+    #[test]
+    fn a_mask_may_have_soft_edges() {
+        let file = tempfile::Builder::new().suffix(".png").tempfile().expect("file");
+        for by_opacity in [false, true] {
+            let pixel = |u: u32, _: u32| {
+                let soft =
+                    [0, 0, 0, 0, 0, 0, 0, 0, 10, 50, 128, 205, 255, 255, 255, 255, 200, 55, 8, 0][u as usize % 20];
+                image::Rgba(if by_opacity { [255, 255, 255, soft] } else { [soft, soft, soft, 255] })
+            };
+            image::RgbaImage::from_fn(SIZE.width, SIZE.height, pixel).save(file.path()).expect("picture");
+            let outline = match read(file.path(), SIZE) {
+                Ok(Given::Region(outline)) => outline,
+                other => panic!("{other:?}"),
+            };
+            assert!((240..=280).contains(&outline.mask.iter().filter(|m| **m != 0).count()), "{by_opacity}");
         }
     }
 

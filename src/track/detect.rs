@@ -3,11 +3,11 @@
 use crate::config::Detect;
 use crate::model::{Luma, Outline};
 use opencv::core::{
-    BORDER_CONSTANT, Mat, Point, Point2f, Rect, Scalar, Size as CvSize, ToInputArray, Vector, bitwise_or, no_array,
-    subtract,
+    BORDER_CONSTANT, Mat, Point, Point2f, Rect, Scalar, Size as CvSize, ToInputArray, Vector, bitwise_and, bitwise_or,
+    no_array, subtract,
 };
 use opencv::imgproc::{
-    MORPH_CLOSE, MORPH_DILATE, MORPH_ELLIPSE, MORPH_ERODE, THRESH_BINARY, circle, erode, get_structuring_element,
+    MORPH_CLOSE, MORPH_DILATE, MORPH_ELLIPSE, MORPH_ERODE, THRESH_BINARY, circle, get_structuring_element,
     good_features_to_track_with_gradient, morphology_ex, threshold,
 };
 use opencv::prelude::*;
@@ -98,12 +98,12 @@ fn allowed_region(outline: &Outline, border_px: i32) -> opencv::Result<(Mat, Rec
     let mut eroded = mask.try_clone()?;
     if let Some(matte) = &outline.matte {
         let matte = Mat::new_rows_cols_with_data(rows, cols, matte)?;
-        within_matte(&matte, border_px, &mut eroded)?;
+        let free = within_matte(&matte, border_px)?;
+        // The matte knows more pieces than the one that is the region; what borders on that is still its own.
+        bitwise_and(&free, &morphed(&mask, MORPH_DILATE, 1)?, &mut eroded, &no_array())?;
     } else if border_px > 0 {
-        let side = 2 * border_px + 1;
-        let disc = get_structuring_element(MORPH_ELLIPSE, CvSize::new(side, side), Point::new(-1, -1))?;
         // Outside the picture counts as not tree, so that no window hangs over the picture's edge.
-        erode(&mask, &mut eroded, &disc, Point::new(-1, -1), 1, BORDER_CONSTANT, Scalar::all(0.0))?;
+        eroded = morphed(&mask, MORPH_ERODE, border_px)?;
     }
     Ok((Mat::roi(&eroded, roi)?.try_clone()?, roi))
 }
@@ -111,24 +111,27 @@ fn allowed_region(outline: &Outline, border_px: i32) -> opencv::Result<(Mat, Rec
 /// Where the tree is wide, its pixels farther than `border_px` from the matte's border, as Zeng keeps points off it. A twig
 /// is all border: where the tree is narrower than two borders all of it is allowed, and the pixel beside it, on which the
 /// corner response of an edge may peak.
-fn within_matte(matte: &impl ToInputArray, border_px: i32, allowed: &mut Mat) -> opencv::Result<()> {
-    let disc = |radius: i32| {
-        get_structuring_element(MORPH_ELLIPSE, CvSize::new(2 * radius + 1, 2 * radius + 1), Point::new(-1, -1))
-    };
-    let morph = |from: &Mat, how: i32, radius: i32| {
-        let (mut to, anchor) = (Mat::default(), Point::new(-1, -1));
-        // Outside the picture counts as not tree.
-        morphology_ex(from, &mut to, how, &disc(radius)?, anchor, 1, BORDER_CONSTANT, Scalar::all(0.0)).map(|()| to)
-    };
+fn within_matte(matte: &impl ToInputArray, border_px: i32) -> opencv::Result<Mat> {
     let mut tree = Mat::default();
     threshold(matte, &mut tree, HALF, 255.0, THRESH_BINARY)?;
     // Holes of a pixel or two are doubts of the matte.
-    let tree = morph(&tree, MORPH_CLOSE, 1)?;
-    let inside = morph(&tree, MORPH_ERODE, border_px)?;
+    let tree = morphed(&tree, MORPH_CLOSE, 1)?;
+    let inside = morphed(&tree, MORPH_ERODE, border_px)?;
     // Half a border more: what is left of the wide part's own corners is no twig.
-    let wide = morph(&inside, MORPH_DILATE, border_px + border_px / 2)?;
+    let wide = morphed(&inside, MORPH_DILATE, border_px + border_px / 2)?;
     let mut twigs = Mat::default();
     subtract(&tree, &wide, &mut twigs, &no_array(), -1)?;
-    let twigs = morph(&twigs, MORPH_DILATE, 1)?;
-    bitwise_or(&inside, &twigs, allowed, &no_array())
+    let twigs = morphed(&twigs, MORPH_DILATE, 1)?;
+    let mut allowed = Mat::default();
+    bitwise_or(&inside, &twigs, &mut allowed, &no_array())?;
+    Ok(allowed)
+}
+
+/// With a disc of `radius` px; outside the picture counts as not tree.
+fn morphed(from: &impl ToInputArray, how: i32, radius: i32) -> opencv::Result<Mat> {
+    let (side, anchor) = (2 * radius + 1, Point::new(-1, -1));
+    let disc = get_structuring_element(MORPH_ELLIPSE, CvSize::new(side, side), anchor)?;
+    let mut to = Mat::default();
+    morphology_ex(from, &mut to, how, &disc, anchor, 1, BORDER_CONSTANT, Scalar::all(0.0))?;
+    Ok(to)
 }

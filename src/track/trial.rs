@@ -19,8 +19,10 @@ const MOVED_S: f64 = 2.0;
 /// wide, and more wall than tree.
 const MOVING_SHARE: f64 = 0.25;
 const MOVED_PX: f32 = 1.0;
-/// They have stirred when so great a share is so far from there, px: what less than that moves makes no tree.
+/// They have stirred when so great a share is so far from there, px, or so many: in a wide outline the tree may have but
+/// few, and half of what evidence of motion needs to count in full may make a tree all the same.
 const STIRRED_SHARE: f64 = 0.1;
+const STIRRED: usize = 16;
 const STIRRED_PX: f32 = 0.3;
 /// More than this between two frames is a gap, in which nobody saw them move, s.
 const STEP_S: f64 = 0.2;
@@ -64,11 +66,9 @@ impl Trials {
 
     /// Takes the time of a frame and how far points are from where they were found, sorted; whether the trial is over.
     fn over(&mut self, time_s: f64, away_px: &[f32]) -> bool {
-        let beyond = |px: f32, share: f64| {
-            let n = away_px.len() - away_px.partition_point(|d| *d <= px);
-            n > 0 && n as f64 >= share * away_px.len() as f64
-        };
-        if self.since_s.is_none() && beyond(STIRRED_PX, STIRRED_SHARE) {
+        let count = |px: f32| away_px.len() - away_px.partition_point(|d| *d <= px);
+        let beyond = |px: f32, share: f64| count(px) > 0 && count(px) as f64 >= share * away_px.len() as f64;
+        if self.since_s.is_none() && (count(STIRRED_PX) >= STIRRED || beyond(STIRRED_PX, STIRRED_SHARE)) {
             self.since_s = Some(time_s);
         }
         if beyond(MOVED_PX, MOVING_SHARE) {
