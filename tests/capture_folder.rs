@@ -104,7 +104,7 @@ fn place(nodes: &[Vec<String>], id: &str) -> usize {
 #[test]
 fn the_tree_stands_on_its_foot_and_parents_come_first() {
     let nodes = made().nodes();
-    assert!(nodes.len() > 100, "{} nodes", nodes.len());
+    assert!(nodes.len() > 50, "{} nodes", nodes.len());
     assert_eq!(nodes[0][1], "", "the root has no parent");
     assert_eq!([6, 7, 8].map(|c| number(&nodes[0][c])), [0.0; 3], "the foot is the origin");
     assert_eq!([0, 1].map(|i| index(&nodes[i][0])), [0, 1], "foot and trunk are 0 and 1");
@@ -272,7 +272,7 @@ fn the_stream_is_what_the_capture_says() {
             let off = (0..3).map(|c| (node[c + 1].as_f64().expect("number") - kept.at[c]).abs()).fold(0.0, f64::max);
             assert!(off < 0.001, "frame {frame} node {id}: {node} and {:?}", kept.at);
         }
-        assert!(streamed.len() > 30, "{} nodes", streamed.len());
+        assert!(streamed.len() > 15, "{} nodes", streamed.len());
     }
     assert!(4 * kept_names >= 3 * measured_names, "{kept_names} of {measured_names} nodes keep their numbers");
 }

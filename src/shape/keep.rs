@@ -35,21 +35,29 @@ pub fn twins(new: &Skeleton, old: &Skeleton, measured: &[Option<Twin>]) -> Vec<O
 /// below them. A branch that the picture shows unchanged then neither jumps nor changes sides between the viewer and the
 /// far end. The foot stays, and with it the model's axes.
 ///
-/// A node may stand anywhere on its branch, so the old place is as good as the new middle of its points as long as they
-/// carry it.
+/// A branch may end a little sooner or later, so the old place is as good as the new one as long as the same branches
+/// leave from there. Where others do, the node goes to the new fork, or what branches off would run back along it; only
+/// its depth stays.
 pub fn stand_as_before(new: &mut Skeleton, old: &Skeleton, twins: &[Option<Twin>], envelope: &Envelope) {
     let foot = [new.foot_px[0] - old.foot_px[0], new.foot_px[1] - old.foot_px[1]];
     new.foot_px = old.foot_px;
     let in_old_axes = Vector3::new(foot[0], -foot[1], 0.0);
     // By how much each node is off the place at which it was built.
     let mut carried: Vec<Vector3<f64>> = Vec::with_capacity(new.nodes.len());
+    let same_fork = same_forks(new, old, twins);
     for i in 0..new.nodes.len() {
         let node = &new.nodes[i];
         let built = if i == 0 { Point3::origin() } else { node.position + in_old_axes };
         let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), node.plane_angle);
         let place = match twins.get(i).copied().flatten() {
             Some(Twin { old: twin, moved_px: [du, dv] }) => {
-                old.nodes[twin.index()].position + turn * Vector3::new(du, -dv, 0.0)
+                let before = old.nodes[twin.index()].position + turn * Vector3::new(du, -dv, 0.0);
+                let copy = node.copy_of.is_some();
+                match (i < 2 || same_fork[i], copy) {
+                    (true, _) => before,
+                    (false, false) => drawn_in(built, Point3::new(built.x, built.y, before.z), envelope),
+                    (false, true) => built,
+                }
             }
             None => {
                 let below = node.parent.map_or_else(Vector3::zeros, |p| carried[p.index()]);
@@ -61,6 +69,27 @@ pub fn stand_as_before(new: &mut Skeleton, old: &Skeleton, twins: &[Option<Twin>
         carried.push(place - built);
         new.nodes[i].position = place;
     }
+}
+
+/// For every node of `new` whether the branches that leave from it are those that left from its twin.
+fn same_forks(new: &Skeleton, old: &Skeleton, twins: &[Option<Twin>]) -> Vec<bool> {
+    let children = |skeleton: &Skeleton| {
+        let mut of = vec![Vec::new(); skeleton.nodes.len()];
+        for (i, node) in skeleton.nodes.iter().enumerate() {
+            if let Some(parent) = node.parent {
+                of[parent.index()].push(i);
+            }
+        }
+        of
+    };
+    let (leave, left) = (children(new), children(old));
+    let twin = |i: usize| twins.get(i).copied().flatten().map(|t| t.old.index());
+    let same = |i: usize| {
+        let mut found: Vec<Option<usize>> = leave[i].iter().map(|&c| twin(c)).collect();
+        found.sort_unstable();
+        twin(i).is_some_and(|t| found.iter().copied().eq(left[t].iter().map(|&c| Some(c))))
+    };
+    (0..new.nodes.len()).map(same).collect()
 }
 
 /// `wanted`, or as much of the way there from `built` as stays in the envelope.
