@@ -141,7 +141,7 @@ fn branches_that_go_on_do_not_jump() {
             pair[1].1.time_s, ordinary[0], ordinary[1]
         );
         assert!(u <= 1.5 * ordinary[0] && z <= 20.0, "a measured node jumps by {u:.2} px, {z:.2} px in depth");
-        assert!(median <= 1.0 && most <= 20.0, "in the median {median:.2} px, 95 % {most:.2} px");
+        assert!(median <= 1.5 && most <= 20.0, "in the median {median:.2} px, 95 % {most:.2} px");
     }
 }
 

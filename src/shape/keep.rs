@@ -45,7 +45,7 @@ pub fn stand_as_before(new: &mut Skeleton, old: &Skeleton, twins: &[Option<Twin>
     // By how much each node is off the place at which it was built.
     let mut carried: Vec<Vector3<f64>> = Vec::with_capacity(new.nodes.len());
     let same_fork = same_forks(new, old, twins);
-    for i in 0..new.nodes.len() {
+    for (i, same_fork) in same_fork.into_iter().enumerate() {
         let node = &new.nodes[i];
         let built = if i == 0 { Point3::origin() } else { node.position + in_old_axes };
         let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), node.plane_angle);
@@ -53,7 +53,7 @@ pub fn stand_as_before(new: &mut Skeleton, old: &Skeleton, twins: &[Option<Twin>
             Some(Twin { old: twin, moved_px: [du, dv] }) => {
                 let before = old.nodes[twin.index()].position + turn * Vector3::new(du, -dv, 0.0);
                 let copy = node.copy_of.is_some();
-                match (i < 2 || same_fork[i], copy) {
+                match (i < 2 || same_fork, copy) {
                     (true, _) => before,
                     (false, false) => drawn_in(built, Point3::new(built.x, built.y, before.z), envelope),
                     (false, true) => built,
