@@ -252,7 +252,7 @@ fn closing_lines(s: &Summary) -> Vec<String> {
             n => format!(", refined {n} times until {:.1} s", tree.time_s),
         };
         lines.push(format!(
-            "tree: {nodes} nodes from {points} moving points and {copies} copied ones, {when} at {:.1} s (accumulation \
+            "tree: {nodes} nodes (from {points} moving points) and {copies} copies, {when} at {:.1} s (accumulation \
              {:.2}){refined}",
             first.time_s, first.measure
         ));
