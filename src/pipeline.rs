@@ -4,12 +4,14 @@
 //! from then on poses it and now and then builds it anew. `runtime` runs the same two halves on threads of their own.
 
 mod back;
+mod dress;
 mod front;
 mod refine;
 mod refiner;
 mod retrace;
 
 pub use back::{BackEnd, Moved};
+pub use dress::{Dressed, Seen, dress};
 pub use front::{Followed, FrontEnd};
 pub use refine::Refinement;
 pub use retrace::Retrace;

@@ -1,7 +1,9 @@
 //! From the flat skeleton to a tree in space (Li et al. section 3).
 
 mod envelope;
+mod foliage;
 mod keep;
+mod limb;
 mod mesh;
 mod planes;
 mod push;
@@ -9,7 +11,9 @@ mod radius;
 mod tube;
 
 pub use envelope::Envelope;
+pub use foliage::{Foliage, FoliageGroup};
 pub use keep::{Twin, stand_as_before, twins};
+pub use limb::{Limb, Riding, Station, limbs};
 pub use mesh::{Detail, Mesh, branches};
 pub use planes::copy_to_planes;
 pub use push::{Terms, envelope_distance, mean_branching_angle, push};

@@ -1,6 +1,8 @@
 //! One tapering, slightly curved tube with frames carried along without twist.
 
+use super::limb::Riding;
 use super::mesh::Mesh;
+use crate::model::NodeId;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Direction of a branch and one direction across it, both of length 1 and square to each other.
@@ -167,14 +169,8 @@ impl Tube {
         mesh.normals.push([normal.x as f32, normal.y as f32, normal.z as f32]);
         mesh.uvs.push([uv[0] as f32, uv[1] as f32]);
         let own = Self::own_weight(t);
-        // A joint that has no share must be 0, or validators warn.
-        let (joints, weights) = if own <= 0.0 {
-            ([self.parent_joint, 0, 0, 0], [1.0, 0.0, 0.0, 0.0])
-        } else if own >= 1.0 {
-            ([self.joint, 0, 0, 0], [1.0, 0.0, 0.0, 0.0])
-        } else {
-            ([self.joint, self.parent_joint, 0, 0], [own, 1.0 - own, 0.0, 0.0])
-        };
+        let Riding { joints, weights } =
+            Riding::between(NodeId(self.parent_joint.into()), NodeId(self.joint.into()), own);
         mesh.joints.push(joints);
         mesh.weights.push(weights);
     }
