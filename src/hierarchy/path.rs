@@ -18,8 +18,8 @@ pub fn likeness(
     foot_px: [f64; 2],
     settings: &Hierarchy,
 ) -> (DMatrix<f32>, DMatrix<f32>) {
-    let rho = displacements.correlations();
-    let common = common_way(&displacements.differences(), rest_px, foot_px);
+    let (rho, differences) = displacements.compared();
+    let common = common_way(&differences, rest_px, foot_px);
     let mut whole: Vec<f32> = common.diagonal().iter().copied().collect();
     let middle = whole.len() / 2;
     if whole.is_empty() {
