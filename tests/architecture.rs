@@ -12,8 +12,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("caught", &[]),
     // A recording is a source, read where its format is known.
     ("source", &["model", "config", "recording", "caught"]),
-    ("outline", &["model", "config"]),
-    ("track", &["model", "config"]),
+    ("outline", &["model", "config", "signal"]),
+    ("track", &["model", "config", "signal"]),
     // The table of positions that the hierarchy is cut from is the tracker's.
     ("hierarchy", &["model", "config", "track::TrackTable", "track::TrackHistory", "signal"]),
     ("skeleton", &["model", "config"]),
@@ -22,13 +22,16 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("motion", &["model", "config"]),
     ("dynamics", &["model", "config", "signal"]),
     ("signal", &[]),
-    ("pipeline", &["model", "config", "outline", "track", "hierarchy", "skeleton", "shape", "motion"]),
+    ("pipeline", &["model", "config", "outline", "track", "hierarchy", "skeleton", "shape", "motion", "signal"]),
     ("recording", &["model"]),
     // `capture.json` holds the whole configuration; the model's file holds the mesh.
     ("export", &["model", "config", "shape::Mesh"]),
     // The screen draws outlines, and refuses the crossing ones as a file would be.
     ("tui", &["model", "outline::crossing", "caught"]),
-    ("runtime", &["model", "config", "source", "outline", "shape", "dynamics", "pipeline", "recording", "export"]),
+    (
+        "runtime",
+        &["model", "config", "source", "outline", "shape", "dynamics", "signal", "pipeline", "recording", "export"],
+    ),
     // It tries what a capture would use: a camera, the decoder, the front end; the rest of the machine it reads itself.
     ("doctor", &["model", "config", "source", "outline::whole", "pipeline::FrontEnd"]),
     ("cli", &["model", "config", "source", "outline", "pipeline", "recording", "runtime", "export", "tui", "doctor"]),
