@@ -20,6 +20,7 @@ use crate::config::Config;
 use crate::hierarchy::{self, Evidence};
 use crate::model::{Frame, MotionHierarchy, NodeId, Outline, Pose, Skeleton, TrackId, TrackSet};
 use crate::motion::{Binding, PoseEstimator};
+use crate::shape::PushFigures;
 use crate::track::TrackTable;
 use crate::{shape, skeleton};
 use std::collections::BTreeMap;
@@ -117,6 +118,17 @@ impl Tree {
         PoseEstimator::new(self.skeleton.clone(), &config.motion)
     }
 
+    /// The skeleton in the picture that it was stood up from, with the number of points on every node.
+    pub fn flat(&self, config: &Config) -> (Vec<skeleton::Node2d>, Vec<u32>) {
+        flat(&self.hierarchy, &self.outline, config)
+    }
+
+    /// How well its push fills the envelope, and how likely its angles are, beside the one-sided ways.
+    pub fn push_figures(&self, config: &Config) -> PushFigures {
+        let (flat, tracks) = self.flat(config);
+        PushFigures::of(&flat, &tracks, &self.outline, &config.shape)
+    }
+
     /// Tracks to poses, from the rest pose on.
     fn poser(&self, config: &Config) -> Poser {
         Poser { binding: self.binding(), estimator: self.estimator(config) }
@@ -147,6 +159,14 @@ fn crown_u(table: &TrackTable, moving: &[usize]) -> Option<f64> {
     (!moving.is_empty()).then(|| sum / moving.len() as f64)
 }
 
+/// The skeleton in the picture, and the number of points on every node.
+fn flat(hierarchy: &MotionHierarchy, outline: &Outline, config: &Config) -> (Vec<skeleton::Node2d>, Vec<u32>) {
+    let flat = skeleton::build(hierarchy, outline, &config.skeleton);
+    let cluster = |n: &skeleton::Node2d| hierarchy.clusters.get(n.cluster.map_or(0, |c| c.0 as usize));
+    let tracks = flat.iter().map(|n| cluster(n).map_or(0, |c| c.members.len() as u32)).collect();
+    (flat, tracks)
+}
+
 /// Tracks to tree: evidence, hierarchy, 2D skeleton, 3D skeleton. `None` if too few points move.
 pub fn build(
     table: &Arc<TrackTable>,
@@ -163,9 +183,7 @@ pub fn build(
     if hierarchy.clusters.first().is_none_or(|all| all.members.len() < LEAST_MOVING) {
         return None;
     }
-    let flat = skeleton::build(&hierarchy, outline, &config.skeleton);
-    let points = |n: &skeleton::Node2d| n.cluster.map_or(0, |c| c.0 as usize);
-    let tracks: Vec<u32> = flat.iter().map(|n| hierarchy.clusters[points(n)].members.len() as u32).collect();
+    let (flat, tracks) = flat(&hierarchy, outline, config);
     let mut skeleton = shape::build(&flat, &tracks, outline, &config.shape);
     let trunk_px = TRUNK_SHARE * skeleton::Foot::of(outline, None).half_width_px;
     shape::pipe_model(&mut skeleton, trunk_px.max(2.0 * TIP_RADIUS_PX), TIP_RADIUS_PX);

@@ -24,8 +24,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("signal", &[]),
     ("pipeline", &["model", "config", "outline", "track", "hierarchy", "skeleton", "shape", "motion", "signal"]),
     ("recording", &["model"]),
-    // `capture.json` holds the whole configuration; the model's file holds the mesh.
-    ("export", &["model", "config", "shape::Mesh"]),
+    // `capture.json` holds the whole configuration and what the push has achieved; the model's file holds the mesh.
+    ("export", &["model", "config", "shape::Mesh", "shape::PushFigures"]),
     // The screen draws outlines, and refuses the crossing ones as a file would be.
     ("tui", &["model", "outline::crossing", "caught"]),
     (

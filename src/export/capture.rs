@@ -218,6 +218,9 @@ pub struct ModelNote {
     pub metres_per_px: f64,
     /// The trunk's foot in the picture, px: the origin of the model.
     pub foot_px: [f64; 2],
+    /// What the push out of the picture's plane has achieved; `None` in a capture of an older version.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub push: Option<crate::shape::PushFigures>,
 }
 
 impl ModelNote {
@@ -231,6 +234,7 @@ impl ModelNote {
             unit: if metres_per_px > 0.0 { "m" } else { "px" }.into(),
             metres_per_px,
             foot_px: skeleton.foot_px,
+            push: None,
         }
     }
 }

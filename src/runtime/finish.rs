@@ -113,7 +113,8 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
     folder.write("tree.glb", &bytes)?;
     let first_frame = poses.first().map_or(0, |p| p.frame);
     let animation = AnimationNote { first_frame, frames: poses.len() as u64, keys };
-    let model = ModelNote::of(&tree.skeleton, metres_per_px);
+    let push = Some(tree.push_figures(&job.config));
+    let model = ModelNote { push, ..ModelNote::of(&tree.skeleton, metres_per_px) };
     let capture = describe(job, Some(&tree), Some((model, animation)), misses.median());
     publish(folder, capture, Some(tree))
 }
