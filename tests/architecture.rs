@@ -22,6 +22,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("motion", &["model", "config"]),
     ("dynamics", &["model", "config", "signal"]),
     ("signal", &[]),
+    // What is drawn.
+    ("draw", &["model", "shape::Mesh", "shape::Foliage", "shape::FoliageGroup"]),
     ("pipeline", &["model", "config", "outline", "track", "hierarchy", "skeleton", "shape", "motion"]),
     ("recording", &["model"]),
     // `capture.json` holds the whole configuration; the model's file holds the mesh.
