@@ -28,8 +28,9 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("recording", &["model"]),
     // `capture.json` holds the whole configuration; the model's file holds the mesh.
     ("export", &["model", "config", "shape::Mesh"]),
-    // The screen draws outlines, and refuses the crossing ones as a file would be.
-    ("tui", &["model", "outline::crossing", "caught"]),
+    // The screen draws outlines, and refuses the crossing ones as a file would be. It draws the tree's wood too, a coarse
+    // mesh that only it needs.
+    ("tui", &["model", "outline::crossing", "caught", "draw", "shape::Detail", "shape::Mesh", "shape::branches"]),
     ("runtime", &["model", "config", "source", "outline", "shape", "dynamics", "pipeline", "recording", "export"]),
     // It tries what a capture would use: a camera, the decoder, the front end; the rest of the machine it reads itself.
     ("doctor", &["model", "config", "source", "outline::whole", "pipeline::FrontEnd"]),

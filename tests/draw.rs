@@ -10,7 +10,7 @@ use synthetic::{sway, tree};
 
 const BARK: [u8; 3] = [104, 84, 66];
 const SIZE: Size = Size { width: 320, height: 240 };
-const LOOK: Look = Look { samples: 2, shadow: false };
+const LOOK: Look = Look { samples: 2, shadow: false, thicker_px: 0.0 };
 
 fn wood(skeleton: &Skeleton) -> Mesh {
     branches(skeleton, Detail::for_budget(skeleton.nodes.len(), 20_000))
@@ -152,7 +152,7 @@ fn the_shadow_lies_on_the_ground_and_only_where_it_is_looked_down_on() {
     let posed = model.posed(None, &[]);
     let with = |shadow: bool, down: f64| {
         let camera = Camera::fitting(&bounds(&posed), View { turn: 0.3, down }, true, SIZE);
-        picture(&posed, &camera, &Look { samples: 1, shadow })
+        picture(&posed, &camera, &Look { samples: 1, shadow, thicker_px: 0.0 })
     };
     assert_eq!(with(true, 0.0), with(false, 0.0));
     let (shaded, plain) = (with(true, 0.4), with(false, 0.4));
@@ -193,7 +193,11 @@ fn nothing_that_a_file_may_hold_brings_it_down() {
         let posed = model.posed(Some(pose), &[[f32::NAN; 2]]);
         let _ = posed.bounds();
         for size in [SIZE, Size::new(1, 1), Size::new(0, 0), Size::new(0, 7)] {
-            picture(&posed, &Camera::fitting(&whole, View::TOP, true, size), &Look { samples: 3, shadow: true });
+            picture(
+                &posed,
+                &Camera::fitting(&whole, View::TOP, true, size),
+                &Look { samples: 3, shadow: true, thicker_px: 0.0 },
+            );
             picture(&posed, &Camera::of_film(&skeleton, size), &LOOK);
         }
     }
@@ -207,7 +211,32 @@ fn the_same_picture_twice() {
     let draw = || {
         let model = Model::bare(&skeleton, &mesh, BARK);
         let posed = model.posed(None, &[]);
-        picture(&posed, &Camera::fitting(&bounds(&posed), View::SIDE, false, SIZE), &Look { samples: 3, shadow: true })
+        picture(
+            &posed,
+            &Camera::fitting(&bounds(&posed), View::SIDE, false, SIZE),
+            &Look { samples: 3, shadow: true, thicker_px: 0.0 },
+        )
     };
     assert_eq!(draw(), draw());
+}
+
+/// What the terminal draws: no twig falls into pieces, however few the dots.
+#[test]
+fn thicker_wood_shows_every_twig_in_a_coarse_picture() {
+    let skeleton = tree(6, 1);
+    let mesh = wood(&skeleton);
+    let model = Model::bare(&skeleton, &mesh, BARK);
+    let posed = model.posed(None, &[]);
+    let camera = Camera::fitting(&bounds(&posed), View::FRONT, false, Size::new(60, 80));
+    let hit = |look: &Look| {
+        let drawn = picture(&posed, &camera, look);
+        let middles = (1..skeleton.nodes.len()).map(|i| {
+            let from = skeleton.nodes[skeleton.nodes[i].parent.unwrap().index()].position;
+            let [x, y, _] = camera.project(&nalgebra::center(&from, &skeleton.nodes[i].position));
+            (-1..=1).any(|dx| (-1..=1).any(|dy| drawn.at((x as i64 + dx) as u32, (y as i64 + dy) as u32)[3] > 0))
+        });
+        middles.filter(|hit| *hit).count()
+    };
+    let coarse = Look { samples: 1, shadow: false, thicker_px: 0.5 };
+    assert_eq!(hit(&coarse), skeleton.nodes.len() - 1);
 }

@@ -7,12 +7,20 @@ use super::picture::Picture;
 use nalgebra::Vector3;
 
 /// How a picture is made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
     /// Samples of a pixel in either direction, 1 to 8: smoother borders, and thinner twigs that still show.
     pub samples: u32,
     /// The tree's shadow on the ground, where the view looks down on it.
     pub shadow: bool,
+    /// By how much wood is drawn thicker on every side, px: a twig thinner than a sample is else drawn in pieces.
+    pub thicker_px: f64,
+}
+
+impl Default for Look {
+    fn default() -> Self {
+        Self { samples: 3, shadow: false, thicker_px: 0.0 }
+    }
 }
 
 /// Share of the light that a shadow takes away at its darkest.
@@ -22,7 +30,8 @@ const SHADE: f32 = 0.4;
 pub fn picture(tree: &Posed, camera: &Camera, look: &Look) -> Picture {
     let samples = look.samples.clamp(1, 8);
     let mut canvas = Canvas::new(camera.size, samples);
-    let eye = Eye::new(camera, samples);
+    let mut eye = Eye::new(camera, samples);
+    eye.thicker = (look.thicker_px / camera.scale) as f32;
     tree.parts.iter().for_each(|part| draw(part, &eye, &mut canvas));
     let picture = canvas.picture();
     if !look.shadow || camera.view.down < 0.05 {
@@ -40,6 +49,8 @@ struct Eye {
     middle: [f32; 2],
     scale: f32,
     sun: Vector3<f32>,
+    /// Model units.
+    thicker: f32,
 }
 
 impl Eye {
@@ -51,6 +62,7 @@ impl Eye {
             middle: camera.middle_px.map(|m| n * m as f32),
             scale: n * camera.scale as f32,
             sun: sun(camera.view),
+            thicker: 0.0,
         }
     }
 
@@ -79,7 +91,8 @@ fn draw(part: &Part, eye: &Eye, canvas: &mut Canvas) {
                 normal = -normal;
             }
             let light = lit(normal, eye.sun, part.two_sided);
-            let [x, y, z] = eye.place(Vector3::from(*p));
+            let thicker = if part.two_sided { 0.0 } else { eye.thicker };
+            let [x, y, z] = eye.place(Vector3::from(*p) + normal * thicker);
             let uv = part.uvs.get(i).copied().unwrap_or_default();
             Corner { x, y, z, rgb: colour.map(|c| (f32::from(c) * light).clamp(0.0, 255.0)), uv }
         })

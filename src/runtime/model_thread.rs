@@ -261,7 +261,7 @@ impl ModelThread {
             Ok(job) => {
                 let shared = self.shared.clone();
                 let write = move || match finish::write(&job, &dir) {
-                    Ok(_) => shared.tell(format!("capture written to {}", dir.display())),
+                    Ok(_) => shared.answer(format!("capture written to {}", dir.display())),
                     Err(e) => shared.warn(e.to_string()),
                 };
                 match std::thread::Builder::new().name("export".into()).spawn(write) {
