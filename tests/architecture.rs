@@ -28,13 +28,32 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("recording", &["model"]),
     // `capture.json` holds the whole configuration; the model's file holds the mesh.
     ("export", &["model", "config", "shape::Mesh"]),
+    // A capture's tables back to the nouns: poses by the rule by which they were made, the outline as a file of its own
+    // would be.
+    ("capture", &["model", "config", "motion::PoseEstimator", "outline", "export"]),
     // The screen draws outlines, and refuses the crossing ones as a file would be. It draws the tree's wood too, a coarse
     // mesh that only it needs.
     ("tui", &["model", "outline::crossing", "caught", "draw", "shape::Detail", "shape::Mesh", "shape::branches"]),
     ("runtime", &["model", "config", "source", "outline", "shape", "dynamics", "pipeline", "recording", "export"]),
     // It tries what a capture would use: a camera, the decoder, the front end; the rest of the machine it reads itself.
     ("doctor", &["model", "config", "source", "outline::whole", "pipeline::FrontEnd"]),
-    ("cli", &["model", "config", "source", "outline", "pipeline", "recording", "runtime", "export", "tui", "doctor"]),
+    (
+        "cli",
+        &[
+            "model",
+            "config",
+            "source",
+            "outline",
+            "pipeline",
+            "recording",
+            "runtime",
+            "export",
+            "capture",
+            "draw",
+            "tui",
+            "doctor",
+        ],
+    ),
     ("main.rs", &["cli"]),
 ];
 

@@ -2,7 +2,7 @@
 
 mod synthetic;
 
-use arborcam::draw::{Bounds, Camera, Look, Model, Picture, Posed, Texture, View, picture};
+use arborcam::draw::{Bounds, Camera, Look, Model, Posed, Rgba, Texture, View, picture};
 use arborcam::model::{JointPose, NodeId, Pose, Size, Skeleton};
 use arborcam::shape::{Detail, Foliage, FoliageGroup, Mesh, branches};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
@@ -21,8 +21,8 @@ fn bounds(posed: &Posed) -> Bounds {
 }
 
 /// Share of the pixels that are drawn in `one` and not in `other`.
-fn missing(one: &Picture, other: &Picture) -> f64 {
-    let drawn = |p: &Picture| p.pixels.chunks_exact(4).map(|p| p[3] > 127).collect::<Vec<_>>();
+fn missing(one: &Rgba, other: &Rgba) -> f64 {
+    let drawn = |p: &Rgba| p.pixels.chunks_exact(4).map(|p| p[3] > 127).collect::<Vec<_>>();
     let (one, other) = (drawn(one), drawn(other));
     let lost = one.iter().zip(&other).filter(|(a, b)| **a && !**b).count();
     lost as f64 / one.iter().filter(|a| **a).count().max(1) as f64
@@ -122,7 +122,7 @@ fn leaves_swing_and_are_cut_out() {
     let mut model = Model { foliage: &foliage, ..Model::bare(&skeleton, &mesh, BARK) };
     let camera = Camera::of_film(&skeleton, Size::new(1280, 720));
     let [u, v] = skeleton.image_from_model(&skeleton.nodes[1].position);
-    let green = |picture: &Picture, dx: f64, dy: f64| {
+    let green = |picture: &Rgba, dx: f64, dy: f64| {
         let [r, g, _, a] = picture.at((u + dx) as u32, (v + dy) as u32);
         a > 0 && g > r
     };

@@ -64,9 +64,9 @@ pub struct Camera {
     pub view: View,
     /// The point of the model that is shown at `middle_px`.
     pub aim: Point3<f64>,
-    /// Picture pixels, the top left corner of the picture being (0, 0).
+    /// Rgba pixels, the top left corner of the picture being (0, 0).
     pub middle_px: [f64; 2],
-    /// Picture pixels for one unit of the model.
+    /// Rgba pixels for one unit of the model.
     pub scale: f64,
     pub size: Size,
 }

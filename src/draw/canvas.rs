@@ -1,6 +1,6 @@
 //! Triangles into samples, the nearest on top.
 
-use super::picture::Picture;
+use super::rgba::Rgba;
 use super::texture::Texture;
 use crate::model::Size;
 
@@ -96,9 +96,9 @@ impl Canvas {
     }
 
     /// The picture: of each pixel the mean of its samples, transparent where nothing was drawn.
-    pub fn picture(&self) -> Picture {
+    pub fn picture(&self) -> Rgba {
         let n = self.samples;
-        let mut out = Picture::of_one(self.size, [0; 4]);
+        let mut out = Rgba::of_one(self.size, [0; 4]);
         for (i, pixel) in out.pixels.chunks_exact_mut(4).enumerate() {
             let (x, y) = (i % self.size.width as usize * n, i / self.size.width as usize * n);
             let (mut sum, mut drawn) = ([0u32; 3], 0u32);

@@ -3,7 +3,7 @@
 use super::camera::{Camera, View};
 use super::canvas::{Canvas, Corner};
 use super::model::{Part, Posed};
-use super::picture::Picture;
+use super::rgba::Rgba;
 use nalgebra::Vector3;
 
 /// How a picture is made.
@@ -27,7 +27,7 @@ impl Default for Look {
 const SHADE: f32 = 0.4;
 
 /// Draws a tree in its pose; transparent where there is none.
-pub fn picture(tree: &Posed, camera: &Camera, look: &Look) -> Picture {
+pub fn picture(tree: &Posed, camera: &Camera, look: &Look) -> Rgba {
     let samples = look.samples.clamp(1, 8);
     let mut canvas = Canvas::new(camera.size, samples);
     let mut eye = Eye::new(camera, samples);
@@ -112,7 +112,7 @@ fn lit(normal: Vector3<f32>, sun: Vector3<f32>, leaf: bool) -> f32 {
 }
 
 /// The shadow on the ground of the foot: grey with soft borders, transparent elsewhere.
-fn shadow(tree: &Posed, camera: &Camera) -> Picture {
+fn shadow(tree: &Posed, camera: &Camera) -> Rgba {
     let (sun, eye) = (Vector3::new(-0.3, 1.0, 0.15), Eye::new(camera, 1));
     let mut canvas = Canvas::new(camera.size, 1);
     for part in &tree.parts {

@@ -5,11 +5,13 @@ pub mod capture;
 pub mod csv;
 mod error;
 pub mod folder;
+pub mod glb_notes;
 pub mod gltf;
 mod gltf_buffer;
 mod gltf_mesh;
 mod joints;
 mod number;
+pub mod picture;
 mod thin_keys;
 
 pub use error::ExportError;

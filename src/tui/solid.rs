@@ -27,7 +27,7 @@ impl Solid {
     }
 
     /// The tree in its present pose, its branches in their colours; transparent where it is not.
-    pub fn picture(&self, s: &Snapshot, camera: &draw::Camera, theme: Theme) -> Option<draw::Picture> {
+    pub fn picture(&self, s: &Snapshot, camera: &draw::Camera, theme: Theme) -> Option<draw::Rgba> {
         let skeleton = self.of.as_deref().filter(|_| camera.size.area() > 0)?;
         let colour = |i: usize| {
             let branch = s.node_colour.get(i).copied().flatten();
@@ -48,7 +48,7 @@ pub const BRAILLE: Size = Size { width: 2, height: 4 };
 
 /// Cells of braille from a picture with [`BRAILLE`] dots in each: letter and mean colour, row by row; `None` where there
 /// is no dot.
-pub fn braille(picture: &draw::Picture) -> impl Iterator<Item = Option<(char, [u8; 3])>> + '_ {
+pub fn braille(picture: &draw::Rgba) -> impl Iterator<Item = Option<(char, [u8; 3])>> + '_ {
     const BITS: [[u32; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
     let (columns, rows) = (picture.size.width / BRAILLE.width, picture.size.height / BRAILLE.height);
     (0..rows).flat_map(move |row| {

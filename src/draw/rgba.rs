@@ -4,12 +4,12 @@ use crate::model::{Rgb, Size};
 
 /// Four bytes a pixel, red first, row by row; alpha is not multiplied in.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Picture {
+pub struct Rgba {
     pub size: Size,
     pub pixels: Vec<u8>,
 }
 
-impl Picture {
+impl Rgba {
     /// Nothing but one colour.
     pub fn of_one(size: Size, rgba: [u8; 4]) -> Self {
         Self { size, pixels: rgba.repeat(size.area()) }
@@ -41,7 +41,7 @@ impl Picture {
     }
 
     /// Draws `over` on top; both must have one size, else nothing happens.
-    pub fn put(&mut self, over: &Picture) {
+    pub fn put(&mut self, over: &Rgba) {
         if self.size != over.size {
             return;
         }
@@ -60,7 +60,7 @@ impl Picture {
     }
 
     /// Two pictures of one height side by side; the lower one is filled up with `around`.
-    pub fn beside(left: &Picture, right: &Picture, around: [u8; 4]) -> Self {
+    pub fn beside(left: &Rgba, right: &Rgba, around: [u8; 4]) -> Self {
         let size = Size::new(left.size.width + right.size.width, left.size.height.max(right.size.height));
         let mut out = Self::of_one(size, around);
         for (picture, from) in [(left, 0), (right, left.size.width as usize)] {
@@ -122,12 +122,12 @@ mod tests {
 
     #[test]
     fn a_half_covered_pixel_lets_half_of_the_film_through() {
-        let mut below = Picture::of_one(Size::new(3, 1), [200, 0, 0, 255]);
+        let mut below = Rgba::of_one(Size::new(3, 1), [200, 0, 0, 255]);
         let over =
-            Picture { size: Size::new(3, 1), pixels: [[0, 100, 0, 0], [0, 100, 0, 128], [0, 100, 0, 255]].concat() };
+            Rgba { size: Size::new(3, 1), pixels: [[0, 100, 0, 0], [0, 100, 0, 128], [0, 100, 0, 255]].concat() };
         below.put(&over);
         assert_eq!(below.pixels, [[200, 0, 0, 255], [100, 50, 0, 255], [0, 100, 0, 255]].concat());
-        let mut nothing = Picture::of_one(Size::new(3, 1), [0; 4]);
+        let mut nothing = Rgba::of_one(Size::new(3, 1), [0; 4]);
         nothing.put(&over);
         assert_eq!(nothing.at(1, 0), [0, 100, 0, 128]);
     }
@@ -136,11 +136,11 @@ mod tests {
     fn a_frame_keeps_its_ratio_and_lies_in_the_middle() {
         let frame = Rgb { size: Size::new(2, 1), pixels: vec![10, 20, 30, 50, 60, 70] };
         let grey = [9, 9, 9, 255];
-        let large = Picture::of_frame(&frame, Size::new(8, 8), grey).unwrap();
+        let large = Rgba::of_frame(&frame, Size::new(8, 8), grey).unwrap();
         assert_eq!((large.at(0, 1), large.at(0, 2), large.at(7, 5)), (grey, [10, 20, 30, 255], [50, 60, 70, 255]));
-        let small = Picture::of_frame(&frame, Size::new(1, 1), grey).unwrap();
+        let small = Rgba::of_frame(&frame, Size::new(1, 1), grey).unwrap();
         assert!(small.at(0, 0) == [30, 40, 50, 255] || small.at(0, 0) == grey, "{small:?}");
         let torn = Rgb { size: Size::new(2, 1), pixels: vec![1] };
-        assert_eq!(Picture::of_frame(&torn, Size::new(8, 8), grey), None);
+        assert_eq!(Rgba::of_frame(&torn, Size::new(8, 8), grey), None);
     }
 }
