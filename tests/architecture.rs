@@ -77,7 +77,8 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("thread::scope", &["runtime"]),
     ("mpsc::", &["runtime"]),
     // The doctor writes a nameless file to see how fast the disk is.
-    ("tempfile::", &["source", "recording", "doctor"]),
+    // What ffmpeg says while it writes a video goes into one too.
+    ("tempfile::", &["source", "recording", "doctor", "export"]),
     ("fs::write", &["export"]),
     ("File::create", &["export"]),
     // Stages know no clock; the pipeline passes one on that it does not look at.

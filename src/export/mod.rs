@@ -4,6 +4,8 @@
 pub mod capture;
 pub mod csv;
 mod error;
+mod file;
+mod film;
 pub mod folder;
 pub mod glb_notes;
 pub mod gltf;
@@ -15,4 +17,6 @@ pub mod picture;
 mod thin_keys;
 
 pub use error::ExportError;
+pub use file::OutputFile;
+pub use film::Film;
 pub use folder::OutputFolder;
