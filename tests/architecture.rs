@@ -24,17 +24,39 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("signal", &[]),
     ("pipeline", &["model", "config", "outline", "track", "hierarchy", "skeleton", "shape", "motion", "signal"]),
     ("recording", &["model"]),
+    // What is drawn.
+    ("draw", &["model", "shape::Mesh", "shape::Foliage", "shape::FoliageGroup"]),
     // `capture.json` holds the whole configuration and what the push has achieved; the model's file holds the mesh.
     ("export", &["model", "config", "shape::Mesh", "shape::PushFigures"]),
-    // The screen draws outlines, and refuses the crossing ones as a file would be.
-    ("tui", &["model", "outline::crossing", "caught"]),
+    // A capture's tables back to the nouns: poses by the rule by which they were made, the outline as a file of its own
+    // would be.
+    ("capture", &["model", "config", "motion::PoseEstimator", "outline", "export"]),
+    // The screen draws outlines, and refuses the crossing ones as a file would be. It draws the tree's wood too, a coarse
+    // mesh that only it needs.
+    ("tui", &["model", "outline::crossing", "caught", "draw", "shape::Detail", "shape::Mesh", "shape::branches"]),
     (
         "runtime",
         &["model", "config", "source", "outline", "shape", "dynamics", "signal", "pipeline", "recording", "export"],
     ),
     // It tries what a capture would use: a camera, the decoder, the front end; the rest of the machine it reads itself.
     ("doctor", &["model", "config", "source", "outline::whole", "pipeline::FrontEnd"]),
-    ("cli", &["model", "config", "source", "outline", "pipeline", "recording", "runtime", "export", "tui", "doctor"]),
+    (
+        "cli",
+        &[
+            "model",
+            "config",
+            "source",
+            "outline",
+            "pipeline",
+            "recording",
+            "runtime",
+            "export",
+            "capture",
+            "draw",
+            "tui",
+            "doctor",
+        ],
+    ),
     ("main.rs", &["cli"]),
 ];
 
@@ -58,7 +80,8 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("thread::scope", &["runtime"]),
     ("mpsc::", &["runtime"]),
     // The doctor writes a nameless file to see how fast the disk is.
-    ("tempfile::", &["source", "recording", "doctor"]),
+    // What ffmpeg says while it writes a video goes into one too.
+    ("tempfile::", &["source", "recording", "doctor", "export"]),
     ("fs::write", &["export"]),
     ("File::create", &["export"]),
     // Stages know no clock; the pipeline passes one on that it does not look at.

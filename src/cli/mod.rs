@@ -8,6 +8,7 @@ mod hangup;
 mod play;
 mod record;
 mod recording;
+mod render;
 mod replay;
 mod service;
 mod session;
@@ -44,6 +45,8 @@ enum Command {
     Record(record::RecordArgs),
     /// Feed a v4l2loopback device from a recording or a video file; other programs see it as a camera.
     Play(play::PlayArgs),
+    /// Draw a capture's tree: a picture (.png) or a video (.mp4).
+    Render(render::RenderArgs),
     /// List the cameras that are plugged in.
     Devices(devices::DevicesArgs),
     /// Find out what is wrong with this machine, and what to do about it.
@@ -132,6 +135,7 @@ pub fn main() -> ExitCode {
         Command::Replay(args) => replay::run(args),
         Command::Record(args) => record::run(args),
         Command::Play(args) => play::run(args),
+        Command::Render(args) => render::run(args),
         Command::Devices(args) => devices::run(args),
         Command::Doctor(args) => doctor::run(args),
     };

@@ -19,6 +19,9 @@ pub enum ExportError {
     Denied { what: String },
     #[error("cannot write {what}: {source}")]
     Io { what: String, source: io::Error },
+    /// Or it is there without the encoder, as some builds are.
+    #[error("ffmpeg is not installed, or lacks libx264, and videos are written with it; run `sudo apt install ffmpeg`")]
+    NoFfmpeg,
     /// The model itself cannot be put into the format.
     #[error("cannot export this tree: {why}")]
     Unfit { why: String },

@@ -4,13 +4,19 @@
 pub mod capture;
 pub mod csv;
 mod error;
+mod file;
+mod film;
 pub mod folder;
+pub mod glb_notes;
 pub mod gltf;
 mod gltf_buffer;
 mod gltf_mesh;
 mod joints;
 mod number;
+pub mod picture;
 mod thin_keys;
 
 pub use error::ExportError;
+pub use file::OutputFile;
+pub use film::Film;
 pub use folder::OutputFolder;
