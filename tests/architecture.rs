@@ -24,8 +24,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("signal", &[]),
     ("pipeline", &["model", "config", "outline", "track", "hierarchy", "skeleton", "shape", "motion"]),
     ("recording", &["model"]),
-    // `capture.json` holds the whole configuration; the model's file holds the mesh.
-    ("export", &["model", "config", "shape::Mesh"]),
+    // `capture.json` holds the whole configuration; the model's file holds the mesh; the HTML page plots the angles.
+    ("export", &["model", "config", "shape::Mesh", "dynamics::angle_to_parent_deg"]),
     // The screen draws outlines, and refuses the crossing ones as a file would be.
     ("tui", &["model", "outline::crossing", "caught"]),
     ("runtime", &["model", "config", "source", "outline", "shape", "dynamics", "pipeline", "recording", "export"]),
@@ -42,6 +42,8 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("ratatui::", &["tui"]),
     ("gltf::", &["export"]),
     ("gltf_json::", &["export"]),
+    ("flate2::", &["export"]),
+    ("base64::", &["export"]),
     ("opencv::", &["track", "outline"]),
     ("turbojpeg::", &["source"]),
     ("mcap::", &["recording"]),

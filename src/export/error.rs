@@ -19,6 +19,11 @@ pub enum ExportError {
     Denied { what: String },
     #[error("cannot write {what}: {source}")]
     Io { what: String, source: io::Error },
+    /// The page of `--format html` is put into the program when it is built, where npm is there.
+    #[error(
+        "this arborcam was built without the HTML viewer; install npm and run `make build`, or export another format"
+    )]
+    NoViewer,
     /// The model itself cannot be put into the format.
     #[error("cannot export this tree: {why}")]
     Unfit { why: String },

@@ -8,6 +8,8 @@ pub mod folder;
 pub mod gltf;
 mod gltf_buffer;
 mod gltf_mesh;
+pub mod html;
+mod html_data;
 mod joints;
 mod number;
 mod thin_keys;
