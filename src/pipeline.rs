@@ -4,6 +4,7 @@
 //! from then on poses it and now and then builds it anew. `runtime` runs the same two halves on threads of their own.
 
 mod back;
+mod bark;
 mod dress;
 mod front;
 mod refine;

@@ -26,12 +26,30 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("recording", &["model"]),
     // `capture.json` holds the whole configuration; the model's file holds the mesh; the HTML page plots the angles.
     ("export", &["model", "config", "shape::Mesh", "dynamics::angle_to_parent_deg"]),
+    // A capture's tables back to the nouns: poses by the rule by which they were made, the outline as a file of its own
+    // would be.
+    ("capture", &["model", "config", "motion::PoseEstimator", "outline", "export"]),
     // The screen draws outlines, and refuses the crossing ones as a file would be.
     ("tui", &["model", "outline::crossing", "caught"]),
     ("runtime", &["model", "config", "source", "outline", "shape", "dynamics", "pipeline", "recording", "export"]),
     // It tries what a capture would use: a camera, the decoder, the front end; the rest of the machine it reads itself.
     ("doctor", &["model", "config", "source", "outline::whole", "pipeline::FrontEnd"]),
-    ("cli", &["model", "config", "source", "outline", "pipeline", "recording", "runtime", "export", "tui", "doctor"]),
+    (
+        "cli",
+        &[
+            "model",
+            "config",
+            "source",
+            "outline",
+            "pipeline",
+            "recording",
+            "runtime",
+            "export",
+            "capture",
+            "tui",
+            "doctor",
+        ],
+    ),
     ("main.rs", &["cli"]),
 ];
 

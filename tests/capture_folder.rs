@@ -282,7 +282,7 @@ fn the_stream_is_what_the_capture_says() {
 fn a_replay_is_reproducible_to_the_byte() {
     let on_one_core = Command::new("taskset").args(["-c", "0", "true"]).status().is_ok_and(|s| s.success());
     let again = replay(if on_one_core { &["taskset", "-c", "0"] } else { &[] }, &["--outline", OUTLINE, "--headless"]);
-    for name in ["capture.json", "tracks.csv", "nodes.csv", "motion.csv", "tree.glb"] {
+    for name in ["capture.json", "tracks.csv", "nodes.csv", "motion.csv", "tree.glb", "frame.jpg"] {
         let [a, b] = [made(), &again].map(|r| fs::read(r.out().join(name)).expect("file"));
         assert!(a == b, "{name} differs from one run to the next");
     }

@@ -1,6 +1,7 @@
 //! The moving tree as one GLB: core glTF 2.0, one skinned mesh, one animation of rotations.
 
 use super::ExportError;
+use super::capture::{AnimationNote, Software};
 use super::gltf_buffer::{BufferBuilder, Layout, accessor, le_f32};
 use super::gltf_mesh::push_skinned_mesh;
 use super::joints::{self, Keys};
@@ -16,6 +17,17 @@ use std::borrow::Cow;
 
 /// Keys are thinned so that no node is farther than this from its pose in any frame, px.
 pub const KEY_TOLERANCE_PX: f64 = 0.2;
+
+/// Where the model comes from, for the file's own notes.
+pub fn provenance(source: &str, software: &Software, poses: &[Pose]) -> Value {
+    json!({
+        "software": software,
+        "source": source,
+        "first_frame": poses.first().map(|p| p.frame),
+        "frames": poses.len(),
+        "measured": "front view: tracked points; depth and copied planes: estimated (Li et al. 2011)",
+    })
+}
 
 /// Everything that goes into the file.
 #[derive(Clone, Debug)]
@@ -49,20 +61,12 @@ impl Model<'_> {
     }
 }
 
-/// The bytes of the GLB file.
+/// The bytes of the GLB file, and what its animation is.
 ///
 /// # Errors
 /// [`ExportError::Unfit`] if the skeleton is empty, out of order or has positions that are no numbers, if a pose
 /// belongs to another tree, or if there is more than the format can count.
-pub fn glb(model: &Model) -> Result<Vec<u8>, ExportError> {
-    glb_and_keys(model).map(|(bytes, _)| bytes)
-}
-
-/// The bytes of the GLB file, and how many rotation keys are in it.
-///
-/// # Errors
-/// As of [`glb`].
-pub fn glb_and_keys(model: &Model) -> Result<(Vec<u8>, u64), ExportError> {
+pub fn glb(model: &Model) -> Result<(Vec<u8>, AnimationNote), ExportError> {
     check(model)?;
     let keys = joints::keys(model.skeleton, model.poses, model.tolerance_px)?;
     let mut root = Root::default();
@@ -90,7 +94,14 @@ pub fn glb_and_keys(model: &Model) -> Result<(Vec<u8>, u64), ExportError> {
     // The length in the header is computed when it is written.
     let header = gltf::binary::Header { magic: *b"glTF", version: 2, length: 0 };
     let bytes = gltf::binary::Glb { header, json, bin }.to_vec().map_err(|e| ExportError::unfit(e.to_string()))?;
-    Ok((bytes, keys.iter().map(|k| k.times_s.len() as u64).sum()))
+    let frames = model.poses.len() as u64;
+    let animation = AnimationNote {
+        first_frame: model.poses.first().map_or(0, |p| p.frame),
+        frames,
+        keys: keys.iter().map(|k| k.times_s.len() as u64).sum(),
+        raw_keys: keys.len() as u64 * frames,
+    };
+    Ok((bytes, animation))
 }
 
 fn check(model: &Model) -> Result<(), ExportError> {

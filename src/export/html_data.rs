@@ -82,7 +82,7 @@ impl Data {
             image: [size.width, size.height],
             foot_px: skeleton.foot_px,
             outline_px: capture.outline.as_ref().map_or_else(Vec::new, |o| o.polygon_px.clone()),
-            picture_time_s: None,
+            picture_time_s: capture.picture.as_ref().map(|p| p.time_s),
             start_s: rounded(start_s, 1e6),
             times_s: poses.iter().map(|p| rounded(p.time_s - start_s, 1e6)).collect(),
             branches: (0..skeleton.nodes.len()).map(|i| branch(skeleton, poses, sway, i)).collect(),

@@ -5,6 +5,7 @@ pub mod capture;
 pub mod csv;
 mod error;
 pub mod folder;
+pub mod glb_notes;
 pub mod gltf;
 mod gltf_buffer;
 mod gltf_mesh;
@@ -12,6 +13,7 @@ pub mod html;
 mod html_data;
 mod joints;
 mod number;
+pub mod picture;
 mod thin_keys;
 
 pub use error::ExportError;

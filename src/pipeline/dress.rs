@@ -1,8 +1,12 @@
 //! From the skeleton to all that is drawn of a tree: wood now, leaves where the film shows them.
 
+use super::bark;
 use crate::config::Config;
 use crate::model::{Outline, Pose, Rgb, Skeleton};
 use crate::shape::{Detail, Foliage, Limb, Mesh, branches, limbs};
+
+/// Triangles of the wood at most.
+const TRIANGLES: usize = 60_000;
 
 /// What the film shows of the tree apart from its motion.
 #[derive(Clone, Copy, Debug, Default)]
@@ -25,7 +29,11 @@ pub struct Dressed {
 }
 
 /// Dresses a skeleton.
-pub fn dress(skeleton: &Skeleton, _seen: Seen, _config: &Config) -> Dressed {
-    let wood = vec![branches(skeleton, Detail::for_budget(skeleton.nodes.len(), 60_000))];
-    Dressed { limbs: limbs(skeleton), wood, foliage: Foliage::default(), bark_rgb: [104, 84, 66] }
+pub fn dress(skeleton: &Skeleton, seen: Seen, _config: &Config) -> Dressed {
+    Dressed {
+        limbs: limbs(skeleton),
+        wood: vec![branches(skeleton, Detail::for_budget(skeleton.nodes.len(), TRIANGLES))],
+        foliage: Foliage::default(),
+        bark_rgb: seen.picture.and_then(|picture| bark::colour(picture, seen.pose, skeleton)).unwrap_or(bark::PLAIN),
+    }
 }
