@@ -41,6 +41,7 @@ export class Views {
   show(name, glide = true) {
     const goal = this.goal(name);
     this.name = name;
+    this.onChange.forEach((f) => f());
     cancelAnimationFrame(this.gliding);
     if (!glide || matchMedia("(prefers-reduced-motion: reduce)").matches) {
       this.place(goal);
