@@ -1,6 +1,6 @@
 # make demo: from a fresh machine to a moving tree in out/demo. make test: every test. make bench: the figures.
 # make install, make uninstall: program and service, below DESTDIR (for packages) and PREFIX.
-.PHONY: demo build test test-v4l2 test-real bench sweep lint setup install uninstall
+.PHONY: demo build viewer test test-v4l2 test-real bench sweep lint setup install uninstall
 
 demo: setup build
 	@scripts/demo.sh
@@ -8,8 +8,13 @@ demo: setup build
 setup:
 	@scripts/setup.sh
 
+# With the HTML viewer where npm is there; without it the program is complete but for `export --format html`.
 build:
+	@scripts/build-viewer.sh || echo "build: goes on without the HTML viewer" >&2
 	cargo build --release --locked
+
+viewer:
+	@scripts/build-viewer.sh
 
 # The V4L2 tests take a virtual machine (tests/vm); what could not be run is said at the end.
 test:

@@ -26,8 +26,9 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("recording", &["model"]),
     // What is drawn.
     ("draw", &["model", "shape::Mesh", "shape::Foliage", "shape::FoliageGroup"]),
-    // `capture.json` holds the whole configuration and what the push has achieved; the model's file holds the mesh.
-    ("export", &["model", "config", "shape::Mesh", "shape::PushFigures"]),
+    // `capture.json` holds the whole configuration and what the push has achieved; the model's file holds the mesh; the
+    // HTML page plots the angles.
+    ("export", &["model", "config", "shape::Mesh", "shape::PushFigures", "dynamics::angle_to_parent_deg"]),
     // A capture's tables back to the nouns: poses by the rule by which they were made, the outline as a file of its own
     // would be.
     ("capture", &["model", "config", "motion::PoseEstimator", "outline", "export"]),
@@ -67,6 +68,8 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("ratatui::", &["tui"]),
     ("gltf::", &["export"]),
     ("gltf_json::", &["export"]),
+    ("flate2::", &["export"]),
+    ("base64::", &["export"]),
     ("opencv::", &["track", "outline"]),
     ("turbojpeg::", &["source"]),
     ("mcap::", &["recording"]),

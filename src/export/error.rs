@@ -22,6 +22,11 @@ pub enum ExportError {
     /// Or it is there without the encoder, as some builds are.
     #[error("ffmpeg is not installed, or lacks libx264, and videos are written with it; run `sudo apt install ffmpeg`")]
     NoFfmpeg,
+    /// The page of `--format html` is put into the program when it is built, where npm is there.
+    #[error(
+        "this arborcam was built without the HTML viewer; install npm and run `make build`, or export another format"
+    )]
+    NoViewer,
     /// The model itself cannot be put into the format.
     #[error("cannot export this tree: {why}")]
     Unfit { why: String },

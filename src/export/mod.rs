@@ -11,6 +11,8 @@ pub mod glb_notes;
 pub mod gltf;
 mod gltf_buffer;
 mod gltf_mesh;
+pub mod html;
+mod html_data;
 mod joints;
 mod number;
 pub mod picture;
