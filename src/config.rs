@@ -2,9 +2,11 @@
 
 mod hierarchy;
 mod reload;
+mod wood;
 
 pub use hierarchy::{Affinity, Hierarchy};
 pub use reload::{Change, EFFECTS, Effect, effect};
+pub use wood::Wood;
 
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -22,6 +24,7 @@ pub struct Config {
     pub hierarchy: Hierarchy,
     pub skeleton: Skeleton,
     pub shape: Shape,
+    pub wood: Wood,
     pub motion: Motion,
     pub export: Export,
 }
@@ -334,6 +337,11 @@ impl Config {
             ("shape.attractors", self.shape.attractors.into(), (8.0, 5000.0, "8 to 5000")),
             ("shape.push_options", self.shape.push_options.into(), (1.0, 1001.0, "1 to 1001")),
             ("shape.push_range", self.shape.push_range, (0.0, 2.0, "0 to 2")),
+            ("wood.curl", self.wood.curl, share),
+            ("wood.twig_px", self.wood.twig_px, (0.0, 500.0, "0 (no twigs) to 500")),
+            ("wood.max_twigs", self.wood.max_twigs.into(), (0.0, 50_000.0, "0 to 50000")),
+            ("wood.trunk_width_px", self.wood.trunk_width_px, (0.0, 1000.0, "0 (measured) to 1000")),
+            ("wood.triangles", self.wood.triangles.into(), (100.0, 1e6, "100 to 1000000")),
         ];
         let motion = &self.motion;
         let more = [

@@ -2,7 +2,8 @@
 
 use crate::config::Config;
 use crate::model::{Outline, Pose, Rgb, Skeleton};
-use crate::shape::{Detail, Foliage, Limb, Mesh, branches, limbs};
+use crate::shape::{Envelope, Foliage, Limb, Mesh, limbs, wood_levels};
+use nalgebra::Point3;
 
 /// What the film shows of the tree apart from its motion.
 #[derive(Clone, Copy, Debug, Default)]
@@ -25,7 +26,24 @@ pub struct Dressed {
 }
 
 /// Dresses a skeleton.
-pub fn dress(skeleton: &Skeleton, _seen: Seen, _config: &Config) -> Dressed {
-    let wood = vec![branches(skeleton, Detail::for_budget(skeleton.nodes.len(), 60_000))];
-    Dressed { limbs: limbs(skeleton), wood, foliage: Foliage::default(), bark_rgb: [104, 84, 66] }
+pub fn dress(skeleton: &Skeleton, seen: Seen, config: &Config) -> Dressed {
+    let room = room(skeleton.foot_px, seen.outline);
+    let limbs = limbs(skeleton, &room, &config.wood, config.wood.seed.into());
+    let wood = wood_levels(&limbs, config.wood.triangles as usize);
+    Dressed { limbs, wood, foliage: Foliage::default(), bark_rgb: [104, 84, 66] }
+}
+
+/// Where twigs may grow (from and to, model axes, px): within the outline turned about its axis, and not out of the outline
+/// itself as seen from the front; everywhere where there is no outline.
+pub(super) fn room(foot_px: [f64; 2], outline: Option<&Outline>) -> impl Fn(&Point3<f64>, &Point3<f64>) -> bool {
+    let envelope = outline.map(|outline| Envelope::of_revolution(outline, foot_px));
+    move |from: &Point3<f64>, to: &Point3<f64>| match (&envelope, outline) {
+        (Some(envelope), Some(outline)) => {
+            let middle = nalgebra::center(from, to);
+            let seen = |p: &Point3<f64>| outline.contains(foot_px[0] + p.x, foot_px[1] - p.y);
+            // A branch that is outside itself, as a copy may be, is no barer for it.
+            envelope.contains(to) && envelope.contains(&middle) && (!seen(from) || (seen(to) && seen(&middle)))
+        }
+        _ => true,
+    }
 }

@@ -14,16 +14,13 @@ use crate::export::csv::{MotionCsv, TracksCsv, nodes};
 use crate::export::gltf::{KEY_TOLERANCE_PX, Model, glb_and_keys};
 use crate::export::{ExportError, OutputFolder};
 use crate::model::{Outline, Pose, Rgb, Skeleton, TrackSet};
-use crate::pipeline::Tree;
+use crate::pipeline::{Seen, Tree, dress};
 use crate::recording::SpoolReader;
-use crate::shape::{Detail, branches};
 use crate::source::SourceInfo;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-/// Triangles of the model at most.
-const TRIANGLES: usize = 60_000;
 /// Colour where no picture has been seen.
 const PLAIN_BARK: [u8; 3] = [104, 84, 66];
 
@@ -151,7 +148,9 @@ fn publish(folder: OutputFolder, capture: Capture, tree: Option<Arc<Tree>>) -> R
 
 fn model_of(job: &CaptureJob, tree: &Tree, poses: &[Pose]) -> Result<(Vec<u8>, u64), ExportError> {
     let skeleton = &tree.skeleton;
-    let mesh = branches(skeleton, Detail::for_budget(skeleton.nodes.len(), TRIANGLES));
+    let seen = Seen { outline: Some(&tree.outline), ..Seen::default() };
+    let dressed = dress(skeleton, seen, &job.config);
+    let mesh = dressed.wood.first().cloned().unwrap_or_default();
     let provenance = serde_json::json!({
         "software": Software::default(),
         "source": job.info.name,

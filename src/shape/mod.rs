@@ -1,7 +1,13 @@
 //! From the flat skeleton to a tree in space (Li et al. section 3).
 
+mod chain;
+mod chance;
+mod curl;
+mod cylinders;
 mod envelope;
 mod foliage;
+mod girth;
+mod habit;
 mod keep;
 mod limb;
 mod mesh;
@@ -9,15 +15,19 @@ mod planes;
 mod push;
 mod radius;
 mod tube;
+mod twigs;
 
+pub use curl::CURL_BOUND;
+pub use cylinders::{Cylinder, cylinders};
 pub use envelope::Envelope;
 pub use foliage::{Foliage, FoliageGroup};
+pub use girth::trunk_radius_px;
 pub use keep::{Twin, stand_as_before, twins};
-pub use limb::{Limb, Riding, Station, limbs};
-pub use mesh::{Detail, Mesh, branches};
+pub use limb::{Limb, Riding, Room, Station, limbs};
+pub use mesh::{LEVELS, Mesh, wood, wood_levels};
 pub use planes::copy_to_planes;
 pub use push::{Terms, envelope_distance, mean_branching_angle, push};
-pub use radius::pipe_model;
+pub use radius::{PIPE_EXPONENTS, TIP_RADIUS_PX, thicken};
 
 use crate::config;
 use crate::model::{Outline, Skeleton};
