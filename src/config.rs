@@ -3,10 +3,12 @@
 mod hierarchy;
 mod reload;
 mod shape;
+mod wood;
 
 pub use hierarchy::{Affinity, Hierarchy};
 pub use reload::{Change, EFFECTS, Effect, effect};
 pub use shape::{EnvelopeKind, Leader, Shape};
+pub use wood::Wood;
 
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -24,6 +26,7 @@ pub struct Config {
     pub hierarchy: Hierarchy,
     pub skeleton: Skeleton,
     pub shape: Shape,
+    pub wood: Wood,
     pub motion: Motion,
     pub export: Export,
 }
@@ -319,6 +322,11 @@ impl Config {
             ("shape.push_range", self.shape.push_range, (0.0, 2.0, "0 to 2")),
             ("shape.passes", self.shape.passes.into(), (1.0, 20.0, "1 to 20")),
             ("shape.angle_tolerance", self.shape.angle_tolerance, (0.01, 100.0, "0.01 to 100")),
+            ("wood.curl", self.wood.curl, share),
+            ("wood.twig_px", self.wood.twig_px, (0.0, 500.0, "0 (no twigs) to 500")),
+            ("wood.max_twigs", self.wood.max_twigs.into(), (0.0, 50_000.0, "0 to 50000")),
+            ("wood.trunk_width_px", self.wood.trunk_width_px, (0.0, 1000.0, "0 (measured) to 1000")),
+            ("wood.triangles", self.wood.triangles.into(), (100.0, 1e6, "100 to 1000000")),
         ];
         let motion = &self.motion;
         let more = [

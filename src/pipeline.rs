@@ -29,10 +29,8 @@ use std::sync::Arc;
 
 /// Fewer moving points than this make no tree, whatever is asked.
 pub const LEAST_MOVING: usize = 16;
-/// Share of the outline's width at the foot that is trunk: outlines are drawn wide.
-const TRUNK_SHARE: f64 = 0.6;
-/// Radius of the last twig, px.
-const TIP_RADIUS_PX: f64 = 0.6;
+/// Share of the outline's width at the foot that is trunk, where none can be measured above it.
+const TRUNK_SHARE: f64 = 0.5;
 
 /// Both halves in one thread.
 pub struct Pipeline {
@@ -186,8 +184,13 @@ pub fn build(
     }
     let (flat, tracks) = flat(&hierarchy, outline, config);
     let mut skeleton = shape::build(&flat, &tracks, outline, &config.shape);
-    let trunk_px = TRUNK_SHARE * skeleton::Foot::of(outline, None).half_width_px;
-    shape::pipe_model(&mut skeleton, trunk_px.max(2.0 * TIP_RADIUS_PX), TIP_RADIUS_PX);
+    let top_px = skeleton.nodes.get(1).map_or(foot_px, |top| skeleton.image_from_model(&top.position));
+    let measured = shape::trunk_radius_px(outline, skeleton.foot_px, top_px);
+    let given = Some(0.5 * config.wood.trunk_width_px).filter(|&given| given > 0.0);
+    let at_foot = || TRUNK_SHARE * skeleton::Foot::of(outline, None).half_width_px;
+    let trunk_px = given.or(measured).unwrap_or_else(at_foot).max(2.0 * shape::TIP_RADIUS_PX);
+    let room = dress::room(skeleton.foot_px, Some(outline));
+    shape::thicken(&mut skeleton, trunk_px, &room, &config.wood, config.wood.seed.into());
     let rest = |row: usize| (table.ids[row], hierarchy::rest_position_px(table, row));
     let first = First { frame, time_s, measure: evidence.measure, moving: evidence.moving.len(), forced };
     Some(Tree {

@@ -34,7 +34,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("capture", &["model", "config", "motion::PoseEstimator", "outline", "export"]),
     // The screen draws outlines, and refuses the crossing ones as a file would be. It draws the tree's wood too, a coarse
     // mesh that only it needs.
-    ("tui", &["model", "outline::crossing", "caught", "draw", "shape::Detail", "shape::Mesh", "shape::branches"]),
+    ("tui", &["model", "outline::crossing", "caught", "draw", "shape::Mesh", "shape::bare_wood"]),
     (
         "runtime",
         &["model", "config", "source", "outline", "shape", "dynamics", "signal", "pipeline", "recording", "export"],

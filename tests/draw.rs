@@ -4,7 +4,7 @@ mod synthetic;
 
 use arborcam::draw::{Bounds, Camera, Look, Model, Posed, Rgba, Texture, View, picture};
 use arborcam::model::{JointPose, NodeId, Pose, Size, Skeleton};
-use arborcam::shape::{Detail, Foliage, FoliageGroup, Mesh, branches};
+use arborcam::shape::{Foliage, FoliageGroup, Mesh, bare_wood};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use synthetic::{sway, tree};
 
@@ -13,7 +13,7 @@ const SIZE: Size = Size { width: 320, height: 240 };
 const LOOK: Look = Look { samples: 2, shadow: false, thicker_px: 0.0 };
 
 fn wood(skeleton: &Skeleton) -> Mesh {
-    branches(skeleton, Detail::for_budget(skeleton.nodes.len(), 20_000))
+    bare_wood(skeleton, 20_000)
 }
 
 fn bounds(posed: &Posed) -> Bounds {

@@ -5,7 +5,7 @@ mod synthetic;
 use arborcam::export::ExportError;
 use arborcam::export::gltf::{KEY_TOLERANCE_PX, Model, glb};
 use arborcam::model::{Pose, Skeleton};
-use arborcam::shape::{Detail, Mesh, branches};
+use arborcam::shape::Mesh;
 use gltf::animation::util::ReadOutputs;
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde_json::{Value, json};
@@ -124,7 +124,7 @@ fn worst_error_px(played: &Played, skeleton: &Skeleton, poses: &[Pose], metres_p
 fn a_viewer_shows_every_branch_where_the_pose_has_it() {
     let skeleton = synthetic::tree(7, 3);
     let poses = synthetic::sway(&skeleton, 60);
-    let mesh = branches(&skeleton, Detail::default());
+    let mesh = synthetic::skin(&skeleton);
     for (tolerance_px, metres_per_px, allowed) in [(0.001, 1.0, 0.01), (0.001, 0.004, 0.01), (0.2, 1.0, 0.201)] {
         let played = Played::parse(&write(&skeleton, &mesh, &poses, tolerance_px, metres_per_px));
         let worst = worst_error_px(&played, &skeleton, &poses, metres_per_px);
@@ -148,7 +148,7 @@ fn turning_all_the_way_round_has_no_jump() {
             pose.joints[i].position = pose.joints[parent].position + q * way;
         }
     }
-    let played = Played::parse(&write(&skeleton, &branches(&skeleton, Detail::default()), &poses, 0.2, 1.0));
+    let played = Played::parse(&write(&skeleton, &synthetic::skin(&skeleton), &poses, 0.2, 1.0));
     assert!(worst_error_px(&played, &skeleton, &poses, 1.0) < 0.201);
     for (_, keys) in played.channels.values() {
         for pair in keys.windows(2) {
@@ -165,7 +165,7 @@ fn a_branch_that_never_moves_has_no_channel_and_time_starts_at_0() {
     for pose in &mut poses {
         (pose.joints[1].rotation, pose.joints[2].rotation) = (UnitQuaternion::identity(), UnitQuaternion::identity());
     }
-    let played = Played::parse(&write(&skeleton, &branches(&skeleton, Detail::default()), &poses, 0.01, 0.0));
+    let played = Played::parse(&write(&skeleton, &synthetic::skin(&skeleton), &poses, 0.01, 0.0));
     assert!(!played.channels.is_empty());
     for still in 0..3 {
         assert!(!played.channels.contains_key(&still));
@@ -179,7 +179,7 @@ fn a_branch_that_never_moves_has_no_channel_and_time_starts_at_0() {
 #[test]
 fn the_smallest_and_oddest_models_are_still_valid_files() {
     let full = synthetic::tree(5, 2);
-    let full_mesh = branches(&full, Detail::default());
+    let full_mesh = synthetic::skin(&full);
     let poses = synthetic::sway(&full, 4);
     let mut foot_only = full.clone();
     foot_only.nodes.truncate(1);
@@ -193,7 +193,7 @@ fn the_smallest_and_oddest_models_are_still_valid_files() {
         ("no poses", &full, &full_mesh, &[]),
         ("one pose", &full, &full_mesh, &poses[..1]),
         ("no mesh", &full, &Mesh::default(), &poses),
-        ("only a foot", &foot_only, &branches(&foot_only, Detail::default()), &foot_poses),
+        ("only a foot", &foot_only, &synthetic::skin(&foot_only), &foot_poses),
         ("only a foot, no poses", &foot_only, &Mesh::default(), &[]),
         ("a clock that stands still", &full, &full_mesh, &stuck),
         ("a pose that was lost", &full, &full_mesh, &lost),
@@ -213,7 +213,7 @@ fn the_smallest_and_oddest_models_are_still_valid_files() {
 #[test]
 fn a_model_that_no_file_can_hold_is_refused_with_a_reason() {
     let good = synthetic::tree(3, 1);
-    let mesh = branches(&good, Detail::default());
+    let mesh = synthetic::skin(&good);
     let mut other = synthetic::sway(&good, 2);
     other[1].joints.pop();
     let mut nan = good.clone();
@@ -238,7 +238,7 @@ fn a_model_that_no_file_can_hold_is_refused_with_a_reason() {
 #[test]
 fn names_and_extras_tell_what_was_measured_and_what_was_copied() {
     let skeleton = synthetic::tree(3, 2);
-    let mesh = branches(&skeleton, Detail::default());
+    let mesh = synthetic::skin(&skeleton);
     let provenance = json!({"source": "oak \"Q\".mkv", "frames": 330});
     let extras = [json!({}), json!({"frequency_hz": 0.5})];
     let bytes = glb(&Model { node_extras: &extras, ..model(&skeleton, &mesh, &[], 0.2, 0.0, &provenance) }).unwrap().0;
@@ -267,7 +267,7 @@ fn a_realistic_tree_is_written_fast_and_small() {
     assert_eq!(skeleton.nodes.len(), 380);
     let poses = synthetic::sway(&skeleton, 330);
     let begin = std::time::Instant::now();
-    let mesh = branches(&skeleton, Detail::default());
+    let mesh = synthetic::skin(&skeleton);
     let provenance = json!({"software": "arborcam", "frames": 330});
     let (bytes, animation) = glb(&model(&skeleton, &mesh, &poses, KEY_TOLERANCE_PX, 0.0, &provenance)).unwrap();
     let took = begin.elapsed();

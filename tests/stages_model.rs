@@ -119,7 +119,7 @@ fn the_skeleton_is_folded_by_two_fifths_and_stands_on_the_foot() {
 fn built() -> Skeleton {
     let tracks = vec![2; 8];
     let mut tree = shape::build(&flat(), &tracks, &outline(), &config::Shape::default());
-    shape::pipe_model(&mut tree, 5.0, 0.6);
+    shape::thicken(&mut tree, 5.0, &|_, _| true, &config::Wood::default(), 1);
     tree
 }
 

@@ -161,7 +161,7 @@ fn model_of(
 ) -> Result<(Vec<u8>, AnimationNote), ExportError> {
     let skeleton = &tree.skeleton;
     let picture = job.picture.as_ref().map(|p| &*p.rgb);
-    let seen = Seen { picture, pose: pose_in_picture, outline: job.outline.as_deref() };
+    let seen = Seen { picture, pose: pose_in_picture, outline: Some(&tree.outline) };
     let dressed = dress(skeleton, seen, &job.config);
     let provenance = provenance(&job.info.name, &Software::default(), poses);
     glb(&Model {

@@ -1,11 +1,13 @@
-//! Generalised cylinders: the skeleton's branches as one skinned mesh.
+//! Generalised cylinders: the limbs as one skinned mesh with a given number of triangles.
 //!
-//! Joint `i` is the branch that ends in node `i` and turns about the parent node. A tube leaves its parent along the
-//! parent's direction and with the parent's weights, so both skins meet at the pivot, which neither moves.
+//! Joint `i` is the branch that ends in node `i` and turns about the parent node. A limb leaves its parent with the
+//! parent's weights, so both skins meet at the pivot, which neither moves.
 
-use super::tube::{self, Frame};
+use super::chain::{Chain, chains};
+use super::limb::{Limb, limbs};
+use super::tube;
+use crate::config;
 use crate::model::Skeleton;
-use nalgebra::Vector3;
 
 /// Triangles with skinning weights; all vectors but `indices` have one entry a vertex.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -24,103 +26,54 @@ pub struct Mesh {
     pub indices: Vec<u32>,
 }
 
-/// How finely branches are drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Detail {
-    /// Faces around the thickest branch, at least 3; thinner ones get fewer.
-    pub sides: u32,
-    /// Rings along one branch, at least 2.
-    pub rings: u32,
-}
+/// Triangles of the levels of detail against the finest, falling.
+pub const LEVELS: [f64; 3] = [1.0, 0.5, 0.25];
+/// Twigs shorter than this, divided by the density, are left out: at a distance at which the tree may be told so
+/// roughly they are hardly seen.
+const SHED_PX: f64 = 3.0;
+/// Factor between two densities that a mesh is made of.
+const STEP: f64 = 1.02;
 
-impl Default for Detail {
-    fn default() -> Self {
-        Self { sides: 12, rings: 8 }
-    }
-}
-
-impl Detail {
-    /// The finest detail, at most the default, with which `branches` branches stay within `max_triangles`; the
-    /// coarsest (3 sides, 2 rings) where nothing fits.
-    pub fn for_budget(branches: usize, max_triangles: usize) -> Self {
-        (0..=18)
-            .rev()
-            .map(|step| Self { sides: 3 + step / 2, rings: 2 + step / 3 })
-            .find(|d| branches.saturating_mul((2 * d.sides * (d.rings + 2)) as usize) <= max_triangles)
-            .unwrap_or(Self { sides: 3, rings: 2 })
-    }
-
-    /// Twigs are seen from so far that five faces look round.
-    fn sides_of(self, radius: f64, thickest: f64) -> usize {
-        let most = self.sides.max(3) as f64;
-        let least = most.min(5.0);
-        (least + (most - least) * (radius / thickest).clamp(0.0, 1.0).sqrt()).round() as usize
-    }
-}
-
-/// Draws every branch of the skeleton; a branch without length or thickness, or with a position that is no number, is
-/// left out. Joint numbers are node indices, at most 65535.
-pub fn branches(skeleton: &Skeleton, detail: Detail) -> Mesh {
-    let nodes = &skeleton.nodes;
-    let drawn: Vec<bool> = (0..nodes.len()).map(|i| is_drawn(skeleton, i)).collect();
-    let follow = following_radius(skeleton, &drawn);
-    let thickest = nodes.iter().map(|n| n.radius).filter(|r| r.is_finite()).fold(f64::MIN_POSITIVE, f64::max);
-    let mut ends: Vec<Option<Frame>> = vec![None; nodes.len()];
-    let mut lengths = vec![0.0; nodes.len()];
-    let mut mesh = Mesh::default();
-    for (i, node) in nodes.iter().enumerate() {
-        let Some(parent) = node.parent.map(|p| p.index()).filter(|&p| p < i) else { continue };
-        if !drawn[i] {
-            ends[i] = ends[parent];
-            lengths[i] = lengths[parent];
-            continue;
+/// The wood with about `triangles` triangles: one closed tube for every chain of limbs that go on in one another, those
+/// that leave it starting inside. Where fewer do, thick and curved wood gets more of them; where even the roughest tubes
+/// are too many, the smallest twigs are left out. No wood gives an empty mesh.
+pub fn wood(limbs: &[Limb], triangles: usize) -> Mesh {
+    let chains = chains(limbs);
+    let count = |density: f64| chains.iter().map(|c| triangles_of(c, density)).sum::<usize>();
+    let (mut low, mut high) = (1e-9_f64, 1e4_f64);
+    while high > low * STEP {
+        let middle = (low * high).sqrt();
+        if count(middle) <= triangles {
+            low = middle;
+        } else {
+            high = middle;
         }
-        let from = nodes[parent].position.coords;
-        let chord = node.position.coords - from;
-        lengths[i] = chord.norm();
-        let start = ends[parent].unwrap_or_else(|| Frame::along(chord / lengths[i]));
-        let tube = tube::Tube {
-            from,
-            to: node.position.coords,
-            start,
-            grows_from_branch: ends[parent].is_some(),
-            // Far enough inside the parent to hide the seam, not so far as to come out below it.
-            root_depth: (0.5 * node.radius).min(0.25 * lengths[parent]),
-            radius: node.radius,
-            end_radius: follow[i],
-            parent_joint: parent as u16,
-            joint: i as u16,
-            sides: detail.sides_of(node.radius, thickest),
-            rings: detail.rings.max(2) as usize,
-        };
-        ends[i] = Some(tube.append_to(&mut mesh));
+    }
+    // The rest goes to the first chains, which are the thickest, as long as there is any.
+    let mut left = triangles.saturating_sub(count(low));
+    let mut mesh = Mesh::default();
+    for chain in &chains {
+        let more = triangles_of(chain, high).saturating_sub(triangles_of(chain, low));
+        let density = if more <= left { high } else { low };
+        left -= if more <= left { more } else { 0 };
+        if triangles_of(chain, density) > 0 {
+            tube::append(chain, density, &mut mesh);
+        }
     }
     mesh
 }
 
-/// Whether branch `i` has a length and a thickness to be seen.
-fn is_drawn(skeleton: &Skeleton, i: usize) -> bool {
-    let node = &skeleton.nodes[i];
-    let Some(parent) = node.parent.filter(|p| p.index() < i && i <= usize::from(u16::MAX)) else { return false };
-    let chord: Vector3<f64> = node.position - skeleton.nodes[parent.index()].position;
-    // `chord.norm() > ..` is false for what is no number.
-    chord.norm() > 1e-6 && chord.norm().is_finite() && node.radius > 1e-6 && node.radius.is_finite()
+/// The wood in falling levels of detail, [`LEVELS`] of `triangles`, all on the same joints.
+pub fn wood_levels(limbs: &[Limb], triangles: usize) -> Vec<Mesh> {
+    LEVELS.iter().map(|share| wood(limbs, (triangles as f64 * share).round() as usize)).collect()
 }
 
-/// Radius with which the tree goes on beyond every node: that of its thickest drawn child, seen through children that
-/// are not drawn; 0 at a tip.
-fn following_radius(skeleton: &Skeleton, drawn: &[bool]) -> Vec<f64> {
-    let mut follow = vec![0.0_f64; drawn.len()];
-    for (i, node) in skeleton.nodes.iter().enumerate().rev() {
-        if let Some(p) = node.parent.filter(|p| p.index() < i) {
-            let own = if drawn[i] { node.radius } else { follow[i] };
-            follow[p.index()] = follow[p.index()].max(own);
-        }
-    }
-    for (f, node) in follow.iter_mut().zip(&skeleton.nodes) {
-        if node.radius.is_finite() {
-            *f = f.min(node.radius);
-        }
-    }
-    follow
+/// The branches of the skeleton alone, without curl and twigs, with about `triangles` triangles: for small pictures.
+pub fn bare_wood(skeleton: &Skeleton, triangles: usize) -> Mesh {
+    let plain = config::Wood { curl: 0.0, max_twigs: 0, ..config::Wood::default() };
+    wood(&limbs(skeleton, &|_, _| false, &plain, 0), triangles)
+}
+
+fn triangles_of(chain: &Chain, density: f64) -> usize {
+    if chain.size_px * density < SHED_PX { 0 } else { tube::triangles(chain, density) }
 }

@@ -1,11 +1,16 @@
 //! From the flat skeleton to a tree in space (Li et al. section 3).
 
 mod angles;
+mod chain;
 mod chance;
+mod curl;
+mod cylinders;
 mod diener;
 mod envelope;
 mod foliage;
 mod fuse;
+mod girth;
+mod habit;
 mod hull;
 mod keep;
 mod limb;
@@ -18,19 +23,23 @@ mod search;
 mod topiary;
 mod trunk;
 mod tube;
+mod twigs;
 
 pub use angles::{Angles, mean_branching_angle};
+pub use curl::CURL_BOUND;
+pub use cylinders::{Cylinder, cylinders};
 pub use diener::diener;
 pub use envelope::Envelope;
 pub use foliage::{Foliage, FoliageGroup};
 pub use fuse::fuse;
+pub use girth::trunk_radius_px;
 pub use keep::{Twin, stand_as_before, twins};
-pub use limb::{Limb, Riding, Station, limbs};
+pub use limb::{Limb, Riding, Room, Station, limbs};
 pub use measure::{PushFigures, side_symmetry};
-pub use mesh::{Detail, Mesh, branches};
+pub use mesh::{LEVELS, Mesh, bare_wood, wood, wood_levels};
 pub use planes::copy_to_planes;
 pub use push::{Terms, envelope_distance, push};
-pub use radius::pipe_model;
+pub use radius::{PIPE_EXPONENTS, TIP_RADIUS_PX, thicken};
 pub use topiary::{Cut, Drawn, Topiary, TopiaryError, coverage, topiary};
 pub use trunk::{is_trunk, trunk};
 

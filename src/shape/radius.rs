@@ -1,118 +1,111 @@
 //! How thick the branches are: the pipe model.
 
+use super::limb::{Grown, Room, limbs};
+use crate::config;
 use crate::model::Skeleton;
 
-/// Exponent e of `r_parent^e = sum r_child^e`. Shinozaki's pipes and Leonardo's rule give 2, measured trees 2 to 3.
-pub const PIPE_EXPONENT: f64 = 2.5;
+/// Exponent e of `r_parent^e = sum r_child^e`, from and to. Shinozaki's pipes and Leonardo's rule give 2, measured trees 2
+/// to 3.
+pub const PIPE_EXPONENTS: [f64; 2] = [1.8, 3.0];
+/// Radius of the last twig, px at 640 px picture width.
+pub const TIP_RADIUS_PX: f64 = 0.6;
+/// Share of a branch's length over which the pipes of what leaves it join it.
+const JOINS_WITHIN: f64 = 0.3;
+/// Power with which a limb that ends runs out.
+const TIP_TAPER: f64 = 0.7;
+/// How much wider a trunk is at the ground, and the share of its length over which that is lost.
+const ROOT_FLARE: f64 = 0.3;
+const FLARE_WITHIN: f64 = 0.2;
 
-/// Gives every node its radius (px): `trunk_radius_px` at levels 0 and 1, thinner with every fork, never below
-/// `tip_radius_px`, and no branch thicker than the one that it grows from.
-///
-/// Only measured nodes count as pipes. Copies stand for branches that the camera cannot tell from the measured ones
-/// in depth; they take the radius of their original, so the branches stay as thick as they were filmed and the trunk
-/// as well, however many planes there are.
-pub fn pipe_model(skeleton: &mut Skeleton, trunk_radius_px: f64, tip_radius_px: f64) {
+/// Gives every node the radius (px) of the branch that ends there, at the middle of its length: `trunk_radius_px` for the
+/// trunk, thinner with every branch and twig that leaves, never below [`TIP_RADIUS_PX`] unless the trunk is. Twigs count
+/// as pipes: they are those that [`limbs`] adds with the same arguments.
+pub fn thicken(skeleton: &mut Skeleton, trunk_radius_px: f64, room: Room, wood: &config::Wood, seed: u64) {
     let trunk = if trunk_radius_px.is_finite() { trunk_radius_px.max(0.0) } else { 0.0 };
-    let tip = tip_radius_px.max(0.0).min(trunk);
-    let pipes = pipes(skeleton);
-    // The whole tree's pipes: those of every measured branch that leaves the foot.
-    let total = pipes.first().copied().unwrap_or(1.0).max(1.0);
-    for (i, &own_pipes) in pipes.iter().enumerate() {
-        let node = &skeleton.nodes[i];
-        let own = match node.copy_of {
-            _ if node.level <= 1 => trunk,
-            Some(original) if original.index() < i => skeleton.nodes[original.index()].radius,
-            Some(_) => tip,
-            None => (trunk * (own_pipes / total).powf(1.0 / PIPE_EXPONENT)).max(tip),
-        };
-        let parent = node.parent.and_then(|p| skeleton.nodes.get(p.index())).map_or(trunk, |p| p.radius);
-        skeleton.nodes[i].radius = own.min(parent);
+    skeleton.nodes.iter_mut().for_each(|n| n.radius = trunk);
+    for limb in limbs(skeleton, room, wood, seed).iter().filter(|l| !l.twig) {
+        if let Some(node) = skeleton.nodes.get_mut(limb.node.index()).filter(|n| n.level > 1) {
+            node.radius = limb.stations[limb.stations.len() / 2].radius;
+        }
+    }
+    for i in 0..skeleton.nodes.len() {
+        let parent = skeleton.nodes[i].parent.filter(|p| p.index() < i);
+        if let Some(parent) = parent.map(|p| skeleton.nodes[p.index()].radius) {
+            skeleton.nodes[i].radius = skeleton.nodes[i].radius.min(parent);
+        }
     }
 }
 
-/// Number of measured tips above every node; summing them is the same as summing `r^e` from the tips down.
-fn pipes(skeleton: &Skeleton) -> Vec<f64> {
-    let mut pipes = vec![0.0_f64; skeleton.nodes.len()];
-    for (i, node) in skeleton.nodes.iter().enumerate().rev() {
-        if node.copy_of.is_some() {
-            continue;
-        }
-        pipes[i] = pipes[i].max(1.0);
-        if let Some(p) = node.parent.filter(|p| p.index() < i) {
-            pipes[p.index()] += pipes[i];
-        }
-    }
-    pipes
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::model::{Node, NodeId, NodeName, Size};
-    use nalgebra::Point3;
-
-    fn node(parent: Option<u32>, level: u8, copy_of: Option<u32>) -> Node {
-        Node {
-            name: NodeName(0),
-            parent: parent.map(NodeId),
-            level,
-            position: Point3::origin(),
-            radius: 0.0,
-            n_tracks: 0,
-            certainty: 0.0,
-            copy_of: copy_of.map(NodeId),
-            plane_angle: 0.0,
+/// Thickness along every limb: `r = r_trunk (pipes above / pipes of the tree)^(1/e)`, where a limb that carries nothing is
+/// one pipe. What leaves joins gradually, so that no limb has a step, and a limb ends as thick as the one begins that it
+/// goes on in.
+///
+/// Only what was measured counts towards what carries it. Copies stand for branches that the camera cannot tell from
+/// the measured ones in depth: with them the branches would become thinner than they were filmed.
+pub(super) fn by_pipes(grown: &mut [Grown], skeleton: &Skeleton, trunk_radius_px: f64) {
+    let trunk = if trunk_radius_px.is_finite() { trunk_radius_px.max(0.0) } else { 0.0 };
+    let tip = (TIP_RADIUS_PX * f64::from(skeleton.image_size.width) / 640.0).min(trunk);
+    let is_copy = |g: &Grown| skeleton.nodes.get(g.limb.node.index()).is_some_and(|n| n.copy_of.is_some());
+    let mut bearing = vec![Bearing::default(); grown.len()];
+    for i in (0..grown.len()).rev() {
+        let own = bearing[i].settle();
+        let Some(p) = grown[i].limb.parent.filter(|&p| p < i) else { continue };
+        if !is_copy(&grown[i]) || is_copy(&grown[p]) {
+            bearing[p].leaving.push((grown[i].at, own));
         }
     }
-
-    fn skeleton(nodes: Vec<Node>) -> Skeleton {
-        Skeleton { nodes, foot_px: [0.0, 0.0], image_size: Size::new(640, 480) }
-    }
-
-    /// Foot, trunk, a fork into 2 and 3, a fork of 2 into 4 and 5.
-    fn measured() -> Vec<Node> {
-        [(None, 0), (Some(0), 1), (Some(1), 2), (Some(1), 2), (Some(2), 3), (Some(2), 3)]
-            .map(|(p, l)| node(p, l, None))
-            .to_vec()
-    }
-
-    #[test]
-    fn pipes_add_up_at_every_fork_and_the_trunk_is_as_thick_as_it_was_measured() {
-        let mut s = skeleton(measured());
-        pipe_model(&mut s, 12.0, 0.1);
-        let r: Vec<f64> = s.nodes.iter().map(|n| n.radius).collect();
-        assert_eq!((r[0], r[1]), (12.0, 12.0));
-        for (parent, children) in [(1, [2, 3]), (2, [4, 5])] {
-            let sum: f64 = children.iter().map(|&c: &usize| r[c].powf(PIPE_EXPONENT)).sum();
-            assert!((sum / r[parent].powf(PIPE_EXPONENT) - 1.0).abs() < 1e-9, "{r:?}");
-        }
-    }
-
-    #[test]
-    fn more_planes_do_not_make_the_measured_branches_thinner() {
-        let mut alone = skeleton(measured());
-        let mut copied = alone.clone();
-        for (parent, original) in [(1, 2), (1, 3), (6, 4), (6, 5)] {
-            copied.nodes.push(node(Some(parent), copied.nodes[original].level, Some(original as u32)));
-        }
-        pipe_model(&mut alone, 12.0, 0.5);
-        pipe_model(&mut copied, 12.0, 0.5);
-        assert_eq!(alone.nodes[..], copied.nodes[..6]);
-        for n in &copied.nodes[6..] {
-            assert_eq!(n.radius, copied.nodes[n.copy_of.unwrap().index()].radius);
-        }
-    }
-
-    #[test]
-    fn odd_radii_give_no_child_thicker_than_its_parent_and_no_nan() {
-        for (trunk, tip) in [(12.0, 100.0), (0.0, 1.0), (f64::NAN, 1.0), (5.0, f64::NAN), (-1.0, -1.0)] {
-            let mut s = skeleton(measured());
-            pipe_model(&mut s, trunk, tip);
-            for n in &s.nodes {
-                assert!(n.radius.is_finite() && n.radius >= 0.0);
-                assert!(n.parent.is_none_or(|p| n.radius <= s.nodes[p.index()].radius), "{trunk} {tip}");
+    let roots = grown.iter().zip(&bearing).filter(|(g, _)| g.limb.parent.is_none());
+    let total = roots.map(|(_, b)| b.pipes(0.0)).fold(1.0, f64::max);
+    // The exponent with which one pipe is as thick as the last twig.
+    let fits = total.max(1.1).ln() / (trunk / tip.max(1e-9)).max(1.1).ln();
+    let exponent = fits.clamp(PIPE_EXPONENTS[0], PIPE_EXPONENTS[1]);
+    let thick = |pipes: f64| (trunk * (pipes / total).powf(1.0 / exponent)).max(tip);
+    for (i, bearing) in bearing.iter().enumerate() {
+        let (earlier, rest) = grown.split_at_mut(i);
+        let Some(Grown { limb, at }) = rest.first_mut() else { continue };
+        let most = limb.parent.and_then(|p| earlier.get(p)).map(|p| p.limb.radius_at(*at));
+        let last = limb.stations.len().saturating_sub(1).max(1) as f64;
+        for (k, station) in limb.stations.iter_mut().enumerate() {
+            let t = k as f64 / last;
+            let mut radius = thick(bearing.pipes(t));
+            if !bearing.goes_on {
+                radius = tip + (radius - tip) * (1.0 - t).powf(TIP_TAPER);
             }
+            if limb.parent.is_none() {
+                radius *= 1.0 + ROOT_FLARE * (1.0 - t / FLARE_WITHIN).max(0.0).powi(2);
+            }
+            // No thicker than what it grows from.
+            station.radius = most.map_or(radius, |most| radius.min(most));
         }
-        pipe_model(&mut skeleton(Vec::new()), 3.0, 1.0);
+    }
+}
+
+/// What a limb carries.
+#[derive(Clone, Debug, Default)]
+struct Bearing {
+    /// Where along the limb (0 to 1) how many pipes leave.
+    leaving: Vec<(f64, f64)>,
+    /// Pipes that its end has.
+    end: f64,
+    goes_on: bool,
+}
+
+impl Bearing {
+    /// Takes what goes on at the end out of what leaves, once all is known, and gives the pipes at the base.
+    fn settle(&mut self) -> f64 {
+        let at_end = |&k: &usize| self.leaving[k].0 >= 1.0;
+        let on =
+            (0..self.leaving.len()).filter(at_end).max_by(|&a, &b| self.leaving[a].1.total_cmp(&self.leaving[b].1));
+        self.goes_on = on.is_some();
+        self.end = on.map_or(1.0, |k| self.leaving.swap_remove(k).1);
+        self.pipes(0.0)
+    }
+
+    /// Pipes at share `t` of the limb.
+    fn pipes(&self, t: f64) -> f64 {
+        let half = 0.5 * JOINS_WITHIN;
+        let joined =
+            |&(at, n): &(f64, f64)| n * ((at.clamp(half, 1.0 - half) - t) / JOINS_WITHIN + 0.5).clamp(0.0, 1.0);
+        self.end + self.leaving.iter().map(joined).sum::<f64>()
     }
 }

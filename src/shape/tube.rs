@@ -1,177 +1,174 @@
-//! One tapering, slightly curved tube with frames carried along without twist.
+//! One closed tube along a chain of limbs, with frames carried along without twist.
 
-use super::limb::Riding;
+use super::chain::{self, Chain};
+use super::curl::square_to;
+use super::limb::Station;
 use super::mesh::Mesh;
-use crate::model::NodeId;
 use nalgebra::{UnitQuaternion, Vector3};
+use std::f64::consts::TAU;
 
-/// Direction of a branch and one direction across it, both of length 1 and square to each other.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Frame {
-    pub tangent: Vector3<f64>,
-    pub across: Vector3<f64>,
+/// Numbers of sides that are used: few steps, so that few rings differ from the next.
+const SIDES: [usize; 18] = [3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 96, 128, 192, 256];
+/// How much wider a side branch is where it leaves, and how fast that is lost, in radii.
+const COLLAR: f64 = 0.35;
+const COLLAR_RADII: f64 = 1.5;
+
+/// A ring of a tube.
+struct Ring {
+    station: Station,
+    tangent: Vector3<f64>,
+    sides: usize,
 }
 
-impl Frame {
-    /// A frame along `tangent` (of length 1), turned about it in an arbitrary but stable way.
-    pub fn along(tangent: Vector3<f64>) -> Self {
-        let axis = if tangent.z.abs() < 0.9 { Vector3::z() } else { Vector3::x() };
-        Self { tangent, across: square_to(axis, tangent).unwrap_or_else(Vector3::y) }
-    }
-
-    /// The same frame turned by the least rotation that brings its tangent to `tangent` (parallel transport).
-    fn carried_to(self, tangent: Vector3<f64>) -> Self {
-        let turned = UnitQuaternion::rotation_between(&self.tangent, &tangent).map_or(self.across, |q| q * self.across);
-        square_to(turned, tangent).map_or_else(|| Self::along(tangent), |across| Self { tangent, across })
-    }
-}
-
-/// `v` less its part along `tangent`, made length 1; `None` if nothing is left.
-fn square_to(v: Vector3<f64>, tangent: Vector3<f64>) -> Option<Vector3<f64>> {
-    (v - tangent * v.dot(&tangent)).try_normalize(1e-9)
-}
-
-/// What one branch looks like at rest, px.
-pub(super) struct Tube {
-    pub from: Vector3<f64>,
-    pub to: Vector3<f64>,
-    /// Frame in which the parent's tube ends.
-    pub start: Frame,
-    /// False for a trunk, which stands on its foot and is closed there.
-    pub grows_from_branch: bool,
-    /// How deep inside the parent the tube begins.
-    pub root_depth: f64,
-    pub radius: f64,
-    /// 0 makes a closed tip.
-    pub end_radius: f64,
-    pub parent_joint: u16,
-    pub joint: u16,
-    pub sides: usize,
-    pub rings: usize,
-}
-
-/// A point of the middle line.
-struct Station {
-    /// 0 at the parent, 1 at the end; below 0 inside the parent.
-    t: f64,
-    centre: Vector3<f64>,
-    frame: Frame,
-    /// Way along the middle line from the first station.
-    s: f64,
-}
-
-impl Tube {
-    /// Adds the tube's triangles and returns the frame in which it ends.
-    pub fn append_to(&self, mesh: &mut Mesh) -> Frame {
-        let stations = self.stations();
-        let first = mesh.positions.len() as u32;
-        for (k, station) in stations.iter().enumerate() {
-            let before = &stations[k.saturating_sub(1)];
-            let after = &stations[(k + 1).min(stations.len() - 1)];
-            let slope = (self.radius_at(after.t) - self.radius_at(before.t)) / (after.s - before.s).max(1e-12);
-            self.ring(mesh, station, slope);
+/// Triangles that [`append`] makes of the chain.
+pub(super) fn triangles(chain: &Chain, density: f64) -> usize {
+    let mut count = 0;
+    let mut before: Option<usize> = None;
+    walk(chain, density, |station, last| {
+        let sides = sides_of(station.radius, density);
+        match before {
+            None => count += sides - 2,
+            Some(before) if last => count += before,
+            Some(before) => count += before + sides,
         }
-        let row = self.sides as u32 + 1;
-        let last = stations.len() as u32 - 1;
-        for k in 0..last {
-            for j in 0..self.sides as u32 {
-                let (a, b) = (first + k * row + j, first + (k + 1) * row + j);
-                mesh.indices.extend([a, a + 1, b]);
-                // The last ring of a tip is a single point: its second triangle would have no area.
-                if k + 1 < last || self.end_radius > 0.0 {
-                    mesh.indices.extend([a + 1, b + 1, b]);
-                }
+        before = Some(sides);
+    });
+    count
+}
+
+fn sides_of(radius: f64, density: f64) -> usize {
+    let wanted = chain::sides(radius) * density;
+    let above = SIDES.partition_point(|&s| s as f64 <= wanted);
+    SIDES[above.saturating_sub(1)]
+}
+
+/// Calls `at` with every ring's station; the last one is the tip.
+fn walk(chain: &Chain, density: f64, mut at: impl FnMut(&Station, bool)) {
+    if let Some(first) = chain.links.first() {
+        at(&first.stations[0], false);
+    }
+    let end = chain.links.len() - 1;
+    for (k, link) in chain.links.iter().enumerate() {
+        let n = link.rings(density);
+        for i in 1..=n {
+            // How thick it is there is all that counting needs, and the same stations are drawn.
+            at(&link.at(i as f64 / n as f64).0, k == end && i == n);
+        }
+    }
+}
+
+/// Adds the tube's triangles.
+pub(super) fn append(chain: &Chain, density: f64, mesh: &mut Mesh) {
+    let rings = rings(chain, density);
+    let Some(first) = rings.first() else { return };
+    let mut across = square_to(first.tangent);
+    close_base(mesh, first, across);
+    let collar = if chain.grows_from_branch { COLLAR } else { 0.0 };
+    let widened =
+        |s: f64, radius: f64| radius * (1.0 + collar * (-s / (COLLAR_RADII * first.station.radius).max(1e-9)).exp());
+    let (mut s, mut v) = (0.0, 0.0);
+    let mut before: Option<(u32, usize)> = None;
+    for (k, ring) in rings.iter().enumerate() {
+        if let Some(last) = k.checked_sub(1).map(|j| &rings[j]) {
+            let step = (ring.station.at - last.station.at).norm();
+            s += step;
+            v += step / (TAU * (0.5 * (ring.station.radius + last.station.radius)).max(1e-6));
+            across = carried(across, last.tangent, ring.tangent);
+        }
+        let tangent = ring.tangent;
+        let is_tip = k + 1 == rings.len();
+        let slope = slope(&rings, k);
+        let start = mesh.positions.len() as u32;
+        let sides = if is_tip { before.map_or(ring.sides, |(_, sides)| sides) } else { ring.sides };
+        // A side branch is wider at its base, but never wider than what it grows from, which it starts in the middle of.
+        let radius = if is_tip {
+            0.0
+        } else if k == 0 {
+            ring.station.radius
+        } else {
+            widened(s, ring.station.radius)
+        };
+        for j in 0..=sides {
+            let (sin, cos) = (TAU * (j % sides) as f64 / sides as f64).sin_cos();
+            let outward = across * cos + tangent.cross(&across) * sin;
+            let normal = (outward - tangent * slope).normalize();
+            let at = ring.station.at.coords + outward * radius;
+            vertex(mesh, at, normal, [j as f64 / sides as f64, v], &ring.station);
+        }
+        if let Some((below, below_sides)) = before {
+            if is_tip {
+                (0..sides as u32).for_each(|j| mesh.indices.extend([below + j, below + j + 1, start + j]));
+            } else {
+                join(mesh, (below, below_sides), (start, sides));
             }
         }
-        if !self.grows_from_branch {
-            self.close_foot(mesh, &stations[0]);
-        }
-        stations.last().map_or(self.start, |s| s.frame)
+        before = Some((start, sides));
     }
+}
 
-    /// Middle line as a Hermite curve: it leaves along the parent and arrives along its own chord.
-    fn stations(&self) -> Vec<Station> {
-        let chord = self.to - self.from;
-        let length = chord.norm();
-        let direction = chord / length;
-        // A branch that turns back must not run a loop first.
-        let straightness = 0.5 + 0.5 * self.start.tangent.dot(&direction);
-        let m0 = self.start.tangent * (length * (0.15 + 0.75 * straightness));
-        let m1 = chord * 0.9;
-        let mut out: Vec<Station> = Vec::with_capacity(self.rings + 2);
-        let mut frame = self.start;
-        if self.grows_from_branch && self.root_depth > 1e-6 * length {
-            let centre = self.from - self.start.tangent * self.root_depth;
-            out.push(Station { t: -self.root_depth / length, centre, frame, s: 0.0 });
+/// `across`, square to `from`, turned by the least rotation that brings `from` to `to` (parallel transport).
+fn carried(across: Vector3<f64>, from: Vector3<f64>, to: Vector3<f64>) -> Vector3<f64> {
+    let turned = UnitQuaternion::rotation_between(&from, &to).map_or(across, |q| q * across);
+    (turned - to * turned.dot(&to)).try_normalize(1e-9).unwrap_or_else(|| square_to(to))
+}
+
+fn rings(chain: &Chain, density: f64) -> Vec<Ring> {
+    let mut out: Vec<Ring> = Vec::new();
+    for (k, link) in chain.links.iter().enumerate() {
+        let n = link.rings(density);
+        for i in (if k == 0 { 0 } else { 1 })..=n {
+            let (station, mut tangent) = link.at(i as f64 / n as f64);
+            if let Some(next) = chain.links.get(k + 1).filter(|_| i == n) {
+                // Where two limbs meet at an angle the ring stands half way.
+                tangent = (tangent + next.at(0.0).1).try_normalize(0.1).unwrap_or(tangent);
+            }
+            out.push(Ring { tangent, sides: sides_of(station.radius, density), station });
         }
-        for k in 0..=self.rings {
-            let t = k as f64 / self.rings as f64;
-            let (t2, t3) = (t * t, t * t * t);
-            let centre = self.from + m0 * (t3 - 2.0 * t2 + t) + chord * (3.0 * t2 - 2.0 * t3) + m1 * (t3 - t2);
-            let way = m0 * (3.0 * t2 - 4.0 * t + 1.0) + chord * (6.0 * t - 6.0 * t2) + m1 * (3.0 * t2 - 2.0 * t);
-            frame = frame.carried_to(way.try_normalize(1e-9 * length).unwrap_or(direction));
-            let s = out.last().map_or(0.0, |before| before.s + (centre - before.centre).norm());
-            out.push(Station { t, centre, frame, s });
-        }
-        out
     }
+    out
+}
 
-    /// Even taper between forks; a tip stays round and closes.
-    fn radius_at(&self, t: f64) -> f64 {
-        let t = t.clamp(0.0, 1.0);
-        if self.end_radius > 0.0 {
-            self.radius + (self.end_radius - self.radius) * t
+/// By how much the radius grows along the way, at ring `k`.
+fn slope(rings: &[Ring], k: usize) -> f64 {
+    let radius = |j: usize| if j + 1 == rings.len() { 0.0 } else { rings[j].station.radius };
+    let (a, b) = (k.saturating_sub(1), (k + 1).min(rings.len() - 1));
+    let way: f64 = (a..b).map(|j| (rings[j + 1].station.at - rings[j].station.at).norm()).sum();
+    ((radius(b) - radius(a)) / way.max(1e-9)).clamp(-2.0, 2.0)
+}
+
+/// Triangles between two rings whose numbers of sides may differ: whichever ring is behind goes on.
+fn join(mesh: &mut Mesh, (below, m): (u32, usize), (above, n): (u32, usize)) {
+    let (mut i, mut j) = (0, 0);
+    while i < m || j < n {
+        let (a, b) = (below + i as u32, above + j as u32);
+        if j == n || (i < m && (i + 1) * n <= (j + 1) * m) {
+            mesh.indices.extend([a, a + 1, b]);
+            i += 1;
         } else {
-            self.radius * (1.0 - t * t)
+            mesh.indices.extend([a, b + 1, b]);
+            j += 1;
         }
     }
+}
 
-    /// Share of the branch's own joint: none at the pivot, all from half its length on.
-    fn own_weight(t: f64) -> f32 {
-        let x = (2.0 * t).clamp(0.0, 1.0);
-        (x * x * (3.0 - 2.0 * x)) as f32
+/// The end of the tube: under a trunk for whoever looks from below, of a branch inside what it grows from.
+fn close_base(mesh: &mut Mesh, ring: &Ring, across: Vector3<f64>) {
+    let first = mesh.positions.len() as u32;
+    let third = ring.tangent.cross(&across);
+    for j in 0..ring.sides {
+        let (sin, cos) = (TAU * j as f64 / ring.sides as f64).sin_cos();
+        let rim = ring.station.at.coords + (across * cos + third * sin) * ring.station.radius;
+        vertex(mesh, rim, -ring.tangent, [0.5 + 0.5 * cos, 0.5 + 0.5 * sin], &ring.station);
     }
+    for j in 1..ring.sides as u32 - 1 {
+        mesh.indices.extend([first, first + j + 1, first + j]);
+    }
+}
 
-    fn ring(&self, mesh: &mut Mesh, station: &Station, slope: f64) {
-        let Frame { tangent, across } = station.frame;
-        let third = tangent.cross(&across);
-        let radius = self.radius_at(station.t);
-        for j in 0..=self.sides {
-            let turn = j as f64 / self.sides as f64;
-            // The seam's two vertices must agree to the last bit.
-            let (sin, cos) = (std::f64::consts::TAU * (j % self.sides) as f64 / self.sides as f64).sin_cos();
-            let outward = across * cos + third * sin;
-            let normal = (outward - tangent * slope).normalize();
-            let v = station.s / (std::f64::consts::TAU * self.radius);
-            self.vertex(mesh, station.centre + outward * radius, normal, [turn, v], station.t);
-        }
-    }
-
-    /// A disc under the trunk, for whoever looks from below.
-    fn close_foot(&self, mesh: &mut Mesh, foot: &Station) {
-        let first = mesh.positions.len() as u32;
-        let Frame { tangent, across } = foot.frame;
-        let third = tangent.cross(&across);
-        let below = -tangent;
-        self.vertex(mesh, foot.centre, below, [0.5, 0.5], foot.t);
-        for j in 0..self.sides {
-            let (sin, cos) = (std::f64::consts::TAU * j as f64 / self.sides as f64).sin_cos();
-            let rim = foot.centre + (across * cos + third * sin) * self.radius_at(foot.t);
-            self.vertex(mesh, rim, below, [0.5 + 0.5 * cos, 0.5 + 0.5 * sin], foot.t);
-        }
-        for j in 0..self.sides as u32 {
-            mesh.indices.extend([first, first + 1 + (j + 1) % self.sides as u32, first + 1 + j]);
-        }
-    }
-
-    fn vertex(&self, mesh: &mut Mesh, at: Vector3<f64>, normal: Vector3<f64>, uv: [f64; 2], t: f64) {
-        mesh.positions.push([at.x as f32, at.y as f32, at.z as f32]);
-        mesh.normals.push([normal.x as f32, normal.y as f32, normal.z as f32]);
-        mesh.uvs.push([uv[0] as f32, uv[1] as f32]);
-        let own = Self::own_weight(t);
-        let Riding { joints, weights } =
-            Riding::between(NodeId(self.parent_joint.into()), NodeId(self.joint.into()), own);
-        mesh.joints.push(joints);
-        mesh.weights.push(weights);
-    }
+fn vertex(mesh: &mut Mesh, at: Vector3<f64>, normal: Vector3<f64>, uv: [f64; 2], station: &Station) {
+    mesh.positions.push([at.x as f32, at.y as f32, at.z as f32]);
+    mesh.normals.push([normal.x as f32, normal.y as f32, normal.z as f32]);
+    mesh.uvs.push([uv[0] as f32, uv[1] as f32]);
+    mesh.joints.push(station.riding.joints);
+    mesh.weights.push(station.riding.weights);
 }

@@ -3,7 +3,7 @@
 use super::theme::Theme;
 use crate::draw;
 use crate::model::{Size, Skeleton, Snapshot};
-use crate::shape::{Detail, Mesh, branches};
+use crate::shape::{Mesh, bare_wood};
 use std::sync::Arc;
 
 /// A cell has eight dots; more triangles than these would not be seen.
@@ -22,8 +22,7 @@ impl Solid {
         if self.of.as_ref().is_some_and(|of| Arc::ptr_eq(of, skeleton)) {
             return self;
         }
-        let mesh = branches(skeleton, Detail::for_budget(skeleton.nodes.len(), TRIANGLES));
-        Self { of: Some(skeleton.clone()), mesh: Arc::new(mesh) }
+        Self { of: Some(skeleton.clone()), mesh: Arc::new(bare_wood(skeleton, TRIANGLES)) }
     }
 
     /// The tree in its present pose, its branches in their colours; transparent where it is not.

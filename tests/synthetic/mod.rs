@@ -3,8 +3,9 @@
 // Every test file compiles this module for itself and uses a part of it.
 #![allow(dead_code)]
 
+use arborcam::config::Wood;
 use arborcam::model::{JointPose, Node, NodeId, NodeName, Pose, Size, Skeleton};
-use arborcam::shape::pipe_model;
+use arborcam::shape::{Limb, Mesh, limbs, thicken, wood};
 use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
 
 /// A number in -1..1 that is always the same for the same arguments.
@@ -61,7 +62,7 @@ pub fn tree(levels: u8, planes: usize) -> Skeleton {
     }
     (0..).zip(&mut nodes).for_each(|(i, n)| n.name = NodeName(i));
     let mut skeleton = Skeleton { nodes, foot_px: [640.0, 700.0], image_size: Size::new(1280, 720) };
-    pipe_model(&mut skeleton, 14.0, 0.6);
+    thicken(&mut skeleton, 14.0, &|_, _| true, &bare(), 1);
     skeleton
 }
 
@@ -89,4 +90,19 @@ pub fn sway(skeleton: &Skeleton, frames: usize) -> Vec<Pose> {
         Pose { frame: 150 + k as u64, time_s, joints }
     };
     (0..frames).map(pose).collect()
+}
+
+/// Wood without twigs.
+pub fn bare() -> Wood {
+    Wood { twig_px: 0.0, ..Wood::default() }
+}
+
+/// The limbs of a skeleton whose twigs may grow anywhere.
+pub fn limbs_of(skeleton: &Skeleton, wood: &Wood) -> Vec<Limb> {
+    limbs(skeleton, &|_, _| true, wood, 1)
+}
+
+/// The skin of a skeleton without twigs.
+pub fn skin(skeleton: &Skeleton) -> Mesh {
+    wood(&limbs_of(skeleton, &bare()), 60_000)
 }

@@ -1,0 +1,136 @@
+//! Chains: limbs that go on in one another, drawn as one tube without a seam.
+
+use super::limb::{FARTHEST_PX, Limb, Station};
+use nalgebra::Vector3;
+
+/// Edges along a tube are at most so many times as long as those around it.
+const LONGEST_EDGE: f64 = 6.0;
+
+/// One limb's share of a chain.
+#[derive(Clone, Debug)]
+pub(super) struct Link<'a> {
+    pub stations: &'a [Station],
+    /// Rings that it needs at density 1.
+    need: f64,
+    /// Rings that it has at least: where a skin bends, twigs must not float beside it.
+    least: usize,
+}
+
+/// From the base of a limb over those that it goes on in to a tip.
+#[derive(Clone, Debug)]
+pub(super) struct Chain<'a> {
+    pub links: Vec<Link<'a>>,
+    /// Length of the longest twig of the chain and of what it carries, px; infinite if a branch of the skeleton is there.
+    pub size_px: f64,
+    /// False for what stands on the ground.
+    pub grows_from_branch: bool,
+}
+
+impl Link<'_> {
+    /// Rings along the link, without that of its base.
+    pub fn rings(&self, density: f64) -> usize {
+        ((self.need * density).round() as usize).clamp(self.least, 20_000)
+    }
+
+    /// The station at share `t` of the link, 0 to 1, and the direction there: a cubic through the stations, whose slopes
+    /// are those of their neighbours.
+    pub fn at(&self, t: f64) -> (Station, Vector3<f64>) {
+        let s = self.stations;
+        let place = t.clamp(0.0, 1.0) * (s.len() - 1) as f64;
+        let k = (place as usize).min(s.len() - 2);
+        let (a, b, x) = (&s[k], &s[k + 1], place - k as f64);
+        let chord = b.at - a.at;
+        // At the ends the slope that makes the curvature go on evenly, so that straight stays straight.
+        let slope = |i: usize| match (i.checked_sub(1).map(|j| s[j].at), s.get(i + 1)) {
+            (Some(before), Some(after)) => (after.at - before) * 0.5,
+            (None, Some(after)) if s.len() > 2 => (after.at - s[i].at) * 2.0 - (s[2].at - s[0].at) * 0.5,
+            (Some(before), None) if s.len() > 2 => (s[i].at - before) * 2.0 - (s[i].at - s[i - 2].at) * 0.5,
+            _ => chord,
+        };
+        let (m0, m1) = (slope(k), slope(k + 1));
+        let (x2, x3) = (x * x, x * x * x);
+        let at = a.at + m0 * (x3 - 2.0 * x2 + x) + chord * (3.0 * x2 - 2.0 * x3) + m1 * (x3 - x2);
+        let way = m0 * (3.0 * x2 - 4.0 * x + 1.0) + chord * (6.0 * (x - x2)) + m1 * (3.0 * x2 - 2.0 * x);
+        let way = way.try_normalize(1e-12).or(chord.try_normalize(1e-12)).unwrap_or_else(Vector3::y);
+        let radius = a.radius + (b.radius - a.radius) * x;
+        (Station { at, radius, riding: a.riding.towards(b.riding, x as f32) }, way)
+    }
+}
+
+/// How finely a tube of `radius` px must be divided around at density 1, not rounded.
+pub(super) fn sides(radius: f64) -> f64 {
+    std::f64::consts::PI * (0.5 * radius).sqrt()
+}
+
+/// Puts the limbs together to chains, each limb in one; those without length or with what is no number are left out.
+pub(super) fn chains(limbs: &[Limb]) -> Vec<Chain<'_>> {
+    let good: Vec<bool> = limbs.iter().map(is_good).collect();
+    let goes_on = continuations(limbs);
+    let mut size_px: Vec<f64> = limbs.iter().map(|l| if l.twig { l.length() } else { f64::INFINITY }).collect();
+    for (i, limb) in limbs.iter().enumerate().rev() {
+        if let Some(p) = limb.parent.filter(|&p| p < i && good[i]) {
+            size_px[p] = size_px[p].max(size_px[i]);
+        }
+    }
+    let mut taken = vec![false; limbs.len()];
+    let mut out = Vec::new();
+    for first in 0..limbs.len() {
+        let (mut at, mut links) = (Some(first).filter(|&i| good[i]), Vec::new());
+        while let Some(i) = at.filter(|&i| !taken[i]) {
+            taken[i] = true;
+            links.push(link(&limbs[i]));
+            at = goes_on[i];
+        }
+        if !links.is_empty() {
+            let grows_from_branch = limbs[first].parent.is_some_and(|p| p < first && good[p]);
+            out.push(Chain { links, size_px: size_px[first], grows_from_branch });
+        }
+    }
+    out
+}
+
+/// The limb that every limb goes on in: of those that leave its end the thickest, and of those alike the straightest.
+pub(super) fn continuations(limbs: &[Limb]) -> Vec<Option<usize>> {
+    let good: Vec<bool> = limbs.iter().map(is_good).collect();
+    let mut best: Vec<Option<(f64, usize)>> = vec![None; limbs.len()];
+    for (i, limb) in limbs.iter().enumerate().filter(|(i, _)| good[*i]) {
+        let Some(p) = limb.parent.filter(|&p| p < i && good[p]) else { continue };
+        let (Some(end), base) = (limbs[p].stations.last(), &limb.stations[0]) else { continue };
+        let score = base.radius * (2.0 + limbs[p].arrives().dot(&leaves(limb)));
+        let at_end = (end.at - base.at).norm() <= 1e-9 * (1.0 + end.at.coords.norm());
+        if at_end && best[p].is_none_or(|(most, _)| score > most) {
+            best[p] = Some((score, i));
+        }
+    }
+    best.into_iter().map(|b| b.map(|(_, k)| k)).collect()
+}
+
+fn is_good(limb: &Limb) -> bool {
+    let near = |s: &Station| s.at.iter().all(|x| x.abs() <= 2.0 * FARTHEST_PX);
+    let finite = |s: &Station| near(s) && (0.0..=FARTHEST_PX).contains(&s.radius);
+    limb.stations.len() >= 2
+        && limb.stations.iter().all(finite)
+        && limb.stations.iter().any(|s| s.radius > 1e-6)
+        && limb.length() > 1e-6
+}
+
+fn leaves(limb: &Limb) -> Vector3<f64> {
+    (limb.stations[1].at - limb.stations[0].at).try_normalize(1e-12).unwrap_or_else(Vector3::y)
+}
+
+fn link(limb: &Limb) -> Link<'_> {
+    let s = &limb.stations;
+    let mut need = 0.0;
+    let mut before: Option<Vector3<f64>> = None;
+    for pair in s.windows(2) {
+        let step = pair[1].at - pair[0].at;
+        let Some(way) = step.try_normalize(1e-9) else { continue };
+        // A bow of curvature k and length l told in n straight pieces is off by k l^2 / (8 n^2).
+        let bend = before.map_or(0.0, |b| b.angle(&way));
+        need += (bend * step.norm() / 8.0).sqrt();
+        let radius = (0.5 * (pair[0].radius + pair[1].radius)).max(1e-6);
+        need += step.norm() * sides(radius) / (LONGEST_EDGE * std::f64::consts::TAU * radius);
+        before = Some(way);
+    }
+    Link { stations: s, need, least: if limb.twig { 1 } else { 3 } }
+}

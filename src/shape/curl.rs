@@ -1,0 +1,132 @@
+//! The middle line of a branch: the path of least jerk of Flash and Hogan, "The coordination of arm movements" (1984).
+//!
+//! Their path from point to point is a polynomial of the fifth degree; through a point on the way it is two of them that
+//! agree in all derivatives up to the fourth (their appendix). The problem is linear in the positions, so sums of such
+//! paths are such paths again: one between the ends with the directions there, and one excursion for each via point.
+
+use super::chance::Chance;
+use nalgebra::{Point3, Vector3};
+
+/// Greatest distance of a middle line from the straight line between its ends, as a share of their distance, at curl 1:
+/// [`BOW`] for each of the two directions at the ends, and both excursions.
+pub const CURL_BOUND: f64 = 2.0 * BOW + 2.0 * EXCURSION;
+/// Greatest value of `t - 6 t^3 + 8 t^4 - 3 t^5`, which a slope of 1 at one end adds, times the largest slope across.
+const BOW: f64 = 0.1971 * MOST_ACROSS;
+/// Directions at the ends lean away from the straight line by at most this sine: branches turn, they do not loop.
+const MOST_ACROSS: f64 = 0.4;
+/// Length of each of the two excursions at curl 1.
+const EXCURSION: f64 = 0.06;
+/// Where on the way the via points are: a third and two thirds make a bow, an S or, out of one plane, a twist.
+const VIA: [f64; 2] = [1.0 / 3.0, 2.0 / 3.0];
+
+/// A path from one end of a branch to the other.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Curve {
+    from: Point3<f64>,
+    to: Point3<f64>,
+    chord: Vector3<f64>,
+    /// Velocities at both ends beyond that of the straight line, and the excursions at [`VIA`].
+    ends: [Vector3<f64>; 2],
+    via: [Vector3<f64>; 2],
+}
+
+impl Curve {
+    /// From `from` to `to`, leaving along `leaves` and arriving along `arrives` (of length 1) as nearly as `curl` (0 to
+    /// 1) lets it; the excursions are drawn from `chance`.
+    pub fn new(ends: [Point3<f64>; 2], leaves: Vector3<f64>, arrives: Vector3<f64>, curl: f64, chance: Chance) -> Self {
+        let chord = ends[1] - ends[0];
+        let length = chord.norm();
+        let along = chord / length.max(1e-12);
+        let curl = curl.clamp(0.0, 1.0);
+        let across = |v: Vector3<f64>| {
+            let across = (v - along * v.dot(&along)) * (2.0 * curl).min(1.0);
+            length * across * (MOST_ACROSS / across.norm().max(MOST_ACROSS))
+        };
+        let mut chance = chance;
+        let mut excursion = || {
+            let (turn, far) = (chance.between(0.0, std::f64::consts::TAU), chance.share().sqrt());
+            let side = square_to(along);
+            length * curl * EXCURSION * far * (side * turn.cos() + along.cross(&side) * turn.sin())
+        };
+        Self {
+            from: ends[0],
+            to: ends[1],
+            chord,
+            ends: [across(leaves), across(arrives)],
+            via: [excursion(), excursion()],
+        }
+    }
+
+    /// The point at share `t` of the way; at 0 and 1 the ends themselves, to the last bit.
+    pub fn at(&self, t: f64) -> Point3<f64> {
+        if t >= 1.0 {
+            return self.to;
+        }
+        let excursions = self.via[0] * passing(VIA[0], t) + self.via[1] * passing(VIA[1], t);
+        self.from + self.chord * t + self.ends[0] * leaving(t) - self.ends[1] * leaving(1.0 - t) + excursions
+    }
+}
+
+/// The path of least jerk that starts with velocity 1 at 0, ends at rest at 0, without acceleration at either end.
+fn leaving(t: f64) -> f64 {
+    t * (1.0 - t * t * (6.0 - t * (8.0 - 3.0 * t)))
+}
+
+/// The path of least jerk from 0 at rest through 1 at time `via` back to 0 at rest, at time `t` of 0..1 (Flash and Hogan,
+/// appendix: equations of x-, x+, pi_1 and c_1 with x_0 = x_f = 0, x_1 = 1, t_f = 1).
+fn passing(via: f64, t: f64) -> f64 {
+    let (a, rest) = (via, (1.0 - via).powi(5));
+    let pi = -20.0 / (a.powi(5) * rest);
+    let c = (120.0 * a * a - 300.0 * a + 200.0) / (a * a * rest);
+    let (t3, t4, t5) = (t.powi(3), t.powi(4), t.powi(5));
+    let before = pi
+        * (a.powi(4) * (15.0 * t4 - 30.0 * t3) + a.powi(3) * (80.0 * t3 - 30.0 * t4) - 60.0 * t3 * a * a
+            + 30.0 * t4 * a
+            - 6.0 * t5)
+        + c * (15.0 * t4 - 10.0 * t3 - 6.0 * t5);
+    before / 720.0 + pi * (t - a).max(0.0).powi(5) / 120.0
+}
+
+/// Some direction square to `along`, always the same one.
+pub(super) fn square_to(along: Vector3<f64>) -> Vector3<f64> {
+    let axis = if along.z.abs() < 0.9 { Vector3::z() } else { Vector3::x() };
+    (axis - along * axis.dot(&along)).try_normalize(1e-9).unwrap_or_else(Vector3::y)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_path_through_a_point_is_there_in_time_and_smooth_on_the_way() {
+        for via in [0.2, 1.0 / 3.0, 0.5, 0.8] {
+            assert!((passing(via, via) - 1.0).abs() < 1e-9);
+            for t in [0.0, 1.0] {
+                let h = 1e-4;
+                let inward = if t == 0.0 { h } else { 1.0 - h };
+                assert!(passing(via, t).abs() < 1e-9, "{via} {t}");
+                assert!(passing(via, inward).abs() < 1e-6, "at rest at both ends: {via} {t}");
+            }
+        }
+    }
+
+    #[test]
+    fn ends_stay_and_the_bound_holds() {
+        let (a, b) = (Point3::new(3.0, 5.0, -2.0), Point3::new(40.0, 60.0, 9.0));
+        let along = (b - a).normalize();
+        for k in 0..500 {
+            let mut chance = Chance::new(k);
+            let mut any =
+                || Vector3::from_fn(|_, _| chance.between(-1.0, 1.0)).try_normalize(1e-9).unwrap_or_else(Vector3::x);
+            let (leaves, arrives, curl) = (any(), any(), (k % 5) as f64 / 4.0);
+            let curve = Curve::new([a, b], leaves, arrives, curl, Chance::new(k));
+            assert!((curve.at(0.0) - a).norm() < 1e-9 && (curve.at(1.0) - b).norm() < 1e-9);
+            for t in 1..100 {
+                let way = curve.at(f64::from(t) / 100.0) - a;
+                let off = (way - along * way.dot(&along)).norm() / (b - a).norm();
+                assert!(off <= CURL_BOUND * (2.0 * curl).min(1.0) + 1e-9, "{off} at curl {curl}");
+                assert!(curl > 0.0 || off < 1e-9, "curl 0 is straight");
+            }
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! Branches as limbs: where they run, how thick they are, which twigs they carry.
+
+mod synthetic;
+
+use arborcam::config::Wood;
+use arborcam::model::{NodeId, Skeleton};
+use arborcam::shape::{CURL_BOUND, Limb, PIPE_EXPONENTS, TIP_RADIUS_PX, cylinders, limbs, thicken};
+use nalgebra::Point3;
+
+fn anywhere(_: &Point3<f64>, _: &Point3<f64>) -> bool {
+    true
+}
+
+fn base_and_end(limb: &Limb) -> (Point3<f64>, Point3<f64>) {
+    (limb.stations[0].at, limb.stations[limb.stations.len() - 1].at)
+}
+
+#[test]
+fn nodes_stay_where_they_were_filmed_and_curl_keeps_its_bound() {
+    let skeleton = synthetic::tree(6, 2);
+    for curl in [0.0, 0.3, 1.0] {
+        let mut bent = 0.0f64;
+        for limb in synthetic::limbs_of(&skeleton, &Wood { curl, ..synthetic::bare() }) {
+            let (base, end) = base_and_end(&limb);
+            let node = &skeleton.nodes[limb.node.index()];
+            assert_eq!((base, end), (skeleton.nodes[node.parent.unwrap().index()].position, node.position));
+            let chord = end - base;
+            for s in &limb.stations {
+                let way = s.at - base;
+                bent = bent.max((way - chord * (way.dot(&chord) / chord.norm_squared())).norm() / chord.norm());
+            }
+        }
+        assert!(bent <= CURL_BOUND, "{bent} at curl {curl}");
+        assert_eq!(bent < 1e-9, curl == 0.0, "curl {curl} bends by {bent}");
+    }
+}
+
+#[test]
+fn a_limb_begins_on_what_carries_it_and_is_no_thicker() {
+    let skeleton = synthetic::tree(6, 3);
+    let all = synthetic::limbs_of(&skeleton, &Wood::default());
+    assert!(all.iter().filter(|l| l.twig).count() > 200, "twigs");
+    for limb in &all {
+        let Some(parent) = limb.parent.map(|p| &all[p]) else { continue };
+        let base = &limb.stations[0];
+        let off = |pair: &[arborcam::shape::Station]| {
+            let way = pair[1].at - pair[0].at;
+            let t = ((base.at - pair[0].at).dot(&way) / way.norm_squared()).clamp(0.0, 1.0);
+            (pair[0].at + way * t - base.at).norm()
+        };
+        let off = parent.stations.windows(2).map(off).fold(f64::INFINITY, f64::min);
+        assert!(off < 1e-6, "a limb begins {off} px beside its parent");
+        let thickest = parent.stations.iter().map(|s| s.radius).fold(0.0, f64::max);
+        assert!(limb.stations.iter().all(|s| s.radius <= thickest + 1e-9));
+        for pair in limb.stations.windows(2) {
+            assert!(pair[1].radius <= pair[0].radius + 1e-9, "a limb grows thicker on its way");
+        }
+        if limb.twig {
+            assert_eq!(limb.node, parent.node, "a twig is carried by the branch that it stands on");
+            assert!(limb.stations.iter().all(|s| s.riding == base.riding), "a twig that bends on its own");
+        }
+    }
+}
+
+/// r^e adds up at every fork, with twigs as without, and the trunk is as thick as it was measured.
+#[test]
+fn pipes_add_up() {
+    let mut skeleton = synthetic::tree(5, 1);
+    thicken(&mut skeleton, 12.0, &anywhere, &synthetic::bare(), 1);
+    let r: Vec<f64> = skeleton.nodes.iter().map(|n| n.radius).collect();
+    assert_eq!((r[0], r[1]), (12.0, 12.0));
+    let all = synthetic::limbs_of(&skeleton, &Wood { curl: 0.0, ..synthetic::bare() });
+    let base = |k: usize| all[k].stations[0].radius;
+    let inner: Vec<(usize, Vec<usize>)> = (0..all.len())
+        .map(|p| (p, (0..all.len()).filter(|&c| all[c].parent == Some(p)).collect::<Vec<_>>()))
+        .filter(|(_, children)| !children.is_empty())
+        .collect();
+    // The foot is wider than the trunk: its fork is judged by the trunk's own radius.
+    let own = |p: usize| if all[p].parent.is_none() { 12.0 } else { base(p) };
+    let exponent = PIPE_EXPONENTS.iter().map(|e| e * 1000.0).map(|e| e as u32).collect::<Vec<_>>();
+    let fits = (exponent[0]..=exponent[1]).map(|e| f64::from(e) / 1000.0).any(|e| {
+        inner.iter().all(|(p, children)| {
+            let sum: f64 = children.iter().map(|&c| base(c).powf(e)).sum();
+            (sum / own(*p).powf(e) - 1.0).abs() < 0.01
+        })
+    });
+    assert!(fits, "no exponent between {PIPE_EXPONENTS:?} adds up");
+}
+
+#[test]
+fn twigs_make_the_last_branches_thin_and_leave_the_trunk_as_it_is() {
+    let mut skeleton = synthetic::tree(5, 1);
+    thicken(&mut skeleton, 12.0, &anywhere, &Wood::default(), 1);
+    assert_eq!(skeleton.nodes[1].radius, 12.0);
+    let all = synthetic::limbs_of(&skeleton, &Wood::default());
+    let tip = TIP_RADIUS_PX * 2.0; // the picture is 1280 px wide
+    for limb in all.iter().filter(|l| l.twig) {
+        let end = limb.stations[limb.stations.len() - 1].radius;
+        assert!(end >= tip - 1e-9, "{end}");
+    }
+    let tips = (0..all.len()).filter(|&k| all.iter().all(|l| l.parent != Some(k)));
+    for k in tips {
+        let end = all[k].stations[all[k].stations.len() - 1].radius;
+        assert!((end - tip).abs() < 1e-9, "a tip ends {end} px thick");
+    }
+}
+
+#[test]
+fn more_planes_do_not_make_the_measured_branches_thinner() {
+    let radii = |planes| {
+        let mut skeleton = synthetic::tree(4, planes);
+        thicken(&mut skeleton, 12.0, &anywhere, &synthetic::bare(), 1);
+        let n = skeleton.measured();
+        skeleton.nodes[..n].iter().map(|n| n.radius).collect::<Vec<_>>()
+    };
+    assert_eq!(radii(1), radii(3));
+}
+
+#[test]
+fn odd_radii_give_no_branch_thicker_than_what_carries_it_and_no_nan() {
+    for trunk in [0.0, f64::NAN, f64::INFINITY, -1.0, 0.1, 1e9] {
+        let mut skeleton = synthetic::tree(4, 2);
+        thicken(&mut skeleton, trunk, &anywhere, &Wood::default(), 1);
+        for n in &skeleton.nodes {
+            assert!(n.radius.is_finite() && n.radius >= 0.0);
+            assert!(n.parent.is_none_or(|p| n.radius <= skeleton.nodes[p.index()].radius), "{trunk}");
+        }
+    }
+    let mut empty = Skeleton { nodes: Vec::new(), ..synthetic::tree(1, 1) };
+    thicken(&mut empty, 3.0, &anywhere, &Wood::default(), 1);
+}
+
+#[test]
+fn twigs_stay_in_their_room_are_no_shorter_than_asked_and_no_more() {
+    let skeleton = synthetic::tree(6, 2);
+    let below = |_: &Point3<f64>, to: &Point3<f64>| to.y < 300.0;
+    let settings = Wood { twig_px: 7.0, max_twigs: 400, ..Wood::default() };
+    let all = limbs(&skeleton, &below, &settings, 5);
+    let twigs: Vec<&Limb> = all.iter().filter(|l| l.twig).collect();
+    let bounded = limbs(&skeleton, &anywhere, &settings, 5).iter().filter(|l| l.twig).count();
+    assert_eq!(bounded, 400, "there is room for more");
+    assert!(twigs.len() > 100 && twigs.len() <= 400, "{} twigs", twigs.len());
+    for twig in &twigs {
+        let (base, end) = base_and_end(twig);
+        assert!(end.y < 300.0);
+        assert!((end - base).norm() >= 14.0 - 1e-9, "7 px at 640 px are 14 at 1280: {}", (end - base).norm());
+    }
+    assert!(synthetic::limbs_of(&skeleton, &synthetic::bare()).iter().all(|l| !l.twig));
+    let walled_in = |_: &Point3<f64>, _: &Point3<f64>| false;
+    assert!(limbs(&skeleton, &walled_in, &settings, 5).iter().all(|l| !l.twig));
+}
+
+/// A bound leaves out the smallest twigs of the whole tree, not all of its last branches.
+#[test]
+fn every_main_branch_gets_twigs() {
+    let skeleton = synthetic::tree(5, 3);
+    let all = synthetic::limbs_of(&skeleton, &Wood { max_twigs: 300, ..Wood::default() });
+    let main_of = |mut node: NodeId| {
+        while skeleton.nodes[node.index()].level > 2 {
+            node = skeleton.nodes[node.index()].parent.unwrap();
+        }
+        node
+    };
+    for main in (0..skeleton.nodes.len() as u32).map(NodeId).filter(|n| skeleton.nodes[n.index()].level == 2) {
+        let twigs = all.iter().filter(|l| l.twig && main_of(l.node) == main).count();
+        assert!(twigs >= 20, "{twigs} twigs on {main:?}");
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_tree_and_another_seed_another_one_on_the_same_branches() {
+    let skeleton = synthetic::tree(5, 2);
+    let with = |seed| limbs(&skeleton, &anywhere, &Wood::default(), seed);
+    assert!(with(3) == with(3));
+    let (a, b) = (with(3), with(4));
+    assert!(a != b);
+    let ends = |all: &[Limb]| all.iter().filter(|l| !l.twig).map(base_and_end).collect::<Vec<_>>();
+    assert!(ends(&a) == ends(&b), "branches moved");
+}
+
+#[test]
+fn cylinders_join_and_number_branches_from_the_trunk_up() {
+    let skeleton = synthetic::tree(4, 1);
+    let all = synthetic::limbs_of(&skeleton, &Wood::default());
+    let table = cylinders(&all);
+    let length: f64 = table.iter().map(|c| (c.end - c.start).norm()).sum();
+    let wood: f64 = all.iter().map(Limb::length).sum();
+    assert!((length - wood).abs() < 1e-6 * wood);
+    assert_eq!(table.iter().filter(|c| c.parent.is_none()).count(), 1, "one stands on the ground");
+    for (k, c) in table.iter().enumerate() {
+        let Some(parent) = c.parent else { continue };
+        assert!(parent < k);
+        let p = &table[parent];
+        assert!(c.order == p.order && c.branch == p.branch || c.order == p.order + 1 && c.branch > p.branch);
+        let along = p.end - p.start;
+        let t = ((c.start - p.start).dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
+        assert!((p.start + along * t - c.start).norm() < 1e-6, "cylinder {k} begins beside its parent");
+    }
+    assert!(cylinders(&[]).is_empty());
+}
