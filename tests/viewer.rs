@@ -4,9 +4,10 @@
 //! nothing; with `ARBORCAM_REQUIRE_TOOLS=1` it fails. `ARBORCAM_VIEWER_DIR=DIR` keeps the pages.
 
 use arborcam::capture::Captured;
-use arborcam::export::html::{self, Data, Page};
+use arborcam::export::html::{self, Branch, Data, Page};
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::Mutex;
 use std::{env, fs};
 
 /// A name that would do harm if it were taken for HTML, and that no file can have.
@@ -39,8 +40,41 @@ fn pages(dir: &Path, clip: &Path, outline: &Path) {
         fs::write(dir.join(format!("page{suffix}.html")), text).expect("page");
         fs::write(dir.join(format!("tree{suffix}.glb")), glb).expect("model");
     }
+    fs::write(dir.join("page-one.html"), one_node()).expect("page");
     fs::copy(outline, dir.join("outline.json")).expect("outline");
     fs::write(dir.join("title.txt"), TITLE).expect("title");
+}
+
+/// The page of a skeleton with one node, which has no branch, no mesh and no motion.
+fn one_node() -> String {
+    let branch = Branch {
+        id: 0,
+        parent: None,
+        copy_of: None,
+        level: 0,
+        n_tracks: 0,
+        end: [0.0; 3],
+        sway: None,
+        angle_deg: None,
+    };
+    let data = Data {
+        source: String::new(),
+        software: "arborcam".into(),
+        metres_per_px: 0.0,
+        image: [64, 48],
+        foot_px: [32.0, 40.0],
+        outline_px: Vec::new(),
+        picture_time_s: None,
+        start_s: 0.0,
+        times_s: Vec::new(),
+        branches: vec![branch],
+    };
+    let mut json =
+        br#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"name":"node_0"}]}"#.to_vec();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let number = |n: usize| (n as u32).to_le_bytes();
+    let glb = [b"glTF", &number(2)[..], &number(20 + json.len()), &number(json.len()), b"JSON", &json].concat();
+    html::page(&Page { title: "one", glb: &glb, data: &data, picture: None }).expect("page")
 }
 
 struct Tools {
@@ -67,6 +101,9 @@ fn tools() -> Result<Tools, String> {
     Ok(Tools { node, chromium: chromium.ok_or("chromium is not installed")?, modules })
 }
 
+/// One browser at a time: the pages are asked for how fast they are.
+static BROWSER: Mutex<()> = Mutex::new(());
+
 /// Presses every control of the page of a clip.
 fn press_all(name: &str, clip: &Path, outline: &Path) {
     let viewer = include_str!(concat!(env!("OUT_DIR"), "/viewer.html"));
@@ -81,6 +118,7 @@ fn press_all(name: &str, clip: &Path, outline: &Path) {
     let dir = kept.as_deref().unwrap_or(made.path());
     fs::create_dir_all(dir).expect("folder");
     pages(dir, clip, outline);
+    let _alone = BROWSER.lock();
     let run = Command::new(&tools.node)
         .arg("tests/viewer/checks.mjs")
         .arg(dir)

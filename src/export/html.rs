@@ -9,10 +9,17 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use image::codecs::jpeg::JpegEncoder;
+use image::imageops::FilterType;
+use std::borrow::Cow;
 use std::io::Write;
 
 /// Empty in a program that was built without npm.
 const VIEWER: &str = include_str!(concat!(env!("OUT_DIR"), "/viewer.html"));
+
+/// A picture of more bytes than this is made smaller, to this length of its longer side, px.
+const PICTURE_BYTES: usize = 1_000_000;
+const PICTURE_SIDE: u32 = 1600;
 
 /// What goes into a page.
 #[derive(Clone, Copy, Debug)]
@@ -22,7 +29,7 @@ pub struct Page<'a> {
     /// The model, which the page gives out byte for byte as it is here.
     pub glb: &'a [u8],
     pub data: &'a Data,
-    /// A frame of the film at its full size, JPEG.
+    /// A frame of the film, JPEG; a large one is put in smaller.
     pub picture: Option<&'a [u8]>,
 }
 
@@ -31,13 +38,13 @@ pub struct Page<'a> {
 /// # Errors
 /// [`ExportError::NoViewer`] if the program was built without it.
 pub fn page(page: &Page) -> Result<String, ExportError> {
-    if VIEWER.is_empty() {
-        return Err(ExportError::NoViewer);
-    }
     fill(VIEWER, page)
 }
 
 fn fill(viewer: &str, page: &Page) -> Result<String, ExportError> {
+    if viewer.is_empty() {
+        return Err(ExportError::NoViewer);
+    }
     let data = serde_json::to_string(&Titled { title: page.title, data: page.data });
     let data = data.map_err(|e| ExportError::unfit(e.to_string()))?;
     let parts = [
@@ -45,7 +52,7 @@ fn fill(viewer: &str, page: &Page) -> Result<String, ExportError> {
         // In JSON `<` stands only inside texts; so written, none of them can end the block that it is in.
         ("@ARBORCAM_DATA@", data.replace('<', "\\u003c")),
         ("@ARBORCAM_GLB@", STANDARD.encode(gzip(page.glb)?)),
-        ("@ARBORCAM_PICTURE@", page.picture.map(|jpeg| STANDARD.encode(jpeg)).unwrap_or_default()),
+        ("@ARBORCAM_PICTURE@", page.picture.map(|jpeg| STANDARD.encode(light(jpeg))).unwrap_or_default()),
     ];
     // From one mark to the next: what was put in is not searched for marks.
     let mut out = String::with_capacity(viewer.len() + parts.iter().map(|(_, text)| text.len()).sum::<usize>());
@@ -70,6 +77,22 @@ struct Titled<'a> {
 
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+/// The picture itself, or a smaller one where it would be most of the page. What cannot be read stays as it is: the page
+/// does without it.
+fn light(jpeg: &[u8]) -> Cow<'_, [u8]> {
+    let smaller = || {
+        let read = image::load_from_memory_with_format(jpeg, image::ImageFormat::Jpeg).ok()?;
+        let small = read.resize(PICTURE_SIDE, PICTURE_SIDE, FilterType::Triangle).into_rgb8();
+        let mut out = Vec::new();
+        JpegEncoder::new_with_quality(&mut out, 85).encode_image(&small).ok()?;
+        Some(out)
+    };
+    if jpeg.len() <= PICTURE_BYTES {
+        return Cow::Borrowed(jpeg);
+    }
+    smaller().filter(|s| s.len() < jpeg.len()).map_or(Cow::Borrowed(jpeg), Cow::Owned)
 }
 
 /// Makes up for what base64 adds. No time of day goes into it.
@@ -115,8 +138,32 @@ mod tests {
     }
 
     #[test]
+    fn a_large_picture_is_made_lighter_and_a_broken_one_left() {
+        let noise =
+            |x: u32, y: u32| image::Rgb([(x * x) as u8 ^ (y * 7) as u8, (x * y) as u8, x as u8 ^ (y * y) as u8]);
+        let mut jpeg = Vec::new();
+        JpegEncoder::new_with_quality(&mut jpeg, 95)
+            .encode_image(&image::RgbImage::from_fn(2400, 1350, noise))
+            .unwrap();
+        assert!(jpeg.len() > PICTURE_BYTES);
+        let small = light(&jpeg);
+        let read = image::load_from_memory(&small).unwrap();
+        assert_eq!((read.width(), read.height()), (1600, 900));
+        assert!(small.len() < jpeg.len() / 2, "{} of {}", small.len(), jpeg.len());
+        let broken = vec![7; 2 * PICTURE_BYTES];
+        assert!(*light(&broken) == broken);
+    }
+
+    #[test]
+    fn a_program_without_the_viewer_says_what_to_do() {
+        let data = data("film");
+        let error = fill("", &Page { title: "tree", glb: b"glb", data: &data, picture: None }).unwrap_err().to_string();
+        assert!(error.contains("npm") && error.contains("make build") && !error.contains('\n'), "{error}");
+    }
+
+    #[test]
     fn the_model_comes_back_byte_for_byte() {
-        let glb: Vec<u8> = (0..10_000_u32).map(|i| (i * i >> 3) as u8).collect();
+        let glb: Vec<u8> = (0..10_000_u32).map(|i| ((i * i) >> 3) as u8).collect();
         let data = data("film");
         let made = fill(VIEWER, &Page { title: "tree", glb: &glb, data: &data, picture: Some(b"\xff\xd8") }).unwrap();
         let block = |k: usize| made.split("<script>").nth(k).unwrap().split("</script>").next().unwrap();

@@ -2,7 +2,8 @@
 //
 //   ARBORCAM_NPM=DIR ARBORCAM_CHROMIUM=PROGRAM node checks.mjs FOLDER
 //
-// FOLDER holds page.html, page-m.html (the same tree in metres), tree.glb, outline.json, title.txt.
+// FOLDER holds page.html, page-m.html (the same tree in metres), page-one.html (one node), tree.glb, outline.json,
+// title.txt.
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import { Eye, launch, open, ready, shot } from "./browser.mjs";
@@ -320,6 +321,18 @@ await check("a phone has it all below one another, and fingers turn the tree", a
   const share = await differs(before, await shot(phone), 0.02, "a finger");
   await phone.context().close();
   return share;
+});
+
+await check("a tree of one node opens, without what it does not have", async () => {
+  const one = await open(browser, file("page-one.html"), {}, bad);
+  await ready(one);
+  for (const name of ["Play", "Mesh", "Leaves", "Film"]) {
+    hold(await one.getByRole("button", { name, exact: true }).isDisabled(), `${name} can be pressed`);
+  }
+  for (const name of ["Skeleton", "Side", "Top", "Branch after"]) await one.getByRole("button", { name, exact: true }).click();
+  for (const mode of ["branch", "frequency", "amplitude"]) await one.getByLabel("Colour", { exact: true }).selectOption(mode);
+  hold(!(await one.getByRole("alert").isVisible()), "it apologises");
+  await one.context().close();
 });
 
 await check("nothing is asked of the network and nothing complains", async () => {

@@ -36,7 +36,11 @@ export async function readModel() {
   return new Uint8Array(await new Response(packed.pipeThrough(new DecompressionStream("gzip"))).arrayBuffer());
 }
 
-export function readPicture() {
+// The source frame as an image, or null where there is none that can be shown.
+export async function readPicture() {
   const base64 = text("arborcam-picture");
-  return base64 ? new Blob([bytesOf(base64)], { type: "image/jpeg" }) : null;
+  if (!base64) return null;
+  const image = new Image();
+  image.src = `data:image/jpeg;base64,${base64}`;
+  return image.decode().then(() => image, () => null);
 }

@@ -14,9 +14,9 @@ export function rectangle(data) {
 
 export class Film {
   // `depth`: where along z, behind everything; from the front that makes no difference.
-  constructor(data, bitmap, depth) {
+  constructor(data, image, depth) {
     const { left, right, top, bottom } = rectangle(data);
-    const texture = new THREE.Texture(bitmap);
+    const texture = new THREE.Texture(image);
     texture.colorSpace = THREE.SRGBColorSpace;
     texture.needsUpdate = true;
     const flat = { transparent: true, depthWrite: false, toneMapped: false };

@@ -26,7 +26,7 @@ function describe(data) {
   const measured = data.branches.filter((b) => b.parent !== null && b.copy_of === null).length;
   const copies = data.branches.filter((b) => b.copy_of !== null).length;
   const parts = [
-    `${measured} measured ${measured === 1 ? "branch" : "branches"}${copies ? `, ${copies} copied` : ""}`,
+    `${measured} ${measured === 1 ? "branch" : "branches"}${copies ? `, ${copies} copies` : ""}`,
     data.source,
   ];
   at("about").textContent = parts.filter(Boolean).join(" · ");
@@ -97,17 +97,12 @@ async function open() {
     sorry("This browser cannot draw in 3D (WebGL 2 is off or missing). Another browser can; the model can be downloaded above.");
     return;
   }
-  const blob = readPicture();
-  const [tree, bitmap] = await Promise.all([
-    Tree.load(model, data),
-    // Textures are filled from below.
-    blob ? createImageBitmap(blob, { imageOrientation: "flipY" }).catch(() => null) : null,
-  ]);
+  const [tree, picture] = await Promise.all([Tree.load(model, data), readPicture()]);
   const box = tree.box();
   const views = new Views(stage, box);
   const sway = new Sway(data);
   const skeleton = new Skeleton(tree);
-  const film = bitmap && new Film(data, bitmap, box.min.z - views.radius);
+  const film = picture && new Film(data, picture, box.min.z - views.radius);
   const filmTime = data.picture_time_s ?? 0;
   const look = () => {
     film?.look(views.awayFromFront());

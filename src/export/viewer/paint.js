@@ -3,7 +3,7 @@ import * as THREE from "three";
 import { jointId } from "./tree.js";
 
 // Even steps of lightness, no yellow: it is read on white and in sunlight (after "plasma").
-const RAMP = ["#0d0887", "#5c01a6", "#9c179e", "#cc4778", "#ed7953", "#f59b3a"];
+const RAMP = ["#2f2fc4", "#7423c6", "#ae2aa6", "#d7456f", "#ee7545", "#f2a32e"];
 const UNKNOWN = new THREE.Color("#9aa19c");
 // The measured skeleton, and its copies, of which nothing was seen.
 const MEASURED = new THREE.Color("#14532d");
@@ -89,7 +89,9 @@ export class Paint {
     const bones = mesh.skeleton?.bones ?? [];
     const colours = bones.map((bone) => {
       const branch = this.data.byId.get(jointId(bone.name));
-      return branch ? colourOf(branch) : UNKNOWN;
+      // The foot is no branch: what hangs on it belongs to the trunk.
+      const own = branch?.parent === null ? this.data.branches.find((b) => b.parent === branch.id) : branch;
+      return own ? colourOf(own) : UNKNOWN;
     });
     for (let v = 0; v < position.count; v++) {
       let [r, g, b, sum] = [0, 0, 0, 0];

@@ -27,7 +27,7 @@ export class Plot {
   // `xs` rising; values that are no numbers break the curve. `area` fills down to 0.
   draw(xs, ys, { area = false } = {}) {
     const { svg } = this;
-    const { clientWidth: width, clientHeight: height } = svg;
+    const { width, height } = svg.getBoundingClientRect();
     svg.replaceChildren();
     this.x = null;
     if (!width || !height) return;

@@ -56,7 +56,8 @@ export class Skeleton {
   }
 
   show(on) {
-    this.all.visible = this.sides.visible = on;
+    // A tree of one node has no lines.
+    this.all.visible = this.sides.visible = on && this.positions.length > 0;
   }
 
   choose(id) {

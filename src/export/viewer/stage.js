@@ -17,6 +17,8 @@ export class Stage {
     this.onResize = [];
     this.asked = false;
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
+    // Phones take the graphics away from a page that is not looked at.
+    canvas.addEventListener("webglcontextrestored", () => this.ask());
     this.resize();
   }
 
