@@ -1,9 +1,14 @@
 # make demo: from a fresh machine to a moving tree in out/demo. make test: every test. make bench: the figures.
+# make pictures: those of README and docs (CLIPS=folder for the oak too).
 # make install, make uninstall: program and service, below DESTDIR (for packages) and PREFIX.
-.PHONY: demo build viewer test test-v4l2 test-real bench sweep lint setup install uninstall
+.PHONY: demo pictures build viewer test test-v4l2 test-real bench sweep lint setup install uninstall
 
 demo: setup build
 	@scripts/demo.sh
+
+# ONLY=views, film, shapes, points or terminal for one group.
+pictures: build
+	@CLIPS="$(CLIPS)" ONLY="$(ONLY)" scripts/pictures.sh
 
 setup:
 	@scripts/setup.sh

@@ -1,0 +1,203 @@
+#!/usr/bin/env python3
+"""Draws what `arborcam render` does not: for scripts/pictures.sh.
+
+    pictures.py terminal SCREEN.txt OUT.png    a screen as `tmux capture-pane -e` gives it
+    pictures.py points CAPTURE OUT.png         the capture's frame with outline and points
+    pictures.py shapes DIR                     five shapes to push a tree into, with alpha
+"""
+
+import csv
+import json
+import math
+import re
+import sys
+from pathlib import Path
+
+from PIL import Image, ImageDraw, ImageFont
+
+FONTS = Path("/usr/share/fonts/truetype/dejavu")
+CELL = (9, 18)  # of the terminal, px
+FINE = 2  # drawn larger, then scaled down: smooth letters and dots
+LARGEST = 150_000  # bytes
+
+TEXT, GROUND = (220, 220, 220), (16, 18, 20)
+BASIC = [
+    (0, 0, 0), (205, 49, 49), (13, 188, 121), (229, 229, 16), (36, 114, 200), (188, 63, 188), (17, 168, 205),
+    (229, 229, 229), (102, 102, 102), (241, 76, 76), (35, 209, 139), (245, 245, 67), (59, 142, 234), (214, 112, 214),
+    (41, 184, 219), (255, 255, 255),
+]
+
+
+def save(picture, out):
+    """With as many colours as the size allows."""
+    for colours in (256, 128, 64, 32):
+        picture.quantize(colours, dither=Image.Dither.NONE).save(out, optimize=True)
+        if Path(out).stat().st_size <= LARGEST:
+            return
+
+
+def indexed(n):
+    if n < 16:
+        return BASIC[n]
+    if n < 232:
+        levels = (0, 95, 135, 175, 215, 255)
+        return levels[(n - 16) // 36], levels[(n - 16) // 6 % 6], levels[(n - 16) % 6]
+    return (8 + 10 * (n - 232),) * 3
+
+
+class Pen:
+    """Colours and weight of the letters that follow."""
+
+    def __init__(self):
+        self.reset()
+
+    def reset(self):
+        self.front, self.back, self.bold, self.reverse = TEXT, GROUND, False, False
+
+    def read(self, codes):
+        codes = [int(c or 0) for c in re.split("[;:]", codes)]
+        while codes:
+            code = codes.pop(0)
+            if code == 0:
+                self.reset()
+            elif code in (1, 22):
+                self.bold = code == 1
+            elif code in (7, 27):
+                self.reverse = code == 7
+            elif code in (38, 48):
+                kind = codes.pop(0)
+                colour = tuple(codes[:3]) if kind == 2 else indexed(codes[0])
+                del codes[: 3 if kind == 2 else 1]
+                if code == 38:
+                    self.front = colour
+                else:
+                    self.back = colour
+            elif code == 39:
+                self.front = TEXT
+            elif code == 49:
+                self.back = GROUND
+            elif 30 <= code < 38 or 90 <= code < 98:
+                self.front = BASIC[code - 30 if code < 38 else code - 82]
+            elif 40 <= code < 48 or 100 <= code < 108:
+                self.back = BASIC[code - 40 if code < 48 else code - 92]
+
+
+def letter(draw, fonts, pen, x, y, w, h, c):
+    front, back = (pen.back, pen.front) if pen.reverse else (pen.front, pen.back)
+    draw.rectangle([x, y, x + w - 1, y + h - 1], fill=back)
+    code = ord(c)
+    if c == "▀":
+        draw.rectangle([x, y, x + w - 1, y + h // 2 - 1], fill=front)
+    elif 0x2581 <= code <= 0x2588:
+        draw.rectangle([x, y + h - h * (code - 0x2580) // 8, x + w - 1, y + h - 1], fill=front)
+    elif 0x2589 <= code <= 0x258F:
+        draw.rectangle([x, y, x + w * (0x2590 - code) // 8 - 1, y + h - 1], fill=front)
+    elif c == "░":
+        draw.rectangle([x, y, x + w - 1, y + h - 1], fill=tuple((f + 3 * b) // 4 for f, b in zip(front, back)))
+    elif c == "─":
+        draw.rectangle([x, y + h // 2 - 1, x + w - 1, y + h // 2], fill=front)
+    elif 0x2800 <= code <= 0x28FF:
+        for bit, (column, row) in enumerate([(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (0, 3), (1, 3)]):
+            if (code - 0x2800) >> bit & 1:
+                cx, cy, r = x + w * (2 * column + 1) / 4, y + h * (2 * row + 1) / 8, 0.95 * FINE
+                draw.ellipse([cx - r, cy - r, cx + r, cy + r], fill=front)
+    elif c != " ":
+        draw.text((x, y + h * 0.78), c, font=fonts[pen.bold], fill=front, anchor="ls")
+
+
+def terminal(screen, out):
+    lines = Path(screen).read_text(encoding="utf-8").rstrip("\n").split("\n")
+    plain = [re.sub(r"\x1b\[[0-9;:]*m", "", line) for line in lines]
+    columns = max(map(len, plain))
+    w, h = CELL[0] * FINE, CELL[1] * FINE
+    fonts = [ImageFont.truetype(str(FONTS / name), 15 * FINE) for name in ("DejaVuSansMono.ttf", "DejaVuSansMono-Bold.ttf")]
+    picture = Image.new("RGB", (columns * w, len(lines) * h), GROUND)
+    draw = ImageDraw.Draw(picture)
+    pen = Pen()
+    for row, line in enumerate(lines):
+        column = 0
+        for found in re.finditer(r"\x1b\[([0-9;:]*)m|(.)", line):
+            if found.group(2) is None:
+                pen.read(found.group(1))
+            else:
+                letter(draw, fonts, pen, column * w, row * h, w, h, found.group(2))
+                column += 1
+    size = (picture.width // FINE, picture.height // FINE)
+    save(picture.resize(size, Image.LANCZOS), out)
+
+
+PALETTE = [
+    (86, 180, 233), (230, 159, 0), (0, 190, 120), (240, 228, 66), (225, 80, 140), (180, 130, 240), (255, 110, 60),
+    (60, 120, 255),
+]
+
+
+def points(capture, out):
+    capture = Path(capture)
+    note = json.loads((capture / "capture.json").read_text())
+    nodes = {n["node_id"]: n for n in csv.DictReader((capture / "nodes.csv").open())}
+    children = {}
+    for node in nodes.values():
+        if int(node["n_tracks"]) > 0:
+            children.setdefault(node["parent_id"], []).append(node["node_id"])
+    # Main branches: follow the trunk up until there are some.
+    mains = children.get("", [])
+    while len(mains) < 4 and any(children.get(m) for m in mains):
+        mains = [c for m in mains for c in children.get(m, [m])]
+
+    def main(node):
+        while node and node not in mains:
+            node = nodes[node]["parent_id"]
+        return node or None
+
+    frame = note["picture"]["frame"]
+    picture = Image.open(capture / note["picture"]["file"]).convert("RGB")
+    scale = 1.5 * 960 / picture.width
+    picture = picture.resize((round(picture.width * scale), round(picture.height * scale)), Image.BICUBIC)
+    draw = ImageDraw.Draw(picture)
+    at = lambda u, v: ((float(u) + 0.5) * scale, (float(v) + 0.5) * scale)
+    outline = [at(u, v) for u, v in (note["outline"] or {}).get("polygon_px", [])]
+    if outline:
+        draw.line(outline + outline[:1], fill=(255, 214, 60), width=3)
+    for row in csv.DictReader((capture / "tracks.csv").open()):
+        if int(row["frame"]) == frame:
+            branch = main(row["node_id"])
+            colour = PALETTE[mains.index(branch) % len(PALETTE)] if branch else (235, 235, 235)
+            (x, y), r = at(row["u_px"], row["v_px"]), 5 if branch else 3.5
+            draw.ellipse([x - r - 1, y - r - 1, x + r + 1, y + r + 1], fill=(10, 10, 10))
+            draw.ellipse([x - r, y - r, x + r, y + r], fill=colour)
+    save(picture.resize((960, 960 * picture.height // picture.width), Image.LANCZOS), out)
+
+
+def shapes(folder):
+    size, grid = 512, range(361)
+    turn = [math.radians(g) for g in grid]
+    polygon = lambda n: [(256 + 240 * math.sin(2 * math.pi * k / n), 256 - 240 * math.cos(2 * math.pi * k / n)) for k in range(n)]
+    heart = [
+        (256 + 14.5 * 16 * math.sin(t) ** 3,
+         236 - 14.5 * (13 * math.cos(t) - 5 * math.cos(2 * t) - 2 * math.cos(3 * t) - math.cos(4 * t)))
+        for t in turn
+    ]
+    # Half widths of lip, neck, belly and foot, at their heights.
+    rings = [(30, 130), (120, 80), (320, 200), (480, 95)]
+    side = []
+    for (top, wide), (bottom, next_wide) in zip(rings, rings[1:]):
+        for k in range(20):
+            ease = 0.5 - 0.5 * math.cos(math.pi * k / 20)
+            side.append((wide + (next_wide - wide) * ease, top + (bottom - top) * k / 20))
+    side.append((rings[-1][1], rings[-1][0]))
+    vase = [(256 - x, y) for x, y in side] + [(256 + x, y) for x, y in reversed(side)]
+    drawn = {"triangle": [(256, 20), (490, 490), (22, 490)], "circle": [(256 + 240 * math.cos(t), 256 + 240 * math.sin(t)) for t in turn],
+             "pentagon": polygon(5), "heart": heart, "vase": vase}
+    for name, corners in drawn.items():
+        picture = Image.new("RGBA", (size, size), (0, 0, 0, 0))
+        ImageDraw.Draw(picture).polygon(corners, fill=(40, 120, 40, 255))
+        picture.save(Path(folder) / f"{name}.png")
+
+
+if __name__ == "__main__":
+    commands = {"terminal": (terminal, 2), "points": (points, 2), "shapes": (shapes, 1)}
+    command, count = commands.get(sys.argv[1] if len(sys.argv) > 1 else "", (None, 0))
+    if command is None or len(sys.argv) != 2 + count:
+        sys.exit(__doc__)
+    command(*sys.argv[2:])

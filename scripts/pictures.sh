@@ -1,0 +1,158 @@
+#!/usr/bin/env bash
+# Makes the pictures of README and docs anew: of the shipped clip, and of the oak too if CLIPS names a folder that
+# holds oak_release/video.mkv and outline.json. ONLY=name makes one group: views, film, shapes, points, terminal.
+# Needs what scripts/apt-packages-test.txt lists, and `make build` first.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+arborcam=$PWD/target/release/arborcam
+to=$PWD/docs/pictures
+clips=${CLIPS:-}
+only=${ONLY:-}
+largest=150000 # bytes of a picture
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+fail() {
+    printf 'pictures: %s\n' "$*" >&2
+    exit 1
+}
+
+for tool in ffmpeg tmux python3; do
+    command -v "$tool" >/dev/null || fail "$tool is not installed; run scripts/setup.sh --tests"
+done
+python3 -c 'import PIL' 2>/dev/null || fail "python3 has no PIL; run scripts/setup.sh --tests"
+[[ -x $arborcam ]] || fail "$arborcam is not there; run \`make build\` first"
+mkdir -p "$to"
+
+trees=(winter)
+declare -A film=([winter]=recordings/sparse_winter.mkv) outline=([winter]=recordings/sparse_winter.outline.json)
+if [[ -n $clips ]]; then
+    film[oak]=$clips/oak_release/video.mkv outline[oak]=$clips/oak_release/outline.json
+    [[ -r ${film[oak]} && -r ${outline[oak]} ]] || fail "CLIPS=$clips holds no oak_release/video.mkv with outline.json"
+    trees+=(oak)
+else
+    echo "pictures: CLIPS is not given; those of the oak stay as they are"
+fi
+
+# Whether a group of pictures is wanted.
+wanted() { [[ -z $only || $only == "$1" ]]; }
+
+# Captures TREE once.
+capture() {
+    [[ -d $work/$1 ]] || "$arborcam" replay "${film[$1]}" --outline "${outline[$1]}" --fast --headless --out "$work/$1" \
+        2>"$work/$1.log" || fail "the replay of ${film[$1]} failed: $(tail -n 1 "$work/$1.log")"
+}
+
+# render TREE FILE OPTIONS...
+render() {
+    local tree=$1 out=$2
+    shift 2
+    capture "$tree"
+    rm -f "$out"
+    "$arborcam" render "$work/$tree" --out "$out" "$@" 2>"$work/render.log" ||
+        fail "render $* failed: $(cat "$work/render.log")"
+}
+
+# row FILE PICTURES...: side by side, with as many colours as the size allows.
+row() {
+    local out=$1 colours inputs=() n
+    shift
+    n=$#
+    for picture in "$@"; do inputs+=(-i "$picture"); done
+    for colours in 256 96 48 24; do
+        ffmpeg -v error -nostdin -y "${inputs[@]}" -filter_complex \
+            "hstack=inputs=$n,split[a][b];[a]palettegen=max_colors=$colours:reserve_transparent=0[p];[b][p]paletteuse=dither=none" \
+            -frames:v 1 "$out"
+        (($(stat -c %s "$out") <= largest)) && break
+    done
+    told "$out"
+}
+
+told() {
+    local bytes
+    bytes=$(stat -c %s "$1")
+    ((bytes <= largest)) || fail "$1 has $bytes bytes, more than $largest"
+    printf 'pictures: %-28s %4d kB\n' "${1#"$PWD/"}" $((bytes / 1000))
+}
+
+# The tree from front, side and top, leafless and in leaf.
+views() {
+    local tree
+    for tree in "${trees[@]}"; do
+        for view in front side top; do
+            render "$tree" "$work/$tree-bare-$view.png" --view $view --size 320x320 --bare
+            render "$tree" "$work/$tree-leaf-$view.png" --view $view --size 320x320
+        done
+        row "$to/$tree-bare.png" "$work/$tree"-bare-{front,side,top}.png
+        # A tree that was filmed without leaves has none.
+        if cmp -s "$work/$tree-bare-front.png" "$work/$tree-leaf-front.png"; then
+            echo "pictures: $tree has no leaves"
+        else
+            row "$to/$tree-leaf.png" "$work/$tree"-leaf-{front,side,top}.png
+        fi
+    done
+    render winter "$work/front.png" --size 480x500
+    render winter "$work/side.png" --view side --size 480x500
+    row "$to/model.png" "$work/front.png" "$work/side.png"
+}
+
+# The film beside the model in the same frame.
+film_beside() {
+    local tree quality
+    for tree in "${trees[@]}"; do
+        render "$tree" "$work/beside.png" --film beside
+        for quality in 3 5 8; do
+            ffmpeg -v error -nostdin -y -i "$work/beside.png" -q:v $quality -frames:v 1 "$to/$tree-film.jpg"
+            (($(stat -c %s "$to/$tree-film.jpg") <= largest)) && break
+        done
+        told "$to/$tree-film.jpg"
+    done
+}
+
+# One tree pushed into five shapes.
+shapes() {
+    if ! "$arborcam" render --help | grep -q -- --envelope; then
+        echo "pictures: this build knows no --envelope; no shapes"
+        return
+    fi
+    local tree=winter shape
+    [[ -n $clips ]] && tree=oak
+    python3 scripts/pictures.py shapes "$work"
+    for shape in triangle circle pentagon heart vase; do
+        render "$tree" "$work/shaped-$shape.png" --size 256x288 --envelope "$work/$shape.png"
+    done
+    row "$to/topiary.png" "$work"/shaped-{triangle,circle,pentagon,heart,vase}.png
+}
+
+# A frame with outline and points, coloured by main branch.
+points() {
+    capture winter
+    python3 scripts/pictures.py points "$work/winter" "$to/frame.png"
+    told "$to/frame.png"
+}
+
+# The screen of a running capture. A server of its own, lest it meets the user's sessions.
+terminal() {
+    local server=arborcam-pictures-$$ k
+    tmux -L "$server" -f /dev/null new-session -d -x 120 -y 40 \
+        "env TERM=tmux-256color COLORTERM=truecolor ARBORCAM_PREVIEW=halfblocks '$arborcam' replay '${film[winter]}' \
+        --outline '${outline[winter]}' --out '$work/screen'; sleep 60"
+    for ((k = 0; k < 60; k++)); do
+        sleep 1
+        tmux -L "$server" capture-pane -p | grep -q ' live ' && tmux -L "$server" capture-pane -p | grep -q 'Front' && break
+    done
+    tmux -L "$server" send-keys m
+    sleep 1
+    tmux -L "$server" capture-pane -e -p >"$work/screen.txt"
+    tmux -L "$server" kill-server
+    python3 scripts/pictures.py terminal "$work/screen.txt" "$to/terminal.png"
+    told "$to/terminal.png"
+}
+
+wanted views && views
+wanted film && film_beside
+wanted shapes && shapes
+wanted points && points
+wanted terminal && terminal
+echo "pictures: $(du -ck "$to"/* | tail -n 1 | cut -f 1) kB in ${to#"$PWD/"}"
