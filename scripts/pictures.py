@@ -31,7 +31,9 @@ BASIC = [
 def save(picture, out):
     """With as many colours as the size allows."""
     for colours in (256, 128, 64, 32):
-        picture.quantize(colours, dither=Image.Dither.NONE).save(out, optimize=True)
+        # The few bright dots are what is to be seen; other methods give them no colour of their own.
+        few = picture.quantize(colours, method=Image.Quantize.MAXCOVERAGE, kmeans=1, dither=Image.Dither.NONE)
+        few.save(out, optimize=True)
         if Path(out).stat().st_size <= LARGEST:
             return
 

@@ -142,7 +142,8 @@ terminal() {
         sleep 1
         tmux -L "$server" capture-pane -p | grep -q ' live ' && tmux -L "$server" capture-pane -p | grep -q 'Front' && break
     done
-    tmux -L "$server" send-keys m
+    # Paused, so that the film does not end before the picture is taken.
+    tmux -L "$server" send-keys Space m
     sleep 1
     tmux -L "$server" capture-pane -e -p >"$work/screen.txt"
     tmux -L "$server" kill-server
