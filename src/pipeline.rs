@@ -9,12 +9,14 @@ mod dress;
 mod front;
 mod refine;
 mod refiner;
+mod reshape;
 mod retrace;
 
 pub use back::{BackEnd, Moved};
 pub use dress::{Dressed, Seen, dress};
 pub use front::{Followed, FrontEnd};
 pub use refine::Refinement;
+pub use reshape::reshape;
 pub use retrace::Retrace;
 
 use crate::config::Config;
@@ -166,6 +168,17 @@ fn flat(hierarchy: &MotionHierarchy, outline: &Outline, config: &Config) -> (Vec
     (flat, tracks)
 }
 
+/// Radii, from the trunk's as it was given or as the outline shows it.
+fn thicken(skeleton: &mut Skeleton, outline: &Outline, wood: &crate::config::Wood) {
+    let top_px = skeleton.nodes.get(1).map_or(skeleton.foot_px, |top| skeleton.image_from_model(&top.position));
+    let measured = shape::trunk_radius_px(outline, skeleton.foot_px, top_px);
+    let given = Some(0.5 * wood.trunk_width_px).filter(|&given| given > 0.0);
+    let at_foot = || TRUNK_SHARE * skeleton::Foot::of(outline, None).half_width_px;
+    let trunk_px = given.or(measured).unwrap_or_else(at_foot).max(2.0 * shape::TIP_RADIUS_PX);
+    let room = dress::room(skeleton.foot_px, Some(outline));
+    shape::thicken(skeleton, trunk_px, &room, wood, wood.seed.into());
+}
+
 /// Tracks to tree: evidence, hierarchy, 2D skeleton, 3D skeleton. `None` if too few points move.
 pub fn build(
     table: &Arc<TrackTable>,
@@ -184,13 +197,7 @@ pub fn build(
     }
     let (flat, tracks) = flat(&hierarchy, outline, config);
     let mut skeleton = shape::build(&flat, &tracks, outline, &config.shape);
-    let top_px = skeleton.nodes.get(1).map_or(foot_px, |top| skeleton.image_from_model(&top.position));
-    let measured = shape::trunk_radius_px(outline, skeleton.foot_px, top_px);
-    let given = Some(0.5 * config.wood.trunk_width_px).filter(|&given| given > 0.0);
-    let at_foot = || TRUNK_SHARE * skeleton::Foot::of(outline, None).half_width_px;
-    let trunk_px = given.or(measured).unwrap_or_else(at_foot).max(2.0 * shape::TIP_RADIUS_PX);
-    let room = dress::room(skeleton.foot_px, Some(outline));
-    shape::thicken(&mut skeleton, trunk_px, &room, &config.wood, config.wood.seed.into());
+    thicken(&mut skeleton, outline, &config.wood);
     let rest = |row: usize| (table.ids[row], hierarchy::rest_position_px(table, row));
     let first = First { frame, time_s, measure: evidence.measure, moving: evidence.moving.len(), forced };
     Some(Tree {

@@ -4,6 +4,7 @@ mod camera;
 mod capture;
 mod devices;
 mod doctor;
+mod export;
 mod hangup;
 mod play;
 mod record;
@@ -12,6 +13,7 @@ mod render;
 mod replay;
 mod service;
 mod session;
+mod shaping;
 
 use crate::config::{Config, ConfigError};
 use crate::outline::OutlineSpec;
@@ -47,6 +49,8 @@ enum Command {
     Play(play::PlayArgs),
     /// Draw a capture's tree: a picture (.png) or a video (.mp4).
     Render(render::RenderArgs),
+    /// Write the tree of a capture as a file for other programs.
+    Export(export::ExportArgs),
     /// List the cameras that are plugged in.
     Devices(devices::DevicesArgs),
     /// Find out what is wrong with this machine, and what to do about it.
@@ -136,6 +140,7 @@ pub fn main() -> ExitCode {
         Command::Record(args) => record::run(args),
         Command::Play(args) => play::run(args),
         Command::Render(args) => render::run(args),
+        Command::Export(args) => export::run(args),
         Command::Devices(args) => devices::run(args),
         Command::Doctor(args) => doctor::run(args),
     };
