@@ -6,12 +6,11 @@ pub use options::RenderArgs;
 
 use super::hangup::Hangup;
 use super::session::stop_on_signals;
+use super::shaping::Made;
 use super::{Ended, say};
-use crate::capture::{CaptureError, Captured};
 use crate::draw::{Bounds, Camera, Look, Model, Posed, Rgba, Texture};
 use crate::export::{ExportError, Film, OutputFile};
 use crate::model::{Pose, Size};
-use crate::pipeline::{Seen, dress};
 use options::{FilmPlace, Kind, ViewName};
 use std::sync::atomic::Ordering;
 
@@ -29,31 +28,26 @@ pub fn run(args: &RenderArgs) -> Result<(), Ended> {
     if args.seconds.is_some_and(|s| s > LONGEST_S) {
         return Err(Ended::BadUsage(anyhow::anyhow!("--seconds is more than {LONGEST_S}; give less")));
     }
-    let unread = |e: CaptureError| Ended::NoInput(e.into());
-    let film_s = Captured::note(&args.dir).map_err(unread)?.timing.duration_s;
-    let captured = Captured::read(&args.dir, tail_s(args, kind, film_s)).map_err(unread)?;
-    let picture = captured.picture.as_ref().map(|p| &*p.rgb);
-    if args.film.is_some() && picture.is_none() {
+    let made = args.shaping.made_with(&args.dir, |film_s| Some(tail_s(args, kind, film_s)))?;
+    if args.film.is_some() && made.captured.picture.is_none() {
         let what = "the capture holds no frame of the film; make it anew with this version, or leave --film out";
         return Err(Ended::Failed(anyhow::anyhow!(what)));
     }
-    let seen = Seen { picture, pose: captured.pose_in_picture.as_ref(), outline: captured.outline.as_ref() };
-    let dressed = dress(&captured.skeleton, seen, &captured.note.config);
-    let Some(wood) = dressed.wood.first() else {
+    let Some(wood) = made.dressed.wood.first() else {
         return Err(Ended::Failed(anyhow::anyhow!("there is nothing to be drawn of this tree")));
     };
-    let mut model = Model::bare(&captured.skeleton, wood, dressed.bark_rgb);
+    let mut model = Model::bare(&made.skeleton, wood, made.dressed.bark_rgb);
     if !args.bare {
-        model.foliage = &dressed.foliage;
-        model.leaf = dressed.foliage.texture.as_ref().and_then(|(_, bytes)| Texture::read(bytes));
+        model.foliage = &made.dressed.foliage;
+        model.leaf = model.foliage.texture.as_ref().and_then(|(_, bytes)| Texture::read(bytes));
     }
-    let studio = Studio::new(args, &captured, model);
+    let studio = Studio::new(args, &made, model);
     let job = match kind {
         Kind::Picture => studio.picture(),
         Kind::Video => studio.video(),
     };
     // Told last, so that the error, if there is one, is the only line.
-    job.inspect(|()| captured.warnings.iter().for_each(|w| say(&format!("arborcam: warning: {w}"))))
+    job.inspect(|()| made.captured.warnings.iter().for_each(|w| say(&format!("arborcam: warning: {w}"))))
 }
 
 /// How much of the end of a film of `film_s` is to be read: hours of poses would fill the memory.
@@ -69,7 +63,7 @@ fn tail_s(args: &RenderArgs, kind: Kind, film_s: f64) -> f64 {
 /// The tree before its camera.
 struct Studio<'a> {
     args: &'a RenderArgs,
-    captured: &'a Captured,
+    made: &'a Made,
     model: Model<'a>,
     size: Size,
     look: Look,
@@ -78,27 +72,27 @@ struct Studio<'a> {
 }
 
 impl<'a> Studio<'a> {
-    fn new(args: &'a RenderArgs, captured: &'a Captured, model: Model<'a>) -> Self {
-        let film = captured.picture.as_ref().map(|p| p.rgb.size);
+    fn new(args: &'a RenderArgs, made: &'a Made, model: Model<'a>) -> Self {
+        let film = made.captured.picture.as_ref().map(|p| p.rgb.size);
         let size = args.size.unwrap_or(if args.film.is_some() { film.unwrap_or(PLAIN) } else { PLAIN });
         let samples = (1..=3).rev().find(|n| size.area() * n * n <= MOST_SAMPLES).unwrap_or(1) as u32;
         let look = Look { samples, shadow: args.view == ViewName::Turntable, ..Look::default() };
         let empty = Bounds { low: nalgebra::Point3::origin(), high: nalgebra::Point3::origin(), radius: 0.0 };
         let rest = model.posed(None, &[]).bounds().unwrap_or(empty);
         // The wood at rest, and as far around it as its joints go.
-        let joints = captured.poses.iter().flat_map(|p| &p.joints).map(|j| j.position);
+        let joints = made.poses.iter().flat_map(|p| &p.joints).map(|j| j.position);
         let bounds = Bounds::of(joints).map_or(rest, |all| all.with(&rest));
-        Self { args, captured, model, size, look, bounds }
+        Self { args, made, model, size, look, bounds }
     }
 
     fn picture(&self) -> Result<(), Ended> {
         let file = OutputFile::create(&self.args.out).map_err(failed)?;
-        let pose = match (self.args.at, self.args.pose) {
-            (Some(at_s), _) => Some(self.pose_at(at_s)?),
-            (None, None) if self.args.film.is_some() => self.captured.pose_in_picture.as_ref(),
-            _ => None,
+        let posed = match (self.args.at, self.args.pose) {
+            (Some(at_s), _) => self.posed(Some(self.pose_at(at_s)?)),
+            (None, None) if self.args.film.is_some() => self.model.posed(self.made.pose_in_picture.as_ref(), &[]),
+            _ => self.posed(None),
         };
-        let drawn = self.draw(&self.model.posed(pose, &[]), 0.0, self.args.background.unwrap_or(WHITE));
+        let drawn = self.draw(&posed, 0.0, self.args.background.unwrap_or(WHITE));
         let mut png = std::io::Cursor::new(Vec::new());
         let (width, height) = (drawn.size.width, drawn.size.height);
         image::write_buffer_with_format(
@@ -115,12 +109,12 @@ impl<'a> Studio<'a> {
     }
 
     fn video(&self) -> Result<(), Ended> {
-        let poses = &self.captured.poses;
+        let poses = &self.made.poses;
         let (first_s, last_s) = (poses.first().map_or(0.0, |p| p.time_s), poses.last().map_or(0.0, |p| p.time_s));
         let still = self.args.pose.is_some() || poses.len() < 2;
         let wanted_s = self.args.seconds.unwrap_or(if still { SECONDS } else { SECONDS.min(last_s - first_s) });
         let from_s = match self.args.at {
-            Some(at_s) => self.pose_at(at_s)?.time_s,
+            Some(at_s) => poses[self.pose_at(at_s)?].time_s,
             None => (last_s - wanted_s).max(first_s),
         };
         let frames = ((wanted_s * self.args.fps).round() as u64).max(1);
@@ -133,11 +127,7 @@ impl<'a> Studio<'a> {
             // Where the film is over it goes back: no jump.
             let time_s = from_s + there_and_back(k as f64 / self.args.fps, last_s - from_s);
             let pose = if still { None } else { nearest(poses, time_s) };
-            let drawn = self.draw(
-                &self.model.posed(pose, &[]),
-                k as f64 / frames as f64,
-                self.args.background.unwrap_or(WHITE),
-            );
+            let drawn = self.draw(&self.posed(pose), k as f64 / frames as f64, self.args.background.unwrap_or(WHITE));
             let rgb: Vec<u8> = drawn.pixels.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
             let film = match &mut film {
                 Some(film) => film,
@@ -153,11 +143,11 @@ impl<'a> Studio<'a> {
         let view = self.args.view_at(share);
         let camera = match (self.args.film, self.args.view) {
             // Beside the film the tree has the film's size.
-            (Some(_), ViewName::Front) if self.args.turn == 0.0 => Camera::of_film(&self.captured.skeleton, self.size),
+            (Some(_), ViewName::Front) if self.args.turn == 0.0 => Camera::of_film(&self.made.skeleton, self.size),
             (_, ViewName::Turntable) => Camera::fitting(&self.bounds, view, true, self.size),
             _ => Camera::fitting(&self.bounds, view, false, self.size),
         };
-        let frame = self.captured.picture.as_ref().filter(|_| self.args.film.is_some());
+        let frame = self.made.captured.picture.as_ref().filter(|_| self.args.film.is_some());
         let frame = frame.and_then(|p| Rgba::of_frame(&p.rgb, self.size, background));
         let mut below = Rgba::of_one(self.size, background);
         if let (Some(FilmPlace::Behind), Some(frame)) = (self.args.film, &frame) {
@@ -170,10 +160,17 @@ impl<'a> Studio<'a> {
         }
     }
 
-    /// The pose at a moment of the film.
-    fn pose_at(&self, at_s: f64) -> Result<&Pose, Ended> {
-        let poses = &self.captured.poses;
-        let found = nearest(poses, at_s).filter(|p| (p.time_s - at_s).abs() < 1.0);
+    /// The tree in one of its poses, its leaves as they swing then; `None` for its rest.
+    fn posed(&self, k: Option<usize>) -> Posed<'_> {
+        let Some(k) = k else { return self.model.posed(None, &[]) };
+        let sway: Vec<[f32; 2]> = self.made.flutter.iter().map(|all| all.get(k).copied().unwrap_or_default()).collect();
+        self.model.posed(self.made.poses.get(k), &sway)
+    }
+
+    /// Which pose is that of a moment of the film.
+    fn pose_at(&self, at_s: f64) -> Result<usize, Ended> {
+        let poses = &self.made.poses;
+        let found = nearest(poses, at_s).filter(|k| (poses[*k].time_s - at_s).abs() < 1.0);
         found.ok_or_else(|| {
             let (first_s, last_s) = (poses.first().map_or(0.0, |p| p.time_s), poses.last().map_or(0.0, |p| p.time_s));
             Ended::BadUsage(anyhow::anyhow!(
@@ -192,11 +189,10 @@ fn failed(e: ExportError) -> Ended {
     }
 }
 
-fn nearest(poses: &[Pose], time_s: f64) -> Option<&Pose> {
+fn nearest(poses: &[Pose], time_s: f64) -> Option<usize> {
     let after = poses.partition_point(|p| p.time_s < time_s);
-    let near = |p: &&Pose| (p.time_s - time_s).abs();
-    let around = poses[after.saturating_sub(1)..poses.len().min(after + 1)].iter();
-    around.min_by(|a, b| near(a).total_cmp(&near(b)))
+    let away = |k: &usize| (poses[*k].time_s - time_s).abs();
+    (after.saturating_sub(1)..poses.len().min(after + 1)).min_by(|a, b| away(a).total_cmp(&away(b)))
 }
 
 /// Where someone is after `way` who goes to and fro over a stretch of `length`.

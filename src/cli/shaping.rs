@@ -35,6 +35,8 @@ pub struct Made {
     pub config: Config,
     pub skeleton: Arc<Skeleton>,
     pub poses: Vec<Pose>,
+    /// The pose in the picture of the capture.
+    pub pose_in_picture: Option<Pose>,
     pub dressed: Dressed,
     /// How far each group of leaves swings in every pose.
     pub flutter: Vec<Vec<[f32; 2]>>,
@@ -75,9 +77,19 @@ impl Shaping {
     /// # Errors
     /// The capture cannot be read, a setting is out of range, or the capture lacks what a new shape is made from.
     pub fn made(&self, dir: &Path) -> Result<Made, Ended> {
+        self.made_with(dir, |_| None)
+    }
+
+    /// The same with other poses than those of an animation: of the last so many seconds, as `tail_s` says for a film of
+    /// its argument's length, s.
+    ///
+    /// # Errors
+    /// As of [`Shaping::made`].
+    pub fn made_with(&self, dir: &Path, tail_s: impl Fn(f64) -> Option<f64>) -> Result<Made, Ended> {
         let note = Captured::note(dir)?;
         let config = self.config(&note.config).map_err(|e| Ended::BadUsage(e.into()))?;
-        let captured = Captured::read(dir, config.export.animation_s)?;
+        let length_s = tail_s(note.timing.duration_s).unwrap_or(config.export.animation_s);
+        let captured = Captured::read(dir, length_s)?;
         let reshaped = config.shape != note.config.shape;
         let (skeleton, poses, pose_in_picture) = if reshaped {
             let outline = captured.outline.as_ref().ok_or_else(|| {
@@ -99,7 +111,18 @@ impl Shaping {
         let node_extras = captured.sway[..captured.skeleton.measured()].iter().map(extras).collect();
         let provenance = provenance(&captured.note.source.name, &Software::default(), &poses);
         let flutter = Vec::new();
-        Ok(Made { captured, config, skeleton, poses, dressed, flutter, node_extras, provenance, reshaped })
+        Ok(Made {
+            captured,
+            config,
+            skeleton,
+            poses,
+            pose_in_picture,
+            dressed,
+            flutter,
+            node_extras,
+            provenance,
+            reshaped,
+        })
     }
 }
 

@@ -1,5 +1,6 @@
 //! What `arborcam render` is asked for.
 
+use super::super::shaping::Shaping;
 use crate::draw::View;
 use crate::model::Size;
 use clap::{Args, ValueEnum};
@@ -46,6 +47,8 @@ pub struct RenderArgs {
     /// Pictures a second of a video, 1 to 120.
     #[arg(long, value_name = "RATE", default_value_t = 30.0, value_parser = rate)]
     pub fps: f64,
+    #[command(flatten)]
+    pub shaping: Shaping,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
