@@ -1,9 +1,11 @@
 //! Settings: plain structs whose defaults are the documented ones. A file overrides a default, the command line a file.
 
 mod hierarchy;
+mod leaves;
 mod reload;
 
 pub use hierarchy::{Affinity, Hierarchy};
+pub use leaves::{LeafShow, Leaves};
 pub use reload::{Change, EFFECTS, Effect, effect};
 
 use serde::{Deserialize, Serialize};
@@ -22,6 +24,7 @@ pub struct Config {
     pub hierarchy: Hierarchy,
     pub skeleton: Skeleton,
     pub shape: Shape,
+    pub leaves: Leaves,
     pub motion: Motion,
     pub export: Export,
 }
@@ -346,7 +349,7 @@ impl Config {
             ("export.animation_s", self.export.animation_s, (0.1, 3600.0, "0.1 to 3600")),
             ("export.metres_per_px", self.export.metres_per_px, (0.0, 1e6, "0 (pixels) or more")),
         ];
-        for (key, value, (low, high, allowed)) in rules.into_iter().chain(more) {
+        for (key, value, (low, high, allowed)) in rules.into_iter().chain(more).chain(self.leaves.rules()) {
             if !(low..=high).contains(&value) {
                 return Err(ConfigError::OutOfRange { key, value, allowed });
             }

@@ -6,6 +6,7 @@
 mod back;
 mod dress;
 mod front;
+mod leaves;
 mod refine;
 mod refiner;
 mod retrace;
@@ -13,6 +14,7 @@ mod retrace;
 pub use back::{BackEnd, Moved};
 pub use dress::{Dressed, Seen, dress};
 pub use front::{Followed, FrontEnd};
+pub use leaves::seeds as leaf_seeds;
 pub use refine::Refinement;
 pub use retrace::Retrace;
 

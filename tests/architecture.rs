@@ -25,7 +25,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("pipeline", &["model", "config", "outline", "track", "hierarchy", "skeleton", "shape", "motion"]),
     ("recording", &["model"]),
     // `capture.json` holds the whole configuration; the model's file holds the mesh.
-    ("export", &["model", "config", "shape::Mesh"]),
+    // A user's leaf is read where glTF is known.
+    ("export", &["model", "config", "shape::Mesh", "shape::Template", "shape::TemplateFault", "shape::TemplateMesh"]),
     // The screen draws outlines, and refuses the crossing ones as a file would be.
     ("tui", &["model", "outline::crossing", "caught"]),
     ("runtime", &["model", "config", "source", "outline", "shape", "dynamics", "pipeline", "recording", "export"]),

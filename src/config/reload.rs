@@ -32,6 +32,7 @@ pub const EFFECTS: &[(&str, Effect)] = &[
     ("hierarchy", TREE),
     ("skeleton", TREE),
     ("shape", TREE),
+    ("leaves", NextStart("the tree would have to be dressed anew")),
     ("motion", POSES),
     ("export.animation_s", NextStart("older poses have been let go already")),
     ("export.metres_per_px", NextStart("one capture has one scale")),

@@ -10,7 +10,9 @@ mod gltf_buffer;
 mod gltf_mesh;
 mod joints;
 mod number;
+mod template;
 mod thin_keys;
 
 pub use error::ExportError;
 pub use folder::OutputFolder;
+pub use template::{TemplateError, read_template};

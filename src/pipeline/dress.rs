@@ -1,8 +1,9 @@
 //! From the skeleton to all that is drawn of a tree: wood now, leaves where the film shows them.
 
+use super::leaves;
 use crate::config::Config;
-use crate::model::{Outline, Pose, Rgb, Skeleton};
-use crate::shape::{Detail, Foliage, Limb, Mesh, branches, limbs};
+use crate::model::{Luma, Outline, Pose, Rgb, Skeleton};
+use crate::shape::{Detail, Foliage, Limb, Mesh, Template, branches, limbs};
 
 /// What the film shows of the tree apart from its motion.
 #[derive(Clone, Copy, Debug, Default)]
@@ -11,6 +12,9 @@ pub struct Seen<'a> {
     pub picture: Option<&'a Rgb>,
     pub pose: Option<&'a Pose>,
     pub outline: Option<&'a Outline>,
+    /// A leaf of the user's own, and a drawn density of the leaves, which goes before the picture's.
+    pub leaf: Option<&'a Template>,
+    pub density: Option<&'a Luma>,
 }
 
 /// Everything that is drawn of a tree at rest.
@@ -24,8 +28,13 @@ pub struct Dressed {
     pub bark_rgb: [u8; 3],
 }
 
+/// Chance in the places of leaves: always the same.
+const SEED: u64 = 0;
+
 /// Dresses a skeleton.
-pub fn dress(skeleton: &Skeleton, _seen: Seen, _config: &Config) -> Dressed {
+pub fn dress(skeleton: &Skeleton, seen: Seen, config: &Config) -> Dressed {
     let wood = vec![branches(skeleton, Detail::for_budget(skeleton.nodes.len(), 60_000))];
-    Dressed { limbs: limbs(skeleton), wood, foliage: Foliage::default(), bark_rgb: [104, 84, 66] }
+    let limbs = limbs(skeleton);
+    let foliage = leaves::foliage(&limbs, skeleton, &seen, &config.leaves, SEED);
+    Dressed { limbs, wood, foliage, bark_rgb: [104, 84, 66] }
 }

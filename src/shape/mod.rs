@@ -3,6 +3,7 @@
 mod envelope;
 mod foliage;
 mod keep;
+mod leaves;
 mod limb;
 mod mesh;
 mod planes;
@@ -13,6 +14,10 @@ mod tube;
 pub use envelope::Envelope;
 pub use foliage::{Foliage, FoliageGroup};
 pub use keep::{Twin, stand_as_before, twins};
+pub use leaves::{
+    LeafView, Sampling, Season, Template, TemplateFault, TemplateMesh, density_match, foliage, foliage_by, leaf_cover,
+    season,
+};
 pub use limb::{Limb, Riding, Station, limbs};
 pub use mesh::{Detail, Mesh, branches};
 pub use planes::copy_to_planes;
