@@ -6,6 +6,9 @@ use super::density::{SCALE, smoothed};
 use super::{LeafView, PLAIN};
 use crate::model::Skeleton;
 
+/// Share of leaf from which on a cell's colour is that of leaves.
+const PURE: f32 = 0.6;
+
 /// What is wanted in every cell, and what is known of it.
 pub(super) struct Target {
     pub grid: Grid,
@@ -85,12 +88,14 @@ impl Target {
     }
 }
 
-/// How much of each cell and of the four beside it is leaf: at a leaf's edge the camera mixes the sky in.
+/// How much of each cell and of the four beside it is leaf, 0 where that is less than [`PURE`]: at a leaf's edge the camera
+/// mixes the sky in, and many cells that are hardly leaf would add up to a blue one.
 fn pure(leaf: &[f32], width: usize) -> Vec<f32> {
     let at = |i: Option<usize>| i.and_then(|i| leaf.get(i)).copied().unwrap_or(0.0);
     let least = |i: usize| {
         let beside = [i.checked_sub(1), Some(i + 1), i.checked_sub(width), Some(i + width)];
-        beside.into_iter().map(at).fold(leaf[i], f32::min)
+        let least = beside.into_iter().map(at).fold(leaf[i], f32::min);
+        if least < PURE { 0.0 } else { least }
     };
     (0..leaf.len()).map(least).collect()
 }
