@@ -1,12 +1,14 @@
 //! Settings: plain structs whose defaults are the documented ones. A file overrides a default, the command line a file.
 
 mod hierarchy;
+mod leaves;
 mod overlay;
 mod reload;
 mod shape;
 mod wood;
 
 pub use hierarchy::{Affinity, Hierarchy};
+pub use leaves::{LeafShow, Leaves};
 pub use reload::{Change, EFFECTS, Effect, effect};
 pub use shape::{EnvelopeKind, Leader, Shape};
 pub use wood::Wood;
@@ -28,6 +30,7 @@ pub struct Config {
     pub skeleton: Skeleton,
     pub shape: Shape,
     pub wood: Wood,
+    pub leaves: Leaves,
     pub motion: Motion,
     pub export: Export,
 }
@@ -340,7 +343,7 @@ impl Config {
             ("export.animation_s", self.export.animation_s, (0.1, 3600.0, "0.1 to 3600")),
             ("export.metres_per_px", self.export.metres_per_px, (0.0, 1e6, "0 (pixels) or more")),
         ];
-        for (key, value, (low, high, allowed)) in rules.into_iter().chain(more) {
+        for (key, value, (low, high, allowed)) in rules.into_iter().chain(more).chain(self.leaves.rules()) {
             if !(low..=high).contains(&value) {
                 return Err(ConfigError::OutOfRange { key, value, allowed });
             }

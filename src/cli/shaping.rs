@@ -104,13 +104,14 @@ impl Shaping {
             (captured.skeleton.clone(), captured.poses.clone(), captured.pose_in_picture.clone())
         };
         let picture = captured.picture.as_ref().map(|p| &*p.rgb);
-        let seen = Seen { picture, pose: pose_in_picture.as_ref(), outline: captured.outline.as_ref() };
+        let seen =
+            Seen { picture, pose: pose_in_picture.as_ref(), outline: captured.outline.as_ref(), ..Seen::default() };
         let dressed = dress(&skeleton, seen, &config);
         let extras = |sway: &Option<_>| sway.as_ref().map_or(Value::Null, |s: &crate::export::csv::Sway| s.extras());
         // Copies come last; nothing was measured on them.
         let node_extras = captured.sway[..captured.skeleton.measured()].iter().map(extras).collect();
         let provenance = provenance(&captured.note.source.name, &Software::default(), &poses);
-        let flutter = Vec::new();
+        let flutter = dressed.flutter(&poses, &skeleton, &config);
         Ok(Made {
             captured,
             config,

@@ -24,9 +24,11 @@ pub mod picture;
 mod skinning;
 mod sparse_keys;
 pub mod still;
+mod template;
 mod thin_keys;
 
 pub use error::ExportError;
 pub use file::OutputFile;
 pub use film::Film;
 pub use folder::OutputFolder;
+pub use template::{TemplateError, read_template};

@@ -3,11 +3,13 @@
 
 mod binding;
 mod deterministic;
+mod flutter;
 mod probabilistic;
 mod recover;
 
 pub use binding::Binding;
 pub use deterministic::direction as deterministic_direction;
+pub use flutter::flutter;
 pub use probabilistic::Problem;
 
 use crate::config::{Motion, MotionMethod};

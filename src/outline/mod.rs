@@ -1,6 +1,7 @@
 //! Which pixels are tree: a polygon, a mask image, scribbles, or found by itself.
 
 mod auto;
+mod density;
 mod laplacian;
 mod matting;
 mod polygon;
@@ -11,6 +12,7 @@ mod steady;
 mod trunk;
 
 pub use auto::{AutoOutline, Found, whole};
+pub use density::{DensityError, density};
 pub use matting::{alpha, outline as from_scribbles};
 pub use polygon::{PolygonFile, crossing, outline as from_polygon};
 pub use scribbles::{Mark, Scribbles};

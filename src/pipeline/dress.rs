@@ -1,9 +1,10 @@
-//! From the skeleton to all that is drawn of a tree: wood now, leaves where the film shows them.
+//! From the skeleton to all that is drawn of a tree: wood, and leaves where the film shows them.
 
-use super::bark;
+use super::{bark, leaves};
 use crate::config::Config;
-use crate::model::{Outline, Pose, Rgb, Skeleton};
-use crate::shape::{Envelope, Foliage, Limb, Mesh, limbs, wood_levels};
+use crate::model::{Luma, NodeId, Outline, Pose, Rgb, Skeleton};
+use crate::motion;
+use crate::shape::{Envelope, Foliage, Limb, Mesh, Template, limbs, wood_levels};
 use nalgebra::Point3;
 
 /// What the film shows of the tree apart from its motion.
@@ -13,6 +14,9 @@ pub struct Seen<'a> {
     pub picture: Option<&'a Rgb>,
     pub pose: Option<&'a Pose>,
     pub outline: Option<&'a Outline>,
+    /// A leaf of the user's own, and a drawn density of the leaves, which goes before the picture's.
+    pub leaf: Option<&'a Template>,
+    pub density: Option<&'a Luma>,
 }
 
 /// Everything that is drawn of a tree at rest.
@@ -26,13 +30,23 @@ pub struct Dressed {
     pub bark_rgb: [u8; 3],
 }
 
+impl Dressed {
+    /// How far each group of leaves swings in every pose, see [`flutter`](crate::motion::flutter).
+    pub fn flutter(&self, poses: &[Pose], skeleton: &Skeleton, config: &Config) -> Vec<Vec<[f32; 2]>> {
+        let groups: Vec<NodeId> = self.foliage.groups.iter().map(|g| g.node).collect();
+        motion::flutter(poses, skeleton, &groups, &config.leaves)
+    }
+}
+
 /// Dresses a skeleton.
 pub fn dress(skeleton: &Skeleton, seen: Seen, config: &Config) -> Dressed {
+    let seed = config.wood.seed.into();
     let room = room(skeleton.foot_px, seen.outline);
-    let limbs = limbs(skeleton, &room, &config.wood, config.wood.seed.into());
+    let limbs = limbs(skeleton, &room, &config.wood, seed);
     let wood = wood_levels(&limbs, config.wood.triangles as usize);
     let bark = seen.picture.and_then(|picture| bark::colour(picture, seen.pose, skeleton));
-    Dressed { limbs, wood, foliage: Foliage::default(), bark_rgb: bark.unwrap_or(bark::PLAIN) }
+    let foliage = leaves::foliage(&limbs, skeleton, &seen, &config.leaves, seed);
+    Dressed { limbs, wood, foliage, bark_rgb: bark.unwrap_or(bark::PLAIN) }
 }
 
 /// Where twigs may grow (from and to, model axes, px): within the outline turned about its axis, and not out of the outline

@@ -161,14 +161,15 @@ fn model_of(
 ) -> Result<(Vec<u8>, AnimationNote), ExportError> {
     let skeleton = &tree.skeleton;
     let picture = job.picture.as_ref().map(|p| &*p.rgb);
-    let seen = Seen { picture, pose: pose_in_picture, outline: Some(&tree.outline) };
+    let seen = Seen { picture, pose: pose_in_picture, outline: Some(&tree.outline), ..Seen::default() };
     let dressed = dress(skeleton, seen, &job.config);
+    let flutter = dressed.flutter(poses, skeleton, &job.config);
     let provenance = provenance(&job.info.name, &Software::default(), poses);
     glb(&Model {
         skeleton,
         dressed: &dressed,
         poses,
-        flutter: &[],
+        flutter: &flutter,
         all_levels: false,
         metres_per_px: job.config.export.metres_per_px,
         tolerance_px: KEY_TOLERANCE_PX,

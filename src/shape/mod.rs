@@ -13,6 +13,7 @@ mod girth;
 mod habit;
 mod hull;
 mod keep;
+mod leaves;
 mod limb;
 mod measure;
 mod mesh;
@@ -34,6 +35,10 @@ pub use foliage::{Foliage, FoliageGroup};
 pub use fuse::fuse;
 pub use girth::trunk_radius_px;
 pub use keep::{Twin, stand_as_before, twins};
+pub use leaves::{
+    LeafView, Sampling, Season, Template, TemplateFault, TemplateMesh, density_match, foliage, foliage_by, leaf_cover,
+    season,
+};
 pub use limb::{Limb, Riding, Room, Station, limbs};
 pub use measure::{PushFigures, side_symmetry};
 pub use mesh::{LEVELS, Mesh, bare_wood, wood, wood_levels};

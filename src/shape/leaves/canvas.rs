@@ -1,0 +1,126 @@
+//! The grid on which colour and density are counted: the picture, made smaller where it is large.
+
+use crate::model::{Outline, Rgb, Size, Skeleton};
+use nalgebra::Point3;
+
+/// Wider pictures are counted at a whole part of their width: leaves are chosen by their density, not by the pixel.
+const LARGEST_PX: u32 = 800;
+
+/// A grid over the source image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Grid {
+    pub size: Size,
+    /// Cells in a pixel of the source image, across and down.
+    scale: [f64; 2],
+    foot_px: [f64; 2],
+}
+
+impl Grid {
+    pub fn of(skeleton: &Skeleton) -> Self {
+        let Size { width, height } = skeleton.image_size;
+        let part = width.max(height).div_ceil(LARGEST_PX).max(1);
+        let size = Size::new((width / part).max(1), (height / part).max(1));
+        let scale =
+            [f64::from(size.width) / f64::from(width.max(1)), f64::from(size.height) / f64::from(height.max(1))];
+        Self { size, scale, foot_px: skeleton.foot_px }
+    }
+
+    /// The place in the grid of a pixel of the source image; the centre of the first cell is (0, 0).
+    pub fn cell_of_pixel(&self, p: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|k| (p[k] + 0.5) * self.scale[k] - 0.5)
+    }
+
+    /// The point in model axes that is seen at `cell`, at depth `z`.
+    pub fn model_at(&self, cell: [f64; 2], z: f64) -> Point3<f64> {
+        let [u, v] = [0, 1].map(|k| (cell[k] + 0.5) / self.scale[k] - 0.5);
+        Point3::new(u - self.foot_px[0], self.foot_px[1] - v, z)
+    }
+
+    /// The front view of a point in model axes.
+    pub fn cell_of(&self, p: &Point3<f64>) -> [f64; 2] {
+        self.cell_of_pixel([self.foot_px[0] + p.x, self.foot_px[1] - p.y])
+    }
+
+    /// Pixels of the source image to cells.
+    pub fn length(&self, px: f64) -> f64 {
+        px * self.scale[0]
+    }
+
+    pub fn area(&self) -> usize {
+        self.size.area()
+    }
+
+    /// The cell that holds a place, if one does.
+    pub fn index(&self, cell: [f64; 2]) -> Option<usize> {
+        let ok = cell[0].is_finite() && cell[1].is_finite() && self.size.contains(cell[0], cell[1]);
+        ok.then(|| {
+            let (u, v) = (cell[0].round().max(0.0) as usize, cell[1].round().max(0.0) as usize);
+            v * self.size.width as usize + u
+        })
+    }
+
+    /// Means of `channels` bytes a pixel over what of a picture of `from` lies in each cell.
+    pub fn reduced(&self, pixels: &[u8], from: Size, channels: usize) -> Option<Vec<u8>> {
+        let (w, h) = (from.width as usize, from.height as usize);
+        if w == 0 || h == 0 || pixels.len() != channels * w * h {
+            return None;
+        }
+        if from == self.size {
+            return Some(pixels.to_vec());
+        }
+        let (cw, ch) = (self.size.width as usize, self.size.height as usize);
+        let span = |k: usize, from: usize, to: usize| {
+            let first = k * from / to;
+            first..((k + 1) * from / to).clamp(first + 1, from.max(first + 1))
+        };
+        let mut out = Vec::with_capacity(channels * cw * ch);
+        for v in 0..ch {
+            for u in 0..cw {
+                let (rows, columns) = (span(v, h, ch), span(u, w, cw));
+                let n = (rows.len() * columns.len()) as u32;
+                for c in 0..channels {
+                    let row = |y: usize| columns.clone().map(move |x| channels * (y * w + x) + c);
+                    let sum: u32 = rows.clone().flat_map(row).map(|i| u32::from(pixels[i])).sum();
+                    out.push(((sum + n / 2) / n) as u8);
+                }
+            }
+        }
+        Some(out)
+    }
+}
+
+/// Picture and outline on the grid.
+pub(super) struct Canvas {
+    pub grid: Grid,
+    pub colours: Vec<[u8; 3]>,
+    pub inside: Vec<bool>,
+    /// Opacity of the tree, 0 to 1, where the outline knows it.
+    pub matte: Option<Vec<f32>>,
+}
+
+impl Canvas {
+    /// `None` where the picture or the outline is not what its size says, or nothing is inside.
+    pub fn new(grid: Grid, picture: &Rgb, outline: &Outline) -> Option<Self> {
+        let bytes = grid.reduced(&picture.pixels, picture.size, 3)?;
+        let colours = bytes.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
+        let mask = grid.reduced(&outline.mask, outline.size, 1)?;
+        let inside: Vec<bool> = mask.iter().map(|&m| m > 127).collect();
+        let matte = match &outline.matte {
+            Some(matte) => Some(grid.reduced(matte, outline.size, 1)?.iter().map(|&a| f32::from(a) / 255.0).collect()),
+            None => None,
+        };
+        inside.contains(&true).then_some(Self { grid, colours, inside, matte })
+    }
+
+    /// First and last row with something inside.
+    pub fn rows(&self) -> (usize, usize) {
+        let w = self.grid.size.width as usize;
+        let row = |i: Option<usize>| i.map_or(0, |i| i / w);
+        (row(self.inside.iter().position(|&m| m)), row(self.inside.iter().rposition(|&m| m)))
+    }
+}
+
+/// Brightness of a colour (Rec. 601), 0 to 255.
+pub(super) fn luma([r, g, b]: [u8; 3]) -> f64 {
+    0.299 * f64::from(r) + 0.587 * f64::from(g) + 0.114 * f64::from(b)
+}

@@ -1,0 +1,178 @@
+//! Clusters to meshes: one for each main branch, with the two displacements of B.2.
+
+use super::cluster::Cluster;
+use super::perch::Perch;
+use super::target::Target;
+use super::template::Template;
+use crate::model::{NodeId, Skeleton};
+use crate::shape::FoliageGroup;
+use nalgebra::Vector3;
+use std::f64::consts::TAU;
+
+/// Meshes of leaves in a tree at most.
+const MOST_GROUPS: usize = 12;
+/// Main branches with fewer of the clusters than this go with the nearest other one.
+const LEAST_SHARE: f64 = 0.02;
+/// Way over which the phase beta of B.2 goes round once, as a share of the tree's height.
+const WAVE: f64 = 0.25;
+/// A leaf turns about its stalk this many times as far as its cluster about its axis, and so much later, radians.
+const LEAF_SWING: f64 = 0.8;
+const LEAF_LATER: f64 = 2.4;
+/// Share of the outward direction in a normal: leaves are lit as a crown, not as a heap of mirrors.
+const OUTWARD: f64 = 0.5;
+
+/// The meshes of all clusters.
+pub(super) fn groups(
+    clusters: &[Cluster],
+    perches: &[Perch],
+    skeleton: &Skeleton,
+    target: Option<&Target>,
+    template: &Template,
+    height: f64,
+) -> Vec<FoliageGroup> {
+    let main = main_branches(skeleton);
+    let of: Vec<usize> = clusters.iter().map(|c| main[perches[c.perch].node.index()]).collect();
+    let stands = kept(&of, skeleton);
+    let mut nodes: Vec<usize> = stands.clone();
+    nodes.sort_unstable();
+    nodes.dedup();
+    let mut out: Vec<FoliageGroup> =
+        nodes.iter().map(|&n| FoliageGroup { node: NodeId(n as u32), ..FoliageGroup::default() }).collect();
+    let drawer = Drawer { skeleton, target, template, height };
+    for (cluster, stand) in clusters.iter().zip(&stands) {
+        if let Ok(k) = nodes.binary_search(stand) {
+            drawer.draw(cluster, &perches[cluster.perch], &mut out[k]);
+        }
+    }
+    out
+}
+
+/// For every node the main branch that it is on: the child of the first fork, or itself below that.
+fn main_branches(skeleton: &Skeleton) -> Vec<usize> {
+    let children = skeleton.children();
+    let mut top = 0;
+    while let Some([only]) = children.get(top).map(Vec::as_slice) {
+        top = only.index();
+    }
+    let mut main: Vec<usize> = (0..skeleton.nodes.len()).collect();
+    for (i, node) in skeleton.nodes.iter().enumerate() {
+        if let Some(parent) = node.parent.map(|p| p.index()).filter(|&p| p != top && p < i && i > top) {
+            main[i] = main[parent];
+        }
+    }
+    main
+}
+
+/// For every cluster the main branch whose group it is in: its own, or the nearest that is kept.
+fn kept(of: &[usize], skeleton: &Skeleton) -> Vec<usize> {
+    let mut counts: Vec<(usize, usize)> = Vec::new();
+    for &node in of {
+        match counts.iter_mut().find(|(_, n)| *n == node) {
+            Some((count, _)) => *count += 1,
+            None => counts.push((1, node)),
+        }
+    }
+    counts.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
+    let least = (LEAST_SHARE * of.len() as f64) as usize;
+    let large: Vec<usize> = counts
+        .iter()
+        .enumerate()
+        .filter(|(k, c)| *k == 0 || *k < MOST_GROUPS && c.0 > least)
+        .map(|(_, c)| c.1)
+        .collect();
+    let place = |n: usize| skeleton.nodes[n].position;
+    let nearest = |&node: &usize| {
+        if large.contains(&node) {
+            return node;
+        }
+        let way = |n: &usize| (place(*n) - place(node)).norm();
+        large.iter().copied().min_by(|a, b| way(a).total_cmp(&way(b))).unwrap_or(node)
+    };
+    of.iter().map(nearest).collect()
+}
+
+struct Drawer<'a> {
+    skeleton: &'a Skeleton,
+    target: Option<&'a Target>,
+    template: &'a Template,
+    height: f64,
+}
+
+impl Drawer<'_> {
+    fn draw(&self, cluster: &Cluster, perch: &Perch, group: &mut FoliageGroup) {
+        let template = self.template;
+        let first = group.mesh.positions.len() as u32;
+        let node = self.skeleton.nodes[perch.node.index()].position;
+        // beta of B.2: later the farther from the branch's node.
+        let way = (cluster.centre - node).norm();
+        let beta = if way.is_finite() { TAU * way / (WAVE * self.height) } else { 0.0 };
+        let axis = cluster.turn * Vector3::y();
+        let trunk = self.skeleton.nodes.get(1).map_or(Vector3::zeros(), |n| n.position.coords);
+        let outward = Vector3::new(cluster.centre.x - trunk.x, 0.3 * self.height, cluster.centre.z - trunk.z);
+        let outward = outward.try_normalize(1e-9).unwrap_or(Vector3::y());
+        let leaves = Leaves::of(self, cluster, perch);
+        for (i, p) in template.positions.iter().enumerate() {
+            let leaf = template.leaf_of[i] as usize;
+            let at = cluster.at(template, p);
+            let normal = cluster.turn * template.normals[i] * (1.0 - OUTWARD) + outward * OUTWARD;
+            let normal = normal.try_normalize(1e-6).unwrap_or(outward);
+            let turned = axis.cross(&(at - cluster.centre));
+            let fluttered = leaves.stalks[leaf].cross(&(at - leaves.apices[leaf])) * LEAF_SWING;
+            let later = beta + LEAF_LATER * (leaf as f64 + 1.0);
+            let sine = turned * beta.cos() + fluttered * later.cos();
+            let cosine = turned * beta.sin() + fluttered * later.sin();
+            group.mesh.positions.push(at.coords.map(|x| x as f32).into());
+            group.mesh.normals.push(normal.map(|x| x as f32).into());
+            group.mesh.uvs.push(template.uvs[i]);
+            group.mesh.joints.push(perch.riding.joints);
+            group.mesh.weights.push(perch.riding.weights);
+            group.colours.push(leaves.colours[leaf]);
+            group.sine.push(sine.map(|x| x as f32).into());
+            group.cosine.push(cosine.map(|x| x as f32).into());
+        }
+        group.mesh.indices.extend(template.indices.iter().map(|i| first + i));
+    }
+}
+
+/// The single leaves of a cluster.
+struct Leaves {
+    /// Where each is held, model axes at rest.
+    apices: Vec<nalgebra::Point3<f64>>,
+    /// From there to its middle, of length 1: what it turns about.
+    stalks: Vec<Vector3<f64>>,
+    colours: Vec<[u8; 3]>,
+}
+
+impl Leaves {
+    fn of(drawer: &Drawer, cluster: &Cluster, perch: &Perch) -> Self {
+        let template = drawer.template;
+        let count = template.apices.len();
+        let (mut sums, mut sizes) = (vec![Vector3::zeros(); count], vec![0.0; count]);
+        for (p, &leaf) in template.positions.iter().zip(&template.leaf_of) {
+            sums[leaf as usize] += p.coords;
+            sizes[leaf as usize] += 1.0;
+        }
+        let middles: Vec<_> = sums
+            .iter()
+            .zip(&sizes)
+            .map(|(s, n)| cluster.at(template, &nalgebra::Point3::from(s / f64::max(*n, 1.0))))
+            .collect();
+        let apices: Vec<_> = template.apices.iter().map(|a| cluster.at(template, a)).collect();
+        let stalk = |(m, a): (&nalgebra::Point3<f64>, &nalgebra::Point3<f64>)| {
+            (m - a).try_normalize(1e-9).unwrap_or(Vector3::zeros())
+        };
+        let stalks = middles.iter().zip(&apices).map(stalk).collect();
+        let colour = |middle: &nalgebra::Point3<f64>| {
+            let film = drawer.target.map_or(super::PLAIN, |t| {
+                let cell = t.grid.cell_of(&perch.carried.posed(middle));
+                t.colour(cell, (0.15 * t.grid.length(cluster.size)).max(1.0))
+            });
+            // Colour times texture is to be what the film shows.
+            std::array::from_fn(|k| {
+                (f64::from(film[k]) / template.texture_mean[k].max(0.05)).round().clamp(0.0, 255.0) as u8
+            })
+        };
+        let colours = middles.iter().map(colour).collect();
+        Self { apices, stalks, colours }
+    }
+}

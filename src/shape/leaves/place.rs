@@ -1,0 +1,241 @@
+//! Where clusters stand and how large they are, so that their density is that of the picture.
+
+use super::chance::Chance;
+use super::cluster::{Cluster, stand};
+use super::density::{Cover, correlation, smoothed};
+use super::perch::Perches;
+use super::target::Target;
+use super::template::Template;
+use crate::shape::leaves::Sampling;
+use nalgebra::{Point3, Vector3};
+
+/// Layers of leaves one behind the other that a size is first tried with.
+const LAYERS: f64 = 2.0;
+/// Sizes that are tried, each from what the one before covered.
+const TRIES: usize = 5;
+/// Shares of the clusters: seeds at most; seeds and density together; with those that stand on branches that bear few, which
+/// the picture does not show, but without them the crown would be thin from the side. What is left closes gaps.
+const SEEDED: f64 = 0.4;
+const BY_DENSITY: f64 = 0.45;
+const BEFORE_GAPS: f64 = 0.7;
+/// Rounds in which gaps are looked for.
+const ROUNDS: usize = 6;
+/// Seeds with less leaf around them are corners of something else.
+const LEAST_DENSITY: f32 = 0.15;
+/// Where more leaf is wanted than this, what is behind does not count.
+const HIDING: f32 = 0.5;
+/// A cluster that is put on a branch stands so far beside it at most, as a share of the tree's height.
+const ASIDE: f64 = 0.02;
+/// A leaf stands so far before or behind its branch at most, as a share of the tree's height.
+const DEEPEST: f64 = 1.0 / 15.0;
+/// Golden section: values `k * GOLDEN mod 1` fill the interval evenly for any number of them.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// All that decides where a cluster goes.
+pub(super) struct Planter<'a> {
+    pub perches: Perches,
+    pub target: &'a Target,
+    pub template: &'a Template,
+    /// In cells, strongest first.
+    pub seeds: Vec<[f64; 2]>,
+    /// The trunk's top at rest.
+    pub axis: Point3<f64>,
+    pub height: f64,
+    /// Clusters.
+    pub count: usize,
+    pub seed: u64,
+    pub sampling: Sampling,
+}
+
+impl Planter<'_> {
+    /// Of the sizes tried, the clusters whose density is most like the target's.
+    pub fn plant(&mut self) -> Vec<Cluster> {
+        let wanted: f64 = self.target.wanted.iter().map(|&w| f64::from(w)).sum();
+        let cells = self.target.grid.length(1.0).max(1e-9).powi(2);
+        if self.perches.all.is_empty() || self.count == 0 || wanted < 1.0 {
+            return Vec::new();
+        }
+        let one = self.template.mean_area().max(1e-9);
+        let mut size = self.bounded((LAYERS * wanted / cells / (self.count as f64 * one)).sqrt());
+        let mut best: Option<(f64, Vec<Cluster>)> = None;
+        for _ in 0..TRIES {
+            let (clusters, cover) = self.attempt(size);
+            let width = self.target.grid.size.width as usize;
+            let density = smoothed(&cover.covered, width, self.target.sigma);
+            let likeness =
+                -density.iter().zip(&self.target.density).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>();
+            if best.as_ref().is_none_or(|(before, _)| likeness > *before) {
+                best = Some((likeness, clusters));
+            }
+            let covered: f64 = cover.covered.iter().map(|&c| f64::from(c)).sum();
+            let next = self.bounded(size * (wanted / covered.max(1.0)).powf(0.8).clamp(0.6, 1.7));
+            if (next / size - 1.0).abs() < 0.01 {
+                break;
+            }
+            size = next;
+        }
+        best.map(|(_, clusters)| clusters).unwrap_or_default()
+    }
+
+    /// Clusters of one size, whatever they cover.
+    pub fn plant_of_size(&mut self, size: f64) -> Vec<Cluster> {
+        if self.perches.all.is_empty() { Vec::new() } else { self.attempt(self.bounded(size)).0 }
+    }
+
+    /// A cluster is seen as one, and is smaller than the crown.
+    fn bounded(&self, size: f64) -> f64 {
+        size.clamp(0.004 * self.height, 0.25 * self.height)
+    }
+
+    fn attempt(&mut self, size: f64) -> (Vec<Cluster>, Cover) {
+        self.perches.clear();
+        let mut work = Work {
+            chance: Chance::new(self.seed),
+            clusters: Vec::with_capacity(self.count),
+            cover: Cover::new(self.target.grid),
+        };
+        if let Sampling::Random { spread } = self.sampling {
+            self.at_random(spread, size, &mut work);
+            return (work.clusters, work.cover);
+        }
+        let most = ((SEEDED * self.count as f64).ceil() as usize).min(self.count);
+        let kept =
+            |cell: &&[f64; 2]| self.target.grid.index(**cell).is_some_and(|i| self.target.density[i] > LEAST_DENSITY);
+        let seeds: Vec<[f64; 2]> = self.seeds.iter().filter(kept).copied().collect();
+        // Every n-th: the strongest corners all lie on the border, before the sky.
+        let used = seeds.len().min(most);
+        for k in 0..used {
+            let cell = seeds[k * seeds.len() / used];
+            self.add(cell, self.target.is_bright(cell), size, &mut work);
+        }
+        let wanted = |(w, _): (&f32, &f32)| *w;
+        self.spread(BY_DENSITY, wanted, size, &mut work);
+        self.fill(BEFORE_GAPS, size, &mut work);
+        for round in 1..=ROUNDS {
+            let share = BEFORE_GAPS + (1.0 - BEFORE_GAPS) * round as f64 / ROUNDS as f64;
+            self.spread(share, |(w, c)| w * (1.0 - c), size, &mut work);
+        }
+        (work.clusters, work.cover)
+    }
+
+    /// Clusters where `weight` of what is wanted and what is covered is, until there are `share` of all.
+    fn spread(&mut self, share: f64, weight: impl Fn((&f32, &f32)) -> f32, size: f64, work: &mut Work) {
+        let count = ((share * self.count as f64).round() as usize).saturating_sub(work.clusters.len());
+        // By squares of about a cluster's size: a gap that large counts, specks between leaves do not.
+        let grid = self.target.grid;
+        let side = (0.5 * grid.length(size)).round().max(1.0) as usize;
+        let width = grid.size.width as usize;
+        let across = width.div_ceil(side);
+        let mut squares = vec![0.0f64; across * (grid.size.height as usize).div_ceil(side)];
+        for (i, pair) in self.target.wanted.iter().zip(&work.cover.covered).enumerate() {
+            squares[i / width / side * across + i % width / side] += f64::from(weight(pair));
+        }
+        let mut sum = 0.0;
+        squares.iter_mut().for_each(|s| {
+            sum += *s * *s;
+            *s = sum;
+        });
+        if sum <= 0.0 {
+            return;
+        }
+        let first = work.chance.share();
+        for k in 0..count {
+            let at = sum * (first + k as f64 * GOLDEN).fract();
+            let square = squares.partition_point(|&s| s <= at).min(squares.len() - 1);
+            let corner = [square % across * side, square / across * side];
+            let cell = corner.map(|c| c as f64 - 0.5 + side as f64 * work.chance.share());
+            if grid.index(cell).is_some() {
+                self.add(cell, self.target.is_bright(cell), size, work);
+            }
+        }
+    }
+
+    /// Clusters on the branches that bear fewest, where the picture's leaves hide them, until there are `share` of all.
+    fn fill(&mut self, share: f64, size: f64, work: &mut Work) {
+        let grid = self.target.grid;
+        let hidden = |i: &usize| grid.index(self.perches.all[*i].cell).is_some_and(|c| self.target.density[c] > HIDING);
+        let mut order: Vec<(f64, usize)> =
+            (0..self.perches.all.len()).filter(hidden).map(|i| (self.perches.all[i].load, i)).collect();
+        // Those with equal load in an order that goes all over the tree.
+        order.iter_mut().for_each(|(load, i)| *load += (*i as f64 * GOLDEN).fract());
+        order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let left = ((share * self.count as f64).round() as usize).saturating_sub(work.clusters.len());
+        for &(_, i) in order.iter().cycle().take(if order.is_empty() { 0 } else { left }) {
+            let perch = &mut self.perches.all[i];
+            perch.load += 1.0;
+            let (aside, bright) = (grid.length(ASIDE * self.height), work.chance.share() < 0.5);
+            let cell = perch.cell.map(|c| c + aside * work.chance.either());
+            self.hang(i, cell, aside, bright, size, work);
+        }
+    }
+
+    /// A cluster that is seen at `cell`, in the front half of the tree if it is bright.
+    fn add(&mut self, cell: [f64; 2], bright: bool, size: f64, work: &mut Work) {
+        if let Some((i, distance)) = self.perches.seat(cell, bright) {
+            self.hang(i, cell, distance, bright, size, work);
+        }
+    }
+
+    /// A cluster on branch place `i`, seen at `cell`, `distance` cells from it.
+    fn hang(&self, i: usize, cell: [f64; 2], distance: f64, bright: bool, size: f64, work: &mut Work) {
+        let perch = &self.perches.all[i];
+        let grid = &self.target.grid;
+        let far = (distance / grid.length(1.0).max(1e-9)).min(DEEPEST * self.height);
+        // Off the bark at least, on the side that it is lit from or not.
+        let off = far * work.chance.share() + perch.radius + 0.2 * size;
+        let posed = grid.model_at(cell, if bright { perch.depth + off } else { perch.depth - off });
+        // At the crown's border a whole cluster would stand out of it.
+        let share = grid.index(cell).map_or(0.0, |c| f64::from(self.target.density[c]));
+        let size = size * (0.5 + 0.6 * share).clamp(0.5, 1.1) * (1.0 + 0.15 * work.chance.either());
+        let centre = perch.carried.to_rest(&posed);
+        self.put(Cluster { perch: i, centre, turn: nalgebra::Rotation3::identity(), size }, work);
+    }
+
+    /// As leaves are sampled without a picture: about the branches, with a deviation of `spread` tree heights.
+    fn at_random(&mut self, spread: f64, size: f64, work: &mut Work) {
+        for _ in 0..self.count {
+            let i = ((work.chance.share() * self.perches.all.len() as f64) as usize).min(self.perches.all.len() - 1);
+            let off = Vector3::new(work.chance.normal(), work.chance.normal(), work.chance.normal());
+            let centre = self.perches.all[i].at + off * (spread * self.height);
+            let size = size * (1.0 + 0.15 * work.chance.either());
+            self.put(Cluster { perch: i, centre, turn: nalgebra::Rotation3::identity(), size }, work);
+        }
+    }
+
+    fn put(&self, mut cluster: Cluster, work: &mut Work) {
+        let perch = &self.perches.all[cluster.perch];
+        let chance = [work.chance.normal(), work.chance.normal(), work.chance.normal()];
+        cluster.turn = stand(perch, &cluster.centre, &self.axis, chance);
+        if !cluster.centre.coords.iter().all(|x| x.is_finite()) {
+            return;
+        }
+        let seen = |p: &Point3<f64>| self.target.grid.cell_of(&perch.carried.posed(&cluster.at(self.template, p)));
+        let cells: Vec<[f64; 2]> = self.template.positions.iter().map(seen).collect();
+        for t in self.template.indices.chunks_exact(3) {
+            work.cover.add([t[0], t[1], t[2]].map(|i| cells[i as usize]));
+        }
+        work.clusters.push(cluster);
+    }
+}
+
+/// What has been planted so far.
+struct Work {
+    chance: Chance,
+    clusters: Vec<Cluster>,
+    cover: Cover,
+}
+
+/// How like the densities of what is covered and of what is wanted are: their correlation over the target's bounding box.
+pub(super) fn likeness(target: &Target, covered: &[f32]) -> f64 {
+    let width = target.grid.size.width as usize;
+    let density = smoothed(covered, width, target.sigma);
+    let there = |i: usize| target.wanted[i] > 0.5 || covered[i] > 0.5;
+    let cells = (0..target.wanted.len()).filter(|&i| there(i)).map(|i| (i % width, i / width));
+    let bounds =
+        cells.fold((usize::MAX, 0, usize::MAX, 0), |(l, r, t, b), (u, v)| (l.min(u), r.max(u), t.min(v), b.max(v)));
+    let inside = |i: usize| {
+        let (u, v) = (i % width, i / width);
+        (bounds.0..=bounds.1).contains(&u) && (bounds.2..=bounds.3).contains(&v)
+    };
+    correlation(&density, &target.density, inside)
+}

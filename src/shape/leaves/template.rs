@@ -1,0 +1,274 @@
+//! The mesh that stands at every seed: a cluster of leaves, ours or the user's (Li et al. appendix B.1).
+
+use super::texture;
+use nalgebra::{Point3, Rotation3, Vector3};
+
+/// Triangles of a template at most: there are hundreds of copies of it.
+pub const MOST_TRIANGLES: usize = 5_000;
+
+/// A cluster of leaves of size 1: it grows from the origin along y, its leaves turn their faces to z.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Template {
+    pub(super) positions: Vec<Point3<f64>>,
+    pub(super) normals: Vec<Vector3<f64>>,
+    pub(super) uvs: Vec<[f32; 2]>,
+    pub(super) indices: Vec<u32>,
+    /// The leaf that each vertex belongs to: what hangs together.
+    pub(super) leaf_of: Vec<u32>,
+    /// Where each leaf is held, about which it turns.
+    pub(super) apices: Vec<Point3<f64>>,
+    /// Middle of the whole.
+    pub(super) centre: Point3<f64>,
+    pub(super) texture: Option<(&'static str, Vec<u8>)>,
+    /// Mean colour of the texture, 0 to 1 (sRGB); white where there is none.
+    pub(super) texture_mean: [f64; 3],
+}
+
+/// A mesh as it stands in a file; y is up.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TemplateMesh {
+    pub positions: Vec<[f32; 3]>,
+    pub normals: Vec<[f32; 3]>,
+    /// Empty where the file has none.
+    pub uvs: Vec<[f32; 2]>,
+    pub indices: Vec<u32>,
+    /// Media type and bytes of a PNG or JPEG.
+    pub texture: Option<(&'static str, Vec<u8>)>,
+}
+
+/// Why a mesh is no template.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum TemplateFault {
+    #[error("it has no triangles")]
+    Empty,
+    #[error("it has {0} triangles, and at most {MOST_TRIANGLES} are taken")]
+    TooMany(usize),
+    #[error("it has vectors of different lengths or indices beyond them")]
+    Torn,
+    #[error("it has positions that are no numbers")]
+    NoNumbers,
+    #[error("it has no size")]
+    Flat,
+    #[error("its texture is no PNG or JPEG, or larger than 4096 pixels")]
+    BadTexture,
+}
+
+/// Texture sides above this are refused, px.
+const LARGEST_TEXTURE: u32 = 4096;
+
+impl Template {
+    /// Our own: five leaves of six triangles, bent and folded along their midrib, around a twig.
+    pub fn ours() -> Self {
+        let mut mesh = TemplateMesh::default();
+        for k in 0..5 {
+            let turn = std::f64::consts::TAU * 0.382 * f64::from(k);
+            // Lower leaves stand off, the last goes on along the twig.
+            let (tilt, at) = (1.25 - 0.22 * f64::from(k), 0.08 * f64::from(k));
+            // All faces look to z somewhat: leaves turn to the light.
+            let stand = Rotation3::from_axis_angle(&Vector3::y_axis(), turn)
+                * Rotation3::from_axis_angle(&Vector3::x_axis(), tilt);
+            leaf(&mut mesh, Vector3::new(0.0, at, 0.0), &stand, 0.72 - 0.03 * f64::from(k));
+        }
+        mesh.texture = texture::png().map(|bytes| ("image/png", bytes));
+        Self::new(mesh).unwrap_or_else(|_| Self::nothing())
+    }
+
+    fn nothing() -> Self {
+        Self {
+            positions: Vec::new(),
+            normals: Vec::new(),
+            uvs: Vec::new(),
+            indices: Vec::new(),
+            leaf_of: Vec::new(),
+            apices: Vec::new(),
+            centre: Point3::origin(),
+            texture: None,
+            texture_mean: [1.0; 3],
+        }
+    }
+
+    /// A template from a mesh of any size, which is scaled so that its longest side is 1 and moved so that the middle of its
+    /// lowest end is the origin. Missing normals are computed.
+    ///
+    /// # Errors
+    /// What [`TemplateFault`] names.
+    pub fn new(mesh: TemplateMesh) -> Result<Self, TemplateFault> {
+        let n = mesh.positions.len();
+        let triangles = mesh.indices.len() / 3;
+        if triangles == 0 || n == 0 {
+            return Err(TemplateFault::Empty);
+        }
+        if triangles > MOST_TRIANGLES || n > 3 * MOST_TRIANGLES {
+            return Err(TemplateFault::TooMany(triangles));
+        }
+        let same = |m: usize| m == 0 || m == n;
+        if !same(mesh.normals.len()) || !same(mesh.uvs.len()) || mesh.indices.iter().any(|&i| i as usize >= n) {
+            return Err(TemplateFault::Torn);
+        }
+        let numbers = mesh.positions.iter().chain(&mesh.normals).flatten().chain(mesh.uvs.iter().flatten());
+        if !numbers.into_iter().all(|x| x.is_finite() && x.abs() < 1e12) {
+            return Err(TemplateFault::NoNumbers);
+        }
+        let given: Vec<Point3<f64>> = mesh.positions.iter().map(|p| Point3::from(p.map(f64::from))).collect();
+        let (low, high) = given.iter().fold((given[0], given[0]), |(low, high), p| (low.inf(p), high.sup(p)));
+        let side = (high - low).max();
+        if side <= 1e-12 {
+            return Err(TemplateFault::Flat);
+        }
+        let near_end: Vec<&Point3<f64>> = given.iter().filter(|p| p.y <= low.y + 0.02 * side).collect();
+        let sum: Vector3<f64> = near_end.iter().map(|p| p.coords).sum();
+        let base = Point3::from(sum / near_end.len().max(1) as f64);
+        let positions: Vec<Point3<f64>> = given.iter().map(|p| Point3::from((p - base) / side)).collect();
+        let texture_mean = match &mesh.texture {
+            Some((_, bytes)) => mean_colour(bytes).ok_or(TemplateFault::BadTexture)?,
+            None => [1.0; 3],
+        };
+        let normals = normals(&mesh, &positions);
+        let leaf_of = pieces(n, &mesh.indices);
+        let leaves = leaf_of.iter().max().map_or(0, |&m| m as usize + 1);
+        let mut apices = vec![Point3::new(f64::MAX, f64::MAX, f64::MAX); leaves];
+        for (p, &leaf) in positions.iter().zip(&leaf_of) {
+            let apex = &mut apices[leaf as usize];
+            if p.coords.norm_squared() < apex.coords.norm_squared() {
+                *apex = *p;
+            }
+        }
+        let centre = Point3::from(positions.iter().map(|p| p.coords).sum::<Vector3<f64>>() / n as f64);
+        let uvs = if mesh.uvs.is_empty() { vec![[0.5; 2]; n] } else { mesh.uvs };
+        let (indices, texture) = (mesh.indices, mesh.texture);
+        Ok(Self { positions, normals, uvs, indices, leaf_of, apices, centre, texture, texture_mean })
+    }
+
+    /// Triangles of one cluster.
+    pub fn triangles(&self) -> usize {
+        self.indices.len() / 3
+    }
+
+    /// Mean area of the cluster's silhouette over all directions at size 1, were no leaf before another (Cauchy): a quarter of
+    /// both faces' area.
+    pub(super) fn mean_area(&self) -> f64 {
+        let area = |t: &[u32]| {
+            let [a, b, c] = [0, 1, 2].map(|k| self.positions[t[k] as usize]);
+            (b - a).cross(&(c - a)).norm() / 2.0
+        };
+        self.indices.chunks_exact(3).map(area).sum::<f64>() / 2.0
+    }
+}
+
+/// One leaf of length `length` along `stand` times y from `from`: 7 vertices, 6 triangles.
+fn leaf(mesh: &mut TemplateMesh, from: Vector3<f64>, stand: &Rotation3<f64>, length: f64) {
+    // Across, along, up; the sides stand up from the midrib, and the tip hangs.
+    const POINTS: [[f64; 3]; 7] = [
+        [0.0, 0.0, 0.0],
+        [-0.30, 0.30, 0.09],
+        [0.30, 0.30, 0.09],
+        [0.0, 0.48, 0.04],
+        [-0.22, 0.68, 0.02],
+        [0.22, 0.68, 0.02],
+        [0.0, 1.0, -0.16],
+    ];
+    const TRIANGLES: [u32; 18] = [0, 3, 1, 1, 3, 4, 4, 3, 6, 0, 2, 3, 2, 5, 3, 5, 6, 3];
+    let first = mesh.positions.len() as u32;
+    for [x, y, z] in POINTS {
+        let p = from + stand * (Vector3::new(x, y, z) * length);
+        mesh.positions.push([p.x as f32, p.y as f32, p.z as f32]);
+        mesh.uvs.push([(0.5 + x / 0.64) as f32, (1.0 - y) as f32]);
+    }
+    mesh.indices.extend(TRIANGLES.map(|i| first + i));
+}
+
+/// Given normals made length 1, and those of the faces around where none is given or it is 0.
+fn normals(mesh: &TemplateMesh, positions: &[Point3<f64>]) -> Vec<Vector3<f64>> {
+    let mut around = vec![Vector3::zeros(); positions.len()];
+    for t in mesh.indices.chunks_exact(3) {
+        let [a, b, c] = [0, 1, 2].map(|k| t[k] as usize);
+        let face = (positions[b] - positions[a]).cross(&(positions[c] - positions[a]));
+        [a, b, c].into_iter().for_each(|i| around[i] += face);
+    }
+    let given = |i: usize| mesh.normals.get(i).and_then(|v| Vector3::from(v.map(f64::from)).try_normalize(1e-12));
+    let own = |(i, v): (usize, Vector3<f64>)| given(i).or(v.try_normalize(1e-12)).unwrap_or(Vector3::z());
+    around.into_iter().enumerate().map(own).collect()
+}
+
+/// Numbers the pieces that hang together, in the order of their first vertex.
+fn pieces(n: usize, indices: &[u32]) -> Vec<u32> {
+    let mut root: Vec<usize> = (0..n).collect();
+    fn find(root: &mut [usize], mut i: usize) -> usize {
+        while root[i] != i {
+            root[i] = root[root[i]];
+            i = root[i];
+        }
+        i
+    }
+    for t in indices.chunks_exact(3) {
+        for k in [1, 2] {
+            let (a, b) = (find(&mut root, t[0] as usize), find(&mut root, t[k] as usize));
+            let (low, high) = (a.min(b), a.max(b));
+            root[high] = low;
+        }
+    }
+    let mut number = vec![u32::MAX; n];
+    let mut next = 0;
+    (0..n)
+        .map(|i| {
+            let r = find(&mut root, i);
+            if number[r] == u32::MAX {
+                number[r] = next;
+                next += 1;
+            }
+            number[r]
+        })
+        .collect()
+}
+
+/// Mean of what can be seen of a picture, 0 to 1; `None` if it cannot be read or is too large.
+fn mean_colour(bytes: &[u8]) -> Option<[f64; 3]> {
+    let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format().ok()?;
+    let mut limits = image::Limits::default();
+    limits.max_image_width = Some(LARGEST_TEXTURE);
+    limits.max_image_height = Some(LARGEST_TEXTURE);
+    reader.limits(limits);
+    let picture = reader.decode().ok()?.into_rgba8();
+    let (mut sum, mut weight) = ([0.0; 3], 0.0);
+    for pixel in picture.pixels() {
+        let [r, g, b, alpha] = pixel.0.map(f64::from);
+        weight += alpha;
+        [r, g, b].iter().zip(&mut sum).for_each(|(c, s)| *s += alpha * c);
+    }
+    Some(sum.map(|s| if weight > 0.0 { s / weight / 255.0 } else { 1.0 }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn our_cluster_is_five_leaves_with_a_texture() {
+        let ours = Template::ours();
+        assert_eq!((ours.triangles(), ours.apices.len()), (30, 5));
+        assert!(ours.texture.is_some() && ours.mean_area() > 0.1, "{}", ours.mean_area());
+        assert!(ours.normals.iter().all(|n| (n.norm() - 1.0).abs() < 1e-9));
+    }
+
+    #[test]
+    fn what_is_no_template_is_refused() {
+        let good = TemplateMesh {
+            positions: vec![[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 4.0, 0.0]],
+            indices: vec![0, 1, 2],
+            ..TemplateMesh::default()
+        };
+        assert!(Template::new(good.clone()).is_ok());
+        let refused = |change: fn(&mut TemplateMesh)| {
+            let mut mesh = good.clone();
+            change(&mut mesh);
+            Template::new(mesh).expect_err("no template")
+        };
+        assert_eq!(refused(|m| m.indices.clear()), TemplateFault::Empty);
+        assert_eq!(refused(|m| m.indices[2] = 3), TemplateFault::Torn);
+        assert_eq!(refused(|m| m.uvs.push([0.0; 2])), TemplateFault::Torn);
+        assert_eq!(refused(|m| m.positions[1][0] = f32::NAN), TemplateFault::NoNumbers);
+        assert_eq!(refused(|m| m.positions.fill([1.0; 3])), TemplateFault::Flat);
+        assert_eq!(refused(|m| m.texture = Some(("image/png", vec![1, 2, 3]))), TemplateFault::BadTexture);
+        assert_eq!(refused(|m| m.indices = [0, 1, 2].repeat(5001)), TemplateFault::TooMany(5001));
+    }
+}
