@@ -1,6 +1,7 @@
 //! Settings: plain structs whose defaults are the documented ones. A file overrides a default, the command line a file.
 
 mod hierarchy;
+mod overlay;
 mod reload;
 
 pub use hierarchy::{Affinity, Hierarchy};

@@ -9,12 +9,14 @@ mod dress;
 mod front;
 mod refine;
 mod refiner;
+mod reshape;
 mod retrace;
 
 pub use back::{BackEnd, Moved};
 pub use dress::{Dressed, Seen, dress};
 pub use front::{Followed, FrontEnd};
 pub use refine::Refinement;
+pub use reshape::reshape;
 pub use retrace::Retrace;
 
 use crate::config::Config;
@@ -148,6 +150,12 @@ fn crown_u(table: &TrackTable, moving: &[usize]) -> Option<f64> {
     (!moving.is_empty()).then(|| sum / moving.len() as f64)
 }
 
+/// Radii, from the trunk's as the outline shows it.
+fn thicken(skeleton: &mut Skeleton, outline: &Outline) {
+    let trunk_px = TRUNK_SHARE * skeleton::Foot::of(outline, None).half_width_px;
+    shape::pipe_model(skeleton, trunk_px.max(2.0 * TIP_RADIUS_PX), TIP_RADIUS_PX);
+}
+
 /// Tracks to tree: evidence, hierarchy, 2D skeleton, 3D skeleton. `None` if too few points move.
 pub fn build(
     table: &Arc<TrackTable>,
@@ -168,8 +176,7 @@ pub fn build(
     let points = |n: &skeleton::Node2d| n.cluster.map_or(0, |c| c.0 as usize);
     let tracks: Vec<u32> = flat.iter().map(|n| hierarchy.clusters[points(n)].members.len() as u32).collect();
     let mut skeleton = shape::build(&flat, &tracks, outline, &config.shape);
-    let trunk_px = TRUNK_SHARE * skeleton::Foot::of(outline, None).half_width_px;
-    shape::pipe_model(&mut skeleton, trunk_px.max(2.0 * TIP_RADIUS_PX), TIP_RADIUS_PX);
+    thicken(&mut skeleton, outline);
     let rest = |row: usize| (table.ids[row], hierarchy::rest_position_px(table, row));
     let first = First { frame, time_s, measure: evidence.measure, moving: evidence.moving.len(), forced };
     Some(Tree {

@@ -24,8 +24,19 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("signal", &[]),
     ("pipeline", &["model", "config", "outline", "track", "hierarchy", "skeleton", "shape", "motion"]),
     ("recording", &["model"]),
-    // `capture.json` holds the whole configuration; the model's file holds the mesh; the HTML page plots the angles.
-    ("export", &["model", "config", "shape::Mesh", "dynamics::angle_to_parent_deg"]),
+    // `capture.json` holds the whole configuration; the model's file holds all that is drawn; the HTML page plots angles.
+    (
+        "export",
+        &[
+            "model",
+            "config",
+            "shape::Mesh",
+            "shape::FoliageGroup",
+            "shape::Cylinder",
+            "pipeline::Dressed",
+            "dynamics::angle_to_parent_deg",
+        ],
+    ),
     // A capture's tables back to the nouns: poses by the rule by which they were made, the outline as a file of its own
     // would be.
     ("capture", &["model", "config", "motion::PoseEstimator", "outline", "export"]),
@@ -46,6 +57,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "runtime",
             "export",
             "capture",
+            // The table of cylinders is of the limbs.
+            "shape::cylinders",
             "tui",
             "doctor",
         ],

@@ -146,7 +146,7 @@ fn a_model_in_metres_is_read_in_pixels() {
 #[test]
 fn a_tree_of_the_same_shape_is_posed_as_it_was() {
     let read = Captured::read(made(), WHOLE).expect("capture");
-    let again = read.reposed(&read.skeleton, &read.note.config);
+    let again = read.reposed(&read.skeleton, &read.note.config, &read.poses);
     let mut off: Vec<f64> = Vec::new();
     for (a, b) in read.poses.iter().zip(&again).skip(60) {
         let front = |j: &arborcam::model::JointPose| read.skeleton.image_from_model(&j.position);

@@ -128,15 +128,15 @@ impl Captured {
         Ok(Self { dir, note, skeleton, sway, poses, picture, pose_in_picture, outline, warnings })
     }
 
-    /// The poses of another skeleton whose measured nodes are those of this one, e.g. one of another shape: its nodes
+    /// `poses` of this tree as those of another whose measured nodes are the same, e.g. one of another shape: its nodes
     /// follow the same places in the picture.
-    pub fn reposed(&self, skeleton: &Arc<Skeleton>, config: &Config) -> Vec<Pose> {
+    pub fn reposed(&self, skeleton: &Arc<Skeleton>, config: &Config, poses: &[Pose]) -> Vec<Pose> {
         let mut estimator = PoseEstimator::new(skeleton.clone(), &config.motion);
         let measured = self.skeleton.measured().min(skeleton.measured());
         let targets = |pose: &Pose| -> Vec<Option<[f64; 2]>> {
             pose.joints[..measured].iter().map(|j| Some(self.skeleton.image_from_model(&j.position))).collect()
         };
-        self.poses.iter().map(|pose| estimator.step(pose.frame, pose.time_s, &targets(pose))).collect()
+        poses.iter().map(|pose| estimator.step(pose.frame, pose.time_s, &targets(pose))).collect()
     }
 }
 

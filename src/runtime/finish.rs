@@ -165,9 +165,10 @@ fn model_of(
     let provenance = provenance(&job.info.name, &Software::default(), poses);
     glb(&Model {
         skeleton,
-        mesh: &dressed.wood[0],
+        dressed: &dressed,
         poses,
-        bark_rgb: dressed.bark_rgb,
+        flutter: &[],
+        all_levels: false,
         metres_per_px: job.config.export.metres_per_px,
         tolerance_px: KEY_TOLERANCE_PX,
         node_extras: &[],

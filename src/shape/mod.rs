@@ -1,5 +1,6 @@
 //! From the flat skeleton to a tree in space (Li et al. section 3).
 
+mod cylinders;
 mod envelope;
 mod foliage;
 mod keep;
@@ -10,6 +11,7 @@ mod push;
 mod radius;
 mod tube;
 
+pub use cylinders::{Cylinder, cylinders};
 pub use envelope::Envelope;
 pub use foliage::{Foliage, FoliageGroup};
 pub use keep::{Twin, stand_as_before, twins};
