@@ -137,8 +137,8 @@ fn model_file() -> String {
     let tree = built(&history, &outline);
     let config = Config::default();
     let (mut binding, mut estimator) = (tree.binding(), tree.estimator(&config));
-    let mut pose = |set: &TrackSet| estimator.step(set.frame, set.time_s, &binding.targets_px(set));
-    let poses: Vec<Pose> = sets.iter().map(|set| pose(set)).collect();
+    let pose = |set: &TrackSet| estimator.step(set.frame, set.time_s, &binding.targets_px(set));
+    let poses: Vec<Pose> = sets.iter().map(pose).collect();
     let seen = Seen { outline: Some(&outline), ..Seen::default() };
     let dressed = dress(&tree.skeleton, seen, &config);
     let provenance = serde_json::Value::Null;
@@ -151,6 +151,7 @@ fn model_file() -> String {
             all_levels: false,
             metres_per_px: 0.0,
             tolerance_px: KEY_TOLERANCE_PX,
+            thorough: true,
             node_extras: &[],
             provenance: &provenance,
         };

@@ -34,6 +34,6 @@ pub fn dress(skeleton: &Skeleton, seen: Seen, _config: &Config) -> Dressed {
         limbs: limbs(skeleton),
         wood: vec![branches(skeleton, Detail::for_budget(skeleton.nodes.len(), TRIANGLES))],
         foliage: Foliage::default(),
-        bark_rgb: seen.picture.and_then(|picture| bark::colour(picture, seen.pose, skeleton)).unwrap_or(bark::PLAIN),
+        bark_rgb: bark::colour(&seen, skeleton).unwrap_or(bark::PLAIN),
     }
 }
