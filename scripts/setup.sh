@@ -43,16 +43,12 @@ own_node() {
 
 wanted_packages() {
     local lists=(scripts/apt-packages.txt) leave_out=()
-    if [[ -n $tests ]]; then
-        lists+=(scripts/apt-packages-test.txt)
-        ! own_node || leave_out=(-e '^nodejs$' -e '^npm$')
-    fi
+    [[ -z $tests ]] || lists+=(scripts/apt-packages-test.txt)
+    ! own_node || leave_out=(-e '^nodejs$' -e '^npm$')
     sed 's/#.*//' "${lists[@]}" | tr -s '[:space:]' '\n' | sed '/^$/d' | grep -v "${leave_out[@]:--e^-}"
 }
 
 installed() {
-    # From wherever it is: Debian's own is made of some hundred packages.
-    [[ $1 == npm ]] && command -v npm >/dev/null && return
     # The bindings' generator finds a clang with a number in its name, too.
     local names=("$1")
     [[ $1 == clang ]] && names+=('clang-[0-9]*')

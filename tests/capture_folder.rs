@@ -297,6 +297,11 @@ fn a_replay_is_reproducible_to_the_byte() {
 #[test]
 fn the_tree_is_found_without_an_outline() {
     let found = replay(&[], &["--headless"]);
+    assert_eq!(
+        found.capture()["picture"]["frame"],
+        0,
+        "the frames that were held back are in the tables, the first among them"
+    );
     assert!(found.nodes().len() > 50, "{} nodes", found.nodes().len());
     let given = support::outline();
     let inside = |r: &Vec<String>| given.contains(number(&r[3]), number(&r[4]));

@@ -215,6 +215,7 @@ const CASES: &[Case] = &[
     ("recordings/README.md --format glb --out {w}/t.glb", NO_INPUT, &["is no capture"]),
     ("{w}/cut --format glb --out {w}/t.glb", NO_INPUT, &["motion.csv, line", "make the capture anew"]),
     ("{w}/bare --format glb --out {w}/t.glb", FAILED, &["holds tracks but no tree", "film for longer"]),
+    ("{w}/lone --format ply --out {w}/t.ply", FAILED, &["no branch of it has a length", "--format csv or glb"]),
     ("{c} --format glb --out {w}/there", FAILED, &["{w}/there exists already", "choose another"]),
     ("{c} --format csv --out {w}/there", FAILED, &["{w}/there exists already", "choose another"]),
     ("{c} --format glb --out {w}/no/such/t.glb", FAILED, &["{w}/no/such is not there", "make it first"]),
@@ -236,7 +237,7 @@ const CASES: &[Case] = &[
 fn bad_input_gets_one_line_and_leaves_nothing() {
     let dir = tempfile::tempdir().expect("tempdir");
     let work = dir.path();
-    for name in ["cut", "bare"] {
+    for name in ["cut", "bare", "lone"] {
         fs::create_dir(work.join(name)).expect("folder");
         for file in fs::read_dir(made()).expect("capture").flatten() {
             fs::copy(file.path(), work.join(name).join(file.file_name())).expect("copy");
@@ -248,6 +249,22 @@ fn bad_input_gets_one_line_and_leaves_nothing() {
     let mut note: serde_json::Value = serde_json::from_str(&note).expect("json");
     note["model"] = serde_json::Value::Null;
     fs::write(work.join("bare/capture.json"), note.to_string()).expect("write");
+    // A foot, and nothing on it.
+    let rows = |name: &str, kept: fn(&str) -> bool| {
+        let text = fs::read_to_string(work.join("lone").join(name)).expect("table");
+        let kept: String = text.lines().filter(|l| kept(l)).map(|l| format!("{l}\n")).collect();
+        fs::write(work.join("lone").join(name), kept).expect("write");
+    };
+    rows("nodes.csv", |l| l.starts_with("node_id") || l.starts_with("0,"));
+    rows("motion.csv", |l| l.starts_with("frame") || l.split(',').nth(2) == Some("0"));
+    fs::remove_file(work.join("lone/tree.glb")).expect("remove");
+    let mut note: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(work.join("lone/capture.json")).expect("note")).expect("json");
+    note["model"]["copied"] = serde_json::json!([]);
+    fs::write(work.join("lone/capture.json"), note.to_string()).expect("write");
+    let lone = export(&work.join("lone"), "glb", Path::new("-"), &[]);
+    assert!(lone.status.success(), "{}", String::from_utf8_lossy(&lone.stderr));
+    assert_eq!(gltf::Gltf::from_slice(&lone.stdout).expect("a valid file").nodes().count(), 1);
     fs::write(work.join("there"), "mine").expect("write");
     fs::write(work.join("bad.toml"), "[shape]\nplains = 3\n").expect("write");
     let before = names_in(work);

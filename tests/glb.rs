@@ -30,8 +30,18 @@ fn model<'a>(
     metres_per_px: f64,
     provenance: &'a Value,
 ) -> Model<'a> {
-    let (flutter, node_extras) = (&[], &[]);
-    Model { skeleton, dressed, poses, flutter, all_levels: false, metres_per_px, tolerance_px, node_extras, provenance }
+    Model {
+        skeleton,
+        dressed,
+        poses,
+        flutter: &[],
+        all_levels: false,
+        metres_per_px,
+        tolerance_px,
+        thorough: true,
+        node_extras: &[],
+        provenance,
+    }
 }
 
 /// With `ARBORCAM_GLB_DIR=DIR` the files stay, for `scripts/validate-glb.mjs` or a viewer.

@@ -264,7 +264,10 @@ fn export_writes_a_capture_and_goes_on() {
     let exported = last(&dir.path().join("capture-1"));
     assert!((270..=281).contains(&exported), "exported up to frame {exported}");
     assert!(dir.path().join("capture-1/tree.glb").exists());
+    let picture = |dir: &std::path::Path| std::fs::read(dir.join("frame.jpg")).expect("picture");
+    let first = picture(&dir.path().join("capture-1"));
     assert_eq!((last(&out), summary.frames), (329, 330), "frames go on");
+    assert!(first == picture(&out), "it is one picture, however often a capture is written");
 }
 
 #[test]

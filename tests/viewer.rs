@@ -3,16 +3,15 @@
 //! Without Chromium, Node, the modules of `scripts/test-modules.sh` or the viewer itself the test says so and does
 //! nothing; with `ARBORCAM_REQUIRE_TOOLS=1` it fails. `ARBORCAM_VIEWER_DIR=DIR` keeps the pages.
 
-use arborcam::capture::Captured;
 use arborcam::export::html::{self, Branch, Data, Page};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
 use std::{env, fs};
 
-/// A name that would do harm if it were taken for HTML, and that no file can have.
-const TITLE: &str = "Winter <b>tree</b> & \"co\"/2</script>";
-/// The page without the tree in it: 3 MB.
+/// A file's name that would do harm if it were taken for HTML.
+const TITLE: &str = "Winter <b>tree<!-- & \"co\" <script>";
+/// 3 MB beside the model.
 const LARGEST_VIEWER: usize = 3_000_000;
 
 /// Fills a folder with the page of a replay of a clip, in px and in metres.
@@ -26,19 +25,26 @@ fn pages(dir: &Path, clip: &Path, outline: &Path) {
             .output()
             .expect("arborcam runs");
         assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-        let captured = Captured::read(&out, 60.0).expect("the capture is read");
-        let glb = fs::read(out.join("tree.glb")).expect("model");
-        let picture = fs::read(out.join("frame.jpg")).expect("picture");
-        let data = Data::of(&captured.note, &captured.skeleton, &captured.poses, &captured.sway);
-        let page = Page { title: TITLE, glb: &glb, data: &data, picture: Some(&picture) };
-        let text = html::page(&page).expect("page");
-        assert_eq!(text, html::page(&page).expect("page"), "the same tree gives another page");
-        let rest = text.len() - glb.len() * 4 / 3;
-        assert!(rest < LARGEST_VIEWER, "{rest} bytes beside the model");
-        println!("page {} kB, model {} kB", text.len() / 1000, glb.len() / 1000);
+        let export = |format: &str, to: &Path| {
+            let run = Command::new(env!("CARGO_BIN_EXE_arborcam"))
+                .args([Path::new("export"), &out, Path::new("--format"), Path::new(format), Path::new("--out"), to])
+                .output()
+                .expect("arborcam runs");
+            assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+            fs::read(to).expect("what was exported")
+        };
+        let pages = [1, 2].map(|k| {
+            let folder = dir.join(format!("{name}-{k}"));
+            fs::create_dir_all(&folder).expect("folder");
+            export("html", &folder.join(format!("{TITLE}.html")))
+        });
+        assert!(pages[0] == pages[1], "the same tree gives another page");
+        let [text, _] = pages;
         let suffix = if name == "px" { "" } else { "-m" };
+        let glb = export("glb", &dir.join(format!("tree{suffix}.glb")));
+        assert!(text.len() < LARGEST_VIEWER + glb.len(), "{} bytes", text.len());
+        println!("page {} kB, model {} kB", text.len() / 1000, glb.len() / 1000);
         fs::write(dir.join(format!("page{suffix}.html")), text).expect("page");
-        fs::write(dir.join(format!("tree{suffix}.glb")), glb).expect("model");
     }
     fs::write(dir.join("page-one.html"), one_node()).expect("page");
     fs::copy(outline, dir.join("outline.json")).expect("outline");

@@ -7,7 +7,7 @@ use crate::export::cylinders::cylinders;
 use crate::export::files::{refuse_taken, write_files};
 use crate::export::gltf::{KEY_TOLERANCE_PX, Model, NamedBytes, glb, gltf_files};
 use crate::export::still::{obj_files, ply};
-use crate::export::{ExportError, OutputFolder};
+use crate::export::{ExportError, OutputFolder, html};
 use crate::shape::cylinders as cylinders_of;
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
@@ -22,10 +22,10 @@ pub struct ExportArgs {
     /// A capture: the folder that --out of `capture` or `replay` has made.
     dir: PathBuf,
     /// What to write. glb: one file, mesh and motion; gltf: the same as .gltf and .bin; csv: a folder with the tables and
-    /// the wood as cylinders; obj and ply: the tree at rest.
+    /// the wood as cylinders; obj and ply: the tree at rest; html: a page for a browser, all in one file.
     #[arg(long, value_name = "FORMAT")]
     format: Format,
-    /// File to write, for csv a folder; it must not exist, and appears when it is complete. `-` is standard output (glb, ply).
+    /// File to write, for csv a folder; it must not exist, and appears when it is complete. `-` is standard output (glb, html, ply).
     #[arg(long, value_name = "PATH")]
     out: PathBuf,
     /// Largest distance between a node and its pose to which keys of the animation are thinned, px.
@@ -41,6 +41,7 @@ pub struct ExportArgs {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Format {
     Glb,
+    Html,
     Gltf,
     Csv,
     Obj,
@@ -55,6 +56,9 @@ fn tolerance(text: &str) -> Result<f64, String> {
 pub fn run(args: &ExportArgs) -> Result<(), Ended> {
     let target = Target::of(args)?;
     target.refuse_taken().map_err(failed)?;
+    if args.format == Format::Html {
+        html::built_in().map_err(failed)?;
+    }
     let made = args.shaping.made(&args.dir)?;
     for warning in &made.captured.warnings {
         say(&format!("arborcam: warning: {warning}"));
@@ -64,12 +68,23 @@ pub fn run(args: &ExportArgs) -> Result<(), Ended> {
     let stem = target.stem();
     let files = match args.format {
         Format::Csv => return tables(args, &made),
+        Format::Html => page(&made, &model, &stem).map(|bytes| vec![(target.name(), bytes)]),
         Format::Glb => glb(&model).map(|(bytes, _)| vec![(target.name(), bytes)]),
         Format::Gltf => gltf_files(&model, &stem).map(|(files, _)| files),
         Format::Obj => obj_files(&made.dressed, &stem, metres_per_px),
         Format::Ply => ply(&made.dressed, metres_per_px).map(|bytes| vec![(target.name(), bytes)]),
     };
     target.write(files.map_err(failed)?)
+}
+
+/// The model as a page that shows it.
+fn page(made: &Made, model: &Model, title: &str) -> Result<Vec<u8>, ExportError> {
+    let (model, _) = glb(model)?;
+    let captured = &made.captured;
+    let metres_per_px = made.config.export.metres_per_px;
+    let data = html::Data::of(&captured.note, &made.skeleton, &made.poses, &captured.sway, metres_per_px);
+    let picture = captured.picture.as_ref().map(|p| &*p.rgb);
+    html::page(&html::Page { title, glb: &model, data: &data, picture }).map(String::into_bytes)
 }
 
 fn failed(e: ExportError) -> Ended {
@@ -88,7 +103,7 @@ impl<'a> Target<'a> {
         let shown = args.out.display();
         if args.out.as_os_str() == STDOUT {
             return match args.format {
-                Format::Glb | Format::Ply => Ok(Self::Stdout),
+                Format::Glb | Format::Html | Format::Ply => Ok(Self::Stdout),
                 _ => unfit("--out -: this format is more than one file; give a path".into()),
             };
         }
@@ -98,7 +113,7 @@ impl<'a> Target<'a> {
         let ending = match args.format {
             Format::Gltf => "gltf",
             Format::Obj => "obj",
-            Format::Glb | Format::Csv | Format::Ply => return Ok(Self::Beside(&args.out)),
+            Format::Glb | Format::Html | Format::Csv | Format::Ply => return Ok(Self::Beside(&args.out)),
         };
         // The names of the files beside it are made from it.
         if args.out.extension().is_none_or(|e| !e.eq_ignore_ascii_case(ending)) {

@@ -5,13 +5,13 @@
 pub use super::html_data::{Branch, Data, SwayNote};
 
 use super::ExportError;
+use super::picture::jpeg;
+use crate::model::{Rgb, Size};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use image::codecs::jpeg::JpegEncoder;
 use image::imageops::FilterType;
-use std::borrow::Cow;
 use std::io::Write;
 
 /// Empty in a program that was built without npm.
@@ -29,14 +29,22 @@ pub struct Page<'a> {
     /// The model, which the page gives out byte for byte as it is here.
     pub glb: &'a [u8],
     pub data: &'a Data,
-    /// A frame of the film, JPEG; a large one is put in smaller.
-    pub picture: Option<&'a [u8]>,
+    /// A frame of the film at its full size; a large one is put in smaller.
+    pub picture: Option<&'a Rgb>,
+}
+
+/// Whether pages can be made at all, for those who want to know it before the work.
+///
+/// # Errors
+/// [`ExportError::NoViewer`] if the program was built without the viewer.
+pub fn built_in() -> Result<(), ExportError> {
+    if VIEWER.is_empty() { Err(ExportError::NoViewer) } else { Ok(()) }
 }
 
 /// The page, UTF-8.
 ///
 /// # Errors
-/// [`ExportError::NoViewer`] if the program was built without it.
+/// [`ExportError::NoViewer`] if the program was built without the viewer; [`ExportError::Unfit`] if the picture is none.
 pub fn page(page: &Page) -> Result<String, ExportError> {
     fill(VIEWER, page)
 }
@@ -52,7 +60,10 @@ fn fill(viewer: &str, page: &Page) -> Result<String, ExportError> {
         // In JSON `<` stands only inside texts; so written, none of them can end the block that it is in.
         ("@ARBORCAM_DATA@", data.replace('<', "\\u003c")),
         ("@ARBORCAM_GLB@", STANDARD.encode(gzip(page.glb)?)),
-        ("@ARBORCAM_PICTURE@", page.picture.map(|jpeg| STANDARD.encode(light(jpeg))).unwrap_or_default()),
+        (
+            "@ARBORCAM_PICTURE@",
+            page.picture.map(light).transpose()?.map(|jpeg| STANDARD.encode(jpeg)).unwrap_or_default(),
+        ),
     ];
     // From one mark to the next: what was put in is not searched for marks.
     let mut out = String::with_capacity(viewer.len() + parts.iter().map(|(_, text)| text.len()).sum::<usize>());
@@ -79,20 +90,13 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// The picture itself, or a smaller one where it would be most of the page. What cannot be read stays as it is: the page
-/// does without it.
-fn light(jpeg: &[u8]) -> Cow<'_, [u8]> {
-    let smaller = || {
-        let read = image::load_from_memory_with_format(jpeg, image::ImageFormat::Jpeg).ok()?;
-        let small = read.resize(PICTURE_SIDE, PICTURE_SIDE, FilterType::Triangle).into_rgb8();
-        let mut out = Vec::new();
-        JpegEncoder::new_with_quality(&mut out, 85).encode_image(&small).ok()?;
-        Some(out)
-    };
-    if jpeg.len() <= PICTURE_BYTES {
-        return Cow::Borrowed(jpeg);
-    }
-    smaller().filter(|s| s.len() < jpeg.len()).map_or(Cow::Borrowed(jpeg), Cow::Owned)
+/// The picture as JPEG, smaller where it would be most of the page.
+fn light(picture: &Rgb) -> Result<Vec<u8>, ExportError> {
+    let whole = jpeg(picture)?;
+    let pixels = image::RgbImage::from_raw(picture.size.width, picture.size.height, picture.pixels.clone());
+    let Some(pixels) = pixels.filter(|_| whole.len() > PICTURE_BYTES) else { return Ok(whole) };
+    let small = image::DynamicImage::from(pixels).resize(PICTURE_SIDE, PICTURE_SIDE, FilterType::Triangle).into_rgb8();
+    jpeg(&Rgb { size: Size::new(small.width(), small.height()), pixels: small.into_raw() })
 }
 
 /// Makes up for what base64 adds. No time of day goes into it.
@@ -138,20 +142,12 @@ mod tests {
     }
 
     #[test]
-    fn a_large_picture_is_made_lighter_and_a_broken_one_left() {
-        let noise =
-            |x: u32, y: u32| image::Rgb([(x * x) as u8 ^ (y * 7) as u8, (x * y) as u8, x as u8 ^ (y * y) as u8]);
-        let mut jpeg = Vec::new();
-        JpegEncoder::new_with_quality(&mut jpeg, 95)
-            .encode_image(&image::RgbImage::from_fn(2400, 1350, noise))
-            .unwrap();
-        assert!(jpeg.len() > PICTURE_BYTES);
-        let small = light(&jpeg);
-        let read = image::load_from_memory(&small).unwrap();
-        assert_eq!((read.width(), read.height()), (1600, 900));
-        assert!(small.len() < jpeg.len() / 2, "{} of {}", small.len(), jpeg.len());
-        let broken = vec![7; 2 * PICTURE_BYTES];
-        assert!(*light(&broken) == broken);
+    fn a_large_picture_is_made_lighter() {
+        let noise = |k: u32| (k.wrapping_mul(k).wrapping_mul(2_654_435_761) >> 24) as u8;
+        let film = |size: Size| Rgb { size, pixels: (0..size.width * size.height * 3).map(noise).collect() };
+        let side = |jpeg: &[u8]| image::load_from_memory(jpeg).map(|i| (i.width(), i.height())).unwrap();
+        assert_eq!(side(&light(&film(Size::new(64, 48))).unwrap()), (64, 48));
+        assert_eq!(side(&light(&film(Size::new(2400, 1350))).unwrap()), (1600, 900));
     }
 
     #[test]
@@ -163,14 +159,15 @@ mod tests {
 
     #[test]
     fn the_model_comes_back_byte_for_byte() {
+        let picture = Rgb { size: Size::new(4, 3), pixels: vec![90; 36] };
         let glb: Vec<u8> = (0..10_000_u32).map(|i| ((i * i) >> 3) as u8).collect();
         let data = data("film");
-        let made = fill(VIEWER, &Page { title: "tree", glb: &glb, data: &data, picture: Some(b"\xff\xd8") }).unwrap();
+        let made = fill(VIEWER, &Page { title: "tree", glb: &glb, data: &data, picture: Some(&picture) }).unwrap();
         let block = |k: usize| made.split("<script>").nth(k).unwrap().split("</script>").next().unwrap();
         let mut back = Vec::new();
         let packed = STANDARD.decode(block(2)).unwrap();
         std::io::Read::read_to_end(&mut flate2::read::GzDecoder::new(&packed[..]), &mut back).unwrap();
         assert!(back == glb);
-        assert_eq!(STANDARD.decode(block(3)).unwrap(), b"\xff\xd8");
+        assert_eq!(STANDARD.decode(block(3)).unwrap(), jpeg(&picture).unwrap());
     }
 }

@@ -70,15 +70,21 @@ impl SwayNote {
 
 impl Data {
     /// The page's facts. `poses` are those of the animation in the order of time; `sway` is by node index, as for
-    /// `nodes.csv`, and may be shorter than the skeleton.
-    pub fn of(capture: &Capture, skeleton: &Skeleton, poses: &[Pose], sway: &[Option<Sway>]) -> Self {
+    /// `nodes.csv`, and may be shorter than the skeleton; `metres_per_px` is that of the model's file.
+    pub fn of(
+        capture: &Capture,
+        skeleton: &Skeleton,
+        poses: &[Pose],
+        sway: &[Option<Sway>],
+        metres_per_px: f64,
+    ) -> Self {
         let size = skeleton.image_size;
         let start_s = poses.iter().map(|p| p.time_s).find(|t| t.is_finite()).unwrap_or(0.0);
         let source = capture.source.name.rsplit(['/', '\\']).find(|part| !part.is_empty()).unwrap_or_default();
         Self {
             source: source.to_owned(),
             software: format!("{} {}", capture.software.name, capture.software.version),
-            metres_per_px: capture.model.as_ref().map_or(0.0, |m| m.metres_per_px),
+            metres_per_px,
             image: [size.width, size.height],
             foot_px: skeleton.foot_px,
             outline_px: capture.outline.as_ref().map_or_else(Vec::new, |o| o.polygon_px.clone()),

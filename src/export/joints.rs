@@ -33,10 +33,11 @@ impl Moving {
     /// Joints are thinned from the foot up, each against what its parent's kept keys show, so that a joint also makes good
     /// its parent's error. The tolerance grows towards the tips: a node may be wrong by `tolerance sqrt(depth / depth of
     /// the deepest tip above)`, of which its parent has used only a part.
-    pub fn new(skeleton: &Skeleton, all: &[Pose], tolerance_px: f64) -> Self {
+    pub fn new(skeleton: &Skeleton, all: &[Pose], tolerance_px: f64, thorough: bool) -> Self {
         let (kept, times_s) = usable(all);
         let poses: Vec<&Pose> = kept.iter().map(|&k| &all[k]).collect();
-        let joints = if poses.is_empty() { Vec::new() } else { keys(skeleton, &poses, &times_s, tolerance_px) };
+        let joints =
+            if poses.is_empty() { Vec::new() } else { keys(skeleton, (&poses, &times_s), tolerance_px, thorough) };
         Self { joints, kept, times_s }
     }
 
@@ -50,7 +51,7 @@ impl Moving {
     }
 }
 
-fn keys(skeleton: &Skeleton, poses: &[&Pose], times: &[f64], tolerance_px: f64) -> Vec<Keys> {
+fn keys(skeleton: &Skeleton, (poses, times): (&[&Pose], &[f64]), tolerance_px: f64, thorough: bool) -> Vec<Keys> {
     let nodes = &skeleton.nodes;
     let budget = budgets(skeleton);
     let mut shown: Vec<Shown> = Vec::with_capacity(nodes.len());
@@ -82,7 +83,7 @@ fn keys(skeleton: &Skeleton, poses: &[&Pose], times: &[f64], tolerance_px: f64) 
         let kept = thin(times.len(), one, spans);
         let path =
             Path { times_s: times, aims: &aims, miss: |k: usize, turn: &UnitQuaternion<f64>| branch.miss(k, turn) };
-        let keyed = path.sparse(kept);
+        let keyed = path.keyed(kept, thorough);
         shown.push(branch.shown(base, &played(&keyed, times)));
         let rotations = one_hemisphere(keyed.turns.iter().copied());
         out.push(Keys {

@@ -8,12 +8,12 @@ use super::thin_keys::Arc;
 use nalgebra::{Quaternion, UnitQuaternion, Vector4};
 
 /// Keys on either side that are moved.
-const WINDOW: usize = 2;
-const ITERATIONS: usize = 9;
+const WINDOW: usize = 3;
+const ITERATIONS: usize = 12;
 /// By now the misses show whether there is a chance.
 const LOOKED_AT: usize = 3;
 const HOPELESS: f64 = 1.5;
-const PASSES: usize = 2;
+const PASSES: usize = 3;
 
 /// Keys of one joint: which frames, and the turn in each.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,10 +32,10 @@ pub(super) struct Path<'a, F: Fn(usize, &UnitQuaternion<f64>) -> f64> {
 }
 
 impl<F: Fn(usize, &UnitQuaternion<f64>) -> f64> Path<'_, F> {
-    /// Keys of which none can be left out; `kept` are frames whose aims do.
-    pub fn sparse(&self, kept: Vec<usize>) -> Keyed {
+    /// Keys at the aims of these frames, which do; `thorough`: as few as can be found beside the path.
+    pub fn keyed(&self, kept: Vec<usize>, thorough: bool) -> Keyed {
         let mut keys: Vec<(usize, Vector4<f64>)> = kept.into_iter().map(|k| (k, self.aims[k])).collect();
-        for _ in 0..PASSES {
+        for _ in 0..if thorough { PASSES } else { 0 } {
             let before = keys.len();
             let mut j = 1;
             while j + 1 < keys.len() {

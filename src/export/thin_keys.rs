@@ -1,33 +1,38 @@
 //! Which of many keys are needed.
 
-use nalgebra::{Quaternion, UnitQuaternion};
+use nalgebra::{Quaternion, UnitQuaternion, Vector4};
 
 /// Spans in a row that do not do, after which longer ones are not tried: a longer span seldom does where shorter ones fail.
 const TRIED: usize = 3;
 
+/// Cosine of half a turn of 0.1 rad. On a shorter way the straight line is ahead or behind by a few millionths of a radian,
+/// and the sines cost most of the time.
+const SHORT: f64 = 0.998_75;
+
 /// The shorter arc between two rotations, along which a glTF viewer goes at even speed (LINEAR).
 pub(super) struct Arc {
-    a: nalgebra::Vector4<f64>,
-    b: nalgebra::Vector4<f64>,
-    angle: f64,
-    sine: f64,
+    a: Vector4<f64>,
+    b: Vector4<f64>,
+    /// Half the angle of the turn and its sine, where that is not short.
+    long: Option<(f64, f64)>,
 }
 
 impl Arc {
     pub fn new(a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>) -> Self {
         let dot = a.coords.dot(&b.coords);
         let end = if dot < 0.0 { -b.coords } else { b.coords };
-        let angle = dot.abs().min(1.0).acos();
-        Self { a: a.coords, b: end, angle, sine: angle.sin() }
+        let long = (dot.abs() < SHORT).then(|| {
+            let angle = dot.abs().acos();
+            (angle, angle.sin())
+        });
+        Self { a: a.coords, b: end, long }
     }
 
     /// 0 at the one end, 1 at the other.
     pub fn at(&self, x: f64) -> UnitQuaternion<f64> {
-        // On an arc this short the straight line is ahead or behind by a few millionths; and the sines cost time.
-        let (wa, wb) = if self.angle < 0.05 {
-            (1.0 - x, x)
-        } else {
-            (((1.0 - x) * self.angle).sin() / self.sine, (x * self.angle).sin() / self.sine)
+        let (wa, wb) = match self.long {
+            Some((angle, sine)) => (((1.0 - x) * angle).sin() / sine, (x * angle).sin() / sine),
+            None => (1.0 - x, x),
         };
         UnitQuaternion::new_normalize(Quaternion::from(self.a * wa + self.b * wb))
     }

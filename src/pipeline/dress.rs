@@ -44,7 +44,7 @@ pub fn dress(skeleton: &Skeleton, seen: Seen, config: &Config) -> Dressed {
     let room = room(skeleton.foot_px, seen.outline);
     let limbs = limbs(skeleton, &room, &config.wood, seed);
     let wood = wood_levels(&limbs, config.wood.triangles as usize);
-    let bark = seen.picture.and_then(|picture| bark::colour(picture, seen.pose, skeleton));
+    let bark = bark::colour(&seen, skeleton);
     let foliage = leaves::foliage(&limbs, skeleton, &seen, &config.leaves, seed);
     Dressed { limbs, wood, foliage, bark_rgb: bark.unwrap_or(bark::PLAIN) }
 }

@@ -22,6 +22,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+/// Joints times frames up to which the fewest keys of the animation are looked for: a service is given two seconds to stop.
+const THOROUGH_UP_TO: usize = 120_000;
+
 /// Figures of the tracking, gathered frame by frame.
 #[derive(Clone, Debug, Default)]
 pub struct Quality {
@@ -173,6 +176,7 @@ fn model_of(
         all_levels: false,
         metres_per_px: job.config.export.metres_per_px,
         tolerance_px: KEY_TOLERANCE_PX,
+        thorough: skeleton.nodes.len() * poses.len() <= THOROUGH_UP_TO,
         node_extras: &[],
         provenance: &provenance,
     })
