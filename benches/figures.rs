@@ -138,7 +138,7 @@ fn model_file() -> String {
     let config = Config::default();
     let (mut binding, mut estimator) = (tree.binding(), tree.estimator(&config));
     let mut pose = |set: &TrackSet| estimator.step(set.frame, set.time_s, &binding.targets_px(set));
-    let poses: Vec<Pose> = sets.iter().map(|set| pose(set)).collect();
+    let poses: Vec<Pose> = sets.iter().map(&mut pose).collect();
     let seen = Seen { outline: Some(&outline), ..Seen::default() };
     let dressed = dress(&tree.skeleton, seen, &config);
     let provenance = serde_json::Value::Null;
