@@ -2,10 +2,11 @@
 
 mod synthetic;
 
+use arborcam::config::Config;
 use arborcam::export::ExportError;
 use arborcam::export::gltf::{KEY_TOLERANCE_PX, Model, glb};
-use arborcam::model::{Pose, Skeleton};
-use arborcam::pipeline::Dressed;
+use arborcam::model::{Pose, Rgb, Skeleton};
+use arborcam::pipeline::{Dressed, Seen, dress};
 use arborcam::shape::Mesh;
 use gltf::animation::util::ReadOutputs;
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
@@ -254,6 +255,27 @@ fn a_model_that_no_file_can_hold_is_refused_with_a_reason() {
             other => panic!("{word}: {:?}", other.map(|b| b.0.len())),
         }
     }
+}
+
+/// A brown trunk on a lawn, in an outline twice as wide, and a skeleton that passes by it.
+#[test]
+fn the_bark_has_the_colour_of_the_trunk() {
+    let skeleton = synthetic::tree(3, 1);
+    let size = skeleton.image_size;
+    let (foot, brown, green) = (skeleton.foot_px, [110, 80, 60], [60, 160, 40]);
+    let colour = |u: u32| if (f64::from(u) - foot[0]).abs() < 9.0 { brown } else { green };
+    let picture = Rgb { size, pixels: (0..size.height).flat_map(|_| (0..size.width).flat_map(colour)).collect() };
+    let corner = |du: f64, v: f64| [foot[0] + du, v];
+    let corners = [corner(-18.0, 200.0), corner(18.0, 200.0), corner(18.0, foot[1]), corner(-18.0, foot[1])];
+    let outline = arborcam::outline::from_polygon(&corners, size).expect("outline");
+    let seen = Seen { picture: Some(&picture), pose: None, outline: Some(&outline) };
+    assert_eq!(dress(&skeleton, seen, &Config::default()).bark_rgb, brown);
+    assert_eq!(dress(&skeleton, Seen { outline: None, ..seen }, &Config::default()).bark_rgb, brown);
+    assert_ne!(
+        dress(&skeleton, Seen::default(), &Config::default()).bark_rgb,
+        brown,
+        "where nothing is seen, a plain one"
+    );
 }
 
 #[test]
