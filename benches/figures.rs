@@ -12,7 +12,7 @@ use arborcam::config::Config;
 use arborcam::hierarchy::{self, COMPARE_HZ, Evidence, evidence, evidence_of};
 use arborcam::model::{Outline, Rgb, Size, TrackId, TrackSet};
 use arborcam::outline::{self, Mark, Scribbles};
-use arborcam::pipeline::{self, Moment, Pipeline, Tree};
+use arborcam::pipeline::{self, Moment, Pipeline, Seen, Tree};
 use arborcam::source::Decoder;
 use arborcam::track::{TrackHistory, TrackTable};
 use criterion::Criterion;
@@ -38,6 +38,7 @@ fn main() {
         .warm_up_time(Duration::from_millis(300))
         .measurement_time(Duration::from_secs(3));
     let lines = [build(&mut criterion, 400, 100), build(&mut criterion, 2000, 1500)].into_iter().chain([
+        dressed(&mut criterion),
         pose(&mut criterion),
         matting(),
         replay(&clip, dir.path()),
@@ -113,6 +114,24 @@ fn build(criterion: &mut Criterion, points: usize, bound_ms: u32) -> String {
     let parting_ms = median((0..10).map(|_| timed_ms(parting).0).collect());
     let moving = evidence.moving.len();
     format!("build of {moving} points: {ms:.0} ms, {parting_ms:.0} ms of it the hierarchy (must be <= {bound_ms})")
+}
+
+/// From the built hierarchy to all that is drawn.
+fn dressed(criterion: &mut Criterion) -> String {
+    let (history, outline, _) = gathered();
+    let tree = built(&history, &outline);
+    let mut config = Config::default();
+    config.wood.triangles = 20_000;
+    let all = || {
+        let skeleton = pipeline::stand(&tree.hierarchy, &outline, &config);
+        pipeline::dress(&skeleton, Seen { outline: Some(&outline), ..Seen::default() }, &config)
+    };
+    criterion.bench_function("static tree of 20,000 triangles", |b| b.iter(all));
+    let ms = median((0..10).map(|_| timed_ms(all).0).collect());
+    let dressed = all();
+    let triangles = dressed.wood.first().map_or(0, |mesh| mesh.indices.len() / 3);
+    let twigs = dressed.limbs.iter().filter(|l| l.twig).count();
+    format!("static tree of {triangles} triangles, {twigs} twigs, with two coarser levels: {ms:.0} ms (must be <= 400)")
 }
 
 fn pose(criterion: &mut Criterion) -> String {

@@ -161,17 +161,7 @@ pub fn build(
     if hierarchy.clusters.first().is_none_or(|all| all.members.len() < LEAST_MOVING) {
         return None;
     }
-    let flat = skeleton::build(&hierarchy, outline, &config.skeleton);
-    let points = |n: &skeleton::Node2d| n.cluster.map_or(0, |c| c.0 as usize);
-    let tracks: Vec<u32> = flat.iter().map(|n| hierarchy.clusters[points(n)].members.len() as u32).collect();
-    let mut skeleton = shape::build(&flat, &tracks, outline, &config.shape);
-    let top_px = skeleton.nodes.get(1).map_or(foot_px, |top| skeleton.image_from_model(&top.position));
-    let measured = shape::trunk_radius_px(outline, skeleton.foot_px, top_px);
-    let given = Some(0.5 * config.wood.trunk_width_px).filter(|&given| given > 0.0);
-    let at_foot = || TRUNK_SHARE * skeleton::Foot::of(outline, None).half_width_px;
-    let trunk_px = given.or(measured).unwrap_or_else(at_foot).max(2.0 * shape::TIP_RADIUS_PX);
-    let room = dress::room(skeleton.foot_px, Some(outline));
-    shape::thicken(&mut skeleton, trunk_px, &room, &config.wood, config.wood.seed.into());
+    let skeleton = stand(&hierarchy, outline, config);
     let rest = |row: usize| (table.ids[row], hierarchy::rest_position_px(table, row));
     let first = First { frame, time_s, measure: evidence.measure, moving: evidence.moving.len(), forced };
     Some(Tree {
@@ -192,4 +182,20 @@ pub fn build(
         evidence,
         forced,
     })
+}
+
+/// Hierarchy to tree in space, with its thickness.
+pub fn stand(hierarchy: &MotionHierarchy, outline: &Outline, config: &Config) -> Skeleton {
+    let flat = skeleton::build(hierarchy, outline, &config.skeleton);
+    let points = |n: &skeleton::Node2d| n.cluster.map_or(0, |c| c.0 as usize);
+    let tracks: Vec<u32> = flat.iter().map(|n| hierarchy.clusters[points(n)].members.len() as u32).collect();
+    let mut skeleton = shape::build(&flat, &tracks, outline, &config.shape);
+    let top_px = skeleton.nodes.get(1).map_or(skeleton.foot_px, |top| skeleton.image_from_model(&top.position));
+    let measured = shape::trunk_radius_px(outline, skeleton.foot_px, top_px);
+    let given = Some(0.5 * config.wood.trunk_width_px).filter(|&given| given > 0.0);
+    let at_foot = || TRUNK_SHARE * skeleton::Foot::of(outline, None).half_width_px;
+    let trunk_px = given.or(measured).unwrap_or_else(at_foot).max(2.0 * shape::TIP_RADIUS_PX);
+    let room = dress::room(skeleton.foot_px, Some(outline));
+    shape::thicken(&mut skeleton, trunk_px, &room, &config.wood, config.wood.seed.into());
+    skeleton
 }
