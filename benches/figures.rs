@@ -22,8 +22,12 @@ use std::sync::Arc;
 use std::time::Duration;
 use tracking::{median, timed_ms};
 
-/// With a word, `make bench ONLY=tracking`, only the figures of the tracker.
+/// With a word, `make bench ONLY=tracking` or `ONLY=wood`, only the figures of the tracker, or of the static tree.
 fn main() {
+    if std::env::args().any(|a| a == "wood") {
+        println!("{}", dressed());
+        return;
+    }
     let dir = tempfile::tempdir().expect("tempdir");
     let clip = scaled(dir.path(), "1280:720");
     let large = scaled(dir.path(), "1920:1080");
@@ -38,7 +42,7 @@ fn main() {
         .warm_up_time(Duration::from_millis(300))
         .measurement_time(Duration::from_secs(3));
     let lines = [build(&mut criterion, 400, 100), build(&mut criterion, 2000, 1500)].into_iter().chain([
-        dressed(&mut criterion),
+        dressed(),
         pose(&mut criterion),
         matting(),
         replay(&clip, dir.path()),
@@ -117,7 +121,7 @@ fn build(criterion: &mut Criterion, points: usize, bound_ms: u32) -> String {
 }
 
 /// From the built hierarchy to all that is drawn.
-fn dressed(criterion: &mut Criterion) -> String {
+fn dressed() -> String {
     let (history, outline, _) = gathered();
     let tree = built(&history, &outline);
     let mut config = Config::default();
@@ -126,7 +130,6 @@ fn dressed(criterion: &mut Criterion) -> String {
         let skeleton = pipeline::stand(&tree.hierarchy, &outline, &config);
         pipeline::dress(&skeleton, Seen { outline: Some(&outline), ..Seen::default() }, &config)
     };
-    criterion.bench_function("static tree of 20,000 triangles", |b| b.iter(all));
     let ms = median((0..10).map(|_| timed_ms(all).0).collect());
     let dressed = all();
     let triangles = dressed.wood.first().map_or(0, |mesh| mesh.indices.len() / 3);
