@@ -1,6 +1,6 @@
 # make demo: from a fresh machine to a moving tree in out/demo. make test: every test. make bench: the figures.
 # make install, make uninstall: program and service, below DESTDIR (for packages) and PREFIX.
-.PHONY: demo build test test-v4l2 test-real bench sweep lint setup install uninstall
+.PHONY: demo build viewer test test-v4l2 test-real bench sweep lint setup install uninstall
 
 demo: setup build
 	@scripts/demo.sh
@@ -8,12 +8,18 @@ demo: setup build
 setup:
 	@scripts/setup.sh
 
+# With the HTML viewer where npm is there; without it the program is complete but for `export --format html`.
 build:
+	@scripts/build-viewer.sh || echo "build: goes on without the HTML viewer, see above" >&2
 	cargo build --release --locked
+
+viewer:
+	@scripts/build-viewer.sh
 
 # The V4L2 tests take a virtual machine (tests/vm); what could not be run is said at the end.
 test:
 	@rm -f target/vm-runs/absent
+	@scripts/build-viewer.sh && scripts/test-modules.sh || echo "test: goes on without the tests of the HTML viewer" >&2
 	cargo test --release --locked
 	@! test -s target/vm-runs/absent || cat target/vm-runs/absent >&2
 
@@ -43,7 +49,7 @@ SYSTEM ?= /usr/lib
 BINARY ?= target/release/arborcam
 put = install -D -m
 with_prefix = sed 's|@PREFIX@|$(PREFIX)|g'
-DOCS = README.md docs/using.md docs/camera.md docs/recordings.md docs/files.md docs/settings.md docs/service.md docs/outline.md docs/method.md docs/sweep.md
+DOCS = README.md docs/using.md docs/camera.md docs/recordings.md docs/files.md docs/settings.md docs/service.md docs/outline.md docs/method.md docs/sweep.md docs/viewer.md
 INSTALLED = $(PREFIX)/bin/arborcam $(PREFIX)/lib/arborcam/arborcam-service \
 	$(addprefix $(PREFIX)/share/arborcam/, arborcam.toml sbc.toml) \
 	$(addprefix $(PREFIX)/share/doc/arborcam/, $(notdir $(DOCS))) \

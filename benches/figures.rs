@@ -9,10 +9,11 @@ mod tracking;
 mod truth;
 
 use arborcam::config::Config;
+use arborcam::export::gltf::{KEY_TOLERANCE_PX, Model, glb};
 use arborcam::hierarchy::{self, COMPARE_HZ, Evidence, evidence, evidence_of};
-use arborcam::model::{Outline, Rgb, Size, TrackId, TrackSet};
+use arborcam::model::{Outline, Pose, Rgb, Size, TrackId, TrackSet};
 use arborcam::outline::{self, Mark, Scribbles};
-use arborcam::pipeline::{self, Moment, Pipeline, Seen, Tree};
+use arborcam::pipeline::{self, Moment, Pipeline, Seen, Tree, dress};
 use arborcam::source::Decoder;
 use arborcam::track::{TrackHistory, TrackTable};
 use criterion::Criterion;
@@ -44,6 +45,7 @@ fn main() {
     let lines = [build(&mut criterion, 400, 100), build(&mut criterion, 2000, 1500)].into_iter().chain([
         dressed(),
         pose(&mut criterion),
+        model_file(),
         matting(),
         replay(&clip, dir.path()),
     ]);
@@ -128,7 +130,7 @@ fn dressed() -> String {
     config.wood.triangles = 20_000;
     let all = || {
         let skeleton = pipeline::stand(&tree.hierarchy, &outline, &config);
-        pipeline::dress(&skeleton, Seen { outline: Some(&outline), ..Seen::default() }, &config)
+        dress(&skeleton, Seen { outline: Some(&outline), ..Seen::default() }, &config)
     };
     let ms = median((0..10).map(|_| timed_ms(all).0).collect());
     let dressed = all();
@@ -149,6 +151,42 @@ fn pose(criterion: &mut Criterion) -> String {
     criterion.bench_function("poses of 330 frames", |b| b.iter(all));
     let ms = median((0..5).map(|_| timed_ms(all).0 / sets.len() as f64).collect());
     format!("pose: {ms:.3} ms a frame (must be <= 1)")
+}
+
+/// The model's file of the whole recording.
+fn model_file() -> String {
+    let (history, outline, sets) = gathered();
+    let tree = built(&history, &outline);
+    let config = Config::default();
+    let (mut binding, mut estimator) = (tree.binding(), tree.estimator(&config));
+    let pose = |set: &TrackSet| estimator.step(set.frame, set.time_s, &binding.targets_px(set));
+    let poses: Vec<Pose> = sets.iter().map(pose).collect();
+    let seen = Seen { outline: Some(&outline), ..Seen::default() };
+    let dressed = dress(&tree.skeleton, seen, &config);
+    let provenance = serde_json::Value::Null;
+    let write = || {
+        let model = Model {
+            skeleton: &tree.skeleton,
+            dressed: &dressed,
+            poses: &poses,
+            flutter: &[],
+            all_levels: false,
+            metres_per_px: 0.0,
+            tolerance_px: KEY_TOLERANCE_PX,
+            node_extras: &[],
+            provenance: &provenance,
+        };
+        glb(&model).expect("a model")
+    };
+    let ms = median((0..5).map(|_| timed_ms(write).0).collect());
+    let (bytes, animation) = write();
+    format!(
+        "GLB of {} frames and {} joints: {ms:.0} ms, {:.2} MB (must be <= 300 and 6); {:.1} % of the keys (must be <= 20)",
+        animation.frames,
+        tree.skeleton.nodes.len(),
+        bytes.len() as f64 / 1e6,
+        100.0 * animation.keys as f64 / animation.raw_keys.max(1) as f64
+    )
 }
 
 /// The program itself, everything included: ffmpeg, decoding, all stages, the capture folder.

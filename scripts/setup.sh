@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Prepares a Debian or Ubuntu machine to build arborcam: installs what is missing of apt-packages.txt and tells cargo
 # where OpenCV is. Changes nothing where all is there; may be run as often as one likes.
+# With --tests also what only tests and pictures need: apt-packages-test.txt, and modules by tests/npm/package-lock.json.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -23,11 +24,35 @@ check_rust() {
         "or install it from https://rustup.rs"
 }
 
+tests=
+case ${1-} in
+'') ;;
+--tests) tests=yes ;;
+*) fail "$1 is unknown; only --tests is" ;;
+esac
+
+need_node=18
+
+# Node from elsewhere will do, and Debian's npm would pull in a second one.
+own_node() {
+    local version
+    command -v npm >/dev/null && version=$(node --version 2>/dev/null) || return 1
+    version=${version#v}
+    ((${version%%.*} >= need_node))
+}
+
 wanted_packages() {
-    sed 's/#.*//' scripts/apt-packages.txt | tr -s '[:space:]' '\n' | sed '/^$/d'
+    local lists=(scripts/apt-packages.txt) leave_out=()
+    if [[ -n $tests ]]; then
+        lists+=(scripts/apt-packages-test.txt)
+        ! own_node || leave_out=(-e '^nodejs$' -e '^npm$')
+    fi
+    sed 's/#.*//' "${lists[@]}" | tr -s '[:space:]' '\n' | sed '/^$/d' | grep -v "${leave_out[@]:--e^-}"
 }
 
 installed() {
+    # From wherever it is: Debian's own is made of some hundred packages.
+    [[ $1 == npm ]] && command -v npm >/dev/null && return
     # The bindings' generator finds a clang with a number in its name, too.
     local names=("$1")
     [[ $1 == clang ]] && names+=('clang-[0-9]*')
@@ -92,4 +117,5 @@ OPENCV_INCLUDE_PATHS = \"$include\""
 check_rust
 install_missing
 write_cargo_config
+[[ -z $tests ]] || scripts/test-modules.sh || fail "the tests' modules could not be fetched; see above"
 echo "setup: done; build with: cargo build --release"

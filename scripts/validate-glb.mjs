@@ -1,9 +1,10 @@
-// Checks GLB files with Khronos' glTF validator; exit status 1 on any error or warning.
+// Checks GLB and glTF files with Khronos' glTF validator; exit status 1 on any error or warning.
 //
-//   npm install --prefix DIR gltf-validator
-//   NODE_PATH=DIR/node_modules node scripts/validate-glb.mjs FILE.glb ...
+//   scripts/test-modules.sh
+//   NODE_PATH=target/test-npm/node_modules node scripts/validate-glb.mjs FILE.glb ...
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
+import { dirname, join } from "node:path";
 
 // `import` does not look at NODE_PATH, `require` does.
 const validator = createRequire(import.meta.url)("gltf-validator");
@@ -15,7 +16,9 @@ if (files.length === 0) {
 
 let bad = false;
 for (const file of files) {
-  const report = await validator.validateBytes(new Uint8Array(readFileSync(file)), { maxIssues: 100 });
+  const beside = async (uri) => new Uint8Array(readFileSync(join(dirname(file), decodeURIComponent(uri))));
+  const options = { maxIssues: 100, externalResourceFunction: beside };
+  const report = await validator.validateBytes(new Uint8Array(readFileSync(file)), options);
   const { numErrors, numWarnings, numInfos, numHints, messages } = report.issues;
   console.log(`${file}: ${numErrors} errors, ${numWarnings} warnings, ${numInfos} infos, ${numHints} hints`);
   for (const m of messages) console.log(`  ${["error", "warning", "info", "hint"][m.severity]} ${m.code} ${m.pointer}: ${m.message}`);

@@ -1,11 +1,14 @@
 //! Settings: plain structs whose defaults are the documented ones. A file overrides a default, the command line a file.
 
 mod hierarchy;
+mod overlay;
 mod reload;
+mod shape;
 mod wood;
 
 pub use hierarchy::{Affinity, Hierarchy};
 pub use reload::{Change, EFFECTS, Effect, effect};
+pub use shape::{EnvelopeKind, Leader, Shape};
 pub use wood::Wood;
 
 use serde::{Deserialize, Serialize};
@@ -142,20 +145,6 @@ pub struct Skeleton {
     pub fold: f64,
 }
 
-/// 3D skeleton (000 section 3).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Shape {
-    /// Planes about the trunk, the measured one included, 1 to 8.
-    pub planes: u32,
-    /// Points on the envelope that pull branches out.
-    pub attractors: u32,
-    /// Largest push, as a share of the tree's width.
-    pub push_range: f64,
-    /// Number of pushes tried for each node.
-    pub push_options: u32,
-}
-
 /// 3D pose (000 section 4).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -231,11 +220,6 @@ impl Default for Accumulate {
 impl Default for Skeleton {
     fn default() -> Self {
         Self { fold: 0.4 }
-    }
-}
-impl Default for Shape {
-    fn default() -> Self {
-        Self { planes: 3, attractors: 256, push_range: 0.2, push_options: 21 }
     }
 }
 impl Default for Motion {
@@ -337,6 +321,8 @@ impl Config {
             ("shape.attractors", self.shape.attractors.into(), (8.0, 5000.0, "8 to 5000")),
             ("shape.push_options", self.shape.push_options.into(), (1.0, 1001.0, "1 to 1001")),
             ("shape.push_range", self.shape.push_range, (0.0, 2.0, "0 to 2")),
+            ("shape.passes", self.shape.passes.into(), (1.0, 20.0, "1 to 20")),
+            ("shape.angle_tolerance", self.shape.angle_tolerance, (0.01, 100.0, "0.01 to 100")),
             ("wood.curl", self.wood.curl, share),
             ("wood.twig_px", self.wood.twig_px, (0.0, 500.0, "0 (no twigs) to 500")),
             ("wood.max_twigs", self.wood.max_twigs.into(), (0.0, 50_000.0, "0 to 50000")),

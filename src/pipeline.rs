@@ -4,22 +4,26 @@
 //! from then on poses it and now and then builds it anew. `runtime` runs the same two halves on threads of their own.
 
 mod back;
+mod bark;
 mod dress;
 mod front;
 mod refine;
 mod refiner;
+mod reshape;
 mod retrace;
 
 pub use back::{BackEnd, Moved};
 pub use dress::{Dressed, Seen, dress};
 pub use front::{Followed, FrontEnd};
 pub use refine::Refinement;
+pub use reshape::reshape;
 pub use retrace::Retrace;
 
 use crate::config::Config;
 use crate::hierarchy::{self, Evidence};
 use crate::model::{Frame, MotionHierarchy, NodeId, Outline, Pose, Skeleton, TrackId, TrackSet};
 use crate::motion::{Binding, PoseEstimator};
+use crate::shape::PushFigures;
 use crate::track::TrackTable;
 use crate::{shape, skeleton};
 use std::collections::BTreeMap;
@@ -115,6 +119,17 @@ impl Tree {
         PoseEstimator::new(self.skeleton.clone(), &config.motion)
     }
 
+    /// The skeleton in the picture that it was stood up from, with the number of points on every node.
+    pub fn flat(&self, config: &Config) -> (Vec<skeleton::Node2d>, Vec<u32>) {
+        flat(&self.hierarchy, &self.outline, config)
+    }
+
+    /// How well its push fills the envelope, and how likely its angles are, beside the one-sided ways.
+    pub fn push_figures(&self, config: &Config) -> PushFigures {
+        let (flat, tracks) = self.flat(config);
+        PushFigures::of(&flat, &tracks, &self.outline, &config.shape)
+    }
+
     /// Tracks to poses, from the rest pose on.
     fn poser(&self, config: &Config) -> Poser {
         Poser { binding: self.binding(), estimator: self.estimator(config) }
@@ -143,6 +158,25 @@ impl Poser {
 fn crown_u(table: &TrackTable, moving: &[usize]) -> Option<f64> {
     let sum: f64 = moving.iter().map(|&row| hierarchy::rest_position_px(table, row)[0]).sum();
     (!moving.is_empty()).then(|| sum / moving.len() as f64)
+}
+
+/// The skeleton in the picture, and the number of points on every node.
+fn flat(hierarchy: &MotionHierarchy, outline: &Outline, config: &Config) -> (Vec<skeleton::Node2d>, Vec<u32>) {
+    let flat = skeleton::build(hierarchy, outline, &config.skeleton);
+    let cluster = |n: &skeleton::Node2d| hierarchy.clusters.get(n.cluster.map_or(0, |c| c.0 as usize));
+    let tracks = flat.iter().map(|n| cluster(n).map_or(0, |c| c.members.len() as u32)).collect();
+    (flat, tracks)
+}
+
+/// Radii, from the trunk's as it was given or as the outline shows it.
+fn thicken(skeleton: &mut Skeleton, outline: &Outline, wood: &crate::config::Wood) {
+    let top_px = skeleton.nodes.get(1).map_or(skeleton.foot_px, |top| skeleton.image_from_model(&top.position));
+    let measured = shape::trunk_radius_px(outline, skeleton.foot_px, top_px);
+    let given = Some(0.5 * wood.trunk_width_px).filter(|&given| given > 0.0);
+    let at_foot = || TRUNK_SHARE * skeleton::Foot::of(outline, None).half_width_px;
+    let trunk_px = given.or(measured).unwrap_or_else(at_foot).max(2.0 * shape::TIP_RADIUS_PX);
+    let room = dress::room(skeleton.foot_px, Some(outline));
+    shape::thicken(skeleton, trunk_px, &room, wood, wood.seed.into());
 }
 
 /// Tracks to tree: evidence, hierarchy, 2D skeleton, 3D skeleton. `None` if too few points move.
@@ -186,16 +220,8 @@ pub fn build(
 
 /// Hierarchy to tree in space, with its thickness.
 pub fn stand(hierarchy: &MotionHierarchy, outline: &Outline, config: &Config) -> Skeleton {
-    let flat = skeleton::build(hierarchy, outline, &config.skeleton);
-    let points = |n: &skeleton::Node2d| n.cluster.map_or(0, |c| c.0 as usize);
-    let tracks: Vec<u32> = flat.iter().map(|n| hierarchy.clusters[points(n)].members.len() as u32).collect();
+    let (flat, tracks) = flat(hierarchy, outline, config);
     let mut skeleton = shape::build(&flat, &tracks, outline, &config.shape);
-    let top_px = skeleton.nodes.get(1).map_or(skeleton.foot_px, |top| skeleton.image_from_model(&top.position));
-    let measured = shape::trunk_radius_px(outline, skeleton.foot_px, top_px);
-    let given = Some(0.5 * config.wood.trunk_width_px).filter(|&given| given > 0.0);
-    let at_foot = || TRUNK_SHARE * skeleton::Foot::of(outline, None).half_width_px;
-    let trunk_px = given.or(measured).unwrap_or_else(at_foot).max(2.0 * shape::TIP_RADIUS_PX);
-    let room = dress::room(skeleton.foot_px, Some(outline));
-    shape::thicken(&mut skeleton, trunk_px, &room, &config.wood, config.wood.seed.into());
+    thicken(&mut skeleton, outline, &config.wood);
     skeleton
 }

@@ -1,5 +1,13 @@
 //! Small mathematics of signals that several stages need.
 
+use std::cmp::Ordering;
+
+/// The middle of `values` by `order`, which must be total: of an even number the upper of the two; `None` of none.
+pub fn median<T: Copy>(mut values: Vec<T>, order: impl Fn(&T, &T) -> Ordering) -> Option<T> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, order).1)
+}
+
 /// Mean removed, projected on the direction of the largest variance.
 pub fn along_principal_direction(d: &[[f64; 2]]) -> Vec<f64> {
     let n = d.len() as f64;

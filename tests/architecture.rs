@@ -12,8 +12,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("caught", &[]),
     // A recording is a source, read where its format is known.
     ("source", &["model", "config", "recording", "caught"]),
-    ("outline", &["model", "config"]),
-    ("track", &["model", "config"]),
+    ("outline", &["model", "config", "signal"]),
+    ("track", &["model", "config", "signal"]),
     // The table of positions that the hierarchy is cut from is the tracker's.
     ("hierarchy", &["model", "config", "track::TrackTable", "track::TrackHistory", "signal"]),
     ("skeleton", &["model", "config"]),
@@ -22,16 +22,56 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("motion", &["model", "config"]),
     ("dynamics", &["model", "config", "signal"]),
     ("signal", &[]),
-    ("pipeline", &["model", "config", "outline", "track", "hierarchy", "skeleton", "shape", "motion"]),
+    ("pipeline", &["model", "config", "outline", "track", "hierarchy", "skeleton", "shape", "motion", "signal"]),
     ("recording", &["model"]),
-    // `capture.json` holds the whole configuration; the model's file holds the mesh.
-    ("export", &["model", "config", "shape::Mesh"]),
-    // The screen draws outlines, and refuses the crossing ones as a file would be.
-    ("tui", &["model", "outline::crossing", "caught"]),
-    ("runtime", &["model", "config", "source", "outline", "shape", "dynamics", "pipeline", "recording", "export"]),
+    // What is drawn.
+    ("draw", &["model", "shape::Mesh", "shape::Foliage", "shape::FoliageGroup"]),
+    // `capture.json` holds the whole configuration and what the push has achieved; the model's file holds all that is
+    // drawn; the HTML page plots the angles.
+    (
+        "export",
+        &[
+            "model",
+            "config",
+            "shape::Mesh",
+            "shape::FoliageGroup",
+            "shape::Cylinder",
+            "shape::PushFigures",
+            "pipeline::Dressed",
+            "dynamics::angle_to_parent_deg",
+        ],
+    ),
+    // A capture's tables back to the nouns: poses by the rule by which they were made, the outline as a file of its own
+    // would be.
+    ("capture", &["model", "config", "motion::PoseEstimator", "outline", "export"]),
+    // The screen draws outlines, and refuses the crossing ones as a file would be. It draws the tree's wood too, a coarse
+    // mesh that only it needs.
+    ("tui", &["model", "outline::crossing", "caught", "draw", "shape::Mesh", "shape::bare_wood"]),
+    (
+        "runtime",
+        &["model", "config", "source", "outline", "shape", "dynamics", "signal", "pipeline", "recording", "export"],
+    ),
     // It tries what a capture would use: a camera, the decoder, the front end; the rest of the machine it reads itself.
     ("doctor", &["model", "config", "source", "outline::whole", "pipeline::FrontEnd"]),
-    ("cli", &["model", "config", "source", "outline", "pipeline", "recording", "runtime", "export", "tui", "doctor"]),
+    (
+        "cli",
+        &[
+            "model",
+            "config",
+            "source",
+            "outline",
+            "pipeline",
+            "recording",
+            "runtime",
+            "export",
+            "capture",
+            "draw",
+            // The table of cylinders is of the limbs.
+            "shape::cylinders",
+            "tui",
+            "doctor",
+        ],
+    ),
     ("main.rs", &["cli"]),
 ];
 
@@ -42,6 +82,8 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("ratatui::", &["tui"]),
     ("gltf::", &["export"]),
     ("gltf_json::", &["export"]),
+    ("flate2::", &["export"]),
+    ("base64::", &["export"]),
     ("opencv::", &["track", "outline"]),
     ("turbojpeg::", &["source"]),
     ("mcap::", &["recording"]),
@@ -55,7 +97,8 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("thread::scope", &["runtime"]),
     ("mpsc::", &["runtime"]),
     // The doctor writes a nameless file to see how fast the disk is.
-    ("tempfile::", &["source", "recording", "doctor"]),
+    // What ffmpeg says while it writes a video goes into one too.
+    ("tempfile::", &["source", "recording", "doctor", "export"]),
     ("fs::write", &["export"]),
     ("File::create", &["export"]),
     // Stages know no clock; the pipeline passes one on that it does not look at.

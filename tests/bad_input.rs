@@ -170,7 +170,7 @@ fn check(name: &str, run: &Run, output: &Output, status: i32, says: &[&str], lef
         names.sort();
         names
     };
-    let tables = ["capture.json", "motion.csv", "nodes.csv", "tracks.csv"];
+    let tables = ["capture.json", "frame.jpg", "motion.csv", "nodes.csv", "tracks.csv"];
     match left {
         Nothing if entries.is_empty() => {}
         Tracks if entries == ["out"] && files(run.out()) == tables => {}

@@ -237,6 +237,11 @@ fn capture_json_says_what_was_seen() {
     assert_eq!((says("/timing/frames_seen"), says("/animation/frames")), (frames.into(), frames.into()));
     let rate = says("/timing/measured_rate_hz").as_f64().expect("rate");
     assert!((rate - 30.0).abs() < 0.1, "{rate} Hz");
+    // What a viewer has to hold: a fifth of a key for every joint and frame is enough.
+    let (keys, raw) =
+        (says("/animation/keys").as_f64().expect("keys"), says("/animation/raw_keys").as_f64().expect("raw"));
+    println!("{keys} of {raw} keys are kept: {:.1} %", 100.0 * keys / raw);
+    assert!(keys > 0.0 && keys <= 0.2 * raw, "{keys} of {raw} keys");
     assert_eq!(says("/model/nodes"), made().nodes().len());
     assert_eq!(says("/build/forced"), false);
     assert_eq!(says("/config"), serde_json::to_value(Config::default()).expect("config"));
@@ -282,7 +287,7 @@ fn the_stream_is_what_the_capture_says() {
 fn a_replay_is_reproducible_to_the_byte() {
     let on_one_core = Command::new("taskset").args(["-c", "0", "true"]).status().is_ok_and(|s| s.success());
     let again = replay(if on_one_core { &["taskset", "-c", "0"] } else { &[] }, &["--outline", OUTLINE, "--headless"]);
-    for name in ["capture.json", "tracks.csv", "nodes.csv", "motion.csv", "tree.glb"] {
+    for name in ["capture.json", "tracks.csv", "nodes.csv", "motion.csv", "tree.glb", "frame.jpg"] {
         let [a, b] = [made(), &again].map(|r| fs::read(r.out().join(name)).expect("file"));
         assert!(a == b, "{name} differs from one run to the next");
     }

@@ -106,6 +106,7 @@ fn a_capture_reads_back_as_it_was_written_and_is_the_same_every_time() {
         timing,
         config: Config::default(),
         outline: None,
+        picture: None,
         build: None,
         refinement: None,
         quality: Quality { median_fb_error_px: Some(0.05), ..Quality::default() },

@@ -299,6 +299,15 @@ fn a_camera_that_is_not_there_is_looked_for_often_enough() {
     assert!(longest < Duration::from_secs(1), "a camera that comes back is seen: {longest:?}");
 }
 
+/// Until the lost camera has been tried for the first time.
+fn wait_for_an_attempt(running: &Running, log: &Mutex<Log>, since: Instant) {
+    while log.lock().expect("log").reopened.is_empty() {
+        assert!(since.elapsed() < HANGS, "it is never tried");
+        look(running, log);
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
 #[test]
 fn a_wish_to_stop_is_heard_while_waiting() {
     let _alone = alone();
@@ -309,11 +318,7 @@ fn a_wish_to_stop_is_heard_while_waiting() {
     let (camera, log) = Camera::new(&[Loss { attempts: u64::MAX, refusal: silent, at: 150, ..UNPLUGGED }], 300);
     let running = runtime::start(camera, Job { config, ..job(Some(&out)) }).expect("start");
     let since = Instant::now();
-    while log.lock().expect("log").reopened.is_empty() {
-        assert!(since.elapsed() < HANGS, "it is never tried");
-        look(&running, &log);
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    wait_for_an_attempt(&running, &log, since);
     // The screen says so though no frame comes.
     let away = |r: &Running| r.latest().is_some_and(|s| s.camera.away.is_some());
     while !away(&running) {
@@ -396,12 +401,7 @@ fn a_wait_that_is_switched_off_meanwhile_ends_with_what_was_captured() {
     config.camera.retry_delay_s = 3600.0;
     let (camera, log) = Camera::new(&[Loss { attempts: u64::MAX, refusal: silent, at: 150, ..UNPLUGGED }], 300);
     let running = runtime::start(camera, Job { config: config.clone(), ..job(Some(&out)) }).expect("start");
-    let since = Instant::now();
-    while log.lock().expect("log").reopened.is_empty() {
-        assert!(since.elapsed() < HANGS, "it is never tried");
-        look(&running, &log);
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    wait_for_an_attempt(&running, &log, Instant::now());
     config.camera.reconnect = false;
     running.reload(config);
     let (summary, failure, _) = ended(running, &log);

@@ -294,6 +294,7 @@ const INSTALLED: &[&str] = &[
     "usr/share/doc/arborcam/service.md",
     "usr/share/doc/arborcam/settings.md",
     "usr/share/doc/arborcam/using.md",
+    "usr/share/doc/arborcam/viewer.md",
 ];
 
 fn make(goal: &str, root: &Path) {

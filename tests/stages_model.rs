@@ -162,11 +162,12 @@ fn attractors_lie_on_the_surface() {
 fn pushing_brings_the_tree_nearer_to_its_envelope() {
     let (settings, outline) = (config::Shape::default(), outline());
     let envelope = Envelope::of_revolution(&outline, skeleton::Foot::of(&outline, None).position_px);
-    let prototype = shape::copy_to_planes(&flat(), &[2; 8], &outline, &envelope, settings.planes);
+    let trunk = shape::trunk(&flat(), config::Leader::None, &[]);
+    let prototype = shape::copy_to_planes(&flat(), &[2; 8], &trunk, &outline, &envelope, settings.planes);
     let distance = |tree: &Skeleton| shape::envelope_distance(tree, &envelope, settings.attractors as usize);
-    for terms in [Terms::Both, Terms::Global] {
+    for terms in [Terms::Both(1.0), Terms::Global] {
         let mut pushed = prototype.clone();
-        shape::push(&mut pushed, &envelope, &settings, terms);
+        shape::push(&mut pushed, &trunk, &envelope, &settings, terms);
         assert!(distance(&pushed) < distance(&prototype), "{terms:?}");
     }
 }

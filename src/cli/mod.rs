@@ -4,13 +4,16 @@ mod camera;
 mod capture;
 mod devices;
 mod doctor;
+mod export;
 mod hangup;
 mod play;
 mod record;
 mod recording;
+mod render;
 mod replay;
 mod service;
 mod session;
+mod shaping;
 
 use crate::config::{Config, ConfigError};
 use crate::outline::OutlineSpec;
@@ -44,6 +47,10 @@ enum Command {
     Record(record::RecordArgs),
     /// Feed a v4l2loopback device from a recording or a video file; other programs see it as a camera.
     Play(play::PlayArgs),
+    /// Draw a capture's tree: a picture (.png) or a video (.mp4).
+    Render(render::RenderArgs),
+    /// Write the tree of a capture as a file for other programs.
+    Export(export::ExportArgs),
     /// List the cameras that are plugged in.
     Devices(devices::DevicesArgs),
     /// Find out what is wrong with this machine, and what to do about it.
@@ -132,6 +139,8 @@ pub fn main() -> ExitCode {
         Command::Replay(args) => replay::run(args),
         Command::Record(args) => record::run(args),
         Command::Play(args) => play::run(args),
+        Command::Render(args) => render::run(args),
+        Command::Export(args) => export::run(args),
         Command::Devices(args) => devices::run(args),
         Command::Doctor(args) => doctor::run(args),
     };

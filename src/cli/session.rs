@@ -21,9 +21,9 @@ use std::time::Duration;
 
 /// Time between two looks at a capture without a screen.
 const HEADLESS_TICK: Duration = Duration::from_millis(20);
-/// Time between two pictures, with and without a screen; without one only the bark's colour is taken from it.
+/// Time between two pictures, with and without a screen.
 const PREVIEW_SCREEN: Duration = Duration::from_millis(80);
-const PREVIEW_HEADLESS: Duration = Duration::from_secs(2);
+const PREVIEW_HEADLESS: Duration = Duration::MAX;
 
 /// What is worked off, and how.
 pub struct Plan<'a> {

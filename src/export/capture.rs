@@ -24,6 +24,9 @@ pub struct Capture {
     pub config: Config,
     /// The region that was tracked, in the form of an outline file, so that it can be used again.
     pub outline: Option<OutlineNote>,
+    /// `None` where nothing was tracked, or no frame could be decoded in colour.
+    #[serde(default)]
+    pub picture: Option<PictureNote>,
     /// `None` if the capture ended before the tree was built.
     pub build: Option<Build>,
     /// `None` if the tree is the one that was built first.
@@ -155,6 +158,14 @@ pub struct OutlineNote {
     pub polygon_px: Vec<[i32; 2]>,
 }
 
+/// The picture in the folder: the first frame that was tracked, whole.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PictureNote {
+    pub file: String,
+    pub frame: u64,
+    pub time_s: f64,
+}
+
 /// When and on what the tree was first built.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Build {
@@ -218,12 +229,31 @@ pub struct ModelNote {
     pub metres_per_px: f64,
     /// The trunk's foot in the picture, px: the origin of the model.
     pub foot_px: [f64; 2],
+    /// What the push out of the picture's plane has achieved; `None` in a capture of an older version.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub push: Option<crate::shape::PushFigures>,
+    /// What every copy repeats; by their numbers in `nodes.csv`. Empty in captures of older versions.
+    #[serde(default)]
+    pub copied: Vec<Copied>,
+}
+
+/// A node that repeats a measured one on another plane.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Copied {
+    pub node: u32,
+    pub original: u32,
+    /// By which the plane is turned about the y axis, degrees.
+    pub plane_angle_deg: f64,
 }
 
 impl ModelNote {
     /// The note for a skeleton that is written with this scale (0: pixels).
     pub fn of(skeleton: &crate::model::Skeleton, metres_per_px: f64) -> Self {
         let nodes = skeleton.nodes.len();
+        let copied = skeleton.nodes.iter().filter_map(|n| {
+            let original = skeleton.name_of(n.copy_of?)?.0;
+            Some(Copied { node: n.name.0, original, plane_angle_deg: n.plane_angle.to_degrees() })
+        });
         Self {
             nodes: nodes as u32,
             copies: (nodes - skeleton.measured()) as u32,
@@ -231,6 +261,8 @@ impl ModelNote {
             unit: if metres_per_px > 0.0 { "m" } else { "px" }.into(),
             metres_per_px,
             foot_px: skeleton.foot_px,
+            push: None,
+            copied: copied.collect(),
         }
     }
 }
@@ -241,8 +273,10 @@ pub struct AnimationNote {
     /// Frame that stands at time 0 of the animation.
     pub first_frame: u64,
     pub frames: u64,
-    /// Rotation keys that were left after thinning.
+    /// Rotation keys that were left after thinning, and how many there were before: a key a joint that moves and frame.
     pub keys: u64,
+    #[serde(default)]
+    pub raw_keys: u64,
 }
 
 /// The text of `capture.json`.

@@ -34,6 +34,23 @@ impl Sway {
         damping_hi: f64::NAN,
     };
 
+    /// For the `extras` of a joint: what is known of it, with 95 % intervals.
+    pub fn extras(&self) -> serde_json::Value {
+        let mut all = serde_json::Map::new();
+        let known = |lo: f64, hi: f64| (lo.is_finite() && hi.is_finite()).then(|| serde_json::json!([lo, hi]));
+        for (name, value, interval) in [
+            ("frequency_hz", self.frequency_hz, known(self.frequency_lo_hz, self.frequency_hi_hz)),
+            ("damping_ratio", self.damping_ratio, known(self.damping_lo, self.damping_hi)),
+        ] {
+            if value.is_finite() {
+                all.insert(name.into(), value.into());
+                interval.into_iter().for_each(|i| drop(all.insert(format!("{name}_interval_95"), i)));
+            }
+        }
+        all.insert("identifiable".into(), self.values().iter().all(|x| x.is_finite()).into());
+        all.into()
+    }
+
     fn values(&self) -> [f64; 6] {
         let damping = [self.damping_ratio, self.damping_lo, self.damping_hi];
         let [d, lo, hi] = damping;
@@ -42,7 +59,7 @@ impl Sway {
 }
 
 /// One CSV file: a row is put together cell by cell.
-struct Table<W: Write> {
+pub(super) struct Table<W: Write> {
     what: &'static str,
     out: ::csv::Writer<W>,
     row: ::csv::StringRecord,
@@ -52,7 +69,7 @@ struct Table<W: Write> {
 }
 
 impl<W: Write> Table<W> {
-    fn new(what: &'static str, header: &str, out: W) -> Result<Self, ExportError> {
+    pub(super) fn new(what: &'static str, header: &str, out: W) -> Result<Self, ExportError> {
         let out = ::csv::Writer::from_writer(out);
         let mut table = Self { what, out, row: ::csv::StringRecord::new(), cell: String::new(), bytes: 0 };
         header.split(',').for_each(|name| table.row.push_field(name));
@@ -60,27 +77,27 @@ impl<W: Write> Table<W> {
         Ok(table)
     }
 
-    fn number(&mut self, x: f64, decimals: usize) {
+    pub(super) fn number(&mut self, x: f64, decimals: usize) {
         self.cell.clear();
         number::push(&mut self.cell, x, decimals);
         self.row.push_field(&self.cell);
     }
 
-    fn count(&mut self, n: impl Into<u64>) {
+    pub(super) fn count(&mut self, n: impl Into<u64>) {
         use std::fmt::Write;
         self.cell.clear();
         let _ = write!(self.cell, "{}", n.into());
         self.row.push_field(&self.cell);
     }
 
-    fn id(&mut self, id: Option<NodeName>) {
+    pub(super) fn id(&mut self, id: Option<NodeName>) {
         match id {
             Some(id) => self.count(id.0),
             None => self.row.push_field(""),
         }
     }
 
-    fn end_row(&mut self) -> Result<(), ExportError> {
+    pub(super) fn end_row(&mut self) -> Result<(), ExportError> {
         self.bytes += (self.row.as_slice().len() + self.row.len()) as u64;
         let written = self.out.write_record(&self.row);
         self.row.clear();
@@ -90,7 +107,7 @@ impl<W: Write> Table<W> {
         })
     }
 
-    fn finish(mut self) -> Result<W, ExportError> {
+    pub(super) fn finish(mut self) -> Result<W, ExportError> {
         let (what, bytes) = (self.what, self.bytes);
         self.out.flush().map_err(|e| ExportError::from_io(what, bytes, e))?;
         self.out.into_inner().map_err(|e| ExportError::from_io(what, bytes, std::io::Error::other(e.to_string())))
@@ -220,7 +237,7 @@ impl<W: Write> MotionCsv<W> {
 }
 
 /// Length of a pixel in the file's unit, and how many decimals more it takes to say as much in that unit.
-fn unit(metres_per_px: f64) -> (f64, usize) {
+pub(super) fn unit(metres_per_px: f64) -> (f64, usize) {
     if metres_per_px > 0.0 {
         (metres_per_px, (-metres_per_px.log10()).ceil().clamp(0.0, 12.0) as usize)
     } else {

@@ -12,6 +12,8 @@ pub enum ExportError {
     /// Some part of the path is a file.
     #[error("{} cannot be a folder: part of the path is a file or no name; choose another", .path.display())]
     NotAFolder { path: PathBuf },
+    #[error("the folder {} is not there; make it first, or choose another", .path.display())]
+    NoFolder { path: PathBuf },
     /// `bytes` is how much was to be written in all, as far as is known at this point.
     #[error("the disk is full: {what} needs at least {} of free space; free some, or choose another disk", size(*.bytes))]
     DiskFull { what: String, bytes: u64 },
@@ -19,6 +21,14 @@ pub enum ExportError {
     Denied { what: String },
     #[error("cannot write {what}: {source}")]
     Io { what: String, source: io::Error },
+    /// Or it is there without the encoder, as some builds are.
+    #[error("ffmpeg is not installed, or lacks libx264, and videos are written with it; run `sudo apt install ffmpeg`")]
+    NoFfmpeg,
+    /// The page of `--format html` is put into the program when it is built, where npm is there.
+    #[error(
+        "this arborcam was built without the HTML viewer; install npm and run `make build`, or export another format"
+    )]
+    NoViewer,
     /// The model itself cannot be put into the format.
     #[error("cannot export this tree: {why}")]
     Unfit { why: String },

@@ -74,6 +74,14 @@ impl OutputFolder {
         write().map_err(|e| self.explain(name, bytes.len() as u64, e))
     }
 
+    /// Copies a file into the folder under the same name.
+    ///
+    /// # Errors
+    /// It cannot be read or not be written to its end.
+    pub fn copy(&self, name: &str, from: &Path) -> Result<(), ExportError> {
+        fs::copy(from.join(name), self.path(name)).map(drop).map_err(|e| self.explain(name, 0, e))
+    }
+
     /// Puts everything on the disk and gives the folder its name, which it returns.
     ///
     /// # Errors

@@ -1,32 +1,48 @@
-//! The moving tree as one GLB: core glTF 2.0, one skinned mesh, one animation of rotations.
+//! The moving tree as glTF 2.0 without extensions: joints, one skin, wood in one level of detail or more, leaves, and one
+//! animation.
 
 use super::ExportError;
-use super::gltf_buffer::{BufferBuilder, Layout, accessor, le_f32};
-use super::gltf_mesh::push_skinned_mesh;
-use super::joints::{self, Keys};
+use super::capture::{AnimationNote, Software};
+use super::gltf_animation::push_animation;
+use super::gltf_buffer::BufferBuilder;
+use super::gltf_check::check;
+use super::gltf_look::{bark, leaf};
+use super::gltf_mesh::{Skinned, push_mesh, push_skin};
+use super::joints::Moving;
 use crate::model::{Pose, Skeleton};
-use crate::shape::Mesh;
-use gltf_json::accessor::Type;
-use gltf_json::animation::{Animation, Channel, Interpolation, Property, Sampler, Target};
+use crate::pipeline::Dressed;
 use gltf_json::extras::RawValue;
-use gltf_json::validation::Checked::Valid;
 use gltf_json::{Asset, Index, Node, Root, Scene};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 
-/// Keys are thinned so that no node is farther than this from its pose in any frame, px.
+/// Keys are thinned so that no node is farther than this from its pose in any frame as seen in its own plane (the picture's
+/// for measured nodes), px; across it, where depth was estimated and not seen, it may be twice as far.
 pub const KEY_TOLERANCE_PX: f64 = 0.2;
 
+/// Where the model comes from, for the file's own notes.
+pub fn provenance(source: &str, software: &Software, poses: &[Pose]) -> Value {
+    json!({
+        "software": software,
+        "source": source,
+        "first_frame": poses.first().map(|p| p.frame),
+        "frames": poses.len(),
+        "measured": "front view: tracked points; depth and copied planes: estimated (Li et al. 2011)",
+    })
+}
+
 /// Everything that goes into the file.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Model<'a> {
     pub skeleton: &'a Skeleton,
-    /// May be empty: then the file holds the joints alone.
-    pub mesh: &'a Mesh,
+    /// Its meshes may be empty: then the file holds the joints alone.
+    pub dressed: &'a Dressed,
     /// In the order of time; the rest pose stands for none.
     pub poses: &'a [Pose],
-    /// Colour of the bark as in a picture (sRGB).
-    pub bark_rgb: [u8; 3],
+    /// How far each group of leaves swings in every pose: the weights of its two displacements. Empty: not at all.
+    pub flutter: &'a [Vec<[f32; 2]>],
+    /// All levels of detail of the wood, as scenes `lod0`, `lod1`, ... on the same joints, instead of the first alone.
+    pub all_levels: bool,
     /// Metres in a pixel; 0 leaves the model in pixels.
     pub metres_per_px: f64,
     /// See [`KEY_TOLERANCE_PX`].
@@ -49,22 +65,62 @@ impl Model<'_> {
     }
 }
 
-/// The bytes of the GLB file.
+/// A file and its bytes.
+pub type NamedBytes = (String, Vec<u8>);
+
+/// The bytes of the GLB file, and what its animation is.
 ///
 /// # Errors
 /// [`ExportError::Unfit`] if the skeleton is empty, out of order or has positions that are no numbers, if a pose
 /// belongs to another tree, or if there is more than the format can count.
-pub fn glb(model: &Model) -> Result<Vec<u8>, ExportError> {
-    glb_and_keys(model).map(|(bytes, _)| bytes)
+pub fn glb(model: &Model) -> Result<(Vec<u8>, AnimationNote), ExportError> {
+    let Assembled { mut root, buffer, animation, .. } = assemble(model, false)?;
+    let bin: Option<Cow<[u8]>> = buffer.finish(&mut root, None).map(Cow::Owned);
+    let json: Cow<[u8]> = Cow::Owned(root.to_vec().map_err(|e| ExportError::unfit(e.to_string()))?);
+    if json.len() + bin.as_ref().map_or(0, |b| b.len()) + 64 > u32::MAX as usize {
+        return Err(ExportError::unfit("it is larger than the 4 GB that a GLB can hold; export a shorter animation"));
+    }
+    // The length in the header is computed when it is written.
+    let header = gltf::binary::Header { magic: *b"glTF", version: 2, length: 0 };
+    let bytes = gltf::binary::Glb { header, json, bin }.to_vec().map_err(|e| ExportError::unfit(e.to_string()))?;
+    Ok((bytes, animation))
 }
 
-/// The bytes of the GLB file, and how many rotation keys are in it.
+/// The same as files beside each other: `STEM.gltf`, `STEM.bin`, and the texture of the leaves where there is one. What is
+/// pointed to comes first, the `.gltf` last.
 ///
 /// # Errors
 /// As of [`glb`].
-pub fn glb_and_keys(model: &Model) -> Result<(Vec<u8>, u64), ExportError> {
+pub fn gltf_files(model: &Model, stem: &str) -> Result<(Vec<NamedBytes>, AnimationNote), ExportError> {
+    let Assembled { mut root, buffer, animation, texture } = assemble(model, true)?;
+    let mut files = Vec::new();
+    // Names in the file are those of links: what a link cannot hold is written as %XX.
+    if let (Some((ending, bytes)), Some(image)) = (texture, root.images.first_mut()) {
+        let name = format!("{stem}_leaf.{ending}");
+        image.uri = Some(percent(&name));
+        files.push((name, bytes));
+    }
+    let name = format!("{stem}.bin");
+    if let Some(bytes) = buffer.finish(&mut root, Some(percent(&name))) {
+        files.push((name, bytes));
+    }
+    let mut text = root.to_vec_pretty().map_err(|e| ExportError::unfit(e.to_string()))?;
+    text.push(b'\n');
+    files.push((format!("{stem}.gltf"), text));
+    Ok((files, animation))
+}
+
+struct Assembled {
+    root: Root,
+    buffer: BufferBuilder,
+    animation: AnimationNote,
+    /// Ending and bytes of the picture that is not in the buffer.
+    texture: Option<(&'static str, Vec<u8>)>,
+}
+
+fn assemble(model: &Model, texture_apart: bool) -> Result<Assembled, ExportError> {
     check(model)?;
-    let keys = joints::keys(model.skeleton, model.poses, model.tolerance_px)?;
+    let moving = Moving::new(model.skeleton, model.poses, model.tolerance_px);
     let mut root = Root::default();
     let mut buffer = BufferBuilder::default();
     root.asset = Asset {
@@ -73,57 +129,42 @@ pub fn glb_and_keys(model: &Model) -> Result<(Vec<u8>, u64), ExportError> {
         ..Asset::default()
     };
     push_joints(&mut root, model)?;
-    let mut scene_nodes = vec![Index::new(0)];
-    if !model.mesh.indices.is_empty() {
-        scene_nodes.push(push_skinned_mesh(&mut root, &mut buffer, model));
-    }
-    if !keys.is_empty() {
-        push_animation(&mut root, &mut buffer, &keys);
-    }
-    let name = Some("arborcam".to_string());
-    root.scene = Some(root.push(Scene { extensions: None, extras: None, name, nodes: scene_nodes }));
-    let bin: Option<Cow<[u8]>> = buffer.finish(&mut root).map(Cow::Owned);
-    let json: Cow<[u8]> = Cow::Owned(root.to_vec().map_err(|e| ExportError::unfit(e.to_string()))?);
-    if json.len() + bin.as_ref().map_or(0, |b| b.len()) + 64 > u32::MAX as usize {
-        return Err(ExportError::unfit("it is larger than the 4 GB that a GLB can hold; export a shorter animation"));
-    }
-    // The length in the header is computed when it is written.
-    let header = gltf::binary::Header { magic: *b"glTF", version: 2, length: 0 };
-    let bytes = gltf::binary::Glb { header, json, bin }.to_vec().map_err(|e| ExportError::unfit(e.to_string()))?;
-    Ok((bytes, keys.iter().map(|k| k.times_s.len() as u64).sum()))
-}
-
-fn check(model: &Model) -> Result<(), ExportError> {
-    let (nodes, mesh) = (&model.skeleton.nodes, model.mesh);
-    if nodes.is_empty() {
-        return Err(ExportError::unfit("it has no nodes"));
-    }
-    if nodes.len() > 1 + usize::from(u16::MAX) {
-        return Err(ExportError::unfit(format!("{} nodes are more than the 65536 joints of a skin", nodes.len())));
-    }
-    for (i, node) in nodes.iter().enumerate() {
-        if node.parent.map(|p| p.index()).is_some_and(|p| p >= i) || (i > 0) != node.parent.is_some() {
-            return Err(ExportError::unfit(format!("node {i} does not come after its parent")));
+    let Dressed { wood, foliage, bark_rgb, .. } = model.dressed;
+    let drawn = wood.iter().chain(foliage.groups.iter().map(|g| &g.mesh)).any(|mesh| !mesh.indices.is_empty());
+    let mut texture = None;
+    let (mut levels, mut leaves) = (Vec::new(), Vec::new());
+    if drawn {
+        let skin = push_skin(&mut root, &mut buffer, model);
+        let material = root.push(bark(*bark_rgb));
+        let wanted = if model.all_levels { wood.len() } else { 1 };
+        for (k, mesh) in wood.iter().take(wanted).enumerate().filter(|(_, mesh)| !mesh.indices.is_empty()) {
+            let name = if k == 0 { "tree".to_owned() } else { format!("tree_lod{k}") };
+            levels.push(push_mesh(&mut root, &mut buffer, model, Skinned::wood(mesh, material, skin, name))?);
         }
-        if !node.position.coords.iter().all(|x| ((x * model.scale()) as f32).is_finite()) {
-            return Err(ExportError::unfit(format!("the position of node {i} is no number")));
+        let shown = || foliage.groups.iter().enumerate().filter(|(_, group)| !group.mesh.indices.is_empty());
+        if shown().next().is_some() {
+            let material;
+            (material, texture) = leaf(&mut root, &mut buffer, foliage.texture.as_ref(), texture_apart)?;
+            for (k, group) in shown() {
+                let branch = model.skeleton.name_of(group.node);
+                let what = Skinned::leaves(group, material, skin, format!("leaves_{k}"), branch);
+                leaves.push((k, push_mesh(&mut root, &mut buffer, model, what)?));
+            }
         }
     }
-    let n = mesh.positions.len();
-    let same = [mesh.normals.len(), mesh.uvs.len(), mesh.joints.len(), mesh.weights.len()].iter().all(|&m| m == n);
-    if !same || !mesh.indices.len().is_multiple_of(3) || mesh.indices.iter().any(|&i| i as usize >= n) {
-        return Err(ExportError::unfit("its mesh has vectors of different lengths or indices beyond them"));
-    }
-    if !mesh.positions.iter().flatten().all(|x| ((f64::from(*x) * model.scale()) as f32).is_finite())
-        || !mesh.joints.iter().flatten().all(|&j| usize::from(j) < nodes.len())
-    {
-        return Err(ExportError::unfit("its mesh has positions that are no numbers or joints of another tree"));
-    }
-    Ok(())
+    push_animation(&mut root, &mut buffer, model, &moving, &leaves);
+    push_scenes(&mut root, &levels, leaves.iter().map(|(_, node)| *node));
+    let animation = AnimationNote {
+        first_frame: model.poses.first().map_or(0, |p| p.frame),
+        frames: model.poses.len() as u64,
+        keys: moving.keys(),
+        raw_keys: moving.raw_keys(),
+    };
+    Ok(Assembled { root, buffer, animation, texture })
 }
 
 /// JSON text that is written as it stands; `null` is left out.
-fn raw(value: &Value) -> Result<Option<Box<RawValue>>, ExportError> {
+pub(super) fn raw(value: &Value) -> Result<Option<Box<RawValue>>, ExportError> {
     let text = (!value.is_null()).then(|| value.to_string());
     text.map(RawValue::from_string).transpose().map_err(|e| ExportError::unfit(e.to_string()))
 }
@@ -158,28 +199,19 @@ fn push_joints(root: &mut Root, model: &Model) -> Result<(), ExportError> {
     Ok(())
 }
 
-/// All times lie in one view and all rotations in another.
-fn push_animation(root: &mut Root, buffer: &mut BufferBuilder, keys: &[Keys]) {
-    let time_bytes = keys.iter().flat_map(|k| k.times_s.iter().flat_map(|t| t.to_le_bytes()));
-    let times = buffer.view(root, time_bytes, None);
-    let rotations = buffer.view(root, keys.iter().flat_map(|k| le_f32(&k.rotations)), None);
-    let (mut channels, mut samplers) = (Vec::new(), Vec::new());
-    let mut before = 0;
-    for joint in keys {
-        let count = joint.times_s.len();
-        let mut input = accessor(times, 4 * before, Layout::f32(Type::Scalar), count);
-        input.min = joint.times_s.first().map(|t| json!([t]));
-        input.max = joint.times_s.last().map(|t| json!([t]));
-        let input = root.push(input);
-        let output = root.push(accessor(rotations, 16 * before, Layout::f32(Type::Vec4), count));
-        before += count;
-        let interpolation = Valid(Interpolation::Linear);
-        samplers.push(Sampler { extensions: None, extras: None, input, interpolation, output });
-        let node = Index::new(joint.node as u32);
-        let target = Target { extensions: None, extras: None, node, path: Valid(Property::Rotation) };
-        let sampler = Index::new(channels.len() as u32);
-        channels.push(Channel { sampler, target, extensions: None, extras: None });
+/// A scene for each level of the wood, which stands beside the joints and not below them: a skin is placed by its joints
+/// alone. The first is the one that is shown.
+fn push_scenes(root: &mut Root, levels: &[Index<Node>], leaves: impl Iterator<Item = Index<Node>> + Clone) {
+    for k in 0..levels.len().max(1) {
+        let nodes = std::iter::once(Index::new(0)).chain(levels.get(k).copied()).chain(leaves.clone()).collect();
+        let name = if levels.len() > 1 { format!("lod{k}") } else { "arborcam".to_owned() };
+        root.push(Scene { extensions: None, extras: None, name: Some(name), nodes });
     }
-    let name = Some("sway".to_string());
-    root.push(Animation { extensions: None, extras: None, channels, name, samplers });
+    root.scene = Some(Index::new(0));
+}
+
+/// A name as a relative link.
+fn percent(name: &str) -> String {
+    let plain = |b: u8| b.is_ascii_alphanumeric() || b"-._~".contains(&b);
+    name.bytes().map(|b| if plain(b) { char::from(b).to_string() } else { format!("%{b:02X}") }).collect()
 }

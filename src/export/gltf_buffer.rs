@@ -16,11 +16,17 @@ pub(super) struct BufferBuilder {
 pub(super) struct Layout {
     pub component: ComponentType,
     pub shape: Type,
+    /// Whole numbers stand for 0 to 1.
+    pub normalized: bool,
 }
 
 impl Layout {
     pub const fn f32(shape: Type) -> Self {
-        Self { component: ComponentType::F32, shape }
+        Self { component: ComponentType::F32, shape, normalized: false }
+    }
+
+    pub const fn normalized(component: ComponentType, shape: Type) -> Self {
+        Self { component, shape, normalized: true }
     }
 }
 
@@ -60,14 +66,15 @@ impl BufferBuilder {
         root.push(accessor(view, 0, layout, count))
     }
 
-    /// Declares the buffer, if anything is in it, and returns its bytes.
-    pub fn finish(mut self, root: &mut Root) -> Option<Vec<u8>> {
+    /// Declares the buffer, if anything is in it, and returns its bytes; `uri` is the file that they go into, if they do
+    /// not follow in the same one.
+    pub fn finish(mut self, root: &mut Root, uri: Option<String>) -> Option<Vec<u8>> {
         if self.bytes.is_empty() {
             return None;
         }
         self.align();
         let byte_length = USize64::from(self.bytes.len());
-        root.push(Buffer { byte_length, name: None, uri: None, extensions: None, extras: None });
+        root.push(Buffer { byte_length, name: None, uri, extensions: None, extras: None });
         Some(self.bytes)
     }
 }
@@ -85,7 +92,7 @@ pub(super) fn accessor(view: Index<View>, offset: usize, layout: Layout, count: 
         min: None,
         max: None,
         name: None,
-        normalized: false,
+        normalized: layout.normalized,
         sparse: None,
     }
 }

@@ -1,73 +1,147 @@
-//! The skinned mesh of a GLB: vertices, skin and bark.
+//! Skinned meshes of a glTF file: wood and leaves.
 
-use super::gltf::Model;
+use super::ExportError;
+use super::gltf::{Model, raw};
 use super::gltf_buffer::{BufferBuilder, Layout, bounds, le_f32};
-use crate::shape::Mesh;
+use super::skinning::{Skinning, skinning};
+use crate::model::NodeName;
+use crate::shape::{FoliageGroup, Mesh};
 use gltf_json::accessor::{ComponentType, Type};
 use gltf_json::buffer::Target::{ArrayBuffer, ElementArrayBuffer};
-use gltf_json::material::{Material, PbrBaseColorFactor, PbrMetallicRoughness, StrengthFactor};
-use gltf_json::mesh::{Mode, Primitive, Semantic};
+use gltf_json::material::Material;
+use gltf_json::mesh::{Mode, MorphTarget, Primitive, Semantic};
 use gltf_json::validation::Checked::Valid;
-use gltf_json::{Index, Node, Root, Skin};
-use serde_json::json;
+use gltf_json::{Accessor, Index, Node, Root, Skin};
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// The mesh stands beside the joints, not below them: a skin is placed by its joints alone.
-pub(super) fn push_skinned_mesh(root: &mut Root, buffer: &mut BufferBuilder, model: &Model) -> Index<Node> {
-    let mesh = model.mesh;
-    let n = mesh.positions.len();
-    let scale = model.scale();
-    let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|p| p.map(|x| (f64::from(x) * scale) as f32)).collect();
-    let (low, high) = bounds(&positions);
-    let vertices = Some(ArrayBuffer);
-    let position = buffer.accessor(root, Layout::f32(Type::Vec3), n, le_f32(&positions), vertices);
-    root.accessors[position.value()].min = Some(json!(low));
-    root.accessors[position.value()].max = Some(json!(high));
-    let normal = buffer.accessor(root, Layout::f32(Type::Vec3), n, le_f32(&mesh.normals), vertices);
+/// One mesh with its skin and looks.
+pub(super) struct Skinned<'a> {
+    mesh: &'a Mesh,
+    /// Empty for one colour.
+    colours: &'a [[u8; 3]],
+    /// Displacements that the animation may add.
+    targets: Vec<&'a [[f32; 3]]>,
+    material: Index<Material>,
+    skin: Index<Skin>,
+    name: String,
+    extras: Value,
+}
+
+impl<'a> Skinned<'a> {
+    pub fn wood(mesh: &'a Mesh, material: Index<Material>, skin: Index<Skin>, name: String) -> Self {
+        Self { mesh, colours: &[], targets: Vec::new(), material, skin, name, extras: Value::Null }
+    }
+
+    /// `branch` is the one with which the leaves swing.
+    pub fn leaves(
+        group: &'a FoliageGroup,
+        material: Index<Material>,
+        skin: Index<Skin>,
+        name: String,
+        branch: Option<NodeName>,
+    ) -> Self {
+        let targets = vec![&group.sine[..], &group.cosine[..]];
+        let extras = json!({ "node": branch.map(|b| b.0) });
+        Self { mesh: &group.mesh, colours: &group.colours, targets, material, skin, name, extras }
+    }
+}
+
+/// Adds the mesh and the node that shows it.
+pub(super) fn push_mesh(
+    root: &mut Root,
+    buffer: &mut BufferBuilder,
+    model: &Model,
+    what: Skinned,
+) -> Result<Index<Node>, ExportError> {
+    let mesh = what.mesh;
+    let (n, vertices) = (mesh.positions.len(), Some(ArrayBuffer));
+    let mut attributes = BTreeMap::new();
+    let position = push_places(root, buffer, &mesh.positions, model.scale());
+    attributes.insert(Valid(Semantic::Positions), position);
+    let normals: Vec<[f32; 3]> = mesh.normals.iter().map(unit).collect();
+    let normal = buffer.accessor(root, Layout::f32(Type::Vec3), n, le_f32(&normals), vertices);
+    attributes.insert(Valid(Semantic::Normals), normal);
     let uv = buffer.accessor(root, Layout::f32(Type::Vec2), n, le_f32(&mesh.uvs), vertices);
-    let weights = buffer.accessor(root, Layout::f32(Type::Vec4), n, le_f32(&mesh.weights), vertices);
-    let joint_bytes = mesh.joints.iter().flatten().flat_map(|j| j.to_le_bytes());
-    let vec4_u16 = Layout { component: ComponentType::U16, shape: Type::Vec4 };
-    let joints = buffer.accessor(root, vec4_u16, n, joint_bytes, vertices);
+    attributes.insert(Valid(Semantic::TexCoords(0)), uv);
+    if !what.colours.is_empty() {
+        // Two bytes a channel: the linear scale has too few dark steps in one.
+        let bytes = what.colours.iter().flat_map(|c| {
+            let [r, g, b] = c.map(|c| (super::gltf_look::linear(c) * 65535.0).round() as u16);
+            [r, g, b, u16::MAX].into_iter().flat_map(u16::to_le_bytes)
+        });
+        let layout = Layout::normalized(ComponentType::U16, Type::Vec4);
+        attributes.insert(Valid(Semantic::Colors(0)), buffer.accessor(root, layout, n, bytes, vertices));
+    }
+    let Skinning { joints, weights } = skinning(mesh);
+    let layout = |size: usize| if size == 1 { ComponentType::U8 } else { ComponentType::U16 };
+    let (size, bytes) = joints.le_bytes();
+    let joints = Layout { component: layout(size), shape: Type::Vec4, normalized: false };
+    attributes.insert(Valid(Semantic::Joints(0)), buffer.accessor(root, joints, n, bytes.into_iter(), vertices));
+    let (size, bytes) = weights.le_bytes();
+    let weights = Layout::normalized(layout(size), Type::Vec4);
+    attributes.insert(Valid(Semantic::Weights(0)), buffer.accessor(root, weights, n, bytes.into_iter(), vertices));
+    let targets: Vec<MorphTarget> = what
+        .targets
+        .iter()
+        .map(|by| push_places(root, buffer, by, model.scale()))
+        .map(|by| MorphTarget { positions: Some(by), normals: None, tangents: None })
+        .collect();
     let indices = push_indices(root, buffer, mesh);
-    let attributes = BTreeMap::from([
-        (Valid(Semantic::Positions), position),
-        (Valid(Semantic::Normals), normal),
-        (Valid(Semantic::TexCoords(0)), uv),
-        (Valid(Semantic::Joints(0)), joints),
-        (Valid(Semantic::Weights(0)), weights),
-    ]);
-    let material = root.push(bark(model.bark_rgb));
+    let at_rest = vec![0.0; targets.len()];
     let primitive = Primitive {
         attributes,
         extensions: None,
         extras: None,
         indices: Some(indices),
-        material: Some(material),
+        material: Some(what.material),
         mode: Valid(Mode::Triangles),
-        targets: None,
+        targets: (!targets.is_empty()).then_some(targets),
     };
-    let name = || Some("tree".to_string());
-    let primitives = vec![primitive];
-    let mesh = root.push(gltf_json::Mesh { extensions: None, extras: None, name: name(), primitives, weights: None });
-    let skin = push_skin(root, buffer, model);
-    root.push(Node { mesh: Some(mesh), skin: Some(skin), name: name(), ..Node::default() })
+    let mesh = root.push(gltf_json::Mesh {
+        extensions: None,
+        extras: if at_rest.is_empty() { None } else { raw(&json!({"targetNames": ["sine", "cosine"]}))? },
+        name: Some(what.name.clone()),
+        primitives: vec![primitive],
+        weights: (!at_rest.is_empty()).then_some(at_rest),
+    });
+    let extras = raw(&what.extras)?;
+    Ok(root.push(Node { mesh: Some(mesh), skin: Some(what.skin), name: Some(what.name), extras, ..Node::default() }))
+}
+
+/// Places or ways, px in the model, with the bounds that the format asks for.
+fn push_places(root: &mut Root, buffer: &mut BufferBuilder, rows: &[[f32; 3]], scale: f64) -> Index<Accessor> {
+    let scaled: Vec<[f32; 3]> = rows.iter().map(|p| p.map(|x| (f64::from(x) * scale) as f32)).collect();
+    let (low, high) = bounds(&scaled);
+    let places = buffer.accessor(root, Layout::f32(Type::Vec3), rows.len(), le_f32(&scaled), Some(ArrayBuffer));
+    root.accessors[places.value()].min = Some(json!(low));
+    root.accessors[places.value()].max = Some(json!(high));
+    places
+}
+
+/// Of length 1, whatever a degenerate triangle has left.
+fn unit(normal: &[f32; 3]) -> [f32; 3] {
+    let n = nalgebra::Vector3::from(*normal).map(f64::from);
+    let n = n.try_normalize(1e-9).unwrap_or_else(nalgebra::Vector3::y);
+    [n.x as f32, n.y as f32, n.z as f32]
 }
 
 /// Half the size where it fits; 65535 itself is reserved by the format.
-fn push_indices(root: &mut Root, buffer: &mut BufferBuilder, mesh: &Mesh) -> Index<gltf_json::Accessor> {
+fn push_indices(root: &mut Root, buffer: &mut BufferBuilder, mesh: &Mesh) -> Index<Accessor> {
     let target = Some(ElementArrayBuffer);
     let count = mesh.indices.len();
+    let layout = |component| Layout { component, shape: Type::Scalar, normalized: false };
     if mesh.positions.len() <= usize::from(u16::MAX) {
         let bytes = mesh.indices.iter().flat_map(|&i| (i as u16).to_le_bytes());
-        buffer.accessor(root, Layout { component: ComponentType::U16, shape: Type::Scalar }, count, bytes, target)
+        buffer.accessor(root, layout(ComponentType::U16), count, bytes, target)
     } else {
         let bytes = mesh.indices.iter().flat_map(|i| i.to_le_bytes());
-        buffer.accessor(root, Layout { component: ComponentType::U32, shape: Type::Scalar }, count, bytes, target)
+        buffer.accessor(root, layout(ComponentType::U32), count, bytes, target)
     }
 }
 
-fn push_skin(root: &mut Root, buffer: &mut BufferBuilder, model: &Model) -> Index<Skin> {
+/// The skin that all meshes share.
+pub(super) fn push_skin(root: &mut Root, buffer: &mut BufferBuilder, model: &Model) -> Index<Skin> {
     let n = model.skeleton.nodes.len();
     let bind: Vec<[f32; 16]> = (0..n)
         .map(|i| {
@@ -85,22 +159,4 @@ fn push_skin(root: &mut Root, buffer: &mut BufferBuilder, model: &Model) -> Inde
         name: Some("tree".to_string()),
         skeleton: Some(Index::new(0)),
     })
-}
-
-fn bark(rgb: [u8; 3]) -> Material {
-    // glTF colours are linear, those of a picture are not (sRGB transfer function, IEC 61966-2-1).
-    let linear = rgb.map(|c| {
-        let c = f32::from(c) / 255.0;
-        if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
-    });
-    Material {
-        name: Some("bark".to_string()),
-        pbr_metallic_roughness: PbrMetallicRoughness {
-            base_color_factor: PbrBaseColorFactor([linear[0], linear[1], linear[2], 1.0]),
-            metallic_factor: StrengthFactor(0.0),
-            roughness_factor: StrengthFactor(0.9),
-            ..PbrMetallicRoughness::default()
-        },
-        ..Material::default()
-    }
 }

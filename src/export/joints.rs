@@ -4,10 +4,10 @@
 //! identity rotation, is a child of P(i)'s joint, and turns by Q_P(i)^-1 Q_i; then a point x of the branch at rest is
 //! skinned to p_P(i)(t) + Q_i(t) (x - rest_P(i)), which is what `JointPose` means. The foot's joint stands still.
 
-use super::ExportError;
-use super::thin_keys::{slerp, thin};
-use crate::model::{Pose, Skeleton};
-use nalgebra::{UnitQuaternion, Vector3};
+use super::sparse_keys::{Keyed, Path};
+use super::thin_keys::{Arc, thin};
+use crate::model::{Node, Pose, Skeleton};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
 
 /// Keys of one joint's local rotation.
 pub(super) struct Keys {
@@ -18,21 +18,40 @@ pub(super) struct Keys {
     pub rotations: Vec<[f32; 4]>,
 }
 
-/// Keys of all joints that move, with every node within `tolerance_px` of its pose in every frame.
-///
-/// Joints are thinned from the foot up, each against what its parent's kept keys show, so that a joint also makes good
-/// its parent's error. The tolerance grows towards the tips: a node may be wrong by `tolerance sqrt(depth / depth of
-/// the deepest tip above)`, of which its parent has used only a part.
-pub(super) fn keys(skeleton: &Skeleton, poses: &[Pose], tolerance_px: f64) -> Result<Vec<Keys>, ExportError> {
+/// How the tree moves.
+pub(super) struct Moving {
+    pub joints: Vec<Keys>,
+    /// The poses that are shown, by their place among all, and their times from the first on, s.
+    pub kept: Vec<usize>,
+    pub times_s: Vec<f64>,
+}
+
+impl Moving {
+    /// Keys of all joints that move, with every node within `tolerance_px` of its pose in every frame as seen in its own
+    /// plane, which is the picture's for measured nodes, and within twice that across it: depth was estimated, not seen.
+    ///
+    /// Joints are thinned from the foot up, each against what its parent's kept keys show, so that a joint also makes good
+    /// its parent's error. The tolerance grows towards the tips: a node may be wrong by `tolerance sqrt(depth / depth of
+    /// the deepest tip above)`, of which its parent has used only a part.
+    pub fn new(skeleton: &Skeleton, all: &[Pose], tolerance_px: f64) -> Self {
+        let (kept, times_s) = usable(all);
+        let poses: Vec<&Pose> = kept.iter().map(|&k| &all[k]).collect();
+        let joints = if poses.is_empty() { Vec::new() } else { keys(skeleton, &poses, &times_s, tolerance_px) };
+        Self { joints, kept, times_s }
+    }
+
+    /// Rotation keys that are left, and how many there were before thinning.
+    pub fn keys(&self) -> u64 {
+        self.joints.iter().map(|k| k.times_s.len() as u64).sum()
+    }
+
+    pub fn raw_keys(&self) -> u64 {
+        (self.joints.len() * self.kept.len()) as u64
+    }
+}
+
+fn keys(skeleton: &Skeleton, poses: &[&Pose], times: &[f64], tolerance_px: f64) -> Vec<Keys> {
     let nodes = &skeleton.nodes;
-    if let Some(p) = poses.iter().find(|p| p.joints.len() != nodes.len()) {
-        let why = format!("the pose of frame {} has {} joints, the tree {}", p.frame, p.joints.len(), nodes.len());
-        return Err(ExportError::unfit(why));
-    }
-    let (poses, times) = usable(poses);
-    if times.is_empty() {
-        return Ok(Vec::new());
-    }
     let budget = budgets(skeleton);
     let mut shown: Vec<Shown> = Vec::with_capacity(nodes.len());
     let mut out = Vec::new();
@@ -41,40 +60,131 @@ pub(super) fn keys(skeleton: &Skeleton, poses: &[Pose], tolerance_px: f64) -> Re
             shown.push(Shown::still(times.len()));
             continue;
         };
-        let wanted = rotations(&poses, i);
         let base = &shown[parent];
-        let local: Vec<_> = wanted.iter().zip(&base.rotation).map(|(q, p)| p.inverse() * q).collect();
-        let way = node.position - nodes[parent].position;
-        let limit_px = (tolerance_px * budget[i]).max(1e-9);
-        let miss = |k: usize, turn: &UnitQuaternion<f64>| base.error_px[k] + (turn * way - wanted[k] * way);
-        let error = |k: usize, turn: &UnitQuaternion<f64>| {
-            let angle = turn.angle_to(&wanted[k]);
-            // Turning about its own axis moves no node, but the bark.
-            let at_bark = angle * node.radius.max(0.0) / tolerance_px.max(1e-9);
-            (miss(k, turn).norm() / limit_px).max(at_bark).max(angle / 0.1)
+        let branch = Followed::new(base, &rotations(poses, i), node, node.position - nodes[parent].position)
+            .within(tolerance_px, budget[i]);
+        let frames = 0..times.len();
+        if frames.clone().all(|k| branch.miss(k, &UnitQuaternion::identity()) <= 1.0) {
+            shown.push(branch.shown(base, &vec![UnitQuaternion::identity(); times.len()]));
+            continue;
+        }
+        let aims = one_hemisphere(frames.clone().map(|k| branch.aim(k)));
+        let aim = |k: usize| UnitQuaternion::new_unchecked(Quaternion::from(aims[k]));
+        let x = |a: usize, b: usize, k: usize| (times[k] - times[a]) / (times[b] - times[a]);
+        let spans = |a: usize, b: usize| {
+            let arc = Arc::new(&aim(a), &aim(b));
+            let fits = |k: usize| branch.miss(k, &arc.at(x(a, b, k))) <= 1.0;
+            // The middle first: it is off the farthest, as a rule.
+            let middle = (a + b) / 2;
+            fits(middle) && (a + 1..b).all(|k| k == middle || fits(k))
         };
-        let between = |a: usize, b: usize, k: usize| {
-            let x = if a == b { 0.0 } else { (times[k] - times[a]) / (times[b] - times[a]) };
-            base.rotation[k] * slerp(&local[a], &local[b], x)
-        };
-        let still = (0..times.len()).all(|k| error(k, &base.rotation[k]) <= 1.0);
-        let kept = thin(times.len(), |a, b, k| error(k, &between(a, b, k)));
-        let rotation: Vec<_> = if still {
-            base.rotation.clone()
-        } else {
-            spans(&kept, times.len()).map(|(a, b, k)| between(a, b, k)).collect()
-        };
-        let error_px = rotation.iter().enumerate().map(|(k, turn)| miss(k, turn)).collect();
-        shown.push(Shown { rotation, error_px });
-        if !still {
-            out.push(Keys {
-                node: i,
-                times_s: kept.iter().map(|&k| times[k] as f32).collect(),
-                rotations: one_hemisphere(kept.iter().map(|&k| local[k])),
-            });
+        let one = frames.clone().all(|k| branch.miss(k, &aim(0)) <= 1.0);
+        let kept = thin(times.len(), one, spans);
+        let path =
+            Path { times_s: times, aims: &aims, miss: |k: usize, turn: &UnitQuaternion<f64>| branch.miss(k, turn) };
+        let keyed = path.sparse(kept);
+        shown.push(branch.shown(base, &played(&keyed, times)));
+        let rotations = one_hemisphere(keyed.turns.iter().copied());
+        out.push(Keys {
+            node: i,
+            times_s: keyed.frames.iter().map(|&k| times[k] as f32).collect(),
+            rotations: rotations.iter().map(|q| [q.x as f32, q.y as f32, q.z as f32, q.w as f32]).collect(),
+        });
+    }
+    out
+}
+
+/// One branch on its way through all frames, in the axes of its parent branch as a viewer shows that.
+struct Followed {
+    /// Where the branch's end is to be, from the parent node as it is shown: this also makes good by how much that is off.
+    targets: Vec<Vector3<f64>>,
+    /// Direction across the node's plane.
+    across: Vec<Vector3<f64>>,
+    wanted: Vec<UnitQuaternion<f64>>,
+    /// From the parent node to this one at rest.
+    way: Vector3<f64>,
+    radius_px: f64,
+    limit_px: f64,
+    limit_angle: f64,
+    /// Cosine of half of it.
+    limit_cosine: f64,
+}
+
+impl Followed {
+    /// `wanted`: rotations in model axes.
+    fn new(base: &Shown, wanted: &[UnitQuaternion<f64>], node: &Node, way: Vector3<f64>) -> Self {
+        let plane = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), node.plane_angle);
+        let back: Vec<UnitQuaternion<f64>> = base.rotation.iter().map(UnitQuaternion::inverse).collect();
+        let every = || wanted.iter().zip(&back).zip(&base.error_px);
+        Self {
+            targets: every().map(|((q, back), off)| back * (q * way - off)).collect(),
+            across: back.iter().map(|back| back * (plane * Vector3::z())).collect(),
+            wanted: every().map(|((q, back), _)| back * q).collect(),
+            way,
+            radius_px: node.radius,
+            limit_px: 0.0,
+            limit_angle: 0.0,
+            limit_cosine: 1.0,
         }
     }
-    Ok(out)
+
+    /// With the end allowed to be off by `share` of `tolerance_px`. Turning about its own axis moves no node, but the bark.
+    fn within(mut self, tolerance_px: f64, share: f64) -> Self {
+        self.limit_angle = (tolerance_px / self.radius_px.max(1e-9)).clamp(1e-9, 0.1);
+        self.limit_px = (tolerance_px * share).max(1e-9);
+        self.limit_cosine = (0.5 * self.limit_angle).cos();
+        self
+    }
+
+    /// By how much the branch is off if it turns by `turn` in its parent's axes, in units of what is allowed.
+    fn miss(&self, k: usize, turn: &UnitQuaternion<f64>) -> f64 {
+        let off = turn * self.way - self.targets[k];
+        let across = off.dot(&self.across[k]);
+        // Half as much across.
+        let off = (off.norm_squared() - 0.75 * across * across).max(0.0).sqrt() / self.limit_px;
+        let cosine = turn.coords.dot(&self.wanted[k].coords).abs();
+        if cosine >= self.limit_cosine { off } else { off.max(2.0 * cosine.min(1.0).acos() / self.limit_angle) }
+    }
+
+    /// The turn that brings the branch's end nearest to where it is to be, by the measure of [`miss`](Self::miss): what
+    /// remains of the parent's error is then no larger than it was there.
+    fn aim(&self, k: usize) -> UnitQuaternion<f64> {
+        let is = self.wanted[k] * self.way;
+        let measure = |v: Vector3<f64>| v - self.across[k] * (0.5 * v.dot(&self.across[k]));
+        let Some(first) =
+            is.cross(&Vector3::x()).try_normalize(1e-9).or_else(|| is.cross(&Vector3::y()).try_normalize(1e-9))
+        else {
+            return self.wanted[k];
+        };
+        let second = is.cross(&first).normalize();
+        let (a, b, off) = (measure(first), measure(second), measure(self.targets[k] - is));
+        // Neither is 0, and they are not parallel: the measure halves one direction at most.
+        let (aa, ab, bb) = (a.dot(&a), a.dot(&b), b.dot(&b));
+        let (x, y) = (a.dot(&off), b.dot(&off));
+        let determinant = aa * bb - ab * ab;
+        let to = is + (first * (x * bb - y * ab) + second * (y * aa - x * ab)) / determinant;
+        let mend = UnitQuaternion::rotation_between(&is, &to);
+        mend.filter(|q| q.angle() <= 0.5 * self.limit_angle).unwrap_or_default() * self.wanted[k]
+    }
+
+    fn shown(&self, base: &Shown, turns: &[UnitQuaternion<f64>]) -> Shown {
+        let off = |(k, turn): (usize, &UnitQuaternion<f64>)| base.rotation[k] * (turn * self.way - self.targets[k]);
+        Shown {
+            rotation: turns.iter().zip(&base.rotation).map(|(turn, base)| base * turn).collect(),
+            error_px: turns.iter().enumerate().map(off).collect(),
+        }
+    }
+}
+
+/// The turns that a viewer makes of the keys, at all times.
+fn played(keyed: &Keyed, times: &[f64]) -> Vec<UnitQuaternion<f64>> {
+    let mut out = vec![keyed.turns.first().copied().unwrap_or_default(); times.len()];
+    for (pair, turns) in keyed.frames.windows(2).zip(keyed.turns.windows(2)) {
+        let (a, b) = (pair[0], pair[1]);
+        let arc = Arc::new(&turns[0], &turns[1]);
+        (a..=b).for_each(|k| out[k] = arc.at((times[k] - times[a]) / (times[b] - times[a])));
+    }
+    out
 }
 
 /// What a viewer shows of one branch at the time of every pose.
@@ -91,22 +201,14 @@ impl Shown {
     }
 }
 
-/// For each of `n` frames the kept keys before and after it, and the frame.
-fn spans(kept: &[usize], n: usize) -> impl Iterator<Item = (usize, usize, usize)> {
-    (0..n).map(|k| {
-        let after = kept.partition_point(|&key| key < k).min(kept.len() - 1);
-        if kept[after] == k { (k, k, k) } else { (kept[after.saturating_sub(1)], kept[after], k) }
-    })
-}
-
-/// Poses whose time grows, also as `f32`, which is what the file holds; and their times from the first on.
-fn usable(poses: &[Pose]) -> (Vec<&Pose>, Vec<f64>) {
+/// Places of the poses whose time grows, also as `f32`, which is what the file holds; and their times from the first on.
+fn usable(poses: &[Pose]) -> (Vec<usize>, Vec<f64>) {
     let start = poses.iter().map(|p| p.time_s).find(|t| t.is_finite()).unwrap_or(0.0);
-    let (mut kept, mut times): (Vec<&Pose>, Vec<f64>) = (Vec::new(), Vec::new());
-    for pose in poses {
+    let (mut kept, mut times): (Vec<usize>, Vec<f64>) = (Vec::new(), Vec::new());
+    for (k, pose) in poses.iter().enumerate() {
         let time = f64::from((pose.time_s - start) as f32);
         if time.is_finite() && times.last().is_none_or(|&last| time > last) {
-            kept.push(pose);
+            kept.push(k);
             times.push(time);
         }
     }
@@ -127,12 +229,12 @@ fn rotations(poses: &[&Pose], i: usize) -> Vec<UnitQuaternion<f64>> {
 }
 
 /// q and -q are one rotation; a viewer that does not know takes the long way round between them.
-fn one_hemisphere(rotations: impl Iterator<Item = UnitQuaternion<f64>>) -> Vec<[f32; 4]> {
-    let mut last = nalgebra::Vector4::new(0.0, 0.0, 0.0, 1.0);
+fn one_hemisphere(rotations: impl Iterator<Item = UnitQuaternion<f64>>) -> Vec<Vector4<f64>> {
+    let mut last = Vector4::new(0.0, 0.0, 0.0, 1.0);
     rotations
         .map(|q| {
             last = if q.coords.dot(&last) < 0.0 { -q.coords } else { q.coords };
-            [last.x as f32, last.y as f32, last.z as f32, last.w as f32]
+            last
         })
         .collect()
 }

@@ -1,16 +1,32 @@
-//! Files for other programs. What goes into a file is made as pure bytes or over any writer; [`OutputFolder`] alone
-//! touches the disk.
+//! Files for other programs. What goes into a file is made as pure bytes or over any writer; only [`OutputFolder`]
+//! and [`files`] touch the disk.
 
 pub mod capture;
 pub mod csv;
+pub mod cylinders;
 mod error;
+mod file;
+pub mod files;
+mod film;
 pub mod folder;
+pub mod glb_notes;
 pub mod gltf;
+mod gltf_animation;
 mod gltf_buffer;
+mod gltf_check;
+mod gltf_look;
 mod gltf_mesh;
+pub mod html;
+mod html_data;
 mod joints;
 mod number;
+pub mod picture;
+mod skinning;
+mod sparse_keys;
+pub mod still;
 mod thin_keys;
 
 pub use error::ExportError;
+pub use file::OutputFile;
+pub use film::Film;
 pub use folder::OutputFolder;

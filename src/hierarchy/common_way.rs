@@ -10,6 +10,7 @@
 //! place of the spanning tree all did worse on trees whose branches leave one trunk.
 
 use super::rest::distance_sq;
+use crate::signal::median;
 use nalgebra::DMatrix;
 
 /// Trees drawn; the first from all points.
@@ -49,9 +50,8 @@ pub fn common_way(apart: &DMatrix<f32>, rest_px: &[[f64; 2]], foot_px: [f64; 2])
 /// Costs of all steps; the last row and column are the foot, which rests.
 fn costs(apart: &DMatrix<f32>, rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> DMatrix<f32> {
     let n = rest_px.len();
-    let mut own: Vec<f32> = (0..n).map(|i| apart[(i, i)]).collect();
-    own.sort_unstable_by(f32::total_cmp);
-    let median = f64::from(own.get(n / 2).copied().unwrap_or(0.0)).max(f64::MIN_POSITIVE);
+    let own: Vec<f32> = (0..n).map(|i| apart[(i, i)]).collect();
+    let median = median(own, f32::total_cmp).map_or(0.0, f64::from).max(f64::MIN_POSITIVE);
     let height = rest_px.iter().map(|&p| distance_sq(p, foot_px).sqrt()).fold(1.0, f64::max);
     let px_of = height / median;
     DMatrix::from_fn(n + 1, n + 1, |a, b| {

@@ -3,6 +3,7 @@
 use super::common_way::common_way;
 use super::signals::Signals;
 use crate::config::Hierarchy;
+use crate::signal::median;
 use nalgebra::DMatrix;
 
 /// Likeness of all pairs, and their common ways: likeness of motion, raised to a power, plus the part of the way from the foot that both have
@@ -18,14 +19,11 @@ pub fn likeness(
     foot_px: [f64; 2],
     settings: &Hierarchy,
 ) -> (DMatrix<f32>, DMatrix<f32>) {
-    let rho = displacements.correlations();
-    let common = common_way(&displacements.differences(), rest_px, foot_px);
-    let mut whole: Vec<f32> = common.diagonal().iter().copied().collect();
-    let middle = whole.len() / 2;
-    if whole.is_empty() {
-        return (rho, common);
-    }
-    let unit = whole.select_nth_unstable_by(middle, f32::total_cmp).1.max(f32::MIN_POSITIVE);
+    let (rho, differences) = displacements.compared();
+    let common = common_way(&differences, rest_px, foot_px);
+    let whole: Vec<f32> = common.diagonal().iter().copied().collect();
+    let Some(unit) = median(whole, f32::total_cmp) else { return (rho, common) };
+    let unit = unit.max(f32::MIN_POSITIVE);
     let (power, weight) = (settings.motion_power as f32, settings.path_weight as f32 / unit);
     (rho.zip_map(&common, |r, way| r.max(0.0).powf(power) + weight * way), common)
 }

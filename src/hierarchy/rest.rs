@@ -1,15 +1,12 @@
 //! Where points rest, and who is near whom.
 
+use crate::signal::median;
 use crate::track::TrackTable;
 
 /// Median position of a track: where the tree rests, whatever pose it was first seen in.
 pub fn rest_position_px(table: &TrackTable, row: usize) -> [f64; 2] {
-    let median = |c: usize| {
-        let mut values: Vec<f32> = table.positions[row].iter().flatten().map(|p| p[c]).collect();
-        let middle = values.len() / 2;
-        if values.is_empty() { 0.0 } else { f64::from(*values.select_nth_unstable_by(middle, f32::total_cmp).1) }
-    };
-    [median(0), median(1)]
+    let values = |c: usize| table.positions[row].iter().flatten().map(|p| p[c]).collect();
+    [0, 1].map(|c| median(values(c), f32::total_cmp).map_or(0.0, f64::from))
 }
 
 /// Mean of the rest positions of `members`, px.

@@ -153,9 +153,31 @@ impl Signals {
     /// The correlations of all pairs: as [`correlation`](Self::correlation), by products of matrices, which is some
     /// twenty times faster.
     pub fn correlations(&self) -> DMatrix<f32> {
-        let mut rho = self.u.tr_mul(&self.u) + self.v.tr_mul(&self.v);
-        // What each point (row) has of energy in the steps in which the other (column) was seen.
+        let (product, energy) = self.products();
+        self.correlations_of(product, &energy)
+    }
+
+    /// [`correlations`](Self::correlations), and the root mean square difference of all pairs over the steps in which both
+    /// were seen, on its diagonal that of each point from rest; infinite for two that never were seen together.
+    pub fn compared(&self) -> (DMatrix<f32>, DMatrix<f32>) {
+        let (product, energy) = self.products();
+        let both = self.seen.tr_mul(&self.seen);
+        let differences = DMatrix::from_fn(self.len(), self.len(), |a, b| {
+            let sum = if a == b { product[(a, a)] } else { energy[(a, b)] + energy[(b, a)] - 2.0 * product[(a, b)] };
+            if both[(a, b)] > 0.0 { (sum.max(0.0) / both[(a, b)]).sqrt() } else { f32::INFINITY }
+        });
+        (self.correlations_of(product, &energy), differences)
+    }
+
+    /// Scalar products of all pairs, and what each point (row) has of energy in the steps in which the other (column) was
+    /// seen.
+    fn products(&self) -> (DMatrix<f32>, DMatrix<f32>) {
+        let product = self.u.tr_mul(&self.u) + self.v.tr_mul(&self.v);
         let energy = (self.u.component_mul(&self.u) + self.v.component_mul(&self.v)).tr_mul(&self.seen);
+        (product, energy)
+    }
+
+    fn correlations_of(&self, mut rho: DMatrix<f32>, energy: &DMatrix<f32>) -> DMatrix<f32> {
         for b in 0..self.len() {
             for a in 0..b {
                 let r = normalised(rho[(a, b)], energy[(a, b)] * energy[(b, a)]);
@@ -165,18 +187,6 @@ impl Signals {
             rho[(b, b)] = 1.0;
         }
         rho
-    }
-
-    /// Root mean square difference of all pairs over the steps in which both were seen, and on the diagonal that of each
-    /// point from rest; infinite for two that never were seen together.
-    pub fn differences(&self) -> DMatrix<f32> {
-        let product = self.u.tr_mul(&self.u) + self.v.tr_mul(&self.v);
-        let energy = (self.u.component_mul(&self.u) + self.v.component_mul(&self.v)).tr_mul(&self.seen);
-        let both = self.seen.tr_mul(&self.seen);
-        DMatrix::from_fn(self.len(), self.len(), |a, b| {
-            let sum = if a == b { product[(a, a)] } else { energy[(a, b)] + energy[(b, a)] - 2.0 * product[(a, b)] };
-            if both[(a, b)] > 0.0 { (sum.max(0.0) / both[(a, b)]).sqrt() } else { f32::INFINITY }
-        })
     }
 }
 

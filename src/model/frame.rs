@@ -147,6 +147,14 @@ impl Rgb {
     }
 }
 
+/// A whole frame in colour, which is kept.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    pub rgb: Arc<Rgb>,
+    pub frame: u64,
+    pub time_s: f64,
+}
+
 /// A decoded frame on its way to the tracker.
 #[derive(Clone, Debug)]
 pub struct Frame {
@@ -157,7 +165,7 @@ pub struct Frame {
     /// When the program received the frame, for latency figures only.
     pub received: std::time::Instant,
     pub luma: Luma,
-    /// A smaller picture in colour for screen and bark, made for some frames only.
+    /// A smaller picture in colour for the screen, made for some frames only.
     pub preview: Option<Arc<Rgb>>,
 }
 

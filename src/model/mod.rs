@@ -13,7 +13,7 @@ mod snapshot;
 mod track;
 
 pub use control::Control;
-pub use frame::{Frame, Luma, PixelFormat, RawFrame, Rgb, Size, nanoseconds, seconds};
+pub use frame::{Frame, Luma, Picture, PixelFormat, RawFrame, Rgb, Size, nanoseconds, seconds};
 pub use hierarchy::{Cluster, ClusterId, MotionHierarchy};
 pub use outline::Outline;
 pub use pose::{JointPose, Pose};

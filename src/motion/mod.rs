@@ -4,6 +4,7 @@
 mod binding;
 mod deterministic;
 mod probabilistic;
+mod recover;
 
 pub use binding::Binding;
 pub use deterministic::direction as deterministic_direction;
@@ -26,6 +27,14 @@ struct Branch {
     parent_direction: Option<UnitVector3<f64>>,
     sigma_shape: f64,
     copy: Option<(NodeId, UnitQuaternion<f64>)>,
+}
+
+impl Branch {
+    /// Where it ends when it turns by `own` in the axes of its parent branch.
+    fn turned(&self, parent: &JointPose, own: UnitQuaternion<f64>) -> JointPose {
+        let rotation = UnitQuaternion::new_normalize((parent.rotation * own).into_inner());
+        JointPose { position: parent.position + rotation * self.vector, rotation }
+    }
 }
 
 /// Follows the pose of a skeleton from frame to frame.
@@ -82,12 +91,9 @@ impl PoseEstimator {
             };
             let parent = joints[branch.parent];
             let own = match &branch.copy {
-                Some((original, turn)) => {
-                    // The copy turns in its plane as the original does in its own.
-                    let above = self.skeleton.nodes[original.index()].parent;
-                    let parent_rotation = above.map_or(UnitQuaternion::identity(), |p| joints[p.index()].rotation);
+                Some(copied) => {
                     directions.push(branch.direction);
-                    turn * (parent_rotation.inverse() * joints[original.index()].rotation) * turn.inverse()
+                    self.turn_of_copy(copied, &joints)
                 }
                 None => {
                     let target_px = targets_px.get(i).copied().flatten();
@@ -96,11 +102,21 @@ impl PoseEstimator {
                     shortest_rotation(&branch.direction, &d)
                 }
             };
-            let rotation = UnitQuaternion::new_normalize((parent.rotation * own).into_inner());
-            joints[i] = JointPose { position: parent.position + rotation * branch.vector, rotation };
+            joints[i] = branch.turned(&parent, own);
         }
         self.previous = Some(directions);
         Pose { frame, time_s, joints }
+    }
+
+    /// The copy turns in its plane as the original does in its own.
+    fn turn_of_copy(
+        &self,
+        (original, turn): &(NodeId, UnitQuaternion<f64>),
+        joints: &[JointPose],
+    ) -> UnitQuaternion<f64> {
+        let above = self.skeleton.nodes[original.index()].parent;
+        let parent_rotation = above.map_or(UnitQuaternion::identity(), |p| joints[p.index()].rotation);
+        turn * (parent_rotation.inverse() * joints[original.index()].rotation) * turn.inverse()
     }
 
     /// Direction of branch `i` in the axes of its parent branch at rest.

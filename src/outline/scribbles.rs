@@ -2,6 +2,7 @@
 
 use super::{Given, OutlineError, region};
 use crate::model::Size;
+use crate::signal::median;
 use image::RgbaImage;
 use std::path::Path;
 
@@ -104,12 +105,8 @@ fn one_shade(picture: &RgbaImage, marks: &[Mark]) -> bool {
         .filter(|(p, m)| **m == Mark::Undecided && p.0[3] >= 128)
         .map(|(p, _)| p.0)
         .collect();
-    let median = |channel: usize| {
-        let mut values: Vec<u8> = rest.iter().map(|p| p[channel]).collect();
-        values.sort_unstable();
-        values.get(values.len() / 2).copied().unwrap_or(0)
-    };
-    let middle = [median(0), median(1), median(2)];
+    let values = |channel: usize| rest.iter().map(|p| p[channel]).collect();
+    let middle = [0, 1, 2].map(|channel| median(values(channel), u8::cmp).unwrap_or(0));
     let near = |p: &&[u8; 4]| (0..3).all(|c| p[c].abs_diff(middle[c]) <= ONE_SHADE);
     rest.iter().filter(near).count() as f64 >= MOST_OF_REST * rest.len() as f64
 }

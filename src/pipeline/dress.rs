@@ -1,5 +1,6 @@
 //! From the skeleton to all that is drawn of a tree: wood now, leaves where the film shows them.
 
+use super::bark;
 use crate::config::Config;
 use crate::model::{Outline, Pose, Rgb, Skeleton};
 use crate::shape::{Envelope, Foliage, Limb, Mesh, limbs, wood_levels};
@@ -30,7 +31,8 @@ pub fn dress(skeleton: &Skeleton, seen: Seen, config: &Config) -> Dressed {
     let room = room(skeleton.foot_px, seen.outline);
     let limbs = limbs(skeleton, &room, &config.wood, config.wood.seed.into());
     let wood = wood_levels(&limbs, config.wood.triangles as usize);
-    Dressed { limbs, wood, foliage: Foliage::default(), bark_rgb: [104, 84, 66] }
+    let bark = seen.picture.and_then(|picture| bark::colour(picture, seen.pose, skeleton));
+    Dressed { limbs, wood, foliage: Foliage::default(), bark_rgb: bark.unwrap_or(bark::PLAIN) }
 }
 
 /// Where twigs may grow (from and to, model axes, px): within the outline turned about its axis, and not out of the outline

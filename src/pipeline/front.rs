@@ -113,6 +113,11 @@ impl FrontEnd {
         self.found.is_none().then_some(self.progress)
     }
 
+    /// The oldest of the frames that are held back.
+    pub fn oldest_held(&self) -> Option<u64> {
+        self.held.front().map(|f| f.index)
+    }
+
     /// A picture buffer that is no longer needed, to decode the next frame into.
     pub fn spare(&mut self) -> Option<Luma> {
         self.spare.take()

@@ -6,6 +6,7 @@ use crate::hierarchy::{self, Gain, OnBoth};
 use crate::model::{MotionHierarchy, NodeId, NodeName, Skeleton, TrackId};
 use crate::motion::Binding;
 use crate::shape::{Envelope, Twin, stand_as_before, twins};
+use crate::signal::median;
 use crate::track::TrackTable;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -137,7 +138,7 @@ impl Refinement {
                 Some([is[0] - was[0], is[1] - was[1]])
             })
             .collect();
-        [0, 1].map(|c| median(moved.iter().map(|m| m[c])))
+        [0, 1].map(|c| median(moved.iter().map(|m| m[c]).collect(), f64::total_cmp).unwrap_or(0.0))
     }
 
     /// Tracks that the new tree was not built from, on the branch that theirs has become or grows from: lost ones, whose
@@ -181,10 +182,4 @@ fn upwards(skeleton: &Skeleton, node: NodeId) -> Vec<u32> {
 fn chain_of(tree: &Tree, id: TrackId) -> Vec<u32> {
     let clusters = tree.hierarchy.clusters.iter().enumerate();
     clusters.filter(|(_, c)| c.members.binary_search(&id).is_ok()).map(|(k, _)| k as u32).collect()
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }

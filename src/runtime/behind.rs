@@ -26,17 +26,18 @@ pub struct BehindTree {
 }
 
 impl BehindTree {
-    /// Has the tables of `tree` brought up to the end of `spool`, in what becomes the folder `dir`.
+    /// Has the tables of `tree` brought up to the end of `spool`, in what becomes the folder `dir`; `pictured` is the frame
+    /// whose pose is kept apart.
     pub fn catch_up(
         &mut self,
         tree: &Arc<Tree>,
         spool: SpoolReader,
-        (dir, config): (&Path, &Config),
+        (dir, config, pictured): (&Path, &Config, Option<u64>),
         shared: &Arc<Shared>,
     ) {
         if self.newest.as_ref().is_none_or(|b| !Arc::ptr_eq(&b.tree, tree)) {
             // Where they cannot be begun, the end will say why.
-            let newest = CaptureTables::create(dir, tree, config)
+            let newest = CaptureTables::create(dir, tree, config, pictured)
                 .ok()
                 .and_then(|tables| Behind::start(tables, tree, shared.clone()).ok());
             match (std::mem::replace(&mut self.newest, newest), self.older.is_some()) {

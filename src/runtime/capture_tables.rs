@@ -31,6 +31,9 @@ pub struct CaptureTables {
     /// Poses of the last [`animation_s`](Self::animation_s), for the animation.
     poses: VecDeque<Pose>,
     animation_s: f64,
+    /// The frame of the capture's picture, and the tree's pose in it.
+    pictured: Option<u64>,
+    pose_in_picture: Option<Pose>,
     misses: Histogram,
 }
 
@@ -39,23 +42,36 @@ pub struct Done {
     pub folder: OutputFolder,
     pub tree: Arc<Tree>,
     pub poses: Vec<Pose>,
+    /// In the frame of the capture's picture.
+    pub pose_in_picture: Option<Pose>,
     /// How far the projected nodes lie from where their tracks put them, px.
     pub misses: Histogram,
 }
 
 impl CaptureTables {
-    /// Begins both files in what becomes the folder `dir`.
+    /// Begins both files in what becomes the folder `dir`; `pictured` is the frame of the capture's picture.
     ///
     /// # Errors
     /// `dir` is there already, or whatever the file system says.
-    pub fn create(dir: &Path, tree: &Arc<Tree>, config: &Config) -> Result<Self, Failure> {
+    pub fn create(dir: &Path, tree: &Arc<Tree>, config: &Config, pictured: Option<u64>) -> Result<Self, Failure> {
         let folder = OutputFolder::create(dir)?;
         let motion = MotionCsv::new(folder.file("motion.csv")?, &tree.skeleton, config.export.metres_per_px)?;
         let tracks = TracksCsv::new(folder.file("tracks.csv")?)?;
-        let (retrace, tree) = (Retrace::new(tree, config), tree.clone());
-        let (poses, misses) = (VecDeque::new(), Histogram::default());
-        let (animation_s, held) = (config.export.animation_s, HeldSets::default());
-        Ok(Self { folder, tree, retrace, motion, tracks, sets: None, held, early: false, poses, animation_s, misses })
+        Ok(Self {
+            folder,
+            tree: tree.clone(),
+            retrace: Retrace::new(tree, config),
+            motion,
+            tracks,
+            sets: None,
+            held: HeldSets::default(),
+            early: false,
+            poses: VecDeque::new(),
+            animation_s: config.export.animation_s,
+            pictured,
+            pose_in_picture: None,
+            misses: Histogram::default(),
+        })
     }
 
     /// Writes all rows up to where `spool` ends; each set calls `wrote`, which may answer `false` to have it given up.
@@ -106,7 +122,8 @@ impl CaptureTables {
         }
         self.tracks.finish()?;
         self.motion.finish()?;
-        Ok(Done { folder: self.folder, tree: self.tree, poses: self.poses.into(), misses: self.misses })
+        let (poses, pose_in_picture) = (self.poses.into(), self.pose_in_picture);
+        Ok(Done { folder: self.folder, tree: self.tree, poses, pose_in_picture, misses: self.misses })
     }
 
     fn pose(&mut self, set: &TrackSet) -> Result<(), Failure> {
@@ -118,6 +135,9 @@ impl CaptureTables {
                 let [u, v] = self.tree.skeleton.image_from_model(&joint.position);
                 self.misses.add((u - t[0]).hypot(v - t[1]));
             }
+        }
+        if self.pictured == Some(pose.frame) {
+            self.pose_in_picture = Some(pose.clone());
         }
         let oldest_s = pose.time_s - self.animation_s;
         self.poses.push_back(pose);

@@ -1,4 +1,4 @@
-//! Writes a capture: the five files of the contract, from the tracks on disk and the tree.
+//! Writes a capture: the files of the contract, from the tracks on disk and the tree.
 
 use super::announce::little_motion;
 use super::capture_tables::{CaptureTables, Done};
@@ -7,22 +7,20 @@ use super::meter::Histogram;
 use super::shared::{Failure, Shared};
 use crate::config::Config;
 use crate::export::capture::{
-    AnimationNote, Build, Capture, ModelNote, OutlineNote, Quality as QualityNote, Refinement, Software, Source,
-    Timing, json,
+    AnimationNote, Build, Capture, ModelNote, OutlineNote, PictureNote, Quality as QualityNote, Refinement, Software,
+    Source, Timing, json,
 };
 use crate::export::csv::{MotionCsv, TracksCsv, nodes};
-use crate::export::gltf::{KEY_TOLERANCE_PX, Model, glb_and_keys};
+use crate::export::gltf::{KEY_TOLERANCE_PX, Model, glb, provenance};
+use crate::export::picture::{PICTURE_FILE, jpeg};
 use crate::export::{ExportError, OutputFolder};
-use crate::model::{Outline, Pose, Rgb, Skeleton, TrackSet};
+use crate::model::{Outline, Picture, Pose, Skeleton, TrackSet};
 use crate::pipeline::{Seen, Tree, dress};
 use crate::recording::SpoolReader;
 use crate::source::SourceInfo;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-
-/// Colour where no picture has been seen.
-const PLAIN_BARK: [u8; 3] = [104, 84, 66];
 
 /// Figures of the tracking, gathered frame by frame.
 #[derive(Clone, Debug, Default)]
@@ -68,7 +66,7 @@ pub struct CaptureJob {
     pub config: Config,
     pub info: SourceInfo,
     pub quality: Quality,
-    pub bark: Option<Arc<Rgb>>,
+    pub picture: Option<Picture>,
     pub shared: Arc<Shared>,
 }
 
@@ -86,7 +84,9 @@ pub struct Written {
 /// `dir` is there already, the disk is full, or whatever else the file system says.
 pub fn write(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
     match &job.tree {
-        Some(tree) => complete(job, CaptureTables::create(dir, tree, &job.config)?),
+        Some(tree) => {
+            complete(job, CaptureTables::create(dir, tree, &job.config, job.picture.as_ref().map(|p| p.frame))?)
+        }
         None => without_tree(job, dir),
     }
 }
@@ -101,18 +101,17 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
         true
     };
     tables.catch_up(&job.tracks, wrote)?;
-    let Done { folder, tree, poses, misses } = tables.finish(&job.tracks, wrote)?;
+    let Done { folder, tree, poses, pose_in_picture, misses } = tables.finish(&job.tracks, wrote)?;
     let metres_per_px = job.config.export.metres_per_px;
     // Intervals that can be defended are a matter of their own; until then no branch claims a frequency.
     let sway = vec![None; tree.skeleton.nodes.len()];
     nodes(folder.file("nodes.csv")?, &tree.skeleton, &sway, metres_per_px)?;
-    let (bytes, keys) = model_of(job, &tree, &poses)?;
+    let (bytes, animation) = model_of(job, &tree, &poses, pose_in_picture.as_ref())?;
     folder.write("tree.glb", &bytes)?;
-    let first_frame = poses.first().map_or(0, |p| p.frame);
-    let animation = AnimationNote { first_frame, frames: poses.len() as u64, keys };
-    let model = ModelNote::of(&tree.skeleton, metres_per_px);
+    let push = Some(tree.push_figures(&job.config));
+    let model = ModelNote { push, ..ModelNote::of(&tree.skeleton, metres_per_px) };
     let capture = describe(job, Some(&tree), Some((model, animation)), misses.median());
-    publish(folder, capture, Some(tree))
+    publish(job, folder, capture, Some(tree))
 }
 
 /// Tables without rows and no model: a reader finds every table, and no tree that was never seen.
@@ -137,58 +136,44 @@ fn without_tree(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
     let foot_only = Arc::new(Skeleton { nodes: Vec::new(), foot_px: [0.0; 2], image_size: job.info.size });
     nodes(folder.file("nodes.csv")?, &foot_only, &[], metres_per_px)?;
     MotionCsv::new(folder.file("motion.csv")?, &foot_only, metres_per_px)?.finish()?;
-    publish(folder, describe(job, None, None, None), None)
+    publish(job, folder, describe(job, None, None, None), None)
 }
 
-fn publish(folder: OutputFolder, capture: Capture, tree: Option<Arc<Tree>>) -> Result<Written, Failure> {
+fn publish(
+    job: &CaptureJob,
+    folder: OutputFolder,
+    capture: Capture,
+    tree: Option<Arc<Tree>>,
+) -> Result<Written, Failure> {
+    if let Some(picture) = &job.picture {
+        folder.write(PICTURE_FILE, &jpeg(&picture.rgb)?)?;
+    }
     folder.write("capture.json", &json(&capture)?)?;
     let dir = folder.publish()?;
     Ok(Written { dir, tree })
 }
 
-fn model_of(job: &CaptureJob, tree: &Tree, poses: &[Pose]) -> Result<(Vec<u8>, u64), ExportError> {
+fn model_of(
+    job: &CaptureJob,
+    tree: &Tree,
+    poses: &[Pose],
+    pose_in_picture: Option<&Pose>,
+) -> Result<(Vec<u8>, AnimationNote), ExportError> {
     let skeleton = &tree.skeleton;
-    let seen = Seen { outline: Some(&tree.outline), ..Seen::default() };
+    let picture = job.picture.as_ref().map(|p| &*p.rgb);
+    let seen = Seen { picture, pose: pose_in_picture, outline: Some(&tree.outline) };
     let dressed = dress(skeleton, seen, &job.config);
-    let mesh = dressed.wood.first().cloned().unwrap_or_default();
-    let provenance = serde_json::json!({
-        "software": Software::default(),
-        "source": job.info.name,
-        "first_frame": poses.first().map(|p| p.frame),
-        "frames": poses.len(),
-        "measured": "front view: tracked points; depth and copied planes: estimated (Li et al. 2011)",
-    });
-    glb_and_keys(&Model {
+    let provenance = provenance(&job.info.name, &Software::default(), poses);
+    glb(&Model {
         skeleton,
-        mesh: &mesh,
+        dressed: &dressed,
         poses,
-        bark_rgb: job.bark.as_deref().map_or(PLAIN_BARK, |picture| bark_rgb(picture, tree)),
+        flutter: &[],
+        all_levels: false,
         metres_per_px: job.config.export.metres_per_px,
         tolerance_px: KEY_TOLERANCE_PX,
         node_extras: &[],
         provenance: &provenance,
-    })
-}
-
-/// Median colour of the picture along the lower trunk, between foot and trunk's top.
-fn bark_rgb(picture: &Rgb, tree: &Tree) -> [u8; 3] {
-    let skeleton = &tree.skeleton;
-    let Some(top) = skeleton.nodes.get(1) else { return PLAIN_BARK };
-    let scale = f64::from(picture.size.width) / f64::from(skeleton.image_size.width.max(1));
-    let (foot, top) = (skeleton.foot_px, skeleton.image_from_model(&top.position));
-    let mut channels: [Vec<u8>; 3] = Default::default();
-    // The lower half of the trunk: above it twigs and sky come before it.
-    for k in 1..=50 {
-        let s = f64::from(k) / 100.0;
-        let at = [foot[0] + s * (top[0] - foot[0]), foot[1] + s * (top[1] - foot[1])].map(|x| (x * scale).round());
-        if picture.size.contains(at[0], at[1]) {
-            let colour = picture.at(at[0].max(0.0) as u32, at[1].max(0.0) as u32);
-            channels.iter_mut().zip(colour).for_each(|(c, x)| c.push(x));
-        }
-    }
-    channels.map(|mut c| {
-        c.sort_unstable();
-        c.get(c.len() / 2).copied().unwrap_or(PLAIN_BARK[0])
     })
 }
 
@@ -248,6 +233,11 @@ fn describe(
             width: o.size.width,
             height: o.size.height,
             polygon_px: o.polygon_px.clone(),
+        }),
+        picture: job.picture.as_ref().map(|p| PictureNote {
+            file: PICTURE_FILE.into(),
+            frame: p.frame,
+            time_s: p.time_s,
         }),
         build: tree.map(|tree| Build {
             frame: tree.first.frame,

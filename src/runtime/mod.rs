@@ -12,6 +12,7 @@ mod announce;
 mod behind;
 mod capture_tables;
 mod finish;
+mod first_picture;
 mod held_sets;
 mod latest;
 mod losses;

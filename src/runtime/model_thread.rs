@@ -11,7 +11,7 @@ use super::shared::{Failure, Shared};
 use super::status::{Status, median_error_px, median_fb_error_px};
 use super::track_thread::ToModel;
 use super::{Job, Summary};
-use crate::model::{Phase, Pose, Rgb};
+use crate::model::{Phase, Picture, Pose};
 use crate::pipeline::{BackEnd, Followed, LEAST_MOVING, Moved};
 use crate::recording::Spool;
 use crate::source::SourceInfo;
@@ -42,7 +42,7 @@ pub struct ModelThread {
     refining: Refining,
     /// Sensor time up to which the tables have been asked for, s.
     behind_s: f64,
-    bark: Option<Arc<Rgb>>,
+    picture: Option<Picture>,
     quality: Quality,
     last_screen: Option<Instant>,
     exports: Vec<JoinHandle<()>>,
@@ -71,7 +71,7 @@ impl ModelThread {
             behind: BehindTree::default(),
             refining: Refining::default(),
             behind_s: f64::NEG_INFINITY,
-            bark: None,
+            picture: None,
             quality: Quality::default(),
             last_screen: None,
             exports: Vec::new(),
@@ -99,6 +99,7 @@ impl ModelThread {
                 Err(RecvTimeoutError::Disconnected) => break,
             };
             match message {
+                ToModel::Picture(picture) => self.picture = Some(picture),
                 ToModel::Followed(followed) => last = Some(self.step(followed)),
                 ToModel::Searching { progress, preview, size, frame, time_s } => {
                     self.status.searching(progress, preview, size, (frame, time_s));
@@ -112,6 +113,7 @@ impl ModelThread {
                     self.behind_s = f64::NEG_INFINITY;
                     self.new_spool();
                     (self.quality, self.announced, last) = (Quality::default(), Announced::default(), None);
+                    self.picture = None;
                 }
                 ToModel::BuildNow if self.back.tree().is_some() => {
                     self.shared.tell("the tree is built already; r starts again".into());
@@ -148,9 +150,6 @@ impl ModelThread {
         self.write_behind(moved.tracks.time_s);
         let tracks = &moved.tracks;
         self.quality.note(tracks, median_fb_error_px(tracks), median_error_px(tracks));
-        if self.bark.is_none() || self.back.tree().is_none() {
-            self.bark = moved.preview.clone().or(self.bark.take());
-        }
         if let Some((recorder, _)) = &self.recorder {
             recorder.found(|| Found {
                 tracks: moved.tracks.clone(),
@@ -179,7 +178,8 @@ impl ModelThread {
         self.behind_s = time_s;
         let (Some(tree), Some(dir), Some(spool)) = (self.back.tree(), &self.job.out, &mut self.spool) else { return };
         if let Ok(reader) = spool.reader() {
-            self.behind.catch_up(tree, reader, (dir, &self.job.config), &self.shared);
+            let pictured = self.picture.as_ref().map(|p| p.frame);
+            self.behind.catch_up(tree, reader, (dir, &self.job.config, pictured), &self.shared);
         }
     }
 
@@ -248,7 +248,7 @@ impl ModelThread {
             config: self.shared.reloaded().unwrap_or_else(|| self.job.config.clone()),
             info: self.info.clone(),
             quality: self.quality.clone(),
-            bark: self.bark.clone(),
+            picture: self.picture.clone(),
             shared: self.shared.clone(),
         })
     }
@@ -261,7 +261,7 @@ impl ModelThread {
             Ok(job) => {
                 let shared = self.shared.clone();
                 let write = move || match finish::write(&job, &dir) {
-                    Ok(_) => shared.tell(format!("capture written to {}", dir.display())),
+                    Ok(_) => shared.answer(format!("capture written to {}", dir.display())),
                     Err(e) => shared.warn(e.to_string()),
                 };
                 match std::thread::Builder::new().name("export".into()).spawn(write) {

@@ -73,7 +73,7 @@ pub struct Shared {
     /// Only the gaps in it are kept up to date; the rest is filled in when the capture is written.
     timing: Mutex<Timing>,
     warnings: Mutex<VecDeque<String>>,
-    notice: Mutex<Option<String>>,
+    notice: Mutex<Notices>,
     failure: Mutex<Option<Failure>>,
     last_time_s: Mutex<f64>,
     reloaded: Mutex<Reloaded>,
@@ -145,13 +145,19 @@ impl Shared {
 
     /// Shows a line on the screen that is no warning and does not go into the capture.
     pub fn tell(&self, line: String) {
-        *self.notice.lock().unwrap_or_else(PoisonError::into_inner) = Some(line);
+        self.notice.lock().unwrap_or_else(PoisonError::into_inner).push(line, false);
     }
 
-    /// What the screen is to show: the warnings and the newest notice.
+    /// The same for the answer to a wish, which stays until the next one: what the capture tells of itself meanwhile must
+    /// not take its place.
+    pub fn answer(&self, line: String) {
+        self.notice.lock().unwrap_or_else(PoisonError::into_inner).push(line, true);
+    }
+
+    /// What the screen is to show: the warnings and the newest notices.
     pub fn messages(&self) -> Vec<String> {
-        let notice = self.notice.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        self.warnings().into_iter().chain(notice).collect()
+        let notices = self.notice.lock().unwrap_or_else(PoisonError::into_inner).0.clone();
+        self.warnings().into_iter().chain(notices.into_iter().map(|(line, _)| line)).collect()
     }
 
     pub fn warnings(&self) -> Vec<String> {
@@ -218,5 +224,38 @@ impl Shared {
     /// Sensor time of the newest frame, s since the first.
     pub fn last_time_s(&self) -> f64 {
         *self.last_time_s.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The newest notice, and the newest answer to a wish if the user may not have read it yet; the newest last.
+#[derive(Debug, Default)]
+struct Notices(Vec<(String, bool)>);
+
+impl Notices {
+    fn push(&mut self, line: String, answer: bool) {
+        // An answer takes the place of all, another line that of others.
+        self.0.retain(|(_, is_answer)| *is_answer && !answer);
+        self.0.push((line, answer));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_answer_to_a_wish_outlives_what_the_capture_tells_of_itself() {
+        let mut notices = Notices::default();
+        let told = |notices: &Notices| notices.0.iter().map(|(line, _)| line.clone()).collect::<Vec<_>>().join(", ");
+        for (line, answer, expected) in [
+            ("cut out", false, "cut out"),
+            ("written to a", true, "written to a"),
+            ("refined", false, "written to a, refined"),
+            ("refined again", false, "written to a, refined again"),
+            ("written to b", true, "written to b"),
+        ] {
+            notices.push(line.into(), answer);
+            assert_eq!(told(&notices), expected);
+        }
     }
 }

@@ -5,6 +5,7 @@ use super::shared::Shared;
 use crate::dynamics::dominant_frequency_hz;
 use crate::model::{BranchRow, FormatNote, NodeName, Observation, Phase, Rgb, Size, Skeleton, Snapshot, TrackSet};
 use crate::pipeline::{BackEnd, Moved, Targets, Tree};
+use crate::signal::median;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -211,18 +212,12 @@ impl Status {
 
 /// Median forward-backward error of a frame's points, px; 0 if there are none.
 pub fn median_fb_error_px(tracks: &TrackSet) -> f64 {
-    median(tracks.counted().map(|o| o.fb_error_px)).unwrap_or(0.0)
+    median(tracks.counted().map(|o| o.fb_error_px).collect(), f32::total_cmp).map_or(0.0, f64::from)
 }
 
 /// Median of the errors that are expected of a frame's points, px.
 pub fn median_error_px(tracks: &TrackSet) -> Option<f64> {
-    median(tracks.counted().filter_map(|o| o.error_px))
-}
-
-fn median(values: impl Iterator<Item = f32>) -> Option<f64> {
-    let mut values: Vec<f32> = values.collect();
-    values.sort_unstable_by(f32::total_cmp);
-    values.get(values.len() / 2).copied().map(f64::from)
+    median(tracks.counted().filter_map(|o| o.error_px).collect(), f32::total_cmp).map(f64::from)
 }
 
 /// Number of the main branch of every node; `None` above the main branches. A copy has its original's, and a branch the

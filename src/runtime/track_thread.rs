@@ -1,9 +1,10 @@
 //! The tracker's thread: decodes frames and runs the front end. Wishes of the user pass through here in their order.
 
+use super::first_picture::FirstPicture;
 use super::pulse::Worker;
 use super::shared::{Failure, Shared};
 use super::source_thread::Timed;
-use crate::model::{Control, Frame, Luma, Outline, Rgb, Size};
+use crate::model::{Control, Frame, Luma, Outline, Picture, Rgb, Size};
 use crate::outline::{self, Scribbles};
 use crate::pipeline::{Followed, FrontEnd};
 use crate::source::{DecodeError, Decoder};
@@ -23,6 +24,8 @@ const OTHER_SIZES: u32 = 5;
 
 /// What the model thread gets.
 pub enum ToModel {
+    /// Of the frame that follows.
+    Picture(Picture),
     Followed(Followed),
     /// The outline is still looked for: how far, and a picture to look at.
     Searching {
@@ -53,6 +56,7 @@ pub struct TrackThread<'a> {
     last_damage: Option<DecodeError>,
     live: bool,
     other_sizes: u32,
+    picture: FirstPicture,
 }
 
 impl<'a> TrackThread<'a> {
@@ -79,6 +83,7 @@ impl<'a> TrackThread<'a> {
             last_damage,
             live,
             other_sizes,
+            picture: FirstPicture::default(),
         })
     }
 
@@ -107,7 +112,7 @@ impl<'a> TrackThread<'a> {
             }
         }
         for followed in self.front.flush() {
-            if !self.pass_on(ToModel::Followed(followed)) {
+            if !self.pass_on_followed(followed) {
                 break;
             }
         }
@@ -134,6 +139,7 @@ impl<'a> TrackThread<'a> {
             self.scribbles = None;
         }
         self.front.restart(outline);
+        self.picture = FirstPicture::default();
         self.pass_on(ToModel::Restart);
     }
 
@@ -176,6 +182,7 @@ impl<'a> TrackThread<'a> {
             }
         }
         let preview = self.preview(timed);
+        self.picture.see(timed, self.front.oldest_held(), &mut self.decoder);
         let frame = Frame {
             index: timed.index,
             time_s: timed.time_s,
@@ -190,7 +197,13 @@ impl<'a> TrackThread<'a> {
             let (size, frame, time_s) = (timed.raw.size, timed.index, timed.time_s);
             return self.pass_on(ToModel::Searching { progress, preview, size, frame, time_s });
         }
-        done.into_iter().all(|followed| self.pass_on(ToModel::Followed(followed)))
+        done.into_iter().all(|followed| self.pass_on_followed(followed))
+    }
+
+    fn pass_on_followed(&mut self, followed: Followed) -> bool {
+        let picture = self.picture.of(&followed.tracks);
+        picture.is_none_or(|picture| self.pass_on(ToModel::Picture(picture)))
+            && self.pass_on(ToModel::Followed(followed))
     }
 
     /// Scribbles are drawn on the first picture, and solved as soon as it is there. That takes a second or two, in which the
@@ -210,8 +223,7 @@ impl<'a> TrackThread<'a> {
         }
     }
 
-    /// A picture for the screen, if one is due. By the sensor's clock: the bark's colour is taken from these pictures, and
-    /// must not depend on how fast this machine is.
+    /// A picture for the screen, if one is due by the sensor's clock.
     fn preview(&mut self, timed: &Timed) -> Option<Arc<Rgb>> {
         if self.last_preview_s.is_some_and(|s| timed.time_s - s < self.preview_every.as_secs_f64()) {
             return None;

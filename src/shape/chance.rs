@@ -31,6 +31,16 @@ impl Chance {
     }
 }
 
+/// From -1 to 1, the same for the same counters.
+pub(super) fn signed(seed: u64, a: u64, b: u64) -> f64 {
+    Chance::new(Chance::part(Chance::part(seed, a), b)).between(-1.0, 1.0)
+}
+
+/// A whole number below `n`, the same for the same counters; 0 if `n` is 0.
+pub(super) fn below(seed: u64, a: u64, b: u64, n: usize) -> usize {
+    (Chance::new(Chance::part(Chance::part(seed, a), b)).share() * n as f64) as usize
+}
+
 fn scramble(mut x: u64) -> u64 {
     x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);

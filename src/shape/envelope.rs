@@ -1,14 +1,19 @@
-//! The envelope: the outline turned about its axis (surface of revolution, Li et al. section 3 after Okabe et al.).
+//! The envelope: the outline turned about its axis (surface of revolution, Li et al. section 3 after Okabe et al.), the
+//! hull of the skeleton turned (Zeng section 5.5), or a drawn shape.
 
+use super::hull::{convex_hull, crossed};
 use crate::model::Outline;
 use nalgebra::Point3;
 
 /// A stack of discs, one a pixel row: at height y the tree lies within `radius` of (`centre_x`, y, 0), model axes, px.
+/// A drawn shape has, besides, what of each row is inside as seen from the front.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Envelope {
     /// Height of the lowest disc; the others follow one pixel apart.
     bottom_y: f64,
     discs: Vec<Disc>,
+    /// Stretches of x of every disc that are inside, from left to right; empty: all is.
+    stretches: Vec<Vec<[f64; 2]>>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,25 +22,63 @@ struct Disc {
     radius: f64,
 }
 
+impl Disc {
+    fn between(left: f64, right: f64) -> Self {
+        Self { centre_x: (left + right) / 2.0, radius: (right - left) / 2.0 }
+    }
+}
+
 impl Envelope {
     /// Turns `outline` about the middle of each of its rows; rows that the region does not touch are bridged.
     pub fn of_revolution(outline: &Outline, foot_px: [f64; 2]) -> Self {
+        Self::turned(outline.bounds_px(), outline.size.width as usize, &outline.mask, foot_px)
+    }
+
+    /// As [`of_revolution`](Self::of_revolution), cut as `mask` is seen from the front: where a row of the shape has gaps,
+    /// as between the lobes of a heart, so has the envelope through its whole depth. The depth is that of the whole row,
+    /// as lobes that were turned each for itself would meet in a step.
+    pub fn of_drawn(outline: &Outline, foot_px: [f64; 2]) -> Self {
+        let mut envelope = Self::of_revolution(outline, foot_px);
         let width = outline.size.width as usize;
-        let Some([_, top, _, bottom]) = outline.bounds_px() else {
-            return Self { bottom_y: 0.0, discs: Vec::new() };
+        let bottom = foot_px[1] - envelope.bottom_y;
+        let row = |k: usize| &outline.mask[(bottom as usize).saturating_sub(k) * width..][..width];
+        envelope.stretches = (0..envelope.discs.len()).map(|k| stretches(row(k), foot_px[0])).collect();
+        envelope
+    }
+
+    /// Turns the convex hull of `points` (model axes, px; z is not looked at), half a pixel wider all around.
+    pub fn of_hull(points: &[Point3<f64>]) -> Self {
+        let flat: Vec<[f64; 2]> =
+            points.iter().map(|p| [p.x, p.y]).filter(|p| p.iter().all(|c| c.is_finite())).collect();
+        let hull = convex_hull(&flat);
+        let ys = || hull.iter().map(|p| p[1]);
+        let (bottom, top) = (ys().fold(f64::INFINITY, f64::min).floor(), ys().fold(f64::NEG_INFINITY, f64::max).ceil());
+        if bottom > top {
+            return Self { bottom_y: 0.0, discs: Vec::new(), stretches: Vec::new() };
+        }
+        let rows = (top - bottom) as usize + 1;
+        let disc = |k: usize| {
+            let (left, right) = crossed(&hull, bottom + k as f64);
+            Disc::between(left - 0.5, right + 0.5)
+        };
+        Self { bottom_y: bottom, discs: (0..rows).map(disc).collect(), stretches: Vec::new() }
+    }
+
+    fn turned(bounds: Option<[u32; 4]>, width: usize, mask: &[u8], foot_px: [f64; 2]) -> Self {
+        let Some([_, top, _, bottom]) = bounds else {
+            return Self { bottom_y: 0.0, discs: Vec::new(), stretches: Vec::new() };
         };
         let mut discs = Vec::new();
         let mut last = Disc { centre_x: 0.0, radius: 0.5 };
         for v in (top..=bottom).rev() {
-            let row = &outline.mask[v as usize * width..][..width];
+            let row = &mask[v as usize * width..][..width];
             let ends = row.iter().position(|&m| m != 0).zip(row.iter().rposition(|&m| m != 0));
             if let Some((left, right)) = ends {
-                let centre_x = (left + right) as f64 / 2.0 - foot_px[0];
-                last = Disc { centre_x, radius: (right - left + 1) as f64 / 2.0 };
+                last = Disc::between(left as f64 - 0.5 - foot_px[0], right as f64 + 0.5 - foot_px[0]);
             }
             discs.push(last);
         }
-        Self { bottom_y: foot_px[1] - f64::from(bottom), discs }
+        Self { bottom_y: foot_px[1] - f64::from(bottom), discs, stretches: Vec::new() }
     }
 
     /// Greatest width, px.
@@ -43,15 +86,35 @@ impl Envelope {
         self.discs.iter().map(|d| 2.0 * d.radius).fold(0.0, f64::max)
     }
 
-    fn disc_at(&self, y: f64) -> Option<Disc> {
+    /// From its lowest row to its highest, px.
+    pub fn height(&self) -> f64 {
+        self.discs.len() as f64
+    }
+
+    fn row_at(&self, y: f64) -> Option<usize> {
         let row = (y - self.bottom_y).round();
         // Half a pixel beyond the last rows still belongs to them: positions there come from pixels inside.
-        (row >= 0.0).then(|| self.discs.get(row as usize).copied()).flatten()
+        (row >= 0.0 && (row as usize) < self.discs.len()).then_some(row as usize)
     }
 
     /// Whether `p` lies inside.
     pub fn contains(&self, p: &Point3<f64>) -> bool {
-        self.disc_at(p.y).is_some_and(|d| (p.x - d.centre_x).hypot(p.z) <= d.radius)
+        self.row_at(p.y).is_some_and(|k| {
+            let d = self.discs[k];
+            (p.x - d.centre_x).hypot(p.z) <= d.radius && self.is_seen_inside(k, p.x)
+        })
+    }
+
+    fn is_seen_inside(&self, row: usize, x: f64) -> bool {
+        self.stretches.get(row).is_none_or(|of| of.iter().any(|[left, right]| (*left..=*right).contains(&x)))
+    }
+
+    /// How deep the envelope is at (`x`, `y`): it reaches from -depth to depth in z; `None` outside.
+    pub fn depth(&self, x: f64, y: f64) -> Option<f64> {
+        let k = self.row_at(y)?;
+        let d = self.discs[k];
+        let depth_sq = d.radius.powi(2) - (x - d.centre_x).powi(2);
+        (depth_sq >= 0.0 && self.is_seen_inside(k, x)).then(|| depth_sq.sqrt())
     }
 
     /// `p` moved towards the axis, at its own height, until it is inside; above and below the envelope to its ends.
@@ -60,15 +123,30 @@ impl Envelope {
             return *p;
         }
         let y = p.y.clamp(self.bottom_y, self.bottom_y + (self.discs.len() - 1) as f64);
-        let Some(d) = self.disc_at(y) else { return *p };
-        let (dx, dz) = (p.x - d.centre_x, p.z);
+        let Some(k) = self.row_at(y) else { return *p };
+        let d = self.discs[k];
+        let x = self.nearest_inside(k, p.x);
+        let (dx, dz) = (x - d.centre_x, p.z);
         // Just inside, so that rounding does not put it out again.
         let shrink = (0.999 * d.radius / dx.hypot(dz).max(1e-9)).min(1.0);
-        Point3::new(d.centre_x + shrink * dx, y, shrink * dz)
+        let drawn_in = d.centre_x + shrink * dx;
+        if self.is_seen_inside(k, drawn_in) {
+            return Point3::new(drawn_in, y, shrink * dz);
+        }
+        // Towards the axis lies a gap: only the depth gives way.
+        let depth = (d.radius.powi(2) - dx * dx).max(0.0).sqrt();
+        Point3::new(x, y, 0.999 * dz.clamp(-depth, depth))
+    }
+
+    fn nearest_inside(&self, row: usize, x: f64) -> f64 {
+        let stretches = self.stretches.get(row).map_or(&[][..], Vec::as_slice);
+        let clamped = stretches.iter().map(|[left, right]| x.clamp(*left, *right));
+        clamped.min_by(|a, b| (a - x).abs().total_cmp(&(b - x).abs())).unwrap_or(x)
     }
 
     /// `m` points spread evenly over the surface, by area: heights at equal shares of the surface, each point turned by
-    /// the golden angle against the one before. No chance is involved.
+    /// the golden angle against the one before. No chance is involved. What would lie in a gap of a drawn shape lies on
+    /// its wall.
     pub fn attractors(&self, m: usize) -> Vec<Point3<f64>> {
         let mut area = Vec::with_capacity(self.discs.len());
         let mut total = 0.0;
@@ -85,8 +163,25 @@ impl Envelope {
                 let row = area.partition_point(|&a| a < wanted).min(self.discs.len().checked_sub(1)?);
                 let (d, angle) = (self.discs[row], i as f64 * golden_angle);
                 let (sin, cos) = angle.sin_cos();
-                Some(Point3::new(d.centre_x + d.radius * cos, self.bottom_y + row as f64, d.radius * sin))
+                let x = self.nearest_inside(row, d.centre_x + d.radius * cos);
+                Some(Point3::new(x, self.bottom_y + row as f64, d.radius * sin))
             })
             .collect()
     }
+}
+
+/// What of a row of a mask is inside, x from the foot, px.
+fn stretches(row: &[u8], foot_u: f64) -> Vec<[f64; 2]> {
+    let mut out: Vec<[f64; 2]> = Vec::new();
+    let mut open = false;
+    for (u, &m) in row.iter().enumerate() {
+        let x = u as f64 - foot_u;
+        match out.last_mut().filter(|_| open) {
+            Some(last) if m != 0 => last[1] = x + 0.5,
+            None if m != 0 => out.push([x - 0.5, x + 0.5]),
+            _ => {}
+        }
+        open = m != 0;
+    }
+    out
 }

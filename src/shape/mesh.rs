@@ -4,8 +4,10 @@
 //! parent's weights, so both skins meet at the pivot, which neither moves.
 
 use super::chain::{Chain, chains};
-use super::limb::Limb;
+use super::limb::{Limb, limbs};
 use super::tube;
+use crate::config;
+use crate::model::Skeleton;
 
 /// Triangles with skinning weights; all vectors but `indices` have one entry a vertex.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -64,6 +66,12 @@ pub fn wood(limbs: &[Limb], triangles: usize) -> Mesh {
 /// The wood in falling levels of detail, [`LEVELS`] of `triangles`, all on the same joints.
 pub fn wood_levels(limbs: &[Limb], triangles: usize) -> Vec<Mesh> {
     LEVELS.iter().map(|share| wood(limbs, (triangles as f64 * share).round() as usize)).collect()
+}
+
+/// The branches of the skeleton alone, without curl and twigs, with about `triangles` triangles: for small pictures.
+pub fn bare_wood(skeleton: &Skeleton, triangles: usize) -> Mesh {
+    let plain = config::Wood { curl: 0.0, max_twigs: 0, ..config::Wood::default() };
+    wood(&limbs(skeleton, &|_, _| false, &plain, 0), triangles)
 }
 
 fn triangles_of(chain: &Chain, density: f64) -> usize {

@@ -6,12 +6,14 @@ use crate::skeleton::Node2d;
 use nalgebra::{Point3, Rotation3, Vector3};
 use std::f64::consts::PI;
 
-/// Stands the 2D skeleton in the plane z = 0 and repeats everything above the trunk's top on `planes - 1` further
-/// planes, turned about the vertical through the trunk's top by equal parts of a half turn. One trunk remains.
-/// Nodes that a turn brings out of the envelope are drawn in towards its axis.
+/// Stands the 2D skeleton in the plane z = 0 and repeats all that is not `trunk` on `planes - 1` further planes, turned
+/// about the vertical through the trunk's top by equal parts of a half turn. One trunk remains.
+/// Nodes that a turn brings out of the envelope are drawn in towards its axis. A node whose place is no number stands
+/// where its parent does: a branch without length.
 pub fn copy_to_planes(
     flat: &[Node2d],
     tracks: &[u32],
+    trunk: &[bool],
     outline: &Outline,
     envelope: &Envelope,
     planes: u32,
@@ -26,7 +28,7 @@ pub fn copy_to_planes(
             name: NodeName(i as u32),
             parent: n.parent.map(|p| NodeId(p as u32)),
             level: n.level,
-            position: if i == 0 { Point3::origin() } else { envelope.clamp(&model(n.position_px)) },
+            position: model(n.position_px),
             radius: 1.0,
             n_tracks,
             certainty: n.certainty,
@@ -34,6 +36,7 @@ pub fn copy_to_planes(
             plane_angle: 0.0,
         })
         .collect();
+    place(&mut nodes, envelope);
     let measured = nodes.len();
     let axis = nodes.get(1).map_or(Vector3::zeros(), |top| Vector3::new(top.position.x, 0.0, 0.0));
     for plane in 1..planes {
@@ -41,7 +44,7 @@ pub fn copy_to_planes(
         let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), angle);
         let mut copy_id: Vec<NodeId> = (0..measured as u32).map(NodeId).collect();
         for original in 0..measured {
-            if nodes[original].level < 2 {
+            if trunk.get(original).is_some_and(|t| *t) {
                 continue; // the trunk is one
             }
             copy_id[original] = NodeId(nodes.len() as u32);
@@ -54,4 +57,16 @@ pub fn copy_to_planes(
         }
     }
     Skeleton { nodes, foot_px, image_size: outline.size }
+}
+
+/// Brings the measured nodes into the envelope, the foot to the origin, and what has no place to its parent's.
+fn place(nodes: &mut [Node], envelope: &Envelope) {
+    for i in 0..nodes.len() {
+        let at = nodes[i].position;
+        nodes[i].position = match nodes[i].parent {
+            None => Point3::origin(),
+            Some(_) if at.coords.iter().all(|x| x.is_finite()) => envelope.clamp(&at),
+            Some(parent) => nodes[parent.index()].position,
+        };
+    }
 }

@@ -69,9 +69,9 @@ impl Anchoring {
         levels: u32,
     ) -> Vec<Option<[f32; 2]>> {
         let born: Vec<[f32; 2]> = points.iter().map(|p| p.born_px).collect();
-        self.flow.track((&keyframe.pyramid, pyramid), &born, None, levels, &mut self.forward);
+        self.flow.track((&keyframe.pyramid, pyramid), &born, levels, &mut self.forward);
         let found: Vec<[f32; 2]> = self.forward.iter().map(|f| f.to).collect();
-        self.flow.track((pyramid, &keyframe.pyramid), &found, None, levels, &mut self.backward);
+        self.flow.track((pyramid, &keyframe.pyramid), &found, levels, &mut self.backward);
         let accepted = |(i, p): (usize, &&Point)| {
             let (forward, backward) = (self.forward[i], self.backward[i]);
             let closed = forward.found && backward.found && distance(backward.to, p.born_px) < FB_LIMIT_PX;

@@ -54,17 +54,9 @@ impl OpticalFlow {
         Self { window_px, from: Vector::new(), to: Vector::new(), status: Vector::new() }
     }
 
-    /// Follows `points` (px) from picture `a` to picture `b`, coarse to fine from pyramid level `levels` down.
-    ///
-    /// `guess`, as long as `points`, is where to start looking; without it the search starts where the point was.
-    pub fn track(
-        &mut self,
-        (a, b): (&Pyramid, &Pyramid),
-        points: &[[f32; 2]],
-        guess: Option<&[[f32; 2]]>,
-        levels: u32,
-        out: &mut Vec<Flow>,
-    ) {
+    /// Follows `points` (px) from picture `a` to picture `b`, coarse to fine from pyramid level `levels` down; the
+    /// search starts where the point was.
+    pub fn track(&mut self, (a, b): (&Pyramid, &Pyramid), points: &[[f32; 2]], levels: u32, out: &mut Vec<Flow>) {
         out.clear();
         let lost = |p: &[f32; 2]| Flow { to: *p, found: false };
         if points.is_empty() || a.0.is_empty() || b.0.is_empty() {
@@ -72,7 +64,7 @@ impl OpticalFlow {
             return;
         }
         fill(&mut self.from, points);
-        fill(&mut self.to, guess.unwrap_or(points));
+        fill(&mut self.to, points);
         let epsilon = TermCriteria_Type::COUNT as i32 | TermCriteria_Type::EPS as i32;
         let done = TermCriteria::new(epsilon, 30, 0.01).and_then(|criteria| {
             calc_optical_flow_pyr_lk(

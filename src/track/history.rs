@@ -1,6 +1,7 @@
 //! The tracks of the last seconds, and their table as the hierarchy wants it.
 
 use crate::model::{TrackId, TrackSet};
+use crate::signal::median;
 use std::collections::{BTreeMap, VecDeque};
 
 /// The track sets of the last so many seconds; memory is bounded by the window.
@@ -91,15 +92,11 @@ impl TrackHistory {
                 }
             }
         }
-        let median = |mut e: Vec<f32>| {
-            e.sort_unstable_by(f32::total_cmp);
-            e[e.len() / 2]
-        };
         TrackTable {
             ids: row.into_keys().collect(),
             times_s: frames.iter().map(|s| s.time_s).collect(),
             positions,
-            fb_errors_px: errors.into_iter().map(median).collect(),
+            fb_errors_px: errors.into_iter().map(|e| median(e, f32::total_cmp).unwrap_or(0.0)).collect(),
         }
     }
 }

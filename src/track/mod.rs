@@ -160,10 +160,10 @@ impl Tracker {
         let followed = |p: &Point| p.coasting == 0 || blind;
         b.from.clear();
         b.from.extend(self.points.iter().filter(|p| followed(p)).map(|p| p.now_px));
-        self.flow.track(pictures, &b.from, None, self.settings.levels, &mut b.forward);
+        self.flow.track(pictures, &b.from, self.settings.levels, &mut b.forward);
         b.to.clear();
         b.to.extend(b.forward.iter().map(|f| f.to));
-        self.flow.track((pictures.1, pictures.0), &b.to, None, self.settings.levels, &mut b.backward);
+        self.flow.track((pictures.1, pictures.0), &b.to, self.settings.levels, &mut b.backward);
         let limit = self.settings.fb_limit_px as f32;
         let mut flows = b.from.iter().zip(b.forward.iter().zip(&b.backward));
         for p in &mut self.points {

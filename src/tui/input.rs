@@ -16,6 +16,11 @@ pub enum Action {
     Restart,
     Export,
     Quit,
+    /// To the left or to the right.
+    Turn(i8),
+    Mesh,
+    /// Up or down.
+    Scroll(i8),
 }
 
 /// What a key does while an outline is drawn.
@@ -43,8 +48,8 @@ const fn bind<A>(key: KeyCode, shown: &'static str, short: &'static str, help: &
     Binding { key, shown, short, help, action }
 }
 
-/// Keys while watching.
-pub const WATCHING: [Binding<Action>; 7] = [
+/// Keys while watching; those without a short name do what another one is told to do.
+pub const WATCHING: [Binding<Action>; 16] = [
     bind(KeyCode::Char('?'), "?", "help", "shows and hides this help", Action::Help),
     bind(KeyCode::Char('q'), "q", "quit", "ends the capture and writes it (Ctrl-C too)", Action::Quit),
     bind(KeyCode::Char(' '), "space", "pause", "stops taking frames, or goes on", Action::Pause),
@@ -52,6 +57,21 @@ pub const WATCHING: [Binding<Action>; 7] = [
     bind(KeyCode::Char('b'), "b", "build", "builds the tree now, from the motion seen so far", Action::Build),
     bind(KeyCode::Char('r'), "r", "restart", "forgets points and tree, starts again", Action::Restart),
     bind(KeyCode::Char('e'), "e", "export", "writes the capture as it is now, goes on", Action::Export),
+    bind(
+        KeyCode::Char('h'),
+        "h l",
+        "turn",
+        "turn the tree (arrows too); m shows its wood, or lines again",
+        Action::Turn(-1),
+    ),
+    bind(KeyCode::Char('m'), "m", "mesh", "", Action::Mesh),
+    bind(KeyCode::Char('j'), "j k", "rows", "move the table of branches (arrows too)", Action::Scroll(1)),
+    bind(KeyCode::Char('l'), "", "", "", Action::Turn(1)),
+    bind(KeyCode::Char('k'), "", "", "", Action::Scroll(-1)),
+    bind(KeyCode::Left, "", "", "", Action::Turn(-1)),
+    bind(KeyCode::Right, "", "", "", Action::Turn(1)),
+    bind(KeyCode::Down, "", "", "", Action::Scroll(1)),
+    bind(KeyCode::Up, "", "", "", Action::Scroll(-1)),
 ];
 
 /// Keys while drawing; those without a short name are told in the help only.
@@ -102,11 +122,19 @@ fn press(key: &KeyEvent, state: &mut State, placed: Option<&Placed>) -> Option<C
         state.drawing = Some(drawing);
     }
     let bound = WATCHING.iter().find(|b| b.key == key.code)?;
+    // A slip must not end or restart the capture of someone who is setting points.
+    let ends_it = matches!(bound.action, Action::Quit | Action::Build | Action::Restart | Action::Export);
+    if state.drawing.is_some() && ends_it {
+        let key = bound.shown;
+        state.say(format!("{key} waits: the outline is being drawn; Enter closes it, Esc leaves it (Ctrl-C ends)."));
+        return None;
+    }
     act(bound.action, state)
 }
 
 fn act(action: Action, state: &mut State) -> Option<Control> {
-    if state.quitting && action != Action::Help {
+    let looks = matches!(action, Action::Help | Action::Turn(_) | Action::Mesh | Action::Scroll(_));
+    if state.quitting && !looks {
         state.say("Still writing the capture…");
         return None;
     }
@@ -117,6 +145,18 @@ fn act(action: Action, state: &mut State) -> Option<Control> {
         }
         Action::Outline => {
             begin_drawing(state);
+            return None;
+        }
+        Action::Turn(steps) => {
+            state.turn(steps.into());
+            return None;
+        }
+        Action::Mesh => {
+            state.switch_mesh();
+            return None;
+        }
+        Action::Scroll(rows) => {
+            state.scroll(rows.into());
             return None;
         }
         Action::Pause => {

@@ -16,6 +16,7 @@ mod placed;
 mod progress;
 mod raster;
 mod screen;
+mod solid;
 mod state;
 #[cfg(test)]
 mod tests;

@@ -25,6 +25,6 @@ pub fn render(frame: &mut Frame, state: &State, theme: Theme, picture: &mut Prev
     messages::render(frame, state, areas.messages, theme);
     messages::keys(frame, state, areas.keys, theme);
     if state.help {
-        help::render(frame, window, theme);
+        help::render(frame, state, window, theme);
     }
 }

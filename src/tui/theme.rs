@@ -45,6 +45,7 @@ const BRANCHES: [[u8; 3]; 8] = [
     [0xc2, 0x6e, 0x50],
 ];
 const GREY: [u8; 3] = [0x80, 0x80, 0x80];
+const WOOD: [u8; 3] = [0xb0, 0x98, 0x78];
 const WARNING: [u8; 3] = [0xd8, 0x60, 0x00];
 
 /// Turns what a thing means into how it looks.
@@ -83,6 +84,13 @@ impl Theme {
         let full = branch.map_or(GREY, |b| self.branch_rgb(Some(b)));
         let mix = |i: usize| ((full[i] as u16 + 2 * GREY[i] as u16) / 3) as u8;
         self.colour([mix(0), mix(1), mix(2)])
+    }
+
+    /// Colour of a branch's wood before light falls on it; the trunk's is that of wood, and what was not measured is half
+    /// way to grey.
+    pub fn wood_rgb(self, branch: Option<u8>, copied: bool) -> [u8; 3] {
+        let full = branch.map_or(WOOD, |b| self.branch_rgb(Some(b)));
+        if copied { [0, 1, 2].map(|i| ((full[i] as u16 + GREY[i] as u16) / 2) as u8) } else { full }
     }
 
     /// Titles of panels.

@@ -5,7 +5,7 @@
 
 use arborcam::config::Wood;
 use arborcam::model::{JointPose, Node, NodeId, NodeName, Pose, Size, Skeleton};
-use arborcam::shape::{Limb, Mesh, limbs, thicken, wood};
+use arborcam::shape::{Foliage, FoliageGroup, Limb, Mesh, limbs, thicken, wood};
 use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
 
 /// A number in -1..1 that is always the same for the same arguments.
@@ -105,4 +105,42 @@ pub fn limbs_of(skeleton: &Skeleton, wood: &Wood) -> Vec<Limb> {
 /// The skin of a skeleton without twigs.
 pub fn skin(skeleton: &Skeleton) -> Mesh {
     wood(&limbs_of(skeleton, &bare()), 60_000)
+}
+
+/// Leaves on the tips of the measured branches, one group for each of two, as small squares that swing.
+pub fn leaves(skeleton: &Skeleton) -> Foliage {
+    let mut groups: Vec<FoliageGroup> = Vec::new();
+    for (k, (i, node)) in skeleton.nodes.iter().enumerate().filter(|(_, n)| n.level == 7 && n.n_tracks > 0).enumerate()
+    {
+        if k % 2 == 0 {
+            groups.push(FoliageGroup { node: NodeId(i as u32), ..FoliageGroup::default() });
+        }
+        let Some(group) = groups.last_mut() else { continue };
+        let first = group.mesh.positions.len() as u32;
+        for corner in [[0.0, 0.0], [6.0, 0.0], [6.0, 6.0], [0.0, 6.0]] {
+            let at = node.position + Vector3::new(corner[0], corner[1], 0.0);
+            group.mesh.positions.push([at.x as f32, at.y as f32, at.z as f32]);
+            group.mesh.normals.push([0.0, 0.0, 1.0]);
+            group.mesh.uvs.push([(corner[0] / 6.0) as f32, (corner[1] / 6.0) as f32]);
+            group.mesh.joints.push([i as u16, 0, 0, 0]);
+            group.mesh.weights.push([1.0, 0.0, 0.0, 0.0]);
+            group.colours.push([60 + k as u8, 110, 40]);
+            group.sine.push([0.0, 0.0, corner[0] as f32]);
+            group.cosine.push([0.0, 0.0, corner[1] as f32]);
+        }
+        group.mesh.indices.extend([0, 1, 2, 0, 2, 3].map(|v| first + v));
+    }
+    let mut png = Vec::new();
+    let image = image::RgbaImage::from_fn(8, 8, |x, y| image::Rgba([90, 160, 60, if x + y < 3 { 0 } else { 255 }]));
+    image.write_to(&mut std::io::Cursor::new(&mut png), image::ImageFormat::Png).expect("png");
+    Foliage { groups, texture: Some(("image/png", png)), frequency_hz: 2.0 }
+}
+
+/// The weights with which they swing in every pose.
+pub fn flutter(foliage: &Foliage, poses: &[Pose]) -> Vec<Vec<[f32; 2]>> {
+    let swing = |p: &Pose| {
+        let phase = std::f64::consts::TAU * foliage.frequency_hz * p.time_s;
+        [(0.3 * phase.sin()) as f32, (0.3 * phase.cos()) as f32]
+    };
+    vec![poses.iter().map(swing).collect(); foliage.groups.len()]
 }

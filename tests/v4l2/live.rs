@@ -62,7 +62,7 @@ fn shows(r: &Results, name: &str) -> Result<(), String> {
 }
 
 fn exported(r: &Results) -> Result<(), String> {
-    for file in ["capture.json", "tracks.csv", "nodes.csv", "motion.csv", "tree.glb"] {
+    for file in ["capture.json", "tracks.csv", "nodes.csv", "motion.csv", "tree.glb", "frame.jpg"] {
         claim(r.path("live/exported").join(file).exists(), || format!("{file} is missing"))?;
     }
     let last = |dir: &str| -> Result<u64, String> {

@@ -32,9 +32,14 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
     let room = (area.width / (WIDEST + 2)).max(1) as usize;
     let tables = room.min(total.div_ceil(height.max(1)));
     let shown = total.min(tables * height);
-    let title = if total > shown { format!("Branches, {shown} of {total}") } else { format!("Branches, {total}") };
+    let first = if total > shown { state.first_branch.min(total - 1) } else { 0 };
+    let title = match first {
+        0 if total > shown => format!("Branches, {shown} of {total}"),
+        0 => format!("Branches, {total}"),
+        _ => format!("Branches, {}–{} of {total}", first + 1, (first + shown).min(total)),
+    };
     let below = titled(frame, area, &title, theme);
-    for (i, rows) in s.branches.chunks(height.max(1)).take(tables).enumerate() {
+    for (i, rows) in s.branches[first..].chunks(height.max(1)).take(tables).enumerate() {
         let x = below.x + i as u16 * (WIDEST + 2);
         let place = Rect { x, width: (below.right() - x).min(WIDEST), ..below };
         let taken = if i == 0 { title.chars().count() as u16 + 3 } else { 0 };

@@ -1,6 +1,7 @@
 //! The help, laid over everything else.
 
 use crate::tui::input::{DRAWING, WATCHING};
+use crate::tui::state::State;
 use crate::tui::theme::Theme;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Rect};
@@ -8,15 +9,20 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Clear, Padding, Paragraph};
 
 /// All keys, from the same tables that they are read with.
-pub fn render(frame: &mut Frame, area: Rect, theme: Theme) {
+pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
     let row = |key: &'static str, help: &'static str| {
         Line::from(vec![Span::styled(format!("{key:<10}"), theme.title()), Span::raw(help)])
     };
-    let mut lines: Vec<Line> = WATCHING.iter().map(|b| row(b.shown, b.help)).collect();
-    lines.push(Line::styled("While an outline is drawn", theme.faint()));
-    lines.push(row("click", "sets a point"));
-    lines.extend(DRAWING.iter().filter(|b| !b.help.is_empty()).map(|b| row(b.shown, b.help)));
-    let (width, height) = (62, lines.len() as u16 + 2);
+    let mut lines: Vec<Line> = WATCHING.iter().filter(|b| !b.help.is_empty()).map(|b| row(b.shown, b.help)).collect();
+    let mut drawing = vec![Line::styled("While an outline is drawn", theme.faint()), row("click", "sets a point")];
+    drawing.extend(DRAWING.iter().filter(|b| !b.help.is_empty()).map(|b| row(b.shown, b.help)));
+    // Where there is no room for both, those that mean something now.
+    if lines.len() + drawing.len() + 2 <= area.height as usize {
+        lines.append(&mut drawing);
+    } else if state.drawing.is_some() {
+        lines = drawing;
+    }
+    let (width, height) = (74, lines.len() as u16 + 2);
     let area = area.centered(Constraint::Length(width), Constraint::Length(height));
     let block = Block::bordered()
         .title(" Keys ")

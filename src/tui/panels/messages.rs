@@ -39,7 +39,15 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
 /// Keys that mean something now.
 pub fn keys(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
     let mut spans = Vec::new();
+    let mut room = area.width as usize;
     let mut add = |key: &'static str, word: &'static str| {
+        // A word cut in two says nothing; the help has them all.
+        let width = key.len() + word.len() + 3;
+        if key.is_empty() || width > room + 1 {
+            room = if key.is_empty() { room } else { 0 };
+            return;
+        }
+        room = room.saturating_sub(width);
         spans.push(Span::styled(format!(" {key}"), theme.title()));
         spans.push(Span::raw(format!(" {word} ")));
     };

@@ -1,8 +1,10 @@
-//! The tree in 3D, from the front and from the side, moving.
+//! The tree in 3D, from two sides at right angles, moving.
 
 use super::{titled, waiting};
-use crate::model::{Phase, Skeleton, Snapshot};
-use crate::tui::state::State;
+use crate::draw::{Camera, View};
+use crate::model::{Phase, Size, Skeleton, Snapshot};
+use crate::tui::solid::{BRAILLE, braille};
+use crate::tui::state::{State, TURN_DEGREES};
 use crate::tui::theme::Theme;
 use nalgebra::Point3;
 use ratatui::Frame;
@@ -10,9 +12,6 @@ use ratatui::layout::{Constraint, Direction, Layout, Rect};
 use ratatui::style::Color;
 use ratatui::symbols::Marker;
 use ratatui::widgets::canvas::{Canvas, Line};
-
-/// A panel, and which coordinate it shows from left to right.
-type View = (Rect, fn(&Point3<f64>) -> f64);
 
 /// Both views in the same scale, or what they wait for.
 pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
@@ -22,7 +21,9 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         waiting(frame, inner, &reason(s), theme);
         return;
     };
-    let Some(bounds) = Bounds::of(skeleton) else { return };
+    let degrees = [0, 90].map(|more| (state.turned * TURN_DEGREES + more) % 360);
+    let views = degrees.map(|d| View { turn: f64::from(d).to_radians(), down: 0.0 });
+    let Some(seen) = views.iter().map(|view| Extent::of(skeleton, *view)).collect::<Option<Vec<_>>>() else { return };
     // Side by side or one above the other, as the tree comes out larger.
     let arrange = |direction: Direction| {
         let layout = Layout::new(direction, [Constraint::Fill(1), Constraint::Fill(1)]).spacing(match direction {
@@ -30,29 +31,51 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
             Direction::Vertical => 0,
         });
         let areas: [Rect; 2] = layout.areas(area);
-        let unit = [0, 1].map(|i| bounds.unit(i, areas[i])).into_iter().fold(0.0, f64::max);
+        let unit = seen.iter().zip(areas).map(|(extent, room)| extent.unit(room)).fold(0.0, f64::max);
         (areas, unit)
     };
     let (beside, above) = (arrange(Direction::Horizontal), arrange(Direction::Vertical));
-    let ([first, second], unit) = if above.1 < beside.1 { above } else { beside };
-    let views: [View; 2] =
-        [(titled(frame, first, "Front", theme), |p| p.x), (titled(frame, second, "Side", theme), |p| p.z)];
-    let branches = branches(s, skeleton, theme);
-    for (i, (room, across)) in views.into_iter().enumerate() {
-        let ([x, y], [w, h]) = (bounds.middle(i), [room.width as f64 * 2.0 * unit, room.height as f64 * 4.0 * unit]);
-        let canvas = Canvas::default()
-            .marker(Marker::Braille)
-            .x_bounds([x - w / 2.0, x + w / 2.0])
-            .y_bounds([y - h / 2.0, y + h / 2.0])
-            .paint(|context| {
-                for (from, to, color) in &branches {
-                    context.draw(&Line::new(across(from), from.y, across(to), to.y, *color));
+    let (areas, unit) = if above.1 < beside.1 { above } else { beside };
+    for ((area, view), (extent, degrees)) in areas.into_iter().zip(views).zip(seen.iter().zip(degrees)) {
+        let room = titled(frame, area, &name(degrees), theme);
+        if unit <= 0.0 || room.is_empty() {
+            continue;
+        }
+        let camera = extent.camera(view, unit, room);
+        match state.solid.as_ref().and_then(|solid| solid.picture(s, &camera, theme)) {
+            None => lines(frame, &branches(s, skeleton, theme), &camera, room),
+            Some(picture) => {
+                for (at, cell) in room.positions().zip(braille(&picture)) {
+                    if let (Some((letter, rgb)), Some(onto)) = (cell, frame.buffer_mut().cell_mut(at)) {
+                        onto.set_char(letter).set_fg(theme.colour(rgb));
+                    }
                 }
-            });
-        if unit > 0.0 && !room.is_empty() {
-            frame.render_widget(canvas, room);
+            }
         }
     }
+}
+
+/// What is seen of the tree by who has walked round it by so much to the right.
+fn name(degrees: u16) -> String {
+    match degrees {
+        0 => "Front".to_owned(),
+        90 => "Side".to_owned(),
+        180 => "Back".to_owned(),
+        270 => "Other side".to_owned(),
+        _ => format!("Turned {degrees}°"),
+    }
+}
+
+fn lines(frame: &mut Frame, branches: &[(Point3<f64>, Point3<f64>, Color)], camera: &Camera, room: Rect) {
+    let size = [camera.size.width, camera.size.height].map(f64::from);
+    let canvas =
+        Canvas::default().marker(Marker::Braille).x_bounds([0.0, size[0]]).y_bounds([0.0, size[1]]).paint(|context| {
+            for (from, to, color) in branches {
+                let ([x1, y1, _], [x2, y2, _]) = (camera.project(from), camera.project(to));
+                context.draw(&Line::new(x1, size[1] - y1, x2, size[1] - y2, *color));
+            }
+        });
+    frame.render_widget(canvas, room);
 }
 
 /// Branches as lines: the copies first, so that what was measured lies on top.
@@ -89,35 +112,46 @@ fn reason(s: &Snapshot) -> String {
     }
 }
 
-/// Extent of the tree at rest: taken from the pose, the scale would breathe with the wind.
-struct Bounds {
-    low: Point3<f64>,
-    high: Point3<f64>,
+/// Extent of the tree at rest in a view: taken from the pose, the scale would breathe with the wind.
+struct Extent {
+    /// Model units to the right and up from the foot.
+    low: [f64; 2],
+    high: [f64; 2],
 }
 
-impl Bounds {
+impl Extent {
     /// Room left around the tree at rest for its sway.
     const MARGIN: f64 = 1.12;
 
-    fn of(skeleton: &Skeleton) -> Option<Self> {
-        let mut points = skeleton.nodes.iter().map(|n| n.position).filter(|p| p.coords.iter().all(|c| c.is_finite()));
-        let first = points.next()?;
-        let (low, high) = points.fold((first, first), |(l, h), p| (l.inf(&p), h.sup(&p)));
-        Some(Self { low, high })
+    fn of(skeleton: &Skeleton, view: View) -> Option<Self> {
+        let [right, up, _] = view.axes();
+        let sound = skeleton.nodes.iter().map(|n| n.position.coords).filter(|p| p.iter().all(|c| c.is_finite()));
+        sound.map(|p| [p.dot(&right), p.dot(&up)]).fold(None, |all, p| {
+            let Some(Self { low, high }) = all else { return Some(Self { low: p, high: p }) };
+            let with = |of: [f64; 2], pick: fn(f64, f64) -> f64| [pick(of[0], p[0]), pick(of[1], p[1])];
+            Some(Self { low: with(low, f64::min), high: with(high, f64::max) })
+        })
     }
 
-    /// Least size of a dot in view `i` with which the tree fits into the panel below its title.
-    fn unit(&self, i: usize, panel: Rect) -> f64 {
-        let axis = [0, 2][i];
-        let across = (self.high[axis] - self.low[axis]) / (2.0 * panel.width.max(1) as f64);
-        let up = (self.high.y - self.low.y) / (4.0 * panel.height.saturating_sub(1).max(1) as f64);
-        let unit = Self::MARGIN * across.max(up);
+    /// Least size of a dot with which the tree fits into the panel below its title.
+    fn unit(&self, panel: Rect) -> f64 {
+        let dots = dots(Rect { height: panel.height.saturating_sub(1).max(1), width: panel.width.max(1), ..panel });
+        let fit = |axis: usize, dots: u32| (self.high[axis] - self.low[axis]) / f64::from(dots);
+        let unit = Self::MARGIN * fit(0, dots.width).max(fit(1, dots.height));
         // A tree without extent is drawn as what it is, a dot.
         if unit.is_finite() && unit > 1e-9 { unit } else { 1.0 }
     }
 
-    fn middle(&self, i: usize) -> [f64; 2] {
-        let axis = [0, 2][i];
-        [(self.low[axis] + self.high[axis]) / 2.0, (self.low.y + self.high.y) / 2.0]
+    /// The camera that shows it in the middle of `room`, one dot a `unit`.
+    fn camera(&self, view: View, unit: f64, room: Rect) -> Camera {
+        let (size, scale) = (dots(room), 1.0 / unit);
+        let middle = [0, 1].map(|i| scale * (self.low[i] + self.high[i]) / 2.0);
+        let middle_px = [f64::from(size.width) / 2.0 - middle[0], f64::from(size.height) / 2.0 + middle[1]];
+        Camera { view, aim: Point3::origin(), middle_px, scale, size }
     }
+}
+
+/// Dots of braille in an area.
+fn dots(area: Rect) -> Size {
+    Size::new(u32::from(area.width) * BRAILLE.width, u32::from(area.height) * BRAILLE.height)
 }

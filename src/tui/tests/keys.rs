@@ -61,8 +61,11 @@ fn keys_send_what_they_say() {
         (vec![letter('b'), letter('r'), letter('e')], vec![BuildNow, Restart, Export]),
         (vec![letter('?'), letter('b')], vec![BuildNow]),
         (vec![letter('x'), key(KeyCode::Esc), key(KeyCode::Enter), ctrl('q'), click(9, 9)], vec![]),
-        // While drawing, space sets a point and the other keys still work.
-        (vec![letter('o'), letter(' '), letter('e')], vec![Export]),
+        // While drawing, space sets a point, and a slip does nothing to the capture.
+        (vec![letter('o'), letter(' '), letter('e'), letter('b'), letter('r'), letter('q')], vec![]),
+        (vec![letter('o'), key(KeyCode::Esc), letter('e')], vec![Export]),
+        (vec![letter('o'), ctrl('c')], vec![Quit]),
+        (vec![letter('h'), letter('l'), letter('m'), letter('j'), letter('k')], vec![]),
     ] {
         assert_eq!(play(Some(wide()), &events).sent, expected, "{events:?}");
     }
@@ -98,7 +101,8 @@ fn drawing_stays_until_it_is_good_or_left() {
         (vec![a.clone(), b.clone(), c.clone(), esc.clone()], None, 0, "Left drawing"),
         (vec![a.clone(), c.clone(), b.clone(), click(20, 9), enter.clone()], Some(4), 0, "crosses itself"),
         (vec![a.clone(), b.clone(), c.clone(), a.clone(), enter.clone()], None, 1, "outline of 3 points"),
-        (vec![a.clone(), letter('q')], None, 1, "writing"),
+        (vec![a.clone(), letter('q')], Some(1), 0, "Enter closes it, Esc leaves it"),
+        (vec![a.clone(), ctrl('c')], None, 1, "writing"),
     ] {
         let events: Vec<Event> = std::iter::once(letter('o')).chain(events).collect();
         let run = play(Some(narrow()), &events);
@@ -133,6 +137,30 @@ fn there_is_no_drawing_without_a_picture() {
     // A picture that is there but not on the screen, as in too small a window.
     let run = play(None, &[letter('o'), click(5, 5), letter(' '), key(KeyCode::Left)]);
     assert!(run.sent.is_empty() && run.state.drawing.is_some_and(|d| d.points_px().is_empty()));
+}
+
+#[test]
+fn the_tree_turns_all_the_way_round_and_shows_its_wood() {
+    let turned = |keys: &str| play(None, &keys.chars().map(letter).collect::<Vec<_>>()).state.turned;
+    assert_eq!([turned("l"), turned("h"), turned("lh"), turned("hhh")], [1, 23, 0, 21]);
+    assert_eq!(turned(&"l".repeat(24)), 0);
+    let run = play(None, &[key(KeyCode::Right), key(KeyCode::Right), key(KeyCode::Left)]);
+    assert_eq!(run.state.turned, 1);
+    for (keys, shown) in [("m", true), ("mm", false), ("mqm", false)] {
+        let run = play(None, &keys.chars().map(letter).collect::<Vec<_>>());
+        assert_eq!(run.state.solid.is_some(), shown, "{keys}");
+    }
+}
+
+#[test]
+fn the_table_of_branches_scrolls_as_far_as_it_goes() {
+    let first = |keys: &str| play(None, &keys.chars().map(letter).collect::<Vec<_>>()).state.first_branch;
+    assert_eq!([first("jj"), first("k"), first("jjjk"), first(&"j".repeat(50))], [2, 0, 2, 9]);
+    // A tree with fewer branches.
+    let mut run = play(None, &[letter('j'), letter('j'), letter('j')]);
+    let fewer = snapshot(Phase::Live).branches[..2].to_vec();
+    run.state.take(Arc::new(Snapshot { branches: fewer, ..snapshot(Phase::Live) }));
+    assert_eq!(run.state.first_branch, 1);
 }
 
 #[test]

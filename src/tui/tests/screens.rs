@@ -34,6 +34,17 @@ fn cases() -> Vec<(&'static str, State)> {
     let mut help = state(snapshot(Phase::Live));
     help.help = true;
     cases.push(("help", help));
+    let mut turned = state(snapshot(Phase::Live));
+    turned.turn(-2);
+    turned.scroll(3);
+    cases.push(("turned", turned));
+    let mut mesh = state(snapshot(Phase::Live));
+    mesh.switch_mesh();
+    cases.push(("mesh", mesh));
+    let mut mesh = state(huge());
+    mesh.switch_mesh();
+    mesh.turn(5);
+    cases.push(("huge_mesh", mesh));
     let mut drawing = state(snapshot(Phase::Accumulate));
     let polygon = drawing.drawing.get_or_insert_default();
     [[100.0, 50.0], [500.0, 60.0], [300.0, 300.0]].into_iter().for_each(|p| polygon.add(p));
@@ -85,7 +96,9 @@ fn no_state_and_no_size_brings_it_down() {
         Snapshot { image_size: Some(Size::new(u32::MAX, 1)), ..huge() },
         Snapshot { progress: f64::NEG_INFINITY, ..huge() },
     ] {
-        all.push(state(change));
+        let mut mesh = state(change.clone());
+        mesh.switch_mesh();
+        all.extend([state(change), mesh]);
     }
     let sizes = [(0, 0), (1, 1), (60, 16), (61, 17), (80, 24), (20, 200), (500, 3), (120, 40), (300, 100)];
     for (i, state) in all.iter().enumerate() {

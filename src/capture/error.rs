@@ -1,0 +1,31 @@
+//! Why a capture could not be read back, by what the caller can do about it.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Each message is one line that says what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum CaptureError {
+    #[error("{} is no capture: there is no capture.json in it; give a folder that `--out` has made", .dir.display())]
+    NotACapture { dir: PathBuf },
+    /// A table without which there is nothing to show.
+    #[error("{} lacks {file}; copy the capture with all its files, or make it anew", .dir.display())]
+    Missing { dir: PathBuf, file: &'static str },
+    #[error("{}: {what}; the file is damaged or was edited: make the capture anew", .file.display())]
+    BadNote { file: PathBuf, what: String },
+    #[error("{} was written by a newer version of arborcam ({what}); use that version", .file.display())]
+    Newer { file: PathBuf, what: String },
+    #[error("{}, line {line}: {what}; the file is damaged or was edited: make the capture anew", .file.display())]
+    BadRow { file: PathBuf, line: u64, what: String },
+    /// A capture that is sound, of a film in which no tree was built.
+    #[error("{} holds tracks but no tree; film for longer or in more wind, and make the capture anew", .dir.display())]
+    NoTree { dir: PathBuf },
+    #[error("cannot read {}: {source}", .file.display())]
+    Unreadable { file: PathBuf, source: io::Error },
+}
+
+impl CaptureError {
+    pub(super) fn row(file: &Path, line: u64, what: impl Into<String>) -> Self {
+        Self::BadRow { file: file.to_owned(), line, what: what.into() }
+    }
+}

@@ -1,0 +1,172 @@
+//! `arborcam export DIR --format F --out PATH`: a capture's tree as a file for other programs.
+
+use super::shaping::{Made, Shaping};
+use super::{Ended, say};
+use crate::export::csv::{MotionCsv, nodes};
+use crate::export::cylinders::cylinders;
+use crate::export::files::{refuse_taken, write_files};
+use crate::export::gltf::{KEY_TOLERANCE_PX, Model, NamedBytes, glb, gltf_files};
+use crate::export::still::{obj_files, ply};
+use crate::export::{ExportError, OutputFolder};
+use crate::shape::cylinders as cylinders_of;
+use anyhow::anyhow;
+use clap::{Args, ValueEnum};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Where the data goes instead of into a file.
+const STDOUT: &str = "-";
+
+#[derive(Debug, Args)]
+pub struct ExportArgs {
+    /// A capture: the folder that --out of `capture` or `replay` has made.
+    dir: PathBuf,
+    /// What to write. glb: one file, mesh and motion; gltf: the same as .gltf and .bin; csv: a folder with the tables and
+    /// the wood as cylinders; obj and ply: the tree at rest.
+    #[arg(long, value_name = "FORMAT")]
+    format: Format,
+    /// File to write, for csv a folder; it must not exist, and appears when it is complete. `-` is standard output (glb, ply).
+    #[arg(long, value_name = "PATH")]
+    out: PathBuf,
+    /// Largest distance between a node and its pose to which keys of the animation are thinned, px.
+    #[arg(long, value_name = "PX", default_value_t = KEY_TOLERANCE_PX, value_parser = tolerance)]
+    tolerance_px: f64,
+    /// All levels of detail, as scenes lod0, lod1, ... on the same bones (glb, gltf).
+    #[arg(long)]
+    lods: bool,
+    #[command(flatten)]
+    shaping: Shaping,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Format {
+    Glb,
+    Gltf,
+    Csv,
+    Obj,
+    Ply,
+}
+
+fn tolerance(text: &str) -> Result<f64, String> {
+    let px = text.parse().ok().filter(|px: &f64| (0.001..=100.0).contains(px));
+    px.ok_or_else(|| "give a number of pixels from 0.001 to 100".to_owned())
+}
+
+pub fn run(args: &ExportArgs) -> Result<(), Ended> {
+    let target = Target::of(args)?;
+    target.refuse_taken().map_err(failed)?;
+    let made = args.shaping.made(&args.dir)?;
+    for warning in &made.captured.warnings {
+        say(&format!("arborcam: warning: {warning}"));
+    }
+    let model = Model { tolerance_px: args.tolerance_px, all_levels: args.lods, ..made.model() };
+    let metres_per_px = made.config.export.metres_per_px;
+    let stem = target.stem();
+    let files = match args.format {
+        Format::Csv => return tables(args, &made),
+        Format::Glb => glb(&model).map(|(bytes, _)| vec![(target.name(), bytes)]),
+        Format::Gltf => gltf_files(&model, &stem).map(|(files, _)| files),
+        Format::Obj => obj_files(&made.dressed, &stem, metres_per_px),
+        Format::Ply => ply(&made.dressed, metres_per_px).map(|bytes| vec![(target.name(), bytes)]),
+    };
+    target.write(files.map_err(failed)?)
+}
+
+fn failed(e: ExportError) -> Ended {
+    Ended::Failed(e.into())
+}
+
+/// The file that was asked for; others may come beside it.
+enum Target<'a> {
+    Stdout,
+    Beside(&'a Path),
+}
+
+impl<'a> Target<'a> {
+    fn of(args: &'a ExportArgs) -> Result<Self, Ended> {
+        let unfit = |why: String| Err(Ended::BadUsage(anyhow!(why)));
+        let shown = args.out.display();
+        if args.out.as_os_str() == STDOUT {
+            return match args.format {
+                Format::Glb | Format::Ply => Ok(Self::Stdout),
+                _ => unfit("--out -: this format is more than one file; give a path".into()),
+            };
+        }
+        if args.out.file_name().is_none() {
+            return unfit(format!("--out {shown} is no name for a file; choose another"));
+        }
+        let ending = match args.format {
+            Format::Gltf => "gltf",
+            Format::Obj => "obj",
+            Format::Glb | Format::Csv | Format::Ply => return Ok(Self::Beside(&args.out)),
+        };
+        // The names of the files beside it are made from it.
+        if args.out.extension().is_none_or(|e| !e.eq_ignore_ascii_case(ending)) {
+            return unfit(format!("--out {shown} does not end in .{ending}, as this format must"));
+        }
+        Ok(Self::Beside(&args.out))
+    }
+
+    fn name(&self) -> String {
+        match self {
+            Self::Stdout => "tree".into(),
+            Self::Beside(path) => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        }
+    }
+
+    fn stem(&self) -> String {
+        match self {
+            Self::Stdout => "tree".into(),
+            Self::Beside(path) => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        }
+    }
+
+    /// Told before anything is worked out.
+    fn refuse_taken(&self) -> Result<(), ExportError> {
+        match self {
+            Self::Stdout => Ok(()),
+            Self::Beside(path) => refuse_taken(path.parent().unwrap_or(Path::new("")), [&*self.name()].into_iter()),
+        }
+    }
+
+    fn write(&self, files: Vec<NamedBytes>) -> Result<(), Ended> {
+        match self {
+            Self::Stdout => {
+                let mut out = std::io::stdout().lock();
+                let written = files.iter().try_for_each(|(_, bytes)| out.write_all(bytes)).and_then(|()| out.flush());
+                written.map_err(|e| Ended::Failed(anyhow!("cannot write to standard output: {e}")))
+            }
+            Self::Beside(path) => {
+                let size: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();
+                write_files(path.parent().unwrap_or(Path::new("")), &files).map_err(failed)?;
+                say(&format!("{}: {:.1} MB", path.display(), size as f64 / 1e6));
+                Ok(())
+            }
+        }
+    }
+}
+
+/// The tables of the capture, as they are or of the changed tree, and the wood as cylinders.
+fn tables(args: &ExportArgs, made: &Made) -> Result<(), Ended> {
+    let folder = OutputFolder::create(&args.out).map_err(failed)?;
+    let metres_per_px = made.config.export.metres_per_px;
+    let as_they_are = !made.reshaped && metres_per_px == made.captured.note.config.export.metres_per_px;
+    let rows = cylinders_of(&made.dressed.limbs);
+    let write = || -> Result<PathBuf, ExportError> {
+        folder.copy("tracks.csv", &args.dir)?;
+        if as_they_are {
+            folder.copy("nodes.csv", &args.dir)?;
+            folder.copy("motion.csv", &args.dir)?;
+        } else {
+            nodes(folder.file("nodes.csv")?, &made.skeleton, &made.captured.sway, metres_per_px)?;
+            let mut motion = MotionCsv::new(folder.file("motion.csv")?, &made.skeleton, metres_per_px)?;
+            made.poses.iter().try_for_each(|pose| motion.pose(pose))?;
+            motion.finish()?;
+        }
+        cylinders(folder.file("cylinders.csv")?, &rows, metres_per_px)?;
+        folder.publish()
+    };
+    let dir = write().map_err(failed)?;
+    say(&format!("{}: nodes, motion and tracks, {} cylinders", dir.display(), cylinders_of(&made.dressed.limbs).len()));
+    Ok(())
+}

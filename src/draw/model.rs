@@ -1,0 +1,79 @@
+//! What is drawn: wood and leaves on a skeleton, at rest and in a pose.
+
+use super::camera::Bounds;
+use super::skin::Joints;
+use super::texture::Texture;
+use crate::model::{Pose, Skeleton};
+use crate::shape::{Foliage, Mesh};
+use nalgebra::Point3;
+
+/// A tree to be drawn, in any pose.
+#[derive(Clone, Debug)]
+pub struct Model<'a> {
+    pub skeleton: &'a Skeleton,
+    pub wood: &'a Mesh,
+    /// Colour of the wood (sRGB).
+    pub bark_rgb: [u8; 3],
+    /// Colour of each branch instead, by node index; may be empty.
+    pub branch_rgb: &'a [[u8; 3]],
+    pub foliage: &'a Foliage,
+    pub leaf: Option<Texture>,
+}
+
+/// Triangles in one pose.
+#[derive(Clone, Debug)]
+pub(super) struct Part<'a> {
+    pub positions: Vec<[f32; 3]>,
+    pub normals: Vec<[f32; 3]>,
+    pub colours: Vec<[u8; 3]>,
+    pub uvs: &'a [[f32; 2]],
+    pub indices: &'a [u32],
+    pub texture: Option<&'a Texture>,
+    /// A leaf has no inside: whichever face is seen is lit.
+    pub two_sided: bool,
+}
+
+/// A tree in one pose.
+#[derive(Clone, Debug)]
+pub struct Posed<'a> {
+    pub(super) parts: Vec<Part<'a>>,
+}
+
+impl<'a> Model<'a> {
+    /// Wood alone.
+    pub fn bare(skeleton: &'a Skeleton, wood: &'a Mesh, bark_rgb: [u8; 3]) -> Self {
+        static NONE: Foliage = Foliage { groups: Vec::new(), texture: None, frequency_hz: 0.0 };
+        Self { skeleton, wood, bark_rgb, branch_rgb: &[], foliage: &NONE, leaf: None }
+    }
+
+    /// The tree in a pose, `None` for its rest. `sway` is how far the leaves of each group swing, rad; see
+    /// [`crate::shape::FoliageGroup`]; it may be shorter than the groups.
+    pub fn posed(&self, pose: Option<&Pose>, sway: &[[f32; 2]]) -> Posed<'_> {
+        let joints = Joints::new(self.skeleton, pose);
+        let (positions, normals) = joints.wood(self.wood);
+        let of_joint = |joint: u16| self.branch_rgb.get(usize::from(joint)).copied().unwrap_or(self.bark_rgb);
+        let colours = match self.branch_rgb {
+            [] => vec![self.bark_rgb; positions.len()],
+            _ => self.wood.joints.iter().map(|j| of_joint(j[0])).collect(),
+        };
+        let (uvs, indices) = (self.wood.uvs.as_slice(), self.wood.indices.as_slice());
+        let mut parts = vec![Part { positions, normals, colours, uvs, indices, texture: None, two_sided: false }];
+        for (i, group) in self.foliage.groups.iter().enumerate() {
+            let (positions, normals) = joints.leaves(group, sway.get(i).copied().unwrap_or_default());
+            let mut colours = group.colours.clone();
+            colours.resize(positions.len(), [255; 3]);
+            let (uvs, indices) = (group.mesh.uvs.as_slice(), group.mesh.indices.as_slice());
+            let texture = self.leaf.as_ref().filter(|_| uvs.len() == positions.len());
+            parts.push(Part { positions, normals, colours, uvs, indices, texture, two_sided: true });
+        }
+        Posed { parts }
+    }
+}
+
+impl Posed<'_> {
+    /// What all of it lies in; `None` for nothing.
+    pub fn bounds(&self) -> Option<Bounds> {
+        let points = self.parts.iter().flat_map(|p| &p.positions);
+        Bounds::of(points.map(|[x, y, z]| Point3::new(f64::from(*x), f64::from(*y), f64::from(*z))))
+    }
+}

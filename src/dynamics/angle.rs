@@ -1,0 +1,128 @@
+//! How a branch turns against the one that carries it, as it is seen in the picture.
+
+use crate::model::{NodeId, Pose, Skeleton};
+
+/// Projections shorter than this have no direction, px.
+const SHORTEST_PX: f64 = 1e-6;
+
+/// The angle between the branch that ends in `node` and its parent branch in every pose, degrees: that of Zhang et al.
+/// (seed 002, eq. 1) in the picture's plane, where it is measured, and signed, counterclockwise for the viewer. It is
+/// continuous in time, so that it may leave ±180°.
+///
+/// The parent branch is the nearest one below that has a length in the picture at rest; upright, where there is none. NaN
+/// for poses of another skeleton and those in which one of the two branches has no direction.
+pub fn angle_to_parent_deg(skeleton: &Skeleton, poses: &[Pose], node: NodeId) -> Vec<f64> {
+    let Some(parent) = parent_of(skeleton, node) else { return vec![f64::NAN; poses.len()] };
+    let carrier = carrier(skeleton, parent);
+    let mut last: Option<f64> = None;
+    poses
+        .iter()
+        .map(|pose| {
+            if pose.joints.len() != skeleton.nodes.len() {
+                return f64::NAN;
+            }
+            let at = |n: NodeId| pose.joints[n.index()].position;
+            let way = |from: NodeId, to: NodeId| [at(to).x - at(from).x, at(to).y - at(from).y];
+            let base = carrier.map_or([0.0, 1.0], |(from, to)| way(from, to));
+            let own = way(parent, node);
+            let shortest = base[0].hypot(base[1]).min(own[0].hypot(own[1]));
+            if !shortest.is_finite() || shortest < SHORTEST_PX {
+                return f64::NAN;
+            }
+            let sine = base[0] * own[1] - base[1] * own[0];
+            let cosine = base[0] * own[0] + base[1] * own[1];
+            let angle = sine.atan2(cosine).to_degrees();
+            let angle = last.map_or(angle, |before| angle - 360.0 * ((angle - before) / 360.0).round());
+            last = Some(angle);
+            angle
+        })
+        .collect()
+}
+
+fn parent_of(skeleton: &Skeleton, node: NodeId) -> Option<NodeId> {
+    // A file may say anything; a child comes after its parent, which ends every walk downwards.
+    skeleton.nodes.get(node.index())?.parent.filter(|p| p.index() < node.index())
+}
+
+/// The nearest branch at or below the one that ends in `node` that has a direction in the picture.
+fn carrier(skeleton: &Skeleton, node: NodeId) -> Option<(NodeId, NodeId)> {
+    let (mut end, nodes) = (node, &skeleton.nodes);
+    while let Some(start) = parent_of(skeleton, end) {
+        let way = nodes[end.index()].position - nodes[start.index()].position;
+        if way.x.hypot(way.y) > SHORTEST_PX {
+            return Some((start, end));
+        }
+        end = start;
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{JointPose, Node, NodeName, Size};
+    use nalgebra::{Point3, UnitQuaternion};
+
+    /// A chain of nodes from the foot up.
+    fn chain(at: &[[f64; 3]]) -> Skeleton {
+        let node = |(i, p): (usize, &[f64; 3])| Node {
+            name: NodeName(i as u32),
+            parent: i.checked_sub(1).map(|p| NodeId(p as u32)),
+            level: i as u8,
+            position: Point3::from(*p),
+            radius: 1.0,
+            n_tracks: 1,
+            certainty: 1.0,
+            copy_of: None,
+            plane_angle: 0.0,
+        };
+        let nodes = at.iter().enumerate().map(node).collect();
+        Skeleton { nodes, foot_px: [0.0, 0.0], image_size: Size { width: 64, height: 64 } }
+    }
+
+    fn pose(at: &[[f64; 3]]) -> Pose {
+        let joint = |p: &[f64; 3]| JointPose { position: Point3::from(*p), rotation: UnitQuaternion::identity() };
+        Pose { frame: 0, time_s: 0.0, joints: at.iter().map(joint).collect() }
+    }
+
+    fn close(found: f64, wanted: f64) {
+        assert!((found - wanted).abs() < 1e-9, "{found}, not {wanted}");
+    }
+
+    #[test]
+    fn a_branch_to_the_left_of_its_parent_has_a_positive_angle() {
+        let rest = [[0.0, 0.0, 0.0], [0.0, 10.0, 0.0], [-10.0, 20.0, 5.0]];
+        let tree = chain(&rest);
+        // The trunk leans by 45° to the right, the branch goes along: nothing changes between the two.
+        let leaning = [[0.0, 0.0, 0.0], [10.0, 10.0, 0.0], [10.0, 24.0, 5.0]];
+        let angles = angle_to_parent_deg(&tree, &[pose(&rest), pose(&leaning)], NodeId(2));
+        close(angles[0], 45.0);
+        close(angles[1], 45.0);
+        // The trunk itself is measured against the upright.
+        close(angle_to_parent_deg(&tree, &[pose(&leaning)], NodeId(1))[0], -45.0);
+    }
+
+    #[test]
+    fn an_angle_that_passes_180_degrees_does_not_jump() {
+        let at = |deg: f64| {
+            let (s, c) = deg.to_radians().sin_cos();
+            pose(&[[0.0; 3], [0.0, 10.0, 0.0], [-10.0 * s, 10.0 + 10.0 * c, 0.0]])
+        };
+        let tree = chain(&[[0.0; 3], [0.0, 10.0, 0.0], [-1.0, 0.0, 0.0]]);
+        let angles = angle_to_parent_deg(&tree, &[at(170.0), at(178.0), at(186.0), at(175.0)], NodeId(2));
+        for (found, wanted) in angles.iter().zip([170.0, 178.0, 186.0, 175.0]) {
+            close(*found, wanted);
+        }
+    }
+
+    #[test]
+    fn what_has_no_direction_has_no_angle_and_a_parent_without_length_is_passed_over() {
+        let rest = [[0.0; 3], [0.0, 10.0, 0.0], [0.0, 10.0, 0.0], [10.0, 10.0, 0.0]];
+        let tree = chain(&rest);
+        close(angle_to_parent_deg(&tree, &[pose(&rest)], NodeId(3))[0], -90.0);
+        assert!(angle_to_parent_deg(&tree, &[pose(&rest)], NodeId(2))[0].is_nan());
+        assert!(angle_to_parent_deg(&tree, &[pose(&rest)], NodeId(0))[0].is_nan());
+        assert!(angle_to_parent_deg(&tree, &[pose(&rest[..2])], NodeId(3))[0].is_nan());
+        assert_eq!(angle_to_parent_deg(&tree, &[pose(&rest)], NodeId(9)).len(), 1);
+    }
+}

@@ -1,0 +1,135 @@
+//! What the HTML page knows of the tree apart from its model.
+
+use super::capture::Capture;
+use super::csv::Sway;
+use crate::dynamics::angle_to_parent_deg;
+use crate::model::{NodeId, Pose, Skeleton};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde::Serialize;
+
+/// Facts for the page. Lengths in px and angles in degrees, whatever the unit of the model's file.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Data {
+    /// Name of what was filmed, without the folders that it lay in.
+    pub source: String,
+    /// Name and version of the program that filmed it.
+    pub software: String,
+    /// Metres in a pixel of the model's file; 0 where it is in pixels.
+    pub metres_per_px: f64,
+    /// Width and height of the picture, px.
+    pub image: [u32; 2],
+    /// The trunk's foot in the picture, px.
+    pub foot_px: [f64; 2],
+    /// Corners of the region that was tracked, px; empty if unknown.
+    pub outline_px: Vec<[i32; 2]>,
+    /// When the picture that goes with the page was taken, s since the first frame.
+    pub picture_time_s: Option<f64>,
+    /// The animation's begin, s since the first frame, and the time of every pose since then, s.
+    pub start_s: f64,
+    pub times_s: Vec<f64>,
+    /// Parents before children, the first without a parent: the foot.
+    pub branches: Vec<Branch>,
+}
+
+/// A branch, named as its end is in `nodes.csv` and in the model's file.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Branch {
+    pub id: u32,
+    pub parent: Option<u32>,
+    /// The measured branch that this one repeats.
+    pub copy_of: Option<u32>,
+    pub level: u8,
+    pub n_tracks: u32,
+    /// Its end at rest, model axes, px.
+    pub end: [f64; 3],
+    /// What was identified of its sway; numbers that are not known are `null`.
+    pub sway: Option<SwayNote>,
+    /// Angle to the parent branch at every one of [`Data::times_s`]: hundredths of a degree as 16-bit integers, little
+    /// endian, in base64; the lowest integer stands for one that is not known. `None` for the foot and for copies.
+    pub angle_deg: Option<String>,
+}
+
+/// [`Sway`] for JSON, where what is no number becomes `null`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SwayNote {
+    pub frequency_hz: f64,
+    pub frequency_lo_hz: f64,
+    pub frequency_hi_hz: f64,
+    pub damping_ratio: f64,
+    pub damping_lo: f64,
+    pub damping_hi: f64,
+}
+
+impl SwayNote {
+    fn of(sway: &Sway) -> Self {
+        let &Sway { frequency_hz, frequency_lo_hz, frequency_hi_hz, damping_ratio, damping_lo, damping_hi } = sway;
+        Self { frequency_hz, frequency_lo_hz, frequency_hi_hz, damping_ratio, damping_lo, damping_hi }
+    }
+}
+
+impl Data {
+    /// The page's facts. `poses` are those of the animation in the order of time; `sway` is by node index, as for
+    /// `nodes.csv`, and may be shorter than the skeleton.
+    pub fn of(capture: &Capture, skeleton: &Skeleton, poses: &[Pose], sway: &[Option<Sway>]) -> Self {
+        let size = skeleton.image_size;
+        let start_s = poses.iter().map(|p| p.time_s).find(|t| t.is_finite()).unwrap_or(0.0);
+        let source = capture.source.name.rsplit(['/', '\\']).find(|part| !part.is_empty()).unwrap_or_default();
+        Self {
+            source: source.to_owned(),
+            software: format!("{} {}", capture.software.name, capture.software.version),
+            metres_per_px: capture.model.as_ref().map_or(0.0, |m| m.metres_per_px),
+            image: [size.width, size.height],
+            foot_px: skeleton.foot_px,
+            outline_px: capture.outline.as_ref().map_or_else(Vec::new, |o| o.polygon_px.clone()),
+            picture_time_s: capture.picture.as_ref().map(|p| p.time_s),
+            start_s: rounded(start_s, 1e6),
+            times_s: poses.iter().map(|p| rounded(p.time_s - start_s, 1e6)).collect(),
+            branches: (0..skeleton.nodes.len()).map(|i| branch(skeleton, poses, sway, i)).collect(),
+        }
+    }
+}
+
+fn branch(skeleton: &Skeleton, poses: &[Pose], sway: &[Option<Sway>], i: usize) -> Branch {
+    let node = &skeleton.nodes[i];
+    let name = |id: NodeId| skeleton.name_of(id).map(|n| n.0);
+    let measured = node.parent.is_some() && node.copy_of.is_none();
+    // A frequency without a number is one that was not identified.
+    let sway = sway.get(i).copied().flatten().filter(|s| s.frequency_hz.is_finite());
+    Branch {
+        id: node.name.0,
+        parent: node.parent.and_then(name),
+        copy_of: node.copy_of.and_then(name),
+        level: node.level,
+        n_tracks: node.n_tracks,
+        end: [node.position.x, node.position.y, node.position.z].map(|x| rounded(x, 1e4)),
+        sway: sway.as_ref().map(SwayNote::of),
+        angle_deg: measured.then(|| packed(&angle_to_parent_deg(skeleton, poses, NodeId(i as u32)))),
+    }
+}
+
+/// No more decimals than mean something; 0 for what is no number, which JSON cannot hold.
+fn rounded(x: f64, scale: f64) -> f64 {
+    let rounded = (x * scale).round() / scale;
+    if rounded.is_finite() { rounded } else { 0.0 }
+}
+
+fn packed(angles_deg: &[f64]) -> String {
+    let hundredths = |a: &f64| match (100.0 * a).round() {
+        x if x.is_finite() => x.clamp(f64::from(-i16::MAX), f64::from(i16::MAX)) as i16,
+        _ => i16::MIN,
+    };
+    STANDARD.encode(angles_deg.iter().flat_map(|a| hundredths(a).to_le_bytes()).collect::<Vec<u8>>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_are_packed_as_the_page_unpacks_them() {
+        let bytes = STANDARD.decode(packed(&[0.0, 1.234, -179.996, 400.0, f64::NAN])).unwrap();
+        let back: Vec<i16> = bytes.chunks(2).map(|b| i16::from_le_bytes([b[0], b[1]])).collect();
+        assert_eq!(back, [0, 123, -18000, i16::MAX, i16::MIN]);
+    }
+}

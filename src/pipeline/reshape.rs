@@ -1,0 +1,31 @@
+//! Another shape in space for a tree that has been measured.
+
+use super::thicken;
+use crate::config::Config;
+use crate::model::{ClusterId, NodeName, Outline, Skeleton};
+use crate::{shape, skeleton};
+
+/// Stands the measured nodes up anew as `config` says. They keep their places in the picture and their names; copies get
+/// names that no node had before.
+pub fn reshape(old: &Skeleton, outline: &Outline, config: &Config) -> Skeleton {
+    let measured = &old.nodes[..old.measured()];
+    let flat: Vec<skeleton::Node2d> = measured
+        .iter()
+        .enumerate()
+        .map(|(i, n)| skeleton::Node2d {
+            parent: n.parent.map(|p| p.index()),
+            level: n.level,
+            cluster: i.checked_sub(1).map(|k| ClusterId(k as u32)),
+            position_px: old.image_from_model(&n.position),
+            certainty: n.certainty,
+        })
+        .collect();
+    let tracks: Vec<u32> = measured.iter().map(|n| n.n_tracks).collect();
+    let mut new = shape::build(&flat, &tracks, outline, &config.shape);
+    thicken(&mut new, outline, &config.wood);
+    let unused = old.nodes.iter().map(|n| n.name.0).max().map_or(0, |n| n.saturating_add(1));
+    let (kept, copies) = new.nodes.split_at_mut(measured.len());
+    kept.iter_mut().zip(measured).for_each(|(new, old)| new.name = old.name);
+    (unused..).zip(copies).for_each(|(name, copy)| copy.name = NodeName(name));
+    new
+}

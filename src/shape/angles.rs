@@ -1,0 +1,62 @@
+//! Branching angles and how likely they are (Li et al. eq. 4).
+
+use crate::config;
+use crate::model::Skeleton;
+use nalgebra::Point3;
+use std::f64::consts::PI;
+
+/// The normal distribution of eq. 4 over branching angles, wider near the root.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Angles {
+    /// mu, the expected angle, radians.
+    pub mean: f64,
+    /// d_max.
+    deepest: u8,
+    /// Factor on the paper's sigma.
+    tolerance: f64,
+}
+
+impl Angles {
+    /// As they are in `skeleton`, which still lies in its planes.
+    pub fn of(skeleton: &Skeleton, settings: &config::Shape) -> Self {
+        let deepest = skeleton.nodes.iter().map(|n| n.level).max().unwrap_or(0);
+        Self { mean: mean_branching_angle(skeleton), deepest, tolerance: settings.angle_tolerance }
+    }
+
+    /// ln of eq. 4 for a branch that ends at `level`, at `angle` (radians) to the one that it grows from.
+    pub fn ln_likelihood(&self, level: u8, angle: f64) -> f64 {
+        // sigma_i = pi (d_max - d_i) / d_max; a tip would get 0 and could not move at all, so tips get half a step.
+        let above = f64::from(self.deepest.saturating_sub(level)).max(0.5);
+        let sigma = self.tolerance * PI * above / f64::from(self.deepest.max(1));
+        -(angle - self.mean).powi(2) / (2.0 * sigma * sigma)
+    }
+
+    /// Geometric mean of eq. 4 over all branches of `skeleton` above the trunk, 0 to 1: how likely its angles are.
+    pub fn likelihood(&self, skeleton: &Skeleton) -> f64 {
+        let above_trunk = |i: &usize| skeleton.nodes[*i].level >= 2;
+        let ln = |i: usize| Some(self.ln_likelihood(skeleton.nodes[i].level, branching_angle(skeleton, i)?));
+        let all: Vec<f64> = (0..skeleton.nodes.len()).filter(above_trunk).filter_map(ln).collect();
+        if all.is_empty() { 1.0 } else { (all.iter().sum::<f64>() / all.len() as f64).exp() }
+    }
+}
+
+/// Angle between the branch a-b and the branch b-c that goes on from it, radians; 0 goes straight on, and is the answer
+/// where one of them has no length.
+pub(super) fn angle_between(a: &Point3<f64>, b: &Point3<f64>, c: &Point3<f64>) -> f64 {
+    (b - a).angle(&(c - b))
+}
+
+/// mu of eq. 4: the mean of all branching angles of the measured branches, radians; 45 degrees where there are none.
+pub fn mean_branching_angle(skeleton: &Skeleton) -> f64 {
+    let measured = (0..skeleton.nodes.len()).filter(|&i| skeleton.nodes[i].copy_of.is_none());
+    let angles: Vec<f64> = measured.filter_map(|i| branching_angle(skeleton, i)).collect();
+    if angles.is_empty() { PI / 4.0 } else { angles.iter().sum::<f64>() / angles.len() as f64 }
+}
+
+/// Angle at which branch `i` leaves the one that it grows from; `None` for what grows from the ground.
+fn branching_angle(skeleton: &Skeleton, i: usize) -> Option<f64> {
+    let nodes = &skeleton.nodes;
+    let parent = &nodes[nodes[i].parent?.index()];
+    let grand = &nodes[parent.parent?.index()];
+    Some(angle_between(&grand.position, &parent.position, &nodes[i].position))
+}

@@ -1,0 +1,79 @@
+//! Branches outside of a shape are cut.
+
+use super::TopiaryError;
+use crate::model::{NodeId, Skeleton};
+use crate::shape::Envelope;
+use nalgebra::Point3;
+
+/// A branch of which less than this share is inside is not worth keeping.
+const STUMP: f64 = 0.1;
+/// The trunk may be led on to a shape that begins above it by this share of the shape's height.
+const LED_ON: f64 = 0.5;
+/// Steps in which the border is looked for along a branch.
+const STEPS: u32 = 64;
+
+/// What is left of a tree.
+pub struct Pruned {
+    pub skeleton: Skeleton,
+    /// For every node that is left, which it was.
+    pub kept: Vec<usize>,
+    /// Branches that end at the border.
+    pub shortened: usize,
+}
+
+/// Keeps of every branch what is inside of `envelope`, from its parent up; what grows beyond the border is gone, and with a
+/// measured branch its copies. The trunk (levels 0 and 1) stays, with its top inside.
+pub fn cut(skeleton: &Skeleton, envelope: &Envelope) -> Result<Pruned, TopiaryError> {
+    let mut nodes = skeleton.nodes.clone();
+    // Whether a node is left, and whether anything may grow from it.
+    let (mut is_left, mut goes_on) = (vec![true; nodes.len()], vec![true; nodes.len()]);
+    let mut shortened = 0;
+    for i in 0..nodes.len() {
+        let (at, Some(parent)) = (nodes[i].position, nodes[i].parent.map(|p| p.index())) else { continue };
+        let from = nodes[parent].position;
+        if nodes[i].level < 2 {
+            nodes[i].position = trunk_top(&from, &at, envelope)?;
+            continue;
+        }
+        let original = nodes[i].copy_of.map_or(i, |o| o.index());
+        is_left[i] = goes_on[parent] && is_left[original] && at.coords.iter().all(|x| x.is_finite());
+        if !is_left[i] {
+            goes_on[i] = false;
+        } else if !envelope.contains(&at) {
+            let share = inside_share(&from, &at, envelope);
+            (is_left[i], goes_on[i]) = (share >= STUMP, false);
+            nodes[i].position = from + (at - from) * share;
+            shortened += usize::from(is_left[i]);
+        }
+    }
+    let kept: Vec<usize> = (0..nodes.len()).filter(|&i| is_left[i]).collect();
+    let new_id = |old: NodeId| NodeId(kept.partition_point(|&k| k < old.index()) as u32);
+    let nodes = kept.iter().map(|&i| {
+        let mut node = nodes[i].clone();
+        (node.parent, node.copy_of) = (node.parent.map(new_id), node.copy_of.map(new_id));
+        node
+    });
+    let nodes = nodes.collect();
+    Ok(Pruned { skeleton: Skeleton { nodes, ..skeleton.clone() }, kept, shortened })
+}
+
+/// Where the trunk ends: at its top if that is inside, else where it leaves the shape; a shape that begins above it is
+/// led on to.
+fn trunk_top(from: &Point3<f64>, at: &Point3<f64>, envelope: &Envelope) -> Result<Point3<f64>, TopiaryError> {
+    if envelope.contains(at) {
+        return Ok(*at);
+    }
+    let along = |k: u32| from + (at - from) * (f64::from(k) / f64::from(STEPS));
+    if let Some(inside) = (1..=STEPS).rev().map(along).find(|p| envelope.contains(p)) {
+        return Ok(inside);
+    }
+    let led_on = envelope.clamp(at);
+    let near = (led_on - at).norm() <= LED_ON * envelope.height() && envelope.contains(&led_on);
+    if near { Ok(led_on) } else { Err(TopiaryError::OffTree) }
+}
+
+/// Share of the way from `from` to `at` that lies inside without a break.
+fn inside_share(from: &Point3<f64>, at: &Point3<f64>, envelope: &Envelope) -> f64 {
+    let inside = |k: &u32| envelope.contains(&(from + (at - from) * (f64::from(*k) / f64::from(STEPS))));
+    (1..=STEPS).take_while(inside).last().map_or(0.0, |k| f64::from(k) / f64::from(STEPS))
+}

@@ -1,0 +1,105 @@
+//! Topiary: the tree in a drawn shape (Li et al. section 6 and figure 11, Zeng section 6.4).
+
+mod cover;
+mod cut;
+mod drawn;
+mod grow;
+
+pub use cover::coverage;
+pub use drawn::{Drawn, TopiaryError};
+
+use super::{Envelope, fuse, is_trunk};
+use crate::config;
+use crate::model::{JointPose, NodeId, Outline, Pose, Skeleton};
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// A tree that was cut to a shape.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Topiary {
+    pub skeleton: Skeleton,
+    /// The shape where it stands in the picture.
+    pub shape: Outline,
+    pub cut: Cut,
+    /// For every node the measured node of the tree before, whose motion against its own parent it repeats.
+    pub moves_as: Vec<NodeId>,
+}
+
+/// What was done to the tree.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cut {
+    /// The shape holds the whole outline: nothing was changed.
+    pub larger: bool,
+    /// Branches that are gone, that end at the border, and that were added to fill the shape.
+    pub gone: usize,
+    pub shortened: usize,
+    pub grown: usize,
+    /// Share of the shape that the tree covers as seen from the front ([`coverage`]), 0 to 1.
+    pub coverage: f64,
+}
+
+/// Cuts `skeleton` to what of it is inside `drawn`, pushes the rest to fill the shape, and adds smaller copies of the
+/// tree's own subtrees where the shape is still bare. The trunk stays. Chance (which of the subtrees, how deep) comes from
+/// `seed`. A shape that holds the whole `outline` of the tree changes nothing (Zeng section 6.4).
+///
+/// # Errors
+/// The shape lies off the tree.
+pub fn topiary(
+    skeleton: &Skeleton,
+    outline: &Outline,
+    drawn: &Drawn,
+    settings: &config::Shape,
+    seed: u64,
+) -> Result<Topiary, TopiaryError> {
+    let shape = drawn.placed(outline, skeleton.foot_px)?;
+    let itself = |i: usize| skeleton.nodes[i].copy_of.unwrap_or(NodeId(i as u32));
+    if outline.mask.iter().zip(&shape.mask).all(|(tree, shape)| *tree == 0 || *shape != 0) {
+        let coverage = coverage(skeleton, &shape);
+        let moves_as = (0..skeleton.nodes.len()).map(itself).collect();
+        let cut = Cut { larger: true, coverage, ..Cut::default() };
+        return Ok(Topiary { skeleton: skeleton.clone(), shape, cut, moves_as });
+    }
+    let envelope = Envelope::of_drawn(&shape, skeleton.foot_px);
+    let cut::Pruned { skeleton: mut pruned, kept, shortened } = cut::cut(skeleton, &envelope)?;
+    let was_trunk = is_trunk(skeleton);
+    let trunk: Vec<bool> = kept.iter().map(|&i| was_trunk[i]).collect();
+    fuse(&mut pruned, &trunk, &envelope, settings);
+    let left = pruned.nodes.len();
+    grow::grow(&mut pruned, &envelope, &shape, settings, seed);
+    let moves_as = |n: usize| match (pruned.nodes[n].copy_of, kept.get(n)) {
+        (Some(original), _) => NodeId(kept[original.index()] as u32),
+        (None, Some(&i)) => itself(i),
+        (None, None) => NodeId(0),
+    };
+    let cut = Cut {
+        larger: false,
+        gone: skeleton.nodes.len() - left,
+        shortened,
+        grown: pruned.nodes.len() - left,
+        coverage: coverage(&pruned, &shape),
+    };
+    Ok(Topiary { moves_as: (0..pruned.nodes.len()).map(moves_as).collect(), skeleton: pruned, shape, cut })
+}
+
+impl Topiary {
+    /// The pose of the cut tree in a frame in which the tree before, `skeleton`, stands as `whole` says. Every branch turns
+    /// against its parent as the measured one does of which it is a copy, in its own plane.
+    pub fn pose(&self, skeleton: &Skeleton, whole: &Pose) -> Pose {
+        let still = JointPose { position: self.skeleton.nodes[0].position, rotation: UnitQuaternion::identity() };
+        let rotation = |i: usize| whole.joints.get(i).map_or(still.rotation, |j| j.rotation);
+        let mut joints: Vec<JointPose> = Vec::with_capacity(self.skeleton.nodes.len());
+        for (node, original) in self.skeleton.nodes.iter().zip(&self.moves_as) {
+            let Some(parent) = node.parent else {
+                joints.push(whole.joints.first().copied().unwrap_or(still));
+                continue;
+            };
+            let above = skeleton.nodes.get(original.index()).and_then(|n| n.parent).map_or(0, |p| p.index());
+            let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), node.plane_angle);
+            let own = turn * (rotation(above).inverse() * rotation(original.index())) * turn.inverse();
+            let parent_joint = joints[parent.index()];
+            let rotation = UnitQuaternion::new_normalize((parent_joint.rotation * own).into_inner());
+            let way = node.position - self.skeleton.nodes[parent.index()].position;
+            joints.push(JointPose { position: parent_joint.position + rotation * way, rotation });
+        }
+        Pose { frame: whole.frame, time_s: whole.time_s, joints }
+    }
+}

@@ -1,0 +1,255 @@
+//! A capture folder read back: what is in it comes out again, and what is damaged is named.
+
+mod support;
+
+use arborcam::capture::{CaptureError, Captured};
+use arborcam::export::capture::Capture;
+use arborcam::model::Skeleton;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+use support::{CLIP, OUTLINE};
+use tempfile::TempDir;
+
+const WHOLE: f64 = 60.0;
+
+/// One replay of the shipped recording.
+fn made() -> &'static Path {
+    static MADE: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
+    let (_, out) = MADE.get_or_init(|| {
+        let dir = tempfile::tempdir().expect("tempdir");
+        let out = dir.path().join("out");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
+        command.args(["replay", CLIP, "--fast", "--headless", "--outline", OUTLINE, "--out"]).arg(&out);
+        let output = command.output().expect("arborcam");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        (dir, out)
+    });
+    out
+}
+
+/// A copy of the capture that a test may spoil.
+fn copy() -> TempDir {
+    let dir = tempfile::tempdir().expect("tempdir");
+    for file in fs::read_dir(made()).expect("capture").flatten() {
+        fs::copy(file.path(), dir.path().join(file.file_name())).expect("copy");
+    }
+    dir
+}
+
+fn edit(dir: &Path, name: &str, change: impl Fn(String) -> String) {
+    let file = dir.join(name);
+    let text = fs::read_to_string(&file).expect("text");
+    fs::write(file, change(text)).expect("write");
+}
+
+fn lengths(skeleton: &Skeleton, at: impl Fn(usize) -> nalgebra::Point3<f64>) -> Vec<f64> {
+    let own = |(i, n): (usize, &arborcam::model::Node)| n.parent.map_or(0.0, |p| (at(i) - at(p.index())).norm());
+    skeleton.nodes.iter().enumerate().map(own).collect()
+}
+
+/// Whoever exports from a folder must get the tree that was filmed, in every frame.
+#[test]
+fn what_was_written_is_read_again() {
+    let read = Captured::read(made(), WHOLE).expect("capture");
+    assert_eq!(read.warnings, [""; 0]);
+    let note = read.note.model.as_ref().expect("model");
+    let copies = read.skeleton.nodes.len() - read.skeleton.measured();
+    assert_eq!((read.skeleton.nodes.len(), copies), (note.nodes as usize, note.copies as usize));
+    assert!(copies > 10 && read.skeleton.nodes[0].certainty >= 0.0);
+    assert!(read.skeleton.nodes[2..].iter().any(|n| n.certainty > 0.5), "how sure the forks are is known");
+    assert_eq!(read.poses.len(), 330);
+    // Every node where the table has it, copies among them: these are read by their originals.
+    let rows = fs::read_to_string(made().join("motion.csv")).expect("motion.csv");
+    let mut worst = 0.0_f64;
+    for (k, row) in rows.lines().skip(1).enumerate() {
+        let cells: Vec<f64> = row.split(',').map(|c| c.parse().expect("number")).collect();
+        let joint = &read.poses[k / read.skeleton.nodes.len()].joints[k % read.skeleton.nodes.len()];
+        worst = (0..3).map(|c| (joint.position[c] - cells[3 + c]).abs()).fold(worst, f64::max);
+    }
+    println!("a node is at most {worst:.5} px off its row");
+    assert!(worst < 0.01, "{worst} px");
+    let rest = lengths(&read.skeleton, |i| read.skeleton.nodes[i].position);
+    for pose in &read.poses {
+        let now = lengths(&read.skeleton, |i| pose.joints[i].position);
+        assert!(rest.iter().zip(now).all(|(a, b)| (a - b).abs() < 1e-6));
+    }
+}
+
+#[test]
+fn the_picture_is_the_first_frame_and_the_tree_stands_in_it() {
+    let read = Captured::read(made(), WHOLE).expect("capture");
+    let picture = read.picture.expect("picture");
+    assert_eq!((picture.frame, picture.time_s), (0, 0.0));
+    let mut decoder = arborcam::source::Decoder::new().expect("decoder");
+    let first = decoder.preview(&support::recording()[0], support::SIZE.width).expect("picture");
+    assert_eq!(picture.rgb.size, first.size);
+    let off: f64 = picture.rgb.pixels.iter().zip(&first.pixels).map(|(a, b)| f64::from(a.abs_diff(*b))).sum();
+    assert!(off / (first.pixels.len() as f64) < 4.0, "the picture is another one");
+    assert_eq!(read.pose_in_picture.as_ref(), read.poses.first());
+    let outline = read.outline.expect("outline");
+    assert_eq!(outline.polygon_px, support::outline().polygon_px);
+}
+
+#[test]
+fn the_end_of_the_film_is_kept_and_the_pose_of_the_picture_with_it() {
+    let read = Captured::read(made(), 2.0).expect("capture");
+    let (first, last) = (&read.poses[0], read.poses.last().expect("poses"));
+    assert_eq!((last.frame, read.poses.len()), (329, 61));
+    assert!(last.time_s - first.time_s <= 2.0);
+    assert_eq!(read.pose_in_picture.expect("pose").frame, 0);
+}
+
+/// A capture of the version before, in which nothing is said of copies and there is no picture.
+#[test]
+fn an_older_capture_is_read_with_what_it_has() {
+    let dir = copy();
+    fs::remove_file(dir.path().join("frame.jpg")).expect("remove");
+    edit(dir.path(), "capture.json", |text| {
+        let mut note: serde_json::Value = serde_json::from_str(&text).expect("json");
+        note.as_object_mut().expect("object").remove("picture");
+        note["model"].as_object_mut().expect("object").remove("copied");
+        note["animation"].as_object_mut().expect("object").remove("raw_keys");
+        note.to_string()
+    });
+    let (new, old) = (Captured::read(made(), WHOLE).expect("new"), Captured::read(dir.path(), WHOLE).expect("old"));
+    assert!(old.picture.is_none());
+    assert!(matches!(&old.warnings[..], [one] if one.contains("no picture")), "{:?}", old.warnings);
+    for (a, b) in new.skeleton.nodes.iter().zip(&old.skeleton.nodes) {
+        assert!((a.plane_angle - b.plane_angle).abs() < 1e-9 && a.copy_of == b.copy_of, "{a:?} and {b:?}");
+    }
+    // Without the model's file nothing is known of the copies: they are where the table has them.
+    fs::remove_file(dir.path().join("tree.glb")).expect("remove");
+    let bare = Captured::read(dir.path(), WHOLE).expect("bare");
+    assert!(bare.skeleton.nodes.iter().all(|n| n.copy_of.is_none()));
+    assert!(bare.warnings.iter().any(|w| w.contains("motion.csv")), "{:?}", bare.warnings);
+    for (a, b) in new.poses.iter().zip(&bare.poses) {
+        assert!(a.joints.iter().zip(&b.joints).all(|(a, b)| (a.position - b.position).norm() < 0.02));
+    }
+}
+
+#[test]
+fn a_model_in_metres_is_read_in_pixels() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("out");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
+    command.args(["replay", CLIP, "--fast", "--headless", "--metres-per-px", "0.01", "--outline", OUTLINE, "--out"]);
+    assert!(command.arg(&out).stderr(std::process::Stdio::null()).status().expect("arborcam").success());
+    let (px, m) = (Captured::read(made(), WHOLE).expect("px"), Captured::read(&out, WHOLE).expect("m"));
+    for (a, b) in px.skeleton.nodes.iter().zip(&m.skeleton.nodes) {
+        assert!((a.position - b.position).norm() < 1e-3 && (a.radius - b.radius).abs() < 1e-3);
+    }
+}
+
+/// Followed anew from the same places in the picture, the same tree moves as before.
+#[test]
+fn a_tree_of_the_same_shape_is_posed_as_it_was() {
+    let read = Captured::read(made(), WHOLE).expect("capture");
+    let again = read.reposed(&read.skeleton, &read.note.config, &read.poses);
+    let mut off: Vec<f64> = Vec::new();
+    for (a, b) in read.poses.iter().zip(&again).skip(60) {
+        let front = |j: &arborcam::model::JointPose| read.skeleton.image_from_model(&j.position);
+        off.extend(a.joints[..read.skeleton.measured()].iter().zip(&b.joints).map(|(a, b)| {
+            let (a, b) = (front(a), front(b));
+            (a[0] - b[0]).hypot(a[1] - b[1])
+        }));
+    }
+    off.sort_by(f64::total_cmp);
+    println!("in the picture: median {:.4} px, worst {:.3} px", off[off.len() / 2], off[off.len() - 1]);
+    assert!(off[off.len() / 2] < 0.1 && off[off.len() * 99 / 100] < 1.0);
+}
+
+/// One damage each: the file that is edited, how, and a word that the message must hold.
+#[test]
+fn damage_is_named_with_file_and_line() {
+    type Edit = fn(String) -> String;
+    fn with(text: String, line: usize, column: usize, value: &str) -> String {
+        let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+        let mut cells: Vec<&str> = lines[line - 1].split(',').collect();
+        cells[column] = value;
+        lines[line - 1] = cells.join(",");
+        lines.join("\n") + "\n"
+    }
+    let cases: &[(&str, Edit, &str)] = &[
+        ("nodes.csv", |t| with(t, 5, 6, "NaN"), "nodes.csv, line 5: x is \"NaN\""),
+        ("nodes.csv", |t| with(t, 5, 6, ""), "nodes.csv, line 5: x is \"\""),
+        ("nodes.csv", |t| with(t, 5, 1, "4000000000"), "line 5: its parent is node 4000000000"),
+        ("nodes.csv", |t| with(t, 5, 0, "0"), "line 5: there are two nodes 0"),
+        ("nodes.csv", |t| with(t, 3, 1, ""), "line 3: the first node"),
+        ("nodes.csv", |t| with(t, 4, 2, "-1"), "line 4: level"),
+        ("nodes.csv", |t| t.replacen("radius", "diameter", 1), "line 1: the column radius is missing"),
+        ("motion.csv", |t| with(t, 90, 3, "inf"), "motion.csv, line 90: x is \"inf\""),
+        ("motion.csv", |t| with(t, 90, 2, "3999"), "line 90: here stands node 3999"),
+        ("motion.csv", |t| with(t, 76, 0, "0"), "motion.csv, line"),
+        ("motion.csv", |t| t[..t.len() - 40].to_owned(), "motion.csv, line"),
+        ("motion.csv", |t| t.lines().take(100).map(|l| format!("{l}\n")).collect(), "in the middle of frame 1"),
+        ("motion.csv", |_| String::new(), "line 1: the column frame is missing"),
+        ("capture.json", |t| t[..t.len() / 2].to_owned(), "capture.json: "),
+        ("capture.json", |t| t.replacen("\"schema_version\": 1", "\"schema_version\": 99", 1), "newer version"),
+        ("capture.json", |t| t.replacen("\"fold\"", "\"unfold\"", 1), "newer version"),
+        ("capture.json", |t| t.replacen("\"width\": 640", "\"width\": 4000000000", 1), "of this size"),
+        ("capture.json", |t| t.replacen("\"fold\": 0.4", "\"fold\": 40.0", 1), "out of range"),
+    ];
+    for (name, change, word) in cases {
+        let dir = copy();
+        edit(dir.path(), name, change);
+        let error = Captured::read(dir.path(), WHOLE).expect_err(word).to_string();
+        assert!(error.contains(word) && !error.contains('\n'), "{word}: {error}");
+    }
+    for name in ["nodes.csv", "motion.csv"] {
+        let dir = copy();
+        fs::remove_file(dir.path().join(name)).expect("remove");
+        let error = Captured::read(dir.path(), WHOLE).expect_err("missing").to_string();
+        assert!(error.contains(&format!("lacks {name}")), "{error}");
+    }
+    let nowhere = Captured::read(Path::new("recordings"), WHOLE).expect_err("no capture");
+    assert!(matches!(nowhere, CaptureError::NotACapture { .. }), "{nowhere}");
+}
+
+#[test]
+fn a_film_without_a_tree_is_no_damage() {
+    let dir = copy();
+    edit(dir.path(), "capture.json", |text| {
+        let mut note: Capture = serde_json::from_str(&text).expect("json");
+        note.model = None;
+        serde_json::to_string(&note).expect("json")
+    });
+    let error = Captured::read(dir.path(), WHOLE).expect_err("no tree");
+    assert!(matches!(error, CaptureError::NoTree { .. }), "{error}");
+}
+
+mod fuzz {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+
+        /// Whatever happened to the bytes, the program says so or goes on; it does not fall.
+        #[test]
+        fn no_damage_makes_the_reader_fall(
+            name in prop::sample::select(vec!["nodes.csv", "motion.csv", "capture.json", "tree.glb", "frame.jpg"]),
+            at in prop::collection::vec(0.0..1.0f64, 1..6),
+            with in prop::sample::select(vec![b',', b'\n', b'"', b'9', b'-', b'e', 0u8, 0xff]),
+            cut in prop::option::of(0.0..1.0f64),
+        ) {
+            let dir = copy();
+            let file = dir.path().join(name);
+            let mut bytes = fs::read(&file).expect("read");
+            // The front of a large file is as good as all of it, and read faster.
+            bytes.truncate(200_000);
+            for at in at {
+                let i = (at * bytes.len() as f64) as usize;
+                bytes[i] = with;
+            }
+            if let Some(cut) = cut {
+                bytes.truncate((cut * bytes.len() as f64) as usize);
+            }
+            fs::write(&file, &bytes).expect("write");
+            if let Err(e) = Captured::read(dir.path(), 1.0) {
+                prop_assert!(!e.to_string().contains('\n'), "{}", e);
+            }
+        }
+    }
+}

@@ -1,0 +1,267 @@
+//! `arborcam export`: what a user gets from a capture, and what bad input gets.
+
+mod support;
+
+use arborcam::capture::Captured;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+use support::{CLIP, OUTLINE};
+use tempfile::TempDir;
+
+const FAILED: i32 = 1;
+const BAD_USAGE: i32 = 2;
+const NO_INPUT: i32 = 3;
+
+/// One replay of the shipped recording.
+fn made() -> &'static Path {
+    static MADE: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
+    let (_, out) = MADE.get_or_init(|| {
+        let dir = tempfile::tempdir().expect("tempdir");
+        let out = dir.path().join("out");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
+        command.args(["replay", CLIP, "--fast", "--headless", "--outline", OUTLINE, "--out"]).arg(&out);
+        let output = command.output().expect("arborcam");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        (dir, out)
+    });
+    out
+}
+
+fn export(dir: &Path, format: &str, out: &Path, more: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
+    command.arg("export").arg(dir).args(["--format", format, "--out"]).arg(out).args(more);
+    command.output().expect("arborcam")
+}
+
+fn exported(format: &str, name: &str, more: &[&str]) -> (TempDir, PathBuf) {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join(name);
+    let output = export(made(), format, &out, more);
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{told}");
+    assert!(!told.contains("warning"), "{told}");
+    (dir, out)
+}
+
+fn names_in(dir: &Path) -> Vec<String> {
+    let mut names: Vec<String> =
+        fs::read_dir(dir).expect("folder").flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// Names of the joints, and how many triangles hang on them.
+fn look(document: &gltf::Document) -> (Vec<String>, usize) {
+    let joints = document.skins().next().expect("a skin").joints();
+    let names = joints.map(|j| j.name().expect("name").to_owned()).collect();
+    let triangles = document.meshes().flat_map(|m| m.primitives().collect::<Vec<_>>());
+    (names, triangles.filter_map(|p| p.indices()).map(|i| i.count() / 3).sum())
+}
+
+/// Whoever exports without changes gets the model that lies in the capture.
+#[test]
+fn the_glb_is_the_captures_own() {
+    let (_dir, out) = exported("glb", "tree.glb", &[]);
+    let (own, ours) = (gltf::Gltf::open(made().join("tree.glb")).expect("own"), gltf::Gltf::open(&out).expect("ours"));
+    assert_eq!(look(&own.document), look(&ours.document));
+    let end_s = |d: &gltf::Gltf| {
+        let ends = d.animations().flat_map(|a| a.channels().collect::<Vec<_>>());
+        ends.map(|c| c.sampler().input().max().expect("max")[0].as_f64().expect("s")).fold(0.0, f64::max)
+    };
+    assert!((end_s(&own) - end_s(&ours)).abs() < 1e-4 && end_s(&ours) > 10.9);
+    let bark = |d: &gltf::Gltf| d.materials().next().expect("bark").pbr_metallic_roughness().base_color_factor();
+    let off = bark(&own).iter().zip(bark(&ours)).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(off < 0.05, "the bark is off by {off}: the picture has been through JPEG, no more");
+    // To standard output, and a second time: the same bytes.
+    let again = export(made(), "glb", Path::new("-"), &[]);
+    assert!(again.status.success());
+    assert!(again.stdout == fs::read(&out).expect("glb"), "standard output differs from the file");
+}
+
+#[test]
+fn gltf_lies_beside_its_parts_whatever_it_is_called() {
+    let (dir, out) = exported("gltf", "my tree, 100%.gltf", &[]);
+    assert_eq!(names_in(dir.path()), ["my tree, 100%.bin", "my tree, 100%.gltf"]);
+    let text = fs::read_to_string(&out).expect("text");
+    let json: serde_json::Value = serde_json::from_str(&text).expect("json");
+    assert_eq!(json["buffers"][0]["uri"], "my%20tree%2C%20100%25.bin");
+    let bytes = fs::metadata(dir.path().join("my tree, 100%.bin")).expect("bin").len();
+    assert_eq!(json["buffers"][0]["byteLength"], bytes);
+    let (_dir, plain) = exported("gltf", "tree.gltf", &[]);
+    let (document, _, _) = gltf::import(&plain).expect("a glTF with its buffer");
+    assert_eq!(look(&document).0.len(), Captured::read(made(), 1.0).expect("capture").skeleton.nodes.len());
+}
+
+#[test]
+fn csv_is_the_tables_and_cylinders_that_join() {
+    let (_dir, out) = exported("csv", "tables", &[]);
+    assert_eq!(names_in(&out), ["cylinders.csv", "motion.csv", "nodes.csv", "tracks.csv"]);
+    for name in ["motion.csv", "nodes.csv", "tracks.csv"] {
+        assert!(fs::read(out.join(name)).expect(name) == fs::read(made().join(name)).expect(name), "{name} differs");
+    }
+    let text = fs::read_to_string(out.join("cylinders.csv")).expect("cylinders");
+    let mut lines = text.lines();
+    assert_eq!(
+        lines.next(),
+        Some(
+            "ID,parentID,start_x,start_y,start_z,end_x,end_y,end_z,axis_x,axis_y,axis_z,radius,length,branch,branch_order"
+        )
+    );
+    let rows: Vec<Vec<f64>> = lines.map(|l| l.split(',').map(|c| c.parse().expect("number")).collect()).collect();
+    assert!(rows.len() > 70, "{} cylinders", rows.len());
+    let mut order: BTreeMap<u64, f64> = BTreeMap::new();
+    for (k, row) in rows.iter().enumerate() {
+        assert_eq!((row.len(), row[0]), (15, k as f64 + 1.0));
+        let way: Vec<f64> = (0..3).map(|c| row[5 + c] - row[2 + c]).collect();
+        let length = way.iter().map(|w| w * w).sum::<f64>().sqrt();
+        assert!((length - row[12]).abs() < 0.001 && row[12] > 0.0 && row[11] >= 0.0, "{row:?}");
+        assert!((0..3).all(|c| (row[8 + c] * length - way[c]).abs() < 0.001), "{row:?}");
+        // A branch keeps its order, and one that leaves another has one more.
+        let known = *order.entry(row[13] as u64).or_insert(row[14]);
+        assert_eq!(known, row[14], "{row:?}");
+        if row[1] == 0.0 {
+            assert_eq!((row[14], row[3].abs() < 1e-6), (0.0, true), "what stands on the ground: {row:?}");
+            continue;
+        }
+        let parent = &rows[row[1] as usize - 1];
+        assert!(row[1] < row[0] && (parent[13] == row[13] || parent[14] + 1.0 == row[14]), "{parent:?} and {row:?}");
+    }
+}
+
+#[test]
+fn the_still_tree_opens_as_obj_and_ply() {
+    let (_, triangles) = look(&gltf::Gltf::open(made().join("tree.glb")).expect("glb").document);
+    let (dir, out) = exported("obj", "tree.obj", &[]);
+    assert_eq!(names_in(dir.path()), ["tree.mtl", "tree.obj"]);
+    let text = fs::read_to_string(&out).expect("obj");
+    let count = |kind: &str| text.lines().filter(|l| l.split(' ').next() == Some(kind)).count();
+    assert_eq!((count("f"), count("v")), (triangles, count("vn")));
+    let vertices = count("v");
+    for corner in text.lines().filter_map(|l| l.strip_prefix("f ")).flat_map(|l| l.split(' ')) {
+        let of: Vec<usize> = corner.split('/').map(|n| n.parse().expect("index")).collect();
+        assert!(of.iter().all(|&i| i >= 1 && i <= vertices), "{corner}");
+    }
+    assert!(fs::read_to_string(dir.path().join("tree.mtl")).expect("mtl").contains("newmtl bark\nKd 0."));
+    let (_dir, out) = exported("ply", "tree.ply", &[]);
+    let bytes = fs::read(&out).expect("ply");
+    let end = b"end_header\n";
+    let at = bytes.windows(end.len()).position(|w| w == end).expect("a header") + end.len();
+    let head = String::from_utf8(bytes[..at].to_vec()).expect("text");
+    assert!(head.contains(&format!("element vertex {vertices}\n")) && head.contains(&format!("face {triangles}\n")));
+    assert_eq!(bytes.len() - at, 27 * vertices + 13 * triangles);
+}
+
+#[test]
+fn another_shape_keeps_what_was_measured() {
+    let (_dir, out) = exported("csv", "tables", &["--planes", "5", "--animation-s", "2"]);
+    let read = Captured::read(made(), 60.0).expect("capture");
+    let measured = read.skeleton.measured();
+    let rows: Vec<Vec<String>> = fs::read_to_string(out.join("nodes.csv"))
+        .expect("nodes")
+        .lines()
+        .skip(1)
+        .map(|l| l.split(',').map(str::to_owned).collect())
+        .collect();
+    let trunk = read.skeleton.nodes.iter().filter(|n| n.level < 2 && n.copy_of.is_none()).count();
+    assert_eq!(rows.len(), measured + 4 * (measured - trunk));
+    let mut names: Vec<&str> = rows.iter().map(|r| r[0].as_str()).collect();
+    for (row, node) in rows.iter().zip(&read.skeleton.nodes[..measured]) {
+        assert_eq!(row[0], node.name.0.to_string());
+        let [u, v] = read.skeleton.image_from_model(&node.position);
+        let px = |c: usize| row[c].parse::<f64>().expect("px");
+        assert!((px(4) - u).abs() < 0.51 && (px(5) - v).abs() < 0.51, "{row:?} stood at {u}, {v}");
+    }
+    names.sort();
+    names.dedup();
+    assert_eq!(names.len(), rows.len(), "no two nodes have one name");
+    let motion = fs::read_to_string(out.join("motion.csv")).expect("motion");
+    assert_eq!(motion.lines().count(), 1 + 61 * rows.len());
+    // The nodes are where they were in the picture.
+    let first: u64 = motion.lines().nth(1).expect("row").split(',').next().expect("frame").parse().expect("frame");
+    let pose = read.poses.iter().find(|p| p.frame == first).expect("pose");
+    for (row, joint) in motion.lines().skip(1).zip(&pose.joints[..measured]) {
+        let cells: Vec<f64> = row.split(',').map(|c| c.parse().expect("number")).collect();
+        let [u, v] = read.skeleton.image_from_model(&joint.position);
+        assert!((cells[6] - u).hypot(cells[7] - v) < 8.0, "{row} was at {u}, {v}");
+    }
+}
+
+#[test]
+fn settings_go_file_over_capture_and_command_line_over_file() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let file = dir.path().join("metres.toml");
+    fs::write(&file, "[export]\nmetres_per_px = 0.5\nanimation_s = 1.0\n").expect("write");
+    let (_dir, out) = exported("csv", "tables", &["--config", file.to_str().expect("path"), "--metres-per-px", "0.01"]);
+    let at = |path: PathBuf| {
+        let text = fs::read_to_string(path).expect("nodes");
+        text.lines().nth(2).expect("row").split(',').nth(7).expect("y").parse::<f64>().expect("y")
+    };
+    let (m, px) = (at(out.join("nodes.csv")), at(made().join("nodes.csv")));
+    assert!((m / px - 0.01).abs() < 1e-5, "{m} m of {px} px");
+    let rows = fs::read_to_string(out.join("motion.csv")).expect("motion").lines().count();
+    let nodes = fs::read_to_string(out.join("nodes.csv")).expect("nodes").lines().count() - 1;
+    assert_eq!(rows, 1 + 31 * nodes, "one second of film");
+}
+
+/// Arguments after `export` ({c} the capture, {w} a folder to write to), status, what the line must say.
+type Case = (&'static str, i32, &'static [&'static str]);
+
+const CASES: &[Case] = &[
+    ("recordings --format glb --out {w}/t.glb", NO_INPUT, &["recordings is no capture", "--out"]),
+    ("{w}/nothing --format glb --out {w}/t.glb", NO_INPUT, &["is no capture"]),
+    ("recordings/README.md --format glb --out {w}/t.glb", NO_INPUT, &["is no capture"]),
+    ("{w}/cut --format glb --out {w}/t.glb", NO_INPUT, &["motion.csv, line", "make the capture anew"]),
+    ("{w}/bare --format glb --out {w}/t.glb", FAILED, &["holds tracks but no tree", "film for longer"]),
+    ("{c} --format glb --out {w}/there", FAILED, &["{w}/there exists already", "choose another"]),
+    ("{c} --format csv --out {w}/there", FAILED, &["{w}/there exists already", "choose another"]),
+    ("{c} --format glb --out {w}/no/such/t.glb", FAILED, &["{w}/no/such is not there", "make it first"]),
+    ("{c} --format glb --out {w}/there/t.glb", FAILED, &["{w}/there", "choose another"]),
+    ("{c} --format glb --out /", BAD_USAGE, &["--out / is no name for a file"]),
+    ("{c} --format fbx --out {w}/t.fbx", BAD_USAGE, &["'fbx'", "glb"]),
+    ("{c} --format gltf --out {w}/t.glb", BAD_USAGE, &["does not end in .gltf"]),
+    ("{c} --format obj --out {w}/t", BAD_USAGE, &["does not end in .obj"]),
+    ("{c} --format csv --out -", BAD_USAGE, &["more than one file"]),
+    ("{c} --format glb --out {w}/t.glb --planes 99", BAD_USAGE, &["shape.planes = 99", "1 to 8"]),
+    ("{c} --format glb --out {w}/t.glb --tolerance-px 0", BAD_USAGE, &["--tolerance-px", "from 0.001"]),
+    ("{c} --format glb --out {w}/t.glb --metres-per-px NaN", BAD_USAGE, &["export.metres_per_px"]),
+    ("{c} --format glb --out {w}/t.glb --config {w}/bad.toml", BAD_USAGE, &["bad.toml, line 2", "plains"]),
+    ("{c} --format glb --out {w}/t.glb --config {w}/none.toml", BAD_USAGE, &["none.toml", "check the name"]),
+    ("{c} --format glb", BAD_USAGE, &["--out"]),
+];
+
+#[test]
+fn bad_input_gets_one_line_and_leaves_nothing() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let work = dir.path();
+    for name in ["cut", "bare"] {
+        fs::create_dir(work.join(name)).expect("folder");
+        for file in fs::read_dir(made()).expect("capture").flatten() {
+            fs::copy(file.path(), work.join(name).join(file.file_name())).expect("copy");
+        }
+    }
+    let motion = fs::read(work.join("cut/motion.csv")).expect("motion");
+    fs::write(work.join("cut/motion.csv"), &motion[..motion.len() / 2]).expect("write");
+    let note = fs::read_to_string(work.join("bare/capture.json")).expect("note");
+    let mut note: serde_json::Value = serde_json::from_str(&note).expect("json");
+    note["model"] = serde_json::Value::Null;
+    fs::write(work.join("bare/capture.json"), note.to_string()).expect("write");
+    fs::write(work.join("there"), "mine").expect("write");
+    fs::write(work.join("bad.toml"), "[shape]\nplains = 3\n").expect("write");
+    let before = names_in(work);
+    for (words, status, says) in CASES {
+        let place =
+            |text: &str| text.replace("{c}", &made().display().to_string()).replace("{w}", &work.display().to_string());
+        let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
+        let output = command.arg("export").args(words.split(' ').map(place)).output().expect("arborcam");
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(*status), "{words}: {told}");
+        assert!(says.iter().all(|part| told.contains(&place(part))), "{words}: {told}");
+        let lines: Vec<&str> = told.lines().filter(|l| l.starts_with("arborcam: ")).collect();
+        assert_eq!(lines.len(), 1, "{words}: {told}");
+        assert_eq!(names_in(work), before, "{words}");
+        assert_eq!(fs::read_to_string(work.join("there")).expect("mine"), "mine");
+    }
+}

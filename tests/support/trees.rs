@@ -1,0 +1,93 @@
+//! Flat skeletons to stand up: those of the public clips, and a made-up one.
+#![allow(dead_code)] // not every test file needs all of it
+
+use arborcam::config::Config;
+use arborcam::model::{Outline, Size};
+use arborcam::outline::{self, Given};
+use arborcam::pipeline::Pipeline;
+use arborcam::skeleton::Node2d;
+use arborcam::source::{self, Decoder};
+use std::path::{Path, PathBuf};
+
+/// What a tree is stood up from.
+pub struct Flat {
+    pub name: &'static str,
+    pub nodes: Vec<Node2d>,
+    pub tracks: Vec<u32>,
+    pub outline: Outline,
+}
+
+impl Flat {
+    pub fn shipped() -> Self {
+        Self::of_clip("sparse_winter", Path::new(super::support::CLIP), Path::new(super::support::OUTLINE))
+    }
+
+    /// The second public clip, `oak_release` below the folder that ARBORCAM_CLIPS names.
+    pub fn oak() -> Option<Self> {
+        let Some(clips) = std::env::var_os("ARBORCAM_CLIPS").map(PathBuf::from) else {
+            println!("skipped: ARBORCAM_CLIPS does not name a folder with oak_release/video.mkv");
+            return None;
+        };
+        let folder = clips.join("oak_release");
+        Some(Self::of_clip("oak_release", &folder.join("video.mkv"), &folder.join("outline.json")))
+    }
+
+    fn of_clip(name: &'static str, clip: &Path, outline: &Path) -> Self {
+        let config = Config::default();
+        let mut clip = source::open(clip, &config.camera, None).expect("clip");
+        let Given::Region(outline) = outline::load(outline, clip.describe().size).expect("outline") else {
+            panic!("a polygon");
+        };
+        let mut pipeline = Pipeline::new(&config, Some(outline.clone()));
+        let mut decoder = Decoder::new().expect("decoder");
+        let (mut first_s, mut index) = (None, 0);
+        while let Some(raw) = clip.next_frame().expect("frame") {
+            let first_s = *first_s.get_or_insert(raw.sensor_time_s);
+            let mut luma = arborcam::model::Luma { size: raw.size, pixels: Vec::new() };
+            decoder.luma(&raw, &mut luma).expect("picture");
+            let time_s = raw.sensor_time_s - first_s;
+            let received = std::time::Instant::now();
+            pipeline.step(arborcam::model::Frame { index, time_s, received, luma, preview: None });
+            index += 1;
+        }
+        pipeline.finish();
+        let (nodes, tracks) = pipeline.back.tree().expect("a tree").flat(&config);
+        Self { name, nodes, tracks, outline }
+    }
+
+    /// A binary tree of `levels` levels that forks by some 45 degrees, more or less (`wild`, radians), in a round crown.
+    pub fn generated(levels: u8) -> Self {
+        Self::generated_by(levels, 0, 0.2)
+    }
+
+    pub fn generated_by(levels: u8, seed: u64, wild: f64) -> Self {
+        let node = |parent, level, position_px| Node2d { parent, level, cluster: None, position_px, certainty: 0.8 };
+        let mut nodes = vec![node(None, 0, [320.0, 340.0]), node(Some(0), 1, [316.0, 240.0])];
+        let mut i = 1;
+        while i < nodes.len() {
+            let (level, at) = (nodes[i].level, nodes[i].position_px);
+            let from = nodes[nodes[i].parent.expect("a parent")].position_px;
+            let lean = (at[0] - from[0]).atan2(from[1] - at[1]);
+            for side in [-1.0, 1.0].into_iter().filter(|_| level < levels) {
+                let wobble = |k: u64| ((i as u64 * 7 + k + 31 * seed) as f64 * 12.9898 + side).sin();
+                let turn = lean + side * 0.75 + wild * wobble(1);
+                let length = 85.0 * 0.72_f64.powi(i32::from(level) - 1) * (1.0 + 0.2 * wobble(2));
+                nodes.push(node(Some(i), level + 1, [at[0] + length * turn.sin(), at[1] - length * turn.cos()]));
+            }
+            i += 1;
+        }
+        let round = |k: usize| {
+            let (sin, cos) = (std::f64::consts::TAU * k as f64 / 48.0).sin_cos();
+            [316.0 + 165.0 * sin, 170.0 + 150.0 * cos]
+        };
+        let mut border = vec![[308.0, 340.0], [332.0, 340.0], [332.0, 315.0]];
+        border.extend((2..47).map(round));
+        border.push([308.0, 315.0]);
+        let outline = outline::from_polygon(&border, Size::new(640, 360)).expect("outline");
+        Self { name: "generated", tracks: vec![3; nodes.len()], nodes, outline }
+    }
+
+    pub fn all() -> Vec<Self> {
+        [Some(Self::generated(6)), Some(Self::shipped()), Self::oak()].into_iter().flatten().collect()
+    }
+}
