@@ -23,8 +23,12 @@ use std::sync::Arc;
 use std::time::Duration;
 use tracking::{median, timed_ms};
 
-/// With a word, `make bench ONLY=tracking`, only the figures of the tracker.
+/// With a word, `make bench ONLY=tracking` or `ONLY=wood`, only the figures of the tracker, or of the static tree.
 fn main() {
+    if std::env::args().any(|a| a == "wood") {
+        println!("{}", dressed());
+        return;
+    }
     let dir = tempfile::tempdir().expect("tempdir");
     let clip = scaled(dir.path(), "1280:720");
     let large = scaled(dir.path(), "1920:1080");
@@ -39,6 +43,7 @@ fn main() {
         .warm_up_time(Duration::from_millis(300))
         .measurement_time(Duration::from_secs(3));
     let lines = [build(&mut criterion, 400, 100), build(&mut criterion, 2000, 1500)].into_iter().chain([
+        dressed(),
         pose(&mut criterion),
         model_file(),
         matting(),
@@ -116,6 +121,23 @@ fn build(criterion: &mut Criterion, points: usize, bound_ms: u32) -> String {
     let parting_ms = median((0..10).map(|_| timed_ms(parting).0).collect());
     let moving = evidence.moving.len();
     format!("build of {moving} points: {ms:.0} ms, {parting_ms:.0} ms of it the hierarchy (must be <= {bound_ms})")
+}
+
+/// From the built hierarchy to all that is drawn.
+fn dressed() -> String {
+    let (history, outline, _) = gathered();
+    let tree = built(&history, &outline);
+    let mut config = Config::default();
+    config.wood.triangles = 20_000;
+    let all = || {
+        let skeleton = pipeline::stand(&tree.hierarchy, &outline, &config);
+        dress(&skeleton, Seen { outline: Some(&outline), ..Seen::default() }, &config)
+    };
+    let ms = median((0..10).map(|_| timed_ms(all).0).collect());
+    let dressed = all();
+    let triangles = dressed.wood.first().map_or(0, |mesh| mesh.indices.len() / 3);
+    let twigs = dressed.limbs.iter().filter(|l| l.twig).count();
+    format!("static tree of {triangles} triangles, {twigs} twigs, with two coarser levels: {ms:.0} ms (must be <= 400)")
 }
 
 fn pose(criterion: &mut Criterion) -> String {

@@ -197,9 +197,7 @@ pub fn build(
     if hierarchy.clusters.first().is_none_or(|all| all.members.len() < LEAST_MOVING) {
         return None;
     }
-    let (flat, tracks) = flat(&hierarchy, outline, config);
-    let mut skeleton = shape::build(&flat, &tracks, outline, &config.shape);
-    thicken(&mut skeleton, outline, &config.wood);
+    let skeleton = stand(&hierarchy, outline, config);
     let rest = |row: usize| (table.ids[row], hierarchy::rest_position_px(table, row));
     let first = First { frame, time_s, measure: evidence.measure, moving: evidence.moving.len(), forced };
     Some(Tree {
@@ -220,4 +218,12 @@ pub fn build(
         evidence,
         forced,
     })
+}
+
+/// Hierarchy to tree in space, with its thickness.
+pub fn stand(hierarchy: &MotionHierarchy, outline: &Outline, config: &Config) -> Skeleton {
+    let (flat, tracks) = flat(hierarchy, outline, config);
+    let mut skeleton = shape::build(&flat, &tracks, outline, &config.shape);
+    thicken(&mut skeleton, outline, &config.wood);
+    skeleton
 }

@@ -268,7 +268,7 @@ fn the_bark_has_the_colour_of_the_trunk() {
     let corner = |du: f64, v: f64| [foot[0] + du, v];
     let corners = [corner(-18.0, 200.0), corner(18.0, 200.0), corner(18.0, foot[1]), corner(-18.0, foot[1])];
     let outline = arborcam::outline::from_polygon(&corners, size).expect("outline");
-    let seen = Seen { picture: Some(&picture), pose: None, outline: Some(&outline) };
+    let seen = Seen { picture: Some(&picture), outline: Some(&outline), ..Seen::default() };
     assert_eq!(dress(&skeleton, seen, &Config::default()).bark_rgb, brown);
     assert_eq!(dress(&skeleton, Seen { outline: None, ..seen }, &Config::default()).bark_rgb, brown);
     assert_ne!(

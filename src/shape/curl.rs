@@ -57,6 +57,11 @@ impl Curve {
         }
     }
 
+    /// The same with `share` of its excursions.
+    pub fn calmer(self, share: f64) -> Self {
+        Self { via: self.via.map(|v| v * share), ..self }
+    }
+
     /// The point at share `t` of the way; at 0 and 1 the ends themselves, to the last bit.
     pub fn at(&self, t: f64) -> Point3<f64> {
         if t >= 1.0 {

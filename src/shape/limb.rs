@@ -181,15 +181,16 @@ fn branches(skeleton: &Skeleton, curl: f64, seed: u64) -> Vec<Grown> {
         let before = arrives[parent.index()];
         let leaves = match limb_of[parent.index()] {
             // A trunk stands upright on the ground.
-            None => (along + Vector3::y()).try_normalize(0.1).unwrap_or(along),
+            None if along.y > 0.0 => Vector3::y(),
+            None => along,
             Some(_) if goes_on[parent.index()] == Some(NodeId(i as u32)) => before,
             // A side branch leaves between the way of its parent and its own.
             Some(_) => (along + before * 0.5).try_normalize(0.1).unwrap_or(along),
         };
         let chance = Chance::new(Chance::part(seed, node.name.0.into()));
-        // A trunk that was filmed is as straight as it looks.
-        let curl = if limb_of[parent.index()].is_none() { 0.4 * curl } else { curl };
         let curve = Curve::new([nodes[parent.index()].position, node.position], leaves, arrives[i], curl, chance);
+        // A trunk was filmed all along, and is as straight as it looks.
+        let curve = if limb_of[parent.index()].is_none() { curve.calmer(0.3) } else { curve };
         let own = NodeId(i as u32);
         let station = |k: u32| {
             let t = f64::from(k) / f64::from(PIECES);

@@ -9,6 +9,8 @@ use crate::model::Skeleton;
 pub const PIPE_EXPONENTS: [f64; 2] = [1.8, 3.0];
 /// Radius of the last twig, px at 640 px picture width.
 pub const TIP_RADIUS_PX: f64 = 0.6;
+/// A branch at whose end no twig stands counts as a pipe for each so many px of its length at 640 px picture width.
+const PIPE_PX: f64 = 12.0;
 /// Share of a branch's length over which the pipes of what leaves it join it.
 const JOINS_WITHIN: f64 = 0.3;
 /// Power with which a limb that ends runs out.
@@ -36,8 +38,8 @@ pub fn thicken(skeleton: &mut Skeleton, trunk_radius_px: f64, room: Room, wood: 
     }
 }
 
-/// Thickness along every limb: `r = r_trunk (pipes above / pipes of the tree)^(1/e)`, where a limb that carries nothing is
-/// one pipe. What leaves joins gradually, so that no limb has a step, and a limb ends as thick as the one begins that it
+/// Thickness along every limb: `r = r_trunk (pipes above / pipes of the tree)^(1/e)`, where a twig that carries nothing is
+/// one pipe, and a branch one for each [`PIPE_PX`] of its length. What leaves joins gradually, so that no limb has a step, and a limb ends as thick as the one begins that it
 /// goes on in.
 ///
 /// Only what was measured counts towards what carries it. Copies stand for branches that the camera cannot tell from
@@ -48,7 +50,11 @@ pub(super) fn by_pipes(grown: &mut [Grown], skeleton: &Skeleton, trunk_radius_px
     let is_copy = |g: &Grown| skeleton.nodes.get(g.limb.node.index()).is_some_and(|n| n.copy_of.is_some());
     let mut bearing = vec![Bearing::default(); grown.len()];
     for i in (0..grown.len()).rev() {
-        let own = bearing[i].settle();
+        let limb = &grown[i].limb;
+        // A branch that was followed is seen, so it is no hair, even where no twig has room on it.
+        let alone_px = PIPE_PX * f64::from(skeleton.image_size.width) / 640.0;
+        let least = if limb.twig { 1.0 } else { (limb.length() / alone_px).max(1.0) };
+        let own = bearing[i].settle(least);
         let Some(p) = grown[i].limb.parent.filter(|&p| p < i) else { continue };
         if !is_copy(&grown[i]) || is_copy(&grown[p]) {
             bearing[p].leaving.push((grown[i].at, own));
@@ -91,13 +97,14 @@ struct Bearing {
 }
 
 impl Bearing {
-    /// Takes what goes on at the end out of what leaves, once all is known, and gives the pipes at the base.
-    fn settle(&mut self) -> f64 {
+    /// Takes what goes on at the end out of what leaves, once all is known, and gives the pipes at the base; an end where
+    /// nothing goes on has `alone`.
+    fn settle(&mut self, alone: f64) -> f64 {
         let at_end = |&k: &usize| self.leaving[k].0 >= 1.0;
         let on =
             (0..self.leaving.len()).filter(at_end).max_by(|&a, &b| self.leaving[a].1.total_cmp(&self.leaving[b].1));
         self.goes_on = on.is_some();
-        self.end = on.map_or(1.0, |k| self.leaving.swap_remove(k).1);
+        self.end = on.map_or(alone, |k| self.leaving.swap_remove(k).1);
         self.pipes(0.0)
     }
 
