@@ -11,6 +11,7 @@ mod recording;
 mod replay;
 mod service;
 mod session;
+mod shape;
 
 use crate::config::{Config, ConfigError};
 use crate::outline::OutlineSpec;
@@ -75,6 +76,8 @@ struct Common {
     /// Metres in a pixel at the tree; the model is then in metres.
     #[arg(long, value_name = "M")]
     metres_per_px: Option<f64>,
+    #[command(flatten)]
+    shape: shape::ShapeArgs,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -92,6 +95,7 @@ impl Common {
         if let Some(metres) = self.metres_per_px {
             config.export.metres_per_px = metres;
         }
+        self.shape.set(&mut config);
         set(&mut config);
         config.check()?;
         Ok(config)
