@@ -75,6 +75,11 @@ fn fixtures() -> &'static Path {
         polygon("outside.json", size, "[10, 10], [990, 10], [90, 90]");
         polygon("crossing.json", size, "[10, 10], [90, 90], [90, 10], [10, 90]");
         polygon("two.json", size, "[10, 10], [90, 90]");
+        let trunk = |name: &str, size: &str, points: &str| {
+            write(name, format!(r#"{{{size}, "polyline_px": [{points}]}}"#).as_bytes());
+        };
+        trunk("trunk-other.json", r#""width": 1280, "height": 720"#, "[10, 90], [10, 10]");
+        trunk("trunk-point.json", size, "[10, 10]");
         write("cut.json", br#"{"frame": 0, "width": 640,"#);
         write("words.json", b"the tree is in the middle");
         let mask = |name: &str, size: [u32; 2], shade: u8| {
@@ -229,6 +234,16 @@ const CASES: &[Case] = &[
         &["words.json", "neither a JSON polygon", "draw it"],
         Nothing,
     ),
+    (
+        "replay {f}/clip.mkv --trunk {f}/trunk-other.json",
+        BAD_USAGE,
+        &["--trunk", "1280x720", "640x360", "draw it"],
+        Nothing,
+    ),
+    ("replay {f}/clip.mkv --trunk {f}/trunk-point.json", BAD_USAGE, &["--trunk", "at least two points"], Nothing),
+    ("replay {f}/clip.mkv --trunk {f}/words.json", BAD_USAGE, &["words.json", "polyline_px"], Nothing),
+    ("replay {f}/clip.mkv --trunk {f}/none.json", BAD_USAGE, &["none.json", "or auto"], Nothing),
+    ("replay {f}/clip.mkv --envelope sphere", BAD_USAGE, &["sphere", "revolution or hull"], Nothing),
     ("replay {f}/clip.mkv --outline {f}/none.json", BAD_USAGE, &["none.json", "check the name"], Nothing),
     ("replay {f}/clip.mkv --outline {f}/small.png", BAD_USAGE, &["small.png", "64x36", "640x360", "draw it"], Nothing),
     ("replay {f}/clip.mkv --outline {f}/black.png", BAD_USAGE, &["black.png", "nothing in it is white"], Nothing),

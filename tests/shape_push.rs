@@ -14,12 +14,16 @@ use trees::Flat;
 /// Li et al. figure 3: the one-sided variants either spread the tree or keep its angles; both together do both.
 #[test]
 fn the_tree_is_as_full_as_by_the_envelope_alone_and_as_plausible_as_by_the_angles_alone() {
-    for tree in Flat::all() {
+    // More made-up ones, lest it is made to fit one.
+    let others = [(5, 1, 0.4), (6, 2, 0.5), (5, 3, 0.1)]
+        .map(|(levels, seed, wild)| Flat { name: "another", ..Flat::generated_by(levels, seed, wild) });
+    for tree in Flat::all().into_iter().chain(others) {
         let figures = PushFigures::of(&tree.nodes, &tree.tracks, &tree.outline, &config::Shape::default());
         let (filling, plausibility) = (figures.filling(), figures.plausibility());
-        println!("{}: filling {filling:.3}, plausibility {plausibility:.3}\n{figures:#?}", tree.name);
-        assert!(filling >= 0.95, "{}: filling {filling:.3}", tree.name);
-        assert!(plausibility >= 0.95, "{}: plausibility {plausibility:.3}", tree.name);
+        println!("{}: filling {filling:.3}, plausibility {plausibility:.3}\n{figures:?}", tree.name);
+        let wanted = if tree.name == "another" { 0.9 } else { 0.95 };
+        assert!(filling >= wanted, "{}: filling {filling:.3}", tree.name);
+        assert!(plausibility >= wanted, "{}: plausibility {plausibility:.3}", tree.name);
         // Neither of the two is good at what the other is for, or there were nothing to fuse.
         let (d, p) = (figures.distance_px, figures.angle_likelihood);
         assert!(d.local_only > d.global_only && p.global_only < p.local_only, "{}", tree.name);

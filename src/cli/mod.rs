@@ -13,6 +13,7 @@ mod render;
 mod replay;
 mod service;
 mod session;
+mod shape;
 mod shaping;
 
 use crate::config::{Config, ConfigError};
@@ -82,6 +83,8 @@ struct Common {
     /// Metres in a pixel at the tree; the model is then in metres.
     #[arg(long, value_name = "M")]
     metres_per_px: Option<f64>,
+    #[command(flatten)]
+    shape: shape::ShapeArgs,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -99,6 +102,7 @@ impl Common {
         if let Some(metres) = self.metres_per_px {
             config.export.metres_per_px = metres;
         }
+        self.shape.set(&mut config);
         set(&mut config);
         config.check()?;
         Ok(config)

@@ -6,8 +6,8 @@ use crate::skeleton::Node2d;
 use nalgebra::{Point3, Rotation3, Vector3};
 use std::f64::consts::PI;
 
-/// Stands the 2D skeleton in the plane z = 0 and repeats all that is not `trunk` on `planes - 1` further planes, turned
-/// about the vertical through the trunk's top by equal parts of a half turn. One trunk remains.
+/// Stands the 2D skeleton in the plane z = 0 and repeats all that is not `trunk` on `planes - 1` further planes, turned by
+/// equal parts of a half turn about the vertical through the place where each branch leaves the trunk. One trunk remains.
 /// Nodes that a turn brings out of the envelope are drawn in towards its axis. A node whose place is no number stands
 /// where its parent does: a branch without length.
 pub fn copy_to_planes(
@@ -38,20 +38,27 @@ pub fn copy_to_planes(
         .collect();
     place(&mut nodes, envelope);
     let measured = nodes.len();
-    let axis = nodes.get(1).map_or(Vector3::zeros(), |top| Vector3::new(top.position.x, 0.0, 0.0));
+    let is_trunk = |i: usize| trunk.get(i).is_some_and(|t| *t);
+    // A leader may lean: a branch that leaves high up must turn about it, and not about its foot.
+    let mut axes: Vec<Vector3<f64>> = Vec::with_capacity(measured);
+    for node in &nodes {
+        let parent = node.parent.map_or(0, |p| p.index());
+        let leaves = Vector3::new(nodes[parent].position.x, 0.0, 0.0);
+        axes.push(axes.get(parent).copied().filter(|_| !is_trunk(parent)).unwrap_or(leaves));
+    }
     for plane in 1..planes {
         let angle = PI * f64::from(plane) / f64::from(planes);
         let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), angle);
         let mut copy_id: Vec<NodeId> = (0..measured as u32).map(NodeId).collect();
         for original in 0..measured {
-            if trunk.get(original).is_some_and(|t| *t) {
+            if is_trunk(original) {
                 continue; // the trunk is one
             }
             copy_id[original] = NodeId(nodes.len() as u32);
             let mut copy = nodes[original].clone();
             copy.name = NodeName(nodes.len() as u32);
             copy.parent = copy.parent.map(|p| copy_id[p.index()]);
-            copy.position = envelope.clamp(&(turn * (copy.position - axis) + axis));
+            copy.position = envelope.clamp(&(turn * (copy.position - axes[original]) + axes[original]));
             (copy.n_tracks, copy.copy_of, copy.plane_angle) = (0, Some(NodeId(original as u32)), angle);
             nodes.push(copy);
         }

@@ -11,18 +11,28 @@ use nalgebra::{Point3, Vector3};
 /// Which terms of the posterior are used; the one-sided ones are the paper's figure 3 a and b.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Terms {
-    /// Local and global, eq. 2, the latter to this power.
-    Both(f64),
+    /// Local and global, eq. 2.
+    Both {
+        /// Power of eq. 6; the paper's is 1.
+        weight: f64,
+        /// A push that brings one attractor nearer by this share of the tree's width says next to nothing. It is added
+        /// to every gain in eq. 6, which else is -inf in logarithms for a push without gain, and would bend a twig out of
+        /// all likelihood for a hundredth of a pixel. The paper's is 0.
+        no_gain: f64,
+        /// Of several traversals the first only spreads the tree, and the later ones mend its angles.
+        spread_first: bool,
+    },
     /// Only the branching angles, eq. 4.
     Local,
     /// Only the filling of the envelope, eq. 6.
     Global,
 }
 
-/// A push that brings one attractor nearer by this share of the tree's width says next to nothing. It is added to every
-/// gain in eq. 6, which else is -inf in logarithms for a push without gain, and would bend a twig out of all likelihood
-/// for a hundredth of a pixel.
-const NO_GAIN: f64 = 0.02;
+impl Terms {
+    fn no_gain(self) -> f64 {
+        if let Terms::Both { no_gain, .. } = self { no_gain } else { 0.0 }
+    }
+}
 
 /// Pushes every node above the trunk, with all that hangs on it, along the normal of its plane, level by level from
 /// the root. Each push is the most probable of `settings.push_options` values in [-delta, delta], with delta a share
@@ -41,7 +51,7 @@ pub fn push(skeleton: &mut Skeleton, trunk: &[bool], envelope: &Envelope, settin
         children: children(skeleton),
         pushed: vec![0.0; skeleton.nodes.len()],
         delta: settings.push_range * envelope.width(),
-        no_gain: if matches!(terms, Terms::Both(_)) { NO_GAIN * envelope.width() } else { 0.0 },
+        no_gain: 0.0,
         skeleton,
         envelope,
         settings,
@@ -50,6 +60,9 @@ pub fn push(skeleton: &mut Skeleton, trunk: &[bool], envelope: &Envelope, settin
         search,
     };
     for pass in 0..settings.passes.max(1) {
+        let spread = pass == 0 && settings.passes > 1 && matches!(terms, Terms::Both { spread_first: true, .. });
+        pusher.terms = if spread { Terms::Global } else { terms };
+        pusher.no_gain = pusher.terms.no_gain() * envelope.width();
         for &i in &order {
             pusher.push_one(i, pass > 0);
         }
@@ -89,7 +102,7 @@ impl Pusher<'_> {
         let before = distance(0.0);
         let options = (0..self.settings.push_options).map(|l| self.delta * option(l, self.settings.push_options));
         let candidates: Vec<Candidate> = options
-            .filter(|&push| push == 0.0 || push == at || self.stays_inside(subtree, normal * (push - at)))
+            .filter(|&push| push == at || self.stays_inside(subtree, normal * (push - at)))
             .map(|push| Candidate {
                 push,
                 local: self.local(i, parent, normal * (push - at), with_children),
@@ -132,7 +145,7 @@ fn most_probable(options: &[Candidate], terms: Terms, no_gain: f64) -> Option<f6
     // Eq. 6 is 0 for every option where none brings the tree nearer to the envelope: it then says nothing.
     let global_speaks = sum > 0.0 && terms != Terms::Local;
     let all = sum + no_gain * options.len() as f64;
-    let weight = if let Terms::Both(weight) = terms { weight } else { 1.0 };
+    let weight = if let Terms::Both { weight, .. } = terms { weight } else { 1.0 };
     let score = |c: &Candidate| {
         let global = if global_speaks { weight * ((c.gain + no_gain) / all).ln() } else { 0.0 };
         global + if terms == Terms::Global { 0.0 } else { c.local }

@@ -88,6 +88,8 @@ impl Flat {
     }
 
     pub fn all() -> Vec<Self> {
-        [Some(Self::generated(6)), Some(Self::shipped()), Self::oak()].into_iter().flatten().collect()
+        let mut all = vec![Self::generated(6), Self::shipped()];
+        all.extend(Self::oak());
+        all
     }
 }

@@ -4,10 +4,10 @@ use crate::model::{Outline, Skeleton};
 
 /// A branch covers what is nearer to it than this share of the shape's larger side: about as far as the leaves on it
 /// reach.
-pub const REACH: f64 = 0.025;
+const REACH: f64 = 0.025;
 
-/// Share of the pixels of `shape` that are within [`REACH`] of a branch above the trunk or of the trunk, in the front
-/// projection: 0 to 1.
+/// Share of the pixels of `shape` that are within a fortieth of the shape's larger side of a branch or of the trunk, in the
+/// front projection: 0 to 1.
 pub fn coverage(skeleton: &Skeleton, shape: &Outline) -> f64 {
     let mut cover = Cover::of(shape);
     for node in &skeleton.nodes {
@@ -57,10 +57,10 @@ impl Cover {
         count
     }
 
-    /// Leaves out of account what is near `at`, as nothing can be done about it.
-    pub fn give_up(&mut self, at: [f64; 2], given_up: &mut Vec<usize>) {
+    /// Notes the bare pixels near `at`, where nothing can be done.
+    pub fn give_up(&self, at: [f64; 2], given_up: &mut Vec<usize>) {
         let mut near = Vec::new();
-        self.near([at, at], 1.0, |k| near.push(k));
+        self.near([at, at], 0.5 * self.reach_px, |k| near.push(k));
         given_up.extend(near.into_iter().filter(|&k| self.bare[k] != 0));
     }
 

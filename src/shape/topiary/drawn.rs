@@ -16,6 +16,8 @@ pub enum TopiaryError {
         "lies off the tree: the trunk does not reach it; draw it over the tree, or in another size than the picture's"
     )]
     OffTree,
+    #[error("is no image that can be read ({0}); give a PNG with a transparent background")]
+    NoImage(String),
     #[error("is not whole: {found} bytes where a {size} picture has four a pixel")]
     NotWhole { found: usize, size: Size },
 }
@@ -30,6 +32,15 @@ pub struct Drawn {
 }
 
 impl Drawn {
+    /// The shape in the bytes of an image file, PNG for choice.
+    ///
+    /// # Errors
+    /// It is no image, has no transparent pixel, or only such.
+    pub fn of_image(bytes: &[u8]) -> Result<Self, TopiaryError> {
+        let image = image::load_from_memory(bytes).map_err(|e| TopiaryError::NoImage(e.to_string()))?.into_rgba8();
+        Self::of_rgba(Size::new(image.width(), image.height()), image.as_raw())
+    }
+
     /// The shape in an image of four bytes a pixel, of which the last is alpha.
     ///
     /// # Errors

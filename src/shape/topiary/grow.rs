@@ -44,7 +44,10 @@ pub fn grow(skeleton: &mut Skeleton, envelope: &Envelope, shape: &Outline, setti
     let first = skeleton.nodes.len();
     let mut names = skeleton.nodes.iter().map(|n| n.name.0).max().unwrap_or(0);
     let mut given_up = Vec::new();
-    for step in 0.. {
+    if measured < 2 {
+        return;
+    }
+    for step in 0..2 * MOST as u64 {
         if cover.share() >= WANTED || skeleton.nodes.len() - first >= MOST {
             break;
         }
@@ -55,8 +58,8 @@ pub fn grow(skeleton: &mut Skeleton, envelope: &Envelope, shape: &Outline, setti
             .flat_map(|from| (0..TRIED).map(move |t| (from, t)))
             .filter_map(|(from, t)| {
                 let pick = chance::below(seed, step, 1 + t + TRIED * from as u64, templates.len() + 1);
-                let single = [0usize, 1].map(|k| k.min(measured - 1));
-                let template = templates.get(pick).map_or(&single[1..], Vec::as_slice);
+                // One straight branch reaches where no subtree is large enough for; it moves as the trunk does.
+                let template = templates.get(pick).map_or(&[1][..], Vec::as_slice);
                 let roll = std::f64::consts::PI * chance::signed(seed, step, 1000 + t);
                 let nodes = shoot(skeleton, envelope, template, (from, target), roll)?;
                 let score = score(skeleton, &cover, &angles, &nodes)?;
@@ -123,7 +126,7 @@ fn shoot(
     }
     let axis = Unit::try_new(is, 1e-9)?;
     let turn = Rotation3::from_axis_angle(&axis, roll) * Rotation3::rotation_between(&was, &is)?;
-    let plane_angle = was.x.atan2(was.z) - is.x.atan2(is.z);
+    let plane_angle = is.x.atan2(is.z) - was.x.atan2(was.z);
     let base = skeleton.nodes.len();
     let mut out: Vec<Node> = Vec::new();
     let mut new_id: Vec<(usize, usize)> = vec![(root, from)];
@@ -151,7 +154,7 @@ fn shoot(
             n_tracks: 0,
             certainty: 0.0,
             copy_of: Some(NodeId(i as u32)),
-            plane_angle: -plane_angle,
+            plane_angle,
         });
     }
     (!out.is_empty()).then_some(out)

@@ -11,7 +11,7 @@ pub use drawn::{Drawn, TopiaryError};
 use super::{Envelope, fuse, is_trunk};
 use crate::config;
 use crate::model::{JointPose, NodeId, Outline, Pose, Skeleton};
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Point3, UnitQuaternion, Vector3};
 
 /// A tree that was cut to a shape.
 #[derive(Clone, Debug, PartialEq)]
@@ -84,7 +84,7 @@ impl Topiary {
     /// The pose of the cut tree in a frame in which the tree before, `skeleton`, stands as `whole` says. Every branch turns
     /// against its parent as the measured one does of which it is a copy, in its own plane.
     pub fn pose(&self, skeleton: &Skeleton, whole: &Pose) -> Pose {
-        let still = JointPose { position: self.skeleton.nodes[0].position, rotation: UnitQuaternion::identity() };
+        let still = JointPose { position: Point3::origin(), rotation: UnitQuaternion::identity() };
         let rotation = |i: usize| whole.joints.get(i).map_or(still.rotation, |j| j.rotation);
         let mut joints: Vec<JointPose> = Vec::with_capacity(self.skeleton.nodes.len());
         for (node, original) in self.skeleton.nodes.iter().zip(&self.moves_as) {
