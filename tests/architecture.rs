@@ -54,8 +54,10 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "export",
             "capture",
             "draw",
-            // The table of cylinders is of the limbs.
+            // The table of cylinders is of the limbs; a drawn shape is read, and what it cut is told.
             "shape::cylinders",
+            "shape::Cut",
+            "shape::Drawn",
             "tui",
             "doctor",
         ],

@@ -82,7 +82,7 @@ fn page(made: &Made, model: &Model, title: &str) -> Result<Vec<u8>, ExportError>
     let (model, _) = glb(model)?;
     let captured = &made.captured;
     let metres_per_px = made.config.export.metres_per_px;
-    let data = html::Data::of(&captured.note, &made.skeleton, &made.poses, &captured.sway, metres_per_px);
+    let data = html::Data::of(&captured.note, &made.skeleton, &made.poses, &made.sway, metres_per_px);
     let picture = captured.picture.as_ref().map(|p| &*p.rgb);
     html::page(&html::Page { title, glb: &model, data: &data, picture }).map(String::into_bytes)
 }
@@ -173,7 +173,7 @@ fn tables(args: &ExportArgs, made: &Made) -> Result<(), Ended> {
             folder.copy("nodes.csv", &args.dir)?;
             folder.copy("motion.csv", &args.dir)?;
         } else {
-            nodes(folder.file("nodes.csv")?, &made.skeleton, &made.captured.sway, metres_per_px)?;
+            nodes(folder.file("nodes.csv")?, &made.skeleton, &made.sway, metres_per_px)?;
             let mut motion = MotionCsv::new(folder.file("motion.csv")?, &made.skeleton, metres_per_px)?;
             made.poses.iter().try_for_each(|pose| motion.pose(pose))?;
             motion.finish()?;

@@ -43,6 +43,7 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
     if !headless && !std::io::stdout().is_terminal() {
         return Err(Ended::BadUsage(tui::TuiError::NoTerminal(None).into()));
     }
+    common.shape.refuse_drawn()?;
     refuse_unfit_out(common.out.as_deref())?;
     plan.record.refuse_unfit()?;
     let source = source::open(plan.input, &config.camera, plan.fps).map_err(no_input)?;

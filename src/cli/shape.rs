@@ -6,17 +6,19 @@ use crate::model::Size;
 use anyhow::anyhow;
 use clap::Args;
 use serde::Deserialize;
+use std::path::{Path, PathBuf};
 
-/// The options of `capture` and `replay` on the shape.
+/// The options of `capture`, `replay` and of the commands that read a capture on the shape.
 #[derive(Clone, Debug, Default, Args)]
 pub struct ShapeArgs {
     /// Keeps one trunk up to the tip, as conifers have: the line that was drawn in FILE (JSON: width, height,
     /// polyline_px from the foot up), or `auto` for the straightest way up.
     #[arg(long, value_name = "FILE|auto", value_parser = Trunk::parse)]
     trunk: Option<Trunk>,
-    /// What the branches fill: the outline turned about its axis, or the hull of the branches seen, turned.
-    #[arg(long, value_name = "revolution|hull", value_parser = envelope)]
-    envelope: Option<EnvelopeKind>,
+    /// What the branches fill: the outline turned about its axis (`revolution`), the hull of the branches seen, turned
+    /// (`hull`), or for `export` and `render` the opaque part of an image: the tree is cut to it.
+    #[arg(long, value_name = "revolution|hull|IMAGE", value_parser = Envelope::parse)]
+    envelope: Option<Envelope>,
 }
 
 impl ShapeArgs {
@@ -29,9 +31,27 @@ impl ShapeArgs {
             }
             None => {}
         }
-        if let Some(envelope) = self.envelope {
-            config.shape.envelope = envelope;
+        if let Some(Envelope::Kind(kind)) = self.envelope {
+            config.shape.envelope = kind;
         }
+    }
+
+    /// The shape that the tree is to be cut to, if one was drawn.
+    pub fn drawn(&self) -> Option<&Path> {
+        match &self.envelope {
+            Some(Envelope::Image(path)) => Some(path),
+            _ => None,
+        }
+    }
+
+    /// Refuses a drawn shape where the tree is only being filmed.
+    pub fn refuse_drawn(&self) -> Result<(), Ended> {
+        self.drawn().map_or(Ok(()), |path| {
+            Err(Ended::BadUsage(anyhow!(
+                "--envelope takes revolution or hull here; `arborcam export` and `render` cut the captured tree to {}",
+                path.display()
+            )))
+        })
     }
 
     /// Refuses a trunk that was drawn on a picture of another size.
@@ -76,10 +96,21 @@ impl Trunk {
     }
 }
 
-fn envelope(name: &str) -> Result<EnvelopeKind, String> {
-    match name {
-        "revolution" => Ok(EnvelopeKind::Revolution),
-        "hull" => Ok(EnvelopeKind::Hull),
-        _ => Err("give revolution or hull; a drawn shape is for `arborcam export`".into()),
+/// What the branches fill.
+#[derive(Clone, Debug)]
+enum Envelope {
+    Kind(EnvelopeKind),
+    Image(PathBuf),
+}
+
+impl Envelope {
+    fn parse(text: &str) -> Result<Self, String> {
+        match text {
+            "revolution" => Ok(Self::Kind(EnvelopeKind::Revolution)),
+            "hull" => Ok(Self::Kind(EnvelopeKind::Hull)),
+            // A word that is no file is more likely a slip of the pen than a picture.
+            path if Path::new(path).is_file() => Ok(Self::Image(path.into())),
+            _ => Err("give revolution, hull, or an image that is there".into()),
+        }
     }
 }

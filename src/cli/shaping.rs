@@ -1,13 +1,19 @@
 //! What a command that reads a capture may change of its tree, and the tree that comes out.
 
-use super::Ended;
+use super::shape::ShapeArgs;
+use super::{Ended, say};
 use crate::capture::{CaptureError, Captured};
-use crate::config::{Config, ConfigError};
+use crate::config::{Config, ConfigError, LeafShow};
 use crate::export::capture::Software;
+use crate::export::csv::Sway;
 use crate::export::gltf::{KEY_TOLERANCE_PX, Model, provenance};
-use crate::model::{Pose, Skeleton};
-use crate::pipeline::{Dressed, Seen, dress, reshape};
-use clap::Args;
+use crate::export::read_template;
+use crate::model::{Luma, Outline, Pose, Skeleton};
+use crate::outline;
+use crate::pipeline::{Dressed, Seen, cut_to, dress, reshape};
+use crate::shape::{Cut, Drawn};
+use anyhow::{Context, anyhow};
+use clap::{Args, ValueEnum};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -21,12 +27,36 @@ pub struct Shaping {
     /// Planes about the trunk on which the tree is repeated, the one that was filmed included.
     #[arg(long, value_name = "N")]
     planes: Option<u32>,
+    #[command(flatten)]
+    shape: ShapeArgs,
+    /// Triangles of the wood, 10000 to 100000 for most uses.
+    #[arg(long, value_name = "N")]
+    triangles: Option<u32>,
+    /// Whether the tree bears leaves; `auto` looks at the film.
+    #[arg(long, value_name = "WHEN")]
+    leaves: Option<Show>,
+    /// A leaf or a small cluster of leaves of your own (.glb, .gltf) instead of the built-in one.
+    #[arg(long, value_name = "FILE")]
+    leaf: Option<PathBuf>,
+    /// How dense the leaves are, as a grey image of the film's size, white where they are densest.
+    #[arg(long, value_name = "IMAGE")]
+    density: Option<PathBuf>,
+    /// Where chance is involved (curl, twigs, leaves), the same number gives the same tree.
+    #[arg(long, value_name = "N")]
+    seed: Option<u32>,
     /// Length of the animation at most, s; the last so many seconds of the film.
     #[arg(long, value_name = "SECONDS")]
     animation_s: Option<f64>,
     /// Metres in a pixel at the tree; 0 for a model in pixels.
     #[arg(long, value_name = "M")]
     metres_per_px: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Show {
+    Auto,
+    On,
+    Off,
 }
 
 /// A tree that has been read, and changed as was wished.
@@ -40,6 +70,8 @@ pub struct Made {
     pub dressed: Dressed,
     /// How far each group of leaves swings in every pose.
     pub flutter: Vec<Vec<[f32; 2]>>,
+    /// What is known of the sway of every node.
+    pub sway: Vec<Option<Sway>>,
     node_extras: Vec<Value>,
     provenance: Value,
     /// It stands otherwise than in the tables of the capture.
@@ -65,7 +97,17 @@ impl Shaping {
             None => own.clone(),
         };
         let set = |value: &mut f64, wanted: Option<f64>| wanted.into_iter().for_each(|w| *value = w);
+        self.shape.set(&mut config);
         self.planes.into_iter().for_each(|n| config.shape.planes = n);
+        self.triangles.into_iter().for_each(|n| config.wood.triangles = n);
+        self.seed.into_iter().for_each(|n| config.wood.seed = n);
+        if let Some(show) = self.leaves {
+            config.leaves.show = match show {
+                Show::Auto => LeafShow::Auto,
+                Show::On => LeafShow::On,
+                Show::Off => LeafShow::Off,
+            };
+        }
         set(&mut config.export.animation_s, self.animation_s);
         set(&mut config.export.metres_per_px, self.metres_per_px);
         config.check()?;
@@ -90,28 +132,31 @@ impl Shaping {
         let config = self.config(&note.config).map_err(|e| Ended::BadUsage(e.into()))?;
         let length_s = tail_s(note.timing.duration_s).unwrap_or(config.export.animation_s);
         let captured = Captured::read(dir, length_s)?;
-        let reshaped = config.shape != note.config.shape;
-        let (skeleton, poses, pose_in_picture) = if reshaped {
-            let outline = captured.outline.as_ref().ok_or_else(|| {
-                Ended::Failed(anyhow::anyhow!("{} holds no outline, which a new shape is made from", dir.display()))
-            })?;
-            let skeleton = Arc::new(reshape(&captured.skeleton, outline, &config));
-            let poses = captured.reposed(&skeleton, &config, &captured.poses);
-            let in_picture = captured.pose_in_picture.as_slice();
-            let in_picture = captured.reposed(&skeleton, &config, in_picture).pop();
-            (skeleton, poses, in_picture)
-        } else {
-            (captured.skeleton.clone(), captured.poses.clone(), captured.pose_in_picture.clone())
+        self.shape.fits(captured.skeleton.image_size)?;
+        let stand = self.stand(&captured, &config, dir)?;
+        let leaf = self.leaf.as_deref().map(read_template).transpose().map_err(|e| Ended::BadUsage(e.into()))?;
+        let density = match &self.density {
+            Some(path) => {
+                let size = captured.skeleton.image_size;
+                Some(outline::density(path, size).map_err(|e| Ended::BadUsage(e.into()))?)
+            }
+            // A tree that was cut to a shape bears leaves all over it.
+            None => stand.cut_to.as_ref().map(|shape| Luma { size: shape.size, pixels: white(&shape.mask) }),
         };
-        let picture = captured.picture.as_ref().map(|p| &*p.rgb);
-        let seen =
-            Seen { picture, pose: pose_in_picture.as_ref(), outline: captured.outline.as_ref(), ..Seen::default() };
-        let dressed = dress(&skeleton, seen, &config);
-        let extras = |sway: &Option<_>| sway.as_ref().map_or(Value::Null, |s: &crate::export::csv::Sway| s.extras());
-        // Copies come last; nothing was measured on them.
-        let node_extras = captured.sway[..captured.skeleton.measured()].iter().map(extras).collect();
-        let provenance = provenance(&captured.note.source.name, &Software::default(), &poses);
-        let flutter = dressed.flutter(&poses, &skeleton, &config);
+        let seen = Seen {
+            picture: captured.picture.as_ref().map(|p| &*p.rgb),
+            pose: stand.pose_in_picture.as_ref(),
+            outline: stand.cut_to.as_ref().or(captured.outline.as_ref()),
+            leaf: leaf.as_ref(),
+            density: density.as_ref(),
+        };
+        let Stand { skeleton, poses, sway, reshaped, .. } = &stand;
+        let dressed = dress(skeleton, seen, &config);
+        let extras = |sway: &Option<_>| sway.as_ref().map_or(Value::Null, Sway::extras);
+        let node_extras = sway.iter().map(extras).collect();
+        let provenance = provenance(&captured.note.source.name, &Software::default(), poses);
+        let (flutter, reshaped) = (dressed.flutter(poses, skeleton, &config), *reshaped);
+        let Stand { skeleton, poses, pose_in_picture, sway, .. } = stand;
         Ok(Made {
             captured,
             config,
@@ -120,11 +165,91 @@ impl Shaping {
             pose_in_picture,
             dressed,
             flutter,
+            sway,
             node_extras,
             provenance,
             reshaped,
         })
     }
+
+    /// The captured tree as it is to stand, and its poses.
+    fn stand(&self, captured: &Captured, config: &Config, dir: &Path) -> Result<Stand, Ended> {
+        let drawn = self.shape.drawn();
+        let reshaped = config.shape != captured.note.config.shape;
+        let outline = || {
+            let lacks = || anyhow!("{} holds no outline, which a new shape is made from", dir.display());
+            captured.outline.as_ref().ok_or_else(lacks).map_err(Ended::Failed)
+        };
+        let mut stand = Stand {
+            skeleton: captured.skeleton.clone(),
+            poses: captured.poses.clone(),
+            pose_in_picture: captured.pose_in_picture.clone(),
+            sway: captured.sway.clone(),
+            cut_to: None,
+            reshaped: reshaped || drawn.is_some(),
+        };
+        if reshaped {
+            stand.skeleton = Arc::new(reshape(&captured.skeleton, outline()?, config));
+            stand.poses = captured.reposed(&stand.skeleton, config, &captured.poses);
+            let in_picture = captured.pose_in_picture.as_slice();
+            stand.pose_in_picture = captured.reposed(&stand.skeleton, config, in_picture).pop();
+            // Copies come last; nothing was measured on them.
+            stand.sway.truncate(captured.skeleton.measured());
+            stand.sway.resize(stand.skeleton.nodes.len(), None);
+        }
+        let Some(path) = drawn else { return Ok(stand) };
+        let unfit = |e: anyhow::Error| Ended::BadUsage(e.context(format!("--envelope {}", path.display())));
+        let bytes = std::fs::read(path).context("cannot read it").map_err(unfit)?;
+        let drawn = Drawn::of_image(&bytes).map_err(|e| unfit(e.into()))?;
+        let topiary = cut_to(&stand.skeleton, outline()?, &drawn, config).map_err(|e| unfit(e.into()))?;
+        tell(&topiary.cut);
+        if topiary.cut.larger {
+            return Ok(stand);
+        }
+        let whole = stand.skeleton.clone();
+        let pose = |pose: &Pose| topiary.pose(&whole, pose);
+        let sway = |(node, of): (&crate::model::Node, &crate::model::NodeId)| {
+            stand.sway.get(of.index()).copied().flatten().filter(|_| node.copy_of.is_none())
+        };
+        Ok(Stand {
+            poses: stand.poses.iter().map(pose).collect(),
+            pose_in_picture: stand.pose_in_picture.as_ref().map(pose),
+            sway: topiary.skeleton.nodes.iter().zip(&topiary.moves_as).map(sway).collect(),
+            skeleton: Arc::new(topiary.skeleton),
+            cut_to: Some(topiary.shape),
+            reshaped: true,
+        })
+    }
+}
+
+/// The tree as it is to stand.
+struct Stand {
+    skeleton: Arc<Skeleton>,
+    poses: Vec<Pose>,
+    pose_in_picture: Option<Pose>,
+    sway: Vec<Option<Sway>>,
+    /// The drawn shape in the picture.
+    cut_to: Option<Outline>,
+    reshaped: bool,
+}
+
+fn white(mask: &[u8]) -> Vec<u8> {
+    mask.iter().map(|&m| if m == 0 { 0 } else { 255 }).collect()
+}
+
+/// What became of the tree.
+fn tell(cut: &Cut) {
+    say(&if cut.larger {
+        "arborcam: warning: the shape of --envelope holds the whole tree; nothing is cut".to_owned()
+    } else {
+        format!(
+            "arborcam: cut to the shape: {} branches gone, {} shortened, {} added; {:.0} % of the shape is covered",
+            cut.gone,
+            cut.shortened,
+            cut.grown,
+            100.0 * cut.coverage
+        )
+    });
 }
 
 impl Made {

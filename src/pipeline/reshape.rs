@@ -3,6 +3,7 @@
 use super::thicken;
 use crate::config::Config;
 use crate::model::{ClusterId, NodeName, Outline, Skeleton};
+use crate::shape::{Drawn, Topiary, TopiaryError};
 use crate::{shape, skeleton};
 
 /// Stands the measured nodes up anew as `config` says. They keep their places in the picture and their names; copies get
@@ -28,4 +29,18 @@ pub fn reshape(old: &Skeleton, outline: &Outline, config: &Config) -> Skeleton {
     kept.iter_mut().zip(measured).for_each(|(new, old)| new.name = old.name);
     (unused..).zip(copies).for_each(|(name, copy)| copy.name = NodeName(name));
     new
+}
+
+/// Cuts the tree to a drawn shape; radii follow from what is left.
+///
+/// # Errors
+/// The shape lies off the tree.
+pub fn cut_to(skeleton: &Skeleton, outline: &Outline, drawn: &Drawn, config: &Config) -> Result<Topiary, TopiaryError> {
+    let mut topiary = shape::topiary(skeleton, outline, drawn, &config.shape, config.wood.seed.into())?;
+    if !topiary.cut.larger {
+        let trunk_px = skeleton.nodes.get(1).map_or(shape::TIP_RADIUS_PX, |top| top.radius);
+        let room = super::dress::room(skeleton.foot_px, Some(&topiary.shape));
+        shape::thicken(&mut topiary.skeleton, trunk_px, &room, &config.wood, config.wood.seed.into());
+    }
+    Ok(topiary)
 }
