@@ -55,7 +55,7 @@ impl Default for Shape {
             attractors: 256,
             push_range: 0.2,
             push_options: 41,
-            passes: 5,
+            passes: 3,
             angle_tolerance: 1.0,
             leader: Leader::None,
             leader_px: Vec::new(),
