@@ -91,7 +91,7 @@ mod tests {
 
     #[test]
     fn even_turning_needs_two_keys_and_rest_one() {
-        assert_eq!(thin_about_z(1e-6, |t| 0.2 * t).0, [0, 329]);
+        assert_eq!(thin_about_z(1e-4, |t| 0.2 * t).0, [0, 329]);
         assert_eq!(thin_about_z(1e-6, |_| 0.3).0, [0]);
         assert_eq!(thin(0, false, |_, _| true), [0; 0]);
         assert_eq!(thin(1, false, |_, _| false), [0]);
