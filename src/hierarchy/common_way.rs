@@ -9,7 +9,7 @@
 //! Chosen by measurement, see `docs/sweep.md`: normalised cuts, average linkage of correlations and shortest paths in
 //! place of the spanning tree all did worse on trees whose branches leave one trunk.
 
-use super::rest::distance_sq;
+use super::rest::{crown_begins, distance_sq};
 use crate::signal::median;
 use nalgebra::DMatrix;
 
@@ -20,12 +20,21 @@ const SHARE: f64 = 0.7;
 /// Standard deviation of the logarithm of what a cost is off by.
 const COST_DEVIATION: f64 = 0.3;
 
-/// Mean common way of all pairs, in px of cost; on the diagonal the whole way from the foot.
+/// What the spanning trees say of all points.
+pub struct Ways {
+    /// Mean common way of all pairs, in px of cost; on the diagonal the whole way from the foot.
+    pub common: DMatrix<f32>,
+    /// The tree of all points at their own costs: from which point each is reached, `None` from the foot, in an order in
+    /// which that one comes first.
+    pub reached: Vec<(usize, Option<usize>)>,
+}
+
+/// The ways from the foot to all points.
 ///
 /// `apart` holds the root mean square difference of the motion of all pairs, and on the diagonal that of a point's own
 /// motion, in whatever unit. Going between two points costs sqrt(d^2 + (h m)^2), with d their
 /// distance, h the way from the foot to the farthest point and m their difference over the median of the diagonal.
-pub fn common_way(apart: &DMatrix<f32>, rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> DMatrix<f32> {
+pub fn ways(apart: &DMatrix<f32>, rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> Ways {
     let n = rest_px.len();
     let costs = costs(apart, rest_px, foot_px);
     let off_by = off_by_table();
@@ -44,7 +53,15 @@ pub fn common_way(apart: &DMatrix<f32>, rest_px: &[[f64; 2]], foot_px: [f64; 2])
             }
         }
     }
-    sum.component_div(&count)
+    let all: Vec<usize> = (0..n).collect();
+    // Over a trunk without points the way that costs least leads to whatever moves least.
+    let top = crown_begins(rest_px, foot_px);
+    let tree = spanning_tree(&all, n, |a, b| match top {
+        Some(top) if a == n => distance_sq(top, rest_px[b]).sqrt() as f32,
+        _ => costs[(a, b)],
+    });
+    let reached = tree.iter().map(|r| (r.drawn, r.parent.map(|p| tree[p].drawn))).collect();
+    Ways { common: sum.component_div(&count), reached }
 }
 
 /// Costs of all steps; the last row and column are the foot, which rests.
@@ -161,7 +178,7 @@ mod tests {
     #[test]
     fn tips_that_touch_are_no_kin_if_they_move_differently() {
         let (apart, rest_px) = two_branches();
-        let common = common_way(&apart, &rest_px, [0.0, 0.0]);
+        let common = ways(&apart, &rest_px, [0.0, 0.0]).common;
         let (left_tip, right_tip, left_base) = (7 + 10, 7 + 11 + 10, 7 + 1);
         assert!(common[(left_tip, left_base)] > 1.2 * common[(left_tip, right_tip)]);
         // Everything on the branches has the trunk in common, which its own lower points have not.
@@ -171,7 +188,8 @@ mod tests {
     #[test]
     fn the_same_points_give_the_same_numbers() {
         let (apart, rest_px) = two_branches();
-        assert_eq!(common_way(&apart, &rest_px, [0.0, 0.0]), common_way(&apart, &rest_px, [0.0, 0.0]));
+        let common = || ways(&apart, &rest_px, [0.0, 0.0]).common;
+        assert_eq!(common(), common());
     }
 
     /// Points that rest, coincide or were never seen together must neither hang it nor come out as no numbers.
@@ -179,7 +197,7 @@ mod tests {
     fn useless_motion_still_gives_numbers() {
         for value in [0.0, f32::NAN, f32::INFINITY] {
             for n in 0..4 {
-                let common = common_way(&DMatrix::from_element(n, n, value), &vec![[5.0, 5.0]; n], [5.0, 9.0]);
+                let common = ways(&DMatrix::from_element(n, n, value), &vec![[5.0, 5.0]; n], [5.0, 9.0]).common;
                 assert!(common.iter().all(|c| c.is_finite()), "{n} points of {value}");
             }
         }

@@ -2,33 +2,101 @@
 
 use super::arrange::Node;
 use super::binary::Binary;
-use super::rest::{centroid, distance_sq};
+use super::rest::{centroid, crown_begins, distance_sq};
+
+/// Points of a way over which its end is evened out: one alone may sit on either edge of its branch.
+const EVENED: usize = 3;
+/// A branch is no shorter than this share of the way from the foot to the farthest point, or it could not be told from
+/// its fork.
+const SHORTEST: f64 = 0.06;
+
+/// The end of every node's branch, px.
+///
+/// The spanning tree of all points (`reached`, see [`Ways`](super::common_way::Ways)) runs along the branches. More than half of the
+/// ways from the foot to a cluster's points run together for a while: that is the way to the cluster. A branch ends
+/// where the ways to its children part; without children it goes on to its tip by the way that most of its points
+/// are on. So forks and tips lie on branches that are seen, not between them.
+///
+/// The papers put nodes at the centroids of clusters that are cut into halves side by side. Here a cluster is often a low
+/// branch and all that is above it; between their centroids, or above the branch, nothing parts.
+pub fn ends_px(
+    nodes: &[Node],
+    tree: &Binary,
+    reached: &[(usize, Option<usize>)],
+    rest_px: &[[f64; 2]],
+    foot_px: [f64; 2],
+) -> Vec<[f64; 2]> {
+    let farthest = rest_px.iter().map(|&p| distance_sq(p, foot_px)).fold(1.0, f64::max).sqrt();
+    let ways: Vec<Vec<usize>> = nodes.iter().map(|n| way(tree.points(n.part), reached, true)).collect();
+    let mut ends: Vec<[f64; 2]> = Vec::with_capacity(nodes.len());
+    for (k, node) in nodes.iter().enumerate() {
+        let begin = node.parent.map_or(foot_px, |p| ends[p]);
+        let children: Vec<usize> = (0..nodes.len()).filter(|&c| nodes[c].parent == Some(k)).collect();
+        let along = match children.split_first() {
+            Some((&first, others)) => {
+                let shared = |i: usize| others.iter().all(|&c| ways[c].get(i) == ways[first].get(i));
+                let parted = (0..ways[first].len()).find(|&i| !shared(i)).unwrap_or(ways[first].len());
+                ways[first][..parted].to_vec()
+            }
+            None => way(tree.points(node.part), reached, false),
+        };
+        let last = &along[along.len().saturating_sub(EVENED)..];
+        let end = centroid(rest_px, last);
+        let far_enough = !last.is_empty() && distance_sq(end, begin).sqrt() >= SHORTEST * farthest;
+        let bare_trunk = crown_begins(rest_px, foot_px).filter(|_| k == 0);
+        ends.push(match bare_trunk {
+            Some(top) => top,
+            None if far_enough => end,
+            None => by_distance(&children, nodes, tree, node, rest_px, begin),
+        });
+    }
+    ends
+}
+
+/// The points on the way from the foot to `points`, in its order: those through which more than half of the ways to them
+/// run, or, not only the `shared` part, at each fork the way to most of them up to the last.
+fn way(points: &[usize], reached: &[(usize, Option<usize>)], shared: bool) -> Vec<usize> {
+    let n = reached.len();
+    let mut beyond = vec![0usize; n];
+    points.iter().for_each(|&p| beyond[p] += 1);
+    for &(point, from) in reached.iter().rev() {
+        if let Some(from) = from {
+            beyond[from] += beyond[point];
+        }
+    }
+    let least = if shared { points.len() / 2 + 1 } else { 1 };
+    let mut next: Vec<Option<usize>> = vec![None; n];
+    let mut first: Option<usize> = None;
+    for &(point, from) in reached {
+        let best = from.map_or(&mut first, |from| &mut next[from]);
+        if beyond[point] >= least && best.is_none_or(|b| beyond[point] > beyond[b]) {
+            *best = Some(point);
+        }
+    }
+    std::iter::successors(first, |&p| next[p]).collect()
+}
 
 /// Share of a cluster's points, those nearest to or farthest from where its branch begins, that mark its end.
 const SHARE: f64 = 0.15;
 /// Fewer points than this mark nothing: one alone may be a bad track.
 const LEAST: usize = 2;
 
-/// The end of every node's branch, px.
-///
-/// A branch begins where its parent's ends, the first at the foot. It ends where its children begin: halfway between
-/// those points of each child that are nearest to the beginning. Without children it goes out to its farthest points.
-///
-/// The papers put nodes at the centroids of clusters that are cut into halves side by side. Here a cluster is often a low
-/// branch and all that is above it; between their centroids, or above the branch, nothing parts.
-pub fn ends_px(nodes: &[Node], tree: &Binary, rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> Vec<[f64; 2]> {
-    let mut ends: Vec<[f64; 2]> = Vec::with_capacity(nodes.len());
-    for (k, node) in nodes.iter().enumerate() {
-        let begin = node.parent.map_or(foot_px, |p| ends[p]);
-        let children = nodes.iter().filter(|n| n.parent == Some(k));
-        let begins: Vec<[f64; 2]> =
-            children.map(|c| outermost(tree.points(c.part), rest_px, |p| distance_sq(p, begin))).collect();
-        ends.push(match begins.len() {
-            0 => outermost(tree.points(node.part), rest_px, |p| -distance_sq(p, begin)),
-            n => centroid(&begins, &(0..n).collect::<Vec<usize>>()),
-        });
+/// Where the ways do not tell: halfway between those points of each child that are nearest to the beginning, or out at
+/// the farthest points.
+fn by_distance(
+    children: &[usize],
+    nodes: &[Node],
+    tree: &Binary,
+    node: &Node,
+    rest_px: &[[f64; 2]],
+    begin: [f64; 2],
+) -> [f64; 2] {
+    if children.is_empty() {
+        return outermost(tree.points(node.part), rest_px, |p| -distance_sq(p, begin));
     }
-    ends
+    let begins: Vec<[f64; 2]> =
+        children.iter().map(|&c| outermost(tree.points(nodes[c].part), rest_px, |p| distance_sq(p, begin))).collect();
+    centroid(&begins, &(0..begins.len()).collect::<Vec<usize>>())
 }
 
 /// Mean of the points of least `rank`.

@@ -52,23 +52,23 @@ pub fn build(table: &TrackTable, moving: &[usize], foot_px: [f64; 2], settings: 
     let rows: Vec<usize> = kept.iter().map(|&i| moving[i]).collect();
     let rest_px: Vec<[f64; 2]> = kept.iter().map(|&i| rest_px[i]).collect();
     let displacements = Signals::displacements(table, &rows);
-    let (tree, stems) = match settings.affinity {
+    let (tree, stems, reached) = match settings.affinity {
         Affinity::Path => {
-            let (likeness, common) = path::likeness(&displacements, &rest_px, foot_px, settings);
+            let (likeness, ways) = path::likeness(&displacements, &rest_px, foot_px, settings);
             let tree = Binary::merged(rows.len(), &linkage::average_linkage(likeness));
-            let stems = stems::stems(&tree, &common);
-            (tree, stems)
+            let stems = stems::stems(&tree, &ways.common);
+            (tree, stems, ways.reached)
         }
         Affinity::Zeng => {
             let tree = cut_in_two(&Signals::velocities(table, &rows, |_| true), &rest_px, settings);
             let stems = vec![false; tree.parts.len()];
-            (tree, stems)
+            (tree, stems, Vec::new())
         }
     };
     let certain = certainty::certainties(&tree, &displacements, &table.times_s);
     let nodes = arranged(&tree, &certain, &stems, settings);
     let ends_px = match settings.affinity {
-        Affinity::Path => ends::ends_px(&nodes, &tree, &rest_px, foot_px).into_iter().map(Some).collect(),
+        Affinity::Path => ends::ends_px(&nodes, &tree, &reached, &rest_px, foot_px).into_iter().map(Some).collect(),
         Affinity::Zeng => vec![None; nodes.len()],
     };
     let cluster = |(node, end_px): (arrange::Node, Option<[f64; 2]>)| {

@@ -1,12 +1,12 @@
 //! How much of the way from the foot two points are likely to share: the affinity of the default method.
 
-use super::common_way::common_way;
+use super::common_way::{Ways, ways};
 use super::signals::Signals;
 use crate::config::Hierarchy;
 use crate::signal::median;
 use nalgebra::DMatrix;
 
-/// Likeness of all pairs, and their common ways: likeness of motion, raised to a power, plus the part of the way from the foot that both have
+/// Likeness of all pairs, and the ways from the foot: likeness of motion, raised to a power, plus the part of the way from the foot that both have
 /// in common.
 ///
 /// - The correlation to its power says who rides on the same branch. Points on a trunk that sways are all alike to some
@@ -18,12 +18,12 @@ pub fn likeness(
     rest_px: &[[f64; 2]],
     foot_px: [f64; 2],
     settings: &Hierarchy,
-) -> (DMatrix<f32>, DMatrix<f32>) {
+) -> (DMatrix<f32>, Ways) {
     let (rho, differences) = displacements.compared();
-    let common = common_way(&differences, rest_px, foot_px);
-    let whole: Vec<f32> = common.diagonal().iter().copied().collect();
-    let Some(unit) = median(whole, f32::total_cmp) else { return (rho, common) };
+    let ways = ways(&differences, rest_px, foot_px);
+    let whole: Vec<f32> = ways.common.diagonal().iter().copied().collect();
+    let Some(unit) = median(whole, f32::total_cmp) else { return (rho, ways) };
     let unit = unit.max(f32::MIN_POSITIVE);
     let (power, weight) = (settings.motion_power as f32, settings.path_weight as f32 / unit);
-    (rho.zip_map(&common, |r, way| r.max(0.0).powf(power) + weight * way), common)
+    (rho.zip_map(&ways.common, |r, way| r.max(0.0).powf(power) + weight * way), ways)
 }

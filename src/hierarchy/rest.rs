@@ -27,3 +27,26 @@ pub fn extent_px(rest_px: &[[f64; 2]], members: &[usize]) -> f64 {
 pub fn distance_sq(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2)
 }
+
+/// A trunk bears no points if none is nearer to the foot than this share of the way to the farthest.
+const BARE_TRUNK: f64 = 0.2;
+/// Share of the points, the lowest ones, below which a crown is taken to begin.
+const LOWEST: f64 = 0.05;
+
+/// Where a trunk that bears no points enters the crown, px: on the line from the foot to the middle of all points, as high
+/// as the lowest of them. `None` where there are points on the trunk, which say better where it goes.
+pub fn crown_begins(rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> Option<[f64; 2]> {
+    let way = |p: &[f64; 2]| distance_sq(*p, foot_px).sqrt();
+    let (nearest, farthest) =
+        rest_px.iter().map(way).fold((f64::INFINITY, 0.0_f64), |(low, high), d| (low.min(d), high.max(d)));
+    if nearest.is_infinite() || nearest <= BARE_TRUNK * farthest {
+        return None;
+    }
+    let all: Vec<usize> = (0..rest_px.len()).collect();
+    let middle = centroid(rest_px, &all);
+    let mut heights: Vec<f64> = rest_px.iter().map(|p| foot_px[1] - p[1]).collect();
+    heights.sort_unstable_by(f64::total_cmp);
+    let lowest = heights.get((LOWEST * heights.len() as f64) as usize).copied().unwrap_or(0.0);
+    let share = (lowest / (foot_px[1] - middle[1]).max(1.0)).clamp(0.0, 1.0);
+    Some([0, 1].map(|c| foot_px[c] + share * (middle[c] - foot_px[c])))
+}

@@ -5,6 +5,11 @@ use std::collections::BTreeMap;
 
 /// A later track is given to the nearest tip only within so many times the mean distance between tips.
 const REACH: f64 = 2.0;
+/// A node moves as this share of the points on it and above it, those nearest to it at rest: it stands at a fork or a tip,
+/// and what is farther out on the branch swings farther.
+const NEAREST: f64 = 0.4;
+/// But as so many points at least, where there are as many.
+const LEAST: usize = 8;
 /// Share of the displacements cut off at either end before the mean is taken: some tracks are always wrong.
 const TRIM: f64 = 0.2;
 
@@ -23,8 +28,9 @@ pub struct Binding {
     rest_px: Vec<[f64; 2]>,
     tips: Vec<NodeId>,
     reach_px: f64,
-    /// Displacements of the present frame by node, kept for their memory.
-    collected: Vec<Vec<[f64; 2]>>,
+    /// Displacements of the present frame by node, each with the squared distance of its point from the node at rest; kept
+    /// for their memory.
+    collected: Vec<Vec<([f64; 2], f64)>>,
 }
 
 impl Binding {
@@ -92,7 +98,7 @@ impl Binding {
             .collected
             .iter_mut()
             .zip(&self.rest_px)
-            .map(|(d, rest)| trimmed_mean(d).map(|d| [rest[0] + d[0], rest[1] + d[1]]))
+            .map(|(d, rest)| trimmed_mean(nearest(d)).map(|d| [rest[0] + d[0], rest[1] + d[1]]))
             .collect();
         let new = set.observations.iter().filter(|o| o.confirmed && !self.tracks.contains_key(&o.id));
         // A tip that has lost all its tracks is where the nearest branch below it that is seen would carry it.
@@ -130,28 +136,43 @@ impl Binding {
             let d = [f64::from(o.u_px) - bound.rest_px[0], f64::from(o.v_px) - bound.rest_px[1]];
             let mut at = Some(bound.node);
             while let Some(node) = at {
-                self.collected[node.index()].push(d);
+                self.collected[node.index()].push((d, distance_sq(bound.rest_px, self.rest_px[node.index()])));
                 at = self.parents[node.index()];
             }
         }
     }
 }
 
-/// Mean of the middle of the values, coordinate by coordinate; reorders them.
-fn trimmed_mean(values: &mut [[f64; 2]]) -> Option<[f64; 2]> {
+/// Those of the displacements whose points are nearest; reorders them.
+fn nearest(all: &mut [([f64; 2], f64)]) -> &mut [([f64; 2], f64)] {
+    let n = ((NEAREST * all.len() as f64).ceil() as usize).max(LEAST);
+    if n < all.len() {
+        all.select_nth_unstable_by(n - 1, |a, b| a.1.total_cmp(&b.1));
+        &mut all[..n]
+    } else {
+        all
+    }
+}
+
+/// Mean of the middle of the displacements, coordinate by coordinate; reorders them.
+fn trimmed_mean(values: &mut [([f64; 2], f64)]) -> Option<[f64; 2]> {
     if values.is_empty() {
         return None;
     }
     let cut = (values.len() as f64 * TRIM) as usize;
     let mut mean = [0.0; 2];
     for (c, m) in mean.iter_mut().enumerate() {
-        values.sort_unstable_by(|a, b| a[c].total_cmp(&b[c]));
+        values.sort_unstable_by(|(a, _), (b, _)| a[c].total_cmp(&b[c]));
         let kept = &values[cut..values.len() - cut];
-        *m = kept.iter().map(|v| v[c]).sum::<f64>() / kept.len() as f64;
+        *m = kept.iter().map(|(v, _)| v[c]).sum::<f64>() / kept.len() as f64;
     }
     Some(mean)
 }
 
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+fn distance_sq(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2)
 }
