@@ -1,12 +1,14 @@
 //! From tracks to the 3D pose of every frame (Li et al. section 4): root to tip, each branch turns about its local root
 //! and carries all that hangs on it. Lengths never change, as only rotations are applied.
 
+mod between;
 mod binding;
 mod deterministic;
 mod flutter;
 mod probabilistic;
 mod recover;
 
+pub use between::between;
 pub use binding::Binding;
 pub use deterministic::direction as deterministic_direction;
 pub use flutter::flutter;
