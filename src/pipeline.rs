@@ -171,13 +171,14 @@ fn flat(hierarchy: &MotionHierarchy, outline: &Outline, config: &Config) -> (Vec
 }
 
 /// Radii, from the trunk's as it was given or as the outline shows it.
-fn thicken(skeleton: &mut Skeleton, outline: &Outline, wood: &crate::config::Wood) {
+fn thicken(skeleton: &mut Skeleton, outline: &Outline, config: &Config) {
+    let wood = &config.wood;
     let top_px = skeleton.nodes.get(1).map_or(skeleton.foot_px, |top| skeleton.image_from_model(&top.position));
     let measured = shape::trunk_radius_px(outline, skeleton.foot_px, top_px);
     let given = Some(0.5 * wood.trunk_width_px).filter(|&given| given > 0.0);
     let at_foot = || TRUNK_SHARE * skeleton::Foot::of(outline, None).half_width_px;
     let trunk_px = given.or(measured).unwrap_or_else(at_foot).max(2.0 * shape::TIP_RADIUS_PX);
-    let room = dress::room(skeleton.foot_px, Some(outline));
+    let room = dress::room(skeleton, Some(outline), dress::Bounds::Filmed(config.shape.envelope));
     shape::thicken(skeleton, trunk_px, &room, wood, wood.seed.into());
 }
 
@@ -224,6 +225,6 @@ pub fn build(
 pub fn stand(hierarchy: &MotionHierarchy, outline: &Outline, config: &Config) -> Skeleton {
     let (flat, tracks) = flat(hierarchy, outline, config);
     let mut skeleton = shape::build(&flat, &tracks, outline, &config.shape);
-    thicken(&mut skeleton, outline, &config.wood);
+    thicken(&mut skeleton, outline, config);
     skeleton
 }

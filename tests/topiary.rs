@@ -4,8 +4,9 @@ mod support;
 #[path = "support/trees.rs"]
 mod trees;
 
-use arborcam::config;
+use arborcam::config::{self, Config};
 use arborcam::model::{JointPose, NodeId, Outline, Pose, Size, Skeleton};
+use arborcam::pipeline::{Seen, cut_to, dress};
 use arborcam::shape::{self, Drawn, Topiary, TopiaryError};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::path::Path;
@@ -185,4 +186,28 @@ fn a_tree_of_next_to_nothing_is_cut_all_the_same() {
         let still = Pose { frame: 0, time_s: 0.0, joints: Vec::new() };
         assert_eq!(cut.pose(&skeleton, &still).joints.len(), cut.skeleton.nodes.len());
     }
+}
+
+/// A twig beside the shape is seen at once: the tree was cut, or pushed, to fill it.
+#[test]
+fn twigs_keep_to_the_shape_that_the_tree_was_made_to_fill() {
+    let tree = &Flat::all()[0];
+    let whole = model(tree);
+    let mut config = Config::default();
+    let twig_ends = |skeleton: &Skeleton, seen: Seen, config: &Config| {
+        let limbs = dress(skeleton, seen, config).limbs;
+        limbs.iter().filter(|l| l.twig).map(|l| l.stations[l.stations.len() - 1].at).collect::<Vec<_>>()
+    };
+    for name in ["heart", "vase"] {
+        let cut = cut_to(&whole, &tree.outline, &drawn(name), &config).expect(name);
+        let seen = Seen { outline: Some(&cut.shape), cut: true, ..Seen::default() };
+        let envelope = shape::Envelope::of_drawn(&cut.shape, cut.skeleton.foot_px);
+        let ends = twig_ends(&cut.skeleton, seen, &config);
+        assert!(ends.len() > 100 && ends.iter().all(|end| envelope.contains(end)), "{name}");
+    }
+    config.shape.envelope = config::EnvelopeKind::Hull;
+    let measured: Vec<_> = whole.nodes[..whole.measured()].iter().map(|n| n.position).collect();
+    let hull = shape::Envelope::of_hull(&measured);
+    let ends = twig_ends(&whole, Seen { outline: Some(&tree.outline), ..Seen::default() }, &config);
+    assert!(ends.len() > 100 && ends.iter().all(|end| hull.contains(end)), "hull");
 }

@@ -147,6 +147,7 @@ impl Shaping {
             picture: captured.picture.as_ref().map(|p| &*p.rgb),
             pose: stand.pose_in_picture.as_ref(),
             outline: stand.cut_to.as_ref().or(captured.outline.as_ref()),
+            cut: stand.cut_to.is_some(),
             leaf: leaf.as_ref(),
             density: density.as_ref(),
         };

@@ -1,7 +1,7 @@
 //! From the skeleton to all that is drawn of a tree: wood, and leaves where the film shows them.
 
 use super::{bark, leaves};
-use crate::config::Config;
+use crate::config::{Config, EnvelopeKind};
 use crate::model::{Luma, NodeId, Outline, Pose, Rgb, Skeleton};
 use crate::motion;
 use crate::shape::{Envelope, Foliage, Limb, Mesh, Template, limbs, wood_levels};
@@ -14,6 +14,8 @@ pub struct Seen<'a> {
     pub picture: Option<&'a Rgb>,
     pub pose: Option<&'a Pose>,
     pub outline: Option<&'a Outline>,
+    /// Whether `outline` is a drawn shape that the tree was cut to, not what was filmed.
+    pub cut: bool,
     /// A leaf of the user's own, and a drawn density of the leaves, which goes before the picture's.
     pub leaf: Option<&'a Template>,
     pub density: Option<&'a Luma>,
@@ -41,7 +43,8 @@ impl Dressed {
 /// Dresses a skeleton.
 pub fn dress(skeleton: &Skeleton, seen: Seen, config: &Config) -> Dressed {
     let seed = config.wood.seed.into();
-    let room = room(skeleton.foot_px, seen.outline);
+    let room =
+        room(skeleton, seen.outline, if seen.cut { Bounds::Drawn } else { Bounds::Filmed(config.shape.envelope) });
     let limbs = limbs(skeleton, &room, &config.wood, seed);
     let wood = wood_levels(&limbs, config.wood.triangles as usize);
     let bark = bark::colour(&seen, skeleton);
@@ -49,10 +52,30 @@ pub fn dress(skeleton: &Skeleton, seen: Seen, config: &Config) -> Dressed {
     Dressed { limbs, wood, foliage, bark_rgb: bark.unwrap_or(bark::PLAIN) }
 }
 
-/// Where twigs may grow (from and to, model axes, px): within the outline turned about its axis, and not out of the outline
-/// itself as seen from the front; everywhere where there is no outline.
-pub(super) fn room(foot_px: [f64; 2], outline: Option<&Outline>) -> impl Fn(&Point3<f64>, &Point3<f64>) -> bool {
-    let envelope = outline.map(|outline| Envelope::of_revolution(outline, foot_px));
+/// What an outline says about the space that the tree stands in.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Bounds {
+    /// It is a drawn shape that the tree was cut to.
+    Drawn,
+    Filmed(EnvelopeKind),
+}
+
+/// Where twigs may grow (from and to, model axes, px): within the envelope that the branches were pushed to fill or were
+/// cut to, and not out of the outline itself as seen from the front; everywhere where there is no outline.
+pub(super) fn room<'a>(
+    skeleton: &Skeleton,
+    outline: Option<&'a Outline>,
+    bounds: Bounds,
+) -> impl Fn(&Point3<f64>, &Point3<f64>) -> bool + use<'a> {
+    let foot_px = skeleton.foot_px;
+    let envelope = outline.map(|outline| match bounds {
+        Bounds::Drawn => Envelope::of_drawn(outline, foot_px),
+        Bounds::Filmed(EnvelopeKind::Revolution) => Envelope::of_revolution(outline, foot_px),
+        Bounds::Filmed(EnvelopeKind::Hull) => {
+            let measured = skeleton.nodes.iter().filter(|n| n.copy_of.is_none());
+            Envelope::of_hull(&measured.map(|n| n.position).collect::<Vec<_>>())
+        }
+    });
     move |from: &Point3<f64>, to: &Point3<f64>| match (&envelope, outline) {
         (Some(envelope), Some(outline)) => {
             let middle = nalgebra::center(from, to);

@@ -1,6 +1,6 @@
 //! Another shape in space for a tree that has been measured.
 
-use super::thicken;
+use super::{dress, thicken};
 use crate::config::Config;
 use crate::model::{ClusterId, NodeName, Outline, Skeleton};
 use crate::shape::{Drawn, Topiary, TopiaryError};
@@ -23,7 +23,7 @@ pub fn reshape(old: &Skeleton, outline: &Outline, config: &Config) -> Skeleton {
         .collect();
     let tracks: Vec<u32> = measured.iter().map(|n| n.n_tracks).collect();
     let mut new = shape::build(&flat, &tracks, outline, &config.shape);
-    thicken(&mut new, outline, &config.wood);
+    thicken(&mut new, outline, config);
     let unused = old.nodes.iter().map(|n| n.name.0).max().map_or(0, |n| n.saturating_add(1));
     let (kept, copies) = new.nodes.split_at_mut(measured.len());
     kept.iter_mut().zip(measured).for_each(|(new, old)| new.name = old.name);
@@ -39,7 +39,7 @@ pub fn cut_to(skeleton: &Skeleton, outline: &Outline, drawn: &Drawn, config: &Co
     let mut topiary = shape::topiary(skeleton, outline, drawn, &config.shape, config.wood.seed.into())?;
     if !topiary.cut.larger {
         let trunk_px = skeleton.nodes.get(1).map_or(shape::TIP_RADIUS_PX, |top| top.radius);
-        let room = super::dress::room(skeleton.foot_px, Some(&topiary.shape));
+        let room = dress::room(&topiary.skeleton, Some(&topiary.shape), dress::Bounds::Drawn);
         shape::thicken(&mut topiary.skeleton, trunk_px, &room, &config.wood, config.wood.seed.into());
     }
     Ok(topiary)

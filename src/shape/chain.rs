@@ -5,6 +5,9 @@ use nalgebra::Vector3;
 
 /// Edges along a tube are at most so many times as long as those around it.
 const LONGEST_EDGE: f64 = 6.0;
+/// Turn from which on a joint gets more than one ring, and from one ring to the next there, radians.
+const FLATTENS: f64 = 0.6;
+const FAN_STEP: f64 = 0.4;
 
 /// One limb's share of a chain.
 #[derive(Clone, Debug)]
@@ -12,8 +15,7 @@ pub(super) struct Link<'a> {
     pub stations: &'a [Station],
     /// Rings that it needs at density 1.
     need: f64,
-    /// Rings that it has at least: where a skin bends, twigs must not float beside it.
-    least: usize,
+    is_twig: bool,
 }
 
 /// From the base of a limb over those that it goes on in to a tip.
@@ -22,14 +24,23 @@ pub(super) struct Chain<'a> {
     pub links: Vec<Link<'a>>,
     /// Length of the longest twig of the chain and of what it carries, px; infinite if a branch of the skeleton is there.
     pub size_px: f64,
-    /// False for what stands on the ground.
-    pub grows_from_branch: bool,
+    /// Radius of what it grows from where it does, px; `None` for what stands on the ground.
+    pub grows_from_px: Option<f64>,
 }
 
 impl Link<'_> {
     /// Rings along the link, without that of its base.
     pub fn rings(&self, density: f64) -> usize {
-        ((self.need * density).round() as usize).clamp(self.least, 20_000)
+        // Where a skin bends, twigs must not float beside it.
+        let least = if self.is_twig { 1 } else { 3 };
+        ((self.need * density).round() as usize).clamp(least, 20_000)
+    }
+
+    /// Rings at the joint to `next`: from a sharp turn on a fan of them about one point, which rounds the elbow like a ball;
+    /// a single ring half way would squeeze the tube flat. Twigs are too thin to show it.
+    pub fn rings_to(&self, next: &Self) -> usize {
+        let turn = self.at(1.0).1.angle(&next.at(0.0).1);
+        if self.is_twig || next.is_twig || turn < FLATTENS { 1 } else { 2 + (turn / FAN_STEP) as usize }
     }
 
     /// The station at share `t` of the link, 0 to 1, and the direction there: a cubic through the stations, whose slopes
@@ -82,8 +93,9 @@ pub(super) fn chains(limbs: &[Limb]) -> Vec<Chain<'_>> {
             at = goes_on[i];
         }
         if !links.is_empty() {
-            let grows_from_branch = limbs[first].parent.is_some_and(|p| p < first && good[p]);
-            out.push(Chain { links, size_px: size_px[first], grows_from_branch });
+            let parent = limbs[first].parent.filter(|&p| p < first && good[p]);
+            let grows_from_px = parent.and_then(|p| radius_near(&limbs[p], &limbs[first]));
+            out.push(Chain { links, size_px: size_px[first], grows_from_px });
         }
     }
     out
@@ -114,7 +126,15 @@ fn is_good(limb: &Limb) -> bool {
         && limb.length() > 1e-6
 }
 
-fn leaves(limb: &Limb) -> Vector3<f64> {
+/// Radius of `parent` at the station next to the base of `limb`.
+fn radius_near(parent: &Limb, limb: &Limb) -> Option<f64> {
+    let base = limb.stations.first()?.at;
+    let away = |s: &&Station| (s.at - base).norm_squared();
+    parent.stations.iter().min_by(|a, b| away(a).total_cmp(&away(b))).map(|s| s.radius)
+}
+
+/// Direction in which a limb begins, of length 1; up where it has none. It has two stations.
+pub(super) fn leaves(limb: &Limb) -> Vector3<f64> {
     (limb.stations[1].at - limb.stations[0].at).try_normalize(1e-12).unwrap_or_else(Vector3::y)
 }
 
@@ -132,5 +152,5 @@ fn link(limb: &Limb) -> Link<'_> {
         need += step.norm() * sides(radius) / (LONGEST_EDGE * std::f64::consts::TAU * radius);
         before = Some(way);
     }
-    Link { stations: s, need, least: if limb.twig { 1 } else { 3 } }
+    Link { stations: s, need, is_twig: limb.twig }
 }

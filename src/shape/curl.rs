@@ -10,12 +10,11 @@ use nalgebra::{Point3, Vector3};
 /// Greatest distance of a middle line from the straight line between its ends, as a share of their distance, at curl 1:
 /// [`BOW`] for each of the two directions at the ends, and both excursions.
 pub const CURL_BOUND: f64 = 2.0 * BOW + 2.0 * EXCURSION;
-/// Greatest value of `t - 6 t^3 + 8 t^4 - 3 t^5`, which a slope of 1 at one end adds, times the largest slope across.
-const BOW: f64 = 0.1971 * MOST_ACROSS;
-/// Directions at the ends lean away from the straight line by at most this sine: branches turn, they do not loop.
-const MOST_ACROSS: f64 = 0.4;
+/// Greatest value of `t - 6 t^3 + 8 t^4 - 3 t^5`, which a slope of 1 at one end adds, times the greatest of
+/// `slope (1 - slope^2) (1 - slope)`, see [`Bend`].
+const BOW: f64 = 0.1971 * 0.2019;
 /// Length of each of the two excursions at curl 1.
-const EXCURSION: f64 = 0.06;
+const EXCURSION: f64 = 0.05;
 /// Where on the way the via points are: a third and two thirds make a bow, an S or, out of one plane, a twist.
 const VIA: [f64; 2] = [1.0 / 3.0, 2.0 / 3.0];
 
@@ -25,9 +24,41 @@ pub(super) struct Curve {
     from: Point3<f64>,
     to: Point3<f64>,
     chord: Vector3<f64>,
-    /// Velocities at both ends beyond that of the straight line, and the excursions at [`VIA`].
-    ends: [Vector3<f64>; 2],
+    ends: [Bend; 2],
+    /// The excursions at [`VIA`].
     via: [Vector3<f64>; 2],
+}
+
+/// How a path leaves the straight line at one of its ends.
+///
+/// A branch bends towards its neighbours only as far as the turn is small: with the tangent of the angle to the straight
+/// line, s, both how far it gives way, `1 - s^2`, and the share of its length on which it does, `1 - s`, shrink. From a
+/// right angle between two branches on (s = 1) they meet as a fork. Else coarse skeletons, which turn far, make loops.
+#[derive(Clone, Copy, Debug)]
+struct Bend {
+    /// Velocity beyond that of the straight line.
+    across: Vector3<f64>,
+    /// Share of the way on which it is felt, above 0.
+    within: f64,
+}
+
+impl Bend {
+    fn new(wanted: Vector3<f64>, chord: Vector3<f64>, share: f64) -> Self {
+        let length = chord.norm();
+        let along = chord / length.max(1e-12);
+        let ahead = wanted.dot(&along);
+        let across = wanted - along * ahead;
+        let slope = if ahead > 0.0 { across.norm() / ahead } else { 1.0 };
+        if slope >= 1.0 {
+            return Self { across: Vector3::zeros(), within: 1.0 };
+        }
+        Self { across: across * (length * share * (1.0 - slope * slope) / ahead), within: 1.0 - slope }
+    }
+
+    /// Offset at share `t` of the way from this end.
+    fn at(&self, t: f64) -> Vector3<f64> {
+        self.across * (self.within * leaving((t / self.within).min(1.0)))
+    }
 }
 
 impl Curve {
@@ -38,23 +69,14 @@ impl Curve {
         let length = chord.norm();
         let along = chord / length.max(1e-12);
         let curl = curl.clamp(0.0, 1.0);
-        let across = |v: Vector3<f64>| {
-            let across = (v - along * v.dot(&along)) * (2.0 * curl).min(1.0);
-            length * across * (MOST_ACROSS / across.norm().max(MOST_ACROSS))
-        };
+        let bend = |wanted| Bend::new(wanted, chord, (2.0 * curl).min(1.0));
         let mut chance = chance;
         let mut excursion = || {
             let (turn, far) = (chance.between(0.0, std::f64::consts::TAU), chance.share().sqrt());
             let side = square_to(along);
             length * curl * EXCURSION * far * (side * turn.cos() + along.cross(&side) * turn.sin())
         };
-        Self {
-            from: ends[0],
-            to: ends[1],
-            chord,
-            ends: [across(leaves), across(arrives)],
-            via: [excursion(), excursion()],
-        }
+        Self { from: ends[0], to: ends[1], chord, ends: [bend(leaves), bend(arrives)], via: [excursion(), excursion()] }
     }
 
     /// The same with `share` of its excursions.
@@ -68,7 +90,7 @@ impl Curve {
             return self.to;
         }
         let excursions = self.via[0] * passing(VIA[0], t) + self.via[1] * passing(VIA[1], t);
-        self.from + self.chord * t + self.ends[0] * leaving(t) - self.ends[1] * leaving(1.0 - t) + excursions
+        self.from + self.chord * t + self.ends[0].at(t) - self.ends[1].at(1.0 - t) + excursions
     }
 }
 

@@ -133,11 +133,11 @@ pub fn limbs(skeleton: &Skeleton, room: Room, wood: &config::Wood, seed: u64) ->
     grown.into_iter().map(|g| g.limb).collect()
 }
 
-/// The child that every branch goes on in: the one with most tips above it, of equal ones the straightest.
+/// The child that every branch goes on in: a thick one, by the tips above it, that is straight.
 pub(super) fn continuations(skeleton: &Skeleton) -> Vec<Option<NodeId>> {
     let nodes = &skeleton.nodes;
     let mut tips = vec![0u32; nodes.len()];
-    let mut best: Vec<Option<(u32, f64, NodeId)>> = vec![None; nodes.len()];
+    let mut best: Vec<Option<(bool, f64, NodeId)>> = vec![None; nodes.len()];
     for (i, node) in nodes.iter().enumerate().rev() {
         tips[i] = tips[i].max(1);
         let Some(p) = node.parent.map(|p| p.index()).filter(|&p| p < i) else { continue };
@@ -145,8 +145,10 @@ pub(super) fn continuations(skeleton: &Skeleton) -> Vec<Option<NodeId>> {
         let Some(way) = way(skeleton, i) else { continue };
         let straight = nodes[p].parent.and_then(|_| self::way(skeleton, p)).map_or(0.0, |before| before.dot(&way));
         // A measured branch goes on in a measured one: its copies lie where nobody looked.
-        let weight = if node.copy_of.is_none() || nodes[p].copy_of.is_some() { tips[i] } else { 0 };
-        let here = (weight, straight, NodeId(i as u32));
+        let seen = node.copy_of.is_none() || nodes[p].copy_of.is_some();
+        // As the pipe model makes it, and as chains of limbs are put together.
+        let thick = f64::from(tips[i]).powf(0.4);
+        let here = (seen, thick * (2.0 + straight), NodeId(i as u32));
         if best[p].is_none_or(|b| (here.0, here.1) >= (b.0, b.1)) {
             best[p] = Some(here);
         }
@@ -184,8 +186,8 @@ fn branches(skeleton: &Skeleton, curl: f64, seed: u64) -> Vec<Grown> {
             None if along.y > 0.0 => Vector3::y(),
             None => along,
             Some(_) if goes_on[parent.index()] == Some(NodeId(i as u32)) => before,
-            // A side branch leaves between the way of its parent and its own.
-            Some(_) => (along + before * 0.5).try_normalize(0.1).unwrap_or(along),
+            // A side branch leaves between the way of its parent and its own; from a right angle on along its own.
+            Some(_) => (along + before * (0.5 * along.dot(&before).max(0.0))).try_normalize(0.1).unwrap_or(along),
         };
         let chance = Chance::new(Chance::part(seed, node.name.0.into()));
         let curve = Curve::new([nodes[parent.index()].position, node.position], leaves, arrives[i], curl, chance);

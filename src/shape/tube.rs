@@ -9,9 +9,11 @@ use std::f64::consts::TAU;
 
 /// Numbers of sides that are used: few steps, so that few rings differ from the next.
 const SIDES: [usize; 18] = [3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 96, 128, 192, 256];
-/// How much wider a side branch is where it leaves, and how fast that is lost, in radii.
-const COLLAR: f64 = 0.35;
+/// How much wider a side branch is where it leaves, and how fast that is lost, in radii; no wider than a share of what it
+/// grows from, or forks become knots.
+const COLLAR: f64 = 0.3;
 const COLLAR_RADII: f64 = 1.5;
+const COLLAR_OF_PARENT: f64 = 0.9;
 
 /// A ring of a tube.
 struct Ring {
@@ -50,7 +52,8 @@ fn walk(chain: &Chain, density: f64, mut at: impl FnMut(&Station, bool)) {
     let end = chain.links.len() - 1;
     for (k, link) in chain.links.iter().enumerate() {
         let n = link.rings(density);
-        for i in 1..=n {
+        let joint = chain.links.get(k + 1).map_or(1, |next| link.rings_to(next));
+        for i in (1..=n).chain(std::iter::repeat_n(n, joint - 1)) {
             // How thick it is there is all that counting needs, and the same stations are drawn.
             at(&link.at(i as f64 / n as f64).0, k == end && i == n);
         }
@@ -63,9 +66,11 @@ pub(super) fn append(chain: &Chain, density: f64, mesh: &mut Mesh) {
     let Some(first) = rings.first() else { return };
     let mut across = square_to(first.tangent);
     close_base(mesh, first, across);
-    let collar = if chain.grows_from_branch { COLLAR } else { 0.0 };
-    let widened =
-        |s: f64, radius: f64| radius * (1.0 + collar * (-s / (COLLAR_RADII * first.station.radius).max(1e-9)).exp());
+    let widest = chain.grows_from_px.map_or(0.0, |px| COLLAR_OF_PARENT * px);
+    let widened = |s: f64, radius: f64| {
+        let wide = radius * (1.0 + COLLAR * (-s / (COLLAR_RADII * first.station.radius).max(1e-9)).exp());
+        wide.min(widest.max(radius))
+    };
     let (mut s, mut v) = (0.0, 0.0);
     let mut before: Option<(u32, usize)> = None;
     for (k, ring) in rings.iter().enumerate() {
@@ -117,12 +122,19 @@ fn rings(chain: &Chain, density: f64) -> Vec<Ring> {
     for (k, link) in chain.links.iter().enumerate() {
         let n = link.rings(density);
         for i in (if k == 0 { 0 } else { 1 })..=n {
-            let (station, mut tangent) = link.at(i as f64 / n as f64);
-            if let Some(next) = chain.links.get(k + 1).filter(|_| i == n) {
-                // Where two limbs meet at an angle the ring stands half way.
-                tangent = (tangent + next.at(0.0).1).try_normalize(0.1).unwrap_or(tangent);
+            let (station, tangent) = link.at(i as f64 / n as f64);
+            let sides = sides_of(station.radius, density);
+            let Some(next) = chain.links.get(k + 1).filter(|_| i == n) else {
+                out.push(Ring { tangent, sides, station });
+                continue;
+            };
+            // Where two limbs meet at an angle the ring stands half way, or several one after the other.
+            let (joint, on) = (link.rings_to(next), next.at(0.0).1);
+            let turn = UnitQuaternion::rotation_between(&tangent, &on).unwrap_or_else(UnitQuaternion::identity);
+            for j in 0..joint {
+                let share = if joint == 1 { 0.5 } else { j as f64 / (joint - 1) as f64 };
+                out.push(Ring { tangent: turn.powf(share) * tangent, sides, station });
             }
-            out.push(Ring { tangent, sides: sides_of(station.radius, density), station });
         }
     }
     out

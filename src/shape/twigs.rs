@@ -195,7 +195,7 @@ impl Maker<'_> {
             let from = before.map_or(stem.from, |b| twig[b].1);
             let came = before.map_or(stem.along, |b| grown[first + b].limb.arrives());
             let along = (to - from).normalize();
-            let leaves = (along + came * 0.5).try_normalize(0.1).unwrap_or(along);
+            let leaves = (along + came * (0.5 * along.dot(&came).max(0.0))).try_normalize(0.1).unwrap_or(along);
             // Twigs turn up to the light.
             let arrives = (along + Vector3::y() * (0.3 * self.habit.lift)).try_normalize(0.1).unwrap_or(along);
             let seed = Chance::part((chance.share() * 2f64.powi(53)) as u64, k as u64);
