@@ -55,7 +55,7 @@ pub(super) struct Perches {
     /// Side of a square, cells.
     reach: f64,
     /// Depth of the trunk: what is nearer to the viewer is the front of the tree.
-    pub middle: f64,
+    middle: f64,
 }
 
 impl Perches {

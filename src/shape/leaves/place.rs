@@ -192,8 +192,7 @@ impl Planter<'_> {
         for i in emptiest(&self.perches.all, hidden, leaves, CUBE * size, left) {
             let perch = &self.perches.all[i];
             let aside = grid.length(ASIDE * self.height);
-            // To the outside of its limb.
-            let side = if perch.depth > self.perches.middle { Side::Front } else { Side::Back };
+            let side = if work.chance.share() < 0.5 { Side::Front } else { Side::Back };
             let cell = perch.cell.map(|c| c + aside * work.chance.either());
             self.hang(i, cell, aside, side, size, work);
         }

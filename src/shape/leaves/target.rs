@@ -56,7 +56,7 @@ impl Target {
         let colours: Vec<([u8; 3], f32)> = match (&canvas, seen) {
             (Some(canvas), Some(seen)) => {
                 let pure = pure(&seen.leaf, grid.size.width as usize);
-                let mut colours = canvas.colours.iter().copied().zip(pure).collect();
+                let mut colours: Vec<_> = canvas.colours.iter().copied().zip(pure).collect();
                 without_strangers(&mut colours);
                 colours
             }
@@ -135,7 +135,7 @@ fn softened(luma: f64, mean: f64) -> f64 {
 
 /// Takes the weight of colours whose hue is none of the leaves': what is seen between them can have colours that are found
 /// nowhere outside. By median and median deviation, so that autumn may have all of its hues.
-fn without_strangers(colours: &mut Vec<([u8; 3], f32)>) {
+fn without_strangers(colours: &mut [([u8; 3], f32)]) {
     let hue = |[r, g, b]: [u8; 3]| {
         let [r, g, b] = [r, g, b].map(|c| f64::from(c) + 4.0);
         [(r - g) / (r + g + b), (b - g) / (r + g + b)]
