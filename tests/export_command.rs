@@ -231,7 +231,28 @@ const CASES: &[Case] = &[
     ("{c} --format glb --out {w}/t.glb --config {w}/bad.toml", BAD_USAGE, &["bad.toml, line 2", "plains"]),
     ("{c} --format glb --out {w}/t.glb --config {w}/none.toml", BAD_USAGE, &["none.toml", "check the name"]),
     ("{c} --format glb", BAD_USAGE, &["--out"]),
+    ("{c} --format glb --out {w}/t.glb --leaf {w}/none.glb", BAD_USAGE, &["none.glb"]),
+    ("{c} --format glb --out {w}/t.glb --leaf {w}/there", BAD_USAGE, &["{w}/there"]),
+    ("{c} --format glb --out {w}/t.glb --density {w}/none.png", BAD_USAGE, &["none.png"]),
+    ("{c} --format glb --out {w}/t.glb --density {w}/there", BAD_USAGE, &["{w}/there"]),
 ];
+
+/// A drawn density puts leaves on a tree that has none in the film, unless they are switched off.
+#[test]
+fn a_drawn_density_brings_leaves() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let path = dir.path().join("density.png");
+    image::GrayImage::from_pixel(640, 360, image::Luma([255])).save(&path).expect("an image");
+    let density = path.display().to_string();
+    let leafy = |more: &[&str]| {
+        let output = export(made(), "glb", Path::new("-"), &[&["--density", &density], more].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let file = gltf::Gltf::from_slice(&output.stdout).expect("a valid file");
+        file.materials().any(|m| m.name() == Some("leaf"))
+    };
+    assert!(leafy(&[]));
+    assert!(!leafy(&["--leaves", "off"]));
+}
 
 #[test]
 fn bad_input_gets_one_line_and_leaves_nothing() {

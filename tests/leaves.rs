@@ -4,6 +4,7 @@ mod support;
 mod synthetic;
 
 use arborcam::config::{Config, LeafShow, Leaves};
+use arborcam::draw::{Camera, Look, Model, View, picture};
 use arborcam::model::{JointPose, Luma, NodeId, Outline, Pose, Rgb, Size, Skeleton};
 use arborcam::motion::flutter;
 use arborcam::pipeline::{Pipeline, Seen, dress, leaf_seeds};
@@ -198,6 +199,56 @@ fn number_is_traded_for_size() {
         let share = covered(most) / wanted;
         assert!((0.8..1.2).contains(&share), "{most} triangles cover {share} of what the picture has");
     }
+}
+
+/// A tree in leaf hides its wood: where the picture has leaves, leaves are seen and not the limbs behind them, as many
+/// pixels as in the picture; and from the side and from above it is no barer.
+#[test]
+fn leaves_hide_the_wood_as_in_the_picture_and_from_all_sides() {
+    let still = still(true);
+    let seen = Seen { picture: Some(&still.picture), outline: Some(&still.outline), ..Seen::default() };
+    let dressed = dress(&still.skeleton, seen, &Config::default());
+    let mut marked = dressed.foliage.clone();
+    marked.groups.iter_mut().for_each(|g| g.colours.fill([255, 0, 255]));
+    let mut model = Model::bare(&still.skeleton, &dressed.wood[0], [0, 255, 0]);
+    model.foliage = &marked;
+    let posed = model.posed(None, &[]);
+    let look = Look { samples: 1, ..Look::default() };
+    let bounds = posed.bounds().expect("a tree");
+    // For every pixel: 2 for leaf, 1 for wood.
+    let kinds = |camera: &Camera| -> Vec<u8> {
+        let kind = |p: &[u8]| u8::from(p[3] > 127) + u8::from(p[3] > 127 && p[0] > p[1]);
+        picture(&posed, camera, &look).pixels.chunks_exact(4).map(kind).collect()
+    };
+    let count = |kinds: &[u8], kind: u8| kinds.iter().filter(|&&k| k == kind).count() as f32;
+    let front = kinds(&Camera::of_film(&still.skeleton, SIZE));
+    let share = count(&front, 2) / still.leaf.iter().sum::<f32>();
+    let before: Vec<u8> = front.iter().zip(&still.leaf).filter(|(_, l)| **l > 0.5).map(|(k, _)| *k).collect();
+    let barer = |view| {
+        let kinds = kinds(&Camera::fitting(&bounds, view, false, SIZE));
+        count(&kinds, 1) / count(&kinds, 2)
+    };
+    let bare = [View::FRONT, View::SIDE, View::TOP].map(barer);
+    let hidden = count(&before, 1) / before.len() as f32;
+    println!("seen {share:.3} of the picture's leaves, wood before {hidden:.3} of them; wood over leaf {bare:?}");
+    assert!((0.85..1.15).contains(&share), "{share}");
+    assert!(hidden < 0.1, "{hidden}");
+    assert!(bare[1] < 2.0 * bare[0] && bare[2] < 2.0 * bare[0], "{bare:?}");
+}
+
+/// Something behind the tree shows through in a colour that is nowhere beside it.
+#[test]
+fn no_leaf_has_the_colour_of_what_is_seen_between_leaves() {
+    let mut still = still(true);
+    let first = still.leaf.iter().position(|&l| l > 0.5).expect("a leaf") / 640;
+    for (i, pixel) in still.picture.pixels.chunks_exact_mut(3).enumerate() {
+        if still.leaf[i] > 0.5 && i / 640 < first + 12 {
+            pixel.copy_from_slice(&[30, 130, 150]);
+        }
+    }
+    let leaves = still.leaves(&Leaves::default());
+    let blue = leaves.groups.iter().flat_map(|g| &g.colours).filter(|c| c[2] >= c[1]).count();
+    assert_eq!(blue, 0);
 }
 
 /// B.1: dark leaves stand at the back, bright ones at the front; each main branch has its own, and all is sound.

@@ -25,6 +25,16 @@ impl Chance {
         low + (high - low) * self.share()
     }
 
+    /// Evenly in -1..1.
+    pub fn either(&mut self) -> f64 {
+        self.between(-1.0, 1.0)
+    }
+
+    /// Mean 0, variance 1; a sum of twelve even numbers, so never beyond 6.
+    pub fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.share()).sum::<f64>() - 6.0
+    }
+
     /// One of `all`, if there is any.
     pub fn one_of<'a, T>(&mut self, all: &'a [T]) -> Option<&'a T> {
         all.get((self.share() * all.len() as f64) as usize)

@@ -93,7 +93,7 @@ fn leaf(canvas: &Canvas, bins: &[u16], tree: &[f32]) -> Vec<f32> {
     bins.iter().zip(tree).map(|(&bin, &tree)| tree * (1.0 - bark.at(bin) as f32)).collect()
 }
 
-fn smooth_step(from: f32, to: f32, x: f32) -> f32 {
+pub(super) fn smooth_step(from: f32, to: f32, x: f32) -> f32 {
     let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }

@@ -70,18 +70,21 @@ pub(super) fn correlation(a: &[f32], b: &[f32], counts: impl Fn(usize) -> bool) 
 }
 
 /// Which cells are covered by triangles seen from the front.
-pub(super) struct Cover {
+pub(super) struct Cover<'a> {
     grid: Grid,
+    /// Depth of what hides the triangles behind it, for every cell; may be empty.
+    pub before: &'a [f32],
     pub covered: Vec<f32>,
 }
 
-impl Cover {
-    pub fn new(grid: Grid) -> Self {
-        Self { grid, covered: vec![0.0; grid.area()] }
+impl<'a> Cover<'a> {
+    pub fn new(grid: Grid, before: &'a [f32]) -> Self {
+        Self { grid, before, covered: vec![0.0; grid.area()] }
     }
 
-    /// Marks the cells whose centre lies in the triangle, whichever way it faces; its corners in cells.
-    pub fn add(&mut self, [a, b, c]: [[f64; 2]; 3]) {
+    /// Marks the cells whose centre lies in the triangle, whichever way it faces, unless something is before it; its corners
+    /// in cells and its depth.
+    pub fn add(&mut self, [a, b, c]: [[f64; 2]; 3], depth: f64) {
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
         if area == 0.0 || !area.is_finite() {
             return;
@@ -100,7 +103,10 @@ impl Cover {
             for u in left as usize..=right as usize {
                 let (x, y) = (u as f64, v as f64);
                 if side(a, b, x, y) >= 0.0 && side(b, c, x, y) >= 0.0 && side(c, a, x, y) >= 0.0 {
-                    self.covered[v * self.grid.size.width as usize + u] = 1.0;
+                    let i = v * self.grid.size.width as usize + u;
+                    if self.before.get(i).is_none_or(|&wood| f64::from(wood) < depth) {
+                        self.covered[i] = 1.0;
+                    }
                 }
             }
         }

@@ -6,7 +6,7 @@ use super::target::Target;
 use super::template::Template;
 use crate::model::{NodeId, Skeleton};
 use crate::shape::FoliageGroup;
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 use std::f64::consts::TAU;
 
 /// Meshes of leaves in a tree at most.
@@ -19,7 +19,9 @@ const WAVE: f64 = 0.25;
 const LEAF_SWING: f64 = 0.8;
 const LEAF_LATER: f64 = 2.4;
 /// Share of the outward direction in a normal: leaves are lit as a crown, not as a heap of mirrors.
-const OUTWARD: f64 = 0.5;
+const OUTWARD: f64 = 0.6;
+/// The point that they point away from is below the crown's middle by this share of the tree's height.
+const LOW: f64 = 0.1;
 
 /// The meshes of all clusters.
 pub(super) fn groups(
@@ -38,7 +40,10 @@ pub(super) fn groups(
     nodes.dedup();
     let mut out: Vec<FoliageGroup> =
         nodes.iter().map(|&n| FoliageGroup { node: NodeId(n as u32), ..FoliageGroup::default() }).collect();
-    let drawer = Drawer { skeleton, target, template, height };
+    let sum: Vector3<f64> = clusters.iter().map(|c| c.centre.coords).sum();
+    // A little low, so that what is lit from above is the most of the crown.
+    let middle = Point3::from(sum / clusters.len().max(1) as f64) - Vector3::y() * (LOW * height);
+    let drawer = Drawer { skeleton, target, template, height, middle };
     for (cluster, stand) in clusters.iter().zip(&stands) {
         if let Ok(k) = nodes.binary_search(stand) {
             drawer.draw(cluster, &perches[cluster.perch], &mut out[k]);
@@ -96,6 +101,8 @@ struct Drawer<'a> {
     target: Option<&'a Target>,
     template: &'a Template,
     height: f64,
+    /// Of the crown.
+    middle: Point3<f64>,
 }
 
 impl Drawer<'_> {
@@ -107,14 +114,15 @@ impl Drawer<'_> {
         let way = (cluster.centre - node).norm();
         let beta = if way.is_finite() { TAU * way / (WAVE * self.height) } else { 0.0 };
         let axis = cluster.turn * Vector3::y();
-        let trunk = self.skeleton.nodes.get(1).map_or(Vector3::zeros(), |n| n.position.coords);
-        let outward = Vector3::new(cluster.centre.x - trunk.x, 0.3 * self.height, cluster.centre.z - trunk.z);
-        let outward = outward.try_normalize(1e-9).unwrap_or(Vector3::y());
         let leaves = Leaves::of(self, cluster, perch);
         for (i, p) in template.positions.iter().enumerate() {
             let leaf = template.leaf_of[i] as usize;
             let at = cluster.at(template, p);
-            let normal = cluster.turn * template.normals[i] * (1.0 - OUTWARD) + outward * OUTWARD;
+            let outward = (at - self.middle).try_normalize(1e-9).unwrap_or(Vector3::y());
+            let own = cluster.turn * template.normals[i];
+            // A leaf has two faces, and the outer one is lit.
+            let own = if own.dot(&outward) < 0.0 { -own } else { own };
+            let normal = own * (1.0 - OUTWARD) + outward * OUTWARD;
             let normal = normal.try_normalize(1e-6).unwrap_or(outward);
             let turned = axis.cross(&(at - cluster.centre));
             let fluttered = leaves.stalks[leaf].cross(&(at - leaves.apices[leaf])) * LEAF_SWING;
@@ -137,7 +145,7 @@ impl Drawer<'_> {
 /// The single leaves of a cluster.
 struct Leaves {
     /// Where each is held, model axes at rest.
-    apices: Vec<nalgebra::Point3<f64>>,
+    apices: Vec<Point3<f64>>,
     /// From there to its middle, of length 1: what it turns about.
     stalks: Vec<Vector3<f64>>,
     colours: Vec<[u8; 3]>,
@@ -152,25 +160,18 @@ impl Leaves {
             sums[leaf as usize] += p.coords;
             sizes[leaf as usize] += 1.0;
         }
-        let middles: Vec<_> = sums
-            .iter()
-            .zip(&sizes)
-            .map(|(s, n)| cluster.at(template, &nalgebra::Point3::from(s / f64::max(*n, 1.0))))
-            .collect();
+        let middles: Vec<_> =
+            sums.iter().zip(&sizes).map(|(s, n)| cluster.at(template, &Point3::from(s / f64::max(*n, 1.0)))).collect();
         let apices: Vec<_> = template.apices.iter().map(|a| cluster.at(template, a)).collect();
-        let stalk = |(m, a): (&nalgebra::Point3<f64>, &nalgebra::Point3<f64>)| {
-            (m - a).try_normalize(1e-9).unwrap_or(Vector3::zeros())
-        };
+        let stalk = |(m, a): (&Point3<f64>, &Point3<f64>)| (m - a).try_normalize(1e-9).unwrap_or(Vector3::zeros());
         let stalks = middles.iter().zip(&apices).map(stalk).collect();
-        let colour = |middle: &nalgebra::Point3<f64>| {
-            let film = drawer.target.map_or(super::PLAIN, |t| {
+        let colour = |middle: &Point3<f64>| {
+            let film = drawer.target.map_or(super::PLAIN.map(f64::from), |t| {
                 let cell = t.grid.cell_of(&perch.carried.posed(middle));
-                t.colour(cell, (0.15 * t.grid.length(cluster.size)).max(1.0))
+                t.soft_colour(cell, (0.15 * t.grid.length(cluster.size)).max(1.0))
             });
             // Colour times texture is to be what the film shows.
-            std::array::from_fn(|k| {
-                (f64::from(film[k]) / template.texture_mean[k].max(0.05)).round().clamp(0.0, 255.0) as u8
-            })
+            std::array::from_fn(|k| (film[k] / template.texture_mean[k].max(0.05)).round().clamp(0.0, 255.0) as u8)
         };
         let colours = middles.iter().map(colour).collect();
         Self { apices, stalks, colours }

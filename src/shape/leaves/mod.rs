@@ -6,17 +6,18 @@
 
 mod canvas;
 mod carry;
-mod chance;
 mod cluster;
 mod colours;
 mod density;
 mod groups;
+mod hidden;
 mod perch;
 mod place;
 mod season;
 mod target;
 mod template;
 mod texture;
+mod wood;
 
 pub use season::{Season, season};
 pub use template::{Template, TemplateFault, TemplateMesh};
@@ -91,6 +92,7 @@ pub fn foliage_by(
     let target = Target::new(skeleton, view, height);
     let grid = Grid::of(skeleton);
     let perches = Perches::new(limbs, skeleton, view.pose, &grid, height);
+    let wood = wood::front(limbs, skeleton, view.pose, &grid);
     let axis = skeleton.nodes.get(1).map_or(Point3::origin(), |n| n.position);
     let seeds = view.seeds.iter().map(|p| grid.cell_of_pixel(p.map(f64::from))).collect();
     let blank;
@@ -101,7 +103,7 @@ pub fn foliage_by(
             (Sampling::Random { spread: SPREAD }, &blank)
         }
     };
-    let mut planter = Planter { perches, target: wanted, template, seeds, axis, height, count, seed, sampling };
+    let mut planter = Planter { perches, wood, target: wanted, template, seeds, axis, height, count, seed, sampling };
     let clusters = match &target {
         Some(_) => planter.plant(),
         None => planter.plant_of_size((AREA_SHARE * height * height / (count as f64 * template.mean_area())).sqrt()),
@@ -126,7 +128,7 @@ pub fn leaf_cover(foliage: &Foliage, skeleton: &Skeleton, pose: Option<&Pose>) -
 }
 
 fn front_cover(foliage: &Foliage, skeleton: &Skeleton, pose: Option<&Pose>, grid: Grid) -> Vec<f32> {
-    let mut cover = density::Cover::new(grid);
+    let mut cover = density::Cover::new(grid, &[]);
     for group in &foliage.groups {
         let mesh = &group.mesh;
         let seen = |i: usize| {
@@ -136,7 +138,7 @@ fn front_cover(foliage: &Foliage, skeleton: &Skeleton, pose: Option<&Pose>, grid
         };
         let cells: Vec<[f64; 2]> = (0..mesh.positions.len()).map(seen).collect();
         for t in mesh.indices.chunks_exact(3) {
-            cover.add([t[0], t[1], t[2]].map(|i| cells[i as usize]));
+            cover.add([t[0], t[1], t[2]].map(|i| cells[i as usize]), 0.0);
         }
     }
     cover.covered

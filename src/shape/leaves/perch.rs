@@ -32,6 +32,18 @@ pub(super) struct Perch {
     pub cell: [f64; 2],
     /// Clusters that sit there.
     pub load: f64,
+    /// On a limb that is too thick to bear leaves: only where there is no other way to hide it.
+    pub thick: bool,
+}
+
+/// Which of the branches at a place in the picture a cluster is put on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Side {
+    /// Those of the front half of the tree.
+    Front,
+    Back,
+    /// Those nearer to the viewer than this depth, px.
+    Before(f64),
 }
 
 /// All of them, sorted into squares of the picture.
@@ -56,13 +68,13 @@ impl Perches {
         // A tree of thick limbs alone still has its leaves.
         let some = |bears: &&&dyn Fn(&Limb) -> bool| limbs.iter().any(bears);
         let bears = kinds.iter().find(some).unwrap_or(&kinds[2]);
-        let bearing: Vec<&Limb> = limbs.iter().filter(|l| bears(l)).collect();
+        let bearing: Vec<&Limb> = limbs.iter().filter(|l| bears(l) || level(l) >= 2).collect();
         let ways = bearing.iter().flat_map(|l| l.stations.windows(2).map(|w| (w[1].at - w[0].at).norm()));
         let length: f64 = ways.filter(|w| w.is_finite()).sum();
         let step = (STEP * height).max(length / MOST).max(1e-6);
         let mut all = Vec::new();
         for limb in bearing {
-            along(limb, step, skeleton, pose, grid, &mut all);
+            along(limb, !bears(limb), step, skeleton, pose, grid, &mut all);
         }
         let reach = grid.length(REACH * height).max(1.0);
         let (across, down) = [grid.size.width, grid.size.height].map(|n| (f64::from(n) / reach) as usize + 1).into();
@@ -83,11 +95,17 @@ impl Perches {
     /// Seats a cluster that is seen at `cell`: on the nearest branch in the picture, and where several are all but equally
     /// near, on one of the front half of the tree if it is bright, of the back half if not, and there on the one that
     /// has fewest (Li et al. B.1). Returns the place and how far it is in the picture, cells.
-    pub fn seat(&mut self, cell: [f64; 2], bright: bool) -> Option<(usize, f64)> {
-        let near = self.near(cell);
+    pub fn seat(&mut self, cell: [f64; 2], side: Side) -> Option<(usize, f64)> {
+        let hides = matches!(side, Side::Before(_));
+        let near = self.near(cell, hides);
         let least = near.iter().map(|n| n.1).fold(f64::MAX, f64::min);
-        let front = |i: usize| (self.all[i].depth > self.middle) == bright;
-        let cost = |&(i, distance): &(usize, f64)| (!front(i), self.all[i].load + distance / self.reach);
+        let front = |i: usize| match side {
+            Side::Front => self.all[i].depth > self.middle,
+            Side::Back => self.all[i].depth <= self.middle,
+            Side::Before(depth) => self.all[i].depth >= depth,
+        };
+        let thick = |i: usize| if self.all[i].thick { 2.0 } else { 0.0 };
+        let cost = |&(i, distance): &(usize, f64)| (!front(i), thick(i) + self.all[i].load + distance / self.reach);
         let order = |a: &(usize, f64), b: &(usize, f64)| {
             let (x, y) = (cost(a), cost(b));
             x.0.cmp(&y.0).then(x.1.total_cmp(&y.1)).then(a.0.cmp(&b.0))
@@ -98,7 +116,7 @@ impl Perches {
     }
 
     /// Places within reach of a cell with their distance; if there are none, those of the first ring of squares that has some.
-    fn near(&self, cell: [f64; 2]) -> Vec<(usize, f64)> {
+    fn near(&self, cell: [f64; 2], thick: bool) -> Vec<(usize, f64)> {
         let [x, y] = square(cell, self.reach, [self.across, self.down]);
         for ring in 1..=self.across.max(self.down) {
             let (left, right) = (x.saturating_sub(ring), (x + ring).min(self.across - 1));
@@ -108,7 +126,8 @@ impl Perches {
                 let c = self.all[i as usize].cell;
                 (i as usize, (c[0] - cell[0]).hypot(c[1] - cell[1]))
             };
-            let found: Vec<(usize, f64)> = squares.flat_map(|s| self.squares[s].iter().map(|&i| distance(i))).collect();
+            let of = squares.flat_map(|s| &self.squares[s]).filter(|&&i| thick || !self.all[i as usize].thick);
+            let found: Vec<(usize, f64)> = of.map(|&i| distance(i)).collect();
             if !found.is_empty() {
                 return found;
             }
@@ -122,7 +141,15 @@ fn square(cell: [f64; 2], side: f64, count: [usize; 2]) -> [usize; 2] {
 }
 
 /// Places along one limb, `step` px apart; near its base there are none, where it is inside its parent.
-fn along(limb: &Limb, step: f64, skeleton: &Skeleton, pose: Option<&Pose>, grid: &Grid, all: &mut Vec<Perch>) {
+fn along(
+    limb: &Limb,
+    thick: bool,
+    step: f64,
+    skeleton: &Skeleton,
+    pose: Option<&Pose>,
+    grid: &Grid,
+    all: &mut Vec<Perch>,
+) {
     let length: f64 = limb.stations.windows(2).map(|w| (w[1].at - w[0].at).norm()).sum();
     if !(length > 0.0 && length.is_finite()) {
         return;
@@ -148,7 +175,7 @@ fn along(limb: &Limb, step: f64, skeleton: &Skeleton, pose: Option<&Pose>, grid:
         let cell = grid.cell_of(&posed);
         if cell.iter().all(|c| c.is_finite()) {
             let (node, depth, load) = (limb.node, posed.z, 0.0);
-            all.push(Perch { node, at, direction, riding, carried, depth, radius, cell, load });
+            all.push(Perch { node, at, direction, riding, carried, depth, radius, cell, load, thick });
         }
     }
 }

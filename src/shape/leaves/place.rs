@@ -1,11 +1,12 @@
 //! Where clusters stand and how large they are, so that their density is that of the picture.
 
-use super::chance::Chance;
 use super::cluster::{Cluster, stand};
 use super::density::{Cover, correlation, smoothed};
-use super::perch::Perches;
+use super::hidden::emptiest;
+use super::perch::{Perch, Perches, Side};
 use super::target::Target;
 use super::template::Template;
+use crate::shape::chance::Chance;
 use crate::shape::leaves::Sampling;
 use nalgebra::{Point3, Vector3};
 
@@ -15,25 +16,29 @@ const LAYERS: f64 = 2.0;
 const TRIES: usize = 5;
 /// Shares of the clusters: seeds at most; seeds and density together; with those that stand on branches that bear few, which
 /// the picture does not show, but without them the crown would be thin from the side. What is left closes gaps.
-const SEEDED: f64 = 0.4;
-const BY_DENSITY: f64 = 0.45;
-const BEFORE_GAPS: f64 = 0.7;
+const SEEDED: f64 = 0.35;
+const BY_DENSITY: f64 = 0.42;
+const BEFORE_GAPS: f64 = 0.72;
 /// Rounds in which gaps are looked for.
 const ROUNDS: usize = 6;
 /// Seeds with less leaf around them are corners of something else.
 const LEAST_DENSITY: f32 = 0.15;
 /// Where more leaf is wanted than this, what is behind does not count.
-const HIDING: f32 = 0.5;
+const HIDING: f32 = 0.4;
 /// A cluster that is put on a branch stands so far beside it at most, as a share of the tree's height.
 const ASIDE: f64 = 0.02;
 /// A leaf stands so far before or behind its branch at most, as a share of the tree's height.
 const DEEPEST: f64 = 1.0 / 15.0;
+/// The crown's emptiest places are looked for in cubes of so many cluster sizes.
+const CUBE: f64 = 1.5;
 /// Golden section: values `k * GOLDEN mod 1` fill the interval evenly for any number of them.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// All that decides where a cluster goes.
 pub(super) struct Planter<'a> {
     pub perches: Perches,
+    /// Depth of the foremost wood in every cell.
+    pub wood: Vec<f32>,
     pub target: &'a Target,
     pub template: &'a Template,
     /// In cells, strongest first.
@@ -59,15 +64,15 @@ impl Planter<'_> {
         let mut size = self.bounded((LAYERS * wanted / cells / (self.count as f64 * one)).sqrt());
         let mut best: Option<(f64, Vec<Cluster>)> = None;
         for _ in 0..TRIES {
-            let (clusters, cover) = self.attempt(size);
+            let (clusters, covered) = self.attempt(size);
             let width = self.target.grid.size.width as usize;
-            let density = smoothed(&cover.covered, width, self.target.sigma);
+            let density = smoothed(&covered, width, self.target.sigma);
             let likeness =
                 -density.iter().zip(&self.target.density).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>();
             if best.as_ref().is_none_or(|(before, _)| likeness > *before) {
                 best = Some((likeness, clusters));
             }
-            let covered: f64 = cover.covered.iter().map(|&c| f64::from(c)).sum();
+            let covered: f64 = covered.iter().map(|&c| f64::from(c)).sum();
             let next = self.bounded(size * (wanted / covered.max(1.0)).powf(0.8).clamp(0.6, 1.7));
             if (next / size - 1.0).abs() < 0.01 {
                 break;
@@ -87,16 +92,24 @@ impl Planter<'_> {
         size.clamp(0.004 * self.height, 0.25 * self.height)
     }
 
-    fn attempt(&mut self, size: f64) -> (Vec<Cluster>, Cover) {
+    /// The clusters, and which cells are covered by leaves that no wood hides.
+    fn attempt(&mut self, size: f64) -> (Vec<Cluster>, Vec<f32>) {
         self.perches.clear();
+        let wood = std::mem::take(&mut self.wood);
+        let found = self.attempt_before(&wood, size);
+        self.wood = wood;
+        found
+    }
+
+    fn attempt_before(&mut self, wood: &[f32], size: f64) -> (Vec<Cluster>, Vec<f32>) {
         let mut work = Work {
             chance: Chance::new(self.seed),
             clusters: Vec::with_capacity(self.count),
-            cover: Cover::new(self.target.grid),
+            cover: Cover::new(self.target.grid, wood),
         };
         if let Sampling::Random { spread } = self.sampling {
             self.at_random(spread, size, &mut work);
-            return (work.clusters, work.cover);
+            return (work.clusters, work.cover.covered);
         }
         let most = ((SEEDED * self.count as f64).ceil() as usize).min(self.count);
         let kept =
@@ -106,20 +119,39 @@ impl Planter<'_> {
         let used = seeds.len().min(most);
         for k in 0..used {
             let cell = seeds[k * seeds.len() / used];
-            self.add(cell, self.target.is_bright(cell), size, &mut work);
+            self.add(cell, self.half(cell), size, &mut work);
         }
         let wanted = |(w, _): (&f32, &f32)| *w;
-        self.spread(BY_DENSITY, wanted, size, &mut work);
+        self.spread(BY_DENSITY, wanted, false, size, &mut work);
         self.fill(BEFORE_GAPS, size, &mut work);
         for round in 1..=ROUNDS {
             let share = BEFORE_GAPS + (1.0 - BEFORE_GAPS) * round as f64 / ROUNDS as f64;
-            self.spread(share, |(w, c)| w * (1.0 - c), size, &mut work);
+            self.spread(share, |(w, c)| w * (1.0 - c), true, size, &mut work);
         }
-        (work.clusters, work.cover)
+        (work.clusters, work.cover.covered)
     }
 
-    /// Clusters where `weight` of what is wanted and what is covered is, until there are `share` of all.
-    fn spread(&mut self, share: f64, weight: impl Fn((&f32, &f32)) -> f32, size: f64, work: &mut Work) {
+    /// Bright leaves are in front (Li et al. B.1).
+    fn half(&self, cell: [f64; 2]) -> Side {
+        if self.target.is_bright(cell) { Side::Front } else { Side::Back }
+    }
+
+    /// Before the wood that is seen at a cell, or in the half that its colour says where there is none.
+    fn before_wood(&self, cell: [f64; 2], wood: &[f32]) -> Side {
+        let depth = self.target.grid.index(cell).and_then(|i| wood.get(i)).copied().unwrap_or(f32::NEG_INFINITY);
+        if depth.is_finite() { Side::Before(f64::from(depth) - 0.5 * DEEPEST * self.height) } else { self.half(cell) }
+    }
+
+    /// Clusters where `weight` of what is wanted and what is covered is, until there are `share` of all; `hiding` the wood
+    /// that stands there.
+    fn spread(
+        &mut self,
+        share: f64,
+        weight: impl Fn((&f32, &f32)) -> f32,
+        hiding: bool,
+        size: f64,
+        work: &mut Work<'_>,
+    ) {
         let count = ((share * self.count as f64).round() as usize).saturating_sub(work.clusters.len());
         // By squares of about a cluster's size: a gap that large counts, specks between leaves do not.
         let grid = self.target.grid;
@@ -145,45 +177,50 @@ impl Planter<'_> {
             let corner = [square % across * side, square / across * side];
             let cell = corner.map(|c| c as f64 - 0.5 + side as f64 * work.chance.share());
             if grid.index(cell).is_some() {
-                self.add(cell, self.target.is_bright(cell), size, work);
+                let side = if hiding { self.before_wood(cell, work.cover.before) } else { self.half(cell) };
+                self.add(cell, side, size, work);
             }
         }
     }
 
-    /// Clusters on the branches that bear fewest, where the picture's leaves hide them, until there are `share` of all.
-    fn fill(&mut self, share: f64, size: f64, work: &mut Work) {
+    /// Clusters on branches where the crown is emptiest and the picture's leaves hide them, until there are `share` of all.
+    fn fill(&mut self, share: f64, size: f64, work: &mut Work<'_>) {
         let grid = self.target.grid;
-        let hidden = |i: &usize| grid.index(self.perches.all[*i].cell).is_some_and(|c| self.target.density[c] > HIDING);
-        let mut order: Vec<(f64, usize)> =
-            (0..self.perches.all.len()).filter(hidden).map(|i| (self.perches.all[i].load, i)).collect();
-        // Those with equal load in an order that goes all over the tree.
-        order.iter_mut().for_each(|(load, i)| *load += (*i as f64 * GOLDEN).fract());
-        order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let hidden = |p: &Perch| !p.thick && grid.index(p.cell).is_some_and(|c| self.target.density[c] > HIDING);
         let left = ((share * self.count as f64).round() as usize).saturating_sub(work.clusters.len());
-        for &(_, i) in order.iter().cycle().take(if order.is_empty() { 0 } else { left }) {
-            let perch = &mut self.perches.all[i];
-            perch.load += 1.0;
-            let (aside, bright) = (grid.length(ASIDE * self.height), work.chance.share() < 0.5);
+        let leaves = work.clusters.iter().map(|c| c.centre);
+        for i in emptiest(&self.perches.all, hidden, leaves, CUBE * size, left) {
+            let perch = &self.perches.all[i];
+            let aside = grid.length(ASIDE * self.height);
+            let side = if work.chance.share() < 0.5 { Side::Front } else { Side::Back };
             let cell = perch.cell.map(|c| c + aside * work.chance.either());
-            self.hang(i, cell, aside, bright, size, work);
+            self.hang(i, cell, aside, side, size, work);
         }
     }
 
-    /// A cluster that is seen at `cell`, in the front half of the tree if it is bright.
-    fn add(&mut self, cell: [f64; 2], bright: bool, size: f64, work: &mut Work) {
-        if let Some((i, distance)) = self.perches.seat(cell, bright) {
-            self.hang(i, cell, distance, bright, size, work);
+    /// A cluster that is seen at `cell`, on a branch of that side of the tree.
+    fn add(&mut self, cell: [f64; 2], side: Side, size: f64, work: &mut Work<'_>) {
+        if let Some((i, distance)) = self.perches.seat(cell, side) {
+            self.hang(i, cell, distance, side, size, work);
         }
     }
 
     /// A cluster on branch place `i`, seen at `cell`, `distance` cells from it.
-    fn hang(&self, i: usize, cell: [f64; 2], distance: f64, bright: bool, size: f64, work: &mut Work) {
+    fn hang(&self, i: usize, cell: [f64; 2], distance: f64, side: Side, size: f64, work: &mut Work<'_>) {
         let perch = &self.perches.all[i];
         let grid = &self.target.grid;
         let far = (distance / grid.length(1.0).max(1e-9)).min(DEEPEST * self.height);
         // Off the bark at least, on the side that it is lit from or not.
         let off = far * work.chance.share() + perch.radius + 0.2 * size;
-        let posed = grid.model_at(cell, if bright { perch.depth + off } else { perch.depth - off });
+        let depth = match side {
+            Side::Front => perch.depth + off,
+            Side::Back => perch.depth - off,
+            Side::Before(wood) => {
+                let clear = wood + 0.5 * DEEPEST * self.height + 0.5 * size;
+                clear.clamp(perch.depth + off, (perch.depth + off).max(perch.depth + DEEPEST * self.height + size))
+            }
+        };
+        let posed = grid.model_at(cell, depth);
         // At the crown's border a whole cluster would stand out of it.
         let share = grid.index(cell).map_or(0.0, |c| f64::from(self.target.density[c]));
         let size = size * (0.5 + 0.6 * share).clamp(0.5, 1.1) * (1.0 + 0.15 * work.chance.either());
@@ -192,9 +229,10 @@ impl Planter<'_> {
     }
 
     /// As leaves are sampled without a picture: about the branches, with a deviation of `spread` tree heights.
-    fn at_random(&mut self, spread: f64, size: f64, work: &mut Work) {
+    fn at_random(&mut self, spread: f64, size: f64, work: &mut Work<'_>) {
+        let bearing: Vec<usize> = (0..self.perches.all.len()).filter(|&i| !self.perches.all[i].thick).collect();
         for _ in 0..self.count {
-            let i = ((work.chance.share() * self.perches.all.len() as f64) as usize).min(self.perches.all.len() - 1);
+            let Some(&i) = work.chance.one_of(&bearing) else { return };
             let off = Vector3::new(work.chance.normal(), work.chance.normal(), work.chance.normal());
             let centre = self.perches.all[i].at + off * (spread * self.height);
             let size = size * (1.0 + 0.15 * work.chance.either());
@@ -202,27 +240,31 @@ impl Planter<'_> {
         }
     }
 
-    fn put(&self, mut cluster: Cluster, work: &mut Work) {
+    fn put(&self, mut cluster: Cluster, work: &mut Work<'_>) {
         let perch = &self.perches.all[cluster.perch];
         let chance = [work.chance.normal(), work.chance.normal(), work.chance.normal()];
         cluster.turn = stand(perch, &cluster.centre, &self.axis, chance);
         if !cluster.centre.coords.iter().all(|x| x.is_finite()) {
             return;
         }
-        let seen = |p: &Point3<f64>| self.target.grid.cell_of(&perch.carried.posed(&cluster.at(self.template, p)));
-        let cells: Vec<[f64; 2]> = self.template.positions.iter().map(seen).collect();
+        let seen = |p: &Point3<f64>| {
+            let posed = perch.carried.posed(&cluster.at(self.template, p));
+            (self.target.grid.cell_of(&posed), posed.z)
+        };
+        let cells: Vec<([f64; 2], f64)> = self.template.positions.iter().map(seen).collect();
         for t in self.template.indices.chunks_exact(3) {
-            work.cover.add([t[0], t[1], t[2]].map(|i| cells[i as usize]));
+            let [a, b, c] = [t[0], t[1], t[2]].map(|i| cells[i as usize]);
+            work.cover.add([a.0, b.0, c.0], (a.1 + b.1 + c.1) / 3.0);
         }
         work.clusters.push(cluster);
     }
 }
 
 /// What has been planted so far.
-struct Work {
+struct Work<'a> {
     chance: Chance,
     clusters: Vec<Cluster>,
-    cover: Cover,
+    cover: Cover<'a>,
 }
 
 /// How like the densities of what is covered and of what is wanted are: their correlation over the target's bounding box.

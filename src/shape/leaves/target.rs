@@ -1,13 +1,21 @@
 //! The density that the leaves are to have: the frame's, or a drawn one.
 
 use super::canvas::{Canvas, Grid, luma};
-use super::colours::{Shares, shares};
+use super::colours::{Shares, shares, smooth_step};
 use super::density::{SCALE, smoothed};
 use super::{LeafView, PLAIN};
 use crate::model::Skeleton;
 
 /// Share of leaf from which on a cell's colour is that of leaves.
 const PURE: f32 = 0.6;
+/// Colour tells a cell apart with some doubt, and the sum of the doubts would be missing: what is by this share leaf in a
+/// cell and those around it is not leaf, or wholly.
+const DOUBT: [f32; 2] = [0.3, 0.6];
+/// Hues farther from the leaves' middle one than so many deviations belong to what is seen between them.
+const STRANGE: f64 = 3.5;
+/// The film's light and shade are in the colours already, and a viewer's own come on top: of their ratio to the mean this power
+/// is kept.
+const SHADING: f64 = 0.65;
 
 /// What is wanted in every cell, and what is known of it.
 pub(super) struct Target {
@@ -23,6 +31,9 @@ pub(super) struct Target {
     mean: [u8; 3],
     /// Half of the leaves are darker (Li et al. B.1).
     middle_luma: f64,
+    mean_luma: f64,
+    /// What gives softened colours the mean of the film's back.
+    brighter: f64,
 }
 
 impl Target {
@@ -34,7 +45,10 @@ impl Target {
         let drawn = view.density.and_then(|d| grid.reduced(&d.pixels, d.size, 1));
         let wanted: Vec<f32> = match (&drawn, &seen) {
             (Some(drawn), _) => drawn.iter().map(|&d| f32::from(d) / 255.0).collect(),
-            (None, Some(seen)) => seen.leaf.clone(),
+            (None, Some(seen)) => {
+                let around = smoothed(&seen.leaf, grid.size.width as usize, 1.0);
+                around.iter().map(|&p| smooth_step(DOUBT[0], DOUBT[1], p)).collect()
+            }
             (None, None) => return None,
         };
         let sigma = grid.length(SCALE * height);
@@ -42,15 +56,20 @@ impl Target {
         let colours: Vec<([u8; 3], f32)> = match (&canvas, seen) {
             (Some(canvas), Some(seen)) => {
                 let pure = pure(&seen.leaf, grid.size.width as usize);
-                canvas.colours.iter().copied().zip(pure).collect()
+                let mut colours: Vec<_> = canvas.colours.iter().copied().zip(pure).collect();
+                without_strangers(&mut colours);
+                colours
             }
             _ => Vec::new(),
         };
         let mut lumas: Vec<f64> = colours.iter().filter(|c| c.1 > 0.5).map(|c| luma(c.0)).collect();
         lumas.sort_unstable_by(f64::total_cmp);
         let middle_luma = lumas.get(lumas.len() / 2).copied().unwrap_or(0.0);
+        let mean_luma = lumas.iter().sum::<f64>() / lumas.len().max(1) as f64;
+        let soft: f64 = lumas.iter().map(|l| softened(*l, mean_luma)).sum::<f64>() / lumas.len().max(1) as f64;
+        let brighter = if soft > 0.0 { mean_luma / soft } else { 1.0 };
         let mean = mean(colours.iter()).unwrap_or(PLAIN);
-        Some(Self { grid, wanted, density, sigma, colours, mean, middle_luma })
+        Some(Self { grid, wanted, density, sigma, colours, mean, middle_luma, mean_luma, brighter })
     }
 
     /// Nothing wanted and nothing known.
@@ -64,6 +83,8 @@ impl Target {
             colours: Vec::new(),
             mean: PLAIN,
             middle_luma: 0.0,
+            mean_luma: 0.0,
+            brighter: 1.0,
         }
     }
 
@@ -82,6 +103,14 @@ impl Target {
         found.unwrap_or(self.mean)
     }
 
+    /// The colour around a cell with its light and shade softened, channels 0 to 255.
+    pub fn soft_colour(&self, cell: [f64; 2], radius: f64) -> [f64; 3] {
+        let colour = self.colour(cell, radius);
+        let luma = luma(colour).max(1.0);
+        let share = if self.mean_luma > 0.0 { self.brighter * softened(luma, self.mean_luma) / luma } else { 1.0 };
+        colour.map(|c| f64::from(c) * share)
+    }
+
     /// Whether a leaf seen there is of the brighter half.
     pub fn is_bright(&self, cell: [f64; 2]) -> bool {
         luma(self.colour(cell, 1.0)) > self.middle_luma
@@ -98,6 +127,32 @@ fn pure(leaf: &[f32], width: usize) -> Vec<f32> {
         if least < PURE { 0.0 } else { least }
     };
     (0..leaf.len()).map(least).collect()
+}
+
+fn softened(luma: f64, mean: f64) -> f64 {
+    mean * (luma / mean.max(1.0)).max(0.0).powf(SHADING)
+}
+
+/// Takes the weight of colours whose hue is none of the leaves': what is seen between them can have colours that are found
+/// nowhere outside. By median and median deviation, so that autumn may have all of its hues.
+fn without_strangers(colours: &mut [([u8; 3], f32)]) {
+    let hue = |[r, g, b]: [u8; 3]| {
+        let [r, g, b] = [r, g, b].map(|c| f64::from(c) + 4.0);
+        [(r - g) / (r + g + b), (b - g) / (r + g + b)]
+    };
+    for k in 0..2 {
+        let mut hues: Vec<f64> = colours.iter().filter(|c| c.1 > 0.5).map(|c| hue(c.0)[k]).collect();
+        let Some(middle) = median(&mut hues) else { return };
+        hues.iter_mut().for_each(|h| *h = (*h - middle).abs());
+        // 1.4826: from the median deviation to the standard one of a normal distribution; below a step of 8 bits all is noise.
+        let most = STRANGE * (1.4826 * median(&mut hues).unwrap_or(0.0)).max(0.02);
+        colours.iter_mut().filter(|c| (hue(c.0)[k] - middle).abs() > most).for_each(|c| c.1 = 0.0);
+    }
+}
+
+fn median(values: &mut [f64]) -> Option<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
 }
 
 /// Mean colour by weight; `None` where there is hardly any.
