@@ -14,7 +14,7 @@ mod reshape;
 mod retrace;
 
 pub use back::{BackEnd, Moved};
-pub use dress::{Dressed, Seen, dress};
+pub use dress::{Seen, dress, flutter};
 pub use front::{Followed, FrontEnd};
 pub use leaves::seeds as leaf_seeds;
 pub use refine::Refinement;

@@ -28,7 +28,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("draw", &["model", "shape::Mesh", "shape::Foliage", "shape::FoliageGroup"]),
     // `capture.json` holds the whole configuration and what the push has achieved; the model's file holds all that is
     // drawn; the HTML page plots the angles; a user's leaf is read where glTF is known.
-    ("export", &["model", "config", "shape", "pipeline::Dressed", "dynamics::angle_to_parent_deg"]),
+    ("export", &["model", "config", "shape", "dynamics::angle_to_parent_deg"]),
     // A capture's tables back to the nouns: poses by the rule by which they were made, the outline as a file of its own
     // would be.
     ("capture", &["model", "config", "motion::PoseEstimator", "outline", "export"]),
@@ -58,6 +58,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "shape::cylinders",
             "shape::Cut",
             "shape::Drawn",
+            "shape::Dressed",
             "tui",
             "doctor",
         ],

@@ -243,7 +243,7 @@ const CASES: &[Case] = &[
     ("replay {f}/clip.mkv --trunk {f}/trunk-point.json", BAD_USAGE, &["--trunk", "at least two points"], Nothing),
     ("replay {f}/clip.mkv --trunk {f}/words.json", BAD_USAGE, &["words.json", "polyline_px"], Nothing),
     ("replay {f}/clip.mkv --trunk {f}/none.json", BAD_USAGE, &["none.json", "or auto"], Nothing),
-    ("replay {f}/clip.mkv --envelope sphere", BAD_USAGE, &["sphere", "revolution or hull"], Nothing),
+    ("replay {f}/clip.mkv --envelope sphere", BAD_USAGE, &["sphere", "give revolution, hull, or an image"], Nothing),
     ("replay {f}/clip.mkv --outline {f}/none.json", BAD_USAGE, &["none.json", "check the name"], Nothing),
     ("replay {f}/clip.mkv --outline {f}/small.png", BAD_USAGE, &["small.png", "64x36", "640x360", "draw it"], Nothing),
     ("replay {f}/clip.mkv --outline {f}/black.png", BAD_USAGE, &["black.png", "nothing in it is white"], Nothing),

@@ -6,8 +6,8 @@ use arborcam::config::Config;
 use arborcam::export::ExportError;
 use arborcam::export::gltf::{KEY_TOLERANCE_PX, Model, glb};
 use arborcam::model::{Pose, Rgb, Skeleton};
-use arborcam::pipeline::{Dressed, Seen, dress};
-use arborcam::shape::Mesh;
+use arborcam::pipeline::{Seen, dress};
+use arborcam::shape::{Dressed, Mesh};
 use gltf::animation::util::ReadOutputs;
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde_json::{Value, json};
@@ -133,10 +133,8 @@ fn worst_error_px(played: &Played, skeleton: &Skeleton, poses: &[Pose], metres_p
         for (i, node) in skeleton.nodes.iter().enumerate() {
             let skinned = joints[i] * (Point3::from(node.position.coords * metres_per_px + bind[i]));
             let off = skinned.coords / metres_per_px - pose.joints[i].position.coords;
-            // Half as much across the plane of the node, in which it was seen or which it copies.
-            let across =
-                off.dot(&(UnitQuaternion::from_axis_angle(&Vector3::y_axis(), node.plane_angle) * Vector3::z()));
-            worst = worst.max((off.norm_squared() - 0.75 * across * across).max(0.0).sqrt());
+            // Depth, which is estimated, counts half.
+            worst = worst.max(Vector3::new(off.x, off.y, 0.5 * off.z).norm());
         }
     }
     worst
@@ -305,27 +303,35 @@ fn names_and_extras_tell_what_was_measured_and_what_was_copied() {
     assert_eq!(told["frequency_hz"], json!(0.5));
 }
 
+/// Time that this thread has had on a processor, s: what others on the machine do must not count.
+fn cpu_s() -> f64 {
+    let stat = std::fs::read_to_string("/proc/thread-self/stat").expect("proc");
+    // utime and stime, in hundredths of a second; the name in brackets before may hold anything.
+    let fields: Vec<&str> = stat[stat.rfind(')').expect("a name")..].split_whitespace().collect();
+    (fields[12].parse::<f64>().expect("utime") + fields[13].parse::<f64>().expect("stime")) / 100.0
+}
+
 #[test]
 fn a_realistic_tree_is_written_fast_and_small() {
     let skeleton = synthetic::tree(7, 3);
     assert_eq!(skeleton.nodes.len(), 380);
     let poses = synthetic::sway(&skeleton, 330);
-    let begin = std::time::Instant::now();
+    let begin_s = cpu_s();
     let mesh = synthetic::skin(&skeleton);
     let provenance = json!({"software": "arborcam", "frames": 330});
     let (bytes, animation) =
         glb(&model(&skeleton, &wooden(&mesh), &poses, KEY_TOLERANCE_PX, 0.0, &provenance)).unwrap();
-    let took = begin.elapsed();
+    let took_s = cpu_s() - begin_s;
     let triangles = mesh.indices.len() / 3;
     println!(
-        "{} bytes, {triangles} triangles, {} of {} keys, {took:?}",
+        "{} bytes, {triangles} triangles, {} of {} keys, {took_s:.2} s",
         bytes.len(),
         animation.keys,
         animation.raw_keys
     );
     assert!(bytes.len() < 10_000_000);
-    // Ten times what it takes, for a busy machine.
-    assert!(took.as_secs_f64() < 5.0, "{took:?}");
+    // Several times what it takes, for a slow machine.
+    assert!(took_s < 5.0, "{took_s} s");
     let played = Played::parse(&bytes);
     assert!(worst_error_px(&played, &skeleton, &poses, 1.0) < KEY_TOLERANCE_PX + 0.001);
     keep("realistic", &bytes);

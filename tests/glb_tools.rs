@@ -7,8 +7,7 @@ mod tools;
 
 use arborcam::export::gltf::{KEY_TOLERANCE_PX, Model, glb, gltf_files};
 use arborcam::model::{Pose, Skeleton};
-use arborcam::pipeline::Dressed;
-use arborcam::shape::{Foliage, Mesh, bare_wood};
+use arborcam::shape::{Dressed, Foliage, Mesh, bare_wood};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -4,10 +4,9 @@ use super::shaping::{Made, Shaping};
 use super::{Ended, say};
 use crate::export::csv::{MotionCsv, nodes};
 use crate::export::cylinders::cylinders;
-use crate::export::files::{refuse_taken, write_files};
 use crate::export::gltf::{KEY_TOLERANCE_PX, Model, NamedBytes, glb, gltf_files};
 use crate::export::still::{obj_files, ply};
-use crate::export::{ExportError, OutputFolder, html};
+use crate::export::{ExportError, OutputFolder, html, refuse_taken, write_files};
 use crate::shape::cylinders as cylinders_of;
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
@@ -28,7 +27,8 @@ pub struct ExportArgs {
     /// File to write, for csv a folder; it must not exist, and appears when it is complete. `-` is standard output (glb, html, ply).
     #[arg(long, value_name = "PATH")]
     out: PathBuf,
-    /// Largest distance between a node and its pose to which keys of the animation are thinned, px.
+    /// How far a node may be from its pose when keys of the animation are left out, px on the screen of the front view;
+    /// twice that in depth.
     #[arg(long, value_name = "PX", default_value_t = KEY_TOLERANCE_PX, value_parser = tolerance)]
     tolerance_px: f64,
     /// All levels of detail, as scenes lod0, lod1, ... on the same bones (glb, gltf).
@@ -140,7 +140,7 @@ impl<'a> Target<'a> {
     fn refuse_taken(&self) -> Result<(), ExportError> {
         match self {
             Self::Stdout => Ok(()),
-            Self::Beside(path) => refuse_taken(path.parent().unwrap_or(Path::new("")), [&*self.name()].into_iter()),
+            Self::Beside(path) => refuse_taken(path),
         }
     }
 

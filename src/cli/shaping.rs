@@ -10,8 +10,8 @@ use crate::export::gltf::{KEY_TOLERANCE_PX, Model, provenance};
 use crate::export::read_template;
 use crate::model::{Luma, Outline, Pose, Skeleton};
 use crate::outline;
-use crate::pipeline::{Dressed, Seen, cut_to, dress, reshape};
-use crate::shape::{Cut, Drawn};
+use crate::pipeline::{Seen, cut_to, dress, flutter, reshape};
+use crate::shape::{Cut, Drawn, Dressed};
 use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
 use serde_json::Value;
@@ -156,7 +156,7 @@ impl Shaping {
         let extras = |sway: &Option<_>| sway.as_ref().map_or(Value::Null, Sway::extras);
         let node_extras = sway.iter().map(extras).collect();
         let provenance = provenance(&captured.note.source.name, &Software::default(), poses);
-        let (flutter, reshaped) = (dressed.flutter(poses, skeleton, &config), *reshaped);
+        let (flutter, reshaped) = (flutter(&dressed, poses, skeleton, &config), *reshaped);
         let Stand { skeleton, poses, pose_in_picture, sway, .. } = stand;
         Ok(Made {
             captured,

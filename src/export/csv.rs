@@ -4,6 +4,7 @@
 
 use super::{ExportError, number};
 use crate::model::{NodeName, Pose, Skeleton, TrackId, TrackSet};
+use serde::Serialize;
 use std::io::Write;
 use std::sync::Arc;
 
@@ -12,8 +13,8 @@ pub const NODES_HEADER: &str = "node_id,parent_id,level,n_tracks,u_px,v_px,x,y,z
 frequency_lo_hz,frequency_hi_hz,damping_ratio,damping_lo,damping_hi,identifiable";
 pub const MOTION_HEADER: &str = "frame,time_s,node_id,x,y,z,u_px,v_px";
 
-/// How one node sways, with 95 % intervals. A value that is no number stands for one that is not known.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// How one node sways, with 95 % intervals. A value that is no number stands for one that is not known (`null` in JSON).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sway {
     pub frequency_hz: f64,
     pub frequency_lo_hz: f64,

@@ -12,8 +12,6 @@ pub enum ExportError {
     /// Some part of the path is a file.
     #[error("{} cannot be a folder: part of the path is a file or no name; choose another", .path.display())]
     NotAFolder { path: PathBuf },
-    #[error("the folder {} is not there; make it first, or choose another", .path.display())]
-    NoFolder { path: PathBuf },
     /// `bytes` is how much was to be written in all, as far as is known at this point.
     #[error("the disk is full: {what} needs at least {} of free space; free some, or choose another disk", size(*.bytes))]
     DiskFull { what: String, bytes: u64 },

@@ -10,7 +10,7 @@ use super::gltf_look::{bark, leaf};
 use super::gltf_mesh::{Skinned, push_mesh, push_skin};
 use super::joints::Moving;
 use crate::model::{Pose, Skeleton};
-use crate::pipeline::Dressed;
+use crate::shape::Dressed;
 use gltf_json::extras::RawValue;
 use gltf_json::{Asset, Index, Node, Root, Scene};
 use serde_json::{Value, json};

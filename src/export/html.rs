@@ -2,7 +2,7 @@
 //!
 //! The page's code lies in `src/export/viewer/` and is put into the program by `build.rs`; here the tree is put into it.
 
-pub use super::html_data::{Branch, Data, SwayNote};
+pub use super::html_data::{Branch, Data};
 
 use super::ExportError;
 use super::picture::jpeg;

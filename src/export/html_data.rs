@@ -44,28 +44,10 @@ pub struct Branch {
     /// Its end at rest, model axes, px.
     pub end: [f64; 3],
     /// What was identified of its sway; numbers that are not known are `null`.
-    pub sway: Option<SwayNote>,
+    pub sway: Option<Sway>,
     /// Angle to the parent branch at every one of [`Data::times_s`]: hundredths of a degree as 16-bit integers, little
     /// endian, in base64; the lowest integer stands for one that is not known. `None` for the foot and for copies.
     pub angle_deg: Option<String>,
-}
-
-/// [`Sway`] for JSON, where what is no number becomes `null`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct SwayNote {
-    pub frequency_hz: f64,
-    pub frequency_lo_hz: f64,
-    pub frequency_hi_hz: f64,
-    pub damping_ratio: f64,
-    pub damping_lo: f64,
-    pub damping_hi: f64,
-}
-
-impl SwayNote {
-    fn of(sway: &Sway) -> Self {
-        let &Sway { frequency_hz, frequency_lo_hz, frequency_hi_hz, damping_ratio, damping_lo, damping_hi } = sway;
-        Self { frequency_hz, frequency_lo_hz, frequency_hi_hz, damping_ratio, damping_lo, damping_hi }
-    }
 }
 
 impl Data {
@@ -109,7 +91,7 @@ fn branch(skeleton: &Skeleton, poses: &[Pose], sway: &[Option<Sway>], i: usize) 
         level: node.level,
         n_tracks: node.n_tracks,
         end: [node.position.x, node.position.y, node.position.z].map(|x| rounded(x, 1e4)),
-        sway: sway.as_ref().map(SwayNote::of),
+        sway,
         angle_deg: measured.then(|| packed(&angle_to_parent_deg(skeleton, poses, NodeId(i as u32)))),
     }
 }

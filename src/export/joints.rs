@@ -27,8 +27,9 @@ pub(super) struct Moving {
 }
 
 impl Moving {
-    /// Keys of all joints that move, with every node within `tolerance_px` of its pose in every frame as seen in its own
-    /// plane, which is the picture's for measured nodes, and within twice that across it: depth was estimated, not seen.
+    /// Keys of all joints that move, with every node in every frame within `tolerance_px` of its pose on the screen of the
+    /// front view, where u and v are, and within twice that in depth, which was estimated and not seen: the error is
+    /// `sqrt(du^2 + dv^2 + (dz / 2)^2)`.
     ///
     /// Joints are thinned from the foot up, each against what its parent's kept keys show, so that a joint also makes good
     /// its parent's error. The tolerance grows towards the tips: a node may be wrong by `tolerance sqrt(depth / depth of
@@ -99,8 +100,8 @@ fn keys(skeleton: &Skeleton, (poses, times): (&[&Pose], &[f64]), tolerance_px: f
 struct Followed {
     /// Where the branch's end is to be, from the parent node as it is shown: this also makes good by how much that is off.
     targets: Vec<Vector3<f64>>,
-    /// Direction across the node's plane.
-    across: Vec<Vector3<f64>>,
+    /// Direction of depth.
+    depth: Vec<Vector3<f64>>,
     wanted: Vec<UnitQuaternion<f64>>,
     /// From the parent node to this one at rest.
     way: Vector3<f64>,
@@ -114,12 +115,11 @@ struct Followed {
 impl Followed {
     /// `wanted`: rotations in model axes.
     fn new(base: &Shown, wanted: &[UnitQuaternion<f64>], node: &Node, way: Vector3<f64>) -> Self {
-        let plane = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), node.plane_angle);
         let back: Vec<UnitQuaternion<f64>> = base.rotation.iter().map(UnitQuaternion::inverse).collect();
         let every = || wanted.iter().zip(&back).zip(&base.error_px);
         Self {
             targets: every().map(|((q, back), off)| back * (q * way - off)).collect(),
-            across: back.iter().map(|back| back * (plane * Vector3::z())).collect(),
+            depth: back.iter().map(|back| back * Vector3::z()).collect(),
             wanted: every().map(|((q, back), _)| back * q).collect(),
             way,
             radius_px: node.radius,
@@ -140,9 +140,9 @@ impl Followed {
     /// By how much the branch is off if it turns by `turn` in its parent's axes, in units of what is allowed.
     fn miss(&self, k: usize, turn: &UnitQuaternion<f64>) -> f64 {
         let off = turn * self.way - self.targets[k];
-        let across = off.dot(&self.across[k]);
-        // Half as much across.
-        let off = (off.norm_squared() - 0.75 * across * across).max(0.0).sqrt() / self.limit_px;
+        let depth = off.dot(&self.depth[k]);
+        // Half as much in depth.
+        let off = (off.norm_squared() - 0.75 * depth * depth).max(0.0).sqrt() / self.limit_px;
         let cosine = turn.coords.dot(&self.wanted[k].coords).abs();
         if cosine >= self.limit_cosine { off } else { off.max(2.0 * cosine.min(1.0).acos() / self.limit_angle) }
     }
@@ -151,7 +151,7 @@ impl Followed {
     /// remains of the parent's error is then no larger than it was there.
     fn aim(&self, k: usize) -> UnitQuaternion<f64> {
         let is = self.wanted[k] * self.way;
-        let measure = |v: Vector3<f64>| v - self.across[k] * (0.5 * v.dot(&self.across[k]));
+        let measure = |v: Vector3<f64>| v - self.depth[k] * (0.5 * v.dot(&self.depth[k]));
         let Some(first) =
             is.cross(&Vector3::x()).try_normalize(1e-9).or_else(|| is.cross(&Vector3::y()).try_normalize(1e-9))
         else {

@@ -6,7 +6,6 @@ pub mod csv;
 pub mod cylinders;
 mod error;
 mod file;
-pub mod files;
 mod film;
 pub mod folder;
 pub mod glb_notes;
@@ -28,7 +27,7 @@ mod template;
 mod thin_keys;
 
 pub use error::ExportError;
-pub use file::OutputFile;
+pub use file::{OutputFile, refuse_taken, write_files};
 pub use film::Film;
 pub use folder::OutputFolder;
 pub use template::{TemplateError, read_template};

@@ -2,8 +2,7 @@
 
 use super::gltf::NamedBytes;
 use super::{ExportError, number};
-use crate::pipeline::Dressed;
-use crate::shape::Mesh;
+use crate::shape::{Dressed, Mesh};
 
 /// A mesh with its looks.
 struct Part<'a> {

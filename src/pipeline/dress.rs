@@ -4,7 +4,7 @@ use super::{bark, leaves};
 use crate::config::{Config, EnvelopeKind};
 use crate::model::{Luma, NodeId, Outline, Pose, Rgb, Skeleton};
 use crate::motion;
-use crate::shape::{Envelope, Foliage, Limb, Mesh, Template, limbs, wood_levels};
+use crate::shape::{Dressed, Envelope, Template, limbs, wood_levels};
 use nalgebra::Point3;
 
 /// What the film shows of the tree apart from its motion.
@@ -21,23 +21,10 @@ pub struct Seen<'a> {
     pub density: Option<&'a Luma>,
 }
 
-/// Everything that is drawn of a tree at rest.
-#[derive(Clone, Debug, Default)]
-pub struct Dressed {
-    pub limbs: Vec<Limb>,
-    /// The wood in falling levels of detail, at least one; all on the joints of the same skeleton.
-    pub wood: Vec<Mesh>,
-    pub foliage: Foliage,
-    /// Colour of the bark as in a picture (sRGB).
-    pub bark_rgb: [u8; 3],
-}
-
-impl Dressed {
-    /// How far each group of leaves swings in every pose, see [`flutter`](crate::motion::flutter).
-    pub fn flutter(&self, poses: &[Pose], skeleton: &Skeleton, config: &Config) -> Vec<Vec<[f32; 2]>> {
-        let groups: Vec<NodeId> = self.foliage.groups.iter().map(|g| g.node).collect();
-        motion::flutter(poses, skeleton, &groups, &config.leaves)
-    }
+/// How far each group of leaves swings in every pose, see [`flutter`](crate::motion::flutter).
+pub fn flutter(dressed: &Dressed, poses: &[Pose], skeleton: &Skeleton, config: &Config) -> Vec<Vec<[f32; 2]>> {
+    let groups: Vec<NodeId> = dressed.foliage.groups.iter().map(|g| g.node).collect();
+    motion::flutter(poses, skeleton, &groups, &config.leaves)
 }
 
 /// Dresses a skeleton.

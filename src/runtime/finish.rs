@@ -15,7 +15,7 @@ use crate::export::gltf::{KEY_TOLERANCE_PX, Model, glb, provenance};
 use crate::export::picture::{PICTURE_FILE, jpeg};
 use crate::export::{ExportError, OutputFolder};
 use crate::model::{Outline, Picture, Pose, Skeleton, TrackSet};
-use crate::pipeline::{Seen, Tree, dress};
+use crate::pipeline::{Seen, Tree, dress, flutter};
 use crate::recording::SpoolReader;
 use crate::source::SourceInfo;
 use std::path::{Path, PathBuf};
@@ -166,7 +166,7 @@ fn model_of(
     let picture = job.picture.as_ref().map(|p| &*p.rgb);
     let seen = Seen { picture, pose: pose_in_picture, outline: Some(&tree.outline), ..Seen::default() };
     let dressed = dress(skeleton, seen, &job.config);
-    let flutter = dressed.flutter(poses, skeleton, &job.config);
+    let flutter = flutter(&dressed, poses, skeleton, &job.config);
     let provenance = provenance(&job.info.name, &Software::default(), poses);
     glb(&Model {
         skeleton,
