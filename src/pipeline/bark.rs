@@ -13,7 +13,7 @@ const MIDDLE: f64 = 0.2;
 
 /// Median colour of the picture along the lower trunk; `None` where no trunk is in it.
 pub fn colour(seen: &Seen, skeleton: &Skeleton) -> Option<[u8; 3]> {
-    let picture = seen.picture?;
+    let picture = seen.picture.filter(|p| p.pixels.len() == 3 * p.size.area())?;
     let top = skeleton.nodes.get(1)?.position;
     let top = seen.pose.and_then(|p| p.joints.get(1)).map_or(top, |joint| joint.position);
     let (foot, top) = (skeleton.foot_px, skeleton.image_from_model(&top));
