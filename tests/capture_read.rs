@@ -6,28 +6,12 @@ use arborcam::capture::{CaptureError, Captured};
 use arborcam::export::capture::Capture;
 use arborcam::model::Skeleton;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
-use std::sync::OnceLock;
-use support::{CLIP, OUTLINE};
+use support::{CLIP, OUTLINE, replayed as made};
 use tempfile::TempDir;
 
 const WHOLE: f64 = 60.0;
-
-/// One replay of the shipped recording.
-fn made() -> &'static Path {
-    static MADE: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
-    let (_, out) = MADE.get_or_init(|| {
-        let dir = tempfile::tempdir().expect("tempdir");
-        let out = dir.path().join("out");
-        let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
-        command.args(["replay", CLIP, "--fast", "--headless", "--outline", OUTLINE, "--out"]).arg(&out);
-        let output = command.output().expect("arborcam");
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        (dir, out)
-    });
-    out
-}
 
 /// A copy of the capture that a test may spoil.
 fn copy() -> TempDir {

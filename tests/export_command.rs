@@ -7,28 +7,12 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::sync::OnceLock;
-use support::{CLIP, OUTLINE};
+use support::replayed as made;
 use tempfile::TempDir;
 
 const FAILED: i32 = 1;
 const BAD_USAGE: i32 = 2;
 const NO_INPUT: i32 = 3;
-
-/// One replay of the shipped recording.
-fn made() -> &'static Path {
-    static MADE: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
-    let (_, out) = MADE.get_or_init(|| {
-        let dir = tempfile::tempdir().expect("tempdir");
-        let out = dir.path().join("out");
-        let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
-        command.args(["replay", CLIP, "--fast", "--headless", "--outline", OUTLINE, "--out"]).arg(&out);
-        let output = command.output().expect("arborcam");
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        (dir, out)
-    });
-    out
-}
 
 fn export(dir: &Path, format: &str, out: &Path, more: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));

@@ -5,9 +5,11 @@ use arborcam::config;
 use arborcam::model::{Frame, Luma, Outline, RawFrame, Size};
 use arborcam::outline::Given;
 use arborcam::source::{self, Decoder};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::sync::OnceLock;
 use std::time::Instant;
+use tempfile::TempDir;
 
 pub const CLIP: &str = "recordings/sparse_winter.mkv";
 pub const OUTLINE: &str = "recordings/sparse_winter.outline.json";
@@ -35,4 +37,19 @@ pub fn outline() -> Outline {
         Given::Region(outline) => outline,
         Given::Scribbles(_) => panic!("a polygon"),
     }
+}
+
+/// The capture folder of one replay of the shipped recording by the program itself.
+pub fn replayed() -> &'static Path {
+    static MADE: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
+    let (_, out) = MADE.get_or_init(|| {
+        let dir = tempfile::tempdir().expect("tempdir");
+        let out = dir.path().join("out");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
+        command.args(["replay", CLIP, "--fast", "--headless", "--outline", OUTLINE, "--out"]).arg(&out);
+        let output = command.output().expect("arborcam");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        (dir, out)
+    });
+    out
 }
