@@ -18,7 +18,7 @@ if (!phone) {
   console.error("usage: node pictures-viewer.mjs PAGE.html DESKTOP.png PHONE.png");
   process.exit(2);
 }
-const { launch, open, ready } = await import("../tests/viewer/browser.mjs");
+const { launch, open, ready, slide } = await import("../tests/viewer/browser.mjs");
 const browser = await launch();
 
 async function picture(options, out, then) {
@@ -37,7 +37,7 @@ const list = (page, name) => page.getByLabel(name, { exact: true });
 await picture({ viewport: { width: 1280, height: 760 } }, desktop, async (page) => {
   await list(page, "Branch").selectOption({ index: 4 });
   await list(page, "Colour").selectOption("branch");
-  await list(page, "Time").fill("1.5");
+  await slide(list(page, "Time"), 1.5);
   const { x, y, width, height } = await page.locator("#canvas").boundingBox();
   await page.mouse.move(x + width / 2, y + height / 2);
   await page.mouse.down();
@@ -47,6 +47,6 @@ await picture({ viewport: { width: 1280, height: 760 } }, desktop, async (page) 
 const small = { viewport: { width: 360, height: 740 }, deviceScaleFactor: 1.5, hasTouch: true, isMobile: true };
 await picture(small, phone, async (page) => {
   await list(page, "Colour").selectOption("frequency");
-  await list(page, "Time").fill("1.5");
+  await slide(list(page, "Time"), 1.5);
 });
 await browser.close();

@@ -4,11 +4,16 @@ mod support;
 #[path = "support/truth.rs"]
 mod truth;
 
+use std::sync::Mutex;
 use truth::{Score, Truth, tracks};
+
+/// OpenCV must not be told another number of threads while it works; now and then it then dies.
+static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 /// `make bench` has the textbook's way beside it (the same corners, forward and backward Lucas-Kanade).
 #[test]
 fn the_tracks_end_where_the_points_truly_are() {
+    let _alone = ONE_AT_A_TIME.lock();
     let (tracks, expected_px) = tracks();
     let Score { tracks: scored, within_2px, median_end_px } = Truth::read().score(&tracks);
     println!(
@@ -25,6 +30,7 @@ fn the_tracks_end_where_the_points_truly_are() {
 /// The same film gives the same tracks on every machine, to the last bit.
 #[test]
 fn tracks_do_not_depend_on_how_many_cores_there_are() {
+    let _alone = ONE_AT_A_TIME.lock();
     let with = |threads: i32| {
         opencv::core::set_num_threads(threads).expect("threads");
         tracks().0

@@ -14,23 +14,20 @@ const TITLE: &str = "Winter <b>tree<!-- & \"co\" <script>";
 /// 3 MB beside the model.
 const LARGEST_VIEWER: usize = 3_000_000;
 
+fn arborcam(args: &[&Path], more: &[&str]) {
+    let run = Command::new(env!("CARGO_BIN_EXE_arborcam")).args(args).args(more).output().expect("arborcam runs");
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+}
+
 /// Fills a folder with the page of a replay of a clip, in px and in metres.
 fn pages(dir: &Path, clip: &Path, outline: &Path) {
+    let [replay, with, out, export, format, capture] =
+        ["replay", "--outline", "--out", "export", "--format", "capture"].map(Path::new);
+    let capture = dir.join(capture);
+    arborcam(&[replay, clip, with, outline, out, &capture], &["--fast", "--headless"]);
     for (name, more) in [("px", &[][..]), ("m", &["--metres-per-px", "0.02"])] {
-        let out = dir.join(name);
-        let run = Command::new(env!("CARGO_BIN_EXE_arborcam"))
-            .args([Path::new("replay"), clip, Path::new("--outline"), outline, Path::new("--out"), &out])
-            .args(["--fast", "--headless"])
-            .args(more)
-            .output()
-            .expect("arborcam runs");
-        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-        let export = |format: &str, to: &Path| {
-            let run = Command::new(env!("CARGO_BIN_EXE_arborcam"))
-                .args([Path::new("export"), &out, Path::new("--format"), Path::new(format), Path::new("--out"), to])
-                .output()
-                .expect("arborcam runs");
-            assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        let export = |kind: &str, to: &Path| {
+            arborcam(&[export, &capture, format, Path::new(kind), out, to], more);
             fs::read(to).expect("what was exported")
         };
         let pages = [1, 2].map(|k| {

@@ -28,7 +28,22 @@ export async function open(browser, file, options = {}, bad = []) {
 // Chromium's own remark on reading pixels back from software graphics, of which the screenshots are made.
 const driver = (text) => /GPU stall due to ReadPixels/.test(text);
 
-export const ready = (page) => page.waitForFunction(() => window.arborcam?.ready, null, { polling: 20 });
+// Asked again and again: the page's own policy forbids what Playwright's waiting for a function does.
+export async function ready(page) {
+  for (const end = Date.now() + 15_000; Date.now() < end; await page.waitForTimeout(20)) {
+    const found = await page.evaluate(() => window.arborcam?.ready);
+    if (found) return found;
+  }
+  throw new Error("the page does not say that it is ready");
+}
+
+// A slider goes to a value; older Playwright cannot fill one with many digits.
+export const slide = (slider, value) =>
+  slider.evaluate((input, value) => {
+    input.value = value;
+    input.dispatchEvent(new Event("input", { bubbles: true }));
+    input.dispatchEvent(new Event("change", { bubbles: true }));
+  }, String(value));
 
 // The canvas alone. Glides between views take a third of a second.
 export async function shot(page, settle = 600) {

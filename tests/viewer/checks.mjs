@@ -6,7 +6,7 @@
 // title.txt.
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
-import { Eye, launch, open, ready, shot } from "./browser.mjs";
+import { Eye, launch, open, ready, shot, slide } from "./browser.mjs";
 
 const file = (name) => join(process.argv[2], name);
 const glb = readFileSync(file("tree.glb"));
@@ -98,7 +98,7 @@ await check("the scrub bar goes to a time", async () => {
   const bar = page.getByLabel("Time", { exact: true });
   await bar.press("Home");
   const begin = await look();
-  await bar.fill(String(0.1 * Number(await bar.getAttribute("max"))));
+  await slide(bar, 0.1 * Number(await bar.getAttribute("max")));
   const later = await look();
   await bar.press("Home");
   hold((await look()).equals(begin), "the same time shows another picture");
