@@ -5,12 +5,14 @@ mod leaves;
 mod overlay;
 mod reload;
 mod shape;
+mod wind;
 mod wood;
 
 pub use hierarchy::{Affinity, Hierarchy};
 pub use leaves::{LeafShow, Leaves};
 pub use reload::{Change, EFFECTS, Effect, effect};
 pub use shape::{EnvelopeKind, Leader, Shape};
+pub use wind::Wind;
 pub use wood::Wood;
 
 use serde::{Deserialize, Serialize};
@@ -32,6 +34,7 @@ pub struct Config {
     pub wood: Wood,
     pub leaves: Leaves,
     pub motion: Motion,
+    pub wind: Wind,
     pub export: Export,
 }
 
@@ -343,7 +346,7 @@ impl Config {
             ("export.animation_s", self.export.animation_s, (0.1, 3600.0, "0.1 to 3600")),
             ("export.metres_per_px", self.export.metres_per_px, (0.0, 1e6, "0 (pixels) or more")),
         ];
-        for (key, value, (low, high, allowed)) in rules.into_iter().chain(more).chain(self.leaves.rules()) {
+        for (key, value, (low, high, allowed)) in rules.into_iter().chain(more).chain(self.leaves.rules()).chain(self.wind.rules()) {
             if !(low..=high).contains(&value) {
                 return Err(ConfigError::OutOfRange { key, value, allowed });
             }

@@ -21,10 +21,11 @@
 //!
 //! [`model`] the nouns · [`source`] where frames come from · [`outline`] which pixels are tree · [`track`] points
 //! followed · [`hierarchy`] who moves with whom · [`skeleton`] in the picture · [`shape`] in space · [`motion`] the pose
-//! of every frame · [`dynamics`] what the motion says · [`signal`] small common mathematics · [`caught`] other people's panics · [`draw`] pictures of it · [`pipeline`] all of it · [`runtime`] on threads ·
+//! of every frame · [`dynamics`] what the motion says · [`animate`] motion that nobody filmed · [`signal`] small common mathematics · [`caught`] other people's panics · [`draw`] pictures of it · [`pipeline`] all of it · [`runtime`] on threads ·
 //! [`recording`] kept on disk · [`export`] files for others · [`capture`] those files read back · [`tui`] the screen · [`doctor`] whether this machine can · [`cli`] the commands · [`config`]
 //! what can be set.
 
+pub mod animate;
 pub mod capture;
 pub mod caught;
 pub mod cli;

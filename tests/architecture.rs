@@ -22,6 +22,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("motion", &["model", "config"]),
     ("dynamics", &["model", "config", "signal"]),
     ("signal", &[]),
+    // The seeded chance that twigs and leaves have too.
+    ("animate", &["model", "config", "signal", "shape::Chance"]),
     ("pipeline", &["model", "config", "outline", "track", "hierarchy", "skeleton", "shape", "motion", "signal"]),
     ("recording", &["model"]),
     // What is drawn.
@@ -53,6 +55,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "runtime",
             "export",
             "capture",
+            "animate",
             "draw",
             // The table of cylinders is of the limbs; a drawn shape is read, and what it cut is told.
             "shape::cylinders",
@@ -79,6 +82,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("turbojpeg::", &["source"]),
     ("mcap::", &["recording"]),
     ("crc32fast::", &["recording"]),
+    ("hound::", &["animate"]),
     ("clap::", &["cli"]),
     ("anyhow::", &["cli"]),
     ("sd_notify::", &["cli"]),

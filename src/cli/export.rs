@@ -78,7 +78,7 @@ pub fn run(args: &ExportArgs) -> Result<(), Ended> {
 }
 
 /// The model as a page that shows it.
-fn page(made: &Made, model: &Model, title: &str) -> Result<Vec<u8>, ExportError> {
+pub fn page(made: &Made, model: &Model, title: &str) -> Result<Vec<u8>, ExportError> {
     let (model, _) = glb(model)?;
     let captured = &made.captured;
     let metres_per_px = made.config.export.metres_per_px;

@@ -1,5 +1,6 @@
 //! The commands: one file each. Here, what they have in common: arguments, exit status, messages.
 
+mod animate;
 mod camera;
 mod capture;
 mod devices;
@@ -52,6 +53,8 @@ enum Command {
     Render(render::RenderArgs),
     /// Write the tree of a capture as a file for other programs.
     Export(export::ExportArgs),
+    /// Make a capture's tree move in a wind that nobody filmed, pull and release it, or magnify its motion.
+    Animate(animate::AnimateArgs),
     /// List the cameras that are plugged in.
     Devices(devices::DevicesArgs),
     /// Find out what is wrong with this machine, and what to do about it.
@@ -145,6 +148,7 @@ pub fn main() -> ExitCode {
         Command::Play(args) => play::run(args),
         Command::Render(args) => render::run(args),
         Command::Export(args) => export::run(args),
+        Command::Animate(args) => animate::run(args),
         Command::Devices(args) => devices::run(args),
         Command::Doctor(args) => doctor::run(args),
     };

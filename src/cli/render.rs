@@ -2,7 +2,7 @@
 
 mod options;
 
-pub use options::RenderArgs;
+pub use options::{Kind, RenderArgs, ViewName, background, rate, size};
 
 use super::hangup::Hangup;
 use super::session::stop_on_signals;
@@ -11,7 +11,7 @@ use super::{Ended, say};
 use crate::draw::{Bounds, Camera, Look, Model, Posed, Rgba, Texture};
 use crate::export::{ExportError, Film, OutputFile};
 use crate::model::{Pose, Size};
-use options::{FilmPlace, Kind, ViewName};
+use options::FilmPlace;
 use std::sync::atomic::Ordering;
 
 /// Length of a video if none is given, s, and of any.
@@ -33,6 +33,13 @@ pub fn run(args: &RenderArgs) -> Result<(), Ended> {
         let what = "the capture holds no frame of the film; make it anew with this version, or leave --film out";
         return Err(Ended::Failed(anyhow::anyhow!(what)));
     }
+    let job = drawn(args, kind, &made);
+    // Told last, so that the error, if there is one, is the only line.
+    job.inspect(|()| made.captured.warnings.iter().for_each(|w| say(&format!("arborcam: warning: {w}"))))
+}
+
+/// Draws a tree that has been made, in its poses.
+pub fn drawn(args: &RenderArgs, kind: Kind, made: &Made) -> Result<(), Ended> {
     let Some(wood) = made.dressed.wood.first() else {
         return Err(Ended::Failed(anyhow::anyhow!("there is nothing to be drawn of this tree")));
     };
@@ -41,13 +48,11 @@ pub fn run(args: &RenderArgs) -> Result<(), Ended> {
         model.foliage = &made.dressed.foliage;
         model.leaf = model.foliage.texture.as_ref().and_then(|(_, bytes)| Texture::read(bytes));
     }
-    let studio = Studio::new(args, &made, model);
-    let job = match kind {
+    let studio = Studio::new(args, made, model);
+    match kind {
         Kind::Picture => studio.picture(),
         Kind::Video => studio.video(),
-    };
-    // Told last, so that the error, if there is one, is the only line.
-    job.inspect(|()| made.captured.warnings.iter().for_each(|w| say(&format!("arborcam: warning: {w}"))))
+    }
 }
 
 /// How much of the end of a film of `film_s` is to be read: hours of poses would fill the memory.

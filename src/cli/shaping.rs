@@ -41,7 +41,7 @@ pub struct Shaping {
     /// How dense the leaves are, as a grey image of the film's size, white where they are densest.
     #[arg(long, value_name = "IMAGE")]
     density: Option<PathBuf>,
-    /// Where chance is involved (curl, twigs, leaves), the same number gives the same tree.
+    /// Where chance is involved (curl, twigs, leaves, wind), the same number gives the same tree.
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
     /// Length of the animation at most, s; the last so many seconds of the film.
@@ -100,7 +100,7 @@ impl Shaping {
         self.shape.set(&mut config);
         self.planes.into_iter().for_each(|n| config.shape.planes = n);
         self.triangles.into_iter().for_each(|n| config.wood.triangles = n);
-        self.seed.into_iter().for_each(|n| config.wood.seed = n);
+        self.seed.into_iter().for_each(|n| (config.wood.seed, config.wind.seed) = (n, n));
         if let Some(show) = self.leaves {
             config.leaves.show = match show {
                 Show::Auto => LeafShow::Auto,
@@ -238,6 +238,15 @@ fn white(mask: &[u8]) -> Vec<u8> {
     mask.iter().map(|&m| if m == 0 { 0 } else { 255 }).collect()
 }
 
+/// The poses of a loop with the lap before and the one after, and how long a lap is, s: nothing begins or ends in it.
+fn round(poses: &[Pose]) -> Option<(Vec<Pose>, f64)> {
+    let (first, rest) = poses.split_first()?;
+    let lap_s = rest.last()?.time_s - first.time_s;
+    let moved = |by_s: f64| move |p: &Pose| Pose { time_s: p.time_s + by_s, ..p.clone() };
+    let before = poses[..rest.len()].iter().map(moved(-lap_s));
+    Some((before.chain(poses.iter().cloned()).chain(rest.iter().map(moved(lap_s))).collect(), lap_s))
+}
+
 /// What became of the tree.
 fn tell(cut: &Cut) {
     say(&if cut.larger {
@@ -254,6 +263,27 @@ fn tell(cut: &Cut) {
 }
 
 impl Made {
+    /// Takes other poses than those of the film, at even times; `looped`: the last is the first again. `what` says for the
+    /// file's own notes where they come from.
+    pub fn animate(&mut self, poses: Vec<Pose>, looped: bool, what: Value) {
+        let flutter = |poses: &[Pose], config: &Config| flutter(&self.dressed, poses, &self.skeleton, config);
+        self.flutter = match round(&poses).filter(|_| looped) {
+            None => flutter(&poses, &self.config),
+            Some((round, lap_s)) => {
+                // Leaves come round too: whole swings in a lap.
+                let mut config = self.config.clone();
+                config.leaves.frequency_hz = (config.leaves.frequency_hz * lap_s).round().max(1.0) / lap_s;
+                let of_lap = poses.len() - 1..2 * poses.len() - 1;
+                flutter(&round, &config).into_iter().map(|all| all[of_lap.clone()].to_vec()).collect()
+            }
+        };
+        self.provenance = provenance(&self.captured.note.source.name, &Software::default(), &poses);
+        if let Some(notes) = self.provenance.as_object_mut() {
+            notes.insert("animated".into(), what);
+        }
+        self.poses = poses;
+    }
+
     /// As it goes into a file.
     pub fn model(&self) -> Model<'_> {
         Model {

@@ -2,7 +2,7 @@
 
 /// SplitMix64 (Steele, Lea and Flood 2014): a counter, scrambled.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Chance(u64);
+pub struct Chance(u64);
 
 impl Chance {
     pub fn new(seed: u64) -> Self {

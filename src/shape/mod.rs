@@ -28,6 +28,7 @@ mod tube;
 mod twigs;
 
 pub use angles::{Angles, mean_branching_angle};
+pub use chance::Chance;
 pub use curl::CURL_BOUND;
 pub use cylinders::{Cylinder, cylinders};
 pub use diener::diener;

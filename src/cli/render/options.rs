@@ -121,13 +121,13 @@ impl RenderArgs {
     }
 }
 
-fn size(text: &str) -> Result<Size, String> {
+pub fn size(text: &str) -> Result<Size, String> {
     let whole = |part: &str| part.parse::<u32>().ok().filter(|n| (1..=LARGEST).contains(n));
     let parsed = text.split_once(['x', 'X']).and_then(|(w, h)| Some(Size::new(whole(w)?, whole(h)?)));
     parsed.ok_or_else(|| format!("give width and height in pixels, as 640x480; each 1 to {LARGEST}"))
 }
 
-fn background(text: &str) -> Result<[u8; 4], String> {
+pub fn background(text: &str) -> Result<[u8; 4], String> {
     let colour = |hex: &str| {
         let sound = hex.len() == 6 && hex.bytes().all(|b| b.is_ascii_hexdigit());
         let part = |i: usize| u8::from_str_radix(&hex[i..i + 2], 16).ok();
@@ -149,7 +149,7 @@ fn moment(text: &str) -> Result<f64, String> {
     moment.ok_or_else(|| "give a number of seconds, 0 or more".to_owned())
 }
 
-fn rate(text: &str) -> Result<f64, String> {
+pub fn rate(text: &str) -> Result<f64, String> {
     let rate = text.parse().ok().filter(|r: &f64| (1.0..=120.0).contains(r));
     rate.ok_or_else(|| "give pictures a second, 1 to 120".to_owned())
 }

@@ -1,0 +1,37 @@
+//! Pull and release: a rope tied to the tree.
+
+use super::animator::{Animator, Pull};
+use crate::model::NodeId;
+use nalgebra::Vector3;
+
+/// Steps of the search for the force; each halves what is left.
+const HALVINGS: usize = 48;
+/// A rope that pulls so hard and moves the tree no farther never will.
+const DOUBLINGS: i32 = 60;
+
+impl Animator {
+    /// Ties a rope to a node and pulls, level, towards `direction_deg` (as the wind's) until the line from the foot to the
+    /// node leans by `lean_deg`; the tree then hangs still in it. Gives the lean that was reached, which is less where the
+    /// branches' bounds do not let it come so far.
+    pub fn pull_aside(&mut self, node: NodeId, direction_deg: f64, lean_deg: f64) -> f64 {
+        let (sin, cos) = direction_deg.to_radians().sin_cos();
+        let towards = Vector3::new(cos, 0.0, -sin);
+        let lean = |animator: &mut Self, force: f64| {
+            animator.pull(Some(Pull { node, force: towards * force }));
+            animator.settle();
+            animator.lean_deg(node)
+        };
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..DOUBLINGS {
+            if lean(self, high) >= lean_deg {
+                break;
+            }
+            (low, high) = (high, 2.0 * high);
+        }
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if lean(self, middle) < lean_deg { low = middle } else { high = middle }
+        }
+        lean(self, high)
+    }
+}
