@@ -17,6 +17,7 @@ const STEPS_HZ: f64 = 60.0;
 const BEFORE_S: f64 = 30.0;
 
 /// One branch. What it needs in every step lies together.
+#[derive(Clone)]
 struct Branch {
     parent: usize,
     load: Load,
@@ -60,12 +61,15 @@ enum Answer {
 }
 
 /// Moves a tree (002 eq. 7 for each branch).
+#[derive(Clone)]
 pub struct Animator {
     skeleton: Arc<Skeleton>,
     branches: Vec<Branch>,
     wind: Wind,
     pull: Option<Pull>,
     most_rad: f64,
+    /// What is shown of every branch's turn; the oscillators know nothing of it.
+    times: f64,
     time_s: f64,
     joints: Vec<JointPose>,
     /// As a matrix, by joint.
@@ -105,6 +109,7 @@ impl Animator {
             wind,
             pull: None,
             most_rad: settings.max_bend_deg.to_radians(),
+            times: 1.0,
             time_s: 0.0,
         }
     }
@@ -121,6 +126,16 @@ impl Animator {
     /// The wind about the tree, to be changed as it blows.
     pub fn wind(&mut self) -> &mut Wind {
         &mut self.wind
+    }
+
+    /// Shows every branch turned so many times as far as it is, within the same bounds.
+    pub fn magnify(&mut self, times: f64) {
+        self.times = times;
+    }
+
+    /// What it is pulled by.
+    pub fn pulled(&self) -> Option<Pull> {
+        self.pull
     }
 
     /// Pulls at a node from now on, or lets go.
@@ -221,7 +236,7 @@ impl Animator {
                 };
             }
             branch.held_at = held_at;
-            let [u, w] = branch.state.map(|s| s.x);
+            let [u, w] = branch.state.map(|s| s.x * self.times);
             let keep = soft(u.hypot(w), 0.5 * self.most_rad, self.most_rad);
             let own = UnitQuaternion::from_scaled_axis((branch.axes[0] * u + branch.axes[1] * w) * keep);
             let rotation = UnitQuaternion::new_normalize((parent.rotation * own).into_inner());

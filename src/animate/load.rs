@@ -9,6 +9,10 @@ use std::f64::consts::TAU;
 const SAIL_BY_SECTION: f64 = 30.0;
 /// A branch may give way so many times more or less than the median one: radii and frequencies are estimates.
 const UNLIKE: f64 = 4.0;
+/// The thicker of two branches gives way less by this power of their radii than frequency and load alone tell. These are
+/// taken as if the wind met all wood alike; it is weaker near the ground and behind other branches, and without this a
+/// trunk would bend as far as a twig.
+const THICKER: f64 = 0.5;
 /// No branch is thinner, px.
 const THINNEST_PX: f64 = 0.3;
 
@@ -61,9 +65,14 @@ pub fn loads(skeleton: &Skeleton, tuning: &[Tuning], bend_deg: f64) -> Vec<Load>
     let median = crate::signal::median(bends().collect(), f64::total_cmp).filter(|m| *m > 0.0);
     let Some(median) = median else { return out };
     let scale = bend_deg.to_radians() / median;
-    for (load, carried) in out.iter_mut().zip(&carried).filter(|(l, _)| l.yields > 0.0) {
-        let unlike = carried.bends / median;
-        load.yields *= scale * unlike.clamp(1.0 / UNLIKE, UNLIKE) / unlike.max(1e-12);
+    let bent = || (0..nodes.len()).filter(|&i| out[i].yields > 0.0);
+    let middle_px = crate::signal::median(bent().map(|i| radius(nodes[i].radius)).collect(), f64::total_cmp);
+    let middle_px = middle_px.unwrap_or(THINNEST_PX);
+    for (i, load) in out.iter_mut().enumerate().filter(|(_, l)| l.yields > 0.0) {
+        let unlike = carried[i].bends / median;
+        let thicker = radius(nodes[i].radius) / middle_px;
+        let believed = (unlike * thicker.powf(-THICKER)).clamp(1.0 / UNLIKE, UNLIKE);
+        load.yields *= scale * believed / unlike.max(1e-12);
     }
     out
 }

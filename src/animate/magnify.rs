@@ -34,9 +34,13 @@ pub enum MagnifyError {
     TooShort(usize),
     #[error("the capture's times are no numbers or do not grow; make it anew")]
     BadTimes,
-    #[error("a loop of {wanted_s:.1} s of film needs {needed_s:.1} s, and there are {length_s:.1}; give less --seconds")]
+    #[error(
+        "a loop of {wanted_s:.1} s of film needs {needed_s:.1} s, and there are {length_s:.1}; give less --seconds"
+    )]
     TooLongALoop { wanted_s: f64, needed_s: f64, length_s: f64 },
-    #[error("the film shows {rate_hz:.1} frames a second: nothing between {low_hz} and {high_hz} Hz can be told; give a lower --band")]
+    #[error(
+        "the film shows {rate_hz:.1} frames a second: nothing between {low_hz} and {high_hz} Hz can be told; give a lower --band"
+    )]
     BandTooHigh { rate_hz: f64, low_hz: f64, high_hz: f64 },
 }
 

@@ -22,6 +22,7 @@ pub use load::{Load, loads};
 pub use magnify::{Magnify, MagnifyError, magnify};
 pub use noise::Noise;
 pub use oscillator::{Oscillation, Transition};
+pub use pull::place_to_pull;
 pub use sound::{Loudness, SoundError};
 pub use tune::{Tuning, tune};
 pub use wind::{Air, Wind, speed_m_s};

@@ -38,10 +38,8 @@ impl Transition {
             let fade = (-decay * step_s).exp();
             (fade, fade * step_s)
         };
-        let free = [
-            [cos + decay * sin_by_rate, sin_by_rate],
-            [-omega * omega * sin_by_rate, cos - decay * sin_by_rate],
-        ];
+        let free =
+            [[cos + decay * sin_by_rate, sin_by_rate], [-omega * omega * sin_by_rate, cos - decay * sin_by_rate]];
         Self { step_s, lag_s: 2.0 * damping_ratio / omega, free }
     }
 

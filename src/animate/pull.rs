@@ -1,13 +1,29 @@
 //! Pull and release: a rope tied to the tree.
 
 use super::animator::{Animator, Pull};
-use crate::model::NodeId;
+use crate::model::{NodeId, Skeleton};
 use nalgebra::Vector3;
 
 /// Steps of the search for the force; each halves what is left.
 const HALVINGS: usize = 48;
 /// A rope that pulls so hard and moves the tree no farther never will.
 const DOUBLINGS: i32 = 60;
+
+/// Share of the tree's height above which a rope is tied.
+const TIED_ABOVE: f64 = 0.45;
+
+/// Where one would tie the rope: the thickest branch that ends well above the ground, of equally thick ones the highest.
+pub fn place_to_pull(skeleton: &Skeleton) -> NodeId {
+    let nodes = &skeleton.nodes;
+    let height = nodes.iter().map(|n| n.position.y).fold(0.0, f64::max);
+    let above = |&i: &usize| nodes[i].position.y >= TIED_ABOVE * height && nodes[i].copy_of.is_none();
+    let stout = |i: usize| (nodes[i].radius, nodes[i].position.y);
+    let better = |&a: &usize, &b: &usize| {
+        let ((ra, ya), (rb, yb)) = (stout(a), stout(b));
+        ra.total_cmp(&rb).then(ya.total_cmp(&yb))
+    };
+    NodeId((1..nodes.len()).filter(above).max_by(better).unwrap_or(0) as u32)
+}
 
 impl Animator {
     /// Ties a rope to a node and pulls, level, towards `direction_deg` (as the wind's) until the line from the foot to the

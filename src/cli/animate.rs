@@ -1,46 +1,88 @@
 //! `arborcam animate DIR`: a capture's tree in another motion than the one that was filmed.
 
+mod live;
 mod options;
 
 pub use options::AnimateArgs;
 
 use super::export::page;
+use super::hangup::Hangup;
 use super::render::{self, RenderArgs, drawn};
+use super::session::stop_on_signals;
 use super::shaping::Made;
 use super::{Ended, say};
-use crate::animate::{Animator, Known, Loudness, Magnify, Wind, magnify};
+use crate::animate::{Animator, Known, Loudness, Magnify, Wind, magnify, place_to_pull};
+use crate::config::Config;
 use crate::export::csv::{MotionCsv, Sway};
 use crate::export::gltf::{NamedBytes, glb, gltf_files};
 use crate::export::{ExportError, html, refuse_taken, write_files};
 use crate::model::{NodeId, Pose};
+use crate::tui;
 use anyhow::{Context, anyhow};
+use live::{AsFilmed, InWind};
 use options::Kind;
 use serde_json::{Value, json};
+use std::io::IsTerminal;
 use std::path::Path;
+use std::sync::atomic::Ordering;
 
 /// Wind that is not looped comes back after so much more than the animation at the least, s.
 const PERIOD_S: f64 = 128.0;
 
 pub fn run(args: &AnimateArgs) -> Result<(), Ended> {
-    let kind = args.check().map_err(|why| Ended::BadUsage(anyhow!(why)))?;
-    refuse_taken(&args.out).map_err(failed)?;
+    args.set(&mut Config::default()).map_err(|e| Ended::BadUsage(e.into()))?;
+    let Some(out) = &args.out else { return live(args) };
+    let kind = args.check(out).map_err(|why| Ended::BadUsage(anyhow!(why)))?;
+    refuse_taken(out).map_err(failed)?;
     if kind == Kind::Html {
         html::built_in().map_err(failed)?;
     }
     let sound = args.wav.as_deref().map(sound).transpose()?;
-    // Wind needs none of the captured motion.
+    let mut made = made(args)?;
+    let (poses, what) = match args.magnify {
+        Some(by) => {
+            let poses = magnify(&made.skeleton, &made.poses, &magnified(args, &made, by), args.fps, args.count());
+            (poses.map_err(|e| Ended::Failed(e.into()))?, json!({ "captured": { "times": by, "speed": args.speed } }))
+        }
+        None => blown(args, &made, sound)?,
+    };
+    made.animate(poses, args.looped, what);
+    write(args, out, kind, &made)
+}
+
+/// On the terminal, until the user leaves.
+fn live(args: &AnimateArgs) -> Result<(), Ended> {
+    if !std::io::stdout().is_terminal() {
+        let why = "there is no terminal to show the tree on; give --out FILE (.glb, .html, .csv, .mp4 or .png)";
+        return Err(Ended::BadUsage(anyhow!(why)));
+    }
+    let sound = args.wav.as_deref().map(sound).transpose()?;
+    let made = made(args)?;
+    let mut moving: Box<dyn tui::Moving> = match args.magnify {
+        Some(by) => {
+            let wanted = magnified(args, &made, by);
+            Box::new(AsFilmed::new(&made, wanted).map_err(|e| Ended::Failed(e.into()))?)
+        }
+        None => {
+            let mut animator = animator(&made, sound, PERIOD_S);
+            animator.warm_up();
+            Box::new(InWind::new(&made, animator))
+        }
+    };
+    let stop = stop_on_signals(Hangup::of_this_process() != Hangup::Ignored)?;
+    tui::watch(&mut *moving, tui::Options::from_env(), &stop).map_err(|e| Ended::BadUsage(e.into()))?;
+    if stop.load(Ordering::SeqCst) { Err(Ended::Stopped) } else { Ok(()) }
+}
+
+/// The tree, with the wind that is asked for, and all of its film where that is to be changed.
+fn made(args: &AnimateArgs) -> Result<Made, Ended> {
     let film_s = |film_s: f64| Some(if args.magnify.is_some() { film_s + 1.0 } else { 0.0 });
     let mut made = args.shaping.made_with(&args.dir, film_s)?;
     args.set(&mut made.config).map_err(|e| Ended::BadUsage(e.into()))?;
     for warning in &made.captured.warnings {
         say(&format!("arborcam: warning: {warning}"));
     }
-    let (poses, what) = match args.magnify {
-        Some(by) => (magnified(args, &made, by)?, json!({ "captured": { "times": by, "speed": args.speed } })),
-        None => blown(args, &made, sound)?,
-    };
-    made.animate(poses, args.looped, what);
-    write(args, kind, &made)
+    Ok(made)
 }
 
 /// The loudness of a WAV file.
@@ -50,35 +92,40 @@ fn sound(path: &Path) -> Result<Loudness, Ended> {
     Loudness::of_wav(&bytes).map_err(|e| unfit(e.into()))
 }
 
-fn magnified(args: &AnimateArgs, made: &Made, by: f64) -> Result<Vec<Pose>, Ended> {
+fn magnified(args: &AnimateArgs, made: &Made, by: f64) -> Magnify {
     let most_rad = made.config.wind.max_bend_deg.to_radians();
-    let wanted = Magnify { by, speed: args.speed, band_hz: args.band, most_rad, looped: args.looped };
-    magnify(&made.skeleton, &made.poses, &wanted, args.fps, args.count()).map_err(|e| Ended::Failed(e.into()))
+    Magnify { by, speed: args.speed, band_hz: args.band, most_rad, looped: args.looped }
 }
 
-/// The tree in the wind, or pulled and let go.
-fn blown(args: &AnimateArgs, made: &Made, sound: Option<Loudness>) -> Result<(Vec<Pose>, Value), Ended> {
+/// The tree at rest in its wind, which comes back after `period_s`.
+fn animator(made: &Made, sound: Option<Loudness>, period_s: f64) -> Animator {
     let settings = &made.config.wind;
-    let count = args.count();
-    let length_s = count as f64 / args.fps;
-    let period_s = if args.looped { length_s } else { PERIOD_S * (length_s / PERIOD_S + 1.0).log2().ceil().exp2() };
     let mut wind = Wind::new(settings, period_s, metres_per_px(made));
     if let Some(sound) = sound {
-        if sound.length_s() < length_s {
-            say(&format!("arborcam: warning: the sound lasts {:.1} s and is repeated", sound.length_s()));
-        }
-        wind = wind.driven_by(if args.looped { sound.looped(length_s) } else { sound });
+        wind = wind.driven_by(sound);
     }
     let known: Vec<Known> = made.sway.iter().map(known).collect();
-    let mut animator = Animator::new(made.skeleton.clone(), &known, settings, wind);
-    let (branches, measured) = (animator.tuning().len() - 1, animator.tuning().filter(|t| t.measured).count());
-    if measured == 0 {
+    let animator = Animator::new(made.skeleton.clone(), &known, settings, wind);
+    if animator.tuning().all(|t| !t.measured) {
         say(&format!(
             "arborcam: warning: the capture has no frequency of any branch; they are taken from thickness and length, the \
              trunk's from wind.trunk_hz ({} Hz)",
             settings.trunk_hz
         ));
     }
+    animator
+}
+
+/// The tree in the wind, or pulled and let go.
+fn blown(args: &AnimateArgs, made: &Made, sound: Option<Loudness>) -> Result<(Vec<Pose>, Value), Ended> {
+    let count = args.count();
+    let length_s = count as f64 / args.fps;
+    let period_s = if args.looped { length_s } else { PERIOD_S * (length_s / PERIOD_S + 1.0).log2().ceil().exp2() };
+    if let Some(sound) = sound.as_ref().filter(|s| s.length_s() < length_s) {
+        say(&format!("arborcam: warning: the sound lasts {:.1} s and is repeated", sound.length_s()));
+    }
+    let sound = sound.map(|s| if args.looped { s.looped(length_s) } else { s });
+    let mut animator = animator(made, sound, period_s);
     if args.looped {
         animator.close(length_s, args.fps);
     } else if let Some(lean_deg) = args.pull {
@@ -100,11 +147,11 @@ fn blown(args: &AnimateArgs, made: &Made, sound: Option<Loudness>) -> Result<(Ve
         }
     }
     let what = json!({
-        "wind": settings,
+        "wind": made.config.wind,
         "pull_deg": args.pull,
         "loop": args.looped,
-        "branches": branches,
-        "branches_with_measured_frequency": measured,
+        "branches": animator.tuning().len() - 1,
+        "branches_with_measured_frequency": animator.tuning().filter(|t| t.measured).count(),
     });
     Ok((poses, what))
 }
@@ -117,11 +164,13 @@ fn pull(args: &AnimateArgs, made: &Made, animator: &mut Animator, lean_deg: f64)
             let unknown = || Ended::BadUsage(anyhow!("--pull-node {name} is no node of this tree; see nodes.csv"));
             (1..nodes.len()).find(|&i| nodes[i].name.0 == name).ok_or_else(unknown)?
         }
-        None => (0..nodes.len()).max_by(|&a, &b| nodes[a].position.y.total_cmp(&nodes[b].position.y)).unwrap_or(0),
+        None => place_to_pull(&made.skeleton).index(),
     };
     let reached_deg = animator.pull_aside(NodeId(node as u32), made.config.wind.direction_deg, lean_deg);
     if reached_deg < lean_deg - 0.1 {
-        say(&format!("arborcam: warning: pulled so far it leans by {reached_deg:.1} degrees; it does not give way farther"));
+        say(&format!(
+            "arborcam: warning: pulled so far it leans by {reached_deg:.1} degrees; it does not give way farther"
+        ));
     }
     Ok(())
 }
@@ -142,22 +191,22 @@ fn metres_per_px(made: &Made) -> f64 {
     if given > 0.0 { given } else { made.config.wind.tree_height_m / height_px }
 }
 
-fn write(args: &AnimateArgs, kind: Kind, made: &Made) -> Result<(), Ended> {
+fn write(args: &AnimateArgs, out: &Path, kind: Kind, made: &Made) -> Result<(), Ended> {
     let part = |of: Option<&std::ffi::OsStr>| of.unwrap_or_default().to_string_lossy().into_owned();
-    let (name, stem) = (part(args.out.file_name()), part(args.out.file_stem()));
+    let (name, stem) = (part(out.file_name()), part(out.file_stem()));
     let model = made.model();
     let files: Result<Vec<NamedBytes>, ExportError> = match kind {
         Kind::Glb => glb(&model).map(|(bytes, _)| vec![(name, bytes)]),
         Kind::Gltf => gltf_files(&model, &stem).map(|(files, _)| files),
         Kind::Html => page(made, &model, &stem).map(|bytes| vec![(name, bytes)]),
         Kind::Csv => table(made).map(|bytes| vec![(name, bytes)]),
-        Kind::Video => return drawn(&picture(args), render::Kind::Video, made),
-        Kind::Picture => return drawn(&picture(args), render::Kind::Picture, made),
+        Kind::Video => return drawn(&picture(args, out), render::Kind::Video, made),
+        Kind::Picture => return drawn(&picture(args, out), render::Kind::Picture, made),
     };
     let files = files.map_err(failed)?;
     let size: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();
-    write_files(args.out.parent().unwrap_or(Path::new("")), &files).map_err(failed)?;
-    say(&format!("{}: {} poses, {:.1} MB", args.out.display(), made.poses.len(), size as f64 / 1e6));
+    write_files(out.parent().unwrap_or(Path::new("")), &files).map_err(failed)?;
+    say(&format!("{}: {} poses, {:.1} MB", out.display(), made.poses.len(), size as f64 / 1e6));
     Ok(())
 }
 
@@ -169,14 +218,14 @@ fn table(made: &Made) -> Result<Vec<u8>, ExportError> {
 }
 
 /// As `render` would be asked; a picture is of the end.
-fn picture(args: &AnimateArgs) -> RenderArgs {
+fn picture(args: &AnimateArgs, out: &Path) -> RenderArgs {
     let length_s = args.count() as f64 / args.fps;
-    let video = args.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("mp4"));
+    let video = out.extension().is_some_and(|e| e.eq_ignore_ascii_case("mp4"));
     RenderArgs {
         dir: args.dir.clone(),
         view: args.view,
         turn: 0.0,
-        out: args.out.clone(),
+        out: out.to_owned(),
         at: (!video).then_some(length_s),
         pose: None,
         size: args.size,

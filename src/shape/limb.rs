@@ -207,8 +207,12 @@ fn branches(skeleton: &Skeleton, curl: f64, seed: u64) -> Vec<Grown> {
     out
 }
 
-/// Share of the branch's own joint: none at the pivot, which neither joint moves, all from half its length on.
+/// Share of the branch's own joint at share `t` of its length: none at the pivot, which neither joint moves, all at its end.
+///
+/// A branch that has turned by a small angle a is so bent as a beam is that is held in its parent's direction at its base
+/// and in its own child's at its end: off the straight line by `a (2 t^2 - t^3)` of its length. Its bending angle follows
+/// the bending moment from piece to piece (Hu et al. 2017, section 6, fig. 13), and it meets the next without a crease.
 fn own_share(t: f64) -> f32 {
-    let x = (2.0 * t).clamp(0.0, 1.0);
-    (x * x * (3.0 - 2.0 * x)) as f32
+    let t = t.clamp(0.0, 1.0);
+    (t * (2.0 - t)) as f32
 }

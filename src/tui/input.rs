@@ -44,7 +44,13 @@ pub struct Binding<A> {
     pub action: A,
 }
 
-const fn bind<A>(key: KeyCode, shown: &'static str, short: &'static str, help: &'static str, action: A) -> Binding<A> {
+pub const fn bind<A>(
+    key: KeyCode,
+    shown: &'static str,
+    short: &'static str,
+    help: &'static str,
+    action: A,
+) -> Binding<A> {
     Binding { key, shown, short, help, action }
 }
 

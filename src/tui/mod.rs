@@ -11,6 +11,7 @@ mod graphics;
 mod guard;
 mod input;
 mod layout;
+mod moving;
 mod panels;
 mod placed;
 mod progress;
@@ -25,6 +26,7 @@ mod tty;
 
 pub use abilities::{Abilities, abilities};
 pub use graphics::Preview;
+pub use moving::{Moving, Whim, watch};
 pub use progress::Progress;
 pub use theme::Depth;
 

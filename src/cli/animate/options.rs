@@ -5,7 +5,7 @@ use super::super::shaping::Shaping;
 use crate::config::{Config, ConfigError};
 use crate::model::Size;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Longest animation, s.
 const LONGEST_S: f64 = 600.0;
@@ -18,9 +18,9 @@ pub struct AnimateArgs {
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = super::super::seconds)]
     pub seconds: f64,
     /// What to write, by its ending: a model (.glb, .gltf), a page (.html), the motion as a table (.csv), a video (.mp4), or
-    /// a picture of the end (.png). It must not exist.
+    /// a picture of the end (.png). It must not exist. Without it the tree moves on the terminal, with keys for the wind.
     #[arg(long, value_name = "PATH")]
-    pub out: PathBuf,
+    pub out: Option<PathBuf>,
     /// Poses a second, 1 to 120.
     #[arg(long, value_name = "RATE", default_value_t = 30.0, value_parser = rate)]
     pub fps: f64,
@@ -46,7 +46,7 @@ pub struct AnimateArgs {
     /// Pulls the tree aside until it leans by so many degrees, and lets it go; without --wind in still air.
     #[arg(long, value_name = "DEGREES", value_parser = lean, conflicts_with_all = ["looped", "wav"])]
     pub pull: Option<f64>,
-    /// The node of nodes.csv that is pulled at; if not given the highest.
+    /// The node of nodes.csv that is pulled at; if not given the thickest of those well above the ground.
     #[arg(long, value_name = "NODE", requires = "pull")]
     pub pull_node: Option<u32>,
     /// When it is let go, s.
@@ -95,8 +95,8 @@ impl AnimateArgs {
     ///
     /// # Errors
     /// What does not go together or is out of range, for the user to read.
-    pub fn check(&self) -> Result<Kind, String> {
-        let ending = self.out.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    pub fn check(&self, out: &Path) -> Result<Kind, String> {
+        let ending = out.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
         let kind = match ending.as_str() {
             "glb" => Kind::Glb,
             "gltf" => Kind::Gltf,
@@ -107,7 +107,7 @@ impl AnimateArgs {
             _ => {
                 return Err(format!(
                     "--out {} does not end in .glb, .gltf, .html, .csv, .mp4 or .png; name it so",
-                    self.out.display()
+                    out.display()
                 ));
             }
         };
@@ -117,8 +117,6 @@ impl AnimateArgs {
         if kind == Kind::Video && self.background.is_some_and(|b| b[3] == 0) {
             return Err("a video cannot be transparent; give --background white or a colour".into());
         }
-        let mut config = Config::default();
-        self.set(&mut config).map_err(|e| e.to_string())?;
         Ok(kind)
     }
 

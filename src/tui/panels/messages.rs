@@ -38,25 +38,28 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
 
 /// Keys that mean something now.
 pub fn keys(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
+    match &state.drawing {
+        Some(_) => {
+            let drawing = DRAWING.iter().filter(|b| !b.short.is_empty()).map(|b| (b.shown, b.short));
+            key_line(frame, std::iter::once(("click", "set")).chain(drawing), area, theme);
+        }
+        None => key_line(frame, WATCHING.iter().map(|b| (b.shown, b.short)), area, theme),
+    }
+}
+
+/// Keys and what they do, as many as there is room for.
+pub fn key_line(frame: &mut Frame, keys: impl Iterator<Item = (&'static str, &'static str)>, area: Rect, theme: Theme) {
     let mut spans = Vec::new();
     let mut room = area.width as usize;
-    let mut add = |key: &'static str, word: &'static str| {
+    for (key, word) in keys.filter(|(key, _)| !key.is_empty()) {
         // A word cut in two says nothing; the help has them all.
-        let width = key.len() + word.len() + 3;
-        if key.is_empty() || width > room + 1 {
-            room = if key.is_empty() { room } else { 0 };
-            return;
+        let width = key.chars().count() + word.chars().count() + 3;
+        if width > room + 1 {
+            break;
         }
         room = room.saturating_sub(width);
         spans.push(Span::styled(format!(" {key}"), theme.title()));
         spans.push(Span::raw(format!(" {word} ")));
-    };
-    match &state.drawing {
-        Some(_) => {
-            add("click", "set");
-            DRAWING.iter().filter(|b| !b.short.is_empty()).for_each(|b| add(b.shown, b.short));
-        }
-        None => WATCHING.iter().for_each(|b| add(b.shown, b.short)),
     }
     frame.render_widget(Line::from(spans), area);
 }

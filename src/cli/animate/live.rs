@@ -1,0 +1,157 @@
+//! The animation on the terminal, with keys for the wind.
+
+use super::super::shaping::Made;
+use crate::animate::{Animator, Magnify, Pull, magnify, place_to_pull};
+use crate::model::{Pose, Skeleton};
+use crate::tui::{Moving, Whim};
+use std::sync::Arc;
+
+/// How far the rope pulls, degrees.
+const LEAN_DEG: f64 = 12.0;
+/// The motion is magnified by this with every press, and by its powers from the lowest to the highest.
+const LARGER: f64 = 1.25;
+const STEPS: i8 = 12;
+/// Poses a second of the captured motion.
+const FPS: f64 = 30.0;
+
+/// A tree in a wind that the user makes.
+pub struct InWind {
+    skeleton: Arc<Skeleton>,
+    animator: Animator,
+    rope: Option<Pull>,
+    force: f64,
+    direction_deg: f64,
+    larger: i8,
+    frame: u64,
+}
+
+impl InWind {
+    /// `animator` in wind as the configuration of `made` has it.
+    pub fn new(made: &Made, animator: Animator) -> Self {
+        let wind = &made.config.wind;
+        let mut still = animator.clone();
+        still.pull_aside(place_to_pull(&made.skeleton), wind.direction_deg, LEAN_DEG);
+        Self {
+            skeleton: made.skeleton.clone(),
+            rope: still.pulled(),
+            animator,
+            force: wind.force,
+            direction_deg: wind.direction_deg,
+            larger: 0,
+            frame: 0,
+        }
+    }
+}
+
+impl Moving for InWind {
+    fn skeleton(&self) -> Arc<Skeleton> {
+        self.skeleton.clone()
+    }
+
+    fn pose(&mut self, elapsed_s: f64) -> Pose {
+        if elapsed_s > 0.0 {
+            self.animator.advance(elapsed_s);
+        }
+        self.frame += 1;
+        self.animator.pose(self.frame)
+    }
+
+    fn change(&mut self, whim: Whim) {
+        match whim {
+            Whim::Stronger(by) => self.force = (self.force + f64::from(by)).clamp(0.0, 12.0),
+            Whim::Veer(by) => self.direction_deg = (self.direction_deg + f64::from(by)).rem_euclid(360.0),
+            Whim::Larger(by) => {
+                self.larger = (self.larger + by).clamp(-STEPS, STEPS);
+                self.animator.magnify(LARGER.powi(self.larger.into()));
+            }
+            Whim::Pull => {
+                let rope = if self.animator.pulled().is_some() { None } else { self.rope };
+                self.animator.pull(rope);
+            }
+        }
+        self.animator.wind().turn_to(self.force, self.direction_deg);
+    }
+
+    fn told(&self) -> String {
+        let pulled = if self.animator.pulled().is_some() { "  pulled" } else { "" };
+        format!(
+            "wind {:.0} of 12 ({})  to {:.0}°  magnified {:.2}{pulled}",
+            self.force,
+            name(self.force),
+            self.direction_deg,
+            LARGER.powi(self.larger.into())
+        )
+    }
+}
+
+/// What the wind of a force is called.
+fn name(force: f64) -> &'static str {
+    match force.round() as u8 {
+        0 => "still",
+        1 => "light air",
+        2..=3 => "breeze",
+        4..=5 => "fresh breeze",
+        6..=7 => "strong wind",
+        8..=9 => "gale",
+        10..=11 => "storm",
+        _ => "hurricane",
+    }
+}
+
+/// The captured motion, to and fro, larger or smaller.
+pub struct AsFilmed {
+    skeleton: Arc<Skeleton>,
+    film: Vec<Pose>,
+    wanted: Magnify,
+    shown: Vec<Pose>,
+    time_s: f64,
+}
+
+impl AsFilmed {
+    /// # Errors
+    /// As of [`magnify`].
+    pub fn new(made: &Made, wanted: Magnify) -> Result<Self, crate::animate::MagnifyError> {
+        let mut new = Self {
+            skeleton: made.skeleton.clone(),
+            film: made.poses.clone(),
+            wanted: Magnify { looped: false, ..wanted },
+            shown: Vec::new(),
+            time_s: 0.0,
+        };
+        new.shown = new.magnified()?;
+        Ok(new)
+    }
+
+    fn magnified(&self) -> Result<Vec<Pose>, crate::animate::MagnifyError> {
+        let length_s = self.film.last().zip(self.film.first()).map_or(0.0, |(b, a)| b.time_s - a.time_s);
+        let count = (2.0 * length_s * FPS / self.wanted.speed).clamp(1.0, 600.0 * FPS) as u64;
+        magnify(&self.skeleton, &self.film, &self.wanted, FPS, count)
+    }
+}
+
+impl Moving for AsFilmed {
+    fn skeleton(&self) -> Arc<Skeleton> {
+        self.skeleton.clone()
+    }
+
+    fn pose(&mut self, elapsed_s: f64) -> Pose {
+        self.time_s += elapsed_s;
+        let k = (self.time_s * FPS) as usize % self.shown.len().max(1);
+        self.shown.get(k).cloned().unwrap_or_else(|| Pose { frame: 0, time_s: 0.0, joints: Vec::new() })
+    }
+
+    fn change(&mut self, whim: Whim) {
+        if let Whim::Larger(by) = whim {
+            let from = self.wanted.by.max(LARGER.powi((-STEPS).into()));
+            self.wanted.by = (from * LARGER.powi(by.into())).min(100.0);
+            // It could be made before, with another factor.
+            if let Ok(shown) = self.magnified() {
+                self.shown = shown;
+            }
+        }
+    }
+
+    fn told(&self) -> String {
+        format!("as filmed, magnified {:.2}, speed {:.2}", self.wanted.by, self.wanted.speed)
+    }
+}
