@@ -36,7 +36,7 @@ test-real:
 	scripts/fetch-real-clip.sh
 	cargo test --release --locked --test real_clip -- --ignored --nocapture
 
-# ONLY=tracking for the tracker alone.
+# ONLY=tracking for the tracker alone, ONLY=animate for the animation.
 bench:
 	cargo bench --locked --bench figures -- $(ONLY)
 
@@ -54,7 +54,7 @@ SYSTEM ?= /usr/lib
 BINARY ?= target/release/arborcam
 put = install -D -m
 with_prefix = sed 's|@PREFIX@|$(PREFIX)|g'
-DOCS = README.md docs/using.md docs/camera.md docs/recordings.md docs/files.md docs/settings.md docs/service.md docs/outline.md docs/method.md docs/sweep.md docs/viewer.md
+DOCS = README.md docs/using.md docs/camera.md docs/recordings.md docs/files.md docs/settings.md docs/service.md docs/outline.md docs/method.md docs/sweep.md docs/viewer.md docs/animate.md
 INSTALLED = $(PREFIX)/bin/arborcam $(PREFIX)/lib/arborcam/arborcam-service \
 	$(addprefix $(PREFIX)/share/arborcam/, arborcam.toml sbc.toml) \
 	$(addprefix $(PREFIX)/share/doc/arborcam/, $(notdir $(DOCS))) \

@@ -4,11 +4,14 @@
 
 #[path = "../tests/support/mod.rs"]
 mod support;
+#[path = "../tests/synthetic/mod.rs"]
+mod synthetic;
 mod tracking;
 #[path = "../tests/support/truth.rs"]
 mod truth;
 
-use arborcam::config::Config;
+use arborcam::animate::{Animator, Wind};
+use arborcam::config::{self, Config};
 use arborcam::export::gltf::{KEY_TOLERANCE_PX, Model, glb};
 use arborcam::hierarchy::{self, COMPARE_HZ, Evidence, evidence, evidence_of};
 use arborcam::model::{Outline, Pose, Rgb, Size, TrackId, TrackSet};
@@ -23,8 +26,13 @@ use std::sync::Arc;
 use std::time::Duration;
 use tracking::{median, timed_ms};
 
-/// With a word, `make bench ONLY=tracking` or `ONLY=wood`, only the figures of the tracker, or of the static tree.
+/// With a word, `make bench ONLY=tracking`, `ONLY=wood` or `ONLY=animate`, only the figures of the tracker, of the static
+/// tree, or of the animation.
 fn main() {
+    if std::env::args().any(|a| a == "animate") {
+        println!("{}", animation());
+        return;
+    }
     if std::env::args().any(|a| a == "wood") {
         println!("{}", dressed());
         return;
@@ -48,6 +56,7 @@ fn main() {
         model_file(),
         matting(),
         dressing(),
+        animation(),
         replay(&clip, dir.path()),
     ]);
     println!();
@@ -243,4 +252,28 @@ fn matting() -> String {
     let ms =
         (0..5).map(|_| timed_ms(|| outline::alpha(&picture, &scribbles).expect("a matte")).0).fold(f64::MAX, f64::min);
     format!("scribbles on a 640x480 picture solved: {ms:.0} ms (must be <= 1500)")
+}
+
+/// A hundred trees in a gale, frame after frame, on this core.
+fn animation() -> String {
+    let skeleton = Arc::new(synthetic::tree(7, 1));
+    let branches = skeleton.nodes.len() - 1;
+    let tree = |seed: u32| {
+        let wind = config::Wind { force: 8.0, seed, ..config::Wind::default() };
+        let mut animator = Animator::new(skeleton.clone(), &[], &wind, Wind::new(&wind, 128.0, 0.03));
+        animator.warm_up();
+        animator
+    };
+    let mut trees: Vec<Animator> = (0..100).map(tree).collect();
+    let mut frame = || {
+        for tree in &mut trees {
+            tree.advance(1.0 / 60.0);
+            std::hint::black_box(tree.pose(0));
+        }
+    };
+    let ms = median((0..200).map(|_| timed_ms(&mut frame).0).collect());
+    format!(
+        "animation: a frame of 100 trees of {branches} branches in {ms:.1} ms (must be <= 16.7); {:.0} frames/s",
+        1e3 / ms
+    )
 }

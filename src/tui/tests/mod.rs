@@ -2,4 +2,5 @@
 
 mod keys;
 mod made_up;
+mod moving;
 mod screens;

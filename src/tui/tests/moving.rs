@@ -1,0 +1,75 @@
+//! The screen of a tree that is made to move, and its keys.
+
+use super::made_up;
+use crate::model::{Pose, Skeleton};
+use crate::tui::moving::{Moving, Stage, Whim};
+use crate::tui::theme::{Depth, Theme};
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+use ratatui::crossterm::event::{Event, KeyCode, KeyEvent, KeyModifiers};
+use std::sync::Arc;
+
+struct Puppet {
+    skeleton: Arc<Skeleton>,
+    whims: Vec<Whim>,
+    lived_s: f64,
+}
+
+impl Moving for Puppet {
+    fn skeleton(&self) -> Arc<Skeleton> {
+        self.skeleton.clone()
+    }
+
+    fn pose(&mut self, elapsed_s: f64) -> Pose {
+        self.lived_s += elapsed_s;
+        made_up::pose(&self.skeleton)
+    }
+
+    fn change(&mut self, whim: Whim) {
+        self.whims.push(whim);
+    }
+
+    fn told(&self) -> String {
+        "wind 4 of 12 (fresh breeze)  to 0°  magnified 1.00".to_owned()
+    }
+}
+
+fn puppet() -> Puppet {
+    Puppet { skeleton: Arc::new(made_up::skeleton()), whims: Vec::new(), lived_s: 0.0 }
+}
+
+#[test]
+fn the_tree_and_what_moves_it_are_seen() {
+    let mut puppet = puppet();
+    let mut stage = Stage::new(&puppet);
+    stage.go_on(&mut puppet, 0.1);
+    for (width, height) in [(80, 24), (120, 40), (1, 1), (20, 3)] {
+        let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
+        terminal.draw(|frame| stage.render(frame, &puppet.told(), Theme::new(Depth::None))).unwrap();
+        if width >= 80 {
+            insta::assert_snapshot!(format!("moving_{width}x{height}"), terminal.backend());
+        }
+    }
+}
+
+#[test]
+fn keys_change_the_wind_and_pause_holds_the_tree() {
+    let mut puppet = puppet();
+    let mut stage = Stage::new(&puppet);
+    let press = |stage: &mut Stage, puppet: &mut Puppet, key: KeyCode, with: KeyModifiers| {
+        stage.press(&Event::Key(KeyEvent::new(key, with)), puppet)
+    };
+    let plain = KeyModifiers::NONE;
+    for key in [KeyCode::Up, KeyCode::Left, KeyCode::Char('-'), KeyCode::Char('p'), KeyCode::Char('x')] {
+        assert!(press(&mut stage, &mut puppet, key, plain));
+    }
+    assert_eq!(puppet.whims, [Whim::Stronger(1), Whim::Veer(-15), Whim::Larger(-1), Whim::Pull]);
+    stage.go_on(&mut puppet, 0.5);
+    assert!(press(&mut stage, &mut puppet, KeyCode::Char(' '), plain));
+    stage.go_on(&mut puppet, 0.5);
+    assert_eq!((puppet.lived_s, stage.paused), (0.5, true));
+    assert!(press(&mut stage, &mut puppet, KeyCode::Char('l'), plain));
+    assert_eq!(stage.state.turned, 1);
+    assert!(!press(&mut stage, &mut puppet, KeyCode::Char('q'), plain));
+    assert!(!press(&mut stage, &mut puppet, KeyCode::Char('c'), KeyModifiers::CONTROL));
+}
