@@ -240,7 +240,7 @@ fn bad_input_gets_one_line_and_its_exit_status() {
         let told = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(*status), "{name} {more:?}: {told}");
         assert!(told.contains(needle), "{name} {more:?}: {told}");
-        let usage = told.contains("Usage:");
+        let usage = told.contains("For more information");
         assert!(usage || told.lines().count() == 1, "{name} {more:?}: {told}");
         assert!(told.starts_with("arborcam: ") && output.stdout.is_empty(), "{told}");
     }

@@ -57,8 +57,8 @@ impl<F: Fn(usize, &UnitQuaternion<f64>) -> f64> Path<'_, F> {
         let mut fewer = keys.to_vec();
         fewer.remove(j);
         let (low, high) = (j.saturating_sub(WINDOW), (j + WINDOW - 1).min(fewer.len() - 1));
-        // The ends of the window stay where they are, unless the path itself ends there.
-        let free = (if low > 0 { low + 1 } else { 0 }, if high + 1 < fewer.len() { high } else { high + 1 });
+        // The ends of the window stay where they are, and those of the path: a loop would no longer close.
+        let free = (low + 1, high);
         self.fit(&mut fewer, (low, high), free).then_some(fewer)
     }
 

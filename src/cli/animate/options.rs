@@ -25,17 +25,17 @@ pub struct AnimateArgs {
     #[arg(long, value_name = "RATE", default_value_t = 30.0, value_parser = rate)]
     pub fps: f64,
     /// Strength of the wind on the Beaufort scale, 0 (still) to 12.
-    #[arg(long, value_name = "FORCE")]
+    #[arg(long, value_name = "FORCE", allow_negative_numbers = true)]
     pub wind: Option<f64>,
     /// Where it blows to, or where --pull pulls to: degrees about the trunk, 0 to the right of the picture, 90 away from
     /// the camera.
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     pub direction: Option<f64>,
     /// How much its speed varies, as a share of the mean, 0 (steady) to 1.
-    #[arg(long, value_name = "SHARE")]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     pub gusts: Option<f64>,
     /// Power of gusts falls with their frequency to the minus beta, 0 (wild) to 4 (smooth).
-    #[arg(long, value_name = "BETA")]
+    #[arg(long, value_name = "BETA", allow_negative_numbers = true)]
     pub beta: Option<f64>,
     /// Ends as it begins, without a seam.
     #[arg(long = "loop")]
