@@ -117,7 +117,7 @@ fn in_wind_every_branch_sways_with_the_frequency_that_was_measured() {
     let fft = planner.plan_fft_forward(long);
     for _ in 0..laps {
         let poses = frames(&mut animator, long as u64);
-        for i in 1..n {
+        for (i, power) in power.iter_mut().enumerate().skip(1) {
             let turns: Vec<Vector3<f64>> = poses.iter().map(|p| turn(&skeleton, p, i)).collect();
             for axis in 0..3 {
                 let mean = turns.iter().map(|t| t[axis]).sum::<f64>() / long as f64;
@@ -125,7 +125,7 @@ fn in_wind_every_branch_sways_with_the_frequency_that_was_measured() {
                 let mut signal: Vec<f64> = (0..long).map(|k| (turns[k][axis] - mean) * window(k)).collect();
                 let mut spectrum = fft.make_output_vec();
                 fft.process(&mut signal, &mut spectrum).expect("lengths agree");
-                (0..long / 2).for_each(|k| power[i][k] += spectrum[k].norm_sqr());
+                power.iter_mut().zip(&spectrum).for_each(|(p, c)| *p += c.norm_sqr());
             }
         }
     }

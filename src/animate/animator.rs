@@ -182,10 +182,10 @@ impl Animator {
                 steps += self.advance_counting(period_s / frames as f64);
             }
             for (branch, start) in self.branches.iter_mut().zip(start) {
-                for k in 0..2 {
-                    let by = Oscillation { x: branch.state[k].x - start[k].x, v: branch.state[k].v - start[k].v };
+                for (now, from) in branch.state.iter_mut().zip(start) {
+                    let by = Oscillation { x: now.x - from.x, v: now.v - from.v };
                     let more = branch.transition.closing(steps, by);
-                    branch.state[k] = Oscillation { x: start[k].x + more.x, v: start[k].v + more.v };
+                    *now = Oscillation { x: from.x + more.x, v: from.v + more.v };
                 }
             }
             self.time_s = 0.0;
@@ -228,11 +228,11 @@ impl Animator {
             let m = self.borne[i].moment * turned;
             let bending = Vector3::new(m.m23 - m.m32, m.m31 - m.m13, m.m12 - m.m21) * branch.load.yields;
             let held_at = branch.axes.map(|axis| axis.dot(&bending));
-            for k in 0..2 {
-                branch.state[k] = match answer {
-                    Answer::Step => branch.transition.step(branch.state[k], branch.held_at[k], held_at[k]),
-                    Answer::Stay => branch.state[k],
-                    Answer::Settle => Oscillation { x: held_at[k], v: 0.0 },
+            for (now, (from, to)) in branch.state.iter_mut().zip(branch.held_at.into_iter().zip(held_at)) {
+                *now = match answer {
+                    Answer::Step => branch.transition.step(*now, from, to),
+                    Answer::Stay => *now,
+                    Answer::Settle => Oscillation { x: to, v: 0.0 },
                 };
             }
             branch.held_at = held_at;
