@@ -219,6 +219,7 @@ fn bad_input_gets_one_line_and_its_exit_status() {
         ("a.csv", &["--seconds", "0"], BAD_USAGE, "seconds"),
         ("a.csv", &["--seconds", "601"], BAD_USAGE, "600"),
         ("a.csv", &["--fps", "0"], BAD_USAGE, "fps"),
+        ("a.csv", &["--fps", "100", "--seconds", "500"], BAD_USAGE, "20000"),
         ("a.csv", &["--pull", "90"], BAD_USAGE, "0.1 to 60"),
         ("a.csv", &["--pull", "5", "--loop"], BAD_USAGE, "--loop"),
         ("a.csv", &["--pull", "5", "--pull-node", "4000"], BAD_USAGE, "nodes.csv"),

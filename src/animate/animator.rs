@@ -237,7 +237,7 @@ impl Animator {
             }
             branch.held_at = held_at;
             let [u, w] = branch.state.map(|s| s.x * self.times);
-            let keep = soft(u.hypot(w), 0.5 * self.most_rad, self.most_rad);
+            let keep = soft((u * u + w * w).sqrt(), 0.5 * self.most_rad, self.most_rad);
             let own = UnitQuaternion::from_scaled_axis((branch.axes[0] * u + branch.axes[1] * w) * keep);
             let rotation = UnitQuaternion::new_normalize((parent.rotation * own).into_inner());
             let matrix = rotation.to_rotation_matrix().into_inner();

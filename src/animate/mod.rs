@@ -36,3 +36,11 @@ fn soft(angle: f64, knee: f64, most: f64) -> f64 {
     }
     (knee + room * ((angle - knee) / room).tanh()) / angle
 }
+
+/// What is left of a number of turns without the whole ones, 0 and above, below 1. `floor` would be a call into a library.
+fn fraction(turns: f64) -> f64 {
+    let left = turns - (turns as i64) as f64;
+    let above = if left < 0.0 { left + 1.0 } else { left };
+    // So little below 0 that adding 1 rounds to it.
+    if above < 1.0 { above } else { 0.0 }
+}

@@ -1,5 +1,6 @@
 //! 1/f^beta noise that comes round to its beginning.
 
+use super::fraction;
 use crate::shape::Chance;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
@@ -14,7 +15,8 @@ const FASTEST_HZ: f64 = 12.0;
 /// above (002 section 7).
 #[derive(Clone, Debug)]
 pub struct Noise {
-    values: Vec<f64>,
+    /// Many trees have many tables, and each is read all over: half the size is half the misses.
+    values: Vec<f32>,
     per_s: f64,
 }
 
@@ -46,7 +48,7 @@ impl Noise {
             values.fill(0.0);
         }
         let scale = 1.0 / power.max(1e-300).sqrt();
-        values.iter_mut().for_each(|v| *v *= scale);
+        let values = values.into_iter().map(|v| (v * scale) as f32).collect();
         Self { values, per_s: n as f64 / period_s }
     }
 
@@ -54,11 +56,11 @@ impl Noise {
     pub fn at(&self, time_s: f64) -> f64 {
         let n = self.values.len();
         let turns = time_s * self.per_s / n as f64;
-        let place = (turns - turns.floor()) * n as f64;
+        let place = fraction(turns) * n as f64;
         let k = place as usize;
         let share = place - k as f64;
-        // Rounding may put a place just below 0 onto n.
-        let (a, b) = (self.values[k % n], self.values[(k + 1) % n]);
+        let (a, b) = if k + 1 < n { (k, k + 1) } else { (n - 1, 0) };
+        let (a, b) = (f64::from(self.values[a]), f64::from(self.values[b]));
         a + (b - a) * share
     }
 }

@@ -1,6 +1,7 @@
 //! A sound as what drives the wind: how loud it is from moment to moment (Li et al. section 6: "the user can drive a tree
 //! using an audio signal of a windy day").
 
+use super::fraction;
 use std::io::Cursor;
 
 /// Values of loudness a second.
@@ -120,7 +121,7 @@ impl Loudness {
             return 0.0;
         }
         let turns = time_s * RATE_HZ / n as f64;
-        let place = (turns - turns.floor()) * n as f64;
+        let place = fraction(turns) * n as f64;
         let k = place as usize;
         let (a, b) = (self.values[k % n], self.values[(k + 1) % n]);
         a + (b - a) * (place - k as f64)

@@ -9,9 +9,8 @@ use nalgebra::{Point3, Vector3};
 /// Speed in steady wind of force 6, m/s: pressure is told as a multiple of what it is there.
 const REFERENCE_M_S: f64 = 12.287;
 /// From about this speed on a crown bends out of the wind and its drag grows less than with the square of speed, m/s;
-/// far beyond with the power 2 - 0.6, as Vogel found for broad leaves and branches.
+/// far beyond with the power 2 - 1/2; Vogel found -0.4 to -0.9 for leaves and branches of broad-leaved trees.
 const STREAMLINED_M_S: f64 = 10.0;
-const VOGEL: f64 = 0.6;
 /// Standard deviations of the speed across the wind and upwards, and of eddies, as shares of that along the wind.
 const ACROSS: f64 = 0.7;
 const RISE: f64 = 0.4;
@@ -143,5 +142,5 @@ fn velocity(force: f64, direction_deg: f64) -> Vector3<f64> {
 fn drag(velocity_m_s: Vector3<f64>) -> Vector3<f64> {
     let speed = velocity_m_s.norm();
     let streamlined = (1.0 + REFERENCE_M_S / STREAMLINED_M_S) / (1.0 + speed / STREAMLINED_M_S);
-    velocity_m_s * (speed / (REFERENCE_M_S * REFERENCE_M_S) * streamlined.powf(VOGEL))
+    velocity_m_s * (speed / (REFERENCE_M_S * REFERENCE_M_S) * streamlined.sqrt())
 }

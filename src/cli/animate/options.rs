@@ -7,8 +7,9 @@ use crate::model::Size;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
-/// Longest animation, s.
+/// Longest animation, s, and most poses: they are kept in memory.
 const LONGEST_S: f64 = 600.0;
+const MOST_POSES: f64 = 20_000.0;
 
 #[derive(Debug, Args)]
 pub struct AnimateArgs {
@@ -113,6 +114,9 @@ impl AnimateArgs {
         };
         if self.seconds > LONGEST_S {
             return Err(format!("--seconds is more than {LONGEST_S}; give less"));
+        }
+        if self.seconds * self.fps > MOST_POSES {
+            return Err(format!("--seconds times --fps is more than {MOST_POSES}; give less of one"));
         }
         if kind == Kind::Video && self.background.is_some_and(|b| b[3] == 0) {
             return Err("a video cannot be transparent; give --background white or a colour".into());
