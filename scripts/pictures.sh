@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Makes the pictures of README and docs anew: of the shipped clip, and of the oak too if CLIPS names a folder that
-# holds oak_release/video.mkv and outline.json. ONLY=name makes one group: views, film, shapes, points, terminal.
+# holds oak_release/video.mkv and outline.json. ONLY=name makes one group: views, film, shapes, wind, points, terminal.
 # Needs what scripts/apt-packages-test.txt lists, and `make build` first.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -125,6 +125,21 @@ shapes() {
     row "$to/topiary.png" "$work"/shaped-{triangle,circle,pentagon,heart,vase}.png
 }
 
+# Still air, a breeze, a gale and a storm.
+wind() {
+    local tree force out
+    for tree in "${trees[@]}"; do
+        capture "$tree"
+        for force in 0 4 7 10; do
+            out=$work/$tree-wind-$force.png
+            rm -f "$out"
+            "$arborcam" animate "$work/$tree" --wind "$force" --seconds 3 --size 288x288 --out "$out" 2>"$work/animate.log" ||
+                fail "animate --wind $force failed: $(tail -n 1 "$work/animate.log")"
+        done
+        row "$to/$tree-wind.png" "$work/$tree"-wind-{0,4,7,10}.png
+    done
+}
+
 # A frame with outline and points, coloured by main branch.
 points() {
     capture winter
@@ -154,6 +169,7 @@ terminal() {
 wanted views && views
 wanted film && film_beside
 wanted shapes && shapes
+wanted wind && wind
 wanted points && points
 wanted terminal && terminal
 echo "pictures: $(du -ck "$to"/* | tail -n 1 | cut -f 1) kB in ${to#"$PWD/"}"

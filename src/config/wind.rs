@@ -41,7 +41,7 @@ impl Default for Wind {
             tree_height_m: 10.0,
             trunk_hz: 0.7,
             damping_ratio: 0.06,
-            bend_deg: 2.0,
+            bend_deg: 1.5,
             max_bend_deg: 40.0,
             seed: 1,
         }
