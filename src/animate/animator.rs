@@ -157,13 +157,14 @@ impl Animator {
         self.time_s = 0.0;
     }
 
-    /// Lets `for_s` seconds pass.
-    pub fn advance(&mut self, for_s: f64) {
+    /// Lets `for_s` seconds pass, in as many even steps as it says.
+    pub fn advance(&mut self, for_s: f64) -> u64 {
         let steps = (for_s * STEPS_HZ - 1e-9).ceil().max(1.0);
         let step_s = for_s / steps;
         for _ in 0..steps as u64 {
             self.step(step_s);
         }
+        steps as u64
     }
 
     /// Chooses the start at time 0 from which the tree comes back to itself after `period_s`, which must be the wind's.
@@ -179,7 +180,7 @@ impl Animator {
             let start: Vec<[Oscillation; 2]> = self.branches.iter().map(|b| b.state).collect();
             let mut steps = 0;
             for _ in 0..frames {
-                steps += self.advance_counting(period_s / frames as f64);
+                steps += self.advance(period_s / frames as f64);
             }
             for (branch, start) in self.branches.iter_mut().zip(start) {
                 for (now, from) in branch.state.iter_mut().zip(start) {
@@ -191,11 +192,6 @@ impl Animator {
             self.time_s = 0.0;
             self.answer(Answer::Stay);
         }
-    }
-
-    fn advance_counting(&mut self, for_s: f64) -> u64 {
-        self.advance(for_s);
-        (for_s * STEPS_HZ - 1e-9).ceil().max(1.0) as u64
     }
 
     fn depth(&self) -> usize {
