@@ -240,3 +240,42 @@ fn cylinders_join_and_number_branches_from_the_trunk_up() {
     }
     assert!(cylinders(&[]).is_empty());
 }
+
+/// As a limb of segments bends in the wind: a hinge, or a crease where two branches meet, would be seen at once.
+#[test]
+fn a_bent_branch_is_the_elastic_line_of_a_beam_and_meets_the_next_without_a_crease() {
+    let mut skeleton = synthetic::tree(1, 1);
+    let mut next = skeleton.nodes[1].clone();
+    (next.parent, next.level, next.position) = (Some(NodeId(1)), 2, Point3::new(0.0, 300.0, 0.0));
+    skeleton.nodes[1].position = Point3::new(0.0, 150.0, 0.0);
+    skeleton.nodes.push(next);
+    let limbs = synthetic::limbs_of(&skeleton, &Wood { curl: 0.0, ..synthetic::bare() });
+    // Each turns by three degrees against the one that carries it.
+    let turn = |i: u16| nalgebra::Rotation3::from_axis_angle(&nalgebra::Vector3::z_axis(), -0.052 * f64::from(i));
+    let base = [Point3::origin(), Point3::origin(), turn(1) * skeleton.nodes[1].position];
+    let rest = [0.0, 0.0, 150.0];
+    let posed = |limb: &Limb| -> Vec<Point3<f64>> {
+        let place = |joint: u16, at: &Point3<f64>| {
+            let k = usize::from(joint);
+            base[k] + turn(joint) * (at - Point3::new(0.0, rest[k], 0.0))
+        };
+        let point = |s: &arborcam::shape::Station| {
+            let parts = s.riding.joints.iter().zip(s.riding.weights);
+            Point3::from(parts.map(|(&j, w)| place(j, &s.at).coords * f64::from(w)).sum::<nalgebra::Vector3<f64>>())
+        };
+        limb.stations.iter().map(point).collect()
+    };
+    let lean = |p: &[Point3<f64>]| ((p[1].x - p[0].x) / (p[1].y - p[0].y)).atan();
+    let (lower, upper) = (posed(&limbs[0]), posed(&limbs[1]));
+    for points in [&lower, &upper] {
+        let angles: Vec<f64> = points.windows(2).map(lean).collect();
+        let bends: Vec<f64> = angles.windows(2).map(|a| a[1] - a[0]).collect();
+        // The moment falls evenly along a beam that is loaded at its ends: so do the angles between its segments.
+        let falls: Vec<f64> = bends.windows(2).map(|b| b[0] - b[1]).collect();
+        let mean = falls.iter().sum::<f64>() / falls.len() as f64;
+        assert!(mean > 0.0 && falls.iter().all(|f| (f - mean).abs() < 0.2 * mean), "{falls:?}");
+        assert!(bends[0] > 0.0 && bends.iter().all(|b| b.abs() < 0.03), "it has a hinge: {bends:?}");
+    }
+    let crease = lean(&upper[..2]) - lean(&lower[lower.len() - 2..]);
+    assert!(crease.abs() < 0.025, "a crease of {} degrees", crease.to_degrees());
+}
