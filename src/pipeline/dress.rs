@@ -1,6 +1,7 @@
 //! From the skeleton to all that is drawn of a tree: wood, and leaves where the film shows them.
 
-use super::{bark, leaves};
+use super::bark;
+use super::leaves::InLeaf;
 use crate::config::{Config, EnvelopeKind};
 use crate::model::{Luma, NodeId, Outline, Pose, Rgb, Skeleton};
 use crate::motion;
@@ -32,10 +33,14 @@ pub fn dress(skeleton: &Skeleton, seen: Seen, config: &Config) -> Dressed {
     let seed = config.wood.seed.into();
     let room =
         room(skeleton, seen.outline, if seen.cut { Bounds::Drawn } else { Bounds::Filmed(config.shape.envelope) });
-    let limbs = limbs(skeleton, &room, &config.wood, seed);
+    let in_leaf = InLeaf::of(skeleton, &seen, &config.leaves);
+    let mut limbs = limbs(skeleton, &room, &config.wood, seed);
+    if let Some(in_leaf) = &in_leaf {
+        limbs = in_leaf.wood(limbs, skeleton, &seen);
+    }
     let wood = wood_levels(&limbs, config.wood.triangles as usize);
     let bark = bark::colour(&seen, skeleton);
-    let foliage = leaves::foliage(&limbs, skeleton, &seen, &config.leaves, seed);
+    let foliage = in_leaf.map(|l| l.foliage(&limbs, skeleton, &seen, &config.leaves, seed)).unwrap_or_default();
     Dressed { limbs, wood, foliage, bark_rgb: bark.unwrap_or(bark::PLAIN) }
 }
 

@@ -10,43 +10,57 @@ use crate::track::Detector;
 const SEED_DISTANCE_PX: f64 = 3.0;
 const SEED_QUALITY: f64 = 1e-4;
 
-/// Leaves for `limbs` if the settings ask for them, or the picture shows them.
-pub(super) fn foliage(
-    limbs: &[Limb],
-    skeleton: &Skeleton,
-    seen: &Seen,
-    settings: &config::Leaves,
-    seed: u64,
-) -> Foliage {
-    let wanted = match settings.show {
-        LeafShow::Off => false,
-        LeafShow::On => true,
-        // Who draws a density wants leaves.
-        LeafShow::Auto => seen.density.is_some() || in_leaf(skeleton, seen),
-    };
-    if !wanted {
-        return Foliage::default();
+/// What is to be known of the leaves before they grow: their seeds.
+pub(super) struct InLeaf {
+    seeds: Vec<[f32; 2]>,
+}
+
+impl InLeaf {
+    /// `None` where the tree is to have no leaves: the settings say so, or the picture shows none.
+    pub fn of(skeleton: &Skeleton, seen: &Seen, settings: &config::Leaves) -> Option<Self> {
+        let wanted = match settings.show {
+            LeafShow::Off => false,
+            LeafShow::On => true,
+            // Who draws a density wants leaves.
+            LeafShow::Auto => seen.density.is_some() || in_leaf(skeleton, seen),
+        };
+        let seeds = match (seen.picture, seen.outline) {
+            (Some(picture), Some(outline)) if wanted && picture.size == outline.size => {
+                seeds(picture, outline, settings.seeds)
+            }
+            _ => Vec::new(),
+        };
+        wanted.then_some(Self { seeds })
     }
-    let seeds = match (seen.picture, seen.outline) {
-        (Some(picture), Some(outline)) if picture.size == outline.size => seeds(picture, outline, settings.seeds),
-        _ => Vec::new(),
-    };
-    let view = LeafView {
-        picture: seen.picture,
-        outline: seen.outline,
-        pose: seen.pose,
-        density: seen.density,
-        seeds: &seeds,
-    };
-    let ours;
-    let template = match seen.leaf {
-        Some(given) => given,
-        None => {
-            ours = Template::ours();
-            &ours
-        }
-    };
-    shape::foliage(limbs, skeleton, &view, template, settings, seed)
+
+    /// The wood of a tree in leaf. In a drawn shape the film's leaves say nothing of where wood may stand.
+    pub fn wood(&self, limbs: Vec<Limb>, skeleton: &Skeleton, seen: &Seen) -> Vec<Limb> {
+        if seen.cut { limbs } else { shape::within_leaves(limbs, skeleton, &self.view(seen)) }
+    }
+
+    pub fn foliage(
+        &self,
+        limbs: &[Limb],
+        skeleton: &Skeleton,
+        seen: &Seen,
+        settings: &config::Leaves,
+        seed: u64,
+    ) -> Foliage {
+        let ours;
+        let template = match seen.leaf {
+            Some(given) => given,
+            None => {
+                ours = Template::ours();
+                &ours
+            }
+        };
+        shape::foliage(limbs, skeleton, &self.view(seen), template, settings, seed)
+    }
+
+    fn view<'a>(&'a self, seen: &Seen<'a>) -> LeafView<'a> {
+        let &Seen { picture, outline, pose, density, .. } = seen;
+        LeafView { picture, outline, pose, density, seeds: &self.seeds }
+    }
 }
 
 fn in_leaf(skeleton: &Skeleton, seen: &Seen) -> bool {

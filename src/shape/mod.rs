@@ -27,7 +27,7 @@ mod trunk;
 mod tube;
 mod twigs;
 
-pub use angles::{Angles, mean_branching_angle};
+pub use angles::{Angles, expected_branching_angle};
 pub use curl::CURL_BOUND;
 pub use cylinders::{Cylinder, cylinders};
 pub use diener::diener;
@@ -39,7 +39,7 @@ pub use girth::trunk_radius_px;
 pub use keep::{Twin, stand_as_before, twins};
 pub use leaves::{
     LeafView, Sampling, Season, Template, TemplateFault, TemplateMesh, density_match, foliage, foliage_by, leaf_cover,
-    season,
+    season, within_leaves,
 };
 pub use limb::{Limb, Riding, Room, Station, limbs};
 pub use measure::{PushFigures, side_symmetry};
