@@ -6,7 +6,7 @@
 demo: setup build
 	@scripts/demo.sh
 
-# ONLY=views, film, shapes, points or terminal for one group.
+# ONLY=views, film, shapes, points, terminal or page for one group.
 pictures: build
 	@CLIPS="$(CLIPS)" ONLY="$(ONLY)" scripts/pictures.sh
 

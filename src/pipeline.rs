@@ -129,7 +129,7 @@ impl Tree {
     /// How well its push fills the envelope, and how likely its angles are, beside the one-sided ways.
     pub fn push_figures(&self, config: &Config) -> PushFigures {
         let (flat, tracks) = self.flat(config);
-        PushFigures::of(&flat, &tracks, &self.outline, &config.shape)
+        PushFigures::of(&self.skeleton, &flat, &tracks, &self.outline, &config.shape)
     }
 
     /// Tracks to poses, from the rest pose on.

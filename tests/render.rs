@@ -164,7 +164,7 @@ fn bad_input_gets_one_line() {
         (&[good, "--out", &new, "--size", "0x480"], 2, "as 640x480"),
         (&[good, "--out", &new, "--size", "640x99999"], 2, "as 640x480"),
         (&[good, "--out", &new, "--size", "large"], 2, "as 640x480"),
-        (&[good, "--out", &new, "--at", "500"], 2, "give --at between"),
+        (&[good, "--out", &new, "--at", "500"], 2, "give less with --at"),
         (&[good, "--out", &new, "--at", "nan"], 2, "number of seconds"),
         (&[good, "--out", &new, "--background", "#12345é"], 2, "#rrggbb"),
         (&[good, "--out", &new, "--seconds", "2"], 2, "--at"),
@@ -172,6 +172,7 @@ fn bad_input_gets_one_line() {
         (&[good, "--out", &video, "--seconds", "1e9"], 2, "give less"),
         (&[good, "--out", &video, "--fps", "0"], 2, "1 to 120"),
         (&[good, "--out", &new, "--film", "behind", "--view", "side"], 2, "--film beside"),
+        (&[good, "--out", &new, "--film", "behind", "--at", "5"], 2, "leave out --at"),
         (&[good, "--out", "/proc/a.png"], 1, "/proc/a.png"),
     ];
     for (arguments, status, told) in cases {

@@ -172,9 +172,9 @@ impl<'a> Studio<'a> {
         let poses = &self.made.poses;
         let found = nearest(poses, at_s).filter(|k| (poses[*k].time_s - at_s).abs() < 1.0);
         found.ok_or_else(|| {
-            let (first_s, last_s) = (poses.first().map_or(0.0, |p| p.time_s), poses.last().map_or(0.0, |p| p.time_s));
+            let last_s = poses.last().map_or(0.0, |p| p.time_s);
             Ended::BadUsage(anyhow::anyhow!(
-                "there is no pose at {at_s} s: the capture has them from {first_s:.1} to {last_s:.1} s; give --at between them"
+                "there is no pose at {at_s} s: the film is {last_s:.1} s long; give less with --at"
             ))
         })
     }

@@ -8,7 +8,7 @@ use crate::export::capture::Software;
 use crate::export::csv::Sway;
 use crate::export::gltf::{KEY_TOLERANCE_PX, Model, provenance};
 use crate::export::read_template;
-use crate::model::{Luma, Outline, Pose, Skeleton};
+use crate::model::{Outline, Pose, Skeleton};
 use crate::outline;
 use crate::pipeline::{Seen, cut_to, dress, flutter, reshape};
 use crate::shape::{Cut, Drawn, Dressed};
@@ -135,19 +135,14 @@ impl Shaping {
         self.shape.fits(captured.skeleton.image_size)?;
         let stand = self.stand(&captured, &config, dir)?;
         let leaf = self.leaf.as_deref().map(read_template).transpose().map_err(|e| Ended::BadUsage(e.into()))?;
-        let density = match &self.density {
-            Some(path) => {
-                let size = captured.skeleton.image_size;
-                Some(outline::density(path, size).map_err(|e| Ended::BadUsage(e.into()))?)
-            }
-            // A tree that was cut to a shape bears leaves all over it.
-            None => stand.cut_to.as_ref().map(|shape| Luma { size: shape.size, pixels: white(&shape.mask) }),
-        };
+        let size = captured.skeleton.image_size;
+        let density = self.density.as_deref().map(|path| outline::density(path, size)).transpose();
+        let density = density.map_err(|e| Ended::BadUsage(e.into()))?;
         let seen = Seen {
             picture: captured.picture.as_ref().map(|p| &*p.rgb),
             pose: stand.pose_in_picture.as_ref(),
-            outline: stand.cut_to.as_ref().or(captured.outline.as_ref()),
-            cut: stand.cut_to.is_some(),
+            outline: captured.outline.as_ref(),
+            cut_to: stand.cut_to.as_ref(),
             leaf: leaf.as_ref(),
             density: density.as_ref(),
         };
@@ -232,10 +227,6 @@ struct Stand {
     /// The drawn shape in the picture.
     cut_to: Option<Outline>,
     reshaped: bool,
-}
-
-fn white(mask: &[u8]) -> Vec<u8> {
-    mask.iter().map(|&m| if m == 0 { 0 } else { 255 }).collect()
 }
 
 /// What became of the tree.

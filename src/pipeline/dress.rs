@@ -15,8 +15,8 @@ pub struct Seen<'a> {
     pub picture: Option<&'a Rgb>,
     pub pose: Option<&'a Pose>,
     pub outline: Option<&'a Outline>,
-    /// Whether `outline` is a drawn shape that the tree was cut to, not what was filmed.
-    pub cut: bool,
+    /// The drawn shape, in the picture, that the tree was cut to. It stands in the tree's place at rest.
+    pub cut_to: Option<&'a Outline>,
     /// A leaf of the user's own, and a drawn density of the leaves, which goes before the picture's.
     pub leaf: Option<&'a Template>,
     pub density: Option<&'a Luma>,
@@ -31,8 +31,10 @@ pub fn flutter(dressed: &Dressed, poses: &[Pose], skeleton: &Skeleton, config: &
 /// Dresses a skeleton.
 pub fn dress(skeleton: &Skeleton, seen: Seen, config: &Config) -> Dressed {
     let seed = config.wood.seed.into();
-    let room =
-        room(skeleton, seen.outline, if seen.cut { Bounds::Drawn } else { Bounds::Filmed(config.shape.envelope) });
+    let room = match seen.cut_to {
+        Some(shape) => room(skeleton, Some(shape), Bounds::Drawn),
+        None => room(skeleton, seen.outline, Bounds::Filmed(config.shape.envelope)),
+    };
     let in_leaf = InLeaf::of(skeleton, &seen, &config.leaves);
     let mut limbs = limbs(skeleton, &room, &config.wood, seed);
     if let Some(in_leaf) = &in_leaf {
@@ -62,11 +64,7 @@ pub(super) fn room<'a>(
     let foot_px = skeleton.foot_px;
     let envelope = outline.map(|outline| match bounds {
         Bounds::Drawn => Envelope::of_drawn(outline, foot_px),
-        Bounds::Filmed(EnvelopeKind::Revolution) => Envelope::of_revolution(outline, foot_px),
-        Bounds::Filmed(EnvelopeKind::Hull) => {
-            let measured = skeleton.nodes.iter().filter(|n| n.copy_of.is_none());
-            Envelope::of_hull(&measured.map(|n| n.position).collect::<Vec<_>>())
-        }
+        Bounds::Filmed(kind) => Envelope::of_filmed(kind, outline, foot_px, &places(skeleton)),
     });
     move |from: &Point3<f64>, to: &Point3<f64>| match (&envelope, outline) {
         (Some(envelope), Some(outline)) => {
@@ -77,4 +75,9 @@ pub(super) fn room<'a>(
         }
         _ => true,
     }
+}
+
+/// Where the measured nodes are, model axes, px.
+pub(super) fn places(skeleton: &Skeleton) -> Vec<Point3<f64>> {
+    skeleton.nodes[..skeleton.measured()].iter().map(|n| n.position).collect()
 }

@@ -8,8 +8,8 @@ use std::f64::consts::PI;
 /// The normal distribution of eq. 4 over branching angles, wider near the root.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Angles {
-    /// mu, the expected angle, radians.
-    pub mean: f64,
+    /// mu, radians.
+    pub expected: f64,
     /// d_max.
     deepest: u8,
     /// Factor on the paper's sigma.
@@ -20,7 +20,7 @@ impl Angles {
     /// As they are in `skeleton`, which still lies in its planes.
     pub fn of(skeleton: &Skeleton, settings: &config::Shape) -> Self {
         let deepest = skeleton.nodes.iter().map(|n| n.level).max().unwrap_or(0);
-        Self { mean: expected_branching_angle(skeleton), deepest, tolerance: settings.angle_tolerance }
+        Self { expected: expected_branching_angle(skeleton), deepest, tolerance: settings.angle_tolerance }
     }
 
     /// ln of eq. 4 for a branch that ends at `level`, at `angle` (radians) to the one that it grows from.
@@ -28,7 +28,7 @@ impl Angles {
         // sigma_i = pi (d_max - d_i) / d_max; a tip would get 0 and could not move at all, so tips get half a step.
         let above = f64::from(self.deepest.saturating_sub(level)).max(0.5);
         let sigma = self.tolerance * PI * above / f64::from(self.deepest.max(1));
-        -(angle - self.mean).powi(2) / (2.0 * sigma * sigma)
+        -(angle - self.expected).powi(2) / (2.0 * sigma * sigma)
     }
 
     /// Geometric mean of eq. 4 over all branches of `skeleton` above the trunk, 0 to 1: how likely its angles are.

@@ -2,6 +2,7 @@
 //! hull of the skeleton turned (Zeng section 5.5), or a drawn shape.
 
 use super::hull::{convex_hull, crossed};
+use crate::config::EnvelopeKind;
 use crate::model::Outline;
 use nalgebra::Point3;
 
@@ -62,6 +63,14 @@ impl Envelope {
             Disc::between(left - 0.5, right + 0.5)
         };
         Self { bottom_y: bottom, discs: (0..rows).map(disc).collect(), stretches: Vec::new() }
+    }
+
+    /// Of a filmed tree whose measured nodes are at `places` (model axes, px), as the settings name it.
+    pub fn of_filmed(kind: EnvelopeKind, outline: &Outline, foot_px: [f64; 2], places: &[Point3<f64>]) -> Self {
+        match kind {
+            EnvelopeKind::Revolution => Self::of_revolution(outline, foot_px),
+            EnvelopeKind::Hull => Self::of_hull(places),
+        }
     }
 
     fn turned(bounds: Option<[u32; 4]>, width: usize, mask: &[u8], foot_px: [f64; 2]) -> Self {

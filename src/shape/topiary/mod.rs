@@ -13,6 +13,9 @@ use crate::config;
 use crate::model::{JointPose, NodeId, Outline, Pose, Skeleton};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
+/// A shape that leaves out no more of the outline than this share holds the tree: nobody draws to the last pixel.
+const LARGER: f64 = 0.01;
+
 /// A tree that was cut to a shape.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Topiary {
@@ -52,7 +55,9 @@ pub fn topiary(
 ) -> Result<Topiary, TopiaryError> {
     let shape = drawn.placed(outline, skeleton.foot_px)?;
     let itself = |i: usize| skeleton.nodes[i].copy_of.unwrap_or(NodeId(i as u32));
-    if outline.mask.iter().zip(&shape.mask).all(|(tree, shape)| *tree == 0 || *shape != 0) {
+    let tree = outline.mask.iter().filter(|m| **m != 0).count();
+    let outside = outline.mask.iter().zip(&shape.mask).filter(|(tree, shape)| **tree != 0 && **shape == 0).count();
+    if outside as f64 <= LARGER * tree as f64 {
         let coverage = coverage(skeleton, &shape);
         let moves_as = (0..skeleton.nodes.len()).map(itself).collect();
         let cut = Cut { larger: true, coverage, ..Cut::default() };
