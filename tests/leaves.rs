@@ -459,5 +459,6 @@ fn a_drawn_density_does_not_leave_the_outline() {
     for (c, m) in covered.iter().zip(&film.outline.mask) {
         *(if *m == 0 { &mut outside } else { &mut inside }) += c;
     }
-    assert!(inside > 10.0 * outside, "{inside} pixels inside, {outside} outside");
+    // Leaves at the border stick out by half their size.
+    assert!(inside > 5.0 * outside, "{inside} pixels inside, {outside} outside");
 }
