@@ -18,7 +18,7 @@ pub use dress::{Seen, dress, flutter};
 pub use front::{Followed, FrontEnd};
 pub use leaves::seeds as leaf_seeds;
 pub use refine::Refinement;
-pub use reshape::{cut_to, reshape};
+pub use reshape::{MOST_RESHAPED, cut_to, reshape};
 pub use retrace::Retrace;
 
 use crate::config::Config;

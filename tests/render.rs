@@ -194,6 +194,24 @@ fn bad_input_gets_one_line() {
     assert_eq!(fs::read(&there).unwrap(), b"mine");
 }
 
+/// Ctrl-C in the middle of a video: nothing is left of it, and the shell can tell.
+#[test]
+fn a_video_that_is_stopped_leaves_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("a.mp4");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
+    command.args(["render", capture(), "--pose", "rest", "--view", "turntable", "--seconds", "100", "--out"]).arg(&out);
+    let mut child = command.stderr(std::process::Stdio::piped()).spawn().unwrap();
+    while fs::read_dir(dir.path()).unwrap().count() == 0 {
+        assert!(child.try_wait().unwrap().is_none(), "it was over before it was stopped");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    assert!(Command::new("kill").args(["-s", "INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!((output.status.code(), String::from_utf8_lossy(&output.stderr).as_ref()), (Some(130), ""));
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
+}
+
 /// Without ffmpeg a picture is still drawn, and a video says what to install.
 #[test]
 fn without_ffmpeg_a_video_names_the_remedy() {

@@ -108,6 +108,46 @@ fn what_is_outside_is_cut_at_the_border_with_all_that_grows_from_it() {
     assert!(at_border.clone().all(|i| children[i].iter().all(|c| c.index() >= skeleton.measured())));
 }
 
+/// A damaged capture may call a branch trunk, or a copy of one that is cut: what hangs in the air goes as well, and no branch
+/// gets the number of one that is gone.
+#[test]
+fn what_is_called_trunk_goes_with_its_parent() {
+    let tree = Flat::generated(5);
+    let half = on_picture(tree.outline.size, |u, v| u >= 300 && tree.outline.contains(u.into(), v.into()));
+    let half = Drawn::of_rgba(tree.outline.size, &half).expect("shape");
+    let whole = model(&tree);
+    let mut damaged = whole.clone();
+    let outside = |i: usize| whole.nodes[i].level >= 2 && whole.image_from_model(&whole.nodes[i].position)[0] < 298.0;
+    let hanging = (2..whole.nodes.len()).filter(|&i| whole.nodes[i].parent.is_some_and(|p| outside(p.index())));
+    let hanging: Vec<usize> = hanging.collect();
+    assert!(hanging.len() > 10);
+    hanging.into_iter().for_each(|i| damaged.nodes[i].level = 1);
+    for whole in [whole, damaged] {
+        let cut = shape::topiary(&whole, &tree.outline, &half, &config::Shape::default(), SEED).expect("a tree");
+        let nodes = &cut.skeleton.nodes;
+        for (i, node) in nodes.iter().enumerate().skip(1) {
+            assert!(node.parent.is_some_and(|p| p.index() < i), "node {i}: {node:?}");
+            assert!(node.copy_of.is_none_or(|of| of.index() < nodes.len()), "node {i}: {node:?}");
+        }
+        let before: std::collections::BTreeSet<_> = whole.nodes.iter().map(|n| n.name).collect();
+        let grown = &nodes[nodes.len() - cut.cut.grown..];
+        assert!(cut.cut.gone > 10 && !grown.is_empty(), "{:?}", cut.cut);
+        assert!(grown.iter().all(|n| !before.contains(&n.name)));
+        assert_eq!(cut.pose(&whole, &pose(&whole, 0.2)).joints.len(), nodes.len());
+    }
+}
+
+/// Numbers that are used up must not begin again at 0, where the trunk is.
+#[test]
+fn names_that_are_used_up_are_not_given_again() {
+    let tree = Flat::generated(5);
+    let mut whole = model(&tree);
+    whole.nodes.last_mut().expect("a node").name.0 = u32::MAX - 3;
+    let cut = shape::topiary(&whole, &tree.outline, &drawn("heart"), &config::Shape::default(), SEED).expect("a tree");
+    let names: std::collections::BTreeSet<_> = cut.skeleton.nodes.iter().map(|n| n.name).collect();
+    assert_eq!((names.len(), cut.cut.grown), (cut.skeleton.nodes.len(), 3));
+}
+
 /// Every branch of the whole tree swings by its own angle; those of the cut one swing with them.
 #[test]
 fn the_cut_tree_moves_as_the_measured_one_does() {

@@ -10,8 +10,8 @@ use crate::export::gltf::{KEY_TOLERANCE_PX, Model, provenance};
 use crate::export::read_template;
 use crate::model::{Outline, Pose, Skeleton};
 use crate::outline;
-use crate::pipeline::{Seen, cut_to, dress, flutter, reshape};
-use crate::shape::{Cut, Drawn, Dressed};
+use crate::pipeline::{MOST_RESHAPED, Seen, cut_to, dress, flutter, reshape};
+use crate::shape::{Cut, Drawn, Dressed, Topiary};
 use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
 use serde_json::Value;
@@ -76,6 +76,16 @@ pub struct Made {
     provenance: Value,
     /// It stands otherwise than in the tables of the capture.
     pub reshaped: bool,
+    restood: Restood,
+}
+
+/// What was done to the captured tree, for all further poses of it.
+#[derive(Default)]
+struct Restood {
+    /// The tree of the new shape.
+    reshaped: Option<Arc<Skeleton>>,
+    /// The tree before it was cut, and the cut one.
+    cut: Option<(Arc<Skeleton>, Topiary)>,
 }
 
 impl From<CaptureError> for Ended {
@@ -152,7 +162,7 @@ impl Shaping {
         let node_extras = sway.iter().map(extras).collect();
         let provenance = provenance(&captured.note.source.name, &Software::default(), poses);
         let (flutter, reshaped) = (flutter(&dressed, poses, skeleton, &config), *reshaped);
-        let Stand { skeleton, poses, pose_in_picture, sway, .. } = stand;
+        let Stand { skeleton, poses, pose_in_picture, sway, restood, .. } = stand;
         Ok(Made {
             captured,
             config,
@@ -165,6 +175,7 @@ impl Shaping {
             node_extras,
             provenance,
             reshaped,
+            restood,
         })
     }
 
@@ -183,7 +194,16 @@ impl Shaping {
             sway: captured.sway.clone(),
             cut_to: None,
             reshaped: reshaped || drawn.is_some(),
+            restood: Restood::default(),
         };
+        let planes = if reshaped { config.shape.planes as usize } else { 0 };
+        let nodes = stand.skeleton.nodes.len().max(planes.saturating_mul(stand.skeleton.measured()));
+        if stand.reshaped && nodes > MOST_RESHAPED {
+            return Err(Ended::Failed(anyhow!(
+                "another shape would have {nodes} nodes, and at most {MOST_RESHAPED} can be given one; take fewer --planes, \
+                 or leave all options of the shape out"
+            )));
+        }
         if reshaped {
             stand.skeleton = Arc::new(reshape(&captured.skeleton, outline()?, config));
             stand.poses = captured.reposed(&stand.skeleton, config, &captured.poses);
@@ -192,6 +212,7 @@ impl Shaping {
             // Copies come last; nothing was measured on them.
             stand.sway.truncate(captured.skeleton.measured());
             stand.sway.resize(stand.skeleton.nodes.len(), None);
+            stand.restood.reshaped = Some(stand.skeleton.clone());
         }
         let Some(path) = drawn else { return Ok(stand) };
         let unfit = |e: anyhow::Error| Ended::BadUsage(e.context(format!("--envelope {}", path.display())));
@@ -211,9 +232,10 @@ impl Shaping {
             poses: stand.poses.iter().map(pose).collect(),
             pose_in_picture: stand.pose_in_picture.as_ref().map(pose),
             sway: topiary.skeleton.nodes.iter().zip(&topiary.moves_as).map(sway).collect(),
-            skeleton: Arc::new(topiary.skeleton),
-            cut_to: Some(topiary.shape),
+            skeleton: Arc::new(topiary.skeleton.clone()),
+            cut_to: Some(topiary.shape.clone()),
             reshaped: true,
+            restood: Restood { cut: Some((whole, topiary)), ..stand.restood },
         })
     }
 }
@@ -227,6 +249,7 @@ struct Stand {
     /// The drawn shape in the picture.
     cut_to: Option<Outline>,
     reshaped: bool,
+    restood: Restood,
 }
 
 /// What became of the tree.
@@ -245,6 +268,26 @@ fn tell(cut: &Cut) {
 }
 
 impl Made {
+    /// All poses of the film, of the tree as it stands; read anew, one at a time.
+    ///
+    /// # Errors
+    /// `motion.csv` cannot be read.
+    pub fn film(&self) -> Result<impl Iterator<Item = Result<Pose, CaptureError>>, CaptureError> {
+        let Restood { reshaped, cut } = &self.restood;
+        let mut repose = reshaped.as_ref().map(|new| self.captured.reposer(new, &self.config));
+        Ok(self.captured.film()?.map(move |pose| {
+            let pose = pose?;
+            let pose = match &mut repose {
+                Some(repose) => repose(&pose),
+                None => pose,
+            };
+            Ok(match cut {
+                Some((whole, topiary)) => topiary.pose(whole, &pose),
+                None => pose,
+            })
+        }))
+    }
+
     /// As it goes into a file.
     pub fn model(&self) -> Model<'_> {
         Model {

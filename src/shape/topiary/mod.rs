@@ -69,9 +69,11 @@ pub fn topiary(
     let trunk: Vec<bool> = kept.iter().map(|&i| was_trunk[i]).collect();
     fuse(&mut pruned, &trunk, &envelope, settings);
     let left = pruned.nodes.len();
-    grow::grow(&mut pruned, &envelope, &shape, settings, seed);
+    // What was cut keeps its number: no other branch gets it.
+    let last = skeleton.nodes.iter().map(|n| n.name.0).max().unwrap_or(0);
+    grow::grow(&mut pruned, (&envelope, &shape), last, settings, seed);
     let moves_as = |n: usize| match (pruned.nodes[n].copy_of, kept.get(n)) {
-        (Some(original), _) => NodeId(kept[original.index()] as u32),
+        (Some(original), _) => NodeId(kept.get(original.index()).map_or(0, |&k| k as u32)),
         (None, Some(&i)) => itself(i),
         (None, None) => NodeId(0),
     };
@@ -93,7 +95,7 @@ impl Topiary {
         let rotation = |i: usize| whole.joints.get(i).map_or(still.rotation, |j| j.rotation);
         let mut joints: Vec<JointPose> = Vec::with_capacity(self.skeleton.nodes.len());
         for (node, original) in self.skeleton.nodes.iter().zip(&self.moves_as) {
-            let Some(parent) = node.parent else {
+            let Some(parent) = node.parent.filter(|p| p.index() < joints.len()) else {
                 joints.push(whole.joints.first().copied().unwrap_or(still));
                 continue;
             };
