@@ -27,6 +27,7 @@ pub struct Variants {
 
 /// What the push has achieved.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct PushFigures {
     pub attractors: u32,
     /// mu of eq. 4, degrees.
