@@ -171,34 +171,8 @@ def points(capture, out):
     save(picture.resize((960, 960 * picture.height // picture.width), Image.LANCZOS), out)
 
 
-def shapes(folder):
-    size, grid = 512, range(361)
-    turn = [math.radians(g) for g in grid]
-    polygon = lambda n: [(256 + 240 * math.sin(2 * math.pi * k / n), 256 - 240 * math.cos(2 * math.pi * k / n)) for k in range(n)]
-    heart = [
-        (256 + 14.5 * 16 * math.sin(t) ** 3,
-         236 - 14.5 * (13 * math.cos(t) - 5 * math.cos(2 * t) - 2 * math.cos(3 * t) - math.cos(4 * t)))
-        for t in turn
-    ]
-    # Half widths of lip, neck, belly and foot, at their heights.
-    rings = [(30, 130), (120, 80), (320, 200), (480, 95)]
-    side = []
-    for (top, wide), (bottom, next_wide) in zip(rings, rings[1:]):
-        for k in range(20):
-            ease = 0.5 - 0.5 * math.cos(math.pi * k / 20)
-            side.append((wide + (next_wide - wide) * ease, top + (bottom - top) * k / 20))
-    side.append((rings[-1][1], rings[-1][0]))
-    vase = [(256 - x, y) for x, y in side] + [(256 + x, y) for x, y in reversed(side)]
-    drawn = {"triangle": [(256, 20), (490, 490), (22, 490)], "circle": [(256 + 240 * math.cos(t), 256 + 240 * math.sin(t)) for t in turn],
-             "pentagon": polygon(5), "heart": heart, "vase": vase}
-    for name, corners in drawn.items():
-        picture = Image.new("RGBA", (size, size), (0, 0, 0, 0))
-        ImageDraw.Draw(picture).polygon(corners, fill=(40, 120, 40, 255))
-        picture.save(Path(folder) / f"{name}.png")
-
-
 if __name__ == "__main__":
-    commands = {"terminal": (terminal, 2), "points": (points, 2), "shapes": (shapes, 1)}
+    commands = {"terminal": (terminal, 2), "points": (points, 2)}
     command, count = commands.get(sys.argv[1] if len(sys.argv) > 1 else "", (None, 0))
     if command is None or len(sys.argv) != 2 + count:
         sys.exit(__doc__)

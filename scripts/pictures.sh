@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Makes the pictures of README and docs anew: of the shipped clip, and of the oak too if CLIPS names a folder that
-# holds oak_release/video.mkv and outline.json. ONLY=name makes one group: views, film, shapes, wind, points, terminal.
+# holds oak_release/video.mkv and outline.json. ONLY=name makes one group: views, film, shapes, wind, points, terminal, page.
 # Needs what scripts/apt-packages-test.txt lists, and `make build` first.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -112,15 +112,10 @@ film_beside() {
 
 # One tree pushed into five shapes.
 shapes() {
-    if ! "$arborcam" render --help | grep -q -- --envelope; then
-        echo "pictures: this build knows no --envelope; no shapes"
-        return
-    fi
     local tree=winter shape
     [[ -n $clips ]] && tree=oak
-    python3 scripts/pictures.py shapes "$work"
     for shape in triangle circle pentagon heart vase; do
-        render "$tree" "$work/shaped-$shape.png" --size 256x288 --envelope "$work/$shape.png"
+        render "$tree" "$work/shaped-$shape.png" --size 256x288 --envelope "docs/shapes/$shape.png" --leaves on
     done
     row "$to/topiary.png" "$work"/shaped-{triangle,circle,pentagon,heart,vase}.png
 }
@@ -166,10 +161,22 @@ terminal() {
     told "$to/terminal.png"
 }
 
+# The page in a desktop's and a phone's browser.
+page() {
+    capture winter
+    scripts/test-modules.sh >/dev/null
+    "$arborcam" export "$work/winter" --format html --out "$work/page.html" 2>"$work/page.log" ||
+        fail "the page was not written: $(cat "$work/page.log")"
+    node scripts/pictures-viewer.mjs "$work/page.html" "$to/viewer.png" "$to/viewer-phone.png"
+    told "$to/viewer.png"
+    told "$to/viewer-phone.png"
+}
+
 wanted views && views
 wanted film && film_beside
 wanted shapes && shapes
 wanted wind && wind
 wanted points && points
 wanted terminal && terminal
+wanted page && page
 echo "pictures: $(du -ck "$to"/* | tail -n 1 | cut -f 1) kB in ${to#"$PWD/"}"

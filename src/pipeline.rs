@@ -18,7 +18,7 @@ pub use dress::{Seen, dress, flutter};
 pub use front::{Followed, FrontEnd};
 pub use leaves::seeds as leaf_seeds;
 pub use refine::Refinement;
-pub use reshape::{cut_to, reshape};
+pub use reshape::{MOST_RESHAPED, cut_to, reshape};
 pub use retrace::Retrace;
 
 use crate::config::Config;
@@ -129,7 +129,7 @@ impl Tree {
     /// How well its push fills the envelope, and how likely its angles are, beside the one-sided ways.
     pub fn push_figures(&self, config: &Config) -> PushFigures {
         let (flat, tracks) = self.flat(config);
-        PushFigures::of(&flat, &tracks, &self.outline, &config.shape)
+        PushFigures::of(&self.skeleton, &flat, &tracks, &self.outline, &config.shape)
     }
 
     /// Tracks to poses, from the rest pose on.

@@ -57,11 +57,12 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "capture",
             "animate",
             "draw",
-            // The table of cylinders is of the limbs; a drawn shape is read, and what it cut is told.
+            // The table of cylinders is of the limbs; a drawn shape is read, and what it cut is told and moves.
             "shape::cylinders",
             "shape::Cut",
             "shape::Drawn",
             "shape::Dressed",
+            "shape::Topiary",
             "tui",
             "doctor",
         ],

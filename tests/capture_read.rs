@@ -155,6 +155,11 @@ fn damage_is_named_with_file_and_line() {
         lines[line - 1] = cells.join(",");
         lines.join("\n") + "\n"
     }
+    fn noted(text: String, change: fn(&mut serde_json::Value)) -> String {
+        let mut note = serde_json::from_str(&text).expect("json");
+        change(&mut note);
+        note.to_string()
+    }
     let cases: &[(&str, Edit, &str)] = &[
         ("nodes.csv", |t| with(t, 5, 6, "NaN"), "nodes.csv, line 5: x is \"NaN\""),
         ("nodes.csv", |t| with(t, 5, 6, ""), "nodes.csv, line 5: x is \"\""),
@@ -162,6 +167,14 @@ fn damage_is_named_with_file_and_line() {
         ("nodes.csv", |t| with(t, 5, 0, "0"), "line 5: there are two nodes 0"),
         ("nodes.csv", |t| with(t, 3, 1, ""), "line 3: the first node"),
         ("nodes.csv", |t| with(t, 4, 2, "-1"), "line 4: level"),
+        ("nodes.csv", |t| with(t, 5, 2, "1"), "nodes.csv, line 5: level is 1, and must be"),
+        ("nodes.csv", |t| with(t, 2, 2, "7"), "nodes.csv, line 2: level is 7, and must be 0"),
+        ("nodes.csv", |t| with(t, 5, 0, "4294967295"), "nodes.csv, line 5: node_id is 4294967295"),
+        ("nodes.csv", |t| with(t, 5, 6, "2e6"), "nodes.csv, line 5: x is \"2e6\", which is 2000000 px"),
+        ("nodes.csv", |t| with(t, 5, 9, "2e6"), "nodes.csv, line 5: radius is \"2e6\""),
+        ("motion.csv", |t| with(t, 90, 4, "-1e7"), "motion.csv, line 90: y is \"-1e7\""),
+        ("capture.json", |t| noted(t, |n| n["model"]["foot_px"] = [1e18, 300.0].into()), "foot_px is far from"),
+        ("capture.json", |t| noted(t, |n| n["model"]["metres_per_px"] = 1e-9.into()), "no tree is so large"),
         ("nodes.csv", |t| t.replacen("radius", "diameter", 1), "line 1: the column radius is missing"),
         ("motion.csv", |t| with(t, 90, 3, "inf"), "motion.csv, line 90: x is \"inf\""),
         ("motion.csv", |t| with(t, 90, 2, "3999"), "line 90: here stands node 3999"),
@@ -191,6 +204,35 @@ fn damage_is_named_with_file_and_line() {
     assert!(matches!(nowhere, CaptureError::NotACapture { .. }), "{nowhere}");
 }
 
+/// What is said of copies may be wrong as well: a branch that repeats one of another level could not be cut with it.
+#[test]
+fn a_copy_of_another_level_is_none() {
+    let dir = copy();
+    edit(dir.path(), "capture.json", |text| {
+        let mut note: Capture = serde_json::from_str(&text).expect("json");
+        let trunk = note.model.as_ref().expect("model").copied[0].original.min(1);
+        note.model.as_mut().expect("model").copied[0].original = trunk;
+        serde_json::to_string(&note).expect("json")
+    });
+    let read = Captured::read(dir.path(), WHOLE).expect("capture");
+    assert!(read.warnings.iter().any(|w| w.contains("not known what they repeat")), "{:?}", read.warnings);
+    let nodes = &read.skeleton.nodes;
+    assert!(nodes.iter().all(|n| n.copy_of.is_none_or(|of| nodes[of.index()].level == n.level)));
+}
+
+/// A film of hours is gone through pose by pose; it must be the same film.
+#[test]
+fn the_film_has_every_pose_once() {
+    let read = Captured::read(made(), WHOLE).expect("capture");
+    let film: Vec<_> = read.film().expect("film").collect::<Result<_, _>>().expect("poses");
+    assert_eq!(film, read.poses);
+    let dir = copy();
+    let read = Captured::read(dir.path(), WHOLE).expect("capture");
+    edit(dir.path(), "motion.csv", |t| t.lines().take(200).map(|l| format!("{l}\n")).collect());
+    let film: Vec<_> = read.film().expect("film").collect();
+    assert!(film.len() > 2 && film[..film.len() - 1].iter().all(Result::is_ok) && film[film.len() - 1].is_err());
+}
+
 #[test]
 fn a_film_without_a_tree_is_no_damage() {
     let dir = copy();
@@ -205,7 +247,12 @@ fn a_film_without_a_tree_is_no_damage() {
 
 mod fuzz {
     use super::*;
+    use arborcam::config::{Config, EnvelopeKind, LeafShow, Leaves, Shape};
+    use arborcam::export::gltf::{KEY_TOLERANCE_PX, Model, glb};
+    use arborcam::model::Pose;
+    use arborcam::pipeline::{Seen, cut_to, dress, flutter, reshape};
     use proptest::prelude::*;
+    use std::sync::Arc;
 
     proptest! {
         #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
@@ -234,6 +281,102 @@ mod fuzz {
             if let Err(e) = Captured::read(dir.path(), 1.0) {
                 prop_assert!(!e.to_string().contains('\n'), "{}", e);
             }
+        }
+    }
+    /// Numbers that no stage would expect.
+    const ODD: [&str; 8] = ["1e18", "-1", "NaN", "0", "65535", "9e5", "1e-300", "255"];
+
+    /// A table with a number in some of its cells changed, a note with some of its numbers.
+    fn spoilt(name: &str, text: &str, picks: &[(f64, &str)]) -> String {
+        if name == "capture.json" {
+            let mut note: serde_json::Value = serde_json::from_str(text).expect("json");
+            for (at, odd) in picks {
+                let mut numbers = Vec::new();
+                collect(&mut note, &mut numbers);
+                let k = (at * numbers.len() as f64) as usize;
+                *numbers[k] = serde_json::from_str(odd).unwrap_or(serde_json::Value::Null);
+            }
+            return note.to_string();
+        }
+        let mut rows: Vec<Vec<&str>> = text.lines().map(|l| l.split(',').collect()).collect();
+        for (at, odd) in picks {
+            let cells = (rows.len() - 1) * rows[0].len();
+            let k = (at * cells as f64) as usize;
+            let (row, column) = (1 + k / rows[0].len(), k % rows[0].len());
+            rows[row][column] = odd;
+        }
+        rows.iter().map(|r| r.join(",") + "\n").collect()
+    }
+
+    fn collect<'a>(value: &'a mut serde_json::Value, into: &mut Vec<&'a mut serde_json::Value>) {
+        match value {
+            serde_json::Value::Number(_) => into.push(value),
+            serde_json::Value::Array(all) => all.iter_mut().for_each(|v| collect(v, into)),
+            serde_json::Value::Object(all) => all.values_mut().for_each(|v| collect(v, into)),
+            _ => {}
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 32, failure_persistence: None, ..ProptestConfig::default() })]
+
+        /// What the reader takes, every later stage takes: the model of it, another shape, a cut one.
+        #[test]
+        fn no_odd_number_makes_an_export_fall(
+            name in prop::sample::select(vec!["nodes.csv", "motion.csv", "capture.json"]),
+            picks in prop::collection::vec((0.0..1.0f64, prop::sample::select(ODD.to_vec())), 1..4),
+        ) {
+            let dir = copy();
+            edit(dir.path(), name, |text| spoilt(name, &text, &picks));
+            let read = match Captured::read(dir.path(), 0.2) {
+                Ok(read) => read,
+                Err(e) => {
+                    prop_assert!(!e.to_string().contains('\n'), "{}", e);
+                    return Ok(());
+                }
+            };
+            let mut config = read.note.config.clone();
+            // Any would do, and these are fast.
+            config.shape = Shape { planes: 2, attractors: 32, push_options: 5, passes: 1, ..config.shape };
+            config.wood.triangles = config.wood.triangles.min(2000);
+            config.leaves = Leaves { show: LeafShow::On, triangles: 1000, ..config.leaves };
+            exported(&read, &read.skeleton, &read.poses, &config);
+            if let Some(outline) = &read.outline {
+                let heart = fs::read("docs/shapes/heart.png").expect("shape");
+                let heart = arborcam::shape::Drawn::of_image(&heart).expect("a shape");
+                if let Ok(cut) = cut_to(&read.skeleton, outline, &heart, &config) {
+                    let poses: Vec<Pose> = read.poses.iter().map(|p| cut.pose(&read.skeleton, p)).collect();
+                    exported(&read, &cut.skeleton, &poses, &config);
+                }
+                for envelope in [EnvelopeKind::Revolution, EnvelopeKind::Hull] {
+                    config.shape.envelope = envelope;
+                    let new = Arc::new(reshape(&read.skeleton, outline, &config));
+                    exported(&read, &new, &read.reposed(&new, &config, &read.poses), &config);
+                }
+            }
+        }
+    }
+
+    /// To a model that opens, or to a refusal of one line.
+    fn exported(read: &Captured, skeleton: &Skeleton, poses: &[Pose], config: &Config) {
+        let seen =
+            Seen { picture: read.picture.as_ref().map(|p| &*p.rgb), outline: read.outline.as_ref(), ..Seen::default() };
+        let dressed = dress(skeleton, seen, config);
+        let model = Model {
+            skeleton,
+            dressed: &dressed,
+            poses,
+            flutter: &flutter(&dressed, poses, skeleton, config),
+            all_levels: false,
+            metres_per_px: config.export.metres_per_px,
+            tolerance_px: KEY_TOLERANCE_PX,
+            thorough: false,
+            node_extras: &[],
+            provenance: &serde_json::Value::Null,
+        };
+        match glb(&model) {
+            Ok((bytes, _)) => assert!(gltf::Gltf::from_slice(&bytes).is_ok(), "the file cannot be opened"),
+            Err(e) => assert!(!e.to_string().contains('\n'), "{e}"),
         }
     }
 }

@@ -113,7 +113,7 @@ fn every_trouble_has_its_verdict_and_its_remedy() {
         ("disk", |f| f.disk = disk(1 << 40, 7e6), Verdict::Warn, "writes 7 MB/s", "another disk"),
         ("disk", |f| f.disk = disk(200_000_000, 2e8), Verdict::Fail, "0.2 GB free", "free some space"),
         ("disk", |f| f.disk = disk(10_000_000_000, 2e8), Verdict::Warn, "42 min of film", "free some space"),
-        ("processor", |f| f.load.frames_per_s = 29.0, Verdict::Fail, "tracks 29 frames of 1280x720", "sbc.toml"),
+        ("processor", |f| f.load.frames_per_s = 29.0, Verdict::Fail, "tracks 29.0 frames of 1280x720", "sbc.toml"),
         ("processor", |f| f.load.frames_per_s = 40.0, Verdict::Warn, "30 are asked", "sbc.toml"),
         ("processor", |f| f.load.celsius = Some(84.0), Verdict::Warn, "84 °C", "cool"),
         ("processor", |f| f.load.clock_share = Some(0.6), Verdict::Warn, "held down", "power supply"),

@@ -162,7 +162,7 @@ fn another_shape_keeps_what_was_measured() {
     names.dedup();
     assert_eq!(names.len(), rows.len(), "no two nodes have one name");
     let motion = fs::read_to_string(out.join("motion.csv")).expect("motion");
-    assert_eq!(motion.lines().count(), 1 + 61 * rows.len());
+    assert_eq!(motion.lines().count(), 1 + 330 * rows.len(), "the whole film, as in tracks.csv");
     // The nodes are where they were in the picture.
     let first: u64 = motion.lines().nth(1).expect("row").split(',').next().expect("frame").parse().expect("frame");
     let pose = read.poses.iter().find(|p| p.frame == first).expect("pose");
@@ -173,11 +173,40 @@ fn another_shape_keeps_what_was_measured() {
     }
 }
 
+/// The tables of a tree that was cut join: no point is on a branch that is not there.
+#[test]
+fn points_of_branches_that_were_cut_are_on_none() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let read = Captured::read(made(), 1.0).expect("capture");
+    let size = read.skeleton.image_size;
+    // The right half of the picture, from the trunk on.
+    let trunk_u = read.skeleton.foot_px[0].min(read.skeleton.image_from_model(&read.skeleton.nodes[1].position)[0]);
+    let half = image::RgbaImage::from_fn(size.width, size.height, |u, _| {
+        image::Rgba([0, 0, 0, if f64::from(u) > trunk_u - 3.0 { 255 } else { 0 }])
+    });
+    let shape = dir.path().join("half.png");
+    half.save(&shape).expect("PNG");
+    let out = dir.path().join("tables");
+    let output = export(made(), "csv", &out, &["--envelope", shape.to_str().expect("path"), "--animation-s", "1"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let column = |dir: &Path, name: &str, c: usize| -> Vec<String> {
+        let text = fs::read_to_string(dir.join(name)).expect(name);
+        text.lines().skip(1).map(|l| l.split(',').nth(c).expect("cell").to_owned()).collect()
+    };
+    let nodes = column(&out, "nodes.csv", 0);
+    let (before, after) = (column(made(), "tracks.csv", 5), column(&out, "tracks.csv", 5));
+    assert_eq!(before.len(), after.len());
+    let gone = before.iter().zip(&after).filter(|(b, a)| !b.is_empty() && a.is_empty()).count();
+    assert!(gone > 0 && after.iter().all(|n| n.is_empty() || nodes.contains(n)), "{gone} rows without a node");
+    assert!(before.iter().zip(&after).all(|(b, a)| a.is_empty() || a == b));
+    assert_eq!(column(&out, "motion.csv", 0).len(), 330 * nodes.len());
+}
+
 #[test]
 fn settings_go_file_over_capture_and_command_line_over_file() {
     let dir = tempfile::tempdir().expect("tempdir");
     let file = dir.path().join("metres.toml");
-    fs::write(&file, "[export]\nmetres_per_px = 0.5\nanimation_s = 1.0\n").expect("write");
+    fs::write(&file, "[export]\nmetres_per_px = 0.5\n[shape]\nplanes = 1\n").expect("write");
     let (_dir, out) = exported("csv", "tables", &["--config", file.to_str().expect("path"), "--metres-per-px", "0.01"]);
     let at = |path: PathBuf| {
         let text = fs::read_to_string(path).expect("nodes");
@@ -185,9 +214,8 @@ fn settings_go_file_over_capture_and_command_line_over_file() {
     };
     let (m, px) = (at(out.join("nodes.csv")), at(made().join("nodes.csv")));
     assert!((m / px - 0.01).abs() < 1e-5, "{m} m of {px} px");
-    let rows = fs::read_to_string(out.join("motion.csv")).expect("motion").lines().count();
     let nodes = fs::read_to_string(out.join("nodes.csv")).expect("nodes").lines().count() - 1;
-    assert_eq!(rows, 1 + 31 * nodes, "one second of film");
+    assert_eq!(nodes, Captured::read(made(), 1.0).expect("capture").skeleton.measured(), "no copies");
 }
 
 /// Arguments after `export` ({c} the capture, {w} a folder to write to), status, what the line must say.
@@ -284,5 +312,108 @@ fn bad_input_gets_one_line_and_leaves_nothing() {
         assert_eq!(lines.len(), 1, "{words}: {told}");
         assert_eq!(names_in(work), before, "{words}");
         assert_eq!(fs::read_to_string(work.join("there")).expect("mine"), "mine");
+    }
+}
+
+/// A capture of `nodes` nodes, each on the one that `parent` says, with a film of two frames.
+fn large(dir: &Path, nodes: usize, parent: impl Fn(usize) -> usize) {
+    fs::create_dir(dir).expect("folder");
+    let text = fs::read_to_string(made().join("capture.json")).expect("note");
+    let mut note: serde_json::Value = serde_json::from_str(&text).expect("json");
+    note["model"]["copied"] = serde_json::json!([]);
+    fs::write(dir.join("capture.json"), note.to_string()).expect("write");
+    fs::write(dir.join("tracks.csv"), "track_id,frame,time_s,u_px,v_px,node_id\n").expect("write");
+    let head = fs::read_to_string(made().join("nodes.csv")).expect("nodes");
+    let mut table = vec![head.lines().next().expect("header").to_owned()];
+    let mut motion = vec!["frame,time_s,node_id,x,y,z,u_px,v_px".to_owned()];
+    let mut levels: Vec<u32> = Vec::new();
+    for i in 0..nodes {
+        let above = if i == 0 { String::new() } else { parent(i).to_string() };
+        levels.push(if i == 0 { 0 } else { levels[parent(i)] + 1 });
+        let (x, y) = (i % 400, i / 400 + if i == 0 { 0 } else { 50 });
+        table.push(format!("{i},{above},{},1,0,0,{x},{y},{},1,,,,,,,false", levels[i], i % 100));
+        motion.push(format!("0,0,{i},{x},{y},{},0,0", i % 100));
+    }
+    fs::write(dir.join("nodes.csv"), table.join("\n") + "\n").expect("write");
+    fs::write(dir.join("motion.csv"), motion.join("\n") + "\n").expect("write");
+}
+
+/// As many nodes as a model can have are a matter of seconds, or are refused: never one of hours.
+#[test]
+fn as_many_nodes_as_can_be_are_exported_or_refused() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let (bush, chain) = (dir.path().join("bush"), dir.path().join("chain"));
+    large(&bush, 1 << 16, |i| if i == 1 { 0 } else { 1 + (i - 2) / 3 });
+    large(&chain, 1 << 16, |i| i - 1);
+    let told = |output: &Output| String::from_utf8_lossy(&output.stderr).into_owned();
+    let plain = export(&bush, "glb", &dir.path().join("bush.glb"), &["--triangles", "10000"]);
+    assert!(plain.status.success(), "{}", told(&plain));
+    for more in [&["--planes", "1"][..], &["--envelope", "docs/shapes/heart.png"]] {
+        let reshaped = export(&bush, "glb", &dir.path().join("other.glb"), more);
+        assert_eq!(reshaped.status.code(), Some(FAILED), "{}", told(&reshaped));
+        assert!(told(&reshaped).contains("at most 4096 can be given one; take fewer"), "{}", told(&reshaped));
+    }
+    let deep = export(&chain, "glb", &dir.path().join("chain.glb"), &[]);
+    assert_eq!(deep.status.code(), Some(NO_INPUT), "{}", told(&deep));
+    assert!(told(&deep).contains("line 258: it has more levels than any tree"), "{}", told(&deep));
+}
+
+/// Ctrl-C while an export is worked out and while it is written: nothing is left, and the shell can tell.
+#[test]
+fn an_export_that_is_stopped_leaves_nothing() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let long = dir.path().join("long");
+    fs::create_dir(&long).expect("folder");
+    for file in fs::read_dir(made()).expect("capture").flatten() {
+        fs::copy(file.path(), long.join(file.file_name())).expect("copy");
+    }
+    // So many frames that writing them takes a while.
+    let text = fs::read_to_string(made().join("motion.csv")).expect("motion");
+    let (head, rows) = text.split_once('\n').expect("header");
+    let mut motion = head.to_owned() + "\n";
+    for round in 0..40 {
+        for row in rows.lines() {
+            let (frame, rest) = row.split_once(',').expect("cells");
+            let (time_s, rest) = rest.split_once(',').expect("cells");
+            let frame: u64 = frame.parse().expect("frame");
+            let time_s: f64 = time_s.parse().expect("time");
+            motion += &format!("{},{:.6},{rest}\n", frame + 330 * round, time_s + 11.0 * round as f64);
+        }
+    }
+    fs::write(long.join("motion.csv"), motion).expect("write");
+    // Before it is read: whoever opens the other end of the pipe knows that the program is there.
+    let waiting = dir.path().join("waiting");
+    fs::create_dir(&waiting).expect("folder");
+    let pipe = waiting.join("capture.json");
+    assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo").success());
+    let out = dir.path().join("out");
+    let cases: [(&str, &Path, &[&str]); 3] = [
+        ("INT", &long, &["--format", "csv", "--planes", "2"]),
+        ("TERM", &long, &["--format", "csv", "--metres-per-px", "0.01"]),
+        ("INT", &waiting, &["--format", "glb"]),
+    ];
+    for (signal, capture, more) in cases {
+        fs::create_dir(&out).expect("folder");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
+        command.arg("export").arg(capture).args(more).arg("--out").arg(out.join("it"));
+        let mut child = command.stderr(std::process::Stdio::piped()).spawn().expect("arborcam");
+        let mut held = None;
+        if capture == waiting {
+            held = Some(fs::OpenOptions::new().write(true).open(&pipe).expect("pipe"));
+        } else {
+            while !names_in(&out).iter().any(|n| n.contains("partial")) {
+                assert!(child.try_wait().expect("status").is_none(), "it was over before it was stopped");
+                std::thread::sleep(std::time::Duration::from_millis(2));
+            }
+        }
+        let sent = Command::new("kill").args(["-s", signal, &child.id().to_string()]).status();
+        assert!(sent.expect("kill").success());
+        let output = child.wait_with_output().expect("end");
+        drop(held);
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(130), "{signal} {more:?}: {told}");
+        assert_eq!(names_in(&out), [""; 0], "{signal} {more:?}");
+        assert_eq!(told, "", "{signal} {more:?}");
+        fs::remove_dir(&out).expect("empty");
     }
 }

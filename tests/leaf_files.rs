@@ -79,11 +79,30 @@ fn what_is_no_leaf_is_refused_in_one_line() {
         gltf["bufferViews"].as_array_mut().expect("views").push(view);
         gltf["accessors"][1] = json!({"bufferView": 3, "componentType": 5121, "count": 18_000, "type": "SCALAR"});
     };
+    // Small files that ask for much: the same data or the same mesh again and again.
+    let again = |gltf: &mut Value, _: &mut Vec<u8>| gltf["buffers"] = vec![gltf["buffers"][0].clone(); 400_000].into();
+    let doubled = |gltf: &mut Value, _: &mut Vec<u8>| {
+        let primitive = gltf["meshes"][0]["primitives"][0].clone();
+        gltf["meshes"][0]["primitives"] = vec![primitive; 30_000].into();
+    };
+    let unused = |gltf: &mut Value, bin: &mut Vec<u8>| {
+        let start = bin.len();
+        bin.resize(start + 12 * 70_000, 0);
+        gltf["buffers"][0]["byteLength"] = bin.len().into();
+        gltf["bufferViews"][0] = json!({"buffer": 0, "byteOffset": start, "byteLength": 12 * 70_000});
+        gltf["accessors"][0]["count"] = 70_000.into();
+    };
     let cases: Vec<(&str, Vec<u8>, &str)> = vec![
+        ("bare_image.glb", glb(|g, _| g["images"] = json!([{"bufferView": 2}])), "an image in it has no data"),
+        ("no_image.glb", glb(|g, _| g["images"] = json!([{}])), "an image in it has no data"),
+        ("again.glb", glb(again), "three times that in all"),
+        ("doubled.glb", glb(doubled), "triangles, and at most 5000"),
+        ("unused.glb", glb(unused), "70000 vertices, and at most 65536"),
+        ("pipe.glb", glb(|g, _| g["buffers"][0]["uri"] = "fifo".into()), "not a file beside it"),
         ("text.glb", b"this is no model".to_vec(), "no glTF"),
         ("empty.glb", Vec::new(), "no glTF"),
         ("cut.glb", glb(|_, _| {})[..200].to_vec(), "no glTF"),
-        ("huge.glb", vec![0; 17 << 20], "at most 16777216 are taken"),
+        ("huge.glb", vec![0; 17 << 20], "at most 16777216 bytes are taken"),
         ("many.glb", glb(many), "6000 triangles"),
         ("bare.glb", glb(|g, _| g["nodes"][0] = json!({})), "no mesh"),
         ("lines.glb", glb(|g, _| g["meshes"][0]["primitives"][0]["mode"] = 1.into()), "no mesh"),
@@ -97,6 +116,8 @@ fn what_is_no_leaf_is_refused_in_one_line() {
         ("away.glb", glb(|g, _| g["buffers"][0]["uri"] = "http://a.b/c".into()), "not a file beside it"),
         ("sparse.glb", glb(|g, _| g["accessors"][0]["bufferView"] = Value::Null), ""),
     ];
+    let fifo = folder.path().join("fifo");
+    assert!(std::process::Command::new("mkfifo").arg(&fifo).status().expect("mkfifo").success());
     for (name, bytes, says) in cases {
         let message = read_template(&written(folder.path(), name, &bytes)).expect_err(name).to_string();
         assert!(message.contains(name) && message.contains(says), "{name}: {message}");
@@ -104,16 +125,19 @@ fn what_is_no_leaf_is_refused_in_one_line() {
     }
     let absent = read_template(&folder.path().join("none.glb"));
     assert!(matches!(absent, Err(TemplateError::Unreadable { .. })));
+    // A device has no length, and no end.
+    assert!(matches!(read_template(Path::new("/dev/zero")), Err(TemplateError::TooLarge { .. })));
 }
 
-/// Nodes that are their own ancestors must not be followed for ever.
+/// Nodes that are their own ancestors must not be followed for ever: each is taken once.
 #[test]
 fn nodes_in_a_ring_end() {
     let folder = tempfile::tempdir().expect("folder");
     let ring = glb(|g, _| {
         g["nodes"] = json!([{"mesh": 0, "children": [1]}, {"children": [0]}]);
     });
-    let _ = read_template(&written(folder.path(), "ring.glb", &ring));
+    let template = read_template(&written(folder.path(), "ring.glb", &ring)).expect("a template");
+    assert_eq!(template.triangles(), 2);
 }
 
 #[test]

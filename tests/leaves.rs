@@ -431,3 +431,34 @@ fn posed_clip(clip: &Path, outline: &Path) -> (Skeleton, Pose, Rgb, Outline) {
     let picture = Rgb { size: frames[0].size, pixels: colour.into_raw() };
     (Skeleton::clone(&tree.skeleton), pose, picture, outline)
 }
+
+/// Leaves that the user asks for on a bare tree hang on it as it is; only a picture in leaf says where no wood can be.
+#[test]
+fn leaves_on_a_bare_tree_cost_it_no_wood() {
+    let bare = still(false);
+    let seen = Seen { picture: Some(&bare.picture), outline: Some(&bare.outline), ..Seen::default() };
+    let with = |show: LeafShow| {
+        let config = Config { leaves: Leaves { show, ..Leaves::default() }, ..Config::default() };
+        dress(&bare.skeleton, seen, &config)
+    };
+    let (off, on) = (with(LeafShow::Off), with(LeafShow::On));
+    assert!(off.limbs.len() > 100 && off.limbs == on.limbs, "{} limbs, {}", off.limbs.len(), on.limbs.len());
+}
+
+/// A density painted over the whole picture fills the crown, not the air and the ground about it.
+#[test]
+fn a_drawn_density_does_not_leave_the_outline() {
+    let film = still(true);
+    let white = Luma { size: SIZE, pixels: vec![255; SIZE.area()] };
+    let seen =
+        Seen { picture: Some(&film.picture), outline: Some(&film.outline), density: Some(&white), ..Seen::default() };
+    let leaves = dress(&film.skeleton, seen, &Config::default()).foliage;
+    let (covered, width) = leaf_cover(&leaves, &film.skeleton, None);
+    assert_eq!(width, SIZE.width as usize);
+    let (mut inside, mut outside) = (0.0, 0.0);
+    for (c, m) in covered.iter().zip(&film.outline.mask) {
+        *(if *m == 0 { &mut outside } else { &mut inside }) += c;
+    }
+    // Leaves at the border stick out by half their size.
+    assert!(inside > 5.0 * outside, "{inside} pixels inside, {outside} outside");
+}

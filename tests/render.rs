@@ -164,7 +164,7 @@ fn bad_input_gets_one_line() {
         (&[good, "--out", &new, "--size", "0x480"], 2, "as 640x480"),
         (&[good, "--out", &new, "--size", "640x99999"], 2, "as 640x480"),
         (&[good, "--out", &new, "--size", "large"], 2, "as 640x480"),
-        (&[good, "--out", &new, "--at", "500"], 2, "give --at between"),
+        (&[good, "--out", &new, "--at", "500"], 2, "give less with --at"),
         (&[good, "--out", &new, "--at", "nan"], 2, "number of seconds"),
         (&[good, "--out", &new, "--background", "#12345é"], 2, "#rrggbb"),
         (&[good, "--out", &new, "--seconds", "2"], 2, "--at"),
@@ -172,6 +172,7 @@ fn bad_input_gets_one_line() {
         (&[good, "--out", &video, "--seconds", "1e9"], 2, "give less"),
         (&[good, "--out", &video, "--fps", "0"], 2, "1 to 120"),
         (&[good, "--out", &new, "--film", "behind", "--view", "side"], 2, "--film beside"),
+        (&[good, "--out", &new, "--film", "behind", "--at", "5"], 2, "leave out --at"),
         (&[good, "--out", "/proc/a.png"], 1, "/proc/a.png"),
     ];
     for (arguments, status, told) in cases {
@@ -191,6 +192,24 @@ fn bad_input_gets_one_line() {
     left.sort();
     assert_eq!(left, ["empty", "old", "spoilt", "there.png"]);
     assert_eq!(fs::read(&there).unwrap(), b"mine");
+}
+
+/// Ctrl-C in the middle of a video: nothing is left of it, and the shell can tell.
+#[test]
+fn a_video_that_is_stopped_leaves_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("a.mp4");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
+    command.args(["render", capture(), "--pose", "rest", "--view", "turntable", "--seconds", "100", "--out"]).arg(&out);
+    let mut child = command.stderr(std::process::Stdio::piped()).spawn().unwrap();
+    while fs::read_dir(dir.path()).unwrap().count() == 0 {
+        assert!(child.try_wait().unwrap().is_none(), "it was over before it was stopped");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    assert!(Command::new("kill").args(["-s", "INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!((output.status.code(), String::from_utf8_lossy(&output.stderr).as_ref()), (Some(130), ""));
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
 }
 
 /// Without ffmpeg a picture is still drawn, and a video says what to install.

@@ -18,7 +18,9 @@ fn the_tree_is_as_full_as_by_the_envelope_alone_and_as_plausible_as_by_the_angle
     let others = [(5, 1, 0.4), (6, 2, 0.5), (5, 3, 0.1)]
         .map(|(levels, seed, wild)| Flat { name: "another", ..Flat::generated_by(levels, seed, wild) });
     for tree in Flat::all().into_iter().chain(others) {
-        let figures = PushFigures::of(&tree.nodes, &tree.tracks, &tree.outline, &config::Shape::default());
+        let settings = config::Shape::default();
+        let built = build(&tree, &settings);
+        let figures = PushFigures::of(&built, &tree.nodes, &tree.tracks, &tree.outline, &settings);
         let (filling, plausibility) = (figures.filling(), figures.plausibility());
         println!("{}: filling {filling:.3}, plausibility {plausibility:.3}\n{figures:?}", tree.name);
         let wanted = if tree.name == "another" { 0.9 } else { 0.95 };

@@ -5,7 +5,8 @@ mod support;
 mod trees;
 
 use arborcam::config::{self, Config};
-use arborcam::model::{JointPose, NodeId, Outline, Pose, Size, Skeleton};
+use arborcam::draw;
+use arborcam::model::{JointPose, NodeId, Outline, Pose, Rgb, Size, Skeleton};
 use arborcam::pipeline::{Seen, cut_to, dress};
 use arborcam::shape::{self, Drawn, Topiary, TopiaryError};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -107,6 +108,46 @@ fn what_is_outside_is_cut_at_the_border_with_all_that_grows_from_it() {
     assert!(at_border.clone().all(|i| children[i].iter().all(|c| c.index() >= skeleton.measured())));
 }
 
+/// A damaged capture may call a branch trunk, or a copy of one that is cut: what hangs in the air goes as well, and no branch
+/// gets the number of one that is gone.
+#[test]
+fn what_is_called_trunk_goes_with_its_parent() {
+    let tree = Flat::generated(5);
+    let half = on_picture(tree.outline.size, |u, v| u >= 300 && tree.outline.contains(u.into(), v.into()));
+    let half = Drawn::of_rgba(tree.outline.size, &half).expect("shape");
+    let whole = model(&tree);
+    let mut damaged = whole.clone();
+    let outside = |i: usize| whole.nodes[i].level >= 2 && whole.image_from_model(&whole.nodes[i].position)[0] < 298.0;
+    let hanging = (2..whole.nodes.len()).filter(|&i| whole.nodes[i].parent.is_some_and(|p| outside(p.index())));
+    let hanging: Vec<usize> = hanging.collect();
+    assert!(hanging.len() > 10);
+    hanging.into_iter().for_each(|i| damaged.nodes[i].level = 1);
+    for whole in [whole, damaged] {
+        let cut = shape::topiary(&whole, &tree.outline, &half, &config::Shape::default(), SEED).expect("a tree");
+        let nodes = &cut.skeleton.nodes;
+        for (i, node) in nodes.iter().enumerate().skip(1) {
+            assert!(node.parent.is_some_and(|p| p.index() < i), "node {i}: {node:?}");
+            assert!(node.copy_of.is_none_or(|of| of.index() < nodes.len()), "node {i}: {node:?}");
+        }
+        let before: std::collections::BTreeSet<_> = whole.nodes.iter().map(|n| n.name).collect();
+        let grown = &nodes[nodes.len() - cut.cut.grown..];
+        assert!(cut.cut.gone > 10 && !grown.is_empty(), "{:?}", cut.cut);
+        assert!(grown.iter().all(|n| !before.contains(&n.name)));
+        assert_eq!(cut.pose(&whole, &pose(&whole, 0.2)).joints.len(), nodes.len());
+    }
+}
+
+/// Numbers that are used up must not begin again at 0, where the trunk is.
+#[test]
+fn names_that_are_used_up_are_not_given_again() {
+    let tree = Flat::generated(5);
+    let mut whole = model(&tree);
+    whole.nodes.last_mut().expect("a node").name.0 = u32::MAX - 3;
+    let cut = shape::topiary(&whole, &tree.outline, &drawn("heart"), &config::Shape::default(), SEED).expect("a tree");
+    let names: std::collections::BTreeSet<_> = cut.skeleton.nodes.iter().map(|n| n.name).collect();
+    assert_eq!((names.len(), cut.cut.grown), (cut.skeleton.nodes.len(), 3));
+}
+
 /// Every branch of the whole tree swings by its own angle; those of the cut one swing with them.
 #[test]
 fn the_cut_tree_moves_as_the_measured_one_does() {
@@ -189,6 +230,45 @@ fn a_tree_of_next_to_nothing_is_cut_all_the_same() {
 }
 
 /// A twig beside the shape is seen at once: the tree was cut, or pushed, to fill it.
+/// What is seen in the end: the shape, full of leaves and wood.
+#[test]
+fn a_shape_is_full_in_the_picture_that_is_drawn_of_it() {
+    let mut config = Config::default();
+    config.leaves.show = config::LeafShow::On;
+    for tree in Flat::all() {
+        for name in SHAPES {
+            let topiary = cut(&tree, &drawn(name)).expect(name);
+            let (skeleton, shape) = (&topiary.skeleton, &topiary.shape);
+            let seen = Seen { outline: Some(&tree.outline), cut_to: Some(shape), ..Seen::default() };
+            let dressed = dress(skeleton, seen, &config);
+            let model = draw::Model {
+                foliage: &dressed.foliage,
+                leaf: dressed.foliage.texture.as_ref().and_then(|(_, bytes)| draw::Texture::read(bytes)),
+                ..draw::Model::bare(skeleton, &dressed.wood[0], dressed.bark_rgb)
+            };
+            let camera = draw::Camera::of_film(skeleton, shape.size);
+            let picture = draw::picture(&model.posed(None, &[]), &camera, &draw::Look::default());
+            let inside: Vec<bool> = shape.mask.iter().map(|&m| m != 0).collect();
+            let opaque = picture.pixels.chunks_exact(4).map(|p| p[3] > 127);
+            let filled = opaque.zip(&inside).filter(|(drawn, inside)| *drawn && **inside).count();
+            let share = filled as f64 / inside.iter().filter(|i| **i).count() as f64;
+            println!("{} {name}: {share:.3} of the pixels", tree.name);
+            assert!(share >= 0.85, "{} {name}: {share:.3} of the pixels", tree.name);
+        }
+    }
+}
+
+/// The shape says how far a tree goes, not whether it is in leaf: that is asked of the film.
+#[test]
+fn a_tree_that_was_filmed_bare_is_bare_in_its_shape() {
+    let tree = Flat::generated(5);
+    let topiary = cut(&tree, &drawn("heart")).expect("heart");
+    let grey = Rgb { size: tree.outline.size, pixels: vec![128; 3 * tree.outline.size.area()] };
+    let seen =
+        Seen { picture: Some(&grey), outline: Some(&tree.outline), cut_to: Some(&topiary.shape), ..Seen::default() };
+    assert!(dress(&topiary.skeleton, seen, &Config::default()).foliage.groups.is_empty());
+}
+
 #[test]
 fn twigs_keep_to_the_shape_that_the_tree_was_made_to_fill() {
     let tree = &Flat::all()[0];
@@ -200,7 +280,7 @@ fn twigs_keep_to_the_shape_that_the_tree_was_made_to_fill() {
     };
     for name in ["heart", "vase"] {
         let cut = cut_to(&whole, &tree.outline, &drawn(name), &config).expect(name);
-        let seen = Seen { outline: Some(&cut.shape), cut: true, ..Seen::default() };
+        let seen = Seen { outline: Some(&tree.outline), cut_to: Some(&cut.shape), ..Seen::default() };
         let envelope = shape::Envelope::of_drawn(&cut.shape, cut.skeleton.foot_px);
         let ends = twig_ends(&cut.skeleton, seen, &config);
         assert!(ends.len() > 100 && ends.iter().all(|end| envelope.contains(end)), "{name}");

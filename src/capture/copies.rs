@@ -28,8 +28,9 @@ pub(super) fn mark(skeleton: &mut Skeleton, copied: &[Copied], joints: Option<&[
             unfit += 1;
             continue;
         };
-        // A copy of a copy, or of what comes after it, could not be posed.
-        if original >= node || original.0 == 0 || skeleton.nodes[original.index()].copy_of.is_some() {
+        let (copy, of) = (&skeleton.nodes[node.index()], &skeleton.nodes[original.index()]);
+        // A copy of a copy, or of what comes after it, could not be posed; one of another level is none.
+        if original >= node || original.0 == 0 || of.copy_of.is_some() || copy.level != of.level {
             unfit += 1;
             continue;
         }

@@ -9,18 +9,22 @@ mod table;
 pub use error::CaptureError;
 
 use crate::config::Config;
-use crate::export::capture::{Capture, PictureNote, SCHEMA_VERSION};
+use crate::export::capture::{Capture, ModelNote, PictureNote, SCHEMA_VERSION};
 use crate::export::csv::Sway;
 use crate::export::glb_notes;
-use crate::model::{Outline, Picture, Pose, Rgb, Size, Skeleton};
+use crate::model::{JointPose, Outline, Picture, Pose, Rgb, Size, Skeleton};
 use crate::motion::PoseEstimator;
 use crate::outline;
+use motion::Postures;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// A picture wider or higher than this is not believed, px.
 const LARGEST_SIDE: u32 = 16384;
+
+/// The trunk's foot is not believed to be so many picture sizes away from the picture's corner.
+const FARTHEST_FOOT: f64 = 4.0;
 
 /// A capture that has been read.
 #[derive(Clone, Debug)]
@@ -81,6 +85,11 @@ impl Captured {
         {
             return Err(bad("metres_per_px or foot_px is no number".into()));
         }
+        let sides = [note.source.width, note.source.height].map(f64::from);
+        let far = |m: &ModelNote| m.foot_px.iter().zip(sides).any(|(x, side)| x.abs() > FARTHEST_FOOT * side);
+        if note.model.as_ref().is_some_and(far) {
+            return Err(bad("foot_px is far from the picture".into()));
+        }
         Ok(note)
     }
 
@@ -104,7 +113,7 @@ impl Captured {
         let estimator = PoseEstimator::new(skeleton.clone(), &note.config.motion);
         let pictured = note.picture.as_ref().map(|p| p.frame);
         let (poses, pose_in_picture) =
-            motion::read(dir, &skeleton, &estimator, (model.metres_per_px, animation_s), pictured)?;
+            motion::read(Postures::open(dir, &skeleton, model.metres_per_px)?, &estimator, animation_s, pictured)?;
         let picture = match note.picture.as_ref().map(|p| picture(dir, p, size)) {
             Some(Ok(picture)) => Some(picture),
             Some(Err(why)) => {
@@ -128,15 +137,37 @@ impl Captured {
         Ok(Self { dir, note, skeleton, sway, poses, picture, pose_in_picture, outline, warnings })
     }
 
-    /// `poses` of this tree as those of another whose measured nodes are the same, e.g. one of another shape: its nodes
-    /// follow the same places in the picture.
-    pub fn reposed(&self, skeleton: &Arc<Skeleton>, config: &Config, poses: &[Pose]) -> Vec<Pose> {
+    /// All poses of the film in their order, read anew, one at a time: those of hours would fill the memory.
+    ///
+    /// # Errors
+    /// `motion.csv` is missing or damaged; after an error the film is over.
+    pub fn film(&self) -> Result<impl Iterator<Item = Result<Pose, CaptureError>>, CaptureError> {
+        let metres_per_px = self.note.model.as_ref().map_or(0.0, |m| m.metres_per_px);
+        let mut postures = Postures::open(&self.dir, &self.skeleton, metres_per_px)?;
+        let estimator = PoseEstimator::new(self.skeleton.clone(), &self.note.config.motion);
+        let mut over = false;
+        Ok(std::iter::from_fn(move || {
+            let next = if over { Ok(None) } else { postures.next() };
+            over |= next.is_err();
+            next.map(|posture| posture.map(|p| p.pose(&estimator))).transpose()
+        }))
+    }
+
+    /// Poses of this tree, in the order in which the result is given them, as those of another tree whose measured nodes
+    /// are the same, e.g. one of another shape: its nodes follow the same places in the picture.
+    pub fn reposer<'a>(&'a self, skeleton: &Arc<Skeleton>, config: &Config) -> impl FnMut(&Pose) -> Pose + use<'a> {
         let mut estimator = PoseEstimator::new(skeleton.clone(), &config.motion);
         let measured = self.skeleton.measured().min(skeleton.measured());
-        let targets = |pose: &Pose| -> Vec<Option<[f64; 2]>> {
-            pose.joints[..measured].iter().map(|j| Some(self.skeleton.image_from_model(&j.position))).collect()
-        };
-        poses.iter().map(|pose| estimator.step(pose.frame, pose.time_s, &targets(pose))).collect()
+        move |pose| {
+            let place = |j: &JointPose| Some(self.skeleton.image_from_model(&j.position));
+            let targets: Vec<Option<[f64; 2]>> = pose.joints[..measured].iter().map(place).collect();
+            estimator.step(pose.frame, pose.time_s, &targets)
+        }
+    }
+
+    /// `poses` by a [`reposer`](Self::reposer) of their own.
+    pub fn reposed(&self, skeleton: &Arc<Skeleton>, config: &Config, poses: &[Pose]) -> Vec<Pose> {
+        poses.iter().map(self.reposer(skeleton, config)).collect()
     }
 }
 

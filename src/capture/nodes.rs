@@ -5,18 +5,19 @@ use super::table::Table;
 use crate::export::capture::ModelNote;
 use crate::export::csv::Sway;
 use crate::model::{Node, NodeId, NodeName, Size, Skeleton};
-use nalgebra::Point3;
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Joints of a skin are numbered with two bytes.
 const MOST_NODES: usize = 1 << 16;
+/// Nodes that a later change adds get numbers above those there are.
+const LARGEST_NAME: u32 = u32::MAX / 2;
 const COLUMNS: [&str; 8] = ["node_id", "parent_id", "level", "n_tracks", "x", "y", "z", "radius"];
 
 /// The nodes in their order, none of them a copy yet, and how each sways, where that is known.
 ///
 /// # Errors
-/// The table is missing or damaged; two nodes have one number, or one stands before its parent.
+/// The table is missing or damaged; two nodes have one number, or one stands before its parent, or not one level above it.
 pub(super) fn read(
     dir: &Path,
     note: &ModelNote,
@@ -31,7 +32,7 @@ pub(super) fn read(
     let mut by_name: BTreeMap<u32, NodeId> = BTreeMap::new();
     while table.next()? {
         let name: u32 = table.whole(0, "node_id")?;
-        let parent = match table.cell(1) {
+        let parent: Option<NodeId> = match table.cell(1) {
             "" => None,
             _ => {
                 let parent: u32 = table.whole(1, "parent_id")?;
@@ -46,17 +47,26 @@ pub(super) fn read(
         if nodes.len() >= MOST_NODES {
             return Err(table.bad(format!("there are more than {MOST_NODES} nodes")));
         }
+        if name > LARGEST_NAME {
+            return Err(table.bad(format!("node_id is {name}, and at most {LARGEST_NAME} can be")));
+        }
+        let level: u32 = table.whole(2, "level")?;
+        let expected = parent.map_or(0, |p| u32::from(nodes[p.index()].level) + 1);
+        if level != expected {
+            return Err(table.bad(format!("level is {level}, and must be {expected} there")));
+        }
+        let level = u8::try_from(level).map_err(|_| table.bad("it has more levels than any tree"))?;
         if by_name.insert(name, NodeId(nodes.len() as u32)).is_some() {
             return Err(table.bad(format!("there are two nodes {name}")));
         }
-        let [x, y, z, radius] =
-            [table.number(4, "x")?, table.number(5, "y")?, table.number(6, "z")?, table.number(7, "radius")?];
+        let position = table.place_px([4, 5, 6], px)?;
+        let radius = table.length_px(7, "radius", px)?;
         nodes.push(Node {
             name: NodeName(name),
             parent,
-            level: table.whole(2, "level")?,
-            position: Point3::new(x, y, z) * px,
-            radius: radius.max(0.0) * px,
+            level,
+            position,
+            radius: radius.max(0.0),
             n_tracks: table.whole(3, "n_tracks")?,
             certainty: 0.0,
             copy_of: None,

@@ -1,7 +1,9 @@
 //! A CSV file row by row, its cells by the names of their columns: later versions may add columns.
 
 use super::CaptureError;
+use crate::model::FARTHEST_PX;
 use csv::{ErrorKind, Position, Reader, ReaderBuilder, StringRecord};
+use nalgebra::Point3;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -74,6 +76,26 @@ impl<const N: usize> Table<N> {
     pub fn number(&self, i: usize, name: &str) -> Result<f64, CaptureError> {
         let number = self.cell(i).parse().ok().filter(|x: &f64| x.is_finite() && x.abs() < 1e12);
         number.ok_or_else(|| self.bad(format!("{name} is {:?}, and must be a number", self.cell(i))))
+    }
+
+    /// A length of the model in pixels, `px` of them to the file's unit.
+    ///
+    /// # Errors
+    /// The cell holds no number, or one that no tree reaches.
+    pub fn length_px(&self, i: usize, name: &str, px: f64) -> Result<f64, CaptureError> {
+        let length_px = self.number(i, name)? * px;
+        if length_px.abs() <= FARTHEST_PX {
+            return Ok(length_px);
+        }
+        Err(self.bad(format!("{name} is {:?}, which is {length_px:.0} px; no tree is so large", self.cell(i))))
+    }
+
+    /// A place in model axes, px, from the columns of its x, y and z.
+    ///
+    /// # Errors
+    /// As of [`Table::length_px`].
+    pub fn place_px(&self, [x, y, z]: [usize; 3], px: f64) -> Result<Point3<f64>, CaptureError> {
+        Ok(Point3::new(self.length_px(x, "x", px)?, self.length_px(y, "y", px)?, self.length_px(z, "z", px)?))
     }
 
     /// What is wrong with the present row.

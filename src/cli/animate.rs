@@ -10,6 +10,7 @@ use super::hangup::Hangup;
 use super::render::{self, RenderArgs, drawn};
 use super::session::stop_on_signals;
 use super::shaping::Made;
+use super::stop::Stop;
 use super::{Ended, say};
 use crate::animate::{Animator, Known, Loudness, Magnify, Wind, magnify, place_to_pull};
 use crate::config::Config;
@@ -37,6 +38,7 @@ pub fn run(args: &AnimateArgs) -> Result<(), Ended> {
     if kind == Kind::Html {
         html::built_in().map_err(failed)?;
     }
+    let stop = Stop::on_signals()?;
     let sound = args.wav.as_deref().map(sound).transpose()?;
     let mut made = made(args)?;
     let (poses, what) = match args.magnify {
@@ -47,7 +49,7 @@ pub fn run(args: &AnimateArgs) -> Result<(), Ended> {
         None => blown(args, &made, sound)?,
     };
     made.animate(poses, args.looped, what);
-    write(args, out, kind, &made)
+    write(args, out, kind, &made, &stop)
 }
 
 /// On the terminal, until the user leaves.
@@ -191,7 +193,7 @@ fn metres_per_px(made: &Made) -> f64 {
     if given > 0.0 { given } else { made.config.wind.tree_height_m / height_px }
 }
 
-fn write(args: &AnimateArgs, out: &Path, kind: Kind, made: &Made) -> Result<(), Ended> {
+fn write(args: &AnimateArgs, out: &Path, kind: Kind, made: &Made, stop: &Stop) -> Result<(), Ended> {
     let part = |of: Option<&std::ffi::OsStr>| of.unwrap_or_default().to_string_lossy().into_owned();
     let (name, stem) = (part(out.file_name()), part(out.file_stem()));
     let model = made.model();
@@ -200,12 +202,12 @@ fn write(args: &AnimateArgs, out: &Path, kind: Kind, made: &Made) -> Result<(), 
         Kind::Gltf => gltf_files(&model, &stem).map(|(files, _)| files),
         Kind::Html => page(made, &model, &stem).map(|bytes| vec![(name, bytes)]),
         Kind::Csv => table(made).map(|bytes| vec![(name, bytes)]),
-        Kind::Video => return drawn(&picture(args, out), render::Kind::Video, made),
-        Kind::Picture => return drawn(&picture(args, out), render::Kind::Picture, made),
+        Kind::Video => return drawn(&picture(args, out), render::Kind::Video, made, stop),
+        Kind::Picture => return drawn(&picture(args, out), render::Kind::Picture, made, stop),
     };
     let files = files.map_err(failed)?;
     let size: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();
-    write_files(out.parent().unwrap_or(Path::new("")), &files).map_err(failed)?;
+    write_files(out.parent().unwrap_or(Path::new("")), &files, stop.while_writing()).map_err(failed)?;
     say(&format!("{}: {} poses, {:.1} MB", out.display(), made.poses.len(), size as f64 / 1e6));
     Ok(())
 }

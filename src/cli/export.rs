@@ -1,17 +1,21 @@
 //! `arborcam export DIR --format F --out PATH`: a capture's tree as a file for other programs.
 
 use super::shaping::{Made, Shaping};
+use super::stop::Stop;
 use super::{Ended, say};
 use crate::export::csv::{MotionCsv, nodes};
 use crate::export::cylinders::cylinders;
 use crate::export::gltf::{KEY_TOLERANCE_PX, Model, NamedBytes, glb, gltf_files};
 use crate::export::still::{obj_files, ply};
-use crate::export::{ExportError, OutputFolder, html, refuse_taken, write_files};
+use crate::export::{ExportError, OutputFolder, html, refuse_taken, tracks_of, write_files};
+use crate::model::NodeName;
 use crate::shape::cylinders as cylinders_of;
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
+use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 
 /// Where the data goes instead of into a file.
 const STDOUT: &str = "-";
@@ -59,6 +63,7 @@ pub fn run(args: &ExportArgs) -> Result<(), Ended> {
     if args.format == Format::Html {
         html::built_in().map_err(failed)?;
     }
+    let stop = Stop::on_signals()?;
     let made = args.shaping.made(&args.dir)?;
     for warning in &made.captured.warnings {
         say(&format!("arborcam: warning: {warning}"));
@@ -67,14 +72,14 @@ pub fn run(args: &ExportArgs) -> Result<(), Ended> {
     let metres_per_px = made.config.export.metres_per_px;
     let stem = target.stem();
     let files = match args.format {
-        Format::Csv => return tables(args, &made),
+        Format::Csv => return tables(args, &made, &stop),
         Format::Html => page(&made, &model, &stem).map(|bytes| vec![(target.name(), bytes)]),
         Format::Glb => glb(&model).map(|(bytes, _)| vec![(target.name(), bytes)]),
         Format::Gltf => gltf_files(&model, &stem).map(|(files, _)| files),
         Format::Obj => obj_files(&made.dressed, &stem, metres_per_px),
         Format::Ply => ply(&made.dressed, metres_per_px).map(|bytes| vec![(target.name(), bytes)]),
     };
-    target.write(files.map_err(failed)?)
+    target.write(files.map_err(failed)?, &stop)
 }
 
 /// The model as a page that shows it.
@@ -88,7 +93,10 @@ pub fn page(made: &Made, model: &Model, title: &str) -> Result<Vec<u8>, ExportEr
 }
 
 fn failed(e: ExportError) -> Ended {
-    Ended::Failed(e.into())
+    match e {
+        ExportError::Stopped => Ended::Stopped,
+        e => Ended::Failed(e.into()),
+    }
 }
 
 /// The file that was asked for; others may come beside it.
@@ -144,7 +152,7 @@ impl<'a> Target<'a> {
         }
     }
 
-    fn write(&self, files: Vec<NamedBytes>) -> Result<(), Ended> {
+    fn write(&self, files: Vec<NamedBytes>, stop: &Stop) -> Result<(), Ended> {
         match self {
             Self::Stdout => {
                 let mut out = std::io::stdout().lock();
@@ -153,7 +161,8 @@ impl<'a> Target<'a> {
             }
             Self::Beside(path) => {
                 let size: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();
-                write_files(path.parent().unwrap_or(Path::new("")), &files).map_err(failed)?;
+                let folder = path.parent().unwrap_or(Path::new(""));
+                write_files(folder, &files, stop.while_writing()).map_err(failed)?;
                 say(&format!("{}: {:.1} MB", path.display(), size as f64 / 1e6));
                 Ok(())
             }
@@ -162,26 +171,36 @@ impl<'a> Target<'a> {
 }
 
 /// The tables of the capture, as they are or of the changed tree, and the wood as cylinders.
-fn tables(args: &ExportArgs, made: &Made) -> Result<(), Ended> {
+fn tables(args: &ExportArgs, made: &Made, stop: &Stop) -> Result<(), Ended> {
+    let rows = cylinders_of(&made.dressed.limbs);
+    let stop = stop.while_writing();
     let folder = OutputFolder::create(&args.out).map_err(failed)?;
     let metres_per_px = made.config.export.metres_per_px;
-    let as_they_are = !made.reshaped && metres_per_px == made.captured.note.config.export.metres_per_px;
-    let rows = cylinders_of(&made.dressed.limbs);
-    let write = || -> Result<PathBuf, ExportError> {
-        folder.copy("tracks.csv", &args.dir)?;
-        if as_they_are {
-            folder.copy("nodes.csv", &args.dir)?;
-            folder.copy("motion.csv", &args.dir)?;
-        } else {
-            nodes(folder.file("nodes.csv")?, &made.skeleton, &made.sway, metres_per_px)?;
-            let mut motion = MotionCsv::new(folder.file("motion.csv")?, &made.skeleton, metres_per_px)?;
-            made.poses.iter().try_for_each(|pose| motion.pose(pose))?;
-            motion.finish()?;
+    let names: BTreeSet<NodeName> = made.skeleton.nodes.iter().map(|n| n.name).collect();
+    // Nothing was measured on copies.
+    if made.captured.skeleton.nodes.iter().all(|n| n.copy_of.is_some() || names.contains(&n.name)) {
+        folder.copy("tracks.csv", &args.dir, stop).map_err(failed)?;
+    } else {
+        tracks_of(&folder, &args.dir, &names, stop).map_err(failed)?;
+    }
+    if !made.reshaped && metres_per_px == made.captured.note.config.export.metres_per_px {
+        folder.copy("nodes.csv", &args.dir, stop).map_err(failed)?;
+        folder.copy("motion.csv", &args.dir, stop).map_err(failed)?;
+    } else {
+        let file = |name| folder.file(name).map_err(failed);
+        nodes(file("nodes.csv")?, &made.skeleton, &made.sway, metres_per_px).map_err(failed)?;
+        let mut motion = MotionCsv::new(file("motion.csv")?, &made.skeleton, metres_per_px).map_err(failed)?;
+        // Not only the poses of the animation: `tracks.csv` beside it is of the whole film.
+        for pose in made.film()? {
+            if stop.load(Ordering::SeqCst) {
+                return Err(Ended::Stopped);
+            }
+            motion.pose(&pose?).map_err(failed)?;
         }
-        cylinders(folder.file("cylinders.csv")?, &rows, metres_per_px)?;
-        folder.publish()
-    };
-    let dir = write().map_err(failed)?;
-    say(&format!("{}: nodes, motion and tracks, {} cylinders", dir.display(), cylinders_of(&made.dressed.limbs).len()));
-    Ok(())
+        motion.finish().map_err(failed)?;
+    }
+    let write_rows = || cylinders(folder.file("cylinders.csv")?, &rows, metres_per_px).map(drop);
+    write_rows().and_then(|()| folder.publish()).map_err(failed).map(|dir| {
+        say(&format!("{}: nodes, motion and tracks, {} cylinders", dir.display(), rows.len()));
+    })
 }

@@ -16,6 +16,7 @@ mod service;
 mod session;
 mod shape;
 mod shaping;
+mod stop;
 
 use crate::config::{Config, ConfigError};
 use crate::outline::OutlineSpec;

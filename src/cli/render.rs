@@ -4,12 +4,11 @@ mod options;
 
 pub use options::{Kind, RenderArgs, ViewName, background, rate, size};
 
-use super::hangup::Hangup;
-use super::session::stop_on_signals;
 use super::shaping::Made;
+use super::stop::Stop;
 use super::{Ended, say};
 use crate::draw::{Bounds, Camera, Look, Model, Posed, Rgba, Texture};
-use crate::export::{ExportError, Film, OutputFile};
+use crate::export::{ExportError, Film, OutputFile, refuse_taken};
 use crate::model::{Pose, Size};
 use options::FilmPlace;
 use std::sync::atomic::Ordering;
@@ -28,18 +27,20 @@ pub fn run(args: &RenderArgs) -> Result<(), Ended> {
     if args.seconds.is_some_and(|s| s > LONGEST_S) {
         return Err(Ended::BadUsage(anyhow::anyhow!("--seconds is more than {LONGEST_S}; give less")));
     }
+    refuse_taken(&args.out).map_err(failed)?;
+    let stop = Stop::on_signals()?;
     let made = args.shaping.made_with(&args.dir, |film_s| Some(tail_s(args, kind, film_s)))?;
     if args.film.is_some() && made.captured.picture.is_none() {
         let what = "the capture holds no frame of the film; make it anew with this version, or leave --film out";
         return Err(Ended::Failed(anyhow::anyhow!(what)));
     }
-    let job = drawn(args, kind, &made);
+    let job = drawn(args, kind, &made, &stop);
     // Told last, so that the error, if there is one, is the only line.
     job.inspect(|()| made.captured.warnings.iter().for_each(|w| say(&format!("arborcam: warning: {w}"))))
 }
 
 /// Draws a tree that has been made, in its poses.
-pub fn drawn(args: &RenderArgs, kind: Kind, made: &Made) -> Result<(), Ended> {
+pub fn drawn(args: &RenderArgs, kind: Kind, made: &Made, stop: &Stop) -> Result<(), Ended> {
     let Some(wood) = made.dressed.wood.first() else {
         return Err(Ended::Failed(anyhow::anyhow!("there is nothing to be drawn of this tree")));
     };
@@ -50,8 +51,8 @@ pub fn drawn(args: &RenderArgs, kind: Kind, made: &Made) -> Result<(), Ended> {
     }
     let studio = Studio::new(args, made, model);
     match kind {
-        Kind::Picture => studio.picture(),
-        Kind::Video => studio.video(),
+        Kind::Picture => studio.picture(stop),
+        Kind::Video => studio.video(stop),
     }
 }
 
@@ -90,8 +91,7 @@ impl<'a> Studio<'a> {
         Self { args, made, model, size, look, bounds }
     }
 
-    fn picture(&self) -> Result<(), Ended> {
-        let file = OutputFile::create(&self.args.out).map_err(failed)?;
+    fn picture(&self, stop: &Stop) -> Result<(), Ended> {
         let posed = match (self.args.at, self.args.pose) {
             (Some(at_s), _) => self.posed(Some(self.pose_at(at_s)?)),
             (None, None) if self.args.film.is_some() => self.model.posed(self.made.pose_in_picture.as_ref(), &[]),
@@ -109,11 +109,13 @@ impl<'a> Studio<'a> {
             image::ImageFormat::Png,
         )
         .map_err(|e| Ended::Failed(e.into()))?;
-        file.write(png.get_ref()).map_err(failed)?;
+        let stop = stop.while_writing();
+        let file = OutputFile::create(&self.args.out).map_err(failed)?;
+        file.write(png.get_ref(), stop).map_err(failed)?;
         file.publish().map_err(failed)
     }
 
-    fn video(&self) -> Result<(), Ended> {
+    fn video(&self, stop: &Stop) -> Result<(), Ended> {
         let poses = &self.made.poses;
         let (first_s, last_s) = (poses.first().map_or(0.0, |p| p.time_s), poses.last().map_or(0.0, |p| p.time_s));
         let still = self.args.pose.is_some() || poses.len() < 2;
@@ -123,7 +125,7 @@ impl<'a> Studio<'a> {
             None => (last_s - wanted_s).max(first_s),
         };
         let frames = ((wanted_s * self.args.fps).round() as u64).max(1);
-        let stop = stop_on_signals(Hangup::of_this_process() != Hangup::Ignored)?;
+        let stop = stop.while_writing();
         let mut film: Option<Film> = None;
         for k in 0..frames {
             if stop.load(Ordering::SeqCst) {
@@ -177,9 +179,9 @@ impl<'a> Studio<'a> {
         let poses = &self.made.poses;
         let found = nearest(poses, at_s).filter(|k| (poses[*k].time_s - at_s).abs() < 1.0);
         found.ok_or_else(|| {
-            let (first_s, last_s) = (poses.first().map_or(0.0, |p| p.time_s), poses.last().map_or(0.0, |p| p.time_s));
+            let last_s = poses.last().map_or(0.0, |p| p.time_s);
             Ended::BadUsage(anyhow::anyhow!(
-                "there is no pose at {at_s} s: the capture has them from {first_s:.1} to {last_s:.1} s; give --at between them"
+                "there is no pose at {at_s} s: the film is {last_s:.1} s long; give less with --at"
             ))
         })
     }
@@ -187,6 +189,7 @@ impl<'a> Studio<'a> {
 
 fn failed(e: ExportError) -> Ended {
     match e {
+        ExportError::Stopped => Ended::Stopped,
         ExportError::Exists { path } => {
             Ended::Failed(anyhow::anyhow!("{} exists already; choose another file, or remove it first", path.display()))
         }

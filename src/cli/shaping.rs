@@ -8,10 +8,10 @@ use crate::export::capture::Software;
 use crate::export::csv::Sway;
 use crate::export::gltf::{KEY_TOLERANCE_PX, Model, provenance};
 use crate::export::read_template;
-use crate::model::{Luma, Outline, Pose, Skeleton};
+use crate::model::{Outline, Pose, Skeleton};
 use crate::outline;
-use crate::pipeline::{Seen, cut_to, dress, flutter, reshape};
-use crate::shape::{Cut, Drawn, Dressed};
+use crate::pipeline::{MOST_RESHAPED, Seen, cut_to, dress, flutter, reshape};
+use crate::shape::{Cut, Drawn, Dressed, Topiary};
 use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
 use serde_json::Value;
@@ -76,6 +76,16 @@ pub struct Made {
     provenance: Value,
     /// It stands otherwise than in the tables of the capture.
     pub reshaped: bool,
+    restood: Restood,
+}
+
+/// What was done to the captured tree, for all further poses of it.
+#[derive(Default)]
+struct Restood {
+    /// The tree of the new shape.
+    reshaped: Option<Arc<Skeleton>>,
+    /// The tree before it was cut, and the cut one.
+    cut: Option<(Arc<Skeleton>, Topiary)>,
 }
 
 impl From<CaptureError> for Ended {
@@ -135,19 +145,14 @@ impl Shaping {
         self.shape.fits(captured.skeleton.image_size)?;
         let stand = self.stand(&captured, &config, dir)?;
         let leaf = self.leaf.as_deref().map(read_template).transpose().map_err(|e| Ended::BadUsage(e.into()))?;
-        let density = match &self.density {
-            Some(path) => {
-                let size = captured.skeleton.image_size;
-                Some(outline::density(path, size).map_err(|e| Ended::BadUsage(e.into()))?)
-            }
-            // A tree that was cut to a shape bears leaves all over it.
-            None => stand.cut_to.as_ref().map(|shape| Luma { size: shape.size, pixels: white(&shape.mask) }),
-        };
+        let size = captured.skeleton.image_size;
+        let density = self.density.as_deref().map(|path| outline::density(path, size)).transpose();
+        let density = density.map_err(|e| Ended::BadUsage(e.into()))?;
         let seen = Seen {
             picture: captured.picture.as_ref().map(|p| &*p.rgb),
             pose: stand.pose_in_picture.as_ref(),
-            outline: stand.cut_to.as_ref().or(captured.outline.as_ref()),
-            cut: stand.cut_to.is_some(),
+            outline: captured.outline.as_ref(),
+            cut_to: stand.cut_to.as_ref(),
             leaf: leaf.as_ref(),
             density: density.as_ref(),
         };
@@ -157,7 +162,7 @@ impl Shaping {
         let node_extras = sway.iter().map(extras).collect();
         let provenance = provenance(&captured.note.source.name, &Software::default(), poses);
         let (flutter, reshaped) = (flutter(&dressed, poses, skeleton, &config), *reshaped);
-        let Stand { skeleton, poses, pose_in_picture, sway, .. } = stand;
+        let Stand { skeleton, poses, pose_in_picture, sway, restood, .. } = stand;
         Ok(Made {
             captured,
             config,
@@ -170,6 +175,7 @@ impl Shaping {
             node_extras,
             provenance,
             reshaped,
+            restood,
         })
     }
 
@@ -188,7 +194,16 @@ impl Shaping {
             sway: captured.sway.clone(),
             cut_to: None,
             reshaped: reshaped || drawn.is_some(),
+            restood: Restood::default(),
         };
+        let planes = if reshaped { config.shape.planes as usize } else { 0 };
+        let nodes = stand.skeleton.nodes.len().max(planes.saturating_mul(stand.skeleton.measured()));
+        if stand.reshaped && nodes > MOST_RESHAPED {
+            return Err(Ended::Failed(anyhow!(
+                "another shape would have {nodes} nodes, and at most {MOST_RESHAPED} can be given one; take fewer --planes, \
+                 or leave all options of the shape out"
+            )));
+        }
         if reshaped {
             stand.skeleton = Arc::new(reshape(&captured.skeleton, outline()?, config));
             stand.poses = captured.reposed(&stand.skeleton, config, &captured.poses);
@@ -197,6 +212,7 @@ impl Shaping {
             // Copies come last; nothing was measured on them.
             stand.sway.truncate(captured.skeleton.measured());
             stand.sway.resize(stand.skeleton.nodes.len(), None);
+            stand.restood.reshaped = Some(stand.skeleton.clone());
         }
         let Some(path) = drawn else { return Ok(stand) };
         let unfit = |e: anyhow::Error| Ended::BadUsage(e.context(format!("--envelope {}", path.display())));
@@ -216,9 +232,10 @@ impl Shaping {
             poses: stand.poses.iter().map(pose).collect(),
             pose_in_picture: stand.pose_in_picture.as_ref().map(pose),
             sway: topiary.skeleton.nodes.iter().zip(&topiary.moves_as).map(sway).collect(),
-            skeleton: Arc::new(topiary.skeleton),
-            cut_to: Some(topiary.shape),
+            skeleton: Arc::new(topiary.skeleton.clone()),
+            cut_to: Some(topiary.shape.clone()),
             reshaped: true,
+            restood: Restood { cut: Some((whole, topiary)), ..stand.restood },
         })
     }
 }
@@ -232,10 +249,7 @@ struct Stand {
     /// The drawn shape in the picture.
     cut_to: Option<Outline>,
     reshaped: bool,
-}
-
-fn white(mask: &[u8]) -> Vec<u8> {
-    mask.iter().map(|&m| if m == 0 { 0 } else { 255 }).collect()
+    restood: Restood,
 }
 
 /// The poses of a loop with the lap before and the one after, and how long a lap is, s: nothing begins or ends in it.
@@ -282,6 +296,26 @@ impl Made {
             notes.insert("animated".into(), what);
         }
         self.poses = poses;
+    }
+
+    /// All poses of the film, of the tree as it stands; read anew, one at a time.
+    ///
+    /// # Errors
+    /// `motion.csv` cannot be read.
+    pub fn film(&self) -> Result<impl Iterator<Item = Result<Pose, CaptureError>>, CaptureError> {
+        let Restood { reshaped, cut } = &self.restood;
+        let mut repose = reshaped.as_ref().map(|new| self.captured.reposer(new, &self.config));
+        Ok(self.captured.film()?.map(move |pose| {
+            let pose = pose?;
+            let pose = match &mut repose {
+                Some(repose) => repose(&pose),
+                None => pose,
+            };
+            Ok(match cut {
+                Some((whole, topiary)) => topiary.pose(whole, &pose),
+                None => pose,
+            })
+        }))
     }
 
     /// As it goes into a file.

@@ -208,7 +208,7 @@ fn processor(load: &Load, config: &Config) -> Check {
     let asked = f64::from(config.camera.rate_hz);
     let heat = load.celsius.map_or(String::new(), |c| format!(", {c:.0} °C"));
     let found = format!(
-        "{} cores{heat}; tracks {:.0} frames of {}x{} a second, {asked} are asked",
+        "{} cores{heat}; tracks {:.1} frames of {}x{} a second, {asked} are asked",
         load.cores, load.frames_per_s, config.camera.width, config.camera.height
     );
     let slower = "take a smaller picture, fewer points or a lower rate: --config config/sbc.toml";

@@ -27,6 +27,9 @@ pub enum ExportError {
         "this arborcam was built without the HTML viewer; install npm and run `make build`, or export another format"
     )]
     NoViewer,
+    /// Whoever asked for it does not want it any more.
+    #[error("stopped before it was complete; nothing is written")]
+    Stopped,
     /// The model itself cannot be put into the format.
     #[error("cannot export this tree: {why}")]
     Unfit { why: String },

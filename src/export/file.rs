@@ -1,54 +1,41 @@
 //! Files that appear only when they are complete.
 
 use super::ExportError;
-use std::fs::{self, File, OpenOptions};
+use super::appear::Place;
+use std::fs::{self, File};
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Is written as a hidden file `.NAME.partial-PID` beside the wanted one, so that publishing is one rename on one file
-/// system. Dropped without [`OutputFile::publish`], it leaves nothing behind.
+/// Bytes that are written between two looks at whether to go on.
+const PIECE: usize = 1 << 20;
+
+/// Is written hidden beside the wanted place. Dropped without [`OutputFile::publish`], it leaves nothing behind.
 #[derive(Debug)]
-pub struct OutputFile {
-    path: PathBuf,
-    /// Where the bytes lie now; empty before there are any.
-    at: PathBuf,
-    /// Folders above `path` that were made for it, the highest first; they go again if nothing is published.
-    made: Vec<PathBuf>,
-    published: bool,
-}
+pub struct OutputFile(Place);
 
-/// Writes files beside each other into `dir`, which is made where it is missing. All of them appear or none.
+/// Writes files beside each other into `dir`, which is made where it is missing. All of them appear or none: also where
+/// `stop` is set meanwhile.
 ///
 /// # Errors
-/// One of the names is taken; they may not be written; the disk is full.
-pub fn write_files(dir: &Path, files: &[(String, Vec<u8>)]) -> Result<(), ExportError> {
+/// One of the names is taken; they may not be written; the disk is full; it was stopped.
+pub fn write_files(dir: &Path, files: &[(String, Vec<u8>)], stop: &AtomicBool) -> Result<(), ExportError> {
     let mut prepared = Vec::with_capacity(files.len());
     let mut write = || {
         for (name, bytes) in files {
             let file = OutputFile::create(&dir.join(name))?;
             prepared.push(file);
-            prepared.last().map_or(Ok(()), |file| file.write(bytes))?;
+            prepared.last().map_or(Ok(()), |file| file.write(bytes, stop))?;
         }
         prepared.iter_mut().try_for_each(OutputFile::show)
     };
     let written = write();
     match written {
-        Ok(()) => prepared.iter_mut().for_each(|file| file.published = true),
+        Ok(()) => prepared.iter_mut().for_each(|file| file.0.keep()),
         // The first one has made the folder, and can take it away when the others have gone.
         Err(_) => while prepared.pop().is_some() {},
     }
     written
-}
-
-/// # Errors
-/// There is something at `path`: a file, a folder, or a link, be it one that leads nowhere.
-pub fn refuse_taken(path: &Path) -> Result<(), ExportError> {
-    // Not `exists()`: that is false for a link to nowhere.
-    match fs::symlink_metadata(path) {
-        Ok(_) => Err(ExportError::Exists { path: path.to_path_buf() }),
-        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(()),
-        Err(e) => Err(ExportError::from_io(path.display().to_string(), 0, e)),
-    }
 }
 
 impl OutputFile {
@@ -57,38 +44,28 @@ impl OutputFile {
     /// # Errors
     /// `path` exists, be it as a file, a folder or a link; it may not be written; the disk is full.
     pub fn create(path: &Path) -> Result<Self, ExportError> {
-        refuse_taken(path)?;
-        let failed = |e: io::Error| ExportError::from_io(path.display().to_string(), 0, e);
-        let no_name = || ExportError::NotAFolder { path: path.to_path_buf() };
-        let name = path.file_name().ok_or_else(no_name)?.to_string_lossy().into_owned();
-        let above = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let missing = above.ancestors().take_while(|a| !a.as_os_str().is_empty() && !a.exists());
-        let mut made: Vec<PathBuf> = missing.map(Path::to_path_buf).collect();
-        made.reverse();
-        // From here on a failure must take away what was made, which is what dropping does.
-        let mut file = Self { path: path.to_path_buf(), at: PathBuf::new(), made, published: false };
-        fs::create_dir_all(above).map_err(|e| match e.kind() {
-            io::ErrorKind::AlreadyExists | io::ErrorKind::NotADirectory => no_name(),
-            _ => failed(e),
-        })?;
-        let partial = above.join(format!(".{name}.partial-{}", std::process::id()));
-        OpenOptions::new().write(true).create(true).truncate(true).open(&partial).map_err(failed)?;
-        file.at = partial;
-        Ok(file)
+        Place::prepare(path, |p| File::create_new(p).map(drop), |p| fs::remove_file(p)).map(Self)
     }
 
     /// Where the bytes are to be written until the file is published.
     pub fn partial(&self) -> &Path {
-        &self.at
+        self.0.at()
     }
 
-    /// Writes the whole file.
+    /// Writes the whole file, unless `stop` is set meanwhile.
     ///
     /// # Errors
-    /// It cannot be written to its end.
-    pub fn write(&self, bytes: &[u8]) -> Result<(), ExportError> {
-        let write = || File::create(&self.at)?.write_all(bytes);
-        write().map_err(|e| self.explain(bytes.len() as u64, e))
+    /// It cannot be written to its end, or was stopped.
+    pub fn write(&self, bytes: &[u8], stop: &AtomicBool) -> Result<(), ExportError> {
+        let explain = |e| self.explain(bytes.len() as u64, e);
+        let mut file = File::create(self.0.at()).map_err(explain)?;
+        for piece in bytes.chunks(PIECE) {
+            if stop.load(Ordering::SeqCst) {
+                return Err(ExportError::Stopped);
+            }
+            file.write_all(piece).map_err(explain)?;
+        }
+        Ok(())
     }
 
     /// Puts everything on the disk and gives the file its name.
@@ -97,40 +74,24 @@ impl OutputFile {
     /// The disk is full, or something else has taken the name meanwhile; then nothing is left of the file.
     pub fn publish(mut self) -> Result<(), ExportError> {
         self.show()?;
-        self.published = true;
+        self.0.keep();
         Ok(())
     }
 
     /// Under its name, and still to go if it is dropped.
     fn show(&mut self) -> Result<(), ExportError> {
         // Some file systems find out only now that there is no space.
-        File::open(&self.at).and_then(|f| f.sync_all()).map_err(|e| self.explain(0, e))?;
-        // Taken meanwhile: a rename would replace it.
-        refuse_taken(&self.path)?;
-        fs::rename(&self.at, &self.path).map_err(|e| self.explain(0, e))?;
-        self.at.clone_from(&self.path);
-        Ok(())
+        File::open(self.0.at()).and_then(|f| f.sync_all()).map_err(|e| self.explain(0, e))?;
+        self.0.appear().map_err(|e| match e.kind() {
+            io::ErrorKind::AlreadyExists => ExportError::Exists { path: self.0.path().to_path_buf() },
+            _ => self.explain(0, e),
+        })
     }
 
     /// Sorts an error of writing; `bytes` is how much was to be written, 0 if only what lies there already is known.
     pub fn explain(&self, bytes: u64, e: io::Error) -> ExportError {
-        let written = fs::metadata(&self.at).map_or(0, |m| m.len());
-        ExportError::from_io(self.path.display().to_string(), bytes.max(written), e)
-    }
-}
-
-impl Drop for OutputFile {
-    fn drop(&mut self) {
-        if self.published {
-            return;
-        }
-        // Nobody is left who could act on a failure here.
-        if !self.at.as_os_str().is_empty() {
-            let _ = fs::remove_file(&self.at);
-        }
-        for folder in self.made.iter().rev() {
-            let _ = fs::remove_dir(folder);
-        }
+        let written = fs::metadata(self.0.at()).map_or(0, |m| m.len());
+        ExportError::from_io(self.0.path().display().to_string(), bytes.max(written), e)
     }
 }
 
@@ -138,17 +99,19 @@ impl Drop for OutputFile {
 mod tests {
     use super::*;
 
+    static GO_ON: AtomicBool = AtomicBool::new(false);
+
     #[test]
     fn appears_whole_or_not_at_all() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("new/picture.png");
         let file = OutputFile::create(&path).unwrap();
-        file.write(b"abc").unwrap();
+        file.write(b"abc", &GO_ON).unwrap();
         assert!(!path.exists());
         drop(file);
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
         let file = OutputFile::create(&path).unwrap();
-        file.write(b"abc").unwrap();
+        file.write(b"abc", &GO_ON).unwrap();
         file.publish().unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"abc");
         assert!(matches!(OutputFile::create(&path), Err(ExportError::Exists { .. })));
@@ -161,12 +124,22 @@ mod tests {
         let below = dir.path().join("new");
         let files = |second: &str| [("a.bin".to_owned(), vec![1]), (second.to_owned(), vec![2])];
         // The second name is no name of a file, so the first one and its folder must go again.
-        assert!(write_files(&below, &files("..")).is_err());
+        assert!(write_files(&below, &files(".."), &GO_ON).is_err());
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
-        write_files(&below, &files("a.gltf")).unwrap();
+        write_files(&below, &files("a.gltf"), &GO_ON).unwrap();
         assert_eq!(fs::read(below.join("a.gltf")).unwrap(), [2]);
         fs::remove_file(below.join("a.bin")).unwrap();
-        assert!(matches!(write_files(&below, &files("a.gltf")), Err(ExportError::Exists { .. })));
+        assert!(matches!(write_files(&below, &files("a.gltf"), &GO_ON), Err(ExportError::Exists { .. })));
         assert_eq!(fs::read_dir(&below).unwrap().count(), 1);
+    }
+
+    /// Ctrl-C while several files are written: none of them is left, nor what was made for them.
+    #[test]
+    fn what_is_stopped_leaves_nothing() {
+        let dir = tempfile::tempdir().unwrap();
+        let files = [("a.bin".to_owned(), vec![1]), ("a.gltf".to_owned(), vec![2])];
+        let stopped = write_files(&dir.path().join("new"), &files, &AtomicBool::new(true));
+        assert!(matches!(stopped, Err(ExportError::Stopped)));
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
     }
 }

@@ -1,20 +1,19 @@
 //! A folder that appears only when it is complete.
 
 use super::ExportError;
+use super::appear::Place;
 use std::fs::{self, File};
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Files are gathered in a hidden folder `.NAME.partial-PID` beside the wanted one, so that publishing is one rename
-/// on one file system. Dropped without [`OutputFolder::publish`], it leaves nothing behind.
+/// Bytes that are copied between two looks at whether to go on.
+const PIECE: u64 = 1 << 20;
+
+/// Files are gathered in a hidden folder beside the wanted one. Dropped without [`OutputFolder::publish`], it leaves nothing
+/// behind.
 #[derive(Debug)]
-pub struct OutputFolder {
-    dir: PathBuf,
-    partial: PathBuf,
-    /// Folders above `dir` that were made for it, the highest first; they go again if nothing is published.
-    made: Vec<PathBuf>,
-    published: bool,
-}
+pub struct OutputFolder(Place);
 
 impl OutputFolder {
     /// Prepares the folder `dir`, and those above it where they are missing.
@@ -23,37 +22,12 @@ impl OutputFolder {
     /// `dir` exists, be it as a file, a folder or a link; it cannot be a folder; it may not be written; the disk is
     /// full.
     pub fn create(dir: &Path) -> Result<Self, ExportError> {
-        let not_a_folder = || ExportError::NotAFolder { path: dir.to_path_buf() };
-        // Not `exists()`: that is false for a link to nowhere, which a rename would fail on much later.
-        match fs::symlink_metadata(dir) {
-            Ok(_) => return Err(ExportError::Exists { path: dir.to_path_buf() }),
-            Err(e) if e.kind() == io::ErrorKind::NotFound => {}
-            Err(e) => return Err(ExportError::from_io(dir.display().to_string(), 0, e)),
-        }
-        let name = dir.file_name().ok_or_else(not_a_folder)?.to_string_lossy().into_owned();
-        let parent = match dir.parent() {
-            Some(p) if !p.as_os_str().is_empty() => p.to_path_buf(),
-            _ => PathBuf::from("."),
-        };
-        let mut made: Vec<PathBuf> = parent
-            .ancestors()
-            .take_while(|a| !a.as_os_str().is_empty() && !a.exists())
-            .map(Path::to_path_buf)
-            .collect();
-        made.reverse();
-        // From here on a failure must take away what was made, which is what dropping does.
-        let mut folder = Self { dir: dir.to_path_buf(), partial: PathBuf::new(), made, published: false };
-        fs::create_dir_all(&parent).map_err(|e| match e.kind() {
-            io::ErrorKind::AlreadyExists | io::ErrorKind::NotADirectory => not_a_folder(),
-            _ => ExportError::from_io(parent.display().to_string(), 0, e),
-        })?;
-        folder.partial = make_partial(&parent, &name)?;
-        Ok(folder)
+        Place::prepare(dir, |p| fs::create_dir(p), |p| fs::remove_dir_all(p)).map(Self)
     }
 
     /// Where the file `name` is to be written until the folder is published.
     pub fn path(&self, name: &str) -> PathBuf {
-        self.partial.join(name)
+        self.0.at().join(name)
     }
 
     /// Opens a new file in the folder, for data that comes bit by bit.
@@ -74,12 +48,19 @@ impl OutputFolder {
         write().map_err(|e| self.explain(name, bytes.len() as u64, e))
     }
 
-    /// Copies a file into the folder under the same name.
+    /// Copies a file into the folder under the same name, unless `stop` is set meanwhile.
     ///
     /// # Errors
-    /// It cannot be read or not be written to its end.
-    pub fn copy(&self, name: &str, from: &Path) -> Result<(), ExportError> {
-        fs::copy(from.join(name), self.path(name)).map(drop).map_err(|e| self.explain(name, 0, e))
+    /// It cannot be read or not be written to its end, or was stopped.
+    pub fn copy(&self, name: &str, from: &Path, stop: &AtomicBool) -> Result<(), ExportError> {
+        let explain = |e| self.explain(name, 0, e);
+        let (from, mut to) = (File::open(from.join(name)).map_err(explain)?, self.file(name)?);
+        while !stop.load(Ordering::SeqCst) {
+            if io::copy(&mut (&from).take(PIECE), &mut to).map_err(explain)? == 0 {
+                return to.flush().map_err(explain);
+            }
+        }
+        Err(ExportError::Stopped)
     }
 
     /// Puts everything on the disk and gives the folder its name, which it returns.
@@ -87,67 +68,30 @@ impl OutputFolder {
     /// # Errors
     /// The disk is full, or something else has taken the name meanwhile; then nothing is left of the folder.
     pub fn publish(mut self) -> Result<PathBuf, ExportError> {
-        let entries = fs::read_dir(&self.partial).map_err(|e| self.explain("the folder", 0, e))?;
+        let entries = fs::read_dir(self.0.at()).map_err(|e| self.explain("the folder", 0, e))?;
         for entry in entries {
             let entry = entry.map_err(|e| self.explain("the folder", 0, e))?;
             let name = entry.file_name().to_string_lossy().into_owned();
             // Some file systems find out only now that there is no space.
             File::open(entry.path()).and_then(|f| f.sync_all()).map_err(|e| self.explain(&name, 0, e))?;
         }
-        // A rename would silently replace an empty folder of that name.
-        if fs::symlink_metadata(&self.dir).is_ok() {
-            return Err(ExportError::Exists { path: self.dir.clone() });
-        }
-        fs::rename(&self.partial, &self.dir).map_err(|e| match e.kind() {
+        let dir = self.0.path().to_path_buf();
+        self.0.appear().map_err(|e| match e.kind() {
             io::ErrorKind::AlreadyExists | io::ErrorKind::DirectoryNotEmpty | io::ErrorKind::NotADirectory => {
-                ExportError::Exists { path: self.dir.clone() }
+                ExportError::Exists { path: dir.clone() }
             }
             _ => self.explain("the folder", 0, e),
         })?;
-        self.published = true;
-        // The rename itself is on the disk once the folder above is; some file systems cannot sync folders.
-        for folder in [Some(self.dir.as_path()), self.dir.parent().filter(|p| !p.as_os_str().is_empty())] {
-            let _ = File::open(folder.unwrap_or(Path::new("."))).and_then(|f| f.sync_all());
-        }
-        Ok(self.dir.clone())
+        self.0.keep();
+        let _ = File::open(&dir).and_then(|f| f.sync_all());
+        Ok(dir)
     }
 
     /// Adds what is written already, because all of it is what the disk must have room for.
-    fn explain(&self, name: &str, bytes: u64, e: io::Error) -> ExportError {
-        let others = fs::read_dir(&self.partial).into_iter().flatten().flatten();
+    pub(super) fn explain(&self, name: &str, bytes: u64, e: io::Error) -> ExportError {
+        let others = fs::read_dir(self.0.at()).into_iter().flatten().flatten();
         let written: u64 =
             others.filter(|f| f.file_name() != name).filter_map(|f| f.metadata().ok()).map(|m| m.len()).sum();
-        ExportError::from_io(self.dir.join(name).display().to_string(), written + bytes, e)
+        ExportError::from_io(self.0.path().join(name).display().to_string(), written + bytes, e)
     }
-}
-
-impl Drop for OutputFolder {
-    fn drop(&mut self) {
-        if self.published {
-            return;
-        }
-        // Nobody is left who could act on a failure here.
-        if !self.partial.as_os_str().is_empty() {
-            let _ = fs::remove_dir_all(&self.partial);
-        }
-        for folder in self.made.iter().rev() {
-            let _ = fs::remove_dir(folder);
-        }
-    }
-}
-
-/// Makes the hidden folder; a name can be taken by a second export of this process or by one that was killed.
-fn make_partial(parent: &Path, name: &str) -> Result<PathBuf, ExportError> {
-    let pid = std::process::id();
-    let mut partial = parent.join(format!(".{name}.partial-{pid}"));
-    for attempt in 1..=100 {
-        match fs::create_dir(&partial) {
-            Err(e) if e.kind() == io::ErrorKind::AlreadyExists && attempt < 100 => {
-                partial = parent.join(format!(".{name}.partial-{pid}-{attempt}"));
-            }
-            Err(e) => return Err(ExportError::from_io(parent.display().to_string(), 0, e)),
-            Ok(()) => break,
-        }
-    }
-    Ok(partial)
 }

@@ -146,7 +146,9 @@ fn assemble(model: &Model, texture_apart: bool) -> Result<Assembled, ExportError
         let shown = || foliage.groups.iter().enumerate().filter(|(_, group)| !group.mesh.indices.is_empty());
         if shown().next().is_some() {
             let material;
-            (material, texture) = leaf(&mut root, &mut buffer, foliage.texture.as_ref(), texture_apart)?;
+            let beyond = |[u, v]: &[f32; 2]| u.min(*v) < -0.01 || u.max(*v) > 1.01;
+            let tiled = foliage.groups.iter().any(|g| g.mesh.uvs.iter().any(beyond));
+            (material, texture) = leaf(&mut root, &mut buffer, foliage.texture.as_ref(), tiled, texture_apart)?;
             for (k, group) in shown() {
                 let branch = model.skeleton.name_of(group.node);
                 let what = Skinned::leaves(group, material, skin, format!("leaves_{k}"), branch);

@@ -3,7 +3,7 @@
 use super::gltf::Model;
 use super::gltf_buffer::{BufferBuilder, Layout, accessor, le_f32};
 use super::joints::Moving;
-use super::thin_keys::thin;
+use super::thin_keys::{share, thin};
 use gltf_json::accessor::Type;
 use gltf_json::animation::{Animation, Channel, Interpolation, Property, Sampler, Target};
 use gltf_json::validation::Checked::Valid;
@@ -55,7 +55,7 @@ fn swing(model: &Model, moving: &Moving, group: usize, node: Index<Node>) -> Opt
     let reach_px = [reach(&group.sine), reach(&group.cosine)];
     let times = &moving.times_s;
     let fits = |a: usize, b: usize, k: usize| {
-        let x = if a == b { 0.0 } else { (times[k] - times[a]) / (times[b] - times[a]) };
+        let x = share(times, a, b, k);
         let off = |c: usize| {
             let [a, b, k] = [a, b, k].map(|i| f64::from(weights[i][c]));
             (a + (b - a) * x - k).abs() * reach_px[c]

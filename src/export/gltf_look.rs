@@ -30,13 +30,14 @@ pub(super) fn bark(rgb: [u8; 3]) -> Material {
 }
 
 /// Leaves take their colour from their vertices, and shape and veins from the texture, where there is one: seen from both
-/// sides, cut out where it is clear. With `apart` the picture is given back with its file's ending instead of being put
+/// sides, cut out where it is clear, repeated where it is `tiled`. With `apart` the picture is given back with its file's ending instead of being put
 /// into the buffer.
 #[allow(clippy::type_complexity)]
 pub(super) fn leaf(
     root: &mut Root,
     buffer: &mut BufferBuilder,
     texture: Option<&(&'static str, Vec<u8>)>,
+    tiled: bool,
     apart: bool,
 ) -> Result<(Index<Material>, Option<(&'static str, Vec<u8>)>), ExportError> {
     let mut material = Material {
@@ -68,12 +69,14 @@ pub(super) fn leaf(
             extensions: None,
             extras: None,
         });
+        // A picture of one leaf must not come in again at its other edge.
+        let wrap = if tiled { WrappingMode::Repeat } else { WrappingMode::ClampToEdge };
         let sampler = root.push(Sampler {
             mag_filter: Some(Valid(MagFilter::Linear)),
             min_filter: Some(Valid(MinFilter::LinearMipmapLinear)),
             name: None,
-            wrap_s: Valid(WrappingMode::ClampToEdge),
-            wrap_t: Valid(WrappingMode::ClampToEdge),
+            wrap_s: Valid(wrap),
+            wrap_t: Valid(wrap),
             extensions: None,
             extras: None,
         });

@@ -1,6 +1,7 @@
 //! Files for other programs. What goes into a file is made as pure bytes or over any writer; only [`OutputFolder`]
 //! and [`files`] touch the disk.
 
+mod appear;
 pub mod capture;
 pub mod csv;
 pub mod cylinders;
@@ -8,6 +9,7 @@ mod error;
 mod file;
 mod film;
 pub mod folder;
+mod followed;
 pub mod glb_notes;
 pub mod gltf;
 mod gltf_animation;
@@ -20,14 +22,19 @@ mod html_data;
 mod joints;
 mod number;
 pub mod picture;
+mod planned_keys;
 mod skinning;
 mod sparse_keys;
 pub mod still;
 mod template;
+mod template_bytes;
 mod thin_keys;
+mod tracks;
 
+pub use appear::refuse_taken;
 pub use error::ExportError;
-pub use file::{OutputFile, refuse_taken, write_files};
+pub use file::{OutputFile, write_files};
 pub use film::Film;
 pub use folder::OutputFolder;
 pub use template::{TemplateError, read_template};
+pub use tracks::tracks_of;

@@ -4,23 +4,21 @@
 //! a fifth. One key after the other is tried to be left out, its neighbours moved so that the largest miss between them is
 //! as small as can be: least squares with the weights of Lawson (1961), which grow where the miss is large.
 
-use super::thin_keys::Arc;
+use super::thin_keys::{Arc, share};
 use nalgebra::{Quaternion, UnitQuaternion, Vector4};
 
 /// Keys on either side that are moved.
 const WINDOW: usize = 3;
-const ITERATIONS: usize = 12;
+const ITERATIONS: usize = 16;
 /// By now the misses show whether there is a chance.
 const LOOKED_AT: usize = 3;
-const HOPELESS: f64 = 1.5;
-const PASSES: usize = 3;
+const HOPELESS: f64 = 1.8;
+const PASSES: usize = 2;
+/// Turns that differ by less (as quaternions) are one: far below what tolerances are, far above rounding.
+const CLOSED: f64 = 1e-7;
 
-/// Keys of one joint: which frames, and the turn in each.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Keyed {
-    pub frames: Vec<usize>,
-    pub turns: Vec<UnitQuaternion<f64>>,
-}
+/// A key of one joint: its frame, and the turn, not quite of length 1.
+pub(super) type Key = (usize, Vector4<f64>);
 
 /// A path of turns, one a frame.
 pub(super) struct Path<'a, F: Fn(usize, &UnitQuaternion<f64>) -> f64> {
@@ -32,10 +30,32 @@ pub(super) struct Path<'a, F: Fn(usize, &UnitQuaternion<f64>) -> f64> {
 }
 
 impl<F: Fn(usize, &UnitQuaternion<f64>) -> f64> Path<'_, F> {
-    /// Keys at the aims of these frames, which do; `thorough`: as few as can be found beside the path.
-    pub fn keyed(&self, kept: Vec<usize>, thorough: bool) -> Keyed {
-        let mut keys: Vec<(usize, Vector4<f64>)> = kept.into_iter().map(|k| (k, self.aims[k])).collect();
-        for _ in 0..if thorough { PASSES } else { 0 } {
+    /// Keys at the aims of these frames.
+    pub fn on_aims(&self, frames: &[usize]) -> Vec<Key> {
+        frames.iter().map(|&k| (k, self.aims[k])).collect()
+    }
+
+    /// Keys that were planned by a rule of thumb, with those moved that miss; `None` where that does not do.
+    pub fn mended(&self, mut keys: Vec<Key>) -> Option<Vec<Key>> {
+        if let [first, .., last] = keys.as_mut_slice() {
+            if self.closes() {
+                (first.1, last.1) = (self.aims[first.0], self.aims[last.0]);
+            }
+        }
+        for j in 1..keys.len() {
+            if !self.fits(&keys[j - 1], &keys[j]) {
+                let window = (j.saturating_sub(1 + WINDOW), (j + WINDOW).min(keys.len() - 1));
+                if !self.fit(&mut keys, window) {
+                    return None;
+                }
+            }
+        }
+        Some(keys)
+    }
+
+    /// As few of these keys, which do, as can be found beside the path.
+    pub fn fewer(&self, mut keys: Vec<Key>) -> Vec<Key> {
+        for _ in 0..PASSES {
             let before = keys.len();
             let mut j = 1;
             while j + 1 < keys.len() {
@@ -48,22 +68,34 @@ impl<F: Fn(usize, &UnitQuaternion<f64>) -> f64> Path<'_, F> {
                 break;
             }
         }
-        let (frames, turns) = keys.into_iter().map(|(k, q)| (k, unit(&q))).unzip();
-        Keyed { frames, turns }
+        keys
     }
 
     /// The keys without number `j`, if those around it can be moved so that all fits.
-    fn without(&self, keys: &[(usize, Vector4<f64>)], j: usize) -> Option<Vec<(usize, Vector4<f64>)>> {
+    fn without(&self, keys: &[Key], j: usize) -> Option<Vec<Key>> {
         let mut fewer = keys.to_vec();
         fewer.remove(j);
-        let (low, high) = (j.saturating_sub(WINDOW), (j + WINDOW - 1).min(fewer.len() - 1));
-        // The ends of the window stay where they are, and those of the path: a loop would no longer close.
-        let free = (low + 1, high);
-        self.fit(&mut fewer, (low, high), free).then_some(fewer)
+        let window = (j.saturating_sub(WINDOW), (j + WINDOW - 1).min(fewer.len() - 1));
+        self.fit(&mut fewer, window).then_some(fewer)
     }
 
-    /// Moves the keys `free.0..free.1` so that everything from key `low` to key `high` fits; `false` if that cannot be.
-    fn fit(&self, keys: &mut [(usize, Vector4<f64>)], (low, high): (usize, usize), free: (usize, usize)) -> bool {
+    /// Whether the path ends where it began: a loop must close with its keys, too.
+    fn closes(&self) -> bool {
+        self.aims.first().zip(self.aims.last()).is_some_and(|(a, b)| (a - b).norm().min((a + b).norm()) < CLOSED)
+    }
+
+    /// Whether the way between two keys does.
+    fn fits(&self, from: &Key, to: &Key) -> bool {
+        let arc = Arc::new(&unit(&from.1), &unit(&to.1));
+        (from.0..=to.0).all(|k| (self.miss)(k, &arc.at(share(self.times_s, from.0, to.0, k))) <= 1.0)
+    }
+
+    /// Moves keys so that everything from key `low` to key `high` fits; `false` if that cannot be. These two stay where they
+    /// are, unless the path itself ends there and is no loop.
+    fn fit(&self, keys: &mut [Key], (low, high): (usize, usize)) -> bool {
+        let ends = !self.closes();
+        let free =
+            (if low == 0 && ends { 0 } else { low + 1 }, if high + 1 == keys.len() && ends { high + 1 } else { high });
         let (first, last) = (keys[low].0, keys[high].0);
         let mut weights = vec![1.0; last - first + 1];
         for round in 0..ITERATIONS {
@@ -73,7 +105,7 @@ impl<F: Fn(usize, &UnitQuaternion<f64>) -> f64> Path<'_, F> {
                 let ((a, from), (b, to)) = (pair[0], pair[1]);
                 let arc = Arc::new(&unit(&from), &unit(&to));
                 for k in a..=b {
-                    let miss = (self.miss)(k, &arc.at(self.share(a, b, k)));
+                    let miss = (self.miss)(k, &arc.at(share(self.times_s, a, b, k)));
                     worst = worst.max(miss);
                     // The frame of a key belongs to both spans, and is weighed once.
                     if k < b || b == last {
@@ -94,13 +126,7 @@ impl<F: Fn(usize, &UnitQuaternion<f64>) -> f64> Path<'_, F> {
     }
 
     /// Least squares in the free keys: a symmetric system with three diagonals.
-    fn solve(
-        &self,
-        keys: &mut [(usize, Vector4<f64>)],
-        (low, high): (usize, usize),
-        free: (usize, usize),
-        weights: &[f64],
-    ) {
+    fn solve(&self, keys: &mut [Key], (low, high): (usize, usize), free: (usize, usize), weights: &[f64]) {
         let n = free.1 - free.0;
         let (mut diagonal, mut beside, mut right) = (vec![0.0; n], vec![0.0; n], vec![Vector4::zeros(); n]);
         let first = keys[low].0;
@@ -111,7 +137,7 @@ impl<F: Fn(usize, &UnitQuaternion<f64>) -> f64> Path<'_, F> {
                 if k == b && key + 1 < high {
                     continue;
                 }
-                let (w, x) = (weights[k - first], self.share(a, b, k));
+                let (w, x) = (weights[k - first], share(self.times_s, a, b, k));
                 let aim = self.aims[k];
                 match (place(key), place(key + 1)) {
                     (Some(i), Some(_)) => {
@@ -144,12 +170,9 @@ impl<F: Fn(usize, &UnitQuaternion<f64>) -> f64> Path<'_, F> {
             keys[free.0 + i].1 = (right[i] - next) / diagonal[i].max(1e-12);
         }
     }
-
-    fn share(&self, a: usize, b: usize, k: usize) -> f64 {
-        if a == b { 0.0 } else { (self.times_s[k] - self.times_s[a]) / (self.times_s[b] - self.times_s[a]) }
-    }
 }
 
-fn unit(q: &Vector4<f64>) -> UnitQuaternion<f64> {
+/// The turn of a key.
+pub(super) fn unit(q: &Vector4<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::try_new(Quaternion::from(*q), 1e-9).unwrap_or_default()
 }

@@ -1,5 +1,6 @@
 //! A user's own leaf: the meshes of a glTF file as the template that stands at every seed.
 
+use super::template_bytes::Taken;
 use crate::shape::{Template, TemplateFault, TemplateMesh};
 use gltf::accessor::{DataType, Dimensions};
 use gltf::mesh::Mode;
@@ -8,8 +9,8 @@ use nalgebra::{Matrix4, Point3, Vector3};
 use std::path::{Path, PathBuf};
 
 /// Larger files are refused, and so are larger files that they refer to, bytes.
-const LARGEST: u64 = 16 << 20;
-/// Vertices of one mesh that are read before it is known how many triangles they make.
+pub(super) const LARGEST: u64 = 16 << 20;
+/// Vertices that are read before it is known which of them the triangles use.
 const MOST_VERTICES: usize = 65_536;
 
 /// Why a file is no leaf template; each message is one line that says what to do.
@@ -17,8 +18,12 @@ const MOST_VERTICES: usize = 65_536;
 pub enum TemplateError {
     #[error("cannot read leaf template {}: {source}; check the name", .path.display())]
     Unreadable { path: PathBuf, source: std::io::Error },
-    #[error("leaf template {} has {bytes} bytes, and at most {LARGEST} are taken; make its texture smaller", .path.display())]
-    TooLarge { path: PathBuf, bytes: u64 },
+    #[error(
+        "leaf template {} is too large: at most {LARGEST} bytes are taken of a file, and three times that in all; make its \
+         texture smaller",
+        .path.display()
+    )]
+    TooLarge { path: PathBuf },
     #[error("leaf template {} is no glTF 2.0 file that can be used: {what}; export it as GLB with its texture inside", .path.display())]
     NoGltf { path: PathBuf, what: String },
     #[error("leaf template {} has no mesh of triangles; export a leaf or a small cluster of leaves", .path.display())]
@@ -33,21 +38,33 @@ pub enum TemplateError {
 /// # Errors
 /// What [`TemplateError`] names.
 pub fn read_template(path: &Path) -> Result<Template, TemplateError> {
-    let bytes = bounded(path)?;
+    let (mut taken, bytes) = Taken::file(path)?;
     let no_gltf = |what: String| TemplateError::NoGltf { path: path.into(), what: what.replace('\n', " ") };
     let Gltf { document, blob } = Gltf::from_slice(&bytes).map_err(|e| no_gltf(e.to_string()))?;
+    // The crate takes for granted what the format says of images, and checks it nowhere.
+    let sound = |image: &gltf::json::Image| match image.buffer_view {
+        Some(_) => image.mime_type.is_some(),
+        None => image.uri.is_some(),
+    };
+    if !document.as_json().images.iter().all(sound) {
+        return Err(no_gltf("an image in it has no data, or does not say of which kind they are".into()));
+    }
     let mut buffers = Vec::new();
     for buffer in document.buffers() {
         let data = match buffer.source() {
-            gltf::buffer::Source::Bin => blob.clone().ok_or_else(|| no_gltf("its binary part is missing".into()))?,
-            gltf::buffer::Source::Uri(uri) => referred(path, uri)?,
+            gltf::buffer::Source::Bin => {
+                let blob = blob.as_ref().ok_or_else(|| no_gltf("its binary part is missing".into()))?;
+                taken.more(blob.len())?;
+                blob.clone()
+            }
+            gltf::buffer::Source::Uri(uri) => taken.referred(uri)?,
         };
         if data.len() < buffer.length() {
             return Err(no_gltf("a buffer is shorter than it says".into()));
         }
         buffers.push(data);
     }
-    let file = File { path, buffers };
+    let mut file = Parts { path, taken, buffers };
     let mut mesh = TemplateMesh::default();
     let scene = document.default_scene().or_else(|| document.scenes().next());
     let mut visited = vec![false; document.nodes().count()];
@@ -73,50 +90,35 @@ pub fn read_template(path: &Path) -> Result<Template, TemplateError> {
     Template::new(mesh).map_err(|fault| TemplateError::Unfit { path: path.into(), fault })
 }
 
-fn bounded(path: &Path) -> Result<Vec<u8>, TemplateError> {
-    let unreadable = |source| TemplateError::Unreadable { path: path.into(), source };
-    let bytes = std::fs::metadata(path).map_err(unreadable)?.len();
-    if bytes > LARGEST {
-        return Err(TemplateError::TooLarge { path: path.into(), bytes });
-    }
-    std::fs::read(path).map_err(unreadable)
-}
-
-/// What a URI in the file at `path` refers to: data in it, or a file beside it.
-fn referred(path: &Path, uri: &str) -> Result<Vec<u8>, TemplateError> {
-    let no_gltf = |what: String| TemplateError::NoGltf { path: path.into(), what };
-    if uri.starts_with("data:") {
-        let data = gltf::buffer::Data::from_source(gltf::buffer::Source::Uri(uri), None);
-        return data.map(|d| d.0).map_err(|e| no_gltf(format!("data in it cannot be read ({e})")));
-    }
-    // Nobody's other files are read because a leaf from somewhere says so.
-    if uri.contains(['/', '\\', ':', '%']) || uri.starts_with('.') {
-        return Err(no_gltf("it refers to something that is not a file beside it".into()));
-    }
-    bounded(&path.with_file_name(uri))
-}
-
-struct File<'a> {
+struct Parts<'a> {
     path: &'a Path,
+    taken: Taken<'a>,
     buffers: Vec<Vec<u8>>,
 }
 
-impl File<'_> {
+impl Parts<'_> {
     fn no_gltf(&self, what: &str) -> TemplateError {
         TemplateError::NoGltf { path: self.path.into(), what: what.into() }
     }
 
     /// Adds the triangles of a primitive that stands at `place`.
     fn add(
-        &self,
+        &mut self,
         primitive: &gltf::Primitive,
         place: &Matrix4<f64>,
         mesh: &mut TemplateMesh,
     ) -> Result<(), TemplateError> {
         let Some(positions) = primitive.get(&Semantic::Positions) else { return Ok(()) };
-        if positions.count() + mesh.positions.len() > MOST_VERTICES {
-            let fault = TemplateFault::TooMany(positions.count() / 3);
-            return Err(TemplateError::Unfit { path: self.path.into(), fault });
+        let unfit = |fault| Err(TemplateError::Unfit { path: self.path.into(), fault });
+        let vertices = positions.count().saturating_add(mesh.positions.len());
+        if vertices > MOST_VERTICES {
+            return unfit(TemplateFault::TooManyVertices { found: vertices, most: MOST_VERTICES });
+        }
+        // Before they are read: a small file may name the same ones any number of times.
+        let corners = primitive.indices().map_or(positions.count(), |i| i.count());
+        let triangles = (mesh.indices.len() / 3).saturating_add(corners / 3);
+        if triangles > Template::MOST_TRIANGLES {
+            return unfit(TemplateFault::TooMany(triangles));
         }
         let first = mesh.positions.len() as u32;
         let count = positions.count() as u32;
@@ -126,7 +128,7 @@ impl File<'_> {
         }
         // A mirrored or stretched normal needs the inverse transpose.
         let upright = place.fixed_view::<3, 3>(0, 0).try_inverse().map(|m| m.transpose());
-        match primitive.get(&Semantic::Normals).zip(upright).filter(|(n, _)| n.count() as u32 == count) {
+        match primitive.get(&Semantic::Normals).zip(upright).filter(|(n, _)| n.count() == positions.count()) {
             Some((normals, upright)) => {
                 for n in self.floats::<3>(&normals, Dimensions::Vec3)? {
                     let n = upright * Vector3::from(n.map(f64::from));
@@ -139,7 +141,7 @@ impl File<'_> {
         }
         // Coordinates as bytes are allowed, and rare; without any the texture's middle is taken.
         let uvs = primitive.get(&Semantic::TexCoords(0));
-        match uvs.filter(|a| a.data_type() == DataType::F32 && a.count() as u32 == count) {
+        match uvs.filter(|a| a.data_type() == DataType::F32 && a.count() == positions.count()) {
             Some(uvs) => mesh.uvs.extend(self.floats::<2>(&uvs, Dimensions::Vec2)?),
             None => mesh.uvs.extend((0..count).map(|_| [0.5; 2])),
         }
@@ -158,7 +160,7 @@ impl File<'_> {
     }
 
     /// The base colour texture, PNG or JPEG.
-    fn texture(&self, primitive: &gltf::Primitive) -> Result<Option<(&'static str, Vec<u8>)>, TemplateError> {
+    fn texture(&mut self, primitive: &gltf::Primitive) -> Result<Option<(&'static str, Vec<u8>)>, TemplateError> {
         let look = primitive.material().pbr_metallic_roughness().base_color_texture();
         let Some(image) = look.map(|t| t.texture().source()) else { return Ok(None) };
         let bytes = match image.source() {
@@ -167,7 +169,7 @@ impl File<'_> {
                 let buffer = &self.buffers[view.buffer().index()];
                 buffer.get(start..end).ok_or_else(|| self.no_gltf("its texture is cut off"))?.to_vec()
             }
-            gltf::image::Source::Uri { uri, .. } => referred(self.path, uri)?,
+            gltf::image::Source::Uri { uri, .. } => self.taken.referred(uri)?,
         };
         let kind = match bytes.as_slice() {
             [0x89, b'P', b'N', b'G', ..] => "image/png",
@@ -194,10 +196,6 @@ impl File<'_> {
             DataType::U32 => 4,
             _ => return Err(self.no_gltf("its indices are no whole numbers")),
         };
-        if accessor.count() > 3 * MOST_VERTICES {
-            let fault = TemplateFault::TooMany(accessor.count() / 3);
-            return Err(TemplateError::Unfit { path: self.path.into(), fault });
-        }
         let number = |b: &[u8]| b.iter().rev().fold(0u32, |n, &byte| n << 8 | u32::from(byte));
         self.elements(accessor, size, number)
     }

@@ -38,6 +38,11 @@ impl Arc {
     }
 }
 
+/// Which share of the time from frame `a` to frame `b` is over in frame `k`.
+pub(super) fn share(times_s: &[f64], a: usize, b: usize, k: usize) -> f64 {
+    if a == b { 0.0 } else { (times_s[k] - times_s[a]) / (times_s[b] - times_s[a]) }
+}
+
 /// Indices of the fewest of `n` keys that do, ascending, the first and the last among them: `spans` is asked for (a, b) with
 /// a + 1 < b whether all keys between the two can be left out. One key where `still` says that one will do.
 ///

@@ -17,6 +17,6 @@ pub use frame::{Frame, Luma, Picture, PixelFormat, RawFrame, Rgb, Size, nanoseco
 pub use hierarchy::{Cluster, ClusterId, MotionHierarchy};
 pub use outline::Outline;
 pub use pose::{JointPose, Pose};
-pub use skeleton::{Node, NodeId, NodeName, Skeleton};
+pub use skeleton::{FARTHEST_PX, Node, NodeId, NodeName, Skeleton};
 pub use snapshot::{BranchRow, CameraState, FormatNote, Phase, Snapshot};
 pub use track::{LONGEST_TRIAL_S, Observation, TrackId, TrackSet};

@@ -3,6 +3,9 @@
 use super::Size;
 use nalgebra::Point3;
 
+/// What lies farther from the foot than this, or at a place that is no number, is neither read nor drawn, px.
+pub const FARTHEST_PX: f64 = 1e6;
+
 /// Index into [`Skeleton::nodes`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct NodeId(pub u32);

@@ -1,6 +1,7 @@
 //! From the skeleton to all that is drawn of a tree: wood, and leaves where the film shows them.
 
-use super::{bark, leaves};
+use super::bark;
+use super::leaves::InLeaf;
 use crate::config::{Config, EnvelopeKind};
 use crate::model::{Luma, NodeId, Outline, Pose, Rgb, Skeleton};
 use crate::motion;
@@ -14,8 +15,8 @@ pub struct Seen<'a> {
     pub picture: Option<&'a Rgb>,
     pub pose: Option<&'a Pose>,
     pub outline: Option<&'a Outline>,
-    /// Whether `outline` is a drawn shape that the tree was cut to, not what was filmed.
-    pub cut: bool,
+    /// The drawn shape, in the picture, that the tree was cut to. It stands in the tree's place at rest.
+    pub cut_to: Option<&'a Outline>,
     /// A leaf of the user's own, and a drawn density of the leaves, which goes before the picture's.
     pub leaf: Option<&'a Template>,
     pub density: Option<&'a Luma>,
@@ -30,12 +31,18 @@ pub fn flutter(dressed: &Dressed, poses: &[Pose], skeleton: &Skeleton, config: &
 /// Dresses a skeleton.
 pub fn dress(skeleton: &Skeleton, seen: Seen, config: &Config) -> Dressed {
     let seed = config.wood.seed.into();
-    let room =
-        room(skeleton, seen.outline, if seen.cut { Bounds::Drawn } else { Bounds::Filmed(config.shape.envelope) });
-    let limbs = limbs(skeleton, &room, &config.wood, seed);
+    let room = match seen.cut_to {
+        Some(shape) => room(skeleton, Some(shape), Bounds::Drawn),
+        None => room(skeleton, seen.outline, Bounds::Filmed(config.shape.envelope)),
+    };
+    let in_leaf = InLeaf::of(skeleton, &seen, &config.leaves);
+    let mut limbs = limbs(skeleton, &room, &config.wood, seed);
+    if let Some(in_leaf) = &in_leaf {
+        limbs = in_leaf.wood(limbs, skeleton, &seen);
+    }
     let wood = wood_levels(&limbs, config.wood.triangles as usize);
     let bark = bark::colour(&seen, skeleton);
-    let foliage = leaves::foliage(&limbs, skeleton, &seen, &config.leaves, seed);
+    let foliage = in_leaf.map(|l| l.foliage(&limbs, skeleton, &seen, &config.leaves, seed)).unwrap_or_default();
     Dressed { limbs, wood, foliage, bark_rgb: bark.unwrap_or(bark::PLAIN) }
 }
 
@@ -57,11 +64,7 @@ pub(super) fn room<'a>(
     let foot_px = skeleton.foot_px;
     let envelope = outline.map(|outline| match bounds {
         Bounds::Drawn => Envelope::of_drawn(outline, foot_px),
-        Bounds::Filmed(EnvelopeKind::Revolution) => Envelope::of_revolution(outline, foot_px),
-        Bounds::Filmed(EnvelopeKind::Hull) => {
-            let measured = skeleton.nodes.iter().filter(|n| n.copy_of.is_none());
-            Envelope::of_hull(&measured.map(|n| n.position).collect::<Vec<_>>())
-        }
+        Bounds::Filmed(kind) => Envelope::of_filmed(kind, outline, foot_px, &places(skeleton)),
     });
     move |from: &Point3<f64>, to: &Point3<f64>| match (&envelope, outline) {
         (Some(envelope), Some(outline)) => {
@@ -72,4 +75,9 @@ pub(super) fn room<'a>(
         }
         _ => true,
     }
+}
+
+/// Where the measured nodes are, model axes, px.
+pub(super) fn places(skeleton: &Skeleton) -> Vec<Point3<f64>> {
+    skeleton.nodes[..skeleton.measured()].iter().map(|n| n.position).collect()
 }

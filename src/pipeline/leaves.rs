@@ -10,47 +10,88 @@ use crate::track::Detector;
 const SEED_DISTANCE_PX: f64 = 3.0;
 const SEED_QUALITY: f64 = 1e-4;
 
-/// Leaves for `limbs` if the settings ask for them, or the picture shows them.
-pub(super) fn foliage(
-    limbs: &[Limb],
-    skeleton: &Skeleton,
-    seen: &Seen,
-    settings: &config::Leaves,
-    seed: u64,
-) -> Foliage {
-    let wanted = match settings.show {
-        LeafShow::Off => false,
-        LeafShow::On => true,
-        // Who draws a density wants leaves.
-        LeafShow::Auto => seen.density.is_some() || in_leaf(skeleton, seen),
-    };
-    if !wanted {
-        return Foliage::default();
-    }
-    let seeds = match (seen.picture, seen.outline) {
-        (Some(picture), Some(outline)) if picture.size == outline.size => seeds(picture, outline, settings.seeds),
-        _ => Vec::new(),
-    };
-    let view = LeafView {
-        picture: seen.picture,
-        outline: seen.outline,
-        pose: seen.pose,
-        density: seen.density,
-        seeds: &seeds,
-    };
-    let ours;
-    let template = match seen.leaf {
-        Some(given) => given,
-        None => {
-            ours = Template::ours();
-            &ours
-        }
-    };
-    shape::foliage(limbs, skeleton, &view, template, settings, seed)
+/// What is to be known of the leaves before they grow.
+pub(super) struct InLeaf {
+    seeds: Vec<[f32; 2]>,
+    /// The picture shows them.
+    filmed: bool,
+    /// A drawn density, where there is one: nothing grows outside of the outline, or of the shape that the tree was cut to.
+    density: Option<Luma>,
 }
 
-fn in_leaf(skeleton: &Skeleton, seen: &Seen) -> bool {
-    let season = seen.picture.zip(seen.outline).and_then(|(p, o)| shape::season(p, o, skeleton));
+impl InLeaf {
+    /// `None` where the tree is to have no leaves: the settings say so, or the picture shows none.
+    pub fn of(skeleton: &Skeleton, seen: &Seen, settings: &config::Leaves) -> Option<Self> {
+        let filmed = in_leaf(skeleton, seen.picture, seen.outline);
+        let wanted = match settings.show {
+            LeafShow::Off => false,
+            LeafShow::On => true,
+            // Who draws a density wants leaves.
+            LeafShow::Auto => seen.density.is_some() || filmed,
+        };
+        if !wanted {
+            return None;
+        }
+        let mut seeds = match (seen.picture, seen.outline) {
+            (Some(picture), Some(outline)) if picture.size == outline.size => seeds(picture, outline, settings.seeds),
+            _ => Vec::new(),
+        };
+        if let Some(shape) = seen.cut_to {
+            seeds.retain(|[u, v]| shape.contains(f64::from(*u), f64::from(*v)));
+        }
+        let density = seen.density.cloned().or_else(|| seen.cut_to.map(whole)).map(|drawn| {
+            let within = seen.cut_to.or(seen.outline).filter(|o| o.size == drawn.size);
+            within.map_or(drawn.clone(), |outline| inside(drawn, outline))
+        });
+        Some(Self { seeds, filmed, density })
+    }
+
+    /// The wood of a tree in leaf. A picture of a bare tree says nothing of where leaves, and with them wood, may be.
+    pub fn wood(&self, limbs: Vec<Limb>, skeleton: &Skeleton, seen: &Seen) -> Vec<Limb> {
+        if self.filmed { shape::within_leaves(limbs, skeleton, &self.view(seen)) } else { limbs }
+    }
+
+    pub fn foliage(
+        &self,
+        limbs: &[Limb],
+        skeleton: &Skeleton,
+        seen: &Seen,
+        settings: &config::Leaves,
+        seed: u64,
+    ) -> Foliage {
+        let ours;
+        let template = match seen.leaf {
+            Some(given) => given,
+            None => {
+                ours = Template::ours();
+                &ours
+            }
+        };
+        shape::foliage(limbs, skeleton, &self.view(seen), template, settings, seed)
+    }
+
+    fn view<'a>(&'a self, seen: &Seen<'a>) -> LeafView<'a> {
+        let &Seen { picture, outline, .. } = seen;
+        // A tree that was cut fills its shape at rest.
+        let pose = seen.pose.filter(|_| seen.cut_to.is_none());
+        LeafView { picture, outline, pose, density: self.density.as_ref(), seeds: &self.seeds }
+    }
+}
+
+/// Leaves all over a shape.
+fn whole(shape: &Outline) -> Luma {
+    Luma { size: shape.size, pixels: vec![u8::MAX; shape.mask.len()] }
+}
+
+/// Black outside of the outline.
+fn inside(mut drawn: Luma, outline: &Outline) -> Luma {
+    drawn.pixels.iter_mut().zip(&outline.mask).filter(|(_, m)| **m == 0).for_each(|(p, _)| *p = 0);
+    drawn
+}
+
+/// Whether the picture shows a tree in leaf; without picture or outline nobody knows, and it is taken for bare.
+fn in_leaf(skeleton: &Skeleton, picture: Option<&Rgb>, outline: Option<&Outline>) -> bool {
+    let season = picture.zip(outline).and_then(|(p, o)| shape::season(p, o, skeleton));
     season.is_some_and(|s| s.in_leaf >= 0.5)
 }
 

@@ -1,6 +1,6 @@
 //! The tree once more, from what has been seen since: who is who, and whether it is better.
 
-use super::{Moment, Tree, build};
+use super::{Moment, Tree, build, dress, thicken};
 use crate::config::Config;
 use crate::hierarchy::{self, Gain, OnBoth};
 use crate::model::{MotionHierarchy, NodeId, NodeName, Skeleton, TrackId};
@@ -87,8 +87,11 @@ impl Refinement {
         let measured = self.measured_twins(tree);
         let mut skeleton = (*tree.skeleton).clone();
         let twins = twins(&skeleton, old, &measured);
-        let envelope = Envelope::of_revolution(&tree.outline, old.foot_px);
+        let kind = self.config.shape.envelope;
+        let envelope = Envelope::of_filmed(kind, &tree.outline, old.foot_px, &dress::places(&skeleton));
         stand_as_before(&mut skeleton, old, &twins, &envelope);
+        // Twigs, and with them the pipes, follow from how far the branches reach.
+        thicken(&mut skeleton, &tree.outline, &self.config);
         let mut names = self.standing.names;
         for (node, twin) in skeleton.nodes.iter_mut().zip(&twins) {
             node.name = twin.and_then(|t| old.name_of(t.old)).unwrap_or_else(|| {

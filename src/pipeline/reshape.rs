@@ -6,6 +6,9 @@ use crate::model::{ClusterId, NodeName, Outline, Skeleton};
 use crate::shape::{Drawn, Topiary, TopiaryError};
 use crate::{shape, skeleton};
 
+/// Nodes that a tree may have, copies included, to be given another shape: pushing them takes time with their square.
+pub const MOST_RESHAPED: usize = 4096;
+
 /// Stands the measured nodes up anew as `config` says. They keep their places in the picture and their names; copies get
 /// names that no node had before.
 pub fn reshape(old: &Skeleton, outline: &Outline, config: &Config) -> Skeleton {

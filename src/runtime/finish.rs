@@ -23,7 +23,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 /// Joints times frames up to which the fewest keys of the animation are looked for: a service is given two seconds to stop.
-const THOROUGH_UP_TO: usize = 120_000;
+const THOROUGH_UP_TO: usize = 100_000;
 
 /// Figures of the tracking, gathered frame by frame.
 #[derive(Clone, Debug, Default)]

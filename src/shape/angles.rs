@@ -8,8 +8,8 @@ use std::f64::consts::PI;
 /// The normal distribution of eq. 4 over branching angles, wider near the root.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Angles {
-    /// mu, the expected angle, radians.
-    pub mean: f64,
+    /// mu, radians.
+    pub expected: f64,
     /// d_max.
     deepest: u8,
     /// Factor on the paper's sigma.
@@ -20,7 +20,7 @@ impl Angles {
     /// As they are in `skeleton`, which still lies in its planes.
     pub fn of(skeleton: &Skeleton, settings: &config::Shape) -> Self {
         let deepest = skeleton.nodes.iter().map(|n| n.level).max().unwrap_or(0);
-        Self { mean: mean_branching_angle(skeleton), deepest, tolerance: settings.angle_tolerance }
+        Self { expected: expected_branching_angle(skeleton), deepest, tolerance: settings.angle_tolerance }
     }
 
     /// ln of eq. 4 for a branch that ends at `level`, at `angle` (radians) to the one that it grows from.
@@ -28,7 +28,7 @@ impl Angles {
         // sigma_i = pi (d_max - d_i) / d_max; a tip would get 0 and could not move at all, so tips get half a step.
         let above = f64::from(self.deepest.saturating_sub(level)).max(0.5);
         let sigma = self.tolerance * PI * above / f64::from(self.deepest.max(1));
-        -(angle - self.mean).powi(2) / (2.0 * sigma * sigma)
+        -(angle - self.expected).powi(2) / (2.0 * sigma * sigma)
     }
 
     /// Geometric mean of eq. 4 over all branches of `skeleton` above the trunk, 0 to 1: how likely its angles are.
@@ -46,11 +46,26 @@ pub(super) fn angle_between(a: &Point3<f64>, b: &Point3<f64>, c: &Point3<f64>) -
     (b - a).angle(&(c - b))
 }
 
-/// mu of eq. 4: the mean of all branching angles of the measured branches, radians; 45 degrees where there are none.
-pub fn mean_branching_angle(skeleton: &Skeleton) -> f64 {
+/// mu of eq. 4: the median of all branching angles of the measured branches, each by the length of the shorter branch, radians;
+/// 45 degrees where there are none. The paper's is the mean; but a fork that was found some pixels off turns a
+/// short branch right round, and a few such angles of 150 degrees and more would make zigzags the likeliest of branches.
+pub fn expected_branching_angle(skeleton: &Skeleton) -> f64 {
+    let length = |i: usize| {
+        let node = &skeleton.nodes[i];
+        node.parent.map_or(0.0, |p| (node.position - skeleton.nodes[p.index()].position).norm())
+    };
+    let shorter = |i: usize| skeleton.nodes[i].parent.map_or(0.0, |p| length(i).min(length(p.index())));
     let measured = (0..skeleton.nodes.len()).filter(|&i| skeleton.nodes[i].copy_of.is_none());
-    let angles: Vec<f64> = measured.filter_map(|i| branching_angle(skeleton, i)).collect();
-    if angles.is_empty() { PI / 4.0 } else { angles.iter().sum::<f64>() / angles.len() as f64 }
+    let mut angles: Vec<(f64, f64)> =
+        measured.filter_map(|i| Some((branching_angle(skeleton, i)?, shorter(i)))).filter(|a| a.1 > 0.0).collect();
+    angles.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half: f64 = angles.iter().map(|a| a.1).sum::<f64>() / 2.0;
+    let mut below = 0.0;
+    let middle = angles.iter().find(|(_, weight)| {
+        below += weight;
+        below >= half
+    });
+    middle.map_or(PI / 4.0, |a| a.0)
 }
 
 /// Angle at which branch `i` leaves the one that it grows from; `None` for what grows from the ground.

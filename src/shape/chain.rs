@@ -1,6 +1,7 @@
 //! Chains: limbs that go on in one another, drawn as one tube without a seam.
 
-use super::limb::{FARTHEST_PX, Limb, Station};
+use super::limb::{Limb, Station};
+use crate::model::FARTHEST_PX;
 use nalgebra::Vector3;
 
 /// Edges along a tube are at most so many times as long as those around it.

@@ -2,8 +2,12 @@
 //! hull of the skeleton turned (Zeng section 5.5), or a drawn shape.
 
 use super::hull::{convex_hull, crossed};
+use crate::config::EnvelopeKind;
 use crate::model::Outline;
 use nalgebra::Point3;
+
+/// Farthest from the foot that a point of a hull is, px: there is a disc for every pixel of its height.
+const FARTHEST_OF_HULL: f64 = 32_768.0;
 
 /// A stack of discs, one a pixel row: at height y the tree lies within `radius` of (`centre_x`, y, 0), model axes, px.
 /// A drawn shape has, besides, what of each row is inside as seen from the front.
@@ -40,16 +44,18 @@ impl Envelope {
     pub fn of_drawn(outline: &Outline, foot_px: [f64; 2]) -> Self {
         let mut envelope = Self::of_revolution(outline, foot_px);
         let width = outline.size.width as usize;
-        let bottom = foot_px[1] - envelope.bottom_y;
-        let row = |k: usize| &outline.mask[(bottom as usize).saturating_sub(k) * width..][..width];
-        envelope.stretches = (0..envelope.discs.len()).map(|k| stretches(row(k), foot_px[0])).collect();
+        // Not from the heights: those of a foot that is far away are not exact.
+        let Some([_, top, _, bottom]) = outline.bounds_px() else { return envelope };
+        let rows = (top..=bottom).rev().map(|v| &outline.mask[v as usize * width..][..width]);
+        envelope.stretches = rows.map(|row| stretches(row, foot_px[0])).collect();
         envelope
     }
 
-    /// Turns the convex hull of `points` (model axes, px; z is not looked at), half a pixel wider all around.
+    /// Turns the convex hull of `points` (model axes, px; z is not looked at), half a pixel wider all around. Points farther
+    /// from the foot than any picture is large are left out.
     pub fn of_hull(points: &[Point3<f64>]) -> Self {
         let flat: Vec<[f64; 2]> =
-            points.iter().map(|p| [p.x, p.y]).filter(|p| p.iter().all(|c| c.is_finite())).collect();
+            points.iter().map(|p| [p.x, p.y]).filter(|p| p.iter().all(|c| c.abs() <= FARTHEST_OF_HULL)).collect();
         let hull = convex_hull(&flat);
         let ys = || hull.iter().map(|p| p[1]);
         let (bottom, top) = (ys().fold(f64::INFINITY, f64::min).floor(), ys().fold(f64::NEG_INFINITY, f64::max).ceil());
@@ -62,6 +68,14 @@ impl Envelope {
             Disc::between(left - 0.5, right + 0.5)
         };
         Self { bottom_y: bottom, discs: (0..rows).map(disc).collect(), stretches: Vec::new() }
+    }
+
+    /// Of a filmed tree whose measured nodes are at `places` (model axes, px), as the settings name it.
+    pub fn of_filmed(kind: EnvelopeKind, outline: &Outline, foot_px: [f64; 2], places: &[Point3<f64>]) -> Self {
+        match kind {
+            EnvelopeKind::Revolution => Self::of_revolution(outline, foot_px),
+            EnvelopeKind::Hull => Self::of_hull(places),
+        }
     }
 
     fn turned(bounds: Option<[u32; 4]>, width: usize, mask: &[u8], foot_px: [f64; 2]) -> Self {
@@ -184,4 +198,25 @@ fn stretches(row: &[u8], foot_u: f64) -> Vec<[f64; 2]> {
         open = m != 0;
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Size;
+
+    /// A damaged file may say that the foot, or a node, is anywhere.
+    #[test]
+    fn numbers_from_a_damaged_file_give_an_envelope_all_the_same() {
+        let size = Size::new(8, 6);
+        let outline = Outline { size, mask: vec![255; 48], polygon_px: Vec::new(), matte: None };
+        for foot in [1e18, -1e18, 7.5] {
+            let envelope = Envelope::of_drawn(&outline, [foot, foot]);
+            assert_eq!((envelope.discs.len(), envelope.stretches.len()), (6, 6));
+        }
+        let far =
+            [Point3::origin(), Point3::new(3.0, 40.0, 0.0), Point3::new(1e9, 1e9, 0.0), Point3::new(0.0, 1e300, 0.0)];
+        assert_eq!(Envelope::of_hull(&far).height(), 41.0);
+        assert_eq!(Envelope::of_hull(&far[2..]).height(), 0.0);
+    }
 }

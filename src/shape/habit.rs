@@ -49,11 +49,11 @@ impl Habit {
         let nodes = &skeleton.nodes;
         let lengths: Vec<f64> = (0..nodes.len()).map(|i| length(skeleton, i)).collect();
         let mut reach_px = vec![0.0_f64; nodes.len()];
-        let mut is_tip = vec![true; nodes.len()];
+        let mut children: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
         for i in (0..nodes.len()).rev() {
             if let Some(p) = nodes[i].parent.map(|p| p.index()).filter(|&p| p < i) {
                 reach_px[p] = reach_px[p].max(lengths[i] + reach_px[i]);
-                is_tip[p] = false;
+                children[p].push(i);
             }
         }
         let goes_on = continuations(skeleton);
@@ -67,10 +67,10 @@ impl Habit {
                 angles.push(own.angle(&before).clamp(ANGLES[0], ANGLES[1]));
                 ratios.push(((lengths[i] + reach_px[i]) / reach_px[p]).clamp(RATIOS[0], RATIOS[1]));
             }
-            if is_tip[i] {
+            if children[i].is_empty() {
                 slopes.push(own.y);
             }
-            parts.extend(part(skeleton, i, lengths[i] + reach_px[i]));
+            parts.extend(part(skeleton, &children, i, lengths[i] + reach_px[i]));
         }
         let lift = (slopes.iter().sum::<f64>() / slopes.len().max(1) as f64).clamp(0.0, 1.0);
         if parts.is_empty() {
@@ -94,26 +94,30 @@ fn length(skeleton: &Skeleton, i: usize) -> f64 {
 }
 
 /// Branch `base` with all above it, if it is a part worth copying: some branches, none of which turns back.
-fn part(skeleton: &Skeleton, base: usize, reach_px: f64) -> Option<Part> {
+fn part(skeleton: &Skeleton, children: &[Vec<usize>], base: usize, reach_px: f64) -> Option<Part> {
     let nodes = &skeleton.nodes;
     let along = way(skeleton, base)?;
     let upright = UnitQuaternion::rotation_between(&along, &Vector3::y())?;
     let origin = nodes[nodes[base].parent?.index()].position;
-    let mut place: Vec<Option<usize>> = vec![None; nodes.len()];
-    let mut pieces = Vec::new();
-    for i in base..nodes.len() {
-        let parent = nodes[i].parent.map(|p| p.index());
-        let within = parent.and_then(|p| place[p]);
-        if i != base && within.is_none() {
-            continue;
-        }
-        let own = way(skeleton, i)?;
-        let before = parent.filter(|_| i != base).and_then(|p| way(skeleton, p));
-        if before.is_some_and(|b| b.angle(&own) > 0.8 * FRAC_PI_2) || pieces.len() == *PART_BRANCHES.end() {
+    let mut all = vec![base];
+    for next in 0..=*PART_BRANCHES.end() {
+        let Some(&from) = all.get(next) else { break };
+        all.extend(&children[from]);
+        if all.len() > *PART_BRANCHES.end() {
             return None;
         }
-        place[i] = Some(pieces.len());
-        pieces.push(Piece { parent: within, to: upright * (nodes[i].position - origin) / reach_px });
+    }
+    all.sort_unstable();
+    let mut pieces = Vec::with_capacity(all.len());
+    for &i in &all {
+        let parent = nodes[i].parent.map(|p| p.index()).filter(|_| i != base);
+        let own = way(skeleton, i)?;
+        let before = parent.and_then(|p| way(skeleton, p));
+        if before.is_some_and(|b| b.angle(&own) > 0.8 * FRAC_PI_2) {
+            return None;
+        }
+        let place = parent.and_then(|p| all.binary_search(&p).ok());
+        pieces.push(Piece { parent: place, to: upright * (nodes[i].position - origin) / reach_px });
     }
     PART_BRANCHES.contains(&pieces.len()).then_some(Part { pieces })
 }

@@ -4,7 +4,7 @@ use super::chance::Chance;
 use super::curl::Curve;
 use super::{radius, twigs};
 use crate::config;
-use crate::model::{NodeId, Skeleton};
+use crate::model::{FARTHEST_PX, NodeId, Skeleton};
 use nalgebra::{Point3, Vector3};
 
 /// Which joints move a point, and their shares: joint `i` is node `i` of the skeleton.
@@ -115,8 +115,6 @@ pub(super) struct Grown {
 /// Whether a twig may grow from one point to another, model axes at rest, px.
 pub type Room<'a> = &'a dyn Fn(&Point3<f64>, &Point3<f64>) -> bool;
 
-/// What lies farther from the foot than this, or at a place that is no number, is not drawn, px.
-pub(super) const FARTHEST_PX: f64 = 1e6;
 /// Straight pieces that the middle line of a branch is told in.
 const PIECES: u32 = 12;
 

@@ -2,7 +2,7 @@
 //! and the mirrored ellipsoid of figure 4 a.
 
 use super::fuse::one_sided;
-use super::{Angles, Prototype, Terms, diener, envelope_distance, fuse};
+use super::{Angles, Prototype, Terms, diener, envelope_distance};
 use crate::config;
 use crate::model::{Outline, Skeleton};
 use crate::skeleton::Node2d;
@@ -27,10 +27,11 @@ pub struct Variants {
 
 /// What the push has achieved.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct PushFigures {
     pub attractors: u32,
     /// mu of eq. 4, degrees.
-    pub mean_angle_deg: f64,
+    pub expected_angle_deg: f64,
     /// D of eq. 5, px: the sum over the attractors of the distance to the nearest node.
     pub distance_px: Variants,
     /// Geometric mean of eq. 4 over all branches above the trunk, 0 to 1.
@@ -40,24 +41,23 @@ pub struct PushFigures {
 }
 
 impl PushFigures {
-    /// Measures all variants of the tree that is built of the same.
-    pub fn of(flat: &[Node2d], tracks: &[u32], outline: &Outline, settings: &config::Shape) -> Self {
+    /// Measures `fused`, the tree as it stands, beside all other variants that can be built of the same.
+    pub fn of(fused: &Skeleton, flat: &[Node2d], tracks: &[u32], outline: &Outline, settings: &config::Shape) -> Self {
         let Prototype { skeleton: rest, envelope, trunk } = Prototype::of(flat, tracks, outline, settings);
         let angles = Angles::of(&rest, settings);
         let pushed = |terms: Terms| one_sided(&rest, &trunk, &envelope, settings, terms);
         let (global, local) = (pushed(Terms::Global), pushed(Terms::Local));
-        let (mut fused, diener) = (rest.clone(), diener(flat, tracks, &trunk, outline));
-        fuse(&mut fused, &trunk, &envelope, settings);
+        let diener = diener(flat, tracks, &trunk, outline);
         let all = |of: &dyn Fn(&Skeleton) -> f64| Variants {
             rest: of(&rest),
             global_only: of(&global),
             local_only: of(&local),
-            fused: of(&fused),
+            fused: of(fused),
             diener: of(&diener),
         };
         Self {
             attractors: settings.attractors,
-            mean_angle_deg: angles.mean.to_degrees(),
+            expected_angle_deg: angles.expected.to_degrees(),
             distance_px: all(&|s| envelope_distance(s, &envelope, settings.attractors as usize)),
             angle_likelihood: all(&|s| angles.likelihood(s)),
             side_symmetry: all(&side_symmetry),

@@ -27,7 +27,7 @@ mod trunk;
 mod tube;
 mod twigs;
 
-pub use angles::{Angles, mean_branching_angle};
+pub use angles::{Angles, expected_branching_angle};
 pub use chance::Chance;
 pub use curl::CURL_BOUND;
 pub use cylinders::{Cylinder, cylinders};
@@ -40,7 +40,7 @@ pub use girth::trunk_radius_px;
 pub use keep::{Twin, stand_as_before, twins};
 pub use leaves::{
     LeafView, Sampling, Season, Template, TemplateFault, TemplateMesh, density_match, foliage, foliage_by, leaf_cover,
-    season,
+    season, within_leaves,
 };
 pub use limb::{Limb, Riding, Room, Station, limbs};
 pub use measure::{PushFigures, side_symmetry};
@@ -51,7 +51,7 @@ pub use radius::{PIPE_EXPONENTS, TIP_RADIUS_PX, thicken};
 pub use topiary::{Cut, Drawn, Topiary, TopiaryError, coverage, topiary};
 pub use trunk::{is_trunk, trunk};
 
-use crate::config::{self, EnvelopeKind};
+use crate::config;
 use crate::model::{Outline, Skeleton};
 use crate::skeleton::Node2d;
 use nalgebra::Point3;
@@ -76,13 +76,9 @@ impl Prototype {
     /// Copies `flat` to its planes in the envelope that the settings name.
     pub fn of(flat: &[Node2d], tracks: &[u32], outline: &Outline, settings: &config::Shape) -> Self {
         let foot_px = flat.first().map_or([0.0, 0.0], |n| n.position_px);
-        let envelope = match settings.envelope {
-            EnvelopeKind::Revolution => Envelope::of_revolution(outline, foot_px),
-            EnvelopeKind::Hull => {
-                let place = |n: &Node2d| Point3::new(n.position_px[0] - foot_px[0], foot_px[1] - n.position_px[1], 0.0);
-                Envelope::of_hull(&flat.iter().map(place).collect::<Vec<_>>())
-            }
-        };
+        let place = |n: &Node2d| Point3::new(n.position_px[0] - foot_px[0], foot_px[1] - n.position_px[1], 0.0);
+        let places: Vec<Point3<f64>> = flat.iter().map(place).collect();
+        let envelope = Envelope::of_filmed(settings.envelope, outline, foot_px, &places);
         let trunk = trunk(flat, settings.leader, &settings.leader_px);
         let skeleton = copy_to_planes(flat, tracks, &trunk, outline, &envelope, settings.planes);
         Self { skeleton, envelope, trunk }

@@ -41,11 +41,13 @@ fn still(screen: &str) -> String {
         }
         out.trim_end().to_owned()
     };
+    // A refinement is told when it is through, however long it took.
+    let refined = |l: &String| l.starts_with("the tree was refined");
     // Where the two views of the tree stand depends on its shape: they are named last, whichever there are.
     let views = ["Front", "Side"];
     let is_view = |l: &String| l.split(' ').all(|word| views.contains(&word));
     let (of_views, mut lines): (Vec<String>, Vec<String>) =
-        masked.lines().map(squeeze).filter(|l| !l.is_empty()).partition(is_view);
+        masked.lines().map(squeeze).filter(|l| !l.is_empty() && !refined(l)).partition(is_view);
     lines.extend(views.into_iter().filter(|v| of_views.iter().any(|l| l.contains(v))).map(str::to_owned));
     // How many of the branches there is room for is told only where some are left out.
     lines.join("\n").replace("Branches, of", "Branches,")

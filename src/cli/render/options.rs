@@ -105,6 +105,10 @@ impl RenderArgs {
                 "--film behind goes with the front view only, from where it was filmed; use --film beside".into()
             );
         }
+        if self.film == Some(FilmPlace::Behind) && (self.at.is_some() || self.pose.is_some() || kind == Kind::Video) {
+            let one = "--film behind lays the tree over the one frame that the capture holds, as it was in it";
+            return Err(format!("{one}; leave out --at and --pose, and make a picture, or use --film beside"));
+        }
         Ok(kind)
     }
 

@@ -4,6 +4,7 @@
 //! given to a branch, which says how deep in the tree it stands, is carried back with that branch from the picture's pose
 //! to the rest, and gets a copy of the template in the picture's colours.
 
+mod beyond;
 mod canvas;
 mod carry;
 mod cluster;
@@ -19,6 +20,7 @@ mod template;
 mod texture;
 mod wood;
 
+pub use beyond::within_leaves;
 pub use season::{Season, season};
 pub use template::{Template, TemplateFault, TemplateMesh};
 

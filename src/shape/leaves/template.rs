@@ -3,9 +3,6 @@
 use super::texture;
 use nalgebra::{Point3, Rotation3, Vector3};
 
-/// Triangles of a template at most: there are hundreds of copies of it.
-pub const MOST_TRIANGLES: usize = 5_000;
-
 /// A cluster of leaves of size 1: it grows from the origin along y, its leaves turn their faces to z.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Template {
@@ -41,8 +38,11 @@ pub struct TemplateMesh {
 pub enum TemplateFault {
     #[error("it has no triangles")]
     Empty,
-    #[error("it has {0} triangles, and at most {MOST_TRIANGLES} are taken")]
+    #[error("it has {0} triangles, and at most {most} are taken", most = Template::MOST_TRIANGLES)]
     TooMany(usize),
+    /// Whoever reads a file bounds what of it is looked at.
+    #[error("it has {found} vertices, and at most {most} are looked at")]
+    TooManyVertices { found: usize, most: usize },
     #[error("it has vectors of different lengths or indices beyond them")]
     Torn,
     #[error("it has positions that are no numbers")]
@@ -57,6 +57,9 @@ pub enum TemplateFault {
 const LARGEST_TEXTURE: u32 = 4096;
 
 impl Template {
+    /// Triangles of a template at most: there are hundreds of copies of it.
+    pub const MOST_TRIANGLES: usize = 5_000;
+
     /// Our own: five leaves of four triangles, folded along their midrib, around a twig.
     pub fn ours() -> Self {
         let mut mesh = TemplateMesh::default();
@@ -88,23 +91,27 @@ impl Template {
     }
 
     /// A template from a mesh of any size, which is scaled so that its longest side is 1 and moved so that the middle of its
-    /// lowest end is the origin. Missing normals are computed.
+    /// lowest end is the origin. Missing normals are computed. Vertices that no triangle uses are left out: every copy would
+    /// carry them.
     ///
     /// # Errors
     /// What [`TemplateFault`] names.
-    pub fn new(mesh: TemplateMesh) -> Result<Self, TemplateFault> {
+    pub fn new(mut mesh: TemplateMesh) -> Result<Self, TemplateFault> {
         let n = mesh.positions.len();
         let triangles = mesh.indices.len() / 3;
         if triangles == 0 || n == 0 {
             return Err(TemplateFault::Empty);
         }
-        if triangles > MOST_TRIANGLES || n > 3 * MOST_TRIANGLES {
+        if triangles > Self::MOST_TRIANGLES {
             return Err(TemplateFault::TooMany(triangles));
         }
         let same = |m: usize| m == 0 || m == n;
         if !same(mesh.normals.len()) || !same(mesh.uvs.len()) || mesh.indices.iter().any(|&i| i as usize >= n) {
             return Err(TemplateFault::Torn);
         }
+        mesh.indices.truncate(3 * triangles);
+        keep_used(&mut mesh);
+        let n = mesh.positions.len();
         let numbers = mesh.positions.iter().chain(&mesh.normals).flatten().chain(mesh.uvs.iter().flatten());
         if !numbers.into_iter().all(|x| x.is_finite() && x.abs() < 1e12) {
             return Err(TemplateFault::NoNumbers);
@@ -174,6 +181,24 @@ fn leaf(mesh: &mut TemplateMesh, from: Vector3<f64>, stand: &Rotation3<f64>, len
         mesh.uvs.push([(0.5 + x / 0.64) as f32, (1.0 - y) as f32]);
     }
     mesh.indices.extend(TRIANGLES.map(|i| first + i));
+}
+
+/// Leaves out the vertices that no triangle uses.
+fn keep_used(mesh: &mut TemplateMesh) {
+    let mut used = vec![false; mesh.positions.len()];
+    mesh.indices.iter().for_each(|&i| used[i as usize] = true);
+    let mut new_index = vec![0; used.len()];
+    for (next, (new, _)) in (0..).zip(new_index.iter_mut().zip(&used).filter(|(_, used)| **used)) {
+        *new = next;
+    }
+    mesh.indices.iter_mut().for_each(|i| *i = new_index[*i as usize]);
+    fn only<T>(all: &mut Vec<T>, used: &[bool]) {
+        let mut each = used.iter();
+        all.retain(|_| each.next().is_none_or(|used| *used));
+    }
+    only(&mut mesh.positions, &used);
+    only(&mut mesh.normals, &used);
+    only(&mut mesh.uvs, &used);
 }
 
 /// Given normals made length 1, and those of the faces around where none is given or it is 0.
@@ -269,5 +294,22 @@ mod tests {
         assert_eq!(refused(|m| m.positions.fill([1.0; 3])), TemplateFault::Flat);
         assert_eq!(refused(|m| m.texture = Some(("image/png", vec![1, 2, 3]))), TemplateFault::BadTexture);
         assert_eq!(refused(|m| m.indices = [0, 1, 2].repeat(5001)), TemplateFault::TooMany(5001));
+    }
+
+    /// Exporters write the vertices of a whole scene beside one leaf's triangles; a thousand leaves would carry them all.
+    #[test]
+    fn vertices_without_a_triangle_are_left_out() {
+        let mesh = TemplateMesh {
+            positions: vec![[f32::NAN; 3], [0.0, 0.0, 0.0], [9e9; 3], [3.0, 0.0, 0.0], [0.0, 4.0, 0.0], [5.0; 3]],
+            normals: (0..6).map(|k| [0.0, 0.0, k as f32]).collect(),
+            uvs: (0..6).map(|k| [k as f32, 0.0]).collect(),
+            indices: vec![4, 1, 3, 5],
+            texture: None,
+        };
+        let template = Template::new(mesh).unwrap();
+        assert_eq!((template.positions.len(), &template.indices[..]), (3, &[2, 0, 1][..]));
+        assert_eq!(template.uvs, [[1.0, 0.0], [3.0, 0.0], [4.0, 0.0]]);
+        assert_eq!((template.normals.len(), template.apices.len()), (3, 1));
+        assert!((template.positions[2] - template.positions[0]).norm() > 0.9);
     }
 }

@@ -5,6 +5,9 @@ use crate::model::{Outline, Skeleton};
 /// A branch covers what is nearer to it than this share of the shape's larger side: about as far as the leaves on it
 /// reach.
 const REACH: f64 = 0.025;
+/// The shape is looked at in cells of several pixels where its picture has a longer side than this, px: the barest place is
+/// looked for anew after every branch.
+const LONGEST_SIDE: u32 = 640;
 
 /// Share of the pixels of `shape` that are within a fortieth of the shape's larger side of a branch or of the trunk, in the
 /// front projection: 0 to 1.
@@ -18,24 +21,32 @@ pub fn coverage(skeleton: &Skeleton, shape: &Outline) -> f64 {
     cover.share()
 }
 
-/// Which pixels of a shape are covered.
+/// Which cells of a shape are covered.
 pub struct Cover {
+    /// Side of a cell, px.
+    cell: usize,
     width: usize,
     height: usize,
     /// 1 where the shape is and nothing covers it yet.
     bare: Vec<u8>,
     bare_count: usize,
     all: usize,
-    pub reach_px: f64,
+    /// In cells, as all lengths below.
+    reach: f64,
 }
 
 impl Cover {
     pub fn of(shape: &Outline) -> Self {
         let larger = shape.bounds_px().map_or(0, |[left, top, right, bottom]| (right - left).max(bottom - top) + 1);
-        let bare: Vec<u8> = shape.mask.iter().map(|m| u8::from(*m != 0)).collect();
+        let size = shape.size;
+        let cell = size.width.max(size.height).div_ceil(LONGEST_SIDE).max(1) as usize;
+        let (width, height) = (size.width as usize / cell, size.height as usize / cell);
+        // The pixel in the middle of a cell speaks for it.
+        let pixel = |k: usize| (k / width * cell + cell / 2) * size.width as usize + k % width * cell + cell / 2;
+        let bare: Vec<u8> = (0..width * height).map(|k| u8::from(shape.mask[pixel(k)] != 0)).collect();
         let all = bare.iter().filter(|b| **b != 0).count();
-        let (width, height) = (shape.size.width as usize, shape.size.height as usize);
-        Self { width, height, bare, bare_count: all, all, reach_px: (REACH * f64::from(larger)).max(1.0) }
+        let reach = (REACH * f64::from(larger) / cell as f64).max(1.0);
+        Self { cell, width, height, bare, bare_count: all, all, reach }
     }
 
     /// Covered share, 0 to 1.
@@ -43,24 +54,24 @@ impl Cover {
         1.0 - self.bare_count as f64 / self.all.max(1) as f64
     }
 
-    /// Marks what a branch covers.
+    /// Marks what a branch covers; its ends in px.
     pub fn add(&mut self, branch: [[f64; 2]; 2]) {
         let mut newly = Vec::new();
-        self.near(branch, self.reach_px, |k| newly.push(k));
+        self.near(branch, self.reach, |k| newly.push(k));
         newly.into_iter().for_each(|k| self.cover(k));
     }
 
-    /// Bare pixels that a branch would cover.
+    /// Bare cells that a branch would cover; its ends in px.
     pub fn gain(&self, branch: [[f64; 2]; 2]) -> usize {
         let mut count = 0;
-        self.near(branch, self.reach_px, |k| count += usize::from(self.bare[k]));
+        self.near(branch, self.reach, |k| count += usize::from(self.bare[k]));
         count
     }
 
-    /// Notes the bare pixels near `at`, where nothing can be done.
+    /// Notes the bare cells near `at`, px, where nothing can be done.
     pub fn give_up(&self, at: [f64; 2], given_up: &mut Vec<usize>) {
         let mut near = Vec::new();
-        self.near([at, at], 0.5 * self.reach_px, |k| near.push(k));
+        self.near([at, at], 0.5 * self.reach, |k| near.push(k));
         given_up.extend(near.into_iter().filter(|&k| self.bare[k] != 0));
     }
 
@@ -69,7 +80,8 @@ impl Cover {
         self.bare[k] = 0;
     }
 
-    fn near(&self, [a, b]: [[f64; 2]; 2], reach: f64, mut each: impl FnMut(usize)) {
+    fn near(&self, ends_px: [[f64; 2]; 2], reach: f64, mut each: impl FnMut(usize)) {
+        let [a, b] = ends_px.map(|end| end.map(|x| (x - self.middle()) / self.cell as f64));
         if !a.iter().chain(&b).all(|x| x.is_finite()) {
             return;
         }
@@ -90,8 +102,13 @@ impl Cover {
         }
     }
 
-    /// The bare pixel that is farthest from what is covered or outside (city blocks), those in `given_up` left out; `None`
-    /// if no pixel is bare.
+    /// Of the pixel of a cell that speaks for it, from the cell's first, px.
+    fn middle(&self) -> f64 {
+        (self.cell / 2) as f64
+    }
+
+    /// The bare cell that is farthest from what is covered or outside (city blocks), those in `given_up` left out: its
+    /// middle, px. `None` if no cell is bare.
     pub fn barest(&self, given_up: &[usize]) -> Option<[f64; 2]> {
         let (w, h) = (self.width, self.height);
         let mut far: Vec<u32> = self.bare.iter().map(|b| if *b != 0 { u32::MAX } else { 0 }).collect();
@@ -108,6 +125,39 @@ impl Cover {
             far[k] = far[k].min(after.saturating_add(1));
         }
         let (k, _) = far.iter().enumerate().filter(|(_, d)| **d > 0).max_by(|a, b| a.1.cmp(b.1).then(b.0.cmp(&a.0)))?;
-        Some([(k % w) as f64, (k / w) as f64])
+        Some([k % w, k / w].map(|x| (x * self.cell) as f64 + self.middle()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Size;
+
+    /// A disc, four fifths as high as the picture, in a picture of `side` px.
+    fn disc(side: u32) -> Outline {
+        let inside = |k: u32| {
+            let (x, y) = (f64::from(k % side) - f64::from(side) / 2.0, f64::from(k / side) - f64::from(side) / 2.0);
+            x.hypot(y) <= 0.4 * f64::from(side)
+        };
+        let mask = (0..side * side).map(|k| u8::from(inside(k)) * 255).collect();
+        Outline { size: Size::new(side, side), mask, polygon_px: Vec::new(), matte: None }
+    }
+
+    /// A film in 4K has nine times the pixels of one in HD, and every branch that is added looks at all.
+    #[test]
+    fn a_large_picture_is_looked_at_coarsely_and_gives_the_same() {
+        let of = |side: u32| {
+            let mut cover = Cover::of(&disc(side));
+            let px = f64::from(side);
+            let barest = cover.barest(&[]).unwrap().map(|x| x / px);
+            cover.add([[0.3 * px, 0.5 * px], [0.7 * px, 0.5 * px]]);
+            (cover.bare.len(), barest, cover.share())
+        };
+        let ((cells, barest, share), (cells_large, barest_large, share_large)) = (of(600), of(4200));
+        assert_eq!((cells, cells_large), (600 * 600, 600 * 600));
+        assert!((share / share_large - 1.0).abs() < 0.1 && share > 0.03, "{share} and {share_large}");
+        assert!((0..2).all(|c| (barest[c] - barest_large[c]).abs() < 0.01), "{barest:?} and {barest_large:?}");
+        assert!((0..2).all(|c| (barest[c] - 0.5).abs() < 0.01), "{barest:?}");
     }
 }

@@ -31,14 +31,13 @@ pub fn cut(skeleton: &Skeleton, envelope: &Envelope) -> Result<Pruned, TopiaryEr
     for i in 0..nodes.len() {
         let (at, Some(parent)) = (nodes[i].position, nodes[i].parent.map(|p| p.index())) else { continue };
         let from = nodes[parent].position;
-        if nodes[i].level < 2 {
-            nodes[i].position = trunk_top(&from, &at, envelope)?;
-            continue;
-        }
         let original = nodes[i].copy_of.map_or(i, |o| o.index());
-        is_left[i] = goes_on[parent] && is_left[original] && at.coords.iter().all(|x| x.is_finite());
+        let is_trunk = nodes[i].level < 2;
+        is_left[i] = goes_on[parent] && is_left[original] && (is_trunk || at.coords.iter().all(|x| x.is_finite()));
         if !is_left[i] {
             goes_on[i] = false;
+        } else if is_trunk {
+            nodes[i].position = trunk_top(&from, &at, envelope)?;
         } else if !envelope.contains(&at) {
             let share = inside_share(&from, &at, envelope);
             (is_left[i], goes_on[i]) = (share >= STUMP, false);

@@ -8,7 +8,7 @@ const INSIDE: u8 = 128;
 /// Why a drawn shape is not taken.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TopiaryError {
-    #[error("has no alpha: every pixel is opaque; save the shape on a transparent background")]
+    #[error("has no transparent pixel, so that the shape fills the whole picture; save it on a transparent background")]
     NoAlpha,
     #[error("is empty: every pixel is transparent; draw the shape opaque")]
     Empty,

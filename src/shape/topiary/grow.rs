@@ -28,8 +28,15 @@ struct Shoot {
     score: f64,
 }
 
-/// Adds copies until the shape is covered or nothing more can be reached.
-pub fn grow(skeleton: &mut Skeleton, envelope: &Envelope, shape: &Outline, settings: &config::Shape, seed: u64) {
+/// Adds copies until the shape is covered or nothing more can be reached. They get names above `last`, which is the highest
+/// that any node of the tree had.
+pub fn grow(
+    skeleton: &mut Skeleton,
+    (envelope, shape): (&Envelope, &Outline),
+    last: u32,
+    settings: &config::Shape,
+    seed: u64,
+) {
     let angles = Angles::of(skeleton, settings);
     let measured = skeleton.measured();
     let all = subtrees(skeleton);
@@ -42,7 +49,7 @@ pub fn grow(skeleton: &mut Skeleton, envelope: &Envelope, shape: &Outline, setti
         cover.add(seen(skeleton, &skeleton.nodes[i]));
     }
     let first = skeleton.nodes.len();
-    let mut names = skeleton.nodes.iter().map(|n| n.name.0).max().unwrap_or(0);
+    let mut last = last;
     let mut given_up = Vec::new();
     if measured < 2 {
         return;
@@ -68,8 +75,10 @@ pub fn grow(skeleton: &mut Skeleton, envelope: &Envelope, shape: &Outline, setti
             .max_by(|a, b| a.score.total_cmp(&b.score));
         let before = cover.share();
         for mut node in shoot.into_iter().flat_map(|s| s.nodes) {
-            names += 1;
-            node.name = NodeName(names);
+            // Names are used up: none is given twice.
+            let Some(next) = last.checked_add(1) else { return };
+            last = next;
+            node.name = NodeName(last);
             cover.add(seen(skeleton, &node));
             skeleton.nodes.push(node);
         }

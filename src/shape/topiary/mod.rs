@@ -13,6 +13,9 @@ use crate::config;
 use crate::model::{JointPose, NodeId, Outline, Pose, Skeleton};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
+/// A shape that leaves out no more of the outline than this share holds the tree: nobody draws to the last pixel.
+const LARGER: f64 = 0.01;
+
 /// A tree that was cut to a shape.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Topiary {
@@ -52,7 +55,9 @@ pub fn topiary(
 ) -> Result<Topiary, TopiaryError> {
     let shape = drawn.placed(outline, skeleton.foot_px)?;
     let itself = |i: usize| skeleton.nodes[i].copy_of.unwrap_or(NodeId(i as u32));
-    if outline.mask.iter().zip(&shape.mask).all(|(tree, shape)| *tree == 0 || *shape != 0) {
+    let tree = outline.mask.iter().filter(|m| **m != 0).count();
+    let outside = outline.mask.iter().zip(&shape.mask).filter(|(tree, shape)| **tree != 0 && **shape == 0).count();
+    if outside as f64 <= LARGER * tree as f64 {
         let coverage = coverage(skeleton, &shape);
         let moves_as = (0..skeleton.nodes.len()).map(itself).collect();
         let cut = Cut { larger: true, coverage, ..Cut::default() };
@@ -64,9 +69,11 @@ pub fn topiary(
     let trunk: Vec<bool> = kept.iter().map(|&i| was_trunk[i]).collect();
     fuse(&mut pruned, &trunk, &envelope, settings);
     let left = pruned.nodes.len();
-    grow::grow(&mut pruned, &envelope, &shape, settings, seed);
+    // What was cut keeps its number: no other branch gets it.
+    let last = skeleton.nodes.iter().map(|n| n.name.0).max().unwrap_or(0);
+    grow::grow(&mut pruned, (&envelope, &shape), last, settings, seed);
     let moves_as = |n: usize| match (pruned.nodes[n].copy_of, kept.get(n)) {
-        (Some(original), _) => NodeId(kept[original.index()] as u32),
+        (Some(original), _) => NodeId(kept.get(original.index()).map_or(0, |&k| k as u32)),
         (None, Some(&i)) => itself(i),
         (None, None) => NodeId(0),
     };
@@ -88,7 +95,7 @@ impl Topiary {
         let rotation = |i: usize| whole.joints.get(i).map_or(still.rotation, |j| j.rotation);
         let mut joints: Vec<JointPose> = Vec::with_capacity(self.skeleton.nodes.len());
         for (node, original) in self.skeleton.nodes.iter().zip(&self.moves_as) {
-            let Some(parent) = node.parent else {
+            let Some(parent) = node.parent.filter(|p| p.index() < joints.len()) else {
                 joints.push(whole.joints.first().copied().unwrap_or(still));
                 continue;
             };
