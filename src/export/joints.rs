@@ -74,7 +74,7 @@ fn keys(skeleton: &Skeleton, (poses, times): (&[&Pose], &[f64]), tolerance_px: f
         let aims = one_hemisphere(frames.clone().map(|k| branch.aim(k)));
         let path =
             Path { times_s: times, aims: &aims, miss: |k: usize, turn: &UnitQuaternion<f64>| branch.miss(k, turn) };
-        let on_aims = || {
+        let on_aims = {
             let aim = |k: usize| UnitQuaternion::new_unchecked(Quaternion::from(aims[k]));
             let spans = |a: usize, b: usize| {
                 let arc = Arc::new(&aim(a), &aim(b));
@@ -87,10 +87,11 @@ fn keys(skeleton: &Skeleton, (poses, times): (&[&Pose], &[f64]), tolerance_px: f
             path.on_aims(&thin(times.len(), one, spans))
         };
         let keys = if thorough {
-            let planned = path.mended(branch.planned(&aims, times));
-            path.fewer(planned.unwrap_or_else(on_aims))
+            // The plan takes arcs for straight, so even turning is better off on its path.
+            let planned = path.mended(branch.planned(&aims, times)).filter(|keys| keys.len() < on_aims.len());
+            path.fewer(planned.unwrap_or(on_aims))
         } else {
-            on_aims()
+            on_aims
         };
         shown.push(branch.shown(base, &played(&keys, times)));
         let rotations = one_hemisphere(keys.iter().map(|(_, turn)| unit(turn)));
