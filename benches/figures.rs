@@ -27,10 +27,10 @@ use std::time::Duration;
 use tracking::{median, timed_ms};
 
 /// With a word, `make bench ONLY=tracking`, `ONLY=wood` or `ONLY=pose`, only the figures of the tracker, of the static tree, or
-/// of the pose of many branches.
+/// of the pose of many branches and the model's file.
 fn main() {
     if std::env::args().any(|a| a == "pose") {
-        println!("{}", pose_of_127());
+        println!("{}\n{}", pose_of_127(), model_file());
         return;
     }
     if std::env::args().any(|a| a == "wood") {
