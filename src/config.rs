@@ -165,7 +165,7 @@ pub struct Motion {
     /// How fast a branch is expected to lean towards the viewer or away, degrees a second (standard deviation): the
     /// picture hardly shows it, so tracking noise would else make the tree tremble in depth.
     pub depth_rate_deg_s: f64,
-    /// Largest rotation of a branch against its parent from one frame to the next, degrees.
+    /// Largest rotation of a branch against its parent from one frame to the next (in 1/30 s, where frames are rarer), degrees.
     pub max_step_deg: f64,
     /// Largest accumulated rotation of a branch against its parent, degrees.
     pub max_total_deg: f64,

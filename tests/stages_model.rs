@@ -266,6 +266,7 @@ fn problem(target: Option<[f64; 2]>) -> Problem {
         sigma_track_px: 1.0,
         sigma_shape: 0.3,
         sigma_depth: None,
+        sigma_lean: None,
         max_step: 0.2,
         max_total: 0.5,
     }

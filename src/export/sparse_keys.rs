@@ -13,7 +13,6 @@ const ITERATIONS: usize = 16;
 /// By now the misses show whether there is a chance.
 const LOOKED_AT: usize = 3;
 const HOPELESS: f64 = 1.8;
-const PASSES: usize = 2;
 /// Turns that differ by less (as quaternions) are one: far below what tolerances are, far above rounding.
 const CLOSED: f64 = 1e-7;
 
@@ -55,17 +54,11 @@ impl<F: Fn(usize, &UnitQuaternion<f64>) -> f64> Path<'_, F> {
 
     /// As few of these keys, which do, as can be found beside the path.
     pub fn fewer(&self, mut keys: Vec<Key>) -> Vec<Key> {
-        for _ in 0..PASSES {
-            let before = keys.len();
-            let mut j = 1;
-            while j + 1 < keys.len() {
-                match self.without(&keys, j) {
-                    Some(fewer) => keys = fewer,
-                    None => j += 1,
-                }
-            }
-            if keys.len() == before {
-                break;
+        let mut j = 1;
+        while j + 1 < keys.len() {
+            match self.without(&keys, j) {
+                Some(fewer) => keys = fewer,
+                None => j += 1,
             }
         }
         keys

@@ -106,3 +106,88 @@ fn outermost(points: &[usize], rest_px: &[[f64; 2]], rank: impl Fn([f64; 2]) -> 
     points.truncate(((SHARE * points.len() as f64) as usize).max(LEAST));
     centroid(rest_px, &points)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::binary::Part;
+    use super::*;
+
+    const FOOT: [f64; 2] = [100.0, 200.0];
+
+    /// A limb for each entry: the point from which it leaves (`None`: the foot), its points, and whether they are a branch.
+    type Limb<'a> = (Option<usize>, &'a [[f64; 2]], bool);
+
+    /// Ends of a tree whose root holds all points, and which has a child for each limb that is a branch.
+    fn ends(foot_px: [f64; 2], limbs: &[Limb]) -> Vec<[f64; 2]> {
+        let (mut rest_px, mut reached, mut branches) = (Vec::new(), Vec::new(), Vec::new());
+        for &(mut from, points, is_branch) in limbs {
+            let first = rest_px.len();
+            for p in points {
+                reached.push((rest_px.len(), from));
+                from = Some(rest_px.len());
+                rest_px.push(*p);
+            }
+            if is_branch {
+                branches.push((first, rest_px.len()));
+            }
+        }
+        let n = rest_px.len();
+        let whole = Part { from: 0, to: n, halves: None };
+        let part = |&(from, to): &(usize, usize)| Part { from, to, halves: None };
+        let tree = Binary {
+            order: (0..n).collect(),
+            parts: std::iter::once(whole).chain(branches.iter().map(part)).collect(),
+        };
+        let root = Node { parent: None, level: 0, part: 0, certainty: 1.0 };
+        let child = |k: usize| Node { parent: Some(0), level: 1, part: k + 1, certainty: 0.0 };
+        let nodes: Vec<Node> = std::iter::once(root).chain((0..branches.len()).map(child)).collect();
+        ends_px(&nodes, &tree, &reached, &rest_px, foot_px)
+    }
+
+    fn line(from: [f64; 2], step: [f64; 2], n: usize) -> Vec<[f64; 2]> {
+        (0..n).map(|k| [from[0] + step[0] * k as f64, from[1] + step[1] * k as f64]).collect()
+    }
+
+    /// Else the picture would show a fork in the air between two limbs.
+    #[test]
+    fn a_fork_lies_on_the_stem_and_tips_on_their_limbs() {
+        let trunk = line([100.0, 190.0], [0.0, -10.0], 8);
+        let (left, right) = (line([90.0, 110.0], [-10.0, -10.0], 6), line([110.0, 112.0], [12.0, -8.0], 6));
+        let ends = ends(FOOT, &[(None, &trunk, false), (Some(7), &left, true), (Some(7), &right, true)]);
+        assert_eq!(ends.len(), 3);
+        assert!(ends[0][0] == 100.0 && (115.0..140.0).contains(&ends[0][1]), "fork: {:?}", ends[0]);
+        let (tip, near) = (ends[1], left[4]);
+        assert!((tip[0] - near[0]).hypot(tip[1] - near[1]) < 1e-9, "left tip: {tip:?}");
+        assert!((ends[2][0] - right[4][0]).hypot(ends[2][1] - right[4][1]) < 1e-9, "right tip: {:?}", ends[2]);
+    }
+
+    /// What the papers' centroids get wrong: halfway between a low branch and the crown above it nothing parts.
+    #[test]
+    fn a_low_branch_leaves_the_trunk_where_it_does_and_not_halfway_up_the_crown() {
+        let trunk = line([100.0, 190.0], [0.0, -10.0], 4);
+        let low = line([90.0, 158.0], [-10.0, -3.0], 5);
+        let above = line([100.0, 150.0], [0.0, -10.0], 14);
+        let ends = ends(FOOT, &[(None, &trunk, false), (Some(3), &low, true), (Some(3), &above, true)]);
+        assert!(ends[0][0] == 100.0 && (158.0..182.0).contains(&ends[0][1]), "fork: {:?}", ends[0]);
+        assert!(ends[2][1] < 40.0, "the crown goes on to its top: {:?}", ends[2]);
+    }
+
+    #[test]
+    fn a_trunk_without_points_ends_where_the_crown_begins() {
+        let (left, right) = (line([90.0, 100.0], [-8.0, -8.0], 6), line([110.0, 100.0], [8.0, -8.0], 6));
+        let ends = ends(FOOT, &[(None, &left, true), (None, &right, true)]);
+        assert!((ends[0][0] - 100.0).abs() < 1.0 && (90.0..=110.0).contains(&ends[0][1]), "top: {:?}", ends[0]);
+    }
+
+    /// A branch of no length has no direction, and could not be posed.
+    #[test]
+    fn no_branch_ends_where_it_begins() {
+        // The way to the right branch is told by its first points alone, right at the fork.
+        let trunk = line([100.0, 190.0], [0.0, -10.0], 8);
+        let (left, right) = (line([90.0, 110.0], [-10.0, -10.0], 6), [[101.0, 121.0], [99.0, 119.0], [104.0, 90.0]]);
+        let ends = ends(FOOT, &[(None, &trunk, false), (Some(7), &left, true), (Some(7), &right, true)]);
+        for tip in &ends[1..] {
+            assert!((tip[0] - ends[0][0]).hypot(tip[1] - ends[0][1]) > 10.0, "{tip:?} at the fork {:?}", ends[0]);
+        }
+    }
+}

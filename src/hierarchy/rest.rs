@@ -50,3 +50,42 @@ pub fn crown_begins(rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> Option<[f64; 2]>
     let share = (lowest / (foot_px[1] - middle[1]).max(1.0)).clamp(0.0, 1.0);
     Some([0, 1].map(|c| foot_px[c] + share * (middle[c] - foot_px[c])))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two limbs that part at `fork`.
+    fn crown(fork: [f64; 2]) -> Vec<[f64; 2]> {
+        let limb =
+            |side: f64| (1..=10).map(move |k| [fork[0] + side * 5.0 * f64::from(k), fork[1] - 6.0 * f64::from(k)]);
+        limb(-1.0).chain(limb(1.0)).collect()
+    }
+
+    #[test]
+    fn a_bare_trunk_is_as_high_as_the_lowest_of_the_crown() {
+        let top = crown_begins(&crown([100.0, 100.0]), [100.0, 200.0]).expect("a bare trunk");
+        assert!((top[0] - 100.0).abs() < 1e-9 && (90.0..=100.0).contains(&top[1]), "{top:?}");
+        // One track that has gone astray must not pull the crown down to the ground.
+        let mut astray: Vec<[f64; 2]> = crown([100.0, 100.0]).into_iter().chain(crown([100.0, 100.0])).collect();
+        astray.push([160.0, 195.0]);
+        let top = crown_begins(&astray, [100.0, 200.0]).expect("a bare trunk");
+        assert!((85.0..=110.0).contains(&top[1]), "{top:?}");
+    }
+
+    #[test]
+    fn points_on_the_trunk_say_better_where_it_goes() {
+        let mut points = crown([100.0, 100.0]);
+        points.push([101.0, 185.0]);
+        assert_eq!(crown_begins(&points, [100.0, 200.0]), None);
+        assert_eq!(crown_begins(&[], [100.0, 200.0]), None);
+    }
+
+    #[test]
+    fn a_crown_below_the_foot_puts_the_top_on_the_foot() {
+        // A tree that hangs from a cliff: nothing is above the foot, and the trunk must not leave the picture.
+        let hanging = crown([100.0, 330.0]);
+        let top = crown_begins(&hanging, [100.0, 200.0]).expect("no points near the foot");
+        assert!(top.iter().all(|c| c.is_finite()) && top == [100.0, 200.0], "{top:?}");
+    }
+}

@@ -1,17 +1,13 @@
 //! Which track moves which node, and where the tracks of a frame put every node in the picture.
 
+use super::local::{self, Nearby};
 use crate::model::{MotionHierarchy, NodeId, Skeleton, TrackId, TrackSet};
 use std::collections::BTreeMap;
 
 /// A later track is given to the nearest tip only within so many times the mean distance between tips.
 const REACH: f64 = 2.0;
-/// A node moves as this share of the points on it and above it, those nearest to it at rest: it stands at a fork or a tip,
-/// and what is farther out on the branch swings farther.
-const NEAREST: f64 = 0.4;
-/// But as so many points at least, where there are as many.
-const LEAST: usize = 8;
-/// Share of the displacements cut off at either end before the mean is taken: some tracks are always wrong.
-const TRIM: f64 = 0.2;
+/// The points around a node count over this share of the picture's width at least.
+const LEAST: f64 = 0.01;
 
 /// A track's node and the place in the picture to which it belongs at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,9 +24,9 @@ pub struct Binding {
     rest_px: Vec<[f64; 2]>,
     tips: Vec<NodeId>,
     reach_px: f64,
-    /// Displacements of the present frame by node, each with the squared distance of its point from the node at rest; kept
-    /// for their memory.
-    collected: Vec<Vec<([f64; 2], f64)>>,
+    least_px: f64,
+    /// Points of the present frame by node; kept for their memory.
+    collected: Vec<Vec<Nearby>>,
 }
 
 impl Binding {
@@ -68,6 +64,7 @@ impl Binding {
             rest_px: rest,
             tips,
             reach_px,
+            least_px: LEAST * f64::from(skeleton.image_size.width),
         }
     }
 
@@ -98,7 +95,7 @@ impl Binding {
             .collected
             .iter_mut()
             .zip(&self.rest_px)
-            .map(|(d, rest)| trimmed_mean(nearest(d)).map(|d| [rest[0] + d[0], rest[1] + d[1]]))
+            .map(|(d, rest)| local::displacement(d, self.least_px).map(|d| [rest[0] + d[0], rest[1] + d[1]]))
             .collect();
         let new = set.observations.iter().filter(|o| o.confirmed && !self.tracks.contains_key(&o.id));
         // A tip that has lost all its tracks is where the nearest branch below it that is seen would carry it.
@@ -136,43 +133,15 @@ impl Binding {
             let d = [f64::from(o.u_px) - bound.rest_px[0], f64::from(o.v_px) - bound.rest_px[1]];
             let mut at = Some(bound.node);
             while let Some(node) = at {
-                self.collected[node.index()].push((d, distance_sq(bound.rest_px, self.rest_px[node.index()])));
+                let rest = self.rest_px[node.index()];
+                let offset = [bound.rest_px[0] - rest[0], bound.rest_px[1] - rest[1]];
+                self.collected[node.index()].push(Nearby { displacement: d, offset });
                 at = self.parents[node.index()];
             }
         }
     }
 }
 
-/// Those of the displacements whose points are nearest; reorders them.
-fn nearest(all: &mut [([f64; 2], f64)]) -> &mut [([f64; 2], f64)] {
-    let n = ((NEAREST * all.len() as f64).ceil() as usize).max(LEAST);
-    if n < all.len() {
-        all.select_nth_unstable_by(n - 1, |a, b| a.1.total_cmp(&b.1));
-        &mut all[..n]
-    } else {
-        all
-    }
-}
-
-/// Mean of the middle of the displacements, coordinate by coordinate; reorders them.
-fn trimmed_mean(values: &mut [([f64; 2], f64)]) -> Option<[f64; 2]> {
-    if values.is_empty() {
-        return None;
-    }
-    let cut = (values.len() as f64 * TRIM) as usize;
-    let mut mean = [0.0; 2];
-    for (c, m) in mean.iter_mut().enumerate() {
-        values.sort_unstable_by(|(a, _), (b, _)| a[c].total_cmp(&b[c]));
-        let kept = &values[cut..values.len() - cut];
-        *m = kept.iter().map(|(v, _)| v[c]).sum::<f64>() / kept.len() as f64;
-    }
-    Some(mean)
-}
-
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
-}
-
-fn distance_sq(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2)
 }

@@ -3,10 +3,13 @@
 
 mod between;
 mod binding;
+mod border;
 mod deterministic;
 mod flutter;
+mod local;
 mod probabilistic;
 mod recover;
+mod search;
 
 pub use between::between;
 pub use binding::Binding;
@@ -18,7 +21,14 @@ use crate::config::{Motion, MotionMethod};
 use crate::model::{JointPose, NodeId, Pose, Skeleton};
 use nalgebra::{Unit, UnitQuaternion, UnitVector3, Vector3};
 use probabilistic::shortest_rotation;
+use std::f64::consts::PI;
 use std::sync::Arc;
+
+/// Rate at which the largest step of the settings is meant for one frame.
+const FRAMES_PER_S: f64 = 30.0;
+/// Standard deviation of how far a branch leans to the viewer or away beyond its rest, as a share of that of its angle to its
+/// parent. The angle may be wide of the rest's because tracks say so; for depth nothing speaks but a shortening.
+const LEAN: f64 = 0.2;
 
 /// One branch at rest.
 struct Branch {
@@ -123,6 +133,18 @@ impl PoseEstimator {
         turn * (parent_rotation.inverse() * joints[original.index()].rotation) * turn.inverse()
     }
 
+    /// By how much the direction of a branch may change that was `turned` from its rest, so that the branch turns by no more than
+    /// `max_step_deg` in a frame, or in 1/30 s where frames are rarer.
+    ///
+    /// The turn from rest to a direction is the shortest one. Between two directions up to an angle theta from the rest these
+    /// turns differ by up to 1 / cos(theta / 2) times the angle between the directions.
+    fn largest_step(&self, turned: f64, elapsed_s: f64) -> f64 {
+        let frames = (elapsed_s * FRAMES_PER_S).max(1.0);
+        let bound = (self.settings.max_step_deg.to_radians() * frames).min(PI);
+        // Beyond 120 degrees, where only settings of one's own let it come, there would soon be nothing left.
+        bound * (0.5 * (turned + bound).min(self.settings.max_total_deg.to_radians())).cos().max(0.5)
+    }
+
     /// Direction of branch `i` in the axes of its parent branch at rest.
     fn direction(
         &self,
@@ -147,13 +169,10 @@ impl PoseEstimator {
                 previous_direction: previous.unwrap_or(branch.direction),
                 sigma_track_px: self.settings.sigma_track_px,
                 sigma_shape: branch.sigma_shape,
-                // The first frame has none before it: depth may then differ from the rest's as the branch's own angle may.
-                // Without that a branch and its mirror image in depth are all but equally probable (eq. 8 and 10 tell
-                // them apart by the parent's lean alone), and it would start on either side.
-                sigma_depth: Some(
-                    previous.map_or(branch.sigma_shape, |_| self.settings.depth_rate_deg_s.to_radians() * elapsed_s),
-                ),
-                max_step: previous.map_or(std::f64::consts::PI, |_| self.settings.max_step_deg.to_radians()),
+                // The first frame has none before it.
+                sigma_depth: previous.map(|_| self.settings.depth_rate_deg_s.to_radians() * elapsed_s),
+                sigma_lean: Some(LEAN * branch.sigma_shape),
+                max_step: previous.map_or(PI, |p| self.largest_step(p.angle(&branch.direction), elapsed_s)),
                 max_total: self.settings.max_total_deg.to_radians(),
             }
             .solve(),

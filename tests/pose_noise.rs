@@ -1,0 +1,241 @@
+//! Poses from noisy tracks: the probabilistic way against the deterministic one, on a made-up tree whose motion is known.
+
+use arborcam::config::{Motion, MotionMethod};
+use arborcam::model::{
+    Cluster, ClusterId, JointPose, MotionHierarchy, Node, NodeId, NodeName, Observation, Pose, Size, Skeleton, TrackId,
+    TrackSet,
+};
+use arborcam::motion::{Binding, PoseEstimator};
+use nalgebra::{Point3, UnitQuaternion, Vector3};
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+const FRAMES: usize = 240;
+const LEVELS: u8 = 5;
+/// Points that are followed on each branch.
+const POINTS: usize = 4;
+/// Share of the observations that are missing.
+const MISSING: f64 = 0.3;
+
+/// Numbers from 0 to 1, and normal ones, that are the same in every run.
+struct Chance(u64);
+
+impl Chance {
+    fn even(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as f64 / f64::from(1u32 << 31)
+    }
+
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.even()).sum::<f64>() - 6.0
+    }
+}
+
+/// Foot, trunk, and two branches at every node up to level [`LEVELS`]: 32 nodes, all measured.
+fn tree() -> Skeleton {
+    let node = |k: usize, parent: Option<usize>, level, position| Node {
+        name: NodeName(k as u32),
+        parent: parent.map(|p| NodeId(p as u32)),
+        level,
+        position,
+        radius: 1.0,
+        n_tracks: POINTS as u32,
+        certainty: 1.0,
+        copy_of: None,
+        plane_angle: 0.0,
+    };
+    let mut chance = Chance(3);
+    let mut nodes = vec![node(0, None, 0, Point3::origin()), node(1, Some(0), 1, Point3::new(3.0, 90.0, 0.0))];
+    let mut i = 1;
+    while i < nodes.len() {
+        let (level, at) = (nodes[i].level, nodes[i].position);
+        let way = (at - nodes[nodes[i].parent.unwrap().index()].position).normalize();
+        for side in [-1.0, 1.0].into_iter().filter(|_| level < LEVELS) {
+            let lean = way.x.atan2(way.y) + side * (0.45 + 0.15 * chance.even());
+            let length = 60.0 * 0.8_f64.powi(i32::from(level) - 1) * (0.9 + 0.2 * chance.even());
+            let depth = 0.9 * (chance.even() - 0.5);
+            let step = Vector3::new(lean.sin() * depth.cos(), lean.cos() * depth.cos(), depth.sin()) * length;
+            nodes.push(node(nodes.len(), Some(i), level + 1, at + step));
+        }
+        i += 1;
+    }
+    Skeleton { nodes, foot_px: [320.0, 340.0], image_size: Size::new(640, 360) }
+}
+
+/// Every branch sways against its parent, in the picture and towards the viewer.
+fn moved(tree: &Skeleton, frame: usize) -> Pose {
+    let time_s = frame as f64 / 30.0;
+    let mut joints: Vec<JointPose> = Vec::new();
+    for (i, node) in tree.nodes.iter().enumerate() {
+        let Some(parent) = node.parent.map(NodeId::index) else {
+            joints.push(JointPose { position: node.position, rotation: UnitQuaternion::identity() });
+            continue;
+        };
+        let level = f64::from(node.level);
+        let sway = |k: f64| {
+            let (hz, phase) = (0.5 + 0.35 * level + 0.05 * (k * 1.7 + i as f64).sin(), k * 2.1 + i as f64 * 0.9);
+            (TAU * hz * time_s + phase).sin()
+        };
+        let turn = Vector3::new(0.02 * sway(1.0), 0.0, 0.04 * sway(2.0)) * level;
+        let rotation = joints[parent].rotation * UnitQuaternion::from_scaled_axis(turn);
+        let way = node.position - tree.nodes[parent].position;
+        joints.push(JointPose { position: joints[parent].position + rotation * way, rotation });
+    }
+    Pose { frame: frame as u64, time_s, joints }
+}
+
+/// A place on a branch, from its beginning (0) to its end (1), in a pose.
+fn on_branch(tree: &Skeleton, pose: &Pose, node: usize, share: f64) -> [f64; 2] {
+    let parent = tree.nodes[node].parent.unwrap().index();
+    let (from, to) = (pose.joints[parent].position, pose.joints[node].position);
+    tree.image_from_model(&(from + (to - from) * share))
+}
+
+/// The tree's points: each branch's own, and where they rest.
+fn points(tree: &Skeleton) -> (MotionHierarchy, BTreeMap<TrackId, [f64; 2]>) {
+    let rest = Pose {
+        frame: 0,
+        time_s: 0.0,
+        joints: tree
+            .nodes
+            .iter()
+            .map(|n| JointPose { position: n.position, rotation: UnitQuaternion::identity() })
+            .collect(),
+    };
+    let branches = 1..tree.nodes.len();
+    let ids = |node: usize| (0..POINTS).map(move |k| TrackId((node * POINTS + k) as u32));
+    let inside = |node: usize, of: usize| {
+        std::iter::successors(Some(node), |&n| tree.nodes[n].parent.map(NodeId::index)).any(|n| n == of)
+    };
+    let cluster = |of: usize| Cluster {
+        parent: (of > 1).then(|| ClusterId(tree.nodes[of].parent.unwrap().0 - 1)),
+        level: tree.nodes[of].level - 1,
+        members: branches.clone().filter(|&n| inside(n, of)).flat_map(ids).collect(),
+        centroid_px: [0.0; 2],
+        end_px: None,
+        certainty: 1.0,
+    };
+    let place = |(n, k): (usize, usize)| {
+        (TrackId((n * POINTS + k) as u32), on_branch(tree, &rest, n, (k + 1) as f64 / POINTS as f64))
+    };
+    let places = branches.clone().flat_map(|n| (0..POINTS).map(move |k| (n, k))).map(place).collect();
+    (MotionHierarchy { clusters: branches.clone().map(cluster).collect() }, places)
+}
+
+fn seen(tree: &Skeleton, truth: &Pose, noise_px: f64, chance: &mut Chance) -> TrackSet {
+    let mut observations = Vec::new();
+    for node in 1..tree.nodes.len() {
+        for k in 0..POINTS {
+            let [u, v] = on_branch(tree, truth, node, (k + 1) as f64 / POINTS as f64);
+            let at = [u + noise_px * chance.normal(), v + noise_px * chance.normal()];
+            if chance.even() < MISSING {
+                continue;
+            }
+            observations.push(Observation {
+                id: TrackId((node * POINTS + k) as u32),
+                u_px: at[0] as f32,
+                v_px: at[1] as f32,
+                fb_error_px: 0.0,
+                error_px: None,
+                confirmed: true,
+            });
+        }
+    }
+    TrackSet { frame: truth.frame, time_s: truth.time_s, observations, ..TrackSet::default() }
+}
+
+/// How far poses are off.
+#[derive(Clone, Copy, Debug)]
+struct Off {
+    /// Root mean square deviation of the angles between branches from those at rest, degrees.
+    shape_deg: f64,
+    /// Root mean square distance of the projected nodes from the true ones, px.
+    motion_px: f64,
+}
+
+fn angle(tree: &Skeleton, at: &dyn Fn(usize) -> Point3<f64>, node: usize) -> Option<f64> {
+    let parent = tree.nodes[node].parent?.index();
+    let before = tree.nodes[parent].parent?.index();
+    Some((at(node) - at(parent)).angle(&(at(parent) - at(before))))
+}
+
+fn off(tree: &Skeleton, poses: &[Pose], truth: &[Pose]) -> Off {
+    let (mut shape, mut angles, mut motion, mut nodes) = (0.0, 0.0, 0.0, 0.0);
+    for (pose, truth) in poses.iter().zip(truth) {
+        for i in 1..tree.nodes.len() {
+            let (is, was) =
+                (tree.image_from_model(&pose.joints[i].position), tree.image_from_model(&truth.joints[i].position));
+            motion += (is[0] - was[0]).powi(2) + (is[1] - was[1]).powi(2);
+            nodes += 1.0;
+            let now = angle(tree, &|k| pose.joints[k].position, i);
+            let rest = angle(tree, &|k| tree.nodes[k].position, i);
+            if let Some((now, rest)) = now.zip(rest) {
+                shape += (now - rest).to_degrees().powi(2);
+                angles += 1.0;
+            }
+        }
+    }
+    Off { shape_deg: (shape / f64::max(angles, 1.0)).sqrt(), motion_px: (motion / f64::max(nodes, 1.0)).sqrt() }
+}
+
+/// Both ways on the same tracks: deterministic, probabilistic.
+fn both(noise_px: f64) -> [Off; 2] {
+    let tree = Arc::new(tree());
+    let truth: Vec<Pose> = (0..FRAMES).map(|k| moved(&tree, k)).collect();
+    let (hierarchy, rest_px) = points(&tree);
+    [MotionMethod::Deterministic, MotionMethod::Probabilistic].map(|method| {
+        let mut chance = Chance(11);
+        let mut binding = Binding::new(&hierarchy, &rest_px, &tree);
+        let mut estimator = PoseEstimator::new(tree.clone(), &Motion { method, ..Motion::default() });
+        let pose = |truth: &Pose| {
+            let set = seen(&tree, truth, noise_px, &mut chance);
+            estimator.step(set.frame, set.time_s, &binding.targets_px(&set))
+        };
+        let poses: Vec<Pose> = truth.iter().map(pose).collect();
+        off(&tree, &poses, &truth)
+    })
+}
+
+/// The table of docs/method.md.
+#[test]
+fn on_noisy_tracks_the_probabilistic_way_is_nearer_to_rest_and_to_the_truth() {
+    for noise_px in [0.0, 0.5, 1.0, 2.0, 4.0] {
+        let [deterministic, probabilistic] = both(noise_px);
+        println!(
+            "| {noise_px} px | {:.1} | {:.1} | {:.1} | {:.1} |",
+            deterministic.shape_deg, probabilistic.shape_deg, deterministic.motion_px, probabilistic.motion_px
+        );
+        assert!(
+            probabilistic.shape_deg < 0.8 * deterministic.shape_deg,
+            "{noise_px} px: angles {deterministic:?} {probabilistic:?}"
+        );
+        assert!(
+            probabilistic.motion_px < 0.9 * deterministic.motion_px,
+            "{noise_px} px: motion {deterministic:?} {probabilistic:?}"
+        );
+    }
+}
+
+/// What is left to the probabilistic way is what the tracks do not tell: with all of them, and without noise, it is as near as
+/// its points are, whose mean moves less than the branch's end.
+#[test]
+fn the_pose_smooths_nothing_that_the_film_shows() {
+    let tree = Arc::new(tree());
+    let mut estimator = PoseEstimator::new(tree.clone(), &Motion::default());
+    let (mut moved_px, mut off_px) = (0.0_f64, 0.0_f64);
+    for k in 0..FRAMES {
+        let truth = moved(&tree, k);
+        let targets: Vec<_> = truth.joints.iter().map(|j| Some(tree.image_from_model(&j.position))).collect();
+        let pose = estimator.step(k as u64, truth.time_s, &targets);
+        for (i, node) in tree.nodes.iter().enumerate() {
+            let [is, should, rest] =
+                [pose.joints[i].position, truth.joints[i].position, node.position].map(|p| tree.image_from_model(&p));
+            off_px += (is[0] - should[0]).powi(2) + (is[1] - should[1]).powi(2);
+            moved_px += (rest[0] - should[0]).powi(2) + (rest[1] - should[1]).powi(2);
+        }
+    }
+    let share = (off_px / moved_px).sqrt();
+    println!("{:.4} of the motion is missed", share);
+    assert!(share < 0.06, "{share}");
+}
