@@ -28,8 +28,8 @@ until_ok 60 shows 'Branches, [0-9]' || true
 sleep 2
 screen built
 press e
-until_ok 20 test -e "$work/live-1/tree.glb" || true
-sleep 1
+# A later message may take its place.
+until_ok 20 shows 'capture written to' || true
 screen exported
 now >/vm/live/asked
 press q
