@@ -1,46 +1,36 @@
 //! What a pose may and may not do: the best direction is found, bounds hold, depth is recovered.
 
+#[path = "support/chance.rs"]
+mod chance;
+
 use arborcam::config::{Motion, MotionMethod};
 use arborcam::model::{Node, NodeId, NodeName, Pose, Size, Skeleton};
 use arborcam::motion::{PoseEstimator, Problem};
+use chance::Chance;
 use nalgebra::{Point3, Unit, UnitQuaternion, UnitVector3, Vector3};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-/// Numbers from 0 to 1 that are the same in every run.
-struct Chance(u64);
+fn direction(chance: &mut Chance) -> UnitVector3<f64> {
+    Unit::new_normalize(Vector3::new(chance.normal(), chance.normal(), chance.normal()))
+}
 
-impl Chance {
-    fn even(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as f64 / f64::from(1u32 << 31)
-    }
-
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.even()).sum::<f64>() - 6.0
-    }
-
-    fn direction(&mut self) -> UnitVector3<f64> {
-        Unit::new_normalize(Vector3::new(self.normal(), self.normal(), self.normal()))
-    }
-
-    /// A direction at `angle` from `centre`.
-    fn beside(&mut self, centre: &UnitVector3<f64>, angle: f64) -> UnitVector3<f64> {
-        let axis = Unit::new_normalize(centre.cross(&self.direction()));
-        UnitQuaternion::from_axis_angle(&axis, angle) * centre
-    }
+/// A direction at `angle` from `centre`.
+fn beside(chance: &mut Chance, centre: &UnitVector3<f64>, angle: f64) -> UnitVector3<f64> {
+    let axis = Unit::new_normalize(centre.cross(&direction(chance)));
+    UnitQuaternion::from_axis_angle(&axis, angle) * centre
 }
 
 /// A branch somewhere within its bounds, seen where it might have gone, with more or less noise.
 fn some_problem(chance: &mut Chance, ours: bool) -> Problem {
     let (max_step, max_total) = (20f64.to_radians(), 70f64.to_radians());
-    let rest_direction = chance.direction();
+    let rest_direction = direction(chance);
     let angle = max_total * chance.even().sqrt();
-    let previous_direction = chance.beside(&rest_direction, angle);
+    let previous_direction = beside(chance, &rest_direction, angle);
     let near = max_step * 1.5 * chance.even();
-    let gone = if chance.even() < 0.7 { chance.beside(&previous_direction, near) } else { chance.direction() };
+    let gone = if chance.even() < 0.7 { beside(chance, &previous_direction, near) } else { direction(chance) };
     let length = 5.0 + 100.0 * chance.even();
-    let (axis, lean) = (chance.direction(), chance.even());
+    let (axis, lean) = (direction(chance), chance.even());
     let parent_rotation = UnitQuaternion::from_axis_angle(&axis, lean);
     let end = parent_rotation * gone.into_inner() * length;
     let noise_px = [0.1, 1.0, 5.0][(chance.even() * 3.0) as usize % 3];
@@ -49,7 +39,7 @@ fn some_problem(chance: &mut Chance, ours: bool) -> Problem {
         parent_rotation,
         length,
         target: Some([end.x + noise_px * chance.normal(), end.y + noise_px * chance.normal()]),
-        parent_direction: (chance.even() < 0.9).then(|| chance.beside(&rest_direction, apart)),
+        parent_direction: (chance.even() < 0.9).then(|| beside(chance, &rest_direction, apart)),
         rest_direction,
         previous_direction,
         sigma_track_px: 1.0,

@@ -1,11 +1,15 @@
 //! Poses from noisy tracks: the probabilistic way against the deterministic one, on a made-up tree whose motion is known.
 
+#[path = "support/chance.rs"]
+mod chance;
+
 use arborcam::config::{Motion, MotionMethod};
 use arborcam::model::{
     Cluster, ClusterId, JointPose, MotionHierarchy, Node, NodeId, NodeName, Observation, Pose, Size, Skeleton, TrackId,
     TrackSet,
 };
 use arborcam::motion::{Binding, PoseEstimator};
+use chance::Chance;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -17,20 +21,6 @@ const LEVELS: u8 = 5;
 const POINTS: usize = 4;
 /// Share of the observations that are missing.
 const MISSING: f64 = 0.3;
-
-/// Numbers from 0 to 1, and normal ones, that are the same in every run.
-struct Chance(u64);
-
-impl Chance {
-    fn even(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as f64 / f64::from(1u32 << 31)
-    }
-
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.even()).sum::<f64>() - 6.0
-    }
-}
 
 /// Foot, trunk, and two branches at every node up to level [`LEVELS`]: 32 nodes, all measured.
 fn tree() -> Skeleton {

@@ -7,7 +7,7 @@ pub use options::AnimateArgs;
 
 use super::export::page;
 use super::hangup::Hangup;
-use super::render::{self, RenderArgs, drawn};
+use super::render::{self, RenderArgs, drawn, failed};
 use super::session::stop_on_signals;
 use super::shaping::Made;
 use super::stop::Stop;
@@ -237,14 +237,5 @@ fn picture(args: &AnimateArgs, out: &Path) -> RenderArgs {
         seconds: video.then_some(length_s),
         fps: args.fps,
         shaping: super::shaping::Shaping::default(),
-    }
-}
-
-fn failed(e: ExportError) -> Ended {
-    match e {
-        ExportError::Exists { path } => {
-            Ended::Failed(anyhow!("{} exists already; choose another file, or remove it first", path.display()))
-        }
-        e => Ended::Failed(e.into()),
     }
 }

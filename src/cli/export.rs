@@ -92,7 +92,8 @@ pub fn page(made: &Made, model: &Model, title: &str) -> Result<Vec<u8>, ExportEr
     html::page(&html::Page { title, glb: &model, data: &data, picture }).map(String::into_bytes)
 }
 
-fn failed(e: ExportError) -> Ended {
+/// How a command ends whose files could not be written.
+pub fn failed(e: ExportError) -> Ended {
     match e {
         ExportError::Stopped => Ended::Stopped,
         e => Ended::Failed(e.into()),

@@ -4,6 +4,7 @@ mod options;
 
 pub use options::{Kind, RenderArgs, ViewName, background, rate, size};
 
+use super::export;
 use super::shaping::Made;
 use super::stop::Stop;
 use super::{Ended, say};
@@ -187,13 +188,13 @@ impl<'a> Studio<'a> {
     }
 }
 
-fn failed(e: ExportError) -> Ended {
+/// The same of one file.
+pub fn failed(e: ExportError) -> Ended {
     match e {
-        ExportError::Stopped => Ended::Stopped,
         ExportError::Exists { path } => {
             Ended::Failed(anyhow::anyhow!("{} exists already; choose another file, or remove it first", path.display()))
         }
-        e => Ended::Failed(e.into()),
+        e => export::failed(e),
     }
 }
 
@@ -210,4 +211,17 @@ fn there_and_back(way: f64, length: f64) -> f64 {
     }
     let along = way.rem_euclid(2.0 * length);
     if along > length { 2.0 * length - along } else { along }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Status 130, by which a script tells Ctrl-C from a failure.
+    #[test]
+    fn who_was_stopped_has_not_failed() {
+        assert!(matches!(failed(ExportError::Stopped), Ended::Stopped));
+        let taken = ExportError::Exists { path: "a.png".into() };
+        assert!(matches!(failed(taken), Ended::Failed(e) if e.to_string().contains("another file")));
+    }
 }

@@ -12,6 +12,7 @@ mod guard;
 mod input;
 mod layout;
 mod moving;
+mod opened;
 mod panels;
 mod placed;
 mod progress;
@@ -31,13 +32,13 @@ pub use progress::Progress;
 pub use theme::Depth;
 
 use crate::model::{Control, Snapshot};
-use graphics::Graphics;
 use guard::Guard;
+use opened::Opened;
 use ratatui::Terminal;
 use ratatui::backend::CrosstermBackend;
 use ratatui::crossterm::event;
 use state::State;
-use std::io::{IsTerminal, Stdout, stdout};
+use std::io::Stdout;
 use std::mem::ManuallyDrop;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -99,16 +100,7 @@ pub enum TuiError {
 /// # Errors
 /// There is no terminal, or it cannot be prepared. Nothing has been sent then.
 pub fn run(session: &mut dyn Session, options: Options, stop: &AtomicBool) -> Result<(), TuiError> {
-    if !stdout().is_terminal() {
-        return Err(TuiError::NoTerminal(None));
-    }
-    let tty = Tty::open().map_err(|e| TuiError::NoTerminal(Some(e)))?;
-    let mut guard = Guard::enter().map_err(TuiError::Unusable)?;
-    let graphics = Graphics::ask(&tty, options.preview, options.depth, ASK).map_err(TuiError::Unusable)?;
-    guard.set_farewell(graphics.farewell());
-    // ratatui's own drop complains on standard error, which panics when the terminal has gone; the guard does its work.
-    let terminal = Terminal::new(CrosstermBackend::new(stdout())).map(ManuallyDrop::new).map_err(TuiError::Unusable)?;
-    let deaf_until = Instant::now() + if graphics.late { DEAF } else { Duration::ZERO };
+    let Opened { terminal, guard, tty, graphics, deaf_until } = Opened::new(options)?;
     let theme = Theme::new(options.depth);
     let mut screen =
         Screen { terminal, guard, tty, theme, deaf_until, preview: panels::preview::Preview::new(graphics) };

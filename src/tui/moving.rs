@@ -1,21 +1,17 @@
 //! The screen of a tree that is made to move: the tree from two sides, what moves it, and the keys that change that.
 
-use super::graphics::Graphics;
-use super::guard::Guard;
 use super::input::{Binding, bind};
+use super::opened::Opened;
 use super::panels::{messages, skeleton};
 use super::state::State;
 use super::theme::Theme;
-use super::tty::{Input, Tty};
-use super::{ASK, DEAF, Options, TICK, TuiError};
+use super::tty::Input;
+use super::{Options, TICK, TuiError};
 use crate::model::{Pose, Skeleton, Snapshot};
-use ratatui::backend::CrosstermBackend;
+use ratatui::Frame;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
 use ratatui::layout::{Constraint, Layout};
 use ratatui::text::Line;
-use ratatui::{Frame, Terminal};
-use std::io::{IsTerminal, stdout};
-use std::mem::ManuallyDrop;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -147,17 +143,7 @@ fn colours(skeleton: &Skeleton) -> Vec<Option<u8>> {
 /// # Errors
 /// There is no terminal, or it cannot be prepared.
 pub fn watch(moving: &mut dyn Moving, options: Options, stop: &AtomicBool) -> Result<(), TuiError> {
-    if !stdout().is_terminal() {
-        return Err(TuiError::NoTerminal(None));
-    }
-    let tty = Tty::open().map_err(|e| TuiError::NoTerminal(Some(e)))?;
-    let mut guard = Guard::enter().map_err(TuiError::Unusable)?;
-    let graphics = Graphics::ask(&tty, options.preview, options.depth, ASK).map_err(TuiError::Unusable)?;
-    guard.set_farewell(graphics.farewell());
-    let deaf_until = Instant::now() + if graphics.late { DEAF } else { Duration::ZERO };
-    // As in `run`: the guard does what ratatui's own drop would.
-    let mut terminal =
-        Terminal::new(CrosstermBackend::new(stdout())).map(ManuallyDrop::new).map_err(TuiError::Unusable)?;
+    let Opened { mut terminal, guard, tty, deaf_until, .. } = Opened::new(options)?;
     let theme = Theme::new(options.depth);
     let mut stage = Stage::new(moving);
     let mut before = Instant::now();
