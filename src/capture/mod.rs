@@ -10,9 +10,8 @@ pub use error::CaptureError;
 
 use crate::config::Config;
 use crate::export::capture::{Capture, PictureNote, SCHEMA_VERSION};
-use crate::export::csv::Sway;
 use crate::export::glb_notes;
-use crate::model::{Outline, Picture, Pose, Rgb, Size, Skeleton};
+use crate::model::{Outline, Picture, Pose, Rgb, Size, Skeleton, Swaying};
 use crate::motion::PoseEstimator;
 use crate::outline;
 use std::io;
@@ -29,8 +28,8 @@ pub struct Captured {
     /// `capture.json`.
     pub note: Capture,
     pub skeleton: Arc<Skeleton>,
-    /// How the nodes sway, by node index; `None` where nothing is known.
-    pub sway: Vec<Option<Sway>>,
+    /// How the nodes sway, by node index.
+    pub sway: Vec<Swaying>,
     /// Poses of the end of the film, by frame; at most as long as was asked for.
     pub poses: Vec<Pose>,
     /// The picture in the capture and the pose in it; `None` in captures of older versions.

@@ -23,6 +23,7 @@ pub mod picture;
 mod skinning;
 mod sparse_keys;
 pub mod still;
+pub mod sway;
 mod template;
 mod thin_keys;
 

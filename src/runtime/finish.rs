@@ -107,7 +107,7 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
     let Done { folder, tree, poses, pose_in_picture, misses } = tables.finish(&job.tracks, wrote)?;
     let metres_per_px = job.config.export.metres_per_px;
     // Intervals that can be defended are a matter of their own; until then no branch claims a frequency.
-    let sway = vec![None; tree.skeleton.nodes.len()];
+    let sway = vec![Err(crate::model::Unidentified::NotMeasured); tree.skeleton.nodes.len()];
     nodes(folder.file("nodes.csv")?, &tree.skeleton, &sway, metres_per_px)?;
     let (bytes, animation) = model_of(job, &tree, &poses, pose_in_picture.as_ref())?;
     folder.write("tree.glb", &bytes)?;
