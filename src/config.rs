@@ -346,7 +346,9 @@ impl Config {
             ("export.animation_s", self.export.animation_s, (0.1, 3600.0, "0.1 to 3600")),
             ("export.metres_per_px", self.export.metres_per_px, (0.0, 1e6, "0 (pixels) or more")),
         ];
-        for (key, value, (low, high, allowed)) in rules.into_iter().chain(more).chain(self.leaves.rules()).chain(self.dynamics.rules()) {
+        for (key, value, (low, high, allowed)) in
+            rules.into_iter().chain(more).chain(self.leaves.rules()).chain(self.dynamics.rules())
+        {
             if !(low..=high).contains(&value) {
                 return Err(ConfigError::OutOfRange { key, value, allowed });
             }

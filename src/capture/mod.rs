@@ -2,6 +2,7 @@
 
 mod copies;
 mod error;
+mod film;
 mod motion;
 mod nodes;
 mod table;
@@ -9,6 +10,7 @@ mod table;
 pub use error::CaptureError;
 
 use crate::config::Config;
+use crate::dynamics::Film;
 use crate::export::capture::{Capture, PictureNote, SCHEMA_VERSION};
 use crate::export::glb_notes;
 use crate::model::{Outline, Picture, Pose, Rgb, Size, Skeleton, Swaying};
@@ -125,6 +127,14 @@ impl Captured {
         });
         let dir = dir.to_owned();
         Ok(Self { dir, note, skeleton, sway, poses, picture, pose_in_picture, outline, warnings })
+    }
+
+    /// The points of the last `window_s` seconds, which its sway is told from.
+    ///
+    /// # Errors
+    /// `tracks.csv` is missing or damaged.
+    pub fn film(&self, window_s: f64) -> Result<Film, CaptureError> {
+        film::read(&self.dir, &self.skeleton, window_s)
     }
 
     /// `poses` of this tree as those of another whose measured nodes are the same, e.g. one of another shape: its nodes

@@ -54,11 +54,14 @@ pub(super) fn begin(film: &Film, points: &Points) -> Begin {
     let Some(still) = energy[..swing].iter().rposition(|e| *e < AT_REST * AT_REST * top) else {
         return Begin { to, ..nothing };
     };
-    let rested = times[still] - first_s >= RESTED_S && {
-        let before = times[..still].iter().rposition(|t| times[still] - t >= RESTED_S).unwrap_or(0);
-        energy[before..still].iter().all(|e| *e < AT_REST * AT_REST * top)
-    };
-    let near = (still + over / 2).min(times.len() - 1);
+    // Let go with the first frame, perhaps: the fit will tell.
+    let at_once = still == 0;
+    let rested = at_once
+        || times[still] - first_s >= RESTED_S && {
+            let before = times[..still].iter().rposition(|t| times[still] - t >= RESTED_S).unwrap_or(0);
+            energy[before..still].iter().all(|e| *e < AT_REST * AT_REST * top)
+        };
+    let near = if at_once { 0 } else { (still + over / 2).min(times.len() - 1) };
     let at_s = let_go(film, &together, near);
     let from = times.iter().position(|t| *t >= at_s).unwrap_or(near);
     Begin { rested, at_s, from, to: to.max(from) }

@@ -8,13 +8,21 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Takes from `x` what the orthonormal `q` span of it, twice for accuracy, and adds the shares to `into`.
-pub(super) fn take_off(x: &mut [f64], q: &[Vec<f64>], into: &mut [f64]) {
+fn take_off(x: &mut [f64], q: &[Vec<f64>], into: &mut [f64]) {
     for _ in 0..2 {
         for (column, share) in q.iter().zip(into.iter_mut()) {
             let s = dot(x, column);
             x.iter_mut().zip(column).for_each(|(x, c)| *x -= s * c);
             *share += s;
         }
+    }
+}
+
+/// Takes from `x` what the orthonormal `q` span of it.
+pub(super) fn take_off_once(x: &mut [f64], q: &[Vec<f64>]) {
+    for column in q {
+        let s = dot(x, column);
+        x.iter_mut().zip(column).for_each(|(x, c)| *x -= s * c);
     }
 }
 

@@ -57,11 +57,14 @@ impl Film {
     }
 }
 
+/// Where points were in one frame, px.
+type Places = Vec<(TrackId, [f32; 2])>;
+
 /// The last seconds of a film that goes on.
 #[derive(Clone, Debug)]
 pub struct FilmLog {
     window_s: f64,
-    sets: VecDeque<(f64, Vec<(TrackId, [f32; 2])>)>,
+    sets: VecDeque<(f64, Places)>,
 }
 
 impl FilmLog {

@@ -4,7 +4,9 @@ use super::film::Film;
 use crate::model::Skeleton;
 
 /// Points of a branch at most that are fitted; more cost time and tell little more.
-const MOST: usize = 32;
+const MOST: usize = 20;
+/// So many points that were always seen are enough, if they are half of all.
+const ENOUGH: usize = 12;
 /// A point must have been seen in this share of the frames, and in so many.
 const SEEN: f64 = 0.5;
 const LEAST_FRAMES: usize = 24;
@@ -38,7 +40,13 @@ impl Points {
         let rows = film.times_s.len() - from;
         let least = ((SEEN * rows as f64) as usize).max(LEAST_FRAMES);
         let seen = |k: &usize| film.tracks[*k].at_px[from..].iter().filter(|p| is_seen(p)).count() >= least;
-        let all: Vec<usize> = tracks.iter().copied().filter(seen).collect();
+        let mut all: Vec<usize> = tracks.iter().copied().filter(seen).collect();
+        let whole: Vec<usize> =
+            all.iter().copied().filter(|&k| film.tracks[k].at_px[from..].iter().all(is_seen)).collect();
+        // Points with gaps cost a fit of their own each.
+        if whole.len() >= ENOUGH && 2 * whole.len() >= all.len() {
+            all = whole;
+        }
         let n = all.len().min(MOST);
         let tracks: Vec<usize> = (0..n).map(|i| all[i * all.len() / n]).collect();
         let signals = tracks.iter().flat_map(|&k| centred(&film.tracks[k].at_px[from..])).collect();

@@ -1,17 +1,18 @@
 //! Likelihood of oscillators that are driven by chance, at any times.
 //!
-//! A damped oscillator driven by white noise is a Gaussian process whose covariance is a sum of exponentials of the time
+//! A damped oscillator driven by gusts is a Gaussian process whose covariance is a sum of exponentials of the time
 //! between two values. The covariance matrix of such sums has a factor that is found in a time that grows with the number
 //! of values only, whatever their times: Foreman-Mackey, Agol, Ambikasaran and Angus, "Fast and scalable Gaussian process
 //! modeling with applications to astronomical time series" (2017), eqs. 9, 20, 33-43.
 
+use nalgebra::Complex;
 use std::f64::consts::TAU;
 
 /// A part of what is seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Part {
-    /// A damped oscillator driven by white noise, of this variance.
-    Oscillator { variance: f64, frequency_hz: f64, damping: f64 },
+    /// A damped oscillator of this variance, driven by gusts that forget themselves at this rate, 1/s.
+    Oscillator { variance: f64, frequency_hz: f64, damping: f64, gusts_per_s: f64 },
     /// What drifts: forgets itself at this rate, 1/s.
     Drift { variance: f64, rate_per_s: f64 },
 }
@@ -33,14 +34,25 @@ struct Term {
     d: f64,
 }
 
-impl From<&Part> for Term {
-    fn from(part: &Part) -> Self {
-        match *part {
-            Part::Oscillator { variance, frequency_hz, damping } => {
-                let (omega, root) = (TAU * frequency_hz, (1.0 - damping * damping).sqrt());
-                Self { a: variance, b: variance * damping / root, c: damping * omega, d: omega * root }
+impl Part {
+    /// Its covariance. Of an oscillator it is what a driven one has: a sum over the poles p of H(s) = 1 / ((s² + 2 zeta w s +
+    /// w²) (s + g)) of H's residue at p times H(-p), which is a pair for the oscillator and one for the gusts.
+    fn terms(&self) -> Vec<Term> {
+        match *self {
+            Self::Oscillator { variance, frequency_hz, damping, gusts_per_s: g } => {
+                let omega = TAU * frequency_hz;
+                let p = Complex::new(-damping * omega, omega * (1.0 - damping * damping).sqrt());
+                let of = |s: Complex<f64>| (s * s + s * (2.0 * damping * omega) + omega * omega) * (s + g);
+                let pair = 2.0 / ((p - p.conj()) * (p + g) * of(-p));
+                let gust = Complex::new(-g, 0.0);
+                let single = 1.0 / ((gust * gust + gust * (2.0 * damping * omega) + omega * omega) * of(-gust));
+                let unit = variance / (pair.re + single.re);
+                vec![
+                    Term { a: unit * pair.re, b: -unit * pair.im, c: -p.re, d: p.im },
+                    Term { a: unit * single.re, b: 0.0, c: g, d: 0.0 },
+                ]
             }
-            Part::Drift { variance, rate_per_s } => Self { a: variance, b: 0.0, c: rate_per_s, d: 0.0 },
+            Self::Drift { variance, rate_per_s } => vec![Term { a: variance, b: 0.0, c: rate_per_s, d: 0.0 }],
         }
     }
 }
@@ -55,7 +67,7 @@ pub(super) fn minus_2_log_likelihood(
     parts: &[Part],
     noise: f64,
 ) -> f64 {
-    let terms: Vec<Term> = parts.iter().map(Term::from).collect();
+    let terms: Vec<Term> = parts.iter().flat_map(Part::terms).collect();
     let j = 2 * terms.len();
     let diagonal = noise + parts.iter().map(Part::variance).sum::<f64>();
     let signals = 1 + known.len();
@@ -91,7 +103,7 @@ pub(super) fn minus_2_log_likelihood(
             su[a] = (0..j).map(|b| s[a * j + b] * u[b]).sum();
         }
         d = diagonal - (0..j).map(|a| u[a] * su[a]).sum::<f64>();
-        if !(d > 0.0) {
+        if d.is_nan() || d <= 0.0 {
             return f64::INFINITY;
         }
         for a in 0..j {
@@ -141,11 +153,12 @@ mod tests {
     /// Against the definition, with a full matrix, at uneven times.
     #[test]
     fn likelihood_is_that_of_the_covariance() {
-        let times: Vec<f64> = (0..40).map(|k| 0.1 * k as f64 + 0.03 * (k as f64 * 1.7).sin() + if k > 20 { 1.3 } else { 0.0 }).collect();
+        let times: Vec<f64> =
+            (0..40).map(|k| 0.1 * k as f64 + 0.03 * (k as f64 * 1.7).sin() + if k > 20 { 1.3 } else { 0.0 }).collect();
         let values: Vec<f64> = times.iter().map(|t| (3.0 * t).sin() + 0.2 * (17.0 * t).cos()).collect();
         let known = vec![vec![1.0; 40], times.iter().map(|t| t.cos()).collect::<Vec<f64>>()];
         let parts = [
-            Part::Oscillator { variance: 0.7, frequency_hz: 0.5, damping: 0.06 },
+            Part::Oscillator { variance: 0.7, frequency_hz: 0.5, damping: 0.06, gusts_per_s: 1e4 },
             Part::Drift { variance: 0.2, rate_per_s: 0.4 },
         ];
         let covariance = |t: f64| {
@@ -153,7 +166,8 @@ mod tests {
             let wd = w * (1.0 - z * z).sqrt();
             0.7 * (-z * w * t).exp() * ((wd * t).cos() + z * w / wd * (wd * t).sin()) + 0.2 * (-0.4 * t).exp()
         };
-        let k = DMatrix::from_fn(40, 40, |i, j| covariance((times[i] - times[j]).abs()) + if i == j { 0.01 } else { 0.0 });
+        let k =
+            DMatrix::from_fn(40, 40, |i, j| covariance((times[i] - times[j]).abs()) + if i == j { 0.01 } else { 0.0 });
         let x = DMatrix::from_fn(40, 2, |i, j| known[j][i]);
         let y = DVector::from_vec(values.clone());
         let inverse = k.clone().try_inverse().unwrap();

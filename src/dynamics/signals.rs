@@ -5,13 +5,13 @@
 //! so that gaps and uneven times cost only the frames that they lack. After a release the moment of it, which all modes
 //! share, is fitted too.
 
-use super::columns::{Qr, dot, take_off};
+use super::columns::{Qr, dot, take_off_once};
 use super::decay::{Mode, Start};
 use nalgebra::{DMatrix, DVector};
 
 /// Iterations of the fit at most, and the relative change of the sum of squares at which it ends.
 const MAX_STEPS: usize = 30;
-const DONE: f64 = 1e-5;
+const DONE: f64 = 1e-4;
 /// Damping ratios that are tried.
 const DAMPING: [f64; 2] = [0.002, 0.45];
 /// Frequencies that a search tries per factor of e, and dampings.
@@ -72,7 +72,13 @@ impl Factor {
 
 impl Signals {
     /// `signals` hold no number where they were not seen; frequencies are looked for within `frequencies_hz`.
-    pub fn new(times_s: Vec<f64>, signals: &[Vec<f64>], start: Start, moment_sd_s: f64, frequencies_hz: [f64; 2]) -> Self {
+    pub fn new(
+        times_s: Vec<f64>,
+        signals: &[Vec<f64>],
+        start: Start,
+        moment_sd_s: f64,
+        frequencies_hz: [f64; 2],
+    ) -> Self {
         let mut groups: Vec<Group> = Vec::new();
         for (id, signal) in signals.iter().enumerate() {
             let rows: Vec<usize> = (0..times_s.len()).filter(|&k| signal[k].is_finite()).collect();
@@ -149,8 +155,8 @@ impl Signals {
             let mut added: Vec<Vec<f64>> = Vec::new();
             for mut column in mode.columns(&times, self.start) {
                 let before = dot(&column, &column);
-                take_off(&mut column, &qr.q, &mut vec![0.0; qr.q.len()]);
-                take_off(&mut column, &added, &mut vec![0.0; added.len()]);
+                take_off_once(&mut column, &qr.q);
+                take_off_once(&mut column, &added);
                 let after = dot(&column, &column);
                 if after > ALIKE * ALIKE * before {
                     column.iter_mut().for_each(|x| *x /= after.sqrt());
@@ -168,6 +174,7 @@ impl Signals {
     pub fn fit(&self, from: &Fit, priors: &[Prior]) -> Fit {
         let mut x = self.parameters(from);
         let mut now = self.linearized(&x, priors);
+        let mut cost = self.cost(&x, now.rss, priors);
         let mut lambda = 1e-3;
         for _ in 0..MAX_STEPS {
             let mut better = false;
@@ -180,10 +187,13 @@ impl Signals {
                     p[0] = p[0].clamp(self.frequencies_hz[0].ln(), self.frequencies_hz[1].ln());
                     p[1] = p[1].clamp(DAMPING[0].ln(), DAMPING[1].ln());
                 });
-                let there = self.linearized(&next, priors);
-                if there.cost < now.cost {
-                    better = now.cost - there.cost > DONE * now.cost;
-                    (x, now) = (next, there);
+                let there = self.cost(&next, self.rss(&self.fit_of(&next)), priors);
+                if there < cost {
+                    better = cost - there > DONE * cost;
+                    if better {
+                        now = self.linearized(&next, priors);
+                    }
+                    (x, cost) = (next, there);
                     lambda *= 0.2;
                     break;
                 }
@@ -193,20 +203,34 @@ impl Signals {
                 break;
             }
         }
-        Fit { rss: now.rss, ..self.fit_of(&x) }
+        let fit = self.fit_of(&x);
+        Fit { rss: self.rss(&fit), ..fit }
+    }
+
+    /// The squares that are left with what the priors add: a prior weighs as much as the noise of one value allows.
+    fn cost(&self, x: &[f64], rss: f64, priors: &[Prior]) -> f64 {
+        let off = |(m, prior): (usize, &Prior)| {
+            let Some((mode, sd)) = prior else { return 0.0 };
+            let at = mode.parameters();
+            (0..2).map(|i| (at[i] - x[2 * m + i]).powi(2) / (sd[i] * sd[i]).max(1e-12)).sum::<f64>()
+        };
+        let of_modes: f64 = priors.iter().enumerate().map(off).sum();
+        let of_moment = match self.start {
+            Start::Rest => x[x.len() - 1].powi(2) / self.moment_sd_s.powi(2).max(1e-12),
+            Start::Moving => 0.0,
+        };
+        rss * (1.0 + (of_modes + of_moment) / (self.values as f64).max(1.0))
     }
 
     /// Everything that a step needs at `x`.
     pub fn linearized(&self, x: &[f64], priors: &[Prior]) -> Linear {
         let fit = self.fit_of(x);
         let p = x.len();
-        let mut out = Linear { hessian: DMatrix::zeros(p, p), gradient: DVector::zeros(p), rss: 0.0, cost: 0.0 };
+        let mut out = Linear { hessian: DMatrix::zeros(p, p), gradient: DVector::zeros(p), rss: 0.0 };
         let (columns, slopes) = (self.columns(&fit), self.slopes(x));
         for g in &self.groups {
             g.parts(&columns, &slopes).add(&mut out);
         }
-        out.cost = out.rss;
-        // A prior weighs as much as the noise of one value allows.
         let noise = out.rss / (self.values as f64).max(1.0);
         for (m, prior) in priors.iter().enumerate() {
             let Some((mode, sd)) = prior else { continue };
@@ -215,14 +239,12 @@ impl Signals {
                 let weight = noise / (sd[i] * sd[i]).max(1e-12);
                 out.hessian[(k, k)] += weight;
                 out.gradient[k] += weight * (at - x[k]);
-                out.cost += weight * (at - x[k]).powi(2);
             }
         }
         if self.start == Start::Rest {
             let weight = noise / self.moment_sd_s.powi(2).max(1e-12);
             out.hessian[(p - 1, p - 1)] += weight;
             out.gradient[p - 1] -= weight * x[p - 1];
-            out.cost += weight * x[p - 1].powi(2);
         }
         out
     }
@@ -230,18 +252,30 @@ impl Signals {
     /// Derivatives of the columns by each parameter, with the columns that they belong to.
     fn slopes(&self, x: &[f64]) -> Vec<Vec<(usize, Vec<f64>)>> {
         const STEP: f64 = 1e-5;
-        let by = |k: usize| {
-            let moved = |by: f64| {
-                let mut x = x.to_vec();
-                x[k] += by;
-                self.columns(&self.fit_of(&x))
-            };
-            let (up, down) = (moved(STEP), moved(-STEP));
-            let of = if k + 1 == x.len() && x.len() % 2 == 1 { 1..up.len() } else { self.columns_of(k / 2) };
-            let slope = |c: usize| up[c].iter().zip(&down[c]).map(|(u, d)| (u - d) / (2.0 * STEP)).collect();
-            of.map(|c| (c, slope(c))).collect()
+        let fit = self.fit_of(x);
+        let slope = |(up, down): (Vec<f64>, Vec<f64>)| -> Vec<f64> {
+            up.iter().zip(&down).map(|(u, d)| (u - d) / (2.0 * STEP)).collect()
         };
-        (0..x.len()).map(by).collect()
+        let times = |later: f64| self.times_s.iter().map(|t| t - fit.moment_s - later).collect::<Vec<f64>>();
+        let now = times(0.0);
+        let of_mode = |k: usize| {
+            let moved = |by: f64| {
+                let mut own = fit.modes[k / 2].parameters();
+                own[k % 2] += by;
+                Mode::of_parameters(&own).columns(&now, self.start)
+            };
+            self.columns_of(k / 2).zip(moved(STEP).into_iter().zip(moved(-STEP)).map(slope)).collect()
+        };
+        let of_moment = |_| {
+            let (late, early) = (times(STEP), times(-STEP));
+            let of = |m: &Mode| {
+                let pairs = m.columns(&late, self.start).into_iter().zip(m.columns(&early, self.start));
+                pairs.map(slope).collect::<Vec<_>>()
+            };
+            fit.modes.iter().flat_map(of).enumerate().map(|(c, s)| (c + 1, s)).collect()
+        };
+        let modes = 2 * fit.modes.len();
+        (0..modes).map(of_mode).chain((modes..x.len()).map(of_moment)).collect()
     }
 
     fn columns_of(&self, mode: usize) -> std::ops::Range<usize> {
@@ -282,22 +316,20 @@ impl Signals {
                     let f = &factors[own.clone()];
                     factor.cosine = f[0];
                     factor.sine = f.get(1).copied().unwrap_or(0.0);
-                    let over = |(f, v): (&f64, &f64)| if *v > 0.0 { f * f / (v * noise * inflation).max(1e-30) } else { 0.0 };
+                    let over =
+                        |(f, v): (&f64, &f64)| if *v > 0.0 { f * f / (v * noise * inflation).max(1e-30) } else { 0.0 };
                     factor.significance = f.iter().zip(&variances[own]).map(over).sum();
                 }
             }
         }
         out
     }
-
 }
 
 pub(super) struct Linear {
     pub hessian: DMatrix<f64>,
     pub gradient: DVector<f64>,
     pub rss: f64,
-    /// With what the priors add.
-    cost: f64,
 }
 
 /// A group's share in a step.
@@ -322,7 +354,7 @@ impl Group {
         let (rests, factors) = self.values.iter().map(|y| qr.solve(y)).unzip();
         let off = |(c, slope): &(usize, Vec<f64>)| {
             let mut slope = self.thin(slope);
-            take_off(&mut slope, &qr.q, &mut vec![0.0; qr.q.len()]);
+            take_off_once(&mut slope, &qr.q);
             (*c, slope)
         };
         Parts { rests, factors, slopes: slopes.iter().map(|s| s.iter().map(off).collect()).collect() }

@@ -136,7 +136,9 @@ fn grow(chance: &mut Chance) -> Vec<MadeBranch> {
                 let side = chance.between(-1.0, 1.0);
                 let depth = chance.between(-0.7, 0.7);
                 let along = p.way.normalize();
-                let way = (along + Vector3::new(1.2 * side, 0.0, depth)).normalize() * p.way.norm() * chance.between(0.4, 0.6);
+                let way = (along + Vector3::new(1.2 * side, 0.0, depth)).normalize()
+                    * p.way.norm()
+                    * chance.between(0.4, 0.6);
                 let first = way.cross(&Vector3::y()).try_normalize(1e-6).unwrap_or_else(Vector3::x);
                 let second = way.normalize().cross(&first);
                 let branch = MadeBranch {
