@@ -155,7 +155,8 @@ fn branch(
         let still = old > 0 && carried - noise < LEFT * (all - noise);
         return Err(if still { Unidentified::AncestorsSway } else { Unidentified::NoOscillation });
     };
-    if aliased(&signals, &fit, m, film.step_s(), demands.highest_hz) {
+    // Films of few frames a second show a fast sway as a slow one.
+    if 1.0 / film.step_s() - fit.modes[m].frequency_hz <= demands.highest_hz {
         return Err(Unidentified::AboveSampling);
     }
     let spread = deviations(&signals, &fit, &priors).ok_or(Unidentified::TooUncertain)?;
@@ -258,22 +259,6 @@ fn everywhere(factors: &[Vec<Factor>], m: usize, part: &[usize]) -> bool {
     let has =
         |k: &&usize| factors[2 * **k][m].significance + factors[2 * **k + 1][m].significance > SIGNIFICANT.powi(2);
     part.iter().filter(has).count() as f64 >= IN_PART * part.len() as f64
-}
-
-/// Whether mode `m` may as well be one that is faster than half the rate of the frames, up to `highest_hz`.
-fn aliased(signals: &Signals, fit: &Fit, m: usize, step_s: f64, highest_hz: f64) -> bool {
-    const AS_WELL: f64 = 1.1;
-    let rate_hz = 1.0 / step_s;
-    let most = (highest_hz / rate_hz).ceil() as usize + 1;
-    let mode = fit.modes[m];
-    (1..=most)
-        .flat_map(|k| [k as f64 * rate_hz - mode.frequency_hz, k as f64 * rate_hz + mode.frequency_hz])
-        .filter(|f| *f > mode.frequency_hz && *f <= highest_hz)
-        .any(|frequency_hz| {
-            let mut other = fit.clone();
-            other.modes[m] = Mode { frequency_hz, damping: mode.damping * mode.frequency_hz / frequency_hz };
-            signals.rss(&other) < AS_WELL * fit.rss
-        })
 }
 
 /// The turn about the branch's base that fits the mode's factors best, degrees.

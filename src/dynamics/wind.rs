@@ -25,6 +25,8 @@ const FRAMES_PER_PERIOD: f64 = 3.0;
 const LEAST_FRAMES: usize = 48;
 /// Motion that is taken for noise, px.
 const NOISE_PX: f64 = 0.15;
+/// Variance of the trunk's oscillator at least, as a share of the largest in the whole tree's motion.
+const LEAST_OF_TRUNK: f64 = 0.1;
 /// A frequency that is nearer to an ancestor's than so many standard deviations is the ancestor's.
 const APART: f64 = 2.0;
 /// How often the gusts of a wind forget themselves, 1/s, at the least and at the most, which is white noise to a tree; and how
@@ -34,7 +36,7 @@ const DRIFTS: f64 = 4.0;
 const DAMPING: [f64; 2] = [0.003, 0.4];
 /// The curvature of the likelihood is that at its top, and gusts are no exact process: intervals are so much wider. Found on
 /// made-up trees (tests/sway_trees.rs).
-const WIDER: f64 = 1.35;
+const WIDER: f64 = 1.1;
 /// Trees are damped by some hundredths of the critical: a weak prior for films that are too short to tell, as the standard
 /// deviation of a logarithm.
 const USUAL_DAMPING: f64 = 0.05;
@@ -51,6 +53,7 @@ struct Own {
 pub(super) fn sways(skeleton: &Skeleton, film: &Film, members: &[Vec<usize>], demands: &Demands) -> Vec<Swaying> {
     let mut own: Vec<Option<Own>> = vec![None; members.len()];
     let mut out = vec![Err(Unidentified::NotMeasured); members.len()];
+    let mut untold = vec![false; members.len()];
     for (i, tracks) in members.iter().enumerate().skip(1) {
         let parent = skeleton.nodes[i].parent.filter(|p| p.index() < i).unwrap_or(NodeId(0));
         let chain = std::iter::successors(Some(parent), |p| skeleton.nodes[p.index()].parent.filter(|q| q < p));
@@ -62,6 +65,13 @@ pub(super) fn sways(skeleton: &Skeleton, film: &Film, members: &[Vec<usize>], de
         let carrier: Vec<usize> = members[parent.index()].iter().copied().filter(|k| !tracks.contains(k)).collect();
         let carrier = Points::of(film, if parent.index() == 0 { &[] } else { &carrier }, 0);
         let base_px = skeleton.image_from_model(&skeleton.nodes[parent.index()].position);
+        // What a carrier's own sway is must be known, or be none, for that of the branch to be told from it.
+        let told = |s: &Swaying| matches!(s, Ok(_) | Err(Unidentified::AncestorsSway));
+        if parent.index() > 0 && (untold[parent.index()] || !told(&out[parent.index()])) {
+            out[i] = Err(Unidentified::AncestorsSway);
+            untold[i] = true;
+            continue;
+        }
         out[i] = branch(film, &points, &carrier, &ancestors, base_px, demands).map(|(found, sway)| {
             own[i] = Some(found);
             sway
@@ -156,6 +166,12 @@ fn branch(
     let mut last = Unidentified::NoOscillation;
     let mut order: Vec<usize> = (first_new..x.len()).step_by(3).collect();
     order.sort_by(|a, b| x[*b].total_cmp(&x[*a]));
+    if ancestors.is_empty() {
+        // The trunk carries all, and all else sways faster than the whole tree.
+        let strong = x[order[0]] + LEAST_OF_TRUNK.ln();
+        order.retain(|&k| x[k] >= strong);
+        order.sort_by(|a, b| x[a + 1].total_cmp(&x[b + 1]));
+    }
     for k in order {
         let sd = |i: usize| covariance.as_ref().map_or(f64::INFINITY, |c| c[(i, i)]).max(0.0).sqrt() * WIDER;
         let (mode, sd) = (Mode { frequency_hz: x[k + 1].exp(), damping: x[k + 2].exp() }, [sd(k + 1), sd(k + 2)]);
