@@ -36,10 +36,10 @@ impl<F: Fn(usize, &UnitQuaternion<f64>) -> f64> Path<'_, F> {
 
     /// Keys that were planned by a rule of thumb, with those moved that miss; `None` where that does not do.
     pub fn mended(&self, mut keys: Vec<Key>) -> Option<Vec<Key>> {
-        if let [first, .., last] = keys.as_mut_slice() {
-            if self.closes() {
-                (first.1, last.1) = (self.aims[first.0], self.aims[last.0]);
-            }
+        if self.closes()
+            && let [first, .., last] = keys.as_mut_slice()
+        {
+            (first.1, last.1) = (self.aims[first.0], self.aims[last.0]);
         }
         for j in 1..keys.len() {
             if !self.fits(&keys[j - 1], &keys[j]) {
