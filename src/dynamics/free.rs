@@ -74,6 +74,7 @@ pub(super) fn sways(
     members: &[Vec<usize>],
     onset: &Onset,
     demands: &Demands,
+    alive: &dyn Fn(),
 ) -> Vec<Swaying> {
     let mut own: Vec<Option<Own>> = vec![None; members.len()];
     let mut out = vec![Err(Unidentified::NotMeasured); members.len()];
@@ -81,6 +82,7 @@ pub(super) fn sways(
     // The release, and how sure that is, s: the trunk's own fit knows it better than the eye.
     let mut moment = [onset.at_s, MOMENT_SD * film.step_s()];
     for (i, members) in members.iter().enumerate().skip(1) {
+        alive();
         let parent = skeleton.nodes[i].parent.filter(|p| p.index() < i);
         let chain = std::iter::successors(parent, |p| skeleton.nodes[p.index()].parent.filter(|q| q < p));
         let ancestors: Vec<Own> = chain.filter_map(|a| own[a.index()]).collect();

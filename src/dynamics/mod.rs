@@ -22,4 +22,4 @@ pub use decay::{Mode, Start};
 pub use film::{Film, FilmLog, FilmTrack};
 pub use release::Onset;
 pub use spectrum::{Spectrum, dominant_frequency_hz, spectrum};
-pub use sway::{Analysis, analyse};
+pub use sway::{Analysis, analyse, analyse_with};

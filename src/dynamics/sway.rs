@@ -28,6 +28,11 @@ pub struct Analysis {
 ///
 /// Never fails: what the film does not carry is [`Unidentified`].
 pub fn analyse(skeleton: &Skeleton, film: &Film, config: &Dynamics) -> Analysis {
+    analyse_with(skeleton, film, config, &|| ())
+}
+
+/// The same; `alive` is called after every branch, as many of them take a while.
+pub fn analyse_with(skeleton: &Skeleton, film: &Film, config: &Dynamics, alive: &dyn Fn()) -> Analysis {
     let members = members(skeleton, film);
     let nothing = |why| {
         let of = |m: &Vec<usize>| Err(if m.is_empty() { Unidentified::NotMeasured } else { why });
@@ -55,8 +60,8 @@ pub fn analyse(skeleton: &Skeleton, film: &Film, config: &Dynamics) -> Analysis 
         return nothing(Unidentified::TooShort);
     }
     let sway = match onset.excitation {
-        Excitation::Release => free::sways(skeleton, film, &members, &onset, &demands),
-        Excitation::Wind => wind::sways(skeleton, film, &members, &demands),
+        Excitation::Release => free::sways(skeleton, film, &members, &onset, &demands, alive),
+        Excitation::Wind => wind::sways(skeleton, film, &members, &demands, alive),
     };
     Analysis { sway, onset: Some(onset) }
 }

@@ -50,11 +50,18 @@ struct Own {
 }
 
 /// The sway of every measured node.
-pub(super) fn sways(skeleton: &Skeleton, film: &Film, members: &[Vec<usize>], demands: &Demands) -> Vec<Swaying> {
+pub(super) fn sways(
+    skeleton: &Skeleton,
+    film: &Film,
+    members: &[Vec<usize>],
+    demands: &Demands,
+    alive: &dyn Fn(),
+) -> Vec<Swaying> {
     let mut own: Vec<Option<Own>> = vec![None; members.len()];
     let mut out = vec![Err(Unidentified::NotMeasured); members.len()];
     let mut untold = vec![false; members.len()];
     for (i, tracks) in members.iter().enumerate().skip(1) {
+        alive();
         let parent = skeleton.nodes[i].parent.filter(|p| p.index() < i).unwrap_or(NodeId(0));
         let chain = std::iter::successors(Some(parent), |p| skeleton.nodes[p.index()].parent.filter(|q| q < p));
         let ancestors: Vec<Own> = chain.filter_map(|a| own[a.index()]).take(ANCESTORS).collect();

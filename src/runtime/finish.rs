@@ -6,7 +6,7 @@ use super::held_sets::{HeldSets, OnTrial};
 use super::meter::Histogram;
 use super::shared::{Failure, Shared};
 use crate::config::Config;
-use crate::dynamics::analyse;
+use crate::dynamics::analyse_with;
 use crate::export::capture::{
     AnimationNote, Build, Capture, ModelNote, OutlineNote, PictureNote, Quality as QualityNote, Refinement, Software,
     Source, Timing, json,
@@ -107,7 +107,7 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
     tables.catch_up(&job.tracks, wrote)?;
     let Done { folder, tree, poses, pose_in_picture, misses, film } = tables.finish(&job.tracks, wrote)?;
     let metres_per_px = job.config.export.metres_per_px;
-    let sway = analyse(&tree.skeleton, &film, &job.config.dynamics).sway;
+    let sway = analyse_with(&tree.skeleton, &film, &job.config.dynamics, &|| job.shared.pulse.wrote()).sway;
     nodes(folder.file("nodes.csv")?, &tree.skeleton, &sway, metres_per_px)?;
     let (bytes, animation) = model_of(job, &tree, &poses, pose_in_picture.as_ref())?;
     folder.write("tree.glb", &bytes)?;
