@@ -59,10 +59,12 @@ row() {
     local out=$1 colours inputs=() n
     shift
     n=$#
+    local stack="hstack=inputs=$n"
+    ((n > 1)) || stack=copy
     for picture in "$@"; do inputs+=(-i "$picture"); done
     for colours in 256 96 48 24; do
         ffmpeg -v error -nostdin -y "${inputs[@]}" -filter_complex \
-            "hstack=inputs=$n,split[a][b];[a]palettegen=max_colors=$colours:reserve_transparent=0[p];[b][p]paletteuse=dither=none" \
+            "$stack,split[a][b];[a]palettegen=max_colors=$colours:reserve_transparent=0[p];[b][p]paletteuse=dither=none" \
             -frames:v 1 "$out"
         (($(stat -c %s "$out") <= largest)) && break
     done
@@ -167,9 +169,9 @@ page() {
     scripts/test-modules.sh >/dev/null
     "$arborcam" export "$work/winter" --format html --out "$work/page.html" 2>"$work/page.log" ||
         fail "the page was not written: $(cat "$work/page.log")"
-    node scripts/pictures-viewer.mjs "$work/page.html" "$to/viewer.png" "$to/viewer-phone.png"
-    told "$to/viewer.png"
-    told "$to/viewer-phone.png"
+    node scripts/pictures-viewer.mjs "$work/page.html" "$work/viewer.png" "$work/viewer-phone.png"
+    row "$to/viewer.png" "$work/viewer.png"
+    row "$to/viewer-phone.png" "$work/viewer-phone.png"
 }
 
 wanted views && views
