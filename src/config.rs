@@ -1,5 +1,6 @@
 //! Settings: plain structs whose defaults are the documented ones. A file overrides a default, the command line a file.
 
+mod dynamics;
 mod hierarchy;
 mod leaves;
 mod overlay;
@@ -8,6 +9,7 @@ mod shape;
 mod wind;
 mod wood;
 
+pub use dynamics::{Dynamics, Excited};
 pub use hierarchy::{Affinity, Hierarchy};
 pub use leaves::{LeafShow, Leaves};
 pub use reload::{Change, EFFECTS, Effect, effect};
@@ -34,6 +36,7 @@ pub struct Config {
     pub wood: Wood,
     pub leaves: Leaves,
     pub motion: Motion,
+    pub dynamics: Dynamics,
     pub wind: Wind,
     pub export: Export,
 }
@@ -346,8 +349,12 @@ impl Config {
             ("export.animation_s", self.export.animation_s, (0.1, 3600.0, "0.1 to 3600")),
             ("export.metres_per_px", self.export.metres_per_px, (0.0, 1e6, "0 (pixels) or more")),
         ];
-        for (key, value, (low, high, allowed)) in
-            rules.into_iter().chain(more).chain(self.leaves.rules()).chain(self.wind.rules())
+        for (key, value, (low, high, allowed)) in rules
+            .into_iter()
+            .chain(more)
+            .chain(self.leaves.rules())
+            .chain(self.dynamics.rules())
+            .chain(self.wind.rules())
         {
             if !(low..=high).contains(&value) {
                 return Err(ConfigError::OutOfRange { key, value, allowed });

@@ -33,7 +33,11 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("export", &["model", "config", "shape", "dynamics::angle_to_parent_deg"]),
     // A capture's tables back to the nouns: poses by the rule by which they were made, the outline as a file of its own
     // would be.
-    ("capture", &["model", "config", "motion::PoseEstimator", "outline", "export"]),
+    // The points, as the sway is told from them.
+    (
+        "capture",
+        &["model", "config", "motion::PoseEstimator", "outline", "export", "dynamics::Film", "dynamics::FilmLog"],
+    ),
     // The screen draws outlines, and refuses the crossing ones as a file would be. It draws the tree's wood too, a coarse
     // mesh that only it needs.
     ("tui", &["model", "outline::crossing", "caught", "draw", "shape::Mesh", "shape::bare_wood"]),

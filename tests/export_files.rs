@@ -4,9 +4,9 @@ mod synthetic;
 
 use arborcam::config::Config;
 use arborcam::export::capture::{self, Capture, Gap, MAX_GAPS, ModelNote, Quality, SCHEMA_VERSION, Timing};
-use arborcam::export::csv::{MotionCsv, Sway, TracksCsv, nodes};
+use arborcam::export::csv::{MotionCsv, TracksCsv, nodes};
 use arborcam::export::{ExportError, OutputFolder};
-use arborcam::model::{NodeId, NodeName, Observation, TrackId, TrackSet};
+use arborcam::model::{Excitation, Interval, NodeId, NodeName, Observation, Sway, TrackId, TrackSet, Unidentified};
 use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
@@ -31,22 +31,22 @@ fn tracks_have_the_agreed_columns_and_an_empty_cell_where_no_node_is() {
 fn nodes_say_what_is_not_identifiable() {
     let skeleton = synthetic::tree(2, 1);
     let sway = Sway {
-        frequency_hz: 0.512_34,
-        frequency_lo_hz: 0.5,
-        frequency_hi_hz: 0.53,
-        damping_ratio: 0.04,
-        damping_lo: 0.02,
-        damping_hi: 0.07,
+        frequency_hz: Interval { value: 0.512_34, lo: 0.5, hi: 0.53 },
+        damping_ratio: Some(Interval { value: 0.04, lo: 0.02, hi: 0.07 }),
+        excitation: Excitation::Release,
+        amplitude_deg: 1.5,
     };
-    let half = Sway { damping_ratio: f64::NAN, damping_lo: f64::NAN, damping_hi: f64::NAN, ..sway };
-    let out = text(nodes(Vec::new(), &skeleton, &[None, Some(sway), Some(half)], 0.0).unwrap());
+    let half = Sway { damping_ratio: None, excitation: Excitation::Wind, ..sway };
+    let all = [Err(Unidentified::NotMeasured), Ok(sway), Ok(half), Err(Unidentified::TooShort)];
+    let out = text(nodes(Vec::new(), &skeleton, &all, 0.0).unwrap());
     let lines: Vec<&str> = out.lines().collect();
     let header = "node_id,parent_id,level,n_tracks,u_px,v_px,x,y,z,radius,frequency_hz,frequency_lo_hz,\
-                  frequency_hi_hz,damping_ratio,damping_lo,damping_hi,identifiable";
+                  frequency_hi_hz,damping_ratio,damping_lo,damping_hi,identifiable,excitation,amplitude_deg,unidentified";
     assert_eq!(lines[0], header);
-    assert_eq!(lines[1], "0,,0,400,640,700,0,0,0,14,,,,,,,false");
-    assert_eq!(lines[2], "1,0,1,200,644,540,4,160,0,14,0.5123,0.5,0.53,0.04,0.02,0.07,true");
-    assert!(lines[3].ends_with(",0.5123,0.5,0.53,,,,false"), "{}", lines[3]);
+    assert_eq!(lines[1], "0,,0,400,640,700,0,0,0,14,,,,,,,false,,,not_measured");
+    assert_eq!(lines[2], "1,0,1,200,644,540,4,160,0,14,0.51234,0.5,0.53,0.04,0.02,0.07,true,release,1.5,");
+    assert!(lines[3].ends_with(",0.51234,0.5,0.53,,,,true,wind,1.5,"), "{}", lines[3]);
+    assert!(lines[4].ends_with(",,,,,,,false,,,too_short"), "{}", lines[4]);
     assert_eq!(lines.len(), 5);
 }
 

@@ -2,6 +2,7 @@
 
 mod copies;
 mod error;
+mod film;
 mod motion;
 mod nodes;
 mod table;
@@ -9,10 +10,10 @@ mod table;
 pub use error::CaptureError;
 
 use crate::config::Config;
+use crate::dynamics::Film;
 use crate::export::capture::{Capture, ModelNote, PictureNote, SCHEMA_VERSION};
-use crate::export::csv::Sway;
 use crate::export::glb_notes;
-use crate::model::{JointPose, Outline, Picture, Pose, Rgb, Size, Skeleton};
+use crate::model::{JointPose, Outline, Picture, Pose, Rgb, Size, Skeleton, Swaying};
 use crate::motion::PoseEstimator;
 use crate::outline;
 use motion::Postures;
@@ -33,8 +34,8 @@ pub struct Captured {
     /// `capture.json`.
     pub note: Capture,
     pub skeleton: Arc<Skeleton>,
-    /// How the nodes sway, by node index; `None` where nothing is known.
-    pub sway: Vec<Option<Sway>>,
+    /// How the nodes sway, by node index.
+    pub sway: Vec<Swaying>,
     /// Poses of the end of the film, by frame; at most as long as was asked for.
     pub poses: Vec<Pose>,
     /// The picture in the capture and the pose in it; `None` in captures of older versions.
@@ -135,6 +136,14 @@ impl Captured {
         });
         let dir = dir.to_owned();
         Ok(Self { dir, note, skeleton, sway, poses, picture, pose_in_picture, outline, warnings })
+    }
+
+    /// The points of the last `window_s` seconds, which its sway is told from.
+    ///
+    /// # Errors
+    /// `tracks.csv` is missing or damaged.
+    pub fn tracked(&self, window_s: f64) -> Result<Film, CaptureError> {
+        film::read(&self.dir, &self.skeleton, window_s)
     }
 
     /// All poses of the film in their order, read anew, one at a time: those of hours would fill the memory.

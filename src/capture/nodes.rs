@@ -3,8 +3,7 @@
 use super::CaptureError;
 use super::table::Table;
 use crate::export::capture::ModelNote;
-use crate::export::csv::Sway;
-use crate::model::{Node, NodeId, NodeName, Size, Skeleton};
+use crate::model::{Excitation, Interval, Node, NodeId, NodeName, Size, Skeleton, Sway, Swaying, Unidentified};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -13,22 +12,27 @@ const MOST_NODES: usize = 1 << 16;
 /// Nodes that a later change adds get numbers above those there are.
 const LARGEST_NAME: u32 = u32::MAX / 2;
 const COLUMNS: [&str; 8] = ["node_id", "parent_id", "level", "n_tracks", "x", "y", "z", "radius"];
+const SWAY_COLUMNS: [&str; 9] = [
+    "frequency_hz",
+    "frequency_lo_hz",
+    "frequency_hi_hz",
+    "damping_ratio",
+    "damping_lo",
+    "damping_hi",
+    "excitation",
+    "amplitude_deg",
+    "unidentified",
+];
 
-/// The nodes in their order, none of them a copy yet, and how each sways, where that is known.
+/// The nodes in their order, none of them a copy yet, and how each sways.
 ///
 /// # Errors
 /// The table is missing or damaged; two nodes have one number, or one stands before its parent, or not one level above it.
-pub(super) fn read(
-    dir: &Path,
-    note: &ModelNote,
-    image_size: Size,
-) -> Result<(Skeleton, Vec<Option<Sway>>), CaptureError> {
+pub(super) fn read(dir: &Path, note: &ModelNote, image_size: Size) -> Result<(Skeleton, Vec<Swaying>), CaptureError> {
     let mut table = Table::open(dir, "nodes.csv", COLUMNS)?;
-    let sway_columns =
-        ["frequency_hz", "frequency_lo_hz", "frequency_hi_hz", "damping_ratio", "damping_lo", "damping_hi"]
-            .map(|name| table.place(name));
+    let sway_columns = SWAY_COLUMNS.map(|name| table.place(name));
     let px = if note.metres_per_px > 0.0 { 1.0 / note.metres_per_px } else { 1.0 };
-    let (mut nodes, mut sway): (Vec<Node>, Vec<Option<Sway>>) = (Vec::new(), Vec::new());
+    let (mut nodes, mut sway): (Vec<Node>, Vec<Swaying>) = (Vec::new(), Vec::new());
     let mut by_name: BTreeMap<u32, NodeId> = BTreeMap::new();
     while table.next()? {
         let name: u32 = table.whole(0, "node_id")?;
@@ -77,17 +81,21 @@ pub(super) fn read(
     Ok((Skeleton { nodes, foot_px: note.foot_px, image_size }, sway))
 }
 
-/// `None` where neither frequency nor damping is known; what else is missing is no number.
-fn sway_of<const N: usize>(table: &Table<N>, columns: [Option<usize>; 6]) -> Option<Sway> {
-    let value = |c: Option<usize>| c.and_then(|c| table.at(c).parse().ok()).filter(|x: &f64| x.is_finite());
-    let [frequency_hz, frequency_lo_hz, frequency_hi_hz, damping_ratio, damping_lo, damping_hi] =
-        columns.map(|c| value(c).unwrap_or(f64::NAN));
-    (frequency_hz.is_finite() || damping_ratio.is_finite()).then_some(Sway {
+/// How the node of the present row sways. A frequency counts with its interval only; where a table does not say what made
+/// it sway, as in captures of older versions, it was wind, which claims less.
+fn sway_of<const N: usize>(table: &Table<N>, columns: [Option<usize>; 9]) -> Swaying {
+    let cell = |c: Option<usize>| c.map_or("", |c| table.at(c));
+    let value = |c| cell(c).parse().ok().filter(|x: &f64| x.is_finite());
+    let interval = |i: usize| {
+        let [value, lo, hi] = [value(columns[i])?, value(columns[i + 1])?, value(columns[i + 2])?];
+        (0.0 <= lo && lo <= value && value <= hi).then_some(Interval { value, lo, hi })
+    };
+    let why = || Unidentified::of_word(cell(columns[8])).unwrap_or(Unidentified::NotMeasured);
+    let frequency_hz = interval(0).filter(|f| f.value > 0.0).ok_or_else(why)?;
+    Ok(Sway {
         frequency_hz,
-        frequency_lo_hz,
-        frequency_hi_hz,
-        damping_ratio,
-        damping_lo,
-        damping_hi,
+        damping_ratio: interval(3),
+        excitation: Excitation::of_word(cell(columns[6])).unwrap_or(Excitation::Wind),
+        amplitude_deg: value(columns[7]).unwrap_or(f64::NAN),
     })
 }

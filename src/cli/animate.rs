@@ -14,10 +14,10 @@ use super::stop::Stop;
 use super::{Ended, say};
 use crate::animate::{Animator, Known, Loudness, Magnify, Wind, magnify, place_to_pull};
 use crate::config::Config;
-use crate::export::csv::{MotionCsv, Sway};
+use crate::export::csv::MotionCsv;
 use crate::export::gltf::{NamedBytes, glb, gltf_files};
 use crate::export::{ExportError, html, refuse_taken, write_files};
-use crate::model::{NodeId, Pose};
+use crate::model::{NodeId, Pose, Swaying};
 use crate::tui;
 use anyhow::{Context, anyhow};
 use live::{AsFilmed, InWind};
@@ -178,12 +178,11 @@ fn pull(args: &AnimateArgs, made: &Made, animator: &mut Animator, lean_deg: f64)
 }
 
 /// What was measured of a branch.
-fn known(sway: &Option<Sway>) -> Known {
-    let number = |x: f64| x.is_finite().then_some(x);
-    sway.as_ref().map_or_else(Known::default, |s| Known {
-        frequency_hz: number(s.frequency_hz),
-        damping_ratio: number(s.damping_ratio),
-    })
+fn known(sway: &Swaying) -> Known {
+    sway.as_ref().map_or_else(
+        |_| Known::default(),
+        |s| Known { frequency_hz: Some(s.frequency_hz.value), damping_ratio: s.damping_ratio.map(|d| d.value) },
+    )
 }
 
 /// The capture's scale, or that of a tree of the height that the configuration says.

@@ -5,10 +5,10 @@ use super::{Ended, say};
 use crate::capture::{CaptureError, Captured};
 use crate::config::{Config, ConfigError, LeafShow};
 use crate::export::capture::Software;
-use crate::export::csv::Sway;
 use crate::export::gltf::{KEY_TOLERANCE_PX, Model, provenance};
 use crate::export::read_template;
-use crate::model::{Outline, Pose, Skeleton};
+use crate::export::sway::extras;
+use crate::model::{Outline, Pose, Skeleton, Swaying, Unidentified};
 use crate::outline;
 use crate::pipeline::{MOST_RESHAPED, Seen, cut_to, dress, flutter, reshape};
 use crate::shape::{Cut, Drawn, Dressed, Topiary};
@@ -71,7 +71,7 @@ pub struct Made {
     /// How far each group of leaves swings in every pose.
     pub flutter: Vec<Vec<[f32; 2]>>,
     /// What is known of the sway of every node.
-    pub sway: Vec<Option<Sway>>,
+    pub sway: Vec<Swaying>,
     node_extras: Vec<Value>,
     provenance: Value,
     /// It stands otherwise than in the tables of the capture.
@@ -158,7 +158,6 @@ impl Shaping {
         };
         let Stand { skeleton, poses, sway, reshaped, .. } = &stand;
         let dressed = dress(skeleton, seen, &config);
-        let extras = |sway: &Option<_>| sway.as_ref().map_or(Value::Null, Sway::extras);
         let node_extras = sway.iter().map(extras).collect();
         let provenance = provenance(&captured.note.source.name, &Software::default(), poses);
         let (flutter, reshaped) = (flutter(&dressed, poses, skeleton, &config), *reshaped);
@@ -211,7 +210,7 @@ impl Shaping {
             stand.pose_in_picture = captured.reposed(&stand.skeleton, config, in_picture).pop();
             // Copies come last; nothing was measured on them.
             stand.sway.truncate(captured.skeleton.measured());
-            stand.sway.resize(stand.skeleton.nodes.len(), None);
+            stand.sway.resize(stand.skeleton.nodes.len(), Err(Unidentified::NotMeasured));
             stand.restood.reshaped = Some(stand.skeleton.clone());
         }
         let Some(path) = drawn else { return Ok(stand) };
@@ -226,7 +225,8 @@ impl Shaping {
         let whole = stand.skeleton.clone();
         let pose = |pose: &Pose| topiary.pose(&whole, pose);
         let sway = |(node, of): (&crate::model::Node, &crate::model::NodeId)| {
-            stand.sway.get(of.index()).copied().flatten().filter(|_| node.copy_of.is_none())
+            let known = stand.sway.get(of.index()).filter(|_| node.copy_of.is_none());
+            known.copied().unwrap_or(Err(Unidentified::NotMeasured))
         };
         Ok(Stand {
             poses: stand.poses.iter().map(pose).collect(),
@@ -245,7 +245,7 @@ struct Stand {
     skeleton: Arc<Skeleton>,
     poses: Vec<Pose>,
     pose_in_picture: Option<Pose>,
-    sway: Vec<Option<Sway>>,
+    sway: Vec<Swaying>,
     /// The drawn shape in the picture.
     cut_to: Option<Outline>,
     reshaped: bool,

@@ -35,6 +35,7 @@ pub const EFFECTS: &[(&str, Effect)] = &[
     ("wood", NextStart("the branches' thickness comes from it, and is in the tree already")),
     ("leaves", NextStart("the tree would have to be dressed anew")),
     ("motion", POSES),
+    ("dynamics", NextStart("one capture has one rule by which a sway counts as known")),
     // Nothing that is captured depends on it.
     ("wind", Now),
     ("export.animation_s", NextStart("older poses have been let go already")),

@@ -1,6 +1,7 @@
 //! How a branch turns against the one that carries it, as it is seen in the picture.
 
 use crate::model::{NodeId, Pose, Skeleton};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 /// Projections shorter than this have no direction, px.
 const SHORTEST_PX: f64 = 1e-6;
@@ -37,6 +38,38 @@ pub fn angle_to_parent_deg(skeleton: &Skeleton, poses: &[Pose], node: NodeId) ->
             angle
         })
         .collect()
+}
+
+/// The same angle in space: how far the branch has turned from where its carrier would have taken it, degrees, signed
+/// along the direction in which it sways most. Unlike the arc cosine of 002 eq. 1 it tells the two sides of a branch that
+/// goes on straight. NaN for poses of another skeleton.
+pub fn angle_in_space_deg(skeleton: &Skeleton, poses: &[Pose], node: NodeId) -> Vec<f64> {
+    let Some(parent) = parent_of(skeleton, node) else { return vec![f64::NAN; poses.len()] };
+    let own = skeleton.nodes[node.index()].position - skeleton.nodes[parent.index()].position;
+    let grand = parent_of(skeleton, parent).map(|_| parent);
+    let turns: Vec<Option<Vector3<f64>>> = poses
+        .iter()
+        .map(|pose| {
+            let joint = |n: NodeId| pose.joints.get(n.index()).filter(|_| pose.joints.len() == skeleton.nodes.len());
+            let now = joint(node)?.position - joint(parent)?.position;
+            // What the branch does beyond being carried.
+            let carried = match grand {
+                Some(carrier) => joint(carrier)?.rotation.inverse() * now,
+                None => now,
+            };
+            UnitQuaternion::rotation_between(&own, &carried)
+                .map(|q| q.scaled_axis())
+                .filter(|v| v.iter().all(|x| x.is_finite()))
+        })
+        .collect();
+    let seen: Vec<Vector3<f64>> = turns.iter().copied().flatten().collect();
+    let mean = seen.iter().sum::<Vector3<f64>>() / (seen.len() as f64).max(1.0);
+    let spread: Matrix3<f64> = seen.iter().map(|v| (v - mean) * (v - mean).transpose()).sum();
+    let eigen = spread.symmetric_eigen();
+    let axis: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into();
+    // Towards the viewer, as counterclockwise is in the picture.
+    let axis = if axis.z < 0.0 { -axis } else { axis };
+    turns.iter().map(|t| t.map_or(f64::NAN, |t| t.dot(&axis).to_degrees())).collect()
 }
 
 fn parent_of(skeleton: &Skeleton, node: NodeId) -> Option<NodeId> {
@@ -100,6 +133,23 @@ mod tests {
         close(angles[1], 45.0);
         // The trunk itself is measured against the upright.
         close(angle_to_parent_deg(&tree, &[pose(&leaning)], NodeId(1))[0], -45.0);
+    }
+
+    /// A branch that sways towards the viewer hardly turns in the picture; in space it does.
+    #[test]
+    fn a_sway_in_depth_is_an_angle_in_space() {
+        let rest = [[0.0; 3], [0.0, 10.0, 0.0], [0.0, 20.0, 0.0]];
+        let tree = chain(&rest);
+        let at = |deg: f64| {
+            let (s, c) = deg.to_radians().sin_cos();
+            pose(&[[0.0; 3], [0.0, 10.0, 0.0], [0.0, 10.0 + 10.0 * c, 10.0 * s]])
+        };
+        let poses: Vec<Pose> = [0.0, 8.0, -8.0, 3.0].map(at).into();
+        let (space, plane) =
+            (angle_in_space_deg(&tree, &poses, NodeId(2)), angle_to_parent_deg(&tree, &poses, NodeId(2)));
+        assert!((space[1] - space[2]).abs() > 15.9 && (space[1] - space[0]).abs() > 7.9, "{space:?}");
+        assert!(plane.iter().all(|a| a.abs() < 1e-6), "{plane:?}");
+        assert!(angle_in_space_deg(&tree, &[pose(&rest[..2])], NodeId(2))[0].is_nan());
     }
 
     #[test]

@@ -1,8 +1,25 @@
-//! What the motion says of the tree: angles between branches, and for now the dominant frequency of a
-//! displacement, for the screen.
+//! What the motion says of the tree: angles between branches, and how each branch sways.
 
 mod angle;
+mod begin;
+mod columns;
+mod common;
+mod decay;
+mod film;
+mod free;
+mod members;
+mod minimum;
+mod process;
+mod release;
+mod signals;
 mod spectrum;
+mod spread;
+mod sway;
+mod wind;
 
-pub use angle::angle_to_parent_deg;
-pub use spectrum::dominant_frequency_hz;
+pub use angle::{angle_in_space_deg, angle_to_parent_deg};
+pub use decay::{Mode, Start};
+pub use film::{Film, FilmLog, FilmTrack};
+pub use release::Onset;
+pub use spectrum::{Spectrum, dominant_frequency_hz, spectrum};
+pub use sway::{Analysis, analyse, analyse_with};

@@ -2,62 +2,17 @@
 //!
 //! Times are seconds with up to 6 decimals, pixels up to 3, lengths in the model up to 4. Unknown is an empty cell.
 
+use super::sway::Columns;
 use super::{ExportError, number};
-use crate::model::{NodeName, Pose, Skeleton, TrackId, TrackSet};
-use serde::Serialize;
+use crate::model::{NodeName, Pose, Skeleton, Swaying, TrackId, TrackSet, Unidentified};
 use std::io::Write;
 use std::sync::Arc;
 
 pub const TRACKS_HEADER: &str = "track_id,frame,time_s,u_px,v_px,node_id";
 pub const NODES_HEADER: &str = "node_id,parent_id,level,n_tracks,u_px,v_px,x,y,z,radius,frequency_hz,\
-frequency_lo_hz,frequency_hi_hz,damping_ratio,damping_lo,damping_hi,identifiable";
+frequency_lo_hz,frequency_hi_hz,damping_ratio,damping_lo,damping_hi,identifiable,\
+excitation,amplitude_deg,unidentified";
 pub const MOTION_HEADER: &str = "frame,time_s,node_id,x,y,z,u_px,v_px";
-
-/// How one node sways, with 95 % intervals. A value that is no number stands for one that is not known (`null` in JSON).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Sway {
-    pub frequency_hz: f64,
-    pub frequency_lo_hz: f64,
-    pub frequency_hi_hz: f64,
-    /// Share of critical damping.
-    pub damping_ratio: f64,
-    pub damping_lo: f64,
-    pub damping_hi: f64,
-}
-
-impl Sway {
-    const UNKNOWN: Self = Self {
-        frequency_hz: f64::NAN,
-        frequency_lo_hz: f64::NAN,
-        frequency_hi_hz: f64::NAN,
-        damping_ratio: f64::NAN,
-        damping_lo: f64::NAN,
-        damping_hi: f64::NAN,
-    };
-
-    /// For the `extras` of a joint: what is known of it, with 95 % intervals.
-    pub fn extras(&self) -> serde_json::Value {
-        let mut all = serde_json::Map::new();
-        let known = |lo: f64, hi: f64| (lo.is_finite() && hi.is_finite()).then(|| serde_json::json!([lo, hi]));
-        for (name, value, interval) in [
-            ("frequency_hz", self.frequency_hz, known(self.frequency_lo_hz, self.frequency_hi_hz)),
-            ("damping_ratio", self.damping_ratio, known(self.damping_lo, self.damping_hi)),
-        ] {
-            if value.is_finite() {
-                all.insert(name.into(), value.into());
-                interval.into_iter().for_each(|i| drop(all.insert(format!("{name}_interval_95"), i)));
-            }
-        }
-        all.insert("identifiable".into(), self.values().iter().all(|x| x.is_finite()).into());
-        all.into()
-    }
-
-    fn values(&self) -> [f64; 6] {
-        let damping = [self.damping_ratio, self.damping_lo, self.damping_hi];
-        let [d, lo, hi] = damping;
-        [self.frequency_hz, self.frequency_lo_hz, self.frequency_hi_hz, d, lo, hi]
-    }
-}
 
 /// One CSV file: a row is put together cell by cell.
 pub(super) struct Table<W: Write> {
@@ -166,27 +121,27 @@ impl<W: Write> TracksCsv<W> {
 }
 
 /// Writes `nodes.csv`. `sway` is by node index and may be shorter than the tree; `metres_per_px` 0 leaves pixels.
+/// A node is identifiable if it has a frequency with its interval; where it is not, the last column says why.
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn nodes<W: Write>(
-    out: W,
-    skeleton: &Skeleton,
-    sway: &[Option<Sway>],
-    metres_per_px: f64,
-) -> Result<W, ExportError> {
+pub fn nodes<W: Write>(out: W, skeleton: &Skeleton, sway: &[Swaying], metres_per_px: f64) -> Result<W, ExportError> {
     let mut table = Table::new("nodes.csv", NODES_HEADER, out)?;
     let (scale, more) = unit(metres_per_px);
     for (i, node) in skeleton.nodes.iter().enumerate() {
-        let sway = sway.get(i).copied().flatten().unwrap_or(Sway::UNKNOWN).values();
+        let sway = sway.get(i).copied().unwrap_or(Err(Unidentified::NotMeasured));
         table.count(node.name.0);
         table.id(node.parent.and_then(|p| skeleton.name_of(p)));
         table.count(node.level);
         table.count(node.n_tracks);
         skeleton.image_from_model(&node.position).into_iter().for_each(|x| table.number(x, 3));
         node.position.iter().chain([&node.radius]).for_each(|x| table.number(x * scale, 4 + more));
-        sway.iter().for_each(|&x| table.number(x, 4));
-        table.row.push_field(if sway.iter().all(|x| x.is_finite()) { "true" } else { "false" });
+        let columns = Columns::of(&sway);
+        columns.values().into_iter().for_each(|x| table.number(x, 5));
+        table.row.push_field(if sway.is_ok() { "true" } else { "false" });
+        table.row.push_field(sway.map_or("", |s| s.excitation.word()));
+        table.number(sway.map_or(f64::NAN, |s| s.amplitude_deg), 4);
+        table.row.push_field(sway.err().map_or("", Unidentified::word));
         table.end_row()?;
     }
     table.finish()

@@ -1,9 +1,9 @@
 //! What the HTML page knows of the tree apart from its model.
 
 use super::capture::Capture;
-use super::csv::Sway;
+use super::sway::Columns;
 use crate::dynamics::angle_to_parent_deg;
-use crate::model::{NodeId, Pose, Skeleton};
+use crate::model::{NodeId, Pose, Skeleton, Swaying};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
@@ -44,7 +44,7 @@ pub struct Branch {
     /// Its end at rest, model axes, px.
     pub end: [f64; 3],
     /// What was identified of its sway; numbers that are not known are `null`.
-    pub sway: Option<Sway>,
+    pub sway: Option<Columns>,
     /// Angle to the parent branch at every one of [`Data::times_s`]: hundredths of a degree as 16-bit integers, little
     /// endian, in base64; the lowest integer stands for one that is not known. `None` for the foot and for copies.
     pub angle_deg: Option<String>,
@@ -53,13 +53,7 @@ pub struct Branch {
 impl Data {
     /// The page's facts. `poses` are those of the animation in the order of time; `sway` is by node index, as for
     /// `nodes.csv`, and may be shorter than the skeleton; `metres_per_px` is that of the model's file.
-    pub fn of(
-        capture: &Capture,
-        skeleton: &Skeleton,
-        poses: &[Pose],
-        sway: &[Option<Sway>],
-        metres_per_px: f64,
-    ) -> Self {
+    pub fn of(capture: &Capture, skeleton: &Skeleton, poses: &[Pose], sway: &[Swaying], metres_per_px: f64) -> Self {
         let size = skeleton.image_size;
         let start_s = poses.iter().map(|p| p.time_s).find(|t| t.is_finite()).unwrap_or(0.0);
         let source = capture.source.name.rsplit(['/', '\\']).find(|part| !part.is_empty()).unwrap_or_default();
@@ -78,12 +72,11 @@ impl Data {
     }
 }
 
-fn branch(skeleton: &Skeleton, poses: &[Pose], sway: &[Option<Sway>], i: usize) -> Branch {
+fn branch(skeleton: &Skeleton, poses: &[Pose], sway: &[Swaying], i: usize) -> Branch {
     let node = &skeleton.nodes[i];
     let name = |id: NodeId| skeleton.name_of(id).map(|n| n.0);
     let measured = node.parent.is_some() && node.copy_of.is_none();
-    // A frequency without a number is one that was not identified.
-    let sway = sway.get(i).copied().flatten().filter(|s| s.frequency_hz.is_finite());
+    let sway = sway.get(i).filter(|s| s.is_ok()).map(Columns::of);
     Branch {
         id: node.name.0,
         parent: node.parent.and_then(name),

@@ -26,6 +26,7 @@ mod planned_keys;
 mod skinning;
 mod sparse_keys;
 pub mod still;
+pub mod sway;
 mod template;
 mod template_bytes;
 mod thin_keys;

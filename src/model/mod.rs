@@ -10,6 +10,7 @@ mod outline;
 mod pose;
 mod skeleton;
 mod snapshot;
+mod sway;
 mod track;
 
 pub use control::Control;
@@ -19,4 +20,5 @@ pub use outline::Outline;
 pub use pose::{JointPose, Pose};
 pub use skeleton::{FARTHEST_PX, Node, NodeId, NodeName, Skeleton};
 pub use snapshot::{BranchRow, CameraState, FormatNote, Phase, Snapshot};
+pub use sway::{Excitation, Interval, Sway, Swaying, Unidentified};
 pub use track::{LONGEST_TRIAL_S, Observation, TrackId, TrackSet};

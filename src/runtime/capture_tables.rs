@@ -5,12 +5,13 @@ use super::held_sets::HeldSets;
 use super::meter::Histogram;
 use super::shared::Failure;
 use crate::config::Config;
+use crate::dynamics::{Film, FilmLog};
 use crate::export::OutputFolder;
 use crate::export::csv::{MotionCsv, TracksCsv};
-use crate::model::{Pose, TrackSet};
+use crate::model::{NodeId, NodeName, Pose, TrackId, TrackSet};
 use crate::pipeline::{Retrace, Tree};
 use crate::recording::{Sets, SpoolReader};
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
@@ -35,6 +36,8 @@ pub struct CaptureTables {
     pictured: Option<u64>,
     pose_in_picture: Option<Pose>,
     misses: Histogram,
+    /// The points of the last seconds, for the sway.
+    log: FilmLog,
 }
 
 /// What is left when both tables are complete.
@@ -46,6 +49,8 @@ pub struct Done {
     pub pose_in_picture: Option<Pose>,
     /// How far the projected nodes lie from where their tracks put them, px.
     pub misses: Histogram,
+    /// The points of the last `dynamics.window_s`.
+    pub film: Film,
 }
 
 impl CaptureTables {
@@ -71,6 +76,7 @@ impl CaptureTables {
             pictured,
             pose_in_picture: None,
             misses: Histogram::default(),
+            log: FilmLog::new(config.dynamics.window_s),
         })
     }
 
@@ -92,7 +98,7 @@ impl CaptureTables {
             }
             while let Some(set) = self.held.decided() {
                 self.early_rows(spool, &wrote)?;
-                self.tracks.set(&set, |id| self.retrace.node_of(id))?;
+                self.rows(&set)?;
             }
             if !wrote() {
                 break;
@@ -118,12 +124,19 @@ impl CaptureTables {
         self.early_rows(spool, &wrote)?;
         while let Some(set) = self.held.next() {
             wrote();
-            self.tracks.set(&set, |id| self.retrace.node_of(id))?;
+            self.rows(&set)?;
         }
         self.tracks.finish()?;
         self.motion.finish()?;
         let (poses, pose_in_picture) = (self.poses.into(), self.pose_in_picture);
-        Ok(Done { folder: self.folder, tree: self.tree, poses, pose_in_picture, misses: self.misses })
+        let film = film(&self.log, &self.tree, |id| self.retrace.node_of(id));
+        Ok(Done { folder: self.folder, tree: self.tree, poses, pose_in_picture, misses: self.misses, film })
+    }
+
+    /// The points of a frame in which it is decided which are kept.
+    fn rows(&mut self, set: &TrackSet) -> Result<(), Failure> {
+        self.log.push(set);
+        Ok(self.tracks.set(set, |id| self.retrace.node_of(id))?)
     }
 
     fn pose(&mut self, set: &TrackSet) -> Result<(), Failure> {
@@ -158,8 +171,15 @@ impl CaptureTables {
                 break;
             }
             self.held.clean(&mut set);
-            self.tracks.set(&set, |id| self.retrace.node_of(id))?;
+            self.rows(&set)?;
         }
         Ok(())
     }
+}
+
+/// The points of `log` on the nodes of `tree`.
+fn film(log: &FilmLog, tree: &Tree, name_of: impl Fn(TrackId) -> Option<NodeName>) -> Film {
+    let names = tree.skeleton.nodes.iter().enumerate().map(|(i, n)| (n.name, NodeId(i as u32)));
+    let by_name: BTreeMap<NodeName, NodeId> = names.collect();
+    log.film(&tree.skeleton, |id| by_name.get(&name_of(id)?).copied())
 }

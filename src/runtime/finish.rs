@@ -6,6 +6,7 @@ use super::held_sets::{HeldSets, OnTrial};
 use super::meter::Histogram;
 use super::shared::{Failure, Shared};
 use crate::config::Config;
+use crate::dynamics::analyse_with;
 use crate::export::capture::{
     AnimationNote, Build, Capture, ModelNote, OutlineNote, PictureNote, Quality as QualityNote, Refinement, Software,
     Source, Timing, json,
@@ -104,10 +105,9 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
         true
     };
     tables.catch_up(&job.tracks, wrote)?;
-    let Done { folder, tree, poses, pose_in_picture, misses } = tables.finish(&job.tracks, wrote)?;
+    let Done { folder, tree, poses, pose_in_picture, misses, film } = tables.finish(&job.tracks, wrote)?;
     let metres_per_px = job.config.export.metres_per_px;
-    // Intervals that can be defended are a matter of their own; until then no branch claims a frequency.
-    let sway = vec![None; tree.skeleton.nodes.len()];
+    let sway = analyse_with(&tree.skeleton, &film, &job.config.dynamics, &|| job.shared.pulse.wrote()).sway;
     nodes(folder.file("nodes.csv")?, &tree.skeleton, &sway, metres_per_px)?;
     let (bytes, animation) = model_of(job, &tree, &poses, pose_in_picture.as_ref())?;
     folder.write("tree.glb", &bytes)?;

@@ -1,0 +1,110 @@
+//! The points of a film, by the branch that they are on: what sway is measured from.
+
+use crate::model::{NodeId, Skeleton, TrackId, TrackSet};
+use std::collections::{BTreeMap, VecDeque};
+
+/// One followed point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FilmTrack {
+    /// The deepest node that it belongs to.
+    pub node: NodeId,
+    /// Where it was in every frame of the film, px; no numbers where it was not seen.
+    pub at_px: Vec<[f64; 2]>,
+}
+
+/// The points of a film in all its frames. Times are those of the sensor: they need not be even, and frames may be
+/// missing.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Film {
+    /// Strictly growing, s.
+    pub times_s: Vec<f64>,
+    pub tracks: Vec<FilmTrack>,
+}
+
+impl Film {
+    /// Frames whose time is no number, or not later than the one before, are left out: nothing can be said of them.
+    pub fn new(times_s: &[f64], tracks: Vec<FilmTrack>) -> Self {
+        let mut last = f64::NEG_INFINITY;
+        let kept: Vec<usize> = (0..times_s.len())
+            .filter(|&k| {
+                let later = times_s[k].is_finite() && times_s[k] > last;
+                last = if later { times_s[k] } else { last };
+                later
+            })
+            .collect();
+        let at = |t: &FilmTrack, k: usize| t.at_px.get(k).copied().unwrap_or([f64::NAN; 2]);
+        let thin = |t: FilmTrack| FilmTrack { node: t.node, at_px: kept.iter().map(|&k| at(&t, k)).collect() };
+        Self { times_s: kept.iter().map(|&k| times_s[k]).collect(), tracks: tracks.into_iter().map(thin).collect() }
+    }
+
+    /// From the time of the first frame to that of the last, s.
+    pub fn span_s(&self) -> f64 {
+        self.times_s.last().zip(self.times_s.first()).map_or(0.0, |(b, a)| b - a)
+    }
+
+    /// The first frames of the film, without frame `to` and what comes after.
+    pub fn until(&self, to: usize) -> Self {
+        let to = to.min(self.times_s.len());
+        let short = |t: &FilmTrack| FilmTrack { node: t.node, at_px: t.at_px[..to].to_vec() };
+        Self { times_s: self.times_s[..to].to_vec(), tracks: self.tracks.iter().map(short).collect() }
+    }
+
+    /// Time that three quarters of the frames are not farther apart than, s; infinite for less than two frames.
+    pub fn step_s(&self) -> f64 {
+        let mut steps: Vec<f64> = self.times_s.windows(2).map(|w| w[1] - w[0]).collect();
+        steps.sort_unstable_by(f64::total_cmp);
+        steps.get(3 * steps.len() / 4).copied().unwrap_or(f64::INFINITY)
+    }
+}
+
+/// Where points were in one frame, px.
+type Places = Vec<(TrackId, [f32; 2])>;
+
+/// The last seconds of a film that goes on.
+#[derive(Clone, Debug)]
+pub struct FilmLog {
+    window_s: f64,
+    sets: VecDeque<(f64, Places)>,
+}
+
+impl FilmLog {
+    /// Keeps `window_s` seconds.
+    pub fn new(window_s: f64) -> Self {
+        Self { window_s, sets: VecDeque::new() }
+    }
+
+    /// Takes the points of the next frame.
+    pub fn push(&mut self, set: &TrackSet) {
+        self.push_points(set.time_s, set.observations.iter().map(|o| (o.id, [o.u_px, o.v_px])));
+    }
+
+    /// Takes points of the next frame, px.
+    pub fn push_points(&mut self, time_s: f64, points: impl Iterator<Item = (TrackId, [f32; 2])>) {
+        match self.sets.back_mut() {
+            Some((last, all)) if *last == time_s => all.extend(points),
+            _ => self.sets.push_back((time_s, points.collect())),
+        }
+        while self.sets.front().is_some_and(|(t, _)| time_s - t > self.window_s) {
+            self.sets.pop_front();
+        }
+    }
+
+    /// The film so far; `node_of` says on which measured node of `skeleton` a point is.
+    pub fn film(&self, skeleton: &Skeleton, node_of: impl Fn(TrackId) -> Option<NodeId>) -> Film {
+        let measured = skeleton.measured();
+        let mut by_id: BTreeMap<TrackId, Option<FilmTrack>> = BTreeMap::new();
+        for (k, (_, points)) in self.sets.iter().enumerate() {
+            for (id, [u, v]) in points {
+                let track = by_id.entry(*id).or_insert_with(|| {
+                    let node = node_of(*id).filter(|n| n.index() < measured)?;
+                    Some(FilmTrack { node, at_px: vec![[f64::NAN; 2]; self.sets.len()] })
+                });
+                if let Some(track) = track {
+                    track.at_px[k] = [f64::from(*u), f64::from(*v)];
+                }
+            }
+        }
+        let times: Vec<f64> = self.sets.iter().map(|(t, _)| *t).collect();
+        Film::new(&times, by_id.into_values().flatten().collect())
+    }
+}
