@@ -6,9 +6,10 @@
 
 use super::decay::Mode;
 use super::film::Film;
+use super::fit::Prior;
 use super::members::{Points, mean_px};
 use super::release::{MOMENT_SD, Onset};
-use super::signals::{Factor, Fit, Prior, Signals};
+use super::signals::{Factor, Fit, Signals};
 use super::spread::deviations;
 use crate::model::{Excitation, Interval, NodeId, Skeleton, Sway, Swaying, Unidentified};
 use crate::signal::along_principal_direction;
@@ -123,7 +124,7 @@ fn branch(
     fit.rss = signals.rss(&fit);
     let carried = fit.rss;
     let noise = points.noise().min(0.9 * carried);
-    let free_factors = (points.signals.len() * signals.per_mode()) as f64;
+    let free_factors = signals.factors_per_mode() as f64;
     let largest = largest(&points.signals);
     // One more than is taken shows how much the answer hangs on how many there are.
     let mut beyond: Vec<Mode> = Vec::new();

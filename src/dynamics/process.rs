@@ -5,6 +5,8 @@
 //! of values only, whatever their times: Foreman-Mackey, Agol, Ambikasaran and Angus, "Fast and scalable Gaussian process
 //! modeling with applications to astronomical time series" (2017), eqs. 9, 20, 33-43.
 
+use super::columns::dot;
+use super::decay::{each_step, powers};
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 
@@ -32,6 +34,32 @@ struct Term {
     b: f64,
     c: f64,
     d: f64,
+}
+
+/// A rank of the covariance in every frame: u v' faded from frame to frame. An oscillation has two, a fading one.
+struct Wave {
+    u: Vec<f64>,
+    v: Vec<f64>,
+    /// From the frame before.
+    fade: Vec<f64>,
+}
+
+impl Term {
+    fn waves(&self, times_s: &[f64]) -> Vec<Wave> {
+        let mut fade = Vec::with_capacity(times_s.len());
+        fade.extend(times_s.first().map(|_| 1.0));
+        each_step(times_s, Complex::from(-self.c), |factor| fade.push(factor.re));
+        if self.d == 0.0 {
+            return vec![Wave { u: vec![self.a; times_s.len()], v: vec![1.0; times_s.len()], fade }];
+        }
+        let turn = powers(times_s, Complex::new(0.0, self.d));
+        let of = |f: &dyn Fn(&Complex<f64>) -> f64| turn.iter().map(f).collect::<Vec<f64>>();
+        let (cos, sin) = (of(&|t| t.re), of(&|t| t.im));
+        vec![
+            Wave { u: of(&|t| self.a * t.re + self.b * t.im), v: cos, fade: fade.clone() },
+            Wave { u: of(&|t| self.a * t.im - self.b * t.re), v: sin, fade },
+        ]
+    }
 }
 
 impl Part {
@@ -68,50 +96,45 @@ pub(super) fn minus_2_log_likelihood(
     noise: f64,
 ) -> f64 {
     let terms: Vec<Term> = parts.iter().flat_map(Part::terms).collect();
-    let j = 2 * terms.len();
+    let waves: Vec<Wave> = terms.iter().flat_map(|term| term.waves(times_s)).collect();
+    let j = waves.len();
     let diagonal = noise + parts.iter().map(Part::variance).sum::<f64>();
     let signals = 1 + known.len();
-    let (mut u, mut v, mut phi) = (vec![0.0; j], vec![0.0; j], vec![0.0; j]);
+    let (mut u, mut phi) = (vec![0.0; j], vec![0.0; j]);
     // S and W of the factor; f of the solution, a row for each signal.
     let (mut s, mut w, mut f) = (vec![0.0; j * j], vec![0.0; j], vec![0.0; j * signals]);
     let (mut z, mut d) = (vec![0.0; signals], 0.0);
-    let mut su = vec![0.0; j];
+    let (mut su, mut new) = (vec![0.0; j], vec![0.0; j]);
     let mut gram = vec![0.0; signals * signals];
     let mut log_determinant = 0.0;
-    for (n, t) in times_s.iter().enumerate() {
-        let dt = if n > 0 { t - times_s[n - 1] } else { 0.0 };
-        for (k, term) in terms.iter().enumerate() {
-            let (sin, cos) = (term.d * t).sin_cos();
-            (u[2 * k], u[2 * k + 1]) = (term.a * cos + term.b * sin, term.a * sin - term.b * cos);
-            (v[2 * k], v[2 * k + 1]) = (cos, sin);
-            let fade = (-term.c * dt).exp();
-            (phi[2 * k], phi[2 * k + 1]) = (fade, fade);
+    for n in 0..times_s.len() {
+        for (k, wave) in waves.iter().enumerate() {
+            (u[k], phi[k]) = (wave.u[n], wave.fade[n]);
+            new[k] = d * w[k] * phi[k];
         }
-        if n > 0 {
-            for a in 0..j {
-                for b in 0..=a {
-                    let x = phi[a] * phi[b] * (s[a * j + b] + d * w[a] * w[b]);
-                    s[a * j + b] = x;
-                    s[b * j + a] = x;
-                }
-                for i in 0..signals {
-                    f[i * j + a] = phi[a] * (f[i * j + a] + w[a] * z[i]);
-                }
+        for (a, row) in s.chunks_exact_mut(j.max(1)).enumerate() {
+            // S becomes phi phi' (S + d w w').
+            let (old, added) = (phi[a], phi[a] * w[a]);
+            for (x, (phi, new)) in row.iter_mut().zip(phi.iter().zip(&new)) {
+                *x = old * phi * *x + added * new;
+            }
+            su[a] = dot(row, &u);
+        }
+        for (f, z) in f.chunks_exact_mut(j.max(1)).zip(&z) {
+            for (f, (phi, w)) in f.iter_mut().zip(phi.iter().zip(&w)) {
+                *f = phi * (*f + w * z);
             }
         }
-        for a in 0..j {
-            su[a] = (0..j).map(|b| s[a * j + b] * u[b]).sum();
-        }
-        d = diagonal - (0..j).map(|a| u[a] * su[a]).sum::<f64>();
+        d = diagonal - dot(&u, &su);
         if d.is_nan() || d <= 0.0 {
             return f64::INFINITY;
         }
-        for a in 0..j {
-            w[a] = (v[a] - su[a]) / d;
+        for (k, wave) in waves.iter().enumerate() {
+            w[k] = (wave.v[n] - su[k]) / d;
         }
-        for i in 0..signals {
+        for (i, f) in f.chunks_exact(j.max(1)).enumerate() {
             let y = if i == 0 { values[n] } else { known[i - 1][n] };
-            z[i] = y - (0..j).map(|a| u[a] * f[i * j + a]).sum::<f64>();
+            z[i] = y - dot(&u, f);
         }
         log_determinant += d.ln();
         for i in 0..signals {

@@ -1,35 +1,28 @@
-//! Damped cosines fitted to many signals at once, at the times at which they were really taken.
+//! Signals that share damped cosines, at the times at which they were really taken.
 //!
 //! All signals share the frequencies and dampings and each has factors of its own, which come from a linear fit inside
-//! the nonlinear one: variable projection (Golub and Pereyra 1973) with Kaufman's Jacobian (1975). Nothing is resampled,
-//! so that gaps and uneven times cost only the frames that they lack. After a release the moment of it, which all modes
-//! share, is fitted too.
+//! the nonlinear one (`fit.rs`). Nothing is resampled, so that gaps and uneven times cost only the frames that they lack.
 
-use super::columns::{Qr, dot, take_off_once};
+use super::columns::{Qr, dot};
 use super::decay::{Mode, Start};
-use nalgebra::{DMatrix, DVector};
+use super::normal::{Factored, products, products_without};
+use nalgebra::DMatrix;
 
-/// Iterations of the fit at most, and the relative change of the sum of squares at which it ends.
-const MAX_STEPS: usize = 30;
-const DONE: f64 = 1e-4;
-/// Damping ratios that are tried.
-const DAMPING: [f64; 2] = [0.002, 0.45];
 /// Frequencies that a search tries per factor of e, and dampings.
 const PER_E: f64 = 24.0;
 const TRIED: [f64; 3] = [0.02, 0.05, 0.1];
 /// A column of which less is left than this, when the others are taken off, adds nothing that could be told from them.
 const ALIKE: f64 = 0.02;
 
-/// What is known of a mode beforehand, with the standard deviations of the logarithms of its frequency and damping.
-pub(super) type Prior = Option<(Mode, [f64; 2])>;
-
 /// Signals that were seen in the same frames.
 pub(super) struct Group {
-    /// Of the frames.
-    rows: Vec<usize>,
+    /// Frames in which they were seen, and in which they were not.
+    seen: Vec<usize>,
+    lacking: Vec<usize>,
     /// Of the signals, as they were given.
     ids: Vec<usize>,
-    values: Vec<Vec<f64>>,
+    /// In all frames; 0 where they were not seen.
+    pub values: Vec<Vec<f64>>,
 }
 
 /// Signals to be fitted together.
@@ -41,7 +34,7 @@ pub(super) struct Signals {
     pub groups: Vec<Group>,
     /// Number of values in all signals.
     pub values: usize,
-    frequencies_hz: [f64; 2],
+    pub frequencies_hz: [f64; 2],
 }
 
 /// A fit of modes to signals.
@@ -81,235 +74,122 @@ impl Signals {
     ) -> Self {
         let mut groups: Vec<Group> = Vec::new();
         for (id, signal) in signals.iter().enumerate() {
-            let rows: Vec<usize> = (0..times_s.len()).filter(|&k| signal[k].is_finite()).collect();
-            let values: Vec<f64> = rows.iter().map(|&k| signal[k]).collect();
-            match groups.iter_mut().find(|g| g.rows == rows) {
+            let (seen, lacking): (Vec<usize>, Vec<usize>) = (0..times_s.len()).partition(|&k| signal[k].is_finite());
+            let mut values = signal.clone();
+            lacking.iter().for_each(|&k| values[k] = 0.0);
+            match groups.iter_mut().find(|g| g.seen == seen) {
                 Some(group) => {
                     group.ids.push(id);
                     group.values.push(values);
                 }
-                None => groups.push(Group { rows, ids: vec![id], values: vec![values] }),
+                None => groups.push(Group { seen, lacking, ids: vec![id], values: vec![values] }),
             }
         }
-        let values = groups.iter().map(|g| g.rows.len() * g.ids.len()).sum();
+        let values = groups.iter().map(|g| g.seen.len() * g.ids.len()).sum();
         Self { times_s, start, moment_sd_s, groups, values, frequencies_hz }
     }
 
     /// Columns per mode.
-    pub fn per_mode(&self) -> usize {
+    fn per_mode(&self) -> usize {
         match self.start {
             Start::Rest => 1,
             Start::Moving => 2,
         }
     }
 
-    fn columns(&self, fit: &Fit) -> Vec<Vec<f64>> {
-        let times: Vec<f64> = self.times_s.iter().map(|t| t - fit.moment_s).collect();
+    /// Factors that a mode has in all signals.
+    pub fn factors_per_mode(&self) -> usize {
+        self.per_mode() * self.groups.iter().map(|g| g.ids.len()).sum::<usize>()
+    }
+
+    /// Of a mode, beside the constant's.
+    pub fn columns_of(&self, mode: usize) -> std::ops::Range<usize> {
+        1 + self.per_mode() * mode..1 + self.per_mode() * (mode + 1)
+    }
+
+    pub fn times_of(&self, fit: &Fit) -> Vec<f64> {
+        self.times_s.iter().map(|t| t - fit.moment_s).collect()
+    }
+
+    /// A constant, then the columns of each mode.
+    pub fn columns(&self, fit: &Fit) -> Vec<Vec<f64>> {
+        let times = self.times_of(fit);
         let ones = std::iter::once(vec![1.0; times.len()]);
         ones.chain(fit.modes.iter().flat_map(|m| m.columns(&times, self.start))).collect()
     }
 
-    fn fit_of(&self, x: &[f64]) -> Fit {
-        let modes = x.chunks_exact(2).map(Mode::of_parameters).collect();
-        Fit { modes, moment_s: if x.len() % 2 == 1 { x[x.len() - 1] } else { 0.0 }, rss: f64::NAN }
-    }
-
-    pub fn parameters(&self, fit: &Fit) -> Vec<f64> {
-        let moment = (self.start == Start::Rest).then_some(fit.moment_s);
-        fit.modes.iter().flat_map(Mode::parameters).chain(moment).collect()
-    }
-
-    /// Sum of the squares that `modes` leave.
+    /// Sum of the squares that `fit` leaves.
     pub fn rss(&self, fit: &Fit) -> f64 {
         let columns = self.columns(fit);
+        let columns = slices(&columns);
+        let all = products(&columns);
         let of = |g: &Group| -> f64 {
-            let qr = Qr::new(g.pick(&columns));
-            g.values.iter().map(|y| qr.solve(y).0).map(|r| dot(&r, &r)).sum()
+            let factored = Factored::new(&g.products(&all, &columns), columns.len());
+            g.values.iter().map(|y| Explained::new(y, &columns, &factored).left).sum()
         };
         self.groups.iter().map(of).sum()
     }
 
     /// The mode that takes off most of what a fit leaves, by trying.
     pub fn search(&self, fit: &Fit) -> Option<Mode> {
-        // The frames that a signal lacks are 0 here: good enough for a first guess, and one set of columns serves all.
         let columns = self.columns(fit);
+        let slices = slices(&columns);
+        let all = products(&slices);
+        // The frames that a signal lacks are 0 here: good enough for a first guess, and one set of columns serves all.
         let qr = Qr::new(columns.clone());
-        let left = self.groups.iter().flat_map(|g| {
-            let own = Qr::new(g.pick(&columns));
-            let spread = |rest: Vec<f64>| {
-                let mut all = vec![0.0; self.times_s.len()];
-                g.rows.iter().zip(&rest).for_each(|(k, r)| all[*k] = *r);
-                all
+        let of_group = |g: &Group| {
+            let factored = Factored::new(&g.products(&all, &slices), slices.len());
+            let left = |y: &Vec<f64>| {
+                let rest = g.rest(y, &slices, &Explained::new(y, &slices, &factored).factors);
+                let on_columns: Vec<f64> = qr.q.iter().map(|q| dot(q, &rest)).collect();
+                (rest, on_columns)
             };
-            g.values.iter().map(|y| spread(own.solve(y).0)).collect::<Vec<_>>()
-        });
-        let left: Vec<Vec<f64>> = left.collect();
+            g.values.iter().map(left).collect::<Vec<_>>()
+        };
+        let left: Vec<(Vec<f64>, Vec<f64>)> = self.groups.iter().flat_map(of_group).collect();
         let [lo, hi] = self.frequencies_hz;
         let n = (PER_E * (hi / lo).ln()).ceil().max(1.0) as usize;
-        let tried = (0..=n).flat_map(|k| {
-            let frequency_hz = lo * (hi / lo).powf(k as f64 / n as f64);
-            TRIED.map(|damping| Mode { frequency_hz, damping })
-        });
-        let times: Vec<f64> = self.times_s.iter().map(|t| t - fit.moment_s).collect();
+        let frequencies_hz = (0..=n).map(|k| lo * (hi / lo).powf(k as f64 / n as f64));
+        let tried = frequencies_hz.flat_map(|frequency_hz| TRIED.map(|damping| Mode { frequency_hz, damping }));
+        let times = self.times_of(fit);
         let gain = |mode: &Mode| -> f64 {
-            let mut added: Vec<Vec<f64>> = Vec::new();
-            for mut column in mode.columns(&times, self.start) {
-                let before = dot(&column, &column);
-                take_off_once(&mut column, &qr.q);
-                take_off_once(&mut column, &added);
-                let after = dot(&column, &column);
-                if after > ALIKE * ALIKE * before {
-                    column.iter_mut().for_each(|x| *x /= after.sqrt());
-                    added.push(column);
+            let new = mode.columns(&times, self.start);
+            // What the new columns add to the fit's: their products, and those with what is left, without the fit's.
+            let on_columns: Vec<Vec<f64>> = new.iter().map(|c| qr.q.iter().map(|q| dot(q, c)).collect()).collect();
+            let k = new.len();
+            let before = DMatrix::from_fn(k, k, |a, b| dot(&new[a], &new[b]));
+            let mut own = DMatrix::from_fn(k, k, |a, b| before[(a, b)] - dot(&on_columns[a], &on_columns[b]));
+            for a in 0..k {
+                if own[(a, a)] <= ALIKE * ALIKE * before[(a, a)] {
+                    own.row_mut(a).fill(0.0);
+                    own.column_mut(a).fill(0.0);
                 }
             }
-            left.iter().map(|r| added.iter().map(|q| dot(r, q).powi(2)).sum::<f64>()).sum()
+            let factored = Factored::new(&own, k);
+            let taken = |(rest, of_rest): &(Vec<f64>, Vec<f64>)| {
+                let by: Vec<f64> = (0..k).map(|a| dot(rest, &new[a]) - dot(of_rest, &on_columns[a])).collect();
+                dot(&factored.solve(&by), &by)
+            };
+            left.iter().map(taken).sum()
         };
         let gains = tried.map(|m| (gain(&m), m));
         gains.filter(|(g, _)| g.is_finite() && *g > 0.0).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, m)| m)
-    }
-
-    /// Fits all of `modes`; those that have a prior are held near it by its standard deviations (of the logarithms of
-    /// frequency and damping).
-    pub fn fit(&self, from: &Fit, priors: &[Prior]) -> Fit {
-        let mut x = self.parameters(from);
-        let mut now = self.linearized(&x, priors);
-        let mut cost = self.cost(&x, now.rss, priors);
-        let mut lambda = 1e-3;
-        for _ in 0..MAX_STEPS {
-            let mut better = false;
-            for _ in 0..6 {
-                let mut h = now.hessian.clone();
-                (0..h.nrows()).for_each(|i| h[(i, i)] *= 1.0 + lambda);
-                let Some(step) = h.lu().solve(&now.gradient) else { break };
-                let mut next: Vec<f64> = x.iter().zip(step.iter()).map(|(x, d)| x + d.clamp(-0.3, 0.3)).collect();
-                next.chunks_exact_mut(2).for_each(|p| {
-                    p[0] = p[0].clamp(self.frequencies_hz[0].ln(), self.frequencies_hz[1].ln());
-                    p[1] = p[1].clamp(DAMPING[0].ln(), DAMPING[1].ln());
-                });
-                let there = self.cost(&next, self.rss(&self.fit_of(&next)), priors);
-                if there < cost {
-                    better = cost - there > DONE * cost;
-                    if better {
-                        now = self.linearized(&next, priors);
-                    }
-                    (x, cost) = (next, there);
-                    lambda *= 0.2;
-                    break;
-                }
-                lambda = (lambda * 5.0).max(1e-6);
-            }
-            if !better {
-                break;
-            }
-        }
-        let fit = self.fit_of(&x);
-        Fit { rss: self.rss(&fit), ..fit }
-    }
-
-    /// The squares that are left with what the priors add: a prior weighs as much as the noise of one value allows.
-    fn cost(&self, x: &[f64], rss: f64, priors: &[Prior]) -> f64 {
-        let off = |(m, prior): (usize, &Prior)| {
-            let Some((mode, sd)) = prior else { return 0.0 };
-            let at = mode.parameters();
-            (0..2).map(|i| (at[i] - x[2 * m + i]).powi(2) / (sd[i] * sd[i]).max(1e-12)).sum::<f64>()
-        };
-        let of_modes: f64 = priors.iter().enumerate().map(off).sum();
-        let of_moment = match self.start {
-            Start::Rest => x[x.len() - 1].powi(2) / self.moment_sd_s.powi(2).max(1e-12),
-            Start::Moving => 0.0,
-        };
-        rss * (1.0 + (of_modes + of_moment) / (self.values as f64).max(1.0))
-    }
-
-    /// Everything that a step needs at `x`.
-    pub fn linearized(&self, x: &[f64], priors: &[Prior]) -> Linear {
-        let fit = self.fit_of(x);
-        let p = x.len();
-        let mut out = Linear { hessian: DMatrix::zeros(p, p), gradient: DVector::zeros(p), rss: 0.0 };
-        let (columns, slopes) = (self.columns(&fit), self.slopes(x));
-        for g in &self.groups {
-            g.parts(&columns, &slopes).add(&mut out);
-        }
-        let noise = out.rss / (self.values as f64).max(1.0);
-        for (m, prior) in priors.iter().enumerate() {
-            let Some((mode, sd)) = prior else { continue };
-            for (i, at) in mode.parameters().into_iter().enumerate() {
-                let k = 2 * m + i;
-                let weight = noise / (sd[i] * sd[i]).max(1e-12);
-                out.hessian[(k, k)] += weight;
-                out.gradient[k] += weight * (at - x[k]);
-            }
-        }
-        if self.start == Start::Rest {
-            let weight = noise / self.moment_sd_s.powi(2).max(1e-12);
-            out.hessian[(p - 1, p - 1)] += weight;
-            out.gradient[p - 1] -= weight * x[p - 1];
-        }
-        out
-    }
-
-    /// Derivatives of the columns by each parameter, with the columns that they belong to.
-    fn slopes(&self, x: &[f64]) -> Vec<Vec<(usize, Vec<f64>)>> {
-        const STEP: f64 = 1e-5;
-        let fit = self.fit_of(x);
-        let slope = |(up, down): (Vec<f64>, Vec<f64>)| -> Vec<f64> {
-            up.iter().zip(&down).map(|(u, d)| (u - d) / (2.0 * STEP)).collect()
-        };
-        let times = |later: f64| self.times_s.iter().map(|t| t - fit.moment_s - later).collect::<Vec<f64>>();
-        let now = times(0.0);
-        let of_mode = |k: usize| {
-            let moved = |by: f64| {
-                let mut own = fit.modes[k / 2].parameters();
-                own[k % 2] += by;
-                Mode::of_parameters(&own).columns(&now, self.start)
-            };
-            self.columns_of(k / 2).zip(moved(STEP).into_iter().zip(moved(-STEP)).map(slope)).collect()
-        };
-        let of_moment = |_| {
-            let (late, early) = (times(STEP), times(-STEP));
-            let of = |m: &Mode| {
-                let pairs = m.columns(&late, self.start).into_iter().zip(m.columns(&early, self.start));
-                pairs.map(slope).collect::<Vec<_>>()
-            };
-            fit.modes.iter().flat_map(of).enumerate().map(|(c, s)| (c + 1, s)).collect()
-        };
-        let modes = 2 * fit.modes.len();
-        (0..modes).map(of_mode).chain((modes..x.len()).map(of_moment)).collect()
-    }
-
-    fn columns_of(&self, mode: usize) -> std::ops::Range<usize> {
-        1 + self.per_mode() * mode..1 + self.per_mode() * (mode + 1)
-    }
-
-    /// For every signal: its values' frames, and what each value adds to the gradient, `[parameter][value]`.
-    pub fn scores(&self, fit: &Fit) -> Vec<(&[usize], Vec<Vec<f64>>)> {
-        let (columns, slopes) = (self.columns(fit), self.slopes(&self.parameters(fit)));
-        let of = |g: &'_ Group| {
-            let parts = g.parts(&columns, &slopes);
-            let signal = |(rest, factors): (&Vec<f64>, &Vec<f64>)| {
-                let by = |of: &Vec<(usize, Vec<f64>)>| {
-                    let at = |i: usize| rest[i] * of.iter().map(|(c, s)| factors[*c] * s[i]).sum::<f64>();
-                    (0..rest.len()).map(at).collect::<Vec<f64>>()
-                };
-                parts.slopes.iter().map(by).collect::<Vec<_>>()
-            };
-            parts.rests.iter().zip(&parts.factors).map(signal).collect::<Vec<_>>()
-        };
-        self.groups.iter().flat_map(|g| of(g).into_iter().map(|s| (g.rows.as_slice(), s))).collect()
     }
 
     /// The factors of every mode in every signal, `[signal][mode]`, with their significance; `signals` is how many were
     /// given. Noise that is alike from frame to frame counts for less.
     pub fn factors(&self, fit: &Fit, signals: usize) -> Vec<Vec<Factor>> {
         let columns = self.columns(fit);
+        let columns = slices(&columns);
+        let all = products(&columns);
         let mut out = vec![vec![Factor::default(); fit.modes.len()]; signals];
         for g in &self.groups {
-            let qr = Qr::new(g.pick(&columns));
-            let variances = qr.variances();
+            let factored = Factored::new(&g.products(&all, &columns), columns.len());
+            let variances = factored.variances();
             for (id, y) in g.ids.iter().zip(&g.values) {
-                let (rest, factors) = qr.solve(y);
-                let noise = dot(&rest, &rest) / (rest.len().saturating_sub(factors.len()) as f64).max(1.0);
+                let factors = Explained::new(y, &columns, &factored).factors;
+                let rest = g.rest(y, &columns, &factors);
+                let noise = dot(&rest, &rest) / (g.seen.len().saturating_sub(factors.len()) as f64).max(1.0);
                 let inflation = inflation(&rest);
                 for (m, factor) in out[*id].iter_mut().enumerate() {
                     let own = self.columns_of(m);
@@ -326,60 +206,44 @@ impl Signals {
     }
 }
 
-pub(super) struct Linear {
-    pub hessian: DMatrix<f64>,
-    pub gradient: DVector<f64>,
-    pub rss: f64,
+pub(super) fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
+    columns.iter().map(Vec::as_slice).collect()
 }
 
-/// A group's share in a step.
-struct Parts {
-    rests: Vec<Vec<f64>>,
-    factors: Vec<Vec<f64>>,
-    /// By parameter: columns, and their derivatives without what the columns themselves span.
-    slopes: Vec<Vec<(usize, Vec<f64>)>>,
+/// What columns explain of one signal.
+pub(super) struct Explained {
+    /// Products of the columns with the signal.
+    pub by: Vec<f64>,
+    /// Of the columns that `Factored` holds.
+    pub factors: Vec<f64>,
+    /// Squares that are left.
+    pub left: f64,
+}
+
+impl Explained {
+    /// Of `y` by the first of `columns`, as many as `factored` holds; the products are had of all.
+    pub fn new(y: &[f64], columns: &[&[f64]], factored: &Factored) -> Self {
+        let by: Vec<f64> = columns.iter().map(|c| dot(c, y)).collect();
+        let factors = factored.solve(&by);
+        let left = (dot(y, y) - dot(&by[..factors.len()], &factors)).max(0.0);
+        Self { by, factors, left }
+    }
 }
 
 impl Group {
-    fn pick(&self, columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        columns.iter().map(|c| self.thin(c)).collect()
+    /// Products of columns over the frames in which the signals were seen, from those over `all` frames.
+    pub fn products(&self, all: &DMatrix<f64>, columns: &[&[f64]]) -> DMatrix<f64> {
+        products_without(all, columns, &self.lacking)
     }
 
-    fn thin(&self, column: &[f64]) -> Vec<f64> {
-        self.rows.iter().map(|&k| column[k]).collect()
-    }
-
-    fn parts(&self, columns: &[Vec<f64>], slopes: &[Vec<(usize, Vec<f64>)>]) -> Parts {
-        let qr = Qr::new(self.pick(columns));
-        let (rests, factors) = self.values.iter().map(|y| qr.solve(y)).unzip();
-        let off = |(c, slope): &(usize, Vec<f64>)| {
-            let mut slope = self.thin(slope);
-            take_off_once(&mut slope, &qr.q);
-            (*c, slope)
-        };
-        Parts { rests, factors, slopes: slopes.iter().map(|s| s.iter().map(off).collect()).collect() }
-    }
-}
-
-impl Parts {
-    /// Kaufman's Jacobian is slopes times factors, so that the normal equations need products of columns and of factors
-    /// only, never the Jacobian itself.
-    fn add(&self, to: &mut Linear) {
-        let alike = |a: usize, b: usize| -> f64 { self.factors.iter().map(|f| f[a] * f[b]).sum() };
-        for (k, of_k) in self.slopes.iter().enumerate() {
-            for (l, of_l) in self.slopes.iter().enumerate().skip(k) {
-                let pairs = of_k.iter().flat_map(|a| of_l.iter().map(move |b| (a, b)));
-                let sum: f64 = pairs.map(|((c, s), (d, t))| dot(s, t) * alike(*c, *d)).sum();
-                to.hessian[(k, l)] += sum;
-                if l > k {
-                    to.hessian[(l, k)] += sum;
-                }
-            }
-            for (rest, factors) in self.rests.iter().zip(&self.factors) {
-                to.gradient[k] += of_k.iter().map(|(c, s)| factors[*c] * dot(s, rest)).sum::<f64>();
-            }
+    /// What `factors` of the columns leave of `y`; 0 where that was not seen.
+    pub fn rest(&self, y: &[f64], columns: &[&[f64]], factors: &[f64]) -> Vec<f64> {
+        let mut rest = y.to_vec();
+        for (column, factor) in columns.iter().zip(factors) {
+            rest.iter_mut().zip(*column).for_each(|(r, c)| *r -= factor * c);
         }
-        to.rss += self.rests.iter().map(|r| dot(r, r)).sum::<f64>();
+        self.lacking.iter().for_each(|&k| rest[k] = 0.0);
+        rest
     }
 }
 

@@ -1,6 +1,7 @@
 //! How sure a fit of decays is.
 
-use super::signals::{Fit, Prior, Signals};
+use super::fit::Prior;
+use super::signals::{Fit, Signals};
 use nalgebra::{DMatrix, DVector};
 
 /// Standard deviations of the parameters of a fit: logarithms of every mode's frequency and damping, then the moment of
@@ -15,12 +16,12 @@ pub(super) fn deviations(signals: &Signals, fit: &Fit, priors: &[Prior]) -> Opti
     let inverse = linear.hessian.try_inverse()?;
     let mut by_frame = vec![vec![0.0; p]; signals.times_s.len()];
     let (mut by_signal, mut count) = (DMatrix::<f64>::zeros(p, p), 0.0);
-    for (rows, scores) in signals.scores(fit) {
+    for scores in signals.scores(fit) {
         let sum = DVector::from_iterator(p, scores.iter().map(|s| s.iter().sum::<f64>()));
         by_signal += &sum * sum.transpose();
         count += 1.0;
         for (k, of_parameter) in scores.iter().enumerate() {
-            rows.iter().zip(of_parameter).for_each(|(row, s)| by_frame[*row][k] += s);
+            by_frame.iter_mut().zip(of_parameter).for_each(|(row, s)| row[k] += s);
         }
     }
     if count > 1.0 {
@@ -47,20 +48,19 @@ pub(super) fn deviations(signals: &Signals, fit: &Fit, priors: &[Prior]) -> Opti
 fn newey_west(scores: &[Vec<f64>], times_s: &[f64], reach_s: f64) -> DMatrix<f64> {
     let p = scores.first().map_or(0, Vec::len);
     let mut out = DMatrix::zeros(p, p);
-    for i in 0..scores.len() {
-        for j in i..scores.len() {
-            let weight = 1.0 - (times_s[j] - times_s[i]) / reach_s;
+    for (i, own) in scores.iter().enumerate() {
+        // Those that come later, summed first: each pair counts both ways round.
+        let mut later: Vec<f64> = own.iter().map(|s| 0.5 * s).collect();
+        for (score, time_s) in scores.iter().zip(times_s).skip(i + 1) {
+            let weight = 1.0 - (time_s - times_s[i]) / reach_s;
             if weight <= 0.0 {
                 break;
             }
-            for a in 0..p {
-                for b in 0..p {
-                    let product = weight * scores[i][a] * scores[j][b];
-                    out[(a, b)] += product;
-                    if j > i {
-                        out[(b, a)] += product;
-                    }
-                }
+            later.iter_mut().zip(score).for_each(|(sum, s)| *sum += weight * s);
+        }
+        for a in 0..p {
+            for b in 0..p {
+                out[(a, b)] += own[a] * later[b] + later[a] * own[b];
             }
         }
     }

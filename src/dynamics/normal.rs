@@ -1,0 +1,106 @@
+//! Normal equations: what a few columns explain of many signals, from the products of all with all.
+//!
+//! Signals that lack other frames than their neighbours do not need columns of their own: the products over all frames
+//! are had once, and those over the frames that are lacking are taken off.
+
+use super::columns::dot;
+use nalgebra::DMatrix;
+
+/// Of a column whose square is less than this share of what it was before the others were taken off nothing is left: the
+/// others span it.
+const SPANNED: f64 = 1e-10;
+
+/// Products of `columns` with each other.
+pub(super) fn products(columns: &[&[f64]]) -> DMatrix<f64> {
+    let n = columns.len();
+    let mut out = DMatrix::zeros(n, n);
+    for i in 0..n {
+        for k in 0..=i {
+            let product = dot(columns[i], columns[k]);
+            (out[(i, k)], out[(k, i)]) = (product, product);
+        }
+    }
+    out
+}
+
+/// The same without `rows`.
+pub(super) fn products_without(all: &DMatrix<f64>, columns: &[&[f64]], rows: &[usize]) -> DMatrix<f64> {
+    let mut out = all.clone();
+    let n = columns.len();
+    let of = |column: &&[f64]| rows.iter().map(|&r| column[r]).collect::<Vec<f64>>();
+    let lacking: Vec<Vec<f64>> = columns.iter().map(of).collect();
+    for i in 0..n {
+        for k in 0..=i {
+            let product = out[(i, k)] - dot(&lacking[i], &lacking[k]);
+            (out[(i, k)], out[(k, i)]) = (product, product);
+        }
+    }
+    out
+}
+
+/// Products C = L Lᵀ of the first columns.
+pub(super) struct Factored {
+    l: DMatrix<f64>,
+}
+
+impl Factored {
+    /// Of the first `n` columns of `products`.
+    pub fn new(products: &DMatrix<f64>, n: usize) -> Self {
+        let mut l = DMatrix::<f64>::zeros(n, n);
+        for k in 0..n {
+            let left = products[(k, k)] - (0..k).map(|m| l[(k, m)] * l[(k, m)]).sum::<f64>();
+            // A column that others span gets no factor: its part of L stays 0.
+            if left.is_nan() || left <= SPANNED * products[(k, k)] {
+                continue;
+            }
+            l[(k, k)] = left.sqrt();
+            for i in k + 1..n {
+                let sum = products[(i, k)] - (0..k).map(|m| l[(i, m)] * l[(k, m)]).sum::<f64>();
+                l[(i, k)] = sum / l[(k, k)];
+            }
+        }
+        Self { l }
+    }
+
+    /// C⁻¹ x, of the columns that have factors; 0 for the others.
+    pub fn solve(&self, x: &[f64]) -> Vec<f64> {
+        let (n, l) = (self.l.nrows(), &self.l);
+        let mut out = vec![0.0; n];
+        for k in (0..n).filter(|&k| l[(k, k)] > 0.0) {
+            out[k] = (x[k] - (0..k).map(|m| l[(k, m)] * out[m]).sum::<f64>()) / l[(k, k)];
+        }
+        for k in (0..n).rev().filter(|&k| l[(k, k)] > 0.0) {
+            out[k] = (out[k] - (k + 1..n).map(|m| l[(m, k)] * out[m]).sum::<f64>()) / l[(k, k)];
+        }
+        out
+    }
+
+    /// Diagonal of C⁻¹: variances of the factors for noise of variance 1.
+    pub fn variances(&self) -> Vec<f64> {
+        let n = self.l.nrows();
+        let unit = |k: usize| (0..n).map(|i| f64::from(i == k)).collect::<Vec<f64>>();
+        (0..n).map(|k| self.solve(&unit(k))[k]).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn factors_are_found_and_dependent_columns_get_none() {
+        let (a, b) = (vec![1.0; 5], vec![0.0, 1.0, 2.0, 4.0, 9.0]);
+        let twice: Vec<f64> = b.iter().map(|x| 2.0 * x).collect();
+        let columns = [a.as_slice(), &b, &twice];
+        // The last frame is lacking, and what stands there must not count.
+        let y: Vec<f64> = b.iter().map(|x| 3.0 - 0.5 * x).take(4).chain([0.0]).collect();
+        let products = products_without(&products(&columns), &columns, &[4]);
+        let by: Vec<f64> = columns.iter().map(|c| dot(c, &y)).collect();
+        let factored = Factored::new(&products, 3);
+        let factors = factored.solve(&by);
+        assert!((factors[0] - 3.0).abs() < 1e-9 && (factors[1] + 0.5).abs() < 1e-9 && factors[2] == 0.0, "{factors:?}");
+        // Variance of a slope: 1 over the squares from the mean.
+        let squares: f64 = b[..4].iter().map(|x| (x - 1.75) * (x - 1.75)).sum();
+        assert!((factored.variances()[1] - 1.0 / squares).abs() < 1e-9);
+    }
+}
