@@ -28,14 +28,6 @@ fn take_off(x: &mut [f64], q: &[Vec<f64>], into: &mut [f64]) {
     }
 }
 
-/// Takes from `x` what the orthonormal `q` span of it.
-pub(super) fn take_off_once(x: &mut [f64], q: &[Vec<f64>]) {
-    for column in q {
-        let s = dot(x, column);
-        x.iter_mut().zip(column).for_each(|(x, c)| *x -= s * c);
-    }
-}
-
 /// Columns B = Q R with Q orthonormal.
 pub(super) struct Qr {
     pub q: Vec<Vec<f64>>,
@@ -81,19 +73,6 @@ impl Qr {
                 x[i] -= self.r[k][i] * x[k];
             }
         }
-    }
-
-    /// Diagonal of (Bᵀ B)⁻¹: variances of the factors for noise of variance 1.
-    pub fn variances(&self) -> Vec<f64> {
-        let n = self.q.len();
-        let mut sums = vec![0.0; n];
-        for j in 0..n {
-            let mut unit = vec![0.0; n];
-            unit[j] = 1.0;
-            self.back(&mut unit);
-            sums.iter_mut().zip(&unit).for_each(|(s, u)| *s += u * u);
-        }
-        sums
     }
 }
 
