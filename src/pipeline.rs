@@ -126,9 +126,16 @@ impl Tree {
         flat(&self.hierarchy, &self.outline, config)
     }
 
+    /// The same with its foot at `foot_px`: that of a capture's first tree stays.
+    fn flat_on(&self, foot_px: [f64; 2], config: &Config) -> (Vec<skeleton::Node2d>, Vec<u32>) {
+        let (mut flat, tracks) = self.flat(config);
+        flat.iter_mut().take(1).for_each(|foot| foot.position_px = foot_px);
+        (flat, tracks)
+    }
+
     /// How well its push fills the envelope, and how likely its angles are, beside the one-sided ways.
     pub fn push_figures(&self, config: &Config) -> PushFigures {
-        let (flat, tracks) = self.flat(config);
+        let (flat, tracks) = self.flat_on(self.skeleton.foot_px, config);
         PushFigures::of(&self.skeleton, &flat, &tracks, &self.outline, &config.shape)
     }
 

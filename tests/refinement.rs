@@ -103,9 +103,11 @@ fn forks(tree: &Tree) -> BTreeMap<NodeName, BTreeSet<NodeName>> {
     forks
 }
 
-/// The screen shows the picture and the tree from the side: in neither does a branch jump or change sides. A branch that is
-/// found to fork otherwise ends at its new fork from then on; of the others no measured one moves farther than half as much again as in
-/// an ordinary frame of this swing. In depth, of which the picture says little, and for copies the bound is 20 px.
+/// The screen shows the picture and the tree from the side. In the picture no branch jumps: one that is found to fork otherwise
+/// ends at its new fork from then on; of the others no measured one moves farther than half as much again as in
+/// an ordinary frame of this swing, and copies hardly. In depth, which is made up, a branch is led to where it does not
+/// make a hook: half of them by no more than the tightest prior's deviation (1/40 of the tree's width), none by more than two of the
+/// loosest one's (2/5).
 #[test]
 fn branches_that_go_on_do_not_jump() {
     let run = run();
@@ -131,16 +133,22 @@ fn branches_that_go_on_do_not_jump() {
     let ordinary = run.frames.windows(2).filter(|pair| Arc::ptr_eq(&pair[0].0, &pair[1].0));
     let ordinary = largest(&ordinary.flat_map(steps).collect::<Vec<_>>());
     for pair in seams(run) {
+        let [left, _, right, _] = pair[1].0.outline.bounds_px().expect("an outline");
+        let width = f64::from(right - left + 1);
         let mut jumps = steps(pair);
+        let mut depths: Vec<f64> = jumps.iter().filter(|s| s.2).map(|s| s.1).collect();
+        depths.sort_by(f64::total_cmp);
+        let half = depths[depths.len() / 2];
         jumps.sort_by(|a, b| a.0.total_cmp(&b.0));
         let ([u, z], n) = (largest(&jumps), jumps.len());
         let (median, most, all) = (jumps[n / 2].0, jumps[n * 95 / 100].0, jumps[n - 1].0);
         println!(
             "{:.1} s: {n} nodes, median {median:.2} px, 95 % {most:.2} px, all {all:.2} px; measured at most {u:.2} px, in \
-             depth {z:.2} px (ordinary frames {:.2} px, {:.2} px)",
+             depth {half:.2} px in the median, {z:.2} px (ordinary frames {:.2} px, {:.2} px)",
             pair[1].1.time_s, ordinary[0], ordinary[1]
         );
-        assert!(u <= 1.5 * ordinary[0] && z <= 20.0, "a measured node jumps by {u:.2} px, {z:.2} px in depth");
+        assert!(u <= 1.5 * ordinary[0], "a measured node jumps by {u:.2} px");
+        assert!(half <= width / 40.0 && z <= 0.4 * width, "in depth by {half:.2} px in the median, at most {z:.2} px");
         assert!(median <= 1.5 && most <= 20.0, "in the median {median:.2} px, 95 % {most:.2} px");
     }
 }

@@ -22,14 +22,13 @@ pub(super) struct InLeaf {
 impl InLeaf {
     /// `None` where the tree is to have no leaves: the settings say so, or the picture shows none.
     pub fn of(skeleton: &Skeleton, seen: &Seen, settings: &config::Leaves) -> Option<Self> {
+        // To look at the picture's colours takes longer than all else that is done for a bare tree.
+        if settings.show == LeafShow::Off {
+            return None;
+        }
         let filmed = in_leaf(skeleton, seen.picture, seen.outline);
-        let wanted = match settings.show {
-            LeafShow::Off => false,
-            LeafShow::On => true,
-            // Who draws a density wants leaves.
-            LeafShow::Auto => seen.density.is_some() || filmed,
-        };
-        if !wanted {
+        // Who draws a density wants leaves.
+        if settings.show == LeafShow::Auto && !filmed && seen.density.is_none() {
             return None;
         }
         let mut seeds = match (seen.picture, seen.outline) {
@@ -41,7 +40,7 @@ impl InLeaf {
         }
         let density = seen.density.cloned().or_else(|| seen.cut_to.map(whole)).map(|drawn| {
             let within = seen.cut_to.or(seen.outline).filter(|o| o.size == drawn.size);
-            within.map_or(drawn.clone(), |outline| inside(drawn, outline))
+            if let Some(outline) = within { inside(drawn, outline) } else { drawn }
         });
         Some(Self { seeds, filmed, density })
     }

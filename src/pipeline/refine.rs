@@ -1,11 +1,11 @@
 //! The tree once more, from what has been seen since: who is who, and whether it is better.
 
-use super::{Moment, Tree, build, dress, thicken};
+use super::{Moment, Tree, build, thicken};
 use crate::config::Config;
 use crate::hierarchy::{self, Gain, OnBoth};
 use crate::model::{MotionHierarchy, NodeId, NodeName, Skeleton, TrackId};
 use crate::motion::Binding;
-use crate::shape::{Envelope, Twin, stand_as_before, twins};
+use crate::shape::{Prototype, Twin, go_on, on_foot, twins};
 use crate::signal::median;
 use crate::track::TrackTable;
 use std::collections::{BTreeMap, BTreeSet};
@@ -85,11 +85,11 @@ impl Refinement {
     fn adopt(&self, tree: &mut Tree) {
         let old = &self.standing.skeleton;
         let measured = self.measured_twins(tree);
-        let mut skeleton = (*tree.skeleton).clone();
-        let twins = twins(&skeleton, old, &measured);
-        let kind = self.config.shape.envelope;
-        let envelope = Envelope::of_filmed(kind, &tree.outline, old.foot_px, &dress::places(&skeleton));
-        stand_as_before(&mut skeleton, old, &twins, &envelope);
+        let anew = on_foot((*tree.skeleton).clone(), old.foot_px);
+        let twins = twins(&anew, old, &measured);
+        let (flat, tracks) = tree.flat_on(old.foot_px, &self.config);
+        let prototype = Prototype::of(&flat, &tracks, &tree.outline, &self.config.shape);
+        let (mut skeleton, _) = go_on(&anew, old, &twins, &prototype, &self.config.shape);
         // Twigs, and with them the pipes, follow from how far the branches reach.
         thicken(&mut skeleton, &tree.outline, &self.config);
         let mut names = self.standing.names;

@@ -15,7 +15,7 @@ const GROWTH: f64 = 1.25;
 const LEAST_SPAN_S: f64 = 1.0;
 /// Film after which a refinement of up to [`POINTS`] points is ready, s. More points take longer by the square of their
 /// number. It is a matter of film and not of the clock, so that threads change nothing.
-const READY_S: f64 = 0.25;
+const READY_S: f64 = 0.5;
 const POINTS: f64 = 400.0;
 /// Remembered frames through which the new tree's pose is followed in the time of one frame.
 const FRAMES_PER_STEP: usize = 30;

@@ -3,7 +3,7 @@
 use crate::config;
 use crate::model::Skeleton;
 use nalgebra::Point3;
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 /// The normal distribution of eq. 4 over branching angles, wider near the root.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,6 +66,13 @@ pub fn expected_branching_angle(skeleton: &Skeleton) -> f64 {
         below >= half
     });
     middle.map_or(PI / 4.0, |a| a.0)
+}
+
+/// By how much branches turn by more than a right angle, in the mean over all of them, radians. Eq. 4 is wide near the root,
+/// where the thick limbs are, and does not mind.
+pub(super) fn turning_back(skeleton: &Skeleton) -> f64 {
+    let all: Vec<f64> = (0..skeleton.nodes.len()).filter_map(|i| branching_angle(skeleton, i)).collect();
+    all.iter().map(|angle| (angle - FRAC_PI_2).max(0.0)).sum::<f64>() / all.len().max(1) as f64
 }
 
 /// Angle at which branch `i` leaves the one that it grows from; `None` for what grows from the ground.

@@ -1,8 +1,10 @@
 //! A tree that was built anew stands as the old one did, as far as its branches are the same.
 
+use super::angles::angle_between;
 use super::envelope::Envelope;
-use crate::model::{NodeId, Skeleton};
+use crate::model::{Node, NodeId, Skeleton};
 use nalgebra::{Point3, Rotation3, Vector3};
+use std::f64::consts::FRAC_PI_2;
 
 /// A node of the old tree that goes on in the new one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,44 +33,89 @@ pub fn twins(new: &Skeleton, old: &Skeleton, measured: &[Option<Twin>]) -> Vec<O
     (0..new.nodes.len()).map(of).collect()
 }
 
+/// The same tree with its foot, and with it the model's axes, at `foot_px`; all else stays where it is in the picture.
+pub fn on_foot(mut skeleton: Skeleton, foot_px: [f64; 2]) -> Skeleton {
+    let way = Vector3::new(skeleton.foot_px[0] - foot_px[0], foot_px[1] - skeleton.foot_px[1], 0.0);
+    skeleton.nodes.iter_mut().skip(1).for_each(|n| n.position += way);
+    skeleton.foot_px = foot_px;
+    skeleton
+}
+
 /// Puts the nodes of `new` that have a twin where that stands in `old`; the others are carried along by the nearest one
 /// below them. A branch that the picture shows unchanged then neither jumps nor changes sides between the viewer and the
-/// far end. The foot stays, and with it the model's axes.
+/// far end. Both trees have the same foot. Gives for every node where its twin has put it, in depth at
+/// least; `None` for those that nothing holds.
 ///
 /// A branch may end a little sooner or later, so the old place is as good as the new one as long as the same branches
-/// leave from there. Where others do, the node goes to the new fork, or what branches off would run back along it; only
-/// its depth stays.
-pub fn stand_as_before(new: &mut Skeleton, old: &Skeleton, twins: &[Option<Twin>], envelope: &Envelope) {
-    let foot = [new.foot_px[0] - old.foot_px[0], new.foot_px[1] - old.foot_px[1]];
-    new.foot_px = old.foot_px;
-    let in_old_axes = Vector3::new(foot[0], -foot[1], 0.0);
+/// leave from there and they do not turn back: that their turns of more than a right angle exceed it by `turned_back_rad` more
+/// than at the new place, in all. Else the node goes to the new fork, and only its depth stays.
+pub fn stand_as_before(
+    new: &mut Skeleton,
+    old: &Skeleton,
+    twins: &[Option<Twin>],
+    envelope: &Envelope,
+    turned_back_rad: f64,
+) -> Vec<Option<Point3<f64>>> {
+    let twin = |i: usize| twins.get(i).copied().flatten();
+    let stood = |(i, node): (usize, &Node)| {
+        let Twin { old: twin, moved_px: [du, dv] } = twin(i)?;
+        let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), node.plane_angle);
+        Some(old.nodes[twin.index()].position + turn * Vector3::new(du, -dv, 0.0))
+    };
+    let stood: Vec<Option<Point3<f64>>> = new.nodes.iter().enumerate().map(stood).collect();
+    let stays = staying(new, &stood, same_forks(new, old, twins), turned_back_rad);
     // By how much each node is off the place at which it was built.
     let mut carried: Vec<Vector3<f64>> = Vec::with_capacity(new.nodes.len());
-    let same_fork = same_forks(new, old, twins);
-    for (i, same_fork) in same_fork.into_iter().enumerate() {
+    let mut held = vec![None; new.nodes.len()];
+    for i in 0..new.nodes.len() {
         let node = &new.nodes[i];
-        let built = if i == 0 { Point3::origin() } else { node.position + in_old_axes };
-        let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), node.plane_angle);
-        let place = match twins.get(i).copied().flatten() {
-            Some(Twin { old: twin, moved_px: [du, dv] }) => {
-                let before = old.nodes[twin.index()].position + turn * Vector3::new(du, -dv, 0.0);
-                let copy = node.copy_of.is_some();
-                match (i < 2 || same_fork, copy) {
-                    (true, _) => before,
-                    (false, false) => drawn_in(built, Point3::new(built.x, built.y, before.z), envelope),
-                    (false, true) => built,
-                }
-            }
+        let (built, copy) = (node.position, node.copy_of.is_some());
+        let place = match stood[i] {
+            Some(before) if stays[i] => before,
+            Some(before) if !copy => drawn_in(built, Point3::new(built.x, built.y, before.z), envelope),
+            Some(_) => built,
             None => {
                 let below = node.parent.map_or_else(Vector3::zeros, |p| carried[p.index()]);
                 // The picture shows where a measured node is; only its depth is free.
-                let way = if node.copy_of.is_some() { below } else { Vector3::new(0.0, 0.0, below.z) };
+                let way = if copy { below } else { Vector3::new(0.0, 0.0, below.z) };
                 drawn_in(built, built + way, envelope)
             }
         };
+        held[i] = stood[i].filter(|_| stays[i] || !copy).map(|_| place);
         carried.push(place - built);
         new.nodes[i].position = place;
     }
+    held
+}
+
+/// Which nodes stay where their twins stood: those from which the same branches leave, unless that makes one of these, or
+/// their own, turn back in the picture where the new place does not. A copy does as its original.
+fn staying(new: &Skeleton, stood: &[Option<Point3<f64>>], same_fork: Vec<bool>, turned_back_rad: f64) -> Vec<bool> {
+    let mut stays = same_fork;
+    stays.iter_mut().take(2).for_each(|foot_or_trunk| *foot_or_trunk = true);
+    let in_picture = |p: &Point3<f64>| Point3::new(p.x, p.y, 0.0);
+    let built = |i: usize| in_picture(&new.nodes[i].position);
+    let mut at: Vec<Point3<f64>> =
+        (0..stood.len()).map(|i| stood[i].filter(|_| stays[i]).map_or_else(|| built(i), |p| in_picture(&p))).collect();
+    let children = new.children();
+    let parent = |i: usize| new.nodes[i].parent.map(|p| p.index());
+    for i in 1..new.measured() {
+        let (Some(before), Some(below)) = (stood[i].filter(|_| stays[i]), parent(i)) else { continue };
+        // By how much the branches that meet there turn back, in all.
+        let back = |place: &Point3<f64>| {
+            let own = parent(below).map(|grand| angle_between(&at[grand], &at[below], place));
+            let leaving = children[i].iter().filter(|c| new.nodes[c.index()].copy_of.is_none());
+            let leaving = leaving.map(|c| angle_between(&at[below], place, &at[c.index()]));
+            leaving.chain(own).map(|turn| (turn - FRAC_PI_2).max(0.0)).sum::<f64>()
+        };
+        if back(&in_picture(&before)) > back(&built(i)) + turned_back_rad {
+            (stays[i], at[i]) = (false, built(i));
+        }
+    }
+    for i in new.measured()..stays.len() {
+        stays[i] &= new.nodes[i].copy_of.is_none_or(|original| stays[original.index()]);
+    }
+    stays
 }
 
 /// For every node of `new` whether the branches that leave from it are those that left from its twin.

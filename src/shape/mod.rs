@@ -22,6 +22,8 @@ mod planes;
 mod push;
 mod radius;
 mod search;
+mod settle;
+mod sides;
 mod topiary;
 mod trunk;
 mod tube;
@@ -37,7 +39,7 @@ pub use envelope::Envelope;
 pub use foliage::{Foliage, FoliageGroup};
 pub use fuse::fuse;
 pub use girth::trunk_radius_px;
-pub use keep::{Twin, stand_as_before, twins};
+pub use keep::{Twin, on_foot, twins};
 pub use leaves::{
     LeafView, Sampling, Season, Template, TemplateFault, TemplateMesh, density_match, foliage, foliage_by, leaf_cover,
     season, within_leaves,
@@ -46,8 +48,9 @@ pub use limb::{Limb, Riding, Room, Station, limbs};
 pub use measure::{PushFigures, side_symmetry};
 pub use mesh::{LEVELS, Mesh, bare_wood, wood, wood_levels};
 pub use planes::copy_to_planes;
-pub use push::{Terms, envelope_distance, push};
+pub use push::{Terms, Tether, envelope_distance, push, push_on};
 pub use radius::{PIPE_EXPONENTS, TIP_RADIUS_PX, thicken};
+pub use settle::go_on;
 pub use topiary::{Cut, Drawn, Topiary, TopiaryError, coverage, topiary};
 pub use trunk::{is_trunk, trunk};
 

@@ -8,6 +8,9 @@ use crate::config;
 use crate::model::Skeleton;
 use nalgebra::{Point3, Vector3};
 
+/// How much farther a way counts that is seen in the picture.
+const SEEN: f64 = 3.0;
+
 /// Which terms of the posterior are used; the one-sided ones are the paper's figure 3 a and b.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Terms {
@@ -42,31 +45,75 @@ impl Terms {
 /// angles of the branches which leave from the node count as well, and a push is measured in a tree without gaps that
 /// are filled later.
 pub fn push(skeleton: &mut Skeleton, trunk: &[bool], envelope: &Envelope, settings: &config::Shape, terms: Terms) {
-    let angles = Angles::of(skeleton, settings);
-    let mut order: Vec<usize> = (0..skeleton.nodes.len()).filter(|&i| !trunk.get(i).is_some_and(|t| *t)).collect();
-    order.sort_by_key(|&i| (skeleton.nodes[i].level, i));
-    let search = Search::new(skeleton, &envelope.attractors(settings.attractors as usize));
-    let mut pusher = Pusher {
-        subtrees: subtrees(skeleton),
-        children: children(skeleton),
-        pushed: vec![0.0; skeleton.nodes.len()],
-        delta: settings.push_range * envelope.width(),
-        no_gain: 0.0,
-        skeleton,
-        envelope,
-        settings,
-        terms,
-        angles,
-        search,
-    };
+    let pushed = vec![0.0; skeleton.nodes.len()];
+    let mut pusher = Pusher::new(skeleton, envelope, settings, pushed, None);
     for pass in 0..settings.passes.max(1) {
-        let spread = pass == 0 && settings.passes > 1 && matches!(terms, Terms::Both { spread_first: true, .. });
-        pusher.terms = if spread { Terms::Global } else { terms };
-        pusher.no_gain = pusher.terms.no_gain() * envelope.width();
-        for &i in &order {
-            pusher.push_one(i, pass > 0);
+        pusher.weigh(terms, pass == 0 && settings.passes > 1);
+        for i in pusher.order(trunk) {
+            pusher.push_one(i, Moved::WithAllOnIt, pass > 0);
         }
     }
+}
+
+/// Where the nodes of a tree that goes on stood: a normal prior on how far each is from there along the normal of its plane,
+/// a third factor of eq. 2. What moves in the picture, as copies do, is seen; it is held three times as tightly.
+#[derive(Clone, Copy, Debug)]
+pub struct Tether<'a> {
+    /// Where each node stood, model axes, px; `None` for a new one, of which nothing was known.
+    pub stood: &'a [Option<Point3<f64>>],
+    /// Deviation in depth, px.
+    pub sigma_px: f64,
+}
+
+/// A way in space squared, what of it is seen in the picture counted three times as long, px².
+pub(super) fn squared_way(way: Vector3<f64>) -> f64 {
+    (SEEN * way.xy()).norm_squared() + way.z * way.z
+}
+
+/// Pushes on from where `skeleton` stands, held by a prior on where its nodes stood: as [`push`] with a tree that stands, and a
+/// fork may also move alone, with what leaves from it staying where it is.
+pub fn push_on(
+    skeleton: &mut Skeleton,
+    trunk: &[bool],
+    envelope: &Envelope,
+    settings: &config::Shape,
+    terms: Terms,
+    tether: Tether,
+) {
+    let pushed = (0..skeleton.nodes.len()).map(|i| own_push(skeleton, i)).collect();
+    let mut pusher = Pusher::new(skeleton, envelope, settings, pushed, Some(tether));
+    for pass in 0..settings.passes.max(1) {
+        pusher.weigh(terms, pass == 0 && settings.passes > 1);
+        for i in pusher.order(trunk) {
+            pusher.push_one(i, Moved::WithAllOnIt, true);
+            pusher.push_one(i, Moved::Alone, true);
+        }
+    }
+}
+
+/// How far a node is out of the plane through its parent, px: the push of its own that has brought it there.
+fn own_push(skeleton: &Skeleton, i: usize) -> f64 {
+    let node = &skeleton.nodes[i];
+    let parent = node.parent.map_or(node, |p| &skeleton.nodes[p.index()]);
+    (node.position - parent.position).dot(&plane_normal(node.plane_angle))
+}
+
+/// How far every node is out of its plane, px: the sum of its own push and those below it. The trunk is in all planes.
+pub(super) fn out_of_planes(skeleton: &Skeleton, trunk: &[bool]) -> Vec<f64> {
+    let is_trunk = |i: usize| trunk.get(i).is_some_and(|t| *t);
+    let mut out = vec![0.0; skeleton.nodes.len()];
+    for i in (0..skeleton.nodes.len()).filter(|&i| !is_trunk(i)) {
+        let below = skeleton.nodes[i].parent.map_or(0.0, |p| out[p.index()]);
+        out[i] = below + own_push(skeleton, i);
+    }
+    out
+}
+
+/// What a push takes along.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Moved {
+    WithAllOnIt,
+    Alone,
 }
 
 struct Pusher<'a> {
@@ -74,6 +121,7 @@ struct Pusher<'a> {
     envelope: &'a Envelope,
     settings: &'a config::Shape,
     terms: Terms,
+    tether: Option<Tether<'a>>,
     angles: Angles,
     search: Search,
     subtrees: Vec<Vec<usize>>,
@@ -84,47 +132,117 @@ struct Pusher<'a> {
     no_gain: f64,
 }
 
-/// One push that was tried: its length, ln of eq. 4, and E of eq. 6.
+/// One push that was tried: its length, ln of eq. 4 and of the prior, and E of eq. 6.
 struct Candidate {
     push: f64,
     local: f64,
+    prior: f64,
     gain: f64,
 }
 
-impl Pusher<'_> {
-    fn push_one(&mut self, i: usize, with_children: bool) {
-        let subtree = &self.subtrees[i];
+impl<'a> Pusher<'a> {
+    fn new(
+        skeleton: &'a mut Skeleton,
+        envelope: &'a Envelope,
+        settings: &'a config::Shape,
+        pushed: Vec<f64>,
+        tether: Option<Tether<'a>>,
+    ) -> Self {
+        Self {
+            search: Search::new(skeleton, &envelope.attractors(settings.attractors as usize)),
+            angles: Angles::of(skeleton, settings),
+            subtrees: subtrees(skeleton),
+            children: children(skeleton),
+            pushed,
+            delta: settings.push_range * envelope.width(),
+            no_gain: 0.0,
+            terms: Terms::Local,
+            skeleton,
+            envelope,
+            settings,
+            tether,
+        }
+    }
+
+    /// Nodes that may be pushed, from the root up.
+    fn order(&self, trunk: &[bool]) -> Vec<usize> {
+        let nodes = &self.skeleton.nodes;
+        let mut order: Vec<usize> = (0..nodes.len()).filter(|&i| !trunk.get(i).is_some_and(|t| *t)).collect();
+        order.sort_by_key(|&i| (nodes[i].level, i));
+        order
+    }
+
+    /// Takes the terms of one traversal.
+    fn weigh(&mut self, terms: Terms, first_of_several: bool) {
+        let spread = first_of_several && matches!(terms, Terms::Both { spread_first: true, .. });
+        self.terms = if spread { Terms::Global } else { terms };
+        self.no_gain = self.terms.no_gain() * self.envelope.width();
+    }
+
+    fn push_one(&mut self, i: usize, what: Moved, with_children: bool) {
+        let moved = match what {
+            Moved::WithAllOnIt => self.subtrees[i].clone(),
+            Moved::Alone if self.children[i].is_empty() => return,
+            Moved::Alone => vec![i],
+        };
         let Some(parent) = self.skeleton.nodes[i].parent.map(|p| p.index()) else { return };
         let normal = plane_normal(self.skeleton.nodes[i].plane_angle);
-        let without = self.search.distances_without(subtree);
+        let without = self.search.distances_without(&moved);
         let at = self.pushed[i];
-        let distance = |push: f64| self.search.total_distance(&without, subtree, normal * (push - at));
+        let distance = |push: f64| self.search.total_distance(&without, &moved, normal * (push - at));
         let before = distance(0.0);
-        let options = (0..self.settings.push_options).map(|l| self.delta * option(l, self.settings.push_options));
+        let n = self.settings.push_options;
+        let stays = self.tether.map(|_| at);
+        let options = (0..n).map(|l| self.delta * option(l, n)).chain(stays);
         let candidates: Vec<Candidate> = options
-            .filter(|&push| push == at || self.stays_inside(subtree, normal * (push - at)))
+            .filter(|&push| push == at || self.may_go(i, &moved, normal, push - at))
             .map(|push| Candidate {
                 push,
-                local: self.local(i, parent, normal * (push - at), with_children),
+                local: self.local(i, parent, normal * (push - at), what, with_children),
+                prior: self.prior(&moved, normal * (push - at)),
                 gain: (before - distance(push)).max(0.0),
             })
             .collect();
         let Some(best) = most_probable(&candidates, self.terms, self.no_gain) else { return };
         let way = normal * (best - at);
-        for &k in subtree {
+        for &k in &moved {
             self.skeleton.nodes[k].position += way;
         }
         self.pushed[i] = best;
-        self.search.moved(self.skeleton, subtree);
+        if what == Moved::Alone {
+            for &k in &self.children[i] {
+                self.pushed[k] -= best - at;
+            }
+        }
+        self.search.moved(self.skeleton, &moved);
     }
 
-    /// Outside of the envelope the probability is 0.
-    fn stays_inside(&self, subtree: &[usize], offset: Vector3<f64>) -> bool {
-        subtree.iter().all(|&k| self.envelope.contains(&(self.skeleton.nodes[k].position + offset)))
+    /// Outside of the envelope the probability is 0, and for the pushes that it leaves to the children beyond delta as well,
+    /// unless they get smaller.
+    fn may_go(&self, i: usize, moved: &[usize], normal: Vector3<f64>, way: f64) -> bool {
+        let inside = |&k: &usize| self.envelope.contains(&(self.skeleton.nodes[k].position + normal * way));
+        let left = |&k: &usize| {
+            let (before, after) = (self.pushed[k].abs(), (self.pushed[k] - way).abs());
+            after <= self.delta.max(before)
+        };
+        moved.iter().all(inside) && (moved.len() == self.subtrees[i].len() || self.children[i].iter().all(left))
+    }
+
+    /// ln of the prior on where the nodes `moved` by `offset` stood.
+    fn prior(&self, moved: &[usize], offset: Vector3<f64>) -> f64 {
+        let Some(Tether { stood, sigma_px }) = self.tether else { return 0.0 };
+        let one = |&k: &usize| {
+            let node = &self.skeleton.nodes[k];
+            let stood = stood.get(k).copied().flatten()?;
+            let normal = plane_normal(node.plane_angle);
+            let off = normal * (node.position + offset - stood).dot(&normal);
+            Some(-squared_way(off) / (2.0 * sigma_px * sigma_px))
+        };
+        moved.iter().filter_map(one).sum()
     }
 
     /// ln of eq. 4 for node `i` moved by `offset`, and for the branches that it carries.
-    fn local(&self, i: usize, parent: usize, offset: Vector3<f64>, with_children: bool) -> f64 {
+    fn local(&self, i: usize, parent: usize, offset: Vector3<f64>, what: Moved, with_children: bool) -> f64 {
         let nodes = &self.skeleton.nodes;
         let (from, at): (Point3<f64>, Point3<f64>) = (nodes[parent].position, nodes[i].position + offset);
         let own = nodes[parent].parent.map_or(0.0, |grand| {
@@ -132,8 +250,16 @@ impl Pusher<'_> {
             self.angles.ln_likelihood(nodes[i].level, angle)
         });
         let carried = |&k: &usize| {
-            let angle = angle_between(&from, &at, &(nodes[k].position + offset));
-            self.angles.ln_likelihood(nodes[k].level, angle)
+            let (end, beyond) = match what {
+                Moved::WithAllOnIt => (nodes[k].position + offset, &[][..]),
+                Moved::Alone => (nodes[k].position, &self.children[k][..]),
+            };
+            let on = |&m: &usize| {
+                let angle = angle_between(&at, &end, &nodes[m].position);
+                self.angles.ln_likelihood(nodes[m].level, angle)
+            };
+            self.angles.ln_likelihood(nodes[k].level, angle_between(&from, &at, &end))
+                + beyond.iter().map(on).sum::<f64>()
         };
         own + if with_children { self.children[i].iter().map(carried).sum() } else { 0.0 }
     }
@@ -148,7 +274,7 @@ fn most_probable(options: &[Candidate], terms: Terms, no_gain: f64) -> Option<f6
     let weight = if let Terms::Both { weight, .. } = terms { weight } else { 1.0 };
     let score = |c: &Candidate| {
         let global = if global_speaks { weight * ((c.gain + no_gain) / all).ln() } else { 0.0 };
-        global + if terms == Terms::Global { 0.0 } else { c.local }
+        global + c.prior + if terms == Terms::Global { 0.0 } else { c.local }
     };
     let better =
         |a: &&Candidate, b: &&Candidate| score(a).total_cmp(&score(b)).then(b.push.abs().total_cmp(&a.push.abs()));
@@ -161,7 +287,7 @@ fn option(l: u32, n: u32) -> f64 {
 }
 
 /// Normal of the plane that is turned by `angle` about the y axis.
-fn plane_normal(angle: f64) -> Vector3<f64> {
+pub(super) fn plane_normal(angle: f64) -> Vector3<f64> {
     Vector3::new(angle.sin(), 0.0, angle.cos())
 }
 

@@ -4,10 +4,11 @@
 use arborcam::config::Config;
 use arborcam::model::{Outline, Size};
 use arborcam::outline::{self, Given};
-use arborcam::pipeline::Pipeline;
+use arborcam::pipeline::{Pipeline, Tree};
 use arborcam::skeleton::Node2d;
 use arborcam::source::{self, Decoder};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What a tree is stood up from.
 pub struct Flat {
@@ -22,37 +23,21 @@ impl Flat {
         Self::of_clip("sparse_winter", Path::new(super::support::CLIP), Path::new(super::support::OUTLINE))
     }
 
-    /// The second public clip, `oak_release` below the folder that ARBORCAM_CLIPS names.
+    /// The second public clip.
     pub fn oak() -> Option<Self> {
-        let Some(clips) = std::env::var_os("ARBORCAM_CLIPS").map(PathBuf::from) else {
-            println!("skipped: ARBORCAM_CLIPS does not name a folder with oak_release/video.mkv");
-            return None;
-        };
-        let folder = clips.join("oak_release");
-        Some(Self::of_clip("oak_release", &folder.join("video.mkv"), &folder.join("outline.json")))
+        let [clip, outline] = oak_clip()?;
+        Some(Self::of_clip("oak_release", &clip, &outline))
     }
 
     fn of_clip(name: &'static str, clip: &Path, outline: &Path) -> Self {
-        let config = Config::default();
-        let mut clip = source::open(clip, &config.camera, None).expect("clip");
-        let Given::Region(outline) = outline::load(outline, clip.describe().size).expect("outline") else {
-            panic!("a polygon");
-        };
-        let mut pipeline = Pipeline::new(&config, Some(outline.clone()));
-        let mut decoder = Decoder::new().expect("decoder");
-        let (mut first_s, mut index) = (None, 0);
-        while let Some(raw) = clip.next_frame().expect("frame") {
-            let first_s = *first_s.get_or_insert(raw.sensor_time_s);
-            let mut luma = arborcam::model::Luma { size: raw.size, pixels: Vec::new() };
-            decoder.luma(&raw, &mut luma).expect("picture");
-            let time_s = raw.sensor_time_s - first_s;
-            let received = std::time::Instant::now();
-            pipeline.step(arborcam::model::Frame { index, time_s, received, luma, preview: None });
-            index += 1;
-        }
-        pipeline.finish();
-        let (nodes, tracks) = pipeline.back.tree().expect("a tree").flat(&config);
-        Self { name, nodes, tracks, outline }
+        Self::of_tree(name, &grown(clip, outline))
+    }
+
+    /// What a tree was stood up from, with its foot where the tree's is.
+    pub fn of_tree(name: &'static str, tree: &Tree) -> Self {
+        let (mut nodes, tracks) = tree.flat(&Config::default());
+        nodes[0].position_px = tree.skeleton.foot_px;
+        Self { name, nodes, tracks, outline: (*tree.outline).clone() }
     }
 
     /// A binary tree of `levels` levels that forks by some 45 degrees, more or less (`wild`, radians), in a round crown.
@@ -92,4 +77,36 @@ impl Flat {
         all.extend(Self::oak());
         all
     }
+}
+
+/// The tree that the whole of a clip gives, refined as it is by default.
+pub fn grown(clip: &Path, outline: &Path) -> Arc<Tree> {
+    let config = Config::default();
+    let mut clip = source::open(clip, &config.camera, None).expect("clip");
+    let Given::Region(outline) = outline::load(outline, clip.describe().size).expect("outline") else {
+        panic!("a polygon");
+    };
+    let mut pipeline = Pipeline::new(&config, Some(outline));
+    let mut decoder = Decoder::new().expect("decoder");
+    let (mut first_s, mut index) = (None, 0);
+    while let Some(raw) = clip.next_frame().expect("frame") {
+        let first_s = *first_s.get_or_insert(raw.sensor_time_s);
+        let mut luma = arborcam::model::Luma { size: raw.size, pixels: Vec::new() };
+        decoder.luma(&raw, &mut luma).expect("picture");
+        let time_s = raw.sensor_time_s - first_s;
+        let received = std::time::Instant::now();
+        pipeline.step(arborcam::model::Frame { index, time_s, received, luma, preview: None });
+        index += 1;
+    }
+    pipeline.finish();
+    pipeline.back.tree().expect("a tree").clone()
+}
+
+/// Video and outline of the second public clip, `oak_release` below the folder that ARBORCAM_CLIPS names.
+pub fn oak_clip() -> Option<[PathBuf; 2]> {
+    let Some(clips) = std::env::var_os("ARBORCAM_CLIPS").map(PathBuf::from) else {
+        println!("skipped: ARBORCAM_CLIPS does not name a folder with oak_release/video.mkv");
+        return None;
+    };
+    Some(["video.mkv", "outline.json"].map(|name| clips.join("oak_release").join(name)))
 }
