@@ -22,10 +22,10 @@ pub fn widened(low: f64, high: f64, least: f64) -> (f64, f64) {
     (low - more, high + more)
 }
 
-/// A curve through `points`, each from the left and from below, 0 to 1.
-pub fn curve(frame: &mut Frame, points: &[[f64; 2]], area: Rect, colour: Color) {
+/// A curve through `points`, each from the left and from below, 0 to 1; broken where two are farther apart than `gap`.
+pub fn curve(frame: &mut Frame, points: &[[f64; 2]], gap: f64, area: Rect, colour: Color) {
     let canvas = Canvas::default().marker(Marker::Braille).x_bounds([0.0, 1.0]).y_bounds([0.0, 1.0]).paint(|context| {
-        for pair in points.windows(2) {
+        for pair in points.windows(2).filter(|p| p[1][0] - p[0][0] <= gap) {
             let ([x1, y1], [x2, y2]) = (pair[0], pair[1]);
             context.draw(&Line::new(x1, y1, x2, y2, colour));
         }

@@ -2,7 +2,7 @@
 
 use super::{titled, waiting};
 use crate::model::{BranchRow, BranchSway, Interval, Snapshot, Sway};
-use crate::tui::format::{count, plus_minus, value, wrap};
+use crate::tui::format::{clock, count, plus_minus, value, wrap};
 use crate::tui::plot;
 use crate::tui::state::State;
 use crate::tui::theme::Theme;
@@ -14,6 +14,8 @@ use ratatui::widgets::Paragraph;
 
 /// Time that a column of the plot of the angle stands for, s: a sway of 2 Hz is still seen as one.
 const COLUMN_S: f64 = 0.25;
+/// What was not seen for longer is left open, s.
+const GAP_S: f64 = 1.0;
 /// Ends of the axis of frequencies, Hz. One is taken for all branches, so that they can be compared.
 const AXES_HZ: [f64; 5] = [1.0, 2.0, 3.0, 5.0, 10.0];
 /// Room that is left beyond the highest answer.
@@ -33,7 +35,11 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
     let title = format!("Branch {}, level {}, {points} points", branch.node.0, branch.level);
     let inner = titled(frame, area, &title, theme);
     let answer = s.sway.as_ref().and_then(|sway| sway.branches.get(&branch.node));
-    let text = told(s, answer, inner.width, theme);
+    let mut text = told(s, answer, inner.width, theme);
+    if let Some(sway) = s.sway.as_ref().filter(|_| s.sway_passed_over > 0) {
+        let late = format!(" as of {}, {} looks passed over", clock(sway.time_s), count(s.sway_passed_over));
+        text.push(Line::styled(late, theme.faint()));
+    }
     let height = (text.len() as u16).min(inner.height);
     let [words, plots] = Layout::vertical([Constraint::Length(height), Constraint::Min(0)]).areas(inner);
     frame.render_widget(Paragraph::new(text), words);
@@ -98,7 +104,7 @@ fn sways(frame: &mut Frame, s: &Snapshot, b: &BranchRow, (note, area): (Rect, Re
     // Tracking noise must not look like a storm.
     let (low, high) = plot::widened(low, high, 1.0);
     let at = |(t, a): &(f64, f64)| [1.0 - (newest_s - t) / span_s, (a - low) / (high - low)];
-    plot::curve(frame, &seen.iter().map(at).collect::<Vec<_>>(), area, colour);
+    plot::curve(frame, &seen.iter().map(at).collect::<Vec<_>>(), GAP_S / span_s, area, colour);
 }
 
 /// Bars, those within the answer's interval marked, and the answer on the axis below.

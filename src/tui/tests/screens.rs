@@ -39,8 +39,8 @@ fn cases() -> Vec<(&'static str, State)> {
     turned.choose(9);
     turned.close_up = false;
     cases.push(("turned", turned));
-    for (name, row) in [("branch", 2), ("branch_unknown", 6)] {
-        let mut close = state(snapshot(Phase::Live));
+    for (name, row, sway_passed_over) in [("branch", 2, 0), ("branch_unknown", 6, 12)] {
+        let mut close = state(Snapshot { sway_passed_over, ..snapshot(Phase::Live) });
         close.choose(row);
         cases.push((name, close));
     }
