@@ -43,3 +43,56 @@ impl AngleWindow {
         Angles { nodes: self.nodes.clone(), rows: self.rows.range(from..).cloned().collect() }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::angle_to_parent_deg;
+    use crate::model::{JointPose, Node, Size};
+    use nalgebra::{Point3, UnitQuaternion, Vector3};
+
+    /// A trunk and a branch that sways on it for `seconds`.
+    fn film(seconds: u32) -> (Skeleton, Vec<Pose>) {
+        let at = [[0.0; 3], [0.0, 50.0, 0.0], [20.0, 80.0, 5.0]].map(Point3::from);
+        let node = |i: usize| Node {
+            name: NodeName(i as u32 * 10),
+            parent: i.checked_sub(1).map(|p| NodeId(p as u32)),
+            level: i as u8,
+            position: at[i],
+            radius: 1.0,
+            n_tracks: 1,
+            certainty: 1.0,
+            copy_of: None,
+            plane_angle: 0.0,
+        };
+        let skeleton = Skeleton { nodes: (0..3).map(node).collect(), foot_px: [0.0; 2], image_size: Size::new(64, 64) };
+        let pose = |k: u32| {
+            let time_s = f64::from(k) / 30.0;
+            let turn = UnitQuaternion::from_scaled_axis(Vector3::z() * 0.1 * (4.0 * time_s).sin());
+            let mut joints = at.map(|position| JointPose { position, rotation: UnitQuaternion::identity() });
+            joints[2].position = at[1] + turn * (at[2] - at[1]);
+            Pose { frame: k.into(), time_s, joints: joints.into() }
+        };
+        (skeleton, (0..30 * seconds).map(pose).collect())
+    }
+
+    /// Hours of film take no more room than the window, and what is in it is the angle of the papers.
+    #[test]
+    fn the_window_slides_and_holds_the_angles_of_its_branches() {
+        let (skeleton, poses) = film(60);
+        let mut window = AngleWindow::new(10.0);
+        window.begin(&skeleton);
+        poses.iter().for_each(|pose| window.push(pose));
+        let all = window.last(f64::INFINITY);
+        assert_eq!((all.rows.len(), &*all.nodes), (301, &[NodeName(10), NodeName(20)][..]));
+        let wanted = angle_to_parent_deg(&skeleton, &poses, NodeId(2));
+        for ((t, angle), k) in all.of(NodeName(20)).zip(poses.len() - 301..) {
+            assert!(t == poses[k].time_s && (angle - wanted[k]).abs() < 1e-4, "{angle} at {t}, not {}", wanted[k]);
+        }
+        assert_eq!(window.last(1.0).rows.len(), 31);
+        assert_eq!(all.of(NodeName(7)).count(), 0);
+        // A tree that is built anew begins anew.
+        window.begin(&skeleton);
+        assert_eq!(window.last(f64::INFINITY).rows.len(), 0);
+    }
+}

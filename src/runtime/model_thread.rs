@@ -13,7 +13,7 @@ use super::stream;
 use super::sway_watch::SwayWatch;
 use super::swaying::Ending;
 use super::track_thread::ToModel;
-use super::{Job, Summary};
+use super::{Job, Pace, Summary};
 use crate::model::{Phase, Picture, Pose, SwayNow};
 use crate::pipeline::{BackEnd, Followed, LEAST_MOVING, Moved};
 use crate::recording::Spool;
@@ -67,7 +67,7 @@ impl ModelThread {
         let status = Status::new(info.name.clone(), info.format.clone(), info.frames_total);
         let back = BackEnd::new(&job.config);
         let looked_at = job.stream.is_some() || job.preview_every < Duration::MAX;
-        let sway = looked_at.then(|| SwayWatch::new(&job.config.dynamics, !info.live, shared.clone()));
+        let sway = looked_at.then(|| SwayWatch::new(&job.config.dynamics, job.pace == Pace::Fast, shared.clone()));
         let mut thread = Self {
             back,
             job,

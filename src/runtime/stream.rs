@@ -81,3 +81,53 @@ fn counts(shared: &Shared) -> String {
         c.reconnects
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Excitation, Size, Sway, Unidentified};
+    use serde_json::{Value, json};
+
+    fn swaying(branches: Vec<(u32, crate::model::Swaying)>) -> SwayNow {
+        let branch = |(name, swaying)| (NodeName(name), BranchSway { swaying, spectrum: None });
+        SwayNow {
+            frame: 300,
+            time_s: 10.0,
+            span_s: 9.5,
+            excitation: None,
+            branches: branches.into_iter().map(branch).collect(),
+        }
+    }
+
+    /// Whatever is not known is left out: a reader must never meet a number that is none.
+    #[test]
+    fn what_is_not_known_is_left_out() {
+        let interval = |value| crate::model::Interval { value, lo: 0.5 * value, hi: 2.0 * value };
+        let known = |damping_ratio, amplitude_deg| {
+            Ok(Sway { frequency_hz: interval(0.8), damping_ratio, excitation: Excitation::Wind, amplitude_deg })
+        };
+        let sway = swaying(vec![
+            (1, known(Some(interval(0.02)), 1.5)),
+            (4, known(None, f64::NAN)),
+            (9, Err(Unidentified::AboveSampling)),
+        ]);
+        let skeleton = Skeleton { nodes: Vec::new(), foot_px: [0.0; 2], image_size: Size::new(64, 64) };
+        let pose = Pose { frame: 330, time_s: 11.0, joints: Vec::new() };
+        let shared = Shared::default();
+        let of = |sway, lost| -> Value { serde_json::from_str(&line(&pose, &skeleton, 0.0, sway, lost)).unwrap() };
+        let told = &of(Some(&sway), Some(&shared));
+        assert_eq!((&told["sway"]["excitation"], &told["dropped"]), (&Value::Null, &json!(0)));
+        assert_eq!(
+            told["sway"]["branches"],
+            json!([
+                {"node_id": 1, "identifiable": true, "frequency_hz": 0.8, "frequency_lo_hz": 0.4,
+                 "frequency_hi_hz": 1.6, "damping_ratio": 0.02, "damping_lo": 0.01, "damping_hi": 0.04,
+                 "amplitude_deg": 1.5, "excitation": "wind"},
+                {"node_id": 4, "identifiable": true, "frequency_hz": 0.8, "frequency_lo_hz": 0.4,
+                 "frequency_hi_hz": 1.6, "excitation": "wind"},
+                {"node_id": 9, "identifiable": false, "unidentified": "above_sampling"},
+            ])
+        );
+        assert_eq!(of(None, None), json!({"frame": 330, "time_s": 11.0, "nodes": []}));
+    }
+}

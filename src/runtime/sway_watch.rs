@@ -25,7 +25,7 @@ pub struct SwayWatch {
 }
 
 impl SwayWatch {
-    /// `waits` for results where they are due, as whoever replays a recording does.
+    /// `waits` for results where they are due, as a replay without a pace of its own does.
     pub fn new(settings: &Dynamics, waits: bool, shared: Arc<Shared>) -> Self {
         Self {
             settings: settings.clone(),

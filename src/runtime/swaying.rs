@@ -1,9 +1,10 @@
 //! The sway is told anew again and again on a thread of its own, while the film goes on.
 //!
 //! A request is made when so much film has passed, and its result takes effect when the next one is due: at a moment of
-//! film, not of the clock. Whoever replays a recording waits for it there, so that the same recording gives the same
-//! answers at the same frames whatever the machine. A camera waits for nobody: what is not ready is looked at again when
-//! the next one is due, and the request that finds the thread busy is passed over and counted.
+//! film, not of the clock. A fast replay waits for it there, so that the same recording gives the same answers at the same
+//! frames whatever the machine. A camera, or a recording at its own pace, waits for nobody: what is not ready is looked at
+//! again when the next one is due, and the request that finds the thread busy is passed over and counted. The thread then
+//! stands back for all others.
 
 use super::pulse::Worker;
 use super::shared::Shared;
@@ -143,8 +144,14 @@ impl Swaying {
     fn errands(&mut self) -> Option<Sender<Errand>> {
         if self.thread.is_none() {
             let (errands, queue) = bounded(1);
-            let (analyser, shared) = (self.analyser, self.shared.clone());
-            match std::thread::Builder::new().name("sway".into()).spawn(move || work(&queue, analyser, &shared)) {
+            let (analyser, shared, waited_for) = (self.analyser, self.shared.clone(), self.waits);
+            let run = move || {
+                if !waited_for {
+                    stand_back();
+                }
+                work(&queue, analyser, &shared);
+            };
+            match std::thread::Builder::new().name("sway".into()).spawn(run) {
                 Ok(thread) => self.thread = Some((errands, thread)),
                 Err(e) => {
                     self.shared.warn(format!("the sway is told only at the end: a thread cannot be started: {e}"));
@@ -190,6 +197,14 @@ fn look(answer: &Receiver<SwayNow>) -> Result<SwayNow, RecvTimeoutError> {
         TryRecvError::Empty => RecvTimeoutError::Timeout,
         TryRecvError::Disconnected => RecvTimeoutError::Disconnected,
     })
+}
+
+/// Lets all other threads go first where there is too little processor for all. Where that is refused, it is not needed for
+/// the result.
+fn stand_back() {
+    const NICE: libc::c_int = 10;
+    // SAFETY: it takes numbers only; 0 is the calling thread, as Linux has it.
+    let _ = unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, NICE) };
 }
 
 /// The thread: one request after the other until nobody has any.
