@@ -3,6 +3,7 @@
 mod support;
 
 use arborcam::config::Config;
+use arborcam::model::Unidentified;
 use arborcam::outline::{AutoOutline, Found};
 use arborcam::source::Decoder;
 use std::collections::{BTreeMap, BTreeSet};
@@ -282,11 +283,48 @@ fn the_stream_is_what_the_capture_says() {
     assert!(4 * kept_names >= 3 * measured_names, "{kept_names} of {measured_names} nodes keep their numbers");
 }
 
+/// Once a second the stream says how the branches sway, by the names and with the units of the files.
+#[test]
+fn the_stream_tells_the_sway_once_a_second() {
+    let lines = made().stream.lines().map(|l| serde_json::from_str::<serde_json::Value>(l).expect("json"));
+    let told: Vec<serde_json::Value> = lines.filter(|l| l.get("sway").is_some()).collect();
+    assert!(told.len() >= 2, "told {} times", told.len());
+    for line in &told {
+        let number = |of: &serde_json::Value, key: &str| of[key].as_f64().unwrap_or_else(|| panic!("{key} in {of}"));
+        let sway = &line["sway"];
+        // It is from the frame in which it was asked for, a second before.
+        let late_s = number(line, "time_s") - number(sway, "time_s");
+        assert!((late_s - 1.0).abs() < 0.05, "{late_s} s late");
+        assert!((number(sway, "span_s") - number(sway, "time_s")).abs() < 0.05, "all of the film so far: {sway}");
+        assert_eq!(sway["excitation"], "release");
+        let ids: Vec<u64> = line["nodes"].as_array().expect("nodes").iter().filter_map(|n| n[0].as_u64()).collect();
+        let branches = sway["branches"].as_array().expect("branches");
+        // The foot is no branch.
+        assert!(branches.len() > 15 && branches.len() < ids.len(), "{} of {} nodes", branches.len(), ids.len());
+        let mut known = 0;
+        for branch in branches {
+            assert!(ids.contains(&branch["node_id"].as_u64().expect("id")), "{branch} is not in the tree");
+            if branch["identifiable"] == false {
+                let why = branch["unidentified"].as_str().expect("a reason");
+                assert!(Unidentified::of_word(why).is_some() && branch.get("frequency_hz").is_none(), "{branch}");
+                continue;
+            }
+            known += 1;
+            let [f, lo, hi] = ["frequency_hz", "frequency_lo_hz", "frequency_hi_hz"].map(|k| number(branch, k));
+            assert!(0.1 < lo && lo < f && f < hi && hi < 5.0, "{branch}");
+            assert!(branch["excitation"] == "release" && branch.get("unidentified").is_none(), "{branch}");
+        }
+        assert!(known >= 2, "{known} branches are identified");
+    }
+}
+
 /// The same clip gives the same bytes, however the threads happen to run.
 #[test]
 fn a_replay_is_reproducible_to_the_byte() {
     let on_one_core = Command::new("taskset").args(["-c", "0", "true"]).status().is_ok_and(|s| s.success());
-    let again = replay(if on_one_core { &["taskset", "-c", "0"] } else { &[] }, &["--outline", OUTLINE, "--headless"]);
+    let before: &[&str] = if on_one_core { &["taskset", "-c", "0"] } else { &[] };
+    let again = replay(before, &["--outline", OUTLINE, "--stream", "ndjson"]);
+    assert!(again.stream == made().stream, "the stream differs from one run to the next");
     for name in ["capture.json", "tracks.csv", "nodes.csv", "motion.csv", "tree.glb", "frame.jpg"] {
         let [a, b] = [made(), &again].map(|r| fs::read(r.out().join(name)).expect("file"));
         assert!(a == b, "{name} differs from one run to the next");

@@ -105,6 +105,7 @@ fn the_small_board_s_profile_differs_where_it_says() {
         ("camera.height", 720.0, 480.0),
         ("camera.width", 1280.0, 640.0),
         ("detect.points", 400.0, 200.0),
+        ("dynamics.every_s", 1.0, 5.0),
         ("dynamics.window_s", 60.0, 30.0),
         ("export.animation_s", 60.0, 30.0),
         ("hierarchy.levels", 7.0, 6.0),

@@ -2,7 +2,7 @@
 
 mod support;
 
-use arborcam::config::Config;
+use arborcam::config::{Config, Dynamics};
 use arborcam::model::{Control, FormatNote, Outline, PixelFormat, RawFrame, Size};
 use arborcam::outline::{Given, Mark, Scribbles};
 use arborcam::pipeline::Pipeline;
@@ -177,10 +177,53 @@ fn threads_give_the_same_poses_as_none() {
                 .collect();
             let expected =
                 format!("{{\"frame\":{},\"time_s\":{:.6},\"nodes\":[{}]}}", pose.frame, pose.time_s, nodes.join(","));
-            assert_eq!(lines.next(), Some(expected.as_str()), "frame {}", pose.frame);
+            // What follows the poses is the sway, which the pipeline does not know.
+            let line = lines.next().unwrap_or_default();
+            let alone = line.split_once(",\"sway\":").map_or(line.to_owned(), |(poses, _)| format!("{poses}}}"));
+            assert_eq!(alone, expected, "frame {}", pose.frame);
             poses += 1;
         }
         assert!(poses > 80 && lines.next().is_none(), "{poses} poses");
+    }
+}
+
+/// Whoever reads the sway of a recording gets the same however fast its frames come.
+#[test]
+fn the_sway_is_told_in_the_same_frames_however_slow_the_source_is() {
+    let streamed = |pause: Duration| {
+        let lines = Lines::default();
+        let job = Job { stream: Some(Box::new(lines.clone())), ..job(Some(support::outline()), None) };
+        let source = fake(false, move |n| {
+            std::thread::sleep(pause);
+            Ok(frame(n))
+        });
+        let (_, failure, _) = run(source, job);
+        assert!(failure.is_none(), "{failure:?}");
+        let text = lines.0.lock().expect("lines").clone();
+        String::from_utf8(text).expect("text")
+    };
+    let (fast, slow) = (streamed(Duration::ZERO), streamed(Duration::from_millis(20)));
+    assert!(fast.contains(",\"sway\":{"), "no sway is told");
+    assert!(fast == slow, "the stream depends on the clock");
+}
+
+/// A sway is looked at in most of the film's last second: a wish to stop must not wait for it, nor for the whole
+/// analysis of a film that nobody writes.
+#[test]
+fn a_stop_while_the_sway_is_looked_at_ends_quickly() {
+    for at in [245, 290] {
+        let (source, gate) = gated(at);
+        let config = Config { dynamics: Dynamics { every_s: 0.05, ..Dynamics::default() }, ..Config::default() };
+        let lines = Lines::default();
+        let job = Job { config, stream: Some(Box::new(lines.clone())), ..job(Some(support::outline()), None) };
+        let running = runtime::start(source, job).expect("start");
+        gate.reached.recv_timeout(HANGS).expect("the gate is reached");
+        running.send(Control::Quit);
+        gate.open.send(()).expect("the source waits");
+        let began = Instant::now();
+        let (summary, failure, _) = ended(running);
+        assert!(failure.is_none() && summary.is_some(), "{failure:?}");
+        assert!(began.elapsed() < Duration::from_secs(5), "{:?} from the wish to the end", began.elapsed());
     }
 }
 

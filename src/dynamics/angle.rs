@@ -13,31 +13,48 @@ const SHORTEST_PX: f64 = 1e-6;
 /// The parent branch is the nearest one below that has a length in the picture at rest; upright, where there is none. NaN
 /// for poses of another skeleton and those in which one of the two branches has no direction.
 pub fn angle_to_parent_deg(skeleton: &Skeleton, poses: &[Pose], node: NodeId) -> Vec<f64> {
-    let Some(parent) = parent_of(skeleton, node) else { return vec![f64::NAN; poses.len()] };
-    let carrier = carrier(skeleton, parent);
-    let mut last: Option<f64> = None;
-    poses
-        .iter()
-        .map(|pose| {
-            if pose.joints.len() != skeleton.nodes.len() {
-                return f64::NAN;
-            }
-            let at = |n: NodeId| pose.joints[n.index()].position;
-            let way = |from: NodeId, to: NodeId| [at(to).x - at(from).x, at(to).y - at(from).y];
-            let base = carrier.map_or([0.0, 1.0], |(from, to)| way(from, to));
-            let own = way(parent, node);
-            let shortest = base[0].hypot(base[1]).min(own[0].hypot(own[1]));
-            if !shortest.is_finite() || shortest < SHORTEST_PX {
-                return f64::NAN;
-            }
-            let sine = base[0] * own[1] - base[1] * own[0];
-            let cosine = base[0] * own[0] + base[1] * own[1];
-            let angle = sine.atan2(cosine).to_degrees();
-            let angle = last.map_or(angle, |before| angle - 360.0 * ((angle - before) / 360.0).round());
-            last = Some(angle);
-            angle
-        })
-        .collect()
+    let mut follower = AngleToParent::new(skeleton, node);
+    poses.iter().map(|pose| follower.step(pose)).collect()
+}
+
+/// [`angle_to_parent_deg`] frame by frame.
+#[derive(Clone, Debug)]
+pub struct AngleToParent {
+    /// Number of nodes of the skeleton that poses must be of.
+    nodes: usize,
+    /// Start and end of the branch.
+    own: Option<[NodeId; 2]>,
+    /// Start and end of the branch that it is measured against; upright, where there is none.
+    carrier: Option<(NodeId, NodeId)>,
+    last_deg: Option<f64>,
+}
+
+impl AngleToParent {
+    /// Follows the branch that ends in `node`.
+    pub fn new(skeleton: &Skeleton, node: NodeId) -> Self {
+        let parent = parent_of(skeleton, node);
+        let carrier = parent.and_then(|parent| carrier(skeleton, parent));
+        Self { nodes: skeleton.nodes.len(), own: parent.map(|p| [p, node]), carrier, last_deg: None }
+    }
+
+    /// The angle in the next pose, degrees; NaN where it has none.
+    pub fn step(&mut self, pose: &Pose) -> f64 {
+        let Some([parent, node]) = self.own.filter(|_| pose.joints.len() == self.nodes) else { return f64::NAN };
+        let at = |n: NodeId| pose.joints[n.index()].position;
+        let way = |from: NodeId, to: NodeId| [at(to).x - at(from).x, at(to).y - at(from).y];
+        let base = self.carrier.map_or([0.0, 1.0], |(from, to)| way(from, to));
+        let own = way(parent, node);
+        let shortest = base[0].hypot(base[1]).min(own[0].hypot(own[1]));
+        if !shortest.is_finite() || shortest < SHORTEST_PX {
+            return f64::NAN;
+        }
+        let sine = base[0] * own[1] - base[1] * own[0];
+        let cosine = base[0] * own[0] + base[1] * own[1];
+        let angle = sine.atan2(cosine).to_degrees();
+        let angle = self.last_deg.map_or(angle, |before| angle - 360.0 * ((angle - before) / 360.0).round());
+        self.last_deg = Some(angle);
+        angle
+    }
 }
 
 /// The same angle in space: how far the branch has turned from where its carrier would have taken it, degrees, signed

@@ -2,6 +2,7 @@
 
 use crate::model::{NodeId, Skeleton, TrackId, TrackSet};
 use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
 
 /// One followed point.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,10 +58,10 @@ impl Film {
     }
 }
 
-/// Where points were in one frame, px.
-type Places = Vec<(TrackId, [f32; 2])>;
+/// Where points were in one frame, px; shared, so that a copy of a whole log costs next to nothing.
+type Places = Arc<[(TrackId, [f32; 2])]>;
 
-/// The last seconds of a film that goes on.
+/// The last seconds of a film that goes on. A copy is cheap: it can be taken while the film goes on and be worked on elsewhere.
 #[derive(Clone, Debug)]
 pub struct FilmLog {
     window_s: f64,
@@ -81,7 +82,7 @@ impl FilmLog {
     /// Takes points of the next frame, px.
     pub fn push_points(&mut self, time_s: f64, points: impl Iterator<Item = (TrackId, [f32; 2])>) {
         match self.sets.back_mut() {
-            Some((last, all)) if *last == time_s => all.extend(points),
+            Some((last, all)) if *last == time_s => *all = all.iter().copied().chain(points).collect(),
             _ => self.sets.push_back((time_s, points.collect())),
         }
         while self.sets.front().is_some_and(|(t, _)| time_s - t > self.window_s) {
@@ -94,7 +95,7 @@ impl FilmLog {
         let measured = skeleton.measured();
         let mut by_id: BTreeMap<TrackId, Option<FilmTrack>> = BTreeMap::new();
         for (k, (_, points)) in self.sets.iter().enumerate() {
-            for (id, [u, v]) in points {
+            for (id, [u, v]) in points.iter() {
                 let track = by_id.entry(*id).or_insert_with(|| {
                     let node = node_of(*id).filter(|n| n.index() < measured)?;
                     Some(FilmTrack { node, at_px: vec![[f64::NAN; 2]; self.sets.len()] })

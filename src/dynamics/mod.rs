@@ -19,9 +19,9 @@ mod spread;
 mod sway;
 mod wind;
 
-pub use angle::{angle_in_space_deg, angle_to_parent_deg};
+pub use angle::{AngleToParent, angle_in_space_deg, angle_to_parent_deg};
 pub use decay::{Mode, Start};
 pub use film::{Film, FilmLog, FilmTrack};
 pub use release::Onset;
-pub use spectrum::{Spectrum, dominant_frequency_hz, spectrum};
+pub use spectrum::{Spectrum, spectrum};
 pub use sway::{Analysis, analyse, analyse_with};

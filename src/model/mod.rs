@@ -11,6 +11,7 @@ mod pose;
 mod skeleton;
 mod snapshot;
 mod sway;
+mod sway_now;
 mod track;
 
 pub use control::Control;
@@ -21,4 +22,5 @@ pub use pose::{JointPose, Pose};
 pub use skeleton::{FARTHEST_PX, Node, NodeId, NodeName, Skeleton};
 pub use snapshot::{BranchRow, CameraState, FormatNote, Phase, Snapshot};
 pub use sway::{Excitation, Interval, Sway, Swaying, Unidentified};
+pub use sway_now::{AngleSpectrum, Angles, BranchSway, SwayNow};
 pub use track::{LONGEST_TRIAL_S, Observation, TrackId, TrackSet};

@@ -1,6 +1,6 @@
 //! What the screen shows of a running capture: one immutable picture of its state, replaced, never changed.
 
-use super::{NodeName, Pose, Rgb, Size, Skeleton};
+use super::{Angles, NodeName, Pose, Rgb, Size, Skeleton, SwayNow};
 use std::sync::Arc;
 
 /// How far the capture has come.
@@ -72,8 +72,6 @@ pub struct BranchRow {
     pub n_tracks: u32,
     /// Root mean square of the node's displacement in the picture over the last seconds, px.
     pub amplitude_px: f64,
-    /// Largest peak of the displacement's spectrum, Hz; `None` while too little has been seen.
-    pub frequency_hz: Option<f64>,
 }
 
 /// State of a capture after some frame.
@@ -123,6 +121,14 @@ pub struct Snapshot {
     /// Main branch of every node of the skeleton, by node index; the same numbers as in `points`.
     pub node_colour: Arc<Vec<Option<u8>>>,
     pub branches: Vec<BranchRow>,
+    /// The newest answer of the sway; `None` while there is none.
+    pub sway: Option<Arc<SwayNow>>,
+    /// Nobody analyses the sway before the end.
+    pub sway_at_end: bool,
+    /// How often the sway was not analysed anew because the last time was not over.
+    pub sway_passed_over: u64,
+    /// The last seconds of every branch's angle to the one that carries it.
+    pub angles: Angles,
     pub paused: bool,
     /// The source has ended or the user has quit: what is shown is the last state.
     pub ended: bool,

@@ -26,8 +26,8 @@ pub struct Moved {
     pub targets_px: Targets,
     /// The posture in this frame, once there is a tree.
     pub pose: Option<Arc<Pose>>,
-    /// In the frame with which a tree, or a refined one, comes into effect: time and targets of the frames remembered from before, oldest first.
-    pub before: Vec<(f64, Targets)>,
+    /// In the frame with which a tree, or a refined one, comes into effect: poses and targets of the frames remembered from before, oldest first.
+    pub before: Vec<(Pose, Targets)>,
 }
 
 /// Tracks to poses: gathers motion, builds the tree, then poses it in every frame and refines it as motion goes on.
@@ -101,7 +101,7 @@ impl BackEnd {
 
     /// Judges the evidence now and then. Where it suffices, or a build is asked for, the tree is built with the frame
     /// after this one, so that the screen can say that it is being built.
-    fn accumulate(&mut self, time_s: f64) -> Vec<(f64, Targets)> {
+    fn accumulate(&mut self, time_s: f64) -> Vec<(Pose, Targets)> {
         let due = self.judged_s.is_none_or(|t| time_s - t >= JUDGE_EVERY_S);
         if !due && self.building.is_none() && !self.build_now {
             return Vec::new();
@@ -132,8 +132,8 @@ impl BackEnd {
         table
     }
 
-    /// Builds, and follows the pose through the remembered frames; gives their times and targets.
-    fn build(&mut self, table: &Arc<TrackTable>, forced: bool) -> Vec<(f64, Targets)> {
+    /// Builds, and follows the pose through the remembered frames; gives their poses and targets.
+    fn build(&mut self, table: &Arc<TrackTable>, forced: bool) -> Vec<(Pose, Targets)> {
         let (Some(outline), Some(first), Some(last)) = (&self.outline, self.history.first(), self.history.last())
         else {
             return Vec::new();
@@ -147,8 +147,7 @@ impl BackEnd {
         // newest frame is left out: it is about to be worked off as every later one is.
         let mut before = Vec::with_capacity(self.history.len());
         for tracks in self.history.sets().take(self.history.len() - 1) {
-            let (_, targets_px) = live.poser.step(tracks);
-            before.push((tracks.time_s, targets_px));
+            before.push(live.poser.step(tracks));
         }
         self.live = Some(live);
         let refiner = Refiner::new(moment.time_s, self.history.span_s(), &self.config);
@@ -164,9 +163,9 @@ impl BackEnd {
         }
     }
 
-    /// Refines the tree where it is time to; in the frame with which a new one takes the old one's place gives times and
+    /// Refines the tree where it is time to; in the frame with which a new one takes the old one's place gives poses and
     /// targets of the frames that it was followed through.
-    fn refine(&mut self) -> Vec<(f64, Targets)> {
+    fn refine(&mut self) -> Vec<(Pose, Targets)> {
         let (Some(mut refiner), Some(live)) = (self.refiner.take(), &self.live) else { return Vec::new() };
         let taken = refiner.step(&self.history, live, &self.config);
         self.keep_on(refiner);

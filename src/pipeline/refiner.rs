@@ -5,6 +5,7 @@ use super::refine::Refinement;
 use super::{Moment, Poser, Targets, Tree};
 use crate::config::Config;
 use crate::hierarchy;
+use crate::model::Pose;
 use crate::track::TrackHistory;
 use std::sync::Arc;
 
@@ -41,13 +42,13 @@ enum Stage {
 struct Following {
     tree: Tree,
     poser: Poser,
-    /// Frames before this one have been followed; their times and targets.
+    /// Frames before this one have been followed; their poses and targets.
     next: u64,
-    before: Vec<(f64, Targets)>,
+    before: Vec<(Pose, Targets)>,
 }
 
-/// A tree that takes the place of another, and times and targets of the frames that it was followed through.
-pub(super) type Taken = (Live, Vec<(f64, Targets)>);
+/// A tree that takes the place of another, and poses and targets of the frames that it was followed through.
+pub(super) type Taken = (Live, Vec<(Pose, Targets)>);
 
 impl Refiner {
     /// For a tree that was built at `built_s` from the last `span_s` of film, s.
@@ -109,8 +110,7 @@ impl Refiner {
         let from = on.tree.followed_from.max(on.next);
         let mut left = history.sets().filter(|set| set.frame >= from && set.frame < newest.frame);
         for set in left.by_ref().take(FRAMES_PER_STEP) {
-            let (_, targets_px) = on.poser.step(set);
-            on.before.push((set.time_s, targets_px));
+            on.before.push(on.poser.step(set));
             on.next = set.frame + 1;
         }
         if left.next().is_some() {

@@ -107,14 +107,32 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
     tables.catch_up(&job.tracks, wrote)?;
     let Done { folder, tree, poses, pose_in_picture, misses, film } = tables.finish(&job.tracks, wrote)?;
     let metres_per_px = job.config.export.metres_per_px;
-    let sway = analyse_with(&tree.skeleton, &film, &job.config.dynamics, &|| job.shared.pulse.wrote()).sway;
+    // The sway and the model need nothing of each other, and whoever has asked for the end is waiting.
+    let (sway, (model, push)) = beside(
+        "sway",
+        || analyse_with(&tree.skeleton, &film, &job.config.dynamics, &|| job.shared.pulse.wrote()).sway,
+        || (model_of(job, &tree, &poses, pose_in_picture.as_ref()), tree.push_figures(&job.config)),
+    );
+    let (bytes, animation) = model?;
     nodes(folder.file("nodes.csv")?, &tree.skeleton, &sway, metres_per_px)?;
-    let (bytes, animation) = model_of(job, &tree, &poses, pose_in_picture.as_ref())?;
     folder.write("tree.glb", &bytes)?;
-    let push = Some(tree.push_figures(&job.config));
+    let push = Some(push);
     let model = ModelNote { push, ..ModelNote::of(&tree.skeleton, metres_per_px) };
     let capture = describe(job, Some(&tree), Some((model, animation)), misses.median());
     publish(job, folder, capture, Some(tree))
+}
+
+/// Does both at the same time, the first on a thread of this name, or one after the other where there is none to be had.
+fn beside<A: Send, B>(name: &str, first: impl Fn() -> A + Sync, second: impl FnOnce() -> B) -> (A, B) {
+    std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new().name(name.into()).spawn_scoped(scope, &first);
+        let b = second();
+        match thread.map(std::thread::ScopedJoinHandle::join) {
+            Ok(Ok(a)) => (a, b),
+            Ok(Err(panic)) => std::panic::resume_unwind(panic),
+            Err(_) => (first(), b),
+        }
+    })
 }
 
 /// Tables without rows and no model: a reader finds every table, and no tree that was never seen.

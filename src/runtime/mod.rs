@@ -8,6 +8,7 @@
 //! A dropped sender ends the stream: when the source is done, the tracker works off its queue and ends, then the model
 //! does and writes the capture.
 
+mod angles;
 mod announce;
 mod behind;
 mod capture_tables;
@@ -29,6 +30,9 @@ mod refining;
 mod shared;
 mod source_thread;
 mod status;
+mod stream;
+mod sway_watch;
+mod swaying;
 mod track_thread;
 mod watched;
 
@@ -74,7 +78,7 @@ pub struct Job {
     pub out: Option<PathBuf>,
     /// Recording of the frames and of what is found in them.
     pub record: Option<RecordTo>,
-    /// Time between two pictures for the screen.
+    /// Time between two pictures for the screen; [`Duration::MAX`] where there is none.
     pub preview_every: Duration,
 }
 

@@ -9,9 +9,12 @@ use super::recorder_thread::{Found, Recorded, Recorder};
 use super::refining::Refining;
 use super::shared::{Failure, Shared};
 use super::status::{Status, median_error_px, median_fb_error_px};
+use super::stream;
+use super::sway_watch::SwayWatch;
+use super::swaying::Ending;
 use super::track_thread::ToModel;
-use super::{Job, Summary};
-use crate::model::{Phase, Picture, Pose};
+use super::{Job, Pace, Summary};
+use crate::model::{Phase, Picture, Pose, SwayNow};
 use crate::pipeline::{BackEnd, Followed, LEAST_MOVING, Moved};
 use crate::recording::Spool;
 use crate::source::SourceInfo;
@@ -40,6 +43,8 @@ pub struct ModelThread {
     spool: Option<Spool>,
     behind: BehindTree,
     refining: Refining,
+    /// Only where somebody looks: a screen, or a reader of the stream.
+    sway: Option<SwayWatch>,
     /// Sensor time up to which the tables have been asked for, s.
     behind_s: f64,
     picture: Option<Picture>,
@@ -61,6 +66,8 @@ impl ModelThread {
     ) -> Self {
         let status = Status::new(info.name.clone(), info.format.clone(), info.frames_total);
         let back = BackEnd::new(&job.config);
+        let looked_at = job.stream.is_some() || job.preview_every < Duration::MAX;
+        let sway = looked_at.then(|| SwayWatch::new(&job.config.dynamics, job.pace == Pace::Fast, shared.clone()));
         let mut thread = Self {
             back,
             job,
@@ -70,6 +77,7 @@ impl ModelThread {
             spool: None,
             behind: BehindTree::default(),
             refining: Refining::default(),
+            sway,
             behind_s: f64::NEG_INFINITY,
             picture: None,
             quality: Quality::default(),
@@ -110,6 +118,7 @@ impl ModelThread {
                     self.status.restart();
                     std::mem::take(&mut self.behind).give_up();
                     self.refining = Refining::default();
+                    self.sway.iter_mut().for_each(SwayWatch::restart);
                     self.behind_s = f64::NEG_INFINITY;
                     self.new_spool();
                     (self.quality, self.announced, last) = (Quality::default(), Announced::default(), None);
@@ -126,12 +135,17 @@ impl ModelThread {
             }
             self.shared.pulse.done(Worker::Model);
         }
+        let swaying = self.sway.as_mut().map(SwayWatch::end);
         self.back.finish();
         self.announce();
         // Shown while the capture is written.
         self.shared.ended.store(true, Ordering::Relaxed);
         self.show(last.as_ref(), true);
-        self.finish()
+        let summary = self.finish();
+        if swaying.is_some_and(Ending::panicked) {
+            self.shared.fail(Failure::Panicked);
+        }
+        summary
     }
 
     fn step(&mut self, followed: Followed) -> Moved {
@@ -157,14 +171,16 @@ impl ModelThread {
                 pose: moved.pose.clone().zip(self.back.tree().map(|tree| tree.skeleton.clone())),
             });
         }
+        let sway = self.sway.as_mut().and_then(|sway| sway.step(&moved, &self.back));
         if let Some(pose) = &moved.pose {
-            self.stream(pose);
+            self.stream(pose, sway.as_deref());
         }
         if self.back.take_refusal() {
             let moving = self.back.evidence().moving.len();
             self.shared.tell(format!("no tree yet: {moving} points move, and {LEAST_MOVING} that agree must"));
         }
         self.status.moved(&moved, &self.back);
+        self.status.sways(sway);
         self.announce();
         self.show(Some(&moved), self.back.phase().0 == Phase::Build);
         moved
@@ -189,24 +205,11 @@ impl ModelThread {
         }
     }
 
-    /// One line of JSON: `{"frame":…,"time_s":…,"nodes":[[id,x,y,z],…]}`, with the losses so far behind it if live; the measured nodes, model axes, in px
-    /// or metres as in the capture.
-    fn stream(&mut self, pose: &Pose) {
+    fn stream(&mut self, pose: &Pose, sway: Option<&SwayNow>) {
         let Some(out) = &mut self.job.stream else { return };
         let Some(tree) = self.back.tree() else { return };
-        let measured = &tree.skeleton.nodes[..tree.skeleton.measured()];
-        let scale = if self.job.config.export.metres_per_px > 0.0 { self.job.config.export.metres_per_px } else { 1.0 };
-        let mut line = format!("{{\"frame\":{},\"time_s\":{:.6},\"nodes\":[", pose.frame, pose.time_s);
-        for (i, (joint, node)) in pose.joints.iter().zip(measured).enumerate() {
-            let p = joint.position * scale;
-            let comma = if i > 0 { "," } else { "" };
-            line.push_str(&format!("{comma}[{},{:.3},{:.3},{:.3}]", node.name.0, p.x, p.y, p.z));
-        }
-        line.push(']');
-        if self.info.live {
-            line.push_str(&counts(&self.shared));
-        }
-        line.push_str("}\n");
+        let lost = self.info.live.then_some(&*self.shared);
+        let line = stream::line(pose, &tree.skeleton, self.job.config.export.metres_per_px, sway, lost);
         if let Err(e) = out.write_all(line.as_bytes()).and_then(|()| out.flush()) {
             // The reader has gone (`| head`): nobody listens any more, and that ends the capture in good order.
             if e.kind() != std::io::ErrorKind::BrokenPipe {
@@ -222,7 +225,7 @@ impl ModelThread {
             return;
         }
         self.last_screen = Some(Instant::now());
-        let snapshot = self.status.snapshot(moved, &self.back, &self.shared);
+        let snapshot = self.status.snapshot(moved, &self.back, self.sway.as_ref(), &self.shared);
         self.shared.screen.put(snapshot);
     }
 
@@ -320,19 +323,6 @@ impl ModelThread {
             not_recorded: self.shared.counts.not_recorded.load(Ordering::Relaxed),
         }
     }
-}
-
-/// What was lost until now, for the stream of a camera. A file's stream has none, so that two replays give the same.
-fn counts(shared: &Shared) -> String {
-    let c = shared.camera_state();
-    let by_sequence = c.lost_by_sequence.map_or_else(|| "null".to_owned(), |n| n.to_string());
-    format!(
-        ",\"dropped\":{},\"dropped_by_sequence\":{by_sequence},\"dropped_by_time\":{},\"broken\":{},\"reconnects\":{}",
-        shared.counts.lost_in_camera.load(Ordering::Relaxed),
-        c.lost_by_time,
-        c.damaged + c.stale + shared.counts.undecodable.load(Ordering::Relaxed),
-        c.reconnects
-    )
 }
 
 /// The folder in which `path` will lie, if it is there already, else the nearest one above it that is.

@@ -12,16 +12,19 @@ pub enum Worker {
     Model,
     /// Works only where a recording is made.
     Record,
+    /// Works only where somebody looks. It marks branch by branch, as it may be given all of them at once.
+    Sway,
 }
 
 impl Worker {
-    const ALL: [Worker; 3] = [Worker::Track, Worker::Model, Worker::Record];
+    const ALL: [Worker; 4] = [Worker::Track, Worker::Model, Worker::Record, Worker::Sway];
 
     fn name(self) -> &'static str {
         match self {
             Worker::Track => "track",
             Worker::Model => "model",
             Worker::Record => "record",
+            Worker::Sway => "sway",
         }
     }
 }
@@ -168,7 +171,9 @@ mod tests {
     /// A camera goes on delivering while a thread hangs: what it drops must not look like work.
     #[test]
     fn a_thread_that_hangs_is_named_although_frames_come() {
-        for (hangs, name) in [(Worker::Track, "track"), (Worker::Model, "model"), (Worker::Record, "record")] {
+        for (hangs, name) in
+            [(Worker::Track, "track"), (Worker::Model, "model"), (Worker::Record, "record"), (Worker::Sway, "sway")]
+        {
             let (pulse, mut vigil) = (Pulse::default(), Vigil::default());
             flow(&pulse);
             assert_eq!(vigil.look(pulse.marks(1, false)), Sign::Flows);

@@ -2,8 +2,10 @@
 
 use super::meter::Recent;
 use super::shared::Shared;
-use crate::dynamics::dominant_frequency_hz;
-use crate::model::{BranchRow, FormatNote, NodeName, Observation, Phase, Rgb, Size, Skeleton, Snapshot, TrackSet};
+use super::sway_watch::SwayWatch;
+use crate::model::{
+    BranchRow, FormatNote, NodeName, Observation, Phase, Rgb, Size, Skeleton, Snapshot, SwayNow, TrackSet,
+};
 use crate::pipeline::{BackEnd, Moved, Targets, Tree};
 use crate::signal::median;
 use std::collections::{BTreeMap, VecDeque};
@@ -14,7 +16,7 @@ use std::time::Instant;
 /// Level of the nodes by which points are coloured, and the deepest level in the table of branches.
 const MAIN_BRANCH_LEVEL: u8 = 4;
 const TABLE_LEVEL: u8 = 5;
-/// Time over which rates are taken, and over which amplitude and frequency of a branch are, s.
+/// Time over which rates are taken, and over which the amplitude of a branch is, s.
 const RATE_S: f64 = 5.0;
 const BRANCH_S: f64 = 10.0;
 /// Entries of the sparkline of errors, one for each quarter of a second.
@@ -120,9 +122,24 @@ impl Status {
         }
     }
 
+    /// An answer of the sway takes effect, if there is one.
+    pub fn sways(&mut self, sway: Option<Arc<SwayNow>>) {
+        self.snapshot.sway = sway.or(self.snapshot.sway.take());
+    }
+
     /// Everything that costs more than a few additions is done here, at the screen's rate and not at the camera's.
-    pub fn snapshot(&mut self, moved: Option<&Moved>, back: &BackEnd, shared: &Shared) -> Arc<Snapshot> {
+    pub fn snapshot(
+        &mut self,
+        moved: Option<&Moved>,
+        back: &BackEnd,
+        sway: Option<&SwayWatch>,
+        shared: &Shared,
+    ) -> Arc<Snapshot> {
         let s = &mut self.snapshot;
+        if let Some(sway) = sway {
+            s.angles = sway.shown();
+            (s.sway_at_end, s.sway_passed_over) = (sway.is_at_end(), sway.passed_over());
+        }
         if let Some(moved) = moved {
             if s.outline_px != moved.outline.polygon_px {
                 s.outline_px.clone_from(&moved.outline.polygon_px);
@@ -167,8 +184,8 @@ impl Status {
             self.snapshot.skeleton = Some(tree.skeleton.clone());
             self.snapshot.node_colour = Arc::new(main_branches(&tree.skeleton, &mut self.colours));
         }
-        for (time_s, targets_px) in &moved.before {
-            self.displaced(*time_s, targets_px);
+        for (pose, targets_px) in &moved.before {
+            self.displaced(pose.time_s, targets_px);
         }
         let time_s = moved.tracks.time_s;
         self.displaced(time_s, &moved.targets_px);
@@ -193,7 +210,6 @@ impl Status {
     }
 
     fn table(&self, skeleton: &Skeleton) -> Vec<BranchRow> {
-        let times: Vec<f64> = self.displacements.iter().map(|(t, _)| *t).collect();
         let row = |(k, &node): (usize, &usize)| {
             let path: Vec<[f64; 2]> = self.displacements.iter().map(|(_, d)| d[k]).collect();
             let n = &skeleton.nodes[node];
@@ -203,7 +219,6 @@ impl Status {
                 level: n.level,
                 n_tracks: n.n_tracks,
                 amplitude_px: rms_px(&path),
-                frequency_hz: dominant_frequency_hz(&times, &path),
             }
         };
         self.table_nodes.iter().enumerate().map(row).collect()

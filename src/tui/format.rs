@@ -1,5 +1,6 @@
 //! Numbers and texts cut to the room there is.
 
+use crate::model::Interval;
 use ratatui::text::Line;
 
 /// A count in at most five characters: `99999`, `1234k`, `56M`.
@@ -22,6 +23,23 @@ pub fn value(x: f64) -> String {
         a if a >= 99.995 => format!("{x:.1}"),
         _ => format!("{x:.2}"),
     }
+}
+
+/// A value and half of its interval, with as many decimals as that bears, in at most thirteen characters where the
+/// value is less than 100. The half is rounded up: nothing looks surer than it is.
+pub fn plus_minus(i: &Interval) -> String {
+    let half = 0.5 * (i.hi - i.lo);
+    if !(i.value.is_finite() && half.is_finite()) || i.value.abs() >= 99.995 || half >= 99.0 {
+        return value(i.value);
+    }
+    let decimals = match half {
+        h if h >= 0.05 => 2,
+        h if h >= 0.005 || i.value >= 9.9995 => 3,
+        _ => 4,
+    };
+    let unit = 10f64.powi(-decimals);
+    let half = ((half / unit - 1e-6).ceil() * unit).max(unit);
+    format!("{:.*}±{half:.*}", decimals as usize, i.value, decimals as usize)
 }
 
 /// Milliseconds, with a decimal only where it counts.
@@ -126,6 +144,22 @@ mod tests {
         }
         for (s, text) in [(0.0, "0:00"), (61.9, "1:01"), (3661.0, "1:01:01"), (f64::NAN, "–"), (1e300, "999:59:59")] {
             assert_eq!(clock(s), text);
+        }
+    }
+
+    #[test]
+    fn intervals() {
+        for (value, lo, hi, text) in [
+            (0.701_23, 0.700_8, 0.701_6, "0.7012±0.0004"),
+            (0.701_23, 0.698, 0.704, "0.7012±0.0030"),
+            (0.7, 0.7, 0.7, "0.7000±0.0001"),
+            (0.041, 0.03, 0.055, "0.041±0.013"),
+            (1.25, 1.15, 1.36, "1.25±0.11"),
+            (12.345, 12.3, 12.31, "12.345±0.005"),
+            (f64::NAN, 0.0, 1.0, "–"),
+            (1.0, 0.0, f64::INFINITY, "1.00"),
+        ] {
+            assert_eq!(plus_minus(&Interval { value, lo, hi }), text);
         }
     }
 

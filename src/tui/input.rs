@@ -19,8 +19,10 @@ pub enum Action {
     /// To the left or to the right.
     Turn(i8),
     Mesh,
-    /// Up or down.
-    Scroll(i8),
+    /// The branch so many rows farther down.
+    Choose(i8),
+    /// Looks away from the chosen branch.
+    Camera,
 }
 
 /// What a key does while an outline is drawn.
@@ -55,7 +57,7 @@ pub const fn bind<A>(
 }
 
 /// Keys while watching; those without a short name do what another one is told to do.
-pub const WATCHING: [Binding<Action>; 16] = [
+pub const WATCHING: [Binding<Action>; 17] = [
     bind(KeyCode::Char('?'), "?", "help", "shows and hides this help", Action::Help),
     bind(KeyCode::Char('q'), "q", "quit", "ends the capture and writes it (Ctrl-C too)", Action::Quit),
     bind(KeyCode::Char(' '), "space", "pause", "stops taking frames, or goes on", Action::Pause),
@@ -63,6 +65,7 @@ pub const WATCHING: [Binding<Action>; 16] = [
     bind(KeyCode::Char('b'), "b", "build", "builds the tree now, from the motion seen so far", Action::Build),
     bind(KeyCode::Char('r'), "r", "restart", "forgets points and tree, starts again", Action::Restart),
     bind(KeyCode::Char('e'), "e", "export", "writes the capture as it is now, goes on", Action::Export),
+    bind(KeyCode::Char('j'), "j k", "branch", "choose a branch (arrows too); Esc leaves it", Action::Choose(1)),
     bind(
         KeyCode::Char('h'),
         "h l",
@@ -71,13 +74,13 @@ pub const WATCHING: [Binding<Action>; 16] = [
         Action::Turn(-1),
     ),
     bind(KeyCode::Char('m'), "m", "mesh", "", Action::Mesh),
-    bind(KeyCode::Char('j'), "j k", "rows", "move the table of branches (arrows too)", Action::Scroll(1)),
     bind(KeyCode::Char('l'), "", "", "", Action::Turn(1)),
-    bind(KeyCode::Char('k'), "", "", "", Action::Scroll(-1)),
+    bind(KeyCode::Char('k'), "", "", "", Action::Choose(-1)),
     bind(KeyCode::Left, "", "", "", Action::Turn(-1)),
     bind(KeyCode::Right, "", "", "", Action::Turn(1)),
-    bind(KeyCode::Down, "", "", "", Action::Scroll(1)),
-    bind(KeyCode::Up, "", "", "", Action::Scroll(-1)),
+    bind(KeyCode::Down, "", "", "", Action::Choose(1)),
+    bind(KeyCode::Up, "", "", "", Action::Choose(-1)),
+    bind(KeyCode::Esc, "", "", "", Action::Camera),
 ];
 
 /// Keys while drawing; those without a short name are told in the help only.
@@ -139,7 +142,7 @@ fn press(key: &KeyEvent, state: &mut State, placed: Option<&Placed>) -> Option<C
 }
 
 fn act(action: Action, state: &mut State) -> Option<Control> {
-    let looks = matches!(action, Action::Help | Action::Turn(_) | Action::Mesh | Action::Scroll(_));
+    let looks = matches!(action, Action::Help | Action::Turn(_) | Action::Mesh | Action::Choose(_) | Action::Camera);
     if state.quitting && !looks {
         state.say("Still writing the capture…");
         return None;
@@ -161,8 +164,12 @@ fn act(action: Action, state: &mut State) -> Option<Control> {
             state.switch_mesh();
             return None;
         }
-        Action::Scroll(rows) => {
-            state.scroll(rows.into());
+        Action::Choose(rows) => {
+            state.choose(rows.into());
+            return None;
+        }
+        Action::Camera => {
+            state.close_up = false;
             return None;
         }
         Action::Pause => {

@@ -1,5 +1,6 @@
 //! Where each panel lies.
 
+use super::state::State;
 use crate::model::Size;
 use ratatui::layout::{Constraint, Layout, Rect};
 
@@ -13,17 +14,44 @@ pub struct Areas {
     pub phase: Rect,
     pub preview: Rect,
     pub branches: Rect,
-    pub camera: Rect,
-    pub tracks: Rect,
+    /// Not where the branch takes their place.
+    pub camera_and_tracks: Option<[Rect; 2]>,
+    /// The chosen branch.
+    pub branch: Option<Rect>,
     pub skeleton: Rect,
     pub messages: Rect,
     pub keys: Rect,
 }
 
+/// What is to be seen of the chosen branch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wish {
+    /// There is none.
+    Nothing,
+    /// It is shown where there is room for all.
+    IfRoom,
+    /// It is shown, if need be in the place of camera and points.
+    CloseUp,
+}
+
+impl Wish {
+    pub fn of(state: &State) -> Self {
+        match (state.snapshot.branches.is_empty(), state.close_up) {
+            (true, _) => Self::Nothing,
+            (_, false) => Self::IfRoom,
+            (_, true) => Self::CloseUp,
+        }
+    }
+}
+
+/// Rows of the chosen branch beside all else, and rows that the tree must keep then.
+const BRANCH_ROWS: u16 = 12;
+const TREE_ROWS: u16 = 9;
+
 impl Areas {
     /// Divides the window, giving the picture the height that it needs; `None` for a window that is too small.
     /// `cell_dots` are the dots of a cell in which the picture will be drawn, across and down.
-    pub fn new(window: Rect, image: Option<Size>, cell_dots: (u16, u16)) -> Option<Self> {
+    pub fn new(window: Rect, image: Option<Size>, cell_dots: (u16, u16), wish: Wish) -> Option<Self> {
         if window.width < SMALLEST.0 || window.height < SMALLEST.1 {
             return None;
         }
@@ -47,14 +75,29 @@ impl Areas {
         let [preview, branches] =
             Layout::vertical([Constraint::Length(preview_height), Constraint::Min(1)]).areas(left);
 
-        let tracks_height = if roomy { 6 } else { 3 };
-        let [camera, tracks, skeleton] = Layout::vertical([
-            Constraint::Length(if body.height < 16 { 6 } else { 8 }),
-            Constraint::Length(tracks_height),
-            Constraint::Min(1),
-        ])
-        .areas(right);
-        Some(Self { header, phase, preview, branches, camera, tracks, skeleton, messages, keys })
+        let camera = if body.height < 16 { 6 } else { 8 };
+        let (beside, short) = (body.height.saturating_sub(camera + BRANCH_ROWS + TREE_ROWS), 3);
+        let fits = wish != Wish::Nothing && beside >= short;
+        let tracks = if roomy && !(fits && beside < 6) { 6 } else { short };
+        let replaced = wish == Wish::CloseUp && !fits;
+        let heights = match (replaced, fits) {
+            (true, _) => [0, 0, camera + tracks],
+            (_, true) => [camera, tracks, BRANCH_ROWS],
+            _ => [camera, tracks, 0],
+        };
+        let [camera, tracks, branch, skeleton] =
+            Layout::vertical(heights.map(Constraint::Length).into_iter().chain([Constraint::Min(1)])).areas(right);
+        Some(Self {
+            header,
+            phase,
+            preview,
+            branches,
+            camera_and_tracks: (!replaced).then_some([camera, tracks]),
+            branch: (replaced || fits).then_some(branch),
+            skeleton,
+            messages,
+            keys,
+        })
     }
 }
 
@@ -72,11 +115,14 @@ mod tests {
     #[test]
     fn panels_fill_the_window_without_overlap() {
         for (width, height) in [(60, 16), (80, 24), (81, 31), (120, 40), (200, 60), (400, 20), (65, 200)] {
-            for image in [None, Some(Size::new(640, 360)), Some(Size::new(1, 10_000)), Some(Size::new(10_000, 1))] {
+            let images = [None, Some(Size::new(640, 360)), Some(Size::new(1, 10_000)), Some(Size::new(10_000, 1))];
+            let wishes = [Wish::Nothing, Wish::IfRoom, Wish::CloseUp];
+            for (image, wish) in images.into_iter().flat_map(|i| wishes.map(|w| (i, w))) {
                 let window = Rect::new(0, 0, width, height);
-                let a = Areas::new(window, image, (1, 2)).unwrap();
-                let all =
-                    [a.header, a.phase, a.preview, a.branches, a.camera, a.tracks, a.skeleton, a.messages, a.keys];
+                let a = Areas::new(window, image, (1, 2), wish).unwrap();
+                assert!(a.branch.is_some() || wish != Wish::CloseUp, "{width}x{height}");
+                let mut all = vec![a.header, a.phase, a.preview, a.branches, a.skeleton, a.messages, a.keys];
+                all.extend(a.camera_and_tracks.into_iter().flatten().chain(a.branch));
                 for (i, one) in all.iter().enumerate() {
                     assert!(!one.is_empty() && window.union(*one) == window, "{i} at {width}x{height}: {one:?}");
                     for other in &all[i + 1..] {
@@ -86,7 +132,7 @@ mod tests {
             }
         }
         for (width, height) in [(0, 0), (1, 1), (59, 60), (200, 15)] {
-            assert_eq!(Areas::new(Rect::new(0, 0, width, height), None, (1, 2)), None);
+            assert_eq!(Areas::new(Rect::new(0, 0, width, height), None, (1, 2), Wish::IfRoom), None);
         }
     }
 }

@@ -15,6 +15,7 @@ mod moving;
 mod opened;
 mod panels;
 mod placed;
+mod plot;
 mod progress;
 mod raster;
 mod screen;

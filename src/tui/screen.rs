@@ -1,8 +1,8 @@
 //! The whole screen: each panel in its place.
 
-use super::layout::{Areas, SMALLEST};
+use super::layout::{Areas, SMALLEST, Wish};
 use super::panels::preview::Preview;
-use super::panels::{branches, camera, header, help, messages, phase, preview, skeleton, tracks};
+use super::panels::{branch, branches, camera, header, help, messages, phase, preview, skeleton, tracks};
 use super::state::State;
 use super::theme::Theme;
 use ratatui::Frame;
@@ -10,7 +10,7 @@ use ratatui::Frame;
 /// Draws everything.
 pub fn render(frame: &mut Frame, state: &State, theme: Theme, picture: &mut Preview) {
     let window = frame.area();
-    let Some(areas) = Areas::new(window, Preview::image(state), picture.graphics.cell_dots) else {
+    let Some(areas) = Areas::new(window, Preview::image(state), picture.graphics.cell_dots, Wish::of(state)) else {
         picture.placed = None;
         help::too_small(frame, SMALLEST, window);
         return;
@@ -19,8 +19,13 @@ pub fn render(frame: &mut Frame, state: &State, theme: Theme, picture: &mut Prev
     phase::render(frame, state, areas.phase, theme);
     preview::render(frame, state, areas.preview, theme, picture);
     branches::render(frame, state, areas.branches, theme);
-    camera::render(frame, state, areas.camera, theme);
-    tracks::render(frame, state, areas.tracks, theme);
+    if let Some([camera, tracks]) = areas.camera_and_tracks {
+        camera::render(frame, state, camera, theme);
+        tracks::render(frame, state, tracks, theme);
+    }
+    if let Some(area) = areas.branch {
+        branch::render(frame, state, area, theme);
+    }
     skeleton::render(frame, state, areas.skeleton, theme);
     messages::render(frame, state, areas.messages, theme);
     messages::keys(frame, state, areas.keys, theme);

@@ -2,7 +2,7 @@
 
 use super::drawing::Drawing;
 use super::solid::Solid;
-use crate::model::Snapshot;
+use crate::model::{NodeName, Snapshot};
 use std::sync::Arc;
 
 /// Redraws for which the screen's own notice stays, about six seconds.
@@ -27,8 +27,10 @@ pub struct State {
     pub turned: u16,
     /// The tree's wood, while it is shown instead of its lines.
     pub solid: Option<Solid>,
-    /// The first row of the table of branches that is shown.
-    pub first_branch: usize,
+    /// The branch that the user has chosen, and its row when he did.
+    chosen: Option<(NodeName, usize)>,
+    /// The chosen branch is looked at, where there is no room for it beside all else.
+    pub close_up: bool,
     notice: Option<(String, u32)>,
 }
 
@@ -43,7 +45,6 @@ impl State {
             self.notice = None;
         }
         self.snapshot = snapshot;
-        self.first_branch = self.first_branch.min(self.snapshot.branches.len().saturating_sub(1));
         if let Some(solid) = self.solid.take() {
             self.solid = Some(self.snapshot.skeleton.as_ref().map_or_else(Solid::default, |s| solid.followed_by(s)));
         }
@@ -64,10 +65,19 @@ impl State {
         };
     }
 
-    /// Moves the table of branches by some rows.
-    pub fn scroll(&mut self, rows: i16) {
+    /// Row of the chosen branch; one that is gone with a refinement leaves its row to another.
+    pub fn chosen(&self) -> usize {
+        let rows = &self.snapshot.branches;
+        let Some((name, row)) = self.chosen else { return 0 };
+        rows.iter().position(|b| b.node == name).unwrap_or(row.min(rows.len().saturating_sub(1)))
+    }
+
+    /// Chooses the branch some rows farther down, and looks at it.
+    pub fn choose(&mut self, rows: i16) {
         let last = self.snapshot.branches.len().saturating_sub(1);
-        self.first_branch = self.first_branch.saturating_add_signed(rows.into()).min(last);
+        let row = self.chosen().saturating_add_signed(rows.into()).min(last);
+        self.chosen = self.snapshot.branches.get(row).map(|b| (b.node, row));
+        self.close_up = self.chosen.is_some();
     }
 
     /// Tells the user something that the capture does not know of.

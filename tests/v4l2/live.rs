@@ -20,8 +20,33 @@ pub const GROUP: Group = Group {
     ],
 };
 
+/// The screen without what is told of the sway, in the rows of the table of branches and in the panel of one of them: it is
+/// another thing in every run.
+fn without_sway(screen: &str) -> String {
+    let lines: Vec<Vec<char>> = screen.lines().map(|l| l.chars().collect()).collect();
+    let find = |line: &[char], what: &str| {
+        let what: Vec<char> = what.chars().collect();
+        line.windows(what.len()).position(|w| *w == what[..])
+    };
+    // The panel is between its title and those of the views; the table between the names of its columns and the messages.
+    let at = |what: &str| lines.iter().enumerate().find_map(|(row, l)| Some((row, find(l, what)?)));
+    let (Some((panel, left)), Some((views, _)), Some((head, _))) = (at(" Branch "), at(" Front "), at("ampl/px"))
+    else {
+        return screen.to_owned();
+    };
+    let messages = lines.len().saturating_sub(5);
+    let cut = |(row, line): (usize, &Vec<char>)| -> String {
+        let in_panel = row > panel && row < views;
+        let in_table = row > head && row < messages;
+        let kept = |column: usize| !(in_panel && column >= left || in_table && column < left);
+        line.iter().enumerate().map(|(column, c)| if kept(column) { *c } else { ' ' }).collect()
+    };
+    lines.iter().enumerate().map(cut).collect::<Vec<_>>().join("\n")
+}
+
 /// The screen without what changes from run to run: digits, and the drawings in the panels of pictures and curves.
 fn still(screen: &str) -> String {
+    let screen = without_sway(screen);
     let masked = screen.chars().map(|c| match c {
         '0'..='9' => '#',
         // Half blocks, blocks and braille.

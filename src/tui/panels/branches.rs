@@ -1,21 +1,27 @@
 //! The table of branches.
 
 use super::{titled, waiting};
-use crate::model::{BranchRow, Phase};
-use crate::tui::format::{count, value};
+use crate::model::{BranchRow, Phase, Snapshot, Unidentified};
+use crate::tui::format::{count, plus_minus, value};
 use crate::tui::state::State;
 use crate::tui::theme::Theme;
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Rect};
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::style::Style;
 use ratatui::text::{Line, Span};
-use ratatui::widgets::{Row, Table};
 
 /// A wider table would be harder to read along a line; there are as many side by side as there is room for.
-const WIDEST: u16 = 48;
-/// Names and widths of the columns after the first.
-const COLUMNS: [(&str, u16); 4] = [("lvl", 3), ("pts", 5), ("ampl/px", 7), ("f/Hz", 5)];
+const WIDEST: u16 = 52;
+/// Width of a value with its interval.
+const SURE: usize = 13;
+/// What stands between the name and the sway: name and width of the columns, where there is room for all.
+const COLUMNS: [(&str, usize); 3] = [("lvl", 3), ("pts", 5), ("ampl/px", 7)];
+/// A narrower table says the level in words, as there is no room for the names of columns beside the title.
+const ALL_FROM: u16 = 50;
+/// With so many lines one can be spared for the names of the columns.
+const NAMED_FROM: usize = 8;
 
-/// One line for each branch as far as there is room; the title says how many there are.
+/// One line for each branch as far as there is room, the chosen one among them; the title says how many there are.
 pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
     let s = &state.snapshot;
     let total = s.branches.len();
@@ -28,48 +34,101 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         waiting(frame, inner, text, theme);
         return;
     }
-    let height = area.height.saturating_sub(1) as usize;
+    let mut height = area.height.saturating_sub(1).max(1) as usize;
     let room = (area.width / (WIDEST + 2)).max(1) as usize;
-    let tables = room.min(total.div_ceil(height.max(1)));
+    let tables = room.min(total.div_ceil(height));
+    // Beside the title there is hardly ever room for the names of all columns.
+    let named_below = tables == 1 && height >= NAMED_FROM && area.width >= ALL_FROM;
+    height -= usize::from(named_below);
     let shown = total.min(tables * height);
-    let first = if total > shown { state.first_branch.min(total - 1) } else { 0 };
-    let title = match first {
-        0 if total > shown => format!("Branches, {shown} of {total}"),
-        0 => format!("Branches, {total}"),
-        _ => format!("Branches, {}–{} of {total}", first + 1, (first + shown).min(total)),
+    let chosen = state.chosen().min(total - 1);
+    let first = chosen.saturating_sub(shown / 2).min(total - shown);
+    let title = match total > shown {
+        true => format!("Branches, {}–{} of {total}", first + 1, first + shown),
+        false => format!("Branches, {total}"),
     };
-    let below = titled(frame, area, &title, theme);
-    for (i, rows) in s.branches[first..].chunks(height.max(1)).take(tables).enumerate() {
+    let mut below = titled(frame, area, &title, theme);
+    if named_below {
+        let [line, rest] = Layout::vertical([Constraint::Length(1), Constraint::Min(1)]).areas(below);
+        names(frame, Rect { width: line.width.min(WIDEST), ..line }, 0, theme);
+        below = rest;
+    }
+    for (i, rows) in s.branches[first..].chunks(height).take(tables).enumerate() {
         let x = below.x + i as u16 * (WIDEST + 2);
         let place = Rect { x, width: (below.right() - x).min(WIDEST), ..below };
-        let taken = if i == 0 { title.chars().count() as u16 + 3 } else { 0 };
-        names(frame, Rect { y: area.y, height: 1, ..place }, taken, theme);
-        table(frame, rows, place, theme);
+        if !named_below {
+            let taken = if i == 0 { title.chars().count() as u16 + 3 } else { 0 };
+            names(frame, Rect { y: area.y, height: 1, ..place }, taken, theme);
+        }
+        for ((k, row), line) in rows.iter().enumerate().zip(place.rows()) {
+            let marked = first + i * height + k == chosen;
+            frame.render_widget(branch(s, row, marked, place.width, theme), line);
+        }
     }
 }
 
-fn table(frame: &mut Frame, rows: &[BranchRow], area: Rect, theme: Theme) {
-    let right = |text: String| Line::from(text).right_aligned();
-    let rows = rows.iter().map(|b| {
-        let colour = theme.branch(b.colour);
-        Row::new([
-            Line::from(vec![Span::styled(" ● ", colour), Span::raw(b.node.0.to_string())]),
-            right(b.level.to_string()),
-            right(count(b.n_tracks.into())),
-            right(value(b.amplitude_px)),
-            right(b.frequency_hz.map_or("–".to_owned(), value)),
-        ])
-    });
-    let widths = [Constraint::Min(6)].into_iter().chain(COLUMNS.map(|(_, width)| Constraint::Length(width)));
-    frame.render_widget(Table::new(rows, widths).column_spacing(1), area);
+fn branch(s: &Snapshot, b: &BranchRow, marked: bool, width: u16, theme: Theme) -> Line<'static> {
+    let middle = if width >= ALL_FROM {
+        let cells = [b.level.to_string(), count(b.n_tracks.into()), value(b.amplitude_px)];
+        cells.iter().zip(COLUMNS).map(|(text, (_, width))| format!(" {text:>width$}")).collect()
+    } else {
+        format!("  level {}", b.level)
+    };
+    let (sway, style) = sway(s, b, theme);
+    let name = b.node.0.to_string();
+    let used = name.chars().count() + middle.chars().count() + 2 * (SURE + 1) + 3;
+    let gap = " ".repeat((width as usize).saturating_sub(used));
+    // In a narrow table the level follows the name, else all columns keep to the right.
+    let (before, after) = if width >= ALL_FROM { (gap, String::new()) } else { (String::new(), gap) };
+    let style_of_name = if marked { theme.strong() } else { Style::new() };
+    Line::from(vec![
+        Span::styled(if marked { "▸" } else { " " }, theme.title()),
+        Span::styled("● ", theme.branch(b.colour)),
+        Span::styled(name, style_of_name),
+        Span::raw(format!("{before}{middle}{after}")),
+        Span::styled(sway, style),
+    ])
 }
 
-/// The columns' names lie on the rule, beside the title: a line saved is a branch shown.
+/// Frequency and damping with half their intervals, or why there are none.
+fn sway(s: &Snapshot, b: &BranchRow, theme: Theme) -> (String, Style) {
+    const WIDTH: usize = 2 * (SURE + 1);
+    match s.sway.as_ref().and_then(|sway| sway.branches.get(&b.node)).map(|branch| branch.swaying) {
+        Some(Ok(sway)) => {
+            let damping = sway.damping_ratio.map_or_else(|| "–".to_owned(), |d| plus_minus(&d));
+            (format!(" {:>SURE$} {damping:>SURE$}", plus_minus(&sway.frequency_hz)), theme.strong())
+        }
+        Some(Err(why)) => (format!("{:>WIDTH$}", in_short(why)), theme.faint()),
+        None => (format!(" {:>SURE$} {:>SURE$}", "–", "–"), theme.faint()),
+    }
+}
+
+/// Two or three words; the branch's own panel has them all.
+fn in_short(why: Unidentified) -> &'static str {
+    match why {
+        Unidentified::NotMeasured => "not measured",
+        Unidentified::TooShort => "film too short",
+        Unidentified::TooLittleMotion => "too little motion",
+        Unidentified::AncestorsSway => "moves as its carrier",
+        Unidentified::AboveSampling => "too fast for the frames",
+        Unidentified::NoOscillation => "no oscillation",
+        Unidentified::TooUncertain => "too uncertain",
+    }
+}
+
+/// The columns' names, as many from the right as there is room for. On the rule, beside the title, they cost no line.
 fn names(frame: &mut Frame, area: Rect, taken: u16, theme: Theme) {
-    let names = COLUMNS.iter().map(|(name, width)| format!(" {name:>0$}", *width as usize)).collect::<String>() + " ";
-    let width = names.chars().count() as u16;
-    if taken + width <= area.width.saturating_add(1) {
-        let area = Rect { x: area.right() + 1 - width, width, ..area };
-        frame.render_widget(Line::styled(names, theme.faint()), area);
+    let mut names: Vec<(&str, usize)> = if area.width >= ALL_FROM { COLUMNS.to_vec() } else { Vec::new() };
+    names.extend([("f/Hz", SURE), ("damping", SURE)]);
+    let mut end = area.right();
+    for (name, width) in names.into_iter().rev() {
+        let own = name.chars().count() as u16;
+        let start = end.saturating_sub(own);
+        if start < area.x + taken + 1 {
+            break;
+        }
+        let place = Rect { x: start.saturating_sub(1), width: own + 2, ..area }.intersection(frame.area());
+        frame.render_widget(Line::styled(format!(" {name} "), theme.faint()), place);
+        end = end.saturating_sub(width as u16 + 1);
     }
 }

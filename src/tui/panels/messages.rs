@@ -1,7 +1,7 @@
 //! The last lines: what the program has to say, and the keys.
 
 use crate::tui::format::wrap;
-use crate::tui::input::{DRAWING, WATCHING};
+use crate::tui::input::{Action, DRAWING, WATCHING};
 use crate::tui::state::State;
 use crate::tui::theme::Theme;
 use ratatui::Frame;
@@ -43,7 +43,16 @@ pub fn keys(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
             let drawing = DRAWING.iter().filter(|b| !b.short.is_empty()).map(|b| (b.shown, b.short));
             key_line(frame, std::iter::once(("click", "set")).chain(drawing), area, theme);
         }
-        None => key_line(frame, WATCHING.iter().map(|b| (b.shown, b.short)), area, theme),
+        None => {
+            let useful = |action: Action| match action {
+                Action::Build => state.snapshot.skeleton.is_none(),
+                Action::Turn(_) | Action::Mesh => state.snapshot.skeleton.is_some(),
+                Action::Choose(_) => !state.snapshot.branches.is_empty(),
+                _ => true,
+            };
+            let keys = WATCHING.iter().filter(|b| useful(b.action)).map(|b| (b.shown, b.short));
+            key_line(frame, keys, area, theme);
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! One file for each panel; each draws a part of the state into its area and changes nothing.
 
+pub mod branch;
 pub mod branches;
 pub mod camera;
 pub mod header;

@@ -43,7 +43,7 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         }
         let camera = extent.camera(view, unit, room);
         match state.solid.as_ref().and_then(|solid| solid.picture(s, &camera, theme)) {
-            None => lines(frame, &branches(s, skeleton, theme), &camera, room),
+            None => lines(frame, &branches(state, skeleton, theme), &camera, room),
             Some(picture) => {
                 for (at, cell) in room.positions().zip(braille(&picture)) {
                     if let (Some((letter, rgb)), Some(onto)) = (cell, frame.buffer_mut().cell_mut(at)) {
@@ -78,8 +78,11 @@ fn lines(frame: &mut Frame, branches: &[(Point3<f64>, Point3<f64>, Color)], came
     frame.render_widget(canvas, room);
 }
 
-/// Branches as lines: the copies first, so that what was measured lies on top.
-fn branches(s: &Snapshot, skeleton: &Skeleton, theme: Theme) -> Vec<(Point3<f64>, Point3<f64>, Color)> {
+/// Branches as lines: the copies first, so that what was measured lies on top; at the very top the chosen one, in the
+/// colour of text, which is none of the branches'.
+fn branches(state: &State, skeleton: &Skeleton, theme: Theme) -> Vec<(Point3<f64>, Point3<f64>, Color)> {
+    let s = &state.snapshot;
+    let chosen = s.branches.get(state.chosen()).map(|b| b.node);
     let pose = s.pose.as_deref().filter(|pose| pose.joints.len() == skeleton.nodes.len());
     let at = |i: usize| match pose {
         Some(pose) => pose.joints.get(i).map(|j| j.position),
@@ -87,6 +90,7 @@ fn branches(s: &Snapshot, skeleton: &Skeleton, theme: Theme) -> Vec<(Point3<f64>
     };
     let mut copies = Vec::new();
     let mut measured = Vec::new();
+    let mut top = None;
     for (i, node) in skeleton.nodes.iter().enumerate() {
         let Some((Some(from), Some(to))) = node.parent.map(|p| (at(p.index()), at(i))) else { continue };
         if !from.coords.iter().chain(to.coords.iter()).all(|c| c.is_finite()) {
@@ -94,11 +98,12 @@ fn branches(s: &Snapshot, skeleton: &Skeleton, theme: Theme) -> Vec<(Point3<f64>
         }
         let branch = s.node_colour.get(i).copied().flatten();
         match node.copy_of {
+            None if Some(node.name) == chosen => top = Some((from, to, Color::Reset)),
             Some(_) => copies.push((from, to, theme.branch_faded(branch))),
             None => measured.push((from, to, theme.branch(branch))),
         }
     }
-    copies.extend(measured);
+    copies.extend(measured.into_iter().chain(top));
     copies
 }
 

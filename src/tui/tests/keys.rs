@@ -1,7 +1,7 @@
 //! What keys and clicks do.
 
 use super::made_up::snapshot;
-use crate::model::{Control, Phase, Size, Snapshot};
+use crate::model::{Control, NodeName, Phase, Size, Snapshot};
 use crate::tui::input::handle;
 use crate::tui::placed::Placed;
 use crate::tui::state::State;
@@ -153,14 +153,38 @@ fn the_tree_turns_all_the_way_round_and_shows_its_wood() {
 }
 
 #[test]
-fn the_table_of_branches_scrolls_as_far_as_it_goes() {
-    let first = |keys: &str| play(None, &keys.chars().map(letter).collect::<Vec<_>>()).state.first_branch;
-    assert_eq!([first("jj"), first("k"), first("jjjk"), first(&"j".repeat(50))], [2, 0, 2, 9]);
-    // A tree with fewer branches.
-    let mut run = play(None, &[letter('j'), letter('j'), letter('j')]);
+fn the_chosen_branch_goes_up_and_down_and_outlives_a_refinement() {
+    let run = |keys: &str| play(None, &keys.chars().map(letter).collect::<Vec<_>>()).state;
+    let chosen = |keys: &str| run(keys).chosen();
+    assert_eq!([chosen(""), chosen("jj"), chosen("k"), chosen("jjjk"), chosen(&"j".repeat(50))], [0, 2, 0, 2, 9]);
+    // The tree is refined: the branch is in another row.
+    let mut state = run("jjj");
+    let mut moved = snapshot(Phase::Live);
+    moved.branches.remove(1);
+    state.take(Arc::new(moved));
+    assert_eq!(state.snapshot.branches[state.chosen()].node, NodeName(4));
+    // It is gone, and so are most: another one takes its row.
     let fewer = snapshot(Phase::Live).branches[..2].to_vec();
-    run.state.take(Arc::new(Snapshot { branches: fewer, ..snapshot(Phase::Live) }));
-    assert_eq!(run.state.first_branch, 1);
+    state.take(Arc::new(Snapshot { branches: fewer, ..snapshot(Phase::Live) }));
+    assert_eq!(state.chosen(), 1);
+}
+
+#[test]
+fn choosing_a_branch_looks_at_it_and_esc_looks_away() {
+    let esc = || key(KeyCode::Esc);
+    for (events, close_up) in [
+        (vec![], false),
+        (vec![letter('j')], true),
+        (vec![key(KeyCode::Up)], true),
+        (vec![letter('j'), esc()], false),
+        // The help goes first.
+        (vec![letter('j'), letter('?'), esc()], true),
+        (vec![letter('j'), letter('q'), esc()], false),
+    ] {
+        assert_eq!(play(None, &events).state.close_up, close_up, "{events:?}");
+    }
+    let mut empty = State::default();
+    assert!(handle(&letter('j'), &mut empty, None).is_none() && !empty.close_up);
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! States of a capture that never was.
 
 use crate::model::{
-    BranchRow, FormatNote, JointPose, Node, NodeId, NodeName, Phase, Pose, Rgb, Size, Skeleton, Snapshot,
+    AngleSpectrum, Angles, BranchRow, BranchSway, Excitation, FormatNote, Interval, JointPose, Node, NodeId, NodeName,
+    Phase, Pose, Rgb, Size, Skeleton, Snapshot, Sway, SwayNow, Unidentified,
 };
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use std::sync::Arc;
@@ -92,15 +93,53 @@ pub fn snapshot(phase: Phase) -> Snapshot {
                 level: skeleton.nodes[node as usize].level,
                 n_tracks: 312 / node,
                 amplitude_px: 0.4 * node as f64,
-                frequency_hz: (node != 4).then_some(0.31 + 0.07 * node as f64),
             })
             .collect();
+        s.sway = Some(Arc::new(sway()));
+        s.angles = angles();
         s.pose = Some(Arc::new(pose(&skeleton)));
         s.skeleton = Some(Arc::new(skeleton));
         s.node_colour = Arc::new(node_colour.to_vec());
         s.progress = 1.0;
     }
     s
+}
+
+/// Ten branches, of which some have no frequency, for every reason that there is.
+pub fn sway() -> SwayNow {
+    let about = |value: f64, share: f64| Interval { value, lo: value * (1.0 - share), hi: value * (1.0 + share) };
+    let known = |node: u32| Sway {
+        frequency_hz: about(0.31 + 0.11 * f64::from(node), 0.001 * f64::from(node * node)),
+        damping_ratio: (node != 2).then(|| about(0.02 + 0.003 * f64::from(node), 0.2)),
+        excitation: Excitation::Release,
+        amplitude_deg: 0.7 * f64::from(node),
+    };
+    let branch = |node: u32| {
+        let swaying = match node {
+            1..=3 => Ok(known(node)),
+            _ => Err(Unidentified::ALL[node as usize - 4]),
+        };
+        let at = |hz: f64| swaying.map_or(0.1, |s| 0.1 + 1.0 / (1.0 + (40.0 * (hz - s.frequency_hz.value)).powi(2)));
+        let amplitude_deg = (0..160).map(|k| at(f64::from(k) / 32.0) as f32 + if k < 3 { 2.0 } else { 0.0 }).collect();
+        (NodeName(node), BranchSway { swaying, spectrum: Some(AngleSpectrum { bin_hz: 1.0 / 32.0, amplitude_deg }) })
+    };
+    SwayNow {
+        frame: 1200,
+        time_s: 40.0,
+        span_s: 40.0,
+        excitation: Some(Excitation::Release),
+        branches: (1..11).map(branch).collect(),
+    }
+}
+
+/// Ten branches that sway a little faster each.
+fn angles() -> Angles {
+    let row = |k: u32| {
+        let t = 21.1 + f64::from(k) / 30.0;
+        let at = |node: u32| 10.0 * f64::from(node) + 4.0 * (f64::from(node) * 0.4 * std::f64::consts::TAU * t).sin();
+        (t, (1..11).map(|node| at(node) as f32).collect())
+    };
+    Angles { nodes: (1..11).map(NodeName).collect(), rows: (0..601).map(row).collect() }
 }
 
 /// A capture that has gone on for ages and whose every number is out of hand.
@@ -130,9 +169,17 @@ pub fn huge() -> Snapshot {
             level: 255,
             n_tracks: u32::MAX,
             amplitude_px: 1e300,
-            frequency_hz: Some(f64::NAN),
         })
         .collect();
+    let mut sway = sway();
+    let mad = Interval { value: 1e300, lo: f64::NEG_INFINITY, hi: f64::NAN };
+    let all =
+        Sway { frequency_hz: mad, damping_ratio: Some(mad), excitation: Excitation::Wind, amplitude_deg: f64::NAN };
+    let spectrum = AngleSpectrum { bin_hz: 0.0, amplitude_deg: vec![f32::NAN, f32::INFINITY, -1.0] };
+    sway.branches = [(NodeName(u32::MAX), BranchSway { swaying: Ok(all), spectrum: Some(spectrum) })].into();
+    s.sway = Some(Arc::new(sway));
+    let rows = [f32::NAN, f32::INFINITY, 1e30, -1e30].into_iter().zip(0..).map(|(x, t)| (f64::from(t), [x].into()));
+    s.angles = Angles { nodes: [NodeName(u32::MAX)].into(), rows: rows.collect() };
     let mut skeleton = skeleton();
     skeleton.nodes[3].position.x = f64::NAN;
     skeleton.nodes[4].position.y = 1e300;

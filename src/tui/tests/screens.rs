@@ -1,7 +1,7 @@
 //! What the whole screen looks like, and that nothing brings it down.
 
 use super::made_up::{huge, snapshot};
-use crate::model::{CameraState, Phase, Rgb, Size, Skeleton, Snapshot};
+use crate::model::{CameraState, Phase, Rgb, Size, Skeleton, Snapshot, Unidentified};
 use crate::tui::graphics::Graphics;
 use crate::tui::panels::preview::Preview;
 use crate::tui::screen;
@@ -36,14 +36,21 @@ fn cases() -> Vec<(&'static str, State)> {
     cases.push(("help", help));
     let mut turned = state(snapshot(Phase::Live));
     turned.turn(-2);
-    turned.scroll(3);
+    turned.choose(9);
+    turned.close_up = false;
     cases.push(("turned", turned));
+    for (name, row, sway_passed_over) in [("branch", 2, 0), ("branch_unknown", 6, 12)] {
+        let mut close = state(Snapshot { sway_passed_over, ..snapshot(Phase::Live) });
+        close.choose(row);
+        cases.push((name, close));
+    }
     let mut mesh = state(snapshot(Phase::Live));
     mesh.switch_mesh();
     cases.push(("mesh", mesh));
     let mut mesh = state(huge());
     mesh.switch_mesh();
     mesh.turn(5);
+    mesh.choose(0);
     cases.push(("huge_mesh", mesh));
     let mut drawing = state(snapshot(Phase::Accumulate));
     let polygon = drawing.drawing.get_or_insert_default();
@@ -107,6 +114,26 @@ fn no_state_and_no_size_brings_it_down() {
                 println!("case {i} at {width}x{height}");
                 drawn(state, depth, width, height);
             }
+        }
+    }
+}
+
+/// Every reason why a branch has no frequency is told in words, and no number stands in its place.
+#[test]
+fn an_unknown_sway_is_told_by_its_reason() {
+    for (row, why) in Unidentified::ALL.into_iter().enumerate() {
+        let mut state = state(snapshot(Phase::Live));
+        state.choose(row as i16 + 3);
+        for (width, height) in [(80, 24), (120, 40)] {
+            let screen = drawn(&state, Depth::None, width, height).to_string();
+            let right: Vec<String> =
+                screen.lines().map(|l| l.chars().skip(width as usize * 58 / 100).collect()).collect();
+            let text = right.join(" ").split_whitespace().collect::<Vec<_>>().join(" ").replace("\" ", "");
+            let told = format!("no frequency: {why}");
+            let words = told.split(' ').collect::<Vec<_>>();
+            let at = text.find("no frequency:").unwrap_or_else(|| panic!("{why}: {screen}"));
+            assert!(words.iter().all(|w| text[at..].contains(w)), "{told}: {screen}");
+            assert!(!text.contains('±'), "{screen}");
         }
     }
 }

@@ -1,0 +1,268 @@
+//! The sway is told anew again and again on a thread of its own, while the film goes on.
+//!
+//! A request is made when so much film has passed, and its result takes effect when the next one is due: at a moment of
+//! film, not of the clock. A fast replay waits for it there, so that the same recording gives the same answers at the same
+//! frames whatever the machine. A camera, or a recording at its own pace, waits for nobody: what is not ready is looked at
+//! again when the next one is due, and the request that finds the thread busy is passed over and counted. The thread then
+//! stands back for all others.
+
+use super::pulse::Worker;
+use super::shared::Shared;
+use crate::config::Dynamics;
+use crate::dynamics::{FilmLog, analyse_with, spectrum};
+use crate::model::{AngleSpectrum, Angles, BranchSway, NodeId, NodeName, Skeleton, SwayNow, TrackId, Unidentified};
+use crossbeam_channel::{Receiver, RecvTimeoutError, SendTimeoutError, Sender, TryRecvError, bounded};
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// A wait is broken off by a wish to stop within this time.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
+
+/// All that an analysis needs, apart from everything that goes on meanwhile.
+pub struct Request {
+    /// The newest frame and its time, s.
+    pub frame: u64,
+    pub time_s: f64,
+    pub skeleton: Arc<Skeleton>,
+    pub log: FilmLog,
+    /// The deepest node of every point that counts.
+    pub nodes: BTreeMap<TrackId, NodeId>,
+    pub angles: Angles,
+    pub settings: Dynamics,
+}
+
+/// Works a request off; calls what it is given again and again, as a sign of life, which may end it from within.
+pub type Analyser = fn(&Request, &dyn Fn()) -> SwayNow;
+
+/// A request on its way to the thread.
+struct Errand {
+    request: Request,
+    wanted: Arc<AtomicBool>,
+    answer: Sender<SwayNow>,
+}
+
+/// A request that has been made; dropped, it is given up.
+struct Pending {
+    wanted: Arc<AtomicBool>,
+    answer: Receiver<SwayNow>,
+}
+
+impl Drop for Pending {
+    fn drop(&mut self) {
+        self.wanted.store(false, Ordering::Relaxed);
+    }
+}
+
+/// What a request that is given up unwinds with.
+struct GivenUp;
+
+/// The thread, and when it is asked.
+pub struct Swaying {
+    every_s: f64,
+    /// Results are waited for where they are due.
+    waits: bool,
+    analyser: Analyser,
+    shared: Arc<Shared>,
+    thread: Option<(Sender<Errand>, JoinHandle<()>)>,
+    pending: Option<Pending>,
+    /// Time of film at which the next request is due, s.
+    next_s: f64,
+    passed_over: u64,
+}
+
+impl Swaying {
+    /// Asks every `every_s` seconds of film, never if that is 0.
+    pub fn new(every_s: f64, waits: bool, analyser: Analyser, shared: Arc<Shared>) -> Self {
+        let next_s = f64::NEG_INFINITY;
+        Self { every_s, waits, analyser, shared, thread: None, pending: None, next_s, passed_over: 0 }
+    }
+
+    /// How often a request was due and the thread was busy.
+    pub fn passed_over(&self) -> u64 {
+        self.passed_over
+    }
+
+    /// Forgets what is under way.
+    pub fn restart(&mut self) {
+        (self.pending, self.next_s) = (None, f64::NEG_INFINITY);
+    }
+
+    /// At the frame of this time: the result that takes effect with it, if there is one, and the next request, if one is
+    /// due.
+    pub fn step(&mut self, time_s: f64, request: impl FnOnce() -> Request) -> Option<SwayNow> {
+        if self.every_s <= 0.0 || time_s < self.next_s || self.shared.hurry.load(Ordering::Relaxed) {
+            return None;
+        }
+        self.next_s = time_s + self.every_s;
+        let found = self.take();
+        if self.pending.is_some() {
+            self.passed_over += 1;
+        } else {
+            self.ask(request());
+        }
+        found
+    }
+
+    /// The result of the last request, if it is there or waited for.
+    fn take(&mut self) -> Option<SwayNow> {
+        let pending = self.pending.take()?;
+        loop {
+            // Without a thread any more there is nothing to come either.
+            match if self.waits { pending.answer.recv_timeout(LOOK_EVERY) } else { look(&pending.answer) } {
+                Ok(found) => return Some(found),
+                Err(RecvTimeoutError::Disconnected) => return None,
+                Err(RecvTimeoutError::Timeout) if self.shared.hurry.load(Ordering::Relaxed) => return None,
+                Err(RecvTimeoutError::Timeout) if self.waits => {}
+                Err(RecvTimeoutError::Timeout) => {
+                    self.pending = Some(pending);
+                    return None;
+                }
+            }
+        }
+    }
+
+    fn ask(&mut self, request: Request) {
+        let Some(errands) = self.errands() else { return };
+        let (answer, answered) = bounded(1);
+        let wanted = Arc::new(AtomicBool::new(true));
+        let errand = Errand { request, wanted: wanted.clone(), answer };
+        let pending = Pending { wanted, answer: answered };
+        // Full only while one that was given up is not over, and another one waits behind it.
+        let sent = if self.waits { send(&errands, errand, &self.shared) } else { errands.try_send(errand).is_ok() };
+        if sent {
+            self.pending = Some(pending);
+        } else {
+            self.passed_over += 1;
+        }
+    }
+
+    /// The way to the thread, which is started for the first request.
+    fn errands(&mut self) -> Option<Sender<Errand>> {
+        if self.thread.is_none() {
+            let (errands, queue) = bounded(1);
+            let (analyser, shared, waited_for) = (self.analyser, self.shared.clone(), self.waits);
+            let run = move || {
+                if !waited_for {
+                    stand_back();
+                }
+                work(&queue, analyser, &shared);
+            };
+            match std::thread::Builder::new().name("sway".into()).spawn(run) {
+                Ok(thread) => self.thread = Some((errands, thread)),
+                Err(e) => {
+                    self.shared.warn(format!("the sway is told only at the end: a thread cannot be started: {e}"));
+                    self.every_s = 0.0;
+                }
+            }
+        }
+        self.thread.as_ref().map(|(errands, _)| errands.clone())
+    }
+
+    /// Gives up what is under way; the thread ends by itself, within a branch.
+    pub fn end(&mut self) -> Ending {
+        self.pending = None;
+        self.every_s = 0.0;
+        Ending(self.thread.take().map(|(_, thread)| thread))
+    }
+}
+
+/// A thread that has nothing more to do.
+#[must_use]
+pub struct Ending(Option<JoinHandle<()>>);
+
+impl Ending {
+    /// Whether it has ended by a panic. One that has not come to its end is not waited for.
+    pub fn panicked(self) -> bool {
+        self.0.filter(JoinHandle::is_finished).is_some_and(|thread| thread.join().is_err())
+    }
+}
+
+/// Waits until there is room, unless somebody wants the end; whether it was sent.
+fn send(errands: &Sender<Errand>, mut errand: Errand, shared: &Shared) -> bool {
+    loop {
+        match errands.send_timeout(errand, LOOK_EVERY) {
+            Ok(()) => return true,
+            Err(SendTimeoutError::Timeout(back)) if !shared.hurry.load(Ordering::Relaxed) => errand = back,
+            Err(_) => return false,
+        }
+    }
+}
+
+fn look(answer: &Receiver<SwayNow>) -> Result<SwayNow, RecvTimeoutError> {
+    answer.try_recv().map_err(|e| match e {
+        TryRecvError::Empty => RecvTimeoutError::Timeout,
+        TryRecvError::Disconnected => RecvTimeoutError::Disconnected,
+    })
+}
+
+/// Lets all other threads go first where there is too little processor for all. Where that is refused, it is not needed for
+/// the result.
+fn stand_back() {
+    const NICE: libc::c_int = 10;
+    // SAFETY: it takes numbers only; 0 is the calling thread, as Linux has it.
+    let _ = unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, NICE) };
+}
+
+/// The thread: one request after the other until nobody has any.
+fn work(queue: &Receiver<Errand>, analyser: Analyser, shared: &Shared) {
+    for Errand { request, wanted, answer } in queue {
+        let pulse = &shared.pulse;
+        pulse.give(Worker::Sway);
+        let alive = || {
+            pulse.give(Worker::Sway);
+            pulse.done(Worker::Sway);
+            if !wanted.load(Ordering::Relaxed) {
+                // Silent, unlike a panic: no hook hears of it.
+                resume_unwind(Box::new(GivenUp));
+            }
+        };
+        let found = catch_unwind(AssertUnwindSafe(|| {
+            alive();
+            analyser(&request, &alive)
+        }));
+        pulse.done(Worker::Sway);
+        match found {
+            // Nobody may be waiting any more.
+            Ok(found) => drop(answer.send(found)),
+            Err(why) if why.is::<GivenUp>() => {}
+            Err(panic) => resume_unwind(panic),
+        }
+    }
+}
+
+/// The sway of every branch, and the spectra of the angles.
+pub fn analyse(request: &Request, alive: &dyn Fn()) -> SwayNow {
+    let Request { skeleton, settings, angles, .. } = request;
+    let film = request.log.film(skeleton, |id| request.nodes.get(&id).copied());
+    alive();
+    let analysis = analyse_with(skeleton, &film, settings, alive);
+    let branch = |(i, name): (usize, &NodeName)| {
+        // The foot is no branch.
+        let swaying = analysis.sway.get(i + 1).copied().unwrap_or(Err(Unidentified::NotMeasured));
+        (*name, BranchSway { swaying, spectrum: spectrum_of(angles, *name, settings.highest_hz) })
+    };
+    SwayNow {
+        frame: request.frame,
+        time_s: request.time_s,
+        span_s: film.span_s(),
+        excitation: analysis.onset.map(|o| o.excitation),
+        branches: angles.nodes.iter().enumerate().map(branch).collect(),
+    }
+}
+
+/// Up to `highest_hz`.
+fn spectrum_of(angles: &Angles, node: NodeName, highest_hz: f64) -> Option<AngleSpectrum> {
+    let (times, values): (Vec<f64>, Vec<f64>) = angles.of(node).unzip();
+    let whole = spectrum(&times, &values)?;
+    let bins = (highest_hz / whole.bin_hz).ceil() as usize + 1;
+    let amplitude_deg = whole.amplitude.into_iter().take(bins).map(|a| a as f32).collect();
+    Some(AngleSpectrum { bin_hz: whole.bin_hz, amplitude_deg })
+}
+
+#[cfg(test)]
+#[path = "tests/swaying.rs"]
+mod tests;

@@ -1,0 +1,161 @@
+//! When a sway is asked for and told: with analysers whose slowness is known.
+
+use super::*;
+use std::time::Instant;
+
+/// What hangs has not come back after so long.
+const HANGS: Duration = Duration::from_secs(20);
+
+fn request(time_s: f64) -> Request {
+    Request {
+        frame: (30.0 * time_s).round() as u64,
+        time_s,
+        skeleton: Arc::new(Skeleton {
+            nodes: Vec::new(),
+            foot_px: [0.0; 2],
+            image_size: crate::model::Size::new(64, 64),
+        }),
+        log: FilmLog::new(10.0),
+        nodes: BTreeMap::new(),
+        angles: Angles::default(),
+        settings: Dynamics::default(),
+    }
+}
+
+fn answer(request: &Request) -> SwayNow {
+    SwayNow { frame: request.frame, time_s: request.time_s, ..SwayNow::default() }
+}
+
+fn at_once(request: &Request, alive: &dyn Fn()) -> SwayNow {
+    alive();
+    answer(request)
+}
+
+fn slow(request: &Request, alive: &dyn Fn()) -> SwayNow {
+    for _ in 0..30 {
+        std::thread::sleep(Duration::from_millis(10));
+        alive();
+    }
+    answer(request)
+}
+
+/// Slower than the machine that looks at it, however busy that is.
+fn very_slow(request: &Request, alive: &dyn Fn()) -> SwayNow {
+    for _ in 0..300 {
+        std::thread::sleep(Duration::from_millis(10));
+        alive();
+    }
+    answer(request)
+}
+
+fn endless(_: &Request, alive: &dyn Fn()) -> SwayNow {
+    loop {
+        std::thread::sleep(Duration::from_millis(5));
+        alive();
+    }
+}
+
+fn of(analyser: Analyser, waits: bool) -> (Swaying, Arc<Shared>) {
+    let shared = Arc::new(Shared::default());
+    (Swaying::new(1.0, waits, analyser, shared.clone()), shared)
+}
+
+/// Steps through a film of 30 frames a second; the answers, with the frame at which each took effect.
+fn film(swaying: &mut Swaying, frames: std::ops::Range<u64>) -> Vec<(u64, u64)> {
+    let mut told = Vec::new();
+    for frame in frames {
+        let time_s = frame as f64 / 30.0;
+        told.extend(swaying.step(time_s, || request(time_s)).map(|found| (frame, found.frame)));
+    }
+    told
+}
+
+/// Waits for the thread to be over; fails if it is not.
+fn over(mut swaying: Swaying) {
+    let began = Instant::now();
+    let Ending(thread) = swaying.end();
+    while thread.as_ref().is_some_and(|t| !t.is_finished()) {
+        assert!(began.elapsed() < HANGS, "the thread goes on");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    assert!(!Ending(thread).panicked(), "giving up is no panic");
+}
+
+/// The same recording gives the same answers in the same frames, however slow the machine is.
+#[test]
+fn a_replay_waits_for_every_answer_where_it_is_due() {
+    for analyser in [at_once as Analyser, slow] {
+        let (mut swaying, _) = of(analyser, true);
+        assert_eq!(film(&mut swaying, 0..130), [(30, 0), (60, 30), (90, 60), (120, 90)]);
+        assert_eq!(swaying.passed_over(), 0);
+    }
+}
+
+#[test]
+fn a_camera_waits_for_no_answer_and_what_is_passed_over_is_counted() {
+    let (mut swaying, _) = of(very_slow, false);
+    let began = Instant::now();
+    assert_eq!(film(&mut swaying, 0..151), [], "nothing is ready so soon");
+    assert!(began.elapsed() < Duration::from_secs(1), "151 frames took {:?}", began.elapsed());
+    assert_eq!(swaying.passed_over(), 5, "one at each second after the first");
+    let began = Instant::now();
+    let mut frame = 151;
+    let told = loop {
+        assert!(began.elapsed() < HANGS, "never told");
+        std::thread::sleep(Duration::from_millis(20));
+        let told = film(&mut swaying, frame..frame + 30);
+        frame += 30;
+        if !told.is_empty() {
+            break told;
+        }
+    };
+    // It is told at a moment at which one is due, and is from the frame in which it was asked for.
+    assert_eq!((told.len(), told[0].0 % 30, told[0].1), (1, 0, 0));
+    over(swaying);
+}
+
+/// Who asks for the end must not wait for an analysis, and nothing of it goes on afterwards.
+#[test]
+fn a_wish_to_stop_breaks_a_wait_off() {
+    let (mut swaying, shared) = of(endless, true);
+    let wish = std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_millis(50));
+        shared.stop_at_once();
+    });
+    let began = Instant::now();
+    assert_eq!(film(&mut swaying, 0..200), []);
+    assert!(began.elapsed() < HANGS);
+    wish.join().expect("the wish");
+    over(swaying);
+}
+
+/// An answer about the points from before a restart would be told of other branches.
+#[test]
+fn a_restart_forgets_what_is_under_way() {
+    let (mut swaying, _) = of(slow, true);
+    assert_eq!(film(&mut swaying, 0..10), []);
+    swaying.restart();
+    assert_eq!(film(&mut swaying, 300..340), [(330, 300)]);
+    over(swaying);
+}
+
+#[test]
+fn without_an_interval_nobody_is_asked() {
+    let shared = Arc::new(Shared::default());
+    let mut swaying = Swaying::new(0.0, true, |_, _| panic!("asked"), shared);
+    assert_eq!(film(&mut swaying, 0..200), []);
+    over(swaying);
+}
+
+/// The capture goes on without it, and the end says that something is wrong.
+#[test]
+fn a_panic_is_not_waited_for() {
+    let (mut swaying, _) = of(|_, _| resume_unwind(Box::new("broken")), true);
+    assert_eq!(film(&mut swaying, 0..100), []);
+    let began = Instant::now();
+    let Ending(thread) = swaying.end();
+    while thread.as_ref().is_some_and(|t| !t.is_finished()) && began.elapsed() < HANGS {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    assert!(Ending(thread).panicked());
+}
