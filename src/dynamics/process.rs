@@ -85,6 +85,18 @@ impl Part {
     }
 }
 
+/// Terms that only fade, and alike, are one: all oscillators have the same gusts.
+fn together(terms: impl Iterator<Item = Term>) -> Vec<Term> {
+    let mut out: Vec<Term> = Vec::new();
+    for term in terms {
+        match out.iter_mut().find(|t| t.d == 0.0 && term.d == 0.0 && t.c == term.c) {
+            Some(same) => same.a += term.a,
+            None => out.push(term),
+        }
+    }
+    out
+}
+
 /// Minus twice the logarithm of the likelihood of `values` at `times_s`, up to a constant, as a sum of `parts` and noise of
 /// variance `noise` in every value, plus any multiples of `known` signals, whose best factors are taken.
 /// Infinite where there is none.
@@ -95,7 +107,7 @@ pub(super) fn minus_2_log_likelihood(
     parts: &[Part],
     noise: f64,
 ) -> f64 {
-    let terms: Vec<Term> = parts.iter().flat_map(Part::terms).collect();
+    let terms = together(parts.iter().flat_map(Part::terms));
     let waves: Vec<Wave> = terms.iter().flat_map(|term| term.waves(times_s)).collect();
     let j = waves.len();
     let diagonal = noise + parts.iter().map(Part::variance).sum::<f64>();

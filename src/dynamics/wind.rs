@@ -20,8 +20,10 @@ const LEAST_POINTS: usize = 2;
 /// Oscillators that are looked for beyond the ancestors', and ancestors that are kept.
 const MOST_NEW: usize = 3;
 const ANCESTORS: usize = 2;
-/// Frames a period of the highest frequency: more are left out, they cost time and tell nothing.
+/// Frames a period of the highest frequency, and frames in all, beyond which neighbours are taken together as their mean: they
+/// cost time and tell little.
 const FRAMES_PER_PERIOD: f64 = 3.0;
+const MOST_FRAMES: usize = 450;
 const LEAST_FRAMES: usize = 48;
 /// Motion that is taken for noise, px.
 const NOISE_PX: f64 = 0.15;
@@ -130,12 +132,14 @@ fn branch(
     let rows: Vec<usize> = (0..film.times_s.len())
         .filter(|&k| common.shift_px.iter().chain(of_carrier.iter().copied()).all(|s| s[k].is_finite()))
         .collect();
-    let skip = ((1.0 / film.step_s()) / (FRAMES_PER_PERIOD * demands.highest_hz)).floor().max(1.0) as usize;
-    let rows: Vec<usize> = rows.into_iter().step_by(skip).collect();
+    let fine = ((1.0 / film.step_s()) / (FRAMES_PER_PERIOD * demands.highest_hz)).floor() as usize;
+    let every = fine.max(rows.len().div_ceil(MOST_FRAMES)).max(1);
+    let rows = neighbours(&rows, &film.times_s, every, film.step_s());
     if rows.len() < LEAST_FRAMES {
         return Err(Unidentified::TooShort);
     }
-    let pick = |s: &Vec<f64>| rows.iter().map(|&k| s[k]).collect::<Vec<f64>>();
+    let mean = |s: &Vec<f64>, of: &Vec<usize>| of.iter().map(|&k| s[k]).sum::<f64>() / of.len() as f64;
+    let pick = |s: &Vec<f64>| rows.iter().map(|of| mean(s, of)).collect::<Vec<f64>>();
     let times_s = pick(&film.times_s);
     let known: Vec<Vec<f64>> = std::iter::once(vec![1.0; rows.len()]).chain(of_carrier.into_iter().map(pick)).collect();
     let shifts = [pick(&common.shift_px[0]), pick(&common.shift_px[1])];
@@ -152,7 +156,7 @@ fn branch(
     if variance.sqrt() < NOISE_PX {
         return Err(Unidentified::AncestorsSway);
     }
-    let step_s = skip as f64 * film.step_s();
+    let step_s = every as f64 * film.step_s();
     let problem = Problem {
         times_s: times_s.clone(),
         values,
@@ -236,6 +240,20 @@ fn best(problem: &Problem, signals: &Signals, variance: f64, frequencies_hz: [f6
         (found, value, found_bounds) = (x.clone(), there.1, bounds.clone());
     }
     (found, found_bounds)
+}
+
+/// Frames by `every` neighbours; those between which frames are missing are not put together.
+fn neighbours(rows: &[usize], times_s: &[f64], every: usize, step_s: f64) -> Vec<Vec<usize>> {
+    let mut out: Vec<Vec<usize>> = Vec::with_capacity(rows.len() / every + 1);
+    for &k in rows {
+        match out.last_mut() {
+            Some(last) if last.len() < every && times_s[k] - times_s[last[0]] < (every as f64 - 0.5) * step_s => {
+                last.push(k)
+            }
+            _ => out.push(vec![k]),
+        }
+    }
+    out
 }
 
 /// Cosine and sine of the direction in which two signals together vary most.
