@@ -4,10 +4,10 @@ mod support;
 
 use serde_json::Value;
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use std::time::Duration;
 use support::replayed;
 use tempfile::TempDir;
 
@@ -451,14 +451,38 @@ fn where_nothing_can_be_written_the_table_is_printed_all_the_same() {
     assert_eq!(names_in(&dir), before);
 }
 
+/// The film again and again: its analysis takes a while.
+fn prolong(dir: &Path, times: u32) {
+    let text = fs::read_to_string(dir.join("tracks.csv")).expect("tracks");
+    let (header, rows) = text.split_once('\n').expect("header");
+    let lap = |k: u32| {
+        let row = move |line: &str| {
+            let cells: Vec<&str> = line.split(',').collect();
+            let time_s = cells[2].parse::<f64>().expect("time") + 11.0 * f64::from(k);
+            format!("{},{},{time_s:.6},{}\n", cells[0], cells[1], cells[3..].join(","))
+        };
+        rows.lines().map(row).collect::<String>()
+    };
+    let all: String = (0..times).map(lap).collect();
+    fs::write(dir.join("tracks.csv"), format!("{header}\n{all}")).expect("tracks");
+}
+
 #[test]
 fn whoever_stops_it_finds_everything_as_it_was() {
     let (_dir, dir) = captured("tree");
+    prolong(&dir, 8);
+    let note = dir.join("capture.json");
+    let mut told: Value = serde_json::from_slice(&fs::read(&note).expect("note")).expect("JSON");
+    // Told before the work begins: the sign to stop it.
+    told["timing"]["duration_s"] = 900.into();
+    fs::write(&note, told.to_string()).expect("note");
     let (before, page) = (fs::read(dir.join("nodes.csv")).expect("nodes"), dir.with_file_name("page.html"));
     let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
     command.arg("analyze").arg(&dir).arg("--report").arg(&page).args(["--excitation", "wind"]);
-    let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("arborcam");
-    std::thread::sleep(Duration::from_millis(150));
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("arborcam");
+    let mut line = String::new();
+    BufReader::new(child.stderr.take().expect("pipe")).read_line(&mut line).expect("line");
+    assert!(line.contains("longer than 600 s"), "{line}");
     // SAFETY: the child is ours and not yet waited for.
     unsafe { libc::kill(child.id() as i32, libc::SIGINT) };
     let status = child.wait().expect("status");

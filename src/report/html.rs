@@ -97,7 +97,7 @@ brackets is meant to hold the true value in 95 of 100 cases.</p>\
 in wind the square root of 2 times the root mean square. <b>End</b> is what that makes at the branch's end, in the picture.</p>\
 <p><b>Peak</b> and <b>half-power damping</b> (Hu et al., equation 6) are what the largest peak of the angle's spectrum says. They are \
 for reference. A short film's peak is as wide as one over its length, so that this damping is too high, and the largest peak may \
-be that of a carrier or of the whole tree.</p>\
+be that of a carrier or of the whole tree. Of a long film in wind, the spectrum is a mean over pieces of 20 s.</p>\
 <p>In the plots of the angle the mean is taken off; the grey part before a release is not used. The dashed curve is the part of \
 the angle that has the branch's own frequency and damping; what is beyond it is the sway of others and noise. The angle in \
 space rests on an estimated depth.</p></section>";

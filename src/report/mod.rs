@@ -8,6 +8,7 @@ mod json;
 mod levels;
 mod matching;
 mod page;
+mod pieces;
 mod plot;
 mod study;
 mod text;

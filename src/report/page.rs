@@ -14,7 +14,8 @@ use super::plot::escaped;
 
 /// A drawing with what it shows; nothing without one. `caption` is HTML.
 fn figure(svg: Option<String>, caption: &str) -> String {
-    svg.map_or(String::new(), |svg| format!("<figure>{svg}<figcaption>{caption}</figcaption></figure>"))
+    let class = |svg: &str| if svg.starts_with("<svg class=\"broad\"") { " class=\"broad\"" } else { "" };
+    svg.map_or(String::new(), |svg| format!("<figure{}>{svg}<figcaption>{caption}</figcaption></figure>", class(&svg)))
 }
 
 /// Which colour is which capture.

@@ -1,6 +1,7 @@
 //! One capture, analysed: what the table, the JSON and the page are made from.
 
 use super::decaying::decaying;
+use super::pieces::averaged;
 use crate::dynamics::{Analysis, Film, Onset, Spectrum, angle_in_space_deg, angle_to_parent_deg, spectrum};
 use crate::model::{Excitation, NodeId, Pose, Skeleton, Sway, Swaying, Unidentified};
 
@@ -85,7 +86,7 @@ pub struct Branch {
     pub space_deg: Vec<f64>,
     /// After a release: the part of the angle in the picture's plane that has the branch's own frequency and damping.
     pub fitted_deg: Option<Vec<f64>>,
-    /// Of the angle in the picture's plane, degrees, over the time that the answer comes from.
+    /// Of the angle in the picture's plane, degrees, over the time that the answer comes from; in wind a mean over pieces.
     pub spectrum: Option<Spectrum>,
     pub reference: Option<Reference>,
     /// Where its end went: to the right of its place at rest and above it, px, by [`times_s`](Self::times_s).
@@ -192,7 +193,9 @@ fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: [f64; 2]) -> Branc
         [angle_to_parent_deg(skeleton, poses, node), angle_in_space_deg(skeleton, poses, node)].map(centred);
     let used: Vec<usize> = (0..times_s.len()).filter(|&k| used_s[0] <= times_s[k] && times_s[k] <= used_s[1]).collect();
     let of_used = |all: &[f64]| used.iter().map(|&k| all[k]).collect::<Vec<f64>>();
-    let spectrum = spectrum(&of_used(&times_s), &of_used(&plane_deg));
+    let driven = given.analysis.onset.is_none_or(|o| o.excitation == Excitation::Wind);
+    let of_pieces = if driven { averaged } else { spectrum };
+    let spectrum = of_pieces(&of_used(&times_s), &of_used(&plane_deg));
     let span_s = used_s[1] - used_s[0];
     let reference = spectrum
         .as_ref()

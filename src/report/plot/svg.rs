@@ -2,6 +2,9 @@
 
 use std::fmt::Write;
 
+/// Wider than this is too wide for half a row.
+const BROAD: f64 = 760.0;
+
 /// Where a text stands against its place.
 #[derive(Clone, Copy, Debug)]
 pub enum Anchor {
@@ -19,8 +22,11 @@ pub struct Svg {
 impl Svg {
     /// `label` is read to those who do not see it.
     pub fn new(width: f64, height: f64, label: &str) -> Self {
-        let head =
-            format!("<svg viewBox=\"0 0 {width:.0} {height:.0}\" role=\"img\" aria-label=\"{}\">", escaped(label));
+        // One that would be too small to read in half a row gets the whole, and can be pushed sideways.
+        let broad =
+            if width > BROAD { format!("class=\"broad\" style=\"min-width:{width:.0}px\" ") } else { String::new() };
+        let label = escaped(label);
+        let head = format!("<svg {broad}viewBox=\"0 0 {width:.0} {height:.0}\" role=\"img\" aria-label=\"{label}\">");
         Self { head, body: String::new() }
     }
 
