@@ -52,7 +52,9 @@ fn one(k: usize, study: &Study, several: bool) -> String {
     out += &table_part(study);
     out += &levels_part(study);
     out += &not_said(study);
-    out += "<h3>Branch by branch</h3>";
+    if study.answers() > 0 {
+        out += "<h3>Branch by branch</h3>";
+    }
     for branch in study.branches.iter().filter(|b| b.sway.is_ok()) {
         out += &branch_part(study, branch);
     }

@@ -26,6 +26,13 @@ fn keys<'a>(names: impl Iterator<Item = &'a str>) -> String {
     names.enumerate().map(key).collect()
 }
 
+/// An interval under its value.
+fn stacked(text: &str) -> String {
+    let Some((value, rest)) = text.split_once(" (") else { return text.into() };
+    let (interval, star) = rest.rsplit_once(')').unwrap_or((rest, ""));
+    format!("{value}{star} <small>{interval}</small>")
+}
+
 /// A row of a table; cells are HTML.
 fn cells(tag: &str, class: &str, cells: &[String]) -> String {
     cells.iter().map(|cell| format!("<{tag} class=\"{class}\">{cell}</{tag}>")).collect()

@@ -110,7 +110,7 @@ fn compared(studies: &[Study], comparison: &Comparison) -> String {
     let mut out = format!("{}\n\n", heading(studies, comparison));
     let first = &studies[0].name;
     let mut rows = vec![["branch", "capture", "called", "frequency, Hz", "damping ratio"].map(String::from).to_vec()];
-    rows[0].extend([format!("frequency to {first}"), format!("damping to {first}")]);
+    rows[0].extend([format!("frequency against {first}"), format!("damping against {first}")]);
     for row in comparison.rows.iter().filter(|row| row.is_told(studies)) {
         rows.extend((0..studies.len()).map(|k| across(studies, row, k)));
     }
@@ -118,7 +118,7 @@ fn compared(studies: &[Study], comparison: &Comparison) -> String {
     let untold: Vec<String> =
         comparison.rows.iter().filter(|row| !row.is_told(studies)).map(|row| row.name.to_string()).collect();
     if !untold.is_empty() {
-        out += &format!("  without a frequency in all of them: {}\n", untold.join(", "));
+        out += &format!("  without a frequency in any of them: {}\n", untold.join(", "));
     }
     if comparison.same_tree {
         out.extend((1..studies.len()).map(|k| unmatched(studies, comparison, k - 1)));

@@ -2,7 +2,7 @@
 
 use super::branch::highest_hz;
 use super::levels::by_level;
-use super::{cells, figure, keys};
+use super::{cells, figure, keys, stacked};
 use crate::model::{Interval, Sway};
 use crate::report::compare::{Change, Comparison, Row};
 use crate::report::plot::{Answer, Curve, Mark, Slot, across, escaped, spectra};
@@ -73,9 +73,9 @@ pub fn compared_part(studies: &[Study], comparison: &Comparison) -> String {
 
 fn table(studies: &[Study], comparison: &Comparison) -> String {
     let first = escaped(&studies[0].name);
-    let to = |what: &str| format!("{what} against {first}");
+    let to = |what: &str| format!("{what}<br>against {first}");
     let head = ["branch", "capture", "called there", "frequency, Hz", "damping ratio"].map(String::from);
-    let head = [&head[..], &[to("frequency"), to("damping")]].concat();
+    let head = [&head[..], &[to("frequency,"), to("damping,")]].concat();
     let told = comparison.rows.iter().filter(|row| row.is_told(studies));
     let rows: String = told.flat_map(|row| (0..studies.len()).map(|k| table_row(studies, row, k))).collect();
     let untold: Vec<String> =
@@ -83,11 +83,11 @@ fn table(studies: &[Study], comparison: &Comparison) -> String {
     let untold = if untold.is_empty() {
         String::new()
     } else {
-        format!("<p class=\"soft\">Without a frequency in all of them: {}.</p>", untold.join(", "))
+        format!("<p class=\"soft\">Without a frequency in any of them: {}.</p>", untold.join(", "))
     };
     format!(
-        "<div class=\"wide\"><table><caption>With a star: beyond what both 95 % intervals allow. Of twenty branches that do \
-         not differ, chance marks one.</caption><tr>{}</tr>{rows}</table></div>{untold}",
+        "<div class=\"wide\"><table><tr>{}</tr>{rows}</table></div><p class=\"soft\">With a star: beyond what both 95 % intervals \
+         allow. Of twenty branches that do not differ, chance marks one.</p>{untold}",
         cells("th", "n", &head)
     )
 }
@@ -107,12 +107,12 @@ fn table_row(studies: &[Study], row: &Row, k: usize) -> String {
         }
         (Some(b), Some(sway)) => {
             let both = row.sway(studies, 0).filter(|_| k > 0).map(|first| (first, sway));
-            let cell = |change: Option<Change>| change.map_or("-".to_owned(), |c| changed(&c));
+            let cell = |change: Option<Change>| change.map_or("-".to_owned(), |c| stacked(&changed(&c)));
             let row = [
                 name,
                 b.name.to_string(),
-                interval(&sway.frequency_hz, 3),
-                sway.damping_ratio.map_or("unknown".into(), |d| interval(&d, 3)),
+                stacked(&interval(&sway.frequency_hz, 3)),
+                sway.damping_ratio.map_or("unknown".into(), |d| stacked(&interval(&d, 3))),
                 cell(both.and_then(|(a, b)| Change::of_frequency(&a, &b))),
                 cell(both.and_then(|(a, b)| Change::of_damping(&a, &b))),
             ];

@@ -1,6 +1,6 @@
 //! All branches in a table, and those without an answer with the reason.
 
-use super::cells;
+use super::{cells, stacked};
 use crate::model::Unidentified;
 use crate::report::study::{Branch, Study};
 use crate::report::text::{interval, number};
@@ -17,7 +17,11 @@ pub fn table_part(study: &Study) -> String {
     head.extend(["peak, Hz", "half-power damping"].map(String::from));
     let columns = head.len();
     let rows: String = study.branches.iter().map(|b| row(study, b, columns)).collect();
-    format!("<h3>All branches</h3><div class=\"wide\"><table><tr>{}</tr>{rows}</table></div>", cells("th", "n", &head))
+    // Narrow screens go without those that stand with each branch as well.
+    let (first, less) = (cells("th", "n", &head[..1]), cells("th", "n less", &head[1..4]));
+    let (most, last) = (cells("th", "n", &head[4..columns - 2]), cells("th", "n less", &head[columns - 2..]));
+    let head = first + &less + &most + &last;
+    format!("<h3>All branches</h3><div class=\"wide\"><table><tr>{head}</tr>{rows}</table></div>")
 }
 
 fn row(study: &Study, branch: &Branch, columns: usize) -> String {
@@ -51,17 +55,11 @@ fn row(study: &Study, branch: &Branch, columns: usize) -> String {
     format!("<tr>{first}{rest}</tr>")
 }
 
-/// The interval under its value.
-fn stacked(text: &str) -> String {
-    match text.split_once(" (") {
-        Some((value, rest)) => format!("{value} <small>{}</small>", rest.trim_end_matches(')')),
-        None => text.into(),
-    }
-}
-
 /// The name of a branch's part within the page.
 pub fn anchor(study: &Study, branch: &Branch) -> String {
-    let plain: String = study.name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
+    // Different names stay different.
+    let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_string() } else { format!("_{:x}", u32::from(c)) };
+    let plain: String = study.name.chars().map(plain).collect();
     format!("{plain}-{}", branch.name)
 }
 
