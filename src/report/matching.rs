@@ -14,7 +14,9 @@ const NEAR: f64 = 0.02;
 const BASE: f64 = 0.5;
 /// How often the pictures are laid on each other anew, by so many branches at least.
 const ROUNDS: usize = 3;
-const LEAST_PAIRS: usize = 4;
+const LEAST_PAIRS: usize = 3;
+/// Sizes of two films of one tree are as its farthest branches that were seen, which need not be the same ones.
+const SIZES: [f64; 5] = [1.0, 0.9, 1.1, 0.8, 1.25];
 
 /// What became of a branch of the first capture in another one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,8 +33,10 @@ pub enum Match {
 pub fn matched(first: &Study, other: &Study) -> Vec<Match> {
     let size_px = first.size_px();
     // A camera that stood still, and one that did not.
-    let starts = [1.0, size_px / other.size_px()].map(|scale| Frame { scale, shift: [0.0; 2] });
-    let tried = starts.into_iter().filter(|f| f.scale.is_finite()).map(|start| {
+    let ratio = size_px / other.size_px();
+    let scales = std::iter::once(1.0).chain(SIZES.iter().map(|s| s * ratio));
+    let starts = scales.map(|scale| Frame { scale, shift: [0.0; 2] });
+    let tried = starts.filter(|f| f.scale.is_finite()).map(|start| {
         let mut frame = start;
         let mut found = seen_from(first, other, &frame, size_px);
         for _ in 0..ROUNDS {
@@ -119,4 +123,83 @@ fn seen_from(first: &Study, other: &Study, frame: &Frame, size_px: f64) -> Vec<M
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Unidentified;
+
+    /// A tree whose branches end at `tips`, each carried by the trunk.
+    fn study(tips: &[[f64; 2]]) -> Study {
+        let branch = |(i, tip): (usize, &[f64; 2])| Branch {
+            name: i as u32 + 1,
+            parent: (i > 0).then_some(1),
+            level: if i > 0 { 2 } else { 1 },
+            points: 9,
+            base: if i > 0 { tips[0] } else { [0.0; 2] },
+            tip: *tip,
+            sway: Err(Unidentified::TooShort),
+            amplitude_px: f64::NAN,
+            times_s: Vec::new(),
+            plane_deg: Vec::new(),
+            space_deg: Vec::new(),
+            fitted_deg: None,
+            spectrum: None,
+            reference: None,
+            way_px: Vec::new(),
+        };
+        Study {
+            name: String::new(),
+            source: String::new(),
+            size: [640, 360],
+            span_s: [0.0, 1.0],
+            frames: 30,
+            gaps_s: Vec::new(),
+            onset: None,
+            given: None,
+            metres_per_px: 0.0,
+            highest_hz: 5.0,
+            foot_px: [320.0, 340.0],
+            outline_px: Vec::new(),
+            picture: None,
+            branches: tips.iter().enumerate().map(branch).collect(),
+            notes: Vec::new(),
+        }
+    }
+
+    fn found(matches: &[Match]) -> Vec<Option<usize>> {
+        let found = |m: &Match| if let Match::Found { branch, .. } = m { Some(*branch) } else { None };
+        matches.iter().map(found).collect()
+    }
+
+    const TREE: [[f64; 2]; 6] =
+        [[0.0, 100.0], [-80.0, 180.0], [-40.0, 240.0], [10.0, 260.0], [70.0, 230.0], [90.0, 150.0]];
+
+    /// The second film is from farther away, its outline's foot lies elsewhere, and it was cut into branches in another order.
+    #[test]
+    fn a_tree_seen_from_farther_away_and_with_another_foot_is_the_same_tree() {
+        let order = [0, 5, 4, 2, 1];
+        let other: Vec<[f64; 2]> = order.iter().map(|&k| [0.7 * TREE[k][0] + 6.0, 0.7 * TREE[k][1] - 9.0]).collect();
+        let matches = matched(&study(&TREE), &study(&other));
+        assert_eq!(found(&matches), [Some(0), Some(4), Some(3), None, Some(2), Some(1)]);
+        assert_eq!(matches[3], Match::Missing);
+    }
+
+    /// Where two grow together it is not guessed which one is meant.
+    #[test]
+    fn a_branch_with_two_as_near_is_unclear() {
+        let mut other = TREE.to_vec();
+        other[4] = [58.0, 230.0];
+        other.push([82.0, 231.0]);
+        let matches = matched(&study(&TREE), &study(&other));
+        assert_eq!(matches[4], Match::Unclear);
+        assert_eq!(found(&matches)[..4], [Some(0), Some(1), Some(2), Some(3)]);
+    }
+
+    #[test]
+    fn nothing_is_found_in_a_tree_without_branches() {
+        assert_eq!(found(&matched(&study(&TREE), &study(&[]))), [None; 6]);
+        assert!(matched(&study(&[]), &study(&TREE)).is_empty());
+    }
 }

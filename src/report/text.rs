@@ -136,8 +136,8 @@ pub fn heading(studies: &[Study], comparison: &Comparison) -> String {
         .map(|(share, s)| format!("{:.0} % in {}", 100.0 * share, s.name))
         .collect();
     let what = if comparison.same_tree { "one tree" } else { "several trees, by their trunks" };
-    let by = if comparison.said { "as --trees says" } else { "by how many branches stand in the same place" };
-    let beside = format!("{}; branches found again: {}", by, shares.join(", "));
+    let by = if comparison.said { "as --trees says" } else { "a guess, which --trees overrules" };
+    let beside = format!("{by}; branches found in the same place: {}", shares.join(", "));
     format!("Compared with {} as {what} ({beside})", studies[0].name)
 }
 

@@ -88,7 +88,7 @@ fn table(studies: &[Study], comparison: &Comparison) -> String {
     format!(
         "<div class=\"wide\"><table><tr>{}</tr>{rows}</table></div><p class=\"soft\">With a star: beyond what both 95 % intervals \
          allow. Of twenty branches that do not differ, chance marks one.</p>{untold}",
-        cells("th", "n", &head)
+        cells("th", "n", &head[..2]) + &cells("th", "n less", &head[2..3]) + &cells("th", "n", &head[3..])
     )
 }
 
@@ -97,7 +97,8 @@ fn table_row(studies: &[Study], row: &Row, k: usize) -> String {
         if k == 0 { format!("<td class=\"n\" rowspan=\"{}\">{}</td>", studies.len(), row.name) } else { String::new() };
     let name = escaped(&studies[k].name);
     let why = |name: String, called: &str, why: &str| {
-        format!("{}<td class=\"why\" colspan=\"4\">{why}</td>", cells("td", "n", &[name, called.into()]))
+        let first = cells("td", "n", &[name]) + &cells("td", "n less", &[called.into()]);
+        format!("{first}<td class=\"why\" colspan=\"4\">{why}</td>")
     };
     let rest = match (row.branch(studies, k), row.sway(studies, k)) {
         (None, _) => why(name, "-", lost(row, k)),
@@ -116,7 +117,7 @@ fn table_row(studies: &[Study], row: &Row, k: usize) -> String {
                 cell(both.and_then(|(a, b)| Change::of_frequency(&a, &b))),
                 cell(both.and_then(|(a, b)| Change::of_damping(&a, &b))),
             ];
-            cells("td", "n", &row)
+            cells("td", "n", &row[..1]) + &cells("td", "n less", &row[1..2]) + &cells("td", "n", &row[2..])
         }
     };
     format!("<tr>{head}{rest}</tr>")
