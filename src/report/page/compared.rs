@@ -98,7 +98,7 @@ fn table_row(studies: &[Study], row: &Row, k: usize) -> String {
     let name = escaped(&studies[k].name);
     let why = |name: String, called: &str, why: &str| {
         let first = cells("td", "n", &[name]) + &cells("td", "n less", &[called.into()]);
-        format!("{first}<td class=\"why\" colspan=\"4\">{why}</td>")
+        format!("{first}<td class=\"why\" colspan=\"4\"><span>{why}</span></td>")
     };
     let rest = match (row.branch(studies, k), row.sway(studies, k)) {
         (None, _) => why(name, "-", lost(row, k)),

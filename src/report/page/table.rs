@@ -34,7 +34,7 @@ fn row(study: &Study, branch: &Branch, columns: usize) -> String {
     let place = [branch.level.to_string(), carrier, branch.points.to_string()];
     let first = cells("td", "n", &[name]) + &cells("td", "n less", &place);
     let rest = match branch.sway {
-        Err(why) => format!("<td class=\"why\" colspan=\"{}\">none: {why}</td>", columns - 4),
+        Err(why) => format!("<td class=\"why\" colspan=\"{}\"><span>none: {why}</span></td>", columns - 4),
         Ok(sway) => {
             let mut rest = vec![
                 stacked(&interval(&sway.frequency_hz, 3)),
