@@ -38,6 +38,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "capture",
         &["model", "config", "motion::PoseEstimator", "outline", "export", "dynamics::Film", "dynamics::FilmLog"],
     ),
+    // Told from what the sway was told from, and drawn beside it.
+    ("report", &["model", "dynamics", "signal"]),
     // The screen draws outlines, and refuses the crossing ones as a file would be. It draws the tree's wood too, a coarse
     // mesh that only it needs.
     ("tui", &["model", "outline::crossing", "caught", "draw", "shape::Mesh", "shape::bare_wood"]),
@@ -61,6 +63,9 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "capture",
             "animate",
             "draw",
+            "report",
+            // What `analyze` asks of a capture's film.
+            "dynamics::analyse_with",
             // The table of cylinders is of the limbs; a drawn shape is read, and what it cut is told and moves.
             "shape::cylinders",
             "shape::Cut",

@@ -296,6 +296,7 @@ const INSTALLED: &[&str] = &[
     "usr/share/doc/arborcam/using.md",
     "usr/share/doc/arborcam/viewer.md",
     "usr/share/doc/arborcam/animate.md",
+    "usr/share/doc/arborcam/analyze.md",
     "usr/share/doc/arborcam/dynamics.md",
     "usr/share/doc/arborcam/gallery.md",
 ];

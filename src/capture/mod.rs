@@ -99,6 +99,19 @@ impl Captured {
     /// # Errors
     /// The folder is no capture or holds no tree, or one of its tables is missing or damaged.
     pub fn read(dir: &Path, animation_s: f64) -> Result<Self, CaptureError> {
+        let mut captured = Self::tree(dir)?;
+        let estimator = PoseEstimator::new(captured.skeleton.clone(), &captured.note.config.motion);
+        let pictured = captured.note.picture.as_ref().map(|p| p.frame);
+        let postures = Postures::open(dir, &captured.skeleton, captured.metres_per_px())?;
+        (captured.poses, captured.pose_in_picture) = motion::read(postures, &estimator, animation_s, pictured)?;
+        Ok(captured)
+    }
+
+    /// The same without any pose: `motion.csv` need not be there.
+    ///
+    /// # Errors
+    /// The folder is no capture or holds no tree, or `nodes.csv` is missing or damaged.
+    pub fn tree(dir: &Path) -> Result<Self, CaptureError> {
         let note = Self::note(dir)?;
         let size = Size::new(note.source.width, note.source.height);
         let model = note.model.clone().ok_or_else(|| CaptureError::NoTree { dir: dir.to_owned() })?;
@@ -111,10 +124,6 @@ impl Captured {
         let joints = std::fs::read(dir.join("tree.glb")).ok().and_then(|bytes| glb_notes::joints(&bytes));
         warnings.extend(copies::mark(&mut skeleton, &model.copied, joints.as_deref()));
         let skeleton = Arc::new(skeleton);
-        let estimator = PoseEstimator::new(skeleton.clone(), &note.config.motion);
-        let pictured = note.picture.as_ref().map(|p| p.frame);
-        let (poses, pose_in_picture) =
-            motion::read(Postures::open(dir, &skeleton, model.metres_per_px)?, &estimator, animation_s, pictured)?;
         let picture = match note.picture.as_ref().map(|p| picture(dir, p, size)) {
             Some(Ok(picture)) => Some(picture),
             Some(Err(why)) => {
@@ -134,8 +143,13 @@ impl Captured {
             warnings.push(format!("the outline of the capture is left out: {why}"));
             None
         });
-        let dir = dir.to_owned();
+        let (dir, poses, pose_in_picture) = (dir.to_owned(), Vec::new(), None);
         Ok(Self { dir, note, skeleton, sway, poses, picture, pose_in_picture, outline, warnings })
+    }
+
+    /// Metres in a pixel; 0 where the capture knows none.
+    pub fn metres_per_px(&self) -> f64 {
+        self.note.model.as_ref().map_or(0.0, |m| m.metres_per_px)
     }
 
     /// The points of the last `window_s` seconds, which its sway is told from.
@@ -143,7 +157,15 @@ impl Captured {
     /// # Errors
     /// `tracks.csv` is missing or damaged.
     pub fn tracked(&self, window_s: f64) -> Result<Film, CaptureError> {
-        film::read(&self.dir, &self.skeleton, window_s)
+        self.tracked_within(window_s, [f64::NEG_INFINITY, f64::INFINITY])
+    }
+
+    /// The same of the film between two times, s.
+    ///
+    /// # Errors
+    /// `tracks.csv` is missing or damaged.
+    pub fn tracked_within(&self, window_s: f64, within_s: [f64; 2]) -> Result<Film, CaptureError> {
+        film::read(&self.dir, &self.skeleton, window_s, within_s)
     }
 
     /// All poses of the film in their order, read anew, one at a time: those of hours would fill the memory.
@@ -151,8 +173,7 @@ impl Captured {
     /// # Errors
     /// `motion.csv` is missing or damaged; after an error the film is over.
     pub fn film(&self) -> Result<impl Iterator<Item = Result<Pose, CaptureError>>, CaptureError> {
-        let metres_per_px = self.note.model.as_ref().map_or(0.0, |m| m.metres_per_px);
-        let mut postures = Postures::open(&self.dir, &self.skeleton, metres_per_px)?;
+        let mut postures = Postures::open(&self.dir, &self.skeleton, self.metres_per_px())?;
         let estimator = PoseEstimator::new(self.skeleton.clone(), &self.note.config.motion);
         let mut over = false;
         Ok(std::iter::from_fn(move || {

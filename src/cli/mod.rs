@@ -1,5 +1,6 @@
 //! The commands: one file each. Here, what they have in common: arguments, exit status, messages.
 
+mod analyze;
 mod animate;
 mod camera;
 mod capture;
@@ -12,6 +13,7 @@ mod record;
 mod recording;
 mod render;
 mod replay;
+mod scale;
 mod service;
 mod session;
 mod shape;
@@ -54,6 +56,8 @@ enum Command {
     Render(render::RenderArgs),
     /// Write the tree of a capture as a file for other programs.
     Export(export::ExportArgs),
+    /// Tell at what frequency every branch of a capture sways and how it is damped; compare captures.
+    Analyze(analyze::AnalyzeArgs),
     /// Make a capture's tree move in a wind that nobody filmed, pull and release it, or magnify its motion.
     Animate(animate::AnimateArgs),
     /// List the cameras that are plugged in.
@@ -84,9 +88,8 @@ struct Common {
     /// End by itself after so many seconds of film.
     #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
     for_s: Option<f64>,
-    /// Metres in a pixel at the tree; the model is then in metres.
-    #[arg(long, value_name = "M")]
-    metres_per_px: Option<f64>,
+    #[command(flatten)]
+    scale: scale::ScaleArgs,
     #[command(flatten)]
     shape: shape::ShapeArgs,
 }
@@ -103,9 +106,7 @@ impl Common {
             Some(path) => Config::load(path)?,
             None => Config::default(),
         };
-        if let Some(metres) = self.metres_per_px {
-            config.export.metres_per_px = metres;
-        }
+        self.scale.set(&mut config);
         self.shape.set(&mut config);
         set(&mut config);
         config.check()?;
@@ -149,6 +150,7 @@ pub fn main() -> ExitCode {
         Command::Play(args) => play::run(args),
         Command::Render(args) => render::run(args),
         Command::Export(args) => export::run(args),
+        Command::Analyze(args) => analyze::run(args),
         Command::Animate(args) => animate::run(args),
         Command::Devices(args) => devices::run(args),
         Command::Doctor(args) => doctor::run(args),

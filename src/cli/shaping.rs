@@ -1,5 +1,6 @@
 //! What a command that reads a capture may change of its tree, and the tree that comes out.
 
+use super::scale::ScaleArgs;
 use super::shape::ShapeArgs;
 use super::{Ended, say};
 use crate::capture::{CaptureError, Captured};
@@ -47,9 +48,8 @@ pub struct Shaping {
     /// Length of the animation at most, s; the last so many seconds of the film.
     #[arg(long, value_name = "SECONDS")]
     animation_s: Option<f64>,
-    /// Metres in a pixel at the tree; 0 for a model in pixels.
-    #[arg(long, value_name = "M")]
-    metres_per_px: Option<f64>,
+    #[command(flatten)]
+    scale: ScaleArgs,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -119,7 +119,7 @@ impl Shaping {
             };
         }
         set(&mut config.export.animation_s, self.animation_s);
-        set(&mut config.export.metres_per_px, self.metres_per_px);
+        self.scale.set(&mut config);
         config.check()?;
         Ok(config)
     }

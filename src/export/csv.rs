@@ -2,7 +2,7 @@
 //!
 //! Times are seconds with up to 6 decimals, pixels up to 3, lengths in the model up to 4. Unknown is an empty cell.
 
-use super::sway::Columns;
+use super::sway::cells;
 use super::{ExportError, number};
 use crate::model::{NodeName, Pose, Skeleton, Swaying, TrackId, TrackSet, Unidentified};
 use std::io::Write;
@@ -136,12 +136,7 @@ pub fn nodes<W: Write>(out: W, skeleton: &Skeleton, sway: &[Swaying], metres_per
         table.count(node.n_tracks);
         skeleton.image_from_model(&node.position).into_iter().for_each(|x| table.number(x, 3));
         node.position.iter().chain([&node.radius]).for_each(|x| table.number(x * scale, 4 + more));
-        let columns = Columns::of(&sway);
-        columns.values().into_iter().for_each(|x| table.number(x, 5));
-        table.row.push_field(if sway.is_ok() { "true" } else { "false" });
-        table.row.push_field(sway.map_or("", |s| s.excitation.word()));
-        table.number(sway.map_or(f64::NAN, |s| s.amplitude_deg), 4);
-        table.row.push_field(sway.err().map_or("", Unidentified::word));
+        cells(&sway).iter().for_each(|cell| table.row.push_field(cell));
         table.end_row()?;
     }
     table.finish()

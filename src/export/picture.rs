@@ -2,12 +2,22 @@
 
 use super::ExportError;
 use crate::model::Rgb;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use image::codecs::jpeg::JpegEncoder;
 
 /// Name of the picture in the folder of a capture.
 pub const PICTURE_FILE: &str = "frame.jpg";
 /// Grain is gone, twigs are not.
 const QUALITY: u8 = 90;
+
+/// The picture as an address that holds it, for a page that is one file.
+///
+/// # Errors
+/// As of [`jpeg`].
+pub fn data_address(picture: &Rgb) -> Result<String, ExportError> {
+    Ok(format!("data:image/jpeg;base64,{}", STANDARD.encode(jpeg(picture)?)))
+}
 
 /// The bytes of a JPEG file; the same on every machine.
 ///

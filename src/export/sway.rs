@@ -1,5 +1,6 @@
 //! What files for others say of a branch's sway.
 
+use super::number;
 use crate::model::Swaying;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -30,6 +31,21 @@ impl Columns {
         let Self { frequency_hz, frequency_lo_hz, frequency_hi_hz, damping_ratio, damping_lo, damping_hi } = *self;
         [frequency_hz, frequency_lo_hz, frequency_hi_hz, damping_ratio, damping_lo, damping_hi]
     }
+}
+
+/// All cells of `nodes.csv` that say something of a branch's sway, in the order of their columns.
+pub(super) fn cells(sway: &Swaying) -> [String; 10] {
+    let told = |x: f64, decimals: usize| {
+        let mut text = String::new();
+        number::push(&mut text, x, decimals);
+        text
+    };
+    let [a, b, c, d, e, f] = Columns::of(sway).values().map(|x| told(x, 5));
+    let identifiable = if sway.is_ok() { "true" } else { "false" };
+    let excitation = sway.map_or("", |s| s.excitation.word());
+    let amplitude = told(sway.map_or(f64::NAN, |s| s.amplitude_deg), 4);
+    let why = sway.err().map_or("", crate::model::Unidentified::word);
+    [a, b, c, d, e, f, identifiable.into(), excitation.into(), amplitude, why.into()]
 }
 
 /// For the `extras` of a joint: what is known of its sway, with 95 % intervals; nothing for one that was not measured.

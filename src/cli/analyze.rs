@@ -1,0 +1,220 @@
+//! `arborcam analyze DIR...`: how every branch of a capture sways, and what captures have in common.
+
+mod options;
+
+use super::stop::Stop;
+use super::{Ended, say};
+use crate::capture::Captured;
+use crate::config::Excited;
+use crate::dynamics::analyse_with;
+use crate::export::picture::data_address;
+use crate::export::{ExportError, refuse_taken, renewed, replace, write_files};
+use crate::model::{Excitation, NodeName, Skeleton, Swaying};
+use crate::report::{Given, Study, compare, json, page, text};
+use anyhow::anyhow;
+pub use options::AnalyzeArgs;
+use std::cell::Cell;
+use std::collections::BTreeMap;
+use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// Film that is analysed at most, s: the end of a longer one. Points of hours would fill the memory.
+const LONGEST_S: f64 = 600.0;
+
+/// One capture and what is to be written into it.
+struct Analysed {
+    study: Study,
+    sway: BTreeMap<NodeName, Swaying>,
+}
+
+pub fn run(args: &AnalyzeArgs) -> Result<(), Ended> {
+    args.check()?;
+    if let Some(path) = &args.report {
+        refuse_taken(path).map_err(|e| Ended::Failed(e.into()))?;
+    }
+    let stop = Stop::on_signals()?;
+    let names = names(&args.dirs);
+    // Before the first is worked on: a mistyped name is told at once.
+    let read: Vec<Captured> = args.dirs.iter().map(|dir| Captured::tree(dir)).collect::<Result<_, _>>()?;
+    let all: Vec<Analysed> =
+        read.iter().zip(&names).map(|(captured, name)| analysed(args, captured, name)).collect::<Result<_, _>>()?;
+    let (studies, sway): (Vec<Study>, Vec<BTreeMap<NodeName, Swaying>>) =
+        all.into_iter().map(|a| (a.study, a.sway)).unzip();
+    let comparison = compare(&studies, args.trees.same());
+    let told = if args.json {
+        format!("{}\n", json(&studies, comparison.as_ref()))
+    } else {
+        text(&studies, comparison.as_ref())
+    };
+    print(&told)?;
+    let stop = stop.while_writing();
+    let mut failures: Vec<ExportError> = Vec::new();
+    if !args.no_write {
+        let written = args.dirs.iter().zip(&sway).map(|(dir, sway)| put_into(dir, sway, stop));
+        failures.extend(written.filter_map(Result::err));
+    }
+    if let Some(path) = &args.report {
+        let html = page(&studies, comparison.as_ref());
+        match put_beside(path, html, stop) {
+            Ok(()) => say(&format!("report:  {}", path.display())),
+            Err(e) => failures.push(e),
+        }
+    }
+    if failures.iter().any(|e| matches!(e, ExportError::Stopped)) {
+        return Err(Ended::Stopped);
+    }
+    match failures.pop() {
+        None => Ok(()),
+        Some(last) => {
+            failures.iter().for_each(|e| say(&format!("arborcam: {e}")));
+            Err(Ended::Failed(last.into()))
+        }
+    }
+}
+
+fn analysed(args: &AnalyzeArgs, captured: &Captured, name: &str) -> Result<Analysed, Ended> {
+    let mut own = captured.note.config.clone();
+    // What its tables are in.
+    own.export.metres_per_px = captured.metres_per_px();
+    let config = args.config(&own)?;
+    let dynamics = &config.dynamics;
+    let film = captured.tracked_within(LONGEST_S, args.within_s())?;
+    let mut notes: Vec<String> = captured.note.warnings.clone();
+    let mut warn = |what: String| {
+        say(&format!("arborcam: warning: {name}: {what}"));
+        notes.push(what);
+    };
+    let ends = film.times_s.first().copied().zip(film.times_s.last().copied());
+    let [from_s, to_s] = ends.map_or([0.0; 2], |(a, b)| [a, b]);
+    let wanted_s = args.to.unwrap_or(captured.note.timing.duration_s) - args.from.unwrap_or(0.0);
+    if wanted_s > LONGEST_S + 1.0 {
+        warn(format!(
+            "the film is longer than {LONGEST_S:.0} s; its end is analysed; choose another part with --from and --to"
+        ));
+    }
+    // Nothing was measured on copies.
+    let skeleton = Skeleton {
+        nodes: captured.skeleton.nodes[..captured.skeleton.measured()].to_vec(),
+        ..(*captured.skeleton).clone()
+    };
+    let progress = Progress::of(name, skeleton.nodes.len());
+    let analysis = analyse_with(&skeleton, &film, dynamics, &|| progress.step());
+    progress.end();
+    let mut poses = Vec::new();
+    let all = captured.film().map(|film| {
+        film.filter(|p| p.as_ref().map_or(true, |p| from_s <= p.time_s && p.time_s <= to_s)).try_for_each(|pose| {
+            let mut pose = pose?;
+            pose.joints.truncate(skeleton.nodes.len());
+            poses.push(pose);
+            Ok(())
+        })
+    });
+    if let Err(e) = all.and_then(|done| done) {
+        warn(format!("there are no plots of angles and spectra: {e}"));
+        poses.clear();
+    }
+    let picture = captured.picture.as_ref().filter(|_| args.report.is_some());
+    let picture = picture.and_then(|p| data_address(&p.rgb).ok());
+    let outline_px = captured.note.outline.as_ref().map_or(&[][..], |o| &o.polygon_px);
+    let excitation = match dynamics.excitation {
+        Excited::Auto => None,
+        Excited::Release => Some(Excitation::Release),
+        Excited::Wind => Some(Excitation::Wind),
+    };
+    let study = Study::of(&Given {
+        name,
+        source: &captured.note.source.name,
+        skeleton: &skeleton,
+        film: &film,
+        poses: &poses,
+        analysis: &analysis,
+        excitation,
+        metres_per_px: config.export.metres_per_px,
+        highest_hz: dynamics.highest_hz,
+        outline_px,
+        picture: picture.as_deref(),
+        notes: &notes,
+    });
+    let sway = skeleton.nodes.iter().map(|n| n.name).zip(analysis.sway).collect();
+    Ok(Analysed { study, sway })
+}
+
+/// Tells how far the work is, on a line that is written over and goes at the end; on a terminal only.
+struct Progress<'a> {
+    name: &'a str,
+    all: usize,
+    done: Cell<usize>,
+    shown: bool,
+}
+
+impl<'a> Progress<'a> {
+    fn of(name: &'a str, all: usize) -> Self {
+        Self { name, all, done: Cell::new(0), shown: std::io::stderr().is_terminal() }
+    }
+
+    fn step(&self) {
+        self.done.set(self.done.get() + 1);
+        if self.shown {
+            let _ = write!(std::io::stderr(), "\r{}: branch {} of {}", self.name, self.done.get(), self.all - 1);
+        }
+    }
+
+    fn end(&self) {
+        if self.shown {
+            let _ = write!(std::io::stderr(), "\r\x1b[K");
+        }
+    }
+}
+
+/// What the captures are called: the names of their folders, with as much of the way to them as tells them apart.
+fn names(dirs: &[PathBuf]) -> Vec<String> {
+    let parts = |dir: &PathBuf| -> Vec<String> {
+        let dir = std::path::absolute(dir).unwrap_or_else(|_| dir.clone());
+        let dir = dir.canonicalize().unwrap_or(dir);
+        dir.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect()
+    };
+    let all: Vec<Vec<String>> = dirs.iter().map(parts).collect();
+    let end = |parts: &[String], n: usize| parts[parts.len().saturating_sub(n)..].join("/");
+    let longest = all.iter().map(Vec::len).max().unwrap_or(1);
+    let name = |parts: &Vec<String>| {
+        let alone = |n: &usize| all.iter().filter(|other| end(other, *n) == end(parts, *n)).count() == 1;
+        end(parts, (1..=longest).find(alone).unwrap_or(longest))
+    };
+    all.iter().map(name).collect()
+}
+
+fn print(text: &str) -> Result<(), Ended> {
+    let mut out = std::io::stdout().lock();
+    let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    // Whoever closed standard output early has seen what they wanted.
+    written
+        .or_else(|e| if e.kind() == std::io::ErrorKind::BrokenPipe { Ok(()) } else { Err(e) })
+        .map_err(|e| Ended::Failed(anyhow!("cannot write to standard output: {e}")))
+}
+
+/// The answers into the capture's own table.
+fn put_into(dir: &Path, sway: &BTreeMap<NodeName, Swaying>, stop: &AtomicBool) -> Result<(), ExportError> {
+    let file = dir.join("nodes.csv");
+    let explain = |e| ExportError::from_io(file.display().to_string(), 0, e);
+    let old = std::fs::read(&file).map_err(explain)?;
+    let new = renewed(&old, sway)?;
+    if new == old { Ok(()) } else { replace(&file, &new, stop) }
+}
+
+fn put_beside(path: &Path, html: String, stop: &AtomicBool) -> Result<(), ExportError> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    write_files(path.parent().unwrap_or(Path::new("")), &[(name, html.into_bytes())], stop)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn captures_of_one_name_are_told_apart_by_where_they_lie() {
+        let named = |dirs: &[&str]| names(&dirs.iter().map(PathBuf::from).collect::<Vec<_>>());
+        assert_eq!(named(&["/x/calm/oak", "/x/storm/oak/", "/x/elm"]), ["calm/oak", "storm/oak", "elm"]);
+        assert_eq!(named(&["/x/oak"]), ["oak"]);
+    }
+}

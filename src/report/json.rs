@@ -1,0 +1,116 @@
+//! The same for programs.
+
+use super::compare::{Change, Comparison};
+use super::levels::{Growth, Spread, growth, levels};
+use super::matching::Match;
+use super::study::{Branch, Study};
+use crate::dynamics::Start;
+use crate::model::{Interval, Unidentified};
+use serde_json::{Value, json};
+
+/// One object: `captures`, and `comparison`, which is `null` for one capture. What is not known is `null`.
+pub fn json(studies: &[Study], comparison: Option<&Comparison>) -> Value {
+    json!({
+        "captures": studies.iter().map(capture).collect::<Vec<Value>>(),
+        "comparison": comparison.map(|c| compared(studies, c)),
+    })
+}
+
+fn capture(study: &Study) -> Value {
+    let onset = study.onset;
+    json!({
+        "name": study.name,
+        "source": study.source,
+        "from_s": study.span_s[0],
+        "to_s": study.span_s[1],
+        "frames": study.frames,
+        "rate_hz": study.rate_hz(),
+        "gaps": study.gaps_s.iter().map(|[after, long]| json!({ "after_s": after, "length_s": long })).collect::<Vec<_>>(),
+        "excitation": onset.map(|o| o.excitation.word()),
+        "excitation_given": study.given.is_some(),
+        "from_rest": onset.map(|o| o.start == Start::Rest),
+        "released_s": onset.filter(|o| o.excitation == crate::model::Excitation::Release).map(|o| o.at_s),
+        "metres_per_px": (study.metres_per_px > 0.0).then_some(study.metres_per_px),
+        "branches": study.branches.iter().map(|b| branch(study, b)).collect::<Vec<Value>>(),
+        "levels": levels(study).iter().map(|l| json!({
+            "level": l.level,
+            "branches": l.branches,
+            "answers": l.answers,
+            "frequency_hz": l.frequency_hz.as_ref().map(spread),
+            "damping_ratio": l.damping_ratio.as_ref().map(spread),
+        })).collect::<Vec<Value>>(),
+        "growth_by_level_percent": {
+            "frequency": growth(study, |s| Some(s.frequency_hz.value)).map(grown),
+            "damping": growth(study, |s| s.damping_ratio.map(|d| d.value)).map(grown),
+        },
+        "notes": study.notes,
+    })
+}
+
+fn branch(study: &Study, branch: &Branch) -> Value {
+    let sway = branch.known();
+    let metres = (study.metres_per_px > 0.0).then_some(branch.amplitude_px * study.metres_per_px);
+    json!({
+        "node_id": branch.name,
+        "parent_id": branch.parent,
+        "level": branch.level,
+        "points": branch.points,
+        "end_px": [study.foot_px[0] + branch.tip[0], study.foot_px[1] - branch.tip[1]],
+        "length_px": branch.length_px(),
+        "identifiable": sway.is_some(),
+        "frequency_hz": sway.map(|s| interval(&s.frequency_hz)),
+        "damping_ratio": sway.and_then(|s| s.damping_ratio).map(|d| interval(&d)),
+        "amplitude_deg": sway.map(|s| s.amplitude_deg),
+        "amplitude_px": sway.map(|_| branch.amplitude_px),
+        "amplitude_m": sway.and(metres),
+        "spectrum_peak_hz": branch.reference.map(|r| r.peak_hz),
+        "half_power_damping": branch.reference.map(|r| r.damping_ratio),
+        "unidentified": branch.sway.err().map(Unidentified::word),
+        "why": branch.sway.err().map(|why| why.to_string()),
+    })
+}
+
+fn compared(studies: &[Study], comparison: &Comparison) -> Value {
+    let row = |row: &super::Row| {
+        let cell = |k: usize| {
+            let found = k.checked_sub(1).and_then(|k| row.others.get(k));
+            let off = found.and_then(|m| if let Match::Found { off, .. } = m { Some(*off) } else { None });
+            let (first, here) = (row.sway(studies, 0), row.sway(studies, k));
+            let both = first.zip(here).filter(|_| k > 0);
+            json!({
+                "capture": studies[k].name,
+                "node_id": row.branch(studies, k).map(|b| b.name),
+                "unclear": matches!(found, Some(Match::Unclear)),
+                "off": off,
+                "frequency_change_percent": both.and_then(|(a, b)| Change::of_frequency(&a, &b)).map(|c| change(&c)),
+                "damping_change_percent": both.and_then(|(a, b)| Change::of_damping(&a, &b)).map(|c| change(&c)),
+            })
+        };
+        json!({ "node_id": row.name, "in": (0..studies.len()).map(cell).collect::<Vec<Value>>() })
+    };
+    let by_name = |k: usize, value: Value| (studies[k + 1].name.clone(), value);
+    json!({
+        "same_tree": comparison.same_tree,
+        "same_tree_given": comparison.said,
+        "found_again": comparison.shares.iter().enumerate().map(|(k, s)| by_name(k, (*s).into())).collect::<serde_json::Map<_, _>>(),
+        "branches": comparison.rows.iter().map(row).collect::<Vec<Value>>(),
+        "not_matched": comparison.left_over.iter().enumerate()
+            .map(|(k, names)| by_name(k, names.clone().into())).collect::<serde_json::Map<_, _>>(),
+    })
+}
+
+fn interval(i: &Interval) -> Value {
+    json!({ "value": i.value, "lo": i.lo, "hi": i.hi })
+}
+
+fn change(c: &Change) -> Value {
+    json!({ "value": c.percent.value, "lo": c.percent.lo, "hi": c.percent.hi, "beyond": c.beyond })
+}
+
+fn spread(s: &Spread) -> Value {
+    json!({ "n": s.n, "median": s.median, "least": s.least, "largest": s.largest })
+}
+
+fn grown(g: Growth) -> Value {
+    json!({ "value": g.percent.value, "lo": g.percent.lo, "hi": g.percent.hi, "branches": g.branches })
+}

@@ -1,0 +1,205 @@
+//! Which branch of one capture is which of another one of the same tree.
+//!
+//! A capture names its branches as it finds them, so that numbers say nothing across captures. What lasts is where a branch
+//! stands in the picture: from the trunk's foot, in sizes of the tree, so that camera and zoom may differ.
+
+use super::study::{Branch, Study};
+
+/// A branch may have moved by this share of the tree's size from one capture to the next.
+const FARTHEST: f64 = 0.08;
+/// Another branch that is at most so many times as far makes it unclear which one is meant, unless it is as near as this.
+const AS_NEAR: f64 = 1.3;
+const NEAR: f64 = 0.02;
+/// Where a branch ends says more than where it begins: forks are seen as far up as points move together.
+const BASE: f64 = 0.5;
+/// How often the pictures are laid on each other anew, by so many branches at least.
+const ROUNDS: usize = 3;
+const LEAST_PAIRS: usize = 3;
+/// Sizes of two films of one tree are as its farthest branches that were seen, which need not be the same ones.
+const SIZES: [f64; 5] = [1.0, 0.9, 1.1, 0.8, 1.25];
+
+/// What became of a branch of the first capture in another one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Match {
+    /// The branch of that place in [`Study::branches`]; `off` is how far the two are apart, as a share of the tree's size.
+    Found { branch: usize, off: f64 },
+    /// There is none near enough.
+    Missing,
+    /// Two are as near.
+    Unclear,
+}
+
+/// What became of every branch of `first` in `other`; no branch of `other` stands twice.
+pub fn matched(first: &Study, other: &Study) -> Vec<Match> {
+    let size_px = first.size_px();
+    // A camera that stood still, and one that did not.
+    let ratio = size_px / other.size_px();
+    let scales = std::iter::once(1.0).chain(SIZES.iter().map(|s| s * ratio));
+    let starts = scales.map(|scale| Frame { scale, shift: [0.0; 2] });
+    let tried = starts.filter(|f| f.scale.is_finite()).map(|start| {
+        let mut frame = start;
+        let mut found = seen_from(first, other, &frame, size_px);
+        for _ in 0..ROUNDS {
+            frame = frame.refined(first, other, &found);
+            found = seen_from(first, other, &frame, size_px);
+        }
+        let offs: Vec<f64> =
+            found.iter().filter_map(|m| if let Match::Found { off, .. } = m { Some(*off) } else { None }).collect();
+        (offs.len(), offs.iter().sum::<f64>(), found)
+    });
+    let best = tried.reduce(|a, b| if (b.0, a.1) > (a.0, b.1) { b } else { a });
+    best.map_or_else(|| vec![Match::Missing; first.branches.len()], |(_, _, found)| found)
+}
+
+/// Where a branch ends in the first capture and in the other one.
+type Pair = ([f64; 2], [f64; 2]);
+
+/// Where the other capture's picture lies on the first one's: its places times `scale` and on by `shift`, px.
+struct Frame {
+    scale: f64,
+    shift: [f64; 2],
+}
+
+impl Frame {
+    fn place(&self, p: [f64; 2]) -> [f64; 2] {
+        [self.scale * p[0] + self.shift[0], self.scale * p[1] + self.shift[1]]
+    }
+
+    /// The scale and shift by which the branches that were found lie on each other best; the same for few of them.
+    fn refined(&self, first: &Study, other: &Study, found: &[Match]) -> Self {
+        let pairs: Vec<Pair> = found
+            .iter()
+            .enumerate()
+            .filter_map(|(i, m)| match m {
+                Match::Found { branch, .. } => Some((first.branches[i].tip, other.branches[*branch].tip)),
+                _ => None,
+            })
+            .collect();
+        let n = pairs.len() as f64;
+        let mean = |of: &dyn Fn(&Pair) -> f64| pairs.iter().map(of).sum::<f64>() / n;
+        let (a, b) = ([0, 1].map(|c| mean(&|p| p.0[c])), [0, 1].map(|c| mean(&|p| p.1[c])));
+        let product = |p: &Pair| (0..2).map(|c| (p.0[c] - a[c]) * (p.1[c] - b[c])).sum::<f64>();
+        let square = |p: &Pair| (0..2).map(|c| (p.1[c] - b[c]).powi(2)).sum::<f64>();
+        let scale = mean(&product) / mean(&square);
+        if pairs.len() < LEAST_PAIRS || !scale.is_finite() || scale <= 0.0 {
+            return Self { ..*self };
+        }
+        Self { scale, shift: [0, 1].map(|c| a[c] - scale * b[c]) }
+    }
+}
+
+/// What became of the branches if the other capture's picture lies so on the first one's; nearest pairs first.
+fn seen_from(first: &Study, other: &Study, frame: &Frame, size_px: f64) -> Vec<Match> {
+    let off = |a: &Branch, b: &Branch| {
+        let far = |p: [f64; 2], q: [f64; 2]| {
+            let q = frame.place(q);
+            (p[0] - q[0]).hypot(p[1] - q[1]) / size_px
+        };
+        far(a.tip, b.tip).hypot(BASE * far(a.base, b.base))
+    };
+    let table: Vec<Vec<f64>> =
+        first.branches.iter().map(|a| other.branches.iter().map(|b| off(a, b)).collect()).collect();
+    let mut pairs: Vec<(f64, usize, usize)> = table
+        .iter()
+        .enumerate()
+        .flat_map(|(i, row)| row.iter().enumerate().map(move |(j, &d)| (d, i, j)))
+        .filter(|(d, _, _)| *d <= FARTHEST)
+        .collect();
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    let mut out = vec![Match::Missing; first.branches.len()];
+    let mut taken = vec![false; other.branches.len()];
+    for (off, i, j) in pairs {
+        if out[i] != Match::Missing || taken[j] {
+            continue;
+        }
+        let rival = |d: f64| d < AS_NEAR * off && off > NEAR;
+        let others_i = (0..taken.len()).any(|k| k != j && !taken[k] && rival(table[i][k]));
+        let others_j = (0..out.len()).any(|k| k != i && out[k] == Match::Missing && rival(table[k][j]));
+        if others_i || others_j {
+            out[i] = Match::Unclear;
+        } else {
+            out[i] = Match::Found { branch: j, off };
+            taken[j] = true;
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Unidentified;
+
+    /// A tree whose branches end at `tips`, each carried by the trunk.
+    fn study(tips: &[[f64; 2]]) -> Study {
+        let branch = |(i, tip): (usize, &[f64; 2])| Branch {
+            name: i as u32 + 1,
+            parent: (i > 0).then_some(1),
+            level: if i > 0 { 2 } else { 1 },
+            points: 9,
+            base: if i > 0 { tips[0] } else { [0.0; 2] },
+            tip: *tip,
+            sway: Err(Unidentified::TooShort),
+            amplitude_px: f64::NAN,
+            times_s: Vec::new(),
+            plane_deg: Vec::new(),
+            space_deg: Vec::new(),
+            fitted_deg: None,
+            spectrum: None,
+            reference: None,
+            way_px: Vec::new(),
+        };
+        Study {
+            name: String::new(),
+            source: String::new(),
+            size: [640, 360],
+            span_s: [0.0, 1.0],
+            frames: 30,
+            gaps_s: Vec::new(),
+            onset: None,
+            given: None,
+            metres_per_px: 0.0,
+            highest_hz: 5.0,
+            foot_px: [320.0, 340.0],
+            outline_px: Vec::new(),
+            picture: None,
+            branches: tips.iter().enumerate().map(branch).collect(),
+            notes: Vec::new(),
+        }
+    }
+
+    fn found(matches: &[Match]) -> Vec<Option<usize>> {
+        let found = |m: &Match| if let Match::Found { branch, .. } = m { Some(*branch) } else { None };
+        matches.iter().map(found).collect()
+    }
+
+    const TREE: [[f64; 2]; 6] =
+        [[0.0, 100.0], [-80.0, 180.0], [-40.0, 240.0], [10.0, 260.0], [70.0, 230.0], [90.0, 150.0]];
+
+    /// The second film is from farther away, its outline's foot lies elsewhere, and it was cut into branches in another order.
+    #[test]
+    fn a_tree_seen_from_farther_away_and_with_another_foot_is_the_same_tree() {
+        let order = [0, 5, 4, 2, 1];
+        let other: Vec<[f64; 2]> = order.iter().map(|&k| [0.7 * TREE[k][0] + 6.0, 0.7 * TREE[k][1] - 9.0]).collect();
+        let matches = matched(&study(&TREE), &study(&other));
+        assert_eq!(found(&matches), [Some(0), Some(4), Some(3), None, Some(2), Some(1)]);
+        assert_eq!(matches[3], Match::Missing);
+    }
+
+    /// Where two grow together it is not guessed which one is meant.
+    #[test]
+    fn a_branch_with_two_as_near_is_unclear() {
+        let mut other = TREE.to_vec();
+        other[4] = [58.0, 230.0];
+        other.push([82.0, 231.0]);
+        let matches = matched(&study(&TREE), &study(&other));
+        assert_eq!(matches[4], Match::Unclear);
+        assert_eq!(found(&matches)[..4], [Some(0), Some(1), Some(2), Some(3)]);
+    }
+
+    #[test]
+    fn nothing_is_found_in_a_tree_without_branches() {
+        assert_eq!(found(&matched(&study(&TREE), &study(&[]))), [None; 6]);
+        assert!(matched(&study(&[]), &study(&TREE)).is_empty());
+    }
+}

@@ -1,0 +1,23 @@
+//! What a film says of a tree's sway, told to people and programs: a table as text, JSON, and one HTML page with plots after
+//! Hu et al. (002 figures 3, 6, 7, 9 to 12 and 15). Pure: what goes in is analysed already, what comes out is text.
+
+mod compare;
+mod decaying;
+mod html;
+mod json;
+mod levels;
+mod matching;
+mod page;
+mod pieces;
+mod plot;
+mod study;
+mod text;
+mod words;
+
+pub use compare::{Change, Comparison, Row, compare};
+pub use html::page;
+pub use json::json;
+pub use levels::{Growth, Level, Spread, growth, levels};
+pub use matching::{Match, matched};
+pub use study::{Branch, Given, Reference, Study};
+pub use text::text;

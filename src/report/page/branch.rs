@@ -1,0 +1,90 @@
+//! One branch: its angle over time, its spectrum, its way.
+
+use super::figure;
+use super::table::anchor;
+use crate::report::plot::{Answer, Curve, angle, escaped, spectra, way};
+use crate::report::study::{Branch, Study};
+use crate::report::text::{interval, number};
+
+/// Frequencies are drawn up to so many times the highest that was found, and at least to this, Hz.
+const BEYOND: f64 = 1.6;
+const LEAST_HZ: f64 = 2.0;
+
+/// A section with all plots of a branch; folded for one without an answer.
+pub fn branch_part(study: &Study, branch: &Branch) -> String {
+    let of = branch.parent.map_or("the trunk".into(), |p| format!("carried by {p}"));
+    let id = escaped(&anchor(study, branch));
+    let head = format!("Branch {}, {of}", branch.name);
+    match branch.sway {
+        Ok(sway) => {
+            let damping = sway.damping_ratio.map_or("unknown".into(), |d| interval(&d, 3));
+            let said = format!(
+                "{} Hz, damping ratio {damping}, sway {}°{}",
+                interval(&sway.frequency_hz, 3),
+                number(sway.amplitude_deg, 2),
+                at_its_end(study, branch)
+            );
+            format!(
+                "<section class=\"branch\" id=\"{id}\"><h3>{head}</h3><p>{said}</p>{}</section>",
+                plots(study, branch)
+            )
+        }
+        Err(why) => {
+            format!("<details id=\"{id}\"><summary>{head}: {why}</summary>{}</details>", plots(study, branch))
+        }
+    }
+}
+
+fn at_its_end(study: &Study, branch: &Branch) -> String {
+    let px = branch.amplitude_px;
+    if study.metres_per_px > 0.0 && px.is_finite() {
+        format!(", {} m at its end", number(px * study.metres_per_px, 4))
+    } else {
+        String::new()
+    }
+}
+
+fn plots(study: &Study, branch: &Branch) -> String {
+    let in_time = "Angle to its carrier: <span class=\"key\"><i class=\"k kp\"></i>in the picture</span> \
+                   <span class=\"key\"><i class=\"k ks\"></i>in space</span>";
+    let fitted = branch.fitted_deg.as_ref().map_or(
+        "",
+        |_| " <span class=\"key\"><i class=\"k kf\"></i>the part with its own frequency and damping</span>",
+    );
+    let drawn = spectrum(study, branch);
+    let answer = branch
+        .known()
+        .map_or("", |_| " <span class=\"key\"><i class=\"k km\"></i>its frequency; shaded: the interval</span>");
+    let peak = branch.reference.map_or(String::new(), |r| {
+        format!(
+            " <span>Level bar: width at half the power of the peak at {:.2} Hz, damping {:.3} (eq. 6).</span>",
+            r.peak_hz, r.damping_ratio
+        )
+    });
+    format!(
+        "<div class=\"plots\">{}{}{}</div>",
+        figure(angle(study, branch), &format!("{in_time}{fitted}")),
+        figure(drawn, &format!("Spectrum of the angle in the picture.{answer}{peak}")),
+        figure(
+            way(study, branch),
+            "Way of its end in the picture, from its place at rest: <span class=\"key\"><i class=\"k kp\"></i>the first 80 \
+             frames</span> <span class=\"key\"><i class=\"k ks\"></i>all</span>"
+        ),
+    )
+}
+
+fn spectrum(study: &Study, branch: &Branch) -> Option<String> {
+    let answer = Answer {
+        frequency_hz: branch.known().map(|s| s.frequency_hz),
+        peak: branch.reference.map(|r| (r.peak_hz, r.damping_ratio)),
+    };
+    let curve = Curve { spectrum: branch.spectrum.as_ref()?, class: "plane".into(), answer: Some(answer) };
+    spectra(&[curve], highest_hz(&[study]), &format!("Spectrum of the angle of branch {}", branch.name))
+}
+
+/// To which frequency spectra are drawn, Hz: the same for all branches, so that they can be compared.
+pub fn highest_hz(studies: &[&Study]) -> f64 {
+    let found = studies.iter().flat_map(|s| s.branches.iter().filter_map(|b| Some(b.known()?.frequency_hz.value)));
+    let asked = studies.iter().map(|s| s.highest_hz).fold(0.0, f64::max);
+    (BEYOND * found.fold(0.0, f64::max)).max(LEAST_HZ).min(asked)
+}

@@ -1,0 +1,243 @@
+//! One capture, analysed: what the table, the JSON and the page are made from.
+
+use super::decaying::decaying;
+use super::pieces::averaged;
+use crate::dynamics::{Analysis, Film, Onset, Spectrum, angle_in_space_deg, angle_to_parent_deg, spectrum};
+use crate::model::{Excitation, NodeId, Pose, Skeleton, Sway, Swaying, Unidentified};
+
+/// A step from frame to frame that is so many times the usual one is a gap.
+const GAP: f64 = 1.6;
+/// Periods of the lowest frequency that the reference method looks for.
+const LEAST_PERIODS: f64 = 1.5;
+
+/// What a [`Study`] is made from.
+#[derive(Clone, Copy, Debug)]
+pub struct Given<'a> {
+    /// What the capture is called in the report.
+    pub name: &'a str,
+    /// What was filmed: the name of the source.
+    pub source: &'a str,
+    pub skeleton: &'a Skeleton,
+    /// The points that were analysed, and poses of the same time; none where `motion.csv` is missing.
+    pub film: &'a Film,
+    pub poses: &'a [Pose],
+    pub analysis: &'a Analysis,
+    /// What the user says made it sway.
+    pub excitation: Option<Excitation>,
+    /// 0 where no scale is known.
+    pub metres_per_px: f64,
+    /// Highest frequency that is looked for, Hz.
+    pub highest_hz: f64,
+    /// Corners of the region that was tracked, px; empty if unknown.
+    pub outline_px: &'a [[i32; 2]],
+    /// A frame of the film as a `data:` address.
+    pub picture: Option<&'a str>,
+    /// What the reader should know, one sentence each.
+    pub notes: &'a [String],
+}
+
+/// One capture, analysed.
+#[derive(Clone, Debug)]
+pub struct Study {
+    pub name: String,
+    /// What was filmed, without the folders that it lies in.
+    pub source: String,
+    /// Size of the picture, px.
+    pub size: [u32; 2],
+    /// First and last frame that were analysed, s since the first of the capture, and how many there are.
+    pub span_s: [f64; 2],
+    pub frames: usize,
+    /// Times without frames: after which moment, and how long, s.
+    pub gaps_s: Vec<[f64; 2]>,
+    pub onset: Option<Onset>,
+    /// What the user says made it sway; `None` where the signal told.
+    pub given: Option<Excitation>,
+    /// 0 where no scale is known.
+    pub metres_per_px: f64,
+    /// Highest frequency that was looked for, Hz.
+    pub highest_hz: f64,
+    /// The trunk's foot in the picture, px.
+    pub foot_px: [f64; 2],
+    pub outline_px: Vec<[i32; 2]>,
+    pub picture: Option<String>,
+    pub branches: Vec<Branch>,
+    pub notes: Vec<String>,
+}
+
+/// One measured branch. Places are in the picture at rest, px to the right of the trunk's foot and above it.
+#[derive(Clone, Debug)]
+pub struct Branch {
+    /// As in `nodes.csv`.
+    pub name: u32,
+    /// The branch that carries it; `None` for the trunk.
+    pub parent: Option<u32>,
+    pub level: u8,
+    /// Points on it and on all that it carries.
+    pub points: u32,
+    pub base: [f64; 2],
+    pub tip: [f64; 2],
+    pub sway: Swaying,
+    /// Amplitude of the branch's end against the one that carries it, px in the picture; no number where unknown.
+    pub amplitude_px: f64,
+    /// When every angle was, s; empty without poses. The angles are to the branch that carries it, less their mean, degrees:
+    /// in the picture's plane and in space (002 eq. 1); no number where it has no direction.
+    pub times_s: Vec<f64>,
+    pub plane_deg: Vec<f64>,
+    pub space_deg: Vec<f64>,
+    /// After a release: the part of the angle in the picture's plane that has the branch's own frequency and damping.
+    pub fitted_deg: Option<Vec<f64>>,
+    /// Of the angle in the picture's plane, degrees, over the time that the answer comes from; in wind a mean over pieces.
+    pub spectrum: Option<Spectrum>,
+    pub reference: Option<Reference>,
+    /// Where its end went: to the right of its place at rest and above it, px, by [`times_s`](Self::times_s).
+    pub way_px: Vec<[f64; 2]>,
+}
+
+/// What the spectrum's largest peak says: the method of 002.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reference {
+    pub peak_hz: f64,
+    /// By its width at half the power, 002 eq. 6.
+    pub damping_ratio: f64,
+}
+
+impl Study {
+    /// Puts together what is told of a capture.
+    pub fn of(given: &Given) -> Self {
+        let Given { skeleton, film, analysis, .. } = *given;
+        let times = &film.times_s;
+        let usual_s = film.step_s();
+        let gaps_s = times.windows(2).filter(|w| w[1] - w[0] > GAP * usual_s).map(|w| [w[0], w[1] - w[0]]).collect();
+        let ends = times.first().zip(times.last()).map_or([0.0; 2], |(a, b)| [*a, *b]);
+        let source = given.source.rsplit(['/', '\\']).find(|part| !part.is_empty()).unwrap_or_default();
+        let mut study = Self {
+            name: given.name.into(),
+            source: source.into(),
+            size: [skeleton.image_size.width, skeleton.image_size.height],
+            span_s: ends,
+            frames: times.len(),
+            gaps_s,
+            onset: analysis.onset,
+            given: given.excitation,
+            metres_per_px: given.metres_per_px,
+            highest_hz: given.highest_hz,
+            foot_px: skeleton.foot_px,
+            outline_px: given.outline_px.to_vec(),
+            picture: given.picture.map(str::to_owned),
+            branches: Vec::new(),
+            notes: given.notes.to_vec(),
+        };
+        let used_s = study.used_s(times);
+        for i in 1..skeleton.measured() {
+            let sway = analysis.sway.get(i).copied().unwrap_or(Err(Unidentified::NotMeasured));
+            study.branches.push(branch(given, NodeId(i as u32), sway, used_s));
+        }
+        study
+    }
+
+    /// First and last moment that the answers come from, s.
+    fn used_s(&self, times_s: &[f64]) -> [f64; 2] {
+        let Some(onset) = self.onset else { return self.span_s };
+        let at = |k: usize| times_s.get(k).copied();
+        [at(onset.from).unwrap_or(self.span_s[0]), at(onset.to.saturating_sub(1)).unwrap_or(self.span_s[1])]
+    }
+
+    /// Frames a second, by their real times; no number for less than two.
+    pub fn rate_hz(&self) -> f64 {
+        let span_s = self.span_s[1] - self.span_s[0];
+        if span_s > 0.0 { (self.frames.saturating_sub(1)) as f64 / span_s } else { f64::NAN }
+    }
+
+    /// How much higher than the foot, or farther from it, the tree's farthest branch ends, px.
+    pub fn size_px(&self) -> f64 {
+        self.branches.iter().map(|b| b.tip[0].hypot(b.tip[1])).fold(0.0, f64::max)
+    }
+
+    /// The branch of a number.
+    pub fn branch(&self, name: u32) -> Option<&Branch> {
+        self.branches.iter().find(|b| b.name == name)
+    }
+
+    /// How many branches have a frequency.
+    pub fn answers(&self) -> usize {
+        self.branches.iter().filter(|b| b.sway.is_ok()).count()
+    }
+}
+
+impl Branch {
+    /// What is known of its sway.
+    pub fn known(&self) -> Option<Sway> {
+        self.sway.ok()
+    }
+
+    /// Its length in the picture at rest, px.
+    pub fn length_px(&self) -> f64 {
+        (self.tip[0] - self.base[0]).hypot(self.tip[1] - self.base[1])
+    }
+}
+
+fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: [f64; 2]) -> Branch {
+    let Given { skeleton, poses, .. } = *given;
+    let at = &skeleton.nodes[node.index()];
+    let place = |n: NodeId| {
+        let p = skeleton.nodes[n.index()].position;
+        [p.x, p.y]
+    };
+    // A file may say anything; a parent stands before its child.
+    let parent = at.parent.filter(|p| p.index() < node.index()).unwrap_or(NodeId(0));
+    let (base, tip) = (place(parent), place(node));
+    let length_px = (tip[0] - base[0]).hypot(tip[1] - base[1]);
+    let of_node = |p: &Pose| p.joints.get(node.index()).map_or([f64::NAN; 2], |j| [j.position.x, j.position.y]);
+    let times_s: Vec<f64> = poses.iter().map(|p| p.time_s).collect();
+    let [plane_deg, space_deg] =
+        [angle_to_parent_deg(skeleton, poses, node), angle_in_space_deg(skeleton, poses, node)].map(centred);
+    let used: Vec<usize> = (0..times_s.len()).filter(|&k| used_s[0] <= times_s[k] && times_s[k] <= used_s[1]).collect();
+    let of_used = |all: &[f64]| used.iter().map(|&k| all[k]).collect::<Vec<f64>>();
+    let driven = given.analysis.onset.is_none_or(|o| o.excitation == Excitation::Wind);
+    let of_pieces = if driven { averaged } else { spectrum };
+    let spectrum = of_pieces(&of_used(&times_s), &of_used(&plane_deg));
+    let span_s = used_s[1] - used_s[0];
+    let reference = spectrum
+        .as_ref()
+        .filter(|_| span_s > 0.0)
+        .and_then(|s| s.half_power([LEAST_PERIODS / span_s, given.highest_hz]))
+        .map(|(peak_hz, damping_ratio)| Reference { peak_hz, damping_ratio });
+    let carriers = std::iter::successors(Some(parent), |p| skeleton.nodes[p.index()].parent.filter(|q| q < p));
+    // Its end is seen to move with what it carries, too.
+    let carried =
+        (0..skeleton.nodes.len() as u32).map(NodeId).filter(|n| skeleton.nodes[n.index()].parent == Some(node));
+    let others: Vec<Sway> = carriers
+        .chain(carried)
+        .filter_map(|p| given.analysis.sway.get(p.index()).copied().and_then(Result::ok))
+        .collect();
+    let fitted_deg = sway
+        .ok()
+        .filter(|s| s.excitation == Excitation::Release)
+        .zip(given.analysis.onset)
+        .and_then(|(own, onset)| decaying(&times_s, &plane_deg, used_s, onset.at_s, &own, &others));
+    Branch {
+        name: at.name.0,
+        parent: at.parent.and(skeleton.nodes.get(parent.index())).filter(|p| p.parent.is_some()).map(|p| p.name.0),
+        level: at.level,
+        points: at.n_tracks,
+        base,
+        tip,
+        sway,
+        amplitude_px: sway.map_or(f64::NAN, |s| s.amplitude_deg.to_radians() * length_px),
+        way_px: poses.iter().map(of_node).map(|[x, y]| [x - tip[0], y - tip[1]]).collect(),
+        times_s,
+        plane_deg,
+        space_deg,
+        fitted_deg,
+        spectrum,
+        reference,
+    }
+}
+
+/// Less their mean.
+fn centred(mut angles: Vec<f64>) -> Vec<f64> {
+    let seen = || angles.iter().filter(|a| a.is_finite());
+    let mean = seen().sum::<f64>() / (seen().count() as f64).max(1.0);
+    angles.iter_mut().for_each(|a| *a -= mean);
+    angles
+}

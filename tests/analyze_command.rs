@@ -1,0 +1,493 @@
+//! `arborcam analyze`: what a user gets from captures, and what bad input gets.
+
+mod support;
+
+use serde_json::Value;
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::os::unix::process::ExitStatusExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use support::replayed;
+use tempfile::TempDir;
+
+const FAILED: i32 = 1;
+const BAD_USAGE: i32 = 2;
+const NO_INPUT: i32 = 3;
+const STOPPED: i32 = 130;
+
+fn analyze(dirs: &[&Path], more: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
+    command.arg("analyze").args(dirs).args(more).output().expect("arborcam")
+}
+
+fn told(dirs: &[&Path], more: &[&str]) -> Value {
+    let output = analyze(dirs, &[more, &["--json"]].concat());
+    assert!(output.status.success(), "{more:?}: {}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).expect("JSON")
+}
+
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir_all(to).expect("folder");
+    for entry in fs::read_dir(from).expect("folder").flatten() {
+        fs::copy(entry.path(), to.join(entry.file_name())).expect("copy");
+    }
+}
+
+/// A copy of the shipped recording's capture under a name.
+fn captured(name: &str) -> (TempDir, PathBuf) {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let to = dir.path().join(name);
+    copy(replayed(), &to);
+    (dir, to)
+}
+
+/// Changes a table cell by cell: `change` gets the column's name and the text.
+fn edit(file: &Path, change: impl Fn(&str, &str) -> String) {
+    let text = fs::read_to_string(file).expect("table");
+    let mut lines = text.lines();
+    let header = lines.next().expect("header").to_owned();
+    let names: Vec<&str> = header.split(',').collect();
+    let row = |line: &str| names.iter().zip(line.split(',')).map(|(n, c)| change(n, c)).collect::<Vec<_>>().join(",");
+    let rows: Vec<String> = std::iter::once(header.clone()).chain(lines.map(row)).collect();
+    fs::write(file, rows.join("\n") + "\n").expect("table");
+}
+
+/// The columns of `nodes.csv` that are not of the sway, as they stand.
+fn others(dir: &Path) -> Vec<Vec<String>> {
+    let text = fs::read_to_string(dir.join("nodes.csv")).expect("nodes");
+    text.lines().map(|l| l.split(',').take(10).map(str::to_owned).collect()).collect()
+}
+
+fn names_in(dir: &Path) -> Vec<String> {
+    let entries = fs::read_dir(dir).expect("folder").flatten();
+    let mut names: Vec<String> = entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+fn number(v: &Value) -> f64 {
+    v.as_f64().unwrap_or_else(|| panic!("a number, not {v}"))
+}
+
+fn branches(told: &Value) -> &[Value] {
+    told["captures"][0]["branches"].as_array().expect("branches")
+}
+
+fn answered(told: &Value) -> Vec<&Value> {
+    branches(told).iter().filter(|b| b["identifiable"] == true).collect()
+}
+
+/// The table that is printed, the JSON and `nodes.csv` say the same, and nothing else of the capture changes.
+#[test]
+fn the_answers_stand_in_the_table_in_json_and_in_the_capture() {
+    let (_dir, dir) = captured("tree");
+    edit(&dir.join("nodes.csv"), |name, cell| if name.starts_with("frequency") { String::new() } else { cell.into() });
+    let (before, files) = (others(&dir), names_in(&dir));
+    let told = told(&[&dir], &[]);
+    let capture = &told["captures"][0];
+    assert_eq!((&capture["name"], &capture["excitation"]), (&"tree".into(), &"release".into()));
+    assert!((number(&capture["rate_hz"]) - 30.0).abs() < 0.1 && capture["gaps"].as_array().is_some_and(Vec::is_empty));
+    assert!(told["comparison"].is_null());
+    assert_eq!((others(&dir), names_in(&dir)), (before, files));
+    // The trunk of the recording sways at 0.70 Hz; a peak of eleven seconds is broader than the truth's 2 %.
+    let known = answered(&told);
+    assert!(known.len() >= 3, "{} answers", known.len());
+    let trunk = known.iter().find(|b| b["parent_id"].is_null()).expect("the trunk has an answer");
+    assert!((number(&trunk["frequency_hz"]["value"]) / 0.7 - 1.0).abs() < 0.01, "{trunk}");
+    assert!((number(&trunk["spectrum_peak_hz"]) - 0.7).abs() < 0.1);
+    assert!(number(&trunk["half_power_damping"]) > number(&trunk["damping_ratio"]["value"]));
+    for branch in branches(&told) {
+        let sound = branch["identifiable"] == branch["unidentified"].is_null();
+        assert!(sound && branch["frequency_hz"].is_null() == branch["why"].is_string(), "{branch}");
+    }
+    let text = fs::read_to_string(dir.join("nodes.csv")).expect("nodes");
+    let plain = analyze(&[&dir], &[]);
+    let plain = String::from_utf8(plain.stdout).expect("text");
+    for branch in known {
+        let (id, f) = (branch["node_id"].to_string(), number(&branch["frequency_hz"]["value"]));
+        let row = text.lines().find(|l| l.split(',').next() == Some(&id)).expect("its row");
+        let written: f64 = row.split(',').nth(10).expect("cell").parse().expect("number");
+        assert!((written - f).abs() < 1e-5 && row.contains(",true,release,"), "{row}");
+        let line =
+            plain.lines().find(|l| l.starts_with("  ") && l.split_whitespace().next() == Some(&id)).expect("its line");
+        let shown: f64 = line.split_whitespace().nth(4).expect("cell").parse().expect("number");
+        assert!((shown - f).abs() < 6e-4, "{line} lacks {f}");
+    }
+    // Once more: nothing is left to change. --no-write changes nothing either.
+    assert_eq!(fs::read_to_string(dir.join("nodes.csv")).expect("nodes"), text);
+    analyze(&[&dir], &["--no-write", "--excitation", "wind"]);
+    assert_eq!(fs::read_to_string(dir.join("nodes.csv")).expect("nodes"), text);
+    analyze(&[&dir], &["--excitation", "wind"]);
+    assert_ne!(fs::read_to_string(dir.join("nodes.csv")).expect("nodes"), text);
+}
+
+#[test]
+fn the_part_of_the_film_and_its_cause_can_be_chosen() {
+    let (_dir, dir) = captured("tree");
+    let part = told(&[&dir], &["--no-write", "--from", "2", "--to", "9", "--excitation", "release"]);
+    let capture = &part["captures"][0];
+    assert!((number(&capture["from_s"]) - 2.0).abs() < 0.04 && (number(&capture["to_s"]) - 9.0).abs() < 0.04);
+    assert_eq!((&capture["excitation_given"], &capture["from_rest"]), (&true.into(), &false.into()));
+    let short = told(&[&dir], &["--no-write", "--to", "0.6"]);
+    assert!(branches(&short).iter().all(|b| b["unidentified"] == "too_short"), "{}", short["captures"][0]);
+    let text = String::from_utf8(analyze(&[&dir], &["--no-write", "--to", "0.6"]).stdout).expect("text");
+    assert!(text.contains("none: the film is too short"), "{text}");
+}
+
+#[test]
+fn a_known_length_gives_amplitudes_in_metres() {
+    let (_dir, dir) = captured("tree");
+    let of = |more: &[&str]| {
+        let told = told(&[&dir], &[&["--no-write"], more].concat());
+        let trunk = branches(&told)[0].clone();
+        (trunk["amplitude_px"].as_f64().expect("px"), trunk["amplitude_m"].as_f64())
+    };
+    assert_eq!(of(&[]).1, None);
+    let (px, m) = of(&["--scale", "10,20:10,120=2m"]);
+    assert!((m.expect("metres") - 0.02 * px).abs() < 1e-9);
+    assert_eq!(of(&["--metres-per-px", "0.02"]).1, m);
+    // A capture that was made with a scale needs none: its tables are in metres.
+    let made = dir.with_file_name("in-metres");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
+    command.args(["replay", support::CLIP, "--fast", "--headless", "--outline", support::OUTLINE]);
+    command.args(["--scale", "10,20:10,120=2", "--out"]).arg(&made);
+    assert!(command.output().expect("arborcam").status.success());
+    let refused = |more: &[&str]| analyze(&[&dir], more).status.code();
+    assert_eq!(refused(&["--metres-per-px", "nan"]), Some(BAD_USAGE));
+    assert_eq!(refused(&["--metres-per-px", "1e9"]), Some(BAD_USAGE));
+    let own = told(&[&made], &["--no-write"]);
+    let trunk = &branches(&own)[0];
+    assert!((number(&trunk["amplitude_m"]) / m.expect("metres") - 1.0).abs() < 0.01, "{trunk}");
+    assert!((number(&trunk["amplitude_px"]) / px - 1.0).abs() < 0.01);
+}
+
+/// The same tree filmed again: other numbers, from nearer, a little to the side, with half the force.
+fn again(dir: &Path, to: &Path, slower: f64) {
+    copy(dir, to);
+    let renamed =
+        |id: &str| id.parse::<u32>().map_or_else(|_| id.to_owned(), |n| if n < 2 { n } else { n + 300 }.to_string());
+    let number = |c: &str| c.parse::<f64>().expect("number");
+    let is_id = |name: &str| name == "node_id" || name == "parent_id";
+    let time = |c: &str| format!("{:.6}", number(c) * slower);
+    edit(&to.join("nodes.csv"), |name, cell| match name {
+        name if is_id(name) => renamed(cell),
+        "x" | "y" => format!("{:.4}", 1.25 * number(cell)),
+        _ => cell.into(),
+    });
+    edit(&to.join("motion.csv"), |name, cell| match name {
+        "node_id" => renamed(cell),
+        "time_s" => time(cell),
+        "x" | "y" => format!("{:.4}", 1.25 * number(cell)),
+        _ => cell.into(),
+    });
+    edit(&to.join("tracks.csv"), |name, cell| match name {
+        "node_id" => renamed(cell),
+        "time_s" => time(cell),
+        "u_px" | "v_px" => format!("{:.3}", 0.5 * number(cell) + 100.0),
+        _ => cell.into(),
+    });
+    // Which nodes are copies is told by their numbers.
+    let text = fs::read_to_string(to.join("capture.json")).expect("note");
+    let mut note: Value = serde_json::from_str(&text).expect("JSON");
+    for copied in note["model"]["copied"].as_array_mut().expect("copies") {
+        for key in ["node", "original"] {
+            copied[key] = renamed(&copied[key].to_string()).parse::<u32>().expect("number").into();
+        }
+    }
+    fs::write(to.join("capture.json"), note.to_string()).expect("note");
+}
+
+#[test]
+fn the_same_branch_is_found_again_and_its_frequency_compared() {
+    let (_dir, first) = captured("hard");
+    let (gentle, slow) = (first.with_file_name("gentle"), first.with_file_name("slow"));
+    again(&first, &gentle, 1.0);
+    again(&first, &slow, 1.1);
+    let told = told(&[&first, &gentle, &slow], &["--no-write"]);
+    let comparison = &told["comparison"];
+    assert_eq!((&comparison["same_tree"], &comparison["same_tree_given"]), (&true.into(), &false.into()));
+    let mut compared = 0;
+    for row in comparison["branches"].as_array().expect("rows") {
+        let id = row["node_id"].as_u64().expect("id");
+        let renamed = if id < 2 { id } else { id + 300 };
+        let [_, gentle, slow] = [0, 1, 2].map(|k| &row["in"][k]);
+        // Two that grow close together may be unclear; none is taken for another.
+        for found in [gentle, slow] {
+            assert!(found["node_id"].is_null() || found["node_id"] == renamed, "{row}");
+        }
+        if let Some(percent) = gentle["frequency_change_percent"]["value"].as_f64() {
+            assert!(percent.abs() < 1.0 && gentle["frequency_change_percent"]["beyond"] == false, "{row}");
+        }
+        if let Some(percent) = slow["frequency_change_percent"]["value"].as_f64() {
+            assert!(
+                (percent + 100.0 / 11.0).abs() < 1.0 && slow["frequency_change_percent"]["beyond"] == true,
+                "{row}"
+            );
+            compared += 1;
+        }
+    }
+    assert!(compared >= 3, "{compared} frequencies compared");
+    for name in ["gentle", "slow"] {
+        let share = number(&comparison["found_again"][name]);
+        assert!(share > 0.8, "{share} found again in {name}");
+    }
+    let text = String::from_utf8(analyze(&[&first, &slow], &["--no-write"]).stdout).expect("text");
+    assert!(text.contains("Compared with hard as one tree") && text.contains("% (-") && text.contains(" *"), "{text}");
+    // Said to be two trees, their trunks alone are compared.
+    let two = told_of_two(&first, &slow);
+    assert_eq!(two["comparison"]["branches"].as_array().map(Vec::len), Some(1));
+    assert_eq!(two["comparison"]["branches"][0]["in"][1]["frequency_change_percent"]["beyond"], true);
+}
+
+fn told_of_two(a: &Path, b: &Path) -> Value {
+    told(&[a, b], &["--no-write", "--trees", "different"])
+}
+
+/// Every element is closed where it must be, so that a browser shows what was meant.
+fn well_formed(html: &str) {
+    let mut open: Vec<&str> = Vec::new();
+    let mut rest = &html[html.find("<html").expect("html")..];
+    while let Some(at) = rest.find('<') {
+        rest = &rest[at + 1..];
+        let end = rest.find('>').expect("a tag that ends");
+        let tag = &rest[..end];
+        rest = &rest[end..];
+        let name = tag.trim_start_matches('/').split([' ', '/']).next().expect("name");
+        if tag.starts_with('/') {
+            assert_eq!(open.pop(), Some(name));
+        } else if !tag.ends_with('/') && !["meta", "br"].contains(&name) {
+            open.push(name);
+        }
+    }
+    assert!(open.is_empty(), "{open:?}");
+}
+
+#[test]
+fn the_report_is_one_file_that_needs_nothing_else_and_tells_all() {
+    let (_dir, first) = captured("<b>&\"calm");
+    let second = first.with_file_name("storm");
+    again(&first, &second, 1.1);
+    let page = first.with_file_name("new/report.html");
+    let shown = page.display().to_string();
+    let told = told(&[&first, &second], &["--no-write", "--report", &shown, "--scale", "0,0:0,100=1"]);
+    let html = fs::read_to_string(&page).expect("report");
+    for forbidden in ["<script", "http:", "https:", "url(", "@import", "<link", "<b>&\"calm", "NaN", "inf "] {
+        assert!(!html.contains(forbidden), "{forbidden} is in the page");
+    }
+    well_formed(&html);
+    assert!(html.contains("&lt;b&gt;&amp;&quot;calm"));
+    assert!(!html.contains("src=") && html.matches("href=\"data:image/jpeg;base64,").count() == 2);
+    for what in
+        ["pulled and let go at", "frames/s", "no gaps", "m in a pixel", "What this does not say", "How to read this"]
+    {
+        assert!(html.contains(what), "the page lacks {what:?}");
+    }
+    for capture in told["captures"].as_array().expect("captures") {
+        for branch in capture["branches"].as_array().expect("branches") {
+            let part = format!("Branch {},", branch["node_id"]);
+            assert!(html.contains(&part), "the page lacks {part}");
+            if let Some(why) = branch["why"].as_str() {
+                assert!(html.contains(why), "the page lacks {why:?}");
+            }
+        }
+    }
+    // Its bytes are the same every time.
+    let again = first.with_file_name("again.html");
+    analyze(&[&first, &second], &["--no-write", "--report", &again.display().to_string(), "--scale", "0,0:0,100=1"]);
+    assert!(fs::read_to_string(&again).expect("report") == html, "two runs differ");
+}
+
+/// A capture of an older version: no model, no picture, no motion, no columns on what excited it.
+#[test]
+fn an_older_capture_is_analysed_with_what_it_has() {
+    let (_dir, dir) = captured("old");
+    for name in ["motion.csv", "tree.glb", "frame.jpg"] {
+        fs::remove_file(dir.join(name)).expect("remove");
+    }
+    let text = fs::read_to_string(dir.join("nodes.csv")).expect("nodes");
+    let short: Vec<String> = text.lines().map(|l| l.split(',').take(17).collect::<Vec<_>>().join(",")).collect();
+    fs::write(dir.join("nodes.csv"), short.join("\r\n") + "\r\n").expect("nodes");
+    let page = dir.with_file_name("old.html");
+    let output = analyze(&[&dir], &["--report", &page.display().to_string()]);
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{told}");
+    assert!(told.contains("lacks motion.csv"), "{told}");
+    let text = fs::read_to_string(dir.join("nodes.csv")).expect("nodes");
+    assert!(text.lines().next().expect("header").ends_with(",identifiable,excitation,amplitude_deg,unidentified"));
+    assert!(text.contains(",true,release,") && text.ends_with("\r\n"), "{text}");
+    well_formed(&fs::read_to_string(page).expect("report"));
+}
+
+/// What is done to the text of a table.
+type Damage<'a> = &'a dyn Fn(&str) -> String;
+
+/// What is no number, or no film, gives no number that is not supported.
+#[test]
+fn damaged_tracks_give_reasons_and_no_numbers() {
+    let cases: &[(&str, Damage)] = &[
+        ("backwards", &|text| {
+            let (header, rows) = text.split_once('\n').expect("header");
+            format!("{header}\n{}\n", rows.lines().rev().collect::<Vec<_>>().join("\n"))
+        }),
+        ("empty", &|text| format!("{}\n", text.lines().next().expect("header"))),
+        ("nowhere", &|text| {
+            let row = |l: &str| {
+                let c: Vec<&str> = l.split(',').collect();
+                format!("{},{},{},NaN,inf,{}", c[0], c[1], c[2], c[5])
+            };
+            let (header, rows) = text.split_once('\n').expect("header");
+            format!("{header}\n{}\n", rows.lines().map(row).collect::<Vec<_>>().join("\n"))
+        }),
+        ("still", &|text| {
+            let row = |l: &str| {
+                let c: Vec<&str> = l.split(',').collect();
+                format!("{},{},{},{},50,{}", c[0], c[1], c[2], c[0], c[5])
+            };
+            let (header, rows) = text.split_once('\n').expect("header");
+            format!("{header}\n{}\n", rows.lines().map(row).collect::<Vec<_>>().join("\n"))
+        }),
+    ];
+    for (name, change) in cases {
+        let (_dir, dir) = captured(name);
+        let text = fs::read_to_string(dir.join("tracks.csv")).expect("tracks");
+        fs::write(dir.join("tracks.csv"), change(&text)).expect("tracks");
+        let page = dir.with_file_name("page.html");
+        let told = told(&[&dir], &["--report", &page.display().to_string()]);
+        assert!(answered(&told).is_empty(), "{name}: {:?}", answered(&told));
+        assert!(branches(&told).iter().all(|b| b["why"].is_string()), "{name}");
+        well_formed(&fs::read_to_string(page).expect("report"));
+    }
+}
+
+#[test]
+fn a_tree_of_one_branch_is_a_tree() {
+    let (_dir, dir) = captured("pole");
+    let text = fs::read_to_string(dir.join("nodes.csv")).expect("nodes");
+    fs::write(dir.join("nodes.csv"), text.lines().take(3).collect::<Vec<_>>().join("\n") + "\n").expect("nodes");
+    edit(
+        &dir.join("tracks.csv"),
+        |name, cell| if name == "node_id" && !cell.is_empty() { "1".into() } else { cell.into() },
+    );
+    let told = told(&[&dir], &["--report", &dir.with_file_name("pole.html").display().to_string()]);
+    assert_eq!(branches(&told).len(), 1);
+}
+
+#[test]
+fn bad_input_gets_a_line_and_the_right_status() {
+    let (_dir, dir) = captured("tree");
+    let at = |name: &str| dir.with_file_name(name);
+    let variant = |name: &str, change: &dyn Fn(&Path)| {
+        copy(&dir, &at(name));
+        change(&at(name));
+        at(name)
+    };
+    fs::create_dir(at("empty")).expect("folder");
+    let no_tracks = variant("no-tracks", &|d| fs::remove_file(d.join("tracks.csv")).expect("remove"));
+    let bad_time = variant("bad-time", &|d| {
+        edit(&d.join("tracks.csv"), |n, c| if n == "time_s" { "soon".into() } else { c.into() })
+    });
+    let cyclic = variant("cyclic", &|d| {
+        edit(&d.join("nodes.csv"), |n, c| if n == "parent_id" && c == "1" { "9999".into() } else { c.into() })
+    });
+    let taken = at("taken.html");
+    fs::write(&taken, "mine").expect("file");
+    let taken = taken.display().to_string();
+    let settings = at("bad.toml");
+    fs::write(&settings, "[dynamics]\nwindow_s = -1\n").expect("file");
+    let settings = settings.display().to_string();
+    let (absent, empty) = (at("absent"), at("empty"));
+    let cases: Vec<(Vec<&Path>, Vec<&str>, i32, &str)> = vec![
+        (vec![], vec![], BAD_USAGE, "<DIR>"),
+        (vec![&absent], vec![], NO_INPUT, "is no capture"),
+        (vec![&empty], vec![], NO_INPUT, "is no capture"),
+        (vec![&dir, &absent], vec![], NO_INPUT, "absent is no capture"),
+        (vec![&no_tracks], vec![], NO_INPUT, "lacks tracks.csv"),
+        (vec![&bad_time], vec![], NO_INPUT, "line 2: time_s is \"soon\""),
+        (vec![&cyclic], vec![], NO_INPUT, "9999"),
+        (vec![&dir, &dir], vec![], BAD_USAGE, "is given twice"),
+        (vec![&dir], vec!["--from", "5", "--to", "5"], BAD_USAGE, "--from 5 is not before --to 5"),
+        (vec![&dir], vec!["--from", "-1"], BAD_USAGE, "give a number of seconds"),
+        (vec![&dir], vec!["--from", "nan"], BAD_USAGE, "give a number of seconds"),
+        (vec![&dir], vec!["--scale", "1,1:1,1=2"], BAD_USAGE, "at least a pixel apart"),
+        (vec![&dir], vec!["--scale", "1,1:9,1=2", "--metres-per-px", "1"], BAD_USAGE, "cannot be used with"),
+        (vec![&dir], vec!["--report", &taken], FAILED, "exists already"),
+        (vec![&dir], vec!["--config", &settings], BAD_USAGE, "dynamics.window_s"),
+        (vec![&dir], vec!["--excitation", "storm"], BAD_USAGE, "storm"),
+    ];
+    let before = fs::read(dir.join("nodes.csv")).expect("nodes");
+    for (dirs, more, status, words) in cases {
+        let output = analyze(&dirs, &more);
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(status), "{dirs:?} {more:?}: {error}");
+        assert!(error.contains(words) && error.starts_with("arborcam: "), "{dirs:?} {more:?}: {error}");
+        assert!(output.stdout.is_empty(), "{dirs:?} {more:?} printed something");
+    }
+    assert_eq!(fs::read(dir.join("nodes.csv")).expect("nodes"), before);
+}
+
+/// The table is there for who cannot write, or has no room; the capture is then as it was.
+#[test]
+fn where_nothing_can_be_written_the_table_is_printed_all_the_same() {
+    let (_dir, dir) = captured("tree");
+    let old = "node_id,parent_id,level,n_tracks,x,y,z,radius\n0,,0,9,0,0,0,3\n1,0,1,9,0,90,0,3\n";
+    fs::write(dir.join("nodes.csv"), old).expect("nodes");
+    edit(
+        &dir.join("tracks.csv"),
+        |name, cell| if name == "node_id" && !cell.is_empty() { "1".into() } else { cell.into() },
+    );
+    fs::remove_file(dir.join("motion.csv")).expect("remove");
+    let before = names_in(&dir);
+    // No file may grow: as on a full disk, also for root.
+    let mut command = Command::new("sh");
+    command.args(["-c", "trap '' XFSZ; ulimit -f 0; exec \"$0\" analyze \"$1\""]);
+    let output = command.arg(env!("CARGO_BIN_EXE_arborcam")).arg(&dir).output().expect("sh");
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(FAILED), "{error}");
+    let last = error.lines().last().expect("a line");
+    assert!(last.starts_with("arborcam: cannot write") && last.contains("nodes.csv"), "{error}");
+    assert!(String::from_utf8_lossy(&output.stdout).contains("frequency, Hz"));
+    assert_eq!(fs::read_to_string(dir.join("nodes.csv")).expect("nodes"), old);
+    assert_eq!(names_in(&dir), before);
+}
+
+/// The film again and again: its analysis takes a while.
+fn prolong(dir: &Path, times: u32) {
+    let text = fs::read_to_string(dir.join("tracks.csv")).expect("tracks");
+    let (header, rows) = text.split_once('\n').expect("header");
+    let lap = |k: u32| {
+        let row = move |line: &str| {
+            let cells: Vec<&str> = line.split(',').collect();
+            let time_s = cells[2].parse::<f64>().expect("time") + 11.0 * f64::from(k);
+            format!("{},{},{time_s:.6},{}\n", cells[0], cells[1], cells[3..].join(","))
+        };
+        rows.lines().map(row).collect::<String>()
+    };
+    let all: String = (0..times).map(lap).collect();
+    fs::write(dir.join("tracks.csv"), format!("{header}\n{all}")).expect("tracks");
+}
+
+#[test]
+fn whoever_stops_it_finds_everything_as_it_was() {
+    let (_dir, dir) = captured("tree");
+    prolong(&dir, 8);
+    let note = dir.join("capture.json");
+    let mut told: Value = serde_json::from_slice(&fs::read(&note).expect("note")).expect("JSON");
+    // Told before the work begins: the sign to stop it.
+    told["timing"]["duration_s"] = 900.into();
+    fs::write(&note, told.to_string()).expect("note");
+    let (before, page) = (fs::read(dir.join("nodes.csv")).expect("nodes"), dir.with_file_name("page.html"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
+    command.arg("analyze").arg(&dir).arg("--report").arg(&page).args(["--excitation", "wind"]);
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("arborcam");
+    let mut line = String::new();
+    BufReader::new(child.stderr.take().expect("pipe")).read_line(&mut line).expect("line");
+    assert!(line.contains("longer than 600 s"), "{line}");
+    // SAFETY: the child is ours and not yet waited for.
+    unsafe { libc::kill(child.id() as i32, libc::SIGINT) };
+    let status = child.wait().expect("status");
+    assert_eq!((status.code(), status.signal()), (Some(STOPPED), None));
+    assert_eq!(fs::read(dir.join("nodes.csv")).expect("nodes"), before);
+    assert_eq!(names_in(dir.parent().expect("folder")), ["tree"]);
+    assert!(names_in(&dir).iter().all(|n| !n.contains("partial")));
+}
