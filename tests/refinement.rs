@@ -218,3 +218,29 @@ fn a_tree_that_cannot_be_followed_to_the_present_is_not_taken() {
     }
     panic!("no refinement");
 }
+
+/// A slow computer: the camera's frames go on with the standing tree until the new one is worked out.
+#[test]
+fn a_refinement_that_is_late_is_taken_when_it_is_there() {
+    let run = run();
+    let mut back = BackEnd::new(&run.config);
+    let mut late = 0;
+    for set in &run.sets {
+        if back.needs_refinement(set.time_s) {
+            late += 1;
+            if late <= 20 {
+                back.put_off_refinement(set.time_s);
+            } else {
+                let tree = back.refinement().expect("a refinement").run();
+                back.put_refinement(tree);
+            }
+        }
+        let outline = run.frames[0].0.outline.clone();
+        back.step(Followed { tracks: set.clone(), outline, preview: None, received: Instant::now() });
+        if back.tree().is_some_and(|tree| tree.refinements > 0) {
+            assert_eq!(late, 21, "taken before it was there");
+            return;
+        }
+    }
+    panic!("no refinement");
+}

@@ -131,6 +131,15 @@ fn wind() {
     assert!(median < 0.012, "the trunk is off by {median} Hz");
 }
 
+/// Whoever films for longer is told more, not less.
+#[test]
+fn two_minutes_of_wind() {
+    let filming = Filming { seconds: 120.0, ..Filming::default() };
+    let found = run(400..416, Drive::Wind, &filming);
+    found.print("wind, 120 s");
+    found.holds(0.9, 0.4, [0.02, 0.3], [0.75, 0.8]);
+}
+
 /// The true sway is 2 Hz, which such a film shows as something else.
 #[test]
 fn a_film_of_few_frames_a_second_claims_nothing() {

@@ -88,6 +88,12 @@ impl Signals {
         Fit { rss: self.rss(&fit), ..fit }
     }
 
+    /// Whether a mode stands where the search ends: what it describes lies beyond.
+    pub fn at_limit(&self, mode: &Mode) -> bool {
+        let at = |x: f64, limits: [f64; 2]| limits.iter().any(|l| (x / l).ln().abs() < 1e-6);
+        at(mode.frequency_hz, self.frequencies_hz) || at(mode.damping, DAMPING)
+    }
+
     /// The squares that are left with what the priors add: a prior weighs as much as the noise of one value allows.
     fn cost(&self, x: &[f64], rss: f64, priors: &[Prior]) -> f64 {
         let off = |(m, prior): (usize, &Prior)| {

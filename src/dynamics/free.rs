@@ -82,6 +82,8 @@ pub(super) fn sways(
     let all = members;
     // The release, and how sure that is, s: the trunk's own fit knows it better than the eye.
     let mut moment = [onset.at_s, MOMENT_SD * film.step_s()];
+    // Whether the trunk's sway, which all points have, could be told.
+    let mut told = false;
     for (i, members) in members.iter().enumerate().skip(1) {
         alive();
         let parent = skeleton.nodes[i].parent.filter(|p| p.index() < i);
@@ -93,13 +95,46 @@ pub(super) fn sways(
         }
         let base_px = skeleton.image_from_model(&skeleton.nodes[parent.unwrap_or(NodeId(0)).index()].position);
         let parts = parts(members, &points.tracks, i, all);
-        out[i] =
-            branch(film, &points, &ancestors, &parts, base_px, (onset, &mut moment), demands).map(|(found, sway)| {
-                own[i] = Some(found);
-                sway
-            });
+        let found = branch(film, &points, &ancestors, &parts, base_px, (onset, &mut moment), demands);
+        let carrier = parent.map_or(0, |p| p.index());
+        let found = found.and_then(|(found, sway)| {
+            let beside: Vec<usize> =
+                all[carrier].iter().copied().filter(|k| members.binary_search(k).is_err()).collect();
+            let seen = || carries(film, &beside, &ancestors, &found.mode, onset, moment[0], demands);
+            if i > 1 && !told && seen() { Err(Unidentified::AncestorsSway) } else { Ok((found, sway)) }
+        });
+        told |= i == 1 && found.is_ok();
+        out[i] = found.map(|(found, sway)| {
+            own[i] = Some(found);
+            sway
+        });
     }
     out
+}
+
+/// Whether the points `beside` a branch, on the one that carries it, have its mode too: it is then no sway of the branch's own.
+/// Nobody knows where there are too few.
+fn carries(
+    film: &Film,
+    beside: &[usize],
+    ancestors: &[Own],
+    mode: &Mode,
+    onset: &Onset,
+    moment_s: f64,
+    demands: &Demands,
+) -> bool {
+    let points = Points::of(film, beside, onset.from);
+    if points.tracks.len() < LEAST_POINTS {
+        return true;
+    }
+    let times = film.times_s[onset.from..].iter().map(|t| t - moment_s).collect();
+    let signals = Signals::new(times, &points.signals, onset.start, MOMENT_SD, demands.frequencies_hz);
+    let modes = ancestors.iter().map(|a| a.mode).chain([*mode]).collect();
+    let factors = signals.factors(&Fit { modes, ..Fit::default() }, points.signals.len());
+    let has = |uv: &&[Vec<Factor>]| {
+        uv.iter().filter_map(|f| f.last()).map(|f| f.significance).sum::<f64>() > SIGNIFICANT.powi(2)
+    };
+    2 * factors.chunks(2).filter(has).count() >= points.tracks.len()
 }
 
 fn branch(
@@ -150,6 +185,7 @@ fn branch(
     let factors = signals.factors(&fit, points.signals.len());
     let chosen = (old..fit.modes.len())
         .filter(|&m| fit.modes[m].damping < HARDLY && fit.modes[m].frequency_hz * span_s >= LEAST_PERIODS)
+        .filter(|&m| !signals.at_limit(&fit.modes[m]))
         .filter_map(|m| Some((m, shared(&factors, m)?)))
         .filter(|(m, _)| parts.iter().all(|part| everywhere(&factors, *m, part)))
         .max_by(|a, b| a.1.0.total_cmp(&b.1.0).then(a.1.1.total_cmp(&b.1.1)));
@@ -197,10 +233,10 @@ fn branch(
     let sd = sd.map(|sd| WIDER * sd);
     let own = Own { mode, sd };
     let frequency_hz = interval(mode.frequency_hz, sd[0]);
-    if sd[0].is_nan() || Z * sd[0] > demands.widest {
+    if !(sd[0] > 0.0 && Z * sd[0] <= demands.widest) {
         return Err(Unidentified::TooUncertain);
     }
-    let damping_ratio = (Z * sd[1] <= 1.0).then(|| interval(mode.damping, sd[1]));
+    let damping_ratio = (sd[1] > 0.0 && Z * sd[1] <= 1.0).then(|| interval(mode.damping, sd[1]));
     let amplitude_deg = amplitude_deg(film, points, &factors, m, base_px, onset);
     Ok((own, Sway { frequency_hz, damping_ratio, excitation: Excitation::Release, amplitude_deg }))
 }

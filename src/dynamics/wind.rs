@@ -20,10 +20,14 @@ const LEAST_POINTS: usize = 2;
 /// Oscillators that are looked for beyond the ancestors', and ancestors that are kept.
 const MOST_NEW: usize = 3;
 const ANCESTORS: usize = 2;
-/// Frames a period of the highest frequency, and frames in all, beyond which neighbours are taken together as their mean: they
-/// cost time and tell little.
+/// Frames a period of the highest frequency beyond which neighbours are taken together as their mean: they cost time and tell
+/// little.
 const FRAMES_PER_PERIOD: f64 = 3.0;
-const MOST_FRAMES: usize = 450;
+/// Longer films, in frames that are left, are thinned to so many a second, if there are as many; and frequencies are looked for
+/// up to this share of the rate. A mean over neighbours hides what is faster, and does not show it as something slower.
+const LONG: usize = 900;
+const LONG_HZ: f64 = 7.5;
+const OF_RATE: f64 = 0.3;
 const LEAST_FRAMES: usize = 48;
 /// Motion that is taken for noise, px.
 const NOISE_PX: f64 = 0.15;
@@ -39,6 +43,9 @@ const DAMPING: [f64; 2] = [0.003, 0.4];
 /// The curvature of the likelihood is that at its top, and gusts are no exact process: intervals are so much wider. Found on
 /// made-up trees (tests/sway_trees.rs).
 const WIDER: f64 = 1.1;
+/// And they do not shrink below these standard deviations of the logarithms of frequency and damping, however long the film is: the
+/// carrier's motion is taken off as a multiple of what its points show, which is not all of it. Found likewise.
+const LEAST_SD: [f64; 2] = [0.012, 0.25];
 /// Trees are damped by some hundredths of the critical: a weak prior for films that are too short to tell, as the standard
 /// deviation of a logarithm.
 const USUAL_DAMPING: f64 = 0.05;
@@ -132,8 +139,9 @@ fn branch(
     let rows: Vec<usize> = (0..film.times_s.len())
         .filter(|&k| common.shift_px.iter().chain(of_carrier.iter().copied()).all(|s| s[k].is_finite()))
         .collect();
-    let fine = ((1.0 / film.step_s()) / (FRAMES_PER_PERIOD * demands.highest_hz)).floor() as usize;
-    let every = fine.max(rows.len().div_ceil(MOST_FRAMES)).max(1);
+    let at_rate = |hz: f64| ((1.0 / film.step_s()) / hz).round().max(1.0) as usize;
+    let fine = at_rate(FRAMES_PER_PERIOD * demands.highest_hz);
+    let every = if rows.len() / fine > LONG { at_rate(LONG_HZ).max(fine) } else { fine };
     let rows = neighbours(&rows, &film.times_s, every, film.step_s());
     if rows.len() < LEAST_FRAMES {
         return Err(Unidentified::TooShort);
@@ -156,7 +164,11 @@ fn branch(
     if variance.sqrt() < NOISE_PX {
         return Err(Unidentified::AncestorsSway);
     }
-    let step_s = every as f64 * film.step_s();
+    let [lowest_hz, highest_hz] = demands.frequencies_hz;
+    let frequencies_hz = match every {
+        1 => demands.frequencies_hz,
+        _ => [lowest_hz, highest_hz.min(OF_RATE / (every as f64 * film.step_s()))],
+    };
     let problem = Problem {
         times_s: times_s.clone(),
         values,
@@ -164,8 +176,8 @@ fn branch(
         ancestors: ancestors.iter().map(|a| a.mode).collect(),
         drift_per_s: DRIFTS / film.span_s(),
     };
-    let signals = Signals::new(times_s, &[rest], Start::Moving, 1.0, demands.frequencies_hz);
-    let (x, bounds) = best(&problem, &signals, variance, demands.frequencies_hz);
+    let signals = Signals::new(times_s, &[rest], Start::Moving, 1.0, frequencies_hz);
+    let (x, bounds) = best(&problem, &signals, variance, frequencies_hz);
     let first_new = 3 + ancestors.len();
     if x.len() == first_new {
         return Err(if ancestors.is_empty() { Unidentified::NoOscillation } else { Unidentified::AncestorsSway });
@@ -185,7 +197,10 @@ fn branch(
     }
     for k in order {
         let sd = |i: usize| covariance.as_ref().map_or(f64::INFINITY, |c| c[(i, i)]).max(0.0).sqrt() * WIDER;
-        let (mode, sd) = (Mode { frequency_hz: x[k + 1].exp(), damping: x[k + 2].exp() }, [sd(k + 1), sd(k + 2)]);
+        let (mode, sd) = (
+            Mode { frequency_hz: x[k + 1].exp(), damping: x[k + 2].exp() },
+            [sd(k + 1).hypot(LEAST_SD[0]), sd(k + 2).hypot(LEAST_SD[1])],
+        );
         let same = |a: &Own| (a.mode.frequency_hz / mode.frequency_hz).ln().abs() < APART * a.sd[0].hypot(sd[0]);
         if at_bound(k + 1) || at_bound(k + 2) {
             continue;
@@ -194,17 +209,17 @@ fn branch(
             last = Unidentified::AncestorsSway;
             continue;
         }
-        if !(sd[0] > 0.0 && Z * sd[0] <= demands.widest) {
+        if !(sd[0] > LEAST_SD[0] && Z * sd[0] <= demands.widest) {
             return Err(Unidentified::TooUncertain);
         }
         // Gusts are not known well enough for a likelihood to tell a frequency from its mirror image at such a rate.
-        if 1.0 / step_s - mode.frequency_hz <= demands.highest_hz {
+        if 1.0 / film.step_s() - mode.frequency_hz <= demands.highest_hz {
             return Err(Unidentified::AboveSampling);
         }
         let arm = (common.middle_px[0] - base_px[0]).hypot(common.middle_px[1] - base_px[1]);
         let sway = Sway {
             frequency_hz: interval(mode.frequency_hz, sd[0]),
-            damping_ratio: (Z * sd[1] <= 1.0).then(|| interval(mode.damping, sd[1])),
+            damping_ratio: (sd[1] > LEAST_SD[1] && Z * sd[1] <= 1.0).then(|| interval(mode.damping, sd[1])),
             excitation: Excitation::Wind,
             amplitude_deg: (2.0 * x[k].exp()).sqrt().atan2(arm).to_degrees(),
         };

@@ -187,6 +187,14 @@ impl BackEnd {
         self.refiner.as_ref().is_some_and(|r| r.is_due(time_s))
     }
 
+    /// Lets frames up to this time do without the result. What comes of it then hangs on the clock: for a camera, which
+    /// does not wait.
+    pub fn put_off_refinement(&mut self, time_s: f64) {
+        if let Some(refiner) = &mut self.refiner {
+            refiner.put_off(time_s);
+        }
+    }
+
     /// Takes the result of [`refinement`](Self::refinement).
     pub fn put_refinement(&mut self, tree: Option<Tree>) {
         if let Some(refiner) = &mut self.refiner {

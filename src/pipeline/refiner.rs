@@ -135,6 +135,13 @@ impl Refiner {
         matches!(&self.stage, Stage::Building(_, due_s, None) if time_s >= *due_s)
     }
 
+    /// Makes the result due after the frame of this time.
+    pub fn put_off(&mut self, time_s: f64) {
+        if let Stage::Building(_, due_s, None) = &mut self.stage {
+            *due_s = due_s.max(time_s.next_up());
+        }
+    }
+
     /// The result of [`work`](Self::work).
     pub fn put(&mut self, tree: Option<Tree>) {
         if let Stage::Building(_, _, done) = &mut self.stage {

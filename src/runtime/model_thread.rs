@@ -150,7 +150,7 @@ impl ModelThread {
 
     fn step(&mut self, followed: Followed) -> Moved {
         let hurry = self.shared.hurry.load(Ordering::Relaxed);
-        self.refining.hand_in(&mut self.back, followed.tracks.time_s, hurry);
+        self.refining.hand_in(&mut self.back, followed.tracks.time_s, self.job.pace == Pace::Live, hurry);
         let moved = self.back.step(followed);
         if !hurry {
             self.refining.begin(&self.back);

@@ -17,9 +17,13 @@ impl Refining {
     }
 
     /// Hands the result in before the frame at `time_s` (s) that needs it. In a `hurry` the standing tree has to do: to
-    /// wait may take as long as a build.
-    pub fn hand_in(&mut self, back: &mut BackEnd, time_s: f64, hurry: bool) {
+    /// wait may take as long as a build. A camera is not made to wait (`live`): the frame does without.
+    pub fn hand_in(&mut self, back: &mut BackEnd, time_s: f64, live: bool, hurry: bool) {
         if !back.needs_refinement(time_s) {
+            return;
+        }
+        if live && !hurry && self.0.as_ref().is_some_and(|work| !work.is_finished()) {
+            back.put_off_refinement(time_s);
             return;
         }
         match self.0.take().filter(|_| !hurry).map(JoinHandle::join) {
