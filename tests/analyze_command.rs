@@ -132,7 +132,10 @@ fn the_part_of_the_film_and_its_cause_can_be_chosen() {
     let short = told(&[&dir], &["--no-write", "--to", "0.6"]);
     assert!(branches(&short).iter().all(|b| b["unidentified"] == "too_short"), "{}", short["captures"][0]);
     let text = String::from_utf8(analyze(&[&dir], &["--no-write", "--to", "0.6"]).stdout).expect("text");
-    assert!(text.contains("none: the film is too short"), "{text}");
+    assert!(text.contains("none: the film is too short") && text.contains("0.0 to 0.6 s of the film"), "{text}");
+    // Beyond the end there is no film, and so none that is too long.
+    let beyond = analyze(&[&dir], &["--no-write", "--to", "1000"]);
+    assert!(beyond.status.success() && beyond.stderr.is_empty(), "{}", String::from_utf8_lossy(&beyond.stderr));
 }
 
 #[test]
@@ -312,7 +315,7 @@ fn an_older_capture_is_analysed_with_what_it_has() {
     let output = analyze(&[&dir], &["--report", &page.display().to_string()]);
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{told}");
-    assert!(told.contains("lacks motion.csv"), "{told}");
+    assert!(told.contains("lacks motion.csv") && told.contains("the picture of the capture is left out"), "{told}");
     let text = fs::read_to_string(dir.join("nodes.csv")).expect("nodes");
     assert!(text.lines().next().expect("header").ends_with(",identifiable,excitation,amplitude_deg,unidentified"));
     assert!(text.contains(",true,release,") && text.ends_with("\r\n"), "{text}");
@@ -326,10 +329,6 @@ type Damage<'a> = &'a dyn Fn(&str) -> String;
 #[test]
 fn damaged_tracks_give_reasons_and_no_numbers() {
     let cases: &[(&str, Damage)] = &[
-        ("backwards", &|text| {
-            let (header, rows) = text.split_once('\n').expect("header");
-            format!("{header}\n{}\n", rows.lines().rev().collect::<Vec<_>>().join("\n"))
-        }),
         ("empty", &|text| format!("{}\n", text.lines().next().expect("header"))),
         ("nowhere", &|text| {
             let row = |l: &str| {
@@ -390,6 +389,18 @@ fn bad_input_gets_a_line_and_the_right_status() {
     let cyclic = variant("cyclic", &|d| {
         edit(&d.join("nodes.csv"), |n, c| if n == "parent_id" && c == "1" { "9999".into() } else { c.into() })
     });
+    // In any other order every row would be a frame of its own: rows times points of memory.
+    let reordered = |name: &str, order: &dyn Fn(&mut Vec<&str>)| {
+        variant(name, &|d| {
+            let text = fs::read_to_string(d.join("tracks.csv")).expect("tracks");
+            let mut rows: Vec<&str> = text.lines().collect();
+            let header = rows.remove(0);
+            order(&mut rows);
+            fs::write(d.join("tracks.csv"), format!("{header}\n{}\n", rows.join("\n"))).expect("tracks");
+        })
+    };
+    let backwards = reordered("backwards", &|rows| rows.reverse());
+    let by_point = reordered("by-point", &|rows| rows.sort_by_key(|r| r.split(',').next().map(str::len)));
     let taken = at("taken.html");
     fs::write(&taken, "mine").expect("file");
     let taken = taken.display().to_string();
@@ -405,6 +416,8 @@ fn bad_input_gets_a_line_and_the_right_status() {
         (vec![&no_tracks], vec![], NO_INPUT, "lacks tracks.csv"),
         (vec![&bad_time], vec![], NO_INPUT, "line 2: time_s is \"soon\""),
         (vec![&cyclic], vec![], NO_INPUT, "9999"),
+        (vec![&backwards], vec![], NO_INPUT, "rows of one frame stand together, in order of time"),
+        (vec![&by_point], vec![], NO_INPUT, "rows of one frame stand together, in order of time"),
         (vec![&dir, &dir], vec![], BAD_USAGE, "is given twice"),
         (vec![&dir], vec!["--from", "5", "--to", "5"], BAD_USAGE, "--from 5 is not before --to 5"),
         (vec![&dir], vec!["--from", "-1"], BAD_USAGE, "give a number of seconds"),
@@ -467,18 +480,45 @@ fn prolong(dir: &Path, times: u32) {
     fs::write(dir.join("tracks.csv"), format!("{header}\n{all}")).expect("tracks");
 }
 
+fn lasts(dir: &Path, seconds: u32) {
+    let note = dir.join("capture.json");
+    let mut told: Value = serde_json::from_slice(&fs::read(&note).expect("note")).expect("JSON");
+    told["timing"]["duration_s"] = seconds.into();
+    fs::write(&note, told.to_string()).expect("note");
+}
+
+/// Points do not live for ever: of the whole of a long film there are few that last, and good answers would go.
+#[test]
+fn of_a_long_film_the_end_is_looked_at_as_the_capture_did() {
+    let (_dir, dir) = captured("long");
+    prolong(&dir, 7);
+    lasts(&dir, 77);
+    let part = |more: &[&str]| {
+        let told = told(&[&dir], &[&["--no-write", "--excitation", "release"], more].concat());
+        let capture = &told["captures"][0];
+        let noted = capture["notes"].to_string().contains("of 77 s of film the last 60 (dynamics.window_s)");
+        ([number(&capture["from_s"]), number(&capture["to_s"])].map(f64::round), noted)
+    };
+    assert_eq!(part(&[]), ([17.0, 77.0], true));
+    assert_eq!(part(&["--from", "0"]), ([0.0, 77.0], false));
+    assert_eq!(part(&["--to", "66"]), ([0.0, 66.0], false));
+    let settings = dir.with_file_name("window.toml");
+    fs::write(&settings, "[dynamics]\nwindow_s = 300\n").expect("file");
+    assert_eq!(part(&["--config", &settings.display().to_string()]), ([0.0, 77.0], false));
+    let output = analyze(&[&dir], &["--no-write", "--excitation", "release"]);
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains(" to 77.0 s of the film"), "{text}");
+}
+
 #[test]
 fn whoever_stops_it_finds_everything_as_it_was() {
     let (_dir, dir) = captured("tree");
     prolong(&dir, 8);
-    let note = dir.join("capture.json");
-    let mut told: Value = serde_json::from_slice(&fs::read(&note).expect("note")).expect("JSON");
     // Told before the work begins: the sign to stop it.
-    told["timing"]["duration_s"] = 900.into();
-    fs::write(&note, told.to_string()).expect("note");
+    lasts(&dir, 900);
     let (before, page) = (fs::read(dir.join("nodes.csv")).expect("nodes"), dir.with_file_name("page.html"));
     let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
-    command.arg("analyze").arg(&dir).arg("--report").arg(&page).args(["--excitation", "wind"]);
+    command.arg("analyze").arg(&dir).arg("--report").arg(&page).args(["--excitation", "wind", "--from", "0"]);
     let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("arborcam");
     let mut line = String::new();
     BufReader::new(child.stderr.take().expect("pipe")).read_line(&mut line).expect("line");

@@ -19,7 +19,7 @@ use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-/// Film that is analysed at most, s: the end of a longer one. Points of hours would fill the memory.
+/// Film that is analysed at most, s, where a part is chosen: the end of a longer one. Points of hours would fill the memory.
 const LONGEST_S: f64 = 600.0;
 
 /// One capture and what is to be written into it.
@@ -79,19 +79,34 @@ fn analysed(args: &AnalyzeArgs, captured: &Captured, name: &str) -> Result<Analy
     own.export.metres_per_px = captured.metres_per_px();
     let config = args.config(&own)?;
     let dynamics = &config.dynamics;
-    let film = captured.tracked_within(LONGEST_S, args.within_s())?;
+    // As at the end of a capture: points do not live for ever, and of those that are gone nothing is said.
+    let chosen = args.from.is_some() || args.to.is_some();
+    let longest_s = if chosen { LONGEST_S } else { dynamics.window_s };
+    let film = captured.tracked_within(longest_s, args.within_s())?;
     let mut notes: Vec<String> = captured.note.warnings.clone();
-    let mut warn = |what: String| {
-        say(&format!("arborcam: warning: {name}: {what}"));
+    let mut tell = |kind: &str, what: String| {
+        say(&format!("arborcam: {kind}: {name}: {what}"));
         notes.push(what);
     };
+    captured.warnings.iter().for_each(|what| tell("warning", what.clone()));
     let ends = film.times_s.first().copied().zip(film.times_s.last().copied());
     let [from_s, to_s] = ends.map_or([0.0; 2], |(a, b)| [a, b]);
-    let wanted_s = args.to.unwrap_or(captured.note.timing.duration_s) - args.from.unwrap_or(0.0);
-    if wanted_s > LONGEST_S + 1.0 {
-        warn(format!(
-            "the film is longer than {LONGEST_S:.0} s; its end is analysed; choose another part with --from and --to"
-        ));
+    let duration_s = captured.note.timing.duration_s;
+    let wanted_s = args.to.map_or(duration_s, |to| to.min(duration_s)) - args.from.unwrap_or(0.0);
+    if wanted_s > longest_s + 1.0 {
+        let (kind, what) = match chosen {
+            true => (
+                "warning",
+                format!("the film is longer than {LONGEST_S:.0} s; its end is analysed; choose another part"),
+            ),
+            false => (
+                "note",
+                format!(
+                    "of {duration_s:.0} s of film the last {longest_s:.0} (dynamics.window_s) are analysed; choose others"
+                ),
+            ),
+        };
+        tell(kind, format!("{what} with --from and --to"));
     }
     // Nothing was measured on copies.
     let skeleton = Skeleton {
@@ -111,7 +126,7 @@ fn analysed(args: &AnalyzeArgs, captured: &Captured, name: &str) -> Result<Analy
         })
     });
     if let Err(e) = all.and_then(|done| done) {
-        warn(format!("there are no plots of angles and spectra: {e}"));
+        tell("warning", format!("there are no plots of angles and spectra: {e}"));
         poses.clear();
     }
     let picture = captured.picture.as_ref().filter(|_| args.report.is_some());

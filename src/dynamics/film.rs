@@ -1,6 +1,7 @@
 //! The points of a film, by the branch that they are on: what sway is measured from.
 
 use crate::model::{NodeId, Skeleton, TrackId, TrackSet};
+use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
@@ -43,11 +44,13 @@ impl Film {
         self.times_s.last().zip(self.times_s.first()).map_or(0.0, |(b, a)| b - a)
     }
 
-    /// The first frames of the film, without frame `to` and what comes after.
-    pub fn until(&self, to: usize) -> Self {
-        let to = to.min(self.times_s.len());
+    /// The first frames of the film, without frame `to` and what comes after; itself where nothing comes after.
+    pub fn until(&self, to: usize) -> Cow<'_, Self> {
+        if to >= self.times_s.len() {
+            return Cow::Borrowed(self);
+        }
         let short = |t: &FilmTrack| FilmTrack { node: t.node, at_px: t.at_px[..to].to_vec() };
-        Self { times_s: self.times_s[..to].to_vec(), tracks: self.tracks.iter().map(short).collect() }
+        Cow::Owned(Self { times_s: self.times_s[..to].to_vec(), tracks: self.tracks.iter().map(short).collect() })
     }
 
     /// Time that three quarters of the frames are not farther apart than, s; infinite for less than two frames.
@@ -79,7 +82,7 @@ impl FilmLog {
         self.push_points(set.time_s, set.observations.iter().map(|o| (o.id, [o.u_px, o.v_px])));
     }
 
-    /// Takes points of the next frame, px.
+    /// Takes the points of the next frame, px; what comes with the same time is of the same frame.
     pub fn push_points(&mut self, time_s: f64, points: impl Iterator<Item = (TrackId, [f32; 2])>) {
         match self.sets.back_mut() {
             Some((last, all)) if *last == time_s => *all = all.iter().copied().chain(points).collect(),
@@ -107,5 +110,20 @@ impl FilmLog {
         }
         let times: Vec<f64> = self.sets.iter().map(|(t, _)| *t).collect();
         Film::new(&times, by_id.into_values().flatten().collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ten minutes of points are some hundred megabytes: no copy is made of a film that is used whole.
+    #[test]
+    fn only_a_film_that_is_cut_is_copied() {
+        let at_px = (0..4).map(|k| [f64::from(k), 1.0]).collect();
+        let film = Film::new(&[0.0, 0.1, 0.2, 0.3], vec![FilmTrack { node: NodeId(1), at_px }]);
+        assert!(matches!(film.until(4), Cow::Borrowed(_)) && matches!(film.until(9), Cow::Borrowed(_)));
+        let cut = film.until(3);
+        assert_eq!((cut.times_s.len(), cut.tracks[0].at_px.last()), (3, Some(&[2.0, 1.0])));
     }
 }

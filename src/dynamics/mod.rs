@@ -24,4 +24,4 @@ pub use decay::{Mode, Start};
 pub use film::{Film, FilmLog, FilmTrack};
 pub use release::Onset;
 pub use spectrum::{Spectrum, spectrum};
-pub use sway::{Analysis, analyse, analyse_with};
+pub use sway::{Analysis, LEAST_PERIODS, analyse, analyse_with};

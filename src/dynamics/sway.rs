@@ -12,8 +12,8 @@ use crate::model::{Excitation, Skeleton, Swaying, Unidentified};
 const LEAST_FRAMES: usize = 32;
 /// Share of half the rate of the frames up to which frequencies are looked for.
 const BELOW_NYQUIST: f64 = 0.9;
-/// Periods of the lowest frequency that is looked for.
-const LEAST_PERIODS: f64 = 1.5;
+/// Periods that a film must have of the lowest frequency that is looked for in it.
+pub const LEAST_PERIODS: f64 = 1.5;
 
 /// What a film says of the sway of its tree.
 #[derive(Clone, Debug)]

@@ -66,18 +66,22 @@ struct Row<'a> {
 fn rows(text: &[u8]) -> Vec<Row<'_>> {
     let mut out = Vec::new();
     let (mut cells, mut from, mut quoted, mut k) = (Vec::new(), 0, false, 0);
+    // Where a quote opens a cell; anywhere else it is a letter, as an inch in a note.
+    let mut begin = if text.starts_with("\u{feff}".as_bytes()) { 3 } else { 0 };
     while k < text.len() {
         match text[k] {
-            b'"' => quoted = !quoted,
+            b'"' if quoted && text.get(k + 1) == Some(&b'"') => k += 1,
+            b'"' if quoted => quoted = false,
+            b'"' if k == begin => quoted = true,
             b',' if !quoted => {
                 cells.push(&text[from..k]);
-                from = k + 1;
+                (from, begin) = (k + 1, k + 1);
             }
             b'\n' if !quoted => {
                 let stop = if k > from && text[k - 1] == b'\r' { k - 1 } else { k };
                 cells.push(&text[from..stop]);
                 out.push(Row { cells: std::mem::take(&mut cells), end: &text[stop..=k] });
-                from = k + 1;
+                (from, begin) = (k + 1, k + 1);
             }
             _ => {}
         }
@@ -124,6 +128,19 @@ mod tests {
         assert_eq!(lines[2], ",9,0.7,0.63,0.77,0.04,0.036,0.044,true,1e3,wind,1.5,");
         // Once more: nothing changes.
         assert_eq!(renewed(out.as_bytes(), &known).unwrap(), out.as_bytes());
+    }
+
+    /// A quote within a cell is a letter, as it is for the reader of tables: else the row would swallow those after it.
+    #[test]
+    fn a_quote_opens_a_cell_only_where_it_begins() {
+        let text = "\u{feff}\"node_id\",note,frequency_hz\n1,3\" thick,7\n2,\"a\"\", b\",8\n3,\"\",9\n";
+        let out =
+            String::from_utf8(renewed(text.as_bytes(), &BTreeMap::from([(NodeName(2), sway())])).unwrap()).unwrap();
+        let lines: Vec<&str> = out.lines().collect();
+        assert_eq!(lines.len(), 4, "{out}");
+        assert!(lines[0].starts_with("\u{feff}\"node_id\",note,frequency_hz,"), "{out}");
+        assert!(lines[1].starts_with("1,3\" thick,,") && lines[1].ends_with(",not_measured"), "{out}");
+        assert!(lines[2].starts_with("2,\"a\"\", b\",0.7,") && lines[3].starts_with("3,\"\",,"), "{out}");
     }
 
     #[test]

@@ -8,10 +8,15 @@ use crate::dynamics::{Spectrum, spectrum};
 /// Length of a piece, s; each begins in the middle of the one before.
 pub const PIECE_S: f64 = 20.0;
 
+/// Length of what [`averaged`] looks at in one piece, s, of a film of `span_s`: no period that is much longer shows.
+pub fn looked_at_s(span_s: f64) -> f64 {
+    if span_s < 1.5 * PIECE_S { span_s } else { PIECE_S }
+}
+
 /// The root of the mean square of the pieces' spectra; the film's own where it is shorter than a piece and a half.
 pub fn averaged(times_s: &[f64], values: &[f64]) -> Option<Spectrum> {
     let (first, last) = (*times_s.first()?, *times_s.last()?);
-    if last - first < 1.5 * PIECE_S {
+    if looked_at_s(last - first) >= last - first {
         return spectrum(times_s, values);
     }
     let count = ((last - first - PIECE_S) / (0.5 * PIECE_S)).floor() as usize + 1;

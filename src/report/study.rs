@@ -1,14 +1,14 @@
 //! One capture, analysed: what the table, the JSON and the page are made from.
 
 use super::decaying::decaying;
-use super::pieces::averaged;
-use crate::dynamics::{Analysis, Film, Onset, Spectrum, angle_in_space_deg, angle_to_parent_deg, spectrum};
+use super::pieces::{averaged, looked_at_s};
+use crate::dynamics::{
+    Analysis, Film, LEAST_PERIODS, Onset, Spectrum, angle_in_space_deg, angle_to_parent_deg, spectrum,
+};
 use crate::model::{Excitation, NodeId, Pose, Skeleton, Sway, Swaying, Unidentified};
 
 /// A step from frame to frame that is so many times the usual one is a gap.
 const GAP: f64 = 1.6;
-/// Periods of the lowest frequency that the reference method looks for.
-const LEAST_PERIODS: f64 = 1.5;
 
 /// What a [`Study`] is made from.
 #[derive(Clone, Copy, Debug)]
@@ -194,14 +194,7 @@ fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: [f64; 2]) -> Branc
     let used: Vec<usize> = (0..times_s.len()).filter(|&k| used_s[0] <= times_s[k] && times_s[k] <= used_s[1]).collect();
     let of_used = |all: &[f64]| used.iter().map(|&k| all[k]).collect::<Vec<f64>>();
     let driven = given.analysis.onset.is_none_or(|o| o.excitation == Excitation::Wind);
-    let of_pieces = if driven { averaged } else { spectrum };
-    let spectrum = of_pieces(&of_used(&times_s), &of_used(&plane_deg));
-    let span_s = used_s[1] - used_s[0];
-    let reference = spectrum
-        .as_ref()
-        .filter(|_| span_s > 0.0)
-        .and_then(|s| s.half_power([LEAST_PERIODS / span_s, given.highest_hz]))
-        .map(|(peak_hz, damping_ratio)| Reference { peak_hz, damping_ratio });
+    let (spectrum, reference) = seen(&of_used(&times_s), &of_used(&plane_deg), driven, given.highest_hz);
     let carriers = std::iter::successors(Some(parent), |p| skeleton.nodes[p.index()].parent.filter(|q| q < p));
     // Its end is seen to move with what it carries, too.
     let carried =
@@ -234,10 +227,41 @@ fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: [f64; 2]) -> Branc
     }
 }
 
+/// The spectrum of an angle, of one that wind has `driven` as a mean over pieces, and what its largest peak says.
+fn seen(times_s: &[f64], angle_deg: &[f64], driven: bool, highest_hz: f64) -> (Option<Spectrum>, Option<Reference>) {
+    let spectrum = if driven { averaged(times_s, angle_deg) } else { spectrum(times_s, angle_deg) };
+    let span_s = times_s.last().zip(times_s.first()).map_or(0.0, |(b, a)| b - a);
+    // What is slower is drift, that the bins of the piece cannot tell from sway.
+    let piece_s = if driven { looked_at_s(span_s) } else { span_s };
+    let reference = spectrum
+        .as_ref()
+        .filter(|_| piece_s > 0.0)
+        .and_then(|s| s.half_power([LEAST_PERIODS / piece_s, highest_hz]))
+        .map(|(peak_hz, damping_ratio)| Reference { peak_hz, damping_ratio });
+    (spectrum, reference)
+}
+
 /// Less their mean.
 fn centred(mut angles: Vec<f64>) -> Vec<f64> {
     let seen = || angles.iter().filter(|a| a.is_finite());
     let mean = seen().sum::<f64>() / (seen().count() as f64).max(1.0);
     angles.iter_mut().for_each(|a| *a -= mean);
     angles
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Pieces of 20 s cannot tell a sway of 20 s from drift, however many minutes of wind there are.
+    #[test]
+    fn drift_that_is_as_slow_as_a_piece_is_not_the_reference() {
+        let times: Vec<f64> = (0..3600).map(|k| f64::from(k) / 30.0).collect();
+        let wave = |hz: f64, t: f64| (std::f64::consts::TAU * hz * t).sin();
+        let angle: Vec<f64> = times.iter().map(|t| 1.5 * wave(0.05, *t) + wave(0.8, *t)).collect();
+        let peak_hz = |driven| seen(&times, &angle, driven, 5.0).1.unwrap().peak_hz;
+        assert!((peak_hz(true) - 0.8).abs() < 0.03, "{} Hz", peak_hz(true));
+        // In one piece of two minutes it is a sway like any other.
+        assert!((peak_hz(false) - 0.05).abs() < 0.01, "{} Hz", peak_hz(false));
+    }
 }

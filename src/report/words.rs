@@ -22,13 +22,12 @@ pub fn excitation(study: &Study) -> String {
     }
 }
 
-/// How many frames in what time.
+/// What part of the film was analysed, and how many frames that is.
 pub fn frames(study: &Study) -> String {
     let [from, to] = study.span_s;
     let rate = study.rate_hz();
     let rate = if rate.is_finite() { format!(" at {rate:.1} frames/s") } else { String::new() };
-    let begin = if from > 0.0005 { format!(" from {from:.1} s on") } else { String::new() };
-    format!("{:.1} s{begin}, {}{rate}", to - from, number_of(study.frames, "frame"))
+    format!("{from:.1} to {to:.1} s of the film, {}{rate}", number_of(study.frames, "frame"))
 }
 
 /// What is missing between the frames.

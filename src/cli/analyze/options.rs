@@ -25,7 +25,7 @@ pub struct AnalyzeArgs {
     /// What made the tree sway; `auto` looks at the motion.
     #[arg(long, value_name = "WHAT")]
     excitation: Option<Cause>,
-    /// First moment of the film to look at, s.
+    /// First moment of the film to look at, s; without --from and --to it is the end of it, `dynamics.window_s` long.
     #[arg(long, value_name = "SECONDS", value_parser = moment, allow_negative_numbers = true)]
     pub from: Option<f64>,
     /// Last moment of the film to look at, s.

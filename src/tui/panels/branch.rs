@@ -99,7 +99,9 @@ fn sways(frame: &mut Frame, s: &Snapshot, b: &BranchRow, (note, area): (Rect, Re
         frame.render_widget(Line::styled(" angle: none in this picture", theme.faint()), note);
         return;
     };
-    let text = format!(" angle {} to {}°, last {:.0} s", value(low), value(high), span_s.min(newest_s.max(0.0)));
+    // A branch may be younger than the panel is wide.
+    let drawn_s = seen.first().map_or(0.0, |(t, _)| newest_s - t);
+    let text = format!(" angle {} to {}°, last {drawn_s:.0} s", value(low), value(high));
     frame.render_widget(Line::styled(text, theme.faint()), note);
     // Tracking noise must not look like a storm.
     let (low, high) = plot::widened(low, high, 1.0);
@@ -147,7 +149,8 @@ fn axis_below(
     area: Rect,
     theme: Theme,
 ) {
-    let end = format!("{top_hz:.0} Hz");
+    // Frames that are few, or a limit that the user has set, end it anywhere.
+    let end = format!("{} Hz", format!("{top_hz:.1}").trim_end_matches(".0"));
     let end_from = area.width.saturating_sub(end.len() as u16);
     let put = |frame: &mut Frame, x: u16, text: &str, style| {
         let width = (text.chars().count() as u16).min(area.width.saturating_sub(x));

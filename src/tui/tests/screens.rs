@@ -138,6 +138,33 @@ fn an_unknown_sway_is_told_by_its_reason() {
     }
 }
 
+/// Scales say what is drawn: of few frames a second the axis ends below 1 Hz, and a young branch has few seconds.
+#[test]
+fn the_plots_of_a_branch_have_true_scales() {
+    let text_of = |last_hz: f64, rows: usize| {
+        let mut s = snapshot(Phase::Live);
+        let mut sway = super::made_up::sway();
+        for branch in sway.branches.values_mut() {
+            branch.spectrum.iter_mut().for_each(|s| s.bin_hz = last_hz / s.amplitude_deg.len() as f64);
+        }
+        s.sway = Some(Arc::new(sway));
+        let gone = s.angles.rows.len() - rows;
+        s.angles.rows = s.angles.rows.iter().skip(gone).cloned().collect();
+        let mut state = state(s);
+        // One without an answer, which may stand in the way of the axis' end.
+        state.choose(6);
+        drawn(&state, Depth::None, 200, 60).to_string()
+    };
+    for (last_hz, rows, end, seconds) in [
+        (0.4, 151, "0.4 Hz", ", last 5 s "),
+        (0.96, 601, " 1 Hz", ", last 20 s "),
+        (0.75, 31, " 0.8 Hz", ", last 1 s "),
+    ] {
+        let text = text_of(last_hz, rows);
+        assert!(text.contains(end) && text.contains(seconds), "{end}{seconds}: {text}");
+    }
+}
+
 #[test]
 fn branches_are_coloured_alike_in_picture_table_and_tree() {
     // So wide that the points are not mixed with the picture.
