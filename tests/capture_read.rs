@@ -172,6 +172,7 @@ fn damage_is_named_with_file_and_line() {
         ("nodes.csv", |t| with(t, 5, 0, "4294967295"), "nodes.csv, line 5: node_id is 4294967295"),
         ("nodes.csv", |t| with(t, 5, 6, "2e6"), "nodes.csv, line 5: x is \"2e6\", which is 2000000 px"),
         ("nodes.csv", |t| with(t, 5, 9, "2e6"), "nodes.csv, line 5: radius is \"2e6\""),
+        ("nodes.csv", |t| with(t, 5, 9, "-1"), "nodes.csv, line 5: radius is -1"),
         ("motion.csv", |t| with(t, 90, 4, "-1e7"), "motion.csv, line 90: y is \"-1e7\""),
         ("capture.json", |t| noted(t, |n| n["model"]["foot_px"] = [1e18, 300.0].into()), "foot_px is far from"),
         ("capture.json", |t| noted(t, |n| n["model"]["metres_per_px"] = 1e-9.into()), "no tree is so large"),

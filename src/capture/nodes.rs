@@ -65,12 +65,15 @@ pub(super) fn read(dir: &Path, note: &ModelNote, image_size: Size) -> Result<(Sk
         }
         let position = table.place_px([4, 5, 6], px)?;
         let radius = table.length_px(7, "radius", px)?;
+        if radius < 0.0 {
+            return Err(table.bad(format!("radius is {radius}, and must not be below 0")));
+        }
         nodes.push(Node {
             name: NodeName(name),
             parent,
             level,
             position,
-            radius: radius.max(0.0),
+            radius,
             n_tracks: table.whole(3, "n_tracks")?,
             certainty: 0.0,
             copy_of: None,

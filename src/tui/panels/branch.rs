@@ -157,17 +157,22 @@ fn axis_below(
         frame.render_widget(Line::styled(text.to_owned(), style), Rect { x: area.x + x, width, ..area });
     };
     put(frame, 0, "0", theme.faint());
-    put(frame, end_from, &end, theme.faint());
+    let mut taken_to = 0;
     if let Some(i) = interval {
         let at = column(i.value);
         let text = value(i.value);
         let room = text.chars().count() as u16;
+        taken_to = at + 1;
         put(frame, at, "▲", theme.warning());
         if at + 1 + room < end_from {
             put(frame, at + 1, &text, theme.strong());
+            taken_to += room;
         } else if at > room {
             put(frame, at - room, &text, theme.strong());
         }
+    }
+    if taken_to < end_from {
+        put(frame, end_from, &end, theme.faint());
     }
 }
 
