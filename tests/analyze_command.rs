@@ -420,6 +420,8 @@ fn bad_input_gets_a_line_and_the_right_status() {
         (vec![&by_point], vec![], NO_INPUT, "rows of one frame stand together, in order of time"),
         (vec![&dir, &dir], vec![], BAD_USAGE, "is given twice"),
         (vec![&dir], vec!["--from", "5", "--to", "5"], BAD_USAGE, "--from 5 is not before --to 5"),
+        (vec![&dir], vec!["--from", "3600"], BAD_USAGE, "--from 3600 is after the end of"),
+        (vec![&dir], vec!["--from", "3600", "--to", "3700"], BAD_USAGE, "--from 3600 is after the end of"),
         (vec![&dir], vec!["--from", "-1"], BAD_USAGE, "give a number of seconds"),
         (vec![&dir], vec!["--from", "nan"], BAD_USAGE, "give a number of seconds"),
         (vec![&dir], vec!["--scale", "1,1:1,1=2"], BAD_USAGE, "at least a pixel apart"),

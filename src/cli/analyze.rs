@@ -92,6 +92,12 @@ fn analysed(args: &AnalyzeArgs, captured: &Captured, name: &str) -> Result<Analy
     let ends = film.times_s.first().copied().zip(film.times_s.last().copied());
     let [from_s, to_s] = ends.map_or([0.0; 2], |(a, b)| [a, b]);
     let duration_s = captured.note.timing.duration_s;
+    if let Some(from) = args.from.filter(|from| film.times_s.is_empty() && *from > duration_s) {
+        let what = format!(
+            "--from {from} is after the end of {name}, which is {duration_s:.1} s long; choose an earlier part"
+        );
+        return Err(Ended::BadUsage(anyhow!(what)));
+    }
     let wanted_s = args.to.map_or(duration_s, |to| to.min(duration_s)) - args.from.unwrap_or(0.0);
     if wanted_s > longest_s + 1.0 {
         let (kind, what) = match chosen {

@@ -36,8 +36,8 @@ const ALIKE: f64 = 0.003;
 const FAR: f64 = 4.0;
 /// Points that a branch must have.
 const LEAST_POINTS: usize = 2;
-/// Periods that must have been seen.
-const LEAST_PERIODS: f64 = 1.5;
+/// Periods that must have been seen: of fewer, branches that lie close together in frequency look like one.
+const LEAST_PERIODS: f64 = 3.0;
 /// Damping above which an oscillation is none that could be seen.
 const HARDLY: f64 = 0.2;
 /// Motion that is taken for noise, px.
@@ -96,13 +96,8 @@ pub(super) fn sways(
         let base_px = skeleton.image_from_model(&skeleton.nodes[parent.unwrap_or(NodeId(0)).index()].position);
         let parts = parts(members, &points.tracks, i, all);
         let found = branch(film, &points, &ancestors, &parts, base_px, (onset, &mut moment), demands);
-        let carrier = parent.map_or(0, |p| p.index());
-        let found = found.and_then(|(found, sway)| {
-            let beside: Vec<usize> =
-                all[carrier].iter().copied().filter(|k| members.binary_search(k).is_err()).collect();
-            let seen = || carries(film, &beside, &ancestors, &found.mode, onset, moment[0], demands);
-            if i > 1 && !told && seen() { Err(Unidentified::AncestorsSway) } else { Ok((found, sway)) }
-        });
+        // All points have the trunk's sway: where it is not known, a branch would be given it.
+        let found = if i == 1 || told { found } else { found.and(Err(Unidentified::AncestorsSway)) };
         told |= i == 1 && found.is_ok();
         out[i] = found.map(|(found, sway)| {
             own[i] = Some(found);
@@ -110,31 +105,6 @@ pub(super) fn sways(
         });
     }
     out
-}
-
-/// Whether the points `beside` a branch, on the one that carries it, have its mode too: it is then no sway of the branch's own.
-/// Nobody knows where there are too few.
-fn carries(
-    film: &Film,
-    beside: &[usize],
-    ancestors: &[Own],
-    mode: &Mode,
-    onset: &Onset,
-    moment_s: f64,
-    demands: &Demands,
-) -> bool {
-    let points = Points::of(film, beside, onset.from);
-    if points.tracks.len() < LEAST_POINTS {
-        return true;
-    }
-    let times = film.times_s[onset.from..].iter().map(|t| t - moment_s).collect();
-    let signals = Signals::new(times, &points.signals, onset.start, MOMENT_SD, demands.frequencies_hz);
-    let modes = ancestors.iter().map(|a| a.mode).chain([*mode]).collect();
-    let factors = signals.factors(&Fit { modes, ..Fit::default() }, points.signals.len());
-    let has = |uv: &&[Vec<Factor>]| {
-        uv.iter().filter_map(|f| f.last()).map(|f| f.significance).sum::<f64>() > SIGNIFICANT.powi(2)
-    };
-    2 * factors.chunks(2).filter(has).count() >= points.tracks.len()
 }
 
 fn branch(

@@ -81,7 +81,7 @@ impl AnalyzeArgs {
         }
         let [from, to] = self.within_s();
         if from >= to {
-            return unfit(format!("--from {from} is not before --to {to}; turn them round"));
+            return unfit(format!("--from {from} is not before --to {to}; --from comes first"));
         }
         match &self.report {
             Some(path) if path.file_name().is_none() => {
