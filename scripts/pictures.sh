@@ -151,8 +151,8 @@ terminal() {
         "env TERM=tmux-256color COLORTERM=truecolor ARBORCAM_PREVIEW=halfblocks '$arborcam' replay '${film[winter]}' \
         --outline '${outline[winter]}' --out '$work/screen'; sleep 60"
     for ((k = 0; k < 60; k++)); do
-        sleep 1
-        tmux -L "$server" capture-pane -p | grep -q ' live ' && tmux -L "$server" capture-pane -p | grep -q 'Front' && break
+        sleep 0.3
+        tmux -L "$server" capture-pane -p | grep -q '±' && break
     done
     # Paused, so that the film does not end before the picture is taken.
     tmux -L "$server" send-keys Space m
