@@ -32,7 +32,7 @@ pub struct AngleToParent {
 impl AngleToParent {
     /// Follows the branch that ends in `node`.
     pub fn new(skeleton: &Skeleton, node: NodeId) -> Self {
-        let parent = parent_of(skeleton, node);
+        let parent = skeleton.ancestors(node).next();
         let carrier = parent.and_then(|parent| carrier(skeleton, parent));
         Self { nodes: skeleton.nodes.len(), own: parent.map(|p| [p, node]), carrier, last_deg: None }
     }
@@ -61,9 +61,9 @@ impl AngleToParent {
 /// along the direction in which it sways most. Unlike the arc cosine of 002 eq. 1 it tells the two sides of a branch that
 /// goes on straight. NaN for poses of another skeleton.
 pub fn angle_in_space_deg(skeleton: &Skeleton, poses: &[Pose], node: NodeId) -> Vec<f64> {
-    let Some(parent) = parent_of(skeleton, node) else { return vec![f64::NAN; poses.len()] };
+    let Some(parent) = skeleton.ancestors(node).next() else { return vec![f64::NAN; poses.len()] };
     let own = skeleton.nodes[node.index()].position - skeleton.nodes[parent.index()].position;
-    let grand = parent_of(skeleton, parent).map(|_| parent);
+    let grand = skeleton.ancestors(parent).next().map(|_| parent);
     let turns: Vec<Option<Vector3<f64>>> = poses
         .iter()
         .map(|pose| {
@@ -89,15 +89,10 @@ pub fn angle_in_space_deg(skeleton: &Skeleton, poses: &[Pose], node: NodeId) -> 
     turns.iter().map(|t| t.map_or(f64::NAN, |t| t.dot(&axis).to_degrees())).collect()
 }
 
-fn parent_of(skeleton: &Skeleton, node: NodeId) -> Option<NodeId> {
-    // A file may say anything; a child comes after its parent, which ends every walk downwards.
-    skeleton.nodes.get(node.index())?.parent.filter(|p| p.index() < node.index())
-}
-
 /// The nearest branch at or below the one that ends in `node` that has a direction in the picture.
 fn carrier(skeleton: &Skeleton, node: NodeId) -> Option<(NodeId, NodeId)> {
     let (mut end, nodes) = (node, &skeleton.nodes);
-    while let Some(start) = parent_of(skeleton, end) {
+    while let Some(start) = skeleton.ancestors(end).next() {
         let way = nodes[end.index()].position - nodes[start.index()].position;
         if way.x.hypot(way.y) > SHORTEST_PX {
             return Some((start, end));

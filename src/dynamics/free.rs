@@ -86,9 +86,9 @@ pub(super) fn sways(
     let mut told = false;
     for (i, members) in members.iter().enumerate().skip(1) {
         alive();
-        let parent = skeleton.nodes[i].parent.filter(|p| p.index() < i);
-        let chain = std::iter::successors(parent, |p| skeleton.nodes[p.index()].parent.filter(|q| q < p));
-        let ancestors: Vec<Own> = chain.filter_map(|a| own[a.index()]).collect();
+        let node = NodeId(i as u32);
+        let parent = skeleton.ancestors(node).next();
+        let ancestors: Vec<Own> = skeleton.ancestors(node).filter_map(|a| own[a.index()]).collect();
         let points = Points::of(film, members, onset.from);
         if points.tracks.len() < LEAST_POINTS {
             continue;

@@ -23,12 +23,9 @@ pub(super) struct Points {
 pub(super) fn members(skeleton: &Skeleton, film: &Film) -> Vec<Vec<usize>> {
     let mut out = vec![Vec::new(); skeleton.measured()];
     for (k, track) in film.tracks.iter().enumerate() {
-        let mut at = Some(track.node);
-        while let Some(node) = at {
+        for node in std::iter::once(track.node).chain(skeleton.ancestors(track.node)) {
             let Some(members) = out.get_mut(node.index()) else { break };
             members.push(k);
-            // A file may say anything; a parent stands before its child.
-            at = skeleton.nodes[node.index()].parent.filter(|p| p.index() < node.index());
         }
     }
     out

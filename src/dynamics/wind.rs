@@ -71,9 +71,9 @@ pub(super) fn sways(
     let mut untold = vec![false; members.len()];
     for (i, tracks) in members.iter().enumerate().skip(1) {
         alive();
-        let parent = skeleton.nodes[i].parent.filter(|p| p.index() < i).unwrap_or(NodeId(0));
-        let chain = std::iter::successors(Some(parent), |p| skeleton.nodes[p.index()].parent.filter(|q| q < p));
-        let ancestors: Vec<Own> = chain.filter_map(|a| own[a.index()]).take(ANCESTORS).collect();
+        let node = NodeId(i as u32);
+        let parent = skeleton.ancestors(node).next().unwrap_or(NodeId(0));
+        let ancestors: Vec<Own> = skeleton.ancestors(node).filter_map(|a| own[a.index()]).take(ANCESTORS).collect();
         let points = Points::of(film, tracks, 0);
         if points.tracks.len() < LEAST_POINTS {
             continue;

@@ -68,6 +68,12 @@ impl Skeleton {
         self.nodes.get(node.index()).map(|n| n.name)
     }
 
+    /// The nodes that carry a node, nearest first. A file may say anything; a parent stands before its child, or the walk ends.
+    pub fn ancestors(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
+        let below = |n: &NodeId| self.nodes.get(n.index())?.parent.filter(|p| p < n);
+        std::iter::successors(below(&node), below)
+    }
+
     /// Children of every node, by node index.
     pub fn children(&self) -> Vec<Vec<NodeId>> {
         let mut out = vec![Vec::new(); self.nodes.len()];

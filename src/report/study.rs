@@ -183,8 +183,7 @@ fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: [f64; 2]) -> Branc
         let p = skeleton.nodes[n.index()].position;
         [p.x, p.y]
     };
-    // A file may say anything; a parent stands before its child.
-    let parent = at.parent.filter(|p| p.index() < node.index()).unwrap_or(NodeId(0));
+    let parent = skeleton.ancestors(node).next().unwrap_or(NodeId(0));
     let (base, tip) = (place(parent), place(node));
     let length_px = (tip[0] - base[0]).hypot(tip[1] - base[1]);
     let of_node = |p: &Pose| p.joints.get(node.index()).map_or([f64::NAN; 2], |j| [j.position.x, j.position.y]);
@@ -195,11 +194,11 @@ fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: [f64; 2]) -> Branc
     let of_used = |all: &[f64]| used.iter().map(|&k| all[k]).collect::<Vec<f64>>();
     let driven = given.analysis.onset.is_none_or(|o| o.excitation == Excitation::Wind);
     let (spectrum, reference) = seen(&of_used(&times_s), &of_used(&plane_deg), driven, given.highest_hz);
-    let carriers = std::iter::successors(Some(parent), |p| skeleton.nodes[p.index()].parent.filter(|q| q < p));
     // Its end is seen to move with what it carries, too.
     let carried =
         (0..skeleton.nodes.len() as u32).map(NodeId).filter(|n| skeleton.nodes[n.index()].parent == Some(node));
-    let others: Vec<Sway> = carriers
+    let others: Vec<Sway> = skeleton
+        .ancestors(node)
         .chain(carried)
         .filter_map(|p| given.analysis.sway.get(p.index()).copied().and_then(Result::ok))
         .collect();

@@ -120,21 +120,12 @@ fn staying(new: &Skeleton, stood: &[Option<Point3<f64>>], same_fork: Vec<bool>, 
 
 /// For every node of `new` whether the branches that leave from it are those that left from its twin.
 fn same_forks(new: &Skeleton, old: &Skeleton, twins: &[Option<Twin>]) -> Vec<bool> {
-    let children = |skeleton: &Skeleton| {
-        let mut of = vec![Vec::new(); skeleton.nodes.len()];
-        for (i, node) in skeleton.nodes.iter().enumerate() {
-            if let Some(parent) = node.parent {
-                of[parent.index()].push(i);
-            }
-        }
-        of
-    };
-    let (leave, left) = (children(new), children(old));
-    let twin = |i: usize| twins.get(i).copied().flatten().map(|t| t.old.index());
+    let (leave, left) = (new.children(), old.children());
+    let twin = |i: usize| twins.get(i).copied().flatten().map(|t| t.old);
     let same = |i: usize| {
-        let mut found: Vec<Option<usize>> = leave[i].iter().map(|&c| twin(c)).collect();
+        let mut found: Vec<Option<NodeId>> = leave[i].iter().map(|c| twin(c.index())).collect();
         found.sort_unstable();
-        twin(i).is_some_and(|t| found.iter().copied().eq(left[t].iter().map(|&c| Some(c))))
+        twin(i).is_some_and(|t| found.iter().copied().eq(left[t.index()].iter().map(|&c| Some(c))))
     };
     (0..new.nodes.len()).map(same).collect()
 }
