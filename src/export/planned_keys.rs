@@ -5,6 +5,7 @@
 //! are a shortest way over frames and places. Keys on the path alone are a quarter more, and leaving keys out one by one
 //! (`sparse_keys.rs`) does not come as low from there as from here.
 
+use super::thin_keys::LONGEST;
 use std::f32::consts::TAU;
 
 /// Radius of the ring of six places about the middle. A second ring of six at 0.92 would save one key in a hundred more and
@@ -95,10 +96,11 @@ pub(super) fn plan(limits: &[f32], between: impl Fn(usize, usize, usize) -> Betw
     keys
 }
 
-/// The frame farthest back from which frame `b` may be reached: not even keys off the path in the best way do from farther.
+/// The frame farthest back from which frame `b` may be reached: not even keys off the path in the best way do from farther, or
+/// it is [`LONGEST`] back.
 fn farthest(b: usize, between: &impl Fn(usize, usize, usize) -> Between) -> usize {
     let (mut far, mut failed) = (b, 0);
-    while far > 0 && failed < TRIED {
+    while far > b.saturating_sub(LONGEST) && failed < TRIED {
         far -= 1;
         let hopeless = |k: usize| {
             let f = between(far, b, k);
@@ -170,10 +172,10 @@ mod tests {
     }
 
     #[test]
-    fn a_straight_path_has_two_keys_on_it() {
-        let (keys, _) = planned(100, 0.2, |k| [0.5 * k as f64, 3.0]);
+    fn a_straight_path_has_as_few_keys_on_it_as_there_can_be() {
+        let (keys, _) = planned(3 * LONGEST + 1, 0.2, |k| [0.5 * k as f64, 3.0]);
         let nothing = |_, _, _| unreachable!("no frames between");
-        assert_eq!(keys, [(0, [0.0; 2]), (99, [0.0; 2])]);
+        assert_eq!(keys, [0, 1, 2, 3].map(|n| (n * LONGEST, [0.0; 2])));
         assert_eq!(plan(&[1.0], nothing).len(), 1);
         assert!(plan(&[], nothing).is_empty());
     }
