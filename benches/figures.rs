@@ -225,7 +225,7 @@ fn model_file() -> String {
             all_levels: false,
             metres_per_px: 0.0,
             tolerance_px: KEY_TOLERANCE_PX,
-            thorough: true,
+            thorough: &|| true,
             node_extras: &[],
             provenance: &provenance,
         };

@@ -371,7 +371,7 @@ mod fuzz {
             all_levels: false,
             metres_per_px: config.export.metres_per_px,
             tolerance_px: KEY_TOLERANCE_PX,
-            thorough: false,
+            thorough: &|| false,
             node_extras: &[],
             provenance: &serde_json::Value::Null,
         };

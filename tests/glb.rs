@@ -39,7 +39,7 @@ fn model<'a>(
         all_levels: false,
         metres_per_px,
         tolerance_px,
-        thorough: true,
+        thorough: &|| true,
         node_extras: &[],
         provenance,
     }

@@ -27,7 +27,7 @@ fn model<'a>(skeleton: &'a Skeleton, dressed: &'a Dressed, poses: &'a [Pose], pr
         all_levels: false,
         metres_per_px: 0.0,
         tolerance_px: KEY_TOLERANCE_PX,
-        thorough: true,
+        thorough: &|| true,
         node_extras: &[],
         provenance,
     }

@@ -4,7 +4,7 @@
 mod made_trees;
 
 use arborcam::config::{Dynamics, Excited};
-use arborcam::dynamics::{Film, FilmTrack, analyse};
+use arborcam::dynamics::{Film, FilmTrack, analyse, analyse_with};
 use arborcam::model::{Excitation, NodeId, Unidentified};
 use made_trees::{Drive, Filming, MadeTree};
 
@@ -201,6 +201,25 @@ fn what_carries_no_answer_gets_a_reason() {
             }
             assert!(sway[2..].iter().all(|s| *s == Err(Unidentified::NotMeasured)));
         }
+    }
+}
+
+/// Whoever wants the end gets what was told until then, the rest named as what it is, and the answers are those of a whole
+/// analysis.
+#[test]
+fn what_is_broken_off_says_so() {
+    for drive in [Drive::Release(0.5), Drive::Wind] {
+        let tree = MadeTree::new(3, drive, &Filming::default());
+        let config = Dynamics::default();
+        let whole = analyse(&tree.skeleton, &tree.film, &config).sway;
+        let asked = std::cell::Cell::new(0);
+        let go_on = || asked.replace(asked.get() + 1) < 2;
+        let part = analyse_with(&tree.skeleton, &tree.film, &config, &go_on).sway;
+        assert!(part.iter().filter(|s| **s == Err(Unidentified::NotInTime)).count() > 1, "{part:?}");
+        for (part, whole) in part.iter().zip(&whole).filter(|(part, _)| **part != Err(Unidentified::NotInTime)) {
+            assert_eq!(part, whole);
+        }
+        assert!(part[1].is_ok() || whole[1].is_err(), "the trunk comes first");
     }
 }
 

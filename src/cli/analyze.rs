@@ -120,7 +120,10 @@ fn analysed(args: &AnalyzeArgs, captured: &Captured, name: &str) -> Result<Analy
         ..(*captured.skeleton).clone()
     };
     let progress = Progress::of(name, skeleton.nodes.len());
-    let analysis = analyse_with(&skeleton, &film, dynamics, &|| progress.step());
+    let analysis = analyse_with(&skeleton, &film, dynamics, &|| {
+        progress.step();
+        true
+    });
     progress.end();
     let mut poses = Vec::new();
     let all = captured.film().map(|film| {

@@ -328,7 +328,7 @@ impl Made {
             all_levels: false,
             metres_per_px: self.config.export.metres_per_px,
             tolerance_px: KEY_TOLERANCE_PX,
-            thorough: true,
+            thorough: &|| true,
             node_extras: &self.node_extras,
             provenance: &self.provenance,
         }

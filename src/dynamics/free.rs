@@ -75,7 +75,7 @@ pub(super) fn sways(
     members: &[Vec<usize>],
     onset: &Onset,
     demands: &Demands,
-    alive: &dyn Fn(),
+    go_on: &dyn Fn() -> bool,
 ) -> Vec<Swaying> {
     let mut own: Vec<Option<Own>> = vec![None; members.len()];
     let mut out = vec![Err(Unidentified::NotMeasured); members.len()];
@@ -85,7 +85,13 @@ pub(super) fn sways(
     // Whether the trunk's sway, which all points have, could be told.
     let mut told = false;
     for (i, members) in members.iter().enumerate().skip(1) {
-        alive();
+        if members.is_empty() {
+            continue;
+        }
+        if !go_on() {
+            out[i] = Err(Unidentified::NotInTime);
+            continue;
+        }
         let node = NodeId(i as u32);
         let parent = skeleton.ancestors(node).next();
         let ancestors: Vec<Own> = skeleton.ancestors(node).filter_map(|a| own[a.index()]).collect();

@@ -28,11 +28,12 @@ pub struct Analysis {
 ///
 /// Never fails: what the film does not carry is [`Unidentified`].
 pub fn analyse(skeleton: &Skeleton, film: &Film, config: &Dynamics) -> Analysis {
-    analyse_with(skeleton, film, config, &|| ())
+    analyse_with(skeleton, film, config, &|| true)
 }
 
-/// The same; `alive` is called after every branch, as many of them take a while.
-pub fn analyse_with(skeleton: &Skeleton, film: &Film, config: &Dynamics, alive: &dyn Fn()) -> Analysis {
+/// The same; `go_on` is asked before every branch, as many of them take a while: those that are left when it says no are
+/// [`Unidentified::NotInTime`].
+pub fn analyse_with(skeleton: &Skeleton, film: &Film, config: &Dynamics, go_on: &dyn Fn() -> bool) -> Analysis {
     let members = members(skeleton, film);
     let nothing = |why| {
         let of = |m: &Vec<usize>| Err(if m.is_empty() { Unidentified::NotMeasured } else { why });
@@ -60,8 +61,8 @@ pub fn analyse_with(skeleton: &Skeleton, film: &Film, config: &Dynamics, alive: 
         return nothing(Unidentified::TooShort);
     }
     let sway = match onset.excitation {
-        Excitation::Release => free::sways(skeleton, film, &members, &onset, &demands, alive),
-        Excitation::Wind => wind::sways(skeleton, film, &members, &demands, alive),
+        Excitation::Release => free::sways(skeleton, film, &members, &onset, &demands, go_on),
+        Excitation::Wind => wind::sways(skeleton, film, &members, &demands, go_on),
     };
     Analysis { sway, onset: Some(onset) }
 }

@@ -64,13 +64,19 @@ pub(super) fn sways(
     film: &Film,
     members: &[Vec<usize>],
     demands: &Demands,
-    alive: &dyn Fn(),
+    go_on: &dyn Fn() -> bool,
 ) -> Vec<Swaying> {
     let mut own: Vec<Option<Own>> = vec![None; members.len()];
     let mut out = vec![Err(Unidentified::NotMeasured); members.len()];
     let mut untold = vec![false; members.len()];
     for (i, tracks) in members.iter().enumerate().skip(1) {
-        alive();
+        if tracks.is_empty() {
+            continue;
+        }
+        if !go_on() {
+            out[i] = Err(Unidentified::NotInTime);
+            continue;
+        }
         let node = NodeId(i as u32);
         let parent = skeleton.ancestors(node).next().unwrap_or(NodeId(0));
         let ancestors: Vec<Own> = skeleton.ancestors(node).filter_map(|a| own[a.index()]).take(ANCESTORS).collect();

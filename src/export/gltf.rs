@@ -32,7 +32,7 @@ pub fn provenance(source: &str, software: &Software, poses: &[Pose]) -> Value {
 }
 
 /// Everything that goes into the file.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Model<'a> {
     pub skeleton: &'a Skeleton,
     /// Its meshes may be empty: then the file holds the joints alone.
@@ -47,8 +47,9 @@ pub struct Model<'a> {
     pub metres_per_px: f64,
     /// See [`KEY_TOLERANCE_PX`].
     pub tolerance_px: f64,
-    /// Look for the fewest keys, which takes some times as long: half a second for 100 joints in 1000 frames.
-    pub thorough: bool,
+    /// Whether to look for the fewest keys, which takes some times as long: half a second for 100 joints in 1000 frames. Asked
+    /// before every joint.
+    pub thorough: &'a dyn Fn() -> bool,
     /// One JSON object a node, added to `level`, `n_tracks` and `copy_of`; may be shorter than the skeleton.
     pub node_extras: &'a [Value],
     /// Software version, name of the source, frames: the `extras` of the asset.

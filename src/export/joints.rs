@@ -35,7 +35,7 @@ impl Moving {
     /// Joints are thinned from the foot up, each against what its parent's kept keys show, so that a joint also makes good
     /// its parent's error. The tolerance grows towards the tips: a node may be wrong by `tolerance sqrt(depth / depth of
     /// the deepest tip above)`, of which its parent has used only a part.
-    pub fn new(skeleton: &Skeleton, all: &[Pose], tolerance_px: f64, thorough: bool) -> Self {
+    pub fn new(skeleton: &Skeleton, all: &[Pose], tolerance_px: f64, thorough: &dyn Fn() -> bool) -> Self {
         let (kept, times_s) = usable(all);
         let poses: Vec<&Pose> = kept.iter().map(|&k| &all[k]).collect();
         let joints =
@@ -53,7 +53,12 @@ impl Moving {
     }
 }
 
-fn keys(skeleton: &Skeleton, (poses, times): (&[&Pose], &[f64]), tolerance_px: f64, thorough: bool) -> Vec<Keys> {
+fn keys(
+    skeleton: &Skeleton,
+    (poses, times): (&[&Pose], &[f64]),
+    tolerance_px: f64,
+    thorough: &dyn Fn() -> bool,
+) -> Vec<Keys> {
     let nodes = &skeleton.nodes;
     let budget = budgets(skeleton);
     let mut shown: Vec<Shown> = Vec::with_capacity(nodes.len());
@@ -86,7 +91,7 @@ fn keys(skeleton: &Skeleton, (poses, times): (&[&Pose], &[f64]), tolerance_px: f
             let one = frames.clone().all(|k| branch.miss(k, &aim(0)) <= 1.0);
             path.on_aims(&thin(times.len(), one, spans))
         };
-        let keys = if thorough {
+        let keys = if thorough() {
             // The plan takes arcs for straight, so even turning is better off on its path.
             let planned = path.mended(branch.planned(&aims, times)).filter(|keys| keys.len() < on_aims.len());
             path.fewer(planned.unwrap_or(on_aims))

@@ -56,6 +56,8 @@ pub enum Unidentified {
     NoOscillation,
     /// There is one, but the data allow frequencies that are too far apart.
     TooUncertain,
+    /// The end was wanted before its turn came: the capture has all that is needed to tell it.
+    NotInTime,
 }
 
 /// The sway of a branch, or why there is none to tell.
@@ -77,7 +79,7 @@ impl Excitation {
 }
 
 impl Unidentified {
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::NotMeasured,
         Self::TooShort,
         Self::TooLittleMotion,
@@ -85,6 +87,7 @@ impl Unidentified {
         Self::AboveSampling,
         Self::NoOscillation,
         Self::TooUncertain,
+        Self::NotInTime,
     ];
 
     /// One word for files.
@@ -97,6 +100,7 @@ impl Unidentified {
             Self::AboveSampling => "above_sampling",
             Self::NoOscillation => "no_oscillation",
             Self::TooUncertain => "too_uncertain",
+            Self::NotInTime => "not_in_time",
         }
     }
 
@@ -116,6 +120,7 @@ impl fmt::Display for Unidentified {
             Self::AboveSampling => "may be faster than the frames can tell",
             Self::NoOscillation => "no oscillation of its own",
             Self::TooUncertain => "too uncertain",
+            Self::NotInTime => "not looked at: the end was wanted first",
         })
     }
 }

@@ -78,5 +78,8 @@ pub fn why(reason: Unidentified) -> &'static str {
         Unidentified::TooUncertain => {
             "There is an oscillation, but the film allows frequencies too far apart: film for longer."
         }
+        Unidentified::NotInTime => {
+            "The end of the capture was wanted before this branch was looked at: `arborcam analyze` does it."
+        }
     }
 }

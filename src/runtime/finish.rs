@@ -4,6 +4,7 @@ use super::announce::little_motion;
 use super::capture_tables::{CaptureTables, Done};
 use super::held_sets::{HeldSets, OnTrial};
 use super::meter::Histogram;
+use super::patience::Patience;
 use super::shared::{Failure, Shared};
 use crate::config::Config;
 use crate::dynamics::analyse_with;
@@ -15,7 +16,7 @@ use crate::export::csv::{MotionCsv, TracksCsv, nodes};
 use crate::export::gltf::{KEY_TOLERANCE_PX, Model, glb, provenance};
 use crate::export::picture::{PICTURE_FILE, jpeg};
 use crate::export::{ExportError, OutputFolder};
-use crate::model::{Outline, Picture, Pose, Skeleton, TrackSet};
+use crate::model::{Outline, Picture, Pose, Skeleton, TrackSet, Unidentified};
 use crate::pipeline::{Seen, Tree, dress, flutter};
 use crate::recording::SpoolReader;
 use crate::source::SourceInfo;
@@ -72,6 +73,7 @@ pub struct CaptureJob {
     pub quality: Quality,
     pub picture: Option<Picture>,
     pub shared: Arc<Shared>,
+    pub patience: Patience,
 }
 
 /// What was written, for the closing lines.
@@ -110,10 +112,17 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
     // The sway and the model need nothing of each other, and whoever has asked for the end is waiting.
     let (sway, (model, push)) = beside(
         "sway",
-        || analyse_with(&tree.skeleton, &film, &job.config.dynamics, &|| job.shared.pulse.wrote()).sway,
+        || analyse_with(&tree.skeleton, &film, &job.config.dynamics, &|| wrote() && !job.patience.is_over()).sway,
         || (model_of(job, &tree, &poses, pose_in_picture.as_ref()), tree.push_figures(&job.config)),
     );
     let (bytes, animation) = model?;
+    let untold = sway.iter().filter(|s| matches!(s, Err(Unidentified::NotInTime))).count();
+    if untold > 0 {
+        let of = tree.skeleton.measured() - 1;
+        job.shared.warn(format!(
+            "the sway of {untold} of {of} branches was not looked at, as the end was wanted: `arborcam analyze DIR` tells it"
+        ));
+    }
     nodes(folder.file("nodes.csv")?, &tree.skeleton, &sway, metres_per_px)?;
     folder.write("tree.glb", &bytes)?;
     let push = Some(push);
@@ -186,6 +195,7 @@ fn model_of(
     let dressed = dress(skeleton, seen, &job.config);
     let flutter = flutter(&dressed, poses, skeleton, &job.config);
     let provenance = provenance(&job.info.name, &Software::default(), poses);
+    let large = skeleton.nodes.len() * poses.len() > THOROUGH_UP_TO;
     glb(&Model {
         skeleton,
         dressed: &dressed,
@@ -194,7 +204,7 @@ fn model_of(
         all_levels: false,
         metres_per_px: job.config.export.metres_per_px,
         tolerance_px: KEY_TOLERANCE_PX,
-        thorough: skeleton.nodes.len() * poses.len() <= THOROUGH_UP_TO,
+        thorough: &|| !large && !job.patience.is_over(),
         node_extras: &[],
         provenance: &provenance,
     })

@@ -4,6 +4,7 @@
 use super::announce::Announced;
 use super::behind::BehindTree;
 use super::finish::{self, CaptureJob, Quality};
+use super::patience::Patience;
 use super::pulse::Worker;
 use super::recorder_thread::{Found, Recorded, Recorder};
 use super::refining::Refining;
@@ -253,6 +254,7 @@ impl ModelThread {
             quality: self.quality.clone(),
             picture: self.picture.clone(),
             shared: self.shared.clone(),
+            patience: Patience::from_now(&self.shared),
         })
     }
 

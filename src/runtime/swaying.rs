@@ -13,7 +13,6 @@ use crate::dynamics::{FilmLog, analyse_with, spectrum};
 use crate::model::{AngleSpectrum, Angles, BranchSway, NodeId, NodeName, Skeleton, SwayNow, TrackId, Unidentified};
 use crossbeam_channel::{Receiver, RecvTimeoutError, SendTimeoutError, Sender, TryRecvError, bounded};
 use std::collections::BTreeMap;
-use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -35,8 +34,8 @@ pub struct Request {
     pub settings: Dynamics,
 }
 
-/// Works a request off; calls what it is given again and again, as a sign of life, which may end it from within.
-pub type Analyser = fn(&Request, &dyn Fn()) -> SwayNow;
+/// Works a request off; asks again and again whether to go on, which is its sign of life, too.
+pub type Analyser = fn(&Request, &dyn Fn() -> bool) -> SwayNow;
 
 /// A request on its way to the thread.
 struct Errand {
@@ -56,9 +55,6 @@ impl Drop for Pending {
         self.wanted.store(false, Ordering::Relaxed);
     }
 }
-
-/// What a request that is given up unwinds with.
-struct GivenUp;
 
 /// The thread, and when it is asked.
 pub struct Swaying {
@@ -212,34 +208,25 @@ fn work(queue: &Receiver<Errand>, analyser: Analyser, shared: &Shared) {
     for Errand { request, wanted, answer } in queue {
         let pulse = &shared.pulse;
         pulse.give(Worker::Sway);
-        let alive = || {
+        let go_on = || {
             pulse.give(Worker::Sway);
             pulse.done(Worker::Sway);
-            if !wanted.load(Ordering::Relaxed) {
-                // Silent, unlike a panic: no hook hears of it.
-                resume_unwind(Box::new(GivenUp));
-            }
+            wanted.load(Ordering::Relaxed)
         };
-        let found = catch_unwind(AssertUnwindSafe(|| {
-            alive();
-            analyser(&request, &alive)
-        }));
-        pulse.done(Worker::Sway);
-        match found {
+        if go_on() {
+            let found = analyser(&request, &go_on);
             // Nobody may be waiting any more.
-            Ok(found) => drop(answer.send(found)),
-            Err(why) if why.is::<GivenUp>() => {}
-            Err(panic) => resume_unwind(panic),
+            drop(answer.send(found));
         }
+        pulse.done(Worker::Sway);
     }
 }
 
 /// The sway of every branch, and the spectra of the angles.
-pub fn analyse(request: &Request, alive: &dyn Fn()) -> SwayNow {
+pub fn analyse(request: &Request, go_on: &dyn Fn() -> bool) -> SwayNow {
     let Request { skeleton, settings, angles, .. } = request;
     let film = request.log.film(skeleton, |id| request.nodes.get(&id).copied());
-    alive();
-    let analysis = analyse_with(skeleton, &film, settings, alive);
+    let analysis = analyse_with(skeleton, &film, settings, go_on);
     let branch = |(i, name): (usize, &NodeName)| {
         // The foot is no branch.
         let swaying = analysis.sway.get(i + 1).copied().unwrap_or(Err(Unidentified::NotMeasured));

@@ -6,6 +6,8 @@ use crate::guest::{Group, Results, claim, clip, slack};
 const CYCLES: usize = 20;
 /// From the device's return to the next pose, s.
 const RECOVERY_S: f64 = 2.0;
+/// From the wish to stop to the end, s: five for what may be given up, the rest for what must be written.
+const END_S: f64 = 10.0;
 
 pub const GROUP: Group = Group {
     name: "replug",
@@ -16,6 +18,7 @@ pub const GROUP: Group = Group {
     cases: &[
         ("each_of_twenty_returns_is_taken_within_two_seconds", recovered),
         ("tree_and_tracks_last_through_the_gaps", one_tree),
+        ("a_wish_to_stop_is_granted_soon_after_a_minute", ends),
         ("another_camera_is_not_taken_for_the_one_that_is_awaited", not_another),
         ("a_camera_that_hangs_is_waited_for", hang),
         ("a_camera_that_hangs_ends_a_capture_that_is_to_end_with_it", hang_once),
@@ -72,6 +75,11 @@ fn one_tree(r: &Results) -> Result<(), String> {
     let (before, after) = (ids(built - 1.0, built), ids(last - 0.5, last));
     let kept = before.intersection(&after).count();
     claim(2 * kept > before.len(), || format!("{kept} of {} points are left", before.len()))
+}
+
+fn ends(r: &Results) -> Result<(), String> {
+    let took = r.seconds("replug", "asked", "ended")?;
+    claim(took <= END_S * slack(), || format!("ended {took} s after the wish: {}", said(r)))
 }
 
 fn not_another(r: &Results) -> Result<(), String> {

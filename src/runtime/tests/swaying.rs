@@ -26,32 +26,31 @@ fn answer(request: &Request) -> SwayNow {
     SwayNow { frame: request.frame, time_s: request.time_s, ..SwayNow::default() }
 }
 
-fn at_once(request: &Request, alive: &dyn Fn()) -> SwayNow {
-    alive();
+fn at_once(request: &Request, _: &dyn Fn() -> bool) -> SwayNow {
     answer(request)
 }
 
-fn slow(request: &Request, alive: &dyn Fn()) -> SwayNow {
-    for _ in 0..30 {
-        std::thread::sleep(Duration::from_millis(10));
-        alive();
-    }
+fn slow(request: &Request, go_on: &dyn Fn() -> bool) -> SwayNow {
+    takes(Duration::from_millis(300), go_on);
     answer(request)
 }
 
 /// Slower than the machine that looks at it, however busy that is.
-fn very_slow(request: &Request, alive: &dyn Fn()) -> SwayNow {
-    for _ in 0..300 {
-        std::thread::sleep(Duration::from_millis(10));
-        alive();
-    }
+fn very_slow(request: &Request, go_on: &dyn Fn() -> bool) -> SwayNow {
+    takes(Duration::from_secs(3), go_on);
     answer(request)
 }
 
-fn endless(_: &Request, alive: &dyn Fn()) -> SwayNow {
-    loop {
+fn endless(request: &Request, go_on: &dyn Fn() -> bool) -> SwayNow {
+    takes(Duration::MAX, go_on);
+    answer(request)
+}
+
+/// So long, or until it is given up.
+fn takes(time: Duration, go_on: &dyn Fn() -> bool) {
+    let began = Instant::now();
+    while began.elapsed() < time && go_on() {
         std::thread::sleep(Duration::from_millis(5));
-        alive();
     }
 }
 
@@ -150,7 +149,7 @@ fn without_an_interval_nobody_is_asked() {
 /// The capture goes on without it, and the end says that something is wrong.
 #[test]
 fn a_panic_is_not_waited_for() {
-    let (mut swaying, _) = of(|_, _| resume_unwind(Box::new("broken")), true);
+    let (mut swaying, _) = of(|_, _| std::panic::resume_unwind(Box::new("broken")), true);
     assert_eq!(film(&mut swaying, 0..100), []);
     let began = Instant::now();
     let Ending(thread) = swaying.end();

@@ -113,6 +113,7 @@ fn in_short(why: Unidentified) -> &'static str {
         Unidentified::AboveSampling => "too fast for the frames",
         Unidentified::NoOscillation => "no oscillation",
         Unidentified::TooUncertain => "too uncertain",
+        Unidentified::NotInTime => "not in time",
     }
 }
 

@@ -121,7 +121,9 @@ fn no_state_and_no_size_brings_it_down() {
 /// Every reason why a branch has no frequency is told in words, and no number stands in its place.
 #[test]
 fn an_unknown_sway_is_told_by_its_reason() {
-    for (row, why) in Unidentified::ALL.into_iter().enumerate() {
+    // While it films nothing has come to its end.
+    let while_filming = Unidentified::ALL.into_iter().filter(|why| *why != Unidentified::NotInTime);
+    for (row, why) in while_filming.enumerate() {
         let mut state = state(snapshot(Phase::Live));
         state.choose(row as i16 + 3);
         for (width, height) in [(80, 24), (120, 40)] {

@@ -28,7 +28,8 @@ begin() {
     pid=$!
 }
 
-# Waits up to SECONDS for the case begun last; what does not end then is killed and has status `hung`.
+# Waits SECONDS at least for the case begun last, longer where the guest is busy; what does not end then is killed and has
+# status `hung`.
 end() {
     local left=$(($1 * 20)) status=0
     while kill -0 "$pid" 2>/dev/null; do
