@@ -248,6 +248,45 @@ const CASES: &[Case] = &[
     ("{c} --format glb --out {w}/t.glb --density {w}/there", BAD_USAGE, &["{w}/there"]),
 ];
 
+/// A leaf of one triangle.
+const TRIANGLE: &str = r#"{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+    "buffers": [{"byteLength": 36,
+        "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}],
+    "bufferViews": [{"buffer": 0, "byteLength": 36}],
+    "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]}]}"#;
+
+/// Whoever asks for what changes nothing is told so, and why, instead of looking for it in the file.
+#[test]
+fn what_changes_nothing_is_said() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let place = |name: &str| dir.path().join(name).display().to_string();
+    fs::write(place("film.toml"), "[detect]\npoints = 99\n[wood]\ncurl = 0.1\n[track]\nlevels = 2\n").expect("write");
+    fs::write(place("wood.toml"), "[wood]\ncurl = 0.1\n").expect("write");
+    fs::write(place("leaf.gltf"), TRIANGLE).expect("write");
+    let (film, wood, leaf) = (place("film.toml"), place("wood.toml"), &place("leaf.gltf"));
+    let cases: [(&str, &[&str], Option<&str>); 9] = [
+        ("ply", &["--lods"], Some("--lods changes nothing here: only glb and gltf")),
+        ("glb", &["--lods"], None),
+        ("ply", &["--tolerance-px", "3"], Some("--tolerance-px changes nothing")),
+        ("glb", &["--tolerance-px", "3"], None),
+        ("glb", &["--config", &film], Some("[detect], [track] in")),
+        ("glb", &["--config", &wood], None),
+        ("glb", &["--leaf", leaf, "--leaves", "off"], Some("--leaf changes nothing here: the tree bears no leaves")),
+        ("glb", &["--leaf", leaf, "--leaves", "on"], None),
+        ("glb", &[], None),
+    ];
+    for (format, more, told) in cases {
+        let output = export(made(), format, Path::new("-"), more);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{said}");
+        match told {
+            Some(words) => assert!(said.contains(words) && said.lines().count() == 1, "{more:?}: {said}"),
+            None => assert!(!said.contains("note"), "{more:?}: {said}"),
+        }
+    }
+}
+
 /// A drawn density puts leaves on a tree that has none in the film, unless they are switched off.
 #[test]
 fn a_drawn_density_brings_leaves() {

@@ -2,7 +2,7 @@
 
 use super::shaping::{Made, Shaping};
 use super::stop::Stop;
-use super::{Ended, say};
+use super::{Ended, idle, say};
 use crate::export::csv::{MotionCsv, nodes};
 use crate::export::cylinders::cylinders;
 use crate::export::gltf::{KEY_TOLERANCE_PX, Model, NamedBytes, glb, gltf_files};
@@ -42,6 +42,18 @@ pub struct ExportArgs {
     shaping: Shaping,
 }
 
+impl ExportArgs {
+    /// Says which options the format has no use for.
+    fn tell_idle(&self) {
+        if self.lods && !matches!(self.format, Format::Glb | Format::Gltf) {
+            idle::tell("--lods", "only glb and gltf hold levels of detail");
+        }
+        if self.tolerance_px != KEY_TOLERANCE_PX && matches!(self.format, Format::Csv | Format::Obj | Format::Ply) {
+            idle::tell("--tolerance-px", "this format holds no keys");
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Format {
     Glb,
@@ -68,7 +80,9 @@ pub fn run(args: &ExportArgs) -> Result<(), Ended> {
     for warning in &made.captured.warnings {
         say(&format!("arborcam: warning: {warning}"));
     }
-    let model = Model { tolerance_px: args.tolerance_px, all_levels: args.lods, ..made.model() };
+    args.tell_idle();
+    let model =
+        Model { tolerance_px: args.tolerance_px, all_levels: args.lods && args.format != Format::Html, ..made.model() };
     let metres_per_px = made.config.export.metres_per_px;
     let stem = target.stem();
     let files = match args.format {

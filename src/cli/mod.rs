@@ -8,6 +8,7 @@ mod devices;
 mod doctor;
 mod export;
 mod hangup;
+mod idle;
 mod play;
 mod record;
 mod recording;

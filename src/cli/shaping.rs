@@ -2,7 +2,7 @@
 
 use super::scale::ScaleArgs;
 use super::shape::ShapeArgs;
-use super::{Ended, say};
+use super::{Ended, idle, say};
 use crate::capture::{CaptureError, Captured};
 use crate::config::{Config, ConfigError, LeafShow};
 use crate::export::capture::Software;
@@ -140,6 +140,7 @@ impl Shaping {
     pub fn made_with(&self, dir: &Path, tail_s: impl Fn(f64) -> Option<f64>) -> Result<Made, Ended> {
         let note = Captured::note(dir)?;
         let config = self.config(&note.config).map_err(|e| Ended::BadUsage(e.into()))?;
+        self.config.iter().for_each(|file| idle::settings(file, &note.config, &config));
         let length_s = tail_s(note.timing.duration_s).unwrap_or(config.export.animation_s);
         let captured = Captured::read(dir, length_s)?;
         self.shape.fits(captured.skeleton.image_size)?;
@@ -158,6 +159,7 @@ impl Shaping {
         };
         let Stand { skeleton, poses, sway, reshaped, .. } = &stand;
         let dressed = dress(skeleton, seen, &config);
+        self.leaf.iter().for_each(|_| idle::leaf(&dressed.foliage));
         let node_extras = sway.iter().map(extras).collect();
         let provenance = provenance(&captured.note.source.name, &Software::default(), poses);
         let (flutter, reshaped) = (flutter(&dressed, poses, skeleton, &config), *reshaped);
