@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, Default, Args)]
 pub struct ShapeArgs {
     /// Keeps one trunk up to the tip, as conifers have: the line that was drawn in FILE (JSON: width, height,
-    /// polyline_px from the foot up), or `auto` for the straightest way up.
+    /// polyline_px from either end), or `auto` for the straightest way up.
     #[arg(long, value_name = "FILE|auto", value_parser = Trunk::parse)]
     trunk: Option<Trunk>,
     /// What the branches fill: the outline turned about its axis (`revolution`), the hull of the branches seen, turned
@@ -79,7 +79,7 @@ enum Trunk {
 struct Line {
     width: u32,
     height: u32,
-    /// From the foot up.
+    /// From the foot up, once it is read.
     polyline_px: Vec<[f64; 2]>,
 }
 
@@ -89,10 +89,19 @@ impl Trunk {
             return Ok(Self::Auto);
         }
         let bytes = std::fs::read(text).map_err(|e| format!("{e}; give a file, or auto"))?;
-        let line: Line =
+        let mut line: Line =
             serde_json::from_slice(&bytes).map_err(|e| format!("{e}; it must hold width, height and polyline_px"))?;
-        let usable = line.polyline_px.len() >= 2 && line.polyline_px.iter().flatten().all(|x| x.is_finite());
-        if usable { Ok(Self::Drawn(line)) } else { Err("polyline_px needs at least two points".into()) }
+        if line.polyline_px.iter().flatten().any(|x| !x.is_finite()) {
+            return Err("polyline_px holds what is no number".into());
+        }
+        let [first, .., last] = line.polyline_px[..] else {
+            return Err("polyline_px needs at least two points".into());
+        };
+        // Drawn from the top down: v grows downwards, and a trunk stands on its foot.
+        if first[1] < last[1] {
+            line.polyline_px.reverse();
+        }
+        Ok(Self::Drawn(line))
     }
 }
 
@@ -112,5 +121,29 @@ impl Envelope {
             path if Path::new(path).is_file() => Ok(Self::Image(path.into())),
             _ => Err("give revolution, hull, or an image that is there".into()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed(polyline_px: &str) -> Result<Vec<[f64; 2]>, String> {
+        let file = tempfile::NamedTempFile::new().expect("file");
+        std::fs::write(file.path(), format!(r#"{{"width": 64, "height": 48, "polyline_px": {polyline_px}}}"#))
+            .expect("write");
+        match Trunk::parse(file.path().to_str().expect("path"))? {
+            Trunk::Drawn(line) => Ok(line.polyline_px),
+            Trunk::Auto => Err("auto".into()),
+        }
+    }
+
+    /// Whoever draws a trunk from the top down means the same trunk.
+    #[test]
+    fn a_trunk_may_be_drawn_from_either_end() {
+        let up = parsed("[[30, 40], [31, 20], [29, 4]]");
+        assert_eq!(up, Ok(vec![[30.0, 40.0], [31.0, 20.0], [29.0, 4.0]]));
+        assert_eq!(parsed("[[29, 4], [31, 20], [30, 40]]"), up);
+        assert!(parsed("[[29, 4]]").is_err_and(|why| why.contains("two points")));
     }
 }
