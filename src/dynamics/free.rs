@@ -11,6 +11,7 @@ use super::members::{Points, mean_px};
 use super::release::{MOMENT_SD, Onset};
 use super::signals::{Factor, Fit, Signals};
 use super::spread::deviations;
+use super::swing::Arms;
 use crate::model::{Excitation, Interval, NodeId, Skeleton, Sway, Swaying, Unidentified};
 use crate::signal::along_principal_direction;
 
@@ -34,8 +35,11 @@ const IN_PART: f64 = 0.75;
 const LEAST_IN_PART: usize = 3;
 const ALIKE: f64 = 0.003;
 const FAR: f64 = 4.0;
-/// Points that a branch must have.
-const LEAST_POINTS: usize = 2;
+/// And they are moved as by one swing ([`Arms::one_swing`]), which points of several branches that are alike in frequency are
+/// not. Found on clips of which none is a public one (docs/dynamics.md).
+const ONE_SWING: f64 = 0.95;
+/// Points that a branch must have: two or three agree by chance.
+const LEAST_POINTS: usize = 4;
 /// Periods that must have been seen: of fewer, branches that lie close together in frequency look like one.
 const LEAST_PERIODS: f64 = 3.0;
 /// Damping above which an oscillation is none that could be seen.
@@ -47,6 +51,9 @@ const LEFT: f64 = 0.2;
 /// Points of one branch err together more than the spread of their fit shows: intervals are so much wider. Found on made-up
 /// trees (tests/sway_trees.rs).
 const WIDER: f64 = 1.25;
+/// And the frequency's does not shrink below this standard deviation of its logarithm, however clear the decay is: most branches
+/// as they are found have some points of their neighbours. Found on the same clips.
+const LEAST_SD: f64 = 0.0015;
 /// Quantile of the normal distribution for 95 %.
 pub(super) const Z: f64 = 1.96;
 
@@ -159,10 +166,12 @@ fn branch(
         fit = more;
     }
     let factors = signals.factors(&fit, points.signals.len());
+    let arms = Arms::new(film, points, onset.from, base_px);
     let chosen = (old..fit.modes.len())
         .filter(|&m| fit.modes[m].damping < HARDLY && fit.modes[m].frequency_hz * span_s >= LEAST_PERIODS)
         .filter(|&m| !signals.at_limit(&fit.modes[m]))
         .filter_map(|m| Some((m, shared(&factors, m)?)))
+        .filter(|(m, _)| arms.one_swing(&factors, *m) >= ONE_SWING)
         .filter(|(m, _)| parts.iter().all(|part| everywhere(&factors, *m, part)))
         .max_by(|a, b| a.1.0.total_cmp(&b.1.0).then(a.1.1.total_cmp(&b.1.1)));
     let Some((m, _)) = chosen else {
@@ -206,14 +215,14 @@ fn branch(
     if let Some(found) = spread.get(2 * fit.modes.len()).filter(|_| old == 0) {
         *moment = [moment[0] + fit.moment_s, found.min(moment[1])];
     }
-    let sd = sd.map(|sd| WIDER * sd);
+    let sd = [(WIDER * sd[0]).hypot(LEAST_SD), WIDER * sd[1]];
     let own = Own { mode, sd };
     let frequency_hz = interval(mode.frequency_hz, sd[0]);
     if !(sd[0] > 0.0 && Z * sd[0] <= demands.widest) {
         return Err(Unidentified::TooUncertain);
     }
     let damping_ratio = (sd[1] > 0.0 && Z * sd[1] <= 1.0).then(|| interval(mode.damping, sd[1]));
-    let amplitude_deg = amplitude_deg(film, points, &factors, m, base_px, onset);
+    let amplitude_deg = arms.amplitude_deg(&factors, m);
     Ok((own, Sway { frequency_hz, damping_ratio, excitation: Excitation::Release, amplitude_deg }))
 }
 
@@ -274,24 +283,4 @@ fn everywhere(factors: &[Vec<Factor>], m: usize, part: &[usize]) -> bool {
     let has =
         |k: &&usize| factors[2 * **k][m].significance + factors[2 * **k + 1][m].significance > SIGNIFICANT.powi(2);
     part.iter().filter(has).count() as f64 >= IN_PART * part.len() as f64
-}
-
-/// The turn about the branch's base that fits the mode's factors best, degrees.
-fn amplitude_deg(
-    film: &Film,
-    points: &Points,
-    factors: &[Vec<Factor>],
-    m: usize,
-    base_px: [f64; 2],
-    onset: &Onset,
-) -> f64 {
-    let (mut turn, mut arms) = ([0.0; 2], 0.0);
-    for (k, uv) in points.tracks.iter().zip(factors.chunks(2)) {
-        let at = mean_px(&film.tracks[*k].at_px[onset.from..]);
-        let arm = [at[0] - base_px[0], at[1] - base_px[1]];
-        arms += arm[0] * arm[0] + arm[1] * arm[1];
-        turn[0] += uv[0][m].cosine * arm[1] - uv[1][m].cosine * arm[0];
-        turn[1] += uv[0][m].sine * arm[1] - uv[1][m].sine * arm[0];
-    }
-    if arms > 0.0 { (turn[0].hypot(turn[1]) / arms).to_degrees() } else { f64::NAN }
 }

@@ -17,6 +17,7 @@ mod signals;
 mod spectrum;
 mod spread;
 mod sway;
+mod swing;
 mod wind;
 
 pub use angle::{AngleToParent, angle_in_space_deg, angle_to_parent_deg};

@@ -1,0 +1,99 @@
+//! How a mode swings a branch: what its points do about the branch's base, in the picture.
+
+use super::film::Film;
+use super::members::{Points, mean_px};
+use super::signals::Factor;
+
+/// Places of a branch's points from its base, in the mean over time.
+pub(super) struct Arms(Vec<[f64; 2]>);
+
+/// What one mode does to every point: factors of cosine and sine of u, then of v.
+type Factors = [f64; 4];
+
+impl Arms {
+    pub fn new(film: &Film, points: &Points, from: usize, base_px: [f64; 2]) -> Self {
+        let arm = |k: &usize| {
+            let at = mean_px(&film.tracks[*k].at_px[from..]);
+            [at[0] - base_px[0], at[1] - base_px[1]]
+        };
+        Self(points.tracks.iter().map(arm).collect())
+    }
+
+    /// How much mode `m` of `factors` (of u and v of each point in turn) is one swing, 0 to 1: all points in one direction, as
+    /// the length of the sum of their factors to the sum of the lengths; or a turn about the base, as its share of the
+    /// squares; whichever is more. Points of several branches do neither.
+    pub fn one_swing(&self, factors: &[Vec<Factor>], m: usize) -> f64 {
+        let (mut sum, mut lengths, mut squares) = ([0.0; 4], 0.0, 0.0);
+        for f in of(factors, m) {
+            sum.iter_mut().zip(f).for_each(|(s, f)| *s += f);
+            lengths += square(&f).sqrt();
+            squares += square(&f);
+        }
+        if squares <= 0.0 {
+            return 0.0;
+        }
+        let (turn, arms) = self.turn(factors, m);
+        let as_turn = if arms > 0.0 { (turn[0] * turn[0] + turn[1] * turn[1]) / (arms * squares) } else { 0.0 };
+        as_turn.max(square(&sum).sqrt() / lengths)
+    }
+
+    /// The turn about the base that fits the mode's factors best, degrees.
+    pub fn amplitude_deg(&self, factors: &[Vec<Factor>], m: usize) -> f64 {
+        let (turn, arms) = self.turn(factors, m);
+        if arms > 0.0 { (turn[0].hypot(turn[1]) / arms).to_degrees() } else { f64::NAN }
+    }
+
+    /// Of cosine and sine, times the squares of the arms; and those.
+    fn turn(&self, factors: &[Vec<Factor>], m: usize) -> ([f64; 2], f64) {
+        let (mut turn, mut arms) = ([0.0; 2], 0.0);
+        for (arm, f) in self.0.iter().zip(of(factors, m)) {
+            arms += arm[0] * arm[0] + arm[1] * arm[1];
+            turn[0] += f[0] * arm[1] - f[2] * arm[0];
+            turn[1] += f[1] * arm[1] - f[3] * arm[0];
+        }
+        (turn, arms)
+    }
+}
+
+fn of(factors: &[Vec<Factor>], m: usize) -> impl Iterator<Item = Factors> {
+    factors.chunks_exact(2).map(move |uv| [uv[0][m].cosine, uv[0][m].sine, uv[1][m].cosine, uv[1][m].sine])
+}
+
+fn square(f: &Factors) -> f64 {
+    f.iter().map(|x| x * x).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points at `arms` that are moved by so much to the right and down.
+    fn one_swing(arms: &[[f64; 2]], moved: &[[f64; 2]]) -> f64 {
+        let factor = |cosine: f64| vec![Factor { cosine, ..Factor::default() }];
+        let factors: Vec<Vec<Factor>> = moved.iter().flatten().map(|x| factor(*x)).collect();
+        Arms(arms.to_vec()).one_swing(&factors, 0)
+    }
+
+    /// A crown on its trunk turns about the foot: to the right above it, down on its right, up on its left.
+    #[test]
+    fn a_turn_is_one_swing_however_the_points_lie_about_the_base() {
+        let arms = [[0.0, -90.0], [60.0, -50.0], [-70.0, -40.0], [10.0, -120.0], [5.0, -10.0]];
+        let turned = arms.map(|[u, v]| [-0.05 * v, 0.05 * u]);
+        assert!(one_swing(&arms, &turned) > 0.999);
+    }
+
+    /// A branch that swings towards the camera shows little but its arc, which is no turn in the picture.
+    #[test]
+    fn one_direction_is_one_swing_wherever_the_base_is() {
+        let arms = [[40.0, 0.0], [60.0, 2.0], [80.0, -1.0], [100.0, 0.0]];
+        assert!(one_swing(&arms, &[[-1.0, 0.1], [-1.6, 0.0], [-2.0, -0.1], [-2.4, 0.2]]) > 0.95);
+    }
+
+    #[test]
+    fn points_of_two_branches_that_swing_apart_are_not_one() {
+        let arms = [[40.0, -40.0], [60.0, -60.0], [-40.0, -40.0], [-60.0, -60.0]];
+        let apart = [[1.0, 1.0], [1.5, 1.5], [-1.0, 1.0], [-1.6, 1.5]];
+        assert!(one_swing(&arms, &apart) < 0.8);
+        assert_eq!(one_swing(&arms, &[[0.0; 2]; 4]), 0.0);
+    }
+}
