@@ -47,8 +47,8 @@ const LEFT: f64 = 0.2;
 /// Points of one branch err together more than the spread of their fit shows: intervals are so much wider. Found on made-up
 /// trees (tests/sway_trees.rs).
 const WIDER: f64 = 1.25;
-/// Quantile of the normal distribution for 95 %.
-pub(super) const Z: f64 = 1.96;
+/// Half an interval, in standard deviations.
+pub(super) const Z: f64 = Interval::Z;
 
 /// What is asked of the estimates.
 #[derive(Clone, Copy, Debug)]

@@ -6,8 +6,6 @@ use crate::model::{Interval, Sway};
 
 /// Captures are of one tree if so many of their branches that could be found again are found again.
 const SAME_TREE: f64 = 0.5;
-/// Quantile of the normal distribution for 95 %.
-const Z: f64 = 1.96;
 
 /// Several captures beside the first.
 #[derive(Clone, Debug)]
@@ -50,8 +48,8 @@ impl Change {
         if !positive(a) || !positive(b) {
             return None;
         }
-        let sd = |i: &Interval| (i.hi / i.lo).ln() / (2.0 * Z);
-        let (ratio, half) = ((b.value / a.value).ln(), Z * sd(a).hypot(sd(b)));
+        let sd = |i: &Interval| (i.hi / i.lo).ln() / (2.0 * Interval::Z);
+        let (ratio, half) = ((b.value / a.value).ln(), Interval::Z * sd(a).hypot(sd(b)));
         let percent = |log: f64| 100.0 * log.exp_m1();
         let percent = Interval { value: percent(ratio), lo: percent(ratio - half), hi: percent(ratio + half) };
         Some(Self { percent, beyond: ratio.abs() > half })
