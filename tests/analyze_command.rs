@@ -113,6 +113,13 @@ fn the_answers_stand_in_the_table_in_json_and_in_the_capture() {
             plain.lines().find(|l| l.starts_with("  ") && l.split_whitespace().next() == Some(&id)).expect("its line");
         let shown: f64 = line.split_whitespace().nth(4).expect("cell").parse().expect("number");
         assert!((shown - f).abs() < 6e-4, "{line} lacks {f}");
+        // One amplitude in all, that of the curve in the report; none where points and angle contradict each other.
+        let [told, points, angle] =
+            ["amplitude_deg", "amplitude_by_points_deg", "amplitude_in_angle_deg"].map(|key| branch[key].as_f64());
+        let agree = points.zip(angle).filter(|(p, a)| (p / a).ln().abs() < 1.5_f64.ln());
+        assert_eq!(told, agree.map(|(_, angle)| angle), "{branch}");
+        let cell = row.split(',').nth(18).expect("cell").parse::<f64>().ok();
+        assert!(cell.zip(told).map_or(cell == told, |(c, t)| (c - t).abs() < 1e-3), "{row} lacks {told:?}");
     }
     // Once more: nothing is left to change. --no-write changes nothing either.
     assert_eq!(fs::read_to_string(dir.join("nodes.csv")).expect("nodes"), text);

@@ -157,7 +157,13 @@ fn analysed(args: &AnalyzeArgs, captured: &Captured, name: &str) -> Result<Analy
         picture: picture.as_deref(),
         notes: &notes,
     });
-    let sway = skeleton.nodes.iter().map(|n| n.name).zip(analysis.sway).collect();
+    let mut sway: BTreeMap<NodeName, Swaying> = skeleton.nodes.iter().map(|n| n.name).zip(analysis.sway).collect();
+    for branch in &study.branches {
+        // The file says what the table says.
+        if let Some(Ok(sway)) = sway.get_mut(&NodeName(branch.name)) {
+            sway.amplitude_deg = branch.amplitude_deg;
+        }
+    }
     Ok(Analysed { study, sway })
 }
 

@@ -52,7 +52,11 @@ fn one(study: &Study) -> String {
     let mut rows = vec![head];
     rows.extend(branches.iter().map(|b| row(study, b)));
     out += &table(&rows);
-    out += "\n  peak and eq. 6: the largest peak of the angle's spectrum and its half-power damping, for reference\n\n";
+    out += "\n  peak and eq. 6: the largest peak of the angle's spectrum and its half-power damping, for reference\n";
+    if branches.iter().any(|b| b.sway.is_ok() && !b.amplitude_deg.is_finite()) {
+        out += "  sway -: a branch's points and its angle do not agree on how far it sways\n";
+    }
+    out += "\n";
     let by_level = levels(study);
     if by_level.iter().any(|l| l.answers > 0) {
         out += &level_table(&by_level);
@@ -69,7 +73,7 @@ fn row(study: &Study, branch: &Branch) -> Vec<String> {
         Ok(sway) => {
             row.push(interval(&sway.frequency_hz, 3));
             row.push(sway.damping_ratio.map_or("unknown".into(), |d| interval(&d, 3)));
-            row.push(number(sway.amplitude_deg, 2));
+            row.push(number(branch.amplitude_deg, 2));
             row.push(number(branch.amplitude_px, 1));
             if study.metres_per_px > 0.0 {
                 row.push(number(branch.amplitude_px * study.metres_per_px, 4));

@@ -138,7 +138,7 @@ fn overlay(studies: &[Study], row: &Row) -> Option<String> {
 /// The branches of a tree that sway most and have an answer, in one plot (figure 10).
 fn of_tree(study: &Study, highest_hz: f64) -> String {
     let mut known: Vec<(&Branch, f64)> =
-        study.branches.iter().filter_map(|b| Some((b, b.known()?.amplitude_deg))).collect();
+        study.branches.iter().filter_map(|b| Some((b, b.known().map(|_| b.amplitude_deg.max(0.0))?))).collect();
     // The trunk, and the others by how far they sway.
     known.sort_by(|a, b| a.0.parent.is_some().cmp(&b.0.parent.is_some()).then(b.1.total_cmp(&a.1)));
     known.truncate(TOGETHER);
