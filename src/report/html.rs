@@ -2,7 +2,7 @@
 
 use super::compare::Comparison;
 use super::page::{branch_part, compared_part, levels_part, not_said, table_part};
-use super::plot::{escaped, map};
+use super::plot::{Map, escaped, map};
 use super::study::Study;
 use super::words;
 
@@ -43,11 +43,18 @@ fn one(k: usize, study: &Study, several: bool) -> String {
     let mut out = String::new();
     let name = if several { escaped(&study.name) } else { "What was filmed".into() };
     out += &format!("<section id=\"s{k}\"><h2>{name}</h2>{}", facts(study));
+    let Map { svg, unnamed } = map(study);
+    let unnamed = match unnamed.as_slice() {
+        [] => String::new(),
+        some => {
+            let names: Vec<String> = some.iter().map(u32::to_string).collect();
+            format!(" <span>There is no room for the numbers of {}.</span>", names.join(", "))
+        }
+    };
     out += &format!(
-        "<figure class=\"map\">{}<figcaption>Branches as they were measured, at rest: <span class=\"key\"><i class=\"k kp\"></i>\
+        "<figure class=\"map\">{svg}<figcaption>Branches as they were measured, at rest: <span class=\"key\"><i class=\"k kp\"></i>\
          with a frequency</span> <span class=\"key\"><i class=\"k ks\"></i>without</span> <span>The dashed line is the region \
-         that was tracked.</span></figcaption></figure>",
-        map(study)
+         that was tracked.</span>{unnamed}</figcaption></figure>"
     );
     out += &table_part(study);
     out += &levels_part(study);
