@@ -62,12 +62,14 @@ fn plots(study: &Study, branch: &Branch) -> String {
         |_| " <span class=\"key\"><i class=\"k kf\"></i>the part of the first that has its own frequency and damping</span>",
     );
     let drawn = spectrum(study, branch);
-    let answer = branch
-        .known()
-        .map_or("", |_| " <span class=\"key\"><i class=\"k km\"></i>its frequency; shaded: the interval</span>");
+    let answer = branch.known().map_or(
+        "",
+        |_| " <span class=\"key\"><i class=\"k kb\"></i>the branch's frequency (line) with its interval (shaded)</span>",
+    );
     let peak = branch.reference.map_or(String::new(), |r| {
         format!(
-            " <span>Level bar: width at half the power of the peak at {:.2} Hz, damping {:.3} (eq. 6).</span>",
+            " <span class=\"key\"><i class=\"k kw\"></i>for reference: width at half the power of the largest peak, at {:.2} Hz; damping \
+             by it {:.3} (eq. 6)</span>",
             r.peak_hz, r.damping_ratio
         )
     });
