@@ -11,7 +11,8 @@ use crate::dynamics::analyse_with;
 use crate::export::picture::data_address;
 use crate::export::{ExportError, refuse_taken};
 use crate::model::{Excitation, NodeName, Skeleton, Swaying};
-use crate::report::{Given, Study, compare, json, page, text};
+use crate::report::{Given, Study, compare, hints, json, page, text};
+use crate::tui::columns;
 use anyhow::anyhow;
 pub use options::AnalyzeArgs;
 use std::cell::Cell;
@@ -45,10 +46,15 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), Ended> {
         read.iter().zip(&names).map(|(captured, name)| analysed(args, captured, name)).collect::<Result<_, _>>()?;
     let (studies, answers): (Vec<Study>, Vec<_>) = all.into_iter().map(|a| (a.study, (a.sway, a.differs))).unzip();
     let comparison = compare(&studies, args.trees.same());
+    if comparison.as_ref().is_some_and(|c| c.same_tree.is_none()) {
+        say(
+            "arborcam: warning: nothing is compared: it cannot be told whether these are films of one tree; say --trees same or different",
+        );
+    }
     let told = if args.json {
         format!("{}\n", json(&studies, comparison.as_ref()))
     } else {
-        text(&studies, comparison.as_ref())
+        text(&studies, comparison.as_ref(), columns().map(usize::from))
     };
     print(&told)?;
     let stop = stop.while_writing();
@@ -130,6 +136,8 @@ fn analysed(args: &AnalyzeArgs, captured: &Captured, name: &str) -> Result<Analy
     let progress = Progress::of(name, skeleton.nodes.len());
     let analysis = analyse_with(&skeleton, &film, dynamics, &|| progress.step());
     progress.end();
+    let given = dynamics.excitation != Excited::Auto;
+    hints(&film, analysis.onset, given).into_iter().for_each(|what| tell("note", what));
     let mut poses = Vec::new();
     let all = captured.film().map(|film| {
         film.filter(|p| p.as_ref().map_or(true, |p| from_s <= p.time_s && p.time_s <= to_s)).try_for_each(|pose| {
