@@ -443,11 +443,15 @@ fn a_model_with_the_former_answers_is_told_of_and_made_anew_by_export() {
 #[test]
 fn several_releases_in_one_film_are_told_of() {
     let (_dir, dir) = captured("twice");
-    prolong(&dir, 2);
-    lasts(&dir, 22);
+    // Pulled again while the camera looks away.
+    prolong(&dir, 2, 14.0);
+    lasts(&dir, 25);
     let told = told(&[&dir], &["--no-write"]);
     let notes = told["captures"][0]["notes"].to_string();
-    assert!(notes.contains("let go 2 times") && notes.contains("--from and --to"), "{notes}");
+    assert!(
+        notes.contains("let go 2 times, at 0.") && notes.contains(", 14.") && notes.contains("--from and --to"),
+        "{notes}"
+    );
     let one = analyze(&[&dir], &["--no-write", "--from", "0", "--to", "10.9"]);
     assert!(one.stderr.is_empty(), "{}", String::from_utf8_lossy(&one.stderr));
 }
@@ -590,13 +594,13 @@ fn where_nothing_can_be_written_the_table_is_printed_all_the_same() {
 }
 
 /// The film again and again: its analysis takes a while.
-fn prolong(dir: &Path, times: u32) {
+fn prolong(dir: &Path, times: u32, every_s: f64) {
     let text = fs::read_to_string(dir.join("tracks.csv")).expect("tracks");
     let (header, rows) = text.split_once('\n').expect("header");
     let lap = |k: u32| {
         let row = move |line: &str| {
             let cells: Vec<&str> = line.split(',').collect();
-            let time_s = cells[2].parse::<f64>().expect("time") + 11.0 * f64::from(k);
+            let time_s = cells[2].parse::<f64>().expect("time") + every_s * f64::from(k);
             format!("{},{},{time_s:.6},{}\n", cells[0], cells[1], cells[3..].join(","))
         };
         rows.lines().map(row).collect::<String>()
@@ -616,7 +620,7 @@ fn lasts(dir: &Path, seconds: u32) {
 #[test]
 fn of_a_long_film_the_end_is_looked_at_as_the_capture_did() {
     let (_dir, dir) = captured("long");
-    prolong(&dir, 7);
+    prolong(&dir, 7, 11.0);
     lasts(&dir, 77);
     let part = |more: &[&str]| {
         let told = told(&[&dir], &[&["--no-write", "--excitation", "release"], more].concat());
@@ -638,7 +642,7 @@ fn of_a_long_film_the_end_is_looked_at_as_the_capture_did() {
 #[test]
 fn whoever_stops_it_finds_everything_as_it_was() {
     let (_dir, dir) = captured("tree");
-    prolong(&dir, 8);
+    prolong(&dir, 8, 11.0);
     // Told before the work begins: the sign to stop it.
     lasts(&dir, 900);
     let (before, page) = (fs::read(dir.join("nodes.csv")).expect("nodes"), dir.with_file_name("page.html"));

@@ -3,7 +3,13 @@
 /// A table that may be narrowed. A row may end early with words that are as long as they like.
 pub struct Table {
     columns: Vec<Column>,
-    rows: Vec<Vec<String>>,
+    rows: Vec<Row>,
+}
+
+/// Cells, the last of which stands in no column where a row ends early.
+struct Row {
+    cells: Vec<String>,
+    ends_early: bool,
 }
 
 /// A column; one with a larger `spare` is left out before one with a smaller, and with 0 it stays.
@@ -19,8 +25,9 @@ impl Table {
         Self { columns: columns.iter().map(column).collect(), rows: Vec::new() }
     }
 
-    pub fn push(&mut self, row: Vec<String>) {
-        self.rows.push(row);
+    pub fn push(&mut self, cells: Vec<String>) {
+        let ends_early = cells.len() < self.columns.len();
+        self.rows.push(Row { cells, ends_early });
     }
 
     /// As lines of at most `width` letters, if leaving columns out can make it so; and the heads of those that are left out.
@@ -41,35 +48,37 @@ impl Table {
     }
 
     fn leave_out(&mut self, at: usize) {
-        let all = self.columns.len();
         for row in &mut self.rows {
-            // The words at the end of a short row stand in no column.
-            if at < row.len() && (row.len() == all || at + 1 < row.len()) {
-                row.remove(at);
+            if at < row.in_columns() {
+                row.cells.remove(at);
             }
         }
     }
 
     /// Columns that are as wide as what stands in them, to the right.
     fn text(&self) -> String {
-        let all = self.columns.len();
-        let heads: Vec<String> = self.columns.iter().map(|c| c.head.clone()).collect();
-        let rows: Vec<&Vec<String>> = std::iter::once(&heads).chain(&self.rows).collect();
-        let ends_early = |row: &Vec<String>, c: usize| row.len() < all && c + 1 == row.len();
+        let heads = Row { cells: self.columns.iter().map(|c| c.head.clone()).collect(), ends_early: false };
+        let rows: Vec<&Row> = std::iter::once(&heads).chain(&self.rows).collect();
         let width = |c: usize| {
-            let cells = rows.iter().filter(|row| !ends_early(row, c)).filter_map(|row| row.get(c));
-            cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
+            let cells = rows.iter().filter(|row| c < row.in_columns()).map(|row| row.cells[c].chars().count());
+            cells.max().unwrap_or(0)
         };
-        let widths: Vec<usize> = (0..all).map(width).collect();
-        let line = |row: &&Vec<String>| {
+        let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
+        let line = |row: &&Row| {
             let cell = |(c, cell): (usize, &String)| {
-                let gap = widths.get(c).copied().unwrap_or(0).saturating_sub(cell.chars().count());
-                if ends_early(row, c) { cell.clone() } else { format!("{}{cell}", " ".repeat(gap)) }
+                let width = widths.get(c).filter(|_| c < row.in_columns()).copied().unwrap_or(0);
+                format!("{}{cell}", " ".repeat(width.saturating_sub(cell.chars().count())))
             };
-            let cells: Vec<String> = row.iter().enumerate().map(cell).collect();
+            let cells: Vec<String> = row.cells.iter().enumerate().map(cell).collect();
             format!("  {}\n", cells.join("  ").trim_end())
         };
         rows.iter().map(line).collect()
+    }
+}
+
+impl Row {
+    fn in_columns(&self) -> usize {
+        self.cells.len() - usize::from(self.ends_early && !self.cells.is_empty())
     }
 }
 
@@ -78,15 +87,16 @@ pub fn wrapped(text: &str, width: Option<usize>) -> String {
     let Some(width) = width else { return text.into() };
     let mut out = String::new();
     for line in text.split_inclusive('\n') {
-        let mut used = 0;
+        let (mut used, mut begun) = (0, false);
         // With its blanks, so that a line that is short enough stays as it is.
         for word in line.split_inclusive(' ') {
             let long = word.trim_end().chars().count();
-            if used > 4 && used + long > width {
+            if begun && used + long > width {
                 out.truncate(out.trim_end_matches(' ').len());
                 out.push_str("\n    ");
                 used = 4;
             }
+            begun |= long > 0;
             out.push_str(word);
             used += word.chars().count();
         }

@@ -9,15 +9,18 @@ const OVER_S: f64 = 0.12;
 const SEEN: f64 = 0.9;
 /// Before a release the tree is at rest for so long, s, with at most this share of the energy that it has at its peak so long
 /// after it, s; and that is at least this share of the film's largest.
-const REST_S: f64 = 0.5;
-const AT_REST: f64 = 0.04;
+const REST_S: f64 = 0.6;
+const AT_REST: f64 = 0.02;
 const RISE_S: f64 = 1.0;
+/// At the begin of the film less of the rest may be seen, s.
+const LEAST_REST_S: f64 = 0.3;
 const LARGE: f64 = 0.2;
 /// Two releases are farther apart than this, s.
 const APART_S: f64 = 2.0;
 /// The film in pieces whose energy falls from each to the next: by so much at the most it may grow, to this share of itself it falls
-/// in all, and its logarithm lies so near to a straight line (share of the variance). Of 232 pieces of windy films 7 did so.
-const PIECES: usize = 6;
+/// in all, and its logarithm lies so near to a straight line (share of the variance). Of 216 parts of windy films of 5 to 10 s
+/// 8 did so, of 57 parts that begin after a release 27.
+const PIECES: usize = 4;
 const GROWS: f64 = 1.15;
 const FALLS: f64 = 0.3;
 const STRAIGHT: f64 = 0.85;
@@ -56,7 +59,7 @@ fn energy(film: &Film) -> Option<Vec<[f64; 2]>> {
         .map(|t| &t.at_px)
         .filter(|at| at.iter().filter(|p| seen(p)).count() as f64 >= SEEN * times.len() as f64)
         .collect();
-    if tracks.is_empty() || times.len() < 4 * PIECES + over {
+    if tracks.is_empty() || times.len() < 8 * PIECES + over {
         return None;
     }
     let at = |k: usize| {
@@ -68,7 +71,7 @@ fn energy(film: &Film) -> Option<Vec<[f64; 2]>> {
         };
         let mut all: Vec<f64> = tracks.iter().filter_map(speed).collect();
         all.sort_unstable_by(f64::total_cmp);
-        Some([times[k + over], *all.get(all.len() / 2)?])
+        Some([0.5 * (times[k] + times[k + over]), *all.get(all.len() / 2)?])
     };
     Some((0..times.len() - over).filter_map(at).collect())
 }
@@ -79,7 +82,7 @@ fn releases(energy: &[[f64; 2]]) -> Vec<f64> {
     let first_s = energy.first().map_or(0.0, |e| e[0]);
     let mut out: Vec<f64> = Vec::new();
     for (k, &[now, _]) in energy.iter().enumerate() {
-        if now - first_s < REST_S - OVER_S || out.last().is_some_and(|last| now - last < APART_S) {
+        if now - first_s < LEAST_REST_S || out.last().is_some_and(|last| now - last < APART_S) {
             continue;
         }
         let largest = |of: &mut dyn Iterator<Item = &[f64; 2]>| of.map(|e| e[1]).fold(0.0, f64::max);
@@ -186,12 +189,12 @@ mod tests {
         }
     }
 
+    /// Wind that happens to fade over the film cannot be told from a free sway by its energy alone.
     #[test]
-    fn wind_and_stillness_get_none() {
-        for seed in 0..20 {
-            let hint = hints(&windy(seed), told(Excitation::Wind), false);
-            assert!(hint.is_empty(), "seed {seed}: {hint:?}");
-        }
+    fn wind_seldom_gets_a_hint_and_stillness_none() {
+        let hinted: Vec<u64> =
+            (0..60).filter(|&seed| !hints(&windy(seed), told(Excitation::Wind), false).is_empty()).collect();
+        assert!(hinted.len() <= 3, "{hinted:?} of 60");
         assert!(hints(&film(10.0, |_| 0.0), told(Excitation::Wind), false).is_empty());
         assert!(hints(&Film::default(), None, false).is_empty());
     }
