@@ -459,18 +459,18 @@ fn several_releases_in_one_film_are_told_of() {
 /// A terminal of so many columns, and what it shows of the table.
 fn on_a_terminal(dir: &Path, columns: u16) -> String {
     let (mut ours, mut theirs) = (0, 0);
-    let mut size = libc::winsize { ws_row: 24, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 };
+    let size = libc::winsize { ws_row: 24, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 };
     let null = std::ptr::null_mut();
     // SAFETY: the pointers are of variables that live on, or null, which is allowed for name and settings.
-    assert_eq!(unsafe { libc::openpty(&mut ours, &mut theirs, null, null.cast(), &mut size) }, 0);
+    assert_eq!(unsafe { libc::openpty(&mut ours, &mut theirs, null, null.cast(), &size) }, 0);
     // SAFETY: both are open and nobody else's.
     let (mut ours, theirs) = unsafe { (fs::File::from_raw_fd(ours), fs::File::from_raw_fd(theirs)) };
     let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
     command.arg("analyze").arg(dir).arg("--no-write").stdout(theirs).stderr(Stdio::null());
     // In a session of its own, so that the terminal of whoever runs the tests is not asked.
-    // SAFETY: setsid may be called between fork and exec.
+    // SAFETY: it takes nothing and touches no memory.
     let alone = || if unsafe { libc::setsid() } < 0 { Err(std::io::Error::last_os_error()) } else { Ok(()) };
-    // SAFETY: nothing else is done there.
+    // SAFETY: setsid may be called between fork and exec.
     unsafe { command.pre_exec(alone) };
     let mut child = command.spawn().expect("arborcam");
     drop(command);
