@@ -4,8 +4,9 @@ mod support;
 
 use serde_json::Value;
 use std::fs;
-use std::io::{BufRead, BufReader};
-use std::os::unix::process::ExitStatusExt;
+use std::io::{BufRead, BufReader, Read};
+use std::os::fd::FromRawFd;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use support::replayed;
@@ -113,6 +114,13 @@ fn the_answers_stand_in_the_table_in_json_and_in_the_capture() {
             plain.lines().find(|l| l.starts_with("  ") && l.split_whitespace().next() == Some(&id)).expect("its line");
         let shown: f64 = line.split_whitespace().nth(4).expect("cell").parse().expect("number");
         assert!((shown - f).abs() < 6e-4, "{line} lacks {f}");
+        // One amplitude in all, that of the curve in the report; none where points and angle contradict each other.
+        let [told, points, angle] =
+            ["amplitude_deg", "amplitude_by_points_deg", "amplitude_in_angle_deg"].map(|key| branch[key].as_f64());
+        let agree = points.zip(angle).filter(|(p, a)| (p / a).ln().abs() < 1.5_f64.ln());
+        assert_eq!(told, agree.map(|(_, angle)| angle), "{branch}");
+        let cell = row.split(',').nth(18).expect("cell").parse::<f64>().ok();
+        assert!(cell.zip(told).map_or(cell == told, |(c, t)| (c - t).abs() < 1e-3), "{row} lacks {told:?}");
     }
     // Once more: nothing is left to change. --no-write changes nothing either.
     assert_eq!(fs::read_to_string(dir.join("nodes.csv")).expect("nodes"), text);
@@ -372,6 +380,124 @@ fn a_tree_of_one_branch_is_a_tree() {
     assert_eq!(branches(&told).len(), 1);
 }
 
+/// One branch that stands where the other's trunk does says nothing of whether the two are one tree.
+#[test]
+fn captures_that_may_be_of_one_tree_or_of_two_are_not_compared_by_a_guess() {
+    let (_dir, first) = captured("tree");
+    let other = first.with_file_name("other");
+    copy(&first, &other);
+    let text = fs::read_to_string(other.join("nodes.csv")).expect("nodes");
+    fs::write(other.join("nodes.csv"), text.lines().take(3).collect::<Vec<_>>().join("\n") + "\n").expect("nodes");
+    let pole = |name: &str, cell: &str| {
+        if name == "node_id" && !cell.is_empty() { "1".into() } else { cell.into() }
+    };
+    edit(&other.join("tracks.csv"), pole);
+    fs::remove_file(other.join("motion.csv")).expect("remove");
+    let page = first.with_file_name("page.html");
+    let output = analyze(&[&first, &other], &["--no-write", "--report", &page.display().to_string()]);
+    let (text, error) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success() && error.contains("--trees same or different"), "{error}");
+    assert!(text.contains("Not compared with tree") && !text.contains("frequency against"), "{text}");
+    let html = fs::read_to_string(page).expect("report");
+    assert!(html.contains("Not compared with tree") && !html.contains("called there"));
+    well_formed(&html);
+    let told = told(&[&first, &other], &["--no-write"]);
+    assert!(told["comparison"]["same_tree"].is_null(), "{}", told["comparison"]);
+    assert!(told["comparison"]["branches"].as_array().is_some_and(Vec::is_empty));
+    // Who knows says so.
+    assert_eq!(told_of_two(&first, &other)["comparison"]["branches"].as_array().map(Vec::len), Some(1));
+}
+
+/// The tables are new and the model beside them is not: that is said, with the command that makes one, and that one is new.
+#[test]
+fn a_model_with_the_former_answers_is_told_of_and_made_anew_by_export() {
+    let (_dir, dir) = captured("it's");
+    edit(&dir.join("nodes.csv"), |name, cell| match (name, cell) {
+        ("frequency_hz" | "frequency_lo_hz" | "frequency_hi_hz", c) if !c.is_empty() => "1.5".into(),
+        _ => cell.into(),
+    });
+    let error = |more: &[&str]| String::from_utf8_lossy(&analyze(&[&dir], more).stderr).into_owned();
+    assert_eq!(error(&["--no-write"]), "");
+    let note = error(&[]);
+    let command = note.trim_end().split("a new one: ").nth(1).unwrap_or_else(|| panic!("no command in {note:?}"));
+    assert!(note.starts_with("arborcam: note: ") && note.lines().count() == 1, "{note}");
+    // Nothing is new the second time.
+    assert_eq!(error(&[]), "");
+    let made = dir.with_file_name("new.glb");
+    let mut shell = Command::new("sh");
+    shell.args(["-c", &command.replacen("arborcam", "\"$ARBORCAM\"", 1)]).current_dir(dir.parent().expect("folder"));
+    let output = shell.env("ARBORCAM", env!("CARGO_BIN_EXE_arborcam")).output().expect("sh");
+    assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
+    let bytes = fs::read(made).expect("the model");
+    let told = told(&[&dir], &["--no-write"]);
+    let known = answered(&told);
+    for branch in &known {
+        let hz = number(&branch["frequency_hz"]["value"]);
+        let json = String::from_utf8_lossy(&bytes);
+        assert!(json.contains(&format!("\"frequency_hz\":{:.3}", (hz * 1e3).floor() / 1e3)), "no {hz} in the model");
+    }
+    assert!(!known.is_empty());
+}
+
+/// A film in which the tree was let go twice: the answers are of one release at most, and the user is told.
+#[test]
+fn several_releases_in_one_film_are_told_of() {
+    let (_dir, dir) = captured("twice");
+    // Pulled again while the camera looks away.
+    prolong(&dir, 2, 14.0);
+    lasts(&dir, 25);
+    let told = told(&[&dir], &["--no-write"]);
+    let notes = told["captures"][0]["notes"].to_string();
+    assert!(
+        notes.contains("let go 2 times, at 0.") && notes.contains(", 14.") && notes.contains("--from and --to"),
+        "{notes}"
+    );
+    let one = analyze(&[&dir], &["--no-write", "--from", "0", "--to", "10.9"]);
+    assert!(one.stderr.is_empty(), "{}", String::from_utf8_lossy(&one.stderr));
+}
+
+/// A terminal of so many columns, and what it shows of the table.
+fn on_a_terminal(dir: &Path, columns: u16) -> String {
+    let (mut ours, mut theirs) = (0, 0);
+    let size = libc::winsize { ws_row: 24, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 };
+    let null = std::ptr::null_mut();
+    // SAFETY: the pointers are of variables that live on, or null, which is allowed for name and settings.
+    assert_eq!(unsafe { libc::openpty(&mut ours, &mut theirs, null, null.cast(), &size) }, 0);
+    // SAFETY: both are open and nobody else's.
+    let (mut ours, theirs) = unsafe { (fs::File::from_raw_fd(ours), fs::File::from_raw_fd(theirs)) };
+    let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
+    command.arg("analyze").arg(dir).arg("--no-write").stdout(theirs).stderr(Stdio::null());
+    // In a session of its own, so that the terminal of whoever runs the tests is not asked.
+    // SAFETY: it takes nothing and touches no memory.
+    let alone = || if unsafe { libc::setsid() } < 0 { Err(std::io::Error::last_os_error()) } else { Ok(()) };
+    // SAFETY: setsid may be called between fork and exec.
+    unsafe { command.pre_exec(alone) };
+    let mut child = command.spawn().expect("arborcam");
+    drop(command);
+    let (mut all, mut buffer) = (Vec::new(), [0; 4096]);
+    // An error is the end of a terminal.
+    while let Ok(n @ 1..) = ours.read(&mut buffer) {
+        all.extend_from_slice(&buffer[..n]);
+    }
+    assert!(child.wait().expect("status").success());
+    String::from_utf8_lossy(&all).replace('\r', "")
+}
+
+#[test]
+fn on_a_narrow_terminal_no_line_is_wider_and_elsewhere_the_table_is_whole() {
+    let (_dir, dir) = captured("tree");
+    let whole = String::from_utf8(analyze(&[&dir], &["--no-write"]).stdout).expect("text");
+    assert!(whole.lines().any(|line| line.ends_with("peak, Hz  eq. 6")), "{whole}");
+    assert_eq!(on_a_terminal(&dir, 200), whole);
+    let narrow = on_a_terminal(&dir, 80);
+    assert!(narrow.lines().all(|line| line.chars().count() <= 80), "{narrow}");
+    assert!(
+        narrow.contains("frequency, Hz") && narrow.contains("sway, deg") && !narrow.contains("peak, Hz  "),
+        "{narrow}"
+    );
+    assert!(narrow.contains("for want of room without: peak, Hz; eq. 6"), "{narrow}");
+}
+
 #[test]
 fn bad_input_gets_a_line_and_the_right_status() {
     let (_dir, dir) = captured("tree");
@@ -425,6 +551,7 @@ fn bad_input_gets_a_line_and_the_right_status() {
         (vec![&dir], vec!["--from", "-1"], BAD_USAGE, "give a number of seconds"),
         (vec![&dir], vec!["--from", "nan"], BAD_USAGE, "give a number of seconds"),
         (vec![&dir], vec!["--scale", "1,1:1,1=2"], BAD_USAGE, "at least a pixel apart"),
+        (vec![&dir], vec!["--scale", "10,10:5000,1=2"], BAD_USAGE, "5000,1 lies off the picture"),
         (vec![&dir], vec!["--scale", "1,1:9,1=2", "--metres-per-px", "1"], BAD_USAGE, "cannot be used with"),
         (vec![&dir], vec!["--report", &taken], FAILED, "exists already"),
         (vec![&dir], vec!["--config", &settings], BAD_USAGE, "dynamics.window_s"),
@@ -467,13 +594,13 @@ fn where_nothing_can_be_written_the_table_is_printed_all_the_same() {
 }
 
 /// The film again and again: its analysis takes a while.
-fn prolong(dir: &Path, times: u32) {
+fn prolong(dir: &Path, times: u32, every_s: f64) {
     let text = fs::read_to_string(dir.join("tracks.csv")).expect("tracks");
     let (header, rows) = text.split_once('\n').expect("header");
     let lap = |k: u32| {
         let row = move |line: &str| {
             let cells: Vec<&str> = line.split(',').collect();
-            let time_s = cells[2].parse::<f64>().expect("time") + 11.0 * f64::from(k);
+            let time_s = cells[2].parse::<f64>().expect("time") + every_s * f64::from(k);
             format!("{},{},{time_s:.6},{}\n", cells[0], cells[1], cells[3..].join(","))
         };
         rows.lines().map(row).collect::<String>()
@@ -493,7 +620,7 @@ fn lasts(dir: &Path, seconds: u32) {
 #[test]
 fn of_a_long_film_the_end_is_looked_at_as_the_capture_did() {
     let (_dir, dir) = captured("long");
-    prolong(&dir, 7);
+    prolong(&dir, 7, 11.0);
     lasts(&dir, 77);
     let part = |more: &[&str]| {
         let told = told(&[&dir], &[&["--no-write", "--excitation", "release"], more].concat());
@@ -515,7 +642,7 @@ fn of_a_long_film_the_end_is_looked_at_as_the_capture_did() {
 #[test]
 fn whoever_stops_it_finds_everything_as_it_was() {
     let (_dir, dir) = captured("tree");
-    prolong(&dir, 8);
+    prolong(&dir, 8, 11.0);
     // Told before the work begins: the sign to stop it.
     lasts(&dir, 900);
     let (before, page) = (fs::read(dir.join("nodes.csv")).expect("nodes"), dir.with_file_name("page.html"));

@@ -1,6 +1,7 @@
 //! `arborcam analyze DIR...`: how every branch of a capture sways, and what captures have in common.
 
 mod options;
+mod written;
 
 use super::stop::Stop;
 use super::{Ended, say};
@@ -8,16 +9,17 @@ use crate::capture::Captured;
 use crate::config::Excited;
 use crate::dynamics::analyse_with;
 use crate::export::picture::data_address;
-use crate::export::{ExportError, refuse_taken, renewed, replace, write_files};
+use crate::export::{ExportError, refuse_taken};
 use crate::model::{Excitation, NodeName, Skeleton, Swaying};
-use crate::report::{Given, Study, compare, json, page, text};
+use crate::report::{Given, Study, compare, hints, json, page, text};
+use crate::tui::columns;
 use anyhow::anyhow;
 pub use options::AnalyzeArgs;
 use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::io::{IsTerminal, Write};
-use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
+use std::path::PathBuf;
+use written::{differs, put_beside, put_into, stale};
 
 /// Film that is analysed at most, s, where a part is chosen: the end of a longer one. Points of hours would fill the memory.
 const LONGEST_S: f64 = 600.0;
@@ -26,6 +28,8 @@ const LONGEST_S: f64 = 600.0;
 struct Analysed {
     study: Study,
     sway: BTreeMap<NodeName, Swaying>,
+    /// Whether that is not what stood there.
+    differs: bool,
 }
 
 pub fn run(args: &AnalyzeArgs) -> Result<(), Ended> {
@@ -37,22 +41,32 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), Ended> {
     let names = names(&args.dirs);
     // Before the first is worked on: a mistyped name is told at once.
     let read: Vec<Captured> = args.dirs.iter().map(|dir| Captured::tree(dir)).collect::<Result<_, _>>()?;
+    read.iter().try_for_each(|captured| args.scale.fits(captured.skeleton.image_size))?;
     let all: Vec<Analysed> =
         read.iter().zip(&names).map(|(captured, name)| analysed(args, captured, name)).collect::<Result<_, _>>()?;
-    let (studies, sway): (Vec<Study>, Vec<BTreeMap<NodeName, Swaying>>) =
-        all.into_iter().map(|a| (a.study, a.sway)).unzip();
+    let (studies, answers): (Vec<Study>, Vec<_>) = all.into_iter().map(|a| (a.study, (a.sway, a.differs))).unzip();
     let comparison = compare(&studies, args.trees.same());
+    if comparison.as_ref().is_some_and(|c| c.same_tree.is_none()) {
+        say(
+            "arborcam: warning: nothing is compared: it cannot be told whether these are films of one tree; say --trees same or different",
+        );
+    }
     let told = if args.json {
         format!("{}\n", json(&studies, comparison.as_ref()))
     } else {
-        text(&studies, comparison.as_ref())
+        text(&studies, comparison.as_ref(), columns().map(usize::from))
     };
     print(&told)?;
     let stop = stop.while_writing();
     let mut failures: Vec<ExportError> = Vec::new();
     if !args.no_write {
-        let written = args.dirs.iter().zip(&sway).map(|(dir, sway)| put_into(dir, sway, stop));
-        failures.extend(written.filter_map(Result::err));
+        for (dir, (sway, differs)) in args.dirs.iter().zip(&answers) {
+            match put_into(dir, sway, stop) {
+                Ok(()) if *differs && dir.join("tree.glb").exists() => say(&stale(dir)),
+                Ok(()) => {}
+                Err(e) => failures.push(e),
+            }
+        }
     }
     if let Some(path) = &args.report {
         let html = page(&studies, comparison.as_ref());
@@ -125,6 +139,8 @@ fn analysed(args: &AnalyzeArgs, captured: &Captured, name: &str) -> Result<Analy
         true
     });
     progress.end();
+    let given = dynamics.excitation != Excited::Auto;
+    hints(&film, analysis.onset, given).into_iter().for_each(|what| tell("note", what));
     let mut poses = Vec::new();
     let all = captured.film().map(|film| {
         film.filter(|p| p.as_ref().map_or(true, |p| from_s <= p.time_s && p.time_s <= to_s)).try_for_each(|pose| {
@@ -160,8 +176,15 @@ fn analysed(args: &AnalyzeArgs, captured: &Captured, name: &str) -> Result<Analy
         picture: picture.as_deref(),
         notes: &notes,
     });
-    let sway = skeleton.nodes.iter().map(|n| n.name).zip(analysis.sway).collect();
-    Ok(Analysed { study, sway })
+    let differs = captured.sway.iter().zip(&analysis.sway).any(|(old, new)| differs(old, new));
+    let mut sway: BTreeMap<NodeName, Swaying> = skeleton.nodes.iter().map(|n| n.name).zip(analysis.sway).collect();
+    for branch in &study.branches {
+        // The file says what the table says.
+        if let Some(Ok(sway)) = sway.get_mut(&NodeName(branch.name)) {
+            sway.amplitude_deg = branch.amplitude_deg;
+        }
+    }
+    Ok(Analysed { study, sway, differs })
 }
 
 /// Tells how far the work is, on a line that is written over and goes at the end; on a terminal only.
@@ -215,20 +238,6 @@ fn print(text: &str) -> Result<(), Ended> {
     written
         .or_else(|e| if e.kind() == std::io::ErrorKind::BrokenPipe { Ok(()) } else { Err(e) })
         .map_err(|e| Ended::Failed(anyhow!("cannot write to standard output: {e}")))
-}
-
-/// The answers into the capture's own table.
-fn put_into(dir: &Path, sway: &BTreeMap<NodeName, Swaying>, stop: &AtomicBool) -> Result<(), ExportError> {
-    let file = dir.join("nodes.csv");
-    let explain = |e| ExportError::from_io(file.display().to_string(), 0, e);
-    let old = std::fs::read(&file).map_err(explain)?;
-    let new = renewed(&old, sway)?;
-    if new == old { Ok(()) } else { replace(&file, &new, stop) }
-}
-
-fn put_beside(path: &Path, html: String, stop: &AtomicBool) -> Result<(), ExportError> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    write_files(path.parent().unwrap_or(Path::new("")), &[(name, html.into_bytes())], stop)
 }
 
 #[cfg(test)]

@@ -1,6 +1,9 @@
 //! How large a pixel is at the tree.
 
+use super::Ended;
 use crate::config::Config;
+use crate::model::Size;
+use anyhow::anyhow;
 use clap::Args;
 
 /// The largest size of a pixel that is believed, m.
@@ -15,20 +18,40 @@ pub struct ScaleArgs {
     /// The same by a known length: two points of the picture (px from the left and from the top) and how far they are apart
     /// at the tree, e.g. 310,340:305,80=2.6
     #[arg(long, value_name = "U,V:U,V=METRES", value_parser = length, conflicts_with = "metres_per_px")]
-    scale: Option<f64>,
+    scale: Option<Known>,
+}
+
+/// A known length in the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Known {
+    /// Its ends, px.
+    ends: [[f64; 2]; 2],
+    metres_per_px: f64,
 }
 
 impl ScaleArgs {
     /// The command line over the settings.
     pub fn set(&self, config: &mut Config) {
-        if let Some(metres) = self.scale.or(self.metres_per_px) {
+        if let Some(metres) = self.scale.map(|known| known.metres_per_px).or(self.metres_per_px) {
             config.export.metres_per_px = metres;
+        }
+    }
+
+    /// Refuses a known length that was not measured in a picture of this size.
+    pub fn fits(&self, size: Size) -> Result<(), Ended> {
+        let sides = [size.width, size.height].map(f64::from);
+        // To the rim of the last pixel, as a mouse may tell it.
+        let within = |p: &[f64; 2]| (0..2).all(|c| (-0.5..=sides[c]).contains(&p[c]));
+        match self.scale.iter().flat_map(|known| known.ends).find(|p| !within(p)) {
+            None => Ok(()),
+            Some([u, v]) => Err(Ended::BadUsage(anyhow!(
+                "--scale: {u},{v} lies off the picture, which is {size} pixels; give two points of a frame of this film"
+            ))),
         }
     }
 }
 
-/// Metres in a pixel by a known length.
-fn length(text: &str) -> Result<f64, String> {
+fn length(text: &str) -> Result<Known, String> {
     let how = || "give two points and their distance in metres, like 310,340:305,80=2.6".to_owned();
     let number = |t: &str| t.trim().parse().ok().filter(|x: &f64| x.is_finite());
     let point = |t: &str| {
@@ -43,8 +66,12 @@ fn length(text: &str) -> Result<f64, String> {
     if px < 1.0 {
         return Err("the two points must be at least a pixel apart".into());
     }
-    let scale = metres / px;
-    if scale > 0.0 && scale <= LARGEST_M { Ok(scale) } else { Err("the distance must be more than 0 metres".into()) }
+    let metres_per_px = metres / px;
+    if metres_per_px > 0.0 && metres_per_px <= LARGEST_M {
+        Ok(Known { ends: [a, b], metres_per_px })
+    } else {
+        Err("the distance must be more than 0 metres".into())
+    }
 }
 
 #[cfg(test)]
@@ -53,12 +80,19 @@ mod tests {
 
     #[test]
     fn a_known_length_gives_the_scale() {
-        assert_eq!(length("0,0:30,40=2.5"), Ok(0.05));
-        assert_eq!(length("10,0 : 10,100 = 1m"), Ok(0.01));
+        assert_eq!(length("0,0:30,40=2.5"), Ok(Known { ends: [[0.0, 0.0], [30.0, 40.0]], metres_per_px: 0.05 }));
+        assert_eq!(length("10,0 : 10,100 = 1m").map(|known| known.metres_per_px), Ok(0.01));
         for bad in
             ["", "1", "0,0:30,40", "0,0:0,0=1", "0,0:30,40=0", "0,0:30,40=-1", "0,0:30=1", "a,0:3,4=1", "0,0:3,4=nan"]
         {
             assert!(length(bad).is_err(), "{bad:?}");
         }
+    }
+
+    #[test]
+    fn a_length_off_the_picture_is_refused() {
+        let fits = |text| ScaleArgs { metres_per_px: None, scale: length(text).ok() }.fits(Size::new(640, 360)).is_ok();
+        assert!(fits("0,0:640,360=1") && ScaleArgs::default().fits(Size::new(1, 1)).is_ok());
+        assert!(!fits("0,0:641,10=1") && !fits("10,361:20,20=1") && !fits("-2,0:20,20=1") && !fits("1e300,0:2,2=1"));
     }
 }

@@ -49,6 +49,7 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
     let source = source::open(plan.input, &config.camera, plan.fps).map_err(no_input)?;
     let info = source.describe();
     common.shape.fits(info.size)?;
+    common.scale.fits(info.size)?;
     let outline = match &common.outline {
         OutlineSpec::Auto => None,
         OutlineSpec::File(path) => Some(outline::load(path, info.size).map_err(|e| Ended::BadUsage(e.into()))?),

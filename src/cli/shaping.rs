@@ -144,6 +144,7 @@ impl Shaping {
         let length_s = tail_s(note.timing.duration_s).unwrap_or(config.export.animation_s);
         let captured = Captured::read(dir, length_s)?;
         self.shape.fits(captured.skeleton.image_size)?;
+        self.scale.fits(captured.skeleton.image_size)?;
         let stand = self.stand(&captured, &config, dir)?;
         let leaf = self.leaf.as_deref().map(read_template).transpose().map_err(|e| Ended::BadUsage(e.into()))?;
         let size = captured.skeleton.image_size;

@@ -54,8 +54,8 @@ const WIDER: f64 = 1.25;
 /// And the frequency's does not shrink below this standard deviation of its logarithm, however clear the decay is: most branches
 /// as they are found have some points of their neighbours. Found on the same clips.
 const LEAST_SD: f64 = 0.0015;
-/// Quantile of the normal distribution for 95 %.
-pub(super) const Z: f64 = 1.96;
+/// Half an interval, in standard deviations.
+pub(super) const Z: f64 = Interval::Z;
 
 /// What is asked of the estimates.
 #[derive(Clone, Copy, Debug)]

@@ -11,6 +11,9 @@ pub struct Interval {
 }
 
 impl Interval {
+    /// Half a 95 % interval in standard deviations: quantile of the normal distribution.
+    pub const Z: f64 = 1.96;
+
     /// Whether the interval holds `x`.
     pub fn holds(&self, x: f64) -> bool {
         self.lo <= x && x <= self.hi

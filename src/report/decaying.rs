@@ -1,4 +1,5 @@
-//! The part of an angle that is a branch's own free decay, for the eye: the answer comes from the points, not from here.
+//! The part of an angle that is a branch's own free decay: how far it sways, for the table and for the eye. Frequency and
+//! damping come from the points, not from here.
 
 use crate::model::Sway;
 use nalgebra::{DMatrix, DVector};
@@ -6,6 +7,14 @@ use std::f64::consts::TAU;
 
 /// Oscillations that count as one in an angle: frequencies within this share of each other.
 const SAME: f64 = 0.01;
+
+/// A branch's own free decay in an angle.
+pub struct Decaying {
+    /// In every frame, degrees; no number outside of the time that is used.
+    pub curve_deg: Vec<f64>,
+    /// Its amplitude at the release, degrees.
+    pub amplitude_deg: f64,
+}
 
 /// The damped cosine of `own` that fits `angle_deg` best between the two times `used_s` (none elsewhere), beside those of
 /// `others` and a constant. `None` without a damping, or where the angle has too few values.
@@ -16,7 +25,7 @@ pub fn decaying(
     released_s: f64,
     own: &Sway,
     others: &[Sway],
-) -> Option<Vec<f64>> {
+) -> Option<Decaying> {
     let own_hz = own.frequency_hz.value;
     let apart = |s: &&Sway| (s.frequency_hz.value / own_hz).ln().abs() > SAME;
     let modes: Vec<(f64, f64)> = std::iter::once(own)
@@ -53,5 +62,6 @@ pub fn decaying(
         cosine * c + sine * s
     };
     let at = |t: &f64| if within(*t) { own_part(*t) } else { f64::NAN };
-    (cosine.is_finite() && sine.is_finite()).then(|| times_s.iter().map(at).collect())
+    let amplitude_deg = cosine.hypot(sine);
+    amplitude_deg.is_finite().then(|| Decaying { curve_deg: times_s.iter().map(at).collect(), amplitude_deg })
 }

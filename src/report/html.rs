@@ -2,7 +2,7 @@
 
 use super::compare::Comparison;
 use super::page::{branch_part, compared_part, levels_part, not_said, table_part};
-use super::plot::{escaped, map};
+use super::plot::{Map, escaped, map};
 use super::study::Study;
 use super::words;
 
@@ -43,11 +43,18 @@ fn one(k: usize, study: &Study, several: bool) -> String {
     let mut out = String::new();
     let name = if several { escaped(&study.name) } else { "What was filmed".into() };
     out += &format!("<section id=\"s{k}\"><h2>{name}</h2>{}", facts(study));
+    let Map { svg, unnamed } = map(study);
+    let unnamed = match unnamed.as_slice() {
+        [] => String::new(),
+        some => {
+            let names: Vec<String> = some.iter().map(u32::to_string).collect();
+            format!(" <span>There is no room for the numbers of {}.</span>", names.join(", "))
+        }
+    };
     out += &format!(
-        "<figure class=\"map\">{}<figcaption>Branches as they were measured, at rest: <span class=\"key\"><i class=\"k kp\"></i>\
+        "<figure class=\"map\">{svg}<figcaption>Branches as they were measured, at rest: <span class=\"key\"><i class=\"k kp\"></i>\
          with a frequency</span> <span class=\"key\"><i class=\"k ks\"></i>without</span> <span>The dashed line is the region \
-         that was tracked.</span></figcaption></figure>",
-        map(study)
+         that was tracked.</span>{unnamed}</figcaption></figure>"
     );
     out += &table_part(study);
     out += &levels_part(study);
@@ -95,8 +102,11 @@ const HOW_TO_READ: &str = "<section><h2>How to read this</h2>\
 <p><b>Frequency</b> is the undamped natural frequency of a branch against the one that carries it, <b>damping ratio</b> its share \
 of critical damping. Both are fitted to all points on the branch in all frames at their real times. The <b>interval</b> in \
 brackets is meant to hold the true value in 95 of 100 cases.</p>\
-<p><b>Sway</b> is the amplitude of the branch's own oscillation in its angle to the carrier: at its largest after a release, and \
-in wind the square root of 2 times the root mean square. <b>End</b> is what that makes at the branch's end, in the picture.</p>\
+<p><b>Sway</b> is the amplitude of the branch's own oscillation in its angle to the carrier. After a release it is that of the \
+dashed curve at the moment of release. The points on the branch are a second witness: how far they turn about the place where it \
+begins. On short branches of few points that is mostly the move of that place. Where the two are more than 1.5 times apart, the \
+film does not show how far the branch sways, and there is a dash. In wind, and without poses, it comes from the points alone: in \
+wind the square root of 2 times the root mean square. <b>End</b> is what it makes at the branch's end, in the picture.</p>\
 <p><b>Peak</b> and <b>half-power damping</b> (Hu et al., equation 6) are what the largest peak of the angle's spectrum says. They are \
 for reference. A short film's peak is as wide as one over its length, so that this damping is too high, and the largest peak may \
 be that of a carrier or of the whole tree. Of a long film in wind, the spectrum is a mean over pieces of 20 s.</p>\

@@ -1,6 +1,7 @@
 //! What a film says of a tree's sway, told to people and programs: a table as text, JSON, and one HTML page with plots after
 //! Hu et al. (002 figures 3, 6, 7, 9 to 12 and 15). Pure: what goes in is analysed already, what comes out is text.
 
+mod columns;
 mod compare;
 mod decaying;
 mod html;
@@ -10,6 +11,7 @@ mod matching;
 mod page;
 mod pieces;
 mod plot;
+mod released;
 mod study;
 mod text;
 mod words;
@@ -19,5 +21,6 @@ pub use html::page;
 pub use json::json;
 pub use levels::{Growth, Level, Spread, growth, levels};
 pub use matching::{Match, matched};
+pub use released::hints;
 pub use study::{Branch, Given, Reference, Study};
 pub use text::text;

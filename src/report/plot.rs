@@ -4,6 +4,7 @@ mod across;
 mod angle;
 mod axes;
 mod curves;
+mod labels;
 mod map;
 mod svg;
 mod way;
@@ -11,7 +12,7 @@ mod way;
 pub use across::{Mark, Slot, across};
 pub use angle::angle;
 pub use curves::{Answer, Curve, spectra};
-pub use map::map;
+pub use map::{Map, map};
 pub use svg::escaped;
 pub use way::way;
 

@@ -1,6 +1,6 @@
 //! One capture, analysed: what the table, the JSON and the page are made from.
 
-use super::decaying::decaying;
+use super::decaying::{Decaying, decaying};
 use super::pieces::{averaged, looked_at_s};
 use crate::dynamics::{
     Analysis, Film, LEAST_PERIODS, Onset, Spectrum, angle_in_space_deg, angle_to_parent_deg, spectrum,
@@ -9,6 +9,9 @@ use crate::model::{Excitation, NodeId, Pose, Skeleton, Sway, Swaying, Unidentifi
 
 /// A step from frame to frame that is so many times the usual one is a gap.
 const GAP: f64 = 1.6;
+/// The points and the angle of the model see a branch's amplitude in different ways; farther apart than so many times, neither
+/// is told.
+const AGREE: f64 = 1.5;
 
 /// What a [`Study`] is made from.
 #[derive(Clone, Copy, Debug)]
@@ -77,7 +80,14 @@ pub struct Branch {
     pub base: [f64; 2],
     pub tip: [f64; 2],
     pub sway: Swaying,
-    /// Amplitude of the branch's end against the one that carries it, px in the picture; no number where unknown.
+    /// Amplitude of the branch's own oscillation in its angle to the one that carries it, degrees; no number where unknown.
+    pub amplitude_deg: f64,
+    /// What it is told from: by the turn of the points about the place where the branch begins at rest, which a move of that
+    /// place makes larger or smaller; and after a release by the angle in the picture's plane, as in
+    /// [`fitted_deg`](Self::fitted_deg). No numbers where unknown.
+    pub by_points_deg: f64,
+    pub in_angle_deg: f64,
+    /// What the amplitude is at the branch's end, px in the picture; no number where unknown.
     pub amplitude_px: f64,
     /// When every angle was, s; empty without poses. The angles are to the branch that carries it, less their mean, degrees:
     /// in the picture's plane and in space (002 eq. 1); no number where it has no direction.
@@ -202,11 +212,16 @@ fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: [f64; 2]) -> Branc
         .chain(carried)
         .filter_map(|p| given.analysis.sway.get(p.index()).copied().and_then(Result::ok))
         .collect();
-    let fitted_deg = sway
+    let fitted = sway
         .ok()
         .filter(|s| s.excitation == Excitation::Release)
         .zip(given.analysis.onset)
         .and_then(|(own, onset)| decaying(&times_s, &plane_deg, used_s, onset.at_s, &own, &others));
+    let by_points_deg = sway.map_or(f64::NAN, |s| s.amplitude_deg);
+    let (fitted_deg, in_angle_deg) =
+        fitted.map_or((None, f64::NAN), |Decaying { curve_deg, amplitude_deg }| (Some(curve_deg), amplitude_deg));
+    let in_angle = poses.len() > 1 && sway.is_ok_and(|s| s.excitation == Excitation::Release);
+    let amplitude_deg = if in_angle { agreed(by_points_deg, in_angle_deg) } else { by_points_deg };
     Branch {
         name: at.name.0,
         parent: at.parent.and(skeleton.nodes.get(parent.index())).filter(|p| p.parent.is_some()).map(|p| p.name.0),
@@ -215,7 +230,10 @@ fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: [f64; 2]) -> Branc
         base,
         tip,
         sway,
-        amplitude_px: sway.map_or(f64::NAN, |s| s.amplitude_deg.to_radians() * length_px),
+        amplitude_deg,
+        by_points_deg,
+        in_angle_deg,
+        amplitude_px: amplitude_deg.to_radians() * length_px,
         way_px: poses.iter().map(of_node).map(|[x, y]| [x - tip[0], y - tip[1]]).collect(),
         times_s,
         plane_deg,
@@ -224,6 +242,12 @@ fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: [f64; 2]) -> Branc
         spectrum,
         reference,
     }
+}
+
+/// An amplitude that is seen in an angle, if the points do not contradict it.
+fn agreed(by_points: f64, in_angle: f64) -> f64 {
+    let apart = (in_angle / by_points).ln().abs();
+    if apart <= AGREE.ln() { in_angle } else { f64::NAN }
 }
 
 /// The spectrum of an angle, of one that wind has `driven` as a mean over pieces, and what its largest peak says.
@@ -251,6 +275,15 @@ fn centred(mut angles: Vec<f64>) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A stub of two points that its carrier takes along seems to turn by 30 degrees: no number that only one witness gives.
+    #[test]
+    fn an_amplitude_that_points_and_angle_do_not_agree_on_is_not_told() {
+        assert_eq!((agreed(3.0, 4.0), agreed(4.0, 3.0)), (4.0, 3.0));
+        for (points, angle) in [(30.6, 4.4), (1.5, 17.1), (f64::NAN, 1.0), (1.0, f64::NAN), (0.0, 1.0), (0.0, 0.0)] {
+            assert!(agreed(points, angle).is_nan(), "{points} and {angle}");
+        }
+    }
 
     /// Pieces of 20 s cannot tell a sway of 20 s from drift, however many minutes of wind there are.
     #[test]

@@ -1,64 +1,60 @@
 //! The table that is printed.
 
-use super::compare::{Change, Comparison, Row};
+mod compared;
+
+use super::columns::{Table, wrapped};
+use super::compare::{Change, Comparison};
 use super::levels::{Growth, Level, Spread, growth, levels};
-use super::matching::Match;
 use super::study::{Branch, Study};
 use super::words;
 use crate::model::Interval;
+pub use compared::{heading, lost, unmatched};
 
-/// Everything as text, a table a capture, and what compares them.
-pub fn text(studies: &[Study], comparison: Option<&Comparison>) -> String {
-    let mut out: Vec<String> = studies.iter().map(one).collect();
-    out.extend(comparison.map(|c| compared(studies, c)));
+/// Everything as text, a table a capture, and what compares them; for a terminal of `columns`, if that is not wide enough, without
+/// what is needed least.
+pub fn text(studies: &[Study], comparison: Option<&Comparison>, columns: Option<usize>) -> String {
+    let mut out: Vec<String> = studies.iter().map(|study| one(study, columns)).collect();
+    out.extend(comparison.map(|c| compared::compared(studies, c, columns)));
     out.join("\n")
 }
 
-/// Columns that are as wide as what stands in them: numbers to the right, the last one as it comes.
-fn table(rows: &[Vec<String>]) -> String {
-    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let width = |c: usize| {
-        // What stands last in its row may be as long as it likes.
-        let cells = rows.iter().filter(|r| r.len() == columns).filter_map(|r| r.get(c));
-        cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
-    };
-    let widths: Vec<usize> = (0..columns).map(width).collect();
-    let line = |row: &Vec<String>| {
-        let cell = |(c, cell): (usize, &String)| {
-            let last = c + 1 == row.len() && row.len() < columns;
-            let gap = widths[c].saturating_sub(cell.chars().count());
-            if last { cell.clone() } else { format!("{}{cell}", " ".repeat(gap)) }
-        };
-        let cells: Vec<String> = row.iter().enumerate().map(cell).collect();
-        format!("  {}\n", cells.join("  ").trim_end())
-    };
-    rows.iter().map(line).collect()
-}
-
-fn one(study: &Study) -> String {
+fn one(study: &Study, columns: Option<usize>) -> String {
     let Study { name, source, branches, .. } = study;
-    let mut out = format!("{name}: {source}, {}, {}\n", words::frames(study), words::gaps(study));
-    out += &format!("{}\n", words::excitation(study));
+    let mut top = format!("{name}: {source}, {}, {}\n", words::frames(study), words::gaps(study));
+    top += &format!("{}\n", words::excitation(study));
     let (answers, all) = (study.answers(), words::number_of(branches.len(), "branch"));
-    out += &format!("{answers} of {all} have a frequency that this film shows; intervals are 95 %\n\n");
-    let mut head: Vec<String> =
-        ["branch", "level", "on", "points", "frequency, Hz", "damping ratio", "sway, deg", "end, px"]
-            .map(String::from)
-            .into();
-    if study.metres_per_px > 0.0 {
-        head.push("end, m".into());
+    top += &format!("{answers} of {all} have a frequency that this film shows; intervals are 95 %\n\n");
+    let metres = study.metres_per_px > 0.0;
+    let mut heads = vec![("branch", 0), ("level", 6), ("on", 1), ("points", 7)];
+    heads.extend([("frequency, Hz", 0), ("damping ratio", 0), ("sway, deg", 3), ("end, px", 5)]);
+    heads.extend(metres.then_some(("end, m", 4)));
+    heads.extend([("peak, Hz", 8), ("eq. 6", 8)]);
+    let mut table = Table::new(&heads);
+    branches.iter().for_each(|b| table.push(row(study, b)));
+    let (table, without) = table.within(columns);
+    let mut notes = String::new();
+    if !without.iter().any(|head| head == "eq. 6") {
+        notes +=
+            "  peak and eq. 6: the largest peak of the angle's spectrum and its half-power damping, for reference\n";
     }
-    head.extend(["peak, Hz".into(), "eq. 6".into()]);
-    let mut rows = vec![head];
-    rows.extend(branches.iter().map(|b| row(study, b)));
-    out += &table(&rows);
-    out += "\n  peak and eq. 6: the largest peak of the angle's spectrum and its half-power damping, for reference\n\n";
+    if branches.iter().any(|b| b.sway.is_ok() && !b.amplitude_deg.is_finite()) {
+        notes += "  sway -: a branch's points and its angle do not agree on how far it sways\n";
+    }
+    notes += &left_out(&without);
+    let mut out = format!("{}{table}\n{}\n", wrapped(&top, columns), wrapped(&notes, columns));
     let by_level = levels(study);
     if by_level.iter().any(|l| l.answers > 0) {
-        out += &level_table(&by_level);
-        out += &trends(study);
+        out += &level_table(&by_level, columns);
+        out += &wrapped(&trends(study), columns);
     }
     out
+}
+
+fn left_out(heads: &[String]) -> String {
+    match heads {
+        [] => String::new(),
+        _ => format!("  for want of room without: {}; a wider terminal or --json has them\n", heads.join("; ")),
+    }
 }
 
 fn row(study: &Study, branch: &Branch) -> Vec<String> {
@@ -69,7 +65,7 @@ fn row(study: &Study, branch: &Branch) -> Vec<String> {
         Ok(sway) => {
             row.push(interval(&sway.frequency_hz, 3));
             row.push(sway.damping_ratio.map_or("unknown".into(), |d| interval(&d, 3)));
-            row.push(number(sway.amplitude_deg, 2));
+            row.push(number(branch.amplitude_deg, 2));
             row.push(number(branch.amplitude_px, 1));
             if study.metres_per_px > 0.0 {
                 row.push(number(branch.amplitude_px * study.metres_per_px, 4));
@@ -81,16 +77,15 @@ fn row(study: &Study, branch: &Branch) -> Vec<String> {
     row
 }
 
-fn level_table(levels: &[Level]) -> String {
-    let head = ["level", "branches", "answers", "frequency, Hz", "damping ratio"].map(String::from);
+fn level_table(levels: &[Level], columns: Option<usize>) -> String {
+    let heads = [("level", 0), ("branches", 2), ("answers", 1), ("frequency, Hz", 0), ("damping ratio", 0)];
+    let mut table = Table::new(&heads);
     let spread = |s: &Option<Spread>| s.as_ref().map_or("-".into(), |s| spread(s, 3));
-    let row = |l: &Level| {
+    for l in levels {
         let counts = [u64::from(l.level), l.branches as u64, l.answers as u64].map(|n| n.to_string());
-        counts.into_iter().chain([spread(&l.frequency_hz), spread(&l.damping_ratio)]).collect::<Vec<String>>()
-    };
-    let mut rows = vec![head.to_vec()];
-    rows.extend(levels.iter().map(row));
-    format!("{}  (median, least to largest)\n", table(&rows))
+        table.push(counts.into_iter().chain([spread(&l.frequency_hz), spread(&l.damping_ratio)]).collect());
+    }
+    format!("{}  (median, least to largest)\n", table.within(columns).0)
 }
 
 /// How frequency and damping grow with the level, in words.
@@ -104,91 +99,6 @@ pub fn trends(study: &Study) -> String {
 pub fn trend(what: &str, growth: &Growth) -> String {
     let chance = if growth.percent.holds(0.0) { "; no trend beyond chance" } else { "" };
     format!("{what} by level: {} a level, of {} branches{chance}", percent(&growth.percent), growth.branches)
-}
-
-fn compared(studies: &[Study], comparison: &Comparison) -> String {
-    let mut out = format!("{}\n\n", heading(studies, comparison));
-    let first = &studies[0].name;
-    let mut rows = vec![["branch", "capture", "called", "frequency, Hz", "damping ratio"].map(String::from).to_vec()];
-    rows[0].extend([format!("frequency against {first}"), format!("damping against {first}")]);
-    for row in comparison.rows.iter().filter(|row| row.is_told(studies)) {
-        rows.extend((0..studies.len()).map(|k| across(studies, row, k)));
-    }
-    out += &table(&rows);
-    let untold: Vec<String> =
-        comparison.rows.iter().filter(|row| !row.is_told(studies)).map(|row| row.name.to_string()).collect();
-    if !untold.is_empty() {
-        out += &format!("  without a frequency in any of them: {}\n", untold.join(", "));
-    }
-    if comparison.same_tree {
-        out.extend((1..studies.len()).map(|k| unmatched(studies, comparison, k - 1)));
-    }
-    out += "  * beyond what both 95 % intervals allow; of twenty branches that do not differ, chance marks one\n";
-    out
-}
-
-/// What is compared, and by which right.
-pub fn heading(studies: &[Study], comparison: &Comparison) -> String {
-    let shares: Vec<String> = comparison
-        .shares
-        .iter()
-        .zip(&studies[1..])
-        .map(|(share, s)| format!("{:.0} % in {}", 100.0 * share, s.name))
-        .collect();
-    let what = if comparison.same_tree { "one tree" } else { "several trees, by their trunks" };
-    let by = if comparison.said { "as --trees says" } else { "a guess, which --trees overrules" };
-    let beside = format!("{by}; branches found in the same place: {}", shares.join(", "));
-    format!("Compared with {} as {what} ({beside})", studies[0].name)
-}
-
-fn across(studies: &[Study], row: &Row, k: usize) -> Vec<String> {
-    let mut cells = vec![if k == 0 { row.name.to_string() } else { String::new() }, studies[k].name.clone()];
-    let Some(branch) = row.branch(studies, k) else {
-        cells.extend(["-".into(), format!("  {}", lost(row, k))]);
-        return cells;
-    };
-    cells.push(branch.name.to_string());
-    let sway = match branch.sway {
-        Ok(sway) => sway,
-        Err(why) => {
-            cells.push(format!("  none: {why}"));
-            return cells;
-        }
-    };
-    cells.push(interval(&sway.frequency_hz, 3));
-    cells.push(sway.damping_ratio.map_or("unknown".into(), |d| interval(&d, 3)));
-    let both = row.sway(studies, 0).filter(|_| k > 0).map(|first| (first, sway));
-    let cell = |change: Option<Change>| change.map_or("-".into(), |c| changed(&c));
-    cells.push(cell(both.and_then(|(a, b)| Change::of_frequency(&a, &b))));
-    cells.push(cell(both.and_then(|(a, b)| Change::of_damping(&a, &b))));
-    cells
-}
-
-/// Why a branch of the first capture stands for nothing in capture `k`.
-pub fn lost(row: &Row, k: usize) -> &'static str {
-    match k.checked_sub(1).and_then(|k| row.others.get(k)) {
-        Some(Match::Unclear) => "unclear which",
-        _ => "not found",
-    }
-}
-
-/// Branches of the first capture and of the one after `other` more that stand for nothing in each other, a line a reason.
-pub fn unmatched(studies: &[Study], comparison: &Comparison, other: usize) -> String {
-    let Some(study) = studies.get(other + 1) else { return String::new() };
-    let names = |of: &dyn Fn(&Match) -> bool| -> Vec<u32> {
-        comparison.rows.iter().filter(|r| r.others.get(other).is_some_and(of)).map(|r| r.name).collect()
-    };
-    let first = &studies[0].name;
-    let list = |what: String, names: &[u32]| {
-        let names: Vec<String> = names.iter().map(u32::to_string).collect();
-        if names.is_empty() { String::new() } else { format!("  {what}: {}\n", names.join(", ")) }
-    };
-    let missing = names(&|m| matches!(m, Match::Missing));
-    let unclear = names(&|m| matches!(m, Match::Unclear));
-    let left = comparison.left_over.get(other).map_or(&[][..], Vec::as_slice);
-    list(format!("branches of {first} that {} does not have", study.name), &missing)
-        + &list(format!("branches of {first} for which two of {} are as near", study.name), &unclear)
-        + &list(format!("branches of {} that {first} does not have", study.name), left)
 }
 
 /// `+1.2 % (0.4 to 2.0 %)`, with a star where it counts.

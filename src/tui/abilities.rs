@@ -16,6 +16,12 @@ pub struct Abilities {
     pub pictures: &'static str,
 }
 
+/// Columns of the terminal that standard output is; `None` where it is none, or does not say.
+pub fn columns() -> Option<u16> {
+    let (columns, _) = stdout().is_terminal().then(terminal::size)?.ok()?;
+    (columns > 0).then_some(columns)
+}
+
 /// Asks the terminal; `None` where standard output is none, or it cannot be asked.
 pub fn abilities() -> Option<Abilities> {
     let tty = stdout().is_terminal().then(Tty::open)?.ok()?;

@@ -26,7 +26,7 @@ mod tests;
 mod theme;
 mod tty;
 
-pub use abilities::{Abilities, abilities};
+pub use abilities::{Abilities, abilities, columns};
 pub use graphics::Preview;
 pub use moving::{Moving, Whim, watch};
 pub use progress::Progress;

@@ -31,7 +31,8 @@ pub struct AnalyzeArgs {
     /// Last moment of the film to look at, s.
     #[arg(long, value_name = "SECONDS", value_parser = moment, allow_negative_numbers = true)]
     pub to: Option<f64>,
-    /// Whether several captures are of the same tree; `auto` looks how many branches stand in the same place.
+    /// Whether several captures are of the same tree; `auto` looks how many branches stand in the same place, and
+    /// compares nothing where that is no evidence.
     #[arg(long, value_name = "WHICH", default_value = "auto")]
     pub trees: Trees,
     #[command(flatten)]

@@ -19,9 +19,9 @@ pub fn branch_part(study: &Study, branch: &Branch) -> String {
         Ok(sway) => {
             let damping = sway.damping_ratio.map_or("unknown".into(), |d| interval(&d, 3));
             let said = format!(
-                "{} Hz, damping ratio {damping}, sway {}°{}",
+                "{} Hz, damping ratio {damping}, {}{}",
                 interval(&sway.frequency_hz, 3),
-                number(sway.amplitude_deg, 2),
+                how_far(branch),
                 at_its_end(study, branch)
             );
             format!(
@@ -32,6 +32,16 @@ pub fn branch_part(study: &Study, branch: &Branch) -> String {
         Err(why) => {
             format!("<details id=\"{id}\"><summary>{head}: {why}</summary>{}</details>", plots(study, branch))
         }
+    }
+}
+
+/// How far it sways, or why that is not said.
+fn how_far(branch: &Branch) -> String {
+    let [points, angle] = [branch.by_points_deg, branch.in_angle_deg].map(|deg| number(deg, 2));
+    match (branch.amplitude_deg.is_finite(), branch.in_angle_deg.is_finite()) {
+        (true, _) => format!("sway {}°", number(branch.amplitude_deg, 2)),
+        (false, true) => format!("sway unknown (by its points {points}°, by the angle {angle}°)"),
+        (false, false) => "sway unknown".into(),
     }
 }
 
@@ -49,15 +59,17 @@ fn plots(study: &Study, branch: &Branch) -> String {
                    <span class=\"key\"><i class=\"k ks\"></i>in space</span>";
     let fitted = branch.fitted_deg.as_ref().map_or(
         "",
-        |_| " <span class=\"key\"><i class=\"k kf\"></i>the part with its own frequency and damping</span>",
+        |_| " <span class=\"key\"><i class=\"k kf\"></i>the part of the first that has its own frequency and damping</span>",
     );
     let drawn = spectrum(study, branch);
-    let answer = branch
-        .known()
-        .map_or("", |_| " <span class=\"key\"><i class=\"k km\"></i>its frequency; shaded: the interval</span>");
+    let answer = branch.known().map_or(
+        "",
+        |_| " <span class=\"key\"><i class=\"k kb\"></i>the branch's frequency (line) with its interval (shaded)</span>",
+    );
     let peak = branch.reference.map_or(String::new(), |r| {
         format!(
-            " <span>Level bar: width at half the power of the peak at {:.2} Hz, damping {:.3} (eq. 6).</span>",
+            " <span class=\"key\"><i class=\"k kw\"></i>for reference: width at half the power of the largest peak, at {:.2} Hz; damping \
+             by it {:.3} (eq. 6)</span>",
             r.peak_hz, r.damping_ratio
         )
     });

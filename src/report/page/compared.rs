@@ -17,8 +17,10 @@ pub fn compared_part(studies: &[Study], comparison: &Comparison) -> String {
     let mut out =
         format!("<section id=\"compared\"><h2>Compared</h2><p>{}.</p>", escaped(&heading(studies, comparison)));
     out += &format!("<p>{}</p>", keys(studies.iter().map(|s| s.name.as_str())));
-    out += &table(studies, comparison);
-    if comparison.same_tree {
+    if comparison.same_tree.is_some() {
+        out += &table(studies, comparison);
+    }
+    if comparison.same_tree == Some(true) {
         let lists: String = (1..studies.len()).map(|k| unmatched(studies, comparison, k - 1)).collect();
         let items: String = lists.lines().map(|line| format!("<li>{}</li>", escaped(line.trim()))).collect();
         if !items.is_empty() {
@@ -35,7 +37,7 @@ pub fn compared_part(studies: &[Study], comparison: &Comparison) -> String {
     let frequency = |s: &Sway| Some(s.frequency_hz);
     let damping = |s: &Sway| s.damping_ratio;
     let mut plots = String::new();
-    if comparison.same_tree {
+    if comparison.same_tree == Some(true) {
         let by = format!("branch, as numbered in {}", studies[0].name);
         plots += &figure(
             across(&by_branch(&frequency), &by, "frequency, Hz", "Frequency by branch"),
@@ -55,13 +57,14 @@ pub fn compared_part(studies: &[Study], comparison: &Comparison) -> String {
         "Damping across levels.",
     );
     out += &format!("<div class=\"plots two\">{plots}</div>");
-    let drawn: String = if comparison.same_tree {
+    let drawn: String = if comparison.same_tree == Some(true) {
         rows.iter().map(|row| figure(overlay(studies, row), &format!("Branch {}.", row.name))).collect()
     } else {
         all.iter().map(|study| of_tree(study, highest_hz(&all))).collect()
     };
     if !drawn.is_empty() {
-        let what = if comparison.same_tree { "The same branch in every capture" } else { "Tree beside tree" };
+        let what =
+            if comparison.same_tree == Some(true) { "The same branch in every capture" } else { "Tree beside tree" };
         out += &format!(
             "<h3>Spectra: {}</h3><p class=\"soft\">Of the angle to the carrier, in the picture; upright lines are the \
                          frequencies that were identified.</p><div class=\"plots\">{drawn}</div>",
@@ -138,7 +141,7 @@ fn overlay(studies: &[Study], row: &Row) -> Option<String> {
 /// The branches of a tree that sway most and have an answer, in one plot (figure 10).
 fn of_tree(study: &Study, highest_hz: f64) -> String {
     let mut known: Vec<(&Branch, f64)> =
-        study.branches.iter().filter_map(|b| Some((b, b.known()?.amplitude_deg))).collect();
+        study.branches.iter().filter_map(|b| Some((b, b.known().map(|_| b.amplitude_deg.max(0.0))?))).collect();
     // The trunk, and the others by how far they sway.
     known.sort_by(|a, b| a.0.parent.is_some().cmp(&b.0.parent.is_some()).then(b.1.total_cmp(&a.1)));
     known.truncate(TOGETHER);

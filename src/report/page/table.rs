@@ -39,7 +39,7 @@ fn row(study: &Study, branch: &Branch, columns: usize) -> String {
             let mut rest = vec![
                 stacked(&interval(&sway.frequency_hz, 3)),
                 sway.damping_ratio.map_or("unknown".into(), |d| stacked(&interval(&d, 3))),
-                number(sway.amplitude_deg, 2),
+                number(branch.amplitude_deg, 2),
                 number(branch.amplitude_px, 1),
             ];
             if study.metres_per_px > 0.0 {

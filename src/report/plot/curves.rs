@@ -8,6 +8,8 @@ use crate::model::Interval;
 
 /// Points of a curve at most.
 const MOST: usize = 700;
+/// Half the height of the ends of the bar that is the width at half the power.
+const END: f64 = 4.0;
 
 /// One curve of a plot.
 pub struct Curve<'a> {
@@ -58,11 +60,12 @@ pub fn spectra(curves: &[Curve], highest_hz: f64, label: &str) -> Option<String>
             let k = (peak_hz / curve.spectrum.bin_hz).round() as usize;
             let height = curve.spectrum.amplitude.get(k).copied().unwrap_or(f64::NAN) * std::f64::consts::FRAC_1_SQRT_2;
             // The width at half the power is twice the damping times the frequency, 002 eq. 6.
-            svg.line(
-                [axes.x((1.0 - damping) * peak_hz), axes.y(height)],
-                [axes.x((1.0 + damping) * peak_hz), axes.y(height)],
-                "width",
-            );
+            let [left, right] =
+                [1.0 - damping, 1.0 + damping].map(|side| axes.x((side * peak_hz).clamp(0.0, highest_hz)));
+            let y = axes.y(height);
+            svg.line([left, y], [right, y], "width");
+            // Ends, so that its shape tells it from the answer where colours do not.
+            [left, right].into_iter().for_each(|x| svg.line([x, y - END], [x, y + END], "width"));
         }
     }
     Some(svg.finish())

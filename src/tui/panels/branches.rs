@@ -19,7 +19,7 @@ const COLUMNS: [(&str, usize); 3] = [("lvl", 3), ("pts", 5), ("ampl/px", 7)];
 /// A narrower table says the level in words, as there is no room for the names of columns beside the title.
 const ALL_FROM: u16 = 50;
 /// With so many lines one can be spared for the names of the columns.
-const NAMED_FROM: usize = 8;
+const NAMED_FROM: usize = 4;
 
 /// One line for each branch as far as there is room, the chosen one among them; the title says how many there are.
 pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
@@ -34,12 +34,12 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         waiting(frame, inner, text, theme);
         return;
     }
-    let mut height = area.height.saturating_sub(1).max(1) as usize;
+    let lines = area.height.saturating_sub(1).max(1) as usize;
+    // Beside the title there is no room for the names of all columns.
+    let named_below = lines >= NAMED_FROM && area.width >= ALL_FROM;
+    let height = lines - usize::from(named_below);
     let room = (area.width / (WIDEST + 2)).max(1) as usize;
     let tables = room.min(total.div_ceil(height));
-    // Beside the title there is hardly ever room for the names of all columns.
-    let named_below = tables == 1 && height >= NAMED_FROM && area.width >= ALL_FROM;
-    height -= usize::from(named_below);
     let shown = total.min(tables * height);
     let chosen = state.chosen().min(total - 1);
     let first = chosen.saturating_sub(shown / 2).min(total - shown);
@@ -47,16 +47,14 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         true => format!("Branches, {}–{} of {total}", first + 1, first + shown),
         false => format!("Branches, {total}"),
     };
-    let mut below = titled(frame, area, &title, theme);
-    if named_below {
-        let [line, rest] = Layout::vertical([Constraint::Length(1), Constraint::Min(1)]).areas(below);
-        names(frame, Rect { width: line.width.min(WIDEST), ..line }, 0, theme);
-        below = rest;
-    }
+    let inner = titled(frame, area, &title, theme);
+    let [head, below] = Layout::vertical([Constraint::Length(u16::from(named_below)), Constraint::Min(1)]).areas(inner);
     for (i, rows) in s.branches[first..].chunks(height).take(tables).enumerate() {
         let x = below.x + i as u16 * (WIDEST + 2);
         let place = Rect { x, width: (below.right() - x).min(WIDEST), ..below };
-        if !named_below {
+        if named_below {
+            names(frame, Rect { y: head.y, height: 1, ..place }, 0, theme);
+        } else {
             let taken = if i == 0 { title.chars().count() as u16 + 3 } else { 0 };
             names(frame, Rect { y: area.y, height: 1, ..place }, taken, theme);
         }

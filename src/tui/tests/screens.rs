@@ -84,6 +84,10 @@ fn looks_as_reviewed() {
             insta::assert_snapshot!(format!("{name}_{width}x{height}"), screen);
         }
     }
+    for (width, height) in [(100, 30), (160, 50)] {
+        let screen = drawn(&state(snapshot(Phase::Live)), Depth::None, width, height);
+        insta::assert_snapshot!(format!("live_{width}x{height}"), screen);
+    }
 }
 
 #[test]
@@ -114,6 +118,20 @@ fn no_state_and_no_size_brings_it_down() {
                 println!("case {i} at {width}x{height}");
                 drawn(state, depth, width, height);
             }
+        }
+    }
+}
+
+/// A number without a head over it could be anything.
+#[test]
+fn every_column_of_the_table_of_branches_has_its_head() {
+    for (width, height) in [(100, 30), (120, 40), (160, 50), (240, 60)] {
+        let text = drawn(&state(snapshot(Phase::Live)), Depth::None, width, height).to_string();
+        let tables = text.matches("f/Hz").count();
+        assert!(tables > 0, "{width}x{height}: {text}");
+        for head in ["lvl", "pts", "ampl/px", "damping"] {
+            let found = text.lines().filter(|l| l.contains("f/Hz")).map(|l| l.matches(head).count()).sum::<usize>();
+            assert_eq!(found, tables, "{head} at {width}x{height}: {text}");
         }
     }
 }
