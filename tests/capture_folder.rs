@@ -283,6 +283,26 @@ fn the_stream_is_what_the_capture_says() {
     assert!(4 * kept_names >= 3 * measured_names, "{kept_names} of {measured_names} nodes keep their numbers");
 }
 
+/// Undamped frequencies of the clip's ten largest branches, Hz, the trunk's first; and its damping ratio.
+const TRUE_HZ: [f64; 10] = [0.7, 0.784, 0.8781, 0.9481, 1.0129, 1.0191, 1.0364, 1.1007, 1.1453, 1.2232];
+const TRUE_DAMPING: f64 = 0.02;
+
+/// What a scientist takes from the table is true: every interval holds the frequency of a branch that there is, and the trunk's its own.
+#[test]
+fn the_frequencies_are_those_of_the_tree() {
+    let nodes = made().nodes();
+    let known: Vec<&Vec<String>> = nodes.iter().filter(|n| n[16] == "true").collect();
+    assert!(known.len() >= 4, "{} branches have an answer", known.len());
+    for node in &known {
+        let [lo, hi] = [11, 12].map(|c| number(&node[c]));
+        assert!(TRUE_HZ.iter().any(|f| (lo..=hi).contains(f)), "no branch sways at {lo} to {hi} Hz: {node:?}");
+        assert!(hi / lo < 1.05, "{node:?}");
+    }
+    let trunk = known.iter().find(|n| n[0] == "1").expect("the trunk's answer");
+    assert!((number(&trunk[11])..=number(&trunk[12])).contains(&TRUE_HZ[0]), "{trunk:?}");
+    assert!((number(&trunk[13]) / TRUE_DAMPING - 1.0).abs() < 0.1, "{trunk:?}");
+}
+
 /// Once a second the stream says how the branches sway, by the names and with the units of the files.
 #[test]
 fn the_stream_tells_the_sway_once_a_second() {

@@ -36,8 +36,10 @@ const LEAST_IN_PART: usize = 3;
 const ALIKE: f64 = 0.003;
 const FAR: f64 = 4.0;
 /// And they are moved as by one swing ([`Arms::one_swing`]), which points of several branches that are alike in frequency are
-/// not. Found on clips of which none is a public one (docs/dynamics.md).
+/// not. Found on clips of our own (docs/dynamics.md).
 const ONE_SWING: f64 = 0.95;
+/// Frequencies that are no farther apart than this share are one.
+const ONE: f64 = 0.01;
 /// Points that a branch must have: two or three agree by chance.
 const LEAST_POINTS: usize = 4;
 /// Periods that must have been seen: of fewer, branches that lie close together in frequency look like one.
@@ -52,7 +54,7 @@ const LEFT: f64 = 0.2;
 /// trees (tests/sway_trees.rs).
 const WIDER: f64 = 1.25;
 /// And the frequency's does not shrink below this standard deviation of its logarithm, however clear the decay is: most branches
-/// as they are found have some points of their neighbours. Found on the same clips.
+/// as they are found have some points of their neighbours. Found likewise.
 const LEAST_SD: f64 = 0.0015;
 /// Half an interval, in standard deviations.
 pub(super) const Z: f64 = Interval::Z;
@@ -85,6 +87,8 @@ pub(super) fn sways(
     go_on: &dyn Fn() -> bool,
 ) -> Vec<Swaying> {
     let mut own: Vec<Option<Own>> = vec![None; members.len()];
+    // Modes of branches that may not be theirs alone: perhaps that of a branch on them.
+    let mut mixed: Vec<Option<Mode>> = vec![None; members.len()];
     let mut out = vec![Err(Unidentified::NotMeasured); members.len()];
     let all = members;
     // The release, and how sure that is, s: the trunk's own fit knows it better than the eye.
@@ -102,33 +106,39 @@ pub(super) fn sways(
         let node = NodeId(i as u32);
         let parent = skeleton.ancestors(node).next();
         let ancestors: Vec<Own> = skeleton.ancestors(node).filter_map(|a| own[a.index()]).collect();
+        let doubted: Vec<Mode> = skeleton.ancestors(node).filter_map(|a| mixed[a.index()]).collect();
         let points = Points::of(film, members, onset.from);
         if points.tracks.len() < LEAST_POINTS {
             continue;
         }
         let base_px = skeleton.image_from_model(&skeleton.nodes[parent.unwrap_or(NodeId(0)).index()].position);
         let parts = parts(members, &points.tracks, i, all);
-        let found = branch(film, &points, &ancestors, &parts, base_px, (onset, &mut moment), demands);
+        let found = branch(film, &points, (&ancestors, &doubted), &parts, base_px, (onset, &mut moment), demands);
         // All points have the trunk's sway: where it is not known, a branch would be given it.
         let found = if i == 1 || told { found } else { found.and(Err(Unidentified::AncestorsSway)) };
         told |= i == 1 && found.is_ok();
-        out[i] = found.map(|(found, sway)| {
-            own[i] = Some(found);
+        out[i] = found.and_then(|(found, sway)| {
+            match sway {
+                Ok(_) => own[i] = Some(found),
+                Err(_) => mixed[i] = Some(found.mode),
+            }
             sway
         });
     }
     out
 }
 
+/// The mode that the branch has beyond its ancestors', for the branches on it, and its sway if that can be told. Another one is
+/// taken rather than one that is `doubted`, which may be of a branch below.
 fn branch(
     film: &Film,
     points: &Points,
-    ancestors: &[Own],
+    (ancestors, doubted): (&[Own], &[Mode]),
     parts: &[Vec<usize>],
     base_px: [f64; 2],
     (onset, moment): (&Onset, &mut [f64; 2]),
     demands: &Demands,
-) -> Result<(Own, Sway), Unidentified> {
+) -> Result<(Own, Swaying), Unidentified> {
     let all_px = points.rms_px();
     if all_px < NOISE_PX {
         return Err(Unidentified::TooLittleMotion);
@@ -167,14 +177,16 @@ fn branch(
     }
     let factors = signals.factors(&fit, points.signals.len());
     let arms = Arms::new(film, points, onset.from, base_px);
+    let doubted = |mode: &Mode| doubted.iter().any(|d| (d.frequency_hz / mode.frequency_hz).ln().abs() < ONE);
     let chosen = (old..fit.modes.len())
         .filter(|&m| fit.modes[m].damping < HARDLY && fit.modes[m].frequency_hz * span_s >= LEAST_PERIODS)
         .filter(|&m| !signals.at_limit(&fit.modes[m]))
         .filter_map(|m| Some((m, shared(&factors, m)?)))
-        .filter(|(m, _)| arms.one_swing(&factors, *m) >= ONE_SWING)
         .filter(|(m, _)| parts.iter().all(|part| everywhere(&factors, *m, part)))
-        .max_by(|a, b| a.1.0.total_cmp(&b.1.0).then(a.1.1.total_cmp(&b.1.1)));
-    let Some((m, _)) = chosen else {
+        // The trunk carries every point: there is nothing it could be mixed up with.
+        .map(|(m, has)| (m, has, [old == 0 || arms.one_swing(&factors, m) >= ONE_SWING, !doubted(&fit.modes[m])]))
+        .max_by(|a, b| a.2.cmp(&b.2).then(a.1.0.total_cmp(&b.1.0)).then(a.1.1.total_cmp(&b.1.1)));
+    let Some((m, _, [one_swing, _])) = chosen else {
         let all = all_px * all_px * signals.values as f64;
         let still = old > 0 && carried - noise < LEFT * (all - noise);
         return Err(if still { Unidentified::AncestorsSway } else { Unidentified::NoOscillation });
@@ -223,7 +235,8 @@ fn branch(
     }
     let damping_ratio = (sd[1] > 0.0 && Z * sd[1] <= 1.0).then(|| interval(mode.damping, sd[1]));
     let amplitude_deg = arms.amplitude_deg(&factors, m);
-    Ok((own, Sway { frequency_hz, damping_ratio, excitation: Excitation::Release, amplitude_deg }))
+    let sway = Sway { frequency_hz, damping_ratio, excitation: Excitation::Release, amplitude_deg };
+    Ok((own, if one_swing { Ok(sway) } else { Err(Unidentified::NoOscillation) }))
 }
 
 pub(super) fn interval(value: f64, sd: f64) -> Interval {

@@ -59,7 +59,9 @@ fn plural(what: &str) -> String {
 /// Why a branch has no frequency, and what would help, in a sentence.
 pub fn why(reason: Unidentified) -> &'static str {
     match reason {
-        Unidentified::NotMeasured => "No point, or just one, could be followed there for long enough.",
+        Unidentified::NotMeasured => {
+            "Fewer than four points could be followed there for long enough: two or three agree by chance."
+        }
         Unidentified::TooShort => "The film is too short, or shows too few periods of the sway: film for longer.",
         Unidentified::TooLittleMotion => {
             "Hardly more motion than the noise of the points: pull harder, wait for more wind, or film from nearer."
