@@ -60,7 +60,7 @@ fn plural(what: &str) -> String {
 pub fn why(reason: Unidentified) -> &'static str {
     match reason {
         Unidentified::NotMeasured => {
-            "Fewer than four points could be followed there for long enough: two or three agree by chance."
+            "Too few points could be followed there for long enough: after a release four are needed, in wind two."
         }
         Unidentified::TooShort => "The film is too short, or shows too few periods of the sway: film for longer.",
         Unidentified::TooLittleMotion => {
