@@ -2,7 +2,6 @@
 
 use super::say;
 use crate::config::Config;
-use crate::shape::Foliage;
 use serde_json::{Value, to_value};
 use std::path::Path;
 
@@ -25,9 +24,7 @@ pub fn settings(file: &Path, own: &Config, new: &Config) {
     }
 }
 
-/// Of a leaf for a tree without leaves.
-pub fn leaf(foliage: &Foliage) {
-    if foliage.groups.is_empty() {
-        tell("--leaf", "the tree bears no leaves; put them on with --leaves on");
-    }
+/// Of a leaf for a tree that bears none.
+pub fn leaf() {
+    tell("--leaf", "the tree bears no leaves; put them on with --leaves on");
 }

@@ -160,7 +160,9 @@ impl Shaping {
         };
         let Stand { skeleton, poses, sway, reshaped, .. } = &stand;
         let dressed = dress(skeleton, seen, &config);
-        self.leaf.iter().for_each(|_| idle::leaf(&dressed.foliage));
+        if self.leaf.is_some() && dressed.foliage.groups.is_empty() {
+            idle::leaf();
+        }
         let node_extras = sway.iter().map(extras).collect();
         let provenance = provenance(&captured.note.source.name, &Software::default(), poses);
         let (flutter, reshaped) = (flutter(&dressed, poses, skeleton, &config), *reshaped);
