@@ -80,6 +80,15 @@ fn said(r: &Results, format: &str) -> String {
     format!("{}{}", of(format!("live-{format}")), of(format!("replay-{format}")))
 }
 
+fn not_in_time(row: &str) -> bool {
+    row.ends_with(",not_in_time")
+}
+
+/// Of a row of `nodes.csv`: all but the sway.
+fn shape(row: &str) -> Vec<&str> {
+    row.split(',').take(10).collect()
+}
+
 fn replay(r: &Results, format: &str) -> Result<(), String> {
     let (live, again) = (format!("live-{format}"), format!("replay-{format}"));
     let statuses = (r.status(&live)?, r.status(&again)?);
@@ -91,8 +100,12 @@ fn replay(r: &Results, format: &str) -> Result<(), String> {
         let [a, b] = [&live, &again].map(|name| r.text(&format!("{name}/capture/{file}")));
         let (a, b) = (a?, b?);
         claim(a.lines().count() > 10, || format!("{live}: {file} has {} lines", a.lines().count()))?;
-        let differ = a.lines().zip(b.lines()).find(|(a, b)| a != b);
-        claim(differ.is_none() && a.len() == b.len(), || format!("{file}: live and replay differ: {differ:?}"))?;
+        // A capture that is asked to end leaves branches to `analyze` that it has not looked at yet; a replay does not.
+        let same = |a: &str, b: &str| a == b || file == "nodes.csv" && not_in_time(a) && shape(a) == shape(b);
+        let differ = a.lines().zip(b.lines()).find(|(a, b)| !same(a, b));
+        claim(differ.is_none() && a.lines().count() == b.lines().count(), || {
+            format!("{file}: live and replay differ: {differ:?}")
+        })?;
     }
     Ok(())
 }
