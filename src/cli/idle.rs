@@ -23,8 +23,3 @@ pub fn settings(file: &Path, own: &Config, new: &Config) {
         tell(&what, "it is of filming; give it to `capture` or `replay`");
     }
 }
-
-/// Of a leaf for a tree that bears none.
-pub fn leaf() {
-    tell("--leaf", "the tree bears no leaves; put them on with --leaves on");
-}

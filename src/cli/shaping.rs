@@ -161,7 +161,7 @@ impl Shaping {
         let Stand { skeleton, poses, sway, reshaped, .. } = &stand;
         let dressed = dress(skeleton, seen, &config);
         if self.leaf.is_some() && dressed.foliage.groups.is_empty() {
-            idle::leaf();
+            idle::tell("--leaf", "the tree bears no leaves; put them on with --leaves on");
         }
         let node_extras = sway.iter().map(extras).collect();
         let provenance = provenance(&captured.note.source.name, &Software::default(), poses);

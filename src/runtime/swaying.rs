@@ -6,7 +6,7 @@
 //! again when the next one is due, and the request that finds the thread busy is passed over and counted. The thread then
 //! stands back for all others.
 
-use super::pulse::Worker;
+use super::pulse::{Pulse, Worker};
 use super::shared::Shared;
 use crate::config::Dynamics;
 use crate::dynamics::{FilmLog, analyse_with, spectrum};
@@ -207,7 +207,7 @@ fn stand_back() {
 fn work(queue: &Receiver<Errand>, analyser: Analyser, shared: &Shared) {
     for Errand { request, wanted, answer } in queue {
         let pulse = &shared.pulse;
-        pulse.give(Worker::Sway);
+        let _at_work = AtWork::new(pulse);
         let go_on = || {
             pulse.give(Worker::Sway);
             pulse.done(Worker::Sway);
@@ -218,7 +218,23 @@ fn work(queue: &Receiver<Errand>, analyser: Analyser, shared: &Shared) {
             // Nobody may be waiting any more.
             drop(answer.send(found));
         }
-        pulse.done(Worker::Sway);
+    }
+}
+
+/// The thread has work until this is dropped, by a panic too: the capture goes on without it, and must not be taken for one
+/// that stalls.
+struct AtWork<'a>(&'a Pulse);
+
+impl<'a> AtWork<'a> {
+    fn new(pulse: &'a Pulse) -> Self {
+        pulse.give(Worker::Sway);
+        Self(pulse)
+    }
+}
+
+impl Drop for AtWork<'_> {
+    fn drop(&mut self) {
+        self.0.done(Worker::Sway);
     }
 }
 

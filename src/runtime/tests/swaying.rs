@@ -1,5 +1,6 @@
 //! When a sway is asked for and told: with analysers whose slowness is known.
 
+use super::super::pulse::{Sign, Vigil};
 use super::*;
 use std::time::Instant;
 
@@ -149,7 +150,7 @@ fn without_an_interval_nobody_is_asked() {
 /// The capture goes on without it, and the end says that something is wrong.
 #[test]
 fn a_panic_is_not_waited_for() {
-    let (mut swaying, _) = of(|_, _| std::panic::resume_unwind(Box::new("broken")), true);
+    let (mut swaying, shared) = of(|_, _| std::panic::resume_unwind(Box::new("broken")), true);
     assert_eq!(film(&mut swaying, 0..100), []);
     let began = Instant::now();
     let Ending(thread) = swaying.end();
@@ -157,4 +158,8 @@ fn a_panic_is_not_waited_for() {
         std::thread::sleep(Duration::from_millis(2));
     }
     assert!(Ending(thread).panicked());
+    // Whoever watches over the capture must not take it for one that hangs, and end it.
+    let mut vigil = Vigil::default();
+    let looks = [1, 2].map(|frames| vigil.look(shared.pulse.marks(frames, false)));
+    assert_eq!(looks[1], Sign::Flows);
 }
