@@ -23,9 +23,15 @@ struct Found {
 }
 
 fn run(seeds: std::ops::Range<u64>, drive: Drive, filming: &Filming) -> Found {
+    run_with(seeds, drive, filming, |_| {})
+}
+
+/// `change` makes the trees harder.
+fn run_with(seeds: std::ops::Range<u64>, drive: Drive, filming: &Filming, change: impl Fn(&mut MadeTree)) -> Found {
     let mut found = Found::default();
     for seed in seeds {
-        let tree = MadeTree::new(seed, drive, filming);
+        let mut tree = MadeTree::new(seed, drive, filming);
+        change(&mut tree);
         let analysis = analyse(&tree.skeleton, &tree.film, &Dynamics::default());
         let wind = analysis.onset.is_some_and(|o| o.excitation == Excitation::Wind);
         found.trees += 1;
@@ -126,18 +132,33 @@ fn wind() {
     let filming = Filming { seconds: 30.0, ..Filming::default() };
     let found = run(300..360, Drive::Wind, &filming);
     found.print("wind, 30 s");
-    found.holds(0.9, 0.08, [0.02, 0.4], [0.8, 0.8]);
-    let median = quantile(found.trunk_hz.clone(), 0.5);
-    assert!(median < 0.012, "the trunk is off by {median} Hz");
+    found.holds(0.9, 0.45, [0.013, 0.25], [0.93, 0.93]);
+    let [median, most] = [0.5, 0.9].map(|q| quantile(found.trunk_hz.clone(), q));
+    assert!(median < 0.01 && most < 0.025, "the trunk is off by {median} Hz, in one of ten by {most} Hz");
 }
 
-/// Whoever films for longer is told more, not less.
+/// Whoever films for longer is told more, and more exactly.
 #[test]
 fn two_minutes_of_wind() {
     let filming = Filming { seconds: 120.0, ..Filming::default() };
     let found = run(400..416, Drive::Wind, &filming);
     found.print("wind, 120 s");
-    found.holds(0.9, 0.4, [0.02, 0.3], [0.75, 0.8]);
+    found.holds(0.9, 0.8, [0.008, 0.22], [0.93, 0.93]);
+}
+
+/// Where the motion was not told apart well, a branch has no points but those of the branches on it: fewer answers, and no frequency
+/// of one of those in its place.
+#[test]
+fn wind_where_only_the_tips_have_points() {
+    let filming = Filming { seconds: 120.0, ..Filming::default() };
+    let found = run_with(400..412, Drive::Wind, &filming, |tree| {
+        let carries = |b: usize| tree.branches.iter().any(|c| c.parent == Some(b));
+        tree.film.tracks.retain(|t| !carries(t.node.index() - 1));
+    });
+    found.print("wind, 120 s, points on the tips only");
+    found.holds(0.9, 0.3, [0.015, 0.3], [0.88, 0.85]);
+    let far = errors(&found.frequency).iter().filter(|e| **e > 0.1).count();
+    assert!(20 * far <= found.frequency.len(), "{far} are far off");
 }
 
 /// The true sway is 2 Hz, which such a film shows as something else.

@@ -6,7 +6,7 @@ const MOST_STEPS: usize = 60;
 /// Step of the differences: the functions are logarithms of likelihoods, which are known to some 1e-9.
 const STEP: f64 = 1e-4;
 /// Change of the function at which it is done.
-const DONE: f64 = 1e-3;
+const DONE: f64 = 1e-2;
 
 /// Minimum near `from` within `bounds`, by BFGS with differences: the place and the value.
 pub(super) fn minimum(f: impl Fn(&[f64]) -> f64, from: &[f64], bounds: &[[f64; 2]]) -> (Vec<f64>, f64) {
@@ -75,17 +75,23 @@ fn slope(f: &impl Fn(&[f64]) -> f64, x: &[f64], value: f64) -> DVector<f64> {
 pub(super) fn curvature(f: impl Fn(&[f64]) -> f64, x: &[f64]) -> DMatrix<f64> {
     const WIDE: f64 = 1e-2;
     let n = x.len();
-    let at = |i: usize, a: f64, k: usize, b: f64| {
+    let at = |i: usize, k: usize, by: f64| {
         let mut there = x.to_vec();
-        there[i] += a;
-        there[k] += b;
+        there[i] += by;
+        if k != i {
+            there[k] += by;
+        }
         f(&there)
     };
+    // To either side: of one number, and of two at once.
+    let sides = |i: usize, k: usize| at(i, k, WIDE) + at(i, k, -WIDE);
+    let (here, own) = (f(x), (0..n).map(|i| sides(i, i)).collect::<Vec<f64>>());
     let mut h = DMatrix::zeros(n, n);
     for i in 0..n {
-        for k in 0..=i {
-            let second = at(i, WIDE, k, WIDE) - at(i, WIDE, k, -WIDE) - at(i, -WIDE, k, WIDE) + at(i, -WIDE, k, -WIDE);
-            h[(i, k)] = second / (4.0 * WIDE * WIDE);
+        h[(i, i)] = (own[i] - 2.0 * here) / (WIDE * WIDE);
+        for k in 0..i {
+            let second = sides(i, k) - own[i] - own[k] + 2.0 * here;
+            h[(i, k)] = second / (2.0 * WIDE * WIDE);
             h[(k, i)] = h[(i, k)];
         }
     }

@@ -5,10 +5,12 @@
 //! of values only, whatever their times: Foreman-Mackey, Agol, Ambikasaran and Angus, "Fast and scalable Gaussian process
 //! modeling with applications to astronomical time series" (2017), eqs. 9, 20, 33-43.
 
-use super::columns::dot;
 use super::decay::{each_step, powers};
 use nalgebra::Complex;
+use std::cell::RefCell;
+use std::collections::VecDeque;
 use std::f64::consts::TAU;
+use std::rc::Rc;
 
 /// A part of what is seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,7 +22,7 @@ pub(super) enum Part {
 }
 
 impl Part {
-    fn variance(&self) -> f64 {
+    pub fn variance(&self) -> f64 {
         match self {
             Self::Oscillator { variance, .. } | Self::Drift { variance, .. } => *variance,
         }
@@ -36,29 +38,91 @@ struct Term {
     d: f64,
 }
 
-/// A rank of the covariance in every frame: u v' faded from frame to frame. An oscillation has two, a fading one.
-struct Wave {
-    u: Vec<f64>,
-    v: Vec<f64>,
-    /// From the frame before.
-    fade: Vec<f64>,
+/// Waves of the covariance in every frame, and how they fade from frame to frame; what depends on a pole alone.
+pub(super) struct Waves {
+    pub cos: Vec<f64>,
+    pub sin: Vec<f64>,
+    pub fade: Vec<f64>,
+}
+
+impl Waves {
+    fn new(times_s: &[f64], term: &Term) -> Self {
+        let mut fade = Vec::with_capacity(times_s.len());
+        fade.extend(times_s.first().map(|_| 1.0));
+        each_step(times_s, Complex::from(-term.c), |factor| fade.push(factor.re));
+        let turn = powers(times_s, Complex::new(0.0, term.d));
+        let of = |f: &dyn Fn(&Complex<f64>) -> f64| turn.iter().map(f).collect::<Vec<f64>>();
+        Self { cos: of(&|t| t.re), sin: of(&|t| t.im), fade }
+    }
+}
+
+/// Times at which values are seen. The waves that were asked for last are kept: from one likelihood to the next few poles change.
+pub(super) struct Times {
+    pub s: Vec<f64>,
+    kept: RefCell<VecDeque<([u64; 2], Rc<Waves>)>>,
+}
+
+/// Ranks u v' of a covariance, which fade from frame to frame: an oscillation has two, a fading one.
+pub(super) struct Ranks(Vec<(Term, Rc<Waves>)>);
+
+impl Times {
+    pub fn new(s: Vec<f64>) -> Self {
+        Self { s, kept: RefCell::default() }
+    }
+
+    fn waves(&self, term: &Term) -> Rc<Waves> {
+        const KEPT: usize = 24;
+        let key = [term.c.to_bits(), term.d.to_bits()];
+        let mut kept = self.kept.borrow_mut();
+        if let Some((_, waves)) = kept.iter().rev().find(|(k, _)| *k == key) {
+            return waves.clone();
+        }
+        let waves = Rc::new(Waves::new(&self.s, term));
+        if kept.len() == KEPT {
+            kept.pop_front();
+        }
+        kept.push_back((key, waves.clone()));
+        waves
+    }
+
+    /// Of the covariance of a sum of `parts`.
+    pub fn ranks(&self, parts: &[Part]) -> Ranks {
+        let terms = together(parts.iter().flat_map(Part::terms));
+        Ranks(terms.into_iter().map(|term| (term, self.waves(&term))).collect())
+    }
+}
+
+impl Ranks {
+    pub fn len(&self) -> usize {
+        self.0.iter().map(|(term, _)| term.ranks()).sum()
+    }
+
+    /// u, v and the fading of every rank in frame `k`.
+    pub fn at(&self, k: usize, u: &mut [f64], v: &mut [f64], fade: &mut [f64]) {
+        let mut i = 0;
+        for (term, waves) in &self.0 {
+            let (cos, sin, faded) = (waves.cos[k], waves.sin[k], waves.fade[k]);
+            (u[i], v[i], fade[i]) = (term.a * cos + term.b * sin, cos, faded);
+            if term.ranks() == 2 {
+                (u[i + 1], v[i + 1], fade[i + 1]) = (term.a * sin - term.b * cos, sin, faded);
+            }
+            i += term.ranks();
+        }
+    }
+}
+
+impl Part {
+    /// Its power at `hz`, the transform of its covariance, per Hz on both sides.
+    pub fn power(&self, hz: f64) -> f64 {
+        let omega = TAU * hz;
+        let at = |t: &Term, by: f64| (t.a * t.c + t.b * by) / (t.c * t.c + by * by);
+        self.terms().iter().map(|t| at(t, t.d + omega) + at(t, t.d - omega)).sum()
+    }
 }
 
 impl Term {
-    fn waves(&self, times_s: &[f64]) -> Vec<Wave> {
-        let mut fade = Vec::with_capacity(times_s.len());
-        fade.extend(times_s.first().map(|_| 1.0));
-        each_step(times_s, Complex::from(-self.c), |factor| fade.push(factor.re));
-        if self.d == 0.0 {
-            return vec![Wave { u: vec![self.a; times_s.len()], v: vec![1.0; times_s.len()], fade }];
-        }
-        let turn = powers(times_s, Complex::new(0.0, self.d));
-        let of = |f: &dyn Fn(&Complex<f64>) -> f64| turn.iter().map(f).collect::<Vec<f64>>();
-        let (cos, sin) = (of(&|t| t.re), of(&|t| t.im));
-        vec![
-            Wave { u: of(&|t| self.a * t.re + self.b * t.im), v: cos, fade: fade.clone() },
-            Wave { u: of(&|t| self.a * t.im - self.b * t.re), v: sin, fade },
-        ]
+    fn ranks(&self) -> usize {
+        if self.d == 0.0 { 1 } else { 2 }
     }
 }
 
@@ -97,65 +161,67 @@ fn together(terms: impl Iterator<Item = Term>) -> Vec<Term> {
     out
 }
 
-/// Minus twice the logarithm of the likelihood of `values` at `times_s`, up to a constant, as a sum of `parts` and noise of
-/// variance `noise` in every value, plus any multiples of `known` signals, whose best factors are taken.
+/// Minus twice the logarithm of the likelihood of the first of `signals` at `times`, up to a constant, as a sum of `parts` and
+/// noise of variance `noise` in every value, plus any multiples of the other signals, whose best factors are taken.
 /// Infinite where there is none.
-pub(super) fn minus_2_log_likelihood(
-    times_s: &[f64],
-    values: &[f64],
-    known: &[Vec<f64>],
-    parts: &[Part],
-    noise: f64,
-) -> f64 {
-    let terms = together(parts.iter().flat_map(Part::terms));
-    let waves: Vec<Wave> = terms.iter().flat_map(|term| term.waves(times_s)).collect();
-    let j = waves.len();
+pub(super) fn minus_2_log_likelihood(times: &Times, signals: &[&[f64]], parts: &[Part], noise: f64) -> f64 {
+    let ranks = times.ranks(parts);
     let diagonal = noise + parts.iter().map(Part::variance).sum::<f64>();
-    let signals = 1 + known.len();
-    let (mut u, mut phi) = (vec![0.0; j], vec![0.0; j]);
+    // The number of ranks is known to the compiler, or this takes three times as long.
+    match ranks.len() {
+        0..=2 => likelihood::<2>(times.s.len(), signals, &ranks, diagonal),
+        3..=4 => likelihood::<4>(times.s.len(), signals, &ranks, diagonal),
+        5..=6 => likelihood::<6>(times.s.len(), signals, &ranks, diagonal),
+        7..=8 => likelihood::<8>(times.s.len(), signals, &ranks, diagonal),
+        9..=10 => likelihood::<10>(times.s.len(), signals, &ranks, diagonal),
+        11..=12 => likelihood::<12>(times.s.len(), signals, &ranks, diagonal),
+        _ => f64::INFINITY,
+    }
+}
+
+fn likelihood<const J: usize>(frames: usize, signals: &[&[f64]], ranks: &Ranks, diagonal: f64) -> f64 {
+    let (mut u, mut v, mut phi) = ([0.0; J], [0.0; J], [0.0; J]);
     // S and W of the factor; f of the solution, a row for each signal.
-    let (mut s, mut w, mut f) = (vec![0.0; j * j], vec![0.0; j], vec![0.0; j * signals]);
-    let (mut z, mut d) = (vec![0.0; signals], 0.0);
-    let (mut su, mut new) = (vec![0.0; j], vec![0.0; j]);
-    let mut gram = vec![0.0; signals * signals];
+    let (mut s, mut w, mut f) = ([[0.0; J]; J], [0.0; J], vec![[0.0; J]; signals.len()]);
+    let (mut z, mut d) = (vec![0.0; signals.len()], 0.0);
+    let n = signals.len();
+    let mut gram = vec![0.0; n * n];
     let mut log_determinant = 0.0;
-    for n in 0..times_s.len() {
-        for (k, wave) in waves.iter().enumerate() {
-            (u[k], phi[k]) = (wave.u[n], wave.fade[n]);
-            new[k] = d * w[k] * phi[k];
-        }
-        for (a, row) in s.chunks_exact_mut(j.max(1)).enumerate() {
-            // S becomes phi phi' (S + d w w').
-            let (old, added) = (phi[a], phi[a] * w[a]);
-            for (x, (phi, new)) in row.iter_mut().zip(phi.iter().zip(&new)) {
-                *x = old * phi * *x + added * new;
-            }
-            su[a] = dot(row, &u);
-        }
-        for (f, z) in f.chunks_exact_mut(j.max(1)).zip(&z) {
-            for (f, (phi, w)) in f.iter_mut().zip(phi.iter().zip(&w)) {
-                *f = phi * (*f + w * z);
+    for k in 0..frames {
+        ranks.at(k, &mut u, &mut v, &mut phi);
+        let mut su = [0.0; J];
+        for a in 0..J {
+            // S becomes phi phi' (S + d w w'), which is symmetric.
+            let added = d * w[a];
+            for b in 0..J {
+                s[a][b] = phi[a] * phi[b] * (s[a][b] + added * w[b]);
+                su[b] += s[a][b] * u[a];
             }
         }
-        d = diagonal - dot(&u, &su);
+        for (f, z) in f.iter_mut().zip(&z) {
+            for a in 0..J {
+                f[a] = phi[a] * (f[a] + w[a] * z);
+            }
+        }
+        d = diagonal - (0..J).map(|a| u[a] * su[a]).sum::<f64>();
         if d.is_nan() || d <= 0.0 {
             return f64::INFINITY;
         }
-        for (k, wave) in waves.iter().enumerate() {
-            w[k] = (wave.v[n] - su[k]) / d;
+        for a in 0..J {
+            w[a] = (v[a] - su[a]) / d;
         }
-        for (i, f) in f.chunks_exact(j.max(1)).enumerate() {
-            let y = if i == 0 { values[n] } else { known[i - 1][n] };
-            z[i] = y - dot(&u, f);
+        for ((z, f), signal) in z.iter_mut().zip(&f).zip(signals) {
+            *z = signal[k] - (0..J).map(|a| u[a] * f[a]).sum::<f64>();
         }
         log_determinant += d.ln();
-        for i in 0..signals {
-            for k in 0..=i {
-                gram[i * signals + k] += z[i] * z[k] / d;
+        for i in 0..n {
+            let share = z[i] / d;
+            for (sum, other) in gram[i * n..].iter_mut().zip(&z[..=i]) {
+                *sum += share * other;
             }
         }
     }
-    log_determinant + squares_left(gram, signals)
+    log_determinant + squares_left(gram, n)
 }
 
 /// What is left of the first signal's squares when the others have been fitted to it: `gram` holds the products below its
@@ -209,7 +275,7 @@ mod tests {
         let factors = (x.transpose() * &inverse * &x).try_inverse().unwrap() * x.transpose() * &inverse * &y;
         let rest = &y - &x * factors;
         let wanted = (rest.transpose() * inverse * rest)[(0, 0)] + k.determinant().ln();
-        let found = minus_2_log_likelihood(&times, &values, &known, &parts, 0.01);
+        let found = minus_2_log_likelihood(&Times::new(times), &[&values, &known[0], &known[1]], &parts, 0.01);
         assert!((found - wanted).abs() < 1e-6 * wanted.abs(), "{found}, not {wanted}");
     }
 }

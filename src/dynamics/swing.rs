@@ -1,8 +1,10 @@
 //! How a mode swings a branch: what its points do about the branch's base, in the picture.
 
+use super::columns::dot;
 use super::film::Film;
 use super::members::{Points, mean_px};
 use super::signals::Factor;
+use nalgebra::{DMatrix, SymmetricEigen};
 
 /// Places of a branch's points from its base, in the mean over time.
 pub(super) struct Arms(Vec<[f64; 2]>);
@@ -55,6 +57,26 @@ impl Arms {
     }
 }
 
+/// How much `signals` (of u and v of each point in turn) are one motion in time that every point makes by a lever of its own, as
+/// a share of the squares; and the share of the points that have more than a trace of it, all the same way.
+pub(super) fn levers(signals: &[Vec<f64>]) -> (f64, f64) {
+    const TRACE: f64 = 0.3;
+    let points: Vec<&[Vec<f64>]> = signals.chunks_exact(2).collect();
+    let n = points.len();
+    let product = |a: usize, b: usize| dot(&points[a][0], &points[b][0]) + dot(&points[a][1], &points[b][1]);
+    let products = DMatrix::from_fn(n, n, |a, b| product(a.max(b), a.min(b)));
+    let all = products.trace();
+    if n == 0 || all <= 0.0 || !all.is_finite() {
+        return (0.0, 0.0);
+    }
+    let eigen = SymmetricEigen::new(products);
+    let first = eigen.eigenvalues.imax();
+    let lever = eigen.eigenvectors.column(first);
+    let least = TRACE * lever.sum().signum() / (n as f64).sqrt();
+    let has = lever.iter().filter(|l| **l * least.signum() > least.abs()).count();
+    (eigen.eigenvalues[first] / all, has as f64 / n as f64)
+}
+
 fn of(factors: &[Vec<Factor>], m: usize) -> impl Iterator<Item = Factors> {
     factors.chunks_exact(2).map(move |uv| [uv[0][m].cosine, uv[0][m].sine, uv[1][m].cosine, uv[1][m].sine])
 }
@@ -95,5 +117,21 @@ mod tests {
         let apart = [[1.0, 1.0], [1.5, 1.5], [-1.0, 1.0], [-1.6, 1.5]];
         assert!(one_swing(&arms, &apart) < 0.8);
         assert_eq!(one_swing(&arms, &[[0.0; 2]; 4]), 0.0);
+    }
+
+    /// In wind a branch swings both ways at once: its points go along with it, each as far as it is from the base.
+    #[test]
+    fn points_that_move_alike_in_time_are_one_swing_and_those_of_two_branches_are_not() {
+        let wave = |hz: f64| (0..600).map(|k| (hz * 0.1 * f64::from(k)).sin()).collect::<Vec<f64>>();
+        let ways = [wave(1.0), wave(1.37), wave(1.71), wave(0.83)];
+        let moved = |lever: f64, way: usize| ways[way].iter().map(|x| lever * x).collect::<Vec<f64>>();
+        let branch = |n: usize, way: usize| {
+            (1..=n).flat_map(|i| [moved(i as f64, way), moved(0.5 * i as f64, way + 1)]).collect::<Vec<_>>()
+        };
+        let (one_swing, shared) = levers(&branch(4, 0));
+        assert!(one_swing > 0.999 && shared >= 0.75, "{one_swing}, {shared}");
+        let two = [branch(4, 0), branch(4, 2)].concat();
+        assert!(levers(&two).0 < 0.7 && levers(&two).1 < 0.75, "{:?}", levers(&two));
+        assert_eq!(levers(&[]), (0.0, 0.0));
     }
 }

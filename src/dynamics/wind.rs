@@ -1,25 +1,33 @@
 //! Sway of every branch in wind, from the trunk up.
 //!
-//! In wind nothing decays: a branch is an oscillator that chance keeps driving. What its carrier's points show is taken
-//! off (any multiple of it, so that no lever arm need be known), and the rest is the sum of its own oscillator, what is
-//! left of its ancestors', drift and noise. The likelihood of that sum tells frequency and damping, at the real times.
+//! In wind nothing decays: a branch is an oscillator that chance keeps driving. Every motion that its carrier's points show is
+//! taken off (any multiple of each, so that no lever arm need be known), and the rest is the sum of its own oscillator, what is
+//! left of its ancestors', drift and noise. The likelihood of that sum tells frequency and damping, at the real times
+//! (`gusts.rs`). It is the branch's own if its points move with it as one swing.
 
 use super::columns::{Qr, dot};
-use super::common::Common;
-use super::decay::{Mode, Start};
+use super::common::{Common, along, enough, principal};
+use super::decay::Mode;
 use super::film::Film;
 use super::free::{Demands, Z, interval};
-use super::members::Points;
-use super::minimum::{curvature, minimum};
-use super::process::{Part, minus_2_log_likelihood};
-use super::signals::{Fit, Signals};
+use super::gusts::{Oscillator, Problem};
+use super::members::{Points, mean_px};
+use super::process::Times;
+use super::swing::levers;
 use crate::model::{Excitation, NodeId, Skeleton, Sway, Swaying, Unidentified};
+use std::cell::RefCell;
 
 /// Points of a branch and of its carrier that are needed.
 const LEAST_POINTS: usize = 2;
-/// Oscillators that are looked for beyond the ancestors', and ancestors that are kept.
-const MOST_NEW: usize = 3;
+/// So many points that are on a branch and on none that it carries speak for it alone.
+const ENOUGH_OWN: usize = 3;
+/// Ancestors that are kept.
 const ANCESTORS: usize = 2;
+/// Motions of the carrier's points that are taken off at most. Each, and a second motion of the branch, must have so many times
+/// the variance of noise, and the second such a share of the first.
+const MOST_CARRIED: usize = 4;
+const CLEAR: f64 = 10.0;
+const SECOND: f64 = 0.02;
 /// Frames a period of the highest frequency beyond which neighbours are taken together as their mean: they cost time and tell
 /// little.
 const FRAMES_PER_PERIOD: f64 = 3.0;
@@ -35,21 +43,29 @@ const NOISE_PX: f64 = 0.15;
 const LEAST_OF_TRUNK: f64 = 0.1;
 /// A frequency that is nearer to an ancestor's than so many standard deviations is the ancestor's.
 const APART: f64 = 2.0;
-/// How often the gusts of a wind forget themselves, 1/s, at the least and at the most, which is white noise to a tree; and how
-/// often what drifts does in a film.
-const GUSTS_PER_S: [f64; 2] = [0.1, 60.0];
+/// An oscillator is one swing if its points move alike in time, each by a lever of its own, to this share of the squares
+/// ([`levers`]), and if such a share of them has it.
+const SHARED: f64 = 0.75;
+/// What drifts forgets itself so often in a film.
 const DRIFTS: f64 = 4.0;
-const DAMPING: [f64; 2] = [0.003, 0.4];
 /// The curvature of the likelihood is that at its top, and gusts are no exact process: intervals are so much wider. Found on
 /// made-up trees (tests/sway_trees.rs).
 const WIDER: f64 = 1.1;
-/// And they do not shrink below these standard deviations of the logarithms of frequency and damping, however long the film is: the
-/// carrier's motion is taken off as a multiple of what its points show, which is not all of it. Found likewise.
-const LEAST_SD: [f64; 2] = [0.012, 0.25];
-/// Trees are damped by some hundredths of the critical: a weak prior for films that are too short to tell, as the standard
-/// deviation of a logarithm.
-const USUAL_DAMPING: f64 = 0.05;
-const DAMPING_SD: f64 = 0.7;
+/// A mode whose interval is so many times wider than is asked for is no answer, but serves to tell those of the branches on it.
+const SERVES: f64 = 2.0;
+
+/// What is asked of an answer, by the points that it comes from. Found on made-up trees (tests/sway_trees.rs).
+struct Asked {
+    one_swing: f64,
+    /// Standard deviations of the logarithms of frequency and damping below which none is believed, however long the film is: what
+    /// the carrier's points show is not all that it does.
+    least_sd: [f64; 2],
+}
+
+/// Where a branch and its carrier have points of their own.
+const ALONE: Asked = Asked { one_swing: 0.85, least_sd: [0.008, 0.25] };
+/// Where those of the branches on them must serve: they sway by themselves besides.
+const MIXED: Asked = Asked { one_swing: 0.87, least_sd: [0.015, 0.25] };
 
 /// A branch's own oscillator.
 #[derive(Clone, Copy)]
@@ -78,23 +94,29 @@ pub(super) fn sways(
             continue;
         }
         let node = NodeId(i as u32);
-        let parent = skeleton.ancestors(node).next().unwrap_or(NodeId(0));
+        let parent = skeleton.ancestors(node).next().unwrap_or(NodeId(0)).index();
         let ancestors: Vec<Own> = skeleton.ancestors(node).filter_map(|a| own[a.index()]).take(ANCESTORS).collect();
-        let points = Points::of(film, tracks, 0);
+        let (speaking_of, alone) = speaking(film, i, tracks);
+        let points = Points::of(film, &speaking_of, 0);
         if points.tracks.len() < LEAST_POINTS {
             continue;
         }
-        let carrier: Vec<usize> = members[parent.index()].iter().copied().filter(|k| !tracks.contains(k)).collect();
-        let carrier = Points::of(film, if parent.index() == 0 { &[] } else { &carrier }, 0);
-        let base_px = skeleton.image_from_model(&skeleton.nodes[parent.index()].position);
-        // What a carrier's own sway is must be known, or be none, for that of the branch to be told from it.
-        let told = |s: &Swaying| matches!(s, Ok(_) | Err(Unidentified::AncestorsSway));
-        if parent.index() > 0 && (untold[parent.index()] || !told(&out[parent.index()])) {
+        let beside: Vec<usize> = match parent {
+            0 => Vec::new(),
+            _ => members[parent].iter().copied().filter(|k| !tracks.contains(k)).collect(),
+        };
+        let (beside, carrier_alone) = speaking(film, parent, &beside);
+        let carrier = Points::of(film, &beside, 0);
+        let asked = if alone && (parent == 0 || carrier_alone) { ALONE } else { MIXED };
+        // What a carrier's own sway is must be known, or be none, and its motion seen, for that of the branch to be told from it.
+        let told = own[parent].is_some() || out[parent] == Err(Unidentified::AncestorsSway) && !untold[parent];
+        if parent > 0 && (!told || carrier.tracks.len() < LEAST_POINTS) {
             out[i] = Err(Unidentified::AncestorsSway);
             untold[i] = true;
             continue;
         }
-        out[i] = branch(film, &points, &carrier, &ancestors, base_px, demands).map(|(found, sway)| {
+        let base_px = skeleton.image_from_model(&skeleton.nodes[parent].position);
+        out[i] = branch(film, &points, &carrier, &ancestors, base_px, (demands, &asked)).and_then(|(found, sway)| {
             own[i] = Some(found);
             sway
         });
@@ -102,171 +124,125 @@ pub(super) fn sways(
     out
 }
 
-/// What is fitted for one branch.
-struct Problem {
-    times_s: Vec<f64>,
-    values: Vec<f64>,
-    known: Vec<Vec<f64>>,
-    ancestors: Vec<Mode>,
-    drift_per_s: f64,
+/// Those of a branch's points that are on none of the branches that it carries, if they are enough, else all; and whether it is
+/// the former.
+fn speaking(film: &Film, i: usize, tracks: &[usize]) -> (Vec<usize>, bool) {
+    let own: Vec<usize> = tracks.iter().copied().filter(|&k| film.tracks[k].node.index() == i).collect();
+    if own.len() >= ENOUGH_OWN || own.len() == tracks.len() { (own, true) } else { (tracks.to_vec(), false) }
 }
 
-impl Problem {
-    /// Logarithms of noise, of the drift's variance, of the rate of the gusts, of the ancestors' variances; then variance,
-    /// frequency and damping of each new oscillator.
-    fn cost(&self, x: &[f64]) -> f64 {
-        let (of_ancestors, of_new) = x[3..].split_at(self.ancestors.len());
-        let drift = Part::Drift { variance: x[1].exp(), rate_per_s: self.drift_per_s };
-        let oscillator = |variance: f64, frequency_hz: f64, damping: f64| Part::Oscillator {
-            variance,
-            frequency_hz,
-            damping,
-            gusts_per_s: x[2].exp(),
-        };
-        let old = self.ancestors.iter().zip(of_ancestors).map(|(m, v)| oscillator(v.exp(), m.frequency_hz, m.damping));
-        let new = of_new.chunks(3).map(|p| oscillator(p[0].exp(), p[1].exp(), p[2].exp()));
-        let parts: Vec<Part> = std::iter::once(drift).chain(old).chain(new).collect();
-        let prior: f64 = of_new.chunks(3).map(|p| ((p[2] - USUAL_DAMPING.ln()) / DAMPING_SD).powi(2)).sum();
-        minus_2_log_likelihood(&self.times_s, &self.values, &self.known, &parts, x[0].exp()) + prior
-    }
-}
-
+/// The oscillator that a branch has beyond its ancestors', for the branches on it, and its sway if that can be told.
 fn branch(
     film: &Film,
     points: &Points,
     carrier: &Points,
     ancestors: &[Own],
     base_px: [f64; 2],
-    demands: &Demands,
-) -> Result<(Own, Sway), Unidentified> {
-    let common = Common::of(film, points).ok_or(Unidentified::NotMeasured)?;
-    let carried = (carrier.tracks.len() >= LEAST_POINTS).then(|| Common::of(film, carrier)).flatten();
-    let of_carrier: Vec<&Vec<f64>> = carried.iter().flat_map(Common::signals).collect();
-    let rows: Vec<usize> = (0..film.times_s.len())
-        .filter(|&k| common.shift_px.iter().chain(of_carrier.iter().copied()).all(|s| s[k].is_finite()))
-        .collect();
+    (demands, asked): (&Demands, &Asked),
+) -> Result<(Own, Swaying), Unidentified> {
     let at_rate = |hz: f64| ((1.0 / film.step_s()) / hz).round().max(1.0) as usize;
     let fine = at_rate(FRAMES_PER_PERIOD * demands.highest_hz);
-    let every = if rows.len() / fine > LONG { at_rate(LONG_HZ).max(fine) } else { fine };
-    let rows = neighbours(&rows, &film.times_s, every, film.step_s());
-    if rows.len() < LEAST_FRAMES {
+    let every = if film.times_s.len() / fine > LONG { at_rate(LONG_HZ).max(fine) } else { fine };
+    let mut frames = neighbours(&film.times_s, every, film.step_s());
+    frames.retain(|of| enough(points, of) && enough(carrier, of));
+    if frames.len() < LEAST_FRAMES {
         return Err(Unidentified::TooShort);
     }
-    let mean = |s: &Vec<f64>, of: &Vec<usize>| of.iter().map(|&k| s[k]).sum::<f64>() / of.len() as f64;
-    let pick = |s: &Vec<f64>| rows.iter().map(|of| mean(s, of)).collect::<Vec<f64>>();
-    let times_s = pick(&film.times_s);
-    let known: Vec<Vec<f64>> = std::iter::once(vec![1.0; rows.len()]).chain(of_carrier.into_iter().map(pick)).collect();
-    let shifts = [pick(&common.shift_px[0]), pick(&common.shift_px[1])];
+    let times_s: Vec<f64> =
+        frames.iter().map(|of| of.iter().map(|&k| film.times_s[k]).sum::<f64>() / of.len() as f64).collect();
+    let (common, carried) = (Common::of(points, &frames), Common::of(carrier, &frames));
+    let of_carrier = principal(&carried.signals);
+    let clear = of_carrier.ways.iter().zip(&of_carrier.variances).filter(|(_, v)| **v > CLEAR * carried.noise);
+    let mut known = vec![vec![1.0; frames.len()]];
+    known.extend(clear.take(MOST_CARRIED).map(|(way, _)| along(&carried.signals, way)));
     let qr = Qr::new(known.clone());
-    let rest: Vec<Vec<f64>> = shifts.iter().map(|s| qr.solve(s).0).collect();
-    let (cos, sin) = principal(&rest);
-    let along = |s: &[Vec<f64>]| s[0].iter().zip(&s[1]).map(|(u, v)| cos * u + sin * v).collect::<Vec<f64>>();
-    let (values, rest) = (along(&shifts), along(&rest));
-    let variance = dot(&rest, &rest) / rest.len() as f64;
-    let before = dot(&values, &values) / values.len() as f64;
-    if before.sqrt() < NOISE_PX {
+    let rest: Vec<Vec<f64>> = common.signals.iter().map(|s| qr.solve(s).0).collect();
+    let of_rest = principal(&rest);
+    let values = (points.tracks.len() * frames.len()) as f64;
+    let rms_px = |signals: &[Vec<f64>]| (signals.iter().map(|s| dot(s, s)).sum::<f64>() / values).sqrt();
+    if rms_px(&common.signals) < NOISE_PX {
         return Err(Unidentified::TooLittleMotion);
     }
-    if variance.sqrt() < NOISE_PX {
+    if rms_px(&rest) < NOISE_PX {
         return Err(Unidentified::AncestorsSway);
     }
+    let second = (SECOND * of_rest.variances[0]).max(CLEAR * common.noise);
+    let motions = if of_rest.variances.get(1).is_some_and(|v| *v > second) { 2 } else { 1 };
+    let motions = &of_rest.ways[..motions];
     let [lowest_hz, highest_hz] = demands.frequencies_hz;
     let frequencies_hz = match every {
         1 => demands.frequencies_hz,
         _ => [lowest_hz, highest_hz.min(OF_RATE / (every as f64 * film.step_s()))],
     };
+    let left: Vec<Vec<f64>> = motions.iter().map(|way| along(&rest, way)).collect();
     let problem = Problem {
-        times_s: times_s.clone(),
-        values,
+        times: Times::new(times_s),
+        motions: motions.iter().map(|way| along(&common.signals, way)).collect(),
         known,
         ancestors: ancestors.iter().map(|a| a.mode).collect(),
         drift_per_s: DRIFTS / film.span_s(),
+        had: RefCell::default(),
     };
-    let signals = Signals::new(times_s, &[rest], Start::Moving, 1.0, frequencies_hz);
-    let (x, bounds) = best(&problem, &signals, variance, frequencies_hz);
-    let first_new = 3 + ancestors.len();
-    if x.len() == first_new {
+    let fitted = problem.fit(&left, common.noise, frequencies_hz);
+    let found = fitted.oscillators();
+    if found.is_empty() {
         return Err(if ancestors.is_empty() { Unidentified::NoOscillation } else { Unidentified::AncestorsSway });
     }
-    let cost = |x: &[f64]| problem.cost(x);
-    let covariance = (0.5 * curvature(cost, &x)).try_inverse();
-    let at_bound = |k: usize| (x[k] - bounds[k][0]).abs() < 1e-6 || (x[k] - bounds[k][1]).abs() < 1e-6;
-    // The largest of those that are no ancestor's.
-    let mut last = Unidentified::NoOscillation;
-    let mut order: Vec<usize> = (first_new..x.len()).step_by(3).collect();
-    order.sort_by(|a, b| x[*b].total_cmp(&x[*a]));
-    if ancestors.is_empty() {
-        // The trunk carries all, and all else sways faster than the whole tree.
-        let strong = x[order[0]] + LEAST_OF_TRUNK.ln();
-        order.retain(|&k| x[k] >= strong);
-        order.sort_by(|a, b| x[a + 1].total_cmp(&x[b + 1]));
+    let wider = |sd: [f64; 2]| [0, 1].map(|i| (WIDER * sd[i]).hypot(asked.least_sd[i]));
+    let same = |o: &Oscillator, a: &Own| {
+        (a.mode.frequency_hz / o.mode.frequency_hz).ln().abs() < APART * a.sd[0].hypot(wider(o.sd)[0])
+    };
+    let of_ancestor = |o: &Oscillator| ancestors.iter().any(|a| same(o, a));
+    let Some(k) =
+        order(&found, ancestors.is_empty()).into_iter().find(|&k| !found[k].at_limit && !of_ancestor(&found[k]))
+    else {
+        let of_ancestors = found.iter().any(|o| !o.at_limit && of_ancestor(o));
+        return Err(if of_ancestors { Unidentified::AncestorsSway } else { Unidentified::NoOscillation });
+    };
+    let (mode, sd) = (found[k].mode, wider(found[k].sd));
+    if !(found[k].sd[0] > 0.0 && Z * sd[0] <= SERVES * demands.widest) {
+        return Err(Unidentified::TooUncertain);
     }
-    for k in order {
-        let sd = |i: usize| covariance.as_ref().map_or(f64::INFINITY, |c| c[(i, i)]).max(0.0).sqrt() * WIDER;
-        let (mode, sd) = (
-            Mode { frequency_hz: x[k + 1].exp(), damping: x[k + 2].exp() },
-            [sd(k + 1).hypot(LEAST_SD[0]), sd(k + 2).hypot(LEAST_SD[1])],
-        );
-        let same = |a: &Own| (a.mode.frequency_hz / mode.frequency_hz).ln().abs() < APART * a.sd[0].hypot(sd[0]);
-        if at_bound(k + 1) || at_bound(k + 2) {
-            continue;
-        }
-        if ancestors.iter().any(same) {
-            last = Unidentified::AncestorsSway;
-            continue;
-        }
-        if !(sd[0] > LEAST_SD[0] && Z * sd[0] <= demands.widest) {
-            return Err(Unidentified::TooUncertain);
-        }
-        // Gusts are not known well enough for a likelihood to tell a frequency from its mirror image at such a rate.
-        if 1.0 / film.step_s() - mode.frequency_hz <= demands.highest_hz {
-            return Err(Unidentified::AboveSampling);
-        }
-        let arm = (common.middle_px[0] - base_px[0]).hypot(common.middle_px[1] - base_px[1]);
-        let sway = Sway {
-            frequency_hz: interval(mode.frequency_hz, sd[0]),
-            damping_ratio: (sd[1] > LEAST_SD[1] && Z * sd[1] <= 1.0).then(|| interval(mode.damping, sd[1])),
-            excitation: Excitation::Wind,
-            amplitude_deg: (2.0 * x[k].exp()).sqrt().atan2(arm).to_degrees(),
-        };
-        return Ok((Own { mode, sd }, sway));
+    let filter = fitted.filter(k, common.noise).ok_or(Unidentified::TooUncertain)?;
+    let (one_swing, shared) = levers(&rest.iter().map(|s| filter.of(s)).collect::<Vec<_>>());
+    if one_swing < asked.one_swing || shared < SHARED {
+        return Err(Unidentified::NoOscillation);
     }
-    Err(last)
+    // Gusts are not known well enough for a likelihood to tell a frequency from its mirror image at such a rate.
+    if 1.0 / film.step_s() - mode.frequency_hz <= demands.highest_hz {
+        return Err(Unidentified::AboveSampling);
+    }
+    let arm = |k: &usize| {
+        let at = mean_px(&film.tracks[*k].at_px);
+        (at[0] - base_px[0]).powi(2) + (at[1] - base_px[1]).powi(2)
+    };
+    let arms: f64 = points.tracks.iter().map(arm).sum();
+    let sway = Sway {
+        frequency_hz: interval(mode.frequency_hz, sd[0]),
+        damping_ratio: (found[k].sd[1] > 0.0 && Z * sd[1] <= 1.0).then(|| interval(mode.damping, sd[1])),
+        excitation: Excitation::Wind,
+        amplitude_deg: (2.0 * found[k].variance).sqrt().atan2(arms.sqrt()).to_degrees(),
+    };
+    let sure = Z * sd[0] <= demands.widest;
+    Ok((Own { mode, sd }, if sure { Ok(sway) } else { Err(Unidentified::TooUncertain) }))
 }
 
-/// The parameters with as many new oscillators as the data carry (Schwarz 1978), and their bounds.
-fn best(problem: &Problem, signals: &Signals, variance: f64, frequencies_hz: [f64; 2]) -> (Vec<f64>, Vec<[f64; 2]>) {
-    let level = variance.ln();
-    let of_variance = [level - 16.0, level + 4.0];
-    let mut bounds = vec![[level - 16.0, level + 1.0], of_variance, GUSTS_PER_S.map(f64::ln)];
-    let mut x = vec![level - 4.0, level - 2.0, 0.0];
-    bounds.extend(problem.ancestors.iter().map(|_| of_variance));
-    x.extend(problem.ancestors.iter().map(|_| level - 2.0));
-    let cost = |x: &[f64]| problem.cost(x);
-    let (mut found, mut value) = minimum(cost, &x, &bounds);
-    let mut found_bounds = bounds.clone();
-    let penalty = (problem.times_s.len() as f64).ln();
-    let mut fit = Fit { modes: problem.ancestors.clone(), ..Fit::default() };
-    let mut x = found.clone();
-    for _ in 0..MOST_NEW {
-        let Some(new) = signals.search(&fit) else { break };
-        fit.modes.push(new);
-        x.extend([level - 1.0, new.frequency_hz.ln(), 0.05_f64.ln()]);
-        bounds.extend([of_variance, frequencies_hz.map(f64::ln), DAMPING.map(f64::ln)]);
-        let there = minimum(cost, &x, &bounds);
-        x = there.0;
-        if there.1 + 3.0 * penalty >= value {
-            break;
-        }
-        (found, value, found_bounds) = (x.clone(), there.1, bounds.clone());
+/// The largest first. Of the trunk the slowest of the larger ones: it carries all, and all else sways faster than the whole tree.
+fn order(found: &[Oscillator], trunk: bool) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..found.len()).collect();
+    order.sort_by(|a, b| found[*b].variance.total_cmp(&found[*a].variance));
+    if trunk {
+        let strong = LEAST_OF_TRUNK * found[order[0]].variance;
+        order.retain(|&k| found[k].variance >= strong);
+        order.sort_by(|a, b| found[*a].mode.frequency_hz.total_cmp(&found[*b].mode.frequency_hz));
     }
-    (found, found_bounds)
+    order
 }
 
 /// Frames by `every` neighbours; those between which frames are missing are not put together.
-fn neighbours(rows: &[usize], times_s: &[f64], every: usize, step_s: f64) -> Vec<Vec<usize>> {
-    let mut out: Vec<Vec<usize>> = Vec::with_capacity(rows.len() / every + 1);
-    for &k in rows {
+fn neighbours(times_s: &[f64], every: usize, step_s: f64) -> Vec<Vec<usize>> {
+    let mut out: Vec<Vec<usize>> = Vec::with_capacity(times_s.len() / every + 1);
+    for k in 0..times_s.len() {
         match out.last_mut() {
             Some(last) if last.len() < every && times_s[k] - times_s[last[0]] < (every as f64 - 0.5) * step_s => {
                 last.push(k)
@@ -275,11 +251,4 @@ fn neighbours(rows: &[usize], times_s: &[f64], every: usize, step_s: f64) -> Vec
         }
     }
     out
-}
-
-/// Cosine and sine of the direction in which two signals together vary most.
-fn principal(s: &[Vec<f64>]) -> (f64, f64) {
-    let (xx, xy, yy) = (dot(&s[0], &s[0]), dot(&s[0], &s[1]), dot(&s[1], &s[1]));
-    let (sin, cos) = (0.5 * (2.0 * xy).atan2(xx - yy)).sin_cos();
-    (cos, sin)
 }
