@@ -257,7 +257,7 @@ mod tests {
         let times: Vec<f64> =
             (0..40).map(|k| 0.1 * k as f64 + 0.03 * (k as f64 * 1.7).sin() + if k > 20 { 1.3 } else { 0.0 }).collect();
         let values: Vec<f64> = times.iter().map(|t| (3.0 * t).sin() + 0.2 * (17.0 * t).cos()).collect();
-        let known = vec![vec![1.0; 40], times.iter().map(|t| t.cos()).collect::<Vec<f64>>()];
+        let known = [vec![1.0; 40], times.iter().map(|t| t.cos()).collect::<Vec<f64>>()];
         let parts = [
             Part::Oscillator { variance: 0.7, frequency_hz: 0.5, damping: 0.06, gusts_per_s: 1e4 },
             Part::Drift { variance: 0.2, rate_per_s: 0.4 },

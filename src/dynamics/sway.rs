@@ -3,10 +3,12 @@
 use super::film::Film;
 use super::free::{self, Demands};
 use super::members::members;
+use super::modal;
 use super::release::{Onset, onset};
 use super::wind;
 use crate::config::{Dynamics, Excited};
 use crate::model::{Excitation, Skeleton, Swaying, Unidentified};
+use std::borrow::Cow;
 
 /// Fewer frames than this say nothing.
 const LEAST_FRAMES: usize = 32;
@@ -34,20 +36,54 @@ pub fn analyse(skeleton: &Skeleton, film: &Film, config: &Dynamics) -> Analysis 
 /// The same; `go_on` is asked before every branch, as many of them take a while: those that are left when it says no are
 /// [`Unidentified::NotInTime`].
 pub fn analyse_with(skeleton: &Skeleton, film: &Film, config: &Dynamics, go_on: &dyn Fn() -> bool) -> Analysis {
-    let members = members(skeleton, film);
-    let nothing = |why| {
-        let of = |m: &Vec<usize>| Err(if m.is_empty() { Unidentified::NotMeasured } else { why });
-        let mut sway: Vec<Swaying> = members.iter().map(of).collect();
+    looked_at(skeleton, film, config, true, go_on)
+}
+
+/// The same in a time that a screen can wait for: one branch after the other, and not all of them at once besides, which takes
+/// several times as long and answers for a few more.
+pub fn analyse_soon(skeleton: &Skeleton, film: &Film, config: &Dynamics, go_on: &dyn Fn() -> bool) -> Analysis {
+    looked_at(skeleton, film, config, false, go_on)
+}
+
+fn looked_at(skeleton: &Skeleton, film: &Film, config: &Dynamics, at_once: bool, go_on: &dyn Fn() -> bool) -> Analysis {
+    let Some(Begun { members, onset, demands, film }) = begun(skeleton, film, config) else {
+        let of = |m: &Vec<usize>| Err(if m.is_empty() { Unidentified::NotMeasured } else { Unidentified::TooShort });
+        let mut sway: Vec<Swaying> = members(skeleton, film).iter().map(of).collect();
         sway.iter_mut().take(1).for_each(|foot| *foot = Err(Unidentified::NotMeasured));
-        Analysis { sway, onset: None }
+        return Analysis { sway, onset: None };
     };
+    let sway = match onset.excitation {
+        Excitation::Release => {
+            let mut sways = free::sways(skeleton, &film, &members, &onset, &demands, go_on);
+            if at_once {
+                modal::answer(skeleton, &film, &onset, &demands, &mut sways, go_on);
+            }
+            sways
+        }
+        Excitation::Wind => wind::sways(skeleton, &film, &members, &demands, go_on),
+    };
+    Analysis { sway, onset: Some(onset) }
+}
+
+/// A film that is long enough to be looked at, and what made its tree sway.
+pub(super) struct Begun<'a> {
+    /// Points of every measured node and of all above it.
+    pub members: Vec<Vec<usize>>,
+    pub onset: Onset,
+    pub demands: Demands,
+    /// As far as it is used.
+    pub film: Cow<'a, Film>,
+}
+
+/// `None` where there is too little film.
+pub(super) fn begun<'a>(skeleton: &Skeleton, film: &'a Film, config: &Dynamics) -> Option<Begun<'a>> {
     if film.times_s.len() < LEAST_FRAMES || film.span_s() <= 0.0 {
-        return nothing(Unidentified::TooShort);
+        return None;
     }
     let highest_hz = (BELOW_NYQUIST * 0.5 / film.step_s()).min(config.highest_hz);
     let frequencies_hz = [LEAST_PERIODS / film.span_s(), highest_hz];
     if frequencies_hz[0] >= frequencies_hz[1] {
-        return nothing(Unidentified::TooShort);
+        return None;
     }
     let demands = Demands { frequencies_hz, highest_hz: config.highest_hz, widest: config.widest };
     let given = match config.excitation {
@@ -55,14 +91,11 @@ pub fn analyse_with(skeleton: &Skeleton, film: &Film, config: &Dynamics, go_on: 
         Excited::Release => Some(Excitation::Release),
         Excited::Wind => Some(Excitation::Wind),
     };
+    let members = members(skeleton, film);
     let onset = onset(film, members.get(1).map_or(&[], Vec::as_slice), given, frequencies_hz);
-    let film = &film.until(onset.to);
+    let film = film.until(onset.to);
     if film.times_s.len() - onset.from < LEAST_FRAMES {
-        return nothing(Unidentified::TooShort);
+        return None;
     }
-    let sway = match onset.excitation {
-        Excitation::Release => free::sways(skeleton, film, &members, &onset, &demands, go_on),
-        Excitation::Wind => wind::sways(skeleton, film, &members, &demands, go_on),
-    };
-    Analysis { sway, onset: Some(onset) }
+    Some(Begun { members, onset, demands, film })
 }

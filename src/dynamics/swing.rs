@@ -14,11 +14,12 @@ type Factors = [f64; 4];
 
 impl Arms {
     pub fn new(film: &Film, points: &Points, from: usize, base_px: [f64; 2]) -> Self {
-        let arm = |k: &usize| {
-            let at = mean_px(&film.tracks[*k].at_px[from..]);
-            [at[0] - base_px[0], at[1] - base_px[1]]
-        };
-        Self(points.tracks.iter().map(arm).collect())
+        Self::at(points.tracks.iter().map(|k| mean_px(&film.tracks[*k].at_px[from..])), base_px)
+    }
+
+    /// Of points at `at_px`.
+    pub fn at(at_px: impl Iterator<Item = [f64; 2]>, base_px: [f64; 2]) -> Self {
+        Self(at_px.map(|at| [at[0] - base_px[0], at[1] - base_px[1]]).collect())
     }
 
     /// How much mode `m` of `factors` (of u and v of each point in turn) is one swing, 0 to 1: all points in one direction, as

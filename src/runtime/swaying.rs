@@ -9,7 +9,7 @@
 use super::pulse::{Pulse, Worker};
 use super::shared::Shared;
 use crate::config::Dynamics;
-use crate::dynamics::{FilmLog, analyse_with, spectrum};
+use crate::dynamics::{FilmLog, analyse_soon, spectrum};
 use crate::model::{AngleSpectrum, Angles, BranchSway, NodeId, NodeName, Skeleton, SwayNow, TrackId, Unidentified};
 use crossbeam_channel::{Receiver, RecvTimeoutError, SendTimeoutError, Sender, TryRecvError, bounded};
 use std::collections::BTreeMap;
@@ -242,7 +242,7 @@ impl Drop for AtWork<'_> {
 pub fn analyse(request: &Request, go_on: &dyn Fn() -> bool) -> SwayNow {
     let Request { skeleton, settings, angles, .. } = request;
     let film = request.log.film(skeleton, |id| request.nodes.get(&id).copied());
-    let analysis = analyse_with(skeleton, &film, settings, go_on);
+    let analysis = analyse_soon(skeleton, &film, settings, go_on);
     let branch = |(i, name): (usize, &NodeName)| {
         // The foot is no branch.
         let swaying = analysis.sway.get(i + 1).copied().unwrap_or(Err(Unidentified::NotMeasured));

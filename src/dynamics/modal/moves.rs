@@ -1,0 +1,194 @@
+//! How a tree becomes a better one: modes change places, branches come apart, points change branches, as long as it is worth it.
+
+use super::super::decay::Mode;
+use super::search::{CLEAR, LEAST, Tried};
+use super::tree::{Branch, Tree};
+
+/// What a change must be worth, and a mode for a branch to be looked at.
+const WORTH: f64 = 10.0;
+const MODE: f64 = 30.0;
+/// Rounds of all changes, of fits after one, and of fits of everything.
+const ROUNDS: usize = 3;
+const AFTER: usize = 5;
+const OF_ALL: usize = 6;
+/// Branches that may come off one in a round.
+const SHOOTS: usize = 4;
+/// Points that a tip must have to be tried as two, and how far apart those are put: share of the frequency either way.
+const FOR_TWO: usize = 8;
+const APART: [f64; 2] = [0.03, 0.08];
+/// Rounds in which points choose between the two, and modes are fitted, in turn.
+const CHOOSE: usize = 3;
+
+impl<'a> Tree<'a> {
+    /// The best tree that the changes lead to; `None` if `go_on` says no before.
+    pub fn grown(mut self, go_on: &dyn Fn() -> bool) -> Option<Self> {
+        let tried = Tried::new(self.decay);
+        self.fit_all();
+        for _ in 0..ROUNDS {
+            let mut changed = false;
+            for branch in 1..self.branches.len() {
+                if !go_on() {
+                    return None;
+                }
+                changed |= self.rearrange(branch, &tried);
+            }
+            let mut largest: Vec<usize> = (1..self.branches.len()).collect();
+            largest.sort_by_key(|&b| std::cmp::Reverse(self.own(b).len()));
+            for branch in largest {
+                if !go_on() {
+                    return None;
+                }
+                changed |= self.shoot(branch, &tried);
+            }
+            for branch in 1..self.branches.len() {
+                changed |= self.part(branch);
+            }
+            if !go_on() {
+                return None;
+            }
+            let all: Vec<usize> = (1..self.branches.len()).collect();
+            changed |= self.choose(&all, &(0..self.branch_of.len()).collect::<Vec<_>>());
+            self.fit_all();
+            for b in 1..self.branches.len() {
+                if self.all(b).len() < LEAST - 1 {
+                    self.branches[b].mode = None;
+                }
+            }
+            if !changed {
+                break;
+            }
+        }
+        Some(self)
+    }
+
+    fn fit_all(&mut self) {
+        let all: Vec<usize> = (0..self.branches.len()).collect();
+        self.refit(&all, &all, OF_ALL);
+    }
+
+    /// Takes `other` if what is within `root` costs less there.
+    fn take(&mut self, mut other: Tree<'a>, root: usize) -> bool {
+        let there = other.within(root);
+        other.refit(&there, &there, AFTER);
+        let better = other.cost(&there) < self.cost(&self.within(root)) - WORTH;
+        if better {
+            *self = other;
+        }
+        better
+    }
+
+    /// The mode of a branch is tried on what carries it, in exchange; left out; and looked for anew.
+    fn rearrange(&mut self, branch: usize, tried: &Tried) -> bool {
+        if self.all(branch).len() < LEAST {
+            self.branches[branch].mode = None;
+            return false;
+        }
+        let mut changed = false;
+        let with = |tree: &Self, at: usize, mode: Option<Mode>| {
+            let mut other = tree.clone();
+            other.branches[at].mode = mode;
+            other
+        };
+        if let (Some(mode), Some(parent)) =
+            (self.branches[branch].mode, self.branches[branch].parent.filter(|&p| p > 0))
+        {
+            let mut other = with(self, branch, self.branches[parent].mode);
+            other.branches[parent].mode = Some(mode);
+            changed |= self.take(other, parent);
+        }
+        if self.branches[branch].mode.is_some() {
+            changed |= self.take(with(self, branch, None), branch);
+        }
+        let without = with(self, branch, None);
+        if let Some(mode) = without.common_mode(branch, tried) {
+            changed |= self.take(with(&without, branch, Some(mode)), branch);
+        }
+        changed
+    }
+
+    /// New branches on `branch`, of those of its own points that have a mode in common.
+    fn shoot(&mut self, branch: usize, tried: &Tried) -> bool {
+        let mut changed = false;
+        for _ in 0..SHOOTS {
+            let points = self.own(branch);
+            if points.len() < LEAST {
+                break;
+            }
+            let Some(found) = self.mode_of_some(branch, points, tried).filter(|f| f.worth >= MODE) else { break };
+            let mut other = self.clone();
+            let new = other.add(branch, Some(found.mode), &found.points);
+            other.refit(&[new], &[new], AFTER);
+            let within = other.within(branch);
+            other.choose(&within, &other.all(branch));
+            if other.all(new).len() < LEAST - 1 || !self.take(other, branch) {
+                break;
+            }
+            changed = true;
+        }
+        changed
+    }
+
+    /// Two branches whose frequencies lie close together are first found as one between them: a tip is tried as two, of which every
+    /// point may choose.
+    fn part(&mut self, branch: usize) -> bool {
+        let (points, within) = (self.own(branch), self.within(branch));
+        let (Some(mode), Some(parent)) = (self.branches[branch].mode, self.branches[branch].parent) else {
+            return false;
+        };
+        if points.len() < FOR_TWO || within.len() > 1 {
+            return false;
+        }
+        for apart in APART {
+            let mut other = self.clone();
+            let at = |share: f64| Some(Mode { frequency_hz: mode.frequency_hz * share, ..mode });
+            other.branches[branch].mode = at((-apart).exp());
+            let new = other.add(parent, at(apart.exp()), &[]);
+            let both = [branch, new];
+            let mut large_enough = true;
+            for _ in 0..CHOOSE {
+                let [here, there] = both.map(|b| other.costs(b, &points));
+                for (k, &p) in points.iter().enumerate() {
+                    other.branch_of[p] = if here[k] <= there[k] { branch } else { new };
+                }
+                large_enough = both.iter().all(|&b| other.own(b).len() >= LEAST);
+                if !large_enough {
+                    break;
+                }
+                other.refit(&both, &both, AFTER);
+            }
+            if large_enough && other.cost(&both) < self.cost(&[branch]) - WORTH {
+                *self = other;
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Every one of `points` may go to that of `branches` where it costs clearly least; tells whether one did.
+    fn choose(&mut self, branches: &[usize], points: &[usize]) -> bool {
+        let costs: Vec<Vec<f64>> = branches
+            .iter()
+            .map(|&b| self.costs(b, points).iter().zip(self.far(b, points)).map(|(c, f)| c + f).collect())
+            .collect();
+        let mut moved = false;
+        for (k, &p) in points.iter().enumerate() {
+            let Some(now) = branches.iter().position(|&b| b == self.branch_of[p]) else { continue };
+            let best = (0..branches.len()).min_by(|&a, &b| costs[a][k].total_cmp(&costs[b][k]));
+            if let Some(best) = best.filter(|&b| costs[b][k] < costs[now][k] - CLEAR) {
+                self.branch_of[p] = branches[best];
+                moved = true;
+            }
+        }
+        moved
+    }
+
+    fn add(&mut self, parent: usize, mode: Option<Mode>, points: &[usize]) -> usize {
+        let new = self.branches.len();
+        let n = (points.len() as f64).max(1.0);
+        let mean = |c: usize| points.iter().map(|&p| self.decay.points[p].at_px[c]).sum::<f64>() / n;
+        let end_px = if points.is_empty() { self.branches[parent].end_px } else { [mean(0), mean(1)] };
+        self.branches.push(Branch { parent: Some(parent), mode, end_px });
+        points.iter().for_each(|&p| self.branch_of[p] = new);
+        new
+    }
+}
