@@ -19,6 +19,7 @@ use super::members::{is_seen, mean_px};
 use super::release::Onset;
 use crate::model::{Excitation, NodeId, Skeleton, Sway, Swaying, Unidentified};
 use read::Reading;
+use search::LEAST;
 use tree::{Branch, Decay, Point, Tree};
 
 /// Frames a second that are enough: neighbours are taken together as their mean.
@@ -42,7 +43,6 @@ const HARDLY: f64 = 0.15;
 /// It is a captured branch's own if it is in so much of its points, and so much of the points that have it are on that.
 const OF_BRANCH: f64 = 0.75;
 const OF_MODE: f64 = 0.6;
-const LEAST_POINTS: usize = 4;
 /// Frequencies that are no farther apart than this share are one.
 const ONE: f64 = 0.012;
 /// Intervals are so much wider than the curvature says, and no narrower than these standard deviations. Found on clips of our own
@@ -66,7 +66,7 @@ pub(super) fn answer(
     if !sways.get(1).is_some_and(Result::is_ok) || !sways.iter().any(open) {
         return;
     }
-    let Some((readings, on, _)) = told(skeleton, film, onset, demands, sways, go_on) else {
+    let Some((readings, on)) = told(skeleton, film, onset, demands, sways, go_on) else {
         if !go_on() {
             sways.iter_mut().filter(|s| open(s)).for_each(|s| *s = Err(Unidentified::NotInTime));
         }
@@ -85,7 +85,7 @@ pub(super) fn answer(
             let either = (r.points.len() + on[b].len()) as f64 - both;
             let own = both >= OF_BRANCH * on[b].len() as f64 && both >= OF_MODE * r.points.len() as f64;
             let new = above.iter().all(|f| (f / r.mode.frequency_hz).ln().abs() >= ONE);
-            (own && new && both >= LEAST_POINTS as f64).then_some(both / either)
+            (own && new && both >= LEAST as f64).then_some(both / either)
         };
         let best = readings.iter().filter_map(|r| Some((fits(&r)?, r))).max_by(|a, b| a.0.total_cmp(&b.0));
         if let Some(sway) = best.and_then(|(_, r)| sway(r, demands)) {
@@ -94,9 +94,7 @@ pub(super) fn answer(
     }
 }
 
-/// The branches that can be told; the points on every captured branch and on what it carries, in order; and which tracks they are.
-type Told = (Vec<Reading>, Vec<Vec<usize>>, Vec<usize>);
-
+/// The branches that can be told, and the points on every captured branch and on what it carries, in order.
 fn told(
     skeleton: &Skeleton,
     film: &Film,
@@ -104,10 +102,10 @@ fn told(
     demands: &Demands,
     sways: &[Swaying],
     go_on: &dyn Fn() -> bool,
-) -> Option<Told> {
-    let (times_s, points, tracks) = thinned(film, onset);
+) -> Option<(Vec<Reading>, Vec<Vec<usize>>)> {
+    let (times_s, points, branch_of) = thinned(film, onset);
     let span_s = times_s.last().zip(times_s.first()).map_or(0.0, |(b, a)| b - a);
-    if points.len() < LEAST_POINTS || span_s <= 0.0 {
+    if points.len() < LEAST || span_s <= 0.0 {
         return None;
     }
     let rate_hz = (times_s.len() - 1) as f64 / span_s;
@@ -116,7 +114,6 @@ fn told(
         return None;
     }
     let decay = Decay::new(times_s, onset.start, frequencies_hz, points);
-    let branch_of: Vec<usize> = tracks.iter().map(|&k| film.tracks[k].node.index()).collect();
     let captured = captured(skeleton, sways, &decay, branch_of);
     let on: Vec<Vec<usize>> = (0..sways.len()).map(|b| captured.all(b)).collect();
     let tree = captured.grown(go_on)?;
@@ -128,7 +125,7 @@ fn told(
             // Films of few frames a second show a fast sway as a slow one.
             && 1.0 / film.step_s() - r.mode.frequency_hz > demands.highest_hz
     };
-    Some((tree.readings().into_iter().filter(clear).collect(), on, tracks))
+    Some((tree.readings().into_iter().filter(clear).collect(), on))
 }
 
 fn sway(reading: &Reading, demands: &Demands) -> Option<Sway> {
@@ -156,14 +153,14 @@ fn captured<'a>(skeleton: &Skeleton, sways: &[Swaying], decay: &'a Decay, branch
     };
     let mut tree = Tree { decay, branches: sways.iter().enumerate().map(branch).collect(), branch_of };
     for b in 0..tree.branches.len() {
-        if tree.all(b).len() < LEAST_POINTS {
+        if tree.all(b).len() < LEAST {
             tree.branches[b].mode = None;
         }
     }
     tree
 }
 
-/// Times from the release on, s, the points that were seen nearly always, and which tracks they are. Neighbouring frames are
+/// Times from the release on, s, the points that were seen nearly always, and the branches that they are on. Neighbouring frames are
 /// taken together, and short gaps bridged by straight lines: to tell whose a mode is.
 fn thinned(film: &Film, onset: &Onset) -> (Vec<f64>, Vec<Point>, Vec<usize>) {
     let together = ((1.0 / (ENOUGH_HZ * film.step_s()) + 0.01) as usize).max(1);
@@ -172,8 +169,8 @@ fn thinned(film: &Film, onset: &Onset) -> (Vec<f64>, Vec<Point>, Vec<usize>) {
         (onset.from..until).step_by(together).map(|k| k..k + together).filter(|rows| rows.end <= until).collect();
     let mean = |rows: &std::ops::Range<usize>| film.times_s[rows.clone()].iter().sum::<f64>() / rows.len() as f64;
     let times_s: Vec<f64> = rows.iter().map(|r| mean(r) - onset.at_s).collect();
-    let (mut points, mut tracks) = (Vec::new(), Vec::new());
-    for (k, track) in film.tracks.iter().enumerate() {
+    let (mut points, mut branch_of) = (Vec::new(), Vec::new());
+    for track in &film.tracks {
         let at: Vec<[f64; 2]> = rows
             .iter()
             .map(|r| {
@@ -186,9 +183,9 @@ fn thinned(film: &Film, onset: &Onset) -> (Vec<f64>, Vec<Point>, Vec<usize>) {
             .collect();
         let Some(values) = bridged(&times_s, &at) else { continue };
         points.push(Point::new(values, mean_px(&at), LEAST_NOISE_PX));
-        tracks.push(k);
+        branch_of.push(track.node.index());
     }
-    (times_s, points, tracks)
+    (times_s, points, branch_of)
 }
 
 /// Displacement from the mean, px; nothing for a point that was seen too little.
@@ -286,11 +283,12 @@ mod tests {
             return Vec::new();
         };
         let sways = free::sways(skeleton, &film, &members, &onset, &demands, &|| true);
-        let Some((readings, on, tracks)) = told(skeleton, &film, &onset, &demands, &sways, &|| true) else {
+        let Some((readings, on)) = told(skeleton, &film, &onset, &demands, &sways, &|| true) else {
             return Vec::new();
         };
         let own = readings.into_iter().filter(|r| r.points.len() < on[2].len());
-        let mut groups: Vec<Vec<usize>> = own.map(|r| r.points.iter().map(|&p| tracks[p]).collect()).collect();
+        // Every track of these films is a point.
+        let mut groups: Vec<Vec<usize>> = own.map(|r| r.points).collect();
         groups.sort();
         groups
     }

@@ -2,11 +2,10 @@
 
 use super::super::decay::Mode;
 use super::search::{CLEAR, LEAST, Tried};
-use super::tree::{Branch, Tree};
+use super::tree::{Branch, PER_MODE, Tree};
 
-/// What a change must be worth, and a mode for a branch to be looked at.
+/// What a change must be worth.
 const WORTH: f64 = 10.0;
-const MODE: f64 = 30.0;
 /// Rounds of all changes, of fits after one, and of fits of everything.
 const ROUNDS: usize = 3;
 const AFTER: usize = 5;
@@ -114,7 +113,7 @@ impl<'a> Tree<'a> {
             if points.len() < LEAST {
                 break;
             }
-            let Some(found) = self.mode_of_some(branch, points, tried).filter(|f| f.worth >= MODE) else { break };
+            let Some(found) = self.mode_of_some(branch, points, tried).filter(|f| f.worth >= PER_MODE) else { break };
             let mut other = self.clone();
             let new = other.add(branch, Some(found.mode), &found.points);
             other.refit(&[new], &[new], AFTER);

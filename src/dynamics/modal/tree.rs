@@ -8,7 +8,7 @@ use super::super::decay::{Mode, Start};
 pub(super) const VALUES: f64 = 80.0;
 /// What a point must gain by each mode that it has, and a mode by being there: twice logarithms of likelihood.
 pub(super) const PER_POINT: f64 = 8.0;
-const PER_MODE: f64 = 30.0;
+pub(super) const PER_MODE: f64 = 30.0;
 /// Damping of branches: median, and standard deviation of the logarithm.
 const USUAL_DAMPING: f64 = 0.05;
 const DAMPING_SD: f64 = 0.8;
