@@ -12,6 +12,7 @@ mod refine;
 mod refiner;
 mod reshape;
 mod retrace;
+mod shoots;
 
 pub use back::{BackEnd, Moved};
 pub use dress::{Seen, dress, flutter};
@@ -20,6 +21,7 @@ pub use leaves::seeds as leaf_seeds;
 pub use refine::Refinement;
 pub use reshape::{MOST_RESHAPED, cut_to, reshape};
 pub use retrace::Retrace;
+pub use shoots::Shoot;
 
 use crate::config::Config;
 use crate::hierarchy::{self, Evidence};
@@ -64,7 +66,11 @@ impl Pipeline {
 #[derive(Clone, Debug)]
 pub struct Tree {
     pub hierarchy: MotionHierarchy,
+    /// The hierarchy in space, and the same with the shoots: the tree as it is shown and written.
+    pub plain: Arc<Skeleton>,
     pub skeleton: Arc<Skeleton>,
+    /// What a refinement has added; their nodes come after those of the hierarchy.
+    pub shoots: Vec<Shoot>,
     /// Rest position of every track that was there when the tree was built, px.
     pub rest_px: BTreeMap<TrackId, [f64; 2]>,
     pub outline: Arc<Outline>,
@@ -114,7 +120,26 @@ impl Tree {
     pub fn binding(&self) -> Binding {
         let mut binding = Binding::new(&self.hierarchy, &self.rest_px, &self.skeleton);
         binding.inherit(&self.inherited);
+        binding.inherit(&self.on_shoots());
         binding
+    }
+
+    /// The points of the shoots with node and rest place, px.
+    fn on_shoots(&self) -> BTreeMap<TrackId, (NodeId, [f64; 2])> {
+        let rest_px = |id: &TrackId| self.inherited.get(id).map(|(_, at)| at).or_else(|| self.rest_px.get(id)).copied();
+        let nodes = (self.plain.measured() as u32..).map(NodeId);
+        let of = |(node, shoot): (NodeId, &Shoot)| {
+            shoot.members.iter().filter_map(move |id| Some((*id, (node, rest_px(id)?)))).collect::<Vec<_>>()
+        };
+        nodes.zip(&self.shoots).flat_map(of).collect()
+    }
+
+    /// Puts `shoots` on in place of those that it has.
+    fn shoot(&mut self, shoots: Vec<Shoot>, config: &Config) {
+        self.shoots = shoots;
+        let mut skeleton = shoots::with(&self.plain, &self.shoots);
+        thicken(&mut skeleton, &self.outline, config);
+        self.skeleton = Arc::new(skeleton);
     }
 
     pub fn estimator(&self, config: &Config) -> PoseEstimator {
@@ -133,10 +158,11 @@ impl Tree {
         (flat, tracks)
     }
 
-    /// How well its push fills the envelope, and how likely its angles are, beside the one-sided ways.
+    /// How well its push fills the envelope, and how likely its angles are, beside the one-sided ways; without shoots, which are
+    /// not pushed.
     pub fn push_figures(&self, config: &Config) -> PushFigures {
-        let (flat, tracks) = self.flat_on(self.skeleton.foot_px, config);
-        PushFigures::of(&self.skeleton, &flat, &tracks, &self.outline, &config.shape)
+        let (flat, tracks) = self.flat_on(self.plain.foot_px, config);
+        PushFigures::of(&self.plain, &flat, &tracks, &self.outline, &config.shape)
     }
 
     /// Tracks to poses, from the rest pose on.
@@ -205,7 +231,7 @@ pub fn build(
     if hierarchy.clusters.first().is_none_or(|all| all.members.len() < LEAST_MOVING) {
         return None;
     }
-    let skeleton = stand(&hierarchy, outline, config);
+    let skeleton = Arc::new(stand(&hierarchy, outline, config));
     let rest = |row: usize| (table.ids[row], hierarchy::rest_position_px(table, row));
     let first = First { frame, time_s, measure: evidence.measure, moving: evidence.moving.len(), forced };
     Some(Tree {
@@ -217,7 +243,9 @@ pub fn build(
         names: skeleton.nodes.len() as u32,
         kept: 0,
         inherited: BTreeMap::new(),
-        skeleton: Arc::new(skeleton),
+        plain: skeleton.clone(),
+        skeleton,
+        shoots: Vec::new(),
         outline: outline.clone(),
         followed_from,
         frame,

@@ -24,7 +24,24 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("signal", &[]),
     // The seeded chance that twigs and leaves have too.
     ("animate", &["model", "config", "signal", "shape::Chance"]),
-    ("pipeline", &["model", "config", "outline", "track", "hierarchy", "skeleton", "shape", "motion", "signal"]),
+    // Branches that only their own sway tells.
+    (
+        "pipeline",
+        &[
+            "model",
+            "config",
+            "outline",
+            "track",
+            "hierarchy",
+            "skeleton",
+            "shape",
+            "motion",
+            "signal",
+            "dynamics::shoots",
+            "dynamics::Film",
+            "dynamics::FilmTrack",
+        ],
+    ),
     ("recording", &["model"]),
     // What is drawn.
     ("draw", &["model", "shape::Mesh", "shape::Foliage", "shape::FoliageGroup"]),

@@ -353,10 +353,10 @@ fn a_stop_right_after_a_refinement_is_written_by_the_tree_from_before_and_a_plan
         let (summary, failure, _) = ended(running);
         assert!(failure.is_none(), "{failure:?}");
         let tree = summary.expect("a summary").tree.expect("a tree");
-        assert_eq!(tree.refinements, u32::from(planned));
+        assert_eq!(tree.refinements > 0, planned, "{} refinements", tree.refinements);
         let capture: serde_json::Value =
             serde_json::from_slice(&std::fs::read(out.join("capture.json")).expect("capture.json")).expect("json");
-        assert_eq!(capture["refinement"]["count"].as_u64(), planned.then_some(1));
+        assert_eq!(capture["refinement"]["count"].as_u64(), planned.then_some(tree.refinements.into()));
         let certainty = tree.hierarchy.median_certainty().map(|c| format!("{c:.6}"));
         assert_eq!(capture["quality"]["median_certainty"].as_f64().map(|c| format!("{c:.6}")), certainty);
         let nodes = std::fs::read_to_string(out.join("nodes.csv")).expect("nodes.csv");

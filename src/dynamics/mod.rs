@@ -27,6 +27,7 @@ mod wind;
 pub use angle::{AngleToParent, angle_in_space_deg, angle_to_parent_deg};
 pub use decay::{Mode, Start};
 pub use film::{Film, FilmLog, FilmTrack};
+pub use modal::{Shoot, shoots};
 pub use release::Onset;
 pub use spectrum::{Spectrum, spectrum};
 pub use sway::{Analysis, LEAST_PERIODS, analyse, analyse_soon, analyse_with};

@@ -1,6 +1,6 @@
 //! The tree once more, from what has been seen since: who is who, and whether it is better.
 
-use super::{Moment, Tree, build, thicken};
+use super::{Moment, Shoot, Tree, build, shoots, thicken};
 use crate::config::Config;
 use crate::hierarchy::{self, Gain, OnBoth};
 use crate::model::{MotionHierarchy, NodeId, NodeName, Skeleton, TrackId};
@@ -22,7 +22,7 @@ const ERRORS: f64 = 2.0;
 pub struct Refinement {
     table: Arc<TrackTable>,
     standing: Arc<Tree>,
-    /// Every track that the standing tree knows, with its deepest node and its rest place, px.
+    /// Every track that the standing tree knows, with its deepest node that is no shoot and its rest place, px.
     bound: BTreeMap<TrackId, (NodeId, [f64; 2])>,
     config: Config,
     moment: Moment,
@@ -36,7 +36,9 @@ impl Refinement {
         config: &Config,
         moment: Moment,
     ) -> Self {
-        let bound = binding.bound().map(|(id, node, rest_px)| (id, (node, rest_px))).collect();
+        let measured = standing.plain.measured();
+        let carrier = |node: NodeId| node.index().checked_sub(measured).map_or(node, |k| standing.shoots[k].on);
+        let bound = binding.bound().map(|(id, node, rest_px)| (id, (carrier(node), rest_px))).collect();
         Self { table, standing: standing.clone(), bound, config: config.clone(), moment }
     }
 
@@ -51,6 +53,11 @@ impl Refinement {
     /// shown), and if it is not worse than the old one by more than chance. Each of them is held against what both were
     /// built from: on its own evidence any tree looks good.
     pub fn run(&self) -> Option<Tree> {
+        self.run_while(&|| true)
+    }
+
+    /// The same; where `go_on` says no meanwhile, nobody waits for what it gives.
+    pub fn run_while(&self, go_on: &dyn Fn() -> bool) -> Option<Tree> {
         let evidence = hierarchy::evidence(&self.table, &self.config.accumulate);
         let enough = self.config.accumulate.threshold.min(self.standing.evidence.measure);
         let (frame, measure) = (self.moment.frame, evidence.measure);
@@ -64,10 +71,59 @@ impl Refinement {
         let taken = gain >= -ERRORS * error;
         tracing::debug!(frame, measure, before.gain, since.gain, error, taken, "refinement");
         if !taken {
-            return None;
+            return self.with_other_shoots(go_on);
         }
         self.adopt(&mut tree);
+        let binding = tree.binding();
+        let shoots = shoots::told(&self.table, &tree.plain, |id| binding.node_of(id), &self.config.dynamics, go_on);
+        self.shoot(&mut tree, shoots);
         Some(tree)
+    }
+
+    /// The standing tree with the shoots that are told by now, if they are others.
+    fn with_other_shoots(&self, go_on: &dyn Fn() -> bool) -> Option<Tree> {
+        let standing = &*self.standing;
+        let node_of = |id: TrackId| Some(self.bound.get(&id)?.0);
+        let shoots = shoots::told(&self.table, &standing.plain, node_of, &self.config.dynamics, go_on);
+        let points = |all: &[Shoot]| all.iter().map(|s| (s.on, s.members.clone())).collect::<BTreeSet<_>>();
+        if points(&shoots) == points(&standing.shoots) {
+            return None;
+        }
+        let mut tree = standing.clone();
+        let Moment { followed_from, frame, time_s, forced: _ } = self.moment;
+        (tree.followed_from, tree.frame, tree.time_s) = (followed_from, frame, time_s);
+        (tree.refinements, tree.kept) = (standing.refinements + 1, standing.plain.measured());
+        // What came after it was built stays where it was put meanwhile, and off the tree if it was put nowhere.
+        let known = members(&standing.hierarchy, 0);
+        let later = self.bound.iter().filter(|(id, _)| !known.contains(id));
+        tree.inherited = later.map(|(id, on)| (*id, *on)).collect();
+        for (row, id) in self.table.ids.iter().enumerate() {
+            tree.rest_px.entry(*id).or_insert_with(|| hierarchy::rest_position_px(&self.table, row));
+        }
+        self.shoot(&mut tree, shoots);
+        Some(tree)
+    }
+
+    /// Puts `shoots` on `tree`. Those that the standing tree has on the same branch keep their names and ends, and its tips that fork
+    /// their forks; on another branch, or as what a tip goes on as, one would jump.
+    fn shoot(&self, tree: &mut Tree, mut shoots: Vec<Shoot>) {
+        let standing = &*self.standing;
+        let points = |all: &[Shoot]| all.iter().map(|s| s.members.clone()).collect::<Vec<_>>();
+        let before = hierarchy::persisting(&points(&standing.shoots), &points(&shoots));
+        for (shoot, before) in shoots.iter_mut().zip(before) {
+            let (on, goes_on) = (tree.plain.name_of(shoot.on), shoot.end_px.is_none());
+            let same = |s: &&Shoot| standing.plain.name_of(s.on) == on;
+            let forked = standing.shoots.iter().filter(same).map(|s| s.fork).find(|f| *f < 1.0);
+            shoot.fork = forked.filter(|_| shoot.fork < 1.0).unwrap_or(shoot.fork);
+            match before.map(|i| &standing.shoots[i]).filter(same).filter(|b| b.end_px.is_none() == goes_on) {
+                Some(before) => (shoot.name, shoot.end_px) = (before.name, before.end_px),
+                None => {
+                    shoot.name = NodeName(tree.names);
+                    tree.names += 1;
+                }
+            }
+        }
+        tree.shoot(shoots, &self.config);
     }
 
     /// How much better `new` is borne out by the motion in `table`, by the points that both trees know.
@@ -75,7 +131,7 @@ impl Refinement {
         let known = members(&new.hierarchy, 0);
         let on_both = |(row, id): (usize, &TrackId)| {
             let (node, _) = self.bound.get(id).filter(|_| known.contains(id))?;
-            Some(OnBoth { row, old: upwards(&self.standing.skeleton, *node), new: chain_of(new, *id) })
+            Some(OnBoth { row, old: upwards(&self.standing.plain, *node), new: chain_of(new, *id) })
         };
         let points: Vec<OnBoth> = table.ids.iter().enumerate().filter_map(on_both).collect();
         hierarchy::gain(table, &points)
@@ -83,9 +139,9 @@ impl Refinement {
 
     /// Names, places and lost tracks go over from the standing tree.
     fn adopt(&self, tree: &mut Tree) {
-        let old = &self.standing.skeleton;
+        let old = &self.standing.plain;
         let measured = self.measured_twins(tree);
-        let anew = on_foot((*tree.skeleton).clone(), old.foot_px);
+        let anew = on_foot((*tree.plain).clone(), old.foot_px);
         let twins = twins(&anew, old, &measured);
         let (flat, tracks) = tree.flat_on(old.foot_px, &self.config);
         let prototype = Prototype::of(&flat, &tracks, &tree.outline, &self.config.shape);
@@ -102,13 +158,14 @@ impl Refinement {
         tree.names = names;
         tree.kept = measured.iter().flatten().count();
         tree.inherited = self.inherited(tree, &measured);
-        tree.skeleton = Arc::new(skeleton);
+        tree.plain = Arc::new(skeleton);
+        tree.skeleton = tree.plain.clone();
         (tree.first, tree.refinements) = (self.standing.first, self.standing.refinements + 1);
     }
 
     /// The twin of every measured node: foot and trunk go on in any case, the others as most of their points do.
     fn measured_twins(&self, tree: &Tree) -> Vec<Option<Twin>> {
-        let skeleton = &self.standing.skeleton;
+        let skeleton = &self.standing.plain;
         let mut old: Vec<Vec<TrackId>> = vec![Vec::new(); skeleton.measured()];
         for (id, (node, _)) in &self.bound {
             upwards(skeleton, *node).into_iter().for_each(|n| old[n as usize].push(*id));
@@ -147,7 +204,7 @@ impl Refinement {
     /// Tracks that the new tree was not built from, on the branch that theirs has become or grows from: lost ones, whose
     /// frames keep their rows, and young ones.
     fn inherited(&self, tree: &Tree, measured: &[Option<Twin>]) -> BTreeMap<TrackId, (NodeId, [f64; 2])> {
-        let old = &self.standing.skeleton;
+        let old = &self.standing.plain;
         let mut goes_on = vec![None; old.measured()];
         for (k, twin) in measured.iter().enumerate() {
             if let Some(twin) = twin {

@@ -137,6 +137,8 @@ impl ModelThread {
             self.shared.pulse.done(Worker::Model);
         }
         let swaying = self.sway.as_mut().map(SwayWatch::end);
+        // No frame is left that could need what is under way.
+        self.refining = Refining::default();
         self.back.finish();
         self.announce();
         // Shown while the capture is written.

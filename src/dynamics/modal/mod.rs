@@ -4,12 +4,13 @@
 //! misleads what is below. Here all points and all modes have their say at once: a point has the modes of the branch that
 //! it is on and of those that carry it, and no others; modes are fitted together, points may go to another branch, branches come off others,
 //! as long as what the film shows becomes likelier by more than what it costs. What comes out answers for the captured branches that
-//! have mostly the same points, and had no answer.
+//! have mostly the same points, and had no answer; and it tells branches that were captured as one with another ([`shoots`]).
 
 mod moves;
 mod read;
 mod refit;
 mod search;
+mod shoots;
 mod tree;
 
 use super::decay::Mode;
@@ -20,6 +21,7 @@ use super::release::Onset;
 use crate::model::{Excitation, NodeId, Skeleton, Sway, Swaying, Unidentified};
 use read::Reading;
 use search::LEAST;
+pub use shoots::{Shoot, shoots};
 use tree::{Branch, Decay, Point, Tree};
 
 /// Frames a second that are enough: neighbours are taken together as their mean.
@@ -35,10 +37,13 @@ const BELOW_NYQUIST: f64 = 0.9;
 /// Damping of a branch whose own is not known.
 const DAMPING: f64 = 0.05;
 const LEAST_NOISE_PX: f64 = 0.03;
-/// A mode is clear if the points gain so much by it, its frequency is known to this standard deviation of the logarithm, and
-/// it is damped less than this.
-const CLEAR: f64 = 40.0;
-const SURE: f64 = 0.0025;
+/// A mode is clear if its points gain so much by it, each (but for a quarter of them) and together; if its frequency is known to
+/// this standard deviation of the logarithm, and changes by less than this one where some of the points are left out; and if it is
+/// damped less than this.
+const CLEAR: f64 = 25.0;
+const CLEAR_TOGETHER: f64 = 120.0;
+const SURE: f64 = 0.009;
+const ALIKE: f64 = 0.0045;
 const HARDLY: f64 = 0.15;
 /// It is a captured branch's own if it is in so much of its points, and so much of the points that have it are on that.
 const OF_BRANCH: f64 = 0.75;
@@ -66,7 +71,7 @@ pub(super) fn answer(
     if !sways.get(1).is_some_and(Result::is_ok) || !sways.iter().any(open) {
         return;
     }
-    let Some((readings, on)) = told(skeleton, film, onset, demands, sways, go_on) else {
+    let Some(told) = told(skeleton, film, onset, demands, sways, go_on) else {
         if !go_on() {
             sways.iter_mut().filter(|s| open(s)).for_each(|s| *s = Err(Unidentified::NotInTime));
         }
@@ -81,20 +86,42 @@ pub(super) fn answer(
             .filter_map(|a| sways[a.index()].as_ref().ok().map(|s| s.frequency_hz.value))
             .collect();
         let fits = |r: &&Reading| {
-            let both = r.points.iter().filter(|p| on[b].binary_search(p).is_ok()).count() as f64;
-            let either = (r.points.len() + on[b].len()) as f64 - both;
-            let own = both >= OF_BRANCH * on[b].len() as f64 && both >= OF_MODE * r.points.len() as f64;
             let new = above.iter().all(|f| (f / r.mode.frequency_hz).ln().abs() >= ONE);
-            (own && new && both >= LEAST as f64).then_some(both / either)
+            told.alike(b, r).filter(|_| new)
         };
-        let best = readings.iter().filter_map(|r| Some((fits(&r)?, r))).max_by(|a, b| a.0.total_cmp(&b.0));
+        let best = told.readings.iter().filter_map(|r| Some((fits(&r)?, r))).max_by(|a, b| a.0.total_cmp(&b.0));
         if let Some(sway) = best.and_then(|(_, r)| sway(r, demands)) {
             sways[b] = Ok(sway);
         }
     }
 }
 
-/// The branches that can be told, and the points on every captured branch and on what it carries, in order.
+/// What the points say of all branches at once.
+struct Told {
+    /// The branches that can be told.
+    readings: Vec<Reading>,
+    /// The points on every captured branch and on what it carries, in order.
+    on: Vec<Vec<usize>>,
+    /// Of every point: the captured branch that it is on, and its track of the film.
+    branch_of: Vec<usize>,
+    tracks: Vec<usize>,
+}
+
+impl Told {
+    /// Points of a reading that are on captured branch `b`.
+    fn both(&self, b: usize, reading: &Reading) -> usize {
+        reading.points.iter().filter(|p| self.on[b].binary_search(p).is_ok()).count()
+    }
+
+    /// How alike the points of a reading and those of captured branch `b` are, 0 to 1, if they are of one branch.
+    fn alike(&self, b: usize, reading: &Reading) -> Option<f64> {
+        let both = self.both(b, reading);
+        let (here, there) = (self.on[b].len() as f64, reading.points.len() as f64);
+        let share = both as f64;
+        (both >= LEAST && share >= OF_BRANCH * here && share >= OF_MODE * there).then(|| share / (here + there - share))
+    }
+}
+
 fn told(
     skeleton: &Skeleton,
     film: &Film,
@@ -102,8 +129,8 @@ fn told(
     demands: &Demands,
     sways: &[Swaying],
     go_on: &dyn Fn() -> bool,
-) -> Option<(Vec<Reading>, Vec<Vec<usize>>)> {
-    let (times_s, points, branch_of) = thinned(film, onset);
+) -> Option<Told> {
+    let (times_s, points, tracks) = thinned(film, onset);
     let span_s = times_s.last().zip(times_s.first()).map_or(0.0, |(b, a)| b - a);
     if points.len() < LEAST || span_s <= 0.0 {
         return None;
@@ -114,18 +141,22 @@ fn told(
         return None;
     }
     let decay = Decay::new(times_s, onset.start, frequencies_hz, points);
-    let captured = captured(skeleton, sways, &decay, branch_of);
+    let branch_of: Vec<usize> = tracks.iter().map(|&k| film.tracks[k].node.index()).collect();
+    let captured = captured(skeleton, sways, &decay, branch_of.clone());
     let on: Vec<Vec<usize>> = (0..sways.len()).map(|b| captured.all(b)).collect();
     let tree = captured.grown(go_on)?;
     let clear = |r: &Reading| {
         r.gain >= CLEAR
+            && r.gain * r.points.len() as f64 >= CLEAR_TOGETHER
             && r.sd[0] <= SURE
+            && r.spread <= ALIKE
             && r.mode.damping <= HARDLY
             && r.mode.frequency_hz * span_s > LEAST_PERIODS
             // Films of few frames a second show a fast sway as a slow one.
             && 1.0 / film.step_s() - r.mode.frequency_hz > demands.highest_hz
     };
-    Some((tree.readings().into_iter().filter(clear).collect(), on))
+    let readings = tree.readings().into_iter().filter(clear).collect();
+    Some(Told { readings, on, branch_of, tracks })
 }
 
 fn sway(reading: &Reading, demands: &Demands) -> Option<Sway> {
@@ -160,7 +191,7 @@ fn captured<'a>(skeleton: &Skeleton, sways: &[Swaying], decay: &'a Decay, branch
     tree
 }
 
-/// Times from the release on, s, the points that were seen nearly always, and the branches that they are on. Neighbouring frames are
+/// Times from the release on, s, the points that were seen nearly always, and which tracks they are. Neighbouring frames are
 /// taken together, and short gaps bridged by straight lines: to tell whose a mode is.
 fn thinned(film: &Film, onset: &Onset) -> (Vec<f64>, Vec<Point>, Vec<usize>) {
     let together = ((1.0 / (ENOUGH_HZ * film.step_s()) + 0.01) as usize).max(1);
@@ -169,8 +200,8 @@ fn thinned(film: &Film, onset: &Onset) -> (Vec<f64>, Vec<Point>, Vec<usize>) {
         (onset.from..until).step_by(together).map(|k| k..k + together).filter(|rows| rows.end <= until).collect();
     let mean = |rows: &std::ops::Range<usize>| film.times_s[rows.clone()].iter().sum::<f64>() / rows.len() as f64;
     let times_s: Vec<f64> = rows.iter().map(|r| mean(r) - onset.at_s).collect();
-    let (mut points, mut branch_of) = (Vec::new(), Vec::new());
-    for track in &film.tracks {
+    let (mut points, mut tracks) = (Vec::new(), Vec::new());
+    for (k, track) in film.tracks.iter().enumerate() {
         let at: Vec<[f64; 2]> = rows
             .iter()
             .map(|r| {
@@ -183,9 +214,9 @@ fn thinned(film: &Film, onset: &Onset) -> (Vec<f64>, Vec<Point>, Vec<usize>) {
             .collect();
         let Some(values) = bridged(&times_s, &at) else { continue };
         points.push(Point::new(values, mean_px(&at), LEAST_NOISE_PX));
-        branch_of.push(track.node.index());
+        tracks.push(k);
     }
-    (times_s, points, branch_of)
+    (times_s, points, tracks)
 }
 
 /// Displacement from the mean, px; nothing for a point that was seen too little.
@@ -283,12 +314,11 @@ mod tests {
             return Vec::new();
         };
         let sways = free::sways(skeleton, &film, &members, &onset, &demands, &|| true);
-        let Some((readings, on)) = told(skeleton, &film, &onset, &demands, &sways, &|| true) else {
+        let Some(told) = told(skeleton, &film, &onset, &demands, &sways, &|| true) else {
             return Vec::new();
         };
-        let own = readings.into_iter().filter(|r| r.points.len() < on[2].len());
-        // Every track of these films is a point.
-        let mut groups: Vec<Vec<usize>> = own.map(|r| r.points).collect();
+        let own = told.readings.iter().filter(|r| r.points.len() < told.on[2].len());
+        let mut groups: Vec<Vec<usize>> = own.map(|r| r.points.iter().map(|&p| told.tracks[p]).collect()).collect();
         groups.sort();
         groups
     }
@@ -310,6 +340,30 @@ mod tests {
     fn one_branch_is_not_cut_whatever_its_lever_arms() {
         assert_eq!(found(&[(1.12, &[2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 2.5, 4.5, 6.5])]), Vec::<Vec<usize>>::new());
         assert_eq!(found(&[(1.12, &[0.0; 10])]), Vec::<Vec<usize>>::new(), "noise on the trunk's sway");
+    }
+
+    fn shot(branches: &[(f64, &[f64])]) -> Vec<Vec<usize>> {
+        let (skeleton, film) = filmed(branches);
+        let shoots = shoots(&skeleton, &film, &Dynamics::default(), &|| true);
+        assert!(shoots.iter().all(|s| s.on == NodeId(2)), "{shoots:?}");
+        let mut groups: Vec<Vec<usize>> = shoots.into_iter().map(|s| s.tracks).collect();
+        groups.sort();
+        groups
+    }
+
+    /// Whoever films wants the frequency of each, and a tip that has both cannot have it.
+    #[test]
+    fn branches_that_only_their_modes_tell_are_shoots_of_their_tip() {
+        let two: &[(f64, &[f64])] = &[(1.10, &[4.0, 5.0, 3.5, 4.5, 5.5]), (1.15, &[3.0, 4.0, 5.0, 3.5, 4.5, 4.0])];
+        assert_eq!(shot(two), [vec![8, 9, 10, 11, 12], vec![13, 14, 15, 16, 17, 18]]);
+    }
+
+    #[test]
+    fn a_tip_that_is_one_branch_has_no_shoots_and_four_points_are_none() {
+        assert_eq!(shot(&[(1.12, &[2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 2.5, 4.5, 6.5])]), Vec::<Vec<usize>>::new());
+        assert_eq!(shot(&[(1.12, &[0.0; 10])]), Vec::<Vec<usize>>::new(), "noise on the trunk's sway");
+        let small = shot(&[(1.10, &[4.0, 5.0, 3.5, 4.5, 5.5, 5.0, 4.0]), (1.6, &[3.0, 4.0, 5.0, 4.0])]);
+        assert!(small.iter().flatten().all(|k| *k < 15), "{small:?}");
     }
 
     /// Three points might be of three branches.

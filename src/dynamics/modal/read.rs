@@ -12,12 +12,17 @@ const HAS: f64 = 10.0;
 /// Points that have a mode are of one branch if it moves them as one swing, and begin with those that go one way, by the cosine.
 const ONE_SWING: f64 = 0.95;
 const ONE_WAY: f64 = 0.8;
+/// Parts of the points that are left out in turn to see whether they agree, and rounds of each fit.
+const PARTS: usize = 4;
+const FITS: usize = 8;
 
 /// A mode and the points that it moves as one swing.
 pub(super) struct Reading {
     pub mode: Mode,
     /// Standard deviations of the logarithms of frequency and damping, by the curvature alone.
     pub sd: [f64; 2],
+    /// Standard deviation of the logarithm of the frequency as the points themselves have it: where some are left out.
+    pub spread: f64,
     /// In order.
     pub points: Vec<usize>,
     /// What the quarter of them that gains least by the mode gains at most.
@@ -49,15 +54,35 @@ impl Tree<'_> {
             gains.sort_unstable_by(f64::total_cmp);
             let all: Vec<&Share> = shares.iter().collect();
             let (arms, factors) = swing_of(self, &all, base_px);
+            let points: Vec<usize> = shares.iter().map(|s| s.point).collect();
             Some(Reading {
                 mode,
                 sd: [deviations[2 * k], deviations[2 * k + 1]],
-                points: shares.iter().map(|s| s.point).collect(),
+                spread: self.spread(branch, &points),
+                points,
                 gain: gains[gains.len() / 4],
                 amplitude_deg: arms.amplitude_deg(&factors, 0),
             })
         };
         of.iter().enumerate().filter_map(reading).collect()
+    }
+
+    /// Standard deviation of the logarithm of a branch's frequency by the jackknife: fitted anew without each part of its `points`
+    /// in turn. Points of two branches that lie close together in frequency have a mode in common that is neither's, and without
+    /// some of either's it changes.
+    fn spread(&self, branch: usize, points: &[usize]) -> f64 {
+        let within = self.within(branch);
+        let without = |part: usize| {
+            let mut other = self.clone();
+            // The foot has no mode.
+            points.iter().skip(part).step_by(PARTS).for_each(|&p| other.branch_of[p] = 0);
+            other.refit(&[branch], &within, FITS);
+            other.branches[branch].mode.map_or(f64::NAN, |m| m.frequency_hz.ln())
+        };
+        let fitted: Vec<f64> = (0..PARTS).map(without).collect();
+        let n = PARTS as f64;
+        let mean = fitted.iter().sum::<f64>() / n;
+        ((n - 1.0) / n * fitted.iter().map(|f| (f - mean).powi(2)).sum::<f64>()).sqrt()
     }
 
     /// The points that have the mode of `branch`, in order.
