@@ -13,6 +13,10 @@ use std::time::Instant;
 
 fn main() {
     let dir = std::env::args().skip(1).find(|a| !a.starts_with('-'));
+    if let Some(Err(e)) = dir.as_ref().map(std::fs::create_dir_all) {
+        println!("{}: {e}", dir.unwrap_or_default());
+        return;
+    }
     // Even times and no gaps: the other side needs them.
     let filming = Filming { seconds: 30.0, jitter: 0.0, lost: 0.0, gaps: 0.0, ..Filming::default() };
     for (name, drive) in [("release", Drive::Release(0.5)), ("decay", Drive::Decay), ("wind", Drive::Wind)] {
