@@ -3,6 +3,7 @@
 use crate::model::{NodeId, Skeleton, TrackId, TrackSet};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// One followed point.
@@ -51,6 +52,24 @@ impl Film {
         }
         let short = |t: &FilmTrack| FilmTrack { node: t.node, at_px: t.at_px[..to].to_vec() };
         Cow::Owned(Self { times_s: self.times_s[..to].to_vec(), tracks: self.tracks.iter().map(short).collect() })
+    }
+
+    /// Some of the frames by `every` neighbours; those between which frames are missing are not put together.
+    pub(super) fn neighbours(&self, frames: Range<usize>, every: usize) -> Vec<Vec<usize>> {
+        let within_s = (every as f64 - 0.5) * self.step_s();
+        let mut out: Vec<Vec<usize>> = Vec::with_capacity(frames.len() / every + 1);
+        for k in frames {
+            match out.last_mut() {
+                Some(last) if last.len() < every && self.times_s[k] - self.times_s[last[0]] < within_s => last.push(k),
+                _ => out.push(vec![k]),
+            }
+        }
+        out
+    }
+
+    /// Mean time of some frames, s.
+    pub(super) fn mean_s(&self, frames: &[usize]) -> f64 {
+        frames.iter().map(|&k| self.times_s[k]).sum::<f64>() / frames.len() as f64
     }
 
     /// Time that three quarters of the frames are not farther apart than, s; infinite for less than two frames.

@@ -43,7 +43,7 @@ const ONE: f64 = 0.01;
 /// Points that a branch must have: two or three agree by chance.
 const LEAST_POINTS: usize = 4;
 /// Periods that must have been seen: of fewer, branches that lie close together in frequency look like one.
-const LEAST_PERIODS: f64 = 3.0;
+pub(super) const LEAST_PERIODS: f64 = 3.0;
 /// Damping above which an oscillation is none that could be seen.
 const HARDLY: f64 = 0.2;
 /// Motion that is taken for noise, px.

@@ -13,7 +13,7 @@ use std::borrow::Cow;
 /// Fewer frames than this say nothing.
 const LEAST_FRAMES: usize = 32;
 /// Share of half the rate of the frames up to which frequencies are looked for.
-const BELOW_NYQUIST: f64 = 0.9;
+pub(super) const BELOW_NYQUIST: f64 = 0.9;
 /// Periods that a film must have of the lowest frequency that is looked for in it.
 pub const LEAST_PERIODS: f64 = 1.5;
 

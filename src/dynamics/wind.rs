@@ -143,13 +143,12 @@ fn branch(
     let at_rate = |hz: f64| ((1.0 / film.step_s()) / hz).round().max(1.0) as usize;
     let fine = at_rate(FRAMES_PER_PERIOD * demands.highest_hz);
     let every = if film.times_s.len() / fine > LONG { at_rate(LONG_HZ).max(fine) } else { fine };
-    let mut frames = neighbours(&film.times_s, every, film.step_s());
+    let mut frames = film.neighbours(0..film.times_s.len(), every);
     frames.retain(|of| enough(points, of) && enough(carrier, of));
     if frames.len() < LEAST_FRAMES {
         return Err(Unidentified::TooShort);
     }
-    let times_s: Vec<f64> =
-        frames.iter().map(|of| of.iter().map(|&k| film.times_s[k]).sum::<f64>() / of.len() as f64).collect();
+    let times_s: Vec<f64> = frames.iter().map(|of| film.mean_s(of)).collect();
     let (common, carried) = (Common::of(points, &frames), Common::of(carrier, &frames));
     let of_carrier = principal(&carried.signals);
     let clear = of_carrier.ways.iter().zip(&of_carrier.variances).filter(|(_, v)| **v > CLEAR * carried.noise);
@@ -237,18 +236,4 @@ fn order(found: &[Oscillator], trunk: bool) -> Vec<usize> {
         order.sort_by(|a, b| found[*a].mode.frequency_hz.total_cmp(&found[*b].mode.frequency_hz));
     }
     order
-}
-
-/// Frames by `every` neighbours; those between which frames are missing are not put together.
-fn neighbours(times_s: &[f64], every: usize, step_s: f64) -> Vec<Vec<usize>> {
-    let mut out: Vec<Vec<usize>> = Vec::with_capacity(times_s.len() / every + 1);
-    for k in 0..times_s.len() {
-        match out.last_mut() {
-            Some(last) if last.len() < every && times_s[k] - times_s[last[0]] < (every as f64 - 0.5) * step_s => {
-                last.push(k)
-            }
-            _ => out.push(vec![k]),
-        }
-    }
-    out
 }

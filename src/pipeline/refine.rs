@@ -104,8 +104,8 @@ impl Refinement {
         Some(tree)
     }
 
-    /// Puts `shoots` on `tree`. Those that the standing tree has on the same branch keep their names and ends, and its tips that fork
-    /// their forks; on another branch, or as what a tip goes on as, one would jump.
+    /// Puts `shoots` on `tree`. Those that the standing tree has on the same branch keep their names and ends, and its tips
+    /// that fork their forks; on another branch, or as what a tip goes on as, one would jump.
     fn shoot(&self, tree: &mut Tree, mut shoots: Vec<Shoot>) {
         let standing = &*self.standing;
         let points = |all: &[Shoot]| all.iter().map(|s| s.members.clone()).collect::<Vec<_>>();

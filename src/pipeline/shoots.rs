@@ -30,7 +30,8 @@ pub struct Shoot {
     /// Ordered by id.
     pub members: Vec<TrackId>,
     pub name: NodeName,
-    /// Where it ends, px. `None` for what a tip goes on as beyond its fork, with the points that are left: it ends where the tip did.
+    /// Where it ends, px. `None` for what a tip goes on as beyond its fork, with the points that are left: it ends where the
+    /// tip did.
     pub end_px: Option<[f64; 2]>,
 }
 

@@ -2,9 +2,10 @@
 //!
 //! Going down the tree one branch at a time (free.rs) takes the captured tree as it is, and a mode that is told wrongly
 //! misleads what is below. Here all points and all modes have their say at once: a point has the modes of the branch that
-//! it is on and of those that carry it, and no others; modes are fitted together, points may go to another branch, branches come off others,
-//! as long as what the film shows becomes likelier by more than what it costs. What comes out answers for the captured branches that
-//! have mostly the same points, and had no answer; and it tells branches that were captured as one with another ([`shoots`]).
+//! it is on and of those that carry it, and no others; modes are fitted together, points may go to another branch,
+//! branches come off others, as long as what the film shows becomes likelier by more than what it costs. What comes out
+//! answers for the captured branches that have mostly the same points, and had no answer; and it tells branches that were
+//! captured as one with another ([`shoots`]).
 
 mod moves;
 mod read;
@@ -15,9 +16,10 @@ mod tree;
 
 use super::decay::Mode;
 use super::film::Film;
-use super::free::{Demands, Z, interval};
+use super::free::{Demands, LEAST_PERIODS, Z, interval};
 use super::members::{is_seen, mean_px};
 use super::release::Onset;
+use super::sway::BELOW_NYQUIST;
 use crate::model::{Excitation, NodeId, Skeleton, Sway, Swaying, Unidentified};
 use read::Reading;
 use search::LEAST;
@@ -30,16 +32,12 @@ const ENOUGH_HZ: f64 = 15.0;
 const ENOUGH_S: f64 = 20.0;
 /// A point must have been seen in this share of the frames.
 const SEEN: f64 = 0.8;
-/// Periods that must have been seen.
-const LEAST_PERIODS: f64 = 3.0;
-/// Share of half the rate up to which frequencies are looked for.
-const BELOW_NYQUIST: f64 = 0.9;
 /// Damping of a branch whose own is not known.
 const DAMPING: f64 = 0.05;
 const LEAST_NOISE_PX: f64 = 0.03;
-/// A mode is clear if its points gain so much by it, each (but for a quarter of them) and together; if its frequency is known to
-/// this standard deviation of the logarithm, and changes by less than this one where some of the points are left out; and if it is
-/// damped less than this.
+/// A mode is clear if its points gain so much by it, each (but for a quarter of them) and together; if its frequency is
+/// known to this standard deviation of the logarithm, and changes by less than this one where some of the points are left
+/// out; and if it is damped less than this.
 const CLEAR: f64 = 25.0;
 const CLEAR_TOGETHER: f64 = 120.0;
 const SURE: f64 = 0.009;
@@ -67,8 +65,7 @@ pub(super) fn answer(
     let open = |sway: &Swaying| {
         matches!(sway, Err(Unidentified::NoOscillation | Unidentified::AncestorsSway | Unidentified::TooUncertain))
     };
-    // All points have the trunk's sway: without it nothing is sure.
-    if !sways.get(1).is_some_and(Result::is_ok) || !sways.iter().any(open) {
+    if !sways.iter().any(open) {
         return;
     }
     let Some(told) = told(skeleton, film, onset, demands, sways, go_on) else {
@@ -122,6 +119,7 @@ impl Told {
     }
 }
 
+/// `None` where too little is seen, or `go_on` says no before.
 fn told(
     skeleton: &Skeleton,
     film: &Film,
@@ -130,6 +128,10 @@ fn told(
     sways: &[Swaying],
     go_on: &dyn Fn() -> bool,
 ) -> Option<Told> {
+    // All points have the trunk's sway: without it nothing is sure.
+    if !sways.get(1).is_some_and(Result::is_ok) {
+        return None;
+    }
     let (times_s, points, tracks) = thinned(film, onset);
     let span_s = times_s.last().zip(times_s.first()).map_or(0.0, |(b, a)| b - a);
     if points.len() < LEAST || span_s <= 0.0 {
@@ -196,22 +198,16 @@ fn captured<'a>(skeleton: &Skeleton, sways: &[Swaying], decay: &'a Decay, branch
 fn thinned(film: &Film, onset: &Onset) -> (Vec<f64>, Vec<Point>, Vec<usize>) {
     let together = ((1.0 / (ENOUGH_HZ * film.step_s()) + 0.01) as usize).max(1);
     let until = film.times_s.partition_point(|t| *t <= onset.at_s + ENOUGH_S);
-    let rows: Vec<std::ops::Range<usize>> =
-        (onset.from..until).step_by(together).map(|k| k..k + together).filter(|rows| rows.end <= until).collect();
-    let mean = |rows: &std::ops::Range<usize>| film.times_s[rows.clone()].iter().sum::<f64>() / rows.len() as f64;
-    let times_s: Vec<f64> = rows.iter().map(|r| mean(r) - onset.at_s).collect();
+    let mut rows = film.neighbours(onset.from..until, together);
+    rows.retain(|row| row.len() == together);
+    let times_s: Vec<f64> = rows.iter().map(|row| film.mean_s(row) - onset.at_s).collect();
     let (mut points, mut tracks) = (Vec::new(), Vec::new());
     for (k, track) in film.tracks.iter().enumerate() {
-        let at: Vec<[f64; 2]> = rows
-            .iter()
-            .map(|r| {
-                if track.at_px[r.clone()].iter().all(is_seen) {
-                    mean_px(&track.at_px[r.clone()])
-                } else {
-                    [f64::NAN; 2]
-                }
-            })
-            .collect();
+        let mean = |row: &Vec<usize>| {
+            let at: Vec<[f64; 2]> = row.iter().map(|&k| track.at_px[k]).collect();
+            if at.iter().all(is_seen) { mean_px(&at) } else { [f64::NAN; 2] }
+        };
+        let at: Vec<[f64; 2]> = rows.iter().map(mean).collect();
         let Some(values) = bridged(&times_s, &at) else { continue };
         points.push(Point::new(values, mean_px(&at), LEAST_NOISE_PX));
         tracks.push(k);

@@ -132,7 +132,8 @@ impl Tree<'_> {
         Normal { hessian, gradient }
     }
 
-    /// How the columns of the modes of the branches `of` that are `free` change with their parameters, and what that does to some points.
+    /// How the columns of the modes of the branches `of` that are `free` change with their parameters, and what that does to
+    /// some points.
     fn slopes(&self, of: &[usize], free: &[usize], points: &[usize], weights: &[f64]) -> Vec<Slope> {
         let mut columns = vec![vec![1.0; self.decay.times_s.len()]];
         let mut raw: Vec<(usize, usize, Vec<f64>)> = Vec::new();
@@ -195,8 +196,8 @@ mod tests {
     use super::*;
     use crate::dynamics::Start;
 
-    /// A trunk and a branch on it, 0.70 and 0.76 Hz: less than a bin of these 10 s apart. Fitted one after the other the first takes
-    /// part of the second.
+    /// A trunk and a branch on it, 0.70 and 0.76 Hz: less than a bin of these 10 s apart. Fitted one after the other the
+    /// first takes part of the second.
     #[test]
     fn modes_that_lie_close_together_are_fitted_together() {
         let times_s: Vec<f64> = (0..150).map(|k| f64::from(k) / 15.0).collect();

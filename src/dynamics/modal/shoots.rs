@@ -31,10 +31,6 @@ pub fn shoots(skeleton: &Skeleton, film: &Film, config: &Dynamics, go_on: &dyn F
         return Vec::new();
     }
     let sways = free::sways(skeleton, &film, &members, &onset, &demands, go_on);
-    // All points have the trunk's sway: without it nothing is sure.
-    if !sways.get(1).is_some_and(Result::is_ok) {
-        return Vec::new();
-    }
     let Some(mut told) = told(skeleton, &film, &onset, &demands, &sways, go_on) else { return Vec::new() };
     let mut readings = std::mem::take(&mut told.readings);
     let clearness = |r: &Reading| r.gain * r.points.len() as f64;

@@ -12,8 +12,8 @@ pub(super) const PER_MODE: f64 = 30.0;
 /// Damping of branches: median, and standard deviation of the logarithm.
 const USUAL_DAMPING: f64 = 0.05;
 const DAMPING_SD: f64 = 0.8;
-/// What it costs a point to be farther from the others of a branch than is usual: per square of the distance, and at most; and where
-/// there are no others.
+/// What it costs a point to be farther from the others of a branch than is usual: per square of the distance, and at most;
+/// and where there are no others.
 const FAR: f64 = 4.0;
 const FARTHEST: f64 = 9.0;
 const ALONE: f64 = 200.0;
