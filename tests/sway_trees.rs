@@ -109,6 +109,15 @@ fn release_from_rest() {
     found.holds(0.85, 0.7, [0.002, 0.05], [0.88, 0.88]);
 }
 
+/// Pulled again while it still sways a little: the second pull is no wind, and no part of the first decay.
+#[test]
+fn released_twice_in_a_film() {
+    let filming = Filming { seconds: 40.0, ..Filming::default() };
+    let twice = run(0..20, Drive::Twice([1.0, 25.0]), &filming);
+    twice.print("pulled and let go twice, 40 s");
+    twice.holds(0.95, 0.7, [0.002, 0.05], [0.88, 0.88]);
+}
+
 #[test]
 fn release_before_the_film() {
     let found = run(100..140, Drive::Decay, &Filming::default());

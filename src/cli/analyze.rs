@@ -140,7 +140,7 @@ fn analysed(args: &AnalyzeArgs, captured: &Captured, name: &str) -> Result<Analy
     });
     progress.end();
     let given = dynamics.excitation != Excited::Auto;
-    hints(&film, analysis.onset, given).into_iter().for_each(|what| tell("note", what));
+    hints(&film, &analysis, given).into_iter().for_each(|what| tell("note", what));
     let mut poses = Vec::new();
     let all = captured.film().map(|film| {
         film.filter(|p| p.as_ref().map_or(true, |p| from_s <= p.time_s && p.time_s <= to_s)).try_for_each(|pose| {

@@ -50,8 +50,13 @@ impl Film {
         if to >= self.times_s.len() {
             return Cow::Borrowed(self);
         }
-        let short = |t: &FilmTrack| FilmTrack { node: t.node, at_px: t.at_px[..to].to_vec() };
-        Cow::Owned(Self { times_s: self.times_s[..to].to_vec(), tracks: self.tracks.iter().map(short).collect() })
+        Cow::Owned(self.part(0..to))
+    }
+
+    /// Some of the frames.
+    pub(super) fn part(&self, frames: Range<usize>) -> Self {
+        let part = |t: &FilmTrack| FilmTrack { node: t.node, at_px: t.at_px[frames.clone()].to_vec() };
+        Self { times_s: self.times_s[frames.clone()].to_vec(), tracks: self.tracks.iter().map(part).collect() }
     }
 
     /// Some of the frames by `every` neighbours; those between which frames are missing are not put together.

@@ -4,6 +4,7 @@ use super::begin::{Begin, begin};
 use super::decay::Start;
 use super::film::Film;
 use super::members::Points;
+use super::pulls::parts;
 use super::signals::{Fit, Signals};
 use crate::model::Excitation;
 
@@ -37,8 +38,34 @@ pub struct Onset {
 }
 
 /// Looks at the points of the whole tree; `given` is what the user says. Frequencies of the tree lie within
-/// `frequencies_hz`.
-pub(super) fn onset(film: &Film, tracks: &[usize], given: Option<Excitation>, frequencies_hz: [f64; 2]) -> Onset {
+/// `frequencies_hz`. Where the tree was let go several times, each from rest, it is the time with the greatest motion, until the
+/// next pull; and when each was, s.
+pub(super) fn onset(
+    film: &Film,
+    tracks: &[usize],
+    given: Option<Excitation>,
+    frequencies_hz: [f64; 2],
+) -> (Onset, Vec<f64>) {
+    let parts = if given == Some(Excitation::Wind) { Vec::new() } else { parts(film) };
+    let each: Vec<(f64, Onset)> = parts
+        .iter()
+        .map(|frames| {
+            let part = film.part(frames.clone());
+            let onset = of_one(&part, tracks, given, frequencies_hz);
+            let motion = squares(&thinned(&part.until(onset.to), tracks, onset.from));
+            (motion, Onset { from: frames.start + onset.from, to: frames.start + onset.to, ..onset })
+        })
+        .collect();
+    // Wind, too, may rest and come again.
+    let all = each.iter().all(|(_, onset)| onset.excitation == Excitation::Release);
+    match each.iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+        Some((_, greatest)) if all => (*greatest, each.iter().map(|(_, onset)| onset.at_s).collect()),
+        _ => (of_one(film, tracks, given, frequencies_hz), Vec::new()),
+    }
+}
+
+/// Of a film with one release at most.
+fn of_one(film: &Film, tracks: &[usize], given: Option<Excitation>, frequencies_hz: [f64; 2]) -> Onset {
     let first_s = film.times_s.first().copied().unwrap_or(0.0);
     let to = film.times_s.len();
     let wind = Onset { excitation: Excitation::Wind, start: Start::Moving, at_s: first_s, from: 0, to };
@@ -59,7 +86,7 @@ pub(super) fn onset(film: &Film, tracks: &[usize], given: Option<Excitation>, fr
     let signals =
         |start| Signals::new(times.clone(), &points.signals, start, MOMENT_SD * film.step_s(), frequencies_hz);
     let Some(free) = described(&signals(Start::Moving), MODES) else { return wind };
-    let all: f64 = points.signals.iter().flatten().filter(|x| x.is_finite()).map(|x| x * x).sum();
+    let all = squares(&points);
     let noise = points.noise().min(0.5 * all);
     if given.is_none()
         && !(left_over < DIED_DOWN[usize::from(rested)]
@@ -83,6 +110,11 @@ fn described(signals: &Signals, n: usize) -> Option<f64> {
         fit = signals.fit(&fit, &[]);
     }
     Some(fit.rss)
+}
+
+/// Of all displacements, px².
+fn squares(points: &Points) -> f64 {
+    points.signals.iter().flatten().filter(|x| x.is_finite()).map(|x| x * x).sum()
 }
 
 fn thinned(film: &Film, tracks: &[usize], from: usize) -> Points {

@@ -24,6 +24,8 @@ pub struct Analysis {
     pub sway: Vec<Swaying>,
     /// What made the tree sway; `None` where there is too little film to tell.
     pub onset: Option<Onset>,
+    /// When it was let go, s, where that was more than once: the answers are of one of them, the onset's.
+    pub releases_s: Vec<f64>,
 }
 
 /// The sway of every measured node of `skeleton` (its foot among them, which has none) in `film`.
@@ -46,11 +48,11 @@ pub fn analyse_soon(skeleton: &Skeleton, film: &Film, config: &Dynamics, go_on: 
 }
 
 fn looked_at(skeleton: &Skeleton, film: &Film, config: &Dynamics, at_once: bool, go_on: &dyn Fn() -> bool) -> Analysis {
-    let Some(Begun { members, onset, demands, film }) = begun(skeleton, film, config) else {
+    let Some(Begun { members, onset, releases_s, demands, film }) = begun(skeleton, film, config) else {
         let of = |m: &Vec<usize>| Err(if m.is_empty() { Unidentified::NotMeasured } else { Unidentified::TooShort });
         let mut sway: Vec<Swaying> = members(skeleton, film).iter().map(of).collect();
         sway.iter_mut().take(1).for_each(|foot| *foot = Err(Unidentified::NotMeasured));
-        return Analysis { sway, onset: None };
+        return Analysis { sway, onset: None, releases_s: Vec::new() };
     };
     let sway = match onset.excitation {
         Excitation::Release => {
@@ -62,7 +64,7 @@ fn looked_at(skeleton: &Skeleton, film: &Film, config: &Dynamics, at_once: bool,
         }
         Excitation::Wind => wind::sways(skeleton, &film, &members, &demands, go_on),
     };
-    Analysis { sway, onset: Some(onset) }
+    Analysis { sway, onset: Some(onset), releases_s }
 }
 
 /// A film that is long enough to be looked at, and what made its tree sway.
@@ -70,6 +72,7 @@ pub(super) struct Begun<'a> {
     /// Points of every measured node and of all above it.
     pub members: Vec<Vec<usize>>,
     pub onset: Onset,
+    pub releases_s: Vec<f64>,
     pub demands: Demands,
     /// As far as it is used.
     pub film: Cow<'a, Film>,
@@ -92,10 +95,10 @@ pub(super) fn begun<'a>(skeleton: &Skeleton, film: &'a Film, config: &Dynamics) 
         Excited::Wind => Some(Excitation::Wind),
     };
     let members = members(skeleton, film);
-    let onset = onset(film, members.get(1).map_or(&[], Vec::as_slice), given, frequencies_hz);
+    let (onset, releases_s) = onset(film, members.get(1).map_or(&[], Vec::as_slice), given, frequencies_hz);
     let film = film.until(onset.to);
     if film.times_s.len() - onset.from < LEAST_FRAMES {
         return None;
     }
-    Some(Begun { members, onset, demands, film })
+    Some(Begun { members, onset, releases_s, demands, film })
 }

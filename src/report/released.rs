@@ -1,22 +1,10 @@
-//! What the motion says of releases that its analysis could not use: one before the part that was looked at, or several in it.
+//! What the motion says of releases that its analysis did not use: one before the part that was looked at, or others in it.
 
-use crate::dynamics::{Film, Onset};
+use crate::dynamics::{Analysis, Film, energy};
 use crate::model::Excitation;
 
 /// Time over which speeds are taken, s.
 const OVER_S: f64 = 0.12;
-/// A point counts if it is seen in so much of the film.
-const SEEN: f64 = 0.9;
-/// Before a release the tree is at rest for so long, s, with at most this share of the energy that it has at its peak so long
-/// after it, s; and that is at least this share of the film's largest.
-const REST_S: f64 = 0.6;
-const AT_REST: f64 = 0.02;
-const RISE_S: f64 = 1.0;
-/// At the begin of the film less of the rest may be seen, s.
-const LEAST_REST_S: f64 = 0.3;
-const LARGE: f64 = 0.2;
-/// Two releases are farther apart than this, s.
-const APART_S: f64 = 2.0;
 /// The film in pieces whose energy falls from each to the next: by so much at the most it may grow, to this share of itself it falls
 /// in all, and its logarithm lies so near to a straight line (share of the variance). Of 216 parts of windy films of 5 to 10 s
 /// 8 did so, of 57 parts that begin after a release 27.
@@ -26,19 +14,19 @@ const FALLS: f64 = 0.3;
 const STRAIGHT: f64 = 0.85;
 
 /// What the user should try, a sentence each. `given` is whether the user says what made the tree sway.
-pub fn hints(film: &Film, onset: Option<Onset>, given: bool) -> Vec<String> {
-    let Some(energy) = energy(film) else { return Vec::new() };
-    let releases = releases(&energy);
-    if releases.len() > 1 {
-        let times: Vec<String> = releases.iter().map(|t| format!("{t:.1}")).collect();
+pub fn hints(film: &Film, Analysis { onset, releases_s, .. }: &Analysis, given: bool) -> Vec<String> {
+    let Some(onset) = onset else { return Vec::new() };
+    if releases_s.len() > 1 {
+        let times: Vec<String> = releases_s.iter().map(|t| format!("{t:.1}")).collect();
         return vec![format!(
-            "the tree seems to have been let go {} times, at {} s; choose one of them with --from and --to",
+            "the tree was let go {} times, at {} s; the answers are of the one at {:.1} s, and --from and --to choose another",
             times.len(),
-            times.join(", ")
+            times.join(", "),
+            onset.at_s
         )];
     }
-    let wind = onset.is_some_and(|o| o.excitation == Excitation::Wind);
-    if wind && !given && releases.is_empty() && dies_down(&energy) {
+    let fades = || energy(film, OVER_S).is_some_and(|energy| dies_down(&energy));
+    if onset.excitation == Excitation::Wind && !given && fades() {
         return vec![
             "the motion dies down from begin to end: if the tree was let go before, say --excitation release, or begin with the \
              release itself (--from and --to)"
@@ -46,55 +34,6 @@ pub fn hints(film: &Film, onset: Option<Onset>, given: bool) -> Vec<String> {
         ];
     }
     Vec::new()
-}
-
-/// Time, s, and square of the speed of the middle one of the points, px²/s²; `None` where too little was seen.
-fn energy(film: &Film) -> Option<Vec<[f64; 2]>> {
-    let times = &film.times_s;
-    let over = ((OVER_S / film.step_s()).round() as usize).max(1);
-    let seen = |p: &[f64; 2]| p[0].is_finite() && p[1].is_finite();
-    let tracks: Vec<&Vec<[f64; 2]>> = film
-        .tracks
-        .iter()
-        .map(|t| &t.at_px)
-        .filter(|at| at.iter().filter(|p| seen(p)).count() as f64 >= SEEN * times.len() as f64)
-        .collect();
-    if tracks.is_empty() || times.len() < 8 * PIECES + over {
-        return None;
-    }
-    let at = |k: usize| {
-        let dt = times[k + over] - times[k];
-        let speed = |at: &&Vec<[f64; 2]>| {
-            let (a, b) = (at.get(k)?, at.get(k + over)?);
-            let square = (b[0] - a[0]).powi(2) + (b[1] - a[1]).powi(2);
-            square.is_finite().then_some(square / (dt * dt))
-        };
-        let mut all: Vec<f64> = tracks.iter().filter_map(speed).collect();
-        all.sort_unstable_by(f64::total_cmp);
-        Some([0.5 * (times[k] + times[k + over]), *all.get(all.len() / 2)?])
-    };
-    Some((0..times.len() - over).filter_map(at).collect())
-}
-
-/// When the tree was let go from rest, s.
-fn releases(energy: &[[f64; 2]]) -> Vec<f64> {
-    let top = energy.iter().map(|e| e[1]).fold(0.0, f64::max);
-    let first_s = energy.first().map_or(0.0, |e| e[0]);
-    let mut out: Vec<f64> = Vec::new();
-    for (k, &[now, _]) in energy.iter().enumerate() {
-        if now - first_s < LEAST_REST_S || out.last().is_some_and(|last| now - last < APART_S) {
-            continue;
-        }
-        let largest = |of: &mut dyn Iterator<Item = &[f64; 2]>| of.map(|e| e[1]).fold(0.0, f64::max);
-        let before = largest(&mut energy[..=k].iter().rev().take_while(|e| now - e[0] <= REST_S));
-        let after = largest(&mut energy[k..].iter().take_while(|e| e[0] - now <= RISE_S));
-        // Of all moments at which the motion is about to come, the last at rest.
-        let begins = energy.get(k + 1).is_some_and(|next| next[1] >= AT_REST * after);
-        if after >= LARGE * top && before < AT_REST * after && begins {
-            out.push(now);
-        }
-    }
-    out
 }
 
 /// Whether the motion grows less from begin to end, as evenly as a free sway does.
@@ -118,8 +57,10 @@ fn dies_down(energy: &[[f64; 2]]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::{FilmTrack, Start};
-    use crate::model::NodeId;
+    use crate::config::Dynamics;
+    use crate::dynamics::{FilmTrack, Onset, Start, analyse};
+    use crate::model::{Node, NodeId, NodeName, Size, Skeleton};
+    use nalgebra::Point3;
     use std::f64::consts::TAU;
 
     fn chance(seed: &mut u64) -> f64 {
@@ -146,8 +87,30 @@ mod tests {
         if t < 0.0 { 12.0 } else { mode(0.6, 9.0) + mode(0.9, 3.0) }
     }
 
-    fn told(excitation: Excitation) -> Option<Onset> {
-        Some(Onset { excitation, start: Start::Moving, at_s: 0.0, from: 0, to: 300 })
+    fn told(excitation: Excitation) -> Analysis {
+        let onset = Onset { excitation, start: Start::Moving, at_s: 0.0, from: 0, to: 300 };
+        Analysis { sway: Vec::new(), onset: Some(onset), releases_s: Vec::new() }
+    }
+
+    /// What is told of a film of a trunk.
+    fn analysed(film: &Film) -> Analysis {
+        let node = |k: u32| Node {
+            name: NodeName(k),
+            parent: k.checked_sub(1).map(NodeId),
+            level: k as u8,
+            position: Point3::new(0.0, 100.0 * f64::from(k), 0.0),
+            radius: 1.0,
+            n_tracks: 9,
+            certainty: 1.0,
+            copy_of: None,
+            plane_angle: 0.0,
+        };
+        let skeleton = Skeleton {
+            nodes: vec![node(0), node(1)],
+            foot_px: [100.0; 2],
+            image_size: Size { width: 640, height: 360 },
+        };
+        analyse(&skeleton, film, &Dynamics::default())
     }
 
     /// Wind shakes an oscillator all the time.
@@ -165,37 +128,59 @@ mod tests {
     #[test]
     fn a_part_after_the_release_that_is_taken_for_wind_gets_a_hint() {
         let late = film(9.0, |t| free(t + 2.0));
-        let hint = hints(&late, told(Excitation::Wind), false);
+        let hint = hints(&late, &told(Excitation::Wind), false);
         assert!(hint.len() == 1 && hint[0].contains("--excitation release"), "{hint:?}");
         // Not where it is said what it was, or was told rightly.
-        assert!(hints(&late, told(Excitation::Wind), true).is_empty());
-        assert!(hints(&late, told(Excitation::Release), false).is_empty());
-        assert!(hints(&late, None, false).is_empty());
+        assert!(hints(&late, &told(Excitation::Wind), true).is_empty());
+        assert!(hints(&late, &told(Excitation::Release), false).is_empty());
+        assert!(hints(&late, &Analysis { onset: None, ..told(Excitation::Wind) }, false).is_empty());
     }
 
+    /// Taken for one decay, or for wind, two would give wrong answers, and nobody would know.
     #[test]
-    fn several_releases_in_a_film_get_a_hint_with_their_times() {
-        let pulled = |t: f64| free(t - 1.0);
-        assert!(hints(&film(11.0, pulled), told(Excitation::Release), false).is_empty());
-        // Pulled again within two seconds, held, let go.
-        let twice = |t: f64| match t - 14.0 {
-            t if t < 0.0 => free(t + 13.0),
-            t if t < 2.0 => free(13.0 + t) + (12.0 - free(15.0)) * t / 2.0,
-            t => free(t - 3.0),
-        };
-        for cause in [Excitation::Wind, Excitation::Release] {
-            let hint = hints(&film(27.0, twice), told(cause), false);
+    fn of_several_releases_in_a_film_one_is_analysed_and_all_are_told() {
+        let once = film(11.0, |t| free(t - 1.0));
+        assert!(hints(&once, &analysed(&once), false).is_empty());
+        // Pulled again slowly, or with a jerk, held, let go.
+        for pulls_s in [2.0, 0.3] {
+            let twice = |t: f64| match t - 14.0 {
+                t if t < 0.0 => free(t + 13.0),
+                t if t < pulls_s => free(13.0 + t) + (12.0 - free(13.0 + pulls_s)) * t / pulls_s,
+                t => free(t - 3.0),
+            };
+            let twice = film(27.0, twice);
+            let found = analysed(&twice);
+            let hint = hints(&twice, &found, false);
             assert!(hint.len() == 1 && hint[0].contains("let go 2 times, at 1.0, 17.0 s"), "{hint:?}");
+            assert!(
+                found.onset.is_some_and(|o| (o.at_s - 1.0).abs() < 0.05 && o.to <= 30 * 14 + 3),
+                "{:?}",
+                found.onset
+            );
+            assert!(found.sway[1].is_ok_and(|sway| sway.frequency_hz.holds(0.6)), "{:?}", found.sway);
         }
+    }
+
+    /// A hand that jerks is no release, in a film with one either.
+    #[test]
+    fn a_pull_with_a_jerk_before_the_release_is_no_release() {
+        let pulled = |t: f64| if t < 1.0 { 0.0 } else { (t - 1.0).min(0.3) * 40.0 };
+        let once = film(16.0, |t| if t < 4.0 { pulled(t) } else { free(t - 4.0) });
+        let found = analysed(&once);
+        assert!(hints(&once, &found, false).is_empty(), "{:?}", hints(&once, &found, false));
+        assert!(found.onset.is_some_and(|o| (o.at_s - 4.0).abs() < 0.05), "{:?}", found.onset);
+        assert!(found.sway[1].is_ok_and(|sway| sway.frequency_hz.holds(0.6)), "{:?}", found.sway);
     }
 
     /// Wind that happens to fade over the film cannot be told from a free sway by its energy alone.
     #[test]
     fn wind_seldom_gets_a_hint_and_stillness_none() {
         let hinted: Vec<u64> =
-            (0..60).filter(|&seed| !hints(&windy(seed), told(Excitation::Wind), false).is_empty()).collect();
+            (0..60).filter(|&seed| !hints(&windy(seed), &told(Excitation::Wind), false).is_empty()).collect();
         assert!(hinted.len() <= 3, "{hinted:?} of 60");
-        assert!(hints(&film(10.0, |_| 0.0), told(Excitation::Wind), false).is_empty());
-        assert!(hints(&Film::default(), None, false).is_empty());
+        let released: Vec<u64> = (0..60).filter(|&seed| !analysed(&windy(seed)).releases_s.is_empty()).collect();
+        assert!(released.len() <= 1, "{released:?} of 60");
+        assert!(hints(&film(10.0, |_| 0.0), &told(Excitation::Wind), false).is_empty());
+        assert!(hints(&Film::default(), &told(Excitation::Wind), false).is_empty());
     }
 }

@@ -40,6 +40,8 @@ impl Chance {
 pub enum Drive {
     /// Held still, and let go at this time, s.
     Release(f64),
+    /// Let go at either time, s: before the second the hand pulls for 1.5 s and holds still for a second.
+    Twice([f64; 2]),
     /// Already in free motion when the film begins.
     Decay,
     Wind,
@@ -166,6 +168,14 @@ impl MadeBranch {
         let free = |t: f64, a: f64| a * (-z * w * t).exp() * ((w * root * t).cos() + z / root * (w * root * t).sin());
         match drive {
             Drive::Release(at_s) => self.pull.map(|a| times.iter().map(|t| free((t - at_s).max(0.0), a)).collect()),
+            Drive::Twice([first, second]) => self.pull.map(|a| {
+                let at = |t: &f64| match (t - (second - 2.5)) / 1.5 {
+                    hand if hand < 0.0 => free((t - first).max(0.0), a),
+                    hand if hand < 1.0 => free(t - first, a) * (1.0 - hand) + a * hand,
+                    _ => free((t - second).max(0.0), a),
+                };
+                times.iter().map(at).collect()
+            }),
             Drive::Decay => {
                 let since: f64 = chance.between(0.5, 1.5);
                 self.pull.map(|a| times.iter().map(|t| free(t + since, a)).collect())

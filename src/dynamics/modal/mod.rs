@@ -306,7 +306,7 @@ mod tests {
 
     /// The points of the branches that are told beside the trunk and the tip as a whole.
     fn groups(skeleton: &Skeleton, film: &Film) -> Vec<Vec<usize>> {
-        let Some(Begun { members, onset, demands, film }) = begun(skeleton, film, &Dynamics::default()) else {
+        let Some(Begun { members, onset, demands, film, .. }) = begun(skeleton, film, &Dynamics::default()) else {
             return Vec::new();
         };
         let sways = free::sways(skeleton, &film, &members, &onset, &demands, &|| true);

@@ -26,7 +26,7 @@ pub struct Shoot {
 /// The branches that a release shows beyond those of `skeleton`, at most one for every point; none in wind, or where the film
 /// carries too little, or where `go_on` says no meanwhile. The one that is clearest by all its points takes them first.
 pub fn shoots(skeleton: &Skeleton, film: &Film, config: &Dynamics, go_on: &dyn Fn() -> bool) -> Vec<Shoot> {
-    let Some(Begun { members, onset, demands, film }) = begun(skeleton, film, config) else { return Vec::new() };
+    let Some(Begun { members, onset, demands, film, .. }) = begun(skeleton, film, config) else { return Vec::new() };
     if onset.excitation != Excitation::Release {
         return Vec::new();
     }
