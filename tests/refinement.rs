@@ -197,6 +197,36 @@ fn the_written_motion_has_no_seam_in_the_middle() {
     assert!(step(150) <= ordinary && step(280) <= 3.0 * ordinary);
 }
 
+/// A film that ends before the first refinement is no reason to take a limb's branches for one.
+#[test]
+fn a_film_that_ends_before_a_refinement_gets_its_shoots_at_the_end() {
+    let (run, config) = (run(), Config::default());
+    let outline = run.frames[0].0.outline.clone();
+    let ended = |go_on: bool| {
+        let mut back = BackEnd::new(&config);
+        for set in run.sets.iter().take_while(|set| set.time_s < 9.5) {
+            let tracks = set.clone();
+            back.step(Followed { tracks, outline: outline.clone(), preview: None, received: Instant::now() });
+        }
+        let standing = back.tree().cloned().expect("a tree");
+        assert_eq!((standing.refinements, standing.shoots.len()), (0, 0));
+        back.finish(&|| go_on);
+        (standing, back.tree().cloned().expect("a tree"))
+    };
+    let (standing, tree) = ended(true);
+    assert!(!tree.shoots.is_empty() && names(&tree).is_superset(&names(&standing)), "{:?}", tree.shoots);
+    assert_eq!((tree.refinements, tree.shown_from), (1, standing.shown_from));
+    // Every one of them has its pose in every frame, and its points are on it.
+    let mut retrace = Retrace::new(&tree, &config);
+    for set in &run.sets {
+        assert_eq!(retrace.step(set).0.joints.len(), tree.skeleton.nodes.len());
+    }
+    assert!(tree.shoots.iter().all(|s| s.members.iter().all(|id| retrace.node_of(*id) == Some(s.name))));
+    // Whoever does not wait gets the tree as it stands.
+    let (standing, tree) = ended(false);
+    assert!(Arc::ptr_eq(&standing, &tree));
+}
+
 /// The computer slept, or the camera was away: the new tree's pose cannot be led over to the present, and it would jump.
 #[test]
 fn a_tree_that_cannot_be_followed_to_the_present_is_not_taken() {

@@ -212,14 +212,26 @@ impl BackEnd {
         std::mem::take(&mut self.refused)
     }
 
-    /// No more frames: if nothing has been built, builds from what there is, unless that is next to nothing.
-    pub fn finish(&mut self) {
+    /// No more frames: if nothing has been built, builds from what there is, unless that is next to nothing; and a tree for which
+    /// there was no refinement gets the shoots that one would have put on it, unless `go_on` says no before.
+    pub fn finish(&mut self, go_on: &dyn Fn() -> bool) {
         if self.live.is_none() && !self.history.is_empty() {
             let table = self.judge();
             let asked = self.build_now || self.building.is_some();
             if asked || self.evidence.measure >= LEAST_MEASURE {
                 self.build(&table, true);
             }
+        }
+        self.shoot(go_on);
+    }
+
+    fn shoot(&mut self, go_on: &dyn Fn() -> bool) {
+        let Some(live) = self.live.as_ref().filter(|live| live.tree.refinements == 0) else { return };
+        let Some(work) = Refinement::of(&self.history, live, &self.config) else { return };
+        if let Some(mut tree) = work.shoots_while(go_on) {
+            // The capture's poses are followed as those of the tree without them were shown.
+            (tree.followed_from, tree.shown_from) = (live.tree.followed_from, live.tree.shown_from);
+            self.live = Some(Live { poser: tree.poser(&self.config), tree: Arc::new(tree) });
         }
     }
 

@@ -1,13 +1,13 @@
 //! The tree once more, from what has been seen since: who is who, and whether it is better.
 
+use super::back::Live;
 use super::{Moment, Shoot, Tree, build, shoots, thicken};
 use crate::config::Config;
-use crate::hierarchy::{self, Gain, OnBoth};
+use crate::hierarchy::{self, Evidence, Gain, OnBoth};
 use crate::model::{MotionHierarchy, NodeId, NodeName, Skeleton, TrackId};
-use crate::motion::Binding;
 use crate::shape::{Prototype, Twin, go_on, on_foot, twins};
 use crate::signal::median;
-use crate::track::TrackTable;
+use crate::track::{TrackHistory, TrackTable};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -29,17 +29,16 @@ pub struct Refinement {
 }
 
 impl Refinement {
-    pub(super) fn new(
-        table: Arc<TrackTable>,
-        standing: &Arc<Tree>,
-        binding: &Binding,
-        config: &Config,
-        moment: Moment,
-    ) -> Self {
+    /// Of a standing tree, from what is remembered; `None` where nothing is.
+    pub(super) fn of(history: &TrackHistory, live: &Live, config: &Config) -> Option<Self> {
+        let (first, newest) = (history.first()?, history.last()?);
+        let table = Arc::new(history.table(1.0 / hierarchy::COMPARE_HZ));
+        let moment = Moment { followed_from: first.frame, frame: newest.frame, time_s: newest.time_s, forced: false };
+        let (standing, binding) = (&live.tree, &live.poser.binding);
         let measured = standing.plain.measured();
         let carrier = |node: NodeId| node.index().checked_sub(measured).map_or(node, |k| standing.shoots[k].on);
         let bound = binding.bound().map(|(id, node, rest_px)| (id, (carrier(node), rest_px))).collect();
-        Self { table, standing: standing.clone(), bound, config: config.clone(), moment }
+        Some(Self { table, standing: standing.clone(), bound, config: config.clone(), moment })
     }
 
     /// Number of points that it is made from: its time grows with their square.
@@ -58,13 +57,8 @@ impl Refinement {
 
     /// The same; where `go_on` says no meanwhile, nobody waits for what it gives.
     pub fn run_while(&self, go_on: &dyn Fn() -> bool) -> Option<Tree> {
-        let evidence = hierarchy::evidence(&self.table, &self.config.accumulate);
-        let enough = self.config.accumulate.threshold.min(self.standing.evidence.measure);
+        let evidence = self.evidence()?;
         let (frame, measure) = (self.moment.frame, evidence.measure);
-        if measure < enough {
-            tracing::debug!(frame, measure, enough, "no refinement: too little motion");
-            return None;
-        }
         let mut tree = build(&self.table, evidence, &self.standing.outline, &self.config, self.moment)?;
         let (before, since) = (self.gain(&self.standing.table, &tree), self.gain(&self.table, &tree));
         let (gain, error) = (before.gain + since.gain, before.error.hypot(since.error));
@@ -80,13 +74,30 @@ impl Refinement {
         Some(tree)
     }
 
-    /// The standing tree with the shoots that are told by now, if they are others.
+    /// The standing tree with the shoots that are told by now, if they are others, and enough motion is seen; not if `go_on` says no
+    /// meanwhile.
+    pub(super) fn shoots_while(&self, go_on: &dyn Fn() -> bool) -> Option<Tree> {
+        self.evidence()?;
+        self.with_other_shoots(go_on)
+    }
+
+    /// The motion seen, if it is enough for a build of its own.
+    fn evidence(&self) -> Option<Evidence> {
+        let evidence = hierarchy::evidence(&self.table, &self.config.accumulate);
+        let enough = self.config.accumulate.threshold.min(self.standing.evidence.measure);
+        let (frame, measure) = (self.moment.frame, evidence.measure);
+        if measure < enough {
+            tracing::debug!(frame, measure, enough, "no refinement: too little motion");
+        }
+        (measure >= enough).then_some(evidence)
+    }
+
     fn with_other_shoots(&self, go_on: &dyn Fn() -> bool) -> Option<Tree> {
         let standing = &*self.standing;
         let node_of = |id: TrackId| Some(self.bound.get(&id)?.0);
         let shoots = shoots::told(&self.table, &standing.plain, node_of, &self.config.dynamics, go_on);
         let points = |all: &[Shoot]| all.iter().map(|s| (s.on, s.members.clone())).collect::<BTreeSet<_>>();
-        if points(&shoots) == points(&standing.shoots) {
+        if !go_on() || points(&shoots) == points(&standing.shoots) {
             return None;
         }
         let mut tree = standing.clone();

@@ -2,9 +2,8 @@
 
 use super::back::Live;
 use super::refine::Refinement;
-use super::{Moment, Poser, Targets, Tree};
+use super::{Poser, Targets, Tree};
 use crate::config::Config;
-use crate::hierarchy;
 use crate::model::Pose;
 use crate::track::TrackHistory;
 use std::sync::Arc;
@@ -79,9 +78,7 @@ impl Refiner {
         let now_s = newest.time_s;
         match std::mem::replace(&mut self.stage, Stage::Over) {
             Stage::Waiting(due_s) if now_s >= due_s => {
-                let table = Arc::new(history.table(1.0 / hierarchy::COMPARE_HZ));
-                let moment = Moment { followed_from: first.frame, frame: newest.frame, time_s: now_s, forced: false };
-                let work = Refinement::new(table, &live.tree, &live.poser.binding, config, moment);
+                let work = Refinement::of(history, live, config)?;
                 let ready_s = READY_S * (work.points() as f64 / POINTS).powi(2).max(1.0);
                 self.stage = Stage::Building(Arc::new(work), now_s + ready_s, None);
             }

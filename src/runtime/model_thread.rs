@@ -139,7 +139,11 @@ impl ModelThread {
         let swaying = self.sway.as_mut().map(SwayWatch::end);
         // No frame is left that could need what is under way.
         self.refining = Refining::default();
-        self.back.finish();
+        let shared = self.shared.clone();
+        self.back.finish(&|| {
+            shared.pulse.wrote();
+            !shared.hurry.load(Ordering::Relaxed)
+        });
         self.announce();
         // Shown while the capture is written.
         self.shared.ended.store(true, Ordering::Relaxed);
