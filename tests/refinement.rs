@@ -227,6 +227,21 @@ fn a_film_that_ends_before_a_refinement_gets_its_shoots_at_the_end() {
     assert!(Arc::ptr_eq(&standing, &tree));
 }
 
+/// It is told of as built, with the warning that it was early, and not as refined: nobody saw another.
+#[test]
+fn a_tree_that_is_built_at_the_end_is_the_first_one_with_its_shoots() {
+    let (run, config) = (run(), Config::default());
+    let mut back = BackEnd::new(&config);
+    for set in run.sets.iter().take_while(|set| set.time_s < 7.9) {
+        let (tracks, outline) = (set.clone(), run.frames[0].0.outline.clone());
+        back.step(Followed { tracks, outline, preview: None, received: Instant::now() });
+    }
+    assert!(back.tree().is_none());
+    back.finish(&|| true);
+    let tree = back.tree().expect("a tree");
+    assert!(tree.forced && tree.refinements == 0 && !tree.shoots.is_empty(), "{:?}", tree.shoots);
+}
+
 /// The computer slept, or the camera was away: the new tree's pose cannot be led over to the present, and it would jump.
 #[test]
 fn a_tree_that_cannot_be_followed_to_the_present_is_not_taken() {

@@ -4,7 +4,7 @@ use super::begin::{Begin, begin};
 use super::decay::Start;
 use super::film::Film;
 use super::members::Points;
-use super::pulls::parts;
+use super::pulls::{REST_S, parts};
 use super::signals::{Fit, Signals};
 use crate::model::Excitation;
 
@@ -21,6 +21,8 @@ const DIED_DOWN: [f64; 2] = [0.35, 0.5];
 const REST_FITS: f64 = 1.3;
 /// Standard deviation of the moment of a release, in frames, before all modes have their say in it.
 pub(super) const MOMENT_SD: f64 = 0.7;
+/// A film's last part tells whether it is a decay or wind if it is so long, s: before, a slow tree has hardly died down.
+const TELLS_S: f64 = 10.0;
 /// Frames that a decay must have.
 const LEAST_FRAMES: usize = 32;
 
@@ -47,20 +49,30 @@ pub(super) fn onset(
     frequencies_hz: [f64; 2],
 ) -> (Onset, Vec<f64>) {
     let parts = if given == Some(Excitation::Wind) { Vec::new() } else { parts(film) };
-    let each: Vec<(f64, Onset)> = parts
-        .iter()
-        .map(|frames| {
-            let part = film.part(frames.clone());
-            let onset = of_one(&part, tracks, given, frequencies_hz);
-            let motion = squares(&thinned(&part.until(onset.to), tracks, onset.from));
-            (motion, Onset { from: frames.start + onset.from, to: frames.start + onset.to, ..onset })
-        })
-        .collect();
-    // Wind, too, may rest and come again.
-    let all = each.iter().all(|(_, onset)| onset.excitation == Excitation::Release);
-    match each.iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
-        Some((_, greatest)) if all => (*greatest, each.iter().map(|(_, onset)| onset.at_s).collect()),
-        _ => (of_one(film, tracks, given, frequencies_hz), Vec::new()),
+    let mut releases: Vec<(f64, Onset)> = Vec::new();
+    let mut times_s = Vec::new();
+    for frames in parts {
+        let part = film.part(frames.clone());
+        // As with the whole film, less than a wave shows no frequency.
+        let lowest_hz = frequencies_hz[0] * film.span_s() / part.span_s();
+        let onset = of_one(&part, tracks, None, [lowest_hz.min(frequencies_hz[1]), frequencies_hz[1]]);
+        times_s.push(if onset.excitation == Excitation::Release { onset.at_s } else { part.times_s[0] + REST_S });
+        match onset.excitation {
+            Excitation::Release => {
+                let motion = squares(&thinned(&part.until(onset.to), tracks, onset.from));
+                releases
+                    .push((motion, Onset { from: frames.start + onset.from, to: frames.start + onset.to, ..onset }));
+            }
+            // Wind, too, may rest and come again. Where the film ends soon after, it does not tell.
+            Excitation::Wind if given.is_none() && (frames.end < film.times_s.len() || part.span_s() >= TELLS_S) => {
+                return (of_one(film, tracks, given, frequencies_hz), Vec::new());
+            }
+            Excitation::Wind => {}
+        }
+    }
+    match releases.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+        Some((_, greatest)) => (greatest, if times_s.len() > 1 { times_s } else { Vec::new() }),
+        None => (of_one(film, tracks, given, frequencies_hz), Vec::new()),
     }
 }
 

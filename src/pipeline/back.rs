@@ -212,8 +212,9 @@ impl BackEnd {
         std::mem::take(&mut self.refused)
     }
 
-    /// No more frames: if nothing has been built, builds from what there is, unless that is next to nothing; and a tree for which
-    /// there was no refinement gets the shoots that one would have put on it, unless `go_on` says no before.
+    /// No more frames: if nothing has been built, builds from what there is, unless that is next to nothing; and a tree that was
+    /// never refined gets the shoots that a refinement would put on it, if there is enough motion in what is remembered, and
+    /// `go_on` does not say no before.
     pub fn finish(&mut self, go_on: &dyn Fn() -> bool) {
         if self.live.is_none() && !self.history.is_empty() {
             let table = self.judge();
@@ -229,8 +230,11 @@ impl BackEnd {
         let Some(live) = self.live.as_ref().filter(|live| live.tree.refinements == 0) else { return };
         let Some(work) = Refinement::of(&self.history, live, &self.config) else { return };
         if let Some(mut tree) = work.shoots_while(go_on) {
+            let standing = &live.tree;
             // The capture's poses are followed as those of the tree without them were shown.
-            (tree.followed_from, tree.shown_from) = (live.tree.followed_from, live.tree.shown_from);
+            (tree.followed_from, tree.shown_from) = (standing.followed_from, standing.shown_from);
+            // Built just now from the same film, it is no other tree.
+            tree.refinements -= u32::from(tree.frame == standing.frame);
             self.live = Some(Live { poser: tree.poser(&self.config), tree: Arc::new(tree) });
         }
     }

@@ -160,6 +160,7 @@ mod tests {
             frames: 30,
             gaps_s: Vec::new(),
             onset: None,
+            used_s: [0.0, 1.0],
             given: None,
             metres_per_px: 0.0,
             highest_hz: 5.0,

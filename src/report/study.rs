@@ -53,6 +53,8 @@ pub struct Study {
     /// Times without frames: after which moment, and how long, s.
     pub gaps_s: Vec<[f64; 2]>,
     pub onset: Option<Onset>,
+    /// First and last moment that the answers come from, s.
+    pub used_s: [f64; 2],
     /// What the user says made it sway; `None` where the signal told.
     pub given: Option<Excitation>,
     /// 0 where no scale is known.
@@ -128,6 +130,7 @@ impl Study {
             frames: times.len(),
             gaps_s,
             onset: analysis.onset,
+            used_s: analysis.onset.map_or(ends, |onset| used_s(&onset, times, ends)),
             given: given.excitation,
             metres_per_px: given.metres_per_px,
             highest_hz: given.highest_hz,
@@ -137,19 +140,11 @@ impl Study {
             branches: Vec::new(),
             notes: given.notes.to_vec(),
         };
-        let used_s = study.used_s(times);
         for i in 1..skeleton.measured() {
             let sway = analysis.sway.get(i).copied().unwrap_or(Err(Unidentified::NotMeasured));
-            study.branches.push(branch(given, NodeId(i as u32), sway, used_s));
+            study.branches.push(branch(given, NodeId(i as u32), sway, study.used_s));
         }
         study
-    }
-
-    /// First and last moment that the answers come from, s.
-    fn used_s(&self, times_s: &[f64]) -> [f64; 2] {
-        let Some(onset) = self.onset else { return self.span_s };
-        let at = |k: usize| times_s.get(k).copied();
-        [at(onset.from).unwrap_or(self.span_s[0]), at(onset.to.saturating_sub(1)).unwrap_or(self.span_s[1])]
     }
 
     /// Frames a second, by their real times; no number for less than two.
@@ -184,6 +179,12 @@ impl Branch {
     pub fn length_px(&self) -> f64 {
         (self.tip[0] - self.base[0]).hypot(self.tip[1] - self.base[1])
     }
+}
+
+/// First and last moment of the frames that an analysis has used, of a film from and to these `ends`, s.
+fn used_s(onset: &Onset, times_s: &[f64], ends: [f64; 2]) -> [f64; 2] {
+    let at = |k: usize| times_s.get(k).copied();
+    [at(onset.from).unwrap_or(ends[0]), at(onset.to.saturating_sub(1)).unwrap_or(ends[1])]
 }
 
 fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: [f64; 2]) -> Branch {

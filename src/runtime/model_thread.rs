@@ -137,6 +137,9 @@ impl ModelThread {
             self.shared.pulse.done(Worker::Model);
         }
         let swaying = self.sway.as_mut().map(SwayWatch::end);
+        // Shown while the tree is finished and the capture is written.
+        self.shared.ended.store(true, Ordering::Relaxed);
+        self.show(last.as_ref(), true);
         // No frame is left that could need what is under way.
         self.refining = Refining::default();
         let shared = self.shared.clone();
@@ -145,9 +148,7 @@ impl ModelThread {
             !shared.hurry.load(Ordering::Relaxed)
         });
         self.announce();
-        // Shown while the capture is written.
-        self.shared.ended.store(true, Ordering::Relaxed);
-        self.show(last.as_ref(), true);
+        self.show(None, true);
         let summary = self.finish();
         if swaying.is_some_and(Ending::panicked) {
             self.shared.fail(Failure::Panicked);

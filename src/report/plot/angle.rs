@@ -20,13 +20,11 @@ pub fn angle(study: &Study, branch: &Branch) -> Option<String> {
     let mut svg = Svg::new(WIDTH, HEIGHT, &format!("Angle of branch {} over time", branch.name));
     let axes = Axes::new([WIDTH, HEIGHT], study.span_s, [lo - room, hi + 2.0 * room]);
     if let Some(onset) = study.onset {
-        // What comes before the release tells nothing of the sway.
-        let [left, _] = axes.sides();
-        svg.rect(
-            [left, axes.top()],
-            [axes.x(onset.at_s.clamp(study.span_s[0], study.span_s[1])), axes.bottom()],
-            "unused",
-        );
+        // What comes before the release, after all has died down, or from the next pull on tells nothing of the sway.
+        let [left, right] = axes.sides();
+        let at = |t: f64| axes.x(t.clamp(study.span_s[0], study.span_s[1]));
+        svg.rect([left, axes.top()], [at(onset.at_s), axes.bottom()], "unused");
+        svg.rect([at(study.used_s[1]), axes.top()], [right, axes.bottom()], "unused");
     }
     axes.draw(&mut svg, "time, s", "degrees");
     let mut curve = |angles: &[f64], class: &str| {
