@@ -28,7 +28,7 @@ use crate::hierarchy::{self, Evidence};
 use crate::model::{Frame, MotionHierarchy, NodeId, Outline, Pose, Skeleton, TrackId, TrackSet};
 use crate::motion::{Binding, PoseEstimator};
 use crate::shape::PushFigures;
-use crate::track::TrackTable;
+use crate::track::{TrackHistory, TrackTable};
 use crate::{shape, skeleton};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -114,6 +114,14 @@ pub struct Moment {
     pub frame: u64,
     pub time_s: f64,
     pub forced: bool,
+}
+
+impl Moment {
+    /// That of the newest frame of `history`; `None` where nothing is remembered.
+    fn of(history: &TrackHistory, forced: bool) -> Option<Self> {
+        let (first, newest) = (history.first()?, history.last()?);
+        Some(Self { followed_from: first.frame, frame: newest.frame, time_s: newest.time_s, forced })
+    }
 }
 
 impl Tree {

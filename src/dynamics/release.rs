@@ -48,32 +48,41 @@ pub(super) fn onset(
     given: Option<Excitation>,
     frequencies_hz: [f64; 2],
 ) -> (Onset, Vec<f64>) {
-    let parts = if given == Some(Excitation::Wind) { Vec::new() } else { parts(film) };
+    let of_several = || of_parts(film, tracks, given, frequencies_hz);
+    let found = if given == Some(Excitation::Wind) { None } else { of_several() };
+    found.unwrap_or_else(|| (of_one(film, tracks, given, frequencies_hz), Vec::new()))
+}
+
+/// The same of the parts that hold a release each; `None` where there are none, or one of them is wind.
+fn of_parts(
+    film: &Film,
+    tracks: &[usize],
+    given: Option<Excitation>,
+    frequencies_hz: [f64; 2],
+) -> Option<(Onset, Vec<f64>)> {
     let mut releases: Vec<(f64, Onset)> = Vec::new();
     let mut times_s = Vec::new();
-    for frames in parts {
+    for frames in parts(film) {
         let part = film.part(frames.clone());
         // As with the whole film, less than a wave shows no frequency.
         let lowest_hz = frequencies_hz[0] * film.span_s() / part.span_s();
         let onset = of_one(&part, tracks, None, [lowest_hz.min(frequencies_hz[1]), frequencies_hz[1]]);
-        times_s.push(if onset.excitation == Excitation::Release { onset.at_s } else { part.times_s[0] + REST_S });
         match onset.excitation {
             Excitation::Release => {
                 let motion = squares(&thinned(&part.until(onset.to), tracks, onset.from));
-                releases
-                    .push((motion, Onset { from: frames.start + onset.from, to: frames.start + onset.to, ..onset }));
+                let [from, to] = [onset.from, onset.to].map(|k| frames.start + k);
+                releases.push((motion, Onset { from, to, ..onset }));
+                times_s.push(onset.at_s);
             }
             // Wind, too, may rest and come again. Where the film ends soon after, it does not tell.
             Excitation::Wind if given.is_none() && (frames.end < film.times_s.len() || part.span_s() >= TELLS_S) => {
-                return (of_one(film, tracks, given, frequencies_hz), Vec::new());
+                return None;
             }
-            Excitation::Wind => {}
+            Excitation::Wind => times_s.push(part.times_s[0] + REST_S),
         }
     }
-    match releases.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
-        Some((_, greatest)) => (greatest, if times_s.len() > 1 { times_s } else { Vec::new() }),
-        None => (of_one(film, tracks, given, frequencies_hz), Vec::new()),
-    }
+    let (_, greatest) = releases.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some((greatest, if times_s.len() > 1 { times_s } else { Vec::new() }))
 }
 
 /// Of a film with one release at most.

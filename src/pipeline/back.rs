@@ -134,11 +134,9 @@ impl BackEnd {
 
     /// Builds, and follows the pose through the remembered frames; gives their poses and targets.
     fn build(&mut self, table: &Arc<TrackTable>, forced: bool) -> Vec<(Pose, Targets)> {
-        let (Some(outline), Some(first), Some(last)) = (&self.outline, self.history.first(), self.history.last())
-        else {
+        let (Some(outline), Some(moment)) = (&self.outline, Moment::of(&self.history, forced)) else {
             return Vec::new();
         };
-        let moment = Moment { followed_from: first.frame, frame: last.frame, time_s: last.time_s, forced };
         let Some(tree) = build(table, self.evidence.clone(), outline, &self.config, moment) else {
             return Vec::new();
         };

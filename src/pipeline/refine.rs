@@ -31,9 +31,8 @@ pub struct Refinement {
 impl Refinement {
     /// Of a standing tree, from what is remembered; `None` where nothing is.
     pub(super) fn of(history: &TrackHistory, live: &Live, config: &Config) -> Option<Self> {
-        let (first, newest) = (history.first()?, history.last()?);
+        let moment = Moment::of(history, false)?;
         let table = Arc::new(history.table(1.0 / hierarchy::COMPARE_HZ));
-        let moment = Moment { followed_from: first.frame, frame: newest.frame, time_s: newest.time_s, forced: false };
         let (standing, binding) = (&live.tree, &live.poser.binding);
         let measured = standing.plain.measured();
         let carrier = |node: NodeId| node.index().checked_sub(measured).map_or(node, |k| standing.shoots[k].on);

@@ -113,28 +113,29 @@ mod tests {
         analyse(&skeleton, film, &Dynamics::default())
     }
 
-    /// Wind shakes an oscillator all the time.
-    fn windy(mut seed: u64) -> Film {
+    /// Where an oscillator of 0.6 Hz is in `n` frames that wind shakes in those that are `windy`.
+    fn shaken(mut seed: u64, n: usize, damping: f64, windy: impl Fn(usize) -> bool) -> Vec<f64> {
         let omega = TAU * 0.6;
-        let (mut x, mut v, mut all) = (0.0, 0.0, Vec::new());
-        for _ in 0..1200 {
-            v += (2000.0 * chance(&mut seed) - 2.0 * 0.05 * omega * v - omega * omega * x) / 30.0;
+        let (mut x, mut v) = (0.0, 0.0);
+        let mut step = |k: usize| {
+            let gust = 2000.0 * chance(&mut seed);
+            let drive = if windy(k) { gust } else { 0.0 };
+            v += (drive - 2.0 * damping * omega * v - omega * omega * x) / 30.0;
             x += v / 30.0;
-            all.push(x);
-        }
+            x
+        };
+        (0..n).map(&mut step).collect()
+    }
+
+    /// Wind all the time.
+    fn windy(seed: u64) -> Film {
+        let all = shaken(seed, 1200, 0.05, |_| true);
         film(20.0, |t| all[600 + (30.0 * t) as usize])
     }
 
     /// Wind that rests twice.
-    fn with_lulls(mut seed: u64) -> Film {
-        let omega = TAU * 0.6;
-        let (mut x, mut v, mut all) = (0.0, 0.0, Vec::new());
-        for k in 0..1500 {
-            let drive = if [60..420, 660..1020].iter().any(|gusts| gusts.contains(&k)) { 2000.0 } else { 0.0 };
-            v += (drive * chance(&mut seed) - 2.0 * 0.1 * omega * v - omega * omega * x) / 30.0;
-            x += v / 30.0;
-            all.push(x);
-        }
+    fn with_lulls(seed: u64) -> Film {
+        let all = shaken(seed, 1500, 0.1, |k| (60..420).contains(&k) || (660..1020).contains(&k));
         film(50.0, |t| all[((30.0 * t).round() as usize).min(1499)])
     }
 
