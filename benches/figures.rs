@@ -27,8 +27,9 @@ use std::sync::Arc;
 use std::time::Duration;
 use tracking::{median, timed_ms};
 
-/// With a word, `make bench ONLY=tracking`, `ONLY=wood`, `ONLY=pose` or `ONLY=animate`, only the figures of the tracker, of the
-/// static tree, of the pose of many branches and the model's file, or of the animation.
+/// With a word, `make bench ONLY=tracking`, `ONLY=wood`, `ONLY=pose` or `ONLY=animate`, only the
+/// figures of the tracker, of the static tree, of the pose of many branches and the model's file,
+/// or of the animation.
 fn main() {
     if std::env::args().any(|a| a == "animate") {
         println!("{}", animation());
@@ -55,7 +56,12 @@ fn main() {
         .sample_size(10)
         .warm_up_time(Duration::from_millis(300))
         .measurement_time(Duration::from_secs(3));
-    let lines = [build(&mut criterion, 400, 100), build(&mut criterion, 2000, 1500)].into_iter().chain([
+    let lines = [
+        build(&mut criterion, 400, 100),
+        build(&mut criterion, 2000, 1500),
+    ]
+    .into_iter()
+    .chain([
         dressed(),
         pose(&mut criterion),
         pose_of_127(),
@@ -65,7 +71,11 @@ fn main() {
         replay(&clip, dir.path()),
     ]);
     println!();
-    table.into_iter().chain([String::new()]).chain(lines).for_each(|line| println!("{line}"));
+    table
+        .into_iter()
+        .chain([String::new()])
+        .chain(lines)
+        .for_each(|line| println!("{line}"));
 }
 
 /// The recording in another size.
@@ -73,7 +83,18 @@ fn scaled(dir: &Path, size: &str) -> PathBuf {
     let clip = dir.join(format!("{}.mkv", size.replace(':', "x")));
     let (filter, quality) = (format!("scale={size}"), ["-c:v", "mjpeg", "-q:v", "4"]);
     let mut ffmpeg = Command::new("ffmpeg");
-    ffmpeg.args(["-v", "error", "-nostdin", "-i", support::CLIP, "-vf", &filter]).args(quality).arg(&clip);
+    ffmpeg
+        .args([
+            "-v",
+            "error",
+            "-nostdin",
+            "-i",
+            support::CLIP,
+            "-vf",
+            &filter,
+        ])
+        .args(quality)
+        .arg(&clip);
     assert!(ffmpeg.status().expect("ffmpeg").success());
     clip
 }
@@ -103,15 +124,24 @@ fn built(history: &TrackHistory, outline: &Arc<Outline>) -> Tree {
     pipeline::build(&table, evidence, outline, &config, Moment::default()).expect("a tree")
 }
 
-/// The recording's tracks over and over until there are `points` that move, each some pixels beside its model.
+/// The recording's tracks over and over until there are `points` that move, each some pixels beside
+/// its model.
 fn crowd(history: &TrackHistory, points: usize) -> (TrackTable, Evidence) {
     let settings = Config::default().accumulate;
     let table = history.table(1.0 / COMPARE_HZ);
     let moving = evidence(&table, &settings).moving;
     let beside = |k: usize| {
         let aside = (k / moving.len()) as f32;
-        let place = |p: [f32; 2]| [p[0] + 1.7 * aside.sin() * aside, p[1] + 1.3 * aside.cos() * aside];
-        table.positions[moving[k % moving.len()]].iter().map(|p| p.map(place)).collect()
+        let place = |p: [f32; 2]| {
+            [
+                p[0] + 1.7 * aside.sin() * aside,
+                p[1] + 1.3 * aside.cos() * aside,
+            ]
+        };
+        table.positions[moving[k % moving.len()]]
+            .iter()
+            .map(|p| p.map(place))
+            .collect()
     };
     let crowd = TrackTable {
         ids: (0..points as u32).map(TrackId).collect(),
@@ -128,25 +158,43 @@ fn build(criterion: &mut Criterion, points: usize, bound_ms: u32) -> String {
     let (table, evidence) = crowd(&history, points);
     let table = Arc::new(table);
     let config = Config::default();
-    let whole = || pipeline::build(&table, evidence.clone(), &outline, &config, Moment::default()).expect("a tree");
+    let whole = || {
+        pipeline::build(
+            &table,
+            evidence.clone(),
+            &outline,
+            &config,
+            Moment::default(),
+        )
+        .expect("a tree")
+    };
     let parting = || hierarchy::build(&table, &evidence.moving, [300.0, 330.0], &config.hierarchy);
-    criterion.bench_function(&format!("build of the tree, {points} points"), |b| b.iter(whole));
+    criterion.bench_function(&format!("build of the tree, {points} points"), |b| {
+        b.iter(whole)
+    });
     let ms = median((0..10).map(|_| timed_ms(whole).0).collect());
     let parting_ms = median((0..10).map(|_| timed_ms(parting).0).collect());
     let moving = evidence.moving.len();
-    format!("build of {moving} points: {ms:.0} ms, {parting_ms:.0} ms of it the hierarchy (must be <= {bound_ms})")
+    format!(
+        "build of {moving} points: {ms:.0} ms, {parting_ms:.0} ms of it the hierarchy (must be <= {bound_ms})"
+    )
 }
 
 /// The recording's tree is bare; a crown of noise gives the leaves as much to do as there can be.
 fn crown_of_noise(outline: &Outline) -> Rgb {
     let size = outline.size;
-    let noise = |i: usize| [60, 110, 40].map(|c: usize| (c / 2 + (i * 7919 + i / 640 * 104_729) % c) as u8);
+    let noise =
+        |i: usize| [60, 110, 40].map(|c: usize| (c / 2 + (i * 7919 + i / 640 * 104_729) % c) as u8);
     let sky = [190, 210, 235];
     let colour = |i: usize| if outline.mask[i] > 0 { noise(i) } else { sky };
-    Rgb { size, pixels: (0..size.area()).flat_map(colour).collect() }
+    Rgb {
+        size,
+        pixels: (0..size.area()).flat_map(colour).collect(),
+    }
 }
 
-/// From the built hierarchy to all that is drawn: skeleton in space, wood of 20,000 triangles and its coarser levels, leaves.
+/// From the built hierarchy to all that is drawn: skeleton in space, wood of 20,000 triangles and
+/// its coarser levels, leaves.
 fn dressed() -> String {
     let (history, outline, _) = gathered();
     let tree = built(&history, &outline);
@@ -155,12 +203,28 @@ fn dressed() -> String {
     config.wood.triangles = 20_000;
     let all = || {
         let skeleton = pipeline::stand(&tree.hierarchy, &outline, &config);
-        dress(&skeleton, Seen { picture: Some(&picture), outline: Some(&outline), ..Seen::default() }, &config)
+        dress(
+            &skeleton,
+            Seen {
+                picture: Some(&picture),
+                outline: Some(&outline),
+                ..Seen::default()
+            },
+            &config,
+        )
     };
     let ms = median((0..10).map(|_| timed_ms(all).0).collect());
     let dressed = all();
-    let triangles = dressed.wood.first().map_or(0, |mesh| mesh.indices.len() / 3);
-    let of_leaves: usize = dressed.foliage.groups.iter().map(|g| g.mesh.indices.len() / 3).sum();
+    let triangles = dressed
+        .wood
+        .first()
+        .map_or(0, |mesh| mesh.indices.len() / 3);
+    let of_leaves: usize = dressed
+        .foliage
+        .groups
+        .iter()
+        .map(|g| g.mesh.indices.len() / 3)
+        .sum();
     let twigs = dressed.limbs.iter().filter(|l| l.twig).count();
     format!(
         "static tree of {triangles} triangles of wood with {twigs} twigs and {of_leaves} of leaves: {ms:.0} ms (must be <= 400)"
@@ -177,7 +241,11 @@ fn pose(criterion: &mut Criterion) -> String {
         }
     };
     criterion.bench_function("poses of 330 frames", |b| b.iter(all));
-    let ms = median((0..5).map(|_| timed_ms(all).0 / sets.len() as f64).collect());
+    let ms = median(
+        (0..5)
+            .map(|_| timed_ms(all).0 / sets.len() as f64)
+            .collect(),
+    );
     format!("targets and pose of the recording's tree: {ms:.3} ms a frame (must be <= 0.5)")
 }
 
@@ -186,7 +254,10 @@ fn pose_of_127() -> String {
     let skeleton = Arc::new(synthetic::tree(7, 3));
     let truth = synthetic::sway(&skeleton, 330);
     let seen = |pose: &Pose| -> Vec<Option<[f64; 2]>> {
-        pose.joints[..skeleton.measured()].iter().map(|j| Some(skeleton.image_from_model(&j.position))).collect()
+        pose.joints[..skeleton.measured()]
+            .iter()
+            .map(|j| Some(skeleton.image_from_model(&j.position)))
+            .collect()
     };
     let targets: Vec<_> = truth.iter().map(seen).collect();
     let all = || {
@@ -195,7 +266,11 @@ fn pose_of_127() -> String {
             std::hint::black_box(estimator.step(pose.frame, pose.time_s, targets));
         }
     };
-    let ms = median((0..9).map(|_| timed_ms(all).0 / truth.len() as f64).collect());
+    let ms = median(
+        (0..9)
+            .map(|_| timed_ms(all).0 / truth.len() as f64)
+            .collect(),
+    );
     let (measured, nodes) = (skeleton.measured() - 1, skeleton.nodes.len());
     format!(
         "pose of {measured} measured nodes and {} copies: {ms:.3} ms a frame (must be <= 0.5)",
@@ -212,7 +287,11 @@ fn model_file() -> String {
     let pose = |set: &TrackSet| estimator.step(set.frame, set.time_s, &binding.targets_px(set));
     let poses: Vec<Pose> = sets.iter().map(pose).collect();
     let picture = crown_of_noise(&outline);
-    let seen = Seen { picture: Some(&picture), outline: Some(&outline), ..Seen::default() };
+    let seen = Seen {
+        picture: Some(&picture),
+        outline: Some(&outline),
+        ..Seen::default()
+    };
     let dressed = dress(&tree.skeleton, seen, &config);
     let flutter = pipeline::flutter(&dressed, &poses, &tree.skeleton, &config);
     let provenance = serde_json::Value::Null;
@@ -245,19 +324,36 @@ fn model_file() -> String {
 /// The program itself, everything included: ffmpeg, decoding, all stages, the capture folder.
 fn replay(clip: &Path, dir: &Path) -> String {
     let outline = dir.join("720p.json");
-    let corners: Vec<[i32; 2]> = support::outline().polygon_px.iter().map(|p| [2 * p[0], 2 * p[1]]).collect();
-    std::fs::write(&outline, format!(r#"{{"width": 1280, "height": 720, "polygon_px": {corners:?}}}"#))
-        .expect("outline");
+    let corners: Vec<[i32; 2]> = support::outline()
+        .polygon_px
+        .iter()
+        .map(|p| [2 * p[0], 2 * p[1]])
+        .collect();
+    std::fs::write(
+        &outline,
+        format!(r#"{{"width": 1280, "height": 720, "polygon_px": {corners:?}}}"#),
+    )
+    .expect("outline");
     let run = |k: usize| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
-        command.args(["replay", "--fast", "--headless"]).arg(clip).arg("--outline").arg(&outline);
-        command.arg("--out").arg(dir.join(format!("out{k}"))).stderr(std::process::Stdio::null());
+        command
+            .args(["replay", "--fast", "--headless"])
+            .arg(clip)
+            .arg("--outline")
+            .arg(&outline);
+        command
+            .arg("--out")
+            .arg(dir.join(format!("out{k}")))
+            .stderr(std::process::Stdio::null());
         let (ms, status) = timed_ms(|| command.status().expect("arborcam"));
         assert!(status.success());
         ms
     };
     let ms = median((0..3).map(run).collect());
-    format!("replay: {:.0} frames/s at 1280x720 (must be >= 80)", support::recording().len() as f64 / ms * 1e3)
+    format!(
+        "replay: {:.0} frames/s at 1280x720 (must be >= 80)",
+        support::recording().len() as f64 / ms * 1e3
+    )
 }
 
 /// The test's picture and scribbles at 640x480, as large as the figure asks.
@@ -265,17 +361,27 @@ fn matting() -> String {
     let load = |name: &str| image::open(Path::new("tests/matting").join(name)).expect("picture");
     let (picture, strokes) = (load("picture.png"), load("scribbles.png"));
     let size = Size::new(640, 480);
-    let pixels = picture.resize_exact(640, 480, image::imageops::FilterType::CatmullRom).into_rgb8().into_raw();
+    let pixels = picture
+        .resize_exact(640, 480, image::imageops::FilterType::CatmullRom)
+        .into_rgb8()
+        .into_raw();
     let mark = |&shade: &u8| match shade {
         0 => Mark::Background,
         255 => Mark::Tree,
         _ => Mark::Undecided,
     };
-    let strokes = strokes.resize_exact(640, 480, image::imageops::FilterType::Nearest).into_luma8();
-    let scribbles = Scribbles { name: String::new(), size, marks: strokes.as_raw().iter().map(mark).collect() };
+    let strokes = strokes
+        .resize_exact(640, 480, image::imageops::FilterType::Nearest)
+        .into_luma8();
+    let scribbles = Scribbles {
+        name: String::new(),
+        size,
+        marks: strokes.as_raw().iter().map(mark).collect(),
+    };
     let picture = Rgb { size, pixels };
-    let ms =
-        (0..5).map(|_| timed_ms(|| outline::alpha(&picture, &scribbles).expect("a matte")).0).fold(f64::MAX, f64::min);
+    let ms = (0..5)
+        .map(|_| timed_ms(|| outline::alpha(&picture, &scribbles).expect("a matte")).0)
+        .fold(f64::MAX, f64::min);
     format!("scribbles on a 640x480 picture solved: {ms:.0} ms (must be <= 1500)")
 }
 
@@ -284,8 +390,13 @@ fn animation() -> String {
     let skeleton = Arc::new(synthetic::tree(7, 1));
     let branches = skeleton.nodes.len() - 1;
     let tree = |seed: u32| {
-        let wind = config::Wind { force: 8.0, seed, ..config::Wind::default() };
-        let mut animator = Animator::new(skeleton.clone(), &[], &wind, Wind::new(&wind, 128.0, 0.03));
+        let wind = config::Wind {
+            force: 8.0,
+            seed,
+            ..config::Wind::default()
+        };
+        let mut animator =
+            Animator::new(skeleton.clone(), &[], &wind, Wind::new(&wind, 128.0, 0.03));
         animator.warm_up();
         animator
     };

@@ -1,7 +1,9 @@
-//! The tree over the published ranges of its settings: `make sweep`, or `make sweep CLIP="film outline branches"`.
+//! The tree over the published ranges of its settings: `make sweep`, or `make sweep CLIP="film
+//! outline branches"`.
 //!
-//! Levels 4 to 7 and 10, 100 to 2,000 points, every n-th frame (Zeng); both ways of putting points together. Prints a
-//! table in Markdown. `branches` is written by `scripts/branches-of-clip.py`; without arguments the shipped recording.
+//! Levels 4 to 7 and 10, 100 to 2,000 points, every n-th frame (Zeng); both ways of putting points
+//! together. Prints a table in Markdown. `branches` is written by `scripts/branches-of-clip.py`;
+//! without arguments the shipped recording.
 
 #[path = "../tests/support/branches.rs"]
 mod branches;
@@ -25,7 +27,12 @@ struct Gathered {
     built_s: f64,
 }
 
-fn gathered(clip: &Path, outline: &Path, points: u32, every: usize) -> (Gathered, Arc<arborcam::model::Outline>) {
+fn gathered(
+    clip: &Path,
+    outline: &Path,
+    points: u32,
+    every: usize,
+) -> (Gathered, Arc<arborcam::model::Outline>) {
     let mut config = Config::default();
     config.detect.points = points;
     // More points find room only if they may stand closer.
@@ -33,20 +40,34 @@ fn gathered(clip: &Path, outline: &Path, points: u32, every: usize) -> (Gathered
     let mut source = source::open(clip, &config.camera, None).expect("clip");
     let mut decoder = Decoder::new().expect("decoder");
     let given = arborcam::outline::load(outline, source.describe().size).expect("outline");
-    let Given::Region(outline) = given else { panic!("the sweep takes a polygon or a mask, no scribbles") };
+    let Given::Region(outline) = given else {
+        panic!("the sweep takes a polygon or a mask, no scribbles")
+    };
     let mut pipeline = Pipeline::new(&config, Some(outline.clone()));
-    let mut gathered =
-        Gathered { history: TrackHistory::new(config.accumulate.window_s), born: Births::default(), built_s: 0.0 };
+    let mut gathered = Gathered {
+        history: TrackHistory::new(config.accumulate.window_s),
+        born: Births::default(),
+        built_s: 0.0,
+    };
     let (mut index, mut start_s) = (0, None);
     while let Some(raw) = source.next_frame().expect("frame") {
         index += 1;
         if (index - 1) % every != 0 {
             continue;
         }
-        let mut luma = Luma { size: raw.size, pixels: Vec::new() };
+        let mut luma = Luma {
+            size: raw.size,
+            pixels: Vec::new(),
+        };
         decoder.luma(&raw, &mut luma).expect("picture");
         let time_s = raw.sensor_time_s - *start_s.get_or_insert(raw.sensor_time_s);
-        let frame = Frame { index: (index - 1) as u64, time_s, received: Instant::now(), luma, preview: None };
+        let frame = Frame {
+            index: (index - 1) as u64,
+            time_s,
+            received: Instant::now(),
+            luma,
+            preview: None,
+        };
         for moved in pipeline.step(frame) {
             gathered.born.take_note(&moved.tracks);
             if pipeline.back.tree().is_none() || gathered.built_s == 0.0 {
@@ -60,7 +81,13 @@ fn gathered(clip: &Path, outline: &Path, points: u32, every: usize) -> (Gathered
     (gathered, Arc::new(outline))
 }
 
-fn row(gathered: &Gathered, outline: &Arc<arborcam::model::Outline>, truth: &Truth, what: &str, config: &Config) {
+fn row(
+    gathered: &Gathered,
+    outline: &Arc<arborcam::model::Outline>,
+    truth: &Truth,
+    what: &str,
+    config: &Config,
+) {
     let table = Arc::new(gathered.history.table(1.0 / COMPARE_HZ));
     let evidence = evidence(&table, &config.accumulate);
     let mut times = Vec::new();
@@ -78,42 +105,94 @@ fn row(gathered: &Gathered, outline: &Arc<arborcam::model::Outline>, truth: &Tru
     let (_, share) = triplets(truth, &tree.hierarchy, &gathered.born);
     let nodes = tree.skeleton.measured();
     let points = tree.hierarchy.clusters[0].members.len();
-    println!("| {what} | {points} | {share:.3} | {nodes} | {:.0} |", times[2]);
+    println!(
+        "| {what} | {points} | {share:.3} | {nodes} | {:.0} |",
+        times[2]
+    );
 }
 
 fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
-    let or = |k: usize, default: &str| arguments.get(k).cloned().unwrap_or_else(|| default.to_owned());
+    let arguments: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|a| !a.starts_with("--"))
+        .collect();
+    let or = |k: usize, default: &str| {
+        arguments
+            .get(k)
+            .cloned()
+            .unwrap_or_else(|| default.to_owned())
+    };
     let clip = or(0, "recordings/sparse_winter.mkv");
     let outline = or(1, "recordings/sparse_winter.outline.json");
     let truth = Truth::read(Path::new(&or(2, branches::BRANCHES)));
-    println!("| settings | points in the tree | triplets | nodes | build, ms |\n|---|---|---|---|---|");
+    println!(
+        "| settings | points in the tree | triplets | nodes | build, ms |\n|---|---|---|---|---|"
+    );
     let default = Config::default();
-    for (points, every) in [(400, 1), (100, 1), (200, 1), (800, 1), (1200, 1), (2000, 1), (400, 2), (400, 3), (400, 5)]
-    {
+    for (points, every) in [
+        (400, 1),
+        (100, 1),
+        (200, 1),
+        (800, 1),
+        (1200, 1),
+        (2000, 1),
+        (400, 2),
+        (400, 3),
+        (400, 5),
+    ] {
         let (gathered, outline) = gathered(Path::new(&clip), Path::new(&outline), points, every);
         let mut config = default.clone();
-        let base = format!("{points} points, every frame in {every}, built at {:.1} s", gathered.built_s);
+        let base = format!(
+            "{points} points, every frame in {every}, built at {:.1} s",
+            gathered.built_s
+        );
         row(&gathered, &outline, &truth, &base, &config);
         if (points, every) == (400, 1) {
             for levels in [4, 5, 6, 10] {
                 config.hierarchy.levels = levels;
-                row(&gathered, &outline, &truth, &format!("{levels} levels"), &config);
+                row(
+                    &gathered,
+                    &outline,
+                    &truth,
+                    &format!("{levels} levels"),
+                    &config,
+                );
             }
             config.hierarchy.levels = 7;
             for max_children in [2, 8] {
                 config.hierarchy.max_children = max_children;
-                row(&gathered, &outline, &truth, &format!("at most {max_children} children"), &config);
+                row(
+                    &gathered,
+                    &outline,
+                    &truth,
+                    &format!("at most {max_children} children"),
+                    &config,
+                );
             }
             config = default.clone();
             for min_certainty in [0.0, 0.3, 0.7] {
                 config.hierarchy.min_certainty = min_certainty;
-                row(&gathered, &outline, &truth, &format!("certainty at least {min_certainty}"), &config);
+                row(
+                    &gathered,
+                    &outline,
+                    &truth,
+                    &format!("certainty at least {min_certainty}"),
+                    &config,
+                );
             }
         }
         config = default.clone();
-        (config.hierarchy.affinity, config.hierarchy.max_children, config.hierarchy.min_certainty) =
-            (Affinity::Zeng, 2, 0.0);
-        row(&gathered, &outline, &truth, "– the same, as in the papers", &config);
+        (
+            config.hierarchy.affinity,
+            config.hierarchy.max_children,
+            config.hierarchy.min_certainty,
+        ) = (Affinity::Zeng, 2, 0.0);
+        row(
+            &gathered,
+            &outline,
+            &truth,
+            "– the same, as in the papers",
+            &config,
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! Panics in other people's code that are caught, and known as such to whoever else hears of panics.
+//! Panics in other people's code that are caught, and known as such to whoever else hears of
+//! panics.
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -7,7 +8,8 @@ thread_local! {
     static CATCHING: Cell<bool> = const { Cell::new(false) };
 }
 
-/// What `call` gives; `None` if it panicked, after which nothing that it worked on is to be used again.
+/// What `call` gives; `None` if it panicked, after which nothing that it worked on is to be used
+/// again.
 pub fn caught<T>(call: impl FnOnce() -> T) -> Option<T> {
     let before = CATCHING.replace(true);
     let done = catch_unwind(AssertUnwindSafe(call)).ok();
@@ -15,8 +17,8 @@ pub fn caught<T>(call: impl FnOnce() -> T) -> Option<T> {
     done
 }
 
-/// Whether a panic on this thread would be caught by [`caught`]. A hook runs before anything is caught, and must not take
-/// such a panic for the end.
+/// Whether a panic on this thread would be caught by [`caught`]. A hook runs before anything is
+/// caught, and must not take such a panic for the end.
 pub fn catching() -> bool {
     CATCHING.get()
 }

@@ -1,4 +1,5 @@
-//! Settings: plain structs whose defaults are the documented ones. A file overrides a default, the command line a file.
+//! Settings: plain structs whose defaults are the documented ones. A file overrides a default, the
+//! command line a file.
 
 mod dynamics;
 mod hierarchy;
@@ -165,10 +166,12 @@ pub struct Motion {
     /// Standard deviation of the branching angle at the root and at the tips, degrees (eq. 10).
     pub sigma_shape_root_deg: f64,
     pub sigma_shape_tip_deg: f64,
-    /// How fast a branch is expected to lean towards the viewer or away, degrees a second (standard deviation): the
-    /// picture hardly shows it, so tracking noise would else make the tree tremble in depth.
+    /// How fast a branch is expected to lean towards the viewer or away, degrees a second (standard
+    /// deviation): the picture hardly shows it, so tracking noise would else make the tree tremble
+    /// in depth.
     pub depth_rate_deg_s: f64,
-    /// Largest rotation of a branch against its parent from one frame to the next (in 1/30 s, where frames are rarer), degrees.
+    /// Largest rotation of a branch against its parent from one frame to the next (in 1/30 s, where
+    /// frames are rarer), degrees.
     pub max_step_deg: f64,
     /// Largest accumulated rotation of a branch against its parent, degrees.
     pub max_total_deg: f64,
@@ -208,22 +211,43 @@ impl Default for Camera {
 }
 impl Default for Outline {
     fn default() -> Self {
-        Self { gather_s: 2.0, give_up_s: 20.0 }
+        Self {
+            gather_s: 2.0,
+            give_up_s: 20.0,
+        }
     }
 }
 impl Default for Detect {
     fn default() -> Self {
-        Self { points: 400, min_distance_px: 5.0, quality: 0.0005, border_px: 5.0 }
+        Self {
+            points: 400,
+            min_distance_px: 5.0,
+            quality: 0.0005,
+            border_px: 5.0,
+        }
     }
 }
 impl Default for Track {
     fn default() -> Self {
-        Self { window_px: 15, levels: 3, fb_limit_px: 1.0, anchor_every: 2, anchor_ncc: 0.6, coast_s: 5.0 }
+        Self {
+            window_px: 15,
+            levels: 3,
+            fb_limit_px: 1.0,
+            anchor_every: 2,
+            anchor_ncc: 0.6,
+            coast_s: 5.0,
+        }
     }
 }
 impl Default for Accumulate {
     fn default() -> Self {
-        Self { window_s: 20.0, min_s: 8.0, threshold: 0.4, moving_snr: 4.0, refine_s: 120.0 }
+        Self {
+            window_s: 20.0,
+            min_s: 8.0,
+            threshold: 0.4,
+            moving_snr: 4.0,
+            refine_s: 120.0,
+        }
     }
 }
 impl Default for Skeleton {
@@ -246,7 +270,10 @@ impl Default for Motion {
 }
 impl Default for Export {
     fn default() -> Self {
-        Self { animation_s: 60.0, metres_per_px: 0.0 }
+        Self {
+            animation_s: 60.0,
+            metres_per_px: 0.0,
+        }
     }
 }
 
@@ -254,22 +281,36 @@ impl Default for Export {
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
     #[error("cannot read configuration {path}: {source}; check the name")]
-    Unreadable { path: String, source: std::io::Error },
+    Unreadable {
+        path: String,
+        source: std::io::Error,
+    },
     #[error("configuration {path}, line {line}: {what}")]
-    BadEntry { path: String, line: usize, what: String },
+    BadEntry {
+        path: String,
+        line: usize,
+        what: String,
+    },
     #[error("configuration: {key} = {value} is out of range; allowed: {allowed}")]
-    OutOfRange { key: &'static str, value: f64, allowed: &'static str },
+    OutOfRange {
+        key: &'static str,
+        value: f64,
+        allowed: &'static str,
+    },
 }
 
 impl Config {
     /// Reads a TOML file over the defaults.
     ///
     /// # Errors
-    /// The file cannot be read, is no TOML, has an unknown key or a value of the wrong kind or out of range.
+    /// The file cannot be read, is no TOML, has an unknown key or a value of the wrong kind or out
+    /// of range.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
         let shown = path.display().to_string();
-        let text =
-            std::fs::read_to_string(path).map_err(|source| ConfigError::Unreadable { path: shown.clone(), source })?;
+        let text = std::fs::read_to_string(path).map_err(|source| ConfigError::Unreadable {
+            path: shown.clone(),
+            source,
+        })?;
         Self::parse(&text, &shown)
     }
 
@@ -281,7 +322,11 @@ impl Config {
         let config: Config = toml::from_str(text).map_err(|e| {
             let at = e.span().map_or(0, |s| s.start);
             let line = text[..at.min(text.len())].matches('\n').count() + 1;
-            ConfigError::BadEntry { path: name.into(), line, what: e.message().replace('\n', " ") }
+            ConfigError::BadEntry {
+                path: name.into(),
+                line,
+                what: e.message().replace('\n', " "),
+            }
         })?;
         config.check()?;
         Ok(config)
@@ -295,59 +340,231 @@ impl Config {
         let positive = (f64::MIN_POSITIVE, 1e9, "greater than 0");
         let share = (0.0, 1.0, "0 to 1");
         let rules = vec![
-            ("camera.width", self.camera.width.into(), (16.0, 16384.0, "16 to 16384")),
-            ("camera.height", self.camera.height.into(), (16.0, 16384.0, "16 to 16384")),
-            ("camera.rate_hz", self.camera.rate_hz.into(), (1.0, 1000.0, "1 to 1000")),
-            ("camera.timeout_s", self.camera.timeout_s, (0.05, 3600.0, "0.05 to 3600")),
-            ("camera.retry_delay_s", self.camera.retry_delay_s, (0.05, 3600.0, "0.05 to 3600")),
-            ("outline.gather_s", self.outline.gather_s, (0.1, 60.0, "0.1 to 60")),
-            ("outline.give_up_s", self.outline.give_up_s, (0.1, 3600.0, "0.1 to 3600")),
-            ("detect.points", self.detect.points.into(), (16.0, 2000.0, "16 to 2000")),
-            ("detect.min_distance_px", self.detect.min_distance_px, (1.0, 100.0, "1 to 100")),
-            ("detect.quality", self.detect.quality, (1e-9, 1.0, "above 0, at most 1")),
-            ("detect.border_px", self.detect.border_px, (0.0, 100.0, "0 to 100")),
-            ("track.window_px", self.track.window_px.into(), (5.0, 61.0, "5 to 61")),
-            ("track.levels", self.track.levels.into(), (0.0, 6.0, "0 to 6")),
+            (
+                "camera.width",
+                self.camera.width.into(),
+                (16.0, 16384.0, "16 to 16384"),
+            ),
+            (
+                "camera.height",
+                self.camera.height.into(),
+                (16.0, 16384.0, "16 to 16384"),
+            ),
+            (
+                "camera.rate_hz",
+                self.camera.rate_hz.into(),
+                (1.0, 1000.0, "1 to 1000"),
+            ),
+            (
+                "camera.timeout_s",
+                self.camera.timeout_s,
+                (0.05, 3600.0, "0.05 to 3600"),
+            ),
+            (
+                "camera.retry_delay_s",
+                self.camera.retry_delay_s,
+                (0.05, 3600.0, "0.05 to 3600"),
+            ),
+            (
+                "outline.gather_s",
+                self.outline.gather_s,
+                (0.1, 60.0, "0.1 to 60"),
+            ),
+            (
+                "outline.give_up_s",
+                self.outline.give_up_s,
+                (0.1, 3600.0, "0.1 to 3600"),
+            ),
+            (
+                "detect.points",
+                self.detect.points.into(),
+                (16.0, 2000.0, "16 to 2000"),
+            ),
+            (
+                "detect.min_distance_px",
+                self.detect.min_distance_px,
+                (1.0, 100.0, "1 to 100"),
+            ),
+            (
+                "detect.quality",
+                self.detect.quality,
+                (1e-9, 1.0, "above 0, at most 1"),
+            ),
+            (
+                "detect.border_px",
+                self.detect.border_px,
+                (0.0, 100.0, "0 to 100"),
+            ),
+            (
+                "track.window_px",
+                self.track.window_px.into(),
+                (5.0, 61.0, "5 to 61"),
+            ),
+            (
+                "track.levels",
+                self.track.levels.into(),
+                (0.0, 6.0, "0 to 6"),
+            ),
             ("track.fb_limit_px", self.track.fb_limit_px, positive),
             ("track.anchor_ncc", self.track.anchor_ncc, share),
             ("track.coast_s", self.track.coast_s, (0.0, 60.0, "0 to 60")),
-            ("accumulate.window_s", self.accumulate.window_s, (1.0, 120.0, "1 to 120")),
-            ("accumulate.min_s", self.accumulate.min_s, (0.2, 100.0, "0.2 to 100")),
+            (
+                "accumulate.window_s",
+                self.accumulate.window_s,
+                (1.0, 120.0, "1 to 120"),
+            ),
+            (
+                "accumulate.min_s",
+                self.accumulate.min_s,
+                (0.2, 100.0, "0.2 to 100"),
+            ),
             ("accumulate.threshold", self.accumulate.threshold, share),
-            ("accumulate.moving_snr", self.accumulate.moving_snr, positive),
-            ("accumulate.refine_s", self.accumulate.refine_s, (0.0, 3600.0, "0 (never) to 3600")),
-            ("hierarchy.levels", self.hierarchy.levels.into(), (2.0, 10.0, "2 to 10")),
-            ("hierarchy.motion_power", self.hierarchy.motion_power, (0.1, 32.0, "0.1 to 32")),
-            ("hierarchy.path_weight", self.hierarchy.path_weight, (0.0, 100.0, "0 to 100")),
-            ("hierarchy.max_children", self.hierarchy.max_children.into(), (2.0, 64.0, "2 to 64")),
-            ("hierarchy.min_certainty", self.hierarchy.min_certainty, share),
-            ("hierarchy.distance_scale", self.hierarchy.distance_scale, positive),
-            ("hierarchy.correlation_power", self.hierarchy.correlation_power, (0.1, 32.0, "0.1 to 32")),
-            ("hierarchy.agreement", self.hierarchy.agreement, (-1.0, 1.0, "-1 to 1")),
-            ("hierarchy.min_points", self.hierarchy.min_points.into(), (2.0, 1000.0, "2 to 1000")),
-            ("skeleton.fold", self.skeleton.fold, (0.0, 0.95, "0 to 0.95")),
-            ("shape.planes", self.shape.planes.into(), (1.0, 8.0, "1 to 8")),
-            ("shape.attractors", self.shape.attractors.into(), (8.0, 5000.0, "8 to 5000")),
-            ("shape.push_options", self.shape.push_options.into(), (1.0, 1001.0, "1 to 1001")),
-            ("shape.push_range", self.shape.push_range, (0.0, 2.0, "0 to 2")),
-            ("shape.passes", self.shape.passes.into(), (1.0, 20.0, "1 to 20")),
-            ("shape.angle_tolerance", self.shape.angle_tolerance, (0.01, 100.0, "0.01 to 100")),
+            (
+                "accumulate.moving_snr",
+                self.accumulate.moving_snr,
+                positive,
+            ),
+            (
+                "accumulate.refine_s",
+                self.accumulate.refine_s,
+                (0.0, 3600.0, "0 (never) to 3600"),
+            ),
+            (
+                "hierarchy.levels",
+                self.hierarchy.levels.into(),
+                (2.0, 10.0, "2 to 10"),
+            ),
+            (
+                "hierarchy.motion_power",
+                self.hierarchy.motion_power,
+                (0.1, 32.0, "0.1 to 32"),
+            ),
+            (
+                "hierarchy.path_weight",
+                self.hierarchy.path_weight,
+                (0.0, 100.0, "0 to 100"),
+            ),
+            (
+                "hierarchy.max_children",
+                self.hierarchy.max_children.into(),
+                (2.0, 64.0, "2 to 64"),
+            ),
+            (
+                "hierarchy.min_certainty",
+                self.hierarchy.min_certainty,
+                share,
+            ),
+            (
+                "hierarchy.distance_scale",
+                self.hierarchy.distance_scale,
+                positive,
+            ),
+            (
+                "hierarchy.correlation_power",
+                self.hierarchy.correlation_power,
+                (0.1, 32.0, "0.1 to 32"),
+            ),
+            (
+                "hierarchy.agreement",
+                self.hierarchy.agreement,
+                (-1.0, 1.0, "-1 to 1"),
+            ),
+            (
+                "hierarchy.min_points",
+                self.hierarchy.min_points.into(),
+                (2.0, 1000.0, "2 to 1000"),
+            ),
+            (
+                "skeleton.fold",
+                self.skeleton.fold,
+                (0.0, 0.95, "0 to 0.95"),
+            ),
+            (
+                "shape.planes",
+                self.shape.planes.into(),
+                (1.0, 8.0, "1 to 8"),
+            ),
+            (
+                "shape.attractors",
+                self.shape.attractors.into(),
+                (8.0, 5000.0, "8 to 5000"),
+            ),
+            (
+                "shape.push_options",
+                self.shape.push_options.into(),
+                (1.0, 1001.0, "1 to 1001"),
+            ),
+            (
+                "shape.push_range",
+                self.shape.push_range,
+                (0.0, 2.0, "0 to 2"),
+            ),
+            (
+                "shape.passes",
+                self.shape.passes.into(),
+                (1.0, 20.0, "1 to 20"),
+            ),
+            (
+                "shape.angle_tolerance",
+                self.shape.angle_tolerance,
+                (0.01, 100.0, "0.01 to 100"),
+            ),
             ("wood.curl", self.wood.curl, share),
-            ("wood.twig_px", self.wood.twig_px, (0.0, 500.0, "0 (no twigs) to 500")),
-            ("wood.max_twigs", self.wood.max_twigs.into(), (0.0, 50_000.0, "0 to 50000")),
-            ("wood.trunk_width_px", self.wood.trunk_width_px, (0.0, 1000.0, "0 (measured) to 1000")),
-            ("wood.triangles", self.wood.triangles.into(), (100.0, 1e6, "100 to 1000000")),
+            (
+                "wood.twig_px",
+                self.wood.twig_px,
+                (0.0, 500.0, "0 (no twigs) to 500"),
+            ),
+            (
+                "wood.max_twigs",
+                self.wood.max_twigs.into(),
+                (0.0, 50_000.0, "0 to 50000"),
+            ),
+            (
+                "wood.trunk_width_px",
+                self.wood.trunk_width_px,
+                (0.0, 1000.0, "0 (measured) to 1000"),
+            ),
+            (
+                "wood.triangles",
+                self.wood.triangles.into(),
+                (100.0, 1e6, "100 to 1000000"),
+            ),
         ];
         let motion = &self.motion;
         let more = [
             ("motion.sigma_track_px", motion.sigma_track_px, positive),
-            ("motion.sigma_shape_root_deg", motion.sigma_shape_root_deg, positive),
-            ("motion.sigma_shape_tip_deg", motion.sigma_shape_tip_deg, positive),
+            (
+                "motion.sigma_shape_root_deg",
+                motion.sigma_shape_root_deg,
+                positive,
+            ),
+            (
+                "motion.sigma_shape_tip_deg",
+                motion.sigma_shape_tip_deg,
+                positive,
+            ),
             ("motion.depth_rate_deg_s", motion.depth_rate_deg_s, positive),
-            ("motion.max_step_deg", motion.max_step_deg, (0.01, 180.0, "0.01 to 180")),
-            ("motion.max_total_deg", motion.max_total_deg, (0.01, 180.0, "0.01 to 180")),
-            ("export.animation_s", self.export.animation_s, (0.1, 3600.0, "0.1 to 3600")),
-            ("export.metres_per_px", self.export.metres_per_px, (0.0, 1e6, "0 (pixels) or more")),
+            (
+                "motion.max_step_deg",
+                motion.max_step_deg,
+                (0.01, 180.0, "0.01 to 180"),
+            ),
+            (
+                "motion.max_total_deg",
+                motion.max_total_deg,
+                (0.01, 180.0, "0.01 to 180"),
+            ),
+            (
+                "export.animation_s",
+                self.export.animation_s,
+                (0.1, 3600.0, "0.1 to 3600"),
+            ),
+            (
+                "export.metres_per_px",
+                self.export.metres_per_px,
+                (0.0, 1e6, "0 (pixels) or more"),
+            ),
         ];
         for (key, value, (low, high, allowed)) in rules
             .into_iter()
@@ -357,18 +574,30 @@ impl Config {
             .chain(self.wind.rules())
         {
             if !(low..=high).contains(&value) {
-                return Err(ConfigError::OutOfRange { key, value, allowed });
+                return Err(ConfigError::OutOfRange {
+                    key,
+                    value,
+                    allowed,
+                });
             }
         }
         if self.accumulate.min_s > 0.9 * self.accumulate.window_s {
             // The memory would never span that time, and the tree never be built.
             let value = self.accumulate.min_s;
             let allowed = "at most nine tenths of accumulate.window_s";
-            return Err(ConfigError::OutOfRange { key: "accumulate.min_s", value, allowed });
+            return Err(ConfigError::OutOfRange {
+                key: "accumulate.min_s",
+                value,
+                allowed,
+            });
         }
         if self.track.window_px.is_multiple_of(2) {
             let value = self.track.window_px.into();
-            return Err(ConfigError::OutOfRange { key: "track.window_px", value, allowed: "an odd number" });
+            return Err(ConfigError::OutOfRange {
+                key: "track.window_px",
+                value,
+                allowed: "an odd number",
+            });
         }
         Ok(())
     }

@@ -1,7 +1,8 @@
 //! The whole algorithm on one screen: what arborcam means, one synchronous step per frame.
 //!
-//! The front end finds the outline and follows points; the back end gathers their motion, builds the tree, and
-//! from then on poses it and now and then builds it anew. `runtime` runs the same two halves on threads of their own.
+//! The front end finds the outline and follows points; the back end gathers their motion, builds
+//! the tree, and from then on poses it and now and then builds it anew. `runtime` runs the same two
+//! halves on threads of their own.
 
 mod back;
 mod bark;
@@ -46,17 +47,29 @@ pub struct Pipeline {
 
 impl Pipeline {
     pub fn new(config: &Config, outline: Option<Outline>) -> Self {
-        Self { front: FrontEnd::new(config, outline), back: BackEnd::new(config) }
+        Self {
+            front: FrontEnd::new(config, outline),
+            back: BackEnd::new(config),
+        }
     }
 
     /// One frame in; what became of it and of frames held back before, in order.
     pub fn step(&mut self, frame: Frame) -> Vec<Moved> {
-        self.front.step(frame).into_iter().map(|followed| self.back.step(followed)).collect()
+        self.front
+            .step(frame)
+            .into_iter()
+            .map(|followed| self.back.step(followed))
+            .collect()
     }
 
     /// No more frames: works off what is held and builds from what there is.
     pub fn finish(&mut self) -> Vec<Moved> {
-        let moved = self.front.flush().into_iter().map(|followed| self.back.step(followed)).collect();
+        let moved = self
+            .front
+            .flush()
+            .into_iter()
+            .map(|followed| self.back.step(followed))
+            .collect();
         self.back.finish(&|| true);
         moved
     }
@@ -88,8 +101,8 @@ pub struct Tree {
     pub forced: bool,
     /// How the first tree of the capture came about: this one, unless it is refined.
     pub first: First,
-    /// How often the tree was built anew, the names that have been given so far, and how many of the measured nodes have
-    /// one from the tree before.
+    /// How often the tree was built anew, the names that have been given so far, and how many of
+    /// the measured nodes have one from the tree before.
     pub refinements: u32,
     pub names: u32,
     pub kept: usize,
@@ -107,7 +120,8 @@ pub struct First {
     pub forced: bool,
 }
 
-/// When a tree is built: the first frame that is remembered, the newest, its time, and whether the build was asked for.
+/// When a tree is built: the first frame that is remembered, the newest, its time, and whether the
+/// build was asked for.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Moment {
     pub followed_from: u64,
@@ -120,7 +134,12 @@ impl Moment {
     /// That of the newest frame of `history`; `None` where nothing is remembered.
     fn of(history: &TrackHistory, forced: bool) -> Option<Self> {
         let (first, newest) = (history.first()?, history.last()?);
-        Some(Self { followed_from: first.frame, frame: newest.frame, time_s: newest.time_s, forced })
+        Some(Self {
+            followed_from: first.frame,
+            frame: newest.frame,
+            time_s: newest.time_s,
+            forced,
+        })
     }
 }
 
@@ -134,10 +153,20 @@ impl Tree {
 
     /// The points of the shoots with node and rest place, px.
     fn on_shoots(&self) -> BTreeMap<TrackId, (NodeId, [f64; 2])> {
-        let rest_px = |id: &TrackId| self.inherited.get(id).map(|(_, at)| at).or_else(|| self.rest_px.get(id)).copied();
+        let rest_px = |id: &TrackId| {
+            self.inherited
+                .get(id)
+                .map(|(_, at)| at)
+                .or_else(|| self.rest_px.get(id))
+                .copied()
+        };
         let nodes = (self.plain.measured() as u32..).map(NodeId);
         let of = |(node, shoot): (NodeId, &Shoot)| {
-            shoot.members.iter().filter_map(move |id| Some((*id, (node, rest_px(id)?)))).collect::<Vec<_>>()
+            shoot
+                .members
+                .iter()
+                .filter_map(move |id| Some((*id, (node, rest_px(id)?))))
+                .collect::<Vec<_>>()
         };
         nodes.zip(&self.shoots).flat_map(of).collect()
     }
@@ -154,7 +183,8 @@ impl Tree {
         PoseEstimator::new(self.skeleton.clone(), &config.motion)
     }
 
-    /// The skeleton in the picture that it was stood up from, with the number of points on every node.
+    /// The skeleton in the picture that it was stood up from, with the number of points on every
+    /// node.
     pub fn flat(&self, config: &Config) -> (Vec<skeleton::Node2d>, Vec<u32>) {
         flat(&self.hierarchy, &self.outline, config)
     }
@@ -162,12 +192,14 @@ impl Tree {
     /// The same with its foot at `foot_px`: that of a capture's first tree stays.
     fn flat_on(&self, foot_px: [f64; 2], config: &Config) -> (Vec<skeleton::Node2d>, Vec<u32>) {
         let (mut flat, tracks) = self.flat(config);
-        flat.iter_mut().take(1).for_each(|foot| foot.position_px = foot_px);
+        flat.iter_mut()
+            .take(1)
+            .for_each(|foot| foot.position_px = foot_px);
         (flat, tracks)
     }
 
-    /// How well its push fills the envelope, and how likely its angles are, beside the one-sided ways; without shoots, which are
-    /// not pushed.
+    /// How well its push fills the envelope, and how likely its angles are, beside the one-sided
+    /// ways; without shoots, which are not pushed.
     pub fn push_figures(&self, config: &Config) -> PushFigures {
         let (flat, tracks) = self.flat_on(self.plain.foot_px, config);
         PushFigures::of(&self.plain, &flat, &tracks, &self.outline, &config.shape)
@@ -175,7 +207,10 @@ impl Tree {
 
     /// Tracks to poses, from the rest pose on.
     fn poser(&self, config: &Config) -> Poser {
-        Poser { binding: self.binding(), estimator: self.estimator(config) }
+        Poser {
+            binding: self.binding(),
+            estimator: self.estimator(config),
+        }
     }
 }
 
@@ -192,34 +227,59 @@ impl Poser {
     /// The pose in the next frame, and where its tracks put the measured nodes.
     fn step(&mut self, tracks: &TrackSet) -> (Pose, Targets) {
         let targets_px = self.binding.targets_px(tracks);
-        let pose = self.estimator.step(tracks.frame, tracks.time_s, &targets_px);
+        let pose = self
+            .estimator
+            .step(tracks.frame, tracks.time_s, &targets_px);
         (pose, targets_px)
     }
 }
 
 /// Where the crown is, from the left, px: the mean of the points that move.
 fn crown_u(table: &TrackTable, moving: &[usize]) -> Option<f64> {
-    let sum: f64 = moving.iter().map(|&row| hierarchy::rest_position_px(table, row)[0]).sum();
+    let sum: f64 = moving
+        .iter()
+        .map(|&row| hierarchy::rest_position_px(table, row)[0])
+        .sum();
     (!moving.is_empty()).then(|| sum / moving.len() as f64)
 }
 
 /// The skeleton in the picture, and the number of points on every node.
-fn flat(hierarchy: &MotionHierarchy, outline: &Outline, config: &Config) -> (Vec<skeleton::Node2d>, Vec<u32>) {
+fn flat(
+    hierarchy: &MotionHierarchy,
+    outline: &Outline,
+    config: &Config,
+) -> (Vec<skeleton::Node2d>, Vec<u32>) {
     let flat = skeleton::build(hierarchy, outline, &config.skeleton);
-    let cluster = |n: &skeleton::Node2d| hierarchy.clusters.get(n.cluster.map_or(0, |c| c.0 as usize));
-    let tracks = flat.iter().map(|n| cluster(n).map_or(0, |c| c.members.len() as u32)).collect();
+    let cluster = |n: &skeleton::Node2d| {
+        hierarchy
+            .clusters
+            .get(n.cluster.map_or(0, |c| c.0 as usize))
+    };
+    let tracks = flat
+        .iter()
+        .map(|n| cluster(n).map_or(0, |c| c.members.len() as u32))
+        .collect();
     (flat, tracks)
 }
 
 /// Radii, from the trunk's as it was given or as the outline shows it.
 fn thicken(skeleton: &mut Skeleton, outline: &Outline, config: &Config) {
     let wood = &config.wood;
-    let top_px = skeleton.nodes.get(1).map_or(skeleton.foot_px, |top| skeleton.image_from_model(&top.position));
+    let top_px = skeleton.nodes.get(1).map_or(skeleton.foot_px, |top| {
+        skeleton.image_from_model(&top.position)
+    });
     let measured = shape::trunk_radius_px(outline, skeleton.foot_px, top_px);
     let given = Some(0.5 * wood.trunk_width_px).filter(|&given| given > 0.0);
     let at_foot = || TRUNK_SHARE * skeleton::Foot::of(outline, None).half_width_px;
-    let trunk_px = given.or(measured).unwrap_or_else(at_foot).max(2.0 * shape::TIP_RADIUS_PX);
-    let room = dress::room(skeleton, Some(outline), dress::Bounds::Filmed(config.shape.envelope));
+    let trunk_px = given
+        .or(measured)
+        .unwrap_or_else(at_foot)
+        .max(2.0 * shape::TIP_RADIUS_PX);
+    let room = dress::room(
+        skeleton,
+        Some(outline),
+        dress::Bounds::Filmed(config.shape.envelope),
+    );
     shape::thicken(skeleton, trunk_px, &room, wood, wood.seed.into());
 }
 
@@ -229,19 +289,34 @@ pub fn build(
     evidence: Evidence,
     outline: &Arc<Outline>,
     config: &Config,
-    Moment { followed_from, frame, time_s, forced }: Moment,
+    Moment {
+        followed_from,
+        frame,
+        time_s,
+        forced,
+    }: Moment,
 ) -> Option<Tree> {
     if evidence.moving.len() < LEAST_MOVING {
         return None;
     }
     let foot_px = skeleton::Foot::of(outline, crown_u(table, &evidence.moving)).position_px;
     let hierarchy = hierarchy::build(table, &evidence.moving, foot_px, &config.hierarchy);
-    if hierarchy.clusters.first().is_none_or(|all| all.members.len() < LEAST_MOVING) {
+    if hierarchy
+        .clusters
+        .first()
+        .is_none_or(|all| all.members.len() < LEAST_MOVING)
+    {
         return None;
     }
     let skeleton = Arc::new(stand(&hierarchy, outline, config));
     let rest = |row: usize| (table.ids[row], hierarchy::rest_position_px(table, row));
-    let first = First { frame, time_s, measure: evidence.measure, moving: evidence.moving.len(), forced };
+    let first = First {
+        frame,
+        time_s,
+        measure: evidence.measure,
+        moving: evidence.moving.len(),
+        forced,
+    };
     Some(Tree {
         rest_px: (0..table.ids.len()).map(rest).collect(),
         hierarchy,

@@ -22,23 +22,39 @@ fn tree(config: &Config) -> (MotionHierarchy, Births) {
         }
     }
     pipeline.finish();
-    (pipeline.back.tree().expect("a tree").hierarchy.clone(), born)
+    (
+        pipeline.back.tree().expect("a tree").hierarchy.clone(),
+        born,
+    )
 }
 
-/// The papers' method on the textbook's tracks puts 0.64 of the triplets in order, on these tracks 0.90, the default 0.96.
+/// The papers' method on the textbook's tracks puts 0.64 of the triplets in order, on these tracks
+/// 0.90, the default 0.96.
 #[test]
 fn the_tree_parts_where_the_true_one_does() {
     let truth = Truth::read(Path::new(BRANCHES));
     let (hierarchy, born) = tree(&Config::default());
     let (points, share) = triplets(&truth, &hierarchy, &born);
-    println!("{points} points in {} clusters, triplets in order: {share:.3}", hierarchy.clusters.len());
-    assert!(points >= 60, "{points} points can be held against the truth");
+    println!(
+        "{points} points in {} clusters, triplets in order: {share:.3}",
+        hierarchy.clusters.len()
+    );
+    assert!(
+        points >= 60,
+        "{points} points can be held against the truth"
+    );
     assert!(share >= 0.91, "triplets in order: {share:.3}");
     let mut papers = Config::default();
-    (papers.hierarchy.affinity, papers.hierarchy.max_children, papers.hierarchy.min_certainty) =
-        (Affinity::Zeng, 2, 0.0);
+    (
+        papers.hierarchy.affinity,
+        papers.hierarchy.max_children,
+        papers.hierarchy.min_certainty,
+    ) = (Affinity::Zeng, 2, 0.0);
     let (hierarchy, born) = tree(&papers);
     let (_, theirs) = triplets(&truth, &hierarchy, &born);
     println!("as in the papers: {theirs:.3}");
-    assert!((0.6..share).contains(&theirs), "as in the papers: {theirs:.3}");
+    assert!(
+        (0.6..share).contains(&theirs),
+        "as in the papers: {theirs:.3}"
+    );
 }

@@ -19,12 +19,21 @@ const STOPPED: i32 = 130;
 
 fn analyze(dirs: &[&Path], more: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
-    command.arg("analyze").args(dirs).args(more).output().expect("arborcam")
+    command
+        .arg("analyze")
+        .args(dirs)
+        .args(more)
+        .output()
+        .expect("arborcam")
 }
 
 fn told(dirs: &[&Path], more: &[&str]) -> Value {
     let output = analyze(dirs, &[more, &["--json"]].concat());
-    assert!(output.status.success(), "{more:?}: {}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{more:?}: {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     serde_json::from_slice(&output.stdout).expect("JSON")
 }
 
@@ -49,20 +58,33 @@ fn edit(file: &Path, change: impl Fn(&str, &str) -> String) {
     let mut lines = text.lines();
     let header = lines.next().expect("header").to_owned();
     let names: Vec<&str> = header.split(',').collect();
-    let row = |line: &str| names.iter().zip(line.split(',')).map(|(n, c)| change(n, c)).collect::<Vec<_>>().join(",");
-    let rows: Vec<String> = std::iter::once(header.clone()).chain(lines.map(row)).collect();
+    let row = |line: &str| {
+        names
+            .iter()
+            .zip(line.split(','))
+            .map(|(n, c)| change(n, c))
+            .collect::<Vec<_>>()
+            .join(",")
+    };
+    let rows: Vec<String> = std::iter::once(header.clone())
+        .chain(lines.map(row))
+        .collect();
     fs::write(file, rows.join("\n") + "\n").expect("table");
 }
 
 /// The columns of `nodes.csv` that are not of the sway, as they stand.
 fn others(dir: &Path) -> Vec<Vec<String>> {
     let text = fs::read_to_string(dir.join("nodes.csv")).expect("nodes");
-    text.lines().map(|l| l.split(',').take(10).map(str::to_owned).collect()).collect()
+    text.lines()
+        .map(|l| l.split(',').take(10).map(str::to_owned).collect())
+        .collect()
 }
 
 fn names_in(dir: &Path) -> Vec<String> {
     let entries = fs::read_dir(dir).expect("folder").flatten();
-    let mut names: Vec<String> = entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+    let mut names: Vec<String> = entries
+        .map(|e| e.file_name().to_string_lossy().into_owned())
+        .collect();
     names.sort();
     names
 }
@@ -72,78 +94,178 @@ fn number(v: &Value) -> f64 {
 }
 
 fn branches(told: &Value) -> &[Value] {
-    told["captures"][0]["branches"].as_array().expect("branches")
+    told["captures"][0]["branches"]
+        .as_array()
+        .expect("branches")
 }
 
 fn answered(told: &Value) -> Vec<&Value> {
-    branches(told).iter().filter(|b| b["identifiable"] == true).collect()
+    branches(told)
+        .iter()
+        .filter(|b| b["identifiable"] == true)
+        .collect()
 }
 
-/// The table that is printed, the JSON and `nodes.csv` say the same, and nothing else of the capture changes.
+/// The table that is printed, the JSON and `nodes.csv` say the same, and nothing else of the
+/// capture changes.
 #[test]
 fn the_answers_stand_in_the_table_in_json_and_in_the_capture() {
     let (_dir, dir) = captured("tree");
-    edit(&dir.join("nodes.csv"), |name, cell| if name.starts_with("frequency") { String::new() } else { cell.into() });
+    edit(&dir.join("nodes.csv"), |name, cell| {
+        if name.starts_with("frequency") {
+            String::new()
+        } else {
+            cell.into()
+        }
+    });
     let (before, files) = (others(&dir), names_in(&dir));
     let told = told(&[&dir], &[]);
     let capture = &told["captures"][0];
-    assert_eq!((&capture["name"], &capture["excitation"]), (&"tree".into(), &"release".into()));
-    assert!((number(&capture["rate_hz"]) - 30.0).abs() < 0.1 && capture["gaps"].as_array().is_some_and(Vec::is_empty));
+    assert_eq!(
+        (&capture["name"], &capture["excitation"]),
+        (&"tree".into(), &"release".into())
+    );
+    assert!(
+        (number(&capture["rate_hz"]) - 30.0).abs() < 0.1
+            && capture["gaps"].as_array().is_some_and(Vec::is_empty)
+    );
     assert!(told["comparison"].is_null());
     assert_eq!((others(&dir), names_in(&dir)), (before, files));
-    // The trunk of the recording sways at 0.70 Hz; a peak of eleven seconds is broader than the truth's 2 %.
+    // The trunk of the recording sways at 0.70 Hz; a peak of eleven seconds is broader than the
+    // truth's 2 %.
     let known = answered(&told);
     assert!(known.len() >= 3, "{} answers", known.len());
-    let trunk = known.iter().find(|b| b["parent_id"].is_null()).expect("the trunk has an answer");
-    assert!((number(&trunk["frequency_hz"]["value"]) / 0.7 - 1.0).abs() < 0.01, "{trunk}");
+    let trunk = known
+        .iter()
+        .find(|b| b["parent_id"].is_null())
+        .expect("the trunk has an answer");
+    assert!(
+        (number(&trunk["frequency_hz"]["value"]) / 0.7 - 1.0).abs() < 0.01,
+        "{trunk}"
+    );
     assert!((number(&trunk["spectrum_peak_hz"]) - 0.7).abs() < 0.1);
     assert!(number(&trunk["half_power_damping"]) > number(&trunk["damping_ratio"]["value"]));
     for branch in branches(&told) {
         let sound = branch["identifiable"] == branch["unidentified"].is_null();
-        assert!(sound && branch["frequency_hz"].is_null() == branch["why"].is_string(), "{branch}");
+        assert!(
+            sound && branch["frequency_hz"].is_null() == branch["why"].is_string(),
+            "{branch}"
+        );
     }
     let text = fs::read_to_string(dir.join("nodes.csv")).expect("nodes");
     let plain = analyze(&[&dir], &[]);
     let plain = String::from_utf8(plain.stdout).expect("text");
     for branch in known {
-        let (id, f) = (branch["node_id"].to_string(), number(&branch["frequency_hz"]["value"]));
-        let row = text.lines().find(|l| l.split(',').next() == Some(&id)).expect("its row");
-        let written: f64 = row.split(',').nth(10).expect("cell").parse().expect("number");
-        assert!((written - f).abs() < 1e-5 && row.contains(",true,release,"), "{row}");
-        let line =
-            plain.lines().find(|l| l.starts_with("  ") && l.split_whitespace().next() == Some(&id)).expect("its line");
-        let shown: f64 = line.split_whitespace().nth(4).expect("cell").parse().expect("number");
+        let (id, f) = (
+            branch["node_id"].to_string(),
+            number(&branch["frequency_hz"]["value"]),
+        );
+        let row = text
+            .lines()
+            .find(|l| l.split(',').next() == Some(&id))
+            .expect("its row");
+        let written: f64 = row
+            .split(',')
+            .nth(10)
+            .expect("cell")
+            .parse()
+            .expect("number");
+        assert!(
+            (written - f).abs() < 1e-5 && row.contains(",true,release,"),
+            "{row}"
+        );
+        let line = plain
+            .lines()
+            .find(|l| l.starts_with("  ") && l.split_whitespace().next() == Some(&id))
+            .expect("its line");
+        let shown: f64 = line
+            .split_whitespace()
+            .nth(4)
+            .expect("cell")
+            .parse()
+            .expect("number");
         assert!((shown - f).abs() < 6e-4, "{line} lacks {f}");
-        // One amplitude in all, that of the curve in the report; none where points and angle contradict each other.
-        let [told, points, angle] =
-            ["amplitude_deg", "amplitude_by_points_deg", "amplitude_in_angle_deg"].map(|key| branch[key].as_f64());
-        let agree = points.zip(angle).filter(|(p, a)| (p / a).ln().abs() < 1.5_f64.ln());
+        // One amplitude in all, that of the curve in the report; none where points and angle
+        // contradict each other.
+        let [told, points, angle] = [
+            "amplitude_deg",
+            "amplitude_by_points_deg",
+            "amplitude_in_angle_deg",
+        ]
+        .map(|key| branch[key].as_f64());
+        let agree = points
+            .zip(angle)
+            .filter(|(p, a)| (p / a).ln().abs() < 1.5_f64.ln());
         assert_eq!(told, agree.map(|(_, angle)| angle), "{branch}");
         let cell = row.split(',').nth(18).expect("cell").parse::<f64>().ok();
-        assert!(cell.zip(told).map_or(cell == told, |(c, t)| (c - t).abs() < 1e-3), "{row} lacks {told:?}");
+        assert!(
+            cell.zip(told)
+                .map_or(cell == told, |(c, t)| (c - t).abs() < 1e-3),
+            "{row} lacks {told:?}"
+        );
     }
     // Once more: nothing is left to change. --no-write changes nothing either.
-    assert_eq!(fs::read_to_string(dir.join("nodes.csv")).expect("nodes"), text);
+    assert_eq!(
+        fs::read_to_string(dir.join("nodes.csv")).expect("nodes"),
+        text
+    );
     analyze(&[&dir], &["--no-write", "--excitation", "wind"]);
-    assert_eq!(fs::read_to_string(dir.join("nodes.csv")).expect("nodes"), text);
+    assert_eq!(
+        fs::read_to_string(dir.join("nodes.csv")).expect("nodes"),
+        text
+    );
     analyze(&[&dir], &["--excitation", "wind"]);
-    assert_ne!(fs::read_to_string(dir.join("nodes.csv")).expect("nodes"), text);
+    assert_ne!(
+        fs::read_to_string(dir.join("nodes.csv")).expect("nodes"),
+        text
+    );
 }
 
 #[test]
 fn the_part_of_the_film_and_its_cause_can_be_chosen() {
     let (_dir, dir) = captured("tree");
-    let part = told(&[&dir], &["--no-write", "--from", "2", "--to", "9", "--excitation", "release"]);
+    let part = told(
+        &[&dir],
+        &[
+            "--no-write",
+            "--from",
+            "2",
+            "--to",
+            "9",
+            "--excitation",
+            "release",
+        ],
+    );
     let capture = &part["captures"][0];
-    assert!((number(&capture["from_s"]) - 2.0).abs() < 0.04 && (number(&capture["to_s"]) - 9.0).abs() < 0.04);
-    assert_eq!((&capture["excitation_given"], &capture["from_rest"]), (&true.into(), &false.into()));
+    assert!(
+        (number(&capture["from_s"]) - 2.0).abs() < 0.04
+            && (number(&capture["to_s"]) - 9.0).abs() < 0.04
+    );
+    assert_eq!(
+        (&capture["excitation_given"], &capture["from_rest"]),
+        (&true.into(), &false.into())
+    );
     let short = told(&[&dir], &["--no-write", "--to", "0.6"]);
-    assert!(branches(&short).iter().all(|b| b["unidentified"] == "too_short"), "{}", short["captures"][0]);
-    let text = String::from_utf8(analyze(&[&dir], &["--no-write", "--to", "0.6"]).stdout).expect("text");
-    assert!(text.contains("none: the film is too short") && text.contains("0.0 to 0.6 s of the film"), "{text}");
+    assert!(
+        branches(&short)
+            .iter()
+            .all(|b| b["unidentified"] == "too_short"),
+        "{}",
+        short["captures"][0]
+    );
+    let text =
+        String::from_utf8(analyze(&[&dir], &["--no-write", "--to", "0.6"]).stdout).expect("text");
+    assert!(
+        text.contains("none: the film is too short") && text.contains("0.0 to 0.6 s of the film"),
+        "{text}"
+    );
     // Beyond the end there is no film, and so none that is too long.
     let beyond = analyze(&[&dir], &["--no-write", "--to", "1000"]);
-    assert!(beyond.status.success() && beyond.stderr.is_empty(), "{}", String::from_utf8_lossy(&beyond.stderr));
+    assert!(
+        beyond.status.success() && beyond.stderr.is_empty(),
+        "{}",
+        String::from_utf8_lossy(&beyond.stderr)
+    );
 }
 
 #[test]
@@ -152,7 +274,10 @@ fn a_known_length_gives_amplitudes_in_metres() {
     let of = |more: &[&str]| {
         let told = told(&[&dir], &[&["--no-write"], more].concat());
         let trunk = branches(&told)[0].clone();
-        (trunk["amplitude_px"].as_f64().expect("px"), trunk["amplitude_m"].as_f64())
+        (
+            trunk["amplitude_px"].as_f64().expect("px"),
+            trunk["amplitude_m"].as_f64(),
+        )
     };
     assert_eq!(of(&[]).1, None);
     let (px, m) = of(&["--scale", "10,20:10,120=2m"]);
@@ -161,23 +286,40 @@ fn a_known_length_gives_amplitudes_in_metres() {
     // A capture that was made with a scale needs none: its tables are in metres.
     let made = dir.with_file_name("in-metres");
     let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
-    command.args(["replay", support::CLIP, "--fast", "--headless", "--outline", support::OUTLINE]);
-    command.args(["--scale", "10,20:10,120=2", "--out"]).arg(&made);
+    command.args([
+        "replay",
+        support::CLIP,
+        "--fast",
+        "--headless",
+        "--outline",
+        support::OUTLINE,
+    ]);
+    command
+        .args(["--scale", "10,20:10,120=2", "--out"])
+        .arg(&made);
     assert!(command.output().expect("arborcam").status.success());
     let refused = |more: &[&str]| analyze(&[&dir], more).status.code();
     assert_eq!(refused(&["--metres-per-px", "nan"]), Some(BAD_USAGE));
     assert_eq!(refused(&["--metres-per-px", "1e9"]), Some(BAD_USAGE));
     let own = told(&[&made], &["--no-write"]);
     let trunk = &branches(&own)[0];
-    assert!((number(&trunk["amplitude_m"]) / m.expect("metres") - 1.0).abs() < 0.01, "{trunk}");
+    assert!(
+        (number(&trunk["amplitude_m"]) / m.expect("metres") - 1.0).abs() < 0.01,
+        "{trunk}"
+    );
     assert!((number(&trunk["amplitude_px"]) / px - 1.0).abs() < 0.01);
 }
 
-/// The same tree filmed again: other numbers, from nearer, a little to the side, with half the force.
+/// The same tree filmed again: other numbers, from nearer, a little to the side, with half the
+/// force.
 fn again(dir: &Path, to: &Path, slower: f64) {
     copy(dir, to);
-    let renamed =
-        |id: &str| id.parse::<u32>().map_or_else(|_| id.to_owned(), |n| if n < 2 { n } else { n + 300 }.to_string());
+    let renamed = |id: &str| {
+        id.parse::<u32>().map_or_else(
+            |_| id.to_owned(),
+            |n| if n < 2 { n } else { n + 300 }.to_string(),
+        )
+    };
     let number = |c: &str| c.parse::<f64>().expect("number");
     let is_id = |name: &str| name == "node_id" || name == "parent_id";
     let time = |c: &str| format!("{:.6}", number(c) * slower);
@@ -203,7 +345,10 @@ fn again(dir: &Path, to: &Path, slower: f64) {
     let mut note: Value = serde_json::from_str(&text).expect("JSON");
     for copied in note["model"]["copied"].as_array_mut().expect("copies") {
         for key in ["node", "original"] {
-            copied[key] = renamed(&copied[key].to_string()).parse::<u32>().expect("number").into();
+            copied[key] = renamed(&copied[key].to_string())
+                .parse::<u32>()
+                .expect("number")
+                .into();
         }
     }
     fs::write(to.join("capture.json"), note.to_string()).expect("note");
@@ -217,7 +362,10 @@ fn the_same_branch_is_found_again_and_its_frequency_compared() {
     again(&first, &slow, 1.1);
     let told = told(&[&first, &gentle, &slow], &["--no-write"]);
     let comparison = &told["comparison"];
-    assert_eq!((&comparison["same_tree"], &comparison["same_tree_given"]), (&true.into(), &false.into()));
+    assert_eq!(
+        (&comparison["same_tree"], &comparison["same_tree_given"]),
+        (&true.into(), &false.into())
+    );
     let mut compared = 0;
     for row in comparison["branches"].as_array().expect("rows") {
         let id = row["node_id"].as_u64().expect("id");
@@ -225,14 +373,21 @@ fn the_same_branch_is_found_again_and_its_frequency_compared() {
         let [_, gentle, slow] = [0, 1, 2].map(|k| &row["in"][k]);
         // Two that grow close together may be unclear; none is taken for another.
         for found in [gentle, slow] {
-            assert!(found["node_id"].is_null() || found["node_id"] == renamed, "{row}");
+            assert!(
+                found["node_id"].is_null() || found["node_id"] == renamed,
+                "{row}"
+            );
         }
         if let Some(percent) = gentle["frequency_change_percent"]["value"].as_f64() {
-            assert!(percent.abs() < 1.0 && gentle["frequency_change_percent"]["beyond"] == false, "{row}");
+            assert!(
+                percent.abs() < 1.0 && gentle["frequency_change_percent"]["beyond"] == false,
+                "{row}"
+            );
         }
         if let Some(percent) = slow["frequency_change_percent"]["value"].as_f64() {
             assert!(
-                (percent + 100.0 / 11.0).abs() < 1.0 && slow["frequency_change_percent"]["beyond"] == true,
+                (percent + 100.0 / 11.0).abs() < 1.0
+                    && slow["frequency_change_percent"]["beyond"] == true,
                 "{row}"
             );
             compared += 1;
@@ -244,11 +399,22 @@ fn the_same_branch_is_found_again_and_its_frequency_compared() {
         assert!(share > 0.8, "{share} found again in {name}");
     }
     let text = String::from_utf8(analyze(&[&first, &slow], &["--no-write"]).stdout).expect("text");
-    assert!(text.contains("Compared with hard as one tree") && text.contains("% (-") && text.contains(" *"), "{text}");
+    assert!(
+        text.contains("Compared with hard as one tree")
+            && text.contains("% (-")
+            && text.contains(" *"),
+        "{text}"
+    );
     // Said to be two trees, their trunks alone are compared.
     let two = told_of_two(&first, &slow);
-    assert_eq!(two["comparison"]["branches"].as_array().map(Vec::len), Some(1));
-    assert_eq!(two["comparison"]["branches"][0]["in"][1]["frequency_change_percent"]["beyond"], true);
+    assert_eq!(
+        two["comparison"]["branches"].as_array().map(Vec::len),
+        Some(1)
+    );
+    assert_eq!(
+        two["comparison"]["branches"][0]["in"][1]["frequency_change_percent"]["beyond"],
+        true
+    );
 }
 
 fn told_of_two(a: &Path, b: &Path) -> Value {
@@ -264,7 +430,11 @@ fn well_formed(html: &str) {
         let end = rest.find('>').expect("a tag that ends");
         let tag = &rest[..end];
         rest = &rest[end..];
-        let name = tag.trim_start_matches('/').split([' ', '/']).next().expect("name");
+        let name = tag
+            .trim_start_matches('/')
+            .split([' ', '/'])
+            .next()
+            .expect("name");
         if tag.starts_with('/') {
             assert_eq!(open.pop(), Some(name));
         } else if !tag.ends_with('/') && !["meta", "br"].contains(&name) {
@@ -281,17 +451,35 @@ fn the_report_is_one_file_that_needs_nothing_else_and_tells_all() {
     again(&first, &second, 1.1);
     let page = first.with_file_name("new/report.html");
     let shown = page.display().to_string();
-    let told = told(&[&first, &second], &["--no-write", "--report", &shown, "--scale", "0,0:0,100=1"]);
+    let told = told(
+        &[&first, &second],
+        &["--no-write", "--report", &shown, "--scale", "0,0:0,100=1"],
+    );
     let html = fs::read_to_string(&page).expect("report");
-    for forbidden in ["<script", "http:", "https:", "url(", "@import", "<link", "<b>&\"calm", "NaN", "inf "] {
+    for forbidden in [
+        "<script",
+        "http:",
+        "https:",
+        "url(",
+        "@import",
+        "<link",
+        "<b>&\"calm",
+        "NaN",
+        "inf ",
+    ] {
         assert!(!html.contains(forbidden), "{forbidden} is in the page");
     }
     well_formed(&html);
     assert!(html.contains("&lt;b&gt;&amp;&quot;calm"));
     assert!(!html.contains("src=") && html.matches("href=\"data:image/jpeg;base64,").count() == 2);
-    for what in
-        ["pulled and let go at", "frames/s", "no gaps", "m in a pixel", "What this does not say", "How to read this"]
-    {
+    for what in [
+        "pulled and let go at",
+        "frames/s",
+        "no gaps",
+        "m in a pixel",
+        "What this does not say",
+        "How to read this",
+    ] {
         assert!(html.contains(what), "the page lacks {what:?}");
     }
     for capture in told["captures"].as_array().expect("captures") {
@@ -305,8 +493,20 @@ fn the_report_is_one_file_that_needs_nothing_else_and_tells_all() {
     }
     // Its bytes are the same every time.
     let again = first.with_file_name("again.html");
-    analyze(&[&first, &second], &["--no-write", "--report", &again.display().to_string(), "--scale", "0,0:0,100=1"]);
-    assert!(fs::read_to_string(&again).expect("report") == html, "two runs differ");
+    analyze(
+        &[&first, &second],
+        &[
+            "--no-write",
+            "--report",
+            &again.display().to_string(),
+            "--scale",
+            "0,0:0,100=1",
+        ],
+    );
+    assert!(
+        fs::read_to_string(&again).expect("report") == html,
+        "two runs differ"
+    );
 }
 
 /// A capture of an older version: no model, no picture, no motion, no columns on what excited it.
@@ -317,16 +517,31 @@ fn an_older_capture_is_analysed_with_what_it_has() {
         fs::remove_file(dir.join(name)).expect("remove");
     }
     let text = fs::read_to_string(dir.join("nodes.csv")).expect("nodes");
-    let short: Vec<String> = text.lines().map(|l| l.split(',').take(17).collect::<Vec<_>>().join(",")).collect();
+    let short: Vec<String> = text
+        .lines()
+        .map(|l| l.split(',').take(17).collect::<Vec<_>>().join(","))
+        .collect();
     fs::write(dir.join("nodes.csv"), short.join("\r\n") + "\r\n").expect("nodes");
     let page = dir.with_file_name("old.html");
     let output = analyze(&[&dir], &["--report", &page.display().to_string()]);
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{told}");
-    assert!(told.contains("lacks motion.csv") && told.contains("the picture of the capture is left out"), "{told}");
+    assert!(
+        told.contains("lacks motion.csv")
+            && told.contains("the picture of the capture is left out"),
+        "{told}"
+    );
     let text = fs::read_to_string(dir.join("nodes.csv")).expect("nodes");
-    assert!(text.lines().next().expect("header").ends_with(",identifiable,excitation,amplitude_deg,unidentified"));
-    assert!(text.contains(",true,release,") && text.ends_with("\r\n"), "{text}");
+    assert!(
+        text.lines()
+            .next()
+            .expect("header")
+            .ends_with(",identifiable,excitation,amplitude_deg,unidentified")
+    );
+    assert!(
+        text.contains(",true,release,") && text.ends_with("\r\n"),
+        "{text}"
+    );
     well_formed(&fs::read_to_string(page).expect("report"));
 }
 
@@ -337,14 +552,19 @@ type Damage<'a> = &'a dyn Fn(&str) -> String;
 #[test]
 fn damaged_tracks_give_reasons_and_no_numbers() {
     let cases: &[(&str, Damage)] = &[
-        ("empty", &|text| format!("{}\n", text.lines().next().expect("header"))),
+        ("empty", &|text| {
+            format!("{}\n", text.lines().next().expect("header"))
+        }),
         ("nowhere", &|text| {
             let row = |l: &str| {
                 let c: Vec<&str> = l.split(',').collect();
                 format!("{},{},{},NaN,inf,{}", c[0], c[1], c[2], c[5])
             };
             let (header, rows) = text.split_once('\n').expect("header");
-            format!("{header}\n{}\n", rows.lines().map(row).collect::<Vec<_>>().join("\n"))
+            format!(
+                "{header}\n{}\n",
+                rows.lines().map(row).collect::<Vec<_>>().join("\n")
+            )
         }),
         ("still", &|text| {
             let row = |l: &str| {
@@ -352,7 +572,10 @@ fn damaged_tracks_give_reasons_and_no_numbers() {
                 format!("{},{},{},{},50,{}", c[0], c[1], c[2], c[0], c[5])
             };
             let (header, rows) = text.split_once('\n').expect("header");
-            format!("{header}\n{}\n", rows.lines().map(row).collect::<Vec<_>>().join("\n"))
+            format!(
+                "{header}\n{}\n",
+                rows.lines().map(row).collect::<Vec<_>>().join("\n")
+            )
         }),
     ];
     for (name, change) in cases {
@@ -362,7 +585,10 @@ fn damaged_tracks_give_reasons_and_no_numbers() {
         let page = dir.with_file_name("page.html");
         let told = told(&[&dir], &["--report", &page.display().to_string()]);
         assert!(answered(&told).is_empty(), "{name}: {:?}", answered(&told));
-        assert!(branches(&told).iter().all(|b| b["why"].is_string()), "{name}");
+        assert!(
+            branches(&told).iter().all(|b| b["why"].is_string()),
+            "{name}"
+        );
         well_formed(&fs::read_to_string(page).expect("report"));
     }
 }
@@ -371,75 +597,146 @@ fn damaged_tracks_give_reasons_and_no_numbers() {
 fn a_tree_of_one_branch_is_a_tree() {
     let (_dir, dir) = captured("pole");
     let text = fs::read_to_string(dir.join("nodes.csv")).expect("nodes");
-    fs::write(dir.join("nodes.csv"), text.lines().take(3).collect::<Vec<_>>().join("\n") + "\n").expect("nodes");
-    edit(
-        &dir.join("tracks.csv"),
-        |name, cell| if name == "node_id" && !cell.is_empty() { "1".into() } else { cell.into() },
+    fs::write(
+        dir.join("nodes.csv"),
+        text.lines().take(3).collect::<Vec<_>>().join("\n") + "\n",
+    )
+    .expect("nodes");
+    edit(&dir.join("tracks.csv"), |name, cell| {
+        if name == "node_id" && !cell.is_empty() {
+            "1".into()
+        } else {
+            cell.into()
+        }
+    });
+    let told = told(
+        &[&dir],
+        &[
+            "--report",
+            &dir.with_file_name("pole.html").display().to_string(),
+        ],
     );
-    let told = told(&[&dir], &["--report", &dir.with_file_name("pole.html").display().to_string()]);
     assert_eq!(branches(&told).len(), 1);
 }
 
-/// One branch that stands where the other's trunk does says nothing of whether the two are one tree.
+/// One branch that stands where the other's trunk does says nothing of whether the two are one
+/// tree.
 #[test]
 fn captures_that_may_be_of_one_tree_or_of_two_are_not_compared_by_a_guess() {
     let (_dir, first) = captured("tree");
     let other = first.with_file_name("other");
     copy(&first, &other);
     let text = fs::read_to_string(other.join("nodes.csv")).expect("nodes");
-    fs::write(other.join("nodes.csv"), text.lines().take(3).collect::<Vec<_>>().join("\n") + "\n").expect("nodes");
+    fs::write(
+        other.join("nodes.csv"),
+        text.lines().take(3).collect::<Vec<_>>().join("\n") + "\n",
+    )
+    .expect("nodes");
     let pole = |name: &str, cell: &str| {
-        if name == "node_id" && !cell.is_empty() { "1".into() } else { cell.into() }
+        if name == "node_id" && !cell.is_empty() {
+            "1".into()
+        } else {
+            cell.into()
+        }
     };
     edit(&other.join("tracks.csv"), pole);
     fs::remove_file(other.join("motion.csv")).expect("remove");
     let page = first.with_file_name("page.html");
-    let output = analyze(&[&first, &other], &["--no-write", "--report", &page.display().to_string()]);
-    let (text, error) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    assert!(output.status.success() && error.contains("--trees same or different"), "{error}");
-    assert!(text.contains("Not compared with tree") && !text.contains("frequency against"), "{text}");
+    let output = analyze(
+        &[&first, &other],
+        &["--no-write", "--report", &page.display().to_string()],
+    );
+    let (text, error) = (
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr),
+    );
+    assert!(
+        output.status.success() && error.contains("--trees same or different"),
+        "{error}"
+    );
+    assert!(
+        text.contains("Not compared with tree") && !text.contains("frequency against"),
+        "{text}"
+    );
     let html = fs::read_to_string(page).expect("report");
     assert!(html.contains("Not compared with tree") && !html.contains("called there"));
     well_formed(&html);
     let told = told(&[&first, &other], &["--no-write"]);
-    assert!(told["comparison"]["same_tree"].is_null(), "{}", told["comparison"]);
-    assert!(told["comparison"]["branches"].as_array().is_some_and(Vec::is_empty));
+    assert!(
+        told["comparison"]["same_tree"].is_null(),
+        "{}",
+        told["comparison"]
+    );
+    assert!(
+        told["comparison"]["branches"]
+            .as_array()
+            .is_some_and(Vec::is_empty)
+    );
     // Who knows says so.
-    assert_eq!(told_of_two(&first, &other)["comparison"]["branches"].as_array().map(Vec::len), Some(1));
+    assert_eq!(
+        told_of_two(&first, &other)["comparison"]["branches"]
+            .as_array()
+            .map(Vec::len),
+        Some(1)
+    );
 }
 
-/// The tables are new and the model beside them is not: that is said, with the command that makes one, and that one is new.
+/// The tables are new and the model beside them is not: that is said, with the command that makes
+/// one, and that one is new.
 #[test]
 fn a_model_with_the_former_answers_is_told_of_and_made_anew_by_export() {
     let (_dir, dir) = captured("it's");
     edit(&dir.join("nodes.csv"), |name, cell| match (name, cell) {
-        ("frequency_hz" | "frequency_lo_hz" | "frequency_hi_hz", c) if !c.is_empty() => "1.5".into(),
+        ("frequency_hz" | "frequency_lo_hz" | "frequency_hi_hz", c) if !c.is_empty() => {
+            "1.5".into()
+        }
         _ => cell.into(),
     });
-    let error = |more: &[&str]| String::from_utf8_lossy(&analyze(&[&dir], more).stderr).into_owned();
+    let error =
+        |more: &[&str]| String::from_utf8_lossy(&analyze(&[&dir], more).stderr).into_owned();
     assert_eq!(error(&["--no-write"]), "");
     let note = error(&[]);
-    let command = note.trim_end().split("a new one: ").nth(1).unwrap_or_else(|| panic!("no command in {note:?}"));
-    assert!(note.starts_with("arborcam: note: ") && note.lines().count() == 1, "{note}");
+    let command = note
+        .trim_end()
+        .split("a new one: ")
+        .nth(1)
+        .unwrap_or_else(|| panic!("no command in {note:?}"));
+    assert!(
+        note.starts_with("arborcam: note: ") && note.lines().count() == 1,
+        "{note}"
+    );
     // Nothing is new the second time.
     assert_eq!(error(&[]), "");
     let made = dir.with_file_name("new.glb");
     let mut shell = Command::new("sh");
-    shell.args(["-c", &command.replacen("arborcam", "\"$ARBORCAM\"", 1)]).current_dir(dir.parent().expect("folder"));
-    let output = shell.env("ARBORCAM", env!("CARGO_BIN_EXE_arborcam")).output().expect("sh");
-    assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
+    shell
+        .args(["-c", &command.replacen("arborcam", "\"$ARBORCAM\"", 1)])
+        .current_dir(dir.parent().expect("folder"));
+    let output = shell
+        .env("ARBORCAM", env!("CARGO_BIN_EXE_arborcam"))
+        .output()
+        .expect("sh");
+    assert!(
+        output.status.success(),
+        "{command}: {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     let bytes = fs::read(made).expect("the model");
     let told = told(&[&dir], &["--no-write"]);
     let known = answered(&told);
     for branch in &known {
         let hz = number(&branch["frequency_hz"]["value"]);
         let json = String::from_utf8_lossy(&bytes);
-        assert!(json.contains(&format!("\"frequency_hz\":{:.3}", (hz * 1e3).floor() / 1e3)), "no {hz} in the model");
+        assert!(
+            json.contains(&format!("\"frequency_hz\":{:.3}", (hz * 1e3).floor() / 1e3)),
+            "no {hz} in the model"
+        );
     }
     assert!(!known.is_empty());
 }
 
-/// A film in which the tree was let go twice: the answers are of one release at most, and the user is told.
+/// A film in which the tree was let go twice: the answers are of one release at most, and the user
+/// is told.
 #[test]
 fn several_releases_in_one_film_are_told_of() {
     let (_dir, dir) = captured("twice");
@@ -449,27 +746,54 @@ fn several_releases_in_one_film_are_told_of() {
     let told = told(&[&dir], &["--no-write"]);
     let notes = told["captures"][0]["notes"].to_string();
     assert!(
-        notes.contains("let go 2 times, at 0.") && notes.contains(", 14.") && notes.contains("--from and --to"),
+        notes.contains("let go 2 times, at 0.")
+            && notes.contains(", 14.")
+            && notes.contains("--from and --to"),
         "{notes}"
     );
     let one = analyze(&[&dir], &["--no-write", "--from", "0", "--to", "10.9"]);
-    assert!(one.stderr.is_empty(), "{}", String::from_utf8_lossy(&one.stderr));
+    assert!(
+        one.stderr.is_empty(),
+        "{}",
+        String::from_utf8_lossy(&one.stderr)
+    );
 }
 
 /// A terminal of so many columns, and what it shows of the table.
 fn on_a_terminal(dir: &Path, columns: u16) -> String {
     let (mut ours, mut theirs) = (0, 0);
-    let size = libc::winsize { ws_row: 24, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 };
+    let size = libc::winsize {
+        ws_row: 24,
+        ws_col: columns,
+        ws_xpixel: 0,
+        ws_ypixel: 0,
+    };
     let null = std::ptr::null_mut();
-    // SAFETY: the pointers are of variables that live on, or null, which is allowed for name and settings.
-    assert_eq!(unsafe { libc::openpty(&mut ours, &mut theirs, null, null.cast(), &size) }, 0);
+    // SAFETY: the pointers are of variables that live on, or null, which is allowed for name and
+    // settings.
+    assert_eq!(
+        unsafe { libc::openpty(&mut ours, &mut theirs, null, null.cast(), &size) },
+        0
+    );
     // SAFETY: both are open and nobody else's.
-    let (mut ours, theirs) = unsafe { (fs::File::from_raw_fd(ours), fs::File::from_raw_fd(theirs)) };
+    let (mut ours, theirs) =
+        unsafe { (fs::File::from_raw_fd(ours), fs::File::from_raw_fd(theirs)) };
     let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
-    command.arg("analyze").arg(dir).arg("--no-write").stdout(theirs).stderr(Stdio::null());
+    command
+        .arg("analyze")
+        .arg(dir)
+        .arg("--no-write")
+        .stdout(theirs)
+        .stderr(Stdio::null());
     // In a session of its own, so that the terminal of whoever runs the tests is not asked.
     // SAFETY: it takes nothing and touches no memory.
-    let alone = || if unsafe { libc::setsid() } < 0 { Err(std::io::Error::last_os_error()) } else { Ok(()) };
+    let alone = || {
+        if unsafe { libc::setsid() } < 0 {
+            Err(std::io::Error::last_os_error())
+        } else {
+            Ok(())
+        }
+    };
     // SAFETY: setsid may be called between fork and exec.
     unsafe { command.pre_exec(alone) };
     let mut child = command.spawn().expect("arborcam");
@@ -487,15 +811,26 @@ fn on_a_terminal(dir: &Path, columns: u16) -> String {
 fn on_a_narrow_terminal_no_line_is_wider_and_elsewhere_the_table_is_whole() {
     let (_dir, dir) = captured("tree");
     let whole = String::from_utf8(analyze(&[&dir], &["--no-write"]).stdout).expect("text");
-    assert!(whole.lines().any(|line| line.ends_with("peak, Hz  eq. 6")), "{whole}");
+    assert!(
+        whole.lines().any(|line| line.ends_with("peak, Hz  eq. 6")),
+        "{whole}"
+    );
     assert_eq!(on_a_terminal(&dir, 200), whole);
     let narrow = on_a_terminal(&dir, 80);
-    assert!(narrow.lines().all(|line| line.chars().count() <= 80), "{narrow}");
     assert!(
-        narrow.contains("frequency, Hz") && narrow.contains("sway, deg") && !narrow.contains("peak, Hz  "),
+        narrow.lines().all(|line| line.chars().count() <= 80),
         "{narrow}"
     );
-    assert!(narrow.contains("for want of room without: peak, Hz; eq. 6"), "{narrow}");
+    assert!(
+        narrow.contains("frequency, Hz")
+            && narrow.contains("sway, deg")
+            && !narrow.contains("peak, Hz  "),
+        "{narrow}"
+    );
+    assert!(
+        narrow.contains("for want of room without: peak, Hz; eq. 6"),
+        "{narrow}"
+    );
 }
 
 #[test]
@@ -508,12 +843,26 @@ fn bad_input_gets_a_line_and_the_right_status() {
         at(name)
     };
     fs::create_dir(at("empty")).expect("folder");
-    let no_tracks = variant("no-tracks", &|d| fs::remove_file(d.join("tracks.csv")).expect("remove"));
+    let no_tracks = variant("no-tracks", &|d| {
+        fs::remove_file(d.join("tracks.csv")).expect("remove")
+    });
     let bad_time = variant("bad-time", &|d| {
-        edit(&d.join("tracks.csv"), |n, c| if n == "time_s" { "soon".into() } else { c.into() })
+        edit(&d.join("tracks.csv"), |n, c| {
+            if n == "time_s" {
+                "soon".into()
+            } else {
+                c.into()
+            }
+        })
     });
     let cyclic = variant("cyclic", &|d| {
-        edit(&d.join("nodes.csv"), |n, c| if n == "parent_id" && c == "1" { "9999".into() } else { c.into() })
+        edit(&d.join("nodes.csv"), |n, c| {
+            if n == "parent_id" && c == "1" {
+                "9999".into()
+            } else {
+                c.into()
+            }
+        })
     });
     // In any other order every row would be a frame of its own: rows times points of memory.
     let reordered = |name: &str, order: &dyn Fn(&mut Vec<&str>)| {
@@ -522,11 +871,17 @@ fn bad_input_gets_a_line_and_the_right_status() {
             let mut rows: Vec<&str> = text.lines().collect();
             let header = rows.remove(0);
             order(&mut rows);
-            fs::write(d.join("tracks.csv"), format!("{header}\n{}\n", rows.join("\n"))).expect("tracks");
+            fs::write(
+                d.join("tracks.csv"),
+                format!("{header}\n{}\n", rows.join("\n")),
+            )
+            .expect("tracks");
         })
     };
     let backwards = reordered("backwards", &|rows| rows.reverse());
-    let by_point = reordered("by-point", &|rows| rows.sort_by_key(|r| r.split(',').next().map(str::len)));
+    let by_point = reordered("by-point", &|rows| {
+        rows.sort_by_key(|r| r.split(',').next().map(str::len))
+    });
     let taken = at("taken.html");
     fs::write(&taken, "mine").expect("file");
     let taken = taken.display().to_string();
@@ -538,32 +893,117 @@ fn bad_input_gets_a_line_and_the_right_status() {
         (vec![], vec![], BAD_USAGE, "<DIR>"),
         (vec![&absent], vec![], NO_INPUT, "is no capture"),
         (vec![&empty], vec![], NO_INPUT, "is no capture"),
-        (vec![&dir, &absent], vec![], NO_INPUT, "absent is no capture"),
+        (
+            vec![&dir, &absent],
+            vec![],
+            NO_INPUT,
+            "absent is no capture",
+        ),
         (vec![&no_tracks], vec![], NO_INPUT, "lacks tracks.csv"),
-        (vec![&bad_time], vec![], NO_INPUT, "line 2: time_s is \"soon\""),
+        (
+            vec![&bad_time],
+            vec![],
+            NO_INPUT,
+            "line 2: time_s is \"soon\"",
+        ),
         (vec![&cyclic], vec![], NO_INPUT, "9999"),
-        (vec![&backwards], vec![], NO_INPUT, "rows of one frame stand together, in order of time"),
-        (vec![&by_point], vec![], NO_INPUT, "rows of one frame stand together, in order of time"),
+        (
+            vec![&backwards],
+            vec![],
+            NO_INPUT,
+            "rows of one frame stand together, in order of time",
+        ),
+        (
+            vec![&by_point],
+            vec![],
+            NO_INPUT,
+            "rows of one frame stand together, in order of time",
+        ),
         (vec![&dir, &dir], vec![], BAD_USAGE, "is given twice"),
-        (vec![&dir], vec!["--from", "5", "--to", "5"], BAD_USAGE, "--from 5 is not before --to 5"),
-        (vec![&dir], vec!["--from", "3600"], BAD_USAGE, "--from 3600 is after the end of"),
-        (vec![&dir], vec!["--from", "3600", "--to", "3700"], BAD_USAGE, "--from 3600 is after the end of"),
-        (vec![&dir], vec!["--from", "-1"], BAD_USAGE, "give a number of seconds"),
-        (vec![&dir], vec!["--from", "nan"], BAD_USAGE, "give a number of seconds"),
-        (vec![&dir], vec!["--scale", "1,1:1,1=2"], BAD_USAGE, "at least a pixel apart"),
-        (vec![&dir], vec!["--scale", "10,10:5000,1=2"], BAD_USAGE, "5000,1 lies off the picture"),
-        (vec![&dir], vec!["--scale", "1,1:9,1=2", "--metres-per-px", "1"], BAD_USAGE, "cannot be used with"),
-        (vec![&dir], vec!["--report", &taken], FAILED, "exists already"),
-        (vec![&dir], vec!["--config", &settings], BAD_USAGE, "dynamics.window_s"),
-        (vec![&dir], vec!["--excitation", "storm"], BAD_USAGE, "storm"),
+        (
+            vec![&dir],
+            vec!["--from", "5", "--to", "5"],
+            BAD_USAGE,
+            "--from 5 is not before --to 5",
+        ),
+        (
+            vec![&dir],
+            vec!["--from", "3600"],
+            BAD_USAGE,
+            "--from 3600 is after the end of",
+        ),
+        (
+            vec![&dir],
+            vec!["--from", "3600", "--to", "3700"],
+            BAD_USAGE,
+            "--from 3600 is after the end of",
+        ),
+        (
+            vec![&dir],
+            vec!["--from", "-1"],
+            BAD_USAGE,
+            "give a number of seconds",
+        ),
+        (
+            vec![&dir],
+            vec!["--from", "nan"],
+            BAD_USAGE,
+            "give a number of seconds",
+        ),
+        (
+            vec![&dir],
+            vec!["--scale", "1,1:1,1=2"],
+            BAD_USAGE,
+            "at least a pixel apart",
+        ),
+        (
+            vec![&dir],
+            vec!["--scale", "10,10:5000,1=2"],
+            BAD_USAGE,
+            "5000,1 lies off the picture",
+        ),
+        (
+            vec![&dir],
+            vec!["--scale", "1,1:9,1=2", "--metres-per-px", "1"],
+            BAD_USAGE,
+            "cannot be used with",
+        ),
+        (
+            vec![&dir],
+            vec!["--report", &taken],
+            FAILED,
+            "exists already",
+        ),
+        (
+            vec![&dir],
+            vec!["--config", &settings],
+            BAD_USAGE,
+            "dynamics.window_s",
+        ),
+        (
+            vec![&dir],
+            vec!["--excitation", "storm"],
+            BAD_USAGE,
+            "storm",
+        ),
     ];
     let before = fs::read(dir.join("nodes.csv")).expect("nodes");
     for (dirs, more, status, words) in cases {
         let output = analyze(&dirs, &more);
         let error = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(status), "{dirs:?} {more:?}: {error}");
-        assert!(error.contains(words) && error.starts_with("arborcam: "), "{dirs:?} {more:?}: {error}");
-        assert!(output.stdout.is_empty(), "{dirs:?} {more:?} printed something");
+        assert_eq!(
+            output.status.code(),
+            Some(status),
+            "{dirs:?} {more:?}: {error}"
+        );
+        assert!(
+            error.contains(words) && error.starts_with("arborcam: "),
+            "{dirs:?} {more:?}: {error}"
+        );
+        assert!(
+            output.stdout.is_empty(),
+            "{dirs:?} {more:?} printed something"
+        );
     }
     assert_eq!(fs::read(dir.join("nodes.csv")).expect("nodes"), before);
 }
@@ -574,22 +1014,38 @@ fn where_nothing_can_be_written_the_table_is_printed_all_the_same() {
     let (_dir, dir) = captured("tree");
     let old = "node_id,parent_id,level,n_tracks,x,y,z,radius\n0,,0,9,0,0,0,3\n1,0,1,9,0,90,0,3\n";
     fs::write(dir.join("nodes.csv"), old).expect("nodes");
-    edit(
-        &dir.join("tracks.csv"),
-        |name, cell| if name == "node_id" && !cell.is_empty() { "1".into() } else { cell.into() },
-    );
+    edit(&dir.join("tracks.csv"), |name, cell| {
+        if name == "node_id" && !cell.is_empty() {
+            "1".into()
+        } else {
+            cell.into()
+        }
+    });
     fs::remove_file(dir.join("motion.csv")).expect("remove");
     let before = names_in(&dir);
     // No file may grow: as on a full disk, also for root.
     let mut command = Command::new("sh");
-    command.args(["-c", "trap '' XFSZ; ulimit -f 0; exec \"$0\" analyze \"$1\""]);
-    let output = command.arg(env!("CARGO_BIN_EXE_arborcam")).arg(&dir).output().expect("sh");
+    command.args([
+        "-c",
+        "trap '' XFSZ; ulimit -f 0; exec \"$0\" analyze \"$1\"",
+    ]);
+    let output = command
+        .arg(env!("CARGO_BIN_EXE_arborcam"))
+        .arg(&dir)
+        .output()
+        .expect("sh");
     let error = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(FAILED), "{error}");
     let last = error.lines().last().expect("a line");
-    assert!(last.starts_with("arborcam: cannot write") && last.contains("nodes.csv"), "{error}");
+    assert!(
+        last.starts_with("arborcam: cannot write") && last.contains("nodes.csv"),
+        "{error}"
+    );
     assert!(String::from_utf8_lossy(&output.stdout).contains("frequency, Hz"));
-    assert_eq!(fs::read_to_string(dir.join("nodes.csv")).expect("nodes"), old);
+    assert_eq!(
+        fs::read_to_string(dir.join("nodes.csv")).expect("nodes"),
+        old
+    );
     assert_eq!(names_in(&dir), before);
 }
 
@@ -601,7 +1057,12 @@ fn prolong(dir: &Path, times: u32, every_s: f64) {
         let row = move |line: &str| {
             let cells: Vec<&str> = line.split(',').collect();
             let time_s = cells[2].parse::<f64>().expect("time") + every_s * f64::from(k);
-            format!("{},{},{time_s:.6},{}\n", cells[0], cells[1], cells[3..].join(","))
+            format!(
+                "{},{},{time_s:.6},{}\n",
+                cells[0],
+                cells[1],
+                cells[3..].join(",")
+            )
         };
         rows.lines().map(row).collect::<String>()
     };
@@ -616,24 +1077,36 @@ fn lasts(dir: &Path, seconds: u32) {
     fs::write(&note, told.to_string()).expect("note");
 }
 
-/// Points do not live for ever: of the whole of a long film there are few that last, and good answers would go.
+/// Points do not live for ever: of the whole of a long film there are few that last, and good
+/// answers would go.
 #[test]
 fn of_a_long_film_the_end_is_looked_at_as_the_capture_did() {
     let (_dir, dir) = captured("long");
     prolong(&dir, 7, 11.0);
     lasts(&dir, 77);
     let part = |more: &[&str]| {
-        let told = told(&[&dir], &[&["--no-write", "--excitation", "release"], more].concat());
+        let told = told(
+            &[&dir],
+            &[&["--no-write", "--excitation", "release"], more].concat(),
+        );
         let capture = &told["captures"][0];
-        let noted = capture["notes"].to_string().contains("of 77 s of film the last 60 (dynamics.window_s)");
-        ([number(&capture["from_s"]), number(&capture["to_s"])].map(f64::round), noted)
+        let noted = capture["notes"]
+            .to_string()
+            .contains("of 77 s of film the last 60 (dynamics.window_s)");
+        (
+            [number(&capture["from_s"]), number(&capture["to_s"])].map(f64::round),
+            noted,
+        )
     };
     assert_eq!(part(&[]), ([17.0, 77.0], true));
     assert_eq!(part(&["--from", "0"]), ([0.0, 77.0], false));
     assert_eq!(part(&["--to", "66"]), ([0.0, 66.0], false));
     let settings = dir.with_file_name("window.toml");
     fs::write(&settings, "[dynamics]\nwindow_s = 300\n").expect("file");
-    assert_eq!(part(&["--config", &settings.display().to_string()]), ([0.0, 77.0], false));
+    assert_eq!(
+        part(&["--config", &settings.display().to_string()]),
+        ([0.0, 77.0], false)
+    );
     let output = analyze(&[&dir], &["--no-write", "--excitation", "release"]);
     let text = String::from_utf8_lossy(&output.stdout);
     assert!(text.contains(" to 77.0 s of the film"), "{text}");
@@ -645,12 +1118,26 @@ fn whoever_stops_it_finds_everything_as_it_was() {
     prolong(&dir, 8, 11.0);
     // Told before the work begins: the sign to stop it.
     lasts(&dir, 900);
-    let (before, page) = (fs::read(dir.join("nodes.csv")).expect("nodes"), dir.with_file_name("page.html"));
+    let (before, page) = (
+        fs::read(dir.join("nodes.csv")).expect("nodes"),
+        dir.with_file_name("page.html"),
+    );
     let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
-    command.arg("analyze").arg(&dir).arg("--report").arg(&page).args(["--excitation", "wind", "--from", "0"]);
-    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("arborcam");
+    command
+        .arg("analyze")
+        .arg(&dir)
+        .arg("--report")
+        .arg(&page)
+        .args(["--excitation", "wind", "--from", "0"]);
+    let mut child = command
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("arborcam");
     let mut line = String::new();
-    BufReader::new(child.stderr.take().expect("pipe")).read_line(&mut line).expect("line");
+    BufReader::new(child.stderr.take().expect("pipe"))
+        .read_line(&mut line)
+        .expect("line");
     assert!(line.contains("longer than 600 s"), "{line}");
     // SAFETY: the child is ours and not yet waited for.
     unsafe { libc::kill(child.id() as i32, libc::SIGINT) };

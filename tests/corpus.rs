@@ -1,4 +1,5 @@
-//! The fuzzers' seeds and some hundred seeded mutations of them, on stable: no panic, and an end. `fuzz/` goes further.
+//! The fuzzers' seeds and some hundred seeded mutations of them, on stable: no panic, and an end.
+//! `fuzz/` goes further.
 
 use arborcam::config::Config;
 use arborcam::model::{PixelFormat, RawFrame, Size};
@@ -15,12 +16,16 @@ struct Chance(u64);
 
 impl Chance {
     fn below(&mut self, bound: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 33) as usize % bound.max(1)
     }
 }
 
-/// What befalls files: flipped bits, lengths that lie, pieces cut out, repeated, or the end missing.
+/// What befalls files: flipped bits, lengths that lie, pieces cut out, repeated, or the end
+/// missing.
 fn mutated(seed: &[u8], number: u64) -> Vec<u8> {
     let mut chance = Chance(number);
     let mut bytes = seed.to_vec();
@@ -53,7 +58,11 @@ fn each(seed: &[u8], mut check: impl FnMut(&[u8])) {
 
 fn seeds(kind: &str) -> Vec<Vec<u8>> {
     let folder = Path::new("fuzz/corpus").join(kind);
-    let mut paths: Vec<_> = fs::read_dir(&folder).expect("corpus").flatten().map(|e| e.path()).collect();
+    let mut paths: Vec<_> = fs::read_dir(&folder)
+        .expect("corpus")
+        .flatten()
+        .map(|e| e.path())
+        .collect();
     paths.sort();
     assert!(!paths.is_empty(), "{} is empty", folder.display());
     paths.iter().map(|p| fs::read(p).expect("seed")).collect()
@@ -63,12 +72,22 @@ fn seeds(kind: &str) -> Vec<Vec<u8>> {
 fn written_now() -> Vec<u8> {
     let dir = tempfile::tempdir().expect("tempdir");
     let path = dir.path().join("seed.mcap");
-    let head = Head { source: "seed".into(), ..Head::default() };
-    let mut series = Series::create(&path, head, Limits::default(), || 1_700_000_000_000_000_000).expect("file");
+    let head = Head {
+        source: "seed".into(),
+        ..Head::default()
+    };
+    let mut series =
+        Series::create(&path, head, Limits::default(), || 1_700_000_000_000_000_000).expect("file");
     for (n, format) in PixelFormat::ALL.into_iter().cycle().take(12).enumerate() {
         let size = Size::new(4, 2);
         let bytes = vec![n as u8; format.picture_bytes(size).unwrap_or(30)];
-        let raw = RawFrame { sequence: Some(n as u64), sensor_time_s: n as f64, size, format, bytes };
+        let raw = RawFrame {
+            sequence: Some(n as u64),
+            sensor_time_s: n as f64,
+            size,
+            format,
+            bytes,
+        };
         series.frame(&raw, n as u64).expect("frame");
         if n % 3 == 2 {
             series.flush().expect("flush");
@@ -84,19 +103,26 @@ fn no_recording_brings_the_reader_down() {
     let mut read = Vec::new();
     for seed in seeds("recording").into_iter().chain([now]) {
         each(&seed, |bytes| {
-            let Ok(mut reader) = Reader::new(Path::new("seed.mcap"), Cursor::new(bytes)) else { return };
+            let Ok(mut reader) = Reader::new(Path::new("seed.mcap"), Cursor::new(bytes)) else {
+                return;
+            };
             read.push(std::iter::from_fn(|| reader.next_picture()).count());
             assert!(reader.warnings().iter().all(|w| !w.contains('\n')));
         });
     }
-    assert!(read.iter().sum::<usize>() > 1000, "hardly anything was ever read: this shows nothing");
+    assert!(
+        read.iter().sum::<usize>() > 1000,
+        "hardly anything was ever read: this shows nothing"
+    );
 }
 
 #[test]
 fn no_text_brings_the_parsers_down() {
     for seed in seeds("config") {
         each(&seed, |bytes| {
-            let said = Config::parse(&String::from_utf8_lossy(bytes), "seed.toml").err().map(|e| e.to_string());
+            let said = Config::parse(&String::from_utf8_lossy(bytes), "seed.toml")
+                .err()
+                .map(|e| e.to_string());
             assert!(said.is_none_or(|s| !s.contains('\n')), "one line");
         });
     }

@@ -9,8 +9,15 @@ use nalgebra::{Point3, UnitQuaternion, Vector3};
 use synthetic::{sway, tree};
 
 const BARK: [u8; 3] = [104, 84, 66];
-const SIZE: Size = Size { width: 320, height: 240 };
-const LOOK: Look = Look { samples: 2, shadow: false, thicker_px: 0.0 };
+const SIZE: Size = Size {
+    width: 320,
+    height: 240,
+};
+const LOOK: Look = Look {
+    samples: 2,
+    shadow: false,
+    thicker_px: 0.0,
+};
 
 fn wood(skeleton: &Skeleton) -> Mesh {
     bare_wood(skeleton, 20_000)
@@ -22,14 +29,19 @@ fn bounds(posed: &Posed) -> Bounds {
 
 /// Share of the pixels that are drawn in `one` and not in `other`.
 fn missing(one: &Rgba, other: &Rgba) -> f64 {
-    let drawn = |p: &Rgba| p.pixels.chunks_exact(4).map(|p| p[3] > 127).collect::<Vec<_>>();
+    let drawn = |p: &Rgba| {
+        p.pixels
+            .chunks_exact(4)
+            .map(|p| p[3] > 127)
+            .collect::<Vec<_>>()
+    };
     let (one, other) = (drawn(one), drawn(other));
     let lost = one.iter().zip(&other).filter(|(a, b)| **a && !**b).count();
     lost as f64 / one.iter().filter(|a| **a).count().max(1) as f64
 }
 
-/// Every node that is thick enough for a pixel lies under a drawn pixel, at rest and in every pose: what is drawn is what
-/// was measured, in its place.
+/// Every node that is thick enough for a pixel lies under a drawn pixel, at rest and in every pose:
+/// what is drawn is what was measured, in its place.
 #[test]
 fn the_tree_is_drawn_where_its_pose_says_it_is() {
     let skeleton = tree(5, 2);
@@ -41,16 +53,25 @@ fn the_tree_is_drawn_where_its_pose_says_it_is() {
         let posed = model.posed(Some(pose), &[]);
         for (view, camera) in [
             ("film", Camera::of_film(&skeleton, size)),
-            ("side", Camera::fitting(&bounds(&posed), View::SIDE, false, size)),
+            (
+                "side",
+                Camera::fitting(&bounds(&posed), View::SIDE, false, size),
+            ),
         ] {
             let drawn = picture(&posed, &camera, &LOOK);
             for (i, joint) in pose.joints.iter().enumerate().skip(1) {
                 // Half way up the branch, where a tip is not too thin yet.
                 let from = pose.joints[skeleton.nodes[i].parent.unwrap().index()].position;
                 let [x, y, _] = camera.project(&nalgebra::center(&from, &joint.position));
-                let near = (-2..=2)
-                    .any(|dx| (-2..=2).any(|dy| drawn.at((x as i64 + dx) as u32, (y as i64 + dy) as u32)[3] > 0));
-                assert!(near, "{view}: node {i} of frame {} at {x:.1} {y:.1}", pose.frame);
+                let near = (-2..=2).any(|dx| {
+                    (-2..=2)
+                        .any(|dy| drawn.at((x as i64 + dx) as u32, (y as i64 + dy) as u32)[3] > 0)
+                });
+                assert!(
+                    near,
+                    "{view}: node {i} of frame {} at {x:.1} {y:.1}",
+                    pose.frame
+                );
             }
         }
     }
@@ -62,13 +83,25 @@ fn a_turned_branch_is_drawn_turned() {
     let skeleton = tree(1, 1);
     let mesh = wood(&skeleton);
     let model = Model::bare(&skeleton, &mesh, BARK);
-    let lying = UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.0, -std::f64::consts::FRAC_PI_2));
-    let still = JointPose { position: Point3::origin(), rotation: UnitQuaternion::identity() };
-    let top = JointPose { position: lying * skeleton.nodes[1].position, rotation: lying };
-    let pose = Pose { frame: 0, time_s: 0.0, joints: vec![still, top] };
+    let lying =
+        UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.0, -std::f64::consts::FRAC_PI_2));
+    let still = JointPose {
+        position: Point3::origin(),
+        rotation: UnitQuaternion::identity(),
+    };
+    let top = JointPose {
+        position: lying * skeleton.nodes[1].position,
+        rotation: lying,
+    };
+    let pose = Pose {
+        frame: 0,
+        time_s: 0.0,
+        joints: vec![still, top],
+    };
     let camera = Camera::of_film(&skeleton, Size::new(1280, 720));
     let [rest, turned] = [None, Some(&pose)].map(|p| picture(&model.posed(p, &[]), &camera, &LOOK));
-    // The foot is at (640, 700), the trunk 160 px long; it bends along its length and lies at its end.
+    // The foot is at (640, 700), the trunk 160 px long; it bends along its length and lies at its
+    // end.
     assert!(rest.at(641, 580)[3] > 0 && rest.at(785, 702)[3] == 0);
     assert!(turned.at(785, 702)[3] > 0 && turned.at(641, 580)[3] == 0);
 }
@@ -80,10 +113,22 @@ fn a_whole_turn_ends_where_it_began() {
     let mesh = wood(&skeleton);
     let model = Model::bare(&skeleton, &mesh, BARK);
     let posed = model.posed(None, &[]);
-    let at =
-        |turn: f64| picture(&posed, &Camera::fitting(&bounds(&posed), View { turn, down: 0.2 }, true, SIZE), &LOOK);
-    let (start, quarter, end) = (at(0.0), at(std::f64::consts::FRAC_PI_2), at(std::f64::consts::TAU));
-    assert!(missing(&start, &quarter) > 0.2, "a quarter turn changes the picture");
+    let at = |turn: f64| {
+        picture(
+            &posed,
+            &Camera::fitting(&bounds(&posed), View { turn, down: 0.2 }, true, SIZE),
+            &LOOK,
+        )
+    };
+    let (start, quarter, end) = (
+        at(0.0),
+        at(std::f64::consts::FRAC_PI_2),
+        at(std::f64::consts::TAU),
+    );
+    assert!(
+        missing(&start, &quarter) > 0.2,
+        "a quarter turn changes the picture"
+    );
     assert!(missing(&start, &end) < 0.01 && missing(&end, &start) < 0.01);
 }
 
@@ -111,7 +156,11 @@ fn leaf(skeleton: &Skeleton, node: usize, half: f32) -> Foliage {
         sine: vec![[40.0, 0.0, 0.0]; 4],
         cosine: vec![[0.0, 40.0, 0.0]; 4],
     };
-    Foliage { groups: vec![group], texture: None, frequency_hz: 2.0 }
+    Foliage {
+        groups: vec![group],
+        texture: None,
+        frequency_hz: 2.0,
+    }
 }
 
 /// A leaf is seen from both sides, moves with its two parts, and is cut out of its texture.
@@ -119,24 +168,49 @@ fn leaf(skeleton: &Skeleton, node: usize, half: f32) -> Foliage {
 fn leaves_swing_and_are_cut_out() {
     let skeleton = tree(1, 1);
     let (mesh, foliage) = (wood(&skeleton), leaf(&skeleton, 1, 10.0));
-    let mut model = Model { foliage: &foliage, ..Model::bare(&skeleton, &mesh, BARK) };
+    let mut model = Model {
+        foliage: &foliage,
+        ..Model::bare(&skeleton, &mesh, BARK)
+    };
     let camera = Camera::of_film(&skeleton, Size::new(1280, 720));
     let [u, v] = skeleton.image_from_model(&skeleton.nodes[1].position);
     let green = |picture: &Rgba, dx: f64, dy: f64| {
         let [r, g, _, a] = picture.at((u + dx) as u32, (v + dy) as u32);
         a > 0 && g > r
     };
-    for (parts, dx, dy) in [([0.0, 0.0], 0.0, 0.0), ([1.0, 0.0], 40.0, 0.0), ([0.0, -1.0], 0.0, 40.0)] {
+    for (parts, dx, dy) in [
+        ([0.0, 0.0], 0.0, 0.0),
+        ([1.0, 0.0], 40.0, 0.0),
+        ([0.0, -1.0], 0.0, 40.0),
+    ] {
         let drawn = picture(&model.posed(None, &[parts]), &camera, &LOOK);
         assert!(green(&drawn, dx, dy), "{parts:?}");
     }
-    let behind = Camera { view: View { turn: std::f64::consts::PI, down: 0.0 }, ..camera };
+    let behind = Camera {
+        view: View {
+            turn: std::f64::consts::PI,
+            down: 0.0,
+        },
+        ..camera
+    };
     let posed = model.posed(None, &[]);
-    let seen = picture(&posed, &Camera { middle_px: [640.0, 700.0], ..behind }, &LOOK);
-    assert!((0..1280).any(|x| (500..700).any(|y| seen.at(x, y)[1] > seen.at(x, y)[0] + 50)), "from behind");
+    let seen = picture(
+        &posed,
+        &Camera {
+            middle_px: [640.0, 700.0],
+            ..behind
+        },
+        &LOOK,
+    );
+    assert!(
+        (0..1280).any(|x| (500..700).any(|y| seen.at(x, y)[1] > seen.at(x, y)[0] + 50)),
+        "from behind"
+    );
 
     // The texture's left half is cut away.
-    let half = image::RgbaImage::from_fn(2, 1, |x, _| image::Rgba([255, 255, 255, if x == 0 { 0 } else { 255 }]));
+    let half = image::RgbaImage::from_fn(2, 1, |x, _| {
+        image::Rgba([255, 255, 255, if x == 0 { 0 } else { 255 }])
+    });
     let mut png = std::io::Cursor::new(Vec::new());
     half.write_to(&mut png, image::ImageFormat::Png).unwrap();
     model.leaf = Texture::read(png.get_ref());
@@ -152,13 +226,24 @@ fn the_shadow_lies_on_the_ground_and_only_where_it_is_looked_down_on() {
     let posed = model.posed(None, &[]);
     let with = |shadow: bool, down: f64| {
         let camera = Camera::fitting(&bounds(&posed), View { turn: 0.3, down }, true, SIZE);
-        picture(&posed, &camera, &Look { samples: 1, shadow, thicker_px: 0.0 })
+        picture(
+            &posed,
+            &camera,
+            &Look {
+                samples: 1,
+                shadow,
+                thicker_px: 0.0,
+            },
+        )
     };
     assert_eq!(with(true, 0.0), with(false, 0.0));
     let (shaded, plain) = (with(true, 0.4), with(false, 0.4));
     let soft = |p: &[u8]| p[3] > 10 && p[3] < 140;
     assert!(shaded.pixels.chunks_exact(4).filter(|p| soft(p)).count() > 200);
-    assert!(missing(&plain, &shaded) == 0.0, "the tree itself is drawn over its shadow");
+    assert!(
+        missing(&plain, &shaded) == 0.0,
+        "the tree itself is drawn over its shadow"
+    );
 }
 
 /// Damaged models are a user's file away.
@@ -176,7 +261,11 @@ fn nothing_that_a_file_may_hold_brings_it_down() {
         pose(Point3::new(f64::NAN, 0.0, 0.0), UnitQuaternion::identity()),
         pose(Point3::new(1e300, 0.0, 0.0), UnitQuaternion::identity()),
         pose(Point3::origin(), nan),
-        Pose { frame: 0, time_s: 0.0, joints: Vec::new() },
+        Pose {
+            frame: 0,
+            time_s: 0.0,
+            joints: Vec::new(),
+        },
     ];
     skeleton.nodes[3].position.x = f64::NAN;
     mesh.positions[5] = [f32::NAN; 3];
@@ -185,9 +274,17 @@ fn nothing_that_a_file_may_hold_brings_it_down() {
     mesh.indices[9] = u32::MAX;
     mesh.normals.truncate(mesh.positions.len() - 3);
     mesh.uvs.clear();
-    let foliage =
-        Foliage { groups: vec![FoliageGroup { mesh: mesh.clone(), ..FoliageGroup::default() }], ..Foliage::default() };
-    let model = Model { foliage: &foliage, ..Model::bare(&skeleton, &mesh, BARK) };
+    let foliage = Foliage {
+        groups: vec![FoliageGroup {
+            mesh: mesh.clone(),
+            ..FoliageGroup::default()
+        }],
+        ..Foliage::default()
+    };
+    let model = Model {
+        foliage: &foliage,
+        ..Model::bare(&skeleton, &mesh, BARK)
+    };
     let whole = Bounds::of([Point3::origin(), Point3::new(100.0, 300.0, 50.0)]).unwrap();
     for pose in &poses {
         let posed = model.posed(Some(pose), &[[f32::NAN; 2]]);
@@ -196,7 +293,11 @@ fn nothing_that_a_file_may_hold_brings_it_down() {
             picture(
                 &posed,
                 &Camera::fitting(&whole, View::TOP, true, size),
-                &Look { samples: 3, shadow: true, thicker_px: 0.0 },
+                &Look {
+                    samples: 3,
+                    shadow: true,
+                    thicker_px: 0.0,
+                },
             );
             picture(&posed, &Camera::of_film(&skeleton, size), &LOOK);
         }
@@ -214,7 +315,11 @@ fn the_same_picture_twice() {
         picture(
             &posed,
             &Camera::fitting(&bounds(&posed), View::SIDE, false, SIZE),
-            &Look { samples: 3, shadow: true, thicker_px: 0.0 },
+            &Look {
+                samples: 3,
+                shadow: true,
+                thicker_px: 0.0,
+            },
         )
     };
     assert_eq!(draw(), draw());
@@ -233,10 +338,16 @@ fn thicker_wood_shows_every_twig_in_a_coarse_picture() {
         let middles = (1..skeleton.nodes.len()).map(|i| {
             let from = skeleton.nodes[skeleton.nodes[i].parent.unwrap().index()].position;
             let [x, y, _] = camera.project(&nalgebra::center(&from, &skeleton.nodes[i].position));
-            (-1..=1).any(|dx| (-1..=1).any(|dy| drawn.at((x as i64 + dx) as u32, (y as i64 + dy) as u32)[3] > 0))
+            (-1..=1).any(|dx| {
+                (-1..=1).any(|dy| drawn.at((x as i64 + dx) as u32, (y as i64 + dy) as u32)[3] > 0)
+            })
         });
         middles.filter(|hit| *hit).count()
     };
-    let coarse = Look { samples: 1, shadow: false, thicker_px: 0.5 };
+    let coarse = Look {
+        samples: 1,
+        shadow: false,
+        thicker_px: 0.5,
+    };
     assert_eq!(hit(&coarse), skeleton.nodes.len() - 1);
 }

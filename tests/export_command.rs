@@ -16,7 +16,12 @@ const NO_INPUT: i32 = 3;
 
 fn export(dir: &Path, format: &str, out: &Path, more: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
-    command.arg("export").arg(dir).args(["--format", format, "--out"]).arg(out).args(more);
+    command
+        .arg("export")
+        .arg(dir)
+        .args(["--format", format, "--out"])
+        .arg(out)
+        .args(more);
     command.output().expect("arborcam")
 }
 
@@ -31,8 +36,11 @@ fn exported(format: &str, name: &str, more: &[&str]) -> (TempDir, PathBuf) {
 }
 
 fn names_in(dir: &Path) -> Vec<String> {
-    let mut names: Vec<String> =
-        fs::read_dir(dir).expect("folder").flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+    let mut names: Vec<String> = fs::read_dir(dir)
+        .expect("folder")
+        .flatten()
+        .map(|e| e.file_name().to_string_lossy().into_owned())
+        .collect();
     names.sort();
     names
 }
@@ -41,50 +49,102 @@ fn names_in(dir: &Path) -> Vec<String> {
 fn look(document: &gltf::Document) -> (Vec<String>, usize) {
     let joints = document.skins().next().expect("a skin").joints();
     let names = joints.map(|j| j.name().expect("name").to_owned()).collect();
-    let triangles = document.meshes().flat_map(|m| m.primitives().collect::<Vec<_>>());
-    (names, triangles.filter_map(|p| p.indices()).map(|i| i.count() / 3).sum())
+    let triangles = document
+        .meshes()
+        .flat_map(|m| m.primitives().collect::<Vec<_>>());
+    (
+        names,
+        triangles
+            .filter_map(|p| p.indices())
+            .map(|i| i.count() / 3)
+            .sum(),
+    )
 }
 
 /// Whoever exports without changes gets the model that lies in the capture.
 #[test]
 fn the_glb_is_the_captures_own() {
     let (_dir, out) = exported("glb", "tree.glb", &[]);
-    let (own, ours) = (gltf::Gltf::open(made().join("tree.glb")).expect("own"), gltf::Gltf::open(&out).expect("ours"));
+    let (own, ours) = (
+        gltf::Gltf::open(made().join("tree.glb")).expect("own"),
+        gltf::Gltf::open(&out).expect("ours"),
+    );
     assert_eq!(look(&own.document), look(&ours.document));
     let end_s = |d: &gltf::Gltf| {
-        let ends = d.animations().flat_map(|a| a.channels().collect::<Vec<_>>());
-        ends.map(|c| c.sampler().input().max().expect("max")[0].as_f64().expect("s")).fold(0.0, f64::max)
+        let ends = d
+            .animations()
+            .flat_map(|a| a.channels().collect::<Vec<_>>());
+        ends.map(|c| {
+            c.sampler().input().max().expect("max")[0]
+                .as_f64()
+                .expect("s")
+        })
+        .fold(0.0, f64::max)
     };
     assert!((end_s(&own) - end_s(&ours)).abs() < 1e-4 && end_s(&ours) > 10.9);
-    let bark = |d: &gltf::Gltf| d.materials().next().expect("bark").pbr_metallic_roughness().base_color_factor();
-    let off = bark(&own).iter().zip(bark(&ours)).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-    assert!(off < 0.05, "the bark is off by {off}: the picture has been through JPEG, no more");
+    let bark = |d: &gltf::Gltf| {
+        d.materials()
+            .next()
+            .expect("bark")
+            .pbr_metallic_roughness()
+            .base_color_factor()
+    };
+    let off = bark(&own)
+        .iter()
+        .zip(bark(&ours))
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f32::max);
+    assert!(
+        off < 0.05,
+        "the bark is off by {off}: the picture has been through JPEG, no more"
+    );
     // To standard output, and a second time: the same bytes.
     let again = export(made(), "glb", Path::new("-"), &[]);
     assert!(again.status.success());
-    assert!(again.stdout == fs::read(&out).expect("glb"), "standard output differs from the file");
+    assert!(
+        again.stdout == fs::read(&out).expect("glb"),
+        "standard output differs from the file"
+    );
 }
 
 #[test]
 fn gltf_lies_beside_its_parts_whatever_it_is_called() {
     let (dir, out) = exported("gltf", "my tree, 100%.gltf", &[]);
-    assert_eq!(names_in(dir.path()), ["my tree, 100%.bin", "my tree, 100%.gltf"]);
+    assert_eq!(
+        names_in(dir.path()),
+        ["my tree, 100%.bin", "my tree, 100%.gltf"]
+    );
     let text = fs::read_to_string(&out).expect("text");
     let json: serde_json::Value = serde_json::from_str(&text).expect("json");
     assert_eq!(json["buffers"][0]["uri"], "my%20tree%2C%20100%25.bin");
-    let bytes = fs::metadata(dir.path().join("my tree, 100%.bin")).expect("bin").len();
+    let bytes = fs::metadata(dir.path().join("my tree, 100%.bin"))
+        .expect("bin")
+        .len();
     assert_eq!(json["buffers"][0]["byteLength"], bytes);
     let (_dir, plain) = exported("gltf", "tree.gltf", &[]);
     let (document, _, _) = gltf::import(&plain).expect("a glTF with its buffer");
-    assert_eq!(look(&document).0.len(), Captured::read(made(), 1.0).expect("capture").skeleton.nodes.len());
+    assert_eq!(
+        look(&document).0.len(),
+        Captured::read(made(), 1.0)
+            .expect("capture")
+            .skeleton
+            .nodes
+            .len()
+    );
 }
 
 #[test]
 fn csv_is_the_tables_and_cylinders_that_join() {
     let (_dir, out) = exported("csv", "tables", &[]);
-    assert_eq!(names_in(&out), ["cylinders.csv", "motion.csv", "nodes.csv", "tracks.csv"]);
+    assert_eq!(
+        names_in(&out),
+        ["cylinders.csv", "motion.csv", "nodes.csv", "tracks.csv"]
+    );
     for name in ["motion.csv", "nodes.csv", "tracks.csv"] {
-        assert!(fs::read(out.join(name)).expect(name) == fs::read(made().join(name)).expect(name), "{name} differs");
+        assert!(
+            fs::read(out.join(name)).expect(name) == fs::read(made().join(name)).expect(name),
+            "{name} differs"
+        );
     }
     let text = fs::read_to_string(out.join("cylinders.csv")).expect("cylinders");
     let mut lines = text.lines();
@@ -94,47 +154,88 @@ fn csv_is_the_tables_and_cylinders_that_join() {
             "ID,parentID,start_x,start_y,start_z,end_x,end_y,end_z,axis_x,axis_y,axis_z,radius,length,branch,branch_order"
         )
     );
-    let rows: Vec<Vec<f64>> = lines.map(|l| l.split(',').map(|c| c.parse().expect("number")).collect()).collect();
+    let rows: Vec<Vec<f64>> = lines
+        .map(|l| l.split(',').map(|c| c.parse().expect("number")).collect())
+        .collect();
     assert!(rows.len() > 70, "{} cylinders", rows.len());
     let mut order: BTreeMap<u64, f64> = BTreeMap::new();
     for (k, row) in rows.iter().enumerate() {
         assert_eq!((row.len(), row[0]), (15, k as f64 + 1.0));
         let way: Vec<f64> = (0..3).map(|c| row[5 + c] - row[2 + c]).collect();
         let length = way.iter().map(|w| w * w).sum::<f64>().sqrt();
-        assert!((length - row[12]).abs() < 0.001 && row[12] > 0.0 && row[11] >= 0.0, "{row:?}");
-        assert!((0..3).all(|c| (row[8 + c] * length - way[c]).abs() < 0.001), "{row:?}");
+        assert!(
+            (length - row[12]).abs() < 0.001 && row[12] > 0.0 && row[11] >= 0.0,
+            "{row:?}"
+        );
+        assert!(
+            (0..3).all(|c| (row[8 + c] * length - way[c]).abs() < 0.001),
+            "{row:?}"
+        );
         // A branch keeps its order, and one that leaves another has one more.
         let known = *order.entry(row[13] as u64).or_insert(row[14]);
         assert_eq!(known, row[14], "{row:?}");
         if row[1] == 0.0 {
-            assert_eq!((row[14], row[3].abs() < 1e-6), (0.0, true), "what stands on the ground: {row:?}");
+            assert_eq!(
+                (row[14], row[3].abs() < 1e-6),
+                (0.0, true),
+                "what stands on the ground: {row:?}"
+            );
             continue;
         }
         let parent = &rows[row[1] as usize - 1];
-        assert!(row[1] < row[0] && (parent[13] == row[13] || parent[14] + 1.0 == row[14]), "{parent:?} and {row:?}");
+        assert!(
+            row[1] < row[0] && (parent[13] == row[13] || parent[14] + 1.0 == row[14]),
+            "{parent:?} and {row:?}"
+        );
     }
 }
 
 #[test]
 fn the_still_tree_opens_as_obj_and_ply() {
-    let (_, triangles) = look(&gltf::Gltf::open(made().join("tree.glb")).expect("glb").document);
+    let (_, triangles) = look(
+        &gltf::Gltf::open(made().join("tree.glb"))
+            .expect("glb")
+            .document,
+    );
     let (dir, out) = exported("obj", "tree.obj", &[]);
     assert_eq!(names_in(dir.path()), ["tree.mtl", "tree.obj"]);
     let text = fs::read_to_string(&out).expect("obj");
-    let count = |kind: &str| text.lines().filter(|l| l.split(' ').next() == Some(kind)).count();
+    let count = |kind: &str| {
+        text.lines()
+            .filter(|l| l.split(' ').next() == Some(kind))
+            .count()
+    };
     assert_eq!((count("f"), count("v")), (triangles, count("vn")));
     let vertices = count("v");
-    for corner in text.lines().filter_map(|l| l.strip_prefix("f ")).flat_map(|l| l.split(' ')) {
-        let of: Vec<usize> = corner.split('/').map(|n| n.parse().expect("index")).collect();
+    for corner in text
+        .lines()
+        .filter_map(|l| l.strip_prefix("f "))
+        .flat_map(|l| l.split(' '))
+    {
+        let of: Vec<usize> = corner
+            .split('/')
+            .map(|n| n.parse().expect("index"))
+            .collect();
         assert!(of.iter().all(|&i| i >= 1 && i <= vertices), "{corner}");
     }
-    assert!(fs::read_to_string(dir.path().join("tree.mtl")).expect("mtl").contains("newmtl bark\nKd 0."));
+    assert!(
+        fs::read_to_string(dir.path().join("tree.mtl"))
+            .expect("mtl")
+            .contains("newmtl bark\nKd 0.")
+    );
     let (_dir, out) = exported("ply", "tree.ply", &[]);
     let bytes = fs::read(&out).expect("ply");
     let end = b"end_header\n";
-    let at = bytes.windows(end.len()).position(|w| w == end).expect("a header") + end.len();
+    let at = bytes
+        .windows(end.len())
+        .position(|w| w == end)
+        .expect("a header")
+        + end.len();
     let head = String::from_utf8(bytes[..at].to_vec()).expect("text");
-    assert!(head.contains(&format!("element vertex {vertices}\n")) && head.contains(&format!("face {triangles}\n")));
+    assert!(
+        head.contains(&format!("element vertex {vertices}\n"))
+            && head.contains(&format!("face {triangles}\n"))
+    );
     assert_eq!(bytes.len() - at, 27 * vertices + 13 * triangles);
 }
 
@@ -149,27 +250,50 @@ fn another_shape_keeps_what_was_measured() {
         .skip(1)
         .map(|l| l.split(',').map(str::to_owned).collect())
         .collect();
-    let trunk = read.skeleton.nodes.iter().filter(|n| n.level < 2 && n.copy_of.is_none()).count();
+    let trunk = read
+        .skeleton
+        .nodes
+        .iter()
+        .filter(|n| n.level < 2 && n.copy_of.is_none())
+        .count();
     assert_eq!(rows.len(), measured + 4 * (measured - trunk));
     let mut names: Vec<&str> = rows.iter().map(|r| r[0].as_str()).collect();
     for (row, node) in rows.iter().zip(&read.skeleton.nodes[..measured]) {
         assert_eq!(row[0], node.name.0.to_string());
         let [u, v] = read.skeleton.image_from_model(&node.position);
         let px = |c: usize| row[c].parse::<f64>().expect("px");
-        assert!((px(4) - u).abs() < 0.51 && (px(5) - v).abs() < 0.51, "{row:?} stood at {u}, {v}");
+        assert!(
+            (px(4) - u).abs() < 0.51 && (px(5) - v).abs() < 0.51,
+            "{row:?} stood at {u}, {v}"
+        );
     }
     names.sort();
     names.dedup();
     assert_eq!(names.len(), rows.len(), "no two nodes have one name");
     let motion = fs::read_to_string(out.join("motion.csv")).expect("motion");
-    assert_eq!(motion.lines().count(), 1 + 330 * rows.len(), "the whole film, as in tracks.csv");
+    assert_eq!(
+        motion.lines().count(),
+        1 + 330 * rows.len(),
+        "the whole film, as in tracks.csv"
+    );
     // The nodes are where they were in the picture.
-    let first: u64 = motion.lines().nth(1).expect("row").split(',').next().expect("frame").parse().expect("frame");
+    let first: u64 = motion
+        .lines()
+        .nth(1)
+        .expect("row")
+        .split(',')
+        .next()
+        .expect("frame")
+        .parse()
+        .expect("frame");
     let pose = read.poses.iter().find(|p| p.frame == first).expect("pose");
     for (row, joint) in motion.lines().skip(1).zip(&pose.joints[..measured]) {
         let cells: Vec<f64> = row.split(',').map(|c| c.parse().expect("number")).collect();
         let [u, v] = read.skeleton.image_from_model(&joint.position);
-        assert!((cells[6] - u).hypot(cells[7] - v) < 8.0, "{row} was at {u}, {v}");
+        assert!(
+            (cells[6] - u).hypot(cells[7] - v) < 8.0,
+            "{row} was at {u}, {v}"
+        );
     }
 }
 
@@ -180,25 +304,60 @@ fn points_of_branches_that_were_cut_are_on_none() {
     let read = Captured::read(made(), 1.0).expect("capture");
     let size = read.skeleton.image_size;
     // The right half of the picture, from the trunk on.
-    let trunk_u = read.skeleton.foot_px[0].min(read.skeleton.image_from_model(&read.skeleton.nodes[1].position)[0]);
+    let trunk_u = read.skeleton.foot_px[0].min(
+        read.skeleton
+            .image_from_model(&read.skeleton.nodes[1].position)[0],
+    );
     let half = image::RgbaImage::from_fn(size.width, size.height, |u, _| {
         image::Rgba([0, 0, 0, if f64::from(u) > trunk_u - 3.0 { 255 } else { 0 }])
     });
     let shape = dir.path().join("half.png");
     half.save(&shape).expect("PNG");
     let out = dir.path().join("tables");
-    let output = export(made(), "csv", &out, &["--envelope", shape.to_str().expect("path"), "--animation-s", "1"]);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let output = export(
+        made(),
+        "csv",
+        &out,
+        &[
+            "--envelope",
+            shape.to_str().expect("path"),
+            "--animation-s",
+            "1",
+        ],
+    );
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     let column = |dir: &Path, name: &str, c: usize| -> Vec<String> {
         let text = fs::read_to_string(dir.join(name)).expect(name);
-        text.lines().skip(1).map(|l| l.split(',').nth(c).expect("cell").to_owned()).collect()
+        text.lines()
+            .skip(1)
+            .map(|l| l.split(',').nth(c).expect("cell").to_owned())
+            .collect()
     };
     let nodes = column(&out, "nodes.csv", 0);
-    let (before, after) = (column(made(), "tracks.csv", 5), column(&out, "tracks.csv", 5));
+    let (before, after) = (
+        column(made(), "tracks.csv", 5),
+        column(&out, "tracks.csv", 5),
+    );
     assert_eq!(before.len(), after.len());
-    let gone = before.iter().zip(&after).filter(|(b, a)| !b.is_empty() && a.is_empty()).count();
-    assert!(gone > 0 && after.iter().all(|n| n.is_empty() || nodes.contains(n)), "{gone} rows without a node");
-    assert!(before.iter().zip(&after).all(|(b, a)| a.is_empty() || a == b));
+    let gone = before
+        .iter()
+        .zip(&after)
+        .filter(|(b, a)| !b.is_empty() && a.is_empty())
+        .count();
+    assert!(
+        gone > 0 && after.iter().all(|n| n.is_empty() || nodes.contains(n)),
+        "{gone} rows without a node"
+    );
+    assert!(
+        before
+            .iter()
+            .zip(&after)
+            .all(|(b, a)| a.is_empty() || a == b)
+    );
     assert_eq!(column(&out, "motion.csv", 0).len(), 330 * nodes.len());
 }
 
@@ -206,46 +365,170 @@ fn points_of_branches_that_were_cut_are_on_none() {
 fn settings_go_file_over_capture_and_command_line_over_file() {
     let dir = tempfile::tempdir().expect("tempdir");
     let file = dir.path().join("metres.toml");
-    fs::write(&file, "[export]\nmetres_per_px = 0.5\n[shape]\nplanes = 1\n").expect("write");
-    let (_dir, out) = exported("csv", "tables", &["--config", file.to_str().expect("path"), "--metres-per-px", "0.01"]);
+    fs::write(
+        &file,
+        "[export]\nmetres_per_px = 0.5\n[shape]\nplanes = 1\n",
+    )
+    .expect("write");
+    let (_dir, out) = exported(
+        "csv",
+        "tables",
+        &[
+            "--config",
+            file.to_str().expect("path"),
+            "--metres-per-px",
+            "0.01",
+        ],
+    );
     let at = |path: PathBuf| {
         let text = fs::read_to_string(path).expect("nodes");
-        text.lines().nth(2).expect("row").split(',').nth(7).expect("y").parse::<f64>().expect("y")
+        text.lines()
+            .nth(2)
+            .expect("row")
+            .split(',')
+            .nth(7)
+            .expect("y")
+            .parse::<f64>()
+            .expect("y")
     };
     let (m, px) = (at(out.join("nodes.csv")), at(made().join("nodes.csv")));
     assert!((m / px - 0.01).abs() < 1e-5, "{m} m of {px} px");
-    let nodes = fs::read_to_string(out.join("nodes.csv")).expect("nodes").lines().count() - 1;
-    assert_eq!(nodes, Captured::read(made(), 1.0).expect("capture").skeleton.measured(), "no copies");
+    let nodes = fs::read_to_string(out.join("nodes.csv"))
+        .expect("nodes")
+        .lines()
+        .count()
+        - 1;
+    assert_eq!(
+        nodes,
+        Captured::read(made(), 1.0)
+            .expect("capture")
+            .skeleton
+            .measured(),
+        "no copies"
+    );
 }
 
-/// Arguments after `export` ({c} the capture, {w} a folder to write to), status, what the line must say.
+/// Arguments after `export` ({c} the capture, {w} a folder to write to), status, what the line must
+/// say.
 type Case = (&'static str, i32, &'static [&'static str]);
 
 const CASES: &[Case] = &[
-    ("recordings --format glb --out {w}/t.glb", NO_INPUT, &["recordings is no capture", "--out"]),
-    ("{w}/nothing --format glb --out {w}/t.glb", NO_INPUT, &["is no capture"]),
-    ("recordings/README.md --format glb --out {w}/t.glb", NO_INPUT, &["is no capture"]),
-    ("{w}/cut --format glb --out {w}/t.glb", NO_INPUT, &["motion.csv, line", "make the capture anew"]),
-    ("{w}/bare --format glb --out {w}/t.glb", FAILED, &["holds tracks but no tree", "film for longer"]),
-    ("{w}/lone --format ply --out {w}/t.ply", FAILED, &["no branch of it has a length", "--format csv or glb"]),
-    ("{c} --format glb --out {w}/there", FAILED, &["{w}/there exists already", "choose another"]),
-    ("{c} --format csv --out {w}/there", FAILED, &["{w}/there exists already", "choose another"]),
-    ("{c} --format glb --out {w}/there/t.glb", FAILED, &["{w}/there", "choose another"]),
-    ("{c} --format glb --out /", BAD_USAGE, &["--out / is no name for a file"]),
-    ("{c} --format fbx --out {w}/t.fbx", BAD_USAGE, &["'fbx'", "glb"]),
-    ("{c} --format gltf --out {w}/t.glb", BAD_USAGE, &["does not end in .gltf"]),
-    ("{c} --format obj --out {w}/t", BAD_USAGE, &["does not end in .obj"]),
-    ("{c} --format csv --out -", BAD_USAGE, &["more than one file"]),
-    ("{c} --format glb --out {w}/t.glb --planes 99", BAD_USAGE, &["shape.planes = 99", "1 to 8"]),
-    ("{c} --format glb --out {w}/t.glb --tolerance-px 0", BAD_USAGE, &["--tolerance-px", "from 0.001"]),
-    ("{c} --format glb --out {w}/t.glb --metres-per-px NaN", BAD_USAGE, &["export.metres_per_px"]),
-    ("{c} --format glb --out {w}/t.glb --config {w}/bad.toml", BAD_USAGE, &["bad.toml, line 2", "plains"]),
-    ("{c} --format glb --out {w}/t.glb --config {w}/none.toml", BAD_USAGE, &["none.toml", "check the name"]),
+    (
+        "recordings --format glb --out {w}/t.glb",
+        NO_INPUT,
+        &["recordings is no capture", "--out"],
+    ),
+    (
+        "{w}/nothing --format glb --out {w}/t.glb",
+        NO_INPUT,
+        &["is no capture"],
+    ),
+    (
+        "recordings/README.md --format glb --out {w}/t.glb",
+        NO_INPUT,
+        &["is no capture"],
+    ),
+    (
+        "{w}/cut --format glb --out {w}/t.glb",
+        NO_INPUT,
+        &["motion.csv, line", "make the capture anew"],
+    ),
+    (
+        "{w}/bare --format glb --out {w}/t.glb",
+        FAILED,
+        &["holds tracks but no tree", "film for longer"],
+    ),
+    (
+        "{w}/lone --format ply --out {w}/t.ply",
+        FAILED,
+        &["no branch of it has a length", "--format csv or glb"],
+    ),
+    (
+        "{c} --format glb --out {w}/there",
+        FAILED,
+        &["{w}/there exists already", "choose another"],
+    ),
+    (
+        "{c} --format csv --out {w}/there",
+        FAILED,
+        &["{w}/there exists already", "choose another"],
+    ),
+    (
+        "{c} --format glb --out {w}/there/t.glb",
+        FAILED,
+        &["{w}/there", "choose another"],
+    ),
+    (
+        "{c} --format glb --out /",
+        BAD_USAGE,
+        &["--out / is no name for a file"],
+    ),
+    (
+        "{c} --format fbx --out {w}/t.fbx",
+        BAD_USAGE,
+        &["'fbx'", "glb"],
+    ),
+    (
+        "{c} --format gltf --out {w}/t.glb",
+        BAD_USAGE,
+        &["does not end in .gltf"],
+    ),
+    (
+        "{c} --format obj --out {w}/t",
+        BAD_USAGE,
+        &["does not end in .obj"],
+    ),
+    (
+        "{c} --format csv --out -",
+        BAD_USAGE,
+        &["more than one file"],
+    ),
+    (
+        "{c} --format glb --out {w}/t.glb --planes 99",
+        BAD_USAGE,
+        &["shape.planes = 99", "1 to 8"],
+    ),
+    (
+        "{c} --format glb --out {w}/t.glb --tolerance-px 0",
+        BAD_USAGE,
+        &["--tolerance-px", "from 0.001"],
+    ),
+    (
+        "{c} --format glb --out {w}/t.glb --metres-per-px NaN",
+        BAD_USAGE,
+        &["export.metres_per_px"],
+    ),
+    (
+        "{c} --format glb --out {w}/t.glb --config {w}/bad.toml",
+        BAD_USAGE,
+        &["bad.toml, line 2", "plains"],
+    ),
+    (
+        "{c} --format glb --out {w}/t.glb --config {w}/none.toml",
+        BAD_USAGE,
+        &["none.toml", "check the name"],
+    ),
     ("{c} --format glb", BAD_USAGE, &["--out"]),
-    ("{c} --format glb --out {w}/t.glb --leaf {w}/none.glb", BAD_USAGE, &["none.glb"]),
-    ("{c} --format glb --out {w}/t.glb --leaf {w}/there", BAD_USAGE, &["{w}/there"]),
-    ("{c} --format glb --out {w}/t.glb --density {w}/none.png", BAD_USAGE, &["none.png"]),
-    ("{c} --format glb --out {w}/t.glb --density {w}/there", BAD_USAGE, &["{w}/there"]),
+    (
+        "{c} --format glb --out {w}/t.glb --leaf {w}/none.glb",
+        BAD_USAGE,
+        &["none.glb"],
+    ),
+    (
+        "{c} --format glb --out {w}/t.glb --leaf {w}/there",
+        BAD_USAGE,
+        &["{w}/there"],
+    ),
+    (
+        "{c} --format glb --out {w}/t.glb --density {w}/none.png",
+        BAD_USAGE,
+        &["none.png"],
+    ),
+    (
+        "{c} --format glb --out {w}/t.glb --density {w}/there",
+        BAD_USAGE,
+        &["{w}/there"],
+    ),
 ];
 
 /// A leaf of one triangle.
@@ -256,23 +539,40 @@ const TRIANGLE: &str = r#"{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]
     "bufferViews": [{"buffer": 0, "byteLength": 36}],
     "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]}]}"#;
 
-/// Whoever asks for what changes nothing is told so, and why, instead of looking for it in the file.
+/// Whoever asks for what changes nothing is told so, and why, instead of looking for it in the
+/// file.
 #[test]
 fn what_changes_nothing_is_said() {
     let dir = tempfile::tempdir().expect("tempdir");
     let place = |name: &str| dir.path().join(name).display().to_string();
-    fs::write(place("film.toml"), "[detect]\npoints = 99\n[wood]\ncurl = 0.1\n[track]\nlevels = 2\n").expect("write");
+    fs::write(
+        place("film.toml"),
+        "[detect]\npoints = 99\n[wood]\ncurl = 0.1\n[track]\nlevels = 2\n",
+    )
+    .expect("write");
     fs::write(place("wood.toml"), "[wood]\ncurl = 0.1\n").expect("write");
     fs::write(place("leaf.gltf"), TRIANGLE).expect("write");
     let (film, wood, leaf) = (place("film.toml"), place("wood.toml"), &place("leaf.gltf"));
     let cases: [(&str, &[&str], Option<&str>); 9] = [
-        ("ply", &["--lods"], Some("--lods changes nothing here: only glb and gltf")),
+        (
+            "ply",
+            &["--lods"],
+            Some("--lods changes nothing here: only glb and gltf"),
+        ),
         ("glb", &["--lods"], None),
-        ("ply", &["--tolerance-px", "3"], Some("--tolerance-px changes nothing")),
+        (
+            "ply",
+            &["--tolerance-px", "3"],
+            Some("--tolerance-px changes nothing"),
+        ),
         ("glb", &["--tolerance-px", "3"], None),
         ("glb", &["--config", &film], Some("[detect], [track] in")),
         ("glb", &["--config", &wood], None),
-        ("glb", &["--leaf", leaf, "--leaves", "off"], Some("--leaf changes nothing here: the tree bears no leaves")),
+        (
+            "glb",
+            &["--leaf", leaf, "--leaves", "off"],
+            Some("--leaf changes nothing here: the tree bears no leaves"),
+        ),
         ("glb", &["--leaf", leaf, "--leaves", "on"], None),
         ("glb", &[], None),
     ];
@@ -281,7 +581,10 @@ fn what_changes_nothing_is_said() {
         let said = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{said}");
         match told {
-            Some(words) => assert!(said.contains(words) && said.lines().count() == 1, "{more:?}: {said}"),
+            Some(words) => assert!(
+                said.contains(words) && said.lines().count() == 1,
+                "{more:?}: {said}"
+            ),
             None => assert!(!said.contains("note"), "{more:?}: {said}"),
         }
     }
@@ -292,11 +595,22 @@ fn what_changes_nothing_is_said() {
 fn a_drawn_density_brings_leaves() {
     let dir = tempfile::tempdir().expect("tempdir");
     let path = dir.path().join("density.png");
-    image::GrayImage::from_pixel(640, 360, image::Luma([255])).save(&path).expect("an image");
+    image::GrayImage::from_pixel(640, 360, image::Luma([255]))
+        .save(&path)
+        .expect("an image");
     let density = path.display().to_string();
     let leafy = |more: &[&str]| {
-        let output = export(made(), "glb", Path::new("-"), &[&["--density", &density], more].concat());
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let output = export(
+            made(),
+            "glb",
+            Path::new("-"),
+            &[&["--density", &density], more].concat(),
+        );
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         let file = gltf::Gltf::from_slice(&output.stdout).expect("a valid file");
         file.materials().any(|m| m.name() == Some("leaf"))
     };
@@ -323,34 +637,68 @@ fn bad_input_gets_one_line_and_leaves_nothing() {
     // A foot, and nothing on it.
     let rows = |name: &str, kept: fn(&str) -> bool| {
         let text = fs::read_to_string(work.join("lone").join(name)).expect("table");
-        let kept: String = text.lines().filter(|l| kept(l)).map(|l| format!("{l}\n")).collect();
+        let kept: String = text
+            .lines()
+            .filter(|l| kept(l))
+            .map(|l| format!("{l}\n"))
+            .collect();
         fs::write(work.join("lone").join(name), kept).expect("write");
     };
-    rows("nodes.csv", |l| l.starts_with("node_id") || l.starts_with("0,"));
-    rows("motion.csv", |l| l.starts_with("frame") || l.split(',').nth(2) == Some("0"));
+    rows("nodes.csv", |l| {
+        l.starts_with("node_id") || l.starts_with("0,")
+    });
+    rows("motion.csv", |l| {
+        l.starts_with("frame") || l.split(',').nth(2) == Some("0")
+    });
     fs::remove_file(work.join("lone/tree.glb")).expect("remove");
     let mut note: serde_json::Value =
-        serde_json::from_str(&fs::read_to_string(work.join("lone/capture.json")).expect("note")).expect("json");
+        serde_json::from_str(&fs::read_to_string(work.join("lone/capture.json")).expect("note"))
+            .expect("json");
     note["model"]["copied"] = serde_json::json!([]);
     fs::write(work.join("lone/capture.json"), note.to_string()).expect("write");
     let lone = export(&work.join("lone"), "glb", Path::new("-"), &[]);
-    assert!(lone.status.success(), "{}", String::from_utf8_lossy(&lone.stderr));
-    assert_eq!(gltf::Gltf::from_slice(&lone.stdout).expect("a valid file").nodes().count(), 1);
+    assert!(
+        lone.status.success(),
+        "{}",
+        String::from_utf8_lossy(&lone.stderr)
+    );
+    assert_eq!(
+        gltf::Gltf::from_slice(&lone.stdout)
+            .expect("a valid file")
+            .nodes()
+            .count(),
+        1
+    );
     fs::write(work.join("there"), "mine").expect("write");
     fs::write(work.join("bad.toml"), "[shape]\nplains = 3\n").expect("write");
     let before = names_in(work);
     for (words, status, says) in CASES {
-        let place =
-            |text: &str| text.replace("{c}", &made().display().to_string()).replace("{w}", &work.display().to_string());
+        let place = |text: &str| {
+            text.replace("{c}", &made().display().to_string())
+                .replace("{w}", &work.display().to_string())
+        };
         let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
-        let output = command.arg("export").args(words.split(' ').map(place)).output().expect("arborcam");
+        let output = command
+            .arg("export")
+            .args(words.split(' ').map(place))
+            .output()
+            .expect("arborcam");
         let told = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(*status), "{words}: {told}");
-        assert!(says.iter().all(|part| told.contains(&place(part))), "{words}: {told}");
-        let lines: Vec<&str> = told.lines().filter(|l| l.starts_with("arborcam: ")).collect();
+        assert!(
+            says.iter().all(|part| told.contains(&place(part))),
+            "{words}: {told}"
+        );
+        let lines: Vec<&str> = told
+            .lines()
+            .filter(|l| l.starts_with("arborcam: "))
+            .collect();
         assert_eq!(lines.len(), 1, "{words}: {told}");
         assert_eq!(names_in(work), before, "{words}");
-        assert_eq!(fs::read_to_string(work.join("there")).expect("mine"), "mine");
+        assert_eq!(
+            fs::read_to_string(work.join("there")).expect("mine"),
+            "mine"
+        );
     }
 }
 
@@ -361,16 +709,28 @@ fn large(dir: &Path, nodes: usize, parent: impl Fn(usize) -> usize) {
     let mut note: serde_json::Value = serde_json::from_str(&text).expect("json");
     note["model"]["copied"] = serde_json::json!([]);
     fs::write(dir.join("capture.json"), note.to_string()).expect("write");
-    fs::write(dir.join("tracks.csv"), "track_id,frame,time_s,u_px,v_px,node_id\n").expect("write");
+    fs::write(
+        dir.join("tracks.csv"),
+        "track_id,frame,time_s,u_px,v_px,node_id\n",
+    )
+    .expect("write");
     let head = fs::read_to_string(made().join("nodes.csv")).expect("nodes");
     let mut table = vec![head.lines().next().expect("header").to_owned()];
     let mut motion = vec!["frame,time_s,node_id,x,y,z,u_px,v_px".to_owned()];
     let mut levels: Vec<u32> = Vec::new();
     for i in 0..nodes {
-        let above = if i == 0 { String::new() } else { parent(i).to_string() };
+        let above = if i == 0 {
+            String::new()
+        } else {
+            parent(i).to_string()
+        };
         levels.push(if i == 0 { 0 } else { levels[parent(i)] + 1 });
         let (x, y) = (i % 400, i / 400 + if i == 0 { 0 } else { 50 });
-        table.push(format!("{i},{above},{},1,0,0,{x},{y},{},1,,,,,,,false", levels[i], i % 100));
+        table.push(format!(
+            "{i},{above},{},1,0,0,{x},{y},{},1,,,,,,,false",
+            levels[i],
+            i % 100
+        ));
         motion.push(format!("0,0,{i},{x},{y},{},0,0", i % 100));
     }
     fs::write(dir.join("nodes.csv"), table.join("\n") + "\n").expect("write");
@@ -385,19 +745,36 @@ fn as_many_nodes_as_can_be_are_exported_or_refused() {
     large(&bush, 1 << 16, |i| if i == 1 { 0 } else { 1 + (i - 2) / 3 });
     large(&chain, 1 << 16, |i| i - 1);
     let told = |output: &Output| String::from_utf8_lossy(&output.stderr).into_owned();
-    let plain = export(&bush, "glb", &dir.path().join("bush.glb"), &["--triangles", "10000"]);
+    let plain = export(
+        &bush,
+        "glb",
+        &dir.path().join("bush.glb"),
+        &["--triangles", "10000"],
+    );
     assert!(plain.status.success(), "{}", told(&plain));
-    for more in [&["--planes", "1"][..], &["--envelope", "docs/shapes/heart.png"]] {
+    for more in [
+        &["--planes", "1"][..],
+        &["--envelope", "docs/shapes/heart.png"],
+    ] {
         let reshaped = export(&bush, "glb", &dir.path().join("other.glb"), more);
         assert_eq!(reshaped.status.code(), Some(FAILED), "{}", told(&reshaped));
-        assert!(told(&reshaped).contains("at most 4096 can be given one; take fewer"), "{}", told(&reshaped));
+        assert!(
+            told(&reshaped).contains("at most 4096 can be given one; take fewer"),
+            "{}",
+            told(&reshaped)
+        );
     }
     let deep = export(&chain, "glb", &dir.path().join("chain.glb"), &[]);
     assert_eq!(deep.status.code(), Some(NO_INPUT), "{}", told(&deep));
-    assert!(told(&deep).contains("line 258: it has more levels than any tree"), "{}", told(&deep));
+    assert!(
+        told(&deep).contains("line 258: it has more levels than any tree"),
+        "{}",
+        told(&deep)
+    );
 }
 
-/// Ctrl-C while an export is worked out and while it is written: nothing is left, and the shell can tell.
+/// Ctrl-C while an export is worked out and while it is written: nothing is left, and the shell can
+/// tell.
 #[test]
 fn an_export_that_is_stopped_leaves_nothing() {
     let dir = tempfile::tempdir().expect("tempdir");
@@ -416,7 +793,11 @@ fn an_export_that_is_stopped_leaves_nothing() {
             let (time_s, rest) = rest.split_once(',').expect("cells");
             let frame: u64 = frame.parse().expect("frame");
             let time_s: f64 = time_s.parse().expect("time");
-            motion += &format!("{},{:.6},{rest}\n", frame + 330 * round, time_s + 11.0 * round as f64);
+            motion += &format!(
+                "{},{:.6},{rest}\n",
+                frame + 330 * round,
+                time_s + 11.0 * round as f64
+            );
         }
     }
     fs::write(long.join("motion.csv"), motion).expect("write");
@@ -424,28 +805,56 @@ fn an_export_that_is_stopped_leaves_nothing() {
     let waiting = dir.path().join("waiting");
     fs::create_dir(&waiting).expect("folder");
     let pipe = waiting.join("capture.json");
-    assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo").success());
+    assert!(
+        Command::new("mkfifo")
+            .arg(&pipe)
+            .status()
+            .expect("mkfifo")
+            .success()
+    );
     let out = dir.path().join("out");
     let cases: [(&str, &Path, &[&str]); 3] = [
         ("INT", &long, &["--format", "csv", "--planes", "2"]),
-        ("TERM", &long, &["--format", "csv", "--metres-per-px", "0.01"]),
+        (
+            "TERM",
+            &long,
+            &["--format", "csv", "--metres-per-px", "0.01"],
+        ),
         ("INT", &waiting, &["--format", "glb"]),
     ];
     for (signal, capture, more) in cases {
         fs::create_dir(&out).expect("folder");
         let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
-        command.arg("export").arg(capture).args(more).arg("--out").arg(out.join("it"));
-        let mut child = command.stderr(std::process::Stdio::piped()).spawn().expect("arborcam");
+        command
+            .arg("export")
+            .arg(capture)
+            .args(more)
+            .arg("--out")
+            .arg(out.join("it"));
+        let mut child = command
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .expect("arborcam");
         let mut held = None;
         if capture == waiting {
-            held = Some(fs::OpenOptions::new().write(true).open(&pipe).expect("pipe"));
+            held = Some(
+                fs::OpenOptions::new()
+                    .write(true)
+                    .open(&pipe)
+                    .expect("pipe"),
+            );
         } else {
             while !names_in(&out).iter().any(|n| n.contains("partial")) {
-                assert!(child.try_wait().expect("status").is_none(), "it was over before it was stopped");
+                assert!(
+                    child.try_wait().expect("status").is_none(),
+                    "it was over before it was stopped"
+                );
                 std::thread::sleep(std::time::Duration::from_millis(2));
             }
         }
-        let sent = Command::new("kill").args(["-s", signal, &child.id().to_string()]).status();
+        let sent = Command::new("kill")
+            .args(["-s", signal, &child.id().to_string()])
+            .status();
         assert!(sent.expect("kill").success());
         let output = child.wait_with_output().expect("end");
         drop(held);

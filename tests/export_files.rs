@@ -3,10 +3,14 @@
 mod synthetic;
 
 use arborcam::config::Config;
-use arborcam::export::capture::{self, Capture, Gap, MAX_GAPS, ModelNote, Quality, SCHEMA_VERSION, Timing};
+use arborcam::export::capture::{
+    self, Capture, Gap, MAX_GAPS, ModelNote, Quality, SCHEMA_VERSION, Timing,
+};
 use arborcam::export::csv::{MotionCsv, TracksCsv, nodes};
 use arborcam::export::{ExportError, OutputFolder};
-use arborcam::model::{Excitation, Interval, NodeId, NodeName, Observation, Sway, TrackId, TrackSet, Unidentified};
+use arborcam::model::{
+    Excitation, Interval, NodeId, NodeName, Observation, Sway, TrackId, TrackSet, Unidentified,
+};
 use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
@@ -18,11 +22,24 @@ fn text(bytes: Vec<u8>) -> String {
 #[test]
 fn tracks_have_the_agreed_columns_and_an_empty_cell_where_no_node_is() {
     let mut csv = TracksCsv::new(Vec::new()).unwrap();
-    let o =
-        |id, u_px| Observation { id: TrackId(id), u_px, v_px: 7.0, fb_error_px: 0.1, error_px: None, confirmed: true };
-    let set = TrackSet { frame: 3, time_s: 0.1, observations: vec![o(1, 10.25), o(2, 0.0)], ..TrackSet::default() };
-    csv.set(&set, |id| (id == TrackId(1)).then_some(NodeName(5))).unwrap();
-    csv.row(TrackId(9), 4, 1.0 / 3.0, [f64::NAN, -0.0], None).unwrap();
+    let o = |id, u_px| Observation {
+        id: TrackId(id),
+        u_px,
+        v_px: 7.0,
+        fb_error_px: 0.1,
+        error_px: None,
+        confirmed: true,
+    };
+    let set = TrackSet {
+        frame: 3,
+        time_s: 0.1,
+        observations: vec![o(1, 10.25), o(2, 0.0)],
+        ..TrackSet::default()
+    };
+    csv.set(&set, |id| (id == TrackId(1)).then_some(NodeName(5)))
+        .unwrap();
+    csv.row(TrackId(9), 4, 1.0 / 3.0, [f64::NAN, -0.0], None)
+        .unwrap();
     let expected = "track_id,frame,time_s,u_px,v_px,node_id\n1,3,0.1,10.25,7,5\n2,3,0.1,0,7,\n9,4,0.333333,,0,\n";
     assert_eq!(text(csv.finish().unwrap()), expected);
 }
@@ -31,22 +48,53 @@ fn tracks_have_the_agreed_columns_and_an_empty_cell_where_no_node_is() {
 fn nodes_say_what_is_not_identifiable() {
     let skeleton = synthetic::tree(2, 1);
     let sway = Sway {
-        frequency_hz: Interval { value: 0.512_34, lo: 0.5, hi: 0.53 },
-        damping_ratio: Some(Interval { value: 0.04, lo: 0.02, hi: 0.07 }),
+        frequency_hz: Interval {
+            value: 0.512_34,
+            lo: 0.5,
+            hi: 0.53,
+        },
+        damping_ratio: Some(Interval {
+            value: 0.04,
+            lo: 0.02,
+            hi: 0.07,
+        }),
         excitation: Excitation::Release,
         amplitude_deg: 1.5,
     };
-    let half = Sway { damping_ratio: None, excitation: Excitation::Wind, ..sway };
-    let all = [Err(Unidentified::NotMeasured), Ok(sway), Ok(half), Err(Unidentified::TooShort)];
+    let half = Sway {
+        damping_ratio: None,
+        excitation: Excitation::Wind,
+        ..sway
+    };
+    let all = [
+        Err(Unidentified::NotMeasured),
+        Ok(sway),
+        Ok(half),
+        Err(Unidentified::TooShort),
+    ];
     let out = text(nodes(Vec::new(), &skeleton, &all, 0.0).unwrap());
     let lines: Vec<&str> = out.lines().collect();
     let header = "node_id,parent_id,level,n_tracks,u_px,v_px,x,y,z,radius,frequency_hz,frequency_lo_hz,\
                   frequency_hi_hz,damping_ratio,damping_lo,damping_hi,identifiable,excitation,amplitude_deg,unidentified";
     assert_eq!(lines[0], header);
-    assert_eq!(lines[1], "0,,0,400,640,700,0,0,0,14,,,,,,,false,,,not_measured");
-    assert_eq!(lines[2], "1,0,1,200,644,540,4,160,0,14,0.51234,0.5,0.53,0.04,0.02,0.07,true,release,1.5,");
-    assert!(lines[3].ends_with(",0.51234,0.5,0.53,,,,true,wind,1.5,"), "{}", lines[3]);
-    assert!(lines[4].ends_with(",,,,,,,false,,,too_short"), "{}", lines[4]);
+    assert_eq!(
+        lines[1],
+        "0,,0,400,640,700,0,0,0,14,,,,,,,false,,,not_measured"
+    );
+    assert_eq!(
+        lines[2],
+        "1,0,1,200,644,540,4,160,0,14,0.51234,0.5,0.53,0.04,0.02,0.07,true,release,1.5,"
+    );
+    assert!(
+        lines[3].ends_with(",0.51234,0.5,0.53,,,,true,wind,1.5,"),
+        "{}",
+        lines[3]
+    );
+    assert!(
+        lines[4].ends_with(",,,,,,,false,,,too_short"),
+        "{}",
+        lines[4]
+    );
     assert_eq!(lines.len(), 5);
 }
 
@@ -54,7 +102,8 @@ fn nodes_say_what_is_not_identifiable() {
 fn lengths(motion: &str, parents: &[Option<NodeId>]) -> HashMap<usize, Vec<f64>> {
     let mut at: HashMap<(u64, usize), [f64; 3]> = HashMap::new();
     for row in csv::Reader::from_reader(motion.as_bytes()).deserialize() {
-        let (frame, _, node, x, y, z, _, _): (u64, f64, usize, f64, f64, f64, f64, f64) = row.unwrap();
+        let (frame, _, node, x, y, z, _, _): (u64, f64, usize, f64, f64, f64, f64, f64) =
+            row.unwrap();
         at.insert((frame, node), [x, y, z]);
     }
     let mut out: HashMap<usize, Vec<f64>> = HashMap::new();
@@ -84,8 +133,13 @@ fn rounding_does_not_stretch_even_the_shortest_branch() {
         assert!(out.starts_with("frame,time_s,node_id,x,y,z,u_px,v_px\n150,"));
         assert_eq!(out.lines().count(), 1 + 20 * skeleton.nodes.len());
         for (node, lengths) in lengths(&out, &parents) {
-            let (low, high) = lengths.iter().fold((f64::MAX, 0.0_f64), |(l, h), &x| (l.min(x), h.max(x)));
-            assert!(high / low - 1.0 < 1e-3, "branch {node}: {low} to {high} at {metres_per_px} m a pixel");
+            let (low, high) = lengths
+                .iter()
+                .fold((f64::MAX, 0.0_f64), |(l, h), &x| (l.min(x), h.max(x)));
+            assert!(
+                high / low - 1.0 < 1e-3,
+                "branch {node}: {low} to {high} at {metres_per_px} m a pixel"
+            );
         }
     }
 }
@@ -93,9 +147,17 @@ fn rounding_does_not_stretch_even_the_shortest_branch() {
 #[test]
 fn a_capture_reads_back_as_it_was_written_and_is_the_same_every_time() {
     let skeleton = synthetic::tree(3, 2);
-    let mut timing = Timing { nominal_rate_hz: Some(30.0), ..Timing::default() };
+    let mut timing = Timing {
+        nominal_rate_hz: Some(30.0),
+        ..Timing::default()
+    };
     for k in 0..MAX_GAPS as u64 + 5 {
-        timing.push_gap(Gap { after_frame: 2 * k, time_s: k as f64, missing: 1, ..Gap::default() });
+        timing.push_gap(Gap {
+            after_frame: 2 * k,
+            time_s: k as f64,
+            missing: 1,
+            ..Gap::default()
+        });
     }
     assert_eq!((timing.gaps.len(), timing.gaps_not_listed), (MAX_GAPS, 5));
     let capture = Capture {
@@ -109,7 +171,10 @@ fn a_capture_reads_back_as_it_was_written_and_is_the_same_every_time() {
         picture: None,
         build: None,
         refinement: None,
-        quality: Quality { median_fb_error_px: Some(0.05), ..Quality::default() },
+        quality: Quality {
+            median_fb_error_px: Some(0.05),
+            ..Quality::default()
+        },
         model: Some(ModelNote::of(&skeleton, 0.004)),
         animation: None,
         warnings: vec!["the camera dropped 3 frames".into()],
@@ -121,7 +186,10 @@ fn a_capture_reads_back_as_it_was_written_and_is_the_same_every_time() {
 }
 
 fn names_in(dir: &Path) -> Vec<String> {
-    let mut names: Vec<_> = fs::read_dir(dir).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    let mut names: Vec<_> = fs::read_dir(dir)
+        .unwrap()
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
     names.sort();
     names
 }
@@ -160,24 +228,41 @@ fn what_exists_is_never_touched_and_the_message_says_what_to_do() {
     std::os::unix::fs::symlink("nowhere", home.path().join("link")).unwrap();
     for taken in ["file", "empty", "link"] {
         let error = OutputFolder::create(&home.path().join(taken)).unwrap_err();
-        assert!(matches!(error, ExportError::Exists { .. }), "{taken}: {error}");
+        assert!(
+            matches!(error, ExportError::Exists { .. }),
+            "{taken}: {error}"
+        );
         let line = error.to_string();
-        assert!(line.contains("choose another") && !line.contains('\n'), "{line}");
+        assert!(
+            line.contains("choose another") && !line.contains('\n'),
+            "{line}"
+        );
     }
     let below_a_file = OutputFolder::create(&home.path().join("file/oak")).unwrap_err();
-    assert!(matches!(below_a_file, ExportError::NotAFolder { .. }), "{below_a_file}");
+    assert!(
+        matches!(below_a_file, ExportError::NotAFolder { .. }),
+        "{below_a_file}"
+    );
     assert!(OutputFolder::create(Path::new("")).is_err());
     assert_eq!(names_in(home.path()), ["empty", "file", "link"]);
 }
 
 #[test]
 fn a_full_disk_is_named_by_the_row_writers() {
-    let full = || fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let full = || {
+        fs::OpenOptions::new()
+            .write(true)
+            .open("/dev/full")
+            .unwrap()
+    };
     let skeleton = synthetic::tree(5, 3);
     let poses = synthetic::sway(&skeleton, 100);
     let mut csv = MotionCsv::new(full(), &skeleton.clone().into(), 0.0).unwrap();
     // Far more than any buffer: the error must come while writing, not at the end of an hour.
-    let error = poses.iter().find_map(|p| csv.pose(p).err()).expect("nothing fits on a full disk");
+    let error = poses
+        .iter()
+        .find_map(|p| csv.pose(p).err())
+        .expect("nothing fits on a full disk");
     assert!(matches!(error, ExportError::DiskFull { .. }), "{error}");
     let short = TracksCsv::new(full()).unwrap().finish().unwrap_err();
     assert!(matches!(short, ExportError::DiskFull { .. }), "{short}");
@@ -188,11 +273,16 @@ fn a_full_disk_is_named_by_the_row_writers() {
 fn a_full_disk_leaves_no_half_written_folder() {
     let home = tempfile::tempdir().unwrap();
     let mount = |command: &str, args: &[&str]| {
-        std::process::Command::new(command).args(args).output().is_ok_and(|o| o.status.success())
+        std::process::Command::new(command)
+            .args(args)
+            .output()
+            .is_ok_and(|o| o.status.success())
     };
     let at = home.path().to_str().unwrap().to_string();
     if !mount("mount", &["-t", "tmpfs", "-o", "size=256k", "tmpfs", &at]) {
-        eprintln!("SKIPPED a_full_disk_leaves_no_half_written_folder: no right to mount a small file system");
+        eprintln!(
+            "SKIPPED a_full_disk_leaves_no_half_written_folder: no right to mount a small file system"
+        );
         return;
     }
     let folder = OutputFolder::create(&home.path().join("oak")).unwrap();
@@ -202,6 +292,15 @@ fn a_full_disk_leaves_no_half_written_folder() {
     let left = names_in(home.path());
     assert!(mount("umount", &[&at]));
     assert_eq!(left, [""; 0]);
-    assert!(matches!(error, ExportError::DiskFull { bytes: 1_100_000, .. }), "{error:?}");
+    assert!(
+        matches!(
+            error,
+            ExportError::DiskFull {
+                bytes: 1_100_000,
+                ..
+            }
+        ),
+        "{error:?}"
+    );
     assert!(error.to_string().contains("1.1 MB"), "{error}");
 }

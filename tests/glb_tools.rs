@@ -1,5 +1,5 @@
-//! The model in other people's hands: the Khronos validator, and Blender. Where they are absent the tests say so and do
-//! nothing; with `ARBORCAM_REQUIRE_TOOLS=1` they fail.
+//! The model in other people's hands: the Khronos validator, and Blender. Where they are absent the
+//! tests say so and do nothing; with `ARBORCAM_REQUIRE_TOOLS=1` they fail.
 
 mod synthetic;
 #[path = "support/tools.rs"]
@@ -15,10 +15,20 @@ use std::process::Command;
 
 fn dressed(skeleton: &Skeleton, levels: usize, foliage: Foliage) -> Dressed {
     let wood = |k: usize| bare_wood(skeleton, 40_000 >> k);
-    Dressed { wood: (0..levels).map(wood).collect(), foliage, bark_rgb: [110, 86, 60], ..Dressed::default() }
+    Dressed {
+        wood: (0..levels).map(wood).collect(),
+        foliage,
+        bark_rgb: [110, 86, 60],
+        ..Dressed::default()
+    }
 }
 
-fn model<'a>(skeleton: &'a Skeleton, dressed: &'a Dressed, poses: &'a [Pose], provenance: &'a Value) -> Model<'a> {
+fn model<'a>(
+    skeleton: &'a Skeleton,
+    dressed: &'a Dressed,
+    poses: &'a [Pose],
+    provenance: &'a Value,
+) -> Model<'a> {
     Model {
         skeleton,
         dressed,
@@ -40,27 +50,53 @@ fn all_kinds(dir: &Path) -> Vec<PathBuf> {
     let note = json!({"software": "arborcam", "source": "a \"b\" <c>"});
     let foliage = synthetic::leaves(&skeleton);
     let flutter = synthetic::flutter(&foliage, &poses);
-    let plain = Foliage { texture: None, ..foliage.clone() };
-    let (bare, leafy, uncut) =
-        (dressed(&skeleton, 1, Foliage::default()), dressed(&skeleton, 3, foliage), dressed(&skeleton, 1, plain));
+    let plain = Foliage {
+        texture: None,
+        ..foliage.clone()
+    };
+    let (bare, leafy, uncut) = (
+        dressed(&skeleton, 1, Foliage::default()),
+        dressed(&skeleton, 3, foliage),
+        dressed(&skeleton, 1, plain),
+    );
     let mut lone = skeleton.clone();
     lone.nodes.truncate(1);
     let lone_poses = synthetic::sway(&lone, 3);
-    let nothing = Dressed { wood: vec![Mesh::default()], ..Dressed::default() };
+    let nothing = Dressed {
+        wood: vec![Mesh::default()],
+        ..Dressed::default()
+    };
     // Two nodes at one place: a branch without length.
     let mut short = skeleton.clone();
     short.nodes[5].position = short.nodes[short.nodes[5].parent.unwrap().index()].position;
     let short_dressed = dressed(&short, 1, Foliage::default());
     let short_poses = synthetic::sway(&short, 20);
-    let with_leaves = Model { flutter: &flutter, all_levels: true, ..model(&skeleton, &leafy, &poses, &note) };
+    let with_leaves = Model {
+        flutter: &flutter,
+        all_levels: true,
+        ..model(&skeleton, &leafy, &poses, &note)
+    };
     let cases = [
         ("bare", model(&skeleton, &bare, &poses, &note)),
         ("still", model(&skeleton, &bare, &[], &note)),
         ("leaves-and-levels", with_leaves),
-        ("leaves-in-metres", Model { metres_per_px: 0.01, all_levels: false, ..with_leaves }),
-        ("leaves-without-texture", model(&skeleton, &uncut, &poses, &note)),
+        (
+            "leaves-in-metres",
+            Model {
+                metres_per_px: 0.01,
+                all_levels: false,
+                ..with_leaves
+            },
+        ),
+        (
+            "leaves-without-texture",
+            model(&skeleton, &uncut, &poses, &note),
+        ),
         ("one-node", model(&lone, &nothing, &lone_poses, &note)),
-        ("no-length", model(&short, &short_dressed, &short_poses, &note)),
+        (
+            "no-length",
+            model(&short, &short_dressed, &short_poses, &note),
+        ),
     ];
     let mut paths = Vec::new();
     for (name, model) in cases {
@@ -77,40 +113,80 @@ fn all_kinds(dir: &Path) -> Vec<PathBuf> {
 
 #[test]
 fn the_khronos_validator_finds_nothing() {
-    let (Some(node), Some(modules)) = (tools::program("node", "--version"), tools::modules("gltf-validator")) else {
+    let (Some(node), Some(modules)) = (
+        tools::program("node", "--version"),
+        tools::modules("gltf-validator"),
+    ) else {
         return;
     };
     let dir = tempfile::tempdir().expect("tempdir");
     let mut files = all_kinds(dir.path());
     let out = dir.path().join("out");
-    let clip = ["recordings/sparse_winter.mkv", "--outline", "recordings/sparse_winter.outline.json"];
+    let clip = [
+        "recordings/sparse_winter.mkv",
+        "--outline",
+        "recordings/sparse_winter.outline.json",
+    ];
     let mut replay = Command::new(env!("CARGO_BIN_EXE_arborcam"));
-    replay.args(["replay", "--fast", "--headless"]).args(clip).arg("--out").arg(&out);
-    assert!(replay.stderr(std::process::Stdio::null()).status().expect("arborcam").success());
+    replay
+        .args(["replay", "--fast", "--headless"])
+        .args(clip)
+        .arg("--out")
+        .arg(&out);
+    assert!(
+        replay
+            .stderr(std::process::Stdio::null())
+            .status()
+            .expect("arborcam")
+            .success()
+    );
     files.push(out.join("tree.glb"));
     let mut validate = Command::new(node);
-    validate.arg("scripts/validate-glb.mjs").args(&files).env("NODE_PATH", modules);
+    validate
+        .arg("scripts/validate-glb.mjs")
+        .args(&files)
+        .env("NODE_PATH", modules);
     let output = validate.output().expect("node");
     let told = String::from_utf8_lossy(&output.stdout);
     println!("{told}");
-    assert!(output.status.success(), "{told}{}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{told}{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     assert_eq!(told.matches("0 errors, 0 warnings").count(), files.len());
 }
 
 fn imported(blender: &Path, file: &Path) -> Value {
     let mut import = Command::new(blender);
-    import.args(["-b", "--factory-startup", "-P", "tests/blender_import.py", "--"]).arg(file);
+    import
+        .args([
+            "-b",
+            "--factory-startup",
+            "-P",
+            "tests/blender_import.py",
+            "--",
+        ])
+        .arg(file);
     let output = import.output().expect("blender");
     let told = String::from_utf8_lossy(&output.stdout).into_owned();
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
-    let line = told.lines().find_map(|l| l.strip_prefix("IMPORTED ")).unwrap_or_else(|| panic!("{told}{errors}"));
-    assert!(!told.contains("Error") && !errors.contains("Traceback"), "{told}{errors}");
+    let line = told
+        .lines()
+        .find_map(|l| l.strip_prefix("IMPORTED "))
+        .unwrap_or_else(|| panic!("{told}{errors}"));
+    assert!(
+        !told.contains("Error") && !errors.contains("Traceback"),
+        "{told}{errors}"
+    );
     serde_json::from_str(line).expect("json")
 }
 
 #[test]
 fn blender_gets_every_bone_and_the_whole_animation() {
-    let Some(blender) = tools::program("blender", "--version") else { return };
+    let Some(blender) = tools::program("blender", "--version") else {
+        return;
+    };
     let dir = tempfile::tempdir().expect("tempdir");
     let skeleton = synthetic::tree(7, 2);
     let poses = synthetic::sway(&skeleton, 91);
@@ -119,8 +195,11 @@ fn blender_gets_every_bone_and_the_whole_animation() {
     let groups = foliage.groups.len();
     let dressed = dressed(&skeleton, 1, foliage);
     let file = dir.path().join("tree.glb");
-    let (bytes, _) =
-        glb(&Model { flutter: &flutter, ..model(&skeleton, &dressed, &poses, &Value::Null) }).expect("glb");
+    let (bytes, _) = glb(&Model {
+        flutter: &flutter,
+        ..model(&skeleton, &dressed, &poses, &Value::Null)
+    })
+    .expect("glb");
     fs::write(&file, bytes).expect("write");
     let there = imported(&blender, &file);
     println!("{there}");
@@ -129,13 +208,28 @@ fn blender_gets_every_bone_and_the_whole_animation() {
         None => format!("node_{}", n.name.0),
     });
     let names: Vec<String> = names.collect();
-    let bones: Vec<&str> = there["bones"].as_array().expect("bones").iter().filter_map(Value::as_str).collect();
+    let bones: Vec<&str> = there["bones"]
+        .as_array()
+        .expect("bones")
+        .iter()
+        .filter_map(Value::as_str)
+        .collect();
     assert_eq!(bones.len(), names.len());
-    assert!(names.iter().all(|name| bones.contains(&name.as_str())), "bones are named by their nodes");
+    assert!(
+        names.iter().all(|name| bones.contains(&name.as_str())),
+        "bones are named by their nodes"
+    );
     let end_s = there["end_s"].as_f64().expect("end");
     let length_s = poses[90].time_s - poses[0].time_s;
     assert!((end_s - length_s).abs() < 0.01, "{end_s} s of {length_s} s");
-    assert_eq!(there["meshes"].as_array().expect("meshes").len(), 1 + groups);
-    assert_eq!(there["shape_keys"], 3 * groups, "the rest and two swings for every group");
+    assert_eq!(
+        there["meshes"].as_array().expect("meshes").len(),
+        1 + groups
+    );
+    assert_eq!(
+        there["shape_keys"],
+        3 * groups,
+        "the rest and two swings for every group"
+    );
     assert_eq!(there["materials"], json!(["bark", "leaf"]));
 }

@@ -1,4 +1,5 @@
-//! Leaves stand where the picture has them, in its colours, on every tree and for every budget; and they swing with the wind.
+//! Leaves stand where the picture has them, in its colours, on every tree and for every budget; and
+//! they swing with the wind.
 
 mod support;
 mod synthetic;
@@ -8,11 +9,14 @@ use arborcam::draw::{Camera, Look, Model, View, picture};
 use arborcam::model::{JointPose, Luma, NodeId, Outline, Pose, Rgb, Size, Skeleton};
 use arborcam::motion::flutter;
 use arborcam::pipeline::{Pipeline, Seen, dress, leaf_seeds};
-use arborcam::shape::{Foliage, LeafView, Sampling, Template, density_match, foliage, foliage_by, leaf_cover, season};
+use arborcam::shape::{
+    Foliage, LeafView, Sampling, Template, density_match, foliage, foliage_by, leaf_cover, season,
+};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use std::path::{Path, PathBuf};
 
-/// A made-up film still: a tree before sky and a wall, drawn by code, with what is leaf known for every pixel.
+/// A made-up film still: a tree before sky and a wall, drawn by code, with what is leaf known for
+/// every pixel.
 struct Still {
     skeleton: Skeleton,
     picture: Rgb,
@@ -20,7 +24,10 @@ struct Still {
     leaf: Vec<f32>,
 }
 
-const SIZE: Size = Size { width: 640, height: 480 };
+const SIZE: Size = Size {
+    width: 640,
+    height: 480,
+};
 
 /// Clumps of leaves about the tips of the branches that the front view shows, or none.
 fn still(in_leaf: bool) -> Still {
@@ -34,29 +41,47 @@ fn still(in_leaf: bool) -> Still {
     for (i, p) in pixels.iter_mut().enumerate() {
         let (u, v) = (i % w, i / w);
         let grain = (8.0 * synthetic::noise(i, 3)) as i32;
-        let base: [i32; 3] = if u < 300 && v > 200 { [142, 84, 66] } else { [178 + v as i32 / 16, 200, 226] };
+        let base: [i32; 3] = if u < 300 && v > 200 {
+            [142, 84, 66]
+        } else {
+            [178 + v as i32 / 16, 200, 226]
+        };
         *p = base.map(|c| (c + grain).clamp(0, 255) as u8);
     }
     let disc = |at: [f64; 2], r: f64| {
         let (l, t) = ((at[0] - r).max(0.0) as usize, (at[1] - r).max(0.0) as usize);
-        let (right, bottom) = (((at[0] + r) as usize + 1).min(w), ((at[1] + r) as usize + 1).min(h));
+        let (right, bottom) = (
+            ((at[0] + r) as usize + 1).min(w),
+            ((at[1] + r) as usize + 1).min(h),
+        );
         let cells = (t..bottom).flat_map(move |v| (l..right).map(move |u| (u, v)));
-        cells.filter(move |(u, v)| (*u as f64 - at[0]).hypot(*v as f64 - at[1]) <= r).map(move |(u, v)| v * w + u)
+        cells
+            .filter(move |(u, v)| (*u as f64 - at[0]).hypot(*v as f64 - at[1]) <= r)
+            .map(move |(u, v)| v * w + u)
     };
     let measured = skeleton.measured();
     let mut outside = vec![true; w * h];
     for node in &skeleton.nodes[1..measured] {
         let (from, to) = (&skeleton.nodes[node.parent.unwrap().index()], node);
         for k in 0..=60 {
-            let at = skeleton.image_from_model(&(from.position + (to.position - from.position) * (k as f64 / 60.0)));
+            let at = skeleton.image_from_model(
+                &(from.position + (to.position - from.position) * (k as f64 / 60.0)),
+            );
             disc(at, (0.7 * node.radius).max(0.7)).for_each(|i| pixels[i] = [96, 80, 68]);
             disc(at, 22.0).for_each(|i| outside[i] = false);
         }
     }
     let mut leaf = vec![0.0; w * h];
-    for (k, node) in skeleton.nodes[..measured].iter().enumerate().filter(|(_, n)| in_leaf && n.level >= 5) {
+    for (k, node) in skeleton.nodes[..measured]
+        .iter()
+        .enumerate()
+        .filter(|(_, n)| in_leaf && n.level >= 5)
+    {
         for j in 0..30 {
-            let off = [16.0 * synthetic::noise(k, j), 16.0 * synthetic::noise(k, j + 50)];
+            let off = [
+                16.0 * synthetic::noise(k, j),
+                16.0 * synthetic::noise(k, j + 50),
+            ];
             let at = skeleton.image_from_model(&node.position);
             let shade = 1.0 + 0.45 * synthetic::noise(k, j + 90);
             let colour = [70.0, 110.0, 40.0].map(|c: f64| (c * shade) as u8);
@@ -67,13 +92,31 @@ fn still(in_leaf: bool) -> Still {
         }
     }
     let mask = outside.iter().map(|&o| if o { 0 } else { 255 }).collect();
-    let outline = Outline { size: SIZE, mask, polygon_px: Vec::new(), matte: None };
-    Still { skeleton, picture: Rgb { size: SIZE, pixels: pixels.concat() }, outline, leaf }
+    let outline = Outline {
+        size: SIZE,
+        mask,
+        polygon_px: Vec::new(),
+        matte: None,
+    };
+    Still {
+        skeleton,
+        picture: Rgb {
+            size: SIZE,
+            pixels: pixels.concat(),
+        },
+        outline,
+        leaf,
+    }
 }
 
 impl Still {
     fn view<'a>(&'a self, seeds: &'a [[f32; 2]]) -> LeafView<'a> {
-        LeafView { picture: Some(&self.picture), outline: Some(&self.outline), seeds, ..LeafView::default() }
+        LeafView {
+            picture: Some(&self.picture),
+            outline: Some(&self.outline),
+            seeds,
+            ..LeafView::default()
+        }
     }
 
     fn leaves(&self, settings: &Leaves) -> Foliage {
@@ -90,25 +133,44 @@ impl Still {
 }
 
 fn triangles(foliage: &Foliage) -> usize {
-    foliage.groups.iter().map(|g| g.mesh.indices.len() / 3).sum()
+    foliage
+        .groups
+        .iter()
+        .map(|g| g.mesh.indices.len() / 3)
+        .sum()
 }
 
-/// Shares of what is covered around every pixel, weighed with a normal distribution of deviation `sigma`; written apart
-/// from the program's own.
+/// Shares of what is covered around every pixel, weighed with a normal distribution of deviation
+/// `sigma`; written apart from the program's own.
 fn density(values: &[f32], width: usize, sigma: f64) -> Vec<f64> {
     let reach = (3.0 * sigma) as i64;
-    let kernel: Vec<f64> = (-reach..=reach).map(|k| (-(k as f64 / sigma).powi(2) / 2.0).exp()).collect();
+    let kernel: Vec<f64> = (-reach..=reach)
+        .map(|k| (-(k as f64 / sigma).powi(2) / 2.0).exp())
+        .collect();
     let sum: f64 = kernel.iter().sum();
     let mut out: Vec<f64> = values.iter().map(|&x| f64::from(x)).collect();
     for stride in [1, width] {
         let before = out.clone();
         for (i, value) in out.iter_mut().enumerate() {
-            let (at, n) = if stride == 1 { (i % width, width) } else { (i / width, values.len() / width) };
+            let (at, n) = if stride == 1 {
+                (i % width, width)
+            } else {
+                (i / width, values.len() / width)
+            };
             let tap = |k: i64| {
                 let to = at as i64 + k;
-                if (0..n as i64).contains(&to) { before[(i as i64 + k * stride as i64) as usize] } else { 0.0 }
+                if (0..n as i64).contains(&to) {
+                    before[(i as i64 + k * stride as i64) as usize]
+                } else {
+                    0.0
+                }
             };
-            *value = kernel.iter().zip(-reach..).map(|(w, k)| w * tap(k)).sum::<f64>() / sum;
+            *value = kernel
+                .iter()
+                .zip(-reach..)
+                .map(|(w, k)| w * tap(k))
+                .sum::<f64>()
+                / sum;
         }
     }
     out
@@ -119,14 +181,22 @@ fn correlation(a: &[f64], b: &[f64], width: usize) -> f64 {
     let there: Vec<usize> = (0..a.len()).filter(|&i| a[i] + b[i] > 0.1).collect();
     let ends = |of: &dyn Fn(usize) -> usize| {
         let values = there.iter().map(|&i| of(i));
-        (values.clone().min().expect("leaves"), values.max().expect("leaves"))
+        (
+            values.clone().min().expect("leaves"),
+            values.max().expect("leaves"),
+        )
     };
     let ((left, right), (top, bottom)) = (ends(&|i| i % width), ends(&|i| i / width));
-    let inside = |i: &usize| (left..=right).contains(&(i % width)) && (top..=bottom).contains(&(i / width));
+    let inside =
+        |i: &usize| (left..=right).contains(&(i % width)) && (top..=bottom).contains(&(i / width));
     let pairs: Vec<(f64, f64)> = (0..a.len()).filter(inside).map(|i| (a[i], b[i])).collect();
     let n = pairs.len() as f64;
-    let (mx, my) = (pairs.iter().map(|p| p.0).sum::<f64>() / n, pairs.iter().map(|p| p.1).sum::<f64>() / n);
-    let sum = |f: &dyn Fn(f64, f64) -> f64| pairs.iter().map(|(x, y)| f(x - mx, y - my)).sum::<f64>();
+    let (mx, my) = (
+        pairs.iter().map(|p| p.0).sum::<f64>() / n,
+        pairs.iter().map(|p| p.1).sum::<f64>() / n,
+    );
+    let sum =
+        |f: &dyn Fn(f64, f64) -> f64| pairs.iter().map(|(x, y)| f(x - mx, y - my)).sum::<f64>();
     sum(&|x, y| x * y) / (sum(&|x, _| x * x) * sum(&|_, y| y * y)).sqrt()
 }
 
@@ -134,13 +204,32 @@ fn correlation(a: &[f64], b: &[f64], width: usize) -> f64 {
 fn better_than_chance(still: &Still, pose: Option<&Pose>, leaf: &[f32]) -> [f64; 3] {
     let settings = Leaves::default();
     let seeds = leaf_seeds(&still.picture, &still.outline, settings.seeds);
-    let view = LeafView { pose, ..still.view(&seeds) };
-    let (wood, template) = (synthetic::limbs_of(&still.skeleton, &synthetic::bare()), Template::ours());
+    let view = LeafView {
+        pose,
+        ..still.view(&seeds)
+    };
+    let (wood, template) = (
+        synthetic::limbs_of(&still.skeleton, &synthetic::bare()),
+        Template::ours(),
+    );
     let heights = still.skeleton.nodes.iter().map(|n| n.position.y);
     let sigma = heights.fold(0.0, f64::max) / 20.0;
     let truth = density(leaf, still.picture.size.width as usize, sigma);
-    [Sampling::Seeds, Sampling::Random { spread: 0.02 }, Sampling::Random { spread: 0.1 }].map(|sampling| {
-        let leaves = foliage_by(sampling, &wood, &still.skeleton, &view, &template, &settings, 0);
+    [
+        Sampling::Seeds,
+        Sampling::Random { spread: 0.02 },
+        Sampling::Random { spread: 0.1 },
+    ]
+    .map(|sampling| {
+        let leaves = foliage_by(
+            sampling,
+            &wood,
+            &still.skeleton,
+            &view,
+            &template,
+            &settings,
+            0,
+        );
         let (covered, width) = leaf_cover(&leaves, &still.skeleton, pose);
         correlation(&density(&covered, width, sigma), &truth, width)
     })
@@ -152,16 +241,27 @@ fn the_density_is_the_picture_s_and_not_that_of_chance() {
     let [ours, small, large] = better_than_chance(&still, None, &still.leaf);
     println!("ours {ours:.3}, chance near the branches {small:.3}, far {large:.3}");
     assert!(ours >= 0.9, "{ours}");
-    assert!(ours > small + 0.05 && ours > large + 0.05, "{ours} {small} {large}");
+    assert!(
+        ours > small + 0.05 && ours > large + 0.05,
+        "{ours} {small} {large}"
+    );
 }
 
-/// The picture shows the tree held aside; the leaves are stored at rest and must be seen aside again in that pose.
+/// The picture shows the tree held aside; the leaves are stored at rest and must be seen aside
+/// again in that pose.
 #[test]
 fn leaves_of_a_tree_held_aside_hang_where_they_hung() {
     let still = still(true);
     let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.25);
-    let joint = |n: &arborcam::model::Node| JointPose { position: rotation * n.position, rotation };
-    let pose = Pose { frame: 0, time_s: 0.0, joints: still.skeleton.nodes.iter().map(joint).collect() };
+    let joint = |n: &arborcam::model::Node| JointPose {
+        position: rotation * n.position,
+        rotation,
+    };
+    let pose = Pose {
+        frame: 0,
+        time_s: 0.0,
+        joints: still.skeleton.nodes.iter().map(joint).collect(),
+    };
     let [ours, ..] = better_than_chance(&still, Some(&pose), &still.leaf);
     assert!(ours >= 0.85, "{ours}");
 }
@@ -172,7 +272,11 @@ fn whether_a_tree_is_in_leaf_is_seen() {
         let still = still(in_leaf);
         let found = season(&still.picture, &still.outline, &still.skeleton).expect("a season");
         assert_eq!(found.in_leaf > 0.5, in_leaf, "{found:?}");
-        let seen = Seen { picture: Some(&still.picture), outline: Some(&still.outline), ..Seen::default() };
+        let seen = Seen {
+            picture: Some(&still.picture),
+            outline: Some(&still.outline),
+            ..Seen::default()
+        };
         let leaves = |show| {
             let mut config = Config::default();
             config.leaves.show = show;
@@ -189,51 +293,87 @@ fn whether_a_tree_is_in_leaf_is_seen() {
 fn number_is_traded_for_size() {
     let still = still(true);
     let covered = |most: u32| {
-        let leaves = still.leaves(&Leaves { triangles: most, ..Leaves::default() });
+        let leaves = still.leaves(&Leaves {
+            triangles: most,
+            ..Leaves::default()
+        });
         let count = triangles(&leaves);
-        assert!(count <= most as usize && count * 10 >= most as usize * 9, "{count} of {most}");
-        leaf_cover(&leaves, &still.skeleton, None).0.iter().sum::<f32>()
+        assert!(
+            count <= most as usize && count * 10 >= most as usize * 9,
+            "{count} of {most}"
+        );
+        leaf_cover(&leaves, &still.skeleton, None)
+            .0
+            .iter()
+            .sum::<f32>()
     };
     let wanted: f32 = still.leaf.iter().sum();
     for most in [3_000, 20_000, 60_000] {
         let share = covered(most) / wanted;
-        assert!((0.8..1.2).contains(&share), "{most} triangles cover {share} of what the picture has");
+        assert!(
+            (0.8..1.2).contains(&share),
+            "{most} triangles cover {share} of what the picture has"
+        );
     }
 }
 
-/// A tree in leaf hides its wood: where the picture has leaves, leaves are seen and not the limbs behind them, as many
-/// pixels as in the picture; and from the side and from above it is no barer.
+/// A tree in leaf hides its wood: where the picture has leaves, leaves are seen and not the limbs
+/// behind them, as many pixels as in the picture; and from the side and from above it is no barer.
 #[test]
 fn leaves_hide_the_wood_as_in_the_picture_and_from_all_sides() {
     let still = still(true);
-    let seen = Seen { picture: Some(&still.picture), outline: Some(&still.outline), ..Seen::default() };
+    let seen = Seen {
+        picture: Some(&still.picture),
+        outline: Some(&still.outline),
+        ..Seen::default()
+    };
     let dressed = dress(&still.skeleton, seen, &Config::default());
     let mut marked = dressed.foliage.clone();
-    marked.groups.iter_mut().for_each(|g| g.colours.fill([255, 0, 255]));
+    marked
+        .groups
+        .iter_mut()
+        .for_each(|g| g.colours.fill([255, 0, 255]));
     let mut model = Model::bare(&still.skeleton, &dressed.wood[0], [0, 255, 0]);
     model.foliage = &marked;
     let posed = model.posed(None, &[]);
-    let look = Look { samples: 1, ..Look::default() };
+    let look = Look {
+        samples: 1,
+        ..Look::default()
+    };
     let bounds = posed.bounds().expect("a tree");
     // For every pixel: 2 for leaf, 1 for wood.
     let kinds = |camera: &Camera| -> Vec<u8> {
         let kind = |p: &[u8]| u8::from(p[3] > 127) + u8::from(p[3] > 127 && p[0] > p[1]);
-        picture(&posed, camera, &look).pixels.chunks_exact(4).map(kind).collect()
+        picture(&posed, camera, &look)
+            .pixels
+            .chunks_exact(4)
+            .map(kind)
+            .collect()
     };
     let count = |kinds: &[u8], kind: u8| kinds.iter().filter(|&&k| k == kind).count() as f32;
     let front = kinds(&Camera::of_film(&still.skeleton, SIZE));
     let share = count(&front, 2) / still.leaf.iter().sum::<f32>();
-    let before: Vec<u8> = front.iter().zip(&still.leaf).filter(|(_, l)| **l > 0.5).map(|(k, _)| *k).collect();
+    let before: Vec<u8> = front
+        .iter()
+        .zip(&still.leaf)
+        .filter(|(_, l)| **l > 0.5)
+        .map(|(k, _)| *k)
+        .collect();
     let barer = |view| {
         let kinds = kinds(&Camera::fitting(&bounds, view, false, SIZE));
         count(&kinds, 1) / count(&kinds, 2)
     };
     let bare = [View::FRONT, View::SIDE, View::TOP].map(barer);
     let hidden = count(&before, 1) / before.len() as f32;
-    println!("seen {share:.3} of the picture's leaves, wood before {hidden:.3} of them; wood over leaf {bare:?}");
+    println!(
+        "seen {share:.3} of the picture's leaves, wood before {hidden:.3} of them; wood over leaf {bare:?}"
+    );
     assert!((0.85..1.15).contains(&share), "{share}");
     assert!(hidden < 0.1, "{hidden}");
-    assert!(bare[1] < 2.0 * bare[0] && bare[2] < 2.0 * bare[0], "{bare:?}");
+    assert!(
+        bare[1] < 2.0 * bare[0] && bare[2] < 2.0 * bare[0],
+        "{bare:?}"
+    );
 }
 
 /// Something behind the tree shows through in a colour that is nowhere beside it.
@@ -247,49 +387,102 @@ fn no_leaf_has_the_colour_of_what_is_seen_between_leaves() {
         }
     }
     let leaves = still.leaves(&Leaves::default());
-    let blue = leaves.groups.iter().flat_map(|g| &g.colours).filter(|c| c[2] >= c[1]).count();
+    let blue = leaves
+        .groups
+        .iter()
+        .flat_map(|g| &g.colours)
+        .filter(|c| c[2] >= c[1])
+        .count();
     assert_eq!(blue, 0);
 }
 
-/// B.1: dark leaves stand at the back, bright ones at the front; each main branch has its own, and all is sound.
+/// B.1: dark leaves stand at the back, bright ones at the front; each main branch has its own, and
+/// all is sound.
 #[test]
 fn bright_leaves_are_in_front_and_every_vertex_is_sound() {
     let still = still(true);
     let leaves = still.leaves(&Leaves::default());
-    assert!((2..=12).contains(&leaves.groups.len()), "{}", leaves.groups.len());
+    assert!(
+        (2..=12).contains(&leaves.groups.len()),
+        "{}",
+        leaves.groups.len()
+    );
     let (mut bright, mut dark) = (Vec::new(), Vec::new());
     for group in &leaves.groups {
         let (mesh, n) = (&group.mesh, group.mesh.positions.len());
-        let lengths = [mesh.normals.len(), mesh.uvs.len(), mesh.joints.len(), mesh.weights.len()];
+        let lengths = [
+            mesh.normals.len(),
+            mesh.uvs.len(),
+            mesh.joints.len(),
+            mesh.weights.len(),
+        ];
         assert_eq!(lengths, [n; 4]);
-        assert_eq!([group.colours.len(), group.sine.len(), group.cosine.len()], [n; 3]);
+        assert_eq!(
+            [group.colours.len(), group.sine.len(), group.cosine.len()],
+            [n; 3]
+        );
         assert!(mesh.indices.iter().all(|&i| (i as usize) < n));
         for i in 0..n {
-            assert!(mesh.positions[i].iter().chain(&group.sine[i]).chain(&group.cosine[i]).all(|x| x.is_finite()));
+            assert!(
+                mesh.positions[i]
+                    .iter()
+                    .chain(&group.sine[i])
+                    .chain(&group.cosine[i])
+                    .all(|x| x.is_finite())
+            );
             assert!((Vector3::from(mesh.normals[i]).norm() - 1.0).abs() < 1e-3);
             assert!((mesh.weights[i].iter().sum::<f32>() - 1.0).abs() < 1e-4);
             let [r, g, b] = group.colours[i].map(f64::from);
-            assert!(g > b && g > 0.9 * r, "{:?} is no colour of these leaves", group.colours[i]);
-            let half = if r + g + b > 230.0 { &mut bright } else { &mut dark };
+            assert!(
+                g > b && g > 0.9 * r,
+                "{:?} is no colour of these leaves",
+                group.colours[i]
+            );
+            let half = if r + g + b > 230.0 {
+                &mut bright
+            } else {
+                &mut dark
+            };
             half.push(f64::from(mesh.positions[i][2]));
         }
     }
     let mean = |z: &[f64]| z.iter().sum::<f64>() / z.len() as f64;
-    assert!(mean(&bright) > mean(&dark) + 10.0, "{} {}", mean(&bright), mean(&dark));
+    assert!(
+        mean(&bright) > mean(&dark) + 10.0,
+        "{} {}",
+        mean(&bright),
+        mean(&dark)
+    );
 }
 
 #[test]
 fn a_drawn_density_goes_before_the_picture_s() {
     let still = still(true);
-    let pixels = (0..SIZE.area()).map(|i| if i % 640 < 320 && i / 640 < 300 { 255 } else { 0 }).collect();
+    let pixels = (0..SIZE.area())
+        .map(|i| {
+            if i % 640 < 320 && i / 640 < 300 {
+                255
+            } else {
+                0
+            }
+        })
+        .collect();
     let drawn = Luma { size: SIZE, pixels };
-    let seen =
-        Seen { picture: Some(&still.picture), outline: Some(&still.outline), density: Some(&drawn), ..Seen::default() };
+    let seen = Seen {
+        picture: Some(&still.picture),
+        outline: Some(&still.outline),
+        density: Some(&drawn),
+        ..Seen::default()
+    };
     let leaves = dress(&still.skeleton, seen, &Config::default()).foliage;
     let (covered, width) = leaf_cover(&leaves, &still.skeleton, None);
     let (mut left, mut right) = (0.0, 0.0);
     for (i, c) in covered.iter().enumerate() {
-        *(if i % width < 325 { &mut left } else { &mut right }) += c;
+        *(if i % width < 325 {
+            &mut left
+        } else {
+            &mut right
+        }) += c;
     }
     assert!(left > 20.0 * right, "{left} {right}");
 }
@@ -297,32 +490,65 @@ fn a_drawn_density_goes_before_the_picture_s() {
 #[test]
 fn the_same_picture_gives_the_same_leaves() {
     let still = still(true);
-    assert_eq!(still.leaves(&Leaves::default()), still.leaves(&Leaves::default()));
+    assert_eq!(
+        still.leaves(&Leaves::default()),
+        still.leaves(&Leaves::default())
+    );
 }
 
-/// Trees without branches, without length, with places that are no numbers; pictures of another size or with no pixels.
+/// Trees without branches, without length, with places that are no numbers; pictures of another
+/// size or with no pixels.
 #[test]
 fn whatever_is_given_the_leaves_are_sound_or_none() {
     let still = still(true);
     let mut one = still.skeleton.clone();
     one.nodes.truncate(1);
     let mut short = still.skeleton.clone();
-    short.nodes.iter_mut().for_each(|n| n.position = Point3::origin());
+    short
+        .nodes
+        .iter_mut()
+        .for_each(|n| n.position = Point3::origin());
     let mut broken = still.skeleton.clone();
-    broken.nodes.iter_mut().skip(5).step_by(7).for_each(|n| n.position.x = f64::NAN);
+    broken
+        .nodes
+        .iter_mut()
+        .skip(5)
+        .step_by(7)
+        .for_each(|n| n.position.x = f64::NAN);
     let mut two = still.skeleton.clone();
     two.nodes.truncate(2);
-    let small = Rgb { size: Size::new(64, 48), pixels: vec![60; 3 * 64 * 48] };
-    let torn = Rgb { size: SIZE, pixels: vec![60; 100] };
-    let nothing = Outline { mask: vec![0; SIZE.area()], ..still.outline.clone() };
+    let small = Rgb {
+        size: Size::new(64, 48),
+        pixels: vec![60; 3 * 64 * 48],
+    };
+    let torn = Rgb {
+        size: SIZE,
+        pixels: vec![60; 100],
+    };
+    let nothing = Outline {
+        mask: vec![0; SIZE.area()],
+        ..still.outline.clone()
+    };
     let mut config = Config::default();
     config.leaves.show = LeafShow::On;
     for skeleton in [&one, &short, &broken, &two, &still.skeleton] {
         for picture in [None, Some(&small), Some(&torn), Some(&still.picture)] {
             for outline in [None, Some(&nothing), Some(&still.outline)] {
-                let seen = Seen { picture, outline, ..Seen::default() };
+                let seen = Seen {
+                    picture,
+                    outline,
+                    ..Seen::default()
+                };
                 let leaves = dress(skeleton, seen, &config).foliage;
-                let _ = density_match(&leaves, skeleton, &LeafView { picture, outline, ..LeafView::default() });
+                let _ = density_match(
+                    &leaves,
+                    skeleton,
+                    &LeafView {
+                        picture,
+                        outline,
+                        ..LeafView::default()
+                    },
+                );
                 for group in &leaves.groups {
                     assert!(group.mesh.positions.iter().flatten().all(|x| x.is_finite()));
                     assert!(group.node.index() < skeleton.nodes.len());
@@ -331,10 +557,14 @@ fn whatever_is_given_the_leaves_are_sound_or_none() {
         }
     }
     let without = dress(&still.skeleton, Seen::default(), &config).foliage;
-    assert!(triangles(&without) > 10_000, "without a picture leaves are sampled about the branches");
+    assert!(
+        triangles(&without) > 10_000,
+        "without a picture leaves are sampled about the branches"
+    );
 }
 
-/// B.2: still leaves on a still tree; the faster the branch, the farther they swing, at the frequency that was set.
+/// B.2: still leaves on a still tree; the faster the branch, the farther they swing, at the
+/// frequency that was set.
 #[test]
 fn leaves_swing_as_their_branch_moves() {
     let still = still(true);
@@ -342,12 +572,20 @@ fn leaves_swing_as_their_branch_moves() {
     // Held still for 1 s, then 2 s of swinging by 20 px at 1 Hz.
     let pose = |k: u64| {
         let time_s = k as f64 / 30.0;
-        let off = if time_s < 1.0 { 0.0 } else { 20.0 * (std::f64::consts::TAU * time_s).sin() };
+        let off = if time_s < 1.0 {
+            0.0
+        } else {
+            20.0 * (std::f64::consts::TAU * time_s).sin()
+        };
         let joint = |n: &arborcam::model::Node| JointPose {
             position: n.position + Vector3::new(off * f64::from(n.level) / 6.0, 0.0, 0.0),
             rotation: UnitQuaternion::identity(),
         };
-        Pose { frame: k, time_s, joints: nodes.iter().map(joint).collect() }
+        Pose {
+            frame: k,
+            time_s,
+            joints: nodes.iter().map(joint).collect(),
+        }
     };
     let poses: Vec<Pose> = (0..90).map(pose).collect();
     let settings = Leaves::default();
@@ -358,46 +596,80 @@ fn leaves_swing_as_their_branch_moves() {
     assert!((0..26).all(|k| amplitude(k) == 0.0));
     let most = (0..90).map(amplitude).fold(0.0, f64::max);
     assert!(most > 2.0 && most <= settings.swing_deg, "{most}");
-    assert!((1..90).all(|k| (amplitude(k) - amplitude(k - 1)).abs() < 0.25 * settings.swing_deg), "jerks");
+    assert!(
+        (1..90).all(|k| (amplitude(k) - amplitude(k - 1)).abs() < 0.25 * settings.swing_deg),
+        "jerks"
+    );
     let angle = |k: usize| f64::from(swung[0][k][0]).atan2(f64::from(swung[0][k][1]));
     let step = (angle(61) - angle(60)).rem_euclid(std::f64::consts::TAU);
-    assert!((step - std::f64::consts::TAU * settings.frequency_hz / 30.0).abs() < 1e-3, "{step}");
-    let off = Leaves { swing_deg: 0.0, ..Leaves::default() };
-    assert!(flutter(&poses, &still.skeleton, &groups, &off).iter().flatten().all(|w| *w == [0.0; 2]));
-    assert!(flutter(&[], &still.skeleton, &groups, &settings).iter().all(Vec::is_empty));
+    assert!(
+        (step - std::f64::consts::TAU * settings.frequency_hz / 30.0).abs() < 1e-3,
+        "{step}"
+    );
+    let off = Leaves {
+        swing_deg: 0.0,
+        ..Leaves::default()
+    };
+    assert!(
+        flutter(&poses, &still.skeleton, &groups, &off)
+            .iter()
+            .flatten()
+            .all(|w| *w == [0.0; 2])
+    );
+    assert!(
+        flutter(&[], &still.skeleton, &groups, &settings)
+            .iter()
+            .all(Vec::is_empty)
+    );
 }
 
 /// The oak of the public clips, where there are any: what is leaf in it is plain by its colour.
 #[test]
 fn the_oak_has_the_density_of_its_first_frame() {
     let Some(clips) = std::env::var_os("ARBORCAM_CLIPS").map(PathBuf::from) else {
-        eprintln!("skipped: ARBORCAM_CLIPS names no folder with oak_release/video.mkv and outline.json");
+        eprintln!(
+            "skipped: ARBORCAM_CLIPS names no folder with oak_release/video.mkv and outline.json"
+        );
         return;
     };
     let folder = clips.join("oak_release");
-    let (skeleton, pose, picture, outline) = posed_clip(&folder.join("video.mkv"), &folder.join("outline.json"));
-    // Leaves are green to yellow; sky, lake, bark and pagoda are not, and the lawn begins below the crown, at row 262. By
-    // hand, apart from the program's own colours.
+    let (skeleton, pose, picture, outline) =
+        posed_clip(&folder.join("video.mkv"), &folder.join("outline.json"));
+    // Leaves are green to yellow; sky, lake, bark and pagoda are not, and the lawn begins below the
+    // crown, at row 262. By hand, apart from the program's own colours.
     let green = |c: &[u8]| {
         let [r, g, b] = [c[0], c[1], c[2]].map(f64::from);
         g > 0.92 * r && g > 1.35 * b && r + g + b > 20.0
     };
     let mask = &outline.mask;
-    let mut leaf: Vec<f32> =
-        picture.pixels.chunks_exact(3).zip(mask).map(|(c, &m)| f32::from(u8::from(m > 0 && green(c)))).collect();
+    let mut leaf: Vec<f32> = picture
+        .pixels
+        .chunks_exact(3)
+        .zip(mask)
+        .map(|(c, &m)| f32::from(u8::from(m > 0 && green(c))))
+        .collect();
     leaf[262 * 640..].fill(0.0);
     let found = season(&picture, &outline, &skeleton).expect("a season");
     assert!(found.in_leaf > 0.5, "{found:?}");
-    let still = Still { skeleton, picture, outline, leaf: Vec::new() };
+    let still = Still {
+        skeleton,
+        picture,
+        outline,
+        leaf: Vec::new(),
+    };
     let [ours, small, large] = better_than_chance(&still, Some(&pose), &leaf);
     println!("oak: ours {ours:.3}, chance near the branches {small:.3}, far {large:.3}, {found:?}");
-    assert!(ours >= 0.9 && ours > small + 0.05 && ours > large + 0.05, "{ours} {small} {large}");
+    assert!(
+        ours >= 0.9 && ours > small + 0.05 && ours > large + 0.05,
+        "{ours} {small} {large}"
+    );
 }
 
 /// The shipped recording is a bare tree, and stays one.
 #[test]
 fn the_winter_tree_is_bare() {
-    let (skeleton, _, picture, outline) = posed_clip(Path::new(support::CLIP), Path::new(support::OUTLINE));
+    let (skeleton, _, picture, outline) =
+        posed_clip(Path::new(support::CLIP), Path::new(support::OUTLINE));
     let found = season(&picture, &outline, &skeleton).expect("a season");
     assert!(found.in_leaf < 0.1, "{found:?}");
 }
@@ -417,41 +689,78 @@ fn posed_clip(clip: &Path, outline: &Path) -> (Skeleton, Pose, Rgb, Outline) {
     let mut pipeline = Pipeline::new(&config, Some(outline.clone()));
     let mut sets = Vec::new();
     for (k, raw) in frames.iter().enumerate() {
-        let mut luma = Luma { size: raw.size, pixels: Vec::new() };
+        let mut luma = Luma {
+            size: raw.size,
+            pixels: Vec::new(),
+        };
         decoder.luma(raw, &mut luma).expect("picture");
         let time_s = raw.sensor_time_s - frames[0].sensor_time_s;
-        let frame = Frame { index: k as u64, time_s, received: std::time::Instant::now(), luma, preview: None };
+        let frame = Frame {
+            index: k as u64,
+            time_s,
+            received: std::time::Instant::now(),
+            luma,
+            preview: None,
+        };
         sets.extend(pipeline.step(frame).into_iter().map(|m| m.tracks));
     }
     sets.extend(pipeline.finish().into_iter().map(|m| m.tracks));
     let tree = pipeline.back.tree().expect("a tree").clone();
     let (mut binding, mut estimator) = (tree.binding(), tree.estimator(&config));
     let pose = estimator.step(sets[0].frame, sets[0].time_s, &binding.targets_px(&sets[0]));
-    let colour = image::load_from_memory(&frames[0].bytes).expect("a JPEG").into_rgb8();
-    let picture = Rgb { size: frames[0].size, pixels: colour.into_raw() };
+    let colour = image::load_from_memory(&frames[0].bytes)
+        .expect("a JPEG")
+        .into_rgb8();
+    let picture = Rgb {
+        size: frames[0].size,
+        pixels: colour.into_raw(),
+    };
     (Skeleton::clone(&tree.skeleton), pose, picture, outline)
 }
 
-/// Leaves that the user asks for on a bare tree hang on it as it is; only a picture in leaf says where no wood can be.
+/// Leaves that the user asks for on a bare tree hang on it as it is; only a picture in leaf says
+/// where no wood can be.
 #[test]
 fn leaves_on_a_bare_tree_cost_it_no_wood() {
     let bare = still(false);
-    let seen = Seen { picture: Some(&bare.picture), outline: Some(&bare.outline), ..Seen::default() };
+    let seen = Seen {
+        picture: Some(&bare.picture),
+        outline: Some(&bare.outline),
+        ..Seen::default()
+    };
     let with = |show: LeafShow| {
-        let config = Config { leaves: Leaves { show, ..Leaves::default() }, ..Config::default() };
+        let config = Config {
+            leaves: Leaves {
+                show,
+                ..Leaves::default()
+            },
+            ..Config::default()
+        };
         dress(&bare.skeleton, seen, &config)
     };
     let (off, on) = (with(LeafShow::Off), with(LeafShow::On));
-    assert!(off.limbs.len() > 100 && off.limbs == on.limbs, "{} limbs, {}", off.limbs.len(), on.limbs.len());
+    assert!(
+        off.limbs.len() > 100 && off.limbs == on.limbs,
+        "{} limbs, {}",
+        off.limbs.len(),
+        on.limbs.len()
+    );
 }
 
 /// A density painted over the whole picture fills the crown, not the air and the ground about it.
 #[test]
 fn a_drawn_density_does_not_leave_the_outline() {
     let film = still(true);
-    let white = Luma { size: SIZE, pixels: vec![255; SIZE.area()] };
-    let seen =
-        Seen { picture: Some(&film.picture), outline: Some(&film.outline), density: Some(&white), ..Seen::default() };
+    let white = Luma {
+        size: SIZE,
+        pixels: vec![255; SIZE.area()],
+    };
+    let seen = Seen {
+        picture: Some(&film.picture),
+        outline: Some(&film.outline),
+        density: Some(&white),
+        ..Seen::default()
+    };
     let leaves = dress(&film.skeleton, seen, &Config::default()).foliage;
     let (covered, width) = leaf_cover(&leaves, &film.skeleton, None);
     assert_eq!(width, SIZE.width as usize);
@@ -460,5 +769,8 @@ fn a_drawn_density_does_not_leave_the_outline() {
         *(if *m == 0 { &mut outside } else { &mut inside }) += c;
     }
     // Leaves at the border stick out by half their size.
-    assert!(inside > 5.0 * outside, "{inside} pixels inside, {outside} outside");
+    assert!(
+        inside > 5.0 * outside,
+        "{inside} pixels inside, {outside} outside"
+    );
 }

@@ -20,27 +20,51 @@ fn triangles(mesh: &Mesh) -> usize {
 /// Everything that must hold for any mesh.
 fn check(mesh: &Mesh, skeleton: &Skeleton) {
     let n = mesh.positions.len();
-    assert_eq!([mesh.normals.len(), mesh.uvs.len(), mesh.joints.len(), mesh.weights.len()], [n; 4]);
+    assert_eq!(
+        [
+            mesh.normals.len(),
+            mesh.uvs.len(),
+            mesh.joints.len(),
+            mesh.weights.len()
+        ],
+        [n; 4]
+    );
     assert!(mesh.indices.len().is_multiple_of(3) && mesh.indices.iter().all(|&i| (i as usize) < n));
-    assert!(mesh.positions.iter().flatten().chain(mesh.uvs.iter().flatten()).all(|x| x.is_finite()));
+    assert!(
+        mesh.positions
+            .iter()
+            .flatten()
+            .chain(mesh.uvs.iter().flatten())
+            .all(|x| x.is_finite())
+    );
     for normal in &mesh.normals {
         assert!((vector(*normal).norm() - 1.0).abs() < 1e-5, "{normal:?}");
     }
     for (weights, joints) in mesh.weights.iter().zip(&mesh.joints) {
         assert!((weights.iter().sum::<f32>() - 1.0).abs() < 2e-7);
         assert!(joints.iter().all(|&j| (j as usize) < skeleton.nodes.len()));
-        assert!(weights.iter().zip(joints).all(|(&w, &j)| w > 0.0 || j == 0), "{weights:?} {joints:?}");
-        assert!(weights[1] == 0.0 || joints[0] != joints[1], "a joint is named twice");
+        assert!(
+            weights.iter().zip(joints).all(|(&w, &j)| w > 0.0 || j == 0),
+            "{weights:?} {joints:?}"
+        );
+        assert!(
+            weights[1] == 0.0 || joints[0] != joints[1],
+            "a joint is named twice"
+        );
     }
     check_closed(mesh);
 }
 
-/// Every edge is run along once in either direction: what is in one place and moves alike is one corner, though texture
-/// or normal differ there.
+/// Every edge is run along once in either direction: what is in one place and moves alike is one
+/// corner, though texture or normal differ there.
 fn check_closed(mesh: &Mesh) {
     let corner = |i: u32| {
         let i = i as usize;
-        (mesh.positions[i].map(f32::to_bits), mesh.joints[i], mesh.weights[i].map(f32::to_bits))
+        (
+            mesh.positions[i].map(f32::to_bits),
+            mesh.joints[i],
+            mesh.weights[i].map(f32::to_bits),
+        )
     };
     let mut edges = HashMap::new();
     for t in mesh.indices.chunks_exact(3) {
@@ -60,7 +84,11 @@ fn the_skin_is_whole_from_every_side() {
     let mesh = synthetic::skin(&skeleton);
     check(&mesh, &skeleton);
     let all = synthetic::limbs_of(&skeleton, &synthetic::bare());
-    let is_buried = |at: Vector3<f64>| all.iter().flat_map(|l| l.stations.windows(2)).any(|s| is_within(at, s));
+    let is_buried = |at: Vector3<f64>| {
+        all.iter()
+            .flat_map(|l| l.stations.windows(2))
+            .any(|s| is_within(at, s))
+    };
     let (mut seen_inward, mut inward, mut area, mut flat) = (0.0, 0, 0.0, 0);
     for t in mesh.indices.chunks_exact(3) {
         let [a, b, c] = [t[0], t[1], t[2]].map(|i| vector(mesh.positions[i as usize]));
@@ -70,15 +98,30 @@ fn the_skin_is_whole_from_every_side() {
         area += face.norm();
         if face.dot(&normal) < 0.0 {
             inward += 1;
-            seen_inward += if is_buried((a + b + c) / 3.0) { 0.0 } else { face.norm() };
+            seen_inward += if is_buried((a + b + c) / 3.0) {
+                0.0
+            } else {
+                face.norm()
+            };
         }
     }
     assert_eq!(flat, 0, "triangles without area");
-    // Where a thick branch bends sharply, and in the fan of rings that rounds an elbow, faces on the inner side fold; they
-    // lie inside the wood.
-    println!("{inward} of {} triangles look inward, {} of the area in sight", triangles(&mesh), seen_inward / area);
-    assert!(inward * 200 < triangles(&mesh), "{inward} triangles look inward");
-    assert!(seen_inward < 1e-4 * area, "{} of the area is seen from inside", seen_inward / area);
+    // Where a thick branch bends sharply, and in the fan of rings that rounds an elbow, faces on
+    // the inner side fold; they lie inside the wood.
+    println!(
+        "{inward} of {} triangles look inward, {} of the area in sight",
+        triangles(&mesh),
+        seen_inward / area
+    );
+    assert!(
+        inward * 200 < triangles(&mesh),
+        "{inward} triangles look inward"
+    );
+    assert!(
+        seen_inward < 1e-4 * area,
+        "{} of the area is seen from inside",
+        seen_inward / area
+    );
 }
 
 /// Whether a point lies inside the wood between two stations, clearly below the surface.
@@ -102,12 +145,16 @@ fn every_branch_reaches_its_node_and_every_tip_is_closed() {
         if children[i].is_empty() {
             assert!(nearest < 1e-4, "the tip of {i} is {nearest} px off");
         } else {
-            assert!(nearest < node.radius + 0.1, "branch {i} ends {nearest} px before its node");
+            assert!(
+                nearest < node.radius + 0.1,
+                "branch {i} ends {nearest} px before its node"
+            );
         }
     }
 }
 
-/// A crease shows as a corner whose faces disagree with its normal: along a limb that goes on in another there is none.
+/// A crease shows as a corner whose faces disagree with its normal: along a limb that goes on in
+/// another there is none.
 #[test]
 fn a_branch_goes_on_in_the_next_without_a_crease_or_a_step() {
     let mut skeleton = synthetic::tree(1, 1);
@@ -124,36 +171,55 @@ fn a_branch_goes_on_in_the_next_without_a_crease_or_a_step() {
     let mut worst: f64 = 0.0;
     for t in mesh.indices.chunks_exact(3) {
         let [a, b, c] = [t[0], t[1], t[2]].map(|i| vector(mesh.positions[i as usize]));
-        let Some(face) = (b - a).cross(&(c - a)).try_normalize(1e-9) else { continue };
-        let is_cap = t.iter().all(|&i| vector(mesh.normals[i as usize]).dot(&face) > 0.999);
+        let Some(face) = (b - a).cross(&(c - a)).try_normalize(1e-9) else {
+            continue;
+        };
+        let is_cap = t
+            .iter()
+            .all(|&i| vector(mesh.normals[i as usize]).dot(&face) > 0.999);
         for &i in t.iter().filter(|_| !is_cap) {
             worst = worst.max(vector(mesh.normals[i as usize]).angle(&face).to_degrees());
         }
     }
-    assert!(worst < 25.0, "a face turns away from the skin by {worst} degrees");
+    assert!(
+        worst < 25.0,
+        "a face turns away from the skin by {worst} degrees"
+    );
 }
 
 #[test]
 fn the_number_of_triangles_is_what_was_asked_for() {
-    let trees = [("bare", synthetic::tree(7, 3), synthetic::bare()), ("twigs", synthetic::tree(6, 3), Wood::default())];
+    let trees = [
+        ("bare", synthetic::tree(7, 3), synthetic::bare()),
+        ("twigs", synthetic::tree(6, 3), Wood::default()),
+    ];
     let alone = ("a trunk alone", synthetic::tree(1, 1), synthetic::bare());
     for (name, skeleton, settings) in trees.iter().chain([&alone]) {
         let limbs = synthetic::limbs_of(skeleton, settings);
         for budget in [10_000, 20_000, 50_000, 100_000] {
             let mesh = wood(&limbs, budget);
             let ratio = triangles(&mesh) as f64 / budget as f64;
-            assert!((0.9..=1.1).contains(&ratio), "{name}: {} of {budget}", triangles(&mesh));
+            assert!(
+                (0.9..=1.1).contains(&ratio),
+                "{name}: {} of {budget}",
+                triangles(&mesh)
+            );
             check(&mesh, skeleton);
         }
         let levels = wood_levels(&limbs, 30_000);
         for (mesh, share) in levels.iter().zip(LEVELS) {
             let ratio = triangles(mesh) as f64 / (30_000.0 * share);
-            assert!((0.9..=1.1).contains(&ratio), "{name}: {} at level {share}", triangles(mesh));
+            assert!(
+                (0.9..=1.1).contains(&ratio),
+                "{name}: {} at level {share}",
+                triangles(mesh)
+            );
         }
     }
 }
 
-/// u once around, v as long along the branch as u is around it: a picture of bark is neither stretched nor squeezed.
+/// u once around, v as long along the branch as u is around it: a picture of bark is neither
+/// stretched nor squeezed.
 #[test]
 fn texture_is_as_long_as_it_is_wide() {
     let skeleton = synthetic::tree(4, 1);
@@ -163,10 +229,21 @@ fn texture_is_as_long_as_it_is_wide() {
         let [a, b, c] = [t[0], t[1], t[2]].map(|i| i as usize);
         let area = |p: [Vector3<f64>; 3]| (p[1] - p[0]).cross(&(p[2] - p[0])).norm();
         let on_skin = area([a, b, c].map(|i| vector(mesh.positions[i])));
-        let on_picture = area([a, b, c].map(|i| Vector3::new(mesh.uvs[i][0].into(), mesh.uvs[i][1].into(), 0.0)));
-        let longest = [a, b, c].map(|i| mesh.uvs[i][0]).into_iter().fold(0.0, f32::max)
-            - [a, b, c].map(|i| mesh.uvs[i][0]).into_iter().fold(1.0, f32::min);
-        assert!(longest <= 0.5 || on_picture > 0.0, "a triangle runs back over the seam");
+        let on_picture = area(
+            [a, b, c].map(|i| Vector3::new(mesh.uvs[i][0].into(), mesh.uvs[i][1].into(), 0.0)),
+        );
+        let longest = [a, b, c]
+            .map(|i| mesh.uvs[i][0])
+            .into_iter()
+            .fold(0.0, f32::max)
+            - [a, b, c]
+                .map(|i| mesh.uvs[i][0])
+                .into_iter()
+                .fold(1.0, f32::min);
+        assert!(
+            longest <= 0.5 || on_picture > 0.0,
+            "a triangle runs back over the seam"
+        );
         // Around a thin limb a px of skin is more of the picture: its circumference says how much.
         let around = on_skin / on_picture.max(1e-12);
         all += 1;
@@ -182,14 +259,30 @@ fn degenerate_skeletons_give_no_nan_and_no_panic() {
     let edits: [(&str, Edit); 10] = [
         ("no nodes", |s| s.nodes.clear()),
         ("only a foot", |s| s.nodes.truncate(1)),
-        ("all nodes at one place", |s| s.nodes.iter_mut().for_each(|n| n.position = Point3::origin())),
-        ("a fork of no length", |s| s.nodes[2].position = s.nodes[1].position),
-        ("a position that is no number", |s| s.nodes[2].position.x = f64::NAN),
-        ("an endless branch", |s| s.nodes[3].position.y = f64::INFINITY),
+        ("all nodes at one place", |s| {
+            s.nodes
+                .iter_mut()
+                .for_each(|n| n.position = Point3::origin())
+        }),
+        ("a fork of no length", |s| {
+            s.nodes[2].position = s.nodes[1].position
+        }),
+        ("a position that is no number", |s| {
+            s.nodes[2].position.x = f64::NAN
+        }),
+        ("an endless branch", |s| {
+            s.nodes[3].position.y = f64::INFINITY
+        }),
         ("a huge branch", |s| s.nodes[3].position.y = 1e300),
-        ("branches that turn back", |s| s.nodes[2].position = Point3::new(4.0, 10.0, 0.0)),
-        ("no thickness", |s| s.nodes.iter_mut().for_each(|n| n.radius = 0.0)),
-        ("a thickness that is no number", |s| s.nodes[1].radius = f64::NAN),
+        ("branches that turn back", |s| {
+            s.nodes[2].position = Point3::new(4.0, 10.0, 0.0)
+        }),
+        ("no thickness", |s| {
+            s.nodes.iter_mut().for_each(|n| n.radius = 0.0)
+        }),
+        ("a thickness that is no number", |s| {
+            s.nodes[1].radius = f64::NAN
+        }),
     ];
     for (name, edit) in edits {
         let mut skeleton = good.clone();
@@ -207,8 +300,17 @@ fn degenerate_skeletons_give_no_nan_and_no_panic() {
 #[test]
 fn limbs_from_anywhere_are_drawn_or_left_out() {
     let riding = Riding::between(NodeId(0), NodeId(1), 0.5);
-    let at = |x: f64, radius: f64| Station { at: Point3::new(x, 2.0 * x, 0.0), radius, riding };
-    let limb = |parent, stations| Limb { node: NodeId(1), parent, twig: false, stations };
+    let at = |x: f64, radius: f64| Station {
+        at: Point3::new(x, 2.0 * x, 0.0),
+        radius,
+        riding,
+    };
+    let limb = |parent, stations| Limb {
+        node: NodeId(1),
+        parent,
+        twig: false,
+        stations,
+    };
     let limbs = [
         limb(None, vec![]),
         limb(None, vec![at(0.0, 1.0)]),

@@ -54,7 +54,10 @@ fn follow(covered: bool) -> Places {
             cover(&mut frame, k);
         }
         let set = tracker.step(&frame);
-        set.observations.iter().map(|o| (o.id, [f64::from(o.u_px), f64::from(o.v_px)])).collect()
+        set.observations
+            .iter()
+            .map(|o| (o.id, [f64::from(o.u_px), f64::from(o.v_px)]))
+            .collect()
     };
     (0..=AFTER).map(step).collect()
 }
@@ -78,14 +81,29 @@ fn tracks_do_not_go_with_what_passes_before_them_and_come_back() {
         let (at, there) = (free[AFTER].get(id)?, covered[AFTER].get(id)?);
         Some((there[0] - at[0]).hypot(there[1] - at[1]))
     };
-    let there: Vec<&TrackId> = were_hidden.iter().filter(|id| free[AFTER].contains_key(*id)).collect();
-    let back = there.iter().filter(|id| away(id).is_some_and(|px| px < 3.0)).count();
+    let there: Vec<&TrackId> = were_hidden
+        .iter()
+        .filter(|id| free[AFTER].contains_key(*id))
+        .collect();
+    let back = there
+        .iter()
+        .filter(|id| away(id).is_some_and(|px| px < 3.0))
+        .count();
     let (n, hidden) = (there.len(), hidden as f64);
     println!(
         "{n} tracks were hidden in {hidden} observations: {reported} reported, {dragged} dragged; {back} are back"
     );
-    assert!(n >= 12 && hidden >= 150.0, "{n} tracks, {hidden} observations");
+    assert!(
+        n >= 12 && hidden >= 150.0,
+        "{n} tracks, {hidden} observations"
+    );
     // Without a look at their first patches nine of ten go along.
-    assert!(dragged as f64 <= 0.2 * hidden, "{dragged} of {hidden} observations went along");
-    assert!(back * 10 >= n * 8, "{back} of {n} are back under their names");
+    assert!(
+        dragged as f64 <= 0.2 * hidden,
+        "{dragged} of {hidden} observations went along"
+    );
+    assert!(
+        back * 10 >= n * 8,
+        "{back} of {n} are back under their names"
+    );
 }

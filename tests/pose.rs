@@ -12,7 +12,11 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 fn direction(chance: &mut Chance) -> UnitVector3<f64> {
-    Unit::new_normalize(Vector3::new(chance.normal(), chance.normal(), chance.normal()))
+    Unit::new_normalize(Vector3::new(
+        chance.normal(),
+        chance.normal(),
+        chance.normal(),
+    ))
 }
 
 /// A direction at `angle` from `centre`.
@@ -28,7 +32,11 @@ fn some_problem(chance: &mut Chance, ours: bool) -> Problem {
     let angle = max_total * chance.even().sqrt();
     let previous_direction = beside(chance, &rest_direction, angle);
     let near = max_step * 1.5 * chance.even();
-    let gone = if chance.even() < 0.7 { beside(chance, &previous_direction, near) } else { direction(chance) };
+    let gone = if chance.even() < 0.7 {
+        beside(chance, &previous_direction, near)
+    } else {
+        direction(chance)
+    };
     let length = 5.0 + 100.0 * chance.even();
     let (axis, lean) = (direction(chance), chance.even());
     let parent_rotation = UnitQuaternion::from_axis_angle(&axis, lean);
@@ -38,7 +46,10 @@ fn some_problem(chance: &mut Chance, ours: bool) -> Problem {
     Problem {
         parent_rotation,
         length,
-        target: Some([end.x + noise_px * chance.normal(), end.y + noise_px * chance.normal()]),
+        target: Some([
+            end.x + noise_px * chance.normal(),
+            end.y + noise_px * chance.normal(),
+        ]),
         parent_direction: (chance.even() < 0.9).then(|| beside(chance, &rest_direction, apart)),
         rest_direction,
         previous_direction,
@@ -51,15 +62,18 @@ fn some_problem(chance: &mut Chance, ours: bool) -> Problem {
     }
 }
 
-/// Least cost over all that the bounds allow, tried exhaustively as the paper does: every third of a degree outwards from
-/// the direction before, every two degrees round.
+/// Least cost over all that the bounds allow, tried exhaustively as the paper does: every third of
+/// a degree outwards from the direction before, every two degrees round.
 fn exhaustive(p: &Problem) -> f64 {
     let across = Unit::new_normalize(p.previous_direction.cross(&Vector3::new(0.3, -0.8, 0.52)));
-    let round = (0..180).map(|k| UnitQuaternion::from_axis_angle(&p.previous_direction, TAU * f64::from(k) / 180.0));
+    let round = (0..180).map(|k| {
+        UnitQuaternion::from_axis_angle(&p.previous_direction, TAU * f64::from(k) / 180.0)
+    });
     let mut least = f64::INFINITY;
     for axis in round.map(|q| q * across) {
         for k in 0..=60 {
-            let d = UnitQuaternion::from_axis_angle(&axis, p.max_step * f64::from(k) / 60.0) * p.previous_direction;
+            let d = UnitQuaternion::from_axis_angle(&axis, p.max_step * f64::from(k) / 60.0)
+                * p.previous_direction;
             if p.rest_direction.angle(&d) <= p.max_total {
                 least = least.min(p.cost(&d));
             }
@@ -76,15 +90,27 @@ fn the_search_finds_what_trying_everything_finds_or_better() {
         for k in 0..500 {
             let p = some_problem(&mut chance, ours);
             let found = p.solve();
-            let (stepped, turned) = (p.previous_direction.angle(&found), p.rest_direction.angle(&found));
-            assert!(stepped <= p.max_step + 1e-9 && turned <= p.max_total + 1e-9, "{k}: {stepped} and {turned} rad");
+            let (stepped, turned) = (
+                p.previous_direction.angle(&found),
+                p.rest_direction.angle(&found),
+            );
+            assert!(
+                stepped <= p.max_step + 1e-9 && turned <= p.max_total + 1e-9,
+                "{k}: {stepped} and {turned} rad"
+            );
             let (cost, least) = (p.cost(&found), exhaustive(&p));
-            assert!(cost <= least + 1e-6 * (1.0 + least), "{k}: {cost} where {least} is possible");
+            assert!(
+                cost <= least + 1e-6 * (1.0 + least),
+                "{k}: {cost} where {least} is possible"
+            );
             better += u32::from(cost < least - 1e-6);
             on_bounds += u32::from(stepped > p.max_step - 1e-6 || turned > p.max_total - 1e-6);
         }
         println!("better than the grid in {better} of 500, on a bound in {on_bounds}");
-        assert!((50..450).contains(&on_bounds), "both kinds are to be among them: {on_bounds}");
+        assert!(
+            (50..450).contains(&on_bounds),
+            "both kinds are to be among them: {on_bounds}"
+        );
     }
 }
 
@@ -116,7 +142,11 @@ fn tree() -> Skeleton {
     for (copy, original) in [(4, 2), (5, 3)] {
         (nodes[copy].copy_of, nodes[copy].plane_angle) = (Some(NodeId(original)), 0.5 * PI);
     }
-    Skeleton { nodes, foot_px: [200.0, 300.0], image_size: Size::new(400, 320) }
+    Skeleton {
+        nodes,
+        foot_px: [200.0, 300.0],
+        image_size: Size::new(400, 320),
+    }
 }
 
 /// By how much a branch has turned against its parent.
@@ -129,7 +159,10 @@ fn own(tree: &Skeleton, pose: &Pose, i: usize) -> UnitQuaternion<f64> {
 fn no_joint_turns_faster_or_farther_than_its_bounds_whatever_is_seen() {
     let tree = Arc::new(tree());
     let settings = Motion::default();
-    let (step, total) = (settings.max_step_deg.to_radians(), settings.max_total_deg.to_radians());
+    let (step, total) = (
+        settings.max_step_deg.to_radians(),
+        settings.max_total_deg.to_radians(),
+    );
     let mut estimator = PoseEstimator::new(tree.clone(), &settings);
     let mut chance = Chance(5);
     let mut before: Option<Pose> = None;
@@ -139,7 +172,10 @@ fn no_joint_turns_faster_or_farther_than_its_bounds_whatever_is_seen() {
             let [u, v] = tree.image_from_model(&node.position);
             (chance.even() < 0.8).then(|| [u + 90.0 * chance.normal(), v + 90.0 * chance.normal()])
         };
-        let targets: Vec<_> = tree.nodes[..4].iter().map(|n| wild(n, &mut chance)).collect();
+        let targets: Vec<_> = tree.nodes[..4]
+            .iter()
+            .map(|n| wild(n, &mut chance))
+            .collect();
         let pose = estimator.step(k, k as f64 / 30.0, &targets);
         for i in 1..tree.nodes.len() {
             let now = own(&tree, &pose, i);
@@ -150,8 +186,16 @@ fn no_joint_turns_faster_or_farther_than_its_bounds_whatever_is_seen() {
         }
         before = Some(pose);
     }
-    assert!(fastest <= step + 1e-6 && fastest > 0.7 * step, "{} degrees in a frame", fastest.to_degrees());
-    assert!(farthest <= total + 1e-6 && farthest > 0.9 * total, "{} degrees", farthest.to_degrees());
+    assert!(
+        fastest <= step + 1e-6 && fastest > 0.7 * step,
+        "{} degrees in a frame",
+        fastest.to_degrees()
+    );
+    assert!(
+        farthest <= total + 1e-6 && farthest > 0.9 * total,
+        "{} degrees",
+        farthest.to_degrees()
+    );
 }
 
 #[test]
@@ -161,28 +205,43 @@ fn after_a_gap_a_branch_may_have_gone_farther() {
         let mut estimator = PoseEstimator::new(tree.clone(), &Motion::default());
         let place = |angle: f64| {
             let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
-            let moved = tree.nodes[1].position + turn * (tree.nodes[2].position - tree.nodes[1].position);
-            let mut targets: Vec<_> =
-                tree.nodes[..3].iter().map(|n| Some(tree.image_from_model(&n.position))).collect();
+            let moved =
+                tree.nodes[1].position + turn * (tree.nodes[2].position - tree.nodes[1].position);
+            let mut targets: Vec<_> = tree.nodes[..3]
+                .iter()
+                .map(|n| Some(tree.image_from_model(&n.position)))
+                .collect();
             targets[2] = Some(tree.image_from_model(&moved));
             targets
         };
         let first = estimator.step(0, 0.0, &place(0.0));
         let frame = 1 + frames_missing;
         let then = estimator.step(frame, frame as f64 / 30.0, &place(0.8));
-        own(&tree, &first, 2).angle_to(&own(&tree, &then, 2)).to_degrees()
+        own(&tree, &first, 2)
+            .angle_to(&own(&tree, &then, 2))
+            .to_degrees()
     };
     assert!(turned_by(0) < 20.001, "{}", turned_by(0));
-    assert!((turned_by(3) - 45.8).abs() < 3.0, "{} of 45.8 degrees", turned_by(3));
+    assert!(
+        (turned_by(3) - 45.8).abs() < 3.0,
+        "{} of 45.8 degrees",
+        turned_by(3)
+    );
 }
 
-/// Figure 6c: a branch whose parent lies along an axis may turn about that axis for ever, a little in each frame, and eq. 10
-/// does not mind, as the angle to the parent stays the same. The accumulated bound stops it.
+/// Figure 6c: a branch whose parent lies along an axis may turn about that axis for ever, a little
+/// in each frame, and eq. 10 does not mind, as the angle to the parent stays the same. The
+/// accumulated bound stops it.
 #[test]
 fn the_accumulated_bound_prevents_the_spin_about_the_parent() {
-    let rest = Unit::new_normalize(Vector3::new(75f64.to_radians().sin(), 75f64.to_radians().cos(), 0.0));
-    // The trunk leans to the viewer, so that the near side of a turn about it is seen lower than the far side; tracks slide
-    // round it by 6 degrees a frame, which the bound on steps allows, twice.
+    let rest = Unit::new_normalize(Vector3::new(
+        75f64.to_radians().sin(),
+        75f64.to_radians().cos(),
+        0.0,
+    ));
+    // The trunk leans to the viewer, so that the near side of a turn about it is seen lower than
+    // the far side; tracks slide round it by 6 degrees a frame, which the bound on steps allows,
+    // twice.
     let farthest = |max_total: f64| {
         let mut p = Problem {
             parent_rotation: UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.6),
@@ -198,9 +257,11 @@ fn the_accumulated_bound_prevents_the_spin_about_the_parent() {
             max_step: 20f64.to_radians(),
             max_total,
         };
-        let (mut farthest, mut most_round, mut round, mut azimuth) = (0.0_f64, 0.0_f64, 0.0, 0.0_f64);
+        let (mut farthest, mut most_round, mut round, mut azimuth) =
+            (0.0_f64, 0.0_f64, 0.0, 0.0_f64);
         for k in 1..=120 {
-            let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -f64::from(k) * TAU / 60.0);
+            let turn =
+                UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -f64::from(k) * TAU / 60.0);
             let at = p.parent_rotation * (turn * rest.into_inner()) * 80.0;
             p.target = Some([at.x, at.y]);
             let d = p.solve();
@@ -214,13 +275,20 @@ fn the_accumulated_bound_prevents_the_spin_about_the_parent() {
         (farthest.to_degrees(), most_round.to_degrees())
     };
     let (angle, round) = farthest(PI);
-    assert!(angle > 110.0 && round > 700.0, "without the bound it spins: {angle}, {round} degrees round");
+    assert!(
+        angle > 110.0 && round > 700.0,
+        "without the bound it spins: {angle}, {round} degrees round"
+    );
     let (angle, round) = farthest(70f64.to_radians());
-    assert!(angle <= 70.001 && round < 90.0, "with it, it does not: {angle}, {round} degrees round");
+    assert!(
+        angle <= 70.001 && round < 90.0,
+        "with it, it does not: {angle}, {round} degrees round"
+    );
 }
 
-/// Depths of the branch's end, as found and as they are, px, and how far it is projected beside, while the branch, which at rest
-/// leans to the viewer by `lean`, swings farther by `swing` and back twice.
+/// Depths of the branch's end, as found and as they are, px, and how far it is projected beside,
+/// while the branch, which at rest leans to the viewer by `lean`, swings farther by `swing` and
+/// back twice.
 fn swing_to_the_viewer(lean: f64, swing: f64, method: MotionMethod) -> Vec<(f64, f64, f64)> {
     let mut tree = tree();
     let top = tree.nodes[1].position;
@@ -228,15 +296,28 @@ fn swing_to_the_viewer(lean: f64, swing: f64, method: MotionMethod) -> Vec<(f64,
     let way = tree.nodes[2].position - top;
     tree.nodes[2].position = top + towards(lean) * way;
     let tree = Arc::new(tree);
-    let mut estimator = PoseEstimator::new(tree.clone(), &Motion { method, ..Motion::default() });
+    let mut estimator = PoseEstimator::new(
+        tree.clone(),
+        &Motion {
+            method,
+            ..Motion::default()
+        },
+    );
     let frame = |k: u64| {
         let truth = top + towards(lean + swing * 0.5 * (1.0 - (TAU * k as f64 / 60.0).cos())) * way;
-        let mut targets: Vec<_> = tree.nodes[..4].iter().map(|n| Some(tree.image_from_model(&n.position))).collect();
+        let mut targets: Vec<_> = tree.nodes[..4]
+            .iter()
+            .map(|n| Some(tree.image_from_model(&n.position)))
+            .collect();
         let target = tree.image_from_model(&truth);
         (targets[2], targets[3]) = (Some(target), None);
         let is = estimator.step(k, k as f64 / 30.0, &targets).joints[2].position;
         let seen = tree.image_from_model(&is);
-        (is.z, truth.z, (seen[0] - target[0]).hypot(seen[1] - target[1]))
+        (
+            is.z,
+            truth.z,
+            (seen[0] - target[0]).hypot(seen[1] - target[1]),
+        )
     };
     (0..120).map(frame).collect()
 }
@@ -248,22 +329,35 @@ fn foreshortening_is_recovered() {
         let depths = swing_to_the_viewer(0.2, 0.65, method);
         for (k, (is, should, beside)) in depths.iter().enumerate() {
             if k % 60 == 30 {
-                assert!((is / should - 1.0).abs() < 0.1, "{method:?}, frame {k}: {is:.1} px in depth of {should:.1}");
+                assert!(
+                    (is / should - 1.0).abs() < 0.1,
+                    "{method:?}, frame {k}: {is:.1} px in depth of {should:.1}"
+                );
             }
-            assert!(*beside < 2.5, "{method:?}, frame {k}: seen {beside:.2} px beside");
+            assert!(
+                *beside < 2.5,
+                "{method:?}, frame {k}: seen {beside:.2} px beside"
+            );
         }
-        let worst = depths.iter().map(|(is, should, _)| (is - should).abs()).fold(0.0, f64::max);
+        let worst = depths
+            .iter()
+            .map(|(is, should, _)| (is - should).abs())
+            .fold(0.0, f64::max);
         assert!(worst < 8.0, "{method:?}: {worst} px in depth of 13 to 52");
     }
 }
 
-/// Of a branch in the plane of the picture it cannot be known to which side it swings, but that it does.
+/// Of a branch in the plane of the picture it cannot be known to which side it swings, but that it
+/// does.
 #[test]
 fn a_branch_in_the_plane_of_the_picture_leaves_it_when_it_gets_shorter() {
     let depths = swing_to_the_viewer(0.0, 0.9, MotionMethod::Probabilistic);
     for (k, (is, should, _)) in depths.iter().enumerate() {
         if k % 60 == 30 {
-            assert!((is.abs() / should - 1.0).abs() < 0.1, "frame {k}: {is:.1} px in depth of {should:.1}");
+            assert!(
+                (is.abs() / should - 1.0).abs() < 0.1,
+                "frame {k}: {is:.1} px in depth of {should:.1}"
+            );
         }
     }
 }

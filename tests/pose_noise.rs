@@ -1,12 +1,13 @@
-//! Poses from noisy tracks: the probabilistic way against the deterministic one, on a made-up tree whose motion is known.
+//! Poses from noisy tracks: the probabilistic way against the deterministic one, on a made-up tree
+//! whose motion is known.
 
 #[path = "support/chance.rs"]
 mod chance;
 
 use arborcam::config::{Motion, MotionMethod};
 use arborcam::model::{
-    Cluster, ClusterId, JointPose, MotionHierarchy, Node, NodeId, NodeName, Observation, Pose, Size, Skeleton, TrackId,
-    TrackSet,
+    Cluster, ClusterId, JointPose, MotionHierarchy, Node, NodeId, NodeName, Observation, Pose,
+    Size, Skeleton, TrackId, TrackSet,
 };
 use arborcam::motion::{Binding, PoseEstimator};
 use chance::Chance;
@@ -36,7 +37,10 @@ fn tree() -> Skeleton {
         plane_angle: 0.0,
     };
     let mut chance = Chance(3);
-    let mut nodes = vec![node(0, None, 0, Point3::origin()), node(1, Some(0), 1, Point3::new(3.0, 90.0, 0.0))];
+    let mut nodes = vec![
+        node(0, None, 0, Point3::origin()),
+        node(1, Some(0), 1, Point3::new(3.0, 90.0, 0.0)),
+    ];
     let mut i = 1;
     while i < nodes.len() {
         let (level, at) = (nodes[i].level, nodes[i].position);
@@ -45,12 +49,20 @@ fn tree() -> Skeleton {
             let lean = way.x.atan2(way.y) + side * (0.45 + 0.15 * chance.even());
             let length = 60.0 * 0.8_f64.powi(i32::from(level) - 1) * (0.9 + 0.2 * chance.even());
             let depth = 0.9 * (chance.even() - 0.5);
-            let step = Vector3::new(lean.sin() * depth.cos(), lean.cos() * depth.cos(), depth.sin()) * length;
+            let step = Vector3::new(
+                lean.sin() * depth.cos(),
+                lean.cos() * depth.cos(),
+                depth.sin(),
+            ) * length;
             nodes.push(node(nodes.len(), Some(i), level + 1, at + step));
         }
         i += 1;
     }
-    Skeleton { nodes, foot_px: [320.0, 340.0], image_size: Size::new(640, 360) }
+    Skeleton {
+        nodes,
+        foot_px: [320.0, 340.0],
+        image_size: Size::new(640, 360),
+    }
 }
 
 /// Every branch sways against its parent, in the picture and towards the viewer.
@@ -59,20 +71,33 @@ fn moved(tree: &Skeleton, frame: usize) -> Pose {
     let mut joints: Vec<JointPose> = Vec::new();
     for (i, node) in tree.nodes.iter().enumerate() {
         let Some(parent) = node.parent.map(NodeId::index) else {
-            joints.push(JointPose { position: node.position, rotation: UnitQuaternion::identity() });
+            joints.push(JointPose {
+                position: node.position,
+                rotation: UnitQuaternion::identity(),
+            });
             continue;
         };
         let level = f64::from(node.level);
         let sway = |k: f64| {
-            let (hz, phase) = (0.5 + 0.35 * level + 0.05 * (k * 1.7 + i as f64).sin(), k * 2.1 + i as f64 * 0.9);
+            let (hz, phase) = (
+                0.5 + 0.35 * level + 0.05 * (k * 1.7 + i as f64).sin(),
+                k * 2.1 + i as f64 * 0.9,
+            );
             (TAU * hz * time_s + phase).sin()
         };
         let turn = Vector3::new(0.02 * sway(1.0), 0.0, 0.04 * sway(2.0)) * level;
         let rotation = joints[parent].rotation * UnitQuaternion::from_scaled_axis(turn);
         let way = node.position - tree.nodes[parent].position;
-        joints.push(JointPose { position: joints[parent].position + rotation * way, rotation });
+        joints.push(JointPose {
+            position: joints[parent].position + rotation * way,
+            rotation,
+        });
     }
-    Pose { frame: frame as u64, time_s, joints }
+    Pose {
+        frame: frame as u64,
+        time_s,
+        joints,
+    }
 }
 
 /// A place on a branch, from its beginning (0) to its end (1), in a pose.
@@ -90,27 +115,47 @@ fn points(tree: &Skeleton) -> (MotionHierarchy, BTreeMap<TrackId, [f64; 2]>) {
         joints: tree
             .nodes
             .iter()
-            .map(|n| JointPose { position: n.position, rotation: UnitQuaternion::identity() })
+            .map(|n| JointPose {
+                position: n.position,
+                rotation: UnitQuaternion::identity(),
+            })
             .collect(),
     };
     let branches = 1..tree.nodes.len();
     let ids = |node: usize| (0..POINTS).map(move |k| TrackId((node * POINTS + k) as u32));
     let inside = |node: usize, of: usize| {
-        std::iter::successors(Some(node), |&n| tree.nodes[n].parent.map(NodeId::index)).any(|n| n == of)
+        std::iter::successors(Some(node), |&n| tree.nodes[n].parent.map(NodeId::index))
+            .any(|n| n == of)
     };
     let cluster = |of: usize| Cluster {
         parent: (of > 1).then(|| ClusterId(tree.nodes[of].parent.unwrap().0 - 1)),
         level: tree.nodes[of].level - 1,
-        members: branches.clone().filter(|&n| inside(n, of)).flat_map(ids).collect(),
+        members: branches
+            .clone()
+            .filter(|&n| inside(n, of))
+            .flat_map(ids)
+            .collect(),
         centroid_px: [0.0; 2],
         end_px: None,
         certainty: 1.0,
     };
     let place = |(n, k): (usize, usize)| {
-        (TrackId((n * POINTS + k) as u32), on_branch(tree, &rest, n, (k + 1) as f64 / POINTS as f64))
+        (
+            TrackId((n * POINTS + k) as u32),
+            on_branch(tree, &rest, n, (k + 1) as f64 / POINTS as f64),
+        )
     };
-    let places = branches.clone().flat_map(|n| (0..POINTS).map(move |k| (n, k))).map(place).collect();
-    (MotionHierarchy { clusters: branches.clone().map(cluster).collect() }, places)
+    let places = branches
+        .clone()
+        .flat_map(|n| (0..POINTS).map(move |k| (n, k)))
+        .map(place)
+        .collect();
+    (
+        MotionHierarchy {
+            clusters: branches.clone().map(cluster).collect(),
+        },
+        places,
+    )
 }
 
 fn seen(tree: &Skeleton, truth: &Pose, noise_px: f64, chance: &mut Chance) -> TrackSet {
@@ -118,7 +163,10 @@ fn seen(tree: &Skeleton, truth: &Pose, noise_px: f64, chance: &mut Chance) -> Tr
     for node in 1..tree.nodes.len() {
         for k in 0..POINTS {
             let [u, v] = on_branch(tree, truth, node, (k + 1) as f64 / POINTS as f64);
-            let at = [u + noise_px * chance.normal(), v + noise_px * chance.normal()];
+            let at = [
+                u + noise_px * chance.normal(),
+                v + noise_px * chance.normal(),
+            ];
             if chance.even() < MISSING {
                 continue;
             }
@@ -132,7 +180,12 @@ fn seen(tree: &Skeleton, truth: &Pose, noise_px: f64, chance: &mut Chance) -> Tr
             });
         }
     }
-    TrackSet { frame: truth.frame, time_s: truth.time_s, observations, ..TrackSet::default() }
+    TrackSet {
+        frame: truth.frame,
+        time_s: truth.time_s,
+        observations,
+        ..TrackSet::default()
+    }
 }
 
 /// How far poses are off.
@@ -154,8 +207,10 @@ fn off(tree: &Skeleton, poses: &[Pose], truth: &[Pose]) -> Off {
     let (mut shape, mut angles, mut motion, mut nodes) = (0.0, 0.0, 0.0, 0.0);
     for (pose, truth) in poses.iter().zip(truth) {
         for i in 1..tree.nodes.len() {
-            let (is, was) =
-                (tree.image_from_model(&pose.joints[i].position), tree.image_from_model(&truth.joints[i].position));
+            let (is, was) = (
+                tree.image_from_model(&pose.joints[i].position),
+                tree.image_from_model(&truth.joints[i].position),
+            );
             motion += (is[0] - was[0]).powi(2) + (is[1] - was[1]).powi(2);
             nodes += 1.0;
             let now = angle(tree, &|k| pose.joints[k].position, i);
@@ -166,7 +221,10 @@ fn off(tree: &Skeleton, poses: &[Pose], truth: &[Pose]) -> Off {
             }
         }
     }
-    Off { shape_deg: (shape / f64::max(angles, 1.0)).sqrt(), motion_px: (motion / f64::max(nodes, 1.0)).sqrt() }
+    Off {
+        shape_deg: (shape / f64::max(angles, 1.0)).sqrt(),
+        motion_px: (motion / f64::max(nodes, 1.0)).sqrt(),
+    }
 }
 
 /// Both ways on the same tracks: deterministic, probabilistic.
@@ -177,7 +235,13 @@ fn both(noise_px: f64) -> [Off; 2] {
     [MotionMethod::Deterministic, MotionMethod::Probabilistic].map(|method| {
         let mut chance = Chance(11);
         let mut binding = Binding::new(&hierarchy, &rest_px, &tree);
-        let mut estimator = PoseEstimator::new(tree.clone(), &Motion { method, ..Motion::default() });
+        let mut estimator = PoseEstimator::new(
+            tree.clone(),
+            &Motion {
+                method,
+                ..Motion::default()
+            },
+        );
         let pose = |truth: &Pose| {
             let set = seen(&tree, truth, noise_px, &mut chance);
             estimator.step(set.frame, set.time_s, &binding.targets_px(&set))
@@ -194,7 +258,10 @@ fn on_noisy_tracks_the_probabilistic_way_is_nearer_to_rest_and_to_the_truth() {
         let [deterministic, probabilistic] = both(noise_px);
         println!(
             "| {noise_px} px | {:.1} | {:.1} | {:.1} | {:.1} |",
-            deterministic.shape_deg, probabilistic.shape_deg, deterministic.motion_px, probabilistic.motion_px
+            deterministic.shape_deg,
+            probabilistic.shape_deg,
+            deterministic.motion_px,
+            probabilistic.motion_px
         );
         assert!(
             probabilistic.shape_deg < 0.8 * deterministic.shape_deg,
@@ -207,8 +274,8 @@ fn on_noisy_tracks_the_probabilistic_way_is_nearer_to_rest_and_to_the_truth() {
     }
 }
 
-/// What is left to the probabilistic way is what the tracks do not tell: with all of them, and without noise, it is as near as
-/// its points are, whose mean moves less than the branch's end.
+/// What is left to the probabilistic way is what the tracks do not tell: with all of them, and
+/// without noise, it is as near as its points are, whose mean moves less than the branch's end.
 #[test]
 fn the_pose_smooths_nothing_that_the_film_shows() {
     let tree = Arc::new(tree());
@@ -216,11 +283,19 @@ fn the_pose_smooths_nothing_that_the_film_shows() {
     let (mut moved_px, mut off_px) = (0.0_f64, 0.0_f64);
     for k in 0..FRAMES {
         let truth = moved(&tree, k);
-        let targets: Vec<_> = truth.joints.iter().map(|j| Some(tree.image_from_model(&j.position))).collect();
+        let targets: Vec<_> = truth
+            .joints
+            .iter()
+            .map(|j| Some(tree.image_from_model(&j.position)))
+            .collect();
         let pose = estimator.step(k as u64, truth.time_s, &targets);
         for (i, node) in tree.nodes.iter().enumerate() {
-            let [is, should, rest] =
-                [pose.joints[i].position, truth.joints[i].position, node.position].map(|p| tree.image_from_model(&p));
+            let [is, should, rest] = [
+                pose.joints[i].position,
+                truth.joints[i].position,
+                node.position,
+            ]
+            .map(|p| tree.image_from_model(&p));
             off_px += (is[0] - should[0]).powi(2) + (is[1] - should[1]).powi(2);
             moved_px += (rest[0] - should[0]).powi(2) + (rest[1] - should[1]).powi(2);
         }

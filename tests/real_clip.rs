@@ -1,4 +1,5 @@
-//! A real tree before a real webcam, and a hand before the tree: `make test-real` fetches the clip (OpenCV's tree.avi).
+//! A real tree before a real webcam, and a hand before the tree: `make test-real` fetches the clip
+//! (OpenCV's tree.avi).
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -351,20 +352,26 @@ const BEFORE: usize = 52;
 /// Nearer to the hand's edge than this nothing is claimed, px.
 const EDGE_PX: f64 = 4.0;
 
-/// Distance from the edge of the hand in frame `k`, px: above 0 inside; far outside where there is none.
+/// Distance from the edge of the hand in frame `k`, px: above 0 inside; far outside where there is
+/// none.
 fn inside_px(k: usize, at: [f64; 2]) -> f64 {
-    let Some((_, hand)) = HAND.iter().find(|(frame, _)| *frame == k) else { return f64::MIN };
+    let Some((_, hand)) = HAND.iter().find(|(frame, _)| *frame == k) else {
+        return f64::MIN;
+    };
     let (mut within, mut nearest) = (false, f64::MAX);
     for (i, a) in hand.iter().enumerate() {
         let [a, b] = [*a, hand[(i + 1) % hand.len()]].map(|p| p.map(f64::from));
-        if (a[1] > at[1]) != (b[1] > at[1]) && at[0] < a[0] + (at[1] - a[1]) * (b[0] - a[0]) / (b[1] - a[1]) {
+        if (a[1] > at[1]) != (b[1] > at[1])
+            && at[0] < a[0] + (at[1] - a[1]) * (b[0] - a[0]) / (b[1] - a[1])
+        {
             within = !within;
         }
         let along = [b[0] - a[0], b[1] - a[1]];
         let length_sq = along[0].powi(2) + along[1].powi(2);
         let share = ((at[0] - a[0]) * along[0] + (at[1] - a[1]) * along[1]) / length_sq.max(1e-9);
         let share = share.clamp(0.0, 1.0);
-        nearest = nearest.min((at[0] - a[0] - share * along[0]).hypot(at[1] - a[1] - share * along[1]));
+        nearest =
+            nearest.min((at[0] - a[0] - share * along[0]).hypot(at[1] - a[1] - share * along[1]));
     }
     if within { nearest } else { -nearest }
 }
@@ -374,11 +381,17 @@ type Track = BTreeMap<usize, [f64; 2]>;
 
 /// Tracks by id, and the time of each frame, s.
 fn replayed() -> (BTreeMap<u32, Track>, BTreeMap<usize, f64>) {
-    assert!(Path::new(CLIP).exists(), "{CLIP} is missing: make test-real fetches it");
+    assert!(
+        Path::new(CLIP).exists(),
+        "{CLIP} is missing: make test-real fetches it"
+    );
     let dir = tempfile::tempdir().expect("folder");
     let (outline, out) = (dir.path().join("outline.json"), dir.path().join("out"));
-    std::fs::write(&outline, format!(r#"{{"frame":0,"width":320,"height":240,"polygon_px":{CROWN}}}"#))
-        .expect("outline");
+    std::fs::write(
+        &outline,
+        format!(r#"{{"frame":0,"width":320,"height":240,"polygon_px":{CROWN}}}"#),
+    )
+    .expect("outline");
     let run = Command::new(env!("CARGO_BIN_EXE_arborcam"))
         .args(["replay", CLIP, "--fast", "--headless", "--outline"])
         .arg(&outline)
@@ -393,7 +406,10 @@ fn replayed() -> (BTreeMap<u32, Track>, BTreeMap<usize, f64>) {
         let field: Vec<&str> = row.split(',').collect();
         let frame: usize = field[1].parse().expect("frame");
         let place = [3, 4].map(|c| field[c].parse().expect("px"));
-        by_id.entry(field[0].parse().expect("id")).or_default().insert(frame, place);
+        by_id
+            .entry(field[0].parse().expect("id"))
+            .or_default()
+            .insert(frame, place);
         times_s.insert(frame, field[2].parse().expect("time"));
     }
     (by_id, times_s)
@@ -418,12 +434,27 @@ fn a_hand_before_a_real_tree_takes_no_track_along() {
     let (tracks, times_s) = replayed();
     // The webcam took its pictures when it could.
     assert_eq!((times_s.len(), times_s.keys().max()), (68, Some(&67)));
-    for (frame, time_s) in [(0, 0.0), (1, 0.733337), (2, 1.133339), (3, 1.600008), (31, 13.266733), (67, 29.533481)] {
-        assert!((times_s[&frame] - time_s).abs() < 1e-3, "frame {frame} is at {} s, not {time_s} s", times_s[&frame]);
+    for (frame, time_s) in [
+        (0, 0.0),
+        (1, 0.733337),
+        (2, 1.133339),
+        (3, 1.600008),
+        (31, 13.266733),
+        (67, 29.533481),
+    ] {
+        assert!(
+            (times_s[&frame] - time_s).abs() < 1e-3,
+            "frame {frame} is at {} s, not {time_s} s",
+            times_s[&frame]
+        );
     }
 
-    let tracks: Vec<(Track, [f64; 2])> =
-        tracks.into_values().filter(|t| t.contains_key(&BEFORE)).map(|t| (rest(&t), t)).map(|(r, t)| (t, r)).collect();
+    let tracks: Vec<(Track, [f64; 2])> = tracks
+        .into_values()
+        .filter(|t| t.contains_key(&BEFORE))
+        .map(|t| (rest(&t), t))
+        .map(|(r, t)| (t, r))
+        .collect();
     assert!(tracks.len() >= 200, "{} tracks", tracks.len());
     let (mut behind, mut reported, mut riding, mut free, mut seen, mut off) = (0, 0, 0, 0, 0, 0);
     for k in BEFORE + 1..68 {
@@ -440,7 +471,9 @@ fn a_hand_before_a_real_tree_takes_no_track_along() {
             }
             // On the hand in two frames, in each elsewhere, and where it does not belong.
             let rides = |at: &[f64; 2]| {
-                let before = k.checked_sub(1).and_then(|k| track.get(&k).filter(|at| inside_px(k, **at) > 0.0));
+                let before = k
+                    .checked_sub(1)
+                    .and_then(|k| track.get(&k).filter(|at| inside_px(k, **at) > 0.0));
                 inside_px(k, *at) > EDGE_PX
                     && before.is_some_and(|b| distance(*at, *b) > EDGE_PX)
                     && distance(*at, *rest) > EDGE_PX
@@ -452,7 +485,10 @@ fn a_hand_before_a_real_tree_takes_no_track_along() {
         (60..66).any(|k| inside_px(k, *rest) > EDGE_PX) && inside_px(67, *rest) < -2.0 * EDGE_PX
     };
     let were: Vec<_> = tracks.iter().filter(hidden_then).collect();
-    let back = were.iter().filter(|(t, rest)| t.get(&67).is_some_and(|at| distance(*at, *rest) < 4.0)).count();
+    let back = were
+        .iter()
+        .filter(|(t, rest)| t.get(&67).is_some_and(|at| distance(*at, *rest) < 4.0))
+        .count();
     println!(
         "{} tracks; behind the hand {behind}, {reported} of them reported, {riding} riding; free {free}, seen {seen}, \
          off {off}; {back} of {} back",
@@ -461,8 +497,17 @@ fn a_hand_before_a_real_tree_takes_no_track_along() {
     );
     assert!(behind >= 400, "{behind}");
     assert_eq!(riding, 0, "tracks ride on the hand");
-    assert!(reported * 20 <= behind, "{reported} of {behind} are reported behind the hand");
-    assert!(seen * 100 >= free * 75, "{seen} of {free} elsewhere are seen");
-    assert!(off * 100 <= seen * 4, "{off} of {seen} elsewhere are off their places");
+    assert!(
+        reported * 20 <= behind,
+        "{reported} of {behind} are reported behind the hand"
+    );
+    assert!(
+        seen * 100 >= free * 75,
+        "{seen} of {free} elsewhere are seen"
+    );
+    assert!(
+        off * 100 <= seen * 4,
+        "{off} of {seen} elsewhere are off their places"
+    );
     assert!(back * 2 >= were.len(), "{back} of {} are back", were.len());
 }

@@ -1,11 +1,14 @@
-//! A camera that is unplugged, hangs and comes back: the capture goes on, and every frame that there was is accounted for.
+//! A camera that is unplugged, hangs and comes back: the capture goes on, and every frame that
+//! there was is accounted for.
 
 mod support;
 
 use arborcam::config::Config;
 use arborcam::model::{Control, FormatNote, Observation, RawFrame, Snapshot, TrackId, TrackSet};
 use arborcam::recording::{Head, Limits};
-use arborcam::runtime::{self, Failure, Job, Pace, QUEUE_BYTES, RecordJob, RecordTo, Running, Summary};
+use arborcam::runtime::{
+    self, Failure, Job, Pace, QUEUE_BYTES, RecordJob, RecordTo, Running, Summary,
+};
 use arborcam::source::{Decoder, Health, Source, SourceError, SourceInfo};
 use arborcam::track::Tracker;
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,30 +21,43 @@ use support::{SIZE, recording};
 const HANGS: Duration = Duration::from_secs(60);
 /// The made-up camera is that much faster than one of 30 frames a second.
 const HURRY: u64 = 2;
-/// It slows down where the program does not keep up, lest what is judged here depend on how fast the machine is: no more
-/// frames are under way than the queue to the tracker holds.
+/// It slows down where the program does not keep up, lest what is judged here depend on how fast
+/// the machine is: no more frames are under way than the queue to the tracker holds.
 const UNDER_WAY_S: f64 = 3.5 / 30.0;
 
-/// The live cases take turns: together they would be slower than any machine for which the limits of time are meant.
+/// The live cases take turns: together they would be slower than any machine for which the limits
+/// of time are meant.
 fn alone() -> MutexGuard<'static, ()> {
     static TURN: Mutex<()> = Mutex::new(());
     TURN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn unplugged() -> SourceError {
-    SourceError::Disconnected { input: "fake".into(), reason: "test".into() }
+    SourceError::Disconnected {
+        input: "fake".into(),
+        reason: "test".into(),
+    }
 }
 
 fn silent() -> SourceError {
-    SourceError::Timeout { input: "fake".into(), seconds: 3.0 }
+    SourceError::Timeout {
+        input: "fake".into(),
+        seconds: 3.0,
+    }
 }
 
 fn denied() -> SourceError {
-    SourceError::Denied { input: "fake".into(), remedy: "test".into() }
+    SourceError::Denied {
+        input: "fake".into(),
+        remedy: "test".into(),
+    }
 }
 
 fn absent() -> SourceError {
-    SourceError::Absent { input: "fake".into(), hint: "test" }
+    SourceError::Absent {
+        input: "fake".into(),
+        hint: "test",
+    }
 }
 
 /// What happens to a camera at some frame.
@@ -59,7 +75,14 @@ struct Loss {
     false_start: bool,
 }
 
-const UNPLUGGED: Loss = Loss { at: 100, how: unplugged, attempts: 2, refusal: absent, away_s: 2.0, false_start: false };
+const UNPLUGGED: Loss = Loss {
+    at: 100,
+    how: unplugged,
+    attempts: 2,
+    refusal: absent,
+    away_s: 2.0,
+    false_start: false,
+};
 
 #[derive(Default)]
 struct Log {
@@ -88,13 +111,29 @@ impl Camera {
         let log = Arc::new(Mutex::new(Log::default()));
         let (losses, stop) = (losses.to_vec(), Arc::default());
         let (next, delivered_s, away_s, refused, gone) = (0, 0.0, 0.0, 0, false);
-        (Box::new(Self { losses, frames, next, delivered_s, away_s, refused, gone, stop, log: log.clone() }), log)
+        (
+            Box::new(Self {
+                losses,
+                frames,
+                next,
+                delivered_s,
+                away_s,
+                refused,
+                gone,
+                stop,
+                log: log.clone(),
+            }),
+            log,
+        )
     }
 
     fn wait_for_the_tracker(&self) {
         let since = Instant::now();
         let behind_s = || self.delivered_s - self.log.lock().expect("log").followed_s;
-        while behind_s() > UNDER_WAY_S && since.elapsed() < HANGS / 4 && !self.stop.load(Ordering::Relaxed) {
+        while behind_s() > UNDER_WAY_S
+            && since.elapsed() < HANGS / 4
+            && !self.stop.load(Ordering::Relaxed)
+        {
             std::thread::sleep(Duration::from_millis(1));
         }
     }
@@ -187,7 +226,10 @@ fn look(running: &Running, log: &Mutex<Log>) -> Option<Arc<Snapshot>> {
 fn ended(running: Running, log: &Mutex<Log>) -> (Summary, Option<Failure>, Vec<String>) {
     let (mut since, mut followed_s, mut news) = (Instant::now(), 0.0, Vec::new());
     while !running.finished() {
-        assert!(since.elapsed() < HANGS, "the run hangs; told so far: {news:?}");
+        assert!(
+            since.elapsed() < HANGS,
+            "the run hangs; told so far: {news:?}"
+        );
         news.extend(running.news());
         // Slow is not hung.
         if let Some(shown) = look(&running, log).filter(|s| s.time_s > followed_s) {
@@ -201,7 +243,8 @@ fn ended(running: Running, log: &Mutex<Log>) -> (Summary, Option<Failure>, Vec<S
 }
 
 fn capture(out: &Path) -> serde_json::Value {
-    serde_json::from_slice(&std::fs::read(out.join("capture.json")).expect("capture.json")).expect("JSON")
+    serde_json::from_slice(&std::fs::read(out.join("capture.json")).expect("capture.json"))
+        .expect("JSON")
 }
 
 /// Runs a camera with these losses; the capture's `timing`, and what was told.
@@ -209,10 +252,16 @@ fn run(losses: &[Loss], frames: u64) -> (serde_json::Value, Summary, Vec<String>
     let dir = tempfile::tempdir().expect("tempdir");
     let out = dir.path().join("out");
     let (camera, log) = Camera::new(losses, frames);
-    let (summary, failure, news) = ended(runtime::start(camera, job(Some(&out))).expect("start"), &log);
+    let (summary, failure, news) = ended(
+        runtime::start(camera, job(Some(&out))).expect("start"),
+        &log,
+    );
     assert!(failure.is_none(), "{failure:?}");
     let timing = capture(&out)["timing"].clone();
-    assert_eq!(timing["frames_dropped_tracker"], 0, "the camera of this test waits for the tracker");
+    assert_eq!(
+        timing["frames_dropped_tracker"], 0,
+        "the camera of this test waits for the tracker"
+    );
     (timing, summary, news)
 }
 
@@ -220,18 +269,40 @@ fn run(losses: &[Loss], frames: u64) -> (serde_json::Value, Summary, Vec<String>
 fn an_unplugged_camera_is_waited_for_and_the_gap_has_its_true_length() {
     let _alone = alone();
     let (timing, summary, news) = run(&[UNPLUGGED], 300);
-    assert_eq!((summary.frames, timing["reconnects"].as_u64()), (300, Some(1)));
+    assert_eq!(
+        (summary.frames, timing["reconnects"].as_u64()),
+        (300, Some(1))
+    );
     let gap = &timing["gaps"][0];
-    assert_eq!((gap["after_frame"].as_u64(), gap["cause"].as_str()), (Some(99), Some("disconnected")));
+    assert_eq!(
+        (gap["after_frame"].as_u64(), gap["cause"].as_str()),
+        (Some(99), Some("disconnected"))
+    );
     assert_eq!(gap["missing"], 60, "two seconds of frames");
-    assert!((gap["length_s"].as_f64().expect("length") - (2.0 + 1.0 / 30.0)).abs() < 1e-3, "{gap}");
+    assert!(
+        (gap["length_s"].as_f64().expect("length") - (2.0 + 1.0 / 30.0)).abs() < 1e-3,
+        "{gap}"
+    );
     assert!((timing["away_s"].as_f64().expect("time") - (2.0 + 1.0 / 30.0)).abs() < 1e-3);
     let rate_hz = timing["measured_rate_hz"].as_f64().expect("rate");
-    assert!((rate_hz - 30.0).abs() < 0.01, "{rate_hz}: the absence is no time in which it filmed");
-    assert_eq!(timing["frames_dropped_camera"], 0, "what was never filmed was not dropped");
+    assert!(
+        (rate_hz - 30.0).abs() < 0.01,
+        "{rate_hz}: the absence is no time in which it filmed"
+    );
+    assert_eq!(
+        timing["frames_dropped_camera"], 0,
+        "what was never filmed was not dropped"
+    );
     assert!((timing["duration_s"].as_f64().expect("time") - (299.0 / 30.0 + 2.0)).abs() < 1e-3);
     let told = |what: &str| news.iter().filter(|l| l.contains(what)).count();
-    assert_eq!((told("was lost at 3.3 s (test)"), told("the camera is back after")), (1, 1), "{news:?}");
+    assert_eq!(
+        (
+            told("was lost at 3.3 s (test)"),
+            told("the camera is back after")
+        ),
+        (1, 1),
+        "{news:?}"
+    );
     assert!(summary.tree.is_some(), "a tree is built all the same");
 }
 
@@ -239,7 +310,13 @@ fn an_unplugged_camera_is_waited_for_and_the_gap_has_its_true_length() {
 fn twenty_times_unplugged_is_twenty_times_back_with_the_same_tree_and_points() {
     let _alone = alone();
     let losses: Vec<Loss> = (0..20)
-        .map(|k| Loss { at: 330 + 15 * k, away_s: 0.5, attempts: k % 2, false_start: k % 3 == 0, ..UNPLUGGED })
+        .map(|k| Loss {
+            at: 330 + 15 * k,
+            away_s: 0.5,
+            attempts: k % 2,
+            false_start: k % 3 == 0,
+            ..UNPLUGGED
+        })
         .collect();
     let dir = tempfile::tempdir().expect("tempdir");
     let out = dir.path().join("out");
@@ -247,43 +324,96 @@ fn twenty_times_unplugged_is_twenty_times_back_with_the_same_tree_and_points() {
     let mut config = Config::default();
     // Less than what is filmed between two losses.
     config.camera.retry_delay_s = 0.1;
-    let (summary, failure, news) =
-        ended(runtime::start(camera, Job { config, ..job(Some(&out)) }).expect("start"), &log);
+    let (summary, failure, news) = ended(
+        runtime::start(
+            camera,
+            Job {
+                config,
+                ..job(Some(&out))
+            },
+        )
+        .expect("start"),
+        &log,
+    );
     assert!(failure.is_none(), "{failure:?}");
     let capture = capture(&out);
     let timing = &capture["timing"];
     assert_eq!(timing["frames_dropped_tracker"], 0);
-    assert_eq!((timing["reconnects"].as_u64(), summary.frames), (Some(20), 660), "{news:?}");
+    assert_eq!(
+        (timing["reconnects"].as_u64(), summary.frames),
+        (Some(20), 660),
+        "{news:?}"
+    );
     assert_eq!(timing["gaps"].as_array().map(Vec::len), Some(20));
     assert!((timing["away_s"].as_f64().expect("time") - 20.0 * (0.5 + 1.0 / 30.0)).abs() < 1e-2);
     let tree = summary.tree.expect("a tree");
-    assert!(tree.first.frame < 330, "built before the first loss, and not from scratch again");
+    assert!(
+        tree.first.frame < 330,
+        "built before the first loss, and not from scratch again"
+    );
     // The points that made the tree are still the ones that move it.
     let text = std::fs::read_to_string(out.join("tracks.csv")).expect("tracks.csv");
-    let row = |l: &str| Some((l.split(',').next()?.parse::<u32>().ok()?, l.split(',').nth(1)?.parse::<u64>().ok()?));
+    let row = |l: &str| {
+        Some((
+            l.split(',').next()?.parse::<u32>().ok()?,
+            l.split(',').nth(1)?.parse::<u64>().ok()?,
+        ))
+    };
     let rows: Vec<(u32, u64)> = text.lines().skip(1).filter_map(row).collect();
     let last = rows.iter().map(|r| r.1).max().expect("tracks");
     assert!(last > 800, "frames keep their places in time: {last}");
     let at_end: Vec<u32> = rows.iter().filter(|r| r.1 == last).map(|r| r.0).collect();
-    let kept = at_end.iter().filter(|id| tree.rest_px.keys().any(|t| t.0 == **id)).count();
-    assert!(kept * 10 >= tree.rest_px.len() * 6, "{kept} of {} points are left", tree.rest_px.len());
+    let kept = at_end
+        .iter()
+        .filter(|id| tree.rest_px.keys().any(|t| t.0 == **id))
+        .count();
+    assert!(
+        kept * 10 >= tree.rest_px.len() * 6,
+        "{kept} of {} points are left",
+        tree.rest_px.len()
+    );
 }
 
 #[test]
 fn why_it_cannot_go_on_yet_is_told_once_and_attempts_do_not_crowd() {
     let _alone = alone();
     fn other_size() -> SourceError {
-        SourceError::BadFormat { input: "fake".into(), what: "it came back with another size".into() }
+        SourceError::BadFormat {
+            input: "fake".into(),
+            what: "it came back with another size".into(),
+        }
     }
-    let (camera, log) = Camera::new(&[Loss { how: silent, attempts: 4, refusal: other_size, ..UNPLUGGED }], 120);
+    let (camera, log) = Camera::new(
+        &[Loss {
+            how: silent,
+            attempts: 4,
+            refusal: other_size,
+            ..UNPLUGGED
+        }],
+        120,
+    );
     let (summary, failure, news) = ended(runtime::start(camera, job(None)).expect("start"), &log);
     assert!(failure.is_none() && summary.frames == 120);
     let told = |what: &str| news.iter().filter(|l| l.contains(what)).count();
-    assert_eq!((told("no frame for 3 s"), told("came back with another size")), (1, 1), "{news:?}");
+    assert_eq!(
+        (
+            told("no frame for 3 s"),
+            told("came back with another size")
+        ),
+        (1, 1),
+        "{news:?}"
+    );
     let times = log.lock().expect("log").reopened.clone();
     assert_eq!(times.len(), 5);
-    let least = times.windows(2).map(|w| w[1] - w[0]).min().expect("attempts");
-    assert!(least >= Duration::from_millis(500), "camera.retry_delay_s is kept: {least:?}");
+    let least = times
+        .windows(2)
+        .map(|w| w[1] - w[0])
+        .min()
+        .expect("attempts");
+    assert!(
+        least >= Duration::from_millis(500),
+        "camera.retry_delay_s is kept: {least:?}"
+    );
 }
 
 #[test]
@@ -291,12 +421,35 @@ fn a_camera_that_is_not_there_is_looked_for_often_enough() {
     let _alone = alone();
     let mut config = Config::default();
     config.camera.retry_delay_s = 3600.0;
-    let (camera, log) = Camera::new(&[Loss { attempts: 5, ..UNPLUGGED }], 120);
-    let (summary, ..) = ended(runtime::start(camera, Job { config, ..job(None) }).expect("start"), &log);
+    let (camera, log) = Camera::new(
+        &[Loss {
+            attempts: 5,
+            ..UNPLUGGED
+        }],
+        120,
+    );
+    let (summary, ..) = ended(
+        runtime::start(
+            camera,
+            Job {
+                config,
+                ..job(None)
+            },
+        )
+        .expect("start"),
+        &log,
+    );
     let times = log.lock().expect("log").reopened.clone();
     assert_eq!((summary.frames, times.len()), (120, 6));
-    let longest = times.windows(2).map(|w| w[1] - w[0]).max().expect("attempts");
-    assert!(longest < Duration::from_secs(1), "a camera that comes back is seen: {longest:?}");
+    let longest = times
+        .windows(2)
+        .map(|w| w[1] - w[0])
+        .max()
+        .expect("attempts");
+    assert!(
+        longest < Duration::from_secs(1),
+        "a camera that comes back is seen: {longest:?}"
+    );
 }
 
 /// Until the lost camera has been tried for the first time.
@@ -315,8 +468,23 @@ fn a_wish_to_stop_is_heard_while_waiting() {
     let out = dir.path().join("out");
     let mut config = Config::default();
     config.camera.retry_delay_s = 3600.0;
-    let (camera, log) = Camera::new(&[Loss { attempts: u64::MAX, refusal: silent, at: 150, ..UNPLUGGED }], 300);
-    let running = runtime::start(camera, Job { config, ..job(Some(&out)) }).expect("start");
+    let (camera, log) = Camera::new(
+        &[Loss {
+            attempts: u64::MAX,
+            refusal: silent,
+            at: 150,
+            ..UNPLUGGED
+        }],
+        300,
+    );
+    let running = runtime::start(
+        camera,
+        Job {
+            config,
+            ..job(Some(&out))
+        },
+    )
+    .expect("start");
     let since = Instant::now();
     wait_for_an_attempt(&running, &log, since);
     // The screen says so though no frame comes.
@@ -329,15 +497,34 @@ fn a_wish_to_stop_is_heard_while_waiting() {
     running.send(Control::Quit);
     let (summary, failure, _) = ended(running, &log);
     assert!(failure.is_none(), "{failure:?}");
-    assert_eq!((summary.frames, summary.written.is_some()), (150, true), "what was captured is kept");
+    assert_eq!(
+        (summary.frames, summary.written.is_some()),
+        (150, true),
+        "what was captured is kept"
+    );
     let timing = &capture(&out)["timing"];
-    let [gap] = timing["gaps"].as_array().expect("gaps").as_slice() else { panic!("{timing}") };
-    assert_eq!((gap["after_frame"].as_u64(), gap["missing"].as_u64()), (Some(149), Some(0)), "{gap}");
-    assert_eq!((gap["cause"].as_str(), &gap["length_s"]), (Some("disconnected"), &timing["away_s"]));
+    let [gap] = timing["gaps"].as_array().expect("gaps").as_slice() else {
+        panic!("{timing}")
+    };
+    assert_eq!(
+        (gap["after_frame"].as_u64(), gap["missing"].as_u64()),
+        (Some(149), Some(0)),
+        "{gap}"
+    );
+    assert_eq!(
+        (gap["cause"].as_str(), &gap["length_s"]),
+        (Some("disconnected"), &timing["away_s"])
+    );
     let away_s = timing["away_s"].as_f64().expect("time");
-    assert!((0.3..since.elapsed().as_secs_f64()).contains(&away_s), "{away_s}");
+    assert!(
+        (0.3..since.elapsed().as_secs_f64()).contains(&away_s),
+        "{away_s}"
+    );
     let rate_hz = timing["measured_rate_hz"].as_f64().expect("rate");
-    assert!((rate_hz - 30.0).abs() < 0.01 && timing["reconnects"] == 0, "{timing}");
+    assert!(
+        (rate_hz - 30.0).abs() < 0.01 && timing["reconnects"] == 0,
+        "{timing}"
+    );
 }
 
 #[test]
@@ -347,10 +534,35 @@ fn without_reconnecting_the_first_loss_ends_the_capture() {
     let out = dir.path().join("out");
     let mut config = Config::default();
     config.camera.reconnect = false;
-    let (camera, log) = Camera::new(&[Loss { at: 150, ..UNPLUGGED }], 300);
-    let (summary, failure, _) = ended(runtime::start(camera, Job { config, ..job(Some(&out)) }).expect("start"), &log);
-    assert!(matches!(failure, Some(Failure::Source(SourceError::Disconnected { .. }))), "{failure:?}");
-    assert_eq!((summary.frames, out.join("capture.json").exists()), (150, true));
+    let (camera, log) = Camera::new(
+        &[Loss {
+            at: 150,
+            ..UNPLUGGED
+        }],
+        300,
+    );
+    let (summary, failure, _) = ended(
+        runtime::start(
+            camera,
+            Job {
+                config,
+                ..job(Some(&out))
+            },
+        )
+        .expect("start"),
+        &log,
+    );
+    assert!(
+        matches!(
+            failure,
+            Some(Failure::Source(SourceError::Disconnected { .. }))
+        ),
+        "{failure:?}"
+    );
+    assert_eq!(
+        (summary.frames, out.join("capture.json").exists()),
+        (150, true)
+    );
     assert!(log.lock().expect("log").reopened.is_empty());
 }
 
@@ -358,9 +570,19 @@ fn without_reconnecting_the_first_loss_ends_the_capture() {
 #[test]
 fn a_camera_that_never_filmed_is_not_waited_for() {
     let _alone = alone();
-    let (camera, log) = Camera::new(&[Loss { at: 0, how: silent, ..UNPLUGGED }], 300);
+    let (camera, log) = Camera::new(
+        &[Loss {
+            at: 0,
+            how: silent,
+            ..UNPLUGGED
+        }],
+        300,
+    );
     let (summary, failure, _) = ended(runtime::start(camera, job(None)).expect("start"), &log);
-    assert!(matches!(failure, Some(Failure::Source(SourceError::Timeout { .. }))), "{failure:?}");
+    assert!(
+        matches!(failure, Some(Failure::Source(SourceError::Timeout { .. }))),
+        "{failure:?}"
+    );
     assert_eq!(summary.frames, 0);
     assert!(log.lock().expect("log").reopened.is_empty());
 }
@@ -371,11 +593,35 @@ fn a_camera_that_may_not_be_opened_yet_is_looked_at_again_at_once_and_told_of_wh
     let _alone = alone();
     let mut config = Config::default();
     config.camera.retry_delay_s = 3600.0;
-    let (camera, log) = Camera::new(&[Loss { attempts: 3, refusal: denied, ..UNPLUGGED }], 120);
-    let (summary, _, news) = ended(runtime::start(camera, Job { config, ..job(None) }).expect("start"), &log);
+    let (camera, log) = Camera::new(
+        &[Loss {
+            attempts: 3,
+            refusal: denied,
+            ..UNPLUGGED
+        }],
+        120,
+    );
+    let (summary, _, news) = ended(
+        runtime::start(
+            camera,
+            Job {
+                config,
+                ..job(None)
+            },
+        )
+        .expect("start"),
+        &log,
+    );
     let told = |news: &[String]| news.iter().filter(|l| l.contains("no permission")).count();
     assert_eq!((summary.frames, told(&news)), (120, 0), "{news:?}");
-    let (camera, log) = Camera::new(&[Loss { attempts: 14, refusal: denied, ..UNPLUGGED }], 120);
+    let (camera, log) = Camera::new(
+        &[Loss {
+            attempts: 14,
+            refusal: denied,
+            ..UNPLUGGED
+        }],
+        120,
+    );
     let (summary, _, news) = ended(runtime::start(camera, job(None)).expect("start"), &log);
     assert_eq!((summary.frames, told(&news)), (120, 1), "{news:?}");
 }
@@ -383,13 +629,26 @@ fn a_camera_that_may_not_be_opened_yet_is_looked_at_again_at_once_and_told_of_wh
 #[test]
 fn a_camera_that_comes_back_for_one_frame_each_is_not_opened_without_a_pause() {
     let _alone = alone();
-    let losses: Vec<Loss> = (100..103).map(|at| Loss { at, attempts: 0, ..UNPLUGGED }).collect();
+    let losses: Vec<Loss> = (100..103)
+        .map(|at| Loss {
+            at,
+            attempts: 0,
+            ..UNPLUGGED
+        })
+        .collect();
     let (camera, log) = Camera::new(&losses, 120);
     let (summary, ..) = ended(runtime::start(camera, job(None)).expect("start"), &log);
     let times = log.lock().expect("log").reopened.clone();
     assert_eq!((summary.frames, times.len()), (120, 3));
-    let least = times.windows(2).map(|w| w[1] - w[0]).min().expect("attempts");
-    assert!(least >= Duration::from_millis(500), "camera.retry_delay_s is kept: {least:?}");
+    let least = times
+        .windows(2)
+        .map(|w| w[1] - w[0])
+        .min()
+        .expect("attempts");
+    assert!(
+        least >= Duration::from_millis(500),
+        "camera.retry_delay_s is kept: {least:?}"
+    );
 }
 
 #[test]
@@ -399,18 +658,43 @@ fn a_wait_that_is_switched_off_meanwhile_ends_with_what_was_captured() {
     let out = dir.path().join("out");
     let mut config = Config::default();
     config.camera.retry_delay_s = 3600.0;
-    let (camera, log) = Camera::new(&[Loss { attempts: u64::MAX, refusal: silent, at: 150, ..UNPLUGGED }], 300);
-    let running = runtime::start(camera, Job { config: config.clone(), ..job(Some(&out)) }).expect("start");
+    let (camera, log) = Camera::new(
+        &[Loss {
+            attempts: u64::MAX,
+            refusal: silent,
+            at: 150,
+            ..UNPLUGGED
+        }],
+        300,
+    );
+    let running = runtime::start(
+        camera,
+        Job {
+            config: config.clone(),
+            ..job(Some(&out))
+        },
+    )
+    .expect("start");
     wait_for_an_attempt(&running, &log, Instant::now());
     config.camera.reconnect = false;
     running.reload(config);
     let (summary, failure, _) = ended(running, &log);
-    assert!(matches!(failure, Some(Failure::Source(SourceError::Disconnected { .. }))), "{failure:?}");
-    assert_eq!((summary.frames, out.join("capture.json").exists()), (150, true));
+    assert!(
+        matches!(
+            failure,
+            Some(Failure::Source(SourceError::Disconnected { .. }))
+        ),
+        "{failure:?}"
+    );
+    assert_eq!(
+        (summary.frames, out.join("capture.json").exists()),
+        (150, true)
+    );
     assert_eq!(log.lock().expect("log").reopened.len(), 1);
 }
 
-/// A camera read by a crate that waits without a limit: it hangs for good, or panics when it is closed.
+/// A camera read by a crate that waits without a limit: it hangs for good, or panics when it is
+/// closed.
 struct Careless {
     camera: Box<Camera>,
     hangs: bool,
@@ -447,9 +731,22 @@ impl Source for Careless {
 fn a_camera_whose_thread_has_ended_is_not_waited_for() {
     let _alone = alone();
     let (camera, log) = Camera::new(&[UNPLUGGED], 300);
-    let running = runtime::start(Box::new(Careless { camera, hangs: false }), job(None)).expect("start");
+    let running = runtime::start(
+        Box::new(Careless {
+            camera,
+            hangs: false,
+        }),
+        job(None),
+    )
+    .expect("start");
     let (summary, failure, _) = ended(running, &log);
-    assert!(matches!(failure, Some(Failure::Source(SourceError::Disconnected { .. }))), "{failure:?}");
+    assert!(
+        matches!(
+            failure,
+            Some(Failure::Source(SourceError::Disconnected { .. }))
+        ),
+        "{failure:?}"
+    );
     assert_eq!(summary.frames, 100);
 }
 
@@ -463,19 +760,36 @@ fn recording_alone_gives_up_a_camera_that_hangs() {
         queue_bytes: QUEUE_BYTES,
     };
     let (camera, _) = Camera::new(&[], 300);
-    let job = RecordJob { to, pace: Pace::Live, camera: Config::default().camera };
-    let running = runtime::record(Box::new(Careless { camera, hangs: true }), job).expect("start");
+    let job = RecordJob {
+        to,
+        pace: Pace::Live,
+        camera: Config::default().camera,
+    };
+    let running = runtime::record(
+        Box::new(Careless {
+            camera,
+            hangs: true,
+        }),
+        job,
+    )
+    .expect("start");
     let since = Instant::now();
     while !running.finished() {
         assert!(since.elapsed() < HANGS, "it waits for ever");
         std::thread::sleep(Duration::from_millis(5));
     }
     let (_, failure) = running.join();
-    assert!(matches!(failure, Some(Failure::Source(SourceError::Timeout { .. }))), "{failure:?}");
+    assert!(
+        matches!(failure, Some(Failure::Source(SourceError::Timeout { .. }))),
+        "{failure:?}"
+    );
 }
 
 /// Follows the frames, `skipped` left out; the points of each of the others.
-fn followed(skipped: std::ops::Range<usize>, adjust: &dyn Fn(usize, &mut arborcam::model::Frame)) -> Vec<TrackSet> {
+fn followed(
+    skipped: std::ops::Range<usize>,
+    adjust: &dyn Fn(usize, &mut arborcam::model::Frame),
+) -> Vec<TrackSet> {
     let config = Config::default();
     let mut tracker = Tracker::new(&config.detect, &config.track, &support::outline(), 0);
     let mut decoder = Decoder::new().expect("decoder");
@@ -488,32 +802,65 @@ fn followed(skipped: std::ops::Range<usize>, adjust: &dyn Fn(usize, &mut arborca
     sets
 }
 
-/// While a camera is away the tree goes on swaying, and a camera that starts takes a moment to find its exposure.
+/// While a camera is away the tree goes on swaying, and a camera that starts takes a moment to find
+/// its exposure.
 #[test]
 fn points_are_found_again_after_a_gap_under_their_names_and_in_their_places() {
     let whole = followed(0..0, &|_, _| {});
-    for (gap, dark) in [(150..153, 0), (150..195, 0), (150..240, 0), (150..240, 10), (150..240, 30)] {
+    for (gap, dark) in [
+        (150..153, 0),
+        (150..195, 0),
+        (150..240, 0),
+        (150..240, 10),
+        (150..240, 30),
+    ] {
         let back = gap.end;
         let with_gap = followed(gap.clone(), &|k, frame| {
             // The first pictures are too dark by half, less and less so.
             if k >= back && k < back + dark {
                 let gain = 0.3 + 0.7 * (k - back) as f64 / dark as f64;
-                frame.luma.pixels.iter_mut().for_each(|p| *p = (f64::from(*p) * gain) as u8);
+                frame
+                    .luma
+                    .pixels
+                    .iter_mut()
+                    .for_each(|p| *p = (f64::from(*p) * gain) as u8);
             }
         });
-        let before: BTreeSet<TrackId> = with_gap[gap.start - 1].observations.iter().map(|o| o.id).collect();
+        let before: BTreeSet<TrackId> = with_gap[gap.start - 1]
+            .observations
+            .iter()
+            .map(|o| o.id)
+            .collect();
         // Two seconds after the camera is back, of which the first may have been dark.
         let k = back + 60;
         let set = &with_gap[k - gap.len()];
-        let truth: BTreeMap<TrackId, [f32; 2]> =
-            whole[k].observations.iter().map(|o| (o.id, [o.u_px, o.v_px])).collect();
-        let kept: Vec<_> = set.observations.iter().filter(|o| before.contains(&o.id)).collect();
+        let truth: BTreeMap<TrackId, [f32; 2]> = whole[k]
+            .observations
+            .iter()
+            .map(|o| (o.id, [o.u_px, o.v_px]))
+            .collect();
+        let kept: Vec<_> = set
+            .observations
+            .iter()
+            .filter(|o| before.contains(&o.id))
+            .collect();
         let least = if gap.len() < 10 { 0.95 } else { 0.55 };
         let share = kept.len() as f64 / before.len() as f64;
-        assert!(share >= least, "{gap:?}, dark for {dark}: {} of {} are left", kept.len(), before.len());
-        let off = |o: &&Observation| Some((o.u_px - truth.get(&o.id)?[0]).hypot(o.v_px - truth[&o.id][1]));
+        assert!(
+            share >= least,
+            "{gap:?}, dark for {dark}: {} of {} are left",
+            kept.len(),
+            before.len()
+        );
+        let off = |o: &&Observation| {
+            Some((o.u_px - truth.get(&o.id)?[0]).hypot(o.v_px - truth[&o.id][1]))
+        };
         let off_px: Vec<f32> = kept.into_iter().filter_map(|o| off(&o)).collect();
         let right = off_px.iter().filter(|d| **d < 2.0).count();
-        assert!(right * 10 >= off_px.len() * 9, "{gap:?}, dark for {dark}: {right} of {} are right", off_px.len());
+        assert!(
+            right * 10 >= off_px.len() * 9,
+            "{gap:?}, dark for {dark}: {right} of {} are right",
+            off_px.len()
+        );
     }
 }

@@ -10,7 +10,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
-/// A run on the recording in which the tree is built after 4 s, as if there had been a gust, and refined from then on.
+/// A run on the recording in which the tree is built after 4 s, as if there had been a gust, and
+/// refined from then on.
 struct Run {
     /// Tree and pose after each frame.
     frames: Vec<(Arc<Tree>, Arc<Pose>)>,
@@ -32,13 +33,19 @@ fn run() -> &'static Run {
                 frames.extend(pipeline.back.tree().cloned().zip(moved.pose));
             }
         }
-        Run { frames, sets, config }
+        Run {
+            frames,
+            sets,
+            config,
+        }
     })
 }
 
 /// Pairs of frames with a refinement between them.
 fn seams(run: &Run) -> impl Iterator<Item = &[(Arc<Tree>, Arc<Pose>)]> {
-    run.frames.windows(2).filter(|pair| !Arc::ptr_eq(&pair[0].0, &pair[1].0))
+    run.frames
+        .windows(2)
+        .filter(|pair| !Arc::ptr_eq(&pair[0].0, &pair[1].0))
 }
 
 fn names(tree: &Tree) -> BTreeSet<NodeName> {
@@ -66,16 +73,37 @@ fn branches_keep_their_numbers_and_no_number_is_given_twice() {
         refined += 1;
         assert_eq!((new.refinements, new.first), (refined, old.first));
         let (before, after) = (names(old), names(new));
-        assert_eq!(after.len(), new.skeleton.nodes.len(), "every node has a name of its own");
+        assert_eq!(
+            after.len(),
+            new.skeleton.nodes.len(),
+            "every node has a name of its own"
+        );
         gone.extend(before.difference(&after).copied());
         assert!(after.is_disjoint(&gone), "a name came back");
-        assert!((0..2).all(|i| new.skeleton.nodes[i].name == NodeName(i as u32)), "foot and trunk are what they were");
+        assert!(
+            (0..2).all(|i| new.skeleton.nodes[i].name == NodeName(i as u32)),
+            "foot and trunk are what they were"
+        );
         let kept = before.intersection(&after).count();
-        println!("{:.1} s: {kept} of {} nodes go on in {}", pair[1].1.time_s, before.len(), after.len());
-        assert!(5 * kept >= 3 * before.len(), "{kept} of {} nodes go on", before.len());
+        println!(
+            "{:.1} s: {kept} of {} nodes go on in {}",
+            pair[1].1.time_s,
+            before.len(),
+            after.len()
+        );
+        assert!(
+            5 * kept >= 3 * before.len(),
+            "{kept} of {} nodes go on",
+            before.len()
+        );
         // A branch goes on where most of its points are.
         let points = |tree: &Tree, name: NodeName| -> BTreeSet<_> {
-            let node = tree.skeleton.nodes.iter().position(|n| n.name == name).expect("node");
+            let node = tree
+                .skeleton
+                .nodes
+                .iter()
+                .position(|n| n.name == name)
+                .expect("node");
             tree.hierarchy
                 .clusters
                 .get(node.wrapping_sub(1))
@@ -83,8 +111,14 @@ fn branches_keep_their_numbers_and_no_number_is_given_twice() {
         };
         for name in before.intersection(&after).filter(|n| n.0 > 1) {
             let (was, is) = (points(old, *name), points(new, *name));
-            let known: BTreeSet<_> = was.intersection(&points(new, NodeName(1))).copied().collect();
-            assert!(2 * known.intersection(&is).count() >= known.len(), "{name:?}: {known:?} became {is:?}");
+            let known: BTreeSet<_> = was
+                .intersection(&points(new, NodeName(1)))
+                .copied()
+                .collect();
+            assert!(
+                2 * known.intersection(&is).count() >= known.len(),
+                "{name:?}: {known:?} became {is:?}"
+            );
         }
     }
     // The film is over after 11 s.
@@ -94,28 +128,39 @@ fn branches_keep_their_numbers_and_no_number_is_given_twice() {
 /// Names of the branches that leave from the end of each branch.
 fn forks(tree: &Tree) -> BTreeMap<NodeName, BTreeSet<NodeName>> {
     let nodes = &tree.skeleton.nodes;
-    let mut forks: BTreeMap<_, BTreeSet<_>> = nodes.iter().map(|n| (n.name, BTreeSet::new())).collect();
+    let mut forks: BTreeMap<_, BTreeSet<_>> =
+        nodes.iter().map(|n| (n.name, BTreeSet::new())).collect();
     for node in nodes {
         if let Some(parent) = node.parent {
-            forks.entry(nodes[parent.index()].name).or_default().insert(node.name);
+            forks
+                .entry(nodes[parent.index()].name)
+                .or_default()
+                .insert(node.name);
         }
     }
     forks
 }
 
-/// The screen shows the picture and the tree from the side. In the picture no branch jumps: one that is found to fork otherwise
-/// ends at its new fork from then on; of the others no measured one moves farther than half as much again as in
-/// an ordinary frame of this swing, and copies hardly. In depth, which is made up, a branch is led to where it does not
-/// make a hook: half of them by no more than the tightest prior's deviation (1/40 of the tree's width), none by more than two of the
-/// loosest one's (2/5).
+/// The screen shows the picture and the tree from the side. In the picture no branch jumps: one
+/// that is found to fork otherwise ends at its new fork from then on; of the others no measured one
+/// moves farther than half as much again as in an ordinary frame of this swing, and copies hardly.
+/// In depth, which is made up, a branch is led to where it does not make a hook: half of them by no
+/// more than the tightest prior's deviation (1/40 of the tree's width), none by more than two of
+/// the loosest one's (2/5).
 #[test]
 fn branches_that_go_on_do_not_jump() {
     let run = run();
     // In the picture and in depth, px, and whether it is a measured node.
     let steps = |pair: &[(Arc<Tree>, Arc<Pose>)]| -> Vec<(f64, f64, bool)> {
-        let (was, is) = (places(&pair[0].0, &pair[0].1), places(&pair[1].0, &pair[1].1));
-        let measured: BTreeSet<NodeName> =
-            pair[1].0.skeleton.nodes[..pair[1].0.skeleton.measured()].iter().map(|n| n.name).collect();
+        let (was, is) = (
+            places(&pair[0].0, &pair[0].1),
+            places(&pair[1].0, &pair[1].1),
+        );
+        let measured: BTreeSet<NodeName> = pair[1].0.skeleton.nodes
+            [..pair[1].0.skeleton.measured()]
+            .iter()
+            .map(|n| n.name)
+            .collect();
         let (forked, forks) = (forks(&pair[0].0), forks(&pair[1].0));
         let step = |(name, a): (&NodeName, &[f64; 3])| {
             let b = is.get(name)?;
@@ -123,14 +168,24 @@ fn branches_that_go_on_do_not_jump() {
             if old != new {
                 return None;
             }
-            Some(((a[0] - b[0]).hypot(a[1] - b[1]), (a[2] - b[2]).abs(), measured.contains(name)))
+            Some((
+                (a[0] - b[0]).hypot(a[1] - b[1]),
+                (a[2] - b[2]).abs(),
+                measured.contains(name),
+            ))
         };
         was.iter().filter_map(step).collect()
     };
     let largest = |steps: &[(f64, f64, bool)]| {
-        steps.iter().filter(|s| s.2).fold([0.0f64; 2], |m, s| [m[0].max(s.0), m[1].max(s.1)])
+        steps
+            .iter()
+            .filter(|s| s.2)
+            .fold([0.0f64; 2], |m, s| [m[0].max(s.0), m[1].max(s.1)])
     };
-    let ordinary = run.frames.windows(2).filter(|pair| Arc::ptr_eq(&pair[0].0, &pair[1].0));
+    let ordinary = run
+        .frames
+        .windows(2)
+        .filter(|pair| Arc::ptr_eq(&pair[0].0, &pair[1].0));
     let ordinary = largest(&ordinary.flat_map(steps).collect::<Vec<_>>());
     for pair in seams(run) {
         let [left, _, right, _] = pair[1].0.outline.bounds_px().expect("an outline");
@@ -148,12 +203,19 @@ fn branches_that_go_on_do_not_jump() {
             pair[1].1.time_s, ordinary[0], ordinary[1]
         );
         assert!(u <= 1.5 * ordinary[0], "a measured node jumps by {u:.2} px");
-        assert!(half <= width / 40.0 && z <= 0.4 * width, "in depth by {half:.2} px in the median, at most {z:.2} px");
-        assert!(median <= 1.5 && most <= 20.0, "in the median {median:.2} px, 95 % {most:.2} px");
+        assert!(
+            half <= width / 40.0 && z <= 0.4 * width,
+            "in depth by {half:.2} px in the median, at most {z:.2} px"
+        );
+        assert!(
+            median <= 1.5 && most <= 20.0,
+            "in the median {median:.2} px, 95 % {most:.2} px"
+        );
     }
 }
 
-/// What is written is what was shown: from the last refinement on the same poses, and every node in every frame before.
+/// What is written is what was shown: from the last refinement on the same poses, and every node in
+/// every frame before.
 #[test]
 fn the_last_tree_has_a_pose_in_every_frame() {
     let run = run();
@@ -168,18 +230,44 @@ fn the_last_tree_has_a_pose_in_every_frame() {
         compared += 1;
     }
     assert!(compared > 5, "{compared} frames");
-    // Points of older trees that have been lost keep a branch, if it or one below it goes on: their rows are of use.
-    let alive: BTreeSet<_> = run.sets.last().expect("sets").observations.iter().map(|o| o.id).collect();
+    // Points of older trees that have been lost keep a branch, if it or one below it goes on: their
+    // rows are of use.
+    let alive: BTreeSet<_> = run
+        .sets
+        .last()
+        .expect("sets")
+        .observations
+        .iter()
+        .map(|o| o.id)
+        .collect();
     let older = seams(run).flat_map(|pair| pair[0].0.hierarchy.clusters[0].members.iter());
     let lost: BTreeSet<_> = older.filter(|id| !alive.contains(id)).collect();
-    let kept = lost.iter().filter(|id| retrace.node_of(***id).is_some()).count();
-    println!("{kept} of {} lost points have a branch, {} by inheritance", lost.len(), tree.inherited.len());
-    assert!(10 * kept >= 9 * lost.len(), "{kept} of {} lost points", lost.len());
-    assert!(!tree.inherited.is_empty() && tree.inherited.keys().all(|id| retrace.node_of(*id).is_some()));
+    let kept = lost
+        .iter()
+        .filter(|id| retrace.node_of(***id).is_some())
+        .count();
+    println!(
+        "{kept} of {} lost points have a branch, {} by inheritance",
+        lost.len(),
+        tree.inherited.len()
+    );
+    assert!(
+        10 * kept >= 9 * lost.len(),
+        "{kept} of {} lost points",
+        lost.len()
+    );
+    assert!(
+        !tree.inherited.is_empty()
+            && tree
+                .inherited
+                .keys()
+                .all(|id| retrace.node_of(*id).is_some())
+    );
 }
 
-/// Whoever plays `motion.csv` or the model sees the tree from the side as well: no branch jumps in depth where the film
-/// that the last refinement remembers begins, and none far where its pose takes over.
+/// Whoever plays `motion.csv` or the model sees the tree from the side as well: no branch jumps in
+/// depth where the film that the last refinement remembers begins, and none far where its pose
+/// takes over.
 #[test]
 fn the_written_motion_has_no_seam_in_the_middle() {
     let run = run();
@@ -189,11 +277,22 @@ fn the_written_motion_has_no_seam_in_the_middle() {
     let mut retrace = Retrace::new(&Arc::new(tree), &run.config);
     let poses: Vec<Pose> = run.sets.iter().map(|set| retrace.step(set).0).collect();
     let step = |k: usize| {
-        let steps = poses[k - 1].joints.iter().zip(&poses[k].joints).map(|(a, b)| (a.position.z - b.position.z).abs());
+        let steps = poses[k - 1]
+            .joints
+            .iter()
+            .zip(&poses[k].joints)
+            .map(|(a, b)| (a.position.z - b.position.z).abs());
         steps.fold(0.0, f64::max)
     };
-    let ordinary = (1..poses.len()).filter(|k| ![150, 280].contains(k)).map(step).fold(0.0, f64::max);
-    println!("in depth {:.2} px and {:.2} px, elsewhere at most {ordinary:.2} px", step(150), step(280));
+    let ordinary = (1..poses.len())
+        .filter(|k| ![150, 280].contains(k))
+        .map(step)
+        .fold(0.0, f64::max);
+    println!(
+        "in depth {:.2} px and {:.2} px, elsewhere at most {ordinary:.2} px",
+        step(150),
+        step(280)
+    );
     assert!(step(150) <= ordinary && step(280) <= 3.0 * ordinary);
 }
 
@@ -206,7 +305,12 @@ fn a_film_that_ends_before_a_refinement_gets_its_shoots_at_the_end() {
         let mut back = BackEnd::new(&config);
         for set in run.sets.iter().take_while(|set| set.time_s < 9.5) {
             let tracks = set.clone();
-            back.step(Followed { tracks, outline: outline.clone(), preview: None, received: Instant::now() });
+            back.step(Followed {
+                tracks,
+                outline: outline.clone(),
+                preview: None,
+                received: Instant::now(),
+            });
         }
         let standing = back.tree().cloned().expect("a tree");
         assert_eq!((standing.refinements, standing.shoots.len()), (0, 0));
@@ -214,35 +318,57 @@ fn a_film_that_ends_before_a_refinement_gets_its_shoots_at_the_end() {
         (standing, back.tree().cloned().expect("a tree"))
     };
     let (standing, tree) = ended(true);
-    assert!(!tree.shoots.is_empty() && names(&tree).is_superset(&names(&standing)), "{:?}", tree.shoots);
-    assert_eq!((tree.refinements, tree.shown_from), (1, standing.shown_from));
+    assert!(
+        !tree.shoots.is_empty() && names(&tree).is_superset(&names(&standing)),
+        "{:?}",
+        tree.shoots
+    );
+    assert_eq!(
+        (tree.refinements, tree.shown_from),
+        (1, standing.shown_from)
+    );
     // Every one of them has its pose in every frame, and its points are on it.
     let mut retrace = Retrace::new(&tree, &config);
     for set in &run.sets {
         assert_eq!(retrace.step(set).0.joints.len(), tree.skeleton.nodes.len());
     }
-    assert!(tree.shoots.iter().all(|s| s.members.iter().all(|id| retrace.node_of(*id) == Some(s.name))));
+    assert!(tree.shoots.iter().all(|s| {
+        s.members
+            .iter()
+            .all(|id| retrace.node_of(*id) == Some(s.name))
+    }));
     // Whoever does not wait gets the tree as it stands.
     let (standing, tree) = ended(false);
     assert!(Arc::ptr_eq(&standing, &tree));
 }
 
-/// It is told of as built, with the warning that it was early, and not as refined: nobody saw another.
+/// It is told of as built, with the warning that it was early, and not as refined: nobody saw
+/// another.
 #[test]
 fn a_tree_that_is_built_at_the_end_is_the_first_one_with_its_shoots() {
     let (run, config) = (run(), Config::default());
     let mut back = BackEnd::new(&config);
     for set in run.sets.iter().take_while(|set| set.time_s < 7.9) {
         let (tracks, outline) = (set.clone(), run.frames[0].0.outline.clone());
-        back.step(Followed { tracks, outline, preview: None, received: Instant::now() });
+        back.step(Followed {
+            tracks,
+            outline,
+            preview: None,
+            received: Instant::now(),
+        });
     }
     assert!(back.tree().is_none());
     back.finish(&|| true);
     let tree = back.tree().expect("a tree");
-    assert!(tree.forced && tree.refinements == 0 && !tree.shoots.is_empty(), "{:?}", tree.shoots);
+    assert!(
+        tree.forced && tree.refinements == 0 && !tree.shoots.is_empty(),
+        "{:?}",
+        tree.shoots
+    );
 }
 
-/// The computer slept, or the camera was away: the new tree's pose cannot be led over to the present, and it would jump.
+/// The computer slept, or the camera was away: the new tree's pose cannot be led over to the
+/// present, and it would jump.
 #[test]
 fn a_tree_that_cannot_be_followed_to_the_present_is_not_taken() {
     let run = run();
@@ -250,11 +376,23 @@ fn a_tree_that_cannot_be_followed_to_the_present_is_not_taken() {
     let mut standing: Option<Arc<Tree>> = None;
     for set in &run.sets {
         let mut tracks = set.clone();
-        tracks.time_s += if standing.is_some() { 10.0 * run.config.accumulate.window_s } else { 0.0 };
+        tracks.time_s += if standing.is_some() {
+            10.0 * run.config.accumulate.window_s
+        } else {
+            0.0
+        };
         let outline = run.frames[0].0.outline.clone();
-        back.step(Followed { tracks, outline, preview: None, received: Instant::now() });
+        back.step(Followed {
+            tracks,
+            outline,
+            preview: None,
+            received: Instant::now(),
+        });
         if let Some(standing) = &standing {
-            assert!(back.tree().is_some_and(|tree| Arc::ptr_eq(tree, standing)), "another tree out of nothing");
+            assert!(
+                back.tree().is_some_and(|tree| Arc::ptr_eq(tree, standing)),
+                "another tree out of nothing"
+            );
             return;
         }
         if back.refinement().is_some_and(|work| work.run().is_some()) {
@@ -264,7 +402,8 @@ fn a_tree_that_cannot_be_followed_to_the_present_is_not_taken() {
     panic!("no refinement");
 }
 
-/// A slow computer: the camera's frames go on with the standing tree until the new one is worked out.
+/// A slow computer: the camera's frames go on with the standing tree until the new one is worked
+/// out.
 #[test]
 fn a_refinement_that_is_late_is_taken_when_it_is_there() {
     let run = run();
@@ -281,7 +420,12 @@ fn a_refinement_that_is_late_is_taken_when_it_is_there() {
             }
         }
         let outline = run.frames[0].0.outline.clone();
-        back.step(Followed { tracks: set.clone(), outline, preview: None, received: Instant::now() });
+        back.step(Followed {
+            tracks: set.clone(),
+            outline,
+            preview: None,
+            received: Instant::now(),
+        });
         if back.tree().is_some_and(|tree| tree.refinements > 0) {
             assert!(late > 20, "taken before it was there");
             return;

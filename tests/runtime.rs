@@ -1,4 +1,5 @@
-//! The pipeline on threads: the same result as without them, wishes honoured, losses counted, and an end in any case.
+//! The pipeline on threads: the same result as without them, wishes honoured, losses counted, and
+//! an end in any case.
 
 mod support;
 
@@ -49,8 +50,15 @@ fn frame(n: u64) -> Option<RawFrame> {
     recording().get(n as usize).cloned()
 }
 
-fn fake(live: bool, script: impl FnMut(u64) -> Result<Option<RawFrame>, SourceError> + Send + 'static) -> Box<Fake> {
-    Box::new(Fake { next: 0, live, script: Box::new(script) })
+fn fake(
+    live: bool,
+    script: impl FnMut(u64) -> Result<Option<RawFrame>, SourceError> + Send + 'static,
+) -> Box<Fake> {
+    Box::new(Fake {
+        next: 0,
+        live,
+        script: Box::new(script),
+    })
 }
 
 /// The recording, waiting before frame `at` until it is let go on.
@@ -67,7 +75,14 @@ fn gated(at: u64) -> (Box<Fake>, Gate) {
         }
         Ok(frame(n))
     });
-    (source, Gate { reached, open, taken })
+    (
+        source,
+        Gate {
+            reached,
+            open,
+            taken,
+        },
+    )
 }
 
 struct Gate {
@@ -126,7 +141,9 @@ fn run(source: Box<Fake>, job: Job) -> (Option<Summary>, Option<Failure>, Vec<St
 fn wish(at: u64, wishes: &[Control], out: &Path) -> (Summary, Vec<String>) {
     let (source, gate) = gated(at);
     let running = runtime::start(source, job(Some(support::outline()), Some(out))).expect("start");
-    gate.reached.recv_timeout(HANGS).expect("the gate is reached");
+    gate.reached
+        .recv_timeout(HANGS)
+        .expect("the gate is reached");
     wishes.iter().for_each(|w| running.send(w.clone()));
     gate.open.send(()).expect("the source waits");
     let (summary, failure, warnings) = ended(running);
@@ -137,8 +154,16 @@ fn wish(at: u64, wishes: &[Control], out: &Path) -> (Summary, Vec<String>) {
 /// Track id and frame of every row of `tracks.csv`.
 fn tracks(out: &Path) -> Vec<(u64, u64)> {
     let text = std::fs::read_to_string(out.join("tracks.csv")).expect("tracks.csv");
-    let cell = |l: &str, c: usize| l.split(',').nth(c).and_then(|x| x.parse().ok()).expect("a number");
-    text.lines().skip(1).map(|l| (cell(l, 0), cell(l, 1))).collect()
+    let cell = |l: &str, c: usize| {
+        l.split(',')
+            .nth(c)
+            .and_then(|x| x.parse().ok())
+            .expect("a number")
+    };
+    text.lines()
+        .skip(1)
+        .map(|l| (cell(l, 0), cell(l, 1)))
+        .collect()
 }
 
 /// What the program means is one synchronous step a frame; threads must not change it.
@@ -155,31 +180,65 @@ fn threads_give_the_same_poses_as_none() {
         }
         moved.extend(pipeline.finish());
         trees.resize(moved.len(), pipeline.back.tree().cloned());
-        assert!(moved.iter().map(|m| m.tracks.frame).eq(0..recording().len() as u64), "every frame, in order");
+        assert!(
+            moved
+                .iter()
+                .map(|m| m.tracks.frame)
+                .eq(0..recording().len() as u64),
+            "every frame, in order"
+        );
 
         let lines = Lines::default();
-        let streamed = Job { stream: Some(Box::new(lines.clone())), ..job(outline, None) };
+        let streamed = Job {
+            stream: Some(Box::new(lines.clone())),
+            ..job(outline, None)
+        };
         let (summary, failure, _) = run(fake(false, |n| Ok(frame(n))), streamed);
         assert!(failure.is_none(), "{failure:?}");
-        let (tree, threaded) = (pipeline.back.tree().expect("tree"), summary.and_then(|s| s.tree).expect("tree"));
+        let (tree, threaded) = (
+            pipeline.back.tree().expect("tree"),
+            summary.and_then(|s| s.tree).expect("tree"),
+        );
         assert_eq!(*tree.skeleton, *threaded.skeleton);
-        assert_eq!((tree.frame, &tree.evidence), (threaded.frame, &threaded.evidence));
-        assert!(tree.refinements > 0 && tree.refinements == threaded.refinements, "{} refinements", tree.refinements);
+        assert_eq!(
+            (tree.frame, &tree.evidence),
+            (threaded.frame, &threaded.evidence)
+        );
+        assert!(
+            tree.refinements > 0 && tree.refinements == threaded.refinements,
+            "{} refinements",
+            tree.refinements
+        );
 
         let text = String::from_utf8(lines.0.lock().expect("lines").clone()).expect("text");
         let mut lines = text.lines();
         let mut poses = 0;
-        for (pose, tree) in moved.iter().zip(&trees).filter_map(|(m, tree)| m.pose.as_ref().zip(tree.as_ref())) {
+        for (pose, tree) in moved
+            .iter()
+            .zip(&trees)
+            .filter_map(|(m, tree)| m.pose.as_ref().zip(tree.as_ref()))
+        {
             let nodes: Vec<String> = tree.skeleton.nodes[..tree.skeleton.measured()]
                 .iter()
                 .zip(&pose.joints)
-                .map(|(n, j)| format!("[{},{:.3},{:.3},{:.3}]", n.name.0, j.position.x, j.position.y, j.position.z))
+                .map(|(n, j)| {
+                    format!(
+                        "[{},{:.3},{:.3},{:.3}]",
+                        n.name.0, j.position.x, j.position.y, j.position.z
+                    )
+                })
                 .collect();
-            let expected =
-                format!("{{\"frame\":{},\"time_s\":{:.6},\"nodes\":[{}]}}", pose.frame, pose.time_s, nodes.join(","));
+            let expected = format!(
+                "{{\"frame\":{},\"time_s\":{:.6},\"nodes\":[{}]}}",
+                pose.frame,
+                pose.time_s,
+                nodes.join(",")
+            );
             // What follows the poses is the sway, which the pipeline does not know.
             let line = lines.next().unwrap_or_default();
-            let alone = line.split_once(",\"sway\":").map_or(line.to_owned(), |(poses, _)| format!("{poses}}}"));
+            let alone = line
+                .split_once(",\"sway\":")
+                .map_or(line.to_owned(), |(poses, _)| format!("{poses}}}"));
             assert_eq!(alone, expected, "frame {}", pose.frame);
             poses += 1;
         }
@@ -192,7 +251,10 @@ fn threads_give_the_same_poses_as_none() {
 fn the_sway_is_told_in_the_same_frames_however_slow_the_source_is() {
     let streamed = |pause: Duration| {
         let lines = Lines::default();
-        let job = Job { stream: Some(Box::new(lines.clone())), ..job(Some(support::outline()), None) };
+        let job = Job {
+            stream: Some(Box::new(lines.clone())),
+            ..job(Some(support::outline()), None)
+        };
         let source = fake(false, move |n| {
             std::thread::sleep(pause);
             Ok(frame(n))
@@ -202,28 +264,47 @@ fn the_sway_is_told_in_the_same_frames_however_slow_the_source_is() {
         let text = lines.0.lock().expect("lines").clone();
         String::from_utf8(text).expect("text")
     };
-    let (fast, slow) = (streamed(Duration::ZERO), streamed(Duration::from_millis(20)));
+    let (fast, slow) = (
+        streamed(Duration::ZERO),
+        streamed(Duration::from_millis(20)),
+    );
     assert!(fast.contains(",\"sway\":{"), "no sway is told");
     assert!(fast == slow, "the stream depends on the clock");
 }
 
-/// A sway is looked at in most of the film's last second: a wish to stop must not wait for it, nor for the whole
-/// analysis of a film that nobody writes.
+/// A sway is looked at in most of the film's last second: a wish to stop must not wait for it, nor
+/// for the whole analysis of a film that nobody writes.
 #[test]
 fn a_stop_while_the_sway_is_looked_at_ends_quickly() {
     for at in [245, 290] {
         let (source, gate) = gated(at);
-        let config = Config { dynamics: Dynamics { every_s: 0.05, ..Dynamics::default() }, ..Config::default() };
+        let config = Config {
+            dynamics: Dynamics {
+                every_s: 0.05,
+                ..Dynamics::default()
+            },
+            ..Config::default()
+        };
         let lines = Lines::default();
-        let job = Job { config, stream: Some(Box::new(lines.clone())), ..job(Some(support::outline()), None) };
+        let job = Job {
+            config,
+            stream: Some(Box::new(lines.clone())),
+            ..job(Some(support::outline()), None)
+        };
         let running = runtime::start(source, job).expect("start");
-        gate.reached.recv_timeout(HANGS).expect("the gate is reached");
+        gate.reached
+            .recv_timeout(HANGS)
+            .expect("the gate is reached");
         running.send(Control::Quit);
         gate.open.send(()).expect("the source waits");
         let began = Instant::now();
         let (summary, failure, _) = ended(running);
         assert!(failure.is_none() && summary.is_some(), "{failure:?}");
-        assert!(began.elapsed() < Duration::from_secs(5), "{:?} from the wish to the end", began.elapsed());
+        assert!(
+            began.elapsed() < Duration::from_secs(5),
+            "{:?} from the wish to the end",
+            began.elapsed()
+        );
     }
 }
 
@@ -232,17 +313,27 @@ fn build_now_builds_early() {
     let dir = tempfile::tempdir().expect("tempdir");
     let (summary, _) = wish(60, &[Control::BuildNow], &dir.path().join("out"));
     let tree = summary.tree.expect("a tree");
-    assert!(tree.first.forced && (55..=62).contains(&tree.first.frame), "built after frame {}", tree.first.frame);
+    assert!(
+        tree.first.forced && (55..=62).contains(&tree.first.frame),
+        "built after frame {}",
+        tree.first.frame
+    );
 }
 
 #[test]
 fn restart_starts_over_with_new_ids() {
-    let (dir, whole) = (tempfile::tempdir().expect("tempdir"), recording().len() as u64);
+    let (dir, whole) = (
+        tempfile::tempdir().expect("tempdir"),
+        recording().len() as u64,
+    );
     let out = dir.path().join("out");
     let (summary, _) = wish(150, &[Control::Restart], &out);
     let tracks = tracks(&out);
     let first = tracks.iter().map(|t| t.1).min().expect("tracks");
-    assert!((140..=151).contains(&first), "tracks begin in frame {first}");
+    assert!(
+        (140..=151).contains(&first),
+        "tracks begin in frame {first}"
+    );
     assert_eq!(tracks.iter().map(|t| t.1).max(), Some(whole - 1));
     // Some 390 points were followed before; none of their names comes back.
     let lowest = tracks.iter().map(|t| t.0).min().expect("tracks");
@@ -255,21 +346,36 @@ fn a_new_outline_is_used_and_a_bad_one_is_refused_in_words() {
     let dir = tempfile::tempdir().expect("tempdir");
     let bad = Control::SetOutline(vec![[10.0, 10.0], [90.0, 90.0]]);
     let (summary, warnings) = wish(20, &[bad], &dir.path().join("bad"));
-    assert!(warnings.iter().any(|w| w.contains("at least 3")), "{warnings:?}");
-    assert_eq!(summary.tree.expect("a tree").outline.polygon_px, support::outline().polygon_px);
-    assert_eq!(tracks(&dir.path().join("bad")).first().map(|t| t.1), Some(0), "what was followed is kept");
+    assert!(
+        warnings.iter().any(|w| w.contains("at least 3")),
+        "{warnings:?}"
+    );
+    assert_eq!(
+        summary.tree.expect("a tree").outline.polygon_px,
+        support::outline().polygon_px
+    );
+    assert_eq!(
+        tracks(&dir.path().join("bad")).first().map(|t| t.1),
+        Some(0),
+        "what was followed is kept"
+    );
 
     let crown = vec![[240.0, 0.0], [480.0, 0.0], [480.0, 250.0], [240.0, 250.0]];
     let (summary, warnings) = wish(20, &[Control::SetOutline(crown)], &dir.path().join("good"));
     assert_eq!(warnings, Vec::<String>::new());
-    assert_eq!(summary.tree.expect("a tree").outline.bounds_px(), Some([240, 0, 480, 250]));
+    assert_eq!(
+        summary.tree.expect("a tree").outline.bounds_px(),
+        Some([240, 0, 480, 250])
+    );
 }
 
-/// The strokes of `tests/matting` lie on a part of the first frame; from the first frame on the tree is followed, in the
-/// region and off the sky between its branches.
+/// The strokes of `tests/matting` lie on a part of the first frame; from the first frame on the
+/// tree is followed, in the region and off the sky between its branches.
 #[test]
 fn scribbles_are_solved_on_the_first_picture() {
-    let strokes = image::open("tests/matting/scribbles.png").expect("scribbles").into_luma8();
+    let strokes = image::open("tests/matting/scribbles.png")
+        .expect("scribbles")
+        .into_luma8();
     let mut marks = vec![Mark::Undecided; support::SIZE.area()];
     for (u, v, shade) in strokes.enumerate_pixels() {
         marks[((v + 60) * support::SIZE.width + u + 180) as usize] = match shade.0[0] {
@@ -278,23 +384,57 @@ fn scribbles_are_solved_on_the_first_picture() {
             _ => Mark::Undecided,
         };
     }
-    let scribbles = Scribbles { name: "strokes".into(), size: support::SIZE, marks: marks.clone() };
+    let scribbles = Scribbles {
+        name: "strokes".into(),
+        size: support::SIZE,
+        marks: marks.clone(),
+    };
     let dir = tempfile::tempdir().expect("tempdir");
     let out = dir.path().join("out");
     let given = Some(Given::Scribbles(scribbles));
-    let (summary, failure, warnings) =
-        run(fake(false, |n| Ok(frame(n))), Job { outline: given, ..job(None, Some(&out)) });
-    assert!(failure.is_none() && !warnings.iter().any(|w| w.contains("strokes")), "{failure:?} {warnings:?}");
-    assert_eq!(tracks(&out).first().map(|t| t.1), Some(0), "from the first frame on");
-    let outline = summary.expect("a summary").tree.expect("a tree").outline.clone();
+    let (summary, failure, warnings) = run(
+        fake(false, |n| Ok(frame(n))),
+        Job {
+            outline: given,
+            ..job(None, Some(&out))
+        },
+    );
+    assert!(
+        failure.is_none() && !warnings.iter().any(|w| w.contains("strokes")),
+        "{failure:?} {warnings:?}"
+    );
+    assert_eq!(
+        tracks(&out).first().map(|t| t.1),
+        Some(0),
+        "from the first frame on"
+    );
+    let outline = summary
+        .expect("a summary")
+        .tree
+        .expect("a tree")
+        .outline
+        .clone();
     let matte = outline.matte.as_ref().expect("a matte");
-    assert!(marks.iter().zip(matte).all(|(mark, alpha)| *mark != Mark::Tree || *alpha == 255));
+    assert!(
+        marks
+            .iter()
+            .zip(matte)
+            .all(|(mark, alpha)| *mark != Mark::Tree || *alpha == 255)
+    );
     let drawn = support::outline();
     let count = |both: fn(bool, bool) -> bool| {
-        outline.mask.iter().zip(&drawn.mask).filter(|(a, b)| both(**a != 0, **b != 0)).count() as f64
+        outline
+            .mask
+            .iter()
+            .zip(&drawn.mask)
+            .filter(|(a, b)| both(**a != 0, **b != 0))
+            .count() as f64
     };
     let iou = count(|a, b| a && b) / count(|a, b| a || b);
-    assert!(iou >= 0.5, "{iou:.2} with the outline that a person drew, which is wider");
+    assert!(
+        iou >= 0.5,
+        "{iou:.2} with the outline that a person drew, which is wider"
+    );
 }
 
 #[test]
@@ -305,12 +445,18 @@ fn export_writes_a_capture_and_goes_on() {
     assert_eq!(warnings, Vec::<String>::new(), "a notice is no warning");
     let last = |dir: &Path| tracks(dir).iter().map(|t| t.1).max().expect("tracks");
     let exported = last(&dir.path().join("capture-1"));
-    assert!((270..=281).contains(&exported), "exported up to frame {exported}");
+    assert!(
+        (270..=281).contains(&exported),
+        "exported up to frame {exported}"
+    );
     assert!(dir.path().join("capture-1/tree.glb").exists());
     let picture = |dir: &std::path::Path| std::fs::read(dir.join("frame.jpg")).expect("picture");
     let first = picture(&dir.path().join("capture-1"));
     assert_eq!((last(&out), summary.frames), (329, 330), "frames go on");
-    assert!(first == picture(&out), "it is one picture, however often a capture is written");
+    assert!(
+        first == picture(&out),
+        "it is one picture, however often a capture is written"
+    );
 }
 
 #[test]
@@ -318,14 +464,20 @@ fn quit_ends_with_a_whole_capture() {
     let dir = tempfile::tempdir().expect("tempdir");
     let out = dir.path().join("out");
     let (summary, _) = wish(200, &[Control::Quit], &out);
-    assert!((200..=201).contains(&summary.frames), "{} frames", summary.frames);
+    assert!(
+        (200..=201).contains(&summary.frames),
+        "{} frames",
+        summary.frames
+    );
     assert!(summary.written.expect("written").tree.is_some() && out.join("tree.glb").exists());
 }
 
-/// Whoever stops is not kept waiting while the whole film is written once more for a tree that is seconds old; a planned
-/// end has the time. Either way all files are of one tree, and the closing lines speak of that one.
+/// Whoever stops is not kept waiting while the whole film is written once more for a tree that is
+/// seconds old; a planned end has the time. Either way all files are of one tree, and the closing
+/// lines speak of that one.
 #[test]
-fn a_stop_right_after_a_refinement_is_written_by_the_tree_from_before_and_a_planned_end_by_the_newest() {
+fn a_stop_right_after_a_refinement_is_written_by_the_tree_from_before_and_a_planned_end_by_the_newest()
+ {
     for planned in [false, true] {
         let dir = tempfile::tempdir().expect("tempdir");
         let out = dir.path().join("out");
@@ -334,7 +486,9 @@ fn a_stop_right_after_a_refinement_is_written_by_the_tree_from_before_and_a_plan
         let mut job = job(Some(support::outline()), Some(&out));
         (job.config.accumulate.min_s, job.config.accumulate.threshold) = (4.0, 0.2);
         let running = runtime::start(source, job).expect("start");
-        gate.reached.recv_timeout(HANGS).expect("the gate is reached");
+        gate.reached
+            .recv_timeout(HANGS)
+            .expect("the gate is reached");
         let begun = Instant::now();
         let shown = loop {
             assert!(begun.elapsed() < HANGS, "the model hangs");
@@ -343,7 +497,14 @@ fn a_stop_right_after_a_refinement_is_written_by_the_tree_from_before_and_a_plan
                 break shown;
             }
         };
-        assert!(shown.messages.iter().any(|m| m.contains("the tree was refined")), "{:?}", shown.messages);
+        assert!(
+            shown
+                .messages
+                .iter()
+                .any(|m| m.contains("the tree was refined")),
+            "{:?}",
+            shown.messages
+        );
         if planned {
             running.end()
         } else {
@@ -353,17 +514,34 @@ fn a_stop_right_after_a_refinement_is_written_by_the_tree_from_before_and_a_plan
         let (summary, failure, _) = ended(running);
         assert!(failure.is_none(), "{failure:?}");
         let tree = summary.expect("a summary").tree.expect("a tree");
-        assert_eq!(tree.refinements > 0, planned, "{} refinements", tree.refinements);
+        assert_eq!(
+            tree.refinements > 0,
+            planned,
+            "{} refinements",
+            tree.refinements
+        );
         let capture: serde_json::Value =
-            serde_json::from_slice(&std::fs::read(out.join("capture.json")).expect("capture.json")).expect("json");
-        assert_eq!(capture["refinement"]["count"].as_u64(), planned.then_some(tree.refinements.into()));
+            serde_json::from_slice(&std::fs::read(out.join("capture.json")).expect("capture.json"))
+                .expect("json");
+        assert_eq!(
+            capture["refinement"]["count"].as_u64(),
+            planned.then_some(tree.refinements.into())
+        );
         let certainty = tree.hierarchy.median_certainty().map(|c| format!("{c:.6}"));
-        assert_eq!(capture["quality"]["median_certainty"].as_f64().map(|c| format!("{c:.6}")), certainty);
+        assert_eq!(
+            capture["quality"]["median_certainty"]
+                .as_f64()
+                .map(|c| format!("{c:.6}")),
+            certainty
+        );
         let nodes = std::fs::read_to_string(out.join("nodes.csv")).expect("nodes.csv");
         assert_eq!(nodes.lines().count(), 1 + tree.skeleton.nodes.len());
         let mut frames: Vec<u64> = tracks(&out).iter().map(|t| t.1).collect();
         frames.dedup();
-        assert!(frames.iter().copied().eq(0..frames.len() as u64) && frames.len() >= 240, "every frame has its rows");
+        assert!(
+            frames.iter().copied().eq(0..frames.len() as u64) && frames.len() >= 240,
+            "every frame has its rows"
+        );
     }
 }
 
@@ -371,35 +549,57 @@ fn a_stop_right_after_a_refinement_is_written_by_the_tree_from_before_and_a_plan
 fn pause_stops_a_replay_and_loses_nothing() {
     let (source, gate) = gated(50);
     let running = runtime::start(source, job(Some(support::outline()), None)).expect("start");
-    gate.reached.recv_timeout(HANGS).expect("the gate is reached");
+    gate.reached
+        .recv_timeout(HANGS)
+        .expect("the gate is reached");
     running.send(Control::Pause(true));
     gate.open.send(()).expect("the source waits");
-    // Time enough to take many frames for one that is not paused; a paused one takes none however long it waits.
+    // Time enough to take many frames for one that is not paused; a paused one takes none however
+    // long it waits.
     std::thread::sleep(Duration::from_millis(400));
-    assert_eq!(gate.taken.load(Ordering::SeqCst), 50, "a paused replay goes on");
+    assert_eq!(
+        gate.taken.load(Ordering::SeqCst),
+        50,
+        "a paused replay goes on"
+    );
     running.send(Control::Pause(false));
     let (summary, failure, _) = ended(running);
     assert!(failure.is_none());
     assert_eq!(summary.expect("a summary").frames, 330);
 }
 
-/// A camera does not wait. What the tracker has no time for is dropped, the oldest first, and counted.
+/// A camera does not wait. What the tracker has no time for is dropped, the oldest first, and
+/// counted.
 #[test]
 fn a_camera_that_is_too_fast_loses_frames_and_says_how_many() {
     let dir = tempfile::tempdir().expect("tempdir");
     let out = dir.path().join("out");
-    let live = Job { pace: Pace::Live, ..job(Some(support::outline()), Some(&out)) };
+    let live = Job {
+        pace: Pace::Live,
+        ..job(Some(support::outline()), Some(&out))
+    };
     let (summary, failure, _) = run(fake(true, |n| Ok(frame(n))), live);
     assert!(failure.is_none());
     let capture: serde_json::Value =
-        serde_json::from_slice(&std::fs::read(out.join("capture.json")).expect("capture.json")).expect("json");
-    let dropped = capture["timing"]["frames_dropped_tracker"].as_u64().expect("count");
+        serde_json::from_slice(&std::fs::read(out.join("capture.json")).expect("capture.json"))
+            .expect("json");
+    let dropped = capture["timing"]["frames_dropped_tracker"]
+        .as_u64()
+        .expect("count");
     let mut frames: Vec<u64> = tracks(&out).iter().map(|t| t.1).collect();
     assert!(frames.is_sorted(), "never back in time");
     frames.dedup();
     assert!(dropped > 0, "without a loss this shows nothing");
-    assert_eq!(frames.len() as u64 + dropped, 330, "each frame is either followed or counted as lost");
-    assert!(frames.ends_with(&[327, 328, 329]), "the newest are kept: {:?}", frames.last());
+    assert_eq!(
+        frames.len() as u64 + dropped,
+        330,
+        "each frame is either followed or counted as lost"
+    );
+    assert!(
+        frames.ends_with(&[327, 328, 329]),
+        "the newest are kept: {:?}",
+        frames.last()
+    );
     assert_eq!(summary.expect("a summary").frames, 330);
 }
 
@@ -408,31 +608,58 @@ fn a_camera_that_is_too_fast_loses_frames_and_says_how_many() {
 fn frames_that_the_camera_lost_are_counted_with_their_place() {
     let dir = tempfile::tempdir().expect("tempdir");
     let out = dir.path().join("out");
-    let (_, failure, _) =
-        run(fake(false, |n| Ok(frame(if n < 40 { n } else { n + 5 }))), job(Some(support::outline()), Some(&out)));
+    let (_, failure, _) = run(
+        fake(false, |n| Ok(frame(if n < 40 { n } else { n + 5 }))),
+        job(Some(support::outline()), Some(&out)),
+    );
     assert!(failure.is_none());
     let capture: serde_json::Value =
-        serde_json::from_slice(&std::fs::read(out.join("capture.json")).expect("capture.json")).expect("json");
+        serde_json::from_slice(&std::fs::read(out.join("capture.json")).expect("capture.json"))
+            .expect("json");
     assert_eq!(capture["timing"]["frames_dropped_camera"], 5);
     assert_eq!(capture["timing"]["gaps"][0]["after_frame"], 39);
-    assert_eq!(tracks(&out).last().map(|t| t.1), Some(329), "later frames keep their places in time");
+    assert_eq!(
+        tracks(&out).last().map(|t| t.1),
+        Some(329),
+        "later frames keep their places in time"
+    );
 }
 
 fn unplugged() -> SourceError {
-    SourceError::Disconnected { input: "fake".into(), reason: "test".into() }
+    SourceError::Disconnected {
+        input: "fake".into(),
+        reason: "test".into(),
+    }
 }
 
-/// Ends that nobody wanted: each is reported as what it is, and what was captured until then is written.
+/// Ends that nobody wanted: each is reported as what it is, and what was captured until then is
+/// written.
 #[test]
 fn a_bad_end_is_reported_and_keeps_what_was_captured() {
-    let small = |n: u64| frame(n).map(|raw| RawFrame { size: Size::new(320, 180), ..raw });
-    let broken =
-        |n: u64| frame(n).map(|raw| RawFrame { bytes: b"not a picture".to_vec(), format: PixelFormat::Mjpeg, ..raw });
+    let small = |n: u64| {
+        frame(n).map(|raw| RawFrame {
+            size: Size::new(320, 180),
+            ..raw
+        })
+    };
+    let broken = |n: u64| {
+        frame(n).map(|raw| RawFrame {
+            bytes: b"not a picture".to_vec(),
+            format: PixelFormat::Mjpeg,
+            ..raw
+        })
+    };
     type End = (&'static str, Script, fn(&Failure) -> bool, u64);
     let ends: [End; 4] = [
         (
             "unplugged",
-            Box::new(|n| if n < 150 { Ok(frame(n)) } else { Err(unplugged()) }),
+            Box::new(|n| {
+                if n < 150 {
+                    Ok(frame(n))
+                } else {
+                    Err(unplugged())
+                }
+            }),
             |f| matches!(f, Failure::Source(SourceError::Disconnected { .. })),
             150,
         ),
@@ -444,19 +671,40 @@ fn a_bad_end_is_reported_and_keeps_what_was_captured() {
         ),
         (
             "a panic",
-            Box::new(|n| if n < 150 { Ok(frame(n)) } else { panic!("test") }),
+            Box::new(|n| {
+                if n < 150 {
+                    Ok(frame(n))
+                } else {
+                    panic!("test")
+                }
+            }),
             |f| matches!(f, Failure::Panicked),
             150,
         ),
-        ("no picture at all", Box::new(move |n| Ok(broken(n))), |f| matches!(f, Failure::NothingDecoded(_)), 0),
+        (
+            "no picture at all",
+            Box::new(move |n| Ok(broken(n))),
+            |f| matches!(f, Failure::NothingDecoded(_)),
+            0,
+        ),
     ];
     for (name, script, expected, frames) in ends {
         let dir = tempfile::tempdir().expect("tempdir");
         let out = dir.path().join("out");
-        let source = Box::new(Fake { next: 0, live: false, script });
+        let source = Box::new(Fake {
+            next: 0,
+            live: false,
+            script,
+        });
         let (summary, failure, _) = run(source, job(Some(support::outline()), Some(&out)));
-        assert!(failure.as_ref().is_some_and(expected), "{name}: {failure:?}");
-        assert!(summary.is_some_and(|s| s.written.is_some() && s.tree.is_some() == (frames > 0)), "{name}");
+        assert!(
+            failure.as_ref().is_some_and(expected),
+            "{name}: {failure:?}"
+        );
+        assert!(
+            summary.is_some_and(|s| s.written.is_some() && s.tree.is_some() == (frames > 0)),
+            "{name}"
+        );
         assert_eq!(tracks(&out).last().map_or(0, |t| t.1 + 1), frames, "{name}");
     }
 }
@@ -476,7 +724,12 @@ fn damaged_frames_are_left_out_and_counted() {
     });
     let (summary, failure, warnings) = run(source, job(Some(support::outline()), Some(&out)));
     assert!(failure.is_none() && summary.is_some_and(|s| s.tree.is_some()));
-    assert!(warnings.iter().any(|w| w.contains("frame 7 ") && w.contains("damaged")), "{warnings:?}");
+    assert!(
+        warnings
+            .iter()
+            .any(|w| w.contains("frame 7 ") && w.contains("damaged")),
+        "{warnings:?}"
+    );
     let text = std::fs::read_to_string(out.join("capture.json")).expect("capture.json");
     assert!(text.contains("\"frames_undecodable\": 7"), "{text}");
 }
@@ -487,7 +740,11 @@ fn a_worker_that_fails_does_not_make_the_run_hang() {
     struct Failing(bool);
     impl Write for Failing {
         fn write(&mut self, _: &[u8]) -> io::Result<usize> {
-            if self.0 { panic!("test") } else { Err(io::Error::other("no more room")) }
+            if self.0 {
+                panic!("test")
+            } else {
+                Err(io::Error::other("no more room"))
+            }
         }
         fn flush(&mut self) -> io::Result<()> {
             Ok(())
@@ -495,16 +752,30 @@ fn a_worker_that_fails_does_not_make_the_run_hang() {
     }
     for panics in [false, true] {
         let stream: Box<dyn Write + Send> = Box::new(Failing(panics));
-        let job = Job { stream: Some(stream), ..job(Some(support::outline()), None) };
+        let job = Job {
+            stream: Some(stream),
+            ..job(Some(support::outline()), None)
+        };
         // A source without an end: only an ended run ends it.
         let endless = fake(true, |n| {
             let mut raw = frame(n % 330);
-            raw.iter_mut().for_each(|f| (f.sequence, f.sensor_time_s) = (Some(n), n as f64 / 30.0));
+            raw.iter_mut()
+                .for_each(|f| (f.sequence, f.sensor_time_s) = (Some(n), n as f64 / 30.0));
             Ok(raw)
         });
         let (summary, failure, warnings) = run(endless, job);
-        assert_eq!(matches!(failure, Some(Failure::Panicked)), panics, "{failure:?}");
+        assert_eq!(
+            matches!(failure, Some(Failure::Panicked)),
+            panics,
+            "{failure:?}"
+        );
         assert_eq!(summary.is_none(), panics);
-        assert_eq!(warnings.iter().any(|w| w.contains("stream of poses has ended")), !panics, "{warnings:?}");
+        assert_eq!(
+            warnings
+                .iter()
+                .any(|w| w.contains("stream of poses has ended")),
+            !panics,
+            "{warnings:?}"
+        );
     }
 }

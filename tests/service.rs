@@ -1,4 +1,5 @@
-//! The service: what a service manager is told, what a hang-up does, what the unit's helper does, what is installed.
+//! The service: what a service manager is told, what a hang-up does, what the unit's helper does,
+//! what is installed.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -12,7 +13,10 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 const CLIP: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/sparse_winter.mkv");
-const OUTLINE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/sparse_winter.outline.json");
+const OUTLINE: &str = concat!(
+    env!("CARGO_MANIFEST_DIR"),
+    "/recordings/sparse_winter.outline.json"
+);
 /// Longest wait for anything here.
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -28,7 +32,9 @@ impl Drop for Running {
 
 impl Running {
     fn signal(&self, signal: &str) {
-        let status = Command::new("kill").args([signal, &self.0.id().to_string()]).status();
+        let status = Command::new("kill")
+            .args([signal, &self.0.id().to_string()])
+            .status();
         assert!(status.expect("kill").success());
     }
 
@@ -51,38 +57,70 @@ impl Manager {
         let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
         let dir = tempfile::tempdir().expect("tempdir");
         let socket = UnixDatagram::bind(dir.path().join("notify")).expect("socket");
-        Self { dir, socket, _alone }
+        Self {
+            dir,
+            socket,
+            _alone,
+        }
     }
 
     fn at(&self, name: &str) -> PathBuf {
         self.dir.path().join(name)
     }
 
-    /// A replay at its own pace, in a session of its own and so without a terminal, with a watchdog of 4 s.
+    /// A replay at its own pace, in a session of its own and so without a terminal, with a watchdog
+    /// of 4 s.
     fn start(&self, more: &[&str]) -> Running {
         let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
-        command.args(["replay", CLIP, "--outline", OUTLINE, "--headless", "--out"]).arg(self.at("out")).args(more);
-        command.env("NOTIFY_SOCKET", self.at("notify")).env("WATCHDOG_USEC", "4000000").env_remove("WATCHDOG_PID");
-        command.stdin(Stdio::null()).stderr(fs::File::create(self.at("stderr")).expect("file"));
+        command
+            .args(["replay", CLIP, "--outline", OUTLINE, "--headless", "--out"])
+            .arg(self.at("out"))
+            .args(more);
+        command
+            .env("NOTIFY_SOCKET", self.at("notify"))
+            .env("WATCHDOG_USEC", "4000000")
+            .env_remove("WATCHDOG_PID");
+        command
+            .stdin(Stdio::null())
+            .stderr(fs::File::create(self.at("stderr")).expect("file"));
         // SAFETY: setsid is safe to call between fork and exec.
         unsafe {
-            command.pre_exec(|| if libc::setsid() < 0 { Err(std::io::Error::last_os_error()) } else { Ok(()) });
+            command.pre_exec(|| {
+                if libc::setsid() < 0 {
+                    Err(std::io::Error::last_os_error())
+                } else {
+                    Ok(())
+                }
+            });
         }
         Running(command.spawn().expect("arborcam"))
     }
 
-    /// Lines that come until one begins with `wanted`, that one included; with `None` those of a time.
+    /// Lines that come until one begins with `wanted`, that one included; with `None` those of a
+    /// time.
     fn hear(&self, wanted: Option<&str>, limit: Duration) -> Vec<String> {
         let (until, mut heard, mut bytes) = (Instant::now() + limit, Vec::new(), [0; 4096]);
         loop {
             let left = until.saturating_duration_since(Instant::now());
             if left.is_zero() {
-                assert!(wanted.is_none(), "no {wanted:?} in {heard:#?}; {}", self.stderr());
+                assert!(
+                    wanted.is_none(),
+                    "no {wanted:?} in {heard:#?}; {}",
+                    self.stderr()
+                );
                 return heard;
             }
-            self.socket.set_read_timeout(Some(left)).expect("time limit");
-            let Ok(n) = self.socket.recv(&mut bytes) else { continue };
-            heard.extend(String::from_utf8_lossy(&bytes[..n]).lines().map(str::to_owned));
+            self.socket
+                .set_read_timeout(Some(left))
+                .expect("time limit");
+            let Ok(n) = self.socket.recv(&mut bytes) else {
+                continue;
+            };
+            heard.extend(
+                String::from_utf8_lossy(&bytes[..n])
+                    .lines()
+                    .map(str::to_owned),
+            );
             if wanted.is_some_and(|w| heard.iter().any(|line| line.starts_with(w))) {
                 return heard;
             }
@@ -103,17 +141,34 @@ fn ready_when_frames_flow_alive_while_they_do_and_stopping_while_it_writes() {
     let manager = Manager::new();
     let running = manager.start(&[]);
     let before = manager.hear(Some("READY=1"), PATIENCE);
-    assert!(!holds(&before, "WATCHDOG=1"), "alive before a frame came: {before:?}");
+    assert!(
+        !holds(&before, "WATCHDOG=1"),
+        "alive before a frame came: {before:?}"
+    );
     let flowing = manager.hear(None, Duration::from_secs(3));
-    assert!(flowing.iter().filter(|l| *l == "WATCHDOG=1").count() >= 2, "{flowing:?}");
-    let state = flowing.iter().rev().find_map(|l| l.strip_prefix("STATUS=")).expect("a line of state");
-    assert!(state.contains(" a second, 0 lost, ") && state.contains(" points"), "{state}");
+    assert!(
+        flowing.iter().filter(|l| *l == "WATCHDOG=1").count() >= 2,
+        "{flowing:?}"
+    );
+    let state = flowing
+        .iter()
+        .rev()
+        .find_map(|l| l.strip_prefix("STATUS="))
+        .expect("a line of state");
+    assert!(
+        state.contains(" a second, 0 lost, ") && state.contains(" points"),
+        "{state}"
+    );
     let asked = Instant::now();
     running.signal("-TERM");
     let ending = manager.hear(Some("STOPPING=1"), PATIENCE);
     assert!(!holds(&ending, "READY=1"), "{ending:?}");
     assert_eq!(running.end(), Some(130), "{}", manager.stderr());
-    assert!(asked.elapsed() < Duration::from_secs(2), "the end took {:?}", asked.elapsed());
+    assert!(
+        asked.elapsed() < Duration::from_secs(2),
+        "the end took {:?}",
+        asked.elapsed()
+    );
     assert!(manager.at("out/capture.json").is_file() && manager.at("out/tracks.csv").is_file());
 }
 
@@ -125,7 +180,10 @@ fn a_program_that_hangs_gives_no_sign_of_life() {
     manager.hear(Some("WATCHDOG=1"), PATIENCE);
     running.signal("-STOP");
     manager.hear(None, Duration::from_millis(200));
-    assert_eq!(manager.hear(None, Duration::from_secs(2)), Vec::<String>::new());
+    assert_eq!(
+        manager.hear(None, Duration::from_secs(2)),
+        Vec::<String>::new()
+    );
     running.signal("-CONT");
     manager.hear(Some("WATCHDOG=1"), PATIENCE);
 }
@@ -162,7 +220,12 @@ fn a_hang_up_without_a_terminal_reads_the_settings_again() {
     reload("[camera]\ntimeout_s = 2.5\n[detect]\npoints = 50\n");
     reload("[camera]\ntimeout_s = -2.0\n");
     running.signal("-TERM");
-    assert_eq!(running.end(), Some(130), "a hang-up must not end it: {}", manager.stderr());
+    assert_eq!(
+        running.end(),
+        Some(130),
+        "a hang-up must not end it: {}",
+        manager.stderr()
+    );
     let said = manager.stderr();
     for line in [
         "reload: camera.timeout_s is now 2.5 (was 3.5)",
@@ -172,9 +235,16 @@ fn a_hang_up_without_a_terminal_reads_the_settings_again() {
         assert!(said.contains(line), "no {line:?} in {said}");
     }
     let capture: serde_json::Value =
-        serde_json::from_str(&fs::read_to_string(manager.at("out/capture.json")).expect("capture")).expect("JSON");
+        serde_json::from_str(&fs::read_to_string(manager.at("out/capture.json")).expect("capture"))
+            .expect("JSON");
     let config = &capture["config"];
-    assert_eq!((config["camera"]["timeout_s"].as_f64(), config["detect"]["points"].as_u64()), (Some(2.5), Some(400)));
+    assert_eq!(
+        (
+            config["camera"]["timeout_s"].as_f64(),
+            config["detect"]["points"].as_u64()
+        ),
+        (Some(2.5), Some(400))
+    );
 }
 
 /// The unit's helper, with a program that only says how it was called.
@@ -198,10 +268,19 @@ impl Helper {
         let at = |name: &str| self.dir.path().join(name);
         let mut command = Command::new("systemd/arborcam-service");
         command.args([verb, "/dev/v4l/by-id/usb-A_cam-video-index0"]);
-        command.env("STATE_DIRECTORY", at("state")).env("RUNTIME_DIRECTORY", at("run"));
-        command.env("ARBORCAM_BIN", at("arborcam")).env("ARBORCAM_LENGTH_S", "300").envs(set.iter().copied());
+        command
+            .env("STATE_DIRECTORY", at("state"))
+            .env("RUNTIME_DIRECTORY", at("run"));
+        command
+            .env("ARBORCAM_BIN", at("arborcam"))
+            .env("ARBORCAM_LENGTH_S", "300")
+            .envs(set.iter().copied());
         let output = command.output().expect("helper");
-        assert!(output.status.success(), "{verb}: {}", String::from_utf8_lossy(&output.stderr));
+        assert!(
+            output.status.success(),
+            "{verb}: {}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         output
     }
 
@@ -213,15 +292,41 @@ impl Helper {
 #[test]
 fn each_start_names_its_own_capture() {
     let helper = Helper::new();
-    let output = helper.run("run", &[("ARBORCAM_RECORD", "yes"), ("ARBORCAM_ARGS", "--config /etc/arborcam/a.toml")]);
+    let output = helper.run(
+        "run",
+        &[
+            ("ARBORCAM_RECORD", "yes"),
+            ("ARBORCAM_ARGS", "--config /etc/arborcam/a.toml"),
+        ],
+    );
     let said = String::from_utf8(output.stdout).expect("text");
     let words: Vec<&str> = said.lines().collect();
     let state = helper.state().display().to_string();
-    assert_eq!(words[..4], ["capture", "/dev/v4l/by-id/usb-A_cam-video-index0", "--headless", "--out"]);
-    let name = words[4].strip_prefix(&format!("{state}/")).expect("in the state folder");
-    assert!(name.len() == 20 && name.ends_with('Z') && name.as_bytes()[10] == b'T', "{name}");
+    assert_eq!(
+        words[..4],
+        [
+            "capture",
+            "/dev/v4l/by-id/usb-A_cam-video-index0",
+            "--headless",
+            "--out"
+        ]
+    );
+    let name = words[4]
+        .strip_prefix(&format!("{state}/"))
+        .expect("in the state folder");
+    assert!(
+        name.len() == 20 && name.ends_with('Z') && name.as_bytes()[10] == b'T',
+        "{name}"
+    );
     let recording = format!("{}.mcap", words[4]);
-    let expected = ["--for", "300", "--record", recording.as_str(), "--config", "/etc/arborcam/a.toml"];
+    let expected = [
+        "--for",
+        "300",
+        "--record",
+        recording.as_str(),
+        "--config",
+        "/etc/arborcam/a.toml",
+    ];
     assert_eq!(words[5..], expected);
 }
 
@@ -231,7 +336,11 @@ fn the_oldest_captures_make_room_and_nothing_else_does() {
     let helper = Helper::new();
     let mine = ["2024-01-01T00-00-00Z", "2024-01-02T00-00-00Z"];
     let kept = ["the good one", "2024-01-01T00-00-00Z keep", "notes.mcap"];
-    for name in mine.iter().chain(&kept).chain(&[".2024-01-03T00-00-00Z.partial-17"]) {
+    for name in mine
+        .iter()
+        .chain(&kept)
+        .chain(&[".2024-01-03T00-00-00Z.partial-17"])
+    {
         fs::create_dir_all(helper.state().join(name)).expect("folder");
     }
     fs::write(helper.state().join("2024-01-01T00-00-00Z.mcap"), "").expect("file");
@@ -239,17 +348,30 @@ fn the_oldest_captures_make_room_and_nothing_else_does() {
     fs::write(helper.state().join("2023-12-31T00-00-00Z.mcap"), "").expect("file");
     let names = || -> BTreeSet<String> {
         let entries = fs::read_dir(helper.state()).expect("folder").flatten();
-        entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect()
+        entries
+            .map(|e| e.file_name().to_string_lossy().into_owned())
+            .collect()
     };
     helper.run("before", &[("ARBORCAM_KEEP_FREE_MB", "1")]);
-    assert_eq!(names().len(), 7, "there is room, and only the half-written one goes: {:?}", names());
+    assert_eq!(
+        names().len(),
+        7,
+        "there is room, and only the half-written one goes: {:?}",
+        names()
+    );
     helper.run("before", &[("ARBORCAM_KEEP_FREE_MB", "0")]);
     assert_eq!(names().len(), 7, "told to remove nothing");
     let output = helper.run("before", &[("ARBORCAM_KEEP_FREE_MB", "999999999999")]);
     assert_eq!(names(), kept.iter().map(|k| (*k).to_owned()).collect());
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    let at = |what: &str| said.find(what).unwrap_or_else(|| panic!("no {what} in {said}"));
-    assert!(at("2023-12-31") < at("2024-01-01") && at("2024-01-01") < at("2024-01-02"), "oldest first: {said}");
+    let at = |what: &str| {
+        said.find(what)
+            .unwrap_or_else(|| panic!("no {what} in {said}"))
+    };
+    assert!(
+        at("2023-12-31") < at("2024-01-01") && at("2024-01-01") < at("2024-01-02"),
+        "oldest first: {said}"
+    );
     assert!(said.contains("no older capture is left"), "{said}");
 }
 
@@ -258,7 +380,14 @@ fn the_oldest_captures_make_room_and_nothing_else_does() {
 fn failures_are_counted_until_something_works() {
     let helper = Helper::new();
     let file = helper.dir.path().join("run/failures");
-    let count = || fs::read_to_string(&file).expect("count").split(' ').next().map(str::to_owned).expect("number");
+    let count = || {
+        fs::read_to_string(&file)
+            .expect("count")
+            .split(' ')
+            .next()
+            .map(str::to_owned)
+            .expect("number")
+    };
     for n in ["1", "2", "3"] {
         helper.run("run", &[]);
         helper.run("after", &[("SERVICE_RESULT", "exit-code")]);
@@ -272,7 +401,10 @@ fn failures_are_counted_until_something_works() {
     assert_eq!(count(), "0");
     let began = Instant::now();
     helper.run("before", &[]);
-    assert!(began.elapsed() < Duration::from_secs(4), "no pause without a failure");
+    assert!(
+        began.elapsed() < Duration::from_secs(4),
+        "no pause without a failure"
+    );
 }
 
 const INSTALLED: &[&str] = &[
@@ -304,28 +436,58 @@ const INSTALLED: &[&str] = &[
 fn make(goal: &str, root: &Path) {
     let binary = format!("BINARY={}", env!("CARGO_BIN_EXE_arborcam"));
     let root = format!("DESTDIR={}", root.display());
-    let output = Command::new("make").args(["-s", goal, "PREFIX=/usr", &root, &binary]).output().expect("make");
-    assert!(output.status.success(), "make {goal}: {}", String::from_utf8_lossy(&output.stderr));
+    let output = Command::new("make")
+        .args(["-s", goal, "PREFIX=/usr", &root, &binary])
+        .output()
+        .expect("make");
+    assert!(
+        output.status.success(),
+        "make {goal}: {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
 }
 
 fn files(root: &Path) -> BTreeSet<String> {
-    let found = Command::new("find").arg(root).args(["-type", "f", "-printf", "%P\\n"]).output().expect("find");
-    String::from_utf8(found.stdout).expect("names").lines().map(str::to_owned).collect()
+    let found = Command::new("find")
+        .arg(root)
+        .args(["-type", "f", "-printf", "%P\\n"])
+        .output()
+        .expect("find");
+    String::from_utf8(found.stdout)
+        .expect("names")
+        .lines()
+        .map(str::to_owned)
+        .collect()
 }
 
 #[test]
 fn install_puts_every_part_in_its_place_and_uninstall_takes_all_of_it_away() {
     let root = tempfile::tempdir().expect("tempdir");
     make("install", root.path());
-    assert_eq!(files(root.path()), INSTALLED.iter().map(|f| (*f).to_owned()).collect());
-    let mode = |name: &str| fs::metadata(root.path().join(name)).expect("file").permissions().mode() & 0o777;
+    assert_eq!(
+        files(root.path()),
+        INSTALLED.iter().map(|f| (*f).to_owned()).collect()
+    );
+    let mode = |name: &str| {
+        fs::metadata(root.path().join(name))
+            .expect("file")
+            .permissions()
+            .mode()
+            & 0o777
+    };
     for name in INSTALLED {
         let runs = name.starts_with("usr/bin/") || name.ends_with("arborcam-service");
         assert_eq!(mode(name), if runs { 0o755 } else { 0o644 }, "{name}");
     }
-    for name in ["usr/lib/systemd/system/arborcam@.service", "usr/lib/arborcam/arborcam-service"] {
+    for name in [
+        "usr/lib/systemd/system/arborcam@.service",
+        "usr/lib/arborcam/arborcam-service",
+    ] {
         let text = fs::read_to_string(root.path().join(name)).expect("file");
-        assert!(!text.contains("@PREFIX@") && text.contains("/usr/"), "{name}");
+        assert!(
+            !text.contains("@PREFIX@") && text.contains("/usr/"),
+            "{name}"
+        );
     }
     unit_is_clean_and_tight(root.path());
     make("uninstall", root.path());
@@ -343,13 +505,27 @@ fn unit_is_clean_and_tight(root: &Path) {
     let text = fs::read_to_string(&unit).expect("unit");
     // An instance whose programs are where verify can find them.
     let instance = root.join("arborcam@video0.service");
-    fs::write(&instance, text.replace("=/usr/lib/arborcam", &format!("={}/usr/lib/arborcam", root.display())))
-        .expect("unit");
+    fs::write(
+        &instance,
+        text.replace(
+            "=/usr/lib/arborcam",
+            &format!("={}/usr/lib/arborcam", root.display()),
+        ),
+    )
+    .expect("unit");
     let verified = analyze(&["verify", instance.to_str().expect("path")]).expect("systemd-analyze");
     let said = String::from_utf8_lossy(&verified.stderr).into_owned();
-    assert!(verified.status.success() && said.trim().is_empty(), "{said}");
-    let scored =
-        analyze(&["security", "--offline=true", "--threshold=20", instance.to_str().expect("path")]).expect("analyze");
+    assert!(
+        verified.status.success() && said.trim().is_empty(),
+        "{said}"
+    );
+    let scored = analyze(&[
+        "security",
+        "--offline=true",
+        "--threshold=20",
+        instance.to_str().expect("path"),
+    ])
+    .expect("analyze");
     let said = String::from_utf8_lossy(&scored.stdout).into_owned();
     fs::remove_file(&instance).expect("remove");
     assert!(scored.status.success(), "exposure above 2.0: {said}");

@@ -23,64 +23,128 @@ fn go_on(new: &Flat, old: &Skeleton, measured: &[Option<Twin>]) -> GoesOn {
     let settings = config::Shape::default();
     let anew = shape::build(&new.nodes, &new.tracks, &new.outline, &settings);
     let prototype = Prototype::of(&new.nodes, &new.tracks, &new.outline, &settings);
-    let (tree, held) = shape::go_on(&anew, old, &twins(&anew, old, measured), &prototype, &settings);
-    GoesOn { tree, held, anew, width: prototype.envelope.width() }
+    let (tree, held) = shape::go_on(
+        &anew,
+        old,
+        &twins(&anew, old, measured),
+        &prototype,
+        &settings,
+    );
+    GoesOn {
+        tree,
+        held,
+        anew,
+        width: prototype.envelope.width(),
+    }
 }
 
 /// Filling and plausibility.
 fn figures(tree: &Skeleton, flat: &Flat) -> [f64; 2] {
-    let figures = PushFigures::of(tree, &flat.nodes, &flat.tracks, &flat.outline, &config::Shape::default());
+    let figures = PushFigures::of(
+        tree,
+        &flat.nodes,
+        &flat.tracks,
+        &flat.outline,
+        &config::Shape::default(),
+    );
     [figures.filling(), figures.plausibility()]
 }
 
 fn stood_up(flat: &Flat) -> Skeleton {
-    shape::build(&flat.nodes, &flat.tracks, &flat.outline, &config::Shape::default())
+    shape::build(
+        &flat.nodes,
+        &flat.tracks,
+        &flat.outline,
+        &config::Shape::default(),
+    )
 }
 
-/// `old` as it is found later: places some pixels off, twigs that part anew, and branches that turn out to grow from their
-/// parent's parent. Nodes keep their order, so that node k's twin is node k.
+/// `old` as it is found later: places some pixels off, twigs that part anew, and branches that turn
+/// out to grow from their parent's parent. Nodes keep their order, so that node k's twin is node k.
 fn found_later(old: &Flat, seed: u64) -> (Flat, Vec<Option<Twin>>) {
     let chance = |k: usize, what: u64| ((k as u64 * 13 + what + 97 * seed) as f64 * 78.233).sin();
     let mut nodes = old.nodes.clone();
     for k in 2..nodes.len() {
         let [u, v] = nodes[k].position_px;
         nodes[k].position_px = [u + 6.0 * chance(k, 1), v + 6.0 * chance(k, 2)];
-        let grand = nodes[k].parent.filter(|&p| p > 1).and_then(|p| nodes[p].parent);
+        let grand = nodes[k]
+            .parent
+            .filter(|&p| p > 1)
+            .and_then(|p| nodes[p].parent);
         if let Some(grand) = grand.filter(|_| chance(k, 3) > 0.7) {
             nodes[k].parent = Some(grand);
         }
         let parent = nodes[k].parent.expect("a parent");
         nodes[k].level = nodes[parent].level + 1;
     }
-    let mut measured: Vec<Option<Twin>> =
-        (0..nodes.len()).map(|k| Some(Twin { old: NodeId(k as u32), moved_px: [0.0; 2] })).collect();
+    let mut measured: Vec<Option<Twin>> = (0..nodes.len())
+        .map(|k| {
+            Some(Twin {
+                old: NodeId(k as u32),
+                moved_px: [0.0; 2],
+            })
+        })
+        .collect();
     for k in (2..old.nodes.len()).filter(|&k| chance(k, 4) > 0.6) {
         let [u, v] = nodes[k].position_px;
         for side in [-1.0, 1.0] {
             let position_px = [u + side * 9.0, v - 14.0];
-            nodes.push(Node2d { parent: Some(k), level: nodes[k].level + 1, position_px, ..nodes[k].clone() });
+            nodes.push(Node2d {
+                parent: Some(k),
+                level: nodes[k].level + 1,
+                position_px,
+                ..nodes[k].clone()
+            });
             measured.push(None);
         }
     }
     let tracks = vec![3; nodes.len()];
-    (Flat { name: "found later", nodes, tracks, outline: old.outline.clone() }, measured)
+    (
+        Flat {
+            name: "found later",
+            nodes,
+            tracks,
+            outline: old.outline.clone(),
+        },
+        measured,
+    )
 }
 
-/// An artist takes the refined tree away: it must not have beams and hooks that a tree built at once would not have.
+/// An artist takes the refined tree away: it must not have beams and hooks that a tree built at
+/// once would not have.
 #[test]
 fn a_tree_that_goes_on_is_as_full_and_as_plausible_as_one_that_was_pushed_anew() {
     let (mut all, mut sides) = (0, 0);
     let (mut way, mut anew_way) = (0.0, 0.0);
-    for (levels, seed, wild) in [(5, 0, 0.2), (5, 1, 0.4), (6, 2, 0.3), (4, 3, 0.5), (5, 4, 0.1), (6, 5, 0.2)] {
+    for (levels, seed, wild) in [
+        (5, 0, 0.2),
+        (5, 1, 0.4),
+        (6, 2, 0.3),
+        (4, 3, 0.5),
+        (5, 4, 0.1),
+        (6, 5, 0.2),
+    ] {
         let before = Flat::generated_by(levels, seed, wild);
         let old = stood_up(&before);
         let (flat, measured) = found_later(&before, seed);
-        let GoesOn { tree, held, anew, width } = go_on(&flat, &old, &measured);
+        let GoesOn {
+            tree,
+            held,
+            anew,
+            width,
+        } = go_on(&flat, &old, &measured);
         let (ours, best) = (figures(&tree, &flat), figures(&anew, &flat));
         let off = |s: &Skeleton| -> Vec<f64> {
-            let way = |(n, stood): (&Node, &Option<Point3<f64>>)| Some((n.position.z - (*stood)?.z).abs());
-            let mut ways: Vec<f64> =
-                s.nodes.iter().zip(&held).filter(|(n, _)| n.copy_of.is_none()).filter_map(way).collect();
+            let way = |(n, stood): (&Node, &Option<Point3<f64>>)| {
+                Some((n.position.z - (*stood)?.z).abs())
+            };
+            let mut ways: Vec<f64> = s
+                .nodes
+                .iter()
+                .zip(&held)
+                .filter(|(n, _)| n.copy_of.is_none())
+                .filter_map(way)
+                .collect();
             ways.sort_by(f64::total_cmp);
             ways
         };
@@ -88,7 +152,11 @@ fn a_tree_that_goes_on_is_as_full_and_as_plausible_as_one_that_was_pushed_anew()
             let other = |n: &Node, stood: &Point3<f64>| {
                 n.position.z * stood.z < 0.0 && (n.position.z - stood.z).abs() > 0.02 * width
             };
-            s.nodes.iter().zip(&held).filter(|(n, h)| n.copy_of.is_none() && h.is_some_and(|h| other(n, &h))).count()
+            s.nodes
+                .iter()
+                .zip(&held)
+                .filter(|(n, h)| n.copy_of.is_none() && h.is_some_and(|h| other(n, &h)))
+                .count()
         };
         let (ways, anews) = (off(&tree), off(&anew));
         let n = ways.len();
@@ -106,11 +174,20 @@ fn a_tree_that_goes_on_is_as_full_and_as_plausible_as_one_that_was_pushed_anew()
             ways[n - 1],
             anews[n - 1]
         );
-        assert!(ours[0] >= 0.95 * best[0] && ours[1] >= 0.95 * best[1], "{ours:?} against {best:?}");
+        assert!(
+            ours[0] >= 0.95 * best[0] && ours[1] >= 0.95 * best[1],
+            "{ours:?} against {best:?}"
+        );
         (all, sides) = (all + n, sides + changed(&tree));
-        (way, anew_way) = (way + ways.iter().sum::<f64>(), anew_way + anews.iter().sum::<f64>());
+        (way, anew_way) = (
+            way + ways.iter().sum::<f64>(),
+            anew_way + anews.iter().sum::<f64>(),
+        );
     }
-    assert!(way <= 0.25 * anew_way, "{way:.0} px in all, pushed anew {anew_way:.0} px");
+    assert!(
+        way <= 0.25 * anew_way,
+        "{way:.0} px in all, pushed anew {anew_way:.0} px"
+    );
     assert!(20 * sides <= all, "{sides} of {all} branches changed sides");
 }
 
@@ -119,31 +196,57 @@ fn a_tree_that_goes_on_is_as_full_and_as_plausible_as_one_that_was_pushed_anew()
 fn a_tree_that_is_found_again_as_it_was_stays_to_the_last_bit() {
     let flat = Flat::generated_by(5, 1, 0.4);
     let old = stood_up(&flat);
-    let measured: Vec<Option<Twin>> =
-        (0..flat.nodes.len()).map(|k| Some(Twin { old: NodeId(k as u32), moved_px: [0.0; 2] })).collect();
+    let measured: Vec<Option<Twin>> = (0..flat.nodes.len())
+        .map(|k| {
+            Some(Twin {
+                old: NodeId(k as u32),
+                moved_px: [0.0; 2],
+            })
+        })
+        .collect();
     assert_eq!(go_on(&flat, &old, &measured).tree, old);
 }
 
-/// A fork that was found elsewhere: held by its old place, a branch would run back along what it leaves.
+/// A fork that was found elsewhere: held by its old place, a branch would run back along what it
+/// leaves.
 #[test]
 fn no_branch_is_held_where_it_would_turn_back() {
-    let node = |parent, level, position_px| Node2d { parent, level, cluster: None, position_px, certainty: 0.5 };
+    let node = |parent, level, position_px| Node2d {
+        parent,
+        level,
+        cluster: None,
+        position_px,
+        certainty: 0.5,
+    };
     let with = |nodes: Vec<Node2d>| Flat {
         name: "fork",
         tracks: vec![3; nodes.len()],
         nodes,
         outline: Flat::generated(3).outline,
     };
-    let foot = [node(None, 0, [320.0, 340.0]), node(Some(0), 1, [318.0, 260.0])];
+    let foot = [
+        node(None, 0, [320.0, 340.0]),
+        node(Some(0), 1, [318.0, 260.0]),
+    ];
     // The limb's fork was taken to be high up, where it is low, with two branches that begin there.
     let of = |limb: [f64; 2]| {
-        let crown = [node(Some(1), 2, limb), node(Some(2), 3, [280.0, 140.0]), node(Some(2), 3, [360.0, 150.0])];
+        let crown = [
+            node(Some(1), 2, limb),
+            node(Some(2), 3, [280.0, 140.0]),
+            node(Some(2), 3, [360.0, 150.0]),
+        ];
         with(foot.iter().cloned().chain(crown).collect())
     };
     let (before, after) = (of([318.0, 60.0]), of([318.0, 200.0]));
     let old = stood_up(&before);
-    let measured: Vec<Option<Twin>> =
-        (0..5).map(|k| Some(Twin { old: NodeId(k as u32), moved_px: [0.0; 2] })).collect();
+    let measured: Vec<Option<Twin>> = (0..5)
+        .map(|k| {
+            Some(Twin {
+                old: NodeId(k as u32),
+                moved_px: [0.0; 2],
+            })
+        })
+        .collect();
     let GoesOn { tree, .. } = go_on(&after, &old, &measured);
     let fork = tree.image_from_model(&tree.nodes[2].position);
     assert_eq!(fork, [318.0, 200.0]);
@@ -153,16 +256,26 @@ fn no_branch_is_held_where_it_would_turn_back() {
     assert_eq!(tree.image_from_model(&fork), [318.0, 60.0]);
 }
 
-/// The tree that a clip's capture is written with has been refined or not; who takes it away shall not see which. Shoots are not
-/// pushed, and stand where the picture shows them.
+/// The tree that a clip's capture is written with has been refined or not; who takes it away shall
+/// not see which. Shoots are not pushed, and stand where the picture shows them.
 #[test]
 fn the_trees_of_the_clips_are_as_good_as_pushed_anew() {
     let shipped = [support::CLIP, support::OUTLINE].map(std::path::PathBuf::from);
     for [clip, outline] in [Some(shipped), trees::oak_clip()].into_iter().flatten() {
         let tree = trees::grown(&clip, &outline);
         let flat = Flat::of_tree("clip", &tree);
-        let (ours, best) = (figures(&tree.plain, &flat), figures(&stood_up(&flat), &flat));
-        println!("{}: refined {} times, {ours:.3?}, pushed anew {best:.3?}", clip.display(), tree.refinements);
-        assert!(ours[0] >= 0.95 * best[0] && ours[1] >= 0.95 * best[1], "{ours:?} against {best:?}");
+        let (ours, best) = (
+            figures(&tree.plain, &flat),
+            figures(&stood_up(&flat), &flat),
+        );
+        println!(
+            "{}: refined {} times, {ours:.3?}, pushed anew {best:.3?}",
+            clip.display(),
+            tree.refinements
+        );
+        assert!(
+            ours[0] >= 0.95 * best[0] && ours[1] >= 0.95 * best[1],
+            "{ours:?} against {best:?}"
+        );
     }
 }

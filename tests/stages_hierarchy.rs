@@ -28,9 +28,12 @@ fn released(branch: usize, t: f64) -> f64 {
 
 /// Gusts that all share, and turbulence of each branch's own.
 fn blown(branch: usize, t: f64) -> f64 {
-    let gust: f64 = (1..6).map(|k| (TAU * 0.13 * f64::from(k) * t + f64::from(k * k)).sin()).sum();
-    let own: f64 =
-        (1..9).map(|k| (TAU * 0.21 * f64::from(k) * t + f64::from(k * k) * (1.3 + branch as f64)).sin()).sum();
+    let gust: f64 = (1..6)
+        .map(|k| (TAU * 0.13 * f64::from(k) * t + f64::from(k * k)).sin())
+        .sum();
+    let own: f64 = (1..9)
+        .map(|k| (TAU * 0.21 * f64::from(k) * t + f64::from(k * k) * (1.3 + branch as f64)).sin())
+        .sum();
     0.012 * gust + 0.02 * own
 }
 
@@ -54,9 +57,9 @@ fn along(i: usize) -> f64 {
     0.15 + 0.85 * ((i / 5) as f64 * 0.618_034).fract()
 }
 
-/// A trunk (0) with three branches, leaving at three heights, to the left, right and left; the right one (2) has two
-/// of its own (3, 4). The points lie along the branches; every point of a branch turns about its joint, on top of what
-/// its parent does. `of` holds each row's branch.
+/// A trunk (0) with three branches, leaving at three heights, to the left, right and left; the
+/// right one (2) has two of its own (3, 4). The points lie along the branches; every point of a
+/// branch turns about its joint, on top of what its parent does. `of` holds each row's branch.
 fn tree(points: usize, sway: Sway, noise_px: f64) -> (TrackTable, Vec<usize>) {
     let times_s: Vec<f64> = (0..150).map(|k| f64::from(k) / 15.0).collect();
     let of: Vec<usize> = (0..points).map(|i| i % 5).collect();
@@ -64,7 +67,10 @@ fn tree(points: usize, sway: Sway, noise_px: f64) -> (TrackTable, Vec<usize>) {
         let along = along(i);
         let (_, joint, tip) = BRANCHES[of[i]];
         let aside = 3.0 * noise(i);
-        let rest = [joint[0] + along * (tip[0] - joint[0]) + aside, joint[1] + along * (tip[1] - joint[1])];
+        let rest = [
+            joint[0] + along * (tip[0] - joint[0]) + aside,
+            joint[1] + along * (tip[1] - joint[1]),
+        ];
         let place = |(k, &t): (usize, &f64)| {
             let (mut at, mut branch) = (rest, of[i]);
             loop {
@@ -76,7 +82,10 @@ fn tree(points: usize, sway: Sway, noise_px: f64) -> (TrackTable, Vec<usize>) {
                     at[0] -= sin * d[1];
                     break;
                 }
-                at = [joint[0] + cos * d[0] - sin * d[1], joint[1] + sin * d[0] + cos * d[1]];
+                at = [
+                    joint[0] + cos * d[0] - sin * d[1],
+                    joint[1] + sin * d[0] + cos * d[1],
+                ];
                 branch = parent;
             }
             let shake = |c: usize| noise_px * noise(2 * (i * 1000 + k) + c);
@@ -103,19 +112,37 @@ fn built(table: &TrackTable, settings: &Hierarchy) -> MotionHierarchy {
 /// What everything after the hierarchy takes for granted.
 fn assert_sound(tree: &MotionHierarchy, settings: &Hierarchy) {
     for (k, c) in tree.clusters.iter().enumerate() {
-        assert!(c.members.windows(2).all(|m| m[0] < m[1]), "members of {k} are ordered");
-        assert!((0.0..=1.0).contains(&c.certainty), "certainty of {k}: {}", c.certainty);
+        assert!(
+            c.members.windows(2).all(|m| m[0] < m[1]),
+            "members of {k} are ordered"
+        );
+        assert!(
+            (0.0..=1.0).contains(&c.certainty),
+            "certainty of {k}: {}",
+            c.certainty
+        );
         assert!(u32::from(c.level) < settings.levels, "level of {k}");
         let of_k = |c: &&Cluster| c.parent.is_some_and(|p| p.0 as usize == k);
         let children: Vec<_> = tree.clusters.iter().filter(of_k).collect();
-        let most = if settings.affinity == Affinity::Zeng { 64 } else { settings.max_children as usize };
-        assert!(children.is_empty() || (2..=most).contains(&children.len()), "{} children of {k}", children.len());
+        let most = if settings.affinity == Affinity::Zeng {
+            64
+        } else {
+            settings.max_children as usize
+        };
+        assert!(
+            children.is_empty() || (2..=most).contains(&children.len()),
+            "{} children of {k}",
+            children.len()
+        );
         let mut seen = BTreeSet::new();
         for child in children {
             assert!(child.level == c.level + 1);
             assert!(child.members.len() >= 2, "a branch has more than one point");
             assert!(
-                child.members.iter().all(|id| c.members.contains(id) && seen.insert(*id)),
+                child
+                    .members
+                    .iter()
+                    .all(|id| c.members.contains(id) && seen.insert(*id)),
                 "children share no point"
             );
         }
@@ -133,7 +160,13 @@ fn way(i: usize, of: &[usize]) -> Vec<(usize, f64)> {
     let mut way = Vec::new();
     loop {
         let (parent, joint, tip) = BRANCHES[branch];
-        way.insert(0, (branch, end.map_or(along(i) * distance(joint, tip), |end| distance(joint, end))));
+        way.insert(
+            0,
+            (
+                branch,
+                end.map_or(along(i) * distance(joint, tip), |end| distance(joint, end)),
+            ),
+        );
         if branch == 0 {
             return way;
         }
@@ -141,14 +174,22 @@ fn way(i: usize, of: &[usize]) -> Vec<(usize, f64)> {
     }
 }
 
-/// Share of triplets whose closest pair, by the way from the foot that it shares, parts last in the hierarchy; what part
-/// at once share the point. Chance is 1/3.
+/// Share of triplets whose closest pair, by the way from the foot that it shares, parts last in the
+/// hierarchy; what part at once share the point. Chance is 1/3.
 fn triplets_in_order(tree: &MotionHierarchy, of: &[usize]) -> f64 {
     let mut clusters: Vec<Vec<usize>> = vec![Vec::new(); of.len()];
     for (k, c) in tree.clusters.iter().enumerate() {
-        c.members.iter().for_each(|id| clusters[id.0 as usize].push(k));
+        c.members
+            .iter()
+            .for_each(|id| clusters[id.0 as usize].push(k));
     }
-    let depth = |a: usize, b: usize| clusters[a].iter().zip(&clusters[b]).take_while(|(x, y)| x == y).count();
+    let depth = |a: usize, b: usize| {
+        clusters[a]
+            .iter()
+            .zip(&clusters[b])
+            .take_while(|(x, y)| x == y)
+            .count()
+    };
     let shared = |a: usize, b: usize| {
         let mut px = 0.0;
         for ((x, p), (y, q)) in way(a, of).into_iter().zip(way(b, of)) {
@@ -159,7 +200,11 @@ fn triplets_in_order(tree: &MotionHierarchy, of: &[usize]) -> f64 {
         }
         px
     };
-    let placed: Vec<usize> = tree.clusters[0].members.iter().map(|id| id.0 as usize).collect();
+    let placed: Vec<usize> = tree.clusters[0]
+        .members
+        .iter()
+        .map(|id| id.0 as usize)
+        .collect();
     let n = placed.len();
     let (mut good, mut all) = (0.0, 0.0);
     for k in 0..20_000 {
@@ -173,9 +218,15 @@ fn triplets_in_order(tree: &MotionHierarchy, of: &[usize]) -> f64 {
         }
         let depths = pairs.map(|(i, j)| depth(i, j));
         let last = depths.iter().max().expect("three pairs");
-        let closest = (0..3).find(|&k| ways[k] == sorted[2]).expect("one of three");
+        let closest = (0..3)
+            .find(|&k| ways[k] == sorted[2])
+            .expect("one of three");
         all += 1.0;
-        good += if depths[closest] == *last { 1.0 / depths.iter().filter(|d| *d == last).count() as f64 } else { 0.0 };
+        good += if depths[closest] == *last {
+            1.0 / depths.iter().filter(|d| *d == last).count() as f64
+        } else {
+            0.0
+        };
     }
     good / all
 }
@@ -188,38 +239,79 @@ fn points_of_a_branch_come_together_after_a_release_and_in_wind() {
         let tree = built(&table, &settings);
         assert_sound(&tree, &settings);
         let share = triplets_in_order(&tree, &of);
-        println!("{name}: {share:.3} of the triplets, {} clusters", tree.clusters.len());
-        assert!(share > 0.8, "{name}: {share:.3} of the triplets, {} clusters", tree.clusters.len());
+        println!(
+            "{name}: {share:.3} of the triplets, {} clusters",
+            tree.clusters.len()
+        );
+        assert!(
+            share > 0.8,
+            "{name}: {share:.3} of the triplets, {} clusters",
+            tree.clusters.len()
+        );
         // The twigs of the right branch part from each other later than from the left one.
         let side = |c: &Cluster| {
             let mut count = [0usize; 5];
-            c.members.iter().for_each(|id| count[of[id.0 as usize]] += 1);
+            c.members
+                .iter()
+                .for_each(|id| count[of[id.0 as usize]] += 1);
             count
         };
-        let right = tree.clusters.iter().skip(1).map(side).any(|n| n[3] > 20 && n[4] > 20 && n[1] == 0);
-        assert!(right, "{name}: {:?}", tree.clusters.iter().map(side).collect::<Vec<_>>());
+        let right = tree
+            .clusters
+            .iter()
+            .skip(1)
+            .map(side)
+            .any(|n| n[3] > 20 && n[4] > 20 && n[1] == 0);
+        assert!(
+            right,
+            "{name}: {:?}",
+            tree.clusters.iter().map(side).collect::<Vec<_>>()
+        );
     }
 }
 
-/// A tree that sways as one piece has no branches to be told apart; whatever comes out is made of noise.
+/// A tree that sways as one piece has no branches to be told apart; whatever comes out is made of
+/// noise.
 #[test]
 fn a_tree_that_sways_as_one_piece_is_not_taken_apart() {
-    let all_made = Hierarchy { min_certainty: 0.0, ..Hierarchy::default() };
+    let all_made = Hierarchy {
+        min_certainty: 0.0,
+        ..Hierarchy::default()
+    };
     for noise_px in [0.05, 0.3] {
         let (table, _) = tree(200, still_on_the_trunk, noise_px);
-        let (careful, careless) = (built(&table, &Hierarchy::default()), built(&table, &all_made));
-        let sure = careful.clusters.iter().filter(|c| c.certainty >= 0.5).count();
-        println!("{noise_px} px: {} clusters, {} if all are made", careful.clusters.len(), careless.clusters.len());
-        assert!(3 * careful.clusters.len() < careless.clusters.len(), "{noise_px} px: {sure} sure splits");
+        let (careful, careless) = (
+            built(&table, &Hierarchy::default()),
+            built(&table, &all_made),
+        );
+        let sure = careful
+            .clusters
+            .iter()
+            .filter(|c| c.certainty >= 0.5)
+            .count();
+        println!(
+            "{noise_px} px: {} clusters, {} if all are made",
+            careful.clusters.len(),
+            careless.clusters.len()
+        );
+        assert!(
+            3 * careful.clusters.len() < careless.clusters.len(),
+            "{noise_px} px: {sure} sure splits"
+        );
     }
     let (table, _) = tree(200, released, 0.1);
     let swaying = built(&table, &Hierarchy::default());
-    let sure = swaying.clusters.iter().filter(|c| c.certainty >= 0.5).count();
+    let sure = swaying
+        .clusters
+        .iter()
+        .filter(|c| c.certainty >= 0.5)
+        .count();
     assert!(sure >= 3, "a tree with three forks has {sure} sure splits");
     assert!(swaying.median_certainty().expect("splits") > 0.5);
 }
 
-/// The published parameters: levels 4 to 7, 100 to 2,000 points, and both ways of putting points together.
+/// The published parameters: levels 4 to 7, 100 to 2,000 points, and both ways of putting points
+/// together.
 #[test]
 fn every_published_setting_gives_a_sound_tree() {
     for points in [100, 400, 2000] {
@@ -227,14 +319,27 @@ fn every_published_setting_gives_a_sound_tree() {
         for affinity in [Affinity::Path, Affinity::Zeng] {
             for levels in if points > 400 { 7..=7 } else { 4..=7 } {
                 let max_children = if affinity == Affinity::Zeng { 2 } else { 4 };
-                let settings = Hierarchy { levels, affinity, max_children, ..Hierarchy::default() };
+                let settings = Hierarchy {
+                    levels,
+                    affinity,
+                    max_children,
+                    ..Hierarchy::default()
+                };
                 let tree = built(&table, &settings);
                 assert_sound(&tree, &settings);
                 let share = triplets_in_order(&tree, &of);
-                // Twigs are not apart from their branch beside the joint, and few levels leave several in one cluster.
-                let least = if affinity == Affinity::Path { 0.75 } else { 0.5 };
+                // Twigs are not apart from their branch beside the joint, and few levels leave
+                // several in one cluster.
+                let least = if affinity == Affinity::Path {
+                    0.75
+                } else {
+                    0.5
+                };
                 println!("{points} points, {levels} levels, {affinity:?}: {share:.3}");
-                assert!(share > least, "{points} points, {levels} levels, {affinity:?}: {share:.3}");
+                assert!(
+                    share > least,
+                    "{points} points, {levels} levels, {affinity:?}: {share:.3}"
+                );
             }
         }
     }
@@ -247,7 +352,8 @@ fn the_same_tracks_give_the_same_tree() {
     assert_eq!(built(&table, &settings), built(&table, &settings));
 }
 
-/// Whatever a tracker may hand over: nothing, one point, points never seen, all in one place, far outside the picture.
+/// Whatever a tracker may hand over: nothing, one point, points never seen, all in one place, far
+/// outside the picture.
 #[test]
 fn useless_tracks_give_a_small_tree_or_none_and_no_failure() {
     let times_s: Vec<f64> = (0..30).map(|k| f64::from(k) / 15.0).collect();
@@ -259,14 +365,21 @@ fn useless_tracks_give_a_small_tree_or_none_and_no_failure() {
         _ => Some([f32::NAN, f32::INFINITY]),
     };
     for affinity in [Affinity::Path, Affinity::Zeng] {
-        let settings = Hierarchy { affinity, agreement: -1.0, min_certainty: 0.0, ..Hierarchy::default() };
+        let settings = Hierarchy {
+            affinity,
+            agreement: -1.0,
+            min_certainty: 0.0,
+            ..Hierarchy::default()
+        };
         for kind in 0..5 {
             for n in [0usize, 1, 2, 3, 20] {
                 for times in [0, 1, 2, 30] {
                     let table = TrackTable {
                         ids: (0..n as u32).map(TrackId).collect(),
                         times_s: times_s[..times].to_vec(),
-                        positions: (0..n).map(|i| (0..times).map(|k| place(kind, i, k)).collect()).collect(),
+                        positions: (0..n)
+                            .map(|i| (0..times).map(|k| place(kind, i, k)).collect())
+                            .collect(),
                         fb_errors_px: vec![0.0; n],
                     };
                     let rows: Vec<usize> = (0..n).collect();

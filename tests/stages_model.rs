@@ -12,7 +12,10 @@ use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-const SIZE: Size = Size { width: 200, height: 240 };
+const SIZE: Size = Size {
+    width: 200,
+    height: 240,
+};
 
 /// A crown on a trunk whose foot is at (100, 230).
 fn outline() -> Outline {
@@ -29,18 +32,27 @@ fn outline() -> Outline {
     arborcam::outline::from_polygon(&crown, SIZE).expect("outline")
 }
 
-/// Two pendulums side by side, of 1.1 and 1.6 Hz, 20 points each, and 10 points between them that stand still.
+/// Two pendulums side by side, of 1.1 and 1.6 Hz, 20 points each, and 10 points between them that
+/// stand still.
 fn pendulums() -> TrackTable {
     let times_s: Vec<f64> = (0..90).map(|k| f64::from(k) / 15.0).collect();
     let path = |i: usize| {
         let (column, row) = (i % 10 % 5, i / 10);
-        let left = [60.0 + 8.0 * column as f64, 60.0 + 12.0 * (row % 2) as f64 + 6.0 * (i % 2) as f64];
+        let left = [
+            60.0 + 8.0 * column as f64,
+            60.0 + 12.0 * (row % 2) as f64 + 6.0 * (i % 2) as f64,
+        ];
         let (rest, hz) = match row {
             0 | 1 => (left, 1.1),
             2 | 3 => ([left[0] + 60.0, left[1]], 1.6),
             _ => ([100.0, 40.0 + 8.0 * (i % 10) as f64], 0.0),
         };
-        let at = |t: &f64| Some([(rest[0] + 5.0 * (TAU * hz * t).sin()) as f32, rest[1] as f32]);
+        let at = |t: &f64| {
+            Some([
+                (rest[0] + 5.0 * (TAU * hz * t).sin()) as f32,
+                rest[1] as f32,
+            ])
+        };
         times_s.iter().map(at).collect()
     };
     TrackTable {
@@ -55,16 +67,38 @@ fn pendulums() -> TrackTable {
 fn what_moves_differently_is_cut_apart_and_what_stands_still_takes_no_part() {
     let table = pendulums();
     let evidence = hierarchy::evidence(&table, &config::Accumulate::default());
-    assert_eq!(evidence.moving, (0..40).collect::<Vec<usize>>(), "the still points are told apart");
-    let tree = hierarchy::build(&table, &evidence.moving, [100.0, 230.0], &config::Hierarchy::default());
-    let side = |c: &Cluster| c.members.iter().map(|id| id.0 / 20).collect::<BTreeSet<u32>>();
+    assert_eq!(
+        evidence.moving,
+        (0..40).collect::<Vec<usize>>(),
+        "the still points are told apart"
+    );
+    let tree = hierarchy::build(
+        &table,
+        &evidence.moving,
+        [100.0, 230.0],
+        &config::Hierarchy::default(),
+    );
+    let side = |c: &Cluster| {
+        c.members
+            .iter()
+            .map(|id| id.0 / 20)
+            .collect::<BTreeSet<u32>>()
+    };
     let first: Vec<&Cluster> = tree.clusters.iter().filter(|c| c.level == 1).collect();
     assert_eq!(first.len(), 2);
-    assert!(first.iter().all(|c| side(c).len() == 1), "the first cut goes between the pendulums: {first:?}");
+    assert!(
+        first.iter().all(|c| side(c).len() == 1),
+        "the first cut goes between the pendulums: {first:?}"
+    );
     for (k, c) in tree.clusters.iter().enumerate().skip(1) {
         let parent = c.parent.expect("a parent");
         assert!((parent.0 as usize) < k && tree.clusters[parent.0 as usize].level + 1 == c.level);
-        assert!(c.members.iter().all(|id| tree.clusters[parent.0 as usize].members.contains(id)), "cluster {k}");
+        assert!(
+            c.members
+                .iter()
+                .all(|id| tree.clusters[parent.0 as usize].members.contains(id)),
+            "cluster {k}"
+        );
     }
 }
 
@@ -95,7 +129,11 @@ fn hierarchy_of_seven() -> MotionHierarchy {
 }
 
 fn flat() -> Vec<Node2d> {
-    skeleton::build(&hierarchy_of_seven(), &outline(), &config::Skeleton::default())
+    skeleton::build(
+        &hierarchy_of_seven(),
+        &outline(),
+        &config::Skeleton::default(),
+    )
 }
 
 #[test]
@@ -103,7 +141,10 @@ fn the_skeleton_is_folded_by_two_fifths_and_stands_on_the_foot() {
     let nodes = flat();
     let near = |i: usize, at: [f64; 2]| {
         let p = nodes[i].position_px;
-        assert!((p[0] - at[0]).hypot(p[1] - at[1]) < 1e-9, "node {i} is at {p:?} and not at {at:?}");
+        assert!(
+            (p[0] - at[0]).hypot(p[1] - at[1]) < 1e-9,
+            "node {i} is at {p:?} and not at {at:?}"
+        );
     };
     assert_eq!(nodes.len(), 8);
     near(0, [100.0, 230.0]);
@@ -113,7 +154,12 @@ fn the_skeleton_is_folded_by_two_fifths_and_stands_on_the_foot() {
     near(3, [118.0, 122.0]);
     // Tips stay, lest the tree shrinks.
     near(4, [55.0, 70.0]);
-    assert!(nodes.iter().skip(1).all(|n| n.parent.is_some_and(|p| nodes[p].level + 1 == n.level)));
+    assert!(
+        nodes
+            .iter()
+            .skip(1)
+            .all(|n| n.parent.is_some_and(|p| nodes[p].level + 1 == n.level))
+    );
 }
 
 fn built() -> Skeleton {
@@ -128,15 +174,31 @@ fn the_tree_in_space_stays_in_its_envelope_on_one_trunk() {
     let (tree, settings) = (built(), config::Shape::default());
     let envelope = Envelope::of_revolution(&outline(), tree.foot_px);
     for (i, node) in tree.nodes.iter().enumerate() {
-        assert!(envelope.contains(&node.position), "node {i} at {} is outside", node.position);
+        assert!(
+            envelope.contains(&node.position),
+            "node {i} at {} is outside",
+            node.position
+        );
     }
     let trunk: Vec<&arborcam::model::Node> = tree.nodes.iter().filter(|n| n.level < 2).collect();
-    assert!(trunk.len() == 2 && trunk.iter().all(|n| n.copy_of.is_none()), "one trunk");
+    assert!(
+        trunk.len() == 2 && trunk.iter().all(|n| n.copy_of.is_none()),
+        "one trunk"
+    );
     // Two more planes of all that is above it.
     assert_eq!((tree.measured(), tree.nodes.len()), (8, 8 + 2 * 6));
-    assert!(tree.nodes.iter().any(|n| n.position.z.abs() > 5.0), "it is not flat");
-    assert!(tree.nodes.iter().all(|n| n.parent.is_none_or(|p| tree.nodes[p.index()].radius >= n.radius)));
-    assert!((200..=300).contains(&settings.attractors), "as in the paper");
+    assert!(
+        tree.nodes.iter().any(|n| n.position.z.abs() > 5.0),
+        "it is not flat"
+    );
+    assert!(tree.nodes.iter().all(|n| {
+        n.parent
+            .is_none_or(|p| tree.nodes[p.index()].radius >= n.radius)
+    }));
+    assert!(
+        (200..=300).contains(&settings.attractors),
+        "as in the paper"
+    );
 }
 
 #[test]
@@ -147,36 +209,71 @@ fn attractors_lie_on_the_surface() {
     assert_eq!(points.len(), 256);
     for p in &points {
         let row = outline().size.width as usize * (foot[1] - p.y).round() as usize;
-        let inside: Vec<usize> = (0..SIZE.width as usize).filter(|u| outline().mask[row + u] != 0).collect();
+        let inside: Vec<usize> = (0..SIZE.width as usize)
+            .filter(|u| outline().mask[row + u] != 0)
+            .collect();
         let (left, right) = (inside[0] as f64, inside[inside.len() - 1] as f64);
         let (centre, radius) = ((left + right) / 2.0 - foot[0], (right - left + 1.0) / 2.0);
-        assert!(((p.x - centre).hypot(p.z) - radius).abs() < 1e-6, "{p} is not on a circle of {radius}");
+        assert!(
+            ((p.x - centre).hypot(p.z) - radius).abs() < 1e-6,
+            "{p} is not on a circle of {radius}"
+        );
     }
     // All around, and not only in front.
     for side in [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]] {
-        assert!(points.iter().filter(|p| p.x * side[0] + p.z * side[1] > 5.0).count() > 40, "{side:?}");
+        assert!(
+            points
+                .iter()
+                .filter(|p| p.x * side[0] + p.z * side[1] > 5.0)
+                .count()
+                > 40,
+            "{side:?}"
+        );
     }
 }
 
 #[test]
 fn pushing_brings_the_tree_nearer_to_its_envelope() {
     let (settings, outline) = (config::Shape::default(), outline());
-    let envelope = Envelope::of_revolution(&outline, skeleton::Foot::of(&outline, None).position_px);
+    let envelope =
+        Envelope::of_revolution(&outline, skeleton::Foot::of(&outline, None).position_px);
     let trunk = shape::trunk(&flat(), config::Leader::None, &[]);
-    let prototype = shape::copy_to_planes(&flat(), &[2; 8], &trunk, &outline, &envelope, settings.planes);
-    let distance = |tree: &Skeleton| shape::envelope_distance(tree, &envelope, settings.attractors as usize);
-    for terms in [Terms::Both { weight: 1.0, no_gain: 0.02, spread_first: false }, Terms::Global] {
+    let prototype = shape::copy_to_planes(
+        &flat(),
+        &[2; 8],
+        &trunk,
+        &outline,
+        &envelope,
+        settings.planes,
+    );
+    let distance =
+        |tree: &Skeleton| shape::envelope_distance(tree, &envelope, settings.attractors as usize);
+    for terms in [
+        Terms::Both {
+            weight: 1.0,
+            no_gain: 0.02,
+            spread_first: false,
+        },
+        Terms::Global,
+    ] {
         let mut pushed = prototype.clone();
         shape::push(&mut pushed, &trunk, &envelope, &settings, terms);
         assert!(distance(&pushed) < distance(&prototype), "{terms:?}");
     }
 }
 
-/// Where the nodes would be seen if each main branch of the built tree were turned by `angle` about `axis`.
+/// Where the nodes would be seen if each main branch of the built tree were turned by `angle` about
+/// `axis`.
 fn swung(tree: &Skeleton, axis: Vector3<f64>, angle: f64) -> Vec<Point3<f64>> {
     let turn = Rotation3::from_axis_angle(&Unit::new_normalize(axis), angle);
     let top = tree.nodes[1].position;
-    let moved = |n: &arborcam::model::Node| if n.level < 2 { n.position } else { top + turn * (n.position - top) };
+    let moved = |n: &arborcam::model::Node| {
+        if n.level < 2 {
+            n.position
+        } else {
+            top + turn * (n.position - top)
+        }
+    };
     tree.nodes[..tree.measured()].iter().map(moved).collect()
 }
 
@@ -185,16 +282,24 @@ fn seen(tree: &Skeleton, at: &[Point3<f64>]) -> Vec<Option<[f64; 2]>> {
 }
 
 fn settings(method: config::MotionMethod) -> config::Motion {
-    config::Motion { method, ..config::Motion::default() }
+    config::Motion {
+        method,
+        ..config::Motion::default()
+    }
 }
 
 #[test]
 fn branches_keep_their_lengths_whatever_is_seen() {
     let tree = Arc::new(built());
     let length = |at: &dyn Fn(usize) -> Point3<f64>, i: usize| {
-        tree.nodes[i].parent.map_or(0.0, |p| (at(i) - at(p.index())).norm())
+        tree.nodes[i]
+            .parent
+            .map_or(0.0, |p| (at(i) - at(p.index())).norm())
     };
-    for method in [config::MotionMethod::Probabilistic, config::MotionMethod::Deterministic] {
+    for method in [
+        config::MotionMethod::Probabilistic,
+        config::MotionMethod::Deterministic,
+    ] {
         let mut estimator = PoseEstimator::new(tree.clone(), &settings(method));
         for k in 0..40u64 {
             let wild = |i: usize| {
@@ -205,8 +310,14 @@ fn branches_keep_their_lengths_whatever_is_seen() {
             let targets: Vec<_> = (0..tree.measured()).map(wild).collect();
             let pose = estimator.step(k, k as f64 / 30.0, &targets);
             for i in 1..tree.nodes.len() {
-                let (is, was) = (length(&|j| pose.joints[j].position, i), length(&|j| tree.nodes[j].position, i));
-                assert!((is - was).abs() < 1e-6 * was.max(1.0), "{method:?}, frame {k}, branch {i}: {was} became {is}");
+                let (is, was) = (
+                    length(&|j| pose.joints[j].position, i),
+                    length(&|j| tree.nodes[j].position, i),
+                );
+                assert!(
+                    (is - was).abs() < 1e-6 * was.max(1.0),
+                    "{method:?}, frame {k}, branch {i}: {was} became {is}"
+                );
             }
         }
     }
@@ -215,22 +326,47 @@ fn branches_keep_their_lengths_whatever_is_seen() {
 #[test]
 fn no_motion_is_the_rest_pose() {
     let tree = Arc::new(built());
-    let mut estimator = PoseEstimator::new(tree.clone(), &settings(config::MotionMethod::Probabilistic));
+    let mut estimator =
+        PoseEstimator::new(tree.clone(), &settings(config::MotionMethod::Probabilistic));
     let targets = seen(&tree, &swung(&tree, Vector3::y(), 0.0));
     for k in 0..5 {
-        for (joint, node) in estimator.step(k, 0.0, &targets).joints.iter().zip(&tree.nodes) {
-            assert!((joint.position - node.position).norm() < 1e-3, "{} became {}", node.position, joint.position);
+        for (joint, node) in estimator
+            .step(k, 0.0, &targets)
+            .joints
+            .iter()
+            .zip(&tree.nodes)
+        {
+            assert!(
+                (joint.position - node.position).norm() < 1e-3,
+                "{} became {}",
+                node.position,
+                joint.position
+            );
         }
     }
 }
 
-/// The same, pushed as in the paper, which brings its main branches before the trunk. (Of a branch behind it the picture cannot
-/// tell whether it swings forward or further back.)
+/// The same, pushed as in the paper, which brings its main branches before the trunk. (Of a branch
+/// behind it the picture cannot tell whether it swings forward or further back.)
 fn leaning() -> Skeleton {
-    let settings = config::Shape { passes: 1, push_options: 21, ..config::Shape::default() };
+    let settings = config::Shape {
+        passes: 1,
+        push_options: 21,
+        ..config::Shape::default()
+    };
     let mut prototype = shape::Prototype::of(&flat(), &[2; 8], &outline(), &settings);
-    let papers = Terms::Both { weight: 1.0, no_gain: 0.0, spread_first: false };
-    shape::push(&mut prototype.skeleton, &prototype.trunk, &prototype.envelope, &settings, papers);
+    let papers = Terms::Both {
+        weight: 1.0,
+        no_gain: 0.0,
+        spread_first: false,
+    };
+    shape::push(
+        &mut prototype.skeleton,
+        &prototype.trunk,
+        &prototype.envelope,
+        &settings,
+        papers,
+    );
     prototype.skeleton
 }
 
@@ -238,7 +374,8 @@ fn leaning() -> Skeleton {
 #[test]
 fn a_swing_towards_the_camera_is_recovered() {
     let tree = Arc::new(leaning());
-    let mut estimator = PoseEstimator::new(tree.clone(), &settings(config::MotionMethod::Probabilistic));
+    let mut estimator =
+        PoseEstimator::new(tree.clone(), &settings(config::MotionMethod::Probabilistic));
     for k in 0..=20u64 {
         let truth = swung(&tree, Vector3::x(), 0.5 * (TAU * k as f64 / 80.0).sin());
         let pose = estimator.step(k, k as f64 / 30.0, &seen(&tree, &truth));
@@ -274,38 +411,69 @@ fn problem(target: Option<[f64; 2]>) -> Problem {
 
 #[test]
 fn a_branch_turns_no_further_than_its_bounds() {
-    for target in [[50.0, 0.0], [-50.0, 0.0], [30.0, 40.0], [0.0, -50.0], [500.0, 500.0]] {
+    for target in [
+        [50.0, 0.0],
+        [-50.0, 0.0],
+        [30.0, 40.0],
+        [0.0, -50.0],
+        [500.0, 500.0],
+    ] {
         let mut p = problem(Some(target));
         for step in 0..10 {
             let d = p.solve();
-            assert!(p.previous_direction.angle(&d) <= p.max_step + 1e-6, "{target:?}, step {step}");
-            assert!(p.rest_direction.angle(&d) <= p.max_total + 1e-6, "{target:?}, step {step}");
+            assert!(
+                p.previous_direction.angle(&d) <= p.max_step + 1e-6,
+                "{target:?}, step {step}"
+            );
+            assert!(
+                p.rest_direction.angle(&d) <= p.max_total + 1e-6,
+                "{target:?}, step {step}"
+            );
             p.previous_direction = d;
         }
         let turned = p.rest_direction.angle(&p.previous_direction);
-        assert!(target[0] == 0.0 || turned > 0.4, "{target:?}: it must try to get there, and turned by {turned}");
+        assert!(
+            target[0] == 0.0 || turned > 0.4,
+            "{target:?}: it must try to get there, and turned by {turned}"
+        );
     }
     let kept = problem(None).solve();
-    assert!(kept.angle(&Vector3::y_axis()) < 1e-9, "what is not seen keeps its angle");
+    assert!(
+        kept.angle(&Vector3::y_axis()) < 1e-9,
+        "what is not seen keeps its angle"
+    );
 }
 
 #[test]
 fn a_target_out_of_reach_is_shifted_until_the_branch_reaches_it() {
     let (root, now) = (Point3::new(10.0, 20.0, 5.0), Point3::new(10.0, 50.0, 45.0));
-    for target in [[30.0, 40.0], [200.0, 20.0], [-300.0, 900.0], [10.0, 20.0], [60.0, 20.0]] {
+    for target in [
+        [30.0, 40.0],
+        [200.0, 20.0],
+        [-300.0, 900.0],
+        [10.0, 20.0],
+        [60.0, 20.0],
+    ] {
         let d = deterministic_direction(&root, 50.0, &now, target);
         let end = root + d.into_inner() * 50.0;
         let wanted = [target[0] - root.x, target[1] - root.y];
         let off = (end.x - target[0]).hypot(end.y - target[1]);
         if wanted[0].hypot(wanted[1]) <= 50.0 {
             assert!(off < 1e-6, "{target:?} is within reach: {end}");
-            assert!(end.z >= root.z, "of two solutions the nearer to where it was");
+            assert!(
+                end.z >= root.z,
+                "of two solutions the nearer to where it was"
+            );
         } else {
             // On the silhouette, on the way from where it was seen to the target.
             assert!((end.z - root.z).abs() < 1e-3, "{target:?}: {end}");
             let way = [target[0] - now.x, target[1] - now.y];
-            let off_line = (way[0] * (end.y - now.y) - way[1] * (end.x - now.x)) / way[0].hypot(way[1]);
-            assert!(off_line.abs() < 1e-6, "{target:?}: {off_line} px off the way");
+            let off_line =
+                (way[0] * (end.y - now.y) - way[1] * (end.x - now.x)) / way[0].hypot(way[1]);
+            assert!(
+                off_line.abs() < 1e-6,
+                "{target:?}: {off_line} px off the way"
+            );
         }
     }
 }

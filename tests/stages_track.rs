@@ -9,13 +9,17 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use std::time::Instant;
 
-const SIZE: Size = Size { width: 320, height: 240 };
+const SIZE: Size = Size {
+    width: 320,
+    height: 240,
+};
 
 /// Brightness of a smooth random texture anywhere, also between pixels.
 fn texture(u: f64, v: f64) -> f64 {
     let wave = |k: usize| {
         let share = |a: f64| (k as f64 * a).fract();
-        // Structure of all sizes, as in a photograph: a pyramid of pictures needs the large ones, too.
+        // Structure of all sizes, as in a photograph: a pyramid of pictures needs the large ones,
+        // too.
         let (angle, length) = (TAU * share(0.618), 7.0 * 1.19f64.powi(k as i32));
         (TAU * (u * angle.cos() + v * angle.sin()) / length + TAU * share(0.569)).sin()
     };
@@ -24,15 +28,29 @@ fn texture(u: f64, v: f64) -> f64 {
 
 /// Picture `k`, brightness by place.
 fn frame(k: u64, at: impl Fn(f64, f64) -> f64) -> Frame {
-    let pixel = |i: u32| at(f64::from(i % SIZE.width), f64::from(i / SIZE.width)).round().clamp(0.0, 255.0) as u8;
+    let pixel = |i: u32| {
+        at(f64::from(i % SIZE.width), f64::from(i / SIZE.width))
+            .round()
+            .clamp(0.0, 255.0) as u8
+    };
     let pixels = (0..SIZE.width * SIZE.height).map(pixel).collect();
     let luma = Luma { size: SIZE, pixels };
-    Frame { index: k, time_s: k as f64 / 30.0, received: Instant::now(), luma, preview: None }
+    Frame {
+        index: k,
+        time_s: k as f64 / 30.0,
+        received: Instant::now(),
+        luma,
+        preview: None,
+    }
 }
 
 fn tracker() -> Tracker {
     Tracker::new(
-        &Detect { points: 300, min_distance_px: 20.0, ..Detect::default() },
+        &Detect {
+            points: 300,
+            min_distance_px: 20.0,
+            ..Detect::default()
+        },
         &Track::default(),
         &whole(SIZE),
         0,
@@ -40,7 +58,10 @@ fn tracker() -> Tracker {
 }
 
 fn places(set: &TrackSet) -> BTreeMap<TrackId, [f64; 2]> {
-    set.observations.iter().map(|o| (o.id, [f64::from(o.u_px), f64::from(o.v_px)])).collect()
+    set.observations
+        .iter()
+        .map(|o| (o.id, [f64::from(o.u_px), f64::from(o.v_px)]))
+        .collect()
 }
 
 /// Shift of the picture in frame `k`, px: a sway of a few pixels.
@@ -59,11 +80,23 @@ fn a_known_motion_is_followed_to_a_tenth_of_a_pixel() {
         let now = places(&tracker.step(&frame(k, |u, v| texture(u - du, v - dv))));
         let mut errors: Vec<f64> = now
             .iter()
-            .filter_map(|(id, at)| first.get(id).map(|from| (at[0] - from[0] - du).hypot(at[1] - from[1] - dv)))
+            .filter_map(|(id, at)| {
+                first
+                    .get(id)
+                    .map(|from| (at[0] - from[0] - du).hypot(at[1] - from[1] - dv))
+            })
             .collect();
         errors.sort_by(f64::total_cmp);
-        assert!(errors.len() * 10 >= first.len() * 8, "frame {k}: {} points are left", errors.len());
-        assert!(errors[errors.len() * 95 / 100] < 0.1, "frame {k}: {:?}", &errors[errors.len() - 5..]);
+        assert!(
+            errors.len() * 10 >= first.len() * 8,
+            "frame {k}: {} points are left",
+            errors.len()
+        );
+        assert!(
+            errors[errors.len() * 95 / 100] < 0.1,
+            "frame {k}: {:?}",
+            &errors[errors.len() - 5..]
+        );
     }
 }
 
@@ -73,10 +106,16 @@ fn a_static_picture_stays_where_it_is() {
     let still = frame(0, texture);
     let first = places(&tracker.step(&still));
     for k in 1..30 {
-        let now = places(&tracker.step(&Frame { index: k, ..still.clone() }));
+        let now = places(&tracker.step(&Frame {
+            index: k,
+            ..still.clone()
+        }));
         assert_eq!(now.len(), first.len(), "none is lost in frame {k}");
         for (id, at) in &now {
-            assert!((at[0] - first[id][0]).hypot(at[1] - first[id][1]) < 0.01, "{id:?} drifts");
+            assert!(
+                (at[0] - first[id][0]).hypot(at[1] - first[id][1]) < 0.01,
+                "{id:?} drifts"
+            );
         }
     }
 }
@@ -89,13 +128,20 @@ fn points_are_found_as_soon_as_there_is_something_to_be_seen() {
         assert!(tracker.step(&frame(k, |_, _| 2.0)).observations.is_empty());
     }
     let light = frame(10, texture);
-    let seen = (10..30).map(|k| tracker.step(&Frame { index: k, time_s: k as f64 / 30.0, ..light.clone() }));
+    let seen = (10..30).map(|k| {
+        tracker.step(&Frame {
+            index: k,
+            time_s: k as f64 / 30.0,
+            ..light.clone()
+        })
+    });
     let n = seen.last().map_or(0, |set| set.observations.len());
     assert!(n >= 80, "{n} points");
 }
 
-/// Without wind nothing tells good points from bad ones: the choice waits for it, however long, and so that the screen
-/// is not empty meanwhile, nobody goes. When the wind comes, it is made as fast as ever.
+/// Without wind nothing tells good points from bad ones: the choice waits for it, however long, and
+/// so that the screen is not empty meanwhile, nobody goes. When the wind comes, it is made as fast
+/// as ever.
 #[test]
 fn the_choice_of_points_waits_for_wind() {
     let mut tracker = tracker();
@@ -105,39 +151,79 @@ fn the_choice_of_points_waits_for_wind() {
         let time_s = k as f64 / 10.0;
         let phase = TAU * (time_s - WIND_S).max(0.0) / 2.0;
         let [du, dv] = [5.0 * phase.sin(), 2.0 * (1.7 * phase).sin()];
-        let set = tracker.step(&Frame { time_s, ..frame(k, |u, v| texture(u - du, v - dv)) });
+        let set = tracker.step(&Frame {
+            time_s,
+            ..frame(k, |u, v| texture(u - du, v - dv))
+        });
         rejected.extend(set.rejected.iter().copied());
         let ids: BTreeSet<TrackId> = places(&set).into_keys().collect();
         if k == 0 {
             first = ids;
         } else if time_s < WIND_S {
-            assert!(ids == first && set.observations.iter().all(|o| !o.confirmed), "{time_s} s");
-        } else if decided_s.is_none() && set.observations.iter().all(|o| o.confirmed && o.error_px.is_some()) {
-            assert!(5 * ids.len() >= 2 * first.len(), "{} of {} are left", ids.len(), first.len());
-            assert_eq!(first.difference(&ids).copied().collect::<BTreeSet<_>>(), rejected, "who is gone is named");
+            assert!(
+                ids == first && set.observations.iter().all(|o| !o.confirmed),
+                "{time_s} s"
+            );
+        } else if decided_s.is_none()
+            && set
+                .observations
+                .iter()
+                .all(|o| o.confirmed && o.error_px.is_some())
+        {
+            assert!(
+                5 * ids.len() >= 2 * first.len(),
+                "{} of {} are left",
+                ids.len(),
+                first.len()
+            );
+            assert_eq!(
+                first.difference(&ids).copied().collect::<BTreeSet<_>>(),
+                rejected,
+                "who is gone is named"
+            );
             decided_s = Some(time_s - WIND_S);
         }
     }
-    assert!(decided_s.is_some_and(|s| s <= LONGEST_TRIAL_S), "{decided_s:?}");
+    assert!(
+        decided_s.is_some_and(|s| s <= LONGEST_TRIAL_S),
+        "{decided_s:?}"
+    );
 }
 
-/// The whole picture for an outline, and a small tree: its points are few of all, but enough to build from, and the choice
-/// must not wait for the wall behind it to move.
+/// The whole picture for an outline, and a small tree: its points are few of all, but enough to
+/// build from, and the choice must not wait for the wall behind it to move.
 #[test]
 fn a_small_tree_in_a_wide_outline_stirs_too() {
-    let detect = Detect { points: 600, min_distance_px: 12.0, ..Detect::default() };
+    let detect = Detect {
+        points: 600,
+        min_distance_px: 12.0,
+        ..Detect::default()
+    };
     let mut tracker = Tracker::new(&detect, &Track::default(), &whole(SIZE), 0);
     let tree = |u: f64, v: f64| (110.0..170.0).contains(&u) && (90.0..150.0).contains(&v);
     let mut decided_s = None;
     for k in 0..100u64 {
         let time_s = k as f64 / 10.0;
         let du = 5.0 * (TAU * time_s / 2.0).sin();
-        let at = |u: f64, v: f64| if tree(u, v) { texture(u - du, v) } else { texture(u, v) };
-        let set = tracker.step(&Frame { time_s, ..frame(k, at) });
+        let at = |u: f64, v: f64| {
+            if tree(u, v) {
+                texture(u - du, v)
+            } else {
+                texture(u, v)
+            }
+        };
+        let set = tracker.step(&Frame {
+            time_s,
+            ..frame(k, at)
+        });
         let seen = places(&set);
         if k == 0 {
             let inside = seen.values().filter(|p| tree(p[0], p[1])).count();
-            assert!(inside >= 20 && 12 * inside < seen.len(), "{inside} of {}", seen.len());
+            assert!(
+                inside >= 20 && 12 * inside < seen.len(),
+                "{inside} of {}",
+                seen.len()
+            );
         }
         if decided_s.is_none() && set.observations.iter().all(|o| o.confirmed) {
             decided_s = Some(time_s);
@@ -145,7 +231,10 @@ fn a_small_tree_in_a_wide_outline_stirs_too() {
             assert!(inside >= 10, "{inside} of the tree's points are left");
         }
     }
-    assert!(decided_s.is_some_and(|s| s <= LONGEST_TRIAL_S + 0.5), "{decided_s:?}");
+    assert!(
+        decided_s.is_some_and(|s| s <= LONGEST_TRIAL_S + 0.5),
+        "{decided_s:?}"
+    );
 }
 
 /// A light breeze moves points by less than would tell them apart: they pass by time.
@@ -156,13 +245,23 @@ fn points_that_hardly_move_pass_their_trial_by_time() {
     for k in 0..100u64 {
         let time_s = k as f64 / 10.0;
         let du = 0.7 * (TAU * time_s / 2.0).sin();
-        let set = tracker.step(&Frame { time_s, ..frame(k, |u, v| texture(u - du, v)) });
-        assert!(set.observations.len() >= 60, "{} points", set.observations.len());
+        let set = tracker.step(&Frame {
+            time_s,
+            ..frame(k, |u, v| texture(u - du, v))
+        });
+        assert!(
+            set.observations.len() >= 60,
+            "{} points",
+            set.observations.len()
+        );
         if passed_s.is_none() && set.observations.iter().all(|o| o.confirmed) {
             passed_s = Some(time_s);
         }
     }
-    assert!(passed_s.is_some_and(|s| (LONGEST_TRIAL_S..LONGEST_TRIAL_S + 1.0).contains(&s)), "{passed_s:?}");
+    assert!(
+        passed_s.is_some_and(|s| (LONGEST_TRIAL_S..LONGEST_TRIAL_S + 1.0).contains(&s)),
+        "{passed_s:?}"
+    );
 }
 
 /// A bird flies by: who is behind it is not reported, and has its old name afterwards.
@@ -190,16 +289,26 @@ fn hidden_points_come_back_with_their_names_in_the_right_place() {
         if k == 39 {
             let behind: Vec<_> = first.iter().filter(|(_, p)| middle(p)).collect();
             let back = |(id, from): &&(&TrackId, &[f64; 2])| {
-                now.get(id).is_some_and(|at| (at[0] - from[0] - du).hypot(at[1] - from[1] - dv) < 0.3)
+                now.get(id)
+                    .is_some_and(|at| (at[0] - from[0] - du).hypot(at[1] - from[1] - dv) < 0.3)
             };
             let n = behind.iter().filter(back).count();
-            assert!(behind.len() >= 2 && 2 * n >= behind.len(), "{n} of {} points came back", behind.len());
-            assert!(seen_behind < behind.len(), "{seen_behind} of {} were reported behind the bird", behind.len());
+            assert!(
+                behind.len() >= 2 && 2 * n >= behind.len(),
+                "{n} of {} points came back",
+                behind.len()
+            );
+            assert!(
+                seen_behind < behind.len(),
+                "{seen_behind} of {} were reported behind the bird",
+                behind.len()
+            );
         }
     }
 }
 
-/// Now and then there is nothing to be seen at all, and every point is lost: names are never given twice.
+/// Now and then there is nothing to be seen at all, and every point is lost: names are never given
+/// twice.
 #[test]
 fn names_are_never_given_twice() {
     let mut tracker = tracker();
@@ -208,29 +317,44 @@ fn names_are_never_given_twice() {
     for k in 0..150u64 {
         let picture = if k % 50 < 25 { &clear } else { &fog };
         let time_s = k as f64 / 4.0;
-        let set = tracker.step(&Frame { index: k, time_s, ..picture.clone() });
+        let set = tracker.step(&Frame {
+            index: k,
+            time_s,
+            ..picture.clone()
+        });
         births += u64::from(set.born);
         for id in places(&set).into_keys() {
             let before = last.insert(id, k).unwrap_or(k);
-            assert!(k - before <= 21, "{id:?} is back in frame {k}, last seen in {before}");
+            assert!(
+                k - before <= 21,
+                "{id:?} is back in frame {k}, last seen in {before}"
+            );
         }
     }
     let lost = last.values().filter(|k| **k < 100).count();
     assert!(lost >= 160, "only {lost} points were ever lost");
-    assert_eq!(births, u64::from(tracker.next_id()), "each birth takes one new name");
+    assert_eq!(
+        births,
+        u64::from(tracker.next_id()),
+        "each birth takes one new name"
+    );
     assert_eq!(births, last.len() as u64);
 }
 
-/// A history of 60 points that sway by `amplitude_px`, each measured with an error of about 0.05 px.
+/// A history of 60 points that sway by `amplitude_px`, each measured with an error of about 0.05
+/// px.
 fn history(amplitude_px: f64, seconds: f64) -> TrackHistory {
     let mut history = TrackHistory::new(20.0);
     for k in 0..(30.0 * seconds) as u64 {
         let time_s = k as f64 / 30.0;
         let at = |i: u32| {
-            let noise = |a: f64| 0.1 * ((f64::from(i) * 12.9898 + k as f64 * a).sin() * 43758.5453).fract();
+            let noise =
+                |a: f64| 0.1 * ((f64::from(i) * 12.9898 + k as f64 * a).sin() * 43758.5453).fract();
             // Higher points sway more, and each row a little later.
             let (row, column) = (i / 6, i % 6);
-            let sway = amplitude_px * (0.3 + f64::from(row) / 9.0) * (TAU * time_s / 1.7 + 0.4 * f64::from(row)).sin();
+            let sway = amplitude_px
+                * (0.3 + f64::from(row) / 9.0)
+                * (TAU * time_s / 1.7 + 0.4 * f64::from(row)).sin();
             Observation {
                 id: TrackId(i),
                 u_px: (40.0 * f64::from(column) + sway + noise(78.233)) as f32,
@@ -241,19 +365,35 @@ fn history(amplitude_px: f64, seconds: f64) -> TrackHistory {
             }
         };
         let observations = (0..60).map(at).collect();
-        history.push(TrackSet { frame: k, time_s, observations, lost: 0, born: 0, rejected: Vec::new() });
+        history.push(TrackSet {
+            frame: k,
+            time_s,
+            observations,
+            lost: 0,
+            born: 0,
+            rejected: Vec::new(),
+        });
     }
     history
 }
 
 #[test]
 fn the_accumulation_measure_grows_with_motion_and_stays_low_on_noise() {
-    let measure =
-        |amplitude_px: f64, seconds: f64| evidence_of(&history(amplitude_px, seconds), &Accumulate::default());
+    let measure = |amplitude_px: f64, seconds: f64| {
+        evidence_of(&history(amplitude_px, seconds), &Accumulate::default())
+    };
     let noise = measure(0.0, 6.0);
     assert!(noise.measure < 0.02 && noise.moving.is_empty(), "{noise:?}");
-    let growing: Vec<f64> = [0.5, 1.5, 4.0, 10.0].map(|a| measure(a, 6.0).measure).to_vec();
-    assert!(growing.windows(2).all(|w| w[0] < w[1] + 1e-6) && growing[0] < 0.5, "{growing:?}");
-    assert!(growing[3] > Accumulate::default().threshold && growing[3] <= 1.0, "{growing:?}");
+    let growing: Vec<f64> = [0.5, 1.5, 4.0, 10.0]
+        .map(|a| measure(a, 6.0).measure)
+        .to_vec();
+    assert!(
+        growing.windows(2).all(|w| w[0] < w[1] + 1e-6) && growing[0] < 0.5,
+        "{growing:?}"
+    );
+    assert!(
+        growing[3] > Accumulate::default().threshold && growing[3] <= 1.0,
+        "{growing:?}"
+    );
     assert_eq!(measure(10.0, 6.0).moving.len(), 60);
 }

@@ -1,5 +1,5 @@
-//! Sway frequency and damping on 200 made-up trees with known answers, and what films get that carry none.
-//! The figures are in docs/dynamics.md; `--nocapture` prints them.
+//! Sway frequency and damping on 200 made-up trees with known answers, and what films get that
+//! carry none. The figures are in docs/dynamics.md; `--nocapture` prints them.
 
 mod made_trees;
 
@@ -27,22 +27,36 @@ fn run(seeds: std::ops::Range<u64>, drive: Drive, filming: &Filming) -> Found {
 }
 
 /// `change` makes the trees harder.
-fn run_with(seeds: std::ops::Range<u64>, drive: Drive, filming: &Filming, change: impl Fn(&mut MadeTree)) -> Found {
+fn run_with(
+    seeds: std::ops::Range<u64>,
+    drive: Drive,
+    filming: &Filming,
+    change: impl Fn(&mut MadeTree),
+) -> Found {
     let mut found = Found::default();
     for seed in seeds {
         let mut tree = MadeTree::new(seed, drive, filming);
         change(&mut tree);
         let analysis = analyse(&tree.skeleton, &tree.film, &Dynamics::default());
-        let wind = analysis.onset.is_some_and(|o| o.excitation == Excitation::Wind);
+        let wind = analysis
+            .onset
+            .is_some_and(|o| o.excitation == Excitation::Wind);
         found.trees += 1;
         found.told += usize::from(wind == matches!(drive, Drive::Wind));
         found.branches += tree.branches.len();
         for (k, b) in tree.branches.iter().enumerate() {
-            let Ok(sway) = &analysis.sway[k + 1] else { continue };
+            let Ok(sway) = &analysis.sway[k + 1] else {
+                continue;
+            };
             let f = sway.frequency_hz;
-            found.frequency.push(((f.value / b.frequency_hz - 1.0).abs(), f.holds(b.frequency_hz)));
+            found.frequency.push((
+                (f.value / b.frequency_hz - 1.0).abs(),
+                f.holds(b.frequency_hz),
+            ));
             if let Some(d) = sway.damping_ratio {
-                found.damping.push(((d.value / b.damping - 1.0).abs(), d.holds(b.damping)));
+                found
+                    .damping
+                    .push(((d.value / b.damping - 1.0).abs(), d.holds(b.damping)));
             }
             if k == 0 {
                 found.trunk_hz.push((f.value - b.frequency_hz).abs());
@@ -54,7 +68,9 @@ fn run_with(seeds: std::ops::Range<u64>, drive: Drive, filming: &Filming, change
 
 fn quantile(mut all: Vec<f64>, q: f64) -> f64 {
     all.sort_unstable_by(f64::total_cmp);
-    all.get((q * all.len().saturating_sub(1) as f64) as usize).copied().unwrap_or(f64::NAN)
+    all.get((q * all.len().saturating_sub(1) as f64) as usize)
+        .copied()
+        .unwrap_or(f64::NAN)
 }
 
 fn errors(all: &[(f64, bool)]) -> Vec<f64> {
@@ -89,16 +105,39 @@ impl Found {
 
     /// Medians of the relative errors of frequency and damping at most, and coverages at least.
     #[track_caller]
-    fn holds(&self, told: f64, identified: f64, [frequency, damping]: [f64; 2], [of_frequency, of_damping]: [f64; 2]) {
-        assert!(self.told as f64 >= told * self.trees as f64, "{} of {} told right", self.told, self.trees);
+    fn holds(
+        &self,
+        told: f64,
+        identified: f64,
+        [frequency, damping]: [f64; 2],
+        [of_frequency, of_damping]: [f64; 2],
+    ) {
+        assert!(
+            self.told as f64 >= told * self.trees as f64,
+            "{} of {} told right",
+            self.told,
+            self.trees
+        );
         let share = self.frequency.len() as f64 / self.branches as f64;
-        assert!(share >= identified, "only {share} of the branches have a frequency");
-        let (f, d) = (quantile(errors(&self.frequency), 0.5), quantile(errors(&self.damping), 0.5));
+        assert!(
+            share >= identified,
+            "only {share} of the branches have a frequency"
+        );
+        let (f, d) = (
+            quantile(errors(&self.frequency), 0.5),
+            quantile(errors(&self.damping), 0.5),
+        );
         assert!(f <= frequency, "frequencies are off by {f}");
         assert!(d <= damping, "dampings are off by {d}");
         let (f, d) = (coverage(&self.frequency), coverage(&self.damping));
-        assert!(f >= of_frequency, "intervals of the frequency hold the truth in {f}");
-        assert!(d >= of_damping, "intervals of the damping hold the truth in {d}");
+        assert!(
+            f >= of_frequency,
+            "intervals of the frequency hold the truth in {f}"
+        );
+        assert!(
+            d >= of_damping,
+            "intervals of the damping hold the truth in {d}"
+        );
     }
 }
 
@@ -109,10 +148,14 @@ fn release_from_rest() {
     found.holds(0.85, 0.7, [0.002, 0.05], [0.88, 0.88]);
 }
 
-/// Pulled again while it still sways a little: the second pull is no wind, and no part of the first decay.
+/// Pulled again while it still sways a little: the second pull is no wind, and no part of the first
+/// decay.
 #[test]
 fn released_twice_in_a_film() {
-    let filming = Filming { seconds: 40.0, ..Filming::default() };
+    let filming = Filming {
+        seconds: 40.0,
+        ..Filming::default()
+    };
     let twice = run(0..20, Drive::Twice([1.0, 25.0]), &filming);
     twice.print("pulled and let go twice, 40 s");
     twice.holds(0.95, 0.7, [0.002, 0.05], [0.88, 0.88]);
@@ -131,7 +174,10 @@ fn release_before_the_film() {
 
 #[test]
 fn release_for_the_trunk_from_30_s() {
-    let filming = Filming { seconds: 30.0, ..Filming::default() };
+    let filming = Filming {
+        seconds: 30.0,
+        ..Filming::default()
+    };
     let found = run(200..220, Drive::Release(1.0), &filming);
     found.print("pulled and let go, 30 s");
     found.holds(0.85, 0.6, [0.002, 0.05], [0.85, 0.85]);
@@ -139,46 +185,72 @@ fn release_for_the_trunk_from_30_s() {
     assert!(worst < 0.01, "the trunk is off by {worst} Hz");
 }
 
-/// In 30 s of wind chance itself moves the answer by some hundredth of the frequency; no method does better.
+/// In 30 s of wind chance itself moves the answer by some hundredth of the frequency; no method
+/// does better.
 #[test]
 fn wind() {
-    let filming = Filming { seconds: 30.0, ..Filming::default() };
+    let filming = Filming {
+        seconds: 30.0,
+        ..Filming::default()
+    };
     let found = run(300..360, Drive::Wind, &filming);
     found.print("wind, 30 s");
     found.holds(0.9, 0.45, [0.013, 0.25], [0.93, 0.93]);
     let [median, most] = [0.5, 0.9].map(|q| quantile(found.trunk_hz.clone(), q));
-    assert!(median < 0.01 && most < 0.025, "the trunk is off by {median} Hz, in one of ten by {most} Hz");
+    assert!(
+        median < 0.01 && most < 0.025,
+        "the trunk is off by {median} Hz, in one of ten by {most} Hz"
+    );
 }
 
 /// Whoever films for longer is told more, and more exactly.
 #[test]
 fn two_minutes_of_wind() {
-    let filming = Filming { seconds: 120.0, ..Filming::default() };
+    let filming = Filming {
+        seconds: 120.0,
+        ..Filming::default()
+    };
     let found = run(400..416, Drive::Wind, &filming);
     found.print("wind, 120 s");
     found.holds(0.9, 0.8, [0.008, 0.22], [0.93, 0.93]);
 }
 
-/// Where the motion was not told apart well, a branch has no points but those of the branches on it: fewer answers, and no frequency
-/// of one of those in its place.
+/// Where the motion was not told apart well, a branch has no points but those of the branches on
+/// it: fewer answers, and no frequency of one of those in its place.
 #[test]
 fn wind_where_only_the_tips_have_points() {
-    let filming = Filming { seconds: 120.0, ..Filming::default() };
+    let filming = Filming {
+        seconds: 120.0,
+        ..Filming::default()
+    };
     let found = run_with(400..412, Drive::Wind, &filming, |tree| {
         let carries = |b: usize| tree.branches.iter().any(|c| c.parent == Some(b));
         tree.film.tracks.retain(|t| !carries(t.node.index() - 1));
     });
     found.print("wind, 120 s, points on the tips only");
     found.holds(0.9, 0.3, [0.015, 0.3], [0.88, 0.85]);
-    let far = errors(&found.frequency).iter().filter(|e| **e > 0.1).count();
+    let far = errors(&found.frequency)
+        .iter()
+        .filter(|e| **e > 0.1)
+        .count();
     assert!(20 * far <= found.frequency.len(), "{far} are far off");
 }
 
 /// The true sway is 2 Hz, which such a film shows as something else.
 #[test]
 fn a_film_of_few_frames_a_second_claims_nothing() {
-    for (rate_hz, drive) in [(2.3, Drive::Wind), (2.3, Drive::Release(0.5)), (4.0, Drive::Decay)] {
-        let filming = Filming { seconds: 60.0, rate_hz, jitter: 0.0, lost: 0.0, ..Filming::default() };
+    for (rate_hz, drive) in [
+        (2.3, Drive::Wind),
+        (2.3, Drive::Release(0.5)),
+        (4.0, Drive::Decay),
+    ] {
+        let filming = Filming {
+            seconds: 60.0,
+            rate_hz,
+            jitter: 0.0,
+            lost: 0.0,
+            ..Filming::default()
+        };
         for seed in 0..4 {
             let tree = MadeTree::new(seed, drive, &filming);
             for sway in analyse(&tree.skeleton, &tree.film, &Dynamics::default()).sway {
@@ -189,7 +261,14 @@ fn a_film_of_few_frames_a_second_claims_nothing() {
 }
 
 fn lone(at: impl Fn(f64) -> [f64; 2], times_s: &[f64]) -> (MadeTree, Film) {
-    let tree = MadeTree::new(1, Drive::Decay, &Filming { seconds: 2.0, ..Filming::default() });
+    let tree = MadeTree::new(
+        1,
+        Drive::Decay,
+        &Filming {
+            seconds: 2.0,
+            ..Filming::default()
+        },
+    );
     let place = |k: usize| {
         let of = |t: &f64| {
             let [u, v] = at(*t);
@@ -197,7 +276,12 @@ fn lone(at: impl Fn(f64) -> [f64; 2], times_s: &[f64]) -> (MadeTree, Film) {
         };
         times_s.iter().map(of).collect()
     };
-    let tracks = (0..6).map(|k| FilmTrack { node: NodeId(1), at_px: place(k) }).collect();
+    let tracks = (0..6)
+        .map(|k| FilmTrack {
+            node: NodeId(1),
+            at_px: place(k),
+        })
+        .collect();
     let film = Film::new(times_s, tracks);
     (tree, film)
 }
@@ -220,11 +304,18 @@ fn what_carries_no_answer_gets_a_reason() {
         (&swaying, &backwards, &[Unidentified::TooShort]),
         (&swaying, &nan, &[Unidentified::TooShort]),
         (&swaying, &even[..20], &[Unidentified::TooShort]),
-        (&swaying, &[], &[Unidentified::TooShort, Unidentified::NotMeasured]),
+        (
+            &swaying,
+            &[],
+            &[Unidentified::TooShort, Unidentified::NotMeasured],
+        ),
         (&drifting, &even, &Unidentified::ALL),
     ];
     for excitation in [Excited::Auto, Excited::Release, Excited::Wind] {
-        let config = Dynamics { excitation, ..Dynamics::default() };
+        let config = Dynamics {
+            excitation,
+            ..Dynamics::default()
+        };
         for (i, (at, times, allowed)) in cases.iter().enumerate() {
             let (tree, film) = lone(at, times);
             let sway = analyse(&tree.skeleton, &film, &config).sway;
@@ -233,13 +324,17 @@ fn what_carries_no_answer_gets_a_reason() {
                 Err(why) => assert!(allowed.contains(&why), "case {i}: {why:?}"),
                 Ok(found) => panic!("case {i}: {found:?}"),
             }
-            assert!(sway[2..].iter().all(|s| *s == Err(Unidentified::NotMeasured)));
+            assert!(
+                sway[2..]
+                    .iter()
+                    .all(|s| *s == Err(Unidentified::NotMeasured))
+            );
         }
     }
 }
 
-/// Whoever wants the end gets what was told until then, the rest named as what it is, and the answers are those of a whole
-/// analysis.
+/// Whoever wants the end gets what was told until then, the rest named as what it is, and the
+/// answers are those of a whole analysis.
 #[test]
 fn what_is_broken_off_says_so() {
     for drive in [Drive::Release(0.5), Drive::Wind] {
@@ -249,27 +344,50 @@ fn what_is_broken_off_says_so() {
         let asked = std::cell::Cell::new(0);
         let go_on = || asked.replace(asked.get() + 1) < 2;
         let part = analyse_with(&tree.skeleton, &tree.film, &config, &go_on).sway;
-        assert!(part.iter().filter(|s| **s == Err(Unidentified::NotInTime)).count() > 1, "{part:?}");
-        for (part, whole) in part.iter().zip(&whole).filter(|(part, _)| **part != Err(Unidentified::NotInTime)) {
+        assert!(
+            part.iter()
+                .filter(|s| **s == Err(Unidentified::NotInTime))
+                .count()
+                > 1,
+            "{part:?}"
+        );
+        for (part, whole) in part
+            .iter()
+            .zip(&whole)
+            .filter(|(part, _)| **part != Err(Unidentified::NotInTime))
+        {
             assert_eq!(part, whole);
         }
-        assert!(part[1].is_ok() || whole[1].is_err(), "the trunk comes first");
+        assert!(
+            part[1].is_ok() || whole[1].is_err(),
+            "the trunk comes first"
+        );
     }
 }
 
-/// One branch alone, as clean as can be: frequency and damping as they went in, with half of the frames missing.
+/// One branch alone, as clean as can be: frequency and damping as they went in, with half of the
+/// frames missing.
 #[test]
 fn one_branch_with_half_of_its_frames() {
-    let times: Vec<f64> = (0..600).filter(|k| k * k % 7 < 3).map(|k| f64::from(k) / 30.0).collect();
+    let times: Vec<f64> = (0..600)
+        .filter(|k| k * k % 7 < 3)
+        .map(|k| f64::from(k) / 30.0)
+        .collect();
     let (w, z) = (std::f64::consts::TAU * 0.8, 0.04_f64);
     let noise = |t: f64, s: f64| 0.1 * (t * 977.0 + s).sin();
     let at = |t: f64| {
         let sway = 6.0 * (-z * w * t).exp() * (w * (1.0 - z * z).sqrt() * t + 0.4).cos();
-        [100.0 + sway + noise(t, 0.0), 50.0 + 0.5 * sway + noise(t, 2.0)]
+        [
+            100.0 + sway + noise(t, 0.0),
+            50.0 + 0.5 * sway + noise(t, 2.0),
+        ]
     };
     let (tree, film) = lone(at, &times);
     let sway = analyse(&tree.skeleton, &film, &Dynamics::default()).sway[1].expect("a sway");
-    assert!((sway.frequency_hz.value / 0.8 - 1.0).abs() < 1e-3, "{sway:?}");
+    assert!(
+        (sway.frequency_hz.value / 0.8 - 1.0).abs() < 1e-3,
+        "{sway:?}"
+    );
     let damping = sway.damping_ratio.expect("a damping");
     assert!((damping.value / 0.04 - 1.0).abs() < 0.05, "{sway:?}");
     assert_eq!(sway.excitation, Excitation::Release);

@@ -1,7 +1,9 @@
-//! The HTML page in a browser: Playwright presses its controls in Chromium (`tests/viewer/checks.mjs`).
+//! The HTML page in a browser: Playwright presses its controls in Chromium
+//! (`tests/viewer/checks.mjs`).
 //!
-//! Without Chromium, Node, the modules of `scripts/test-modules.sh` or the viewer itself the test says so and does
-//! nothing; with `ARBORCAM_REQUIRE_TOOLS=1` it fails. `ARBORCAM_VIEWER_DIR=DIR` keeps the pages.
+//! Without Chromium, Node, the modules of `scripts/test-modules.sh` or the viewer itself the test
+//! says so and does nothing; with `ARBORCAM_REQUIRE_TOOLS=1` it fails. `ARBORCAM_VIEWER_DIR=DIR`
+//! keeps the pages.
 
 use arborcam::export::html::{self, Branch, Data, Page};
 use std::path::{Path, PathBuf};
@@ -15,16 +17,34 @@ const TITLE: &str = "Winter <b>tree<!-- & \"co\" <script>";
 const LARGEST_VIEWER: usize = 3_000_000;
 
 fn arborcam(args: &[&Path], more: &[&str]) {
-    let run = Command::new(env!("CARGO_BIN_EXE_arborcam")).args(args).args(more).output().expect("arborcam runs");
-    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let run = Command::new(env!("CARGO_BIN_EXE_arborcam"))
+        .args(args)
+        .args(more)
+        .output()
+        .expect("arborcam runs");
+    assert!(
+        run.status.success(),
+        "{}",
+        String::from_utf8_lossy(&run.stderr)
+    );
 }
 
 /// Fills a folder with the page of a replay of a clip, in px and in metres.
 fn pages(dir: &Path, clip: &Path, outline: &Path) {
-    let [replay, with, out, export, format, capture] =
-        ["replay", "--outline", "--out", "export", "--format", "capture"].map(Path::new);
+    let [replay, with, out, export, format, capture] = [
+        "replay",
+        "--outline",
+        "--out",
+        "export",
+        "--format",
+        "capture",
+    ]
+    .map(Path::new);
     let capture = dir.join(capture);
-    arborcam(&[replay, clip, with, outline, out, &capture], &["--fast", "--headless"]);
+    arborcam(
+        &[replay, clip, with, outline, out, &capture],
+        &["--fast", "--headless"],
+    );
     for (name, more) in [("px", &[][..]), ("m", &["--metres-per-px", "0.02"])] {
         let export = |kind: &str, to: &Path| {
             arborcam(&[export, &capture, format, Path::new(kind), out, to], more);
@@ -39,8 +59,16 @@ fn pages(dir: &Path, clip: &Path, outline: &Path) {
         let [text, _] = pages;
         let suffix = if name == "px" { "" } else { "-m" };
         let glb = export("glb", &dir.join(format!("tree{suffix}.glb")));
-        assert!(text.len() < LARGEST_VIEWER + glb.len(), "{} bytes", text.len());
-        println!("page {} kB, model {} kB", text.len() / 1000, glb.len() / 1000);
+        assert!(
+            text.len() < LARGEST_VIEWER + glb.len(),
+            "{} bytes",
+            text.len()
+        );
+        println!(
+            "page {} kB, model {} kB",
+            text.len() / 1000,
+            glb.len() / 1000
+        );
         fs::write(dir.join(format!("page{suffix}.html")), text).expect("page");
     }
     fs::write(dir.join("page-one.html"), one_node()).expect("page");
@@ -76,8 +104,22 @@ fn one_node() -> String {
         br#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"name":"node_0"}]}"#.to_vec();
     json.resize(json.len().next_multiple_of(4), b' ');
     let number = |n: usize| (n as u32).to_le_bytes();
-    let glb = [b"glTF", &number(2)[..], &number(20 + json.len()), &number(json.len()), b"JSON", &json].concat();
-    html::page(&Page { title: "one", glb: &glb, data: &data, picture: None }).expect("page")
+    let glb = [
+        b"glTF",
+        &number(2)[..],
+        &number(20 + json.len()),
+        &number(json.len()),
+        b"JSON",
+        &json,
+    ]
+    .concat();
+    html::page(&Page {
+        title: "one",
+        glb: &glb,
+        data: &data,
+        picture: None,
+    })
+    .expect("page")
 }
 
 struct Tools {
@@ -91,17 +133,25 @@ fn tools() -> Result<Tools, String> {
     let in_path = |names: &[&str]| {
         let path = env::var_os("PATH").unwrap_or_default();
         let folders: Vec<PathBuf> = env::split_paths(&path).collect();
-        names.iter().flat_map(|n| folders.iter().map(move |f| f.join(n))).find(|p| p.is_file())
+        names
+            .iter()
+            .flat_map(|n| folders.iter().map(move |f| f.join(n)))
+            .find(|p| p.is_file())
     };
     let node = in_path(&["node"]).ok_or("node is not installed")?;
     let chromium = env::var_os("ARBORCAM_CHROMIUM").map(PathBuf::from);
     let chromium = chromium.or_else(|| in_path(&["chromium", "chromium-browser", "google-chrome"]));
-    let modules = env::var_os("CARGO_TARGET_DIR").map_or_else(|| PathBuf::from("target"), PathBuf::from);
+    let modules =
+        env::var_os("CARGO_TARGET_DIR").map_or_else(|| PathBuf::from("target"), PathBuf::from);
     let modules = std::path::absolute(modules.join("test-npm")).map_err(|e| e.to_string())?;
     if !modules.join("node_modules/playwright-core").is_dir() {
         return Err("playwright-core is not there; run scripts/test-modules.sh".into());
     }
-    Ok(Tools { node, chromium: chromium.ok_or("chromium is not installed")?, modules })
+    Ok(Tools {
+        node,
+        chromium: chromium.ok_or("chromium is not installed")?,
+        modules,
+    })
 }
 
 /// One browser at a time: the pages are asked for how fast they are.
@@ -110,7 +160,11 @@ static BROWSER: Mutex<()> = Mutex::new(());
 /// Presses every control of the page of a clip.
 fn press_all(name: &str, clip: &Path, outline: &Path) {
     let viewer = include_str!(concat!(env!("OUT_DIR"), "/viewer.html"));
-    let built = if viewer.is_empty() { Err("the viewer is not built in; run `make viewer`".into()) } else { Ok(()) };
+    let built = if viewer.is_empty() {
+        Err("the viewer is not built in; run `make viewer`".into())
+    } else {
+        Ok(())
+    };
     let tools = match built.and_then(|()| tools()) {
         Ok(tools) => tools,
         Err(why) if env::var_os("ARBORCAM_REQUIRE_TOOLS").is_some() => panic!("{why}"),
@@ -132,13 +186,24 @@ fn press_all(name: &str, clip: &Path, outline: &Path) {
     let said = String::from_utf8_lossy(&run.stdout);
     println!("{said}");
     let failed: Vec<&str> = said.lines().filter(|l| l.starts_with("FAIL")).collect();
-    assert!(run.status.success(), "{failed:#?}\n{}", String::from_utf8_lossy(&run.stderr));
-    assert!(said.lines().filter(|l| l.starts_with("ok")).count() >= 15, "{said}");
+    assert!(
+        run.status.success(),
+        "{failed:#?}\n{}",
+        String::from_utf8_lossy(&run.stderr)
+    );
+    assert!(
+        said.lines().filter(|l| l.starts_with("ok")).count() >= 15,
+        "{said}"
+    );
 }
 
 #[test]
 fn the_page_of_the_shipped_clip_does_what_its_controls_say() {
-    press_all("winter", "recordings/sparse_winter.mkv".as_ref(), "recordings/sparse_winter.outline.json".as_ref());
+    press_all(
+        "winter",
+        "recordings/sparse_winter.mkv".as_ref(),
+        "recordings/sparse_winter.outline.json".as_ref(),
+    );
 }
 
 /// The other public clip lies outside the repository, in the folder that `ARBORCAM_CLIPS` names.
@@ -159,8 +224,16 @@ fn the_viewer_is_small_and_names_its_licence() {
         return eprintln!("SKIPPED: the viewer is not built in; run `make viewer`");
     }
     assert!(viewer.len() < LARGEST_VIEWER, "{} bytes", viewer.len());
-    assert!(viewer.contains("Permission is hereby granted, free of charge"), "three.js' licence is not in the page");
-    for word in ["src=\"http", "href=\"http", "@import", "<link rel=\"stylesheet"] {
+    assert!(
+        viewer.contains("Permission is hereby granted, free of charge"),
+        "three.js' licence is not in the page"
+    );
+    for word in [
+        "src=\"http",
+        "href=\"http",
+        "@import",
+        "<link rel=\"stylesheet",
+    ] {
         assert!(!viewer.contains(word), "{word}");
     }
 }

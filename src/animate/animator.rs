@@ -23,7 +23,8 @@ struct Branch {
     load: Load,
     /// From the parent node to its own at rest, px.
     way: Vector3<f64>,
-    /// The local axes u and w (002 fig. 13) that it bends about; v, along it, is left out: it neither stretches nor twists.
+    /// The local axes u and w (002 fig. 13) that it bends about; v, along it, is left out: it
+    /// neither stretches nor twists.
     axes: [Vector3<f64>; 2],
     tuning: Tuning,
     transition: Transition,
@@ -79,14 +80,22 @@ pub struct Animator {
 
 impl Animator {
     /// The tree at rest at time 0, in `wind`. `known` is what was measured, by node index.
-    pub fn new(skeleton: Arc<Skeleton>, known: &[Known], settings: &config::Wind, wind: Wind) -> Self {
+    pub fn new(
+        skeleton: Arc<Skeleton>,
+        known: &[Known],
+        settings: &config::Wind,
+        wind: Wind,
+    ) -> Self {
         let tuning = tune(&skeleton, known, settings);
         let loads = loads(&skeleton, &tuning, settings.bend_deg);
         let branch = |(i, (tuning, load)): (usize, (Tuning, Load))| {
             let node = &skeleton.nodes[i];
             let parent = node.parent.map_or(i, |p| p.index()).min(i);
             let way = node.position - skeleton.nodes[parent].position;
-            let mut chance = Chance::new(Chance::part(settings.seed.into(), 1000 + u64::from(node.name.0)));
+            let mut chance = Chance::new(Chance::part(
+                settings.seed.into(),
+                1000 + u64::from(node.name.0),
+            ));
             Branch {
                 parent,
                 load,
@@ -101,7 +110,12 @@ impl Animator {
         };
         let n = skeleton.nodes.len();
         Self {
-            branches: tuning.into_iter().zip(loads).enumerate().map(branch).collect(),
+            branches: tuning
+                .into_iter()
+                .zip(loads)
+                .enumerate()
+                .map(branch)
+                .collect(),
             joints: skeleton.nodes.iter().map(|n| at_rest(n.position)).collect(),
             turned: vec![Matrix3::identity(); n],
             borne: vec![Borne::default(); n],
@@ -149,7 +163,8 @@ impl Animator {
         self.answer(Answer::Settle);
     }
 
-    /// Lets the wind blow for a while, so that the animation, which begins at time 0, begins in the midst of it.
+    /// Lets the wind blow for a while, so that the animation, which begins at time 0, begins in the
+    /// midst of it.
     pub fn warm_up(&mut self) {
         self.time_s = -BEFORE_S;
         self.settle();
@@ -167,10 +182,12 @@ impl Animator {
         steps as u64
     }
 
-    /// Chooses the start at time 0 from which the tree comes back to itself after `period_s`, which must be the wind's.
+    /// Chooses the start at time 0 from which the tree comes back to itself after `period_s`, which
+    /// must be the wind's.
     ///
-    /// A branch is driven by the wind and by how those that carry it have turned, and by nothing else. So once those come
-    /// round its own start follows from how far it misses it: from the trunk up, one lap a level.
+    /// A branch is driven by the wind and by how those that carry it have turned, and by nothing
+    /// else. So once those come round its own start follows from how far it misses it: from the
+    /// trunk up, one lap a level.
     pub fn close(&mut self, period_s: f64, steps_each_s: f64) {
         let frames = (period_s * steps_each_s).round().max(1.0) as u64;
         let laps = 1 + self.depth();
@@ -184,9 +201,15 @@ impl Animator {
             }
             for (branch, start) in self.branches.iter_mut().zip(start) {
                 for (now, from) in branch.state.iter_mut().zip(start) {
-                    let by = Oscillation { x: now.x - from.x, v: now.v - from.v };
+                    let by = Oscillation {
+                        x: now.x - from.x,
+                        v: now.v - from.v,
+                    };
                     let more = branch.transition.closing(steps, by);
-                    *now = Oscillation { x: from.x + more.x, v: from.v + more.v };
+                    *now = Oscillation {
+                        x: from.x + more.x,
+                        v: from.v + more.v,
+                    };
                 }
             }
             self.time_s = 0.0;
@@ -203,15 +226,24 @@ impl Animator {
     }
 
     fn step(&mut self, step_s: f64) {
-        for branch in self.branches.iter_mut().filter(|b| b.transition.step_s() != step_s) {
-            branch.transition = Transition::new(branch.tuning.frequency_hz, branch.tuning.damping_ratio, step_s);
+        for branch in self
+            .branches
+            .iter_mut()
+            .filter(|b| b.transition.step_s() != step_s)
+        {
+            branch.transition = Transition::new(
+                branch.tuning.frequency_hz,
+                branch.tuning.damping_ratio,
+                step_s,
+            );
         }
         self.time_s += step_s;
         self.wind.follow(step_s);
         self.answer(Answer::Step);
     }
 
-    /// Works out the forces at the present time, from the tips down, and what the branches do, from the trunk up.
+    /// Works out the forces at the present time, from the tips down, and what the branches do, from
+    /// the trunk up.
     fn answer(&mut self, answer: Answer) {
         self.gather();
         for (i, branch) in self.branches.iter_mut().enumerate() {
@@ -219,12 +251,18 @@ impl Animator {
                 continue;
             }
             let (parent, turned) = (self.joints[branch.parent], &self.turned[branch.parent]);
-            // What a branch carries is taken as it stands at rest in the axes of the one that carries it: the force is
-            // turned into these axes, and its part along the branch bends nothing.
+            // What a branch carries is taken as it stands at rest in the axes of the one that
+            // carries it: the force is turned into these axes, and its part along the branch bends
+            // nothing.
             let m = self.borne[i].moment * turned;
-            let bending = Vector3::new(m.m23 - m.m32, m.m31 - m.m13, m.m12 - m.m21) * branch.load.yields;
+            let bending =
+                Vector3::new(m.m23 - m.m32, m.m31 - m.m13, m.m12 - m.m21) * branch.load.yields;
             let held_at = branch.axes.map(|axis| axis.dot(&bending));
-            for (now, (from, to)) in branch.state.iter_mut().zip(branch.held_at.into_iter().zip(held_at)) {
+            for (now, (from, to)) in branch
+                .state
+                .iter_mut()
+                .zip(branch.held_at.into_iter().zip(held_at))
+            {
                 *now = match answer {
                     Answer::Step => branch.transition.step(*now, from, to),
                     Answer::Stay => *now,
@@ -234,11 +272,15 @@ impl Animator {
             branch.held_at = held_at;
             let [u, w] = branch.state.map(|s| s.x * self.times);
             let keep = soft((u * u + w * w).sqrt(), 0.5 * self.most_rad, self.most_rad);
-            let own = UnitQuaternion::from_scaled_axis((branch.axes[0] * u + branch.axes[1] * w) * keep);
+            let own =
+                UnitQuaternion::from_scaled_axis((branch.axes[0] * u + branch.axes[1] * w) * keep);
             let rotation = UnitQuaternion::new_normalize((parent.rotation * own).into_inner());
             let matrix = rotation.to_rotation_matrix().into_inner();
             self.turned[i] = matrix;
-            self.joints[i] = JointPose { position: parent.position + matrix * branch.way, rotation };
+            self.joints[i] = JointPose {
+                position: parent.position + matrix * branch.way,
+                rotation,
+            };
         }
     }
 
@@ -247,9 +289,14 @@ impl Animator {
         self.borne.fill(Borne::default());
         if let Some(air) = self.wind.at(self.time_s) {
             for (borne, branch) in self.borne.iter_mut().zip(&self.branches) {
-                let Load { base, lever, sail, .. } = branch.load;
+                let Load {
+                    base, lever, sail, ..
+                } = branch.load;
                 let force = self.wind.pressure(&air, &(base + lever), branch.own_s) * sail;
-                *borne = Borne { force, moment: lever * force.transpose() };
+                *borne = Borne {
+                    force,
+                    moment: lever * force.transpose(),
+                };
             }
         }
         if let Some(pull) = self.pull
@@ -272,27 +319,43 @@ impl Animator {
 
     /// The pose of now.
     pub fn pose(&self, frame: u64) -> Pose {
-        Pose { frame, time_s: self.time_s, joints: self.joints.clone() }
+        Pose {
+            frame,
+            time_s: self.time_s,
+            joints: self.joints.clone(),
+        }
     }
 
     /// How the line from the foot to a node leans now against its rest, degrees.
     pub fn lean_deg(&self, node: NodeId) -> f64 {
-        let (Some(now), Some(rest)) = (self.joints.get(node.index()), self.skeleton.nodes.get(node.index())) else {
+        let (Some(now), Some(rest)) = (
+            self.joints.get(node.index()),
+            self.skeleton.nodes.get(node.index()),
+        ) else {
             return 0.0;
         };
         let foot = self.skeleton.nodes[0].position;
-        (now.position - foot).angle(&(rest.position - foot)).to_degrees()
+        (now.position - foot)
+            .angle(&(rest.position - foot))
+            .to_degrees()
     }
 }
 
 fn at_rest(position: Point3<f64>) -> JointPose {
-    JointPose { position, rotation: UnitQuaternion::identity() }
+    JointPose {
+        position,
+        rotation: UnitQuaternion::identity(),
+    }
 }
 
 /// Two unit vectors at right angles to a branch and to each other.
 fn across(way: &Vector3<f64>) -> [Vector3<f64>; 2] {
     let v = way.try_normalize(1e-9).unwrap_or_else(Vector3::y);
-    let other = if v.z.abs() < 0.9 { Vector3::z() } else { Vector3::x() };
+    let other = if v.z.abs() < 0.9 {
+        Vector3::z()
+    } else {
+        Vector3::x()
+    };
     let u = v.cross(&other).normalize();
     [u, u.cross(&v)]
 }

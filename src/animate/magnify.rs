@@ -1,4 +1,5 @@
-//! The captured motion made larger or smaller, as a whole or in one band of frequencies, at another speed.
+//! The captured motion made larger or smaller, as a whole or in one band of frequencies, at another
+//! speed.
 
 use super::soft;
 use crate::model::{JointPose, Pose, Skeleton};
@@ -7,21 +8,23 @@ use realfft::RealFftPlanner;
 
 /// Share of a band's ends over which it fades.
 const EDGE: f64 = 0.1;
-/// The end of a loop is blended with the film before its beginning over this share of it at most, and over so many seconds
-/// at least.
+/// The end of a loop is blended with the film before its beginning over this share of it at most,
+/// and over so many seconds at least.
 const SEAM: f64 = 1.0 / 3.0;
 const LEAST_SEAM_S: f64 = 0.2;
 
 /// What is to become of the captured motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Magnify {
-    /// Every branch turns so many times as far from its mean as it did: 0 holds it there, 1 is as filmed.
+    /// Every branch turns so many times as far from its mean as it did: 0 holds it there, 1 is as
+    /// filmed.
     pub by: f64,
     /// Seconds of film in a second.
     pub speed: f64,
     /// Only what is between these frequencies (Hz, of the film) is changed.
     pub band_hz: Option<[f64; 2]>,
-    /// A branch turns at most so far against the one that carries it, rad; farther only if it did in the film.
+    /// A branch turns at most so far against the one that carries it, rad; farther only if it did
+    /// in the film.
     pub most_rad: f64,
     /// It ends as it begins.
     pub looped: bool,
@@ -37,15 +40,23 @@ pub enum MagnifyError {
     #[error(
         "a loop of {wanted_s:.1} s of film needs {needed_s:.1} s, and there are {length_s:.1}; give less --seconds"
     )]
-    TooLongALoop { wanted_s: f64, needed_s: f64, length_s: f64 },
+    TooLongALoop {
+        wanted_s: f64,
+        needed_s: f64,
+        length_s: f64,
+    },
     #[error(
         "the film shows {rate_hz:.1} frames a second: nothing between {low_hz} and {high_hz} Hz can be told; give a lower --band"
     )]
-    BandTooHigh { rate_hz: f64, low_hz: f64, high_hz: f64 },
+    BandTooHigh {
+        rate_hz: f64,
+        low_hz: f64,
+        high_hz: f64,
+    },
 }
 
-/// `count + 1` poses at `fps` poses a second, of the captured `poses`. Where the film is over it goes back; a loop takes the
-/// last of it.
+/// `count + 1` poses at `fps` poses a second, of the captured `poses`. Where the film is over it
+/// goes back; a loop takes the last of it.
 ///
 /// # Errors
 /// The film is too short, its times are no numbers, or the band lies above what it shows.
@@ -70,16 +81,25 @@ pub fn magnify(
     if let Some([low_hz, high_hz]) = wanted.band_hz
         && low_hz >= 0.5 * rate_hz
     {
-        return Err(MagnifyError::BandTooHigh { rate_hz, low_hz, high_hz });
+        return Err(MagnifyError::BandTooHigh {
+            rate_hz,
+            low_hz,
+            high_hz,
+        });
     }
-    let turns: Vec<Vec<Vector3<f64>>> =
-        (0..skeleton.nodes.len()).map(|i| changed(&own_turns(skeleton, &poses, i), &times, wanted)).collect();
+    let turns: Vec<Vec<Vector3<f64>>> = (0..skeleton.nodes.len())
+        .map(|i| changed(&own_turns(skeleton, &poses, i), &times, wanted))
+        .collect();
     let film_s = |k: u64| k as f64 / fps * wanted.speed;
     let whole_s = film_s(count);
     let seam_s = (length_s - whole_s).min(SEAM * whole_s);
     if wanted.looped && seam_s < LEAST_SEAM_S.min(SEAM * whole_s) {
         let needed_s = whole_s + LEAST_SEAM_S.min(SEAM * whole_s);
-        return Err(MagnifyError::TooLongALoop { wanted_s: whole_s, needed_s, length_s });
+        return Err(MagnifyError::TooLongALoop {
+            wanted_s: whole_s,
+            needed_s,
+            length_s,
+        });
     }
     let at = |k: u64| -> Vec<Vector3<f64>> {
         let moment = |s: f64| Moment::of(&times, s);
@@ -93,23 +113,39 @@ pub fn magnify(
         let share = 1.0 - ((whole_s - film_s(k)) / seam_s).clamp(0.0, 1.0);
         let share = share * share * (3.0 - 2.0 * share);
         let before = moment((from_s + film_s(k) - whole_s).max(0.0));
-        turns.iter().map(|t| here.value(t) * (1.0 - share) + before.value(t) * share).collect()
+        turns
+            .iter()
+            .map(|t| here.value(t) * (1.0 - share) + before.value(t) * share)
+            .collect()
     };
-    Ok((0..=count).map(|k| posed(skeleton, &at(k), k, k as f64 / fps)).collect())
+    Ok((0..=count)
+        .map(|k| posed(skeleton, &at(k), k, k as f64 / fps))
+        .collect())
 }
 
-/// How branch `i` had turned against the one that carries it, as an axis times an angle, in every pose.
+/// How branch `i` had turned against the one that carries it, as an axis times an angle, in every
+/// pose.
 fn own_turns(skeleton: &Skeleton, poses: &[&Pose], i: usize) -> Vec<Vector3<f64>> {
-    let parent = skeleton.nodes[i].parent.map(|p| p.index()).filter(|&p| p < i);
+    let parent = skeleton.nodes[i]
+        .parent
+        .map(|p| p.index())
+        .filter(|&p| p < i);
     let own = |pose: &&Pose| {
         let turned = pose.joints[i].rotation;
-        let own = parent.map_or(turned, |p| pose.joints[p].rotation.inverse() * turned).scaled_axis();
-        if own.iter().all(|x| x.is_finite()) { own } else { Vector3::zeros() }
+        let own = parent
+            .map_or(turned, |p| pose.joints[p].rotation.inverse() * turned)
+            .scaled_axis();
+        if own.iter().all(|x| x.is_finite()) {
+            own
+        } else {
+            Vector3::zeros()
+        }
     };
     poses.iter().map(own).collect()
 }
 
-/// The same with its changes about the mean, or the part of them in the band, magnified and bounded.
+/// The same with its changes about the mean, or the part of them in the band, magnified and
+/// bounded.
 fn changed(turns: &[Vector3<f64>], times: &[f64], wanted: &Magnify) -> Vec<Vector3<f64>> {
     let mean = turns.iter().sum::<Vector3<f64>>() / turns.len() as f64;
     let changes: Vec<Vector3<f64>> = turns.iter().map(|t| t - mean).collect();
@@ -127,19 +163,33 @@ fn changed(turns: &[Vector3<f64>], times: &[f64], wanted: &Magnify) -> Vec<Vecto
     turns.iter().zip(&part).map(change).collect()
 }
 
-/// What of the values lies within a band of frequencies, Hz. The film is continued by its mirror image at both ends.
-fn in_band(values: &[Vector3<f64>], times: &[f64], [low_hz, high_hz]: [f64; 2]) -> Vec<Vector3<f64>> {
+/// What of the values lies within a band of frequencies, Hz. The film is continued by its mirror
+/// image at both ends.
+fn in_band(
+    values: &[Vector3<f64>],
+    times: &[f64],
+    [low_hz, high_hz]: [f64; 2],
+) -> Vec<Vector3<f64>> {
     let n = values.len();
     let length_s = times[n - 1];
     let even_s = |k: usize| length_s * k as f64 / (n - 1) as f64;
     // Forth and back, the ends once.
     let long = 2 * (n - 1);
     let mut planner = RealFftPlanner::<f64>::new();
-    let (forward, inverse) = (planner.plan_fft_forward(long), planner.plan_fft_inverse(long));
+    let (forward, inverse) = (
+        planner.plan_fft_forward(long),
+        planner.plan_fft_inverse(long),
+    );
     let mut parts: [Vec<f64>; 3] = Default::default();
     for (axis, part) in parts.iter_mut().enumerate() {
-        let even: Vec<f64> = (0..n).map(|k| Moment::of(times, even_s(k)).value(values)[axis]).collect();
-        let mut signal: Vec<f64> = even.iter().chain(even[1..n - 1].iter().rev()).copied().collect();
+        let even: Vec<f64> = (0..n)
+            .map(|k| Moment::of(times, even_s(k)).value(values)[axis])
+            .collect();
+        let mut signal: Vec<f64> = even
+            .iter()
+            .chain(even[1..n - 1].iter().rev())
+            .copied()
+            .collect();
         let mut spectrum = forward.make_output_vec();
         // Both fail for lengths only, which come from the plans; nothing is in the band then.
         if forward.process(&mut signal, &mut spectrum).is_err() {
@@ -153,9 +203,14 @@ fn in_band(values: &[Vector3<f64>], times: &[f64], [low_hz, high_hz]: [f64; 2]) 
         }
         *part = signal;
     }
-    let even: Vec<Vector3<f64>> = (0..n).map(|k| Vector3::new(parts[0][k], parts[1][k], parts[2][k])).collect();
+    let even: Vec<Vector3<f64>> = (0..n)
+        .map(|k| Vector3::new(parts[0][k], parts[1][k], parts[2][k]))
+        .collect();
     let even_times: Vec<f64> = (0..n).map(even_s).collect();
-    times.iter().map(|t| Moment::of(&even_times, *t).value(&even)).collect()
+    times
+        .iter()
+        .map(|t| Moment::of(&even_times, *t).value(&even))
+        .collect()
 }
 
 /// 1 within the band, 0 outside, half at its ends.
@@ -176,9 +231,15 @@ struct Moment {
 
 impl Moment {
     fn of(times: &[f64], time_s: f64) -> Self {
-        let before = times.partition_point(|t| *t <= time_s).clamp(1, times.len() - 1) - 1;
+        let before = times
+            .partition_point(|t| *t <= time_s)
+            .clamp(1, times.len() - 1)
+            - 1;
         let (a, b) = (times[before], times[before + 1]);
-        Self { before, share: ((time_s - a) / (b - a)).clamp(0.0, 1.0) }
+        Self {
+            before,
+            share: ((time_s - a) / (b - a)).clamp(0.0, 1.0),
+        }
     }
 
     fn value(&self, of: &[Vector3<f64>]) -> Vector3<f64> {
@@ -193,18 +254,33 @@ fn posed(skeleton: &Skeleton, turns: &[Vector3<f64>], frame: u64, time_s: f64) -
         let own = UnitQuaternion::from_scaled_axis(*turn);
         joints.push(match node.parent.map(|p| p.index()).filter(|&p| p < i) {
             Some(p) => {
-                let rotation = UnitQuaternion::new_normalize((joints[p].rotation * own).into_inner());
+                let rotation =
+                    UnitQuaternion::new_normalize((joints[p].rotation * own).into_inner());
                 let way = node.position - skeleton.nodes[p].position;
-                JointPose { position: joints[p].position + rotation * way, rotation }
+                JointPose {
+                    position: joints[p].position + rotation * way,
+                    rotation,
+                }
             }
-            None => JointPose { position: node.position, rotation: UnitQuaternion::identity() },
+            None => JointPose {
+                position: node.position,
+                rotation: UnitQuaternion::identity(),
+            },
         });
     }
-    Pose { frame, time_s, joints }
+    Pose {
+        frame,
+        time_s,
+        joints,
+    }
 }
 
 /// Where someone is after `way` who goes to and fro over a stretch of `length`.
 fn there_and_back(way: f64, length: f64) -> f64 {
     let along = way.rem_euclid(2.0 * length);
-    if along > length { 2.0 * length - along } else { along }
+    if along > length {
+        2.0 * length - along
+    } else {
+        along
+    }
 }

@@ -11,8 +11,8 @@ const RATE_HZ: f64 = 64.0;
 /// What changes faster than this a branch hardly feels, and the table could not hold.
 const FASTEST_HZ: f64 = 12.0;
 
-/// Noise of mean 0 and variance 1 whose power falls as `1 / (corner^2 + f^2)^(beta / 2)`: flat below the corner, 1/f^beta
-/// above (002 section 7).
+/// Noise of mean 0 and variance 1 whose power falls as `1 / (corner^2 + f^2)^(beta / 2)`: flat
+/// below the corner, 1/f^beta above (002 section 7).
 #[derive(Clone, Debug)]
 pub struct Noise {
     /// Many trees have many tables, and each is read all over: half the size is half the misses.
@@ -37,7 +37,8 @@ impl Noise {
             if frequency_hz > FASTEST_HZ && k > 1 {
                 break;
             }
-            let amplitude = (corner_hz * corner_hz + frequency_hz * frequency_hz).powf(-0.25 * beta);
+            let amplitude =
+                (corner_hz * corner_hz + frequency_hz * frequency_hz).powf(-0.25 * beta);
             *entry = Complex::from_polar(amplitude, phase);
             // A cosine of amplitude 2 a.
             power += 2.0 * amplitude * amplitude;
@@ -49,7 +50,10 @@ impl Noise {
         }
         let scale = 1.0 / power.max(1e-300).sqrt();
         let values = values.into_iter().map(|v| (v * scale) as f32).collect();
-        Self { values, per_s: n as f64 / period_s }
+        Self {
+            values,
+            per_s: n as f64 / period_s,
+        }
     }
 
     /// The noise at a time, s; any time has one.

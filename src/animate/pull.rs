@@ -12,11 +12,13 @@ const DOUBLINGS: i32 = 60;
 /// Share of the tree's height above which a rope is tied.
 const TIED_ABOVE: f64 = 0.45;
 
-/// Where one would tie the rope: the thickest branch that ends well above the ground, of equally thick ones the highest.
+/// Where one would tie the rope: the thickest branch that ends well above the ground, of equally
+/// thick ones the highest.
 pub fn place_to_pull(skeleton: &Skeleton) -> NodeId {
     let nodes = &skeleton.nodes;
     let height = nodes.iter().map(|n| n.position.y).fold(0.0, f64::max);
-    let above = |&i: &usize| nodes[i].position.y >= TIED_ABOVE * height && nodes[i].copy_of.is_none();
+    let above =
+        |&i: &usize| nodes[i].position.y >= TIED_ABOVE * height && nodes[i].copy_of.is_none();
     let stout = |i: usize| (nodes[i].radius, nodes[i].position.y);
     let better = |&a: &usize, &b: &usize| {
         let ((ra, ya), (rb, yb)) = (stout(a), stout(b));
@@ -26,14 +28,18 @@ pub fn place_to_pull(skeleton: &Skeleton) -> NodeId {
 }
 
 impl Animator {
-    /// Ties a rope to a node and pulls, level, towards `direction_deg` (as the wind's) until the line from the foot to the
-    /// node leans by `lean_deg`; the tree then hangs still in it. Gives the lean that was reached, which is less where the
-    /// branches' bounds do not let it come so far.
+    /// Ties a rope to a node and pulls, level, towards `direction_deg` (as the wind's) until the
+    /// line from the foot to the node leans by `lean_deg`; the tree then hangs still in it. Gives
+    /// the lean that was reached, which is less where the branches' bounds do not let it come so
+    /// far.
     pub fn pull_aside(&mut self, node: NodeId, direction_deg: f64, lean_deg: f64) -> f64 {
         let (sin, cos) = direction_deg.to_radians().sin_cos();
         let towards = Vector3::new(cos, 0.0, -sin);
         let lean = |animator: &mut Self, force: f64| {
-            animator.pull(Some(Pull { node, force: towards * force }));
+            animator.pull(Some(Pull {
+                node,
+                force: towards * force,
+            }));
             animator.settle();
             animator.lean_deg(node)
         };
@@ -46,7 +52,11 @@ impl Animator {
         }
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);
-            if lean(self, middle) < lean_deg { low = middle } else { high = middle }
+            if lean(self, middle) < lean_deg {
+                low = middle
+            } else {
+                high = middle
+            }
         }
         lean(self, high)
     }

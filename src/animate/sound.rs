@@ -1,5 +1,5 @@
-//! A sound as what drives the wind: how loud it is from moment to moment (Li et al. section 6: "the user can drive a tree
-//! using an audio signal of a windy day").
+//! A sound as what drives the wind: how loud it is from moment to moment (Li et al. section 6: "the
+//! user can drive a tree using an audio signal of a windy day").
 
 use super::fraction;
 use std::io::Cursor;
@@ -44,14 +44,18 @@ impl Loudness {
         let mut reader = hound::WavReader::new(Cursor::new(bytes)).map_err(unreadable)?;
         let spec = reader.spec();
         if spec.sample_rate == 0 || spec.channels == 0 {
-            return Err(SoundError::Unreadable("no sample rate, or no channels".into()));
+            return Err(SoundError::Unreadable(
+                "no sample rate, or no channels".into(),
+            ));
         }
         let per_s = f64::from(spec.sample_rate) * f64::from(spec.channels);
         if f64::from(reader.len()) > LONGEST_S * per_s {
             return Err(SoundError::TooLong);
         }
         let samples: Result<Vec<f64>, _> = match spec.sample_format {
-            hound::SampleFormat::Float => reader.samples::<f32>().map(|s| s.map(f64::from)).collect(),
+            hound::SampleFormat::Float => {
+                reader.samples::<f32>().map(|s| s.map(f64::from)).collect()
+            }
             hound::SampleFormat::Int => reader.samples::<i32>().map(|s| s.map(f64::from)).collect(),
         };
         Self::of_samples(&samples.map_err(unreadable)?, per_s)
@@ -65,7 +69,10 @@ impl Loudness {
         if samples.is_empty() || !(per_s.is_finite() && per_s > 0.0) {
             return Err(SoundError::Empty);
         }
-        if let Some(k) = samples.iter().position(|s| !s.is_finite() || s.abs() > 1e30) {
+        if let Some(k) = samples
+            .iter()
+            .position(|s| !s.is_finite() || s.abs() > 1e30)
+        {
             return Err(SoundError::NoNumber(k as u64));
         }
         // Some microphones add a constant, which nobody hears.
@@ -95,18 +102,28 @@ impl Loudness {
         Ok(Self { values })
     }
 
-    /// Its first `period_s` as something that comes round without a seam; a shorter sound is gone through again and again
-    /// until then.
+    /// Its first `period_s` as something that comes round without a seam; a shorter sound is gone
+    /// through again and again until then.
     pub fn looped(&self, period_s: f64) -> Self {
         let count = ((period_s * RATE_HZ).round() as usize).max(1);
         let seam = SEAM * count as f64;
         let first = self.values.first().copied().unwrap_or(0.0);
         let value = |k: usize| {
-            let here = self.values.get(k % self.values.len().max(1)).copied().unwrap_or(0.0);
+            let here = self
+                .values
+                .get(k % self.values.len().max(1))
+                .copied()
+                .unwrap_or(0.0);
             let left = (count - k) as f64 / seam;
-            if left < 1.0 { first + (here - first) * left } else { here }
+            if left < 1.0 {
+                first + (here - first) * left
+            } else {
+                here
+            }
         };
-        Self { values: (0..count).map(value).collect() }
+        Self {
+            values: (0..count).map(value).collect(),
+        }
     }
 
     /// Length, s.

@@ -1,4 +1,5 @@
-//! The frequency and damping of every branch: what was measured, and for the others what they are likely to have.
+//! The frequency and damping of every branch: what was measured, and for the others what they are
+//! likely to have.
 
 use super::known::Known;
 use crate::config;
@@ -13,7 +14,8 @@ const HIGHEST_BY_TRUNK: f64 = 12.0;
 const LOWEST_BY_TRUNK: f64 = 0.3;
 /// Branches whose thickness differs by this factor are as unlike as those a level apart.
 const LEVEL_BY_THICKNESS: f64 = 1.4;
-/// What a branch carries does not reach less far than this share of the tree's height: radii of stubs are no measure.
+/// What a branch carries does not reach less far than this share of the tree's height: radii of
+/// stubs are no measure.
 const SHORTEST: f64 = 0.03;
 
 /// How one branch sways against the one that carries it.
@@ -26,12 +28,14 @@ pub struct Tuning {
     pub measured: bool,
 }
 
-/// The tuning of every node of the skeleton, by its index. `known` is by node index and may be shorter.
+/// The tuning of every node of the skeleton, by its index. `known` is by node index and may be
+/// shorter.
 ///
-/// A measured branch keeps what was measured, and a copy has its original's. For the others the logarithm of the frequency
-/// is that of a rod, `f ~ sqrt(r) / l` with the radius r and the reach l of what it carries, moved by as much as the
-/// measured branches are off that rule: their mean, weighed by likeness in level and thickness. Where nothing was measured
-/// the trunk sways with `settings.trunk_hz`.
+/// A measured branch keeps what was measured, and a copy has its original's. For the others the
+/// logarithm of the frequency is that of a rod, `f ~ sqrt(r) / l` with the radius r and the reach l
+/// of what it carries, moved by as much as the measured branches are off that rule: their mean,
+/// weighed by likeness in level and thickness. Where nothing was measured the trunk sways with
+/// `settings.trunk_hz`.
 pub fn tune(skeleton: &Skeleton, known: &[Known], settings: &config::Wind) -> Vec<Tuning> {
     let nodes = &skeleton.nodes;
     let rods = rods(skeleton);
@@ -39,23 +43,43 @@ pub fn tune(skeleton: &Skeleton, known: &[Known], settings: &config::Wind) -> Ve
     let within = |x: f64, (low, high): (f64, f64)| x.is_finite() && (low..=high).contains(&x);
     let of = |i: usize| known.get(i).copied().unwrap_or_default();
     let own = |i: usize| nodes[i].copy_of.is_none() && nodes[i].parent.is_some();
-    let frequency = |i: usize| of(i).frequency_hz.filter(|f| own(i) && within(*f, FREQUENCIES_HZ));
-    let damping = |i: usize| of(i).damping_ratio.filter(|d| own(i) && d.is_finite() && *d > 0.0);
-    let off: Vec<(usize, f64)> = (0..nodes.len()).filter_map(|i| Some((i, frequency(i)?.ln() - rods[i]))).collect();
-    let damped: Vec<(usize, f64)> = (0..nodes.len()).filter_map(|i| Some((i, damping(i)?.ln()))).collect();
+    let frequency = |i: usize| {
+        of(i)
+            .frequency_hz
+            .filter(|f| own(i) && within(*f, FREQUENCIES_HZ))
+    };
+    let damping = |i: usize| {
+        of(i)
+            .damping_ratio
+            .filter(|d| own(i) && d.is_finite() && *d > 0.0)
+    };
+    let off: Vec<(usize, f64)> = (0..nodes.len())
+        .filter_map(|i| Some((i, frequency(i)?.ln() - rods[i])))
+        .collect();
+    let damped: Vec<(usize, f64)> = (0..nodes.len())
+        .filter_map(|i| Some((i, damping(i)?.ln())))
+        .collect();
     let likely = |i: usize, from: &[(usize, f64)], else_: f64| {
         let weight = |j: usize| {
             let levels = f64::from(nodes[i].level) - f64::from(nodes[j].level);
             let apart = levels * levels + (thickness(i) - thickness(j)).powi(2);
             (0.5 + apart).powi(-2)
         };
-        let (sum, all) = from.iter().fold((0.0, 0.0), |(s, w), &(j, x)| (s + weight(j) * x, w + weight(j)));
+        let (sum, all) = from.iter().fold((0.0, 0.0), |(s, w), &(j, x)| {
+            (s + weight(j) * x, w + weight(j))
+        });
         if all > 0.0 { sum / all } else { else_ }
     };
     let trunk = nodes.iter().position(|n| n.parent.is_some()).unwrap_or(0);
     let untold = settings.trunk_hz.ln() - rods.get(trunk).copied().unwrap_or(0.0);
     let guessed = |i: usize| (rods[i] + likely(i, &off, untold)).exp();
-    let base = frequency(trunk).unwrap_or_else(|| if nodes.is_empty() { 1.0 } else { guessed(trunk) });
+    let base = frequency(trunk).unwrap_or_else(|| {
+        if nodes.is_empty() {
+            1.0
+        } else {
+            guessed(trunk)
+        }
+    });
     let base = base.clamp(FREQUENCIES_HZ.0, HIGHEST_HZ);
     let mut out: Vec<Tuning> = Vec::with_capacity(nodes.len());
     for (i, node) in nodes.iter().enumerate() {
@@ -80,15 +104,25 @@ fn rods(skeleton: &Skeleton) -> Vec<f64> {
     let nodes = &skeleton.nodes;
     let mut reach = vec![0.0f64; nodes.len()];
     for i in (0..nodes.len()).rev() {
-        let Some(p) = nodes[i].parent.map(|p| p.index()).filter(|&p| p < i) else { continue };
+        let Some(p) = nodes[i].parent.map(|p| p.index()).filter(|&p| p < i) else {
+            continue;
+        };
         let length = (nodes[i].position - nodes[p].position).norm();
         // Here from its base: its own length and what goes on from its end.
         reach[i] += if length.is_finite() { length } else { 0.0 };
         reach[p] = reach[p].max(reach[i]);
     }
-    let height = nodes.iter().map(|n| n.position.y).filter(|y| y.is_finite()).fold(1.0, f64::max);
+    let height = nodes
+        .iter()
+        .map(|n| n.position.y)
+        .filter(|y| y.is_finite())
+        .fold(1.0, f64::max);
     let rod = |(node, reach): (&crate::model::Node, &f64)| {
-        let radius = if node.radius.is_finite() { node.radius.max(1e-3) } else { 1.0 };
+        let radius = if node.radius.is_finite() {
+            node.radius.max(1e-3)
+        } else {
+            1.0
+        };
         0.5 * radius.ln() - reach.max(SHORTEST * height).ln()
     };
     nodes.iter().zip(&reach).map(rod).collect()

@@ -8,10 +8,12 @@ use nalgebra::{Point3, Vector3};
 
 /// Speed in steady wind of force 6, m/s: pressure is told as a multiple of what it is there.
 const REFERENCE_M_S: f64 = 12.287;
-/// From about this speed on a crown bends out of the wind and its drag grows less than with the square of speed, m/s;
-/// far beyond with the power 2 - 1/2; Vogel found -0.4 to -0.9 for leaves and branches of broad-leaved trees.
+/// From about this speed on a crown bends out of the wind and its drag grows less than with the
+/// square of speed, m/s; far beyond with the power 2 - 1/2; Vogel found -0.4 to -0.9 for leaves and
+/// branches of broad-leaved trees.
 const STREAMLINED_M_S: f64 = 10.0;
-/// Standard deviations of the speed across the wind and upwards, and of eddies, as shares of that along the wind.
+/// Standard deviations of the speed across the wind and upwards, and of eddies, as shares of that
+/// along the wind.
 const ACROSS: f64 = 0.7;
 const RISE: f64 = 0.4;
 const EDDY: f64 = 0.6;
@@ -65,7 +67,12 @@ impl Wind {
     pub fn new(settings: &config::Wind, period_s: f64, metres_per_px: f64) -> Self {
         let seed = u64::from(settings.seed);
         let noise = |part: u64, slowest_s: f64| {
-            Noise::new(period_s, settings.beta, 1.0 / slowest_s.max(1e-3), Chance::part(seed, part))
+            Noise::new(
+                period_s,
+                settings.beta,
+                1.0 / slowest_s.max(1e-3),
+                Chance::part(seed, part),
+            )
         };
         let mean_m_s = velocity(settings.force, settings.direction_deg);
         Self {
@@ -97,7 +104,11 @@ impl Wind {
         if self.mean_m_s != self.wanted_m_s {
             let left = self.wanted_m_s - self.mean_m_s;
             let near = left.norm() < 1e-3;
-            self.mean_m_s += if near { left } else { left * (1.0 - (-step_s / CHANGE_S).exp()) };
+            self.mean_m_s += if near {
+                left
+            } else {
+                left * (1.0 - (-step_s / CHANGE_S).exp())
+            };
         }
     }
 
@@ -106,11 +117,17 @@ impl Wind {
         let speed_m_s = self.mean_m_s.norm();
         let along = self.mean_m_s.try_normalize(1e-6)?;
         let delay_s_per_px = self.metres_per_px / speed_m_s.max(SLOWEST_M_S);
-        Some(Air { time_s, speed_m_s, along, across: Vector3::y().cross(&along), delay_s_per_px })
+        Some(Air {
+            time_s,
+            speed_m_s,
+            along,
+            across: Vector3::y().cross(&along),
+            delay_s_per_px,
+        })
     }
 
-    /// How the air presses at a place (model axes, px), as a multiple of steady wind of force 6. `own_s` tells the eddies of
-    /// one branch from those of another.
+    /// How the air presses at a place (model axes, px), as a multiple of steady wind of force 6.
+    /// `own_s` tells the eddies of one branch from those of another.
     pub fn pressure(&self, air: &Air, place: &Point3<f64>, own_s: f64) -> Vector3<f64> {
         let here_s = air.time_s - place.coords.dot(&air.along) * air.delay_s_per_px;
         let (mean, vary) = match &self.gusts {

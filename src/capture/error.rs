@@ -16,7 +16,11 @@ pub enum CaptureError {
     #[error("{} was written by a newer version of arborcam ({what}); use that version", .file.display())]
     Newer { file: PathBuf, what: String },
     #[error("{}, line {line}: {what}; the file is damaged or was edited: make the capture anew", .file.display())]
-    BadRow { file: PathBuf, line: u64, what: String },
+    BadRow {
+        file: PathBuf,
+        line: u64,
+        what: String,
+    },
     /// A capture that is sound, of a film in which no tree was built.
     #[error("{} holds tracks but no tree; film for longer or in more wind, and make the capture anew", .dir.display())]
     NoTree { dir: PathBuf },
@@ -26,6 +30,10 @@ pub enum CaptureError {
 
 impl CaptureError {
     pub(super) fn row(file: &Path, line: u64, what: impl Into<String>) -> Self {
-        Self::BadRow { file: file.to_owned(), line, what: what.into() }
+        Self::BadRow {
+            file: file.to_owned(),
+            line,
+            what: what.into(),
+        }
     }
 }

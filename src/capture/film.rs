@@ -9,9 +9,10 @@ use std::path::Path;
 
 const COLUMNS: [&str; 6] = ["track_id", "frame", "time_s", "u_px", "v_px", "node_id"];
 
-/// The points of the last `window_s` seconds of what lies between two times, s, in the capture in `dir`, on the nodes of
-/// `skeleton`; a point is on the node that its last row says. The table goes by row by row, so that a long capture takes no more room than
-/// what is kept of it; that needs its rows in order of time.
+/// The points of the last `window_s` seconds of what lies between two times, s, in the capture in
+/// `dir`, on the nodes of
+/// `skeleton`; a point is on the node that its last row says. The table goes by row by row, so that
+/// a long capture takes no more room than what is kept of it; that needs its rows in order of time.
 ///
 /// # Errors
 /// The table is missing or damaged, or its times run backwards.
@@ -22,8 +23,12 @@ pub(super) fn read(
     [from_s, to_s]: [f64; 2],
 ) -> Result<Film, CaptureError> {
     let mut table = Table::open(dir, "tracks.csv", COLUMNS)?;
-    let by_name: BTreeMap<NodeName, NodeId> =
-        skeleton.nodes.iter().enumerate().map(|(i, n)| (n.name, NodeId(i as u32))).collect();
+    let by_name: BTreeMap<NodeName, NodeId> = skeleton
+        .nodes
+        .iter()
+        .enumerate()
+        .map(|(i, n)| (n.name, NodeId(i as u32)))
+        .collect();
     let mut node_of: BTreeMap<TrackId, NodeId> = BTreeMap::new();
     let mut log = FilmLog::new(window_s);
     let (mut frame_s, mut points) = (f64::NEG_INFINITY, Vec::new());
@@ -32,8 +37,11 @@ pub(super) fn read(
         let time_s = table.number(2, "time_s")?;
         // In any other order every row would be a frame of its own, with room for all points.
         if time_s < frame_s {
-            let what = "rows of one frame stand together, in order of time; sort the table by frame";
-            return Err(table.bad(format!("time_s is {time_s}, after {frame_s} in the row before: {what}")));
+            let what =
+                "rows of one frame stand together, in order of time; sort the table by frame";
+            return Err(table.bad(format!(
+                "time_s is {time_s}, after {frame_s} in the row before: {what}"
+            )));
         }
         if time_s > frame_s {
             push(&mut log, frame_s, &mut points);
@@ -46,7 +54,9 @@ pub(super) fn read(
         }
         if !table.cell(5).is_empty() {
             let name = NodeName(table.whole(5, "node_id")?);
-            let node = by_name.get(&name).ok_or_else(|| table.bad(format!("there is no node {}", name.0)))?;
+            let node = by_name
+                .get(&name)
+                .ok_or_else(|| table.bad(format!("there is no node {}", name.0)))?;
             node_of.insert(id, *node);
         }
     }

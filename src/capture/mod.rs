@@ -42,7 +42,8 @@ pub struct Captured {
     pub picture: Option<Picture>,
     pub pose_in_picture: Option<Pose>,
     pub outline: Option<Outline>,
-    /// What the user should know: parts that are missing, and what stands in for them. One sentence each.
+    /// What the user should know: parts that are missing, and what stands in for them. One sentence
+    /// each.
     pub warnings: Vec<String>,
 }
 
@@ -54,13 +55,24 @@ impl Captured {
     pub fn note(dir: &Path) -> Result<Capture, CaptureError> {
         let file = dir.join("capture.json");
         let text = std::fs::read(&file).map_err(|source| match source.kind() {
-            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => CaptureError::NotACapture { dir: dir.to_owned() },
-            _ => CaptureError::Unreadable { file: file.clone(), source },
+            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => CaptureError::NotACapture {
+                dir: dir.to_owned(),
+            },
+            _ => CaptureError::Unreadable {
+                file: file.clone(),
+                source,
+            },
         })?;
-        let bad = |what: String| CaptureError::BadNote { file: file.clone(), what };
-        let value: serde_json::Value = serde_json::from_slice(&text).map_err(|e| bad(e.to_string()))?;
+        let bad = |what: String| CaptureError::BadNote {
+            file: file.clone(),
+            what,
+        };
+        let value: serde_json::Value =
+            serde_json::from_slice(&text).map_err(|e| bad(e.to_string()))?;
         // Looked at first: a newer file would be refused for the wrong reason.
-        let version = value.get("schema_version").and_then(serde_json::Value::as_u64);
+        let version = value
+            .get("schema_version")
+            .and_then(serde_json::Value::as_u64);
         if version.is_some_and(|v| v > SCHEMA_VERSION.into()) {
             let what = format!("schema_version {}", version.unwrap_or_default());
             return Err(CaptureError::Newer { file, what });
@@ -68,7 +80,10 @@ impl Captured {
         let note: Capture = serde_json::from_value(value).map_err(|e| {
             let what = e.to_string();
             if what.starts_with("unknown field") {
-                return CaptureError::Newer { file: file.clone(), what };
+                return CaptureError::Newer {
+                    file: file.clone(),
+                    what,
+                };
             }
             bad(what)
         })?;
@@ -76,7 +91,10 @@ impl Captured {
         let sizes = [note.source.width, note.source.height]
             .into_iter()
             .chain(note.outline.iter().flat_map(|o| [o.width, o.height]));
-        if sizes.into_iter().any(|side| side == 0 || side > LARGEST_SIDE) {
+        if sizes
+            .into_iter()
+            .any(|side| side == 0 || side > LARGEST_SIDE)
+        {
             return Err(bad("a picture of this size cannot be".into()));
         }
         if let Some(model) = &note.model
@@ -87,7 +105,12 @@ impl Captured {
             return Err(bad("metres_per_px or foot_px is no number".into()));
         }
         let sides = [note.source.width, note.source.height].map(f64::from);
-        let far = |m: &ModelNote| m.foot_px.iter().zip(sides).any(|(x, side)| x.abs() > FARTHEST_FOOT * side);
+        let far = |m: &ModelNote| {
+            m.foot_px
+                .iter()
+                .zip(sides)
+                .any(|(x, side)| x.abs() > FARTHEST_FOOT * side)
+        };
         if note.model.as_ref().is_some_and(far) {
             return Err(bad("foot_px is far from the picture".into()));
         }
@@ -103,7 +126,8 @@ impl Captured {
         let estimator = PoseEstimator::new(captured.skeleton.clone(), &captured.note.config.motion);
         let pictured = captured.note.picture.as_ref().map(|p| p.frame);
         let postures = Postures::open(dir, &captured.skeleton, captured.metres_per_px())?;
-        (captured.poses, captured.pose_in_picture) = motion::read(postures, &estimator, animation_s, pictured)?;
+        (captured.poses, captured.pose_in_picture) =
+            motion::read(postures, &estimator, animation_s, pictured)?;
         Ok(captured)
     }
 
@@ -114,15 +138,25 @@ impl Captured {
     pub fn tree(dir: &Path) -> Result<Self, CaptureError> {
         let note = Self::note(dir)?;
         let size = Size::new(note.source.width, note.source.height);
-        let model = note.model.clone().ok_or_else(|| CaptureError::NoTree { dir: dir.to_owned() })?;
+        let model = note.model.clone().ok_or_else(|| CaptureError::NoTree {
+            dir: dir.to_owned(),
+        })?;
         let (mut skeleton, sway) = nodes::read(dir, &model, size)?;
         if skeleton.nodes.is_empty() {
-            return Err(CaptureError::NoTree { dir: dir.to_owned() });
+            return Err(CaptureError::NoTree {
+                dir: dir.to_owned(),
+            });
         }
         let mut warnings = Vec::new();
         // It repeats what the tables say but for these notes; without it they are left out.
-        let joints = std::fs::read(dir.join("tree.glb")).ok().and_then(|bytes| glb_notes::joints(&bytes));
-        warnings.extend(copies::mark(&mut skeleton, &model.copied, joints.as_deref()));
+        let joints = std::fs::read(dir.join("tree.glb"))
+            .ok()
+            .and_then(|bytes| glb_notes::joints(&bytes));
+        warnings.extend(copies::mark(
+            &mut skeleton,
+            &model.copied,
+            joints.as_deref(),
+        ));
         let skeleton = Arc::new(skeleton);
         let picture = match note.picture.as_ref().map(|p| picture(dir, p, size)) {
             Some(Ok(picture)) => Some(picture),
@@ -131,7 +165,10 @@ impl Captured {
                 None
             }
             None => {
-                warnings.push("the capture holds no picture: it is older, or the frame could not be decoded".into());
+                warnings.push(
+                    "the capture holds no picture: it is older, or the frame could not be decoded"
+                        .into(),
+                );
                 None
             }
         };
@@ -144,7 +181,17 @@ impl Captured {
             None
         });
         let (dir, poses, pose_in_picture) = (dir.to_owned(), Vec::new(), None);
-        Ok(Self { dir, note, skeleton, sway, poses, picture, pose_in_picture, outline, warnings })
+        Ok(Self {
+            dir,
+            note,
+            skeleton,
+            sway,
+            poses,
+            picture,
+            pose_in_picture,
+            outline,
+            warnings,
+        })
     }
 
     /// Metres in a pixel; 0 where the capture knows none.
@@ -168,7 +215,8 @@ impl Captured {
         film::read(&self.dir, &self.skeleton, window_s, within_s)
     }
 
-    /// All poses of the film in their order, read anew, one at a time: those of hours would fill the memory.
+    /// All poses of the film in their order, read anew, one at a time: those of hours would fill
+    /// the memory.
     ///
     /// # Errors
     /// `motion.csv` is missing or damaged; after an error the film is over.
@@ -179,18 +227,25 @@ impl Captured {
         Ok(std::iter::from_fn(move || {
             let next = if over { Ok(None) } else { postures.next() };
             over |= next.is_err();
-            next.map(|posture| posture.map(|p| p.pose(&estimator))).transpose()
+            next.map(|posture| posture.map(|p| p.pose(&estimator)))
+                .transpose()
         }))
     }
 
-    /// Poses of this tree, in the order in which the result is given them, as those of another tree whose measured nodes
-    /// are the same, e.g. one of another shape: its nodes follow the same places in the picture.
-    pub fn reposer<'a>(&'a self, skeleton: &Arc<Skeleton>, config: &Config) -> impl FnMut(&Pose) -> Pose + use<'a> {
+    /// Poses of this tree, in the order in which the result is given them, as those of another tree
+    /// whose measured nodes are the same, e.g. one of another shape: its nodes follow the same
+    /// places in the picture.
+    pub fn reposer<'a>(
+        &'a self,
+        skeleton: &Arc<Skeleton>,
+        config: &Config,
+    ) -> impl FnMut(&Pose) -> Pose + use<'a> {
         let mut estimator = PoseEstimator::new(skeleton.clone(), &config.motion);
         let measured = self.skeleton.measured().min(skeleton.measured());
         move |pose| {
             let place = |j: &JointPose| Some(self.skeleton.image_from_model(&j.position));
-            let targets: Vec<Option<[f64; 2]>> = pose.joints[..measured].iter().map(place).collect();
+            let targets: Vec<Option<[f64; 2]>> =
+                pose.joints[..measured].iter().map(place).collect();
             estimator.step(pose.frame, pose.time_s, &targets)
         }
     }
@@ -205,10 +260,19 @@ impl Captured {
 fn picture(dir: &Path, note: &PictureNote, size: Size) -> Result<Picture, String> {
     // A name and no way: the file lies in the folder.
     let name = Path::new(&note.file).file_name().ok_or("it has no name")?;
-    let rgb = image::open(dir.join(name)).map_err(|e| e.to_string())?.into_rgb8();
+    let rgb = image::open(dir.join(name))
+        .map_err(|e| e.to_string())?
+        .into_rgb8();
     let found = Size::new(rgb.width(), rgb.height());
     if found != size {
         return Err(format!("it is {found}, and the film is {size}"));
     }
-    Ok(Picture { rgb: Arc::new(Rgb { size, pixels: rgb.into_raw() }), frame: note.frame, time_s: note.time_s })
+    Ok(Picture {
+        rgb: Arc::new(Rgb {
+            size,
+            pixels: rgb.into_raw(),
+        }),
+        frame: note.frame,
+        time_s: note.time_s,
+    })
 }

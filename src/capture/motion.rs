@@ -36,9 +36,22 @@ pub(super) struct Postures {
 impl Postures {
     /// # Errors
     /// The table is missing or damaged.
-    pub fn open(dir: &Path, skeleton: &Arc<Skeleton>, metres_per_px: f64) -> Result<Self, CaptureError> {
-        let px = if metres_per_px > 0.0 { 1.0 / metres_per_px } else { 1.0 };
-        Ok(Self { table: Table::open(dir, "motion.csv", COLUMNS)?, skeleton: skeleton.clone(), px, last: None })
+    pub fn open(
+        dir: &Path,
+        skeleton: &Arc<Skeleton>,
+        metres_per_px: f64,
+    ) -> Result<Self, CaptureError> {
+        let px = if metres_per_px > 0.0 {
+            1.0 / metres_per_px
+        } else {
+            1.0
+        };
+        Ok(Self {
+            table: Table::open(dir, "motion.csv", COLUMNS)?,
+            skeleton: skeleton.clone(),
+            px,
+            last: None,
+        })
     }
 
     /// The next frame; `None` at the end.
@@ -46,17 +59,25 @@ impl Postures {
     /// # Errors
     /// The table is damaged, or is of another tree.
     pub fn next(&mut self) -> Result<Option<Posture>, CaptureError> {
-        let Some(posture) = next(&mut self.table, &self.skeleton, self.px)? else { return Ok(None) };
-        if self.last.is_some_and(|(frame, time_s)| posture.frame <= frame || posture.time_s < time_s) {
-            return Err(self.table.bad(format!("frame {} does not come after the one before it", posture.frame)));
+        let Some(posture) = next(&mut self.table, &self.skeleton, self.px)? else {
+            return Ok(None);
+        };
+        if self
+            .last
+            .is_some_and(|(frame, time_s)| posture.frame <= frame || posture.time_s < time_s)
+        {
+            return Err(self.table.bad(format!(
+                "frame {} does not come after the one before it",
+                posture.frame
+            )));
         }
         self.last = Some((posture.frame, posture.time_s));
         Ok(Some(posture))
     }
 }
 
-/// The poses of the last `animation_s` of the capture, and the one in frame `pictured`. The table goes by row by row, so
-/// that a capture of hours takes no more room than what is kept of it.
+/// The poses of the last `animation_s` of the capture, and the one in frame `pictured`. The table
+/// goes by row by row, so that a capture of hours takes no more room than what is kept of it.
 ///
 /// # Errors
 /// The table is damaged, or is of another tree.
@@ -82,12 +103,18 @@ pub(super) fn read(
 }
 
 /// The rows of the next frame: every node of the skeleton, in its order.
-fn next(table: &mut Table<6>, skeleton: &Skeleton, px: f64) -> Result<Option<Posture>, CaptureError> {
+fn next(
+    table: &mut Table<6>,
+    skeleton: &Skeleton,
+    px: f64,
+) -> Result<Option<Posture>, CaptureError> {
     let mut posture: Option<Posture> = None;
     for (i, node) in skeleton.nodes.iter().enumerate() {
         if !table.next()? {
             return match posture {
-                Some(p) => Err(table.bad_end(format!("the table ends in the middle of frame {}", p.frame))),
+                Some(p) => {
+                    Err(table.bad_end(format!("the table ends in the middle of frame {}", p.frame)))
+                }
                 None => Ok(None),
             };
         }
@@ -95,14 +122,26 @@ fn next(table: &mut Table<6>, skeleton: &Skeleton, px: f64) -> Result<Option<Pos
         let name: u32 = table.whole(2, "node_id")?;
         let expected = node.name.0;
         if name != expected {
-            return Err(table.bad(format!("here stands node {name}, where nodes.csv has node {expected}")));
+            return Err(table.bad(format!(
+                "here stands node {name}, where nodes.csv has node {expected}"
+            )));
         }
         let place = table.place_px([3, 4, 5], px)?;
         match &mut posture {
-            None => posture = Some(Posture { frame, time_s: table.number(1, "time_s")?, places: vec![place] }),
+            None => {
+                posture = Some(Posture {
+                    frame,
+                    time_s: table.number(1, "time_s")?,
+                    places: vec![place],
+                })
+            }
             Some(p) if p.frame == frame => p.places.push(place),
             Some(p) => {
-                return Err(table.bad(format!("frame {} has rows for {i} of {} nodes", p.frame, skeleton.nodes.len())));
+                return Err(table.bad(format!(
+                    "frame {} has rows for {i} of {} nodes",
+                    p.frame,
+                    skeleton.nodes.len()
+                )));
             }
         }
     }

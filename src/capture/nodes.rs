@@ -3,7 +3,9 @@
 use super::CaptureError;
 use super::table::Table;
 use crate::export::capture::ModelNote;
-use crate::model::{Excitation, Interval, Node, NodeId, NodeName, Size, Skeleton, Sway, Swaying, Unidentified};
+use crate::model::{
+    Excitation, Interval, Node, NodeId, NodeName, Size, Skeleton, Sway, Swaying, Unidentified,
+};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -11,7 +13,16 @@ use std::path::Path;
 const MOST_NODES: usize = 1 << 16;
 /// Nodes that a later change adds get numbers above those there are.
 const LARGEST_NAME: u32 = u32::MAX / 2;
-const COLUMNS: [&str; 8] = ["node_id", "parent_id", "level", "n_tracks", "x", "y", "z", "radius"];
+const COLUMNS: [&str; 8] = [
+    "node_id",
+    "parent_id",
+    "level",
+    "n_tracks",
+    "x",
+    "y",
+    "z",
+    "radius",
+];
 const SWAY_COLUMNS: [&str; 9] = [
     "frequency_hz",
     "frequency_lo_hz",
@@ -27,11 +38,20 @@ const SWAY_COLUMNS: [&str; 9] = [
 /// The nodes in their order, none of them a copy yet, and how each sways.
 ///
 /// # Errors
-/// The table is missing or damaged; two nodes have one number, or one stands before its parent, or not one level above it.
-pub(super) fn read(dir: &Path, note: &ModelNote, image_size: Size) -> Result<(Skeleton, Vec<Swaying>), CaptureError> {
+/// The table is missing or damaged; two nodes have one number, or one stands before its parent, or
+/// not one level above it.
+pub(super) fn read(
+    dir: &Path,
+    note: &ModelNote,
+    image_size: Size,
+) -> Result<(Skeleton, Vec<Swaying>), CaptureError> {
     let mut table = Table::open(dir, "nodes.csv", COLUMNS)?;
     let sway_columns = SWAY_COLUMNS.map(|name| table.place(name));
-    let px = if note.metres_per_px > 0.0 { 1.0 / note.metres_per_px } else { 1.0 };
+    let px = if note.metres_per_px > 0.0 {
+        1.0 / note.metres_per_px
+    } else {
+        1.0
+    };
     let (mut nodes, mut sway): (Vec<Node>, Vec<Swaying>) = (Vec::new(), Vec::new());
     let mut by_name: BTreeMap<u32, NodeId> = BTreeMap::new();
     while table.next()? {
@@ -41,7 +61,8 @@ pub(super) fn read(dir: &Path, note: &ModelNote, image_size: Size) -> Result<(Sk
             _ => {
                 let parent: u32 = table.whole(1, "parent_id")?;
                 let known = by_name.get(&parent).copied();
-                let why = || format!("its parent is node {parent}, which is in no row before this one");
+                let why =
+                    || format!("its parent is node {parent}, which is in no row before this one");
                 Some(known.ok_or_else(|| table.bad(why()))?)
             }
         };
@@ -52,14 +73,17 @@ pub(super) fn read(dir: &Path, note: &ModelNote, image_size: Size) -> Result<(Sk
             return Err(table.bad(format!("there are more than {MOST_NODES} nodes")));
         }
         if name > LARGEST_NAME {
-            return Err(table.bad(format!("node_id is {name}, and at most {LARGEST_NAME} can be")));
+            return Err(table.bad(format!(
+                "node_id is {name}, and at most {LARGEST_NAME} can be"
+            )));
         }
         let level: u32 = table.whole(2, "level")?;
         let expected = parent.map_or(0, |p| u32::from(nodes[p.index()].level) + 1);
         if level != expected {
             return Err(table.bad(format!("level is {level}, and must be {expected} there")));
         }
-        let level = u8::try_from(level).map_err(|_| table.bad("it has more levels than any tree"))?;
+        let level =
+            u8::try_from(level).map_err(|_| table.bad("it has more levels than any tree"))?;
         if by_name.insert(name, NodeId(nodes.len() as u32)).is_some() {
             return Err(table.bad(format!("there are two nodes {name}")));
         }
@@ -81,16 +105,28 @@ pub(super) fn read(dir: &Path, note: &ModelNote, image_size: Size) -> Result<(Sk
         });
         sway.push(sway_of(&table, sway_columns));
     }
-    Ok((Skeleton { nodes, foot_px: note.foot_px, image_size }, sway))
+    Ok((
+        Skeleton {
+            nodes,
+            foot_px: note.foot_px,
+            image_size,
+        },
+        sway,
+    ))
 }
 
-/// How the node of the present row sways. A frequency counts with its interval only; where a table does not say what made
-/// it sway, as in captures of older versions, it was wind, which claims less.
+/// How the node of the present row sways. A frequency counts with its interval only; where a table
+/// does not say what made it sway, as in captures of older versions, it was wind, which claims
+/// less.
 fn sway_of<const N: usize>(table: &Table<N>, columns: [Option<usize>; 9]) -> Swaying {
     let cell = |c: Option<usize>| c.map_or("", |c| table.at(c));
     let value = |c| cell(c).parse().ok().filter(|x: &f64| x.is_finite());
     let interval = |i: usize| {
-        let [value, lo, hi] = [value(columns[i])?, value(columns[i + 1])?, value(columns[i + 2])?];
+        let [value, lo, hi] = [
+            value(columns[i])?,
+            value(columns[i + 1])?,
+            value(columns[i + 2])?,
+        ];
         (0.0 <= lo && lo <= value && value <= hi).then_some(Interval { value, lo, hi })
     };
     let why = || Unidentified::of_word(cell(columns[8])).unwrap_or(Unidentified::NotMeasured);

@@ -24,8 +24,14 @@ impl<const N: usize> Table<N> {
     pub fn open(dir: &Path, name: &'static str, columns: [&str; N]) -> Result<Self, CaptureError> {
         let file = dir.join(name);
         let opened = File::open(&file).map_err(|source| match source.kind() {
-            io::ErrorKind::NotFound => CaptureError::Missing { dir: dir.to_owned(), file: name },
-            _ => CaptureError::Unreadable { file: file.clone(), source },
+            io::ErrorKind::NotFound => CaptureError::Missing {
+                dir: dir.to_owned(),
+                file: name,
+            },
+            _ => CaptureError::Unreadable {
+                file: file.clone(),
+                source,
+            },
         })?;
         // Rows of another length are told by us, with their line.
         let mut reader = ReaderBuilder::new().flexible(true).from_reader(opened);
@@ -33,9 +39,16 @@ impl<const N: usize> Table<N> {
         let mut at = [0; N];
         for (at, name) in at.iter_mut().zip(columns) {
             let found = header.iter().position(|c| c == name);
-            *at = found.ok_or_else(|| CaptureError::row(&file, 1, format!("the column {name} is missing")))?;
+            *at = found.ok_or_else(|| {
+                CaptureError::row(&file, 1, format!("the column {name} is missing"))
+            })?;
         }
-        Ok(Self { file, reader, columns: at, row: StringRecord::new() })
+        Ok(Self {
+            file,
+            reader,
+            columns: at,
+            row: StringRecord::new(),
+        })
     }
 
     /// Place of a column that need not be there.
@@ -48,7 +61,9 @@ impl<const N: usize> Table<N> {
     /// # Errors
     /// The file cannot be read, or is no text there.
     pub fn next(&mut self) -> Result<bool, CaptureError> {
-        self.reader.read_record(&mut self.row).map_err(|e| explain(&self.file, e))
+        self.reader
+            .read_record(&mut self.row)
+            .map_err(|e| explain(&self.file, e))
     }
 
     /// The cell of the `i`-th column that was asked for; empty where the row is too short.
@@ -66,7 +81,12 @@ impl<const N: usize> Table<N> {
     /// # Errors
     /// The cell holds none.
     pub fn whole<T: std::str::FromStr>(&self, i: usize, name: &str) -> Result<T, CaptureError> {
-        self.cell(i).parse().map_err(|_| self.bad(format!("{name} is {:?}, and must be a whole number", self.cell(i))))
+        self.cell(i).parse().map_err(|_| {
+            self.bad(format!(
+                "{name} is {:?}, and must be a whole number",
+                self.cell(i)
+            ))
+        })
     }
 
     /// A number that is neither infinite nor none.
@@ -74,8 +94,17 @@ impl<const N: usize> Table<N> {
     /// # Errors
     /// The cell holds none.
     pub fn number(&self, i: usize, name: &str) -> Result<f64, CaptureError> {
-        let number = self.cell(i).parse().ok().filter(|x: &f64| x.is_finite() && x.abs() < 1e12);
-        number.ok_or_else(|| self.bad(format!("{name} is {:?}, and must be a number", self.cell(i))))
+        let number = self
+            .cell(i)
+            .parse()
+            .ok()
+            .filter(|x: &f64| x.is_finite() && x.abs() < 1e12);
+        number.ok_or_else(|| {
+            self.bad(format!(
+                "{name} is {:?}, and must be a number",
+                self.cell(i)
+            ))
+        })
     }
 
     /// A length of the model in pixels, `px` of them to the file's unit.
@@ -87,7 +116,10 @@ impl<const N: usize> Table<N> {
         if length_px.abs() <= FARTHEST_PX {
             return Ok(length_px);
         }
-        Err(self.bad(format!("{name} is {:?}, which is {length_px:.0} px; no tree is so large", self.cell(i))))
+        Err(self.bad(format!(
+            "{name} is {:?}, which is {length_px:.0} px; no tree is so large",
+            self.cell(i)
+        )))
     }
 
     /// A place in model axes, px, from the columns of its x, y and z.
@@ -95,12 +127,20 @@ impl<const N: usize> Table<N> {
     /// # Errors
     /// As of [`Table::length_px`].
     pub fn place_px(&self, [x, y, z]: [usize; 3], px: f64) -> Result<Point3<f64>, CaptureError> {
-        Ok(Point3::new(self.length_px(x, "x", px)?, self.length_px(y, "y", px)?, self.length_px(z, "z", px)?))
+        Ok(Point3::new(
+            self.length_px(x, "x", px)?,
+            self.length_px(y, "y", px)?,
+            self.length_px(z, "z", px)?,
+        ))
     }
 
     /// What is wrong with the present row.
     pub fn bad(&self, what: impl Into<String>) -> CaptureError {
-        CaptureError::row(&self.file, self.row.position().map_or(0, Position::line), what)
+        CaptureError::row(
+            &self.file,
+            self.row.position().map_or(0, Position::line),
+            what,
+        )
     }
 
     /// What is wrong with the file at its end.
@@ -112,7 +152,10 @@ impl<const N: usize> Table<N> {
 fn explain(file: &Path, e: csv::Error) -> CaptureError {
     let line = e.position().map_or(1, Position::line);
     match e.into_kind() {
-        ErrorKind::Io(source) => CaptureError::Unreadable { file: file.to_owned(), source },
+        ErrorKind::Io(source) => CaptureError::Unreadable {
+            file: file.to_owned(),
+            source,
+        },
         ErrorKind::Utf8 { .. } => CaptureError::row(file, line, "it is no text"),
         other => CaptureError::row(file, line, format!("{other:?}")),
     }

@@ -1,4 +1,5 @@
-//! `arborcam analyze DIR...`: how every branch of a capture sways, and what captures have in common.
+//! `arborcam analyze DIR...`: how every branch of a capture sways, and what captures have in
+//! common.
 
 mod options;
 mod written;
@@ -21,7 +22,8 @@ use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use written::{differs, put_beside, put_into, stale};
 
-/// Film that is analysed at most, s, where a part is chosen: the end of a longer one. Points of hours would fill the memory.
+/// Film that is analysed at most, s, where a part is chosen: the end of a longer one. Points of
+/// hours would fill the memory.
 const LONGEST_S: f64 = 600.0;
 
 /// One capture and what is to be written into it.
@@ -40,11 +42,22 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), Ended> {
     let stop = Stop::on_signals()?;
     let names = names(&args.dirs);
     // Before the first is worked on: a mistyped name is told at once.
-    let read: Vec<Captured> = args.dirs.iter().map(|dir| Captured::tree(dir)).collect::<Result<_, _>>()?;
-    read.iter().try_for_each(|captured| args.scale.fits(captured.skeleton.image_size))?;
-    let all: Vec<Analysed> =
-        read.iter().zip(&names).map(|(captured, name)| analysed(args, captured, name)).collect::<Result<_, _>>()?;
-    let (studies, answers): (Vec<Study>, Vec<_>) = all.into_iter().map(|a| (a.study, (a.sway, a.differs))).unzip();
+    let read: Vec<Captured> = args
+        .dirs
+        .iter()
+        .map(|dir| Captured::tree(dir))
+        .collect::<Result<_, _>>()?;
+    read.iter()
+        .try_for_each(|captured| args.scale.fits(captured.skeleton.image_size))?;
+    let all: Vec<Analysed> = read
+        .iter()
+        .zip(&names)
+        .map(|(captured, name)| analysed(args, captured, name))
+        .collect::<Result<_, _>>()?;
+    let (studies, answers): (Vec<Study>, Vec<_>) = all
+        .into_iter()
+        .map(|a| (a.study, (a.sway, a.differs)))
+        .unzip();
     let comparison = compare(&studies, args.trees.same());
     if comparison.as_ref().is_some_and(|c| c.same_tree.is_none()) {
         say(
@@ -93,7 +106,8 @@ fn analysed(args: &AnalyzeArgs, captured: &Captured, name: &str) -> Result<Analy
     own.export.metres_per_px = captured.metres_per_px();
     let config = args.config(&own)?;
     let dynamics = &config.dynamics;
-    // As at the end of a capture: points do not live for ever, and of those that are gone nothing is said.
+    // As at the end of a capture: points do not live for ever, and of those that are gone nothing
+    // is said.
     let chosen = args.from.is_some() || args.to.is_some();
     let longest_s = if chosen { LONGEST_S } else { dynamics.window_s };
     let film = captured.tracked_within(longest_s, args.within_s())?;
@@ -102,11 +116,21 @@ fn analysed(args: &AnalyzeArgs, captured: &Captured, name: &str) -> Result<Analy
         say(&format!("arborcam: {kind}: {name}: {what}"));
         notes.push(what);
     };
-    captured.warnings.iter().for_each(|what| tell("warning", what.clone()));
-    let ends = film.times_s.first().copied().zip(film.times_s.last().copied());
+    captured
+        .warnings
+        .iter()
+        .for_each(|what| tell("warning", what.clone()));
+    let ends = film
+        .times_s
+        .first()
+        .copied()
+        .zip(film.times_s.last().copied());
     let [from_s, to_s] = ends.map_or([0.0; 2], |(a, b)| [a, b]);
     let duration_s = captured.note.timing.duration_s;
-    if let Some(from) = args.from.filter(|from| film.times_s.is_empty() && *from > duration_s) {
+    if let Some(from) = args
+        .from
+        .filter(|from| film.times_s.is_empty() && *from > duration_s)
+    {
         let what = format!(
             "--from {from} is after the end of {name}, which is {duration_s:.1} s long; choose an earlier part"
         );
@@ -117,7 +141,9 @@ fn analysed(args: &AnalyzeArgs, captured: &Captured, name: &str) -> Result<Analy
         let (kind, what) = match chosen {
             true => (
                 "warning",
-                format!("the film is longer than {LONGEST_S:.0} s; its end is analysed; choose another part"),
+                format!(
+                    "the film is longer than {LONGEST_S:.0} s; its end is analysed; choose another part"
+                ),
             ),
             false => (
                 "note",
@@ -140,10 +166,16 @@ fn analysed(args: &AnalyzeArgs, captured: &Captured, name: &str) -> Result<Analy
     });
     progress.end();
     let given = dynamics.excitation != Excited::Auto;
-    hints(&film, &analysis, given).into_iter().for_each(|what| tell("note", what));
+    hints(&film, &analysis, given)
+        .into_iter()
+        .for_each(|what| tell("note", what));
     let mut poses = Vec::new();
     let all = captured.film().map(|film| {
-        film.filter(|p| p.as_ref().map_or(true, |p| from_s <= p.time_s && p.time_s <= to_s)).try_for_each(|pose| {
+        film.filter(|p| {
+            p.as_ref()
+                .map_or(true, |p| from_s <= p.time_s && p.time_s <= to_s)
+        })
+        .try_for_each(|pose| {
             let mut pose = pose?;
             pose.joints.truncate(skeleton.nodes.len());
             poses.push(pose);
@@ -151,12 +183,19 @@ fn analysed(args: &AnalyzeArgs, captured: &Captured, name: &str) -> Result<Analy
         })
     });
     if let Err(e) = all.and_then(|done| done) {
-        tell("warning", format!("there are no plots of angles and spectra: {e}"));
+        tell(
+            "warning",
+            format!("there are no plots of angles and spectra: {e}"),
+        );
         poses.clear();
     }
     let picture = captured.picture.as_ref().filter(|_| args.report.is_some());
     let picture = picture.and_then(|p| data_address(&p.rgb).ok());
-    let outline_px = captured.note.outline.as_ref().map_or(&[][..], |o| &o.polygon_px);
+    let outline_px = captured
+        .note
+        .outline
+        .as_ref()
+        .map_or(&[][..], |o| &o.polygon_px);
     let excitation = match dynamics.excitation {
         Excited::Auto => None,
         Excited::Release => Some(Excitation::Release),
@@ -176,18 +215,32 @@ fn analysed(args: &AnalyzeArgs, captured: &Captured, name: &str) -> Result<Analy
         picture: picture.as_deref(),
         notes: &notes,
     });
-    let differs = captured.sway.iter().zip(&analysis.sway).any(|(old, new)| differs(old, new));
-    let mut sway: BTreeMap<NodeName, Swaying> = skeleton.nodes.iter().map(|n| n.name).zip(analysis.sway).collect();
+    let differs = captured
+        .sway
+        .iter()
+        .zip(&analysis.sway)
+        .any(|(old, new)| differs(old, new));
+    let mut sway: BTreeMap<NodeName, Swaying> = skeleton
+        .nodes
+        .iter()
+        .map(|n| n.name)
+        .zip(analysis.sway)
+        .collect();
     for branch in &study.branches {
         // The file says what the table says.
         if let Some(Ok(sway)) = sway.get_mut(&NodeName(branch.name)) {
             sway.amplitude_deg = branch.amplitude_deg;
         }
     }
-    Ok(Analysed { study, sway, differs })
+    Ok(Analysed {
+        study,
+        sway,
+        differs,
+    })
 }
 
-/// Tells how far the work is, on a line that is written over and goes at the end; on a terminal only.
+/// Tells how far the work is, on a line that is written over and goes at the end; on a terminal
+/// only.
 struct Progress<'a> {
     name: &'a str,
     all: usize,
@@ -197,13 +250,24 @@ struct Progress<'a> {
 
 impl<'a> Progress<'a> {
     fn of(name: &'a str, all: usize) -> Self {
-        Self { name, all, done: Cell::new(0), shown: std::io::stderr().is_terminal() }
+        Self {
+            name,
+            all,
+            done: Cell::new(0),
+            shown: std::io::stderr().is_terminal(),
+        }
     }
 
     fn step(&self) {
         self.done.set(self.done.get() + 1);
         if self.shown {
-            let _ = write!(std::io::stderr(), "\r{}: branch {} of {}", self.name, self.done.get(), self.all - 1);
+            let _ = write!(
+                std::io::stderr(),
+                "\r{}: branch {} of {}",
+                self.name,
+                self.done.get(),
+                self.all - 1
+            );
         }
     }
 
@@ -214,18 +278,26 @@ impl<'a> Progress<'a> {
     }
 }
 
-/// What the captures are called: the names of their folders, with as much of the way to them as tells them apart.
+/// What the captures are called: the names of their folders, with as much of the way to them as
+/// tells them apart.
 fn names(dirs: &[PathBuf]) -> Vec<String> {
     let parts = |dir: &PathBuf| -> Vec<String> {
         let dir = std::path::absolute(dir).unwrap_or_else(|_| dir.clone());
         let dir = dir.canonicalize().unwrap_or(dir);
-        dir.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect()
+        dir.components()
+            .map(|c| c.as_os_str().to_string_lossy().into_owned())
+            .collect()
     };
     let all: Vec<Vec<String>> = dirs.iter().map(parts).collect();
     let end = |parts: &[String], n: usize| parts[parts.len().saturating_sub(n)..].join("/");
     let longest = all.iter().map(Vec::len).max().unwrap_or(1);
     let name = |parts: &Vec<String>| {
-        let alone = |n: &usize| all.iter().filter(|other| end(other, *n) == end(parts, *n)).count() == 1;
+        let alone = |n: &usize| {
+            all.iter()
+                .filter(|other| end(other, *n) == end(parts, *n))
+                .count()
+                == 1
+        };
         end(parts, (1..=longest).find(alone).unwrap_or(longest))
     };
     all.iter().map(name).collect()
@@ -236,7 +308,13 @@ fn print(text: &str) -> Result<(), Ended> {
     let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
     // Whoever closed standard output early has seen what they wanted.
     written
-        .or_else(|e| if e.kind() == std::io::ErrorKind::BrokenPipe { Ok(()) } else { Err(e) })
+        .or_else(|e| {
+            if e.kind() == std::io::ErrorKind::BrokenPipe {
+                Ok(())
+            } else {
+                Err(e)
+            }
+        })
         .map_err(|e| Ended::Failed(anyhow!("cannot write to standard output: {e}")))
 }
 
@@ -247,7 +325,10 @@ mod tests {
     #[test]
     fn captures_of_one_name_are_told_apart_by_where_they_lie() {
         let named = |dirs: &[&str]| names(&dirs.iter().map(PathBuf::from).collect::<Vec<_>>());
-        assert_eq!(named(&["/x/calm/oak", "/x/storm/oak/", "/x/elm"]), ["calm/oak", "storm/oak", "elm"]);
+        assert_eq!(
+            named(&["/x/calm/oak", "/x/storm/oak/", "/x/elm"]),
+            ["calm/oak", "storm/oak", "elm"]
+        );
         assert_eq!(named(&["/x/oak"]), ["oak"]);
     }
 }

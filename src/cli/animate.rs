@@ -31,9 +31,14 @@ use std::sync::atomic::Ordering;
 const PERIOD_S: f64 = 128.0;
 
 pub fn run(args: &AnimateArgs) -> Result<(), Ended> {
-    args.set(&mut Config::default()).map_err(|e| Ended::BadUsage(e.into()))?;
-    let Some(out) = &args.out else { return live(args) };
-    let kind = args.check(out).map_err(|why| Ended::BadUsage(anyhow!(why)))?;
+    args.set(&mut Config::default())
+        .map_err(|e| Ended::BadUsage(e.into()))?;
+    let Some(out) = &args.out else {
+        return live(args);
+    };
+    let kind = args
+        .check(out)
+        .map_err(|why| Ended::BadUsage(anyhow!(why)))?;
     refuse_taken(out).map_err(failed)?;
     if kind == Kind::Html {
         html::built_in().map_err(failed)?;
@@ -43,8 +48,17 @@ pub fn run(args: &AnimateArgs) -> Result<(), Ended> {
     let mut made = made(args)?;
     let (poses, what) = match args.magnify {
         Some(by) => {
-            let poses = magnify(&made.skeleton, &made.poses, &magnified(args, &made, by), args.fps, args.count());
-            (poses.map_err(|e| Ended::Failed(e.into()))?, json!({ "captured": { "times": by, "speed": args.speed } }))
+            let poses = magnify(
+                &made.skeleton,
+                &made.poses,
+                &magnified(args, &made, by),
+                args.fps,
+                args.count(),
+            );
+            (
+                poses.map_err(|e| Ended::Failed(e.into()))?,
+                json!({ "captured": { "times": by, "speed": args.speed } }),
+            )
         }
         None => blown(args, &made, sound)?,
     };
@@ -72,15 +86,27 @@ fn live(args: &AnimateArgs) -> Result<(), Ended> {
         }
     };
     let stop = stop_on_signals(Hangup::of_this_process() != Hangup::Ignored)?;
-    tui::watch(&mut *moving, tui::Options::from_env(), &stop).map_err(|e| Ended::BadUsage(e.into()))?;
-    if stop.load(Ordering::SeqCst) { Err(Ended::Stopped) } else { Ok(()) }
+    tui::watch(&mut *moving, tui::Options::from_env(), &stop)
+        .map_err(|e| Ended::BadUsage(e.into()))?;
+    if stop.load(Ordering::SeqCst) {
+        Err(Ended::Stopped)
+    } else {
+        Ok(())
+    }
 }
 
 /// The tree, with the wind that is asked for, and all of its film where that is to be changed.
 fn made(args: &AnimateArgs) -> Result<Made, Ended> {
-    let film_s = |film_s: f64| Some(if args.magnify.is_some() { film_s + 1.0 } else { 0.0 });
+    let film_s = |film_s: f64| {
+        Some(if args.magnify.is_some() {
+            film_s + 1.0
+        } else {
+            0.0
+        })
+    };
     let mut made = args.shaping.made_with(&args.dir, film_s)?;
-    args.set(&mut made.config).map_err(|e| Ended::BadUsage(e.into()))?;
+    args.set(&mut made.config)
+        .map_err(|e| Ended::BadUsage(e.into()))?;
     for warning in &made.captured.warnings {
         say(&format!("arborcam: warning: {warning}"));
     }
@@ -90,13 +116,21 @@ fn made(args: &AnimateArgs) -> Result<Made, Ended> {
 /// The loudness of a WAV file.
 fn sound(path: &Path) -> Result<Loudness, Ended> {
     let unfit = |e: anyhow::Error| Ended::BadUsage(e.context(format!("--wav {}", path.display())));
-    let bytes = std::fs::read(path).context("cannot read it").map_err(unfit)?;
+    let bytes = std::fs::read(path)
+        .context("cannot read it")
+        .map_err(unfit)?;
     Loudness::of_wav(&bytes).map_err(|e| unfit(e.into()))
 }
 
 fn magnified(args: &AnimateArgs, made: &Made, by: f64) -> Magnify {
     let most_rad = made.config.wind.max_bend_deg.to_radians();
-    Magnify { by, speed: args.speed, band_hz: args.band, most_rad, looped: args.looped }
+    Magnify {
+        by,
+        speed: args.speed,
+        band_hz: args.band,
+        most_rad,
+        looped: args.looped,
+    }
 }
 
 /// The tree at rest in its wind, which comes back after `period_s`.
@@ -119,12 +153,23 @@ fn animator(made: &Made, sound: Option<Loudness>, period_s: f64) -> Animator {
 }
 
 /// The tree in the wind, or pulled and let go.
-fn blown(args: &AnimateArgs, made: &Made, sound: Option<Loudness>) -> Result<(Vec<Pose>, Value), Ended> {
+fn blown(
+    args: &AnimateArgs,
+    made: &Made,
+    sound: Option<Loudness>,
+) -> Result<(Vec<Pose>, Value), Ended> {
     let count = args.count();
     let length_s = count as f64 / args.fps;
-    let period_s = if args.looped { length_s } else { PERIOD_S * (length_s / PERIOD_S + 1.0).log2().ceil().exp2() };
+    let period_s = if args.looped {
+        length_s
+    } else {
+        PERIOD_S * (length_s / PERIOD_S + 1.0).log2().ceil().exp2()
+    };
     if let Some(sound) = sound.as_ref().filter(|s| s.length_s() < length_s) {
-        say(&format!("arborcam: warning: the sound lasts {:.1} s and is repeated", sound.length_s()));
+        say(&format!(
+            "arborcam: warning: the sound lasts {:.1} s and is repeated",
+            sound.length_s()
+        ));
     }
     let sound = sound.map(|s| if args.looped { s.looped(length_s) } else { s });
     let mut animator = animator(made, sound, period_s);
@@ -138,7 +183,10 @@ fn blown(args: &AnimateArgs, made: &Made, sound: Option<Loudness>) -> Result<(Ve
     let mut poses = Vec::with_capacity(count as usize + 1);
     for k in 0..=count {
         // Not the animator's own time: a sum of steps is not quite it.
-        poses.push(Pose { time_s: k as f64 / args.fps, ..animator.pose(k) });
+        poses.push(Pose {
+            time_s: k as f64 / args.fps,
+            ..animator.pose(k)
+        });
         let (from_s, step_s) = (k as f64 / args.fps, 1.0 / args.fps);
         if args.pull.is_some() && (from_s..from_s + step_s).contains(&args.release) {
             animator.advance(args.release - from_s);
@@ -159,16 +207,31 @@ fn blown(args: &AnimateArgs, made: &Made, sound: Option<Loudness>) -> Result<(Ve
 }
 
 /// Hangs the tree in its rope.
-fn pull(args: &AnimateArgs, made: &Made, animator: &mut Animator, lean_deg: f64) -> Result<(), Ended> {
+fn pull(
+    args: &AnimateArgs,
+    made: &Made,
+    animator: &mut Animator,
+    lean_deg: f64,
+) -> Result<(), Ended> {
     let nodes = &made.skeleton.nodes;
     let node = match args.pull_node {
         Some(name) => {
-            let unknown = || Ended::BadUsage(anyhow!("--pull-node {name} is no node of this tree; see nodes.csv"));
-            (1..nodes.len()).find(|&i| nodes[i].name.0 == name).ok_or_else(unknown)?
+            let unknown = || {
+                Ended::BadUsage(anyhow!(
+                    "--pull-node {name} is no node of this tree; see nodes.csv"
+                ))
+            };
+            (1..nodes.len())
+                .find(|&i| nodes[i].name.0 == name)
+                .ok_or_else(unknown)?
         }
         None => place_to_pull(&made.skeleton).index(),
     };
-    let reached_deg = animator.pull_aside(NodeId(node as u32), made.config.wind.direction_deg, lean_deg);
+    let reached_deg = animator.pull_aside(
+        NodeId(node as u32),
+        made.config.wind.direction_deg,
+        lean_deg,
+    );
     if reached_deg < lean_deg - 0.1 {
         say(&format!(
             "arborcam: warning: pulled so far it leans by {reached_deg:.1} degrees; it does not give way farther"
@@ -181,18 +244,36 @@ fn pull(args: &AnimateArgs, made: &Made, animator: &mut Animator, lean_deg: f64)
 fn known(sway: &Swaying) -> Known {
     sway.as_ref().map_or_else(
         |_| Known::default(),
-        |s| Known { frequency_hz: Some(s.frequency_hz.value), damping_ratio: s.damping_ratio.map(|d| d.value) },
+        |s| Known {
+            frequency_hz: Some(s.frequency_hz.value),
+            damping_ratio: s.damping_ratio.map(|d| d.value),
+        },
     )
 }
 
 /// The capture's scale, or that of a tree of the height that the configuration says.
 fn metres_per_px(made: &Made) -> f64 {
     let given = made.config.export.metres_per_px;
-    let height_px = made.skeleton.nodes.iter().map(|n| n.position.y).fold(1.0, f64::max);
-    if given > 0.0 { given } else { made.config.wind.tree_height_m / height_px }
+    let height_px = made
+        .skeleton
+        .nodes
+        .iter()
+        .map(|n| n.position.y)
+        .fold(1.0, f64::max);
+    if given > 0.0 {
+        given
+    } else {
+        made.config.wind.tree_height_m / height_px
+    }
 }
 
-fn write(args: &AnimateArgs, out: &Path, kind: Kind, made: &Made, stop: &Stop) -> Result<(), Ended> {
+fn write(
+    args: &AnimateArgs,
+    out: &Path,
+    kind: Kind,
+    made: &Made,
+    stop: &Stop,
+) -> Result<(), Ended> {
     let part = |of: Option<&std::ffi::OsStr>| of.unwrap_or_default().to_string_lossy().into_owned();
     let (name, stem) = (part(out.file_name()), part(out.file_stem()));
     let model = made.model();
@@ -206,8 +287,18 @@ fn write(args: &AnimateArgs, out: &Path, kind: Kind, made: &Made, stop: &Stop) -
     };
     let files = files.map_err(failed)?;
     let size: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();
-    write_files(out.parent().unwrap_or(Path::new("")), &files, stop.while_writing()).map_err(failed)?;
-    say(&format!("{}: {} poses, {:.1} MB", out.display(), made.poses.len(), size as f64 / 1e6));
+    write_files(
+        out.parent().unwrap_or(Path::new("")),
+        &files,
+        stop.while_writing(),
+    )
+    .map_err(failed)?;
+    say(&format!(
+        "{}: {} poses, {:.1} MB",
+        out.display(),
+        made.poses.len(),
+        size as f64 / 1e6
+    ));
     Ok(())
 }
 
@@ -221,7 +312,9 @@ fn table(made: &Made) -> Result<Vec<u8>, ExportError> {
 /// As `render` would be asked; a picture is of the end.
 fn picture(args: &AnimateArgs, out: &Path) -> RenderArgs {
     let length_s = args.count() as f64 / args.fps;
-    let video = out.extension().is_some_and(|e| e.eq_ignore_ascii_case("mp4"));
+    let video = out
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("mp4"));
     RenderArgs {
         dir: args.dir.clone(),
         view: args.view,

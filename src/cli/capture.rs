@@ -10,8 +10,8 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub struct CaptureArgs {
-    /// The camera: /dev/video0, a link to it, or the name that stays, all as `arborcam devices` lists them. A recording is
-    /// taken at its own pace.
+    /// The camera: /dev/video0, a link to it, or the name that stays, all as `arborcam devices`
+    /// lists them. A recording is taken at its own pace.
     device: PathBuf,
     #[command(flatten)]
     camera: CameraArgs,
@@ -23,5 +23,14 @@ pub struct CaptureArgs {
 
 pub fn run(args: &CaptureArgs) -> Result<(), Ended> {
     let set = |config: &mut Config| args.camera.set(&mut config.camera);
-    session::run(&args.common, Plan { input: &args.device, fps: None, pace: None, set: &set, record: &args.record })
+    session::run(
+        &args.common,
+        Plan {
+            input: &args.device,
+            fps: None,
+            pace: None,
+            set: &set,
+            record: &args.record,
+        },
+    )
 }

@@ -24,7 +24,10 @@ pub fn run(args: &DevicesArgs) -> Result<(), Ended> {
     };
     let devices = source::list_for(&config.camera, &Places::default());
     let text = if args.json {
-        format!("{}\n", devices.iter().map(json).collect::<serde_json::Value>())
+        format!(
+            "{}\n",
+            devices.iter().map(json).collect::<serde_json::Value>()
+        )
     } else {
         devices.iter().map(shown).collect()
     };
@@ -36,7 +39,13 @@ pub fn run(args: &DevicesArgs) -> Result<(), Ended> {
     }
     // Whoever closed standard output early has seen what they wanted.
     written
-        .or_else(|e| if e.kind() == std::io::ErrorKind::BrokenPipe { Ok(()) } else { Err(e) })
+        .or_else(|e| {
+            if e.kind() == std::io::ErrorKind::BrokenPipe {
+                Ok(())
+            } else {
+                Err(e)
+            }
+        })
         .map_err(|e| Ended::Failed(e.into()))
 }
 
@@ -65,11 +74,22 @@ fn json(d: &Device) -> serde_json::Value {
 
 /// One line for the camera, below it what stays of it, what it can do and what would be filmed.
 fn shown(d: &Device) -> String {
-    let mut text = format!("{:<14} {}  ({})\n", d.path.display().to_string(), d.name, d.description);
+    let mut text = format!(
+        "{:<14} {}  ({})\n",
+        d.path.display().to_string(),
+        d.name,
+        d.description
+    );
     let mut line = |name: &str, what: &str| text.push_str(&format!("    {name:<9} {what}\n"));
     if let Some(identity) = &d.identity {
-        let serial = identity.serial.as_ref().map_or(String::new(), |s| format!(", serial number {s}"));
-        line("identity", &format!("{} ({}{serial})", identity.id, identity.port));
+        let serial = identity
+            .serial
+            .as_ref()
+            .map_or(String::new(), |s| format!(", serial number {s}"));
+        line(
+            "identity",
+            &format!("{} ({}{serial})", identity.id, identity.port),
+        );
     }
     if let Some(link) = &d.link {
         line("link", &link.display().to_string());
@@ -90,15 +110,24 @@ fn shown(d: &Device) -> String {
 fn rows(modes: &[Mode]) -> Vec<String> {
     let mut rows: Vec<(&str, String)> = Vec::new();
     for mode in modes {
-        let rates: String = mode.rates_hz.iter().map(|hz| format!(" {}", (hz * 100.0).round() / 100.0)).collect();
+        let rates: String = mode
+            .rates_hz
+            .iter()
+            .map(|hz| format!(" {}", (hz * 100.0).round() / 100.0))
+            .collect();
         let at = if rates.is_empty() { "" } else { " @" };
         let size = format!("{}{at}{rates}", mode.size);
-        match rows.iter_mut().find(|(format, _)| *format == mode.format.fourcc()) {
+        match rows
+            .iter_mut()
+            .find(|(format, _)| *format == mode.format.fourcc())
+        {
             Some((_, row)) => row.push_str(&format!(", {size}")),
             None => rows.push((mode.format.fourcc(), size)),
         }
     }
-    rows.into_iter().map(|(format, row)| format!("{format} {row}")).collect()
+    rows.into_iter()
+        .map(|(format, row)| format!("{format} {row}"))
+        .collect()
 }
 
 #[cfg(test)]
@@ -118,7 +147,10 @@ mod tests {
             mode(PixelFormat::Yuyv, 640, 480, &[]),
             mode(PixelFormat::Mjpeg, 640, 480, &[60.0]),
         ];
-        assert_eq!(rows(&modes), ["MJPG 1280x720 @ 30 29.97, 640x480 @ 60", "YUYV 640x480"]);
+        assert_eq!(
+            rows(&modes),
+            ["MJPG 1280x720 @ 30 29.97, 640x480 @ 60", "YUYV 640x480"]
+        );
         let device = Device {
             path: "/dev/video2".into(),
             name: "Cam".into(),
@@ -136,15 +168,23 @@ mod tests {
             closed: None,
         };
         let text = shown(&device);
-        for what in
-            ["/dev/video2", "usb-046d:0825-A1-0.0 (usb 1-1, serial number A1)", "would be  MJPG 1280x720 @ 30: why"]
-        {
+        for what in [
+            "/dev/video2",
+            "usb-046d:0825-A1-0.0 (usb 1-1, serial number A1)",
+            "would be  MJPG 1280x720 @ 30: why",
+        ] {
             assert!(text.contains(what), "{text}");
         }
         let json = json(&device);
-        assert_eq!((&json["identity"], &json["serial"]), (&"usb-046d:0825-A1-0.0".into(), &"A1".into()));
         assert_eq!(
-            (json["modes"][0]["width"].as_u64(), json["chosen"]["mode"].as_str()),
+            (&json["identity"], &json["serial"]),
+            (&"usb-046d:0825-A1-0.0".into(), &"A1".into())
+        );
+        assert_eq!(
+            (
+                json["modes"][0]["width"].as_u64(),
+                json["chosen"]["mode"].as_str()
+            ),
             (Some(1280), Some("MJPG 1280x720 @ 30"))
         );
     }

@@ -30,8 +30,15 @@ pub fn run(args: &DoctorArgs) -> Result<(), Ended> {
     };
     let wanted = args.out.clone().unwrap_or_else(|| PathBuf::from("."));
     // A capture makes its own folder; the one above it is what counts.
-    let there = std::path::absolute(&wanted).ok().and_then(|p| p.ancestors().find(|a| a.is_dir()).map(PathBuf::from));
-    let asked = Asked { device: args.device.clone(), config, folder: there.unwrap_or(wanted), screen: screen() };
+    let there = std::path::absolute(&wanted)
+        .ok()
+        .and_then(|p| p.ancestors().find(|a| a.is_dir()).map(PathBuf::from));
+    let asked = Asked {
+        device: args.device.clone(),
+        config,
+        folder: there.unwrap_or(wanted),
+        screen: screen(),
+    };
     let checks = doctor::judge(&doctor::gather(asked));
     let failed = checks.iter().filter(|c| c.verdict == Verdict::Fail).count();
     let text = if args.json {
@@ -42,19 +49,34 @@ pub fn run(args: &DoctorArgs) -> Result<(), Ended> {
     std::io::stdout()
         .lock()
         .write_all(text.as_bytes())
-        .or_else(|e| if e.kind() == std::io::ErrorKind::BrokenPipe { Ok(()) } else { Err(e) })
+        .or_else(|e| {
+            if e.kind() == std::io::ErrorKind::BrokenPipe {
+                Ok(())
+            } else {
+                Err(e)
+            }
+        })
         .map_err(|e| Ended::Failed(e.into()))?;
     match failed {
         0 => Ok(()),
-        _ => Err(Ended::Failed(anyhow::anyhow!("{failed} of {} checks failed; each says what to do", checks.len()))),
+        _ => Err(Ended::Failed(anyhow::anyhow!(
+            "{failed} of {} checks failed; each says what to do",
+            checks.len()
+        ))),
     }
 }
 
 fn screen() -> Screen {
-    let Some(found) = tui::abilities() else { return Screen::default() };
+    let Some(found) = tui::abilities() else {
+        return Screen::default();
+    };
     let set = |name: &str| std::env::var(name).ok().filter(|v| !v.is_empty());
     // The first that is set counts, by the rules of locales.
-    let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(set).unwrap_or_default().to_lowercase();
+    let locale = ["LC_ALL", "LC_CTYPE", "LANG"]
+        .into_iter()
+        .find_map(set)
+        .unwrap_or_default()
+        .to_lowercase();
     Screen {
         cells: Some(found.cells),
         utf8: locale.contains("utf-8") || locale.contains("utf8"),

@@ -24,15 +24,17 @@ const STDOUT: &str = "-";
 pub struct ExportArgs {
     /// A capture: the folder that --out of `capture` or `replay` has made.
     dir: PathBuf,
-    /// What to write. glb: one file, mesh and motion; gltf: the same as .gltf and .bin; csv: a folder with the tables and
-    /// the wood as cylinders; obj and ply: the tree at rest; html: a page for a browser, all in one file.
+    /// What to write. glb: one file, mesh and motion; gltf: the same as .gltf and .bin; csv: a
+    /// folder with the tables and the wood as cylinders; obj and ply: the tree at rest; html: a
+    /// page for a browser, all in one file.
     #[arg(long, value_name = "FORMAT")]
     format: Format,
-    /// File to write, for csv a folder; it must not exist, and appears when it is complete. `-` is standard output (glb, html, ply).
+    /// File to write, for csv a folder; it must not exist, and appears when it is complete. `-` is
+    /// standard output (glb, html, ply).
     #[arg(long, value_name = "PATH")]
     out: PathBuf,
-    /// How far a node may be from its pose when keys of the animation are left out, px on the screen of the front view;
-    /// twice that in depth.
+    /// How far a node may be from its pose when keys of the animation are left out, px on the
+    /// screen of the front view; twice that in depth.
     #[arg(long, value_name = "PX", default_value_t = KEY_TOLERANCE_PX, value_parser = tolerance)]
     tolerance_px: f64,
     /// All levels of detail, as scenes lod0, lod1, ... on the same bones (glb, gltf).
@@ -48,7 +50,9 @@ impl ExportArgs {
         if self.lods && !matches!(self.format, Format::Glb | Format::Gltf) {
             idle::tell("--lods", "only glb and gltf hold levels of detail");
         }
-        if self.tolerance_px != KEY_TOLERANCE_PX && matches!(self.format, Format::Csv | Format::Obj | Format::Ply) {
+        if self.tolerance_px != KEY_TOLERANCE_PX
+            && matches!(self.format, Format::Csv | Format::Obj | Format::Ply)
+        {
             idle::tell("--tolerance-px", "this format holds no keys");
         }
     }
@@ -65,7 +69,10 @@ enum Format {
 }
 
 fn tolerance(text: &str) -> Result<f64, String> {
-    let px = text.parse().ok().filter(|px: &f64| (0.001..=100.0).contains(px));
+    let px = text
+        .parse()
+        .ok()
+        .filter(|px: &f64| (0.001..=100.0).contains(px));
     px.ok_or_else(|| "give a number of pixels from 0.001 to 100".to_owned())
 }
 
@@ -81,8 +88,11 @@ pub fn run(args: &ExportArgs) -> Result<(), Ended> {
         say(&format!("arborcam: warning: {warning}"));
     }
     args.tell_idle();
-    let model =
-        Model { tolerance_px: args.tolerance_px, all_levels: args.lods && args.format != Format::Html, ..made.model() };
+    let model = Model {
+        tolerance_px: args.tolerance_px,
+        all_levels: args.lods && args.format != Format::Html,
+        ..made.model()
+    };
     let metres_per_px = made.config.export.metres_per_px;
     let stem = target.stem();
     let files = match args.format {
@@ -101,9 +111,21 @@ pub fn page(made: &Made, model: &Model, title: &str) -> Result<Vec<u8>, ExportEr
     let (model, _) = glb(model)?;
     let captured = &made.captured;
     let metres_per_px = made.config.export.metres_per_px;
-    let data = html::Data::of(&captured.note, &made.skeleton, &made.poses, &made.sway, metres_per_px);
+    let data = html::Data::of(
+        &captured.note,
+        &made.skeleton,
+        &made.poses,
+        &made.sway,
+        metres_per_px,
+    );
     let picture = captured.picture.as_ref().map(|p| &*p.rgb);
-    html::page(&html::Page { title, glb: &model, data: &data, picture }).map(String::into_bytes)
+    html::page(&html::Page {
+        title,
+        glb: &model,
+        data: &data,
+        picture,
+    })
+    .map(String::into_bytes)
 }
 
 /// How a command ends whose files could not be written.
@@ -131,16 +153,26 @@ impl<'a> Target<'a> {
             };
         }
         if args.out.file_name().is_none() {
-            return unfit(format!("--out {shown} is no name for a file; choose another"));
+            return unfit(format!(
+                "--out {shown} is no name for a file; choose another"
+            ));
         }
         let ending = match args.format {
             Format::Gltf => "gltf",
             Format::Obj => "obj",
-            Format::Glb | Format::Html | Format::Csv | Format::Ply => return Ok(Self::Beside(&args.out)),
+            Format::Glb | Format::Html | Format::Csv | Format::Ply => {
+                return Ok(Self::Beside(&args.out));
+            }
         };
         // The names of the files beside it are made from it.
-        if args.out.extension().is_none_or(|e| !e.eq_ignore_ascii_case(ending)) {
-            return unfit(format!("--out {shown} does not end in .{ending}, as this format must"));
+        if args
+            .out
+            .extension()
+            .is_none_or(|e| !e.eq_ignore_ascii_case(ending))
+        {
+            return unfit(format!(
+                "--out {shown} does not end in .{ending}, as this format must"
+            ));
         }
         Ok(Self::Beside(&args.out))
     }
@@ -148,14 +180,22 @@ impl<'a> Target<'a> {
     fn name(&self) -> String {
         match self {
             Self::Stdout => "tree".into(),
-            Self::Beside(path) => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            Self::Beside(path) => path
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned(),
         }
     }
 
     fn stem(&self) -> String {
         match self {
             Self::Stdout => "tree".into(),
-            Self::Beside(path) => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            Self::Beside(path) => path
+                .file_stem()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned(),
         }
     }
 
@@ -171,7 +211,10 @@ impl<'a> Target<'a> {
         match self {
             Self::Stdout => {
                 let mut out = std::io::stdout().lock();
-                let written = files.iter().try_for_each(|(_, bytes)| out.write_all(bytes)).and_then(|()| out.flush());
+                let written = files
+                    .iter()
+                    .try_for_each(|(_, bytes)| out.write_all(bytes))
+                    .and_then(|()| out.flush());
                 written.map_err(|e| Ended::Failed(anyhow!("cannot write to standard output: {e}")))
             }
             Self::Beside(path) => {
@@ -193,7 +236,13 @@ fn tables(args: &ExportArgs, made: &Made, stop: &Stop) -> Result<(), Ended> {
     let metres_per_px = made.config.export.metres_per_px;
     let names: BTreeSet<NodeName> = made.skeleton.nodes.iter().map(|n| n.name).collect();
     // Nothing was measured on copies.
-    if made.captured.skeleton.nodes.iter().all(|n| n.copy_of.is_some() || names.contains(&n.name)) {
+    if made
+        .captured
+        .skeleton
+        .nodes
+        .iter()
+        .all(|n| n.copy_of.is_some() || names.contains(&n.name))
+    {
         folder.copy("tracks.csv", &args.dir, stop).map_err(failed)?;
     } else {
         tracks_of(&folder, &args.dir, &names, stop).map_err(failed)?;
@@ -203,8 +252,15 @@ fn tables(args: &ExportArgs, made: &Made, stop: &Stop) -> Result<(), Ended> {
         folder.copy("motion.csv", &args.dir, stop).map_err(failed)?;
     } else {
         let file = |name| folder.file(name).map_err(failed);
-        nodes(file("nodes.csv")?, &made.skeleton, &made.sway, metres_per_px).map_err(failed)?;
-        let mut motion = MotionCsv::new(file("motion.csv")?, &made.skeleton, metres_per_px).map_err(failed)?;
+        nodes(
+            file("nodes.csv")?,
+            &made.skeleton,
+            &made.sway,
+            metres_per_px,
+        )
+        .map_err(failed)?;
+        let mut motion =
+            MotionCsv::new(file("motion.csv")?, &made.skeleton, metres_per_px).map_err(failed)?;
         // Not only the poses of the animation: `tracks.csv` beside it is of the whole film.
         for pose in made.film()? {
             if stop.load(Ordering::SeqCst) {
@@ -215,7 +271,14 @@ fn tables(args: &ExportArgs, made: &Made, stop: &Stop) -> Result<(), Ended> {
         motion.finish().map_err(failed)?;
     }
     let write_rows = || cylinders(folder.file("cylinders.csv")?, &rows, metres_per_px).map(drop);
-    write_rows().and_then(|()| folder.publish()).map_err(failed).map(|dir| {
-        say(&format!("{}: nodes, motion and tracks, {} cylinders", dir.display(), rows.len()));
-    })
+    write_rows()
+        .and_then(|()| folder.publish())
+        .map_err(failed)
+        .map(|dir| {
+            say(&format!(
+                "{}: nodes, motion and tracks, {} cylinders",
+                dir.display(),
+                rows.len()
+            ));
+        })
 }

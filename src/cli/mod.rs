@@ -51,15 +51,18 @@ enum Command {
     Replay(replay::ReplayArgs),
     /// Film into a recording (.mcap), frames only.
     Record(record::RecordArgs),
-    /// Feed a v4l2loopback device from a recording or a video file; other programs see it as a camera.
+    /// Feed a v4l2loopback device from a recording or a video file; other programs see it as a
+    /// camera.
     Play(play::PlayArgs),
     /// Draw a capture's tree: a picture (.png) or a video (.mp4).
     Render(render::RenderArgs),
     /// Write the tree of a capture as a file for other programs.
     Export(export::ExportArgs),
-    /// Tell at what frequency every branch of a capture sways and how it is damped; compare captures.
+    /// Tell at what frequency every branch of a capture sways and how it is damped; compare
+    /// captures.
     Analyze(analyze::AnalyzeArgs),
-    /// Make a capture's tree move in a wind that nobody filmed, pull and release it, or magnify its motion.
+    /// Make a capture's tree move in a wind that nobody filmed, pull and release it, or magnify its
+    /// motion.
     Animate(animate::AnimateArgs),
     /// List the cameras that are plugged in.
     Devices(devices::DevicesArgs),
@@ -70,8 +73,8 @@ enum Command {
 /// What `capture` and `replay` share.
 #[derive(Debug, Args)]
 struct Common {
-    /// Where the tree is: a JSON polygon, a mask image (white = tree), a scribble image (white = tree, black = background,
-    /// rest grey or transparent), or `auto` to find it by its motion.
+    /// Where the tree is: a JSON polygon, a mask image (white = tree), a scribble image (white =
+    /// tree, black = background, rest grey or transparent), or `auto` to find it by its motion.
     #[arg(long, value_name = "FILE|auto", default_value = "auto")]
     outline: OutlineSpec,
     /// Folder for the result; it must not exist, and appears when it is complete.
@@ -101,7 +104,8 @@ enum Stream {
 }
 
 impl Common {
-    /// The file over the defaults, and over both what the command line says; `set` is for the command's own arguments.
+    /// The file over the defaults, and over both what the command line says; `set` is for the
+    /// command's own arguments.
     fn config(&self, set: &dyn Fn(&mut Config)) -> Result<Config, ConfigError> {
         let mut config = match &self.config {
             Some(path) => Config::load(path)?,
@@ -116,7 +120,10 @@ impl Common {
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
-    let seconds = text.parse().ok().filter(|s: &f64| s.is_finite() && *s > 0.0);
+    let seconds = text
+        .parse()
+        .ok()
+        .filter(|s: &f64| s.is_finite() && *s > 0.0);
     seconds.ok_or_else(|| "give a number of seconds above 0".to_owned())
 }
 
@@ -167,14 +174,19 @@ pub fn main() -> ExitCode {
     ExitCode::from(status)
 }
 
-/// Arguments that clap does not take, in the form that all our errors have; or help and version, which were asked for.
+/// Arguments that clap does not take, in the form that all our errors have; or help and version,
+/// which were asked for.
 fn refused(e: &clap::Error) -> ExitCode {
     let text = e.render().to_string();
     match text.strip_prefix("error: ") {
         Some(what) => say(&format!("arborcam: {}", what.trim_end())),
         None => drop(e.print()),
     }
-    if e.use_stderr() { ExitCode::from(BAD_USAGE) } else { ExitCode::SUCCESS }
+    if e.use_stderr() {
+        ExitCode::from(BAD_USAGE)
+    } else {
+        ExitCode::SUCCESS
+    }
 }
 
 /// The error with those of its causes that it does not quote already.

@@ -26,7 +26,10 @@ pub struct PlayArgs {
 
 pub fn run(args: &PlayArgs) -> Result<(), Ended> {
     if !(args.fps.is_finite() && args.fps > 0.0) {
-        return Err(Ended::BadUsage(anyhow::anyhow!("--fps {} is no rate; give a number above 0", args.fps)));
+        return Err(Ended::BadUsage(anyhow::anyhow!(
+            "--fps {} is no rate; give a number above 0",
+            args.fps
+        )));
     }
     // There are no settings to read again: whoever hangs up on it wants it to end.
     let stop = stop_on_signals(Hangup::of_this_process() != Hangup::Ignored)?;
@@ -43,7 +46,13 @@ pub fn run(args: &PlayArgs) -> Result<(), Ended> {
         for warning in source.warnings() {
             say(&format!("arborcam: warning: {warning}"));
         }
-        let played = played.map_err(|e| if frames == 0 { no_input(e) } else { Ended::Failed(e.into()) })?;
+        let played = played.map_err(|e| {
+            if frames == 0 {
+                no_input(e)
+            } else {
+                Ended::Failed(e.into())
+            }
+        })?;
         frames += played.frames;
         if played.stopped || !args.again {
             break played.stopped;

@@ -18,7 +18,8 @@ const TICK: Duration = Duration::from_millis(20);
 
 #[derive(Debug, Args)]
 pub struct RecordArgs {
-    /// The camera, e.g. /dev/video0; `arborcam devices` lists them. Any other input is taken at its own pace.
+    /// The camera, e.g. /dev/video0; `arborcam devices` lists them. Any other input is taken at its
+    /// own pace.
     device: PathBuf,
     /// The recording; it must not exist, and ends in .mcap.
     file: PathBuf,
@@ -29,7 +30,8 @@ pub struct RecordArgs {
     camera: CameraArgs,
     #[command(flatten)]
     limits: LimitArgs,
-    /// Settings that differ from the defaults (TOML; see config/arborcam.toml); only `[camera]` is used.
+    /// Settings that differ from the defaults (TOML; see config/arborcam.toml); only `[camera]` is
+    /// used.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
 }
@@ -48,15 +50,27 @@ pub fn run(args: &RecordArgs) -> Result<(), Ended> {
     let stop = stop_on_signals(Hangup::of_this_process() != Hangup::Ignored)?;
     init_log(true);
     if info.live && info.format.asked != info.format.given {
-        say(&format!("arborcam: asked for {}, the camera gives {}", info.format.asked, info.format.given));
+        say(&format!(
+            "arborcam: asked for {}, the camera gives {}",
+            info.format.asked, info.format.given
+        ));
     }
-    let pace = if info.live { Pace::Live } else { Pace::Recorded };
-    let job =
-        RecordJob { to: recording::target(&args.file, args.limits.limits(), &*source), pace, camera: config.camera };
+    let pace = if info.live {
+        Pace::Live
+    } else {
+        Pace::Recorded
+    };
+    let job = RecordJob {
+        to: recording::target(&args.file, args.limits.limits(), &*source),
+        pace,
+        camera: config.camera,
+    };
     let running = runtime::record(source, job)?;
     while !running.finished() {
         let (_, _, time_s, _) = running.counts();
-        let over = args.duration.is_some_and(|limit| time_s * 1e9 >= limit as f64);
+        let over = args
+            .duration
+            .is_some_and(|limit| time_s * 1e9 >= limit as f64);
         if over || running.broken() || stop.load(Ordering::SeqCst) {
             running.stop();
         }
@@ -71,14 +85,22 @@ pub fn run(args: &RecordArgs) -> Result<(), Ended> {
         say(&format!("arborcam: {line}"));
     }
     let (recorded, failure) = running.join();
-    let lost = if lost > 0 { format!(", {lost} lost in the camera") } else { String::new() };
+    let lost = if lost > 0 {
+        format!(", {lost} lost in the camera")
+    } else {
+        String::new()
+    };
     say(&format!("{seen} frames in {time_s:.1} s{lost}"));
-    recorded.iter().for_each(|recorded| say(&recording::closing_line(recorded, missing)));
+    recorded
+        .iter()
+        .for_each(|recorded| say(&recording::closing_line(recorded, missing)));
     let broken = recorded.is_some_and(|r| r.stopped);
     match failure {
         Some(Failure::Source(e)) if seen == 0 => Err(no_input(e)),
         Some(failure) => Err(failure.into()),
-        None if broken => Err(Ended::Failed(anyhow::anyhow!("the recording is not complete; see the warning above"))),
+        None if broken => Err(Ended::Failed(anyhow::anyhow!(
+            "the recording is not complete; see the warning above"
+        ))),
         None if stop.load(Ordering::SeqCst) => Err(Ended::Stopped),
         None => Ok(()),
     }

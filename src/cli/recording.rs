@@ -20,7 +20,8 @@ pub struct RecordOption {
 /// When a recording goes on in a next file.
 #[derive(Clone, Debug, Args)]
 pub struct LimitArgs {
-    /// Go on in a next file (NAME-1.mcap, …) when one has grown to this size, e.g. 2GB, 500MB or 1GiB.
+    /// Go on in a next file (NAME-1.mcap, …) when one has grown to this size, e.g. 2GB, 500MB or
+    /// 1GiB.
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     max_size: Option<u64>,
     /// Go on in a next file after this time, e.g. 10min, 90s or 2h.
@@ -30,7 +31,10 @@ pub struct LimitArgs {
 
 impl LimitArgs {
     pub fn limits(&self) -> Limits {
-        Limits { max_bytes: self.max_size, max_time_ns: self.max_time }
+        Limits {
+            max_bytes: self.max_size,
+            max_time_ns: self.max_time,
+        }
     }
 }
 
@@ -40,12 +44,16 @@ impl RecordOption {
         match &self.record {
             Some(path) => refuse_unfit(path),
             None if self.limits.limits() == Limits::default() => Ok(()),
-            None => Err(Ended::BadUsage(anyhow::anyhow!("--max-size and --max-time go with --record FILE; add it"))),
+            None => Err(Ended::BadUsage(anyhow::anyhow!(
+                "--max-size and --max-time go with --record FILE; add it"
+            ))),
         }
     }
 
     pub fn target(&self, source: &dyn Source) -> Option<RecordTo> {
-        self.record.as_ref().map(|path| target(path, self.limits.limits(), source))
+        self.record
+            .as_ref()
+            .map(|path| target(path, self.limits.limits(), source))
     }
 }
 
@@ -59,18 +67,30 @@ pub fn target(path: &Path, limits: Limits, source: &dyn Source) -> RecordTo {
         nominal_rate_hz: info.nominal_rate_hz,
         clock: source.health().clock.name().into(),
     };
-    RecordTo { path: path.to_owned(), limits, head, queue_bytes: QUEUE_BYTES }
+    RecordTo {
+        path: path.to_owned(),
+        limits,
+        head,
+        queue_bytes: QUEUE_BYTES,
+    }
 }
 
 /// Nothing is ever overwritten, and another ending would not be known again.
 pub fn refuse_unfit(path: &Path) -> Result<(), Ended> {
-    if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
+    if !path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("mcap"))
+    {
         let shown = path.display();
-        return Err(Ended::BadUsage(anyhow::anyhow!("{shown} does not end in .mcap, which a recording must")));
+        return Err(Ended::BadUsage(anyhow::anyhow!(
+            "{shown} does not end in .mcap, which a recording must"
+        )));
     }
     // A link that leads nowhere is something that is there, too.
     if path.symlink_metadata().is_ok() {
-        return Err(refused(RecordingError::Exists { path: path.to_owned() }));
+        return Err(refused(RecordingError::Exists {
+            path: path.to_owned(),
+        }));
     }
     Ok(())
 }
@@ -85,21 +105,36 @@ pub fn refused(e: RecordingError) -> Ended {
 
 /// What was recorded, for the end.
 pub fn closing_line(recorded: &Recorded, missing: u64) -> String {
-    let Recorded { frames, files, bytes, last, .. } = recorded;
-    let size =
-        if *bytes < 1_000_000 { format!("{} kB", bytes / 1000) } else { format!("{:.1} MB", *bytes as f64 / 1e6) };
+    let Recorded {
+        frames,
+        files,
+        bytes,
+        last,
+        ..
+    } = recorded;
+    let size = if *bytes < 1_000_000 {
+        format!("{} kB", bytes / 1000)
+    } else {
+        format!("{:.1} MB", *bytes as f64 / 1e6)
+    };
     let where_to = match files {
         1 => last.display().to_string(),
         n => format!("{n} files, the last of them {}", last.display()),
     };
-    let but = if missing > 0 { format!(", {missing} frames are missing in it") } else { String::new() };
+    let but = if missing > 0 {
+        format!(", {missing} frames are missing in it")
+    } else {
+        String::new()
+    };
     format!("recording: {where_to}: {frames} frames, {size}{but}")
 }
 
 /// Number and unit of `10min`.
 fn split(text: &str) -> Option<(f64, String)> {
     let text = text.trim();
-    let at = text.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(text.len());
+    let at = text
+        .find(|c: char| !(c.is_ascii_digit() || c == '.'))
+        .unwrap_or(text.len());
     let number: f64 = text[..at].parse().ok()?;
     (number > 0.0 && number.is_finite()).then(|| (number, text[at..].trim().to_lowercase()))
 }
@@ -154,7 +189,17 @@ mod tests {
         assert_eq!(parse_size("1.5 gib"), Ok(1_610_612_736));
         assert_eq!(parse_time_ns("10min"), Ok(600_000_000_000));
         assert_eq!(parse_time_ns("1.5h"), Ok(5_400_000_000_000));
-        for bad in ["", "2", "GB", "2 parsecs", "-1GB", "0GB", "nanGB", "1kB", "1e999GB"] {
+        for bad in [
+            "",
+            "2",
+            "GB",
+            "2 parsecs",
+            "-1GB",
+            "0GB",
+            "nanGB",
+            "1kB",
+            "1e999GB",
+        ] {
             assert!(parse_size(bad).is_err(), "{bad}");
         }
         for bad in ["", "10", "min", "0s", "0.5s", "1e5000h"] {

@@ -9,9 +9,11 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub struct ReplayArgs {
-    /// A recording (.mcap), a video file (.mkv .avi .mp4) or a folder of pictures (.png .jpg .bmp, in name order).
+    /// A recording (.mcap), a video file (.mkv .avi .mp4) or a folder of pictures (.png .jpg .bmp,
+    /// in name order).
     input: PathBuf,
-    /// As fast as the machine allows; nothing is dropped. Without it the recording's own pace is kept.
+    /// As fast as the machine allows; nothing is dropped. Without it the recording's own pace is
+    /// kept.
     #[arg(long)]
     fast: bool,
     /// Rate of a folder of pictures, frames a second.
@@ -25,11 +27,24 @@ pub struct ReplayArgs {
 
 pub fn run(args: &ReplayArgs) -> Result<(), Ended> {
     if !(args.fps.is_finite() && args.fps > 0.0) {
-        return Err(Ended::BadUsage(anyhow::anyhow!("--fps {} is no rate; give a number above 0", args.fps)));
+        return Err(Ended::BadUsage(anyhow::anyhow!(
+            "--fps {} is no rate; give a number above 0",
+            args.fps
+        )));
     }
-    let pace = if args.fast { Pace::Fast } else { Pace::Recorded };
+    let pace = if args.fast {
+        Pace::Fast
+    } else {
+        Pace::Recorded
+    };
     session::run(
         &args.common,
-        Plan { input: &args.input, fps: Some(args.fps), pace: Some(pace), set: &|_| {}, record: &args.record },
+        Plan {
+            input: &args.input,
+            fps: Some(args.fps),
+            pace: Some(pace),
+            set: &|_| {},
+            record: &args.record,
+        },
     )
 }

@@ -15,8 +15,8 @@ pub struct ScaleArgs {
     /// Metres in a pixel at the tree; lengths are then in metres. 0 for pixels.
     #[arg(long, value_name = "M")]
     metres_per_px: Option<f64>,
-    /// The same by a known length: two points of the picture (px from the left and from the top) and how far they are apart
-    /// at the tree, e.g. 310,340:305,80=2.6
+    /// The same by a known length: two points of the picture (px from the left and from the top)
+    /// and how far they are apart at the tree, e.g. 310,340:305,80=2.6
     #[arg(long, value_name = "U,V:U,V=METRES", value_parser = length, conflicts_with = "metres_per_px")]
     scale: Option<Known>,
 }
@@ -32,7 +32,11 @@ struct Known {
 impl ScaleArgs {
     /// The command line over the settings.
     pub fn set(&self, config: &mut Config) {
-        if let Some(metres) = self.scale.map(|known| known.metres_per_px).or(self.metres_per_px) {
+        if let Some(metres) = self
+            .scale
+            .map(|known| known.metres_per_px)
+            .or(self.metres_per_px)
+        {
             config.export.metres_per_px = metres;
         }
     }
@@ -42,7 +46,12 @@ impl ScaleArgs {
         let sides = [size.width, size.height].map(f64::from);
         // To the rim of the last pixel, as a mouse may tell it.
         let within = |p: &[f64; 2]| (0..2).all(|c| (-0.5..=sides[c]).contains(&p[c]));
-        match self.scale.iter().flat_map(|known| known.ends).find(|p| !within(p)) {
+        match self
+            .scale
+            .iter()
+            .flat_map(|known| known.ends)
+            .find(|p| !within(p))
+        {
             None => Ok(()),
             Some([u, v]) => Err(Ended::BadUsage(anyhow!(
                 "--scale: {u},{v} lies off the picture, which is {size} pixels; give two points of a frame of this film"
@@ -68,7 +77,10 @@ fn length(text: &str) -> Result<Known, String> {
     }
     let metres_per_px = metres / px;
     if metres_per_px > 0.0 && metres_per_px <= LARGEST_M {
-        Ok(Known { ends: [a, b], metres_per_px })
+        Ok(Known {
+            ends: [a, b],
+            metres_per_px,
+        })
     } else {
         Err("the distance must be more than 0 metres".into())
     }
@@ -80,19 +92,48 @@ mod tests {
 
     #[test]
     fn a_known_length_gives_the_scale() {
-        assert_eq!(length("0,0:30,40=2.5"), Ok(Known { ends: [[0.0, 0.0], [30.0, 40.0]], metres_per_px: 0.05 }));
-        assert_eq!(length("10,0 : 10,100 = 1m").map(|known| known.metres_per_px), Ok(0.01));
-        for bad in
-            ["", "1", "0,0:30,40", "0,0:0,0=1", "0,0:30,40=0", "0,0:30,40=-1", "0,0:30=1", "a,0:3,4=1", "0,0:3,4=nan"]
-        {
+        assert_eq!(
+            length("0,0:30,40=2.5"),
+            Ok(Known {
+                ends: [[0.0, 0.0], [30.0, 40.0]],
+                metres_per_px: 0.05
+            })
+        );
+        assert_eq!(
+            length("10,0 : 10,100 = 1m").map(|known| known.metres_per_px),
+            Ok(0.01)
+        );
+        for bad in [
+            "",
+            "1",
+            "0,0:30,40",
+            "0,0:0,0=1",
+            "0,0:30,40=0",
+            "0,0:30,40=-1",
+            "0,0:30=1",
+            "a,0:3,4=1",
+            "0,0:3,4=nan",
+        ] {
             assert!(length(bad).is_err(), "{bad:?}");
         }
     }
 
     #[test]
     fn a_length_off_the_picture_is_refused() {
-        let fits = |text| ScaleArgs { metres_per_px: None, scale: length(text).ok() }.fits(Size::new(640, 360)).is_ok();
+        let fits = |text| {
+            ScaleArgs {
+                metres_per_px: None,
+                scale: length(text).ok(),
+            }
+            .fits(Size::new(640, 360))
+            .is_ok()
+        };
         assert!(fits("0,0:640,360=1") && ScaleArgs::default().fits(Size::new(1, 1)).is_ok());
-        assert!(!fits("0,0:641,10=1") && !fits("10,361:20,20=1") && !fits("-2,0:20,20=1") && !fits("1e300,0:2,2=1"));
+        assert!(
+            !fits("0,0:641,10=1")
+                && !fits("10,361:20,20=1")
+                && !fits("-2,0:20,20=1")
+                && !fits("1e300,0:2,2=1")
+        );
     }
 }

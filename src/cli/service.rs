@@ -1,4 +1,5 @@
-//! What a service manager is told (sd_notify): ready when frames flow, alive as long as they do, one line of state.
+//! What a service manager is told (sd_notify): ready when frames flow, alive as long as they do,
+//! one line of state.
 //!
 //! Nothing is sent where nobody asked for it (`NOTIFY_SOCKET`), so this runs in every capture.
 
@@ -26,7 +27,8 @@ pub struct Service {
 }
 
 impl Service {
-    /// `None` where no service manager listens. `timeout_s` is the silence that a camera is allowed.
+    /// `None` where no service manager listens. `timeout_s` is the silence that a camera is
+    /// allowed.
     pub fn from_env(timeout_s: f64) -> Option<Self> {
         std::env::var_os("NOTIFY_SOCKET")?;
         let watchdog = sd_notify::watchdog_enabled();
@@ -45,9 +47,13 @@ impl Service {
         Some(service)
     }
 
-    /// Says so if the manager takes a camera that is silent for as long as it may be for a program that hangs.
+    /// Says so if the manager takes a camera that is silent for as long as it may be for a program
+    /// that hangs.
     pub fn warn_of_limit(&self, timeout_s: f64) {
-        if let Some(limit) = self.watchdog.filter(|limit| limit.as_secs_f64() <= timeout_s) {
+        if let Some(limit) = self
+            .watchdog
+            .filter(|limit| limit.as_secs_f64() <= timeout_s)
+        {
             say(&format!(
                 "arborcam: warning: the watchdog's limit of {} s is not above camera.timeout_s = {timeout_s}; a silent \
                  camera will look like a hung program: raise WatchdogSec, or lower camera.timeout_s",
@@ -80,14 +86,20 @@ impl Service {
             // Every frame so far was damaged: alive, and of no use yet.
             Sign::Flows => send(&[NotifyState::Status("no whole frame yet")]),
             Sign::Waits => {
-                send(&[NotifyState::Watchdog, NotifyState::Status("waiting for the camera")]);
+                send(&[
+                    NotifyState::Watchdog,
+                    NotifyState::Status("waiting for the camera"),
+                ]);
                 if !self.ready {
                     send(&[put_off]);
                 }
             }
             Sign::Ends => {
                 if !std::mem::replace(&mut self.stopping, true) {
-                    send(&[NotifyState::Stopping, NotifyState::Status("writing the capture")]);
+                    send(&[
+                        NotifyState::Stopping,
+                        NotifyState::Status("writing the capture"),
+                    ]);
                 }
                 send(&[put_off]);
             }
@@ -121,6 +133,9 @@ fn send(state: &[NotifyState]) {
 
 fn status(s: &Snapshot) -> String {
     let lost = s.lost_in_camera + s.dropped_before_tracker + s.undecodable;
-    let frames = format!("frame {}, {:.1} a second, {lost} lost, {} points", s.frame, s.sensor_rate_hz, s.tracks_alive);
+    let frames = format!(
+        "frame {}, {:.1} a second, {lost} lost, {} points",
+        s.frame, s.sensor_rate_hz, s.tracks_alive
+    );
     format!("{}: {frames}", s.phase.name())
 }

@@ -38,7 +38,9 @@ pub struct Plan<'a> {
 
 /// Runs a capture from the first frame to the last line.
 pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
-    let config = common.config(plan.set).map_err(|e| Ended::BadUsage(e.into()))?;
+    let config = common
+        .config(plan.set)
+        .map_err(|e| Ended::BadUsage(e.into()))?;
     let headless = common.headless || common.stream.is_some();
     if !headless && !std::io::stdout().is_terminal() {
         return Err(Ended::BadUsage(tui::TuiError::NoTerminal(None).into()));
@@ -52,9 +54,15 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
     common.scale.fits(info.size)?;
     let outline = match &common.outline {
         OutlineSpec::Auto => None,
-        OutlineSpec::File(path) => Some(outline::load(path, info.size).map_err(|e| Ended::BadUsage(e.into()))?),
+        OutlineSpec::File(path) => {
+            Some(outline::load(path, info.size).map_err(|e| Ended::BadUsage(e.into()))?)
+        }
     };
-    let own_pace = if info.live { Pace::Live } else { Pace::Recorded };
+    let own_pace = if info.live {
+        Pace::Live
+    } else {
+        Pace::Recorded
+    };
     let job = Job {
         config,
         outline,
@@ -63,26 +71,56 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
         stream: common.stream.map(|_| Box::new(std::io::stdout()) as _),
         out: common.out.clone(),
         record: plan.record.target(&*source),
-        preview_every: if headless { PREVIEW_HEADLESS } else { PREVIEW_SCREEN },
+        preview_every: if headless {
+            PREVIEW_HEADLESS
+        } else {
+            PREVIEW_SCREEN
+        },
     };
     let hangup = Hangup::of_this_process();
     let stop = stop_on_signals(hangup == Hangup::Stop)?;
     if headless && info.live && info.format.asked != info.format.given {
-        say(&format!("arborcam: asked for {}, the camera gives {}", info.format.asked, info.format.given));
+        say(&format!(
+            "arborcam: asked for {}, the camera gives {}",
+            info.format.asked, info.format.given
+        ));
     }
     if common.out.is_none() && common.stream.is_none() {
-        let but = if headless { "" } else { " but what key e exports" };
-        say(&format!("arborcam: warning: without --out nothing is written{but}"));
+        let but = if headless {
+            ""
+        } else {
+            " but what key e exports"
+        };
+        say(&format!(
+            "arborcam: warning: without --out nothing is written{but}"
+        ));
     }
     init_log(headless);
-    let reload = Reload::new((common, plan.set), &job.config, hangup).map_err(|e| Ended::Failed(e.into()))?;
+    let reload = Reload::new((common, plan.set), &job.config, hangup)
+        .map_err(|e| Ended::Failed(e.into()))?;
     let service = Service::from_env(job.config.camera.timeout_s);
     let running = runtime::start(source, job)?;
-    let mut warden = Warden { running: &running, reload, service, end_s: common.for_s.unwrap_or(f64::INFINITY) };
-    let watched = if headless { watch(&mut warden, &stop) } else { show(&mut warden, &stop) };
+    let mut warden = Warden {
+        running: &running,
+        reload,
+        service,
+        end_s: common.for_s.unwrap_or(f64::INFINITY),
+    };
+    let watched = if headless {
+        watch(&mut warden, &stop)
+    } else {
+        show(&mut warden, &stop)
+    };
     // A screen has shown its messages only as long as it was there.
-    let left =
-        if headless { running.news() } else { running.warnings().iter().map(|w| format!("warning: {w}")).collect() };
+    let left = if headless {
+        running.news()
+    } else {
+        running
+            .warnings()
+            .iter()
+            .map(|w| format!("warning: {w}"))
+            .collect()
+    };
     let (summary, failure) = running.join();
     watched?;
     for line in left {
@@ -94,11 +132,19 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
 /// Set when the user or the system asks us to end; by a hang-up as well, if so wanted.
 pub fn stop_on_signals(by_hangup: bool) -> Result<Arc<AtomicBool>, Ended> {
     let stop = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM].into_iter().chain(by_hangup.then_some(SIGHUP)) {
-        // Twice the same signal ends at once, without a capture: a disk that hangs must not make the program immortal.
-        signal_hook::flag::register_conditional_shutdown(signal, i32::from(super::FAILED), stop.clone())
-            .and_then(|_| signal_hook::flag::register(signal, stop.clone()))
-            .map_err(|e| Ended::Failed(e.into()))?;
+    for signal in [SIGINT, SIGTERM]
+        .into_iter()
+        .chain(by_hangup.then_some(SIGHUP))
+    {
+        // Twice the same signal ends at once, without a capture: a disk that hangs must not make
+        // the program immortal.
+        signal_hook::flag::register_conditional_shutdown(
+            signal,
+            i32::from(super::FAILED),
+            stop.clone(),
+        )
+        .and_then(|_| signal_hook::flag::register(signal, stop.clone()))
+        .map_err(|e| Ended::Failed(e.into()))?;
     }
     Ok(stop)
 }
@@ -110,10 +156,12 @@ pub fn no_input(e: SourceError) -> Ended {
 /// Told before anything is filmed, not after: that the folder exists, or may not be made.
 fn refuse_unfit_out(out: Option<&Path>) -> Result<(), Ended> {
     // Made and dropped: nothing of it is left.
-    out.map_or(Ok(()), |dir| OutputFolder::create(dir).map(drop)).map_err(|e| Ended::Failed(e.into()))
+    out.map_or(Ok(()), |dir| OutputFolder::create(dir).map(drop))
+        .map_err(|e| Ended::Failed(e.into()))
 }
 
-/// Looks after a capture from outside, with and without a screen: its length, its settings, its service manager.
+/// Looks after a capture from outside, with and without a screen: its length, its settings, its
+/// service manager.
 struct Warden<'a> {
     running: &'a Running,
     reload: Reload<'a>,
@@ -210,14 +258,17 @@ fn report(summary: Option<&Summary>, failure: Option<Failure>, stopped: bool) ->
         for line in closing_lines(s) {
             say(&line);
         }
-        s.recorded.iter().for_each(|recorded| say(&recording::closing_line(recorded, s.not_recorded)));
+        s.recorded
+            .iter()
+            .for_each(|recorded| say(&recording::closing_line(recorded, s.not_recorded)));
     }
     match failure {
         // Not one frame: there was no usable camera, whatever it said when it was opened.
         Some(Failure::Source(e)) if summary.is_none_or(|s| s.frames == 0) => Err(no_input(e)),
         Some(failure) => Err(failure.into()),
         None if stopped => Err(Ended::Stopped),
-        // Tracks alone are not what was asked for; whoever looks for tree.glb is to learn it from the status.
+        // Tracks alone are not what was asked for; whoever looks for tree.glb is to learn it from
+        // the status.
         None => match summary.filter(|s| s.tree.is_none()) {
             Some(s) => Err(Ended::Failed(no_tree(s))),
             None => Ok(()),
@@ -243,12 +294,19 @@ fn no_tree(s: &Summary) -> anyhow::Error {
 }
 
 fn closing_lines(s: &Summary) -> Vec<String> {
-    let mut lines = vec![format!("{} frames, {} points followed", s.frames, s.tracks_total)];
+    let mut lines = vec![format!(
+        "{} frames, {} points followed",
+        s.frames, s.tracks_total
+    )];
     if let Some(tree) = &s.tree {
         let (nodes, points) = (tree.skeleton.measured(), tree.skeleton.nodes[0].n_tracks);
         let copies = tree.skeleton.nodes.len() - nodes;
         let first = &tree.first;
-        let when = if first.forced { "built early," } else { "built" };
+        let when = if first.forced {
+            "built early,"
+        } else {
+            "built"
+        };
         let refined = match tree.refinements {
             0 => String::new(),
             1 => format!(", refined at {:.1} s", tree.time_s),

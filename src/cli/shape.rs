@@ -11,12 +11,13 @@ use std::path::{Path, PathBuf};
 /// The options of `capture`, `replay` and of the commands that read a capture on the shape.
 #[derive(Clone, Debug, Default, Args)]
 pub struct ShapeArgs {
-    /// Keeps one trunk up to the tip, as conifers have: the line that was drawn in FILE (JSON: width, height,
-    /// polyline_px from either end), or `auto` for the straightest way up.
+    /// Keeps one trunk up to the tip, as conifers have: the line that was drawn in FILE (JSON:
+    /// width, height, polyline_px from either end), or `auto` for the straightest way up.
     #[arg(long, value_name = "FILE|auto", value_parser = Trunk::parse)]
     trunk: Option<Trunk>,
-    /// What the branches fill: the outline turned about its axis (`revolution`), the hull of the branches seen, turned
-    /// (`hull`), or for `export` and `render` the opaque part of an image: the tree is cut to it.
+    /// What the branches fill: the outline turned about its axis (`revolution`), the hull of the
+    /// branches seen, turned (`hull`), or for `export` and `render` the opaque part of an image:
+    /// the tree is cut to it.
     #[arg(long, value_name = "revolution|hull|IMAGE", value_parser = Envelope::parse)]
     envelope: Option<Envelope>,
 }
@@ -27,7 +28,8 @@ impl ShapeArgs {
         match &self.trunk {
             Some(Trunk::Auto) => config.shape.leader = Leader::Auto,
             Some(Trunk::Drawn(line)) => {
-                (config.shape.leader, config.shape.leader_px) = (Leader::Drawn, line.polyline_px.clone());
+                (config.shape.leader, config.shape.leader_px) =
+                    (Leader::Drawn, line.polyline_px.clone());
             }
             None => {}
         }
@@ -57,11 +59,13 @@ impl ShapeArgs {
     /// Refuses a trunk that was drawn on a picture of another size.
     pub fn fits(&self, size: Size) -> Result<(), Ended> {
         match &self.trunk {
-            Some(Trunk::Drawn(line)) if Size::new(line.width, line.height) != size => Err(Ended::BadUsage(anyhow!(
-                "--trunk is for a picture of {}x{}, this one is {size}; draw it on a frame of this clip",
-                line.width,
-                line.height
-            ))),
+            Some(Trunk::Drawn(line)) if Size::new(line.width, line.height) != size => {
+                Err(Ended::BadUsage(anyhow!(
+                    "--trunk is for a picture of {}x{}, this one is {size}; draw it on a frame of this clip",
+                    line.width,
+                    line.height
+                )))
+            }
             _ => Ok(()),
         }
     }
@@ -89,8 +93,8 @@ impl Trunk {
             return Ok(Self::Auto);
         }
         let bytes = std::fs::read(text).map_err(|e| format!("{e}; give a file, or auto"))?;
-        let mut line: Line =
-            serde_json::from_slice(&bytes).map_err(|e| format!("{e}; it must hold width, height and polyline_px"))?;
+        let mut line: Line = serde_json::from_slice(&bytes)
+            .map_err(|e| format!("{e}; it must hold width, height and polyline_px"))?;
         if line.polyline_px.iter().flatten().any(|x| !x.is_finite()) {
             return Err("polyline_px holds what is no number".into());
         }
@@ -130,8 +134,11 @@ mod tests {
 
     fn parsed(polyline_px: &str) -> Result<Vec<[f64; 2]>, String> {
         let file = tempfile::NamedTempFile::new().expect("file");
-        std::fs::write(file.path(), format!(r#"{{"width": 64, "height": 48, "polyline_px": {polyline_px}}}"#))
-            .expect("write");
+        std::fs::write(
+            file.path(),
+            format!(r#"{{"width": 64, "height": 48, "polyline_px": {polyline_px}}}"#),
+        )
+        .expect("write");
         match Trunk::parse(file.path().to_str().expect("path"))? {
             Trunk::Drawn(line) => Ok(line.polyline_px),
             Trunk::Auto => Err("auto".into()),

@@ -99,18 +99,25 @@ impl From<CaptureError> for Ended {
 }
 
 impl Shaping {
-    /// The settings of the capture with what is to be changed of them: the file over the capture's, the command line over
-    /// both.
+    /// The settings of the capture with what is to be changed of them: the file over the capture's,
+    /// the command line over both.
     fn config(&self, own: &Config) -> Result<Config, ConfigError> {
         let mut config = match &self.config {
             Some(path) => own.overlaid(path)?,
             None => own.clone(),
         };
-        let set = |value: &mut f64, wanted: Option<f64>| wanted.into_iter().for_each(|w| *value = w);
+        let set =
+            |value: &mut f64, wanted: Option<f64>| wanted.into_iter().for_each(|w| *value = w);
         self.shape.set(&mut config);
-        self.planes.into_iter().for_each(|n| config.shape.planes = n);
-        self.triangles.into_iter().for_each(|n| config.wood.triangles = n);
-        self.seed.into_iter().for_each(|n| (config.wood.seed, config.wind.seed) = (n, n));
+        self.planes
+            .into_iter()
+            .for_each(|n| config.shape.planes = n);
+        self.triangles
+            .into_iter()
+            .for_each(|n| config.wood.triangles = n);
+        self.seed
+            .into_iter()
+            .for_each(|n| (config.wood.seed, config.wind.seed) = (n, n));
         if let Some(show) = self.leaves {
             config.leaves.show = match show {
                 Show::Auto => LeafShow::Auto,
@@ -127,28 +134,46 @@ impl Shaping {
     /// Reads the capture in `dir` and makes the tree that is wished for.
     ///
     /// # Errors
-    /// The capture cannot be read, a setting is out of range, or the capture lacks what a new shape is made from.
+    /// The capture cannot be read, a setting is out of range, or the capture lacks what a new shape
+    /// is made from.
     pub fn made(&self, dir: &Path) -> Result<Made, Ended> {
         self.made_with(dir, |_| None)
     }
 
-    /// The same with other poses than those of an animation: of the last so many seconds, as `tail_s` says for a film of
-    /// its argument's length, s.
+    /// The same with other poses than those of an animation: of the last so many seconds, as
+    /// `tail_s` says for a film of its argument's length, s.
     ///
     /// # Errors
     /// As of [`Shaping::made`].
-    pub fn made_with(&self, dir: &Path, tail_s: impl Fn(f64) -> Option<f64>) -> Result<Made, Ended> {
+    pub fn made_with(
+        &self,
+        dir: &Path,
+        tail_s: impl Fn(f64) -> Option<f64>,
+    ) -> Result<Made, Ended> {
         let note = Captured::note(dir)?;
-        let config = self.config(&note.config).map_err(|e| Ended::BadUsage(e.into()))?;
-        self.config.iter().for_each(|file| idle::settings(file, &note.config, &config));
+        let config = self
+            .config(&note.config)
+            .map_err(|e| Ended::BadUsage(e.into()))?;
+        self.config
+            .iter()
+            .for_each(|file| idle::settings(file, &note.config, &config));
         let length_s = tail_s(note.timing.duration_s).unwrap_or(config.export.animation_s);
         let captured = Captured::read(dir, length_s)?;
         self.shape.fits(captured.skeleton.image_size)?;
         self.scale.fits(captured.skeleton.image_size)?;
         let stand = self.stand(&captured, &config, dir)?;
-        let leaf = self.leaf.as_deref().map(read_template).transpose().map_err(|e| Ended::BadUsage(e.into()))?;
+        let leaf = self
+            .leaf
+            .as_deref()
+            .map(read_template)
+            .transpose()
+            .map_err(|e| Ended::BadUsage(e.into()))?;
         let size = captured.skeleton.image_size;
-        let density = self.density.as_deref().map(|path| outline::density(path, size)).transpose();
+        let density = self
+            .density
+            .as_deref()
+            .map(|path| outline::density(path, size))
+            .transpose();
         let density = density.map_err(|e| Ended::BadUsage(e.into()))?;
         let seen = Seen {
             picture: captured.picture.as_ref().map(|p| &*p.rgb),
@@ -158,15 +183,31 @@ impl Shaping {
             leaf: leaf.as_ref(),
             density: density.as_ref(),
         };
-        let Stand { skeleton, poses, sway, reshaped, .. } = &stand;
+        let Stand {
+            skeleton,
+            poses,
+            sway,
+            reshaped,
+            ..
+        } = &stand;
         let dressed = dress(skeleton, seen, &config);
         if self.leaf.is_some() && dressed.foliage.groups.is_empty() {
-            idle::tell("--leaf", "the tree bears no leaves; put them on with --leaves on");
+            idle::tell(
+                "--leaf",
+                "the tree bears no leaves; put them on with --leaves on",
+            );
         }
         let node_extras = sway.iter().map(extras).collect();
         let provenance = provenance(&captured.note.source.name, &Software::default(), poses);
         let (flutter, reshaped) = (flutter(&dressed, poses, skeleton, &config), *reshaped);
-        let Stand { skeleton, poses, pose_in_picture, sway, restood, .. } = stand;
+        let Stand {
+            skeleton,
+            poses,
+            pose_in_picture,
+            sway,
+            restood,
+            ..
+        } = stand;
         Ok(Made {
             captured,
             config,
@@ -188,8 +229,17 @@ impl Shaping {
         let drawn = self.shape.drawn();
         let reshaped = config.shape != captured.note.config.shape;
         let outline = || {
-            let lacks = || anyhow!("{} holds no outline, which a new shape is made from", dir.display());
-            captured.outline.as_ref().ok_or_else(lacks).map_err(Ended::Failed)
+            let lacks = || {
+                anyhow!(
+                    "{} holds no outline, which a new shape is made from",
+                    dir.display()
+                )
+            };
+            captured
+                .outline
+                .as_ref()
+                .ok_or_else(lacks)
+                .map_err(Ended::Failed)
         };
         let mut stand = Stand {
             skeleton: captured.skeleton.clone(),
@@ -200,8 +250,16 @@ impl Shaping {
             reshaped: reshaped || drawn.is_some(),
             restood: Restood::default(),
         };
-        let planes = if reshaped { config.shape.planes as usize } else { 0 };
-        let nodes = stand.skeleton.nodes.len().max(planes.saturating_mul(stand.skeleton.measured()));
+        let planes = if reshaped {
+            config.shape.planes as usize
+        } else {
+            0
+        };
+        let nodes = stand
+            .skeleton
+            .nodes
+            .len()
+            .max(planes.saturating_mul(stand.skeleton.measured()));
         if stand.reshaped && nodes > MOST_RESHAPED {
             return Err(Ended::Failed(anyhow!(
                 "another shape would have {nodes} nodes, and at most {MOST_RESHAPED} can be given one; take fewer --planes, \
@@ -215,14 +273,20 @@ impl Shaping {
             stand.pose_in_picture = captured.reposed(&stand.skeleton, config, in_picture).pop();
             // Copies come last; nothing was measured on them.
             stand.sway.truncate(captured.skeleton.measured());
-            stand.sway.resize(stand.skeleton.nodes.len(), Err(Unidentified::NotMeasured));
+            stand
+                .sway
+                .resize(stand.skeleton.nodes.len(), Err(Unidentified::NotMeasured));
             stand.restood.reshaped = Some(stand.skeleton.clone());
         }
         let Some(path) = drawn else { return Ok(stand) };
-        let unfit = |e: anyhow::Error| Ended::BadUsage(e.context(format!("--envelope {}", path.display())));
-        let bytes = std::fs::read(path).context("cannot read it").map_err(unfit)?;
+        let unfit =
+            |e: anyhow::Error| Ended::BadUsage(e.context(format!("--envelope {}", path.display())));
+        let bytes = std::fs::read(path)
+            .context("cannot read it")
+            .map_err(unfit)?;
         let drawn = Drawn::of_image(&bytes).map_err(|e| unfit(e.into()))?;
-        let topiary = cut_to(&stand.skeleton, outline()?, &drawn, config).map_err(|e| unfit(e.into()))?;
+        let topiary =
+            cut_to(&stand.skeleton, outline()?, &drawn, config).map_err(|e| unfit(e.into()))?;
         tell(&topiary.cut);
         if topiary.cut.larger {
             return Ok(stand);
@@ -230,17 +294,29 @@ impl Shaping {
         let whole = stand.skeleton.clone();
         let pose = |pose: &Pose| topiary.pose(&whole, pose);
         let sway = |(node, of): (&crate::model::Node, &crate::model::NodeId)| {
-            let known = stand.sway.get(of.index()).filter(|_| node.copy_of.is_none());
+            let known = stand
+                .sway
+                .get(of.index())
+                .filter(|_| node.copy_of.is_none());
             known.copied().unwrap_or(Err(Unidentified::NotMeasured))
         };
         Ok(Stand {
             poses: stand.poses.iter().map(pose).collect(),
             pose_in_picture: stand.pose_in_picture.as_ref().map(pose),
-            sway: topiary.skeleton.nodes.iter().zip(&topiary.moves_as).map(sway).collect(),
+            sway: topiary
+                .skeleton
+                .nodes
+                .iter()
+                .zip(&topiary.moves_as)
+                .map(sway)
+                .collect(),
             skeleton: Arc::new(topiary.skeleton.clone()),
             cut_to: Some(topiary.shape.clone()),
             reshaped: true,
-            restood: Restood { cut: Some((whole, topiary)), ..stand.restood },
+            restood: Restood {
+                cut: Some((whole, topiary)),
+                ..stand.restood
+            },
         })
     }
 }
@@ -257,13 +333,25 @@ struct Stand {
     restood: Restood,
 }
 
-/// The poses of a loop with the lap before and the one after, and how long a lap is, s: nothing begins or ends in it.
+/// The poses of a loop with the lap before and the one after, and how long a lap is, s: nothing
+/// begins or ends in it.
 fn round(poses: &[Pose]) -> Option<(Vec<Pose>, f64)> {
     let (first, rest) = poses.split_first()?;
     let lap_s = rest.last()?.time_s - first.time_s;
-    let moved = |by_s: f64| move |p: &Pose| Pose { time_s: p.time_s + by_s, ..p.clone() };
+    let moved = |by_s: f64| {
+        move |p: &Pose| Pose {
+            time_s: p.time_s + by_s,
+            ..p.clone()
+        }
+    };
     let before = poses[..rest.len()].iter().map(moved(-lap_s));
-    Some((before.chain(poses.iter().cloned()).chain(rest.iter().map(moved(lap_s))).collect(), lap_s))
+    Some((
+        before
+            .chain(poses.iter().cloned())
+            .chain(rest.iter().map(moved(lap_s)))
+            .collect(),
+        lap_s,
+    ))
 }
 
 /// What became of the tree.
@@ -282,21 +370,30 @@ fn tell(cut: &Cut) {
 }
 
 impl Made {
-    /// Takes other poses than those of the film, at even times; `looped`: the last is the first again. `what` says for the
-    /// file's own notes where they come from.
+    /// Takes other poses than those of the film, at even times; `looped`: the last is the first
+    /// again. `what` says for the file's own notes where they come from.
     pub fn animate(&mut self, poses: Vec<Pose>, looped: bool, what: Value) {
-        let flutter = |poses: &[Pose], config: &Config| flutter(&self.dressed, poses, &self.skeleton, config);
+        let flutter =
+            |poses: &[Pose], config: &Config| flutter(&self.dressed, poses, &self.skeleton, config);
         self.flutter = match round(&poses).filter(|_| looped) {
             None => flutter(&poses, &self.config),
             Some((round, lap_s)) => {
                 // Leaves come round too: whole swings in a lap.
                 let mut config = self.config.clone();
-                config.leaves.frequency_hz = (config.leaves.frequency_hz * lap_s).round().max(1.0) / lap_s;
+                config.leaves.frequency_hz =
+                    (config.leaves.frequency_hz * lap_s).round().max(1.0) / lap_s;
                 let of_lap = poses.len() - 1..2 * poses.len() - 1;
-                flutter(&round, &config).into_iter().map(|all| all[of_lap.clone()].to_vec()).collect()
+                flutter(&round, &config)
+                    .into_iter()
+                    .map(|all| all[of_lap.clone()].to_vec())
+                    .collect()
             }
         };
-        self.provenance = provenance(&self.captured.note.source.name, &Software::default(), &poses);
+        self.provenance = provenance(
+            &self.captured.note.source.name,
+            &Software::default(),
+            &poses,
+        );
         if let Some(notes) = self.provenance.as_object_mut() {
             notes.insert("animated".into(), what);
         }
@@ -309,7 +406,9 @@ impl Made {
     /// `motion.csv` cannot be read.
     pub fn film(&self) -> Result<impl Iterator<Item = Result<Pose, CaptureError>>, CaptureError> {
         let Restood { reshaped, cut } = &self.restood;
-        let mut repose = reshaped.as_ref().map(|new| self.captured.reposer(new, &self.config));
+        let mut repose = reshaped
+            .as_ref()
+            .map(|new| self.captured.reposer(new, &self.config));
         Ok(self.captured.film()?.map(move |pose| {
             let pose = pose?;
             let pose = match &mut repose {

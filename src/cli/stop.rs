@@ -7,8 +7,8 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// The wish to end. As long as nothing is written it is fulfilled at once, however long a step takes; from then on it is for
-/// the writer, so that nothing half-written is left.
+/// The wish to end. As long as nothing is written it is fulfilled at once, however long a step
+/// takes; from then on it is for the writer, so that nothing half-written is left.
 pub struct Stop {
     at_once: Arc<AtomicBool>,
     wish: Arc<AtomicBool>,
@@ -20,14 +20,25 @@ impl Stop {
     pub fn on_signals() -> Result<Self, Ended> {
         let at_once = Arc::new(AtomicBool::new(true));
         let by_hangup = Hangup::of_this_process() != Hangup::Ignored;
-        for signal in [SIGINT, SIGTERM].into_iter().chain(by_hangup.then_some(SIGHUP)) {
-            signal_hook::flag::register_conditional_shutdown(signal, i32::from(STOPPED), at_once.clone())
-                .map_err(|e| Ended::Failed(e.into()))?;
+        for signal in [SIGINT, SIGTERM]
+            .into_iter()
+            .chain(by_hangup.then_some(SIGHUP))
+        {
+            signal_hook::flag::register_conditional_shutdown(
+                signal,
+                i32::from(STOPPED),
+                at_once.clone(),
+            )
+            .map_err(|e| Ended::Failed(e.into()))?;
         }
-        Ok(Self { at_once, wish: stop_on_signals(by_hangup)? })
+        Ok(Self {
+            at_once,
+            wish: stop_on_signals(by_hangup)?,
+        })
     }
 
-    /// From now on there is something to be taken away again; whoever writes looks at what this gives.
+    /// From now on there is something to be taken away again; whoever writes looks at what this
+    /// gives.
     pub fn while_writing(&self) -> &AtomicBool {
         self.at_once.store(false, Ordering::SeqCst);
         &self.wish

@@ -14,7 +14,8 @@ pub struct Dynamics {
     pub every_s: f64,
     /// Highest frequency that a branch of the tree may have, Hz.
     pub highest_hz: f64,
-    /// Half the 95 % interval of a frequency at most, as a share of it; what is less sure counts as not identified.
+    /// Half the 95 % interval of a frequency at most, as a share of it; what is less sure counts as
+    /// not identified.
     pub widest: f64,
 }
 
@@ -31,7 +32,13 @@ pub enum Excited {
 
 impl Default for Dynamics {
     fn default() -> Self {
-        Self { excitation: Excited::Auto, window_s: 60.0, every_s: 1.0, highest_hz: 5.0, widest: 0.05 }
+        Self {
+            excitation: Excited::Auto,
+            window_s: 60.0,
+            every_s: 1.0,
+            highest_hz: 5.0,
+            widest: 0.05,
+        }
     }
 }
 
@@ -40,8 +47,16 @@ impl Dynamics {
     pub(super) fn rules(&self) -> Vec<(&'static str, f64, (f64, f64, &'static str))> {
         vec![
             ("dynamics.window_s", self.window_s, (5.0, 600.0, "5 to 600")),
-            ("dynamics.every_s", self.every_s, (0.0, 600.0, "0 (only at the end) to 600")),
-            ("dynamics.highest_hz", self.highest_hz, (0.5, 20.0, "0.5 to 20")),
+            (
+                "dynamics.every_s",
+                self.every_s,
+                (0.0, 600.0, "0 (only at the end) to 600"),
+            ),
+            (
+                "dynamics.highest_hz",
+                self.highest_hz,
+                (0.5, 20.0, "0.5 to 20"),
+            ),
             ("dynamics.widest", self.widest, (0.001, 0.5, "0.001 to 0.5")),
         ]
     }

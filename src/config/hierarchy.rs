@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Who moves with whom: average linkage, or recursive normalised cuts (000 appendix A, 003 section 5.4.1).
+/// Who moves with whom: average linkage, or recursive normalised cuts (000 appendix A, 003 section
+/// 5.4.1).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Hierarchy {
@@ -18,11 +19,13 @@ pub struct Hierarchy {
     pub distance_scale: f64,
     /// `zeng`: power of the velocity correlation; 1 is the paper's.
     pub correlation_power: f64,
-    /// Branches that may leave at one place, where it is not sure which leaves first; 2 is the papers'.
+    /// Branches that may leave at one place, where it is not sure which leaves first; 2 is the
+    /// papers'.
     pub max_children: u32,
     /// Splits less sure than this are not made, 0 to 1.
     pub min_certainty: f64,
-    /// Points whose motion correlates less than this with that of the points around them are left out, -1 to 1.
+    /// Points whose motion correlates less than this with that of the points around them are left
+    /// out, -1 to 1.
     pub agreement: f64,
     /// Clusters of fewer points are not cut.
     pub min_points: u32,

@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 pub struct Wind {
     /// Strength on the Beaufort scale; 0 is still.
     pub force: f64,
-    /// Where it blows to, degrees about the trunk: 0 to the right of the picture, 90 away from the camera.
+    /// Where it blows to, degrees about the trunk: 0 to the right of the picture, 90 away from the
+    /// camera.
     pub direction_deg: f64,
     /// Standard deviation of its speed, as a share of the mean.
     pub gusts: f64,
@@ -16,13 +17,15 @@ pub struct Wind {
     pub gust_s: f64,
     /// The power of a gust falls with its frequency to the minus beta (1/f^beta noise).
     pub beta: f64,
-    /// Height of the tree where the model has no scale, m: gusts need their time to travel across it.
+    /// Height of the tree where the model has no scale, m: gusts need their time to travel across
+    /// it.
     pub tree_height_m: f64,
     /// Sway of the trunk where the capture has no frequency at all, Hz.
     pub trunk_hz: f64,
     /// Damping ratio where the capture has none.
     pub damping_ratio: f64,
-    /// How far a branch leans against the one that carries it in steady wind of force 6, degrees: the median.
+    /// How far a branch leans against the one that carries it in steady wind of force 6, degrees:
+    /// the median.
     pub bend_deg: f64,
     /// A branch turns at most so far against the one that carries it, degrees.
     pub max_bend_deg: f64,
@@ -53,15 +56,31 @@ impl Wind {
     pub(super) fn rules(&self) -> Vec<(&'static str, f64, (f64, f64, &'static str))> {
         vec![
             ("wind.force", self.force, (0.0, 12.0, "0 (still) to 12")),
-            ("wind.direction_deg", self.direction_deg, (-360.0, 360.0, "-360 to 360")),
+            (
+                "wind.direction_deg",
+                self.direction_deg,
+                (-360.0, 360.0, "-360 to 360"),
+            ),
             ("wind.gusts", self.gusts, (0.0, 1.0, "0 (steady) to 1")),
             ("wind.gust_s", self.gust_s, (0.5, 60.0, "0.5 to 60")),
             ("wind.beta", self.beta, (0.0, 4.0, "0 to 4")),
-            ("wind.tree_height_m", self.tree_height_m, (0.1, 100.0, "0.1 to 100")),
+            (
+                "wind.tree_height_m",
+                self.tree_height_m,
+                (0.1, 100.0, "0.1 to 100"),
+            ),
             ("wind.trunk_hz", self.trunk_hz, (0.02, 10.0, "0.02 to 10")),
-            ("wind.damping_ratio", self.damping_ratio, (0.001, 1.0, "0.001 to 1")),
+            (
+                "wind.damping_ratio",
+                self.damping_ratio,
+                (0.001, 1.0, "0.001 to 1"),
+            ),
             ("wind.bend_deg", self.bend_deg, (0.01, 20.0, "0.01 to 20")),
-            ("wind.max_bend_deg", self.max_bend_deg, (1.0, 80.0, "1 to 80")),
+            (
+                "wind.max_bend_deg",
+                self.max_bend_deg,
+                (1.0, 80.0, "1 to 80"),
+            ),
         ]
     }
 }

@@ -22,6 +22,13 @@ pub struct Wood {
 
 impl Default for Wood {
     fn default() -> Self {
-        Self { curl: 0.5, twig_px: 9.0, max_twigs: 2000, trunk_width_px: 0.0, triangles: 30_000, seed: 1 }
+        Self {
+            curl: 0.5,
+            twig_px: 9.0,
+            max_twigs: 2000,
+            trunk_width_px: 0.0,
+            triangles: 30_000,
+            seed: 1,
+        }
     }
 }

@@ -38,7 +38,8 @@ pub enum Film {
     Frames {
         asked: String,
         given: String,
-        /// Sensor times, s, and the kernel's monotonic clock when the last frame was handed over, s.
+        /// Sensor times, s, and the kernel's monotonic clock when the last frame was handed over,
+        /// s.
         times_s: Vec<f64>,
         now_s: f64,
         /// Mean size of a frame as delivered, bytes.
@@ -50,9 +51,14 @@ pub enum Film {
 }
 
 pub fn seen(device: Option<&Path>) -> Seen {
-    let films: Vec<(PathBuf, String)> =
-        source::list().into_iter().filter(|d| d.films).map(|d| (d.path, d.name)).collect();
-    let chosen = device.map(Path::to_path_buf).or_else(|| films.first().map(|(path, _)| path.clone()));
+    let films: Vec<(PathBuf, String)> = source::list()
+        .into_iter()
+        .filter(|d| d.films)
+        .map(|d| (d.path, d.name))
+        .collect();
+    let chosen = device
+        .map(Path::to_path_buf)
+        .or_else(|| films.first().map(|(path, _)| path.clone()));
     Seen { films, chosen }
 }
 
@@ -67,14 +73,21 @@ pub fn node(device: &Path) -> Node {
 
 fn group(device: &Path) -> Option<String> {
     use std::os::unix::fs::MetadataExt;
-    let gid = std::fs::metadata(device).ok().filter(|m| m.mode() & 0o060 == 0o060 && m.gid() != 0)?.gid();
+    let gid = std::fs::metadata(device)
+        .ok()
+        .filter(|m| m.mode() & 0o060 == 0o060 && m.gid() != 0)?
+        .gid();
     source::group_name(gid)
 }
 
 pub fn film(device: &Path, settings: &config::Camera) -> Film {
     // Never through nokhwa, which may wait for ever; what is looked at here is the same either way.
     let (timeout_s, backend) = (settings.timeout_s.min(SILENCE_S), config::Backend::V4l2);
-    let settings = config::Camera { timeout_s, backend, ..settings.clone() };
+    let settings = config::Camera {
+        timeout_s,
+        backend,
+        ..settings.clone()
+    };
     match sample(device, &settings) {
         Ok(film) => film,
         Err(e @ SourceError::Busy { .. }) => Film::Busy(e.to_string()),
@@ -85,20 +98,32 @@ pub fn film(device: &Path, settings: &config::Camera) -> Film {
 fn sample(device: &Path, settings: &config::Camera) -> Result<Film, SourceError> {
     let mut source = source::open(device, settings, None)?;
     let format = source.describe().format;
-    let (until, mut times_s, mut bytes, mut now_s) = (Instant::now() + SAMPLE_LIMIT, Vec::new(), 0, 0.0);
+    let (until, mut times_s, mut bytes, mut now_s) =
+        (Instant::now() + SAMPLE_LIMIT, Vec::new(), 0, 0.0);
     while times_s.len() < SAMPLE && Instant::now() < until {
-        let Some(frame) = source.next_frame()? else { break };
+        let Some(frame) = source.next_frame()? else {
+            break;
+        };
         now_s = monotonic_s();
         times_s.push(frame.sensor_time_s);
         bytes += frame.bytes.len();
     }
     let bytes = bytes / times_s.len().max(1);
-    Ok(Film::Frames { asked: format.asked, given: format.given, times_s, now_s, bytes })
+    Ok(Film::Frames {
+        asked: format.asked,
+        given: format.given,
+        times_s,
+        now_s,
+        bytes,
+    })
 }
 
 /// The kernel's monotonic clock, which drivers stamp frames with, s.
 fn monotonic_s() -> f64 {
-    let mut now = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    let mut now = libc::timespec {
+        tv_sec: 0,
+        tv_nsec: 0,
+    };
     // SAFETY: the pointer is to a timespec that lives through the call.
     unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &mut now) };
     now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9

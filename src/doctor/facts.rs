@@ -93,7 +93,11 @@ pub fn gather(asked: Asked) -> Facts {
 }
 
 fn ffmpeg() -> Option<String> {
-    let output = Command::new("ffmpeg").arg("-version").stdin(Stdio::null()).output().ok()?;
+    let output = Command::new("ffmpeg")
+        .arg("-version")
+        .stdin(Stdio::null())
+        .output()
+        .ok()?;
     let text = String::from_utf8_lossy(&output.stdout);
     text.lines()
         .next()
@@ -102,17 +106,30 @@ fn ffmpeg() -> Option<String> {
 }
 
 fn load(config: &Config) -> Load {
-    let number = |path: &Path| std::fs::read_to_string(path).ok()?.trim().parse::<f64>().ok();
-    let zones = std::fs::read_dir("/sys/class/thermal").into_iter().flatten().flatten();
+    let number = |path: &Path| {
+        std::fs::read_to_string(path)
+            .ok()?
+            .trim()
+            .parse::<f64>()
+            .ok()
+    };
+    let zones = std::fs::read_dir("/sys/class/thermal")
+        .into_iter()
+        .flatten()
+        .flatten();
     let zones = zones.filter(|z| z.file_name().to_string_lossy().starts_with("thermal_zone"));
     let clock = Path::new("/sys/devices/system/cpu/cpu0/cpufreq");
-    let [now, able] = ["scaling_max_freq", "cpuinfo_max_freq"].map(|name| number(&clock.join(name)));
+    let [now, able] =
+        ["scaling_max_freq", "cpuinfo_max_freq"].map(|name| number(&clock.join(name)));
     let frames_per_s = measure::frames_per_s(config);
     Load {
         cores: std::thread::available_parallelism().map_or(1, usize::from),
         frames_per_s,
         // Read after the work, when it is warm.
-        celsius: zones.filter_map(|z| number(&z.path().join("temp"))).map(|m| m / 1000.0).reduce(f64::max),
+        celsius: zones
+            .filter_map(|z| number(&z.path().join("temp")))
+            .map(|m| m / 1000.0)
+            .reduce(f64::max),
         clock_share: now.zip(able).map(|(now, able)| now / able.max(1.0)),
     }
 }

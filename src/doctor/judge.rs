@@ -7,7 +7,8 @@ use super::measure::Disk;
 use super::service::{Installed, Part};
 use crate::config::Config;
 
-/// Share by which a machine should be faster than it must: other programs run as well, and trees differ.
+/// Share by which a machine should be faster than it must: other programs run as well, and trees
+/// differ.
 const MARGIN: f64 = 1.5;
 /// Film for which there should be room, and must be, s.
 const ROOM_S: [f64; 2] = [3600.0, 60.0];
@@ -41,7 +42,11 @@ pub fn judge(facts: &Facts) -> Vec<Check> {
 fn settings(error: Option<&str>) -> Check {
     match error {
         None => Check::ok("settings", "valid"),
-        Some(e) => Check::fail("settings", e, "mend that line; docs/settings.md has every key"),
+        Some(e) => Check::fail(
+            "settings",
+            e,
+            "mend that line; docs/settings.md has every key",
+        ),
     }
 }
 
@@ -49,10 +54,18 @@ fn camera(seen: &Seen) -> Check {
     match &seen.chosen {
         Some(chosen) => {
             let others = seen.films.iter().filter(|(path, _)| path != chosen).count();
-            let name = seen.films.iter().find(|(path, _)| path == chosen).map_or("", |(_, name)| name.as_str());
+            let name = seen
+                .films
+                .iter()
+                .find(|(path, _)| path == chosen)
+                .map_or("", |(_, name)| name.as_str());
             Check::ok(
                 "camera",
-                format!("{} {name} would be taken; {others} more there", chosen.display()).replace("  ", " "),
+                format!(
+                    "{} {name} would be taken; {others} more there",
+                    chosen.display()
+                )
+                .replace("  ", " "),
             )
         }
         None => Check::fail(
@@ -64,7 +77,10 @@ fn camera(seen: &Seen) -> Check {
 }
 
 fn permission(seen: &Seen, node: Option<&Node>) -> Check {
-    let path = seen.chosen.as_ref().map_or(String::new(), |p| p.display().to_string());
+    let path = seen
+        .chosen
+        .as_ref()
+        .map_or(String::new(), |p| p.display().to_string());
     match node {
         None => Check::warn(
             "permission",
@@ -85,26 +101,50 @@ fn permission(seen: &Seen, node: Option<&Node>) -> Check {
         Some(Node::Denied(None)) => Check::fail(
             "permission",
             format!("{path} may be opened by no group"),
-            format!("run `sudo chgrp video {path} && sudo chmod 660 {path}`, and be in the group video"),
+            format!(
+                "run `sudo chgrp video {path} && sudo chmod 660 {path}`, and be in the group video"
+            ),
         ),
-        Some(Node::Refuses(why)) => {
-            Check::fail("permission", format!("{path} cannot be opened: {why}"), "unplug it and plug it in again")
-        }
+        Some(Node::Refuses(why)) => Check::fail(
+            "permission",
+            format!("{path} cannot be opened: {why}"),
+            "unplug it and plug it in again",
+        ),
     }
 }
 
 fn frames(film: Option<&Film>, config: &Config) -> Check {
     let name = "frames";
     match film {
-        None => Check::warn(name, "not looked at, for lack of a camera that opens", "see above"),
-        Some(Film::Busy(why)) => Check::warn(name, format!("not looked at: {why}"), "try again when it is free"),
-        Some(Film::Failed(why)) => Check::fail(name, why, "docs/using.md explains each of these messages"),
-        Some(Film::Frames { times_s, .. }) if times_s.len() < 2 => {
-            Check::fail(name, "the camera gives no film", "unplug it and plug it in again, without a hub between")
+        None => Check::warn(
+            name,
+            "not looked at, for lack of a camera that opens",
+            "see above",
+        ),
+        Some(Film::Busy(why)) => Check::warn(
+            name,
+            format!("not looked at: {why}"),
+            "try again when it is free",
+        ),
+        Some(Film::Failed(why)) => {
+            Check::fail(name, why, "docs/using.md explains each of these messages")
         }
-        Some(Film::Frames { asked, given, times_s, .. }) => {
+        Some(Film::Frames { times_s, .. }) if times_s.len() < 2 => Check::fail(
+            name,
+            "the camera gives no film",
+            "unplug it and plug it in again, without a hub between",
+        ),
+        Some(Film::Frames {
+            asked,
+            given,
+            times_s,
+            ..
+        }) => {
             let span_s = times_s[times_s.len() - 1] - times_s[0];
-            let (rate, wanted) = ((times_s.len() - 1) as f64 / span_s.max(1e-6), f64::from(config.camera.rate_hz));
+            let (rate, wanted) = (
+                (times_s.len() - 1) as f64 / span_s.max(1e-6),
+                f64::from(config.camera.rate_hz),
+            );
             if rate < 0.9 * wanted {
                 return Check::warn(
                     name,
@@ -139,29 +179,47 @@ fn stamps(film: Option<&Film>) -> Check {
             "times are as good as the driver's own clock; for uvcvideo load it with clock=CLOCK_MONOTONIC",
         );
     }
-    Check::ok(name, format!("the kernel's monotonic clock, {:.0} ms from stamp to program", age_s * 1e3))
+    Check::ok(
+        name,
+        format!(
+            "the kernel's monotonic clock, {:.0} ms from stamp to program",
+            age_s * 1e3
+        ),
+    )
 }
 
 fn decoder(ms: &Result<f64, String>, config: &Config) -> Check {
     let budget_ms = 1e3 / f64::from(config.camera.rate_hz);
-    let remedy = "build with `make build` (it needs nasm for the fast decoder), or take a smaller picture";
+    let remedy =
+        "build with `make build` (it needs nasm for the fast decoder), or take a smaller picture";
     match ms {
         Err(e) => Check::fail("decoder", e, "build arborcam anew: make build"),
         // Tracking has to fit in beside it.
-        Ok(ms) if *ms > budget_ms / 2.0 => {
-            Check::fail("decoder", format!("{ms:.1} ms a frame, of {budget_ms:.1} there are"), remedy)
-        }
-        Ok(ms) if *ms > budget_ms / 4.0 => {
-            Check::warn("decoder", format!("{ms:.1} ms a frame, of {budget_ms:.1} there are"), remedy)
-        }
-        Ok(ms) => Check::ok("decoder", format!("JPEG in {ms:.1} ms a frame, of {budget_ms:.1} there are")),
+        Ok(ms) if *ms > budget_ms / 2.0 => Check::fail(
+            "decoder",
+            format!("{ms:.1} ms a frame, of {budget_ms:.1} there are"),
+            remedy,
+        ),
+        Ok(ms) if *ms > budget_ms / 4.0 => Check::warn(
+            "decoder",
+            format!("{ms:.1} ms a frame, of {budget_ms:.1} there are"),
+            remedy,
+        ),
+        Ok(ms) => Check::ok(
+            "decoder",
+            format!("JPEG in {ms:.1} ms a frame, of {budget_ms:.1} there are"),
+        ),
     }
 }
 
 fn ffmpeg(version: Option<&str>) -> Check {
     match version {
         Some(version) => Check::ok("ffmpeg", version),
-        None => Check::warn("ffmpeg", "not installed; video files cannot be replayed", "run `sudo apt install ffmpeg`"),
+        None => Check::warn(
+            "ffmpeg",
+            "not installed; video files cannot be replayed",
+            "run `sudo apt install ffmpeg`",
+        ),
     }
 }
 
@@ -180,7 +238,13 @@ fn need_bytes_per_s(film: Option<&Film>, config: &Config) -> f64 {
 fn disk(disk: &Result<Disk, String>, film: Option<&Film>, config: &Config) -> Check {
     let disk = match disk {
         Ok(disk) => disk,
-        Err(e) => return Check::fail("disk", e, "choose a folder in which you may write, with --out"),
+        Err(e) => {
+            return Check::fail(
+                "disk",
+                e,
+                "choose a folder in which you may write, with --out",
+            );
+        }
     };
     let need = need_bytes_per_s(film, config);
     let room_s = disk.free_bytes as f64 / need;
@@ -206,7 +270,9 @@ fn disk(disk: &Result<Disk, String>, film: Option<&Film>, config: &Config) -> Ch
 
 fn processor(load: &Load, config: &Config) -> Check {
     let asked = f64::from(config.camera.rate_hz);
-    let heat = load.celsius.map_or(String::new(), |c| format!(", {c:.0} °C"));
+    let heat = load
+        .celsius
+        .map_or(String::new(), |c| format!(", {c:.0} °C"));
     let found = format!(
         "{} cores{heat}; tracks {:.1} frames of {}x{} a second, {asked} are asked",
         load.cores, load.frames_per_s, config.camera.width, config.camera.height
@@ -216,7 +282,11 @@ fn processor(load: &Load, config: &Config) -> Check {
         return Check::fail("processor", found, slower);
     }
     if load.celsius.is_some_and(|c| c >= HOT) {
-        return Check::warn("processor", found, "cool it: from about here it slows itself down");
+        return Check::warn(
+            "processor",
+            found,
+            "cool it: from about here it slows itself down",
+        );
     }
     if load.clock_share.is_some_and(|share| share < 0.9) {
         return Check::warn(
@@ -242,16 +312,31 @@ fn terminal(screen: &Screen) -> Check {
     let Some((columns, rows)) = screen.cells else {
         return Check::ok("terminal", "none; captures run with --headless");
     };
-    let found = format!("{columns}x{rows}, colours: {}, pictures: {}", screen.colours, screen.pictures);
+    let found = format!(
+        "{columns}x{rows}, colours: {}, pictures: {}",
+        screen.colours, screen.pictures
+    );
     let smaller = |(c, r): (u16, u16)| columns < c || rows < r;
     if smaller(CELLS[0]) {
-        return Check::warn("terminal", found, "make it 80x24 or larger; below 60x16 nothing is drawn");
+        return Check::warn(
+            "terminal",
+            found,
+            "make it 80x24 or larger; below 60x16 nothing is drawn",
+        );
     }
     if !screen.utf8 {
-        return Check::warn("terminal", format!("{found}, not UTF-8"), "set a UTF-8 locale: export LANG=C.UTF-8");
+        return Check::warn(
+            "terminal",
+            format!("{found}, not UTF-8"),
+            "set a UTF-8 locale: export LANG=C.UTF-8",
+        );
     }
     if screen.colours == "none" {
-        return Check::warn("terminal", found, "unset NO_COLOR to see pictures in colour");
+        return Check::warn(
+            "terminal",
+            found,
+            "unset NO_COLOR to see pictures in colour",
+        );
     }
     if smaller(CELLS[1]) {
         return Check::warn("terminal", found, "it is made for 80x24");
@@ -264,10 +349,15 @@ fn service(installed: &Installed) -> Check {
     let parts = [installed.unit, installed.helper, installed.rule];
     let install = "run `sudo make install`";
     match (&installed.enabled[..], installed.unit) {
-        ([], Part::Missing) => Check::ok(name, "not installed; it is for filming unattended (docs/service.md)"),
-        (enabled, Part::Missing) => {
-            Check::fail(name, format!("{} is enabled and not installed", enabled.join(", ")), install)
-        }
+        ([], Part::Missing) => Check::ok(
+            name,
+            "not installed; it is for filming unattended (docs/service.md)",
+        ),
+        (enabled, Part::Missing) => Check::fail(
+            name,
+            format!("{} is enabled and not installed", enabled.join(", ")),
+            install,
+        ),
         (_, _) if parts.contains(&Part::Missing) => Check::fail(name, "installed in part", install),
         (_, _) if parts.contains(&Part::Differs) => Check::warn(
             name,

@@ -18,7 +18,10 @@ const PIECE: usize = 1 << 20;
 
 /// A picture of our own, so that decoding can be tried without a camera.
 const PROBE: &[u8] = include_bytes!("probe.jpg");
-const PROBE_SIZE: Size = Size { width: 320, height: 180 };
+const PROBE_SIZE: Size = Size {
+    width: 320,
+    height: 180,
+};
 
 /// Time to decode a picture of `size` from JPEG to luma, ms.
 ///
@@ -33,7 +36,10 @@ pub fn decode_ms(size: Size) -> Result<f64, String> {
         format: PixelFormat::Mjpeg,
         bytes: PROBE.to_vec(),
     };
-    let mut luma = Luma { size: PROBE_SIZE, pixels: Vec::new() };
+    let mut luma = Luma {
+        size: PROBE_SIZE,
+        pixels: Vec::new(),
+    };
     decoder.luma(&raw, &mut luma).map_err(|e| e.to_string())?;
     let (began, mut n) = (Instant::now(), 0_u32);
     while began.elapsed() < SPAN / 4 {
@@ -51,11 +57,20 @@ pub fn frames_per_s(config: &Config) -> f64 {
     let mut front = FrontEnd::new(config, Some(whole(size)));
     let pictures = [0, 1].map(|shift| texture(size, shift));
     let mut step = |k: u64| {
-        let mut luma = front.spare().unwrap_or(Luma { size, pixels: Vec::new() });
+        let mut luma = front.spare().unwrap_or(Luma {
+            size,
+            pixels: Vec::new(),
+        });
         luma.pixels.clear();
         luma.pixels.extend_from_slice(&pictures[k as usize % 2]);
         let time_s = k as f64 / f64::from(config.camera.rate_hz);
-        drop(front.step(Frame { index: k, time_s, received: Instant::now(), luma, preview: None::<Arc<_>> }));
+        drop(front.step(Frame {
+            index: k,
+            time_s,
+            received: Instant::now(),
+            luma,
+            preview: None::<Arc<_>>,
+        }));
     };
     // Detection comes once, and is not what has to keep up.
     step(0);
@@ -70,11 +85,14 @@ pub fn frames_per_s(config: &Config) -> f64 {
 /// Blocks of pseudo-random brightness, full of corners, moved by `shift` px.
 fn texture(size: Size, shift: usize) -> Vec<u8> {
     let brightness = |u: usize, v: usize| {
-        let mixed = ((u / 8) as u32).wrapping_mul(0x9e37_79b1) ^ ((v / 8) as u32).wrapping_mul(0x85eb_ca6b);
+        let mixed =
+            ((u / 8) as u32).wrapping_mul(0x9e37_79b1) ^ ((v / 8) as u32).wrapping_mul(0x85eb_ca6b);
         (mixed.wrapping_mul(0xc2b2_ae35) >> 24) as u8
     };
     let (width, height) = (size.width as usize, size.height as usize);
-    (0..height).flat_map(|v| (0..width).map(move |u| brightness(u + shift, v))).collect()
+    (0..height)
+        .flat_map(|v| (0..width).map(move |u| brightness(u + shift, v)))
+        .collect()
 }
 
 /// A disk that is to be written to.
@@ -102,14 +120,19 @@ pub fn disk(folder: &Path) -> std::io::Result<Disk> {
         file.sync_data()?;
     }
     let bytes_per_s = written as f64 / began.elapsed().as_secs_f64().max(1e-6);
-    Ok(Disk { folder: folder.display().to_string(), free_bytes, bytes_per_s })
+    Ok(Disk {
+        folder: folder.display().to_string(),
+        free_bytes,
+        bytes_per_s,
+    })
 }
 
 fn free_bytes(folder: &Path) -> std::io::Result<u64> {
     use std::os::unix::ffi::OsStrExt;
     let path = std::ffi::CString::new(folder.as_os_str().as_bytes())?;
     let mut stat = std::mem::MaybeUninit::<libc::statvfs>::zeroed();
-    // SAFETY: the path ends with a zero byte, and the call fills the structure that the pointer is to.
+    // SAFETY: the path ends with a zero byte, and the call fills the structure that the pointer is
+    // to.
     if unsafe { libc::statvfs(path.as_ptr(), stat.as_mut_ptr()) } != 0 {
         return Err(std::io::Error::last_os_error());
     }

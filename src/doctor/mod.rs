@@ -1,7 +1,8 @@
-//! Whether this machine can do what it is asked to, one finding a line, each with what to do about it.
+//! Whether this machine can do what it is asked to, one finding a line, each with what to do about
+//! it.
 //!
-//! [`gather`](facts::gather) looks at the machine and measures; [`judge`] turns what was found into verdicts and touches
-//! nothing, so that every remedy can be held by a test.
+//! [`gather`](facts::gather) looks at the machine and measures; [`judge`] turns what was found into
+//! verdicts and touches nothing, so that every remedy can be held by a test.
 
 mod camera;
 mod facts;
@@ -41,15 +42,38 @@ pub struct Check {
 
 impl Check {
     pub(crate) fn ok(name: &'static str, found: impl Into<String>) -> Self {
-        Self { name, verdict: Verdict::Ok, found: found.into(), remedy: String::new() }
+        Self {
+            name,
+            verdict: Verdict::Ok,
+            found: found.into(),
+            remedy: String::new(),
+        }
     }
 
-    pub(crate) fn warn(name: &'static str, found: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self { name, verdict: Verdict::Warn, found: found.into(), remedy: remedy.into() }
+    pub(crate) fn warn(
+        name: &'static str,
+        found: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Self {
+        Self {
+            name,
+            verdict: Verdict::Warn,
+            found: found.into(),
+            remedy: remedy.into(),
+        }
     }
 
-    pub(crate) fn fail(name: &'static str, found: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self { name, verdict: Verdict::Fail, found: found.into(), remedy: remedy.into() }
+    pub(crate) fn fail(
+        name: &'static str,
+        found: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Self {
+        Self {
+            name,
+            verdict: Verdict::Fail,
+            found: found.into(),
+            remedy: remedy.into(),
+        }
     }
 }
 
@@ -61,6 +85,10 @@ impl std::fmt::Display for Check {
             Verdict::Fail => "FAIL",
         };
         let colon = if self.remedy.is_empty() { "" } else { "; " };
-        write!(f, "{verdict}  {:<12} {}{colon}{}", self.name, self.found, self.remedy)
+        write!(
+            f,
+            "{verdict}  {:<12} {}{colon}{}",
+            self.name, self.found, self.remedy
+        )
     }
 }

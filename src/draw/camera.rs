@@ -6,28 +6,39 @@ use nalgebra::{Point3, Vector3};
 /// A direction to look from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
-    /// How far the viewer has walked round the tree, counter-clockwise seen from above, radians: 0 is where the film was
-    /// taken from, a quarter turn its right.
+    /// How far the viewer has walked round the tree, counter-clockwise seen from above, radians: 0
+    /// is where the film was taken from, a quarter turn its right.
     pub turn: f64,
     /// How far the viewer looks down, radians: 0 level, a quarter turn from above.
     pub down: f64,
 }
 
 impl View {
-    pub const FRONT: View = View { turn: 0.0, down: 0.0 };
-    pub const SIDE: View = View { turn: std::f64::consts::FRAC_PI_2, down: 0.0 };
-    pub const TOP: View = View { turn: 0.0, down: std::f64::consts::FRAC_PI_2 };
+    pub const FRONT: View = View {
+        turn: 0.0,
+        down: 0.0,
+    };
+    pub const SIDE: View = View {
+        turn: std::f64::consts::FRAC_PI_2,
+        down: 0.0,
+    };
+    pub const TOP: View = View {
+        turn: 0.0,
+        down: std::f64::consts::FRAC_PI_2,
+    };
 
     /// Unit vectors in model axes: to the right and up in the picture, and towards the viewer.
     pub fn axes(self) -> [Vector3<f64>; 3] {
-        let ((turn_sin, turn_cos), (down_sin, down_cos)) = (self.turn.sin_cos(), self.down.sin_cos());
+        let ((turn_sin, turn_cos), (down_sin, down_cos)) =
+            (self.turn.sin_cos(), self.down.sin_cos());
         let right = Vector3::new(turn_cos, 0.0, -turn_sin);
         let towards = Vector3::new(turn_sin * down_cos, down_sin, turn_cos * down_cos);
         [right, towards.cross(&right), towards]
     }
 }
 
-/// The upright cylinder about the trunk's foot that holds a tree: whoever walks round it sees it in one size.
+/// The upright cylinder about the trunk's foot that holds a tree: whoever walks round it sees it in
+/// one size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     pub low: Point3<f64>,
@@ -39,21 +50,39 @@ pub struct Bounds {
 impl Bounds {
     /// Of points in model axes; those that are no numbers are left out. `None` if none is left.
     pub fn of(points: impl IntoIterator<Item = Point3<f64>>) -> Option<Self> {
-        points.into_iter().filter(|p| p.coords.iter().all(|c| c.is_finite() && c.abs() < 1e12)).fold(None, |all, p| {
-            let one = Self { low: p, high: p, radius: p.x.hypot(p.z) };
-            Some(all.map_or(one, |all: Self| all.with(&one)))
-        })
+        points
+            .into_iter()
+            .filter(|p| p.coords.iter().all(|c| c.is_finite() && c.abs() < 1e12))
+            .fold(None, |all, p| {
+                let one = Self {
+                    low: p,
+                    high: p,
+                    radius: p.x.hypot(p.z),
+                };
+                Some(all.map_or(one, |all: Self| all.with(&one)))
+            })
     }
 
     /// What holds both.
     pub fn with(&self, other: &Self) -> Self {
         let (low, high) = (self.low.inf(&other.low), self.high.sup(&other.high));
-        Self { low, high, radius: self.radius.max(other.radius) }
+        Self {
+            low,
+            high,
+            radius: self.radius.max(other.radius),
+        }
     }
 
     fn corners(&self) -> impl Iterator<Item = Point3<f64>> {
-        let pick = |bit: usize, axis: usize| if bit == 0 { self.low[axis] } else { self.high[axis] };
-        let corner = move |i: usize| Point3::new(pick(i & 1, 0), pick(i >> 1 & 1, 1), pick(i >> 2 & 1, 2));
+        let pick = |bit: usize, axis: usize| {
+            if bit == 0 {
+                self.low[axis]
+            } else {
+                self.high[axis]
+            }
+        };
+        let corner =
+            move |i: usize| Point3::new(pick(i & 1, 0), pick(i >> 1 & 1, 1), pick(i >> 2 & 1, 2));
         [0, 1, 2, 3, 4, 5, 6, 7].map(corner).into_iter()
     }
 }
@@ -75,25 +104,41 @@ pub struct Camera {
 const MARGIN: f64 = 0.05;
 
 impl Camera {
-    /// Shows all of `bounds`, as large as it fits. With `steady` the tree keeps size and place when it turns.
+    /// Shows all of `bounds`, as large as it fits. With `steady` the tree keeps size and place when
+    /// it turns.
     pub fn fitting(bounds: &Bounds, view: View, steady: bool, size: Size) -> Self {
         let [right, up, _] = view.axes();
         let mut aim = nalgebra::center(&bounds.low, &bounds.high);
         let span = |axis: &Vector3<f64>| {
-            let along = bounds.corners().map(|c| (c - aim).dot(axis)).fold(0.0, f64::max);
+            let along = bounds
+                .corners()
+                .map(|c| (c - aim).dot(axis))
+                .fold(0.0, f64::max);
             2.0 * along
         };
         let (mut across, mut high) = (span(&right), span(&up));
         if steady {
             (aim.x, aim.z) = (0.0, 0.0);
             across = 2.0 * bounds.radius;
-            high = (bounds.high.y - bounds.low.y) * view.down.cos().abs() + across * view.down.sin().abs();
+            high = (bounds.high.y - bounds.low.y) * view.down.cos().abs()
+                + across * view.down.sin().abs();
         }
         let keep = 1.0 - 2.0 * MARGIN;
-        let scale = (keep * f64::from(size.width) / across).min(keep * f64::from(size.height) / high);
+        let scale =
+            (keep * f64::from(size.width) / across).min(keep * f64::from(size.height) / high);
         // What has no extent is a dot in the middle, whatever the scale.
-        let scale = if scale.is_finite() && scale > 0.0 { scale } else { 1.0 };
-        Self { view, aim, middle_px: [f64::from(size.width) / 2.0, f64::from(size.height) / 2.0], scale, size }
+        let scale = if scale.is_finite() && scale > 0.0 {
+            scale
+        } else {
+            1.0
+        };
+        Self {
+            view,
+            aim,
+            middle_px: [f64::from(size.width) / 2.0, f64::from(size.height) / 2.0],
+            scale,
+            size,
+        }
     }
 
     /// The film's own camera: what it draws lies over the filmed frame drawn at this size.
@@ -104,15 +149,29 @@ impl Camera {
         let left = (f64::from(size.width) - scale * f64::from(film.width)) / 2.0;
         let top = (f64::from(size.height) - scale * f64::from(film.height)) / 2.0;
         // The centre of the film's first pixel is 0, its corner -0.5.
-        let middle_px = [left + scale * (skeleton.foot_px[0] + 0.5), top + scale * (skeleton.foot_px[1] + 0.5)];
-        Self { view: View::FRONT, aim: Point3::origin(), middle_px, scale, size }
+        let middle_px = [
+            left + scale * (skeleton.foot_px[0] + 0.5),
+            top + scale * (skeleton.foot_px[1] + 0.5),
+        ];
+        Self {
+            view: View::FRONT,
+            aim: Point3::origin(),
+            middle_px,
+            scale,
+            size,
+        }
     }
 
-    /// Where a point of the model is in the picture, px from its top left corner, and how near the viewer, model units.
+    /// Where a point of the model is in the picture, px from its top left corner, and how near the
+    /// viewer, model units.
     pub fn project(&self, p: &Point3<f64>) -> [f64; 3] {
         let [right, up, towards] = self.view.axes();
         let d = p - self.aim;
-        [self.middle_px[0] + self.scale * d.dot(&right), self.middle_px[1] - self.scale * d.dot(&up), d.dot(&towards)]
+        [
+            self.middle_px[0] + self.scale * d.dot(&right),
+            self.middle_px[1] - self.scale * d.dot(&up),
+            d.dot(&towards),
+        ]
     }
 }
 
@@ -124,25 +183,51 @@ mod tests {
     #[test]
     fn every_view_shows_the_axes_where_a_viewer_standing_there_sees_them() {
         for (view, x, y, z) in [
-            (View::FRONT, [1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]),
-            (View::SIDE, [0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]),
+            (
+                View::FRONT,
+                [1.0, 0.0, 0.0],
+                [0.0, -1.0, 0.0],
+                [0.0, 0.0, 1.0],
+            ),
+            (
+                View::SIDE,
+                [0.0, 0.0, 1.0],
+                [0.0, -1.0, 0.0],
+                [-1.0, 0.0, 0.0],
+            ),
             (View::TOP, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]),
         ] {
-            let camera =
-                Camera { view, aim: Point3::origin(), middle_px: [0.0; 2], scale: 1.0, size: Size::new(10, 10) };
-            for (point, expected) in [(Point3::new(1.0, 0.0, 0.0), x), (Point3::new(0.0, 1.0, 0.0), y)]
-                .into_iter()
-                .chain([(Point3::new(0.0, 0.0, 1.0), z)])
+            let camera = Camera {
+                view,
+                aim: Point3::origin(),
+                middle_px: [0.0; 2],
+                scale: 1.0,
+                size: Size::new(10, 10),
+            };
+            for (point, expected) in [
+                (Point3::new(1.0, 0.0, 0.0), x),
+                (Point3::new(0.0, 1.0, 0.0), y),
+            ]
+            .into_iter()
+            .chain([(Point3::new(0.0, 0.0, 1.0), z)])
             {
                 let seen = camera.project(&point);
-                assert!((0..3).all(|i| (seen[i] - expected[i]).abs() < 1e-12), "{view:?} {point}: {seen:?}");
+                assert!(
+                    (0..3).all(|i| (seen[i] - expected[i]).abs() < 1e-12),
+                    "{view:?} {point}: {seen:?}"
+                );
             }
         }
     }
 
     #[test]
     fn the_whole_tree_is_in_the_picture_from_everywhere() {
-        let points = [[-40.0, 0.0, 3.0], [70.0, 200.0, -90.0], [5.0, 120.0, 60.0], [f64::NAN, 1.0, 1.0]];
+        let points = [
+            [-40.0, 0.0, 3.0],
+            [70.0, 200.0, -90.0],
+            [5.0, 120.0, 60.0],
+            [f64::NAN, 1.0, 1.0],
+        ];
         let points = points.map(|[x, y, z]| Point3::new(x, y, z));
         let bounds = Bounds::of(points).unwrap();
         for size in [Size::new(640, 480), Size::new(100, 900)] {
@@ -153,8 +238,10 @@ mod tests {
                         let camera = Camera::fitting(&bounds, View { turn, down }, steady, size);
                         for p in &points[..3] {
                             let [x, y, _] = camera.project(p);
-                            let inside =
-                                x >= 0.0 && y >= 0.0 && x <= f64::from(size.width) && y <= f64::from(size.height);
+                            let inside = x >= 0.0
+                                && y >= 0.0
+                                && x <= f64::from(size.width)
+                                && y <= f64::from(size.height);
                             assert!(inside, "{p} at {x} {y}, {camera:?}");
                         }
                     }
@@ -165,12 +252,19 @@ mod tests {
 
     #[test]
     fn the_films_camera_puts_a_node_on_its_own_pixel() {
-        let skeleton = Skeleton { nodes: Vec::new(), foot_px: [325.5, 336.0], image_size: Size::new(640, 360) };
+        let skeleton = Skeleton {
+            nodes: Vec::new(),
+            foot_px: [325.5, 336.0],
+            image_size: Size::new(640, 360),
+        };
         // Twice as large, with bars above and below.
         let camera = Camera::of_film(&skeleton, Size::new(1280, 800));
         let p = Point3::new(8.0, 78.0, 5.0);
         let [u, v] = skeleton.image_from_model(&p);
         let [x, y, _] = camera.project(&p);
-        assert!((x - 2.0 * (u + 0.5)).abs() < 1e-9 && (y - 40.0 - 2.0 * (v + 0.5)).abs() < 1e-9, "{x} {y}");
+        assert!(
+            (x - 2.0 * (u + 0.5)).abs() < 1e-9 && (y - 40.0 - 2.0 * (v + 0.5)).abs() < 1e-9,
+            "{x} {y}"
+        );
     }
 }

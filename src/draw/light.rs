@@ -9,17 +9,23 @@ use nalgebra::Vector3;
 /// How a picture is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
-    /// Samples of a pixel in either direction, 1 to 8: smoother borders, and thinner twigs that still show.
+    /// Samples of a pixel in either direction, 1 to 8: smoother borders, and thinner twigs that
+    /// still show.
     pub samples: u32,
     /// The tree's shadow on the ground, where the view looks down on it.
     pub shadow: bool,
-    /// By how much wood is drawn thicker on every side, px: a twig thinner than a sample is else drawn in pieces.
+    /// By how much wood is drawn thicker on every side, px: a twig thinner than a sample is else
+    /// drawn in pieces.
     pub thicker_px: f64,
 }
 
 impl Default for Look {
     fn default() -> Self {
-        Self { samples: 3, shadow: false, thicker_px: 0.0 }
+        Self {
+            samples: 3,
+            shadow: false,
+            thicker_px: 0.0,
+        }
     }
 }
 
@@ -32,7 +38,9 @@ pub fn picture(tree: &Posed, camera: &Camera, look: &Look) -> Rgba {
     let mut canvas = Canvas::new(camera.size, samples);
     let mut eye = Eye::new(camera, samples);
     eye.thicker = (look.thicker_px / camera.scale) as f32;
-    tree.parts.iter().for_each(|part| draw(part, &eye, &mut canvas));
+    tree.parts
+        .iter()
+        .for_each(|part| draw(part, &eye, &mut canvas));
     let picture = canvas.picture();
     if !look.shadow || camera.view.down < 0.05 {
         return picture;
@@ -69,11 +77,16 @@ impl Eye {
     fn place(&self, p: Vector3<f32>) -> [f32; 3] {
         let d = p - self.aim;
         let [right, up, towards] = &self.axes;
-        [self.middle[0] + self.scale * d.dot(right), self.middle[1] - self.scale * d.dot(up), d.dot(towards)]
+        [
+            self.middle[0] + self.scale * d.dot(right),
+            self.middle[1] - self.scale * d.dot(up),
+            d.dot(towards),
+        ]
     }
 }
 
-/// Towards the sun; it goes round with the viewer, so that every view is lit alike, and stays in the sky from above.
+/// Towards the sun; it goes round with the viewer, so that every view is lit alike, and stays in
+/// the sky from above.
 fn sun(view: View) -> Vector3<f32> {
     let [right, _, towards] = View { down: 0.0, ..view }.axes();
     let way: Vector3<f64> = towards * 0.6 + Vector3::y() * 0.75 - right * 0.5;
@@ -82,7 +95,11 @@ fn sun(view: View) -> Vector3<f32> {
 
 fn draw(part: &Part, eye: &Eye, canvas: &mut Canvas) {
     let towards = eye.axes[2];
-    let parts = part.positions.iter().zip(part.normals.iter().zip(&part.colours)).enumerate();
+    let parts = part
+        .positions
+        .iter()
+        .zip(part.normals.iter().zip(&part.colours))
+        .enumerate();
     let corners: Vec<Corner> = parts
         .map(|(i, (p, (n, colour)))| {
             let mut normal = Vector3::from(*n);
@@ -94,7 +111,13 @@ fn draw(part: &Part, eye: &Eye, canvas: &mut Canvas) {
             let thicker = if part.two_sided { 0.0 } else { eye.thicker };
             let [x, y, z] = eye.place(Vector3::from(*p) + normal * thicker);
             let uv = part.uvs.get(i).copied().unwrap_or_default();
-            Corner { x, y, z, rgb: colour.map(|c| (f32::from(c) * light).clamp(0.0, 255.0)), uv }
+            Corner {
+                x,
+                y,
+                z,
+                rgb: colour.map(|c| (f32::from(c) * light).clamp(0.0, 255.0)),
+                uv,
+            }
         })
         .collect();
     for t in part.indices.chunks_exact(3) {
@@ -105,10 +128,15 @@ fn draw(part: &Part, eye: &Eye, canvas: &mut Canvas) {
     }
 }
 
-/// Share of its colour that a surface shows. Leaves let light through, and theirs has the film's shadows in it already.
+/// Share of its colour that a surface shows. Leaves let light through, and theirs has the film's
+/// shadows in it already.
 fn lit(normal: Vector3<f32>, sun: Vector3<f32>, leaf: bool) -> f32 {
     let (sky, key) = (0.5 + 0.5 * normal.y, normal.dot(&sun));
-    if leaf { 0.72 + 0.13 * sky + 0.25 * key.abs() } else { 0.45 + 0.25 * sky + 0.6 * key.max(0.0) }
+    if leaf {
+        0.72 + 0.13 * sky + 0.25 * key.abs()
+    } else {
+        0.45 + 0.25 * sky + 0.6 * key.max(0.0)
+    }
 }
 
 /// The shadow on the ground of the foot: grey with soft borders, transparent elsewhere.
@@ -122,7 +150,13 @@ fn shadow(tree: &Posed, camera: &Camera) -> Rgba {
             .map(|p| {
                 let p = Vector3::from(*p);
                 let [x, y, _] = eye.place(p - sun * p.y.max(0.0));
-                Corner { x, y, z: 0.0, rgb: [0.0; 3], uv: [0.0; 2] }
+                Corner {
+                    x,
+                    y,
+                    z: 0.0,
+                    rgb: [0.0; 3],
+                    uv: [0.0; 2],
+                }
             })
             .collect();
         for t in part.indices.chunks_exact(3) {
@@ -134,7 +168,11 @@ fn shadow(tree: &Posed, camera: &Camera) -> Rgba {
     }
     let mut picture = canvas.picture();
     let (width, height) = (camera.size.width as usize, camera.size.height as usize);
-    let mut cover: Vec<f32> = picture.pixels.chunks_exact(4).map(|p| f32::from(p[3]) * SHADE).collect();
+    let mut cover: Vec<f32> = picture
+        .pixels
+        .chunks_exact(4)
+        .map(|p| f32::from(p[3]) * SHADE)
+        .collect();
     let soft = 1 + width.max(height) / 200;
     // Seen from the side the ground is foreshortened, and so is the softness of what lies on it.
     let soft_down = ((soft as f64 * camera.view.down.sin()).round() as usize).max(1);
@@ -148,7 +186,8 @@ fn shadow(tree: &Posed, camera: &Camera) -> Rgba {
     picture
 }
 
-/// Running mean over `2 radius + 1` values along lines: `n` values `step` apart, `lines` of them `next` apart.
+/// Running mean over `2 radius + 1` values along lines: `n` values `step` apart, `lines` of them
+/// `next` apart.
 fn blur(values: &mut [f32], n: usize, lines: usize, radius: usize, step: usize, next: usize) {
     let mut line = vec![0.0_f32; n];
     for l in 0..lines {
@@ -157,7 +196,9 @@ fn blur(values: &mut [f32], n: usize, lines: usize, radius: usize, step: usize, 
         let mut sum: f64 = line.iter().take(radius).map(|v| f64::from(*v)).sum();
         for i in 0..n {
             sum += line.get(i + radius).map_or(0.0, |v| f64::from(*v));
-            sum -= i.checked_sub(radius + 1).map_or(0.0, |k| f64::from(line[k]));
+            sum -= i
+                .checked_sub(radius + 1)
+                .map_or(0.0, |k| f64::from(line[k]));
             values[at(i)] = (sum / (2 * radius + 1) as f64) as f32;
         }
     }
@@ -183,6 +224,9 @@ mod tests {
         blur(&mut values, 9, 3, 1, 1, 9);
         assert_eq!(values[9..18], [0.0, 0.0, 0.0, 3.0, 3.0, 3.0, 0.0, 0.0, 0.0]);
         blur(&mut values, 3, 9, 1, 9, 1);
-        assert!(values.iter().map(|v| v.round()).sum::<f32>() == 9.0, "{values:?}");
+        assert!(
+            values.iter().map(|v| v.round()).sum::<f32>() == 9.0,
+            "{values:?}"
+        );
     }
 }

@@ -42,29 +42,62 @@ pub struct Posed<'a> {
 impl<'a> Model<'a> {
     /// Wood alone.
     pub fn bare(skeleton: &'a Skeleton, wood: &'a Mesh, bark_rgb: [u8; 3]) -> Self {
-        static NONE: Foliage = Foliage { groups: Vec::new(), texture: None, frequency_hz: 0.0 };
-        Self { skeleton, wood, bark_rgb, branch_rgb: &[], foliage: &NONE, leaf: None }
+        static NONE: Foliage = Foliage {
+            groups: Vec::new(),
+            texture: None,
+            frequency_hz: 0.0,
+        };
+        Self {
+            skeleton,
+            wood,
+            bark_rgb,
+            branch_rgb: &[],
+            foliage: &NONE,
+            leaf: None,
+        }
     }
 
-    /// The tree in a pose, `None` for its rest. `sway` is how far the leaves of each group swing, rad; see
-    /// [`crate::shape::FoliageGroup`]; it may be shorter than the groups.
+    /// The tree in a pose, `None` for its rest. `sway` is how far the leaves of each group swing,
+    /// rad; see [`crate::shape::FoliageGroup`]; it may be shorter than the groups.
     pub fn posed(&self, pose: Option<&Pose>, sway: &[[f32; 2]]) -> Posed<'_> {
         let joints = Joints::new(self.skeleton, pose);
         let (positions, normals) = joints.wood(self.wood);
-        let of_joint = |joint: u16| self.branch_rgb.get(usize::from(joint)).copied().unwrap_or(self.bark_rgb);
+        let of_joint = |joint: u16| {
+            self.branch_rgb
+                .get(usize::from(joint))
+                .copied()
+                .unwrap_or(self.bark_rgb)
+        };
         let colours = match self.branch_rgb {
             [] => vec![self.bark_rgb; positions.len()],
             _ => self.wood.joints.iter().map(|j| of_joint(j[0])).collect(),
         };
         let (uvs, indices) = (self.wood.uvs.as_slice(), self.wood.indices.as_slice());
-        let mut parts = vec![Part { positions, normals, colours, uvs, indices, texture: None, two_sided: false }];
+        let mut parts = vec![Part {
+            positions,
+            normals,
+            colours,
+            uvs,
+            indices,
+            texture: None,
+            two_sided: false,
+        }];
         for (i, group) in self.foliage.groups.iter().enumerate() {
-            let (positions, normals) = joints.leaves(group, sway.get(i).copied().unwrap_or_default());
+            let (positions, normals) =
+                joints.leaves(group, sway.get(i).copied().unwrap_or_default());
             let mut colours = group.colours.clone();
             colours.resize(positions.len(), [255; 3]);
             let (uvs, indices) = (group.mesh.uvs.as_slice(), group.mesh.indices.as_slice());
             let texture = self.leaf.as_ref().filter(|_| uvs.len() == positions.len());
-            parts.push(Part { positions, normals, colours, uvs, indices, texture, two_sided: true });
+            parts.push(Part {
+                positions,
+                normals,
+                colours,
+                uvs,
+                indices,
+                texture,
+                two_sided: true,
+            });
         }
         Posed { parts }
     }

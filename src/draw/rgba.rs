@@ -12,11 +12,15 @@ pub struct Rgba {
 impl Rgba {
     /// Nothing but one colour.
     pub fn of_one(size: Size, rgba: [u8; 4]) -> Self {
-        Self { size, pixels: rgba.repeat(size.area()) }
+        Self {
+            size,
+            pixels: rgba.repeat(size.area()),
+        }
     }
 
-    /// A filmed frame, scaled (each pixel the mean of those that it covers) into a picture of this size, with its sides' ratio
-    /// kept and the rest in `around`. `None` if the frame's bytes do not match its size.
+    /// A filmed frame, scaled (each pixel the mean of those that it covers) into a picture of this
+    /// size, with its sides' ratio kept and the rest in `around`. `None` if the frame's bytes do
+    /// not match its size.
     pub fn of_frame(frame: &Rgb, size: Size, around: [u8; 4]) -> Option<Self> {
         if frame.size.area() == 0 || frame.pixels.len() != 3 * frame.size.area() {
             return None;
@@ -24,14 +28,24 @@ impl Rgba {
         let mut out = Self::of_one(size, around);
         let (fw, fh) = (f64::from(frame.size.width), f64::from(frame.size.height));
         let scale = (f64::from(size.width) / fw).min(f64::from(size.height) / fh);
-        let (left, top) = ((f64::from(size.width) - scale * fw) / 2.0, (f64::from(size.height) - scale * fh) / 2.0);
+        let (left, top) = (
+            (f64::from(size.width) - scale * fw) / 2.0,
+            (f64::from(size.height) - scale * fh) / 2.0,
+        );
         for y in 0..size.height {
             for x in 0..size.width {
-                let (u, v) = ((f64::from(x) + 0.5 - left) / scale, (f64::from(y) + 0.5 - top) / scale);
+                let (u, v) = (
+                    (f64::from(x) + 0.5 - left) / scale,
+                    (f64::from(y) + 0.5 - top) / scale,
+                );
                 if u < 0.0 || v < 0.0 || u >= fw || v >= fh {
                     continue;
                 }
-                let rgb = if scale < 1.0 { mean(frame, u, v, 0.5 / scale) } else { between(frame, u - 0.5, v - 0.5) };
+                let rgb = if scale < 1.0 {
+                    mean(frame, u, v, 0.5 / scale)
+                } else {
+                    between(frame, u - 0.5, v - 0.5)
+                };
                 let at = 4 * (y as usize * size.width as usize + x as usize);
                 out.pixels[at..at + 3].copy_from_slice(&rgb);
                 out.pixels[at + 3] = 255;
@@ -45,7 +59,11 @@ impl Rgba {
         if self.size != over.size {
             return;
         }
-        for (below, above) in self.pixels.chunks_exact_mut(4).zip(over.pixels.chunks_exact(4)) {
+        for (below, above) in self
+            .pixels
+            .chunks_exact_mut(4)
+            .zip(over.pixels.chunks_exact(4))
+        {
             let (a, b) = (u32::from(above[3]), u32::from(below[3]));
             let out = 255 * a + (255 - a) * b;
             if out == 0 {
@@ -61,7 +79,10 @@ impl Rgba {
 
     /// Two pictures of one height side by side; the lower one is filled up with `around`.
     pub fn beside(left: &Rgba, right: &Rgba, around: [u8; 4]) -> Self {
-        let size = Size::new(left.size.width + right.size.width, left.size.height.max(right.size.height));
+        let size = Size::new(
+            left.size.width + right.size.width,
+            left.size.height.max(right.size.height),
+        );
         let mut out = Self::of_one(size, around);
         for (picture, from) in [(left, 0), (right, left.size.width as usize)] {
             let width = picture.size.width as usize;
@@ -105,13 +126,21 @@ fn between(frame: &Rgb, u: f64, v: f64) -> [u8; 3] {
     let split = |c: f64, n: u32| {
         let c = c.clamp(0.0, f64::from(n - 1));
         let low = c.floor();
-        (low as usize, (low as usize + 1).min(n as usize - 1), c - low)
+        (
+            low as usize,
+            (low as usize + 1).min(n as usize - 1),
+            c - low,
+        )
     };
     let ((x0, x1, fx), (y0, y1, fy)) = (split(u, frame.size.width), split(v, frame.size.height));
-    let at = |x: usize, y: usize, c: usize| f64::from(frame.pixels[3 * (y * frame.size.width as usize + x) + c]);
+    let at = |x: usize, y: usize, c: usize| {
+        f64::from(frame.pixels[3 * (y * frame.size.width as usize + x) + c])
+    };
     [0, 1, 2].map(|c| {
-        let (above, below) =
-            (at(x0, y0, c) * (1.0 - fx) + at(x1, y0, c) * fx, at(x0, y1, c) * (1.0 - fx) + at(x1, y1, c) * fx);
+        let (above, below) = (
+            at(x0, y0, c) * (1.0 - fx) + at(x1, y0, c) * fx,
+            at(x0, y1, c) * (1.0 - fx) + at(x1, y1, c) * fx,
+        );
         (above * (1.0 - fy) + below * fy).round() as u8
     })
 }
@@ -123,10 +152,15 @@ mod tests {
     #[test]
     fn a_half_covered_pixel_lets_half_of_the_film_through() {
         let mut below = Rgba::of_one(Size::new(3, 1), [200, 0, 0, 255]);
-        let over =
-            Rgba { size: Size::new(3, 1), pixels: [[0, 100, 0, 0], [0, 100, 0, 128], [0, 100, 0, 255]].concat() };
+        let over = Rgba {
+            size: Size::new(3, 1),
+            pixels: [[0, 100, 0, 0], [0, 100, 0, 128], [0, 100, 0, 255]].concat(),
+        };
         below.put(&over);
-        assert_eq!(below.pixels, [[200, 0, 0, 255], [100, 50, 0, 255], [0, 100, 0, 255]].concat());
+        assert_eq!(
+            below.pixels,
+            [[200, 0, 0, 255], [100, 50, 0, 255], [0, 100, 0, 255]].concat()
+        );
         let mut nothing = Rgba::of_one(Size::new(3, 1), [0; 4]);
         nothing.put(&over);
         assert_eq!(nothing.at(1, 0), [0, 100, 0, 128]);
@@ -134,13 +168,25 @@ mod tests {
 
     #[test]
     fn a_frame_keeps_its_ratio_and_lies_in_the_middle() {
-        let frame = Rgb { size: Size::new(2, 1), pixels: vec![10, 20, 30, 50, 60, 70] };
+        let frame = Rgb {
+            size: Size::new(2, 1),
+            pixels: vec![10, 20, 30, 50, 60, 70],
+        };
         let grey = [9, 9, 9, 255];
         let large = Rgba::of_frame(&frame, Size::new(8, 8), grey).unwrap();
-        assert_eq!((large.at(0, 1), large.at(0, 2), large.at(7, 5)), (grey, [10, 20, 30, 255], [50, 60, 70, 255]));
+        assert_eq!(
+            (large.at(0, 1), large.at(0, 2), large.at(7, 5)),
+            (grey, [10, 20, 30, 255], [50, 60, 70, 255])
+        );
         let small = Rgba::of_frame(&frame, Size::new(1, 1), grey).unwrap();
-        assert!(small.at(0, 0) == [30, 40, 50, 255] || small.at(0, 0) == grey, "{small:?}");
-        let torn = Rgb { size: Size::new(2, 1), pixels: vec![1] };
+        assert!(
+            small.at(0, 0) == [30, 40, 50, 255] || small.at(0, 0) == grey,
+            "{small:?}"
+        );
+        let torn = Rgb {
+            size: Size::new(2, 1),
+            pixels: vec![1],
+        };
         assert_eq!(Rgba::of_frame(&torn, Size::new(8, 8), grey), None);
     }
 }

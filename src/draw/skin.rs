@@ -6,31 +6,53 @@ use nalgebra::{Matrix3, Vector3};
 
 /// How every joint moves what hangs on it: `p` goes to `turn p + shift`.
 ///
-/// Joint `i` turns about its parent node by the branch's rotation, as the joints of the model's file do.
+/// Joint `i` turns about its parent node by the branch's rotation, as the joints of the model's
+/// file do.
 pub(super) struct Joints(Vec<(Matrix3<f32>, Vector3<f32>)>);
 
 impl Joints {
-    /// `None` stands for the rest pose, as does a pose of another tree or a joint with no number in it.
+    /// `None` stands for the rest pose, as does a pose of another tree or a joint with no number in
+    /// it.
     pub fn new(skeleton: &Skeleton, pose: Option<&Pose>) -> Self {
         let pose = pose.filter(|p| p.joints.len() == skeleton.nodes.len());
         let still = (Matrix3::identity(), Vector3::zeros());
         let joint = |i: usize| {
             let (node, pose) = (skeleton.nodes.get(i)?, pose?);
             let pivot = node.parent?.index();
-            let (rest, now) = (skeleton.nodes.get(pivot)?.position, pose.joints.get(pivot)?.position);
-            let turn = pose.joints.get(i)?.rotation.to_rotation_matrix().into_inner();
+            let (rest, now) = (
+                skeleton.nodes.get(pivot)?.position,
+                pose.joints.get(pivot)?.position,
+            );
+            let turn = pose
+                .joints
+                .get(i)?
+                .rotation
+                .to_rotation_matrix()
+                .into_inner();
             let shift = now.coords - turn * rest.coords;
             let sound = turn.iter().chain(shift.iter()).all(|c| c.is_finite());
             sound.then(|| (turn.cast::<f32>(), shift.cast::<f32>()))
         };
-        Self((0..skeleton.nodes.len().max(1)).map(|i| joint(i).unwrap_or(still)).collect())
+        Self(
+            (0..skeleton.nodes.len().max(1))
+                .map(|i| joint(i).unwrap_or(still))
+                .collect(),
+        )
     }
 
     /// Moves a vertex and its normal by the shares of its joints (linear blend skinning).
-    fn carry(&self, at: Vector3<f32>, normal: Vector3<f32>, joints: [u16; 4], weights: [f32; 4]) -> [[f32; 3]; 2] {
+    fn carry(
+        &self,
+        at: Vector3<f32>,
+        normal: Vector3<f32>,
+        joints: [u16; 4],
+        weights: [f32; 4],
+    ) -> [[f32; 3]; 2] {
         let (mut p, mut n) = (Vector3::zeros(), Vector3::zeros());
         for (joint, weight) in joints.into_iter().zip(weights).filter(|(_, w)| *w > 0.0) {
-            let Some((turn, shift)) = self.0.get(usize::from(joint)) else { continue };
+            let Some((turn, shift)) = self.0.get(usize::from(joint)) else {
+                continue;
+            };
             p += (turn * at + shift) * weight;
             n += turn * normal * weight;
         }
@@ -43,16 +65,33 @@ impl Joints {
     }
 
     /// The same of leaves, swung by their two parts (see [`FoliageGroup`]), rad.
-    pub fn leaves(&self, group: &FoliageGroup, [sine, cosine]: [f32; 2]) -> (Vec<[f32; 3]>, Vec<[f32; 3]>) {
-        let part = |of: &[[f32; 3]], i: usize| of.get(i).map_or_else(Vector3::zeros, |d| Vector3::from(*d));
+    pub fn leaves(
+        &self,
+        group: &FoliageGroup,
+        [sine, cosine]: [f32; 2],
+    ) -> (Vec<[f32; 3]>, Vec<[f32; 3]>) {
+        let part = |of: &[[f32; 3]], i: usize| {
+            of.get(i).map_or_else(Vector3::zeros, |d| Vector3::from(*d))
+        };
         self.all(&group.mesh, |i| {
-            Vector3::from(group.mesh.positions[i]) + part(&group.sine, i) * sine + part(&group.cosine, i) * cosine
+            Vector3::from(group.mesh.positions[i])
+                + part(&group.sine, i) * sine
+                + part(&group.cosine, i) * cosine
         })
     }
 
-    fn all(&self, mesh: &Mesh, at: impl Fn(usize) -> Vector3<f32>) -> (Vec<[f32; 3]>, Vec<[f32; 3]>) {
+    fn all(
+        &self,
+        mesh: &Mesh,
+        at: impl Fn(usize) -> Vector3<f32>,
+    ) -> (Vec<[f32; 3]>, Vec<[f32; 3]>) {
         let n = mesh.positions.len();
-        let parts = mesh.normals.iter().zip(mesh.joints.iter().zip(&mesh.weights)).take(n).enumerate();
+        let parts = mesh
+            .normals
+            .iter()
+            .zip(mesh.joints.iter().zip(&mesh.weights))
+            .take(n)
+            .enumerate();
         let moved = parts.map(|(i, (normal, (joints, weights)))| {
             let [p, n] = self.carry(at(i), Vector3::from(*normal), *joints, *weights);
             (p, n)

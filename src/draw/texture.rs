@@ -9,13 +9,16 @@ pub struct Texture {
     rgba: Vec<u8>,
 }
 
-/// Sides beyond this are scaled down: a leaf covers a few pixels, and textures of users come from cameras.
+/// Sides beyond this are scaled down: a leaf covers a few pixels, and textures of users come from
+/// cameras.
 const LARGEST: u32 = 1024;
 
 impl Texture {
     /// Reads PNG or JPEG bytes; `None` for what is neither.
     pub fn read(bytes: &[u8]) -> Option<Self> {
-        let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format().ok()?;
+        let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes))
+            .with_guessed_format()
+            .ok()?;
         // A small file may unfold to more than the memory holds.
         let mut limits = image::Limits::default();
         (limits.max_image_width, limits.max_image_height) = (Some(1 << 14), Some(1 << 14));
@@ -28,14 +31,24 @@ impl Texture {
         };
         let rgba = picture.to_rgba8();
         let (width, height) = (rgba.width() as usize, rgba.height() as usize);
-        (width * height > 0).then(|| Self { width, height, rgba: rgba.into_raw() })
+        (width * height > 0).then(|| Self {
+            width,
+            height,
+            rgba: rgba.into_raw(),
+        })
     }
 
-    /// The texel at (`u`, `v`), 0 to 1 across and down, repeated beyond that as glTF does by default.
+    /// The texel at (`u`, `v`), 0 to 1 across and down, repeated beyond that as glTF does by
+    /// default.
     pub fn at(&self, u: f32, v: f32) -> [u8; 4] {
         let texel = |c: f32, n: usize| (((c - c.floor()) * n as f32) as usize).min(n - 1);
         let at = 4 * (texel(v, self.height) * self.width + texel(u, self.width));
-        [self.rgba[at], self.rgba[at + 1], self.rgba[at + 2], self.rgba[at + 3]]
+        [
+            self.rgba[at],
+            self.rgba[at + 1],
+            self.rgba[at + 2],
+            self.rgba[at + 3],
+        ]
     }
 }
 
@@ -49,7 +62,12 @@ mod tests {
         let mut png = std::io::Cursor::new(Vec::new());
         picture.write_to(&mut png, image::ImageFormat::Png).unwrap();
         let texture = Texture::read(png.get_ref()).unwrap();
-        for (u, expected) in [(0.2, [1, 2, 3, 255]), (0.9, [7, 8, 9, 0]), (-0.9, [1, 2, 3, 255]), (5.9, [7, 8, 9, 0])] {
+        for (u, expected) in [
+            (0.2, [1, 2, 3, 255]),
+            (0.9, [7, 8, 9, 0]),
+            (-0.9, [1, 2, 3, 255]),
+            (5.9, [7, 8, 9, 0]),
+        ] {
             assert_eq!(texture.at(u, 0.5), expected, "{u}");
         }
         assert_eq!(texture.at(f32::NAN, f32::INFINITY), [1, 2, 3, 255]);

@@ -6,12 +6,13 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 /// Projections shorter than this have no direction, px.
 const SHORTEST_PX: f64 = 1e-6;
 
-/// The angle between the branch that ends in `node` and its parent branch in every pose, degrees: that of Zhang et al.
-/// (seed 002, eq. 1) in the picture's plane, where it is measured, and signed, counterclockwise for the viewer. It is
-/// continuous in time, so that it may leave ±180°.
+/// The angle between the branch that ends in `node` and its parent branch in every pose, degrees:
+/// that of Zhang et al. (seed 002, eq. 1) in the picture's plane, where it is measured, and signed,
+/// counterclockwise for the viewer. It is continuous in time, so that it may leave ±180°.
 ///
-/// The parent branch is the nearest one below that has a length in the picture at rest; upright, where there is none. NaN
-/// for poses of another skeleton and those in which one of the two branches has no direction.
+/// The parent branch is the nearest one below that has a length in the picture at rest; upright,
+/// where there is none. NaN for poses of another skeleton and those in which one of the two
+/// branches has no direction.
 pub fn angle_to_parent_deg(skeleton: &Skeleton, poses: &[Pose], node: NodeId) -> Vec<f64> {
     let mut follower = AngleToParent::new(skeleton, node);
     poses.iter().map(|pose| follower.step(pose)).collect()
@@ -34,12 +35,19 @@ impl AngleToParent {
     pub fn new(skeleton: &Skeleton, node: NodeId) -> Self {
         let parent = skeleton.ancestors(node).next();
         let carrier = parent.and_then(|parent| carrier(skeleton, parent));
-        Self { nodes: skeleton.nodes.len(), own: parent.map(|p| [p, node]), carrier, last_deg: None }
+        Self {
+            nodes: skeleton.nodes.len(),
+            own: parent.map(|p| [p, node]),
+            carrier,
+            last_deg: None,
+        }
     }
 
     /// The angle in the next pose, degrees; NaN where it has none.
     pub fn step(&mut self, pose: &Pose) -> f64 {
-        let Some([parent, node]) = self.own.filter(|_| pose.joints.len() == self.nodes) else { return f64::NAN };
+        let Some([parent, node]) = self.own.filter(|_| pose.joints.len() == self.nodes) else {
+            return f64::NAN;
+        };
         let at = |n: NodeId| pose.joints[n.index()].position;
         let way = |from: NodeId, to: NodeId| [at(to).x - at(from).x, at(to).y - at(from).y];
         let base = self.carrier.map_or([0.0, 1.0], |(from, to)| way(from, to));
@@ -51,23 +59,31 @@ impl AngleToParent {
         let sine = base[0] * own[1] - base[1] * own[0];
         let cosine = base[0] * own[0] + base[1] * own[1];
         let angle = sine.atan2(cosine).to_degrees();
-        let angle = self.last_deg.map_or(angle, |before| angle - 360.0 * ((angle - before) / 360.0).round());
+        let angle = self.last_deg.map_or(angle, |before| {
+            angle - 360.0 * ((angle - before) / 360.0).round()
+        });
         self.last_deg = Some(angle);
         angle
     }
 }
 
-/// The same angle in space: how far the branch has turned from where its carrier would have taken it, degrees, signed
-/// along the direction in which it sways most. Unlike the arc cosine of 002 eq. 1 it tells the two sides of a branch that
-/// goes on straight. NaN for poses of another skeleton.
+/// The same angle in space: how far the branch has turned from where its carrier would have taken
+/// it, degrees, signed along the direction in which it sways most. Unlike the arc cosine of 002 eq.
+/// 1 it tells the two sides of a branch that goes on straight. NaN for poses of another skeleton.
 pub fn angle_in_space_deg(skeleton: &Skeleton, poses: &[Pose], node: NodeId) -> Vec<f64> {
-    let Some(parent) = skeleton.ancestors(node).next() else { return vec![f64::NAN; poses.len()] };
+    let Some(parent) = skeleton.ancestors(node).next() else {
+        return vec![f64::NAN; poses.len()];
+    };
     let own = skeleton.nodes[node.index()].position - skeleton.nodes[parent.index()].position;
     let grand = skeleton.ancestors(parent).next().map(|_| parent);
     let turns: Vec<Option<Vector3<f64>>> = poses
         .iter()
         .map(|pose| {
-            let joint = |n: NodeId| pose.joints.get(n.index()).filter(|_| pose.joints.len() == skeleton.nodes.len());
+            let joint = |n: NodeId| {
+                pose.joints
+                    .get(n.index())
+                    .filter(|_| pose.joints.len() == skeleton.nodes.len())
+            };
             let now = joint(node)?.position - joint(parent)?.position;
             // What the branch does beyond being carried.
             let carried = match grand {
@@ -81,12 +97,18 @@ pub fn angle_in_space_deg(skeleton: &Skeleton, poses: &[Pose], node: NodeId) -> 
         .collect();
     let seen: Vec<Vector3<f64>> = turns.iter().copied().flatten().collect();
     let mean = seen.iter().sum::<Vector3<f64>>() / (seen.len() as f64).max(1.0);
-    let spread: Matrix3<f64> = seen.iter().map(|v| (v - mean) * (v - mean).transpose()).sum();
+    let spread: Matrix3<f64> = seen
+        .iter()
+        .map(|v| (v - mean) * (v - mean).transpose())
+        .sum();
     let eigen = spread.symmetric_eigen();
     let axis: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into();
     // Towards the viewer, as counterclockwise is in the picture.
     let axis = if axis.z < 0.0 { -axis } else { axis };
-    turns.iter().map(|t| t.map_or(f64::NAN, |t| t.dot(&axis).to_degrees())).collect()
+    turns
+        .iter()
+        .map(|t| t.map_or(f64::NAN, |t| t.dot(&axis).to_degrees()))
+        .collect()
 }
 
 /// The nearest branch at or below the one that ends in `node` that has a direction in the picture.
@@ -122,12 +144,26 @@ mod tests {
             plane_angle: 0.0,
         };
         let nodes = at.iter().enumerate().map(node).collect();
-        Skeleton { nodes, foot_px: [0.0, 0.0], image_size: Size { width: 64, height: 64 } }
+        Skeleton {
+            nodes,
+            foot_px: [0.0, 0.0],
+            image_size: Size {
+                width: 64,
+                height: 64,
+            },
+        }
     }
 
     fn pose(at: &[[f64; 3]]) -> Pose {
-        let joint = |p: &[f64; 3]| JointPose { position: Point3::from(*p), rotation: UnitQuaternion::identity() };
-        Pose { frame: 0, time_s: 0.0, joints: at.iter().map(joint).collect() }
+        let joint = |p: &[f64; 3]| JointPose {
+            position: Point3::from(*p),
+            rotation: UnitQuaternion::identity(),
+        };
+        Pose {
+            frame: 0,
+            time_s: 0.0,
+            joints: at.iter().map(joint).collect(),
+        }
     }
 
     fn close(found: f64, wanted: f64) {
@@ -138,13 +174,17 @@ mod tests {
     fn a_branch_to_the_left_of_its_parent_has_a_positive_angle() {
         let rest = [[0.0, 0.0, 0.0], [0.0, 10.0, 0.0], [-10.0, 20.0, 5.0]];
         let tree = chain(&rest);
-        // The trunk leans by 45° to the right, the branch goes along: nothing changes between the two.
+        // The trunk leans by 45° to the right, the branch goes along: nothing changes between the
+        // two.
         let leaning = [[0.0, 0.0, 0.0], [10.0, 10.0, 0.0], [10.0, 24.0, 5.0]];
         let angles = angle_to_parent_deg(&tree, &[pose(&rest), pose(&leaning)], NodeId(2));
         close(angles[0], 45.0);
         close(angles[1], 45.0);
         // The trunk itself is measured against the upright.
-        close(angle_to_parent_deg(&tree, &[pose(&leaning)], NodeId(1))[0], -45.0);
+        close(
+            angle_to_parent_deg(&tree, &[pose(&leaning)], NodeId(1))[0],
+            -45.0,
+        );
     }
 
     /// A branch that sways towards the viewer hardly turns in the picture; in space it does.
@@ -157,9 +197,14 @@ mod tests {
             pose(&[[0.0; 3], [0.0, 10.0, 0.0], [0.0, 10.0 + 10.0 * c, 10.0 * s]])
         };
         let poses: Vec<Pose> = [0.0, 8.0, -8.0, 3.0].map(at).into();
-        let (space, plane) =
-            (angle_in_space_deg(&tree, &poses, NodeId(2)), angle_to_parent_deg(&tree, &poses, NodeId(2)));
-        assert!((space[1] - space[2]).abs() > 15.9 && (space[1] - space[0]).abs() > 7.9, "{space:?}");
+        let (space, plane) = (
+            angle_in_space_deg(&tree, &poses, NodeId(2)),
+            angle_to_parent_deg(&tree, &poses, NodeId(2)),
+        );
+        assert!(
+            (space[1] - space[2]).abs() > 15.9 && (space[1] - space[0]).abs() > 7.9,
+            "{space:?}"
+        );
         assert!(plane.iter().all(|a| a.abs() < 1e-6), "{plane:?}");
         assert!(angle_in_space_deg(&tree, &[pose(&rest[..2])], NodeId(2))[0].is_nan());
     }
@@ -168,10 +213,18 @@ mod tests {
     fn an_angle_that_passes_180_degrees_does_not_jump() {
         let at = |deg: f64| {
             let (s, c) = deg.to_radians().sin_cos();
-            pose(&[[0.0; 3], [0.0, 10.0, 0.0], [-10.0 * s, 10.0 + 10.0 * c, 0.0]])
+            pose(&[
+                [0.0; 3],
+                [0.0, 10.0, 0.0],
+                [-10.0 * s, 10.0 + 10.0 * c, 0.0],
+            ])
         };
         let tree = chain(&[[0.0; 3], [0.0, 10.0, 0.0], [-1.0, 0.0, 0.0]]);
-        let angles = angle_to_parent_deg(&tree, &[at(170.0), at(178.0), at(186.0), at(175.0)], NodeId(2));
+        let angles = angle_to_parent_deg(
+            &tree,
+            &[at(170.0), at(178.0), at(186.0), at(175.0)],
+            NodeId(2),
+        );
         for (found, wanted) in angles.iter().zip([170.0, 178.0, 186.0, 175.0]) {
             close(*found, wanted);
         }
@@ -179,12 +232,23 @@ mod tests {
 
     #[test]
     fn what_has_no_direction_has_no_angle_and_a_parent_without_length_is_passed_over() {
-        let rest = [[0.0; 3], [0.0, 10.0, 0.0], [0.0, 10.0, 0.0], [10.0, 10.0, 0.0]];
+        let rest = [
+            [0.0; 3],
+            [0.0, 10.0, 0.0],
+            [0.0, 10.0, 0.0],
+            [10.0, 10.0, 0.0],
+        ];
         let tree = chain(&rest);
-        close(angle_to_parent_deg(&tree, &[pose(&rest)], NodeId(3))[0], -90.0);
+        close(
+            angle_to_parent_deg(&tree, &[pose(&rest)], NodeId(3))[0],
+            -90.0,
+        );
         assert!(angle_to_parent_deg(&tree, &[pose(&rest)], NodeId(2))[0].is_nan());
         assert!(angle_to_parent_deg(&tree, &[pose(&rest)], NodeId(0))[0].is_nan());
         assert!(angle_to_parent_deg(&tree, &[pose(&rest[..2])], NodeId(3))[0].is_nan());
-        assert_eq!(angle_to_parent_deg(&tree, &[pose(&rest)], NodeId(9)).len(), 1);
+        assert_eq!(
+            angle_to_parent_deg(&tree, &[pose(&rest)], NodeId(9)).len(),
+            1
+        );
     }
 }

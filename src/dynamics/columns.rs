@@ -1,14 +1,22 @@
-//! Columns of numbers over the frames: the little linear algebra that fits of a few columns to many signals need.
+//! Columns of numbers over the frames: the little linear algebra that fits of a few columns to many
+//! signals need.
 
-/// Columns shorter than this share of what they were before the others were taken off count as none: the others span them.
+/// Columns shorter than this share of what they were before the others were taken off count as
+/// none: the others span them.
 const SPANNED: f64 = 1e-5;
 
-/// Sum of the products. In lanes, or the order of the sum would keep the processor from doing several at once.
+/// Sum of the products. In lanes, or the order of the sum would keep the processor from doing
+/// several at once.
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     const LANES: usize = 8;
     let mut sums = [0.0; LANES];
     let (whole_a, whole_b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
-    let rest: f64 = whole_a.remainder().iter().zip(whole_b.remainder()).map(|(x, y)| x * y).sum();
+    let rest: f64 = whole_a
+        .remainder()
+        .iter()
+        .zip(whole_b.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
     for (x, y) in whole_a.zip(whole_b) {
         for ((sum, x), y) in sums.iter_mut().zip(x).zip(y) {
             *sum += x * y;
@@ -17,7 +25,8 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + rest
 }
 
-/// Takes from `x` what the orthonormal `q` span of it, twice for accuracy, and adds the shares to `into`.
+/// Takes from `x` what the orthonormal `q` span of it, twice for accuracy, and adds the shares to
+/// `into`.
 fn take_off(x: &mut [f64], q: &[Vec<f64>], into: &mut [f64]) {
     for _ in 0..2 {
         for (column, share) in q.iter().zip(into.iter_mut()) {
@@ -31,7 +40,8 @@ fn take_off(x: &mut [f64], q: &[Vec<f64>], into: &mut [f64]) {
 /// Columns B = Q R with Q orthonormal.
 pub(super) struct Qr {
     pub q: Vec<Vec<f64>>,
-    /// Column k of R in `r[k]`; its k-th number is 0 where column k of B depends on those before it.
+    /// Column k of R in `r[k]`; its k-th number is 0 where column k of B depends on those before
+    /// it.
     r: Vec<Vec<f64>>,
 }
 
@@ -87,6 +97,10 @@ mod tests {
         let y: Vec<f64> = b.iter().map(|x| 3.0 - 0.5 * x).collect();
         let (rest, factors) = Qr::new(vec![a, b, twice]).solve(&y);
         assert!(rest.iter().all(|r| r.abs() < 1e-12));
-        assert!((factors[0] - 3.0).abs() < 1e-12 && (factors[1] + 0.5).abs() < 1e-12 && factors[2] == 0.0);
+        assert!(
+            (factors[0] - 3.0).abs() < 1e-12
+                && (factors[1] + 0.5).abs() < 1e-12
+                && factors[2] == 0.0
+        );
     }
 }

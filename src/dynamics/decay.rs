@@ -3,7 +3,8 @@
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 
-/// What a step between two frames may be off the one before, times the rate of a mode, for a short series to tell it.
+/// What a step between two frames may be off the one before, times the rate of a mode, for a short
+/// series to tell it.
 const ALIKE: f64 = 0.05;
 
 /// One mode: undamped frequency in Hz and damping ratio.
@@ -16,7 +17,8 @@ pub struct Mode {
 /// How the decay begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Start {
-    /// Let go from rest at time 0: the phase of every mode is known, which tells modes apart that are close together.
+    /// Let go from rest at time 0: the phase of every mode is known, which tells modes apart that
+    /// are close together.
     Rest,
     /// In the middle of the motion: any phase.
     Moving,
@@ -37,37 +39,63 @@ impl Mode {
         Complex::new(-zeta * omega, omega * (1.0 - zeta * zeta).sqrt())
     }
 
-    /// Complex factors of exp(λ t) whose real parts are the columns: of one from rest, or of cosine and sine; each with its
-    /// derivative by the logarithm of the damping.
+    /// Complex factors of exp(λ t) whose real parts are the columns: of one from rest, or of cosine
+    /// and sine; each with its derivative by the logarithm of the damping.
     fn weights(&self, start: Start) -> Vec<[Complex<f64>; 2]> {
         let root = (1.0 - self.damping * self.damping).sqrt();
         let i = Complex::i();
         match start {
-            Start::Rest => vec![[1.0 - i * (self.damping / root), -i * (self.damping / root.powi(3))]],
-            Start::Moving => vec![[Complex::from(1.0), Complex::from(0.0)], [-i, Complex::from(0.0)]],
+            Start::Rest => vec![[
+                1.0 - i * (self.damping / root),
+                -i * (self.damping / root.powi(3)),
+            ]],
+            Start::Moving => vec![
+                [Complex::from(1.0), Complex::from(0.0)],
+                [-i, Complex::from(0.0)],
+            ],
         }
     }
 
     /// The mode's columns at `times_s`: one if it starts from rest, cosine and sine otherwise.
     pub(super) fn columns(&self, times_s: &[f64], start: Start) -> Vec<Vec<f64>> {
         let waves = powers(times_s, self.pole());
-        self.weights(start).iter().map(|[a, _]| waves.iter().map(|z| (a * z).re).collect()).collect()
+        self.weights(start)
+            .iter()
+            .map(|[a, _]| waves.iter().map(|z| (a * z).re).collect())
+            .collect()
     }
 
     /// The columns, and how each changes with the parameters.
-    pub(super) fn columns_and_slopes(&self, times_s: &[f64], start: Start) -> Vec<(Vec<f64>, Slopes)> {
+    pub(super) fn columns_and_slopes(
+        &self,
+        times_s: &[f64],
+        start: Start,
+    ) -> Vec<(Vec<f64>, Slopes)> {
         let pole = self.pole();
         let waves = powers(times_s, pole);
         let root = (1.0 - self.damping * self.damping).sqrt();
         let omega = TAU * self.frequency_hz;
         let by_damping = -self.damping * omega * Complex::new(1.0, self.damping / root);
         let of = |f: &dyn Fn(f64, Complex<f64>) -> Complex<f64>| -> Vec<f64> {
-            times_s.iter().zip(&waves).map(|(t, z)| f(*t, *z).re).collect()
+            times_s
+                .iter()
+                .zip(&waves)
+                .map(|(t, z)| f(*t, *z).re)
+                .collect()
         };
         let column = |[a, slope]: &[Complex<f64>; 2]| {
             let (faster, damped, later) = (a * pole, a * by_damping, -a * pole);
-            let by_mode = [of(&|t, z| faster * z * t), of(&|t, z| (slope + damped * t) * z)];
-            (of(&|_, z| a * z), Slopes { by_mode, by_moment: of(&|_, z| later * z) })
+            let by_mode = [
+                of(&|t, z| faster * z * t),
+                of(&|t, z| (slope + damped * t) * z),
+            ];
+            (
+                of(&|_, z| a * z),
+                Slopes {
+                    by_mode,
+                    by_moment: of(&|_, z| later * z),
+                },
+            )
         };
         self.weights(start).iter().map(column).collect()
     }
@@ -77,13 +105,19 @@ impl Mode {
     }
 
     pub(super) fn of_parameters(x: &[f64]) -> Self {
-        Self { frequency_hz: x[0].exp(), damping: x[1].exp() }
+        Self {
+            frequency_hz: x[0].exp(),
+            damping: x[1].exp(),
+        }
     }
 }
 
-/// exp(λ t) at growing times: each value is the one before times a factor, which is most of the work of a fit.
+/// exp(λ t) at growing times: each value is the one before times a factor, which is most of the
+/// work of a fit.
 pub(super) fn powers(times_s: &[f64], pole: Complex<f64>) -> Vec<Complex<f64>> {
-    let Some(first) = times_s.first() else { return Vec::new() };
+    let Some(first) = times_s.first() else {
+        return Vec::new();
+    };
     let mut value = (pole * *first).exp();
     let mut out = vec![value];
     each_step(times_s, pole, |factor| {
@@ -93,8 +127,8 @@ pub(super) fn powers(times_s: &[f64], pole: Complex<f64>) -> Vec<Complex<f64>> {
     out
 }
 
-/// exp(λ dt) for the time from each frame to the next. The frames of a camera are nearly evenly apart, so that a factor
-/// serves for many, with a short series for the little that a step is off.
+/// exp(λ dt) for the time from each frame to the next. The frames of a camera are nearly evenly
+/// apart, so that a factor serves for many, with a short series for the little that a step is off.
 pub(super) fn each_step(times_s: &[f64], pole: Complex<f64>, mut take: impl FnMut(Complex<f64>)) {
     let (mut step_s, mut factor) = (0.0, Complex::from(1.0));
     for pair in times_s.windows(2) {
@@ -117,7 +151,10 @@ fn short_exp(x: Complex<f64>) -> Complex<f64> {
     if x.norm_sqr() < 1e-8 {
         return start;
     }
-    start + square * x * (square * (1.0 / 120.0) + x * (1.0 / 24.0) + 1.0 / 6.0 + square * x * (1.0 / 720.0))
+    start
+        + square
+            * x
+            * (square * (1.0 / 120.0) + x * (1.0 / 24.0) + 1.0 / 6.0 + square * x * (1.0 / 720.0))
 }
 
 #[cfg(test)]
@@ -127,24 +164,37 @@ mod tests {
     /// A camera's uneven times, with a gap.
     fn times() -> Vec<f64> {
         (0..300)
-            .map(|k| k as f64 / 30.0 - 0.01 + 0.003 * (k as f64 * 1.7).sin() + if k > 200 { 0.4 } else { 0.0 })
+            .map(|k| {
+                k as f64 / 30.0 - 0.01
+                    + 0.003 * (k as f64 * 1.7).sin()
+                    + if k > 200 { 0.4 } else { 0.0 }
+            })
             .collect()
     }
 
     #[test]
     fn columns_are_those_of_the_definition() {
         for (frequency_hz, damping) in [(0.5, 0.02), (4.7, 0.3)] {
-            let mode = Mode { frequency_hz, damping };
+            let mode = Mode {
+                frequency_hz,
+                damping,
+            };
             let (omega, root) = (TAU * frequency_hz, (1.0 - damping * damping).sqrt());
             let rest = mode.columns(&times(), Start::Rest);
             let moving = mode.columns(&times(), Start::Moving);
             for (k, t) in times().into_iter().enumerate() {
                 let fade = (-damping * omega * t).exp();
                 let (sin, cos) = (omega * root * t).sin_cos();
-                for (found, wanted) in
-                    [(moving[0][k], cos), (moving[1][k], sin), (rest[0][k], cos + damping / root * sin)]
-                {
-                    assert!((found - fade * wanted).abs() < 1e-10, "{found}, not {}", fade * wanted);
+                for (found, wanted) in [
+                    (moving[0][k], cos),
+                    (moving[1][k], sin),
+                    (rest[0][k], cos + damping / root * sin),
+                ] {
+                    assert!(
+                        (found - fade * wanted).abs() < 1e-10,
+                        "{found}, not {}",
+                        fade * wanted
+                    );
                 }
             }
         }
@@ -152,14 +202,23 @@ mod tests {
 
     #[test]
     fn slopes_are_those_of_the_columns() {
-        let mode = Mode { frequency_hz: 0.8, damping: 0.06 };
+        let mode = Mode {
+            frequency_hz: 0.8,
+            damping: 0.06,
+        };
         let step = 1e-5;
         for start in [Start::Rest, Start::Moving] {
-            for (c, (column, slopes)) in mode.columns_and_slopes(&times(), start).into_iter().enumerate() {
+            for (c, (column, slopes)) in mode
+                .columns_and_slopes(&times(), start)
+                .into_iter()
+                .enumerate()
+            {
                 assert_eq!(column, mode.columns(&times(), start)[c]);
                 let moved = |by: [f64; 2]| {
                     let x = mode.parameters();
-                    Mode::of_parameters(&[x[0] + by[0], x[1] + by[1]]).columns(&times(), start).swap_remove(c)
+                    Mode::of_parameters(&[x[0] + by[0], x[1] + by[1]])
+                        .columns(&times(), start)
+                        .swap_remove(c)
                 };
                 let shifted = |by: f64| {
                     let later: Vec<f64> = times().iter().map(|t| t - by).collect();
@@ -173,7 +232,10 @@ mod tests {
                 for (slope, up, down) in pairs {
                     for (k, s) in slope.iter().enumerate() {
                         let wanted = (up[k] - down[k]) / (2.0 * step);
-                        assert!((s - wanted).abs() < 1e-5 * (1.0 + wanted.abs()), "{s}, not {wanted}");
+                        assert!(
+                            (s - wanted).abs() < 1e-5 * (1.0 + wanted.abs()),
+                            "{s}, not {wanted}"
+                        );
                     }
                 }
             }

@@ -15,8 +15,8 @@ pub struct FilmTrack {
     pub at_px: Vec<[f64; 2]>,
 }
 
-/// The points of a film in all its frames. Times are those of the sensor: they need not be even, and frames may be
-/// missing.
+/// The points of a film in all its frames. Times are those of the sensor: they need not be even,
+/// and frames may be missing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Film {
     /// Strictly growing, s.
@@ -25,7 +25,8 @@ pub struct Film {
 }
 
 impl Film {
-    /// Frames whose time is no number, or not later than the one before, are left out: nothing can be said of them.
+    /// Frames whose time is no number, or not later than the one before, are left out: nothing can
+    /// be said of them.
     pub fn new(times_s: &[f64], tracks: Vec<FilmTrack>) -> Self {
         let mut last = f64::NEG_INFINITY;
         let kept: Vec<usize> = (0..times_s.len())
@@ -36,16 +37,26 @@ impl Film {
             })
             .collect();
         let at = |t: &FilmTrack, k: usize| t.at_px.get(k).copied().unwrap_or([f64::NAN; 2]);
-        let thin = |t: FilmTrack| FilmTrack { node: t.node, at_px: kept.iter().map(|&k| at(&t, k)).collect() };
-        Self { times_s: kept.iter().map(|&k| times_s[k]).collect(), tracks: tracks.into_iter().map(thin).collect() }
+        let thin = |t: FilmTrack| FilmTrack {
+            node: t.node,
+            at_px: kept.iter().map(|&k| at(&t, k)).collect(),
+        };
+        Self {
+            times_s: kept.iter().map(|&k| times_s[k]).collect(),
+            tracks: tracks.into_iter().map(thin).collect(),
+        }
     }
 
     /// From the time of the first frame to that of the last, s.
     pub fn span_s(&self) -> f64 {
-        self.times_s.last().zip(self.times_s.first()).map_or(0.0, |(b, a)| b - a)
+        self.times_s
+            .last()
+            .zip(self.times_s.first())
+            .map_or(0.0, |(b, a)| b - a)
     }
 
-    /// The first frames of the film, without frame `to` and what comes after; itself where nothing comes after.
+    /// The first frames of the film, without frame `to` and what comes after; itself where nothing
+    /// comes after.
     pub fn until(&self, to: usize) -> Cow<'_, Self> {
         if to >= self.times_s.len() {
             return Cow::Borrowed(self);
@@ -55,17 +66,28 @@ impl Film {
 
     /// Some of the frames.
     pub(super) fn part(&self, frames: Range<usize>) -> Self {
-        let part = |t: &FilmTrack| FilmTrack { node: t.node, at_px: t.at_px[frames.clone()].to_vec() };
-        Self { times_s: self.times_s[frames.clone()].to_vec(), tracks: self.tracks.iter().map(part).collect() }
+        let part = |t: &FilmTrack| FilmTrack {
+            node: t.node,
+            at_px: t.at_px[frames.clone()].to_vec(),
+        };
+        Self {
+            times_s: self.times_s[frames.clone()].to_vec(),
+            tracks: self.tracks.iter().map(part).collect(),
+        }
     }
 
-    /// Some of the frames by `every` neighbours; those between which frames are missing are not put together.
+    /// Some of the frames by `every` neighbours; those between which frames are missing are not put
+    /// together.
     pub(super) fn neighbours(&self, frames: Range<usize>, every: usize) -> Vec<Vec<usize>> {
         let within_s = (every as f64 - 0.5) * self.step_s();
         let mut out: Vec<Vec<usize>> = Vec::with_capacity(frames.len() / every + 1);
         for k in frames {
             match out.last_mut() {
-                Some(last) if last.len() < every && self.times_s[k] - self.times_s[last[0]] < within_s => last.push(k),
+                Some(last)
+                    if last.len() < every && self.times_s[k] - self.times_s[last[0]] < within_s =>
+                {
+                    last.push(k)
+                }
                 _ => out.push(vec![k]),
             }
         }
@@ -77,18 +99,23 @@ impl Film {
         frames.iter().map(|&k| self.times_s[k]).sum::<f64>() / frames.len() as f64
     }
 
-    /// Time that three quarters of the frames are not farther apart than, s; infinite for less than two frames.
+    /// Time that three quarters of the frames are not farther apart than, s; infinite for less than
+    /// two frames.
     pub fn step_s(&self) -> f64 {
         let mut steps: Vec<f64> = self.times_s.windows(2).map(|w| w[1] - w[0]).collect();
         steps.sort_unstable_by(f64::total_cmp);
-        steps.get(3 * steps.len() / 4).copied().unwrap_or(f64::INFINITY)
+        steps
+            .get(3 * steps.len() / 4)
+            .copied()
+            .unwrap_or(f64::INFINITY)
     }
 }
 
 /// Where points were in one frame, px; shared, so that a copy of a whole log costs next to nothing.
 type Places = Arc<[(TrackId, [f32; 2])]>;
 
-/// The last seconds of a film that goes on. A copy is cheap: it can be taken while the film goes on and be worked on elsewhere.
+/// The last seconds of a film that goes on. A copy is cheap: it can be taken while the film goes on
+/// and be worked on elsewhere.
 #[derive(Clone, Debug)]
 pub struct FilmLog {
     window_s: f64,
@@ -98,21 +125,33 @@ pub struct FilmLog {
 impl FilmLog {
     /// Keeps `window_s` seconds.
     pub fn new(window_s: f64) -> Self {
-        Self { window_s, sets: VecDeque::new() }
+        Self {
+            window_s,
+            sets: VecDeque::new(),
+        }
     }
 
     /// Takes the points of the next frame.
     pub fn push(&mut self, set: &TrackSet) {
-        self.push_points(set.time_s, set.observations.iter().map(|o| (o.id, [o.u_px, o.v_px])));
+        self.push_points(
+            set.time_s,
+            set.observations.iter().map(|o| (o.id, [o.u_px, o.v_px])),
+        );
     }
 
     /// Takes the points of the next frame, px; what comes with the same time is of the same frame.
     pub fn push_points(&mut self, time_s: f64, points: impl Iterator<Item = (TrackId, [f32; 2])>) {
         match self.sets.back_mut() {
-            Some((last, all)) if *last == time_s => *all = all.iter().copied().chain(points).collect(),
+            Some((last, all)) if *last == time_s => {
+                *all = all.iter().copied().chain(points).collect()
+            }
             _ => self.sets.push_back((time_s, points.collect())),
         }
-        while self.sets.front().is_some_and(|(t, _)| time_s - t > self.window_s) {
+        while self
+            .sets
+            .front()
+            .is_some_and(|(t, _)| time_s - t > self.window_s)
+        {
             self.sets.pop_front();
         }
     }
@@ -125,7 +164,10 @@ impl FilmLog {
             for (id, [u, v]) in points.iter() {
                 let track = by_id.entry(*id).or_insert_with(|| {
                     let node = node_of(*id).filter(|n| n.index() < measured)?;
-                    Some(FilmTrack { node, at_px: vec![[f64::NAN; 2]; self.sets.len()] })
+                    Some(FilmTrack {
+                        node,
+                        at_px: vec![[f64::NAN; 2]; self.sets.len()],
+                    })
                 });
                 if let Some(track) = track {
                     track.at_px[k] = [f64::from(*u), f64::from(*v)];
@@ -141,13 +183,25 @@ impl FilmLog {
 mod tests {
     use super::*;
 
-    /// Ten minutes of points are some hundred megabytes: no copy is made of a film that is used whole.
+    /// Ten minutes of points are some hundred megabytes: no copy is made of a film that is used
+    /// whole.
     #[test]
     fn only_a_film_that_is_cut_is_copied() {
         let at_px = (0..4).map(|k| [f64::from(k), 1.0]).collect();
-        let film = Film::new(&[0.0, 0.1, 0.2, 0.3], vec![FilmTrack { node: NodeId(1), at_px }]);
-        assert!(matches!(film.until(4), Cow::Borrowed(_)) && matches!(film.until(9), Cow::Borrowed(_)));
+        let film = Film::new(
+            &[0.0, 0.1, 0.2, 0.3],
+            vec![FilmTrack {
+                node: NodeId(1),
+                at_px,
+            }],
+        );
+        assert!(
+            matches!(film.until(4), Cow::Borrowed(_)) && matches!(film.until(9), Cow::Borrowed(_))
+        );
         let cut = film.until(3);
-        assert_eq!((cut.times_s.len(), cut.tracks[0].at_px.last()), (3, Some(&[2.0, 1.0])));
+        assert_eq!(
+            (cut.times_s.len(), cut.tracks[0].at_px.last()),
+            (3, Some(&[2.0, 1.0]))
+        );
     }
 }

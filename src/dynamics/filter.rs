@@ -1,13 +1,14 @@
 //! What signals have of one oscillation among others: Wiener's filter, at any times.
 //!
-//! The covariance of the sum is inverted and that of the part multiplied in a time that grows with the number of values
-//! only, by the same factor as the likelihood's (`process.rs`).
+//! The covariance of the sum is inverted and that of the part multiplied in a time that grows with
+//! the number of values only, by the same factor as the likelihood's (`process.rs`).
 
 use super::process::{Part, Ranks, Times};
 
 /// A filter for one part of a sum.
 pub(super) struct Filter {
-    /// Of the sum: u, v and fading of every rank in every frame, then W of its factor and the diagonal.
+    /// Of the sum: u, v and fading of every rank in every frame, then W of its factor and the
+    /// diagonal.
     all: Table,
     w: Vec<f64>,
     d: Vec<f64>,
@@ -26,21 +27,34 @@ struct Table {
 impl Table {
     fn new(ranks: &Ranks, frames: usize) -> Self {
         let j = ranks.len();
-        let [mut u, mut v, mut fade] = [vec![0.0; frames * j], vec![0.0; frames * j], vec![0.0; frames * j]];
+        let [mut u, mut v, mut fade] = [
+            vec![0.0; frames * j],
+            vec![0.0; frames * j],
+            vec![0.0; frames * j],
+        ];
         for k in 0..frames {
             let row = k * j..(k + 1) * j;
             ranks.at(k, &mut u[row.clone()], &mut v[row.clone()], &mut fade[row]);
         }
-        Self { ranks: j, u, v, fade }
+        Self {
+            ranks: j,
+            u,
+            v,
+            fade,
+        }
     }
 }
 
 impl Filter {
-    /// For `parts[of]` of a sum of `parts` and noise of variance `noise` in every value; `None` if the sum has no likelihood.
+    /// For `parts[of]` of a sum of `parts` and noise of variance `noise` in every value; `None` if
+    /// the sum has no likelihood.
     pub fn new(times: &Times, parts: &[Part], noise: f64, of: usize) -> Option<Self> {
         let part = parts.get(of)?;
         let n = times.s.len();
-        let (all, own) = (Table::new(&times.ranks(parts), n), Table::new(&times.ranks(&[*part]), n));
+        let (all, own) = (
+            Table::new(&times.ranks(parts), n),
+            Table::new(&times.ranks(&[*part]), n),
+        );
         let j = all.ranks;
         let diagonal = noise + parts.iter().map(Part::variance).sum::<f64>();
         let (mut s, mut w, mut d) = (vec![0.0; j * j], vec![0.0; n * j], vec![0.0; n]);
@@ -62,7 +76,13 @@ impl Filter {
             }
             (0..j).for_each(|a| w[k * j + a] = (v[a] - su[a]) / d[k]);
         }
-        Some(Self { all, w, d, own, variance: part.variance() })
+        Some(Self {
+            all,
+            w,
+            d,
+            own,
+            variance: part.variance(),
+        })
     }
 
     /// The best guess of the part in a signal.
@@ -113,8 +133,15 @@ mod tests {
     /// Two sways close together in one signal: each comes out as it went in.
     #[test]
     fn a_sway_is_told_from_another_one_beside_it() {
-        let times: Vec<f64> = (0..900).map(|k| 0.066 * f64::from(k) + 0.01 * (f64::from(k) * 1.7).sin()).collect();
-        let wave = |hz: f64| times.iter().map(|t| (std::f64::consts::TAU * hz * t).sin()).collect::<Vec<f64>>();
+        let times: Vec<f64> = (0..900)
+            .map(|k| 0.066 * f64::from(k) + 0.01 * (f64::from(k) * 1.7).sin())
+            .collect();
+        let wave = |hz: f64| {
+            times
+                .iter()
+                .map(|t| (std::f64::consts::TAU * hz * t).sin())
+                .collect::<Vec<f64>>()
+        };
         let (slow, fast) = (wave(0.6), wave(0.8));
         let both: Vec<f64> = slow.iter().zip(&fast).map(|(a, b)| a + 2.0 * b).collect();
         let part = |frequency_hz: f64, variance: f64| Part::Oscillator {
@@ -123,12 +150,28 @@ mod tests {
             damping: 0.01,
             gusts_per_s: 1e3,
         };
-        let parts = [part(0.6, 0.5), Part::Drift { variance: 0.01, rate_per_s: 0.1 }, part(0.8, 2.0)];
+        let parts = [
+            part(0.6, 0.5),
+            Part::Drift {
+                variance: 0.01,
+                rate_per_s: 0.1,
+            },
+            part(0.8, 2.0),
+        ];
         let times = Times::new(times.clone());
         for (of, wanted, size) in [(0, &slow, 1.0), (2, &fast, 2.0)] {
             let found = Filter::new(&times, &parts, 1e-3, of).unwrap().of(&both);
-            let off = found.iter().zip(wanted).map(|(f, w)| (f - size * w).powi(2)).sum::<f64>() / 900.0;
-            assert!(off.sqrt() < 0.1 * size, "part {of} is off by {}", off.sqrt());
+            let off = found
+                .iter()
+                .zip(wanted)
+                .map(|(f, w)| (f - size * w).powi(2))
+                .sum::<f64>()
+                / 900.0;
+            assert!(
+                off.sqrt() < 0.1 * size,
+                "part {of} is off by {}",
+                off.sqrt()
+            );
         }
         assert!(Filter::new(&times, &parts, -9.0, 0).is_none());
     }

@@ -1,8 +1,9 @@
 //! The nonlinear fit of damped cosines to many signals at once.
 //!
-//! Factors come from a linear fit inside the nonlinear one: variable projection (Golub and Pereyra 1973) with Kaufman's
-//! Jacobian (1975), all of it by normal equations, so that a step costs products of columns with signals and little else.
-//! After a release the moment of it, which all modes share, is fitted too.
+//! Factors come from a linear fit inside the nonlinear one: variable projection (Golub and Pereyra
+//! 1973) with Kaufman's Jacobian (1975), all of it by normal equations, so that a step costs
+//! products of columns with signals and little else. After a release the moment of it, which all
+//! modes share, is fitted too.
 
 use super::columns::dot;
 use super::decay::{Mode, Slopes, Start};
@@ -16,7 +17,8 @@ const DONE: f64 = 1e-4;
 /// Damping ratios that are tried.
 const DAMPING: [f64; 2] = [0.002, 0.45];
 
-/// What is known of a mode beforehand, with the standard deviations of the logarithms of its frequency and damping.
+/// What is known of a mode beforehand, with the standard deviations of the logarithms of its
+/// frequency and damping.
 pub(super) type Prior = Option<(Mode, [f64; 2])>;
 
 /// Everything that a step needs.
@@ -41,17 +43,29 @@ struct Slope {
 impl Signals {
     fn fit_of(&self, x: &[f64]) -> Fit {
         let modes = x.chunks_exact(2).map(Mode::of_parameters).collect();
-        Fit { modes, moment_s: if x.len() % 2 == 1 { x[x.len() - 1] } else { 0.0 }, rss: f64::NAN }
+        Fit {
+            modes,
+            moment_s: if x.len() % 2 == 1 {
+                x[x.len() - 1]
+            } else {
+                0.0
+            },
+            rss: f64::NAN,
+        }
     }
 
     /// Logarithms of frequency and damping of each mode; after a release from rest its moment, s.
     pub fn parameters(&self, fit: &Fit) -> Vec<f64> {
         let moment = (self.start == Start::Rest).then_some(fit.moment_s);
-        fit.modes.iter().flat_map(Mode::parameters).chain(moment).collect()
+        fit.modes
+            .iter()
+            .flat_map(Mode::parameters)
+            .chain(moment)
+            .collect()
     }
 
-    /// Fits all of `modes`; those that have a prior are held near it by its standard deviations (of the logarithms of
-    /// frequency and damping).
+    /// Fits all of `modes`; those that have a prior are held near it by its standard deviations (of
+    /// the logarithms of frequency and damping).
     pub fn fit(&self, from: &Fit, priors: &[Prior]) -> Fit {
         let mut x = self.parameters(from);
         let mut now = self.linearized(&x, priors);
@@ -62,8 +76,14 @@ impl Signals {
             for _ in 0..6 {
                 let mut h = now.hessian.clone();
                 (0..h.nrows()).for_each(|i| h[(i, i)] *= 1.0 + lambda);
-                let Some(step) = h.lu().solve(&now.gradient) else { break };
-                let mut next: Vec<f64> = x.iter().zip(step.iter()).map(|(x, d)| x + d.clamp(-0.3, 0.3)).collect();
+                let Some(step) = h.lu().solve(&now.gradient) else {
+                    break;
+                };
+                let mut next: Vec<f64> = x
+                    .iter()
+                    .zip(step.iter())
+                    .map(|(x, d)| x + d.clamp(-0.3, 0.3))
+                    .collect();
                 next.chunks_exact_mut(2).for_each(|p| {
                     p[0] = p[0].clamp(self.frequencies_hz[0].ln(), self.frequencies_hz[1].ln());
                     p[1] = p[1].clamp(DAMPING[0].ln(), DAMPING[1].ln());
@@ -85,7 +105,10 @@ impl Signals {
             }
         }
         let fit = self.fit_of(&x);
-        Fit { rss: self.rss(&fit), ..fit }
+        Fit {
+            rss: self.rss(&fit),
+            ..fit
+        }
     }
 
     /// Whether a mode stands where the search ends: what it describes lies beyond.
@@ -94,12 +117,15 @@ impl Signals {
         at(mode.frequency_hz, self.frequencies_hz) || at(mode.damping, DAMPING)
     }
 
-    /// The squares that are left with what the priors add: a prior weighs as much as the noise of one value allows.
+    /// The squares that are left with what the priors add: a prior weighs as much as the noise of
+    /// one value allows.
     fn cost(&self, x: &[f64], rss: f64, priors: &[Prior]) -> f64 {
         let off = |(m, prior): (usize, &Prior)| {
             let Some((mode, sd)) = prior else { return 0.0 };
             let at = mode.parameters();
-            (0..2).map(|i| (at[i] - x[2 * m + i]).powi(2) / (sd[i] * sd[i]).max(1e-12)).sum::<f64>()
+            (0..2)
+                .map(|i| (at[i] - x[2 * m + i]).powi(2) / (sd[i] * sd[i]).max(1e-12))
+                .sum::<f64>()
         };
         let of_modes: f64 = priors.iter().enumerate().map(off).sum();
         let of_moment = match self.start {
@@ -112,7 +138,11 @@ impl Signals {
     /// Everything that a step needs at `x`.
     pub fn linearized(&self, x: &[f64], priors: &[Prior]) -> Linear {
         let p = x.len();
-        let mut out = Linear { hessian: DMatrix::zeros(p, p), gradient: DVector::zeros(p), rss: 0.0 };
+        let mut out = Linear {
+            hessian: DMatrix::zeros(p, p),
+            gradient: DVector::zeros(p),
+            rss: 0.0,
+        };
         let basis = self.basis(&self.fit_of(x));
         let all = basis.all();
         let of_all = products(&all);
@@ -139,25 +169,43 @@ impl Signals {
 
     fn basis(&self, fit: &Fit) -> Basis {
         let times = self.times_of(fit);
-        let mut basis = Basis { columns: vec![vec![1.0; times.len()]], slopes: Vec::new() };
+        let mut basis = Basis {
+            columns: vec![vec![1.0; times.len()]],
+            slopes: Vec::new(),
+        };
         for (m, mode) in fit.modes.iter().enumerate() {
-            for (values, Slopes { by_mode, by_moment }) in mode.columns_and_slopes(&times, self.start) {
+            for (values, Slopes { by_mode, by_moment }) in
+                mode.columns_and_slopes(&times, self.start)
+            {
                 let column = basis.columns.len();
                 basis.columns.push(values);
-                let of_mode = by_mode.into_iter().enumerate().map(|(i, values)| (2 * m + i, values));
-                let of_moment = (self.start == Start::Rest).then_some((2 * fit.modes.len(), by_moment));
+                let of_mode = by_mode
+                    .into_iter()
+                    .enumerate()
+                    .map(|(i, values)| (2 * m + i, values));
+                let of_moment =
+                    (self.start == Start::Rest).then_some((2 * fit.modes.len(), by_moment));
                 let slopes = of_mode.chain(of_moment);
-                basis.slopes.extend(slopes.map(|(parameter, values)| Slope { parameter, column, values }));
+                basis.slopes.extend(slopes.map(|(parameter, values)| Slope {
+                    parameter,
+                    column,
+                    values,
+                }));
             }
         }
         basis
     }
 
-    /// For every signal what each of its values adds to the gradient, `[parameter][frame]`: 0 in frames that it lacks.
+    /// For every signal what each of its values adds to the gradient, `[parameter][frame]`: 0 in
+    /// frames that it lacks.
     pub fn scores(&self, fit: &Fit) -> Vec<Vec<Vec<f64>>> {
         let basis = self.basis(fit);
         let all = basis.all();
-        let (of_all, n, p) = (products(&all), basis.columns.len(), self.parameters(fit).len());
+        let (of_all, n, p) = (
+            products(&all),
+            basis.columns.len(),
+            self.parameters(fit).len(),
+        );
         let of_group = |g: &Group| {
             let products = g.products(&of_all, &all);
             let factored = Factored::new(&products, n);
@@ -173,7 +221,9 @@ impl Signals {
                 let mut scores = vec![vec![0.0; rest.len()]; p];
                 for (slope, values) in basis.slopes.iter().zip(&slopes) {
                     let factor = factors[slope.column];
-                    let of = scores[slope.parameter].iter_mut().zip(rest.iter().zip(values));
+                    let of = scores[slope.parameter]
+                        .iter_mut()
+                        .zip(rest.iter().zip(values));
                     of.for_each(|(score, (r, s))| *score += r * factor * s);
                 }
                 scores
@@ -194,20 +244,34 @@ impl Basis {
 }
 
 impl Linear {
-    /// Adds a group's share. Kaufman's Jacobian is slopes (without what the columns span of them) times factors, so that
-    /// products of columns and of factors are enough, and the Jacobian itself is never made.
+    /// Adds a group's share. Kaufman's Jacobian is slopes (without what the columns span of them)
+    /// times factors, so that products of columns and of factors are enough, and the Jacobian
+    /// itself is never made.
     fn add(&mut self, group: &Group, products: &DMatrix<f64>, basis: &Basis, all: &[&[f64]]) {
         let n = basis.columns.len();
         let factored = Factored::new(products, n);
-        let explained: Vec<Explained> = group.values.iter().map(|y| Explained::new(y, all, &factored)).collect();
-        let alike = DMatrix::from_fn(n, n, |a, b| explained.iter().map(|e| e.factors[a] * e.factors[b]).sum::<f64>());
+        let explained: Vec<Explained> = group
+            .values
+            .iter()
+            .map(|y| Explained::new(y, all, &factored))
+            .collect();
+        let alike = DMatrix::from_fn(n, n, |a, b| {
+            explained
+                .iter()
+                .map(|e| e.factors[a] * e.factors[b])
+                .sum::<f64>()
+        });
         let on_columns = |s: usize| (0..n).map(|c| products[(c, n + s)]).collect::<Vec<f64>>();
         for (s, slope) in basis.slopes.iter().enumerate() {
             let by = on_columns(s);
             let spanned = factored.solve(&by);
             for (t, other) in basis.slopes.iter().enumerate() {
-                let left = products[(n + s, n + t)] - (0..n).map(|c| spanned[c] * products[(c, n + t)]).sum::<f64>();
-                self.hessian[(slope.parameter, other.parameter)] += left * alike[(slope.column, other.column)];
+                let left = products[(n + s, n + t)]
+                    - (0..n)
+                        .map(|c| spanned[c] * products[(c, n + t)])
+                        .sum::<f64>();
+                self.hessian[(slope.parameter, other.parameter)] +=
+                    left * alike[(slope.column, other.column)];
             }
             let of = |e: &Explained| e.factors[slope.column] * (e.by[n + s] - dot(&by, &e.factors));
             self.gradient[slope.parameter] += explained.iter().map(of).sum::<f64>();

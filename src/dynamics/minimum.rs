@@ -3,14 +3,23 @@
 use nalgebra::{DMatrix, DVector};
 
 const MOST_STEPS: usize = 60;
-/// Step of the differences: the functions are logarithms of likelihoods, which are known to some 1e-9.
+/// Step of the differences: the functions are logarithms of likelihoods, which are known to some
+/// 1e-9.
 const STEP: f64 = 1e-4;
 /// Change of the function at which it is done.
 const DONE: f64 = 1e-2;
 
 /// Minimum near `from` within `bounds`, by BFGS with differences: the place and the value.
-pub(super) fn minimum(f: impl Fn(&[f64]) -> f64, from: &[f64], bounds: &[[f64; 2]]) -> (Vec<f64>, f64) {
-    let within = |x: &mut [f64]| x.iter_mut().zip(bounds).for_each(|(x, b)| *x = x.clamp(b[0], b[1]));
+pub(super) fn minimum(
+    f: impl Fn(&[f64]) -> f64,
+    from: &[f64],
+    bounds: &[[f64; 2]],
+) -> (Vec<f64>, f64) {
+    let within = |x: &mut [f64]| {
+        x.iter_mut()
+            .zip(bounds)
+            .for_each(|(x, b)| *x = x.clamp(b[0], b[1]))
+    };
     let n = from.len();
     let mut x = from.to_vec();
     within(&mut x);
@@ -31,7 +40,11 @@ pub(super) fn minimum(f: impl Fn(&[f64]) -> f64, from: &[f64], bounds: &[[f64; 2
         let mut share = 1.0;
         let mut found = None;
         for _ in 0..12 {
-            let mut there: Vec<f64> = x.iter().zip(way.iter()).map(|(x, w)| x + share * w).collect();
+            let mut there: Vec<f64> = x
+                .iter()
+                .zip(way.iter())
+                .map(|(x, w)| x + share * w)
+                .collect();
             within(&mut there);
             let v = f(&there);
             if v < value {
@@ -66,7 +79,11 @@ fn slope(f: &impl Fn(&[f64]) -> f64, x: &[f64], value: f64) -> DVector<f64> {
             let mut there = x.to_vec();
             there[i] += STEP;
             let v = f(&there);
-            if v.is_finite() { (v - value) / STEP } else { 0.0 }
+            if v.is_finite() {
+                (v - value) / STEP
+            } else {
+                0.0
+            }
         }),
     )
 }
@@ -108,6 +125,9 @@ mod tests {
         let (x, value) = minimum(f, &[-1.0, 1.0], &[[-3.0, 3.0]; 2]);
         assert!(value < 1e-2 && (x[0] - 1.0).abs() < 0.1, "{x:?}: {value}");
         let h = curvature(f, &[1.0, 1.0]);
-        assert!((h[(0, 0)] - 242.0).abs() < 1.0 && (h[(1, 1)] - 60.0).abs() < 0.1, "{h}");
+        assert!(
+            (h[(0, 0)] - 242.0).abs() < 1.0 && (h[(1, 1)] - 60.0).abs() < 0.1,
+            "{h}"
+        );
     }
 }

@@ -1,13 +1,13 @@
 //! Normal equations: what a few columns explain of many signals, from the products of all with all.
 //!
-//! Signals that lack other frames than their neighbours do not need columns of their own: the products over all frames
-//! are had once, and those over the frames that are lacking are taken off.
+//! Signals that lack other frames than their neighbours do not need columns of their own: the
+//! products over all frames are had once, and those over the frames that are lacking are taken off.
 
 use super::columns::dot;
 use nalgebra::DMatrix;
 
-/// Of a column whose square is less than this share of what it was before the others were taken off nothing is left: the
-/// others span it.
+/// Of a column whose square is less than this share of what it was before the others were taken off
+/// nothing is left: the others span it.
 const SPANNED: f64 = 1e-10;
 
 /// Products of `columns` with each other.
@@ -24,7 +24,11 @@ pub(super) fn products(columns: &[&[f64]]) -> DMatrix<f64> {
 }
 
 /// The same without `rows`.
-pub(super) fn products_without(all: &DMatrix<f64>, columns: &[&[f64]], rows: &[usize]) -> DMatrix<f64> {
+pub(super) fn products_without(
+    all: &DMatrix<f64>,
+    columns: &[&[f64]],
+    rows: &[usize],
+) -> DMatrix<f64> {
     let mut out = all.clone();
     let n = columns.len();
     let of = |column: &&[f64]| rows.iter().map(|&r| column[r]).collect::<Vec<f64>>();
@@ -93,12 +97,20 @@ mod tests {
         let twice: Vec<f64> = b.iter().map(|x| 2.0 * x).collect();
         let columns = [a.as_slice(), &b, &twice];
         // The last frame is lacking, and what stands there must not count.
-        let y: Vec<f64> = b.iter().map(|x| 3.0 - 0.5 * x).take(4).chain([0.0]).collect();
+        let y: Vec<f64> = b
+            .iter()
+            .map(|x| 3.0 - 0.5 * x)
+            .take(4)
+            .chain([0.0])
+            .collect();
         let products = products_without(&products(&columns), &columns, &[4]);
         let by: Vec<f64> = columns.iter().map(|c| dot(c, &y)).collect();
         let factored = Factored::new(&products, 3);
         let factors = factored.solve(&by);
-        assert!((factors[0] - 3.0).abs() < 1e-9 && (factors[1] + 0.5).abs() < 1e-9 && factors[2] == 0.0, "{factors:?}");
+        assert!(
+            (factors[0] - 3.0).abs() < 1e-9 && (factors[1] + 0.5).abs() < 1e-9 && factors[2] == 0.0,
+            "{factors:?}"
+        );
         // Variance of a slope: 1 over the squares from the mean.
         let squares: f64 = b[..4].iter().map(|x| (x - 1.75) * (x - 1.75)).sum();
         assert!((factored.variances()[1] - 1.0 / squares).abs() < 1e-9);

@@ -1,9 +1,10 @@
 //! Likelihood of oscillators that are driven by chance, at any times.
 //!
-//! A damped oscillator driven by gusts is a Gaussian process whose covariance is a sum of exponentials of the time
-//! between two values. The covariance matrix of such sums has a factor that is found in a time that grows with the number
-//! of values only, whatever their times: Foreman-Mackey, Agol, Ambikasaran and Angus, "Fast and scalable Gaussian process
-//! modeling with applications to astronomical time series" (2017), eqs. 9, 20, 33-43.
+//! A damped oscillator driven by gusts is a Gaussian process whose covariance is a sum of
+//! exponentials of the time between two values. The covariance matrix of such sums has a factor
+//! that is found in a time that grows with the number of values only, whatever their times:
+//! Foreman-Mackey, Agol, Ambikasaran and Angus, "Fast and scalable Gaussian process modeling with
+//! applications to astronomical time series" (2017), eqs. 9, 20, 33-43.
 
 use super::decay::{each_step, powers};
 use nalgebra::Complex;
@@ -15,8 +16,14 @@ use std::rc::Rc;
 /// A part of what is seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Part {
-    /// A damped oscillator of this variance, driven by gusts that forget themselves at this rate, 1/s.
-    Oscillator { variance: f64, frequency_hz: f64, damping: f64, gusts_per_s: f64 },
+    /// A damped oscillator of this variance, driven by gusts that forget themselves at this rate,
+    /// 1/s.
+    Oscillator {
+        variance: f64,
+        frequency_hz: f64,
+        damping: f64,
+        gusts_per_s: f64,
+    },
     /// What drifts: forgets itself at this rate, 1/s.
     Drift { variance: f64, rate_per_s: f64 },
 }
@@ -38,7 +45,8 @@ struct Term {
     d: f64,
 }
 
-/// Waves of the covariance in every frame, and how they fade from frame to frame; what depends on a pole alone.
+/// Waves of the covariance in every frame, and how they fade from frame to frame; what depends on a
+/// pole alone.
 pub(super) struct Waves {
     pub cos: Vec<f64>,
     pub sin: Vec<f64>,
@@ -49,25 +57,36 @@ impl Waves {
     fn new(times_s: &[f64], term: &Term) -> Self {
         let mut fade = Vec::with_capacity(times_s.len());
         fade.extend(times_s.first().map(|_| 1.0));
-        each_step(times_s, Complex::from(-term.c), |factor| fade.push(factor.re));
+        each_step(times_s, Complex::from(-term.c), |factor| {
+            fade.push(factor.re)
+        });
         let turn = powers(times_s, Complex::new(0.0, term.d));
         let of = |f: &dyn Fn(&Complex<f64>) -> f64| turn.iter().map(f).collect::<Vec<f64>>();
-        Self { cos: of(&|t| t.re), sin: of(&|t| t.im), fade }
+        Self {
+            cos: of(&|t| t.re),
+            sin: of(&|t| t.im),
+            fade,
+        }
     }
 }
 
-/// Times at which values are seen. The waves that were asked for last are kept: from one likelihood to the next few poles change.
+/// Times at which values are seen. The waves that were asked for last are kept: from one likelihood
+/// to the next few poles change.
 pub(super) struct Times {
     pub s: Vec<f64>,
     kept: RefCell<VecDeque<([u64; 2], Rc<Waves>)>>,
 }
 
-/// Ranks u v' of a covariance, which fade from frame to frame: an oscillation has two, a fading one.
+/// Ranks u v' of a covariance, which fade from frame to frame: an oscillation has two, a fading
+/// one.
 pub(super) struct Ranks(Vec<(Term, Rc<Waves>)>);
 
 impl Times {
     pub fn new(s: Vec<f64>) -> Self {
-        Self { s, kept: RefCell::default() }
+        Self {
+            s,
+            kept: RefCell::default(),
+        }
     }
 
     fn waves(&self, term: &Term) -> Rc<Waves> {
@@ -88,7 +107,12 @@ impl Times {
     /// Of the covariance of a sum of `parts`.
     pub fn ranks(&self, parts: &[Part]) -> Ranks {
         let terms = together(parts.iter().flat_map(Part::terms));
-        Ranks(terms.into_iter().map(|term| (term, self.waves(&term))).collect())
+        Ranks(
+            terms
+                .into_iter()
+                .map(|term| (term, self.waves(&term)))
+                .collect(),
+        )
     }
 }
 
@@ -116,7 +140,10 @@ impl Part {
     pub fn power(&self, hz: f64) -> f64 {
         let omega = TAU * hz;
         let at = |t: &Term, by: f64| (t.a * t.c + t.b * by) / (t.c * t.c + by * by);
-        self.terms().iter().map(|t| at(t, t.d + omega) + at(t, t.d - omega)).sum()
+        self.terms()
+            .iter()
+            .map(|t| at(t, t.d + omega) + at(t, t.d - omega))
+            .sum()
     }
 }
 
@@ -127,24 +154,51 @@ impl Term {
 }
 
 impl Part {
-    /// Its covariance. Of an oscillator it is what a driven one has: a sum over the poles p of H(s) = 1 / ((s² + 2 zeta w s +
-    /// w²) (s + g)) of H's residue at p times H(-p), which is a pair for the oscillator and one for the gusts.
+    /// Its covariance. Of an oscillator it is what a driven one has: a sum over the poles p of H(s)
+    /// = 1 / ((s² + 2 zeta w s + w²) (s + g)) of H's residue at p times H(-p), which is a pair for
+    /// the oscillator and one for the gusts.
     fn terms(&self) -> Vec<Term> {
         match *self {
-            Self::Oscillator { variance, frequency_hz, damping, gusts_per_s: g } => {
+            Self::Oscillator {
+                variance,
+                frequency_hz,
+                damping,
+                gusts_per_s: g,
+            } => {
                 let omega = TAU * frequency_hz;
                 let p = Complex::new(-damping * omega, omega * (1.0 - damping * damping).sqrt());
-                let of = |s: Complex<f64>| (s * s + s * (2.0 * damping * omega) + omega * omega) * (s + g);
+                let of = |s: Complex<f64>| {
+                    (s * s + s * (2.0 * damping * omega) + omega * omega) * (s + g)
+                };
                 let pair = 2.0 / ((p - p.conj()) * (p + g) * of(-p));
                 let gust = Complex::new(-g, 0.0);
-                let single = 1.0 / ((gust * gust + gust * (2.0 * damping * omega) + omega * omega) * of(-gust));
+                let single = 1.0
+                    / ((gust * gust + gust * (2.0 * damping * omega) + omega * omega) * of(-gust));
                 let unit = variance / (pair.re + single.re);
                 vec![
-                    Term { a: unit * pair.re, b: -unit * pair.im, c: -p.re, d: p.im },
-                    Term { a: unit * single.re, b: 0.0, c: g, d: 0.0 },
+                    Term {
+                        a: unit * pair.re,
+                        b: -unit * pair.im,
+                        c: -p.re,
+                        d: p.im,
+                    },
+                    Term {
+                        a: unit * single.re,
+                        b: 0.0,
+                        c: g,
+                        d: 0.0,
+                    },
                 ]
             }
-            Self::Drift { variance, rate_per_s } => vec![Term { a: variance, b: 0.0, c: rate_per_s, d: 0.0 }],
+            Self::Drift {
+                variance,
+                rate_per_s,
+            } => vec![Term {
+                a: variance,
+                b: 0.0,
+                c: rate_per_s,
+                d: 0.0,
+            }],
         }
     }
 }
@@ -153,7 +207,10 @@ impl Part {
 fn together(terms: impl Iterator<Item = Term>) -> Vec<Term> {
     let mut out: Vec<Term> = Vec::new();
     for term in terms {
-        match out.iter_mut().find(|t| t.d == 0.0 && term.d == 0.0 && t.c == term.c) {
+        match out
+            .iter_mut()
+            .find(|t| t.d == 0.0 && term.d == 0.0 && t.c == term.c)
+        {
             Some(same) => same.a += term.a,
             None => out.push(term),
         }
@@ -161,10 +218,15 @@ fn together(terms: impl Iterator<Item = Term>) -> Vec<Term> {
     out
 }
 
-/// Minus twice the logarithm of the likelihood of the first of `signals` at `times`, up to a constant, as a sum of `parts` and
-/// noise of variance `noise` in every value, plus any multiples of the other signals, whose best factors are taken.
-/// Infinite where there is none.
-pub(super) fn minus_2_log_likelihood(times: &Times, signals: &[&[f64]], parts: &[Part], noise: f64) -> f64 {
+/// Minus twice the logarithm of the likelihood of the first of `signals` at `times`, up to a
+/// constant, as a sum of `parts` and noise of variance `noise` in every value, plus any multiples
+/// of the other signals, whose best factors are taken. Infinite where there is none.
+pub(super) fn minus_2_log_likelihood(
+    times: &Times,
+    signals: &[&[f64]],
+    parts: &[Part],
+    noise: f64,
+) -> f64 {
     let ranks = times.ranks(parts);
     let diagonal = noise + parts.iter().map(Part::variance).sum::<f64>();
     // The number of ranks is known to the compiler, or this takes three times as long.
@@ -179,7 +241,12 @@ pub(super) fn minus_2_log_likelihood(times: &Times, signals: &[&[f64]], parts: &
     }
 }
 
-fn likelihood<const J: usize>(frames: usize, signals: &[&[f64]], ranks: &Ranks, diagonal: f64) -> f64 {
+fn likelihood<const J: usize>(
+    frames: usize,
+    signals: &[&[f64]],
+    ranks: &Ranks,
+    diagonal: f64,
+) -> f64 {
     let (mut u, mut v, mut phi) = ([0.0; J], [0.0; J], [0.0; J]);
     // S and W of the factor; f of the solution, a row for each signal.
     let (mut s, mut w, mut f) = ([[0.0; J]; J], [0.0; J], vec![[0.0; J]; signals.len()]);
@@ -224,20 +291,25 @@ fn likelihood<const J: usize>(frames: usize, signals: &[&[f64]], ranks: &Ranks, 
     log_determinant + squares_left(gram, n)
 }
 
-/// What is left of the first signal's squares when the others have been fitted to it: `gram` holds the products below its
-/// diagonal. Cholesky with the first signal last.
+/// What is left of the first signal's squares when the others have been fitted to it: `gram` holds
+/// the products below its diagonal. Cholesky with the first signal last.
 fn squares_left(gram: Vec<f64>, n: usize) -> f64 {
     let product = |i: usize, k: usize| gram[i.max(k) * n + i.min(k)];
     let order: Vec<usize> = (1..n).chain([0]).collect();
     let mut l = vec![0.0; n * n];
     for i in 0..n {
         for k in 0..=i {
-            let sum: f64 = product(order[i], order[k]) - (0..k).map(|m| l[i * n + m] * l[k * n + m]).sum::<f64>();
+            let sum: f64 = product(order[i], order[k])
+                - (0..k).map(|m| l[i * n + m] * l[k * n + m]).sum::<f64>();
             l[i * n + k] = if i == n - 1 && k == i {
                 return sum;
             } else if k == i {
                 // A signal that is a multiple of others adds nothing.
-                if sum > 1e-10 * product(order[i], order[i]) { sum.sqrt() } else { f64::INFINITY }
+                if sum > 1e-10 * product(order[i], order[i]) {
+                    sum.sqrt()
+                } else {
+                    f64::INFINITY
+                }
             } else {
                 sum / l[k * n + k]
             };
@@ -254,28 +326,56 @@ mod tests {
     /// Against the definition, with a full matrix, at uneven times.
     #[test]
     fn likelihood_is_that_of_the_covariance() {
-        let times: Vec<f64> =
-            (0..40).map(|k| 0.1 * k as f64 + 0.03 * (k as f64 * 1.7).sin() + if k > 20 { 1.3 } else { 0.0 }).collect();
-        let values: Vec<f64> = times.iter().map(|t| (3.0 * t).sin() + 0.2 * (17.0 * t).cos()).collect();
-        let known = [vec![1.0; 40], times.iter().map(|t| t.cos()).collect::<Vec<f64>>()];
+        let times: Vec<f64> = (0..40)
+            .map(|k| {
+                0.1 * k as f64 + 0.03 * (k as f64 * 1.7).sin() + if k > 20 { 1.3 } else { 0.0 }
+            })
+            .collect();
+        let values: Vec<f64> = times
+            .iter()
+            .map(|t| (3.0 * t).sin() + 0.2 * (17.0 * t).cos())
+            .collect();
+        let known = [
+            vec![1.0; 40],
+            times.iter().map(|t| t.cos()).collect::<Vec<f64>>(),
+        ];
         let parts = [
-            Part::Oscillator { variance: 0.7, frequency_hz: 0.5, damping: 0.06, gusts_per_s: 1e4 },
-            Part::Drift { variance: 0.2, rate_per_s: 0.4 },
+            Part::Oscillator {
+                variance: 0.7,
+                frequency_hz: 0.5,
+                damping: 0.06,
+                gusts_per_s: 1e4,
+            },
+            Part::Drift {
+                variance: 0.2,
+                rate_per_s: 0.4,
+            },
         ];
         let covariance = |t: f64| {
             let (w, z) = (TAU * 0.5, 0.06_f64);
             let wd = w * (1.0 - z * z).sqrt();
-            0.7 * (-z * w * t).exp() * ((wd * t).cos() + z * w / wd * (wd * t).sin()) + 0.2 * (-0.4 * t).exp()
+            0.7 * (-z * w * t).exp() * ((wd * t).cos() + z * w / wd * (wd * t).sin())
+                + 0.2 * (-0.4 * t).exp()
         };
-        let k =
-            DMatrix::from_fn(40, 40, |i, j| covariance((times[i] - times[j]).abs()) + if i == j { 0.01 } else { 0.0 });
+        let k = DMatrix::from_fn(40, 40, |i, j| {
+            covariance((times[i] - times[j]).abs()) + if i == j { 0.01 } else { 0.0 }
+        });
         let x = DMatrix::from_fn(40, 2, |i, j| known[j][i]);
         let y = DVector::from_vec(values.clone());
         let inverse = k.clone().try_inverse().unwrap();
-        let factors = (x.transpose() * &inverse * &x).try_inverse().unwrap() * x.transpose() * &inverse * &y;
+        let factors =
+            (x.transpose() * &inverse * &x).try_inverse().unwrap() * x.transpose() * &inverse * &y;
         let rest = &y - &x * factors;
         let wanted = (rest.transpose() * inverse * rest)[(0, 0)] + k.determinant().ln();
-        let found = minus_2_log_likelihood(&Times::new(times), &[&values, &known[0], &known[1]], &parts, 0.01);
-        assert!((found - wanted).abs() < 1e-6 * wanted.abs(), "{found}, not {wanted}");
+        let found = minus_2_log_likelihood(
+            &Times::new(times),
+            &[&values, &known[0], &known[1]],
+            &parts,
+            0.01,
+        );
+        assert!(
+            (found - wanted).abs() < 1e-6 * wanted.abs(),
+            "{found}, not {wanted}"
+        );
     }
 }

@@ -9,29 +9,29 @@ use std::ops::Range;
 const OVER_S: f64 = 0.2;
 /// A point counts if it is seen in so much of the film.
 const SEEN: f64 = 0.9;
-/// Before a release the tree is at rest for so long, s, with at most this share of the energy that it has at its peak so long
-/// after it, s; and that is at least this share of the film's largest.
+/// Before a release the tree is at rest for so long, s, with at most this share of the energy that
+/// it has at its peak so long after it, s; and that is at least this share of the film's largest.
 pub(super) const REST_S: f64 = 0.6;
 const AT_REST: f64 = 0.02;
 const RISE_S: f64 = 1.0;
 /// Of the rest so much must be seen, s.
 const LEAST_REST_S: f64 = 0.3;
 const LARGE: f64 = 0.2;
-/// A sway that begins with its release is largest at once, and one that wind stirs grows: of the energy that it has at its peak so
-/// long after the rest, s, the first peak has this share.
+/// A sway that begins with its release is largest at once, and one that wind stirs grows: of the
+/// energy that it has at its peak so long after the rest, s, the first peak has this share.
 const GROWN_S: f64 = 6.0;
 const AT_ONCE: f64 = 0.33;
 /// What is shorter from its rest on is no decay, but the pull itself, s.
 const LEAST_S: f64 = 3.0;
 /// Fewer speeds say nothing.
 const LEAST_FRAMES: usize = 32;
-/// A hand brings the tree from where it rests to where it holds it: it has come so far along when it is surely under way, and
-/// when it is all but there.
+/// A hand brings the tree from where it rests to where it holds it: it has come so far along when
+/// it is surely under way, and when it is all but there.
 const UNDER_WAY: f64 = 0.3;
 const THERE: f64 = 0.9;
 
-/// Time, s, and square of the speed of the middle one of the points over `over_s` seconds, px²/s²; `None` where too little was
-/// seen.
+/// Time, s, and square of the speed of the middle one of the points over `over_s` seconds, px²/s²;
+/// `None` where too little was seen.
 pub fn energy(film: &Film, over_s: f64) -> Option<Vec<[f64; 2]>> {
     let times = &film.times_s;
     let step_s = film.step_s();
@@ -71,16 +71,24 @@ fn floor_and_top(energy: &[[f64; 2]]) -> [f64; 2] {
     [floor, sorted.last().map_or(0.0, |top| top - floor)]
 }
 
-/// When the tree was let go from rest, or pulled from there with a jerk, s; `step_s` lie between two frames.
+/// When the tree was let go from rest, or pulled from there with a jerk, s; `step_s` lie between
+/// two frames.
 fn comes_out_of_rest_s(energy: &[[f64; 2]], step_s: f64) -> Vec<f64> {
     let [floor, top] = floor_and_top(energy);
     let mut out: Vec<f64> = Vec::new();
     let mut at_rest: Option<f64> = None;
     for (k, &[now, _]) in energy.iter().enumerate() {
-        let before = energy[..=k].iter().rev().take_while(|e| now - e[0] <= REST_S);
+        let before = energy[..=k]
+            .iter()
+            .rev()
+            .take_while(|e| now - e[0] <= REST_S);
         let (sum, n) = before.fold((0.0, 0.0), |(sum, n), e| (sum + e[1] - floor, n + 1.0));
         let peak = |within_s: f64| {
-            energy[k..].iter().take_while(|e| e[0] - now <= within_s).map(|e| e[1] - floor).fold(0.0, f64::max)
+            energy[k..]
+                .iter()
+                .take_while(|e| e[0] - now <= within_s)
+                .map(|e| e[1] - floor)
+                .fold(0.0, f64::max)
         };
         let after = peak(RISE_S);
         // What was hardly seen was not seen at rest.
@@ -95,24 +103,39 @@ fn comes_out_of_rest_s(energy: &[[f64; 2]], step_s: f64) -> Vec<f64> {
     out
 }
 
-/// The parts of a film that hold a release each, in order: from the rest before it until a hand pulls again. None where the tree
-/// came out of rest once at most.
+/// The parts of a film that hold a release each, in order: from the rest before it until a hand
+/// pulls again. None where the tree came out of rest once at most.
 pub(super) fn parts(film: &Film) -> Vec<Range<usize>> {
-    let Some(energy) = energy(film, OVER_S) else { return Vec::new() };
+    let Some(energy) = energy(film, OVER_S) else {
+        return Vec::new();
+    };
     let out_of_rest_s = comes_out_of_rest_s(&energy, film.step_s());
     if out_of_rest_s.len() < 2 {
         return Vec::new();
     }
     let at = |t: f64| film.times_s.partition_point(|s| *s < t);
     let [floor, top] = floor_and_top(&energy);
-    let swinging: Vec<usize> = energy.iter().filter(|e| e[1] - floor > AT_REST * top).map(|e| at(e[0])).collect();
+    let swinging: Vec<usize> = energy
+        .iter()
+        .filter(|e| e[1] - floor > AT_REST * top)
+        .map(|e| at(e[0]))
+        .collect();
     let begins = out_of_rest_s.iter().map(|t| at(t - REST_S));
-    let pulled = out_of_rest_s.windows(2).map(|pair| at(pulled_again_s(film, &swinging, [pair[0], pair[1]])));
-    let long = |&(from, to): &(usize, usize)| from < to && film.times_s[to - 1] - film.times_s[from] >= LEAST_S;
-    begins.zip(pulled.chain([film.times_s.len()])).filter(long).map(|(from, to)| from..to).collect()
+    let pulled = out_of_rest_s
+        .windows(2)
+        .map(|pair| at(pulled_again_s(film, &swinging, [pair[0], pair[1]])));
+    let long = |&(from, to): &(usize, usize)| {
+        from < to && film.times_s[to - 1] - film.times_s[from] >= LEAST_S
+    };
+    begins
+        .zip(pulled.chain([film.times_s.len()]))
+        .filter(long)
+        .map(|(from, to)| from..to)
+        .collect()
 }
 
-/// When a hand came back after the first of two releases, s. In the frames `swinging` the tree is not held.
+/// When a hand came back after the first of two releases, s. In the frames `swinging` the tree is
+/// not held.
 fn pulled_again_s(film: &Film, swinging: &[usize], releases_s: [f64; 2]) -> f64 {
     let at = |t: f64| film.times_s.partition_point(|s| *s < t);
     let [first, held, second] = [releases_s[0], releases_s[1] - REST_S, releases_s[1]].map(at);
@@ -122,7 +145,8 @@ fn pulled_again_s(film: &Film, swinging: &[usize], releases_s: [f64; 2]) -> f64 
         let of = |c: usize| median(seen.iter().map(|p| p[c]).collect(), f64::total_cmp);
         Some([of(0)?, of(1)?])
     };
-    // Of every point the place about which it swings, and which way and how far it is held from there.
+    // Of every point the place about which it swings, and which way and how far it is held from
+    // there.
     let ways: Vec<(usize, [f64; 2], [f64; 2])> = (0..film.tracks.len())
         .filter_map(|k| {
             let at_px = &film.tracks[k].at_px;
@@ -141,8 +165,13 @@ fn pulled_again_s(film: &Film, swinging: &[usize], releases_s: [f64; 2]) -> f64 
         }
         along / all
     };
-    let under_way = (first..held).rev().find(|&k| share(k) < UNDER_WAY).unwrap_or(first);
-    let there = (under_way..second).find(|&k| share(k) > THERE).unwrap_or(held);
+    let under_way = (first..held)
+        .rev()
+        .find(|&k| share(k) < UNDER_WAY)
+        .unwrap_or(first);
+    let there = (under_way..second)
+        .find(|&k| share(k) > THERE)
+        .unwrap_or(held);
     let took_s = film.times_s[there] - film.times_s[under_way];
     // It began as slowly as it went on, or more slowly.
     (film.times_s[under_way] - took_s).max(releases_s[0])
@@ -155,21 +184,33 @@ mod tests {
     use crate::model::NodeId;
     use std::f64::consts::TAU;
 
-    /// Nine points that move as `sway` says, px, each by another factor, with a little noise; frames at `rate_hz` but for a `gap`, s.
+    /// Nine points that move as `sway` says, px, each by another factor, with a little noise;
+    /// frames at `rate_hz` but for a `gap`, s.
     fn film(seconds: f64, rate_hz: f64, gap: Range<f64>, sway: impl Fn(f64) -> f64) -> Film {
         let all = (0..(rate_hz * seconds) as u32).map(|k| f64::from(k) / rate_hz);
         let times: Vec<f64> = all.filter(|t| !gap.contains(t)).collect();
         let track = |i: u32| {
             let noise = |t: f64| 0.2 * (1234.5 * t * f64::from(i + 1)).sin();
-            let at_px = times.iter().map(|&t| [9.0 + (0.5 + 0.1 * f64::from(i)) * sway(t) + noise(t), noise(t + 0.7)]);
-            FilmTrack { node: NodeId(1), at_px: at_px.collect() }
+            let at_px = times.iter().map(|&t| {
+                [
+                    9.0 + (0.5 + 0.1 * f64::from(i)) * sway(t) + noise(t),
+                    noise(t + 0.7),
+                ]
+            });
+            FilmTrack {
+                node: NodeId(1),
+                at_px: at_px.collect(),
+            }
         };
         Film::new(&times, (0..9).map(track).collect())
     }
 
-    /// Pulled within a second, held for `holds_s`, and let go at each of some times, s, by so many px.
+    /// Pulled within a second, held for `holds_s`, and let go at each of some times, s, by so many
+    /// px.
     fn pulled(releases: &[[f64; 2]], holds_s: f64, t: f64) -> f64 {
-        let after = |[at, px]: [f64; 2]| px * (-0.04 * TAU * 0.6 * (t - at)).exp() * (TAU * 0.6 * (t - at)).cos();
+        let after = |[at, px]: [f64; 2]| {
+            px * (-0.04 * TAU * 0.6 * (t - at)).exp() * (TAU * 0.6 * (t - at)).cos()
+        };
         let now = releases.iter().rposition(|r| r[0] <= t);
         let free = now.map_or(0.0, |k| after(releases[k]));
         match releases.get(now.map_or(0, |k| k + 1)) {
@@ -184,13 +225,18 @@ mod tests {
 
     #[track_caller]
     fn holds(film: &Film, wanted_s: &[[f64; 2]]) {
-        let parts: Vec<[f64; 2]> =
-            parts(film).iter().map(|p| [film.times_s[p.start], film.times_s[p.end - 1]]).collect();
+        let parts: Vec<[f64; 2]> = parts(film)
+            .iter()
+            .map(|p| [film.times_s[p.start], film.times_s[p.end - 1]])
+            .collect();
         // Of the decay rather too little than any of the pull.
         let near = |(is, wanted): (&[f64; 2], &[f64; 2])| {
             (is[0] - wanted[0]).abs() < 0.3 && (-0.8..0.1).contains(&(is[1] - wanted[1]))
         };
-        assert!(parts.len() == wanted_s.len() && parts.iter().zip(wanted_s).all(near), "{parts:?}, not {wanted_s:?}");
+        assert!(
+            parts.len() == wanted_s.len() && parts.iter().zip(wanted_s).all(near),
+            "{parts:?}, not {wanted_s:?}"
+        );
     }
 
     /// With the second pull in it, a decay is none.
@@ -205,7 +251,10 @@ mod tests {
         }
         // Held for longer than it swings.
         let two = [[1.0, 9.0], [31.0, 9.0]];
-        holds(&film(40.0, 30.0, 0.0..0.0, |t| pulled(&two, 18.0, t)), &[[0.4, 12.0], [30.4, 40.0]]);
+        holds(
+            &film(40.0, 30.0, 0.0..0.0, |t| pulled(&two, 18.0, t)),
+            &[[0.4, 12.0], [30.4, 40.0]],
+        );
     }
 
     #[test]
@@ -216,7 +265,10 @@ mod tests {
         holds(&film(1.0, 30.0, 0.0..0.0, |t| pulled(&one, 1.0, t)), &[]);
         holds(&Film::default(), &[]);
         let mut unseen = film(20.0, 30.0, 0.0..0.0, |t| pulled(&one, 1.0, t));
-        unseen.tracks.iter_mut().for_each(|t| t.at_px.fill([f64::NAN; 2]));
+        unseen
+            .tracks
+            .iter_mut()
+            .for_each(|t| t.at_px.fill([f64::NAN; 2]));
         holds(&unseen, &[]);
     }
 
@@ -226,7 +278,10 @@ mod tests {
         let one = [[1.0, 9.0]];
         for tenths in 5..40 {
             let gap_s = f64::from(tenths) / 10.0;
-            holds(&film(20.0, 30.0, 4.0..4.0 + gap_s, |t| pulled(&one, 1.0, t)), &[]);
+            holds(
+                &film(20.0, 30.0, 4.0..4.0 + gap_s, |t| pulled(&one, 1.0, t)),
+                &[],
+            );
         }
     }
 }

@@ -1,7 +1,8 @@
 //! Signals that share damped cosines, at the times at which they were really taken.
 //!
-//! All signals share the frequencies and dampings and each has factors of its own, which come from a linear fit inside
-//! the nonlinear one (`fit.rs`). Nothing is resampled, so that gaps and uneven times cost only the frames that they lack.
+//! All signals share the frequencies and dampings and each has factors of its own, which come from
+//! a linear fit inside the nonlinear one (`fit.rs`). Nothing is resampled, so that gaps and uneven
+//! times cost only the frames that they lack.
 
 use super::columns::{Qr, dot};
 use super::decay::{Mode, Start};
@@ -11,7 +12,8 @@ use nalgebra::DMatrix;
 /// Frequencies that a search tries per factor of e, and dampings.
 const PER_E: f64 = 24.0;
 const TRIED: [f64; 3] = [0.02, 0.05, 0.1];
-/// A column of which less is left than this, when the others are taken off, adds nothing that could be told from them.
+/// A column of which less is left than this, when the others are taken off, adds nothing that could
+/// be told from them.
 const ALIKE: f64 = 0.02;
 
 /// Signals that were seen in the same frames.
@@ -64,7 +66,8 @@ impl Factor {
 }
 
 impl Signals {
-    /// `signals` hold no number where they were not seen; frequencies are looked for within `frequencies_hz`.
+    /// `signals` hold no number where they were not seen; frequencies are looked for within
+    /// `frequencies_hz`.
     pub fn new(
         times_s: Vec<f64>,
         signals: &[Vec<f64>],
@@ -74,7 +77,8 @@ impl Signals {
     ) -> Self {
         let mut groups: Vec<Group> = Vec::new();
         for (id, signal) in signals.iter().enumerate() {
-            let (seen, lacking): (Vec<usize>, Vec<usize>) = (0..times_s.len()).partition(|&k| signal[k].is_finite());
+            let (seen, lacking): (Vec<usize>, Vec<usize>) =
+                (0..times_s.len()).partition(|&k| signal[k].is_finite());
             let mut values = signal.clone();
             lacking.iter().for_each(|&k| values[k] = 0.0);
             match groups.iter_mut().find(|g| g.seen == seen) {
@@ -82,11 +86,23 @@ impl Signals {
                     group.ids.push(id);
                     group.values.push(values);
                 }
-                None => groups.push(Group { seen, lacking, ids: vec![id], values: vec![values] }),
+                None => groups.push(Group {
+                    seen,
+                    lacking,
+                    ids: vec![id],
+                    values: vec![values],
+                }),
             }
         }
         let values = groups.iter().map(|g| g.seen.len() * g.ids.len()).sum();
-        Self { times_s, start, moment_sd_s, groups, values, frequencies_hz }
+        Self {
+            times_s,
+            start,
+            moment_sd_s,
+            groups,
+            values,
+            frequencies_hz,
+        }
     }
 
     /// Columns per mode.
@@ -115,7 +131,8 @@ impl Signals {
     pub fn columns(&self, fit: &Fit) -> Vec<Vec<f64>> {
         let times = self.times_of(fit);
         let ones = std::iter::once(vec![1.0; times.len()]);
-        ones.chain(fit.modes.iter().flat_map(|m| m.columns(&times, self.start))).collect()
+        ones.chain(fit.modes.iter().flat_map(|m| m.columns(&times, self.start)))
+            .collect()
     }
 
     /// Sum of the squares that `fit` leaves.
@@ -125,7 +142,10 @@ impl Signals {
         let all = products(&columns);
         let of = |g: &Group| -> f64 {
             let factored = Factored::new(&g.products(&all, &columns), columns.len());
-            g.values.iter().map(|y| Explained::new(y, &columns, &factored).left).sum()
+            g.values
+                .iter()
+                .map(|y| Explained::new(y, &columns, &factored).left)
+                .sum()
         };
         self.groups.iter().map(of).sum()
     }
@@ -135,7 +155,8 @@ impl Signals {
         let columns = self.columns(fit);
         let slices = slices(&columns);
         let all = products(&slices);
-        // The frames that a signal lacks are 0 here: good enough for a first guess, and one set of columns serves all.
+        // The frames that a signal lacks are 0 here: good enough for a first guess, and one set of
+        // columns serves all.
         let qr = Qr::new(columns.clone());
         let of_group = |g: &Group| {
             let factored = Factored::new(&g.products(&all, &slices), slices.len());
@@ -150,15 +171,26 @@ impl Signals {
         let [lo, hi] = self.frequencies_hz;
         let n = (PER_E * (hi / lo).ln()).ceil().max(1.0) as usize;
         let frequencies_hz = (0..=n).map(|k| lo * (hi / lo).powf(k as f64 / n as f64));
-        let tried = frequencies_hz.flat_map(|frequency_hz| TRIED.map(|damping| Mode { frequency_hz, damping }));
+        let tried = frequencies_hz.flat_map(|frequency_hz| {
+            TRIED.map(|damping| Mode {
+                frequency_hz,
+                damping,
+            })
+        });
         let times = self.times_of(fit);
         let gain = |mode: &Mode| -> f64 {
             let new = mode.columns(&times, self.start);
-            // What the new columns add to the fit's: their products, and those with what is left, without the fit's.
-            let on_columns: Vec<Vec<f64>> = new.iter().map(|c| qr.q.iter().map(|q| dot(q, c)).collect()).collect();
+            // What the new columns add to the fit's: their products, and those with what is left,
+            // without the fit's.
+            let on_columns: Vec<Vec<f64>> = new
+                .iter()
+                .map(|c| qr.q.iter().map(|q| dot(q, c)).collect())
+                .collect();
             let k = new.len();
             let before = DMatrix::from_fn(k, k, |a, b| dot(&new[a], &new[b]));
-            let mut own = DMatrix::from_fn(k, k, |a, b| before[(a, b)] - dot(&on_columns[a], &on_columns[b]));
+            let mut own = DMatrix::from_fn(k, k, |a, b| {
+                before[(a, b)] - dot(&on_columns[a], &on_columns[b])
+            });
             for a in 0..k {
                 if own[(a, a)] <= ALIKE * ALIKE * before[(a, a)] {
                     own.row_mut(a).fill(0.0);
@@ -167,17 +199,22 @@ impl Signals {
             }
             let factored = Factored::new(&own, k);
             let taken = |(rest, of_rest): &(Vec<f64>, Vec<f64>)| {
-                let by: Vec<f64> = (0..k).map(|a| dot(rest, &new[a]) - dot(of_rest, &on_columns[a])).collect();
+                let by: Vec<f64> = (0..k)
+                    .map(|a| dot(rest, &new[a]) - dot(of_rest, &on_columns[a]))
+                    .collect();
                 dot(&factored.solve(&by), &by)
             };
             left.iter().map(taken).sum()
         };
         let gains = tried.map(|m| (gain(&m), m));
-        gains.filter(|(g, _)| g.is_finite() && *g > 0.0).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, m)| m)
+        gains
+            .filter(|(g, _)| g.is_finite() && *g > 0.0)
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, m)| m)
     }
 
-    /// The factors of every mode in every signal, `[signal][mode]`, with their significance; `signals` is how many were
-    /// given. Noise that is alike from frame to frame counts for less.
+    /// The factors of every mode in every signal, `[signal][mode]`, with their significance;
+    /// `signals` is how many were given. Noise that is alike from frame to frame counts for less.
     pub fn factors(&self, fit: &Fit, signals: usize) -> Vec<Vec<Factor>> {
         let columns = self.columns(fit);
         let columns = slices(&columns);
@@ -189,15 +226,21 @@ impl Signals {
             for (id, y) in g.ids.iter().zip(&g.values) {
                 let factors = Explained::new(y, &columns, &factored).factors;
                 let rest = g.rest(y, &columns, &factors);
-                let noise = dot(&rest, &rest) / (g.seen.len().saturating_sub(factors.len()) as f64).max(1.0);
+                let noise = dot(&rest, &rest)
+                    / (g.seen.len().saturating_sub(factors.len()) as f64).max(1.0);
                 let inflation = inflation(&rest);
                 for (m, factor) in out[*id].iter_mut().enumerate() {
                     let own = self.columns_of(m);
                     let f = &factors[own.clone()];
                     factor.cosine = f[0];
                     factor.sine = f.get(1).copied().unwrap_or(0.0);
-                    let over =
-                        |(f, v): (&f64, &f64)| if *v > 0.0 { f * f / (v * noise * inflation).max(1e-30) } else { 0.0 };
+                    let over = |(f, v): (&f64, &f64)| {
+                        if *v > 0.0 {
+                            f * f / (v * noise * inflation).max(1e-30)
+                        } else {
+                            0.0
+                        }
+                    };
                     factor.significance = f.iter().zip(&variances[own]).map(over).sum();
                 }
             }
@@ -231,7 +274,8 @@ impl Explained {
 }
 
 impl Group {
-    /// Products of columns over the frames in which the signals were seen, from those over `all` frames.
+    /// Products of columns over the frames in which the signals were seen, from those over `all`
+    /// frames.
     pub fn products(&self, all: &DMatrix<f64>, columns: &[&[f64]]) -> DMatrix<f64> {
         products_without(all, columns, &self.lacking)
     }
@@ -240,17 +284,24 @@ impl Group {
     pub fn rest(&self, y: &[f64], columns: &[&[f64]], factors: &[f64]) -> Vec<f64> {
         let mut rest = y.to_vec();
         for (column, factor) in columns.iter().zip(factors) {
-            rest.iter_mut().zip(*column).for_each(|(r, c)| *r -= factor * c);
+            rest.iter_mut()
+                .zip(*column)
+                .for_each(|(r, c)| *r -= factor * c);
         }
         self.lacking.iter().for_each(|&k| rest[k] = 0.0);
         rest
     }
 }
 
-/// How much less values count that are alike from frame to frame: (1 + r) / (1 - r) by their correlation r.
+/// How much less values count that are alike from frame to frame: (1 + r) / (1 - r) by their
+/// correlation r.
 fn inflation(rest: &[f64]) -> f64 {
     let squares = dot(rest, rest);
     let pairs: f64 = rest.windows(2).map(|w| w[0] * w[1]).sum();
-    let r = if squares > 0.0 { (pairs / squares).clamp(0.0, 0.97) } else { 0.0 };
+    let r = if squares > 0.0 {
+        (pairs / squares).clamp(0.0, 0.97)
+    } else {
+        0.0
+    };
     (1.0 + r) / (1.0 - r)
 }

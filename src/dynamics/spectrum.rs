@@ -14,9 +14,10 @@ pub struct Spectrum {
     pub amplitude: Vec<f64>,
 }
 
-/// Amplitude spectrum by FFT of `values` at `times_s`, its mean taken off, drawn with four times as many points as the
-/// film's length allows to tell apart. Values that are no numbers are left out. For the eye and as a reference: the FFT
-/// needs even times, so that what is missing is drawn straight between its neighbours. `None` for less than 32 values.
+/// Amplitude spectrum by FFT of `values` at `times_s`, its mean taken off, drawn with four times as
+/// many points as the film's length allows to tell apart. Values that are no numbers are left out.
+/// For the eye and as a reference: the FFT needs even times, so that what is missing is drawn
+/// straight between its neighbours. `None` for less than 32 values.
 pub fn spectrum(times_s: &[f64], values: &[f64]) -> Option<Spectrum> {
     let mut last = f64::NEG_INFINITY;
     let seen = times_s.iter().zip(values).filter(|(t, x)| {
@@ -31,20 +32,26 @@ pub fn spectrum(times_s: &[f64], values: &[f64]) -> Option<Spectrum> {
     }
     let mut signal = even_grid(&times, &seen);
     let mean = signal.iter().sum::<f64>() / n as f64;
-    signal.iter_mut().for_each(|x| *x = 2.0 * (*x - mean) / n as f64);
+    signal
+        .iter_mut()
+        .for_each(|x| *x = 2.0 * (*x - mean) / n as f64);
     let padded = (4 * n).next_power_of_two();
     signal.resize(padded, 0.0);
     let fft = RealFftPlanner::<f64>::new().plan_fft_forward(padded);
     let mut out = fft.make_output_vec();
     fft.process(&mut signal, &mut out).ok()?;
     let bin_hz = (n - 1) as f64 / (times[n - 1] - times[0]) / padded as f64;
-    Some(Spectrum { bin_hz, amplitude: out.iter().map(|c| c.norm()).collect() })
+    Some(Spectrum {
+        bin_hz,
+        amplitude: out.iter().map(|c| c.norm()).collect(),
+    })
 }
 
 impl Spectrum {
-    /// Frequency (Hz) of the largest peak within `[lowest, highest]` and its half-power damping ratio: width of the peak
-    /// at 1/√2 of its amplitude over twice its frequency (002 eq. 6). The width of a short film's bin comes on top of
-    /// the tree's, so that it errs to the high side. `None` where there is no peak, or one that does not come down.
+    /// Frequency (Hz) of the largest peak within `[lowest, highest]` and its half-power damping
+    /// ratio: width of the peak at 1/√2 of its amplitude over twice its frequency (002 eq. 6). The
+    /// width of a short film's bin comes on top of the tree's, so that it errs to the high side.
+    /// `None` where there is no peak, or one that does not come down.
     pub fn half_power(&self, [lowest_hz, highest_hz]: [f64; 2]) -> Option<(f64, f64)> {
         let a = &self.amplitude;
         let last = ((highest_hz / self.bin_hz) as usize).min(a.len().saturating_sub(2));
@@ -59,7 +66,10 @@ impl Spectrum {
         let left = (0..peak).rev().find(|&k| a[k] < level)?;
         let right = (right - 1) as f64 + between(right - 1, right);
         let left = (left + 1) as f64 - between(left + 1, left);
-        Some((peak as f64 * self.bin_hz, (right - left) / (2.0 * peak as f64)))
+        Some((
+            peak as f64 * self.bin_hz,
+            (right - left) / (2.0 * peak as f64),
+        ))
     }
 }
 
@@ -75,7 +85,11 @@ fn even_grid(times_s: &[f64], values: &[f64]) -> Vec<f64> {
                 j += 1;
             }
             let width = times_s[j + 1] - times_s[j];
-            let share = if width > 0.0 { ((t - times_s[j]) / width).clamp(0.0, 1.0) } else { 0.0 };
+            let share = if width > 0.0 {
+                ((t - times_s[j]) / width).clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
             values[j] + share * (values[j + 1] - values[j])
         })
         .collect()
@@ -90,14 +104,31 @@ mod tests {
         for (hz, damping) in [(0.7, 0.05), (2.0, 0.03)] {
             let times: Vec<f64> = (0..1800).map(|k| f64::from(k) / 30.0).collect();
             let w = std::f64::consts::TAU * hz;
-            let values: Vec<f64> = times.iter().map(|t| 3.0 + (-damping * w * t).exp() * (w * t).cos()).collect();
-            let (found_hz, found) = spectrum(&times, &values).unwrap().half_power([0.2, 5.0]).unwrap();
-            assert!((found_hz / hz - 1.0).abs() < 0.01, "{found_hz} Hz, not {hz}");
-            assert!((found / damping - 1.0).abs() < 0.15, "{found}, not {damping}");
+            let values: Vec<f64> = times
+                .iter()
+                .map(|t| 3.0 + (-damping * w * t).exp() * (w * t).cos())
+                .collect();
+            let (found_hz, found) = spectrum(&times, &values)
+                .unwrap()
+                .half_power([0.2, 5.0])
+                .unwrap();
+            assert!(
+                (found_hz / hz - 1.0).abs() < 0.01,
+                "{found_hz} Hz, not {hz}"
+            );
+            assert!(
+                (found / damping - 1.0).abs() < 0.15,
+                "{found}, not {damping}"
+            );
         }
         let flat = spectrum(&[0.0; 64], &[1.0; 64]);
         assert!(flat.is_none(), "times that stand still");
         let constant: Vec<f64> = (0..64).map(f64::from).collect();
-        assert_eq!(spectrum(&constant, &[1.0; 64]).unwrap().half_power([0.05, 0.4]), None);
+        assert_eq!(
+            spectrum(&constant, &[1.0; 64])
+                .unwrap()
+                .half_power([0.05, 0.4]),
+            None
+        );
     }
 }

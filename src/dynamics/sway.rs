@@ -24,7 +24,8 @@ pub struct Analysis {
     pub sway: Vec<Swaying>,
     /// What made the tree sway; `None` where there is too little film to tell.
     pub onset: Option<Onset>,
-    /// When it was let go, s, where that was more than once: the answers are of one of them, the onset's.
+    /// When it was let go, s, where that was more than once: the answers are of one of them, the
+    /// onset's.
     pub releases_s: Vec<f64>,
 }
 
@@ -35,24 +36,59 @@ pub fn analyse(skeleton: &Skeleton, film: &Film, config: &Dynamics) -> Analysis 
     analyse_with(skeleton, film, config, &|| true)
 }
 
-/// The same; `go_on` is asked before every branch, as many of them take a while: those that are left when it says no are
-/// [`Unidentified::NotInTime`].
-pub fn analyse_with(skeleton: &Skeleton, film: &Film, config: &Dynamics, go_on: &dyn Fn() -> bool) -> Analysis {
+/// The same; `go_on` is asked before every branch, as many of them take a while: those that are
+/// left when it says no are [`Unidentified::NotInTime`].
+pub fn analyse_with(
+    skeleton: &Skeleton,
+    film: &Film,
+    config: &Dynamics,
+    go_on: &dyn Fn() -> bool,
+) -> Analysis {
     looked_at(skeleton, film, config, true, go_on)
 }
 
-/// The same in a time that a screen can wait for: one branch after the other, and not all of them at once besides, which takes
-/// several times as long and answers for a few more.
-pub fn analyse_soon(skeleton: &Skeleton, film: &Film, config: &Dynamics, go_on: &dyn Fn() -> bool) -> Analysis {
+/// The same in a time that a screen can wait for: one branch after the other, and not all of them
+/// at once besides, which takes several times as long and answers for a few more.
+pub fn analyse_soon(
+    skeleton: &Skeleton,
+    film: &Film,
+    config: &Dynamics,
+    go_on: &dyn Fn() -> bool,
+) -> Analysis {
     looked_at(skeleton, film, config, false, go_on)
 }
 
-fn looked_at(skeleton: &Skeleton, film: &Film, config: &Dynamics, at_once: bool, go_on: &dyn Fn() -> bool) -> Analysis {
-    let Some(Begun { members, onset, releases_s, demands, film }) = begun(skeleton, film, config) else {
-        let of = |m: &Vec<usize>| Err(if m.is_empty() { Unidentified::NotMeasured } else { Unidentified::TooShort });
+fn looked_at(
+    skeleton: &Skeleton,
+    film: &Film,
+    config: &Dynamics,
+    at_once: bool,
+    go_on: &dyn Fn() -> bool,
+) -> Analysis {
+    let Some(Begun {
+        members,
+        onset,
+        releases_s,
+        demands,
+        film,
+    }) = begun(skeleton, film, config)
+    else {
+        let of = |m: &Vec<usize>| {
+            Err(if m.is_empty() {
+                Unidentified::NotMeasured
+            } else {
+                Unidentified::TooShort
+            })
+        };
         let mut sway: Vec<Swaying> = members(skeleton, film).iter().map(of).collect();
-        sway.iter_mut().take(1).for_each(|foot| *foot = Err(Unidentified::NotMeasured));
-        return Analysis { sway, onset: None, releases_s: Vec::new() };
+        sway.iter_mut()
+            .take(1)
+            .for_each(|foot| *foot = Err(Unidentified::NotMeasured));
+        return Analysis {
+            sway,
+            onset: None,
+            releases_s: Vec::new(),
+        };
     };
     let sway = match onset.excitation {
         Excitation::Release => {
@@ -64,7 +100,11 @@ fn looked_at(skeleton: &Skeleton, film: &Film, config: &Dynamics, at_once: bool,
         }
         Excitation::Wind => wind::sways(skeleton, &film, &members, &demands, go_on),
     };
-    Analysis { sway, onset: Some(onset), releases_s }
+    Analysis {
+        sway,
+        onset: Some(onset),
+        releases_s,
+    }
 }
 
 /// A film that is long enough to be looked at, and what made its tree sway.
@@ -79,7 +119,11 @@ pub(super) struct Begun<'a> {
 }
 
 /// `None` where there is too little film.
-pub(super) fn begun<'a>(skeleton: &Skeleton, film: &'a Film, config: &Dynamics) -> Option<Begun<'a>> {
+pub(super) fn begun<'a>(
+    skeleton: &Skeleton,
+    film: &'a Film,
+    config: &Dynamics,
+) -> Option<Begun<'a>> {
     if film.times_s.len() < LEAST_FRAMES || film.span_s() <= 0.0 {
         return None;
     }
@@ -88,17 +132,32 @@ pub(super) fn begun<'a>(skeleton: &Skeleton, film: &'a Film, config: &Dynamics) 
     if frequencies_hz[0] >= frequencies_hz[1] {
         return None;
     }
-    let demands = Demands { frequencies_hz, highest_hz: config.highest_hz, widest: config.widest };
+    let demands = Demands {
+        frequencies_hz,
+        highest_hz: config.highest_hz,
+        widest: config.widest,
+    };
     let given = match config.excitation {
         Excited::Auto => None,
         Excited::Release => Some(Excitation::Release),
         Excited::Wind => Some(Excitation::Wind),
     };
     let members = members(skeleton, film);
-    let (onset, releases_s) = onset(film, members.get(1).map_or(&[], Vec::as_slice), given, frequencies_hz);
+    let (onset, releases_s) = onset(
+        film,
+        members.get(1).map_or(&[], Vec::as_slice),
+        given,
+        frequencies_hz,
+    );
     let film = film.until(onset.to);
     if film.times_s.len() - onset.from < LEAST_FRAMES {
         return None;
     }
-    Some(Begun { members, onset, releases_s, demands, film })
+    Some(Begun {
+        members,
+        onset,
+        releases_s,
+        demands,
+        film,
+    })
 }

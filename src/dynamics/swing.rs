@@ -14,17 +14,28 @@ type Factors = [f64; 4];
 
 impl Arms {
     pub fn new(film: &Film, points: &Points, from: usize, base_px: [f64; 2]) -> Self {
-        Self::at(points.tracks.iter().map(|k| mean_px(&film.tracks[*k].at_px[from..])), base_px)
+        Self::at(
+            points
+                .tracks
+                .iter()
+                .map(|k| mean_px(&film.tracks[*k].at_px[from..])),
+            base_px,
+        )
     }
 
     /// Of points at `at_px`.
     pub fn at(at_px: impl Iterator<Item = [f64; 2]>, base_px: [f64; 2]) -> Self {
-        Self(at_px.map(|at| [at[0] - base_px[0], at[1] - base_px[1]]).collect())
+        Self(
+            at_px
+                .map(|at| [at[0] - base_px[0], at[1] - base_px[1]])
+                .collect(),
+        )
     }
 
-    /// How much mode `m` of `factors` (of u and v of each point in turn) is one swing, 0 to 1: all points in one direction, as
-    /// the length of the sum of their factors to the sum of the lengths; or a turn about the base, as its share of the
-    /// squares; whichever is more. Points of several branches do neither.
+    /// How much mode `m` of `factors` (of u and v of each point in turn) is one swing, 0 to 1: all
+    /// points in one direction, as the length of the sum of their factors to the sum of the
+    /// lengths; or a turn about the base, as its share of the squares; whichever is more. Points of
+    /// several branches do neither.
     pub fn one_swing(&self, factors: &[Vec<Factor>], m: usize) -> f64 {
         let (mut sum, mut lengths, mut squares) = ([0.0; 4], 0.0, 0.0);
         for f in of(factors, m) {
@@ -36,14 +47,22 @@ impl Arms {
             return 0.0;
         }
         let (turn, arms) = self.turn(factors, m);
-        let as_turn = if arms > 0.0 { (turn[0] * turn[0] + turn[1] * turn[1]) / (arms * squares) } else { 0.0 };
+        let as_turn = if arms > 0.0 {
+            (turn[0] * turn[0] + turn[1] * turn[1]) / (arms * squares)
+        } else {
+            0.0
+        };
         as_turn.max(square(&sum).sqrt() / lengths)
     }
 
     /// The turn about the base that fits the mode's factors best, degrees.
     pub fn amplitude_deg(&self, factors: &[Vec<Factor>], m: usize) -> f64 {
         let (turn, arms) = self.turn(factors, m);
-        if arms > 0.0 { (turn[0].hypot(turn[1]) / arms).to_degrees() } else { f64::NAN }
+        if arms > 0.0 {
+            (turn[0].hypot(turn[1]) / arms).to_degrees()
+        } else {
+            f64::NAN
+        }
     }
 
     /// Of cosine and sine, times the squares of the arms; and those.
@@ -58,13 +77,15 @@ impl Arms {
     }
 }
 
-/// How much `signals` (of u and v of each point in turn) are one motion in time that every point makes by a lever of its own, as
-/// a share of the squares; and the share of the points that have more than a trace of it, all the same way.
+/// How much `signals` (of u and v of each point in turn) are one motion in time that every point
+/// makes by a lever of its own, as a share of the squares; and the share of the points that have
+/// more than a trace of it, all the same way.
 pub(super) fn levers(signals: &[Vec<f64>]) -> (f64, f64) {
     const TRACE: f64 = 0.3;
     let points: Vec<&[Vec<f64>]> = signals.chunks_exact(2).collect();
     let n = points.len();
-    let product = |a: usize, b: usize| dot(&points[a][0], &points[b][0]) + dot(&points[a][1], &points[b][1]);
+    let product =
+        |a: usize, b: usize| dot(&points[a][0], &points[b][0]) + dot(&points[a][1], &points[b][1]);
     let products = DMatrix::from_fn(n, n, |a, b| product(a.max(b), a.min(b)));
     let all = products.trace();
     if n == 0 || all <= 0.0 || !all.is_finite() {
@@ -74,12 +95,22 @@ pub(super) fn levers(signals: &[Vec<f64>]) -> (f64, f64) {
     let first = eigen.eigenvalues.imax();
     let lever = eigen.eigenvectors.column(first);
     let least = TRACE * lever.sum().signum() / (n as f64).sqrt();
-    let has = lever.iter().filter(|l| **l * least.signum() > least.abs()).count();
+    let has = lever
+        .iter()
+        .filter(|l| **l * least.signum() > least.abs())
+        .count();
     (eigen.eigenvalues[first] / all, has as f64 / n as f64)
 }
 
 fn of(factors: &[Vec<Factor>], m: usize) -> impl Iterator<Item = Factors> {
-    factors.chunks_exact(2).map(move |uv| [uv[0][m].cosine, uv[0][m].sine, uv[1][m].cosine, uv[1][m].sine])
+    factors.chunks_exact(2).map(move |uv| {
+        [
+            uv[0][m].cosine,
+            uv[0][m].sine,
+            uv[1][m].cosine,
+            uv[1][m].sine,
+        ]
+    })
 }
 
 fn square(f: &Factors) -> f64 {
@@ -92,24 +123,42 @@ mod tests {
 
     /// Points at `arms` that are moved by so much to the right and down.
     fn one_swing(arms: &[[f64; 2]], moved: &[[f64; 2]]) -> f64 {
-        let factor = |cosine: f64| vec![Factor { cosine, ..Factor::default() }];
+        let factor = |cosine: f64| {
+            vec![Factor {
+                cosine,
+                ..Factor::default()
+            }]
+        };
         let factors: Vec<Vec<Factor>> = moved.iter().flatten().map(|x| factor(*x)).collect();
         Arms(arms.to_vec()).one_swing(&factors, 0)
     }
 
-    /// A crown on its trunk turns about the foot: to the right above it, down on its right, up on its left.
+    /// A crown on its trunk turns about the foot: to the right above it, down on its right, up on
+    /// its left.
     #[test]
     fn a_turn_is_one_swing_however_the_points_lie_about_the_base() {
-        let arms = [[0.0, -90.0], [60.0, -50.0], [-70.0, -40.0], [10.0, -120.0], [5.0, -10.0]];
+        let arms = [
+            [0.0, -90.0],
+            [60.0, -50.0],
+            [-70.0, -40.0],
+            [10.0, -120.0],
+            [5.0, -10.0],
+        ];
         let turned = arms.map(|[u, v]| [-0.05 * v, 0.05 * u]);
         assert!(one_swing(&arms, &turned) > 0.999);
     }
 
-    /// A branch that swings towards the camera shows little but its arc, which is no turn in the picture.
+    /// A branch that swings towards the camera shows little but its arc, which is no turn in the
+    /// picture.
     #[test]
     fn one_direction_is_one_swing_wherever_the_base_is() {
         let arms = [[40.0, 0.0], [60.0, 2.0], [80.0, -1.0], [100.0, 0.0]];
-        assert!(one_swing(&arms, &[[-1.0, 0.1], [-1.6, 0.0], [-2.0, -0.1], [-2.4, 0.2]]) > 0.95);
+        assert!(
+            one_swing(
+                &arms,
+                &[[-1.0, 0.1], [-1.6, 0.0], [-2.0, -0.1], [-2.4, 0.2]]
+            ) > 0.95
+        );
     }
 
     #[test]
@@ -120,19 +169,31 @@ mod tests {
         assert_eq!(one_swing(&arms, &[[0.0; 2]; 4]), 0.0);
     }
 
-    /// In wind a branch swings both ways at once: its points go along with it, each as far as it is from the base.
+    /// In wind a branch swings both ways at once: its points go along with it, each as far as it is
+    /// from the base.
     #[test]
     fn points_that_move_alike_in_time_are_one_swing_and_those_of_two_branches_are_not() {
-        let wave = |hz: f64| (0..600).map(|k| (hz * 0.1 * f64::from(k)).sin()).collect::<Vec<f64>>();
+        let wave = |hz: f64| {
+            (0..600)
+                .map(|k| (hz * 0.1 * f64::from(k)).sin())
+                .collect::<Vec<f64>>()
+        };
         let ways = [wave(1.0), wave(1.37), wave(1.71), wave(0.83)];
-        let moved = |lever: f64, way: usize| ways[way].iter().map(|x| lever * x).collect::<Vec<f64>>();
+        let moved =
+            |lever: f64, way: usize| ways[way].iter().map(|x| lever * x).collect::<Vec<f64>>();
         let branch = |n: usize, way: usize| {
-            (1..=n).flat_map(|i| [moved(i as f64, way), moved(0.5 * i as f64, way + 1)]).collect::<Vec<_>>()
+            (1..=n)
+                .flat_map(|i| [moved(i as f64, way), moved(0.5 * i as f64, way + 1)])
+                .collect::<Vec<_>>()
         };
         let (one_swing, shared) = levers(&branch(4, 0));
         assert!(one_swing > 0.999 && shared >= 0.75, "{one_swing}, {shared}");
         let two = [branch(4, 0), branch(4, 2)].concat();
-        assert!(levers(&two).0 < 0.7 && levers(&two).1 < 0.75, "{:?}", levers(&two));
+        assert!(
+            levers(&two).0 < 0.7 && levers(&two).1 < 0.75,
+            "{:?}",
+            levers(&two)
+        );
         assert_eq!(levers(&[]), (0.0, 0.0));
     }
 }

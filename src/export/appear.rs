@@ -1,4 +1,5 @@
-//! Things that appear under their name only when they are complete: what files and folders have in common.
+//! Things that appear under their name only when they are complete: what files and folders have in
+//! common.
 
 use super::ExportError;
 use std::ffi::CString;
@@ -7,8 +8,9 @@ use std::io;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
-/// A place that is not taken. Until it appears, the thing lies hidden beside it as `.NAME.partial-PID`, so that appearing
-/// is one rename on one file system. Dropped before [`Place::keep`], it leaves nothing behind.
+/// A place that is not taken. Until it appears, the thing lies hidden beside it as
+/// `.NAME.partial-PID`, so that appearing is one rename on one file system. Dropped before
+/// [`Place::keep`], it leaves nothing behind.
 #[derive(Debug)]
 pub(super) struct Place {
     path: PathBuf,
@@ -21,8 +23,8 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// Makes the thing hidden, by `make`, which must fail where there is something already, and the folders above it where
-    /// they are missing. `remove` takes it away again.
+    /// Makes the thing hidden, by `make`, which must fail where there is something already, and the
+    /// folders above it where they are missing. `remove` takes it away again.
     ///
     /// # Errors
     /// `path` is taken or is no name, part of it is a file, or it may not be written there.
@@ -33,14 +35,28 @@ impl Place {
     ) -> Result<Self, ExportError> {
         refuse_taken(path)?;
         let failed = |e: io::Error| ExportError::from_io(path.display().to_string(), 0, e);
-        let no_name = || ExportError::NotAFolder { path: path.to_path_buf() };
-        let name = path.file_name().ok_or_else(no_name)?.to_string_lossy().into_owned();
+        let no_name = || ExportError::NotAFolder {
+            path: path.to_path_buf(),
+        };
+        let name = path
+            .file_name()
+            .ok_or_else(no_name)?
+            .to_string_lossy()
+            .into_owned();
         let above = above(path);
-        let missing = above.ancestors().take_while(|a| !a.as_os_str().is_empty() && !a.exists());
+        let missing = above
+            .ancestors()
+            .take_while(|a| !a.as_os_str().is_empty() && !a.exists());
         let mut made: Vec<PathBuf> = missing.map(Path::to_path_buf).collect();
         made.reverse();
         // From here on a failure must take away what was made, which is what dropping does.
-        let mut place = Self { path: path.to_path_buf(), at: PathBuf::new(), made, remove, kept: false };
+        let mut place = Self {
+            path: path.to_path_buf(),
+            at: PathBuf::new(),
+            made,
+            remove,
+            kept: false,
+        };
         fs::create_dir_all(above).map_err(|e| match e.kind() {
             io::ErrorKind::AlreadyExists | io::ErrorKind::NotADirectory => no_name(),
             _ => failed(e),
@@ -78,7 +94,8 @@ impl Place {
     pub fn appear(&mut self) -> io::Result<()> {
         rename_new(&self.at, &self.path)?;
         self.at.clone_from(&self.path);
-        // The rename itself is on the disk once the folder above is; some file systems cannot sync folders.
+        // The rename itself is on the disk once the folder above is; some file systems cannot sync
+        // folders.
         let _ = File::open(above(&self.path)).and_then(|f| f.sync_all());
         Ok(())
     }
@@ -109,14 +126,18 @@ impl Drop for Place {
 pub fn refuse_taken(path: &Path) -> Result<(), ExportError> {
     // Not `exists()`: that is false for a link to nowhere.
     match fs::symlink_metadata(path) {
-        Ok(_) => Err(ExportError::Exists { path: path.to_path_buf() }),
+        Ok(_) => Err(ExportError::Exists {
+            path: path.to_path_buf(),
+        }),
         Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(()),
         Err(e) => Err(ExportError::from_io(path.display().to_string(), 0, e)),
     }
 }
 
 fn above(path: &Path) -> &Path {
-    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+    path.parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."))
 }
 
 /// Renames without ever replacing what has taken the name meanwhile.
@@ -125,13 +146,22 @@ fn rename_new(from: &Path, to: &Path) -> io::Result<()> {
     let (from_c, to_c) = (c_string(from)?, c_string(to)?);
     let here = libc::AT_FDCWD;
     // SAFETY: both are strings that end with a zero, and outlive the call, which keeps neither.
-    let done = unsafe { libc::renameat2(here, from_c.as_ptr(), here, to_c.as_ptr(), libc::RENAME_NOREPLACE) };
+    let done = unsafe {
+        libc::renameat2(
+            here,
+            from_c.as_ptr(),
+            here,
+            to_c.as_ptr(),
+            libc::RENAME_NOREPLACE,
+        )
+    };
     if done == 0 {
         return Ok(());
     }
     let e = io::Error::last_os_error();
     match e.raw_os_error() {
-        // Not every file system can; there a moment remains in which another file would be replaced.
+        // Not every file system can; there a moment remains in which another file would be
+        // replaced.
         Some(libc::EINVAL | libc::ENOSYS) if fs::symlink_metadata(to).is_ok() => {
             Err(io::ErrorKind::AlreadyExists.into())
         }
@@ -151,7 +181,10 @@ mod tests {
         let at = |name: &str| dir.path().join(name);
         fs::write(at("mine"), "mine").unwrap();
         fs::write(at("theirs"), "theirs").unwrap();
-        assert_eq!(rename_new(&at("mine"), &at("theirs")).unwrap_err().kind(), io::ErrorKind::AlreadyExists);
+        assert_eq!(
+            rename_new(&at("mine"), &at("theirs")).unwrap_err().kind(),
+            io::ErrorKind::AlreadyExists
+        );
         assert_eq!(fs::read(at("theirs")).unwrap(), b"theirs");
         // An ordinary rename replaces an empty folder in silence.
         fs::create_dir(at("my folder")).unwrap();

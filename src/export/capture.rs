@@ -1,4 +1,5 @@
-//! `capture.json`: what was filmed, with what, how well. No date of today, so that a replay gives the same file.
+//! `capture.json`: what was filmed, with what, how well. No date of today, so that a replay gives
+//! the same file.
 
 use super::ExportError;
 use crate::config::Config;
@@ -15,7 +16,8 @@ pub const MAX_GAPS: usize = 1000;
 pub struct Capture {
     pub schema_version: u32,
     pub software: Software,
-    /// When the capture began, RFC 3339, if the caller wants it in the file; a replay leaves it out.
+    /// When the capture began, RFC 3339, if the caller wants it in the file; a replay leaves it
+    /// out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub captured_at: Option<String>,
     pub source: Source,
@@ -47,7 +49,10 @@ pub struct Software {
 
 impl Default for Software {
     fn default() -> Self {
-        Self { name: "arborcam".into(), version: env!("CARGO_PKG_VERSION").into() }
+        Self {
+            name: "arborcam".into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+        }
     }
 }
 
@@ -70,8 +75,9 @@ pub struct Timing {
     pub nominal_rate_hz: Option<f64>,
     pub measured_rate_hz: Option<f64>,
     pub frames_seen: u64,
-    /// Lost before us: what is to be believed of the two counts that follow. The driver's numbers where it numbers its
-    /// frames; the times where it does not, starts anew, or numbers only what it delivers.
+    /// Lost before us: what is to be believed of the two counts that follow. The driver's numbers
+    /// where it numbers its frames; the times where it does not, starts anew, or numbers only what
+    /// it delivers.
     pub frames_dropped_camera: u64,
     /// Holes in the driver's numbers; `None` where it does not number its frames.
     #[serde(default)]
@@ -85,8 +91,9 @@ pub struct Timing {
     /// Came with a time that was not later than the one before, and were left out.
     #[serde(default)]
     pub frames_stale: u64,
-    /// What the times are by: `file`, `monotonic` (the system's clock, read by the driver), `copied` (from whoever feeds
-    /// the device), `unknown`, or `received` (the moment of reception).
+    /// What the times are by: `file`, `monotonic` (the system's clock, read by the driver),
+    /// `copied` (from whoever feeds the device), `unknown`, or `received` (the moment of
+    /// reception).
     #[serde(default)]
     pub clock: String,
     /// How often the camera was lost and came back, and for how long it was away, s.
@@ -126,7 +133,8 @@ pub struct Gap {
     /// The last frame before the hole, and its time, s.
     pub after_frame: u64,
     pub time_s: f64,
-    /// Number of frames missing; where the camera was away, as many as it would have delivered, and 0 where it did not come back.
+    /// Number of frames missing; where the camera was away, as many as it would have delivered, and
+    /// 0 where it did not come back.
     pub missing: u64,
     #[serde(default)]
     pub cause: GapCause,
@@ -188,7 +196,8 @@ pub struct Refinement {
     /// The accumulation measure at that time, 0 to 1.
     pub accumulation: f64,
     pub moving_points: u32,
-    /// First frame in which the screen and the stream showed this tree; the tables have it in all frames.
+    /// First frame in which the screen and the stream showed this tree; the tables have it in all
+    /// frames.
     pub shown_from: u64,
     /// Measured nodes that were in the tree before, and kept their numbers.
     pub nodes_kept: u32,
@@ -198,21 +207,24 @@ pub struct Refinement {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
     pub tracks_total: u64,
-    /// Candidates that turned out not to be points that can be followed; they are not in the tables.
+    /// Candidates that turned out not to be points that can be followed; they are not in the
+    /// tables.
     #[serde(default)]
     pub tracks_rejected: u64,
     pub tracks_alive_end: u64,
     /// Distance by which tracking forward and back misses the start, px.
     pub median_fb_error_px: Option<f64>,
-    /// How far a point is expected to be from the one that it was when it was found, by its likeness to that and by what
-    /// its neighbours say, px: the median over the frames of the median over the points.
+    /// How far a point is expected to be from the one that it was when it was found, by its
+    /// likeness to that and by what its neighbours say, px: the median over the frames of the
+    /// median over the points.
     #[serde(default)]
     pub median_error_px: Option<f64>,
     pub lost_per_s: Option<f64>,
     /// How sure the forks of the tree are, 0 to 1: the median over the forks.
     #[serde(default)]
     pub median_certainty: Option<f64>,
-    /// Median distance between where the points put a node in the picture and where the 3D pose does, px.
+    /// Median distance between where the points put a node in the picture and where the 3D pose
+    /// does, px.
     pub median_reprojection_px: Option<f64>,
 }
 
@@ -229,10 +241,12 @@ pub struct ModelNote {
     pub metres_per_px: f64,
     /// The trunk's foot in the picture, px: the origin of the model.
     pub foot_px: [f64; 2],
-    /// What the push out of the picture's plane has achieved; `None` in a capture of an older version.
+    /// What the push out of the picture's plane has achieved; `None` in a capture of an older
+    /// version.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub push: Option<crate::shape::PushFigures>,
-    /// What every copy repeats; by their numbers in `nodes.csv`. Empty in captures of older versions.
+    /// What every copy repeats; by their numbers in `nodes.csv`. Empty in captures of older
+    /// versions.
     #[serde(default)]
     pub copied: Vec<Copied>,
 }
@@ -252,12 +266,17 @@ impl ModelNote {
         let nodes = skeleton.nodes.len();
         let copied = skeleton.nodes.iter().filter_map(|n| {
             let original = skeleton.name_of(n.copy_of?)?.0;
-            Some(Copied { node: n.name.0, original, plane_angle_deg: n.plane_angle.to_degrees() })
+            Some(Copied {
+                node: n.name.0,
+                original,
+                plane_angle_deg: n.plane_angle.to_degrees(),
+            })
         });
         Self {
             nodes: nodes as u32,
             copies: (nodes - skeleton.measured()) as u32,
-            axes: "x right, y up, z towards the viewer, right-handed; origin at the trunk's foot".into(),
+            axes: "x right, y up, z towards the viewer, right-handed; origin at the trunk's foot"
+                .into(),
             unit: if metres_per_px > 0.0 { "m" } else { "px" }.into(),
             metres_per_px,
             foot_px: skeleton.foot_px,
@@ -273,7 +292,8 @@ pub struct AnimationNote {
     /// Frame that stands at time 0 of the animation.
     pub first_frame: u64,
     pub frames: u64,
-    /// Rotation keys that were left after thinning, and how many there were before: a key a joint that moves and frame.
+    /// Rotation keys that were left after thinning, and how many there were before: a key a joint
+    /// that moves and frame.
     pub keys: u64,
     #[serde(default)]
     pub raw_keys: u64,
@@ -284,7 +304,8 @@ pub struct AnimationNote {
 /// # Errors
 /// None in practice: every field has a JSON form.
 pub fn json(capture: &Capture) -> Result<Vec<u8>, ExportError> {
-    let mut text = serde_json::to_vec_pretty(capture).map_err(|e| ExportError::unfit(e.to_string()))?;
+    let mut text =
+        serde_json::to_vec_pretty(capture).map_err(|e| ExportError::unfit(e.to_string()))?;
     text.push(b'\n');
     Ok(text)
 }

@@ -1,6 +1,7 @@
 //! `tracks.csv`, `nodes.csv` and `motion.csv` over any writer, row by row.
 //!
-//! Times are seconds with up to 6 decimals, pixels up to 3, lengths in the model up to 4. Unknown is an empty cell.
+//! Times are seconds with up to 6 decimals, pixels up to 3, lengths in the model up to 4. Unknown
+//! is an empty cell.
 
 use super::sway::cells;
 use super::{ExportError, number};
@@ -27,8 +28,16 @@ pub(super) struct Table<W: Write> {
 impl<W: Write> Table<W> {
     pub(super) fn new(what: &'static str, header: &str, out: W) -> Result<Self, ExportError> {
         let out = ::csv::Writer::from_writer(out);
-        let mut table = Self { what, out, row: ::csv::StringRecord::new(), cell: String::new(), bytes: 0 };
-        header.split(',').for_each(|name| table.row.push_field(name));
+        let mut table = Self {
+            what,
+            out,
+            row: ::csv::StringRecord::new(),
+            cell: String::new(),
+            bytes: 0,
+        };
+        header
+            .split(',')
+            .for_each(|name| table.row.push_field(name));
         table.end_row()?;
         Ok(table)
     }
@@ -59,14 +68,21 @@ impl<W: Write> Table<W> {
         self.row.clear();
         written.map_err(|e| match e.into_kind() {
             ::csv::ErrorKind::Io(e) => ExportError::from_io(self.what, self.bytes, e),
-            other => ExportError::Io { what: self.what.into(), source: std::io::Error::other(format!("{other:?}")) },
+            other => ExportError::Io {
+                what: self.what.into(),
+                source: std::io::Error::other(format!("{other:?}")),
+            },
         })
     }
 
     pub(super) fn finish(mut self) -> Result<W, ExportError> {
         let (what, bytes) = (self.what, self.bytes);
-        self.out.flush().map_err(|e| ExportError::from_io(what, bytes, e))?;
-        self.out.into_inner().map_err(|e| ExportError::from_io(what, bytes, std::io::Error::other(e.to_string())))
+        self.out
+            .flush()
+            .map_err(|e| ExportError::from_io(what, bytes, e))?;
+        self.out
+            .into_inner()
+            .map_err(|e| ExportError::from_io(what, bytes, std::io::Error::other(e.to_string())))
     }
 }
 
@@ -104,14 +120,25 @@ impl<W: Write> TracksCsv<W> {
     ///
     /// # Errors
     /// A row cannot be written.
-    pub fn set(&mut self, set: &TrackSet, node_of: impl Fn(TrackId) -> Option<NodeName>) -> Result<(), ExportError> {
+    pub fn set(
+        &mut self,
+        set: &TrackSet,
+        node_of: impl Fn(TrackId) -> Option<NodeName>,
+    ) -> Result<(), ExportError> {
         for o in &set.observations {
-            self.row(o.id, set.frame, set.time_s, [o.u_px.into(), o.v_px.into()], node_of(o.id))?;
+            self.row(
+                o.id,
+                set.frame,
+                set.time_s,
+                [o.u_px.into(), o.v_px.into()],
+                node_of(o.id),
+            )?;
         }
         Ok(())
     }
 
-    /// Ends the file and gives the writer back; without this, errors of the last rows would be lost.
+    /// Ends the file and gives the writer back; without this, errors of the last rows would be
+    /// lost.
     ///
     /// # Errors
     /// The last rows cannot be written.
@@ -120,23 +147,40 @@ impl<W: Write> TracksCsv<W> {
     }
 }
 
-/// Writes `nodes.csv`. `sway` is by node index and may be shorter than the tree; `metres_per_px` 0 leaves pixels.
-/// A node is identifiable if it has a frequency with its interval; where it is not, the last column says why.
+/// Writes `nodes.csv`. `sway` is by node index and may be shorter than the tree; `metres_per_px` 0
+/// leaves pixels. A node is identifiable if it has a frequency with its interval; where it is not,
+/// the last column says why.
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn nodes<W: Write>(out: W, skeleton: &Skeleton, sway: &[Swaying], metres_per_px: f64) -> Result<W, ExportError> {
+pub fn nodes<W: Write>(
+    out: W,
+    skeleton: &Skeleton,
+    sway: &[Swaying],
+    metres_per_px: f64,
+) -> Result<W, ExportError> {
     let mut table = Table::new("nodes.csv", NODES_HEADER, out)?;
     let (scale, more) = unit(metres_per_px);
     for (i, node) in skeleton.nodes.iter().enumerate() {
-        let sway = sway.get(i).copied().unwrap_or(Err(Unidentified::NotMeasured));
+        let sway = sway
+            .get(i)
+            .copied()
+            .unwrap_or(Err(Unidentified::NotMeasured));
         table.count(node.name.0);
         table.id(node.parent.and_then(|p| skeleton.name_of(p)));
         table.count(node.level);
         table.count(node.n_tracks);
-        skeleton.image_from_model(&node.position).into_iter().for_each(|x| table.number(x, 3));
-        node.position.iter().chain([&node.radius]).for_each(|x| table.number(x * scale, 4 + more));
-        cells(&sway).iter().for_each(|cell| table.row.push_field(cell));
+        skeleton
+            .image_from_model(&node.position)
+            .into_iter()
+            .for_each(|x| table.number(x, 3));
+        node.position
+            .iter()
+            .chain([&node.radius])
+            .for_each(|x| table.number(x * scale, 4 + more));
+        cells(&sway)
+            .iter()
+            .for_each(|cell| table.row.push_field(cell));
         table.end_row()?;
     }
     table.finish()
@@ -157,9 +201,15 @@ impl<W: Write> MotionCsv<W> {
     /// The header cannot be written.
     pub fn new(out: W, skeleton: &Arc<Skeleton>, metres_per_px: f64) -> Result<Self, ExportError> {
         let (scale, more) = unit(metres_per_px);
-        // One decimal more than other lengths: rounding must not stretch a branch of a few pixels by a thousandth.
+        // One decimal more than other lengths: rounding must not stretch a branch of a few pixels
+        // by a thousandth.
         let decimals = 5 + more;
-        Ok(Self { table: Table::new("motion.csv", MOTION_HEADER, out)?, skeleton: skeleton.clone(), scale, decimals })
+        Ok(Self {
+            table: Table::new("motion.csv", MOTION_HEADER, out)?,
+            skeleton: skeleton.clone(),
+            scale,
+            decimals,
+        })
     }
 
     /// Every node in one frame.
@@ -171,14 +221,21 @@ impl<W: Write> MotionCsv<W> {
             self.table.count(pose.frame);
             self.table.number(pose.time_s, 6);
             self.table.count(node.name.0);
-            joint.position.iter().for_each(|x| self.table.number(x * self.scale, self.decimals));
-            self.skeleton.image_from_model(&joint.position).into_iter().for_each(|x| self.table.number(x, 3));
+            joint
+                .position
+                .iter()
+                .for_each(|x| self.table.number(x * self.scale, self.decimals));
+            self.skeleton
+                .image_from_model(&joint.position)
+                .into_iter()
+                .for_each(|x| self.table.number(x, 3));
             self.table.end_row()?;
         }
         Ok(())
     }
 
-    /// Ends the file and gives the writer back; without this, errors of the last rows would be lost.
+    /// Ends the file and gives the writer back; without this, errors of the last rows would be
+    /// lost.
     ///
     /// # Errors
     /// The last rows cannot be written.
@@ -187,10 +244,14 @@ impl<W: Write> MotionCsv<W> {
     }
 }
 
-/// Length of a pixel in the file's unit, and how many decimals more it takes to say as much in that unit.
+/// Length of a pixel in the file's unit, and how many decimals more it takes to say as much in that
+/// unit.
 pub(super) fn unit(metres_per_px: f64) -> (f64, usize) {
     if metres_per_px > 0.0 {
-        (metres_per_px, (-metres_per_px.log10()).ceil().clamp(0.0, 12.0) as usize)
+        (
+            metres_per_px,
+            (-metres_per_px.log10()).ceil().clamp(0.0, 12.0) as usize,
+        )
     } else {
         (1.0, 0)
     }

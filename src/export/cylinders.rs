@@ -8,21 +8,33 @@ use std::io::Write;
 pub const CYLINDERS_HEADER: &str = "ID,parentID,start_x,start_y,start_z,end_x,end_y,end_z,axis_x,axis_y,axis_z,radius,\
 length,branch,branch_order";
 
-/// Writes the table. Numbers count from 1, and the parent of what stands on the ground is 0, as those tools have it. Model
-/// axes; `metres_per_px` 0 leaves pixels.
+/// Writes the table. Numbers count from 1, and the parent of what stands on the ground is 0, as
+/// those tools have it. Model axes; `metres_per_px` 0 leaves pixels.
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn cylinders<W: Write>(out: W, rows: &[Cylinder], metres_per_px: f64) -> Result<W, ExportError> {
+pub fn cylinders<W: Write>(
+    out: W,
+    rows: &[Cylinder],
+    metres_per_px: f64,
+) -> Result<W, ExportError> {
     let mut table = Table::new("cylinders.csv", CYLINDERS_HEADER, out)?;
     let (scale, more) = unit(metres_per_px);
     for (id, row) in (1_u64..).zip(rows) {
         table.count(id);
         table.count(row.parent.map_or(0, |p| p as u64 + 1));
-        row.start.iter().chain(row.end.iter()).for_each(|x| table.number(x * scale, 4 + more));
+        row.start
+            .iter()
+            .chain(row.end.iter())
+            .for_each(|x| table.number(x * scale, 4 + more));
         let way = row.end - row.start;
-        way.try_normalize(1e-12).unwrap_or_default().iter().for_each(|x| table.number(*x, 6));
-        [row.radius, way.norm()].iter().for_each(|x| table.number(x * scale, 4 + more));
+        way.try_normalize(1e-12)
+            .unwrap_or_default()
+            .iter()
+            .for_each(|x| table.number(*x, 6));
+        [row.radius, way.norm()]
+            .iter()
+            .for_each(|x| table.number(x * scale, 4 + more));
         table.count(row.branch as u64 + 1);
         table.count(row.order);
         table.end_row()?;

@@ -15,12 +15,16 @@ pub enum ExportError {
     /// `bytes` is how much was to be written in all, as far as is known at this point.
     #[error("the disk is full: {what} needs at least {} of free space; free some, or choose another disk", size(*.bytes))]
     DiskFull { what: String, bytes: u64 },
-    #[error("not allowed to write {what}; choose a place of your own, or ask for the right to write there")]
+    #[error(
+        "not allowed to write {what}; choose a place of your own, or ask for the right to write there"
+    )]
     Denied { what: String },
     #[error("cannot write {what}: {source}")]
     Io { what: String, source: io::Error },
     /// Or it is there without the encoder, as some builds are.
-    #[error("ffmpeg is not installed, or lacks libx264, and videos are written with it; run `sudo apt install ffmpeg`")]
+    #[error(
+        "ffmpeg is not installed, or lacks libx264, and videos are written with it; run `sudo apt install ffmpeg`"
+    )]
     NoFfmpeg,
     /// The page of `--format html` is put into the program when it is built, where npm is there.
     #[error(
@@ -36,12 +40,17 @@ pub enum ExportError {
 }
 
 impl ExportError {
-    /// Sorts an I/O error; `what` names the file, `bytes` how much had to be written to it so far or in all.
+    /// Sorts an I/O error; `what` names the file, `bytes` how much had to be written to it so far
+    /// or in all.
     pub fn from_io(what: impl Into<String>, bytes: u64, source: io::Error) -> Self {
         let what = what.into();
         match source.kind() {
-            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Self::DiskFull { what, bytes },
-            io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => Self::Denied { what },
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+                Self::DiskFull { what, bytes }
+            }
+            io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+                Self::Denied { what }
+            }
             io::ErrorKind::NotADirectory => Self::NotAFolder { path: what.into() },
             _ => Self::Io { what, source },
         }

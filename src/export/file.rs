@@ -10,22 +10,30 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Bytes that are written between two looks at whether to go on.
 const PIECE: usize = 1 << 20;
 
-/// Is written hidden beside the wanted place. Dropped without [`OutputFile::publish`], it leaves nothing behind.
+/// Is written hidden beside the wanted place. Dropped without [`OutputFile::publish`], it leaves
+/// nothing behind.
 #[derive(Debug)]
 pub struct OutputFile(Place);
 
-/// Writes files beside each other into `dir`, which is made where it is missing. All of them appear or none: also where
+/// Writes files beside each other into `dir`, which is made where it is missing. All of them appear
+/// or none: also where
 /// `stop` is set meanwhile.
 ///
 /// # Errors
 /// One of the names is taken; they may not be written; the disk is full; it was stopped.
-pub fn write_files(dir: &Path, files: &[(String, Vec<u8>)], stop: &AtomicBool) -> Result<(), ExportError> {
+pub fn write_files(
+    dir: &Path,
+    files: &[(String, Vec<u8>)],
+    stop: &AtomicBool,
+) -> Result<(), ExportError> {
     let mut prepared = Vec::with_capacity(files.len());
     let mut write = || {
         for (name, bytes) in files {
             let file = OutputFile::create(&dir.join(name))?;
             prepared.push(file);
-            prepared.last().map_or(Ok(()), |file| file.write(bytes, stop))?;
+            prepared
+                .last()
+                .map_or(Ok(()), |file| file.write(bytes, stop))?;
         }
         prepared.iter_mut().try_for_each(OutputFile::show)
     };
@@ -44,7 +52,12 @@ impl OutputFile {
     /// # Errors
     /// `path` exists, be it as a file, a folder or a link; it may not be written; the disk is full.
     pub fn create(path: &Path) -> Result<Self, ExportError> {
-        Place::prepare(path, |p| File::create_new(p).map(drop), |p| fs::remove_file(p)).map(Self)
+        Place::prepare(
+            path,
+            |p| File::create_new(p).map(drop),
+            |p| fs::remove_file(p),
+        )
+        .map(Self)
     }
 
     /// Where the bytes are to be written until the file is published.
@@ -71,7 +84,8 @@ impl OutputFile {
     /// Puts everything on the disk and gives the file its name.
     ///
     /// # Errors
-    /// The disk is full, or something else has taken the name meanwhile; then nothing is left of the file.
+    /// The disk is full, or something else has taken the name meanwhile; then nothing is left of
+    /// the file.
     pub fn publish(mut self) -> Result<(), ExportError> {
         self.show()?;
         self.0.keep();
@@ -81,14 +95,19 @@ impl OutputFile {
     /// Under its name, and still to go if it is dropped.
     fn show(&mut self) -> Result<(), ExportError> {
         // Some file systems find out only now that there is no space.
-        File::open(self.0.at()).and_then(|f| f.sync_all()).map_err(|e| self.explain(0, e))?;
+        File::open(self.0.at())
+            .and_then(|f| f.sync_all())
+            .map_err(|e| self.explain(0, e))?;
         self.0.appear().map_err(|e| match e.kind() {
-            io::ErrorKind::AlreadyExists => ExportError::Exists { path: self.0.path().to_path_buf() },
+            io::ErrorKind::AlreadyExists => ExportError::Exists {
+                path: self.0.path().to_path_buf(),
+            },
             _ => self.explain(0, e),
         })
     }
 
-    /// Sorts an error of writing; `bytes` is how much was to be written, 0 if only what lies there already is known.
+    /// Sorts an error of writing; `bytes` is how much was to be written, 0 if only what lies there
+    /// already is known.
     pub fn explain(&self, bytes: u64, e: io::Error) -> ExportError {
         let written = fs::metadata(self.0.at()).map_or(0, |m| m.len());
         ExportError::from_io(self.0.path().display().to_string(), bytes.max(written), e)
@@ -114,8 +133,14 @@ mod tests {
         file.write(b"abc", &GO_ON).unwrap();
         file.publish().unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"abc");
-        assert!(matches!(OutputFile::create(&path), Err(ExportError::Exists { .. })));
-        assert!(matches!(OutputFile::create(&path.join("below.png")), Err(ExportError::NotAFolder { .. })));
+        assert!(matches!(
+            OutputFile::create(&path),
+            Err(ExportError::Exists { .. })
+        ));
+        assert!(matches!(
+            OutputFile::create(&path.join("below.png")),
+            Err(ExportError::NotAFolder { .. })
+        ));
     }
 
     #[test]
@@ -129,7 +154,10 @@ mod tests {
         write_files(&below, &files("a.gltf"), &GO_ON).unwrap();
         assert_eq!(fs::read(below.join("a.gltf")).unwrap(), [2]);
         fs::remove_file(below.join("a.bin")).unwrap();
-        assert!(matches!(write_files(&below, &files("a.gltf"), &GO_ON), Err(ExportError::Exists { .. })));
+        assert!(matches!(
+            write_files(&below, &files("a.gltf"), &GO_ON),
+            Err(ExportError::Exists { .. })
+        ));
         assert_eq!(fs::read_dir(&below).unwrap().count(), 1);
     }
 
@@ -137,7 +165,10 @@ mod tests {
     #[test]
     fn what_is_stopped_leaves_nothing() {
         let dir = tempfile::tempdir().unwrap();
-        let files = [("a.bin".to_owned(), vec![1]), ("a.gltf".to_owned(), vec![2])];
+        let files = [
+            ("a.bin".to_owned(), vec![1]),
+            ("a.gltf".to_owned(), vec![2]),
+        ];
         let stopped = write_files(&dir.path().join("new"), &files, &AtomicBool::new(true));
         assert!(matches!(stopped, Err(ExportError::Stopped)));
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);

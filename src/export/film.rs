@@ -22,7 +22,8 @@ pub struct Film {
 }
 
 impl Film {
-    /// Begins a video of pictures of one size at `fps` pictures a second. An odd side gets a black line, as H.264 wants.
+    /// Begins a video of pictures of one size at `fps` pictures a second. An odd side gets a black
+    /// line, as H.264 wants.
     ///
     /// # Errors
     /// ffmpeg is not there; the file exists or cannot be written.
@@ -34,16 +35,54 @@ impl Film {
         let file = OutputFile::create(path)?;
         let log = tempfile::tempfile().map_err(|e| file.explain(0, e))?;
         let mut command = Command::new(ffmpeg);
-        command.args(["-hide_banner", "-v", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24"]);
-        command.args(["-s", &size.to_string(), "-r", &fps.to_string(), "-i", "pipe:0"]);
-        command.args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p"]);
-        // With more threads, and with the version in the file, the bytes would depend on the machine.
-        command.args(["-threads", "1", "-fflags", "+bitexact", "-flags:v", "+bitexact"]);
+        command.args([
+            "-hide_banner",
+            "-v",
+            "error",
+            "-y",
+            "-f",
+            "rawvideo",
+            "-pix_fmt",
+            "rgb24",
+        ]);
+        command.args([
+            "-s",
+            &size.to_string(),
+            "-r",
+            &fps.to_string(),
+            "-i",
+            "pipe:0",
+        ]);
+        command.args([
+            "-vf",
+            "pad=ceil(iw/2)*2:ceil(ih/2)*2",
+            "-c:v",
+            "libx264",
+            "-crf",
+            "20",
+            "-pix_fmt",
+            "yuv420p",
+        ]);
+        // With more threads, and with the version in the file, the bytes would depend on the
+        // machine.
+        command.args([
+            "-threads",
+            "1",
+            "-fflags",
+            "+bitexact",
+            "-flags:v",
+            "+bitexact",
+        ]);
         let mut target = OsString::from("file:");
         target.push(file.partial());
-        command.args(["-movflags", "+faststart", "-f", "mp4"]).arg(target);
+        command
+            .args(["-movflags", "+faststart", "-f", "mp4"])
+            .arg(target);
         let errors = log.try_clone().map_err(|e| file.explain(0, e))?;
-        command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(errors);
+        command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(errors);
         // A group of its own: Ctrl-C at the terminal is for us.
         command.process_group(0);
         let mut child = command.spawn().map_err(|e| match e.kind() {
@@ -51,7 +90,13 @@ impl Film {
             _ => file.explain(0, e),
         })?;
         let input = child.stdin.take();
-        Ok(Self { file: Some(file), child, input, log, bytes: 3 * size.area() })
+        Ok(Self {
+            file: Some(file),
+            child,
+            input,
+            log,
+            bytes: 3 * size.area(),
+        })
     }
 
     /// Adds a picture: three bytes a pixel, red first, row by row.
@@ -62,7 +107,10 @@ impl Film {
         if rgb.len() != self.bytes {
             return Err(ExportError::unfit("its pictures are not of one size"));
         }
-        let written = self.input.as_mut().map_or(Ok(()), |input| input.write_all(rgb));
+        let written = self
+            .input
+            .as_mut()
+            .map_or(Ok(()), |input| input.write_all(rgb));
         written.map_err(|e| self.failure(e))
     }
 
@@ -88,7 +136,9 @@ impl Film {
         drop(self.input.take());
         let _ = self.child.wait();
         let _ = self.log.rewind();
-        let lines = BufReader::new((&self.log).take(1 << 16)).lines().map_while(Result::ok);
+        let lines = BufReader::new((&self.log).take(1 << 16))
+            .lines()
+            .map_while(Result::ok);
         let said: Vec<String> = lines.filter(|l| !l.trim().is_empty()).collect();
         let holds = |words: &str| said.iter().any(|l| l.contains(words));
         let full = holds("No space left") || holds("Disk quota");
@@ -96,10 +146,21 @@ impl Film {
             return ExportError::NoFfmpeg;
         }
         // `[libx264 @ 0x5581] ...`: the address tells nobody anything.
-        let line = said.first().map(|l| l.split_once("] ").map_or(l.as_str(), |(_, rest)| rest).trim().to_owned());
+        let line = said.first().map(|l| {
+            l.split_once("] ")
+                .map_or(l.as_str(), |(_, rest)| rest)
+                .trim()
+                .to_owned()
+        });
         let said = line.map_or(e, |said| io::Error::other(format!("ffmpeg: {said}")));
-        let e = if full { io::ErrorKind::StorageFull.into() } else { said };
-        self.file.as_ref().map_or(ExportError::NoFfmpeg, |file| file.explain(0, e))
+        let e = if full {
+            io::ErrorKind::StorageFull.into()
+        } else {
+            said
+        };
+        self.file
+            .as_ref()
+            .map_or(ExportError::NoFfmpeg, |file| file.explain(0, e))
     }
 }
 
@@ -117,7 +178,13 @@ mod tests {
     #[test]
     fn without_ffmpeg_the_remedy_is_named_and_nothing_is_left() {
         let dir = tempfile::tempdir().unwrap();
-        let error = Film::begin_with(&dir.path().join("a.mp4"), Size::new(4, 4), 30.0, "no-such-ffmpeg").unwrap_err();
+        let error = Film::begin_with(
+            &dir.path().join("a.mp4"),
+            Size::new(4, 4),
+            30.0,
+            "no-such-ffmpeg",
+        )
+        .unwrap_err();
         assert!(error.to_string().contains("apt install ffmpeg"), "{error}");
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
     }

@@ -10,8 +10,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Bytes that are copied between two looks at whether to go on.
 const PIECE: u64 = 1 << 20;
 
-/// Files are gathered in a hidden folder beside the wanted one. Dropped without [`OutputFolder::publish`], it leaves nothing
-/// behind.
+/// Files are gathered in a hidden folder beside the wanted one. Dropped without
+/// [`OutputFolder::publish`], it leaves nothing behind.
 #[derive(Debug)]
 pub struct OutputFolder(Place);
 
@@ -19,8 +19,8 @@ impl OutputFolder {
     /// Prepares the folder `dir`, and those above it where they are missing.
     ///
     /// # Errors
-    /// `dir` exists, be it as a file, a folder or a link; it cannot be a folder; it may not be written; the disk is
-    /// full.
+    /// `dir` exists, be it as a file, a folder or a link; it cannot be a folder; it may not be
+    /// written; the disk is full.
     pub fn create(dir: &Path) -> Result<Self, ExportError> {
         Place::prepare(dir, |p| fs::create_dir(p), |p| fs::remove_dir_all(p)).map(Self)
     }
@@ -54,7 +54,10 @@ impl OutputFolder {
     /// It cannot be read or not be written to its end, or was stopped.
     pub fn copy(&self, name: &str, from: &Path, stop: &AtomicBool) -> Result<(), ExportError> {
         let explain = |e| self.explain(name, 0, e);
-        let (from, mut to) = (File::open(from.join(name)).map_err(explain)?, self.file(name)?);
+        let (from, mut to) = (
+            File::open(from.join(name)).map_err(explain)?,
+            self.file(name)?,
+        );
         while !stop.load(Ordering::SeqCst) {
             if io::copy(&mut (&from).take(PIECE), &mut to).map_err(explain)? == 0 {
                 return to.flush().map_err(explain);
@@ -66,20 +69,23 @@ impl OutputFolder {
     /// Puts everything on the disk and gives the folder its name, which it returns.
     ///
     /// # Errors
-    /// The disk is full, or something else has taken the name meanwhile; then nothing is left of the folder.
+    /// The disk is full, or something else has taken the name meanwhile; then nothing is left of
+    /// the folder.
     pub fn publish(mut self) -> Result<PathBuf, ExportError> {
         let entries = fs::read_dir(self.0.at()).map_err(|e| self.explain("the folder", 0, e))?;
         for entry in entries {
             let entry = entry.map_err(|e| self.explain("the folder", 0, e))?;
             let name = entry.file_name().to_string_lossy().into_owned();
             // Some file systems find out only now that there is no space.
-            File::open(entry.path()).and_then(|f| f.sync_all()).map_err(|e| self.explain(&name, 0, e))?;
+            File::open(entry.path())
+                .and_then(|f| f.sync_all())
+                .map_err(|e| self.explain(&name, 0, e))?;
         }
         let dir = self.0.path().to_path_buf();
         self.0.appear().map_err(|e| match e.kind() {
-            io::ErrorKind::AlreadyExists | io::ErrorKind::DirectoryNotEmpty | io::ErrorKind::NotADirectory => {
-                ExportError::Exists { path: dir.clone() }
-            }
+            io::ErrorKind::AlreadyExists
+            | io::ErrorKind::DirectoryNotEmpty
+            | io::ErrorKind::NotADirectory => ExportError::Exists { path: dir.clone() },
             _ => self.explain("the folder", 0, e),
         })?;
         self.0.keep();
@@ -90,8 +96,15 @@ impl OutputFolder {
     /// Adds what is written already, because all of it is what the disk must have room for.
     pub(super) fn explain(&self, name: &str, bytes: u64, e: io::Error) -> ExportError {
         let others = fs::read_dir(self.0.at()).into_iter().flatten().flatten();
-        let written: u64 =
-            others.filter(|f| f.file_name() != name).filter_map(|f| f.metadata().ok()).map(|m| m.len()).sum();
-        ExportError::from_io(self.0.path().join(name).display().to_string(), written + bytes, e)
+        let written: u64 = others
+            .filter(|f| f.file_name() != name)
+            .filter_map(|f| f.metadata().ok())
+            .map(|m| m.len())
+            .sum();
+        ExportError::from_io(
+            self.0.path().join(name).display().to_string(),
+            written + bytes,
+            e,
+        )
     }
 }

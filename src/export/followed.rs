@@ -6,9 +6,11 @@ use super::thin_keys::{Arc, share};
 use crate::model::Node;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
 
-/// One branch on its way through all frames, in the axes of its parent branch as a viewer shows that.
+/// One branch on its way through all frames, in the axes of its parent branch as a viewer shows
+/// that.
 pub(super) struct Followed {
-    /// Where the branch's end is to be, from the parent node as it is shown: this also makes good by how much that is off.
+    /// Where the branch's end is to be, from the parent node as it is shown: this also makes good
+    /// by how much that is off.
     targets: Vec<Vector3<f64>>,
     /// Direction of depth.
     depth: Vec<Vector3<f64>>,
@@ -24,11 +26,19 @@ pub(super) struct Followed {
 
 impl Followed {
     /// `wanted`: rotations in model axes.
-    pub fn new(base: &Shown, wanted: &[UnitQuaternion<f64>], node: &Node, way: Vector3<f64>) -> Self {
-        let back: Vec<UnitQuaternion<f64>> = base.rotation.iter().map(UnitQuaternion::inverse).collect();
+    pub fn new(
+        base: &Shown,
+        wanted: &[UnitQuaternion<f64>],
+        node: &Node,
+        way: Vector3<f64>,
+    ) -> Self {
+        let back: Vec<UnitQuaternion<f64>> =
+            base.rotation.iter().map(UnitQuaternion::inverse).collect();
         let every = || wanted.iter().zip(&back).zip(&base.error_px);
         Self {
-            targets: every().map(|((q, back), off)| back * (q * way - off)).collect(),
+            targets: every()
+                .map(|((q, back), off)| back * (q * way - off))
+                .collect(),
             depth: back.iter().map(|back| back * Vector3::z()).collect(),
             wanted: every().map(|((q, back), _)| back * q).collect(),
             way,
@@ -39,7 +49,8 @@ impl Followed {
         }
     }
 
-    /// With the end allowed to be off by `share` of `tolerance_px`. Turning about its own axis moves no node, but the bark.
+    /// With the end allowed to be off by `share` of `tolerance_px`. Turning about its own axis
+    /// moves no node, but the bark.
     pub fn within(mut self, tolerance_px: f64, share: f64) -> Self {
         self.limit_angle = (tolerance_px / self.radius_px.max(1e-9)).clamp(1e-9, 0.1);
         self.limit_px = (tolerance_px * share).max(1e-9);
@@ -47,53 +58,74 @@ impl Followed {
         self
     }
 
-    /// By how much the branch is off if it turns by `turn` in its parent's axes, in units of what is allowed.
+    /// By how much the branch is off if it turns by `turn` in its parent's axes, in units of what
+    /// is allowed.
     pub fn miss(&self, k: usize, turn: &UnitQuaternion<f64>) -> f64 {
         let off = turn * self.way - self.targets[k];
         let depth = off.dot(&self.depth[k]);
         // Half as much in depth.
         let off = (off.norm_squared() - 0.75 * depth * depth).max(0.0).sqrt() / self.limit_px;
         let cosine = turn.coords.dot(&self.wanted[k].coords).abs();
-        if cosine >= self.limit_cosine { off } else { off.max(2.0 * cosine.min(1.0).acos() / self.limit_angle) }
+        if cosine >= self.limit_cosine {
+            off
+        } else {
+            off.max(2.0 * cosine.min(1.0).acos() / self.limit_angle)
+        }
     }
 
-    /// The turn that brings the branch's end nearest to where it is to be, by the measure of [`miss`](Self::miss): what
-    /// remains of the parent's error is then no larger than it was there.
+    /// The turn that brings the branch's end nearest to where it is to be, by the measure of
+    /// [`miss`](Self::miss): what remains of the parent's error is then no larger than it was
+    /// there.
     pub fn aim(&self, k: usize) -> UnitQuaternion<f64> {
         let is = self.wanted[k] * self.way;
         let measure = |v: Vector3<f64>| self.measure(k, v);
-        let Some(first) =
-            is.cross(&Vector3::x()).try_normalize(1e-9).or_else(|| is.cross(&Vector3::y()).try_normalize(1e-9))
+        let Some(first) = is
+            .cross(&Vector3::x())
+            .try_normalize(1e-9)
+            .or_else(|| is.cross(&Vector3::y()).try_normalize(1e-9))
         else {
             return self.wanted[k];
         };
         let second = is.cross(&first).normalize();
-        let (a, b, off) = (measure(first), measure(second), measure(self.targets[k] - is));
+        let (a, b, off) = (
+            measure(first),
+            measure(second),
+            measure(self.targets[k] - is),
+        );
         // Neither is 0, and they are not parallel: the measure halves one direction at most.
         let (aa, ab, bb) = (a.dot(&a), a.dot(&b), b.dot(&b));
         let (x, y) = (a.dot(&off), b.dot(&off));
         let determinant = aa * bb - ab * ab;
         let to = is + (first * (x * bb - y * ab) + second * (y * aa - x * ab)) / determinant;
         let mend = UnitQuaternion::rotation_between(&is, &to);
-        mend.filter(|q| q.angle() <= 0.5 * self.limit_angle).unwrap_or_default() * self.wanted[k]
+        mend.filter(|q| q.angle() <= 0.5 * self.limit_angle)
+            .unwrap_or_default()
+            * self.wanted[k]
     }
 
-    /// The fewest keys beside the path of `aims`, by a rule of thumb: arcs between keys are taken for straight, and turns
-    /// about the branch's own axis for none.
+    /// The fewest keys beside the path of `aims`, by a rule of thumb: arcs between keys are taken
+    /// for straight, and turns about the branch's own axis for none.
     pub fn planned(&self, aims: &[Vector4<f64>], times: &[f64]) -> Vec<Key> {
         let aim = |k: usize| UnitQuaternion::new_unchecked(Quaternion::from(aims[k]));
-        let sides: Vec<[Vector3<f64>; 2]> = (0..aims.len()).map(|k| self.sides(&aim(k), k)).collect();
+        let sides: Vec<[Vector3<f64>; 2]> =
+            (0..aims.len()).map(|k| self.sides(&aim(k), k)).collect();
         let limit = |k: usize| (1.0 - self.miss(k, &aim(k)).powi(2)).max(0.0).sqrt() as f32;
         let limits: Vec<f32> = (0..aims.len()).map(limit).collect();
         let ends: Vec<Vector3<f64>> = (0..aims.len()).map(|k| aim(k) * self.way).collect();
         let weights: Vec<[Vector3<f64>; 2]> = (0..aims.len())
-            .map(|k| sides[k].map(|side| self.measure(k, self.measure(k, side)) / self.limit_px.powi(2)))
+            .map(|k| {
+                sides[k].map(|side| self.measure(k, self.measure(k, side)) / self.limit_px.powi(2))
+            })
             .collect();
         let between = |a: usize, b: usize, k: usize| {
             let share = share(times, a, b, k);
             let off = ends[a] + (ends[b] - ends[a]) * share - ends[k];
             let off = [0, 1].map(|c| off.dot(&weights[k][c]) as f32);
-            Between { share: share as f32, off, limit: limits[k] }
+            Between {
+                share: share as f32,
+                off,
+                limit: limits[k],
+            }
         };
         let key = |(k, off): (usize, [f32; 2])| {
             let is = aim(k) * self.way;
@@ -102,12 +134,20 @@ impl Followed {
                 &(is + sides[k][0] * f64::from(off[0]) + sides[k][1] * f64::from(off[1])),
             );
             let turn = (turn.unwrap_or_default() * aim(k)).coords;
-            (k, if turn.dot(&aims[k]) < 0.0 { -turn } else { turn })
+            (
+                k,
+                if turn.dot(&aims[k]) < 0.0 {
+                    -turn
+                } else {
+                    turn
+                },
+            )
         };
         plan(&limits, between).into_iter().map(key).collect()
     }
 
-    /// Two ways off the branch's end, at right angles by the measure of [`miss`](Self::miss), on which it grows by 1.
+    /// Two ways off the branch's end, at right angles by the measure of [`miss`](Self::miss), on
+    /// which it grows by 1.
     fn sides(&self, aim: &UnitQuaternion<f64>, k: usize) -> [Vector3<f64>; 2] {
         let is = aim * self.way;
         // The same axis for all frames, so that the ways turn as little as the branch does.
@@ -116,8 +156,8 @@ impl Followed {
         let second = is.cross(&first);
         let unit = |v: Vector3<f64>| v * (self.limit_px / self.measure(k, v).norm().max(1e-9));
         let first = unit(first);
-        let along =
-            self.measure(k, second).dot(&self.measure(k, first)) / self.measure(k, first).norm_squared().max(1e-9);
+        let along = self.measure(k, second).dot(&self.measure(k, first))
+            / self.measure(k, first).norm_squared().max(1e-9);
         [first, unit(second - first * along)]
     }
 
@@ -127,9 +167,15 @@ impl Followed {
     }
 
     pub fn shown(&self, base: &Shown, turns: &[UnitQuaternion<f64>]) -> Shown {
-        let off = |(k, turn): (usize, &UnitQuaternion<f64>)| base.rotation[k] * (turn * self.way - self.targets[k]);
+        let off = |(k, turn): (usize, &UnitQuaternion<f64>)| {
+            base.rotation[k] * (turn * self.way - self.targets[k])
+        };
         Shown {
-            rotation: turns.iter().zip(&base.rotation).map(|(turn, base)| base * turn).collect(),
+            rotation: turns
+                .iter()
+                .zip(&base.rotation)
+                .map(|(turn, base)| base * turn)
+                .collect(),
             error_px: turns.iter().enumerate().map(off).collect(),
         }
     }
@@ -137,7 +183,11 @@ impl Followed {
 
 /// The turns that a viewer makes of the keys, at all times.
 pub(super) fn played(keys: &[Key], times: &[f64]) -> Vec<UnitQuaternion<f64>> {
-    let mut out = vec![keys.first().map_or_else(UnitQuaternion::identity, |k| unit(&k.1)); times.len()];
+    let mut out = vec![
+        keys.first()
+            .map_or_else(UnitQuaternion::identity, |k| unit(&k.1));
+        times.len()
+    ];
     for pair in keys.windows(2) {
         let ((a, from), (b, to)) = (pair[0], pair[1]);
         let arc = Arc::new(&unit(&from), &unit(&to));
@@ -156,6 +206,9 @@ pub(super) struct Shown {
 
 impl Shown {
     pub fn still(n: usize) -> Self {
-        Self { rotation: vec![UnitQuaternion::identity(); n], error_px: vec![Vector3::zeros(); n] }
+        Self {
+            rotation: vec![UnitQuaternion::identity(); n],
+            error_px: vec![Vector3::zeros(); n],
+        }
     }
 }

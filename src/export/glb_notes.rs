@@ -19,15 +19,27 @@ pub fn joints(glb: &[u8]) -> Option<Vec<JointNote>> {
         return None;
     }
     let root: Value = serde_json::from_slice(glb.get(20..20usize.checked_add(word(12)?)?)?).ok()?;
-    let number = |v: Option<&Value>| v.and_then(Value::as_u64).and_then(|n| u32::try_from(n).ok());
+    let number = |v: Option<&Value>| {
+        v.and_then(Value::as_u64)
+            .and_then(|n| u32::try_from(n).ok())
+    };
     let joint = |node: &Value| {
         let (name, extras) = (node.get("name")?.as_str()?, node.get("extras")?);
         let digits = name.strip_prefix("node_")?.split('_').next()?;
         Some(JointNote {
             node: digits.parse().ok()?,
-            certainty: extras.get("certainty").and_then(Value::as_f64).unwrap_or(0.0) as f32,
+            certainty: extras
+                .get("certainty")
+                .and_then(Value::as_f64)
+                .unwrap_or(0.0) as f32,
             copy_of: number(extras.get("copy_of")),
         })
     };
-    Some(root.get("nodes")?.as_array()?.iter().filter_map(joint).collect())
+    Some(
+        root.get("nodes")?
+            .as_array()?
+            .iter()
+            .filter_map(joint)
+            .collect(),
+    )
 }

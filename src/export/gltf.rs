@@ -1,5 +1,5 @@
-//! The moving tree as glTF 2.0 without extensions: joints, one skin, wood in one level of detail or more, leaves, and one
-//! animation.
+//! The moving tree as glTF 2.0 without extensions: joints, one skin, wood in one level of detail or
+//! more, leaves, and one animation.
 
 use super::ExportError;
 use super::capture::{AnimationNote, Software};
@@ -16,8 +16,9 @@ use gltf_json::{Asset, Index, Node, Root, Scene};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 
-/// Keys are thinned so that no node is farther than this from its pose in any frame as seen in its own plane (the picture's
-/// for measured nodes), px; across it, where depth was estimated and not seen, it may be twice as far.
+/// Keys are thinned so that no node is farther than this from its pose in any frame as seen in its
+/// own plane (the picture's for measured nodes), px; across it, where depth was estimated and not
+/// seen, it may be twice as far.
 pub const KEY_TOLERANCE_PX: f64 = 0.2;
 
 /// Where the model comes from, for the file's own notes.
@@ -39,18 +40,21 @@ pub struct Model<'a> {
     pub dressed: &'a Dressed,
     /// In the order of time; the rest pose stands for none.
     pub poses: &'a [Pose],
-    /// How far each group of leaves swings in every pose: the weights of its two displacements. Empty: not at all.
+    /// How far each group of leaves swings in every pose: the weights of its two displacements.
+    /// Empty: not at all.
     pub flutter: &'a [Vec<[f32; 2]>],
-    /// All levels of detail of the wood, as scenes `lod0`, `lod1`, ... on the same joints, instead of the first alone.
+    /// All levels of detail of the wood, as scenes `lod0`, `lod1`, ... on the same joints, instead
+    /// of the first alone.
     pub all_levels: bool,
     /// Metres in a pixel; 0 leaves the model in pixels.
     pub metres_per_px: f64,
     /// See [`KEY_TOLERANCE_PX`].
     pub tolerance_px: f64,
-    /// Whether to look for the fewest keys, which takes some times as long: half a second for 100 joints in 1000 frames. Asked
-    /// before every joint.
+    /// Whether to look for the fewest keys, which takes some times as long: half a second for 100
+    /// joints in 1000 frames. Asked before every joint.
     pub thorough: &'a dyn Fn() -> bool,
-    /// One JSON object a node, added to `level`, `n_tracks` and `copy_of`; may be shorter than the skeleton.
+    /// One JSON object a node, added to `level`, `n_tracks` and `copy_of`; may be shorter than the
+    /// skeleton.
     pub node_extras: &'a [Value],
     /// Software version, name of the source, frames: the `extras` of the asset.
     pub provenance: &'a Value,
@@ -58,13 +62,21 @@ pub struct Model<'a> {
 
 impl Model<'_> {
     pub(super) fn scale(&self) -> f64 {
-        if self.metres_per_px > 0.0 { self.metres_per_px } else { 1.0 }
+        if self.metres_per_px > 0.0 {
+            self.metres_per_px
+        } else {
+            1.0
+        }
     }
 
-    /// Where the joint of node `i` rests, in the file's unit: at the parent node, about which the branch turns.
+    /// Where the joint of node `i` rests, in the file's unit: at the parent node, about which the
+    /// branch turns.
     pub(super) fn pivot(&self, i: usize) -> nalgebra::Vector3<f64> {
         let nodes = &self.skeleton.nodes;
-        nodes[nodes[i].parent.map_or(i, |p| p.index())].position.coords * self.scale()
+        nodes[nodes[i].parent.map_or(i, |p| p.index())]
+            .position
+            .coords
+            * self.scale()
     }
 }
 
@@ -74,28 +86,52 @@ pub type NamedBytes = (String, Vec<u8>);
 /// The bytes of the GLB file, and what its animation is.
 ///
 /// # Errors
-/// [`ExportError::Unfit`] if the skeleton is empty, out of order or has positions that are no numbers, if a pose
-/// belongs to another tree, or if there is more than the format can count.
+/// [`ExportError::Unfit`] if the skeleton is empty, out of order or has positions that are no
+/// numbers, if a pose belongs to another tree, or if there is more than the format can count.
 pub fn glb(model: &Model) -> Result<(Vec<u8>, AnimationNote), ExportError> {
-    let Assembled { mut root, buffer, animation, .. } = assemble(model, false)?;
+    let Assembled {
+        mut root,
+        buffer,
+        animation,
+        ..
+    } = assemble(model, false)?;
     let bin: Option<Cow<[u8]>> = buffer.finish(&mut root, None).map(Cow::Owned);
-    let json: Cow<[u8]> = Cow::Owned(root.to_vec().map_err(|e| ExportError::unfit(e.to_string()))?);
+    let json: Cow<[u8]> = Cow::Owned(
+        root.to_vec()
+            .map_err(|e| ExportError::unfit(e.to_string()))?,
+    );
     if json.len() + bin.as_ref().map_or(0, |b| b.len()) + 64 > u32::MAX as usize {
-        return Err(ExportError::unfit("it is larger than the 4 GB that a GLB can hold; export a shorter animation"));
+        return Err(ExportError::unfit(
+            "it is larger than the 4 GB that a GLB can hold; export a shorter animation",
+        ));
     }
     // The length in the header is computed when it is written.
-    let header = gltf::binary::Header { magic: *b"glTF", version: 2, length: 0 };
-    let bytes = gltf::binary::Glb { header, json, bin }.to_vec().map_err(|e| ExportError::unfit(e.to_string()))?;
+    let header = gltf::binary::Header {
+        magic: *b"glTF",
+        version: 2,
+        length: 0,
+    };
+    let bytes = gltf::binary::Glb { header, json, bin }
+        .to_vec()
+        .map_err(|e| ExportError::unfit(e.to_string()))?;
     Ok((bytes, animation))
 }
 
-/// The same as files beside each other: `STEM.gltf`, `STEM.bin`, and the texture of the leaves where there is one. What is
-/// pointed to comes first, the `.gltf` last.
+/// The same as files beside each other: `STEM.gltf`, `STEM.bin`, and the texture of the leaves
+/// where there is one. What is pointed to comes first, the `.gltf` last.
 ///
 /// # Errors
 /// As of [`glb`].
-pub fn gltf_files(model: &Model, stem: &str) -> Result<(Vec<NamedBytes>, AnimationNote), ExportError> {
-    let Assembled { mut root, buffer, animation, texture } = assemble(model, true)?;
+pub fn gltf_files(
+    model: &Model,
+    stem: &str,
+) -> Result<(Vec<NamedBytes>, AnimationNote), ExportError> {
+    let Assembled {
+        mut root,
+        buffer,
+        animation,
+        texture,
+    } = assemble(model, true)?;
     let mut files = Vec::new();
     // Names in the file are those of links: what a link cannot hold is written as %XX.
     if let (Some((ending, bytes)), Some(image)) = (texture, root.images.first_mut()) {
@@ -107,7 +143,9 @@ pub fn gltf_files(model: &Model, stem: &str) -> Result<(Vec<NamedBytes>, Animati
     if let Some(bytes) = buffer.finish(&mut root, Some(percent(&name))) {
         files.push((name, bytes));
     }
-    let mut text = root.to_vec_pretty().map_err(|e| ExportError::unfit(e.to_string()))?;
+    let mut text = root
+        .to_vec_pretty()
+        .map_err(|e| ExportError::unfit(e.to_string()))?;
     text.push(b'\n');
     files.push((format!("{stem}.gltf"), text));
     Ok((files, animation))
@@ -123,7 +161,12 @@ struct Assembled {
 
 fn assemble(model: &Model, texture_apart: bool) -> Result<Assembled, ExportError> {
     check(model)?;
-    let moving = Moving::new(model.skeleton, model.poses, model.tolerance_px, model.thorough);
+    let moving = Moving::new(
+        model.skeleton,
+        model.poses,
+        model.tolerance_px,
+        model.thorough,
+    );
     let mut root = Root::default();
     let mut buffer = BufferBuilder::default();
     root.asset = Asset {
@@ -132,24 +175,58 @@ fn assemble(model: &Model, texture_apart: bool) -> Result<Assembled, ExportError
         ..Asset::default()
     };
     push_joints(&mut root, model)?;
-    let Dressed { wood, foliage, bark_rgb, .. } = model.dressed;
-    let drawn = wood.iter().chain(foliage.groups.iter().map(|g| &g.mesh)).any(|mesh| !mesh.indices.is_empty());
+    let Dressed {
+        wood,
+        foliage,
+        bark_rgb,
+        ..
+    } = model.dressed;
+    let drawn = wood
+        .iter()
+        .chain(foliage.groups.iter().map(|g| &g.mesh))
+        .any(|mesh| !mesh.indices.is_empty());
     let mut texture = None;
     let (mut levels, mut leaves) = (Vec::new(), Vec::new());
     if drawn {
         let skin = push_skin(&mut root, &mut buffer, model);
         let material = root.push(bark(*bark_rgb));
         let wanted = if model.all_levels { wood.len() } else { 1 };
-        for (k, mesh) in wood.iter().take(wanted).enumerate().filter(|(_, mesh)| !mesh.indices.is_empty()) {
-            let name = if k == 0 { "tree".to_owned() } else { format!("tree_lod{k}") };
-            levels.push(push_mesh(&mut root, &mut buffer, model, Skinned::wood(mesh, material, skin, name))?);
+        for (k, mesh) in wood
+            .iter()
+            .take(wanted)
+            .enumerate()
+            .filter(|(_, mesh)| !mesh.indices.is_empty())
+        {
+            let name = if k == 0 {
+                "tree".to_owned()
+            } else {
+                format!("tree_lod{k}")
+            };
+            levels.push(push_mesh(
+                &mut root,
+                &mut buffer,
+                model,
+                Skinned::wood(mesh, material, skin, name),
+            )?);
         }
-        let shown = || foliage.groups.iter().enumerate().filter(|(_, group)| !group.mesh.indices.is_empty());
+        let shown = || {
+            foliage
+                .groups
+                .iter()
+                .enumerate()
+                .filter(|(_, group)| !group.mesh.indices.is_empty())
+        };
         if shown().next().is_some() {
             let material;
             let beyond = |[u, v]: &[f32; 2]| u.min(*v) < -0.01 || u.max(*v) > 1.01;
             let tiled = foliage.groups.iter().any(|g| g.mesh.uvs.iter().any(beyond));
-            (material, texture) = leaf(&mut root, &mut buffer, foliage.texture.as_ref(), tiled, texture_apart)?;
+            (material, texture) = leaf(
+                &mut root,
+                &mut buffer,
+                foliage.texture.as_ref(),
+                tiled,
+                texture_apart,
+            )?;
             for (k, group) in shown() {
                 let branch = model.skeleton.name_of(group.node);
                 let what = Skinned::leaves(group, material, skin, format!("leaves_{k}"), branch);
@@ -165,33 +242,48 @@ fn assemble(model: &Model, texture_apart: bool) -> Result<Assembled, ExportError
         keys: moving.keys(),
         raw_keys: moving.raw_keys(),
     };
-    Ok(Assembled { root, buffer, animation, texture })
+    Ok(Assembled {
+        root,
+        buffer,
+        animation,
+        texture,
+    })
 }
 
 /// JSON text that is written as it stands; `null` is left out.
 pub(super) fn raw(value: &Value) -> Result<Option<Box<RawValue>>, ExportError> {
     let text = (!value.is_null()).then(|| value.to_string());
-    text.map(RawValue::from_string).transpose().map_err(|e| ExportError::unfit(e.to_string()))
+    text.map(RawValue::from_string)
+        .transpose()
+        .map_err(|e| ExportError::unfit(e.to_string()))
 }
 
 /// One glTF node a skeleton node, in the same order, so that the indices agree.
 fn push_joints(root: &mut Root, model: &Model) -> Result<(), ExportError> {
     let children = model.skeleton.children();
     for (i, node) in model.skeleton.nodes.iter().enumerate() {
-        let parent_pivot = node.parent.map_or_else(nalgebra::Vector3::zeros, |p| model.pivot(p.index()));
+        let parent_pivot = node
+            .parent
+            .map_or_else(nalgebra::Vector3::zeros, |p| model.pivot(p.index()));
         let t = model.pivot(i) - parent_pivot;
-        let (name, original) = (node.name.0, node.copy_of.and_then(|o| model.skeleton.name_of(o)));
+        let (name, original) = (
+            node.name.0,
+            node.copy_of.and_then(|o| model.skeleton.name_of(o)),
+        );
         let mut extras = json!({
             "level": node.level,
             "n_tracks": node.n_tracks,
             "certainty": node.certainty,
             "copy_of": original.map(|c| c.0),
         });
-        if let (Some(all), Some(Value::Object(more))) = (extras.as_object_mut(), model.node_extras.get(i)) {
+        if let (Some(all), Some(Value::Object(more))) =
+            (extras.as_object_mut(), model.node_extras.get(i))
+        {
             all.extend(more.clone());
         }
         root.nodes.push(Node {
-            children: (!children[i].is_empty()).then(|| children[i].iter().map(|c| Index::new(c.0)).collect()),
+            children: (!children[i].is_empty())
+                .then(|| children[i].iter().map(|c| Index::new(c.0)).collect()),
             extras: raw(&extras)?,
             name: Some(match original {
                 Some(original) => format!("node_{name}_copy_of_{}", original.0),
@@ -204,13 +296,29 @@ fn push_joints(root: &mut Root, model: &Model) -> Result<(), ExportError> {
     Ok(())
 }
 
-/// A scene for each level of the wood, which stands beside the joints and not below them: a skin is placed by its joints
-/// alone. The first is the one that is shown.
-fn push_scenes(root: &mut Root, levels: &[Index<Node>], leaves: impl Iterator<Item = Index<Node>> + Clone) {
+/// A scene for each level of the wood, which stands beside the joints and not below them: a skin is
+/// placed by its joints alone. The first is the one that is shown.
+fn push_scenes(
+    root: &mut Root,
+    levels: &[Index<Node>],
+    leaves: impl Iterator<Item = Index<Node>> + Clone,
+) {
     for k in 0..levels.len().max(1) {
-        let nodes = std::iter::once(Index::new(0)).chain(levels.get(k).copied()).chain(leaves.clone()).collect();
-        let name = if levels.len() > 1 { format!("lod{k}") } else { "arborcam".to_owned() };
-        root.push(Scene { extensions: None, extras: None, name: Some(name), nodes });
+        let nodes = std::iter::once(Index::new(0))
+            .chain(levels.get(k).copied())
+            .chain(leaves.clone())
+            .collect();
+        let name = if levels.len() > 1 {
+            format!("lod{k}")
+        } else {
+            "arborcam".to_owned()
+        };
+        root.push(Scene {
+            extensions: None,
+            extras: None,
+            name: Some(name),
+            nodes,
+        });
     }
     root.scene = Some(Index::new(0));
 }
@@ -218,5 +326,13 @@ fn push_scenes(root: &mut Root, levels: &[Index<Node>], leaves: impl Iterator<It
 /// A name as a relative link.
 fn percent(name: &str) -> String {
     let plain = |b: u8| b.is_ascii_alphanumeric() || b"-._~".contains(&b);
-    name.bytes().map(|b| if plain(b) { char::from(b).to_string() } else { format!("%{b:02X}") }).collect()
+    name.bytes()
+        .map(|b| {
+            if plain(b) {
+                char::from(b).to_string()
+            } else {
+                format!("%{b:02X}")
+            }
+        })
+        .collect()
 }

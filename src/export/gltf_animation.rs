@@ -17,7 +17,8 @@ struct Track<const N: usize> {
     values: Vec<[f32; N]>,
 }
 
-/// Adds the animation, if anything moves. `leaves` are the groups that are in the file, by their place among all groups.
+/// Adds the animation, if anything moves. `leaves` are the groups that are in the file, by their
+/// place among all groups.
 pub(super) fn push_animation(
     root: &mut Root,
     buffer: &mut BufferBuilder,
@@ -28,24 +29,48 @@ pub(super) fn push_animation(
     let turns: Vec<Track<4>> = moving
         .joints
         .iter()
-        .map(|k| Track { node: Index::new(k.node as u32), times_s: k.times_s.clone(), values: k.rotations.clone() })
+        .map(|k| Track {
+            node: Index::new(k.node as u32),
+            times_s: k.times_s.clone(),
+            values: k.rotations.clone(),
+        })
         .collect();
-    let swings: Vec<Track<2>> = leaves.iter().filter_map(|(k, node)| swing(model, moving, *k, *node)).collect();
+    let swings: Vec<Track<2>> = leaves
+        .iter()
+        .filter_map(|(k, node)| swing(model, moving, *k, *node))
+        .collect();
     if turns.is_empty() && swings.is_empty() {
         return;
     }
     let name = Some("sway".to_string());
-    let mut animation = Animation { extensions: None, extras: None, channels: Vec::new(), name, samplers: Vec::new() };
+    let mut animation = Animation {
+        extensions: None,
+        extras: None,
+        channels: Vec::new(),
+        name,
+        samplers: Vec::new(),
+    };
     push_tracks(root, buffer, &mut animation, &turns, Property::Rotation);
-    push_tracks(root, buffer, &mut animation, &swings, Property::MorphTargetWeights);
+    push_tracks(
+        root,
+        buffer,
+        &mut animation,
+        &swings,
+        Property::MorphTargetWeights,
+    );
     root.push(animation);
 }
 
-/// The weights of a group's displacements, thinned so that no leaf is off by more than the tolerance; `None` where it
-/// never swings.
+/// The weights of a group's displacements, thinned so that no leaf is off by more than the
+/// tolerance; `None` where it never swings.
 fn swing(model: &Model, moving: &Moving, group: usize, node: Index<Node>) -> Option<Track<2>> {
     let all = model.flutter.get(group)?;
-    let weights: Vec<[f32; 2]> = moving.kept.iter().filter_map(|&k| all.get(k)).copied().collect();
+    let weights: Vec<[f32; 2]> = moving
+        .kept
+        .iter()
+        .filter_map(|&k| all.get(k))
+        .copied()
+        .collect();
     if weights.iter().flatten().all(|w| *w == 0.0) {
         return None;
     }
@@ -63,7 +88,9 @@ fn swing(model: &Model, moving: &Moving, group: usize, node: Index<Node>) -> Opt
         off(0) + off(1) <= model.tolerance_px
     };
     let still = (0..weights.len()).all(|k| fits(0, 0, k));
-    let kept = thin(weights.len(), still, |a, b| (a + 1..b).all(|k| fits(a, b, k)));
+    let kept = thin(weights.len(), still, |a, b| {
+        (a + 1..b).all(|k| fits(a, b, k))
+    });
     Some(Track {
         node,
         times_s: kept.iter().map(|&k| times[k] as f32).collect(),
@@ -83,8 +110,14 @@ fn push_tracks<const N: usize>(
         return;
     }
     // Weights of displacements are single numbers one after another.
-    let (shape, each) = if property == Property::Rotation { (Type::Vec4, 1) } else { (Type::Scalar, N) };
-    let time_bytes = tracks.iter().flat_map(|t| t.times_s.iter().flat_map(|t| t.to_le_bytes()));
+    let (shape, each) = if property == Property::Rotation {
+        (Type::Vec4, 1)
+    } else {
+        (Type::Scalar, N)
+    };
+    let time_bytes = tracks
+        .iter()
+        .flat_map(|t| t.times_s.iter().flat_map(|t| t.to_le_bytes()));
     let times = buffer.view(root, time_bytes, None);
     let values = buffer.view(root, tracks.iter().flat_map(|t| le_f32(&t.values)), None);
     let mut before = 0;
@@ -94,12 +127,33 @@ fn push_tracks<const N: usize>(
         input.min = track.times_s.first().map(|t| json!([t]));
         input.max = track.times_s.last().map(|t| json!([t]));
         let input = root.push(input);
-        let output = root.push(accessor(values, 4 * N * before, Layout::f32(shape), count * each));
+        let output = root.push(accessor(
+            values,
+            4 * N * before,
+            Layout::f32(shape),
+            count * each,
+        ));
         before += count;
         let interpolation = Valid(Interpolation::Linear);
         let sampler = Index::new(animation.samplers.len() as u32);
-        animation.samplers.push(Sampler { extensions: None, extras: None, input, interpolation, output });
-        let target = Target { extensions: None, extras: None, node: track.node, path: Valid(property) };
-        animation.channels.push(Channel { sampler, target, extensions: None, extras: None });
+        animation.samplers.push(Sampler {
+            extensions: None,
+            extras: None,
+            input,
+            interpolation,
+            output,
+        });
+        let target = Target {
+            extensions: None,
+            extras: None,
+            node: track.node,
+            path: Valid(property),
+        };
+        animation.channels.push(Channel {
+            sampler,
+            target,
+            extensions: None,
+            extras: None,
+        });
     }
 }

@@ -22,11 +22,19 @@ pub(super) struct Layout {
 
 impl Layout {
     pub const fn f32(shape: Type) -> Self {
-        Self { component: ComponentType::F32, shape, normalized: false }
+        Self {
+            component: ComponentType::F32,
+            shape,
+            normalized: false,
+        }
     }
 
     pub const fn normalized(component: ComponentType, shape: Type) -> Self {
-        Self { component, shape, normalized: true }
+        Self {
+            component,
+            shape,
+            normalized: true,
+        }
     }
 }
 
@@ -38,7 +46,12 @@ impl BufferBuilder {
     }
 
     /// Appends the bytes as a view of their own.
-    pub fn view(&mut self, root: &mut Root, data: impl Iterator<Item = u8>, target: Option<Target>) -> Index<View> {
+    pub fn view(
+        &mut self,
+        root: &mut Root,
+        data: impl Iterator<Item = u8>,
+        target: Option<Target>,
+    ) -> Index<View> {
         let offset = self.align();
         self.bytes.extend(data);
         root.push(View {
@@ -66,15 +79,21 @@ impl BufferBuilder {
         root.push(accessor(view, 0, layout, count))
     }
 
-    /// Declares the buffer, if anything is in it, and returns its bytes; `uri` is the file that they go into, if they do
-    /// not follow in the same one.
+    /// Declares the buffer, if anything is in it, and returns its bytes; `uri` is the file that
+    /// they go into, if they do not follow in the same one.
     pub fn finish(mut self, root: &mut Root, uri: Option<String>) -> Option<Vec<u8>> {
         if self.bytes.is_empty() {
             return None;
         }
         self.align();
         let byte_length = USize64::from(self.bytes.len());
-        root.push(Buffer { byte_length, name: None, uri, extensions: None, extras: None });
+        root.push(Buffer {
+            byte_length,
+            name: None,
+            uri,
+            extensions: None,
+            extras: None,
+        });
         Some(self.bytes)
     }
 }
@@ -105,11 +124,12 @@ pub(super) fn le_f32<const N: usize>(rows: &[[f32; N]]) -> impl Iterator<Item = 
 /// Smallest and largest value of every column; of no rows both are 0.
 pub(super) fn bounds<const N: usize>(rows: &[[f32; N]]) -> ([f32; N], [f32; N]) {
     let first = rows.first().copied().unwrap_or([0.0; N]);
-    rows.iter().fold((first, first), |(mut low, mut high), row| {
-        for (c, &x) in row.iter().enumerate() {
-            low[c] = low[c].min(x);
-            high[c] = high[c].max(x);
-        }
-        (low, high)
-    })
+    rows.iter()
+        .fold((first, first), |(mut low, mut high), row| {
+            for (c, &x) in row.iter().enumerate() {
+                low[c] = low[c].min(x);
+                high[c] = high[c].max(x);
+            }
+            (low, high)
+        })
 }

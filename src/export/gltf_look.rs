@@ -3,15 +3,22 @@
 use super::ExportError;
 use super::gltf_buffer::BufferBuilder;
 use gltf_json::image::MimeType;
-use gltf_json::material::{AlphaCutoff, AlphaMode, Material, PbrBaseColorFactor, PbrMetallicRoughness, StrengthFactor};
+use gltf_json::material::{
+    AlphaCutoff, AlphaMode, Material, PbrBaseColorFactor, PbrMetallicRoughness, StrengthFactor,
+};
 use gltf_json::texture::{Info, MagFilter, MinFilter, Sampler, Texture, WrappingMode};
 use gltf_json::validation::Checked::Valid;
 use gltf_json::{Image, Index, Root};
 
-/// glTF colours are linear, those of a picture are not (sRGB transfer function, IEC 61966-2-1). 0 to 1.
+/// glTF colours are linear, those of a picture are not (sRGB transfer function, IEC 61966-2-1). 0
+/// to 1.
 pub(super) fn linear(channel: u8) -> f32 {
     let c = f32::from(channel) / 255.0;
-    if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+    if c <= 0.04045 {
+        c / 12.92
+    } else {
+        ((c + 0.055) / 1.055).powf(2.4)
+    }
 }
 
 /// One colour (sRGB).
@@ -29,9 +36,9 @@ pub(super) fn bark(rgb: [u8; 3]) -> Material {
     }
 }
 
-/// Leaves take their colour from their vertices, and shape and veins from the texture, where there is one: seen from both
-/// sides, cut out where it is clear, repeated where it is `tiled`. With `apart` the picture is given back with its file's ending instead of being put
-/// into the buffer.
+/// Leaves take their colour from their vertices, and shape and veins from the texture, where there
+/// is one: seen from both sides, cut out where it is clear, repeated where it is `tiled`. With
+/// `apart` the picture is given back with its file's ending instead of being put into the buffer.
 #[allow(clippy::type_complexity)]
 pub(super) fn leaf(
     root: &mut Root,
@@ -56,7 +63,9 @@ pub(super) fn leaf(
             "image/png" => "png",
             "image/jpeg" => "jpg",
             other => {
-                return Err(ExportError::unfit(format!("{other} is no texture for a model, only PNG and JPEG are")));
+                return Err(ExportError::unfit(format!(
+                    "{other} is no texture for a model, only PNG and JPEG are"
+                )));
             }
         };
         let buffer_view = (!apart).then(|| buffer.view(root, bytes.iter().copied(), None));
@@ -70,7 +79,11 @@ pub(super) fn leaf(
             extras: None,
         });
         // A picture of one leaf must not come in again at its other edge.
-        let wrap = if tiled { WrappingMode::Repeat } else { WrappingMode::ClampToEdge };
+        let wrap = if tiled {
+            WrappingMode::Repeat
+        } else {
+            WrappingMode::ClampToEdge
+        };
         let sampler = root.push(Sampler {
             mag_filter: Some(Valid(MagFilter::Linear)),
             min_filter: Some(Valid(MinFilter::LinearMipmapLinear)),
@@ -81,8 +94,19 @@ pub(super) fn leaf(
             extras: None,
         });
         let name = Some("leaf".to_string());
-        let texture = root.push(Texture { name, sampler: Some(sampler), source, extensions: None, extras: None });
-        let info = Info { index: texture, tex_coord: 0, extensions: None, extras: None };
+        let texture = root.push(Texture {
+            name,
+            sampler: Some(sampler),
+            source,
+            extensions: None,
+            extras: None,
+        });
+        let info = Info {
+            index: texture,
+            tex_coord: 0,
+            extensions: None,
+            extras: None,
+        };
         material.pbr_metallic_roughness.base_color_texture = Some(info);
         material.alpha_mode = Valid(AlphaMode::Mask);
         material.alpha_cutoff = Some(AlphaCutoff(0.5));

@@ -29,8 +29,21 @@ pub(super) struct Skinned<'a> {
 }
 
 impl<'a> Skinned<'a> {
-    pub fn wood(mesh: &'a Mesh, material: Index<Material>, skin: Index<Skin>, name: String) -> Self {
-        Self { mesh, colours: &[], targets: Vec::new(), material, skin, name, extras: Value::Null }
+    pub fn wood(
+        mesh: &'a Mesh,
+        material: Index<Material>,
+        skin: Index<Skin>,
+        name: String,
+    ) -> Self {
+        Self {
+            mesh,
+            colours: &[],
+            targets: Vec::new(),
+            material,
+            skin,
+            name,
+            extras: Value::Null,
+        }
     }
 
     /// `branch` is the one with which the leaves swing.
@@ -43,7 +56,15 @@ impl<'a> Skinned<'a> {
     ) -> Self {
         let targets = vec![&group.sine[..], &group.cosine[..]];
         let extras = json!({ "node": branch.map(|b| b.0) });
-        Self { mesh: &group.mesh, colours: &group.colours, targets, material, skin, name, extras }
+        Self {
+            mesh: &group.mesh,
+            colours: &group.colours,
+            targets,
+            material,
+            skin,
+            name,
+            extras,
+        }
     }
 }
 
@@ -62,7 +83,13 @@ pub(super) fn push_mesh(
     let normals: Vec<[f32; 3]> = mesh.normals.iter().map(unit).collect();
     let normal = buffer.accessor(root, Layout::f32(Type::Vec3), n, le_f32(&normals), vertices);
     attributes.insert(Valid(Semantic::Normals), normal);
-    let uv = buffer.accessor(root, Layout::f32(Type::Vec2), n, le_f32(&mesh.uvs), vertices);
+    let uv = buffer.accessor(
+        root,
+        Layout::f32(Type::Vec2),
+        n,
+        le_f32(&mesh.uvs),
+        vertices,
+    );
     attributes.insert(Valid(Semantic::TexCoords(0)), uv);
     if !what.colours.is_empty() {
         // Two bytes a channel: the linear scale has too few dark steps in one.
@@ -71,21 +98,44 @@ pub(super) fn push_mesh(
             [r, g, b, u16::MAX].into_iter().flat_map(u16::to_le_bytes)
         });
         let layout = Layout::normalized(ComponentType::U16, Type::Vec4);
-        attributes.insert(Valid(Semantic::Colors(0)), buffer.accessor(root, layout, n, bytes, vertices));
+        attributes.insert(
+            Valid(Semantic::Colors(0)),
+            buffer.accessor(root, layout, n, bytes, vertices),
+        );
     }
     let Skinning { joints, weights } = skinning(mesh);
-    let layout = |size: usize| if size == 1 { ComponentType::U8 } else { ComponentType::U16 };
+    let layout = |size: usize| {
+        if size == 1 {
+            ComponentType::U8
+        } else {
+            ComponentType::U16
+        }
+    };
     let (size, bytes) = joints.le_bytes();
-    let joints = Layout { component: layout(size), shape: Type::Vec4, normalized: false };
-    attributes.insert(Valid(Semantic::Joints(0)), buffer.accessor(root, joints, n, bytes.into_iter(), vertices));
+    let joints = Layout {
+        component: layout(size),
+        shape: Type::Vec4,
+        normalized: false,
+    };
+    attributes.insert(
+        Valid(Semantic::Joints(0)),
+        buffer.accessor(root, joints, n, bytes.into_iter(), vertices),
+    );
     let (size, bytes) = weights.le_bytes();
     let weights = Layout::normalized(layout(size), Type::Vec4);
-    attributes.insert(Valid(Semantic::Weights(0)), buffer.accessor(root, weights, n, bytes.into_iter(), vertices));
+    attributes.insert(
+        Valid(Semantic::Weights(0)),
+        buffer.accessor(root, weights, n, bytes.into_iter(), vertices),
+    );
     let targets: Vec<MorphTarget> = what
         .targets
         .iter()
         .map(|by| push_places(root, buffer, by, model.scale()))
-        .map(|by| MorphTarget { positions: Some(by), normals: None, tangents: None })
+        .map(|by| MorphTarget {
+            positions: Some(by),
+            normals: None,
+            tangents: None,
+        })
         .collect();
     let indices = push_indices(root, buffer, mesh);
     let at_rest = vec![0.0; targets.len()];
@@ -100,20 +150,44 @@ pub(super) fn push_mesh(
     };
     let mesh = root.push(gltf_json::Mesh {
         extensions: None,
-        extras: if at_rest.is_empty() { None } else { raw(&json!({"targetNames": ["sine", "cosine"]}))? },
+        extras: if at_rest.is_empty() {
+            None
+        } else {
+            raw(&json!({"targetNames": ["sine", "cosine"]}))?
+        },
         name: Some(what.name.clone()),
         primitives: vec![primitive],
         weights: (!at_rest.is_empty()).then_some(at_rest),
     });
     let extras = raw(&what.extras)?;
-    Ok(root.push(Node { mesh: Some(mesh), skin: Some(what.skin), name: Some(what.name), extras, ..Node::default() }))
+    Ok(root.push(Node {
+        mesh: Some(mesh),
+        skin: Some(what.skin),
+        name: Some(what.name),
+        extras,
+        ..Node::default()
+    }))
 }
 
 /// Places or ways, px in the model, with the bounds that the format asks for.
-fn push_places(root: &mut Root, buffer: &mut BufferBuilder, rows: &[[f32; 3]], scale: f64) -> Index<Accessor> {
-    let scaled: Vec<[f32; 3]> = rows.iter().map(|p| p.map(|x| (f64::from(x) * scale) as f32)).collect();
+fn push_places(
+    root: &mut Root,
+    buffer: &mut BufferBuilder,
+    rows: &[[f32; 3]],
+    scale: f64,
+) -> Index<Accessor> {
+    let scaled: Vec<[f32; 3]> = rows
+        .iter()
+        .map(|p| p.map(|x| (f64::from(x) * scale) as f32))
+        .collect();
     let (low, high) = bounds(&scaled);
-    let places = buffer.accessor(root, Layout::f32(Type::Vec3), rows.len(), le_f32(&scaled), Some(ArrayBuffer));
+    let places = buffer.accessor(
+        root,
+        Layout::f32(Type::Vec3),
+        rows.len(),
+        le_f32(&scaled),
+        Some(ArrayBuffer),
+    );
     root.accessors[places.value()].min = Some(json!(low));
     root.accessors[places.value()].max = Some(json!(high));
     places
@@ -130,7 +204,11 @@ fn unit(normal: &[f32; 3]) -> [f32; 3] {
 fn push_indices(root: &mut Root, buffer: &mut BufferBuilder, mesh: &Mesh) -> Index<Accessor> {
     let target = Some(ElementArrayBuffer);
     let count = mesh.indices.len();
-    let layout = |component| Layout { component, shape: Type::Scalar, normalized: false };
+    let layout = |component| Layout {
+        component,
+        shape: Type::Scalar,
+        normalized: false,
+    };
     if mesh.positions.len() <= usize::from(u16::MAX) {
         let bytes = mesh.indices.iter().flat_map(|&i| (i as u16).to_le_bytes());
         buffer.accessor(root, layout(ComponentType::U16), count, bytes, target)
@@ -147,7 +225,9 @@ pub(super) fn push_skin(root: &mut Root, buffer: &mut BufferBuilder, model: &Mod
         .map(|i| {
             let back = -model.pivot(i);
             let (x, y, z) = (back.x as f32, back.y as f32, back.z as f32);
-            [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, x, y, z, 1.0]
+            [
+                1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, x, y, z, 1.0,
+            ]
         })
         .collect();
     let inverse_bind = buffer.accessor(root, Layout::f32(Type::Mat4), n, le_f32(&bind), None);

@@ -45,29 +45,55 @@ pub struct Branch {
     pub end: [f64; 3],
     /// What was identified of its sway; numbers that are not known are `null`.
     pub sway: Option<Columns>,
-    /// Angle to the parent branch at every one of [`Data::times_s`]: hundredths of a degree as 16-bit integers, little
-    /// endian, in base64; the lowest integer stands for one that is not known. `None` for the foot and for copies.
+    /// Angle to the parent branch at every one of [`Data::times_s`]: hundredths of a degree as
+    /// 16-bit integers, little endian, in base64; the lowest integer stands for one that is not
+    /// known. `None` for the foot and for copies.
     pub angle_deg: Option<String>,
 }
 
 impl Data {
-    /// The page's facts. `poses` are those of the animation in the order of time; `sway` is by node index, as for
-    /// `nodes.csv`, and may be shorter than the skeleton; `metres_per_px` is that of the model's file.
-    pub fn of(capture: &Capture, skeleton: &Skeleton, poses: &[Pose], sway: &[Swaying], metres_per_px: f64) -> Self {
+    /// The page's facts. `poses` are those of the animation in the order of time; `sway` is by node
+    /// index, as for
+    /// `nodes.csv`, and may be shorter than the skeleton; `metres_per_px` is that of the model's
+    /// file.
+    pub fn of(
+        capture: &Capture,
+        skeleton: &Skeleton,
+        poses: &[Pose],
+        sway: &[Swaying],
+        metres_per_px: f64,
+    ) -> Self {
         let size = skeleton.image_size;
-        let start_s = poses.iter().map(|p| p.time_s).find(|t| t.is_finite()).unwrap_or(0.0);
-        let source = capture.source.name.rsplit(['/', '\\']).find(|part| !part.is_empty()).unwrap_or_default();
+        let start_s = poses
+            .iter()
+            .map(|p| p.time_s)
+            .find(|t| t.is_finite())
+            .unwrap_or(0.0);
+        let source = capture
+            .source
+            .name
+            .rsplit(['/', '\\'])
+            .find(|part| !part.is_empty())
+            .unwrap_or_default();
         Self {
             source: source.to_owned(),
             software: format!("{} {}", capture.software.name, capture.software.version),
             metres_per_px,
             image: [size.width, size.height],
             foot_px: skeleton.foot_px,
-            outline_px: capture.outline.as_ref().map_or_else(Vec::new, |o| o.polygon_px.clone()),
+            outline_px: capture
+                .outline
+                .as_ref()
+                .map_or_else(Vec::new, |o| o.polygon_px.clone()),
             picture_time_s: capture.picture.as_ref().map(|p| p.time_s),
             start_s: rounded(start_s, 1e6),
-            times_s: poses.iter().map(|p| rounded(p.time_s - start_s, 1e6)).collect(),
-            branches: (0..skeleton.nodes.len()).map(|i| branch(skeleton, poses, sway, i)).collect(),
+            times_s: poses
+                .iter()
+                .map(|p| rounded(p.time_s - start_s, 1e6))
+                .collect(),
+            branches: (0..skeleton.nodes.len())
+                .map(|i| branch(skeleton, poses, sway, i))
+                .collect(),
         }
     }
 }
@@ -85,7 +111,8 @@ fn branch(skeleton: &Skeleton, poses: &[Pose], sway: &[Swaying], i: usize) -> Br
         n_tracks: node.n_tracks,
         end: [node.position.x, node.position.y, node.position.z].map(|x| rounded(x, 1e4)),
         sway,
-        angle_deg: measured.then(|| packed(&angle_to_parent_deg(skeleton, poses, NodeId(i as u32)))),
+        angle_deg: measured
+            .then(|| packed(&angle_to_parent_deg(skeleton, poses, NodeId(i as u32)))),
     }
 }
 
@@ -100,7 +127,12 @@ fn packed(angles_deg: &[f64]) -> String {
         x if x.is_finite() => x.clamp(f64::from(-i16::MAX), f64::from(i16::MAX)) as i16,
         _ => i16::MIN,
     };
-    STANDARD.encode(angles_deg.iter().flat_map(|a| hundredths(a).to_le_bytes()).collect::<Vec<u8>>())
+    STANDARD.encode(
+        angles_deg
+            .iter()
+            .flat_map(|a| hundredths(a).to_le_bytes())
+            .collect::<Vec<u8>>(),
+    )
 }
 
 #[cfg(test)]
@@ -109,8 +141,13 @@ mod tests {
 
     #[test]
     fn angles_are_packed_as_the_page_unpacks_them() {
-        let bytes = STANDARD.decode(packed(&[0.0, 1.234, -179.996, 400.0, f64::NAN])).unwrap();
-        let back: Vec<i16> = bytes.chunks(2).map(|b| i16::from_le_bytes([b[0], b[1]])).collect();
+        let bytes = STANDARD
+            .decode(packed(&[0.0, 1.234, -179.996, 400.0, f64::NAN]))
+            .unwrap();
+        let back: Vec<i16> = bytes
+            .chunks(2)
+            .map(|b| i16::from_le_bytes([b[0], b[1]]))
+            .collect();
         assert_eq!(back, [0, 123, -18000, i16::MAX, i16::MIN]);
     }
 }

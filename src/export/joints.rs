@@ -1,8 +1,9 @@
 //! From poses to the local rotations of glTF joints, thinned.
 //!
-//! Branch `i` turns about its parent node P(i) by Q_i(t), in model axes. Its glTF joint therefore rests at P(i) with
-//! identity rotation, is a child of P(i)'s joint, and turns by Q_P(i)^-1 Q_i; then a point x of the branch at rest is
-//! skinned to p_P(i)(t) + Q_i(t) (x - rest_P(i)), which is what `JointPose` means. The foot's joint stands still.
+//! Branch `i` turns about its parent node P(i) by Q_i(t), in model axes. Its glTF joint therefore
+//! rests at P(i) with identity rotation, is a child of P(i)'s joint, and turns by Q_P(i)^-1 Q_i;
+//! then a point x of the branch at rest is skinned to p_P(i)(t) + Q_i(t) (x - rest_P(i)), which is
+//! what `JointPose` means. The foot's joint stands still.
 
 use super::followed::{Followed, Shown, played};
 use super::sparse_keys::{Path, unit};
@@ -28,19 +29,33 @@ pub(super) struct Moving {
 }
 
 impl Moving {
-    /// Keys of all joints that move, with every node in every frame within `tolerance_px` of its pose on the screen of the
-    /// front view, where u and v are, and within twice that in depth, which was estimated and not seen: the error is
+    /// Keys of all joints that move, with every node in every frame within `tolerance_px` of its
+    /// pose on the screen of the front view, where u and v are, and within twice that in depth,
+    /// which was estimated and not seen: the error is
     /// `sqrt(du^2 + dv^2 + (dz / 2)^2)`.
     ///
-    /// Joints are thinned from the foot up, each against what its parent's kept keys show, so that a joint also makes good
-    /// its parent's error. The tolerance grows towards the tips: a node may be wrong by `tolerance sqrt(depth / depth of
-    /// the deepest tip above)`, of which its parent has used only a part.
-    pub fn new(skeleton: &Skeleton, all: &[Pose], tolerance_px: f64, thorough: &dyn Fn() -> bool) -> Self {
+    /// Joints are thinned from the foot up, each against what its parent's kept keys show, so that
+    /// a joint also makes good its parent's error. The tolerance grows towards the tips: a node may
+    /// be wrong by `tolerance sqrt(depth / depth of the deepest tip above)`, of which its parent
+    /// has used only a part.
+    pub fn new(
+        skeleton: &Skeleton,
+        all: &[Pose],
+        tolerance_px: f64,
+        thorough: &dyn Fn() -> bool,
+    ) -> Self {
         let (kept, times_s) = usable(all);
         let poses: Vec<&Pose> = kept.iter().map(|&k| &all[k]).collect();
-        let joints =
-            if poses.is_empty() { Vec::new() } else { keys(skeleton, (&poses, &times_s), tolerance_px, thorough) };
-        Self { joints, kept, times_s }
+        let joints = if poses.is_empty() {
+            Vec::new()
+        } else {
+            keys(skeleton, (&poses, &times_s), tolerance_px, thorough)
+        };
+        Self {
+            joints,
+            kept,
+            times_s,
+        }
     }
 
     /// Rotation keys that are left, and how many there were before thinning.
@@ -69,16 +84,27 @@ fn keys(
             continue;
         };
         let base = &shown[parent];
-        let branch = Followed::new(base, &rotations(poses, i), node, node.position - nodes[parent].position)
-            .within(tolerance_px, budget[i]);
+        let branch = Followed::new(
+            base,
+            &rotations(poses, i),
+            node,
+            node.position - nodes[parent].position,
+        )
+        .within(tolerance_px, budget[i]);
         let frames = 0..times.len();
-        if frames.clone().all(|k| branch.miss(k, &UnitQuaternion::identity()) <= 1.0) {
+        if frames
+            .clone()
+            .all(|k| branch.miss(k, &UnitQuaternion::identity()) <= 1.0)
+        {
             shown.push(branch.shown(base, &vec![UnitQuaternion::identity(); times.len()]));
             continue;
         }
         let aims = one_hemisphere(frames.clone().map(|k| branch.aim(k)));
-        let path =
-            Path { times_s: times, aims: &aims, miss: |k: usize, turn: &UnitQuaternion<f64>| branch.miss(k, turn) };
+        let path = Path {
+            times_s: times,
+            aims: &aims,
+            miss: |k: usize, turn: &UnitQuaternion<f64>| branch.miss(k, turn),
+        };
         let on_aims = {
             let aim = |k: usize| UnitQuaternion::new_unchecked(Quaternion::from(aims[k]));
             let spans = |a: usize, b: usize| {
@@ -93,7 +119,9 @@ fn keys(
         };
         let keys = if thorough() {
             // The plan takes arcs for straight, so even turning is better off on its path.
-            let planned = path.mended(branch.planned(&aims, times)).filter(|keys| keys.len() < on_aims.len());
+            let planned = path
+                .mended(branch.planned(&aims, times))
+                .filter(|keys| keys.len() < on_aims.len());
             path.fewer(planned.unwrap_or(on_aims))
         } else {
             on_aims
@@ -103,15 +131,23 @@ fn keys(
         out.push(Keys {
             node: i,
             times_s: keys.iter().map(|(k, _)| times[*k] as f32).collect(),
-            rotations: rotations.iter().map(|q| [q.x as f32, q.y as f32, q.z as f32, q.w as f32]).collect(),
+            rotations: rotations
+                .iter()
+                .map(|q| [q.x as f32, q.y as f32, q.z as f32, q.w as f32])
+                .collect(),
         });
     }
     out
 }
 
-/// Places of the poses whose time grows, also as `f32`, which is what the file holds; and their times from the first on.
+/// Places of the poses whose time grows, also as `f32`, which is what the file holds; and their
+/// times from the first on.
 fn usable(poses: &[Pose]) -> (Vec<usize>, Vec<f64>) {
-    let start = poses.iter().map(|p| p.time_s).find(|t| t.is_finite()).unwrap_or(0.0);
+    let start = poses
+        .iter()
+        .map(|p| p.time_s)
+        .find(|t| t.is_finite())
+        .unwrap_or(0.0);
     let (mut kept, mut times): (Vec<usize>, Vec<f64>) = (Vec::new(), Vec::new());
     for (k, pose) in poses.iter().enumerate() {
         let time = f64::from((pose.time_s - start) as f32);
@@ -141,7 +177,11 @@ fn one_hemisphere(rotations: impl Iterator<Item = UnitQuaternion<f64>>) -> Vec<V
     let mut last = Vector4::new(0.0, 0.0, 0.0, 1.0);
     rotations
         .map(|q| {
-            last = if q.coords.dot(&last) < 0.0 { -q.coords } else { q.coords };
+            last = if q.coords.dot(&last) < 0.0 {
+                -q.coords
+            } else {
+                q.coords
+            };
             last
         })
         .collect()
@@ -160,5 +200,9 @@ fn budgets(skeleton: &Skeleton) -> Vec<f64> {
             deepest[p.index()] = deepest[p.index()].max(deepest[i]);
         }
     }
-    depth.iter().zip(&deepest).map(|(&d, &of)| (f64::from(d) / f64::from(of.max(1))).sqrt()).collect()
+    depth
+        .iter()
+        .zip(&deepest)
+        .map(|(&d, &of)| (f64::from(d) / f64::from(of.max(1))).sqrt())
+        .collect()
 }

@@ -1,5 +1,5 @@
-//! Files for other programs. What goes into a file is made as pure bytes or over any writer; only [`OutputFolder`]
-//! and [`files`] touch the disk.
+//! Files for other programs. What goes into a file is made as pure bytes or over any writer; only
+//! [`OutputFolder`] and [`files`] touch the disk.
 
 mod appear;
 pub mod capture;

@@ -1,7 +1,7 @@
 //! Numbers as text, the same on every machine.
 
-/// Appends `x` with at most `decimals` digits after the point, no trailing zeros, no exponent and no negative zero;
-/// nothing at all for what is no number.
+/// Appends `x` with at most `decimals` digits after the point, no trailing zeros, no exponent and
+/// no negative zero; nothing at all for what is no number.
 pub(super) fn push(out: &mut String, x: f64, decimals: usize) {
     use std::fmt::Write;
     if !x.is_finite() {
@@ -11,7 +11,13 @@ pub(super) fn push(out: &mut String, x: f64, decimals: usize) {
     // Writing to a string cannot fail.
     let _ = write!(out, "{x:.decimals$}");
     if decimals > 0 {
-        out.truncate(start + out[start..].trim_end_matches('0').trim_end_matches('.').len());
+        out.truncate(
+            start
+                + out[start..]
+                    .trim_end_matches('0')
+                    .trim_end_matches('.')
+                    .len(),
+        );
     }
     if &out[start..] == "-0" {
         out.remove(start);

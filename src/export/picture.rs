@@ -16,7 +16,10 @@ const QUALITY: u8 = 90;
 /// # Errors
 /// As of [`jpeg`].
 pub fn data_address(picture: &Rgb) -> Result<String, ExportError> {
-    Ok(format!("data:image/jpeg;base64,{}", STANDARD.encode(jpeg(picture)?)))
+    Ok(format!(
+        "data:image/jpeg;base64,{}",
+        STANDARD.encode(jpeg(picture)?)
+    ))
 }
 
 /// The bytes of a JPEG file; the same on every machine.
@@ -27,7 +30,12 @@ pub fn jpeg(picture: &Rgb) -> Result<Vec<u8>, ExportError> {
     let mut bytes = Vec::new();
     let (width, height) = (picture.size.width, picture.size.height);
     JpegEncoder::new_with_quality(&mut bytes, QUALITY)
-        .encode(&picture.pixels, width, height, image::ExtendedColorType::Rgb8)
+        .encode(
+            &picture.pixels,
+            width,
+            height,
+            image::ExtendedColorType::Rgb8,
+        )
         .map_err(|e| ExportError::unfit(format!("the picture cannot be a JPEG: {e}")))?;
     Ok(bytes)
 }

@@ -1,8 +1,9 @@
 //! Fewer keys by keys that lie beside the path.
 //!
-//! Keys that lie on a path cut its bends and carry its noise; keys that may lie beside it, within the tolerance, are fewer by
-//! a fifth. One key after the other is tried to be left out, its neighbours moved so that the largest miss between them is
-//! as small as can be: least squares with the weights of Lawson (1961), which grow where the miss is large.
+//! Keys that lie on a path cut its bends and carry its noise; keys that may lie beside it, within
+//! the tolerance, are fewer by a fifth. One key after the other is tried to be left out, its
+//! neighbours moved so that the largest miss between them is as small as can be: least squares with
+//! the weights of Lawson (1961), which grow where the miss is large.
 
 use super::thin_keys::{Arc, share};
 use nalgebra::{Quaternion, UnitQuaternion, Vector4};
@@ -13,7 +14,8 @@ const ITERATIONS: usize = 16;
 /// By now the misses show whether there is a chance.
 const LOOKED_AT: usize = 3;
 const HOPELESS: f64 = 1.8;
-/// Turns that differ by less (as quaternions) are one: far below what tolerances are, far above rounding.
+/// Turns that differ by less (as quaternions) are one: far below what tolerances are, far above
+/// rounding.
 const CLOSED: f64 = 1e-7;
 
 /// A key of one joint: its frame, and the turn, not quite of length 1.
@@ -34,7 +36,8 @@ impl<F: Fn(usize, &UnitQuaternion<f64>) -> f64> Path<'_, F> {
         frames.iter().map(|&k| (k, self.aims[k])).collect()
     }
 
-    /// Keys that were planned by a rule of thumb, with those moved that miss; `None` where that does not do.
+    /// Keys that were planned by a rule of thumb, with those moved that miss; `None` where that
+    /// does not do.
     pub fn mended(&self, mut keys: Vec<Key>) -> Option<Vec<Key>> {
         if self.closes()
             && let [first, .., last] = keys.as_mut_slice()
@@ -43,7 +46,10 @@ impl<F: Fn(usize, &UnitQuaternion<f64>) -> f64> Path<'_, F> {
         }
         for j in 1..keys.len() {
             if !self.fits(&keys[j - 1], &keys[j]) {
-                let window = (j.saturating_sub(1 + WINDOW), (j + WINDOW).min(keys.len() - 1));
+                let window = (
+                    j.saturating_sub(1 + WINDOW),
+                    (j + WINDOW).min(keys.len() - 1),
+                );
                 if !self.fit(&mut keys, window) {
                     return None;
                 }
@@ -68,27 +74,40 @@ impl<F: Fn(usize, &UnitQuaternion<f64>) -> f64> Path<'_, F> {
     fn without(&self, keys: &[Key], j: usize) -> Option<Vec<Key>> {
         let mut fewer = keys.to_vec();
         fewer.remove(j);
-        let window = (j.saturating_sub(WINDOW), (j + WINDOW - 1).min(fewer.len() - 1));
+        let window = (
+            j.saturating_sub(WINDOW),
+            (j + WINDOW - 1).min(fewer.len() - 1),
+        );
         self.fit(&mut fewer, window).then_some(fewer)
     }
 
     /// Whether the path ends where it began: a loop must close with its keys, too.
     fn closes(&self) -> bool {
-        self.aims.first().zip(self.aims.last()).is_some_and(|(a, b)| (a - b).norm().min((a + b).norm()) < CLOSED)
+        self.aims
+            .first()
+            .zip(self.aims.last())
+            .is_some_and(|(a, b)| (a - b).norm().min((a + b).norm()) < CLOSED)
     }
 
     /// Whether the way between two keys does.
     fn fits(&self, from: &Key, to: &Key) -> bool {
         let arc = Arc::new(&unit(&from.1), &unit(&to.1));
-        (from.0..=to.0).all(|k| (self.miss)(k, &arc.at(share(self.times_s, from.0, to.0, k))) <= 1.0)
+        (from.0..=to.0)
+            .all(|k| (self.miss)(k, &arc.at(share(self.times_s, from.0, to.0, k))) <= 1.0)
     }
 
-    /// Moves keys so that everything from key `low` to key `high` fits; `false` if that cannot be. These two stay where they
-    /// are, unless the path itself ends there and is no loop.
+    /// Moves keys so that everything from key `low` to key `high` fits; `false` if that cannot be.
+    /// These two stay where they are, unless the path itself ends there and is no loop.
     fn fit(&self, keys: &mut [Key], (low, high): (usize, usize)) -> bool {
         let ends = !self.closes();
-        let free =
-            (if low == 0 && ends { 0 } else { low + 1 }, if high + 1 == keys.len() && ends { high + 1 } else { high });
+        let free = (
+            if low == 0 && ends { 0 } else { low + 1 },
+            if high + 1 == keys.len() && ends {
+                high + 1
+            } else {
+                high
+            },
+        );
         let (first, last) = (keys[low].0, keys[high].0);
         let mut weights = vec![1.0; last - first + 1];
         for round in 0..ITERATIONS {
@@ -119,9 +138,16 @@ impl<F: Fn(usize, &UnitQuaternion<f64>) -> f64> Path<'_, F> {
     }
 
     /// Least squares in the free keys: a symmetric system with three diagonals.
-    fn solve(&self, keys: &mut [Key], (low, high): (usize, usize), free: (usize, usize), weights: &[f64]) {
+    fn solve(
+        &self,
+        keys: &mut [Key],
+        (low, high): (usize, usize),
+        free: (usize, usize),
+        weights: &[f64],
+    ) {
         let n = free.1 - free.0;
-        let (mut diagonal, mut beside, mut right) = (vec![0.0; n], vec![0.0; n], vec![Vector4::zeros(); n]);
+        let (mut diagonal, mut beside, mut right) =
+            (vec![0.0; n], vec![0.0; n], vec![Vector4::zeros(); n]);
         let first = keys[low].0;
         let place = |key: usize| (free.0..free.1).contains(&key).then(|| key - free.0);
         for key in low..high {
@@ -159,7 +185,11 @@ impl<F: Fn(usize, &UnitQuaternion<f64>) -> f64> Path<'_, F> {
             right[i] -= above * m;
         }
         for i in (0..n).rev() {
-            let next = if i + 1 < n { keys[free.0 + i + 1].1 * beside[i] } else { Vector4::zeros() };
+            let next = if i + 1 < n {
+                keys[free.0 + i + 1].1 * beside[i]
+            } else {
+                Vector4::zeros()
+            };
             keys[free.0 + i].1 = (right[i] - next) / diagonal[i].max(1e-12);
         }
     }

@@ -5,7 +5,8 @@ use crate::model::Swaying;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-/// A branch's sway as the six columns of `nodes.csv`; no number (`null` in JSON) where a value is not known.
+/// A branch's sway as the six columns of `nodes.csv`; no number (`null` in JSON) where a value is
+/// not known.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Columns {
     pub frequency_hz: f64,
@@ -20,16 +21,40 @@ pub struct Columns {
 impl Columns {
     /// The columns of one branch.
     pub fn of(sway: &Swaying) -> Self {
-        let columns = |i: Option<crate::model::Interval>| i.map_or([f64::NAN; 3], |i| [i.value, i.lo, i.hi]);
-        let [frequency_hz, frequency_lo_hz, frequency_hi_hz] = columns(sway.ok().map(|s| s.frequency_hz));
-        let [damping_ratio, damping_lo, damping_hi] = columns(sway.ok().and_then(|s| s.damping_ratio));
-        Self { frequency_hz, frequency_lo_hz, frequency_hi_hz, damping_ratio, damping_lo, damping_hi }
+        let columns =
+            |i: Option<crate::model::Interval>| i.map_or([f64::NAN; 3], |i| [i.value, i.lo, i.hi]);
+        let [frequency_hz, frequency_lo_hz, frequency_hi_hz] =
+            columns(sway.ok().map(|s| s.frequency_hz));
+        let [damping_ratio, damping_lo, damping_hi] =
+            columns(sway.ok().and_then(|s| s.damping_ratio));
+        Self {
+            frequency_hz,
+            frequency_lo_hz,
+            frequency_hi_hz,
+            damping_ratio,
+            damping_lo,
+            damping_hi,
+        }
     }
 
     /// In the order of the columns.
     pub fn values(&self) -> [f64; 6] {
-        let Self { frequency_hz, frequency_lo_hz, frequency_hi_hz, damping_ratio, damping_lo, damping_hi } = *self;
-        [frequency_hz, frequency_lo_hz, frequency_hi_hz, damping_ratio, damping_lo, damping_hi]
+        let Self {
+            frequency_hz,
+            frequency_lo_hz,
+            frequency_hi_hz,
+            damping_ratio,
+            damping_lo,
+            damping_hi,
+        } = *self;
+        [
+            frequency_hz,
+            frequency_lo_hz,
+            frequency_hi_hz,
+            damping_ratio,
+            damping_lo,
+            damping_hi,
+        ]
     }
 }
 
@@ -45,10 +70,22 @@ pub(super) fn cells(sway: &Swaying) -> [String; 10] {
     let excitation = sway.map_or("", |s| s.excitation.word());
     let amplitude = told(sway.map_or(f64::NAN, |s| s.amplitude_deg), 4);
     let why = sway.err().map_or("", crate::model::Unidentified::word);
-    [a, b, c, d, e, f, identifiable.into(), excitation.into(), amplitude, why.into()]
+    [
+        a,
+        b,
+        c,
+        d,
+        e,
+        f,
+        identifiable.into(),
+        excitation.into(),
+        amplitude,
+        why.into(),
+    ]
 }
 
-/// For the `extras` of a joint: what is known of its sway, with 95 % intervals; nothing for one that was not measured.
+/// For the `extras` of a joint: what is known of its sway, with 95 % intervals; nothing for one
+/// that was not measured.
 pub fn extras(sway: &Swaying) -> Value {
     let mut all = Map::new();
     let mut put = |name: &str, value: f64, lo: f64, hi: f64| {
@@ -63,7 +100,9 @@ pub fn extras(sway: &Swaying) -> Value {
         Ok(sway) => {
             let f = sway.frequency_hz;
             put("frequency_hz", f.value, f.lo, f.hi);
-            sway.damping_ratio.into_iter().for_each(|d| put("damping_ratio", d.value, d.lo, d.hi));
+            sway.damping_ratio
+                .into_iter()
+                .for_each(|d| put("damping_ratio", d.value, d.lo, d.hi));
             all.insert("excitation".into(), sway.excitation.word().into());
         }
     }

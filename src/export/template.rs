@@ -17,7 +17,10 @@ const MOST_VERTICES: usize = 65_536;
 #[derive(Debug, thiserror::Error)]
 pub enum TemplateError {
     #[error("cannot read leaf template {}: {source}; check the name", .path.display())]
-    Unreadable { path: PathBuf, source: std::io::Error },
+    Unreadable {
+        path: PathBuf,
+        source: std::io::Error,
+    },
     #[error(
         "leaf template {} is too large: at most {LARGEST} bytes are taken of a file, and three times that in all; make its \
          texture smaller",
@@ -32,14 +35,18 @@ pub enum TemplateError {
     Unfit { path: PathBuf, fault: TemplateFault },
 }
 
-/// Reads a leaf template from a `.glb` or `.gltf`: all triangles of its scene, where they stand, and the base colour texture
-/// of the first mesh that has one. Files beside it are read by plain name only.
+/// Reads a leaf template from a `.glb` or `.gltf`: all triangles of its scene, where they stand,
+/// and the base colour texture of the first mesh that has one. Files beside it are read by plain
+/// name only.
 ///
 /// # Errors
 /// What [`TemplateError`] names.
 pub fn read_template(path: &Path) -> Result<Template, TemplateError> {
     let (mut taken, bytes) = Taken::file(path)?;
-    let no_gltf = |what: String| TemplateError::NoGltf { path: path.into(), what: what.replace('\n', " ") };
+    let no_gltf = |what: String| TemplateError::NoGltf {
+        path: path.into(),
+        what: what.replace('\n', " "),
+    };
     let Gltf { document, blob } = Gltf::from_slice(&bytes).map_err(|e| no_gltf(e.to_string()))?;
     // The crate takes for granted what the format says of images, and checks it nowhere.
     let sound = |image: &gltf::json::Image| match image.buffer_view {
@@ -47,13 +54,17 @@ pub fn read_template(path: &Path) -> Result<Template, TemplateError> {
         None => image.uri.is_some(),
     };
     if !document.as_json().images.iter().all(sound) {
-        return Err(no_gltf("an image in it has no data, or does not say of which kind they are".into()));
+        return Err(no_gltf(
+            "an image in it has no data, or does not say of which kind they are".into(),
+        ));
     }
     let mut buffers = Vec::new();
     for buffer in document.buffers() {
         let data = match buffer.source() {
             gltf::buffer::Source::Bin => {
-                let blob = blob.as_ref().ok_or_else(|| no_gltf("its binary part is missing".into()))?;
+                let blob = blob
+                    .as_ref()
+                    .ok_or_else(|| no_gltf("its binary part is missing".into()))?;
                 taken.more(blob.len())?;
                 blob.clone()
             }
@@ -64,9 +75,15 @@ pub fn read_template(path: &Path) -> Result<Template, TemplateError> {
         }
         buffers.push(data);
     }
-    let mut file = Parts { path, taken, buffers };
+    let mut file = Parts {
+        path,
+        taken,
+        buffers,
+    };
     let mut mesh = TemplateMesh::default();
-    let scene = document.default_scene().or_else(|| document.scenes().next());
+    let scene = document
+        .default_scene()
+        .or_else(|| document.scenes().next());
     let mut visited = vec![false; document.nodes().count()];
     let mut waiting: Vec<(gltf::Node, Matrix4<f64>)> = Vec::new();
     if let Some(scene) = scene {
@@ -79,7 +96,12 @@ pub fn read_template(path: &Path) -> Result<Template, TemplateError> {
         }
         let columns = node.transform().matrix().map(|c| c.map(f64::from));
         let place = above * Matrix4::from_fn(|r, c| columns[c][r]);
-        for primitive in node.mesh().iter().flat_map(|m| m.primitives()).filter(|p| p.mode() == Mode::Triangles) {
+        for primitive in node
+            .mesh()
+            .iter()
+            .flat_map(|m| m.primitives())
+            .filter(|p| p.mode() == Mode::Triangles)
+        {
             file.add(&primitive, &place, &mut mesh)?;
         }
         waiting.extend(node.children().map(|child| (child, place)));
@@ -87,7 +109,10 @@ pub fn read_template(path: &Path) -> Result<Template, TemplateError> {
     if mesh.indices.is_empty() {
         return Err(TemplateError::NoMesh { path: path.into() });
     }
-    Template::new(mesh).map_err(|fault| TemplateError::Unfit { path: path.into(), fault })
+    Template::new(mesh).map_err(|fault| TemplateError::Unfit {
+        path: path.into(),
+        fault,
+    })
 }
 
 struct Parts<'a> {
@@ -98,7 +123,10 @@ struct Parts<'a> {
 
 impl Parts<'_> {
     fn no_gltf(&self, what: &str) -> TemplateError {
-        TemplateError::NoGltf { path: self.path.into(), what: what.into() }
+        TemplateError::NoGltf {
+            path: self.path.into(),
+            what: what.into(),
+        }
     }
 
     /// Adds the triangles of a primitive that stands at `place`.
@@ -108,11 +136,21 @@ impl Parts<'_> {
         place: &Matrix4<f64>,
         mesh: &mut TemplateMesh,
     ) -> Result<(), TemplateError> {
-        let Some(positions) = primitive.get(&Semantic::Positions) else { return Ok(()) };
-        let unfit = |fault| Err(TemplateError::Unfit { path: self.path.into(), fault });
+        let Some(positions) = primitive.get(&Semantic::Positions) else {
+            return Ok(());
+        };
+        let unfit = |fault| {
+            Err(TemplateError::Unfit {
+                path: self.path.into(),
+                fault,
+            })
+        };
         let vertices = positions.count().saturating_add(mesh.positions.len());
         if vertices > MOST_VERTICES {
-            return unfit(TemplateFault::TooManyVertices { found: vertices, most: MOST_VERTICES });
+            return unfit(TemplateFault::TooManyVertices {
+                found: vertices,
+                most: MOST_VERTICES,
+            });
         }
         // Before they are read: a small file may name the same ones any number of times.
         let corners = primitive.indices().map_or(positions.count(), |i| i.count());
@@ -127,8 +165,15 @@ impl Parts<'_> {
             mesh.positions.push([at.x as f32, at.y as f32, at.z as f32]);
         }
         // A mirrored or stretched normal needs the inverse transpose.
-        let upright = place.fixed_view::<3, 3>(0, 0).try_inverse().map(|m| m.transpose());
-        match primitive.get(&Semantic::Normals).zip(upright).filter(|(n, _)| n.count() == positions.count()) {
+        let upright = place
+            .fixed_view::<3, 3>(0, 0)
+            .try_inverse()
+            .map(|m| m.transpose());
+        match primitive
+            .get(&Semantic::Normals)
+            .zip(upright)
+            .filter(|(n, _)| n.count() == positions.count())
+        {
             Some((normals, upright)) => {
                 for n in self.floats::<3>(&normals, Dimensions::Vec3)? {
                     let n = upright * Vector3::from(n.map(f64::from));
@@ -152,7 +197,8 @@ impl Parts<'_> {
         if indices.iter().any(|&i| i >= count) {
             return Err(self.no_gltf("an index points beyond its vertices"));
         }
-        mesh.indices.extend(indices[..indices.len() / 3 * 3].iter().map(|i| first + i));
+        mesh.indices
+            .extend(indices[..indices.len() / 3 * 3].iter().map(|i| first + i));
         if mesh.texture.is_none() {
             mesh.texture = self.texture(primitive)?;
         }
@@ -160,27 +206,47 @@ impl Parts<'_> {
     }
 
     /// The base colour texture, PNG or JPEG.
-    fn texture(&mut self, primitive: &gltf::Primitive) -> Result<Option<(&'static str, Vec<u8>)>, TemplateError> {
-        let look = primitive.material().pbr_metallic_roughness().base_color_texture();
-        let Some(image) = look.map(|t| t.texture().source()) else { return Ok(None) };
+    fn texture(
+        &mut self,
+        primitive: &gltf::Primitive,
+    ) -> Result<Option<(&'static str, Vec<u8>)>, TemplateError> {
+        let look = primitive
+            .material()
+            .pbr_metallic_roughness()
+            .base_color_texture();
+        let Some(image) = look.map(|t| t.texture().source()) else {
+            return Ok(None);
+        };
         let bytes = match image.source() {
             gltf::image::Source::View { view, .. } => {
                 let (start, end) = (view.offset(), view.offset().saturating_add(view.length()));
                 let buffer = &self.buffers[view.buffer().index()];
-                buffer.get(start..end).ok_or_else(|| self.no_gltf("its texture is cut off"))?.to_vec()
+                buffer
+                    .get(start..end)
+                    .ok_or_else(|| self.no_gltf("its texture is cut off"))?
+                    .to_vec()
             }
             gltf::image::Source::Uri { uri, .. } => self.taken.referred(uri)?,
         };
         let kind = match bytes.as_slice() {
             [0x89, b'P', b'N', b'G', ..] => "image/png",
             [0xff, 0xd8, ..] => "image/jpeg",
-            _ => return Err(TemplateError::Unfit { path: self.path.into(), fault: TemplateFault::BadTexture }),
+            _ => {
+                return Err(TemplateError::Unfit {
+                    path: self.path.into(),
+                    fault: TemplateFault::BadTexture,
+                });
+            }
         };
         Ok(Some((kind, bytes)))
     }
 
     /// Vectors of `N` floats.
-    fn floats<const N: usize>(&self, accessor: &Accessor, kind: Dimensions) -> Result<Vec<[f32; N]>, TemplateError> {
+    fn floats<const N: usize>(
+        &self,
+        accessor: &Accessor,
+        kind: Dimensions,
+    ) -> Result<Vec<[f32; N]>, TemplateError> {
         if accessor.data_type() != DataType::F32 || accessor.dimensions() != kind {
             return Err(self.no_gltf("its positions, normals or texture coordinates are no floats"));
         }
@@ -196,7 +262,11 @@ impl Parts<'_> {
             DataType::U32 => 4,
             _ => return Err(self.no_gltf("its indices are no whole numbers")),
         };
-        let number = |b: &[u8]| b.iter().rev().fold(0u32, |n, &byte| n << 8 | u32::from(byte));
+        let number = |b: &[u8]| {
+            b.iter()
+                .rev()
+                .fold(0u32, |n, &byte| n << 8 | u32::from(byte))
+        };
         self.elements(accessor, size, number)
     }
 
@@ -218,6 +288,8 @@ impl Parts<'_> {
             let start = stride.checked_mul(k)?.checked_add(accessor.offset())?;
             bytes.get(start..start.checked_add(size)?)
         };
-        (0..accessor.count()).map(|k| at(k).map(&element).ok_or_else(cut_off)).collect()
+        (0..accessor.count())
+            .map(|k| at(k).map(&element).ok_or_else(cut_off))
+            .collect()
     }
 }

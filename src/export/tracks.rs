@@ -10,8 +10,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 const NAME: &str = "tracks.csv";
 
-/// Copies `tracks.csv` of the capture `from`; a point whose node is not among `nodes` any more is written without one, as
-/// points that move nothing are.
+/// Copies `tracks.csv` of the capture `from`; a point whose node is not among `nodes` any more is
+/// written without one, as points that move nothing are.
 ///
 /// # Errors
 /// The table cannot be read, or not be written to its end; `stop` was set meanwhile.
@@ -23,19 +23,36 @@ pub fn tracks_of(
 ) -> Result<(), ExportError> {
     let failed = |e: csv::Error| match e.into_kind() {
         csv::ErrorKind::Io(e) => folder.explain(NAME, 0, e),
-        other => folder.explain(NAME, 0, io::Error::other(format!("tracks.csv of the capture is damaged ({other:?})"))),
+        other => folder.explain(
+            NAME,
+            0,
+            io::Error::other(format!("tracks.csv of the capture is damaged ({other:?})")),
+        ),
     };
-    let mut table =
-        ReaderBuilder::new().has_headers(false).flexible(true).from_path(from.join(NAME)).map_err(failed)?;
+    let mut table = ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .from_path(from.join(NAME))
+        .map_err(failed)?;
     let mut out = Writer::from_writer(folder.file(NAME)?);
     let (mut row, mut column) = (StringRecord::new(), None);
     while table.read_record(&mut row).map_err(failed)? {
         if stop.load(Ordering::SeqCst) {
             return Err(ExportError::Stopped);
         }
-        let at = *column.get_or_insert_with(|| row.iter().position(|name| name == "node_id").unwrap_or(usize::MAX));
-        let gone = |cell: &str| cell.parse().is_ok_and(|name| !nodes.contains(&NodeName(name)));
-        let cells = row.iter().enumerate().map(|(i, cell)| if i == at && gone(cell) { "" } else { cell });
+        let at = *column.get_or_insert_with(|| {
+            row.iter()
+                .position(|name| name == "node_id")
+                .unwrap_or(usize::MAX)
+        });
+        let gone = |cell: &str| {
+            cell.parse()
+                .is_ok_and(|name| !nodes.contains(&NodeName(name)))
+        };
+        let cells = row
+            .iter()
+            .enumerate()
+            .map(|(i, cell)| if i == at && gone(cell) { "" } else { cell });
         out.write_record(cells).map_err(failed)?;
     }
     out.flush().map_err(|e| folder.explain(NAME, 0, e))
@@ -57,7 +74,12 @@ mod tests {
         let written = fs::read_to_string(folder.path(NAME)).unwrap();
         assert_eq!(written, text.replace("4,7\n", "4,\n"));
         fs::write(dir.path().join(NAME), [b'a', 0xff, b'\n']).unwrap();
-        let damaged = tracks_of(&folder, dir.path(), &nodes, &AtomicBool::new(false)).unwrap_err().to_string();
-        assert!(damaged.contains("damaged") && !damaged.contains('\n'), "{damaged}");
+        let damaged = tracks_of(&folder, dir.path(), &nodes, &AtomicBool::new(false))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            damaged.contains("damaged") && !damaged.contains('\n'),
+            "{damaged}"
+        );
     }
 }

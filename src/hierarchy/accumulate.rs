@@ -5,7 +5,8 @@ use crate::config::Accumulate;
 use crate::signal::along_principal_direction;
 use crate::track::{TrackHistory, TrackTable};
 
-/// Rate at which tracks are compared, Hz: velocities over longer steps stand out better from tracking noise.
+/// Rate at which tracks are compared, Hz: velocities over longer steps stand out better from
+/// tracking noise.
 pub const COMPARE_HZ: f64 = 15.0;
 /// Points that are compared with each other for stability; more say the same at a higher price.
 const COMPARED: usize = 48;
@@ -17,7 +18,8 @@ const NOISE_FLOOR_PX: f64 = 0.1;
 const SNR_SCALE: f64 = 8.0;
 /// Sways of the whole tree after which the sway term has reached 1 - 1/e.
 const SWAYS_SCALE: f64 = 2.0;
-/// A sway counts when it goes this share of the root mean square displacement beyond the middle, on both sides.
+/// A sway counts when it goes this share of the root mean square displacement beyond the middle, on
+/// both sides.
 const SWAY_HYSTERESIS: f64 = 0.2;
 /// Moving points below which the evidence counts for less.
 const ENOUGH_MOVING: f64 = 32.0;
@@ -25,15 +27,19 @@ const ENOUGH_MOVING: f64 = 32.0;
 /// What has been seen so far.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Evidence {
-    /// The accumulation measure, 0 to 1: motion times stability times sway times the share of 32 points that move.
+    /// The accumulation measure, 0 to 1: motion times stability times sway times the share of 32
+    /// points that move.
     pub measure: f64,
-    /// 1 - exp(-snr / 8), with snr the median over the moving points of displacement over tracking noise.
+    /// 1 - exp(-snr / 8), with snr the median over the moving points of displacement over tracking
+    /// noise.
     pub motion: f64,
-    /// Correlation between the affinities from one half of the time and from the other, 0 to 1: if the tree's
-    /// structure is in the tracks, both halves (blocks of half a second, dealt in turn) tell the same one.
+    /// Correlation between the affinities from one half of the time and from the other, 0 to 1: if
+    /// the tree's structure is in the tracks, both halves (blocks of half a second, dealt in turn)
+    /// tell the same one.
     pub stability: f64,
-    /// 1 - exp(-n / 2), with n the number of times that the tree as a whole has swayed to and fro: branches that swing
-    /// at different rates are apart for sure only after some periods of the slowest.
+    /// 1 - exp(-n / 2), with n the number of times that the tree as a whole has swayed to and fro:
+    /// branches that swing at different rates are apart for sure only after some periods of the
+    /// slowest.
     pub sway: f64,
     /// Rows of the table whose points move.
     pub moving: Vec<usize>,
@@ -41,10 +47,17 @@ pub struct Evidence {
 
 /// Judges the tracks of `table`.
 pub fn evidence(table: &TrackTable, settings: &Accumulate) -> Evidence {
-    let snr: Vec<f64> = (0..table.ids.len()).map(|i| displacement_px(table, i) / noise_px(table, i)).collect();
-    let moving: Vec<usize> = (0..snr.len()).filter(|&i| snr[i] > settings.moving_snr).collect();
+    let snr: Vec<f64> = (0..table.ids.len())
+        .map(|i| displacement_px(table, i) / noise_px(table, i))
+        .collect();
+    let moving: Vec<usize> = (0..snr.len())
+        .filter(|&i| snr[i] > settings.moving_snr)
+        .collect();
     if moving.len() < 3 {
-        return Evidence { moving, ..Evidence::default() };
+        return Evidence {
+            moving,
+            ..Evidence::default()
+        };
     }
     let mut of_moving: Vec<f64> = moving.iter().map(|&i| snr[i]).collect();
     of_moving.sort_unstable_by(f64::total_cmp);
@@ -52,7 +65,13 @@ pub fn evidence(table: &TrackTable, settings: &Accumulate) -> Evidence {
     let stability = stability(table, &moving);
     let sway = 1.0 - (-sways(table, &moving) / SWAYS_SCALE).exp();
     let enough = (moving.len() as f64 / ENOUGH_MOVING).min(1.0);
-    Evidence { measure: motion * stability * sway * enough, motion, stability, sway, moving }
+    Evidence {
+        measure: motion * stability * sway * enough,
+        motion,
+        stability,
+        sway,
+        moving,
+    }
 }
 
 /// Evidence of a history, on frames at the rate at which tracks are compared.
@@ -69,7 +88,11 @@ fn displacement_px(table: &TrackTable, row: usize) -> f64 {
     }
     let mean = |c: usize| seen().map(|p| f64::from(p[c])).sum::<f64>() / n;
     let (mu, mv) = (mean(0), mean(1));
-    (seen().map(|p| (f64::from(p[0]) - mu).powi(2) + (f64::from(p[1]) - mv).powi(2)).sum::<f64>() / n).sqrt()
+    (seen()
+        .map(|p| (f64::from(p[0]) - mu).powi(2) + (f64::from(p[1]) - mv).powi(2))
+        .sum::<f64>()
+        / n)
+        .sqrt()
 }
 
 /// What tracking itself admits: the median forward-backward error, not less than the floor.
@@ -105,10 +128,19 @@ fn stability(table: &TrackTable, moving: &[usize]) -> f64 {
     let some: Vec<usize> = moving.iter().copied().step_by(stride).collect();
     let start_s = table.times_s.first().copied().unwrap_or(0.0);
     let half = |k: usize| (((table.times_s[k] - start_s) / BLOCK_S) as u64).is_multiple_of(2);
-    let (even, odd) = (Signals::velocities(table, &some, half), Signals::velocities(table, &some, |k| !half(k)));
+    let (even, odd) = (
+        Signals::velocities(table, &some, half),
+        Signals::velocities(table, &some, |k| !half(k)),
+    );
     let pairs = (0..some.len()).flat_map(|a| (a + 1..some.len()).map(move |b| (a, b)));
-    let (x, y): (Vec<f64>, Vec<f64>) =
-        pairs.map(|(a, b)| (f64::from(even.correlation(a, b)), f64::from(odd.correlation(a, b)))).unzip();
+    let (x, y): (Vec<f64>, Vec<f64>) = pairs
+        .map(|(a, b)| {
+            (
+                f64::from(even.correlation(a, b)),
+                f64::from(odd.correlation(a, b)),
+            )
+        })
+        .unzip();
     pearson(&x, &y).max(0.0)
 }
 
@@ -121,5 +153,9 @@ fn pearson(x: &[f64], y: &[f64]) -> f64 {
         xx += (a - mx).powi(2);
         yy += (b - my).powi(2);
     }
-    if xx > 0.0 && yy > 0.0 { xy / (xx * yy).sqrt() } else { 0.0 }
+    if xx > 0.0 && yy > 0.0 {
+        xy / (xx * yy).sqrt()
+    } else {
+        0.0
+    }
 }

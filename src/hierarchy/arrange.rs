@@ -1,4 +1,5 @@
-//! From a tree in two to the hierarchy: splits that the data support, as many at once as cannot be told apart.
+//! From a tree in two to the hierarchy: splits that the data support, as many at once as cannot be
+//! told apart.
 
 use super::MIN_SIDE;
 use super::binary::Binary;
@@ -17,17 +18,30 @@ pub struct Node {
 
 /// The nodes, level by level, each before its children, of which the largest comes first.
 ///
-/// - A few points that come off alone are no branch: they stay with the node and are in none of its children. So do
+/// - A few points that come off alone are no branch: they stay with the node and are in none of its
+///   children. So do
 ///   those of its stem, `stems`.
 /// - A split that is not sure (`min_certainty`) and has no sure one under it is not made.
-/// - One that is not sure but leads to sure ones says only that it is not known which branch leaves first: they leave
+/// - One that is not sure but leads to sure ones says only that it is not known which branch leaves
+///   first: they leave
 ///   together, up to `max_children`.
 pub fn arranged(tree: &Binary, certain: &[f32], stems: &[bool], settings: &Hierarchy) -> Vec<Node> {
     if tree.parts.is_empty() {
         return Vec::new();
     }
-    let arranging = Arranging { tree, certain, stems, settings, surest: surest_below(tree, certain, stems) };
-    let mut nodes = vec![Node { parent: None, level: 0, part: 0, certainty: 0.0 }];
+    let arranging = Arranging {
+        tree,
+        certain,
+        stems,
+        settings,
+        surest: surest_below(tree, certain, stems),
+    };
+    let mut nodes = vec![Node {
+        parent: None,
+        level: 0,
+        part: 0,
+        certainty: 0.0,
+    }];
     let mut next = 0;
     while next < nodes.len() {
         let Node { level, part, .. } = nodes[next];
@@ -56,12 +70,19 @@ struct Arranging<'a> {
 
 impl Arranging<'_> {
     fn children(&self, part: usize) -> (Vec<usize>, f32) {
-        let Some((split, halves)) = self.split(part) else { return (Vec::new(), 0.0) };
+        let Some((split, halves)) = self.split(part) else {
+            return (Vec::new(), 0.0);
+        };
         let (mut children, mut last, mut certainty) = (halves.to_vec(), split, self.certain[split]);
         while !self.sure(last) && children.len() < self.settings.max_children as usize {
             let size = |p: usize| self.tree.parts[p].len();
-            let open = children.iter().enumerate().filter_map(|(k, &c)| Some((k, self.split(c)?)));
-            let Some((k, (next, halves))) = open.max_by_key(|(k, _)| size(children[*k])) else { break };
+            let open = children
+                .iter()
+                .enumerate()
+                .filter_map(|(k, &c)| Some((k, self.split(c)?)));
+            let Some((k, (next, halves))) = open.max_by_key(|(k, _)| size(children[*k])) else {
+                break;
+            };
             children.splice(k..=k, halves);
             certainty = certainty.max(self.certain[next]);
             last = next;
@@ -74,7 +95,8 @@ impl Arranging<'_> {
         f64::from(self.certain[part]) >= self.settings.min_certainty
     }
 
-    /// The first split at or below `part` that has a branch on both sides, if it or one under it is sure.
+    /// The first split at or below `part` that has a branch on both sides, if it or one under it is
+    /// sure.
     fn split(&self, mut part: usize) -> Option<(usize, [usize; 2])> {
         let size = |p: usize| self.tree.parts[p].len();
         loop {
@@ -84,9 +106,14 @@ impl Arranging<'_> {
                 return None;
             }
             if size(a).min(size(b)) >= MIN_SIDE && !self.stems[a] && !self.stems[b] {
-                return (f64::from(self.surest[part]) >= self.settings.min_certainty).then_some((part, halves));
+                return (f64::from(self.surest[part]) >= self.settings.min_certainty)
+                    .then_some((part, halves));
             }
-            part = if self.stems[b] || (size(a) > size(b) && !self.stems[a]) { a } else { b };
+            part = if self.stems[b] || (size(a) > size(b) && !self.stems[a]) {
+                a
+            } else {
+                b
+            };
         }
     }
 }
@@ -96,7 +123,10 @@ fn surest_below(tree: &Binary, certain: &[f32], stems: &[bool]) -> Vec<f32> {
     let mut surest = vec![0.0f32; tree.parts.len()];
     for (k, part) in tree.parts.iter().enumerate().rev() {
         let Some(halves) = part.halves else { continue };
-        if halves.iter().all(|h| !stems[*h] && tree.parts[*h].len() >= MIN_SIDE) {
+        if halves
+            .iter()
+            .all(|h| !stems[*h] && tree.parts[*h].len() >= MIN_SIDE)
+        {
             surest[k] = certain[k];
         }
         for half in halves.into_iter().filter(|h| !stems[*h]) {
@@ -110,10 +140,13 @@ fn surest_below(tree: &Binary, certain: &[f32], stems: &[bool]) -> Vec<f32> {
 mod tests {
     use super::*;
 
-    /// Points 0 and 1, 2 and 3, … come apart pair by pair, one after the other, as branches leave a trunk.
+    /// Points 0 and 1, 2 and 3, … come apart pair by pair, one after the other, as branches leave a
+    /// trunk.
     fn trunk(pairs: usize) -> Binary {
         let points: Vec<usize> = (0..2 * pairs).collect();
-        Binary::divided(points, |p, _| (p.len() > 2).then(|| (0..p.len()).map(|k| k < 2).collect()))
+        Binary::divided(points, |p, _| {
+            (p.len() > 2).then(|| (0..p.len()).map(|k| k < 2).collect())
+        })
     }
 
     fn arranged_all(tree: &Binary, certain: &[f32], settings: &Hierarchy) -> Vec<Node> {
@@ -121,25 +154,56 @@ mod tests {
     }
 
     fn sizes(nodes: &[Node], tree: &Binary) -> Vec<(u8, usize)> {
-        nodes.iter().map(|n| (n.level, tree.parts[n.part].len())).collect()
+        nodes
+            .iter()
+            .map(|n| (n.level, tree.parts[n.part].len()))
+            .collect()
     }
 
     #[test]
     fn sure_splits_are_made_one_after_the_other() {
         let tree = trunk(4);
-        let settings = Hierarchy { levels: 10, min_points: 2, ..Hierarchy::default() };
+        let settings = Hierarchy {
+            levels: 10,
+            min_points: 2,
+            ..Hierarchy::default()
+        };
         let nodes = arranged_all(&tree, &vec![0.9; tree.parts.len()], &settings);
-        assert_eq!(sizes(&nodes, &tree), [(0, 8), (1, 6), (1, 2), (2, 4), (2, 2), (3, 2), (3, 2)]);
-        let few = arranged_all(&tree, &vec![0.9; tree.parts.len()], &Hierarchy { levels: 2, ..settings });
+        assert_eq!(
+            sizes(&nodes, &tree),
+            [(0, 8), (1, 6), (1, 2), (2, 4), (2, 2), (3, 2), (3, 2)]
+        );
+        let few = arranged_all(
+            &tree,
+            &vec![0.9; tree.parts.len()],
+            &Hierarchy {
+                levels: 2,
+                ..settings
+            },
+        );
         assert_eq!(few.len(), 3, "no deeper than the levels");
     }
 
     #[test]
     fn splits_that_nothing_supports_are_not_made() {
         let tree = trunk(4);
-        let settings = Hierarchy { levels: 10, min_points: 2, ..Hierarchy::default() };
-        assert_eq!(arranged_all(&tree, &vec![0.2; tree.parts.len()], &settings).len(), 1);
-        let all = arranged_all(&tree, &vec![0.2; tree.parts.len()], &Hierarchy { min_certainty: 0.0, ..settings });
+        let settings = Hierarchy {
+            levels: 10,
+            min_points: 2,
+            ..Hierarchy::default()
+        };
+        assert_eq!(
+            arranged_all(&tree, &vec![0.2; tree.parts.len()], &settings).len(),
+            1
+        );
+        let all = arranged_all(
+            &tree,
+            &vec![0.2; tree.parts.len()],
+            &Hierarchy {
+                min_certainty: 0.0,
+                ..settings
+            },
+        );
         assert_eq!(all.len(), 7, "unless nothing is asked of them");
     }
 
@@ -148,10 +212,19 @@ mod tests {
         let tree = trunk(4);
         let mut certain = vec![0.2; tree.parts.len()];
         // Only the split farthest from the foot is sure.
-        let last = tree.parts.iter().rposition(|p| p.halves.is_some()).expect("a split");
+        let last = tree
+            .parts
+            .iter()
+            .rposition(|p| p.halves.is_some())
+            .expect("a split");
         certain[last] = 0.9;
         let of = |max_children| {
-            let settings = Hierarchy { levels: 10, min_points: 2, max_children, ..Hierarchy::default() };
+            let settings = Hierarchy {
+                levels: 10,
+                min_points: 2,
+                max_children,
+                ..Hierarchy::default()
+            };
             sizes(&arranged_all(&tree, &certain, &settings), &tree)
         };
         assert_eq!(of(4), [(0, 8), (1, 2), (1, 2), (1, 2), (1, 2)]);
@@ -162,11 +235,18 @@ mod tests {
     #[test]
     fn points_of_the_stem_stay_with_the_node() {
         let tree = trunk(4);
-        let settings = Hierarchy { levels: 10, min_points: 2, ..Hierarchy::default() };
+        let settings = Hierarchy {
+            levels: 10,
+            min_points: 2,
+            ..Hierarchy::default()
+        };
         let mut stems = vec![false; tree.parts.len()];
         let [first, _] = tree.parts[0].halves.expect("halves");
         stems[first] = true;
         let nodes = arranged(&tree, &vec![0.9; tree.parts.len()], &stems, &settings);
-        assert_eq!(sizes(&nodes, &tree), [(0, 8), (1, 4), (1, 2), (2, 2), (2, 2)]);
+        assert_eq!(
+            sizes(&nodes, &tree),
+            [(0, 8), (1, 4), (1, 2), (2, 2), (2, 2)]
+        );
     }
 }

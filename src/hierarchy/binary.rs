@@ -25,21 +25,38 @@ pub struct Binary {
 }
 
 impl Binary {
-    /// Divides `points` again and again; `halve` says for each of some points whether it is in the first half, or
-    /// nothing if they are not to be divided. It is given the depth as well, 0 for all points.
-    pub fn divided(points: Vec<usize>, mut halve: impl FnMut(&[usize], u32) -> Option<Vec<bool>>) -> Self {
-        let mut parts = vec![Part { from: 0, to: points.len(), halves: None }];
+    /// Divides `points` again and again; `halve` says for each of some points whether it is in the
+    /// first half, or nothing if they are not to be divided. It is given the depth as well, 0 for
+    /// all points.
+    pub fn divided(
+        points: Vec<usize>,
+        mut halve: impl FnMut(&[usize], u32) -> Option<Vec<bool>>,
+    ) -> Self {
+        let mut parts = vec![Part {
+            from: 0,
+            to: points.len(),
+            halves: None,
+        }];
         let (mut order, mut depths, mut next) = (points, vec![0u32], 0);
         while next < parts.len() {
             let (from, to, depth) = (parts[next].from, parts[next].to, depths[next]);
             if let Some(first) = halve(&order[from..to], depth) {
-                let side = |want: bool| order[from..to].iter().zip(&first).filter(move |(_, f)| **f == want);
+                let side = |want: bool| {
+                    order[from..to]
+                        .iter()
+                        .zip(&first)
+                        .filter(move |(_, f)| **f == want)
+                };
                 let split: Vec<usize> = side(true).chain(side(false)).map(|(&i, _)| i).collect();
                 let middle = from + first.iter().filter(|f| **f).count();
                 order[from..to].copy_from_slice(&split);
                 parts[next].halves = Some([parts.len(), parts.len() + 1]);
                 for (from, to) in [(from, middle), (middle, to)] {
-                    parts.push(Part { from, to, halves: None });
+                    parts.push(Part {
+                        from,
+                        to,
+                        halves: None,
+                    });
                     depths.push(depth + 1);
                 }
             }
@@ -48,16 +65,25 @@ impl Binary {
         Self { order, parts }
     }
 
-    /// The tree of `n` points that were merged pair by pair: merge k joins two of the points 0 to n - 1 or of the
-    /// earlier merges n, n + 1, …, n + k - 1 into n + k. There are n - 1 merges.
+    /// The tree of `n` points that were merged pair by pair: merge k joins two of the points 0 to n
+    /// - 1 or of the earlier merges n, n + 1, …, n + k - 1 into n + k. There are n - 1 merges.
     pub fn merged(n: usize, merges: &[[usize; 2]]) -> Self {
         let mut sizes = vec![1; n];
         for m in merges {
             sizes.push(sizes[m[0]] + sizes[m[1]]);
         }
-        let Some(top) = sizes.len().checked_sub(1) else { return Self { order: vec![], parts: vec![] } };
+        let Some(top) = sizes.len().checked_sub(1) else {
+            return Self {
+                order: vec![],
+                parts: vec![],
+            };
+        };
         let mut order = vec![0; n];
-        let mut parts = vec![Part { from: 0, to: n, halves: None }];
+        let mut parts = vec![Part {
+            from: 0,
+            to: n,
+            halves: None,
+        }];
         let mut ids = vec![top];
         let mut next = 0;
         while next < parts.len() {
@@ -68,8 +94,16 @@ impl Binary {
                 let [a, b] = merges[id - n];
                 let middle = from + sizes[a];
                 parts[next].halves = Some([parts.len(), parts.len() + 1]);
-                parts.push(Part { from, to: middle, halves: None });
-                parts.push(Part { from: middle, to, halves: None });
+                parts.push(Part {
+                    from,
+                    to: middle,
+                    halves: None,
+                });
+                parts.push(Part {
+                    from: middle,
+                    to,
+                    halves: None,
+                });
                 ids.extend([a, b]);
             }
             next += 1;

@@ -3,18 +3,20 @@
 use super::binary::Binary;
 use super::signals::Signals;
 
-/// Time over which one vote is taken, s: longer than the slowest tracking error, shorter than most periods.
+/// Time over which one vote is taken, s: longer than the slowest tracking error, shorter than most
+/// periods.
 const VOTE_S: f64 = 1.0;
-/// Standard errors at which a split is as likely chance as not. Where nothing but noise tells points apart, the best
-/// split found among very many stands out by up to so many.
+/// Standard errors at which a split is as likely chance as not. Where nothing but noise tells
+/// points apart, the best split found among very many stands out by up to so many.
 const CHANCE_ERRORS: f64 = 3.0;
 
-/// For every part of `tree` how sure it is that its halves move apart, 0 to 1; 0 for one without halves, or with a half
-/// of one point, of which nothing can be said.
+/// For every part of `tree` how sure it is that its halves move apart, 0 to 1; 0 for one without
+/// halves, or with a half of one point, of which nothing can be said.
 ///
-/// In every second that was seen the points of the halves are more like each other within the halves than across, or not. With t the
-/// mean of that contrast over its standard error, it is t^2 / (t^2 + 9) for positive t: 0.5 where chance alone might
-/// give the same, 0.8 at twice as many standard errors.
+/// In every second that was seen the points of the halves are more like each other within the
+/// halves than across, or not. With t the mean of that contrast over its standard error, it is t^2
+/// / (t^2 + 9) for positive t: 0.5 where chance alone might give the same, 0.8 at twice as many
+/// standard errors.
 pub fn certainties(tree: &Binary, signals: &Signals, times_s: &[f64]) -> Vec<f32> {
     let votes = Votes::new(times_s, signals.steps());
     let mut sums: Vec<Option<Sums>> = vec![None; tree.parts.len()];
@@ -25,20 +27,29 @@ pub fn certainties(tree: &Binary, signals: &Signals, times_s: &[f64]) -> Vec<f32
             let mut own = vec![0.0f32; votes.count];
             for &i in tree.points(k) {
                 let unit = signals.unit(i);
-                own.iter_mut().zip(votes.products(&unit, &unit)).for_each(|(o, e)| *o += e);
+                own.iter_mut()
+                    .zip(votes.products(&unit, &unit))
+                    .for_each(|(o, e)| *o += e);
                 add(&mut sum, &unit);
             }
             sums[k] = Some((sum, own));
             continue;
         };
         // Each part is a half of one other only, so that what it kept is used up here.
-        let (Some((mut a, mut own_a)), Some((b, own_b))) = (sums[halves[0]].take(), sums[halves[1]].take()) else {
+        let (Some((mut a, mut own_a)), Some((b, own_b))) =
+            (sums[halves[0]].take(), sums[halves[1]].take())
+        else {
             continue;
         };
         let [n_a, n_b] = halves.map(|h| tree.parts[h].len() as f32);
         if n_a > 1.0 && n_b > 1.0 {
             let within = |sum: &[[f32; 2]], own: &[f32], n: f32| -> Vec<f32> {
-                votes.products(sum, sum).iter().zip(own).map(|(all, own)| (all - own) / (n * (n - 1.0))).collect()
+                votes
+                    .products(sum, sum)
+                    .iter()
+                    .zip(own)
+                    .map(|(all, own)| (all - own) / (n * (n - 1.0)))
+                    .collect()
             };
             let (in_a, in_b) = (within(&a, &own_a, n_a), within(&b, &own_b, n_b));
             let across = votes.products(&a, &b);
@@ -66,11 +77,17 @@ fn certainty(contrast: &[f64]) -> f32 {
     let variance = contrast.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / (n - 1.0);
     let t_sq = mean.max(0.0).powi(2) / (variance / n).max(f64::MIN_POSITIVE);
     // Infinite for a contrast without any spread: as sure as can be.
-    if t_sq.is_finite() { (t_sq / (t_sq + CHANCE_ERRORS.powi(2))) as f32 } else { 1.0 }
+    if t_sq.is_finite() {
+        (t_sq / (t_sq + CHANCE_ERRORS.powi(2))) as f32
+    } else {
+        1.0
+    }
 }
 
 fn add(sum: &mut [[f32; 2]], more: &[[f32; 2]]) {
-    sum.iter_mut().zip(more).for_each(|(s, m)| *s = [s[0] + m[0], s[1] + m[1]]);
+    sum.iter_mut()
+        .zip(more)
+        .for_each(|(s, m)| *s = [s[0] + m[0], s[1] + m[1]]);
 }
 
 /// The steps dealt to the votes.
@@ -80,10 +97,14 @@ struct Votes {
 }
 
 impl Votes {
-    /// The steps are those of `times_s`, from two seconds on in votes of a second or little more, so that none is a
-    /// remainder. When nothing was seen there is no vote, and of a slow camera every step is one.
+    /// The steps are those of `times_s`, from two seconds on in votes of a second or little more,
+    /// so that none is a remainder. When nothing was seen there is no vote, and of a slow camera
+    /// every step is one.
     fn new(times_s: &[f64], steps: usize) -> Self {
-        let (start_s, end_s) = (times_s.first().copied().unwrap_or(0.0), times_s.last().copied().unwrap_or(0.0));
+        let (start_s, end_s) = (
+            times_s.first().copied().unwrap_or(0.0),
+            times_s.last().copied().unwrap_or(0.0),
+        );
         let span_s = end_s - start_s;
         let spans = (span_s / VOTE_S).floor().max(2.0);
         let (mut count, mut last) = (0, None);
@@ -93,7 +114,10 @@ impl Votes {
             last = Some(span);
             count.max(1) - 1
         };
-        Self { of_step: times_s.iter().take(steps).map(of).collect(), count }
+        Self {
+            of_step: times_s.iter().take(steps).map(of).collect(),
+            count,
+        }
     }
 
     /// Sums of the products of two motions, vote by vote.
@@ -112,20 +136,28 @@ mod tests {
     use crate::model::TrackId;
     use crate::track::TrackTable;
 
-    /// Two pairs of points that swing at different rates, seen at `times_s`, and how sure it is that they are two.
+    /// Two pairs of points that swing at different rates, seen at `times_s`, and how sure it is
+    /// that they are two.
     fn certain(times_s: Vec<f64>) -> f32 {
         let at = |i: usize, t: f64| {
             let noise = (((i * 7919) as f64 + t * 78.233).sin() * 43758.5453).fract();
             let rate = if i < 2 { 0.3 } else { 0.7 };
-            Some([(100.0 * i as f64 + 5.0 * (rate * t).sin() + noise) as f32, 50.0])
+            Some([
+                (100.0 * i as f64 + 5.0 * (rate * t).sin() + noise) as f32,
+                50.0,
+            ])
         };
         let table = TrackTable {
             ids: (0..4).map(TrackId).collect(),
-            positions: (0..4).map(|i| times_s.iter().map(|&t| at(i, t)).collect()).collect(),
+            positions: (0..4)
+                .map(|i| times_s.iter().map(|&t| at(i, t)).collect())
+                .collect(),
             times_s,
             fb_errors_px: vec![0.1; 4],
         };
-        let tree = Binary::divided((0..4).collect(), |_, depth| (depth == 0).then(|| vec![true, true, false, false]));
+        let tree = Binary::divided((0..4).collect(), |_, depth| {
+            (depth == 0).then(|| vec![true, true, false, false])
+        });
         let signals = Signals::displacements(&table, &[0, 1, 2, 3]);
         certainties(&tree, &signals, &table.times_s)[0]
     }
@@ -135,15 +167,28 @@ mod tests {
     fn a_slow_camera_and_a_gap_give_no_empty_votes() {
         let slow: Vec<f64> = (0..31).map(|k| 2.0 * f64::from(k)).collect();
         let votes = Votes::new(&slow, slow.len());
-        assert_eq!((votes.count, votes.of_step), (31, (0..31).collect()), "each frame is a vote");
+        assert_eq!(
+            (votes.count, votes.of_step),
+            (31, (0..31).collect()),
+            "each frame is a vote"
+        );
         let certainty = certain(slow);
         assert!(certainty > 0.8, "{certainty}");
-        let gap: Vec<f64> = (0..300).map(|k| f64::from(k) / 15.0 + if k < 150 { 0.0 } else { 30.0 }).collect();
+        let gap: Vec<f64> = (0..300)
+            .map(|k| f64::from(k) / 15.0 + if k < 150 { 0.0 } else { 30.0 })
+            .collect();
         let votes = Votes::new(&gap, gap.len());
         let mut sizes = vec![0; votes.count];
         votes.of_step.iter().for_each(|&v| sizes[v] += 1);
-        assert!((19..=22).contains(&votes.count) && sizes.iter().all(|n| *n > 0), "{sizes:?}");
+        assert!(
+            (19..=22).contains(&votes.count) && sizes.iter().all(|n| *n > 0),
+            "{sizes:?}"
+        );
         let votes = Votes::new(&[3.0; 5], 5);
-        assert_eq!((votes.count, votes.of_step), (1, vec![0; 5]), "no time at all");
+        assert_eq!(
+            (votes.count, votes.of_step),
+            (1, vec![0; 5]),
+            "no time at all"
+        );
     }
 }

@@ -1,13 +1,15 @@
 //! How much of the way from the foot two points have in common: the affinity of the default method.
 //!
-//! Two points of a tree are as near kin as their ways from the foot part late. The ways are not seen, but steps between
-//! points that are near each other and move alike are likely to lie on them: a minimum spanning tree, rooted at the
-//! foot, joins all points by such steps. One false step takes a whole branch along, so the tree is drawn many times from
-//! part of the points with costs that are off by chance, and what the trees say is averaged (Felsenstein's bootstrap of
+//! Two points of a tree are as near kin as their ways from the foot part late. The ways are not
+//! seen, but steps between points that are near each other and move alike are likely to lie on
+//! them: a minimum spanning tree, rooted at the foot, joins all points by such steps. One false
+//! step takes a whole branch along, so the tree is drawn many times from part of the points with
+//! costs that are off by chance, and what the trees say is averaged (Felsenstein's bootstrap of
 //! 1985 for trees of descent).
 //!
-//! Chosen by measurement, see `docs/sweep.md`: normalised cuts, average linkage of correlations and shortest paths in
-//! place of the spanning tree all did worse on trees whose branches leave one trunk.
+//! Chosen by measurement, see `docs/sweep.md`: normalised cuts, average linkage of correlations and
+//! shortest paths in place of the spanning tree all did worse on trees whose branches leave one
+//! trunk.
 
 use super::rest::{crown_begins, distance_sq};
 use crate::signal::median;
@@ -24,23 +26,26 @@ const COST_DEVIATION: f64 = 0.3;
 pub struct Ways {
     /// Mean common way of all pairs, in px of cost; on the diagonal the whole way from the foot.
     pub common: DMatrix<f32>,
-    /// The tree of all points at their own costs: from which point each is reached, `None` from the foot, in an order in
-    /// which that one comes first.
+    /// The tree of all points at their own costs: from which point each is reached, `None` from the
+    /// foot, in an order in which that one comes first.
     pub reached: Vec<(usize, Option<usize>)>,
 }
 
 /// The ways from the foot to all points.
 ///
-/// `apart` holds the root mean square difference of the motion of all pairs, and on the diagonal that of a point's own
-/// motion, in whatever unit. Going between two points costs sqrt(d^2 + (h m)^2), with d their
-/// distance, h the way from the foot to the farthest point and m their difference over the median of the diagonal.
+/// `apart` holds the root mean square difference of the motion of all pairs, and on the diagonal
+/// that of a point's own motion, in whatever unit. Going between two points costs sqrt(d^2 + (h
+/// m)^2), with d their distance, h the way from the foot to the farthest point and m their
+/// difference over the median of the diagonal.
 pub fn ways(apart: &DMatrix<f32>, rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> Ways {
     let n = rest_px.len();
     let costs = costs(apart, rest_px, foot_px);
     let off_by = off_by_table();
     let (mut sum, mut count) = (DMatrix::<f32>::zeros(n, n), DMatrix::<f32>::zeros(n, n));
     for tree in 0..TREES {
-        let drawn: Vec<usize> = (0..n).filter(|&i| tree == 0 || below(hash(tree, i, i), SHARE)).collect();
+        let drawn: Vec<usize> = (0..n)
+            .filter(|&i| tree == 0 || below(hash(tree, i, i), SHARE))
+            .collect();
         let cost = |a: usize, b: usize| {
             let chance = hash(tree, a.min(b), a.max(b)) as usize % off_by.len();
             costs[(a, b)] * off_by[chance]
@@ -60,16 +65,27 @@ pub fn ways(apart: &DMatrix<f32>, rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> Wa
         Some(top) if a == n => distance_sq(top, rest_px[b]).sqrt() as f32,
         _ => costs[(a, b)],
     });
-    let reached = tree.iter().map(|r| (r.drawn, r.parent.map(|p| tree[p].drawn))).collect();
-    Ways { common: sum.component_div(&count), reached }
+    let reached = tree
+        .iter()
+        .map(|r| (r.drawn, r.parent.map(|p| tree[p].drawn)))
+        .collect();
+    Ways {
+        common: sum.component_div(&count),
+        reached,
+    }
 }
 
 /// Costs of all steps; the last row and column are the foot, which rests.
 fn costs(apart: &DMatrix<f32>, rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> DMatrix<f32> {
     let n = rest_px.len();
     let own: Vec<f32> = (0..n).map(|i| apart[(i, i)]).collect();
-    let median = median(own, f32::total_cmp).map_or(0.0, f64::from).max(f64::MIN_POSITIVE);
-    let height = rest_px.iter().map(|&p| distance_sq(p, foot_px).sqrt()).fold(1.0, f64::max);
+    let median = median(own, f32::total_cmp)
+        .map_or(0.0, f64::from)
+        .max(f64::MIN_POSITIVE);
+    let height = rest_px
+        .iter()
+        .map(|&p| distance_sq(p, foot_px).sqrt())
+        .fold(1.0, f64::max);
     let px_of = height / median;
     DMatrix::from_fn(n + 1, n + 1, |a, b| {
         let at = |i: usize| rest_px.get(i).copied().unwrap_or(foot_px);
@@ -81,29 +97,41 @@ fn costs(apart: &DMatrix<f32>, rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> DMatr
         };
         let cost = (distance_sq(at(a), at(b)) + (px_of * f64::from(motion)).powi(2)).sqrt() as f32;
         // What is no number would end the tree early; it is a step that nobody would take.
-        if cost.is_finite() { cost } else { f32::MAX.sqrt() }
+        if cost.is_finite() {
+            cost
+        } else {
+            f32::MAX.sqrt()
+        }
     })
 }
 
-/// A point of the tree: its index among those drawn, the position of its parent in the list (`None`: the foot), and the
-/// way from the foot.
+/// A point of the tree: its index among those drawn, the position of its parent in the list
+/// (`None`: the foot), and the way from the foot.
 struct Reached {
     drawn: usize,
     parent: Option<usize>,
     way: f32,
 }
 
-/// The minimum spanning tree of the points `drawn` and the root (Prim), in the order in which they are reached.
+/// The minimum spanning tree of the points `drawn` and the root (Prim), in the order in which they
+/// are reached.
 fn spanning_tree(drawn: &[usize], root: usize, cost: impl Fn(usize, usize) -> f32) -> Vec<Reached> {
     let mut reached: Vec<Reached> = Vec::with_capacity(drawn.len());
     // For every point that is left: the cheapest step to it, and from where.
-    let mut left: Vec<(usize, f32, Option<usize>)> =
-        drawn.iter().enumerate().map(|(k, &i)| (k, cost(root, i), None)).collect();
+    let mut left: Vec<(usize, f32, Option<usize>)> = drawn
+        .iter()
+        .enumerate()
+        .map(|(k, &i)| (k, cost(root, i), None))
+        .collect();
     while let Some(cheapest) = (0..left.len()).min_by(|&a, &b| left[a].1.total_cmp(&left[b].1)) {
         let (point, step, parent) = left.swap_remove(cheapest);
         let way = step + parent.map_or(0.0, |p: usize| reached[p].way);
         let at = Some(reached.len());
-        reached.push(Reached { drawn: point, parent, way });
+        reached.push(Reached {
+            drawn: point,
+            parent,
+            way,
+        });
         for (k, best, from) in &mut left {
             let through = cost(drawn[point], drawn[*k]);
             if through < *best {
@@ -137,8 +165,11 @@ fn off_by_table() -> Vec<f32> {
     // Sums of three evenly spread numbers are near enough to a normal distribution: variance 3/12.
     const SIDE: usize = 10;
     let evenly = |k: usize| (k as f64 + 0.5) / SIDE as f64 - 0.5;
-    let normal = |k: usize| 2.0 * (evenly(k % SIDE) + evenly(k / SIDE % SIDE) + evenly(k / SIDE / SIDE));
-    (0..SIDE * SIDE * SIDE).map(|k| (COST_DEVIATION * normal(k)).exp() as f32).collect()
+    let normal =
+        |k: usize| 2.0 * (evenly(k % SIDE) + evenly(k / SIDE % SIDE) + evenly(k / SIDE / SIDE));
+    (0..SIDE * SIDE * SIDE)
+        .map(|k| (COST_DEVIATION * normal(k)).exp() as f32)
+        .collect()
 }
 
 fn below(hash: u64, share: f64) -> bool {
@@ -148,7 +179,9 @@ fn below(hash: u64, share: f64) -> bool {
 /// Chance that is the same at every run and in any order: the finaliser of splitmix64.
 fn hash(tree: u32, a: usize, b: usize) -> u64 {
     let mut x = (u64::from(tree) << 48) ^ ((a as u64) << 24) ^ b as u64;
-    x = (x ^ (x >> 30)).wrapping_add(0x9e37_79b9_7f4a_7c15).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ (x >> 30))
+        .wrapping_add(0x9e37_79b9_7f4a_7c15)
+        .wrapping_mul(0xbf58_476d_1ce4_e5b9);
     x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     x ^ (x >> 31)
 }
@@ -157,17 +190,26 @@ fn hash(tree: u32, a: usize, b: usize) -> u64 {
 mod tests {
     use super::*;
 
-    /// A trunk with a branch to each side whose tips come near each other again; the branches move differently.
+    /// A trunk with a branch to each side whose tips come near each other again; the branches move
+    /// differently.
     fn two_branches() -> (DMatrix<f32>, Vec<[f64; 2]>) {
         let trunk = (1..8).map(|k| ([0.0, -10.0 * f64::from(k)], [0.1f32, 0.0]));
         let branch = |side: f64| {
-            let motion = if side < 0.0 { [1.0f32, 0.0] } else { [0.0, 1.0] };
+            let motion = if side < 0.0 {
+                [1.0f32, 0.0]
+            } else {
+                [0.0, 1.0]
+            };
             (1..12).map(move |k| {
                 let out = f64::from(if k < 6 { k } else { 11 - k });
-                ([side * (8.0 * out + 3.0), -70.0 - 8.0 * f64::from(k)], motion)
+                (
+                    [side * (8.0 * out + 3.0), -70.0 - 8.0 * f64::from(k)],
+                    motion,
+                )
             })
         };
-        let points: Vec<([f64; 2], [f32; 2])> = trunk.chain(branch(-1.0)).chain(branch(1.0)).collect();
+        let points: Vec<([f64; 2], [f32; 2])> =
+            trunk.chain(branch(-1.0)).chain(branch(1.0)).collect();
         let apart = DMatrix::from_fn(points.len(), points.len(), |a, b| {
             let (p, q) = (points[a].1, if a == b { [0.0; 2] } else { points[b].1 });
             ((p[0] - q[0]).powi(2) + (p[1] - q[1]).powi(2)).sqrt()
@@ -192,13 +234,22 @@ mod tests {
         assert_eq!(common(), common());
     }
 
-    /// Points that rest, coincide or were never seen together must neither hang it nor come out as no numbers.
+    /// Points that rest, coincide or were never seen together must neither hang it nor come out as
+    /// no numbers.
     #[test]
     fn useless_motion_still_gives_numbers() {
         for value in [0.0, f32::NAN, f32::INFINITY] {
             for n in 0..4 {
-                let common = ways(&DMatrix::from_element(n, n, value), &vec![[5.0, 5.0]; n], [5.0, 9.0]).common;
-                assert!(common.iter().all(|c| c.is_finite()), "{n} points of {value}");
+                let common = ways(
+                    &DMatrix::from_element(n, n, value),
+                    &vec![[5.0, 5.0]; n],
+                    [5.0, 9.0],
+                )
+                .common;
+                assert!(
+                    common.iter().all(|c| c.is_finite()),
+                    "{n} points of {value}"
+                );
             }
         }
     }

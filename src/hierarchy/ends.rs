@@ -4,21 +4,24 @@ use super::arrange::Node;
 use super::binary::Binary;
 use super::rest::{centroid, crown_begins, distance_sq};
 
-/// Points of a way over which its end is evened out: one alone may sit on either edge of its branch.
+/// Points of a way over which its end is evened out: one alone may sit on either edge of its
+/// branch.
 const EVENED: usize = 3;
-/// A branch is no shorter than this share of the way from the foot to the farthest point, or it could not be told from
-/// its fork.
+/// A branch is no shorter than this share of the way from the foot to the farthest point, or it
+/// could not be told from its fork.
 const SHORTEST: f64 = 0.06;
 
 /// The end of every node's branch, px.
 ///
-/// The spanning tree of all points (`reached`, see [`Ways`](super::common_way::Ways)) runs along the branches. More than half of the
-/// ways from the foot to a cluster's points run together for a while: that is the way to the cluster. A branch ends
-/// where the ways to its children part; without children it goes on to its tip by the way that most of its points
-/// are on. So forks and tips lie on branches that are seen, not between them.
+/// The spanning tree of all points (`reached`, see [`Ways`](super::common_way::Ways)) runs along
+/// the branches. More than half of the ways from the foot to a cluster's points run together for a
+/// while: that is the way to the cluster. A branch ends where the ways to its children part;
+/// without children it goes on to its tip by the way that most of its points are on. So forks and
+/// tips lie on branches that are seen, not between them.
 ///
-/// The papers put nodes at the centroids of clusters that are cut into halves side by side. Here a cluster is often a low
-/// branch and all that is above it; between their centroids, or above the branch, nothing parts.
+/// The papers put nodes at the centroids of clusters that are cut into halves side by side. Here a
+/// cluster is often a low branch and all that is above it; between their centroids, or above the
+/// branch, nothing parts.
 pub fn ends_px(
     nodes: &[Node],
     tree: &Binary,
@@ -26,16 +29,28 @@ pub fn ends_px(
     rest_px: &[[f64; 2]],
     foot_px: [f64; 2],
 ) -> Vec<[f64; 2]> {
-    let farthest = rest_px.iter().map(|&p| distance_sq(p, foot_px)).fold(1.0, f64::max).sqrt();
-    let ways: Vec<Vec<usize>> = nodes.iter().map(|n| way(tree.points(n.part), reached, true)).collect();
+    let farthest = rest_px
+        .iter()
+        .map(|&p| distance_sq(p, foot_px))
+        .fold(1.0, f64::max)
+        .sqrt();
+    let ways: Vec<Vec<usize>> = nodes
+        .iter()
+        .map(|n| way(tree.points(n.part), reached, true))
+        .collect();
     let mut ends: Vec<[f64; 2]> = Vec::with_capacity(nodes.len());
     for (k, node) in nodes.iter().enumerate() {
         let begin = node.parent.map_or(foot_px, |p| ends[p]);
-        let children: Vec<usize> = (0..nodes.len()).filter(|&c| nodes[c].parent == Some(k)).collect();
+        let children: Vec<usize> = (0..nodes.len())
+            .filter(|&c| nodes[c].parent == Some(k))
+            .collect();
         let along = match children.split_first() {
             Some((&first, others)) => {
-                let shared = |i: usize| others.iter().all(|&c| ways[c].get(i) == ways[first].get(i));
-                let parted = (0..ways[first].len()).find(|&i| !shared(i)).unwrap_or(ways[first].len());
+                let shared =
+                    |i: usize| others.iter().all(|&c| ways[c].get(i) == ways[first].get(i));
+                let parted = (0..ways[first].len())
+                    .find(|&i| !shared(i))
+                    .unwrap_or(ways[first].len());
                 ways[first][..parted].to_vec()
             }
             None => way(tree.points(node.part), reached, false),
@@ -53,8 +68,9 @@ pub fn ends_px(
     ends
 }
 
-/// The points on the way from the foot to `points`, in its order: those through which more than half of the ways to them
-/// run, or, not only the `shared` part, at each fork the way to most of them up to the last.
+/// The points on the way from the foot to `points`, in its order: those through which more than
+/// half of the ways to them run, or, not only the `shared` part, at each fork the way to most of
+/// them up to the last.
 fn way(points: &[usize], reached: &[(usize, Option<usize>)], shared: bool) -> Vec<usize> {
     let n = reached.len();
     let mut beyond = vec![0usize; n];
@@ -76,13 +92,14 @@ fn way(points: &[usize], reached: &[(usize, Option<usize>)], shared: bool) -> Ve
     std::iter::successors(first, |&p| next[p]).collect()
 }
 
-/// Share of a cluster's points, those nearest to or farthest from where its branch begins, that mark its end.
+/// Share of a cluster's points, those nearest to or farthest from where its branch begins, that
+/// mark its end.
 const SHARE: f64 = 0.15;
 /// Fewer points than this mark nothing: one alone may be a bad track.
 const LEAST: usize = 2;
 
-/// Where the ways do not tell: halfway between those points of each child that are nearest to the beginning, or out at
-/// the farthest points.
+/// Where the ways do not tell: halfway between those points of each child that are nearest to the
+/// beginning, or out at the farthest points.
 fn by_distance(
     children: &[usize],
     nodes: &[Node],
@@ -94,8 +111,14 @@ fn by_distance(
     if children.is_empty() {
         return outermost(tree.points(node.part), rest_px, |p| -distance_sq(p, begin));
     }
-    let begins: Vec<[f64; 2]> =
-        children.iter().map(|&c| outermost(tree.points(nodes[c].part), rest_px, |p| distance_sq(p, begin))).collect();
+    let begins: Vec<[f64; 2]> = children
+        .iter()
+        .map(|&c| {
+            outermost(tree.points(nodes[c].part), rest_px, |p| {
+                distance_sq(p, begin)
+            })
+        })
+        .collect();
     centroid(&begins, &(0..begins.len()).collect::<Vec<usize>>())
 }
 
@@ -114,10 +137,12 @@ mod tests {
 
     const FOOT: [f64; 2] = [100.0, 200.0];
 
-    /// A limb for each entry: the point from which it leaves (`None`: the foot), its points, and whether they are a branch.
+    /// A limb for each entry: the point from which it leaves (`None`: the foot), its points, and
+    /// whether they are a branch.
     type Limb<'a> = (Option<usize>, &'a [[f64; 2]], bool);
 
-    /// Ends of a tree whose root holds all points, and which has a child for each limb that is a branch.
+    /// Ends of a tree whose root holds all points, and which has a child for each limb that is a
+    /// branch.
     fn ends(foot_px: [f64; 2], limbs: &[Limb]) -> Vec<[f64; 2]> {
         let (mut rest_px, mut reached, mut branches) = (Vec::new(), Vec::new(), Vec::new());
         for &(mut from, points, is_branch) in limbs {
@@ -132,51 +157,119 @@ mod tests {
             }
         }
         let n = rest_px.len();
-        let whole = Part { from: 0, to: n, halves: None };
-        let part = |&(from, to): &(usize, usize)| Part { from, to, halves: None };
+        let whole = Part {
+            from: 0,
+            to: n,
+            halves: None,
+        };
+        let part = |&(from, to): &(usize, usize)| Part {
+            from,
+            to,
+            halves: None,
+        };
         let tree = Binary {
             order: (0..n).collect(),
-            parts: std::iter::once(whole).chain(branches.iter().map(part)).collect(),
+            parts: std::iter::once(whole)
+                .chain(branches.iter().map(part))
+                .collect(),
         };
-        let root = Node { parent: None, level: 0, part: 0, certainty: 1.0 };
-        let child = |k: usize| Node { parent: Some(0), level: 1, part: k + 1, certainty: 0.0 };
-        let nodes: Vec<Node> = std::iter::once(root).chain((0..branches.len()).map(child)).collect();
+        let root = Node {
+            parent: None,
+            level: 0,
+            part: 0,
+            certainty: 1.0,
+        };
+        let child = |k: usize| Node {
+            parent: Some(0),
+            level: 1,
+            part: k + 1,
+            certainty: 0.0,
+        };
+        let nodes: Vec<Node> = std::iter::once(root)
+            .chain((0..branches.len()).map(child))
+            .collect();
         ends_px(&nodes, &tree, &reached, &rest_px, foot_px)
     }
 
     fn line(from: [f64; 2], step: [f64; 2], n: usize) -> Vec<[f64; 2]> {
-        (0..n).map(|k| [from[0] + step[0] * k as f64, from[1] + step[1] * k as f64]).collect()
+        (0..n)
+            .map(|k| [from[0] + step[0] * k as f64, from[1] + step[1] * k as f64])
+            .collect()
     }
 
     /// Else the picture would show a fork in the air between two limbs.
     #[test]
     fn a_fork_lies_on_the_stem_and_tips_on_their_limbs() {
         let trunk = line([100.0, 190.0], [0.0, -10.0], 8);
-        let (left, right) = (line([90.0, 110.0], [-10.0, -10.0], 6), line([110.0, 112.0], [12.0, -8.0], 6));
-        let ends = ends(FOOT, &[(None, &trunk, false), (Some(7), &left, true), (Some(7), &right, true)]);
+        let (left, right) = (
+            line([90.0, 110.0], [-10.0, -10.0], 6),
+            line([110.0, 112.0], [12.0, -8.0], 6),
+        );
+        let ends = ends(
+            FOOT,
+            &[
+                (None, &trunk, false),
+                (Some(7), &left, true),
+                (Some(7), &right, true),
+            ],
+        );
         assert_eq!(ends.len(), 3);
-        assert!(ends[0][0] == 100.0 && (115.0..140.0).contains(&ends[0][1]), "fork: {:?}", ends[0]);
+        assert!(
+            ends[0][0] == 100.0 && (115.0..140.0).contains(&ends[0][1]),
+            "fork: {:?}",
+            ends[0]
+        );
         let (tip, near) = (ends[1], left[4]);
-        assert!((tip[0] - near[0]).hypot(tip[1] - near[1]) < 1e-9, "left tip: {tip:?}");
-        assert!((ends[2][0] - right[4][0]).hypot(ends[2][1] - right[4][1]) < 1e-9, "right tip: {:?}", ends[2]);
+        assert!(
+            (tip[0] - near[0]).hypot(tip[1] - near[1]) < 1e-9,
+            "left tip: {tip:?}"
+        );
+        assert!(
+            (ends[2][0] - right[4][0]).hypot(ends[2][1] - right[4][1]) < 1e-9,
+            "right tip: {:?}",
+            ends[2]
+        );
     }
 
-    /// What the papers' centroids get wrong: halfway between a low branch and the crown above it nothing parts.
+    /// What the papers' centroids get wrong: halfway between a low branch and the crown above it
+    /// nothing parts.
     #[test]
     fn a_low_branch_leaves_the_trunk_where_it_does_and_not_halfway_up_the_crown() {
         let trunk = line([100.0, 190.0], [0.0, -10.0], 4);
         let low = line([90.0, 158.0], [-10.0, -3.0], 5);
         let above = line([100.0, 150.0], [0.0, -10.0], 14);
-        let ends = ends(FOOT, &[(None, &trunk, false), (Some(3), &low, true), (Some(3), &above, true)]);
-        assert!(ends[0][0] == 100.0 && (158.0..182.0).contains(&ends[0][1]), "fork: {:?}", ends[0]);
-        assert!(ends[2][1] < 40.0, "the crown goes on to its top: {:?}", ends[2]);
+        let ends = ends(
+            FOOT,
+            &[
+                (None, &trunk, false),
+                (Some(3), &low, true),
+                (Some(3), &above, true),
+            ],
+        );
+        assert!(
+            ends[0][0] == 100.0 && (158.0..182.0).contains(&ends[0][1]),
+            "fork: {:?}",
+            ends[0]
+        );
+        assert!(
+            ends[2][1] < 40.0,
+            "the crown goes on to its top: {:?}",
+            ends[2]
+        );
     }
 
     #[test]
     fn a_trunk_without_points_ends_where_the_crown_begins() {
-        let (left, right) = (line([90.0, 100.0], [-8.0, -8.0], 6), line([110.0, 100.0], [8.0, -8.0], 6));
+        let (left, right) = (
+            line([90.0, 100.0], [-8.0, -8.0], 6),
+            line([110.0, 100.0], [8.0, -8.0], 6),
+        );
         let ends = ends(FOOT, &[(None, &left, true), (None, &right, true)]);
-        assert!((ends[0][0] - 100.0).abs() < 1.0 && (90.0..=110.0).contains(&ends[0][1]), "top: {:?}", ends[0]);
+        assert!(
+            (ends[0][0] - 100.0).abs() < 1.0 && (90.0..=110.0).contains(&ends[0][1]),
+            "top: {:?}",
+            ends[0]
+        );
     }
 
     /// A branch of no length has no direction, and could not be posed.
@@ -184,10 +277,24 @@ mod tests {
     fn no_branch_ends_where_it_begins() {
         // The way to the right branch is told by its first points alone, right at the fork.
         let trunk = line([100.0, 190.0], [0.0, -10.0], 8);
-        let (left, right) = (line([90.0, 110.0], [-10.0, -10.0], 6), [[101.0, 121.0], [99.0, 119.0], [104.0, 90.0]]);
-        let ends = ends(FOOT, &[(None, &trunk, false), (Some(7), &left, true), (Some(7), &right, true)]);
+        let (left, right) = (
+            line([90.0, 110.0], [-10.0, -10.0], 6),
+            [[101.0, 121.0], [99.0, 119.0], [104.0, 90.0]],
+        );
+        let ends = ends(
+            FOOT,
+            &[
+                (None, &trunk, false),
+                (Some(7), &left, true),
+                (Some(7), &right, true),
+            ],
+        );
         for tip in &ends[1..] {
-            assert!((tip[0] - ends[0][0]).hypot(tip[1] - ends[0][1]) > 10.0, "{tip:?} at the fork {:?}", ends[0]);
+            assert!(
+                (tip[0] - ends[0][0]).hypot(tip[1] - ends[0][1]) > 10.0,
+                "{tip:?} at the fork {:?}",
+                ends[0]
+            );
         }
     }
 }

@@ -1,14 +1,18 @@
-//! Average linkage: the two groups that are most alike in the mean over their pairs are joined, again and again.
+//! Average linkage: the two groups that are most alike in the mean over their pairs are joined,
+//! again and again.
 //!
-//! A normalised cut prefers halves of equal weight, and a trunk that gives off one branch after the other has none.
+//! A normalised cut prefers halves of equal weight, and a trunk that gives off one branch after the
+//! other has none.
 
 use nalgebra::DMatrix;
 
-/// Joins all points; merge k is of points (below n) or earlier merges (n, n + 1, …), see [`super::binary::Binary`].
+/// Joins all points; merge k is of points (below n) or earlier merges (n, n + 1, …), see
+/// [`super::binary::Binary`].
 /// `alike` is symmetric and used up.
 ///
-/// Chains of nearest neighbours (Murtagh 1983): from any group to the one most like it, until two are each other's
-/// most alike. For the mean over pairs these may be joined at once, so that all takes of the order of n^2 steps.
+/// Chains of nearest neighbours (Murtagh 1983): from any group to the one most like it, until two
+/// are each other's most alike. For the mean over pairs these may be joined at once, so that all
+/// takes of the order of n^2 steps.
 pub fn average_linkage(mut alike: DMatrix<f32>) -> Vec<[usize; 2]> {
     let n = alike.nrows();
     let mut merges = Vec::with_capacity(n.saturating_sub(1));
@@ -32,7 +36,9 @@ pub fn average_linkage(mut alike: DMatrix<f32>) -> Vec<[usize; 2]> {
             }
         }
         // Nothing compares greater only among values that are no numbers; any partner will do.
-        let Some(other) = best.or_else(|| left.iter().copied().find(|&k| k != last)) else { break };
+        let Some(other) = best.or_else(|| left.iter().copied().find(|&k| k != last)) else {
+            break;
+        };
         if before != Some(other) {
             chain.push(other);
             continue;
@@ -75,12 +81,19 @@ mod tests {
             let mut expected = BTreeSet::new();
             while groups.len() > 1 {
                 let mean = |a: &BTreeSet<usize>, b: &BTreeSet<usize>| {
-                    a.iter().flat_map(|&i| b.iter().map(move |&j| (i, j))).map(|p| f64::from(w[p])).sum::<f64>()
+                    a.iter()
+                        .flat_map(|&i| b.iter().map(move |&j| (i, j)))
+                        .map(|p| f64::from(w[p]))
+                        .sum::<f64>()
                         / (a.len() * b.len()) as f64
                 };
-                let pairs = (0..groups.len()).flat_map(|i| (i + 1..groups.len()).map(move |j| (i, j)));
+                let pairs =
+                    (0..groups.len()).flat_map(|i| (i + 1..groups.len()).map(move |j| (i, j)));
                 let (i, j) = pairs
-                    .max_by(|x, y| mean(&groups[x.0], &groups[x.1]).total_cmp(&mean(&groups[y.0], &groups[y.1])))
+                    .max_by(|x, y| {
+                        mean(&groups[x.0], &groups[x.1])
+                            .total_cmp(&mean(&groups[y.0], &groups[y.1]))
+                    })
                     .unwrap();
                 let gone = groups.remove(j);
                 groups[i].extend(gone);
@@ -99,7 +112,11 @@ mod tests {
     #[test]
     fn ends_on_useless_values() {
         for value in [f32::NAN, 0.0, f32::INFINITY, f32::NEG_INFINITY] {
-            assert_eq!(average_linkage(DMatrix::from_element(9, 9, value)).len(), 8, "{value}");
+            assert_eq!(
+                average_linkage(DMatrix::from_element(9, 9, value)).len(),
+                8,
+                "{value}"
+            );
         }
     }
 }

@@ -1,7 +1,8 @@
 //! From tracks to the motion hierarchy: which points move together, and where they part.
 //!
-//! By default average linkage over the likeness of [`path`]. `affinity = "zeng"` is the papers' method: recursive
-//! two-way normalised cuts on nearness and likeness of motion (Li et al. appendix A, Zeng section 5.4.1).
+//! By default average linkage over the likeness of [`path`]. `affinity = "zeng"` is the papers'
+//! method: recursive two-way normalised cuts on nearness and likeness of motion (Li et al. appendix
+//! A, Zeng section 5.4.1).
 
 mod accumulate;
 mod agreement;
@@ -39,10 +40,18 @@ use signals::Signals;
 /// Fewest points on either side of a cut: one alone is more likely a bad track than a branch.
 const MIN_SIDE: usize = 2;
 
-/// Puts those of the points `moving` (rows of `table`) that agree with their neighbours into a hierarchy; empty if
-/// there are none. `foot_px` is where the tree leaves the ground.
-pub fn build(table: &TrackTable, moving: &[usize], foot_px: [f64; 2], settings: &Hierarchy) -> MotionHierarchy {
-    let rest_px: Vec<[f64; 2]> = moving.iter().map(|&row| rest_position_px(table, row)).collect();
+/// Puts those of the points `moving` (rows of `table`) that agree with their neighbours into a
+/// hierarchy; empty if there are none. `foot_px` is where the tree leaves the ground.
+pub fn build(
+    table: &TrackTable,
+    moving: &[usize],
+    foot_px: [f64; 2],
+    settings: &Hierarchy,
+) -> MotionHierarchy {
+    let rest_px: Vec<[f64; 2]> = moving
+        .iter()
+        .map(|&row| rest_position_px(table, row))
+        .collect();
     let velocities = Signals::velocities(table, moving, |_| true);
     // Indices into `moving`.
     let kept = in_agreement(&velocities, &rest_px, settings.agreement);
@@ -60,7 +69,11 @@ pub fn build(table: &TrackTable, moving: &[usize], foot_px: [f64; 2], settings: 
             (tree, stems, ways.reached)
         }
         Affinity::Zeng => {
-            let tree = cut_in_two(&Signals::velocities(table, &rows, |_| true), &rest_px, settings);
+            let tree = cut_in_two(
+                &Signals::velocities(table, &rows, |_| true),
+                &rest_px,
+                settings,
+            );
             let stems = vec![false; tree.parts.len()];
             (tree, stems, Vec::new())
         }
@@ -68,7 +81,10 @@ pub fn build(table: &TrackTable, moving: &[usize], foot_px: [f64; 2], settings: 
     let certain = certainty::certainties(&tree, &displacements, &table.times_s);
     let nodes = arranged(&tree, &certain, &stems, settings);
     let ends_px = match settings.affinity {
-        Affinity::Path => ends::ends_px(&nodes, &tree, &reached, &rest_px, foot_px).into_iter().map(Some).collect(),
+        Affinity::Path => ends::ends_px(&nodes, &tree, &reached, &rest_px, foot_px)
+            .into_iter()
+            .map(Some)
+            .collect(),
         Affinity::Zeng => vec![None; nodes.len()],
     };
     let cluster = |(node, end_px): (arrange::Node, Option<[f64; 2]>)| {
@@ -84,7 +100,9 @@ pub fn build(table: &TrackTable, moving: &[usize], foot_px: [f64; 2], settings: 
             certainty: node.certainty,
         }
     };
-    MotionHierarchy { clusters: nodes.into_iter().zip(ends_px).map(cluster).collect() }
+    MotionHierarchy {
+        clusters: nodes.into_iter().zip(ends_px).map(cluster).collect(),
+    }
 }
 
 /// The papers' recursive normalised cuts.
@@ -94,7 +112,13 @@ fn cut_in_two(velocities: &Signals, rest_px: &[[f64; 2]], settings: &Hierarchy) 
         if depth + 1 >= settings.levels || points.len() < settings.min_points as usize {
             return None;
         }
-        let w = zeng::affinity(&rho, rest_px, points, settings.distance_scale, settings.correlation_power);
+        let w = zeng::affinity(
+            &rho,
+            rest_px,
+            points,
+            settings.distance_scale,
+            settings.correlation_power,
+        );
         normalised_cut(&w, MIN_SIDE).map(|cut| cut.first_side)
     })
 }

@@ -12,8 +12,10 @@ pub struct Cut {
     pub ncut: f64,
 }
 
-/// The best threshold cut along the second eigenvector of D^-1/2 W D^-1/2 in which each side keeps at least
-/// `min_side` vertices; `None` if there are too few. `w` is symmetric with positive weights off the diagonal.
+/// The best threshold cut along the second eigenvector of D^-1/2 W D^-1/2 in which each side keeps
+/// at least
+/// `min_side` vertices; `None` if there are too few. `w` is symmetric with positive weights off the
+/// diagonal.
 pub fn normalised_cut(w: &DMatrix<f32>, min_side: usize) -> Option<Cut> {
     let n = w.nrows();
     if n < 2 * min_side.max(1) {
@@ -24,12 +26,19 @@ pub fn normalised_cut(w: &DMatrix<f32>, min_side: usize) -> Option<Cut> {
         return None;
     }
     let root = degree.map(f32::sqrt);
-    let scaled = DMatrix::from_fn(n, n, |i, j| if i == j { 0.0 } else { w[(i, j)] / (root[i] * root[j]) });
+    let scaled = DMatrix::from_fn(n, n, |i, j| {
+        if i == j {
+            0.0
+        } else {
+            w[(i, j)] / (root[i] * root[j])
+        }
+    });
     let fiedler = second_eigenvector(&scaled, &root).component_div(&root);
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|&a, &b| fiedler[a].total_cmp(&fiedler[b]).then(a.cmp(&b)));
 
-    // One sweep: moving a vertex over changes the cut by what it has left on its side less what it joins.
+    // One sweep: moving a vertex over changes the cut by what it has left on its side less what it
+    // joins.
     let total: f64 = degree.iter().map(|&d| f64::from(d)).sum();
     let (mut cut, mut volume) = (0.0f64, 0.0f64);
     let mut tie_to_first = vec![0.0f64; n];
@@ -54,7 +63,10 @@ pub fn normalised_cut(w: &DMatrix<f32>, min_side: usize) -> Option<Cut> {
     for &i in &order[..best_at] {
         first_side[i] = true;
     }
-    (best_at > 0).then_some(Cut { first_side, ncut: best })
+    (best_at > 0).then_some(Cut {
+        first_side,
+        ncut: best,
+    })
 }
 
 #[cfg(test)]
@@ -70,7 +82,11 @@ mod tests {
             let cut = normalised_cut(&w, 2).unwrap();
             let same = (0..n).all(|i| cut.first_side[i] == group(i));
             let swapped = (0..n).all(|i| cut.first_side[i] != group(i));
-            assert!(same || swapped, "{n} points, {split} in the first group: {:?}", cut.first_side);
+            assert!(
+                same || swapped,
+                "{n} points, {split} in the first group: {:?}",
+                cut.first_side
+            );
         }
     }
 
@@ -78,13 +94,23 @@ mod tests {
     #[test]
     fn ncut_value_is_the_definition() {
         let n = 12;
-        let w = DMatrix::from_fn(n, n, |i, j| if i == j { 0.0 } else { 1.0 / (1.0 + (i as f32 - j as f32).abs()) });
+        let w = DMatrix::from_fn(n, n, |i, j| {
+            if i == j {
+                0.0
+            } else {
+                1.0 / (1.0 + (i as f32 - j as f32).abs())
+            }
+        });
         let cut = normalised_cut(&w, 2).unwrap();
         let (mut across, mut a, mut b) = (0.0, 0.0, 0.0);
         for i in 0..n {
             for j in 0..n {
                 let x = f64::from(w[(i, j)]);
-                across += if cut.first_side[i] && !cut.first_side[j] { x } else { 0.0 };
+                across += if cut.first_side[i] && !cut.first_side[j] {
+                    x
+                } else {
+                    0.0
+                };
                 *(if cut.first_side[i] { &mut a } else { &mut b }) += x;
             }
         }

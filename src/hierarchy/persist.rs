@@ -5,22 +5,32 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// For every group of points in `new` the group in `old` that it goes on as; none goes on as two.
 ///
-/// An old group goes on where most of its points went: more than half of those that both trees hold. Of several new
-/// groups that hold them (a branch lies in all those above it), or several old ones that went into one, the pair that is
-/// most alike counts: shared points over all points of both (Jaccard), pair by pair from the best down. The best
-/// assignment of all (Hungarian) may give up a certain pair for two doubtful ones, and then a branch that has not
-/// changed gets another's name.
+/// An old group goes on where most of its points went: more than half of those that both trees
+/// hold. Of several new groups that hold them (a branch lies in all those above it), or several old
+/// ones that went into one, the pair that is most alike counts: shared points over all points of
+/// both (Jaccard), pair by pair from the best down. The best assignment of all (Hungarian) may give
+/// up a certain pair for two doubtful ones, and then a branch that has not changed gets another's
+/// name.
 pub fn persisting(old: &[Vec<TrackId>], new: &[Vec<TrackId>]) -> Vec<Option<usize>> {
     // Points that were lost meanwhile, or are new, say nothing about what moved where.
-    let all = |groups: &[Vec<TrackId>]| groups.iter().flatten().copied().collect::<BTreeSet<TrackId>>();
+    let all = |groups: &[Vec<TrackId>]| {
+        groups
+            .iter()
+            .flatten()
+            .copied()
+            .collect::<BTreeSet<TrackId>>()
+    };
     let (in_old, in_new) = (all(old), all(new));
-    let in_both =
-        |group: &Vec<TrackId>, other: &BTreeSet<TrackId>| group.iter().filter(|id| other.contains(id)).count();
+    let in_both = |group: &Vec<TrackId>, other: &BTreeSet<TrackId>| {
+        group.iter().filter(|id| other.contains(id)).count()
+    };
     let old_sizes: Vec<usize> = old.iter().map(|group| in_both(group, &in_new)).collect();
     let new_sizes: Vec<usize> = new.iter().map(|group| in_both(group, &in_old)).collect();
     let mut groups_of: BTreeMap<TrackId, Vec<usize>> = BTreeMap::new();
     for (i, group) in old.iter().enumerate() {
-        group.iter().for_each(|id| groups_of.entry(*id).or_default().push(i));
+        group
+            .iter()
+            .for_each(|id| groups_of.entry(*id).or_default().push(i));
     }
     let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
     for (k, group) in new.iter().enumerate() {
@@ -29,7 +39,8 @@ pub fn persisting(old: &[Vec<TrackId>], new: &[Vec<TrackId>]) -> Vec<Option<usiz
             *shared.entry(*i).or_default() += 1;
         }
         let most = shared.into_iter().filter(|(i, n)| 2 * n > old_sizes[*i]);
-        pairs.extend(most.map(|(i, n)| (n as f64 / (old_sizes[i] + new_sizes[k] - n) as f64, i, k)));
+        pairs
+            .extend(most.map(|(i, n)| (n as f64 / (old_sizes[i] + new_sizes[k] - n) as f64, i, k)));
     }
     pairs.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
     let (mut of_new, mut taken) = (vec![None; new.len()], vec![false; old.len()]);
@@ -46,16 +57,28 @@ mod tests {
     use super::*;
 
     fn groups(sets: &[&[u32]]) -> Vec<Vec<TrackId>> {
-        sets.iter().map(|s| s.iter().map(|&i| TrackId(i)).collect()).collect()
+        sets.iter()
+            .map(|s| s.iter().map(|&i| TrackId(i)).collect())
+            .collect()
     }
 
     /// Whole, two main branches, two twigs on the first.
-    const OLD: [&[u32]; 5] = [&[1, 2, 3, 4, 5, 6, 7, 8, 9], &[1, 2, 3, 4, 5], &[6, 7, 8, 9], &[1, 2, 3], &[4, 5]];
+    const OLD: [&[u32]; 5] = [
+        &[1, 2, 3, 4, 5, 6, 7, 8, 9],
+        &[1, 2, 3, 4, 5],
+        &[6, 7, 8, 9],
+        &[1, 2, 3],
+        &[4, 5],
+    ];
 
     /// A branch that loses its number for nothing makes every table and every stream of it useless.
     #[test]
     fn a_group_goes_on_where_most_of_its_points_went() {
-        type Case = (&'static str, &'static [&'static [u32]], &'static [Option<usize>]);
+        type Case = (
+            &'static str,
+            &'static [&'static [u32]],
+            &'static [Option<usize>],
+        );
         let cases: [Case; 6] = [
             (
                 "the same tree in another order",
@@ -69,22 +92,41 @@ mod tests {
             ),
             (
                 "points were lost and found",
-                &[&[1, 2, 4, 5, 6, 7, 20], &[1, 2, 4, 5, 20], &[6, 7], &[1, 2, 20], &[4, 5]],
+                &[
+                    &[1, 2, 4, 5, 6, 7, 20],
+                    &[1, 2, 4, 5, 20],
+                    &[6, 7],
+                    &[1, 2, 20],
+                    &[4, 5],
+                ],
                 &[Some(0), Some(1), Some(2), Some(3), Some(4)],
             ),
-            ("a split is not made any more", &[OLD[0], OLD[1], OLD[2]], &[Some(0), Some(1), Some(2)]),
+            (
+                "a split is not made any more",
+                &[OLD[0], OLD[1], OLD[2]],
+                &[Some(0), Some(1), Some(2)],
+            ),
             (
                 "a branch falls into two halves: neither is it",
                 &[OLD[0], &[6, 7], &[8, 9], OLD[1]],
                 &[Some(0), None, None, Some(1)],
             ),
-            ("none of its points is left", &[&[6, 7, 8, 9, 30, 31], &[6, 7, 8, 9], &[30, 31]], &[None, Some(0), None]),
+            (
+                "none of its points is left",
+                &[&[6, 7, 8, 9, 30, 31], &[6, 7, 8, 9], &[30, 31]],
+                &[None, Some(0), None],
+            ),
         ];
         for (what, new, expected) in cases {
             let found = persisting(&groups(&OLD), &groups(new));
             if what.starts_with("none") {
-                // All that is left of the whole tree is one branch: both names fit, one of them is given.
-                assert_eq!(found.iter().flatten().count(), 1 + usize::from(found[0].is_some()), "{what}: {found:?}");
+                // All that is left of the whole tree is one branch: both names fit, one of them is
+                // given.
+                assert_eq!(
+                    found.iter().flatten().count(),
+                    1 + usize::from(found[0].is_some()),
+                    "{what}: {found:?}"
+                );
                 assert_eq!(found[2], None, "{what}");
                 continue;
             }

@@ -5,22 +5,34 @@ use crate::track::TrackTable;
 
 /// Median position of a track: where the tree rests, whatever pose it was first seen in.
 pub fn rest_position_px(table: &TrackTable, row: usize) -> [f64; 2] {
-    let values = |c: usize| table.positions[row].iter().flatten().map(|p| p[c]).collect();
+    let values = |c: usize| {
+        table.positions[row]
+            .iter()
+            .flatten()
+            .map(|p| p[c])
+            .collect()
+    };
     [0, 1].map(|c| median(values(c), f32::total_cmp).map_or(0.0, f64::from))
 }
 
 /// Mean of the rest positions of `members`, px.
 pub fn centroid(rest_px: &[[f64; 2]], members: &[usize]) -> [f64; 2] {
     let n = members.len().max(1) as f64;
-    let sum = members.iter().fold([0.0; 2], |s, &i| [s[0] + rest_px[i][0], s[1] + rest_px[i][1]]);
+    let sum = members.iter().fold([0.0; 2], |s, &i| {
+        [s[0] + rest_px[i][0], s[1] + rest_px[i][1]]
+    });
     [sum[0] / n, sum[1] / n]
 }
 
-/// Twice the root mean square distance of `members` from their centroid, px: about 1.4 times the radius of an evenly
-/// filled disc.
+/// Twice the root mean square distance of `members` from their centroid, px: about 1.4 times the
+/// radius of an evenly filled disc.
 pub fn extent_px(rest_px: &[[f64; 2]], members: &[usize]) -> f64 {
     let centre = centroid(rest_px, members);
-    let variance = members.iter().map(|&i| distance_sq(rest_px[i], centre)).sum::<f64>() / members.len().max(1) as f64;
+    let variance = members
+        .iter()
+        .map(|&i| distance_sq(rest_px[i], centre))
+        .sum::<f64>()
+        / members.len().max(1) as f64;
     2.0 * variance.sqrt()
 }
 
@@ -28,17 +40,23 @@ pub fn distance_sq(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2)
 }
 
-/// A trunk bears no points if none is nearer to the foot than this share of the way to the farthest.
+/// A trunk bears no points if none is nearer to the foot than this share of the way to the
+/// farthest.
 const BARE_TRUNK: f64 = 0.2;
 /// Share of the points, the lowest ones, below which a crown is taken to begin.
 const LOWEST: f64 = 0.05;
 
-/// Where a trunk that bears no points enters the crown, px: on the line from the foot to the middle of all points, as high
-/// as the lowest of them. `None` where there are points on the trunk, which say better where it goes.
+/// Where a trunk that bears no points enters the crown, px: on the line from the foot to the middle
+/// of all points, as high as the lowest of them. `None` where there are points on the trunk, which
+/// say better where it goes.
 pub fn crown_begins(rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> Option<[f64; 2]> {
     let way = |p: &[f64; 2]| distance_sq(*p, foot_px).sqrt();
-    let (nearest, farthest) =
-        rest_px.iter().map(way).fold((f64::INFINITY, 0.0_f64), |(low, high), d| (low.min(d), high.max(d)));
+    let (nearest, farthest) = rest_px
+        .iter()
+        .map(way)
+        .fold((f64::INFINITY, 0.0_f64), |(low, high), d| {
+            (low.min(d), high.max(d))
+        });
     if nearest.is_infinite() || nearest <= BARE_TRUNK * farthest {
         return None;
     }
@@ -46,7 +64,10 @@ pub fn crown_begins(rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> Option<[f64; 2]>
     let middle = centroid(rest_px, &all);
     let mut heights: Vec<f64> = rest_px.iter().map(|p| foot_px[1] - p[1]).collect();
     heights.sort_unstable_by(f64::total_cmp);
-    let lowest = heights.get((LOWEST * heights.len() as f64) as usize).copied().unwrap_or(0.0);
+    let lowest = heights
+        .get((LOWEST * heights.len() as f64) as usize)
+        .copied()
+        .unwrap_or(0.0);
     let share = (lowest / (foot_px[1] - middle[1]).max(1.0)).clamp(0.0, 1.0);
     Some([0, 1].map(|c| foot_px[c] + share * (middle[c] - foot_px[c])))
 }
@@ -57,17 +78,29 @@ mod tests {
 
     /// Two limbs that part at `fork`.
     fn crown(fork: [f64; 2]) -> Vec<[f64; 2]> {
-        let limb =
-            |side: f64| (1..=10).map(move |k| [fork[0] + side * 5.0 * f64::from(k), fork[1] - 6.0 * f64::from(k)]);
+        let limb = |side: f64| {
+            (1..=10).map(move |k| {
+                [
+                    fork[0] + side * 5.0 * f64::from(k),
+                    fork[1] - 6.0 * f64::from(k),
+                ]
+            })
+        };
         limb(-1.0).chain(limb(1.0)).collect()
     }
 
     #[test]
     fn a_bare_trunk_is_as_high_as_the_lowest_of_the_crown() {
         let top = crown_begins(&crown([100.0, 100.0]), [100.0, 200.0]).expect("a bare trunk");
-        assert!((top[0] - 100.0).abs() < 1e-9 && (90.0..=100.0).contains(&top[1]), "{top:?}");
+        assert!(
+            (top[0] - 100.0).abs() < 1e-9 && (90.0..=100.0).contains(&top[1]),
+            "{top:?}"
+        );
         // One track that has gone astray must not pull the crown down to the ground.
-        let mut astray: Vec<[f64; 2]> = crown([100.0, 100.0]).into_iter().chain(crown([100.0, 100.0])).collect();
+        let mut astray: Vec<[f64; 2]> = crown([100.0, 100.0])
+            .into_iter()
+            .chain(crown([100.0, 100.0]))
+            .collect();
         astray.push([160.0, 195.0]);
         let top = crown_begins(&astray, [100.0, 200.0]).expect("a bare trunk");
         assert!((85.0..=110.0).contains(&top[1]), "{top:?}");
@@ -83,9 +116,13 @@ mod tests {
 
     #[test]
     fn a_crown_below_the_foot_puts_the_top_on_the_foot() {
-        // A tree that hangs from a cliff: nothing is above the foot, and the trunk must not leave the picture.
+        // A tree that hangs from a cliff: nothing is above the foot, and the trunk must not leave
+        // the picture.
         let hanging = crown([100.0, 330.0]);
         let top = crown_begins(&hanging, [100.0, 200.0]).expect("no points near the foot");
-        assert!(top.iter().all(|c| c.is_finite()) && top == [100.0, 200.0], "{top:?}");
+        assert!(
+            top.iter().all(|c| c.is_finite()) && top == [100.0, 200.0],
+            "{top:?}"
+        );
     }
 }

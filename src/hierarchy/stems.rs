@@ -6,16 +6,19 @@ use nalgebra::DMatrix;
 /// A half of which so much of the whole way is on the way to the other half is its stem.
 const ON_THE_WAY: f32 = 0.9;
 
-/// For every part of `tree` whether it is the stem of the part beside it. `common` holds the common ways of all pairs,
-/// and on the diagonal the whole way of each point from the foot, see [`super::common_way`].
+/// For every part of `tree` whether it is the stem of the part beside it. `common` holds the common
+/// ways of all pairs, and on the diagonal the whole way of each point from the foot, see
+/// [`super::common_way`].
 ///
-/// Linkage sets the points along a limb apart from all that is on its upper end, as their ways end before the others
-/// part. Taken for a branch they would stick out of their own limb.
+/// Linkage sets the points along a limb apart from all that is on its upper end, as their ways end
+/// before the others part. Taken for a branch they would stick out of their own limb.
 pub fn stems(tree: &Binary, common: &DMatrix<f32>) -> Vec<bool> {
     let mut stems = vec![false; tree.parts.len()];
     for [a, b] in tree.parts.iter().filter_map(|p| p.halves) {
-        let (on_b, on_a) =
-            (share(tree.points(a), tree.points(b), common), share(tree.points(b), tree.points(a), common));
+        let (on_b, on_a) = (
+            share(tree.points(a), tree.points(b), common),
+            share(tree.points(b), tree.points(a), common),
+        );
         stems[a] = on_b >= ON_THE_WAY && on_b >= on_a;
         stems[b] = on_a >= ON_THE_WAY && !stems[a];
     }

@@ -3,7 +3,8 @@
 use super::signals::Signals;
 use crate::track::TrackTable;
 
-/// Points that are compared in threes; more say the same at a higher price (64 make 41,664 triplets).
+/// Points that are compared in threes; more say the same at a higher price (64 make 41,664
+/// triplets).
 const COMPARED: usize = 64;
 
 /// A point and the branches that it is on in either tree, from the trunk up.
@@ -17,27 +18,40 @@ pub struct OnBoth {
 /// How much better one tree is borne out than another.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Gain {
-    /// Share of triplets that the new tree has right and the old one has not, less the reverse, -1 to 1.
+    /// Share of triplets that the new tree has right and the old one has not, less the reverse, -1
+    /// to 1.
     pub gain: f64,
     /// Its standard error: other points of the same tree would give another.
     pub error: f64,
 }
 
-/// Holds two trees against the motion in `table`: of three points a tree should put those two nearest together that move
-/// most alike.
+/// Holds two trees against the motion in `table`: of three points a tree should put those two
+/// nearest together that move most alike.
 ///
-/// A triplet counts by how clearly the motion tells its nearest pair from the next; pairs that a tree holds equally near
-/// share the point. It is the measure by which trees are held against a known truth, with the correlation of displacements
-/// in the truth's place, so it speaks of all levels alike and does not care how many splits a tree has. The error is the
-/// jackknife's over points, to first order.
+/// A triplet counts by how clearly the motion tells its nearest pair from the next; pairs that a
+/// tree holds equally near share the point. It is the measure by which trees are held against a
+/// known truth, with the correlation of displacements in the truth's place, so it speaks of all
+/// levels alike and does not care how many splits a tree has. The error is the jackknife's over
+/// points, to first order.
 pub fn gain(table: &TrackTable, points: &[OnBoth]) -> Gain {
-    let some: Vec<&OnBoth> = points.iter().step_by(points.len().div_ceil(COMPARED).max(1)).collect();
+    let some: Vec<&OnBoth> = points
+        .iter()
+        .step_by(points.len().div_ceil(COMPARED).max(1))
+        .collect();
     let rows: Vec<usize> = some.iter().map(|p| p.row).collect();
     let alike = Signals::displacements(table, &rows).correlations();
     let n = some.len();
     let depths = |chain: fn(&OnBoth) -> &[u32]| -> Vec<Vec<usize>> {
-        let shared = |a: &OnBoth, b: &OnBoth| chain(a).iter().zip(chain(b)).take_while(|(p, q)| p == q).count();
-        some.iter().map(|a| some.iter().map(|b| shared(a, b)).collect()).collect()
+        let shared = |a: &OnBoth, b: &OnBoth| {
+            chain(a)
+                .iter()
+                .zip(chain(b))
+                .take_while(|(p, q)| p == q)
+                .count()
+        };
+        some.iter()
+            .map(|a| some.iter().map(|b| shared(a, b)).collect())
+            .collect()
     };
     let (old, new) = (depths(|p| &p.old), depths(|p| &p.new));
     let mut triplets: Vec<([usize; 3], f64, f64)> = Vec::new();
@@ -47,8 +61,12 @@ pub fn gain(table: &TrackTable, points: &[OnBoth]) -> Gain {
                 let pairs = [(a, b), (a, c), (b, c)];
                 let rho = pairs.map(|p| f64::from(alike[p]));
                 let best = (0..3).fold(0, |m, k| if rho[k] > rho[m] { k } else { m });
-                let second = (0..3).filter(|&k| k != best).map(|k| rho[k]).fold(f64::NEG_INFINITY, f64::max);
-                let credit = |depths: &[Vec<usize>]| share_of(best, pairs.map(|(i, j)| depths[i][j]));
+                let second = (0..3)
+                    .filter(|&k| k != best)
+                    .map(|k| rho[k])
+                    .fold(f64::NEG_INFINITY, f64::max);
+                let credit =
+                    |depths: &[Vec<usize>]| share_of(best, pairs.map(|(i, j)| depths[i][j]));
                 triplets.push(([a, b, c], rho[best] - second, credit(&new) - credit(&old)));
             }
         }
@@ -60,16 +78,25 @@ pub fn gain(table: &TrackTable, points: &[OnBoth]) -> Gain {
     let gain = triplets.iter().map(|t| t.1 * t.2).sum::<f64>() / weight;
     let mut influence = vec![0.0; n];
     for (points, clear, better) in &triplets {
-        points.iter().for_each(|&i| influence[i] += clear * (better - gain) / weight);
+        points
+            .iter()
+            .for_each(|&i| influence[i] += clear * (better - gain) / weight);
     }
-    Gain { gain, error: influence.iter().map(|i| i * i).sum::<f64>().sqrt() }
+    Gain {
+        gain,
+        error: influence.iter().map(|i| i * i).sum::<f64>().sqrt(),
+    }
 }
 
 /// What pair `best` gets if the deepest of three wins and equals share.
 fn share_of(best: usize, depths: [usize; 3]) -> f64 {
     let deepest = depths.into_iter().max().unwrap_or(0);
     let winners = depths.iter().filter(|d| **d == deepest).count();
-    if depths[best] == deepest { 1.0 / winners as f64 } else { 0.0 }
+    if depths[best] == deepest {
+        1.0 / winners as f64
+    } else {
+        0.0
+    }
 }
 
 #[cfg(test)]
@@ -77,13 +104,17 @@ mod tests {
     use super::*;
     use crate::model::TrackId;
 
-    /// Twelve points on two branches that sway at rates of their own, on each of which two twigs do the same on top.
+    /// Twelve points on two branches that sway at rates of their own, on each of which two twigs do
+    /// the same on top.
     fn table() -> TrackTable {
         let times_s: Vec<f64> = (0..150).map(|k| f64::from(k) / 15.0).collect();
         let path = |i: usize| {
             let sway = |hz: f64, t: f64| (std::f64::consts::TAU * hz * t).sin();
             let (branch, twig) = ([0.5, 0.8][i / 6], [1.3, 1.9, 2.4, 3.1][i / 3]);
-            times_s.iter().map(|&t| Some([(4.0 * sway(branch, t) + sway(twig, t)) as f32, 0.0])).collect()
+            times_s
+                .iter()
+                .map(|&t| Some([(4.0 * sway(branch, t) + sway(twig, t)) as f32, 0.0]))
+                .collect()
         };
         TrackTable {
             ids: (0..12).map(TrackId).collect(),
@@ -98,7 +129,13 @@ mod tests {
     }
 
     fn held(old: fn(u32) -> Vec<u32>, new: fn(u32) -> Vec<u32>) -> Gain {
-        let points: Vec<OnBoth> = (0..12).map(|i| OnBoth { row: i as usize, old: old(i), new: new(i) }).collect();
+        let points: Vec<OnBoth> = (0..12)
+            .map(|i| OnBoth {
+                row: i as usize,
+                old: old(i),
+                new: new(i),
+            })
+            .collect();
         gain(&table(), &points)
     }
 
@@ -106,14 +143,24 @@ mod tests {
     #[test]
     fn the_tree_that_the_motion_shows_is_told_from_one_that_it_does_not() {
         // Every other point on the wrong branch; twigs right and branches wrong; no twigs at all.
-        let wrong: [fn(u32) -> Vec<u32>; 3] =
-            [|i| vec![0, 1 + i % 2, 3 + i / 3], |i| vec![0, 1 + (i / 3) % 2, 3 + i / 3], |i| vec![0, 1 + i / 6]];
+        let wrong: [fn(u32) -> Vec<u32>; 3] = [
+            |i| vec![0, 1 + i % 2, 3 + i / 3],
+            |i| vec![0, 1 + (i / 3) % 2, 3 + i / 3],
+            |i| vec![0, 1 + i / 6],
+        ];
         for (k, wrong) in wrong.into_iter().enumerate() {
             let (better, worse) = (held(wrong, right), held(right, wrong));
             assert!(better.gain > 3.0 * better.error, "tree {k}: {better:?}");
-            assert!((better.gain + worse.gain).abs() < 1e-12 && better.error > 0.0, "tree {k}: {worse:?}");
+            assert!(
+                (better.gain + worse.gain).abs() < 1e-12 && better.error > 0.0,
+                "tree {k}: {worse:?}"
+            );
         }
-        assert_eq!(held(right, right), Gain::default(), "the same tree is neither better nor worse");
+        assert_eq!(
+            held(right, right),
+            Gain::default(),
+            "the same tree is neither better nor worse"
+        );
         assert_eq!(gain(&table(), &[]), Gain::default());
     }
 }

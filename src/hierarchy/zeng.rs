@@ -1,10 +1,11 @@
-//! How alike two points are in the papers: how near they are, times how alike they move (Zeng eq. 2.20 after Liu et al.
-//! 2005).
+//! How alike two points are in the papers: how near they are, times how alike they move (Zeng eq.
+//! 2.20 after Liu et al. 2005).
 
 use super::rest::{distance_sq, extent_px};
 use nalgebra::DMatrix;
 
-/// Affinity of the points `members`: exp(-d^2 / 2s^2) * max(rho, 0)^power, with s a share of the members' own extent.
+/// Affinity of the points `members`: exp(-d^2 / 2s^2) * max(rho, 0)^power, with s a share of the
+/// members' own extent.
 pub fn affinity(
     rho: &DMatrix<f32>,
     rest_px: &[[f64; 2]],
@@ -17,9 +18,11 @@ pub fn affinity(
     let mut w = DMatrix::zeros(n, n);
     for a in 0..n {
         for b in a + 1..n {
-            let near = (-distance_sq(rest_px[members[a]], rest_px[members[b]]) / (2.0 * s * s)).exp();
+            let near =
+                (-distance_sq(rest_px[members[a]], rest_px[members[b]]) / (2.0 * s * s)).exp();
             let alike = f64::from(rho[(members[a], members[b])].max(0.0)).powf(power);
-            // A floor keeps the graph connected, so that its second eigenvector exists and means a cut.
+            // A floor keeps the graph connected, so that its second eigenvector exists and means a
+            // cut.
             let weight = (near * alike).max(1e-6) as f32;
             w[(a, b)] = weight;
             w[(b, a)] = weight;

@@ -11,7 +11,8 @@ pub enum Control {
     Restart,
     /// Write the capture as it is now, and go on.
     Export,
-    /// Stop or go on taking frames; a camera goes on filming and its frames are dropped and counted.
+    /// Stop or go on taking frames; a camera goes on filming and its frames are dropped and
+    /// counted.
     Pause(bool),
     /// Finish: write the capture and end.
     Quit,

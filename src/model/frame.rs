@@ -21,7 +21,10 @@ impl Size {
 
     /// Whether the pixel whose centre is nearest to (`u_px`, `v_px`) lies in the picture.
     pub fn contains(self, u_px: f64, v_px: f64) -> bool {
-        u_px >= -0.5 && v_px >= -0.5 && u_px < self.width as f64 - 0.5 && v_px < self.height as f64 - 0.5
+        u_px >= -0.5
+            && v_px >= -0.5
+            && u_px < self.width as f64 - 0.5
+            && v_px < self.height as f64 - 0.5
     }
 }
 
@@ -100,28 +103,35 @@ impl std::fmt::Display for PixelFormat {
 /// A frame as it left the camera or the file, not decoded.
 #[derive(Clone, Debug)]
 pub struct RawFrame {
-    /// The driver's own count with its wraps undone, or the index in the file; a step of more than one is a loss before
-    /// us. `None` where the driver does not count.
+    /// The driver's own count with its wraps undone, or the index in the file; a step of more than
+    /// one is a loss before us. `None` where the driver does not count.
     pub sequence: Option<u64>,
-    /// The sensor's time in seconds, a whole number of nanoseconds ([`seconds`]); only differences mean something.
-    /// Strictly growing within one source.
+    /// The sensor's time in seconds, a whole number of nanoseconds ([`seconds`]); only differences
+    /// mean something. Strictly growing within one source.
     pub sensor_time_s: f64,
     pub size: Size,
     pub format: PixelFormat,
     pub bytes: Vec<u8>,
 }
 
-/// Whole nanoseconds of a time in seconds: what a recording keeps of it. Times beyond 292 years are cut to that.
+/// Whole nanoseconds of a time in seconds: what a recording keeps of it. Times beyond 292 years are
+/// cut to that.
 pub fn nanoseconds(time_s: f64) -> i64 {
     let whole = time_s.floor();
     // The fraction of a double is exact, so nothing is lost by taking it off first.
     let part = ((time_s - whole) * 1e9).round();
-    (whole as i64).saturating_mul(1_000_000_000).saturating_add(part as i64)
+    (whole as i64)
+        .saturating_mul(1_000_000_000)
+        .saturating_add(part as i64)
 }
 
-/// The same back again; `seconds(nanoseconds(t))` is `t` for every `t` that came out of here, to the last bit.
+/// The same back again; `seconds(nanoseconds(t))` is `t` for every `t` that came out of here, to
+/// the last bit.
 pub fn seconds(time_ns: i64) -> f64 {
-    let (whole, part) = (time_ns.div_euclid(1_000_000_000), time_ns.rem_euclid(1_000_000_000));
+    let (whole, part) = (
+        time_ns.div_euclid(1_000_000_000),
+        time_ns.rem_euclid(1_000_000_000),
+    );
     whole as f64 + part as f64 / 1e9
 }
 
@@ -158,7 +168,8 @@ pub struct Picture {
 /// A decoded frame on its way to the tracker.
 #[derive(Clone, Debug)]
 pub struct Frame {
-    /// Frames since the first one of this capture; a frame lost before us leaves a hole in the count.
+    /// Frames since the first one of this capture; a frame lost before us leaves a hole in the
+    /// count.
     pub index: u64,
     /// Seconds since the first frame of this capture, by the sensor's clock.
     pub time_s: f64,
@@ -173,8 +184,8 @@ pub struct Frame {
 mod tests {
     use super::*;
 
-    /// A replay must see the times of the run that recorded it, whatever clock they came from: uptime, the epoch, a
-    /// file's ticks, or before zero.
+    /// A replay must see the times of the run that recorded it, whatever clock they came from:
+    /// uptime, the epoch, a file's ticks, or before zero.
     #[test]
     fn a_time_survives_the_way_through_nanoseconds() {
         for start_s in [0.0, -0.25, 12.345_678, 86_400.0 * 300.0, 1.7e9] {
@@ -184,7 +195,10 @@ mod tests {
                 assert!((time_s - start_s - f64::from(k) / 29.97).abs() < 3e-7);
             }
         }
-        assert_eq!((nanoseconds(-0.25), seconds(-250_000_000)), (-250_000_000, -0.25));
+        assert_eq!(
+            (nanoseconds(-0.25), seconds(-250_000_000)),
+            (-250_000_000, -0.25)
+        );
         assert_eq!(nanoseconds(f64::INFINITY), i64::MAX);
     }
 }

@@ -1,7 +1,8 @@
 //! The nouns that flow through arborcam: plain data, no I/O, no threads.
 //!
-//! `RawFrame -> Frame -> TrackSet -> MotionHierarchy -> Skeleton -> Pose`. Each carries the frame number and the
-//! sensor time of the picture that it comes from. Trees are flat arrays in which a parent stands before its children.
+//! `RawFrame -> Frame -> TrackSet -> MotionHierarchy -> Skeleton -> Pose`. Each carries the frame
+//! number and the sensor time of the picture that it comes from. Trees are flat arrays in which a
+//! parent stands before its children.
 
 mod control;
 mod frame;

@@ -10,8 +10,8 @@ pub struct Outline {
     pub mask: Vec<u8>,
     /// The region's border in pixels, for drawing; closed, not repeating its first point.
     pub polygon_px: Vec<[i32; 2]>,
-    /// Opacity of the tree, 0 to 255, row by row, where the region was solved from scribbles: the sky between its
-    /// branches has none, though it is inside.
+    /// Opacity of the tree, 0 to 255, row by row, where the region was solved from scribbles: the
+    /// sky between its branches has none, though it is inside.
     pub matte: Option<Vec<u8>>,
 }
 
@@ -19,7 +19,10 @@ impl Outline {
     /// Whether the pixel nearest to (`u_px`, `v_px`) is tree; outside the picture nothing is.
     pub fn contains(&self, u_px: f64, v_px: f64) -> bool {
         self.size.contains(u_px, v_px) && {
-            let (u, v) = (u_px.round().max(0.0) as usize, v_px.round().max(0.0) as usize);
+            let (u, v) = (
+                u_px.round().max(0.0) as usize,
+                v_px.round().max(0.0) as usize,
+            );
             self.mask[v * self.size.width as usize + u] != 0
         }
     }
@@ -29,10 +32,17 @@ impl Outline {
         let w = self.size.width as usize;
         let mut bounds: Option<[u32; 4]> = None;
         for (v, row) in self.mask.chunks_exact(w).enumerate() {
-            let Some(first) = row.iter().position(|&m| m != 0) else { continue };
+            let Some(first) = row.iter().position(|&m| m != 0) else {
+                continue;
+            };
             let last = row.iter().rposition(|&m| m != 0).unwrap_or(first);
             let b = bounds.get_or_insert([first as u32, v as u32, last as u32, v as u32]);
-            *b = [b[0].min(first as u32), b[1], b[2].max(last as u32), v as u32];
+            *b = [
+                b[0].min(first as u32),
+                b[1],
+                b[2].max(last as u32),
+                v as u32,
+            ];
         }
         bounds
     }

@@ -7,7 +7,8 @@ use nalgebra::{Point3, UnitQuaternion};
 pub struct JointPose {
     /// Model axes, px.
     pub position: Point3<f64>,
-    /// Rotation of the branch from its rest direction, in model axes; the branch turns about its parent node, so
+    /// Rotation of the branch from its rest direction, in model axes; the branch turns about its
+    /// parent node, so
     /// `position = parent.position + rotation * (rest - parent rest)`.
     pub rotation: UnitQuaternion<f64>,
 }

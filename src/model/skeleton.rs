@@ -3,7 +3,8 @@
 use super::Size;
 use nalgebra::Point3;
 
-/// What lies farther from the foot than this, or at a place that is no number, is neither read nor drawn, px.
+/// What lies farther from the foot than this, or at a place that is no number, is neither read nor
+/// drawn, px.
 pub const FARTHEST_PX: f64 = 1e6;
 
 /// Index into [`Skeleton::nodes`].
@@ -16,25 +17,31 @@ impl NodeId {
     }
 }
 
-/// Names one node for good: it keeps its name when the tree is refined, and no other node of the capture ever gets it.
+/// Names one node for good: it keeps its name when the tree is refined, and no other node of the
+/// capture ever gets it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct NodeName(pub u32);
 
-/// The end of a branch. The branch itself runs from the parent node to this one; the first node is the trunk's foot.
+/// The end of a branch. The branch itself runs from the parent node to this one; the first node is
+/// the trunk's foot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
-    /// What it is called outside, in every file and on the screen; its place in the array changes with a refinement.
+    /// What it is called outside, in every file and on the screen; its place in the array changes
+    /// with a refinement.
     pub name: NodeName,
     pub parent: Option<NodeId>,
     /// 0 at the trunk's foot, 1 at the trunk's top, one more with every cut of the hierarchy.
     pub level: u8,
-    /// Position at rest in model axes: x right, y up, z towards the viewer, px, the trunk's foot at the origin.
+    /// Position at rest in model axes: x right, y up, z towards the viewer, px, the trunk's foot at
+    /// the origin.
     pub position: Point3<f64>,
     /// Radius of the branch that ends here, px.
     pub radius: f64,
-    /// Points that move with this node or one below it; 0 for a copy, which nothing was measured on.
+    /// Points that move with this node or one below it; 0 for a copy, which nothing was measured
+    /// on.
     pub n_tracks: u32,
-    /// How sure it is that the branches above part here, 0 to 1; 0 at a tip, and at the foot, which nothing parts from.
+    /// How sure it is that the branches above part here, 0 to 1; 0 at a tip, and at the foot, which
+    /// nothing parts from.
     pub certainty: f32,
     /// The measured node that this one repeats on a plane turned about the trunk.
     pub copy_of: Option<NodeId>,
@@ -55,7 +62,10 @@ pub struct Skeleton {
 impl Skeleton {
     /// Number of nodes that were measured; they come first.
     pub fn measured(&self) -> usize {
-        self.nodes.iter().take_while(|n| n.copy_of.is_none()).count()
+        self.nodes
+            .iter()
+            .take_while(|n| n.copy_of.is_none())
+            .count()
     }
 
     /// Orthographic projection of a point in model axes to the picture, px.
@@ -68,7 +78,8 @@ impl Skeleton {
         self.nodes.get(node.index()).map(|n| n.name)
     }
 
-    /// The nodes that carry a node, nearest first. A file may say anything; a parent stands before its child, or the walk ends.
+    /// The nodes that carry a node, nearest first. A file may say anything; a parent stands before
+    /// its child, or the walk ends.
     pub fn ancestors(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
         let below = |n: &NodeId| self.nodes.get(n.index())?.parent.filter(|p| p < n);
         std::iter::successors(below(&node), below)

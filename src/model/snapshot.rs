@@ -1,4 +1,5 @@
-//! What the screen shows of a running capture: one immutable picture of its state, replaced, never changed.
+//! What the screen shows of a running capture: one immutable picture of its state, replaced, never
+//! changed.
 
 use super::{Angles, NodeName, Pose, Rgb, Size, Skeleton, SwayNow};
 use std::sync::Arc;
@@ -20,7 +21,13 @@ pub enum Phase {
 }
 
 impl Phase {
-    pub const ALL: [Phase; 5] = [Phase::Outline, Phase::Detect, Phase::Accumulate, Phase::Build, Phase::Live];
+    pub const ALL: [Phase; 5] = [
+        Phase::Outline,
+        Phase::Detect,
+        Phase::Accumulate,
+        Phase::Build,
+        Phase::Live,
+    ];
 
     pub fn name(self) -> &'static str {
         match self {
@@ -88,11 +95,13 @@ pub struct Snapshot {
     pub time_s: f64,
     /// Frames that the source will deliver, where it knows.
     pub frames_total: Option<u64>,
-    /// Rate by the sensor's clock over the last seconds, and rate at which frames are worked off, Hz.
+    /// Rate by the sensor's clock over the last seconds, and rate at which frames are worked off,
+    /// Hz.
     pub sensor_rate_hz: f64,
     pub work_rate_hz: f64,
     pub camera: CameraState,
-    /// Frames lost before us (what is to be believed of both counts), between camera and tracker, undecodable, and not shown.
+    /// Frames lost before us (what is to be believed of both counts), between camera and tracker,
+    /// undecodable, and not shown.
     pub lost_in_camera: u64,
     pub dropped_before_tracker: u64,
     pub undecodable: u64,
@@ -107,12 +116,14 @@ pub struct Snapshot {
     /// Median forward-backward error of this frame, px, and its history, oldest first.
     pub fb_error_px: f64,
     pub fb_history_px: Vec<f64>,
-    /// Median distance at which the points are expected to be from those that they were when they were found, px.
+    /// Median distance at which the points are expected to be from those that they were when they
+    /// were found, px.
     pub error_px: Option<f64>,
     pub image_size: Option<Size>,
     pub preview: Option<Arc<Rgb>>,
     pub outline_px: Vec<[i32; 2]>,
-    /// Points of this frame, px, each with the number of its main branch, `None` before the tree is built.
+    /// Points of this frame, px, each with the number of its main branch, `None` before the tree is
+    /// built.
     pub points: Vec<([f32; 2], Option<u8>)>,
     /// Points on trial, px.
     pub candidates_px: Vec<[f32; 2]>,

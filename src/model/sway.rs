@@ -37,15 +37,16 @@ pub struct Sway {
     /// Share of critical damping; `None` where only the frequency is known.
     pub damping_ratio: Option<Interval>,
     pub excitation: Excitation,
-    /// Of the sway in the angle to the carrier: at its largest after a release, square root of 2 times the root mean
-    /// square in wind; degrees. No number where it is not known.
+    /// Of the sway in the angle to the carrier: at its largest after a release, square root of 2
+    /// times the root mean square in wind; degrees. No number where it is not known.
     pub amplitude_deg: f64,
 }
 
 /// Why a branch has no frequency of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unidentified {
-    /// Nothing was measured on it: the foot, a branch that no point follows, a capture of an older version.
+    /// Nothing was measured on it: the foot, a branch that no point follows, a capture of an older
+    /// version.
     NotMeasured,
     /// Too few frames, or too few periods of its sway.
     TooShort,
@@ -77,7 +78,9 @@ impl Excitation {
 
     /// The excitation of that [`word`](Self::word).
     pub fn of_word(word: &str) -> Option<Self> {
-        [Self::Release, Self::Wind].into_iter().find(|e| e.word() == word)
+        [Self::Release, Self::Wind]
+            .into_iter()
+            .find(|e| e.word() == word)
     }
 }
 

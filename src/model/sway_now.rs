@@ -38,7 +38,8 @@ pub struct SwayNow {
 pub struct Angles {
     /// Which branch each column is.
     pub nodes: Arc<[NodeName]>,
-    /// Time (s) and angles (degrees, signed, counterclockwise for the viewer; no number where a branch has none).
+    /// Time (s) and angles (degrees, signed, counterclockwise for the viewer; no number where a
+    /// branch has none).
     pub rows: Vec<(f64, Arc<[f32]>)>,
 }
 
@@ -46,6 +47,8 @@ impl Angles {
     /// Times (s) and angles (degrees) of one branch; nothing for a branch that is not there.
     pub fn of(&self, node: NodeName) -> impl Iterator<Item = (f64, f64)> {
         let column = self.nodes.iter().position(|n| *n == node);
-        self.rows.iter().filter_map(move |(t, row)| Some((*t, f64::from(*row.get(column?)?))))
+        self.rows
+            .iter()
+            .filter_map(move |(t, row)| Some((*t, f64::from(*row.get(column?)?))))
     }
 }

@@ -4,8 +4,9 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct TrackId(pub u32);
 
-/// Within this time of its birth it is decided whether a point is kept, s; for the first of a capture, within this time of
-/// the tree's first stirring. What has not stirred makes no tree, and rows are written only after a build.
+/// Within this time of its birth it is decided whether a point is kept, s; for the first of a
+/// capture, within this time of the tree's first stirring. What has not stirred makes no tree, and
+/// rows are written only after a build.
 pub const LONGEST_TRIAL_S: f64 = 6.0;
 
 /// One point as seen in one frame.
@@ -14,10 +15,11 @@ pub struct Observation {
     pub id: TrackId,
     pub u_px: f32,
     pub v_px: f32,
-    /// Distance by which tracking forward and back again missed the start, px; 0 in the frame of birth.
+    /// Distance by which tracking forward and back again missed the start, px; 0 in the frame of
+    /// birth.
     pub fb_error_px: f32,
-    /// How far it is expected to be from the point that it was when it was found (median), px; `None` where it was never
-    /// compared with that.
+    /// How far it is expected to be from the point that it was when it was found (median), px;
+    /// `None` where it was never compared with that.
     pub error_px: Option<f32>,
     /// Its trial is over; of those on trial about half will be dropped.
     pub confirmed: bool,
@@ -41,6 +43,8 @@ impl TrackSet {
     /// The points that count: those that have passed their trial, or all while none has.
     pub fn counted(&self) -> impl Iterator<Item = &Observation> {
         let passed = self.observations.iter().any(|o| o.confirmed);
-        self.observations.iter().filter(move |o| o.confirmed || !passed)
+        self.observations
+            .iter()
+            .filter(move |o| o.confirmed || !passed)
     }
 }

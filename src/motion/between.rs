@@ -2,14 +2,18 @@
 
 use crate::model::{JointPose, Pose, Skeleton};
 
-/// The pose that is `share` (0 to 1) of the way from `a` to `b`, of frame and time of `a`: every branch turns evenly, and
-/// keeps its length. Joints that one of them lacks are at rest.
+/// The pose that is `share` (0 to 1) of the way from `a` to `b`, of frame and time of `a`: every
+/// branch turns evenly, and keeps its length. Joints that one of them lacks are at rest.
 pub fn between(skeleton: &Skeleton, a: &Pose, b: &Pose, share: f64) -> Pose {
     let mut joints: Vec<JointPose> = Vec::with_capacity(skeleton.nodes.len());
     for (i, node) in skeleton.nodes.iter().enumerate() {
         let turned = a.joints.get(i).zip(b.joints.get(i));
         // Opposite rotations have no shortest way between them; either is as good.
-        let rotation = turned.map(|(a, b)| a.rotation.try_slerp(&b.rotation, share, 1e-9).unwrap_or(a.rotation));
+        let rotation = turned.map(|(a, b)| {
+            a.rotation
+                .try_slerp(&b.rotation, share, 1e-9)
+                .unwrap_or(a.rotation)
+        });
         let rotation = rotation.unwrap_or_default();
         let position = match node.parent.filter(|p| p.index() < i) {
             Some(parent) => {
@@ -20,7 +24,11 @@ pub fn between(skeleton: &Skeleton, a: &Pose, b: &Pose, share: f64) -> Pose {
         };
         joints.push(JointPose { position, rotation });
     }
-    Pose { frame: a.frame, time_s: a.time_s, joints }
+    Pose {
+        frame: a.frame,
+        time_s: a.time_s,
+        joints,
+    }
 }
 
 #[cfg(test)]
@@ -48,27 +56,39 @@ mod tests {
             node(1, Some(0), Point3::new(0.0, 100.0, 0.0)),
             node(2, Some(1), Point3::new(30.0, 140.0, 20.0)),
         ];
-        Skeleton { nodes, foot_px: [50.0, 200.0], image_size: Size::new(100, 220) }
+        Skeleton {
+            nodes,
+            foot_px: [50.0, 200.0],
+            image_size: Size::new(100, 220),
+        }
     }
 
     /// Trunk and branch turned by these angles about the line of sight.
     fn pose(frame: u64, skeleton: &Skeleton, angles: &[f64]) -> Pose {
-        let mut joints = vec![JointPose { position: Point3::origin(), rotation: UnitQuaternion::identity() }];
+        let mut joints = vec![JointPose {
+            position: Point3::origin(),
+            rotation: UnitQuaternion::identity(),
+        }];
         for (i, angle) in angles.iter().enumerate() {
             let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), *angle);
             let way = skeleton.nodes[i + 1].position - skeleton.nodes[i].position;
-            joints.push(JointPose { position: joints[i].position + rotation * way, rotation });
+            joints.push(JointPose {
+                position: joints[i].position + rotation * way,
+                rotation,
+            });
         }
-        Pose { frame, time_s: frame as f64 / 30.0, joints }
+        Pose {
+            frame,
+            time_s: frame as f64 / 30.0,
+            joints,
+        }
     }
 
     fn near(is: &Pose, want: &Pose) -> bool {
         is.joints.len() == want.joints.len()
-            && is
-                .joints
-                .iter()
-                .zip(&want.joints)
-                .all(|(a, b)| (a.position - b.position).norm() < 1e-9 && a.rotation.angle_to(&b.rotation) < 1e-9)
+            && is.joints.iter().zip(&want.joints).all(|(a, b)| {
+                (a.position - b.position).norm() < 1e-9 && a.rotation.angle_to(&b.rotation) < 1e-9
+            })
     }
 
     #[test]
@@ -79,7 +99,11 @@ mod tests {
         assert!(near(&between(&tree, &a, &b, 1.0), &b));
         let middle = between(&tree, &a, &b, 0.5);
         assert!(near(&middle, &pose(3, &tree, &[0.3, 0.8])));
-        assert_eq!((middle.frame, middle.time_s), (3, 0.1), "the moment is that of the first");
+        assert_eq!(
+            (middle.frame, middle.time_s),
+            (3, 0.1),
+            "the moment is that of the first"
+        );
     }
 
     #[test]
@@ -91,7 +115,10 @@ mod tests {
             for i in 1..3 {
                 let was = (tree.nodes[i].position - tree.nodes[i - 1].position).norm();
                 let is = (pose.joints[i].position - pose.joints[i - 1].position).norm();
-                assert!((is - was).abs() < 1e-9, "branch {i} at {share}: {was} became {is}");
+                assert!(
+                    (is - was).abs() < 1e-9,
+                    "branch {i} at {share}: {was} became {is}"
+                );
             }
         }
     }
@@ -101,11 +128,18 @@ mod tests {
         let tree = skeleton();
         let (short, whole) = (pose(0, &tree, &[0.3]), pose(1, &tree, &[0.3, 0.5]));
         assert!(
-            near(&between(&tree, &short, &whole, 0.5), &pose(0, &tree, &[0.3, 0.0])),
+            near(
+                &between(&tree, &short, &whole, 0.5),
+                &pose(0, &tree, &[0.3, 0.0])
+            ),
             "at rest where one is missing"
         );
         let (there, back) = (pose(0, &tree, &[0.0, 0.0]), pose(1, &tree, &[PI, 0.0]));
         let pose = between(&tree, &there, &back, 0.5);
-        assert!(pose.joints.iter().all(|j| j.position.iter().all(|c| c.is_finite())));
+        assert!(
+            pose.joints
+                .iter()
+                .all(|j| j.position.iter().all(|c| c.is_finite()))
+        );
     }
 }

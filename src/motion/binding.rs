@@ -4,7 +4,8 @@ use super::local::{self, Nearby};
 use crate::model::{MotionHierarchy, NodeId, Skeleton, TrackId, TrackSet};
 use std::collections::BTreeMap;
 
-/// A later track is given to the nearest tip only within so many times the mean distance between tips.
+/// A later track is given to the nearest tip only within so many times the mean distance between
+/// tips.
 const REACH: f64 = 2.0;
 /// The points around a node count over this share of the picture's width at least.
 const LEAST: f64 = 0.01;
@@ -30,13 +31,20 @@ pub struct Binding {
 }
 
 impl Binding {
-    /// Binds the members of `hierarchy` to the nodes of `skeleton`; node k + 1 belongs to cluster k. `rest_px` holds the
-    /// rest positions of all tracks that were there when the tree was built; those that are in no cluster did not move
-    /// or contradicted their neighbours, and stay unbound.
-    pub fn new(hierarchy: &MotionHierarchy, rest_px: &BTreeMap<TrackId, [f64; 2]>, skeleton: &Skeleton) -> Self {
+    /// Binds the members of `hierarchy` to the nodes of `skeleton`; node k + 1 belongs to cluster
+    /// k. `rest_px` holds the rest positions of all tracks that were there when the tree was built;
+    /// those that are in no cluster did not move or contradicted their neighbours, and stay
+    /// unbound.
+    pub fn new(
+        hierarchy: &MotionHierarchy,
+        rest_px: &BTreeMap<TrackId, [f64; 2]>,
+        skeleton: &Skeleton,
+    ) -> Self {
         let nodes = &skeleton.nodes[..skeleton.measured()];
-        let mut tracks: BTreeMap<TrackId, Option<Bound>> = rest_px.keys().map(|id| (*id, None)).collect();
-        // Deeper clusters come later and overwrite: each track ends at the deepest node that it belongs to.
+        let mut tracks: BTreeMap<TrackId, Option<Bound>> =
+            rest_px.keys().map(|id| (*id, None)).collect();
+        // Deeper clusters come later and overwrite: each track ends at the deepest node that it
+        // belongs to.
         for (k, cluster) in hierarchy.clusters.iter().enumerate() {
             let node = NodeId(k as u32 + 1);
             for id in &cluster.members {
@@ -49,11 +57,20 @@ impl Binding {
         for parent in nodes.iter().filter_map(|n| n.parent) {
             is_tip[parent.index()] = false;
         }
-        let tips: Vec<NodeId> = (1..nodes.len()).filter(|&i| is_tip[i]).map(|i| NodeId(i as u32)).collect();
-        let rest: Vec<[f64; 2]> = nodes.iter().map(|n| skeleton.image_from_model(&n.position)).collect();
+        let tips: Vec<NodeId> = (1..nodes.len())
+            .filter(|&i| is_tip[i])
+            .map(|i| NodeId(i as u32))
+            .collect();
+        let rest: Vec<[f64; 2]> = nodes
+            .iter()
+            .map(|n| skeleton.image_from_model(&n.position))
+            .collect();
         let at = |t: NodeId| rest[t.index()];
         let nearest = |t: &NodeId| {
-            tips.iter().filter(|o| *o != t).map(|o| distance(at(*t), at(*o))).fold(f64::INFINITY, f64::min)
+            tips.iter()
+                .filter(|o| *o != t)
+                .map(|o| distance(at(*t), at(*o)))
+                .fold(f64::INFINITY, f64::min)
         };
         let gaps: Vec<f64> = tips.iter().map(nearest).filter(|d| d.is_finite()).collect();
         let reach_px = REACH * gaps.iter().sum::<f64>() / gaps.len().max(1) as f64;
@@ -68,17 +85,27 @@ impl Binding {
         }
     }
 
-    /// Takes over tracks that an older tree knew, with the node and the rest place (px) that each has here.
+    /// Takes over tracks that an older tree knew, with the node and the rest place (px) that each
+    /// has here.
     pub fn inherit(&mut self, tracks: &BTreeMap<TrackId, (NodeId, [f64; 2])>) {
         let bound = |(id, (node, rest_px)): (&TrackId, &(NodeId, [f64; 2]))| {
-            (*id, Some(Bound { node: *node, rest_px: *rest_px }))
+            (
+                *id,
+                Some(Bound {
+                    node: *node,
+                    rest_px: *rest_px,
+                }),
+            )
         };
         self.tracks.extend(tracks.iter().map(bound));
     }
 
-    /// Every bound track with its deepest node and its rest place, px; those that have been lost among them.
+    /// Every bound track with its deepest node and its rest place, px; those that have been lost
+    /// among them.
     pub fn bound(&self) -> impl Iterator<Item = (TrackId, NodeId, [f64; 2])> {
-        self.tracks.iter().filter_map(|(id, bound)| bound.map(|b| (*id, b.node, b.rest_px)))
+        self.tracks
+            .iter()
+            .filter_map(|(id, bound)| bound.map(|b| (*id, b.node, b.rest_px)))
     }
 
     /// The deepest node that a track belongs to.
@@ -86,24 +113,36 @@ impl Binding {
         self.tracks.get(&track)?.map(|b| b.node)
     }
 
-    /// Where the tracks put each measured node, px; `None` where none of its tracks was seen. The foot never moves.
+    /// Where the tracks put each measured node, px; `None` where none of its tracks was seen. The
+    /// foot never moves.
     ///
-    /// Tracks that are new and confirmed are bound to the tip that is nearest to them in this frame, if one is near enough.
+    /// Tracks that are new and confirmed are bound to the tip that is nearest to them in this
+    /// frame, if one is near enough.
     pub fn targets_px(&mut self, set: &TrackSet) -> Vec<Option<[f64; 2]>> {
         self.collect(set);
         let mut targets: Vec<Option<[f64; 2]>> = self
             .collected
             .iter_mut()
             .zip(&self.rest_px)
-            .map(|(d, rest)| local::displacement(d, self.least_px).map(|d| [rest[0] + d[0], rest[1] + d[1]]))
+            .map(|(d, rest)| {
+                local::displacement(d, self.least_px).map(|d| [rest[0] + d[0], rest[1] + d[1]])
+            })
             .collect();
-        let new = set.observations.iter().filter(|o| o.confirmed && !self.tracks.contains_key(&o.id));
-        // A tip that has lost all its tracks is where the nearest branch below it that is seen would carry it.
+        let new = set
+            .observations
+            .iter()
+            .filter(|o| o.confirmed && !self.tracks.contains_key(&o.id));
+        // A tip that has lost all its tracks is where the nearest branch below it that is seen
+        // would carry it.
         let expected = |tip: NodeId| {
             let seen = |n: &NodeId| targets[n.index()].is_some();
-            let carrier = std::iter::successors(Some(tip), |n| self.parents[n.index()]).find(seen)?;
-            let (target, rest, own) =
-                (targets[carrier.index()]?, self.rest_px[carrier.index()], self.rest_px[tip.index()]);
+            let carrier =
+                std::iter::successors(Some(tip), |n| self.parents[n.index()]).find(seen)?;
+            let (target, rest, own) = (
+                targets[carrier.index()]?,
+                self.rest_px[carrier.index()],
+                self.rest_px[tip.index()],
+            );
             Some([own[0] + target[0] - rest[0], own[1] + target[1] - rest[1]])
         };
         // Decided once: a point of the background stays unbound when a branch swings near it later.
@@ -111,10 +150,12 @@ impl Binding {
             .filter_map(|o| {
                 let at = [f64::from(o.u_px), f64::from(o.v_px)];
                 let placed = self.tips.iter().filter_map(|t| Some((*t, expected(*t)?)));
-                let (tip, target) = placed.min_by(|a, b| distance(at, a.1).total_cmp(&distance(at, b.1)))?;
+                let (tip, target) =
+                    placed.min_by(|a, b| distance(at, a.1).total_cmp(&distance(at, b.1)))?;
                 let rest = self.rest_px[tip.index()];
                 let rest_px = [at[0] - target[0] + rest[0], at[1] - target[1] + rest[1]];
-                let bound = (distance(at, target) <= self.reach_px).then_some(Bound { node: tip, rest_px });
+                let bound =
+                    (distance(at, target) <= self.reach_px).then_some(Bound { node: tip, rest_px });
                 Some((o.id, bound))
             })
             .collect();
@@ -129,13 +170,21 @@ impl Binding {
     fn collect(&mut self, set: &TrackSet) {
         self.collected.iter_mut().for_each(Vec::clear);
         for o in &set.observations {
-            let Some(Some(bound)) = self.tracks.get(&o.id) else { continue };
-            let d = [f64::from(o.u_px) - bound.rest_px[0], f64::from(o.v_px) - bound.rest_px[1]];
+            let Some(Some(bound)) = self.tracks.get(&o.id) else {
+                continue;
+            };
+            let d = [
+                f64::from(o.u_px) - bound.rest_px[0],
+                f64::from(o.v_px) - bound.rest_px[1],
+            ];
             let mut at = Some(bound.node);
             while let Some(node) = at {
                 let rest = self.rest_px[node.index()];
                 let offset = [bound.rest_px[0] - rest[0], bound.rest_px[1] - rest[1]];
-                self.collected[node.index()].push(Nearby { displacement: d, offset });
+                self.collected[node.index()].push(Nearby {
+                    displacement: d,
+                    offset,
+                });
                 at = self.parents[node.index()];
             }
         }

@@ -10,8 +10,8 @@ const PLACES: usize = 32;
 const STEPS: usize = 28;
 const GOLDEN: f64 = 0.618_033_988_749_895;
 
-/// The best direction and its cost, of those on the circles `(centre, angle)`, angles in radians. `within` brings a
-/// direction within all bounds and gives its cost; `None` if no cost is a number.
+/// The best direction and its cost, of those on the circles `(centre, angle)`, angles in radians.
+/// `within` brings a direction within all bounds and gives its cost; `None` if no cost is a number.
 pub(super) fn best(
     circles: &[(UnitVector3<f64>, f64)],
     within: impl Fn(&UnitVector3<f64>) -> (UnitVector3<f64>, f64),
@@ -20,7 +20,8 @@ pub(super) fn best(
     for (centre, angle) in circles {
         let (a, b) = tangents(centre);
         let at = |turn: f64| {
-            let d = centre.into_inner() * angle.cos() + (a * turn.cos() + b * turn.sin()) * angle.sin();
+            let d =
+                centre.into_inner() * angle.cos() + (a * turn.cos() + b * turn.sin()) * angle.sin();
             within(&Unit::new_normalize(d))
         };
         let step = TAU / PLACES as f64;
@@ -28,7 +29,11 @@ pub(super) fn best(
         for k in 0..PLACES {
             let beside = [costs[(k + PLACES - 1) % PLACES], costs[(k + 1) % PLACES]];
             if beside.iter().all(|c| costs[k] <= *c) {
-                let found = at(lowest(|turn| at(turn).1, (k as f64 - 1.0) * step, (k as f64 + 1.0) * step));
+                let found = at(lowest(
+                    |turn| at(turn).1,
+                    (k as f64 - 1.0) * step,
+                    (k as f64 + 1.0) * step,
+                ));
                 if best.is_none_or(|b| found.1 < b.1) {
                     best = Some(found);
                 }

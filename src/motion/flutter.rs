@@ -7,24 +7,35 @@ use std::f64::consts::TAU;
 /// Speeds are means over so long: leaves do not jerk with the noise of single frames.
 const SMOOTHED_S: f64 = 0.2;
 
-/// For each group of leaves and every pose `A(t) sin(omega t)` and `A(t) cos(omega t)`: the weights of the two displacements
-/// of its vertices, radians.
+/// For each group of leaves and every pose `A(t) sin(omega t)` and `A(t) cos(omega t)`: the weights
+/// of the two displacements of its vertices, radians.
 ///
-/// A grows with the speed of the group's branches, those above `groups[k]`, and stays below `settings.swing_deg`. A pose of
-/// another tree or with a place or a time that is no number counts as still.
-pub fn flutter(poses: &[Pose], skeleton: &Skeleton, groups: &[NodeId], settings: &Leaves) -> Vec<Vec<[f32; 2]>> {
+/// A grows with the speed of the group's branches, those above `groups[k]`, and stays below
+/// `settings.swing_deg`. A pose of another tree or with a place or a time that is no number counts
+/// as still.
+pub fn flutter(
+    poses: &[Pose],
+    skeleton: &Skeleton,
+    groups: &[NodeId],
+    settings: &Leaves,
+) -> Vec<Vec<[f32; 2]>> {
     let height = height(skeleton);
     let most = settings.swing_deg.to_radians();
     let weights = |group: &NodeId| {
         let members = above(skeleton, *group);
-        let steps: Vec<f64> = (0..poses.len()).map(|k| speed(poses, k, &members) / height).collect();
+        let steps: Vec<f64> = (0..poses.len())
+            .map(|k| speed(poses, k, &members) / height)
+            .collect();
         let weight = |k: usize| {
             let speed = smoothed(poses, &steps, k);
             // tanh 0.973 = 3/4; beyond it grows no more than leaves can turn.
             let amplitude = most * (0.973 * speed / settings.swing_speed.max(1e-6)).tanh();
             let phase = TAU * settings.frequency_hz * (poses[k].time_s - poses[0].time_s);
             if phase.is_finite() && amplitude.is_finite() {
-                [(amplitude * phase.sin()) as f32, (amplitude * phase.cos()) as f32]
+                [
+                    (amplitude * phase.sin()) as f32,
+                    (amplitude * phase.cos()) as f32,
+                ]
             } else {
                 [0.0; 2]
             }
@@ -38,26 +49,39 @@ pub fn flutter(poses: &[Pose], skeleton: &Skeleton, groups: &[NodeId], settings:
 fn above(skeleton: &Skeleton, node: NodeId) -> Vec<usize> {
     let mut inside = vec![false; skeleton.nodes.len()];
     for (i, n) in skeleton.nodes.iter().enumerate() {
-        inside[i] = i == node.index() || n.parent.is_some_and(|p| p.index() < i && inside[p.index()]);
+        inside[i] =
+            i == node.index() || n.parent.is_some_and(|p| p.index() < i && inside[p.index()]);
     }
     (0..inside.len()).filter(|&i| inside[i]).collect()
 }
 
 /// Mean speed of the nodes from the pose before to pose `k`, px/s.
 fn speed(poses: &[Pose], k: usize, members: &[usize]) -> f64 {
-    let Some(before) = k.checked_sub(1).map(|b| &poses[b]) else { return 0.0 };
+    let Some(before) = k.checked_sub(1).map(|b| &poses[b]) else {
+        return 0.0;
+    };
     let elapsed_s = poses[k].time_s - before.time_s;
-    let way = |&i: &usize| Some((poses[k].joints.get(i)?.position - before.joints.get(i)?.position).norm());
+    let way = |&i: &usize| {
+        Some((poses[k].joints.get(i)?.position - before.joints.get(i)?.position).norm())
+    };
     let ways: f64 = members.iter().filter_map(way).sum();
     let speed = ways / members.len().max(1) as f64 / elapsed_s;
-    if elapsed_s > 0.0 && speed.is_finite() { speed } else { 0.0 }
+    if elapsed_s > 0.0 && speed.is_finite() {
+        speed
+    } else {
+        0.0
+    }
 }
 
 /// Mean of the steps that end within half of [`SMOOTHED_S`] of pose `k`.
 fn smoothed(poses: &[Pose], steps: &[f64], k: usize) -> f64 {
     let near = |j: &usize| (poses[*j].time_s - poses[k].time_s).abs() <= 0.5 * SMOOTHED_S + 1e-9;
     let (mut sum, mut count) = (steps[k], 1.0);
-    for j in (0..k).rev().take_while(near).chain((k + 1..steps.len()).take_while(near)) {
+    for j in (0..k)
+        .rev()
+        .take_while(near)
+        .chain((k + 1..steps.len()).take_while(near))
+    {
         sum += steps[j];
         count += 1.0;
     }
@@ -65,7 +89,13 @@ fn smoothed(poses: &[Pose], steps: &[f64], k: usize) -> f64 {
 }
 
 fn height(skeleton: &Skeleton) -> f64 {
-    let ys = skeleton.nodes.iter().map(|n| n.position.y).filter(|y| y.is_finite());
-    let (low, high) = ys.fold((f64::MAX, f64::MIN), |(low, high), y| (low.min(y), high.max(y)));
+    let ys = skeleton
+        .nodes
+        .iter()
+        .map(|n| n.position.y)
+        .filter(|y| y.is_finite());
+    let (low, high) = ys.fold((f64::MAX, f64::MIN), |(low, high), y| {
+        (low.min(y), high.max(y))
+    });
     (high - low).max(1e-6)
 }

@@ -17,20 +17,22 @@ impl Nearby {
 const POINTS: usize = 16;
 /// Rounds in which points that disagree lose weight: some tracks are always wrong.
 const ROUNDS: usize = 3;
-/// Where there is little to tell the slopes by they are taken for small: as if points of this weight stood at one standard
-/// deviation to all sides and moved alike.
+/// Where there is little to tell the slopes by they are taken for small: as if points of this
+/// weight stood at one standard deviation to all sides and moved alike.
 const SLOPES: f64 = 2.0;
 /// A point that misses by this many times the median has half its weight (Cauchy).
 const HALF_AT: f64 = 2.0;
 /// Misses of tracking itself, px: below it nobody disagrees.
 const FLOOR_PX: f64 = 0.05;
 
-/// Displacement of the place, px: that of a field that is linear in the picture, fitted to the points around it with
-/// weights that fall off as a normal distribution; `None` without points. `least_px`: no weights are narrower. Reorders
+/// Displacement of the place, px: that of a field that is linear in the picture, fitted to the
+/// points around it with weights that fall off as a normal distribution; `None` without points.
+/// `least_px`: no weights are narrower. Reorders
 /// `points`.
 ///
-/// A branch that turns moves its points the farther the farther out they are. Their mean is the motion of their middle,
-/// and the node, a fork or a tip, stands at their edge; the slopes take it there.
+/// A branch that turns moves its points the farther the farther out they are. Their mean is the
+/// motion of their middle, and the node, a fork or a tip, stands at their edge; the slopes take it
+/// there.
 pub(super) fn displacement(points: &mut [Nearby], least_px: f64) -> Option<[f64; 2]> {
     let used = points.len().min(2 * POINTS);
     if used == 0 {
@@ -43,7 +45,10 @@ pub(super) fn displacement(points: &mut [Nearby], least_px: f64) -> Option<[f64;
     let points = &mut points[..used];
     let rank = used.min(POINTS) - 1;
     points.select_nth_unstable_by(rank, by_distance);
-    let variance = points[rank].distance_sq().max(least_px * least_px).max(1e-6);
+    let variance = points[rank]
+        .distance_sq()
+        .max(least_px * least_px)
+        .max(1e-6);
     let mut near = [0.0; 2 * POINTS];
     for (weight, p) in near.iter_mut().zip(points.iter()) {
         *weight = (-0.5 * p.distance_sq() / variance).exp();
@@ -52,8 +57,12 @@ pub(super) fn displacement(points: &mut [Nearby], least_px: f64) -> Option<[f64;
     let mut field = fitted(points, &weights, variance);
     for _ in 1..ROUNDS {
         for (miss, p) in misses.iter_mut().zip(points.iter()) {
-            let off =
-                |c: usize| p.displacement[c] - field[c][0] - field[c][1] * p.offset[0] - field[c][2] * p.offset[1];
+            let off = |c: usize| {
+                p.displacement[c]
+                    - field[c][0]
+                    - field[c][1] * p.offset[0]
+                    - field[c][2] * p.offset[1]
+            };
             *miss = (off(0).powi(2) + off(1).powi(2)).sqrt();
         }
         let mut sorted = misses;
@@ -69,7 +78,8 @@ pub(super) fn displacement(points: &mut [Nearby], least_px: f64) -> Option<[f64;
 
 /// For either coordinate: displacement at the place, and its slopes along u and v.
 fn fitted(points: &[Nearby], weights: &[f64], variance: f64) -> [[f64; 3]; 2] {
-    let (mut s, mut su, mut sv, mut suu, mut suv, mut svv) = (0.0, 0.0, 0.0, SLOPES * variance, 0.0, SLOPES * variance);
+    let (mut s, mut su, mut sv, mut suu, mut suv, mut svv) =
+        (0.0, 0.0, 0.0, SLOPES * variance, 0.0, SLOPES * variance);
     let mut right = [[0.0; 3]; 2];
     for (p, w) in points.iter().zip(weights) {
         let [u, v] = p.offset;
@@ -91,7 +101,10 @@ fn fitted(points: &[Nearby], weights: &[f64], variance: f64) -> [[f64; 3]; 2] {
     let determinant = (a * c - b * b).max(1e-12);
     right.map(|[r, ru, rv]| {
         let (ru, rv) = (ru - su * r / s, rv - sv * r / s);
-        let (slope_u, slope_v) = ((c * ru - b * rv) / determinant, (a * rv - b * ru) / determinant);
+        let (slope_u, slope_v) = (
+            (c * ru - b * rv) / determinant,
+            (a * rv - b * ru) / determinant,
+        );
         [(r - slope_u * su - slope_v * sv) / s, slope_u, slope_v]
     })
 }
@@ -100,11 +113,15 @@ fn fitted(points: &[Nearby], weights: &[f64], variance: f64) -> [[f64; 3]; 2] {
 mod tests {
     use super::*;
 
-    /// Points along a branch that begins at the place `from` px below it and turns by `angle` about its beginning.
+    /// Points along a branch that begins at the place `from` px below it and turns by `angle` about
+    /// its beginning.
     fn branch(n: usize, from: f64, angle: f64) -> Vec<Nearby> {
         let point = |k: usize| {
             let out = from * k as f64 / n as f64;
-            Nearby { displacement: [angle * out, 0.0], offset: [0.0, from - out] }
+            Nearby {
+                displacement: [angle * out, 0.0],
+                offset: [0.0, from - out],
+            }
         };
         (1..=n).map(point).collect()
     }
@@ -113,15 +130,23 @@ mod tests {
     fn a_tip_moves_as_the_tip_and_not_as_the_middle_of_its_branch() {
         let moved = displacement(&mut branch(12, 100.0, 0.1), 6.0).expect("points");
         // Their middle moves by 5.4 px.
-        assert!((6.8..=10.0).contains(&moved[0]) && moved[1].abs() < 1e-9, "{moved:?} of 10 px");
+        assert!(
+            (6.8..=10.0).contains(&moved[0]) && moved[1].abs() < 1e-9,
+            "{moved:?} of 10 px"
+        );
     }
 
     #[test]
     fn a_tree_that_is_shifted_as_a_whole_is_followed_to_the_last_bit() {
         let mut points = branch(30, 80.0, 0.0);
-        points.iter_mut().for_each(|p| p.displacement = [2.5, -1.25]);
+        points
+            .iter_mut()
+            .for_each(|p| p.displacement = [2.5, -1.25]);
         let moved = displacement(&mut points, 6.0).expect("points");
-        assert!((moved[0] - 2.5).abs() < 1e-9 && (moved[1] + 1.25).abs() < 1e-9, "{moved:?}");
+        assert!(
+            (moved[0] - 2.5).abs() < 1e-9 && (moved[1] + 1.25).abs() < 1e-9,
+            "{moved:?}"
+        );
     }
 
     #[test]
@@ -133,16 +158,35 @@ mod tests {
         }
         // Their mean would be carried off by 12 px.
         let moved = displacement(&mut points, 6.0).expect("points");
-        assert!((moved[0] - right[0]).hypot(moved[1] - right[1]) < 2.5, "{moved:?} and without them {right:?}");
+        assert!(
+            (moved[0] - right[0]).hypot(moved[1] - right[1]) < 2.5,
+            "{moved:?} and without them {right:?}"
+        );
     }
 
     #[test]
     fn one_point_or_many_in_one_place_are_enough_and_none_is_nothing() {
-        let one = Nearby { displacement: [3.0, 4.0], offset: [10.0, 0.0] };
+        let one = Nearby {
+            displacement: [3.0, 4.0],
+            offset: [10.0, 0.0],
+        };
         let moved = displacement(&mut [one], 6.0).expect("a point");
-        assert!((moved[0] - 3.0).abs() < 1e-6 && (moved[1] - 4.0).abs() < 1e-6, "{moved:?}");
-        let moved = displacement(&mut [Nearby { offset: [0.0; 2], ..one }; 40], 0.0).expect("points");
-        assert!((moved[0] - 3.0).abs() < 1e-6 && (moved[1] - 4.0).abs() < 1e-6, "{moved:?}");
+        assert!(
+            (moved[0] - 3.0).abs() < 1e-6 && (moved[1] - 4.0).abs() < 1e-6,
+            "{moved:?}"
+        );
+        let moved = displacement(
+            &mut [Nearby {
+                offset: [0.0; 2],
+                ..one
+            }; 40],
+            0.0,
+        )
+        .expect("points");
+        assert!(
+            (moved[0] - 3.0).abs() < 1e-6 && (moved[1] - 4.0).abs() < 1e-6,
+            "{moved:?}"
+        );
         assert_eq!(displacement(&mut [], 6.0), None);
     }
 }

@@ -1,5 +1,6 @@
-//! From tracks to the 3D pose of every frame (Li et al. section 4): root to tip, each branch turns about its local root
-//! and carries all that hangs on it. Lengths never change, as only rotations are applied.
+//! From tracks to the 3D pose of every frame (Li et al. section 4): root to tip, each branch turns
+//! about its local root and carries all that hangs on it. Lengths never change, as only rotations
+//! are applied.
 
 mod between;
 mod binding;
@@ -26,8 +27,9 @@ use std::sync::Arc;
 
 /// Rate at which the largest step of the settings is meant for one frame.
 const FRAMES_PER_S: f64 = 30.0;
-/// Standard deviation of how far a branch leans to the viewer or away beyond its rest, as a share of that of its angle to its
-/// parent. The angle may be wide of the rest's because tracks say so; for depth nothing speaks but a shortening.
+/// Standard deviation of how far a branch leans to the viewer or away beyond its rest, as a share
+/// of that of its angle to its parent. The angle may be wide of the rest's because tracks say so;
+/// for depth nothing speaks but a shortening.
 const LEAN: f64 = 0.2;
 
 /// One branch at rest.
@@ -47,7 +49,10 @@ impl Branch {
     /// Where it ends when it turns by `own` in the axes of its parent branch.
     fn turned(&self, parent: &JointPose, own: UnitQuaternion<f64>) -> JointPose {
         let rotation = UnitQuaternion::new_normalize((parent.rotation * own).into_inner());
-        JointPose { position: parent.position + rotation * self.vector, rotation }
+        JointPose {
+            position: parent.position + rotation * self.vector,
+            rotation,
+        }
     }
 }
 
@@ -56,18 +61,27 @@ pub struct PoseEstimator {
     skeleton: Arc<Skeleton>,
     settings: Motion,
     branches: Vec<Option<Branch>>,
-    /// Direction of each measured branch in the frame before, in the axes of its parent branch at rest; `None` before
-    /// the first frame, which may lie anywhere within the accumulated bound.
+    /// Direction of each measured branch in the frame before, in the axes of its parent branch at
+    /// rest; `None` before the first frame, which may lie anywhere within the accumulated bound.
     previous: Option<Vec<UnitVector3<f64>>>,
     previous_s: f64,
 }
 
 impl PoseEstimator {
     pub fn new(skeleton: Arc<Skeleton>, settings: &Motion) -> Self {
-        let deepest = f64::from(skeleton.nodes.iter().map(|n| n.level).max().unwrap_or(1).max(2));
+        let deepest = f64::from(
+            skeleton
+                .nodes
+                .iter()
+                .map(|n| n.level)
+                .max()
+                .unwrap_or(1)
+                .max(2),
+        );
         let vector_of = |i: usize| {
             let node = &skeleton.nodes[i];
-            node.parent.map(|p| node.position - skeleton.nodes[p.index()].position)
+            node.parent
+                .map(|p| node.position - skeleton.nodes[p.index()].position)
         };
         let branches = (0..skeleton.nodes.len()).map(|i| {
             let node = &skeleton.nodes[i];
@@ -83,11 +97,22 @@ impl PoseEstimator {
                 length: vector.norm(),
                 parent_direction: vector_of(parent).and_then(|v| Unit::try_new(v, 1e-9)),
                 sigma_shape: (root + depth * (tip - root)).to_radians(),
-                copy: node.copy_of.map(|o| (o, UnitQuaternion::from_axis_angle(&Vector3::y_axis(), node.plane_angle))),
+                copy: node.copy_of.map(|o| {
+                    (
+                        o,
+                        UnitQuaternion::from_axis_angle(&Vector3::y_axis(), node.plane_angle),
+                    )
+                }),
             })
         });
         let branches = branches.collect();
-        Self { skeleton, settings: settings.clone(), branches, previous: None, previous_s: 0.0 }
+        Self {
+            skeleton,
+            settings: settings.clone(),
+            branches,
+            previous: None,
+            previous_s: 0.0,
+        }
     }
 
     /// The most probable pose, given where the tracks put each measured node (px in the picture).
@@ -95,7 +120,10 @@ impl PoseEstimator {
         // A clock that stands still must not forbid all motion.
         let elapsed_s = (time_s - self.previous_s).max(1e-3);
         self.previous_s = time_s;
-        let rest = |n: &crate::model::Node| JointPose { position: n.position, rotation: UnitQuaternion::identity() };
+        let rest = |n: &crate::model::Node| JointPose {
+            position: n.position,
+            rotation: UnitQuaternion::identity(),
+        };
         let mut joints: Vec<JointPose> = self.skeleton.nodes.iter().map(rest).collect();
         let mut directions: Vec<UnitVector3<f64>> = Vec::with_capacity(self.skeleton.nodes.len());
         for i in 0..joints.len() {
@@ -119,7 +147,11 @@ impl PoseEstimator {
             joints[i] = branch.turned(&parent, own);
         }
         self.previous = Some(directions);
-        Pose { frame, time_s, joints }
+        Pose {
+            frame,
+            time_s,
+            joints,
+        }
     }
 
     /// The copy turns in its plane as the original does in its own.
@@ -129,20 +161,27 @@ impl PoseEstimator {
         joints: &[JointPose],
     ) -> UnitQuaternion<f64> {
         let above = self.skeleton.nodes[original.index()].parent;
-        let parent_rotation = above.map_or(UnitQuaternion::identity(), |p| joints[p.index()].rotation);
+        let parent_rotation =
+            above.map_or(UnitQuaternion::identity(), |p| joints[p.index()].rotation);
         turn * (parent_rotation.inverse() * joints[original.index()].rotation) * turn.inverse()
     }
 
-    /// By how much the direction of a branch may change that was `turned` from its rest, so that the branch turns by no more than
+    /// By how much the direction of a branch may change that was `turned` from its rest, so that
+    /// the branch turns by no more than
     /// `max_step_deg` in a frame, or in 1/30 s where frames are rarer.
     ///
-    /// The turn from rest to a direction is the shortest one. Between two directions up to an angle theta from the rest these
-    /// turns differ by up to 1 / cos(theta / 2) times the angle between the directions.
+    /// The turn from rest to a direction is the shortest one. Between two directions up to an angle
+    /// theta from the rest these turns differ by up to 1 / cos(theta / 2) times the angle between
+    /// the directions.
     fn largest_step(&self, turned: f64, elapsed_s: f64) -> f64 {
         let frames = (elapsed_s * FRAMES_PER_S).max(1.0);
         let bound = (self.settings.max_step_deg.to_radians() * frames).min(PI);
-        // Beyond 120 degrees, where only settings of one's own let it come, there would soon be nothing left.
-        bound * (0.5 * (turned + bound).min(self.settings.max_total_deg.to_radians())).cos().max(0.5)
+        // Beyond 120 degrees, where only settings of one's own let it come, there would soon be
+        // nothing left.
+        bound
+            * (0.5 * (turned + bound).min(self.settings.max_total_deg.to_radians()))
+                .cos()
+                .max(0.5)
     }
 
     /// Direction of branch `i` in the axes of its parent branch at rest.
@@ -170,9 +209,12 @@ impl PoseEstimator {
                 sigma_track_px: self.settings.sigma_track_px,
                 sigma_shape: branch.sigma_shape,
                 // The first frame has none before it.
-                sigma_depth: previous.map(|_| self.settings.depth_rate_deg_s.to_radians() * elapsed_s),
+                sigma_depth: previous
+                    .map(|_| self.settings.depth_rate_deg_s.to_radians() * elapsed_s),
                 sigma_lean: Some(LEAN * branch.sigma_shape),
-                max_step: previous.map_or(PI, |p| self.largest_step(p.angle(&branch.direction), elapsed_s)),
+                max_step: previous.map_or(PI, |p| {
+                    self.largest_step(p.angle(&branch.direction), elapsed_s)
+                }),
                 max_total: self.settings.max_total_deg.to_radians(),
             }
             .solve(),

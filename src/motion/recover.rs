@@ -6,15 +6,19 @@ use crate::model::{JointPose, Pose};
 use nalgebra::{Point3, Unit, UnitQuaternion};
 
 impl PoseEstimator {
-    /// The pose whose nodes lie at `places` (model axes, px, one a node), by the rule by which poses are made: a measured
-    /// branch turns the shortest way in the axes of its parent branch, a copy as its original. Lengths are those at rest,
-    /// whatever `places` says; what is missing or no number stays as its parent has it.
+    /// The pose whose nodes lie at `places` (model axes, px, one a node), by the rule by which
+    /// poses are made: a measured branch turns the shortest way in the axes of its parent branch, a
+    /// copy as its original. Lengths are those at rest, whatever `places` says; what is missing or
+    /// no number stays as its parent has it.
     pub fn recover(&self, frame: u64, time_s: f64, places: &[Point3<f64>]) -> Pose {
         let mut joints: Vec<JointPose> = Vec::with_capacity(self.branches.len());
         for (i, branch) in self.branches.iter().enumerate() {
             let Some(branch) = branch else {
                 let position = self.skeleton.nodes[i].position;
-                joints.push(JointPose { position, rotation: UnitQuaternion::identity() });
+                joints.push(JointPose {
+                    position,
+                    rotation: UnitQuaternion::identity(),
+                });
                 continue;
             };
             let parent = joints[branch.parent];
@@ -24,12 +28,20 @@ impl PoseEstimator {
                     .get(i)
                     .zip(places.get(branch.parent))
                     .filter(|_| branch.length >= 1e-6)
-                    .and_then(|(end, start)| Unit::try_new(parent.rotation.inverse() * (end - start), 1e-9))
+                    .and_then(|(end, start)| {
+                        Unit::try_new(parent.rotation.inverse() * (end - start), 1e-9)
+                    })
                     .filter(|d| d.iter().all(|x| x.is_finite()))
-                    .map_or_else(UnitQuaternion::identity, |d| shortest_rotation(&branch.direction, &d)),
+                    .map_or_else(UnitQuaternion::identity, |d| {
+                        shortest_rotation(&branch.direction, &d)
+                    }),
             };
             joints.push(branch.turned(&parent, own));
         }
-        Pose { frame, time_s, joints }
+        Pose {
+            frame,
+            time_s,
+            joints,
+        }
     }
 }

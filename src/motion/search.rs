@@ -1,9 +1,10 @@
 //! The search for the most probable direction of a branch.
 //!
-//! Levenberg-Marquardt on the sphere, every step held within the bounds, from the direction before, from the rest, and from
-//! the two directions that are seen where the branch is seen (of a branch in the picture's plane neither is found from the
-//! others: to both sides the slope is 0). Where the best of these lies on a bound, along which such steps cannot slide, both
-//! borders are searched all round. `tests/pose.rs` holds it against trying everything, as the paper does.
+//! Levenberg-Marquardt on the sphere, every step held within the bounds, from the direction before,
+//! from the rest, and from the two directions that are seen where the branch is seen (of a branch
+//! in the picture's plane neither is found from the others: to both sides the slope is 0). Where
+//! the best of these lies on a bound, along which such steps cannot slide, both borders are
+//! searched all round. `tests/pose.rs` holds it against trying everything, as the paper does.
 //!
 //! All is in model axes, so that nothing has to be turned on the way.
 
@@ -21,7 +22,11 @@ pub(super) fn best(problem: &Problem) -> UnitVector3<f64> {
     let back = problem.parent_rotation.inverse();
     let Some(target) = problem.target else {
         // Nothing was seen: eq. 10 alone is satisfied by the branch keeping its angle.
-        return within(&problem.previous_direction, &problem.rest_direction, problem.max_total);
+        return within(
+            &problem.previous_direction,
+            &problem.rest_direction,
+            problem.max_total,
+        );
     };
     let search = Search::new(problem, target);
     let mut best = search.descend(search.bounded(&search.previous));
@@ -35,7 +40,10 @@ pub(super) fn best(problem: &Problem) -> UnitVector3<f64> {
         }
     }
     if search.on_a_bound(&best.0) {
-        let borders = [(search.previous, problem.max_step), (search.rest, problem.max_total)];
+        let borders = [
+            (search.previous, problem.max_step),
+            (search.rest, problem.max_total),
+        ];
         let other = border::best(&borders, |d| {
             let d = search.bounded(d);
             (d, search.at(&d).cost())
@@ -52,7 +60,8 @@ struct Search {
     rest: UnitVector3<f64>,
     /// Direction of the parent branch, and the angle to it at rest.
     parent: Option<(Vector3<f64>, f64)>,
-    /// One over the standard deviations: of the place, px, of the angle, and of both priors on the depth together.
+    /// One over the standard deviations: of the place, px, of the angle, and of both priors on the
+    /// depth together.
     per_track: f64,
     per_shape: f64,
     per_depth: f64,
@@ -79,7 +88,10 @@ impl Off {
 impl Search {
     fn new(problem: &Problem, target: [f64; 2]) -> Self {
         let turned = |d: &UnitVector3<f64>| problem.parent_rotation * d;
-        let (previous, rest) = (turned(&problem.previous_direction), turned(&problem.rest_direction));
+        let (previous, rest) = (
+            turned(&problem.previous_direction),
+            turned(&problem.rest_direction),
+        );
         let weight = |sigma: Option<f64>| sigma.map_or(0.0, |s| 1.0 / (s * s));
         let (rate, lean) = (weight(problem.sigma_depth), weight(problem.sigma_lean));
         let parent = problem.parent_direction.map(|p| {
@@ -102,8 +114,9 @@ impl Search {
     }
 
     fn at(&self, d: &UnitVector3<f64>) -> Off {
-        let shape =
-            |&(parent, rest): &(Vector3<f64>, f64)| (parent.dot(d).clamp(-1.0, 1.0).acos() - rest) * self.per_shape;
+        let shape = |&(parent, rest): &(Vector3<f64>, f64)| {
+            (parent.dot(d).clamp(-1.0, 1.0).acos() - rest) * self.per_shape
+        };
         Off {
             track: (d.xy() * self.length - self.target) * self.per_track,
             shape: self.parent.as_ref().map_or(0.0, shape),
@@ -111,12 +124,14 @@ impl Search {
         }
     }
 
-    /// The directions in which the branch would be seen at the target, or nearest to it: to the viewer and away.
+    /// The directions in which the branch would be seen at the target, or nearest to it: to the
+    /// viewer and away.
     fn seen_at(&self) -> [UnitVector3<f64>; 2] {
         let at = self.target / self.length;
         let at = at / at.norm().max(1.0);
         let depth = (1.0 - at.norm_squared()).max(0.0).sqrt();
-        [depth, -depth].map(|z| Unit::try_new(Vector3::new(at.x, at.y, z), 1e-9).unwrap_or(self.previous))
+        [depth, -depth]
+            .map(|z| Unit::try_new(Vector3::new(at.x, at.y, z), 1e-9).unwrap_or(self.previous))
     }
 
     /// The direction to which steps lead from `start`, and its cost.
@@ -128,7 +143,8 @@ impl Search {
         for _ in 0..ITERATIONS {
             let (a, b) = tangents(&d);
             let (ta, tb) = (a.xy() * scale, b.xy() * scale);
-            // d(alpha)/d(d) = -p / sin(alpha); where the branch goes straight on alpha has no slope.
+            // d(alpha)/d(d) = -p / sin(alpha); where the branch goes straight on alpha has no
+            // slope.
             let (sa, sb) = match &self.parent {
                 Some((p, _)) if p.cross(&d).norm_squared() > 1e-6 => {
                     let slope = -self.per_shape / p.cross(&d).norm();
@@ -137,7 +153,8 @@ impl Search {
                 _ => (0.0, 0.0),
             };
             let (pull, stiffness) = (off.depth * self.per_depth, self.per_depth * self.per_depth);
-            // The sphere bends away from its tangents: where the target is out of reach that is most of the slope's change.
+            // The sphere bends away from its tangents: where the target is out of reach that is
+            // most of the slope's change.
             let bend = -(off.track.dot(&d.xy()) * scale + pull * d.z);
             let bend = bend.max(0.0);
             let mixed = ta.dot(&tb) + sa * sb + a.z * b.z * stiffness;
@@ -154,7 +171,10 @@ impl Search {
             }
             let step_a = (mixed * gradient.y - (bb + more) * gradient.x) / determinant;
             let step_b = (mixed * gradient.x - (aa + more) * gradient.y) / determinant;
-            let Some(candidate) = Unit::try_new(d.into_inner() + a * step_a + b * step_b, 1e-9) else { break };
+            let Some(candidate) = Unit::try_new(d.into_inner() + a * step_a + b * step_b, 1e-9)
+            else {
+                break;
+            };
             let candidate = self.bounded(&candidate);
             let candidate_off = self.at(&candidate);
             let candidate_cost = candidate_off.cost();
@@ -185,7 +205,8 @@ impl Search {
     }
 }
 
-/// `d`, or where it is more than `angle` away from `centre`, the direction on the way to it that is not.
+/// `d`, or where it is more than `angle` away from `centre`, the direction on the way to it that is
+/// not.
 fn within(d: &UnitVector3<f64>, centre: &UnitVector3<f64>, angle: f64) -> UnitVector3<f64> {
     let apart = centre.dot(d).clamp(-1.0, 1.0).acos();
     if apart <= angle {
@@ -197,7 +218,11 @@ fn within(d: &UnitVector3<f64>, centre: &UnitVector3<f64>, angle: f64) -> UnitVe
 
 /// Two unit vectors at right angles to `d` and to each other.
 pub(super) fn tangents(d: &UnitVector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    let other = if d.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
+    let other = if d.x.abs() < 0.6 {
+        Vector3::x()
+    } else {
+        Vector3::y()
+    };
     let a = d.cross(&other).normalize();
     (a, d.cross(&a))
 }

@@ -1,34 +1,43 @@
-//! The outline found by itself: what moves over the first seconds and was elsewhere in the first picture, without the
-//! shadow, closed to one region.
+//! The outline found by itself: what moves over the first seconds and was elsewhere in the first
+//! picture, without the shadow, closed to one region.
 
 use super::steady::steadiness;
 use super::{region, trunk};
 use crate::config;
 use crate::model::{Luma, Outline, Size};
 
-/// Width to which pictures are reduced, px: sway of a pixel or two is then still seen, single-pixel noise is not.
+/// Width to which pictures are reduced, px: sway of a pixel or two is then still seen, single-pixel
+/// noise is not.
 const REDUCED_WIDTH: u32 = 320;
-/// While nothing is found it is tried again after so long, s: one try takes as long as a frame or two.
+/// While nothing is found it is tried again after so long, s: one try takes as long as a frame or
+/// two.
 const TRY_EVERY_S: f64 = 0.5;
-/// Motion must stand out so many times above the standard deviation of the picture's quietest quarter, which is no tree,
-/// and above this in grey levels: sensor noise and compression stay below.
+/// Motion must stand out so many times above the standard deviation of the picture's quietest
+/// quarter, which is no tree, and above this in grey levels: sensor noise and compression stay
+/// below.
 const ABOVE_QUIET: f32 = 4.0;
 const ABOVE_GREY: f32 = 3.0;
-/// What moves was tree in the first picture if it was so many grey levels off its median over time there: the pixel that
-/// the tree only swept over later shows its background at first, as it does most of the time.
+/// What moves was tree in the first picture if it was so many grey levels off its median over time
+/// there: the pixel that the tree only swept over later shows its background at first, as it does
+/// most of the time.
 const OFF_MEDIAN: u8 = 6;
-/// Gaps up to this share of the picture's width are closed: between branches there is sky that does not move.
+/// Gaps up to this share of the picture's width are closed: between branches there is sky that does
+/// not move.
 const CLOSE_SHARE: f64 = 0.045;
-/// Limbs whose fork hardly moves lie farther apart: up to this share is closed if one piece then has nearly all.
+/// Limbs whose fork hardly moves lie farther apart: up to this share is closed if one piece then
+/// has nearly all.
 const CLOSE_MOST: f64 = 0.08;
 const CLOSE_STEP: f64 = 0.01;
 const NEARLY_ALL: f64 = 0.9;
-/// The region is drawn so much wider than what moves, as a share of the picture's width; the trunk is not.
+/// The region is drawn so much wider than what moves, as a share of the picture's width; the trunk
+/// is not.
 const MARGIN_SHARE: f64 = 0.006;
-/// Pieces smaller than this share of all that moves are noise; gaps of two pixels do not make two pieces.
+/// Pieces smaller than this share of all that moves are noise; gaps of two pixels do not make two
+/// pieces.
 const SPECK_SHARE: f64 = 0.002;
 const SPECK_GAP_PX: u32 = 2;
-/// Pictures kept, and the least time between two of them at first, s; when there are too many, every other one goes.
+/// Pictures kept, and the least time between two of them at first, s; when there are too many,
+/// every other one goes.
 const MOST_KEPT: usize = 60;
 const KEEP_EVERY_S: f64 = 1.0 / 20.0;
 /// Pictures in which structure is compared.
@@ -38,9 +47,9 @@ const LEAST_COVERAGE: f64 = 0.005;
 /// Where less than this share of it moves, closing does not make a tree of it.
 const LEAST_MOVING: f64 = LEAST_COVERAGE / 10.0;
 
-/// Gathers motion energy: the variance of every pixel's brightness over time (Welford's running form), less half the
-/// mean square of its change from frame to frame. Of white noise that leaves nothing; a sway, which takes many frames,
-/// keeps nearly all of its variance.
+/// Gathers motion energy: the variance of every pixel's brightness over time (Welford's running
+/// form), less half the mean square of its change from frame to frame. Of white noise that leaves
+/// nothing; a sway, which takes many frames, keeps nearly all of its variance.
 pub struct AutoOutline {
     settings: config::Outline,
     start_s: Option<f64>,
@@ -86,17 +95,22 @@ impl AutoOutline {
         }
     }
 
-    /// Tracking will begin at `time_s`, not at the first picture: the outline is to be that of then.
+    /// Tracking will begin at `time_s`, not at the first picture: the outline is to be that of
+    /// then.
     pub fn begin_at(&mut self, time_s: f64) {
         let before = self.kept.partition_point(|(t, _)| *t < time_s);
-        self.kept.drain(..before.min(self.kept.len().saturating_sub(1)));
+        self.kept
+            .drain(..before.min(self.kept.len().saturating_sub(1)));
     }
 
     /// Takes the next picture, seen at `time_s`.
     pub fn step(&mut self, luma: &Luma, time_s: f64) -> Found {
         let start_s = *self.start_s.get_or_insert_with(|| {
             self.scale = luma.size.width.div_ceil(REDUCED_WIDTH).max(1);
-            self.reduced = Size::new(luma.size.width / self.scale, (luma.size.height / self.scale).max(1));
+            self.reduced = Size::new(
+                luma.size.width / self.scale,
+                (luma.size.height / self.scale).max(1),
+            );
             let zero = vec![0.0; self.reduced.area()];
             (self.mean, self.sum_sq) = (zero.clone(), zero.clone());
             (self.last, self.sum_change_sq) = (zero.clone(), zero);
@@ -109,7 +123,11 @@ impl AutoOutline {
             return Found::NotYet(gathered_s / self.settings.gather_s);
         }
         let over = gathered_s >= self.settings.give_up_s;
-        if !over && self.tried_s.is_some_and(|tried_s| time_s - tried_s < TRY_EVERY_S) {
+        if !over
+            && self
+                .tried_s
+                .is_some_and(|tried_s| time_s - tried_s < TRY_EVERY_S)
+        {
             return Found::NotYet(0.99);
         }
         self.tried_s = Some(time_s);
@@ -134,23 +152,41 @@ impl AutoOutline {
     }
 
     fn reduced_region(&self) -> opencv::Result<Option<Outline>> {
-        let (size, px) = (self.reduced, |share: f64| (share * f64::from(self.reduced.width)).round() as u32);
-        let Some((first, _)) = self.kept.split_first().filter(|_| self.count >= 2.0) else { return Ok(None) };
+        let (size, px) = (self.reduced, |share: f64| {
+            (share * f64::from(self.reduced.width)).round() as u32
+        });
+        let Some((first, _)) = self.kept.split_first().filter(|_| self.count >= 2.0) else {
+            return Ok(None);
+        };
         let moving = self.moving();
         if (moving.iter().filter(|m| **m).count() as f64) < LEAST_MOVING * size.area() as f64 {
             return Ok(None);
         }
         let median = self.median();
-        let was_tree = |(i, &moves): (usize, &bool)| moves && first.1.pixels[i].abs_diff(median[i]) >= OFF_MEDIAN;
-        let mut mask: Vec<u8> = moving.iter().enumerate().map(|m| if was_tree(m) { 255 } else { 0 }).collect();
+        let was_tree = |(i, &moves): (usize, &bool)| {
+            moves && first.1.pixels[i].abs_diff(median[i]) >= OFF_MEDIAN
+        };
+        let mut mask: Vec<u8> = moving
+            .iter()
+            .enumerate()
+            .map(|m| if was_tree(m) { 255 } else { 0 })
+            .collect();
         region::without_specks(size, &mut mask, SPECK_GAP_PX, SPECK_SHARE)?;
         let step = self.kept.len().div_ceil(COMPARED);
-        let compared: Vec<&Luma> = self.kept.iter().step_by(step).map(|(_, picture)| picture).collect();
+        let compared: Vec<&Luma> = self
+            .kept
+            .iter()
+            .step_by(step)
+            .map(|(_, picture)| picture)
+            .collect();
         let stands = trunk::stand(size, &mut mask, &steadiness(&compared));
-        let Some(mut one) = region::close_to_one(size, &mask, px(CLOSE_SHARE))? else { return Ok(None) };
+        let Some(mut one) = region::close_to_one(size, &mask, px(CLOSE_SHARE))? else {
+            return Ok(None);
+        };
         let mut share = CLOSE_SHARE + CLOSE_STEP;
         while share <= CLOSE_MOST && held(&mask, &one) < NEARLY_ALL {
-            if let Some(joined) = region::close_to_one(size, &mask, px(share))?.filter(|o| held(&mask, o) >= NEARLY_ALL)
+            if let Some(joined) = region::close_to_one(size, &mask, px(share))?
+                .filter(|o| held(&mask, o) >= NEARLY_ALL)
             {
                 one = joined;
             }
@@ -167,7 +203,12 @@ impl AutoOutline {
     /// Which pixels change more than noise does.
     fn moving(&self) -> Vec<bool> {
         let sway = |(s, c): (&f32, &f32)| ((s - 0.5 * c) / (self.count - 1.0)).max(0.0).sqrt();
-        let deviation: Vec<f32> = self.sum_sq.iter().zip(&self.sum_change_sq).map(sway).collect();
+        let deviation: Vec<f32> = self
+            .sum_sq
+            .iter()
+            .zip(&self.sum_change_sq)
+            .map(sway)
+            .collect();
         let mut sorted = deviation.clone();
         let quarter = sorted.len() / 4;
         let quiet = *sorted.select_nth_unstable_by(quarter, f32::total_cmp).1;
@@ -179,7 +220,10 @@ impl AutoOutline {
     fn median(&self) -> Vec<u8> {
         let mut values = vec![0; self.kept.len()];
         let of = |i: usize| {
-            values.iter_mut().zip(&self.kept).for_each(|(value, (_, picture))| *value = picture.pixels[i]);
+            values
+                .iter_mut()
+                .zip(&self.kept)
+                .for_each(|(value, (_, picture))| *value = picture.pixels[i]);
             let middle = values.len() / 2;
             *values.select_nth_unstable(middle).1
         };
@@ -187,7 +231,11 @@ impl AutoOutline {
     }
 
     fn keep(&mut self, picture: Luma, time_s: f64) {
-        if self.kept.last().is_some_and(|(last_s, _)| time_s - last_s < self.keep_every_s) {
+        if self
+            .kept
+            .last()
+            .is_some_and(|(last_s, _)| time_s - last_s < self.keep_every_s)
+        {
             return;
         }
         self.kept.push((time_s, picture));
@@ -203,14 +251,20 @@ impl AutoOutline {
 
     /// Adds a picture to the sums, and gives it back reduced.
     fn add(&mut self, luma: &Luma) -> Luma {
-        let mut picture = Luma { size: self.reduced, pixels: Vec::with_capacity(self.reduced.area()) };
+        let mut picture = Luma {
+            size: self.reduced,
+            pixels: Vec::with_capacity(self.reduced.area()),
+        };
         self.count += 1.0;
         let (scale, width) = (self.scale as usize, luma.size.width as usize);
         let per_cell = (scale * scale) as f32;
         for v in 0..self.reduced.height as usize {
             for u in 0..self.reduced.width as usize {
                 let rows = luma.pixels[v * scale * width..].chunks(width).take(scale);
-                let sum: u32 = rows.flat_map(|row| &row[u * scale..(u + 1) * scale]).map(|&p| u32::from(p)).sum();
+                let sum: u32 = rows
+                    .flat_map(|row| &row[u * scale..(u + 1) * scale])
+                    .map(|&p| u32::from(p))
+                    .sum();
                 let x = sum as f32 / per_cell;
                 let i = v * self.reduced.width as usize + u;
                 let before = x - self.mean[i];
@@ -230,13 +284,22 @@ impl AutoOutline {
 /// The whole picture as an outline.
 pub fn whole(size: Size) -> Outline {
     let (w, h) = (size.width as i32 - 1, size.height as i32 - 1);
-    Outline { size, mask: vec![255; size.area()], polygon_px: vec![[0, 0], [w, 0], [w, h], [0, h]], matte: None }
+    Outline {
+        size,
+        mask: vec![255; size.area()],
+        polygon_px: vec![[0, 0], [w, 0], [w, h], [0, h]],
+        matte: None,
+    }
 }
 
 /// Share of a mask that an outline holds.
 fn held(mask: &[u8], outline: &Outline) -> f64 {
     let of = mask.iter().filter(|m| **m != 0).count();
-    let inside = mask.iter().zip(&outline.mask).filter(|(m, o)| **m != 0 && **o != 0).count();
+    let inside = mask
+        .iter()
+        .zip(&outline.mask)
+        .filter(|(m, o)| **m != 0 && **o != 0)
+        .count();
     inside as f64 / of.max(1) as f64
 }
 

@@ -9,10 +9,18 @@ const LEAST_MEAN: f64 = 0.5;
 /// Why a picture is no density.
 #[derive(Debug, thiserror::Error)]
 pub enum DensityError {
-    #[error("cannot read density {name}: {what}; give a PNG, JPEG or BMP of the film's size, white where leaves are")]
+    #[error(
+        "cannot read density {name}: {what}; give a PNG, JPEG or BMP of the film's size, white where leaves are"
+    )]
     Unreadable { name: String, what: String },
-    #[error("density {name} is for {found}, the picture is {wanted}; draw it on a frame of this clip")]
-    WrongSize { name: String, found: Size, wanted: Size },
+    #[error(
+        "density {name} is for {found}, the picture is {wanted}; draw it on a frame of this clip"
+    )]
+    WrongSize {
+        name: String,
+        found: Size,
+        wanted: Size,
+    },
     #[error("density {name} is black all over; draw in white where leaves are to be")]
     Empty { name: String },
 }
@@ -23,17 +31,29 @@ pub enum DensityError {
 /// It cannot be read, is of another size, or has nothing in it.
 pub fn density(path: &Path, size: Size) -> Result<Luma, DensityError> {
     let name = path.display().to_string();
-    let unreadable = |what: String| DensityError::Unreadable { name: name.clone(), what };
+    let unreadable = |what: String| DensityError::Unreadable {
+        name: name.clone(),
+        what,
+    };
     let reader = image::ImageReader::open(path).map_err(|e| unreadable(e.to_string()))?;
-    let mut reader = reader.with_guessed_format().map_err(|e| unreadable(e.to_string()))?;
+    let mut reader = reader
+        .with_guessed_format()
+        .map_err(|e| unreadable(e.to_string()))?;
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(16384);
     limits.max_image_height = Some(16384);
     reader.limits(limits);
-    let picture = reader.decode().map_err(|e| unreadable(e.to_string()))?.into_luma_alpha8();
+    let picture = reader
+        .decode()
+        .map_err(|e| unreadable(e.to_string()))?
+        .into_luma_alpha8();
     let found = Size::new(picture.width(), picture.height());
     if found != size {
-        return Err(DensityError::WrongSize { name, found, wanted: size });
+        return Err(DensityError::WrongSize {
+            name,
+            found,
+            wanted: size,
+        });
     }
     let seen = |p: &image::LumaA<u8>| (u16::from(p.0[0]) * u16::from(p.0[1]) / 255) as u8;
     let pixels: Vec<u8> = picture.pixels().map(seen).collect();

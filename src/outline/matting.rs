@@ -6,52 +6,94 @@ use crate::model::{Outline, Rgb, Size};
 
 /// Gaps between branches up to this share of the picture's width are in the region.
 const CLOSE_SHARE: f64 = 0.03;
-/// Pictures with a side of at least so many pixels are solved at half their size first, which takes the long waves out of
-/// the error.
+/// Pictures with a side of at least so many pixels are solved at half their size first, which takes
+/// the long waves out of the error.
 const LEAST_HALVED: usize = 80;
-/// Residuals at which a solution is good enough to start from, and to be used: the second is 0.003 from PyMatting's.
+/// Residuals at which a solution is good enough to start from, and to be used: the second is 0.003
+/// from PyMatting's.
 const START: f64 = 1e-3;
 const ENOUGH: f64 = 5e-5;
 
-/// The tree that scribbles mark in the picture that they were drawn on, which may come smaller than they are.
+/// The tree that scribbles mark in the picture that they were drawn on, which may come smaller than
+/// they are.
 ///
 /// # Errors
 /// The picture is too small, or OpenCV fails.
 pub fn outline(scribbles: &Scribbles, picture: &Rgb) -> Result<Outline, OutlineError> {
-    let bad = |what: String| OutlineError::BadFile { name: scribbles.name.clone(), what };
+    let bad = |what: String| OutlineError::BadFile {
+        name: scribbles.name.clone(),
+        what,
+    };
     let (small, size) = (picture.size, scribbles.size);
-    let solved =
-        solved(picture, scribbles).ok_or_else(|| bad(format!("a {small} picture is too small for scribbles")))?;
-    let tree: Vec<u8> = solved.iter().map(|&a| if a >= 0.5 { 255 } else { 0 }).collect();
+    let solved = solved(picture, scribbles)
+        .ok_or_else(|| bad(format!("a {small} picture is too small for scribbles")))?;
+    let tree: Vec<u8> = solved
+        .iter()
+        .map(|&a| if a >= 0.5 { 255 } else { 0 })
+        .collect();
     let close_px = (CLOSE_SHARE * f64::from(small.width)).round() as u32;
-    // Closed where it was solved: the time of that grows with the fourth power of the picture's width.
+    // Closed where it was solved: the time of that grows with the fourth power of the picture's
+    // width.
     let one = region::close_to_one(small, &tree, close_px).map_err(|e| bad(e.to_string()))?;
     let none = || bad("the scribbles leave no tree; draw more white strokes on it".into());
     let one = one.ok_or_else(none)?;
-    let inside: Vec<f64> = one.mask.iter().map(|&m| if m == 0 { 0.0 } else { 1.0 }).collect();
-    let mask: Vec<u8> = enlarged(&inside, small, size).iter().map(|&a| if a >= 0.5 { 255 } else { 0 }).collect();
-    let one = region::close_to_one(size, &mask, 0).map_err(|e| bad(e.to_string()))?.ok_or_else(none)?;
-    Ok(Outline { matte: Some(opacity(&enlarged(&solved, small, size))), ..one })
+    let inside: Vec<f64> = one
+        .mask
+        .iter()
+        .map(|&m| if m == 0 { 0.0 } else { 1.0 })
+        .collect();
+    let mask: Vec<u8> = enlarged(&inside, small, size)
+        .iter()
+        .map(|&a| if a >= 0.5 { 255 } else { 0 })
+        .collect();
+    let one = region::close_to_one(size, &mask, 0)
+        .map_err(|e| bad(e.to_string()))?
+        .ok_or_else(none)?;
+    Ok(Outline {
+        matte: Some(opacity(&enlarged(&solved, small, size))),
+        ..one
+    })
 }
 
-/// Opacity of the tree at every pixel of the scribbles, 0 to 255; `None` where the picture is too small.
+/// Opacity of the tree at every pixel of the scribbles, 0 to 255; `None` where the picture is too
+/// small.
 pub fn alpha(picture: &Rgb, scribbles: &Scribbles) -> Option<Vec<u8>> {
-    Some(opacity(&enlarged(&solved(picture, scribbles)?, picture.size, scribbles.size)))
+    Some(opacity(&enlarged(
+        &solved(picture, scribbles)?,
+        picture.size,
+        scribbles.size,
+    )))
 }
 
 fn opacity(alpha: &[f64]) -> Vec<u8> {
-    alpha.iter().map(|a| (a.clamp(0.0, 1.0) * 255.0).round() as u8).collect()
+    alpha
+        .iter()
+        .map(|a| (a.clamp(0.0, 1.0) * 255.0).round() as u8)
+        .collect()
 }
 
 /// The solution at the picture's size.
 fn solved(picture: &Rgb, scribbles: &Scribbles) -> Option<Vec<f64>> {
     let size = picture.size;
-    if (size.width.min(size.height) as usize) < solve::LEAST_SIDE || picture.pixels.len() != 3 * size.area() {
+    if (size.width.min(size.height) as usize) < solve::LEAST_SIDE
+        || picture.pixels.len() != 3 * size.area()
+    {
         return None;
     }
-    let colours = picture.pixels.chunks_exact(3).map(|p| [p[0], p[1], p[2]].map(|c| f64::from(c) / 255.0)).collect();
+    let colours = picture
+        .pixels
+        .chunks_exact(3)
+        .map(|p| [p[0], p[1], p[2]].map(|c| f64::from(c) / 255.0))
+        .collect();
     let marks = reduced(&scribbles.marks, scribbles.size, size);
-    Some(Level { size, colours, marks }.solve(ENOUGH))
+    Some(
+        Level {
+            size,
+            colours,
+            marks,
+        }
+        .solve(ENOUGH),
+    )
 }
 
 /// The problem at one size.
@@ -80,10 +122,21 @@ impl Level {
                 Mark::Undecided => {}
             }
         }
-        // What the strokes say to the others; the rows of the strokes themselves are solved from the start.
-        let told =
-            right.iter().zip(&self.marks).filter(|(_, m)| **m == Mark::Undecided).map(|(b, _)| b * b).sum::<f64>();
-        solve::conjugate_gradients(&matrix, &right, &mut x, width, tolerance * told.sqrt().max(1.0));
+        // What the strokes say to the others; the rows of the strokes themselves are solved from
+        // the start.
+        let told = right
+            .iter()
+            .zip(&self.marks)
+            .filter(|(_, m)| **m == Mark::Undecided)
+            .map(|(b, _)| b * b)
+            .sum::<f64>();
+        solve::conjugate_gradients(
+            &matrix,
+            &right,
+            &mut x,
+            width,
+            tolerance * told.sqrt().max(1.0),
+        );
         x
     }
 
@@ -95,10 +148,16 @@ impl Level {
             for u in 0..size.width as usize {
                 let at = 2 * v * width + 2 * u;
                 let four = [at, at + 1, at + width, at + width + 1].map(|i| self.colours[i]);
-                colours.push(std::array::from_fn(|c| four.iter().map(|p| p[c]).sum::<f64>() / 4.0));
+                colours.push(std::array::from_fn(|c| {
+                    four.iter().map(|p| p[c]).sum::<f64>() / 4.0
+                }));
             }
         }
-        Level { size, colours, marks: reduced(&self.marks, self.size, size) }
+        Level {
+            size,
+            colours,
+            marks: reduced(&self.marks, self.size, size),
+        }
     }
 }
 
@@ -109,9 +168,14 @@ fn reduced(marks: &[Mark], from: Size, to: Size) -> Vec<Mark> {
     }
     let mut votes = vec![(0u32, 0u32); to.area()];
     for (i, mark) in marks.iter().enumerate() {
-        let (u, v) = (i as u64 % u64::from(from.width), i as u64 / u64::from(from.width));
-        let (u, v) =
-            (u * u64::from(to.width) / u64::from(from.width), v * u64::from(to.height) / u64::from(from.height));
+        let (u, v) = (
+            i as u64 % u64::from(from.width),
+            i as u64 / u64::from(from.width),
+        );
+        let (u, v) = (
+            u * u64::from(to.width) / u64::from(from.width),
+            v * u64::from(to.height) / u64::from(from.height),
+        );
         let (tree, background) = &mut votes[(v * u64::from(to.width) + u) as usize];
         *tree += u32::from(*mark == Mark::Tree);
         *background += u32::from(*mark == Mark::Background);
@@ -132,17 +196,28 @@ fn enlarged(values: &[f64], from: Size, to: Size) -> Vec<f64> {
     let place = |i: u32, from: u32, to: u32| {
         let at = (f64::from(i) + 0.5) * f64::from(from) / f64::from(to) - 0.5;
         let at = at.clamp(0.0, f64::from(from - 1));
-        (at as usize, (at as usize + 1).min(from as usize - 1), at.fract())
+        (
+            at as usize,
+            (at as usize + 1).min(from as usize - 1),
+            at.fract(),
+        )
     };
-    let columns: Vec<(usize, usize, f64)> = (0..to.width).map(|u| place(u, from.width, to.width)).collect();
+    let columns: Vec<(usize, usize, f64)> = (0..to.width)
+        .map(|u| place(u, from.width, to.width))
+        .collect();
     let mut into = Vec::with_capacity(to.area());
     for v in 0..to.height {
         let (above, below, down) = place(v, from.height, to.height);
         let row = |v: usize| &values[v * from.width as usize..][..from.width as usize];
         let (above, below) = (row(above), row(below));
-        let between =
-            |row: &[f64], (left, right, over): (usize, usize, f64)| row[left] * (1.0 - over) + row[right] * over;
-        into.extend(columns.iter().map(|&c| between(above, c) * (1.0 - down) + between(below, c) * down));
+        let between = |row: &[f64], (left, right, over): (usize, usize, f64)| {
+            row[left] * (1.0 - over) + row[right] * over
+        };
+        into.extend(
+            columns
+                .iter()
+                .map(|&c| between(above, c) * (1.0 - down) + between(below, c) * down),
+        );
     }
     into
 }

@@ -26,11 +26,20 @@ pub enum OutlineError {
     #[error(
         "cannot read outline {name}: {source}; check the name, or leave --outline out to find the tree by its motion"
     )]
-    Unreadable { name: String, source: std::io::Error },
+    Unreadable {
+        name: String,
+        source: std::io::Error,
+    },
     #[error("outline {name}: {what}; draw it on a frame of this clip, or leave --outline out")]
     BadFile { name: String, what: String },
-    #[error("outline {name} is for {found}, the picture is {wanted}; draw it on a frame of this clip")]
-    WrongSize { name: String, found: Size, wanted: Size },
+    #[error(
+        "outline {name} is for {found}, the picture is {wanted}; draw it on a frame of this clip"
+    )]
+    WrongSize {
+        name: String,
+        found: Size,
+        wanted: Size,
+    },
     #[error("the outline is no usable polygon: {what}")]
     BadPolygon { what: String },
 }
@@ -48,7 +57,11 @@ impl std::str::FromStr for OutlineSpec {
     type Err = std::convert::Infallible;
 
     fn from_str(s: &str) -> Result<Self, Self::Err> {
-        Ok(if s == "auto" { OutlineSpec::Auto } else { OutlineSpec::File(s.into()) })
+        Ok(if s == "auto" {
+            OutlineSpec::Auto
+        } else {
+            OutlineSpec::File(s.into())
+        })
     }
 }
 
@@ -70,11 +83,14 @@ impl From<Outline> for Given {
 /// Reads an outline for pictures of `size` from a JSON polygon, a mask image or scribbles.
 ///
 /// # Errors
-/// The file cannot be read, is none of these, is for another size, the polygon encloses nothing usable, or the scribbles
-/// lack one of their colours.
+/// The file cannot be read, is none of these, is for another size, the polygon encloses nothing
+/// usable, or the scribbles lack one of their colours.
 pub fn load(path: &Path, size: Size) -> Result<Given, OutlineError> {
     let name = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|source| OutlineError::Unreadable { name: name.clone(), source })?;
+    let bytes = std::fs::read(path).map_err(|source| OutlineError::Unreadable {
+        name: name.clone(),
+        source,
+    })?;
     if bytes.iter().find(|b| !b.is_ascii_whitespace()) != Some(&b'{') {
         return scribbles::read(path, size);
     }
@@ -89,7 +105,11 @@ pub fn parse(text: &str, name: String, size: Size) -> Result<Outline, OutlineErr
     let file = polygon::parse(text, &name)?;
     let found = Size::new(file.width, file.height);
     if found != size {
-        return Err(OutlineError::WrongSize { name, found, wanted: size });
+        return Err(OutlineError::WrongSize {
+            name,
+            found,
+            wanted: size,
+        });
     }
     polygon::outline(&file.polygon_px, size).map_err(|e| match e {
         OutlineError::BadPolygon { what } => OutlineError::BadFile { name, what },

@@ -1,4 +1,5 @@
-//! Outlines drawn as a picture: a mask, white on black, or scribbles, white and black strokes on undecided ground.
+//! Outlines drawn as a picture: a mask, white on black, or scribbles, white and black strokes on
+//! undecided ground.
 
 use super::{Given, OutlineError, region};
 use crate::model::Size;
@@ -6,15 +7,17 @@ use crate::signal::median;
 use image::RgbaImage;
 use std::path::Path;
 
-/// Share of undecided pixels above which a picture holds scribbles: a mask has them at its soft edges only.
+/// Share of undecided pixels above which a picture holds scribbles: a mask has them at its soft
+/// edges only.
 const MOST_UNDECIDED: f64 = 0.05;
-/// Brightness up to which a stroke counts as black, and from which as white; JPEG leaves neither quite alone.
+/// Brightness up to which a stroke counts as black, and from which as white; JPEG leaves neither
+/// quite alone.
 const BLACK: u8 = 40;
 const WHITE: u8 = 215;
 /// From here to there it is neither, at the soft edge of a mask.
 const GREY: std::ops::RangeInclusive<u8> = 64..=192;
-/// In a scribble image the undecided rest is of one shade, so many grey levels wide; else it is a photograph, whose bright
-/// sky would be taken for tree.
+/// In a scribble image the undecided rest is of one shade, so many grey levels wide; else it is a
+/// photograph, whose bright sky would be taken for tree.
 const ONE_SHADE: u8 = 24;
 /// Share of the undecided pixels that must be of that shade; the edges of strokes are not.
 const MOST_OF_REST: f64 = 0.8;
@@ -27,7 +30,8 @@ pub enum Mark {
     Tree,
 }
 
-/// Strokes of a person who marked some of the tree and some of the background in the first frame (Zeng section 5.3.1).
+/// Strokes of a person who marked some of the tree and some of the background in the first frame
+/// (Zeng section 5.3.1).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Scribbles {
     /// Name of the file, for messages.
@@ -37,29 +41,46 @@ pub struct Scribbles {
     pub marks: Vec<Mark>,
 }
 
-/// Reads a mask or scribbles (PNG, JPEG, BMP). They are told apart by what they hold: a mask is black and white, or white
-/// and transparent; scribbles leave more than 5 % of the picture undecided, in one grey or transparent, and have black.
+/// Reads a mask or scribbles (PNG, JPEG, BMP). They are told apart by what they hold: a mask is
+/// black and white, or white and transparent; scribbles leave more than 5 % of the picture
+/// undecided, in one grey or transparent, and have black.
 ///
 /// # Errors
-/// It cannot be read, is not of `size`, is neither of the two, or lacks white, or black in scribbles.
+/// It cannot be read, is not of `size`, is neither of the two, or lacks white, or black in
+/// scribbles.
 pub fn read(path: &Path, size: Size) -> Result<Given, OutlineError> {
     let name = path.display().to_string();
-    let bad = |what: String| OutlineError::BadFile { name: name.clone(), what };
-    let picture =
-        image::open(path).map_err(|e| bad(format!("it is neither a JSON polygon nor a picture ({e})")))?.into_rgba8();
+    let bad = |what: String| OutlineError::BadFile {
+        name: name.clone(),
+        what,
+    };
+    let picture = image::open(path)
+        .map_err(|e| bad(format!("it is neither a JSON polygon nor a picture ({e})")))?
+        .into_rgba8();
     let found = Size::new(picture.width(), picture.height());
     if found != size {
-        return Err(OutlineError::WrongSize { name, found, wanted: size });
+        return Err(OutlineError::WrongSize {
+            name,
+            found,
+            wanted: size,
+        });
     }
     let shades: Vec<Option<u8>> = picture.pixels().map(|p| shade(p.0)).collect();
     let marks: Vec<Mark> = shades.iter().map(|s| mark(*s)).collect();
     if is_mask(&picture, &shades, &marks) {
         if shades.contains(&None) && !marks.contains(&Mark::Background) {
-            tracing::warn!("outline {name}: taken for a mask, as it has white and no black; scribbles need both");
+            tracing::warn!(
+                "outline {name}: taken for a mask, as it has white and no black; scribbles need both"
+            );
         }
-        let mask: Vec<u8> = shades.iter().map(|s| if s.is_some_and(|s| s >= 128) { 255 } else { 0 }).collect();
+        let mask: Vec<u8> = shades
+            .iter()
+            .map(|s| if s.is_some_and(|s| s >= 128) { 255 } else { 0 })
+            .collect();
         let one = region::close_to_one(size, &mask, 0).map_err(|e| bad(e.to_string()))?;
-        return one.map(Given::Region).ok_or_else(|| bad("nothing in it is white, and white is tree".into()));
+        return one
+            .map(Given::Region)
+            .ok_or_else(|| bad("nothing in it is white, and white is tree".into()));
     }
     check(&picture, &marks).map_err(|what| bad(what.into()))?;
     Ok(Given::Scribbles(Scribbles { name, size, marks }))
@@ -119,13 +140,20 @@ fn check(picture: &RgbaImage, marks: &[Mark]) -> Result<(), &'static str> {
                     or transparent)",
         );
     }
-    match (marks.contains(&Mark::Tree), marks.contains(&Mark::Background)) {
+    match (
+        marks.contains(&Mark::Tree),
+        marks.contains(&Mark::Background),
+    ) {
         (true, true) => Ok(()),
-        (true, false) => {
-            Err("its scribbles mark no background; draw black strokes on some of it, or fill the rest black for a mask")
+        (true, false) => Err(
+            "its scribbles mark no background; draw black strokes on some of it, or fill the rest black for a mask",
+        ),
+        (false, true) => {
+            Err("its scribbles mark no tree; draw white strokes on trunk and branches")
         }
-        (false, true) => Err("its scribbles mark no tree; draw white strokes on trunk and branches"),
-        (false, false) => Err("it has no scribbles; draw white strokes on the tree and black ones on the background"),
+        (false, false) => Err(
+            "it has no scribbles; draw white strokes on the tree and black ones on the background",
+        ),
     }
 }
 
@@ -133,22 +161,35 @@ fn check(picture: &RgbaImage, marks: &[Mark]) -> Result<(), &'static str> {
 mod tests {
     use super::*;
 
-    const SIZE: Size = Size { width: 60, height: 40 };
+    const SIZE: Size = Size {
+        width: 60,
+        height: 40,
+    };
 
     /// A picture of one colour with strokes, as a file.
     fn given(ground: [u8; 4], strokes: &[([u8; 4], u32)]) -> Result<Given, String> {
         let mut picture = RgbaImage::from_pixel(SIZE.width, SIZE.height, image::Rgba(ground));
         for &(colour, left) in strokes {
-            (5..35).for_each(|v| (left..left + 6).for_each(|u| picture.put_pixel(u, v, image::Rgba(colour))));
+            (5..35).for_each(|v| {
+                (left..left + 6).for_each(|u| picture.put_pixel(u, v, image::Rgba(colour)))
+            });
         }
-        let file = tempfile::Builder::new().suffix(".png").tempfile().expect("file");
+        let file = tempfile::Builder::new()
+            .suffix(".png")
+            .tempfile()
+            .expect("file");
         picture.save(file.path()).expect("picture");
         read(file.path(), SIZE).map_err(|e| e.to_string())
     }
 
     #[test]
     fn masks_and_scribbles_are_told_apart_by_what_they_hold() {
-        let (black, white, grey, clear) = ([0, 0, 0, 255], [255; 4], [128, 128, 128, 255], [255, 255, 255, 0]);
+        let (black, white, grey, clear) = (
+            [0, 0, 0, 255],
+            [255; 4],
+            [128, 128, 128, 255],
+            [255, 255, 255, 0],
+        );
         let masked = |given: Result<Given, String>| match given {
             Ok(Given::Region(outline)) => outline.mask.iter().filter(|m| **m != 0).count(),
             other => panic!("{other:?}"),
@@ -158,38 +199,65 @@ mod tests {
         assert_eq!(masked(given(clear, &[(white, 9)])), 180);
         assert_eq!(masked(given([0; 4], &[(white, 9)])), 180);
         for ground in [grey, clear, [200, 190, 210, 255]] {
-            let Ok(Given::Scribbles(s)) = given(ground, &[(white, 9), (black, 40)]) else { panic!("{ground:?}") };
+            let Ok(Given::Scribbles(s)) = given(ground, &[(white, 9), (black, 40)]) else {
+                panic!("{ground:?}")
+            };
             let count = |mark| s.marks.iter().filter(|m| **m == mark).count();
-            assert_eq!((count(Mark::Tree), count(Mark::Background)), (180, 180), "{ground:?}");
+            assert_eq!(
+                (count(Mark::Tree), count(Mark::Background)),
+                (180, 180),
+                "{ground:?}"
+            );
         }
     }
 
     /// A bare tree as a segmentation tool gives it is a lot of edge, fading in grey or in opacity.
     #[test]
     fn a_mask_may_have_soft_edges() {
-        let file = tempfile::Builder::new().suffix(".png").tempfile().expect("file");
+        let file = tempfile::Builder::new()
+            .suffix(".png")
+            .tempfile()
+            .expect("file");
         for by_opacity in [false, true] {
             let pixel = |u: u32, _: u32| {
-                let soft =
-                    [0, 0, 0, 0, 0, 0, 0, 0, 10, 50, 128, 205, 255, 255, 255, 255, 200, 55, 8, 0][u as usize % 20];
-                image::Rgba(if by_opacity { [255, 255, 255, soft] } else { [soft, soft, soft, 255] })
+                let soft = [
+                    0, 0, 0, 0, 0, 0, 0, 0, 10, 50, 128, 205, 255, 255, 255, 255, 200, 55, 8, 0,
+                ][u as usize % 20];
+                image::Rgba(if by_opacity {
+                    [255, 255, 255, soft]
+                } else {
+                    [soft, soft, soft, 255]
+                })
             };
-            image::RgbaImage::from_fn(SIZE.width, SIZE.height, pixel).save(file.path()).expect("picture");
+            image::RgbaImage::from_fn(SIZE.width, SIZE.height, pixel)
+                .save(file.path())
+                .expect("picture");
             let outline = match read(file.path(), SIZE) {
                 Ok(Given::Region(outline)) => outline,
                 other => panic!("{other:?}"),
             };
-            assert!((240..=280).contains(&outline.mask.iter().filter(|m| **m != 0).count()), "{by_opacity}");
+            assert!(
+                (240..=280).contains(&outline.mask.iter().filter(|m| **m != 0).count()),
+                "{by_opacity}"
+            );
         }
     }
 
     /// Its black shadows and white sky are no scribbles.
     #[test]
     fn a_photograph_is_refused() {
-        let file = tempfile::Builder::new().suffix(".png").tempfile().expect("file");
+        let file = tempfile::Builder::new()
+            .suffix(".png")
+            .tempfile()
+            .expect("file");
         let pixel = |u: u32, v: u32| image::Rgb([(4 * u) as u8, (6 * v) as u8, (4 * u) as u8]);
-        image::RgbImage::from_fn(SIZE.width, SIZE.height, pixel).save(file.path()).expect("picture");
-        let message = read(file.path(), SIZE).map(drop).expect_err("a photograph").to_string();
+        image::RgbImage::from_fn(SIZE.width, SIZE.height, pixel)
+            .save(file.path())
+            .expect("picture");
+        let message = read(file.path(), SIZE)
+            .map(drop)
+            .expect_err("a photograph")
+            .to_string();
         assert!(message.contains("neither a mask"), "{message}");
     }
 
@@ -204,7 +272,10 @@ mod tests {
         ];
         for (result, says) in cases {
             let message = result.map(drop).expect_err(says);
-            assert!(message.contains(says) && message.contains("leave --outline out"), "{message}");
+            assert!(
+                message.contains(says) && message.contains("leave --outline out"),
+                "{message}"
+            );
         }
     }
 }

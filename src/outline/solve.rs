@@ -1,16 +1,18 @@
 //! Conjugate gradients with an incomplete Cholesky factor, for matrices of bands over a picture.
 //!
-//! Own code, because no well-kept crate has an incomplete factor, and because bands need no table of indices. A direct
-//! factor of such a matrix takes too much memory (docs/method.md has the figures).
+//! Own code, because no well-kept crate has an incomplete factor, and because bands need no table
+//! of indices. A direct factor of such a matrix takes too much memory (docs/method.md has the
+//! figures).
 
 use super::laplacian::{Banded, steps_back};
 
-/// The factor may fill pixels up to two rows and four columns before each: half the iterations of the matrix's own bands.
+/// The factor may fill pixels up to two rows and four columns before each: half the iterations of
+/// the matrix's own bands.
 const ROWS: usize = 2;
 const COLUMNS: usize = 4;
 const FILLED: usize = COLUMNS + ROWS * (2 * COLUMNS + 1);
-/// The Laplacian has positive entries off its diagonal, and what the factor leaves out may leave nothing positive: the
-/// diagonal is raised by this share first, by more where it must be.
+/// The Laplacian has positive entries off its diagonal, and what the factor leaves out may leave
+/// nothing positive: the diagonal is raised by this share first, by more where it must be.
 const RAISED: f64 = 0.01;
 const RAISED_MORE: f64 = 4.0;
 /// By so large a share the matrix is its diagonal.
@@ -26,9 +28,15 @@ struct Factor {
     inverse: Vec<f64>,
 }
 
-/// Improves `x` until the residual is at most `enough`, or as small as rounding lets it be; positive definite matrices only.
-/// With a warning it stops where it was after so many iterations.
-pub fn conjugate_gradients(matrix: &Banded, right: &[f64], x: &mut [f64], width: usize, enough: f64) {
+/// Improves `x` until the residual is at most `enough`, or as small as rounding lets it be;
+/// positive definite matrices only. With a warning it stops where it was after so many iterations.
+pub fn conjugate_gradients(
+    matrix: &Banded,
+    right: &[f64],
+    x: &mut [f64],
+    width: usize,
+    enough: f64,
+) {
     let mut raised = RAISED;
     let factor = loop {
         match Factor::of(matrix, width, raised) {
@@ -64,7 +72,10 @@ pub fn conjugate_gradients(matrix: &Banded, right: &[f64], x: &mut [f64], width:
         let next = dot(&residual, &corrected);
         let keep = next / gain;
         gain = next;
-        direction.iter_mut().zip(&corrected).for_each(|(d, z)| *d = z + keep * *d);
+        direction
+            .iter_mut()
+            .zip(&corrected)
+            .for_each(|(d, z)| *d = z + keep * *d);
     }
     let left = dot(&residual, &residual).sqrt();
     tracing::warn!(
@@ -78,14 +89,23 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 impl Factor {
-    /// Column after column, what falls outside the bands left out; `None` where a pivot is not positive.
+    /// Column after column, what falls outside the bands left out; `None` where a pivot is not
+    /// positive.
     fn of(matrix: &Banded, width: usize, raised: f64) -> Option<Self> {
         let n = matrix.diagonal.len();
         let steps: [usize; FILLED] = steps_back(width, ROWS, COLUMNS);
         let band = |step: usize| steps.iter().position(|&s| s == step);
         let mut before = vec![[0f32; FILLED]; n];
-        for (k, own) in matrix.steps.iter().enumerate().filter_map(|(k, &s)| Some((k, band(s)?))) {
-            before.iter_mut().zip(&matrix.before).for_each(|(to, from)| to[own] = from[k] as f32);
+        for (k, own) in matrix
+            .steps
+            .iter()
+            .enumerate()
+            .filter_map(|(k, &s)| Some((k, band(s)?)))
+        {
+            before
+                .iter_mut()
+                .zip(&matrix.before)
+                .for_each(|(to, from)| to[own] = from[k] as f32);
         }
         // The column's entries p and q meet in row p; in this band of it, or in none.
         let meet = steps.map(|p| steps.map(|q| p.checked_sub(q).filter(|d| *d > 0).and_then(band)));
@@ -95,11 +115,18 @@ impl Factor {
         let mut inverse = vec![0.0; n];
         let mut column = [0f32; FILLED];
         for i in 0..n {
-            if diagonal[i].is_nan() || diagonal[i] <= 1e-3 * matrix.diagonal[i] || diagonal[i] <= 0.0 {
+            if diagonal[i].is_nan()
+                || diagonal[i] <= 1e-3 * matrix.diagonal[i]
+                || diagonal[i] <= 0.0
+            {
                 return None;
             }
             inverse[i] = 1.0 / diagonal[i].sqrt();
-            for (p, &step) in steps.iter().enumerate().take_while(|(_, step)| i + **step < n) {
+            for (p, &step) in steps
+                .iter()
+                .enumerate()
+                .take_while(|(_, step)| i + **step < n)
+            {
                 let row = &mut before[i + step];
                 let entry = (f64::from(row[p]) * inverse[i]) as f32;
                 (row[p], column[p]) = (entry, entry);
@@ -112,7 +139,11 @@ impl Factor {
                 }
             }
         }
-        Some(Self { steps, before, inverse })
+        Some(Self {
+            steps,
+            before,
+            inverse,
+        })
     }
 
     /// `into` = inverse of (factor times its transpose) times `right`.
@@ -126,7 +157,11 @@ impl Factor {
                     sum -= f64::from(*entry) * into[i - step];
                 }
             } else {
-                for (entry, step) in row.iter().zip(&self.steps).take_while(|(_, step)| **step <= i) {
+                for (entry, step) in row
+                    .iter()
+                    .zip(&self.steps)
+                    .take_while(|(_, step)| **step <= i)
+                {
                     sum -= f64::from(*entry) * into[i - step];
                 }
             }
@@ -135,7 +170,11 @@ impl Factor {
         for (i, row) in self.before.iter().enumerate().rev() {
             let x = into[i] * self.inverse[i];
             into[i] = x;
-            for (entry, step) in row.iter().zip(&self.steps).take_while(|(_, step)| **step <= i) {
+            for (entry, step) in row
+                .iter()
+                .zip(&self.steps)
+                .take_while(|(_, step)| **step <= i)
+            {
                 into[i - step] -= f64::from(*entry) * x;
             }
         }
@@ -148,14 +187,16 @@ mod tests {
     use super::super::scribbles::Mark;
     use super::*;
 
-    /// The solver must solve: against elimination by the textbook, on a picture of noise, where the Laplacian is at its
-    /// most uneven.
+    /// The solver must solve: against elimination by the textbook, on a picture of noise, where the
+    /// Laplacian is at its most uneven.
     #[test]
     fn the_solution_is_that_of_a_direct_solver() {
         let (width, height) = (14, 11);
         let n = width * height;
         let noise = |i: usize, c: usize| ((i * 7919 + c * 104_729 + 31) as f64 * 0.618_034).fract();
-        let colours: Vec<[f64; 3]> = (0..n).map(|i| std::array::from_fn(|c| noise(i, c))).collect();
+        let colours: Vec<[f64; 3]> = (0..n)
+            .map(|i| std::array::from_fn(|c| noise(i, c)))
+            .collect();
         let mark = |i: usize| match i % 37 {
             0 => Mark::Tree,
             5 => Mark::Background,
@@ -167,11 +208,18 @@ mod tests {
         let mut full = nalgebra::DMatrix::<f64>::zeros(n, n);
         for i in 0..n {
             full[(i, i)] = matrix.diagonal[i];
-            for (entry, step) in matrix.before[i].iter().zip(matrix.steps).filter(|(_, step)| *step <= i) {
+            for (entry, step) in matrix.before[i]
+                .iter()
+                .zip(matrix.steps)
+                .filter(|(_, step)| *step <= i)
+            {
                 (full[(i, i - step)], full[(i - step, i)]) = (*entry, *entry);
             }
         }
-        let expected = full.lu().solve(&nalgebra::DVector::from_column_slice(&right)).expect("solution");
+        let expected = full
+            .lu()
+            .solve(&nalgebra::DVector::from_column_slice(&right))
+            .expect("solution");
         let mut x = vec![0.0; n];
         conjugate_gradients(&matrix, &right, &mut x, width, 1e-11);
         for (i, (x, y)) in x.iter().zip(expected.iter()).enumerate() {

@@ -7,9 +7,11 @@ const ROWS_ABOUT: usize = 2;
 /// Share of a row's pixels beyond each end of its width: single ones far off are not the tree.
 const BEYOND: f64 = 0.05;
 const LEAST_IN_ROW: usize = 3;
-/// So many times as wide as the waist must be what lies below it. A trunk widens to its foot by less.
+/// So many times as wide as the waist must be what lies below it. A trunk widens to its foot by
+/// less.
 const WIDENS: f64 = 2.0;
-/// Correlation above which structure stays where it is: half of a shadow's pixels do, those of a crown do not.
+/// Correlation above which structure stays where it is: half of a shadow's pixels do, those of a
+/// crown do not.
 const STEADY: f32 = 0.6;
 
 /// Where a trunk was found above a shadow.
@@ -19,14 +21,21 @@ pub struct Trunk {
     pub waist: usize,
 }
 
-/// Looks below the crown for a waist under which what changes (`mask`, non-zero) is wide again and keeps its structure
-/// (`steady`): that is the tree's shadow on the ground. It is taken off beside the trunk, and the trunk, which hardly
-/// moves, is filled from the waist down to the lowest change below it, as wide as the waist.
+/// Looks below the crown for a waist under which what changes (`mask`, non-zero) is wide again and
+/// keeps its structure (`steady`): that is the tree's shadow on the ground. It is taken off beside
+/// the trunk, and the trunk, which hardly moves, is filled from the waist down to the lowest change
+/// below it, as wide as the waist.
 pub fn stand(size: Size, mask: &mut [u8], steady: &[f32]) -> Option<Trunk> {
     let width = size.width as usize;
     let rows: Vec<Vec<usize>> = mask
         .chunks_exact(width)
-        .map(|row| row.iter().enumerate().filter(|(_, m)| **m != 0).map(|(u, _)| u).collect())
+        .map(|row| {
+            row.iter()
+                .enumerate()
+                .filter(|(_, m)| **m != 0)
+                .map(|(u, _)| u)
+                .collect()
+        })
         .collect();
     let spans: Vec<Option<(usize, usize)>> = (0..rows.len()).map(|v| span(&rows, v)).collect();
     let wide = |v: usize| spans[v].map_or(0.0, |(left, right)| (right - left + 1) as f64);
@@ -46,13 +55,19 @@ pub fn stand(size: Size, mask: &mut [u8], steady: &[f32]) -> Option<Trunk> {
     let (left, right) = spans[waist]?;
     let trunk = left..=right;
     let below = || (waist + 1..rows.len()).flat_map(|v| rows[v].iter().map(move |&u| (u, v)));
-    let mut beside: Vec<f32> =
-        below().filter(|(u, _)| !trunk.contains(u)).map(|(u, v)| steady[v * width + u]).collect();
+    let mut beside: Vec<f32> = below()
+        .filter(|(u, _)| !trunk.contains(u))
+        .map(|(u, v)| steady[v * width + u])
+        .collect();
     beside.sort_unstable_by(f32::total_cmp);
     if *beside.get(beside.len() / 2)? <= STEADY {
         return None;
     }
-    let foot = below().filter(|(u, _)| trunk.contains(u)).map(|(_, v)| v).max().unwrap_or(waist);
+    let foot = below()
+        .filter(|(u, _)| trunk.contains(u))
+        .map(|(_, v)| v)
+        .max()
+        .unwrap_or(waist);
     for (v, row) in mask.chunks_exact_mut(width).enumerate().skip(waist + 1) {
         row.fill(0);
         if v <= foot {
@@ -77,7 +92,10 @@ fn span(rows: &[Vec<usize>], v: usize) -> Option<(usize, usize)> {
 /// The middle row of what changes its structure, or of all that changes.
 fn crown_row(width: usize, mask: &[u8], steady: &[f32]) -> Option<usize> {
     let middle = |moves: &dyn Fn(f32) -> bool| {
-        let of: Vec<usize> = (0..mask.len()).filter(|&i| mask[i] != 0 && moves(steady[i])).map(|i| i / width).collect();
+        let of: Vec<usize> = (0..mask.len())
+            .filter(|&i| mask[i] != 0 && moves(steady[i]))
+            .map(|i| i / width)
+            .collect();
         of.get(of.len() / 2).copied()
     };
     middle(&|s| s < STEADY).or_else(|| middle(&|_| true))
@@ -87,7 +105,10 @@ fn crown_row(width: usize, mask: &[u8], steady: &[f32]) -> Option<usize> {
 mod tests {
     use super::*;
 
-    const SIZE: Size = Size { width: 100, height: 80 };
+    const SIZE: Size = Size {
+        width: 100,
+        height: 80,
+    };
 
     /// A round crown, a trunk, and a shadow on the ground to the right.
     fn scene(shadow_steady: f32) -> (Vec<u8>, Vec<f32>) {
@@ -113,7 +134,11 @@ mod tests {
         let trunk = stand(SIZE, &mut mask, &steady).expect("a trunk");
         assert!((45..66).contains(&trunk.waist), "{trunk:?}");
         assert_eq!(mask[70 * 100 + 80], 0, "the shadow");
-        assert_eq!((mask[70 * 100 + 50], mask[25 * 100 + 35]), (255, 255), "trunk and crown");
+        assert_eq!(
+            (mask[70 * 100 + 50], mask[25 * 100 + 35]),
+            (255, 255),
+            "trunk and crown"
+        );
     }
 
     /// Low branches that sway are as wide as a shadow, but do not keep their structure.

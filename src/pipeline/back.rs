@@ -26,11 +26,13 @@ pub struct Moved {
     pub targets_px: Targets,
     /// The posture in this frame, once there is a tree.
     pub pose: Option<Arc<Pose>>,
-    /// In the frame with which a tree, or a refined one, comes into effect: poses and targets of the frames remembered from before, oldest first.
+    /// In the frame with which a tree, or a refined one, comes into effect: poses and targets of
+    /// the frames remembered from before, oldest first.
     pub before: Vec<(Pose, Targets)>,
 }
 
-/// Tracks to poses: gathers motion, builds the tree, then poses it in every frame and refines it as motion goes on.
+/// Tracks to poses: gathers motion, builds the tree, then poses it in every frame and refines it as
+/// motion goes on.
 pub struct BackEnd {
     config: Config,
     history: TrackHistory,
@@ -79,7 +81,12 @@ impl BackEnd {
 
     /// Takes the tracks of a frame; gives its pose, once there is a tree.
     pub fn step(&mut self, followed: Followed) -> Moved {
-        let Followed { tracks, outline, preview, received } = followed;
+        let Followed {
+            tracks,
+            outline,
+            preview,
+            received,
+        } = followed;
         self.outline = Some(outline.clone());
         let mut before = Vec::new();
         if self.live.is_none() {
@@ -96,11 +103,19 @@ impl BackEnd {
             }
             None => (Vec::new(), None),
         };
-        Moved { tracks, outline, preview, received, targets_px, pose, before }
+        Moved {
+            tracks,
+            outline,
+            preview,
+            received,
+            targets_px,
+            pose,
+            before,
+        }
     }
 
-    /// Judges the evidence now and then. Where it suffices, or a build is asked for, the tree is built with the frame
-    /// after this one, so that the screen can say that it is being built.
+    /// Judges the evidence now and then. Where it suffices, or a build is asked for, the tree is
+    /// built with the frame after this one, so that the screen can say that it is being built.
     fn accumulate(&mut self, time_s: f64) -> Vec<(Pose, Targets)> {
         let due = self.judged_s.is_none_or(|t| time_s - t >= JUDGE_EVERY_S);
         if !due && self.building.is_none() && !self.build_now {
@@ -110,7 +125,15 @@ impl BackEnd {
         let table = self.judge();
         let e = &self.evidence;
         let moving = e.moving.len();
-        tracing::debug!(time_s, measure = e.measure, e.motion, e.stability, e.sway, moving, "evidence");
+        tracing::debug!(
+            time_s,
+            measure = e.measure,
+            e.motion,
+            e.stability,
+            e.sway,
+            moving,
+            "evidence"
+        );
         if let Some(why) = self.building.take() {
             let before = self.build(&table, why == Why::Asked);
             self.refused = why == Why::Asked && self.live.is_none();
@@ -134,15 +157,20 @@ impl BackEnd {
 
     /// Builds, and follows the pose through the remembered frames; gives their poses and targets.
     fn build(&mut self, table: &Arc<TrackTable>, forced: bool) -> Vec<(Pose, Targets)> {
-        let (Some(outline), Some(moment)) = (&self.outline, Moment::of(&self.history, forced)) else {
+        let (Some(outline), Some(moment)) = (&self.outline, Moment::of(&self.history, forced))
+        else {
             return Vec::new();
         };
         let Some(tree) = build(table, self.evidence.clone(), outline, &self.config, moment) else {
             return Vec::new();
         };
-        let mut live = Live { poser: tree.poser(&self.config), tree: Arc::new(tree) };
-        // The pose is followed from the first remembered frame, so that it does not jump where the tree was built. The
-        // newest frame is left out: it is about to be worked off as every later one is.
+        let mut live = Live {
+            poser: tree.poser(&self.config),
+            tree: Arc::new(tree),
+        };
+        // The pose is followed from the first remembered frame, so that it does not jump where the
+        // tree was built. The newest frame is left out: it is about to be worked off as every later
+        // one is.
         let mut before = Vec::with_capacity(self.history.len());
         for tracks in self.history.sets().take(self.history.len() - 1) {
             before.push(live.poser.step(tracks));
@@ -161,21 +189,26 @@ impl BackEnd {
         }
     }
 
-    /// Refines the tree where it is time to; in the frame with which a new one takes the old one's place gives poses and
-    /// targets of the frames that it was followed through.
+    /// Refines the tree where it is time to; in the frame with which a new one takes the old one's
+    /// place gives poses and targets of the frames that it was followed through.
     fn refine(&mut self) -> Vec<(Pose, Targets)> {
-        let (Some(mut refiner), Some(live)) = (self.refiner.take(), &self.live) else { return Vec::new() };
+        let (Some(mut refiner), Some(live)) = (self.refiner.take(), &self.live) else {
+            return Vec::new();
+        };
         let taken = refiner.step(&self.history, live, &self.config);
         self.keep_on(refiner);
-        let Some((live, before)) = taken else { return Vec::new() };
+        let Some((live, before)) = taken else {
+            return Vec::new();
+        };
         self.evidence = live.tree.evidence.clone();
         self.live = Some(live);
         before
     }
 
-    /// A refinement that has to be worked out by the time that [`needs_refinement`](Self::needs_refinement) tells. Who
-    /// can do so meanwhile hands it in with [`put_refinement`](Self::put_refinement); else it is done in that frame.
-    /// The result is the same.
+    /// A refinement that has to be worked out by the time that
+    /// [`needs_refinement`](Self::needs_refinement) tells. Who can do so meanwhile hands it in with
+    /// [`put_refinement`](Self::put_refinement); else it is done in that frame. The result is the
+    /// same.
     pub fn refinement(&self) -> Option<&Arc<Refinement>> {
         self.refiner.as_ref()?.work()
     }
@@ -185,8 +218,8 @@ impl BackEnd {
         self.refiner.as_ref().is_some_and(|r| r.is_due(time_s))
     }
 
-    /// Lets frames up to this time do without the result. What comes of it then hangs on the clock: for a camera, which
-    /// does not wait.
+    /// Lets frames up to this time do without the result. What comes of it then hangs on the clock:
+    /// for a camera, which does not wait.
     pub fn put_off_refinement(&mut self, time_s: f64) {
         if let Some(refiner) = &mut self.refiner {
             refiner.put_off(time_s);
@@ -210,8 +243,9 @@ impl BackEnd {
         std::mem::take(&mut self.refused)
     }
 
-    /// No more frames: if nothing has been built, builds from what there is, unless that is next to nothing; and a tree that was
-    /// never refined gets the shoots that a refinement would put on it, if there is enough motion in what is remembered, and
+    /// No more frames: if nothing has been built, builds from what there is, unless that is next to
+    /// nothing; and a tree that was never refined gets the shoots that a refinement would put on
+    /// it, if there is enough motion in what is remembered, and
     /// `go_on` does not say no before.
     pub fn finish(&mut self, go_on: &dyn Fn() -> bool) {
         if self.live.is_none() && !self.history.is_empty() {
@@ -225,15 +259,22 @@ impl BackEnd {
     }
 
     fn shoot(&mut self, go_on: &dyn Fn() -> bool) {
-        let Some(live) = self.live.as_ref().filter(|live| live.tree.refinements == 0) else { return };
-        let Some(work) = Refinement::of(&self.history, live, &self.config) else { return };
+        let Some(live) = self.live.as_ref().filter(|live| live.tree.refinements == 0) else {
+            return;
+        };
+        let Some(work) = Refinement::of(&self.history, live, &self.config) else {
+            return;
+        };
         if let Some(mut tree) = work.shoots_while(go_on) {
             let standing = &live.tree;
             // The capture's poses are followed as those of the tree without them were shown.
             (tree.followed_from, tree.shown_from) = (standing.followed_from, standing.shown_from);
             // Built just now from the same film, it is no other tree.
             tree.refinements -= u32::from(tree.frame == standing.frame);
-            self.live = Some(Live { poser: tree.poser(&self.config), tree: Arc::new(tree) });
+            self.live = Some(Live {
+                poser: tree.poser(&self.config),
+                tree: Arc::new(tree),
+            });
         }
     }
 

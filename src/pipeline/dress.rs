@@ -15,15 +15,22 @@ pub struct Seen<'a> {
     pub picture: Option<&'a Rgb>,
     pub pose: Option<&'a Pose>,
     pub outline: Option<&'a Outline>,
-    /// The drawn shape, in the picture, that the tree was cut to. It stands in the tree's place at rest.
+    /// The drawn shape, in the picture, that the tree was cut to. It stands in the tree's place at
+    /// rest.
     pub cut_to: Option<&'a Outline>,
-    /// A leaf of the user's own, and a drawn density of the leaves, which goes before the picture's.
+    /// A leaf of the user's own, and a drawn density of the leaves, which goes before the
+    /// picture's.
     pub leaf: Option<&'a Template>,
     pub density: Option<&'a Luma>,
 }
 
 /// How far each group of leaves swings in every pose, see [`flutter`](crate::motion::flutter).
-pub fn flutter(dressed: &Dressed, poses: &[Pose], skeleton: &Skeleton, config: &Config) -> Vec<Vec<[f32; 2]>> {
+pub fn flutter(
+    dressed: &Dressed,
+    poses: &[Pose],
+    skeleton: &Skeleton,
+    config: &Config,
+) -> Vec<Vec<[f32; 2]>> {
     let groups: Vec<NodeId> = dressed.foliage.groups.iter().map(|g| g.node).collect();
     motion::flutter(poses, skeleton, &groups, &config.leaves)
 }
@@ -33,7 +40,11 @@ pub fn dress(skeleton: &Skeleton, seen: Seen, config: &Config) -> Dressed {
     let seed = config.wood.seed.into();
     let room = match seen.cut_to {
         Some(shape) => room(skeleton, Some(shape), Bounds::Drawn),
-        None => room(skeleton, seen.outline, Bounds::Filmed(config.shape.envelope)),
+        None => room(
+            skeleton,
+            seen.outline,
+            Bounds::Filmed(config.shape.envelope),
+        ),
     };
     let in_leaf = InLeaf::of(skeleton, &seen, &config.leaves);
     let mut limbs = limbs(skeleton, &room, &config.wood, seed);
@@ -42,8 +53,15 @@ pub fn dress(skeleton: &Skeleton, seen: Seen, config: &Config) -> Dressed {
     }
     let wood = wood_levels(&limbs, config.wood.triangles as usize);
     let bark = bark::colour(&seen, skeleton);
-    let foliage = in_leaf.map(|l| l.foliage(&limbs, skeleton, &seen, &config.leaves, seed)).unwrap_or_default();
-    Dressed { limbs, wood, foliage, bark_rgb: bark.unwrap_or(bark::PLAIN) }
+    let foliage = in_leaf
+        .map(|l| l.foliage(&limbs, skeleton, &seen, &config.leaves, seed))
+        .unwrap_or_default();
+    Dressed {
+        limbs,
+        wood,
+        foliage,
+        bark_rgb: bark.unwrap_or(bark::PLAIN),
+    }
 }
 
 /// What an outline says about the space that the tree stands in.
@@ -54,8 +72,9 @@ pub(super) enum Bounds {
     Filmed(EnvelopeKind),
 }
 
-/// Where twigs may grow (from and to, model axes, px): within the envelope that the branches were pushed to fill or were
-/// cut to, and not out of the outline itself as seen from the front; everywhere where there is no outline.
+/// Where twigs may grow (from and to, model axes, px): within the envelope that the branches were
+/// pushed to fill or were cut to, and not out of the outline itself as seen from the front;
+/// everywhere where there is no outline.
 pub(super) fn room<'a>(
     skeleton: &Skeleton,
     outline: Option<&'a Outline>,
@@ -71,7 +90,9 @@ pub(super) fn room<'a>(
             let middle = nalgebra::center(from, to);
             let seen = |p: &Point3<f64>| outline.contains(foot_px[0] + p.x, foot_px[1] - p.y);
             // A branch that is outside itself, as a copy may be, is no barer for it.
-            envelope.contains(to) && envelope.contains(&middle) && (!seen(from) || (seen(to) && seen(&middle)))
+            envelope.contains(to)
+                && envelope.contains(&middle)
+                && (!seen(from) || (seen(to) && seen(&middle)))
         }
         _ => true,
     }
@@ -79,5 +100,8 @@ pub(super) fn room<'a>(
 
 /// Where the measured nodes are, model axes, px.
 pub(super) fn places(skeleton: &Skeleton) -> Vec<Point3<f64>> {
-    skeleton.nodes[..skeleton.measured()].iter().map(|n| n.position).collect()
+    skeleton.nodes[..skeleton.measured()]
+        .iter()
+        .map(|n| n.position)
+        .collect()
 }

@@ -8,7 +8,8 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Frames kept while the outline is not known yet take at most so many bytes; beyond that the oldest is let go.
+/// Frames kept while the outline is not known yet take at most so many bytes; beyond that the
+/// oldest is let go.
 const HELD_BYTES: usize = 80 << 20;
 /// Frames worked off in one step while held ones remain: catches up without a long pause.
 const FRAMES_PER_STEP: usize = 3;
@@ -54,7 +55,8 @@ impl FrontEnd {
         }
     }
 
-    /// Takes a frame; gives back up to three that are done, none while the outline is being looked for.
+    /// Takes a frame; gives back up to three that are done, none while the outline is being looked
+    /// for.
     pub fn step(&mut self, frame: Frame) -> Vec<Followed> {
         if self.found.is_none() {
             match &self.given {
@@ -71,7 +73,8 @@ impl FrontEnd {
         }
         self.held.push_back(frame);
         if self.found.is_none() {
-            let bytes = |f: &Frame| f.luma.pixels.len() + f.preview.as_ref().map_or(0, |p| p.pixels.len());
+            let bytes =
+                |f: &Frame| f.luma.pixels.len() + f.preview.as_ref().map_or(0, |p| p.pixels.len());
             while self.held.iter().map(bytes).sum::<usize>() > HELD_BYTES {
                 self.held.pop_front();
                 self.let_go += 1;
@@ -85,14 +88,17 @@ impl FrontEnd {
         (0..n).filter_map(|_| self.follow_next()).collect()
     }
 
-    /// Works off all held frames; an outline that was still looked for is what the frames so far show.
+    /// Works off all held frames; an outline that was still looked for is what the frames so far
+    /// show.
     pub fn flush(&mut self) -> Vec<Followed> {
         if self.found.is_none()
             && let Some(size) = self.held.back().map(|f| f.luma.size)
         {
             let outline = self.search.conclude(size);
             self.no_motion = outline.is_none();
-            self.settle(Arc::new(outline.unwrap_or_else(|| crate::outline::whole(size))));
+            self.settle(Arc::new(
+                outline.unwrap_or_else(|| crate::outline::whole(size)),
+            ));
         }
         std::iter::from_fn(|| self.follow_next()).collect()
     }
@@ -124,7 +130,12 @@ impl FrontEnd {
     }
 
     fn settle(&mut self, outline: Arc<Outline>) {
-        let tracker = Tracker::new(&self.config.detect, &self.config.track, &outline, self.next_id);
+        let tracker = Tracker::new(
+            &self.config.detect,
+            &self.config.track,
+            &outline,
+            self.next_id,
+        );
         self.found = Some((outline, tracker));
     }
 
@@ -133,6 +144,11 @@ impl FrontEnd {
         let frame = self.held.pop_front()?;
         let tracks = tracker.step(&frame);
         self.spare = Some(frame.luma);
-        Some(Followed { tracks, outline: outline.clone(), preview: frame.preview, received: frame.received })
+        Some(Followed {
+            tracks,
+            outline: outline.clone(),
+            preview: frame.preview,
+            received: frame.received,
+        })
     }
 }

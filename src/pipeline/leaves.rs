@@ -1,4 +1,5 @@
-//! The leaves of a tree as a picture shows them: whether there are any, their seeds, and where they stand.
+//! The leaves of a tree as a picture shows them: whether there are any, their seeds, and where they
+//! stand.
 
 use super::Seen;
 use crate::config::{self, LeafShow};
@@ -6,7 +7,8 @@ use crate::model::{Luma, Outline, Rgb, Skeleton};
 use crate::shape::{self, Foliage, LeafView, Limb, Template};
 use crate::track::Detector;
 
-/// Corners may lie nearer together than points that are followed, px at 640 px picture width, and be weaker: each is a leaf.
+/// Corners may lie nearer together than points that are followed, px at 640 px picture width, and
+/// be weaker: each is a leaf.
 const SEED_DISTANCE_PX: f64 = 3.0;
 const SEED_QUALITY: f64 = 1e-4;
 
@@ -15,7 +17,8 @@ pub(super) struct InLeaf {
     seeds: Vec<[f32; 2]>,
     /// The picture shows them.
     filmed: bool,
-    /// A drawn density, where there is one: nothing grows outside of the outline, or of the shape that the tree was cut to.
+    /// A drawn density, where there is one: nothing grows outside of the outline, or of the shape
+    /// that the tree was cut to.
     density: Option<Luma>,
 }
 
@@ -32,22 +35,44 @@ impl InLeaf {
             return None;
         }
         let mut seeds = match (seen.picture, seen.outline) {
-            (Some(picture), Some(outline)) if picture.size == outline.size => seeds(picture, outline, settings.seeds),
+            (Some(picture), Some(outline)) if picture.size == outline.size => {
+                seeds(picture, outline, settings.seeds)
+            }
             _ => Vec::new(),
         };
         if let Some(shape) = seen.cut_to {
             seeds.retain(|[u, v]| shape.contains(f64::from(*u), f64::from(*v)));
         }
-        let density = seen.density.cloned().or_else(|| seen.cut_to.map(whole)).map(|drawn| {
-            let within = seen.cut_to.or(seen.outline).filter(|o| o.size == drawn.size);
-            if let Some(outline) = within { inside(drawn, outline) } else { drawn }
-        });
-        Some(Self { seeds, filmed, density })
+        let density = seen
+            .density
+            .cloned()
+            .or_else(|| seen.cut_to.map(whole))
+            .map(|drawn| {
+                let within = seen
+                    .cut_to
+                    .or(seen.outline)
+                    .filter(|o| o.size == drawn.size);
+                if let Some(outline) = within {
+                    inside(drawn, outline)
+                } else {
+                    drawn
+                }
+            });
+        Some(Self {
+            seeds,
+            filmed,
+            density,
+        })
     }
 
-    /// The wood of a tree in leaf. A picture of a bare tree says nothing of where leaves, and with them wood, may be.
+    /// The wood of a tree in leaf. A picture of a bare tree says nothing of where leaves, and with
+    /// them wood, may be.
     pub fn wood(&self, limbs: Vec<Limb>, skeleton: &Skeleton, seen: &Seen) -> Vec<Limb> {
-        if self.filmed { shape::within_leaves(limbs, skeleton, &self.view(seen)) } else { limbs }
+        if self.filmed {
+            shape::within_leaves(limbs, skeleton, &self.view(seen))
+        } else {
+            limbs
+        }
     }
 
     pub fn foliage(
@@ -70,38 +95,67 @@ impl InLeaf {
     }
 
     fn view<'a>(&'a self, seen: &Seen<'a>) -> LeafView<'a> {
-        let &Seen { picture, outline, .. } = seen;
+        let &Seen {
+            picture, outline, ..
+        } = seen;
         // A tree that was cut fills its shape at rest.
         let pose = seen.pose.filter(|_| seen.cut_to.is_none());
-        LeafView { picture, outline, pose, density: self.density.as_ref(), seeds: &self.seeds }
+        LeafView {
+            picture,
+            outline,
+            pose,
+            density: self.density.as_ref(),
+            seeds: &self.seeds,
+        }
     }
 }
 
 /// Leaves all over a shape.
 fn whole(shape: &Outline) -> Luma {
-    Luma { size: shape.size, pixels: vec![u8::MAX; shape.mask.len()] }
+    Luma {
+        size: shape.size,
+        pixels: vec![u8::MAX; shape.mask.len()],
+    }
 }
 
 /// Black outside of the outline.
 fn inside(mut drawn: Luma, outline: &Outline) -> Luma {
-    drawn.pixels.iter_mut().zip(&outline.mask).filter(|(_, m)| **m == 0).for_each(|(p, _)| *p = 0);
+    drawn
+        .pixels
+        .iter_mut()
+        .zip(&outline.mask)
+        .filter(|(_, m)| **m == 0)
+        .for_each(|(p, _)| *p = 0);
     drawn
 }
 
-/// Whether the picture shows a tree in leaf; without picture or outline nobody knows, and it is taken for bare.
+/// Whether the picture shows a tree in leaf; without picture or outline nobody knows, and it is
+/// taken for bare.
 fn in_leaf(skeleton: &Skeleton, picture: Option<&Rgb>, outline: Option<&Outline>) -> bool {
-    let season = picture.zip(outline).and_then(|(p, o)| shape::season(p, o, skeleton));
+    let season = picture
+        .zip(outline)
+        .and_then(|(p, o)| shape::season(p, o, skeleton));
     season.is_some_and(|s| s.in_leaf >= 0.5)
 }
 
 /// Harris corners of a whole frame inside the outline, px, strongest first.
 pub fn seeds(picture: &Rgb, outline: &Outline, count: u32) -> Vec<[f32; 2]> {
-    if picture.pixels.len() != 3 * picture.size.area() || outline.mask.len() != outline.size.area() {
+    if picture.pixels.len() != 3 * picture.size.area() || outline.mask.len() != outline.size.area()
+    {
         return Vec::new();
     }
-    let detect =
-        config::Detect { points: count, min_distance_px: SEED_DISTANCE_PX, quality: SEED_QUALITY, border_px: 0.0 };
-    let grey = |c: &[u8]| ((299 * u32::from(c[0]) + 587 * u32::from(c[1]) + 114 * u32::from(c[2]) + 500) / 1000) as u8;
-    let luma = Luma { size: picture.size, pixels: picture.pixels.chunks_exact(3).map(grey).collect() };
+    let detect = config::Detect {
+        points: count,
+        min_distance_px: SEED_DISTANCE_PX,
+        quality: SEED_QUALITY,
+        border_px: 0.0,
+    };
+    let grey = |c: &[u8]| {
+        ((299 * u32::from(c[0]) + 587 * u32::from(c[1]) + 114 * u32::from(c[2]) + 500) / 1000) as u8
+    };
+    let luma = Luma {
+        size: picture.size,
+        pixels: picture.pixels.chunks_exact(3).map(grey).collect(),
+    };
     Detector::new(&detect, outline).detect(&luma, &[], count as usize)
 }

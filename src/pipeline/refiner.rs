@@ -1,4 +1,5 @@
-//! When the tree is built anew, and how the new one takes the old one's place without a pause or a jump.
+//! When the tree is built anew, and how the new one takes the old one's place without a pause or a
+//! jump.
 
 use super::back::Live;
 use super::refine::Refinement;
@@ -8,13 +9,14 @@ use crate::model::Pose;
 use crate::track::TrackHistory;
 use std::sync::Arc;
 
-/// The tree is built anew each time that film has grown by this factor: the error of a correlation falls with the square
-/// root of the time, so equal steps would bring ever less.
+/// The tree is built anew each time that film has grown by this factor: the error of a correlation
+/// falls with the square root of the time, so equal steps would bring ever less.
 const GROWTH: f64 = 1.25;
 /// Less film than this does not grow by factors, s.
 const LEAST_SPAN_S: f64 = 1.0;
-/// Film after which a refinement of up to [`POINTS`] points is ready, s. More points take longer by the square of their
-/// number. It is a matter of film and not of the clock, so that threads change nothing.
+/// Film after which a refinement of up to [`POINTS`] points is ready, s. More points take longer by
+/// the square of their number. It is a matter of film and not of the clock, so that threads change
+/// nothing.
 const READY_S: f64 = 0.5;
 const POINTS: f64 = 400.0;
 /// Remembered frames through which the new tree's pose is followed in the time of one frame.
@@ -46,13 +48,18 @@ struct Following {
     before: Vec<(Pose, Targets)>,
 }
 
-/// A tree that takes the place of another, and poses and targets of the frames that it was followed through.
+/// A tree that takes the place of another, and poses and targets of the frames that it was followed
+/// through.
 pub(super) type Taken = (Live, Vec<(Pose, Targets)>);
 
 impl Refiner {
     /// For a tree that was built at `built_s` from the last `span_s` of film, s.
     pub fn new(built_s: f64, span_s: f64, config: &Config) -> Self {
-        let mut refiner = Self { built_s, span_s: span_s.max(LEAST_SPAN_S), stage: Stage::Over };
+        let mut refiner = Self {
+            built_s,
+            span_s: span_s.max(LEAST_SPAN_S),
+            stage: Stage::Over,
+        };
         refiner.wait(built_s, config);
         refiner
     }
@@ -66,13 +73,17 @@ impl Refiner {
     fn wait(&mut self, now_s: f64, config: &Config) {
         let refined_for_s = config.accumulate.refine_s;
         let growths = std::iter::successors(Some(GROWTH), |g| Some(g * GROWTH));
-        let mut times = growths.map(|g| self.span_s * (g - 1.0)).take_while(|&after_s| after_s <= refined_for_s);
+        let mut times = growths
+            .map(|g| self.span_s * (g - 1.0))
+            .take_while(|&after_s| after_s <= refined_for_s);
         let next = times.find(|after_s| self.built_s + after_s > now_s);
-        self.stage = next.map_or(Stage::Over, |after_s| Stage::Waiting(self.built_s + after_s));
+        self.stage = next.map_or(Stage::Over, |after_s| {
+            Stage::Waiting(self.built_s + after_s)
+        });
     }
 
-    /// Takes the next frame, the newest of `history`. Gives the tree that takes the place of `live` with it, its pose
-    /// followed up to the frame before.
+    /// Takes the next frame, the newest of `history`. Gives the tree that takes the place of `live`
+    /// with it, its pose followed up to the frame before.
     pub fn step(&mut self, history: &TrackHistory, live: &Live, config: &Config) -> Option<Taken> {
         let (first, newest) = (history.first()?, history.last()?);
         let now_s = newest.time_s;
@@ -82,30 +93,48 @@ impl Refiner {
                 let ready_s = READY_S * (work.points() as f64 / POINTS).powi(2).max(1.0);
                 self.stage = Stage::Building(Arc::new(work), now_s + ready_s, None);
             }
-            Stage::Building(work, due_s, done) if now_s >= due_s => match done.map_or_else(|| work.run(), |tree| *tree)
-            {
-                // After a long pause nothing is remembered by which its pose could be followed: it would jump. There will
-                // be a better one.
-                Some(tree) if first.frame > tree.frame => self.wait(now_s, config),
-                Some(mut tree) => {
-                    // What has been forgotten meanwhile cannot be followed.
-                    tree.followed_from = tree.followed_from.max(first.frame);
-                    let poser = tree.poser(config);
-                    return self.follow(Following { tree, poser, next: 0, before: Vec::new() }, history, config);
+            Stage::Building(work, due_s, done) if now_s >= due_s => {
+                match done.map_or_else(|| work.run(), |tree| *tree) {
+                    // After a long pause nothing is remembered by which its pose could be followed:
+                    // it would jump. There will be a better one.
+                    Some(tree) if first.frame > tree.frame => self.wait(now_s, config),
+                    Some(mut tree) => {
+                        // What has been forgotten meanwhile cannot be followed.
+                        tree.followed_from = tree.followed_from.max(first.frame);
+                        let poser = tree.poser(config);
+                        return self.follow(
+                            Following {
+                                tree,
+                                poser,
+                                next: 0,
+                                before: Vec::new(),
+                            },
+                            history,
+                            config,
+                        );
+                    }
+                    None => self.wait(now_s, config),
                 }
-                None => self.wait(now_s, config),
-            },
+            }
             Stage::Following(following) => return self.follow(*following, history, config),
             stage => self.stage = stage,
         }
         None
     }
 
-    /// Follows the new tree's pose through some of the remembered frames; gives it when only the newest is left.
-    fn follow(&mut self, mut on: Following, history: &TrackHistory, config: &Config) -> Option<Taken> {
+    /// Follows the new tree's pose through some of the remembered frames; gives it when only the
+    /// newest is left.
+    fn follow(
+        &mut self,
+        mut on: Following,
+        history: &TrackHistory,
+        config: &Config,
+    ) -> Option<Taken> {
         let newest = history.last()?;
         let from = on.tree.followed_from.max(on.next);
-        let mut left = history.sets().filter(|set| set.frame >= from && set.frame < newest.frame);
+        let mut left = history
+            .sets()
+            .filter(|set| set.frame >= from && set.frame < newest.frame);
         for set in left.by_ref().take(FRAMES_PER_STEP) {
             on.before.push(on.poser.step(set));
             on.next = set.frame + 1;
@@ -116,10 +145,17 @@ impl Refiner {
         }
         self.wait(newest.time_s, config);
         on.tree.shown_from = newest.frame;
-        Some((Live { tree: Arc::new(on.tree), poser: on.poser }, on.before))
+        Some((
+            Live {
+                tree: Arc::new(on.tree),
+                poser: on.poser,
+            },
+            on.before,
+        ))
     }
 
-    /// A refinement to be worked out, which whoever asks may do meanwhile; else it is done when it is due.
+    /// A refinement to be worked out, which whoever asks may do meanwhile; else it is done when it
+    /// is due.
     pub fn work(&self) -> Option<&Arc<Refinement>> {
         match &self.stage {
             Stage::Building(work, _, None) => Some(work),

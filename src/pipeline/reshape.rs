@@ -6,11 +6,12 @@ use crate::model::{ClusterId, NodeName, Outline, Skeleton};
 use crate::shape::{Drawn, Topiary, TopiaryError};
 use crate::{shape, skeleton};
 
-/// Nodes that a tree may have, copies included, to be given another shape: pushing them takes time with their square.
+/// Nodes that a tree may have, copies included, to be given another shape: pushing them takes time
+/// with their square.
 pub const MOST_RESHAPED: usize = 4096;
 
-/// Stands the measured nodes up anew as `config` says. They keep their places in the picture and their names; copies get
-/// names that no node had before.
+/// Stands the measured nodes up anew as `config` says. They keep their places in the picture and
+/// their names; copies get names that no node had before.
 pub fn reshape(old: &Skeleton, outline: &Outline, config: &Config) -> Skeleton {
     let measured = &old.nodes[..old.measured()];
     let flat: Vec<skeleton::Node2d> = measured
@@ -27,10 +28,19 @@ pub fn reshape(old: &Skeleton, outline: &Outline, config: &Config) -> Skeleton {
     let tracks: Vec<u32> = measured.iter().map(|n| n.n_tracks).collect();
     let mut new = shape::build(&flat, &tracks, outline, &config.shape);
     thicken(&mut new, outline, config);
-    let unused = old.nodes.iter().map(|n| n.name.0).max().map_or(0, |n| n.saturating_add(1));
+    let unused = old
+        .nodes
+        .iter()
+        .map(|n| n.name.0)
+        .max()
+        .map_or(0, |n| n.saturating_add(1));
     let (kept, copies) = new.nodes.split_at_mut(measured.len());
-    kept.iter_mut().zip(measured).for_each(|(new, old)| new.name = old.name);
-    (unused..).zip(copies).for_each(|(name, copy)| copy.name = NodeName(name));
+    kept.iter_mut()
+        .zip(measured)
+        .for_each(|(new, old)| new.name = old.name);
+    (unused..)
+        .zip(copies)
+        .for_each(|(name, copy)| copy.name = NodeName(name));
     new
 }
 
@@ -38,12 +48,36 @@ pub fn reshape(old: &Skeleton, outline: &Outline, config: &Config) -> Skeleton {
 ///
 /// # Errors
 /// The shape lies off the tree.
-pub fn cut_to(skeleton: &Skeleton, outline: &Outline, drawn: &Drawn, config: &Config) -> Result<Topiary, TopiaryError> {
-    let mut topiary = shape::topiary(skeleton, outline, drawn, &config.shape, config.wood.seed.into())?;
+pub fn cut_to(
+    skeleton: &Skeleton,
+    outline: &Outline,
+    drawn: &Drawn,
+    config: &Config,
+) -> Result<Topiary, TopiaryError> {
+    let mut topiary = shape::topiary(
+        skeleton,
+        outline,
+        drawn,
+        &config.shape,
+        config.wood.seed.into(),
+    )?;
     if !topiary.cut.larger {
-        let trunk_px = skeleton.nodes.get(1).map_or(shape::TIP_RADIUS_PX, |top| top.radius);
-        let room = dress::room(&topiary.skeleton, Some(&topiary.shape), dress::Bounds::Drawn);
-        shape::thicken(&mut topiary.skeleton, trunk_px, &room, &config.wood, config.wood.seed.into());
+        let trunk_px = skeleton
+            .nodes
+            .get(1)
+            .map_or(shape::TIP_RADIUS_PX, |top| top.radius);
+        let room = dress::room(
+            &topiary.skeleton,
+            Some(&topiary.shape),
+            dress::Bounds::Drawn,
+        );
+        shape::thicken(
+            &mut topiary.skeleton,
+            trunk_px,
+            &room,
+            &config.wood,
+            config.wood.seed.into(),
+        );
     }
     Ok(topiary)
 }

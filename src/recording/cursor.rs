@@ -1,5 +1,5 @@
-//! Little-endian numbers and length-prefixed texts out of a record that may be damaged. The crate's own parser takes
-//! some lengths on trust.
+//! Little-endian numbers and length-prefixed texts out of a record that may be damaged. The crate's
+//! own parser takes some lengths on trust.
 
 /// Reads from the front; `None` where there is too little.
 pub(super) struct Cursor<'a>(pub &'a [u8]);

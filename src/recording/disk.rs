@@ -1,5 +1,5 @@
-//! A file whose room is taken from the disk ahead of what is written to it, so that there is enough left to close it
-//! properly when the disk is full.
+//! A file whose room is taken from the disk ahead of what is written to it, so that there is enough
+//! left to close it properly when the disk is full.
 
 use super::error::is_full;
 use std::fs::{File, OpenOptions};
@@ -13,7 +13,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Room is taken in steps of so many bytes.
 const STEP: u64 = 16 << 20;
 
-/// What the writer of the format writes to. It keeps its own place, so that it can be cut back from outside.
+/// What the writer of the format writes to. It keeps its own place, so that it can be cut back from
+/// outside.
 pub(super) struct Disk {
     file: Arc<File>,
     at: u64,
@@ -36,7 +37,12 @@ pub(super) struct Room {
 pub(super) fn create(path: &Path) -> io::Result<(Disk, Room)> {
     let file = Arc::new(OpenOptions::new().write(true).create_new(true).open(path)?);
     let end = Arc::new(AtomicU64::new(0));
-    let room = Room { file: file.clone(), end: end.clone(), taken: 0, can_take: true };
+    let room = Room {
+        file: file.clone(),
+        end: end.clone(),
+        taken: 0,
+        can_take: true,
+    };
     Ok((Disk { file, at: 0, end }, room))
 }
 
@@ -63,7 +69,14 @@ impl Room {
     fn take(&mut self, upto: u64) -> io::Result<()> {
         let (from, to) = (self.taken as libc::off_t, upto as libc::off_t);
         // SAFETY: the descriptor is open for as long as `file` is; the call takes no pointers.
-        let failed = unsafe { libc::fallocate(self.file.as_raw_fd(), libc::FALLOC_FL_KEEP_SIZE, from, to - from) } != 0;
+        let failed = unsafe {
+            libc::fallocate(
+                self.file.as_raw_fd(),
+                libc::FALLOC_FL_KEEP_SIZE,
+                from,
+                to - from,
+            )
+        } != 0;
         if failed {
             return Err(io::Error::last_os_error());
         }

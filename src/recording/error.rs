@@ -40,12 +40,18 @@ impl RecordingError {
         let path = path.to_owned();
         match error {
             mcap::McapError::Io(e) if is_full(e) => Self::Full { path },
-            other => Self::Disk { path, what: other.to_string() },
+            other => Self::Disk {
+                path,
+                what: other.to_string(),
+            },
         }
     }
 }
 
 /// No space, no quota left, or the largest file that is allowed.
 pub(super) fn is_full(e: &io::Error) -> bool {
-    matches!(e.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge)
+    matches!(
+        e.kind(),
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge
+    )
 }

@@ -45,7 +45,11 @@ fn format_of(name: &str) -> Option<PixelFormat> {
         "8UC1" => Some(PixelFormat::Grey),
         _ => None,
     };
-    other.or_else(|| PixelFormat::ALL.into_iter().find(|f| encoding_name(*f) == Some(name)))
+    other.or_else(|| {
+        PixelFormat::ALL
+            .into_iter()
+            .find(|f| encoding_name(*f) == Some(name))
+    })
 }
 
 /// Bytes of a line.
@@ -91,8 +95,8 @@ pub(super) fn encode(raw: &RawFrame, log_time_ns: u64, into: &mut Vec<u8>) {
     }
 }
 
-/// The picture in a message of the schema, with the time that the message gives itself, ns; `None` if there is none
-/// that can be used.
+/// The picture in a message of the schema, with the time that the message gives itself, ns; `None`
+/// if there is none that can be used.
 pub(super) fn decode(schema: &str, message: &[u8]) -> Option<(Encoding, Option<i64>, Vec<u8>)> {
     let raw = schema == RAW_IMAGE;
     if !raw && schema != COMPRESSED_IMAGE {
@@ -104,7 +108,9 @@ pub(super) fn decode(schema: &str, message: &[u8]) -> Option<(Encoding, Option<i
         match (raw, field, value) {
             (_, 1, Value::Bytes(t)) => time_ns = timestamp(t),
             (false, 2, Value::Bytes(d)) | (true, 6, Value::Bytes(d)) => data = Some(d),
-            (false, 3, Value::Bytes(n)) | (true, 4, Value::Bytes(n)) => name = std::str::from_utf8(n).ok()?,
+            (false, 3, Value::Bytes(n)) | (true, 4, Value::Bytes(n)) => {
+                name = std::str::from_utf8(n).ok()?
+            }
             (true, 2, Value::Number(n)) => width = u32::try_from(n).ok()?,
             (true, 3, Value::Number(n)) => height = u32::try_from(n).ok()?,
             (true, 5, Value::Number(n)) => given_step = n as usize,
@@ -123,7 +129,11 @@ pub(super) fn decode(schema: &str, message: &[u8]) -> Option<(Encoding, Option<i
     let line = step(format, size) as usize;
     // Somebody else's lines may be padded.
     let bytes = if given_step > line && format != PixelFormat::Nv12 {
-        data.chunks(given_step).take(height as usize).flat_map(|l| &l[..l.len().min(line)]).copied().collect()
+        data.chunks(given_step)
+            .take(height as usize)
+            .flat_map(|l| &l[..l.len().min(line)])
+            .copied()
+            .collect()
     } else {
         data.to_vec()
     };

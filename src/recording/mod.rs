@@ -1,7 +1,8 @@
-//! What is kept: the tracks of a running capture ([`Spool`]), and recordings of what the camera delivered (MCAP).
+//! What is kept: the tracks of a running capture ([`Spool`]), and recordings of what the camera
+//! delivered (MCAP).
 //!
-//! A recording is written by [`Series`], which makes one file after another where a limit is set, and read by
-//! [`Reader`]. `docs/recordings.md` says what is in the files.
+//! A recording is written by [`Series`], which makes one file after another where a limit is set,
+//! and read by [`Reader`]. `docs/recordings.md` says what is in the files.
 
 mod cursor;
 mod disk;

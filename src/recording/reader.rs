@@ -3,7 +3,9 @@
 use super::cursor::Cursor;
 use super::error::RecordingError;
 use super::image::{Picture, decode};
-use super::schema::{ABOUT, COMPRESSED_IMAGE, COUNTED, FIRST_SEQUENCE, RAW_IMAGE, SEQUENCE, SHIFT_NS};
+use super::schema::{
+    ABOUT, COMPRESSED_IMAGE, COUNTED, FIRST_SEQUENCE, RAW_IMAGE, SEQUENCE, SHIFT_NS,
+};
 use super::walk::{Walk, read_up_to};
 use mcap::records::op;
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,7 +18,8 @@ const FOOTER: u64 = 9 + 20 + 8;
 /// A summary beyond this is not read; the file can be without.
 const MAX_SUMMARY: u64 = 1 << 28;
 
-/// What a recording says of itself, by the keys of `docs/recordings.md`; empty for another program's.
+/// What a recording says of itself, by the keys of `docs/recordings.md`; empty for another
+/// program's.
 pub type About = BTreeMap<String, String>;
 
 struct Channel {
@@ -48,7 +51,10 @@ impl Reader {
     /// # Errors
     /// It cannot be read, is no recording, or holds several series of pictures.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
-        let file = File::open(path).map_err(|source| RecordingError::Unreadable { path: path.to_owned(), source })?;
+        let file = File::open(path).map_err(|source| RecordingError::Unreadable {
+            path: path.to_owned(),
+            source,
+        })?;
         Self::new(path, file)
     }
 }
@@ -59,13 +65,20 @@ impl<R: Read + Seek> Reader<R> {
     /// # Errors
     /// As for [`Reader::open`].
     pub fn new(path: &Path, mut file: R) -> Result<Self, RecordingError> {
-        let unreadable = |source| RecordingError::Unreadable { path: path.to_owned(), source };
-        let unusable = |what: String| RecordingError::Unusable { path: path.to_owned(), what };
+        let unreadable = |source| RecordingError::Unreadable {
+            path: path.to_owned(),
+            source,
+        };
+        let unusable = |what: String| RecordingError::Unusable {
+            path: path.to_owned(),
+            what,
+        };
         // What is told at the end is a help, not a condition.
         let summary = summary(&mut file).map_err(unreadable)?.unwrap_or_default();
         let Some(walk) = Walk::new(file).map_err(unreadable)? else {
             return Err(unusable(
-                "it does not begin as a recording (MCAP) does; give a file that `record` made".into(),
+                "it does not begin as a recording (MCAP) does; give a file that `record` made"
+                    .into(),
             ));
         };
         let mut reader = Self {
@@ -107,17 +120,26 @@ impl<R: Read + Seek> Reader<R> {
 
     /// Pictures in the file, if it was ended properly.
     pub fn pictures_total(&self) -> Option<u64> {
-        let of = |(id, count): (&u16, &u64)| self.channels.get(id).filter(|c| c.is_picture()).map(|_| *count);
+        let of = |(id, count): (&u16, &u64)| {
+            self.channels
+                .get(id)
+                .filter(|c| c.is_picture())
+                .map(|_| *count)
+        };
         let total: u64 = self.counts.iter().filter_map(of).sum();
         (total > 0).then_some(total)
     }
 
     /// Channels seen so far, `topic (schema)`, for saying what there is instead of pictures.
     pub fn topics(&self) -> Vec<String> {
-        self.channels.values().map(|c| format!("{} ({})", c.topic, c.schema)).collect()
+        self.channels
+            .values()
+            .map(|c| format!("{} ({})", c.topic, c.schema))
+            .collect()
     }
 
-    /// The next picture; `None` at the end, and after an error of the disk, which the warnings then name.
+    /// The next picture; `None` at the end, and after an error of the disk, which the warnings then
+    /// name.
     pub fn next_picture(&mut self) -> Option<Picture> {
         loop {
             let kind = match self.walk.next() {
@@ -143,7 +165,9 @@ impl<R: Read + Seek> Reader<R> {
         let mut body = Cursor(self.walk.body());
         let (id, number, log_ns, publish_ns) = (body.u16()?, body.u32()?, body.u64()?, body.u64()?);
         let channel = self.channels.get(&id).filter(|c| c.is_picture())?;
-        if channel.counted.is_none() && *self.chosen.get_or_insert_with(|| channel.topic.clone()) != channel.topic {
+        if channel.counted.is_none()
+            && *self.chosen.get_or_insert_with(|| channel.topic.clone()) != channel.topic
+        {
             self.others.insert(channel.topic.clone());
             return None;
         }
@@ -151,20 +175,37 @@ impl<R: Read + Seek> Reader<R> {
             self.unreadable += 1;
             return None;
         };
-        let shift_ns: i64 = self.about.get(SHIFT_NS).and_then(|n| n.parse().ok()).unwrap_or(0);
+        let shift_ns: i64 = self
+            .about
+            .get(SHIFT_NS)
+            .and_then(|n| n.parse().ok())
+            .unwrap_or(0);
         let sensor_time_ns = match channel.counted {
             Some(_) => i64::try_from(publish_ns).ok()?.checked_sub(shift_ns)?,
-            // What other programs mean by their times differs; the picture's own is the nearest to the sensor's.
-            None => own_ns.filter(|ns| *ns != 0).or(i64::try_from(log_ns).ok())?,
+            // What other programs mean by their times differs; the picture's own is the nearest to
+            // the sensor's.
+            None => own_ns
+                .filter(|ns| *ns != 0)
+                .or(i64::try_from(log_ns).ok())?,
         };
         let sequence = (channel.counted == Some(true)).then(|| {
             // 32 bits are in the file.
-            let first = || self.about.get(FIRST_SEQUENCE).and_then(|n| n.parse().ok()).unwrap_or(u64::from(number));
+            let first = || {
+                self.about
+                    .get(FIRST_SEQUENCE)
+                    .and_then(|n| n.parse().ok())
+                    .unwrap_or(u64::from(number))
+            };
             let before = self.sequence.unwrap_or_else(first);
             before.saturating_add(u64::from(number.wrapping_sub(before as u32)))
         });
         self.sequence = sequence.or(self.sequence);
-        Some(Picture { sequence, sensor_time_ns, encoding, bytes })
+        Some(Picture {
+            sequence,
+            sensor_time_ns,
+            encoding,
+            bytes,
+        })
     }
 
     /// Takes in a record that is no message.
@@ -188,19 +229,38 @@ impl<R: Read + Seek> Reader<R> {
 
     fn note_channel(&mut self, body: &[u8]) -> Option<()> {
         let mut body = Cursor(body);
-        let (id, schema_id, topic, encoding) = (body.u16()?, body.u16()?, body.text()?, body.text()?);
+        let (id, schema_id, topic, encoding) =
+            (body.u16()?, body.u16()?, body.text()?, body.text()?);
         let metadata = body.map()?;
-        let known = if encoding == "protobuf" { self.schemas.get(&schema_id).cloned() } else { None };
-        let counted = metadata.iter().find(|(key, _)| *key == SEQUENCE).map(|(_, value)| *value == COUNTED);
+        let known = if encoding == "protobuf" {
+            self.schemas.get(&schema_id).cloned()
+        } else {
+            None
+        };
+        let counted = metadata
+            .iter()
+            .find(|(key, _)| *key == SEQUENCE)
+            .map(|(_, value)| *value == COUNTED);
         let schema = known.unwrap_or_else(|| encoding.to_owned());
-        self.channels.insert(id, Channel { topic: topic.to_owned(), schema, counted });
+        self.channels.insert(
+            id,
+            Channel {
+                topic: topic.to_owned(),
+                schema,
+                counted,
+            },
+        );
         Some(())
     }
 
     fn note_metadata(&mut self, body: &[u8]) -> Option<()> {
         let mut body = Cursor(body);
         if body.text()? == ABOUT {
-            self.about.extend(body.map()?.into_iter().map(|(key, value)| (key.to_owned(), value.to_owned())));
+            self.about.extend(
+                body.map()?
+                    .into_iter()
+                    .map(|(key, value)| (key.to_owned(), value.to_owned())),
+            );
         }
         Some(())
     }
@@ -221,7 +281,9 @@ impl<R: Read + Seek> Reader<R> {
         let mut lines = Vec::new();
         if damage.parts > 0 {
             let (parts, bytes) = (damage.parts, damage.bytes);
-            lines.push(format!("{name}: damaged parts left out: {parts} ({bytes} bytes); the rest is used"));
+            lines.push(format!(
+                "{name}: damaged parts left out: {parts} ({bytes} bytes); the rest is used"
+            ));
         }
         if let Some(tail) = damage.tail {
             lines.push(format!(
@@ -229,15 +291,27 @@ impl<R: Read + Seek> Reader<R> {
             ));
         }
         if self.unreadable > 0 {
-            lines.push(format!("{name}: messages left out because they hold no picture: {}", self.unreadable));
+            lines.push(format!(
+                "{name}: messages left out because they hold no picture: {}",
+                self.unreadable
+            ));
         }
         if !self.others.is_empty() {
-            let others = self.others.iter().map(String::as_str).collect::<Vec<_>>().join(", ");
+            let others = self
+                .others
+                .iter()
+                .map(String::as_str)
+                .collect::<Vec<_>>()
+                .join(", ");
             let chosen = self.chosen.as_deref().unwrap_or_default();
-            lines.push(format!("{name}: the pictures of {chosen} are used, those of {others} are not"));
+            lines.push(format!(
+                "{name}: the pictures of {chosen} are used, those of {others} are not"
+            ));
         }
         if let Some(e) = &self.broken {
-            lines.push(format!("{name}: reading it fails ({e}); what came before is used"));
+            lines.push(format!(
+                "{name}: reading it fails ({e}); what came before is used"
+            ));
         }
         lines
     }
@@ -252,16 +326,21 @@ impl Channel {
 /// The records at the end of a file that was ended properly.
 fn summary(file: &mut (impl Read + Seek)) -> io::Result<Option<Vec<u8>>> {
     let length = file.seek(SeekFrom::End(0))?;
-    let Some(footer_at) = length.checked_sub(FOOTER) else { return Ok(None) };
+    let Some(footer_at) = length.checked_sub(FOOTER) else {
+        return Ok(None);
+    };
     file.seek(SeekFrom::Start(footer_at))?;
     let mut footer = [0; FOOTER as usize];
     let read = read_up_to(file, &mut footer)?;
     let mut cursor = Cursor(&footer[..read]);
-    let Some((op::FOOTER, mut body)) = cursor.record().map(|(kind, body)| (kind, Cursor(body))) else {
+    let Some((op::FOOTER, mut body)) = cursor.record().map(|(kind, body)| (kind, Cursor(body)))
+    else {
         return Ok(None);
     };
     let start = body.u64().filter(|start| *start > 0 && *start < footer_at);
-    let Some(start) = start.filter(|start| cursor.0 == mcap::MAGIC && footer_at - start <= MAX_SUMMARY) else {
+    let Some(start) =
+        start.filter(|start| cursor.0 == mcap::MAGIC && footer_at - start <= MAX_SUMMARY)
+    else {
         return Ok(None);
     };
     file.seek(SeekFrom::Start(start))?;

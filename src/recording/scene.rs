@@ -22,7 +22,10 @@ pub(super) fn outline(outline: &Outline, time_ns: u64, into: &mut Vec<u8>) {
 }
 
 pub(super) fn points(tracks: &TrackSet, time_ns: u64, into: &mut Vec<u8>) {
-    let points = tracks.observations.iter().map(|o| [f64::from(o.u_px), f64::from(o.v_px)]);
+    let points = tracks
+        .observations
+        .iter()
+        .map(|o| [f64::from(o.u_px), f64::from(o.v_px)]);
     annotation(POINTS, points, POINT_COLOUR, 4.0, time_ns, into);
 }
 
@@ -58,10 +61,15 @@ pub(super) fn scene(skeleton: &Skeleton, pose: &Pose, time_ns: u64, into: &mut V
             lines.int(1, LINE_LIST);
             lines.double(3, 2.0);
             lines.int(4, 1); // as wide on the screen however far away
-            pose.joints[..measured].iter().for_each(|j| lines.doubles(5, j.position.coords.as_slice()));
+            pose.joints[..measured]
+                .iter()
+                .for_each(|j| lines.doubles(5, j.position.coords.as_slice()));
             lines.doubles(6, &BRANCH_COLOUR);
             let ends = skeleton.nodes[..measured].iter().enumerate();
-            let pairs: Vec<u32> = ends.flat_map(|(i, n)| n.parent.map(|p| [p.0, i as u32])).flatten().collect();
+            let pairs: Vec<u32> = ends
+                .flat_map(|(i, n)| n.parent.map(|p| [p.0, i as u32]))
+                .flatten()
+                .collect();
             lines.packed_fixed32(8, &pairs);
         });
     });
@@ -73,11 +81,26 @@ pub(super) fn transforms(skeleton: &Skeleton, pose: &Pose, time_ns: u64, into: &
     let mut message = Message(into);
     // A quarter turn about x: the tree's y is the world's z.
     let half = std::f64::consts::FRAC_1_SQRT_2;
-    transform(&mut message, (WORLD, TREE), time_ns, [0.0; 3], [half, 0.0, 0.0, half]);
-    for (node, joint) in skeleton.nodes[..skeleton.measured()].iter().zip(&pose.joints) {
+    transform(
+        &mut message,
+        (WORLD, TREE),
+        time_ns,
+        [0.0; 3],
+        [half, 0.0, 0.0, half],
+    );
+    for (node, joint) in skeleton.nodes[..skeleton.measured()]
+        .iter()
+        .zip(&pose.joints)
+    {
         let q = joint.rotation.coords;
         let name = format!("node_{}", node.name.0);
-        transform(&mut message, (TREE, &name), time_ns, joint.position.coords.into(), [q.x, q.y, q.z, q.w]);
+        transform(
+            &mut message,
+            (TREE, &name),
+            time_ns,
+            joint.position.coords.into(),
+            [q.x, q.y, q.z, q.w],
+        );
     }
 }
 
@@ -168,11 +191,29 @@ pub(super) fn skeleton_json(
         let id_of = |n: Option<NodeId>| n.and_then(|n| skeleton.name_of(n)).map(|name| name.0);
         let (id, parent, copy_of, p) = (n.name.0, id_of(n.parent), id_of(n.copy_of), n.position);
         let (n_tracks, certainty) = (n.n_tracks, n.certainty);
-        NodeJson { id, parent, level: n.level, x: p.x, y: p.y, z: p.z, radius: n.radius, n_tracks, certainty, copy_of }
+        NodeJson {
+            id,
+            parent,
+            level: n.level,
+            x: p.x,
+            y: p.y,
+            z: p.z,
+            radius: n.radius,
+            n_tracks,
+            certainty,
+            copy_of,
+        }
     });
     let size = skeleton.image_size;
     let foot_px = skeleton.foot_px;
-    let all = SkeletonJson { frame, time_s, foot_px, width: size.width, height: size.height, nodes: nodes.collect() };
+    let all = SkeletonJson {
+        frame,
+        time_s,
+        foot_px,
+        width: size.width,
+        height: size.height,
+        nodes: nodes.collect(),
+    };
     into.clear();
     serde_json::to_writer(into, &all)
 }

@@ -1,10 +1,12 @@
-//! The channels of a recording: topic, published schema, encoding. The protobuf schemas are Foxglove's
-//! (<https://github.com/foxglove/foxglove-sdk>, MIT), made by `scripts/foxglove-schemas.py`.
+//! The channels of a recording: topic, published schema, encoding. The protobuf schemas are
+//! Foxglove's (<https://github.com/foxglove/foxglove-sdk>, MIT), made by
+//! `scripts/foxglove-schemas.py`.
 
 /// One kind of message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) enum Topic {
-    /// Frames that are compressed, and frames that are not; with the driver's number, and without one.
+    /// Frames that are compressed, and frames that are not; with the driver's number, and without
+    /// one.
     Image,
     ImageUncounted,
     RawImage,
@@ -29,7 +31,8 @@ pub(super) struct Channel {
 pub(super) const COMPRESSED_IMAGE: &str = "foxglove.CompressedImage";
 pub(super) const RAW_IMAGE: &str = "foxglove.RawImage";
 
-/// Keys of a channel's metadata: what the header's `sequence` is, see [`COUNTED`] and [`UNCOUNTED`].
+/// Keys of a channel's metadata: what the header's `sequence` is, see [`COUNTED`] and
+/// [`UNCOUNTED`].
 pub(super) const SEQUENCE: &str = "sequence";
 pub(super) const COUNTED: &str = "driver";
 pub(super) const UNCOUNTED: &str = "none";
@@ -56,24 +59,38 @@ impl Topic {
             message_encoding: "json",
         };
         match self {
-            Topic::Image | Topic::ImageUncounted => {
-                protobuf("/camera/image", COMPRESSED_IMAGE, include_bytes!("foxglove/CompressedImage.bin"))
-            }
-            Topic::RawImage | Topic::RawImageUncounted => {
-                protobuf("/camera/image_raw", RAW_IMAGE, include_bytes!("foxglove/RawImage.bin"))
-            }
-            Topic::Outline => {
-                protobuf("/tree/outline", "foxglove.ImageAnnotations", include_bytes!("foxglove/ImageAnnotations.bin"))
-            }
-            Topic::Points => {
-                protobuf("/tree/points", "foxglove.ImageAnnotations", include_bytes!("foxglove/ImageAnnotations.bin"))
-            }
+            Topic::Image | Topic::ImageUncounted => protobuf(
+                "/camera/image",
+                COMPRESSED_IMAGE,
+                include_bytes!("foxglove/CompressedImage.bin"),
+            ),
+            Topic::RawImage | Topic::RawImageUncounted => protobuf(
+                "/camera/image_raw",
+                RAW_IMAGE,
+                include_bytes!("foxglove/RawImage.bin"),
+            ),
+            Topic::Outline => protobuf(
+                "/tree/outline",
+                "foxglove.ImageAnnotations",
+                include_bytes!("foxglove/ImageAnnotations.bin"),
+            ),
+            Topic::Points => protobuf(
+                "/tree/points",
+                "foxglove.ImageAnnotations",
+                include_bytes!("foxglove/ImageAnnotations.bin"),
+            ),
             Topic::Tracks => json("/tree/tracks", "arborcam.Tracks", TRACKS),
             Topic::Skeleton => json("/tree/skeleton", "arborcam.Skeleton", SKELETON),
-            Topic::Scene => protobuf("/tree/scene", "foxglove.SceneUpdate", include_bytes!("foxglove/SceneUpdate.bin")),
-            Topic::Transforms => {
-                protobuf("/tree/poses", "foxglove.FrameTransforms", include_bytes!("foxglove/FrameTransforms.bin"))
-            }
+            Topic::Scene => protobuf(
+                "/tree/scene",
+                "foxglove.SceneUpdate",
+                include_bytes!("foxglove/SceneUpdate.bin"),
+            ),
+            Topic::Transforms => protobuf(
+                "/tree/poses",
+                "foxglove.FrameTransforms",
+                include_bytes!("foxglove/FrameTransforms.bin"),
+            ),
         }
     }
 

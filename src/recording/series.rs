@@ -15,7 +15,8 @@ const REMEMBERED: usize = 4096;
 /// What is recorded, for the head of each file.
 #[derive(Clone, Debug, Default)]
 pub struct Head {
-    /// The input as the user named it, and its own name; for a camera also what tells it from others.
+    /// The input as the user named it, and its own name; for a camera also what tells it from
+    /// others.
     pub source: String,
     pub format: FormatNote,
     pub size: Option<Size>,
@@ -33,7 +34,8 @@ pub struct Limits {
     pub max_time_ns: Option<u64>,
 }
 
-/// Sensor time to the times in the file. All files of a series share it, so that differences are exact across them.
+/// Sensor time to the times in the file. All files of a series share it, so that differences are
+/// exact across them.
 #[derive(Clone, Copy, Debug)]
 struct Clock {
     log_minus_sensor_ns: i64,
@@ -45,7 +47,10 @@ struct Clock {
 impl Clock {
     fn times(self, sensor_ns: i64) -> Times {
         let to = |offset: i64| u64::try_from(sensor_ns.saturating_add(offset)).unwrap_or(0);
-        Times { log: to(self.log_minus_sensor_ns), publish: to(self.publish_minus_sensor_ns) }
+        Times {
+            log: to(self.log_minus_sensor_ns),
+            publish: to(self.publish_minus_sensor_ns),
+        }
     }
 }
 
@@ -77,7 +82,12 @@ impl Series {
     ///
     /// # Errors
     /// There is a file of that name, or none can be made.
-    pub fn create(path: &Path, head: Head, limits: Limits, now_ns: fn() -> u64) -> Result<Self, RecordingError> {
+    pub fn create(
+        path: &Path,
+        head: Head,
+        limits: Limits,
+        now_ns: fn() -> u64,
+    ) -> Result<Self, RecordingError> {
         Ok(Self {
             base: path.to_owned(),
             head,
@@ -108,7 +118,8 @@ impl Series {
         self.files
     }
 
-    /// Frames that were written since the last chunk was closed: where writing fails, they are lost.
+    /// Frames that were written since the last chunk was closed: where writing fails, they are
+    /// lost.
     pub fn open_frames(&self) -> u64 {
         self.open_frames
     }
@@ -156,7 +167,8 @@ impl Series {
         let times = clock.times(sensor_ns);
         image::encode(raw, times.log, &mut self.buffer);
         let number = raw.sequence.unwrap_or(self.frames) as u32;
-        self.writer.message(image::topic(raw), number, times, &self.buffer)?;
+        self.writer
+            .message(image::topic(raw), number, times, &self.buffer)?;
         if self.frames == 0 {
             // Whatever happens now, there is a picture.
             self.writer.flush()?;
@@ -173,7 +185,9 @@ impl Series {
 
     /// Whether a limit says that this frame begins another file.
     fn is_over(&self, raw: &RawFrame, sensor_ns: i64) -> bool {
-        let Some(start_ns) = self.part_start_ns else { return false };
+        let Some(start_ns) = self.part_start_ns else {
+            return false;
+        };
         let bytes = self.writer.bytes() + raw.bytes.len() as u64;
         let time_ns = u64::try_from(sensor_ns.saturating_sub(start_ns)).unwrap_or(0);
         self.limits.max_bytes.is_some_and(|max| bytes > max)
@@ -186,24 +200,36 @@ impl Series {
         let size = head.size.unwrap_or(first.size);
         let mut entries = BTreeMap::new();
         let mut put = |key: &str, value: String| drop(entries.insert(key.to_owned(), value));
-        put("software", concat!("arborcam ", env!("CARGO_PKG_VERSION")).to_owned());
+        put(
+            "software",
+            concat!("arborcam ", env!("CARGO_PKG_VERSION")).to_owned(),
+        );
         put("source", head.source.clone());
         put("format_asked", head.format.asked.clone());
         put("format_given", head.format.given.clone());
         put("fourcc", first.format.fourcc().to_owned());
         put("width", size.width.to_string());
         put("height", size.height.to_string());
-        head.nominal_rate_hz.into_iter().for_each(|hz| put("nominal_rate_hz", hz.to_string()));
+        head.nominal_rate_hz
+            .into_iter()
+            .for_each(|hz| put("nominal_rate_hz", hz.to_string()));
         put("clock", head.clock.clone());
-        put("log_time_minus_sensor_time_ns", clock.log_minus_sensor_ns.to_string());
+        put(
+            "log_time_minus_sensor_time_ns",
+            clock.log_minus_sensor_ns.to_string(),
+        );
         put(SHIFT_NS, clock.publish_minus_sensor_ns.to_string());
-        first.sequence.into_iter().for_each(|n| put(FIRST_SEQUENCE, n.to_string()));
+        first
+            .sequence
+            .into_iter()
+            .for_each(|n| put(FIRST_SEQUENCE, n.to_string()));
         put("file", self.part.to_string());
         self.writer.about(entries)?;
         let times = clock.times(nanoseconds(first.sensor_time_s));
         if let Some(outline) = &self.outline {
             scene::outline(outline, times.log, &mut self.buffer);
-            self.writer.message(Topic::Outline, 0, times, &self.buffer)?;
+            self.writer
+                .message(Topic::Outline, 0, times, &self.buffer)?;
         }
         if let Some((skeleton, frame, time_s)) = self.tree.clone() {
             self.write_skeleton(&skeleton, (frame, time_s), times)?;
@@ -228,22 +254,36 @@ impl Series {
         Ok(())
     }
 
-    /// Appends what was found in a frame: its points, and the outline where it is another one than before.
+    /// Appends what was found in a frame: its points, and the outline where it is another one than
+    /// before.
     ///
     /// # Errors
     /// As for [`Series::frame`].
-    pub fn tracks(&mut self, tracks: &TrackSet, outline: &Arc<Outline>) -> Result<(), RecordingError> {
-        let Some(times) = self.times_of(tracks.frame, tracks.time_s) else { return Ok(()) };
-        if self.outline.as_ref().is_none_or(|o| !Arc::ptr_eq(o, outline) && **o != **outline) {
+    pub fn tracks(
+        &mut self,
+        tracks: &TrackSet,
+        outline: &Arc<Outline>,
+    ) -> Result<(), RecordingError> {
+        let Some(times) = self.times_of(tracks.frame, tracks.time_s) else {
+            return Ok(());
+        };
+        if self
+            .outline
+            .as_ref()
+            .is_none_or(|o| !Arc::ptr_eq(o, outline) && **o != **outline)
+        {
             self.outline = Some(outline.clone());
             scene::outline(outline, times.log, &mut self.buffer);
-            self.writer.message(Topic::Outline, tracks.frame as u32, times, &self.buffer)?;
+            self.writer
+                .message(Topic::Outline, tracks.frame as u32, times, &self.buffer)?;
         }
         scene::points(tracks, times.log, &mut self.buffer);
-        self.writer.message(Topic::Points, tracks.frame as u32, times, &self.buffer)?;
+        self.writer
+            .message(Topic::Points, tracks.frame as u32, times, &self.buffer)?;
         // Numbers only; that cannot fail.
         if scene::tracks_json(tracks, &mut self.buffer).is_ok() {
-            self.writer.message(Topic::Tracks, tracks.frame as u32, times, &self.buffer)?;
+            self.writer
+                .message(Topic::Tracks, tracks.frame as u32, times, &self.buffer)?;
         }
         Ok(())
     }
@@ -253,31 +293,54 @@ impl Series {
     /// # Errors
     /// As for [`Series::frame`].
     pub fn pose(&mut self, pose: &Pose, skeleton: &Arc<Skeleton>) -> Result<(), RecordingError> {
-        let Some(times) = self.times_of(pose.frame, pose.time_s) else { return Ok(()) };
-        if self.tree.as_ref().is_none_or(|(known, ..)| !Arc::ptr_eq(known, skeleton)) {
+        let Some(times) = self.times_of(pose.frame, pose.time_s) else {
+            return Ok(());
+        };
+        if self
+            .tree
+            .as_ref()
+            .is_none_or(|(known, ..)| !Arc::ptr_eq(known, skeleton))
+        {
             self.tree = Some((skeleton.clone(), pose.frame, pose.time_s));
             self.write_skeleton(skeleton, (pose.frame, pose.time_s), times)?;
         }
         scene::scene(skeleton, pose, times.log, &mut self.buffer);
-        self.writer.message(Topic::Scene, pose.frame as u32, times, &self.buffer)?;
+        self.writer
+            .message(Topic::Scene, pose.frame as u32, times, &self.buffer)?;
         scene::transforms(skeleton, pose, times.log, &mut self.buffer);
-        self.writer.message(Topic::Transforms, pose.frame as u32, times, &self.buffer)
+        self.writer
+            .message(Topic::Transforms, pose.frame as u32, times, &self.buffer)
     }
 
-    fn write_skeleton(&mut self, skeleton: &Skeleton, at: (u64, f64), times: Times) -> Result<(), RecordingError> {
+    fn write_skeleton(
+        &mut self,
+        skeleton: &Skeleton,
+        at: (u64, f64),
+        times: Times,
+    ) -> Result<(), RecordingError> {
         match scene::skeleton_json(skeleton, at, &mut self.buffer) {
-            Ok(()) => self.writer.message(Topic::Skeleton, at.0 as u32, times, &self.buffer),
+            Ok(()) => self
+                .writer
+                .message(Topic::Skeleton, at.0 as u32, times, &self.buffer),
             Err(_) => Ok(()),
         }
     }
 
-    /// The times of the frame with this place in the capture, to the nanosecond those of its picture.
+    /// The times of the frame with this place in the capture, to the nanosecond those of its
+    /// picture.
     fn times_of(&self, index: u64, time_s: f64) -> Option<Times> {
         let clock = self.clock?;
         let at = self.recent.partition_point(|(i, _)| *i < index);
-        let known = self.recent.get(at).filter(|(i, _)| *i == index).map(|(_, ns)| *ns);
+        let known = self
+            .recent
+            .get(at)
+            .filter(|(i, _)| *i == index)
+            .map(|(_, ns)| *ns);
         // Its picture was not recorded, or long ago: by the time since the first.
-        Some(clock.times(known.unwrap_or_else(|| clock.start_ns.saturating_add(nanoseconds(time_s)))))
+        Some(
+            clock
+                .times(known.unwrap_or_else(|| clock.start_ns.saturating_add(nanoseconds(time_s)))),
+        )
     }
 
     /// Closes the chunk and hands it to the system: from here on it survives the program.
@@ -303,7 +366,13 @@ impl Series {
 
 /// `name.mcap`, `name-1.mcap`, `name-2.mcap`, …
 fn numbered(base: &Path, part: u32) -> PathBuf {
-    let stem = base.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    let ending = base.extension().map(|e| format!(".{}", e.to_string_lossy())).unwrap_or_default();
+    let stem = base
+        .file_stem()
+        .map(|s| s.to_string_lossy().into_owned())
+        .unwrap_or_default();
+    let ending = base
+        .extension()
+        .map(|e| format!(".{}", e.to_string_lossy()))
+        .unwrap_or_default();
     base.with_file_name(format!("{stem}-{part}{ending}"))
 }

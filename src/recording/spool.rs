@@ -1,5 +1,5 @@
-//! All track sets of a capture in a nameless temporary file, so that memory stays flat however long it runs. The file
-//! vanishes with the program, whatever its end.
+//! All track sets of a capture in a nameless temporary file, so that memory stays flat however long
+//! it runs. The file vanishes with the program, whatever its end.
 
 use crate::model::{Observation, TrackId, TrackSet};
 use std::fs::File;
@@ -45,8 +45,19 @@ impl Spool {
     /// Whatever the file system says.
     pub fn create(folder: &Path) -> io::Result<Self> {
         let file = Arc::new(tempfile::tempfile_in(folder)?);
-        let writer = BufWriter::with_capacity(1 << 16, Appender { file: file.clone(), at: 0 });
-        Ok(Self { file, writer, buffer: Vec::new(), sets: 0 })
+        let writer = BufWriter::with_capacity(
+            1 << 16,
+            Appender {
+                file: file.clone(),
+                at: 0,
+            },
+        );
+        Ok(Self {
+            file,
+            writer,
+            buffer: Vec::new(),
+            sets: 0,
+        })
     }
 
     /// Appends a set.
@@ -64,12 +75,19 @@ impl Spool {
         b.extend((set.rejected.len() as u32).to_le_bytes());
         for o in &set.observations {
             b.extend(o.id.0.to_le_bytes());
-            for x in [o.u_px, o.v_px, o.fb_error_px, o.error_px.unwrap_or(f32::NAN)] {
+            for x in [
+                o.u_px,
+                o.v_px,
+                o.fb_error_px,
+                o.error_px.unwrap_or(f32::NAN),
+            ] {
                 b.extend(x.to_le_bytes());
             }
             b.push(u8::from(o.confirmed));
         }
-        set.rejected.iter().for_each(|id| b.extend(id.0.to_le_bytes()));
+        set.rejected
+            .iter()
+            .for_each(|id| b.extend(id.0.to_le_bytes()));
         self.writer.write_all(b)?;
         self.sets += 1;
         Ok(())
@@ -81,7 +99,10 @@ impl Spool {
     /// Whatever the file system says.
     pub fn reader(&mut self) -> io::Result<SpoolReader> {
         self.writer.flush()?;
-        Ok(SpoolReader { file: self.file.clone(), sets: self.sets })
+        Ok(SpoolReader {
+            file: self.file.clone(),
+            sets: self.sets,
+        })
     }
 }
 
@@ -104,8 +125,18 @@ impl SpoolReader {
 
     /// The sets in their order.
     pub fn sets(&self) -> Sets {
-        let reader = io::BufReader::with_capacity(1 << 16, At { file: self.file.clone(), at: 0 });
-        Sets { reader, next: 0, end: self.sets }
+        let reader = io::BufReader::with_capacity(
+            1 << 16,
+            At {
+                file: self.file.clone(),
+                at: 0,
+            },
+        );
+        Sets {
+            reader,
+            next: 0,
+            end: self.sets,
+        }
     }
 }
 
@@ -162,7 +193,14 @@ fn read_set(reader: &mut impl Read) -> io::Result<TrackSet> {
         let word = |i: usize| u32::from_le_bytes(std::array::from_fn(|k| o[4 * i + k]));
         let [u_px, v_px, fb_error_px, error_px] = [1, 2, 3, 4].map(|i| f32::from_bits(word(i)));
         let error_px = (!error_px.is_nan()).then_some(error_px);
-        Observation { id: TrackId(word(0)), u_px, v_px, fb_error_px, error_px, confirmed: o[20] != 0 }
+        Observation {
+            id: TrackId(word(0)),
+            u_px,
+            v_px,
+            fb_error_px,
+            error_px,
+            confirmed: o[20] != 0,
+        }
     };
     Ok(TrackSet {
         frame: u64_at(0),
@@ -170,7 +208,12 @@ fn read_set(reader: &mut impl Read) -> io::Result<TrackSet> {
         lost: u32_at(16),
         born: u32_at(20),
         observations: bytes.chunks_exact(OBSERVATION).map(observation).collect(),
-        rejected: rejected.as_chunks().0.iter().map(|id| TrackId(u32::from_le_bytes(*id))).collect(),
+        rejected: rejected
+            .as_chunks()
+            .0
+            .iter()
+            .map(|id| TrackId(u32::from_le_bytes(*id)))
+            .collect(),
     })
 }
 
@@ -189,10 +232,18 @@ mod tests {
         };
         let observations = (0..n).map(at).collect();
         let rejected = (0..n / 20).map(TrackId).collect();
-        TrackSet { frame, time_s: frame as f64 / 30.0, observations, lost: 2, born: n, rejected }
+        TrackSet {
+            frame,
+            time_s: frame as f64 / 30.0,
+            observations,
+            lost: 2,
+            born: n,
+            rejected,
+        }
     }
 
-    /// An export in the middle of a capture reads what was there and does not disturb what comes after.
+    /// An export in the middle of a capture reads what was there and does not disturb what comes
+    /// after.
     #[test]
     fn what_is_pushed_is_read_back_also_while_writing_goes_on() {
         let mut spool = Spool::create(&std::env::temp_dir()).unwrap();
@@ -216,7 +267,12 @@ mod tests {
         sets[1500..].iter().for_each(|s| spool.push(s).unwrap());
         let all = spool.reader().unwrap();
         along.until(&all);
-        assert!(along.map(Result::unwrap).zip(&sets[1000..]).all(|(a, b)| same(&a, b)));
+        assert!(
+            along
+                .map(Result::unwrap)
+                .zip(&sets[1000..])
+                .all(|(a, b)| same(&a, b))
+        );
         check(all, 2000);
         check(half, 1000);
     }

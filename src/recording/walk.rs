@@ -1,5 +1,5 @@
-//! From record to record through a file that may be cut short, damaged or hostile: what is whole is given out, what is
-//! not is left out and counted. Memory holds one chunk.
+//! From record to record through a file that may be cut short, damaged or hostile: what is whole is
+//! given out, what is not is left out and counted. Memory holds one chunk.
 
 use super::cursor::Cursor;
 use super::wire::little;
@@ -45,7 +45,8 @@ struct Chunk {
 }
 
 enum Content {
-    /// Not compressed: its records, and how far they have been given out. The crate's reader would trust their lengths.
+    /// Not compressed: its records, and how far they have been given out. The crate's reader would
+    /// trust their lengths.
     Plain(Vec<u8>, usize),
     /// The crate unpacks it; bytes of it that have not been read from the file.
     Packed(Box<LinearReader>, u64),
@@ -63,17 +64,30 @@ impl<R: Read + Seek> Walk<R> {
         }
         file.read_exact(&mut magic)?;
         let at = magic.len() as u64;
-        let walk = Self { file, at, length, chunk: None, ended: false, body: Vec::new(), damage: Damage::default() };
+        let walk = Self {
+            file,
+            at,
+            length,
+            chunk: None,
+            ended: false,
+            body: Vec::new(),
+            damage: Damage::default(),
+        };
         Ok((magic == mcap::MAGIC).then_some(walk))
     }
 
-    /// Kind of the next record that is whole, within a chunk or outside; `None` at the end. See [`Walk::body`].
+    /// Kind of the next record that is whole, within a chunk or outside; `None` at the end. See
+    /// [`Walk::body`].
     ///
     /// # Errors
     /// The file itself cannot be read.
     pub fn next(&mut self) -> io::Result<Option<u8>> {
         while !self.ended {
-            let found = if self.chunk.is_some() { self.in_chunk()? } else { self.outside()? };
+            let found = if self.chunk.is_some() {
+                self.in_chunk()?
+            } else {
+                self.outside()?
+            };
             if found.is_some() {
                 return Ok(found);
             }
@@ -87,7 +101,9 @@ impl<R: Read + Seek> Walk<R> {
     }
 
     fn in_chunk(&mut self) -> io::Result<Option<u8>> {
-        let Some(chunk) = &mut self.chunk else { return Ok(None) };
+        let Some(chunk) = &mut self.chunk else {
+            return Ok(None);
+        };
         let (reader, left) = match &mut chunk.content {
             Content::Packed(reader, left) => (reader, left),
             Content::Plain(bytes, given) => {
@@ -118,9 +134,14 @@ impl<R: Read + Seek> Walk<R> {
             Some(Ok(LinearReadEvent::ReadRequest(wanted))) => {
                 let count = (*left).min(wanted as u64);
                 let read = read_up_to(&mut self.file, reader.insert(count as usize))?;
-                // Nothing left means the end to the reader, which then says whether the chunk was whole.
+                // Nothing left means the end to the reader, which then says whether the chunk was
+                // whole.
                 reader.notify_read(read);
-                *left = if read as u64 == count { *left - count } else { 0 };
+                *left = if read as u64 == count {
+                    *left - count
+                } else {
+                    0
+                };
             }
             Some(Err(_)) => {
                 let start = chunk.start;
@@ -151,7 +172,9 @@ impl<R: Read + Seek> Walk<R> {
             op::CHUNK if fits && length >= CHUNK_HEAD => self.open_chunk(start, &head, length)?,
             op::DATA_END if length == 4 => self.ended = true,
             op::FOOTER if length == 20 => self.ended = true,
-            op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA if fits && length <= MAX_RECORD => {
+            op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA
+                if fits && length <= MAX_RECORD =>
+            {
                 self.body.resize(length as usize, 0);
                 self.file.read_exact(&mut self.body)?;
                 self.at = start + HEAD + length;
@@ -183,7 +206,10 @@ impl<R: Read + Seek> Walk<R> {
             if checksum.is_some_and(|saved| saved != 0 && saved != crc32fast::hash(&bytes)) {
                 return self.find_chunk(start);
             }
-            self.chunk = Some(Chunk { start, content: Content::Plain(bytes, 0) });
+            self.chunk = Some(Chunk {
+                start,
+                content: Content::Plain(bytes, 0),
+            });
             return Ok(());
         }
         let options = LinearReaderOptions::default()
@@ -196,7 +222,10 @@ impl<R: Read + Seek> Walk<R> {
             reader.insert(part.len()).copy_from_slice(part);
             reader.notify_read(part.len());
         }
-        self.chunk = Some(Chunk { start, content: Content::Packed(Box::new(reader), length - CHUNK_HEAD) });
+        self.chunk = Some(Chunk {
+            start,
+            content: Content::Packed(Box::new(reader), length - CHUNK_HEAD),
+        });
         Ok(())
     }
 
@@ -209,7 +238,8 @@ impl<R: Read + Seek> Walk<R> {
         let (kind, length) = (head[0], little(&head[1..]));
         // A chunk that was not closed has the greatest length of all.
         let known = (op::HEADER..=op::DATA_END).contains(&kind) || kind >= 0x80;
-        Ok(read < head.len() || known && (length <= MAX_RECORD || (kind == op::CHUNK && length == !0)))
+        Ok(read < head.len()
+            || known && (length <= MAX_RECORD || (kind == op::CHUNK && length == !0)))
     }
 
     /// Goes to the next chunk behind `from` whose head makes sense; all before it is damaged.
@@ -224,8 +254,8 @@ impl<R: Read + Seek> Walk<R> {
                 break;
             }
             let room = |i: usize| self.length - (at + i as u64);
-            if let Some(found) =
-                (0..=read - head_bytes).find(|&i| window[i] == op::CHUNK && is_chunk(&window[i + 1..], room(i)))
+            if let Some(found) = (0..=read - head_bytes)
+                .find(|&i| window[i] == op::CHUNK && is_chunk(&window[i + 1..], room(i)))
             {
                 self.at = at + found as u64;
                 self.file.seek(SeekFrom::Start(self.at))?;
@@ -241,21 +271,33 @@ impl<R: Read + Seek> Walk<R> {
     }
 }
 
-/// Whether these bytes, behind the kind, are the head of a chunk that ends within `room` bytes of its beginning.
+/// Whether these bytes, behind the kind, are the head of a chunk that ends within `room` bytes of
+/// its beginning.
 fn is_chunk(bytes: &[u8], room: u64) -> bool {
     let mut cursor = Cursor(bytes);
     let mut number = || cursor.u64();
-    let (Some(length), Some(start), Some(end), Some(uncompressed)) = (number(), number(), number(), number()) else {
+    let (Some(length), Some(start), Some(end), Some(uncompressed)) =
+        (number(), number(), number(), number())
+    else {
         return false;
     };
-    if length < CHUNK_HEAD || length > room.saturating_sub(HEAD) || start > end || uncompressed > MAX_RECORD {
+    if length < CHUNK_HEAD
+        || length > room.saturating_sub(HEAD)
+        || start > end
+        || uncompressed > MAX_RECORD
+    {
         return false;
     }
     let checksum = cursor.u32();
-    let (Some(compression), Some(compressed)) = (cursor.text(), cursor.u64()) else { return false };
+    let (Some(compression), Some(compressed)) = (cursor.text(), cursor.u64()) else {
+        return false;
+    };
     let known = matches!(compression, "" | "lz4" | "zstd");
     let whole = (CHUNK_HEAD + compression.len() as u64).checked_add(compressed) == Some(length);
-    checksum.is_some_and(|c| c != 0) && known && whole && (!compression.is_empty() || compressed == uncompressed)
+    checksum.is_some_and(|c| c != 0)
+        && known
+        && whole
+        && (!compression.is_empty() || compressed == uncompressed)
 }
 
 /// As many bytes as there are, which is fewer than asked for only at the end of the file.

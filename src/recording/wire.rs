@@ -1,4 +1,5 @@
-//! The few forms of protobuf's wire format that the published schemas need. A crate would copy every frame once more.
+//! The few forms of protobuf's wire format that the published schemas need. A crate would copy
+//! every frame once more.
 
 /// A message under construction, appended to a buffer that is used again and again.
 pub(super) struct Message<'a>(pub &'a mut Vec<u8>);

@@ -21,8 +21,14 @@ struct Column {
 impl Table {
     /// With so many columns, each with its head and how soon it can be spared.
     pub fn new(columns: &[(&str, u8)]) -> Self {
-        let column = |(head, spare): &(&str, u8)| Column { head: (*head).to_owned(), spare: *spare };
-        Self { columns: columns.iter().map(column).collect(), rows: Vec::new() }
+        let column = |(head, spare): &(&str, u8)| Column {
+            head: (*head).to_owned(),
+            spare: *spare,
+        };
+        Self {
+            columns: columns.iter().map(column).collect(),
+            rows: Vec::new(),
+        }
     }
 
     pub fn push(&mut self, cells: Vec<String>) {
@@ -30,12 +36,17 @@ impl Table {
         self.rows.push(Row { cells, ends_early });
     }
 
-    /// As lines of at most `width` letters, if leaving columns out can make it so; and the heads of those that are left out.
+    /// As lines of at most `width` letters, if leaving columns out can make it so; and the heads of
+    /// those that are left out.
     pub fn within(mut self, width: Option<usize>) -> (String, Vec<String>) {
         let mut without = Vec::new();
         loop {
             let text = self.text();
-            let widest = text.lines().map(|line| line.chars().count()).max().unwrap_or(0);
+            let widest = text
+                .lines()
+                .map(|line| line.chars().count())
+                .max()
+                .unwrap_or(0);
             let most = self.columns.iter().map(|c| c.spare).max().unwrap_or(0);
             if width.is_none_or(|w| widest <= w) || most == 0 {
                 return (text, without);
@@ -57,17 +68,30 @@ impl Table {
 
     /// Columns that are as wide as what stands in them, to the right.
     fn text(&self) -> String {
-        let heads = Row { cells: self.columns.iter().map(|c| c.head.clone()).collect(), ends_early: false };
+        let heads = Row {
+            cells: self.columns.iter().map(|c| c.head.clone()).collect(),
+            ends_early: false,
+        };
         let rows: Vec<&Row> = std::iter::once(&heads).chain(&self.rows).collect();
         let width = |c: usize| {
-            let cells = rows.iter().filter(|row| c < row.in_columns()).map(|row| row.cells[c].chars().count());
+            let cells = rows
+                .iter()
+                .filter(|row| c < row.in_columns())
+                .map(|row| row.cells[c].chars().count());
             cells.max().unwrap_or(0)
         };
         let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
         let line = |row: &&Row| {
             let cell = |(c, cell): (usize, &String)| {
-                let width = widths.get(c).filter(|_| c < row.in_columns()).copied().unwrap_or(0);
-                format!("{}{cell}", " ".repeat(width.saturating_sub(cell.chars().count())))
+                let width = widths
+                    .get(c)
+                    .filter(|_| c < row.in_columns())
+                    .copied()
+                    .unwrap_or(0);
+                format!(
+                    "{}{cell}",
+                    " ".repeat(width.saturating_sub(cell.chars().count()))
+                )
             };
             let cells: Vec<String> = row.cells.iter().enumerate().map(cell).collect();
             format!("  {}\n", cells.join("  ").trim_end())
@@ -82,9 +106,12 @@ impl Row {
     }
 }
 
-/// Lines of text, broken between words where they would be longer than `width`; what goes on is indented by four letters.
+/// Lines of text, broken between words where they would be longer than `width`; what goes on is
+/// indented by four letters.
 pub fn wrapped(text: &str, width: Option<usize>) -> String {
-    let Some(width) = width else { return text.into() };
+    let Some(width) = width else {
+        return text.into();
+    };
     let mut out = String::new();
     for line in text.split_inclusive('\n') {
         let (mut used, mut begun) = (0, false);
@@ -110,7 +137,11 @@ mod tests {
 
     fn table() -> Table {
         let mut table = Table::new(&[("branch", 0), ("points", 2), ("frequency", 0), ("eq. 6", 3)]);
-        table.push(["1", "307", "0.501 (0.498 to 0.504)", "0.11"].map(String::from).to_vec());
+        table.push(
+            ["1", "307", "0.501 (0.498 to 0.504)", "0.11"]
+                .map(String::from)
+                .to_vec(),
+        );
         table.push(["12", "5", "  none: too short"].map(String::from).to_vec());
         table
     }
@@ -125,15 +156,20 @@ mod tests {
         assert_eq!(table().within(Some(46)).1, ["eq. 6"]);
         let (text, without) = table().within(Some(20));
         assert_eq!(without, ["eq. 6", "points"]);
-        let narrow =
-            "  branch               frequency\n       1  0.501 (0.498 to 0.504)\n      12    none: too short\n";
+        let narrow = "  branch               frequency\n       1  0.501 (0.498 to 0.504)\n      12    none: too short\n";
         assert_eq!(text, narrow);
     }
 
     #[test]
     fn words_are_not_broken() {
-        assert_eq!(wrapped("one two  three\nfour\n", Some(9)), "one two\n    three\nfour\n");
-        assert_eq!(wrapped("  a verylongword b", Some(6)), "  a\n    verylongword\n    b");
+        assert_eq!(
+            wrapped("one two  three\nfour\n", Some(9)),
+            "one two\n    three\nfour\n"
+        );
+        assert_eq!(
+            wrapped("  a verylongword b", Some(6)),
+            "  a\n    verylongword\n    b"
+        );
         assert_eq!(wrapped("any length", None), "any length");
     }
 }

@@ -1,5 +1,5 @@
-//! The part of an angle that is a branch's own free decay: how far it sways, for the table and for the eye. Frequency and
-//! damping come from the points, not from here.
+//! The part of an angle that is a branch's own free decay: how far it sways, for the table and for
+//! the eye. Frequency and damping come from the points, not from here.
 
 use crate::model::Sway;
 use nalgebra::{DMatrix, DVector};
@@ -16,7 +16,8 @@ pub struct Decaying {
     pub amplitude_deg: f64,
 }
 
-/// The damped cosine of `own` that fits `angle_deg` best between the two times `used_s` (none elsewhere), beside those of
+/// The damped cosine of `own` that fits `angle_deg` best between the two times `used_s` (none
+/// elsewhere), beside those of
 /// `others` and a constant. `None` without a damping, or where the angle has too few values.
 pub fn decaying(
     times_s: &[f64],
@@ -35,15 +36,21 @@ pub fn decaying(
         .collect();
     own.damping_ratio?;
     let wave = |(hz, damping): (f64, f64), t: f64| {
-        let (size, phase) = ((-damping * TAU * hz * t).exp(), (1.0 - damping * damping).sqrt() * TAU * hz * t);
+        let (size, phase) = (
+            (-damping * TAU * hz * t).exp(),
+            (1.0 - damping * damping).sqrt() * TAU * hz * t,
+        );
         [size * phase.cos(), size * phase.sin()]
     };
     let row = |t: f64| -> Vec<f64> {
-        std::iter::once(1.0).chain(modes.iter().flat_map(|&mode| wave(mode, t - released_s))).collect()
+        std::iter::once(1.0)
+            .chain(modes.iter().flat_map(|&mode| wave(mode, t - released_s)))
+            .collect()
     };
     let within = |t: f64| used_s[0] <= t && t <= used_s[1];
-    let rows: Vec<usize> =
-        (0..times_s.len().min(angle_deg.len())).filter(|&k| within(times_s[k]) && angle_deg[k].is_finite()).collect();
+    let rows: Vec<usize> = (0..times_s.len().min(angle_deg.len()))
+        .filter(|&k| within(times_s[k]) && angle_deg[k].is_finite())
+        .collect();
     let columns = 1 + 2 * modes.len();
     if rows.len() < 2 * columns || columns < 3 {
         return None;
@@ -63,5 +70,8 @@ pub fn decaying(
     };
     let at = |t: &f64| if within(*t) { own_part(*t) } else { f64::NAN };
     let amplitude_deg = cosine.hypot(sine);
-    amplitude_deg.is_finite().then(|| Decaying { curve_deg: times_s.iter().map(at).collect(), amplitude_deg })
+    amplitude_deg.is_finite().then(|| Decaying {
+        curve_deg: times_s.iter().map(at).collect(),
+        amplitude_deg,
+    })
 }

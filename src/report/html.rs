@@ -14,8 +14,14 @@ pub fn page(studies: &[Study], comparison: Option<&Comparison>) -> String {
     let title = escaped(&format!("Sway of {}", names.join(", ")));
     let mut body = format!("<h1>{title}</h1><p>{}</p>", summary(studies));
     if studies.len() > 1 {
-        let links = studies.iter().enumerate().map(|(k, s)| format!("<a href=\"#s{k}\">{}</a>", escaped(&s.name)));
-        body += &format!("<nav><a href=\"#compared\">Compared</a>{}</nav>", links.collect::<String>());
+        let links = studies
+            .iter()
+            .enumerate()
+            .map(|(k, s)| format!("<a href=\"#s{k}\">{}</a>", escaped(&s.name)));
+        body += &format!(
+            "<nav><a href=\"#compared\">Compared</a>{}</nav>",
+            links.collect::<String>()
+        );
     }
     body += &comparison.map_or(String::new(), |c| compared_part(studies, c));
     for (k, study) in studies.iter().enumerate() {
@@ -33,22 +39,37 @@ pub fn page(studies: &[Study], comparison: Option<&Comparison>) -> String {
 
 /// What there is to say in a sentence.
 fn summary(studies: &[Study]) -> String {
-    let (answers, all) = studies.iter().fold((0, 0), |n, s| (n.0 + s.answers(), n.1 + s.branches.len()));
-    let films = if studies.len() > 1 { format!(" in {} captures", studies.len()) } else { String::new() };
+    let (answers, all) = studies
+        .iter()
+        .fold((0, 0), |n, s| (n.0 + s.answers(), n.1 + s.branches.len()));
+    let films = if studies.len() > 1 {
+        format!(" in {} captures", studies.len())
+    } else {
+        String::new()
+    };
     let of = words::number_of(all, "branch");
-    format!("{answers} of {of}{films} have a frequency of their own that the film shows. Intervals are 95 %.")
+    format!(
+        "{answers} of {of}{films} have a frequency of their own that the film shows. Intervals are 95 %."
+    )
 }
 
 fn one(k: usize, study: &Study, several: bool) -> String {
     let mut out = String::new();
-    let name = if several { escaped(&study.name) } else { "What was filmed".into() };
+    let name = if several {
+        escaped(&study.name)
+    } else {
+        "What was filmed".into()
+    };
     out += &format!("<section id=\"s{k}\"><h2>{name}</h2>{}", facts(study));
     let Map { svg, unnamed } = map(study);
     let unnamed = match unnamed.as_slice() {
         [] => String::new(),
         some => {
             let names: Vec<String> = some.iter().map(u32::to_string).collect();
-            format!(" <span>There is no room for the numbers of {}.</span>", names.join(", "))
+            format!(
+                " <span>There is no room for the numbers of {}.</span>",
+                names.join(", ")
+            )
         }
     };
     out += &format!(
@@ -65,10 +86,18 @@ fn one(k: usize, study: &Study, several: bool) -> String {
     for branch in study.branches.iter().filter(|b| b.sway.is_ok()) {
         out += &branch_part(study, branch);
     }
-    let without: Vec<_> = study.branches.iter().filter(|b| b.sway.is_err() && !b.times_s.is_empty()).collect();
+    let without: Vec<_> = study
+        .branches
+        .iter()
+        .filter(|b| b.sway.is_err() && !b.times_s.is_empty())
+        .collect();
     if !without.is_empty() {
-        out += "<h3>How the others moved</h3><p class=\"soft\">Without a frequency; for the eye.</p>";
-        out += &without.into_iter().map(|b| branch_part(study, b)).collect::<String>();
+        out +=
+            "<h3>How the others moved</h3><p class=\"soft\">Without a frequency; for the eye.</p>";
+        out += &without
+            .into_iter()
+            .map(|b| branch_part(study, b))
+            .collect::<String>();
     }
     out + "</section>"
 }
@@ -76,7 +105,10 @@ fn one(k: usize, study: &Study, several: bool) -> String {
 /// What was filmed, how long, how fast, what is missing, what made it sway.
 fn facts(study: &Study) -> String {
     let mut rows = vec![
-        ("Film", format!("{}, {} x {} px", study.source, study.size[0], study.size[1])),
+        (
+            "Film",
+            format!("{}, {} x {} px", study.source, study.size[0], study.size[1]),
+        ),
         ("Analysed", words::frames(study)),
         ("Gaps", words::gaps(study)),
         ("Excitation", words::excitation(study)),
@@ -84,7 +116,11 @@ fn facts(study: &Study) -> String {
     let scale = study.metres_per_px;
     rows.push((
         "Scale",
-        if scale > 0.0 { format!("{} m in a pixel", significant(scale)) } else { "none given".into() },
+        if scale > 0.0 {
+            format!("{} m in a pixel", significant(scale))
+        } else {
+            "none given".into()
+        },
     ));
     rows.extend(study.notes.iter().map(|note| ("Note", note.clone())));
     let row = |(name, text): &(&str, String)| format!("<dt>{name}</dt><dd>{}</dd>", escaped(text));
@@ -95,7 +131,11 @@ fn facts(study: &Study) -> String {
 fn significant(x: f64) -> String {
     let decimals = (2.0 - x.abs().log10().floor()).clamp(0.0, 12.0) as usize;
     let text = format!("{x:.decimals$}");
-    if decimals > 0 { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+    if decimals > 0 {
+        text.trim_end_matches('0').trim_end_matches('.').into()
+    } else {
+        text
+    }
 }
 
 const HOW_TO_READ: &str = "<section><h2>How to read this</h2>\

@@ -8,7 +8,8 @@ use crate::dynamics::Start;
 use crate::model::{Interval, Unidentified};
 use serde_json::{Value, json};
 
-/// One object: `captures`, and `comparison`, which is `null` for one capture. What is not known is `null`.
+/// One object: `captures`, and `comparison`, which is `null` for one capture. What is not known is
+/// `null`.
 pub fn json(studies: &[Study], comparison: Option<&Comparison>) -> Value {
     json!({
         "captures": studies.iter().map(capture).collect::<Vec<Value>>(),
@@ -76,7 +77,13 @@ fn compared(studies: &[Study], comparison: &Comparison) -> Value {
     let row = |row: &super::Row| {
         let cell = |k: usize| {
             let found = k.checked_sub(1).and_then(|k| row.others.get(k));
-            let off = found.and_then(|m| if let Match::Found { off, .. } = m { Some(*off) } else { None });
+            let off = found.and_then(|m| {
+                if let Match::Found { off, .. } = m {
+                    Some(*off)
+                } else {
+                    None
+                }
+            });
             let (first, here) = (row.sway(studies, 0), row.sway(studies, k));
             let both = first.zip(here).filter(|_| k > 0);
             json!({

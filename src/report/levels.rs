@@ -43,7 +43,12 @@ impl Spread {
         sorted.sort_unstable_by(f64::total_cmp);
         let middle = |k: usize| sorted.get(k).copied();
         let median = 0.5 * (middle(values.len() / 2)? + middle((values.len() - 1) / 2)?);
-        Some(Self { n: values.len(), median, least: fold(f64::min)?, largest: fold(f64::max)? })
+        Some(Self {
+            n: values.len(),
+            median,
+            least: fold(f64::min)?,
+            largest: fold(f64::max)?,
+        })
     }
 }
 
@@ -56,7 +61,10 @@ pub fn levels(study: &Study) -> Vec<Level> {
         let of = || study.branches.iter().filter(move |b| b.level == level);
         let known: Vec<Sway> = of().filter_map(|b| b.known()).collect();
         let frequencies: Vec<f64> = known.iter().map(|s| s.frequency_hz.value).collect();
-        let dampings: Vec<f64> = known.iter().filter_map(|s| Some(s.damping_ratio?.value)).collect();
+        let dampings: Vec<f64> = known
+            .iter()
+            .filter_map(|s| Some(s.damping_ratio?.value))
+            .collect();
         Level {
             level,
             branches: of().count(),
@@ -68,19 +76,26 @@ pub fn levels(study: &Study) -> Vec<Level> {
     numbers.into_iter().map(level).collect()
 }
 
-/// How `value` grows from level to level: a straight line through its logarithms. `None` for fewer than four branches, or all on one
-/// level.
+/// How `value` grows from level to level: a straight line through its logarithms. `None` for fewer
+/// than four branches, or all on one level.
 pub fn growth(study: &Study, value: impl Fn(&Sway) -> Option<f64>) -> Option<Growth> {
     let points: Vec<(f64, f64)> = study
         .branches
         .iter()
-        .filter_map(|b| Some((f64::from(b.level), value(&b.known()?).filter(|v| *v > 0.0)?.ln())))
+        .filter_map(|b| {
+            Some((
+                f64::from(b.level),
+                value(&b.known()?).filter(|v| *v > 0.0)?.ln(),
+            ))
+        })
         .collect();
     let n = points.len() as f64;
     if points.len() < LEAST {
         return None;
     }
-    let mean = points.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
+    let mean = points
+        .iter()
+        .fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
     let sum = |f: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(f).sum::<f64>();
     let wide = sum(&|p| (p.0 - mean.0).powi(2));
     if wide <= 0.0 {
@@ -90,21 +105,34 @@ pub fn growth(study: &Study, value: impl Fn(&Sway) -> Option<f64>) -> Option<Gro
     let left = sum(&|p| (p.1 - mean.1 - slope * (p.0 - mean.0)).powi(2));
     let half = students_975(n - 2.0) * (left / (n - 2.0) / wide).sqrt();
     let percent = |x: f64| 100.0 * x.exp_m1();
-    let percent = Interval { value: percent(slope), lo: percent(slope - half), hi: percent(slope + half) };
-    Some(Growth { percent, branches: points.len() })
+    let percent = Interval {
+        value: percent(slope),
+        lo: percent(slope - half),
+        hi: percent(slope + half),
+    };
+    Some(Growth {
+        percent,
+        branches: points.len(),
+    })
 }
 
-/// Quantile of Student's distribution that leaves 2.5 % above it: Cornish and Fisher's expansion, good to 2 % from two degrees of
-/// freedom on.
+/// Quantile of Student's distribution that leaves 2.5 % above it: Cornish and Fisher's expansion,
+/// good to 2 % from two degrees of freedom on.
 fn students_975(freedom: f64) -> f64 {
     let z = 1.959_964_f64;
     let terms = [
         (z.powi(3) + z) / 4.0,
         (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / 96.0,
         (3.0 * z.powi(7) + 19.0 * z.powi(5) + 17.0 * z.powi(3) - 15.0 * z) / 384.0,
-        (79.0 * z.powi(9) + 776.0 * z.powi(7) + 1482.0 * z.powi(5) - 1920.0 * z.powi(3) - 945.0 * z) / 92160.0,
+        (79.0 * z.powi(9) + 776.0 * z.powi(7) + 1482.0 * z.powi(5)
+            - 1920.0 * z.powi(3)
+            - 945.0 * z)
+            / 92160.0,
     ];
-    terms.iter().enumerate().fold(z, |sum, (i, t)| sum + t / freedom.powi(i as i32 + 1))
+    terms
+        .iter()
+        .enumerate()
+        .fold(z, |sum, (i, t)| sum + t / freedom.powi(i as i32 + 1))
 }
 
 #[cfg(test)]
@@ -113,9 +141,18 @@ mod tests {
 
     #[test]
     fn students_quantiles_are_those_of_the_tables() {
-        for (freedom, wanted) in [(2.0, 4.303), (3.0, 3.182), (5.0, 2.571), (10.0, 2.228), (100.0, 1.984)] {
+        for (freedom, wanted) in [
+            (2.0, 4.303),
+            (3.0, 3.182),
+            (5.0, 2.571),
+            (10.0, 2.228),
+            (100.0, 1.984),
+        ] {
             let found = students_975(freedom);
-            assert!((found / wanted - 1.0).abs() < 0.02, "{freedom}: {found}, not {wanted}");
+            assert!(
+                (found / wanted - 1.0).abs() < 0.02,
+                "{freedom}: {found}, not {wanted}"
+            );
         }
     }
 
@@ -123,6 +160,14 @@ mod tests {
     fn the_spread_of_none_is_none() {
         assert_eq!(Spread::of(&[]), None);
         let three = Spread::of(&[3.0, 1.0, 2.0]);
-        assert_eq!(three, Some(Spread { n: 3, median: 2.0, least: 1.0, largest: 3.0 }));
+        assert_eq!(
+            three,
+            Some(Spread {
+                n: 3,
+                median: 2.0,
+                least: 1.0,
+                largest: 3.0
+            })
+        );
     }
 }

@@ -1,27 +1,32 @@
 //! Which branch of one capture is which of another one of the same tree.
 //!
-//! A capture names its branches as it finds them, so that numbers say nothing across captures. What lasts is where a branch
-//! stands in the picture: from the trunk's foot, in sizes of the tree, so that camera and zoom may differ.
+//! A capture names its branches as it finds them, so that numbers say nothing across captures. What
+//! lasts is where a branch stands in the picture: from the trunk's foot, in sizes of the tree, so
+//! that camera and zoom may differ.
 
 use super::study::{Branch, Study};
 
 /// A branch may have moved by this share of the tree's size from one capture to the next.
 const FARTHEST: f64 = 0.08;
-/// Another branch that is at most so many times as far makes it unclear which one is meant, unless it is as near as this.
+/// Another branch that is at most so many times as far makes it unclear which one is meant, unless
+/// it is as near as this.
 const AS_NEAR: f64 = 1.3;
 const NEAR: f64 = 0.02;
-/// Where a branch ends says more than where it begins: forks are seen as far up as points move together.
+/// Where a branch ends says more than where it begins: forks are seen as far up as points move
+/// together.
 const BASE: f64 = 0.5;
 /// How often the pictures are laid on each other anew, by so many branches at least.
 const ROUNDS: usize = 3;
 const LEAST_PAIRS: usize = 3;
-/// Sizes of two films of one tree are as its farthest branches that were seen, which need not be the same ones.
+/// Sizes of two films of one tree are as its farthest branches that were seen, which need not be
+/// the same ones.
 const SIZES: [f64; 5] = [1.0, 0.9, 1.1, 0.8, 1.25];
 
 /// What became of a branch of the first capture in another one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Match {
-    /// The branch of that place in [`Study::branches`]; `off` is how far the two are apart, as a share of the tree's size.
+    /// The branch of that place in [`Study::branches`]; `off` is how far the two are apart, as a
+    /// share of the tree's size.
     Found { branch: usize, off: f64 },
     /// There is none near enough.
     Missing,
@@ -35,7 +40,10 @@ pub fn matched(first: &Study, other: &Study) -> Vec<Match> {
     // A camera that stood still, and one that did not.
     let ratio = size_px / other.size_px();
     let scales = std::iter::once(1.0).chain(SIZES.iter().map(|s| s * ratio));
-    let starts = scales.map(|scale| Frame { scale, shift: [0.0; 2] });
+    let starts = scales.map(|scale| Frame {
+        scale,
+        shift: [0.0; 2],
+    });
     let tried = starts.filter(|f| f.scale.is_finite()).map(|start| {
         let mut frame = start;
         let mut found = seen_from(first, other, &frame, size_px);
@@ -43,18 +51,30 @@ pub fn matched(first: &Study, other: &Study) -> Vec<Match> {
             frame = frame.refined(first, other, &found);
             found = seen_from(first, other, &frame, size_px);
         }
-        let offs: Vec<f64> =
-            found.iter().filter_map(|m| if let Match::Found { off, .. } = m { Some(*off) } else { None }).collect();
+        let offs: Vec<f64> = found
+            .iter()
+            .filter_map(|m| {
+                if let Match::Found { off, .. } = m {
+                    Some(*off)
+                } else {
+                    None
+                }
+            })
+            .collect();
         (offs.len(), offs.iter().sum::<f64>(), found)
     });
     let best = tried.reduce(|a, b| if (b.0, a.1) > (a.0, b.1) { b } else { a });
-    best.map_or_else(|| vec![Match::Missing; first.branches.len()], |(_, _, found)| found)
+    best.map_or_else(
+        || vec![Match::Missing; first.branches.len()],
+        |(_, _, found)| found,
+    )
 }
 
 /// Where a branch ends in the first capture and in the other one.
 type Pair = ([f64; 2], [f64; 2]);
 
-/// Where the other capture's picture lies on the first one's: its places times `scale` and on by `shift`, px.
+/// Where the other capture's picture lies on the first one's: its places times `scale` and on by
+/// `shift`, px.
 struct Frame {
     scale: f64,
     shift: [f64; 2],
@@ -62,33 +82,50 @@ struct Frame {
 
 impl Frame {
     fn place(&self, p: [f64; 2]) -> [f64; 2] {
-        [self.scale * p[0] + self.shift[0], self.scale * p[1] + self.shift[1]]
+        [
+            self.scale * p[0] + self.shift[0],
+            self.scale * p[1] + self.shift[1],
+        ]
     }
 
-    /// The scale and shift by which the branches that were found lie on each other best; the same for few of them.
+    /// The scale and shift by which the branches that were found lie on each other best; the same
+    /// for few of them.
     fn refined(&self, first: &Study, other: &Study, found: &[Match]) -> Self {
         let pairs: Vec<Pair> = found
             .iter()
             .enumerate()
             .filter_map(|(i, m)| match m {
-                Match::Found { branch, .. } => Some((first.branches[i].tip, other.branches[*branch].tip)),
+                Match::Found { branch, .. } => {
+                    Some((first.branches[i].tip, other.branches[*branch].tip))
+                }
                 _ => None,
             })
             .collect();
         let n = pairs.len() as f64;
         let mean = |of: &dyn Fn(&Pair) -> f64| pairs.iter().map(of).sum::<f64>() / n;
-        let (a, b) = ([0, 1].map(|c| mean(&|p| p.0[c])), [0, 1].map(|c| mean(&|p| p.1[c])));
-        let product = |p: &Pair| (0..2).map(|c| (p.0[c] - a[c]) * (p.1[c] - b[c])).sum::<f64>();
+        let (a, b) = (
+            [0, 1].map(|c| mean(&|p| p.0[c])),
+            [0, 1].map(|c| mean(&|p| p.1[c])),
+        );
+        let product = |p: &Pair| {
+            (0..2)
+                .map(|c| (p.0[c] - a[c]) * (p.1[c] - b[c]))
+                .sum::<f64>()
+        };
         let square = |p: &Pair| (0..2).map(|c| (p.1[c] - b[c]).powi(2)).sum::<f64>();
         let scale = mean(&product) / mean(&square);
         if pairs.len() < LEAST_PAIRS || !scale.is_finite() || scale <= 0.0 {
             return Self { ..*self };
         }
-        Self { scale, shift: [0, 1].map(|c| a[c] - scale * b[c]) }
+        Self {
+            scale,
+            shift: [0, 1].map(|c| a[c] - scale * b[c]),
+        }
     }
 }
 
-/// What became of the branches if the other capture's picture lies so on the first one's; nearest pairs first.
+/// What became of the branches if the other capture's picture lies so on the first one's; nearest
+/// pairs first.
 fn seen_from(first: &Study, other: &Study, frame: &Frame, size_px: f64) -> Vec<Match> {
     let off = |a: &Branch, b: &Branch| {
         let far = |p: [f64; 2], q: [f64; 2]| {
@@ -97,8 +134,11 @@ fn seen_from(first: &Study, other: &Study, frame: &Frame, size_px: f64) -> Vec<M
         };
         far(a.tip, b.tip).hypot(BASE * far(a.base, b.base))
     };
-    let table: Vec<Vec<f64>> =
-        first.branches.iter().map(|a| other.branches.iter().map(|b| off(a, b)).collect()).collect();
+    let table: Vec<Vec<f64>> = first
+        .branches
+        .iter()
+        .map(|a| other.branches.iter().map(|b| off(a, b)).collect())
+        .collect();
     let mut pairs: Vec<(f64, usize, usize)> = table
         .iter()
         .enumerate()
@@ -114,7 +154,8 @@ fn seen_from(first: &Study, other: &Study, frame: &Frame, size_px: f64) -> Vec<M
         }
         let rival = |d: f64| d < AS_NEAR * off && off > NEAR;
         let others_i = (0..taken.len()).any(|k| k != j && !taken[k] && rival(table[i][k]));
-        let others_j = (0..out.len()).any(|k| k != i && out[k] == Match::Missing && rival(table[k][j]));
+        let others_j =
+            (0..out.len()).any(|k| k != i && out[k] == Match::Missing && rival(table[k][j]));
         if others_i || others_j {
             out[i] = Match::Unclear;
         } else {
@@ -173,20 +214,39 @@ mod tests {
     }
 
     fn found(matches: &[Match]) -> Vec<Option<usize>> {
-        let found = |m: &Match| if let Match::Found { branch, .. } = m { Some(*branch) } else { None };
+        let found = |m: &Match| {
+            if let Match::Found { branch, .. } = m {
+                Some(*branch)
+            } else {
+                None
+            }
+        };
         matches.iter().map(found).collect()
     }
 
-    const TREE: [[f64; 2]; 6] =
-        [[0.0, 100.0], [-80.0, 180.0], [-40.0, 240.0], [10.0, 260.0], [70.0, 230.0], [90.0, 150.0]];
+    const TREE: [[f64; 2]; 6] = [
+        [0.0, 100.0],
+        [-80.0, 180.0],
+        [-40.0, 240.0],
+        [10.0, 260.0],
+        [70.0, 230.0],
+        [90.0, 150.0],
+    ];
 
-    /// The second film is from farther away, its outline's foot lies elsewhere, and it was cut into branches in another order.
+    /// The second film is from farther away, its outline's foot lies elsewhere, and it was cut into
+    /// branches in another order.
     #[test]
     fn a_tree_seen_from_farther_away_and_with_another_foot_is_the_same_tree() {
         let order = [0, 5, 4, 2, 1];
-        let other: Vec<[f64; 2]> = order.iter().map(|&k| [0.7 * TREE[k][0] + 6.0, 0.7 * TREE[k][1] - 9.0]).collect();
+        let other: Vec<[f64; 2]> = order
+            .iter()
+            .map(|&k| [0.7 * TREE[k][0] + 6.0, 0.7 * TREE[k][1] - 9.0])
+            .collect();
         let matches = matched(&study(&TREE), &study(&other));
-        assert_eq!(found(&matches), [Some(0), Some(4), Some(3), None, Some(2), Some(1)]);
+        assert_eq!(
+            found(&matches),
+            [Some(0), Some(4), Some(3), None, Some(2), Some(1)]
+        );
         assert_eq!(matches[3], Match::Missing);
     }
 

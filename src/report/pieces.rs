@@ -1,19 +1,26 @@
 //! The spectrum of an angle that wind drives: a mean over pieces.
 //!
-//! Wind is chance: the spectrum of a long film in one piece is as ragged as noise, however long it is, and the peaks in it are one
-//! bin wide (P. Welch 1967). The mean over pieces is smooth, and as fine as a piece is long.
+//! Wind is chance: the spectrum of a long film in one piece is as ragged as noise, however long it
+//! is, and the peaks in it are one bin wide (P. Welch 1967). The mean over pieces is smooth, and as
+//! fine as a piece is long.
 
 use crate::dynamics::{Spectrum, spectrum};
 
 /// Length of a piece, s; each begins in the middle of the one before.
 pub const PIECE_S: f64 = 20.0;
 
-/// Length of what [`averaged`] looks at in one piece, s, of a film of `span_s`: no period that is much longer shows.
+/// Length of what [`averaged`] looks at in one piece, s, of a film of `span_s`: no period that is
+/// much longer shows.
 pub fn looked_at_s(span_s: f64) -> f64 {
-    if span_s < 1.5 * PIECE_S { span_s } else { PIECE_S }
+    if span_s < 1.5 * PIECE_S {
+        span_s
+    } else {
+        PIECE_S
+    }
 }
 
-/// The root of the mean square of the pieces' spectra; the film's own where it is shorter than a piece and a half.
+/// The root of the mean square of the pieces' spectra; the film's own where it is shorter than a
+/// piece and a half.
 pub fn averaged(times_s: &[f64], values: &[f64]) -> Option<Spectrum> {
     let (first, last) = (*times_s.first()?, *times_s.last()?);
     if looked_at_s(last - first) >= last - first {
@@ -39,17 +46,24 @@ pub fn averaged(times_s: &[f64], values: &[f64]) -> Option<Spectrum> {
             let value = |k: usize| other.amplitude.get(k).copied().unwrap_or(0.0);
             value(low) + share * (value(low + 1) - value(low))
         };
-        squares.iter_mut().enumerate().for_each(|(k, s)| *s += at(k as f64 * bin_hz).powi(2));
+        squares
+            .iter_mut()
+            .enumerate()
+            .for_each(|(k, s)| *s += at(k as f64 * bin_hz).powi(2));
         n += 1.0;
     }
-    Some(Spectrum { bin_hz, amplitude: squares.into_iter().map(|s| (s / n).sqrt()).collect() })
+    Some(Spectrum {
+        bin_hz,
+        amplitude: squares.into_iter().map(|s| (s / n).sqrt()).collect(),
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// An oscillator that chance drives for long: one spectrum of it all would give a damping of about nothing.
+    /// An oscillator that chance drives for long: one spectrum of it all would give a damping of
+    /// about nothing.
     #[test]
     fn the_half_power_damping_of_a_driven_oscillator_is_of_its_size() {
         let (hz, damping, step) = (0.8, 0.06, 1.0 / 30.0);
@@ -57,19 +71,27 @@ mod tests {
         let (mut x, mut v, mut seed) = (0.0_f64, 0.0_f64, 1_u64);
         let (mut times, mut values) = (Vec::new(), Vec::new());
         for k in 0..18_000 {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            seed = seed
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             let push = (seed >> 33) as f64 / f64::from(1_u32 << 31) - 0.5;
             v += step * (push * 100.0 - 2.0 * damping * omega * v - omega * omega * x);
             x += step * v;
             times.push(f64::from(k) * step);
             values.push(x);
         }
-        let (found_hz, found) = averaged(&times, &values).unwrap().half_power([0.2, 5.0]).unwrap();
+        let (found_hz, found) = averaged(&times, &values)
+            .unwrap()
+            .half_power([0.2, 5.0])
+            .unwrap();
         assert!(
             (found_hz / hz - 1.0).abs() < 0.05 && (0.5..2.0).contains(&(found / damping)),
             "{found_hz} Hz, {found}"
         );
-        let (_, whole) = spectrum(&times, &values).unwrap().half_power([0.2, 5.0]).unwrap();
+        let (_, whole) = spectrum(&times, &values)
+            .unwrap()
+            .half_power([0.2, 5.0])
+            .unwrap();
         assert!(whole < 0.2 * damping, "{whole}");
     }
 }

@@ -1,4 +1,5 @@
-//! Plots as SVG text. Colours and widths are those of the page's style sheet, by class, so that a plot is light where the page is.
+//! Plots as SVG text. Colours and widths are those of the page's style sheet, by class, so that a
+//! plot is light where the page is.
 
 mod across;
 mod angle;

@@ -1,21 +1,32 @@
-//! What the motion says of releases that its analysis did not use: one before the part that was looked at, or others in it.
+//! What the motion says of releases that its analysis did not use: one before the part that was
+//! looked at, or others in it.
 
 use crate::dynamics::{Analysis, Film, energy};
 use crate::model::Excitation;
 
 /// Time over which speeds are taken, s.
 const OVER_S: f64 = 0.12;
-/// The film in pieces whose energy falls from each to the next: by so much at the most it may grow, to this share of itself it falls
-/// in all, and its logarithm lies so near to a straight line (share of the variance). Of 216 parts of windy films of 5 to 10 s
-/// 8 did so, of 57 parts that begin after a release 27.
+/// The film in pieces whose energy falls from each to the next: by so much at the most it may grow,
+/// to this share of itself it falls in all, and its logarithm lies so near to a straight line
+/// (share of the variance). Of 216 parts of windy films of 5 to 10 s 8 did so, of 57 parts that
+/// begin after a release 27.
 const PIECES: usize = 4;
 const GROWS: f64 = 1.15;
 const FALLS: f64 = 0.3;
 const STRAIGHT: f64 = 0.85;
 
-/// What the user should try, a sentence each. `given` is whether the user says what made the tree sway.
-pub fn hints(film: &Film, Analysis { onset, releases_s, .. }: &Analysis, given: bool) -> Vec<String> {
-    let Some(onset) = onset else { return Vec::new() };
+/// What the user should try, a sentence each. `given` is whether the user says what made the tree
+/// sway.
+pub fn hints(
+    film: &Film,
+    Analysis {
+        onset, releases_s, ..
+    }: &Analysis,
+    given: bool,
+) -> Vec<String> {
+    let Some(onset) = onset else {
+        return Vec::new();
+    };
     if releases_s.len() > 1 {
         let times: Vec<String> = releases_s.iter().map(|t| format!("{t:.1}")).collect();
         return vec![format!(
@@ -38,7 +49,8 @@ pub fn hints(film: &Film, Analysis { onset, releases_s, .. }: &Analysis, given: 
 
 /// Whether the motion grows less from begin to end, as evenly as a free sway does.
 fn dies_down(energy: &[[f64; 2]]) -> bool {
-    let mean = |piece: &[[f64; 2]]| piece.iter().map(|e| e[1]).sum::<f64>() / piece.len().max(1) as f64;
+    let mean =
+        |piece: &[[f64; 2]]| piece.iter().map(|e| e[1]).sum::<f64>() / piece.len().max(1) as f64;
     let ends: Vec<usize> = (0..=PIECES).map(|k| k * energy.len() / PIECES).collect();
     let means: Vec<f64> = ends.windows(2).map(|w| mean(&energy[w[0]..w[1]])).collect();
     if means.iter().any(|m| *m <= 0.0) || means.windows(2).any(|w| w[1] > GROWS * w[0]) {
@@ -48,9 +60,16 @@ fn dies_down(energy: &[[f64; 2]]) -> bool {
     let middle = 0.5 * (PIECES - 1) as f64;
     let average = logs.iter().sum::<f64>() / PIECES as f64;
     let product = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
-        logs.iter().enumerate().map(|(k, y)| of(k as f64 - middle, y - average)).sum()
+        logs.iter()
+            .enumerate()
+            .map(|(k, y)| of(k as f64 - middle, y - average))
+            .sum()
     };
-    let (xx, xy, yy) = (product(&|x, _| x * x), product(&|x, y| x * y), product(&|_, y| y * y));
+    let (xx, xy, yy) = (
+        product(&|x, _| x * x),
+        product(&|x, y| x * y),
+        product(&|_, y| y * y),
+    );
     xy / xx * (PIECES - 1) as f64 <= FALLS.ln() && xy * xy >= STRAIGHT * xx * yy
 }
 
@@ -64,18 +83,28 @@ mod tests {
     use std::f64::consts::TAU;
 
     fn chance(seed: &mut u64) -> f64 {
-        *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        *seed = seed
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (*seed >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
     }
 
     /// Nine points that move as `sway` says, px, each by another factor, with noise.
     fn film(seconds: f64, sway: impl Fn(f64) -> f64) -> Film {
-        let times: Vec<f64> = (0..(30.0 * seconds) as u32).map(|k| f64::from(k) / 30.0).collect();
+        let times: Vec<f64> = (0..(30.0 * seconds) as u32)
+            .map(|k| f64::from(k) / 30.0)
+            .collect();
         let mut seed = 5;
         let track = |i: u32| {
             let factor = 0.5 + 0.1 * f64::from(i);
-            let at_px = times.iter().map(|t| [100.0 + factor * sway(*t), 50.0 + 0.3 * chance(&mut seed)]).collect();
-            FilmTrack { node: NodeId(1), at_px }
+            let at_px = times
+                .iter()
+                .map(|t| [100.0 + factor * sway(*t), 50.0 + 0.3 * chance(&mut seed)])
+                .collect();
+            FilmTrack {
+                node: NodeId(1),
+                at_px,
+            }
         };
         let tracks = (0..9).map(track).collect();
         Film::new(&times, tracks)
@@ -84,12 +113,26 @@ mod tests {
     /// Let go at 0: two modes.
     fn free(t: f64) -> f64 {
         let mode = |hz: f64, px: f64| px * (-0.05 * TAU * hz * t).exp() * (TAU * hz * t).cos();
-        if t < 0.0 { 12.0 } else { mode(0.6, 9.0) + mode(0.9, 3.0) }
+        if t < 0.0 {
+            12.0
+        } else {
+            mode(0.6, 9.0) + mode(0.9, 3.0)
+        }
     }
 
     fn told(excitation: Excitation) -> Analysis {
-        let onset = Onset { excitation, start: Start::Moving, at_s: 0.0, from: 0, to: 300 };
-        Analysis { sway: Vec::new(), onset: Some(onset), releases_s: Vec::new() }
+        let onset = Onset {
+            excitation,
+            start: Start::Moving,
+            at_s: 0.0,
+            from: 0,
+            to: 300,
+        };
+        Analysis {
+            sway: Vec::new(),
+            onset: Some(onset),
+            releases_s: Vec::new(),
+        }
     }
 
     /// What is told of a film of a trunk.
@@ -108,7 +151,10 @@ mod tests {
         let skeleton = Skeleton {
             nodes: vec![node(0), node(1)],
             foot_px: [100.0; 2],
-            image_size: Size { width: 640, height: 360 },
+            image_size: Size {
+                width: 640,
+                height: 360,
+            },
         };
         analyse(&skeleton, film, &Dynamics::default())
     }
@@ -135,7 +181,9 @@ mod tests {
 
     /// Wind that rests twice.
     fn with_lulls(seed: u64) -> Film {
-        let all = shaken(seed, 1500, 0.1, |k| (60..420).contains(&k) || (660..1020).contains(&k));
+        let all = shaken(seed, 1500, 0.1, |k| {
+            (60..420).contains(&k) || (660..1020).contains(&k)
+        });
         film(50.0, |t| all[((30.0 * t).round() as usize).min(1499)])
     }
 
@@ -151,11 +199,24 @@ mod tests {
     fn a_part_after_the_release_that_is_taken_for_wind_gets_a_hint() {
         let late = film(9.0, |t| free(t + 2.0));
         let hint = hints(&late, &told(Excitation::Wind), false);
-        assert!(hint.len() == 1 && hint[0].contains("--excitation release"), "{hint:?}");
+        assert!(
+            hint.len() == 1 && hint[0].contains("--excitation release"),
+            "{hint:?}"
+        );
         // Not where it is said what it was, or was told rightly.
         assert!(hints(&late, &told(Excitation::Wind), true).is_empty());
         assert!(hints(&late, &told(Excitation::Release), false).is_empty());
-        assert!(hints(&late, &Analysis { onset: None, ..told(Excitation::Wind) }, false).is_empty());
+        assert!(
+            hints(
+                &late,
+                &Analysis {
+                    onset: None,
+                    ..told(Excitation::Wind)
+                },
+                false
+            )
+            .is_empty()
+        );
     }
 
     /// Taken for one decay, or for wind, two would give wrong answers, and nobody would know.
@@ -173,34 +234,64 @@ mod tests {
             let twice = film(27.0, twice);
             let found = analysed(&twice);
             let hint = hints(&twice, &found, false);
-            assert!(hint.len() == 1 && hint[0].contains("let go 2 times, at 1.0, 17.0 s"), "{hint:?}");
             assert!(
-                found.onset.is_some_and(|o| (o.at_s - 1.0).abs() < 0.05 && o.to <= 30 * 14 + 3),
+                hint.len() == 1 && hint[0].contains("let go 2 times, at 1.0, 17.0 s"),
+                "{hint:?}"
+            );
+            assert!(
+                found
+                    .onset
+                    .is_some_and(|o| (o.at_s - 1.0).abs() < 0.05 && o.to <= 30 * 14 + 3),
                 "{:?}",
                 found.onset
             );
-            assert!(found.sway[1].is_ok_and(|sway| sway.frequency_hz.holds(0.6)), "{:?}", found.sway);
+            assert!(
+                found.sway[1].is_ok_and(|sway| sway.frequency_hz.holds(0.6)),
+                "{:?}",
+                found.sway
+            );
         }
     }
 
     /// A hand that jerks is no release, in a film with one either.
     #[test]
     fn a_pull_with_a_jerk_before_the_release_is_no_release() {
-        let pulled = |t: f64| if t < 1.0 { 0.0 } else { (t - 1.0).min(0.3) * 40.0 };
+        let pulled = |t: f64| {
+            if t < 1.0 {
+                0.0
+            } else {
+                (t - 1.0).min(0.3) * 40.0
+            }
+        };
         let once = film(16.0, |t| if t < 4.0 { pulled(t) } else { free(t - 4.0) });
         let found = analysed(&once);
-        assert!(hints(&once, &found, false).is_empty(), "{:?}", hints(&once, &found, false));
-        assert!(found.onset.is_some_and(|o| (o.at_s - 4.0).abs() < 0.05), "{:?}", found.onset);
-        assert!(found.sway[1].is_ok_and(|sway| sway.frequency_hz.holds(0.6)), "{:?}", found.sway);
+        assert!(
+            hints(&once, &found, false).is_empty(),
+            "{:?}",
+            hints(&once, &found, false)
+        );
+        assert!(
+            found.onset.is_some_and(|o| (o.at_s - 4.0).abs() < 0.05),
+            "{:?}",
+            found.onset
+        );
+        assert!(
+            found.sway[1].is_ok_and(|sway| sway.frequency_hz.holds(0.6)),
+            "{:?}",
+            found.sway
+        );
     }
 
     /// Wind that happens to fade over the film cannot be told from a free sway by its energy alone.
     #[test]
     fn wind_seldom_gets_a_hint_and_stillness_none() {
-        let hinted: Vec<u64> =
-            (0..60).filter(|&seed| !hints(&windy(seed), &told(Excitation::Wind), false).is_empty()).collect();
+        let hinted: Vec<u64> = (0..60)
+            .filter(|&seed| !hints(&windy(seed), &told(Excitation::Wind), false).is_empty())
+            .collect();
         assert!(hinted.len() <= 3, "{hinted:?} of 60");
-        let released: Vec<u64> = (0..60).filter(|&seed| !analysed(&windy(seed)).releases_s.is_empty()).collect();
+        let released: Vec<u64> = (0..60)
+            .filter(|&seed| !analysed(&windy(seed)).releases_s.is_empty())
+            .collect();
         assert!(released.len() <= 1, "{released:?} of 60");
         assert!(hints(&film(10.0, |_| 0.0), &told(Excitation::Wind), false).is_empty());
         assert!(hints(&Film::default(), &told(Excitation::Wind), false).is_empty());

@@ -3,14 +3,15 @@
 use super::decaying::{Decaying, decaying};
 use super::pieces::{averaged, looked_at_s};
 use crate::dynamics::{
-    Analysis, Film, LEAST_PERIODS, Onset, Spectrum, angle_in_space_deg, angle_to_parent_deg, spectrum,
+    Analysis, Film, LEAST_PERIODS, Onset, Spectrum, angle_in_space_deg, angle_to_parent_deg,
+    spectrum,
 };
 use crate::model::{Excitation, NodeId, Pose, Skeleton, Sway, Swaying, Unidentified};
 
 /// A step from frame to frame that is so many times the usual one is a gap.
 const GAP: f64 = 1.6;
-/// The points and the angle of the model see a branch's amplitude in different ways; farther apart than so many times, neither
-/// is told.
+/// The points and the angle of the model see a branch's amplitude in different ways; farther apart
+/// than so many times, neither is told.
 const AGREE: f64 = 1.5;
 
 /// What a [`Study`] is made from.
@@ -21,7 +22,8 @@ pub struct Given<'a> {
     /// What was filmed: the name of the source.
     pub source: &'a str,
     pub skeleton: &'a Skeleton,
-    /// The points that were analysed, and poses of the same time; none where `motion.csv` is missing.
+    /// The points that were analysed, and poses of the same time; none where `motion.csv` is
+    /// missing.
     pub film: &'a Film,
     pub poses: &'a [Pose],
     pub analysis: &'a Analysis,
@@ -47,7 +49,8 @@ pub struct Study {
     pub source: String,
     /// Size of the picture, px.
     pub size: [u32; 2],
-    /// First and last frame that were analysed, s since the first of the capture, and how many there are.
+    /// First and last frame that were analysed, s since the first of the capture, and how many
+    /// there are.
     pub span_s: [f64; 2],
     pub frames: usize,
     /// Times without frames: after which moment, and how long, s.
@@ -69,7 +72,8 @@ pub struct Study {
     pub notes: Vec<String>,
 }
 
-/// One measured branch. Places are in the picture at rest, px to the right of the trunk's foot and above it.
+/// One measured branch. Places are in the picture at rest, px to the right of the trunk's foot and
+/// above it.
 #[derive(Clone, Debug)]
 pub struct Branch {
     /// As in `nodes.csv`.
@@ -82,26 +86,31 @@ pub struct Branch {
     pub base: [f64; 2],
     pub tip: [f64; 2],
     pub sway: Swaying,
-    /// Amplitude of the branch's own oscillation in its angle to the one that carries it, degrees; no number where unknown.
+    /// Amplitude of the branch's own oscillation in its angle to the one that carries it, degrees;
+    /// no number where unknown.
     pub amplitude_deg: f64,
-    /// What it is told from: by the turn of the points about the place where the branch begins at rest, which a move of that
-    /// place makes larger or smaller; and after a release by the angle in the picture's plane, as in
-    /// [`fitted_deg`](Self::fitted_deg). No numbers where unknown.
+    /// What it is told from: by the turn of the points about the place where the branch begins at
+    /// rest, which a move of that place makes larger or smaller; and after a release by the angle
+    /// in the picture's plane, as in [`fitted_deg`](Self::fitted_deg). No numbers where unknown.
     pub by_points_deg: f64,
     pub in_angle_deg: f64,
     /// What the amplitude is at the branch's end, px in the picture; no number where unknown.
     pub amplitude_px: f64,
-    /// When every angle was, s; empty without poses. The angles are to the branch that carries it, less their mean, degrees:
-    /// in the picture's plane and in space (002 eq. 1); no number where it has no direction.
+    /// When every angle was, s; empty without poses. The angles are to the branch that carries it,
+    /// less their mean, degrees: in the picture's plane and in space (002 eq. 1); no number where
+    /// it has no direction.
     pub times_s: Vec<f64>,
     pub plane_deg: Vec<f64>,
     pub space_deg: Vec<f64>,
-    /// After a release: the part of the angle in the picture's plane that has the branch's own frequency and damping.
+    /// After a release: the part of the angle in the picture's plane that has the branch's own
+    /// frequency and damping.
     pub fitted_deg: Option<Vec<f64>>,
-    /// Of the angle in the picture's plane, degrees, over the time that the answer comes from; in wind a mean over pieces.
+    /// Of the angle in the picture's plane, degrees, over the time that the answer comes from; in
+    /// wind a mean over pieces.
     pub spectrum: Option<Spectrum>,
     pub reference: Option<Reference>,
-    /// Where its end went: to the right of its place at rest and above it, px, by [`times_s`](Self::times_s).
+    /// Where its end went: to the right of its place at rest and above it, px, by
+    /// [`times_s`](Self::times_s).
     pub way_px: Vec<[f64; 2]>,
 }
 
@@ -116,12 +125,28 @@ pub struct Reference {
 impl Study {
     /// Puts together what is told of a capture.
     pub fn of(given: &Given) -> Self {
-        let Given { skeleton, film, analysis, .. } = *given;
+        let Given {
+            skeleton,
+            film,
+            analysis,
+            ..
+        } = *given;
         let times = &film.times_s;
         let usual_s = film.step_s();
-        let gaps_s = times.windows(2).filter(|w| w[1] - w[0] > GAP * usual_s).map(|w| [w[0], w[1] - w[0]]).collect();
-        let ends = times.first().zip(times.last()).map_or([0.0; 2], |(a, b)| [*a, *b]);
-        let source = given.source.rsplit(['/', '\\']).find(|part| !part.is_empty()).unwrap_or_default();
+        let gaps_s = times
+            .windows(2)
+            .filter(|w| w[1] - w[0] > GAP * usual_s)
+            .map(|w| [w[0], w[1] - w[0]])
+            .collect();
+        let ends = times
+            .first()
+            .zip(times.last())
+            .map_or([0.0; 2], |(a, b)| [*a, *b]);
+        let source = given
+            .source
+            .rsplit(['/', '\\'])
+            .find(|part| !part.is_empty())
+            .unwrap_or_default();
         let mut study = Self {
             name: given.name.into(),
             source: source.into(),
@@ -130,7 +155,9 @@ impl Study {
             frames: times.len(),
             gaps_s,
             onset: analysis.onset,
-            used_s: analysis.onset.map_or(ends, |onset| used_s(&onset, times, ends)),
+            used_s: analysis
+                .onset
+                .map_or(ends, |onset| used_s(&onset, times, ends)),
             given: given.excitation,
             metres_per_px: given.metres_per_px,
             highest_hz: given.highest_hz,
@@ -141,8 +168,14 @@ impl Study {
             notes: given.notes.to_vec(),
         };
         for i in 1..skeleton.measured() {
-            let sway = analysis.sway.get(i).copied().unwrap_or(Err(Unidentified::NotMeasured));
-            study.branches.push(branch(given, NodeId(i as u32), sway, study.used_s));
+            let sway = analysis
+                .sway
+                .get(i)
+                .copied()
+                .unwrap_or(Err(Unidentified::NotMeasured));
+            study
+                .branches
+                .push(branch(given, NodeId(i as u32), sway, study.used_s));
         }
         study
     }
@@ -150,12 +183,19 @@ impl Study {
     /// Frames a second, by their real times; no number for less than two.
     pub fn rate_hz(&self) -> f64 {
         let span_s = self.span_s[1] - self.span_s[0];
-        if span_s > 0.0 { (self.frames.saturating_sub(1)) as f64 / span_s } else { f64::NAN }
+        if span_s > 0.0 {
+            (self.frames.saturating_sub(1)) as f64 / span_s
+        } else {
+            f64::NAN
+        }
     }
 
     /// How much higher than the foot, or farther from it, the tree's farthest branch ends, px.
     pub fn size_px(&self) -> f64 {
-        self.branches.iter().map(|b| b.tip[0].hypot(b.tip[1])).fold(0.0, f64::max)
+        self.branches
+            .iter()
+            .map(|b| b.tip[0].hypot(b.tip[1]))
+            .fold(0.0, f64::max)
     }
 
     /// The branch of a number.
@@ -181,14 +221,20 @@ impl Branch {
     }
 }
 
-/// First and last moment of the frames that an analysis has used, of a film from and to these `ends`, s.
+/// First and last moment of the frames that an analysis has used, of a film from and to these
+/// `ends`, s.
 fn used_s(onset: &Onset, times_s: &[f64], ends: [f64; 2]) -> [f64; 2] {
     let at = |k: usize| times_s.get(k).copied();
-    [at(onset.from).unwrap_or(ends[0]), at(onset.to.saturating_sub(1)).unwrap_or(ends[1])]
+    [
+        at(onset.from).unwrap_or(ends[0]),
+        at(onset.to.saturating_sub(1)).unwrap_or(ends[1]),
+    ]
 }
 
 fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: [f64; 2]) -> Branch {
-    let Given { skeleton, poses, .. } = *given;
+    let Given {
+        skeleton, poses, ..
+    } = *given;
     let at = &skeleton.nodes[node.index()];
     let place = |n: NodeId| {
         let p = skeleton.nodes[n.index()].position;
@@ -197,21 +243,46 @@ fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: [f64; 2]) -> Branc
     let parent = skeleton.ancestors(node).next().unwrap_or(NodeId(0));
     let (base, tip) = (place(parent), place(node));
     let length_px = (tip[0] - base[0]).hypot(tip[1] - base[1]);
-    let of_node = |p: &Pose| p.joints.get(node.index()).map_or([f64::NAN; 2], |j| [j.position.x, j.position.y]);
+    let of_node = |p: &Pose| {
+        p.joints
+            .get(node.index())
+            .map_or([f64::NAN; 2], |j| [j.position.x, j.position.y])
+    };
     let times_s: Vec<f64> = poses.iter().map(|p| p.time_s).collect();
-    let [plane_deg, space_deg] =
-        [angle_to_parent_deg(skeleton, poses, node), angle_in_space_deg(skeleton, poses, node)].map(centred);
-    let used: Vec<usize> = (0..times_s.len()).filter(|&k| used_s[0] <= times_s[k] && times_s[k] <= used_s[1]).collect();
+    let [plane_deg, space_deg] = [
+        angle_to_parent_deg(skeleton, poses, node),
+        angle_in_space_deg(skeleton, poses, node),
+    ]
+    .map(centred);
+    let used: Vec<usize> = (0..times_s.len())
+        .filter(|&k| used_s[0] <= times_s[k] && times_s[k] <= used_s[1])
+        .collect();
     let of_used = |all: &[f64]| used.iter().map(|&k| all[k]).collect::<Vec<f64>>();
-    let driven = given.analysis.onset.is_none_or(|o| o.excitation == Excitation::Wind);
-    let (spectrum, reference) = seen(&of_used(&times_s), &of_used(&plane_deg), driven, given.highest_hz);
+    let driven = given
+        .analysis
+        .onset
+        .is_none_or(|o| o.excitation == Excitation::Wind);
+    let (spectrum, reference) = seen(
+        &of_used(&times_s),
+        &of_used(&plane_deg),
+        driven,
+        given.highest_hz,
+    );
     // Its end is seen to move with what it carries, too.
-    let carried =
-        (0..skeleton.nodes.len() as u32).map(NodeId).filter(|n| skeleton.nodes[n.index()].parent == Some(node));
+    let carried = (0..skeleton.nodes.len() as u32)
+        .map(NodeId)
+        .filter(|n| skeleton.nodes[n.index()].parent == Some(node));
     let others: Vec<Sway> = skeleton
         .ancestors(node)
         .chain(carried)
-        .filter_map(|p| given.analysis.sway.get(p.index()).copied().and_then(Result::ok))
+        .filter_map(|p| {
+            given
+                .analysis
+                .sway
+                .get(p.index())
+                .copied()
+                .and_then(Result::ok)
+        })
         .collect();
     let fitted = sway
         .ok()
@@ -219,13 +290,26 @@ fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: [f64; 2]) -> Branc
         .zip(given.analysis.onset)
         .and_then(|(own, onset)| decaying(&times_s, &plane_deg, used_s, onset.at_s, &own, &others));
     let by_points_deg = sway.map_or(f64::NAN, |s| s.amplitude_deg);
-    let (fitted_deg, in_angle_deg) =
-        fitted.map_or((None, f64::NAN), |Decaying { curve_deg, amplitude_deg }| (Some(curve_deg), amplitude_deg));
+    let (fitted_deg, in_angle_deg) = fitted.map_or(
+        (None, f64::NAN),
+        |Decaying {
+             curve_deg,
+             amplitude_deg,
+         }| (Some(curve_deg), amplitude_deg),
+    );
     let in_angle = poses.len() > 1 && sway.is_ok_and(|s| s.excitation == Excitation::Release);
-    let amplitude_deg = if in_angle { agreed(by_points_deg, in_angle_deg) } else { by_points_deg };
+    let amplitude_deg = if in_angle {
+        agreed(by_points_deg, in_angle_deg)
+    } else {
+        by_points_deg
+    };
     Branch {
         name: at.name.0,
-        parent: at.parent.and(skeleton.nodes.get(parent.index())).filter(|p| p.parent.is_some()).map(|p| p.name.0),
+        parent: at
+            .parent
+            .and(skeleton.nodes.get(parent.index()))
+            .filter(|p| p.parent.is_some())
+            .map(|p| p.name.0),
         level: at.level,
         points: at.n_tracks,
         base,
@@ -235,7 +319,11 @@ fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: [f64; 2]) -> Branc
         by_points_deg,
         in_angle_deg,
         amplitude_px: amplitude_deg.to_radians() * length_px,
-        way_px: poses.iter().map(of_node).map(|[x, y]| [x - tip[0], y - tip[1]]).collect(),
+        way_px: poses
+            .iter()
+            .map(of_node)
+            .map(|[x, y]| [x - tip[0], y - tip[1]])
+            .collect(),
         times_s,
         plane_deg,
         space_deg,
@@ -248,20 +336,40 @@ fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: [f64; 2]) -> Branc
 /// An amplitude that is seen in an angle, if the points do not contradict it.
 fn agreed(by_points: f64, in_angle: f64) -> f64 {
     let apart = (in_angle / by_points).ln().abs();
-    if apart <= AGREE.ln() { in_angle } else { f64::NAN }
+    if apart <= AGREE.ln() {
+        in_angle
+    } else {
+        f64::NAN
+    }
 }
 
-/// The spectrum of an angle, of one that wind has `driven` as a mean over pieces, and what its largest peak says.
-fn seen(times_s: &[f64], angle_deg: &[f64], driven: bool, highest_hz: f64) -> (Option<Spectrum>, Option<Reference>) {
-    let spectrum = if driven { averaged(times_s, angle_deg) } else { spectrum(times_s, angle_deg) };
-    let span_s = times_s.last().zip(times_s.first()).map_or(0.0, |(b, a)| b - a);
+/// The spectrum of an angle, of one that wind has `driven` as a mean over pieces, and what its
+/// largest peak says.
+fn seen(
+    times_s: &[f64],
+    angle_deg: &[f64],
+    driven: bool,
+    highest_hz: f64,
+) -> (Option<Spectrum>, Option<Reference>) {
+    let spectrum = if driven {
+        averaged(times_s, angle_deg)
+    } else {
+        spectrum(times_s, angle_deg)
+    };
+    let span_s = times_s
+        .last()
+        .zip(times_s.first())
+        .map_or(0.0, |(b, a)| b - a);
     // What is slower is drift, that the bins of the piece cannot tell from sway.
     let piece_s = if driven { looked_at_s(span_s) } else { span_s };
     let reference = spectrum
         .as_ref()
         .filter(|_| piece_s > 0.0)
         .and_then(|s| s.half_power([LEAST_PERIODS / piece_s, highest_hz]))
-        .map(|(peak_hz, damping_ratio)| Reference { peak_hz, damping_ratio });
+        .map(|(peak_hz, damping_ratio)| Reference {
+            peak_hz,
+            damping_ratio,
+        });
     (spectrum, reference)
 }
 
@@ -277,24 +385,40 @@ fn centred(mut angles: Vec<f64>) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// A stub of two points that its carrier takes along seems to turn by 30 degrees: no number that only one witness gives.
+    /// A stub of two points that its carrier takes along seems to turn by 30 degrees: no number
+    /// that only one witness gives.
     #[test]
     fn an_amplitude_that_points_and_angle_do_not_agree_on_is_not_told() {
         assert_eq!((agreed(3.0, 4.0), agreed(4.0, 3.0)), (4.0, 3.0));
-        for (points, angle) in [(30.6, 4.4), (1.5, 17.1), (f64::NAN, 1.0), (1.0, f64::NAN), (0.0, 1.0), (0.0, 0.0)] {
+        for (points, angle) in [
+            (30.6, 4.4),
+            (1.5, 17.1),
+            (f64::NAN, 1.0),
+            (1.0, f64::NAN),
+            (0.0, 1.0),
+            (0.0, 0.0),
+        ] {
             assert!(agreed(points, angle).is_nan(), "{points} and {angle}");
         }
     }
 
-    /// Pieces of 20 s cannot tell a sway of 20 s from drift, however many minutes of wind there are.
+    /// Pieces of 20 s cannot tell a sway of 20 s from drift, however many minutes of wind there
+    /// are.
     #[test]
     fn drift_that_is_as_slow_as_a_piece_is_not_the_reference() {
         let times: Vec<f64> = (0..3600).map(|k| f64::from(k) / 30.0).collect();
         let wave = |hz: f64, t: f64| (std::f64::consts::TAU * hz * t).sin();
-        let angle: Vec<f64> = times.iter().map(|t| 1.5 * wave(0.05, *t) + wave(0.8, *t)).collect();
+        let angle: Vec<f64> = times
+            .iter()
+            .map(|t| 1.5 * wave(0.05, *t) + wave(0.8, *t))
+            .collect();
         let peak_hz = |driven| seen(&times, &angle, driven, 5.0).1.unwrap().peak_hz;
         assert!((peak_hz(true) - 0.8).abs() < 0.03, "{} Hz", peak_hz(true));
         // In one piece of two minutes it is a sway like any other.
-        assert!((peak_hz(false) - 0.05).abs() < 0.01, "{} Hz", peak_hz(false));
+        assert!(
+            (peak_hz(false) - 0.05).abs() < 0.01,
+            "{} Hz",
+            peak_hz(false)
+        );
     }
 }

@@ -10,8 +10,8 @@ use super::words;
 use crate::model::Interval;
 pub use compared::{heading, lost, unmatched};
 
-/// Everything as text, a table a capture, and what compares them; for a terminal of `columns`, if that is not wide enough, without
-/// what is needed least.
+/// Everything as text, a table a capture, and what compares them; for a terminal of `columns`, if
+/// that is not wide enough, without what is needed least.
 pub fn text(studies: &[Study], comparison: Option<&Comparison>, columns: Option<usize>) -> String {
     let mut out: Vec<String> = studies.iter().map(|study| one(study, columns)).collect();
     out.extend(comparison.map(|c| compared::compared(studies, c, columns)));
@@ -19,14 +19,30 @@ pub fn text(studies: &[Study], comparison: Option<&Comparison>, columns: Option<
 }
 
 fn one(study: &Study, columns: Option<usize>) -> String {
-    let Study { name, source, branches, .. } = study;
-    let mut top = format!("{name}: {source}, {}, {}\n", words::frames(study), words::gaps(study));
+    let Study {
+        name,
+        source,
+        branches,
+        ..
+    } = study;
+    let mut top = format!(
+        "{name}: {source}, {}, {}\n",
+        words::frames(study),
+        words::gaps(study)
+    );
     top += &format!("{}\n", words::excitation(study));
     let (answers, all) = (study.answers(), words::number_of(branches.len(), "branch"));
-    top += &format!("{answers} of {all} have a frequency that this film shows; intervals are 95 %\n\n");
+    top += &format!(
+        "{answers} of {all} have a frequency that this film shows; intervals are 95 %\n\n"
+    );
     let metres = study.metres_per_px > 0.0;
     let mut heads = vec![("branch", 0), ("level", 6), ("on", 1), ("points", 7)];
-    heads.extend([("frequency, Hz", 0), ("damping ratio", 0), ("sway, deg", 3), ("end, px", 5)]);
+    heads.extend([
+        ("frequency, Hz", 0),
+        ("damping ratio", 0),
+        ("sway, deg", 3),
+        ("end, px", 5),
+    ]);
     heads.extend(metres.then_some(("end, m", 4)));
     heads.extend([("peak, Hz", 8), ("eq. 6", 8)]);
     let mut table = Table::new(&heads);
@@ -34,14 +50,20 @@ fn one(study: &Study, columns: Option<usize>) -> String {
     let (table, without) = table.within(columns);
     let mut notes = String::new();
     if !without.iter().any(|head| head == "eq. 6") {
-        notes +=
-            "  peak and eq. 6: the largest peak of the angle's spectrum and its half-power damping, for reference\n";
+        notes += "  peak and eq. 6: the largest peak of the angle's spectrum and its half-power damping, for reference\n";
     }
-    if branches.iter().any(|b| b.sway.is_ok() && !b.amplitude_deg.is_finite()) {
+    if branches
+        .iter()
+        .any(|b| b.sway.is_ok() && !b.amplitude_deg.is_finite())
+    {
         notes += "  sway -: a branch's points and its angle do not agree on how far it sways\n";
     }
     notes += &left_out(&without);
-    let mut out = format!("{}{table}\n{}\n", wrapped(&top, columns), wrapped(&notes, columns));
+    let mut out = format!(
+        "{}{table}\n{}\n",
+        wrapped(&top, columns),
+        wrapped(&notes, columns)
+    );
     let by_level = levels(study);
     if by_level.iter().any(|l| l.answers > 0) {
         out += &level_table(&by_level, columns);
@@ -53,57 +75,102 @@ fn one(study: &Study, columns: Option<usize>) -> String {
 fn left_out(heads: &[String]) -> String {
     match heads {
         [] => String::new(),
-        _ => format!("  for want of room without: {}; a wider terminal or --json has them\n", heads.join("; ")),
+        _ => format!(
+            "  for want of room without: {}; a wider terminal or --json has them\n",
+            heads.join("; ")
+        ),
     }
 }
 
 fn row(study: &Study, branch: &Branch) -> Vec<String> {
     let carrier = branch.parent.map_or("foot".into(), |p| p.to_string());
-    let mut row = vec![branch.name.to_string(), branch.level.to_string(), carrier, branch.points.to_string()];
+    let mut row = vec![
+        branch.name.to_string(),
+        branch.level.to_string(),
+        carrier,
+        branch.points.to_string(),
+    ];
     match branch.sway {
         Err(why) => row.push(format!("  none: {why}")),
         Ok(sway) => {
             row.push(interval(&sway.frequency_hz, 3));
-            row.push(sway.damping_ratio.map_or("unknown".into(), |d| interval(&d, 3)));
+            row.push(
+                sway.damping_ratio
+                    .map_or("unknown".into(), |d| interval(&d, 3)),
+            );
             row.push(number(branch.amplitude_deg, 2));
             row.push(number(branch.amplitude_px, 1));
             if study.metres_per_px > 0.0 {
                 row.push(number(branch.amplitude_px * study.metres_per_px, 4));
             }
             row.push(number(branch.reference.map_or(f64::NAN, |r| r.peak_hz), 2));
-            row.push(number(branch.reference.map_or(f64::NAN, |r| r.damping_ratio), 3));
+            row.push(number(
+                branch.reference.map_or(f64::NAN, |r| r.damping_ratio),
+                3,
+            ));
         }
     }
     row
 }
 
 fn level_table(levels: &[Level], columns: Option<usize>) -> String {
-    let heads = [("level", 0), ("branches", 2), ("answers", 1), ("frequency, Hz", 0), ("damping ratio", 0)];
+    let heads = [
+        ("level", 0),
+        ("branches", 2),
+        ("answers", 1),
+        ("frequency, Hz", 0),
+        ("damping ratio", 0),
+    ];
     let mut table = Table::new(&heads);
     let spread = |s: &Option<Spread>| s.as_ref().map_or("-".into(), |s| spread(s, 3));
     for l in levels {
-        let counts = [u64::from(l.level), l.branches as u64, l.answers as u64].map(|n| n.to_string());
-        table.push(counts.into_iter().chain([spread(&l.frequency_hz), spread(&l.damping_ratio)]).collect());
+        let counts =
+            [u64::from(l.level), l.branches as u64, l.answers as u64].map(|n| n.to_string());
+        table.push(
+            counts
+                .into_iter()
+                .chain([spread(&l.frequency_hz), spread(&l.damping_ratio)])
+                .collect(),
+        );
     }
     format!("{}  (median, least to largest)\n", table.within(columns).0)
 }
 
 /// How frequency and damping grow with the level, in words.
 pub fn trends(study: &Study) -> String {
-    let of = |what: &str, g: Option<Growth>| g.map_or(String::new(), |g| format!("  {}\n", trend(what, &g)));
+    let of = |what: &str, g: Option<Growth>| {
+        g.map_or(String::new(), |g| format!("  {}\n", trend(what, &g)))
+    };
     let frequency = of("frequency", growth(study, |s| Some(s.frequency_hz.value)));
-    frequency + &of("damping", growth(study, |s| s.damping_ratio.map(|d| d.value)))
+    frequency
+        + &of(
+            "damping",
+            growth(study, |s| s.damping_ratio.map(|d| d.value)),
+        )
 }
 
-/// `frequency by level: +12 % a level (+5 to +20 %, of 9 branches)`, and whether that is more than chance.
+/// `frequency by level: +12 % a level (+5 to +20 %, of 9 branches)`, and whether that is more than
+/// chance.
 pub fn trend(what: &str, growth: &Growth) -> String {
-    let chance = if growth.percent.holds(0.0) { "; no trend beyond chance" } else { "" };
-    format!("{what} by level: {} a level, of {} branches{chance}", percent(&growth.percent), growth.branches)
+    let chance = if growth.percent.holds(0.0) {
+        "; no trend beyond chance"
+    } else {
+        ""
+    };
+    format!(
+        "{what} by level: {} a level, of {} branches{chance}",
+        percent(&growth.percent),
+        growth.branches
+    )
 }
 
 /// `+1.2 % (0.4 to 2.0 %)`, with a star where it counts.
 pub fn changed(change: &Change) -> String {
-    format!("{}{}", percent(&change.percent), if change.beyond { " *" } else { "" })
+    format!(
+        "{}{}",
+        percent(&change.percent),
+        if change.beyond { " *" } else { "" }
+    )
 }
 
 /// `+1.2 % (+0.4 to +2.0 %)`.
@@ -111,20 +178,45 @@ pub fn percent(of: &Interval) -> String {
     let decimals = if (of.hi - of.lo).abs() < 10.0 { 1 } else { 0 };
     let signed = |x: f64| {
         let text = format!("{x:+.decimals$}");
-        if text.trim_start_matches(['+', '-']).chars().all(|c| c == '0' || c == '.') { text[1..].into() } else { text }
+        if text
+            .trim_start_matches(['+', '-'])
+            .chars()
+            .all(|c| c == '0' || c == '.')
+        {
+            text[1..].into()
+        } else {
+            text
+        }
     };
-    format!("{} % ({} to {} %)", signed(of.value), signed(of.lo), signed(of.hi))
+    format!(
+        "{} % ({} to {} %)",
+        signed(of.value),
+        signed(of.lo),
+        signed(of.hi)
+    )
 }
 
 /// `0.700 (0.699 to 0.702)`: digits enough to tell the ends apart.
 pub fn interval(of: &Interval, decimals: usize) -> String {
-    let decimals = if (of.hi - of.lo) < 4.0 * 10.0_f64.powi(-(decimals as i32)) { decimals + 1 } else { decimals };
-    format!("{:.decimals$} ({:.decimals$} to {:.decimals$})", of.value, of.lo, of.hi)
+    let decimals = if (of.hi - of.lo) < 4.0 * 10.0_f64.powi(-(decimals as i32)) {
+        decimals + 1
+    } else {
+        decimals
+    };
+    format!(
+        "{:.decimals$} ({:.decimals$} to {:.decimals$})",
+        of.value, of.lo, of.hi
+    )
 }
 
 /// `1.23 (0.70 to 2.10)`; the value alone where there is just one.
 pub fn spread(of: &Spread, decimals: usize) -> String {
-    let Spread { n, median, least, largest } = of;
+    let Spread {
+        n,
+        median,
+        least,
+        largest,
+    } = of;
     if *n < 2 {
         return format!("{median:.decimals$}");
     }
@@ -133,5 +225,9 @@ pub fn spread(of: &Spread, decimals: usize) -> String {
 
 /// A number for people; `-` for none.
 pub fn number(x: f64, decimals: usize) -> String {
-    if x.is_finite() { format!("{x:.decimals$}") } else { "-".into() }
+    if x.is_finite() {
+        format!("{x:.decimals$}")
+    } else {
+        "-".into()
+    }
 }

@@ -5,7 +5,8 @@ use crate::model::{Angles, NodeId, NodeName, Pose, Skeleton};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// A window that slides along. A row is shared by all that look at it: a copy of the whole window costs one count a frame.
+/// A window that slides along. A row is shared by all that look at it: a copy of the whole window
+/// costs one count a frame.
 pub struct AngleWindow {
     window_s: f64,
     nodes: Arc<[NodeName]>,
@@ -16,22 +17,37 @@ pub struct AngleWindow {
 impl AngleWindow {
     /// Keeps `window_s` seconds.
     pub fn new(window_s: f64) -> Self {
-        Self { window_s, nodes: Arc::default(), followers: Vec::new(), rows: VecDeque::new() }
+        Self {
+            window_s,
+            nodes: Arc::default(),
+            followers: Vec::new(),
+            rows: VecDeque::new(),
+        }
     }
 
     /// Begins anew with the measured branches of `skeleton`.
     pub fn begin(&mut self, skeleton: &Skeleton) {
         let measured = &skeleton.nodes[..skeleton.measured()];
         self.nodes = measured.iter().skip(1).map(|n| n.name).collect();
-        self.followers = (1..measured.len()).map(|i| AngleToParent::new(skeleton, NodeId(i as u32))).collect();
+        self.followers = (1..measured.len())
+            .map(|i| AngleToParent::new(skeleton, NodeId(i as u32)))
+            .collect();
         self.rows.clear();
     }
 
     /// Takes the next pose.
     pub fn push(&mut self, pose: &Pose) {
-        let row = self.followers.iter_mut().map(|f| f.step(pose) as f32).collect();
+        let row = self
+            .followers
+            .iter_mut()
+            .map(|f| f.step(pose) as f32)
+            .collect();
         self.rows.push_back((pose.time_s, row));
-        while self.rows.front().is_some_and(|(t, _)| pose.time_s - t > self.window_s) {
+        while self
+            .rows
+            .front()
+            .is_some_and(|(t, _)| pose.time_s - t > self.window_s)
+        {
             self.rows.pop_front();
         }
     }
@@ -40,7 +56,10 @@ impl AngleWindow {
     pub fn last(&self, span_s: f64) -> Angles {
         let from_s = self.rows.back().map_or(0.0, |(t, _)| t - span_s);
         let from = self.rows.partition_point(|(t, _)| *t < from_s);
-        Angles { nodes: self.nodes.clone(), rows: self.rows.range(from..).cloned().collect() }
+        Angles {
+            nodes: self.nodes.clone(),
+            rows: self.rows.range(from..).cloned().collect(),
+        }
     }
 }
 
@@ -65,18 +84,30 @@ mod tests {
             copy_of: None,
             plane_angle: 0.0,
         };
-        let skeleton = Skeleton { nodes: (0..3).map(node).collect(), foot_px: [0.0; 2], image_size: Size::new(64, 64) };
+        let skeleton = Skeleton {
+            nodes: (0..3).map(node).collect(),
+            foot_px: [0.0; 2],
+            image_size: Size::new(64, 64),
+        };
         let pose = |k: u32| {
             let time_s = f64::from(k) / 30.0;
             let turn = UnitQuaternion::from_scaled_axis(Vector3::z() * 0.1 * (4.0 * time_s).sin());
-            let mut joints = at.map(|position| JointPose { position, rotation: UnitQuaternion::identity() });
+            let mut joints = at.map(|position| JointPose {
+                position,
+                rotation: UnitQuaternion::identity(),
+            });
             joints[2].position = at[1] + turn * (at[2] - at[1]);
-            Pose { frame: k.into(), time_s, joints: joints.into() }
+            Pose {
+                frame: k.into(),
+                time_s,
+                joints: joints.into(),
+            }
         };
         (skeleton, (0..30 * seconds).map(pose).collect())
     }
 
-    /// Hours of film take no more room than the window, and what is in it is the angle of the papers.
+    /// Hours of film take no more room than the window, and what is in it is the angle of the
+    /// papers.
     #[test]
     fn the_window_slides_and_holds_the_angles_of_its_branches() {
         let (skeleton, poses) = film(60);
@@ -84,10 +115,17 @@ mod tests {
         window.begin(&skeleton);
         poses.iter().for_each(|pose| window.push(pose));
         let all = window.last(f64::INFINITY);
-        assert_eq!((all.rows.len(), &*all.nodes), (301, &[NodeName(10), NodeName(20)][..]));
+        assert_eq!(
+            (all.rows.len(), &*all.nodes),
+            (301, &[NodeName(10), NodeName(20)][..])
+        );
         let wanted = angle_to_parent_deg(&skeleton, &poses, NodeId(2));
         for ((t, angle), k) in all.of(NodeName(20)).zip(poses.len() - 301..) {
-            assert!(t == poses[k].time_s && (angle - wanted[k]).abs() < 1e-4, "{angle} at {t}, not {}", wanted[k]);
+            assert!(
+                t == poses[k].time_s && (angle - wanted[k]).abs() < 1e-4,
+                "{angle} at {t}, not {}",
+                wanted[k]
+            );
         }
         assert_eq!(window.last(1.0).rows.len(), 31);
         assert_eq!(all.of(NodeName(7)).count(), 0);

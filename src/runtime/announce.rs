@@ -13,10 +13,14 @@ pub struct Announced {
 }
 
 impl Announced {
-    /// Tells of `tree` if it is a new one. One built early is worth less than `threshold` (accumulation measure), and the
-    /// capture is to say so until a refinement has made up for it.
+    /// Tells of `tree` if it is a new one. One built early is worth less than `threshold`
+    /// (accumulation measure), and the capture is to say so until a refinement has made up for it.
     pub fn tell(&mut self, tree: &Arc<Tree>, threshold: f64, shared: &Shared) {
-        if self.tree.as_ref().is_some_and(|known| Arc::ptr_eq(known, tree)) {
+        if self
+            .tree
+            .as_ref()
+            .is_some_and(|known| Arc::ptr_eq(known, tree))
+        {
             return;
         }
         let first = self.tree.replace(tree.clone()).is_none();
@@ -27,15 +31,25 @@ impl Announced {
                 "the tree was refined from {:.0} s on: {kept} of {nodes} nodes are those of before",
                 tree.time_s
             ));
-            tracing::info!("tree refined at {:.1} s: {kept} of {nodes} nodes go on", tree.time_s);
+            tracing::info!(
+                "tree refined at {:.1} s: {kept} of {nodes} nodes go on",
+                tree.time_s
+            );
             if tree.evidence.measure >= threshold {
-                self.warned.take().into_iter().for_each(|warning| shared.withdraw(&warning));
+                self.warned
+                    .take()
+                    .into_iter()
+                    .for_each(|warning| shared.withdraw(&warning));
             }
         } else if first {
             self.warned = little_motion(tree, threshold);
-            self.warned.iter().for_each(|warning| shared.warn(warning.clone()));
+            self.warned
+                .iter()
+                .for_each(|warning| shared.warn(warning.clone()));
             let (points, time_s) = (tree.evidence.moving.len(), tree.time_s);
-            tracing::info!("tree built at {time_s:.1} s: {nodes} nodes from {points} moving points");
+            tracing::info!(
+                "tree built at {time_s:.1} s: {nodes} nodes from {points} moving points"
+            );
         }
     }
 }

@@ -1,8 +1,10 @@
-//! The tables of a capture on a thread of their own, and their change to another tree when it is refined.
+//! The tables of a capture on a thread of their own, and their change to another tree when it is
+//! refined.
 //!
-//! Every frame of a capture has its pose by the tree that it ends with, so a refinement means writing both tables anew
-//! from the first frame. That is done behind, like all else; until it has come as far as the film, the old tree's tables
-//! are kept, so that a wish to stop is granted as fast as ever.
+//! Every frame of a capture has its pose by the tree that it ends with, so a refinement means
+//! writing both tables anew from the first frame. That is done behind, like all else; until it has
+//! come as far as the film, the old tree's tables are kept, so that a wish to stop is granted as
+//! fast as ever.
 
 use super::capture_tables::CaptureTables;
 use super::shared::{Failure, Shared};
@@ -26,8 +28,8 @@ pub struct BehindTree {
 }
 
 impl BehindTree {
-    /// Has the tables of `tree` brought up to the end of `spool`, in what becomes the folder `dir`; `pictured` is the frame
-    /// whose pose is kept apart.
+    /// Has the tables of `tree` brought up to the end of `spool`, in what becomes the folder `dir`;
+    /// `pictured` is the frame whose pose is kept apart.
     pub fn catch_up(
         &mut self,
         tree: &Arc<Tree>,
@@ -35,12 +37,19 @@ impl BehindTree {
         (dir, config, pictured): (&Path, &Config, Option<u64>),
         shared: &Arc<Shared>,
     ) {
-        if self.newest.as_ref().is_none_or(|b| !Arc::ptr_eq(&b.tree, tree)) {
+        if self
+            .newest
+            .as_ref()
+            .is_none_or(|b| !Arc::ptr_eq(&b.tree, tree))
+        {
             // Where they cannot be begun, the end will say why.
             let newest = CaptureTables::create(dir, tree, config, pictured)
                 .ok()
                 .and_then(|tables| Behind::start(tables, tree, shared.clone()).ok());
-            match (std::mem::replace(&mut self.newest, newest), self.older.is_some()) {
+            match (
+                std::mem::replace(&mut self.newest, newest),
+                self.older.is_some(),
+            ) {
                 // The one before had not caught up itself.
                 (Some(overtaken), true) => overtaken.give_up(),
                 (before, false) => self.older = before,
@@ -64,11 +73,14 @@ impl BehindTree {
 
     /// Nobody wants the tables any more; nothing is left of them.
     pub fn give_up(self) {
-        self.newest.into_iter().chain(self.older).for_each(Behind::give_up);
+        self.newest
+            .into_iter()
+            .chain(self.older)
+            .for_each(Behind::give_up);
     }
 
-    /// The tables as far as they are; `None` if there are none or they could not be written. In a hurry those that
-    /// have come farther.
+    /// The tables as far as they are; `None` if there are none or they could not be written. In a
+    /// hurry those that have come farther.
     pub fn join(self, hurry: bool) -> Option<CaptureTables> {
         let (kept, other) = match (self.newest, self.older) {
             (newest, Some(older)) if hurry => (Some(older), newest),
@@ -115,8 +127,16 @@ impl Behind {
             }
             Ok(tables)
         };
-        let thread = std::thread::Builder::new().name("behind".into()).spawn(run)?;
-        Ok(Self { tree: tree.clone(), spool, written, given_up, thread })
+        let thread = std::thread::Builder::new()
+            .name("behind".into())
+            .spawn(run)?;
+        Ok(Self {
+            tree: tree.clone(),
+            spool,
+            written,
+            given_up,
+            thread,
+        })
     }
 
     /// There is more to be written. What comes while the thread is busy is left for the next time.

@@ -1,5 +1,5 @@
-//! `tracks.csv` and `motion.csv`, written behind the capture while it runs, so that little is left to do at its end: a
-//! service is given two seconds to stop.
+//! `tracks.csv` and `motion.csv`, written behind the capture while it runs, so that little is left
+//! to do at its end: a service is given two seconds to stop.
 
 use super::held_sets::HeldSets;
 use super::meter::Histogram;
@@ -17,7 +17,8 @@ use std::io::BufWriter;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Both tables as far as they are written. What is in them does not depend on when and in how many pieces that is done.
+/// Both tables as far as they are written. What is in them does not depend on when and in how many
+/// pieces that is done.
 pub struct CaptureTables {
     folder: OutputFolder,
     tree: Arc<Tree>,
@@ -25,7 +26,8 @@ pub struct CaptureTables {
     motion: MotionCsv<BufWriter<File>>,
     tracks: TracksCsv<BufWriter<File>>,
     sets: Option<Sets>,
-    /// Sets whose poses are written and whose points are not yet: some of those may still be on trial.
+    /// Sets whose poses are written and whose points are not yet: some of those may still be on
+    /// trial.
     held: HeldSets,
     /// Whether the tracks from before the tree was built have their rows.
     early: bool,
@@ -54,13 +56,23 @@ pub struct Done {
 }
 
 impl CaptureTables {
-    /// Begins both files in what becomes the folder `dir`; `pictured` is the frame of the capture's picture.
+    /// Begins both files in what becomes the folder `dir`; `pictured` is the frame of the capture's
+    /// picture.
     ///
     /// # Errors
     /// `dir` is there already, or whatever the file system says.
-    pub fn create(dir: &Path, tree: &Arc<Tree>, config: &Config, pictured: Option<u64>) -> Result<Self, Failure> {
+    pub fn create(
+        dir: &Path,
+        tree: &Arc<Tree>,
+        config: &Config,
+        pictured: Option<u64>,
+    ) -> Result<Self, Failure> {
         let folder = OutputFolder::create(dir)?;
-        let motion = MotionCsv::new(folder.file("motion.csv")?, &tree.skeleton, config.export.metres_per_px)?;
+        let motion = MotionCsv::new(
+            folder.file("motion.csv")?,
+            &tree.skeleton,
+            config.export.metres_per_px,
+        )?;
         let tracks = TracksCsv::new(folder.file("tracks.csv")?)?;
         Ok(Self {
             folder,
@@ -80,17 +92,23 @@ impl CaptureTables {
         })
     }
 
-    /// Writes all rows up to where `spool` ends; each set calls `wrote`, which may answer `false` to have it given up.
+    /// Writes all rows up to where `spool` ends; each set calls `wrote`, which may answer `false`
+    /// to have it given up.
     ///
     /// # Errors
     /// Whatever the file system says, a full disk among it.
-    pub fn catch_up(&mut self, spool: &SpoolReader, wrote: impl Fn() -> bool) -> Result<(), Failure> {
+    pub fn catch_up(
+        &mut self,
+        spool: &SpoolReader,
+        wrote: impl Fn() -> bool,
+    ) -> Result<(), Failure> {
         let mut sets = self.sets.take().unwrap_or_else(|| spool.sets());
         sets.until(spool);
         for set in sets.by_ref() {
             let set = set.map_err(Failure::Spool)?;
             self.pose(&set)?;
-            // A track's node is decided when it has passed its trial; of those that were there when the tree was built, then.
+            // A track's node is decided when it has passed its trial; of those that were there when
+            // the tree was built, then.
             if set.frame > self.tree.frame {
                 self.held.push(set);
             } else {
@@ -108,18 +126,23 @@ impl CaptureTables {
         Ok(())
     }
 
-    /// Whether nothing is left that grows with the length of the film: `tracks.csv` begins only when the last trial from
-    /// before the tree is over.
+    /// Whether nothing is left that grows with the length of the film: `tracks.csv` begins only
+    /// when the last trial from before the tree is over.
     pub fn is_abreast(&self) -> bool {
         self.early
     }
 
-    /// Ends both tables, the last rows of which are those that [`catch_up`](Self::catch_up) has written; each set calls
+    /// Ends both tables, the last rows of which are those that [`catch_up`](Self::catch_up) has
+    /// written; each set calls
     /// `wrote` as there.
     ///
     /// # Errors
     /// Whatever the file system says.
-    pub fn finish(mut self, spool: &SpoolReader, wrote: impl Fn() -> bool) -> Result<Done, Failure> {
+    pub fn finish(
+        mut self,
+        spool: &SpoolReader,
+        wrote: impl Fn() -> bool,
+    ) -> Result<Done, Failure> {
         self.held.close();
         self.early_rows(spool, &wrote)?;
         while let Some(set) = self.held.next() {
@@ -130,7 +153,14 @@ impl CaptureTables {
         self.motion.finish()?;
         let (poses, pose_in_picture) = (self.poses.into(), self.pose_in_picture);
         let film = film(&self.log, &self.tree, |id| self.retrace.node_of(id));
-        Ok(Done { folder: self.folder, tree: self.tree, poses, pose_in_picture, misses: self.misses, film })
+        Ok(Done {
+            folder: self.folder,
+            tree: self.tree,
+            poses,
+            pose_in_picture,
+            misses: self.misses,
+            film,
+        })
     }
 
     /// The points of a frame in which it is decided which are kept.
@@ -160,8 +190,13 @@ impl CaptureTables {
         Ok(())
     }
 
-    /// The rows of the frames up to the one in which the tree was built, once that has been gone through.
-    fn early_rows(&mut self, spool: &SpoolReader, wrote: &impl Fn() -> bool) -> Result<(), Failure> {
+    /// The rows of the frames up to the one in which the tree was built, once that has been gone
+    /// through.
+    fn early_rows(
+        &mut self,
+        spool: &SpoolReader,
+        wrote: &impl Fn() -> bool,
+    ) -> Result<(), Failure> {
         if std::mem::replace(&mut self.early, true) {
             return Ok(());
         }
@@ -179,7 +214,12 @@ impl CaptureTables {
 
 /// The points of `log` on the nodes of `tree`.
 fn film(log: &FilmLog, tree: &Tree, name_of: impl Fn(TrackId) -> Option<NodeName>) -> Film {
-    let names = tree.skeleton.nodes.iter().enumerate().map(|(i, n)| (n.name, NodeId(i as u32)));
+    let names = tree
+        .skeleton
+        .nodes
+        .iter()
+        .enumerate()
+        .map(|(i, n)| (n.name, NodeId(i as u32)));
     let by_name: BTreeMap<NodeName, NodeId> = names.collect();
     log.film(&tree.skeleton, |id| by_name.get(&name_of(id)?).copied())
 }

@@ -9,8 +9,8 @@ use super::shared::{Failure, Shared};
 use crate::config::Config;
 use crate::dynamics::analyse_with;
 use crate::export::capture::{
-    AnimationNote, Build, Capture, ModelNote, OutlineNote, PictureNote, Quality as QualityNote, Refinement, Software,
-    Source, Timing, json,
+    AnimationNote, Build, Capture, ModelNote, OutlineNote, PictureNote, Quality as QualityNote,
+    Refinement, Software, Source, Timing, json,
 };
 use crate::export::csv::{MotionCsv, TracksCsv, nodes};
 use crate::export::gltf::{KEY_TOLERANCE_PX, Model, glb, provenance};
@@ -24,7 +24,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-/// Joints times frames up to which the fewest keys of the animation are looked for: a service is given two seconds to stop.
+/// Joints times frames up to which the fewest keys of the animation are looked for: a service is
+/// given two seconds to stop.
 const THOROUGH_UP_TO: usize = 100_000;
 
 /// Figures of the tracking, gathered frame by frame.
@@ -42,7 +43,8 @@ pub struct Quality {
 }
 
 impl Quality {
-    /// Takes the tracks of a frame and the medians of their forward-backward and of their expected error, px.
+    /// Takes the tracks of a frame and the medians of their forward-backward and of their expected
+    /// error, px.
     pub fn note(&mut self, tracks: &TrackSet, fb_error_px: f64, error_px: Option<f64>) {
         self.rejected += tracks.rejected.len() as u64;
         self.on_trial.note(tracks);
@@ -59,11 +61,13 @@ impl Quality {
 
     /// Points followed that count: those that have passed their trial, or all while none has.
     pub fn tracks_total(&self) -> u64 {
-        self.born.saturating_sub(self.rejected + self.on_trial.void().count() as u64)
+        self.born
+            .saturating_sub(self.rejected + self.on_trial.void().count() as u64)
     }
 }
 
-/// Everything that a capture is made of; owned, so that it can be written on any thread while frames go on.
+/// Everything that a capture is made of; owned, so that it can be written on any thread while
+/// frames go on.
 pub struct CaptureJob {
     pub tree: Option<Arc<Tree>>,
     pub outline: Option<Arc<Outline>>,
@@ -90,9 +94,15 @@ pub struct Written {
 /// `dir` is there already, the disk is full, or whatever else the file system says.
 pub fn write(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
     match &job.tree {
-        Some(tree) => {
-            complete(job, CaptureTables::create(dir, tree, &job.config, job.picture.as_ref().map(|p| p.frame))?)
-        }
+        Some(tree) => complete(
+            job,
+            CaptureTables::create(
+                dir,
+                tree,
+                &job.config,
+                job.picture.as_ref().map(|p| p.frame),
+            )?,
+        ),
         None => without_tree(job, dir),
     }
 }
@@ -107,34 +117,70 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
         true
     };
     tables.catch_up(&job.tracks, wrote)?;
-    let Done { folder, tree, poses, pose_in_picture, misses, film } = tables.finish(&job.tracks, wrote)?;
+    let Done {
+        folder,
+        tree,
+        poses,
+        pose_in_picture,
+        misses,
+        film,
+    } = tables.finish(&job.tracks, wrote)?;
     let metres_per_px = job.config.export.metres_per_px;
-    // The sway and the model need nothing of each other, and whoever has asked for the end is waiting.
+    // The sway and the model need nothing of each other, and whoever has asked for the end is
+    // waiting.
     let (sway, (model, push)) = beside(
         "sway",
-        || analyse_with(&tree.skeleton, &film, &job.config.dynamics, &|| wrote() && !job.patience.is_over()).sway,
-        || (model_of(job, &tree, &poses, pose_in_picture.as_ref()), tree.push_figures(&job.config)),
+        || {
+            analyse_with(&tree.skeleton, &film, &job.config.dynamics, &|| {
+                wrote() && !job.patience.is_over()
+            })
+            .sway
+        },
+        || {
+            (
+                model_of(job, &tree, &poses, pose_in_picture.as_ref()),
+                tree.push_figures(&job.config),
+            )
+        },
     );
     let (bytes, animation) = model?;
-    let untold = sway.iter().filter(|s| matches!(s, Err(Unidentified::NotInTime))).count();
+    let untold = sway
+        .iter()
+        .filter(|s| matches!(s, Err(Unidentified::NotInTime)))
+        .count();
     if untold > 0 {
         let of = tree.skeleton.measured() - 1;
         job.shared.warn(format!(
             "the sway of {untold} of {of} branches was not looked at, as the end was wanted: `arborcam analyze DIR` tells it"
         ));
     }
-    nodes(folder.file("nodes.csv")?, &tree.skeleton, &sway, metres_per_px)?;
+    nodes(
+        folder.file("nodes.csv")?,
+        &tree.skeleton,
+        &sway,
+        metres_per_px,
+    )?;
     folder.write("tree.glb", &bytes)?;
     let push = Some(push);
-    let model = ModelNote { push, ..ModelNote::of(&tree.skeleton, metres_per_px) };
+    let model = ModelNote {
+        push,
+        ..ModelNote::of(&tree.skeleton, metres_per_px)
+    };
     let capture = describe(job, Some(&tree), Some((model, animation)), misses.median());
     publish(job, folder, capture, Some(tree))
 }
 
-/// Does both at the same time, the first on a thread of this name, or one after the other where there is none to be had.
-fn beside<A: Send, B>(name: &str, first: impl Fn() -> A + Sync, second: impl FnOnce() -> B) -> (A, B) {
+/// Does both at the same time, the first on a thread of this name, or one after the other where
+/// there is none to be had.
+fn beside<A: Send, B>(
+    name: &str,
+    first: impl Fn() -> A + Sync,
+    second: impl FnOnce() -> B,
+) -> (A, B) {
     std::thread::scope(|scope| {
-        let thread = std::thread::Builder::new().name(name.into()).spawn_scoped(scope, &first);
+        let thread = std::thread::Builder::new()
+            .name(name.into())
+            .spawn_scoped(scope, &first);
         let b = second();
         match thread.map(std::thread::ScopedJoinHandle::join) {
             Ok(Ok(a)) => (a, b),
@@ -149,7 +195,8 @@ fn without_tree(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
     let folder = OutputFolder::create(dir)?;
     let metres_per_px = job.config.export.metres_per_px;
     let mut tracks = TracksCsv::new(folder.file("tracks.csv")?)?;
-    // Which points are void is known for sure only at the end: where the tree did not move, a trial may last for long.
+    // Which points are void is known for sure only at the end: where the tree did not move, a trial
+    // may last for long.
     let mut held = HeldSets::default();
     for set in job.tracks.sets() {
         held.note(&set.map_err(Failure::Spool)?);
@@ -163,7 +210,11 @@ fn without_tree(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
         job.shared.pulse.wrote();
     }
     tracks.finish()?;
-    let foot_only = Arc::new(Skeleton { nodes: Vec::new(), foot_px: [0.0; 2], image_size: job.info.size });
+    let foot_only = Arc::new(Skeleton {
+        nodes: Vec::new(),
+        foot_px: [0.0; 2],
+        image_size: job.info.size,
+    });
     nodes(folder.file("nodes.csv")?, &foot_only, &[], metres_per_px)?;
     MotionCsv::new(folder.file("motion.csv")?, &foot_only, metres_per_px)?.finish()?;
     publish(job, folder, describe(job, None, None, None), None)
@@ -191,7 +242,12 @@ fn model_of(
 ) -> Result<(Vec<u8>, AnimationNote), ExportError> {
     let skeleton = &tree.skeleton;
     let picture = job.picture.as_ref().map(|p| &*p.rgb);
-    let seen = Seen { picture, pose: pose_in_picture, outline: Some(&tree.outline), ..Seen::default() };
+    let seen = Seen {
+        picture,
+        pose: pose_in_picture,
+        outline: Some(&tree.outline),
+        ..Seen::default()
+    };
     let dressed = dress(skeleton, seen, &job.config);
     let flutter = flutter(&dressed, poses, skeleton, &job.config);
     let provenance = provenance(&job.info.name, &Software::default(), poses);
@@ -222,7 +278,10 @@ fn describe(
     let (seen, duration_s) = (count(&counts.seen), job.shared.last_time_s());
     let camera = job.shared.camera_state();
     // Each absence is one of the steps from frame to frame.
-    let (steps, filmed_s) = (seen.saturating_sub(1 + camera.reconnects), duration_s - camera.away_s);
+    let (steps, filmed_s) = (
+        seen.saturating_sub(1 + camera.reconnects),
+        duration_s - camera.away_s,
+    );
     let timing = Timing {
         nominal_rate_hz: job.info.nominal_rate_hz,
         measured_rate_hz: (steps > 0 && filmed_s > 0.0).then(|| steps as f64 / filmed_s),
@@ -279,15 +338,17 @@ fn describe(
             moving_points: tree.first.moving as u32,
             forced: tree.first.forced,
         }),
-        refinement: tree.filter(|tree| tree.refinements > 0).map(|tree| Refinement {
-            count: tree.refinements,
-            frame: tree.frame,
-            time_s: tree.time_s,
-            accumulation: tree.evidence.measure,
-            moving_points: tree.evidence.moving.len() as u32,
-            shown_from: tree.shown_from,
-            nodes_kept: tree.kept as u32,
-        }),
+        refinement: tree
+            .filter(|tree| tree.refinements > 0)
+            .map(|tree| Refinement {
+                count: tree.refinements,
+                frame: tree.frame,
+                time_s: tree.time_s,
+                accumulation: tree.evidence.measure,
+                moving_points: tree.evidence.moving.len() as u32,
+                shown_from: tree.shown_from,
+                nodes_kept: tree.kept as u32,
+            }),
         quality: QualityNote {
             tracks_total: quality.tracks_total(),
             tracks_rejected: quality.rejected,

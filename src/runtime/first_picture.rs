@@ -7,8 +7,9 @@ use std::sync::Arc;
 
 /// Decodes one frame in colour and hands it out when that frame is followed.
 ///
-/// Frames are held back while the outline is looked for, and only the first of them is kept in colour: all would take
-/// four times the room. If it is let go, the newest is taken in its place, and the picture is then not quite the first.
+/// Frames are held back while the outline is looked for, and only the first of them is kept in
+/// colour: all would take four times the room. If it is let go, the newest is taken in its place,
+/// and the picture is then not quite the first.
 #[derive(Default)]
 pub struct FirstPicture {
     kept: Option<Picture>,
@@ -16,16 +17,24 @@ pub struct FirstPicture {
 }
 
 impl FirstPicture {
-    /// Looks at a frame that is about to be followed; `oldest_held` is the oldest that still waits for that.
+    /// Looks at a frame that is about to be followed; `oldest_held` is the oldest that still waits
+    /// for that.
     pub fn see(&mut self, timed: &Timed, oldest_held: Option<u64>, decoder: &mut Decoder) {
         if self.handed_out {
             return;
         }
-        let lost = self.kept.as_ref().is_some_and(|p| oldest_held.is_none_or(|oldest| p.frame < oldest));
+        let lost = self
+            .kept
+            .as_ref()
+            .is_some_and(|p| oldest_held.is_none_or(|oldest| p.frame < oldest));
         if self.kept.is_none() || lost {
             // A frame that cannot be decoded in colour is passed over; the next may be whole.
             let rgb = decoder.preview(&timed.raw, timed.raw.size.width).ok();
-            self.kept = rgb.map(|rgb| Picture { rgb: Arc::new(rgb), frame: timed.index, time_s: timed.time_s });
+            self.kept = rgb.map(|rgb| Picture {
+                rgb: Arc::new(rgb),
+                frame: timed.index,
+                time_s: timed.time_s,
+            });
         }
     }
 

@@ -27,8 +27,8 @@ impl OnTrial {
         });
     }
 
-    /// Points that do not count if there are no more frames: half of them are no good. Where none has passed, they are
-    /// all that there is.
+    /// Points that do not count if there are no more frames: half of them are no good. Where none
+    /// has passed, they are all that there is.
     pub fn void(&self) -> impl Iterator<Item = TrackId> {
         self.ids.iter().copied().filter(|_| self.any_passed)
     }
@@ -63,7 +63,10 @@ impl HeldSets {
     /// The next set that is decided, without the points that did not pass.
     pub fn decided(&mut self) -> Option<TrackSet> {
         let newest_s = self.sets.back()?.time_s;
-        let due = self.sets.front().is_some_and(|s| newest_s - s.time_s >= LONGEST_TRIAL_S);
+        let due = self
+            .sets
+            .front()
+            .is_some_and(|s| newest_s - s.time_s >= LONGEST_TRIAL_S);
         if due { self.next() } else { None }
     }
 
@@ -106,9 +109,19 @@ mod tests {
                 50..60 => &[0, 3],
                 _ => &[0, 2, 3],
             };
-            let rejected = if k == 50 { vec![TrackId(1)] } else { Vec::new() };
+            let rejected = if k == 50 {
+                vec![TrackId(1)]
+            } else {
+                Vec::new()
+            };
             let observations = seen.iter().map(|id| o(*id)).collect();
-            TrackSet { frame: k, time_s: k as f64 / 10.0, observations, rejected, ..TrackSet::default() }
+            TrackSet {
+                frame: k,
+                time_s: k as f64 / 10.0,
+                observations,
+                rejected,
+                ..TrackSet::default()
+            }
         };
         let mut held = HeldSets::default();
         let mut out = Vec::new();
@@ -119,20 +132,38 @@ mod tests {
         assert_eq!(out.len(), 40, "what is younger than a trial is held");
         held.close();
         out.extend(std::iter::from_fn(|| held.next()));
-        assert_eq!(out.iter().map(|s| s.frame).collect::<Vec<_>>(), (0..100).collect::<Vec<_>>());
+        assert_eq!(
+            out.iter().map(|s| s.frame).collect::<Vec<_>>(),
+            (0..100).collect::<Vec<_>>()
+        );
         let ids = |s: &TrackSet| s.observations.iter().map(|o| o.id.0).collect::<Vec<_>>();
         assert!(out[..50].iter().all(|s| ids(s) == [0]));
-        assert!(out[50..60].iter().all(|s| ids(s) == [0, 3]), "3 passes later");
-        assert!(out[60..].iter().all(|s| ids(s) == [0, 3]), "2 is on trial when the frames end");
+        assert!(
+            out[50..60].iter().all(|s| ids(s) == [0, 3]),
+            "3 passes later"
+        );
+        assert!(
+            out[60..].iter().all(|s| ids(s) == [0, 3]),
+            "2 is on trial when the frames end"
+        );
     }
 
     /// A capture that is over before any trial is has tracks all the same.
     #[test]
     fn where_no_trial_is_over_all_points_are_kept() {
-        let o =
-            Observation { id: TrackId(7), u_px: 0.0, v_px: 0.0, fb_error_px: 0.0, error_px: None, confirmed: false };
+        let o = Observation {
+            id: TrackId(7),
+            u_px: 0.0,
+            v_px: 0.0,
+            fb_error_px: 0.0,
+            error_px: None,
+            confirmed: false,
+        };
         let mut held = HeldSets::default();
-        held.push(TrackSet { observations: vec![o], ..TrackSet::default() });
+        held.push(TrackSet {
+            observations: vec![o],
+            ..TrackSet::default()
+        });
         held.close();
         assert_eq!(held.next().map(|s| s.observations.len()), Some(1));
     }

@@ -11,7 +11,10 @@ pub struct Latest<T> {
 
 impl<T> Default for Latest<T> {
     fn default() -> Self {
-        Self { slot: Mutex::new(None), replaced: AtomicU64::new(0) }
+        Self {
+            slot: Mutex::new(None),
+            replaced: AtomicU64::new(0),
+        }
     }
 }
 
@@ -24,7 +27,10 @@ impl<T> Latest<T> {
     }
 
     pub fn take(&self) -> Option<T> {
-        self.slot.lock().unwrap_or_else(PoisonError::into_inner).take()
+        self.slot
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take()
     }
 
     /// Values that were replaced before anyone took them.

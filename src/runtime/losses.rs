@@ -1,8 +1,10 @@
-//! Frames that were lost before they reached us, counted twice over: by the driver's numbers and by the times.
+//! Frames that were lost before they reached us, counted twice over: by the driver's numbers and by
+//! the times.
 //!
-//! Some drivers start counting anew or do not count, others give times that jitter; so both counts are kept. A hole in the
-//! numbers is believed at once. A hole in the times is judged late, when the frames around it are known: one that the
-//! frames before or after make up for was jitter, and one as long as all the steps on either side is a slower rate.
+//! Some drivers start counting anew or do not count, others give times that jitter; so both counts
+//! are kept. A hole in the numbers is believed at once. A hole in the times is judged late, when
+//! the frames around it are known: one that the frames before or after make up for was jitter, and
+//! one as long as all the steps on either side is a slower rate.
 
 use crate::export::capture::{Gap, GapCause};
 use std::collections::VecDeque;
@@ -13,8 +15,8 @@ const AROUND: usize = 16;
 const LEAST_STEPS: usize = 4;
 /// A frame that came late is made up for within so many steps.
 const MADE_UP: usize = 6;
-/// A driver that numbers only what it delivers shows no hole: its times are believed from so many losses on, if they
-/// are also more than this share of all frames.
+/// A driver that numbers only what it delivers shows no hole: its times are believed from so many
+/// losses on, if they are also more than this share of all frames.
 const TIMES_BELIEVED: u64 = 5;
 const TIMES_SHARE: f64 = 0.01;
 
@@ -52,7 +54,8 @@ pub struct Losses {
     nominal_s: Option<f64>,
     /// The last number, and frames without one since, useless ones included.
     last_number: Option<(u64, u64)>,
-    /// The last frame, one that is to be judged at most [`AROUND`] before it, and the frames before that one.
+    /// The last frame, one that is to be judged at most [`AROUND`] before it, and the frames before
+    /// that one.
     ticks: VecDeque<Tick>,
     /// Position in `ticks` of the next one to be judged.
     next: usize,
@@ -69,7 +72,9 @@ impl Losses {
     pub fn new(live: bool, nominal_rate_hz: Option<f64>) -> Self {
         Self {
             live,
-            nominal_s: nominal_rate_hz.map(|hz| 1.0 / hz).filter(|s| s.is_finite() && *s > 0.0),
+            nominal_s: nominal_rate_hz
+                .map(|hz| 1.0 / hz)
+                .filter(|s| s.is_finite() && *s > 0.0),
             last_number: None,
             ticks: VecDeque::new(),
             next: 1,
@@ -84,9 +89,13 @@ impl Losses {
         self.totals
     }
 
-    /// Time from frame to frame by the last times, losses left out, s; `None` while there are too few.
+    /// Time from frame to frame by the last times, losses left out, s; `None` while there are too
+    /// few.
     pub fn interval_s(&self) -> Option<f64> {
-        self.interval_of(self.ticks.len().saturating_sub(2 * AROUND), self.ticks.len())
+        self.interval_of(
+            self.ticks.len().saturating_sub(2 * AROUND),
+            self.ticks.len(),
+        )
     }
 
     /// A frame has come; `broken` came before it and were of no use.
@@ -95,21 +104,52 @@ impl Losses {
         let mut gaps = Vec::new();
         if let Some((last, cause)) = self.before_away.take() {
             let length_s = time_s - last.time_s;
-            let interval_s = self.interval_s().or(self.nominal_s).unwrap_or(f64::INFINITY);
+            let interval_s = self
+                .interval_s()
+                .or(self.nominal_s)
+                .unwrap_or(f64::INFINITY);
             // `as` saturates, and makes 0 of what is no number.
             let step = ((length_s / interval_s).round() as u64).max(1);
-            gaps.push(Gap { after_frame: last.index, time_s: last.time_s, missing: step - 1, cause, length_s });
+            gaps.push(Gap {
+                after_frame: last.index,
+                time_s: last.time_s,
+                missing: step - 1,
+                cause,
+                length_s,
+            });
             self.ticks.clear();
-            self.begin(Tick { index: last.index + step, time_s, broken, numbered: false }, sequence);
-            return Arrival { index: last.index + step, gaps };
+            self.begin(
+                Tick {
+                    index: last.index + step,
+                    time_s,
+                    broken,
+                    numbered: false,
+                },
+                sequence,
+            );
+            return Arrival {
+                index: last.index + step,
+                gaps,
+            };
         }
         let Some(&last) = self.ticks.back() else {
-            self.begin(Tick { index: 0, time_s, broken, numbered: false }, sequence);
+            self.begin(
+                Tick {
+                    index: 0,
+                    time_s,
+                    broken,
+                    numbered: false,
+                },
+                sequence,
+            );
             return Arrival { index: 0, gaps };
         };
         let hole = sequence
             .zip(self.last_number)
-            .map(|(now, (number, since))| now.saturating_sub(number).saturating_sub(1 + since + broken));
+            .map(|(now, (number, since))| {
+                now.saturating_sub(number)
+                    .saturating_sub(1 + since + broken)
+            });
         self.last_number = match (sequence, self.last_number) {
             (Some(now), _) => Some((now, 0)),
             (None, Some((number, since))) => Some((number, since + 1 + broken)),
@@ -130,7 +170,12 @@ impl Losses {
                 length_s,
             });
         }
-        self.ticks.push_back(Tick { index, time_s, broken, numbered: hole.is_some() });
+        self.ticks.push_back(Tick {
+            index,
+            time_s,
+            broken,
+            numbered: hole.is_some(),
+        });
         while self.ticks.len() > self.next + AROUND {
             gaps.extend(self.judge());
             if self.ticks.len() > 2 * AROUND + MADE_UP {
@@ -151,14 +196,25 @@ impl Losses {
     /// The source is away; the next frame is the first after that.
     pub fn away(&mut self, cause: GapCause) -> Vec<Gap> {
         let gaps = self.finish();
-        self.before_away = self.ticks.back().map(|last| (*last, cause)).or(self.before_away);
+        self.before_away = self
+            .ticks
+            .back()
+            .map(|last| (*last, cause))
+            .or(self.before_away);
         gaps
     }
 
-    /// Nothing more comes, `length_s` after the last frame; gives the gap if the source was still away.
+    /// Nothing more comes, `length_s` after the last frame; gives the gap if the source was still
+    /// away.
     pub fn ended_away(&mut self, length_s: f64) -> Option<Gap> {
         let (last, cause) = self.before_away.take()?;
-        Some(Gap { after_frame: last.index, time_s: last.time_s, missing: 0, cause, length_s })
+        Some(Gap {
+            after_frame: last.index,
+            time_s: last.time_s,
+            missing: 0,
+            cause,
+            length_s,
+        })
     }
 
     /// Judges the steps that still wait for more frames.
@@ -188,8 +244,14 @@ impl Losses {
             let broken: u64 = (from + 1..=to).filter_map(|i| Some(tick(i)?.broken)).sum();
             Some((steps.max(0.0) as u64).saturating_sub((to - from) as u64 + broken))
         };
-        let later = (0..MADE_UP).filter_map(|k| between(at - 1, at + k)).min().unwrap_or(0);
-        let sooner = (0..MADE_UP).filter_map(|k| between((at - 1).checked_sub(k)?, at)).min().unwrap_or(0);
+        let later = (0..MADE_UP)
+            .filter_map(|k| between(at - 1, at + k))
+            .min()
+            .unwrap_or(0);
+        let sooner = (0..MADE_UP)
+            .filter_map(|k| between((at - 1).checked_sub(k)?, at))
+            .min()
+            .unwrap_or(0);
         let missing = later.min(sooner);
         if missing == 0 {
             return None;
@@ -201,16 +263,24 @@ impl Losses {
         }
         self.unnumbered += missing;
         let (time_s, length_s) = (last.time_s, this.time_s - last.time_s);
-        Some(Gap { after_frame: last.index, time_s, missing, cause: GapCause::Dropped, length_s })
+        Some(Gap {
+            after_frame: last.index,
+            time_s,
+            missing,
+            cause: GapCause::Dropped,
+            length_s,
+        })
     }
 
-    /// Time from frame to frame among the ticks from `from` to before `to`, however many were lost between them: most
-    /// of the short steps are of one frame.
+    /// Time from frame to frame among the ticks from `from` to before `to`, however many were lost
+    /// between them: most of the short steps are of one frame.
     fn interval_of(&self, from: usize, to: usize) -> Option<f64> {
         let ticks = self.ticks.range(from.min(to)..to.min(self.ticks.len()));
         let later = ticks.clone().skip(1);
-        let mut steps_s: Vec<f64> =
-            ticks.zip(later).map(|(a, b)| (b.time_s - a.time_s) / (1 + b.broken) as f64).collect();
+        let mut steps_s: Vec<f64> = ticks
+            .zip(later)
+            .map(|(a, b)| (b.time_s - a.time_s) / (1 + b.broken) as f64)
+            .collect();
         steps_s.retain(|s| *s > 0.0);
         if steps_s.len() < LEAST_STEPS {
             return None;
@@ -222,14 +292,20 @@ impl Losses {
         singles_s.sort_unstable_by(f64::total_cmp);
         // Over the whole of it jitter weighs next to nothing.
         let single_s = singles_s[singles_s.len() / 2];
-        Some(steps_s.iter().sum::<f64>() / steps_s.iter().map(|s| frames(*s, single_s)).sum::<f64>())
+        Some(
+            steps_s.iter().sum::<f64>() / steps_s.iter().map(|s| frames(*s, single_s)).sum::<f64>(),
+        )
     }
 
     fn reconcile(&mut self) {
         let t = &mut self.totals;
         let believed = TIMES_BELIEVED.max((TIMES_SHARE * self.seen as f64) as u64);
         let numbers_only_delivered = self.live && t.by_sequence == Some(0) && t.by_time > believed;
-        let now = if numbers_only_delivered { t.by_time } else { t.by_sequence.unwrap_or(0) + self.unnumbered };
+        let now = if numbers_only_delivered {
+            t.by_time
+        } else {
+            t.by_sequence.unwrap_or(0) + self.unnumbered
+        };
         t.reconciled = t.reconciled.max(now);
     }
 }

@@ -10,12 +10,19 @@ pub struct Recent {
 
 impl Recent {
     pub fn new(window_s: f64) -> Self {
-        Self { window_s, values: VecDeque::new() }
+        Self {
+            window_s,
+            values: VecDeque::new(),
+        }
     }
 
     pub fn push(&mut self, time_s: f64, value: f64) {
         self.values.push_back((time_s, value));
-        while self.values.front().is_some_and(|(t, _)| *t < time_s - self.window_s) {
+        while self
+            .values
+            .front()
+            .is_some_and(|(t, _)| *t < time_s - self.window_s)
+        {
             self.values.pop_front();
         }
     }
@@ -31,7 +38,9 @@ impl Recent {
     /// Sum of the values a second.
     pub fn sum_per_s(&self) -> f64 {
         match (self.values.front(), self.values.back()) {
-            (Some((a, _)), Some((b, _))) if b > a => self.values.iter().map(|v| v.1).sum::<f64>() / (b - a),
+            (Some((a, _)), Some((b, _))) if b > a => {
+                self.values.iter().map(|v| v.1).sum::<f64>() / (b - a)
+            }
             _ => 0.0,
         }
     }

@@ -5,8 +5,8 @@
 //!        \--(512 entries, 96 MB; live: what does not fit is counted)--> record <--/
 //! ```
 //!
-//! A dropped sender ends the stream: when the source is done, the tracker works off its queue and ends, then the model
-//! does and writes the capture.
+//! A dropped sender ends the stream: when the source is done, the tracker works off its queue and
+//! ends, then the model does and writes the capture.
 
 mod angles;
 mod announce;
@@ -62,8 +62,8 @@ use std::time::Duration;
 use track_thread::TrackThread;
 use watched::Watched;
 
-/// Frames that may wait for the tracker, and track sets that may wait for the model (two seconds at 30 a second, more
-/// than a build takes).
+/// Frames that may wait for the tracker, and track sets that may wait for the model (two seconds at
+/// 30 a second, more than a build takes).
 const FRAME_QUEUE: usize = 4;
 const MODEL_QUEUE: usize = 64;
 
@@ -108,8 +108,8 @@ pub struct Running {
     model: Option<JoinHandle<Summary>>,
 }
 
-/// Stops the source when the tracker or the model is done for, be it by a panic: the source holds both ends of its queue, and would
-/// never learn otherwise that nobody takes from it.
+/// Stops the source when the tracker or the model is done for, be it by a panic: the source holds
+/// both ends of its queue, and would never learn otherwise that nobody takes from it.
 struct StopAll<'a>(&'a Shared);
 
 impl Drop for StopAll<'_> {
@@ -171,11 +171,20 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
     };
     let source = {
         let shared = shared.clone();
-        let queue = source_thread::Queue { into: frames_in, out_of: frames_out };
+        let queue = source_thread::Queue {
+            into: frames_in,
+            out_of: frames_out,
+        };
         let run = move || source_thread::run(source, pace, camera, queue, recorder, &shared);
         thread("source").spawn(run).map_err(failed)?
     };
-    Ok(Running { shared, controls, source: Some(source), track: Some(track), model: Some(model) })
+    Ok(Running {
+        shared,
+        controls,
+        source: Some(source),
+        track: Some(track),
+        model: Some(model),
+    })
 }
 
 impl Running {
@@ -184,7 +193,8 @@ impl Running {
         self.shared.screen.take()
     }
 
-    /// Passes a wish on; pausing and quitting take effect at once, whatever the tracker is busy with.
+    /// Passes a wish on; pausing and quitting take effect at once, whatever the tracker is busy
+    /// with.
     pub fn send(&self, wish: Control) {
         match wish {
             Control::Quit => self.stop(),
@@ -193,8 +203,8 @@ impl Running {
         }
     }
 
-    /// Goes on with other settings; they may differ from the former ones in what can be changed while frames flow
-    /// ([`Config::reload`] sees to that).
+    /// Goes on with other settings; they may differ from the former ones in what can be changed
+    /// while frames flow ([`Config::reload`] sees to that).
     pub fn reload(&self, config: Config) {
         self.shared.reload(config);
     }
@@ -204,7 +214,8 @@ impl Running {
         self.shared.stop_at_once();
     }
 
-    /// Take no more frames and finish, as at the end of a film: as much as was wanted has been filmed, and nobody waits.
+    /// Take no more frames and finish, as at the end of a film: as much as was wanted has been
+    /// filmed, and nobody waits.
     pub fn end(&self) {
         self.shared.stop.store(true, Ordering::Relaxed);
     }
@@ -218,10 +229,13 @@ impl Running {
     pub fn marks(&self) -> Marks {
         let over = self.source.as_ref().is_none_or(JoinHandle::is_finished);
         let ending = over || self.shared.stop.load(Ordering::Relaxed);
-        self.shared.pulse.marks(self.shared.counts.seen.load(Ordering::Relaxed), ending)
+        self.shared
+            .pulse
+            .marks(self.shared.counts.seen.load(Ordering::Relaxed), ending)
     }
 
-    /// What there is to be told since the last call, warnings among it. The screen shows it by itself.
+    /// What there is to be told since the last call, warnings among it. The screen shows it by
+    /// itself.
     pub fn news(&self) -> Vec<String> {
         self.shared.take_news()
     }
@@ -231,11 +245,14 @@ impl Running {
         self.shared.warnings()
     }
 
-    /// Waits for the end: the result, and what went wrong on the way, if anything did. What had been captured until
-    /// then is in the result all the same.
+    /// Waits for the end: the result, and what went wrong on the way, if anything did. What had
+    /// been captured until then is in the result all the same.
     pub fn join(mut self) -> (Option<Summary>, Option<Failure>) {
         let ends = [self.source.take(), self.track.take()];
-        let panicked = ends.into_iter().flatten().any(|handle| handle.join().is_err());
+        let panicked = ends
+            .into_iter()
+            .flatten()
+            .any(|handle| handle.join().is_err());
         let summary = self.model.take().and_then(|handle| handle.join().ok());
         if panicked || summary.is_none() {
             self.shared.fail(Failure::Panicked);

@@ -1,5 +1,5 @@
-//! The model's thread: runs the back end, keeps the tracks, streams the poses, tells the screen, and writes the capture
-//! at the end.
+//! The model's thread: runs the back end, keeps the tracks, streams the poses, tells the screen,
+//! and writes the capture at the end.
 
 use super::announce::Announced;
 use super::behind::BehindTree;
@@ -29,7 +29,8 @@ use std::time::{Duration, Instant};
 
 /// Time between two states for the screen.
 const SCREEN_EVERY: Duration = Duration::from_millis(40);
-/// Without frames the screen is shown a new state at this interval: a camera that is gone must be seen to be.
+/// Without frames the screen is shown a new state at this interval: a camera that is gone must be
+/// seen to be.
 const IDLE_EVERY: Duration = Duration::from_millis(200);
 /// Film after which the tables of the capture are brought up to date, s.
 const BEHIND_EVERY_S: f64 = 1.0;
@@ -68,7 +69,8 @@ impl ModelThread {
         let status = Status::new(info.name.clone(), info.format.clone(), info.frames_total);
         let back = BackEnd::new(&job.config);
         let looked_at = job.stream.is_some() || job.preview_every < Duration::MAX;
-        let sway = looked_at.then(|| SwayWatch::new(&job.config.dynamics, job.pace == Pace::Fast, shared.clone()));
+        let sway = looked_at
+            .then(|| SwayWatch::new(&job.config.dynamics, job.pace == Pace::Fast, shared.clone()));
         let mut thread = Self {
             back,
             job,
@@ -90,7 +92,9 @@ impl ModelThread {
         };
         thread.new_spool();
         if thread.job.out.is_none() {
-            thread.shared.tell("no --out: nothing is written unless you press e".into());
+            thread
+                .shared
+                .tell("no --out: nothing is written unless you press e".into());
         }
         thread
     }
@@ -110,8 +114,15 @@ impl ModelThread {
             match message {
                 ToModel::Picture(picture) => self.picture = Some(picture),
                 ToModel::Followed(followed) => last = Some(self.step(followed)),
-                ToModel::Searching { progress, preview, size, frame, time_s } => {
-                    self.status.searching(progress, preview, size, (frame, time_s));
+                ToModel::Searching {
+                    progress,
+                    preview,
+                    size,
+                    frame,
+                    time_s,
+                } => {
+                    self.status
+                        .searching(progress, preview, size, (frame, time_s));
                     self.show(None, false);
                 }
                 ToModel::Restart => {
@@ -122,15 +133,18 @@ impl ModelThread {
                     self.sway.iter_mut().for_each(SwayWatch::restart);
                     self.behind_s = f64::NEG_INFINITY;
                     self.new_spool();
-                    (self.quality, self.announced, last) = (Quality::default(), Announced::default(), None);
+                    (self.quality, self.announced, last) =
+                        (Quality::default(), Announced::default(), None);
                     self.picture = None;
                 }
                 ToModel::BuildNow if self.back.tree().is_some() => {
-                    self.shared.tell("the tree is built already; r starts again".into());
+                    self.shared
+                        .tell("the tree is built already; r starts again".into());
                 }
                 ToModel::BuildNow => {
                     self.back.build_now();
-                    self.shared.tell("building the tree from what has been seen so far".into());
+                    self.shared
+                        .tell("building the tree from what has been seen so far".into());
                 }
                 ToModel::Export => self.export_now(),
             }
@@ -158,7 +172,12 @@ impl ModelThread {
 
     fn step(&mut self, followed: Followed) -> Moved {
         let hurry = self.shared.hurry.load(Ordering::Relaxed);
-        self.refining.hand_in(&mut self.back, followed.tracks.time_s, self.job.pace == Pace::Live, hurry);
+        self.refining.hand_in(
+            &mut self.back,
+            followed.tracks.time_s,
+            self.job.pace == Pace::Live,
+            hurry,
+        );
         let moved = self.back.step(followed);
         if !hurry {
             self.refining.begin(&self.back);
@@ -171,21 +190,30 @@ impl ModelThread {
         }
         self.write_behind(moved.tracks.time_s);
         let tracks = &moved.tracks;
-        self.quality.note(tracks, median_fb_error_px(tracks), median_error_px(tracks));
+        self.quality
+            .note(tracks, median_fb_error_px(tracks), median_error_px(tracks));
         if let Some((recorder, _)) = &self.recorder {
             recorder.found(|| Found {
                 tracks: moved.tracks.clone(),
                 outline: moved.outline.clone(),
-                pose: moved.pose.clone().zip(self.back.tree().map(|tree| tree.skeleton.clone())),
+                pose: moved
+                    .pose
+                    .clone()
+                    .zip(self.back.tree().map(|tree| tree.skeleton.clone())),
             });
         }
-        let sway = self.sway.as_mut().and_then(|sway| sway.step(&moved, &self.back));
+        let sway = self
+            .sway
+            .as_mut()
+            .and_then(|sway| sway.step(&moved, &self.back));
         if let Some(pose) = &moved.pose {
             self.stream(pose, sway.as_deref());
         }
         if self.back.take_refusal() {
             let moving = self.back.evidence().moving.len();
-            self.shared.tell(format!("no tree yet: {moving} points move, and {LEAST_MOVING} that agree must"));
+            self.shared.tell(format!(
+                "no tree yet: {moving} points move, and {LEAST_MOVING} that agree must"
+            ));
         }
         self.status.moved(&moved, &self.back);
         self.status.sways(sway);
@@ -200,28 +228,48 @@ impl ModelThread {
             return;
         }
         self.behind_s = time_s;
-        let (Some(tree), Some(dir), Some(spool)) = (self.back.tree(), &self.job.out, &mut self.spool) else { return };
+        let (Some(tree), Some(dir), Some(spool)) =
+            (self.back.tree(), &self.job.out, &mut self.spool)
+        else {
+            return;
+        };
         if let Ok(reader) = spool.reader() {
             let pictured = self.picture.as_ref().map(|p| p.frame);
-            self.behind.catch_up(tree, reader, (dir, &self.job.config, pictured), &self.shared);
+            self.behind.catch_up(
+                tree,
+                reader,
+                (dir, &self.job.config, pictured),
+                &self.shared,
+            );
         }
     }
 
     fn announce(&mut self) {
         if let Some(tree) = self.back.tree() {
-            self.announced.tell(tree, self.job.config.accumulate.threshold, &self.shared);
+            self.announced
+                .tell(tree, self.job.config.accumulate.threshold, &self.shared);
         }
     }
 
     fn stream(&mut self, pose: &Pose, sway: Option<&SwayNow>) {
-        let Some(out) = &mut self.job.stream else { return };
+        let Some(out) = &mut self.job.stream else {
+            return;
+        };
         let Some(tree) = self.back.tree() else { return };
         let lost = self.info.live.then_some(&*self.shared);
-        let line = stream::line(pose, &tree.skeleton, self.job.config.export.metres_per_px, sway, lost);
+        let line = stream::line(
+            pose,
+            &tree.skeleton,
+            self.job.config.export.metres_per_px,
+            sway,
+            lost,
+        );
         if let Err(e) = out.write_all(line.as_bytes()).and_then(|()| out.flush()) {
-            // The reader has gone (`| head`): nobody listens any more, and that ends the capture in good order.
+            // The reader has gone (`| head`): nobody listens any more, and that ends the capture in
+            // good order.
             if e.kind() != std::io::ErrorKind::BrokenPipe {
-                self.shared.warn(format!("the stream of poses has ended: {e}"));
+                self.shared
+                    .warn(format!("the stream of poses has ended: {e}"));
             }
             self.job.stream = None;
             self.shared.stop.store(true, Ordering::Relaxed);
@@ -233,12 +281,19 @@ impl ModelThread {
             return;
         }
         self.last_screen = Some(Instant::now());
-        let snapshot = self.status.snapshot(moved, &self.back, self.sway.as_ref(), &self.shared);
+        let snapshot = self
+            .status
+            .snapshot(moved, &self.back, self.sway.as_ref(), &self.shared);
         self.shared.screen.put(snapshot);
     }
 
     fn new_spool(&mut self) {
-        let folder = self.job.out.as_deref().and_then(nearest_folder).unwrap_or_else(std::env::temp_dir);
+        let folder = self
+            .job
+            .out
+            .as_deref()
+            .and_then(nearest_folder)
+            .unwrap_or_else(std::env::temp_dir);
         self.spool = match Spool::create(&folder) {
             Ok(spool) => Some(spool),
             Err(e) => {
@@ -250,13 +305,18 @@ impl ModelThread {
 
     fn capture_job(&mut self) -> Result<CaptureJob, Failure> {
         let Some(spool) = &mut self.spool else {
-            return Err(Failure::Spool(std::io::Error::other("it could not be created")));
+            return Err(Failure::Spool(std::io::Error::other(
+                "it could not be created",
+            )));
         };
         Ok(CaptureJob {
             tree: self.back.tree().cloned(),
             outline: self.back.outline().cloned(),
             tracks: spool.reader().map_err(Failure::Spool)?,
-            config: self.shared.reloaded().unwrap_or_else(|| self.job.config.clone()),
+            config: self
+                .shared
+                .reloaded()
+                .unwrap_or_else(|| self.job.config.clone()),
             info: self.info.clone(),
             quality: self.quality.clone(),
             picture: self.picture.clone(),
@@ -267,7 +327,11 @@ impl ModelThread {
 
     /// Writes the capture as it is now beside the final one, on a thread of its own: frames go on.
     fn export_now(&mut self) {
-        let wanted = self.job.out.clone().unwrap_or_else(|| PathBuf::from("capture"));
+        let wanted = self
+            .job
+            .out
+            .clone()
+            .unwrap_or_else(|| PathBuf::from("capture"));
         let dir = free_name(&wanted, &mut self.exported);
         match self.capture_job() {
             Ok(job) => {
@@ -276,7 +340,10 @@ impl ModelThread {
                     Ok(_) => shared.answer(format!("capture written to {}", dir.display())),
                     Err(e) => shared.warn(e.to_string()),
                 };
-                match std::thread::Builder::new().name("export".into()).spawn(write) {
+                match std::thread::Builder::new()
+                    .name("export".into())
+                    .spawn(write)
+                {
                     Ok(handle) => self.exports.push(handle),
                     Err(e) => self.shared.warn(format!("export: {e}")),
                 }
@@ -286,8 +353,8 @@ impl ModelThread {
     }
 
     fn finish(&mut self) -> Summary {
-        // The source has gone; with this end of the queue the recorder works off what is left and ends its file. Only
-        // then it is known what is missing in it.
+        // The source has gone; with this end of the queue the recorder works off what is left and
+        // ends its file. Only then it is known what is missing in it.
         let recorded = self.recorder.take().and_then(|(recorder, thread)| {
             drop(recorder);
             thread.join().ok()
@@ -303,11 +370,14 @@ impl ModelThread {
             self.write_behind(f64::INFINITY);
         }
         let behind = std::mem::take(&mut self.behind);
-        let written = match (self.job.out.clone().filter(|_| seen > 0), self.capture_job()) {
-            (Some(dir), Ok(job)) => match behind
-                .join(hurry)
-                .map_or_else(|| finish::write(&job, &dir), |tables| finish::complete(&job, tables))
-            {
+        let written = match (
+            self.job.out.clone().filter(|_| seen > 0),
+            self.capture_job(),
+        ) {
+            (Some(dir), Ok(job)) => match behind.join(hurry).map_or_else(
+                || finish::write(&job, &dir),
+                |tables| finish::complete(&job, tables),
+            ) {
                 Ok(written) => Some(written),
                 Err(e) => {
                     self.shared.fail(e);
@@ -326,7 +396,9 @@ impl ModelThread {
             moving: self.back.evidence().moving.len(),
             accumulation: self.back.evidence().measure,
             // The one that is in the folder, where there is a folder.
-            tree: written.as_ref().map_or_else(|| self.back.tree().cloned(), |w| w.tree.clone()),
+            tree: written
+                .as_ref()
+                .map_or_else(|| self.back.tree().cloned(), |w| w.tree.clone()),
             written,
             recorded,
             not_recorded: self.shared.counts.not_recorded.load(Ordering::Relaxed),
@@ -334,13 +406,19 @@ impl ModelThread {
     }
 }
 
-/// The folder in which `path` will lie, if it is there already, else the nearest one above it that is.
+/// The folder in which `path` will lie, if it is there already, else the nearest one above it that
+/// is.
 fn nearest_folder(path: &Path) -> Option<PathBuf> {
     let absolute = std::path::absolute(path).ok()?;
-    absolute.ancestors().skip(1).find(|a| a.is_dir()).map(Path::to_path_buf)
+    absolute
+        .ancestors()
+        .skip(1)
+        .find(|a| a.is_dir())
+        .map(Path::to_path_buf)
 }
 
-/// `wanted-1`, `wanted-2`, ...: the first after number `last` that is not there yet; `last` becomes its number.
+/// `wanted-1`, `wanted-2`, ...: the first after number `last` that is not there yet; `last` becomes
+/// its number.
 fn free_name(wanted: &Path, last: &mut u32) -> PathBuf {
     loop {
         *last += 1;

@@ -13,7 +13,8 @@ pub struct Played {
     pub stopped: bool,
 }
 
-/// Plays `source` once; `open` makes the output for the first frame, or gives the one that is open already.
+/// Plays `source` once; `open` makes the output for the first frame, or gives the one that is open
+/// already.
 ///
 /// # Errors
 /// The source fails, or the device.
@@ -24,7 +25,9 @@ pub fn play(
     stop: &AtomicBool,
 ) -> Result<Played, SourceError> {
     let mut played = Played::default();
-    let Some(mut waiting) = source.next_frame()? else { return Ok(played) };
+    let Some(mut waiting) = source.next_frame()? else {
+        return Ok(played);
+    };
     let output = match output {
         Some(open) => open,
         None => output.insert(open(&waiting)?),
@@ -32,19 +35,30 @@ pub fn play(
     let (start, start_s) = (Instant::now(), waiting.sensor_time_s);
     let mut interval = Duration::ZERO;
     loop {
-        let due = start + Duration::from_secs_f64((waiting.sensor_time_s - start_s).clamp(0.0, 1e6));
+        let due =
+            start + Duration::from_secs_f64((waiting.sensor_time_s - start_s).clamp(0.0, 1e6));
         if !nap::until(due, stop) {
-            return Ok(Played { stopped: true, ..played });
+            return Ok(Played {
+                stopped: true,
+                ..played
+            });
         }
         output.put(&waiting)?;
         played.frames += 1;
         match source.next_frame()? {
             Some(raw) => {
-                interval = Duration::from_secs_f64((raw.sensor_time_s - waiting.sensor_time_s).clamp(0.0, 1e6));
+                interval = Duration::from_secs_f64(
+                    (raw.sensor_time_s - waiting.sensor_time_s).clamp(0.0, 1e6),
+                );
                 waiting = raw;
             }
             // The last frame has its time as well, before another round begins.
-            None => return Ok(Played { stopped: !nap::until(due + interval, stop), ..played }),
+            None => {
+                return Ok(Played {
+                    stopped: !nap::until(due + interval, stop),
+                    ..played
+                });
+            }
         }
     }
 }

@@ -1,7 +1,8 @@
 //! Whether a capture is alive: every thread leaves marks as it works, and [`Vigil`] reads them.
 //!
-//! A supervisor that is fed by a timer learns only that the timer lives. So a sign of life is given for work alone:
-//! frames that came in and went through every thread, or a source that says itself that it waits for its camera.
+//! A supervisor that is fed by a timer learns only that the timer lives. So a sign of life is given
+//! for work alone: frames that came in and went through every thread, or a source that says itself
+//! that it waits for its camera.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -12,7 +13,8 @@ pub enum Worker {
     Model,
     /// Works only where a recording is made.
     Record,
-    /// Works only where somebody looks. It marks branch by branch, as it may be given all of them at once.
+    /// Works only where somebody looks. It marks branch by branch, as it may be given all of them
+    /// at once.
     Sway,
 }
 
@@ -44,7 +46,8 @@ impl Pulse {
         self.given[worker as usize].fetch_add(1, Ordering::Relaxed);
     }
 
-    /// It was taken out of the queue again by somebody else: what is dropped is no work that was done.
+    /// It was taken out of the queue again by somebody else: what is dropped is no work that was
+    /// done.
     pub fn take_back(&self, worker: Worker) {
         self.given[worker as usize].fetch_sub(1, Ordering::Relaxed);
     }
@@ -64,13 +67,23 @@ impl Pulse {
         self.written.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// All marks as they are now; `frames` were taken from the source so far, and `ending` says that no more are wanted.
+    /// All marks as they are now; `frames` were taken from the source so far, and `ending` says
+    /// that no more are wanted.
     pub fn marks(&self, frames: u64, ending: bool) -> Marks {
-        let read = |counts: &[AtomicU64; Worker::ALL.len()]| counts.each_ref().map(|c| c.load(Ordering::Relaxed));
+        let read = |counts: &[AtomicU64; Worker::ALL.len()]| {
+            counts.each_ref().map(|c| c.load(Ordering::Relaxed))
+        };
         // What is done is read first, lest more be done than was given.
         let (done, given) = (read(&self.done), read(&self.given));
         let [waits, written] = [&self.waits, &self.written].map(|c| c.load(Ordering::Relaxed));
-        Marks { frames, waits, written, given, done, ending }
+        Marks {
+            frames,
+            waits,
+            written,
+            given,
+            done,
+            ending,
+        }
     }
 }
 
@@ -117,8 +130,8 @@ pub struct Vigil {
 }
 
 impl Vigil {
-    /// What has happened since the last call that was not answered with [`Sign::Stalls`]: slow work is alive as soon as
-    /// it is done, however often it was looked at before.
+    /// What has happened since the last call that was not answered with [`Sign::Stalls`]: slow work
+    /// is alive as soon as it is done, however often it was looked at before.
     pub fn look(&mut self, now: Marks) -> Sign {
         let sign = self.compare(&now);
         if !matches!(sign, Sign::Stalls(_)) {
@@ -131,7 +144,11 @@ impl Vigil {
         let last = &self.last;
         if now.ending {
             let moved = now.written > last.written || now.done != last.done || !last.ending;
-            return if moved { Sign::Ends } else { Sign::Stalls("writer") };
+            return if moved {
+                Sign::Ends
+            } else {
+                Sign::Stalls("writer")
+            };
         }
         let stuck = Worker::ALL.into_iter().find(|&w| {
             let w = w as usize;
@@ -165,15 +182,22 @@ mod tests {
         flow(&pulse);
         assert_eq!(vigil.look(pulse.marks(1, false)), Sign::Flows);
         assert!(pulse.marks(1, false).flowed());
-        assert_eq!(vigil.look(pulse.marks(1, false)), Sign::Stalls("source"), "the same frame is no new life");
+        assert_eq!(
+            vigil.look(pulse.marks(1, false)),
+            Sign::Stalls("source"),
+            "the same frame is no new life"
+        );
     }
 
     /// A camera goes on delivering while a thread hangs: what it drops must not look like work.
     #[test]
     fn a_thread_that_hangs_is_named_although_frames_come() {
-        for (hangs, name) in
-            [(Worker::Track, "track"), (Worker::Model, "model"), (Worker::Record, "record"), (Worker::Sway, "sway")]
-        {
+        for (hangs, name) in [
+            (Worker::Track, "track"),
+            (Worker::Model, "model"),
+            (Worker::Record, "record"),
+            (Worker::Sway, "sway"),
+        ] {
             let (pulse, mut vigil) = (Pulse::default(), Vigil::default());
             flow(&pulse);
             assert_eq!(vigil.look(pulse.marks(1, false)), Sign::Flows);
@@ -189,7 +213,11 @@ mod tests {
                 assert_eq!(vigil.look(pulse.marks(frames, false)), Sign::Stalls(name));
             }
             pulse.done(hangs);
-            assert_eq!(vigil.look(pulse.marks(20, false)), Sign::Flows, "slow is not dead");
+            assert_eq!(
+                vigil.look(pulse.marks(20, false)),
+                Sign::Flows,
+                "slow is not dead"
+            );
         }
     }
 
@@ -200,7 +228,11 @@ mod tests {
         assert_eq!(vigil.look(pulse.marks(1, false)), Sign::Flows);
         pulse.waits();
         assert_eq!(vigil.look(pulse.marks(1, false)), Sign::Waits);
-        assert_eq!(vigil.look(pulse.marks(1, false)), Sign::Stalls("source"), "the waiting loop hangs");
+        assert_eq!(
+            vigil.look(pulse.marks(1, false)),
+            Sign::Stalls("source"),
+            "the waiting loop hangs"
+        );
         pulse.waits();
         pulse.give(Worker::Model);
         assert_eq!(vigil.look(pulse.marks(1, false)), Sign::Stalls("model"));

@@ -15,7 +15,11 @@ pub struct RateWatch {
 
 impl RateWatch {
     pub fn new(nominal_hz: Option<f64>) -> Self {
-        Self { nominal_hz, since_s: None, off: false }
+        Self {
+            nominal_hz,
+            since_s: None,
+            off: false,
+        }
     }
 
     /// The rate has been another one for seconds.
@@ -23,9 +27,12 @@ impl RateWatch {
         self.off
     }
 
-    /// Takes the time from frame to frame by the newest times; gives a line when the rate has turned out to be another one.
+    /// Takes the time from frame to frame by the newest times; gives a line when the rate has
+    /// turned out to be another one.
     pub fn look(&mut self, time_s: f64, interval_s: Option<f64>) -> Option<String> {
-        let (Some(nominal_hz), Some(interval_s)) = (self.nominal_hz, interval_s) else { return None };
+        let (Some(nominal_hz), Some(interval_s)) = (self.nominal_hz, interval_s) else {
+            return None;
+        };
         let measured_hz = 1.0 / interval_s;
         let other = ((measured_hz / nominal_hz - 1.0).abs() > OFF) != self.off;
         if !other {
@@ -62,7 +69,10 @@ mod tests {
             assert_eq!(watch.is_off(), (23.0..53.0).contains(&time_s), "{time_s}");
         }
         assert_eq!(told.len(), 1);
-        assert!(told[0].contains("15.0 frames a second and not 30.0"), "{told:?}");
+        assert!(
+            told[0].contains("15.0 frames a second and not 30.0"),
+            "{told:?}"
+        );
         assert_eq!(RateWatch::new(None).look(9.0, Some(1.0)), None);
     }
 }

@@ -8,8 +8,8 @@ use crate::model::RawFrame;
 use crate::source::{Source, SourceError};
 use std::time::{Duration, Instant};
 
-/// Time between two looks whether the camera is there. It costs next to nothing, and is a small part of the two seconds
-/// within which a capture has to go on.
+/// Time between two looks whether the camera is there. It costs next to nothing, and is a small
+/// part of the two seconds within which a capture has to go on.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 /// A node belongs to root alone until udev has given it its group, a moment after it has appeared.
 const SETTLES: Duration = Duration::from_secs(2);
@@ -45,12 +45,17 @@ pub fn wait(
     let since = Instant::now();
     let at_s = shared.last_time_s();
     let reason = lost.brief();
-    shared.news(format!("the camera was lost at {at_s:.1} s ({reason}); waiting for it, what was captured is kept"));
+    shared.news(format!(
+        "the camera was lost at {at_s:.1} s ({reason}); waiting for it, what was captured is kept"
+    ));
     shared.camera(|c| c.away = Some(reason.clone()));
     let mut said = reason;
     let mut denied_since = None;
-    // One that delivers a frame and fails, over and over, is not opened more often than one that never delivers.
-    let mut pause = returned.map_or(Duration::ZERO, |at| retry_delay(camera).saturating_sub(at.elapsed()));
+    // One that delivers a frame and fails, over and over, is not opened more often than one that
+    // never delivers.
+    let mut pause = returned.map_or(Duration::ZERO, |at| {
+        retry_delay(camera).saturating_sub(at.elapsed())
+    });
     let waited = loop {
         if !sleep(pause, shared) {
             break Waited::Stopped;
@@ -69,7 +74,9 @@ pub fn wait(
             break Waited::Hopeless(e);
         }
         let unsettled = match e {
-            SourceError::Denied { .. } => denied_since.get_or_insert_with(Instant::now).elapsed() < SETTLES,
+            SourceError::Denied { .. } => {
+                denied_since.get_or_insert_with(Instant::now).elapsed() < SETTLES
+            }
             _ => {
                 denied_since = None;
                 false
@@ -93,7 +100,9 @@ pub fn wait(
     });
     if is_back {
         let away_s = since.elapsed().as_secs_f64();
-        shared.news(format!("the camera is back after {away_s:.1} s; the capture goes on"));
+        shared.news(format!(
+            "the camera is back after {away_s:.1} s; the capture goes on"
+        ));
     }
     waited
 }
@@ -110,7 +119,8 @@ pub fn adopt_new_settings(source: &mut dyn Source, camera: &mut config::Camera, 
     }
 }
 
-/// `false` when asked to stop meanwhile. New settings end it early: they may shorten or forbid the wait.
+/// `false` when asked to stop meanwhile. New settings end it early: they may shorten or forbid the
+/// wait.
 fn sleep(length: Duration, shared: &Shared) -> bool {
     let until = Instant::now() + length;
     while !shared.stopped() {

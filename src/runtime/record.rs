@@ -40,18 +40,28 @@ pub fn record(source: Box<dyn Source>, job: RecordJob) -> Result<RunningRecord, 
     // Nobody looks at the frames; the source hands them on as ever.
     let drain = {
         let frames = frames_out.clone();
-        thread("drain").spawn(move || frames.iter().for_each(drop)).map_err(Failure::Thread)?
+        thread("drain")
+            .spawn(move || frames.iter().for_each(drop))
+            .map_err(Failure::Thread)?
     };
     let source = {
         let shared = shared.clone();
         let run = move || {
             let _ends_all = StopAll(&shared);
-            let queue = source_thread::Queue { into: frames_in, out_of: frames_out };
+            let queue = source_thread::Queue {
+                into: frames_in,
+                out_of: frames_out,
+            };
             source_thread::run(source, job.pace, job.camera, queue, Some(recorder), &shared);
         };
         thread("source").spawn(run).map_err(Failure::Thread)?
     };
-    Ok(RunningRecord { shared, source, drain, recording })
+    Ok(RunningRecord {
+        shared,
+        source,
+        drain,
+        recording,
+    })
 }
 
 impl RunningRecord {
@@ -75,11 +85,17 @@ impl RunningRecord {
         self.recording.is_finished()
     }
 
-    /// Frames seen and lost before us, sensor time from the first to the last, s, and frames missing in the recording.
+    /// Frames seen and lost before us, sensor time from the first to the last, s, and frames
+    /// missing in the recording.
     pub fn counts(&self) -> (u64, u64, f64, u64) {
         let counts = &self.shared.counts;
         let load = |c: &std::sync::atomic::AtomicU64| c.load(Ordering::Relaxed);
-        (load(&counts.seen), load(&counts.lost_in_camera), self.shared.last_time_s(), load(&counts.not_recorded))
+        (
+            load(&counts.seen),
+            load(&counts.lost_in_camera),
+            self.shared.last_time_s(),
+            load(&counts.not_recorded),
+        )
     }
 
     /// What there is to be told so far.

@@ -1,5 +1,5 @@
-//! The recorder's thread. It takes what it is offered out of a bounded queue; who offers never waits for the disk while a
-//! camera films. What does not fit is counted, and the count is told.
+//! The recorder's thread. It takes what it is offered out of a bounded queue; who offers never
+//! waits for the disk while a camera films. What does not fit is counted, and the count is told.
 
 use super::pulse::Worker;
 use super::shared::Shared;
@@ -12,10 +12,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// What may wait for the disk: as many entries, and as many bytes of pictures (some seconds of a fast camera).
+/// What may wait for the disk: as many entries, and as many bytes of pictures (some seconds of a
+/// fast camera).
 const QUEUE: usize = 512;
 pub const QUEUE_BYTES: usize = 96 << 20;
-/// What has been written for longer than this is handed to the system: a quarter of the second that may be lost, the rest is for a machine that is busy.
+/// What has been written for longer than this is handed to the system: a quarter of the second that
+/// may be lost, the rest is for a machine that is busy.
 const FLUSH_EVERY: Duration = Duration::from_millis(250);
 
 /// A source that can wait looks again after so long.
@@ -79,19 +81,39 @@ pub fn start(
     let (queue, items) = bounded(QUEUE);
     let waiting = Arc::new(AtomicUsize::new(0));
     let queue_bytes = to.queue_bytes;
-    let recorder = Recorder { queue, waiting: waiting.clone(), queue_bytes, shared: shared.clone(), live };
+    let recorder = Recorder {
+        queue,
+        waiting: waiting.clone(),
+        queue_bytes,
+        shared: shared.clone(),
+        live,
+    };
     shared.recording.store(true, Ordering::Relaxed);
     let shared = shared.clone();
-    let run = move || Thread { series, waiting, shared, broken: false, oldest: None }.run(&items);
+    let run = move || {
+        Thread {
+            series,
+            waiting,
+            shared,
+            broken: false,
+            oldest: None,
+        }
+        .run(&items)
+    };
     let handle = std::thread::Builder::new()
         .name("record".into())
         .spawn(run)
-        .map_err(|source| RecordingError::Place { path: to.path, source })?;
+        .map_err(|source| RecordingError::Place {
+            path: to.path,
+            source,
+        })?;
     Ok((recorder, handle))
 }
 
 fn now_ns() -> u64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let since = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default();
     u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
 }
 
@@ -100,7 +122,10 @@ impl Recorder {
     pub fn offer(&self, raw: &Arc<RawFrame>, index: u64) {
         let bytes = raw.bytes.len();
         // One that is larger than the whole queue is let in alone.
-        let full = || self.waiting.load(Ordering::Relaxed) + bytes > self.queue_bytes && !self.queue.is_empty();
+        let full = || {
+            self.waiting.load(Ordering::Relaxed) + bytes > self.queue_bytes
+                && !self.queue.is_empty()
+        };
         while !self.live && full() && !self.shared.stopped() {
             std::thread::sleep(NAP);
         }
@@ -110,16 +135,29 @@ impl Recorder {
         if refused || !self.put(Item::Frame(raw.clone(), index)) {
             self.shared.pulse.take_back(Worker::Record);
             self.waiting.fetch_sub(bytes, Ordering::Relaxed);
-            if self.shared.counts.not_recorded.fetch_add(1, Ordering::Relaxed) == 0 {
-                self.shared.warn("the recording does not keep up, frames are missing in it; see the count".into());
+            if self
+                .shared
+                .counts
+                .not_recorded
+                .fetch_add(1, Ordering::Relaxed)
+                == 0
+            {
+                self.shared.warn(
+                    "the recording does not keep up, frames are missing in it; see the count"
+                        .into(),
+                );
             }
         }
     }
 
     /// Offers what was found in a frame. It can be computed again; frames cannot, and go first.
     pub fn found(&self, found: impl FnOnce() -> Found) {
-        if (self.live && self.queue.len() > QUEUE / 2) || !self.put(Item::Result(Box::new(found()))) {
-            self.shared.counts.results_not_recorded.fetch_add(1, Ordering::Relaxed);
+        if (self.live && self.queue.len() > QUEUE / 2) || !self.put(Item::Result(Box::new(found())))
+        {
+            self.shared
+                .counts
+                .results_not_recorded
+                .fetch_add(1, Ordering::Relaxed);
         }
     }
 
@@ -142,7 +180,8 @@ struct Thread {
     series: Series,
     waiting: Arc<AtomicUsize>,
     shared: Arc<Shared>,
-    /// Nothing can be written any more. Frames are taken and counted all the same, until the capture ends.
+    /// Nothing can be written any more. Frames are taken and counted all the same, until the
+    /// capture ends.
     broken: bool,
     /// When the oldest thing was written that has not been handed to the system.
     oldest: Option<Instant>,
@@ -151,7 +190,9 @@ struct Thread {
 impl Thread {
     fn run(mut self, items: &Receiver<Item>) -> Recorded {
         loop {
-            let wait = self.oldest.map_or(FLUSH_EVERY, |since| FLUSH_EVERY.saturating_sub(since.elapsed()));
+            let wait = self.oldest.map_or(FLUSH_EVERY, |since| {
+                FLUSH_EVERY.saturating_sub(since.elapsed())
+            });
             match items.recv_timeout(wait) {
                 Ok(item) => self.take(item),
                 Err(RecvTimeoutError::Timeout) => {}
@@ -159,7 +200,10 @@ impl Thread {
             }
             if self.series.unflushed() == 0 {
                 self.oldest = None;
-            } else if self.oldest.is_some_and(|since| since.elapsed() >= FLUSH_EVERY) {
+            } else if self
+                .oldest
+                .is_some_and(|since| since.elapsed() >= FLUSH_EVERY)
+            {
                 let done = self.series.flush();
                 self.note(done);
                 self.oldest = None;
@@ -171,28 +215,54 @@ impl Thread {
             self.note(done);
         }
         let last = self.series.path().to_owned();
-        let frames = self.series.frames() - if stopped { self.series.open_frames() } else { 0 };
-        Recorded { frames, files: self.series.files(), bytes: self.series.bytes(), last, stopped }
+        let frames = self.series.frames()
+            - if stopped {
+                self.series.open_frames()
+            } else {
+                0
+            };
+        Recorded {
+            frames,
+            files: self.series.files(),
+            bytes: self.series.bytes(),
+            last,
+            stopped,
+        }
     }
 
     fn take(&mut self, item: Item) {
         self.oldest.get_or_insert_with(Instant::now);
         match item {
             Item::Frame(raw, index) => {
-                let done = if self.broken { Ok(()) } else { self.series.frame(&raw, index) };
+                let done = if self.broken {
+                    Ok(())
+                } else {
+                    self.series.frame(&raw, index)
+                };
                 let failed = self.broken || done.is_err();
                 self.note(done);
                 self.waiting.fetch_sub(raw.bytes.len(), Ordering::Relaxed);
                 let counts = &self.shared.counts;
-                let count = if failed { &counts.not_recorded } else { &counts.recorded };
+                let count = if failed {
+                    &counts.not_recorded
+                } else {
+                    &counts.recorded
+                };
                 count.fetch_add(1, Ordering::Relaxed);
                 self.shared.pulse.done(Worker::Record);
             }
             Item::Result(_) if self.broken => {
-                self.shared.counts.results_not_recorded.fetch_add(1, Ordering::Relaxed);
+                self.shared
+                    .counts
+                    .results_not_recorded
+                    .fetch_add(1, Ordering::Relaxed);
             }
             Item::Result(found) => {
-                let Found { tracks, outline, pose } = *found;
+                let Found {
+                    tracks,
+                    outline,
+                    pose,
+                } = *found;
                 let mut done = self.series.tracks(&tracks, &outline);
                 if let (Ok(()), Some((pose, skeleton))) = (&done, pose) {
                     done = self.series.pose(&pose, &skeleton);
@@ -210,8 +280,12 @@ impl Thread {
             self.shared.recording_ended.store(true, Ordering::Relaxed);
             // What stood in the open chunk is cut off with it.
             let counts = &self.shared.counts;
-            counts.recorded.fetch_sub(self.series.open_frames(), Ordering::Relaxed);
-            counts.not_recorded.fetch_add(self.series.open_frames(), Ordering::Relaxed);
+            counts
+                .recorded
+                .fetch_sub(self.series.open_frames(), Ordering::Relaxed);
+            counts
+                .not_recorded
+                .fetch_add(self.series.open_frames(), Ordering::Relaxed);
             self.shared.warn(e.to_string());
         }
     }

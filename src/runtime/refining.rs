@@ -14,17 +14,22 @@ pub struct Refining {
 }
 
 impl Refining {
-    /// Begins what `back` wants worked out. Where no thread can be had, `back` does it itself when it is due.
+    /// Begins what `back` wants worked out. Where no thread can be had, `back` does it itself when
+    /// it is due.
     pub fn begin(&mut self, back: &BackEnd) {
         if let (Some(work), None) = (back.refinement(), &self.work) {
             let (work, given_up) = (work.clone(), self.given_up.clone());
             let run = move || work.run_while(&|| !given_up.load(Ordering::Relaxed));
-            self.work = std::thread::Builder::new().name("refine".into()).spawn(run).ok();
+            self.work = std::thread::Builder::new()
+                .name("refine".into())
+                .spawn(run)
+                .ok();
         }
     }
 
-    /// Hands the result in before the frame at `time_s` (s) that needs it. In a `hurry` the standing tree has to do: to
-    /// wait may take as long as a build. A camera is not made to wait (`live`): the frame does without.
+    /// Hands the result in before the frame at `time_s` (s) that needs it. In a `hurry` the
+    /// standing tree has to do: to wait may take as long as a build. A camera is not made to wait
+    /// (`live`): the frame does without.
     pub fn hand_in(&mut self, back: &mut BackEnd, time_s: f64, live: bool, hurry: bool) {
         if hurry {
             self.given_up.store(true, Ordering::Relaxed);

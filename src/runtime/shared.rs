@@ -48,7 +48,8 @@ pub struct Counts {
     pub dropped_before_tracker: AtomicU64,
     pub undecodable: AtomicU64,
     pub before_outline: AtomicU64,
-    /// Frames in the recording, frames that should be in it and are not, and results of frames that are not.
+    /// Frames in the recording, frames that should be in it and are not, and results of frames that
+    /// are not.
     pub recorded: AtomicU64,
     pub not_recorded: AtomicU64,
     pub results_not_recorded: AtomicU64,
@@ -91,36 +92,60 @@ struct Reloaded {
 
 impl Shared {
     pub fn reload(&self, config: Config) {
-        *self.reloaded.lock().unwrap_or_else(PoisonError::into_inner) = Reloaded { config: Some(config), is_new: true };
+        *self.reloaded.lock().unwrap_or_else(PoisonError::into_inner) = Reloaded {
+            config: Some(config),
+            is_new: true,
+        };
     }
 
     /// The settings as they are now, where they are not those of the start.
     pub fn reloaded(&self) -> Option<Config> {
-        self.reloaded.lock().unwrap_or_else(PoisonError::into_inner).config.clone()
+        self.reloaded
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .config
+            .clone()
     }
 
     /// The same, once, for the source.
     pub fn newly_reloaded(&self) -> Option<Config> {
         let mut reloaded = self.reloaded.lock().unwrap_or_else(PoisonError::into_inner);
-        std::mem::take(&mut reloaded.is_new).then(|| reloaded.config.clone()).flatten()
+        std::mem::take(&mut reloaded.is_new)
+            .then(|| reloaded.config.clone())
+            .flatten()
     }
 
     /// Whether [`newly_reloaded`](Self::newly_reloaded) has something to give.
     pub fn has_new_settings(&self) -> bool {
-        self.reloaded.lock().unwrap_or_else(PoisonError::into_inner).is_new
+        self.reloaded
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .is_new
     }
 
     pub fn fail(&self, failure: Failure) {
-        self.failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(failure);
+        self.failure
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .get_or_insert(failure);
     }
 
     pub fn take_failure(&self) -> Option<Failure> {
-        self.failure.lock().unwrap_or_else(PoisonError::into_inner).take()
+        self.failure
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take()
     }
 
     /// Tells at once, and keeps it for the capture.
     pub fn warn(&self, warning: String) {
-        if self.warnings.lock().unwrap_or_else(PoisonError::into_inner).back() != Some(&warning) {
+        if self
+            .warnings
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .back()
+            != Some(&warning)
+        {
             self.push_news(format!("warning: {warning}"));
         }
         self.note(warning);
@@ -140,32 +165,57 @@ impl Shared {
 
     /// What was warned of has been made up for.
     pub fn withdraw(&self, warning: &str) {
-        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).retain(|w| w != warning);
+        self.warnings
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .retain(|w| w != warning);
     }
 
     /// Shows a line on the screen that is no warning and does not go into the capture.
     pub fn tell(&self, line: String) {
-        self.notice.lock().unwrap_or_else(PoisonError::into_inner).push(line, false);
+        self.notice
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push(line, false);
     }
 
-    /// The same for the answer to a wish, which stays until the next one: what the capture tells of itself meanwhile must
-    /// not take its place.
+    /// The same for the answer to a wish, which stays until the next one: what the capture tells of
+    /// itself meanwhile must not take its place.
     pub fn answer(&self, line: String) {
-        self.notice.lock().unwrap_or_else(PoisonError::into_inner).push(line, true);
+        self.notice
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push(line, true);
     }
 
     /// What the screen is to show: the warnings and the newest notices.
     pub fn messages(&self) -> Vec<String> {
-        let notices = self.notice.lock().unwrap_or_else(PoisonError::into_inner).0.clone();
-        self.warnings().into_iter().chain(notices.into_iter().map(|(line, _)| line)).collect()
+        let notices = self
+            .notice
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .0
+            .clone();
+        self.warnings()
+            .into_iter()
+            .chain(notices.into_iter().map(|(line, _)| line))
+            .collect()
     }
 
     pub fn warnings(&self) -> Vec<String> {
-        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned().collect()
+        self.warnings
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .iter()
+            .cloned()
+            .collect()
     }
 
     pub fn gap(&self, gap: Gap) {
-        self.timing.lock().unwrap_or_else(PoisonError::into_inner).push_gap(gap);
+        self.timing
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push_gap(gap);
     }
 
     /// Changes what is known of the camera.
@@ -174,7 +224,10 @@ impl Shared {
     }
 
     pub fn camera_state(&self) -> CameraState {
-        self.camera.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.camera
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
     }
 
     /// Tells at once, on the screen or without one, what cannot wait for the end.
@@ -207,7 +260,10 @@ impl Shared {
 
     /// The gaps so far, all else at its default.
     pub fn gaps(&self) -> Timing {
-        self.timing.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.timing
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
     }
 
     /// Ends the capture for a reason; what has been captured until now is written.
@@ -218,16 +274,23 @@ impl Shared {
 
     pub fn frame_seen(&self, time_s: f64) {
         self.counts.seen.fetch_add(1, Ordering::Relaxed);
-        *self.last_time_s.lock().unwrap_or_else(PoisonError::into_inner) = time_s;
+        *self
+            .last_time_s
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner) = time_s;
     }
 
     /// Sensor time of the newest frame, s since the first.
     pub fn last_time_s(&self) -> f64 {
-        *self.last_time_s.lock().unwrap_or_else(PoisonError::into_inner)
+        *self
+            .last_time_s
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// The newest notice, and the newest answer to a wish if the user may not have read it yet; the newest last.
+/// The newest notice, and the newest answer to a wish if the user may not have read it yet; the
+/// newest last.
 #[derive(Debug, Default)]
 struct Notices(Vec<(String, bool)>);
 
@@ -246,7 +309,14 @@ mod tests {
     #[test]
     fn the_answer_to_a_wish_outlives_what_the_capture_tells_of_itself() {
         let mut notices = Notices::default();
-        let told = |notices: &Notices| notices.0.iter().map(|(line, _)| line.clone()).collect::<Vec<_>>().join(", ");
+        let told = |notices: &Notices| {
+            notices
+                .0
+                .iter()
+                .map(|(line, _)| line.clone())
+                .collect::<Vec<_>>()
+                .join(", ")
+        };
         for (line, answer, expected) in [
             ("cut out", false, "cut out"),
             ("written to a", true, "written to a"),

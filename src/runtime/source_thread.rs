@@ -1,5 +1,6 @@
-//! The source's own thread: takes frames, paces a replay, and hands them on. A camera is never made to wait: where the
-//! tracker is late, the oldest waiting frame is dropped and counted. A camera that is lost is waited for.
+//! The source's own thread: takes frames, paces a replay, and hands them on. A camera is never made
+//! to wait: where the tracker is late, the oldest waiting frame is dropped and counted. A camera
+//! that is lost is waited for.
 
 use super::losses::Losses;
 use super::nap::{self, NAP};
@@ -37,7 +38,8 @@ pub enum Pace {
     Fast,
 }
 
-/// Both ends of the queue to the tracker: where a live source finds it full, the oldest frame is taken out again.
+/// Both ends of the queue to the tracker: where a live source finds it full, the oldest frame is
+/// taken out again.
 pub struct Queue {
     pub into: Sender<Timed>,
     pub out_of: Receiver<Timed>,
@@ -70,7 +72,8 @@ pub fn run(
     };
     while let Err(lost) = feed.run_once(&mut *source, &mut camera) {
         if shared.stopped() {
-            // Asked to stop meanwhile: that is the reason for the end, not a camera that fell silent.
+            // Asked to stop meanwhile: that is the reason for the end, not a camera that fell
+            // silent.
             break;
         }
         // One that never delivered is no camera that could come back.
@@ -79,7 +82,8 @@ pub fn run(
             break;
         }
         feed.away(reconnect::cause(&lost));
-        let failure = match reconnect::wait(&mut *source, &lost, &mut camera, feed.returned, shared) {
+        let failure = match reconnect::wait(&mut *source, &lost, &mut camera, feed.returned, shared)
+        {
             Waited::Back(first) => {
                 feed.back(first, &*source, &lost);
                 continue;
@@ -117,7 +121,11 @@ struct Feed<'a> {
 
 impl Feed<'_> {
     /// Hands on what the source delivers until it ends or fails, or nothing further is wanted.
-    fn run_once(&mut self, source: &mut dyn Source, camera: &mut config::Camera) -> Result<(), SourceError> {
+    fn run_once(
+        &mut self,
+        source: &mut dyn Source,
+        camera: &mut config::Camera,
+    ) -> Result<(), SourceError> {
         while !self.shared.stopped() {
             reconnect::adopt_new_settings(source, camera, self.shared);
             if self.pace != Pace::Live && self.shared.paused.load(Ordering::Relaxed) {
@@ -138,7 +146,8 @@ impl Feed<'_> {
 
     /// Gives a frame its place in the capture and counts what was lost before it.
     fn stamp(&mut self, mut raw: RawFrame, source: &dyn Source) -> Timed {
-        // A recording keeps whole nanoseconds; what is worked with must be what is kept, whatever the source gave.
+        // A recording keeps whole nanoseconds; what is worked with must be what is kept, whatever
+        // the source gave.
         raw.sensor_time_s = seconds(nanoseconds(raw.sensor_time_s));
         let time_s = raw.sensor_time_s - *self.first_time_s.get_or_insert(raw.sensor_time_s);
         let health = source.health();
@@ -151,14 +160,22 @@ impl Feed<'_> {
         }
         let rate_off = self.rate.is_off();
         self.shared.camera(|c| {
-            (c.damaged, c.stale, c.clock, c.rate_off) = (health.damaged, health.stale, health.clock.name(), rate_off);
+            (c.damaged, c.stale, c.clock, c.rate_off) =
+                (health.damaged, health.stale, health.clock.name(), rate_off);
         });
         self.shared.frame_seen(time_s);
         let raw = Arc::new(raw);
-        self.recorder.iter().for_each(|recorder| recorder.offer(&raw, arrival.index));
+        self.recorder
+            .iter()
+            .for_each(|recorder| recorder.offer(&raw, arrival.index));
         let received = Instant::now();
         self.last_frame = Some(received);
-        Timed { raw, index: arrival.index, time_s, received }
+        Timed {
+            raw,
+            index: arrival.index,
+            time_s,
+            received,
+        }
     }
 
     /// `false` when nobody takes frames any more.
@@ -186,7 +203,8 @@ impl Feed<'_> {
         true
     }
 
-    /// Waits for room, but not beyond a wish to stop; `false` when the frame could not be handed on.
+    /// Waits for room, but not beyond a wish to stop; `false` when the frame could not be handed
+    /// on.
     fn send_blocking(&self, mut timed: Timed) -> bool {
         self.shared.pulse.give(Worker::Track);
         loop {
@@ -209,14 +227,18 @@ impl Feed<'_> {
         self.note(&gaps);
     }
 
-    /// The first frame after an absence, which is kept as a warning as well: the result shows nothing of that time.
+    /// The first frame after an absence, which is kept as a warning as well: the result shows
+    /// nothing of that time.
     fn back(&mut self, first: RawFrame, source: &dyn Source, lost: &SourceError) {
         let before_s = self.shared.last_time_s();
         self.returned = Some(Instant::now());
         let timed = self.stamp(first, source);
         let away_s = timed.time_s - before_s;
         self.shared.camera(|c| c.away_s += away_s);
-        self.shared.note(format!("the camera was away for {away_s:.1} s from {before_s:.1} s on ({})", lost.brief()));
+        self.shared.note(format!(
+            "the camera was away for {away_s:.1} s from {before_s:.1} s on ({})",
+            lost.brief()
+        ));
         self.hand_on(timed);
     }
 
@@ -234,7 +256,12 @@ impl Feed<'_> {
     fn note(&self, gaps: &[Gap]) {
         gaps.iter().for_each(|gap| self.shared.gap(*gap));
         let totals = self.losses.totals();
-        self.shared.counts.lost_in_camera.store(totals.reconciled, Ordering::Relaxed);
-        self.shared.camera(|c| (c.lost_by_sequence, c.lost_by_time) = (totals.by_sequence, totals.by_time));
+        self.shared
+            .counts
+            .lost_in_camera
+            .store(totals.reconciled, Ordering::Relaxed);
+        self.shared.camera(|c| {
+            (c.lost_by_sequence, c.lost_by_time) = (totals.by_sequence, totals.by_time)
+        });
     }
 }

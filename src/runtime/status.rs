@@ -4,7 +4,8 @@ use super::meter::Recent;
 use super::shared::Shared;
 use super::sway_watch::SwayWatch;
 use crate::model::{
-    BranchRow, FormatNote, NodeName, Observation, Phase, Rgb, Size, Skeleton, Snapshot, SwayNow, TrackSet,
+    BranchRow, FormatNote, NodeName, Observation, Phase, Rgb, Size, Skeleton, Snapshot, SwayNow,
+    TrackSet,
 };
 use crate::pipeline::{BackEnd, Moved, Targets, Tree};
 use crate::signal::median;
@@ -48,7 +49,12 @@ pub struct Status {
 impl Status {
     pub fn new(source: String, format: FormatNote, frames_total: Option<u64>) -> Self {
         Self {
-            snapshot: Snapshot { source, format, frames_total, ..Snapshot::default() },
+            snapshot: Snapshot {
+                source,
+                format,
+                frames_total,
+                ..Snapshot::default()
+            },
             started: Instant::now(),
             newest_s: None,
             sensor: Recent::new(RATE_S),
@@ -69,11 +75,20 @@ impl Status {
     /// Forgets the tree.
     pub fn restart(&mut self) {
         let kept = std::mem::take(&mut self.snapshot);
-        *self = Self { started: self.started, ..Self::new(kept.source, kept.format, kept.frames_total) };
+        *self = Self {
+            started: self.started,
+            ..Self::new(kept.source, kept.format, kept.frames_total)
+        };
     }
 
     /// The outline is still looked for.
-    pub fn searching(&mut self, progress: f64, preview: Option<Arc<Rgb>>, size: Size, (frame, time_s): (u64, f64)) {
+    pub fn searching(
+        &mut self,
+        progress: f64,
+        preview: Option<Arc<Rgb>>,
+        size: Size,
+        (frame, time_s): (u64, f64),
+    ) {
         self.arrived(time_s);
         let s = &mut self.snapshot;
         (s.phase, s.progress, s.frame, s.time_s) = (Phase::Outline, progress, frame, time_s);
@@ -83,7 +98,8 @@ impl Status {
         }
     }
 
-    /// Counts a frame for the rates, but not again when it was held back while the outline was sought.
+    /// Counts a frame for the rates, but not again when it was held back while the outline was
+    /// sought.
     fn arrived(&mut self, time_s: f64) {
         if self.newest_s.is_none_or(|newest| time_s > newest) {
             self.newest_s = Some(time_s);
@@ -97,7 +113,8 @@ impl Status {
         let now_s = self.started.elapsed().as_secs_f64();
         let time_s = moved.tracks.time_s;
         self.arrived(time_s);
-        self.latency_ms.push(now_s, moved.received.elapsed().as_secs_f64() * 1e3);
+        self.latency_ms
+            .push(now_s, moved.received.elapsed().as_secs_f64() * 1e3);
         self.lost.push(time_s, f64::from(moved.tracks.lost));
         let error_px = median_fb_error_px(&moved.tracks);
         if time_s - self.fb_noted_s >= HISTORY_EVERY_S {
@@ -127,7 +144,8 @@ impl Status {
         self.snapshot.sway = sway.or(self.snapshot.sway.take());
     }
 
-    /// Everything that costs more than a few additions is done here, at the screen's rate and not at the camera's.
+    /// Everything that costs more than a few additions is done here, at the screen's rate and not
+    /// at the camera's.
     pub fn snapshot(
         &mut self,
         moved: Option<&Moved>,
@@ -145,11 +163,16 @@ impl Status {
                 s.outline_px.clone_from(&moved.outline.polygon_px);
             }
             let colour = |id| {
-                back.binding().and_then(|b| b.node_of(id)).and_then(|n| s.node_colour.get(n.index())?.as_ref().copied())
+                back.binding()
+                    .and_then(|b| b.node_of(id))
+                    .and_then(|n| s.node_colour.get(n.index())?.as_ref().copied())
             };
             let (passed, on_trial): (Vec<&Observation>, Vec<&Observation>) =
                 moved.tracks.observations.iter().partition(|o| o.confirmed);
-            s.points = passed.into_iter().map(|o| ([o.u_px, o.v_px], colour(o.id))).collect();
+            s.points = passed
+                .into_iter()
+                .map(|o| ([o.u_px, o.v_px], colour(o.id)))
+                .collect();
             s.candidates_px = on_trial.into_iter().map(|o| [o.u_px, o.v_px]).collect();
         }
         s.sensor_rate_hz = self.sensor.rate_hz();
@@ -165,7 +188,12 @@ impl Status {
         s.not_shown = shared.screen.replaced();
         let (recorded, missing) = (&shared.counts.recorded, &shared.counts.not_recorded);
         let recording = shared.recording.load(Ordering::Relaxed);
-        s.recorded = recording.then(|| (recorded.load(Ordering::Relaxed), missing.load(Ordering::Relaxed)));
+        s.recorded = recording.then(|| {
+            (
+                recorded.load(Ordering::Relaxed),
+                missing.load(Ordering::Relaxed),
+            )
+        });
         s.paused = shared.paused.load(Ordering::Relaxed);
         s.ended = shared.ended.load(Ordering::Relaxed);
         s.messages = shared.messages();
@@ -173,10 +201,16 @@ impl Status {
     }
 
     fn follow_tree(&mut self, tree: &Tree, moved: &Moved) {
-        if self.skeleton.as_ref().is_none_or(|s| !Arc::ptr_eq(s, &tree.skeleton)) {
+        if self
+            .skeleton
+            .as_ref()
+            .is_none_or(|s| !Arc::ptr_eq(s, &tree.skeleton))
+        {
             self.skeleton = Some(tree.skeleton.clone());
             let nodes = &tree.skeleton.nodes;
-            self.table_nodes = (1..tree.skeleton.measured()).filter(|&i| nodes[i].level <= TABLE_LEVEL).collect();
+            self.table_nodes = (1..tree.skeleton.measured())
+                .filter(|&i| nodes[i].level <= TABLE_LEVEL)
+                .collect();
             let at_rest = |&i: &usize| tree.skeleton.image_from_model(&nodes[i].position);
             self.table_rest_px = self.table_nodes.iter().map(at_rest).collect();
             self.displacements.clear();
@@ -200,11 +234,25 @@ impl Status {
         let before = self.displacements.back().map(|(_, d)| d);
         let at = |k: usize, node: usize| {
             // A node that no track saw stays where it was, and before that is at rest.
-            targets_px.get(node).copied().flatten().or(before.map(|d| d[k])).unwrap_or(self.table_rest_px[k])
+            targets_px
+                .get(node)
+                .copied()
+                .flatten()
+                .or(before.map(|d| d[k]))
+                .unwrap_or(self.table_rest_px[k])
         };
-        let row = self.table_nodes.iter().enumerate().map(|(k, &node)| at(k, node)).collect();
+        let row = self
+            .table_nodes
+            .iter()
+            .enumerate()
+            .map(|(k, &node)| at(k, node))
+            .collect();
         self.displacements.push_back((time_s, row));
-        while self.displacements.front().is_some_and(|(t, _)| *t < time_s - BRANCH_S) {
+        while self
+            .displacements
+            .front()
+            .is_some_and(|(t, _)| *t < time_s - BRANCH_S)
+        {
             self.displacements.pop_front();
         }
     }
@@ -227,16 +275,24 @@ impl Status {
 
 /// Median forward-backward error of a frame's points, px; 0 if there are none.
 pub fn median_fb_error_px(tracks: &TrackSet) -> f64 {
-    median(tracks.counted().map(|o| o.fb_error_px).collect(), f32::total_cmp).map_or(0.0, f64::from)
+    median(
+        tracks.counted().map(|o| o.fb_error_px).collect(),
+        f32::total_cmp,
+    )
+    .map_or(0.0, f64::from)
 }
 
 /// Median of the errors that are expected of a frame's points, px.
 pub fn median_error_px(tracks: &TrackSet) -> Option<f64> {
-    median(tracks.counted().filter_map(|o| o.error_px).collect(), f32::total_cmp).map(f64::from)
+    median(
+        tracks.counted().filter_map(|o| o.error_px).collect(),
+        f32::total_cmp,
+    )
+    .map(f64::from)
 }
 
-/// Number of the main branch of every node; `None` above the main branches. A copy has its original's, and a branch the
-/// one that `given` knows.
+/// Number of the main branch of every node; `None` above the main branches. A copy has its
+/// original's, and a branch the one that `given` knows.
 fn main_branches(skeleton: &Skeleton, given: &mut BTreeMap<NodeName, u8>) -> Vec<Option<u8>> {
     let mut colours: Vec<Option<u8>> = Vec::with_capacity(skeleton.nodes.len());
     for node in &skeleton.nodes {
@@ -256,6 +312,13 @@ fn main_branches(skeleton: &Skeleton, given: &mut BTreeMap<NodeName, u8>) -> Vec
 
 fn rms_px(path: &[[f64; 2]]) -> f64 {
     let n = path.len().max(1) as f64;
-    let mean = path.iter().fold([0.0; 2], |m, p| [m[0] + p[0] / n, m[1] + p[1] / n]);
-    (path.iter().map(|p| (p[0] - mean[0]).powi(2) + (p[1] - mean[1]).powi(2)).sum::<f64>() / n).sqrt()
+    let mean = path
+        .iter()
+        .fold([0.0; 2], |m, p| [m[0] + p[0] / n, m[1] + p[1] / n]);
+    (path
+        .iter()
+        .map(|p| (p[0] - mean[0]).powi(2) + (p[1] - mean[1]).powi(2))
+        .sum::<f64>()
+        / n)
+        .sqrt()
 }

@@ -5,9 +5,10 @@ use crate::model::{BranchSway, NodeName, Pose, Skeleton, SwayNow};
 use std::fmt::Write;
 use std::sync::atomic::Ordering;
 
-/// `{"frame":…,"time_s":…,"nodes":[[id,x,y,z],…]}` and a line feed: the measured nodes, model axes, in px or, where
-/// `metres_per_px` is not 0, in metres. In the frame with which an answer of the sway takes effect `"sway":{…}` follows,
-/// and with a camera what was lost so far.
+/// `{"frame":…,"time_s":…,"nodes":[[id,x,y,z],…]}` and a line feed: the measured nodes, model axes,
+/// in px or, where
+/// `metres_per_px` is not 0, in metres. In the frame with which an answer of the sway takes effect
+/// `"sway":{…}` follows, and with a camera what was lost so far.
 pub fn line(
     pose: &Pose,
     skeleton: &Skeleton,
@@ -16,13 +17,20 @@ pub fn line(
     lost: Option<&Shared>,
 ) -> String {
     let measured = &skeleton.nodes[..skeleton.measured()];
-    let scale = if metres_per_px > 0.0 { metres_per_px } else { 1.0 };
+    let scale = if metres_per_px > 0.0 {
+        metres_per_px
+    } else {
+        1.0
+    };
     let nodes = pose.joints.iter().zip(measured).map(|(joint, node)| {
         let p = joint.position * scale;
         format!("[{},{:.3},{:.3},{:.3}]", node.name.0, p.x, p.y, p.z)
     });
     let nodes = list(nodes);
-    let mut line = format!("{{\"frame\":{},\"time_s\":{:.6},\"nodes\":{nodes}", pose.frame, pose.time_s);
+    let mut line = format!(
+        "{{\"frame\":{},\"time_s\":{:.6},\"nodes\":{nodes}",
+        pose.frame, pose.time_s
+    );
     if let Some(sway) = sway {
         line.push_str(&told(sway));
     }
@@ -39,8 +47,14 @@ fn list(entries: impl Iterator<Item = String>) -> String {
 
 /// The same names and units as in `nodes.csv`.
 fn told(sway: &SwayNow) -> String {
-    let branches = list(sway.branches.iter().map(|(name, branch)| of_branch(*name, branch)));
-    let excitation = sway.excitation.map_or_else(|| "null".to_owned(), |e| format!("\"{}\"", e.word()));
+    let branches = list(
+        sway.branches
+            .iter()
+            .map(|(name, branch)| of_branch(*name, branch)),
+    );
+    let excitation = sway
+        .excitation
+        .map_or_else(|| "null".to_owned(), |e| format!("\"{}\"", e.word()));
     format!(
         ",\"sway\":{{\"frame\":{},\"time_s\":{:.6},\"span_s\":{:.3},\"excitation\":{excitation},\"branches\":{branches}}}",
         sway.frame, sway.time_s, sway.span_s
@@ -48,13 +62,25 @@ fn told(sway: &SwayNow) -> String {
 }
 
 fn of_branch(name: NodeName, branch: &BranchSway) -> String {
-    let mut text = format!("{{\"node_id\":{},\"identifiable\":{}", name.0, branch.swaying.is_ok());
+    let mut text = format!(
+        "{{\"node_id\":{},\"identifiable\":{}",
+        name.0,
+        branch.swaying.is_ok()
+    );
     match &branch.swaying {
         Ok(sway) => {
             let f = sway.frequency_hz;
-            let mut all = vec![("frequency_hz", f.value), ("frequency_lo_hz", f.lo), ("frequency_hi_hz", f.hi)];
+            let mut all = vec![
+                ("frequency_hz", f.value),
+                ("frequency_lo_hz", f.lo),
+                ("frequency_hi_hz", f.hi),
+            ];
             if let Some(d) = sway.damping_ratio {
-                all.extend([("damping_ratio", d.value), ("damping_lo", d.lo), ("damping_hi", d.hi)]);
+                all.extend([
+                    ("damping_ratio", d.value),
+                    ("damping_lo", d.lo),
+                    ("damping_hi", d.hi),
+                ]);
             }
             all.push(("amplitude_deg", sway.amplitude_deg));
             // JSON knows no infinity.
@@ -69,10 +95,13 @@ fn of_branch(name: NodeName, branch: &BranchSway) -> String {
     text
 }
 
-/// What was lost until now, for the stream of a camera. A file's stream has none, so that two replays give the same.
+/// What was lost until now, for the stream of a camera. A file's stream has none, so that two
+/// replays give the same.
 fn counts(shared: &Shared) -> String {
     let c = shared.camera_state();
-    let by_sequence = c.lost_by_sequence.map_or_else(|| "null".to_owned(), |n| n.to_string());
+    let by_sequence = c
+        .lost_by_sequence
+        .map_or_else(|| "null".to_owned(), |n| n.to_string());
     format!(
         ",\"dropped\":{},\"dropped_by_sequence\":{by_sequence},\"dropped_by_time\":{},\"broken\":{},\"reconnects\":{}",
         shared.counts.lost_in_camera.load(Ordering::Relaxed),
@@ -89,7 +118,15 @@ mod tests {
     use serde_json::{Value, json};
 
     fn swaying(branches: Vec<(u32, crate::model::Swaying)>) -> SwayNow {
-        let branch = |(name, swaying)| (NodeName(name), BranchSway { swaying, spectrum: None });
+        let branch = |(name, swaying)| {
+            (
+                NodeName(name),
+                BranchSway {
+                    swaying,
+                    spectrum: None,
+                },
+            )
+        };
         SwayNow {
             frame: 300,
             time_s: 10.0,
@@ -102,21 +139,43 @@ mod tests {
     /// Whatever is not known is left out: a reader must never meet a number that is none.
     #[test]
     fn what_is_not_known_is_left_out() {
-        let interval = |value| crate::model::Interval { value, lo: 0.5 * value, hi: 2.0 * value };
+        let interval = |value| crate::model::Interval {
+            value,
+            lo: 0.5 * value,
+            hi: 2.0 * value,
+        };
         let known = |damping_ratio, amplitude_deg| {
-            Ok(Sway { frequency_hz: interval(0.8), damping_ratio, excitation: Excitation::Wind, amplitude_deg })
+            Ok(Sway {
+                frequency_hz: interval(0.8),
+                damping_ratio,
+                excitation: Excitation::Wind,
+                amplitude_deg,
+            })
         };
         let sway = swaying(vec![
             (1, known(Some(interval(0.02)), 1.5)),
             (4, known(None, f64::NAN)),
             (9, Err(Unidentified::AboveSampling)),
         ]);
-        let skeleton = Skeleton { nodes: Vec::new(), foot_px: [0.0; 2], image_size: Size::new(64, 64) };
-        let pose = Pose { frame: 330, time_s: 11.0, joints: Vec::new() };
+        let skeleton = Skeleton {
+            nodes: Vec::new(),
+            foot_px: [0.0; 2],
+            image_size: Size::new(64, 64),
+        };
+        let pose = Pose {
+            frame: 330,
+            time_s: 11.0,
+            joints: Vec::new(),
+        };
         let shared = Shared::default();
-        let of = |sway, lost| -> Value { serde_json::from_str(&line(&pose, &skeleton, 0.0, sway, lost)).unwrap() };
+        let of = |sway, lost| -> Value {
+            serde_json::from_str(&line(&pose, &skeleton, 0.0, sway, lost)).unwrap()
+        };
         let told = &of(Some(&sway), Some(&shared));
-        assert_eq!((&told["sway"]["excitation"], &told["dropped"]), (&Value::Null, &json!(0)));
+        assert_eq!(
+            (&told["sway"]["excitation"], &told["dropped"]),
+            (&Value::Null, &json!(0))
+        );
         assert_eq!(
             told["sway"]["branches"],
             json!([
@@ -128,6 +187,9 @@ mod tests {
                 {"node_id": 9, "identifiable": false, "unidentified": "above_sampling"},
             ])
         );
-        assert_eq!(of(None, None), json!({"frame": 330, "time_s": 11.0, "nodes": []}));
+        assert_eq!(
+            of(None, None),
+            json!({"frame": 330, "time_s": 11.0, "nodes": []})
+        );
     }
 }

@@ -37,17 +37,25 @@ impl SwayWatch {
         }
     }
 
-    /// Takes the next frame; gives the sway that takes effect with it, of the branches of the present tree.
+    /// Takes the next frame; gives the sway that takes effect with it, of the branches of the
+    /// present tree.
     pub fn step(&mut self, moved: &Moved, back: &BackEnd) -> Option<Arc<SwayNow>> {
         if self.settings.every_s > 0.0 {
             self.remember(&moved.tracks);
         }
         let skeleton = back.tree()?.skeleton.clone();
-        if self.skeleton.as_ref().is_none_or(|s| !Arc::ptr_eq(s, &skeleton)) {
+        if self
+            .skeleton
+            .as_ref()
+            .is_none_or(|s| !Arc::ptr_eq(s, &skeleton))
+        {
             self.angles.begin(&skeleton);
             self.skeleton = Some(skeleton.clone());
         }
-        moved.before.iter().for_each(|(pose, _)| self.angles.push(pose));
+        moved
+            .before
+            .iter()
+            .for_each(|(pose, _)| self.angles.push(pose));
         if let Some(pose) = &moved.pose {
             self.angles.push(pose);
         }
@@ -71,13 +79,16 @@ impl SwayWatch {
         let mut found = self.swaying.step(set.time_s, request)?;
         // It was asked for by a tree that may have been refined since.
         let there = &skeleton.nodes[..skeleton.measured()];
-        found.branches.retain(|name, _| there.iter().any(|n| n.name == *name));
+        found
+            .branches
+            .retain(|name, _| there.iter().any(|n| n.name == *name));
         Some(Arc::new(found))
     }
 
     fn remember(&mut self, set: &TrackSet) {
         self.log.push(set);
-        self.void.extend(set.rejected.iter().map(|id| (*id, set.time_s)));
+        self.void
+            .extend(set.rejected.iter().map(|id| (*id, set.time_s)));
         if !set.rejected.is_empty() {
             // Nothing is left of them in the log by then.
             let oldest_s = set.time_s - self.settings.window_s;

@@ -1,17 +1,22 @@
 //! The sway is told anew again and again on a thread of its own, while the film goes on.
 //!
-//! A request is made when so much film has passed, and its result takes effect when the next one is due: at a moment of
-//! film, not of the clock. A fast replay waits for it there, so that the same recording gives the same answers at the same
-//! frames whatever the machine. A camera, or a recording at its own pace, waits for nobody: what is not ready is looked at
-//! again when the next one is due, and the request that finds the thread busy is passed over and counted. The thread then
-//! stands back for all others.
+//! A request is made when so much film has passed, and its result takes effect when the next one is
+//! due: at a moment of film, not of the clock. A fast replay waits for it there, so that the same
+//! recording gives the same answers at the same frames whatever the machine. A camera, or a
+//! recording at its own pace, waits for nobody: what is not ready is looked at again when the next
+//! one is due, and the request that finds the thread busy is passed over and counted. The thread
+//! then stands back for all others.
 
 use super::pulse::{Pulse, Worker};
 use super::shared::Shared;
 use crate::config::Dynamics;
 use crate::dynamics::{FilmLog, analyse_soon, spectrum};
-use crate::model::{AngleSpectrum, Angles, BranchSway, NodeId, NodeName, Skeleton, SwayNow, TrackId, Unidentified};
-use crossbeam_channel::{Receiver, RecvTimeoutError, SendTimeoutError, Sender, TryRecvError, bounded};
+use crate::model::{
+    AngleSpectrum, Angles, BranchSway, NodeId, NodeName, Skeleton, SwayNow, TrackId, Unidentified,
+};
+use crossbeam_channel::{
+    Receiver, RecvTimeoutError, SendTimeoutError, Sender, TryRecvError, bounded,
+};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -74,7 +79,16 @@ impl Swaying {
     /// Asks every `every_s` seconds of film, never if that is 0.
     pub fn new(every_s: f64, waits: bool, analyser: Analyser, shared: Arc<Shared>) -> Self {
         let next_s = f64::NEG_INFINITY;
-        Self { every_s, waits, analyser, shared, thread: None, pending: None, next_s, passed_over: 0 }
+        Self {
+            every_s,
+            waits,
+            analyser,
+            shared,
+            thread: None,
+            pending: None,
+            next_s,
+            passed_over: 0,
+        }
     }
 
     /// How often a request was due and the thread was busy.
@@ -87,10 +101,11 @@ impl Swaying {
         (self.pending, self.next_s) = (None, f64::NEG_INFINITY);
     }
 
-    /// At the frame of this time: the result that takes effect with it, if there is one, and the next request, if one is
-    /// due.
+    /// At the frame of this time: the result that takes effect with it, if there is one, and the
+    /// next request, if one is due.
     pub fn step(&mut self, time_s: f64, request: impl FnOnce() -> Request) -> Option<SwayNow> {
-        if self.every_s <= 0.0 || time_s < self.next_s || self.shared.hurry.load(Ordering::Relaxed) {
+        if self.every_s <= 0.0 || time_s < self.next_s || self.shared.hurry.load(Ordering::Relaxed)
+        {
             return None;
         }
         self.next_s = time_s + self.every_s;
@@ -108,10 +123,16 @@ impl Swaying {
         let pending = self.pending.take()?;
         loop {
             // Without a thread any more there is nothing to come either.
-            match if self.waits { pending.answer.recv_timeout(LOOK_EVERY) } else { look(&pending.answer) } {
+            match if self.waits {
+                pending.answer.recv_timeout(LOOK_EVERY)
+            } else {
+                look(&pending.answer)
+            } {
                 Ok(found) => return Some(found),
                 Err(RecvTimeoutError::Disconnected) => return None,
-                Err(RecvTimeoutError::Timeout) if self.shared.hurry.load(Ordering::Relaxed) => return None,
+                Err(RecvTimeoutError::Timeout) if self.shared.hurry.load(Ordering::Relaxed) => {
+                    return None;
+                }
                 Err(RecvTimeoutError::Timeout) if self.waits => {}
                 Err(RecvTimeoutError::Timeout) => {
                     self.pending = Some(pending);
@@ -122,13 +143,26 @@ impl Swaying {
     }
 
     fn ask(&mut self, request: Request) {
-        let Some(errands) = self.errands() else { return };
+        let Some(errands) = self.errands() else {
+            return;
+        };
         let (answer, answered) = bounded(1);
         let wanted = Arc::new(AtomicBool::new(true));
-        let errand = Errand { request, wanted: wanted.clone(), answer };
-        let pending = Pending { wanted, answer: answered };
+        let errand = Errand {
+            request,
+            wanted: wanted.clone(),
+            answer,
+        };
+        let pending = Pending {
+            wanted,
+            answer: answered,
+        };
         // Full only while one that was given up is not over, and another one waits behind it.
-        let sent = if self.waits { send(&errands, errand, &self.shared) } else { errands.try_send(errand).is_ok() };
+        let sent = if self.waits {
+            send(&errands, errand, &self.shared)
+        } else {
+            errands.try_send(errand).is_ok()
+        };
         if sent {
             self.pending = Some(pending);
         } else {
@@ -150,7 +184,9 @@ impl Swaying {
             match std::thread::Builder::new().name("sway".into()).spawn(run) {
                 Ok(thread) => self.thread = Some((errands, thread)),
                 Err(e) => {
-                    self.shared.warn(format!("the sway is told only at the end: a thread cannot be started: {e}"));
+                    self.shared.warn(format!(
+                        "the sway is told only at the end: a thread cannot be started: {e}"
+                    ));
                     self.every_s = 0.0;
                 }
             }
@@ -173,7 +209,9 @@ pub struct Ending(Option<JoinHandle<()>>);
 impl Ending {
     /// Whether it has ended by a panic. One that has not come to its end is not waited for.
     pub fn panicked(self) -> bool {
-        self.0.filter(JoinHandle::is_finished).is_some_and(|thread| thread.join().is_err())
+        self.0
+            .filter(JoinHandle::is_finished)
+            .is_some_and(|thread| thread.join().is_err())
     }
 }
 
@@ -182,7 +220,9 @@ fn send(errands: &Sender<Errand>, mut errand: Errand, shared: &Shared) -> bool {
     loop {
         match errands.send_timeout(errand, LOOK_EVERY) {
             Ok(()) => return true,
-            Err(SendTimeoutError::Timeout(back)) if !shared.hurry.load(Ordering::Relaxed) => errand = back,
+            Err(SendTimeoutError::Timeout(back)) if !shared.hurry.load(Ordering::Relaxed) => {
+                errand = back
+            }
             Err(_) => return false,
         }
     }
@@ -195,8 +235,8 @@ fn look(answer: &Receiver<SwayNow>) -> Result<SwayNow, RecvTimeoutError> {
     })
 }
 
-/// Lets all other threads go first where there is too little processor for all. Where that is refused, it is not needed for
-/// the result.
+/// Lets all other threads go first where there is too little processor for all. Where that is
+/// refused, it is not needed for the result.
 fn stand_back() {
     const NICE: libc::c_int = 10;
     // SAFETY: it takes numbers only; 0 is the calling thread, as Linux has it.
@@ -205,7 +245,12 @@ fn stand_back() {
 
 /// The thread: one request after the other until nobody has any.
 fn work(queue: &Receiver<Errand>, analyser: Analyser, shared: &Shared) {
-    for Errand { request, wanted, answer } in queue {
+    for Errand {
+        request,
+        wanted,
+        answer,
+    } in queue
+    {
         let pulse = &shared.pulse;
         let _at_work = AtWork::new(pulse);
         let go_on = || {
@@ -221,8 +266,8 @@ fn work(queue: &Receiver<Errand>, analyser: Analyser, shared: &Shared) {
     }
 }
 
-/// The thread has work until this is dropped, by a panic too: the capture goes on without it, and must not be taken for one
-/// that stalls.
+/// The thread has work until this is dropped, by a panic too: the capture goes on without it, and
+/// must not be taken for one that stalls.
 struct AtWork<'a>(&'a Pulse);
 
 impl<'a> AtWork<'a> {
@@ -240,13 +285,30 @@ impl Drop for AtWork<'_> {
 
 /// The sway of every branch, and the spectra of the angles.
 pub fn analyse(request: &Request, go_on: &dyn Fn() -> bool) -> SwayNow {
-    let Request { skeleton, settings, angles, .. } = request;
-    let film = request.log.film(skeleton, |id| request.nodes.get(&id).copied());
+    let Request {
+        skeleton,
+        settings,
+        angles,
+        ..
+    } = request;
+    let film = request
+        .log
+        .film(skeleton, |id| request.nodes.get(&id).copied());
     let analysis = analyse_soon(skeleton, &film, settings, go_on);
     let branch = |(i, name): (usize, &NodeName)| {
         // The foot is no branch.
-        let swaying = analysis.sway.get(i + 1).copied().unwrap_or(Err(Unidentified::NotMeasured));
-        (*name, BranchSway { swaying, spectrum: spectrum_of(angles, *name, settings.highest_hz) })
+        let swaying = analysis
+            .sway
+            .get(i + 1)
+            .copied()
+            .unwrap_or(Err(Unidentified::NotMeasured));
+        (
+            *name,
+            BranchSway {
+                swaying,
+                spectrum: spectrum_of(angles, *name, settings.highest_hz),
+            },
+        )
     };
     SwayNow {
         frame: request.frame,
@@ -262,8 +324,16 @@ fn spectrum_of(angles: &Angles, node: NodeName, highest_hz: f64) -> Option<Angle
     let (times, values): (Vec<f64>, Vec<f64>) = angles.of(node).unzip();
     let whole = spectrum(&times, &values)?;
     let bins = (highest_hz / whole.bin_hz).ceil() as usize + 1;
-    let amplitude_deg = whole.amplitude.into_iter().take(bins).map(|a| a as f32).collect();
-    Some(AngleSpectrum { bin_hz: whole.bin_hz, amplitude_deg })
+    let amplitude_deg = whole
+        .amplitude
+        .into_iter()
+        .take(bins)
+        .map(|a| a as f32)
+        .collect();
+    Some(AngleSpectrum {
+        bin_hz: whole.bin_hz,
+        amplitude_deg,
+    })
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! The tracker's thread: decodes frames and runs the front end. Wishes of the user pass through here in their order.
+//! The tracker's thread: decodes frames and runs the front end. Wishes of the user pass through
+//! here in their order.
 
 use super::first_picture::FirstPicture;
 use super::pulse::Worker;
@@ -15,7 +16,8 @@ use std::time::Duration;
 
 /// Width of the pictures for the screen, px.
 const PREVIEW_WIDTH: u32 = 640;
-/// Scribbles are solved on pictures no wider than this, px: a larger one would take seconds, and shows no more branches.
+/// Scribbles are solved on pictures no wider than this, px: a larger one would take seconds, and
+/// shows no more branches.
 const MATTING_WIDTH: u32 = 960;
 /// Damaged frames that are reported one by one; further ones are only counted.
 const DAMAGE_REPORTED: u64 = 5;
@@ -121,10 +123,15 @@ impl<'a> TrackThread<'a> {
 
     fn honour(&mut self, wish: Control) {
         match wish {
-            Control::SetOutline(polygon_px) => match self.size.map(|size| outline::from_polygon(&polygon_px, size)) {
+            Control::SetOutline(polygon_px) => match self
+                .size
+                .map(|size| outline::from_polygon(&polygon_px, size))
+            {
                 Some(Ok(outline)) => self.restart(Some(outline)),
                 Some(Err(e)) => self.shared.warn(e.to_string()),
-                None => self.shared.warn("no picture has arrived yet that an outline could be drawn on".into()),
+                None => self
+                    .shared
+                    .warn("no picture has arrived yet that an outline could be drawn on".into()),
             },
             Control::Restart => self.restart(None),
             Control::BuildNow => drop(self.pass_on(ToModel::BuildNow)),
@@ -157,17 +164,24 @@ impl<'a> TrackThread<'a> {
     }
 
     fn follow(&mut self, timed: &Timed) -> bool {
-        let mut luma = self.front.spare().unwrap_or(Luma { size: timed.raw.size, pixels: Vec::new() });
+        let mut luma = self.front.spare().unwrap_or(Luma {
+            size: timed.raw.size,
+            pixels: Vec::new(),
+        });
         let decoded = match self.size {
-            Some(expected) if expected != timed.raw.size => {
-                Err(DecodeError::SizeChanged { expected, found: timed.raw.size })
-            }
+            Some(expected) if expected != timed.raw.size => Err(DecodeError::SizeChanged {
+                expected,
+                found: timed.raw.size,
+            }),
             _ => self.decoder.luma(&timed.raw, &mut luma),
         };
         match decoded {
             Ok(()) => (self.size, self.other_sizes) = (Some(luma.size), 0),
-            // Damage can hit the size that a picture gives itself; a camera that really changes it keeps to that.
-            Err(e @ DecodeError::SizeChanged { .. }) if self.live && self.other_sizes < OTHER_SIZES => {
+            // Damage can hit the size that a picture gives itself; a camera that really changes it
+            // keeps to that.
+            Err(e @ DecodeError::SizeChanged { .. })
+                if self.live && self.other_sizes < OTHER_SIZES =>
+            {
                 self.other_sizes += 1;
                 self.leave_out(timed, e);
                 return true;
@@ -177,12 +191,16 @@ impl<'a> TrackThread<'a> {
                 return true;
             }
             Err(e) => {
-                self.shared.abort(Failure::Frame { frame: timed.index, error: e });
+                self.shared.abort(Failure::Frame {
+                    frame: timed.index,
+                    error: e,
+                });
                 return false;
             }
         }
         let preview = self.preview(timed);
-        self.picture.see(timed, self.front.oldest_held(), &mut self.decoder);
+        self.picture
+            .see(timed, self.front.oldest_held(), &mut self.decoder);
         let frame = Frame {
             index: timed.index,
             time_s: timed.time_s,
@@ -195,9 +213,16 @@ impl<'a> TrackThread<'a> {
         self.report();
         if let Some(progress) = self.front.searching() {
             let (size, frame, time_s) = (timed.raw.size, timed.index, timed.time_s);
-            return self.pass_on(ToModel::Searching { progress, preview, size, frame, time_s });
+            return self.pass_on(ToModel::Searching {
+                progress,
+                preview,
+                size,
+                frame,
+                time_s,
+            });
         }
-        done.into_iter().all(|followed| self.pass_on_followed(followed))
+        done.into_iter()
+            .all(|followed| self.pass_on_followed(followed))
     }
 
     fn pass_on_followed(&mut self, followed: Followed) -> bool {
@@ -206,42 +231,70 @@ impl<'a> TrackThread<'a> {
             && self.pass_on(ToModel::Followed(followed))
     }
 
-    /// Scribbles are drawn on the first picture, and solved as soon as it is there. That takes a second or two, in which the
-    /// screen shows the picture and what is going on; frames of a live camera that find no room meanwhile are counted.
+    /// Scribbles are drawn on the first picture, and solved as soon as it is there. That takes a
+    /// second or two, in which the screen shows the picture and what is going on; frames of a live
+    /// camera that find no room meanwhile are counted.
     fn solve_scribbles(&mut self, timed: &Timed, preview: Option<Arc<Rgb>>) {
         if self.scribbles.is_none() {
             return;
         }
-        let Ok(picture) = self.decoder.preview(&timed.raw, MATTING_WIDTH) else { return };
-        let Some(scribbles) = self.scribbles.take() else { return };
-        self.shared.tell("the tree is cut out along the scribbles".into());
+        let Ok(picture) = self.decoder.preview(&timed.raw, MATTING_WIDTH) else {
+            return;
+        };
+        let Some(scribbles) = self.scribbles.take() else {
+            return;
+        };
+        self.shared
+            .tell("the tree is cut out along the scribbles".into());
         let (size, frame, time_s) = (timed.raw.size, timed.index, timed.time_s);
-        self.pass_on(ToModel::Searching { progress: 0.0, preview, size, frame, time_s });
+        self.pass_on(ToModel::Searching {
+            progress: 0.0,
+            preview,
+            size,
+            frame,
+            time_s,
+        });
         match outline::from_scribbles(&scribbles, &picture) {
             Ok(outline) => self.front.restart(Some(outline)),
-            Err(e) => self.shared.warn(format!("{e}; the tree is looked for by its motion")),
+            Err(e) => self
+                .shared
+                .warn(format!("{e}; the tree is looked for by its motion")),
         }
     }
 
     /// A picture for the screen, if one is due by the sensor's clock.
     fn preview(&mut self, timed: &Timed) -> Option<Arc<Rgb>> {
-        if self.last_preview_s.is_some_and(|s| timed.time_s - s < self.preview_every.as_secs_f64()) {
+        if self
+            .last_preview_s
+            .is_some_and(|s| timed.time_s - s < self.preview_every.as_secs_f64())
+        {
             return None;
         }
         self.last_preview_s = Some(timed.time_s);
-        self.decoder.preview(&timed.raw, PREVIEW_WIDTH).ok().map(Arc::new)
+        self.decoder
+            .preview(&timed.raw, PREVIEW_WIDTH)
+            .ok()
+            .map(Arc::new)
     }
 
     fn leave_out(&mut self, timed: &Timed, e: DecodeError) {
-        let n = self.shared.counts.undecodable.fetch_add(1, Ordering::Relaxed);
+        let n = self
+            .shared
+            .counts
+            .undecodable
+            .fetch_add(1, Ordering::Relaxed);
         if n < DAMAGE_REPORTED {
-            self.shared.warn(format!("frame {} is left out: {e}", timed.index));
+            self.shared
+                .warn(format!("frame {} is left out: {e}", timed.index));
         }
         self.last_damage = Some(e);
     }
 
     fn report(&mut self) {
-        self.shared.counts.before_outline.store(self.front.let_go, Ordering::Relaxed);
+        self.shared
+            .counts
+            .before_outline
+            .store(self.front.let_go, Ordering::Relaxed);
         if std::mem::take(&mut self.front.no_motion) {
             self.shared.warn(
                 "nothing moved enough to find the tree by; the whole picture is taken: wait for wind, come nearer, \

@@ -19,7 +19,8 @@ enum Answer {
     Reopened(Result<(), SourceError>),
 }
 
-/// One question at a time goes to the thread; an answer that does not come in time is waited for before the next one.
+/// One question at a time goes to the thread; an answer that does not come in time is waited for
+/// before the next one.
 pub struct Watched {
     ask: Sender<Ask>,
     answers: Receiver<Answer>,
@@ -45,7 +46,8 @@ impl Watched {
         })
     }
 
-    /// Takes the source to a thread of its own, which ends with this value, or with the call that it hangs in.
+    /// Takes the source to a thread of its own, which ends with this value, or with the call that
+    /// it hangs in.
     ///
     /// # Errors
     /// The thread cannot be started.
@@ -67,17 +69,34 @@ impl Watched {
                 }
             }
         };
-        std::thread::Builder::new().name("camera".into()).spawn(run)?;
-        Ok(Self { ask, answers, hanging: false, ended: false, info, health, limit, stop: Arc::default() })
+        std::thread::Builder::new()
+            .name("camera".into())
+            .spawn(run)?;
+        Ok(Self {
+            ask,
+            answers,
+            hanging: false,
+            ended: false,
+            info,
+            health,
+            limit,
+            stop: Arc::default(),
+        })
     }
 
     fn silent(&self) -> SourceError {
-        SourceError::Timeout { input: self.info.name.clone(), seconds: self.limit.as_secs_f64() }
+        SourceError::Timeout {
+            input: self.info.name.clone(),
+            seconds: self.limit.as_secs_f64(),
+        }
     }
 
     fn ended(&mut self) -> SourceError {
         self.ended = true;
-        SourceError::Disconnected { input: self.info.name.clone(), reason: "its thread has ended".into() }
+        SourceError::Disconnected {
+            input: self.info.name.clone(),
+            reason: "its thread has ended".into(),
+        }
     }
 
     /// Asks, unless an answer is still awaited, and waits for it; `Ok(None)` when asked to stop.
@@ -94,8 +113,12 @@ impl Watched {
                     return Ok(Some(answer));
                 }
                 Err(RecvTimeoutError::Disconnected) => return Err(self.ended()),
-                Err(RecvTimeoutError::Timeout) if self.stop.load(Ordering::Relaxed) => return Ok(None),
-                Err(RecvTimeoutError::Timeout) if Instant::now() >= until => return Err(self.silent()),
+                Err(RecvTimeoutError::Timeout) if self.stop.load(Ordering::Relaxed) => {
+                    return Ok(None);
+                }
+                Err(RecvTimeoutError::Timeout) if Instant::now() >= until => {
+                    return Err(self.silent());
+                }
                 Err(RecvTimeoutError::Timeout) => {}
             }
         }
@@ -135,7 +158,8 @@ impl Source for Watched {
 
     fn reopen(&mut self) -> Result<(), SourceError> {
         if self.hanging {
-            // The call that hangs holds the device: only its own return can free it. A frame means that it is well again.
+            // The call that hangs holds the device: only its own return can free it. A frame means
+            // that it is well again.
             return match self.question(Ask::Reopen)? {
                 Some(Answer::Next(next, health)) => {
                     self.health = health;
@@ -175,15 +199,31 @@ mod tests {
                 let _ = self.go_on.recv();
             }
             if n == 4 {
-                return Err(SourceError::Disconnected { input: "fake".into(), reason: "test".into() });
+                return Err(SourceError::Disconnected {
+                    input: "fake".into(),
+                    reason: "test".into(),
+                });
             }
             let (size, format) = (Size::new(2, 2), PixelFormat::Grey);
-            Ok(Some(RawFrame { sequence: None, sensor_time_s: n as f64, size, format, bytes: vec![0; 4] }))
+            Ok(Some(RawFrame {
+                sequence: None,
+                sensor_time_s: n as f64,
+                size,
+                format,
+                bytes: vec![0; 4],
+            }))
         }
 
         fn describe(&self) -> SourceInfo {
             let (format, size) = (FormatNote::default(), Size::new(2, 2));
-            SourceInfo { name: "fake".into(), format, size, nominal_rate_hz: None, frames_total: None, live: true }
+            SourceInfo {
+                name: "fake".into(),
+                format,
+                size,
+                nominal_rate_hz: None,
+                frames_total: None,
+                live: true,
+            }
         }
 
         fn reopen(&mut self) -> Result<(), SourceError> {
@@ -195,16 +235,26 @@ mod tests {
     fn a_call_that_hangs_is_given_up_and_its_return_is_a_return() {
         let (go_on_in, go_on) = bounded(1);
         let limit = Duration::from_millis(60);
-        let mut watched = Watched::start(Box::new(Hanging { next: 0, go_on }), limit).expect("a thread");
+        let mut watched =
+            Watched::start(Box::new(Hanging { next: 0, go_on }), limit).expect("a thread");
         let time = |w: &mut Watched| w.next_frame().map(|f| f.map(|f| f.sensor_time_s));
         assert!(matches!(time(&mut watched), Ok(Some(0.0))));
         assert!(matches!(time(&mut watched), Ok(Some(1.0))));
-        assert!(matches!(time(&mut watched), Err(SourceError::Timeout { .. })));
-        assert!(matches!(watched.reopen(), Err(SourceError::Timeout { .. })), "it hangs still");
+        assert!(matches!(
+            time(&mut watched),
+            Err(SourceError::Timeout { .. })
+        ));
+        assert!(
+            matches!(watched.reopen(), Err(SourceError::Timeout { .. })),
+            "it hangs still"
+        );
         go_on_in.send(()).expect("it waits");
         assert!(watched.reopen().is_ok());
         assert!(matches!(time(&mut watched), Ok(Some(3.0))));
-        assert!(matches!(time(&mut watched), Err(SourceError::Disconnected { .. })));
+        assert!(matches!(
+            time(&mut watched),
+            Err(SourceError::Disconnected { .. })
+        ));
         assert!(watched.reopen().is_ok());
         assert!(matches!(time(&mut watched), Ok(Some(5.0))));
     }
@@ -212,8 +262,11 @@ mod tests {
     #[test]
     fn a_wish_to_stop_is_heard_while_it_hangs() {
         let (_go_on_in, go_on) = bounded(1);
-        let mut watched =
-            Watched::start(Box::new(Hanging { next: 2, go_on }), Duration::from_secs(60)).expect("a thread");
+        let mut watched = Watched::start(
+            Box::new(Hanging { next: 2, go_on }),
+            Duration::from_secs(60),
+        )
+        .expect("a thread");
         let stop = Arc::new(AtomicBool::new(true));
         watched.stop_when(stop);
         let since = Instant::now();

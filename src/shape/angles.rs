@@ -20,44 +20,69 @@ impl Angles {
     /// As they are in `skeleton`, which still lies in its planes.
     pub fn of(skeleton: &Skeleton, settings: &config::Shape) -> Self {
         let deepest = skeleton.nodes.iter().map(|n| n.level).max().unwrap_or(0);
-        Self { expected: expected_branching_angle(skeleton), deepest, tolerance: settings.angle_tolerance }
+        Self {
+            expected: expected_branching_angle(skeleton),
+            deepest,
+            tolerance: settings.angle_tolerance,
+        }
     }
 
-    /// ln of eq. 4 for a branch that ends at `level`, at `angle` (radians) to the one that it grows from.
+    /// ln of eq. 4 for a branch that ends at `level`, at `angle` (radians) to the one that it grows
+    /// from.
     pub fn ln_likelihood(&self, level: u8, angle: f64) -> f64 {
-        // sigma_i = pi (d_max - d_i) / d_max; a tip would get 0 and could not move at all, so tips get half a step.
+        // sigma_i = pi (d_max - d_i) / d_max; a tip would get 0 and could not move at all, so tips
+        // get half a step.
         let above = f64::from(self.deepest.saturating_sub(level)).max(0.5);
         let sigma = self.tolerance * PI * above / f64::from(self.deepest.max(1));
         -(angle - self.expected).powi(2) / (2.0 * sigma * sigma)
     }
 
-    /// Geometric mean of eq. 4 over all branches of `skeleton` above the trunk, 0 to 1: how likely its angles are.
+    /// Geometric mean of eq. 4 over all branches of `skeleton` above the trunk, 0 to 1: how likely
+    /// its angles are.
     pub fn likelihood(&self, skeleton: &Skeleton) -> f64 {
         let above_trunk = |i: &usize| skeleton.nodes[*i].level >= 2;
-        let ln = |i: usize| Some(self.ln_likelihood(skeleton.nodes[i].level, branching_angle(skeleton, i)?));
-        let all: Vec<f64> = (0..skeleton.nodes.len()).filter(above_trunk).filter_map(ln).collect();
-        if all.is_empty() { 1.0 } else { (all.iter().sum::<f64>() / all.len() as f64).exp() }
+        let ln = |i: usize| {
+            Some(self.ln_likelihood(skeleton.nodes[i].level, branching_angle(skeleton, i)?))
+        };
+        let all: Vec<f64> = (0..skeleton.nodes.len())
+            .filter(above_trunk)
+            .filter_map(ln)
+            .collect();
+        if all.is_empty() {
+            1.0
+        } else {
+            (all.iter().sum::<f64>() / all.len() as f64).exp()
+        }
     }
 }
 
-/// Angle between the branch a-b and the branch b-c that goes on from it, radians; 0 goes straight on, and is the answer
-/// where one of them has no length.
+/// Angle between the branch a-b and the branch b-c that goes on from it, radians; 0 goes straight
+/// on, and is the answer where one of them has no length.
 pub(super) fn angle_between(a: &Point3<f64>, b: &Point3<f64>, c: &Point3<f64>) -> f64 {
     (b - a).angle(&(c - b))
 }
 
-/// mu of eq. 4: the median of all branching angles of the measured branches, each by the length of the shorter branch, radians;
-/// 45 degrees where there are none. The paper's is the mean; but a fork that was found some pixels off turns a
-/// short branch right round, and a few such angles of 150 degrees and more would make zigzags the likeliest of branches.
+/// mu of eq. 4: the median of all branching angles of the measured branches, each by the length of
+/// the shorter branch, radians; 45 degrees where there are none. The paper's is the mean; but a
+/// fork that was found some pixels off turns a short branch right round, and a few such angles of
+/// 150 degrees and more would make zigzags the likeliest of branches.
 pub fn expected_branching_angle(skeleton: &Skeleton) -> f64 {
     let length = |i: usize| {
         let node = &skeleton.nodes[i];
-        node.parent.map_or(0.0, |p| (node.position - skeleton.nodes[p.index()].position).norm())
+        node.parent.map_or(0.0, |p| {
+            (node.position - skeleton.nodes[p.index()].position).norm()
+        })
     };
-    let shorter = |i: usize| skeleton.nodes[i].parent.map_or(0.0, |p| length(i).min(length(p.index())));
+    let shorter = |i: usize| {
+        skeleton.nodes[i]
+            .parent
+            .map_or(0.0, |p| length(i).min(length(p.index())))
+    };
     let measured = (0..skeleton.nodes.len()).filter(|&i| skeleton.nodes[i].copy_of.is_none());
-    let mut angles: Vec<(f64, f64)> =
-        measured.filter_map(|i| Some((branching_angle(skeleton, i)?, shorter(i)))).filter(|a| a.1 > 0.0).collect();
+    let mut angles: Vec<(f64, f64)> = measured
+        .filter_map(|i| Some((branching_angle(skeleton, i)?, shorter(i))))
+        .filter(|a| a.1 > 0.0)
+        .collect();
     angles.sort_by(|a, b| a.0.total_cmp(&b.0));
     let half: f64 = angles.iter().map(|a| a.1).sum::<f64>() / 2.0;
     let mut below = 0.0;
@@ -68,17 +93,27 @@ pub fn expected_branching_angle(skeleton: &Skeleton) -> f64 {
     middle.map_or(PI / 4.0, |a| a.0)
 }
 
-/// By how much branches turn by more than a right angle, in the mean over all of them, radians. Eq. 4 is wide near the root,
-/// where the thick limbs are, and does not mind.
+/// By how much branches turn by more than a right angle, in the mean over all of them, radians. Eq.
+/// 4 is wide near the root, where the thick limbs are, and does not mind.
 pub(super) fn turning_back(skeleton: &Skeleton) -> f64 {
-    let all: Vec<f64> = (0..skeleton.nodes.len()).filter_map(|i| branching_angle(skeleton, i)).collect();
-    all.iter().map(|angle| (angle - FRAC_PI_2).max(0.0)).sum::<f64>() / all.len().max(1) as f64
+    let all: Vec<f64> = (0..skeleton.nodes.len())
+        .filter_map(|i| branching_angle(skeleton, i))
+        .collect();
+    all.iter()
+        .map(|angle| (angle - FRAC_PI_2).max(0.0))
+        .sum::<f64>()
+        / all.len().max(1) as f64
 }
 
-/// Angle at which branch `i` leaves the one that it grows from; `None` for what grows from the ground.
+/// Angle at which branch `i` leaves the one that it grows from; `None` for what grows from the
+/// ground.
 fn branching_angle(skeleton: &Skeleton, i: usize) -> Option<f64> {
     let nodes = &skeleton.nodes;
     let parent = &nodes[nodes[i].parent?.index()];
     let grand = &nodes[parent.parent?.index()];
-    Some(angle_between(&grand.position, &parent.position, &nodes[i].position))
+    Some(angle_between(
+        &grand.position,
+        &parent.position,
+        &nodes[i].position,
+    ))
 }

@@ -6,7 +6,8 @@ use nalgebra::Vector3;
 
 /// Edges along a tube are at most so many times as long as those around it.
 const LONGEST_EDGE: f64 = 6.0;
-/// Turn from which on a joint gets more than one ring, and from one ring to the next there, radians.
+/// Turn from which on a joint gets more than one ring, and from one ring to the next there,
+/// radians.
 const FLATTENS: f64 = 0.6;
 const FAN_STEP: f64 = 0.4;
 
@@ -23,7 +24,8 @@ pub(super) struct Link<'a> {
 #[derive(Clone, Debug)]
 pub(super) struct Chain<'a> {
     pub links: Vec<Link<'a>>,
-    /// Length of the longest twig of the chain and of what it carries, px; infinite if a branch of the skeleton is there.
+    /// Length of the longest twig of the chain and of what it carries, px; infinite if a branch of
+    /// the skeleton is there.
     pub size_px: f64,
     /// Radius of what it grows from where it does, px; `None` for what stands on the ground.
     pub grows_from_px: Option<f64>,
@@ -37,35 +39,56 @@ impl Link<'_> {
         ((self.need * density).round() as usize).clamp(least, 20_000)
     }
 
-    /// Rings at the joint to `next`: from a sharp turn on a fan of them about one point, which rounds the elbow like a ball;
-    /// a single ring half way would squeeze the tube flat. Twigs are too thin to show it.
+    /// Rings at the joint to `next`: from a sharp turn on a fan of them about one point, which
+    /// rounds the elbow like a ball; a single ring half way would squeeze the tube flat. Twigs are
+    /// too thin to show it.
     pub fn rings_to(&self, next: &Self) -> usize {
         let turn = self.at(1.0).1.angle(&next.at(0.0).1);
-        if self.is_twig || next.is_twig || turn < FLATTENS { 1 } else { 2 + (turn / FAN_STEP) as usize }
+        if self.is_twig || next.is_twig || turn < FLATTENS {
+            1
+        } else {
+            2 + (turn / FAN_STEP) as usize
+        }
     }
 
-    /// The station at share `t` of the link, 0 to 1, and the direction there: a cubic through the stations, whose slopes
-    /// are those of their neighbours.
+    /// The station at share `t` of the link, 0 to 1, and the direction there: a cubic through the
+    /// stations, whose slopes are those of their neighbours.
     pub fn at(&self, t: f64) -> (Station, Vector3<f64>) {
         let s = self.stations;
         let place = t.clamp(0.0, 1.0) * (s.len() - 1) as f64;
         let k = (place as usize).min(s.len() - 2);
         let (a, b, x) = (&s[k], &s[k + 1], place - k as f64);
         let chord = b.at - a.at;
-        // At the ends the slope that makes the curvature go on evenly, so that straight stays straight.
+        // At the ends the slope that makes the curvature go on evenly, so that straight stays
+        // straight.
         let slope = |i: usize| match (i.checked_sub(1).map(|j| s[j].at), s.get(i + 1)) {
             (Some(before), Some(after)) => (after.at - before) * 0.5,
-            (None, Some(after)) if s.len() > 2 => (after.at - s[i].at) * 2.0 - (s[2].at - s[0].at) * 0.5,
-            (Some(before), None) if s.len() > 2 => (s[i].at - before) * 2.0 - (s[i].at - s[i - 2].at) * 0.5,
+            (None, Some(after)) if s.len() > 2 => {
+                (after.at - s[i].at) * 2.0 - (s[2].at - s[0].at) * 0.5
+            }
+            (Some(before), None) if s.len() > 2 => {
+                (s[i].at - before) * 2.0 - (s[i].at - s[i - 2].at) * 0.5
+            }
             _ => chord,
         };
         let (m0, m1) = (slope(k), slope(k + 1));
         let (x2, x3) = (x * x, x * x * x);
         let at = a.at + m0 * (x3 - 2.0 * x2 + x) + chord * (3.0 * x2 - 2.0 * x3) + m1 * (x3 - x2);
-        let way = m0 * (3.0 * x2 - 4.0 * x + 1.0) + chord * (6.0 * (x - x2)) + m1 * (3.0 * x2 - 2.0 * x);
-        let way = way.try_normalize(1e-12).or(chord.try_normalize(1e-12)).unwrap_or_else(Vector3::y);
+        let way =
+            m0 * (3.0 * x2 - 4.0 * x + 1.0) + chord * (6.0 * (x - x2)) + m1 * (3.0 * x2 - 2.0 * x);
+        let way = way
+            .try_normalize(1e-12)
+            .or(chord.try_normalize(1e-12))
+            .unwrap_or_else(Vector3::y);
         let radius = a.radius + (b.radius - a.radius) * x;
-        (Station { at, radius, riding: a.riding.towards(b.riding, x as f32) }, way)
+        (
+            Station {
+                at,
+                radius,
+                riding: a.riding.towards(b.riding, x as f32),
+            },
+            way,
+        )
     }
 }
 
@@ -74,11 +97,15 @@ pub(super) fn sides(radius: f64) -> f64 {
     std::f64::consts::PI * (0.5 * radius).sqrt()
 }
 
-/// Puts the limbs together to chains, each limb in one; those without length or with what is no number are left out.
+/// Puts the limbs together to chains, each limb in one; those without length or with what is no
+/// number are left out.
 pub(super) fn chains(limbs: &[Limb]) -> Vec<Chain<'_>> {
     let good: Vec<bool> = limbs.iter().map(is_good).collect();
     let goes_on = continuations(limbs);
-    let mut size_px: Vec<f64> = limbs.iter().map(|l| if l.twig { l.length() } else { f64::INFINITY }).collect();
+    let mut size_px: Vec<f64> = limbs
+        .iter()
+        .map(|l| if l.twig { l.length() } else { f64::INFINITY })
+        .collect();
     for (i, limb) in limbs.iter().enumerate().rev() {
         if let Some(p) = limb.parent.filter(|&p| p < i && good[i]) {
             size_px[p] = size_px[p].max(size_px[i]);
@@ -96,19 +123,28 @@ pub(super) fn chains(limbs: &[Limb]) -> Vec<Chain<'_>> {
         if !links.is_empty() {
             let parent = limbs[first].parent.filter(|&p| p < first && good[p]);
             let grows_from_px = parent.and_then(|p| radius_near(&limbs[p], &limbs[first]));
-            out.push(Chain { links, size_px: size_px[first], grows_from_px });
+            out.push(Chain {
+                links,
+                size_px: size_px[first],
+                grows_from_px,
+            });
         }
     }
     out
 }
 
-/// The limb that every limb goes on in: of those that leave its end the thickest, and of those alike the straightest.
+/// The limb that every limb goes on in: of those that leave its end the thickest, and of those
+/// alike the straightest.
 pub(super) fn continuations(limbs: &[Limb]) -> Vec<Option<usize>> {
     let good: Vec<bool> = limbs.iter().map(is_good).collect();
     let mut best: Vec<Option<(f64, usize)>> = vec![None; limbs.len()];
     for (i, limb) in limbs.iter().enumerate().filter(|(i, _)| good[*i]) {
-        let Some(p) = limb.parent.filter(|&p| p < i && good[p]) else { continue };
-        let (Some(end), base) = (limbs[p].stations.last(), &limb.stations[0]) else { continue };
+        let Some(p) = limb.parent.filter(|&p| p < i && good[p]) else {
+            continue;
+        };
+        let (Some(end), base) = (limbs[p].stations.last(), &limb.stations[0]) else {
+            continue;
+        };
         let score = base.radius * (2.0 + limbs[p].arrives().dot(&leaves(limb)));
         let at_end = (end.at - base.at).norm() <= 1e-9 * (1.0 + end.at.coords.norm());
         if at_end && best[p].is_none_or(|(most, _)| score > most) {
@@ -131,12 +167,18 @@ fn is_good(limb: &Limb) -> bool {
 fn radius_near(parent: &Limb, limb: &Limb) -> Option<f64> {
     let base = limb.stations.first()?.at;
     let away = |s: &&Station| (s.at - base).norm_squared();
-    parent.stations.iter().min_by(|a, b| away(a).total_cmp(&away(b))).map(|s| s.radius)
+    parent
+        .stations
+        .iter()
+        .min_by(|a, b| away(a).total_cmp(&away(b)))
+        .map(|s| s.radius)
 }
 
 /// Direction in which a limb begins, of length 1; up where it has none. It has two stations.
 pub(super) fn leaves(limb: &Limb) -> Vector3<f64> {
-    (limb.stations[1].at - limb.stations[0].at).try_normalize(1e-12).unwrap_or_else(Vector3::y)
+    (limb.stations[1].at - limb.stations[0].at)
+        .try_normalize(1e-12)
+        .unwrap_or_else(Vector3::y)
 }
 
 fn link(limb: &Limb) -> Link<'_> {
@@ -145,7 +187,9 @@ fn link(limb: &Limb) -> Link<'_> {
     let mut before: Option<Vector3<f64>> = None;
     for pair in s.windows(2) {
         let step = pair[1].at - pair[0].at;
-        let Some(way) = step.try_normalize(1e-9) else { continue };
+        let Some(way) = step.try_normalize(1e-9) else {
+            continue;
+        };
         // A bow of curvature k and length l told in n straight pieces is off by k l^2 / (8 n^2).
         let bend = before.map_or(0.0, |b| b.angle(&way));
         need += (bend * step.norm() / 8.0).sqrt();
@@ -153,5 +197,9 @@ fn link(limb: &Limb) -> Link<'_> {
         need += step.norm() * sides(radius) / (LONGEST_EDGE * std::f64::consts::TAU * radius);
         before = Some(way);
     }
-    Link { stations: s, need, is_twig: limb.twig }
+    Link {
+        stations: s,
+        need,
+        is_twig: limb.twig,
+    }
 }

@@ -1,21 +1,25 @@
-//! The middle line of a branch: the path of least jerk of Flash and Hogan, "The coordination of arm movements" (1984).
+//! The middle line of a branch: the path of least jerk of Flash and Hogan, "The coordination of arm
+//! movements" (1984).
 //!
-//! Their path from point to point is a polynomial of the fifth degree; through a point on the way it is two of them that
-//! agree in all derivatives up to the fourth (their appendix). The problem is linear in the positions, so sums of such
-//! paths are such paths again: one between the ends with the directions there, and one excursion for each via point.
+//! Their path from point to point is a polynomial of the fifth degree; through a point on the way
+//! it is two of them that agree in all derivatives up to the fourth (their appendix). The problem
+//! is linear in the positions, so sums of such paths are such paths again: one between the ends
+//! with the directions there, and one excursion for each via point.
 
 use super::chance::Chance;
 use nalgebra::{Point3, Vector3};
 
-/// Greatest distance of a middle line from the straight line between its ends, as a share of their distance, at curl 1:
-/// [`BOW`] for each of the two directions at the ends, and both excursions.
+/// Greatest distance of a middle line from the straight line between its ends, as a share of their
+/// distance, at curl 1: [`BOW`] for each of the two directions at the ends, and both excursions.
 pub const CURL_BOUND: f64 = 2.0 * BOW + 2.0 * EXCURSION;
-/// Greatest value of `t - 6 t^3 + 8 t^4 - 3 t^5`, which a slope of 1 at one end adds, times the greatest of
+/// Greatest value of `t - 6 t^3 + 8 t^4 - 3 t^5`, which a slope of 1 at one end adds, times the
+/// greatest of
 /// `slope (1 - slope^2) (1 - slope)`, see [`Bend`].
 const BOW: f64 = 0.1971 * 0.2019;
 /// Length of each of the two excursions at curl 1.
 const EXCURSION: f64 = 0.05;
-/// Where on the way the via points are: a third and two thirds make a bow, an S or, out of one plane, a twist.
+/// Where on the way the via points are: a third and two thirds make a bow, an S or, out of one
+/// plane, a twist.
 const VIA: [f64; 2] = [1.0 / 3.0, 2.0 / 3.0];
 
 /// A path from one end of a branch to the other.
@@ -31,9 +35,10 @@ pub(super) struct Curve {
 
 /// How a path leaves the straight line at one of its ends.
 ///
-/// A branch bends towards its neighbours only as far as the turn is small: with the tangent of the angle to the straight
-/// line, s, both how far it gives way, `1 - s^2`, and the share of its length on which it does, `1 - s`, shrink. From a
-/// right angle between two branches on (s = 1) they meet as a fork. Else coarse skeletons, which turn far, make loops.
+/// A branch bends towards its neighbours only as far as the turn is small: with the tangent of the
+/// angle to the straight line, s, both how far it gives way, `1 - s^2`, and the share of its length
+/// on which it does, `1 - s`, shrink. From a right angle between two branches on (s = 1) they meet
+/// as a fork. Else coarse skeletons, which turn far, make loops.
 #[derive(Clone, Copy, Debug)]
 struct Bend {
     /// Velocity beyond that of the straight line.
@@ -48,11 +53,21 @@ impl Bend {
         let along = chord / length.max(1e-12);
         let ahead = wanted.dot(&along);
         let across = wanted - along * ahead;
-        let slope = if ahead > 0.0 { across.norm() / ahead } else { 1.0 };
+        let slope = if ahead > 0.0 {
+            across.norm() / ahead
+        } else {
+            1.0
+        };
         if slope >= 1.0 {
-            return Self { across: Vector3::zeros(), within: 1.0 };
+            return Self {
+                across: Vector3::zeros(),
+                within: 1.0,
+            };
         }
-        Self { across: across * (length * share * (1.0 - slope * slope) / ahead), within: 1.0 - slope }
+        Self {
+            across: across * (length * share * (1.0 - slope * slope) / ahead),
+            within: 1.0 - slope,
+        }
     }
 
     /// Offset at share `t` of the way from this end.
@@ -62,9 +77,15 @@ impl Bend {
 }
 
 impl Curve {
-    /// From `from` to `to`, leaving along `leaves` and arriving along `arrives` (of length 1) as nearly as `curl` (0 to
-    /// 1) lets it; the excursions are drawn from `chance`.
-    pub fn new(ends: [Point3<f64>; 2], leaves: Vector3<f64>, arrives: Vector3<f64>, curl: f64, chance: Chance) -> Self {
+    /// From `from` to `to`, leaving along `leaves` and arriving along `arrives` (of length 1) as
+    /// nearly as `curl` (0 to 1) lets it; the excursions are drawn from `chance`.
+    pub fn new(
+        ends: [Point3<f64>; 2],
+        leaves: Vector3<f64>,
+        arrives: Vector3<f64>,
+        curl: f64,
+        chance: Chance,
+    ) -> Self {
         let chord = ends[1] - ends[0];
         let length = chord.norm();
         let along = chord / length.max(1e-12);
@@ -72,16 +93,28 @@ impl Curve {
         let bend = |wanted| Bend::new(wanted, chord, (2.0 * curl).min(1.0));
         let mut chance = chance;
         let mut excursion = || {
-            let (turn, far) = (chance.between(0.0, std::f64::consts::TAU), chance.share().sqrt());
+            let (turn, far) = (
+                chance.between(0.0, std::f64::consts::TAU),
+                chance.share().sqrt(),
+            );
             let side = square_to(along);
             length * curl * EXCURSION * far * (side * turn.cos() + along.cross(&side) * turn.sin())
         };
-        Self { from: ends[0], to: ends[1], chord, ends: [bend(leaves), bend(arrives)], via: [excursion(), excursion()] }
+        Self {
+            from: ends[0],
+            to: ends[1],
+            chord,
+            ends: [bend(leaves), bend(arrives)],
+            via: [excursion(), excursion()],
+        }
     }
 
     /// The same with `share` of its excursions.
     pub fn calmer(self, share: f64) -> Self {
-        Self { via: self.via.map(|v| v * share), ..self }
+        Self {
+            via: self.via.map(|v| v * share),
+            ..self
+        }
     }
 
     /// The point at share `t` of the way; at 0 and 1 the ends themselves, to the last bit.
@@ -94,20 +127,23 @@ impl Curve {
     }
 }
 
-/// The path of least jerk that starts with velocity 1 at 0, ends at rest at 0, without acceleration at either end.
+/// The path of least jerk that starts with velocity 1 at 0, ends at rest at 0, without acceleration
+/// at either end.
 fn leaving(t: f64) -> f64 {
     t * (1.0 - t * t * (6.0 - t * (8.0 - 3.0 * t)))
 }
 
-/// The path of least jerk from 0 at rest through 1 at time `via` back to 0 at rest, at time `t` of 0..1 (Flash and Hogan,
-/// appendix: equations of x-, x+, pi_1 and c_1 with x_0 = x_f = 0, x_1 = 1, t_f = 1).
+/// The path of least jerk from 0 at rest through 1 at time `via` back to 0 at rest, at time `t` of
+/// 0..1 (Flash and Hogan, appendix: equations of x-, x+, pi_1 and c_1 with x_0 = x_f = 0, x_1 = 1,
+/// t_f = 1).
 fn passing(via: f64, t: f64) -> f64 {
     let (a, rest) = (via, (1.0 - via).powi(5));
     let pi = -20.0 / (a.powi(5) * rest);
     let c = (120.0 * a * a - 300.0 * a + 200.0) / (a * a * rest);
     let (t3, t4, t5) = (t.powi(3), t.powi(4), t.powi(5));
     let before = pi
-        * (a.powi(4) * (15.0 * t4 - 30.0 * t3) + a.powi(3) * (80.0 * t3 - 30.0 * t4) - 60.0 * t3 * a * a
+        * (a.powi(4) * (15.0 * t4 - 30.0 * t3) + a.powi(3) * (80.0 * t3 - 30.0 * t4)
+            - 60.0 * t3 * a * a
             + 30.0 * t4 * a
             - 6.0 * t5)
         + c * (15.0 * t4 - 10.0 * t3 - 6.0 * t5);
@@ -116,8 +152,14 @@ fn passing(via: f64, t: f64) -> f64 {
 
 /// Some direction square to `along`, always the same one.
 pub(super) fn square_to(along: Vector3<f64>) -> Vector3<f64> {
-    let axis = if along.z.abs() < 0.9 { Vector3::z() } else { Vector3::x() };
-    (axis - along * axis.dot(&along)).try_normalize(1e-9).unwrap_or_else(Vector3::y)
+    let axis = if along.z.abs() < 0.9 {
+        Vector3::z()
+    } else {
+        Vector3::x()
+    };
+    (axis - along * axis.dot(&along))
+        .try_normalize(1e-9)
+        .unwrap_or_else(Vector3::y)
 }
 
 #[cfg(test)]
@@ -132,7 +174,10 @@ mod tests {
                 let h = 1e-4;
                 let inward = if t == 0.0 { h } else { 1.0 - h };
                 assert!(passing(via, t).abs() < 1e-9, "{via} {t}");
-                assert!(passing(via, inward).abs() < 1e-6, "at rest at both ends: {via} {t}");
+                assert!(
+                    passing(via, inward).abs() < 1e-6,
+                    "at rest at both ends: {via} {t}"
+                );
             }
         }
     }
@@ -143,15 +188,21 @@ mod tests {
         let along = (b - a).normalize();
         for k in 0..500 {
             let mut chance = Chance::new(k);
-            let mut any =
-                || Vector3::from_fn(|_, _| chance.between(-1.0, 1.0)).try_normalize(1e-9).unwrap_or_else(Vector3::x);
+            let mut any = || {
+                Vector3::from_fn(|_, _| chance.between(-1.0, 1.0))
+                    .try_normalize(1e-9)
+                    .unwrap_or_else(Vector3::x)
+            };
             let (leaves, arrives, curl) = (any(), any(), (k % 5) as f64 / 4.0);
             let curve = Curve::new([a, b], leaves, arrives, curl, Chance::new(k));
             assert!((curve.at(0.0) - a).norm() < 1e-9 && (curve.at(1.0) - b).norm() < 1e-9);
             for t in 1..100 {
                 let way = curve.at(f64::from(t) / 100.0) - a;
                 let off = (way - along * way.dot(&along)).norm() / (b - a).norm();
-                assert!(off <= CURL_BOUND * (2.0 * curl).min(1.0) + 1e-9, "{off} at curl {curl}");
+                assert!(
+                    off <= CURL_BOUND * (2.0 * curl).min(1.0) + 1e-9,
+                    "{off} at curl {curl}"
+                );
                 assert!(curl > 0.0 || off < 1e-9, "curl 0 is straight");
             }
         }

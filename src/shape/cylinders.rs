@@ -1,4 +1,5 @@
-//! The wood as cylinders, as tools for tree models from laser scans tell it (TreeQSM, Raumonen et al. 2013; SimpleTree).
+//! The wood as cylinders, as tools for tree models from laser scans tell it (TreeQSM, Raumonen et
+//! al. 2013; SimpleTree).
 
 use super::limb::Limb;
 use nalgebra::Point3;
@@ -21,8 +22,8 @@ pub struct Cylinder {
     pub limb: usize,
 }
 
-/// The limbs as cylinders, parents first; each as thick as its limb is at the middle of the cylinder. Pieces without
-/// length are left out.
+/// The limbs as cylinders, parents first; each as thick as its limb is at the middle of the
+/// cylinder. Pieces without length are left out.
 pub fn cylinders(limbs: &[Limb]) -> Vec<Cylinder> {
     let mut out: Vec<Cylinder> = Vec::new();
     // The cylinders of every limb, and its branch with its order.
@@ -43,16 +44,32 @@ pub fn cylinders(limbs: &[Limb]) -> Vec<Cylinder> {
         let first = out.len();
         let mut before = parent.and_then(|p| nearest(&out, of_limb[p].clone(), limb));
         for pair in limb.stations.windows(2) {
-            let (start, end, radius) = (pair[0].at, pair[1].at, 0.5 * (pair[0].radius + pair[1].radius));
+            let (start, end, radius) = (
+                pair[0].at,
+                pair[1].at,
+                0.5 * (pair[0].radius + pair[1].radius),
+            );
             let length = (end - start).norm();
             if !(length > 1e-9 && length.is_finite() && radius.is_finite()) {
                 continue;
             }
-            out.push(Cylinder { parent: before, start, end, radius, branch, order, limb: i });
+            out.push(Cylinder {
+                parent: before,
+                start,
+                end,
+                radius,
+                branch,
+                order,
+                limb: i,
+            });
             before = Some(out.len() - 1);
         }
         // A limb that has none hands on its parent's.
-        let own = if out.len() > first { first..out.len() } else { parent.map_or(0..0, |p| of_limb[p].clone()) };
+        let own = if out.len() > first {
+            first..out.len()
+        } else {
+            parent.map_or(0..0, |p| of_limb[p].clone())
+        };
         of_limb.push(own);
     }
     out

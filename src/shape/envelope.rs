@@ -1,16 +1,18 @@
-//! The envelope: the outline turned about its axis (surface of revolution, Li et al. section 3 after Okabe et al.), the
-//! hull of the skeleton turned (Zeng section 5.5), or a drawn shape.
+//! The envelope: the outline turned about its axis (surface of revolution, Li et al. section 3
+//! after Okabe et al.), the hull of the skeleton turned (Zeng section 5.5), or a drawn shape.
 
 use super::hull::{convex_hull, crossed};
 use crate::config::EnvelopeKind;
 use crate::model::Outline;
 use nalgebra::Point3;
 
-/// Farthest from the foot that a point of a hull is, px: there is a disc for every pixel of its height.
+/// Farthest from the foot that a point of a hull is, px: there is a disc for every pixel of its
+/// height.
 const FARTHEST_OF_HULL: f64 = 32_768.0;
 
-/// A stack of discs, one a pixel row: at height y the tree lies within `radius` of (`centre_x`, y, 0), model axes, px.
-/// A drawn shape has, besides, what of each row is inside as seen from the front.
+/// A stack of discs, one a pixel row: at height y the tree lies within `radius` of (`centre_x`, y,
+/// 0), model axes, px. A drawn shape has, besides, what of each row is inside as seen from the
+/// front.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Envelope {
     /// Height of the lowest disc; the others follow one pixel apart.
@@ -28,50 +30,84 @@ struct Disc {
 
 impl Disc {
     fn between(left: f64, right: f64) -> Self {
-        Self { centre_x: (left + right) / 2.0, radius: (right - left) / 2.0 }
+        Self {
+            centre_x: (left + right) / 2.0,
+            radius: (right - left) / 2.0,
+        }
     }
 }
 
 impl Envelope {
-    /// Turns `outline` about the middle of each of its rows; rows that the region does not touch are bridged.
+    /// Turns `outline` about the middle of each of its rows; rows that the region does not touch
+    /// are bridged.
     pub fn of_revolution(outline: &Outline, foot_px: [f64; 2]) -> Self {
-        Self::turned(outline.bounds_px(), outline.size.width as usize, &outline.mask, foot_px)
+        Self::turned(
+            outline.bounds_px(),
+            outline.size.width as usize,
+            &outline.mask,
+            foot_px,
+        )
     }
 
-    /// As [`of_revolution`](Self::of_revolution), cut as `mask` is seen from the front: where a row of the shape has gaps,
-    /// as between the lobes of a heart, so has the envelope through its whole depth. The depth is that of the whole row,
-    /// as lobes that were turned each for itself would meet in a step.
+    /// As [`of_revolution`](Self::of_revolution), cut as `mask` is seen from the front: where a row
+    /// of the shape has gaps, as between the lobes of a heart, so has the envelope through its
+    /// whole depth. The depth is that of the whole row, as lobes that were turned each for itself
+    /// would meet in a step.
     pub fn of_drawn(outline: &Outline, foot_px: [f64; 2]) -> Self {
         let mut envelope = Self::of_revolution(outline, foot_px);
         let width = outline.size.width as usize;
         // Not from the heights: those of a foot that is far away are not exact.
-        let Some([_, top, _, bottom]) = outline.bounds_px() else { return envelope };
-        let rows = (top..=bottom).rev().map(|v| &outline.mask[v as usize * width..][..width]);
+        let Some([_, top, _, bottom]) = outline.bounds_px() else {
+            return envelope;
+        };
+        let rows = (top..=bottom)
+            .rev()
+            .map(|v| &outline.mask[v as usize * width..][..width]);
         envelope.stretches = rows.map(|row| stretches(row, foot_px[0])).collect();
         envelope
     }
 
-    /// Turns the convex hull of `points` (model axes, px; z is not looked at), half a pixel wider all around. Points farther
-    /// from the foot than any picture is large are left out.
+    /// Turns the convex hull of `points` (model axes, px; z is not looked at), half a pixel wider
+    /// all around. Points farther from the foot than any picture is large are left out.
     pub fn of_hull(points: &[Point3<f64>]) -> Self {
-        let flat: Vec<[f64; 2]> =
-            points.iter().map(|p| [p.x, p.y]).filter(|p| p.iter().all(|c| c.abs() <= FARTHEST_OF_HULL)).collect();
+        let flat: Vec<[f64; 2]> = points
+            .iter()
+            .map(|p| [p.x, p.y])
+            .filter(|p| p.iter().all(|c| c.abs() <= FARTHEST_OF_HULL))
+            .collect();
         let hull = convex_hull(&flat);
         let ys = || hull.iter().map(|p| p[1]);
-        let (bottom, top) = (ys().fold(f64::INFINITY, f64::min).floor(), ys().fold(f64::NEG_INFINITY, f64::max).ceil());
+        let (bottom, top) = (
+            ys().fold(f64::INFINITY, f64::min).floor(),
+            ys().fold(f64::NEG_INFINITY, f64::max).ceil(),
+        );
         if bottom > top {
-            return Self { bottom_y: 0.0, discs: Vec::new(), stretches: Vec::new() };
+            return Self {
+                bottom_y: 0.0,
+                discs: Vec::new(),
+                stretches: Vec::new(),
+            };
         }
         let rows = (top - bottom) as usize + 1;
         let disc = |k: usize| {
             let (left, right) = crossed(&hull, bottom + k as f64);
             Disc::between(left - 0.5, right + 0.5)
         };
-        Self { bottom_y: bottom, discs: (0..rows).map(disc).collect(), stretches: Vec::new() }
+        Self {
+            bottom_y: bottom,
+            discs: (0..rows).map(disc).collect(),
+            stretches: Vec::new(),
+        }
     }
 
-    /// Of a filmed tree whose measured nodes are at `places` (model axes, px), as the settings name it.
-    pub fn of_filmed(kind: EnvelopeKind, outline: &Outline, foot_px: [f64; 2], places: &[Point3<f64>]) -> Self {
+    /// Of a filmed tree whose measured nodes are at `places` (model axes, px), as the settings name
+    /// it.
+    pub fn of_filmed(
+        kind: EnvelopeKind,
+        outline: &Outline,
+        foot_px: [f64; 2],
+        places: &[Point3<f64>],
+    ) -> Self {
         match kind {
             EnvelopeKind::Revolution => Self::of_revolution(outline, foot_px),
             EnvelopeKind::Hull => Self::of_hull(places),
@@ -80,24 +116,44 @@ impl Envelope {
 
     fn turned(bounds: Option<[u32; 4]>, width: usize, mask: &[u8], foot_px: [f64; 2]) -> Self {
         let Some([_, top, _, bottom]) = bounds else {
-            return Self { bottom_y: 0.0, discs: Vec::new(), stretches: Vec::new() };
+            return Self {
+                bottom_y: 0.0,
+                discs: Vec::new(),
+                stretches: Vec::new(),
+            };
         };
         let mut discs = Vec::new();
-        let mut last = Disc { centre_x: 0.0, radius: 0.5 };
+        let mut last = Disc {
+            centre_x: 0.0,
+            radius: 0.5,
+        };
         for v in (top..=bottom).rev() {
             let row = &mask[v as usize * width..][..width];
-            let ends = row.iter().position(|&m| m != 0).zip(row.iter().rposition(|&m| m != 0));
+            let ends = row
+                .iter()
+                .position(|&m| m != 0)
+                .zip(row.iter().rposition(|&m| m != 0));
             if let Some((left, right)) = ends {
-                last = Disc::between(left as f64 - 0.5 - foot_px[0], right as f64 + 0.5 - foot_px[0]);
+                last = Disc::between(
+                    left as f64 - 0.5 - foot_px[0],
+                    right as f64 + 0.5 - foot_px[0],
+                );
             }
             discs.push(last);
         }
-        Self { bottom_y: foot_px[1] - f64::from(bottom), discs, stretches: Vec::new() }
+        Self {
+            bottom_y: foot_px[1] - f64::from(bottom),
+            discs,
+            stretches: Vec::new(),
+        }
     }
 
     /// Greatest width, px.
     pub fn width(&self) -> f64 {
-        self.discs.iter().map(|d| 2.0 * d.radius).fold(0.0, f64::max)
+        self.discs
+            .iter()
+            .map(|d| 2.0 * d.radius)
+            .fold(0.0, f64::max)
     }
 
     /// From its lowest row to its highest, px.
@@ -107,7 +163,8 @@ impl Envelope {
 
     fn row_at(&self, y: f64) -> Option<usize> {
         let row = (y - self.bottom_y).round();
-        // Half a pixel beyond the last rows still belongs to them: positions there come from pixels inside.
+        // Half a pixel beyond the last rows still belongs to them: positions there come from pixels
+        // inside.
         (row >= 0.0 && (row as usize) < self.discs.len()).then_some(row as usize)
     }
 
@@ -120,10 +177,13 @@ impl Envelope {
     }
 
     fn is_seen_inside(&self, row: usize, x: f64) -> bool {
-        self.stretches.get(row).is_none_or(|of| of.iter().any(|[left, right]| (*left..=*right).contains(&x)))
+        self.stretches
+            .get(row)
+            .is_none_or(|of| of.iter().any(|[left, right]| (*left..=*right).contains(&x)))
     }
 
-    /// How deep the envelope is at (`x`, `y`): it reaches from -depth to depth in z; `None` outside.
+    /// How deep the envelope is at (`x`, `y`): it reaches from -depth to depth in z; `None`
+    /// outside.
     pub fn depth(&self, x: f64, y: f64) -> Option<f64> {
         let k = self.row_at(y)?;
         let d = self.discs[k];
@@ -131,12 +191,14 @@ impl Envelope {
         (depth_sq >= 0.0 && self.is_seen_inside(k, x)).then(|| depth_sq.sqrt())
     }
 
-    /// `p` moved towards the axis, at its own height, until it is inside; above and below the envelope to its ends.
+    /// `p` moved towards the axis, at its own height, until it is inside; above and below the
+    /// envelope to its ends.
     pub fn clamp(&self, p: &Point3<f64>) -> Point3<f64> {
         if self.discs.is_empty() || self.contains(p) {
             return *p;
         }
-        let y = p.y.clamp(self.bottom_y, self.bottom_y + (self.discs.len() - 1) as f64);
+        let y =
+            p.y.clamp(self.bottom_y, self.bottom_y + (self.discs.len() - 1) as f64);
         let Some(k) = self.row_at(y) else { return *p };
         let d = self.discs[k];
         let x = self.nearest_inside(k, p.x);
@@ -155,12 +217,14 @@ impl Envelope {
     fn nearest_inside(&self, row: usize, x: f64) -> f64 {
         let stretches = self.stretches.get(row).map_or(&[][..], Vec::as_slice);
         let clamped = stretches.iter().map(|[left, right]| x.clamp(*left, *right));
-        clamped.min_by(|a, b| (a - x).abs().total_cmp(&(b - x).abs())).unwrap_or(x)
+        clamped
+            .min_by(|a, b| (a - x).abs().total_cmp(&(b - x).abs()))
+            .unwrap_or(x)
     }
 
-    /// `m` points spread evenly over the surface, by area: heights at equal shares of the surface, each point turned by
-    /// the golden angle against the one before. No chance is involved. What would lie in a gap of a drawn shape lies on
-    /// its wall.
+    /// `m` points spread evenly over the surface, by area: heights at equal shares of the surface,
+    /// each point turned by the golden angle against the one before. No chance is involved. What
+    /// would lie in a gap of a drawn shape lies on its wall.
     pub fn attractors(&self, m: usize) -> Vec<Point3<f64>> {
         let mut area = Vec::with_capacity(self.discs.len());
         let mut total = 0.0;
@@ -174,7 +238,9 @@ impl Envelope {
         (0..m)
             .filter_map(|i| {
                 let wanted = (i as f64 + 0.5) / m as f64 * total;
-                let row = area.partition_point(|&a| a < wanted).min(self.discs.len().checked_sub(1)?);
+                let row = area
+                    .partition_point(|&a| a < wanted)
+                    .min(self.discs.len().checked_sub(1)?);
                 let (d, angle) = (self.discs[row], i as f64 * golden_angle);
                 let (sin, cos) = angle.sin_cos();
                 let x = self.nearest_inside(row, d.centre_x + d.radius * cos);
@@ -209,13 +275,22 @@ mod tests {
     #[test]
     fn numbers_from_a_damaged_file_give_an_envelope_all_the_same() {
         let size = Size::new(8, 6);
-        let outline = Outline { size, mask: vec![255; 48], polygon_px: Vec::new(), matte: None };
+        let outline = Outline {
+            size,
+            mask: vec![255; 48],
+            polygon_px: Vec::new(),
+            matte: None,
+        };
         for foot in [1e18, -1e18, 7.5] {
             let envelope = Envelope::of_drawn(&outline, [foot, foot]);
             assert_eq!((envelope.discs.len(), envelope.stretches.len()), (6, 6));
         }
-        let far =
-            [Point3::origin(), Point3::new(3.0, 40.0, 0.0), Point3::new(1e9, 1e9, 0.0), Point3::new(0.0, 1e300, 0.0)];
+        let far = [
+            Point3::origin(),
+            Point3::new(3.0, 40.0, 0.0),
+            Point3::new(1e9, 1e9, 0.0),
+            Point3::new(0.0, 1e300, 0.0),
+        ];
         assert_eq!(Envelope::of_hull(&far).height(), 41.0);
         assert_eq!(Envelope::of_hull(&far[2..]).height(), 0.0);
     }

@@ -5,9 +5,10 @@ use crate::model::NodeId;
 
 /// The leaves that oscillate together: those of one main branch.
 ///
-/// A cluster of leaves turns about its main axis by `A(t) sin(omega t + beta)` (appendix B.2). For small angles that is
-/// `A(t) sin(omega t)` times one displacement of its vertices plus `A(t) cos(omega t)` times another, which every vertex
-/// carries with the phase `beta` of its cluster in it.
+/// A cluster of leaves turns about its main axis by `A(t) sin(omega t + beta)` (appendix B.2). For
+/// small angles that is
+/// `A(t) sin(omega t)` times one displacement of its vertices plus `A(t) cos(omega t)` times
+/// another, which every vertex carries with the phase `beta` of its cluster in it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FoliageGroup {
     /// The branch whose speed decides how far the leaves swing.

@@ -4,9 +4,10 @@ use super::{Angles, Envelope, Terms, envelope_distance, push};
 use crate::config;
 use crate::model::Skeleton;
 
-/// What is tried: the power of eq. 6, what counts as no gain, and whether the tree is spread first (see [`Terms::Both`]). The
-/// paper's are 1, 0 and no; but how sharply each term speaks hangs on the tree (how many nodes share the filling, how deep
-/// it forks), so that with one choice for all, one of the two gives way on some trees.
+/// What is tried: the power of eq. 6, what counts as no gain, and whether the tree is spread first
+/// (see [`Terms::Both`]). The paper's are 1, 0 and no; but how sharply each term speaks hangs on
+/// the tree (how many nodes share the filling, how deep it forks), so that with one choice for all,
+/// one of the two gives way on some trees.
 const TRIED: [(f64, f64, bool); 10] = [
     (1.4, 0.02, false),
     (1.4, 0.02, true),
@@ -22,9 +23,15 @@ const TRIED: [(f64, f64, bool); 10] = [
 /// With so little given up the search ends.
 const ENOUGH: f64 = 0.96;
 
-/// Pushes by both terms, weighed so that neither gives up more than it must: held against what the paper's single traversal
-/// achieves with either term alone, the worse of the two is the best of all that is tried.
-pub fn fuse(skeleton: &mut Skeleton, trunk: &[bool], envelope: &Envelope, settings: &config::Shape) {
+/// Pushes by both terms, weighed so that neither gives up more than it must: held against what the
+/// paper's single traversal achieves with either term alone, the worse of the two is the best of
+/// all that is tried.
+pub fn fuse(
+    skeleton: &mut Skeleton,
+    trunk: &[bool],
+    envelope: &Envelope,
+    settings: &config::Shape,
+) {
     let judge = Judge::of(skeleton, trunk, envelope, settings);
     let mut best: Option<(f64, Skeleton)> = None;
     for terms in weights() {
@@ -45,7 +52,13 @@ pub fn fuse(skeleton: &mut Skeleton, trunk: &[bool], envelope: &Envelope, settin
 
 /// The ways to weigh the terms, best tried in this order.
 pub(super) fn weights() -> impl Iterator<Item = Terms> {
-    TRIED.into_iter().map(|(weight, no_gain, spread_first)| Terms::Both { weight, no_gain, spread_first })
+    TRIED
+        .into_iter()
+        .map(|(weight, no_gain, spread_first)| Terms::Both {
+            weight,
+            no_gain,
+            spread_first,
+        })
 }
 
 /// What a tree achieves of what either term alone does in a single traversal.
@@ -86,22 +99,42 @@ pub(super) struct Judge<'a> {
 
 impl<'a> Judge<'a> {
     /// `rest` are the copies in their planes.
-    pub fn of(rest: &Skeleton, trunk: &[bool], envelope: &'a Envelope, settings: &config::Shape) -> Self {
+    pub fn of(
+        rest: &Skeleton,
+        trunk: &[bool],
+        envelope: &'a Envelope,
+        settings: &config::Shape,
+    ) -> Self {
         let attractors = settings.attractors as usize;
         let angles = Angles::of(rest, settings);
         let rest_px = envelope_distance(rest, envelope, attractors);
         let alone = |terms: Terms| one_sided(rest, trunk, envelope, settings, terms);
         let nearer_px = rest_px - envelope_distance(&alone(Terms::Global), envelope, attractors);
         let likely = angles.likelihood(&alone(Terms::Local));
-        Self { angles, envelope, attractors, rest_px, nearer_px, likely }
+        Self {
+            angles,
+            envelope,
+            attractors,
+            rest_px,
+            nearer_px,
+            likely,
+        }
     }
 
     pub fn of_both(&self, pushed: &Skeleton) -> Achieved {
         let nearer_px = self.rest_px - envelope_distance(pushed, self.envelope, self.attractors);
         let likely = self.angles.likelihood(pushed);
         Achieved {
-            filling: if self.nearer_px > 0.0 { nearer_px / self.nearer_px } else { 1.0 },
-            plausibility: if self.likely > 0.0 { likely / self.likely } else { 1.0 },
+            filling: if self.nearer_px > 0.0 {
+                nearer_px / self.nearer_px
+            } else {
+                1.0
+            },
+            plausibility: if self.likely > 0.0 {
+                likely / self.likely
+            } else {
+                1.0
+            },
         }
     }
 }
@@ -115,6 +148,15 @@ pub(super) fn one_sided(
     terms: Terms,
 ) -> Skeleton {
     let mut pushed = skeleton.clone();
-    push(&mut pushed, trunk, envelope, &config::Shape { passes: 1, ..settings.clone() }, terms);
+    push(
+        &mut pushed,
+        trunk,
+        envelope,
+        &config::Shape {
+            passes: 1,
+            ..settings.clone()
+        },
+        terms,
+    );
     pushed
 }

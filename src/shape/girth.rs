@@ -2,21 +2,24 @@
 
 use crate::model::Outline;
 
-/// Share of the outline's width that is trunk: outlines are drawn wide, masks that are found by motion are wider still.
+/// Share of the outline's width that is trunk: outlines are drawn wide, masks that are found by
+/// motion are wider still.
 const TRUNK_SHARE: f64 = 0.5;
-/// Part of the way from the foot to the trunk's top that is looked at: below it roots and the ground, above it the fork.
+/// Part of the way from the foot to the trunk's top that is looked at: below it roots and the
+/// ground, above it the fork.
 const LOOKED_AT: std::ops::RangeInclusive<f64> = 0.1..=0.8;
 /// Rows that are enough to measure in.
 const LEAST_ROWS: usize = 4;
 /// No trunk is thicker than this share of the way from its foot to the top of the outline.
 const THICKEST: f64 = 0.12;
 
-/// Half the trunk's width between its foot and its top, px; `None` where the outline has no trunk there, or where it is
-/// wider than a trunk can be.
+/// Half the trunk's width between its foot and its top, px; `None` where the outline has no trunk
+/// there, or where it is wider than a trunk can be.
 ///
-/// In each row the run of the outline that the line from foot to top goes through. A run may be wider than the trunk for
-/// many reasons, a fork or a low branch, and narrower for none, so the lower quartile of their widths counts: half of
-/// it, or where the outline has a matte, what is opaque of it.
+/// In each row the run of the outline that the line from foot to top goes through. A run may be
+/// wider than the trunk for many reasons, a fork or a low branch, and narrower for none, so the
+/// lower quartile of their widths counts: half of it, or where the outline has a matte, what is
+/// opaque of it.
 pub fn trunk_radius_px(outline: &Outline, foot_px: [f64; 2], top_px: [f64; 2]) -> Option<f64> {
     let width = outline.size.width as usize;
     let rise = foot_px[1] - top_px[1];
@@ -29,15 +32,35 @@ pub fn trunk_radius_px(outline: &Outline, foot_px: [f64; 2], top_px: [f64; 2]) -
         if !LOOKED_AT.contains(&share) || !outline.contains(u, v as f64) {
             return None;
         }
-        let (row, u) = (&outline.mask[v * width..(v + 1) * width], u.round() as usize);
+        let (row, u) = (
+            &outline.mask[v * width..(v + 1) * width],
+            u.round() as usize,
+        );
         let left = row[..u].iter().rposition(|&m| m == 0).map_or(0, |k| k + 1);
-        let right = row[u..].iter().position(|&m| m == 0).map_or(width, |k| u + k);
-        let opaque = |matte: &Vec<u8>| matte.get(v * width + left..v * width + right).map(opaque_px);
-        Some(outline.matte.as_ref().and_then(opaque).unwrap_or(TRUNK_SHARE * (right - left) as f64))
+        let right = row[u..]
+            .iter()
+            .position(|&m| m == 0)
+            .map_or(width, |k| u + k);
+        let opaque = |matte: &Vec<u8>| {
+            matte
+                .get(v * width + left..v * width + right)
+                .map(opaque_px)
+        };
+        Some(
+            outline
+                .matte
+                .as_ref()
+                .and_then(opaque)
+                .unwrap_or(TRUNK_SHARE * (right - left) as f64),
+        )
     };
-    let mut widths: Vec<f64> = (0..outline.size.height as usize).filter_map(trunk_in).collect();
+    let mut widths: Vec<f64> = (0..outline.size.height as usize)
+        .filter_map(trunk_in)
+        .collect();
     widths.sort_unstable_by(f64::total_cmp);
-    let narrow = *widths.get(widths.len() / 4).filter(|_| widths.len() >= LEAST_ROWS)?;
+    let narrow = *widths
+        .get(widths.len() / 4)
+        .filter(|_| widths.len() >= LEAST_ROWS)?;
     let tall = foot_px[1] - f64::from(outline.bounds_px()?[1]);
     (narrow > 0.0 && narrow <= THICKEST * tall).then_some(0.5 * narrow)
 }
@@ -51,7 +74,8 @@ mod tests {
     use super::*;
     use crate::model::Size;
 
-    /// A trunk `width` px wide in an outline drawn 8 px wider on either side, 100 rows high, below a crown.
+    /// A trunk `width` px wide in an outline drawn 8 px wider on either side, 100 rows high, below
+    /// a crown.
     fn outline(width: usize, matte: bool) -> Outline {
         let size = Size::new(200, 200);
         let (mut mask, mut alpha) = (vec![0; 200 * 200], vec![0; 200 * 200]);
@@ -59,10 +83,19 @@ mod tests {
             let half = if v < 100 { 80 } else { width / 2 };
             for u in 0..200usize {
                 mask[v * 200 + u] = if u.abs_diff(100) <= half + 8 { 255 } else { 0 };
-                alpha[v * 200 + u] = if v >= 100 && u >= 100 - half && u < 100 + half { 255 } else { 0 };
+                alpha[v * 200 + u] = if v >= 100 && u >= 100 - half && u < 100 + half {
+                    255
+                } else {
+                    0
+                };
             }
         }
-        Outline { size, mask, polygon_px: Vec::new(), matte: matte.then_some(alpha) }
+        Outline {
+            size,
+            mask,
+            polygon_px: Vec::new(),
+            matte: matte.then_some(alpha),
+        }
     }
 
     #[test]
@@ -76,9 +109,24 @@ mod tests {
     #[test]
     fn where_there_is_no_trunk_nothing_is_made_up() {
         let wide = outline(120, false);
-        assert_eq!(trunk_radius_px(&wide, [100.0, 199.0], [100.0, 90.0]), None, "wider than a trunk can be");
-        assert_eq!(trunk_radius_px(&wide, [100.0, 90.0], [100.0, 199.0]), None, "upside down");
-        assert_eq!(trunk_radius_px(&wide, [f64::NAN, 199.0], [100.0, 90.0]), None);
-        assert_eq!(trunk_radius_px(&wide, [900.0, 199.0], [900.0, 90.0]), None, "beside the picture");
+        assert_eq!(
+            trunk_radius_px(&wide, [100.0, 199.0], [100.0, 90.0]),
+            None,
+            "wider than a trunk can be"
+        );
+        assert_eq!(
+            trunk_radius_px(&wide, [100.0, 90.0], [100.0, 199.0]),
+            None,
+            "upside down"
+        );
+        assert_eq!(
+            trunk_radius_px(&wide, [f64::NAN, 199.0], [100.0, 90.0]),
+            None
+        );
+        assert_eq!(
+            trunk_radius_px(&wide, [900.0, 199.0], [900.0, 90.0]),
+            None,
+            "beside the picture"
+        );
     }
 }

@@ -1,7 +1,7 @@
 //! What a tree's own branches say of the twigs that were too thin to be followed: self-similarity.
 //!
-//! Li et al. section 3 after Shlyakhter et al. 2001, Tan et al. 2007 and Chen et al. 2008: a twig is a small, turned copy
-//! of a part of the tree itself.
+//! Li et al. section 3 after Shlyakhter et al. 2001, Tan et al. 2007 and Chen et al. 2008: a twig
+//! is a small, turned copy of a part of the tree itself.
 
 use super::chance::Chance;
 use super::limb::{continuations, way};
@@ -9,7 +9,8 @@ use crate::model::Skeleton;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::FRAC_PI_2;
 
-/// Angles between a branch and what leaves it that are believed, rad; others are noise of the skeleton.
+/// Angles between a branch and what leaves it that are believed, rad; others are noise of the
+/// skeleton.
 const ANGLES: [f64; 2] = [0.35, 1.15];
 /// Reaches of side branches against that of what they leave that are believed.
 const RATIOS: [f64; 2] = [0.25, 0.6];
@@ -24,7 +25,8 @@ pub(super) struct Piece {
     pub to: Vector3<f64>,
 }
 
-/// A branch with what it carries; it leaves the origin along +y and reaches 1 along its longest way.
+/// A branch with what it carries; it leaves the origin along +y and reaches 1 along its longest
+/// way.
 #[derive(Clone, Debug)]
 pub(super) struct Part {
     pub pieces: Vec<Piece>,
@@ -60,9 +62,17 @@ impl Habit {
         // What a tree without enough forks is taken to be like.
         let (mut angles, mut ratios, mut parts) = (vec![0.75], vec![0.45], vec![]);
         let mut slopes = Vec::new();
-        for (i, node) in nodes.iter().enumerate().filter(|(_, n)| n.copy_of.is_none() && n.level > 1) {
-            let Some(p) = node.parent.map(|p| p.index()) else { continue };
-            let (Some(own), Some(before)) = (way(skeleton, i), way(skeleton, p)) else { continue };
+        for (i, node) in nodes
+            .iter()
+            .enumerate()
+            .filter(|(_, n)| n.copy_of.is_none() && n.level > 1)
+        {
+            let Some(p) = node.parent.map(|p| p.index()) else {
+                continue;
+            };
+            let (Some(own), Some(before)) = (way(skeleton, i), way(skeleton, p)) else {
+                continue;
+            };
             if goes_on[p].is_none_or(|on| on.index() != i) {
                 angles.push(own.angle(&before).clamp(ANGLES[0], ANGLES[1]));
                 ratios.push(((lengths[i] + reach_px[i]) / reach_px[p]).clamp(RATIOS[0], RATIOS[1]));
@@ -76,7 +86,13 @@ impl Habit {
         if parts.is_empty() {
             parts.push(fork());
         }
-        Self { angles, ratios, lift, parts, reach_px }
+        Self {
+            angles,
+            ratios,
+            lift,
+            parts,
+            reach_px,
+        }
     }
 
     pub fn angle(&self, chance: &mut Chance) -> f64 {
@@ -89,11 +105,16 @@ impl Habit {
 }
 
 fn length(skeleton: &Skeleton, i: usize) -> f64 {
-    let parent = skeleton.nodes[i].parent.filter(|_| way(skeleton, i).is_some());
-    parent.map_or(0.0, |p| (skeleton.nodes[i].position - skeleton.nodes[p.index()].position).norm())
+    let parent = skeleton.nodes[i]
+        .parent
+        .filter(|_| way(skeleton, i).is_some());
+    parent.map_or(0.0, |p| {
+        (skeleton.nodes[i].position - skeleton.nodes[p.index()].position).norm()
+    })
 }
 
-/// Branch `base` with all above it, if it is a part worth copying: some branches, none of which turns back.
+/// Branch `base` with all above it, if it is a part worth copying: some branches, none of which
+/// turns back.
 fn part(skeleton: &Skeleton, children: &[Vec<usize>], base: usize, reach_px: f64) -> Option<Part> {
     let nodes = &skeleton.nodes;
     let along = way(skeleton, base)?;
@@ -117,13 +138,27 @@ fn part(skeleton: &Skeleton, children: &[Vec<usize>], base: usize, reach_px: f64
             return None;
         }
         let place = parent.and_then(|p| all.binary_search(&p).ok());
-        pieces.push(Piece { parent: place, to: upright * (nodes[i].position - origin) / reach_px });
+        pieces.push(Piece {
+            parent: place,
+            to: upright * (nodes[i].position - origin) / reach_px,
+        });
     }
-    PART_BRANCHES.contains(&pieces.len()).then_some(Part { pieces })
+    PART_BRANCHES
+        .contains(&pieces.len())
+        .then_some(Part { pieces })
 }
 
 /// A twig with two more, for trees that have no part to copy.
 fn fork() -> Part {
-    let piece = |parent, x: f64, y: f64| Piece { parent, to: Vector3::new(x, y, 0.0) };
-    Part { pieces: vec![piece(None, 0.0, 0.55), piece(Some(0), 0.2, 0.95), piece(Some(0), -0.15, 0.8)] }
+    let piece = |parent, x: f64, y: f64| Piece {
+        parent,
+        to: Vector3::new(x, y, 0.0),
+    };
+    Part {
+        pieces: vec![
+            piece(None, 0.0, 0.55),
+            piece(Some(0), 0.2, 0.95),
+            piece(Some(0), -0.15, 0.8),
+        ],
+    }
 }

@@ -1,7 +1,7 @@
 //! Convex hull of points in the plane.
 
-/// Corners of the convex hull, counter-clockwise, by Andrew's monotone chain; fewer than three where all points lie on a
-/// line. Coordinates must be numbers.
+/// Corners of the convex hull, counter-clockwise, by Andrew's monotone chain; fewer than three
+/// where all points lie on a line. Coordinates must be numbers.
 pub(super) fn convex_hull(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut sorted = points.to_vec();
     sorted.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
@@ -31,19 +31,29 @@ fn half<'a>(points: impl Iterator<Item = &'a [f64; 2]>) -> Vec<[f64; 2]> {
     side
 }
 
-/// Where the horizontal line at `y` enters and leaves a convex polygon; beyond its ends, as at its nearest corner.
+/// Where the horizontal line at `y` enters and leaves a convex polygon; beyond its ends, as at its
+/// nearest corner.
 pub(super) fn crossed(hull: &[[f64; 2]], y: f64) -> (f64, f64) {
     let sides = || hull.iter().zip(hull.iter().cycle().skip(1));
     let crossing = |(a, b): (&[f64; 2], &[f64; 2])| {
         let between = (a[1].min(b[1])..=a[1].max(b[1])).contains(&y);
-        let t = if a[1] == b[1] { 0.0 } else { (y - a[1]) / (b[1] - a[1]) };
+        let t = if a[1] == b[1] {
+            0.0
+        } else {
+            (y - a[1]) / (b[1] - a[1])
+        };
         between.then(|| a[0] + t * (b[0] - a[0]))
     };
     let level = |(a, b): (&[f64; 2], &[f64; 2])| (a[1] == y && b[1] == y).then(|| b[0]);
-    let xs: Vec<f64> = sides().filter_map(crossing).chain(sides().filter_map(level)).collect();
+    let xs: Vec<f64> = sides()
+        .filter_map(crossing)
+        .chain(sides().filter_map(level))
+        .collect();
     if let Some(low) = xs.iter().copied().min_by(f64::total_cmp) {
         return (low, xs.iter().copied().fold(low, f64::max));
     }
-    let corner = hull.iter().min_by(|a, b| (a[1] - y).abs().total_cmp(&(b[1] - y).abs()));
+    let corner = hull
+        .iter()
+        .min_by(|a, b| (a[1] - y).abs().total_cmp(&(b[1] - y).abs()));
     corner.map_or((0.0, 0.0), |c| (c[0], c[0]))
 }

@@ -1,5 +1,5 @@
-//! How well a tree fills its envelope and how likely its angles are, beside the one-sided variants of Li et al. figure 3
-//! and the mirrored ellipsoid of figure 4 a.
+//! How well a tree fills its envelope and how likely its angles are, beside the one-sided variants
+//! of Li et al. figure 3 and the mirrored ellipsoid of figure 4 a.
 
 use super::fuse::one_sided;
 use super::{Angles, Prototype, Terms, diener, envelope_distance};
@@ -41,9 +41,20 @@ pub struct PushFigures {
 }
 
 impl PushFigures {
-    /// Measures `fused`, the tree as it stands, beside all other variants that can be built of the same.
-    pub fn of(fused: &Skeleton, flat: &[Node2d], tracks: &[u32], outline: &Outline, settings: &config::Shape) -> Self {
-        let Prototype { skeleton: rest, envelope, trunk } = Prototype::of(flat, tracks, outline, settings);
+    /// Measures `fused`, the tree as it stands, beside all other variants that can be built of the
+    /// same.
+    pub fn of(
+        fused: &Skeleton,
+        flat: &[Node2d],
+        tracks: &[u32],
+        outline: &Outline,
+        settings: &config::Shape,
+    ) -> Self {
+        let Prototype {
+            skeleton: rest,
+            envelope,
+            trunk,
+        } = Prototype::of(flat, tracks, outline, settings);
         let angles = Angles::of(&rest, settings);
         let pushed = |terms: Terms| one_sided(&rest, &trunk, &envelope, settings, terms);
         let (global, local) = (pushed(Terms::Global), pushed(Terms::Local));
@@ -64,7 +75,8 @@ impl PushFigures {
         }
     }
 
-    /// By how much the fused push brings the envelope nearer, as a share of what the global term alone achieves.
+    /// By how much the fused push brings the envelope nearer, as a share of what the global term
+    /// alone achieves.
     pub fn filling(&self) -> f64 {
         let d = &self.distance_px;
         (d.rest - d.fused) / (d.rest - d.global_only)
@@ -76,15 +88,25 @@ impl PushFigures {
     }
 }
 
-/// Share of the nodes whose mirror image in the side view (z to -z, at the same height) lies within a hundredth of the
-/// tree's height of a node; nodes nearer than that to the middle, which are their own images, are left out. 1 is
-/// a mirror image through and through; 0 where no node is off the middle.
+/// Share of the nodes whose mirror image in the side view (z to -z, at the same height) lies within
+/// a hundredth of the tree's height of a node; nodes nearer than that to the middle, which are
+/// their own images, are left out. 1 is a mirror image through and through; 0 where no node is off
+/// the middle.
 pub fn side_symmetry(skeleton: &Skeleton) -> f64 {
-    let places: Vec<[f64; 2]> = skeleton.nodes.iter().map(|n| [n.position.z, n.position.y]).collect();
+    let places: Vec<[f64; 2]> = skeleton
+        .nodes
+        .iter()
+        .map(|n| [n.position.z, n.position.y])
+        .collect();
     let heights = || places.iter().map(|p| p[1]);
-    let height = heights().fold(f64::NEG_INFINITY, f64::max) - heights().fold(f64::INFINITY, f64::min);
+    let height =
+        heights().fold(f64::NEG_INFINITY, f64::max) - heights().fold(f64::INFINITY, f64::min);
     let near = MIRRORED * height;
     let off: Vec<&[f64; 2]> = places.iter().filter(|p| p[0].abs() > near).collect();
-    let has_image = |p: &&&[f64; 2]| places.iter().any(|q| (q[0] + p[0]).hypot(q[1] - p[1]) <= near);
+    let has_image = |p: &&&[f64; 2]| {
+        places
+            .iter()
+            .any(|q| (q[0] + p[0]).hypot(q[1] - p[1]) <= near)
+    };
     off.iter().filter(has_image).count() as f64 / off.len().max(1) as f64
 }

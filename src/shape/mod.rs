@@ -41,8 +41,8 @@ pub use fuse::fuse;
 pub use girth::trunk_radius_px;
 pub use keep::{Twin, on_foot, twins};
 pub use leaves::{
-    LeafView, Sampling, Season, Template, TemplateFault, TemplateMesh, density_match, foliage, foliage_by, leaf_cover,
-    season, within_leaves,
+    LeafView, Sampling, Season, Template, TemplateFault, TemplateMesh, density_match, foliage,
+    foliage_by, leaf_cover, season, within_leaves,
 };
 pub use limb::{Limb, Riding, Room, Station, limbs};
 pub use measure::{PushFigures, side_symmetry};
@@ -60,10 +60,20 @@ use crate::skeleton::Node2d;
 use nalgebra::Point3;
 
 /// Copies, then pushes: the 3D skeleton of `flat`, with `tracks` points on each of its nodes.
-pub fn build(flat: &[Node2d], tracks: &[u32], outline: &Outline, settings: &config::Shape) -> Skeleton {
+pub fn build(
+    flat: &[Node2d],
+    tracks: &[u32],
+    outline: &Outline,
+    settings: &config::Shape,
+) -> Skeleton {
     let prototype = Prototype::of(flat, tracks, outline, settings);
     let mut skeleton = prototype.skeleton;
-    fuse(&mut skeleton, &prototype.trunk, &prototype.envelope, settings);
+    fuse(
+        &mut skeleton,
+        &prototype.trunk,
+        &prototype.envelope,
+        settings,
+    );
     skeleton
 }
 
@@ -77,13 +87,28 @@ pub struct Prototype {
 
 impl Prototype {
     /// Copies `flat` to its planes in the envelope that the settings name.
-    pub fn of(flat: &[Node2d], tracks: &[u32], outline: &Outline, settings: &config::Shape) -> Self {
+    pub fn of(
+        flat: &[Node2d],
+        tracks: &[u32],
+        outline: &Outline,
+        settings: &config::Shape,
+    ) -> Self {
         let foot_px = flat.first().map_or([0.0, 0.0], |n| n.position_px);
-        let place = |n: &Node2d| Point3::new(n.position_px[0] - foot_px[0], foot_px[1] - n.position_px[1], 0.0);
+        let place = |n: &Node2d| {
+            Point3::new(
+                n.position_px[0] - foot_px[0],
+                foot_px[1] - n.position_px[1],
+                0.0,
+            )
+        };
         let places: Vec<Point3<f64>> = flat.iter().map(place).collect();
         let envelope = Envelope::of_filmed(settings.envelope, outline, foot_px, &places);
         let trunk = trunk(flat, settings.leader, &settings.leader_px);
         let skeleton = copy_to_planes(flat, tracks, &trunk, outline, &envelope, settings.planes);
-        Self { skeleton, envelope, trunk }
+        Self {
+            skeleton,
+            envelope,
+            trunk,
+        }
     }
 }

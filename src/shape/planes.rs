@@ -1,4 +1,5 @@
-//! From the flat skeleton to a prototype in space: copies on planes turned about the trunk (Li et al. section 3).
+//! From the flat skeleton to a prototype in space: copies on planes turned about the trunk (Li et
+//! al. section 3).
 
 use super::envelope::Envelope;
 use crate::model::{Node, NodeId, NodeName, Outline, Skeleton};
@@ -6,10 +7,11 @@ use crate::skeleton::Node2d;
 use nalgebra::{Point3, Rotation3, Vector3};
 use std::f64::consts::PI;
 
-/// Stands the 2D skeleton in the plane z = 0 and repeats all that is not `trunk` on `planes - 1` further planes, turned by
-/// equal parts of a half turn about the vertical through the place where each branch leaves the trunk. One trunk remains.
-/// Nodes that a turn brings out of the envelope are drawn in towards its axis. A node whose place is no number stands
-/// where its parent does: a branch without length.
+/// Stands the 2D skeleton in the plane z = 0 and repeats all that is not `trunk` on `planes - 1`
+/// further planes, turned by equal parts of a half turn about the vertical through the place where
+/// each branch leaves the trunk. One trunk remains. Nodes that a turn brings out of the envelope
+/// are drawn in towards its axis. A node whose place is no number stands where its parent does: a
+/// branch without length.
 pub fn copy_to_planes(
     flat: &[Node2d],
     tracks: &[u32],
@@ -44,7 +46,12 @@ pub fn copy_to_planes(
     for node in &nodes {
         let parent = node.parent.map_or(0, |p| p.index());
         let leaves = Vector3::new(nodes[parent].position.x, 0.0, 0.0);
-        axes.push(axes.get(parent).copied().filter(|_| !is_trunk(parent)).unwrap_or(leaves));
+        axes.push(
+            axes.get(parent)
+                .copied()
+                .filter(|_| !is_trunk(parent))
+                .unwrap_or(leaves),
+        );
     }
     for plane in 1..planes {
         let angle = PI * f64::from(plane) / f64::from(planes);
@@ -58,15 +65,22 @@ pub fn copy_to_planes(
             let mut copy = nodes[original].clone();
             copy.name = NodeName(nodes.len() as u32);
             copy.parent = copy.parent.map(|p| copy_id[p.index()]);
-            copy.position = envelope.clamp(&(turn * (copy.position - axes[original]) + axes[original]));
-            (copy.n_tracks, copy.copy_of, copy.plane_angle) = (0, Some(NodeId(original as u32)), angle);
+            copy.position =
+                envelope.clamp(&(turn * (copy.position - axes[original]) + axes[original]));
+            (copy.n_tracks, copy.copy_of, copy.plane_angle) =
+                (0, Some(NodeId(original as u32)), angle);
             nodes.push(copy);
         }
     }
-    Skeleton { nodes, foot_px, image_size: outline.size }
+    Skeleton {
+        nodes,
+        foot_px,
+        image_size: outline.size,
+    }
 }
 
-/// Brings the measured nodes into the envelope, the foot to the origin, and what has no place to its parent's.
+/// Brings the measured nodes into the envelope, the foot to the origin, and what has no place to
+/// its parent's.
 fn place(nodes: &mut [Node], envelope: &Envelope) {
     for i in 0..nodes.len() {
         let at = nodes[i].position;

@@ -3,8 +3,8 @@
 use crate::model::Skeleton;
 use nalgebra::{Point3, Vector3};
 
-/// Nearest-node distances from the attractors, in single precision and coordinate by coordinate, which the compiler
-/// turns into vector instructions: nearly all of the push's time goes into this.
+/// Nearest-node distances from the attractors, in single precision and coordinate by coordinate,
+/// which the compiler turns into vector instructions: nearly all of the push's time goes into this.
 pub(super) struct Search {
     ax: Vec<f32>,
     ay: Vec<f32>,
@@ -29,7 +29,12 @@ impl Search {
     }
 
     fn lower(&self, nearest_sq: &mut [f32], p: [f32; 3]) {
-        for (((d, x), y), z) in nearest_sq.iter_mut().zip(&self.ax).zip(&self.ay).zip(&self.az) {
+        for (((d, x), y), z) in nearest_sq
+            .iter_mut()
+            .zip(&self.ax)
+            .zip(&self.ay)
+            .zip(&self.az)
+        {
             let (dx, dy, dz) = (x - p[0], y - p[1], z - p[2]);
             *d = d.min(dx * dx + dy * dy + dz * dz);
         }
@@ -42,7 +47,12 @@ impl Search {
             inside[k] = true;
         }
         let mut nearest_sq = vec![f32::INFINITY; self.ax.len()];
-        for (p, _) in self.nodes.iter().zip(&inside).filter(|(_, inside)| !**inside) {
+        for (p, _) in self
+            .nodes
+            .iter()
+            .zip(&inside)
+            .filter(|(_, inside)| !**inside)
+        {
             self.lower(&mut nearest_sq, *p);
         }
         nearest_sq

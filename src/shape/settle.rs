@@ -1,4 +1,5 @@
-//! A tree that goes on at a refinement is pushed on from where it stood, and no farther than it must.
+//! A tree that goes on at a refinement is pushed on from where it stood, and no farther than it
+//! must.
 
 use super::angles::turning_back;
 use super::fuse::{Achieved, Judge, weights};
@@ -15,20 +16,23 @@ use std::f64::consts::PI;
 const SIGMAS: [f64; 4] = [0.025, 0.05, 0.1, 0.2];
 /// How many ways to weigh the terms are tried with each.
 const WEIGHTS: usize = 2;
-/// What a tree that goes on must achieve, as a share of what the same branches do that were pushed anew.
+/// What a tree that goes on must achieve, as a share of what the same branches do that were pushed
+/// anew.
 const OF_ANEW: f64 = 0.95;
-/// Where the places in the picture that are kept do not allow for that, a share of the best that was found: the last of it
-/// would cost most.
+/// Where the places in the picture that are kept do not allow for that, a share of the best that
+/// was found: the last of it would cost most.
 const OF_BEST: f64 = 0.9;
 /// A tree that turns back by no more than this in the mean has as good as no hooks, radians.
 const NEXT_TO_STRAIGHT_RAD: f64 = 5.0 * PI / 180.0;
-/// How much branches may be made to turn back by their old places in the picture: without need, and where the figures need it.
+/// How much branches may be made to turn back by their old places in the picture: without need, and
+/// where the figures need it.
 const TURNED_BACK_RAD: [f64; 2] = [PI / 2.0, PI / 6.0];
 /// What is left of either figure, as a share, when branches are brought back to their sides.
 const OF_SETTLED: f64 = 0.95;
 
-/// `anew`, a tree in the axes of `old`, as the old one goes on in it, and where its nodes are held. If branches have to turn back
-/// a little in the picture for the tree to be as good as it must, these go to their new places, too.
+/// `anew`, a tree in the axes of `old`, as the old one goes on in it, and where its nodes are held.
+/// If branches have to turn back a little in the picture for the tree to be as good as it must,
+/// these go to their new places, too.
 pub fn go_on(
     anew: &Skeleton,
     old: &Skeleton,
@@ -51,14 +55,16 @@ pub fn go_on(
 }
 
 /// Pushes `kept`, the tree as [`stand_as_before`] has put it, on by the posterior of eq. 2 with a
-/// prior on where its nodes stood (`held`). The prior is as tight as leaves the tree all but as full and as likely as
-/// `anew`, the same branches pushed without regard to the old tree, with hardly more hooks; a tree that is so already stays
-/// as it is.
+/// prior on where its nodes stood (`held`). The prior is as tight as leaves the tree all but as
+/// full and as likely as
+/// `anew`, the same branches pushed without regard to the old tree, with hardly more hooks; a tree
+/// that is so already stays as it is.
 ///
-/// With each prior two trees are pushed on: the kept one, and `anew` with every main branch turned to the side on which it
-/// stood. Of those that will do the one is taken that is nearest to where the tree stood; if none will, hooks are let be,
-/// and then what is little worse than the best will do. Last, what has changed sides, or would be seen to jump, goes back
-/// as far as the figures allow. Gives the worse of the figures, as a share of those of `anew`.
+/// With each prior two trees are pushed on: the kept one, and `anew` with every main branch turned
+/// to the side on which it stood. Of those that will do the one is taken that is nearest to where
+/// the tree stood; if none will, hooks are let be, and then what is little worse than the best will
+/// do. Last, what has changed sides, or would be seen to jump, goes back as far as the figures
+/// allow. Gives the worse of the figures, as a share of those of `anew`.
 fn settle(
     kept: &mut Skeleton,
     held: &[Option<Point3<f64>>],
@@ -66,7 +72,11 @@ fn settle(
     prototype: &Prototype,
     settings: &config::Shape,
 ) -> f64 {
-    let Prototype { skeleton: rest, envelope, trunk } = prototype;
+    let Prototype {
+        skeleton: rest,
+        envelope,
+        trunk,
+    } = prototype;
     let judge = Judge::of(rest, trunk, envelope, settings);
     let best = judge.of_both(anew);
     let of_anew = |tree: &Skeleton| judge.of_both(tree).as_share_of(&best);
@@ -75,11 +85,17 @@ fn settle(
         return of_anew(kept).worse();
     }
     let turned = turned_as_before(kept, held, anew, trunk);
-    let mut tried = vec![Tried::of(kept.clone(), of_anew, held), Tried::of(turned.clone(), of_anew, held)];
+    let mut tried = vec![
+        Tried::of(kept.clone(), of_anew, held),
+        Tried::of(turned.clone(), of_anew, held),
+    ];
     let mut least = OF_ANEW;
     let mut chosen = None;
     for sigma in SIGMAS {
-        let tether = Tether { stood: held, sigma_px: sigma * envelope.width() };
+        let tether = Tether {
+            stood: held,
+            sigma_px: sigma * envelope.width(),
+        };
         let of_this = tried.len();
         for from in [&*kept, &turned] {
             for terms in weights().take(WEIGHTS) {
@@ -100,12 +116,16 @@ fn settle(
         least = OF_BEST * tried.iter().map(|t| t.worse).fold(0.0, f64::max);
         chosen = nearest(&tried, least, f64::INFINITY);
     }
-    let Some(settled) = chosen else { return of_anew(kept).worse() };
+    let Some(settled) = chosen else {
+        return of_anew(kept).worse();
+    };
     *kept = settled.clone();
     let had = of_anew(kept);
     let least = Achieved {
         filling: had.filling.min(least.max(OF_SETTLED * had.filling)),
-        plausibility: had.plausibility.min(least.max(OF_SETTLED * had.plausibility)),
+        plausibility: had
+            .plausibility
+            .min(least.max(OF_SETTLED * had.plausibility)),
     };
     let straight_rad = straight_rad.max(turning_back(kept));
     let good_enough = |tree: &Skeleton| {
@@ -128,14 +148,30 @@ struct Tried {
 }
 
 impl Tried {
-    fn of(tree: Skeleton, of_anew: impl Fn(&Skeleton) -> Achieved, held: &[Option<Point3<f64>>]) -> Self {
-        let ways = tree.nodes.iter().zip(held).filter_map(|(n, stood)| Some(squared_way(n.position - (*stood)?)));
-        Self { worse: of_anew(&tree).worse(), off_px2: ways.sum(), tree }
+    fn of(
+        tree: Skeleton,
+        of_anew: impl Fn(&Skeleton) -> Achieved,
+        held: &[Option<Point3<f64>>],
+    ) -> Self {
+        let ways = tree
+            .nodes
+            .iter()
+            .zip(held)
+            .filter_map(|(n, stood)| Some(squared_way(n.position - (*stood)?)));
+        Self {
+            worse: of_anew(&tree).worse(),
+            off_px2: ways.sum(),
+            tree,
+        }
     }
 }
 
-/// Of those that are good enough and turn back by no more than `straight_rad` the one that is nearest to where it stood.
+/// Of those that are good enough and turn back by no more than `straight_rad` the one that is
+/// nearest to where it stood.
 fn nearest(tried: &[Tried], least: f64, straight_rad: f64) -> Option<&Skeleton> {
-    let good = tried.iter().filter(|t| t.worse >= least && turning_back(&t.tree) <= straight_rad);
-    good.min_by(|a, b| a.off_px2.total_cmp(&b.off_px2)).map(|t| &t.tree)
+    let good = tried
+        .iter()
+        .filter(|t| t.worse >= least && turning_back(&t.tree) <= straight_rad);
+    good.min_by(|a, b| a.off_px2.total_cmp(&b.off_px2))
+        .map(|t| &t.tree)
 }

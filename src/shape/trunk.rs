@@ -9,22 +9,39 @@ const REACH: f64 = 0.06;
 /// A leader that is looked for goes on as long as it turns by less than this, radians.
 const STRAIGHT: f64 = std::f64::consts::FRAC_PI_4;
 
-/// Which nodes of the flat skeleton are trunk: the foot, the trunk's top, and with a leader the chain that goes on from
-/// there along it. `leader_px` is the line that was drawn, from the foot up, px; it counts only with [`Leader::Drawn`].
+/// Which nodes of the flat skeleton are trunk: the foot, the trunk's top, and with a leader the
+/// chain that goes on from there along it. `leader_px` is the line that was drawn, from the foot
+/// up, px; it counts only with [`Leader::Drawn`].
 pub fn trunk(flat: &[Node2d], leader: Leader, leader_px: &[[f64; 2]]) -> Vec<bool> {
     let mut trunk: Vec<bool> = flat.iter().map(|n| n.level < 2).collect();
-    let Some(foot) = flat.first().map(|n| n.position_px) else { return trunk };
-    let top_v = flat.iter().map(|n| n.position_px[1]).filter(|v| v.is_finite()).fold(foot[1], f64::min);
+    let Some(foot) = flat.first().map(|n| n.position_px) else {
+        return trunk;
+    };
+    let top_v = flat
+        .iter()
+        .map(|n| n.position_px[1])
+        .filter(|v| v.is_finite())
+        .fold(foot[1], f64::min);
     let reach = REACH * (foot[1] - top_v);
     let mut at = flat.iter().position(|n| n.level == 1);
     while let Some(from) = at {
-        let children = (0..flat.len()).filter(|&i| flat[i].parent == Some(from) && flat[i].level >= 2);
+        let children =
+            (0..flat.len()).filter(|&i| flat[i].parent == Some(from) && flat[i].level >= 2);
         let next = match leader {
             Leader::None => None,
-            Leader::Drawn => nearest(children.map(|i| (i, way_from(flat[i].position_px, leader_px))), reach),
+            Leader::Drawn => nearest(
+                children.map(|i| (i, way_from(flat[i].position_px, leader_px))),
+                reach,
+            ),
             Leader::Auto => {
-                let (here, before) = (flat[from].position_px, flat[from].parent.map_or(foot, |p| flat[p].position_px));
-                nearest(children.map(|i| (i, turn(before, here, flat[i].position_px))), STRAIGHT)
+                let (here, before) = (
+                    flat[from].position_px,
+                    flat[from].parent.map_or(foot, |p| flat[p].position_px),
+                );
+                nearest(
+                    children.map(|i| (i, turn(before, here, flat[i].position_px))),
+                    STRAIGHT,
+                )
             }
         };
         if let Some(i) = next {
@@ -35,35 +52,53 @@ pub fn trunk(flat: &[Node2d], leader: Leader, leader_px: &[[f64; 2]]) -> Vec<boo
     trunk
 }
 
-/// Which nodes of a skeleton are trunk: those of levels 0 and 1, and where there are copies what has none.
+/// Which nodes of a skeleton are trunk: those of levels 0 and 1, and where there are copies what
+/// has none.
 pub fn is_trunk(skeleton: &Skeleton) -> Vec<bool> {
     let mut copied = vec![false; skeleton.nodes.len()];
     for original in skeleton.nodes.iter().filter_map(|n| n.copy_of) {
         copied[original.index()] = true;
     }
     let any = copied.contains(&true);
-    let trunk = |(i, n): (usize, &crate::model::Node)| n.level < 2 || any && n.copy_of.is_none() && !copied[i];
+    let trunk = |(i, n): (usize, &crate::model::Node)| {
+        n.level < 2 || any && n.copy_of.is_none() && !copied[i]
+    };
     skeleton.nodes.iter().enumerate().map(trunk).collect()
 }
 
 /// The item with the smallest value below `limit`; the first of equals.
 fn nearest(items: impl Iterator<Item = (usize, f64)>, limit: f64) -> Option<usize> {
-    items.filter(|(_, d)| *d < limit).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+    items
+        .filter(|(_, d)| *d < limit)
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(i, _)| i)
 }
 
 /// Distance of `p` from a line of several pieces, px.
 fn way_from(p: [f64; 2], line: &[[f64; 2]]) -> f64 {
     let from_piece = |w: &[[f64; 2]]| {
-        let (along, to) = ([w[1][0] - w[0][0], w[1][1] - w[0][1]], [p[0] - w[0][0], p[1] - w[0][1]]);
+        let (along, to) = (
+            [w[1][0] - w[0][0], w[1][1] - w[0][1]],
+            [p[0] - w[0][0], p[1] - w[0][1]],
+        );
         let length_sq = along[0].powi(2) + along[1].powi(2);
-        let t = if length_sq > 0.0 { (along[0] * to[0] + along[1] * to[1]) / length_sq } else { 0.0 }.clamp(0.0, 1.0);
+        let t = if length_sq > 0.0 {
+            (along[0] * to[0] + along[1] * to[1]) / length_sq
+        } else {
+            0.0
+        }
+        .clamp(0.0, 1.0);
         (to[0] - t * along[0]).hypot(to[1] - t * along[1])
     };
-    line.windows(2).map(from_piece).fold(f64::INFINITY, f64::min)
+    line.windows(2)
+        .map(from_piece)
+        .fold(f64::INFINITY, f64::min)
 }
 
 /// By how much the way a-b-c turns at b, radians.
 fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     let (u, v) = ([b[0] - a[0], b[1] - a[1]], [c[0] - b[0], c[1] - b[1]]);
-    (u[0] * v[1] - u[1] * v[0]).atan2(u[0] * v[0] + u[1] * v[1]).abs()
+    (u[0] * v[1] - u[1] * v[0])
+        .atan2(u[0] * v[0] + u[1] * v[1])
+        .abs()
 }

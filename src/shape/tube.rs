@@ -8,9 +8,11 @@ use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
 /// Numbers of sides that are used: few steps, so that few rings differ from the next.
-const SIDES: [usize; 18] = [3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 96, 128, 192, 256];
-/// How much wider a side branch is where it leaves, and how fast that is lost, in radii; no wider than a share of what it
-/// grows from, or forks become knots.
+const SIDES: [usize; 18] = [
+    3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 96, 128, 192, 256,
+];
+/// How much wider a side branch is where it leaves, and how fast that is lost, in radii; no wider
+/// than a share of what it grows from, or forks become knots.
 const COLLAR: f64 = 0.3;
 const COLLAR_RADII: f64 = 1.5;
 const COLLAR_OF_PARENT: f64 = 0.9;
@@ -68,7 +70,8 @@ pub(super) fn append(chain: &Chain, density: f64, mesh: &mut Mesh) {
     close_base(mesh, first, across);
     let widest = chain.grows_from_px.map_or(0.0, |px| COLLAR_OF_PARENT * px);
     let widened = |s: f64, radius: f64| {
-        let wide = radius * (1.0 + COLLAR * (-s / (COLLAR_RADII * first.station.radius).max(1e-9)).exp());
+        let wide =
+            radius * (1.0 + COLLAR * (-s / (COLLAR_RADII * first.station.radius).max(1e-9)).exp());
         wide.min(widest.max(radius))
     };
     let (mut s, mut v) = (0.0, 0.0);
@@ -84,8 +87,13 @@ pub(super) fn append(chain: &Chain, density: f64, mesh: &mut Mesh) {
         let is_tip = k + 1 == rings.len();
         let slope = slope(&rings, k);
         let start = mesh.positions.len() as u32;
-        let sides = if is_tip { before.map_or(ring.sides, |(_, sides)| sides) } else { ring.sides };
-        // A side branch is wider at its base, but never wider than what it grows from, which it starts in the middle of.
+        let sides = if is_tip {
+            before.map_or(ring.sides, |(_, sides)| sides)
+        } else {
+            ring.sides
+        };
+        // A side branch is wider at its base, but never wider than what it grows from, which it
+        // starts in the middle of.
         let radius = if is_tip {
             0.0
         } else if k == 0 {
@@ -98,11 +106,18 @@ pub(super) fn append(chain: &Chain, density: f64, mesh: &mut Mesh) {
             let outward = across * cos + tangent.cross(&across) * sin;
             let normal = (outward - tangent * slope).normalize();
             let at = ring.station.at.coords + outward * radius;
-            vertex(mesh, at, normal, [j as f64 / sides as f64, v], &ring.station);
+            vertex(
+                mesh,
+                at,
+                normal,
+                [j as f64 / sides as f64, v],
+                &ring.station,
+            );
         }
         if let Some((below, below_sides)) = before {
             if is_tip {
-                (0..sides as u32).for_each(|j| mesh.indices.extend([below + j, below + j + 1, start + j]));
+                (0..sides as u32)
+                    .for_each(|j| mesh.indices.extend([below + j, below + j + 1, start + j]));
             } else {
                 join(mesh, (below, below_sides), (start, sides));
             }
@@ -111,10 +126,13 @@ pub(super) fn append(chain: &Chain, density: f64, mesh: &mut Mesh) {
     }
 }
 
-/// `across`, square to `from`, turned by the least rotation that brings `from` to `to` (parallel transport).
+/// `across`, square to `from`, turned by the least rotation that brings `from` to `to` (parallel
+/// transport).
 fn carried(across: Vector3<f64>, from: Vector3<f64>, to: Vector3<f64>) -> Vector3<f64> {
     let turned = UnitQuaternion::rotation_between(&from, &to).map_or(across, |q| q * across);
-    (turned - to * turned.dot(&to)).try_normalize(1e-9).unwrap_or_else(|| square_to(to))
+    (turned - to * turned.dot(&to))
+        .try_normalize(1e-9)
+        .unwrap_or_else(|| square_to(to))
 }
 
 fn rings(chain: &Chain, density: f64) -> Vec<Ring> {
@@ -125,15 +143,29 @@ fn rings(chain: &Chain, density: f64) -> Vec<Ring> {
             let (station, tangent) = link.at(i as f64 / n as f64);
             let sides = sides_of(station.radius, density);
             let Some(next) = chain.links.get(k + 1).filter(|_| i == n) else {
-                out.push(Ring { tangent, sides, station });
+                out.push(Ring {
+                    tangent,
+                    sides,
+                    station,
+                });
                 continue;
             };
-            // Where two limbs meet at an angle the ring stands half way, or several one after the other.
+            // Where two limbs meet at an angle the ring stands half way, or several one after the
+            // other.
             let (joint, on) = (link.rings_to(next), next.at(0.0).1);
-            let turn = UnitQuaternion::rotation_between(&tangent, &on).unwrap_or_else(UnitQuaternion::identity);
+            let turn = UnitQuaternion::rotation_between(&tangent, &on)
+                .unwrap_or_else(UnitQuaternion::identity);
             for j in 0..joint {
-                let share = if joint == 1 { 0.5 } else { j as f64 / (joint - 1) as f64 };
-                out.push(Ring { tangent: turn.powf(share) * tangent, sides, station });
+                let share = if joint == 1 {
+                    0.5
+                } else {
+                    j as f64 / (joint - 1) as f64
+                };
+                out.push(Ring {
+                    tangent: turn.powf(share) * tangent,
+                    sides,
+                    station,
+                });
             }
         }
     }
@@ -142,9 +174,17 @@ fn rings(chain: &Chain, density: f64) -> Vec<Ring> {
 
 /// By how much the radius grows along the way, at ring `k`.
 fn slope(rings: &[Ring], k: usize) -> f64 {
-    let radius = |j: usize| if j + 1 == rings.len() { 0.0 } else { rings[j].station.radius };
+    let radius = |j: usize| {
+        if j + 1 == rings.len() {
+            0.0
+        } else {
+            rings[j].station.radius
+        }
+    };
     let (a, b) = (k.saturating_sub(1), (k + 1).min(rings.len() - 1));
-    let way: f64 = (a..b).map(|j| (rings[j + 1].station.at - rings[j].station.at).norm()).sum();
+    let way: f64 = (a..b)
+        .map(|j| (rings[j + 1].station.at - rings[j].station.at).norm())
+        .sum();
     ((radius(b) - radius(a)) / way.max(1e-9)).clamp(-2.0, 2.0)
 }
 
@@ -163,23 +203,37 @@ fn join(mesh: &mut Mesh, (below, m): (u32, usize), (above, n): (u32, usize)) {
     }
 }
 
-/// The end of the tube: under a trunk for whoever looks from below, of a branch inside what it grows from.
+/// The end of the tube: under a trunk for whoever looks from below, of a branch inside what it
+/// grows from.
 fn close_base(mesh: &mut Mesh, ring: &Ring, across: Vector3<f64>) {
     let first = mesh.positions.len() as u32;
     let third = ring.tangent.cross(&across);
     for j in 0..ring.sides {
         let (sin, cos) = (TAU * j as f64 / ring.sides as f64).sin_cos();
         let rim = ring.station.at.coords + (across * cos + third * sin) * ring.station.radius;
-        vertex(mesh, rim, -ring.tangent, [0.5 + 0.5 * cos, 0.5 + 0.5 * sin], &ring.station);
+        vertex(
+            mesh,
+            rim,
+            -ring.tangent,
+            [0.5 + 0.5 * cos, 0.5 + 0.5 * sin],
+            &ring.station,
+        );
     }
     for j in 1..ring.sides as u32 - 1 {
         mesh.indices.extend([first, first + j + 1, first + j]);
     }
 }
 
-fn vertex(mesh: &mut Mesh, at: Vector3<f64>, normal: Vector3<f64>, uv: [f64; 2], station: &Station) {
+fn vertex(
+    mesh: &mut Mesh,
+    at: Vector3<f64>,
+    normal: Vector3<f64>,
+    uv: [f64; 2],
+    station: &Station,
+) {
     mesh.positions.push([at.x as f32, at.y as f32, at.z as f32]);
-    mesh.normals.push([normal.x as f32, normal.y as f32, normal.z as f32]);
+    mesh.normals
+        .push([normal.x as f32, normal.y as f32, normal.z as f32]);
     mesh.uvs.push([uv[0] as f32, uv[1] as f32]);
     mesh.joints.push(station.riding.joints);
     mesh.weights.push(station.riding.weights);

@@ -1,4 +1,5 @@
-//! Twigs by self-similarity: small, turned copies of the tree's own parts along its branches and at their ends.
+//! Twigs by self-similarity: small, turned copies of the tree's own parts along its branches and at
+//! their ends.
 
 use super::chance::Chance;
 use super::curl::{Curve, square_to};
@@ -21,7 +22,8 @@ const TRIES: u32 = 5;
 /// Angle from twig to twig about their branch: the golden angle, in which buds stand.
 const GOLDEN: f64 = PI * 0.763_932_022_500_210_3;
 
-/// A place for a twig. The longest are taken first, so that a bound on their number leaves out the smallest everywhere.
+/// A place for a twig. The longest are taken first, so that a bound on their number leaves out the
+/// smallest everywhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Bud {
     reach_px: f64,
@@ -45,14 +47,26 @@ impl PartialOrd for Bud {
 }
 
 /// Adds twigs to the branches of `skeleton`, which are `grown`.
-pub(super) fn add(grown: &mut Vec<Grown>, skeleton: &Skeleton, room: Room, wood: &config::Wood, seed: u64) {
+pub(super) fn add(
+    grown: &mut Vec<Grown>,
+    skeleton: &Skeleton,
+    room: Room,
+    wood: &config::Wood,
+    seed: u64,
+) {
     let least_px = wood.twig_px * f64::from(skeleton.image_size.width) / 640.0;
     if least_px <= 0.0 || !least_px.is_finite() {
         return;
     }
     let habit = Habit::of(skeleton);
     let whole_px = habit.reach_px.first().copied().unwrap_or(0.0);
-    let maker = Maker { habit: &habit, least_px, longest_px: LONGEST * whole_px, curl: wood.curl, room };
+    let maker = Maker {
+        habit: &habit,
+        least_px,
+        longest_px: LONGEST * whole_px,
+        curl: wood.curl,
+        room,
+    };
     let mut buds = BinaryHeap::new();
     for (k, host) in grown.iter().enumerate() {
         let node = &skeleton.nodes[host.limb.node.index()];
@@ -90,9 +104,18 @@ struct Maker<'a> {
 }
 
 impl Maker<'_> {
-    /// Places for twigs along `limb` and at its end, with `beyond_px` of tree above it; where most of the tree, `whole_px`,
-    /// is still above, most places stay empty: in the shade of the crown twigs are shed.
-    fn buds(&self, limb: &Limb, host: usize, beyond_px: f64, whole_px: f64, seed: u64, into: &mut BinaryHeap<Bud>) {
+    /// Places for twigs along `limb` and at its end, with `beyond_px` of tree above it; where most
+    /// of the tree, `whole_px`, is still above, most places stay empty: in the shade of the crown
+    /// twigs are shed.
+    fn buds(
+        &self,
+        limb: &Limb,
+        host: usize,
+        beyond_px: f64,
+        whole_px: f64,
+        seed: u64,
+        into: &mut BinaryHeap<Bud>,
+    ) {
         let length_px = limb.length();
         if length_px + beyond_px < 2.0 * self.least_px {
             return;
@@ -101,11 +124,18 @@ impl Maker<'_> {
         let mut turn = chance.between(0.0, TAU);
         let mut way_px = 0.15 * length_px;
         let mut bud = |reach_px: f64, at: f64, turn: f64, k: u64| {
-            into.push(Bud { reach_px, host, at, turn, seed: Chance::part(seed, k) });
+            into.push(Bud {
+                reach_px,
+                host,
+                at,
+                turn,
+                seed: Chance::part(seed, k),
+            });
         };
         for k in 0.. {
             let above_px = length_px - way_px + beyond_px;
-            let reach_px = (self.habit.ratio(&mut chance) * above_px).min(self.longest_px * chance.between(0.7, 1.0));
+            let reach_px = (self.habit.ratio(&mut chance) * above_px)
+                .min(self.longest_px * chance.between(0.7, 1.0));
             way_px += (SPACING * reach_px).max(0.4 * self.least_px) * chance.between(0.5, 1.5);
             turn += GOLDEN + chance.between(-0.4, 0.4);
             let shaded = chance.share() < above_px / whole_px;
@@ -117,7 +147,9 @@ impl Maker<'_> {
             }
         }
         if beyond_px <= 0.0 {
-            let reach_px = (0.3 * length_px).min(self.longest_px).max(1.2 * self.least_px);
+            let reach_px = (0.3 * length_px)
+                .min(self.longest_px)
+                .max(1.2 * self.least_px);
             bud(reach_px, 1.0, turn, u64::MAX);
             bud(0.8 * reach_px, 1.0, turn + PI, u64::MAX - 1);
         }
@@ -126,9 +158,17 @@ impl Maker<'_> {
     /// Grows a twig from `bud` and gives how far the tree reaches beyond each of its pieces, px.
     fn grow(&self, bud: Bud, grown: &mut Vec<Grown>) -> Vec<f64> {
         let host = &grown[bud.host].limb;
-        let Some((a, b, s)) = host.between(bud.at) else { return Vec::new() };
-        let Some(along) = (b.at - a.at).try_normalize(1e-9) else { return Vec::new() };
-        let (from, riding, node) = (a.at + (b.at - a.at) * s, a.riding.towards(b.riding, s as f32), host.node);
+        let Some((a, b, s)) = host.between(bud.at) else {
+            return Vec::new();
+        };
+        let Some(along) = (b.at - a.at).try_normalize(1e-9) else {
+            return Vec::new();
+        };
+        let (from, riding, node) = (
+            a.at + (b.at - a.at) * s,
+            a.riding.towards(b.riding, s as f32),
+            host.node,
+        );
         let mut chance = Chance::new(bud.seed);
         let plain = bud.reach_px < 2.0 * self.least_px;
         let part = chance.one_of(&self.habit.parts).filter(|_| !plain);
@@ -140,17 +180,33 @@ impl Maker<'_> {
             let side = square_to(along);
             let out = side * cos + along.cross(&side) * sin;
             let straight = along * angle.cos() + out * angle.sin();
-            let Some(way) = (straight + Vector3::y() * (0.4 * self.habit.lift)).try_normalize(0.1) else { continue };
-            let turn = UnitQuaternion::rotation_between(&Vector3::y(), &way).unwrap_or_else(UnitQuaternion::identity);
+            let Some(way) = (straight + Vector3::y() * (0.4 * self.habit.lift)).try_normalize(0.1)
+            else {
+                continue;
+            };
+            let turn = UnitQuaternion::rotation_between(&Vector3::y(), &way)
+                .unwrap_or_else(UnitQuaternion::identity);
             let twig = self.placed(part, from, turn * roll, reach_px, way);
             if !twig.is_empty() {
-                return self.append(&twig, &Stem { bud, from, along, riding, node }, chance, grown);
+                return self.append(
+                    &twig,
+                    &Stem {
+                        bud,
+                        from,
+                        along,
+                        riding,
+                        node,
+                    },
+                    chance,
+                    grown,
+                );
             }
         }
         Vec::new()
     }
 
-    /// Ends of the twig's pieces with their parents; without those that are too short or outside, and what they carry.
+    /// Ends of the twig's pieces with their parents; without those that are too short or outside,
+    /// and what they carry.
     fn placed(
         &self,
         part: Option<&Part>,
@@ -162,7 +218,11 @@ impl Maker<'_> {
         let fits = |a: Point3<f64>, b: Point3<f64>| (self.room)(&a, &b);
         let Some(part) = part else {
             let to = from + way * reach_px;
-            return if reach_px >= self.least_px && fits(from, to) { vec![(None, to)] } else { Vec::new() };
+            return if reach_px >= self.least_px && fits(from, to) {
+                vec![(None, to)]
+            } else {
+                Vec::new()
+            };
         };
         let mut out: Vec<(Option<usize>, Point3<f64>)> = Vec::new();
         let mut place: Vec<Option<usize>> = Vec::new();
@@ -173,7 +233,8 @@ impl Maker<'_> {
                 Some(before) => before.map(|k| out[k].1),
             };
             let to = from + turn * piece.to * reach_px;
-            let kept = start.filter(|&start| fits(start, to) && (to - start).norm() >= self.least_px);
+            let kept =
+                start.filter(|&start| fits(start, to) && (to - start).norm() >= self.least_px);
             place.push(kept.map(|_| out.len()));
             if kept.is_some() {
                 out.push((before.flatten(), to));
@@ -195,18 +256,34 @@ impl Maker<'_> {
             let from = before.map_or(stem.from, |b| twig[b].1);
             let came = before.map_or(stem.along, |b| grown[first + b].limb.arrives());
             let along = (to - from).normalize();
-            let leaves = (along + came * (0.5 * along.dot(&came).max(0.0))).try_normalize(0.1).unwrap_or(along);
+            let leaves = (along + came * (0.5 * along.dot(&came).max(0.0)))
+                .try_normalize(0.1)
+                .unwrap_or(along);
             // Twigs turn up to the light.
-            let arrives = (along + Vector3::y() * (0.3 * self.habit.lift)).try_normalize(0.1).unwrap_or(along);
+            let arrives = (along + Vector3::y() * (0.3 * self.habit.lift))
+                .try_normalize(0.1)
+                .unwrap_or(along);
             let seed = Chance::part((chance.share() * 2f64.powi(53)) as u64, k as u64);
             let curve = Curve::new([from, to], leaves, arrives, self.curl, Chance::new(seed));
             let station = |i: u32| {
                 let at = curve.at(f64::from(i) / f64::from(PIECES));
-                Station { at, radius: 0.0, riding: stem.riding }
+                Station {
+                    at,
+                    radius: 0.0,
+                    riding: stem.riding,
+                }
             };
             let (parent, at) = before.map_or((stem.bud.host, stem.bud.at), |b| (first + b, 1.0));
             let stations = (0..=PIECES).map(station).collect();
-            grown.push(Grown { limb: Limb { node: stem.node, parent: Some(parent), twig: true, stations }, at });
+            grown.push(Grown {
+                limb: Limb {
+                    node: stem.node,
+                    parent: Some(parent),
+                    twig: true,
+                    stations,
+                },
+                at,
+            });
         }
         for (k, &(before, _)) in twig.iter().enumerate().rev() {
             let through = grown[first + k].limb.length() + reaches[k];

@@ -19,11 +19,22 @@ pub struct Node2d {
 
 /// The 2D skeleton T' of the paper. Node 0 is the foot, node k + 1 belongs to cluster k.
 ///
-/// A node is where its cluster's branch ends; where that is not known, at the centroid, folded as in the paper.
-pub fn build(hierarchy: &MotionHierarchy, outline: &Outline, settings: &config::Skeleton) -> Vec<Node2d> {
+/// A node is where its cluster's branch ends; where that is not known, at the centroid, folded as
+/// in the paper.
+pub fn build(
+    hierarchy: &MotionHierarchy,
+    outline: &Outline,
+    settings: &config::Skeleton,
+) -> Vec<Node2d> {
     let crown_u = hierarchy.clusters.first().map(|all| all.centroid_px[0]);
     let position_px = Foot::of(outline, crown_u).position_px;
-    let foot = Node2d { parent: None, level: 0, cluster: None, position_px, certainty: 0.0 };
+    let foot = Node2d {
+        parent: None,
+        level: 0,
+        cluster: None,
+        position_px,
+        certainty: 0.0,
+    };
     let mut nodes = vec![foot];
     for (k, c) in hierarchy.clusters.iter().enumerate() {
         nodes.push(Node2d {
@@ -38,13 +49,17 @@ pub fn build(hierarchy: &MotionHierarchy, outline: &Outline, settings: &config::
     for parent in nodes.iter().filter_map(|n| n.parent) {
         has_children[parent] = true;
     }
-    // x' <- x' + alpha (parent - x'), root to tip, with the parent already folded; tips stay, lest the tree shrinks.
+    // x' <- x' + alpha (parent - x'), root to tip, with the parent already folded; tips stay, lest
+    // the tree shrinks.
     for i in 1..nodes.len() {
         let at_centroid = hierarchy.clusters[i - 1].end_px.is_none();
         if let Some(parent) = nodes[i].parent.filter(|_| has_children[i] && at_centroid) {
             let towards = nodes[parent].position_px;
             let p = &mut nodes[i].position_px;
-            *p = [p[0] + settings.fold * (towards[0] - p[0]), p[1] + settings.fold * (towards[1] - p[1])];
+            *p = [
+                p[0] + settings.fold * (towards[0] - p[0]),
+                p[1] + settings.fold * (towards[1] - p[1]),
+            ];
         }
     }
     nodes
@@ -59,26 +74,40 @@ const FOOT_ROWS: f64 = 1.0 / 30.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Foot {
     pub position_px: [f64; 2],
-    /// Half the outline's width there, px: an upper bound of the trunk's radius, as outlines are drawn wide.
+    /// Half the outline's width there, px: an upper bound of the trunk's radius, as outlines are
+    /// drawn wide.
     pub half_width_px: f64,
 }
 
 impl Foot {
-    /// The foot of the tree in `outline`: the middle of its lowest rows, where these are no wider than a trunk can be.
-    /// Wider ones are more than trunk (a shadow on the ground that moved, a crown without a trunk, a whole picture):
-    /// there the foot is what lies below the middle of the crown, `crown_u` px from the left.
+    /// The foot of the tree in `outline`: the middle of its lowest rows, where these are no wider
+    /// than a trunk can be. Wider ones are more than trunk (a shadow on the ground that moved, a
+    /// crown without a trunk, a whole picture): there the foot is what lies below the middle of the
+    /// crown, `crown_u` px from the left.
     pub fn of(outline: &Outline, crown_u: Option<f64>) -> Self {
         let Some([left, top, right, bottom]) = outline.bounds_px() else {
-            return Self { position_px: [0.0, 0.0], half_width_px: 1.0 };
+            return Self {
+                position_px: [0.0, 0.0],
+                half_width_px: 1.0,
+            };
         };
         let height = f64::from(bottom - top + 1);
         let rows = (FOOT_ROWS * height) as u32;
         let width = outline.size.width as usize;
-        let lowest = || outline.mask.chunks_exact(width).take(bottom as usize + 1).skip((bottom - rows) as usize);
+        let lowest = || {
+            outline
+                .mask
+                .chunks_exact(width)
+                .take(bottom as usize + 1)
+                .skip((bottom - rows) as usize)
+        };
         let inside = |u: u32| lowest().any(|row| row[u as usize] != 0);
         let columns: Vec<u32> = (left..=right).filter(|&u| inside(u)).collect();
         let (Some(&first), Some(&last)) = (columns.first(), columns.last()) else {
-            return Self { position_px: [0.0, 0.0], half_width_px: 1.0 };
+            return Self {
+                position_px: [0.0, 0.0],
+                half_width_px: 1.0,
+            };
         };
         let half_width_px = f64::from(last - first + 1) / 2.0;
         let thickest_px = THICKEST_TRUNK * height / 2.0;
@@ -86,8 +115,13 @@ impl Foot {
         let u = if half_width_px <= thickest_px {
             middle
         } else {
-            crown_u.unwrap_or(middle).clamp(f64::from(first), f64::from(last))
+            crown_u
+                .unwrap_or(middle)
+                .clamp(f64::from(first), f64::from(last))
         };
-        Self { position_px: [u, f64::from(bottom)], half_width_px: half_width_px.min(thickest_px) }
+        Self {
+            position_px: [u, f64::from(bottom)],
+            half_width_px: half_width_px.min(thickest_px),
+        }
     }
 }

@@ -1,8 +1,8 @@
 //! Which of the things that a camera can do is asked of it.
 //!
-//! The size that was asked for first, then a rate that reaches the one asked for, then what is cheapest. Uncompressed
-//! pictures cost the processor least and show most, but over USB they crowd each other out: there they are taken up to
-//! [`USB_BYTES_PER_S`], and MJPEG beyond it.
+//! The size that was asked for first, then a rate that reaches the one asked for, then what is
+//! cheapest. Uncompressed pictures cost the processor least and show most, but over USB they crowd
+//! each other out: there they are taken up to [`USB_BYTES_PER_S`], and MJPEG beyond it.
 
 use crate::config::{self, CameraFormat};
 use crate::model::{PixelFormat, Size};
@@ -59,14 +59,20 @@ impl Wish {
             CameraFormat::Grey => Some(PixelFormat::Grey),
             CameraFormat::Rgb24 => Some(PixelFormat::Rgb24),
         };
-        Self { format, size: Size::new(config.width, config.height), rate_hz: f64::from(config.rate_hz) }
+        Self {
+            format,
+            size: Size::new(config.width, config.height),
+            rate_hz: f64::from(config.rate_hz),
+        }
     }
 
     /// Whether this is what was asked for. A rate that is not told is none that was substituted.
     pub(super) fn is_met_by(&self, granted: &Granted) -> bool {
         self.format.is_none_or(|f| f == granted.format)
             && self.size == granted.size
-            && granted.rate_hz.is_none_or(|hz| is_same_rate(hz, self.rate_hz))
+            && granted
+                .rate_hz
+                .is_none_or(|hz| is_same_rate(hz, self.rate_hz))
     }
 }
 
@@ -80,7 +86,8 @@ impl std::fmt::Display for Wish {
 impl std::fmt::Display for Granted {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{} {}", self.format, self.size)?;
-        self.rate_hz.map_or(Ok(()), |hz| write!(f, " @ {}", rate(hz)))
+        self.rate_hz
+            .map_or(Ok(()), |hz| write!(f, " @ {}", rate(hz)))
     }
 }
 
@@ -97,12 +104,17 @@ pub(super) fn rate(hz: f64) -> f64 {
 pub(super) fn choose(modes: &[Mode], wish: &Wish, usb: bool) -> Option<(Granted, String)> {
     let of_format = |m: &&Mode| wish.format.is_none_or(|f| f == m.format);
     let nearest = |all: &[Granted]| {
-        all.iter()
-            .copied()
-            .min_by(|a, b| cost(a, wish, usb).partial_cmp(&cost(b, wish, usb)).unwrap_or(std::cmp::Ordering::Equal))
+        all.iter().copied().min_by(|a, b| {
+            cost(a, wish, usb)
+                .partial_cmp(&cost(b, wish, usb))
+                .unwrap_or(std::cmp::Ordering::Equal)
+        })
     };
-    let with_rate =
-        |m: &Mode| Granted { format: m.format, size: m.size, rate_hz: nearest_rate(&m.rates_hz, wish.rate_hz) };
+    let with_rate = |m: &Mode| Granted {
+        format: m.format,
+        size: m.size,
+        rate_hz: nearest_rate(&m.rates_hz, wish.rate_hz),
+    };
     let fitting: Vec<Granted> = modes.iter().filter(of_format).map(with_rate).collect();
     let all: Vec<Granted> = modes.iter().map(with_rate).collect();
     let chosen = nearest(&fitting).or_else(|| nearest(&all))?;
@@ -111,8 +123,13 @@ pub(super) fn choose(modes: &[Mode], wish: &Wish, usb: bool) -> Option<(Granted,
 
 /// The slowest rate that reaches the one asked for, else the fastest.
 fn nearest_rate(rates_hz: &[f64], asked_hz: f64) -> Option<f64> {
-    let reaching = rates_hz.iter().copied().filter(|hz| *hz >= asked_hz * (1.0 - SAME_RATE));
-    reaching.min_by(f64::total_cmp).or_else(|| rates_hz.iter().copied().max_by(f64::total_cmp))
+    let reaching = rates_hz
+        .iter()
+        .copied()
+        .filter(|hz| *hz >= asked_hz * (1.0 - SAME_RATE));
+    reaching
+        .min_by(f64::total_cmp)
+        .or_else(|| rates_hz.iter().copied().max_by(f64::total_cmp))
 }
 
 /// Smaller is better, from the first entry to the last.
@@ -128,13 +145,23 @@ fn cost(g: &Granted, wish: &Wish, usb: bool) -> (f64, f64, bool, usize) {
     } else {
         wish.rate_hz / hz.max(1e-3)
     };
-    let order = PREFERENCE.iter().position(|f| *f == g.format).unwrap_or(PREFERENCE.len());
-    (size, rate, usb && bytes_per_s(g, wish).is_some_and(|b| b > USB_BYTES_PER_S), order)
+    let order = PREFERENCE
+        .iter()
+        .position(|f| *f == g.format)
+        .unwrap_or(PREFERENCE.len());
+    (
+        size,
+        rate,
+        usb && bytes_per_s(g, wish).is_some_and(|b| b > USB_BYTES_PER_S),
+        order,
+    )
 }
 
 /// `None` for compressed pictures.
 fn bytes_per_s(g: &Granted, wish: &Wish) -> Option<f64> {
-    g.format.picture_bytes(g.size).map(|bytes| bytes as f64 * g.rate_hz.unwrap_or(wish.rate_hz))
+    g.format
+        .picture_bytes(g.size)
+        .map(|bytes| bytes as f64 * g.rate_hz.unwrap_or(wish.rate_hz))
 }
 
 fn why(g: &Granted, wish: &Wish, usb: bool) -> String {
@@ -144,15 +171,23 @@ fn why(g: &Granted, wish: &Wish, usb: bool) -> String {
     }
     match g.rate_hz {
         Some(hz) if is_same_rate(hz, wish.rate_hz) => {}
-        Some(hz) if hz > wish.rate_hz => reasons.push(format!("it has no {} a second, only more", rate(wish.rate_hz))),
-        Some(_) => reasons.push(format!("the fastest at that size; {} a second were asked", rate(wish.rate_hz))),
+        Some(hz) if hz > wish.rate_hz => reasons.push(format!(
+            "it has no {} a second, only more",
+            rate(wish.rate_hz)
+        )),
+        Some(_) => reasons.push(format!(
+            "the fastest at that size; {} a second were asked",
+            rate(wish.rate_hz)
+        )),
         None => reasons.push("it does not tell its rates".into()),
     }
     let megabytes = bytes_per_s(g, wish).map(|b| b / 1e6);
     reasons.push(match (wish.format, megabytes) {
         (Some(f), _) if f == g.format => "the format that was asked for".into(),
         (Some(f), _) => format!("it has no {f}"),
-        (None, None) => "compressed, as uncompressed it is not to be had or too much for USB".into(),
+        (None, None) => {
+            "compressed, as uncompressed it is not to be had or too much for USB".into()
+        }
         (None, Some(mb)) if usb && mb * 1e6 > USB_BYTES_PER_S => {
             format!("uncompressed, {mb:.0} MB/s: much for USB, but there is no MJPEG")
         }
@@ -167,7 +202,11 @@ mod tests {
     use PixelFormat::{Grey, Mjpeg, Nv12, Yuyv};
 
     fn mode(format: PixelFormat, width: u32, height: u32, rates_hz: &[f64]) -> Mode {
-        Mode { format, size: Size::new(width, height), rates_hz: rates_hz.to_vec() }
+        Mode {
+            format,
+            size: Size::new(width, height),
+            rates_hz: rates_hz.to_vec(),
+        }
     }
 
     /// A usual webcam.
@@ -184,38 +223,133 @@ mod tests {
     fn size_then_rate_then_cost() {
         let slow_only = vec![mode(Yuyv, 1280, 720, &[10.0, 5.0])];
         let silent = vec![mode(Grey, 1280, 720, &[]), mode(Nv12, 1280, 720, &[])];
-        let both = vec![mode(Yuyv, 1280, 720, &[30.0]), mode(Mjpeg, 1280, 720, &[30.0])];
+        let both = vec![
+            mode(Yuyv, 1280, 720, &[30.0]),
+            mode(Mjpeg, 1280, 720, &[30.0]),
+        ];
         let fast = vec![mode(Mjpeg, 1280, 720, &[120.0, 60.0])];
         // Modes, format and size asked for, over USB, and what is chosen.
-        type Case = (&'static str, Vec<Mode>, Option<PixelFormat>, (u32, u32), bool, &'static str);
+        type Case = (
+            &'static str,
+            Vec<Mode>,
+            Option<PixelFormat>,
+            (u32, u32),
+            bool,
+            &'static str,
+        );
         let cases: [Case; 9] = [
-            ("the rate decides", webcam(), None, (1280, 720), true, "MJPG 1280x720 @ 30"),
-            ("18 MB/s are no burden", webcam(), None, (640, 480), true, "YUYV 640x480 @ 30"),
-            ("55 MB/s are", both.clone(), None, (1280, 720), true, "MJPG 1280x720 @ 30"),
-            ("but not on another bus", both, None, (1280, 720), false, "YUYV 1280x720 @ 30"),
-            ("asked for is asked for", webcam(), Some(Yuyv), (1280, 720), true, "YUYV 1280x720 @ 10"),
-            ("slow is better than nothing", slow_only, None, (1280, 720), true, "YUYV 1280x720 @ 10"),
-            ("no rates", silent, None, (1280, 720), false, "NV12 1280x720"),
-            ("no such size", webcam(), None, (1920, 1080), true, "MJPG 1280x720 @ 30"),
-            ("too fast is better than too slow", fast, None, (1280, 720), true, "MJPG 1280x720 @ 60"),
+            (
+                "the rate decides",
+                webcam(),
+                None,
+                (1280, 720),
+                true,
+                "MJPG 1280x720 @ 30",
+            ),
+            (
+                "18 MB/s are no burden",
+                webcam(),
+                None,
+                (640, 480),
+                true,
+                "YUYV 640x480 @ 30",
+            ),
+            (
+                "55 MB/s are",
+                both.clone(),
+                None,
+                (1280, 720),
+                true,
+                "MJPG 1280x720 @ 30",
+            ),
+            (
+                "but not on another bus",
+                both,
+                None,
+                (1280, 720),
+                false,
+                "YUYV 1280x720 @ 30",
+            ),
+            (
+                "asked for is asked for",
+                webcam(),
+                Some(Yuyv),
+                (1280, 720),
+                true,
+                "YUYV 1280x720 @ 10",
+            ),
+            (
+                "slow is better than nothing",
+                slow_only,
+                None,
+                (1280, 720),
+                true,
+                "YUYV 1280x720 @ 10",
+            ),
+            (
+                "no rates",
+                silent,
+                None,
+                (1280, 720),
+                false,
+                "NV12 1280x720",
+            ),
+            (
+                "no such size",
+                webcam(),
+                None,
+                (1920, 1080),
+                true,
+                "MJPG 1280x720 @ 30",
+            ),
+            (
+                "too fast is better than too slow",
+                fast,
+                None,
+                (1280, 720),
+                true,
+                "MJPG 1280x720 @ 60",
+            ),
         ];
         for (name, modes, format, (width, height), usb, expected) in cases {
-            let wish = Wish { format, size: Size::new(width, height), rate_hz: 30.0 };
+            let wish = Wish {
+                format,
+                size: Size::new(width, height),
+                rate_hz: 30.0,
+            };
             let (chosen, why) = choose(&modes, &wish, usb).expect(name);
             assert_eq!(chosen.to_string(), expected, "{name}");
             assert!(!why.is_empty());
         }
-        let wish = Wish { format: Some(Nv12), size: Size::new(640, 480), rate_hz: 30.0 };
+        let wish = Wish {
+            format: Some(Nv12),
+            size: Size::new(640, 480),
+            rate_hz: 30.0,
+        };
         assert_eq!(choose(&[], &wish, true), None);
         let (chosen, why) = choose(&webcam(), &wish, true).expect("something");
-        assert!(!wish.is_met_by(&chosen) && why.contains("no NV12"), "{chosen} {why}");
+        assert!(
+            !wish.is_met_by(&chosen) && why.contains("no NV12"),
+            "{chosen} {why}"
+        );
     }
 
     #[test]
     fn what_is_not_told_is_not_substituted() {
-        let wish = Wish { format: None, size: Size::new(640, 480), rate_hz: 30.0 };
-        let granted = |width, rate_hz| Granted { format: Yuyv, size: Size::new(width, 480), rate_hz };
-        assert!(wish.is_met_by(&granted(640, None)) && wish.is_met_by(&granted(640, Some(30000.0 / 1001.0))));
+        let wish = Wish {
+            format: None,
+            size: Size::new(640, 480),
+            rate_hz: 30.0,
+        };
+        let granted = |width, rate_hz| Granted {
+            format: Yuyv,
+            size: Size::new(width, 480),
+            rate_hz,
+        };
+        assert!(
+            wish.is_met_by(&granted(640, None))
+                && wish.is_met_by(&granted(640, Some(30000.0 / 1001.0)))
+        );
         assert!(!wish.is_met_by(&granted(640, Some(25.0))) && !wish.is_met_by(&granted(648, None)));
     }
 }

@@ -1,7 +1,8 @@
 //! The count and the time of a driver, as the rest of the program may rely on them: both only grow.
 //!
-//! A driver's clock is believed for as long as it can be true. Where it jumps, stands still or starts anew, the time that
-//! went by here, between two frames received, bridges the step, and the driver's clock is followed again from there on.
+//! A driver's clock is believed for as long as it can be true. Where it jumps, stands still or
+//! starts anew, the time that went by here, between two frames received, bridges the step, and the
+//! driver's clock is followed again from there on.
 
 use v4l::buffer::{Flags, Metadata};
 
@@ -33,13 +34,13 @@ impl ClockKind {
     }
 }
 
-/// A frame's time may differ by so much from what the time of its reception allows, s. Deliveries are late by a few
-/// frames; a clock that jumps usually does so by far more.
+/// A frame's time may differ by so much from what the time of its reception allows, s. Deliveries
+/// are late by a few frames; a clock that jumps usually does so by far more.
 const SLACK_S: f64 = 2.0;
 /// After so many frames without progress the clock counts as broken, not the frames.
 const STANDS_STILL: u32 = 5;
-/// A clock that begins beyond this, s, is counted from our own zero: 64 bits of nanoseconds end at 9.2e9 s, and a time
-/// that goes on past them would stand still in every file that counts so.
+/// A clock that begins beyond this, s, is counted from our own zero: 64 bits of nanoseconds end at
+/// 9.2e9 s, and a time that goes on past them would stand still in every file that counts so.
 const FAR_S: f64 = 4e9;
 /// Least step where the times of reception cannot tell two frames apart, s.
 const LEAST_STEP_S: f64 = 1e-4;
@@ -55,7 +56,8 @@ pub(super) struct Clock {
     last: Option<Last>,
     /// From the driver's time to ours, s.
     offset_s: f64,
-    /// Least time from a frame's own time to its reception since the last bridge, s; its zero means nothing.
+    /// Least time from a frame's own time to its reception since the last bridge, s; its zero means
+    /// nothing.
     least_delay_s: f64,
     stood_still: u32,
     first_still_raw_s: f64,
@@ -91,13 +93,15 @@ impl Clock {
         self.kind
     }
 
-    /// The camera was opened anew: it counts from the beginning, and its clock may have started again.
+    /// The camera was opened anew: it counts from the beginning, and its clock may have started
+    /// again.
     pub(super) fn returned(&mut self) {
         (self.raw_sequence, self.returned) = (None, true);
     }
 
-    /// Number and time of a frame that was received at `received_s` by any clock that only grows; `None` for a frame that
-    /// is not later than the one before. No number where the driver does not count or starts counting anew.
+    /// Number and time of a frame that was received at `received_s` by any clock that only grows;
+    /// `None` for a frame that is not later than the one before. No number where the driver does
+    /// not count or starts counting anew.
     pub(super) fn take(&mut self, meta: &Metadata, received_s: f64) -> Option<(Option<u64>, f64)> {
         let raw_s = meta.timestamp.sec as f64 + meta.timestamp.usec as f64 * 1e-6;
         let sequence = self.number(meta.sequence);
@@ -110,7 +114,11 @@ impl Clock {
             self.kind = kind;
         }
         let time_s = self.time(raw_s, received_s)?;
-        self.last = Some(Last { raw_s, time_s, received_s });
+        self.last = Some(Last {
+            raw_s,
+            time_s,
+            received_s,
+        });
         self.least_delay_s = self.least_delay_s.min(received_s - raw_s);
         (self.stood_still, self.returned) = (0, false);
         Some((sequence, time_s))
@@ -126,24 +134,34 @@ impl Clock {
         let step = before.map_or(0, |before| raw.wrapping_sub(before));
         let known = (1..=u32::MAX / 2).contains(&step);
         let first = before.is_none() && self.last.is_none();
-        self.sequence += if known { u64::from(step) } else { u64::from(!first) };
+        self.sequence += if known {
+            u64::from(step)
+        } else {
+            u64::from(!first)
+        };
         (known || first).then_some(self.sequence)
     }
 
     fn time(&mut self, raw_s: f64, received_s: f64) -> Option<f64> {
         let Some(last) = self.last else {
-            self.offset_s = if raw_s.abs() < FAR_S { 0.0 } else { received_s - raw_s };
+            self.offset_s = if raw_s.abs() < FAR_S {
+                0.0
+            } else {
+                received_s - raw_s
+            };
             return Some(raw_s + self.offset_s);
         };
         let (by_driver_s, by_us_s) = (raw_s - last.raw_s, received_s - last.received_s);
         if self.kind == ClockKind::Received {
             return Some(last.time_s + by_us_s.max(LEAST_STEP_S));
         }
-        // A frame that came late leaves the next one, which comes in time, a longer step by its own clock than by ours.
+        // A frame that came late leaves the next one, which comes in time, a longer step by its own
+        // clock than by ours.
         let came_late_s = (last.received_s - last.raw_s - self.least_delay_s).max(0.0);
         let from_the_future = by_driver_s > by_us_s + came_late_s + SLACK_S;
         let another_clock = self.returned
-            && (self.kind != ClockKind::Monotonic || (by_driver_s - by_us_s).abs() > came_late_s + SLACK_S);
+            && (self.kind != ClockKind::Monotonic
+                || (by_driver_s - by_us_s).abs() > came_late_s + SLACK_S);
         if from_the_future || another_clock || by_driver_s < -SLACK_S {
             return Some(self.bridge(last, raw_s, received_s));
         }
@@ -165,7 +183,8 @@ impl Clock {
         Some(self.bridge(last, raw_s, received_s))
     }
 
-    /// The step from the last frame by the times of reception; the driver's clock is followed again from here.
+    /// The step from the last frame by the times of reception; the driver's clock is followed again
+    /// from here.
     fn bridge(&mut self, last: Last, raw_s: f64, received_s: f64) -> f64 {
         let time_s = last.time_s + (received_s - last.received_s).max(LEAST_STEP_S);
         (self.offset_s, self.least_delay_s) = (time_s - raw_s, received_s - raw_s);
@@ -180,8 +199,14 @@ mod tests {
 
     fn meta(sequence: u32, time_s: f64, flags: Flags) -> Metadata {
         let whole = time_s.floor();
-        let timestamp = v4l::timestamp::Timestamp::new(whole as i64, ((time_s - whole) * 1e6).round() as i64);
-        Metadata { sequence, timestamp, flags, ..Metadata::default() }
+        let timestamp =
+            v4l::timestamp::Timestamp::new(whole as i64, ((time_s - whole) * 1e6).round() as i64);
+        Metadata {
+            sequence,
+            timestamp,
+            flags,
+            ..Metadata::default()
+        }
     }
 
     fn monotonic(sequence: u32, time_s: f64) -> Metadata {
@@ -191,7 +216,10 @@ mod tests {
     fn numbers(raw: &[u32]) -> Vec<Option<u64>> {
         let mut clock = Clock::new(true);
         let at = |i: usize| 1.0 + i as f64 / 30.0;
-        raw.iter().enumerate().map(|(i, &n)| clock.take(&monotonic(n, at(i)), at(i)).expect("later").0).collect()
+        raw.iter()
+            .enumerate()
+            .map(|(i, &n)| clock.take(&monotonic(n, at(i)), at(i)).expect("later").0)
+            .collect()
     }
 
     #[test]
@@ -200,7 +228,10 @@ mod tests {
         let top = u64::from(u32::MAX) - 1;
         let numbers_at_top = numbers(&[u32::MAX - 1, u32::MAX, 0, 2]);
         let first = numbers_at_top[0].expect("a number");
-        assert_eq!(numbers_at_top, [first, first + 1, first + 2, first + 4].map(Some));
+        assert_eq!(
+            numbers_at_top,
+            [first, first + 1, first + 2, first + 4].map(Some)
+        );
         assert!(top >= first);
         assert_eq!(numbers(&[7, 3, 4, 6]), [Some(0), None, Some(2), Some(4)]);
         assert_eq!(numbers(&[5, 5, 5, 6]), [Some(0), None, None, Some(3)]);
@@ -211,7 +242,11 @@ mod tests {
     #[test]
     fn a_frame_that_is_not_later_is_left_out() {
         let mut clock = Clock::new(true);
-        let mut at = |n, s: f64, received_s| clock.take(&monotonic(n, s), received_s).map(|(_, time_s)| time_s);
+        let mut at = |n, s: f64, received_s| {
+            clock
+                .take(&monotonic(n, s), received_s)
+                .map(|(_, time_s)| time_s)
+        };
         assert_eq!(at(1, 50.0, 0.0), Some(50.0));
         assert_eq!(at(2, 50.0, 0.03), None);
         assert_eq!(at(3, 49.5, 0.06), None);
@@ -222,13 +257,18 @@ mod tests {
     fn check(name: &str, flags: Flags, frames: &[(f64, f64, f64)], kind: ClockKind) {
         let mut clock = Clock::new(false);
         for (i, &(raw_ms, received_ms, expected_ms)) in frames.iter().enumerate() {
-            let taken = clock.take(&meta(0, raw_ms / 1e3, flags), received_ms / 1e3).map(|(_, time_s)| time_s * 1e3);
+            let taken = clock
+                .take(&meta(0, raw_ms / 1e3, flags), received_ms / 1e3)
+                .map(|(_, time_s)| time_s * 1e3);
             let good = if expected_ms.is_nan() {
                 taken.is_none()
             } else {
                 taken.is_some_and(|t| (t - expected_ms).abs() < 0.1)
             };
-            assert!(good, "{name}, frame {i}: {taken:?} instead of {expected_ms}");
+            assert!(
+                good,
+                "{name}, frame {i}: {taken:?} instead of {expected_ms}"
+            );
         }
         assert_eq!(clock.kind(), kind, "{name}");
     }
@@ -237,8 +277,14 @@ mod tests {
     fn a_clock_is_followed_for_as_long_as_it_can_be_true() {
         let gone = f64::NAN;
         let monotonic = Flags::TIMESTAMP_MONOTONIC;
-        // Half a minute of standstill here, then what waited in the buffers, then a picture in time.
-        let late = [(0.0, 1.0, 0.0), (33.0, 30_000.0, 33.0), (66.0, 30_000.0, 66.0), (30_033.0, 30_034.0, 30_033.0)];
+        // Half a minute of standstill here, then what waited in the buffers, then a picture in
+        // time.
+        let late = [
+            (0.0, 1.0, 0.0),
+            (33.0, 30_000.0, 33.0),
+            (66.0, 30_000.0, 66.0),
+            (30_033.0, 30_034.0, 30_033.0),
+        ];
         check("late deliveries", monotonic, &late, ClockKind::Monotonic);
         let wrapped = [
             (5e6, 0.0, 5e6),
@@ -249,7 +295,12 @@ mod tests {
         check("a wrap", monotonic, &wrapped, ClockKind::Monotonic);
         // Milliseconds before 64 bits of nanoseconds end, and after it.
         let end = 9_223_372_036_000.0;
-        let far = [(end, 5.0, 5.0), (end + 40.0, 45.0, 45.0), (-end, 90.0, 90.0), (-end + 40.0, 130.0, 130.0)];
+        let far = [
+            (end, 5.0, 5.0),
+            (end + 40.0, 45.0, 45.0),
+            (-end, 90.0, 90.0),
+            (-end + 40.0, 130.0, 130.0),
+        ];
         check("a wrap of 64 bits", monotonic, &far, ClockKind::Monotonic);
         check(
             "a jump ahead",
@@ -258,12 +309,24 @@ mod tests {
             ClockKind::Monotonic,
         );
         // Whoever feeds a loopback device faster than it was filmed has times of their own.
-        let fast: Vec<_> = (0..2000).map(|i| (33.0 * f64::from(i), f64::from(i), 33.0 * f64::from(i))).collect();
-        check("a fast feeder", Flags::TIMESTAMP_COPY, &fast, ClockKind::Copied);
+        let fast: Vec<_> = (0..2000)
+            .map(|i| (33.0 * f64::from(i), f64::from(i), 33.0 * f64::from(i)))
+            .collect();
+        check(
+            "a fast feeder",
+            Flags::TIMESTAMP_COPY,
+            &fast,
+            ClockKind::Copied,
+        );
         let mut still = vec![(0.0, 0.0, 0.0)];
         still.extend((1..5).map(|i| (0.0, 33.0 * f64::from(i), gone)));
         still.extend((5..9).map(|i| (0.0, 33.0 * f64::from(i), 33.0 * f64::from(i))));
-        check("a clock that stands", Flags::TIMESTAMP_UNKNOWN, &still, ClockKind::Received);
+        check(
+            "a clock that stands",
+            Flags::TIMESTAMP_UNKNOWN,
+            &still,
+            ClockKind::Received,
+        );
     }
 
     #[test]
@@ -272,18 +335,32 @@ mod tests {
         let cases = [
             ("the clock went on", Flags::TIMESTAMP_MONOTONIC, 110.0),
             ("it started anew", Flags::TIMESTAMP_MONOTONIC, 0.5),
-            ("anew, and beyond what it was", Flags::TIMESTAMP_MONOTONIC, 101.0),
+            (
+                "anew, and beyond what it was",
+                Flags::TIMESTAMP_MONOTONIC,
+                101.0,
+            ),
             ("a copied clock", Flags::TIMESTAMP_COPY, 100.02),
         ];
         for (name, flags, back_raw_s) in cases {
             let mut clock = Clock::new(true);
             assert!(clock.take(&meta(70, 100.0, flags), 100.0).is_some());
             clock.returned();
-            let (number, time_s) = clock.take(&meta(0, back_raw_s, flags), 110.0).expect("a frame");
+            let (number, time_s) = clock
+                .take(&meta(0, back_raw_s, flags), 110.0)
+                .expect("a frame");
             assert!((time_s - 110.0).abs() < 1e-3, "{name}: {time_s}");
-            assert_eq!(number, None, "{name}: nobody knows how many it would have been");
-            let (number, later_s) = clock.take(&meta(1, back_raw_s + 0.04, flags), 110.03).expect("a frame");
-            assert!((later_s - 110.04).abs() < 1e-3 && number.is_some(), "{name}: {later_s} {number:?}");
+            assert_eq!(
+                number, None,
+                "{name}: nobody knows how many it would have been"
+            );
+            let (number, later_s) = clock
+                .take(&meta(1, back_raw_s + 0.04, flags), 110.03)
+                .expect("a frame");
+            assert!(
+                (later_s - 110.04).abs() < 1e-3 && number.is_some(),
+                "{name}: {later_s} {number:?}"
+            );
         }
     }
 

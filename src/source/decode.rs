@@ -3,8 +3,8 @@
 use crate::model::{Luma, PixelFormat, RawFrame, Rgb, Size};
 use turbojpeg::{Decompressor, Image, ScalingFactor};
 
-/// Some cheap cameras leave a few filling bytes before the end mark of every picture. They are harmless; more of them
-/// are what is left when a damaged picture has been read out of step.
+/// Some cheap cameras leave a few filling bytes before the end mark of every picture. They are
+/// harmless; more of them are what is left when a damaged picture has been read out of step.
 const FILLING_BYTES: u32 = 8;
 
 /// Why a frame could not be decoded; the source goes on, the next frame may be whole.
@@ -24,7 +24,8 @@ pub enum DecodeError {
 /// Decodes frame after frame and keeps what it needs for that.
 pub struct Decoder {
     jpeg: Decompressor,
-    /// Sizes to which a JPEG can be decoded at once, as shares of the full one, largest first, none above 1.
+    /// Sizes to which a JPEG can be decoded at once, as shares of the full one, largest first, none
+    /// above 1.
     scales: Vec<ScalingFactor>,
 }
 
@@ -39,31 +40,53 @@ impl Decoder {
         Ok(Self { jpeg, scales })
     }
 
-    /// Decodes the brightness into `into`. An empty `into` takes the frame's size, and is not allocated again as long
-    /// as that stays; after an error its content means nothing.
+    /// Decodes the brightness into `into`. An empty `into` takes the frame's size, and is not
+    /// allocated again as long as that stays; after an error its content means nothing.
     ///
     /// # Errors
     /// The frame is damaged, or its size is not that of `into` or not what the source said.
     pub fn luma(&mut self, raw: &RawFrame, into: &mut Luma) -> Result<(), DecodeError> {
         self.check(raw)?;
         if !into.pixels.is_empty() && into.size != raw.size {
-            return Err(DecodeError::SizeChanged { expected: into.size, found: raw.size });
+            return Err(DecodeError::SizeChanged {
+                expected: into.size,
+                found: raw.size,
+            });
         }
         into.size = raw.size;
         into.pixels.resize(raw.size.area(), 0);
         let pixels = into.pixels.as_mut_slice();
         match raw.format {
             PixelFormat::Mjpeg => {
-                self.decompress(raw, ScalingFactor::ONE, raw.size, turbojpeg::PixelFormat::GRAY, pixels)?;
+                self.decompress(
+                    raw,
+                    ScalingFactor::ONE,
+                    raw.size,
+                    turbojpeg::PixelFormat::GRAY,
+                    pixels,
+                )?;
             }
-            PixelFormat::Yuyv => pixels.iter_mut().zip(raw.bytes.chunks_exact(2)).for_each(|(y, pair)| *y = pair[0]),
-            PixelFormat::Uyvy => pixels.iter_mut().zip(raw.bytes.chunks_exact(2)).for_each(|(y, pair)| *y = pair[1]),
-            PixelFormat::Grey | PixelFormat::Nv12 => pixels.copy_from_slice(&raw.bytes[..raw.size.area()]),
-            PixelFormat::Rgb24 => pixels.iter_mut().zip(raw.bytes.chunks_exact(3)).for_each(|(y, p)| {
-                // BT.601, the weights that JPEG and YUYV are made with.
-                let [r, g, b] = [p[0], p[1], p[2]].map(u32::from);
-                *y = ((77 * r + 150 * g + 29 * b + 128) >> 8) as u8;
-            }),
+            PixelFormat::Yuyv => pixels
+                .iter_mut()
+                .zip(raw.bytes.chunks_exact(2))
+                .for_each(|(y, pair)| *y = pair[0]),
+            PixelFormat::Uyvy => pixels
+                .iter_mut()
+                .zip(raw.bytes.chunks_exact(2))
+                .for_each(|(y, pair)| *y = pair[1]),
+            PixelFormat::Grey | PixelFormat::Nv12 => {
+                pixels.copy_from_slice(&raw.bytes[..raw.size.area()])
+            }
+            PixelFormat::Rgb24 => {
+                pixels
+                    .iter_mut()
+                    .zip(raw.bytes.chunks_exact(3))
+                    .for_each(|(y, p)| {
+                        // BT.601, the weights that JPEG and YUYV are made with.
+                        let [r, g, b] = [p[0], p[1], p[2]].map(u32::from);
+                        *y = ((77 * r + 150 * g + 29 * b + 128) >> 8) as u8;
+                    })
+            }
         }
         Ok(())
     }
@@ -78,11 +101,27 @@ impl Decoder {
         if raw.format != PixelFormat::Mjpeg {
             return Ok(thin_out(raw.size, max_width, colour_of(raw)));
         }
-        let fitting = self.scales.iter().find(|s| s.scale(raw.size.width as usize) <= max_width as usize);
-        let scale = fitting.or(self.scales.last()).copied().unwrap_or(ScalingFactor::ONE);
-        let [width, height] = [raw.size.width, raw.size.height].map(|side| scale.scale(side as usize) as u32);
-        let mut rgb = Rgb { size: Size::new(width, height), pixels: vec![0; 3 * Size::new(width, height).area()] };
-        self.decompress(raw, scale, rgb.size, turbojpeg::PixelFormat::RGB, &mut rgb.pixels)?;
+        let fitting = self
+            .scales
+            .iter()
+            .find(|s| s.scale(raw.size.width as usize) <= max_width as usize);
+        let scale = fitting
+            .or(self.scales.last())
+            .copied()
+            .unwrap_or(ScalingFactor::ONE);
+        let [width, height] =
+            [raw.size.width, raw.size.height].map(|side| scale.scale(side as usize) as u32);
+        let mut rgb = Rgb {
+            size: Size::new(width, height),
+            pixels: vec![0; 3 * Size::new(width, height).area()],
+        };
+        self.decompress(
+            raw,
+            scale,
+            rgb.size,
+            turbojpeg::PixelFormat::RGB,
+            &mut rgb.pixels,
+        )?;
         if width <= max_width {
             return Ok(rgb);
         }
@@ -93,11 +132,17 @@ impl Decoder {
     /// Makes sure that the frame has the size that it says.
     fn check(&mut self, raw: &RawFrame) -> Result<(), DecodeError> {
         let Some(must) = raw.format.picture_bytes(raw.size) else {
-            let header = self.jpeg.read_header(&raw.bytes).map_err(|e| self.damaged(e.to_string()))?;
+            let header = self
+                .jpeg
+                .read_header(&raw.bytes)
+                .map_err(|e| self.damaged(e.to_string()))?;
             let found = Size::new(header.width as u32, header.height as u32);
             if found != raw.size {
                 self.renew()?;
-                return Err(DecodeError::SizeChanged { expected: raw.size, found });
+                return Err(DecodeError::SizeChanged {
+                    expected: raw.size,
+                    found,
+                });
             }
             return Ok(());
         };
@@ -119,9 +164,19 @@ impl Decoder {
         pixels: &mut [u8],
     ) -> Result<(), DecodeError> {
         let (width, height) = (size.width as usize, size.height as usize);
-        let output = Image { pixels, width, pitch: width * format.size(), height, format };
-        let done = self.jpeg.set_scaling_factor(scale).and_then(|()| self.jpeg.decompress(&raw.bytes, output));
-        // The library goes on after damage, fills the rest with grey and warns; the crate makes that an error.
+        let output = Image {
+            pixels,
+            width,
+            pitch: width * format.size(),
+            height,
+            format,
+        };
+        let done = self
+            .jpeg
+            .set_scaling_factor(scale)
+            .and_then(|()| self.jpeg.decompress(&raw.bytes, output));
+        // The library goes on after damage, fills the rest with grey and warns; the crate makes
+        // that an error.
         match done.map_err(|e| e.to_string()) {
             Err(what) if !is_filling(&what) => Err(self.damaged(what)),
             _ => Ok(()),
@@ -132,8 +187,8 @@ impl Decoder {
         self.renew().err().unwrap_or(DecodeError::Damaged { what })
     }
 
-    /// Takes a new JPEG decoder: the old one keeps the Huffman tables of a damaged picture, and would read every later
-    /// one with them whose camera leaves its tables out.
+    /// Takes a new JPEG decoder: the old one keeps the Huffman tables of a damaged picture, and
+    /// would read every later one with them whose camera leaves its tables out.
     fn renew(&mut self) -> Result<(), DecodeError> {
         self.jpeg = new_jpeg()?;
         Ok(())
@@ -141,12 +196,17 @@ impl Decoder {
 }
 
 fn new_jpeg() -> Result<Decompressor, DecodeError> {
-    Decompressor::new().map_err(|e| DecodeError::Unavailable { what: e.to_string() })
+    Decompressor::new().map_err(|e| DecodeError::Unavailable {
+        what: e.to_string(),
+    })
 }
 
-/// Whether the library only complains about a few bytes before the end mark, after the whole picture.
+/// Whether the library only complains about a few bytes before the end mark, after the whole
+/// picture.
 fn is_filling(what: &str) -> bool {
-    let Some((before, mark)) = what.split_once(" extraneous bytes before marker ") else { return false };
+    let Some((before, mark)) = what.split_once(" extraneous bytes before marker ") else {
+        return false;
+    };
     let count = before.rsplit(' ').next().and_then(|n| n.parse().ok());
     mark.starts_with("0xd9") && count.is_some_and(|n: u32| n <= FILLING_BYTES)
 }
@@ -161,7 +221,10 @@ fn thin_out(size: Size, max_width: u32, colour: impl Fn(u32, u32) -> [u8; 3]) ->
             pixels.extend_from_slice(&colour(u, v));
         }
     }
-    Rgb { size: small, pixels }
+    Rgb {
+        size: small,
+        pixels,
+    }
 }
 
 /// Colour of a pixel of a frame that is not compressed.
@@ -172,12 +235,22 @@ fn colour_of(raw: &RawFrame) -> impl Fn(u32, u32) -> [u8; 3] {
         let i = v as usize * width + u as usize;
         match format {
             PixelFormat::Rgb24 => [bytes[3 * i], bytes[3 * i + 1], bytes[3 * i + 2]],
-            // A pair of pixels shares U and V. An odd width does not occur: source and ffmpeg see to it.
-            PixelFormat::Yuyv => rgb_of(bytes[2 * i], bytes.get(4 * (i / 2) + 1), bytes.get(4 * (i / 2) + 3)),
-            PixelFormat::Uyvy => rgb_of(bytes[2 * i + 1], bytes.get(4 * (i / 2)), bytes.get(4 * (i / 2) + 2)),
+            // A pair of pixels shares U and V. An odd width does not occur: source and ffmpeg see
+            // to it.
+            PixelFormat::Yuyv => rgb_of(
+                bytes[2 * i],
+                bytes.get(4 * (i / 2) + 1),
+                bytes.get(4 * (i / 2) + 3),
+            ),
+            PixelFormat::Uyvy => rgb_of(
+                bytes[2 * i + 1],
+                bytes.get(4 * (i / 2)),
+                bytes.get(4 * (i / 2) + 2),
+            ),
             PixelFormat::Nv12 => {
                 // Two by two pixels share theirs; a last odd row or column has none.
-                let pair = height * width + (v as usize / 2) * 2 * (width / 2) + 2 * (u as usize / 2);
+                let pair =
+                    height * width + (v as usize / 2) * 2 * (width / 2) + 2 * (u as usize / 2);
                 rgb_of(bytes[i], bytes.get(pair), bytes.get(pair + 1))
             }
             PixelFormat::Grey | PixelFormat::Mjpeg => [bytes[i]; 3],

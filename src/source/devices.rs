@@ -1,4 +1,5 @@
-//! Cameras that are plugged in: which they are, what they can do, and what would be filmed with them.
+//! Cameras that are plugged in: which they are, what they can do, and what would be filmed with
+//! them.
 
 use super::SourceError;
 use super::choice::Mode;
@@ -13,7 +14,8 @@ pub struct Device {
     pub path: PathBuf,
     /// What the driver calls it.
     pub name: String,
-    /// Driver and bus where they can be asked, e.g. `uvcvideo at usb-0000:00:14.0-1`, else what is known.
+    /// Driver and bus where they can be asked, e.g. `uvcvideo at usb-0000:00:14.0-1`, else what is
+    /// known.
     pub description: String,
     /// Which it is, whatever its number; `None` where the system does not tell.
     pub identity: Option<Identity>,
@@ -29,7 +31,8 @@ pub struct Device {
     pub closed: Option<String>,
 }
 
-/// All video devices, by number, and what would be filmed with the default settings; none is no error.
+/// All video devices, by number, and what would be filmed with the default settings; none is no
+/// error.
 pub fn list() -> Vec<Device> {
     list_for(&config::Camera::default(), &Places::default())
 }
@@ -39,7 +42,9 @@ pub fn list_for(config: &config::Camera, places: &Places) -> Vec<Device> {
     let device = |node: Node| {
         let link = link(places, &node.path);
         let (path, identity) = (node.path, node.identity);
-        let port = identity.as_ref().map_or_else(|| "nothing is known of it".to_owned(), |i| i.port.clone());
+        let port = identity
+            .as_ref()
+            .map_or_else(|| "nothing is known of it".to_owned(), |i| i.port.clone());
         match prospect(&path, config) {
             Ok(p) => {
                 let kind = if p.films { "" } else { ", does not film" };
@@ -56,7 +61,11 @@ pub fn list_for(config: &config::Camera, places: &Places) -> Vec<Device> {
                 }
             }
             Err(e) => Device {
-                name: if node.name.is_empty() { "?".into() } else { node.name },
+                name: if node.name.is_empty() {
+                    "?".into()
+                } else {
+                    node.name
+                },
                 description: port,
                 // Nobody can know; whoever may open it will see.
                 films: true,
@@ -88,12 +97,23 @@ pub(super) fn by_identity(id: &str, places: &Places) -> Result<PathBuf, SourceEr
         [only] => Ok(only.path.clone()),
         twins => {
             let other_name = |n: &Node| {
-                let port = n.identity.as_ref().map_or(String::new(), |i| format!(" ({})", i.port));
-                format!("{}{port}", link_by_path(places, &n.path).unwrap_or_else(|| n.path.clone()).display())
+                let port = n
+                    .identity
+                    .as_ref()
+                    .map_or(String::new(), |i| format!(" ({})", i.port));
+                format!(
+                    "{}{port}",
+                    link_by_path(places, &n.path)
+                        .unwrap_or_else(|| n.path.clone())
+                        .display()
+                )
             };
             let names: Vec<String> = twins.iter().map(other_name).collect();
-            let what =
-                format!("{} cameras go by this name; name the one that is meant: {}", twins.len(), names.join(", "));
+            let what = format!(
+                "{} cameras go by this name; name the one that is meant: {}",
+                twins.len(),
+                names.join(", ")
+            );
             Err(SourceError::BadFormat { input, what })
         }
     }

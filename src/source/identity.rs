@@ -1,7 +1,7 @@
 //! Which camera is which, whatever number the system gave it today: by sysfs.
 //!
-//! `/dev/videoN` goes to whoever is plugged in first. A USB camera is known by vendor, product and serial number; one
-//! without a serial number, and any other, by the socket that it sits in.
+//! `/dev/videoN` goes to whoever is plugged in first. A USB camera is known by vendor, product and
+//! serial number; one without a serial number, and any other, by the socket that it sits in.
 
 use std::path::{Path, PathBuf};
 
@@ -14,14 +14,18 @@ pub struct Places {
 
 impl Default for Places {
     fn default() -> Self {
-        Self { sys: "/sys".into(), dev: "/dev".into() }
+        Self {
+            sys: "/sys".into(),
+            dev: "/dev".into(),
+        }
     }
 }
 
 /// What stays when the number changes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Identity {
-    /// E.g. `usb-046d:0825-8A3F21-0.0`: no blanks, the same after every plugging in. [`crate::source::open`] takes it.
+    /// E.g. `usb-046d:0825-8A3F21-0.0`: no blanks, the same after every plugging in.
+    /// [`crate::source::open`] takes it.
     pub id: String,
     /// The socket, e.g. `usb 1-1.2` or `platform vivid.0`.
     pub port: String,
@@ -43,19 +47,35 @@ pub(super) struct Node {
 pub(super) fn nodes(places: &Places) -> Vec<Node> {
     let numbers = |folder: PathBuf| {
         let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-        entries.filter_map(|e| e.file_name().to_str()?.strip_prefix("video")?.parse::<u32>().ok())
+        entries.filter_map(|e| {
+            e.file_name()
+                .to_str()?
+                .strip_prefix("video")?
+                .parse::<u32>()
+                .ok()
+        })
     };
-    let mut all: Vec<u32> = numbers(places.sys.join("class/video4linux")).chain(numbers(places.dev.clone())).collect();
+    let mut all: Vec<u32> = numbers(places.sys.join("class/video4linux"))
+        .chain(numbers(places.dev.clone()))
+        .collect();
     all.sort_unstable();
     all.dedup();
-    all.into_iter().map(|n| node(places, &format!("video{n}"))).collect()
+    all.into_iter()
+        .map(|n| node(places, &format!("video{n}")))
+        .collect()
 }
 
 fn node(places: &Places, name: &str) -> Node {
     let class = places.sys.join("class/video4linux").join(name);
     let card = attribute(&class, "name").unwrap_or_default();
-    let identity = std::fs::canonicalize(&class).ok().and_then(|device| identify(&device, &card));
-    Node { path: places.dev.join(name), name: card, identity }
+    let identity = std::fs::canonicalize(&class)
+        .ok()
+        .and_then(|device| identify(&device, &card));
+    Node {
+        path: places.dev.join(name),
+        name: card,
+        identity,
+    }
 }
 
 fn attribute(device: &Path, name: &str) -> Option<String> {
@@ -70,27 +90,60 @@ fn identify(device: &Path, card: &str) -> Option<Identity> {
     let index = attribute(device, "index").unwrap_or_else(|| "0".into());
     let parent = device.parent()?.parent()?;
     if let Some(usb) = parent.ancestors().find(|a| a.join("idVendor").exists()) {
-        let product = format!("{}:{}", attribute(usb, "idVendor")?, attribute(usb, "idProduct")?);
+        let product = format!(
+            "{}:{}",
+            attribute(usb, "idVendor")?,
+            attribute(usb, "idProduct")?
+        );
         let (serial, socket) = (attribute(usb, "serial"), name(usb)?);
-        // One camera may have two of them: the number of the interface tells, and the same after every plugging in.
-        let part = attribute(parent, "bInterfaceNumber").map_or(0, |n| u32::from_str_radix(&n, 16).unwrap_or(0));
-        let who = serial.as_deref().map_or_else(|| format!("at-{socket}"), plain);
+        // One camera may have two of them: the number of the interface tells, and the same after
+        // every plugging in.
+        let part = attribute(parent, "bInterfaceNumber")
+            .map_or(0, |n| u32::from_str_radix(&n, 16).unwrap_or(0));
+        let who = serial
+            .as_deref()
+            .map_or_else(|| format!("at-{socket}"), plain);
         let id = format!("usb-{product}-{who}-{part}.{index}");
-        return Some(Identity { id, port: format!("usb {socket}"), product: Some(product), serial });
+        return Some(Identity {
+            id,
+            port: format!("usb {socket}"),
+            product: Some(product),
+            serial,
+        });
     }
     let (product, serial) = (None, None);
     if name(parent)? == "virtual" {
         // Nothing is plugged in anywhere; the number is the only socket there is.
-        return Some(Identity { id: format!("virtual-{}-{index}", plain(card)), port: name(device)?, product, serial });
+        return Some(Identity {
+            id: format!("virtual-{}-{index}", plain(card)),
+            port: name(device)?,
+            product,
+            serial,
+        });
     }
-    let bus = std::fs::canonicalize(parent.join("subsystem")).ok().and_then(|s| name(&s));
+    let bus = std::fs::canonicalize(parent.join("subsystem"))
+        .ok()
+        .and_then(|s| name(&s));
     let (bus, socket) = (bus.unwrap_or_else(|| "bus".into()), name(parent)?);
-    Some(Identity { id: format!("{bus}-{}-{index}", plain(&socket)), port: format!("{bus} {socket}"), product, serial })
+    Some(Identity {
+        id: format!("{bus}-{}-{index}", plain(&socket)),
+        port: format!("{bus} {socket}"),
+        product,
+        serial,
+    })
 }
 
 /// The text with everything that a shell might take for something else made `_`.
 fn plain(text: &str) -> String {
-    text.chars().map(|c| if c.is_ascii_alphanumeric() || ".:+-".contains(c) { c } else { '_' }).collect()
+    text.chars()
+        .map(|c| {
+            if c.is_ascii_alphanumeric() || ".:+-".contains(c) {
+                c
+            } else {
+                '_'
+            }
+        })
+        .collect()
 }
 
 /// The name under `/dev/v4l/by-id` (else `by-path`) that leads to `path`.
@@ -109,7 +162,9 @@ fn link_in(places: &Places, path: &Path, folders: &[&str]) -> Option<PathBuf> {
         let entries = std::fs::read_dir(places.dev.join(folder)).ok()?.flatten();
         let mut links: Vec<PathBuf> = entries.map(|e| e.path()).collect();
         links.sort();
-        links.into_iter().find(|link| std::fs::canonicalize(link).is_ok_and(|t| t == target))
+        links
+            .into_iter()
+            .find(|link| std::fs::canonicalize(link).is_ok_and(|t| t == target))
     })
 }
 
@@ -128,29 +183,49 @@ impl Known {
         // A link under by-id is another name of the node.
         let path = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
         let all = nodes(&places);
-        let identity = all.iter().find(|n| n.path == path).and_then(|n| n.identity.clone());
-        let is_twin =
-            |n: &&Node| n.path != path && n.identity.as_ref().map(|i| &i.id) == identity.as_ref().map(|i| &i.id);
+        let identity = all
+            .iter()
+            .find(|n| n.path == path)
+            .and_then(|n| n.identity.clone());
+        let is_twin = |n: &&Node| {
+            n.path != path && n.identity.as_ref().map(|i| &i.id) == identity.as_ref().map(|i| &i.id)
+        };
         let twins = match identity {
-            Some(_) => all.iter().filter(is_twin).filter_map(|n| Some(n.identity.as_ref()?.port.clone())).collect(),
+            Some(_) => all
+                .iter()
+                .filter(is_twin)
+                .filter_map(|n| Some(n.identity.as_ref()?.port.clone()))
+                .collect(),
             None => Vec::new(),
         };
-        Self { places, path, identity, twins }
+        Self {
+            places,
+            path,
+            identity,
+            twins,
+        }
     }
 
     pub(super) fn identity(&self) -> Option<&Identity> {
         self.identity.as_ref()
     }
 
-    /// Where it is now: it may have got another number. Without an identity the path is all that is known of it.
+    /// Where it is now: it may have got another number. Without an identity the path is all that is
+    /// known of it.
     pub(super) fn find(&self) -> Option<PathBuf> {
         let Some(known) = &self.identity else {
             return self.path.exists().then(|| self.path.clone());
         };
-        let same =
-            |n: &Node| n.identity.as_ref().filter(|i| i.id == known.id && !self.twins.contains(&i.port)).cloned();
-        let found: Vec<(PathBuf, Identity)> =
-            nodes(&self.places).into_iter().filter_map(|n| Some((n.path.clone(), same(&n)?))).collect();
+        let same = |n: &Node| {
+            n.identity
+                .as_ref()
+                .filter(|i| i.id == known.id && !self.twins.contains(&i.port))
+                .cloned()
+        };
+        let found: Vec<(PathBuf, Identity)> = nodes(&self.places)
+            .into_iter()
+            .filter_map(|n| Some((n.path.clone(), same(&n)?)))
+            .collect();
         let at_its_port = found.iter().find(|(_, i)| i.port == known.port);
         at_its_port.or(found.first()).map(|(path, _)| path.clone())
     }
@@ -172,38 +247,62 @@ mod tests {
         fn new() -> Self {
             let folder = tempfile::tempdir().expect("tempdir");
             let root = fs::canonicalize(folder.path()).expect("path");
-            let places = Places { sys: root.join("sys"), dev: root.join("dev") };
+            let places = Places {
+                sys: root.join("sys"),
+                dev: root.join("dev"),
+            };
             fs::create_dir_all(places.sys.join("class/video4linux")).expect("class");
             fs::create_dir_all(places.dev.join("v4l/by-id")).expect("dev");
             Self { folder, places }
         }
 
-        /// Plugs in a device below `parent` as `videoN`; `files` are its attributes, by path below sys/devices.
+        /// Plugs in a device below `parent` as `videoN`; `files` are its attributes, by path below
+        /// sys/devices.
         fn plug(&self, parent: &str, number: u32, files: &[(&str, &str)]) {
             let node = format!("video{number}");
-            let device = self.places.sys.join("devices").join(parent).join("video4linux").join(&node);
+            let device = self
+                .places
+                .sys
+                .join("devices")
+                .join(parent)
+                .join("video4linux")
+                .join(&node);
             fs::create_dir_all(&device).expect("device");
             fs::write(device.join("name"), "Cam: a cam\n").expect("name");
             fs::write(device.join("index"), "0\n").expect("index");
             for (name, text) in files {
                 fs::write(self.places.sys.join("devices").join(name), text).expect("attribute");
             }
-            symlink(&device, self.places.sys.join("class/video4linux").join(&node)).expect("link");
+            symlink(
+                &device,
+                self.places.sys.join("class/video4linux").join(&node),
+            )
+            .expect("link");
             fs::write(self.places.dev.join(&node), "").expect("node");
         }
 
         fn usb(&self, socket: &str, number: u32, serial: Option<&str>) {
             let usb = format!("pci0/usb1/{socket}");
-            let files = [(format!("{usb}/idVendor"), "046d\n"), (format!("{usb}/idProduct"), "0825\n")];
+            let files = [
+                (format!("{usb}/idVendor"), "046d\n"),
+                (format!("{usb}/idProduct"), "0825\n"),
+            ];
             let files: Vec<(&str, &str)> = files.iter().map(|(a, b)| (a.as_str(), *b)).collect();
             self.plug(&format!("{usb}/{socket}:1.0"), number, &files);
             if let Some(serial) = serial {
-                fs::write(self.places.sys.join("devices").join(&usb).join("serial"), serial).expect("serial");
+                fs::write(
+                    self.places.sys.join("devices").join(&usb).join("serial"),
+                    serial,
+                )
+                .expect("serial");
             }
         }
 
         fn unplug(&self, number: u32) {
-            let class = self.places.sys.join(format!("class/video4linux/video{number}"));
+            let class = self
+                .places
+                .sys
+                .join(format!("class/video4linux/video{number}"));
             let device = fs::canonicalize(&class).expect("device");
             fs::remove_file(class).expect("link");
             fs::remove_dir_all(device).expect("device");
@@ -219,7 +318,11 @@ mod tests {
         }
 
         fn id(&self, number: u32) -> String {
-            self.known(number).identity().expect("an identity").id.clone()
+            self.known(number)
+                .identity()
+                .expect("an identity")
+                .id
+                .clone()
         }
     }
 
@@ -232,10 +335,19 @@ mod tests {
         system.plug("virtual", 10, &[]);
         assert!(system.folder.path().exists());
         let ids = [0, 4, 5, 10].map(|n| system.id(n));
-        let expected = ["usb-046d:0825-8A_3F-0.0", "usb-046d:0825-at-1-3-0.0", "bus-vivid.0-0", "virtual-Cam:_a_cam-0"];
+        let expected = [
+            "usb-046d:0825-8A_3F-0.0",
+            "usb-046d:0825-at-1-3-0.0",
+            "bus-vivid.0-0",
+            "virtual-Cam:_a_cam-0",
+        ];
         assert_eq!(ids, expected);
         let numbers: Vec<PathBuf> = nodes(&system.places).into_iter().map(|n| n.path).collect();
-        assert_eq!(numbers, [0, 4, 5, 10].map(|n| system.dev(n)), "by number, not by letters");
+        assert_eq!(
+            numbers,
+            [0, 4, 5, 10].map(|n| system.dev(n)),
+            "by number, not by letters"
+        );
     }
 
     #[test]
@@ -273,14 +385,20 @@ mod tests {
         let named = || crate::source::devices::by_identity(&id, &system.places);
         assert_eq!(named().ok(), Some(system.dev(0)));
         system.usb("1-2", 1, Some("SN0001"));
-        let by_path = system.places.dev.join("v4l/by-path/pci-usb-1-2-video-index0");
+        let by_path = system
+            .places
+            .dev
+            .join("v4l/by-path/pci-usb-1-2-video-index0");
         fs::create_dir_all(system.places.dev.join("v4l/by-path")).expect("dev");
         symlink(system.dev(1), &by_path).expect("link");
         let said = named().expect_err("either might be meant").to_string();
         for what in [&id, "2 cameras", "usb 1-1", "usb 1-2"] {
             assert!(said.contains(what), "{said}");
         }
-        assert!(said.contains(&by_path.display().to_string()) && !said.contains('\n'), "{said}");
+        assert!(
+            said.contains(&by_path.display().to_string()) && !said.contains('\n'),
+            "{said}"
+        );
         system.unplug(0);
         assert_eq!(named().ok(), Some(system.dev(1)), "alone it is the one");
     }
@@ -292,7 +410,12 @@ mod tests {
         let name = system.places.dev.join("v4l/by-id/usb-Cam-video-index0");
         symlink(system.dev(2), &name).expect("link");
         assert_eq!(link(&system.places, &system.dev(2)), Some(name.clone()));
-        assert_eq!(Known::new(system.places.clone(), &name).identity().map(|i| i.id.clone()), Some(system.id(2)));
+        assert_eq!(
+            Known::new(system.places.clone(), &name)
+                .identity()
+                .map(|i| i.id.clone()),
+            Some(system.id(2))
+        );
     }
 
     #[test]
@@ -300,6 +423,9 @@ mod tests {
         let system = System::new();
         fs::write(system.dev(0), "").expect("node");
         let known = system.known(0);
-        assert_eq!((known.identity(), known.find()), (None, Some(system.dev(0))));
+        assert_eq!(
+            (known.identity(), known.find()),
+            (None, Some(system.dev(0)))
+        );
     }
 }

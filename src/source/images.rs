@@ -18,7 +18,9 @@ impl Images {
     pub(super) fn open(folder: &Path, rate_hz: f64) -> Result<Self, SourceError> {
         let input = folder.display().to_string();
         if !(rate_hz.is_finite() && rate_hz > 0.0) {
-            let what = format!("{rate_hz} pictures a second is no rate; give one greater than 0 with --fps");
+            let what = format!(
+                "{rate_hz} pictures a second is no rate; give one greater than 0 with --fps"
+            );
             return Err(SourceError::BadFormat { input, what });
         }
         let entries = std::fs::read_dir(folder).map_err(|e| SourceError::of_file(folder, &e))?;
@@ -40,30 +42,55 @@ impl Images {
         if files.len() == 1 {
             return Err(SourceError::SingleFrame { input });
         }
-        Ok(Self { folder: folder.to_owned(), files, next: 0, size, rate_hz })
+        Ok(Self {
+            folder: folder.to_owned(),
+            files,
+            next: 0,
+            size,
+            rate_hz,
+        })
     }
 }
 
 impl Source for Images {
     fn next_frame(&mut self) -> Result<Option<RawFrame>, SourceError> {
-        let Some(path) = self.files.get(self.next) else { return Ok(None) };
-        let frame = read(path, self.next as u64, seconds(nanoseconds(self.next as f64 / self.rate_hz)))?;
+        let Some(path) = self.files.get(self.next) else {
+            return Ok(None);
+        };
+        let frame = read(
+            path,
+            self.next as u64,
+            seconds(nanoseconds(self.next as f64 / self.rate_hz)),
+        )?;
         if frame.size != self.size {
             let (is, was) = (frame.size, self.size);
-            let what = format!("the picture is {is}, those before it are {was}; make all of one size");
-            return Err(SourceError::BadFormat { input: path.display().to_string(), what });
+            let what =
+                format!("the picture is {is}, those before it are {was}; make all of one size");
+            return Err(SourceError::BadFormat {
+                input: path.display().to_string(),
+                what,
+            });
         }
         self.next += 1;
         Ok(Some(frame))
     }
 
     fn describe(&self) -> SourceInfo {
-        let kind = self.files.first().and_then(|f| f.extension()).map(|e| e.to_string_lossy().to_lowercase());
+        let kind = self
+            .files
+            .first()
+            .and_then(|f| f.extension())
+            .map(|e| e.to_string_lossy().to_lowercase());
         SourceInfo {
             name: self.folder.display().to_string(),
             format: FormatNote {
                 asked: format!("pictures @ {}", self.rate_hz),
-                given: format!("{} {} @ {}", kind.unwrap_or_default(), self.size, self.rate_hz),
+                given: format!(
+                    "{} {} @ {}",
+                    kind.unwrap_or_default(),
+                    self.size,
+                    self.rate_hz
+                ),
             },
             size: self.size,
             nominal_rate_hz: Some(self.rate_hz),
@@ -74,7 +101,9 @@ impl Source for Images {
 }
 
 fn is_picture(path: &Path) -> bool {
-    let hidden = path.file_name().is_none_or(|n| n.to_string_lossy().starts_with('.'));
+    let hidden = path
+        .file_name()
+        .is_none_or(|n| n.to_string_lossy().starts_with('.'));
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
     !hidden && matches!(ending.as_deref(), Some("png" | "jpg" | "jpeg" | "bmp")) && path.is_file()
 }
@@ -86,7 +115,13 @@ fn read(path: &Path, sequence: u64, sensor_time_s: f64) -> Result<RawFrame, Sour
         input: path.display().to_string(),
         what: format!("it is no readable picture ({e}); replace it, or take it out of the folder"),
     })?;
-    Ok(RawFrame { sequence: Some(sequence), sensor_time_s, size, format, bytes })
+    Ok(RawFrame {
+        sequence: Some(sequence),
+        sensor_time_s,
+        size,
+        format,
+        bytes,
+    })
 }
 
 /// The picture in the bytes of a picture file, or why it is none.
@@ -114,7 +149,8 @@ fn by_name(a: &str, b: &str) -> Ordering {
     while let (Some(p), Some(q)) = (x.chars().next(), y.chars().next()) {
         let order = if p.is_ascii_digit() && q.is_ascii_digit() {
             let (m, n) = (take_number(&mut x), take_number(&mut y));
-            // Without leading zeros the longer number is the greater one, however many digits it has.
+            // Without leading zeros the longer number is the greater one, however many digits it
+            // has.
             m.len().cmp(&n.len()).then_with(|| m.cmp(n))
         } else {
             x = &x[p.len_utf8()..];
@@ -130,7 +166,9 @@ fn by_name(a: &str, b: &str) -> Ordering {
 
 /// Cuts the digits off the front and gives them without leading zeros.
 fn take_number<'a>(text: &mut &'a str) -> &'a str {
-    let end = text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
+    let end = text
+        .find(|c: char| !c.is_ascii_digit())
+        .unwrap_or(text.len());
     let (digits, rest) = text.split_at(end);
     *text = rest;
     digits.trim_start_matches('0')
@@ -142,11 +180,29 @@ mod tests {
 
     #[test]
     fn names_are_ordered_by_their_numbers() {
-        let mut names =
-            ["f10.png", "f9.png", "f009b.png", "f1.png", "f2-2.png", "f2-10.png", "F1.png", "f.png", "f01.png"];
+        let mut names = [
+            "f10.png",
+            "f9.png",
+            "f009b.png",
+            "f1.png",
+            "f2-2.png",
+            "f2-10.png",
+            "F1.png",
+            "f.png",
+            "f01.png",
+        ];
         names.sort_by(|a, b| by_name(a, b));
-        let wanted =
-            ["F1.png", "f.png", "f01.png", "f1.png", "f2-2.png", "f2-10.png", "f9.png", "f009b.png", "f10.png"];
+        let wanted = [
+            "F1.png",
+            "f.png",
+            "f01.png",
+            "f1.png",
+            "f2-2.png",
+            "f2-10.png",
+            "f9.png",
+            "f009b.png",
+            "f10.png",
+        ];
         assert_eq!(names, wanted);
     }
 }

@@ -1,6 +1,7 @@
-//! The other direction: frames into a v4l2loopback device, which other programs then see as a camera. Through mapped
-//! buffers: with `write()` a device made with `exclusive_caps=1` hangs when its feeder goes. The `v4l` crate's stream takes
-//! each buffer back as soon as it has handed it over, and would overwrite what others still read; so this keeps a ring.
+//! The other direction: frames into a v4l2loopback device, which other programs then see as a
+//! camera. Through mapped buffers: with `write()` a device made with `exclusive_caps=1` hangs when
+//! its feeder goes. The `v4l` crate's stream takes each buffer back as soon as it has handed it
+//! over, and would overwrite what others still read; so this keeps a ring.
 
 use super::SourceError;
 use crate::model::{PixelFormat, RawFrame, Size};
@@ -39,54 +40,104 @@ impl Loopback {
     /// It is not there, takes no frames, is in use, or takes no frames of that format or size.
     pub fn open(path: &Path, first: &RawFrame, rate_hz: Option<f64>) -> Result<Self, SourceError> {
         let input = path.display().to_string();
-        let failed = |doing: &'static str| move |e: io::Error| SourceError::of_driver(path, doing, &e);
-        let bad = |what: String| SourceError::BadFormat { input: input.clone(), what };
-        let device = Device::with_path(path).map_err(|e| match SourceError::of_driver(path, "opening it", &e) {
-            SourceError::Absent { input, .. } => {
-                SourceError::Absent { input, hint: "make it with `sudo modprobe v4l2loopback`, then see /dev/video*" }
+        let failed =
+            |doing: &'static str| move |e: io::Error| SourceError::of_driver(path, doing, &e);
+        let bad = |what: String| SourceError::BadFormat {
+            input: input.clone(),
+            what,
+        };
+        let device = Device::with_path(path).map_err(|e| {
+            match SourceError::of_driver(path, "opening it", &e) {
+                SourceError::Absent { input, .. } => SourceError::Absent {
+                    input,
+                    hint: "make it with `sudo modprobe v4l2loopback`, then see /dev/video*",
+                },
+                other => other,
             }
-            other => other,
         })?;
-        let caps = device.query_caps().map_err(failed("asking for its abilities"))?;
+        let caps = device
+            .query_caps()
+            .map_err(failed("asking for its abilities"))?;
         if !caps.capabilities.contains(Caps::VIDEO_OUTPUT) {
-            let what =
-                "it takes no frames; give a device made with `sudo modprobe v4l2loopback` that nothing feeds yet";
+            let what = "it takes no frames; give a device made with `sudo modprobe v4l2loopback` that nothing feeds yet";
             return Err(bad(what.to_owned()));
         }
-        let fourcc: [u8; 4] = first.format.fourcc().as_bytes().try_into().unwrap_or(*b"MJPG");
+        let fourcc: [u8; 4] = first
+            .format
+            .fourcc()
+            .as_bytes()
+            .try_into()
+            .unwrap_or(*b"MJPG");
         let wanted = Format::new(first.size.width, first.size.height, FourCC::new(&fourcc));
-        let granted = device.set_format(&wanted).map_err(failed("setting the picture format"))?;
-        if (granted.width, granted.height, granted.fourcc) != (wanted.width, wanted.height, wanted.fourcc) {
+        let granted = device
+            .set_format(&wanted)
+            .map_err(failed("setting the picture format"))?;
+        if (granted.width, granted.height, granted.fourcc)
+            != (wanted.width, wanted.height, wanted.fourcc)
+        {
             let given = format!("{} {}x{}", granted.fourcc, granted.width, granted.height);
-            return Err(bad(format!("it takes {given} and not {} {}", first.format, first.size)));
+            return Err(bad(format!(
+                "it takes {given} and not {} {}",
+                first.format, first.size
+            )));
         }
         if let Some(hz) = rate_hz.filter(|hz| (1.0..=1000.0).contains(hz)) {
             // Only what readers are told; the frames' own times pace them.
             let _ = device.set_params(&Parameters::with_fps(hz.round() as u32));
         }
         let (format, size) = (first.format, first.size);
-        let mut output = Self { path: path.to_owned(), device, buffers: Vec::new(), frames: 0, format, size };
+        let mut output = Self {
+            path: path.to_owned(),
+            device,
+            buffers: Vec::new(),
+            frames: 0,
+            format,
+            size,
+        };
         output.map_buffers().map_err(failed("asking for buffers"))?;
         Ok(output)
     }
 
     /// Asks for buffers and maps them.
     fn map_buffers(&mut self) -> io::Result<()> {
-        let mut request =
-            v4l2_requestbuffers { count: BUFFERS, type_: OUTPUT, memory: Memory::Mmap as u32, ..zeroed() };
+        let mut request = v4l2_requestbuffers {
+            count: BUFFERS,
+            type_: OUTPUT,
+            memory: Memory::Mmap as u32,
+            ..zeroed()
+        };
         self.call(vidioc::VIDIOC_REQBUFS, &mut request)?;
         for index in 0..request.count {
-            let mut buffer = v4l2_buffer { index, ..described() };
+            let mut buffer = v4l2_buffer {
+                index,
+                ..described()
+            };
             self.call(vidioc::VIDIOC_QUERYBUF, &mut buffer)?;
             let length = buffer.length as usize;
-            let (access, fd) = (libc::PROT_READ | libc::PROT_WRITE, self.device.handle().fd());
-            // SAFETY: the driver has just said which of the union's fields holds, and where the buffer lies; the mapping
-            // is private to this value and ends with it.
-            let start =
-                unsafe { v4l2::mmap(null_mut(), length, access, libc::MAP_SHARED, fd, buffer.m.offset.into()) }?;
-            self.buffers.push(slice_from_raw_parts_mut(start.cast(), length));
+            let (access, fd) = (
+                libc::PROT_READ | libc::PROT_WRITE,
+                self.device.handle().fd(),
+            );
+            // SAFETY: the driver has just said which of the union's fields holds, and where the
+            // buffer lies; the mapping is private to this value and ends with it.
+            let start = unsafe {
+                v4l2::mmap(
+                    null_mut(),
+                    length,
+                    access,
+                    libc::MAP_SHARED,
+                    fd,
+                    buffer.m.offset.into(),
+                )
+            }?;
+            self.buffers
+                .push(slice_from_raw_parts_mut(start.cast(), length));
         }
-        if self.buffers.is_empty() { Err(io::Error::from_raw_os_error(libc::ENOMEM)) } else { Ok(()) }
+        if self.buffers.is_empty() {
+            Err(io::Error::from_raw_os_error(libc::ENOMEM))
+        } else {
+            Ok(())
+        }
     }
 
     /// Hands a frame to the device, which gives it the time of this moment.
@@ -94,38 +145,69 @@ impl Loopback {
     /// # Errors
     /// The device refuses, or the frame is none of those it was opened for.
     pub fn put(&mut self, raw: &RawFrame) -> Result<(), SourceError> {
-        let bad = |what: String| SourceError::BadFormat { input: self.path.display().to_string(), what };
+        let bad = |what: String| SourceError::BadFormat {
+            input: self.path.display().to_string(),
+            what,
+        };
         if (raw.format, raw.size) != (self.format, self.size) {
             let (format, size) = (self.format, self.size);
-            return Err(bad(format!("frames change from {format} {size} to {} {}", raw.format, raw.size)));
+            return Err(bad(format!(
+                "frames change from {format} {size} to {} {}",
+                raw.format, raw.size
+            )));
         }
         let failed = |e: io::Error| SourceError::of_driver(&self.path, "handing over a frame", &e);
-        let mut buffer = v4l2_buffer { index: self.frames as u32, ..described() };
-        // Each buffer goes round once before the first is taken back: it is the one that was read longest ago.
+        let mut buffer = v4l2_buffer {
+            index: self.frames as u32,
+            ..described()
+        };
+        // Each buffer goes round once before the first is taken back: it is the one that was read
+        // longest ago.
         if self.frames >= self.buffers.len() as u64 {
-            self.call(vidioc::VIDIOC_DQBUF, &mut buffer).map_err(failed)?;
+            self.call(vidioc::VIDIOC_DQBUF, &mut buffer)
+                .map_err(failed)?;
         }
         let mapped = self.buffers.get(buffer.index as usize).copied();
         let Some(mapped) = mapped.filter(|m| m.len() >= raw.bytes.len()) else {
-            return Err(bad(format!("a frame of {} bytes does not fit into its buffers", raw.bytes.len())));
+            return Err(bad(format!(
+                "a frame of {} bytes does not fit into its buffers",
+                raw.bytes.len()
+            )));
         };
-        // SAFETY: the mapping lasts as long as `self`, is as long as was just compared, and the driver has given the buffer
-        // to us. Other programs may read it; a torn picture is all that they can get.
-        unsafe { std::ptr::copy_nonoverlapping(raw.bytes.as_ptr(), mapped.cast::<u8>(), raw.bytes.len()) };
+        // SAFETY: the mapping lasts as long as `self`, is as long as was just compared, and the
+        // driver has given the buffer to us. Other programs may read it; a torn picture is all that
+        // they can get.
+        unsafe {
+            std::ptr::copy_nonoverlapping(raw.bytes.as_ptr(), mapped.cast::<u8>(), raw.bytes.len())
+        };
         let index = buffer.index;
-        let mut buffer = v4l2_buffer { index, bytesused: raw.bytes.len() as u32, field: FIELD_NONE, ..described() };
+        let mut buffer = v4l2_buffer {
+            index,
+            bytesused: raw.bytes.len() as u32,
+            field: FIELD_NONE,
+            ..described()
+        };
         if self.frames == 0 {
             let mut kind = OUTPUT;
-            self.call(vidioc::VIDIOC_STREAMON, &mut kind).map_err(failed)?;
+            self.call(vidioc::VIDIOC_STREAMON, &mut kind)
+                .map_err(failed)?;
         }
-        self.call(vidioc::VIDIOC_QBUF, &mut buffer).map_err(failed)?;
+        self.call(vidioc::VIDIOC_QBUF, &mut buffer)
+            .map_err(failed)?;
         self.frames += 1;
         Ok(())
     }
 
     fn call<T>(&self, request: vidioc::_IOC_TYPE, argument: &mut T) -> io::Result<()> {
-        // SAFETY: each request is made with the type that it is declared for; the descriptor is open.
-        unsafe { v4l2::ioctl(self.device.handle().fd(), request, std::ptr::from_mut(argument).cast()) }
+        // SAFETY: each request is made with the type that it is declared for; the descriptor is
+        // open.
+        unsafe {
+            v4l2::ioctl(
+                self.device.handle().fd(),
+                request,
+                std::ptr::from_mut(argument).cast(),
+            )
+        }
     }
 }
 
@@ -143,7 +225,11 @@ impl Drop for Loopback {
 
 /// A buffer of ours to be filled in.
 fn described() -> v4l2_buffer {
-    v4l2_buffer { type_: OUTPUT, memory: Memory::Mmap as u32, ..zeroed() }
+    v4l2_buffer {
+        type_: OUTPUT,
+        memory: Memory::Mmap as u32,
+        ..zeroed()
+    }
 }
 
 /// The kernel's structures as it wants to get them.

@@ -1,7 +1,8 @@
-//! Where frames come from: a camera, a recording, a video file or a folder of pictures, all behind one trait.
+//! Where frames come from: a camera, a recording, a video file or a folder of pictures, all behind
+//! one trait.
 //!
-//! A source hands frames out as they left the camera or the file, with their own number and time; [`Decoder`] turns
-//! them into the pictures that the tracker and the screen want.
+//! A source hands frames out as they left the camera or the file, with their own number and time;
+//! [`Decoder`] turns them into the pictures that the tracker and the screen want.
 
 mod choice;
 mod clock;
@@ -64,7 +65,8 @@ pub trait Source: Send {
     /// Waits for the next frame; `None` is the end, and stays it.
     ///
     /// # Errors
-    /// The source has failed and will not deliver again, unless it [`returns`](Self::returns) and is opened anew.
+    /// The source has failed and will not deliver again, unless it [`returns`](Self::returns) and
+    /// is opened anew.
     fn next_frame(&mut self) -> Result<Option<RawFrame>, SourceError>;
 
     fn describe(&self) -> SourceInfo;
@@ -80,17 +82,22 @@ pub trait Source: Send {
         false
     }
 
-    /// One attempt to go on after a failure: the same camera, the same format. Whoever calls decides when to try again;
-    /// the source only says why it is not yet. Its frames go on with times that fit those before.
+    /// One attempt to go on after a failure: the same camera, the same format. Whoever calls
+    /// decides when to try again; the source only says why it is not yet. Its frames go on with
+    /// times that fit those before.
     ///
     /// # Errors
-    /// It is not back: `Absent` where it is not even there, which costs next to nothing to find out.
+    /// It is not back: `Absent` where it is not even there, which costs next to nothing to find
+    /// out.
     fn reopen(&mut self) -> Result<(), SourceError> {
-        Err(SourceError::Absent { input: self.describe().name, hint: "it cannot be opened again" })
+        Err(SourceError::Absent {
+            input: self.describe().name,
+            hint: "it cannot be opened again",
+        })
     }
 
-    /// The time after which silence is a failure, of a source that cannot keep to it by itself: [`next_frame`] may then
-    /// wait for ever, and belongs on a thread of its own.
+    /// The time after which silence is a failure, of a source that cannot keep to it by itself:
+    /// [`next_frame`] may then wait for ever, and belongs on a thread of its own.
     ///
     /// [`next_frame`]: Self::next_frame
     fn waits_without_limit(&self) -> Option<Duration> {
@@ -101,17 +108,23 @@ pub trait Source: Send {
         Health::default()
     }
 
-    /// Lines to show to the user since the last call, e.g. that a clip ends early; complete after the end.
+    /// Lines to show to the user since the last call, e.g. that a clip ends early; complete after
+    /// the end.
     fn warnings(&mut self) -> Vec<String> {
         Vec::new()
     }
 }
 
-/// Opens whatever `input` is, a path or the identity of a camera; `fps` is the rate of a folder of pictures (30 if not given), nothing else needs it.
+/// Opens whatever `input` is, a path or the identity of a camera; `fps` is the rate of a folder of
+/// pictures (30 if not given), nothing else needs it.
 ///
 /// # Errors
 /// There is nothing that can be read as frames; the error says why and what to do.
-pub fn open(input: &Path, config: &config::Camera, fps: Option<f64>) -> Result<Box<dyn Source>, SourceError> {
+pub fn open(
+    input: &Path,
+    config: &config::Camera,
+    fps: Option<f64>,
+) -> Result<Box<dyn Source>, SourceError> {
     let name = input.display().to_string();
     let named;
     let input = if devices::is_identity(&name) && !input.exists() {
@@ -120,7 +133,9 @@ pub fn open(input: &Path, config: &config::Camera, fps: Option<f64>) -> Result<B
     } else {
         input
     };
-    let kind = std::fs::metadata(input).map_err(|e| SourceError::of_file(input, &e))?.file_type();
+    let kind = std::fs::metadata(input)
+        .map_err(|e| SourceError::of_file(input, &e))?
+        .file_type();
     if kind.is_char_device() {
         Ok(match config.backend {
             config::Backend::V4l2 => Box::new(v4l2::Camera::open(input, config)?),
@@ -131,7 +146,10 @@ pub fn open(input: &Path, config: &config::Camera, fps: Option<f64>) -> Result<B
     } else if !kind.is_file() {
         let what = "it is neither a camera, nor a video file, nor a folder of pictures".to_owned();
         Err(SourceError::BadFormat { input: name, what })
-    } else if input.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
+    } else if input
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("mcap"))
+    {
         Ok(Box::new(recording::Recording::open(input)?))
     } else {
         Ok(Box::new(video::Video::open(input)?))

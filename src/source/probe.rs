@@ -6,7 +6,8 @@ use std::io::Read;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// Up to this length every packet is counted; a longer file would make the user wait for a mere progress bar.
+/// Up to this length every packet is counted; a longer file would make the user wait for a mere
+/// progress bar.
 const COUNTED_BYTES: u64 = 128 << 20;
 
 /// The first video stream of a file.
@@ -15,9 +16,11 @@ pub(super) struct Probe {
     pub codec: String,
     pub rate_hz: Option<f64>,
     pub frames: Option<u64>,
-    /// How long the stream is by the file's own head, s; a clip that was cut in the middle still says its full length.
+    /// How long the stream is by the file's own head, s; a clip that was cut in the middle still
+    /// says its full length.
     pub duration_s: Option<f64>,
-    /// The file is shorter than its head says; only AVI is looked at, of the others ffmpeg itself says so.
+    /// The file is shorter than its head says; only AVI is looked at, of the others ffmpeg itself
+    /// says so.
     pub cut: bool,
 }
 
@@ -31,47 +34,94 @@ pub(super) fn file_url(path: &Path) -> OsString {
 /// What it means that a child process did not start.
 pub(super) fn spawn_error(program: &str, path: &Path, e: &std::io::Error) -> SourceError {
     if e.kind() == std::io::ErrorKind::NotFound {
-        return SourceError::MissingTool { tool: program.to_owned() };
+        return SourceError::MissingTool {
+            tool: program.to_owned(),
+        };
     }
-    SourceError::BadFormat { input: path.display().to_string(), what: format!("{program} does not start: {e}") }
+    SourceError::BadFormat {
+        input: path.display().to_string(),
+        what: format!("{program} does not start: {e}"),
+    }
 }
 
 /// Asks ffprobe, which is called `program`.
 pub(super) fn probe(path: &Path, program: &str) -> Result<Probe, SourceError> {
-    let bad = |what: String| SourceError::BadFormat { input: path.display().to_string(), what };
+    let bad = |what: String| SourceError::BadFormat {
+        input: path.display().to_string(),
+        what,
+    };
     let (length, cut) = look_into(path).map_err(|e| SourceError::of_file(path, &e))?;
     if length == 0 {
-        return Err(bad("the file has no content; film again, or name another file".to_owned()));
+        return Err(bad(
+            "the file has no content; film again, or name another file".to_owned(),
+        ));
     }
     let mut command = Command::new(program);
     // Only V: a picture of a sleeve in a sound file is a video stream, too, but not one that moves.
-    command.args(["-v", "error", "-protocol_whitelist", "file", "-select_streams", "V:0", "-of", "json"]);
+    command.args([
+        "-v",
+        "error",
+        "-protocol_whitelist",
+        "file",
+        "-select_streams",
+        "V:0",
+        "-of",
+        "json",
+    ]);
     if length <= COUNTED_BYTES {
         command.arg("-count_packets");
     }
-    command.args(["-show_entries", "stream=codec_name,nb_frames,nb_read_packets,duration,avg_frame_rate:stream_tags"]);
-    command.args(["-show_entries", "format=format_name,nb_streams,duration,start_time", "-i"]).arg(file_url(path));
-    let output = command.stdin(Stdio::null()).output().map_err(|e| spawn_error(program, path, &e))?;
+    command.args([
+        "-show_entries",
+        "stream=codec_name,nb_frames,nb_read_packets,duration,avg_frame_rate:stream_tags",
+    ]);
+    command
+        .args([
+            "-show_entries",
+            "format=format_name,nb_streams,duration,start_time",
+            "-i",
+        ])
+        .arg(file_url(path));
+    let output = command
+        .stdin(Stdio::null())
+        .output()
+        .map_err(|e| spawn_error(program, path, &e))?;
     if !output.status.success() {
         let said = String::from_utf8_lossy(&output.stderr);
-        let hint = if said.contains("moov atom not found") { " (an .mp4 that was cut short)" } else { "" };
-        return Err(bad(format!("it is no video that ffmpeg can read{hint}; try to play it with `ffplay`")));
+        let hint = if said.contains("moov atom not found") {
+            " (an .mp4 that was cut short)"
+        } else {
+            ""
+        };
+        return Err(bad(format!(
+            "it is no video that ffmpeg can read{hint}; try to play it with `ffplay`"
+        )));
     }
-    let said: serde_json::Value =
-        serde_json::from_slice(&output.stdout).map_err(|e| bad(format!("{program} gives no answer: {e}")))?;
+    let said: serde_json::Value = serde_json::from_slice(&output.stdout)
+        .map_err(|e| bad(format!("{program} gives no answer: {e}")))?;
     let (stream, format) = (&said["streams"][0], &said["format"]);
     let container = format["format_name"].as_str().unwrap_or_default();
     let is_picture = container == "image2" || container.ends_with("_pipe");
     // Other containers only guess; for MJPEG in AVI it may be twice the number.
-    let indexed = || if container.contains("mp4") { number(&stream["nb_frames"]) } else { None };
+    let indexed = || {
+        if container.contains("mp4") {
+            number(&stream["nb_frames"])
+        } else {
+            None
+        }
+    };
     // ffmpeg plays a text file as a typewriter, which nobody wants to see here.
     let is_text = container == "tty" || stream["codec_name"] == "ansi";
     match stream["codec_name"].as_str() {
-        _ if is_picture => Err(bad("it is a single picture; give the folder of pictures, or a video".to_owned())),
+        _ if is_picture => Err(bad(
+            "it is a single picture; give the folder of pictures, or a video".to_owned(),
+        )),
         Some(codec) if !is_text => Ok(Probe {
             codec: codec.to_owned(),
             rate_hz: ratio(stream["avg_frame_rate"].as_str().unwrap_or_default()),
-            frames: number(&stream["nb_read_packets"]).or_else(indexed).map(|n| n as u64),
+            frames: number(&stream["nb_read_packets"])
+                .or_else(indexed)
+                .map(|n| n as u64),
             cut,
             duration_s: duration(stream, format),
         }),
@@ -79,20 +129,28 @@ pub(super) fn probe(path: &Path, program: &str) -> Result<Probe, SourceError> {
     }
 }
 
-/// Length of the file, and whether its RIFF head promises more. A head that promises nothing is not finished, either.
+/// Length of the file, and whether its RIFF head promises more. A head that promises nothing is not
+/// finished, either.
 fn look_into(path: &Path) -> std::io::Result<(u64, bool)> {
     let file = std::fs::File::open(path)?;
     let (length, mut head) = (file.metadata()?.len(), Vec::new());
     file.take(8).read_to_end(&mut head)?;
     let promised = match head.as_slice() {
-        [b'R', b'I', b'F', b'F', size @ ..] => size.iter().rev().fold(0, |n, &byte| n << 8 | u64::from(byte)),
+        [b'R', b'I', b'F', b'F', size @ ..] => size
+            .iter()
+            .rev()
+            .fold(0, |n, &byte| n << 8 | u64::from(byte)),
         _ => return Ok((length, false)),
     };
     Ok((length, promised == 0 || promised + 8 > length))
 }
 
 fn number(value: &serde_json::Value) -> Option<f64> {
-    value.as_str()?.parse().ok().filter(|n: &f64| n.is_finite() && *n > 0.0)
+    value
+        .as_str()?
+        .parse()
+        .ok()
+        .filter(|n: &f64| n.is_finite() && *n > 0.0)
 }
 
 /// `30000/1001` as a number; nothing for `0/0`.
@@ -104,7 +162,10 @@ pub(super) fn ratio(text: &str) -> Option<f64> {
 
 fn duration(stream: &serde_json::Value, format: &serde_json::Value) -> Option<f64> {
     let tagged = || {
-        let mut parts = stream["tags"]["DURATION"].as_str()?.split(':').map(|p| p.parse::<f64>().ok());
+        let mut parts = stream["tags"]["DURATION"]
+            .as_str()?
+            .split(':')
+            .map(|p| p.parse::<f64>().ok());
         Some(3600.0 * parts.next()?? + 60.0 * parts.next()?? + parts.next()??)
     };
     // The whole file may be longer than its picture, unless there is nothing else in it.

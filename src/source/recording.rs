@@ -11,7 +11,8 @@ use std::path::{Path, PathBuf};
 pub(super) struct Recording {
     path: PathBuf,
     reader: Reader,
-    /// The first two frames are read when the file is opened: only then it is known that there are any, and motion.
+    /// The first two frames are read when the file is opened: only then it is known that there are
+    /// any, and motion.
     pending: VecDeque<RawFrame>,
     size: Option<Size>,
     frames: u64,
@@ -26,8 +27,14 @@ impl Recording {
         let input = path.display().to_string();
         let reader = Reader::open(path).map_err(|e| match e {
             RecordingError::Unreadable { source, .. } => SourceError::of_file(path, &source),
-            RecordingError::Unusable { what, .. } => SourceError::BadFormat { input: input.clone(), what },
-            other => SourceError::BadFormat { input: input.clone(), what: other.to_string() },
+            RecordingError::Unusable { what, .. } => SourceError::BadFormat {
+                input: input.clone(),
+                what,
+            },
+            other => SourceError::BadFormat {
+                input: input.clone(),
+                what: other.to_string(),
+            },
         })?;
         let mut recording = Self {
             path: path.to_owned(),
@@ -56,7 +63,10 @@ impl Recording {
             what = format!("{what}; it holds {}", topics.join(", "));
         }
         for warning in recording.reader.warnings() {
-            what = format!("{what}; {}", warning.trim_start_matches(&format!("{input}: ")));
+            what = format!(
+                "{what}; {}",
+                warning.trim_start_matches(&format!("{input}: "))
+            );
         }
         Err(SourceError::BadFormat { input, what })
     }
@@ -64,7 +74,12 @@ impl Recording {
     /// The next frame whose time is later than the last one's.
     fn read_frame(&mut self) -> Option<RawFrame> {
         loop {
-            let Picture { sequence, sensor_time_ns, encoding, bytes } = self.reader.next_picture()?;
+            let Picture {
+                sequence,
+                sensor_time_ns,
+                encoding,
+                bytes,
+            } = self.reader.next_picture()?;
             if self.last_ns.is_some_and(|last| sensor_time_ns <= last) {
                 self.out_of_order += 1;
                 continue;
@@ -76,7 +91,13 @@ impl Recording {
             self.last_ns = Some(sensor_time_ns);
             self.size = Some(size);
             self.frames += 1;
-            return Some(RawFrame { sequence, sensor_time_s: seconds(sensor_time_ns), size, format, bytes });
+            return Some(RawFrame {
+                sequence,
+                sensor_time_s: seconds(sensor_time_ns),
+                size,
+                format,
+                bytes,
+            });
         }
     }
 
@@ -85,11 +106,17 @@ impl Recording {
         if let Encoding::Pixels(format, size) = encoding {
             return Some((size, format, bytes));
         }
-        // A picture that was damaged before it was recorded is counted where a camera's is: by the decoder.
+        // A picture that was damaged before it was recorded is counted where a camera's is: by the
+        // decoder.
         let told = |key: &str| self.reader.about().get(key).and_then(|n| n.parse().ok());
-        let known = told("width").zip(told("height")).map(|(w, h)| Size::new(w, h)).or(self.size);
+        let known = told("width")
+            .zip(told("height"))
+            .map(|(w, h)| Size::new(w, h))
+            .or(self.size);
         match known {
-            Some(size) if bytes.starts_with(&[0xff, 0xd8]) => Some((size, PixelFormat::Mjpeg, bytes)),
+            Some(size) if bytes.starts_with(&[0xff, 0xd8]) => {
+                Some((size, PixelFormat::Mjpeg, bytes))
+            }
             _ => picture(bytes).ok(),
         }
     }
@@ -109,13 +136,24 @@ impl Source for Recording {
         let about = self.reader.about();
         let told = |key: &str| about.get(key).cloned().unwrap_or_default();
         let size = self.size.unwrap_or(Size::new(0, 0));
-        let first = self.pending.front().map_or(PixelFormat::Mjpeg, |f| f.format);
-        let given = Some(told("format_given")).filter(|f| !f.is_empty()).unwrap_or(format!("{first} {size}"));
+        let first = self
+            .pending
+            .front()
+            .map_or(PixelFormat::Mjpeg, |f| f.format);
+        let given = Some(told("format_given"))
+            .filter(|f| !f.is_empty())
+            .unwrap_or(format!("{first} {size}"));
         SourceInfo {
             name: self.path.display().to_string(),
-            format: FormatNote { asked: given.clone(), given },
+            format: FormatNote {
+                asked: given.clone(),
+                given,
+            },
             size,
-            nominal_rate_hz: about.get("nominal_rate_hz").and_then(|hz| hz.parse().ok()).filter(|hz: &f64| *hz > 0.0),
+            nominal_rate_hz: about
+                .get("nominal_rate_hz")
+                .and_then(|hz| hz.parse().ok())
+                .filter(|hz: &f64| *hz > 0.0),
             frames_total: self.reader.pictures_total(),
             live: false,
         }
@@ -133,7 +171,12 @@ impl Source for Recording {
         let mut lines: Vec<String> = kinds
             .into_iter()
             .filter(|(count, _)| **count > 0)
-            .map(|(count, what)| format!("{name}: frames left out because they {what}: {}", std::mem::take(count)))
+            .map(|(count, what)| {
+                format!(
+                    "{name}: frames left out because they {what}: {}",
+                    std::mem::take(count)
+                )
+            })
             .collect();
         lines.extend(self.reader.warnings());
         lines

@@ -1,5 +1,6 @@
-//! A camera read through the nokhwa crate, for those that fail with our own way. It waits for a frame without a limit, and
-//! tells neither numbers nor flags nor times: the time is that of reception, and whoever runs it must watch it.
+//! A camera read through the nokhwa crate, for those that fail with our own way. It waits for a
+//! frame without a limit, and tells neither numbers nor flags nor times: the time is that of
+//! reception, and whoever runs it must watch it.
 
 use super::choice::{Granted, Wish};
 use super::clock::ClockKind;
@@ -11,7 +12,8 @@ use crate::caught::caught;
 use crate::config;
 use crate::model::{PixelFormat, RawFrame, Size};
 use nokhwa::utils::{
-    ApiBackend, CameraFormat, CameraIndex, FrameFormat, RequestedFormat, RequestedFormatType, Resolution,
+    ApiBackend, CameraFormat, CameraIndex, FrameFormat, RequestedFormat, RequestedFormatType,
+    Resolution,
 };
 use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
@@ -34,7 +36,8 @@ pub(super) struct NokhwaCamera {
 impl NokhwaCamera {
     pub(super) fn open(path: &Path, config: &config::Camera) -> Result<Self, SourceError> {
         let asked = Wish::of(config);
-        // What it lists is asked for in our own way: nokhwa leaves out ranges and what it has no name for.
+        // What it lists is asked for in our own way: nokhwa leaves out ranges and what it has no
+        // name for.
         let prospect = prospect(path, config)?;
         let best = prospect.chosen.map(|(granted, _)| granted);
         let wanted = best.unwrap_or(Granted {
@@ -46,8 +49,12 @@ impl NokhwaCamera {
             if asked.is_met_by(offered) || config.accept_format {
                 return Ok(());
             }
-            let what = format!("asked for {asked}, it offers {offered}; take that with --accept-format");
-            Err(SourceError::BadFormat { input: path.display().to_string(), what })
+            let what =
+                format!("asked for {asked}, it offers {offered}; take that with --accept-format");
+            Err(SourceError::BadFormat {
+                input: path.display().to_string(),
+                what,
+            })
         };
         accept(&wanted)?;
         let known = Known::new(Places::default(), path);
@@ -89,17 +96,38 @@ impl Source for NokhwaCamera {
         let Granted { format, size, .. } = self.granted;
         let shown = self.path.display().to_string();
         let Some(camera) = &mut self.camera.0 else {
-            return Err(SourceError::Disconnected { input: shown, reason: "it is closed".into() });
+            return Err(SourceError::Disconnected {
+                input: shown,
+                reason: "it is closed".into(),
+            });
         };
-        let take = || guarded(|| camera.frame_raw().map(|bytes| picture(&bytes, format, size)));
+        let take = || {
+            guarded(|| {
+                camera
+                    .frame_raw()
+                    .map(|bytes| picture(&bytes, format, size))
+            })
+        };
         let failed = match first_usable(take, self.timeout, &mut self.damaged) {
             Ok(Some(bytes)) => {
                 // Two frames that come at once are told apart by the least step.
                 self.last_s = self.opened.elapsed().as_secs_f64().max(self.last_s + 1e-4);
-                return Ok(Some(RawFrame { sequence: None, sensor_time_s: self.last_s, size, format, bytes }));
+                return Ok(Some(RawFrame {
+                    sequence: None,
+                    sensor_time_s: self.last_s,
+                    size,
+                    format,
+                    bytes,
+                }));
             }
-            Ok(None) => SourceError::Timeout { input: shown, seconds: self.timeout.as_secs_f64() },
-            Err(reason) => SourceError::Disconnected { input: shown, reason },
+            Ok(None) => SourceError::Timeout {
+                input: shown,
+                seconds: self.timeout.as_secs_f64(),
+            },
+            Err(reason) => SourceError::Disconnected {
+                input: shown,
+                reason,
+            },
         };
         self.camera.close();
         Err(failed)
@@ -116,7 +144,10 @@ impl Source for NokhwaCamera {
 
     fn reopen(&mut self) -> Result<(), SourceError> {
         self.camera.close();
-        let absent = || SourceError::Absent { input: self.path.display().to_string(), hint: "plug it in again" };
+        let absent = || SourceError::Absent {
+            input: self.path.display().to_string(),
+            hint: "plug it in again",
+        };
         let path = self.known.find().ok_or_else(absent)?;
         let (camera, granted) = start(&path, &self.granted, self.asked.rate_hz)?;
         same_again(&path, &self.granted, &granted)?;
@@ -125,7 +156,11 @@ impl Source for NokhwaCamera {
     }
 
     fn health(&self) -> Health {
-        Health { damaged: self.damaged, stale: 0, clock: ClockKind::Received }
+        Health {
+            damaged: self.damaged,
+            stale: 0,
+            clock: ClockKind::Received,
+        }
     }
 
     fn waits_without_limit(&self) -> Option<Duration> {
@@ -143,34 +178,59 @@ fn guarded<T>(call: impl FnOnce() -> Result<T, nokhwa::NokhwaError>) -> Result<T
 
 fn start(path: &Path, wanted: &Granted, rate_hz: f64) -> Result<(Opened, Granted), SourceError> {
     let input = path.display().to_string();
-    let bad = |what: String| SourceError::BadFormat { input: input.clone(), what };
+    let bad = |what: String| SourceError::BadFormat {
+        input: input.clone(),
+        what,
+    };
     let target = std::fs::canonicalize(path).map_err(|e| SourceError::of_file(path, &e))?;
-    let number = target.file_name().and_then(|n| n.to_str()?.strip_prefix("video")?.parse().ok());
+    let number = target
+        .file_name()
+        .and_then(|n| n.to_str()?.strip_prefix("video")?.parse().ok());
     let number = number.ok_or_else(|| bad("nokhwa takes /dev/videoN only".into()))?;
-    // nokhwa gives no reason that could be told from another: one that may not be opened yet is to be looked at again.
+    // nokhwa gives no reason that could be told from another: one that may not be opened yet is to
+    // be looked at again.
     let may_open = OpenOptions::new().read(true).write(true).open(&target);
     may_open.map_err(|e| SourceError::of_driver(path, "opening it", &e))?;
     let format = frame_format(wanted.format).ok_or_else(|| {
-        bad(format!("nokhwa does not read {}; set camera.format, or use --backend v4l2", wanted.format))
+        bad(format!(
+            "nokhwa does not read {}; set camera.format, or use --backend v4l2",
+            wanted.format
+        ))
     })?;
     let size = Resolution::new(wanted.size.width, wanted.size.height);
-    let exact = CameraFormat::new(size, format, wanted.rate_hz.unwrap_or(rate_hz).round() as u32);
+    let exact = CameraFormat::new(
+        size,
+        format,
+        wanted.rate_hz.unwrap_or(rate_hz).round() as u32,
+    );
     let formats = [format];
     let request = RequestedFormat::with_formats(RequestedFormatType::Exact(exact), &formats);
     let opened = guarded(|| {
-        let mut camera = nokhwa::Camera::with_backend(CameraIndex::Index(number), request, ApiBackend::Video4Linux)?;
+        let mut camera = nokhwa::Camera::with_backend(
+            CameraIndex::Index(number),
+            request,
+            ApiBackend::Video4Linux,
+        )?;
         camera.open_stream()?;
         Ok(camera)
     });
-    let camera = Opened(Some(opened.map_err(|e| bad(format!("nokhwa: {e}; try --backend v4l2")))?));
-    let given = camera.0.as_ref().map_or(exact, nokhwa::Camera::camera_format);
+    let camera =
+        Opened(Some(opened.map_err(|e| {
+            bad(format!("nokhwa: {e}; try --backend v4l2"))
+        })?));
+    let given = camera
+        .0
+        .as_ref()
+        .map_or(exact, nokhwa::Camera::camera_format);
     let granted = Granted {
         format: wanted.format,
         size: Size::new(given.width(), given.height()),
         rate_hz: Some(f64::from(given.frame_rate())),
     };
     if given.format() != format || granted.size != wanted.size {
-        return Err(bad(format!("nokhwa gives {given} where {wanted} was asked; use --backend v4l2")));
+        return Err(bad(format!(
+            "nokhwa gives {given} where {wanted} was asked; use --backend v4l2"
+        )));
     }
     Ok((camera, granted))
 }
@@ -186,7 +246,8 @@ fn frame_format(format: PixelFormat) -> Option<FrameFormat> {
     }
 }
 
-/// The first picture of any use among those that `take` gives; `None` if there is none within the limit.
+/// The first picture of any use among those that `take` gives; `None` if there is none within the
+/// limit.
 fn first_usable(
     mut take: impl FnMut() -> Result<Option<Vec<u8>>, String>,
     limit: Duration,
@@ -210,16 +271,21 @@ fn picture(buffer: &[u8], format: PixelFormat, size: Size) -> Option<Vec<u8>> {
         Some(length) => length,
         None => jpeg_length(buffer)?,
     };
-    buffer.get(..length).filter(|b| !b.is_empty()).map(<[u8]>::to_vec)
+    buffer
+        .get(..length)
+        .filter(|b| !b.is_empty())
+        .map(<[u8]>::to_vec)
 }
 
-/// Length of the JPEG at the start of `buffer`: behind it may lie the rest of an older and longer one.
+/// Length of the JPEG at the start of `buffer`: behind it may lie the rest of an older and longer
+/// one.
 fn jpeg_length(buffer: &[u8]) -> Option<usize> {
     if !buffer.starts_with(&[0xFF, 0xD8]) {
         return None;
     }
     let mut at = 2;
-    // Segments with their lengths up to the start of the scan; a preview inside of one has an end mark of its own.
+    // Segments with their lengths up to the start of the scan; a preview inside of one has an end
+    // mark of its own.
     loop {
         let [mark, kind, high, low] = *buffer.get(at..at + 4)?.first_chunk()?;
         if mark != 0xFF {
@@ -230,7 +296,10 @@ fn jpeg_length(buffer: &[u8]) -> Option<usize> {
             break;
         }
     }
-    let end = buffer.get(at..)?.windows(2).position(|w| w == [0xFF, 0xD9])?;
+    let end = buffer
+        .get(at..)?
+        .windows(2)
+        .position(|w| w == [0xFF, 0xD9])?;
     Some(at + end + 2)
 }
 
@@ -245,19 +314,27 @@ mod tests {
             taken += 1;
             Ok((taken == 3).then(|| vec![7]))
         };
-        assert_eq!(first_usable(third, Duration::from_secs(60), &mut damaged), Ok(Some(vec![7])));
+        assert_eq!(
+            first_usable(third, Duration::from_secs(60), &mut damaged),
+            Ok(Some(vec![7]))
+        );
         assert_eq!(damaged, 2);
         let never = || {
             std::thread::sleep(Duration::from_millis(1));
             Ok(None)
         };
-        assert_eq!(first_usable(never, Duration::from_millis(20), &mut damaged), Ok(None));
+        assert_eq!(
+            first_usable(never, Duration::from_millis(20), &mut damaged),
+            Ok(None)
+        );
         assert!(damaged > 2);
     }
 
     #[test]
     fn a_jpeg_ends_at_its_own_end_mark() {
-        let mut jpeg = vec![0xFF, 0xD8, 0xFF, 0xE1, 0x00, 0x06, 0xFF, 0xD9, 1, 2, 0xFF, 0xDA, 0x00, 0x02];
+        let mut jpeg = vec![
+            0xFF, 0xD8, 0xFF, 0xE1, 0x00, 0x06, 0xFF, 0xD9, 1, 2, 0xFF, 0xDA, 0x00, 0x02,
+        ];
         jpeg.extend([7, 7, 0xFF, 0x00, 7, 0xFF, 0xD9]);
         let length = jpeg.len();
         jpeg.extend([3, 3, 0xFF, 0xD9, 0, 0]);
@@ -266,6 +343,9 @@ mod tests {
             assert_eq!(jpeg_length(&jpeg[..cut]), None, "{cut}");
         }
         assert_eq!(picture(&[0; 7], PixelFormat::Yuyv, Size::new(2, 2)), None);
-        assert_eq!(picture(&[0; 9], PixelFormat::Yuyv, Size::new(2, 2)).map(|b| b.len()), Some(8));
+        assert_eq!(
+            picture(&[0; 9], PixelFormat::Yuyv, Size::new(2, 2)).map(|b| b.len()),
+            Some(8)
+        );
     }
 }

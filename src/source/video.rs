@@ -1,10 +1,12 @@
 //! Video files, through ffmpeg as a child process.
 //!
-//! ffmpeg writes two things: one line of text a frame with its time and length (`framecrc`), and the frame's bytes.
-//! Each is flushed frame by frame and the line goes first, so that reading a line and then that many bytes, in turns,
-//! can never wait for something that ffmpeg has not written: no thread and no polling is needed.
+//! ffmpeg writes two things: one line of text a frame with its time and length (`framecrc`), and
+//! the frame's bytes. Each is flushed frame by frame and the line goes first, so that reading a
+//! line and then that many bytes, in turns, can never wait for something that ffmpeg has not
+//! written: no thread and no polling is needed.
 //!
-//! MJPEG is only taken out of its container, every other codec is decoded to YUYV. Times are those in the file.
+//! MJPEG is only taken out of its container, every other codec is decoded to YUYV. Times are those
+//! in the file.
 
 use super::probe::{Probe, file_url, probe, ratio, spawn_error};
 use super::{Source, SourceError, SourceInfo};
@@ -18,7 +20,8 @@ use std::process::{Child, ChildStdout, Command, Stdio};
 /// No frame of a size that we can work with is longer; what is comes from a broken file.
 const MAX_FRAME_BYTES: usize = 1 << 30;
 
-/// The line goes to the pipe that is the child's descriptor 0, before the frame goes to its standard output.
+/// The line goes to the pipe that is the child's descriptor 0, before the frame goes to its
+/// standard output.
 const OUTPUTS: &str = "[f=framecrc:flush_packets=1]pipe:0|[f=rawvideo:flush_packets=1]pipe:1";
 
 /// A video file that is being read.
@@ -33,7 +36,8 @@ pub(super) struct Video {
     size: Size,
     format: PixelFormat,
     tick_s: f64,
-    /// The first two frames are read when the file is opened: only then it is known that there are any, and motion.
+    /// The first two frames are read when the file is opened: only then it is known that there are
+    /// any, and motion.
     pending: VecDeque<RawFrame>,
     frames: u64,
     out_of_order: u64,
@@ -51,29 +55,57 @@ impl Video {
 
     fn open_with(path: &Path, ffmpeg: &str, ffprobe: &str) -> Result<Self, SourceError> {
         let probe = probe(path, ffprobe)?;
-        let format = if probe.codec == "mjpeg" { PixelFormat::Mjpeg } else { PixelFormat::Yuyv };
-        let local = |e: std::io::Error| spawn_error(ffmpeg, path, &std::io::Error::other(e.to_string()));
+        let format = if probe.codec == "mjpeg" {
+            PixelFormat::Mjpeg
+        } else {
+            PixelFormat::Yuyv
+        };
+        let local =
+            |e: std::io::Error| spawn_error(ffmpeg, path, &std::io::Error::other(e.to_string()));
         let (lines, lines_end) = std::io::pipe().map_err(local)?;
         let log = tempfile::tempfile().map_err(local)?;
         let mut command = Command::new(ffmpeg);
-        command.args(["-nostdin", "-hide_banner", "-v", "error", "-protocol_whitelist", "file"]);
-        command.args(["-fflags", "+discardcorrupt", "-copyts", "-i"]).arg(file_url(path)).args(["-map", "0:V:0"]);
+        command.args([
+            "-nostdin",
+            "-hide_banner",
+            "-v",
+            "error",
+            "-protocol_whitelist",
+            "file",
+        ]);
+        command
+            .args(["-fflags", "+discardcorrupt", "-copyts", "-i"])
+            .arg(file_url(path))
+            .args(["-map", "0:V:0"]);
         match format {
             PixelFormat::Mjpeg => command.args(["-c:v", "copy"]),
-            // Two pixels share their colour in YUYV: an odd column at the right is cut off. Without `-enc_time_base`
-            // and `-vsync` the times would be rounded to a nominal rate.
+            // Two pixels share their colour in YUYV: an odd column at the right is cut off. Without
+            // `-enc_time_base` and `-vsync` the times would be rounded to a nominal rate.
             _ => command
-                .args(["-vf", "format=yuyv422,crop=trunc(iw/2)*2:ih:0:0", "-c:v", "rawvideo", "-pix_fmt", "yuyv422"])
+                .args([
+                    "-vf",
+                    "format=yuyv422,crop=trunc(iw/2)*2:ih:0:0",
+                    "-c:v",
+                    "rawvideo",
+                    "-pix_fmt",
+                    "yuyv422",
+                ])
                 .args(["-vsync", "passthrough", "-enc_time_base", "-1"]),
         };
         command.args(["-f", "tee", OUTPUTS]);
-        command.stdin(lines_end).stdout(Stdio::piped()).stderr(log.try_clone().map_err(local)?);
-        // A group of its own: Ctrl-C at the terminal is for us, and would look like the clip's end if ffmpeg got it.
+        command
+            .stdin(lines_end)
+            .stdout(Stdio::piped())
+            .stderr(log.try_clone().map_err(local)?);
+        // A group of its own: Ctrl-C at the terminal is for us, and would look like the clip's end
+        // if ffmpeg got it.
         command.process_group(0);
         let mut child = command.spawn().map_err(|e| spawn_error(ffmpeg, path, &e))?;
         // The command still holds the pipe's other end, and with it the end of the stream.
         drop(command);
-        let Some(data) = child.stdout.take() else { return Err(local(std::io::Error::other("no pipe"))) };
+        let Some(data) = child.stdout.take() else {
+            return Err(local(std::io::Error::other("no pipe")));
+        };
         let mut video = Self {
             path: path.to_owned(),
             probe,
@@ -101,10 +133,14 @@ impl Video {
             _ => return Ok(video),
         }
         Err(match video.complaint() {
-            None => SourceError::Empty { input, what: "the video has no frame; film again, or name another file" },
-            Some(what) => {
-                SourceError::BadFormat { input, what: format!("no frame of it can be read (ffmpeg: {what})") }
-            }
+            None => SourceError::Empty {
+                input,
+                what: "the video has no frame; film again, or name another file",
+            },
+            Some(what) => SourceError::BadFormat {
+                input,
+                what: format!("no frame of it can be read (ffmpeg: {what})"),
+            },
         })
     }
 
@@ -112,7 +148,11 @@ impl Video {
     fn read_frame(&mut self) -> Option<RawFrame> {
         while let Some((ticks, length)) = self.read_line() {
             let mut bytes = Vec::with_capacity(length);
-            let read = self.data.by_ref().take(length as u64).read_to_end(&mut bytes);
+            let read = self
+                .data
+                .by_ref()
+                .take(length as u64)
+                .read_to_end(&mut bytes);
             if read.is_err() || bytes.len() < length {
                 return None;
             }
@@ -140,7 +180,8 @@ impl Video {
         None
     }
 
-    /// Time in ticks and length of the next frame; the head before the first one is taken in on the way.
+    /// Time in ticks and length of the next frame; the head before the first one is taken in on the
+    /// way.
     fn read_line(&mut self) -> Option<(i64, usize)> {
         let mut line = String::new();
         loop {
@@ -175,7 +216,12 @@ impl Video {
         let _ = (&self.log).take(1 << 16).read_to_string(&mut said);
         // `[matroska,webm @ 0x5581] File ended prematurely`: the address tells nobody anything.
         let line = said.lines().find(|l| !l.trim().is_empty())?;
-        Some(line.split_once("] ").map_or(line, |(_, rest)| rest).trim().to_owned())
+        Some(
+            line.split_once("] ")
+                .map_or(line, |(_, rest)| rest)
+                .trim()
+                .to_owned(),
+        )
     }
 
     /// Works out what is to be said when no more frames come.
@@ -184,21 +230,32 @@ impl Video {
         let name = self.path.display();
         let read_s = self.last_time_s - self.first_time_s + self.interval_s;
         let frames = self.frames;
-        let promised_s = self.probe.duration_s.filter(|d| d - read_s > f64::max(0.5, 3.0 * self.interval_s));
+        let promised_s = self
+            .probe
+            .duration_s
+            .filter(|d| d - read_s > f64::max(0.5, 3.0 * self.interval_s));
         let cut = self.probe.cut
-            || complaint.as_ref().is_some_and(|c| c.contains("prematurely") || c.contains("partial file"));
+            || complaint
+                .as_ref()
+                .is_some_and(|c| c.contains("prematurely") || c.contains("partial file"));
         if let Some(promised_s) = promised_s {
-            let text =
-                format!("{name}: clip ends early: {read_s:.1} s ({frames} frames) of {promised_s:.1} s are readable");
+            let text = format!(
+                "{name}: clip ends early: {read_s:.1} s ({frames} frames) of {promised_s:.1} s are readable"
+            );
             self.warnings.push(format!("{text}; they are used"));
         } else if cut {
-            self.warnings.push(format!("{name}: clip ends early: the {frames} frames before the cut are used"));
+            self.warnings.push(format!(
+                "{name}: clip ends early: the {frames} frames before the cut are used"
+            ));
         } else if let Some(complaint) = complaint {
-            self.warnings.push(format!("{name}: parts of the clip are damaged (ffmpeg: {complaint})"));
+            self.warnings.push(format!(
+                "{name}: parts of the clip are damaged (ffmpeg: {complaint})"
+            ));
         }
         if self.out_of_order > 0 {
             let text = "frames left out because they were not later than the one before";
-            self.warnings.push(format!("{name}: {text}: {}", self.out_of_order));
+            self.warnings
+                .push(format!("{name}: {text}: {}", self.out_of_order));
         }
     }
 }
@@ -217,14 +274,22 @@ impl Source for Video {
     }
 
     fn describe(&self) -> SourceInfo {
-        let rate = self.probe.rate_hz.map_or(String::new(), |hz| format!(" @ {}", (hz * 100.0).round() / 100.0));
+        let rate = self.probe.rate_hz.map_or(String::new(), |hz| {
+            format!(" @ {}", (hz * 100.0).round() / 100.0)
+        });
         let given = match self.format {
             PixelFormat::Mjpeg => format!("{} {}{rate}", self.format, self.size),
-            _ => format!("{} {}{rate}, decoded to {}", self.probe.codec, self.size, self.format),
+            _ => format!(
+                "{} {}{rate}, decoded to {}",
+                self.probe.codec, self.size, self.format
+            ),
         };
         SourceInfo {
             name: self.path.display().to_string(),
-            format: FormatNote { asked: given.clone(), given },
+            format: FormatNote {
+                asked: given.clone(),
+                given,
+            },
             size: self.size,
             nominal_rate_hz: self.probe.rate_hz,
             frames_total: self.probe.frames,
@@ -252,7 +317,9 @@ mod tests {
     fn a_missing_ffmpeg_is_named_with_the_remedy() {
         let clip = Path::new("recordings/sparse_winter.mkv");
         for (ffmpeg, ffprobe) in [("ffmpeg", "no-such-ffprobe"), ("no-such-ffmpeg", "ffprobe")] {
-            let Err(error) = Video::open_with(clip, ffmpeg, ffprobe) else { panic!("opened without ffmpeg") };
+            let Err(error) = Video::open_with(clip, ffmpeg, ffprobe) else {
+                panic!("opened without ffmpeg")
+            };
             assert!(matches!(error, SourceError::MissingTool { .. }), "{error}");
             assert!(error.to_string().contains("apt install ffmpeg"));
         }

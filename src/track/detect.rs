@@ -1,14 +1,15 @@
-//! Harris corners inside the outline, none on its border (Li et al. appendix A, Zeng section 5.3.2).
+//! Harris corners inside the outline, none on its border (Li et al. appendix A, Zeng section
+//! 5.3.2).
 
 use crate::config::Detect;
 use crate::model::{Luma, Outline};
 use opencv::core::{
-    BORDER_CONSTANT, Mat, Point, Point2f, Rect, Scalar, Size as CvSize, ToInputArray, Vector, bitwise_and, bitwise_or,
-    no_array, subtract,
+    BORDER_CONSTANT, Mat, Point, Point2f, Rect, Scalar, Size as CvSize, ToInputArray, Vector,
+    bitwise_and, bitwise_or, no_array, subtract,
 };
 use opencv::imgproc::{
-    MORPH_CLOSE, MORPH_DILATE, MORPH_ELLIPSE, MORPH_ERODE, THRESH_BINARY, circle, get_structuring_element,
-    good_features_to_track_with_gradient, morphology_ex, threshold,
+    MORPH_CLOSE, MORPH_DILATE, MORPH_ELLIPSE, MORPH_ERODE, THRESH_BINARY, circle,
+    get_structuring_element, good_features_to_track_with_gradient, morphology_ex, threshold,
 };
 use opencv::prelude::*;
 
@@ -30,7 +31,8 @@ pub struct Detector {
 }
 
 impl Detector {
-    /// Prepares detection in `outline`; distances in `settings` are for a picture 640 px wide and grow with it.
+    /// Prepares detection in `outline`; distances in `settings` are for a picture 640 px wide and
+    /// grow with it.
     pub fn new(settings: &Detect, outline: &Outline) -> Self {
         let scale = f64::from(outline.size.width) / 640.0;
         let border_px = (settings.border_px * scale).round() as i32;
@@ -39,7 +41,12 @@ impl Detector {
             (Mat::default(), Rect::default())
         });
         let min_distance_px = (settings.min_distance_px * scale).max(1.0);
-        Self { settings: settings.clone(), allowed, roi, min_distance_px }
+        Self {
+            settings: settings.clone(),
+            allowed,
+            roi,
+            min_distance_px,
+        }
     }
 
     /// Least distance between two points, px.
@@ -47,8 +54,9 @@ impl Detector {
         self.min_distance_px
     }
 
-    /// At most `wanted` corners (px), strongest first, at the minimum distance from `taken`; as they are candidates, of
-    /// which the better half is kept, twice as many find place side by side.
+    /// At most `wanted` corners (px), strongest first, at the minimum distance from `taken`; as
+    /// they are candidates, of which the better half is kept, twice as many find place side by
+    /// side.
     pub fn detect(&self, luma: &Luma, taken: &[[f32; 2]], wanted: usize) -> Vec<[f32; 2]> {
         if self.roi.area() == 0 || wanted == 0 {
             return Vec::new();
@@ -63,14 +71,34 @@ impl Detector {
         (self.min_distance_px * std::f64::consts::FRAC_1_SQRT_2).max(1.0)
     }
 
-    fn corners(&self, luma: &Luma, taken: &[[f32; 2]], wanted: usize) -> opencv::Result<Vec<[f32; 2]>> {
+    fn corners(
+        &self,
+        luma: &Luma,
+        taken: &[[f32; 2]],
+        wanted: usize,
+    ) -> opencv::Result<Vec<[f32; 2]>> {
         let mut mask = self.allowed.clone();
         for p in taken {
-            let centre = Point::new(p[0].round() as i32 - self.roi.x, p[1].round() as i32 - self.roi.y);
+            let centre = Point::new(
+                p[0].round() as i32 - self.roi.x,
+                p[1].round() as i32 - self.roi.y,
+            );
             let radius = self.min_distance_px.round() as i32;
-            circle(&mut mask, centre, radius, Scalar::all(0.0), -1, opencv::imgproc::LINE_8, 0)?;
+            circle(
+                &mut mask,
+                centre,
+                radius,
+                Scalar::all(0.0),
+                -1,
+                opencv::imgproc::LINE_8,
+                0,
+            )?;
         }
-        let picture = Mat::new_rows_cols_with_data(luma.size.height as i32, luma.size.width as i32, &luma.pixels)?;
+        let picture = Mat::new_rows_cols_with_data(
+            luma.size.height as i32,
+            luma.size.width as i32,
+            &luma.pixels,
+        )?;
         let crop = Mat::roi(&picture, self.roi)?;
         let mut corners: Vector<Point2f> = Vector::new();
         good_features_to_track_with_gradient(
@@ -91,16 +119,29 @@ impl Detector {
 }
 
 fn allowed_region(outline: &Outline, border_px: i32) -> opencv::Result<(Mat, Rect)> {
-    let Some([left, top, right, bottom]) = outline.bounds_px() else { return Ok((Mat::default(), Rect::default())) };
-    let roi = Rect::new(left as i32, top as i32, (right - left + 1) as i32, (bottom - top + 1) as i32);
+    let Some([left, top, right, bottom]) = outline.bounds_px() else {
+        return Ok((Mat::default(), Rect::default()));
+    };
+    let roi = Rect::new(
+        left as i32,
+        top as i32,
+        (right - left + 1) as i32,
+        (bottom - top + 1) as i32,
+    );
     let (rows, cols) = (outline.size.height as i32, outline.size.width as i32);
     let mask = Mat::new_rows_cols_with_data(rows, cols, &outline.mask)?;
     let mut eroded = mask.try_clone()?;
     if let Some(matte) = &outline.matte {
         let matte = Mat::new_rows_cols_with_data(rows, cols, matte)?;
         let free = within_matte(&matte, border_px)?;
-        // The matte knows more pieces than the one that is the region; what borders on that is still its own.
-        bitwise_and(&free, &morphed(&mask, MORPH_DILATE, 1)?, &mut eroded, &no_array())?;
+        // The matte knows more pieces than the one that is the region; what borders on that is
+        // still its own.
+        bitwise_and(
+            &free,
+            &morphed(&mask, MORPH_DILATE, 1)?,
+            &mut eroded,
+            &no_array(),
+        )?;
     } else if border_px > 0 {
         // Outside the picture counts as not tree, so that no window hangs over the picture's edge.
         eroded = morphed(&mask, MORPH_ERODE, border_px)?;
@@ -108,9 +149,9 @@ fn allowed_region(outline: &Outline, border_px: i32) -> opencv::Result<(Mat, Rec
     Ok((Mat::roi(&eroded, roi)?.try_clone()?, roi))
 }
 
-/// Where the tree is wide, its pixels farther than `border_px` from the matte's border, as Zeng keeps points off it. A twig
-/// is all border: where the tree is narrower than two borders all of it is allowed, and the pixel beside it, on which the
-/// corner response of an edge may peak.
+/// Where the tree is wide, its pixels farther than `border_px` from the matte's border, as Zeng
+/// keeps points off it. A twig is all border: where the tree is narrower than two borders all of it
+/// is allowed, and the pixel beside it, on which the corner response of an edge may peak.
 fn within_matte(matte: &impl ToInputArray, border_px: i32) -> opencv::Result<Mat> {
     let mut tree = Mat::default();
     threshold(matte, &mut tree, HALF, 255.0, THRESH_BINARY)?;
@@ -132,6 +173,15 @@ fn morphed(from: &impl ToInputArray, how: i32, radius: i32) -> opencv::Result<Ma
     let (side, anchor) = (2 * radius + 1, Point::new(-1, -1));
     let disc = get_structuring_element(MORPH_ELLIPSE, CvSize::new(side, side), anchor)?;
     let mut to = Mat::default();
-    morphology_ex(from, &mut to, how, &disc, anchor, 1, BORDER_CONSTANT, Scalar::all(0.0))?;
+    morphology_ex(
+        from,
+        &mut to,
+        how,
+        &disc,
+        anchor,
+        1,
+        BORDER_CONSTANT,
+        Scalar::all(0.0),
+    )?;
     Ok(to)
 }

@@ -1,15 +1,21 @@
 //! Sparse optical flow: pyramidal Lucas-Kanade on pyramids that are built once a frame (OpenCV).
 
 use crate::model::Luma;
-use opencv::core::{Mat, Point2f, Size as CvSize, TermCriteria, TermCriteria_Type, Vector, no_array};
-use opencv::video::{OPTFLOW_USE_INITIAL_FLOW, build_optical_flow_pyramid, calc_optical_flow_pyr_lk};
+use opencv::core::{
+    Mat, Point2f, Size as CvSize, TermCriteria, TermCriteria_Type, Vector, no_array,
+};
+use opencv::video::{
+    OPTFLOW_USE_INITIAL_FLOW, build_optical_flow_pyramid, calc_optical_flow_pyr_lk,
+};
 
-/// Smallest eigenvalue of the structure tensor, per window pixel, below which a window has too little texture.
+/// Smallest eigenvalue of the structure tensor, per window pixel, below which a window has too
+/// little texture.
 const MIN_EIGENVALUE: f64 = 1e-4;
 
 /// A picture at falling sizes, each with the border that Lucas-Kanade reads beyond its edge.
 ///
-/// Derivatives are left out: computing them again costs less than the memory traffic of keeping them.
+/// Derivatives are left out: computing them again costs less than the memory traffic of keeping
+/// them.
 #[derive(Default)]
 pub struct Pyramid(Vector<Mat>);
 
@@ -18,12 +24,21 @@ impl Pyramid {
     pub fn rebuild(&mut self, luma: &Luma, window_px: u32, levels: u32) {
         let (rows, cols) = (luma.size.height as i32, luma.size.width as i32);
         let built = Mat::new_rows_cols_with_data(rows, cols, &luma.pixels).and_then(|mat| {
-            // Without derivatives OpenCV would take the input itself as level 0; it must outlive this frame, so it is
-            // told not to (`try_reuse_input_image = false`).
+            // Without derivatives OpenCV would take the input itself as level 0; it must outlive
+            // this frame, so it is told not to (`try_reuse_input_image = false`).
             let border = opencv::core::BORDER_REFLECT_101;
             let constant = opencv::core::BORDER_CONSTANT;
             let window = square(window_px);
-            build_optical_flow_pyramid(&mat, &mut self.0, window, levels as i32, false, border, constant, false)
+            build_optical_flow_pyramid(
+                &mat,
+                &mut self.0,
+                window,
+                levels as i32,
+                false,
+                border,
+                constant,
+                false,
+            )
         });
         if let Err(e) = built {
             tracing::error!("optical flow pyramid of a {} picture: {e}", luma.size);
@@ -51,14 +66,28 @@ pub struct OpticalFlow {
 impl OpticalFlow {
     /// `window_px` is the side of the window, odd.
     pub fn new(window_px: u32) -> Self {
-        Self { window_px, from: Vector::new(), to: Vector::new(), status: Vector::new() }
+        Self {
+            window_px,
+            from: Vector::new(),
+            to: Vector::new(),
+            status: Vector::new(),
+        }
     }
 
-    /// Follows `points` (px) from picture `a` to picture `b`, coarse to fine from pyramid level `levels` down; the
-    /// search starts where the point was.
-    pub fn track(&mut self, (a, b): (&Pyramid, &Pyramid), points: &[[f32; 2]], levels: u32, out: &mut Vec<Flow>) {
+    /// Follows `points` (px) from picture `a` to picture `b`, coarse to fine from pyramid level
+    /// `levels` down; the search starts where the point was.
+    pub fn track(
+        &mut self,
+        (a, b): (&Pyramid, &Pyramid),
+        points: &[[f32; 2]],
+        levels: u32,
+        out: &mut Vec<Flow>,
+    ) {
         out.clear();
-        let lost = |p: &[f32; 2]| Flow { to: *p, found: false };
+        let lost = |p: &[f32; 2]| Flow {
+            to: *p,
+            found: false,
+        };
         if points.is_empty() || a.0.is_empty() || b.0.is_empty() {
             out.extend(points.iter().map(lost));
             return;
@@ -88,7 +117,10 @@ impl OpticalFlow {
             return;
         }
         let found = self.status.iter().map(|s| s != 0);
-        out.extend(self.to.iter().zip(found).map(|(p, found)| Flow { to: [p.x, p.y], found }));
+        out.extend(self.to.iter().zip(found).map(|(p, found)| Flow {
+            to: [p.x, p.y],
+            found,
+        }));
     }
 }
 

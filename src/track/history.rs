@@ -24,7 +24,10 @@ pub struct TrackTable {
 
 impl TrackHistory {
     pub fn new(window_s: f64) -> Self {
-        Self { window_s, sets: VecDeque::new() }
+        Self {
+            window_s,
+            sets: VecDeque::new(),
+        }
     }
 
     pub fn push(&mut self, set: TrackSet) {
@@ -69,19 +72,30 @@ impl TrackHistory {
         }
     }
 
-    /// Confirmed tracks seen in the newest frame, also from before they were confirmed, on frames at least `step_s` apart.
+    /// Confirmed tracks seen in the newest frame, also from before they were confirmed, on frames
+    /// at least `step_s` apart.
     pub fn table(&self, step_s: f64) -> TrackTable {
         let mut frames: Vec<&TrackSet> = Vec::new();
         // From the newest backwards, so that the newest frame is always in.
         for set in self.sets.iter().rev() {
-            // A tenth of tolerance: sensor times jitter, and a step of three frames is to stay one of three.
-            if frames.last().is_none_or(|next| next.time_s - set.time_s >= 0.9 * step_s) {
+            // A tenth of tolerance: sensor times jitter, and a step of three frames is to stay one
+            // of three.
+            if frames
+                .last()
+                .is_none_or(|next| next.time_s - set.time_s >= 0.9 * step_s)
+            {
                 frames.push(set);
             }
         }
         frames.reverse();
-        let Some(newest) = frames.last() else { return TrackTable::default() };
-        let row: BTreeMap<TrackId, usize> = newest.counted().enumerate().map(|(i, o)| (o.id, i)).collect();
+        let Some(newest) = frames.last() else {
+            return TrackTable::default();
+        };
+        let row: BTreeMap<TrackId, usize> = newest
+            .counted()
+            .enumerate()
+            .map(|(i, o)| (o.id, i))
+            .collect();
         let mut positions = vec![vec![None; frames.len()]; row.len()];
         let mut errors = vec![Vec::new(); row.len()];
         for (f, set) in frames.iter().enumerate() {
@@ -96,7 +110,10 @@ impl TrackHistory {
             ids: row.into_keys().collect(),
             times_s: frames.iter().map(|s| s.time_s).collect(),
             positions,
-            fb_errors_px: errors.into_iter().map(|e| median(e, f32::total_cmp).unwrap_or(0.0)).collect(),
+            fb_errors_px: errors
+                .into_iter()
+                .map(|e| median(e, f32::total_cmp).unwrap_or(0.0))
+                .collect(),
         }
     }
 }

@@ -1,7 +1,8 @@
 //! Points inside the outline, followed from frame to frame.
 //!
-//! Each frame: flow forward and back; who does not come home rides on its neighbours for a while; a part of the points
-//! is put back on its first patch; who is lost is replaced. Ids are never used twice.
+//! Each frame: flow forward and back; who does not come home rides on its neighbours for a while; a
+//! part of the points is put back on its first patch; who is lost is replaced. Ids are never used
+//! twice.
 
 mod anchor;
 mod detect;
@@ -26,7 +27,8 @@ use trial::{Trial, Trials};
 
 /// Pictures kept to put points back on; the oldest but the first gives way.
 const KEYFRAMES: usize = 4;
-/// New points are looked for when so great a share of the wanted ones is missing, and not more often than this.
+/// New points are looked for when so great a share of the wanted ones is missing, and not more
+/// often than this.
 const REFILL_SHARE: f64 = 0.1;
 const REFILL_S: f64 = 0.5;
 /// Where there were not enough good points to be found, they are looked for again after so long, s.
@@ -102,7 +104,8 @@ impl Tracker {
     /// Follows all points into `frame` and replaces the lost ones.
     pub fn step(&mut self, frame: &Frame) -> TrackSet {
         std::mem::swap(&mut self.previous, &mut self.present);
-        self.present.rebuild(&frame.luma, self.settings.window_px, self.settings.levels);
+        self.present
+            .rebuild(&frame.luma, self.settings.window_px, self.settings.levels);
         let before = self.points.len();
         let mut rejected = Vec::new();
         let regaining = self.gaps.regaining(frame.time_s);
@@ -117,7 +120,11 @@ impl Tracker {
         }
         let lost = (before - self.points.len() - rejected.len()) as u32;
         rejected.extend(self.judge(frame.time_s));
-        let born = if self.refill_due(frame.time_s) { self.refill(frame) } else { 0 };
+        let born = if self.refill_due(frame.time_s) {
+            self.refill(frame)
+        } else {
+            0
+        };
         self.frames += 1;
         let observations = self
             .points
@@ -132,17 +139,26 @@ impl Tracker {
                 confirmed: p.trial.is_none(),
             })
             .collect();
-        TrackSet { frame: frame.index, time_s: frame.time_s, observations, lost, born, rejected }
+        TrackSet {
+            frame: frame.index,
+            time_s: frame.time_s,
+            observations,
+            lost,
+            born,
+            rejected,
+        }
     }
 
-    /// Drops the points that were not seen for too long or have left the picture; those on trial have not passed it.
+    /// Drops the points that were not seen for too long or have left the picture; those on trial
+    /// have not passed it.
     fn give_up(&mut self, frame: &Frame, rejected: &mut Vec<TrackId>) {
         let (size, time_s, patience_s) = (frame.luma.size, frame.time_s, self.settings.coast_s);
         self.points.retain_mut(|p| {
             if p.coasting == 0 {
                 p.seen_s = time_s;
             }
-            let keep = time_s - p.seen_s <= patience_s && size.contains(f64::from(p.now_px[0]), f64::from(p.now_px[1]));
+            let keep = time_s - p.seen_s <= patience_s
+                && size.contains(f64::from(p.now_px[0]), f64::from(p.now_px[1]));
             if !keep && p.trial.is_some() {
                 rejected.push(p.id);
             }
@@ -150,20 +166,28 @@ impl Tracker {
         });
     }
 
-    /// Lucas-Kanade forward and back; who misses its start by too much is moved with its neighbours.
+    /// Lucas-Kanade forward and back; who misses its start by too much is moved with its
+    /// neighbours.
     fn follow(&mut self) {
         let b = &mut self.buffers;
         let pictures = (&self.previous, &self.present);
-        // What flow finds where a hidden point is thought to be may be whatever hides it: that it is the point its first patch
-        // must tell.
+        // What flow finds where a hidden point is thought to be may be whatever hides it: that it
+        // is the point its first patch must tell.
         let blind = self.settings.anchor_every == 0;
         let followed = |p: &Point| p.coasting == 0 || blind;
         b.from.clear();
-        b.from.extend(self.points.iter().filter(|p| followed(p)).map(|p| p.now_px));
-        self.flow.track(pictures, &b.from, self.settings.levels, &mut b.forward);
+        b.from
+            .extend(self.points.iter().filter(|p| followed(p)).map(|p| p.now_px));
+        self.flow
+            .track(pictures, &b.from, self.settings.levels, &mut b.forward);
         b.to.clear();
         b.to.extend(b.forward.iter().map(|f| f.to));
-        self.flow.track((pictures.1, pictures.0), &b.to, self.settings.levels, &mut b.backward);
+        self.flow.track(
+            (pictures.1, pictures.0),
+            &b.to,
+            self.settings.levels,
+            &mut b.backward,
+        );
         let limit = self.settings.fb_limit_px as f32;
         let mut flows = b.from.iter().zip(b.forward.iter().zip(&b.backward));
         for p in &mut self.points {
@@ -181,9 +205,12 @@ impl Tracker {
         self.ride();
     }
 
-    /// Whether points are to be looked for: so many of those that there were are lost, or it is worth another try.
+    /// Whether points are to be looked for: so many of those that there were are lost, or it is
+    /// worth another try.
     fn refill_due(&self, time_s: f64) -> bool {
-        let few = |of: usize| of.saturating_sub(self.points.len()) as f64 >= REFILL_SHARE * self.wanted as f64;
+        let few = |of: usize| {
+            of.saturating_sub(self.points.len()) as f64 >= REFILL_SHARE * self.wanted as f64
+        };
         let rested = time_s >= self.detected_s + REFILL_S;
         let again = few(self.wanted) && time_s >= self.detected_s + TRY_AGAIN_S;
         // While the tree rests, a trial may be long, and the light may take points away.
@@ -206,12 +233,21 @@ impl Tracker {
         if self.keyframes.len() == KEYFRAMES {
             self.keyframes.remove(1);
         }
-        self.keyframes.push((self.next_keyframe, Keyframe::new(&frame.luma, &self.settings)));
-        let known_ids: Vec<TrackId> = (self.points.iter().filter(|p| p.coasting == 0).map(|p| p.id))
-            .chain((0..found.len() as u32).map(|k| TrackId(self.next_id + k)))
-            .collect();
-        let known_px: Vec<[f32; 2]> =
-            (self.points.iter().filter(|p| p.coasting == 0).map(|p| p.now_px)).chain(found.iter().copied()).collect();
+        self.keyframes.push((
+            self.next_keyframe,
+            Keyframe::new(&frame.luma, &self.settings),
+        ));
+        let known_ids: Vec<TrackId> =
+            (self.points.iter().filter(|p| p.coasting == 0).map(|p| p.id))
+                .chain((0..found.len() as u32).map(|k| TrackId(self.next_id + k)))
+                .collect();
+        let known_px: Vec<[f32; 2]> = (self
+            .points
+            .iter()
+            .filter(|p| p.coasting == 0)
+            .map(|p| p.now_px))
+        .chain(found.iter().copied())
+        .collect();
         for (at, near) in found.iter().zip(neighbours::nearest(&found, &known_px)) {
             self.points.push(Point {
                 id: TrackId(self.next_id),
@@ -222,7 +258,10 @@ impl Tracker {
                 fb_error_px: 0.0,
                 coasting: 0,
                 seen_s: frame.time_s,
-                neighbours: near.into_iter().map(|j| (known_ids[j as usize], known_px[j as usize])).collect(),
+                neighbours: near
+                    .into_iter()
+                    .map(|j| (known_ids[j as usize], known_px[j as usize]))
+                    .collect(),
                 record: Record::default(),
                 trial: on_trial.then(Trial::default),
             });
@@ -230,7 +269,11 @@ impl Tracker {
         }
         self.next_keyframe += 1;
         if on_trial && self.trials.is_none() {
-            self.trials = Some(Trials::new(frame.time_s, self.bar_px.is_none(), found.len()));
+            self.trials = Some(Trials::new(
+                frame.time_s,
+                self.bar_px.is_none(),
+                found.len(),
+            ));
         }
         found.len() as u32
     }

@@ -1,4 +1,5 @@
-//! What the points around a point say of where it should be: a robust local affine fit of displacements.
+//! What the points around a point say of where it should be: a robust local affine fit of
+//! displacements.
 
 use super::register::Warp;
 use nalgebra::{Matrix3, Matrix3x2, Vector3};
@@ -10,8 +11,8 @@ pub const REMEMBERED: usize = 2 * NEIGHBOURS;
 /// Fewer neighbours than this say nothing.
 const AT_LEAST: usize = 4;
 
-/// For every point the indices of its nearest others among all of `known`, at most [`REMEMBERED`], nearest first. The
-/// points themselves are the last of `known`.
+/// For every point the indices of its nearest others among all of `known`, at most [`REMEMBERED`],
+/// nearest first. The points themselves are the last of `known`.
 pub fn nearest(points: &[[f32; 2]], known: &[[f32; 2]]) -> Vec<Vec<u32>> {
     let distance_sq = |a: &[f32; 2], b: &[f32; 2]| (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2);
     let before = known.len() - points.len();
@@ -22,8 +23,9 @@ pub fn nearest(points: &[[f32; 2]], known: &[[f32; 2]]) -> Vec<Vec<u32>> {
         .map(|(i, p)| {
             order.clear();
             order.extend((0..known.len() as u32).filter(|&j| j as usize != before + i));
-            let by_distance =
-                |a: &u32, b: &u32| distance_sq(p, &known[*a as usize]).total_cmp(&distance_sq(p, &known[*b as usize]));
+            let by_distance = |a: &u32, b: &u32| {
+                distance_sq(p, &known[*a as usize]).total_cmp(&distance_sq(p, &known[*b as usize]))
+            };
             if order.len() > REMEMBERED {
                 order.select_nth_unstable_by(REMEMBERED - 1, by_distance);
                 order.truncate(REMEMBERED);
@@ -53,27 +55,42 @@ pub struct Fit {
     pub warp: Warp,
 }
 
-/// An affine fit to the displacements of a point's neighbours. Disagreeing neighbours lose their weight (iteratively
-/// reweighted least squares with Cauchy-squared weights); the slope is held towards zero, so that few or collinear
-/// neighbours still give an answer.
+/// An affine fit to the displacements of a point's neighbours. Disagreeing neighbours lose their
+/// weight (iteratively reweighted least squares with Cauchy-squared weights); the slope is held
+/// towards zero, so that few or collinear neighbours still give an answer.
 pub fn fit(witnesses: &[Witness]) -> Option<Fit> {
     if witnesses.len() < AT_LEAST {
         return None;
     }
     let used = &witnesses[..witnesses.len().min(NEIGHBOURS)];
     let mut weights = [0.0; NEIGHBOURS];
-    weights.iter_mut().zip(used).for_each(|(w, n)| *w = n.weight);
+    weights
+        .iter_mut()
+        .zip(used)
+        .for_each(|(w, n)| *w = n.weight);
     let mut fit = Matrix3x2::zeros();
     for _ in 0..4 {
         let mut normal = Matrix3::from_diagonal(&Vector3::new(1e-3, 30.0, 30.0));
         let mut right = Matrix3x2::zeros();
-        for (Witness { offset, displacement, .. }, &w) in used.iter().zip(&weights) {
+        for (
+            Witness {
+                offset,
+                displacement,
+                ..
+            },
+            &w,
+        ) in used.iter().zip(&weights)
+        {
             let row = Vector3::new(1.0, offset[0], offset[1]);
             normal += w * row * row.transpose();
             right += w * row * nalgebra::RowVector2::new(displacement[0], displacement[1]);
         }
         fit = normal.cholesky()?.solve(&right);
-        let square = |Witness { offset, displacement, .. }: &Witness| {
+        let square = |Witness {
+                          offset,
+                          displacement,
+                          ..
+                      }: &Witness| {
             let at = |c: usize| fit[(0, c)] + fit[(1, c)] * offset[0] + fit[(2, c)] * offset[1];
             (displacement[0] - at(0)).powi(2) + (displacement[1] - at(1)).powi(2)
         };
@@ -90,6 +107,12 @@ pub fn fit(witnesses: &[Witness]) -> Option<Fit> {
         }
     }
     let slope = |of: usize, along: usize| fit[(1 + along, of)] as f32;
-    let warp = [[1.0 + slope(0, 0), slope(0, 1)], [slope(1, 0), 1.0 + slope(1, 1)]];
-    Some(Fit { displacement: [fit[(0, 0)], fit[(0, 1)]], warp })
+    let warp = [
+        [1.0 + slope(0, 0), slope(0, 1)],
+        [slope(1, 0), 1.0 + slope(1, 1)],
+    ];
+    Some(Fit {
+        displacement: [fit[(0, 0)], fit[(0, 1)]],
+        warp,
+    })
 }

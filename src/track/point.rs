@@ -10,15 +10,16 @@ use crate::model::TrackId;
 const NEWEST: f32 = 0.1;
 /// Likeness below which a neighbour is hardly believed.
 const DOUBTFUL: f32 = 0.5;
-/// A point is hidden where it looks less like its first patch than this share of what is usual for it, and there again
-/// from that share on.
+/// A point is hidden where it looks less like its first patch than this share of what is usual for
+/// it, and there again from that share on.
 const HIDDEN: f32 = 0.2;
 const THERE_AGAIN: f32 = 0.8;
-/// The same where no neighbour vouches for the place: the share of what is usual, and not less than is asked of all.
+/// The same where no neighbour vouches for the place: the share of what is usual, and not less than
+/// is asked of all.
 const SURELY_THERE: f32 = 0.9;
-/// Expected error = 4.7 px exp(-1.9 likeness) sqrt(distance from the neighbours' place + 0.2 px): least squares on the
-/// logarithms of true errors on two rendered clips of known motion, all points that were tried. Of those kept it tells
-/// good from bad only roughly (docs/method.md).
+/// Expected error = 4.7 px exp(-1.9 likeness) sqrt(distance from the neighbours' place + 0.2 px):
+/// least squares on the logarithms of true errors on two rendered clips of known motion, all points
+/// that were tried. Of those kept it tells good from bad only roughly (docs/method.md).
 const ERROR_PX: f32 = 4.7;
 const PER_LIKENESS: f32 = -1.9;
 const APART_FLOOR_PX: f32 = 0.2;
@@ -51,7 +52,8 @@ impl Point {
         f64::from(((self.usual_likeness() - DOUBTFUL) / (1.0 - DOUBTFUL)).clamp(0.02, 1.0))
     }
 
-    /// Whether it is compared with its first patch in frame `frame`, where each is in one of `every`; 0 is never.
+    /// Whether it is compared with its first patch in frame `frame`, where each is in one of
+    /// `every`; 0 is never.
     pub fn in_turn(&self, every: u32, frame: u64) -> bool {
         every > 0 && u64::from(self.id.0) % u64::from(every) == frame % u64::from(every)
     }
@@ -61,15 +63,24 @@ impl Point {
         HIDDEN * self.usual_likeness()
     }
 
-    /// Likeness above which it is found again. Not more than `enough`, for foliage never looks the same twice; but not less
-    /// than nearly usual where it is hidden and no neighbour vouches for the place.
+    /// Likeness above which it is found again. Not more than `enough`, for foliage never looks the
+    /// same twice; but not less than nearly usual where it is hidden and no neighbour vouches for
+    /// the place.
     pub fn found_above(&self, enough: f32, vouched: bool) -> f32 {
         let usual = self.usual_likeness();
-        if self.coasting > 0 && !vouched { enough.max(SURELY_THERE * usual) } else { enough.min(THERE_AGAIN * usual) }
+        if self.coasting > 0 && !vouched {
+            enough.max(SURELY_THERE * usual)
+        } else {
+            enough.min(THERE_AGAIN * usual)
+        }
     }
 
     fn usual_likeness(&self) -> f32 {
-        if self.record.comparisons == 0 { 1.0 } else { self.record.likeness }
+        if self.record.comparisons == 0 {
+            1.0
+        } else {
+            self.record.likeness
+        }
     }
 
     /// Where its neighbours say that it is, px.
@@ -106,8 +117,10 @@ impl Record {
         self.ln_apart += share * ((apart_px + APART_FLOOR_PX).ln() - self.ln_apart);
     }
 
-    /// How far the point is expected to be from the one that it was (median), px; `None` before the first comparison.
+    /// How far the point is expected to be from the one that it was (median), px; `None` before the
+    /// first comparison.
     pub fn error_px(&self) -> Option<f32> {
-        (self.comparisons > 0).then(|| ERROR_PX * (PER_LIKENESS * self.likeness + 0.5 * self.ln_apart).exp())
+        (self.comparisons > 0)
+            .then(|| ERROR_PX * (PER_LIKENESS * self.likeness + 0.5 * self.ln_apart).exp())
     }
 }

@@ -1,7 +1,8 @@
 //! After a gap: points are found again by the pictures they were first seen in.
 //!
-//! Following them from the last picture before the gap would not do. The tree has swayed on, and points slide onto others
-//! that look alike; a camera that has just started shows pictures that are too dark or too bright to be compared at all.
+//! Following them from the last picture before the gap would not do. The tree has swayed on, and
+//! points slide onto others that look alike; a camera that has just started shows pictures that are
+//! too dark or too bright to be compared at all.
 
 use super::Tracker;
 use super::point::Point;
@@ -27,7 +28,10 @@ impl Gaps {
     pub fn regaining(&mut self, time_s: f64) -> bool {
         if let Some(last_s) = self.last_s.replace(time_s) {
             let step_s = time_s - last_s;
-            if self.step_s.is_some_and(|usual_s| step_s > (GAP_STEPS * usual_s).max(GAP_S)) {
+            if self
+                .step_s
+                .is_some_and(|usual_s| step_s > (GAP_STEPS * usual_s).max(GAP_S))
+            {
                 self.until_s = Some(time_s + PATIENCE_S);
             } else {
                 self.step_s = Some(step_s);
@@ -42,11 +46,20 @@ impl Tracker {
     /// Looks for every point by its first picture; those that are not found ride on those that are.
     pub(super) fn regain(&mut self, frame: &Frame) {
         // One that was not seen for a while is not given up for it: it had no chance.
-        self.points.iter_mut().for_each(|p| (p.coasting, p.seen_s) = (1, frame.time_s));
+        self.points
+            .iter_mut()
+            .for_each(|p| (p.coasting, p.seen_s) = (1, frame.time_s));
         for (number, keyframe) in &self.keyframes {
-            let indices: Vec<usize> = (0..self.points.len()).filter(|&i| self.points[i].keyframe == *number).collect();
+            let indices: Vec<usize> = (0..self.points.len())
+                .filter(|&i| self.points[i].keyframe == *number)
+                .collect();
             let points: Vec<&Point> = indices.iter().map(|&i| &self.points[i]).collect();
-            let found = self.anchoring.search(keyframe, (&frame.luma, &self.present), &points, self.settings.levels);
+            let found = self.anchoring.search(
+                keyframe,
+                (&frame.luma, &self.present),
+                &points,
+                self.settings.levels,
+            );
             for (i, at) in indices.into_iter().zip(found) {
                 if let Some(at) = at {
                     let p = &mut self.points[i];

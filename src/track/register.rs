@@ -1,8 +1,9 @@
 //! A point's first patch found again in a later picture, to a fraction of a pixel.
 //!
-//! Inverse compositional Gauss-Newton on the shift alone (Baker and Matthews, "Lucas-Kanade 20 years on", 2004). The patch
-//! is warped as the points around it say that the branch has turned and bent; patch and picture are brought to zero mean
-//! and unit variance, so that a leaf in the shade is the same leaf; weights fall off from the middle, where the point is.
+//! Inverse compositional Gauss-Newton on the shift alone (Baker and Matthews, "Lucas-Kanade 20
+//! years on", 2004). The patch is warped as the points around it say that the branch has turned and
+//! bent; patch and picture are brought to zero mean and unit variance, so that a leaf in the shade
+//! is the same leaf; weights fall off from the middle, where the point is.
 
 use crate::model::Luma;
 
@@ -10,17 +11,20 @@ use crate::model::Luma;
 const HALF_PX: i32 = 5;
 const SIDE: usize = 2 * HALF_PX as usize + 1;
 const N: usize = SIDE * SIDE;
-/// Sums are added up in so many lanes, always in the same order; arrays are filled up with zeros to whole lanes.
+/// Sums are added up in so many lanes, always in the same order; arrays are filled up with zeros to
+/// whole lanes.
 const LANES: usize = 8;
 const FILLED: usize = N.next_multiple_of(LANES);
-/// Places between pixels in fixed point: a pixel is 2^16, of whose bits 11 are used to mix brightness.
+/// Places between pixels in fixed point: a pixel is 2^16, of whose bits 11 are used to mix
+/// brightness.
 const PIXEL_BITS: u32 = 16;
 const MIX_BITS: u32 = 11;
 /// Pictures as wide as this no longer fit, px.
 const WIDEST_PX: f32 = 32_000.0;
 /// Standard deviation of the Gaussian weights, as a share of half the side.
 const SIGMA: f32 = 0.6;
-/// The search ends when a step is shorter than this, px, or after so many; no step is longer than that, px.
+/// The search ends when a step is shorter than this, px, or after so many; no step is longer than
+/// that, px.
 const CLOSE_PX: f32 = 0.03;
 const STEPS: usize = 12;
 const LONGEST_STEP_PX: f32 = 1.5;
@@ -78,7 +82,8 @@ impl Registration {
     pub fn patch(&self, luma: &Luma, at: [f32; 2]) -> Patch {
         let (mut values, mut slopes) = ([0.0; FILLED], [[0.0; FILLED]; 2]);
         sample(luma, at, &UPRIGHT, &mut values);
-        let mean = |of: &[f32; FILLED]| self.weights.iter().zip(of).map(|(w, v)| w * v).sum::<f32>();
+        let mean =
+            |of: &[f32; FILLED]| self.weights.iter().zip(of).map(|(w, v)| w * v).sum::<f32>();
         let centre = |of: &mut [f32; FILLED]| {
             let mean = mean(of);
             of[..N].iter_mut().for_each(|v| *v -= mean);
@@ -95,7 +100,12 @@ impl Registration {
         // Brightness is compared less its mean, so that its slopes count less their means, too.
         slopes.iter_mut().for_each(centre);
         let product = |a: &[f32; FILLED], b: &[f32; FILLED]| {
-            self.weights.iter().zip(a).zip(b).map(|((w, a), b)| w * a * b).sum::<f32>()
+            self.weights
+                .iter()
+                .zip(a)
+                .zip(b)
+                .map(|((w, a), b)| w * a * b)
+                .sum::<f32>()
         };
         let [x, y] = &slopes;
         let (xx, xy, yy) = (product(x, x) + 1e-4, product(x, y), product(y, y) + 1e-4);
@@ -104,7 +114,12 @@ impl Registration {
         for of in [&mut values].into_iter().chain(&mut slopes) {
             of.iter_mut().zip(&self.weights).for_each(|(v, w)| *v *= w);
         }
-        Patch { values, slopes, at_home, inverse: [yy / determinant, -xy / determinant, xx / determinant] }
+        Patch {
+            values,
+            slopes,
+            at_home,
+            inverse: [yy / determinant, -xy / determinant, xx / determinant],
+        }
     }
 
     /// How alike `patch` and the picture around `at` are, -1 to 1.
@@ -117,7 +132,12 @@ impl Registration {
     /// Looks for `patch` in `luma` from `start` (px) on.
     pub fn find(&self, patch: &Patch, luma: &Luma, start: [f32; 2], warp: &Warp) -> Match {
         let mut values = [0.0; FILLED];
-        let mut found = Match { at_px: start, likeness: 0.0, likeness_at_start: 0.0, converged: false };
+        let mut found = Match {
+            at_px: start,
+            likeness: 0.0,
+            likeness_at_start: 0.0,
+            converged: false,
+        };
         for k in 0..STEPS {
             sample(luma, found.at_px, warp, &mut values);
             let (likeness, right) = self.compare(patch, &values);
@@ -141,17 +161,22 @@ impl Registration {
         found
     }
 
-    /// Correlation of patch and `values`, and the weighted sum of the patch's slopes times what it is brighter by, both at
-    /// zero mean and unit variance. Patch and slopes have no mean, so that those of `values` need not be taken out first:
-    /// all sums come from one pass.
+    /// Correlation of patch and `values`, and the weighted sum of the patch's slopes times what it
+    /// is brighter by, both at zero mean and unit variance. Patch and slopes have no mean, so that
+    /// those of `values` need not be taken out first: all sums come from one pass.
     fn compare(&self, patch: &Patch, values: &[f32; FILLED]) -> (f32, [f32; 2]) {
         // From a value near the mean, or the variance would be lost in the digits.
         let near = values[N / 2];
         let mut sums = [[0.0f32; LANES]; 5];
-        let lanes = |of: &[f32; FILLED], k: usize| -> [f32; LANES] { std::array::from_fn(|l| of[k + l]) };
+        let lanes =
+            |of: &[f32; FILLED], k: usize| -> [f32; LANES] { std::array::from_fn(|l| of[k + l]) };
         for k in (0..FILLED).step_by(LANES) {
             let (w, v) = (lanes(&self.weights, k), lanes(values, k).map(|v| v - near));
-            let (p, x, y) = (lanes(&patch.values, k), lanes(&patch.slopes[0], k), lanes(&patch.slopes[1], k));
+            let (p, x, y) = (
+                lanes(&patch.values, k),
+                lanes(&patch.slopes[0], k),
+                lanes(&patch.slopes[1], k),
+            );
             for l in 0..LANES {
                 let weighted = w[l] * v[l];
                 sums[0][l] += weighted;
@@ -163,13 +188,20 @@ impl Registration {
         }
         let [mean, square, alike, x, y] = sums.map(|s| s.iter().sum::<f32>());
         let scale = scale(square - mean * mean);
-        (scale * alike, [patch.at_home[0] - scale * x, patch.at_home[1] - scale * y])
+        (
+            scale * alike,
+            [patch.at_home[0] - scale * x, patch.at_home[1] - scale * y],
+        )
     }
 }
 
 /// What brings brightness to unit variance; 0 where there is no texture: that is like nothing.
 fn scale(variance: f32) -> f32 {
-    if variance < LEAST_VARIANCE { 0.0 } else { 1.0 / variance.sqrt() }
+    if variance < LEAST_VARIANCE {
+        0.0
+    } else {
+        1.0 / variance.sqrt()
+    }
 }
 
 /// Offsets of a patch's pixels from its middle, row by row.
@@ -183,7 +215,8 @@ fn sample(luma: &Luma, at: [f32; 2], warp: &Warp, into: &mut [f32; FILLED]) {
     let half = HALF_PX as f32;
     let reach = [0, 1].map(|c| half * (warp[c][0].abs() + warp[c][1].abs()));
     // Rounding may put the outermost a hair farther out.
-    let inside = |c: usize| at[c] - reach[c] >= 1.0 && at[c] + reach[c] < (size[c] - 2.0).min(WIDEST_PX);
+    let inside =
+        |c: usize| at[c] - reach[c] >= 1.0 && at[c] + reach[c] < (size[c] - 2.0).min(WIDEST_PX);
     if !(inside(0) && inside(1)) {
         for (value, (x, y)) in into.iter_mut().zip(offsets()) {
             let to = [0, 1].map(|c| at[c] + warp[c][0] * x + warp[c][1] * y);
@@ -195,17 +228,21 @@ fn sample(luma: &Luma, at: [f32; 2], warp: &Warp, into: &mut [f32; FILLED]) {
     let mix = |p: i32| (p >> (PIXEL_BITS - MIX_BITS)) & ((1 << MIX_BITS) - 1);
     let (step, width) = ([0, 1].map(|c| fixed(warp[c][0])), luma.size.width as usize);
     for (row, y) in into[..N].chunks_exact_mut(SIDE).zip(-HALF_PX..=HALF_PX) {
-        let [mut u, mut v] = [0, 1].map(|c| fixed(at[c] + warp[c][1] * y as f32 - warp[c][0] * half));
+        let [mut u, mut v] =
+            [0, 1].map(|c| fixed(at[c] + warp[c][1] * y as f32 - warp[c][0] * half));
         for value in row {
             let upper = (v >> PIXEL_BITS) as usize * width + (u >> PIXEL_BITS) as usize;
             let pair = |from: usize| luma.pixels.get(from..).and_then(|p| p.first_chunk::<2>());
-            let (Some(above), Some(below)) = (pair(upper), pair(upper + width)) else { continue };
+            let (Some(above), Some(below)) = (pair(upper), pair(upper + width)) else {
+                continue;
+            };
             let (a, b) = (mix(u), mix(v));
             let [above, below] = [above, below].map(|p| {
                 let [left, right] = p.map(i32::from);
                 (left << MIX_BITS) + a * (right - left)
             });
-            *value = ((above << MIX_BITS) + b * (below - above)) as f32 * (1.0 / (1 << (2 * MIX_BITS)) as f32);
+            *value = ((above << MIX_BITS) + b * (below - above)) as f32
+                * (1.0 / (1 << (2 * MIX_BITS)) as f32);
             (u, v) = (u + step[0], v + step[1]);
         }
     }
@@ -220,5 +257,6 @@ fn bilinear(luma: &Luma, u_px: f32, v_px: f32) -> f32 {
     let (u1, v1) = ((u0 + 1).min(w - 1), (v0 + 1).min(h - 1));
     let (fu, fv) = (u - u0 as f32, v - v0 as f32);
     let at = |u: i32, v: i32| f32::from(luma.pixels[(v * w + u) as usize]);
-    (at(u0, v0) * (1.0 - fu) + at(u1, v0) * fu) * (1.0 - fv) + (at(u0, v1) * (1.0 - fu) + at(u1, v1) * fu) * fv
+    (at(u0, v0) * (1.0 - fu) + at(u1, v0) * fu) * (1.0 - fv)
+        + (at(u0, v1) * (1.0 - fu) + at(u1, v1) * fu) * fv
 }

@@ -1,8 +1,9 @@
-//! New points are on trial: twice as many as wanted are followed for a while, and the better half is kept.
+//! New points are on trial: twice as many as wanted are followed for a while, and the better half
+//! is kept.
 //!
-//! A third of all corners lie where two layers of motion meet in one window, a branch before a branch, a leaf over a
-//! leaf. No patch can be followed there, and at first sight they cannot be told from the others; while the tree moves,
-//! they can.
+//! A third of all corners lie where two layers of motion meet in one window, a branch before a
+//! branch, a leaf over a leaf. No patch can be followed there, and at first sight they cannot be
+//! told from the others; while the tree moves, they can.
 
 use super::Tracker;
 use super::anchor::distance;
@@ -12,25 +13,28 @@ use std::collections::BTreeSet;
 
 /// So many candidates are followed for each point that is wanted.
 pub const CANDIDATES: usize = 2;
-/// A trial lasts until the points have moved for so long, s, and not longer than [`LONGEST_TRIAL_S`] from when the first
-/// of them have stirred.
+/// A trial lasts until the points have moved for so long, s, and not longer than
+/// [`LONGEST_TRIAL_S`] from when the first of them have stirred.
 const MOVED_S: f64 = 2.0;
-/// Points count as moving while so great a share of them is so far from where they were found, px. An outline may be
-/// wide, and more wall than tree.
+/// Points count as moving while so great a share of them is so far from where they were found, px.
+/// An outline may be wide, and more wall than tree.
 const MOVING_SHARE: f64 = 0.25;
 const MOVED_PX: f32 = 1.0;
-/// They have stirred when so great a share is so far from there, px, or so many: in a wide outline the tree may have but
-/// few, and half of what evidence of motion needs to count in full may make a tree all the same.
+/// They have stirred when so great a share is so far from there, px, or so many: in a wide outline
+/// the tree may have but few, and half of what evidence of motion needs to count in full may make a
+/// tree all the same.
 const STIRRED_SHARE: f64 = 0.1;
 const STIRRED: usize = 16;
 const STIRRED_PX: f32 = 0.3;
 /// More than this between two frames is a gap, in which nobody saw them move, s.
 const STEP_S: f64 = 0.2;
-/// Points that move alike far compete with each other: else those of the trunk, which are easy, would drive out the twigs.
+/// Points that move alike far compete with each other: else those of the trunk, which are easy,
+/// would drive out the twigs.
 const CLASSES: usize = 4;
 /// Later points must be as good as so great a share of those that were kept first.
 const BAR: f64 = 0.75;
-/// So many are kept that move, good or not, if so many are wanted: twice what evidence of motion needs to count in full.
+/// So many are kept that move, good or not, if so many are wanted: twice what evidence of motion
+/// needs to count in full.
 const NEEDED: usize = 64;
 
 /// What is known of one point on trial.
@@ -44,7 +48,8 @@ pub struct Trial {
 /// The trial that is going on.
 #[derive(Debug)]
 pub struct Trials {
-    /// From when on its length counts; `None` while everything is at rest, where nothing can be told.
+    /// From when on its length counts; `None` while everything is at rest, where nothing can be
+    /// told.
     since_s: Option<f64>,
     last_s: f64,
     moved_s: f64,
@@ -53,10 +58,16 @@ pub struct Trials {
 }
 
 impl Trials {
-    /// The first points of a capture wait for the tree to move, however long that takes: until then there is nothing
-    /// to be decided, and no tree to which they belong. Later ones have [`LONGEST_TRIAL_S`] in any case.
+    /// The first points of a capture wait for the tree to move, however long that takes: until then
+    /// there is nothing to be decided, and no tree to which they belong. Later ones have
+    /// [`LONGEST_TRIAL_S`] in any case.
     pub fn new(time_s: f64, first: bool, started: usize) -> Self {
-        Self { started, since_s: (!first).then_some(time_s), last_s: time_s, moved_s: 0.0 }
+        Self {
+            started,
+            since_s: (!first).then_some(time_s),
+            last_s: time_s,
+            moved_s: 0.0,
+        }
     }
 
     /// Nothing has stirred yet.
@@ -64,18 +75,25 @@ impl Trials {
         self.since_s.is_none()
     }
 
-    /// Takes the time of a frame and how far points are from where they were found, sorted; whether the trial is over.
+    /// Takes the time of a frame and how far points are from where they were found, sorted; whether
+    /// the trial is over.
     fn over(&mut self, time_s: f64, away_px: &[f32]) -> bool {
         let count = |px: f32| away_px.len() - away_px.partition_point(|d| *d <= px);
-        let beyond = |px: f32, share: f64| count(px) > 0 && count(px) as f64 >= share * away_px.len() as f64;
-        if self.since_s.is_none() && (count(STIRRED_PX) >= STIRRED || beyond(STIRRED_PX, STIRRED_SHARE)) {
+        let beyond =
+            |px: f32, share: f64| count(px) > 0 && count(px) as f64 >= share * away_px.len() as f64;
+        if self.since_s.is_none()
+            && (count(STIRRED_PX) >= STIRRED || beyond(STIRRED_PX, STIRRED_SHARE))
+        {
             self.since_s = Some(time_s);
         }
         if beyond(MOVED_PX, MOVING_SHARE) {
             self.moved_s += (time_s - self.last_s).clamp(0.0, STEP_S);
         }
         self.last_s = time_s;
-        self.moved_s >= MOVED_S || self.since_s.is_some_and(|since_s| time_s - since_s >= LONGEST_TRIAL_S)
+        self.moved_s >= MOVED_S
+            || self
+                .since_s
+                .is_some_and(|since_s| time_s - since_s >= LONGEST_TRIAL_S)
     }
 }
 
@@ -96,7 +114,9 @@ impl Candidate {
 impl Tracker {
     /// Ends the trial if it is time; gives the points that are dropped for it, by id.
     pub(super) fn judge(&mut self, time_s: f64) -> Vec<TrackId> {
-        let Some(trials) = &mut self.trials else { return Vec::new() };
+        let Some(trials) = &mut self.trials else {
+            return Vec::new();
+        };
         let mut away_px: Vec<f32> = Vec::new();
         for p in &mut self.points {
             if let Some(trial) = &mut p.trial {
@@ -113,7 +133,11 @@ impl Tracker {
         self.trials = None;
         let candidate = |p: &Point| {
             let trial = p.trial.as_ref().filter(|_| p.coasting == 0)?;
-            Some(Candidate { id: p.id, reach_px: trial.reach_px, error_px: trial.record.error_px()? })
+            Some(Candidate {
+                id: p.id,
+                reach_px: trial.reach_px,
+                error_px: trial.record.error_px()?,
+            })
         };
         let mut candidates: Vec<Candidate> = self.points.iter().filter_map(candidate).collect();
         let there = self.points.iter().filter(|p| p.trial.is_none()).count();
@@ -126,11 +150,17 @@ impl Tracker {
             Some(bar_px) => {
                 candidates.sort_by(|a, b| a.error_px.total_cmp(&b.error_px));
                 let good = candidates.iter().take_while(|c| c.error_px <= bar_px);
-                good.take(self.wanted.saturating_sub(there)).map(|c| c.id).collect()
+                good.take(self.wanted.saturating_sub(there))
+                    .map(|c| c.id)
+                    .collect()
             }
         };
         let needed = NEEDED.min(self.wanted).saturating_sub(there);
-        let kept = fill_up(kept, candidates, (needed, self.wanted.saturating_sub(there)));
+        let kept = fill_up(
+            kept,
+            candidates,
+            (needed, self.wanted.saturating_sub(there)),
+        );
         let mut dropped = Vec::new();
         self.points.retain_mut(|p| {
             let keep = p.trial.is_none() || kept.contains(&p.id);
@@ -145,8 +175,8 @@ impl Tracker {
     }
 }
 
-/// So many, the same share of each class of reach, that are expected to err least, and the error that [`BAR`] of them
-/// keep below, px.
+/// So many, the same share of each class of reach, that are expected to err least, and the error
+/// that [`BAR`] of them keep below, px.
 fn best(candidates: &mut [Candidate], wanted: usize) -> (BTreeSet<TrackId>, Option<f32>) {
     let share = (wanted as f64 / candidates.len().max(1) as f64).min(1.0);
     candidates.sort_by(|a, b| a.reach_px.total_cmp(&b.reach_px));
@@ -163,8 +193,9 @@ fn best(candidates: &mut [Candidate], wanted: usize) -> (BTreeSet<TrackId>, Opti
     (kept, bar_px)
 }
 
-/// Adds the best of those that were not kept until `needed` are that move, and failing those, until so many are at all:
-/// a tree from doubtful points is better than none. More than `wanted` are not kept for it: the worst that rest go.
+/// Adds the best of those that were not kept until `needed` are that move, and failing those, until
+/// so many are at all: a tree from doubtful points is better than none. More than `wanted` are not
+/// kept for it: the worst that rest go.
 fn fill_up(
     mut kept: BTreeSet<TrackId>,
     mut candidates: Vec<Candidate>,
@@ -173,7 +204,11 @@ fn fill_up(
     candidates.sort_by(|a, b| a.error_px.total_cmp(&b.error_px));
     let moving = candidates.iter().filter(|c| c.moves());
     let missing = needed.saturating_sub(moving.clone().filter(|c| kept.contains(&c.id)).count());
-    let more: Vec<TrackId> = moving.map(|c| c.id).filter(|id| !kept.contains(id)).take(missing).collect();
+    let more: Vec<TrackId> = moving
+        .map(|c| c.id)
+        .filter(|id| !kept.contains(id))
+        .take(missing)
+        .collect();
     kept.extend(more);
     for worst in candidates.iter().rev().filter(|c| !c.moves()) {
         if kept.len() <= wanted {
@@ -182,7 +217,12 @@ fn fill_up(
         kept.remove(&worst.id);
     }
     let missing = needed.saturating_sub(kept.len());
-    let more: Vec<TrackId> = candidates.iter().map(|c| c.id).filter(|id| !kept.contains(id)).take(missing).collect();
+    let more: Vec<TrackId> = candidates
+        .iter()
+        .map(|c| c.id)
+        .filter(|id| !kept.contains(id))
+        .take(missing)
+        .collect();
     kept.extend(more);
     kept
 }
@@ -191,7 +231,8 @@ fn fill_up(
 mod tests {
     use super::*;
 
-    /// The trunk's points, which hardly move and are easy to follow, must not drive out those of the twigs.
+    /// The trunk's points, which hardly move and are easy to follow, must not drive out those of
+    /// the twigs.
     #[test]
     fn points_compete_with_those_that_move_alike_far() {
         let candidate = |k: u32| Candidate {
@@ -216,28 +257,51 @@ mod tests {
         let mut few: Vec<Candidate> = (0..240).map(candidate).collect();
         let moving: BTreeSet<TrackId> = (0..240).step_by(6).map(TrackId).collect();
         let (half, _) = best(&mut few, 120);
-        assert!(half.intersection(&moving).count() < 35, "the half alone has too few");
+        assert!(
+            half.intersection(&moving).count() < 35,
+            "the half alone has too few"
+        );
         let kept = fill_up(half, few, (64, 120));
         assert_eq!(
             (kept.intersection(&moving).count(), kept.len()),
             (40, 120),
             "all that move, and not more than wanted"
         );
-        let still: Vec<Candidate> = (0..100).map(|k| Candidate { reach_px: 0.0, ..candidate(k) }).collect();
+        let still: Vec<Candidate> = (0..100)
+            .map(|k| Candidate {
+                reach_px: 0.0,
+                ..candidate(k)
+            })
+            .collect();
         let best: BTreeSet<TrackId> = (0..64).map(TrackId).collect();
-        assert_eq!(fill_up(BTreeSet::new(), still, (64, 120)), best, "where nothing moves, the best");
+        assert_eq!(
+            fill_up(BTreeSet::new(), still, (64, 120)),
+            best,
+            "where nothing moves, the best"
+        );
     }
 
-    /// Whoever starts the camera, goes out and pulls at the tree must get the same choice as one who was quick.
+    /// Whoever starts the camera, goes out and pulls at the tree must get the same choice as one
+    /// who was quick.
     #[test]
     fn while_the_tree_rests_nothing_is_decided() {
         let mut first = Trials::new(0.0, true, 40);
         let (still, swaying) = ([0.05; 40], [0.1, 0.2, 3.0, 5.0]);
         assert!((1..400).all(|k| !first.over(f64::from(k) * 0.1, &still) && first.at_rest()));
-        let over_s = (400..).map(|k| f64::from(k) * 0.1).find(|t| first.over(*t, &swaying));
-        assert!(over_s.is_some_and(|s| (41.8..42.2).contains(&s)), "{over_s:?}");
+        let over_s = (400..)
+            .map(|k| f64::from(k) * 0.1)
+            .find(|t| first.over(*t, &swaying));
+        assert!(
+            over_s.is_some_and(|s| (41.8..42.2).contains(&s)),
+            "{over_s:?}"
+        );
         let mut later = Trials::new(0.0, false, 40);
-        let over_s = (1..).map(|k| f64::from(k) * 0.1).find(|t| later.over(*t, &still));
-        assert!(over_s.is_some_and(|s| (s - LONGEST_TRIAL_S).abs() < 0.15), "later ones have a limit: {over_s:?}");
+        let over_s = (1..)
+            .map(|k| f64::from(k) * 0.1)
+            .find(|t| later.over(*t, &still));
+        assert!(
+            over_s.is_some_and(|s| (s - LONGEST_TRIAL_S).abs() < 0.15),
+            "later ones have a limit: {over_s:?}"
+        );
     }
 }

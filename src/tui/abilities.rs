@@ -38,5 +38,9 @@ pub fn abilities() -> Option<Abilities> {
         Kind::Sixel => "Sixel",
         Kind::Iterm2 => "iTerm2",
     };
-    Some(Abilities { cells, depth: options.depth, pictures })
+    Some(Abilities {
+        cells,
+        depth: options.depth,
+        pictures,
+    })
 }

@@ -63,8 +63,11 @@ fn crosses_itself(polygon: &[[f64; 2]]) -> bool {
         let (a, b) = side(i);
         let (_, c) = side((i + 1) % n);
         // A side that runs back over the one before it encloses nothing.
-        let back = turn(a, b, c) == 0.0 && (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1]) < 0.0;
-        back || (i + 2..n).filter(|j| (j + 1) % n != i).any(|j| meet(side(i), side(j)))
+        let back = turn(a, b, c) == 0.0
+            && (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1]) < 0.0;
+        back || (i + 2..n)
+            .filter(|j| (j + 1) % n != i)
+            .any(|j| meet(side(i), side(j)))
     })
 }
 
@@ -80,7 +83,8 @@ fn meet((a, b): Side, (c, d): Side) -> bool {
         || (s4 == 0.0 && between(c, d, b))
 }
 
-/// Twice the signed area of a triangle; clicks lie on a grid, so a straight run rounds to nearly zero.
+/// Twice the signed area of a triangle; clicks lie on a grid, so a straight run rounds to nearly
+/// zero.
 fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
     if area.abs() < 1e-6 { 0.0 } else { area }
@@ -101,12 +105,36 @@ mod tests {
             ("nothing", &[], false),
             ("a line", &[[0.0, 0.0], [9.0, 9.0]], false),
             ("a triangle", &[[0.0, 0.0], [9.0, 0.0], [0.0, 9.0]], true),
-            ("there and back", &[[0.0, 0.0], [9.0, 0.0], [4.0, 0.0]], false),
-            ("a bow tie", &[[0.0, 0.0], [9.0, 9.0], [9.0, 0.0], [0.0, 9.0]], false),
-            ("a straight run in a side", &[[0.0, 0.0], [4.0, 0.0], [9.0, 0.0], [9.0, 9.0], [0.0, 9.0]], true),
-            ("a notch", &[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [5.0, 2.0], [0.0, 9.0]], true),
-            ("a corner on a side", &[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [5.0, 0.0], [0.0, 9.0]], false),
-            ("closed by hand", &[[0.0, 0.0], [9.0, 0.0], [0.0, 9.0], [0.0, 0.0]], true),
+            (
+                "there and back",
+                &[[0.0, 0.0], [9.0, 0.0], [4.0, 0.0]],
+                false,
+            ),
+            (
+                "a bow tie",
+                &[[0.0, 0.0], [9.0, 9.0], [9.0, 0.0], [0.0, 9.0]],
+                false,
+            ),
+            (
+                "a straight run in a side",
+                &[[0.0, 0.0], [4.0, 0.0], [9.0, 0.0], [9.0, 9.0], [0.0, 9.0]],
+                true,
+            ),
+            (
+                "a notch",
+                &[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [5.0, 2.0], [0.0, 9.0]],
+                true,
+            ),
+            (
+                "a corner on a side",
+                &[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [5.0, 0.0], [0.0, 9.0]],
+                false,
+            ),
+            (
+                "closed by hand",
+                &[[0.0, 0.0], [9.0, 0.0], [0.0, 9.0], [0.0, 0.0]],
+                true,
+            ),
         ];
         for (name, points, good) in cases {
             let mut drawing = Drawing::default();

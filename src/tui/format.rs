@@ -14,7 +14,8 @@ pub fn count(n: u64) -> String {
     }
 }
 
-/// A measured value in at most seven characters, with two decimals where they fit; a dash for what is no number.
+/// A measured value in at most seven characters, with two decimals where they fit; a dash for what
+/// is no number.
 pub fn value(x: f64) -> String {
     match x.abs() {
         a if !a.is_finite() => "–".to_owned(),
@@ -25,8 +26,9 @@ pub fn value(x: f64) -> String {
     }
 }
 
-/// A value and half of its interval, with as many decimals as that bears, in at most thirteen characters where the
-/// value is less than 100. The half is rounded up: nothing looks surer than it is.
+/// A value and half of its interval, with as many decimals as that bears, in at most thirteen
+/// characters where the value is less than 100. The half is rounded up: nothing looks surer than it
+/// is.
 pub fn plus_minus(i: &Interval) -> String {
     let half = 0.5 * (i.hi - i.lo);
     if !(i.value.is_finite() && half.is_finite()) || i.value.abs() >= 99.995 || half >= 99.0 {
@@ -39,16 +41,27 @@ pub fn plus_minus(i: &Interval) -> String {
     };
     let unit = 10f64.powi(-decimals);
     let half = ((half / unit - 1e-6).ceil() * unit).max(unit);
-    format!("{:.*}±{half:.*}", decimals as usize, i.value, decimals as usize)
+    format!(
+        "{:.*}±{half:.*}",
+        decimals as usize, i.value, decimals as usize
+    )
 }
 
 /// Milliseconds, with a decimal only where it counts.
 pub fn millis(ms: f64) -> String {
-    if ms.abs() < 9_999.5 && (ms.abs() >= 9.95) { format!("{ms:.0} ms") } else { format!("{} ms", short(ms)) }
+    if ms.abs() < 9_999.5 && (ms.abs() >= 9.95) {
+        format!("{ms:.0} ms")
+    } else {
+        format!("{} ms", short(ms))
+    }
 }
 
 fn short(x: f64) -> String {
-    if x.abs() < 9.95 { format!("{x:.1}") } else { value(x) }
+    if x.abs() < 9.95 {
+        format!("{x:.1}")
+    } else {
+        value(x)
+    }
 }
 
 /// Seconds as `m:ss` or `h:mm:ss`.
@@ -83,10 +96,15 @@ pub fn keep_end(text: &str, room: usize) -> String {
         }
         kept = longer;
     }
-    if room == 0 { String::new() } else { format!("…{kept}") }
+    if room == 0 {
+        String::new()
+    } else {
+        format!("…{kept}")
+    }
 }
 
-/// Breaks a text at spaces into lines of at most `room` columns; a word longer than that is broken where it must.
+/// Breaks a text at spaces into lines of at most `room` columns; a word longer than that is broken
+/// where it must.
 pub fn wrap(text: &str, room: usize) -> Vec<String> {
     let mut lines = Vec::new();
     if room == 0 {
@@ -123,7 +141,13 @@ mod tests {
 
     #[test]
     fn numbers() {
-        for (n, text) in [(0, "0"), (99_999, "99999"), (123_456, "123k"), (45_000_000, "45M"), (u64::MAX, "lots")] {
+        for (n, text) in [
+            (0, "0"),
+            (99_999, "99999"),
+            (123_456, "123k"),
+            (45_000_000, "45M"),
+            (u64::MAX, "lots"),
+        ] {
             assert_eq!(count(n), text);
         }
         for (x, text) in [
@@ -139,10 +163,21 @@ mod tests {
         ] {
             assert_eq!(value(x), text);
         }
-        for (ms, text) in [(0.04, "0.0 ms"), (21.4, "21 ms"), (1e9, "1e9 ms"), (f64::NAN, "– ms")] {
+        for (ms, text) in [
+            (0.04, "0.0 ms"),
+            (21.4, "21 ms"),
+            (1e9, "1e9 ms"),
+            (f64::NAN, "– ms"),
+        ] {
             assert_eq!(millis(ms), text);
         }
-        for (s, text) in [(0.0, "0:00"), (61.9, "1:01"), (3661.0, "1:01:01"), (f64::NAN, "–"), (1e300, "999:59:59")] {
+        for (s, text) in [
+            (0.0, "0:00"),
+            (61.9, "1:01"),
+            (3661.0, "1:01:01"),
+            (f64::NAN, "–"),
+            (1e300, "999:59:59"),
+        ] {
             assert_eq!(clock(s), text);
         }
     }
@@ -177,7 +212,11 @@ mod tests {
         ] {
             assert_eq!(wrap(text, room), lines, "{text:?} in {room}");
         }
-        for (text, room, kept) in [("/a/b.mcap", 20, "/a/b.mcap"), ("/a/b.mcap", 6, "….mcap"), ("abc", 0, "")] {
+        for (text, room, kept) in [
+            ("/a/b.mcap", 20, "/a/b.mcap"),
+            ("/a/b.mcap", 6, "….mcap"),
+            ("abc", 0, ""),
+        ] {
             assert_eq!(keep_end(text, room), kept);
         }
     }

@@ -1,4 +1,5 @@
-//! How pictures reach the terminal: by an image protocol where it has one, else as half blocks, else as letters.
+//! How pictures reach the terminal: by an image protocol where it has one, else as half blocks,
+//! else as letters.
 
 use super::raster::Raster;
 use super::theme::Depth;
@@ -42,7 +43,8 @@ pub struct Graphics {
     pub cell_dots: (u16, u16),
     /// Whether a picture is packed before it is sent; worth its time only over a network.
     pack: bool,
-    /// The terminal did not answer in time: its answer may still come and is not to be taken for keys.
+    /// The terminal did not answer in time: its answer may still come and is not to be taken for
+    /// keys.
     pub late: bool,
     sent: u32,
 }
@@ -53,11 +55,22 @@ const KITTY_IDS: [u32; 2] = [0x00a2_b041, 0x00a2_b042];
 impl Graphics {
     /// Pictures made of characters.
     pub fn characters(depth: Depth) -> Self {
-        let kind = if depth == Depth::None { Kind::Letters } else { Kind::HalfBlocks };
-        Self { kind, cell_dots: (1, 2), pack: false, late: false, sent: 0 }
+        let kind = if depth == Depth::None {
+            Kind::Letters
+        } else {
+            Kind::HalfBlocks
+        };
+        Self {
+            kind,
+            cell_dots: (1, 2),
+            pack: false,
+            late: false,
+            sent: 0,
+        }
     }
 
-    /// Asks the terminal, for at most `limit`. It must be in raw mode, and nobody else may read from it.
+    /// Asks the terminal, for at most `limit`. It must be in raw mode, and nobody else may read
+    /// from it.
     ///
     /// # Errors
     /// The terminal cannot be written to or read from.
@@ -67,43 +80,59 @@ impl Graphics {
             return Ok(graphics);
         }
         let set = |name: &str| std::env::var(name).is_ok_and(|v| !v.is_empty());
-        let mut query = QueryStdioOptions { kitty_compression: true, ..QueryStdioOptions::default() };
+        let mut query = QueryStdioOptions {
+            kitty_compression: true,
+            ..QueryStdioOptions::default()
+        };
         if set("WEZTERM_EXECUTABLE") || set("KONSOLE_VERSION") {
             // Both claim kitty's protocol without its placeholders.
             query.blacklist_protocols = vec![ProtocolType::Kitty, ProtocolType::Sixel];
         }
-        // tmux is asked as a terminal of its own: passing through it would need its options changed.
+        // tmux is asked as a terminal of its own: passing through it would need its options
+        // changed.
         let mut out = stdout();
         out.write_all(Parser::query(false, query).as_bytes())?;
         out.flush()?;
         let (answers, late) = answers(tty, limit)?;
         graphics.late = late;
         graphics.pack = answers.contains(&Response::KittyCompression) && set("SSH_CONNECTION");
-        if let Some((kind, cell_dots)) = choose(wanted, &answers, iterm2_by_name(), cell_by_window()) {
+        if let Some((kind, cell_dots)) =
+            choose(wanted, &answers, iterm2_by_name(), cell_by_window())
+        {
             (graphics.kind, graphics.cell_dots) = (kind, cell_dots);
         }
         Ok(graphics)
     }
 
-    /// Makes a picture ready to be put on the screen; `None` if this kind of terminal is not sent pictures.
+    /// Makes a picture ready to be put on the screen; `None` if this kind of terminal is not sent
+    /// pictures.
     pub fn encode(&mut self, raster: Raster, cells: Size) -> Option<Protocol> {
-        let picture = image::RgbImage::from_raw(raster.size.width, raster.size.height, raster.pixels)?.into();
+        let picture =
+            image::RgbImage::from_raw(raster.size.width, raster.size.height, raster.pixels)?.into();
         match self.kind {
             Kind::Letters | Kind::HalfBlocks => None,
             Kind::Kitty => {
                 self.sent = self.sent.wrapping_add(1);
                 let id = KITTY_IDS[self.sent as usize % 2];
-                Kitty::new(picture, cells, id, false, self.pack).ok().map(Protocol::Kitty)
+                Kitty::new(picture, cells, id, false, self.pack)
+                    .ok()
+                    .map(Protocol::Kitty)
             }
             Kind::Sixel => Sixel::new(picture, cells, false).ok().map(Protocol::Sixel),
-            Kind::Iterm2 => Iterm2::new(picture, cells, false).ok().map(Protocol::ITerm2),
+            Kind::Iterm2 => Iterm2::new(picture, cells, false)
+                .ok()
+                .map(Protocol::ITerm2),
         }
     }
 
     /// What the terminal is told at the end, so that it forgets the pictures.
     pub fn farewell(&self) -> String {
         let forget = |id: &u32| format!("\x1b_Ga=d,d=I,i={id},q=2\x1b\\");
-        if self.kind == Kind::Kitty { KITTY_IDS.iter().map(forget).collect() } else { String::new() }
+        if self.kind == Kind::Kitty {
+            KITTY_IDS.iter().map(forget).collect()
+        } else {
+            String::new()
+        }
     }
 }
 
@@ -141,7 +170,9 @@ fn choose(
         Response::CellSize(size) => *size,
         _ => None,
     });
-    let cell = told.or(window_cell).filter(|(w, h)| (3..=100).contains(w) && (3..=200).contains(h))?;
+    let cell = told
+        .or(window_cell)
+        .filter(|(w, h)| (3..=100).contains(w) && (3..=200).contains(h))?;
     let kind = match wanted {
         Preview::HalfBlocks => return None,
         Preview::Kitty => Kind::Kitty,
@@ -155,16 +186,31 @@ fn choose(
     Some((kind, cell))
 }
 
-/// Terminals with iTerm2's protocol, which cannot be asked for. Inside tmux the name is that of another terminal.
+/// Terminals with iTerm2's protocol, which cannot be asked for. Inside tmux the name is that of
+/// another terminal.
 fn iterm2_by_name() -> bool {
     let name = |variable: &str| std::env::var(variable).unwrap_or_default();
-    let known = ["iTerm", "WezTerm", "mintty", "vscode", "Tabby", "rio", "WarpTerminal"];
-    name("TMUX").is_empty() && known.iter().any(|k| name("TERM_PROGRAM").contains(k) || name("LC_TERMINAL").contains(k))
+    let known = [
+        "iTerm",
+        "WezTerm",
+        "mintty",
+        "vscode",
+        "Tabby",
+        "rio",
+        "WarpTerminal",
+    ];
+    name("TMUX").is_empty()
+        && known
+            .iter()
+            .any(|k| name("TERM_PROGRAM").contains(k) || name("LC_TERMINAL").contains(k))
 }
 
 fn cell_by_window() -> Option<(u16, u16)> {
     let window = ratatui::crossterm::terminal::window_size().ok()?;
-    Some((window.width.checked_div(window.columns)?, window.height.checked_div(window.rows)?))
+    Some((
+        window.width.checked_div(window.columns)?,
+        window.height.checked_div(window.rows)?,
+    ))
 }
 
 #[cfg(test)]
@@ -179,16 +225,44 @@ mod tests {
             (Preview::Auto, vec![], false, None),
             (Preview::Auto, vec![Status], true, None),
             (Preview::Auto, vec![cell.clone(), Status], false, None),
-            (Preview::Auto, vec![Kitty, Sixel, cell.clone()], true, Some(Kind::Kitty)),
-            (Preview::Auto, vec![Sixel, cell.clone()], false, Some(Kind::Sixel)),
-            (Preview::Auto, vec![Sixel, cell.clone()], true, Some(Kind::Iterm2)),
-            (Preview::Auto, vec![Sixel, CellSize(Some((0, 0)))], false, None),
+            (
+                Preview::Auto,
+                vec![Kitty, Sixel, cell.clone()],
+                true,
+                Some(Kind::Kitty),
+            ),
+            (
+                Preview::Auto,
+                vec![Sixel, cell.clone()],
+                false,
+                Some(Kind::Sixel),
+            ),
+            (
+                Preview::Auto,
+                vec![Sixel, cell.clone()],
+                true,
+                Some(Kind::Iterm2),
+            ),
+            (
+                Preview::Auto,
+                vec![Sixel, CellSize(Some((0, 0)))],
+                false,
+                None,
+            ),
             (Preview::HalfBlocks, vec![Kitty, cell.clone()], false, None),
-            (Preview::Sixel, vec![Kitty, cell.clone()], false, Some(Kind::Sixel)),
+            (
+                Preview::Sixel,
+                vec![Kitty, cell.clone()],
+                false,
+                Some(Kind::Sixel),
+            ),
         ] {
             let kind = choose(wanted, &answers, iterm2, None).map(|c| c.0);
             assert_eq!(kind, expected, "{wanted:?} {answers:?} {iterm2}");
         }
-        assert_eq!(choose(Preview::Auto, &[Kitty], false, Some((8, 16))), Some((Kind::Kitty, (8, 16))));
+        assert_eq!(
+            choose(Preview::Auto, &[Kitty], false, Some((8, 16))),
+            Some((Kind::Kitty, (8, 16)))
+        );
     }
 }

@@ -4,7 +4,9 @@ use crate::caught;
 use ratatui::crossterm::cursor::Show;
 use ratatui::crossterm::execute;
 use ratatui::crossterm::style::ResetColor;
-use ratatui::crossterm::terminal::{EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode};
+use ratatui::crossterm::terminal::{
+    EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode,
+};
 use std::io::{self, Write, stdout};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, Once, TryLockError};
@@ -26,7 +28,8 @@ pub struct Guard {
 }
 
 impl Guard {
-    /// Raw mode and the alternate screen; from here on a panic gives both back before it prints itself.
+    /// Raw mode and the alternate screen; from here on a panic gives both back before it prints
+    /// itself.
     ///
     /// # Errors
     /// Standard output is no terminal, or cannot be written to.
@@ -34,7 +37,10 @@ impl Guard {
         HOOK.call_once(hook_panics);
         enable_raw_mode()?;
         ACTIVE.store(true, Ordering::SeqCst);
-        let guard = Self { mouse: false, farewell: String::new() };
+        let guard = Self {
+            mouse: false,
+            farewell: String::new(),
+        };
         execute!(stdout(), EnterAlternateScreen)?;
         Ok(guard)
     }
@@ -46,7 +52,9 @@ impl Guard {
 
     /// Permission to write to the screen, `None` once a panic has given it back.
     pub fn writing(&self) -> Option<MutexGuard<'static, ()>> {
-        let lock = WRITING.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let lock = WRITING
+            .lock()
+            .unwrap_or_else(|poisoned| poisoned.into_inner());
         ACTIVE.load(Ordering::SeqCst).then_some(lock)
     }
 
@@ -58,7 +66,9 @@ impl Guard {
         if on == self.mouse {
             return Ok(());
         }
-        let Some(_lock) = self.writing() else { return Ok(()) };
+        let Some(_lock) = self.writing() else {
+            return Ok(());
+        };
         self.mouse = on;
         let mut out = stdout();
         out.write_all(if on { MOUSE_ON } else { MOUSE_OFF }.as_bytes())?;
@@ -84,7 +94,8 @@ impl Drop for Guard {
     }
 }
 
-/// Gives the terminal back, once. There is nobody to tell of a failure: the terminal itself is what failed.
+/// Gives the terminal back, once. There is nobody to tell of a failure: the terminal itself is what
+/// failed.
 fn restore(farewell: &str) {
     if !ACTIVE.swap(false, Ordering::SeqCst) {
         return;
@@ -116,6 +127,9 @@ mod tests {
         let caught = caught::caught(|| panic!("a driver"));
         // What `Guard::enter` did not do must not be undone.
         let active = ACTIVE.swap(false, Ordering::SeqCst);
-        assert_eq!((caught, active, caught::catching()), (None::<()>, true, false));
+        assert_eq!(
+            (caught, active, caught::catching()),
+            (None::<()>, true, false)
+        );
     }
 }

@@ -4,7 +4,9 @@ use super::drawing::Drawing;
 use super::placed::Placed;
 use super::state::State;
 use crate::model::Control;
-use ratatui::crossterm::event::{Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers, MouseButton, MouseEventKind};
+use ratatui::crossterm::event::{
+    Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers, MouseButton, MouseEventKind,
+};
 
 /// What a key does while the capture is watched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,19 +55,73 @@ pub const fn bind<A>(
     help: &'static str,
     action: A,
 ) -> Binding<A> {
-    Binding { key, shown, short, help, action }
+    Binding {
+        key,
+        shown,
+        short,
+        help,
+        action,
+    }
 }
 
 /// Keys while watching; those without a short name do what another one is told to do.
 pub const WATCHING: [Binding<Action>; 17] = [
-    bind(KeyCode::Char('?'), "?", "help", "shows and hides this help", Action::Help),
-    bind(KeyCode::Char('q'), "q", "quit", "ends the capture and writes it (Ctrl-C too)", Action::Quit),
-    bind(KeyCode::Char(' '), "space", "pause", "stops taking frames, or goes on", Action::Pause),
-    bind(KeyCode::Char('o'), "o", "outline", "draws the tree's outline by mouse or keyboard", Action::Outline),
-    bind(KeyCode::Char('b'), "b", "build", "builds the tree now, from the motion seen so far", Action::Build),
-    bind(KeyCode::Char('r'), "r", "restart", "forgets points and tree, starts again", Action::Restart),
-    bind(KeyCode::Char('e'), "e", "export", "writes the capture as it is now, goes on", Action::Export),
-    bind(KeyCode::Char('j'), "j k", "branch", "choose a branch (arrows too); Esc leaves it", Action::Choose(1)),
+    bind(
+        KeyCode::Char('?'),
+        "?",
+        "help",
+        "shows and hides this help",
+        Action::Help,
+    ),
+    bind(
+        KeyCode::Char('q'),
+        "q",
+        "quit",
+        "ends the capture and writes it (Ctrl-C too)",
+        Action::Quit,
+    ),
+    bind(
+        KeyCode::Char(' '),
+        "space",
+        "pause",
+        "stops taking frames, or goes on",
+        Action::Pause,
+    ),
+    bind(
+        KeyCode::Char('o'),
+        "o",
+        "outline",
+        "draws the tree's outline by mouse or keyboard",
+        Action::Outline,
+    ),
+    bind(
+        KeyCode::Char('b'),
+        "b",
+        "build",
+        "builds the tree now, from the motion seen so far",
+        Action::Build,
+    ),
+    bind(
+        KeyCode::Char('r'),
+        "r",
+        "restart",
+        "forgets points and tree, starts again",
+        Action::Restart,
+    ),
+    bind(
+        KeyCode::Char('e'),
+        "e",
+        "export",
+        "writes the capture as it is now, goes on",
+        Action::Export,
+    ),
+    bind(
+        KeyCode::Char('j'),
+        "j k",
+        "branch",
+        "choose a branch (arrows too); Esc leaves it",
+        Action::Choose(1),
+    ),
     bind(
         KeyCode::Char('h'),
         "h l",
@@ -85,11 +141,41 @@ pub const WATCHING: [Binding<Action>; 17] = [
 
 /// Keys while drawing; those without a short name are told in the help only.
 pub const DRAWING: [Binding<Stroke>; 12] = [
-    bind(KeyCode::Enter, "Enter", "close", "closes the outline and starts with it", Stroke::Close),
-    bind(KeyCode::Backspace, "Bksp", "back", "takes the last point back", Stroke::TakeBack),
-    bind(KeyCode::Esc, "Esc", "leave", "leaves everything as it was", Stroke::Leave),
-    bind(KeyCode::Char(' '), "space", "set", "sets a point at the cross", Stroke::Set),
-    bind(KeyCode::Left, "arrows", "move", "move the cross by a cell; H J K L by eight", Stroke::Move(-1, 0)),
+    bind(
+        KeyCode::Enter,
+        "Enter",
+        "close",
+        "closes the outline and starts with it",
+        Stroke::Close,
+    ),
+    bind(
+        KeyCode::Backspace,
+        "Bksp",
+        "back",
+        "takes the last point back",
+        Stroke::TakeBack,
+    ),
+    bind(
+        KeyCode::Esc,
+        "Esc",
+        "leave",
+        "leaves everything as it was",
+        Stroke::Leave,
+    ),
+    bind(
+        KeyCode::Char(' '),
+        "space",
+        "set",
+        "sets a point at the cross",
+        Stroke::Set,
+    ),
+    bind(
+        KeyCode::Left,
+        "arrows",
+        "move",
+        "move the cross by a cell; H J K L by eight",
+        Stroke::Move(-1, 0),
+    ),
     bind(KeyCode::Right, "", "", "", Stroke::Move(1, 0)),
     bind(KeyCode::Up, "", "", "", Stroke::Move(0, -1)),
     bind(KeyCode::Down, "", "", "", Stroke::Move(0, 1)),
@@ -99,7 +185,8 @@ pub const DRAWING: [Binding<Stroke>; 12] = [
     bind(KeyCode::Char('J'), "", "", "", Stroke::Move(0, 8)),
 ];
 
-/// Takes one event; `placed` is where the preview lies on the screen. Returns what the capture is to do.
+/// Takes one event; `placed` is where the preview lies on the screen. Returns what the capture is
+/// to do.
 pub fn handle(event: &Event, state: &mut State, placed: Option<&Placed>) -> Option<Control> {
     match event {
         Event::Key(key) if key.kind != KeyEventKind::Release => press(key, state, placed),
@@ -115,7 +202,11 @@ pub fn handle(event: &Event, state: &mut State, placed: Option<&Placed>) -> Opti
 
 fn press(key: &KeyEvent, state: &mut State, placed: Option<&Placed>) -> Option<Control> {
     if key.modifiers.contains(KeyModifiers::CONTROL) {
-        return if key.code == KeyCode::Char('c') { act(Action::Quit, state) } else { None };
+        return if key.code == KeyCode::Char('c') {
+            act(Action::Quit, state)
+        } else {
+            None
+        };
     }
     if key.modifiers.contains(KeyModifiers::ALT) {
         return None;
@@ -132,17 +223,25 @@ fn press(key: &KeyEvent, state: &mut State, placed: Option<&Placed>) -> Option<C
     }
     let bound = WATCHING.iter().find(|b| b.key == key.code)?;
     // A slip must not end or restart the capture of someone who is setting points.
-    let ends_it = matches!(bound.action, Action::Quit | Action::Build | Action::Restart | Action::Export);
+    let ends_it = matches!(
+        bound.action,
+        Action::Quit | Action::Build | Action::Restart | Action::Export
+    );
     if state.drawing.is_some() && ends_it {
         let key = bound.shown;
-        state.say(format!("{key} waits: the outline is being drawn; Enter closes it, Esc leaves it (Ctrl-C ends)."));
+        state.say(format!(
+            "{key} waits: the outline is being drawn; Enter closes it, Esc leaves it (Ctrl-C ends)."
+        ));
         return None;
     }
     act(bound.action, state)
 }
 
 fn act(action: Action, state: &mut State) -> Option<Control> {
-    let looks = matches!(action, Action::Help | Action::Turn(_) | Action::Mesh | Action::Choose(_) | Action::Camera);
+    let looks = matches!(
+        action,
+        Action::Help | Action::Turn(_) | Action::Mesh | Action::Choose(_) | Action::Camera
+    );
     if state.quitting && !looks {
         state.say("Still writing the capture…");
         return None;
@@ -206,7 +305,12 @@ fn click(column: u16, row: u16, state: &mut State, placed: Option<&Placed>) {
     }
 }
 
-fn draw(stroke: Stroke, mut drawing: Drawing, state: &mut State, placed: Option<&Placed>) -> Option<Control> {
+fn draw(
+    stroke: Stroke,
+    mut drawing: Drawing,
+    state: &mut State,
+    placed: Option<&Placed>,
+) -> Option<Control> {
     match stroke {
         Stroke::Leave => {
             state.say("Left drawing; the outline is as it was.");
@@ -214,7 +318,10 @@ fn draw(stroke: Stroke, mut drawing: Drawing, state: &mut State, placed: Option<
         }
         Stroke::Close => match drawing.close() {
             Ok(polygon) => {
-                state.say(format!("Starting with your outline of {} points.", polygon.len()));
+                state.say(format!(
+                    "Starting with your outline of {} points.",
+                    polygon.len()
+                ));
                 return Some(Control::SetOutline(polygon));
             }
             Err(why) => state.say(why),
@@ -241,7 +348,12 @@ fn move_cursor(drawing: &mut Drawing, placed: Option<&Placed>, right: i8, down: 
     let (column, row) = drawing
         .cursor_px()
         .and_then(|pixel| placed.cell_from_pixel(pixel))
-        .map(|(c, r)| (c.saturating_add_signed(right.into()), r.saturating_add_signed(down.into())))
+        .map(|(c, r)| {
+            (
+                c.saturating_add_signed(right.into()),
+                r.saturating_add_signed(down.into()),
+            )
+        })
         .unwrap_or((area.x + area.width / 2, area.y + area.height / 2));
     let column = column.clamp(area.left(), area.right().saturating_sub(1));
     let row = row.clamp(area.top(), area.bottom().saturating_sub(1));

@@ -49,9 +49,15 @@ const BRANCH_ROWS: u16 = 12;
 const TREE_ROWS: u16 = 9;
 
 impl Areas {
-    /// Divides the window, giving the picture the height that it needs; `None` for a window that is too small.
+    /// Divides the window, giving the picture the height that it needs; `None` for a window that is
+    /// too small.
     /// `cell_dots` are the dots of a cell in which the picture will be drawn, across and down.
-    pub fn new(window: Rect, image: Option<Size>, cell_dots: (u16, u16), wish: Wish) -> Option<Self> {
+    pub fn new(
+        window: Rect,
+        image: Option<Size>,
+        cell_dots: (u16, u16),
+        wish: Wish,
+    ) -> Option<Self> {
         if window.width < SMALLEST.0 || window.height < SMALLEST.1 {
             return None;
         }
@@ -65,28 +71,48 @@ impl Areas {
         ])
         .areas(window);
         let left_width = (body.width as u32 * 58 / 100) as u16;
-        let [left, _, right] =
-            Layout::horizontal([Constraint::Length(left_width), Constraint::Length(1), Constraint::Min(1)]).areas(body);
+        let [left, _, right] = Layout::horizontal([
+            Constraint::Length(left_width),
+            Constraint::Length(1),
+            Constraint::Min(1),
+        ])
+        .areas(body);
 
         // One line of title; at least the table's head and some rows must stay below the picture.
         let table_least = if roomy { 8 } else { (body.height / 4).max(3) };
-        let wanted = image.map_or(body.height, |image| rows_needed(image, left.width, cell_dots)).saturating_add(1);
+        let wanted = image
+            .map_or(body.height, |image| {
+                rows_needed(image, left.width, cell_dots)
+            })
+            .saturating_add(1);
         let preview_height = wanted.min(body.height.saturating_sub(table_least));
         let [preview, branches] =
             Layout::vertical([Constraint::Length(preview_height), Constraint::Min(1)]).areas(left);
 
         let camera = if body.height < 16 { 6 } else { 8 };
-        let (beside, short) = (body.height.saturating_sub(camera + BRANCH_ROWS + TREE_ROWS), 3);
+        let (beside, short) = (
+            body.height.saturating_sub(camera + BRANCH_ROWS + TREE_ROWS),
+            3,
+        );
         let fits = wish != Wish::Nothing && beside >= short;
-        let tracks = if roomy && !(fits && beside < 6) { 6 } else { short };
+        let tracks = if roomy && !(fits && beside < 6) {
+            6
+        } else {
+            short
+        };
         let replaced = wish == Wish::CloseUp && !fits;
         let heights = match (replaced, fits) {
             (true, _) => [0, 0, camera + tracks],
             (_, true) => [camera, tracks, BRANCH_ROWS],
             _ => [camera, tracks, 0],
         };
-        let [camera, tracks, branch, skeleton] =
-            Layout::vertical(heights.map(Constraint::Length).into_iter().chain([Constraint::Min(1)])).areas(right);
+        let [camera, tracks, branch, skeleton] = Layout::vertical(
+            heights
+                .map(Constraint::Length)
+                .into_iter()
+                .chain([Constraint::Min(1)]),
+        )
+        .areas(right);
         Some(Self {
             header,
             phase,
@@ -104,7 +130,8 @@ impl Areas {
 /// Rows of cells that a picture takes when it is as wide as the column.
 fn rows_needed(image: Size, columns: u16, cell_dots: (u16, u16)) -> u16 {
     let dots_wide = columns as f64 * cell_dots.0 as f64;
-    let rows = dots_wide * image.height as f64 / image.width.max(1) as f64 / cell_dots.1.max(1) as f64;
+    let rows =
+        dots_wide * image.height as f64 / image.width.max(1) as f64 / cell_dots.1.max(1) as f64;
     rows.ceil().min(10_000.0) as u16
 }
 
@@ -114,25 +141,52 @@ mod tests {
 
     #[test]
     fn panels_fill_the_window_without_overlap() {
-        for (width, height) in [(60, 16), (80, 24), (81, 31), (120, 40), (200, 60), (400, 20), (65, 200)] {
-            let images = [None, Some(Size::new(640, 360)), Some(Size::new(1, 10_000)), Some(Size::new(10_000, 1))];
+        for (width, height) in [
+            (60, 16),
+            (80, 24),
+            (81, 31),
+            (120, 40),
+            (200, 60),
+            (400, 20),
+            (65, 200),
+        ] {
+            let images = [
+                None,
+                Some(Size::new(640, 360)),
+                Some(Size::new(1, 10_000)),
+                Some(Size::new(10_000, 1)),
+            ];
             let wishes = [Wish::Nothing, Wish::IfRoom, Wish::CloseUp];
             for (image, wish) in images.into_iter().flat_map(|i| wishes.map(|w| (i, w))) {
                 let window = Rect::new(0, 0, width, height);
                 let a = Areas::new(window, image, (1, 2), wish).unwrap();
-                assert!(a.branch.is_some() || wish != Wish::CloseUp, "{width}x{height}");
-                let mut all = vec![a.header, a.phase, a.preview, a.branches, a.skeleton, a.messages, a.keys];
+                assert!(
+                    a.branch.is_some() || wish != Wish::CloseUp,
+                    "{width}x{height}"
+                );
+                let mut all = vec![
+                    a.header, a.phase, a.preview, a.branches, a.skeleton, a.messages, a.keys,
+                ];
                 all.extend(a.camera_and_tracks.into_iter().flatten().chain(a.branch));
                 for (i, one) in all.iter().enumerate() {
-                    assert!(!one.is_empty() && window.union(*one) == window, "{i} at {width}x{height}: {one:?}");
+                    assert!(
+                        !one.is_empty() && window.union(*one) == window,
+                        "{i} at {width}x{height}: {one:?}"
+                    );
                     for other in &all[i + 1..] {
-                        assert!(!one.intersects(*other), "{one:?} and {other:?} at {width}x{height}");
+                        assert!(
+                            !one.intersects(*other),
+                            "{one:?} and {other:?} at {width}x{height}"
+                        );
                     }
                 }
             }
         }
         for (width, height) in [(0, 0), (1, 1), (59, 60), (200, 15)] {
-            assert_eq!(Areas::new(Rect::new(0, 0, width, height), None, (1, 2), Wish::IfRoom), None);
+            assert_eq!(
+                Areas::new(Rect::new(0, 0, width, height), None, (1, 2), Wish::IfRoom),
+                None
+            );
         }
     }
 }

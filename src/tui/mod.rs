@@ -1,7 +1,9 @@
-//! The screen of a running capture: what is filmed, how well it goes, the tree as it moves, and keys to steer it.
+//! The screen of a running capture: what is filmed, how well it goes, the tree as it moves, and
+//! keys to steer it.
 //!
-//! The screen reads immutable [`Snapshot`]s and sends [`Control`]s through a [`Session`]; it knows nothing of the
-//! pipeline and starts no thread. [`run`] blocks the calling thread until the capture has ended.
+//! The screen reads immutable [`Snapshot`]s and sends [`Control`]s through a [`Session`]; it knows
+//! nothing of the pipeline and starts no thread. [`run`] blocks the calling thread until the
+//! capture has ended.
 
 mod abilities;
 mod compose;
@@ -72,17 +74,25 @@ pub struct Options {
 }
 
 impl Options {
-    /// `ARBORCAM_PREVIEW` is `halfblocks`, `kitty`, `sixel`, `iterm2` or anything else for automatic; colours follow
+    /// `ARBORCAM_PREVIEW` is `halfblocks`, `kitty`, `sixel`, `iterm2` or anything else for
+    /// automatic; colours follow
     /// `NO_COLOR`, `COLORTERM` and `TERM`.
     pub fn from_env() -> Self {
-        let preview = match std::env::var("ARBORCAM_PREVIEW").unwrap_or_default().to_lowercase().as_str() {
+        let preview = match std::env::var("ARBORCAM_PREVIEW")
+            .unwrap_or_default()
+            .to_lowercase()
+            .as_str()
+        {
             "halfblocks" => Preview::HalfBlocks,
             "kitty" => Preview::Kitty,
             "sixel" => Preview::Sixel,
             "iterm2" => Preview::Iterm2,
             _ => Preview::Auto,
         };
-        Self { preview, depth: Depth::from_env() }
+        Self {
+            preview,
+            depth: Depth::from_env(),
+        }
     }
 }
 
@@ -95,16 +105,29 @@ pub enum TuiError {
     Unusable(#[source] std::io::Error),
 }
 
-/// Shows the capture until it has ended, `stop` is set, the terminal has gone or some thread has panicked; in all but
-/// the first case [`Control::Quit`] is sent before. The terminal is then as it was.
+/// Shows the capture until it has ended, `stop` is set, the terminal has gone or some thread has
+/// panicked; in all but the first case [`Control::Quit`] is sent before. The terminal is then as it
+/// was.
 ///
 /// # Errors
 /// There is no terminal, or it cannot be prepared. Nothing has been sent then.
 pub fn run(session: &mut dyn Session, options: Options, stop: &AtomicBool) -> Result<(), TuiError> {
-    let Opened { terminal, guard, tty, graphics, deaf_until } = Opened::new(options)?;
+    let Opened {
+        terminal,
+        guard,
+        tty,
+        graphics,
+        deaf_until,
+    } = Opened::new(options)?;
     let theme = Theme::new(options.depth);
-    let mut screen =
-        Screen { terminal, guard, tty, theme, deaf_until, preview: panels::preview::Preview::new(graphics) };
+    let mut screen = Screen {
+        terminal,
+        guard,
+        tty,
+        theme,
+        deaf_until,
+        preview: panels::preview::Preview::new(graphics),
+    };
     let mut state = State::default();
     while !session.finished() {
         if let Some(snapshot) = session.latest() {
@@ -129,19 +152,23 @@ struct Screen {
 }
 
 impl Screen {
-    /// Draws once and passes on what the user does until the next redraw is due; `None` when the terminal has gone.
+    /// Draws once and passes on what the user does until the next redraw is due; `None` when the
+    /// terminal has gone.
     fn step(&mut self, state: &mut State, session: &mut dyn Session) -> Option<()> {
         let began = Instant::now();
         {
             let _lock = self.guard.writing()?;
-            self.terminal.draw(|frame| screen::render(frame, state, self.theme, &mut self.preview)).ok()?;
+            self.terminal
+                .draw(|frame| screen::render(frame, state, self.theme, &mut self.preview))
+                .ok()?;
         }
         self.preview.drawn(began, Instant::now());
         state.tick();
         match self.tty.wait(TICK.saturating_sub(began.elapsed())) {
             Input::Gone => return None,
             Input::Quiet => {}
-            // crossterm may leave bytes unread until more come; without a pause that would be a busy loop.
+            // crossterm may leave bytes unread until more come; without a pause that would be a
+            // busy loop.
             Input::Ready if self.listen(state, session)? == 0 => std::thread::sleep(TICK / 5),
             Input::Ready => {}
         }

@@ -1,4 +1,5 @@
-//! The screen of a tree that is made to move: the tree from two sides, what moves it, and the keys that change that.
+//! The screen of a tree that is made to move: the tree from two sides, what moves it, and the keys
+//! that change that.
 
 use super::input::{Binding, bind};
 use super::opened::Opened;
@@ -55,16 +56,52 @@ pub(super) enum Action {
 
 pub(super) const KEYS: [Binding<Action>; 12] = [
     bind(KeyCode::Char('q'), "q", "quit", "", Action::Quit),
-    bind(KeyCode::Up, "↑↓", "wind", "", Action::Change(Whim::Stronger(1))),
-    bind(KeyCode::Right, "←→", "direction", "", Action::Change(Whim::Veer(15))),
-    bind(KeyCode::Char('+'), "+-", "magnify", "", Action::Change(Whim::Larger(1))),
-    bind(KeyCode::Char('p'), "p", "pull, let go", "", Action::Change(Whim::Pull)),
+    bind(
+        KeyCode::Up,
+        "↑↓",
+        "wind",
+        "",
+        Action::Change(Whim::Stronger(1)),
+    ),
+    bind(
+        KeyCode::Right,
+        "←→",
+        "direction",
+        "",
+        Action::Change(Whim::Veer(15)),
+    ),
+    bind(
+        KeyCode::Char('+'),
+        "+-",
+        "magnify",
+        "",
+        Action::Change(Whim::Larger(1)),
+    ),
+    bind(
+        KeyCode::Char('p'),
+        "p",
+        "pull, let go",
+        "",
+        Action::Change(Whim::Pull),
+    ),
     bind(KeyCode::Char(' '), "space", "pause", "", Action::Pause),
     bind(KeyCode::Char('h'), "h l", "turn", "", Action::Turn(-1)),
     bind(KeyCode::Char('m'), "m", "mesh", "", Action::Mesh),
-    bind(KeyCode::Down, "", "", "", Action::Change(Whim::Stronger(-1))),
+    bind(
+        KeyCode::Down,
+        "",
+        "",
+        "",
+        Action::Change(Whim::Stronger(-1)),
+    ),
     bind(KeyCode::Left, "", "", "", Action::Change(Whim::Veer(-15))),
-    bind(KeyCode::Char('-'), "", "", "", Action::Change(Whim::Larger(-1))),
+    bind(
+        KeyCode::Char('-'),
+        "",
+        "",
+        "",
+        Action::Change(Whim::Larger(-1)),
+    ),
     bind(KeyCode::Char('l'), "", "", "", Action::Turn(1)),
 ];
 
@@ -78,15 +115,25 @@ pub(super) struct Stage {
 impl Stage {
     pub fn new(moving: &dyn Moving) -> Self {
         let skeleton = moving.skeleton();
-        let still =
-            Snapshot { node_colour: Arc::new(colours(&skeleton)), skeleton: Some(skeleton), ..Snapshot::default() };
-        Self { state: State::default(), paused: false, still }
+        let still = Snapshot {
+            node_colour: Arc::new(colours(&skeleton)),
+            skeleton: Some(skeleton),
+            ..Snapshot::default()
+        };
+        Self {
+            state: State::default(),
+            paused: false,
+            still,
+        }
     }
 
     /// Lets time pass for the tree, unless it is paused.
     pub fn go_on(&mut self, moving: &mut dyn Moving, elapsed_s: f64) {
         let pose = moving.pose(if self.paused { 0.0 } else { elapsed_s });
-        self.state.take(Arc::new(Snapshot { pose: Some(Arc::new(pose)), ..self.still.clone() }));
+        self.state.take(Arc::new(Snapshot {
+            pose: Some(Arc::new(pose)),
+            ..self.still.clone()
+        }));
     }
 
     /// Does what a key asks for; `false` to leave.
@@ -110,21 +157,31 @@ impl Stage {
     }
 
     pub fn render(&self, frame: &mut Frame, told: &str, theme: Theme) {
-        let [line, tree, keys] =
-            Layout::vertical([Constraint::Length(1), Constraint::Fill(1), Constraint::Length(1)]).areas(frame.area());
+        let [line, tree, keys] = Layout::vertical([
+            Constraint::Length(1),
+            Constraint::Fill(1),
+            Constraint::Length(1),
+        ])
+        .areas(frame.area());
         let paused = if self.paused { "  paused" } else { "" };
-        frame.render_widget(Line::styled(format!(" arborcam  {told}{paused}"), theme.strong()), line);
+        frame.render_widget(
+            Line::styled(format!(" arborcam  {told}{paused}"), theme.strong()),
+            line,
+        );
         skeleton::render(frame, &self.state, tree, theme);
         messages::key_line(frame, KEYS.iter().map(|b| (b.shown, b.short)), keys, theme);
     }
 }
 
-/// The number of the main branch that every node belongs to: those that leave the trunk's top, in their order.
+/// The number of the main branch that every node belongs to: those that leave the trunk's top, in
+/// their order.
 fn colours(skeleton: &Skeleton) -> Vec<Option<u8>> {
     let mut of: Vec<Option<u8>> = vec![None; skeleton.nodes.len()];
     let mut next = 0;
     for (i, node) in skeleton.nodes.iter().enumerate() {
-        let original = node.copy_of.and_then(|o| of.get(o.index()).copied().flatten());
+        let original = node
+            .copy_of
+            .and_then(|o| of.get(o.index()).copied().flatten());
         of[i] = original.or_else(|| match node.parent {
             Some(p) if p.index() == 1 => {
                 next += 1;
@@ -137,13 +194,19 @@ fn colours(skeleton: &Skeleton) -> Vec<Option<u8>> {
     of
 }
 
-/// Shows the tree and does what keys ask for until the user leaves, `stop` is set or the terminal has gone. The terminal is
-/// then as it was.
+/// Shows the tree and does what keys ask for until the user leaves, `stop` is set or the terminal
+/// has gone. The terminal is then as it was.
 ///
 /// # Errors
 /// There is no terminal, or it cannot be prepared.
 pub fn watch(moving: &mut dyn Moving, options: Options, stop: &AtomicBool) -> Result<(), TuiError> {
-    let Opened { mut terminal, guard, tty, deaf_until, .. } = Opened::new(options)?;
+    let Opened {
+        mut terminal,
+        guard,
+        tty,
+        deaf_until,
+        ..
+    } = Opened::new(options)?;
     let theme = Theme::new(options.depth);
     let mut stage = Stage::new(moving);
     let mut before = Instant::now();
@@ -153,7 +216,10 @@ pub fn watch(moving: &mut dyn Moving, options: Options, stop: &AtomicBool) -> Re
         before = began;
         {
             let Some(_lock) = guard.writing() else { break };
-            if terminal.draw(|frame| stage.render(frame, &moving.told(), theme)).is_err() {
+            if terminal
+                .draw(|frame| stage.render(frame, &moving.told(), theme))
+                .is_err()
+            {
                 break;
             }
         }
@@ -164,7 +230,9 @@ pub fn watch(moving: &mut dyn Moving, options: Options, stop: &AtomicBool) -> Re
             Input::Ready => {}
         }
         while event::poll(Duration::ZERO).unwrap_or(false) {
-            let Ok(event) = event::read() else { return Ok(()) };
+            let Ok(event) = event::read() else {
+                return Ok(());
+            };
             heard += 1;
             if Instant::now() >= deaf_until && !stage.press(&event, moving) {
                 return Ok(());

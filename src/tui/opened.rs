@@ -29,12 +29,21 @@ impl Opened {
         }
         let tty = Tty::open().map_err(|e| TuiError::NoTerminal(Some(e)))?;
         let mut guard = Guard::enter().map_err(TuiError::Unusable)?;
-        let graphics = Graphics::ask(&tty, options.preview, options.depth, ASK).map_err(TuiError::Unusable)?;
+        let graphics =
+            Graphics::ask(&tty, options.preview, options.depth, ASK).map_err(TuiError::Unusable)?;
         guard.set_farewell(graphics.farewell());
-        // ratatui's own drop complains on standard error, which panics when the terminal has gone; the guard does its work.
-        let terminal =
-            Terminal::new(CrosstermBackend::new(stdout())).map(ManuallyDrop::new).map_err(TuiError::Unusable)?;
+        // ratatui's own drop complains on standard error, which panics when the terminal has gone;
+        // the guard does its work.
+        let terminal = Terminal::new(CrosstermBackend::new(stdout()))
+            .map(ManuallyDrop::new)
+            .map_err(TuiError::Unusable)?;
         let deaf_until = Instant::now() + if graphics.late { DEAF } else { Duration::ZERO };
-        Ok(Self { terminal, guard, tty, graphics, deaf_until })
+        Ok(Self {
+            terminal,
+            guard,
+            tty,
+            graphics,
+            deaf_until,
+        })
     }
 }

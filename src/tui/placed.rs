@@ -6,7 +6,8 @@ use ratatui::layout::{Position, Rect};
 /// A picture fitted into an area: as large as it can be with its sides' ratio kept, in the middle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placed {
-    /// The cells that the picture touches. It starts at their top left corner and may end inside the last ones.
+    /// The cells that the picture touches. It starts at their top left corner and may end inside
+    /// the last ones.
     pub area: Rect,
     /// Size at which the picture is drawn, in dots.
     pub dots: Size,
@@ -34,10 +35,16 @@ impl Placed {
             cols.min(room.width),
             rows.min(room.height),
         );
-        Some(Self { area, dots: Size::new(dots_w as u32, dots_h as u32), cell_dots, image })
+        Some(Self {
+            area,
+            dots: Size::new(dots_w as u32, dots_h as u32),
+            cell_dots,
+            image,
+        })
     }
 
-    /// The picture pixel in the middle of what the cell shows of the picture, `None` for a cell that shows nothing.
+    /// The picture pixel in the middle of what the cell shows of the picture, `None` for a cell
+    /// that shows nothing.
     pub fn pixel_at(&self, column: u16, row: u16) -> Option<[f64; 2]> {
         if !self.area.contains(Position::new(column, row)) {
             return None;
@@ -49,8 +56,20 @@ impl Placed {
             (low < high).then(|| 0.5 * (low + high) / dots as f64 * pixels as f64 - 0.5)
         };
         Some([
-            along(column, self.area.x, self.cell_dots.0, self.dots.width, self.image.width)?,
-            along(row, self.area.y, self.cell_dots.1, self.dots.height, self.image.height)?,
+            along(
+                column,
+                self.area.x,
+                self.cell_dots.0,
+                self.dots.width,
+                self.image.width,
+            )?,
+            along(
+                row,
+                self.area.y,
+                self.cell_dots.1,
+                self.dots.height,
+                self.image.height,
+            )?,
         ])
     }
 
@@ -65,9 +84,13 @@ impl Placed {
     /// The cell that shows a picture pixel.
     pub fn cell_from_pixel(&self, pixel: [f64; 2]) -> Option<(u16, u16)> {
         let [x, y] = self.dot_from_pixel(pixel);
-        let inside = x >= 0.0 && y >= 0.0 && x < self.dots.width as f64 && y < self.dots.height as f64;
+        let inside =
+            x >= 0.0 && y >= 0.0 && x < self.dots.width as f64 && y < self.dots.height as f64;
         inside.then(|| {
-            (self.area.x + (x / self.cell_dots.0 as f64) as u16, self.area.y + (y / self.cell_dots.1 as f64) as u16)
+            (
+                self.area.x + (x / self.cell_dots.0 as f64) as u16,
+                self.area.y + (y / self.cell_dots.1 as f64) as u16,
+            )
         })
     }
 }
@@ -83,15 +106,29 @@ mod tests {
             // 16:9 in half blocks: 40 dots wide are 22.5 high, that is 11.5 rows.
             ((640, 360), Rect::new(3, 2, 40, 20), Rect::new(3, 6, 40, 12)),
             // The same in a low room: 10 rows are 20 dots, 35.6 wide.
-            ((640, 360), Rect::new(0, 0, 60, 10), Rect::new(12, 0, 36, 10)),
-            ((360, 640), Rect::new(0, 0, 60, 10), Rect::new(24, 0, 11, 10)),
+            (
+                (640, 360),
+                Rect::new(0, 0, 60, 10),
+                Rect::new(12, 0, 36, 10),
+            ),
+            (
+                (360, 640),
+                Rect::new(0, 0, 60, 10),
+                Rect::new(24, 0, 11, 10),
+            ),
             ((1, 1), Rect::new(5, 5, 1, 1), Rect::new(5, 5, 1, 1)),
         ] {
             let placed = Placed::fit(Size::new(image.0, image.1), room, (1, 2)).map(|p| p.area);
             assert_eq!(placed, Some(area), "{image:?} in {room:?}");
         }
-        assert_eq!(Placed::fit(Size::new(0, 9), Rect::new(0, 0, 9, 9), (1, 2)), None);
-        assert_eq!(Placed::fit(Size::new(9, 9), Rect::new(0, 0, 0, 9), (1, 2)), None);
+        assert_eq!(
+            Placed::fit(Size::new(0, 9), Rect::new(0, 0, 9, 9), (1, 2)),
+            None
+        );
+        assert_eq!(
+            Placed::fit(Size::new(9, 9), Rect::new(0, 0, 0, 9), (1, 2)),
+            None
+        );
     }
 
     proptest! {

@@ -13,7 +13,9 @@ const EIGHTHS: [&str; 9] = [" ", "▁", "▂", "▃", "▄", "▅", "▆", "▇"
 pub fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     values
         .filter(|x| x.is_finite())
-        .fold(None, |all: Option<(f64, f64)>, x| Some(all.map_or((x, x), |(low, high)| (low.min(x), high.max(x)))))
+        .fold(None, |all: Option<(f64, f64)>, x| {
+            Some(all.map_or((x, x), |(low, high)| (low.min(x), high.max(x))))
+        })
 }
 
 /// A range that is at least `least` wide, about the same middle.
@@ -22,21 +24,36 @@ pub fn widened(low: f64, high: f64, least: f64) -> (f64, f64) {
     (low - more, high + more)
 }
 
-/// A curve through `points`, each from the left and from below, 0 to 1; broken where two are farther apart than `gap`.
+/// A curve through `points`, each from the left and from below, 0 to 1; broken where two are
+/// farther apart than `gap`.
 pub fn curve(frame: &mut Frame, points: &[[f64; 2]], gap: f64, area: Rect, colour: Color) {
-    let canvas = Canvas::default().marker(Marker::Braille).x_bounds([0.0, 1.0]).y_bounds([0.0, 1.0]).paint(|context| {
-        for pair in points.windows(2).filter(|p| p[1][0] - p[0][0] <= gap) {
-            let ([x1, y1], [x2, y2]) = (pair[0], pair[1]);
-            context.draw(&Line::new(x1, y1, x2, y2, colour));
-        }
-    });
+    let canvas = Canvas::default()
+        .marker(Marker::Braille)
+        .x_bounds([0.0, 1.0])
+        .y_bounds([0.0, 1.0])
+        .paint(|context| {
+            for pair in points.windows(2).filter(|p| p[1][0] - p[0][0] <= gap) {
+                let ([x1, y1], [x2, y2]) = (pair[0], pair[1]);
+                context.draw(&Line::new(x1, y1, x2, y2, colour));
+            }
+        });
     frame.render_widget(canvas, area);
 }
 
 /// A bar a column, the highest `most`; what is higher is cut.
-pub fn bars(frame: &mut Frame, values: &[f64], most: f64, area: Rect, style: impl Fn(u16) -> Style) {
+pub fn bars(
+    frame: &mut Frame,
+    values: &[f64],
+    most: f64,
+    area: Rect,
+    style: impl Fn(u16) -> Style,
+) {
     for (k, value) in (0..area.width).zip(values) {
-        let share = if most > 0.0 && value.is_finite() { (value / most).clamp(0.0, 1.0) } else { 0.0 };
+        let share = if most > 0.0 && value.is_finite() {
+            (value / most).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
         let mut eighths = (share * f64::from(area.height) * 8.0).round() as usize;
         for y in (area.top()..area.bottom()).rev() {
             let part = eighths.min(8);
@@ -53,6 +70,12 @@ pub fn highest(spectrum: &AngleSpectrum, [from_hz, to_hz]: [f64; 2]) -> f64 {
     let bin = |hz: f64| (hz / spectrum.bin_hz).round().clamp(0.0, 1e9) as usize;
     let last = spectrum.amplitude_deg.len().saturating_sub(1);
     let (from, to) = (bin(from_hz).min(last), bin(to_hz).min(last));
-    let bins = spectrum.amplitude_deg.get(from..=to.max(from)).unwrap_or(&[]);
-    bins.iter().map(|a| f64::from(*a)).filter(|a| a.is_finite()).fold(0.0, f64::max)
+    let bins = spectrum
+        .amplitude_deg
+        .get(from..=to.max(from))
+        .unwrap_or(&[]);
+    bins.iter()
+        .map(|a| f64::from(*a))
+        .filter(|a| a.is_finite())
+        .fold(0.0, f64::max)
 }

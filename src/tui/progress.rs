@@ -15,8 +15,14 @@ impl Progress {
     /// Nothing is shown before the first [`update`](Self::update).
     pub fn new() -> Self {
         let shown = std::io::stderr().is_terminal();
-        let target = if shown { ProgressDrawTarget::stderr_with_hz(10) } else { ProgressDrawTarget::hidden() };
-        Self { bar: ProgressBar::with_draw_target(None, target).with_style(style(false)) }
+        let target = if shown {
+            ProgressDrawTarget::stderr_with_hz(10)
+        } else {
+            ProgressDrawTarget::hidden()
+        };
+        Self {
+            bar: ProgressBar::with_draw_target(None, target).with_style(style(false)),
+        }
     }
 
     /// Shows a newer state.
@@ -34,7 +40,8 @@ impl Progress {
     /// Prints a line of text on standard error, above the line that shows the progress.
     pub fn tell(&self, line: &str) {
         // Where nobody reads it any more, that is no reason to fail.
-        self.bar.suspend(|| drop(writeln!(std::io::stderr(), "{line}")));
+        self.bar
+            .suspend(|| drop(writeln!(std::io::stderr(), "{line}")));
     }
 
     /// Takes the line away.
@@ -55,7 +62,11 @@ fn text(snapshot: &Snapshot) -> String {
 }
 
 fn style(total_known: bool) -> ProgressStyle {
-    let template = if total_known { "{pos}/{len} {wide_bar} {eta} · {msg}" } else { "{spinner} frame {pos} · {msg}" };
+    let template = if total_known {
+        "{pos}/{len} {wide_bar} {eta} · {msg}"
+    } else {
+        "{spinner} frame {pos} · {msg}"
+    };
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
@@ -66,11 +77,20 @@ mod tests {
 
     #[test]
     fn tells_phase_rate_and_points() {
-        let snapshot = Snapshot { phase: Phase::Live, work_rate_hz: 29.97, tracks_alive: 312, ..Snapshot::default() };
+        let snapshot = Snapshot {
+            phase: Phase::Live,
+            work_rate_hz: 29.97,
+            tracks_alive: 312,
+            ..Snapshot::default()
+        };
         assert_eq!(text(&snapshot), "29.97 Hz · 312 points · live");
         let progress = Progress::default();
         for total in [None, Some(0), Some(900), None] {
-            progress.update(&Snapshot { frames_total: total, frame: 901, ..Snapshot::default() });
+            progress.update(&Snapshot {
+                frames_total: total,
+                frame: 901,
+                ..Snapshot::default()
+            });
         }
         progress.finish();
     }

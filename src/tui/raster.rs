@@ -1,4 +1,5 @@
-//! A small colour picture to draw into: scaled down from a camera picture, with lines and dots on top.
+//! A small colour picture to draw into: scaled down from a camera picture, with lines and dots on
+//! top.
 
 use crate::model::{Rgb, Size};
 
@@ -11,8 +12,8 @@ pub struct Raster {
 }
 
 impl Raster {
-    /// Scales a picture; each dot is the mean of the pixels that it covers. `None` if the picture's bytes do not match
-    /// its size.
+    /// Scales a picture; each dot is the mean of the pixels that it covers. `None` if the picture's
+    /// bytes do not match its size.
     pub fn scaled(from: &Rgb, size: Size) -> Option<Self> {
         if from.size.area() == 0 || from.pixels.len() != 3 * from.size.area() {
             return None;
@@ -22,7 +23,9 @@ impl Raster {
             let high = ((i as u64 + 1) * pixels as u64 / dots as u64) as usize;
             low..high.max(low + 1)
         };
-        let columns: Vec<_> = (0..size.width).map(|x| span(x, size.width, from.size.width)).collect();
+        let columns: Vec<_> = (0..size.width)
+            .map(|x| span(x, size.width, from.size.width))
+            .collect();
         let stride = 3 * from.size.width as usize;
         let mut pixels = Vec::with_capacity(3 * size.area());
         for y in 0..size.height {
@@ -30,7 +33,9 @@ impl Raster {
             for columns in &columns {
                 let mut sum = [0u64; 3];
                 for row in rows.clone() {
-                    for p in from.pixels[row * stride..][3 * columns.start..3 * columns.end].chunks_exact(3) {
+                    for p in from.pixels[row * stride..][3 * columns.start..3 * columns.end]
+                        .chunks_exact(3)
+                    {
                         (0..3).for_each(|c| sum[c] += p[c] as u64);
                     }
                 }
@@ -43,13 +48,17 @@ impl Raster {
 
     /// The colour of a dot; black outside.
     pub fn at(&self, x: u32, y: u32) -> [u8; 3] {
-        self.index(x as i64, y as i64).map_or([0; 3], |i| [self.pixels[i], self.pixels[i + 1], self.pixels[i + 2]])
+        self.index(x as i64, y as i64).map_or([0; 3], |i| {
+            [self.pixels[i], self.pixels[i + 1], self.pixels[i + 2]]
+        })
     }
 
     /// Makes every dot darker, by `share` of its brightness.
     pub fn darken(&mut self, share: f64) {
         let keep = (256.0 * (1.0 - share.clamp(0.0, 1.0))) as u32;
-        self.pixels.iter_mut().for_each(|p| *p = (*p as u32 * keep / 256) as u8);
+        self.pixels
+            .iter_mut()
+            .for_each(|p| *p = (*p as u32 * keep / 256) as u8);
     }
 
     /// Fills the square of side `2 * radius + 1` around a dot.
@@ -75,17 +84,24 @@ impl Raster {
     }
 }
 
-/// Visits the dots of a line, as far as it lies in a picture of this size; at most one dot past its far borders.
+/// Visits the dots of a line, as far as it lies in a picture of this size; at most one dot past its
+/// far borders.
 pub fn walk(from: [f64; 2], to: [f64; 2], size: Size, mut visit: impl FnMut(i64, i64)) {
-    let Some((a, b)) = clip(from, to, [size.width as f64, size.height as f64]) else { return };
+    let Some((a, b)) = clip(from, to, [size.width as f64, size.height as f64]) else {
+        return;
+    };
     let steps = (b[0] - a[0]).abs().max((b[1] - a[1]).abs()).ceil().max(1.0);
     for i in 0..=steps as u64 {
         let t = i as f64 / steps;
-        visit((a[0] + t * (b[0] - a[0])).floor() as i64, (a[1] + t * (b[1] - a[1])).floor() as i64);
+        visit(
+            (a[0] + t * (b[0] - a[0])).floor() as i64,
+            (a[1] + t * (b[1] - a[1])).floor() as i64,
+        );
     }
 }
 
-/// The part of a line inside the box from 0 to `high` (Liang and Barsky): a far end must not cost a million steps.
+/// The part of a line inside the box from 0 to `high` (Liang and Barsky): a far end must not cost a
+/// million steps.
 fn clip(from: [f64; 2], to: [f64; 2], high: [f64; 2]) -> Option<([f64; 2], [f64; 2])> {
     let (mut t0, mut t1) = (0.0f64, 1.0f64);
     for axis in 0..2 {
@@ -100,11 +116,20 @@ fn clip(from: [f64; 2], to: [f64; 2], high: [f64; 2]) -> Option<([f64; 2], [f64;
             }
             continue;
         }
-        let (enter, leave) = if d > 0.0 { (low_gap / d, high_gap / d) } else { (high_gap / d, low_gap / d) };
+        let (enter, leave) = if d > 0.0 {
+            (low_gap / d, high_gap / d)
+        } else {
+            (high_gap / d, low_gap / d)
+        };
         t0 = t0.max(enter);
         t1 = t1.min(leave);
     }
-    let at = |t: f64| [from[0] + t * (to[0] - from[0]), from[1] + t * (to[1] - from[1])];
+    let at = |t: f64| {
+        [
+            from[0] + t * (to[0] - from[0]),
+            from[1] + t * (to[1] - from[1]),
+        ]
+    };
     (t0 <= t1).then(|| (at(t0), at(t1)))
 }
 
@@ -114,12 +139,21 @@ mod tests {
 
     #[test]
     fn scaling_takes_the_mean_and_repeats() {
-        let from = Rgb { size: Size::new(2, 2), pixels: [[0u8; 3], [100; 3], [200; 3], [100; 3]].concat() };
+        let from = Rgb {
+            size: Size::new(2, 2),
+            pixels: [[0u8; 3], [100; 3], [200; 3], [100; 3]].concat(),
+        };
         let down = Raster::scaled(&from, Size::new(1, 1)).unwrap();
         assert_eq!(down.pixels, [100; 3]);
         let up = Raster::scaled(&from, Size::new(4, 2)).unwrap();
-        assert_eq!((up.at(0, 0), up.at(1, 0), up.at(2, 0), up.at(1, 1)), ([0; 3], [0; 3], [100; 3], [200; 3]));
-        let torn = Rgb { size: Size::new(2, 2), pixels: vec![0; 5] };
+        assert_eq!(
+            (up.at(0, 0), up.at(1, 0), up.at(2, 0), up.at(1, 1)),
+            ([0; 3], [0; 3], [100; 3], [200; 3])
+        );
+        let torn = Rgb {
+            size: Size::new(2, 2),
+            pixels: vec![0; 5],
+        };
         assert_eq!(Raster::scaled(&torn, Size::new(1, 1)), None);
     }
 
@@ -127,7 +161,11 @@ mod tests {
     fn lines_stay_inside() {
         for (from, to, expected) in [
             ([0.5, 0.5], [3.5, 0.5], vec![(0, 0), (1, 0), (2, 0), (3, 0)]),
-            ([-1e12, 1.5], [1e12, 1.5], vec![(0, 1), (1, 1), (2, 1), (3, 1)]),
+            (
+                [-1e12, 1.5],
+                [1e12, 1.5],
+                vec![(0, 1), (1, 1), (2, 1), (3, 1)],
+            ),
             ([0.5, -9.0], [4.0, -1.0], vec![]),
             ([f64::NAN, 0.0], [1.0, 1.0], vec![]),
             ([f64::INFINITY, 0.0], [1.0, 1.0], vec![]),

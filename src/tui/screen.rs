@@ -2,7 +2,9 @@
 
 use super::layout::{Areas, SMALLEST, Wish};
 use super::panels::preview::Preview;
-use super::panels::{branch, branches, camera, header, help, messages, phase, preview, skeleton, tracks};
+use super::panels::{
+    branch, branches, camera, header, help, messages, phase, preview, skeleton, tracks,
+};
 use super::state::State;
 use super::theme::Theme;
 use ratatui::Frame;
@@ -10,7 +12,12 @@ use ratatui::Frame;
 /// Draws everything.
 pub fn render(frame: &mut Frame, state: &State, theme: Theme, picture: &mut Preview) {
     let window = frame.area();
-    let Some(areas) = Areas::new(window, Preview::image(state), picture.graphics.cell_dots, Wish::of(state)) else {
+    let Some(areas) = Areas::new(
+        window,
+        Preview::image(state),
+        picture.graphics.cell_dots,
+        Wish::of(state),
+    ) else {
         picture.placed = None;
         help::too_small(frame, SMALLEST, window);
         return;

@@ -22,7 +22,10 @@ impl Solid {
         if self.of.as_ref().is_some_and(|of| Arc::ptr_eq(of, skeleton)) {
             return self;
         }
-        Self { of: Some(skeleton.clone()), mesh: Arc::new(bare_wood(skeleton, TRIANGLES)) }
+        Self {
+            of: Some(skeleton.clone()),
+            mesh: Arc::new(bare_wood(skeleton, TRIANGLES)),
+        }
     }
 
     /// The tree in its present pose, its branches in their colours; transparent where it is not.
@@ -37,25 +40,40 @@ impl Solid {
             branch_rgb: &colours,
             ..draw::Model::bare(skeleton, &self.mesh, theme.wood_rgb(None, false))
         };
-        let look = draw::Look { samples: 1, shadow: false, thicker_px: 0.5 };
-        Some(draw::picture(&model.posed(s.pose.as_deref(), &[]), camera, &look))
+        let look = draw::Look {
+            samples: 1,
+            shadow: false,
+            thicker_px: 0.5,
+        };
+        Some(draw::picture(
+            &model.posed(s.pose.as_deref(), &[]),
+            camera,
+            &look,
+        ))
     }
 }
 
 /// Dots of a cell of braille, across and down.
-pub const BRAILLE: Size = Size { width: 2, height: 4 };
+pub const BRAILLE: Size = Size {
+    width: 2,
+    height: 4,
+};
 
-/// Cells of braille from a picture with [`BRAILLE`] dots in each: letter and mean colour, row by row; `None` where there
-/// is no dot.
+/// Cells of braille from a picture with [`BRAILLE`] dots in each: letter and mean colour, row by
+/// row; `None` where there is no dot.
 pub fn braille(picture: &draw::Rgba) -> impl Iterator<Item = Option<(char, [u8; 3])>> + '_ {
     const BITS: [[u32; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
-    let (columns, rows) = (picture.size.width / BRAILLE.width, picture.size.height / BRAILLE.height);
+    let (columns, rows) = (
+        picture.size.width / BRAILLE.width,
+        picture.size.height / BRAILLE.height,
+    );
     (0..rows).flat_map(move |row| {
         (0..columns).map(move |column| {
             let (mut bits, mut sum, mut n) = (0, [0u32; 3], 0);
             for (y, pair) in (0..).zip(BITS) {
                 for (x, bit) in (0..).zip(pair) {
-                    let [r, g, b, a] = picture.at(BRAILLE.width * column + x, BRAILLE.height * row + y);
+                    let [r, g, b, a] =
+                        picture.at(BRAILLE.width * column + x, BRAILLE.height * row + y);
                     if a > 0 {
                         bits |= bit;
                         n += 1;

@@ -46,7 +46,12 @@ impl State {
         }
         self.snapshot = snapshot;
         if let Some(solid) = self.solid.take() {
-            self.solid = Some(self.snapshot.skeleton.as_ref().map_or_else(Solid::default, |s| solid.followed_by(s)));
+            self.solid = Some(
+                self.snapshot
+                    .skeleton
+                    .as_ref()
+                    .map_or_else(Solid::default, |s| solid.followed_by(s)),
+            );
         }
     }
 
@@ -59,17 +64,24 @@ impl State {
     pub fn switch_mesh(&mut self) {
         self.solid = match self.solid.take() {
             Some(_) => None,
-            None => {
-                Some(self.snapshot.skeleton.as_ref().map_or_else(Solid::default, |s| Solid::default().followed_by(s)))
-            }
+            None => Some(
+                self.snapshot
+                    .skeleton
+                    .as_ref()
+                    .map_or_else(Solid::default, |s| Solid::default().followed_by(s)),
+            ),
         };
     }
 
     /// Row of the chosen branch; one that is gone with a refinement leaves its row to another.
     pub fn chosen(&self) -> usize {
         let rows = &self.snapshot.branches;
-        let Some((name, row)) = self.chosen else { return 0 };
-        rows.iter().position(|b| b.node == name).unwrap_or(row.min(rows.len().saturating_sub(1)))
+        let Some((name, row)) = self.chosen else {
+            return 0;
+        };
+        rows.iter()
+            .position(|b| b.node == name)
+            .unwrap_or(row.min(rows.len().saturating_sub(1)))
     }
 
     /// Chooses the branch some rows farther down, and looks at it.
@@ -97,6 +109,10 @@ impl State {
 
     /// Everything to be told, the newest last.
     pub fn messages(&self) -> impl DoubleEndedIterator<Item = &str> {
-        self.snapshot.messages.iter().map(String::as_str).chain(self.notice.iter().map(|(text, _)| text.as_str()))
+        self.snapshot
+            .messages
+            .iter()
+            .map(String::as_str)
+            .chain(self.notice.iter().map(|(text, _)| text.as_str()))
     }
 }

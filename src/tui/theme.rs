@@ -1,4 +1,5 @@
-//! Colours: few, of middle brightness so that they can be read on dark and on light, none at all under `NO_COLOR`.
+//! Colours: few, of middle brightness so that they can be read on dark and on light, none at all
+//! under `NO_COLOR`.
 
 use ratatui::style::{Color, Modifier, Style};
 
@@ -14,7 +15,8 @@ pub enum Depth {
 }
 
 impl Depth {
-    /// What the environment says. `TMUX` counts as full colour because tmux itself reduces what the terminal lacks.
+    /// What the environment says. `TMUX` counts as full colour because tmux itself reduces what the
+    /// terminal lacks.
     pub fn from_env() -> Self {
         let set = |name: &str| std::env::var(name).is_ok_and(|v| !v.is_empty());
         let holds = |name: &str, parts: &[&str]| {
@@ -24,7 +26,10 @@ impl Depth {
             Depth::None
         } else if set("TMUX")
             || holds("COLORTERM", &["truecolor", "24bit"])
-            || holds("TERM", &["direct", "kitty", "ghostty", "alacritty", "wezterm", "foot"])
+            || holds(
+                "TERM",
+                &["direct", "kitty", "ghostty", "alacritty", "wezterm", "foot"],
+            )
         {
             Depth::True
         } else {
@@ -69,12 +74,14 @@ impl Theme {
         }
     }
 
-    /// Colour of a main branch as it is mixed into a picture; white where a point belongs to none yet.
+    /// Colour of a main branch as it is mixed into a picture; white where a point belongs to none
+    /// yet.
     pub fn branch_rgb(self, branch: Option<u8>) -> [u8; 3] {
         branch.map_or([0xff; 3], |b| BRANCHES[b as usize % BRANCHES.len()])
     }
 
-    /// Colour of a main branch on the terminal's own ground; the ground's text colour for the trunk.
+    /// Colour of a main branch on the terminal's own ground; the ground's text colour for the
+    /// trunk.
     pub fn branch(self, branch: Option<u8>) -> Color {
         branch.map_or(Color::Reset, |b| self.colour(self.branch_rgb(Some(b))))
     }
@@ -86,16 +93,22 @@ impl Theme {
         self.colour([mix(0), mix(1), mix(2)])
     }
 
-    /// Colour of a branch's wood before light falls on it; the trunk's is that of wood, and what was not measured is half
-    /// way to grey.
+    /// Colour of a branch's wood before light falls on it; the trunk's is that of wood, and what
+    /// was not measured is half way to grey.
     pub fn wood_rgb(self, branch: Option<u8>, copied: bool) -> [u8; 3] {
         let full = branch.map_or(WOOD, |b| self.branch_rgb(Some(b)));
-        if copied { [0, 1, 2].map(|i| ((full[i] as u16 + GREY[i] as u16) / 2) as u8) } else { full }
+        if copied {
+            [0, 1, 2].map(|i| ((full[i] as u16 + GREY[i] as u16) / 2) as u8)
+        } else {
+            full
+        }
     }
 
     /// Titles of panels.
     pub fn title(self) -> Style {
-        Style::new().fg(self.colour(BRANCHES[5])).add_modifier(Modifier::BOLD)
+        Style::new()
+            .fg(self.colour(BRANCHES[5]))
+            .add_modifier(Modifier::BOLD)
     }
 
     /// Names beside values, rules, things of the second rank.
@@ -110,18 +123,28 @@ impl Theme {
 
     /// What is going wrong.
     pub fn warning(self) -> Style {
-        Style::new().fg(self.colour(WARNING)).add_modifier(Modifier::BOLD)
+        Style::new()
+            .fg(self.colour(WARNING))
+            .add_modifier(Modifier::BOLD)
     }
 
     /// Where the program is now; reversed, so that it shows without colour as well.
     pub fn here(self) -> Style {
-        Style::new().fg(self.colour(BRANCHES[5])).add_modifier(Modifier::BOLD | Modifier::REVERSED)
+        Style::new()
+            .fg(self.colour(BRANCHES[5]))
+            .add_modifier(Modifier::BOLD | Modifier::REVERSED)
     }
 }
 
 /// Nearest entry of the 6x6x6 cube or of the grey ramp of the 256 colours.
 fn index_from_rgb(rgb: [u8; 3]) -> u8 {
-    let level = |c: u8| if c < 48 { 0 } else { (((c as u16).saturating_sub(35)) / 40).min(5) as u8 };
+    let level = |c: u8| {
+        if c < 48 {
+            0
+        } else {
+            (((c as u16).saturating_sub(35)) / 40).min(5) as u8
+        }
+    };
     let value = |l: u8| if l == 0 { 0i32 } else { 55 + 40 * l as i32 };
     let distance = |to: [i32; 3]| (0..3).map(|i| (rgb[i] as i32 - to[i]).pow(2)).sum::<i32>();
     let cube = rgb.map(level);
@@ -140,9 +163,13 @@ mod tests {
 
     #[test]
     fn indexed_colours_are_near() {
-        for (rgb, index) in
-            [([0, 0, 0], 16), ([255, 255, 255], 231), ([128, 128, 128], 244), ([255, 0, 0], 196), ([0, 95, 175], 25)]
-        {
+        for (rgb, index) in [
+            ([0, 0, 0], 16),
+            ([255, 255, 255], 231),
+            ([128, 128, 128], 244),
+            ([255, 0, 0], 196),
+            ([0, 95, 175], 25),
+        ] {
             assert_eq!(index_from_rgb(rgb), index, "{rgb:?}");
         }
     }
@@ -151,7 +178,10 @@ mod tests {
     fn without_colour_nothing_is_coloured() {
         let theme = Theme::new(Depth::None);
         for branch in [None, Some(0), Some(255)] {
-            assert_eq!((theme.branch(branch), theme.branch_faded(branch)), (Color::Reset, Color::Reset));
+            assert_eq!(
+                (theme.branch(branch), theme.branch_faded(branch)),
+                (Color::Reset, Color::Reset)
+            );
         }
     }
 }

@@ -16,9 +16,11 @@ pub enum Input {
     Gone,
 }
 
-/// The terminal that the keyboard belongs to: standard input, or where that is something else `/dev/tty`.
+/// The terminal that the keyboard belongs to: standard input, or where that is something else
+/// `/dev/tty`.
 ///
-/// crossterm spins for ever in a read once the terminal has hung up, so it must be asked only when this says `Ready`.
+/// crossterm spins for ever in a read once the terminal has hung up, so it must be asked only when
+/// this says `Ready`.
 #[derive(Debug)]
 pub struct Tty(Option<File>);
 
@@ -26,19 +28,31 @@ impl Tty {
     /// # Errors
     /// The process has no terminal.
     pub fn open() -> io::Result<Self> {
-        let own = if io::stdin().is_terminal() { None } else { Some(File::open("/dev/tty")?) };
+        let own = if io::stdin().is_terminal() {
+            None
+        } else {
+            Some(File::open("/dev/tty")?)
+        };
         Ok(Self(own))
     }
 
     /// Waits until there is something to read, at most `limit`; a signal counts as something.
     pub fn wait(&self, limit: Duration) -> Input {
-        let mut fd = libc::pollfd { fd: self.fd(), events: libc::POLLIN, revents: 0 };
+        let mut fd = libc::pollfd {
+            fd: self.fd(),
+            events: libc::POLLIN,
+            revents: 0,
+        };
         let limit_ms = limit.as_millis().min(10_000) as libc::c_int;
         // SAFETY: the pointer is to one pollfd that lives through the call, as the count says.
         let n = unsafe { libc::poll(&mut fd, 1, limit_ms) };
         if n < 0 {
             let interrupted = io::Error::last_os_error().kind() == io::ErrorKind::Interrupted;
-            return if interrupted { Input::Quiet } else { Input::Gone };
+            return if interrupted {
+                Input::Quiet
+            } else {
+                Input::Gone
+            };
         }
         match fd.revents {
             0 => Input::Quiet,
@@ -58,6 +72,8 @@ impl Tty {
     }
 
     fn fd(&self) -> RawFd {
-        self.0.as_ref().map_or(libc::STDIN_FILENO, AsRawFd::as_raw_fd)
+        self.0
+            .as_ref()
+            .map_or(libc::STDIN_FILENO, AsRawFd::as_raw_fd)
     }
 }

@@ -1,7 +1,8 @@
 //! Trees of oscillators with known answers, filmed as points: what the sway is tested on.
 //!
-//! Every branch obeys th'' + 2 zeta w th' + w² (th - drive) = 0 against its parent and carries its children; points lie
-//! along it. The picture is the projection from the front, with noise, drift of points, gaps and uneven times.
+//! Every branch obeys th'' + 2 zeta w th' + w² (th - drive) = 0 against its parent and carries its
+//! children; points lie along it. The picture is the projection from the front, with noise, drift
+//! of points, gaps and uneven times.
 
 #![allow(dead_code)]
 
@@ -40,7 +41,8 @@ impl Chance {
 pub enum Drive {
     /// Held still, and let go at this time, s.
     Release(f64),
-    /// Let go at either time, s: before the second the hand pulls for 1.5 s and holds still for a second.
+    /// Let go at either time, s: before the second the hand pulls for 1.5 s and holds still for a
+    /// second.
     Twice([f64; 2]),
     /// Already in free motion when the film begins.
     Decay,
@@ -62,7 +64,14 @@ pub struct Filming {
 
 impl Default for Filming {
     fn default() -> Self {
-        Self { seconds: 12.0, rate_hz: 30.0, noise_px: 0.2, jitter: 0.1, lost: 0.03, gaps: 0.15 }
+        Self {
+            seconds: 12.0,
+            rate_hz: 30.0,
+            noise_px: 0.2,
+            jitter: 0.1,
+            lost: 0.03,
+            gaps: 0.15,
+        }
     }
 }
 
@@ -101,18 +110,42 @@ impl MadeTree {
             (chance.even() >= filming.lost).then_some(at)
         };
         let times: Vec<f64> = (0..frames).filter_map(frame).collect();
-        let angles: Vec<[Vec<f64>; 2]> = branches.iter().map(|b| b.angles(&times, drive, &mut chance)).collect();
+        let angles: Vec<[Vec<f64>; 2]> = branches
+            .iter()
+            .map(|b| b.angles(&times, drive, &mut chance))
+            .collect();
         let mut tracks = Vec::new();
         for (k, b) in branches.iter().enumerate() {
-            let n = if k == 0 { 6 } else { 3 + (chance.even() * 6.0) as usize };
+            let n = if k == 0 {
+                6
+            } else {
+                3 + (chance.even() * 6.0) as usize
+            };
             for _ in 0..n {
                 let share = chance.between(0.25, 1.0);
                 let at = b.base + b.way * share + Vector3::from_fn(|_, _| 2.0 * chance.normal());
-                let at_px = seen(&branches, &angles, k, share, at, times.len(), filming, &mut chance);
-                tracks.push(FilmTrack { node: NodeId(k as u32 + 1), at_px });
+                let at_px = seen(
+                    &branches,
+                    &angles,
+                    k,
+                    share,
+                    at,
+                    times.len(),
+                    filming,
+                    &mut chance,
+                );
+                tracks.push(FilmTrack {
+                    node: NodeId(k as u32 + 1),
+                    at_px,
+                });
             }
         }
-        Self { film: Film::new(&times, tracks), branches, skeleton, angles }
+        Self {
+            film: Film::new(&times, tracks),
+            branches,
+            skeleton,
+            angles,
+        }
     }
 }
 
@@ -122,7 +155,11 @@ fn grow(chance: &mut Chance) -> Vec<MadeBranch> {
         frequency_hz: chance.between(0.35, 0.8),
         damping: chance.between(0.015, 0.06),
         base: Vector3::zeros(),
-        way: Vector3::new(chance.between(-15.0, 15.0), chance.between(170.0, 230.0), 0.0),
+        way: Vector3::new(
+            chance.between(-15.0, 15.0),
+            chance.between(170.0, 230.0),
+            0.0,
+        ),
         at: 0.0,
         axes: [Vector3::z(), Vector3::x()],
         pull: [chance.between(0.02, 0.05), chance.between(-0.03, 0.03)],
@@ -141,7 +178,10 @@ fn grow(chance: &mut Chance) -> Vec<MadeBranch> {
                 let way = (along + Vector3::new(1.2 * side, 0.0, depth)).normalize()
                     * p.way.norm()
                     * chance.between(0.4, 0.6);
-                let first = way.cross(&Vector3::y()).try_normalize(1e-6).unwrap_or_else(Vector3::x);
+                let first = way
+                    .cross(&Vector3::y())
+                    .try_normalize(1e-6)
+                    .unwrap_or_else(Vector3::x);
                 let second = way.normalize().cross(&first);
                 let branch = MadeBranch {
                     parent: Some(parent),
@@ -165,9 +205,13 @@ impl MadeBranch {
     fn angles(&self, times: &[f64], drive: Drive, chance: &mut Chance) -> [Vec<f64>; 2] {
         let (w, z) = (TAU * self.frequency_hz, self.damping);
         let root = (1.0 - z * z).sqrt();
-        let free = |t: f64, a: f64| a * (-z * w * t).exp() * ((w * root * t).cos() + z / root * (w * root * t).sin());
+        let free = |t: f64, a: f64| {
+            a * (-z * w * t).exp() * ((w * root * t).cos() + z / root * (w * root * t).sin())
+        };
         match drive {
-            Drive::Release(at_s) => self.pull.map(|a| times.iter().map(|t| free((t - at_s).max(0.0), a)).collect()),
+            Drive::Release(at_s) => self
+                .pull
+                .map(|a| times.iter().map(|t| free((t - at_s).max(0.0), a)).collect()),
             Drive::Twice([first, second]) => self.pull.map(|a| {
                 let at = |t: &f64| match (t - (second - 2.5)) / 1.5 {
                     hand if hand < 0.0 => free((t - first).max(0.0), a),
@@ -178,9 +222,12 @@ impl MadeBranch {
             }),
             Drive::Decay => {
                 let since: f64 = chance.between(0.5, 1.5);
-                self.pull.map(|a| times.iter().map(|t| free(t + since, a)).collect())
+                self.pull
+                    .map(|a| times.iter().map(|t| free(t + since, a)).collect())
             }
-            Drive::Wind => self.pull.map(|a| blown(times, w, z, 0.6 * a.abs().max(0.02), chance)),
+            Drive::Wind => self
+                .pull
+                .map(|a| blown(times, w, z, 0.6 * a.abs().max(0.02), chance)),
         }
     }
 }
@@ -205,9 +252,13 @@ fn blown(times: &[f64], w: f64, z: f64, strength: f64, chance: &mut Chance) -> V
     out
 }
 
-/// How far a branch has turned at a share of its length, and by what its points were shifted up to there.
+/// How far a branch has turned at a share of its length, and by what its points were shifted up to
+/// there.
 fn turned(share: f64) -> (f64, f64) {
-    ((1.0 - FLEX) + FLEX * share, (1.0 - FLEX) + 0.5 * FLEX * share)
+    (
+        (1.0 - FLEX) + FLEX * share,
+        (1.0 - FLEX) + 0.5 * FLEX * share,
+    )
 }
 
 #[allow(clippy::too_many_arguments)]
@@ -245,12 +296,20 @@ fn seen(
                 let Some(parent) = it.parent else { break };
                 (b, s) = (parent, it.at);
             }
-            drift.iter_mut().for_each(|d| *d = 0.95 * *d + 0.3 * filming.noise_px * chance.normal());
+            drift
+                .iter_mut()
+                .for_each(|d| *d = 0.95 * *d + 0.3 * filming.noise_px * chance.normal());
             if gap.as_ref().is_some_and(|g| g.contains(&k)) {
                 return [f64::NAN; 2];
             }
-            let noise = [filming.noise_px * chance.normal(), filming.noise_px * chance.normal()];
-            [320.0 + at.x + moved.x + noise[0] + drift[0], 340.0 - at.y - moved.y + noise[1] + drift[1]]
+            let noise = [
+                filming.noise_px * chance.normal(),
+                filming.noise_px * chance.normal(),
+            ];
+            [
+                320.0 + at.x + moved.x + noise[0] + drift[0],
+                340.0 - at.y - moved.y + noise[1] + drift[1],
+            ]
         })
         .collect()
 }
@@ -270,8 +329,20 @@ fn skeleton(branches: &[MadeBranch]) -> Skeleton {
     let foot = node(0, None, Vector3::zeros(), 0);
     let ends = branches.iter().enumerate().map(|(k, b)| {
         let parent = b.parent.map_or(0, |p| p as u32 + 1);
-        node(k + 1, Some(parent), b.base + b.way, if b.parent.is_some() { 2 } else { 1 })
+        node(
+            k + 1,
+            Some(parent),
+            b.base + b.way,
+            if b.parent.is_some() { 2 } else { 1 },
+        )
     });
     let nodes = std::iter::once(foot).chain(ends).collect();
-    Skeleton { nodes, foot_px: [320.0, 340.0], image_size: Size { width: 640, height: 360 } }
+    Skeleton {
+        nodes,
+        foot_px: [320.0, 340.0],
+        image_size: Size {
+            width: 640,
+            height: 360,
+        },
+    }
 }

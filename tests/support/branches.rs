@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 pub const BRANCHES: &str = "recordings/sparse_winter.branches.json";
-/// A track is on the branch of the nearest true point if born so near to it, px, and not later than in this frame.
+/// A track is on the branch of the nearest true point if born so near to it, px, and not later than
+/// in this frame.
 const SNAP_PX: f64 = 2.5;
 const LATEST_BIRTH: u64 = 5;
 /// Ways in common that differ by less than this share of the trunk's length count as equal.
@@ -38,7 +39,8 @@ impl Truth {
 
     fn way(&self, at: [f64; 2], mut branch: usize) -> Way {
         let line = &self.branches[branch].line_px;
-        let nearest = |a: &usize, b: &usize| distance(line[*a], at).total_cmp(&distance(line[*b], at));
+        let nearest =
+            |a: &usize, b: &usize| distance(line[*a], at).total_cmp(&distance(line[*b], at));
         let vertex = (0..line.len()).min_by(nearest).expect("a line");
         let arc = vertex as f64 / (line.len() - 1) as f64 * self.branches[branch].length_m;
         let mut way = vec![(branch, arc)];
@@ -76,30 +78,50 @@ pub struct Births(BTreeMap<TrackId, [f64; 2]>);
 
 impl Births {
     pub fn take_note(&mut self, set: &TrackSet) {
-        for o in set.observations.iter().filter(|_| set.frame <= LATEST_BIRTH) {
-            self.0.entry(o.id).or_insert([f64::from(o.u_px), f64::from(o.v_px)]);
+        for o in set
+            .observations
+            .iter()
+            .filter(|_| set.frame <= LATEST_BIRTH)
+        {
+            self.0
+                .entry(o.id)
+                .or_insert([f64::from(o.u_px), f64::from(o.v_px)]);
         }
     }
 }
 
-/// Share of point triplets whose closest pair, by the way from the foot that it shares, is the pair that parts last in
-/// the hierarchy; where two or three pairs part at once, the point is shared among them. Chance is 1/3.
+/// Share of point triplets whose closest pair, by the way from the foot that it shares, is the pair
+/// that parts last in the hierarchy; where two or three pairs part at once, the point is shared
+/// among them. Chance is 1/3.
 pub fn triplets(truth: &Truth, hierarchy: &MotionHierarchy, born: &Births) -> (usize, f64) {
     let mut nodes: BTreeMap<TrackId, Vec<usize>> = BTreeMap::new();
     for (k, cluster) in hierarchy.clusters.iter().enumerate() {
-        cluster.members.iter().for_each(|id| nodes.entry(*id).or_default().push(k));
+        cluster
+            .members
+            .iter()
+            .for_each(|id| nodes.entry(*id).or_default().push(k));
     }
     let scored: Vec<(Way, &Vec<usize>)> = nodes
         .iter()
         .filter_map(|(id, nodes)| {
             let at = *born.0.get(id)?;
             let apart = |p: &(f64, f64, usize)| distance([p.0, p.1], at);
-            let point = truth.points.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
+            let point = truth
+                .points
+                .iter()
+                .min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
             (apart(point) <= SNAP_PX).then(|| (truth.way(at, point.2), nodes))
         })
         .collect();
     let n = scored.len();
-    let together = |a: usize, b: usize| scored[a].1.iter().zip(scored[b].1).take_while(|(x, y)| x == y).count();
+    let together = |a: usize, b: usize| {
+        scored[a]
+            .1
+            .iter()
+            .zip(scored[b].1)
+            .take_while(|(x, y)| x == y)
+            .count()
+    };
     let (mut good, mut all) = (0.0, 0.0);
     for a in 0..n {
         for b in a + 1..n {
@@ -111,7 +133,9 @@ pub fn triplets(truth: &Truth, hierarchy: &MotionHierarchy, born: &Births) -> (u
                 if sorted[2] - sorted[1] < MARGIN * truth.branches[0].length_m {
                     continue;
                 }
-                let closest = (0..3).max_by(|&x, &y| shared[x].total_cmp(&shared[y])).expect("three pairs");
+                let closest = (0..3)
+                    .max_by(|&x, &y| shared[x].total_cmp(&shared[y]))
+                    .expect("three pairs");
                 let depth = pairs.map(|(i, j)| together(i, j));
                 let last = depth.iter().max().expect("three pairs");
                 all += 1.0;

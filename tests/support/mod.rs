@@ -13,12 +13,16 @@ use tempfile::TempDir;
 
 pub const CLIP: &str = "recordings/sparse_winter.mkv";
 pub const OUTLINE: &str = "recordings/sparse_winter.outline.json";
-pub const SIZE: Size = Size { width: 640, height: 360 };
+pub const SIZE: Size = Size {
+    width: 640,
+    height: 360,
+};
 
 pub fn recording() -> &'static [RawFrame] {
     static FRAMES: OnceLock<Vec<RawFrame>> = OnceLock::new();
     FRAMES.get_or_init(|| {
-        let mut clip = source::open(Path::new(CLIP), &config::Camera::default(), None).expect("clip");
+        let mut clip =
+            source::open(Path::new(CLIP), &config::Camera::default(), None).expect("clip");
         std::iter::from_fn(|| clip.next_frame().expect("frame")).collect()
     })
 }
@@ -26,10 +30,19 @@ pub fn recording() -> &'static [RawFrame] {
 /// Frame `k` of the recording as the tracker gets it.
 pub fn decoded(decoder: &mut Decoder, k: usize) -> Frame {
     let (raw, first) = (&recording()[k], &recording()[0]);
-    let mut luma = Luma { size: raw.size, pixels: Vec::new() };
+    let mut luma = Luma {
+        size: raw.size,
+        pixels: Vec::new(),
+    };
     decoder.luma(raw, &mut luma).expect("picture");
     let time_s = raw.sensor_time_s - first.sensor_time_s;
-    Frame { index: k as u64, time_s, received: Instant::now(), luma, preview: None }
+    Frame {
+        index: k as u64,
+        time_s,
+        received: Instant::now(),
+        luma,
+        preview: None,
+    }
 }
 
 pub fn outline() -> Outline {
@@ -46,9 +59,23 @@ pub fn replayed() -> &'static Path {
         let dir = tempfile::tempdir().expect("tempdir");
         let out = dir.path().join("out");
         let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
-        command.args(["replay", CLIP, "--fast", "--headless", "--outline", OUTLINE, "--out"]).arg(&out);
+        command
+            .args([
+                "replay",
+                CLIP,
+                "--fast",
+                "--headless",
+                "--outline",
+                OUTLINE,
+                "--out",
+            ])
+            .arg(&out);
         let output = command.output().expect("arborcam");
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         (dir, out)
     });
     out

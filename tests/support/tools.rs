@@ -3,22 +3,36 @@
 use std::path::PathBuf;
 use std::process::Command;
 
-/// A program, if it is there. Else the test says why it skips; with `ARBORCAM_REQUIRE_TOOLS` it fails.
+/// A program, if it is there. Else the test says why it skips; with `ARBORCAM_REQUIRE_TOOLS` it
+/// fails.
 pub fn program(name: &str, ask: &str) -> Option<PathBuf> {
-    let found = Command::new(name).arg(ask).output().is_ok_and(|o| o.status.success());
-    found.then(|| PathBuf::from(name)).or_else(|| absent(&format!("{name} is not installed")))
+    let found = Command::new(name)
+        .arg(ask)
+        .output()
+        .is_ok_and(|o| o.status.success());
+    found
+        .then(|| PathBuf::from(name))
+        .or_else(|| absent(&format!("{name} is not installed")))
 }
 
 /// Modules of `scripts/test-modules.sh` with `name` among them.
 pub fn modules(name: &str) -> Option<PathBuf> {
-    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| PathBuf::from("target"), PathBuf::from);
+    let target =
+        std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| PathBuf::from("target"), PathBuf::from);
     let modules = std::path::absolute(target.join("test-npm/node_modules")).expect("path");
-    if modules.join(name).is_dir() { Some(modules) } else { absent(&format!("npm's {name} is not there")) }
+    if modules.join(name).is_dir() {
+        Some(modules)
+    } else {
+        absent(&format!("npm's {name} is not there"))
+    }
 }
 
 fn absent<T>(what: &str) -> Option<T> {
     let line = format!("{what}; run scripts/setup.sh --tests");
-    assert!(std::env::var_os("ARBORCAM_REQUIRE_TOOLS").is_none(), "{line}");
+    assert!(
+        std::env::var_os("ARBORCAM_REQUIRE_TOOLS").is_none(),
+        "{line}"
+    );
     eprintln!("SKIPPED: {line}");
     None
 }

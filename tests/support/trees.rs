@@ -20,7 +20,11 @@ pub struct Flat {
 
 impl Flat {
     pub fn shipped() -> Self {
-        Self::of_clip("sparse_winter", Path::new(super::support::CLIP), Path::new(super::support::OUTLINE))
+        Self::of_clip(
+            "sparse_winter",
+            Path::new(super::support::CLIP),
+            Path::new(super::support::OUTLINE),
+        )
     }
 
     /// The second public clip.
@@ -37,27 +41,47 @@ impl Flat {
     pub fn of_tree(name: &'static str, tree: &Tree) -> Self {
         let (mut nodes, tracks) = tree.flat(&Config::default());
         nodes[0].position_px = tree.skeleton.foot_px;
-        Self { name, nodes, tracks, outline: (*tree.outline).clone() }
+        Self {
+            name,
+            nodes,
+            tracks,
+            outline: (*tree.outline).clone(),
+        }
     }
 
-    /// A binary tree of `levels` levels that forks by some 45 degrees, more or less (`wild`, radians), in a round crown.
+    /// A binary tree of `levels` levels that forks by some 45 degrees, more or less (`wild`,
+    /// radians), in a round crown.
     pub fn generated(levels: u8) -> Self {
         Self::generated_by(levels, 0, 0.2)
     }
 
     pub fn generated_by(levels: u8, seed: u64, wild: f64) -> Self {
-        let node = |parent, level, position_px| Node2d { parent, level, cluster: None, position_px, certainty: 0.8 };
-        let mut nodes = vec![node(None, 0, [320.0, 340.0]), node(Some(0), 1, [316.0, 240.0])];
+        let node = |parent, level, position_px| Node2d {
+            parent,
+            level,
+            cluster: None,
+            position_px,
+            certainty: 0.8,
+        };
+        let mut nodes = vec![
+            node(None, 0, [320.0, 340.0]),
+            node(Some(0), 1, [316.0, 240.0]),
+        ];
         let mut i = 1;
         while i < nodes.len() {
             let (level, at) = (nodes[i].level, nodes[i].position_px);
             let from = nodes[nodes[i].parent.expect("a parent")].position_px;
             let lean = (at[0] - from[0]).atan2(from[1] - at[1]);
             for side in [-1.0, 1.0].into_iter().filter(|_| level < levels) {
-                let wobble = |k: u64| ((i as u64 * 7 + k + 31 * seed) as f64 * 12.9898 + side).sin();
+                let wobble =
+                    |k: u64| ((i as u64 * 7 + k + 31 * seed) as f64 * 12.9898 + side).sin();
                 let turn = lean + side * 0.75 + wild * wobble(1);
                 let length = 85.0 * 0.72_f64.powi(i32::from(level) - 1) * (1.0 + 0.2 * wobble(2));
-                nodes.push(node(Some(i), level + 1, [at[0] + length * turn.sin(), at[1] - length * turn.cos()]));
+                nodes.push(node(
+                    Some(i),
+                    level + 1,
+                    [at[0] + length * turn.sin(), at[1] - length * turn.cos()],
+                ));
             }
             i += 1;
         }
@@ -69,7 +93,12 @@ impl Flat {
         border.extend((2..47).map(round));
         border.push([308.0, 315.0]);
         let outline = outline::from_polygon(&border, Size::new(640, 360)).expect("outline");
-        Self { name: "generated", tracks: vec![3; nodes.len()], nodes, outline }
+        Self {
+            name: "generated",
+            tracks: vec![3; nodes.len()],
+            nodes,
+            outline,
+        }
     }
 
     pub fn all() -> Vec<Self> {
@@ -83,7 +112,8 @@ impl Flat {
 pub fn grown(clip: &Path, outline: &Path) -> Arc<Tree> {
     let config = Config::default();
     let mut clip = source::open(clip, &config.camera, None).expect("clip");
-    let Given::Region(outline) = outline::load(outline, clip.describe().size).expect("outline") else {
+    let Given::Region(outline) = outline::load(outline, clip.describe().size).expect("outline")
+    else {
         panic!("a polygon");
     };
     let mut pipeline = Pipeline::new(&config, Some(outline));
@@ -91,18 +121,28 @@ pub fn grown(clip: &Path, outline: &Path) -> Arc<Tree> {
     let (mut first_s, mut index) = (None, 0);
     while let Some(raw) = clip.next_frame().expect("frame") {
         let first_s = *first_s.get_or_insert(raw.sensor_time_s);
-        let mut luma = arborcam::model::Luma { size: raw.size, pixels: Vec::new() };
+        let mut luma = arborcam::model::Luma {
+            size: raw.size,
+            pixels: Vec::new(),
+        };
         decoder.luma(&raw, &mut luma).expect("picture");
         let time_s = raw.sensor_time_s - first_s;
         let received = std::time::Instant::now();
-        pipeline.step(arborcam::model::Frame { index, time_s, received, luma, preview: None });
+        pipeline.step(arborcam::model::Frame {
+            index,
+            time_s,
+            received,
+            luma,
+            preview: None,
+        });
         index += 1;
     }
     pipeline.finish();
     pipeline.back.tree().expect("a tree").clone()
 }
 
-/// Video and outline of the second public clip, `oak_release` below the folder that ARBORCAM_CLIPS names.
+/// Video and outline of the second public clip, `oak_release` below the folder that ARBORCAM_CLIPS
+/// names.
 pub fn oak_clip() -> Option<[PathBuf; 2]> {
     let Some(clips) = std::env::var_os("ARBORCAM_CLIPS").map(PathBuf::from) else {
         println!("skipped: ARBORCAM_CLIPS does not name a folder with oak_release/video.mkv");

@@ -8,7 +8,8 @@ use arborcam::track::Tracker;
 use std::collections::{BTreeMap, BTreeSet};
 
 const TRUTH: &str = "recordings/sparse_winter.truth";
-/// A track is one of the truth's points if it was born so near to it, px, and not later than in this frame.
+/// A track is one of the truth's points if it was born so near to it, px, and not later than in
+/// this frame.
 const SNAP_PX: f64 = 2.5;
 const LATEST_BIRTH: u64 = 5;
 /// A branch's width: tracks beyond that are on another branch.
@@ -36,7 +37,8 @@ pub struct Score {
 impl Truth {
     pub fn read() -> Self {
         let bytes = std::fs::read(TRUTH).expect("truth");
-        let word = |i: usize| u32::from_le_bytes(bytes[4 * i..4 * i + 4].try_into().expect("four bytes"));
+        let word =
+            |i: usize| u32::from_le_bytes(bytes[4 * i..4 * i + 4].try_into().expect("four bytes"));
         let (points, frames) = (word(0) as usize, word(1) as usize);
         let places: Vec<[f64; 2]> = bytes[4 * (2 + frames)..]
             .as_chunks::<4>()
@@ -55,13 +57,19 @@ impl Truth {
         let (mut near, mut pairs, mut errors) = (0usize, 0usize, Vec::new());
         let mut scored = 0;
         for seen in tracks.values() {
-            let Some((_, &born)) = seen.first_key_value().filter(|(frame, _)| **frame <= LATEST_BIRTH) else {
+            let Some((_, &born)) = seen
+                .first_key_value()
+                .filter(|(frame, _)| **frame <= LATEST_BIRTH)
+            else {
                 continue;
             };
             let nearest = |a: &usize, b: &usize| {
-                distance(self.positions[0][*a], born).total_cmp(&distance(self.positions[0][*b], born))
+                distance(self.positions[0][*a], born)
+                    .total_cmp(&distance(self.positions[0][*b], born))
             };
-            let point = (0..self.positions[0].len()).min_by(nearest).expect("points");
+            let point = (0..self.positions[0].len())
+                .min_by(nearest)
+                .expect("points");
             let start = self.positions[0][point];
             if distance(start, born) > SNAP_PX {
                 continue;
@@ -70,13 +78,22 @@ impl Truth {
             for (frame, positions) in self.frames.iter().zip(&self.positions).skip(1) {
                 let at = positions[point];
                 pairs += 1;
-                let Some(&there) = seen.get(frame) else { continue };
-                let error = distance(there, [at[0] + born[0] - start[0], at[1] + born[1] - start[1]]);
+                let Some(&there) = seen.get(frame) else {
+                    continue;
+                };
+                let error = distance(
+                    there,
+                    [at[0] + born[0] - start[0], at[1] + born[1] - start[1]],
+                );
                 near += usize::from(error < NEAR_PX);
                 errors.push(error);
             }
         }
-        Score { tracks: scored, within_2px: near as f64 / pairs as f64, median_end_px: median(&mut errors) }
+        Score {
+            tracks: scored,
+            within_2px: near as f64 / pairs as f64,
+            median_end_px: median(&mut errors),
+        }
     }
 }
 
@@ -89,8 +106,8 @@ pub fn median(values: &mut [f64]) -> f64 {
     values[values.len() / 2]
 }
 
-/// All tracks of the recording that are kept, by frame, and the median of the errors that the tracker itself expects in
-/// the last frame, px.
+/// All tracks of the recording that are kept, by frame, and the median of the errors that the
+/// tracker itself expects in the last frame, px.
 pub fn tracks() -> (Places, f64) {
     let config = Config::default();
     let mut tracker = Tracker::new(&config.detect, &config.track, &support::outline(), 0);
@@ -99,10 +116,17 @@ pub fn tracks() -> (Places, f64) {
     for k in 0..support::recording().len() {
         let set = tracker.step(&support::decoded(&mut decoder, k));
         for o in &set.observations {
-            places.entry(o.id).or_default().insert(set.frame, [o.u_px.into(), o.v_px.into()]);
+            places
+                .entry(o.id)
+                .or_default()
+                .insert(set.frame, [o.u_px.into(), o.v_px.into()]);
         }
         rejected.extend(set.rejected.iter().copied());
-        expected = set.counted().filter_map(|o| o.error_px).map(f64::from).collect();
+        expected = set
+            .counted()
+            .filter_map(|o| o.error_px)
+            .map(f64::from)
+            .collect();
     }
     places.retain(|id, _| !rejected.contains(id));
     (places, median(&mut expected))

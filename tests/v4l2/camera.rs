@@ -1,11 +1,11 @@
-//! A USB camera without hardware: a UVC device spoken over USB/IP to the guest's own kernel, through `vhci_hcd`. The
-//! kernel sees it as plugged into a port, with vendor, product and serial number; `uvcvideo` makes the /dev/video
-//! device. Ending this process pulls the plug.
+//! A USB camera without hardware: a UVC device spoken over USB/IP to the guest's own kernel,
+//! through `vhci_hcd`. The kernel sees it as plugged into a port, with vendor, product and serial
+//! number; `uvcvideo` makes the /dev/video device. Ending this process pulls the plug.
 //!
 //!     usb-camera CLIP.mjpg WIDTH HEIGHT FPS SERIAL PORT GATE
 //!
-//! It delivers the pictures of CLIP over and over, as they are, while the file GATE is there; without it, it is a camera
-//! that answers and films nothing.
+//! It delivers the pictures of CLIP over and over, as they are, while the file GATE is there;
+//! without it, it is a camera that answers and films nothing.
 
 mod descriptors;
 mod usbip;
@@ -19,7 +19,8 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 use usbip::{Request, Submit};
 
-/// What a transfer of pictures may hold, with its header of two bytes: what `uvcvideo` asks for at once.
+/// What a transfer of pictures may hold, with its header of two bytes: what `uvcvideo` asks for at
+/// once.
 const PAYLOAD: usize = 16 * 1024;
 const HEADER: usize = 2;
 /// Time between two looks while nothing is to be sent.
@@ -57,9 +58,14 @@ pub fn main(args: &[String]) -> ExitCode {
 
 fn plug_in(args: &[String]) -> io::Result<()> {
     let [clip, width, height, fps, serial, port, gate] = args else {
-        return Err(io::Error::other("usb-camera CLIP.mjpg WIDTH HEIGHT FPS SERIAL PORT GATE"));
+        return Err(io::Error::other(
+            "usb-camera CLIP.mjpg WIDTH HEIGHT FPS SERIAL PORT GATE",
+        ));
     };
-    let number = |text: &str| text.parse::<u16>().map_err(|_| io::Error::other(format!("{text} is no number")));
+    let number = |text: &str| {
+        text.parse::<u16>()
+            .map_err(|_| io::Error::other(format!("{text} is no number")))
+    };
     let mode = Mode {
         width: number(width)?,
         height: number(height)?,
@@ -84,7 +90,16 @@ fn plug_in(args: &[String]) -> io::Result<()> {
     }
     drop(kernels);
     let gate = PathBuf::from(gate);
-    Camera { socket: ours, mode, pictures, gate, waiting: VecDeque::new(), probe: [0; 26], filming: None }.run()
+    Camera {
+        socket: ours,
+        mode,
+        pictures,
+        gate,
+        waiting: VecDeque::new(),
+        probe: [0; 26],
+        filming: None,
+    }
+    .run()
 }
 
 /// The JPEG pictures of a file that holds nothing else, one after the other.
@@ -124,10 +139,18 @@ impl Camera {
         loop {
             self.deliver()?;
             let nap = self.filming.as_ref().map_or(IDLE, |f| self.due(f));
-            self.socket.set_read_timeout(Some(nap.max(Duration::from_millis(1))))?;
+            self.socket
+                .set_read_timeout(Some(nap.max(Duration::from_millis(1))))?;
             let request = match usbip::read(&mut self.socket) {
                 Ok(request) => request,
-                Err(e) if matches!(e.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => continue,
+                Err(e)
+                    if matches!(
+                        e.kind(),
+                        io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut
+                    ) =>
+                {
+                    continue;
+                }
                 // The port was switched off.
                 Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => return Ok(()),
                 Err(e) => return Err(e),
@@ -149,7 +172,8 @@ impl Camera {
         (filming.started + at).saturating_duration_since(Instant::now())
     }
 
-    /// Sends what is due into the transfers that wait. A camera whose host is late leaves pictures out.
+    /// Sends what is due into the transfers that wait. A camera whose host is late leaves pictures
+    /// out.
     fn deliver(&mut self) -> io::Result<()> {
         if self.waiting.is_empty() {
             return Ok(());
@@ -158,14 +182,20 @@ impl Camera {
             self.filming = None;
             return Ok(());
         }
-        let filming = self.filming.get_or_insert_with(|| Filming { started: Instant::now(), picture: 0, sent: 0 });
+        let filming = self.filming.get_or_insert_with(|| Filming {
+            started: Instant::now(),
+            picture: 0,
+            sent: 0,
+        });
         while let Some(transfer) = self.waiting.front() {
             let due = filming.started + Duration::from_secs(filming.picture) / self.mode.fps;
             if Instant::now() < due {
                 break;
             }
             let picture = &self.pictures[(filming.picture % self.pictures.len() as u64) as usize];
-            let room = (transfer.length as usize).min(PAYLOAD).saturating_sub(HEADER);
+            let room = (transfer.length as usize)
+                .min(PAYLOAD)
+                .saturating_sub(HEADER);
             let part = &picture[filming.sent..(filming.sent + room).min(picture.len())];
             let last = filming.sent + part.len() == picture.len();
             // End of header, the picture's parity, end of picture.
@@ -203,7 +233,8 @@ impl Camera {
             (0x80..=0x82, 0) => Some(vec![0, 0]),
             (0x80, 8) => Some(vec![1]),
             (0x81, 10) => Some(vec![0]),
-            // Address, configuration, interface, and a cleared halt, which is how streaming over bulk is stopped.
+            // Address, configuration, interface, and a cleared halt, which is how streaming over
+            // bulk is stopped.
             (0x00..=0x02, _) => {
                 if request == 1 {
                     self.filming = None;

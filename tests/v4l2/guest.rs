@@ -40,7 +40,10 @@ pub struct Guest {
 impl Guest {
     /// For a list of the cases.
     pub fn unused() -> Self {
-        Self { absent: None, one_at_a_time: Mutex::new(()) }
+        Self {
+            absent: None,
+            one_at_a_time: Mutex::new(()),
+        }
     }
 
     /// Makes the machine if it is not there.
@@ -51,7 +54,10 @@ impl Guest {
             Ok(done) if done.status.success() => None,
             Ok(done) => Some(String::from_utf8_lossy(&done.stderr).trim().to_owned()),
         };
-        Self { absent, ..Self::unused() }
+        Self {
+            absent,
+            ..Self::unused()
+        }
     }
 
     /// No machine, and none is demanded.
@@ -63,7 +69,9 @@ impl Guest {
     pub fn say_absent(&self) {
         if let Some(why) = &self.absent {
             let line = "=".repeat(80);
-            let text = format!("{line}\nTHE V4L2 TESTS WERE NOT RUN: no virtual machine.\n{why}\n{line}\n");
+            let text = format!(
+                "{line}\nTHE V4L2 TESTS WERE NOT RUN: no virtual machine.\n{why}\n{line}\n"
+            );
             let _ = std::io::stderr().write_all(text.as_bytes());
             // `make test` repeats it after the other tests.
             let _ = fs::create_dir_all(RUNS);
@@ -76,14 +84,19 @@ impl Guest {
         if let Some(why) = &self.absent {
             return Err(format!("there is no virtual machine: {why}"));
         }
-        let _alone = self.one_at_a_time.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let _alone = self
+            .one_at_a_time
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
         let folder = Path::new(RUNS).join(group.name);
         let _ = fs::remove_dir_all(&folder);
         fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
         (group.provide)(&folder)?;
-        let script = fs::canonicalize(Path::new("tests/vm/guest").join(group.script)).map_err(|e| e.to_string())?;
+        let script = fs::canonicalize(Path::new("tests/vm/guest").join(group.script))
+            .map_err(|e| e.to_string())?;
         // Another build may be put to the test, to find out which one brought a fault.
-        let program = std::env::var_os("ARBORCAM_VM_PROGRAM").unwrap_or_else(|| env!("CARGO_BIN_EXE_arborcam").into());
+        let program = std::env::var_os("ARBORCAM_VM_PROGRAM")
+            .unwrap_or_else(|| env!("CARGO_BIN_EXE_arborcam").into());
         let own = std::env::current_exe().map_err(|e| e.to_string())?;
         let ran = Command::new(RUN)
             .args(["-i", group.first, "-t", &group.limit_s.to_string()])
@@ -91,19 +104,32 @@ impl Guest {
             .stdin(Stdio::null())
             .output()
             .map_err(|e| format!("{RUN}: {e}"))?;
-        let said = format!("{}{}", String::from_utf8_lossy(&ran.stdout), String::from_utf8_lossy(&ran.stderr));
+        let said = format!(
+            "{}{}",
+            String::from_utf8_lossy(&ran.stdout),
+            String::from_utf8_lossy(&ran.stderr)
+        );
         if ran.status.success() {
-            let _ = write!(std::io::stderr(), "{}", String::from_utf8_lossy(&ran.stdout));
+            let _ = write!(
+                std::io::stderr(),
+                "{}",
+                String::from_utf8_lossy(&ran.stdout)
+            );
             return Ok(Results { folder });
         }
         // Once, not with every case.
         let _ = writeln!(std::io::stderr(), "{said}");
-        Err(format!("the guest's script failed; what it left is in {}", folder.display()))
+        Err(format!(
+            "the guest's script failed; what it left is in {}",
+            folder.display()
+        ))
     }
 }
 
 fn demanded() -> bool {
-    ["CI", "ARBORCAM_REQUIRE_VM"].iter().any(|name| std::env::var_os(name).is_some_and(|v| !v.is_empty()))
+    ["CI", "ARBORCAM_REQUIRE_VM"]
+        .iter()
+        .any(|name| std::env::var_os(name).is_some_and(|v| !v.is_empty()))
 }
 
 /// What a group's script wrote to its folder, `/vm` in the guest.
@@ -117,13 +143,16 @@ impl Results {
     }
 
     pub fn text(&self, name: &str) -> Result<String, String> {
-        fs::read_to_string(self.path(name)).map_err(|e| format!("{}: {e}", self.path(name).display()))
+        fs::read_to_string(self.path(name))
+            .map_err(|e| format!("{}: {e}", self.path(name).display()))
     }
 
     /// A file with one number.
     pub fn number(&self, name: &str) -> Result<f64, String> {
         let text = self.text(name)?;
-        text.trim().parse().map_err(|_| format!("{name} is no number: {text}"))
+        text.trim()
+            .parse()
+            .map_err(|_| format!("{name} is no number: {text}"))
     }
 
     /// Seconds between two of a case's moments, each a file.
@@ -149,12 +178,14 @@ impl Results {
     /// A count of the case's timing.
     pub fn count(&self, case: &str, name: &str) -> Result<u64, String> {
         let capture = self.capture(case)?;
-        capture["timing"][name].as_u64().ok_or_else(|| format!("{case}: no count {name} in {}", capture["timing"]))
+        capture["timing"][name]
+            .as_u64()
+            .ok_or_else(|| format!("{case}: no count {name} in {}", capture["timing"]))
     }
 }
 
-/// The shipped recording, small enough for an emulated processor: `clip.mjpg`, pictures one after the other, and the
-/// same in `clip.mkv`.
+/// The shipped recording, small enough for an emulated processor: `clip.mjpg`, pictures one after
+/// the other, and the same in `clip.mkv`.
 pub fn clip(folder: &Path) -> Result<(), String> {
     let film = |input: &Path, output: &Path, how: &[&str]| -> Result<(), String> {
         let run = Command::new("ffmpeg")
@@ -165,11 +196,24 @@ pub fn clip(folder: &Path) -> Result<(), String> {
             .stdin(Stdio::null())
             .output()
             .map_err(|e| format!("ffmpeg: {e}"))?;
-        claim(run.status.success(), || String::from_utf8_lossy(&run.stderr).into_owned())
+        claim(run.status.success(), || {
+            String::from_utf8_lossy(&run.stderr).into_owned()
+        })
     };
     let pictures = folder.join("clip.mjpg");
     // Tables as every camera sends them.
-    let small = ["-vf", "scale=320:180", "-c:v", "mjpeg", "-q:v", "3", "-huffman", "default", "-f", "mjpeg"];
+    let small = [
+        "-vf",
+        "scale=320:180",
+        "-c:v",
+        "mjpeg",
+        "-q:v",
+        "3",
+        "-huffman",
+        "default",
+        "-f",
+        "mjpeg",
+    ];
     film(Path::new("recordings/sparse_winter.mkv"), &pictures, &small)?;
     film(&pictures, &folder.join("clip.mkv"), &["-c", "copy"])
 }
@@ -186,17 +230,19 @@ pub fn frames_of(path: &Path) -> Result<Vec<RawFrame>, String> {
 
 /// Makes a recording of `frames`.
 pub fn record(path: &Path, frames: &[RawFrame]) -> Result<(), String> {
-    let mut series = Series::create(path, Head::default(), Limits::default(), || 0).map_err(|e| e.to_string())?;
+    let mut series = Series::create(path, Head::default(), Limits::default(), || 0)
+        .map_err(|e| e.to_string())?;
     for (raw, index) in frames.iter().zip(0..) {
         series.frame(raw, index).map_err(|e| e.to_string())?;
     }
     series.close().map_err(|e| e.to_string())
 }
 
-/// By how much a time that holds for a real machine may be exceeded: an emulated processor is many times slower, and
-/// shares the host with whatever else runs there.
+/// By how much a time that holds for a real machine may be exceeded: an emulated processor is many
+/// times slower, and shares the host with whatever else runs there.
 pub fn slack() -> f64 {
-    let emulated = fs::read_to_string("target/vm/accelerator").is_ok_and(|text| text.contains("tcg"));
+    let emulated =
+        fs::read_to_string("target/vm/accelerator").is_ok_and(|text| text.contains("tcg"));
     if emulated { 2.0 } else { 1.0 }
 }
 

@@ -1,4 +1,5 @@
-//! A capture in a real terminal: what it shows, what its keys do, and what it leaves of the terminal.
+//! A capture in a real terminal: what it shows, what its keys do, and what it leaves of the
+//! terminal.
 
 use crate::guest::{Group, Results, claim, clip};
 
@@ -9,7 +10,9 @@ pub const GROUP: Group = Group {
     limit_s: 240,
     provide: clip,
     cases: &[
-        ("the_screen_while_it_gathers_motion", |r| shows(r, "watching")),
+        ("the_screen_while_it_gathers_motion", |r| {
+            shows(r, "watching")
+        }),
         ("the_help", |r| shows(r, "help")),
         ("the_screen_after_the_build", |r| shows(r, "built")),
         ("the_message_of_an_export", |r| shows(r, "exported")),
@@ -20,17 +23,24 @@ pub const GROUP: Group = Group {
     ],
 };
 
-/// The screen without what is told of the sway, in the rows of the table of branches and in the panel of one of them: it is
-/// another thing in every run.
+/// The screen without what is told of the sway, in the rows of the table of branches and in the
+/// panel of one of them: it is another thing in every run.
 fn without_sway(screen: &str) -> String {
     let lines: Vec<Vec<char>> = screen.lines().map(|l| l.chars().collect()).collect();
     let find = |line: &[char], what: &str| {
         let what: Vec<char> = what.chars().collect();
         line.windows(what.len()).position(|w| *w == what[..])
     };
-    // The panel is between its title and those of the views; the table between the names of its columns and the messages.
-    let at = |what: &str| lines.iter().enumerate().find_map(|(row, l)| Some((row, find(l, what)?)));
-    let (Some((panel, left)), Some((views, _)), Some((head, _))) = (at(" Branch "), at(" Front "), at("ampl/px"))
+    // The panel is between its title and those of the views; the table between the names of its
+    // columns and the messages.
+    let at = |what: &str| {
+        lines
+            .iter()
+            .enumerate()
+            .find_map(|(row, l)| Some((row, find(l, what)?)))
+    };
+    let (Some((panel, left)), Some((views, _)), Some((head, _))) =
+        (at(" Branch "), at(" Front "), at("ampl/px"))
     else {
         return screen.to_owned();
     };
@@ -39,12 +49,21 @@ fn without_sway(screen: &str) -> String {
         let in_panel = row > panel && row < views;
         let in_table = row > head && row < messages;
         let kept = |column: usize| !(in_panel && column >= left || in_table && column < left);
-        line.iter().enumerate().map(|(column, c)| if kept(column) { *c } else { ' ' }).collect()
+        line.iter()
+            .enumerate()
+            .map(|(column, c)| if kept(column) { *c } else { ' ' })
+            .collect()
     };
-    lines.iter().enumerate().map(cut).collect::<Vec<_>>().join("\n")
+    lines
+        .iter()
+        .enumerate()
+        .map(cut)
+        .collect::<Vec<_>>()
+        .join("\n")
 }
 
-/// The screen without what changes from run to run: digits, and the drawings in the panels of pictures and curves.
+/// The screen without what changes from run to run: digits, and the drawings in the panels of
+/// pictures and curves.
 fn still(screen: &str) -> String {
     let screen = without_sway(screen);
     let masked = screen.chars().map(|c| match c {
@@ -58,7 +77,11 @@ fn still(screen: &str) -> String {
         // A number of one digit more must not move what follows it.
         let mut out = String::new();
         for word in line.split_whitespace() {
-            let word: String = word.split('#').filter(|p| !p.is_empty()).collect::<Vec<_>>().join("#");
+            let word: String = word
+                .split('#')
+                .filter(|p| !p.is_empty())
+                .collect::<Vec<_>>()
+                .join("#");
             if !word.is_empty() && word.chars().any(char::is_alphabetic) {
                 out.push_str(&word);
                 out.push(' ');
@@ -68,12 +91,21 @@ fn still(screen: &str) -> String {
     };
     // A refinement is told when it is through, however long it took.
     let refined = |l: &String| l.starts_with("the tree was refined");
-    // Where the two views of the tree stand depends on its shape: they are named last, whichever there are.
+    // Where the two views of the tree stand depends on its shape: they are named last, whichever
+    // there are.
     let views = ["Front", "Side"];
     let is_view = |l: &String| l.split(' ').all(|word| views.contains(&word));
-    let (of_views, mut lines): (Vec<String>, Vec<String>) =
-        masked.lines().map(squeeze).filter(|l| !l.is_empty() && !refined(l)).partition(is_view);
-    lines.extend(views.into_iter().filter(|v| of_views.iter().any(|l| l.contains(v))).map(str::to_owned));
+    let (of_views, mut lines): (Vec<String>, Vec<String>) = masked
+        .lines()
+        .map(squeeze)
+        .filter(|l| !l.is_empty() && !refined(l))
+        .partition(is_view);
+    lines.extend(
+        views
+            .into_iter()
+            .filter(|v| of_views.iter().any(|l| l.contains(v)))
+            .map(str::to_owned),
+    );
     // How many of the branches there is room for is told only where some are left out.
     lines.join("\n").replace("Branches, of", "Branches,")
 }
@@ -85,33 +117,66 @@ fn shows(r: &Results, name: &str) -> Result<(), String> {
         return std::fs::write(&path, found + "\n").map_err(|e| format!("{path}: {e}"));
     }
     let wanted = std::fs::read_to_string(&path).map_err(|e| format!("{path}: {e}"))?;
-    claim(found.trim() == wanted.trim(), || format!("{path}:\n--- wanted\n{wanted}\n--- found\n{found}"))
+    claim(found.trim() == wanted.trim(), || {
+        format!("{path}:\n--- wanted\n{wanted}\n--- found\n{found}")
+    })
 }
 
 fn exported(r: &Results) -> Result<(), String> {
-    for file in ["capture.json", "tracks.csv", "nodes.csv", "motion.csv", "tree.glb", "frame.jpg"] {
-        claim(r.path("live/exported").join(file).exists(), || format!("{file} is missing"))?;
+    for file in [
+        "capture.json",
+        "tracks.csv",
+        "nodes.csv",
+        "motion.csv",
+        "tree.glb",
+        "frame.jpg",
+    ] {
+        claim(r.path("live/exported").join(file).exists(), || {
+            format!("{file} is missing")
+        })?;
     }
     let last = |dir: &str| -> Result<u64, String> {
         let text = r.text(&format!("live/{dir}/tracks.csv"))?;
-        Ok(text.lines().skip(1).filter_map(|l| l.split(',').nth(1)?.parse().ok()).max().unwrap_or(0))
+        Ok(text
+            .lines()
+            .skip(1)
+            .filter_map(|l| l.split(',').nth(1)?.parse().ok())
+            .max()
+            .unwrap_or(0))
     };
     let (then, at_the_end) = (last("exported")?, last("capture")?);
-    claim(then < at_the_end, || format!("exported up to frame {then}, ended at {at_the_end}"))
+    claim(then < at_the_end, || {
+        format!("exported up to frame {then}, ended at {at_the_end}")
+    })
 }
 
 fn quit(r: &Results) -> Result<(), String> {
     let (status, took) = (r.status("live")?, r.seconds("live", "asked", "ended")?);
-    claim(status == "0", || format!("status {status}: {}", r.text("after.screen").unwrap_or_default()))?;
+    claim(status == "0", || {
+        format!(
+            "status {status}: {}",
+            r.text("after.screen").unwrap_or_default()
+        )
+    })?;
     claim(took < 10.0, || format!("{took} s from q to the end"))?;
-    claim(r.path("live/capture/tree.glb").exists(), || "no model".into())
+    claim(r.path("live/capture/tree.glb").exists(), || {
+        "no model".into()
+    })
 }
 
 fn given_back(r: &Results) -> Result<(), String> {
     let (modes, screen) = (r.text("live/terminal")?, r.text("after.screen")?);
-    claim(modes.contains("echo") && !modes.contains("-echo") && modes.contains("icanon"), || modes.clone())?;
-    claim(screen.contains("after>") && screen.contains("capture: "), || screen.clone())?;
-    claim(!screen.contains("Camera ─"), || format!("the program's screen is still there:\n{screen}"))
+    claim(
+        modes.contains("echo") && !modes.contains("-echo") && modes.contains("icanon"),
+        || modes.clone(),
+    )?;
+    claim(
+        screen.contains("after>") && screen.contains("capture: "),
+        || screen.clone(),
+    )?;
+    claim(!screen.contains("Camera ─"), || {
+        format!("the program's screen is still there:\n{screen}")
+    })
 }
 
 fn streamed(r: &Results) -> Result<(), String> {
@@ -120,12 +185,25 @@ fn streamed(r: &Results) -> Result<(), String> {
     let mut poses = 0;
     // A line that was cut by the end is none.
     for line in text.lines() {
-        let pose: serde_json::Value = serde_json::from_str(line).map_err(|e| format!("{e}: {line}"))?;
-        let Some(frame) = pose["frame"].as_u64() else { continue };
-        claim(last.is_none_or(|l| frame > l), || format!("frame {frame} after {last:?}"))?;
-        claim(pose["nodes"].as_array().is_some_and(|n| n.len() > 3), || format!("few nodes: {line}"))?;
+        let pose: serde_json::Value =
+            serde_json::from_str(line).map_err(|e| format!("{e}: {line}"))?;
+        let Some(frame) = pose["frame"].as_u64() else {
+            continue;
+        };
+        claim(last.is_none_or(|l| frame > l), || {
+            format!("frame {frame} after {last:?}")
+        })?;
+        claim(
+            pose["nodes"].as_array().is_some_and(|n| n.len() > 3),
+            || format!("few nodes: {line}"),
+        )?;
         last = Some(frame);
         poses += 1;
     }
-    claim(poses >= 10, || format!("{poses} poses: {}", r.messages("stream").unwrap_or_default()))
+    claim(poses >= 10, || {
+        format!(
+            "{poses} poses: {}",
+            r.messages("stream").unwrap_or_default()
+        )
+    })
 }

@@ -1,8 +1,8 @@
-//! The program against real kernel V4L2 devices, in a virtual machine (see tests/vm). Each group of cases is one boot
-//! and one script; what the guest left behind is judged here, case by case.
+//! The program against real kernel V4L2 devices, in a virtual machine (see tests/vm). Each group of
+//! cases is one boot and one script; what the guest left behind is judged here, case by case.
 //!
-//! Where the machine cannot be made, the cases count as ignored and a line says so; with `CI` or `ARBORCAM_REQUIRE_VM`
-//! set, they fail.
+//! Where the machine cannot be made, the cases count as ignored and a line says so; with `CI` or
+//! `ARBORCAM_REQUIRE_VM` set, they fail.
 
 mod camera;
 mod faults;
@@ -20,7 +20,13 @@ use std::sync::Arc;
 /// A named judgement on what a group left behind.
 pub type Case = (&'static str, fn(&guest::Results) -> Result<(), String>);
 
-const GROUPS: &[Group] = &[parity::GROUP, live::GROUP, faults::GROUP, replug::GROUP, service::GROUP];
+const GROUPS: &[Group] = &[
+    parity::GROUP,
+    live::GROUP,
+    faults::GROUP,
+    replug::GROUP,
+    service::GROUP,
+];
 
 fn main() -> ExitCode {
     // The same binary plays the USB camera in the guest.
@@ -29,7 +35,11 @@ fn main() -> ExitCode {
         return camera::main(&args[2..]);
     }
     let args = Arguments::from_args();
-    let guest = if args.list { Guest::unused() } else { Guest::prepare() };
+    let guest = if args.list {
+        Guest::unused()
+    } else {
+        Guest::prepare()
+    };
     let guest = Arc::new(guest);
     let trials = GROUPS.iter().flat_map(|group| {
         let run = Arc::new(std::sync::OnceLock::new());
@@ -39,7 +49,11 @@ fn main() -> ExitCode {
             let ignored = guest.is_absent();
             Trial::test(format!("{}::{name}", group.name), move || {
                 let results = run.get_or_init(|| guest.run(group));
-                results.as_ref().map_err(Clone::clone).and_then(judge).map_err(Into::into)
+                results
+                    .as_ref()
+                    .map_err(Clone::clone)
+                    .and_then(judge)
+                    .map_err(Into::into)
             })
             .with_ignored_flag(ignored)
         })

@@ -1,4 +1,5 @@
-//! A clip through a real device gives what the file gives: the same luma, and from it the same tracks and tree.
+//! A clip through a real device gives what the file gives: the same luma, and from it the same
+//! tracks and tree.
 
 use crate::guest::{Group, Results, claim, clip, frames_of};
 use arborcam::model::{Luma, PixelFormat, RawFrame, Size};
@@ -14,12 +15,17 @@ pub const GROUP: Group = Group {
     cases: &[
         ("mjpeg_has_the_luma_of_the_file", |r| luma(r, "mjpeg")),
         ("yuyv_has_the_luma_of_the_file", |r| luma(r, "yuyv")),
-        ("mjpeg_gives_the_tracks_and_the_tree_of_its_replay", |r| replay(r, "mjpeg")),
-        ("yuyv_gives_the_tracks_and_the_tree_of_its_replay", |r| replay(r, "yuyv")),
+        ("mjpeg_gives_the_tracks_and_the_tree_of_its_replay", |r| {
+            replay(r, "mjpeg")
+        }),
+        ("yuyv_gives_the_tracks_and_the_tree_of_its_replay", |r| {
+            replay(r, "yuyv")
+        }),
     ],
 };
 
-/// Rate at which the clip is played: what an emulated processor follows without dropping a frame, Hz.
+/// Rate at which the clip is played: what an emulated processor follows without dropping a frame,
+/// Hz.
 const RATE_HZ: f64 = 8.0;
 
 /// Frames that may be passed over at once.
@@ -29,7 +35,10 @@ const LATE: usize = 4;
 fn lumas(frames: &[RawFrame]) -> Result<Vec<Vec<u8>>, String> {
     let mut decoder = Decoder::new().map_err(|e| e.to_string())?;
     let decoded = frames.iter().map(|raw| {
-        let mut luma = Luma { size: raw.size, pixels: Vec::new() };
+        let mut luma = Luma {
+            size: raw.size,
+            pixels: Vec::new(),
+        };
         decoder.luma(raw, &mut luma).map_err(|e| e.to_string())?;
         Ok(luma.pixels)
     });
@@ -54,30 +63,51 @@ fn provide(folder: &Path) -> Result<(), String> {
     crate::guest::record(&folder.join("clip-yuyv.mcap"), &frames)
 }
 
-/// Each filmed frame is the clip's next, from wherever the filming began. The device does not wait for a reader that is
-/// late: where the whole machine stood still, it has gone on by a few frames.
+/// Each filmed frame is the clip's next, from wherever the filming began. The device does not wait
+/// for a reader that is late: where the whole machine stood still, it has gone on by a few frames.
 fn luma(r: &Results, format: &str) -> Result<(), String> {
     let clip = lumas(&frames_of(&r.path(&format!("clip-{format}.mcap")))?)?;
     let filmed = frames_of(&r.path(&format!("live-{format}.mcap")))?;
-    claim(filmed.len() > 100, || format!("{} frames filmed: {}", filmed.len(), said(r, format)))?;
+    claim(filmed.len() > 100, || {
+        format!("{} frames filmed: {}", filmed.len(), said(r, format))
+    })?;
     let right = PixelFormat::from_fourcc(if format == "mjpeg" { "MJPG" } else { "YUYV" });
-    claim(filmed.iter().all(|f| Some(f.format) == right && f.size == Size::new(320, 180)), || "another format".into())?;
+    claim(
+        filmed
+            .iter()
+            .all(|f| Some(f.format) == right && f.size == Size::new(320, 180)),
+        || "another format".into(),
+    )?;
     let filmed = lumas(&filmed)?;
-    let first = clip.iter().position(|l| *l == filmed[0]).ok_or("the first frame is none of the clip's")?;
+    let first = clip
+        .iter()
+        .position(|l| *l == filmed[0])
+        .ok_or("the first frame is none of the clip's")?;
     let (mut at, mut passed_over) = (first, 0);
     for (n, luma) in filmed.iter().enumerate().skip(1) {
-        let step = (1..=LATE).find(|step| clip[(at + step) % clip.len()] == *luma).ok_or_else(|| {
-            let is = clip.iter().position(|l| l == luma);
-            format!("filmed frame {n} is the clip's {is:?} instead of {}", (at + 1) % clip.len())
-        })?;
+        let step = (1..=LATE)
+            .find(|step| clip[(at + step) % clip.len()] == *luma)
+            .ok_or_else(|| {
+                let is = clip.iter().position(|l| l == luma);
+                format!(
+                    "filmed frame {n} is the clip's {is:?} instead of {}",
+                    (at + 1) % clip.len()
+                )
+            })?;
         (at, passed_over) = (at + step, passed_over + step - 1);
     }
-    claim(20 * passed_over <= filmed.len(), || format!("{passed_over} passed over beside {} filmed", filmed.len()))
+    claim(20 * passed_over <= filmed.len(), || {
+        format!("{passed_over} passed over beside {} filmed", filmed.len())
+    })
 }
 
 fn said(r: &Results, format: &str) -> String {
     let of = |name: String| r.messages(&name).unwrap_or_default();
-    format!("{}{}", of(format!("live-{format}")), of(format!("replay-{format}")))
+    format!(
+        "{}{}",
+        of(format!("live-{format}")),
+        of(format!("replay-{format}"))
+    )
 }
 
 fn not_in_time(row: &str) -> bool {
@@ -92,20 +122,30 @@ fn shape(row: &str) -> Vec<&str> {
 fn replay(r: &Results, format: &str) -> Result<(), String> {
     let (live, again) = (format!("live-{format}"), format!("replay-{format}"));
     let statuses = (r.status(&live)?, r.status(&again)?);
-    claim(statuses == ("130".into(), "0".into()), || format!("{statuses:?}: {}", said(r, format)))?;
+    claim(statuses == ("130".into(), "0".into()), || {
+        format!("{statuses:?}: {}", said(r, format))
+    })?;
     // A frame that the tracker had no time for would be a difference of its own.
     let dropped = r.count(&live, "frames_dropped_tracker")?;
-    claim(dropped == 0, || format!("the guest was too slow: {dropped} frames dropped"))?;
+    claim(dropped == 0, || {
+        format!("the guest was too slow: {dropped} frames dropped")
+    })?;
     for file in ["tracks.csv", "nodes.csv", "motion.csv"] {
         let [a, b] = [&live, &again].map(|name| r.text(&format!("{name}/capture/{file}")));
         let (a, b) = (a?, b?);
-        claim(a.lines().count() > 10, || format!("{live}: {file} has {} lines", a.lines().count()))?;
-        // A capture that is asked to end leaves branches to `analyze` that it has not looked at yet; a replay does not.
-        let same = |a: &str, b: &str| a == b || file == "nodes.csv" && not_in_time(a) && shape(a) == shape(b);
-        let differ = a.lines().zip(b.lines()).find(|(a, b)| !same(a, b));
-        claim(differ.is_none() && a.lines().count() == b.lines().count(), || {
-            format!("{file}: live and replay differ: {differ:?}")
+        claim(a.lines().count() > 10, || {
+            format!("{live}: {file} has {} lines", a.lines().count())
         })?;
+        // A capture that is asked to end leaves branches to `analyze` that it has not looked at
+        // yet; a replay does not.
+        let same = |a: &str, b: &str| {
+            a == b || file == "nodes.csv" && not_in_time(a) && shape(a) == shape(b)
+        };
+        let differ = a.lines().zip(b.lines()).find(|(a, b)| !same(a, b));
+        claim(
+            differ.is_none() && a.lines().count() == b.lines().count(),
+            || format!("{file}: live and replay differ: {differ:?}"),
+        )?;
     }
     Ok(())
 }

@@ -1,4 +1,5 @@
-//! The service as it is installed, under a real systemd, with a camera that appears, is silent, and hangs.
+//! The service as it is installed, under a real systemd, with a camera that appears, is silent, and
+//! hangs.
 
 use crate::guest::{Group, Results, claim, clip, slack};
 use std::path::Path;
@@ -15,7 +16,10 @@ pub const GROUP: Group = Group {
         ("it_is_ready_only_when_frames_flow", ready),
         ("it_runs_as_its_own_user", own_user),
         ("the_watchdog_restarts_it_when_it_hangs", watchdog),
-        ("it_stops_within_two_seconds_with_its_capture_complete", stops),
+        (
+            "it_stops_within_two_seconds_with_its_capture_complete",
+            stops,
+        ),
         ("its_recording_is_readable_after_a_kill", killed),
     ],
 };
@@ -29,7 +33,9 @@ fn provide(folder: &Path) -> Result<(), String> {
         .arg(format!("DESTDIR={}", root.display()))
         .output()
         .map_err(|e| format!("make: {e}"))?;
-    claim(make.status.success(), || format!("make install: {}", String::from_utf8_lossy(&make.stderr)))
+    claim(make.status.success(), || {
+        format!("make install: {}", String::from_utf8_lossy(&make.stderr))
+    })
 }
 
 fn said(r: &Results) -> String {
@@ -38,16 +44,26 @@ fn said(r: &Results) -> String {
 
 fn starts(r: &Results) -> Result<(), String> {
     let (before, filming) = (r.text("before")?, r.text("filming")?);
-    claim(before.starts_with("inactive/"), || format!("before the camera came: {before}"))?;
-    claim(filming.starts_with("activating/"), || format!("with the camera: {filming}{}", said(r)))
+    claim(before.starts_with("inactive/"), || {
+        format!("before the camera came: {before}")
+    })?;
+    claim(filming.starts_with("activating/"), || {
+        format!("with the camera: {filming}{}", said(r))
+    })
 }
 
 fn ready(r: &Results) -> Result<(), String> {
     let (filming, flowing) = (r.text("filming")?, r.text("flowing")?);
-    claim(filming.trim() == "activating/start", || format!("without a frame: {filming}{}", said(r)))?;
-    claim(flowing.trim() == "active/running", || format!("with frames: {flowing}{}", said(r)))?;
+    claim(filming.trim() == "activating/start", || {
+        format!("without a frame: {filming}{}", said(r))
+    })?;
+    claim(flowing.trim() == "active/running", || {
+        format!("with frames: {flowing}{}", said(r))
+    })?;
     let took = r.number("ready")? - r.number("flows")?;
-    claim(took < 5.0, || format!("ready {took} s after the first frame"))
+    claim(took < 5.0, || {
+        format!("ready {took} s after the first frame")
+    })
 }
 
 fn own_user(r: &Results) -> Result<(), String> {
@@ -61,19 +77,27 @@ fn watchdog(r: &Results) -> Result<(), String> {
     claim(said(r).contains("atchdog timeout"), || said(r))?;
     // The limit, the time to abort, and the pause before the next start.
     let took = r.number("restarted")? - r.number("stopped")?;
-    claim((3.0..30.0).contains(&took), || format!("back after {took} s: {}", said(r)))
+    claim((3.0..30.0).contains(&took), || {
+        format!("back after {took} s: {}", said(r))
+    })
 }
 
 fn stops(r: &Results) -> Result<(), String> {
     let took = r.number("ended")? - r.number("asked")?;
-    claim(took <= 2.0 * slack(), || format!("ended {took} s after SIGTERM: {}", said(r)))?;
+    claim(took <= 2.0 * slack(), || {
+        format!("ended {took} s after SIGTERM: {}", said(r))
+    })?;
     let result = r.text("stopping")?;
-    claim(result.trim() == "success 130", || format!("{result}{}", said(r)))?;
+    claim(result.trim() == "success 130", || {
+        format!("{result}{}", said(r))
+    })?;
     for file in ["capture.json", "tracks.csv", "nodes.csv", "motion.csv"] {
-        claim(r.path("capture").join(file).exists(), || format!("{file} is missing: {}", said(r)))?;
+        claim(r.path("capture").join(file).exists(), || {
+            format!("{file} is missing: {}", said(r))
+        })?;
     }
-    let json: serde_json::Value =
-        serde_json::from_str(&r.text("capture/capture.json")?).map_err(|e| format!("capture.json: {e}"))?;
+    let json: serde_json::Value = serde_json::from_str(&r.text("capture/capture.json")?)
+        .map_err(|e| format!("capture.json: {e}"))?;
     let seen = json["timing"]["frames_seen"].as_u64().unwrap_or(0);
     claim(seen >= 20, || format!("{seen} frames"))
 }
@@ -81,5 +105,7 @@ fn stops(r: &Results) -> Result<(), String> {
 fn killed(r: &Results) -> Result<(), String> {
     let frames = crate::guest::frames_of(&r.path("killed.mcap"))?;
     // Five seconds at 15 Hz, of which the last may be lost.
-    claim(frames.len() >= 45, || format!("{} frames in the recording", frames.len()))
+    claim(frames.len() >= 45, || {
+        format!("{} frames in the recording", frames.len())
+    })
 }

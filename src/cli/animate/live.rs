@@ -8,7 +8,8 @@ use std::sync::Arc;
 
 /// How far the rope pulls, degrees.
 const LEAN_DEG: f64 = 12.0;
-/// The motion is magnified by this with every press, and by its powers from the lowest to the highest.
+/// The motion is magnified by this with every press, and by its powers from the lowest to the
+/// highest.
 const LARGER: f64 = 1.25;
 const STEPS: i8 = 12;
 /// Poses a second of the captured motion.
@@ -59,13 +60,19 @@ impl Moving for InWind {
     fn change(&mut self, whim: Whim) {
         match whim {
             Whim::Stronger(by) => self.force = (self.force + f64::from(by)).clamp(0.0, 12.0),
-            Whim::Veer(by) => self.direction_deg = (self.direction_deg + f64::from(by)).rem_euclid(360.0),
+            Whim::Veer(by) => {
+                self.direction_deg = (self.direction_deg + f64::from(by)).rem_euclid(360.0)
+            }
             Whim::Larger(by) => {
                 self.larger = (self.larger + by).clamp(-STEPS, STEPS);
                 self.animator.magnify(LARGER.powi(self.larger.into()));
             }
             Whim::Pull => {
-                let rope = if self.animator.pulled().is_some() { None } else { self.rope };
+                let rope = if self.animator.pulled().is_some() {
+                    None
+                } else {
+                    self.rope
+                };
                 self.animator.pull(rope);
             }
         }
@@ -73,7 +80,11 @@ impl Moving for InWind {
     }
 
     fn told(&self) -> String {
-        let pulled = if self.animator.pulled().is_some() { "  pulled" } else { "" };
+        let pulled = if self.animator.pulled().is_some() {
+            "  pulled"
+        } else {
+            ""
+        };
         format!(
             "wind {:.0} of 12 ({})  to {:.0}°  magnified {:.2}{pulled}",
             self.force,
@@ -114,7 +125,10 @@ impl AsFilmed {
         let mut new = Self {
             skeleton: made.skeleton.clone(),
             film: made.poses.clone(),
-            wanted: Magnify { looped: false, ..wanted },
+            wanted: Magnify {
+                looped: false,
+                ..wanted
+            },
             shown: Vec::new(),
             time_s: 0.0,
         };
@@ -123,7 +137,11 @@ impl AsFilmed {
     }
 
     fn magnified(&self) -> Result<Vec<Pose>, crate::animate::MagnifyError> {
-        let length_s = self.film.last().zip(self.film.first()).map_or(0.0, |(b, a)| b.time_s - a.time_s);
+        let length_s = self
+            .film
+            .last()
+            .zip(self.film.first())
+            .map_or(0.0, |(b, a)| b.time_s - a.time_s);
         let count = (2.0 * length_s * FPS / self.wanted.speed).clamp(1.0, 600.0 * FPS) as u64;
         magnify(&self.skeleton, &self.film, &self.wanted, FPS, count)
     }
@@ -137,7 +155,11 @@ impl Moving for AsFilmed {
     fn pose(&mut self, elapsed_s: f64) -> Pose {
         self.time_s += elapsed_s;
         let k = (self.time_s * FPS) as usize % self.shown.len().max(1);
-        self.shown.get(k).cloned().unwrap_or_else(|| Pose { frame: 0, time_s: 0.0, joints: Vec::new() })
+        self.shown.get(k).cloned().unwrap_or_else(|| Pose {
+            frame: 0,
+            time_s: 0.0,
+            joints: Vec::new(),
+        })
     }
 
     fn change(&mut self, whim: Whim) {
@@ -152,6 +174,9 @@ impl Moving for AsFilmed {
     }
 
     fn told(&self) -> String {
-        format!("as filmed, magnified {:.2}, speed {:.2}", self.wanted.by, self.wanted.speed)
+        format!(
+            "as filmed, magnified {:.2}, speed {:.2}",
+            self.wanted.by, self.wanted.speed
+        )
     }
 }

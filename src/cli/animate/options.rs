@@ -18,8 +18,9 @@ pub struct AnimateArgs {
     /// Length of the animation, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = super::super::seconds)]
     pub seconds: f64,
-    /// What to write, by its ending: a model (.glb, .gltf), a page (.html), the motion as a table (.csv), a video (.mp4), or
-    /// a picture of the end (.png). It must not exist. Without it the tree moves on the terminal, with keys for the wind.
+    /// What to write, by its ending: a model (.glb, .gltf), a page (.html), the motion as a table
+    /// (.csv), a video (.mp4), or a picture of the end (.png). It must not exist. Without it the
+    /// tree moves on the terminal, with keys for the wind.
     #[arg(long, value_name = "PATH")]
     pub out: Option<PathBuf>,
     /// Poses a second, 1 to 120.
@@ -28,8 +29,8 @@ pub struct AnimateArgs {
     /// Strength of the wind on the Beaufort scale, 0 (still) to 12.
     #[arg(long, value_name = "FORCE", allow_negative_numbers = true)]
     pub wind: Option<f64>,
-    /// Where it blows to, or where --pull pulls to: degrees about the trunk, 0 to the right of the picture, 90 away from
-    /// the camera.
+    /// Where it blows to, or where --pull pulls to: degrees about the trunk, 0 to the right of the
+    /// picture, 90 away from the camera.
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     pub direction: Option<f64>,
     /// How much its speed varies, as a share of the mean, 0 (steady) to 1.
@@ -41,19 +42,23 @@ pub struct AnimateArgs {
     /// Ends as it begins, without a seam.
     #[arg(long = "loop")]
     pub looped: bool,
-    /// A sound (.wav) that drives the wind: it blows as loud as the sound is, with --wind on average.
+    /// A sound (.wav) that drives the wind: it blows as loud as the sound is, with --wind on
+    /// average.
     #[arg(long, value_name = "FILE")]
     pub wav: Option<PathBuf>,
-    /// Pulls the tree aside until it leans by so many degrees, and lets it go; without --wind in still air.
+    /// Pulls the tree aside until it leans by so many degrees, and lets it go; without --wind in
+    /// still air.
     #[arg(long, value_name = "DEGREES", value_parser = lean, conflicts_with_all = ["looped", "wav"])]
     pub pull: Option<f64>,
-    /// The node of nodes.csv that is pulled at; if not given the thickest of those well above the ground.
+    /// The node of nodes.csv that is pulled at; if not given the thickest of those well above the
+    /// ground.
     #[arg(long, value_name = "NODE", requires = "pull")]
     pub pull_node: Option<u32>,
     /// When it is let go, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.5, requires = "pull", value_parser = moment)]
     pub release: f64,
-    /// The captured motion instead of wind, so many times as large; 0 holds the tree still, 1 is as filmed.
+    /// The captured motion instead of wind, so many times as large; 0 holds the tree still, 1 is as
+    /// filmed.
     #[arg(
         long, value_name = "TIMES", value_parser = times, conflicts_with_all = ["wind", "gusts", "beta", "wav", "pull", "direction"]
     )]
@@ -97,7 +102,10 @@ impl AnimateArgs {
     /// # Errors
     /// What does not go together or is out of range, for the user to read.
     pub fn check(&self, out: &Path) -> Result<Kind, String> {
-        let ending = out.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+        let ending = out
+            .extension()
+            .map(|e| e.to_string_lossy().to_lowercase())
+            .unwrap_or_default();
         let kind = match ending.as_str() {
             "glb" => Kind::Glb,
             "gltf" => Kind::Gltf,
@@ -116,10 +124,14 @@ impl AnimateArgs {
             return Err(format!("--seconds is more than {LONGEST_S}; give less"));
         }
         if self.seconds * self.fps > MOST_POSES {
-            return Err(format!("--seconds times --fps is more than {MOST_POSES}; give less of one"));
+            return Err(format!(
+                "--seconds times --fps is more than {MOST_POSES}; give less of one"
+            ));
         }
         if kind == Kind::Video && self.background.is_some_and(|b| b[3] == 0) {
-            return Err("a video cannot be transparent; give --background white or a colour".into());
+            return Err(
+                "a video cannot be transparent; give --background white or a colour".into(),
+            );
         }
         Ok(kind)
     }
@@ -130,7 +142,8 @@ impl AnimateArgs {
     /// It is out of range.
     pub fn set(&self, config: &mut Config) -> Result<(), ConfigError> {
         let wind = &mut config.wind;
-        let set = |value: &mut f64, wanted: Option<f64>| wanted.into_iter().for_each(|w| *value = w);
+        let set =
+            |value: &mut f64, wanted: Option<f64>| wanted.into_iter().for_each(|w| *value = w);
         set(&mut wind.force, self.wind.or(self.pull.map(|_| 0.0)));
         set(&mut wind.direction_deg, self.direction);
         set(&mut wind.gusts, self.gusts);
@@ -145,7 +158,10 @@ impl AnimateArgs {
 }
 
 fn within(text: &str, low: f64, high: f64, else_: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|x: &f64| (low..=high).contains(x)).ok_or_else(|| else_.to_owned())
+    text.parse()
+        .ok()
+        .filter(|x: &f64| (low..=high).contains(x))
+        .ok_or_else(|| else_.to_owned())
 }
 
 fn lean(text: &str) -> Result<f64, String> {
@@ -161,11 +177,25 @@ fn speed(text: &str) -> Result<f64, String> {
 }
 
 fn moment(text: &str) -> Result<f64, String> {
-    within(text, 0.0, LONGEST_S, "give a number of seconds from 0 to 600")
+    within(
+        text,
+        0.0,
+        LONGEST_S,
+        "give a number of seconds from 0 to 600",
+    )
 }
 
 fn band(text: &str) -> Result<[f64; 2], String> {
-    let number = |part: &str| part.trim().parse::<f64>().ok().filter(|x| (0.0..=1000.0).contains(x));
-    let parsed = text.split_once("..").and_then(|(low, high)| Some([number(low)?, number(high)?]));
-    parsed.filter(|[low, high]| low < high).ok_or_else(|| "give two frequencies in Hz, as 0.5..2".to_owned())
+    let number = |part: &str| {
+        part.trim()
+            .parse::<f64>()
+            .ok()
+            .filter(|x| (0.0..=1000.0).contains(x))
+    };
+    let parsed = text
+        .split_once("..")
+        .and_then(|(low, high)| Some([number(low)?, number(high)?]));
+    parsed
+        .filter(|[low, high]| low < high)
+        .ok_or_else(|| "give two frequencies in Hz, as 0.5..2".to_owned())
 }

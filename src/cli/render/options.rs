@@ -22,8 +22,8 @@ pub struct RenderArgs {
     /// The picture (.png) or the video (.mp4); it must not exist.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Moment of the film, s. A video begins there. If not given, a picture shows the tree at rest, or with --film as it was
-    /// in that frame, and a video the end of the film.
+    /// Moment of the film, s. A video begins there. If not given, a picture shows the tree at rest,
+    /// or with --film as it was in that frame, and a video the end of the film.
     #[arg(long, value_name = "SECONDS", value_parser = moment, conflicts_with = "pose")]
     pub at: Option<f64>,
     /// `rest`: the tree at rest, in a video too.
@@ -88,26 +88,45 @@ impl RenderArgs {
     /// # Errors
     /// What does not go together, for the user to read.
     pub fn check(&self) -> Result<Kind, String> {
-        let suffix = self.out.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+        let suffix = self
+            .out
+            .extension()
+            .map(|e| e.to_string_lossy().to_lowercase())
+            .unwrap_or_default();
         let kind = match suffix.as_str() {
             "png" => Kind::Picture,
             "mp4" => Kind::Video,
-            _ => return Err(format!("--out {} does not end in .png or .mp4; name it so", self.out.display())),
+            _ => {
+                return Err(format!(
+                    "--out {} does not end in .png or .mp4; name it so",
+                    self.out.display()
+                ));
+            }
         };
         if kind == Kind::Video && self.background.is_some_and(|b| b[3] == 0) {
-            return Err("a video cannot be transparent; give --background white or a colour".into());
+            return Err(
+                "a video cannot be transparent; give --background white or a colour".into(),
+            );
         }
         if kind == Kind::Picture && self.seconds.is_some() {
-            return Err("--seconds goes with a video; name one with --out FILE.mp4, or use --at".into());
+            return Err(
+                "--seconds goes with a video; name one with --out FILE.mp4, or use --at".into(),
+            );
         }
-        if self.film == Some(FilmPlace::Behind) && (self.view != ViewName::Front || self.turn != 0.0) {
+        if self.film == Some(FilmPlace::Behind)
+            && (self.view != ViewName::Front || self.turn != 0.0)
+        {
             return Err(
                 "--film behind goes with the front view only, from where it was filmed; use --film beside".into()
             );
         }
-        if self.film == Some(FilmPlace::Behind) && (self.at.is_some() || self.pose.is_some() || kind == Kind::Video) {
+        if self.film == Some(FilmPlace::Behind)
+            && (self.at.is_some() || self.pose.is_some() || kind == Kind::Video)
+        {
             let one = "--film behind lays the tree over the one frame that the capture holds, as it was in it";
-            return Err(format!("{one}; leave out --at and --pose, and make a picture, or use --film beside"));
+            return Err(format!(
+                "{one}; leave out --at and --pose, and make a picture, or use --film beside"
+            ));
         }
         Ok(kind)
     }
@@ -117,43 +136,73 @@ impl RenderArgs {
         let from = match self.view {
             ViewName::Front => View::FRONT,
             ViewName::Side => View::SIDE,
-            ViewName::Back => View { turn: std::f64::consts::PI, down: 0.0 },
+            ViewName::Back => View {
+                turn: std::f64::consts::PI,
+                down: 0.0,
+            },
             ViewName::Top => View::TOP,
-            ViewName::Turntable => View { turn: std::f64::consts::TAU * share, down: 0.2 },
+            ViewName::Turntable => View {
+                turn: std::f64::consts::TAU * share,
+                down: 0.2,
+            },
         };
-        View { turn: from.turn + self.turn.to_radians(), ..from }
+        View {
+            turn: from.turn + self.turn.to_radians(),
+            ..from
+        }
     }
 }
 
 pub fn size(text: &str) -> Result<Size, String> {
-    let whole = |part: &str| part.parse::<u32>().ok().filter(|n| (1..=LARGEST).contains(n));
-    let parsed = text.split_once(['x', 'X']).and_then(|(w, h)| Some(Size::new(whole(w)?, whole(h)?)));
-    parsed.ok_or_else(|| format!("give width and height in pixels, as 640x480; each 1 to {LARGEST}"))
+    let whole = |part: &str| {
+        part.parse::<u32>()
+            .ok()
+            .filter(|n| (1..=LARGEST).contains(n))
+    };
+    let parsed = text
+        .split_once(['x', 'X'])
+        .and_then(|(w, h)| Some(Size::new(whole(w)?, whole(h)?)));
+    parsed
+        .ok_or_else(|| format!("give width and height in pixels, as 640x480; each 1 to {LARGEST}"))
 }
 
 pub fn background(text: &str) -> Result<[u8; 4], String> {
     let colour = |hex: &str| {
         let sound = hex.len() == 6 && hex.bytes().all(|b| b.is_ascii_hexdigit());
         let part = |i: usize| u8::from_str_radix(&hex[i..i + 2], 16).ok();
-        sound.then(|| Some([part(0)?, part(2)?, part(4)?, 255])).flatten()
+        sound
+            .then(|| Some([part(0)?, part(2)?, part(4)?, 255]))
+            .flatten()
     };
     match text {
         "transparent" => Ok([0; 4]),
         "white" => Ok([255; 4]),
-        _ => text.strip_prefix('#').and_then(colour).ok_or_else(|| "give transparent, white or #rrggbb".to_owned()),
+        _ => text
+            .strip_prefix('#')
+            .and_then(colour)
+            .ok_or_else(|| "give transparent, white or #rrggbb".to_owned()),
     }
 }
 
 fn number(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|n: &f64| n.is_finite() && n.abs() < 1e6).ok_or_else(|| "give a number".to_owned())
+    text.parse()
+        .ok()
+        .filter(|n: &f64| n.is_finite() && n.abs() < 1e6)
+        .ok_or_else(|| "give a number".to_owned())
 }
 
 fn moment(text: &str) -> Result<f64, String> {
-    let moment = text.parse().ok().filter(|s: &f64| s.is_finite() && *s >= 0.0);
+    let moment = text
+        .parse()
+        .ok()
+        .filter(|s: &f64| s.is_finite() && *s >= 0.0);
     moment.ok_or_else(|| "give a number of seconds, 0 or more".to_owned())
 }
 
 pub fn rate(text: &str) -> Result<f64, String> {
-    let rate = text.parse().ok().filter(|r: &f64| (1.0..=120.0).contains(r));
+    let rate = text
+        .parse()
+        .ok()
+        .filter(|r: &f64| (1.0..=120.0).contains(r));
     rate.ok_or_else(|| "give pictures a second, 1 to 120".to_owned())
 }

@@ -1,4 +1,5 @@
-//! How a tree becomes a better one: modes change places, branches come apart, points change branches, as long as it is worth it.
+//! How a tree becomes a better one: modes change places, branches come apart, points change
+//! branches, as long as it is worth it.
 
 use super::super::decay::Mode;
 use super::search::{CLEAR, LEAST, Tried};
@@ -12,7 +13,8 @@ const AFTER: usize = 5;
 const OF_ALL: usize = 6;
 /// Branches that may come off one in a round.
 const SHOOTS: usize = 4;
-/// Points that a tip must have to be tried as two, and how far apart those are put: share of the frequency either way.
+/// Points that a tip must have to be tried as two, and how far apart those are put: share of the
+/// frequency either way.
 const FOR_TWO: usize = 8;
 const APART: [f64; 2] = [0.03, 0.08];
 /// Rounds in which points choose between the two, and modes are fitted, in turn.
@@ -76,7 +78,8 @@ impl<'a> Tree<'a> {
         better
     }
 
-    /// The mode of a branch is tried on what carries it, in exchange; left out; and looked for anew.
+    /// The mode of a branch is tried on what carries it, in exchange; left out; and looked for
+    /// anew.
     fn rearrange(&mut self, branch: usize, tried: &Tried) -> bool {
         if self.all(branch).len() < LEAST {
             self.branches[branch].mode = None;
@@ -88,9 +91,10 @@ impl<'a> Tree<'a> {
             other.branches[at].mode = mode;
             other
         };
-        if let (Some(mode), Some(parent)) =
-            (self.branches[branch].mode, self.branches[branch].parent.filter(|&p| p > 0))
-        {
+        if let (Some(mode), Some(parent)) = (
+            self.branches[branch].mode,
+            self.branches[branch].parent.filter(|&p| p > 0),
+        ) {
             let mut other = with(self, branch, self.branches[parent].mode);
             other.branches[parent].mode = Some(mode);
             changed |= self.take(other, parent);
@@ -113,7 +117,12 @@ impl<'a> Tree<'a> {
             if points.len() < LEAST {
                 break;
             }
-            let Some(found) = self.mode_of_some(branch, points, tried).filter(|f| f.worth >= PER_MODE) else { break };
+            let Some(found) = self
+                .mode_of_some(branch, points, tried)
+                .filter(|f| f.worth >= PER_MODE)
+            else {
+                break;
+            };
             let mut other = self.clone();
             let new = other.add(branch, Some(found.mode), &found.points);
             other.refit(&[new], &[new], AFTER);
@@ -127,11 +136,12 @@ impl<'a> Tree<'a> {
         changed
     }
 
-    /// Two branches whose frequencies lie close together are first found as one between them: a tip is tried as two, of which every
-    /// point may choose.
+    /// Two branches whose frequencies lie close together are first found as one between them: a tip
+    /// is tried as two, of which every point may choose.
     fn part(&mut self, branch: usize) -> bool {
         let (points, within) = (self.own(branch), self.within(branch));
-        let (Some(mode), Some(parent)) = (self.branches[branch].mode, self.branches[branch].parent) else {
+        let (Some(mode), Some(parent)) = (self.branches[branch].mode, self.branches[branch].parent)
+        else {
             return false;
         };
         if points.len() < FOR_TWO || within.len() > 1 {
@@ -139,7 +149,12 @@ impl<'a> Tree<'a> {
         }
         for apart in APART {
             let mut other = self.clone();
-            let at = |share: f64| Some(Mode { frequency_hz: mode.frequency_hz * share, ..mode });
+            let at = |share: f64| {
+                Some(Mode {
+                    frequency_hz: mode.frequency_hz * share,
+                    ..mode
+                })
+            };
             other.branches[branch].mode = at((-apart).exp());
             let new = other.add(parent, at(apart.exp()), &[]);
             let both = [branch, new];
@@ -163,15 +178,24 @@ impl<'a> Tree<'a> {
         false
     }
 
-    /// Every one of `points` may go to that of `branches` where it costs clearly least; tells whether one did.
+    /// Every one of `points` may go to that of `branches` where it costs clearly least; tells
+    /// whether one did.
     fn choose(&mut self, branches: &[usize], points: &[usize]) -> bool {
         let costs: Vec<Vec<f64>> = branches
             .iter()
-            .map(|&b| self.costs(b, points).iter().zip(self.far(b, points)).map(|(c, f)| c + f).collect())
+            .map(|&b| {
+                self.costs(b, points)
+                    .iter()
+                    .zip(self.far(b, points))
+                    .map(|(c, f)| c + f)
+                    .collect()
+            })
             .collect();
         let mut moved = false;
         for (k, &p) in points.iter().enumerate() {
-            let Some(now) = branches.iter().position(|&b| b == self.branch_of[p]) else { continue };
+            let Some(now) = branches.iter().position(|&b| b == self.branch_of[p]) else {
+                continue;
+            };
             let best = (0..branches.len()).min_by(|&a, &b| costs[a][k].total_cmp(&costs[b][k]));
             if let Some(best) = best.filter(|&b| costs[b][k] < costs[now][k] - CLEAR) {
                 self.branch_of[p] = branches[best];
@@ -184,9 +208,23 @@ impl<'a> Tree<'a> {
     fn add(&mut self, parent: usize, mode: Option<Mode>, points: &[usize]) -> usize {
         let new = self.branches.len();
         let n = (points.len() as f64).max(1.0);
-        let mean = |c: usize| points.iter().map(|&p| self.decay.points[p].at_px[c]).sum::<f64>() / n;
-        let end_px = if points.is_empty() { self.branches[parent].end_px } else { [mean(0), mean(1)] };
-        self.branches.push(Branch { parent: Some(parent), mode, end_px });
+        let mean = |c: usize| {
+            points
+                .iter()
+                .map(|&p| self.decay.points[p].at_px[c])
+                .sum::<f64>()
+                / n
+        };
+        let end_px = if points.is_empty() {
+            self.branches[parent].end_px
+        } else {
+            [mean(0), mean(1)]
+        };
+        self.branches.push(Branch {
+            parent: Some(parent),
+            mode,
+            end_px,
+        });
         points.iter().for_each(|&p| self.branch_of[p] = new);
         new
     }

@@ -8,11 +8,13 @@ use super::tree::{Decay, Design, PER_POINT, Tree, VALUES};
 const PER_E: f64 = 33.0;
 const HIGHEST_HZ: f64 = 4.5;
 const DAMPING: [f64; 3] = [0.02, 0.05, 0.1];
-/// A column of which less is left than this share, when the others are taken off, adds nothing that could be told from them.
+/// A column of which less is left than this share, when the others are taken off, adds nothing that
+/// could be told from them.
 const ALIKE: f64 = 0.04;
 /// What a point must gain by a mode to have it clearly.
 pub(super) const CLEAR: f64 = 5.0;
-/// A mode is a branch's if this share of its points, and of the points of every branch on it with so many, gains so much.
+/// A mode is a branch's if this share of its points, and of the points of every branch on it with
+/// so many, gains so much.
 const SHARE: f64 = 0.75;
 const IN_PART: usize = 3;
 const GAIN: f64 = 16.0;
@@ -35,7 +37,12 @@ impl Tried {
         let [lo, hi] = decay.frequencies_hz;
         let n = (PER_E * (hi.min(HIGHEST_HZ) / lo).ln()).max(0.0) as usize;
         let frequencies_hz = (0..=n).map(|k| lo * (k as f64 / PER_E).exp());
-        let modes = frequencies_hz.flat_map(|frequency_hz| DAMPING.map(|damping| Mode { frequency_hz, damping }));
+        let modes = frequencies_hz.flat_map(|frequency_hz| {
+            DAMPING.map(|damping| Mode {
+                frequency_hz,
+                damping,
+            })
+        });
         Self(modes.map(|m| (m, decay.columns(&m))).collect())
     }
 }
@@ -52,14 +59,25 @@ impl Rests {
     fn new(tree: &Tree, branch: usize, points: Vec<usize>) -> Self {
         let design = tree.design(branch);
         let left = points.iter().map(|&p| tree.left(&design, p)).collect();
-        let rests =
-            points.iter().map(|&p| [0, 1].map(|c| design.qr.solve(&tree.decay.points[p].values[c]).0)).collect();
-        Self { design, points, left, rests }
+        let rests = points
+            .iter()
+            .map(|&p| [0, 1].map(|c| design.qr.solve(&tree.decay.points[p].values[c]).0))
+            .collect();
+        Self {
+            design,
+            points,
+            left,
+            rests,
+        }
     }
 
-    /// What a mode with these columns takes off; nothing if it could not be told from what the points have.
+    /// What a mode with these columns takes off; nothing if it could not be told from what the
+    /// points have.
     fn taken(&self, columns: &[Vec<f64>]) -> Vec<f64> {
-        let by: Vec<Vec<f64>> = columns.iter().map(|c| self.design.qr.q.iter().map(|q| dot(q, c)).collect()).collect();
+        let by: Vec<Vec<f64>> = columns
+            .iter()
+            .map(|c| self.design.qr.q.iter().map(|q| dot(q, c)).collect())
+            .collect();
         let product = |a: usize, b: usize| dot(&columns[a], &columns[b]) - dot(&by[a], &by[b]);
         let alone = |k: usize| product(k, k) < ALIKE * ALIKE * dot(&columns[k], &columns[k]);
         if (0..columns.len()).any(alone) {
@@ -74,11 +92,18 @@ impl Rests {
             let a = dot(&columns[0], y);
             let more = second.map_or(0.0, |(share, own)| {
                 let b = dot(&columns[1], y) - share * a;
-                if own > ALIKE * ALIKE * first { b * b / own } else { 0.0 }
+                if own > ALIKE * ALIKE * first {
+                    b * b / own
+                } else {
+                    0.0
+                }
             });
             a * a / first + more
         };
-        self.rests.iter().map(|uv| uv.iter().map(of).sum()).collect()
+        self.rests
+            .iter()
+            .map(|uv| uv.iter().map(of).sum())
+            .collect()
     }
 }
 
@@ -98,23 +123,36 @@ impl Tree<'_> {
             .filter(|&&b| self.branches[b].parent == Some(branch) && self.all(b).len() >= IN_PART)
             .map(|&b| {
                 let all = self.all(b);
-                (0..rests.len()).filter(|&g| all.binary_search(&rests[g].points[0]).is_ok()).collect()
+                (0..rests.len())
+                    .filter(|&g| all.binary_search(&rests[g].points[0]).is_ok())
+                    .collect()
             })
             .collect();
         let worth = |columns: &[Vec<f64>]| -> Option<f64> {
             let gains: Vec<Vec<f64>> = rests
                 .iter()
-                .map(|r| r.taken(columns).iter().zip(&r.left).map(|(t, l)| VALUES * t / l).collect())
+                .map(|r| {
+                    r.taken(columns)
+                        .iter()
+                        .zip(&r.left)
+                        .map(|(t, l)| VALUES * t / l)
+                        .collect()
+                })
                 .collect();
             let shared = |groups: &mut dyn Iterator<Item = usize>| {
                 let mut all: Vec<f64> = groups.flat_map(|g| gains[g].iter().copied()).collect();
                 all.sort_unstable_by(f64::total_cmp);
-                all.get(((1.0 - SHARE) * all.len().saturating_sub(1) as f64) as usize).is_some_and(|g| *g > GAIN)
+                all.get(((1.0 - SHARE) * all.len().saturating_sub(1) as f64) as usize)
+                    .is_some_and(|g| *g > GAIN)
             };
-            let all_have = shared(&mut (0..gains.len())) && parts.iter().all(|p| shared(&mut p.iter().copied()));
+            let all_have = shared(&mut (0..gains.len()))
+                && parts.iter().all(|p| shared(&mut p.iter().copied()));
             all_have.then(|| gains.iter().flatten().map(|g| (g / GAIN).ln_1p()).sum())
         };
-        let best = tried.0.iter().filter_map(|(m, columns)| Some((worth(columns)?, m)));
+        let best = tried
+            .0
+            .iter()
+            .filter_map(|(m, columns)| Some((worth(columns)?, m)));
         best.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, m)| *m)
     }
 
@@ -124,14 +162,22 @@ impl Tree<'_> {
         let mut best: Option<(f64, &Mode, Vec<usize>)> = None;
         for (mode, columns) in &tried.0 {
             let taken = rests.taken(columns);
-            let gain = |(taken, left): (&f64, &f64)| -VALUES * (1.0 - taken / left).ln() - PER_POINT;
+            let gain =
+                |(taken, left): (&f64, &f64)| -VALUES * (1.0 - taken / left).ln() - PER_POINT;
             let each: Vec<f64> = taken.iter().zip(&rests.left).map(gain).collect();
             let worth = each.iter().map(|g| g.max(0.0)).sum();
-            let clear: Vec<usize> = (0..each.len()).filter(|&i| each[i] > CLEAR).map(|i| rests.points[i]).collect();
+            let clear: Vec<usize> = (0..each.len())
+                .filter(|&i| each[i] > CLEAR)
+                .map(|i| rests.points[i])
+                .collect();
             if clear.len() >= LEAST && best.as_ref().is_none_or(|b| worth > b.0) {
                 best = Some((worth, mode, clear));
             }
         }
-        best.map(|(worth, mode, points)| Found { mode: *mode, worth, points })
+        best.map(|(worth, mode, points)| Found {
+            mode: *mode,
+            worth,
+            points,
+        })
     }
 }

@@ -3,17 +3,18 @@
 use super::super::columns::{Qr, dot};
 use super::super::decay::{Mode, Start};
 
-/// Values that count as one, of a point: what is left of it is branches that are not told and what is not linear, alike from frame
-/// to frame.
+/// Values that count as one, of a point: what is left of it is branches that are not told and what
+/// is not linear, alike from frame to frame.
 pub(super) const VALUES: f64 = 80.0;
-/// What a point must gain by each mode that it has, and a mode by being there: twice logarithms of likelihood.
+/// What a point must gain by each mode that it has, and a mode by being there: twice logarithms of
+/// likelihood.
 pub(super) const PER_POINT: f64 = 8.0;
 pub(super) const PER_MODE: f64 = 30.0;
 /// Damping of branches: median, and standard deviation of the logarithm.
 const USUAL_DAMPING: f64 = 0.05;
 const DAMPING_SD: f64 = 0.8;
-/// What it costs a point to be farther from the others of a branch than is usual: per square of the distance, and at most;
-/// and where there are no others.
+/// What it costs a point to be farther from the others of a branch than is usual: per square of the
+/// distance, and at most; and where there are no others.
 const FAR: f64 = 4.0;
 const FARTHEST: f64 = 9.0;
 const ALONE: f64 = 200.0;
@@ -37,10 +38,16 @@ impl Point {
         let third = |w: &[f64]| w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0];
         let thirds = || values.iter().flat_map(|v| v.windows(4).map(third));
         // The squares of 1, 3, 3, 1 make 20.
-        let noise = thirds().map(|d| d * d).sum::<f64>() / (20.0 * (thirds().count() as f64).max(1.0));
+        let noise =
+            thirds().map(|d| d * d).sum::<f64>() / (20.0 * (thirds().count() as f64).max(1.0));
         let floor = 2.0 * (2 * values[0].len()) as f64 * noise.max(least_noise_px * least_noise_px);
         let squares = values.iter().map(|v| dot(v, v)).sum();
-        Self { values, squares, floor, at_px }
+        Self {
+            values,
+            squares,
+            floor,
+            at_px,
+        }
     }
 }
 
@@ -56,10 +63,24 @@ pub(super) struct Decay {
 }
 
 impl Decay {
-    pub fn new(times_s: Vec<f64>, start: Start, frequencies_hz: [f64; 2], points: Vec<Point>) -> Self {
-        let mut decay = Self { times_s, start, frequencies_hz, points, usual_px: 1.0 };
+    pub fn new(
+        times_s: Vec<f64>,
+        start: Start,
+        frequencies_hz: [f64; 2],
+        points: Vec<Point>,
+    ) -> Self {
+        let mut decay = Self {
+            times_s,
+            start,
+            frequencies_hz,
+            points,
+            usual_px: 1.0,
+        };
         let all: Vec<usize> = (0..decay.points.len()).collect();
-        let mut near: Vec<f64> = all.iter().map(|&p| decay.distance_px(p, &all, NEIGHBOUR + 1)).collect();
+        let mut near: Vec<f64> = all
+            .iter()
+            .map(|&p| decay.distance_px(p, &all, NEIGHBOUR + 1))
+            .collect();
         near.sort_unstable_by(f64::total_cmp);
         decay.usual_px = USUAL * near.get(near.len() / 2).copied().unwrap_or(1.0).max(1.0);
         decay
@@ -112,7 +133,9 @@ impl Tree<'_> {
     pub fn carries(&self, above: usize, mut branch: usize) -> bool {
         // Parents come first.
         while branch > above {
-            let Some(parent) = self.branches[branch].parent else { return false };
+            let Some(parent) = self.branches[branch].parent else {
+                return false;
+            };
             branch = parent;
         }
         branch == above
@@ -120,18 +143,24 @@ impl Tree<'_> {
 
     /// `branch` and all on it.
     pub fn within(&self, branch: usize) -> Vec<usize> {
-        (branch..self.branches.len()).filter(|&b| self.carries(branch, b)).collect()
+        (branch..self.branches.len())
+            .filter(|&b| self.carries(branch, b))
+            .collect()
     }
 
     /// Points of `branch` itself.
     pub fn own(&self, branch: usize) -> Vec<usize> {
-        (0..self.branch_of.len()).filter(|&p| self.branch_of[p] == branch).collect()
+        (0..self.branch_of.len())
+            .filter(|&p| self.branch_of[p] == branch)
+            .collect()
     }
 
     /// Points of `branch` and of all on it.
     pub fn all(&self, branch: usize) -> Vec<usize> {
         let within = self.within(branch);
-        (0..self.branch_of.len()).filter(|&p| within.binary_search(&self.branch_of[p]).is_ok()).collect()
+        (0..self.branch_of.len())
+            .filter(|&p| within.binary_search(&self.branch_of[p]).is_ok())
+            .collect()
     }
 
     /// The branches with modes that carry `branch`, itself included, from the foot up.
@@ -147,8 +176,13 @@ impl Tree<'_> {
         let of = self.modes_of(branch);
         let ones = std::iter::once(vec![1.0; self.decay.times_s.len()]);
         let modes = of.iter().filter_map(|b| self.branches[*b].mode.as_ref());
-        let columns = ones.chain(modes.flat_map(|m| self.decay.columns(m))).collect();
-        Design { of, qr: Qr::new(columns) }
+        let columns = ones
+            .chain(modes.flat_map(|m| self.decay.columns(m)))
+            .collect();
+        Design {
+            of,
+            qr: Qr::new(columns),
+        }
     }
 
     /// Squares of a point that a design leaves, with those of noise, px².
@@ -162,15 +196,24 @@ impl Tree<'_> {
     pub fn costs(&self, branch: usize, points: &[usize]) -> Vec<f64> {
         let design = self.design(branch);
         let modes = design.of.len() as f64;
-        points.iter().map(|&p| VALUES * self.left(&design, p).ln() + PER_POINT * modes).collect()
+        points
+            .iter()
+            .map(|&p| VALUES * self.left(&design, p).ln() + PER_POINT * modes)
+            .collect()
     }
 
     /// What some branches cost with their own points and modes.
     pub fn cost(&self, branches: &[usize]) -> f64 {
         let of = |&b: &usize| {
             let points = self.own(b);
-            let own: f64 = if points.is_empty() { 0.0 } else { self.costs(b, &points).iter().sum() };
-            own + self.branches[b].mode.map_or(0.0, |m| PER_MODE + unusual(&m))
+            let own: f64 = if points.is_empty() {
+                0.0
+            } else {
+                self.costs(b, &points).iter().sum()
+            };
+            own + self.branches[b]
+                .mode
+                .map_or(0.0, |m| PER_MODE + unusual(&m))
         };
         branches.iter().map(of).sum()
     }

@@ -12,12 +12,16 @@ const LEAST_HZ: f64 = 2.0;
 
 /// A section with all plots of a branch; folded for one without an answer.
 pub fn branch_part(study: &Study, branch: &Branch) -> String {
-    let of = branch.parent.map_or("the trunk".into(), |p| format!("carried by {p}"));
+    let of = branch
+        .parent
+        .map_or("the trunk".into(), |p| format!("carried by {p}"));
     let id = escaped(&anchor(study, branch));
     let head = format!("Branch {}, {of}", branch.name);
     match branch.sway {
         Ok(sway) => {
-            let damping = sway.damping_ratio.map_or("unknown".into(), |d| interval(&d, 3));
+            let damping = sway
+                .damping_ratio
+                .map_or("unknown".into(), |d| interval(&d, 3));
             let said = format!(
                 "{} Hz, damping ratio {damping}, {}{}",
                 interval(&sway.frequency_hz, 3),
@@ -30,7 +34,10 @@ pub fn branch_part(study: &Study, branch: &Branch) -> String {
             )
         }
         Err(why) => {
-            format!("<details id=\"{id}\"><summary>{head}: {why}</summary>{}</details>", plots(study, branch))
+            format!(
+                "<details id=\"{id}\"><summary>{head}: {why}</summary>{}</details>",
+                plots(study, branch)
+            )
         }
     }
 }
@@ -38,7 +45,10 @@ pub fn branch_part(study: &Study, branch: &Branch) -> String {
 /// How far it sways, or why that is not said.
 fn how_far(branch: &Branch) -> String {
     let [points, angle] = [branch.by_points_deg, branch.in_angle_deg].map(|deg| number(deg, 2));
-    match (branch.amplitude_deg.is_finite(), branch.in_angle_deg.is_finite()) {
+    match (
+        branch.amplitude_deg.is_finite(),
+        branch.in_angle_deg.is_finite(),
+    ) {
         (true, _) => format!("sway {}°", number(branch.amplitude_deg, 2)),
         (false, true) => format!("sway unknown (by its points {points}°, by the angle {angle}°)"),
         (false, false) => "sway unknown".into(),
@@ -76,7 +86,10 @@ fn plots(study: &Study, branch: &Branch) -> String {
     format!(
         "<div class=\"plots\">{}{}{}</div>",
         figure(angle(study, branch), &format!("{in_time}{fitted}")),
-        figure(drawn, &format!("Spectrum of the angle in the picture.{answer}{peak}")),
+        figure(
+            drawn,
+            &format!("Spectrum of the angle in the picture.{answer}{peak}")
+        ),
         figure(
             way(study, branch),
             "Way of its end in the picture, from its place at rest: <span class=\"key\"><i class=\"k kp\"></i>the first 80 \
@@ -90,13 +103,28 @@ fn spectrum(study: &Study, branch: &Branch) -> Option<String> {
         frequency_hz: branch.known().map(|s| s.frequency_hz),
         peak: branch.reference.map(|r| (r.peak_hz, r.damping_ratio)),
     };
-    let curve = Curve { spectrum: branch.spectrum.as_ref()?, class: "plane".into(), answer: Some(answer) };
-    spectra(&[curve], highest_hz(&[study]), &format!("Spectrum of the angle of branch {}", branch.name))
+    let curve = Curve {
+        spectrum: branch.spectrum.as_ref()?,
+        class: "plane".into(),
+        answer: Some(answer),
+    };
+    spectra(
+        &[curve],
+        highest_hz(&[study]),
+        &format!("Spectrum of the angle of branch {}", branch.name),
+    )
 }
 
-/// To which frequency spectra are drawn, Hz: the same for all branches, so that they can be compared.
+/// To which frequency spectra are drawn, Hz: the same for all branches, so that they can be
+/// compared.
 pub fn highest_hz(studies: &[&Study]) -> f64 {
-    let found = studies.iter().flat_map(|s| s.branches.iter().filter_map(|b| Some(b.known()?.frequency_hz.value)));
+    let found = studies.iter().flat_map(|s| {
+        s.branches
+            .iter()
+            .filter_map(|b| Some(b.known()?.frequency_hz.value))
+    });
     let asked = studies.iter().map(|s| s.highest_hz).fold(0.0, f64::max);
-    (BEYOND * found.fold(0.0, f64::max)).max(LEAST_HZ).min(asked)
+    (BEYOND * found.fold(0.0, f64::max))
+        .max(LEAST_HZ)
+        .min(asked)
 }

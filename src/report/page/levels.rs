@@ -16,28 +16,59 @@ pub fn levels_part(study: &Study) -> String {
     let frequency = |s: &Sway| Some(s.frequency_hz);
     let damping = |s: &Sway| s.damping_ratio;
     let plots = figure(
-        across(&by_level(&[study], &frequency), "level", "frequency, Hz", "Frequency by level"),
+        across(
+            &by_level(&[study], &frequency),
+            "level",
+            "frequency, Hz",
+            "Frequency by level",
+        ),
         &told("frequency", growth(study, |s| Some(s.frequency_hz.value))),
     ) + &figure(
-        across(&by_level(&[study], &damping), "level", "damping ratio", "Damping by level"),
-        &told("damping", growth(study, |s| s.damping_ratio.map(|d| d.value))),
+        across(
+            &by_level(&[study], &damping),
+            "level",
+            "damping ratio",
+            "Damping by level",
+        ),
+        &told(
+            "damping",
+            growth(study, |s| s.damping_ratio.map(|d| d.value)),
+        ),
     );
-    format!("<h3>Pattern across levels</h3><div class=\"plots\">{plots}</div>{}", table(&levels))
+    format!(
+        "<h3>Pattern across levels</h3><div class=\"plots\">{plots}</div>{}",
+        table(&levels)
+    )
 }
 
 /// The answers of every level, those of several captures beside each other.
 pub fn by_level(studies: &[&Study], of: &dyn Fn(&Sway) -> Option<Interval>) -> Vec<Slot> {
-    let highest = studies.iter().flat_map(|s| s.branches.iter().map(|b| b.level)).max().unwrap_or(0);
+    let highest = studies
+        .iter()
+        .flat_map(|s| s.branches.iter().map(|b| b.level))
+        .max()
+        .unwrap_or(0);
     let marks = |level: u8| {
         let of_study = |(kind, study): (usize, &&Study)| {
-            let known = study.branches.iter().filter(|b| b.level == level).filter_map(|b| of(&b.known()?));
+            let known = study
+                .branches
+                .iter()
+                .filter(|b| b.level == level)
+                .filter_map(|b| of(&b.known()?));
             let mut all: Vec<Interval> = known.collect();
             all.sort_by(|a, b| a.value.total_cmp(&b.value));
-            all.into_iter().map(|of| Mark { of, kind }).collect::<Vec<Mark>>()
+            all.into_iter()
+                .map(|of| Mark { of, kind })
+                .collect::<Vec<Mark>>()
         };
         studies.iter().enumerate().flat_map(of_study).collect()
     };
-    (1..=highest).map(|level| Slot { name: level.to_string(), marks: marks(level) }).collect()
+    (1..=highest)
+        .map(|level| Slot {
+            name: level.to_string(),
+            marks: marks(level),
+        })
+        .collect()
 }
 
 fn told(what: &str, growth: Option<Growth>) -> String {
@@ -46,7 +77,14 @@ fn told(what: &str, growth: Option<Growth>) -> String {
 }
 
 fn table(levels: &[Level]) -> String {
-    let head = ["level", "branches", "answers", "frequency, Hz", "damping ratio"].map(String::from);
+    let head = [
+        "level",
+        "branches",
+        "answers",
+        "frequency, Hz",
+        "damping ratio",
+    ]
+    .map(String::from);
     let of = |s: &Option<Spread>| s.as_ref().map_or("-".into(), |s| spread(s, 3));
     let row = |l: &Level| {
         let row = [

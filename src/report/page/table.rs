@@ -9,17 +9,29 @@ use crate::report::words;
 /// Every branch in a row.
 pub fn table_part(study: &Study) -> String {
     let metres = study.metres_per_px > 0.0;
-    let mut head: Vec<String> = ["branch", "level", "carried by", "points"].map(String::from).into();
+    let mut head: Vec<String> = ["branch", "level", "carried by", "points"]
+        .map(String::from)
+        .into();
     head.extend(["frequency, Hz", "damping ratio", "sway, deg", "end, px"].map(String::from));
     if metres {
         head.push("end, m".into());
     }
     head.extend(["peak, Hz", "half-power damping"].map(String::from));
     let columns = head.len();
-    let rows: String = study.branches.iter().map(|b| row(study, b, columns)).collect();
+    let rows: String = study
+        .branches
+        .iter()
+        .map(|b| row(study, b, columns))
+        .collect();
     // Narrow screens go without those that stand with each branch as well.
-    let (first, less) = (cells("th", "n", &head[..1]), cells("th", "n less", &head[1..4]));
-    let (most, last) = (cells("th", "n", &head[4..columns - 2]), cells("th", "n less", &head[columns - 2..]));
+    let (first, less) = (
+        cells("th", "n", &head[..1]),
+        cells("th", "n less", &head[1..4]),
+    );
+    let (most, last) = (
+        cells("th", "n", &head[4..columns - 2]),
+        cells("th", "n less", &head[columns - 2..]),
+    );
     let head = first + &less + &most + &last;
     format!("<h3>All branches</h3><div class=\"wide\"><table><tr>{head}</tr>{rows}</table></div>")
 }
@@ -34,11 +46,15 @@ fn row(study: &Study, branch: &Branch, columns: usize) -> String {
     let place = [branch.level.to_string(), carrier, branch.points.to_string()];
     let first = cells("td", "n", &[name]) + &cells("td", "n less", &place);
     let rest = match branch.sway {
-        Err(why) => format!("<td class=\"why\" colspan=\"{}\"><span>none: {why}</span></td>", columns - 4),
+        Err(why) => format!(
+            "<td class=\"why\" colspan=\"{}\"><span>none: {why}</span></td>",
+            columns - 4
+        ),
         Ok(sway) => {
             let mut rest = vec![
                 stacked(&interval(&sway.frequency_hz, 3)),
-                sway.damping_ratio.map_or("unknown".into(), |d| stacked(&interval(&d, 3))),
+                sway.damping_ratio
+                    .map_or("unknown".into(), |d| stacked(&interval(&d, 3))),
                 number(branch.amplitude_deg, 2),
                 number(branch.amplitude_px, 1),
             ];
@@ -58,7 +74,13 @@ fn row(study: &Study, branch: &Branch, columns: usize) -> String {
 /// The name of a branch's part within the page.
 pub fn anchor(study: &Study, branch: &Branch) -> String {
     // Different names stay different.
-    let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_string() } else { format!("_{:x}", u32::from(c)) };
+    let plain = |c: char| {
+        if c.is_ascii_alphanumeric() {
+            c.to_string()
+        } else {
+            format!("_{:x}", u32::from(c))
+        }
+    };
     let plain: String = study.name.chars().map(plain).collect();
     format!("{plain}-{}", branch.name)
 }
@@ -67,14 +89,30 @@ pub fn anchor(study: &Study, branch: &Branch) -> String {
 pub fn not_said(study: &Study) -> String {
     let mut items = String::new();
     for reason in Unidentified::ALL {
-        let names: Vec<String> =
-            study.branches.iter().filter(|b| b.sway == Err(reason)).map(|b| b.name.to_string()).collect();
+        let names: Vec<String> = study
+            .branches
+            .iter()
+            .filter(|b| b.sway == Err(reason))
+            .map(|b| b.name.to_string())
+            .collect();
         if !names.is_empty() {
-            let what = if names.len() > 1 { "Branches" } else { "Branch" };
-            items += &format!("<li>{what} {} ({reason}). {}</li>", names.join(", "), words::why(reason));
+            let what = if names.len() > 1 {
+                "Branches"
+            } else {
+                "Branch"
+            };
+            items += &format!(
+                "<li>{what} {} ({reason}). {}</li>",
+                names.join(", "),
+                words::why(reason)
+            );
         }
     }
-    if study.branches.iter().any(|b| b.known().is_some_and(|s| s.damping_ratio.is_none())) {
+    if study
+        .branches
+        .iter()
+        .any(|b| b.known().is_some_and(|s| s.damping_ratio.is_none()))
+    {
         items += "<li>Where damping is unknown, the film shows the frequency but not how the sway dies down.</li>";
     }
     items += "<li>A frequency is that of the tree as it was on that day, with its leaves and the water on them, and for sways of \

@@ -1,4 +1,5 @@
-//! Values with their intervals side by side: across levels (002 section 5.4) and across captures (figure 15).
+//! Values with their intervals side by side: across levels (002 section 5.4) and across captures
+//! (figure 15).
 
 use super::HEIGHT;
 use super::axes::{Axes, range};
@@ -27,14 +28,25 @@ pub struct Mark {
 
 /// A dot and its interval for every value. `None` if there are none.
 pub fn across(slots: &[Slot], x_label: &str, y_label: &str, label: &str) -> Option<String> {
-    let ends = range(slots.iter().flat_map(|s| s.marks.iter().flat_map(|m| [m.of.lo, m.of.hi])));
+    let ends = range(
+        slots
+            .iter()
+            .flat_map(|s| s.marks.iter().flat_map(|m| [m.of.lo, m.of.hi])),
+    );
     // A single huge interval must not flatten all others.
-    let values = range(slots.iter().flat_map(|s| s.marks.iter().map(|m| m.of.value)));
+    let values = range(
+        slots
+            .iter()
+            .flat_map(|s| s.marks.iter().map(|m| m.of.value)),
+    );
     if !values[0].is_finite() {
         return None;
     }
     let top = ends[1].min(1.6 * values[1]);
-    let needs: Vec<f64> = slots.iter().map(|s| STEP * s.marks.len().max(1) as f64 + BETWEEN).collect();
+    let needs: Vec<f64> = slots
+        .iter()
+        .map(|s| STEP * s.marks.len().max(1) as f64 + BETWEEN)
+        .collect();
     let sum: f64 = needs.iter().sum();
     let width = (sum + BESIDE).max(LEAST_WIDTH);
     let stretch = (width - BESIDE) / sum;
@@ -43,16 +55,31 @@ pub fn across(slots: &[Slot], x_label: &str, y_label: &str, label: &str) -> Opti
     axes.draw_y(&mut svg, y_label);
     let [left, right] = axes.sides();
     svg.line([left, axes.bottom()], [right, axes.bottom()], "axis");
-    svg.text([0.5 * (left + right), axes.bottom() + 27.0], Anchor::Middle, "label", x_label);
+    svg.text(
+        [0.5 * (left + right), axes.bottom() + 27.0],
+        Anchor::Middle,
+        "label",
+        x_label,
+    );
     let mut from = 0.0;
     for (slot, need) in slots.iter().zip(&needs) {
         let middle = axes.x(from + 0.5 * need);
-        svg.text([middle, axes.bottom() + 13.0], Anchor::Middle, "tick", &slot.name);
+        svg.text(
+            [middle, axes.bottom() + 13.0],
+            Anchor::Middle,
+            "tick",
+            &slot.name,
+        );
         for (k, mark) in slot.marks.iter().enumerate() {
-            let x = middle + (k as f64 - 0.5 * (slot.marks.len() as f64 - 1.0)) * STEP * stretch.min(1.5);
+            let x = middle
+                + (k as f64 - 0.5 * (slot.marks.len() as f64 - 1.0)) * STEP * stretch.min(1.5);
             let class = format!("c{}", mark.kind % 6);
             let y = |v: f64| axes.y(v.clamp(0.0, 1.1 * top));
-            svg.line([x, y(mark.of.lo)], [x, y(mark.of.hi)], &format!("{class} bar"));
+            svg.line(
+                [x, y(mark.of.lo)],
+                [x, y(mark.of.hi)],
+                &format!("{class} bar"),
+            );
             svg.dot([x, y(mark.of.value)], mark.kind, &format!("{class} dot"));
         }
         from += need;

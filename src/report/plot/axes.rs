@@ -19,22 +19,32 @@ pub struct Axes {
 }
 
 impl Axes {
-    /// For values within `x` and `y` in a drawing of a size. Ranges that hold nothing are made wider.
+    /// For values within `x` and `y` in a drawing of a size. Ranges that hold nothing are made
+    /// wider.
     pub fn new(size: [f64; 2], x: [f64; 2], y: [f64; 2]) -> Self {
         let frame = [LEFT, TOP, size[0] - RIGHT, size[1] - BOTTOM];
-        Self { x: sound(x), y: sound(y), frame }
+        Self {
+            x: sound(x),
+            y: sound(y),
+            frame,
+        }
     }
 
     /// The same with one scale for both directions, as in a picture.
     pub fn even(size: [f64; 2], x: [f64; 2], y: [f64; 2]) -> Self {
         let (x, y) = (sound(x), sound(y));
         let frame = [LEFT, TOP, size[0] - RIGHT, size[1] - BOTTOM];
-        let per = ((x[1] - x[0]) / (frame[2] - frame[0])).max((y[1] - y[0]) / (frame[3] - frame[1]));
+        let per =
+            ((x[1] - x[0]) / (frame[2] - frame[0])).max((y[1] - y[0]) / (frame[3] - frame[1]));
         let about = |r: [f64; 2], side: f64| {
             let middle = 0.5 * (r[0] + r[1]);
             [middle - 0.5 * per * side, middle + 0.5 * per * side]
         };
-        Self { x: about(x, frame[2] - frame[0]), y: about(y, frame[3] - frame[1]), frame }
+        Self {
+            x: about(x, frame[2] - frame[0]),
+            y: about(y, frame[3] - frame[1]),
+            frame,
+        }
     }
 
     pub fn x(&self, value: f64) -> f64 {
@@ -49,7 +59,11 @@ impl Axes {
 
     /// No number outside of the frame's sides.
     pub fn at(&self, x: f64, y: f64) -> [f64; 2] {
-        if x < self.x[0] || x > self.x[1] { [f64::NAN; 2] } else { [self.x(x), self.y(y)] }
+        if x < self.x[0] || x > self.x[1] {
+            [f64::NAN; 2]
+        } else {
+            [self.x(x), self.y(y)]
+        }
     }
 
     pub fn top(&self) -> f64 {
@@ -78,7 +92,12 @@ impl Axes {
             svg.text([x, bottom + 13.0], Anchor::Middle, "tick", &text);
         }
         svg.line([left, bottom], [right, bottom], "axis");
-        svg.text([0.5 * (left + right), bottom + 27.0], Anchor::Middle, "label", label);
+        svg.text(
+            [0.5 * (left + right), bottom + 27.0],
+            Anchor::Middle,
+            "label",
+            label,
+        );
     }
 
     pub fn draw_y(&self, svg: &mut Svg, label: &str) {
@@ -107,17 +126,33 @@ fn sound([lo, hi]: [f64; 2]) -> [f64; 2] {
 fn ticks([lo, hi]: [f64; 2]) -> Vec<(f64, String)> {
     let rough = (hi - lo) / TICKS;
     let power = 10.0_f64.powf(rough.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * power).find(|s| *s >= rough).unwrap_or(rough);
+    let step = [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .map(|m| m * power)
+        .find(|s| *s >= rough)
+        .unwrap_or(rough);
     let decimals = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
     let (first, last) = ((lo / step).ceil() as i64, (hi / step).floor() as i64);
     let text = |v: f64| {
         let text = format!("{v:.decimals$}");
-        if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') { "0".into() } else { text }
+        if text
+            .trim_start_matches('-')
+            .chars()
+            .all(|c| c == '0' || c == '.')
+        {
+            "0".into()
+        } else {
+            text
+        }
     };
-    (first..=last.min(first + 20)).map(|k| k as f64 * step).map(|v| (v, text(v))).collect()
+    (first..=last.min(first + 20))
+        .map(|k| k as f64 * step)
+        .map(|v| (v, text(v)))
+        .collect()
 }
 
-/// At most `most` points or so of a line: of every stretch its lowest and its highest, so that no swing is lost.
+/// At most `most` points or so of a line: of every stretch its lowest and its highest, so that no
+/// swing is lost.
 pub fn thinned(points: &[[f64; 2]], most: usize) -> Vec<[f64; 2]> {
     if points.len() <= most {
         return points.to_vec();
@@ -138,8 +173,14 @@ pub fn thinned(points: &[[f64; 2]], most: usize) -> Vec<[f64; 2]> {
 /// The least and the largest of some values; no numbers of none.
 pub fn range(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
     let seen = values.into_iter().filter(|v| v.is_finite());
-    let ends = seen.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], v| [lo.min(v), hi.max(v)]);
-    if ends[0] <= ends[1] { ends } else { [f64::NAN; 2] }
+    let ends = seen.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], v| {
+        [lo.min(v), hi.max(v)]
+    });
+    if ends[0] <= ends[1] {
+        ends
+    } else {
+        [f64::NAN; 2]
+    }
 }
 
 #[cfg(test)]
@@ -152,16 +193,28 @@ mod tests {
         assert_eq!(texts([0.0, 11.0]), ["0", "5", "10"]);
         assert_eq!(texts([-0.02, 0.031]), ["-0.02", "0", "0.02"]);
         assert_eq!(texts([0.0, 1.0]), ["0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
-        for odd in [[0.0, 0.0], [f64::NAN, 1.0], [1e300, 1e300], [5.0, 5.0 + 1e-15], [f64::INFINITY, 0.0]] {
+        for odd in [
+            [0.0, 0.0],
+            [f64::NAN, 1.0],
+            [1e300, 1e300],
+            [5.0, 5.0 + 1e-15],
+            [f64::INFINITY, 0.0],
+        ] {
             assert!(ticks(sound(odd)).len() < 30);
         }
     }
 
     #[test]
     fn a_long_line_keeps_its_highest_and_lowest_points() {
-        let line: Vec<[f64; 2]> = (0..10_000).map(|k| [f64::from(k), if k == 7777 { 9.0 } else { 0.0 }]).collect();
+        let line: Vec<[f64; 2]> = (0..10_000)
+            .map(|k| [f64::from(k), if k == 7777 { 9.0 } else { 0.0 }])
+            .collect();
         let thin = thinned(&line, 400);
-        assert!(thin.len() <= 400 && thin.iter().any(|p| p[1] == 9.0), "{}", thin.len());
+        assert!(
+            thin.len() <= 400 && thin.iter().any(|p| p[1] == 9.0),
+            "{}",
+            thin.len()
+        );
         assert!(thin.windows(2).all(|w| w[0][0] <= w[1][0]));
     }
 }

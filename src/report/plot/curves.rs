@@ -27,10 +27,15 @@ pub struct Answer {
     pub peak: Option<(f64, f64)>,
 }
 
-/// Spectra from 0 to `highest_hz`; with one curve, its answer with the interval and the peak's width at half the power.
+/// Spectra from 0 to `highest_hz`; with one curve, its answer with the interval and the peak's
+/// width at half the power.
 pub fn spectra(curves: &[Curve], highest_hz: f64, label: &str) -> Option<String> {
     let points = |s: &Spectrum| -> Vec<[f64; 2]> {
-        let all = s.amplitude.iter().enumerate().map(|(k, a)| [k as f64 * s.bin_hz, *a]);
+        let all = s
+            .amplitude
+            .iter()
+            .enumerate()
+            .map(|(k, a)| [k as f64 * s.bin_hz, *a]);
         all.take_while(|p| p[0] <= highest_hz).collect()
     };
     let all: Vec<Vec<[f64; 2]>> = curves.iter().map(|c| points(c.spectrum)).collect();
@@ -50,22 +55,37 @@ pub fn spectra(curves: &[Curve], highest_hz: f64, label: &str) -> Option<String>
                 [axes.x(f.hi.min(highest_hz)), axes.bottom()],
                 &format!("{class} band"),
             );
-            svg.path([axes.at(f.value, 0.0), axes.at(f.value, 1.15 * top)], &format!("{class} mark"));
+            svg.path(
+                [axes.at(f.value, 0.0), axes.at(f.value, 1.15 * top)],
+                &format!("{class} mark"),
+            );
         }
     }
     axes.draw(&mut svg, "frequency, Hz", "degrees");
     for (curve, points) in curves.iter().zip(&all) {
-        svg.path(thinned(points, MOST).into_iter().map(|[f, a]| axes.at(f, a)), &curve.class);
-        if let Some((peak_hz, damping)) = curve.answer.and_then(|a| a.peak).filter(|_| curves.len() == 1) {
+        svg.path(
+            thinned(points, MOST)
+                .into_iter()
+                .map(|[f, a]| axes.at(f, a)),
+            &curve.class,
+        );
+        if let Some((peak_hz, damping)) = curve
+            .answer
+            .and_then(|a| a.peak)
+            .filter(|_| curves.len() == 1)
+        {
             let k = (peak_hz / curve.spectrum.bin_hz).round() as usize;
-            let height = curve.spectrum.amplitude.get(k).copied().unwrap_or(f64::NAN) * std::f64::consts::FRAC_1_SQRT_2;
+            let height = curve.spectrum.amplitude.get(k).copied().unwrap_or(f64::NAN)
+                * std::f64::consts::FRAC_1_SQRT_2;
             // The width at half the power is twice the damping times the frequency, 002 eq. 6.
-            let [left, right] =
-                [1.0 - damping, 1.0 + damping].map(|side| axes.x((side * peak_hz).clamp(0.0, highest_hz)));
+            let [left, right] = [1.0 - damping, 1.0 + damping]
+                .map(|side| axes.x((side * peak_hz).clamp(0.0, highest_hz)));
             let y = axes.y(height);
             svg.line([left, y], [right, y], "width");
             // Ends, so that its shape tells it from the answer where colours do not.
-            [left, right].into_iter().for_each(|x| svg.line([x, y - END], [x, y + END], "width"));
+            [left, right]
+                .into_iter()
+                .for_each(|x| svg.line([x, y - END], [x, y + END], "width"));
         }
     }
     Some(svg.finish())

@@ -1,6 +1,8 @@
-//! Where the names of crowded places are written: none over another, those that come first nearest to their place.
+//! Where the names of crowded places are written: none over another, those that come first nearest
+//! to their place.
 
-/// Widest digit, from the top of a digit to the line that it stands on, and what hangs below, as shares of the letters' size.
+/// Widest digit, from the top of a digit to the line that it stands on, and what hangs below, as
+/// shares of the letters' size.
 const DIGIT: f64 = 0.7;
 const RISE: f64 = 0.75;
 const DROP: f64 = 0.08;
@@ -11,8 +13,8 @@ const RINGS: [f64; 9] = [6.0, 9.0, 15.0, 23.0, 33.0, 45.0, 60.0, 80.0, 105.0];
 const DIRECTIONS: usize = 24;
 /// Farther from its place than this a name needs a line that leads to it.
 const NEAR: f64 = 8.0;
-/// What a line under a name costs, what another place does, what a line that leads across another one does, and what it costs
-/// not to go on in the branch's own direction: in units of distance.
+/// What a line under a name costs, what another place does, what a line that leads across another
+/// one does, and what it costs not to go on in the branch's own direction: in units of distance.
 const OVER_LINE: f64 = 9.0;
 const OVER_PLACE: f64 = 25.0;
 const ACROSS: f64 = 12.0;
@@ -48,28 +50,45 @@ pub struct Placed {
 /// Left, top, right and bottom.
 type Frame = [f64; 4];
 
-/// Finds a place for every name in turn; `None` where there is no room. `lines` are drawn as well, in a drawing of a `size`.
+/// Finds a place for every name in turn; `None` where there is no room. `lines` are drawn as well,
+/// in a drawing of a `size`.
 pub fn placed(wanted: &[Wanted], lines: &[Segment], size: Point) -> Vec<Option<Placed>> {
     let mut out: Vec<Option<Placed>> = Vec::with_capacity(wanted.len());
     for want in wanted {
         let free = |p: &Placed| {
-            let inside =
-                frames(want, p).flatten().all(|[l, t, r, b]| l >= 0.0 && t >= 0.0 && r <= size[0] && b <= size[1]);
-            let known = wanted.iter().zip(&out).filter_map(|(w, p)| Some((w, p.as_ref()?)));
+            let inside = frames(want, p)
+                .flatten()
+                .all(|[l, t, r, b]| l >= 0.0 && t >= 0.0 && r <= size[0] && b <= size[1]);
+            let known = wanted
+                .iter()
+                .zip(&out)
+                .filter_map(|(w, p)| Some((w, p.as_ref()?)));
             inside && known.into_iter().all(|(w, q)| apart((want, p), (w, q)))
         };
         let cost = |p: &Placed, ring: f64, turn: f64| {
             let frame = frame(want, p, want.size);
             let under = lines.iter().filter(|l| cuts(&frame, l)).count() as f64;
-            let dots = wanted.iter().filter(|w| touches(&frame, &around(w.at))).count() as f64;
+            let dots = wanted
+                .iter()
+                .filter(|w| touches(&frame, &around(w.at)))
+                .count() as f64;
             let leads = out.iter().flatten().filter_map(|q| q.leader);
-            let across = leads.filter(|l| p.leader.is_some_and(|own| crosses(&own, l))).count() as f64;
-            ring + OVER_LINE * under + OVER_PLACE * dots + ACROSS * across + ASIDE * (1.0 - turn.cos())
+            let across = leads
+                .filter(|l| p.leader.is_some_and(|own| crosses(&own, l)))
+                .count() as f64;
+            ring + OVER_LINE * under
+                + OVER_PLACE * dots
+                + ACROSS * across
+                + ASIDE * (1.0 - turn.cos())
         };
         let own = (want.at[1] - want.from[1]).atan2(want.at[0] - want.from[0]);
-        let tried = RINGS.iter().filter(|r| **r <= want.farthest).flat_map(|ring| {
-            (0..DIRECTIONS).map(move |k| (*ring, k as f64 * std::f64::consts::TAU / DIRECTIONS as f64))
-        });
+        let tried = RINGS
+            .iter()
+            .filter(|r| **r <= want.farthest)
+            .flat_map(|ring| {
+                (0..DIRECTIONS)
+                    .map(move |k| (*ring, k as f64 * std::f64::consts::TAU / DIRECTIONS as f64))
+            });
         let best = tried
             .map(|(ring, turn)| (candidate(want, ring, own + turn), ring, turn))
             .filter(|(p, ..)| free(p))
@@ -83,14 +102,22 @@ pub fn placed(wanted: &[Wanted], lines: &[Segment], size: Point) -> Vec<Option<P
 /// A name whose frame is `ring` away from its place.
 fn candidate(want: &Wanted, ring: f64, direction: f64) -> Placed {
     let (sin, cos) = direction.sin_cos();
-    let half = [0.5 * width(want, want.size), 0.5 * (RISE + DROP) * want.size];
+    let half = [
+        0.5 * width(want, want.size),
+        0.5 * (RISE + DROP) * want.size,
+    ];
     // From the middle of a frame to its rim, that way.
     let rim = (half[0] / cos.abs().max(1e-9)).min(half[1] / sin.abs().max(1e-9));
     let far = ring + rim;
     let middle = [want.at[0] + far * cos, want.at[1] + far * sin];
     let at = [middle[0], middle[1] + 0.5 * (RISE - DROP) * want.size];
-    let leader =
-        (ring > NEAR).then_some([want.at, [want.at[0] + (ring - ROOM) * cos, want.at[1] + (ring - ROOM) * sin]]);
+    let leader = (ring > NEAR).then_some([
+        want.at,
+        [
+            want.at[0] + (ring - ROOM) * cos,
+            want.at[1] + (ring - ROOM) * sin,
+        ],
+    ]);
     Placed { at, leader }
 }
 
@@ -100,12 +127,21 @@ fn width(want: &Wanted, size: f64) -> f64 {
 
 fn frame(want: &Wanted, p: &Placed, size: f64) -> Frame {
     let half = 0.5 * width(want, size) + ROOM;
-    [p.at[0] - half, p.at[1] - RISE * size - ROOM, p.at[0] + half, p.at[1] + DROP * size + ROOM]
+    [
+        p.at[0] - half,
+        p.at[1] - RISE * size - ROOM,
+        p.at[0] + half,
+        p.at[1] + DROP * size + ROOM,
+    ]
 }
 
 /// On a large screen and on a small one.
 fn frames(want: &Wanted, p: &Placed) -> impl Iterator<Item = Option<Frame>> {
-    [Some(frame(want, p, want.size)), want.size_on_small.map(|size| frame(want, p, size))].into_iter()
+    [
+        Some(frame(want, p, want.size)),
+        want.size_on_small.map(|size| frame(want, p, size)),
+    ]
+    .into_iter()
 }
 
 /// Whether neither name lies on the other, nor on the line that leads to it, on any screen.
@@ -137,13 +173,18 @@ fn cuts(frame: &Frame, [a, b]: &Segment) -> bool {
             continue;
         }
         let ends = [lo / d, hi / d];
-        within = [within[0].max(ends[0].min(ends[1])), within[1].min(ends[0].max(ends[1]))];
+        within = [
+            within[0].max(ends[0].min(ends[1])),
+            within[1].min(ends[0].max(ends[1])),
+        ];
     }
     within[0] < within[1]
 }
 
 fn crosses([a, b]: &Segment, [c, d]: &Segment) -> bool {
-    let side = |p: &Point, q: &Point, r: &Point| (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+    let side = |p: &Point, q: &Point, r: &Point| {
+        (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+    };
     side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0
 }
 
@@ -153,7 +194,14 @@ mod tests {
 
     fn wanted(at: Point, farthest: f64) -> Wanted {
         let from = [at[0], at[1] + 40.0];
-        Wanted { at, from, letters: 2, size: 15.0, size_on_small: Some(22.0), farthest }
+        Wanted {
+            at,
+            from,
+            letters: 2,
+            size: 15.0,
+            size_on_small: Some(22.0),
+            farthest,
+        }
     }
 
     /// Thirty branches that end in a patch of 50 by 50, as in the crown of a tree in leaf.
@@ -170,10 +218,17 @@ mod tests {
         assert!(found.iter().take(10).all(Option::is_some), "{found:?}");
         for (i, p) in found.iter().enumerate() {
             let Some(p) = p else { continue };
-            assert!(frames(&all[i], p).flatten().all(|f| f[0] >= 0.0 && f[1] >= 0.0 && f[2] <= 720.0 && f[3] <= 405.0));
+            assert!(
+                frames(&all[i], p)
+                    .flatten()
+                    .all(|f| f[0] >= 0.0 && f[1] >= 0.0 && f[2] <= 720.0 && f[3] <= 405.0)
+            );
             for (j, q) in found.iter().enumerate().skip(i + 1) {
                 if let Some(q) = q {
-                    assert!(apart((&all[i], p), (&all[j], q)), "{i} lies on {j}: {p:?} {q:?}");
+                    assert!(
+                        apart((&all[i], p), (&all[j], q)),
+                        "{i} lies on {j}: {p:?} {q:?}"
+                    );
                 }
             }
             // The line leads from the place to the name, and ends before it.
@@ -187,8 +242,17 @@ mod tests {
     #[test]
     fn a_name_that_has_room_stands_at_its_place_and_one_that_has_none_is_left_out() {
         let found = placed(&[wanted([100.0, 100.0], 30.0)], &[], [200.0, 200.0]);
-        assert!(found[0].is_some_and(|p| p.leader.is_none() && p.at[1] < 100.0), "{found:?}");
-        assert_eq!(placed(&[wanted([5.0, 5.0], 30.0)], &[], [12.0, 12.0]), [None]);
-        assert_eq!(placed(&[wanted([f64::NAN, 5.0], 30.0)], &[], [200.0, 200.0]), [None]);
+        assert!(
+            found[0].is_some_and(|p| p.leader.is_none() && p.at[1] < 100.0),
+            "{found:?}"
+        );
+        assert_eq!(
+            placed(&[wanted([5.0, 5.0], 30.0)], &[], [12.0, 12.0]),
+            [None]
+        );
+        assert_eq!(
+            placed(&[wanted([f64::NAN, 5.0], 30.0)], &[], [200.0, 200.0]),
+            [None]
+        );
     }
 }

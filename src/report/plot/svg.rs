@@ -22,15 +22,25 @@ pub struct Svg {
 impl Svg {
     /// `label` is read to those who do not see it.
     pub fn new(width: f64, height: f64, label: &str) -> Self {
-        // One that would be too small to read in half a row gets the whole, and can be pushed sideways.
-        let broad =
-            if width > BROAD { format!("class=\"broad\" style=\"min-width:{width:.0}px\" ") } else { String::new() };
+        // One that would be too small to read in half a row gets the whole, and can be pushed
+        // sideways.
+        let broad = if width > BROAD {
+            format!("class=\"broad\" style=\"min-width:{width:.0}px\" ")
+        } else {
+            String::new()
+        };
         let label = escaped(label);
-        let head = format!("<svg {broad}viewBox=\"0 0 {width:.0} {height:.0}\" role=\"img\" aria-label=\"{label}\">");
-        Self { head, body: String::new() }
+        let head = format!(
+            "<svg {broad}viewBox=\"0 0 {width:.0} {height:.0}\" role=\"img\" aria-label=\"{label}\">"
+        );
+        Self {
+            head,
+            body: String::new(),
+        }
     }
 
-    /// A line through points, broken where there is no number; nothing of a point that stands alone.
+    /// A line through points, broken where there is no number; nothing of a point that stands
+    /// alone.
     pub fn path(&mut self, points: impl IntoIterator<Item = [f64; 2]>, class: &str) {
         let (mut way, mut pen) = (String::new(), false);
         for [x, y] in points {
@@ -70,7 +80,10 @@ impl Svg {
         }
         let r = 3.6;
         let _ = match kind % 4 {
-            0 => write!(self.body, "<circle class=\"{class}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{r}\"/>"),
+            0 => write!(
+                self.body,
+                "<circle class=\"{class}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{r}\"/>"
+            ),
             1 => write!(
                 self.body,
                 "<rect class=\"{class}\" x=\"{:.1}\" y=\"{:.1}\" width=\"6.4\" height=\"6.4\"/>",
@@ -115,7 +128,11 @@ impl Svg {
     /// A picture that lies in the page.
     pub fn image(&mut self, size: [f64; 2], address: &str) {
         let [w, h] = size;
-        let _ = write!(self.body, "<image width=\"{w:.0}\" height=\"{h:.0}\" href=\"{}\"/>", escaped(address));
+        let _ = write!(
+            self.body,
+            "<image width=\"{w:.0}\" height=\"{h:.0}\" href=\"{}\"/>",
+            escaped(address)
+        );
     }
 
     pub fn finish(self) -> String {
@@ -123,7 +140,8 @@ impl Svg {
     }
 }
 
-/// Text as it stands in HTML and in its attributes; characters that steer and are no text are left out.
+/// Text as it stands in HTML and in its attributes; characters that steer and are no text are left
+/// out.
 pub fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {

@@ -7,7 +7,8 @@ use crate::report::compare::{Change, Comparison, Row};
 use crate::report::matching::Match;
 use crate::report::study::Study;
 
-/// What the captures have in common and where they differ; on a narrow terminal frequency and damping under each other.
+/// What the captures have in common and where they differ; on a narrow terminal frequency and
+/// damping under each other.
 pub fn compared(studies: &[Study], comparison: &Comparison, columns: Option<usize>) -> String {
     let mut out = wrapped(&format!("{}\n", heading(studies, comparison)), columns);
     if comparison.same_tree.is_none() {
@@ -15,7 +16,8 @@ pub fn compared(studies: &[Study], comparison: &Comparison, columns: Option<usiz
     }
     out.push('\n');
     let first = &studies[0].name;
-    let [frequency, damping] = ["frequency", "damping"].map(|what| format!("{what} against {first}"));
+    let [frequency, damping] =
+        ["frequency", "damping"].map(|what| format!("{what} against {first}"));
     let mut whole = Table::new(&[
         ("branch", 0),
         ("capture", 0),
@@ -25,25 +27,48 @@ pub fn compared(studies: &[Study], comparison: &Comparison, columns: Option<usiz
         (&frequency, 0),
         (&damping, 0),
     ]);
-    let told: Vec<&Row> = comparison.rows.iter().filter(|row| row.is_told(studies)).collect();
-    let all = || told.iter().flat_map(|row| (0..studies.len()).map(move |k| (*row, k)));
+    let told: Vec<&Row> = comparison
+        .rows
+        .iter()
+        .filter(|row| row.is_told(studies))
+        .collect();
+    let all = || {
+        told.iter()
+            .flat_map(|row| (0..studies.len()).map(move |k| (*row, k)))
+    };
     all().for_each(|(row, k)| whole.push(across(studies, row, k, &[frequency_of, damping_of])));
     let (whole, _) = whole.within(None);
     if columns.is_none_or(|most| whole.lines().all(|line| line.chars().count() <= most)) {
         out += &whole;
     } else {
         let against = format!("against {first}");
-        for (head, of) in [("frequency, Hz", frequency_of as Value), ("damping ratio", damping_of)] {
-            let mut table = Table::new(&[("branch", 0), ("capture", 0), ("called", 1), (head, 0), (&against, 0)]);
+        for (head, of) in [
+            ("frequency, Hz", frequency_of as Value),
+            ("damping ratio", damping_of),
+        ] {
+            let mut table = Table::new(&[
+                ("branch", 0),
+                ("capture", 0),
+                ("called", 1),
+                (head, 0),
+                (&against, 0),
+            ]);
             all().for_each(|(row, k)| table.push(across(studies, row, k, &[of])));
             out += &format!("{}\n", table.within(columns).0);
         }
     }
-    let untold: Vec<String> =
-        comparison.rows.iter().filter(|row| !row.is_told(studies)).map(|row| row.name.to_string()).collect();
+    let untold: Vec<String> = comparison
+        .rows
+        .iter()
+        .filter(|row| !row.is_told(studies))
+        .map(|row| row.name.to_string())
+        .collect();
     let mut notes = String::new();
     if !untold.is_empty() {
-        notes += &format!("  without a frequency in any of them: {}\n", untold.join(", "));
+        notes += &format!(
+            "  without a frequency in any of them: {}\n",
+            untold.join(", ")
+        );
     }
     if comparison.same_tree == Some(true) {
         notes.extend((1..studies.len()).map(|k| unmatched(studies, comparison, k - 1)));
@@ -72,25 +97,47 @@ pub fn heading(studies: &[Study], comparison: &Comparison) -> String {
             );
         }
     };
-    let by = if comparison.said { "as --trees says" } else { "told by their places, which --trees overrules" };
-    format!("Compared with {} as {what} ({by}; {found})", studies[0].name)
+    let by = if comparison.said {
+        "as --trees says"
+    } else {
+        "told by their places, which --trees overrules"
+    };
+    format!(
+        "Compared with {} as {what} ({by}; {found})",
+        studies[0].name
+    )
 }
 
 /// A value as a cell, and how it differs from that of the first capture.
 type Value = fn(&Sway, Option<&Sway>) -> (String, Option<Change>);
 
 fn frequency_of(sway: &Sway, first: Option<&Sway>) -> (String, Option<Change>) {
-    (interval(&sway.frequency_hz, 3), first.and_then(|first| Change::of_frequency(first, sway)))
+    (
+        interval(&sway.frequency_hz, 3),
+        first.and_then(|first| Change::of_frequency(first, sway)),
+    )
 }
 
 fn damping_of(sway: &Sway, first: Option<&Sway>) -> (String, Option<Change>) {
-    let value = sway.damping_ratio.map_or("unknown".into(), |d| interval(&d, 3));
-    (value, first.and_then(|first| Change::of_damping(first, sway)))
+    let value = sway
+        .damping_ratio
+        .map_or("unknown".into(), |d| interval(&d, 3));
+    (
+        value,
+        first.and_then(|first| Change::of_damping(first, sway)),
+    )
 }
 
 /// A branch in capture `k`: its values, and then all their changes.
 fn across(studies: &[Study], row: &Row, k: usize, values: &[Value]) -> Vec<String> {
-    let mut cells = vec![if k == 0 { row.name.to_string() } else { String::new() }, studies[k].name.clone()];
+    let mut cells = vec![
+        if k == 0 {
+            row.name.to_string()
+        } else {
+            String::new()
+        },
+        studies[k].name.clone(),
+    ];
     let Some(branch) = row.branch(studies, k) else {
         cells.extend(["-".into(), format!("  {}", lost(row, k))]);
         return cells;
@@ -107,7 +154,11 @@ fn across(studies: &[Study], row: &Row, k: usize, values: &[Value]) -> Vec<Strin
     let (shown, changes): (Vec<String>, Vec<Option<Change>>) =
         values.iter().map(|of| of(&sway, first.as_ref())).unzip();
     cells.extend(shown);
-    cells.extend(changes.iter().map(|change| change.as_ref().map_or("-".into(), changed)));
+    cells.extend(
+        changes
+            .iter()
+            .map(|change| change.as_ref().map_or("-".into(), changed)),
+    );
     cells
 }
 
@@ -119,21 +170,46 @@ pub fn lost(row: &Row, k: usize) -> &'static str {
     }
 }
 
-/// Branches of the first capture and of the one after `other` more that stand for nothing in each other, a line a reason.
+/// Branches of the first capture and of the one after `other` more that stand for nothing in each
+/// other, a line a reason.
 pub fn unmatched(studies: &[Study], comparison: &Comparison, other: usize) -> String {
-    let Some(study) = studies.get(other + 1) else { return String::new() };
+    let Some(study) = studies.get(other + 1) else {
+        return String::new();
+    };
     let names = |of: &dyn Fn(&Match) -> bool| -> Vec<u32> {
-        comparison.rows.iter().filter(|r| r.others.get(other).is_some_and(of)).map(|r| r.name).collect()
+        comparison
+            .rows
+            .iter()
+            .filter(|r| r.others.get(other).is_some_and(of))
+            .map(|r| r.name)
+            .collect()
     };
     let first = &studies[0].name;
     let list = |what: String, names: &[u32]| {
         let names: Vec<String> = names.iter().map(u32::to_string).collect();
-        if names.is_empty() { String::new() } else { format!("  {what}: {}\n", names.join(", ")) }
+        if names.is_empty() {
+            String::new()
+        } else {
+            format!("  {what}: {}\n", names.join(", "))
+        }
     };
     let missing = names(&|m| matches!(m, Match::Missing));
     let unclear = names(&|m| matches!(m, Match::Unclear));
-    let left = comparison.left_over.get(other).map_or(&[][..], Vec::as_slice);
-    list(format!("branches of {first} that {} does not have", study.name), &missing)
-        + &list(format!("branches of {first} for which two of {} are as near", study.name), &unclear)
-        + &list(format!("branches of {} that {first} does not have", study.name), left)
+    let left = comparison
+        .left_over
+        .get(other)
+        .map_or(&[][..], Vec::as_slice);
+    list(
+        format!("branches of {first} that {} does not have", study.name),
+        &missing,
+    ) + &list(
+        format!(
+            "branches of {first} for which two of {} are as near",
+            study.name
+        ),
+        &unclear,
+    ) + &list(
+        format!("branches of {} that {first} does not have", study.name),
+        left,
+    )
 }

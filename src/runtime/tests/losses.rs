@@ -3,7 +3,8 @@
 use super::*;
 use proptest::prelude::*;
 
-/// Frames as a camera of 30 a second takes them: which are lost, how their times jitter, how they are numbered.
+/// Frames as a camera of 30 a second takes them: which are lost, how their times jitter, how they
+/// are numbered.
 struct Camera<'a> {
     lost: &'a dyn Fn(u64) -> bool,
     /// Off its place by so many intervals.
@@ -13,8 +14,12 @@ struct Camera<'a> {
     interval_s: &'a dyn Fn(u64) -> f64,
 }
 
-const STEADY: Camera =
-    Camera { lost: &|_| false, jitter: &|_| 0.0, number: &|n, _| Some(n), interval_s: &|_| 1.0 / 30.0 };
+const STEADY: Camera = Camera {
+    lost: &|_| false,
+    jitter: &|_| 0.0,
+    number: &|n, _| Some(n),
+    interval_s: &|_| 1.0 / 30.0,
+};
 
 /// Runs `frames` of it; gives the totals, the losses there were, and the gaps.
 fn run(camera: &Camera, frames: u64) -> (Totals, u64, Vec<Gap>) {
@@ -30,10 +35,17 @@ fn run(camera: &Camera, frames: u64) -> (Totals, u64, Vec<Gap>) {
             continue;
         }
         let seen_s = time_s + (camera.jitter)(n) * interval_s;
-        gaps.extend(losses.arrived((camera.number)(n, delivered), seen_s, 0).gaps);
+        gaps.extend(
+            losses
+                .arrived((camera.number)(n, delivered), seen_s, 0)
+                .gaps,
+        );
         delivered += 1;
         let now = losses.totals();
-        assert!(now.by_time >= before.by_time && now.reconciled >= before.reconciled, "counts only grow");
+        assert!(
+            now.by_time >= before.by_time && now.reconciled >= before.reconciled,
+            "counts only grow"
+        );
         assert!(now.by_sequence >= before.by_sequence);
         before = now;
     }
@@ -51,11 +63,50 @@ fn each_count_stands_where_the_other_falls() {
     let reset = |n: u64, _: u64| if n.is_multiple_of(100) { None } else { Some(n) };
     let cases: [(&str, Camera, [bool; 2]); 6] = [
         ("steady", Camera { ..STEADY }, [true, true]),
-        ("losses", Camera { lost: &some, ..STEADY }, [true, true]),
-        ("times that jitter", Camera { lost: &some, jitter: &late, ..STEADY }, [true, false]),
-        ("no numbers", Camera { lost: &some, number: &none, ..STEADY }, [false, true]),
-        ("numbers of what is delivered", Camera { lost: &some, number: &delivered_only, ..STEADY }, [false, true]),
-        ("numbers that begin anew", Camera { lost: &some, number: &reset, ..STEADY }, [false, true]),
+        (
+            "losses",
+            Camera {
+                lost: &some,
+                ..STEADY
+            },
+            [true, true],
+        ),
+        (
+            "times that jitter",
+            Camera {
+                lost: &some,
+                jitter: &late,
+                ..STEADY
+            },
+            [true, false],
+        ),
+        (
+            "no numbers",
+            Camera {
+                lost: &some,
+                number: &none,
+                ..STEADY
+            },
+            [false, true],
+        ),
+        (
+            "numbers of what is delivered",
+            Camera {
+                lost: &some,
+                number: &delivered_only,
+                ..STEADY
+            },
+            [false, true],
+        ),
+        (
+            "numbers that begin anew",
+            Camera {
+                lost: &some,
+                number: &reset,
+                ..STEADY
+            },
+            [false, true],
+        ),
     ];
     for (name, camera, [numbers, times]) in cases {
         let (totals, lost, gaps) = run(&camera, 900);
@@ -78,11 +129,31 @@ fn each_count_stands_where_the_other_falls() {
 #[test]
 fn a_rate_that_exposure_changes_is_no_loss() {
     let none = |_: u64, _: u64| None;
-    let slower = |n: u64| if (300..600).contains(&n) { 1.0 / 15.0 } else { 1.0 / 30.0 };
-    let (totals, ..) = run(&Camera { number: &none, interval_s: &slower, ..STEADY }, 900);
+    let slower = |n: u64| {
+        if (300..600).contains(&n) {
+            1.0 / 15.0
+        } else {
+            1.0 / 30.0
+        }
+    };
+    let (totals, ..) = run(
+        &Camera {
+            number: &none,
+            interval_s: &slower,
+            ..STEADY
+        },
+        900,
+    );
     assert_eq!((totals.by_time, totals.reconciled), (0, 0));
     let creeping = |n: u64| 1.0 / (30.0 - 20.0 * (n as f64 / 900.0));
-    let (totals, ..) = run(&Camera { number: &none, interval_s: &creeping, ..STEADY }, 900);
+    let (totals, ..) = run(
+        &Camera {
+            number: &none,
+            interval_s: &creeping,
+            ..STEADY
+        },
+        900,
+    );
     assert_eq!(totals.by_time, 0);
 }
 
@@ -98,7 +169,14 @@ fn frames_that_came_and_were_broken_are_not_lost() {
         assert_eq!(arrival.index, n, "it keeps its place");
     }
     losses.finish();
-    assert_eq!(losses.totals(), Totals { by_sequence: Some(0), by_time: 0, reconciled: 0 });
+    assert_eq!(
+        losses.totals(),
+        Totals {
+            by_sequence: Some(0),
+            by_time: 0,
+            reconciled: 0
+        }
+    );
 }
 
 #[test]
@@ -112,8 +190,13 @@ fn an_absence_is_a_gap_of_its_true_length_and_no_loss() {
     losses.away(GapCause::Silent);
     let back_s = 99.0 / 30.0 + 4.0;
     let arrival = losses.arrived(Some(0), back_s, 0);
-    let [gap] = arrival.gaps.as_slice() else { panic!("{arrival:?}") };
-    assert_eq!((gap.after_frame, gap.missing, arrival.index), (99, 119, 219));
+    let [gap] = arrival.gaps.as_slice() else {
+        panic!("{arrival:?}")
+    };
+    assert_eq!(
+        (gap.after_frame, gap.missing, arrival.index),
+        (99, 119, 219)
+    );
     assert!((gap.length_s - 4.0).abs() < 1e-9);
     for n in 1..100u64 {
         losses.arrived(Some(n), back_s + n as f64 / 30.0, 0);
@@ -123,8 +206,8 @@ fn an_absence_is_a_gap_of_its_true_length_and_no_loss() {
 }
 
 proptest! {
-    /// Up to 40 % lost at random, and times off by up to a sixth of an interval: the numbers are exact, and the
-    /// times right but for a tenth.
+    /// Up to 40 % lost at random, and times off by up to a sixth of an interval: the numbers are
+    /// exact, and the times right but for a tenth.
     #[test]
     fn random_losses_are_counted_both_ways(seed in any::<u64>(), percent in 0..41u64) {
         let hash = |n: u64, salt: u64| {

@@ -24,7 +24,11 @@ fn request(time_s: f64) -> Request {
 }
 
 fn answer(request: &Request) -> SwayNow {
-    SwayNow { frame: request.frame, time_s: request.time_s, ..SwayNow::default() }
+    SwayNow {
+        frame: request.frame,
+        time_s: request.time_s,
+        ..SwayNow::default()
+    }
 }
 
 fn at_once(request: &Request, _: &dyn Fn() -> bool) -> SwayNow {
@@ -60,12 +64,17 @@ fn of(analyser: Analyser, waits: bool) -> (Swaying, Arc<Shared>) {
     (Swaying::new(1.0, waits, analyser, shared.clone()), shared)
 }
 
-/// Steps through a film of 30 frames a second; the answers, with the frame at which each took effect.
+/// Steps through a film of 30 frames a second; the answers, with the frame at which each took
+/// effect.
 fn film(swaying: &mut Swaying, frames: std::ops::Range<u64>) -> Vec<(u64, u64)> {
     let mut told = Vec::new();
     for frame in frames {
         let time_s = frame as f64 / 30.0;
-        told.extend(swaying.step(time_s, || request(time_s)).map(|found| (frame, found.frame)));
+        told.extend(
+            swaying
+                .step(time_s, || request(time_s))
+                .map(|found| (frame, found.frame)),
+        );
     }
     told
 }
@@ -86,7 +95,10 @@ fn over(mut swaying: Swaying) {
 fn a_replay_waits_for_every_answer_where_it_is_due() {
     for analyser in [at_once as Analyser, slow] {
         let (mut swaying, _) = of(analyser, true);
-        assert_eq!(film(&mut swaying, 0..130), [(30, 0), (60, 30), (90, 60), (120, 90)]);
+        assert_eq!(
+            film(&mut swaying, 0..130),
+            [(30, 0), (60, 30), (90, 60), (120, 90)]
+        );
         assert_eq!(swaying.passed_over(), 0);
     }
 }
@@ -96,8 +108,16 @@ fn a_camera_waits_for_no_answer_and_what_is_passed_over_is_counted() {
     let (mut swaying, _) = of(very_slow, false);
     let began = Instant::now();
     assert_eq!(film(&mut swaying, 0..151), [], "nothing is ready so soon");
-    assert!(began.elapsed() < Duration::from_secs(1), "151 frames took {:?}", began.elapsed());
-    assert_eq!(swaying.passed_over(), 5, "one at each second after the first");
+    assert!(
+        began.elapsed() < Duration::from_secs(1),
+        "151 frames took {:?}",
+        began.elapsed()
+    );
+    assert_eq!(
+        swaying.passed_over(),
+        5,
+        "one at each second after the first"
+    );
     let began = Instant::now();
     let mut frame = 151;
     let told = loop {

@@ -9,19 +9,28 @@ use crate::shape::Limb;
 /// Less of the smoothed density than this is beyond the leaves: it is a half at their edge.
 const EDGE: f32 = 0.4;
 
-/// `limbs` without the copies and twigs that end where the picture shows no leaves, and carry nothing that does not: the
-/// envelope is round and does not know it, and a tree in leaf has no bare boughs beside its crown. Measured branches
-/// stay. Without a picture, or where a drawing says where the leaves are to be, all stay.
+/// `limbs` without the copies and twigs that end where the picture shows no leaves, and carry
+/// nothing that does not: the envelope is round and does not know it, and a tree in leaf has no
+/// bare boughs beside its crown. Measured branches stay. Without a picture, or where a drawing says
+/// where the leaves are to be, all stay.
 pub fn within_leaves(limbs: Vec<Limb>, skeleton: &Skeleton, view: &LeafView) -> Vec<Limb> {
     if view.density.is_some() {
         return limbs;
     }
-    let Some(target) = Target::new(skeleton, view, super::height(skeleton)) else { return limbs };
+    let Some(target) = Target::new(skeleton, view, super::height(skeleton)) else {
+        return limbs;
+    };
     let mut stays: Vec<bool> = limbs
         .iter()
         .map(|limb| {
-            let invented = limb.twig || skeleton.nodes.get(limb.node.index()).is_some_and(|n| n.copy_of.is_some());
-            let Some(tip) = limb.stations.last().filter(|_| invented) else { return true };
+            let invented = limb.twig
+                || skeleton
+                    .nodes
+                    .get(limb.node.index())
+                    .is_some_and(|n| n.copy_of.is_some());
+            let Some(tip) = limb.stations.last().filter(|_| invented) else {
+                return true;
+            };
             let seen = Carried::by(&tip.riding, skeleton, view.pose).posed(&tip.at);
             let cell = target.grid.index(target.grid.cell_of(&seen));
             cell.is_some_and(|i| target.density[i] >= EDGE)
@@ -77,24 +86,62 @@ mod tests {
                 riding: Riding::between(NodeId(from as u32), NodeId(k as u32), 1.0),
             };
             let stations = vec![station(nodes[from].position), station(nodes[k].position)];
-            Limb { node: NodeId(k as u32), parent, twig: false, stations }
+            Limb {
+                node: NodeId(k as u32),
+                parent,
+                twig: false,
+                stations,
+            }
         };
         let limbs = vec![limb(1, None), limb(3, Some(0)), limb(2, Some(0))];
-        (Skeleton { nodes, foot_px: [50.0, 100.0], image_size: Size::new(100, 101) }, limbs)
+        (
+            Skeleton {
+                nodes,
+                foot_px: [50.0, 100.0],
+                image_size: Size::new(100, 101),
+            },
+            limbs,
+        )
     }
 
     fn left(copied: [bool; 2]) -> Vec<(u32, Option<usize>)> {
         let (skeleton, limbs) = tree(copied);
         // Leaves from the crown's top down to its middle, and not out at the side; sky elsewhere.
         let size = Size::new(100, 101);
-        let colour =
-            |i: usize| if (30..70).contains(&(i % 100)) && i / 100 < 60 { [60, 110, 40] } else { [150, 180, 230] };
-        let picture = Rgb { size, pixels: (0..size.area()).flat_map(colour).collect() };
-        let inside = |i: usize| if (5..97).contains(&(i % 100)) && (2..70).contains(&(i / 100)) { 255 } else { 0 };
+        let colour = |i: usize| {
+            if (30..70).contains(&(i % 100)) && i / 100 < 60 {
+                [60, 110, 40]
+            } else {
+                [150, 180, 230]
+            }
+        };
+        let picture = Rgb {
+            size,
+            pixels: (0..size.area()).flat_map(colour).collect(),
+        };
+        let inside = |i: usize| {
+            if (5..97).contains(&(i % 100)) && (2..70).contains(&(i / 100)) {
+                255
+            } else {
+                0
+            }
+        };
         let mask = (0..size.area()).map(inside).collect();
-        let outline = Outline { size, mask, polygon_px: Vec::new(), matte: None };
-        let view = LeafView { picture: Some(&picture), outline: Some(&outline), ..LeafView::default() };
-        within_leaves(limbs, &skeleton, &view).iter().map(|l| (l.node.0, l.parent)).collect()
+        let outline = Outline {
+            size,
+            mask,
+            polygon_px: Vec::new(),
+            matte: None,
+        };
+        let view = LeafView {
+            picture: Some(&picture),
+            outline: Some(&outline),
+            ..LeafView::default()
+        };
+        within_leaves(limbs, &skeleton, &view)
+            .iter()
+            .map(|l| (l.node.0, l.parent))
+            .collect()
     }
 
     #[test]

@@ -3,7 +3,8 @@
 use crate::model::{Outline, Rgb, Size, Skeleton};
 use nalgebra::Point3;
 
-/// Wider pictures are counted at a whole part of their width: leaves are chosen by their density, not by the pixel.
+/// Wider pictures are counted at a whole part of their width: leaves are chosen by their density,
+/// not by the pixel.
 const LARGEST_PX: u32 = 800;
 
 /// A grid over the source image.
@@ -20,12 +21,19 @@ impl Grid {
         let Size { width, height } = skeleton.image_size;
         let part = width.max(height).div_ceil(LARGEST_PX).max(1);
         let size = Size::new((width / part).max(1), (height / part).max(1));
-        let scale =
-            [f64::from(size.width) / f64::from(width.max(1)), f64::from(size.height) / f64::from(height.max(1))];
-        Self { size, scale, foot_px: skeleton.foot_px }
+        let scale = [
+            f64::from(size.width) / f64::from(width.max(1)),
+            f64::from(size.height) / f64::from(height.max(1)),
+        ];
+        Self {
+            size,
+            scale,
+            foot_px: skeleton.foot_px,
+        }
     }
 
-    /// The place in the grid of a pixel of the source image; the centre of the first cell is (0, 0).
+    /// The place in the grid of a pixel of the source image; the centre of the first cell is (0,
+    /// 0).
     pub fn cell_of_pixel(&self, p: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|k| (p[k] + 0.5) * self.scale[k] - 0.5)
     }
@@ -54,7 +62,10 @@ impl Grid {
     pub fn index(&self, cell: [f64; 2]) -> Option<usize> {
         let ok = cell[0].is_finite() && cell[1].is_finite() && self.size.contains(cell[0], cell[1]);
         ok.then(|| {
-            let (u, v) = (cell[0].round().max(0.0) as usize, cell[1].round().max(0.0) as usize);
+            let (u, v) = (
+                cell[0].round().max(0.0) as usize,
+                cell[1].round().max(0.0) as usize,
+            );
             v * self.size.width as usize + u
         })
     }
@@ -80,7 +91,11 @@ impl Grid {
                 let n = (rows.len() * columns.len()) as u32;
                 for c in 0..channels {
                     let row = |y: usize| columns.clone().map(move |x| channels * (y * w + x) + c);
-                    let sum: u32 = rows.clone().flat_map(row).map(|i| u32::from(pixels[i])).sum();
+                    let sum: u32 = rows
+                        .clone()
+                        .flat_map(row)
+                        .map(|i| u32::from(pixels[i]))
+                        .sum();
                     out.push(((sum + n / 2) / n) as u8);
                 }
             }
@@ -106,17 +121,30 @@ impl Canvas {
         let mask = grid.reduced(&outline.mask, outline.size, 1)?;
         let inside: Vec<bool> = mask.iter().map(|&m| m > 127).collect();
         let matte = match &outline.matte {
-            Some(matte) => Some(grid.reduced(matte, outline.size, 1)?.iter().map(|&a| f32::from(a) / 255.0).collect()),
+            Some(matte) => Some(
+                grid.reduced(matte, outline.size, 1)?
+                    .iter()
+                    .map(|&a| f32::from(a) / 255.0)
+                    .collect(),
+            ),
             None => None,
         };
-        inside.contains(&true).then_some(Self { grid, colours, inside, matte })
+        inside.contains(&true).then_some(Self {
+            grid,
+            colours,
+            inside,
+            matte,
+        })
     }
 
     /// First and last row with something inside.
     pub fn rows(&self) -> (usize, usize) {
         let w = self.grid.size.width as usize;
         let row = |i: Option<usize>| i.map_or(0, |i| i / w);
-        (row(self.inside.iter().position(|&m| m)), row(self.inside.iter().rposition(|&m| m)))
+        (
+            row(self.inside.iter().position(|&m| m)),
+            row(self.inside.iter().rposition(|&m| m)),
+        )
     }
 }
 

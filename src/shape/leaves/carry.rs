@@ -13,17 +13,34 @@ pub(super) struct Carried {
 
 impl Carried {
     pub fn by(riding: &Riding, skeleton: &Skeleton, pose: Option<&Pose>) -> Self {
-        let still = Self { turn: Matrix3::identity(), way: Vector3::zeros() };
-        let Some(pose) = pose.filter(|p| p.joints.len() == skeleton.nodes.len()) else { return still };
+        let still = Self {
+            turn: Matrix3::identity(),
+            way: Vector3::zeros(),
+        };
+        let Some(pose) = pose.filter(|p| p.joints.len() == skeleton.nodes.len()) else {
+            return still;
+        };
         let (mut turn, mut way) = (Matrix3::zeros(), Vector3::zeros());
-        for (&joint, &weight) in riding.joints.iter().zip(&riding.weights).filter(|(_, w)| **w > 0.0) {
-            let Some(node) = skeleton.nodes.get(usize::from(joint)) else { return still };
+        for (&joint, &weight) in riding
+            .joints
+            .iter()
+            .zip(&riding.weights)
+            .filter(|(_, w)| **w > 0.0)
+        {
+            let Some(node) = skeleton.nodes.get(usize::from(joint)) else {
+                return still;
+            };
             // The joint turns about its parent node (`JointPose`).
             let pivot = node.parent.map_or(usize::from(joint), |p| p.index());
-            let rotation = pose.joints[usize::from(joint)].rotation.to_rotation_matrix().into_inner();
+            let rotation = pose.joints[usize::from(joint)]
+                .rotation
+                .to_rotation_matrix()
+                .into_inner();
             let weight = f64::from(weight);
             turn += rotation * weight;
-            way += (pose.joints[pivot].position.coords - rotation * skeleton.nodes[pivot].position.coords) * weight;
+            way += (pose.joints[pivot].position.coords
+                - rotation * skeleton.nodes[pivot].position.coords)
+                * weight;
         }
         let finite = turn.iter().chain(way.iter()).all(|x| x.is_finite());
         if finite { Self { turn, way } } else { still }
@@ -36,7 +53,11 @@ impl Carried {
     pub fn to_rest(self, p: &Point3<f64>) -> Point3<f64> {
         let moved = p.coords - self.way;
         // Two branches that turn against each other by half a circle would leave nothing to invert.
-        Point3::from(self.turn.try_inverse().map_or(moved, |inverse| inverse * moved))
+        Point3::from(
+            self.turn
+                .try_inverse()
+                .map_or(moved, |inverse| inverse * moved),
+        )
     }
 }
 
@@ -44,7 +65,12 @@ impl Carried {
 pub(super) fn between(a: &Riding, b: &Riding, t: f64) -> Riding {
     let mut shares: Vec<(u16, f32)> = Vec::with_capacity(8);
     for (riding, part) in [(a, 1.0 - t as f32), (b, t as f32)] {
-        for (&joint, &weight) in riding.joints.iter().zip(&riding.weights).filter(|(_, w)| **w * part > 1e-4) {
+        for (&joint, &weight) in riding
+            .joints
+            .iter()
+            .zip(&riding.weights)
+            .filter(|(_, w)| **w * part > 1e-4)
+        {
             match shares.iter_mut().find(|(j, _)| *j == joint) {
                 Some((_, share)) => *share += weight * part,
                 None => shares.push((joint, weight * part)),
@@ -54,7 +80,10 @@ pub(super) fn between(a: &Riding, b: &Riding, t: f64) -> Riding {
     shares.sort_by(|x, y| y.1.total_cmp(&x.1).then(x.0.cmp(&y.0)));
     shares.truncate(4);
     let sum: f32 = shares.iter().map(|s| s.1).sum();
-    let mut riding = Riding { joints: [0; 4], weights: [0.0; 4] };
+    let mut riding = Riding {
+        joints: [0; 4],
+        weights: [0.0; 4],
+    };
     for (k, (joint, share)) in shares.into_iter().enumerate() {
         (riding.joints[k], riding.weights[k]) = (joint, share / sum.max(f32::MIN_POSITIVE));
     }

@@ -1,8 +1,9 @@
 //! What in the outline is tree, and what of that is leaf, by colour.
 //!
-//! An outline as a person draws it holds sky, walls and lawn between the branches. Those colours are also found just
-//! outside, at the same height; the tree's are not. With h_in and h_out the shares of a colour among the pixels inside and
-//! near outside, and k the share of the inside that is background, k h_out of h_in is background.
+//! An outline as a person draws it holds sky, walls and lawn between the branches. Those colours
+//! are also found just outside, at the same height; the tree's are not. With h_in and h_out the
+//! shares of a colour among the pixels inside and near outside, and k the share of the inside that
+//! is background, k h_out of h_in is background.
 
 use super::canvas::Canvas;
 
@@ -10,15 +11,19 @@ use super::canvas::Canvas;
 const STEPS: usize = 16;
 /// Heights at which the background is learned anew: sky above, a lawn below.
 const BANDS: usize = 7;
-/// The background is learned from so near to the outline, as a share of the tree's height: what is farther is another thing.
+/// The background is learned from so near to the outline, as a share of the tree's height: what is
+/// farther is another thing.
 const REACH: f64 = 0.25;
-/// Background colours inside are not spread just as outside; so many times their share counts as background still.
+/// Background colours inside are not spread just as outside; so many times their share counts as
+/// background still.
 const MARGIN: f64 = 1.5;
-/// The least part of the inside that is taken for background: outlines are drawn around trees, not on them.
+/// The least part of the inside that is taken for background: outlines are drawn around trees, not
+/// on them.
 const LEAST_BACKGROUND: f64 = 0.05;
 /// Bark is learned below this share of the tree's height, and looked for above it.
 const BARK_SHARE: f64 = 0.25;
-/// Where more than this share of the crown has the bark's colours, bark and leaf cannot be told apart by them.
+/// Where more than this share of the crown has the bark's colours, bark and leaf cannot be told
+/// apart by them.
 const MOST_BARK: f64 = 0.5;
 
 /// For every cell how much of it is tree, and how much leaf, 0 to 1.
@@ -53,7 +58,8 @@ fn tree(canvas: &Canvas, bins: &[u16]) -> Vec<f32> {
     let mut share = vec![0.0f32; bins.len()];
     for k in 0..BANDS {
         let middle = top as f64 + step * k as f64;
-        let weight_at = |v: usize, reach: f64| (1.0 - (v as f64 - middle).abs() / (reach * step)).max(0.0);
+        let weight_at =
+            |v: usize, reach: f64| (1.0 - (v as f64 - middle).abs() / (reach * step)).max(0.0);
         let (mut inside, mut outside) = (Histogram::default(), Histogram::default());
         for (i, &bin) in bins.iter().enumerate() {
             let weight = weight_at(i / width, 1.5);
@@ -65,7 +71,8 @@ fn tree(canvas: &Canvas, bins: &[u16]) -> Vec<f32> {
         }
         let background = inside.share_made_of(&outside, LEAST_BACKGROUND);
         for (i, &bin) in bins.iter().enumerate().filter(|(i, _)| canvas.inside[*i]) {
-            // Bands pass into each other; above the first and below the last there is nothing inside.
+            // Bands pass into each other; above the first and below the last there is nothing
+            // inside.
             let weight = weight_at(i / width, 1.0);
             if weight > 0.0 {
                 share[i] += (weight * (1.0 - background.at(bin))) as f32;
@@ -83,14 +90,21 @@ fn leaf(canvas: &Canvas, bins: &[u16], tree: &[f32]) -> Vec<f32> {
     let limit = bottom as f64 - BARK_SHARE * (bottom + 1 - top) as f64;
     let (mut crown, mut trunk) = (Histogram::default(), Histogram::default());
     for (i, &bin) in bins.iter().enumerate().filter(|(i, _)| tree[*i] > 0.5) {
-        let part = if (i / width) as f64 > limit { &mut trunk } else { &mut crown };
+        let part = if (i / width) as f64 > limit {
+            &mut trunk
+        } else {
+            &mut crown
+        };
         part.add(bin, f64::from(tree[i]));
     }
     let bark = crown.share_made_of(&trunk, 0.0);
     if bark.amount > MOST_BARK {
         return tree.to_vec();
     }
-    bins.iter().zip(tree).map(|(&bin, &tree)| tree * (1.0 - bark.at(bin) as f32)).collect()
+    bins.iter()
+        .zip(tree)
+        .map(|(&bin, &tree)| tree * (1.0 - bark.at(bin) as f32))
+        .collect()
 }
 
 pub(super) fn smooth_step(from: f32, to: f32, x: f32) -> f32 {
@@ -105,7 +119,9 @@ struct Histogram {
 
 impl Default for Histogram {
     fn default() -> Self {
-        Self { counts: vec![0.0; STEPS * STEPS * STEPS] }
+        Self {
+            counts: vec![0.0; STEPS * STEPS * STEPS],
+        }
     }
 }
 
@@ -127,7 +143,8 @@ impl Histogram {
         self.counts[usize::from(bin)] += weight;
     }
 
-    /// Shares of the colours, smoothed by a step to either side: a few thousand pixels cannot fill 4096 bins.
+    /// Shares of the colours, smoothed by a step to either side: a few thousand pixels cannot fill
+    /// 4096 bins.
     fn smoothed(&self) -> Vec<f64> {
         const KERNEL: [f64; 5] = [0.0545, 0.2442, 0.4026, 0.2442, 0.0545];
         let mut values = self.counts.clone();
@@ -143,19 +160,29 @@ impl Histogram {
             }
         }
         let sum: f64 = values.iter().sum();
-        values.iter_mut().for_each(|v| *v /= sum.max(f64::MIN_POSITIVE));
+        values
+            .iter_mut()
+            .for_each(|v| *v /= sum.max(f64::MIN_POSITIVE));
         values
     }
 
-    /// How much of this region could be more of `other`: in a colour that only `other` has here, all of it. The amount is
-    /// the median, over the pixels of `other`, of how much rarer their colour is here.
+    /// How much of this region could be more of `other`: in a colour that only `other` has here,
+    /// all of it. The amount is the median, over the pixels of `other`, of how much rarer their
+    /// colour is here.
     fn share_made_of(&self, other: &Histogram, least: f64) -> Made {
         if other.counts.iter().all(|&c| c <= 0.0) || self.counts.iter().all(|&c| c <= 0.0) {
-            return Made { amount: 0.0, of_colour: vec![0.0; self.counts.len()] };
+            return Made {
+                amount: 0.0,
+                of_colour: vec![0.0; self.counts.len()],
+            };
         }
         let (own, other) = (self.smoothed(), other.smoothed());
-        let mut ratios: Vec<(f64, f64)> =
-            own.iter().zip(&other).filter(|(_, o)| **o > 0.0).map(|(h, o)| ((h / o).min(1.0), *o)).collect();
+        let mut ratios: Vec<(f64, f64)> = own
+            .iter()
+            .zip(&other)
+            .filter(|(_, o)| **o > 0.0)
+            .map(|(h, o)| ((h / o).min(1.0), *o))
+            .collect();
         ratios.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
         let mut before = 0.0;
         let middle = ratios.iter().find(|(_, weight)| {
@@ -164,8 +191,11 @@ impl Histogram {
         });
         let amount = middle.map_or(0.0, |(ratio, _)| *ratio);
         let take = MARGIN * amount.max(least);
-        let of_colour =
-            own.iter().zip(&other).map(|(h, o)| (take * o / h.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)).collect();
+        let of_colour = own
+            .iter()
+            .zip(&other)
+            .map(|(h, o)| (take * o / h.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0))
+            .collect();
         Made { amount, of_colour }
     }
 }

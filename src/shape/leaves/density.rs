@@ -2,19 +2,23 @@
 
 use super::canvas::Grid;
 
-/// A density map is smoothed over this share of the tree's height (standard deviation): some leaves, not one.
+/// A density map is smoothed over this share of the tree's height (standard deviation): some
+/// leaves, not one.
 pub(super) const SCALE: f64 = 1.0 / 20.0;
 
-/// Values smoothed by three running means, which are all but a normal distribution of deviation `sigma` cells; nothing lies
-/// beyond the picture.
+/// Values smoothed by three running means, which are all but a normal distribution of deviation
+/// `sigma` cells; nothing lies beyond the picture.
 pub(super) fn smoothed(values: &[f32], width: usize, sigma: f64) -> Vec<f32> {
-    let radius = ((4.0 * sigma * sigma + 1.0).sqrt() / 2.0 - 0.5).round().max(0.0) as usize;
+    let radius = ((4.0 * sigma * sigma + 1.0).sqrt() / 2.0 - 0.5)
+        .round()
+        .max(0.0) as usize;
     if radius == 0 || width == 0 {
         return values.to_vec();
     }
     let mut out = values.to_vec();
     for _ in 0..3 {
-        out.chunks_exact_mut(width).for_each(|row| mean_along(row, radius));
+        out.chunks_exact_mut(width)
+            .for_each(|row| mean_along(row, radius));
         mean_down(&mut out, width, radius);
     }
     out
@@ -28,7 +32,9 @@ fn mean_along(row: &mut [f32], radius: usize) {
     for (k, value) in row.iter_mut().enumerate() {
         sum += before.get(k + radius).map_or(0.0, |&x| f64::from(x));
         *value = (sum * share) as f32;
-        sum -= k.checked_sub(radius).map_or(0.0, |first| f64::from(before[first]));
+        sum -= k
+            .checked_sub(radius)
+            .map_or(0.0, |first| f64::from(before[first]));
     }
 }
 
@@ -39,18 +45,27 @@ fn mean_down(values: &mut [f32], width: usize, radius: usize) {
     let row = |v: usize| before.get(v * width..(v + 1) * width).unwrap_or_default();
     let mut sums = vec![0.0f64; width];
     for v in 0..radius {
-        sums.iter_mut().zip(row(v)).for_each(|(s, &x)| *s += f64::from(x));
+        sums.iter_mut()
+            .zip(row(v))
+            .for_each(|(s, &x)| *s += f64::from(x));
     }
     for (v, out) in values.chunks_exact_mut(width).enumerate() {
-        sums.iter_mut().zip(row(v + radius)).for_each(|(s, &x)| *s += f64::from(x));
-        out.iter_mut().zip(&sums).for_each(|(o, s)| *o = (s * share) as f32);
+        sums.iter_mut()
+            .zip(row(v + radius))
+            .for_each(|(s, &x)| *s += f64::from(x));
+        out.iter_mut()
+            .zip(&sums)
+            .for_each(|(o, s)| *o = (s * share) as f32);
         if let Some(first) = v.checked_sub(radius) {
-            sums.iter_mut().zip(row(first)).for_each(|(s, &x)| *s -= f64::from(x));
+            sums.iter_mut()
+                .zip(row(first))
+                .for_each(|(s, &x)| *s -= f64::from(x));
         }
     }
 }
 
-/// Correlation (Pearson) of two maps over the cells where `counts`; 0 where one of them is the same everywhere.
+/// Correlation (Pearson) of two maps over the cells where `counts`; 0 where one of them is the same
+/// everywhere.
 pub(super) fn correlation(a: &[f32], b: &[f32], counts: impl Fn(usize) -> bool) -> f64 {
     let pairs: Vec<(f64, f64)> = a
         .iter()
@@ -60,13 +75,20 @@ pub(super) fn correlation(a: &[f32], b: &[f32], counts: impl Fn(usize) -> bool) 
         .map(|(_, (x, y))| (f64::from(*x), f64::from(*y)))
         .collect();
     let n = pairs.len().max(1) as f64;
-    let (mx, my) = (pairs.iter().map(|p| p.0).sum::<f64>() / n, pairs.iter().map(|p| p.1).sum::<f64>() / n);
+    let (mx, my) = (
+        pairs.iter().map(|p| p.0).sum::<f64>() / n,
+        pairs.iter().map(|p| p.1).sum::<f64>() / n,
+    );
     let (mut xx, mut yy, mut xy) = (0.0, 0.0, 0.0);
     for (x, y) in pairs {
         let (dx, dy) = (x - mx, y - my);
         (xx, yy, xy) = (xx + dx * dx, yy + dy * dy, xy + dx * dy);
     }
-    if xx * yy > 0.0 { xy / (xx * yy).sqrt() } else { 0.0 }
+    if xx * yy > 0.0 {
+        xy / (xx * yy).sqrt()
+    } else {
+        0.0
+    }
 }
 
 /// Which cells are covered by triangles seen from the front.
@@ -79,17 +101,24 @@ pub(super) struct Cover<'a> {
 
 impl<'a> Cover<'a> {
     pub fn new(grid: Grid, before: &'a [f32]) -> Self {
-        Self { grid, before, covered: vec![0.0; grid.area()] }
+        Self {
+            grid,
+            before,
+            covered: vec![0.0; grid.area()],
+        }
     }
 
-    /// Marks the cells whose centre lies in the triangle, whichever way it faces, unless something is before it; its corners
-    /// in cells and its depth.
+    /// Marks the cells whose centre lies in the triangle, whichever way it faces, unless something
+    /// is before it; its corners in cells and its depth.
     pub fn add(&mut self, [a, b, c]: [[f64; 2]; 3], depth: f64) {
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
         if area == 0.0 || !area.is_finite() {
             return;
         }
-        let (width, height) = (f64::from(self.grid.size.width), f64::from(self.grid.size.height));
+        let (width, height) = (
+            f64::from(self.grid.size.width),
+            f64::from(self.grid.size.height),
+        );
         let low = |k: usize| a[k].min(b[k]).min(c[k]).ceil().max(0.0);
         let high = |k: usize, most: f64| a[k].max(b[k]).max(c[k]).floor().min(most - 1.0);
         let (left, right, top, bottom) = (low(0), high(0, width), low(1), high(1, height));
@@ -104,7 +133,11 @@ impl<'a> Cover<'a> {
                 let (x, y) = (u as f64, v as f64);
                 if side(a, b, x, y) >= 0.0 && side(b, c, x, y) >= 0.0 && side(c, a, x, y) >= 0.0 {
                     let i = v * self.grid.size.width as usize + u;
-                    if self.before.get(i).is_none_or(|&wood| f64::from(wood) < depth) {
+                    if self
+                        .before
+                        .get(i)
+                        .is_none_or(|&wood| f64::from(wood) < depth)
+                    {
                         self.covered[i] = 1.0;
                     }
                 }

@@ -15,12 +15,14 @@ const MOST_GROUPS: usize = 12;
 const LEAST_SHARE: f64 = 0.02;
 /// Way over which the phase beta of B.2 goes round once, as a share of the tree's height.
 const WAVE: f64 = 0.25;
-/// A leaf turns about its stalk this many times as far as its cluster about its axis, and so much later, radians.
+/// A leaf turns about its stalk this many times as far as its cluster about its axis, and so much
+/// later, radians.
 const LEAF_SWING: f64 = 0.8;
 const LEAF_LATER: f64 = 2.4;
 /// Share of the outward direction in a normal: leaves are lit as a crown, not as a heap of mirrors.
 const OUTWARD: f64 = 0.6;
-/// The point that they point away from is below the crown's middle by this share of the tree's height.
+/// The point that they point away from is below the crown's middle by this share of the tree's
+/// height.
 const LOW: f64 = 0.1;
 
 /// The meshes of all clusters.
@@ -33,17 +35,31 @@ pub(super) fn groups(
     height: f64,
 ) -> Vec<FoliageGroup> {
     let main = main_branches(skeleton);
-    let of: Vec<usize> = clusters.iter().map(|c| main[perches[c.perch].node.index()]).collect();
+    let of: Vec<usize> = clusters
+        .iter()
+        .map(|c| main[perches[c.perch].node.index()])
+        .collect();
     let stands = kept(&of, skeleton);
     let mut nodes: Vec<usize> = stands.clone();
     nodes.sort_unstable();
     nodes.dedup();
-    let mut out: Vec<FoliageGroup> =
-        nodes.iter().map(|&n| FoliageGroup { node: NodeId(n as u32), ..FoliageGroup::default() }).collect();
+    let mut out: Vec<FoliageGroup> = nodes
+        .iter()
+        .map(|&n| FoliageGroup {
+            node: NodeId(n as u32),
+            ..FoliageGroup::default()
+        })
+        .collect();
     let sum: Vector3<f64> = clusters.iter().map(|c| c.centre.coords).sum();
     // A little low, so that what is lit from above is the most of the crown.
     let middle = Point3::from(sum / clusters.len().max(1) as f64) - Vector3::y() * (LOW * height);
-    let drawer = Drawer { skeleton, target, template, height, middle };
+    let drawer = Drawer {
+        skeleton,
+        target,
+        template,
+        height,
+        middle,
+    };
     for (cluster, stand) in clusters.iter().zip(&stands) {
         if let Ok(k) = nodes.binary_search(stand) {
             drawer.draw(cluster, &perches[cluster.perch], &mut out[k]);
@@ -61,7 +77,11 @@ fn main_branches(skeleton: &Skeleton) -> Vec<usize> {
     }
     let mut main: Vec<usize> = (0..skeleton.nodes.len()).collect();
     for (i, node) in skeleton.nodes.iter().enumerate() {
-        if let Some(parent) = node.parent.map(|p| p.index()).filter(|&p| p != top && p < i && i > top) {
+        if let Some(parent) = node
+            .parent
+            .map(|p| p.index())
+            .filter(|&p| p != top && p < i && i > top)
+        {
             main[i] = main[parent];
         }
     }
@@ -91,7 +111,11 @@ fn kept(of: &[usize], skeleton: &Skeleton) -> Vec<usize> {
             return node;
         }
         let way = |n: &usize| (place(*n) - place(node)).norm();
-        large.iter().copied().min_by(|a, b| way(a).total_cmp(&way(b))).unwrap_or(node)
+        large
+            .iter()
+            .copied()
+            .min_by(|a, b| way(a).total_cmp(&way(b)))
+            .unwrap_or(node)
     };
     of.iter().map(nearest).collect()
 }
@@ -112,13 +136,19 @@ impl Drawer<'_> {
         let node = self.skeleton.nodes[perch.node.index()].position;
         // beta of B.2: later the farther from the branch's node.
         let way = (cluster.centre - node).norm();
-        let beta = if way.is_finite() { TAU * way / (WAVE * self.height) } else { 0.0 };
+        let beta = if way.is_finite() {
+            TAU * way / (WAVE * self.height)
+        } else {
+            0.0
+        };
         let axis = cluster.turn * Vector3::y();
         let leaves = Leaves::of(self, cluster, perch);
         for (i, p) in template.positions.iter().enumerate() {
             let leaf = template.leaf_of[i] as usize;
             let at = cluster.at(template, p);
-            let outward = (at - self.middle).try_normalize(1e-9).unwrap_or(Vector3::y());
+            let outward = (at - self.middle)
+                .try_normalize(1e-9)
+                .unwrap_or(Vector3::y());
             let own = cluster.turn * template.normals[i];
             // A leaf has two faces, and the outer one is lit.
             let own = if own.dot(&outward) < 0.0 { -own } else { own };
@@ -129,7 +159,10 @@ impl Drawer<'_> {
             let later = beta + LEAF_LATER * (leaf as f64 + 1.0);
             let sine = turned * beta.cos() + fluttered * later.cos();
             let cosine = turned * beta.sin() + fluttered * later.sin();
-            group.mesh.positions.push(at.coords.map(|x| x as f32).into());
+            group
+                .mesh
+                .positions
+                .push(at.coords.map(|x| x as f32).into());
             group.mesh.normals.push(normal.map(|x| x as f32).into());
             group.mesh.uvs.push(template.uvs[i]);
             group.mesh.joints.push(perch.riding.joints);
@@ -138,7 +171,10 @@ impl Drawer<'_> {
             group.sine.push(sine.map(|x| x as f32).into());
             group.cosine.push(cosine.map(|x| x as f32).into());
         }
-        group.mesh.indices.extend(template.indices.iter().map(|i| first + i));
+        group
+            .mesh
+            .indices
+            .extend(template.indices.iter().map(|i| first + i));
     }
 }
 
@@ -160,10 +196,19 @@ impl Leaves {
             sums[leaf as usize] += p.coords;
             sizes[leaf as usize] += 1.0;
         }
-        let middles: Vec<_> =
-            sums.iter().zip(&sizes).map(|(s, n)| cluster.at(template, &Point3::from(s / f64::max(*n, 1.0)))).collect();
-        let apices: Vec<_> = template.apices.iter().map(|a| cluster.at(template, a)).collect();
-        let stalk = |(m, a): (&Point3<f64>, &Point3<f64>)| (m - a).try_normalize(1e-9).unwrap_or(Vector3::zeros());
+        let middles: Vec<_> = sums
+            .iter()
+            .zip(&sizes)
+            .map(|(s, n)| cluster.at(template, &Point3::from(s / f64::max(*n, 1.0))))
+            .collect();
+        let apices: Vec<_> = template
+            .apices
+            .iter()
+            .map(|a| cluster.at(template, a))
+            .collect();
+        let stalk = |(m, a): (&Point3<f64>, &Point3<f64>)| {
+            (m - a).try_normalize(1e-9).unwrap_or(Vector3::zeros())
+        };
         let stalks = middles.iter().zip(&apices).map(stalk).collect();
         let colour = |middle: &Point3<f64>| {
             let film = drawer.target.map_or(super::PLAIN.map(f64::from), |t| {
@@ -171,9 +216,17 @@ impl Leaves {
                 t.soft_colour(cell, (0.15 * t.grid.length(cluster.size)).max(1.0))
             });
             // Colour times texture is to be what the film shows.
-            std::array::from_fn(|k| (film[k] / template.texture_mean[k].max(0.05)).round().clamp(0.0, 255.0) as u8)
+            std::array::from_fn(|k| {
+                (film[k] / template.texture_mean[k].max(0.05))
+                    .round()
+                    .clamp(0.0, 255.0) as u8
+            })
         };
         let colours = middles.iter().map(colour).collect();
-        Self { apices, stalks, colours }
+        Self {
+            apices,
+            stalks,
+            colours,
+        }
     }
 }

@@ -1,12 +1,14 @@
-//! Leaves that the picture does not show, so that the crown is as full from the side as from the front.
+//! Leaves that the picture does not show, so that the crown is as full from the side as from the
+//! front.
 
 use super::perch::Perch;
 use nalgebra::Point3;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
-/// The places that `may` bear leaves, `count` of them (some more than once), each time one where the crown is emptiest: in
-/// the cube of side `side` px that holds the fewest of `leaves` and of those before it.
+/// The places that `may` bear leaves, `count` of them (some more than once), each time one where
+/// the crown is emptiest: in the cube of side `side` px that holds the fewest of `leaves` and of
+/// those before it.
 pub(super) fn emptiest(
     perches: &[Perch],
     may: impl Fn(&Perch) -> bool,
@@ -26,8 +28,11 @@ pub(super) fn emptiest(
     }
     // Equally empty cubes in an order that goes all over the tree, not along an axis.
     let order = |k: usize| (k as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    let mut heap: BinaryHeap<_> =
-        cubes.values().enumerate().map(|(k, (held, at))| Reverse((*held, order(k), 0usize, at))).collect();
+    let mut heap: BinaryHeap<_> = cubes
+        .values()
+        .enumerate()
+        .map(|(k, (held, at))| Reverse((*held, order(k), 0usize, at)))
+        .collect();
     let mut out = Vec::with_capacity(count);
     while let Some(Reverse((held, order, used, at))) = heap.pop().filter(|_| out.len() < count) {
         // About every third place of a cube, so that neighbours on a twig do not follow each other.

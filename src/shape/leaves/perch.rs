@@ -8,7 +8,8 @@ use nalgebra::{Point3, Vector3};
 
 /// Leaves sit where a limb is thinner than this share of the thickest.
 const THIN: f64 = 0.4;
-/// Way between two places on a limb, and reach within which branches count as equally near, as shares of the tree's height.
+/// Way between two places on a limb, and reach within which branches count as equally near, as
+/// shares of the tree's height.
 const STEP: f64 = 1.0 / 80.0;
 const REACH: f64 = 1.0 / 25.0;
 /// More places than this on all limbs make them only slower to search.
@@ -59,17 +60,32 @@ pub(super) struct Perches {
 }
 
 impl Perches {
-    pub fn new(limbs: &[Limb], skeleton: &Skeleton, pose: Option<&Pose>, grid: &Grid, height: f64) -> Self {
+    pub fn new(
+        limbs: &[Limb],
+        skeleton: &Skeleton,
+        pose: Option<&Pose>,
+        grid: &Grid,
+        height: f64,
+    ) -> Self {
         let radius = |l: &Limb| l.stations.first().map_or(0.0, |s| s.radius);
-        let thickest = limbs.iter().map(radius).filter(|r| r.is_finite()).fold(0.0, f64::max);
+        let thickest = limbs
+            .iter()
+            .map(radius)
+            .filter(|r| r.is_finite())
+            .fold(0.0, f64::max);
         let level = |l: &Limb| skeleton.nodes.get(l.node.index()).map_or(0, |n| n.level);
-        let kinds: [&dyn Fn(&Limb) -> bool; 3] =
-            [&|l| l.twig || level(l) >= 2 && radius(l) <= THIN * thickest, &|l| level(l) >= 2, &|_| true];
+        let kinds: [&dyn Fn(&Limb) -> bool; 3] = [
+            &|l| l.twig || level(l) >= 2 && radius(l) <= THIN * thickest,
+            &|l| level(l) >= 2,
+            &|_| true,
+        ];
         // A tree of thick limbs alone still has its leaves.
         let some = |bears: &&&dyn Fn(&Limb) -> bool| limbs.iter().any(bears);
         let bears = kinds.iter().find(some).unwrap_or(&kinds[2]);
         let bearing: Vec<&Limb> = limbs.iter().filter(|l| bears(l) || level(l) >= 2).collect();
-        let ways = bearing.iter().flat_map(|l| l.stations.windows(2).map(|w| (w[1].at - w[0].at).norm()));
+        let ways = bearing
+            .iter()
+            .flat_map(|l| l.stations.windows(2).map(|w| (w[1].at - w[0].at).norm()));
         let length: f64 = ways.filter(|w| w.is_finite()).sum();
         let step = (STEP * height).max(length / MOST).max(1e-6);
         let mut all = Vec::new();
@@ -77,14 +93,23 @@ impl Perches {
             along(limb, !bears(limb), step, skeleton, pose, grid, &mut all);
         }
         let reach = grid.length(REACH * height).max(1.0);
-        let (across, down) = [grid.size.width, grid.size.height].map(|n| (f64::from(n) / reach) as usize + 1).into();
+        let (across, down) = [grid.size.width, grid.size.height]
+            .map(|n| (f64::from(n) / reach) as usize + 1)
+            .into();
         let mut squares = vec![Vec::new(); across * down];
         for (i, perch) in all.iter().enumerate() {
             let [x, y] = square(perch.cell, reach, [across, down]);
             squares[y * across + x].push(i as u32);
         }
         let middle = skeleton.nodes.get(1).map_or(0.0, |n| n.position.z);
-        Self { all, squares, across, down, reach, middle }
+        Self {
+            all,
+            squares,
+            across,
+            down,
+            reach,
+            middle,
+        }
     }
 
     /// Forgets what has been seated.
@@ -92,9 +117,10 @@ impl Perches {
         self.all.iter_mut().for_each(|p| p.load = 0.0);
     }
 
-    /// Seats a cluster that is seen at `cell`: on the nearest branch in the picture, and where several are all but equally
-    /// near, on one of the front half of the tree if it is bright, of the back half if not, and there on the one that
-    /// has fewest (Li et al. B.1). Returns the place and how far it is in the picture, cells.
+    /// Seats a cluster that is seen at `cell`: on the nearest branch in the picture, and where
+    /// several are all but equally near, on one of the front half of the tree if it is bright, of
+    /// the back half if not, and there on the one that has fewest (Li et al. B.1). Returns the
+    /// place and how far it is in the picture, cells.
     pub fn seat(&mut self, cell: [f64; 2], side: Side) -> Option<(usize, f64)> {
         let hides = matches!(side, Side::Before(_));
         let near = self.near(cell, hides);
@@ -105,28 +131,41 @@ impl Perches {
             Side::Before(depth) => self.all[i].depth >= depth,
         };
         let thick = |i: usize| if self.all[i].thick { 2.0 } else { 0.0 };
-        let cost = |&(i, distance): &(usize, f64)| (!front(i), thick(i) + self.all[i].load + distance / self.reach);
+        let cost = |&(i, distance): &(usize, f64)| {
+            (
+                !front(i),
+                thick(i) + self.all[i].load + distance / self.reach,
+            )
+        };
         let order = |a: &(usize, f64), b: &(usize, f64)| {
             let (x, y) = (cost(a), cost(b));
             x.0.cmp(&y.0).then(x.1.total_cmp(&y.1)).then(a.0.cmp(&b.0))
         };
-        let (i, distance) = near.iter().filter(|n| n.1 <= least + self.reach).copied().min_by(order)?;
+        let (i, distance) = near
+            .iter()
+            .filter(|n| n.1 <= least + self.reach)
+            .copied()
+            .min_by(order)?;
         self.all[i].load += 1.0;
         Some((i, distance))
     }
 
-    /// Places within reach of a cell with their distance; if there are none, those of the first ring of squares that has some.
+    /// Places within reach of a cell with their distance; if there are none, those of the first
+    /// ring of squares that has some.
     fn near(&self, cell: [f64; 2], thick: bool) -> Vec<(usize, f64)> {
         let [x, y] = square(cell, self.reach, [self.across, self.down]);
         for ring in 1..=self.across.max(self.down) {
             let (left, right) = (x.saturating_sub(ring), (x + ring).min(self.across - 1));
             let (top, bottom) = (y.saturating_sub(ring), (y + ring).min(self.down - 1));
-            let squares = (top..=bottom).flat_map(|v| (left..=right).map(move |u| v * self.across + u));
+            let squares =
+                (top..=bottom).flat_map(|v| (left..=right).map(move |u| v * self.across + u));
             let distance = |i: u32| {
                 let c = self.all[i as usize].cell;
                 (i as usize, (c[0] - cell[0]).hypot(c[1] - cell[1]))
             };
-            let of = squares.flat_map(|s| &self.squares[s]).filter(|&&i| thick || !self.all[i as usize].thick);
+            let of = squares
+                .flat_map(|s| &self.squares[s])
+                .filter(|&&i| thick || !self.all[i as usize].thick);
             let found: Vec<(usize, f64)> = of.map(|&i| distance(i)).collect();
             if !found.is_empty() {
                 return found;
@@ -140,7 +179,8 @@ fn square(cell: [f64; 2], side: f64, count: [usize; 2]) -> [usize; 2] {
     [0, 1].map(|k| ((cell[k] / side).max(0.0) as usize).min(count[k] - 1))
 }
 
-/// Places along one limb, `step` px apart; near its base there are none, where it is inside its parent.
+/// Places along one limb, `step` px apart; near its base there are none, where it is inside its
+/// parent.
 fn along(
     limb: &Limb,
     thick: bool,
@@ -150,7 +190,11 @@ fn along(
     grid: &Grid,
     all: &mut Vec<Perch>,
 ) {
-    let length: f64 = limb.stations.windows(2).map(|w| (w[1].at - w[0].at).norm()).sum();
+    let length: f64 = limb
+        .stations
+        .windows(2)
+        .map(|w| (w[1].at - w[0].at).norm())
+        .sum();
     if !(length > 0.0 && length.is_finite()) {
         return;
     }
@@ -165,7 +209,11 @@ fn along(
             segment += 1;
         }
         let (a, b) = (&limb.stations[segment], &limb.stations[segment + 1]);
-        let t = if span(segment) > 0.0 { ((way - before) / span(segment)).clamp(0.0, 1.0) } else { 0.0 };
+        let t = if span(segment) > 0.0 {
+            ((way - before) / span(segment)).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
         let at = a.at + (b.at - a.at) * t;
         let riding = between(&a.riding, &b.riding, t);
         let carried = Carried::by(&riding, skeleton, pose);
@@ -175,7 +223,18 @@ fn along(
         let cell = grid.cell_of(&posed);
         if cell.iter().all(|c| c.is_finite()) {
             let (node, depth, load) = (limb.node, posed.z, 0.0);
-            all.push(Perch { node, at, direction, riding, carried, depth, radius, cell, load, thick });
+            all.push(Perch {
+                node,
+                at,
+                direction,
+                riding,
+                carried,
+                depth,
+                radius,
+                cell,
+                load,
+                thick,
+            });
         }
     }
 }

@@ -14,8 +14,9 @@ use nalgebra::{Point3, Vector3};
 const LAYERS: f64 = 2.0;
 /// Sizes that are tried, each from what the one before covered.
 const TRIES: usize = 5;
-/// Shares of the clusters: seeds at most; seeds and density together; with those that stand on branches that bear few, which
-/// the picture does not show, but without them the crown would be thin from the side. What is left closes gaps.
+/// Shares of the clusters: seeds at most; seeds and density together; with those that stand on
+/// branches that bear few, which the picture does not show, but without them the crown would be
+/// thin from the side. What is left closes gaps.
 const SEEDED: f64 = 0.35;
 const BY_DENSITY: f64 = 0.42;
 const BEFORE_GAPS: f64 = 0.72;
@@ -25,7 +26,8 @@ const ROUNDS: usize = 6;
 const LEAST_DENSITY: f32 = 0.15;
 /// Where more leaf is wanted than this, what is behind does not count.
 const HIDING: f32 = 0.4;
-/// A cluster that is put on a branch stands so far beside it at most, as a share of the tree's height.
+/// A cluster that is put on a branch stands so far beside it at most, as a share of the tree's
+/// height.
 const ASIDE: f64 = 0.02;
 /// A leaf stands so far before or behind its branch at most, as a share of the tree's height.
 const DEEPEST: f64 = 1.0 / 15.0;
@@ -67,8 +69,11 @@ impl Planter<'_> {
             let (clusters, covered) = self.attempt(size);
             let width = self.target.grid.size.width as usize;
             let density = smoothed(&covered, width, self.target.sigma);
-            let likeness =
-                -density.iter().zip(&self.target.density).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>();
+            let likeness = -density
+                .iter()
+                .zip(&self.target.density)
+                .map(|(a, b)| f64::from(a - b).powi(2))
+                .sum::<f64>();
             if best.as_ref().is_none_or(|(before, _)| likeness > *before) {
                 best = Some((likeness, clusters));
             }
@@ -84,7 +89,11 @@ impl Planter<'_> {
 
     /// Clusters of one size, whatever they cover.
     pub fn plant_of_size(&mut self, size: f64) -> Vec<Cluster> {
-        if self.perches.all.is_empty() { Vec::new() } else { self.attempt(self.bounded(size)).0 }
+        if self.perches.all.is_empty() {
+            Vec::new()
+        } else {
+            self.attempt(self.bounded(size)).0
+        }
     }
 
     /// A cluster is seen as one, and is smaller than the crown.
@@ -112,8 +121,12 @@ impl Planter<'_> {
             return (work.clusters, work.cover.covered);
         }
         let most = ((SEEDED * self.count as f64).ceil() as usize).min(self.count);
-        let kept =
-            |cell: &&[f64; 2]| self.target.grid.index(**cell).is_some_and(|i| self.target.density[i] > LEAST_DENSITY);
+        let kept = |cell: &&[f64; 2]| {
+            self.target
+                .grid
+                .index(**cell)
+                .is_some_and(|i| self.target.density[i] > LEAST_DENSITY)
+        };
         let seeds: Vec<[f64; 2]> = self.seeds.iter().filter(kept).copied().collect();
         // Every n-th: the strongest corners all lie on the border, before the sky.
         let used = seeds.len().min(most);
@@ -133,17 +146,32 @@ impl Planter<'_> {
 
     /// Bright leaves are in front (Li et al. B.1).
     fn half(&self, cell: [f64; 2]) -> Side {
-        if self.target.is_bright(cell) { Side::Front } else { Side::Back }
+        if self.target.is_bright(cell) {
+            Side::Front
+        } else {
+            Side::Back
+        }
     }
 
-    /// Before the wood that is seen at a cell, or in the half that its colour says where there is none.
+    /// Before the wood that is seen at a cell, or in the half that its colour says where there is
+    /// none.
     fn before_wood(&self, cell: [f64; 2], wood: &[f32]) -> Side {
-        let depth = self.target.grid.index(cell).and_then(|i| wood.get(i)).copied().unwrap_or(f32::NEG_INFINITY);
-        if depth.is_finite() { Side::Before(f64::from(depth) - 0.5 * DEEPEST * self.height) } else { self.half(cell) }
+        let depth = self
+            .target
+            .grid
+            .index(cell)
+            .and_then(|i| wood.get(i))
+            .copied()
+            .unwrap_or(f32::NEG_INFINITY);
+        if depth.is_finite() {
+            Side::Before(f64::from(depth) - 0.5 * DEEPEST * self.height)
+        } else {
+            self.half(cell)
+        }
     }
 
-    /// Clusters where `weight` of what is wanted and what is covered is, until there are `share` of all; `hiding` the wood
-    /// that stands there.
+    /// Clusters where `weight` of what is wanted and what is covered is, until there are `share` of
+    /// all; `hiding` the wood that stands there.
     fn spread(
         &mut self,
         share: f64,
@@ -152,14 +180,22 @@ impl Planter<'_> {
         size: f64,
         work: &mut Work<'_>,
     ) {
-        let count = ((share * self.count as f64).round() as usize).saturating_sub(work.clusters.len());
-        // By squares of about a cluster's size: a gap that large counts, specks between leaves do not.
+        let count =
+            ((share * self.count as f64).round() as usize).saturating_sub(work.clusters.len());
+        // By squares of about a cluster's size: a gap that large counts, specks between leaves do
+        // not.
         let grid = self.target.grid;
         let side = (0.5 * grid.length(size)).round().max(1.0) as usize;
         let width = grid.size.width as usize;
         let across = width.div_ceil(side);
         let mut squares = vec![0.0f64; across * (grid.size.height as usize).div_ceil(side)];
-        for (i, pair) in self.target.wanted.iter().zip(&work.cover.covered).enumerate() {
+        for (i, pair) in self
+            .target
+            .wanted
+            .iter()
+            .zip(&work.cover.covered)
+            .enumerate()
+        {
             squares[i / width / side * across + i % width / side] += f64::from(weight(pair));
         }
         let mut sum = 0.0;
@@ -177,22 +213,37 @@ impl Planter<'_> {
             let corner = [square % across * side, square / across * side];
             let cell = corner.map(|c| c as f64 - 0.5 + side as f64 * work.chance.share());
             if grid.index(cell).is_some() {
-                let side = if hiding { self.before_wood(cell, work.cover.before) } else { self.half(cell) };
+                let side = if hiding {
+                    self.before_wood(cell, work.cover.before)
+                } else {
+                    self.half(cell)
+                };
                 self.add(cell, side, size, work);
             }
         }
     }
 
-    /// Clusters on branches where the crown is emptiest and the picture's leaves hide them, until there are `share` of all.
+    /// Clusters on branches where the crown is emptiest and the picture's leaves hide them, until
+    /// there are `share` of all.
     fn fill(&mut self, share: f64, size: f64, work: &mut Work<'_>) {
         let grid = self.target.grid;
-        let hidden = |p: &Perch| !p.thick && grid.index(p.cell).is_some_and(|c| self.target.density[c] > HIDING);
-        let left = ((share * self.count as f64).round() as usize).saturating_sub(work.clusters.len());
+        let hidden = |p: &Perch| {
+            !p.thick
+                && grid
+                    .index(p.cell)
+                    .is_some_and(|c| self.target.density[c] > HIDING)
+        };
+        let left =
+            ((share * self.count as f64).round() as usize).saturating_sub(work.clusters.len());
         let leaves = work.clusters.iter().map(|c| c.centre);
         for i in emptiest(&self.perches.all, hidden, leaves, CUBE * size, left) {
             let perch = &self.perches.all[i];
             let aside = grid.length(ASIDE * self.height);
-            let side = if work.chance.share() < 0.5 { Side::Front } else { Side::Back };
+            let side = if work.chance.share() < 0.5 {
+                Side::Front
+            } else {
+                Side::Back
+            };
             let cell = perch.cell.map(|c| c + aside * work.chance.either());
             self.hang(i, cell, aside, side, size, work);
         }
@@ -206,7 +257,15 @@ impl Planter<'_> {
     }
 
     /// A cluster on branch place `i`, seen at `cell`, `distance` cells from it.
-    fn hang(&self, i: usize, cell: [f64; 2], distance: f64, side: Side, size: f64, work: &mut Work<'_>) {
+    fn hang(
+        &self,
+        i: usize,
+        cell: [f64; 2],
+        distance: f64,
+        side: Side,
+        size: f64,
+        work: &mut Work<'_>,
+    ) {
         let perch = &self.perches.all[i];
         let grid = &self.target.grid;
         let far = (distance / grid.length(1.0).max(1e-9)).min(DEEPEST * self.height);
@@ -217,32 +276,66 @@ impl Planter<'_> {
             Side::Back => perch.depth - off,
             Side::Before(wood) => {
                 let clear = wood + 0.5 * DEEPEST * self.height + 0.5 * size;
-                clear.clamp(perch.depth + off, (perch.depth + off).max(perch.depth + DEEPEST * self.height + size))
+                clear.clamp(
+                    perch.depth + off,
+                    (perch.depth + off).max(perch.depth + DEEPEST * self.height + size),
+                )
             }
         };
         let posed = grid.model_at(cell, depth);
         // At the crown's border a whole cluster would stand out of it.
-        let share = grid.index(cell).map_or(0.0, |c| f64::from(self.target.density[c]));
+        let share = grid
+            .index(cell)
+            .map_or(0.0, |c| f64::from(self.target.density[c]));
         let size = size * (0.5 + 0.6 * share).clamp(0.5, 1.1) * (1.0 + 0.15 * work.chance.either());
         let centre = perch.carried.to_rest(&posed);
-        self.put(Cluster { perch: i, centre, turn: nalgebra::Rotation3::identity(), size }, work);
+        self.put(
+            Cluster {
+                perch: i,
+                centre,
+                turn: nalgebra::Rotation3::identity(),
+                size,
+            },
+            work,
+        );
     }
 
-    /// As leaves are sampled without a picture: about the branches, with a deviation of `spread` tree heights.
+    /// As leaves are sampled without a picture: about the branches, with a deviation of `spread`
+    /// tree heights.
     fn at_random(&mut self, spread: f64, size: f64, work: &mut Work<'_>) {
-        let bearing: Vec<usize> = (0..self.perches.all.len()).filter(|&i| !self.perches.all[i].thick).collect();
+        let bearing: Vec<usize> = (0..self.perches.all.len())
+            .filter(|&i| !self.perches.all[i].thick)
+            .collect();
         for _ in 0..self.count {
-            let Some(&i) = work.chance.one_of(&bearing) else { return };
-            let off = Vector3::new(work.chance.normal(), work.chance.normal(), work.chance.normal());
+            let Some(&i) = work.chance.one_of(&bearing) else {
+                return;
+            };
+            let off = Vector3::new(
+                work.chance.normal(),
+                work.chance.normal(),
+                work.chance.normal(),
+            );
             let centre = self.perches.all[i].at + off * (spread * self.height);
             let size = size * (1.0 + 0.15 * work.chance.either());
-            self.put(Cluster { perch: i, centre, turn: nalgebra::Rotation3::identity(), size }, work);
+            self.put(
+                Cluster {
+                    perch: i,
+                    centre,
+                    turn: nalgebra::Rotation3::identity(),
+                    size,
+                },
+                work,
+            );
         }
     }
 
     fn put(&self, mut cluster: Cluster, work: &mut Work<'_>) {
         let perch = &self.perches.all[cluster.perch];
-        let chance = [work.chance.normal(), work.chance.normal(), work.chance.normal()];
+        let chance = [
+            work.chance.normal(),
+            work.chance.normal(),
+            work.chance.normal(),
+        ];
         cluster.turn = stand(perch, &cluster.centre, &self.axis, chance);
         if !cluster.centre.coords.iter().all(|x| x.is_finite()) {
             return;
@@ -267,14 +360,18 @@ struct Work<'a> {
     cover: Cover<'a>,
 }
 
-/// How like the densities of what is covered and of what is wanted are: their correlation over the target's bounding box.
+/// How like the densities of what is covered and of what is wanted are: their correlation over the
+/// target's bounding box.
 pub(super) fn likeness(target: &Target, covered: &[f32]) -> f64 {
     let width = target.grid.size.width as usize;
     let density = smoothed(covered, width, target.sigma);
     let there = |i: usize| target.wanted[i] > 0.5 || covered[i] > 0.5;
-    let cells = (0..target.wanted.len()).filter(|&i| there(i)).map(|i| (i % width, i / width));
-    let bounds =
-        cells.fold((usize::MAX, 0, usize::MAX, 0), |(l, r, t, b), (u, v)| (l.min(u), r.max(u), t.min(v), b.max(v)));
+    let cells = (0..target.wanted.len())
+        .filter(|&i| there(i))
+        .map(|i| (i % width, i / width));
+    let bounds = cells.fold((usize::MAX, 0, usize::MAX, 0), |(l, r, t, b), (u, v)| {
+        (l.min(u), r.max(u), t.min(v), b.max(v))
+    });
     let inside = |i: usize| {
         let (u, v) = (i % width, i / width);
         (bounds.0..=bounds.1).contains(&u) && (bounds.2..=bounds.3).contains(&v)

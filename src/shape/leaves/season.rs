@@ -5,9 +5,11 @@ use super::colours::shares;
 use super::density::{SCALE, smoothed};
 use crate::model::{Outline, Rgb, Skeleton};
 
-/// Above this share of the tree's height it is crown: below there is mostly trunk, in winter as in summer.
+/// Above this share of the tree's height it is crown: below there is mostly trunk, in winter as in
+/// summer.
 const CROWN_SHARE: f64 = 0.35;
-/// Half a tree in leaf has this density; the bare trees that were looked at have 0.23 and 0.40, those in leaf 0.69 to 0.77.
+/// Half a tree in leaf has this density; the bare trees that were looked at have 0.23 and 0.40,
+/// those in leaf 0.69 to 0.77.
 const HALF: f64 = 0.55;
 /// Over this difference of density the odds change by a factor of e.
 const SPREAD: f64 = 0.05;
@@ -15,14 +17,16 @@ const SPREAD: f64 = 0.05;
 /// What the picture says about leaves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Season {
-    /// Half of the crown's pixels have more tree around them than this, 0 to 1, at a twentieth of the tree's height.
+    /// Half of the crown's pixels have more tree around them than this, 0 to 1, at a twentieth of
+    /// the tree's height.
     pub density: f64,
     /// How sure it is that the tree is in leaf, 0 to 1.
     pub in_leaf: f64,
 }
 
-/// Looks whether a tree is in leaf: around a pixel of a crown in leaf there is more tree, around one of a bare crown there is
-/// mostly what stands behind. `None` where picture and outline say nothing.
+/// Looks whether a tree is in leaf: around a pixel of a crown in leaf there is more tree, around
+/// one of a bare crown there is mostly what stands behind. `None` where picture and outline say
+/// nothing.
 pub fn season(picture: &Rgb, outline: &Outline, skeleton: &Skeleton) -> Option<Season> {
     let canvas = Canvas::new(Grid::of(skeleton), picture, outline)?;
     let tree = shares(&canvas).tree;
@@ -39,5 +43,8 @@ pub(super) fn of_tree(canvas: &Canvas, tree: &[f32]) -> Option<Season> {
     let mut found: Vec<f32> = (0..tree.len()).filter(crown).map(|i| around[i]).collect();
     found.sort_unstable_by(f32::total_cmp);
     let density = f64::from(*found.get(found.len() / 2)?);
-    Some(Season { density, in_leaf: 1.0 / (1.0 + ((HALF - density) / SPREAD).exp()) })
+    Some(Season {
+        density,
+        in_leaf: 1.0 / (1.0 + ((HALF - density) / SPREAD).exp()),
+    })
 }

@@ -8,13 +8,14 @@ use crate::model::Skeleton;
 
 /// Share of leaf from which on a cell's colour is that of leaves.
 const PURE: f32 = 0.6;
-/// Colour tells a cell apart with some doubt, and the sum of the doubts would be missing: what is by this share leaf in a
-/// cell and those around it is not leaf, or wholly.
+/// Colour tells a cell apart with some doubt, and the sum of the doubts would be missing: what is
+/// by this share leaf in a cell and those around it is not leaf, or wholly.
 const DOUBT: [f32; 2] = [0.3, 0.6];
-/// Hues farther from the leaves' middle one than so many deviations belong to what is seen between them.
+/// Hues farther from the leaves' middle one than so many deviations belong to what is seen between
+/// them.
 const STRANGE: f64 = 3.5;
-/// The film's light and shade are in the colours already, and a viewer's own come on top: of their ratio to the mean this power
-/// is kept.
+/// The film's light and shade are in the colours already, and a viewer's own come on top: of their
+/// ratio to the mean this power is kept.
 const SHADING: f64 = 0.65;
 
 /// What is wanted in every cell, and what is known of it.
@@ -40,14 +41,22 @@ impl Target {
     /// `None` where nothing says where leaves are to be.
     pub fn new(skeleton: &Skeleton, view: &LeafView, height: f64) -> Option<Self> {
         let grid = Grid::of(skeleton);
-        let canvas = view.picture.zip(view.outline).and_then(|(p, o)| Canvas::new(grid, p, o));
+        let canvas = view
+            .picture
+            .zip(view.outline)
+            .and_then(|(p, o)| Canvas::new(grid, p, o));
         let seen: Option<Shares> = canvas.as_ref().map(shares);
-        let drawn = view.density.and_then(|d| grid.reduced(&d.pixels, d.size, 1));
+        let drawn = view
+            .density
+            .and_then(|d| grid.reduced(&d.pixels, d.size, 1));
         let wanted: Vec<f32> = match (&drawn, &seen) {
             (Some(drawn), _) => drawn.iter().map(|&d| f32::from(d) / 255.0).collect(),
             (None, Some(seen)) => {
                 let around = smoothed(&seen.leaf, grid.size.width as usize, 1.0);
-                around.iter().map(|&p| smooth_step(DOUBT[0], DOUBT[1], p)).collect()
+                around
+                    .iter()
+                    .map(|&p| smooth_step(DOUBT[0], DOUBT[1], p))
+                    .collect()
             }
             (None, None) => return None,
         };
@@ -62,14 +71,29 @@ impl Target {
             }
             _ => Vec::new(),
         };
-        let mut lumas: Vec<f64> = colours.iter().filter(|c| c.1 > 0.5).map(|c| luma(c.0)).collect();
+        let mut lumas: Vec<f64> = colours
+            .iter()
+            .filter(|c| c.1 > 0.5)
+            .map(|c| luma(c.0))
+            .collect();
         lumas.sort_unstable_by(f64::total_cmp);
         let middle_luma = lumas.get(lumas.len() / 2).copied().unwrap_or(0.0);
         let mean_luma = lumas.iter().sum::<f64>() / lumas.len().max(1) as f64;
-        let soft: f64 = lumas.iter().map(|l| softened(*l, mean_luma)).sum::<f64>() / lumas.len().max(1) as f64;
+        let soft: f64 =
+            lumas.iter().map(|l| softened(*l, mean_luma)).sum::<f64>() / lumas.len().max(1) as f64;
         let brighter = if soft > 0.0 { mean_luma / soft } else { 1.0 };
         let mean = mean(colours.iter()).unwrap_or(PLAIN);
-        Some(Self { grid, wanted, density, sigma, colours, mean, middle_luma, mean_luma, brighter })
+        Some(Self {
+            grid,
+            wanted,
+            density,
+            sigma,
+            colours,
+            mean,
+            middle_luma,
+            mean_luma,
+            brighter,
+        })
     }
 
     /// Nothing wanted and nothing known.
@@ -94,10 +118,16 @@ impl Target {
             return self.mean;
         }
         let (w, h) = (self.grid.size.width as i64, self.grid.size.height as i64);
-        let (u, v, radius) = (cell[0].round() as i64, cell[1].round() as i64, radius.round().clamp(0.0, 20.0) as i64);
+        let (u, v, radius) = (
+            cell[0].round() as i64,
+            cell[1].round() as i64,
+            radius.round().clamp(0.0, 20.0) as i64,
+        );
         let found = [radius, 2 * radius + 2].into_iter().find_map(|r| {
             let rows = (v - r).max(0)..=(v + r).min(h - 1);
-            let around = rows.flat_map(|y| ((u - r).max(0)..=(u + r).min(w - 1)).map(move |x| (y * w + x) as usize));
+            let around = rows.flat_map(|y| {
+                ((u - r).max(0)..=(u + r).min(w - 1)).map(move |x| (y * w + x) as usize)
+            });
             mean(around.map(|i| &self.colours[i]))
         });
         found.unwrap_or(self.mean)
@@ -107,7 +137,11 @@ impl Target {
     pub fn soft_colour(&self, cell: [f64; 2], radius: f64) -> [f64; 3] {
         let colour = self.colour(cell, radius);
         let luma = luma(colour).max(1.0);
-        let share = if self.mean_luma > 0.0 { self.brighter * softened(luma, self.mean_luma) / luma } else { 1.0 };
+        let share = if self.mean_luma > 0.0 {
+            self.brighter * softened(luma, self.mean_luma) / luma
+        } else {
+            1.0
+        };
         colour.map(|c| f64::from(c) * share)
     }
 
@@ -117,12 +151,18 @@ impl Target {
     }
 }
 
-/// How much of each cell and of the four beside it is leaf, 0 where that is less than [`PURE`]: at a leaf's edge the camera
-/// mixes the sky in, and many cells that are hardly leaf would add up to a blue one.
+/// How much of each cell and of the four beside it is leaf, 0 where that is less than [`PURE`]: at
+/// a leaf's edge the camera mixes the sky in, and many cells that are hardly leaf would add up to a
+/// blue one.
 fn pure(leaf: &[f32], width: usize) -> Vec<f32> {
     let at = |i: Option<usize>| i.and_then(|i| leaf.get(i)).copied().unwrap_or(0.0);
     let least = |i: usize| {
-        let beside = [i.checked_sub(1), Some(i + 1), i.checked_sub(width), Some(i + width)];
+        let beside = [
+            i.checked_sub(1),
+            Some(i + 1),
+            i.checked_sub(width),
+            Some(i + width),
+        ];
         let least = beside.into_iter().map(at).fold(leaf[i], f32::min);
         if least < PURE { 0.0 } else { least }
     };
@@ -133,20 +173,31 @@ fn softened(luma: f64, mean: f64) -> f64 {
     mean * (luma / mean.max(1.0)).max(0.0).powf(SHADING)
 }
 
-/// Takes the weight of colours whose hue is none of the leaves': what is seen between them can have colours that are found
-/// nowhere outside. By median and median deviation, so that autumn may have all of its hues.
+/// Takes the weight of colours whose hue is none of the leaves': what is seen between them can have
+/// colours that are found nowhere outside. By median and median deviation, so that autumn may have
+/// all of its hues.
 fn without_strangers(colours: &mut [([u8; 3], f32)]) {
     let hue = |[r, g, b]: [u8; 3]| {
         let [r, g, b] = [r, g, b].map(|c| f64::from(c) + 4.0);
         [(r - g) / (r + g + b), (b - g) / (r + g + b)]
     };
     for k in 0..2 {
-        let mut hues: Vec<f64> = colours.iter().filter(|c| c.1 > 0.5).map(|c| hue(c.0)[k]).collect();
-        let Some(middle) = median(&mut hues) else { return };
+        let mut hues: Vec<f64> = colours
+            .iter()
+            .filter(|c| c.1 > 0.5)
+            .map(|c| hue(c.0)[k])
+            .collect();
+        let Some(middle) = median(&mut hues) else {
+            return;
+        };
         hues.iter_mut().for_each(|h| *h = (*h - middle).abs());
-        // 1.4826: from the median deviation to the standard one of a normal distribution; below a step of 8 bits all is noise.
+        // 1.4826: from the median deviation to the standard one of a normal distribution; below a
+        // step of 8 bits all is noise.
         let most = STRANGE * (1.4826 * median(&mut hues).unwrap_or(0.0)).max(0.02);
-        colours.iter_mut().filter(|c| (hue(c.0)[k] - middle).abs() > most).for_each(|c| c.1 = 0.0);
+        colours
+            .iter_mut()
+            .filter(|c| (hue(c.0)[k] - middle).abs() > most)
+            .for_each(|c| c.1 = 0.0);
     }
 }
 
@@ -160,7 +211,10 @@ fn mean<'a>(colours: impl Iterator<Item = &'a ([u8; 3], f32)>) -> Option<[u8; 3]
     let (mut sum, mut weight) = ([0.0f64; 3], 0.0);
     for (colour, w) in colours {
         weight += f64::from(*w);
-        colour.iter().zip(&mut sum).for_each(|(&c, s)| *s += f64::from(*w) * f64::from(c));
+        colour
+            .iter()
+            .zip(&mut sum)
+            .for_each(|(&c, s)| *s += f64::from(*w) * f64::from(c));
     }
     (weight > 0.5).then(|| sum.map(|s| (s / weight).round() as u8))
 }

@@ -1,9 +1,11 @@
-//! The mesh that stands at every seed: a cluster of leaves, ours or the user's (Li et al. appendix B.1).
+//! The mesh that stands at every seed: a cluster of leaves, ours or the user's (Li et al. appendix
+//! B.1).
 
 use super::texture;
 use nalgebra::{Point3, Rotation3, Vector3};
 
-/// A cluster of leaves of size 1: it grows from the origin along y, its leaves turn their faces to z.
+/// A cluster of leaves of size 1: it grows from the origin along y, its leaves turn their faces to
+/// z.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Template {
     pub(super) positions: Vec<Point3<f64>>,
@@ -70,7 +72,12 @@ impl Template {
             // All faces look to z somewhat: leaves turn to the light.
             let stand = Rotation3::from_axis_angle(&Vector3::y_axis(), turn)
                 * Rotation3::from_axis_angle(&Vector3::x_axis(), tilt);
-            leaf(&mut mesh, Vector3::new(0.0, at, 0.0), &stand, 0.72 - 0.03 * f64::from(k));
+            leaf(
+                &mut mesh,
+                Vector3::new(0.0, at, 0.0),
+                &stand,
+                0.72 - 0.03 * f64::from(k),
+            );
         }
         mesh.texture = texture::png().map(|bytes| ("image/png", bytes));
         Self::new(mesh).unwrap_or_else(|_| Self::nothing())
@@ -90,9 +97,9 @@ impl Template {
         }
     }
 
-    /// A template from a mesh of any size, which is scaled so that its longest side is 1 and moved so that the middle of its
-    /// lowest end is the origin. Missing normals are computed. Vertices that no triangle uses are left out: every copy would
-    /// carry them.
+    /// A template from a mesh of any size, which is scaled so that its longest side is 1 and moved
+    /// so that the middle of its lowest end is the origin. Missing normals are computed. Vertices
+    /// that no triangle uses are left out: every copy would carry them.
     ///
     /// # Errors
     /// What [`TemplateFault`] names.
@@ -106,26 +113,46 @@ impl Template {
             return Err(TemplateFault::TooMany(triangles));
         }
         let same = |m: usize| m == 0 || m == n;
-        if !same(mesh.normals.len()) || !same(mesh.uvs.len()) || mesh.indices.iter().any(|&i| i as usize >= n) {
+        if !same(mesh.normals.len())
+            || !same(mesh.uvs.len())
+            || mesh.indices.iter().any(|&i| i as usize >= n)
+        {
             return Err(TemplateFault::Torn);
         }
         mesh.indices.truncate(3 * triangles);
         keep_used(&mut mesh);
         let n = mesh.positions.len();
-        let numbers = mesh.positions.iter().chain(&mesh.normals).flatten().chain(mesh.uvs.iter().flatten());
+        let numbers = mesh
+            .positions
+            .iter()
+            .chain(&mesh.normals)
+            .flatten()
+            .chain(mesh.uvs.iter().flatten());
         if !numbers.into_iter().all(|x| x.is_finite() && x.abs() < 1e12) {
             return Err(TemplateFault::NoNumbers);
         }
-        let given: Vec<Point3<f64>> = mesh.positions.iter().map(|p| Point3::from(p.map(f64::from))).collect();
-        let (low, high) = given.iter().fold((given[0], given[0]), |(low, high), p| (low.inf(p), high.sup(p)));
+        let given: Vec<Point3<f64>> = mesh
+            .positions
+            .iter()
+            .map(|p| Point3::from(p.map(f64::from)))
+            .collect();
+        let (low, high) = given.iter().fold((given[0], given[0]), |(low, high), p| {
+            (low.inf(p), high.sup(p))
+        });
         let side = (high - low).max();
         if side <= 1e-12 {
             return Err(TemplateFault::Flat);
         }
-        let near_end: Vec<&Point3<f64>> = given.iter().filter(|p| p.y <= low.y + 0.02 * side).collect();
+        let near_end: Vec<&Point3<f64>> = given
+            .iter()
+            .filter(|p| p.y <= low.y + 0.02 * side)
+            .collect();
         let sum: Vector3<f64> = near_end.iter().map(|p| p.coords).sum();
         let base = Point3::from(sum / near_end.len().max(1) as f64);
-        let positions: Vec<Point3<f64>> = given.iter().map(|p| Point3::from((p - base) / side)).collect();
+        let positions: Vec<Point3<f64>> = given
+            .iter()
+            .map(|p| Point3::from((p - base) / side))
+            .collect();
         let texture_mean = match &mesh.texture {
             Some((_, bytes)) => mean_colour(bytes).ok_or(TemplateFault::BadTexture)?,
             None => [1.0; 3],
@@ -140,10 +167,25 @@ impl Template {
                 *apex = *p;
             }
         }
-        let centre = Point3::from(positions.iter().map(|p| p.coords).sum::<Vector3<f64>>() / n as f64);
-        let uvs = if mesh.uvs.is_empty() { vec![[0.5; 2]; n] } else { mesh.uvs };
+        let centre =
+            Point3::from(positions.iter().map(|p| p.coords).sum::<Vector3<f64>>() / n as f64);
+        let uvs = if mesh.uvs.is_empty() {
+            vec![[0.5; 2]; n]
+        } else {
+            mesh.uvs
+        };
         let (indices, texture) = (mesh.indices, mesh.texture);
-        Ok(Self { positions, normals, uvs, indices, leaf_of, apices, centre, texture, texture_mean })
+        Ok(Self {
+            positions,
+            normals,
+            uvs,
+            indices,
+            leaf_of,
+            apices,
+            centre,
+            texture,
+            texture_mean,
+        })
     }
 
     /// Triangles of one cluster.
@@ -151,8 +193,8 @@ impl Template {
         self.indices.len() / 3
     }
 
-    /// Mean area of the cluster's silhouette over all directions at size 1, were no leaf before another (Cauchy): a quarter of
-    /// both faces' area.
+    /// Mean area of the cluster's silhouette over all directions at size 1, were no leaf before
+    /// another (Cauchy): a quarter of both faces' area.
     pub(super) fn mean_area(&self) -> f64 {
         let area = |t: &[u32]| {
             let [a, b, c] = [0, 1, 2].map(|k| self.positions[t[k] as usize]);
@@ -191,7 +233,9 @@ fn keep_used(mesh: &mut TemplateMesh) {
     for (next, (new, _)) in (0..).zip(new_index.iter_mut().zip(&used).filter(|(_, used)| **used)) {
         *new = next;
     }
-    mesh.indices.iter_mut().for_each(|i| *i = new_index[*i as usize]);
+    mesh.indices
+        .iter_mut()
+        .for_each(|i| *i = new_index[*i as usize]);
     fn only<T>(all: &mut Vec<T>, used: &[bool]) {
         let mut each = used.iter();
         all.retain(|_| each.next().is_none_or(|used| *used));
@@ -209,8 +253,13 @@ fn normals(mesh: &TemplateMesh, positions: &[Point3<f64>]) -> Vec<Vector3<f64>> 
         let face = (positions[b] - positions[a]).cross(&(positions[c] - positions[a]));
         [a, b, c].into_iter().for_each(|i| around[i] += face);
     }
-    let given = |i: usize| mesh.normals.get(i).and_then(|v| Vector3::from(v.map(f64::from)).try_normalize(1e-12));
-    let own = |(i, v): (usize, Vector3<f64>)| given(i).or(v.try_normalize(1e-12)).unwrap_or(Vector3::z());
+    let given = |i: usize| {
+        mesh.normals
+            .get(i)
+            .and_then(|v| Vector3::from(v.map(f64::from)).try_normalize(1e-12))
+    };
+    let own =
+        |(i, v): (usize, Vector3<f64>)| given(i).or(v.try_normalize(1e-12)).unwrap_or(Vector3::z());
     around.into_iter().enumerate().map(own).collect()
 }
 
@@ -226,7 +275,10 @@ fn pieces(n: usize, indices: &[u32]) -> Vec<u32> {
     }
     for t in indices.chunks_exact(3) {
         for k in [1, 2] {
-            let (a, b) = (find(&mut root, t[0] as usize), find(&mut root, t[k] as usize));
+            let (a, b) = (
+                find(&mut root, t[0] as usize),
+                find(&mut root, t[k] as usize),
+            );
             let (low, high) = (a.min(b), a.max(b));
             root[high] = low;
         }
@@ -247,7 +299,9 @@ fn pieces(n: usize, indices: &[u32]) -> Vec<u32> {
 
 /// Mean of what can be seen of a picture, 0 to 1; `None` if it cannot be read or is too large.
 fn mean_colour(bytes: &[u8]) -> Option<[f64; 3]> {
-    let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format().ok()?;
+    let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes))
+        .with_guessed_format()
+        .ok()?;
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(LARGEST_TEXTURE);
     limits.max_image_height = Some(LARGEST_TEXTURE);
@@ -257,9 +311,18 @@ fn mean_colour(bytes: &[u8]) -> Option<[f64; 3]> {
     for pixel in picture.pixels() {
         let [r, g, b, alpha] = pixel.0.map(f64::from);
         weight += alpha;
-        [r, g, b].iter().zip(&mut sum).for_each(|(c, s)| *s += alpha * c);
+        [r, g, b]
+            .iter()
+            .zip(&mut sum)
+            .for_each(|(c, s)| *s += alpha * c);
     }
-    Some(sum.map(|s| if weight > 0.0 { s / weight / 255.0 } else { 1.0 }))
+    Some(sum.map(|s| {
+        if weight > 0.0 {
+            s / weight / 255.0
+        } else {
+            1.0
+        }
+    }))
 }
 
 #[cfg(test)]
@@ -270,7 +333,11 @@ mod tests {
     fn our_cluster_is_five_leaves_with_a_texture() {
         let ours = Template::ours();
         assert_eq!((ours.triangles(), ours.apices.len()), (20, 5));
-        assert!(ours.texture.is_some() && ours.mean_area() > 0.1, "{}", ours.mean_area());
+        assert!(
+            ours.texture.is_some() && ours.mean_area() > 0.1,
+            "{}",
+            ours.mean_area()
+        );
         assert!(ours.normals.iter().all(|n| (n.norm() - 1.0).abs() < 1e-9));
     }
 
@@ -290,24 +357,44 @@ mod tests {
         assert_eq!(refused(|m| m.indices.clear()), TemplateFault::Empty);
         assert_eq!(refused(|m| m.indices[2] = 3), TemplateFault::Torn);
         assert_eq!(refused(|m| m.uvs.push([0.0; 2])), TemplateFault::Torn);
-        assert_eq!(refused(|m| m.positions[1][0] = f32::NAN), TemplateFault::NoNumbers);
+        assert_eq!(
+            refused(|m| m.positions[1][0] = f32::NAN),
+            TemplateFault::NoNumbers
+        );
         assert_eq!(refused(|m| m.positions.fill([1.0; 3])), TemplateFault::Flat);
-        assert_eq!(refused(|m| m.texture = Some(("image/png", vec![1, 2, 3]))), TemplateFault::BadTexture);
-        assert_eq!(refused(|m| m.indices = [0, 1, 2].repeat(5001)), TemplateFault::TooMany(5001));
+        assert_eq!(
+            refused(|m| m.texture = Some(("image/png", vec![1, 2, 3]))),
+            TemplateFault::BadTexture
+        );
+        assert_eq!(
+            refused(|m| m.indices = [0, 1, 2].repeat(5001)),
+            TemplateFault::TooMany(5001)
+        );
     }
 
-    /// Exporters write the vertices of a whole scene beside one leaf's triangles; a thousand leaves would carry them all.
+    /// Exporters write the vertices of a whole scene beside one leaf's triangles; a thousand leaves
+    /// would carry them all.
     #[test]
     fn vertices_without_a_triangle_are_left_out() {
         let mesh = TemplateMesh {
-            positions: vec![[f32::NAN; 3], [0.0, 0.0, 0.0], [9e9; 3], [3.0, 0.0, 0.0], [0.0, 4.0, 0.0], [5.0; 3]],
+            positions: vec![
+                [f32::NAN; 3],
+                [0.0, 0.0, 0.0],
+                [9e9; 3],
+                [3.0, 0.0, 0.0],
+                [0.0, 4.0, 0.0],
+                [5.0; 3],
+            ],
             normals: (0..6).map(|k| [0.0, 0.0, k as f32]).collect(),
             uvs: (0..6).map(|k| [k as f32, 0.0]).collect(),
             indices: vec![4, 1, 3, 5],
             texture: None,
         };
         let template = Template::new(mesh).unwrap();
-        assert_eq!((template.positions.len(), &template.indices[..]), (3, &[2, 0, 1][..]));
+        assert_eq!(
+            (template.positions.len(), &template.indices[..]),
+            (3, &[2, 0, 1][..])
+        );
         assert_eq!(template.uvs, [[1.0, 0.0], [3.0, 0.0], [4.0, 0.0]]);
         assert_eq!((template.normals.len(), template.apices.len()), (3, 1));
         assert!((template.positions[2] - template.positions[0]).norm() > 0.9);

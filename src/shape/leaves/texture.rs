@@ -8,8 +8,8 @@ const SIDE: u32 = 128;
 /// Side veins to either side of the midrib.
 const VEINS: f64 = 6.0;
 
-/// A leaf from its base (v = 1) to its tip (v = 0) as a PNG, all but grey: colour comes from the film. Its border is bled
-/// out, so that no seam is seen at the edge.
+/// A leaf from its base (v = 1) to its tip (v = 0) as a PNG, all but grey: colour comes from the
+/// film. Its border is bled out, so that no seam is seen at the edge.
 pub(super) fn png() -> Option<Vec<u8>> {
     let shade = |x: u32, y: u32| {
         let across = ((f64::from(x) + 0.5) / f64::from(SIDE) - 0.5).abs() * 2.0;
@@ -17,7 +17,10 @@ pub(super) fn png() -> Option<Vec<u8>> {
         // Side veins leave the midrib upwards and bend towards the tip.
         let phase = (along - 0.35 * across - 0.1 * across * across) * VEINS;
         let from_vein = (phase - phase.round()).abs() / VEINS;
-        let vein = (1.0 - from_vein / 0.014).max(0.0) * (1.0 - 0.6 * across) * (1.0 - along).min(0.25) * 4.0;
+        let vein = (1.0 - from_vein / 0.014).max(0.0)
+            * (1.0 - 0.6 * across)
+            * (1.0 - along).min(0.25)
+            * 4.0;
         let midrib = (1.0 - across / (0.05 * (1.25 - along))).max(0.0);
         let edge = ((across - 0.8) / 0.2).max(0.0);
         // Between two veins the blade bulges.
@@ -29,6 +32,8 @@ pub(super) fn png() -> Option<Vec<u8>> {
         Pixel([s as u8, s as u8, (0.96 * s) as u8])
     });
     let mut bytes = Vec::new();
-    picture.write_to(&mut Cursor::new(&mut bytes), ImageFormat::Png).ok()?;
+    picture
+        .write_to(&mut Cursor::new(&mut bytes), ImageFormat::Png)
+        .ok()?;
     Some(bytes)
 }

@@ -2,15 +2,15 @@
 
 use crate::model::{Outline, Skeleton};
 
-/// A branch covers what is nearer to it than this share of the shape's larger side: about as far as the leaves on it
-/// reach.
+/// A branch covers what is nearer to it than this share of the shape's larger side: about as far as
+/// the leaves on it reach.
 const REACH: f64 = 0.025;
-/// The shape is looked at in cells of several pixels where its picture has a longer side than this, px: the barest place is
-/// looked for anew after every branch.
+/// The shape is looked at in cells of several pixels where its picture has a longer side than this,
+/// px: the barest place is looked for anew after every branch.
 const LONGEST_SIDE: u32 = 640;
 
-/// Share of the pixels of `shape` that are within a fortieth of the shape's larger side of a branch or of the trunk, in the
-/// front projection: 0 to 1.
+/// Share of the pixels of `shape` that are within a fortieth of the shape's larger side of a branch
+/// or of the trunk, in the front projection: 0 to 1.
 pub fn coverage(skeleton: &Skeleton, shape: &Outline) -> f64 {
     let mut cover = Cover::of(shape);
     for node in &skeleton.nodes {
@@ -37,16 +37,30 @@ pub struct Cover {
 
 impl Cover {
     pub fn of(shape: &Outline) -> Self {
-        let larger = shape.bounds_px().map_or(0, |[left, top, right, bottom]| (right - left).max(bottom - top) + 1);
+        let larger = shape.bounds_px().map_or(0, |[left, top, right, bottom]| {
+            (right - left).max(bottom - top) + 1
+        });
         let size = shape.size;
         let cell = size.width.max(size.height).div_ceil(LONGEST_SIDE).max(1) as usize;
         let (width, height) = (size.width as usize / cell, size.height as usize / cell);
         // The pixel in the middle of a cell speaks for it.
-        let pixel = |k: usize| (k / width * cell + cell / 2) * size.width as usize + k % width * cell + cell / 2;
-        let bare: Vec<u8> = (0..width * height).map(|k| u8::from(shape.mask[pixel(k)] != 0)).collect();
+        let pixel = |k: usize| {
+            (k / width * cell + cell / 2) * size.width as usize + k % width * cell + cell / 2
+        };
+        let bare: Vec<u8> = (0..width * height)
+            .map(|k| u8::from(shape.mask[pixel(k)] != 0))
+            .collect();
         let all = bare.iter().filter(|b| **b != 0).count();
         let reach = (REACH * f64::from(larger) / cell as f64).max(1.0);
-        Self { cell, width, height, bare, bare_count: all, all, reach }
+        Self {
+            cell,
+            width,
+            height,
+            bare,
+            bare_count: all,
+            all,
+            reach,
+        }
     }
 
     /// Covered share, 0 to 1.
@@ -95,7 +109,8 @@ impl Cover {
             for u in columns.clone() {
                 let to = [u as f64 - a[0], v as f64 - a[1]];
                 let t = ((along[0] * to[0] + along[1] * to[1]) / length_sq).clamp(0.0, 1.0);
-                if (to[0] - t * along[0]).powi(2) + (to[1] - t * along[1]).powi(2) <= reach * reach {
+                if (to[0] - t * along[0]).powi(2) + (to[1] - t * along[1]).powi(2) <= reach * reach
+                {
                     each(v * self.width + u);
                 }
             }
@@ -107,24 +122,40 @@ impl Cover {
         (self.cell / 2) as f64
     }
 
-    /// The bare cell that is farthest from what is covered or outside (city blocks), those in `given_up` left out: its
-    /// middle, px. `None` if no cell is bare.
+    /// The bare cell that is farthest from what is covered or outside (city blocks), those in
+    /// `given_up` left out: its middle, px. `None` if no cell is bare.
     pub fn barest(&self, given_up: &[usize]) -> Option<[f64; 2]> {
         let (w, h) = (self.width, self.height);
-        let mut far: Vec<u32> = self.bare.iter().map(|b| if *b != 0 { u32::MAX } else { 0 }).collect();
+        let mut far: Vec<u32> = self
+            .bare
+            .iter()
+            .map(|b| if *b != 0 { u32::MAX } else { 0 })
+            .collect();
         given_up.iter().for_each(|&k| far[k] = 0);
         let edge = |u: usize, v: usize| u == 0 || v == 0 || u + 1 == w || v + 1 == h;
         for k in 0..far.len() {
             let (u, v) = (k % w, k / w);
-            let before = if edge(u, v) { 0 } else { far[k - 1].min(far[k - w]) };
+            let before = if edge(u, v) {
+                0
+            } else {
+                far[k - 1].min(far[k - w])
+            };
             far[k] = far[k].min(before.saturating_add(1));
         }
         for k in (0..far.len()).rev() {
             let (u, v) = (k % w, k / w);
-            let after = if edge(u, v) { 0 } else { far[k + 1].min(far[k + w]) };
+            let after = if edge(u, v) {
+                0
+            } else {
+                far[k + 1].min(far[k + w])
+            };
             far[k] = far[k].min(after.saturating_add(1));
         }
-        let (k, _) = far.iter().enumerate().filter(|(_, d)| **d > 0).max_by(|a, b| a.1.cmp(b.1).then(b.0.cmp(&a.0)))?;
+        let (k, _) = far
+            .iter()
+            .enumerate()
+            .filter(|(_, d)| **d > 0)
+            .max_by(|a, b| a.1.cmp(b.1).then(b.0.cmp(&a.0)))?;
         Some([k % w, k / w].map(|x| (x * self.cell) as f64 + self.middle()))
     }
 }
@@ -137,14 +168,25 @@ mod tests {
     /// A disc, four fifths as high as the picture, in a picture of `side` px.
     fn disc(side: u32) -> Outline {
         let inside = |k: u32| {
-            let (x, y) = (f64::from(k % side) - f64::from(side) / 2.0, f64::from(k / side) - f64::from(side) / 2.0);
+            let (x, y) = (
+                f64::from(k % side) - f64::from(side) / 2.0,
+                f64::from(k / side) - f64::from(side) / 2.0,
+            );
             x.hypot(y) <= 0.4 * f64::from(side)
         };
-        let mask = (0..side * side).map(|k| u8::from(inside(k)) * 255).collect();
-        Outline { size: Size::new(side, side), mask, polygon_px: Vec::new(), matte: None }
+        let mask = (0..side * side)
+            .map(|k| u8::from(inside(k)) * 255)
+            .collect();
+        Outline {
+            size: Size::new(side, side),
+            mask,
+            polygon_px: Vec::new(),
+            matte: None,
+        }
     }
 
-    /// A film in 4K has nine times the pixels of one in HD, and every branch that is added looks at all.
+    /// A film in 4K has nine times the pixels of one in HD, and every branch that is added looks at
+    /// all.
     #[test]
     fn a_large_picture_is_looked_at_coarsely_and_gives_the_same() {
         let of = |side: u32| {
@@ -154,10 +196,17 @@ mod tests {
             cover.add([[0.3 * px, 0.5 * px], [0.7 * px, 0.5 * px]]);
             (cover.bare.len(), barest, cover.share())
         };
-        let ((cells, barest, share), (cells_large, barest_large, share_large)) = (of(600), of(4200));
+        let ((cells, barest, share), (cells_large, barest_large, share_large)) =
+            (of(600), of(4200));
         assert_eq!((cells, cells_large), (600 * 600, 600 * 600));
-        assert!((share / share_large - 1.0).abs() < 0.1 && share > 0.03, "{share} and {share_large}");
-        assert!((0..2).all(|c| (barest[c] - barest_large[c]).abs() < 0.01), "{barest:?} and {barest_large:?}");
+        assert!(
+            (share / share_large - 1.0).abs() < 0.1 && share > 0.03,
+            "{share} and {share_large}"
+        );
+        assert!(
+            (0..2).all(|c| (barest[c] - barest_large[c]).abs() < 0.01),
+            "{barest:?} and {barest_large:?}"
+        );
         assert!((0..2).all(|c| (barest[c] - 0.5).abs() < 0.01), "{barest:?}");
     }
 }

@@ -21,19 +21,24 @@ pub struct Pruned {
     pub shortened: usize,
 }
 
-/// Keeps of every branch what is inside of `envelope`, from its parent up; what grows beyond the border is gone, and with a
-/// measured branch its copies. The trunk (levels 0 and 1) stays, with its top inside.
+/// Keeps of every branch what is inside of `envelope`, from its parent up; what grows beyond the
+/// border is gone, and with a measured branch its copies. The trunk (levels 0 and 1) stays, with
+/// its top inside.
 pub fn cut(skeleton: &Skeleton, envelope: &Envelope) -> Result<Pruned, TopiaryError> {
     let mut nodes = skeleton.nodes.clone();
     // Whether a node is left, and whether anything may grow from it.
     let (mut is_left, mut goes_on) = (vec![true; nodes.len()], vec![true; nodes.len()]);
     let mut shortened = 0;
     for i in 0..nodes.len() {
-        let (at, Some(parent)) = (nodes[i].position, nodes[i].parent.map(|p| p.index())) else { continue };
+        let (at, Some(parent)) = (nodes[i].position, nodes[i].parent.map(|p| p.index())) else {
+            continue;
+        };
         let from = nodes[parent].position;
         let original = nodes[i].copy_of.map_or(i, |o| o.index());
         let is_trunk = nodes[i].level < 2;
-        is_left[i] = goes_on[parent] && is_left[original] && (is_trunk || at.coords.iter().all(|x| x.is_finite()));
+        is_left[i] = goes_on[parent]
+            && is_left[original]
+            && (is_trunk || at.coords.iter().all(|x| x.is_finite()));
         if !is_left[i] {
             goes_on[i] = false;
         } else if is_trunk {
@@ -53,12 +58,23 @@ pub fn cut(skeleton: &Skeleton, envelope: &Envelope) -> Result<Pruned, TopiaryEr
         node
     });
     let nodes = nodes.collect();
-    Ok(Pruned { skeleton: Skeleton { nodes, ..skeleton.clone() }, kept, shortened })
+    Ok(Pruned {
+        skeleton: Skeleton {
+            nodes,
+            ..skeleton.clone()
+        },
+        kept,
+        shortened,
+    })
 }
 
-/// Where the trunk ends: at its top if that is inside, else where it leaves the shape; a shape that begins above it is
-/// led on to.
-fn trunk_top(from: &Point3<f64>, at: &Point3<f64>, envelope: &Envelope) -> Result<Point3<f64>, TopiaryError> {
+/// Where the trunk ends: at its top if that is inside, else where it leaves the shape; a shape that
+/// begins above it is led on to.
+fn trunk_top(
+    from: &Point3<f64>,
+    at: &Point3<f64>,
+    envelope: &Envelope,
+) -> Result<Point3<f64>, TopiaryError> {
     if envelope.contains(at) {
         return Ok(*at);
     }
@@ -68,11 +84,19 @@ fn trunk_top(from: &Point3<f64>, at: &Point3<f64>, envelope: &Envelope) -> Resul
     }
     let led_on = envelope.clamp(at);
     let near = (led_on - at).norm() <= LED_ON * envelope.height() && envelope.contains(&led_on);
-    if near { Ok(led_on) } else { Err(TopiaryError::OffTree) }
+    if near {
+        Ok(led_on)
+    } else {
+        Err(TopiaryError::OffTree)
+    }
 }
 
 /// Share of the way from `from` to `at` that lies inside without a break.
 fn inside_share(from: &Point3<f64>, at: &Point3<f64>, envelope: &Envelope) -> f64 {
-    let inside = |k: &u32| envelope.contains(&(from + (at - from) * (f64::from(*k) / f64::from(STEPS))));
-    (1..=STEPS).take_while(inside).last().map_or(0.0, |k| f64::from(k) / f64::from(STEPS))
+    let inside =
+        |k: &u32| envelope.contains(&(from + (at - from) * (f64::from(*k) / f64::from(STEPS))));
+    (1..=STEPS)
+        .take_while(inside)
+        .last()
+        .map_or(0.0, |k| f64::from(k) / f64::from(STEPS))
 }

@@ -8,7 +8,9 @@ const INSIDE: u8 = 128;
 /// Why a drawn shape is not taken.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TopiaryError {
-    #[error("has no transparent pixel, so that the shape fills the whole picture; save it on a transparent background")]
+    #[error(
+        "has no transparent pixel, so that the shape fills the whole picture; save it on a transparent background"
+    )]
     NoAlpha,
     #[error("is empty: every pixel is transparent; draw the shape opaque")]
     Empty,
@@ -37,7 +39,9 @@ impl Drawn {
     /// # Errors
     /// It is no image, has no transparent pixel, or only such.
     pub fn of_image(bytes: &[u8]) -> Result<Self, TopiaryError> {
-        let image = image::load_from_memory(bytes).map_err(|e| TopiaryError::NoImage(e.to_string()))?.into_rgba8();
+        let image = image::load_from_memory(bytes)
+            .map_err(|e| TopiaryError::NoImage(e.to_string()))?
+            .into_rgba8();
         Self::of_rgba(Size::new(image.width(), image.height()), image.as_raw())
     }
 
@@ -46,17 +50,32 @@ impl Drawn {
     /// # Errors
     /// It has no transparent pixel, or only such.
     pub fn of_rgba(size: Size, rgba: &[u8]) -> Result<Self, TopiaryError> {
-        if rgba.is_empty() || rgba.len() as u64 != 4 * u64::from(size.width) * u64::from(size.height) {
-            return Err(TopiaryError::NotWhole { found: rgba.len(), size });
+        if rgba.is_empty()
+            || rgba.len() as u64 != 4 * u64::from(size.width) * u64::from(size.height)
+        {
+            return Err(TopiaryError::NotWhole {
+                found: rgba.len(),
+                size,
+            });
         }
         let inside: Vec<bool> = rgba.chunks_exact(4).map(|p| p[3] >= INSIDE).collect();
         if rgba.chunks_exact(4).all(|p| p[3] == u8::MAX) {
             return Err(TopiaryError::NoAlpha);
         }
         let mask: Vec<u8> = inside.iter().map(|i| u8::from(*i) * 255).collect();
-        let bounds =
-            Outline { size, mask, polygon_px: Vec::new(), matte: None }.bounds_px().ok_or(TopiaryError::Empty)?;
-        Ok(Self { size, inside, bounds })
+        let bounds = Outline {
+            size,
+            mask,
+            polygon_px: Vec::new(),
+            matte: None,
+        }
+        .bounds_px()
+        .ok_or(TopiaryError::Empty)?;
+        Ok(Self {
+            size,
+            inside,
+            bounds,
+        })
     }
 
     fn contains(&self, u: i64, v: i64) -> bool {
@@ -65,9 +84,9 @@ impl Drawn {
             && self.inside[(v * i64::from(self.size.width) + u) as usize]
     }
 
-    /// The shape in the picture of `outline`: pixel on pixel if it is of the picture's size; else scaled, in its own
-    /// proportions, to the box around the tree's outline, with the middle of its lowest row on the tree's foot. What comes
-    /// to lie outside of the picture is lost.
+    /// The shape in the picture of `outline`: pixel on pixel if it is of the picture's size; else
+    /// scaled, in its own proportions, to the box around the tree's outline, with the middle of its
+    /// lowest row on the tree's foot. What comes to lie outside of the picture is lost.
     ///
     /// # Errors
     /// Nothing of it lies in the picture.
@@ -79,16 +98,24 @@ impl Drawn {
             let [left, top, right, bottom] = outline.bounds_px().ok_or(TopiaryError::OffTree)?;
             self.scaled(size, [right - left + 1, bottom - top + 1], foot_px)
         };
-        let placed = Outline { size, mask, polygon_px: Vec::new(), matte: None };
-        placed.bounds_px().map_or(Err(TopiaryError::OffTree), |_| Ok(placed))
+        let placed = Outline {
+            size,
+            mask,
+            polygon_px: Vec::new(),
+            matte: None,
+        };
+        placed
+            .bounds_px()
+            .map_or(Err(TopiaryError::OffTree), |_| Ok(placed))
     }
 
     fn scaled(&self, size: Size, into: [u32; 2], foot_px: [f64; 2]) -> Vec<u8> {
         let [left, top, right, bottom] = self.bounds;
-        let scale =
-            (f64::from(into[0]) / f64::from(right - left + 1)).min(f64::from(into[1]) / f64::from(bottom - top + 1));
+        let scale = (f64::from(into[0]) / f64::from(right - left + 1))
+            .min(f64::from(into[1]) / f64::from(bottom - top + 1));
         let lowest = || (left..=right).filter(|&u| self.contains(u.into(), bottom.into()));
-        let middle = f64::from(lowest().min().unwrap_or(left) + lowest().max().unwrap_or(right)) / 2.0;
+        let middle =
+            f64::from(lowest().min().unwrap_or(left) + lowest().max().unwrap_or(right)) / 2.0;
         let inside = |u: u32, v: u32| {
             let at = [
                 middle + (f64::from(u) - foot_px[0]) / scale,

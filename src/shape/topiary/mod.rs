@@ -13,7 +13,8 @@ use crate::config;
 use crate::model::{JointPose, NodeId, Outline, Pose, Skeleton};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
-/// A shape that leaves out no more of the outline than this share holds the tree: nobody draws to the last pixel.
+/// A shape that leaves out no more of the outline than this share holds the tree: nobody draws to
+/// the last pixel.
 const LARGER: f64 = 0.01;
 
 /// A tree that was cut to a shape.
@@ -23,7 +24,8 @@ pub struct Topiary {
     /// The shape where it stands in the picture.
     pub shape: Outline,
     pub cut: Cut,
-    /// For every node the measured node of the tree before, whose motion against its own parent it repeats.
+    /// For every node the measured node of the tree before, whose motion against its own parent it
+    /// repeats.
     pub moves_as: Vec<NodeId>,
 }
 
@@ -40,8 +42,9 @@ pub struct Cut {
     pub coverage: f64,
 }
 
-/// Cuts `skeleton` to what of it is inside `drawn`, pushes the rest to fill the shape, and adds smaller copies of the
-/// tree's own subtrees where the shape is still bare. The trunk stays. Chance (which of the subtrees, how deep) comes from
+/// Cuts `skeleton` to what of it is inside `drawn`, pushes the rest to fill the shape, and adds
+/// smaller copies of the tree's own subtrees where the shape is still bare. The trunk stays. Chance
+/// (which of the subtrees, how deep) comes from
 /// `seed`. A shape that holds the whole `outline` of the tree changes nothing (Zeng section 6.4).
 ///
 /// # Errors
@@ -56,15 +59,33 @@ pub fn topiary(
     let shape = drawn.placed(outline, skeleton.foot_px)?;
     let itself = |i: usize| skeleton.nodes[i].copy_of.unwrap_or(NodeId(i as u32));
     let tree = outline.mask.iter().filter(|m| **m != 0).count();
-    let outside = outline.mask.iter().zip(&shape.mask).filter(|(tree, shape)| **tree != 0 && **shape == 0).count();
+    let outside = outline
+        .mask
+        .iter()
+        .zip(&shape.mask)
+        .filter(|(tree, shape)| **tree != 0 && **shape == 0)
+        .count();
     if outside as f64 <= LARGER * tree as f64 {
         let coverage = coverage(skeleton, &shape);
         let moves_as = (0..skeleton.nodes.len()).map(itself).collect();
-        let cut = Cut { larger: true, coverage, ..Cut::default() };
-        return Ok(Topiary { skeleton: skeleton.clone(), shape, cut, moves_as });
+        let cut = Cut {
+            larger: true,
+            coverage,
+            ..Cut::default()
+        };
+        return Ok(Topiary {
+            skeleton: skeleton.clone(),
+            shape,
+            cut,
+            moves_as,
+        });
     }
     let envelope = Envelope::of_drawn(&shape, skeleton.foot_px);
-    let cut::Pruned { skeleton: mut pruned, kept, shortened } = cut::cut(skeleton, &envelope)?;
+    let cut::Pruned {
+        skeleton: mut pruned,
+        kept,
+        shortened,
+    } = cut::cut(skeleton, &envelope)?;
     let was_trunk = is_trunk(skeleton);
     let trunk: Vec<bool> = kept.iter().map(|&i| was_trunk[i]).collect();
     fuse(&mut pruned, &trunk, &envelope, settings);
@@ -84,14 +105,23 @@ pub fn topiary(
         grown: pruned.nodes.len() - left,
         coverage: coverage(&pruned, &shape),
     };
-    Ok(Topiary { moves_as: (0..pruned.nodes.len()).map(moves_as).collect(), skeleton: pruned, shape, cut })
+    Ok(Topiary {
+        moves_as: (0..pruned.nodes.len()).map(moves_as).collect(),
+        skeleton: pruned,
+        shape,
+        cut,
+    })
 }
 
 impl Topiary {
-    /// The pose of the cut tree in a frame in which the tree before, `skeleton`, stands as `whole` says. Every branch turns
-    /// against its parent as the measured one does of which it is a copy, in its own plane.
+    /// The pose of the cut tree in a frame in which the tree before, `skeleton`, stands as `whole`
+    /// says. Every branch turns against its parent as the measured one does of which it is a copy,
+    /// in its own plane.
     pub fn pose(&self, skeleton: &Skeleton, whole: &Pose) -> Pose {
-        let still = JointPose { position: Point3::origin(), rotation: UnitQuaternion::identity() };
+        let still = JointPose {
+            position: Point3::origin(),
+            rotation: UnitQuaternion::identity(),
+        };
         let rotation = |i: usize| whole.joints.get(i).map_or(still.rotation, |j| j.rotation);
         let mut joints: Vec<JointPose> = Vec::with_capacity(self.skeleton.nodes.len());
         for (node, original) in self.skeleton.nodes.iter().zip(&self.moves_as) {
@@ -99,14 +129,27 @@ impl Topiary {
                 joints.push(whole.joints.first().copied().unwrap_or(still));
                 continue;
             };
-            let above = skeleton.nodes.get(original.index()).and_then(|n| n.parent).map_or(0, |p| p.index());
+            let above = skeleton
+                .nodes
+                .get(original.index())
+                .and_then(|n| n.parent)
+                .map_or(0, |p| p.index());
             let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), node.plane_angle);
-            let own = turn * (rotation(above).inverse() * rotation(original.index())) * turn.inverse();
+            let own =
+                turn * (rotation(above).inverse() * rotation(original.index())) * turn.inverse();
             let parent_joint = joints[parent.index()];
-            let rotation = UnitQuaternion::new_normalize((parent_joint.rotation * own).into_inner());
+            let rotation =
+                UnitQuaternion::new_normalize((parent_joint.rotation * own).into_inner());
             let way = node.position - self.skeleton.nodes[parent.index()].position;
-            joints.push(JointPose { position: parent_joint.position + rotation * way, rotation });
+            joints.push(JointPose {
+                position: parent_joint.position + rotation * way,
+                rotation,
+            });
         }
-        Pose { frame: whole.frame, time_s: whole.time_s, joints }
+        Pose {
+            frame: whole.frame,
+            time_s: whole.time_s,
+            joints,
+        }
     }
 }

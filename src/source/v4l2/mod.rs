@@ -1,5 +1,5 @@
-//! A V4L2 camera: one negotiation of the format, then frames from mapped buffers, each copied once. One that was lost is
-//! found again by its identity, and must grant what it granted before.
+//! A V4L2 camera: one negotiation of the format, then frames from mapped buffers, each copied once.
+//! One that was lost is found again by its identity, and must grant what it granted before.
 
 mod offers;
 mod session;
@@ -21,7 +21,8 @@ use std::time::{Duration, Instant};
 use v4l::buffer::Flags;
 use v4l::capability::{Capabilities, Flags as Caps};
 
-/// The first picture of this driver is what happens to lie in its buffer, with a fresh time on it; and it does not count.
+/// The first picture of this driver is what happens to lie in its buffer, with a fresh time on it;
+/// and it does not count.
 const LOOPBACK: &str = "v4l2 loopback";
 
 /// A camera that films, or did until a moment ago.
@@ -55,11 +56,22 @@ struct Opened {
 impl Camera {
     pub(super) fn open(path: &Path, config: &config::Camera) -> Result<Self, SourceError> {
         let asked = Wish::of(config);
-        let Opened { caps, negotiated, device } = open(path, &asked)?;
-        let Negotiated { granted, stride, modes } = negotiated;
+        let Opened {
+            caps,
+            negotiated,
+            device,
+        } = open(path, &asked)?;
+        let Negotiated {
+            granted,
+            stride,
+            modes,
+        } = negotiated;
         if !asked.is_met_by(&granted) && !config.accept_format {
             let what = refusal(&asked, &granted, &modes);
-            return Err(SourceError::BadFormat { input: path.display().to_string(), what });
+            return Err(SourceError::BadFormat {
+                input: path.display().to_string(),
+                what,
+            });
         }
         let session = start(path, &device)?;
         let loopback = caps.driver == LOOPBACK;
@@ -91,10 +103,15 @@ impl Camera {
         match session.wait(until, &self.stop) {
             Ok(Waited::Ready) => Ok(Some(())),
             Ok(Waited::Stopped) => Ok(None),
-            Ok(Waited::Silent) => {
-                Err(SourceError::Timeout { input: self.shown(), seconds: self.timeout.as_secs_f64() })
-            }
-            Err(e) => Err(SourceError::of_driver(&self.path, "waiting for a frame", &e)),
+            Ok(Waited::Silent) => Err(SourceError::Timeout {
+                input: self.shown(),
+                seconds: self.timeout.as_secs_f64(),
+            }),
+            Err(e) => Err(SourceError::of_driver(
+                &self.path,
+                "waiting for a frame",
+                &e,
+            )),
         }
     }
 
@@ -120,20 +137,30 @@ impl Camera {
                 self.leave_out -= 1;
                 continue;
             }
-            // A damaged frame's number is not taken in: it shows up as a hole in the count, as frames that were lost do,
-            // and is told from them by the count of damaged ones.
+            // A damaged frame's number is not taken in: it shows up as a hole in the count, as
+            // frames that were lost do, and is told from them by the count of damaged ones.
             let whole = !meta.flags.contains(Flags::ERROR);
-            let bytes = whole.then(|| without_padding(used, self.granted.format, self.granted.size, self.stride));
+            let bytes = whole.then(|| {
+                without_padding(used, self.granted.format, self.granted.size, self.stride)
+            });
             let Some(bytes) = bytes.flatten() else {
                 self.damaged += 1;
                 continue;
             };
-            let Some((sequence, sensor_time_s)) = self.clock.take(meta, self.opened.elapsed().as_secs_f64()) else {
+            let Some((sequence, sensor_time_s)) =
+                self.clock.take(meta, self.opened.elapsed().as_secs_f64())
+            else {
                 self.stale += 1;
                 continue;
             };
             let (size, format) = (self.granted.size, self.granted.format);
-            return Ok(Some(RawFrame { sequence, sensor_time_s, size, format, bytes }));
+            return Ok(Some(RawFrame {
+                sequence,
+                sensor_time_s,
+                size,
+                format,
+                bytes,
+            }));
         }
     }
 }
@@ -141,7 +168,10 @@ impl Camera {
 impl Source for Camera {
     fn next_frame(&mut self) -> Result<Option<RawFrame>, SourceError> {
         let Some(mut session) = self.session.take() else {
-            return Err(SourceError::Disconnected { input: self.shown(), reason: "it is closed".into() });
+            return Err(SourceError::Disconnected {
+                input: self.shown(),
+                reason: "it is closed".into(),
+            });
         };
         let next = self.next_of(&mut session);
         // After an error the device is closed, so that it can go and come back.
@@ -156,11 +186,25 @@ impl Source for Camera {
     fn reopen(&mut self) -> Result<(), SourceError> {
         self.session = None;
         let hint = "plug it in again";
-        let path = self.known.find().ok_or_else(|| SourceError::Absent { input: self.shown(), hint })?;
-        // Exactly what was granted, and not what was asked for: the pictures must stay as they were.
-        let Granted { format, size, rate_hz } = self.granted;
-        let wish = Wish { format: Some(format), size, rate_hz: rate_hz.unwrap_or(self.asked.rate_hz) };
-        let Opened { negotiated, device, .. } = open(&path, &wish)?;
+        let path = self.known.find().ok_or_else(|| SourceError::Absent {
+            input: self.shown(),
+            hint,
+        })?;
+        // Exactly what was granted, and not what was asked for: the pictures must stay as they
+        // were.
+        let Granted {
+            format,
+            size,
+            rate_hz,
+        } = self.granted;
+        let wish = Wish {
+            format: Some(format),
+            size,
+            rate_hz: rate_hz.unwrap_or(self.asked.rate_hz),
+        };
+        let Opened {
+            negotiated, device, ..
+        } = open(&path, &wish)?;
         same_again(&path, &self.granted, &negotiated.granted)?;
         self.stride = negotiated.stride.max(line_bytes(format, size));
         self.session = Some(start(&path, &device)?);
@@ -179,32 +223,59 @@ impl Source for Camera {
     }
 
     fn describe(&self) -> SourceInfo {
-        describe(&self.path, &self.name, &self.known, &self.asked, &self.granted)
+        describe(
+            &self.path,
+            &self.name,
+            &self.known,
+            &self.asked,
+            &self.granted,
+        )
     }
 
     fn health(&self) -> Health {
-        Health { damaged: self.damaged, stale: self.stale, clock: self.clock.kind() }
+        Health {
+            damaged: self.damaged,
+            stale: self.stale,
+            clock: self.clock.kind(),
+        }
     }
 }
 
 /// Opens the device and negotiates.
 fn open(path: &Path, wish: &Wish) -> Result<Opened, SourceError> {
-    let bad = |what: String| SourceError::BadFormat { input: path.display().to_string(), what };
+    let bad = |what: String| SourceError::BadFormat {
+        input: path.display().to_string(),
+        what,
+    };
     let failed = |doing: &'static str| move |e: io::Error| SourceError::of_driver(path, doing, &e);
     let device = v4l::Device::with_path(path).map_err(failed("opening it"))?;
-    let caps = device.query_caps().map_err(failed("asking for its abilities"))?;
-    if !caps.capabilities.contains(Caps::VIDEO_CAPTURE | Caps::STREAMING) {
+    let caps = device
+        .query_caps()
+        .map_err(failed("asking for its abilities"))?;
+    if !caps
+        .capabilities
+        .contains(Caps::VIDEO_CAPTURE | Caps::STREAMING)
+    {
         let what = "it does not film (or nothing feeds it yet); `arborcam devices` lists what does";
         return Err(bad(what.to_owned()));
     }
     let negotiated = negotiate(&device, wish, is_usb(&caps)).map_err(|e| match e {
-        Ok(name) => bad(format!("it delivers {name}, which is none of the formats that can be read")),
+        Ok(name) => bad(format!(
+            "it delivers {name}, which is none of the formats that can be read"
+        )),
         Err(e) => failed("setting the picture format")(e),
     })?;
     if !negotiated.granted.size.width.is_multiple_of(2) {
-        return Err(bad(format!("its pictures have an odd width ({})", negotiated.granted.size)));
+        return Err(bad(format!(
+            "its pictures have an odd width ({})",
+            negotiated.granted.size
+        )));
     }
-    Ok(Opened { caps, negotiated, device })
+    Ok(Opened {
+        caps,
+        negotiated,
+        device,
+    })
 }
 
 fn start(path: &Path, device: &v4l::Device) -> Result<Session, SourceError> {
@@ -227,7 +298,11 @@ fn refusal(asked: &Wish, granted: &Granted, modes: &[Mode]) -> String {
     }
     sizes.sort_unstable_by_key(|s| std::cmp::Reverse(s.area()));
     let listed: Vec<String> = sizes.iter().take(LISTED).map(Size::to_string).collect();
-    let more = if listed.is_empty() { String::new() } else { format!(" (it lists {})", listed.join(", ")) };
+    let more = if listed.is_empty() {
+        String::new()
+    } else {
+        format!(" (it lists {})", listed.join(", "))
+    };
     format!(
         "asked for {asked}, it offers {granted}{more}; take that with --accept-format, or set camera.format, width, height and \
          rate_hz to what `arborcam devices` lists"
@@ -248,23 +323,43 @@ pub(super) struct Prospect {
 pub(super) fn prospect(path: &Path, config: &config::Camera) -> Result<Prospect, SourceError> {
     let failed = |doing: &'static str| move |e: io::Error| SourceError::of_driver(path, doing, &e);
     let device = v4l::Device::with_path(path).map_err(failed("opening it"))?;
-    let caps = device.query_caps().map_err(failed("asking for its abilities"))?;
-    let films = caps.capabilities.contains(Caps::VIDEO_CAPTURE | Caps::STREAMING);
+    let caps = device
+        .query_caps()
+        .map_err(failed("asking for its abilities"))?;
+    let films = caps
+        .capabilities
+        .contains(Caps::VIDEO_CAPTURE | Caps::STREAMING);
     let wish = Wish::of(config);
-    let modes = if films { offers::modes(&device, &wish) } else { Vec::new() };
+    let modes = if films {
+        offers::modes(&device, &wish)
+    } else {
+        Vec::new()
+    };
     let chosen = choose(&modes, &wish, is_usb(&caps));
     let text = |s: &str| s.trim().to_owned();
-    Ok(Prospect { card: text(&caps.card), driver: text(&caps.driver), bus: text(&caps.bus), films, modes, chosen })
+    Ok(Prospect {
+        card: text(&caps.card),
+        driver: text(&caps.driver),
+        bus: text(&caps.bus),
+        films,
+        modes,
+        chosen,
+    })
 }
 
-/// The picture without what the driver puts at the end of each line; `None` if there is too little of it.
+/// The picture without what the driver puts at the end of each line; `None` if there is too little
+/// of it.
 fn without_padding(used: &[u8], format: PixelFormat, size: Size, stride: usize) -> Option<Vec<u8>> {
     if format == PixelFormat::Mjpeg {
         return (!used.is_empty()).then(|| used.to_vec());
     }
     let line = line_bytes(format, size);
     let rows = size.height as usize;
-    let height = if format == PixelFormat::Nv12 { rows + rows / 2 } else { rows };
+    let height = if format == PixelFormat::Nv12 {
+        rows + rows / 2
+    } else {
+        rows
+    };
     // The last line's padding need not be there.
     if height == 0 || used.len() < stride * (height - 1) + line {
         return None;
@@ -273,7 +368,9 @@ fn without_padding(used: &[u8], format: PixelFormat, size: Size, stride: usize) 
         return Some(used[..line * height].to_vec());
     }
     let mut bytes = Vec::with_capacity(line * height);
-    used.chunks(stride).take(height).for_each(|padded| bytes.extend_from_slice(&padded[..line]));
+    used.chunks(stride)
+        .take(height)
+        .for_each(|padded| bytes.extend_from_slice(&padded[..line]));
     Some(bytes)
 }
 
@@ -298,8 +395,14 @@ mod tests {
         let padded = [1, 2, 3, 4, 9, 9, 5, 6, 7, 8];
         let whole = without_padding(&padded, PixelFormat::Yuyv, size, 6);
         assert_eq!(whole.as_deref(), Some(&[1, 2, 3, 4, 5, 6, 7, 8][..]));
-        assert_eq!(without_padding(&padded[..9], PixelFormat::Yuyv, size, 6), None);
-        assert_eq!(without_padding(&padded[..4], PixelFormat::Mjpeg, size, 0).map(|b| b.len()), Some(4));
+        assert_eq!(
+            without_padding(&padded[..9], PixelFormat::Yuyv, size, 6),
+            None
+        );
+        assert_eq!(
+            without_padding(&padded[..4], PixelFormat::Mjpeg, size, 0).map(|b| b.len()),
+            Some(4)
+        );
         assert_eq!(without_padding(&[], PixelFormat::Mjpeg, size, 0), None);
     }
 }

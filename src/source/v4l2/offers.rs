@@ -11,7 +11,8 @@ use v4l::video::Capture;
 use v4l::video::capture::Parameters;
 use v4l::{Device, Format, FourCC};
 
-/// Tried in this order where a device lists nothing: compressed first, as such devices are mostly old webcams.
+/// Tried in this order where a device lists nothing: compressed first, as such devices are mostly
+/// old webcams.
 const UNLISTED: [PixelFormat; 6] = [
     PixelFormat::Mjpeg,
     PixelFormat::Yuyv,
@@ -23,7 +24,9 @@ const UNLISTED: [PixelFormat; 6] = [
 
 fn fourcc(format: PixelFormat) -> FourCC {
     let mut repr = [b' '; 4];
-    repr.iter_mut().zip(format.fourcc().bytes()).for_each(|(to, from)| *to = from);
+    repr.iter_mut()
+        .zip(format.fourcc().bytes())
+        .for_each(|(to, from)| *to = from);
     FourCC::new(&repr)
 }
 
@@ -32,16 +35,22 @@ fn hz(interval: Fraction) -> Option<f64> {
     (hz.is_finite() && hz > 0.0).then_some(hz)
 }
 
-/// All that the device lists and we can read. Of a range the size or rate nearest to `wish` stands for all, beside its
-/// ends.
+/// All that the device lists and we can read. Of a range the size or rate nearest to `wish` stands
+/// for all, beside its ends.
 pub(super) fn modes(device: &Device, wish: &Wish) -> Vec<Mode> {
     let mut modes = Vec::new();
     let listed = device.enum_formats().unwrap_or_default();
-    let formats = listed.iter().filter_map(|f| Some((f.fourcc, PixelFormat::from_fourcc(f.fourcc.str().ok()?)?)));
+    let formats = listed
+        .iter()
+        .filter_map(|f| Some((f.fourcc, PixelFormat::from_fourcc(f.fourcc.str().ok()?)?)));
     for (code, format) in formats {
         for size in sizes(device, code, wish.size) {
             let rates_hz = rates(device, code, size, wish.rate_hz);
-            modes.push(Mode { format, size, rates_hz });
+            modes.push(Mode {
+                format,
+                size,
+                rates_hz,
+            });
         }
     }
     modes
@@ -77,7 +86,10 @@ fn sizes(device: &Device, code: FourCC, wish: Size) -> Vec<Size> {
 
 fn rates(device: &Device, code: FourCC, size: Size, wish_hz: f64) -> Vec<f64> {
     let mut rates = Vec::new();
-    for listed in device.enum_frameintervals(code, size.width, size.height).unwrap_or_default() {
+    for listed in device
+        .enum_frameintervals(code, size.width, size.height)
+        .unwrap_or_default()
+    {
         match listed.interval {
             FrameIntervalEnum::Discrete(interval) => rates.extend(hz(interval)),
             FrameIntervalEnum::Stepwise(s) => {
@@ -101,11 +113,17 @@ pub(super) struct Negotiated {
     pub modes: Vec<Mode>,
 }
 
-/// Asks for the best of what the device lists and reads back what it makes of it. `Err(Ok(name))` where that is a format
-/// of this name, which we cannot read.
-pub(super) fn negotiate(device: &Device, wish: &Wish, usb: bool) -> Result<Negotiated, Result<String, io::Error>> {
+/// Asks for the best of what the device lists and reads back what it makes of it. `Err(Ok(name))`
+/// where that is a format of this name, which we cannot read.
+pub(super) fn negotiate(
+    device: &Device,
+    wish: &Wish,
+    usb: bool,
+) -> Result<Negotiated, Result<String, io::Error>> {
     let modes = modes(device, wish);
-    let ask = |format, size: Size| device.set_format(&Format::new(size.width, size.height, fourcc(format)));
+    let ask = |format, size: Size| {
+        device.set_format(&Format::new(size.width, size.height, fourcc(format)))
+    };
     let granted = match choose(&modes, wish, usb) {
         Some((best, _)) => ask(best.format, best.size),
         None => {
@@ -128,10 +146,17 @@ pub(super) fn negotiate(device: &Device, wish: &Wish, usb: bool) -> Result<Negot
     };
     // Many devices have no rate to set; the frames' own times tell what it is.
     let _ = device.set_params(&Parameters::new(interval_of(wish.rate_hz)));
-    let told = device.params().ok().filter(|p| p.capabilities.contains(Capabilities::TIME_PER_FRAME));
+    let told = device
+        .params()
+        .ok()
+        .filter(|p| p.capabilities.contains(Capabilities::TIME_PER_FRAME));
     let granted_rate_hz = told.and_then(|p| hz(p.interval));
     Ok(Negotiated {
-        granted: Granted { format, size: Size::new(granted.width, granted.height), rate_hz: granted_rate_hz },
+        granted: Granted {
+            format,
+            size: Size::new(granted.width, granted.height),
+            rate_hz: granted_rate_hz,
+        },
         stride: granted.stride as usize,
         modes,
     })

@@ -16,7 +16,8 @@ use ratatui::widgets::Paragraph;
 const COLUMN_S: f64 = 0.25;
 /// What was not seen for longer is left open, s.
 const GAP_S: f64 = 1.0;
-/// Ends of the axis of frequencies, Hz. One is taken for all branches, so that they can be compared.
+/// Ends of the axis of frequencies, Hz. One is taken for all branches, so that they can be
+/// compared.
 const AXES_HZ: [f64; 5] = [1.0, 2.0, 3.0, 5.0, 10.0];
 /// Room that is left beyond the highest answer.
 const BEYOND: f64 = 1.3;
@@ -32,24 +33,39 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         return;
     };
     let points = count(branch.n_tracks.into());
-    let title = format!("Branch {}, level {}, {points} points", branch.node.0, branch.level);
+    let title = format!(
+        "Branch {}, level {}, {points} points",
+        branch.node.0, branch.level
+    );
     let inner = titled(frame, area, &title, theme);
-    let answer = s.sway.as_ref().and_then(|sway| sway.branches.get(&branch.node));
+    let answer = s
+        .sway
+        .as_ref()
+        .and_then(|sway| sway.branches.get(&branch.node));
     let mut text = told(s, answer, inner.width, theme);
     if let Some(sway) = s.sway.as_ref().filter(|_| s.sway_passed_over > 0) {
-        let late = format!(" as of {}, {} looks passed over", clock(sway.time_s), count(s.sway_passed_over));
+        let late = format!(
+            " as of {}, {} looks passed over",
+            clock(sway.time_s),
+            count(s.sway_passed_over)
+        );
         text.push(Line::styled(late, theme.faint()));
     }
     let height = (text.len() as u16).min(inner.height);
-    let [words, plots] = Layout::vertical([Constraint::Length(height), Constraint::Min(0)]).areas(inner);
+    let [words, plots] =
+        Layout::vertical([Constraint::Length(height), Constraint::Min(0)]).areas(inner);
     frame.render_widget(Paragraph::new(text), words);
     // A plot without its scale would say nothing.
     if plots.height < 4 {
         return;
     }
-    let [angle_note, angle, spectrum, axis] =
-        Layout::vertical([Constraint::Length(1), Constraint::Fill(1), Constraint::Fill(1), Constraint::Length(1)])
-            .areas(plots);
+    let [angle_note, angle, spectrum, axis] = Layout::vertical([
+        Constraint::Length(1),
+        Constraint::Fill(1),
+        Constraint::Fill(1),
+        Constraint::Length(1),
+    ])
+    .areas(plots);
     let colour = theme.branch(branch.colour);
     sways(frame, s, branch, (angle_note, angle), colour, theme);
     spectrum_of(frame, s, answer, (spectrum, axis), colour, theme);
@@ -76,7 +92,11 @@ fn told(s: &Snapshot, answer: Option<&BranchSway>, width: u16, theme: Theme) -> 
                 Some(damping) => row("damping", plus_minus(damping), String::new()),
                 None => row("damping", "–".into(), "  too uncertain".into()),
             };
-            vec![row("sways at", plus_minus(&sway.frequency_hz), " Hz".into()), damping, made_by(&sway, row)]
+            vec![
+                row("sways at", plus_minus(&sway.frequency_hz), " Hz".into()),
+                damping,
+                made_by(&sway, row),
+            ]
         }
     }
 }
@@ -91,22 +111,46 @@ fn made_by(sway: &Sway, row: impl Fn(&str, String, String) -> Line<'static>) -> 
 }
 
 /// The newest angles that there is room for, the newest at the right.
-fn sways(frame: &mut Frame, s: &Snapshot, b: &BranchRow, (note, area): (Rect, Rect), colour: Color, theme: Theme) {
+fn sways(
+    frame: &mut Frame,
+    s: &Snapshot,
+    b: &BranchRow,
+    (note, area): (Rect, Rect),
+    colour: Color,
+    theme: Theme,
+) {
     let span_s = COLUMN_S * f64::from(area.width);
     let newest_s = s.angles.rows.last().map_or(0.0, |(t, _)| *t);
-    let seen: Vec<(f64, f64)> = s.angles.of(b.node).filter(|(t, a)| newest_s - t <= span_s && a.is_finite()).collect();
+    let seen: Vec<(f64, f64)> = s
+        .angles
+        .of(b.node)
+        .filter(|(t, a)| newest_s - t <= span_s && a.is_finite())
+        .collect();
     let Some((low, high)) = plot::range(seen.iter().map(|(_, a)| *a)) else {
-        frame.render_widget(Line::styled(" angle: none in this picture", theme.faint()), note);
+        frame.render_widget(
+            Line::styled(" angle: none in this picture", theme.faint()),
+            note,
+        );
         return;
     };
     // A branch may be younger than the panel is wide.
     let drawn_s = seen.first().map_or(0.0, |(t, _)| newest_s - t);
-    let text = format!(" angle {} to {}°, last {drawn_s:.0} s", value(low), value(high));
+    let text = format!(
+        " angle {} to {}°, last {drawn_s:.0} s",
+        value(low),
+        value(high)
+    );
     frame.render_widget(Line::styled(text, theme.faint()), note);
     // Tracking noise must not look like a storm.
     let (low, high) = plot::widened(low, high, 1.0);
     let at = |(t, a): &(f64, f64)| [1.0 - (newest_s - t) / span_s, (a - low) / (high - low)];
-    plot::curve(frame, &seen.iter().map(at).collect::<Vec<_>>(), GAP_S / span_s, area, colour);
+    plot::curve(
+        frame,
+        &seen.iter().map(at).collect::<Vec<_>>(),
+        GAP_S / span_s,
+        area,
+        colour,
+    );
 }
 
 /// Bars, those within the answer's interval marked, and the answer on the axis below.
@@ -118,20 +162,34 @@ fn spectrum_of(
     colour: Color,
     theme: Theme,
 ) {
-    let Some((spectrum, span_s)) =
-        answer.and_then(|a| a.spectrum.as_ref()).zip(s.sway.as_ref().map(|sway| sway.span_s))
+    let Some((spectrum, span_s)) = answer
+        .and_then(|a| a.spectrum.as_ref())
+        .zip(s.sway.as_ref().map(|sway| sway.span_s))
     else {
         return;
     };
     let top_hz = axis_hz(s, spectrum.bin_hz * spectrum.amplitude_deg.len() as f64);
     let columns = f64::from(area.width.max(1));
     let column = |hz: f64| (hz / top_hz * columns).floor().clamp(0.0, columns - 1.0) as u16;
-    let interval = answer.and_then(|a| a.swaying.ok()).map(|sway| sway.frequency_hz);
-    let bars: Vec<f64> =
-        (0..area.width).map(|k| plot::highest(spectrum, [k, k + 1].map(|k| f64::from(k) / columns * top_hz))).collect();
+    let interval = answer
+        .and_then(|a| a.swaying.ok())
+        .map(|sway| sway.frequency_hz);
+    let bars: Vec<f64> = (0..area.width)
+        .map(|k| {
+            plot::highest(
+                spectrum,
+                [k, k + 1].map(|k| f64::from(k) / columns * top_hz),
+            )
+        })
+        .collect();
     // Drift makes the lowest frequencies the highest bars, whatever the branch does.
     let from = column(LEAST_PERIODS / span_s.max(0.1));
-    let most = bars.get(usize::from(from)..).unwrap_or(&[]).iter().copied().fold(0.0, f64::max);
+    let most = bars
+        .get(usize::from(from)..)
+        .unwrap_or(&[])
+        .iter()
+        .copied()
+        .fold(0.0, f64::max);
     let marked = interval.map(|i| column(i.lo)..=column(i.hi));
     plot::bars(frame, &bars, most, area, |k| match &marked {
         Some(marked) if marked.contains(&k) => theme.warning(),
@@ -141,7 +199,8 @@ fn spectrum_of(
     axis_below(frame, interval, (top_hz, column), axis, theme);
 }
 
-/// `0`, the answer below its bar, and the end of the axis; where they would touch, the answer goes first.
+/// `0`, the answer below its bar, and the end of the axis; where they would touch, the answer goes
+/// first.
 fn axis_below(
     frame: &mut Frame,
     interval: Option<Interval>,
@@ -154,7 +213,14 @@ fn axis_below(
     let end_from = area.width.saturating_sub(end.len() as u16);
     let put = |frame: &mut Frame, x: u16, text: &str, style| {
         let width = (text.chars().count() as u16).min(area.width.saturating_sub(x));
-        frame.render_widget(Line::styled(text.to_owned(), style), Rect { x: area.x + x, width, ..area });
+        frame.render_widget(
+            Line::styled(text.to_owned(), style),
+            Rect {
+                x: area.x + x,
+                width,
+                ..area
+            },
+        );
     };
     put(frame, 0, "0", theme.faint());
     let mut taken_to = 0;
@@ -178,8 +244,18 @@ fn axis_below(
 
 /// The least end of the axis that shows every branch's answer, and not more than `highest_hz`.
 fn axis_hz(s: &Snapshot, highest_hz: f64) -> f64 {
-    let answers = s.sway.iter().flat_map(|sway| sway.branches.values()).filter_map(|b| b.swaying.ok());
-    let most = answers.map(|sway| BEYOND * sway.frequency_hz.value).fold(0.0, f64::max);
+    let answers = s
+        .sway
+        .iter()
+        .flat_map(|sway| sway.branches.values())
+        .filter_map(|b| b.swaying.ok());
+    let most = answers
+        .map(|sway| BEYOND * sway.frequency_hz.value)
+        .fold(0.0, f64::max);
     let fits = |hz: &f64| *hz >= if most > 0.0 { most } else { 2.0 };
-    AXES_HZ.into_iter().find(fits).unwrap_or(20.0).min(highest_hz.max(0.1))
+    AXES_HZ
+        .into_iter()
+        .find(fits)
+        .unwrap_or(20.0)
+        .min(highest_hz.max(0.1))
 }

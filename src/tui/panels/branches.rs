@@ -10,18 +10,22 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
-/// A wider table would be harder to read along a line; there are as many side by side as there is room for.
+/// A wider table would be harder to read along a line; there are as many side by side as there is
+/// room for.
 const WIDEST: u16 = 52;
 /// Width of a value with its interval.
 const SURE: usize = 13;
-/// What stands between the name and the sway: name and width of the columns, where there is room for all.
+/// What stands between the name and the sway: name and width of the columns, where there is room
+/// for all.
 const COLUMNS: [(&str, usize); 3] = [("lvl", 3), ("pts", 5), ("ampl/px", 7)];
-/// A narrower table says the level in words, as there is no room for the names of columns beside the title.
+/// A narrower table says the level in words, as there is no room for the names of columns beside
+/// the title.
 const ALL_FROM: u16 = 50;
 /// With so many lines one can be spared for the names of the columns.
 const NAMED_FROM: usize = 4;
 
-/// One line for each branch as far as there is room, the chosen one among them; the title says how many there are.
+/// One line for each branch as far as there is room, the chosen one among them; the title says how
+/// many there are.
 pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
     let s = &state.snapshot;
     let total = s.branches.len();
@@ -48,15 +52,45 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         false => format!("Branches, {total}"),
     };
     let inner = titled(frame, area, &title, theme);
-    let [head, below] = Layout::vertical([Constraint::Length(u16::from(named_below)), Constraint::Min(1)]).areas(inner);
+    let [head, below] = Layout::vertical([
+        Constraint::Length(u16::from(named_below)),
+        Constraint::Min(1),
+    ])
+    .areas(inner);
     for (i, rows) in s.branches[first..].chunks(height).take(tables).enumerate() {
         let x = below.x + i as u16 * (WIDEST + 2);
-        let place = Rect { x, width: (below.right() - x).min(WIDEST), ..below };
+        let place = Rect {
+            x,
+            width: (below.right() - x).min(WIDEST),
+            ..below
+        };
         if named_below {
-            names(frame, Rect { y: head.y, height: 1, ..place }, 0, theme);
+            names(
+                frame,
+                Rect {
+                    y: head.y,
+                    height: 1,
+                    ..place
+                },
+                0,
+                theme,
+            );
         } else {
-            let taken = if i == 0 { title.chars().count() as u16 + 3 } else { 0 };
-            names(frame, Rect { y: area.y, height: 1, ..place }, taken, theme);
+            let taken = if i == 0 {
+                title.chars().count() as u16 + 3
+            } else {
+                0
+            };
+            names(
+                frame,
+                Rect {
+                    y: area.y,
+                    height: 1,
+                    ..place
+                },
+                taken,
+                theme,
+            );
         }
         for ((k, row), line) in rows.iter().enumerate().zip(place.rows()) {
             let marked = first + i * height + k == chosen;
@@ -67,8 +101,16 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
 
 fn branch(s: &Snapshot, b: &BranchRow, marked: bool, width: u16, theme: Theme) -> Line<'static> {
     let middle = if width >= ALL_FROM {
-        let cells = [b.level.to_string(), count(b.n_tracks.into()), value(b.amplitude_px)];
-        cells.iter().zip(COLUMNS).map(|(text, (_, width))| format!(" {text:>width$}")).collect()
+        let cells = [
+            b.level.to_string(),
+            count(b.n_tracks.into()),
+            value(b.amplitude_px),
+        ];
+        cells
+            .iter()
+            .zip(COLUMNS)
+            .map(|(text, (_, width))| format!(" {text:>width$}"))
+            .collect()
     } else {
         format!("  level {}", b.level)
     };
@@ -77,7 +119,11 @@ fn branch(s: &Snapshot, b: &BranchRow, marked: bool, width: u16, theme: Theme) -
     let used = name.chars().count() + middle.chars().count() + 2 * (SURE + 1) + 3;
     let gap = " ".repeat((width as usize).saturating_sub(used));
     // In a narrow table the level follows the name, else all columns keep to the right.
-    let (before, after) = if width >= ALL_FROM { (gap, String::new()) } else { (String::new(), gap) };
+    let (before, after) = if width >= ALL_FROM {
+        (gap, String::new())
+    } else {
+        (String::new(), gap)
+    };
     let style_of_name = if marked { theme.strong() } else { Style::new() };
     Line::from(vec![
         Span::styled(if marked { "▸" } else { " " }, theme.title()),
@@ -91,10 +137,23 @@ fn branch(s: &Snapshot, b: &BranchRow, marked: bool, width: u16, theme: Theme) -
 /// Frequency and damping with half their intervals, or why there are none.
 fn sway(s: &Snapshot, b: &BranchRow, theme: Theme) -> (String, Style) {
     const WIDTH: usize = 2 * (SURE + 1);
-    match s.sway.as_ref().and_then(|sway| sway.branches.get(&b.node)).map(|branch| branch.swaying) {
+    match s
+        .sway
+        .as_ref()
+        .and_then(|sway| sway.branches.get(&b.node))
+        .map(|branch| branch.swaying)
+    {
         Some(Ok(sway)) => {
-            let damping = sway.damping_ratio.map_or_else(|| "–".to_owned(), |d| plus_minus(&d));
-            (format!(" {:>SURE$} {damping:>SURE$}", plus_minus(&sway.frequency_hz)), theme.strong())
+            let damping = sway
+                .damping_ratio
+                .map_or_else(|| "–".to_owned(), |d| plus_minus(&d));
+            (
+                format!(
+                    " {:>SURE$} {damping:>SURE$}",
+                    plus_minus(&sway.frequency_hz)
+                ),
+                theme.strong(),
+            )
         }
         Some(Err(why)) => (format!("{:>WIDTH$}", in_short(why)), theme.faint()),
         None => (format!(" {:>SURE$} {:>SURE$}", "–", "–"), theme.faint()),
@@ -115,9 +174,14 @@ fn in_short(why: Unidentified) -> &'static str {
     }
 }
 
-/// The columns' names, as many from the right as there is room for. On the rule, beside the title, they cost no line.
+/// The columns' names, as many from the right as there is room for. On the rule, beside the title,
+/// they cost no line.
 fn names(frame: &mut Frame, area: Rect, taken: u16, theme: Theme) {
-    let mut names: Vec<(&str, usize)> = if area.width >= ALL_FROM { COLUMNS.to_vec() } else { Vec::new() };
+    let mut names: Vec<(&str, usize)> = if area.width >= ALL_FROM {
+        COLUMNS.to_vec()
+    } else {
+        Vec::new()
+    };
     names.extend([("f/Hz", SURE), ("damping", SURE)]);
     let mut end = area.right();
     for (name, width) in names.into_iter().rev() {
@@ -126,7 +190,12 @@ fn names(frame: &mut Frame, area: Rect, taken: u16, theme: Theme) {
         if start < area.x + taken + 1 {
             break;
         }
-        let place = Rect { x: start.saturating_sub(1), width: own + 2, ..area }.intersection(frame.area());
+        let place = Rect {
+            x: start.saturating_sub(1),
+            width: own + 2,
+            ..area
+        }
+        .intersection(frame.area());
         frame.render_widget(Line::styled(format!(" {name} "), theme.faint()), place);
         end = end.saturating_sub(width as u16 + 1);
     }

@@ -9,7 +9,8 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-/// Seven lines; where there is no room for all, the last ones tell only of losses that seldom happen.
+/// Seven lines; where there is no room for all, the last ones tell only of losses that seldom
+/// happen.
 pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
     let s = &state.snapshot;
     let inner = titled(frame, area, "Camera", theme);
@@ -18,31 +19,58 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         spans.extend(value);
         Line::from(spans)
     };
-    let or_dash = |text: &str| Span::raw(if text.is_empty() { "–".to_owned() } else { text.to_owned() });
+    let or_dash = |text: &str| {
+        Span::raw(if text.is_empty() {
+            "–".to_owned()
+        } else {
+            text.to_owned()
+        })
+    };
     let loss = |name: &'static str, n: u64| {
-        let style = if n > 0 { theme.warning() } else { theme.faint() };
+        let style = if n > 0 {
+            theme.warning()
+        } else {
+            theme.faint()
+        };
         [Span::raw(format!("{name} ")), Span::styled(count(n), style)]
     };
     let joined = |parts: &[[Span<'static>; 2]]| {
-        let mut spans: Vec<_> = parts.iter().flat_map(|part| [part.as_slice(), &[Span::raw("  ")]].concat()).collect();
+        let mut spans: Vec<_> = parts
+            .iter()
+            .flat_map(|part| [part.as_slice(), &[Span::raw("  ")]].concat())
+            .collect();
         spans.pop();
         spans
     };
     let rate = || format!("{} Hz", value(s.sensor_rate_hz));
     let rate = match &s.camera.away {
         Some(reason) => vec![Span::styled(format!("gone: {reason}"), theme.warning())],
-        None if s.camera.rate_off => vec![Span::styled(format!("{}  not as given", rate()), theme.warning())],
-        None => vec![Span::styled(rate(), theme.strong()), Span::raw(format!("  worked {}", value(s.work_rate_hz)))],
+        None if s.camera.rate_off => vec![Span::styled(
+            format!("{}  not as given", rate()),
+            theme.warning(),
+        )],
+        None => vec![
+            Span::styled(rate(), theme.strong()),
+            Span::raw(format!("  worked {}", value(s.work_rate_hz))),
+        ],
     };
-    // Both counts of what was lost before us: by the driver's numbers, where it has them, and by the times.
+    // Both counts of what was lost before us: by the driver's numbers, where it has them, and by
+    // the times.
     let by_number = match s.camera.lost_by_sequence {
         Some(n) => loss("numbers", n),
         None => [Span::raw("numbers "), Span::styled("–", theme.faint())],
     };
-    let broken = s.undecodable.saturating_add(s.camera.damaged).saturating_add(s.camera.stale);
+    let broken = s
+        .undecodable
+        .saturating_add(s.camera.damaged)
+        .saturating_add(s.camera.stale);
     // A file is asked for nothing.
     let other = !s.format.asked.is_empty() && s.format.asked != s.format.given;
-    let given_style = if other { theme.warning() } else { theme.strong() };
+    let given_style = if other {
+        theme.warning()
+    } else {
+        theme.strong()
+    };
     let lines = vec![
         row("asked", vec![or_dash(&s.format.asked)]),
         row("given", vec![or_dash(&s.format.given).style(given_style)]),
@@ -54,9 +82,21 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
                 Span::raw(format!("  p99 {}", millis(s.latency_p99_ms))),
             ],
         ),
-        row("lost", joined(&[loss("camera", s.lost_in_camera), loss("queue", s.dropped_before_tracker)])),
-        row("", joined(&[loss("broken", broken), loss("unshown", s.not_shown)])),
-        row("", joined(&[by_number, loss("times", s.camera.lost_by_time)])),
+        row(
+            "lost",
+            joined(&[
+                loss("camera", s.lost_in_camera),
+                loss("queue", s.dropped_before_tracker),
+            ]),
+        ),
+        row(
+            "",
+            joined(&[loss("broken", broken), loss("unshown", s.not_shown)]),
+        ),
+        row(
+            "",
+            joined(&[by_number, loss("times", s.camera.lost_by_time)]),
+        ),
     ];
     frame.render_widget(Paragraph::new(lines), inner);
 }

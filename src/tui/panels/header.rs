@@ -18,12 +18,19 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         _ => None,
     };
     let count = match s.frames_total {
-        Some(total) => format!("frame {} of {}", format::count(s.frame), format::count(total)),
+        Some(total) => format!(
+            "frame {} of {}",
+            format::count(s.frame),
+            format::count(total)
+        ),
         None => format!("frame {}", format::count(s.frame)),
     };
     let recorded = match s.recorded {
         Some((_, 0)) => Some(Span::styled(" REC ", theme.here())),
-        Some((_, missing)) => Some(Span::styled(format!(" REC, {} missing ", format::count(missing)), theme.warning())),
+        Some((_, missing)) => Some(Span::styled(
+            format!(" REC, {} missing ", format::count(missing)),
+            theme.warning(),
+        )),
         None => None,
     };
     let mut right: Vec<Span> = recorded.into_iter().collect();
@@ -31,7 +38,9 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
     right.extend(word.map(|w| Span::styled(w, theme.here())));
     let right = Line::from(right);
 
-    let size = s.image_size.map_or(String::new(), |size| format!("  {size}"));
+    let size = s
+        .image_size
+        .map_or(String::new(), |size| format!("  {size}"));
     let taken = right.width() + format::width(&size) + format::width(" arborcam  ");
     let source = format::keep_end(&s.source, (area.width as usize).saturating_sub(taken));
     let left = Line::from(vec![
@@ -41,5 +50,12 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
     ]);
     frame.render_widget(left, area);
     let width = (right.width() as u16).min(area.width);
-    frame.render_widget(right, Rect { x: area.right() - width, width, ..area });
+    frame.render_widget(
+        right,
+        Rect {
+            x: area.right() - width,
+            width,
+            ..area
+        },
+    );
 }

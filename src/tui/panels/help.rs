@@ -10,21 +10,42 @@ use ratatui::widgets::{Block, Clear, Padding, Paragraph};
 
 /// What stands in the table and the panel of the branches.
 const MEANINGS: [(&str, &str); 3] = [
-    ("f/Hz", "sway against the branch that carries it; ± half of 95 %"),
-    ("damping", "share of the critical; no number where the film tells none"),
+    (
+        "f/Hz",
+        "sway against the branch that carries it; ± half of 95 %",
+    ),
+    (
+        "damping",
+        "share of the critical; no number where the film tells none",
+    ),
     ("▲", "the answer in the spectrum of its angle, for the eye"),
 ];
 
 /// All keys, from the same tables that they are read with.
 pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
     let row = |key: &'static str, help: &'static str| {
-        Line::from(vec![Span::styled(format!("{key:<10}"), theme.title()), Span::raw(help)])
+        Line::from(vec![
+            Span::styled(format!("{key:<10}"), theme.title()),
+            Span::raw(help),
+        ])
     };
-    let mut lines: Vec<Line> = WATCHING.iter().filter(|b| !b.help.is_empty()).map(|b| row(b.shown, b.help)).collect();
+    let mut lines: Vec<Line> = WATCHING
+        .iter()
+        .filter(|b| !b.help.is_empty())
+        .map(|b| row(b.shown, b.help))
+        .collect();
     lines.push(Line::styled("What is told of a branch", theme.faint()));
     lines.extend(MEANINGS.map(|(shown, help)| row(shown, help)));
-    let mut drawing = vec![Line::styled("While an outline is drawn", theme.faint()), row("click", "sets a point")];
-    drawing.extend(DRAWING.iter().filter(|b| !b.help.is_empty()).map(|b| row(b.shown, b.help)));
+    let mut drawing = vec![
+        Line::styled("While an outline is drawn", theme.faint()),
+        row("click", "sets a point"),
+    ];
+    drawing.extend(
+        DRAWING
+            .iter()
+            .filter(|b| !b.help.is_empty())
+            .map(|b| row(b.shown, b.help)),
+    );
     // Where there is no room for both, those that mean something now.
     if lines.len() + drawing.len() + 2 <= area.height as usize {
         lines.append(&mut drawing);
@@ -45,6 +66,9 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
 /// What is said in a window in which nothing can be shown.
 pub fn too_small(frame: &mut Frame, (width, height): (u16, u16), area: Rect) {
     let text = format!("arborcam needs {width}x{height} characters; enlarge the window. q ends.");
-    let lines: Vec<Line> = crate::tui::format::wrap(&text, area.width as usize).into_iter().map(Line::from).collect();
+    let lines: Vec<Line> = crate::tui::format::wrap(&text, area.width as usize)
+        .into_iter()
+        .map(Line::from)
+        .collect();
     frame.render_widget(Paragraph::new(lines), area);
 }

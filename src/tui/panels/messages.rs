@@ -23,25 +23,50 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
                 break;
             }
             wrapped.truncate(left);
-            wrapped.iter_mut().skip(left - 1).for_each(|line| line.push('…'));
+            wrapped
+                .iter_mut()
+                .skip(left - 1)
+                .for_each(|line| line.push('…'));
         }
-        let (mark, style) = if age == 0 { (" ▸ ", theme.strong()) } else { (" · ", theme.faint()) };
+        let (mark, style) = if age == 0 {
+            (" ▸ ", theme.strong())
+        } else {
+            (" · ", theme.faint())
+        };
         for (i, text) in wrapped.into_iter().enumerate().rev() {
-            lines.push(Line::styled(format!("{}{text}", if i == 0 { mark } else { "   " }), style));
+            lines.push(Line::styled(
+                format!("{}{text}", if i == 0 { mark } else { "   " }),
+                style,
+            ));
         }
     }
     lines.reverse();
     // At the bottom, so that the newest is always in the same place.
     let height = (lines.len() as u16).min(area.height);
-    frame.render_widget(Paragraph::new(lines), Rect { y: area.bottom() - height, height, ..area });
+    frame.render_widget(
+        Paragraph::new(lines),
+        Rect {
+            y: area.bottom() - height,
+            height,
+            ..area
+        },
+    );
 }
 
 /// Keys that mean something now.
 pub fn keys(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
     match &state.drawing {
         Some(_) => {
-            let drawing = DRAWING.iter().filter(|b| !b.short.is_empty()).map(|b| (b.shown, b.short));
-            key_line(frame, std::iter::once(("click", "set")).chain(drawing), area, theme);
+            let drawing = DRAWING
+                .iter()
+                .filter(|b| !b.short.is_empty())
+                .map(|b| (b.shown, b.short));
+            key_line(
+                frame,
+                std::iter::once(("click", "set")).chain(drawing),
+                area,
+                theme,
+            );
         }
         None => {
             let useful = |action: Action| match action {
@@ -50,14 +75,22 @@ pub fn keys(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
                 Action::Choose(_) => !state.snapshot.branches.is_empty(),
                 _ => true,
             };
-            let keys = WATCHING.iter().filter(|b| useful(b.action)).map(|b| (b.shown, b.short));
+            let keys = WATCHING
+                .iter()
+                .filter(|b| useful(b.action))
+                .map(|b| (b.shown, b.short));
             key_line(frame, keys, area, theme);
         }
     }
 }
 
 /// Keys and what they do, as many as there is room for.
-pub fn key_line(frame: &mut Frame, keys: impl Iterator<Item = (&'static str, &'static str)>, area: Rect, theme: Theme) {
+pub fn key_line(
+    frame: &mut Frame,
+    keys: impl Iterator<Item = (&'static str, &'static str)>,
+    area: Rect,
+    theme: Theme,
+) {
     let mut spans = Vec::new();
     let mut room = area.width as usize;
     for (key, word) in keys.filter(|(key, _)| !key.is_empty()) {

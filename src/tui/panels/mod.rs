@@ -33,7 +33,11 @@ fn titled(frame: &mut Frame, area: Rect, title: &str, theme: Theme) -> Rect {
 fn waiting(frame: &mut Frame, area: Rect, text: &str, theme: Theme) {
     let lines = super::format::wrap(text, area.width.saturating_sub(2) as usize);
     let top = area.height.saturating_sub(lines.len() as u16) / 2;
-    let area = Rect { y: area.y + top, height: area.height - top, ..area };
+    let area = Rect {
+        y: area.y + top,
+        height: area.height - top,
+        ..area
+    };
     let lines: Vec<Line> = lines.into_iter().map(Line::from).collect();
     frame.render_widget(Paragraph::new(lines).centered().style(theme.faint()), area);
 }

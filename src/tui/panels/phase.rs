@@ -16,17 +16,28 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         if phase != Phase::Outline {
             spans.push(Span::styled("›", theme.faint()));
         }
-        let style = if phase == now { theme.here() } else { theme.faint() };
+        let style = if phase == now {
+            theme.here()
+        } else {
+            theme.faint()
+        };
         spans.push(Span::styled(format!(" {} ", phase.name()), style));
     }
     let way = Line::from(spans);
-    let [left, right] =
-        Layout::horizontal([Constraint::Length(way.width() as u16 + 1), Constraint::Min(0)]).areas(area);
+    let [left, right] = Layout::horizontal([
+        Constraint::Length(way.width() as u16 + 1),
+        Constraint::Min(0),
+    ])
+    .areas(area);
     frame.render_widget(way, left);
 
     // The gauge refuses what lies outside 0 to 1.
     let progress = state.snapshot.progress;
-    let done = if progress.is_nan() { 0.0 } else { progress.clamp(0.0, 1.0) };
+    let done = if progress.is_nan() {
+        0.0
+    } else {
+        progress.clamp(0.0, 1.0)
+    };
     let gauge = LineGauge::default()
         .ratio(done)
         .label(format!("{:3.0} %", 100.0 * done))
@@ -34,5 +45,11 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         .unfilled_symbol("░")
         .filled_style(theme.title())
         .unfilled_style(theme.faint());
-    frame.render_widget(gauge, Rect { width: right.width.saturating_sub(1), ..right });
+    frame.render_widget(
+        gauge,
+        Rect {
+            width: right.width.saturating_sub(1),
+            ..right
+        },
+    );
 }

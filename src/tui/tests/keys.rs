@@ -5,7 +5,9 @@ use crate::model::{Control, NodeName, Phase, Size, Snapshot};
 use crate::tui::input::handle;
 use crate::tui::placed::Placed;
 use crate::tui::state::State;
-use ratatui::crossterm::event::{Event, KeyCode, KeyEvent, KeyModifiers, MouseButton, MouseEvent, MouseEventKind};
+use ratatui::crossterm::event::{
+    Event, KeyCode, KeyEvent, KeyModifiers, MouseButton, MouseEvent, MouseEventKind,
+};
 use ratatui::layout::Rect;
 use std::sync::Arc;
 
@@ -23,15 +25,22 @@ fn ctrl(c: char) -> Event {
 
 fn click(column: u16, row: u16) -> Event {
     let kind = MouseEventKind::Down(MouseButton::Left);
-    Event::Mouse(MouseEvent { kind, column, row, modifiers: KeyModifiers::NONE })
+    Event::Mouse(MouseEvent {
+        kind,
+        column,
+        row,
+        modifiers: KeyModifiers::NONE,
+    })
 }
 
-/// A 640x360 picture at ten pixels a dot: 64 columns from column 3 on, 18 rows from row 4 on, bars above and below.
+/// A 640x360 picture at ten pixels a dot: 64 columns from column 3 on, 18 rows from row 4 on, bars
+/// above and below.
 fn wide() -> Placed {
     Placed::fit(Size::new(640, 360), Rect::new(3, 2, 64, 22), (1, 2)).unwrap()
 }
 
-/// The same at twenty pixels a dot with bars at the sides: 32 columns from column 13 on, 9 rows from row 1 on.
+/// The same at twenty pixels a dot with bars at the sides: 32 columns from column 13 on, 9 rows
+/// from row 1 on.
 fn narrow() -> Placed {
     Placed::fit(Size::new(640, 360), Rect::new(5, 1, 48, 9), (1, 2)).unwrap()
 }
@@ -45,7 +54,10 @@ struct Run {
 fn play(placed: Option<Placed>, events: &[Event]) -> Run {
     let mut state = State::default();
     state.take(Arc::new(snapshot(Phase::Live)));
-    let sent = events.iter().filter_map(|e| handle(e, &mut state, placed.as_ref())).collect();
+    let sent = events
+        .iter()
+        .filter_map(|e| handle(e, &mut state, placed.as_ref()))
+        .collect();
     Run { state, sent }
 }
 
@@ -55,17 +67,63 @@ fn keys_send_what_they_say() {
     for (events, expected) in [
         (vec![letter('q')], vec![Quit]),
         (vec![ctrl('c')], vec![Quit]),
-        (vec![letter('q'), letter('q'), ctrl('c'), letter('b'), letter('o')], vec![Quit]),
+        (
+            vec![
+                letter('q'),
+                letter('q'),
+                ctrl('c'),
+                letter('b'),
+                letter('o'),
+            ],
+            vec![Quit],
+        ),
         (vec![letter(' ')], vec![Pause(true)]),
-        (vec![letter(' '), letter(' ')], vec![Pause(true), Pause(false)]),
-        (vec![letter('b'), letter('r'), letter('e')], vec![BuildNow, Restart, Export]),
+        (
+            vec![letter(' '), letter(' ')],
+            vec![Pause(true), Pause(false)],
+        ),
+        (
+            vec![letter('b'), letter('r'), letter('e')],
+            vec![BuildNow, Restart, Export],
+        ),
         (vec![letter('?'), letter('b')], vec![BuildNow]),
-        (vec![letter('x'), key(KeyCode::Esc), key(KeyCode::Enter), ctrl('q'), click(9, 9)], vec![]),
+        (
+            vec![
+                letter('x'),
+                key(KeyCode::Esc),
+                key(KeyCode::Enter),
+                ctrl('q'),
+                click(9, 9),
+            ],
+            vec![],
+        ),
         // While drawing, space sets a point, and a slip does nothing to the capture.
-        (vec![letter('o'), letter(' '), letter('e'), letter('b'), letter('r'), letter('q')], vec![]),
-        (vec![letter('o'), key(KeyCode::Esc), letter('e')], vec![Export]),
+        (
+            vec![
+                letter('o'),
+                letter(' '),
+                letter('e'),
+                letter('b'),
+                letter('r'),
+                letter('q'),
+            ],
+            vec![],
+        ),
+        (
+            vec![letter('o'), key(KeyCode::Esc), letter('e')],
+            vec![Export],
+        ),
         (vec![letter('o'), ctrl('c')], vec![Quit]),
-        (vec![letter('h'), letter('l'), letter('m'), letter('j'), letter('k')], vec![]),
+        (
+            vec![
+                letter('h'),
+                letter('l'),
+                letter('m'),
+                letter('j'),
+                letter('k'),
+            ],
+            vec![],
+        ),
     ] {
         assert_eq!(play(Some(wide()), &events).sent, expected, "{events:?}");
     }
@@ -74,8 +132,16 @@ fn keys_send_what_they_say() {
 #[test]
 fn clicks_make_a_polygon_of_the_pixels_below_them() {
     for (placed, clicks, polygon) in [
-        (wide(), [(3, 4), (66, 4), (35, 21)], [[4.5, 9.5], [634.5, 9.5], [324.5, 349.5]]),
-        (narrow(), [(13, 1), (44, 1), (29, 9)], [[9.5, 19.5], [629.5, 19.5], [329.5, 339.5]]),
+        (
+            wide(),
+            [(3, 4), (66, 4), (35, 21)],
+            [[4.5, 9.5], [634.5, 9.5], [324.5, 349.5]],
+        ),
+        (
+            narrow(),
+            [(13, 1), (44, 1), (29, 9)],
+            [[9.5, 19.5], [629.5, 19.5], [329.5, 339.5]],
+        ),
     ] {
         let mut events = vec![letter('o')];
         events.extend(clicks.map(|(column, row)| click(column, row)));
@@ -89,24 +155,73 @@ fn clicks_make_a_polygon_of_the_pixels_below_them() {
 #[test]
 fn drawing_stays_until_it_is_good_or_left() {
     let (a, b, c) = (click(13, 1), click(44, 1), click(29, 9));
-    let (enter, esc, back) = (key(KeyCode::Enter), key(KeyCode::Esc), key(KeyCode::Backspace));
-    // Points left in the drawing (none: not drawing any more), outlines sent, and what the user is told last.
+    let (enter, esc, back) = (
+        key(KeyCode::Enter),
+        key(KeyCode::Esc),
+        key(KeyCode::Backspace),
+    );
+    // Points left in the drawing (none: not drawing any more), outlines sent, and what the user is
+    // told last.
     for (events, points, sent, told) in [
         (vec![enter.clone()], Some(0), 0, "at least 3 points"),
-        (vec![a.clone(), b.clone(), enter.clone()], Some(2), 0, "at least 3 points"),
-        (vec![a.clone(), a.clone(), a.clone(), enter.clone()], Some(1), 0, "at least 3 points"),
-        (vec![a.clone(), b.clone(), c.clone(), back.clone(), enter.clone()], Some(2), 0, "at least 3 points"),
+        (
+            vec![a.clone(), b.clone(), enter.clone()],
+            Some(2),
+            0,
+            "at least 3 points",
+        ),
+        (
+            vec![a.clone(), a.clone(), a.clone(), enter.clone()],
+            Some(1),
+            0,
+            "at least 3 points",
+        ),
+        (
+            vec![a.clone(), b.clone(), c.clone(), back.clone(), enter.clone()],
+            Some(2),
+            0,
+            "at least 3 points",
+        ),
         (vec![back.clone()], Some(0), 0, "No point is left"),
-        (vec![click(12, 5), click(45, 5), click(20, 0), click(20, 10)], Some(0), 0, "outside the picture"),
-        (vec![a.clone(), b.clone(), c.clone(), esc.clone()], None, 0, "Left drawing"),
-        (vec![a.clone(), c.clone(), b.clone(), click(20, 9), enter.clone()], Some(4), 0, "crosses itself"),
-        (vec![a.clone(), b.clone(), c.clone(), a.clone(), enter.clone()], None, 1, "outline of 3 points"),
-        (vec![a.clone(), letter('q')], Some(1), 0, "Enter closes it, Esc leaves it"),
+        (
+            vec![click(12, 5), click(45, 5), click(20, 0), click(20, 10)],
+            Some(0),
+            0,
+            "outside the picture",
+        ),
+        (
+            vec![a.clone(), b.clone(), c.clone(), esc.clone()],
+            None,
+            0,
+            "Left drawing",
+        ),
+        (
+            vec![a.clone(), c.clone(), b.clone(), click(20, 9), enter.clone()],
+            Some(4),
+            0,
+            "crosses itself",
+        ),
+        (
+            vec![a.clone(), b.clone(), c.clone(), a.clone(), enter.clone()],
+            None,
+            1,
+            "outline of 3 points",
+        ),
+        (
+            vec![a.clone(), letter('q')],
+            Some(1),
+            0,
+            "Enter closes it, Esc leaves it",
+        ),
         (vec![a.clone(), ctrl('c')], None, 1, "writing"),
     ] {
         let events: Vec<Event> = std::iter::once(letter('o')).chain(events).collect();
         let run = play(Some(narrow()), &events);
-        assert_eq!(run.state.drawing.as_ref().map(|d| d.points_px().len()), points, "{events:?}");
+        assert_eq!(
+            run.state.drawing.as_ref().map(|d| d.points_px().len()),
+            points,
+            "{events:?}"
+        );
         assert_eq!(run.sent.len(), sent, "{events:?}");
         let last = run.state.messages().next_back().unwrap_or_default();
         assert!(last.contains(told), "{last:?} after {events:?}");
@@ -122,10 +237,22 @@ fn the_keyboard_reaches_what_the_mouse_reaches() {
         events.extend(far(across).chain(far(down)));
         events.push(letter(' '));
     }
-    events.extend([arrow(KeyCode::Left), arrow(KeyCode::Up), letter(' '), key(KeyCode::Backspace)]);
+    events.extend([
+        arrow(KeyCode::Left),
+        arrow(KeyCode::Up),
+        letter(' '),
+        key(KeyCode::Backspace),
+    ]);
     events.push(key(KeyCode::Enter));
     let run = play(Some(narrow()), &events);
-    assert_eq!(run.sent, [Control::SetOutline(vec![[9.5, 19.5], [629.5, 19.5], [629.5, 339.5]])]);
+    assert_eq!(
+        run.sent,
+        [Control::SetOutline(vec![
+            [9.5, 19.5],
+            [629.5, 19.5],
+            [629.5, 339.5]
+        ])]
+    );
 }
 
 #[test]
@@ -135,16 +262,29 @@ fn there_is_no_drawing_without_a_picture() {
     assert_eq!(state.drawing, None);
     assert!(state.messages().any(|m| m.contains("no picture yet")));
     // A picture that is there but not on the screen, as in too small a window.
-    let run = play(None, &[letter('o'), click(5, 5), letter(' '), key(KeyCode::Left)]);
+    let run = play(
+        None,
+        &[letter('o'), click(5, 5), letter(' '), key(KeyCode::Left)],
+    );
     assert!(run.sent.is_empty() && run.state.drawing.is_some_and(|d| d.points_px().is_empty()));
 }
 
 #[test]
 fn the_tree_turns_all_the_way_round_and_shows_its_wood() {
-    let turned = |keys: &str| play(None, &keys.chars().map(letter).collect::<Vec<_>>()).state.turned;
-    assert_eq!([turned("l"), turned("h"), turned("lh"), turned("hhh")], [1, 23, 0, 21]);
+    let turned = |keys: &str| {
+        play(None, &keys.chars().map(letter).collect::<Vec<_>>())
+            .state
+            .turned
+    };
+    assert_eq!(
+        [turned("l"), turned("h"), turned("lh"), turned("hhh")],
+        [1, 23, 0, 21]
+    );
     assert_eq!(turned(&"l".repeat(24)), 0);
-    let run = play(None, &[key(KeyCode::Right), key(KeyCode::Right), key(KeyCode::Left)]);
+    let run = play(
+        None,
+        &[key(KeyCode::Right), key(KeyCode::Right), key(KeyCode::Left)],
+    );
     assert_eq!(run.state.turned, 1);
     for (keys, shown) in [("m", true), ("mm", false), ("mqm", false)] {
         let run = play(None, &keys.chars().map(letter).collect::<Vec<_>>());
@@ -156,7 +296,16 @@ fn the_tree_turns_all_the_way_round_and_shows_its_wood() {
 fn the_chosen_branch_goes_up_and_down_and_outlives_a_refinement() {
     let run = |keys: &str| play(None, &keys.chars().map(letter).collect::<Vec<_>>()).state;
     let chosen = |keys: &str| run(keys).chosen();
-    assert_eq!([chosen(""), chosen("jj"), chosen("k"), chosen("jjjk"), chosen(&"j".repeat(50))], [0, 2, 0, 2, 9]);
+    assert_eq!(
+        [
+            chosen(""),
+            chosen("jj"),
+            chosen("k"),
+            chosen("jjjk"),
+            chosen(&"j".repeat(50))
+        ],
+        [0, 2, 0, 2, 9]
+    );
     // The tree is refined: the branch is in another row.
     let mut state = run("jjj");
     let mut moved = snapshot(Phase::Live);
@@ -165,7 +314,10 @@ fn the_chosen_branch_goes_up_and_down_and_outlives_a_refinement() {
     assert_eq!(state.snapshot.branches[state.chosen()].node, NodeName(4));
     // It is gone, and so are most: another one takes its row.
     let fewer = snapshot(Phase::Live).branches[..2].to_vec();
-    state.take(Arc::new(Snapshot { branches: fewer, ..snapshot(Phase::Live) }));
+    state.take(Arc::new(Snapshot {
+        branches: fewer,
+        ..snapshot(Phase::Live)
+    }));
     assert_eq!(state.chosen(), 1);
 }
 
@@ -192,7 +344,10 @@ fn a_late_snapshot_does_not_undo_a_pause() {
     let mut run = play(None, &[letter(' ')]);
     run.state.take(Arc::new(snapshot(Phase::Live)));
     assert!(run.state.paused);
-    run.state.take(Arc::new(Snapshot { paused: true, ..snapshot(Phase::Live) }));
+    run.state.take(Arc::new(Snapshot {
+        paused: true,
+        ..snapshot(Phase::Live)
+    }));
     run.state.take(Arc::new(snapshot(Phase::Live)));
     assert!(!run.state.paused);
 }
@@ -205,6 +360,9 @@ fn a_notice_goes_when_the_capture_speaks_or_with_time() {
     (0..1000).for_each(|_| run.state.tick());
     assert!(newest(&run.state).contains("Gathering"));
     run.state.say("something");
-    run.state.take(Arc::new(Snapshot { messages: vec!["Exported.".to_owned()], ..snapshot(Phase::Live) }));
+    run.state.take(Arc::new(Snapshot {
+        messages: vec!["Exported.".to_owned()],
+        ..snapshot(Phase::Live)
+    }));
     assert_eq!(newest(&run.state), "Exported.");
 }

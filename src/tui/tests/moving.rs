@@ -35,7 +35,11 @@ impl Moving for Puppet {
 }
 
 fn puppet() -> Puppet {
-    Puppet { skeleton: Arc::new(made_up::skeleton()), whims: Vec::new(), lived_s: 0.0 }
+    Puppet {
+        skeleton: Arc::new(made_up::skeleton()),
+        whims: Vec::new(),
+        lived_s: 0.0,
+    }
 }
 
 #[test]
@@ -45,7 +49,9 @@ fn the_tree_and_what_moves_it_are_seen() {
     stage.go_on(&mut puppet, 0.1);
     for (width, height) in [(80, 24), (120, 40), (1, 1), (20, 3)] {
         let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
-        terminal.draw(|frame| stage.render(frame, &puppet.told(), Theme::new(Depth::None))).unwrap();
+        terminal
+            .draw(|frame| stage.render(frame, &puppet.told(), Theme::new(Depth::None)))
+            .unwrap();
         if width >= 80 {
             insta::assert_snapshot!(format!("moving_{width}x{height}"), terminal.backend());
         }
@@ -60,10 +66,24 @@ fn keys_change_the_wind_and_pause_holds_the_tree() {
         stage.press(&Event::Key(KeyEvent::new(key, with)), puppet)
     };
     let plain = KeyModifiers::NONE;
-    for key in [KeyCode::Up, KeyCode::Left, KeyCode::Char('-'), KeyCode::Char('p'), KeyCode::Char('x')] {
+    for key in [
+        KeyCode::Up,
+        KeyCode::Left,
+        KeyCode::Char('-'),
+        KeyCode::Char('p'),
+        KeyCode::Char('x'),
+    ] {
         assert!(press(&mut stage, &mut puppet, key, plain));
     }
-    assert_eq!(puppet.whims, [Whim::Stronger(1), Whim::Veer(-15), Whim::Larger(-1), Whim::Pull]);
+    assert_eq!(
+        puppet.whims,
+        [
+            Whim::Stronger(1),
+            Whim::Veer(-15),
+            Whim::Larger(-1),
+            Whim::Pull
+        ]
+    );
     stage.go_on(&mut puppet, 0.5);
     assert!(press(&mut stage, &mut puppet, KeyCode::Char(' '), plain));
     stage.go_on(&mut puppet, 0.5);
@@ -71,5 +91,10 @@ fn keys_change_the_wind_and_pause_holds_the_tree() {
     assert!(press(&mut stage, &mut puppet, KeyCode::Char('l'), plain));
     assert_eq!(stage.state.turned, 1);
     assert!(!press(&mut stage, &mut puppet, KeyCode::Char('q'), plain));
-    assert!(!press(&mut stage, &mut puppet, KeyCode::Char('c'), KeyModifiers::CONTROL));
+    assert!(!press(
+        &mut stage,
+        &mut puppet,
+        KeyCode::Char('c'),
+        KeyModifiers::CONTROL
+    ));
 }

@@ -15,7 +15,9 @@ use std::sync::Arc;
 fn drawn(state: &State, depth: Depth, width: u16, height: u16) -> TestBackend {
     let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
     let mut preview = Preview::new(Graphics::characters(depth));
-    terminal.draw(|frame| screen::render(frame, state, Theme::new(depth), &mut preview)).unwrap();
+    terminal
+        .draw(|frame| screen::render(frame, state, Theme::new(depth), &mut preview))
+        .unwrap();
     terminal.backend().clone()
 }
 
@@ -26,10 +28,17 @@ fn state(snapshot: Snapshot) -> State {
 }
 
 fn cases() -> Vec<(&'static str, State)> {
-    let mut cases: Vec<_> = Phase::ALL.into_iter().map(|phase| (phase.name(), state(snapshot(phase)))).collect();
+    let mut cases: Vec<_> = Phase::ALL
+        .into_iter()
+        .map(|phase| (phase.name(), state(snapshot(phase))))
+        .collect();
     cases.push(("empty", state(Snapshot::default())));
     cases.push(("huge", state(huge())));
-    let replay = Snapshot { frames_total: Some(5000), source: "oak.mcap".to_owned(), ..snapshot(Phase::Live) };
+    let replay = Snapshot {
+        frames_total: Some(5000),
+        source: "oak.mcap".to_owned(),
+        ..snapshot(Phase::Live)
+    };
     cases.push(("replay", state(replay)));
     let mut help = state(snapshot(Phase::Live));
     help.help = true;
@@ -40,7 +49,10 @@ fn cases() -> Vec<(&'static str, State)> {
     turned.close_up = false;
     cases.push(("turned", turned));
     for (name, row, sway_passed_over) in [("branch", 2, 0), ("branch_unknown", 6, 12)] {
-        let mut close = state(Snapshot { sway_passed_over, ..snapshot(Phase::Live) });
+        let mut close = state(Snapshot {
+            sway_passed_over,
+            ..snapshot(Phase::Live)
+        });
         close.choose(row);
         cases.push((name, close));
     }
@@ -54,7 +66,9 @@ fn cases() -> Vec<(&'static str, State)> {
     cases.push(("huge_mesh", mesh));
     let mut drawing = state(snapshot(Phase::Accumulate));
     let polygon = drawing.drawing.get_or_insert_default();
-    [[100.0, 50.0], [500.0, 60.0], [300.0, 300.0]].into_iter().for_each(|p| polygon.add(p));
+    [[100.0, 50.0], [500.0, 60.0], [300.0, 300.0]]
+        .into_iter()
+        .for_each(|p| polygon.add(p));
     polygon.set_cursor([320.0, 180.0]);
     drawing.say("That is outside the picture.");
     cases.push(("drawing", drawing));
@@ -65,10 +79,29 @@ fn cases() -> Vec<(&'static str, State)> {
         damaged: 4,
         ..CameraState::default()
     };
-    cases.push(("away", state(Snapshot { camera, ..snapshot(Phase::Live) })));
-    let slow = CameraState { rate_off: true, ..CameraState::default() };
-    cases.push(("slow", state(Snapshot { camera: slow, sensor_rate_hz: 15.0, ..snapshot(Phase::Live) })));
-    let mut quitting = state(Snapshot { paused: true, ..snapshot(Phase::Live) });
+    cases.push((
+        "away",
+        state(Snapshot {
+            camera,
+            ..snapshot(Phase::Live)
+        }),
+    ));
+    let slow = CameraState {
+        rate_off: true,
+        ..CameraState::default()
+    };
+    cases.push((
+        "slow",
+        state(Snapshot {
+            camera: slow,
+            sensor_rate_hz: 15.0,
+            ..snapshot(Phase::Live)
+        }),
+    ));
+    let mut quitting = state(Snapshot {
+        paused: true,
+        ..snapshot(Phase::Live)
+    });
     quitting.quitting = true;
     quitting.say("Ending; writing the capture…");
     cases.push(("quitting", quitting));
@@ -92,26 +125,71 @@ fn looks_as_reviewed() {
 
 #[test]
 fn no_state_and_no_size_brings_it_down() {
-    let torn = Rgb { size: Size::new(640, 360), pixels: vec![1, 2, 3] };
-    let none = Rgb { size: Size::new(0, 0), pixels: Vec::new() };
-    let bare = Skeleton { nodes: Vec::new(), foot_px: [0.0; 2], image_size: Size::new(0, 0) };
+    let torn = Rgb {
+        size: Size::new(640, 360),
+        pixels: vec![1, 2, 3],
+    };
+    let none = Rgb {
+        size: Size::new(0, 0),
+        pixels: Vec::new(),
+    };
+    let bare = Skeleton {
+        nodes: Vec::new(),
+        foot_px: [0.0; 2],
+        image_size: Size::new(0, 0),
+    };
     let mut flat = super::made_up::skeleton();
-    flat.nodes.iter_mut().for_each(|n| n.position = nalgebra::Point3::origin());
+    flat.nodes
+        .iter_mut()
+        .for_each(|n| n.position = nalgebra::Point3::origin());
     let mut all: Vec<State> = cases().into_iter().map(|(_, state)| state).collect();
     for change in [
-        Snapshot { preview: Some(Arc::new(torn)), ..snapshot(Phase::Live) },
-        Snapshot { preview: Some(Arc::new(none)), image_size: Some(Size::new(0, 7)), ..snapshot(Phase::Live) },
-        Snapshot { image_size: None, ..snapshot(Phase::Live) },
-        Snapshot { skeleton: Some(Arc::new(bare)), ..snapshot(Phase::Live) },
-        Snapshot { skeleton: Some(Arc::new(flat)), pose: None, ..snapshot(Phase::Live) },
-        Snapshot { image_size: Some(Size::new(u32::MAX, 1)), ..huge() },
-        Snapshot { progress: f64::NEG_INFINITY, ..huge() },
+        Snapshot {
+            preview: Some(Arc::new(torn)),
+            ..snapshot(Phase::Live)
+        },
+        Snapshot {
+            preview: Some(Arc::new(none)),
+            image_size: Some(Size::new(0, 7)),
+            ..snapshot(Phase::Live)
+        },
+        Snapshot {
+            image_size: None,
+            ..snapshot(Phase::Live)
+        },
+        Snapshot {
+            skeleton: Some(Arc::new(bare)),
+            ..snapshot(Phase::Live)
+        },
+        Snapshot {
+            skeleton: Some(Arc::new(flat)),
+            pose: None,
+            ..snapshot(Phase::Live)
+        },
+        Snapshot {
+            image_size: Some(Size::new(u32::MAX, 1)),
+            ..huge()
+        },
+        Snapshot {
+            progress: f64::NEG_INFINITY,
+            ..huge()
+        },
     ] {
         let mut mesh = state(change.clone());
         mesh.switch_mesh();
         all.extend([state(change), mesh]);
     }
-    let sizes = [(0, 0), (1, 1), (60, 16), (61, 17), (80, 24), (20, 200), (500, 3), (120, 40), (300, 100)];
+    let sizes = [
+        (0, 0),
+        (1, 1),
+        (60, 16),
+        (61, 17),
+        (80, 24),
+        (20, 200),
+        (500, 3),
+        (120, 40),
+        (300, 100),
+    ];
     for (i, state) in all.iter().enumerate() {
         for (width, height) in sizes {
             for depth in [Depth::None, Depth::Indexed, Depth::True] {
@@ -130,7 +208,11 @@ fn every_column_of_the_table_of_branches_has_its_head() {
         let tables = text.matches("f/Hz").count();
         assert!(tables > 0, "{width}x{height}: {text}");
         for head in ["lvl", "pts", "ampl/px", "damping"] {
-            let found = text.lines().filter(|l| l.contains("f/Hz")).map(|l| l.matches(head).count()).sum::<usize>();
+            let found = text
+                .lines()
+                .filter(|l| l.contains("f/Hz"))
+                .map(|l| l.matches(head).count())
+                .sum::<usize>();
             assert_eq!(found, tables, "{head} at {width}x{height}: {text}");
         }
     }
@@ -140,32 +222,50 @@ fn every_column_of_the_table_of_branches_has_its_head() {
 #[test]
 fn an_unknown_sway_is_told_by_its_reason() {
     // While it films nothing has come to its end.
-    let while_filming = Unidentified::ALL.into_iter().filter(|why| *why != Unidentified::NotInTime);
+    let while_filming = Unidentified::ALL
+        .into_iter()
+        .filter(|why| *why != Unidentified::NotInTime);
     for (row, why) in while_filming.enumerate() {
         let mut state = state(snapshot(Phase::Live));
         state.choose(row as i16 + 3);
         for (width, height) in [(80, 24), (120, 40)] {
             let screen = drawn(&state, Depth::None, width, height).to_string();
-            let right: Vec<String> =
-                screen.lines().map(|l| l.chars().skip(width as usize * 58 / 100).collect()).collect();
-            let text = right.join(" ").split_whitespace().collect::<Vec<_>>().join(" ").replace("\" ", "");
+            let right: Vec<String> = screen
+                .lines()
+                .map(|l| l.chars().skip(width as usize * 58 / 100).collect())
+                .collect();
+            let text = right
+                .join(" ")
+                .split_whitespace()
+                .collect::<Vec<_>>()
+                .join(" ")
+                .replace("\" ", "");
             let told = format!("no frequency: {why}");
             let words = told.split(' ').collect::<Vec<_>>();
-            let at = text.find("no frequency:").unwrap_or_else(|| panic!("{why}: {screen}"));
-            assert!(words.iter().all(|w| text[at..].contains(w)), "{told}: {screen}");
+            let at = text
+                .find("no frequency:")
+                .unwrap_or_else(|| panic!("{why}: {screen}"));
+            assert!(
+                words.iter().all(|w| text[at..].contains(w)),
+                "{told}: {screen}"
+            );
             assert!(!text.contains('±'), "{screen}");
         }
     }
 }
 
-/// Scales say what is drawn: of few frames a second the axis ends below 1 Hz, and a young branch has few seconds.
+/// Scales say what is drawn: of few frames a second the axis ends below 1 Hz, and a young branch
+/// has few seconds.
 #[test]
 fn the_plots_of_a_branch_have_true_scales() {
     let text_of = |last_hz: f64, rows: usize| {
         let mut s = snapshot(Phase::Live);
         let mut sway = super::made_up::sway();
         for branch in sway.branches.values_mut() {
-            branch.spectrum.iter_mut().for_each(|s| s.bin_hz = last_hz / s.amplitude_deg.len() as f64);
+            branch
+                .spectrum
+                .iter_mut()
+                .for_each(|s| s.bin_hz = last_hz / s.amplitude_deg.len() as f64);
         }
         s.sway = Some(Arc::new(sway));
         let gone = s.angles.rows.len() - rows;
@@ -181,7 +281,10 @@ fn the_plots_of_a_branch_have_true_scales() {
         (0.75, 31, " 0.8 Hz", ", last 1 s "),
     ] {
         let text = text_of(last_hz, rows);
-        assert!(text.contains(end) && text.contains(seconds), "{end}{seconds}: {text}");
+        assert!(
+            text.contains(end) && text.contains(seconds),
+            "{end}{seconds}: {text}"
+        );
     }
 }
 
@@ -193,11 +296,18 @@ fn branches_are_coloured_alike_in_picture_table_and_tree() {
     for branch in 0..3 {
         let colour = theme.branch(Some(branch));
         let used = |pick: fn(&str) -> bool| {
-            screen.buffer().content.iter().any(|c| pick(c.symbol()) && (c.fg == colour || c.bg == colour))
+            screen
+                .buffer()
+                .content
+                .iter()
+                .any(|c| pick(c.symbol()) && (c.fg == colour || c.bg == colour))
         };
         assert!(used(|s| s == "▀"), "picture, branch {branch}");
         assert!(used(|s| s == "●"), "table, branch {branch}");
-        assert!(used(|s| ("\u{2801}"..="\u{28ff}").contains(&s)), "tree, branch {branch}");
+        assert!(
+            used(|s| ("\u{2801}"..="\u{28ff}").contains(&s)),
+            "tree, branch {branch}"
+        );
     }
 }
 
@@ -205,7 +315,11 @@ fn branches_are_coloured_alike_in_picture_table_and_tree() {
 fn without_colour_no_cell_is_coloured() {
     for (name, state) in cases() {
         let screen = drawn(&state, Depth::None, 80, 24);
-        let plain = screen.buffer().content.iter().all(|c| c.fg == Color::Reset && c.bg == Color::Reset);
+        let plain = screen
+            .buffer()
+            .content
+            .iter()
+            .all(|c| c.fg == Color::Reset && c.bg == Color::Reset);
         assert!(plain, "{name}");
     }
 }

@@ -1,4 +1,5 @@
-//! What the camera says of itself: a UVC 1.1 device with one MJPEG format of one size and rate, over a bulk endpoint.
+//! What the camera says of itself: a UVC 1.1 device with one MJPEG format of one size and rate,
+//! over a bulk endpoint.
 
 use super::{Mode, PAYLOAD};
 
@@ -40,8 +41,11 @@ pub fn probe(mode: &Mode) -> [u8; 26] {
 fn device() -> Vec<u8> {
     let [v0, v1] = VENDOR.to_le_bytes();
     let [p0, p1] = PRODUCT.to_le_bytes();
-    // USB 2.0, interfaces in associations, packets of 64 bytes; maker, product and serial are strings 1 to 3.
-    vec![18, DEVICE, 0x00, 0x02, 0xef, 2, 1, 64, v0, v1, p0, p1, 0x00, 0x01, 1, 2, 3, 1]
+    // USB 2.0, interfaces in associations, packets of 64 bytes; maker, product and serial are
+    // strings 1 to 3.
+    vec![
+        18, DEVICE, 0x00, 0x02, 0xef, 2, 1, 64, v0, v1, p0, p1, 0x00, 0x01, 1, 2, 3, 1,
+    ]
 }
 
 fn string(text: &str) -> Vec<u8> {

@@ -1,4 +1,5 @@
-//! USB/IP as the kernel speaks it on an attached socket: a header of 48 bytes, big-endian, then the data.
+//! USB/IP as the kernel speaks it on an attached socket: a header of 48 bytes, big-endian, then the
+//! data.
 
 use std::io::{self, Read, Write};
 
@@ -34,27 +35,46 @@ pub fn read(socket: &mut (impl Read + Write)) -> io::Result<Request> {
     let mut header = [0; HEADER];
     // The kernel writes a header in one go: a time-out comes before its first byte, or not at all.
     socket.read_exact(&mut header)?;
-    let word = |at: usize| u32::from_be_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]]);
+    let word = |at: usize| {
+        u32::from_be_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]])
+    };
     match word(0) {
         SUBMIT => {
             let mut setup = [0; 8];
             setup.copy_from_slice(&header[40..48]);
-            let submit =
-                Submit { sequence: word(4), incoming: word(12) == 1, endpoint: word(16), length: word(24), setup };
+            let submit = Submit {
+                sequence: word(4),
+                incoming: word(12) == 1,
+                endpoint: word(16),
+                length: word(24),
+                setup,
+            };
             if !submit.incoming {
                 let mut data = vec![0; submit.length as usize];
                 socket.read_exact(&mut data)?;
             }
             Ok(Request::Submit(submit))
         }
-        UNLINK => Ok(Request::Unlink { sequence: word(4), of: word(20) }),
+        UNLINK => Ok(Request::Unlink {
+            sequence: word(4),
+            of: word(20),
+        }),
         other => Err(io::Error::other(format!("unknown USB/IP command {other}"))),
     }
 }
 
 /// Ends a transfer with `status` (0 or a negative error number) and, towards the host, with `data`.
-pub fn answer(socket: &mut impl Write, submit: &Submit, status: i32, data: &[u8]) -> io::Result<()> {
-    let length = if submit.incoming { data.len() as u32 } else { submit.length };
+pub fn answer(
+    socket: &mut impl Write,
+    submit: &Submit,
+    status: i32,
+    data: &[u8],
+) -> io::Result<()> {
+    let length = if submit.incoming {
+        data.len() as u32
+    } else {
+        submit.length
+    };
     let mut packet = header(RETURN_SUBMIT, submit.sequence, status);
     packet[24..28].copy_from_slice(&length.to_be_bytes());
     if submit.incoming {
