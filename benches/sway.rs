@@ -5,6 +5,7 @@
 #[path = "../tests/made_trees/mod.rs"]
 mod made_trees;
 
+use arborcam::cancel::CancelToken;
 use arborcam::config::Dynamics;
 use arborcam::dynamics::analyse;
 use made_trees::{Drive, Filming, MadeTree};
@@ -37,7 +38,13 @@ fn main() {
         for seed in 0..20 {
             let tree = MadeTree::new(1000 + seed, drive, &filming);
             let start = Instant::now();
-            let sway = analyse(&tree.skeleton, &tree.film, &Dynamics::default()).sway;
+            let sway = analyse(
+                &tree.skeleton,
+                &tree.film,
+                &Dynamics::default(),
+                &CancelToken::new(),
+            )
+            .sway;
             took_s += start.elapsed().as_secs_f64();
             branches += tree.branches.len();
             for (k, b) in tree.branches.iter().enumerate() {

@@ -29,6 +29,7 @@
 //! whether this machine can · [`cli`] the commands · [`config`] what can be set.
 
 pub mod animate;
+pub mod cancel;
 pub mod capture;
 pub mod caught;
 pub mod cli;

@@ -24,6 +24,7 @@ pub use reshape::{MOST_RESHAPED, cut_to, reshape};
 pub use retrace::Retrace;
 pub use shoots::Shoot;
 
+use crate::cancel::CancelToken;
 use crate::config::Config;
 use crate::hierarchy::{self, Evidence};
 use crate::model::{Frame, MotionHierarchy, NodeId, Outline, Pose, Skeleton, TrackId, TrackSet};
@@ -70,7 +71,7 @@ impl Pipeline {
             .into_iter()
             .map(|followed| self.back.step(followed))
             .collect();
-        self.back.finish(&|| true);
+        self.back.finish(&CancelToken::new());
         moved
     }
 }

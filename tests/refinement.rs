@@ -2,6 +2,7 @@
 
 mod support;
 
+use arborcam::cancel::CancelToken;
 use arborcam::config::Config;
 use arborcam::model::{NodeName, Pose};
 use arborcam::pipeline::{BackEnd, Followed, Pipeline, Retrace, Tree};
@@ -314,7 +315,11 @@ fn a_film_that_ends_before_a_refinement_gets_its_shoots_at_the_end() {
         }
         let standing = back.tree().cloned().expect("a tree");
         assert_eq!((standing.refinements, standing.shoots.len()), (0, 0));
-        back.finish(&|| go_on);
+        let cancel = CancelToken::new();
+        if !go_on {
+            cancel.cancel();
+        }
+        back.finish(&cancel);
         (standing, back.tree().cloned().expect("a tree"))
     };
     let (standing, tree) = ended(true);
@@ -358,7 +363,7 @@ fn a_tree_that_is_built_at_the_end_is_the_first_one_with_its_shoots() {
         });
     }
     assert!(back.tree().is_none());
-    back.finish(&|| true);
+    back.finish(&CancelToken::new());
     let tree = back.tree().expect("a tree");
     assert!(
         tree.forced && tree.refinements == 0 && !tree.shoots.is_empty(),

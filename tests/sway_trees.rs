@@ -3,8 +3,9 @@
 
 mod made_trees;
 
+use arborcam::cancel::CancelToken;
 use arborcam::config::{Dynamics, Excited};
-use arborcam::dynamics::{Film, FilmTrack, analyse, analyse_with};
+use arborcam::dynamics::{Film, FilmTrack, analyse};
 use arborcam::model::{Excitation, NodeId, Unidentified};
 use made_trees::{Drive, Filming, MadeTree};
 
@@ -37,7 +38,12 @@ fn run_with(
     for seed in seeds {
         let mut tree = MadeTree::new(seed, drive, filming);
         change(&mut tree);
-        let analysis = analyse(&tree.skeleton, &tree.film, &Dynamics::default());
+        let analysis = analyse(
+            &tree.skeleton,
+            &tree.film,
+            &Dynamics::default(),
+            &CancelToken::new(),
+        );
         let wind = analysis
             .onset
             .is_some_and(|o| o.excitation == Excitation::Wind);
@@ -253,7 +259,14 @@ fn a_film_of_few_frames_a_second_claims_nothing() {
         };
         for seed in 0..4 {
             let tree = MadeTree::new(seed, drive, &filming);
-            for sway in analyse(&tree.skeleton, &tree.film, &Dynamics::default()).sway {
+            for sway in analyse(
+                &tree.skeleton,
+                &tree.film,
+                &Dynamics::default(),
+                &CancelToken::new(),
+            )
+            .sway
+            {
                 assert!(sway.is_err(), "{sway:?} from {rate_hz} frames/s");
             }
         }
@@ -318,7 +331,7 @@ fn what_carries_no_answer_gets_a_reason() {
         };
         for (i, (at, times, allowed)) in cases.iter().enumerate() {
             let (tree, film) = lone(at, times);
-            let sway = analyse(&tree.skeleton, &film, &config).sway;
+            let sway = analyse(&tree.skeleton, &film, &config, &CancelToken::new()).sway;
             assert_eq!(sway.len(), tree.skeleton.measured());
             match sway[1] {
                 Err(why) => assert!(allowed.contains(&why), "case {i}: {why:?}"),
@@ -340,10 +353,17 @@ fn what_is_broken_off_says_so() {
     for drive in [Drive::Release(0.5), Drive::Wind] {
         let tree = MadeTree::new(3, drive, &Filming::default());
         let config = Dynamics::default();
-        let whole = analyse(&tree.skeleton, &tree.film, &config).sway;
-        let asked = std::cell::Cell::new(0);
-        let go_on = || asked.replace(asked.get() + 1) < 2;
-        let part = analyse_with(&tree.skeleton, &tree.film, &config, &go_on).sway;
+        let whole = analyse(&tree.skeleton, &tree.film, &config, &CancelToken::new()).sway;
+        let cancel = CancelToken::new();
+        let part = std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while cancel.checks() < 2 {
+                    std::hint::spin_loop();
+                }
+                cancel.cancel();
+            });
+            analyse(&tree.skeleton, &tree.film, &config, &cancel).sway
+        });
         assert!(
             part.iter()
                 .filter(|s| **s == Err(Unidentified::NotInTime))
@@ -383,7 +403,14 @@ fn one_branch_with_half_of_its_frames() {
         ]
     };
     let (tree, film) = lone(at, &times);
-    let sway = analyse(&tree.skeleton, &film, &Dynamics::default()).sway[1].expect("a sway");
+    let sway = analyse(
+        &tree.skeleton,
+        &film,
+        &Dynamics::default(),
+        &CancelToken::new(),
+    )
+    .sway[1]
+        .expect("a sway");
     assert!(
         (sway.frequency_hz.value / 0.8 - 1.0).abs() < 1e-3,
         "{sway:?}"

@@ -6,9 +6,10 @@ mod written;
 
 use super::stop::Stop;
 use super::{Ended, say};
+use crate::cancel::CancelToken;
 use crate::capture::Captured;
 use crate::config::Excited;
-use crate::dynamics::analyse_with;
+use crate::dynamics::analyse;
 use crate::export::picture::data_address;
 use crate::export::{ExportError, refuse_taken};
 use crate::model::{Excitation, NodeName, Skeleton, Swaying};
@@ -16,7 +17,6 @@ use crate::report::{Given, Study, compare, hints, json, page, text};
 use crate::tui::columns;
 use anyhow::anyhow;
 pub use options::AnalyzeArgs;
-use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
@@ -159,12 +159,9 @@ fn analysed(args: &AnalyzeArgs, captured: &Captured, name: &str) -> Result<Analy
         nodes: captured.skeleton.nodes[..captured.skeleton.measured()].to_vec(),
         ..(*captured.skeleton).clone()
     };
-    let progress = Progress::of(name, skeleton.nodes.len());
-    let analysis = analyse_with(&skeleton, &film, dynamics, &|| {
-        progress.step();
-        true
-    });
-    progress.end();
+    let progress = Progress::begin(name, skeleton.nodes.len().saturating_sub(1));
+    let analysis = analyse(&skeleton, &film, dynamics, &CancelToken::new());
+    drop(progress);
     let given = dynamics.excitation != Excited::Auto;
     hints(&film, &analysis, given)
         .into_iter()
@@ -239,39 +236,23 @@ fn analysed(args: &AnalyzeArgs, captured: &Captured, name: &str) -> Result<Analy
     })
 }
 
-/// Tells how far the work is, on a line that is written over and goes at the end; on a terminal
-/// only.
-struct Progress<'a> {
-    name: &'a str,
-    all: usize,
-    done: Cell<usize>,
+/// A line on the terminal while a capture is analysed, gone when this is dropped.
+struct Progress {
     shown: bool,
 }
 
-impl<'a> Progress<'a> {
-    fn of(name: &'a str, all: usize) -> Self {
-        Self {
-            name,
-            all,
-            done: Cell::new(0),
-            shown: std::io::stderr().is_terminal(),
+impl Progress {
+    fn begin(name: &str, branches: usize) -> Self {
+        let shown = std::io::stderr().is_terminal();
+        if shown {
+            let _ = write!(std::io::stderr(), "{name}: analysing {branches} branches");
         }
+        Self { shown }
     }
+}
 
-    fn step(&self) {
-        self.done.set(self.done.get() + 1);
-        if self.shown {
-            let _ = write!(
-                std::io::stderr(),
-                "\r{}: branch {} of {}",
-                self.name,
-                self.done.get(),
-                self.all - 1
-            );
-        }
-    }
-
-    fn end(&self) {
+impl Drop for Progress {
+    fn drop(&mut self) {
         if self.shown {
             let _ = write!(std::io::stderr(), "\r\x1b[K");
         }

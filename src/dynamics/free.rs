@@ -12,6 +12,7 @@ use super::release::{MOMENT_SD, Onset};
 use super::signals::{Factor, Fit, Signals};
 use super::spread::deviations;
 use super::swing::Arms;
+use crate::cancel::CancelToken;
 use crate::model::{Excitation, Interval, NodeId, Skeleton, Sway, Swaying, Unidentified};
 use crate::signal::along_principal_direction;
 
@@ -90,7 +91,7 @@ pub(super) fn sways(
     members: &[Vec<usize>],
     onset: &Onset,
     demands: &Demands,
-    go_on: &dyn Fn() -> bool,
+    cancel: &CancelToken,
 ) -> Vec<Swaying> {
     let mut own: Vec<Option<Own>> = vec![None; members.len()];
     // Modes of branches that may not be theirs alone: perhaps that of a branch on them.
@@ -105,7 +106,7 @@ pub(super) fn sways(
         if members.is_empty() {
             continue;
         }
-        if !go_on() {
+        if cancel.is_cancelled() {
             out[i] = Err(Unidentified::NotInTime);
             continue;
         }

@@ -32,4 +32,4 @@ pub use modal::{Shoot, shoots};
 pub use pulls::energy;
 pub use release::Onset;
 pub use spectrum::{Spectrum, spectrum};
-pub use sway::{Analysis, LEAST_PERIODS, analyse, analyse_soon, analyse_with};
+pub use sway::{Analysis, LEAST_PERIODS, analyse, analyse_soon};

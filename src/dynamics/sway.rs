@@ -6,6 +6,7 @@ use super::members::members;
 use super::modal;
 use super::release::{Onset, onset};
 use super::wind;
+use crate::cancel::CancelToken;
 use crate::config::{Dynamics, Excited};
 use crate::model::{Excitation, Skeleton, Swaying, Unidentified};
 use std::borrow::Cow;
@@ -32,19 +33,15 @@ pub struct Analysis {
 /// The sway of every measured node of `skeleton` (its foot among them, which has none) in `film`.
 ///
 /// Never fails: what the film does not carry is [`Unidentified`].
-pub fn analyse(skeleton: &Skeleton, film: &Film, config: &Dynamics) -> Analysis {
-    analyse_with(skeleton, film, config, &|| true)
-}
-
-/// The same; `go_on` is asked before every branch, as many of them take a while: those that are
-/// left when it says no are [`Unidentified::NotInTime`].
-pub fn analyse_with(
+/// `cancel` is looked at before every branch, as many of them take a while: those that are left by
+/// then are [`Unidentified::NotInTime`].
+pub fn analyse(
     skeleton: &Skeleton,
     film: &Film,
     config: &Dynamics,
-    go_on: &dyn Fn() -> bool,
+    cancel: &CancelToken,
 ) -> Analysis {
-    looked_at(skeleton, film, config, true, go_on)
+    looked_at(skeleton, film, config, true, cancel)
 }
 
 /// The same in a time that a screen can wait for: one branch after the other, and not all of them
@@ -53,9 +50,9 @@ pub fn analyse_soon(
     skeleton: &Skeleton,
     film: &Film,
     config: &Dynamics,
-    go_on: &dyn Fn() -> bool,
+    cancel: &CancelToken,
 ) -> Analysis {
-    looked_at(skeleton, film, config, false, go_on)
+    looked_at(skeleton, film, config, false, cancel)
 }
 
 fn looked_at(
@@ -63,7 +60,7 @@ fn looked_at(
     film: &Film,
     config: &Dynamics,
     at_once: bool,
-    go_on: &dyn Fn() -> bool,
+    cancel: &CancelToken,
 ) -> Analysis {
     let Some(Begun {
         members,
@@ -92,13 +89,13 @@ fn looked_at(
     };
     let sway = match onset.excitation {
         Excitation::Release => {
-            let mut sways = free::sways(skeleton, &film, &members, &onset, &demands, go_on);
+            let mut sways = free::sways(skeleton, &film, &members, &onset, &demands, cancel);
             if at_once {
-                modal::answer(skeleton, &film, &onset, &demands, &mut sways, go_on);
+                modal::answer(skeleton, &film, &onset, &demands, &mut sways, cancel);
             }
             sways
         }
-        Excitation::Wind => wind::sways(skeleton, &film, &members, &demands, go_on),
+        Excitation::Wind => wind::sways(skeleton, &film, &members, &demands, cancel),
     };
     Analysis {
         sway,

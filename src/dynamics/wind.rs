@@ -15,6 +15,7 @@ use super::gusts::{Oscillator, Problem};
 use super::members::{Points, mean_px};
 use super::process::Times;
 use super::swing::levers;
+use crate::cancel::CancelToken;
 use crate::model::{Excitation, NodeId, Skeleton, Sway, Swaying, Unidentified};
 use std::cell::RefCell;
 
@@ -91,7 +92,7 @@ pub(super) fn sways(
     film: &Film,
     members: &[Vec<usize>],
     demands: &Demands,
-    go_on: &dyn Fn() -> bool,
+    cancel: &CancelToken,
 ) -> Vec<Swaying> {
     let mut own: Vec<Option<Own>> = vec![None; members.len()];
     let mut out = vec![Err(Unidentified::NotMeasured); members.len()];
@@ -100,7 +101,7 @@ pub(super) fn sways(
         if tracks.is_empty() {
             continue;
         }
-        if !go_on() {
+        if cancel.is_cancelled() {
             out[i] = Err(Unidentified::NotInTime);
             continue;
         }

@@ -2,6 +2,7 @@
 
 use super::refiner::Refiner;
 use super::{Followed, Moment, Poser, Refinement, Targets, Tree, build};
+use crate::cancel::CancelToken;
 use crate::config::Config;
 use crate::hierarchy::{self, Evidence};
 use crate::model::{Outline, Phase, Pose, Rgb, TrackSet};
@@ -246,8 +247,8 @@ impl BackEnd {
     /// No more frames: if nothing has been built, builds from what there is, unless that is next to
     /// nothing; and a tree that was never refined gets the shoots that a refinement would put on
     /// it, if there is enough motion in what is remembered, and
-    /// `go_on` does not say no before.
-    pub fn finish(&mut self, go_on: &dyn Fn() -> bool) {
+    /// `cancel` does not end it before.
+    pub fn finish(&mut self, cancel: &CancelToken) {
         if self.live.is_none() && !self.history.is_empty() {
             let table = self.judge();
             let asked = self.build_now || self.building.is_some();
@@ -255,17 +256,17 @@ impl BackEnd {
                 self.build(&table, true);
             }
         }
-        self.shoot(go_on);
+        self.shoot(cancel);
     }
 
-    fn shoot(&mut self, go_on: &dyn Fn() -> bool) {
+    fn shoot(&mut self, cancel: &CancelToken) {
         let Some(live) = self.live.as_ref().filter(|live| live.tree.refinements == 0) else {
             return;
         };
         let Some(work) = Refinement::of(&self.history, live, &self.config) else {
             return;
         };
-        if let Some(mut tree) = work.shoots_while(go_on) {
+        if let Some(mut tree) = work.shoots_while(cancel) {
             let standing = &live.tree;
             // The capture's poses are followed as those of the tree without them were shown.
             (tree.followed_from, tree.shown_from) = (standing.followed_from, standing.shown_from);

@@ -2,6 +2,7 @@
 
 use super::back::Live;
 use super::{Moment, Shoot, Tree, build, shoots, thicken};
+use crate::cancel::CancelToken;
 use crate::config::Config;
 use crate::hierarchy::{self, Evidence, Gain, OnBoth};
 use crate::model::{MotionHierarchy, NodeId, NodeName, Skeleton, TrackId};
@@ -66,11 +67,11 @@ impl Refinement {
     /// undo what wind has shown), and if it is not worse than the old one by more than chance. Each
     /// of them is held against what both were built from: on its own evidence any tree looks good.
     pub fn run(&self) -> Option<Tree> {
-        self.run_while(&|| true)
+        self.run_while(&CancelToken::new())
     }
 
-    /// The same; where `go_on` says no meanwhile, nobody waits for what it gives.
-    pub fn run_while(&self, go_on: &dyn Fn() -> bool) -> Option<Tree> {
+    /// The same; where `cancel` ends it before, nobody waits for what it gives.
+    pub fn run_while(&self, cancel: &CancelToken) -> Option<Tree> {
         let evidence = self.evidence()?;
         let (frame, measure) = (self.moment.frame, evidence.measure);
         let mut tree = build(
@@ -96,7 +97,7 @@ impl Refinement {
             "refinement"
         );
         if !taken {
-            return self.with_other_shoots(go_on);
+            return self.with_other_shoots(cancel);
         }
         self.adopt(&mut tree);
         let binding = tree.binding();
@@ -105,17 +106,17 @@ impl Refinement {
             &tree.plain,
             |id| binding.node_of(id),
             &self.config.dynamics,
-            go_on,
+            cancel,
         );
         self.shoot(&mut tree, shoots);
         Some(tree)
     }
 
     /// The standing tree with the shoots that are told by now, if they are others, and enough
-    /// motion is seen; not if `go_on` says no meanwhile.
-    pub(super) fn shoots_while(&self, go_on: &dyn Fn() -> bool) -> Option<Tree> {
+    /// motion is seen; not if `cancel` ends it before.
+    pub(super) fn shoots_while(&self, cancel: &CancelToken) -> Option<Tree> {
         self.evidence()?;
-        self.with_other_shoots(go_on)
+        self.with_other_shoots(cancel)
     }
 
     /// The motion seen, if it is enough for a build of its own.
@@ -133,7 +134,7 @@ impl Refinement {
         (measure >= enough).then_some(evidence)
     }
 
-    fn with_other_shoots(&self, go_on: &dyn Fn() -> bool) -> Option<Tree> {
+    fn with_other_shoots(&self, cancel: &CancelToken) -> Option<Tree> {
         let standing = &*self.standing;
         let node_of = |id: TrackId| Some(self.bound.get(&id)?.0);
         let shoots = shoots::told(
@@ -141,14 +142,14 @@ impl Refinement {
             &standing.plain,
             node_of,
             &self.config.dynamics,
-            go_on,
+            cancel,
         );
         let points = |all: &[Shoot]| {
             all.iter()
                 .map(|s| (s.on, s.members.clone()))
                 .collect::<BTreeSet<_>>()
         };
-        if !go_on() || points(&shoots) == points(&standing.shoots) {
+        if cancel.is_cancelled() || points(&shoots) == points(&standing.shoots) {
             return None;
         }
         let mut tree = standing.clone();

@@ -5,6 +5,7 @@
 //! than another are of the tree without them. So whatever is told of them, the tree itself stands
 //! as it did.
 
+use crate::cancel::CancelToken;
 use crate::config::Dynamics;
 use crate::dynamics::{Film, FilmTrack, shoots};
 use crate::hierarchy::rest_position_px;
@@ -46,7 +47,7 @@ pub(super) fn told(
     skeleton: &Skeleton,
     node_of: impl Fn(TrackId) -> Option<NodeId>,
     config: &Dynamics,
-    go_on: &dyn Fn() -> bool,
+    cancel: &CancelToken,
 ) -> Vec<Shoot> {
     let at = |p: &Option<[f32; 2]>| p.map_or([f64::NAN; 2], |p| p.map(f64::from));
     let on_tree = |row: usize| Some((row, node_of(table.ids[row])?));
@@ -60,7 +61,7 @@ pub(super) fn told(
         .iter()
         .map(|&row| rest_position_px(table, row))
         .collect();
-    let told = shoots(skeleton, &film, config, go_on);
+    let told = shoots(skeleton, &film, config, cancel);
     let mut out = Vec::new();
     for on in (0..skeleton.measured() as u32).map(NodeId) {
         let of_this: Vec<&Vec<usize>> = told

@@ -76,6 +76,7 @@ fn dies_down(energy: &[[f64; 2]]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cancel::CancelToken;
     use crate::config::Dynamics;
     use crate::dynamics::{FilmTrack, Onset, Start, analyse};
     use crate::model::{Node, NodeId, NodeName, Size, Skeleton};
@@ -156,7 +157,7 @@ mod tests {
                 height: 360,
             },
         };
-        analyse(&skeleton, film, &Dynamics::default())
+        analyse(&skeleton, film, &Dynamics::default(), &CancelToken::new())
     }
 
     /// Where an oscillator of 0.6 Hz is in `n` frames that wind shakes in those that are `windy`.

@@ -4,10 +4,9 @@ use super::announce::little_motion;
 use super::capture_tables::{CaptureTables, Done};
 use super::held_sets::{HeldSets, OnTrial};
 use super::meter::Histogram;
-use super::patience::Patience;
 use super::shared::{Failure, Shared};
 use crate::config::Config;
-use crate::dynamics::analyse_with;
+use crate::dynamics::analyse;
 use crate::export::capture::{
     AnimationNote, Build, Capture, ModelNote, OutlineNote, PictureNote, Quality as QualityNote,
     Refinement, Software, Source, Timing, json,
@@ -77,7 +76,6 @@ pub struct CaptureJob {
     pub quality: Quality,
     pub picture: Option<Picture>,
     pub shared: Arc<Shared>,
-    pub patience: Patience,
 }
 
 /// What was written, for the closing lines.
@@ -131,10 +129,8 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
     let (sway, (model, push)) = beside(
         "sway",
         || {
-            analyse_with(&tree.skeleton, &film, &job.config.dynamics, &|| {
-                wrote() && !job.patience.is_over()
-            })
-            .sway
+            let cancel = &job.shared.pulse.closing_work;
+            analyse(&tree.skeleton, &film, &job.config.dynamics, cancel).sway
         },
         || {
             (
@@ -260,7 +256,7 @@ fn model_of(
         all_levels: false,
         metres_per_px: job.config.export.metres_per_px,
         tolerance_px: KEY_TOLERANCE_PX,
-        thorough: &|| !large && !job.patience.is_over(),
+        thorough: &|| !large && !job.shared.pulse.closing_work.is_cancelled(),
         node_extras: &[],
         provenance: &provenance,
     })

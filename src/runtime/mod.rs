@@ -20,7 +20,6 @@ mod losses;
 mod meter;
 mod model_thread;
 mod nap;
-mod patience;
 mod play;
 mod pulse;
 mod rate;

@@ -4,7 +4,6 @@
 use super::announce::Announced;
 use super::behind::BehindTree;
 use super::finish::{self, CaptureJob, Quality};
-use super::patience::Patience;
 use super::pulse::Worker;
 use super::recorder_thread::{Found, Recorded, Recorder};
 use super::refining::Refining;
@@ -156,11 +155,7 @@ impl ModelThread {
         self.show(last.as_ref(), true);
         // No frame is left that could need what is under way.
         self.refining = Refining::default();
-        let shared = self.shared.clone();
-        self.back.finish(&|| {
-            shared.pulse.wrote();
-            !shared.hurry.load(Ordering::Relaxed)
-        });
+        self.back.finish(&self.shared.pulse.optional_work);
         self.announce();
         self.show(None, true);
         let summary = self.finish();
@@ -321,7 +316,6 @@ impl ModelThread {
             quality: self.quality.clone(),
             picture: self.picture.clone(),
             shared: self.shared.clone(),
-            patience: Patience::from_now(&self.shared),
         })
     }
 

@@ -4,6 +4,7 @@
 //! for work alone: frames that came in and went through every thread, or a source that says itself
 //! that it waits for its camera.
 
+use crate::cancel::CancelToken;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The threads that are given work by another one.
@@ -38,6 +39,12 @@ pub struct Pulse {
     done: [AtomicU64; Worker::ALL.len()],
     waits: AtomicU64,
     written: AtomicU64,
+    /// What the `sway` thread works on is a child of this token: each look at it is a piece done.
+    pub sway_work: CancelToken,
+    /// The work of the end that nobody waits for who asks for the end, and the work that he gives
+    /// some seconds. Each look at them is a sign of life, as a frame written is.
+    pub optional_work: CancelToken,
+    pub closing_work: CancelToken,
 }
 
 impl Pulse {
@@ -74,8 +81,12 @@ impl Pulse {
             counts.each_ref().map(|c| c.load(Ordering::Relaxed))
         };
         // What is done is read first, lest more be done than was given.
-        let (done, given) = (read(&self.done), read(&self.given));
+        let (mut done, mut given) = (read(&self.done), read(&self.given));
+        let steps = self.sway_work.checks();
+        done[Worker::Sway as usize] += steps;
+        given[Worker::Sway as usize] += steps;
         let [waits, written] = [&self.waits, &self.written].map(|c| c.load(Ordering::Relaxed));
+        let written = written + self.optional_work.checks() + self.closing_work.checks();
         Marks {
             frames,
             waits,

@@ -1,8 +1,7 @@
 //! The tree is worked out anew on a thread of its own, while poses go on.
 
+use crate::cancel::CancelToken;
 use crate::pipeline::{BackEnd, Tree};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
 /// A refinement under way, if there is one.
@@ -10,7 +9,7 @@ use std::thread::JoinHandle;
 pub struct Refining {
     work: Option<JoinHandle<Option<Tree>>>,
     /// Nobody waits for it any more: it shall leave the computer to others.
-    given_up: Arc<AtomicBool>,
+    given_up: CancelToken,
 }
 
 impl Refining {
@@ -19,7 +18,7 @@ impl Refining {
     pub fn begin(&mut self, back: &BackEnd) {
         if let (Some(work), None) = (back.refinement(), &self.work) {
             let (work, given_up) = (work.clone(), self.given_up.clone());
-            let run = move || work.run_while(&|| !given_up.load(Ordering::Relaxed));
+            let run = move || work.run_while(&given_up);
             self.work = std::thread::Builder::new()
                 .name("refine".into())
                 .spawn(run)
@@ -32,7 +31,7 @@ impl Refining {
     /// (`live`): the frame does without.
     pub fn hand_in(&mut self, back: &mut BackEnd, time_s: f64, live: bool, hurry: bool) {
         if hurry {
-            self.given_up.store(true, Ordering::Relaxed);
+            self.given_up.cancel();
         }
         if !back.needs_refinement(time_s) {
             return;
@@ -51,6 +50,6 @@ impl Refining {
 
 impl Drop for Refining {
     fn drop(&mut self) {
-        self.given_up.store(true, Ordering::Relaxed);
+        self.given_up.cancel();
     }
 }

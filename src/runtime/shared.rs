@@ -11,6 +11,13 @@ use crate::source::{DecodeError, SourceError};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// What is only made better by more time, or can be had from the capture afterwards, ends so long
+/// after somebody asked for the end: everything else takes a second, and a service is killed if it
+/// does not end. A film that ends by itself is not hurried: the same recording gives the same
+/// capture however slow the machine is.
+const ENDS_WITHIN: Duration = Duration::from_secs(5);
 
 /// Warnings that are kept; the oldest give way.
 const WARNINGS_KEPT: usize = 50;
@@ -255,6 +262,10 @@ impl Shared {
     /// Ends the capture because somebody wants it.
     pub fn stop_at_once(&self) {
         self.hurry.store(true, Ordering::Relaxed);
+        self.pulse.optional_work.cancel();
+        self.pulse
+            .closing_work
+            .cancel_at(Instant::now() + ENDS_WITHIN);
         self.stop.store(true, Ordering::Relaxed);
     }
 

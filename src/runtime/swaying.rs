@@ -9,6 +9,7 @@
 
 use super::pulse::{Pulse, Worker};
 use super::shared::Shared;
+use crate::cancel::CancelToken;
 use crate::config::Dynamics;
 use crate::dynamics::{FilmLog, analyse_soon, spectrum};
 use crate::model::{
@@ -19,7 +20,7 @@ use crossbeam_channel::{
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -40,24 +41,24 @@ pub struct Request {
 }
 
 /// Works a request off; asks again and again whether to go on, which is its sign of life, too.
-pub type Analyser = fn(&Request, &dyn Fn() -> bool) -> SwayNow;
+pub type Analyser = fn(&Request, &CancelToken) -> SwayNow;
 
 /// A request on its way to the thread.
 struct Errand {
     request: Request,
-    wanted: Arc<AtomicBool>,
+    wanted: CancelToken,
     answer: Sender<SwayNow>,
 }
 
 /// A request that has been made; dropped, it is given up.
 struct Pending {
-    wanted: Arc<AtomicBool>,
+    wanted: CancelToken,
     answer: Receiver<SwayNow>,
 }
 
 impl Drop for Pending {
     fn drop(&mut self) {
-        self.wanted.store(false, Ordering::Relaxed);
+        self.wanted.cancel();
     }
 }
 
@@ -147,7 +148,7 @@ impl Swaying {
             return;
         };
         let (answer, answered) = bounded(1);
-        let wanted = Arc::new(AtomicBool::new(true));
+        let wanted = self.shared.pulse.sway_work.child();
         let errand = Errand {
             request,
             wanted: wanted.clone(),
@@ -251,15 +252,9 @@ fn work(queue: &Receiver<Errand>, analyser: Analyser, shared: &Shared) {
         answer,
     } in queue
     {
-        let pulse = &shared.pulse;
-        let _at_work = AtWork::new(pulse);
-        let go_on = || {
-            pulse.give(Worker::Sway);
-            pulse.done(Worker::Sway);
-            wanted.load(Ordering::Relaxed)
-        };
-        if go_on() {
-            let found = analyser(&request, &go_on);
+        let _at_work = AtWork::new(&shared.pulse);
+        if !wanted.is_cancelled() {
+            let found = analyser(&request, &wanted);
             // Nobody may be waiting any more.
             drop(answer.send(found));
         }
@@ -284,7 +279,7 @@ impl Drop for AtWork<'_> {
 }
 
 /// The sway of every branch, and the spectra of the angles.
-pub fn analyse(request: &Request, go_on: &dyn Fn() -> bool) -> SwayNow {
+pub fn analyse(request: &Request, cancel: &CancelToken) -> SwayNow {
     let Request {
         skeleton,
         settings,
@@ -294,7 +289,7 @@ pub fn analyse(request: &Request, go_on: &dyn Fn() -> bool) -> SwayNow {
     let film = request
         .log
         .film(skeleton, |id| request.nodes.get(&id).copied());
-    let analysis = analyse_soon(skeleton, &film, settings, go_on);
+    let analysis = analyse_soon(skeleton, &film, settings, cancel);
     let branch = |(i, name): (usize, &NodeName)| {
         // The foot is no branch.
         let swaying = analysis

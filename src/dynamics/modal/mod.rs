@@ -21,6 +21,7 @@ use super::free::{Demands, LEAST_PERIODS, Z, interval};
 use super::members::{is_seen, mean_px};
 use super::release::Onset;
 use super::sway::BELOW_NYQUIST;
+use crate::cancel::CancelToken;
 use crate::model::{Excitation, NodeId, Skeleton, Sway, Swaying, Unidentified};
 use read::Reading;
 use search::LEAST;
@@ -62,7 +63,7 @@ pub(super) fn answer(
     onset: &Onset,
     demands: &Demands,
     sways: &mut [Swaying],
-    go_on: &dyn Fn() -> bool,
+    cancel: &CancelToken,
 ) {
     let open = |sway: &Swaying| {
         matches!(
@@ -75,8 +76,8 @@ pub(super) fn answer(
     if !sways.iter().any(open) {
         return;
     }
-    let Some(told) = told(skeleton, film, onset, demands, sways, go_on) else {
-        if !go_on() {
+    let Some(told) = told(skeleton, film, onset, demands, sways, cancel) else {
+        if cancel.is_cancelled() {
             sways
                 .iter_mut()
                 .filter(|s| open(s))
@@ -141,14 +142,14 @@ impl Told {
     }
 }
 
-/// `None` where too little is seen, or `go_on` says no before.
+/// `None` where too little is seen, or `cancel` ends it before.
 fn told(
     skeleton: &Skeleton,
     film: &Film,
     onset: &Onset,
     demands: &Demands,
     sways: &[Swaying],
-    go_on: &dyn Fn() -> bool,
+    cancel: &CancelToken,
 ) -> Option<Told> {
     // All points have the trunk's sway: without it nothing is sure.
     if !sways.get(1).is_some_and(Result::is_ok) {
@@ -177,7 +178,7 @@ fn told(
         .collect();
     let captured = captured(skeleton, sways, &decay, branch_of.clone());
     let on: Vec<Vec<usize>> = (0..sways.len()).map(|b| captured.all(b)).collect();
-    let tree = captured.grown(go_on)?;
+    let tree = captured.grown(cancel)?;
     let clear = |r: &Reading| {
         r.gain >= CLEAR
             && r.gain * r.points.len() as f64 >= CLEAR_TOGETHER
@@ -378,7 +379,8 @@ mod tests {
     fn a_branch_with_a_few_strangers_gets_its_answer() {
         let (skeleton, film) =
             filmed(&[(1.10, &[4.0, 5.0, 3.5, 4.5, 5.5, 5.0]), (1.6, &[3.0, 4.0])]);
-        let sway = analyse(&skeleton, &film, &Dynamics::default()).sway[2].unwrap();
+        let sway =
+            analyse(&skeleton, &film, &Dynamics::default(), &CancelToken::new()).sway[2].unwrap();
         assert!(sway.frequency_hz.holds(1.10), "{sway:?}");
         assert!(
             sway.damping_ratio.is_some_and(|d| d.holds(0.03)),
@@ -398,8 +400,22 @@ mod tests {
         else {
             return Vec::new();
         };
-        let sways = free::sways(skeleton, &film, &members, &onset, &demands, &|| true);
-        let Some(told) = told(skeleton, &film, &onset, &demands, &sways, &|| true) else {
+        let sways = free::sways(
+            skeleton,
+            &film,
+            &members,
+            &onset,
+            &demands,
+            &CancelToken::new(),
+        );
+        let Some(told) = told(
+            skeleton,
+            &film,
+            &onset,
+            &demands,
+            &sways,
+            &CancelToken::new(),
+        ) else {
             return Vec::new();
         };
         let own = told
@@ -447,7 +463,7 @@ mod tests {
 
     fn shot(branches: &[(f64, &[f64])]) -> Vec<Vec<usize>> {
         let (skeleton, film) = filmed(branches);
-        let shoots = shoots(&skeleton, &film, &Dynamics::default(), &|| true);
+        let shoots = shoots(&skeleton, &film, &Dynamics::default(), &CancelToken::new());
         assert!(shoots.iter().all(|s| s.on == NodeId(2)), "{shoots:?}");
         let mut groups: Vec<Vec<usize>> = shoots.into_iter().map(|s| s.tracks).collect();
         groups.sort();

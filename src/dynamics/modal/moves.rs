@@ -4,6 +4,7 @@
 use super::super::decay::Mode;
 use super::search::{CLEAR, LEAST, Tried};
 use super::tree::{Branch, PER_MODE, Tree};
+use crate::cancel::CancelToken;
 
 /// What a change must be worth.
 const WORTH: f64 = 10.0;
@@ -21,14 +22,14 @@ const APART: [f64; 2] = [0.03, 0.08];
 const CHOOSE: usize = 3;
 
 impl<'a> Tree<'a> {
-    /// The best tree that the changes lead to; `None` if `go_on` says no before.
-    pub fn grown(mut self, go_on: &dyn Fn() -> bool) -> Option<Self> {
+    /// The best tree that the changes lead to; `None` if `cancel` ends it before.
+    pub fn grown(mut self, cancel: &CancelToken) -> Option<Self> {
         let tried = Tried::new(self.decay);
         self.fit_all();
         for _ in 0..ROUNDS {
             let mut changed = false;
             for branch in 1..self.branches.len() {
-                if !go_on() {
+                if cancel.is_cancelled() {
                     return None;
                 }
                 changed |= self.rearrange(branch, &tried);
@@ -36,7 +37,7 @@ impl<'a> Tree<'a> {
             let mut largest: Vec<usize> = (1..self.branches.len()).collect();
             largest.sort_by_key(|&b| std::cmp::Reverse(self.own(b).len()));
             for branch in largest {
-                if !go_on() {
+                if cancel.is_cancelled() {
                     return None;
                 }
                 changed |= self.shoot(branch, &tried);
@@ -44,7 +45,7 @@ impl<'a> Tree<'a> {
             for branch in 1..self.branches.len() {
                 changed |= self.part(branch);
             }
-            if !go_on() {
+            if cancel.is_cancelled() {
                 return None;
             }
             let all: Vec<usize> = (1..self.branches.len()).collect();

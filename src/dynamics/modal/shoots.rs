@@ -4,6 +4,7 @@ use super::super::film::Film;
 use super::super::free;
 use super::super::sway::{Begun, begun};
 use super::{ONE, Reading, told};
+use crate::cancel::CancelToken;
 use crate::config::Dynamics;
 use crate::model::{Excitation, NodeId, Skeleton, Sway};
 
@@ -26,13 +27,13 @@ pub struct Shoot {
 }
 
 /// The branches that a release shows beyond those of `skeleton`, at most one for every point; none
-/// in wind, or where the film carries too little, or where `go_on` says no meanwhile. The one that
+/// in wind, or where the film carries too little, or where `cancel` ends it before. The one that
 /// is clearest by all its points takes them first.
 pub fn shoots(
     skeleton: &Skeleton,
     film: &Film,
     config: &Dynamics,
-    go_on: &dyn Fn() -> bool,
+    cancel: &CancelToken,
 ) -> Vec<Shoot> {
     let Some(Begun {
         members,
@@ -47,8 +48,8 @@ pub fn shoots(
     if onset.excitation != Excitation::Release {
         return Vec::new();
     }
-    let sways = free::sways(skeleton, &film, &members, &onset, &demands, go_on);
-    let Some(mut told) = told(skeleton, &film, &onset, &demands, &sways, go_on) else {
+    let sways = free::sways(skeleton, &film, &members, &onset, &demands, cancel);
+    let Some(mut told) = told(skeleton, &film, &onset, &demands, &sways, cancel) else {
         return Vec::new();
     };
     let mut readings = std::mem::take(&mut told.readings);

@@ -2,6 +2,7 @@
 
 use super::super::pulse::{Sign, Vigil};
 use super::*;
+use crate::cancel::CancelToken;
 use std::time::Instant;
 
 /// What hangs has not come back after so long.
@@ -31,30 +32,30 @@ fn answer(request: &Request) -> SwayNow {
     }
 }
 
-fn at_once(request: &Request, _: &dyn Fn() -> bool) -> SwayNow {
+fn at_once(request: &Request, _: &CancelToken) -> SwayNow {
     answer(request)
 }
 
-fn slow(request: &Request, go_on: &dyn Fn() -> bool) -> SwayNow {
-    takes(Duration::from_millis(300), go_on);
+fn slow(request: &Request, cancel: &CancelToken) -> SwayNow {
+    takes(Duration::from_millis(300), cancel);
     answer(request)
 }
 
 /// Slower than the machine that looks at it, however busy that is.
-fn very_slow(request: &Request, go_on: &dyn Fn() -> bool) -> SwayNow {
-    takes(Duration::from_secs(3), go_on);
+fn very_slow(request: &Request, cancel: &CancelToken) -> SwayNow {
+    takes(Duration::from_secs(3), cancel);
     answer(request)
 }
 
-fn endless(request: &Request, go_on: &dyn Fn() -> bool) -> SwayNow {
-    takes(Duration::MAX, go_on);
+fn endless(request: &Request, cancel: &CancelToken) -> SwayNow {
+    takes(Duration::MAX, cancel);
     answer(request)
 }
 
 /// So long, or until it is given up.
-fn takes(time: Duration, go_on: &dyn Fn() -> bool) {
+fn takes(time: Duration, cancel: &CancelToken) {
     let began = Instant::now();
-    while began.elapsed() < time && go_on() {
+    while began.elapsed() < time && !cancel.is_cancelled() {
         std::thread::sleep(Duration::from_millis(5));
     }
 }
