@@ -11,15 +11,16 @@ mod tracking;
 mod truth;
 
 use arborcam::animate::{Animator, Wind};
+use arborcam::cancel::CancelToken;
 use arborcam::config::{self, Config};
 use arborcam::export::gltf::{KEY_TOLERANCE_PX, Model, glb};
-use arborcam::hierarchy::{self, COMPARE_HZ, Evidence, evidence, evidence_of};
-use arborcam::model::{Outline, Pose, Rgb, Size, TrackId, TrackSet};
+use arborcam::hierarchy::{self, evidence};
+use arborcam::model::{Observation, Outline, Pose, Rgb, Size, TrackId, TrackLog, TrackSet};
 use arborcam::motion::PoseEstimator;
 use arborcam::outline::{self, Mark, Scribbles};
-use arborcam::pipeline::{self, Moment, Pipeline, Seen, Tree, dress};
+use arborcam::pipeline::{self, Pipeline, PoseTracker, Seen, dress};
+use arborcam::solve::{self, lift_to_3d, solve};
 use arborcam::source::Decoder;
-use arborcam::track::{TrackHistory, TrackTable};
 use criterion::Criterion;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -100,74 +101,66 @@ fn scaled(dir: &Path, size: &str) -> PathBuf {
 }
 
 /// What has been seen of the recording by the time the tree is built.
-fn gathered() -> (TrackHistory, Arc<Outline>, Vec<TrackSet>) {
+fn gathered() -> (TrackLog, Arc<Outline>, Vec<TrackSet>) {
     let config = Config::default();
     let outline = support::outline();
     let mut pipeline = Pipeline::new(&config, Some(outline.clone()));
     let mut decoder = Decoder::new().expect("decoder");
-    let (mut history, mut sets) = (TrackHistory::new(config.accumulate.window_s), Vec::new());
+    let mut log = TrackLog::new(config.accumulate.window_s);
+    let mut sets = Vec::new();
     for k in 0..support::recording().len() {
         for moved in pipeline.step(support::decoded(&mut decoder, k)) {
-            if pipeline.back.tree().is_none() || history.is_empty() {
-                history.push(moved.tracks.clone());
+            if pipeline.back.model().is_none() || log.all().is_empty() {
+                log.push(moved.tracks.clone());
             }
             sets.push(moved.tracks);
         }
     }
-    (history, Arc::new(outline), sets)
+    (log, Arc::new(outline), sets)
 }
 
-fn built(history: &TrackHistory, outline: &Arc<Outline>) -> Tree {
-    let config = Config::default();
-    let evidence = evidence_of(history, &config.accumulate);
-    let table = Arc::new(history.table(1.0 / COMPARE_HZ));
-    pipeline::build(&table, evidence, outline, &config, Moment::default()).expect("a tree")
+fn built(log: &TrackLog, outline: &Arc<Outline>) -> solve::Model {
+    solve(log, outline, None, &Config::default(), &CancelToken::new()).expect("a tree")
 }
 
-/// The recording's tracks over and over until there are `points` that move, each some pixels beside
+/// The recording's points that move, over and over until there are `points`, each some pixels beside
 /// its model.
-fn crowd(history: &TrackHistory, points: usize) -> (TrackTable, Evidence) {
-    let settings = Config::default().accumulate;
-    let table = history.table(1.0 / COMPARE_HZ);
-    let moving = evidence(&table, &settings).moving;
-    let beside = |k: usize| {
-        let aside = (k / moving.len()) as f32;
-        let place = |p: [f32; 2]| {
-            [
-                p[0] + 1.7 * aside.sin() * aside,
-                p[1] + 1.3 * aside.cos() * aside,
-            ]
-        };
-        table.positions[moving[k % moving.len()]]
-            .iter()
-            .map(|p| p.map(place))
-            .collect()
-    };
-    let crowd = TrackTable {
-        ids: (0..points as u32).map(TrackId).collect(),
-        times_s: table.times_s.clone(),
-        positions: (0..points).map(beside).collect(),
-        fb_errors_px: vec![0.05; points],
-    };
-    let evidence = evidence(&crowd, &settings);
-    (crowd, evidence)
+fn crowd(log: &TrackLog, points: usize) -> TrackLog {
+    let table = hierarchy::table(log.all());
+    let moving = evidence(&table, &Config::default().accumulate).moving;
+    let mut crowd = TrackLog::new(f64::INFINITY);
+    for set in log.all().sets() {
+        let mut observations = Vec::new();
+        for k in 0..points {
+            let id = table.ids[moving[k % moving.len()]];
+            let aside = (k / moving.len()) as f32;
+            if let Some(seen) = set.observations.iter().find(|o| o.id == id) {
+                observations.push(Observation {
+                    id: TrackId(k as u32),
+                    u_px: seen.u_px + 1.7 * aside.sin() * aside,
+                    v_px: seen.v_px + 1.3 * aside.cos() * aside,
+                    fb_error_px: 0.05,
+                    confirmed: true,
+                    ..*seen
+                });
+            }
+        }
+        crowd.push(TrackSet {
+            observations,
+            rejected: Vec::new(),
+            ..set.clone()
+        });
+    }
+    crowd
 }
 
 fn build(criterion: &mut Criterion, points: usize, bound_ms: u32) -> String {
-    let (history, outline, _) = gathered();
-    let (table, evidence) = crowd(&history, points);
-    let table = Arc::new(table);
+    let (log, outline, _) = gathered();
+    let log = crowd(&log, points);
     let config = Config::default();
-    let whole = || {
-        pipeline::build(
-            &table,
-            evidence.clone(),
-            &outline,
-            &config,
-            Moment::default(),
-        )
-        .expect("a tree")
-    };
+    let table = hierarchy::table(log.all());
+    let evidence = evidence(&table, &config.accumulate);
+    let whole = || built(&log, &outline);
     let parting = || hierarchy::build(&table, &evidence.moving, [300.0, 330.0], &config.hierarchy);
     criterion.bench_function(&format!("build of the tree, {points} points"), |b| {
         b.iter(whole)
@@ -196,13 +189,13 @@ fn crown_of_noise(outline: &Outline) -> Rgb {
 /// From the built hierarchy to all that is drawn: skeleton in space, wood of 20,000 triangles and
 /// its coarser levels, leaves.
 fn dressed() -> String {
-    let (history, outline, _) = gathered();
-    let tree = built(&history, &outline);
+    let (log, outline, _) = gathered();
+    let tree = built(&log, &outline);
     let picture = crown_of_noise(&outline);
     let mut config = Config::default();
     config.wood.triangles = 20_000;
     let all = || {
-        let skeleton = pipeline::stand(&tree.hierarchy, &outline, &config);
+        let skeleton = lift_to_3d(&tree.hierarchy, &outline, &config);
         dress(
             &skeleton,
             Seen {
@@ -232,12 +225,12 @@ fn dressed() -> String {
 }
 
 fn pose(criterion: &mut Criterion) -> String {
-    let (history, outline, sets) = gathered();
-    let tree = built(&history, &outline);
+    let (log, outline, sets) = gathered();
+    let tree = Arc::new(built(&log, &outline));
     let all = || {
-        let (mut binding, mut estimator) = (tree.binding(), tree.estimator(&Config::default()));
+        let mut tracker = PoseTracker::new(tree.clone(), &Config::default());
         for set in &sets {
-            std::hint::black_box(estimator.step(set.frame, set.time_s, &binding.targets_px(set)));
+            std::hint::black_box(tracker.step(set));
         }
     };
     criterion.bench_function("poses of 330 frames", |b| b.iter(all));
@@ -280,12 +273,11 @@ fn pose_of_127() -> String {
 
 /// The model's file of the whole recording, in full leaf.
 fn model_file() -> String {
-    let (history, outline, sets) = gathered();
-    let tree = built(&history, &outline);
+    let (log, outline, sets) = gathered();
+    let tree = Arc::new(built(&log, &outline));
     let config = Config::default();
-    let (mut binding, mut estimator) = (tree.binding(), tree.estimator(&config));
-    let pose = |set: &TrackSet| estimator.step(set.frame, set.time_s, &binding.targets_px(set));
-    let poses: Vec<Pose> = sets.iter().map(pose).collect();
+    let mut tracker = PoseTracker::new(tree.clone(), &config);
+    let poses: Vec<Pose> = sets.iter().map(|set| tracker.step(set).0).collect();
     let picture = crown_of_noise(&outline);
     let seen = Seen {
         picture: Some(&picture),

@@ -8,13 +8,13 @@
 #[path = "../tests/support/branches.rs"]
 mod branches;
 
+use arborcam::cancel::CancelToken;
 use arborcam::config::{Affinity, Config};
-use arborcam::hierarchy::{COMPARE_HZ, evidence};
-use arborcam::model::{Frame, Luma};
+use arborcam::model::{Frame, Luma, TrackLog};
 use arborcam::outline::Given;
-use arborcam::pipeline::{self, Moment, Pipeline};
+use arborcam::pipeline::Pipeline;
+use arborcam::solve::solve;
 use arborcam::source::{self, Decoder};
-use arborcam::track::TrackHistory;
 use branches::{Births, Truth, triplets};
 use std::path::Path;
 use std::sync::Arc;
@@ -22,7 +22,7 @@ use std::time::Instant;
 
 /// What has been seen of the clip when its tree is built.
 struct Gathered {
-    history: TrackHistory,
+    log: TrackLog,
     born: Births,
     built_s: f64,
 }
@@ -45,7 +45,7 @@ fn gathered(
     };
     let mut pipeline = Pipeline::new(&config, Some(outline.clone()));
     let mut gathered = Gathered {
-        history: TrackHistory::new(config.accumulate.window_s),
+        log: TrackLog::new(config.accumulate.window_s),
         born: Births::default(),
         built_s: 0.0,
     };
@@ -70,11 +70,11 @@ fn gathered(
         };
         for moved in pipeline.step(frame) {
             gathered.born.take_note(&moved.tracks);
-            if pipeline.back.tree().is_none() || gathered.built_s == 0.0 {
-                gathered.history.push(moved.tracks);
+            if pipeline.back.model().is_none() || gathered.built_s == 0.0 {
+                gathered.log.push(moved.tracks);
             }
         }
-        if let (Some(tree), 0.0) = (pipeline.back.tree(), gathered.built_s) {
+        if let (Some(tree), 0.0) = (pipeline.back.model(), gathered.built_s) {
             gathered.built_s = tree.time_s;
         }
     }
@@ -88,13 +88,11 @@ fn row(
     what: &str,
     config: &Config,
 ) {
-    let table = Arc::new(gathered.history.table(1.0 / COMPARE_HZ));
-    let evidence = evidence(&table, &config.accumulate);
     let mut times = Vec::new();
     let mut tree = None;
     for _ in 0..5 {
         let start = Instant::now();
-        tree = pipeline::build(&table, evidence.clone(), outline, config, Moment::default());
+        tree = solve(&gathered.log, outline, None, config, &CancelToken::new());
         times.push(start.elapsed().as_secs_f64() * 1e3);
     }
     times.sort_by(f64::total_cmp);

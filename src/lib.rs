@@ -49,6 +49,7 @@ pub mod runtime;
 pub mod shape;
 pub mod signal;
 pub mod skeleton;
+pub mod solve;
 pub mod source;
 pub mod track;
 pub mod tui;

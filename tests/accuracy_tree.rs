@@ -23,7 +23,7 @@ fn tree(config: &Config) -> (MotionHierarchy, Births) {
     }
     pipeline.finish();
     (
-        pipeline.back.tree().expect("a tree").hierarchy.clone(),
+        pipeline.back.model().expect("a tree").hierarchy.clone(),
         born,
     )
 }

@@ -20,13 +20,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     // The table of positions that the hierarchy is cut from is the tracker's.
     (
         "hierarchy",
-        &[
-            "model",
-            "config",
-            "track::TrackTable",
-            "track::TrackHistory",
-            "signal",
-        ],
+        &["model", "config", "track::TrackTable", "signal"],
     ),
     ("skeleton", &["model", "config"]),
     // The flat node that is stood up in space.

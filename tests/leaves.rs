@@ -8,7 +8,7 @@ use arborcam::config::{Config, LeafShow, Leaves};
 use arborcam::draw::{Camera, Look, Model, View, picture};
 use arborcam::model::{JointPose, Luma, NodeId, Outline, Pose, Rgb, Size, Skeleton};
 use arborcam::motion::flutter;
-use arborcam::pipeline::{Pipeline, Seen, dress, leaf_seeds};
+use arborcam::pipeline::{Pipeline, PoseTracker, Seen, dress, leaf_seeds};
 use arborcam::shape::{
     Foliage, LeafView, Sampling, Template, density_match, foliage, foliage_by, leaf_cover, season,
 };
@@ -705,9 +705,9 @@ fn posed_clip(clip: &Path, outline: &Path) -> (Skeleton, Pose, Rgb, Outline) {
         sets.extend(pipeline.step(frame).into_iter().map(|m| m.tracks));
     }
     sets.extend(pipeline.finish().into_iter().map(|m| m.tracks));
-    let tree = pipeline.back.tree().expect("a tree").clone();
-    let (mut binding, mut estimator) = (tree.binding(), tree.estimator(&config));
-    let pose = estimator.step(sets[0].frame, sets[0].time_s, &binding.targets_px(&sets[0]));
+    let tree = pipeline.back.model().expect("a tree").clone();
+    let mut tracker = PoseTracker::new(tree.clone(), &config);
+    let (pose, _) = tracker.step(&sets[0]);
     let colour = image::load_from_memory(&frames[0].bytes)
         .expect("a JPEG")
         .into_rgb8();

@@ -5,7 +5,8 @@ mod support;
 use arborcam::cancel::CancelToken;
 use arborcam::config::Config;
 use arborcam::model::{NodeName, Pose};
-use arborcam::pipeline::{BackEnd, Followed, Pipeline, Retrace, Tree};
+use arborcam::pipeline::{BackEnd, Followed, Pipeline, PoseReplay};
+use arborcam::solve::Model;
 use arborcam::source::Decoder;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};
@@ -14,8 +15,8 @@ use std::time::Instant;
 /// A run on the recording in which the tree is built after 4 s, as if there had been a gust, and
 /// refined from then on.
 struct Run {
-    /// Tree and pose after each frame.
-    frames: Vec<(Arc<Tree>, Arc<Pose>)>,
+    /// Model and pose after each frame.
+    frames: Vec<(Arc<Model>, Arc<Pose>)>,
     sets: Vec<arborcam::model::TrackSet>,
     config: Config,
 }
@@ -31,7 +32,7 @@ fn run() -> &'static Run {
         for k in 0..support::recording().len() {
             for moved in pipeline.step(support::decoded(&mut decoder, k)) {
                 sets.push(moved.tracks);
-                frames.extend(pipeline.back.tree().cloned().zip(moved.pose));
+                frames.extend(pipeline.back.model().cloned().zip(moved.pose));
             }
         }
         Run {
@@ -43,18 +44,18 @@ fn run() -> &'static Run {
 }
 
 /// Pairs of frames with a refinement between them.
-fn seams(run: &Run) -> impl Iterator<Item = &[(Arc<Tree>, Arc<Pose>)]> {
+fn seams(run: &Run) -> impl Iterator<Item = &[(Arc<Model>, Arc<Pose>)]> {
     run.frames
         .windows(2)
         .filter(|pair| !Arc::ptr_eq(&pair[0].0, &pair[1].0))
 }
 
-fn names(tree: &Tree) -> BTreeSet<NodeName> {
+fn names(tree: &Model) -> BTreeSet<NodeName> {
     tree.skeleton.nodes.iter().map(|n| n.name).collect()
 }
 
 /// Places of all nodes in the picture and in depth, px.
-fn places(tree: &Tree, pose: &Pose) -> BTreeMap<NodeName, [f64; 3]> {
+fn places(tree: &Model, pose: &Pose) -> BTreeMap<NodeName, [f64; 3]> {
     let skeleton = &tree.skeleton;
     let place = |(n, j): (&arborcam::model::Node, &arborcam::model::JointPose)| {
         let [u, v] = skeleton.image_from_model(&j.position);
@@ -98,7 +99,7 @@ fn branches_keep_their_numbers_and_no_number_is_given_twice() {
             before.len()
         );
         // A branch goes on where most of its points are.
-        let points = |tree: &Tree, name: NodeName| -> BTreeSet<_> {
+        let points = |tree: &Model, name: NodeName| -> BTreeSet<_> {
             let node = tree
                 .skeleton
                 .nodes
@@ -127,7 +128,7 @@ fn branches_keep_their_numbers_and_no_number_is_given_twice() {
 }
 
 /// Names of the branches that leave from the end of each branch.
-fn forks(tree: &Tree) -> BTreeMap<NodeName, BTreeSet<NodeName>> {
+fn forks(tree: &Model) -> BTreeMap<NodeName, BTreeSet<NodeName>> {
     let nodes = &tree.skeleton.nodes;
     let mut forks: BTreeMap<_, BTreeSet<_>> =
         nodes.iter().map(|n| (n.name, BTreeSet::new())).collect();
@@ -152,7 +153,7 @@ fn forks(tree: &Tree) -> BTreeMap<NodeName, BTreeSet<NodeName>> {
 fn branches_that_go_on_do_not_jump() {
     let run = run();
     // In the picture and in depth, px, and whether it is a measured node.
-    let steps = |pair: &[(Arc<Tree>, Arc<Pose>)]| -> Vec<(f64, f64, bool)> {
+    let steps = |pair: &[(Arc<Model>, Arc<Pose>)]| -> Vec<(f64, f64, bool)> {
         let (was, is) = (
             places(&pair[0].0, &pair[0].1),
             places(&pair[1].0, &pair[1].1),
@@ -222,7 +223,7 @@ fn the_last_tree_has_a_pose_in_every_frame() {
     let run = run();
     let (tree, _) = run.frames.last().expect("frames");
     assert!(tree.refinements > 0);
-    let mut retrace = Retrace::new(tree, &run.config);
+    let mut retrace = PoseReplay::new(tree, &run.config);
     let poses: Vec<Pose> = run.sets.iter().map(|set| retrace.step(set).0).collect();
     let shown = run.frames.iter().filter(|(t, _)| Arc::ptr_eq(t, tree));
     let mut compared = 0;
@@ -250,20 +251,14 @@ fn the_last_tree_has_a_pose_in_every_frame() {
     println!(
         "{kept} of {} lost points have a branch, {} by inheritance",
         lost.len(),
-        tree.inherited.len()
+        tree.joined.len()
     );
     assert!(
         10 * kept >= 9 * lost.len(),
         "{kept} of {} lost points",
         lost.len()
     );
-    assert!(
-        !tree.inherited.is_empty()
-            && tree
-                .inherited
-                .keys()
-                .all(|id| retrace.node_of(*id).is_some())
-    );
+    assert!(!tree.joined.is_empty() && tree.joined.keys().all(|id| retrace.node_of(*id).is_some()));
 }
 
 /// Whoever plays `motion.csv` or the model sees the tree from the side as well: no branch jumps in
@@ -275,7 +270,7 @@ fn the_written_motion_has_no_seam_in_the_middle() {
     let mut tree = (*run.frames.last().expect("frames").0).clone();
     // As in a film longer than what is remembered.
     (tree.followed_from, tree.shown_from) = (150, 280);
-    let mut retrace = Retrace::new(&Arc::new(tree), &run.config);
+    let mut retrace = PoseReplay::new(&Arc::new(tree), &run.config);
     let poses: Vec<Pose> = run.sets.iter().map(|set| retrace.step(set).0).collect();
     let step = |k: usize| {
         let steps = poses[k - 1]
@@ -313,31 +308,31 @@ fn a_film_that_ends_before_a_refinement_gets_its_shoots_at_the_end() {
                 received: Instant::now(),
             });
         }
-        let standing = back.tree().cloned().expect("a tree");
-        assert_eq!((standing.refinements, standing.shoots.len()), (0, 0));
+        let standing = back.model().cloned().expect("a tree");
+        assert_eq!((standing.refinements, standing.sub_branches.len()), (0, 0));
         let cancel = CancelToken::new();
         if !go_on {
             cancel.cancel();
         }
         back.finish(&cancel);
-        (standing, back.tree().cloned().expect("a tree"))
+        (standing, back.model().cloned().expect("a tree"))
     };
     let (standing, tree) = ended(true);
     assert!(
-        !tree.shoots.is_empty() && names(&tree).is_superset(&names(&standing)),
+        !tree.sub_branches.is_empty() && names(&tree).is_superset(&names(&standing)),
         "{:?}",
-        tree.shoots
+        tree.sub_branches
     );
     assert_eq!(
         (tree.refinements, tree.shown_from),
         (1, standing.shown_from)
     );
     // Every one of them has its pose in every frame, and its points are on it.
-    let mut retrace = Retrace::new(&tree, &config);
+    let mut retrace = PoseReplay::new(&tree, &config);
     for set in &run.sets {
         assert_eq!(retrace.step(set).0.joints.len(), tree.skeleton.nodes.len());
     }
-    assert!(tree.shoots.iter().all(|s| {
+    assert!(tree.sub_branches.iter().all(|s| {
         s.members
             .iter()
             .all(|id| retrace.node_of(*id) == Some(s.name))
@@ -362,13 +357,13 @@ fn a_tree_that_is_built_at_the_end_is_the_first_one_with_its_shoots() {
             received: Instant::now(),
         });
     }
-    assert!(back.tree().is_none());
+    assert!(back.model().is_none());
     back.finish(&CancelToken::new());
-    let tree = back.tree().expect("a tree");
+    let tree = back.model().expect("a tree");
     assert!(
-        tree.forced && tree.refinements == 0 && !tree.shoots.is_empty(),
+        tree.forced && tree.refinements == 0 && !tree.sub_branches.is_empty(),
         "{:?}",
-        tree.shoots
+        tree.sub_branches
     );
 }
 
@@ -378,7 +373,7 @@ fn a_tree_that_is_built_at_the_end_is_the_first_one_with_its_shoots() {
 fn a_tree_that_cannot_be_followed_to_the_present_is_not_taken() {
     let run = run();
     let mut back = BackEnd::new(&run.config);
-    let mut standing: Option<Arc<Tree>> = None;
+    let mut standing: Option<Arc<Model>> = None;
     for set in &run.sets {
         let mut tracks = set.clone();
         tracks.time_s += if standing.is_some() {
@@ -395,13 +390,16 @@ fn a_tree_that_cannot_be_followed_to_the_present_is_not_taken() {
         });
         if let Some(standing) = &standing {
             assert!(
-                back.tree().is_some_and(|tree| Arc::ptr_eq(tree, standing)),
+                back.model().is_some_and(|tree| Arc::ptr_eq(tree, standing)),
                 "another tree out of nothing"
             );
             return;
         }
-        if back.refinement().is_some_and(|work| work.run().is_some()) {
-            standing = back.tree().cloned();
+        if back
+            .job()
+            .is_some_and(|job| job.run(&CancelToken::new()).is_some())
+        {
+            standing = back.model().cloned();
         }
     }
     panic!("no refinement");
@@ -415,13 +413,13 @@ fn a_refinement_that_is_late_is_taken_when_it_is_there() {
     let mut back = BackEnd::new(&run.config);
     let mut late = 0;
     for set in &run.sets {
-        if back.needs_refinement(set.time_s) {
+        if back.needs_model(set.time_s) {
             late += 1;
             if late <= 20 {
-                back.put_off_refinement(set.time_s);
+                back.put_off_model(set.time_s);
             } else {
-                let tree = back.refinement().expect("a refinement").run();
-                back.put_refinement(tree);
+                let tree = back.job().expect("a job").run(&CancelToken::new());
+                back.put_model(tree);
             }
         }
         let outline = run.frames[0].0.outline.clone();
@@ -431,7 +429,7 @@ fn a_refinement_that_is_late_is_taken_when_it_is_there() {
             preview: None,
             received: Instant::now(),
         });
-        if back.tree().is_some_and(|tree| tree.refinements > 0) {
+        if back.model().is_some_and(|tree| tree.refinements > 0) {
             assert!(late > 20, "taken before it was there");
             return;
         }

@@ -1,10 +1,12 @@
 //! Following points, on pictures whose motion is known.
 
 use arborcam::config::{Accumulate, Detect, Track};
-use arborcam::hierarchy::evidence_of;
-use arborcam::model::{Frame, LONGEST_TRIAL_S, Luma, Observation, Size, TrackId, TrackSet};
+use arborcam::hierarchy::{self, evidence};
+use arborcam::model::{
+    Frame, LONGEST_TRIAL_S, Luma, Observation, Size, TrackId, TrackLog, TrackSet,
+};
 use arborcam::outline::whole;
-use arborcam::track::{TrackHistory, Tracker};
+use arborcam::track::Tracker;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use std::time::Instant;
@@ -341,10 +343,10 @@ fn names_are_never_given_twice() {
     assert_eq!(births, last.len() as u64);
 }
 
-/// A history of 60 points that sway by `amplitude_px`, each measured with an error of about 0.05
+/// A log of 60 points that sway by `amplitude_px`, each measured with an error of about 0.05
 /// px.
-fn history(amplitude_px: f64, seconds: f64) -> TrackHistory {
-    let mut history = TrackHistory::new(20.0);
+fn log(amplitude_px: f64, seconds: f64) -> TrackLog {
+    let mut log = TrackLog::new(20.0);
     for k in 0..(30.0 * seconds) as u64 {
         let time_s = k as f64 / 30.0;
         let at = |i: u32| {
@@ -365,7 +367,7 @@ fn history(amplitude_px: f64, seconds: f64) -> TrackHistory {
             }
         };
         let observations = (0..60).map(at).collect();
-        history.push(TrackSet {
+        log.push(TrackSet {
             frame: k,
             time_s,
             observations,
@@ -374,13 +376,16 @@ fn history(amplitude_px: f64, seconds: f64) -> TrackHistory {
             rejected: Vec::new(),
         });
     }
-    history
+    log
 }
 
 #[test]
 fn the_accumulation_measure_grows_with_motion_and_stays_low_on_noise() {
     let measure = |amplitude_px: f64, seconds: f64| {
-        evidence_of(&history(amplitude_px, seconds), &Accumulate::default())
+        evidence(
+            &hierarchy::table(log(amplitude_px, seconds).all()),
+            &Accumulate::default(),
+        )
     };
     let noise = measure(0.0, 6.0);
     assert!(noise.measure < 0.02 && noise.moving.is_empty(), "{noise:?}");

@@ -7,6 +7,7 @@ mod capture;
 mod devices;
 mod doctor;
 mod export;
+mod finish;
 mod hangup;
 mod idle;
 mod play;
@@ -64,6 +65,8 @@ enum Command {
     /// Make a capture's tree move in a wind that nobody filmed, pull and release it, or magnify its
     /// motion.
     Animate(animate::AnimateArgs),
+    /// Complete a capture whose run was cut, by a crash or a full disk.
+    Finish(finish::FinishArgs),
     /// List the cameras that are plugged in.
     Devices(devices::DevicesArgs),
     /// Find out what is wrong with this machine, and what to do about it.
@@ -160,6 +163,7 @@ pub fn main() -> ExitCode {
         Command::Export(args) => export::run(args),
         Command::Analyze(args) => analyze::run(args),
         Command::Animate(args) => animate::run(args),
+        Command::Finish(args) => finish::run(args),
         Command::Devices(args) => devices::run(args),
         Command::Doctor(args) => doctor::run(args),
     };

@@ -156,8 +156,13 @@ pub fn no_input(e: SourceError) -> Ended {
 /// Told before anything is filmed, not after: that the folder exists, or may not be made.
 fn refuse_unfit_out(out: Option<&Path>) -> Result<(), Ended> {
     // Made and dropped: nothing of it is left.
-    out.map_or(Ok(()), |dir| OutputFolder::create(dir).map(drop))
-        .map_err(|e| Ended::Failed(e.into()))
+    let Some(dir) = out else { return Ok(()) };
+    OutputFolder::create(dir).map_err(|e| Ended::Failed(e.into()))?;
+    let unfinished = runtime::unfinished_dir(dir);
+    if unfinished.exists() {
+        return Err(Failure::UnfinishedIsThere { dir: unfinished }.into());
+    }
+    Ok(())
 }
 
 /// Looks after a capture from outside, with and without a screen: its length, its settings, its
@@ -277,7 +282,7 @@ fn report(summary: Option<&Summary>, failure: Option<Failure>, stopped: bool) ->
 }
 
 fn no_tree(s: &Summary) -> anyhow::Error {
-    if s.moving >= crate::pipeline::LEAST_MOVING {
+    if s.moving >= crate::solve::LEAST_MOVING {
         return anyhow!(
             "no tree: {} points moved, but not enough to tell branches apart (accumulation {:.2}); film for longer, at \
              least ten seconds, or in more wind",
@@ -289,7 +294,7 @@ fn no_tree(s: &Summary) -> anyhow::Error {
         "no tree: {} points moved, and at least {} must; wait for wind, come nearer, keep the camera still, or draw the \
          outline closer (--outline)",
         s.moving,
-        crate::pipeline::LEAST_MOVING
+        crate::solve::LEAST_MOVING
     )
 }
 

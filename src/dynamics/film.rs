@@ -1,6 +1,6 @@
 //! The points of a film, by the branch that they are on: what sway is measured from.
 
-use crate::model::{NodeId, Skeleton, TrackId, TrackSet};
+use crate::model::{LogWindow, NodeId, Skeleton, TrackId, TrackSet};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::Range;
@@ -45,6 +45,31 @@ impl Film {
             times_s: kept.iter().map(|&k| times_s[k]).collect(),
             tracks: tracks.into_iter().map(thin).collect(),
         }
+    }
+
+    /// The points of a part of the log; `node_of` says on which measured node of `skeleton` a point
+    /// is, `None` where on none.
+    pub fn from_log(
+        window: LogWindow,
+        skeleton: &Skeleton,
+        node_of: impl Fn(TrackId) -> Option<NodeId>,
+    ) -> Self {
+        let measured = skeleton.measured();
+        let mut tracks: BTreeMap<TrackId, Option<FilmTrack>> = BTreeMap::new();
+        for (k, set) in window.sets().enumerate() {
+            for o in &set.observations {
+                let track = tracks.entry(o.id).or_insert_with(|| {
+                    let node = node_of(o.id).filter(|n| n.index() < measured)?;
+                    let at_px = vec![[f64::NAN; 2]; window.len()];
+                    Some(FilmTrack { node, at_px })
+                });
+                if let Some(track) = track {
+                    track.at_px[k] = [f64::from(o.u_px), f64::from(o.v_px)];
+                }
+            }
+        }
+        let times_s: Vec<f64> = window.sets().map(|set| set.time_s).collect();
+        Self::new(&times_s, tracks.into_values().flatten().collect())
     }
 
     /// From the time of the first frame to that of the last, s.

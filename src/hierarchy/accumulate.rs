@@ -3,7 +3,7 @@
 use super::signals::Signals;
 use crate::config::Accumulate;
 use crate::signal::along_principal_direction;
-use crate::track::{TrackHistory, TrackTable};
+use crate::track::TrackTable;
 
 /// Rate at which tracks are compared, Hz: velocities over longer steps stand out better from
 /// tracking noise.
@@ -72,11 +72,6 @@ pub fn evidence(table: &TrackTable, settings: &Accumulate) -> Evidence {
         sway,
         moving,
     }
-}
-
-/// Evidence of a history, on frames at the rate at which tracks are compared.
-pub fn evidence_of(history: &TrackHistory, settings: &Accumulate) -> Evidence {
-    evidence(&history.table(1.0 / COMPARE_HZ), settings)
 }
 
 /// Root mean square distance of a track from its mean position, px.

@@ -20,13 +20,15 @@ mod rest;
 mod signals;
 mod stems;
 mod support;
+mod table;
 mod zeng;
 
-pub use accumulate::{COMPARE_HZ, Evidence, evidence, evidence_of};
+pub use accumulate::{COMPARE_HZ, Evidence, evidence};
 pub use ncut::{Cut, normalised_cut};
 pub use persist::persisting;
 pub use rest::rest_position_px;
 pub use support::{Gain, OnBoth, gain};
+pub use table::table;
 
 use crate::config::{Affinity, Hierarchy};
 use crate::model::{Cluster, ClusterId, MotionHierarchy};

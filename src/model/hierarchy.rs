@@ -1,6 +1,7 @@
 //! Which points move together: the tree as the motion shows it.
 
 use super::TrackId;
+use std::collections::BTreeSet;
 
 /// Index into [`MotionHierarchy::clusters`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -33,6 +34,14 @@ pub struct MotionHierarchy {
 }
 
 impl MotionHierarchy {
+    /// All tracks that the tree is made of.
+    pub fn members(&self) -> BTreeSet<TrackId> {
+        match self.clusters.first() {
+            Some(all) => all.members.iter().copied().collect(),
+            None => BTreeSet::new(),
+        }
+    }
+
     /// How sure the splits are, 0 to 1: the median over the clusters that have children.
     pub fn median_certainty(&self) -> Option<f64> {
         let mut parted: Vec<u32> = self

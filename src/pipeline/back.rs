@@ -1,13 +1,14 @@
 //! The back end: tracks to tree and poses.
 
-use super::refiner::Refiner;
-use super::{Followed, Moment, Poser, Refinement, Targets, Tree, build};
+use super::Followed;
+use super::pose_tracker::{PoseTracker, Targets};
+use super::refiner::{Refiner, SolveJob, Taken};
 use crate::cancel::CancelToken;
 use crate::config::Config;
 use crate::hierarchy::{self, Evidence};
-use crate::model::{Outline, Phase, Pose, Rgb, TrackSet};
+use crate::model::{Outline, Phase, Pose, Rgb, TrackLog, TrackSet};
 use crate::motion::Binding;
-use crate::track::{TrackHistory, TrackTable};
+use crate::solve::{Model, identify_sub_branches, solve};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -32,15 +33,15 @@ pub struct Moved {
     pub before: Vec<(Pose, Targets)>,
 }
 
-/// Tracks to poses: gathers motion, builds the tree, then poses it in every frame and refines it as
-/// motion goes on.
+/// Tracks to poses: logs the points, solves for the tree when enough motion has accumulated, then
+/// poses it in every frame and solves again as motion goes on.
 pub struct BackEnd {
     config: Config,
-    history: TrackHistory,
+    log: TrackLog,
     evidence: Evidence,
     judged_s: Option<f64>,
     outline: Option<Arc<Outline>>,
-    live: Option<Live>,
+    tracker: Option<PoseTracker>,
     refiner: Option<Refiner>,
     build_now: bool,
     /// The tree is built with the next frame.
@@ -58,21 +59,15 @@ enum Why {
     Asked,
 }
 
-/// A tree and the pose that it has come to.
-pub(super) struct Live {
-    pub tree: Arc<Tree>,
-    pub poser: Poser,
-}
-
 impl BackEnd {
     pub fn new(config: &Config) -> Self {
         Self {
             config: config.clone(),
-            history: TrackHistory::new(config.accumulate.window_s),
+            log: TrackLog::new(remembered_s(config)),
             evidence: Evidence::default(),
             judged_s: None,
             outline: None,
-            live: None,
+            tracker: None,
             refiner: None,
             build_now: false,
             building: None,
@@ -89,20 +84,17 @@ impl BackEnd {
             received,
         } = followed;
         self.outline = Some(outline.clone());
-        let mut before = Vec::new();
-        if self.live.is_none() {
-            self.history.push(tracks.clone());
-            before = self.accumulate(tracks.time_s);
-        } else if self.refiner.is_some() {
-            self.history.push(tracks.clone());
-            before = self.refine();
-        }
-        let (targets_px, pose) = match &mut self.live {
-            Some(live) => {
-                let (pose, targets_px) = live.poser.step(&tracks);
-                (targets_px, Some(Arc::new(pose)))
+        self.log.push(tracks.clone());
+        let before = match self.tracker {
+            Some(_) => self.refine(),
+            None => self.accumulate(tracks.time_s),
+        };
+        let (pose, targets_px) = match &mut self.tracker {
+            Some(tracker) => {
+                let (pose, targets_px) = tracker.step(&tracks);
+                (Some(Arc::new(pose)), targets_px)
             }
-            None => (Vec::new(), None),
+            None => (None, Vec::new()),
         };
         Moved {
             tracks,
@@ -123,7 +115,7 @@ impl BackEnd {
             return Vec::new();
         }
         self.judged_s = Some(time_s);
-        let table = self.judge();
+        self.judge();
         let e = &self.evidence;
         let moving = e.moving.len();
         tracing::debug!(
@@ -136,12 +128,13 @@ impl BackEnd {
             "evidence"
         );
         if let Some(why) = self.building.take() {
-            let before = self.build(&table, why == Why::Asked);
-            self.refused = why == Why::Asked && self.live.is_none();
+            let before = self.build();
+            self.refused = why == Why::Asked && self.tracker.is_none();
             return before;
         }
         let settings = &self.config.accumulate;
-        if e.measure >= settings.threshold && self.history.span_s() >= settings.min_s {
+        let window = self.log.last(settings.window_s);
+        if e.measure >= settings.threshold && window.span_s() >= settings.min_s {
             self.building = Some(Why::Enough);
         } else if std::mem::take(&mut self.build_now) {
             self.building = Some(Why::Asked);
@@ -149,88 +142,75 @@ impl BackEnd {
         Vec::new()
     }
 
-    /// Judges what is remembered; gives the table of tracks whose rows the evidence names.
-    fn judge(&mut self) -> Arc<TrackTable> {
-        let table = Arc::new(self.history.table(1.0 / hierarchy::COMPARE_HZ));
+    /// Judges what is remembered.
+    fn judge(&mut self) {
+        let table = hierarchy::table(self.log.last(self.config.accumulate.window_s));
         self.evidence = hierarchy::evidence(&table, &self.config.accumulate);
-        table
     }
 
     /// Builds, and follows the pose through the remembered frames; gives their poses and targets.
-    fn build(&mut self, table: &Arc<TrackTable>, forced: bool) -> Vec<(Pose, Targets)> {
-        let (Some(outline), Some(moment)) = (&self.outline, Moment::of(&self.history, forced))
-        else {
+    fn build(&mut self) -> Vec<(Pose, Targets)> {
+        let Some(outline) = &self.outline else {
             return Vec::new();
         };
-        let Some(tree) = build(table, self.evidence.clone(), outline, &self.config, moment) else {
+        let Some(model) = solve(&self.log, outline, None, &self.config, &CancelToken::new()) else {
             return Vec::new();
         };
-        let mut live = Live {
-            poser: tree.poser(&self.config),
-            tree: Arc::new(tree),
-        };
+        let window = self.log.last(self.config.accumulate.window_s);
+        let refiner = Refiner::new(model.time_s, window.span_s(), &self.config);
+        let mut tracker = PoseTracker::new(Arc::new(model), &self.config);
         // The pose is followed from the first remembered frame, so that it does not jump where the
         // tree was built. The newest frame is left out: it is about to be worked off as every later
         // one is.
-        let mut before = Vec::with_capacity(self.history.len());
-        for tracks in self.history.sets().take(self.history.len() - 1) {
-            before.push(live.poser.step(tracks));
+        let mut before = Vec::with_capacity(window.len());
+        for tracks in window.sets().take(window.len() - 1) {
+            before.push(tracker.step(tracks));
         }
-        self.live = Some(live);
-        let refiner = Refiner::new(moment.time_s, self.history.span_s(), &self.config);
-        self.keep_on(refiner);
+        self.tracker = Some(tracker);
+        self.refiner = Some(refiner).filter(|r| !r.is_over());
         before
     }
 
-    /// Goes on with `refiner`, and remembers for as long as it is not over.
-    fn keep_on(&mut self, refiner: Refiner) {
-        self.refiner = Some(refiner).filter(|r| !r.is_over());
-        if self.refiner.is_none() {
-            self.history.clear();
-        }
-    }
-
-    /// Refines the tree where it is time to; in the frame with which a new one takes the old one's
+    /// Solves anew where it is time to; in the frame with which a new model takes the old one's
     /// place gives poses and targets of the frames that it was followed through.
     fn refine(&mut self) -> Vec<(Pose, Targets)> {
-        let (Some(mut refiner), Some(live)) = (self.refiner.take(), &self.live) else {
+        let (Some(mut refiner), Some(standing)) = (self.refiner.take(), &self.tracker) else {
             return Vec::new();
         };
-        let taken = refiner.step(&self.history, live, &self.config);
-        self.keep_on(refiner);
-        let Some((live, before)) = taken else {
+        let taken = refiner.step(&self.log, standing, &self.config);
+        self.refiner = Some(refiner).filter(|r| !r.is_over());
+        let Some(Taken { tracker, before }) = taken else {
             return Vec::new();
         };
-        self.evidence = live.tree.evidence.clone();
-        self.live = Some(live);
+        self.evidence = tracker.model().evidence.clone();
+        self.tracker = Some(tracker);
         before
     }
 
-    /// A refinement that has to be worked out by the time that
-    /// [`needs_refinement`](Self::needs_refinement) tells. Who can do so meanwhile hands it in with
-    /// [`put_refinement`](Self::put_refinement); else it is done in that frame. The result is the
-    /// same.
-    pub fn refinement(&self) -> Option<&Arc<Refinement>> {
-        self.refiner.as_ref()?.work()
+    /// A job that has to be worked out by the time that [`needs_model`](Self::needs_model) says. Who
+    /// can do so meanwhile hands the result in with [`put_model`](Self::put_model); else it is done
+    /// in that frame. The result is the same.
+    pub fn job(&self) -> Option<&Arc<SolveJob>> {
+        self.refiner.as_ref()?.job()
     }
 
-    /// Whether a frame of this time needs the result of the refinement.
-    pub fn needs_refinement(&self, time_s: f64) -> bool {
+    /// Whether a frame of this time needs the result of the job.
+    pub fn needs_model(&self, time_s: f64) -> bool {
         self.refiner.as_ref().is_some_and(|r| r.is_due(time_s))
     }
 
     /// Lets frames up to this time do without the result. What comes of it then hangs on the clock:
     /// for a camera, which does not wait.
-    pub fn put_off_refinement(&mut self, time_s: f64) {
+    pub fn put_off_model(&mut self, time_s: f64) {
         if let Some(refiner) = &mut self.refiner {
             refiner.put_off(time_s);
         }
     }
 
-    /// Takes the result of [`refinement`](Self::refinement).
-    pub fn put_refinement(&mut self, tree: Option<Tree>) {
+    /// Takes the result of [`job`](Self::job).
+    pub fn put_model(&mut self, model: Option<Model>) {
         if let Some(refiner) = &mut self.refiner {
-            refiner.put(tree);
+            refiner.put(model);
         }
     }
 
@@ -245,37 +225,39 @@ impl BackEnd {
     }
 
     /// No more frames: if nothing has been built, builds from what there is, unless that is next to
-    /// nothing; and a tree that was never refined gets the shoots that a refinement would put on
-    /// it, if there is enough motion in what is remembered, and
-    /// `cancel` does not end it before.
+    /// nothing; and a tree that was never refined gets the sub-branches that a refinement would put
+    /// on it, if there is enough motion in what is remembered, and `cancel` does not end it before.
     pub fn finish(&mut self, cancel: &CancelToken) {
-        if self.live.is_none() && !self.history.is_empty() {
-            let table = self.judge();
+        self.log.close();
+        if self.tracker.is_none() && !self.log.all().is_empty() {
+            self.judge();
             let asked = self.build_now || self.building.is_some();
             if asked || self.evidence.measure >= LEAST_MEASURE {
-                self.build(&table, true);
+                self.build();
             }
         }
-        self.shoot(cancel);
+        self.identify_sub_branches(cancel);
     }
 
-    fn shoot(&mut self, cancel: &CancelToken) {
-        let Some(live) = self.live.as_ref().filter(|live| live.tree.refinements == 0) else {
+    fn identify_sub_branches(&mut self, cancel: &CancelToken) {
+        let Some(tracker) = self.tracker.as_ref().filter(|_| self.refiner.is_some()) else {
             return;
         };
-        let Some(work) = Refinement::of(&self.history, live, &self.config) else {
+        let standing = tracker.model();
+        if standing.refinements > 0 {
             return;
-        };
-        if let Some(mut tree) = work.shoots_while(cancel) {
-            let standing = &live.tree;
-            // The capture's poses are followed as those of the tree without them were shown.
-            (tree.followed_from, tree.shown_from) = (standing.followed_from, standing.shown_from);
-            // Built just now from the same film, it is no other tree.
-            tree.refinements -= u32::from(tree.frame == standing.frame);
-            self.live = Some(Live {
-                poser: tree.poser(&self.config),
-                tree: Arc::new(tree),
-            });
+        }
+        let prior = standing.joined_by(tracker.binding());
+        if let Some(model) = identify_sub_branches(&self.log, &prior, &self.config, cancel) {
+            let model = Model {
+                // The capture's poses are followed as those of the tree without them were shown.
+                followed_from: standing.followed_from,
+                shown_from: standing.shown_from,
+                // Built just now from the same film, it is no other tree.
+                refinements: u32::from(model.frame != standing.frame),
+                ..model
+            };
+            self.tracker = Some(PoseTracker::new(Arc::new(model), &self.config));
         }
     }
 
@@ -284,13 +266,23 @@ impl BackEnd {
         *self = Self::new(&self.config);
     }
 
-    pub fn tree(&self) -> Option<&Arc<Tree>> {
-        self.live.as_ref().map(|l| &l.tree)
+    /// The points of the last seconds.
+    pub fn log(&self) -> &TrackLog {
+        &self.log
+    }
+
+    pub fn model(&self) -> Option<&Arc<Model>> {
+        self.tracker.as_ref().map(PoseTracker::model)
+    }
+
+    /// There is a model, and it stays as it is until the end.
+    pub fn is_settled(&self) -> bool {
+        self.tracker.is_some() && self.refiner.is_none()
     }
 
     /// The binding of tracks to nodes, later tracks included.
     pub fn binding(&self) -> Option<&Binding> {
-        self.live.as_ref().map(|l| &l.poser.binding)
+        self.tracker.as_ref().map(PoseTracker::binding)
     }
 
     /// The outline of the newest frame.
@@ -304,11 +296,16 @@ impl BackEnd {
 
     /// What is being done, and how far it is, 0 to 1.
     pub fn phase(&self) -> (Phase, f64) {
-        match &self.live {
+        match &self.tracker {
             Some(_) => (Phase::Live, 1.0),
-            None if self.history.len() < 2 => (Phase::Detect, 0.0),
+            None if self.log.all().len() < 2 => (Phase::Detect, 0.0),
             None if self.building.is_some() => (Phase::Build, 1.0),
             None => (Phase::Accumulate, self.evidence.measure),
         }
     }
+}
+
+/// Film that is remembered, s: what trees are built from, and what the sway is analysed in.
+fn remembered_s(config: &Config) -> f64 {
+    config.accumulate.window_s.max(config.dynamics.window_s)
 }

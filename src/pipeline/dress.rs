@@ -66,7 +66,7 @@ pub fn dress(skeleton: &Skeleton, seen: Seen, config: &Config) -> Dressed {
 
 /// What an outline says about the space that the tree stands in.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Bounds {
+pub(crate) enum Bounds {
     /// It is a drawn shape that the tree was cut to.
     Drawn,
     Filmed(EnvelopeKind),
@@ -75,7 +75,7 @@ pub(super) enum Bounds {
 /// Where twigs may grow (from and to, model axes, px): within the envelope that the branches were
 /// pushed to fill or were cut to, and not out of the outline itself as seen from the front;
 /// everywhere where there is no outline.
-pub(super) fn room<'a>(
+pub(crate) fn room<'a>(
     skeleton: &Skeleton,
     outline: Option<&'a Outline>,
     bounds: Bounds,

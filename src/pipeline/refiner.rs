@@ -1,12 +1,11 @@
-//! When the tree is built anew, and how the new one takes the old one's place without a pause or a
-//! jump.
+//! When the model is solved anew, and how the new one takes the old one's place without a pause or
+//! a jump.
 
-use super::back::Live;
-use super::refine::Refinement;
-use super::{Poser, Targets, Tree};
+use super::pose_tracker::{PoseTracker, Targets};
+use crate::cancel::CancelToken;
 use crate::config::Config;
-use crate::model::Pose;
-use crate::track::TrackHistory;
+use crate::model::{Outline, Pose, TrackLog};
+use crate::solve::{Model, solve};
 use std::sync::Arc;
 
 /// The tree is built anew each time that film has grown by this factor: the error of a correlation
@@ -22,7 +21,45 @@ const POINTS: f64 = 400.0;
 /// Remembered frames through which the new tree's pose is followed in the time of one frame.
 const FRAMES_PER_STEP: usize = 30;
 
-/// Looks after the standing tree.
+/// All that [`solve`] needs, apart from everything that goes on meanwhile: it can be done on any
+/// thread.
+pub struct SolveJob {
+    log: TrackLog,
+    outline: Arc<Outline>,
+    prior: Model,
+    config: Config,
+}
+
+impl SolveJob {
+    fn new(log: &TrackLog, standing: &PoseTracker, config: &Config) -> Self {
+        Self {
+            log: log.clone(),
+            outline: standing.model().outline.clone(),
+            prior: standing.model().joined_by(standing.binding()),
+            config: config.clone(),
+        }
+    }
+
+    /// Film after which the result is due, s.
+    fn ready_s(&self) -> f64 {
+        let newest = self.log.all().newest();
+        let n_points = newest.map_or(0, |set| set.counted().count());
+        READY_S * (n_points as f64 / POINTS).powi(2).max(1.0)
+    }
+
+    /// The better model, if there is one; `None`, too, where `cancel` ends the work before.
+    pub fn run(&self, cancel: &CancelToken) -> Option<Model> {
+        solve(
+            &self.log,
+            &self.outline,
+            Some(&self.prior),
+            &self.config,
+            cancel,
+        )
+    }
+}
+
+/// Looks after the standing model.
 pub(super) struct Refiner {
     /// When the tree was built, and how much film it was built from, s.
     built_s: f64,
@@ -33,24 +70,33 @@ pub(super) struct Refiner {
 enum Stage {
     /// Until there is more film, s.
     Waiting(f64),
-    /// Until it is due, s; with the result where somebody has worked it out before.
-    Building(Arc<Refinement>, f64, Option<Box<Option<Tree>>>),
+    Solving(Solving),
     Following(Box<Following>),
     Over,
 }
 
-/// A new tree whose pose is being followed.
+/// A job that is due at some time of film, s; with the result where somebody has worked it out
+/// before.
+struct Solving {
+    job: Arc<SolveJob>,
+    due_s: f64,
+    done: Option<Option<Box<Model>>>,
+}
+
+/// A new model whose pose is being followed.
 struct Following {
-    tree: Tree,
-    poser: Poser,
+    tracker: PoseTracker,
     /// Frames before this one have been followed; their poses and targets.
     next: u64,
     before: Vec<(Pose, Targets)>,
 }
 
-/// A tree that takes the place of another, and poses and targets of the frames that it was followed
-/// through.
-pub(super) type Taken = (Live, Vec<(Pose, Targets)>);
+/// A model that takes the place of another, and poses and targets of the frames that it was
+/// followed through.
+pub(super) struct Taken {
+    pub tracker: PoseTracker,
+    pub before: Vec<(Pose, Targets)>,
+}
 
 impl Refiner {
     /// For a tree that was built at `built_s` from the last `span_s` of film, s.
@@ -64,121 +110,145 @@ impl Refiner {
         refiner
     }
 
-    /// No more refinements: nothing has to be remembered.
+    /// No more refinements: the model stays as it is.
     pub fn is_over(&self) -> bool {
         matches!(self.stage, Stage::Over)
     }
 
     /// Waits for the next time after `now_s` by which film has grown enough, if there is one.
     fn wait(&mut self, now_s: f64, config: &Config) {
-        let refined_for_s = config.accumulate.refine_s;
-        let growths = std::iter::successors(Some(GROWTH), |g| Some(g * GROWTH));
-        let mut times = growths
-            .map(|g| self.span_s * (g - 1.0))
-            .take_while(|&after_s| after_s <= refined_for_s);
-        let next = times.find(|after_s| self.built_s + after_s > now_s);
-        self.stage = next.map_or(Stage::Over, |after_s| {
-            Stage::Waiting(self.built_s + after_s)
-        });
+        self.stage = Stage::Over;
+        let mut growth = GROWTH;
+        loop {
+            let after_s = self.span_s * (growth - 1.0);
+            if after_s > config.accumulate.refine_s {
+                return;
+            }
+            if self.built_s + after_s > now_s {
+                self.stage = Stage::Waiting(self.built_s + after_s);
+                return;
+            }
+            growth *= GROWTH;
+        }
     }
 
-    /// Takes the next frame, the newest of `history`. Gives the tree that takes the place of `live`
-    /// with it, its pose followed up to the frame before.
-    pub fn step(&mut self, history: &TrackHistory, live: &Live, config: &Config) -> Option<Taken> {
-        let (first, newest) = (history.first()?, history.last()?);
-        let now_s = newest.time_s;
+    /// Takes the next frame, the newest of `log`. Gives the model that takes the place of
+    /// `standing` with it, its pose followed up to the frame before.
+    pub fn step(
+        &mut self,
+        log: &TrackLog,
+        standing: &PoseTracker,
+        config: &Config,
+    ) -> Option<Taken> {
+        let now_s = log.all().newest()?.time_s;
         match std::mem::replace(&mut self.stage, Stage::Over) {
             Stage::Waiting(due_s) if now_s >= due_s => {
-                let work = Refinement::of(history, live, config)?;
-                let ready_s = READY_S * (work.points() as f64 / POINTS).powi(2).max(1.0);
-                self.stage = Stage::Building(Arc::new(work), now_s + ready_s, None);
+                let job = SolveJob::new(log, standing, config);
+                self.stage = Stage::Solving(Solving {
+                    due_s: now_s + job.ready_s(),
+                    job: Arc::new(job),
+                    done: None,
+                });
+                None
             }
-            Stage::Building(work, due_s, done) if now_s >= due_s => {
-                match done.map_or_else(|| work.run(), |tree| *tree) {
-                    // After a long pause nothing is remembered by which its pose could be followed:
-                    // it would jump. There will be a better one.
-                    Some(tree) if first.frame > tree.frame => self.wait(now_s, config),
-                    Some(mut tree) => {
-                        // What has been forgotten meanwhile cannot be followed.
-                        tree.followed_from = tree.followed_from.max(first.frame);
-                        let poser = tree.poser(config);
-                        return self.follow(
-                            Following {
-                                tree,
-                                poser,
-                                next: 0,
-                                before: Vec::new(),
-                            },
-                            history,
-                            config,
-                        );
-                    }
-                    None => self.wait(now_s, config),
-                }
+            Stage::Solving(solving) if now_s >= solving.due_s => {
+                let model = match solving.done {
+                    Some(model) => model.map(|model| *model),
+                    None => solving.job.run(&CancelToken::new()),
+                };
+                self.begin_to_follow(model, log, config)
             }
-            Stage::Following(following) => return self.follow(*following, history, config),
-            stage => self.stage = stage,
+            Stage::Following(following) => self.follow(*following, log, config),
+            stage => {
+                self.stage = stage;
+                None
+            }
         }
-        None
     }
 
-    /// Follows the new tree's pose through some of the remembered frames; gives it when only the
+    fn begin_to_follow(
+        &mut self,
+        model: Option<Model>,
+        log: &TrackLog,
+        config: &Config,
+    ) -> Option<Taken> {
+        let window = log.last(config.accumulate.window_s);
+        let (first, newest) = (window.first()?, window.newest()?);
+        // After a long pause nothing is remembered by which a new model's pose could be followed:
+        // it would jump. There will be a better one.
+        let Some(mut model) = model.filter(|model| first.frame <= model.frame) else {
+            self.wait(newest.time_s, config);
+            return None;
+        };
+        // What has been forgotten meanwhile cannot be followed.
+        model.followed_from = model.followed_from.max(first.frame);
+        let following = Following {
+            tracker: PoseTracker::new(Arc::new(model), config),
+            next: 0,
+            before: Vec::new(),
+        };
+        self.follow(following, log, config)
+    }
+
+    /// Follows the new model's pose through some of the remembered frames; gives it when only the
     /// newest is left.
     fn follow(
         &mut self,
-        mut on: Following,
-        history: &TrackHistory,
+        mut following: Following,
+        log: &TrackLog,
         config: &Config,
     ) -> Option<Taken> {
-        let newest = history.last()?;
-        let from = on.tree.followed_from.max(on.next);
-        let mut left = history
+        let newest = log.all().newest()?;
+        let from = following.tracker.model().followed_from.max(following.next);
+        let mut left = log
+            .all()
             .sets()
             .filter(|set| set.frame >= from && set.frame < newest.frame);
         for set in left.by_ref().take(FRAMES_PER_STEP) {
-            on.before.push(on.poser.step(set));
-            on.next = set.frame + 1;
+            following.before.push(following.tracker.step(set));
+            following.next = set.frame + 1;
         }
         if left.next().is_some() {
-            self.stage = Stage::Following(Box::new(on));
+            self.stage = Stage::Following(Box::new(following));
             return None;
         }
         self.wait(newest.time_s, config);
-        on.tree.shown_from = newest.frame;
-        Some((
-            Live {
-                tree: Arc::new(on.tree),
-                poser: on.poser,
-            },
-            on.before,
-        ))
+        following.tracker.set_shown_from(newest.frame);
+        Some(Taken {
+            tracker: following.tracker,
+            before: following.before,
+        })
     }
 
-    /// A refinement to be worked out, which whoever asks may do meanwhile; else it is done when it
-    /// is due.
-    pub fn work(&self) -> Option<&Arc<Refinement>> {
+    /// A job to be worked out, which whoever asks may do meanwhile; else it is done when it is due.
+    pub fn job(&self) -> Option<&Arc<SolveJob>> {
         match &self.stage {
-            Stage::Building(work, _, None) => Some(work),
+            Stage::Solving(Solving {
+                job, done: None, ..
+            }) => Some(job),
             _ => None,
         }
     }
 
     /// Whether a frame of this time needs the result.
     pub fn is_due(&self, time_s: f64) -> bool {
-        matches!(&self.stage, Stage::Building(_, due_s, None) if time_s >= *due_s)
+        matches!(&self.stage, Stage::Solving(s) if s.done.is_none() && time_s >= s.due_s)
     }
 
     /// Makes the result due after the frame of this time.
     pub fn put_off(&mut self, time_s: f64) {
-        if let Stage::Building(_, due_s, None) = &mut self.stage {
+        if let Stage::Solving(Solving {
+            due_s, done: None, ..
+        }) = &mut self.stage
+        {
             *due_s = due_s.max(time_s.next_up());
         }
     }
 
-    /// The result of [`work`](Self::work).
-    pub fn put(&mut self, tree: Option<Tree>) {
-        if let Stage::Building(_, _, done) = &mut self.stage {
-            *done = Some(Box::new(tree));
+    /// The result of [`job`](Self::job).
+    pub fn put(&mut self, model: Option<Model>) {
+        if let Stage::Solving(solving) = &mut self.stage {
+            solving.done = Some(model.map(Box::new));
         }
     }
 }

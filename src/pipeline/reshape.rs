@@ -1,9 +1,10 @@
 //! Another shape in space for a tree that has been measured.
 
-use super::{dress, thicken};
+use super::dress;
 use crate::config::Config;
 use crate::model::{ClusterId, NodeName, Outline, Skeleton};
 use crate::shape::{Drawn, Topiary, TopiaryError};
+use crate::solve::assign_radii;
 use crate::{shape, skeleton};
 
 /// Nodes that a tree may have, copies included, to be given another shape: pushing them takes time
@@ -27,7 +28,7 @@ pub fn reshape(old: &Skeleton, outline: &Outline, config: &Config) -> Skeleton {
         .collect();
     let tracks: Vec<u32> = measured.iter().map(|n| n.n_tracks).collect();
     let mut new = shape::build(&flat, &tracks, outline, &config.shape);
-    thicken(&mut new, outline, config);
+    assign_radii(&mut new, outline, config);
     let unused = old
         .nodes
         .iter()

@@ -46,6 +46,36 @@ pub(super) fn create(path: &Path) -> io::Result<(Disk, Room)> {
     Ok((Disk { file, at: 0, end }, room))
 }
 
+/// Space on the disk that is held back by a file without contents.
+pub struct SpaceReserve(Room);
+
+impl SpaceReserve {
+    /// Holds back at least `bytes` in the new file `path`.
+    ///
+    /// # Errors
+    /// The disk has not so much, or the file cannot be made.
+    pub fn create(path: &Path, bytes: u64) -> io::Result<Self> {
+        let (_, mut room) = create(path)?;
+        room.reserve(bytes)?;
+        Ok(Self(room))
+    }
+
+    /// Holds back at least `bytes` in all.
+    ///
+    /// # Errors
+    /// The disk has not so much.
+    pub fn grow_to(&mut self, bytes: u64) -> io::Result<()> {
+        self.0.reserve(bytes)
+    }
+
+    /// Gives the space back.
+    pub fn release(&mut self) {
+        self.0.can_take = false;
+        // Where that fails, removing the file gives it back.
+        let _ = self.0.cut(0);
+    }
+}
+
 impl Room {
     /// Makes sure that the file can grow to `upto` bytes.
     ///

@@ -1,4 +1,4 @@
-//! What is kept: the tracks of a running capture ([`Spool`]), and recordings of what the camera
+//! What is kept: the track log of a capture ([`TrackFile`]), and recordings of what the camera
 //! delivered (MCAP).
 //!
 //! A recording is written by [`Series`], which makes one file after another where a limit is set,
@@ -12,13 +12,14 @@ mod reader;
 mod scene;
 mod schema;
 mod series;
-mod spool;
+mod track_file;
 mod walk;
 mod wire;
 mod writer;
 
+pub use disk::SpaceReserve;
 pub use error::RecordingError;
 pub use image::{Encoding, Picture};
 pub use reader::{About, Reader};
 pub use series::{Head, Limits, Series};
-pub use spool::{Sets, Spool, SpoolReader};
+pub use track_file::{Sets, TrackFile, TrackFileReader};

@@ -1,13 +1,13 @@
 //! What is said when a tree comes into effect.
 
 use super::shared::Shared;
-use crate::pipeline::Tree;
+use crate::solve::Model;
 use std::sync::Arc;
 
 /// The tree that was last told of.
 #[derive(Default)]
 pub struct Announced {
-    tree: Option<Arc<Tree>>,
+    tree: Option<Arc<Model>>,
     /// The warning that the first one was worth little.
     warned: Option<String>,
 }
@@ -15,7 +15,7 @@ pub struct Announced {
 impl Announced {
     /// Tells of `tree` if it is a new one. One built early is worth less than `threshold`
     /// (accumulation measure), and the capture is to say so until a refinement has made up for it.
-    pub fn tell(&mut self, tree: &Arc<Tree>, threshold: f64, shared: &Shared) {
+    pub fn tell(&mut self, tree: &Arc<Model>, threshold: f64, shared: &Shared) {
         if self
             .tree
             .as_ref()
@@ -55,7 +55,7 @@ impl Announced {
 }
 
 /// The warning that goes with a tree that was asked for before the measure had reached `threshold`.
-pub fn little_motion(tree: &Tree, threshold: f64) -> Option<String> {
+pub fn little_motion(tree: &Model, threshold: f64) -> Option<String> {
     let measure = tree.evidence.measure;
     (tree.forced && measure < threshold).then(|| {
         format!(

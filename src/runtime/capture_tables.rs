@@ -1,17 +1,17 @@
 //! `tracks.csv` and `motion.csv`, written behind the capture while it runs, so that little is left
 //! to do at its end: a service is given two seconds to stop.
 
-use super::held_sets::HeldSets;
 use super::meter::Histogram;
 use super::shared::Failure;
+use crate::cancel::CancelToken;
 use crate::config::Config;
-use crate::dynamics::{Film, FilmLog};
 use crate::export::OutputFolder;
 use crate::export::csv::{MotionCsv, TracksCsv};
-use crate::model::{NodeId, NodeName, Pose, TrackId, TrackSet};
-use crate::pipeline::{Retrace, Tree};
-use crate::recording::{Sets, SpoolReader};
-use std::collections::{BTreeMap, VecDeque};
+use crate::model::{LONGEST_TRIAL_S, Pose, TrackId, TrackLog, TrackSet};
+use crate::pipeline::PoseReplay;
+use crate::recording::{Sets, TrackFileReader};
+use crate::solve::Model;
+use std::collections::{BTreeSet, VecDeque};
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
@@ -21,38 +21,36 @@ use std::sync::Arc;
 /// pieces that is done.
 pub struct CaptureTables {
     folder: OutputFolder,
-    tree: Arc<Tree>,
-    retrace: Retrace,
+    replay: PoseReplay,
     motion: MotionCsv<BufWriter<File>>,
     tracks: TracksCsv<BufWriter<File>>,
     sets: Option<Sets>,
     /// Sets whose poses are written and whose points are not yet: some of those may still be on
     /// trial.
-    held: HeldSets,
-    /// Whether the tracks from before the tree was built have their rows.
-    early: bool,
-    /// Poses of the last [`animation_s`](Self::animation_s), for the animation.
+    undecided: TrackLog,
+    /// Points that did not pass their trial, until the rows from before the tree are written.
+    rejected: BTreeSet<TrackId>,
+    /// Whether the frames up to the one in which the tree was built have their rows.
+    early_rows_written: bool,
+    /// Poses of the last `animation_s`, for the animation.
     poses: VecDeque<Pose>,
     animation_s: f64,
     /// The frame of the capture's picture, and the tree's pose in it.
     pictured: Option<u64>,
     pose_in_picture: Option<Pose>,
     misses: Histogram,
-    /// The points of the last seconds, for the sway.
-    log: FilmLog,
 }
 
 /// What is left when both tables are complete.
 pub struct Done {
     pub folder: OutputFolder,
-    pub tree: Arc<Tree>,
+    /// Knows the node of every track.
+    pub replay: PoseReplay,
     pub poses: Vec<Pose>,
     /// In the frame of the capture's picture.
     pub pose_in_picture: Option<Pose>,
     /// How far the projected nodes lie from where their tracks put them, px.
     pub misses: Histogram,
-    /// The points of the last `dynamics.window_s`.
-    pub film: Film,
 }
 
 impl CaptureTables {
@@ -63,119 +61,102 @@ impl CaptureTables {
     /// `dir` is there already, or whatever the file system says.
     pub fn create(
         dir: &Path,
-        tree: &Arc<Tree>,
+        model: &Arc<Model>,
         config: &Config,
         pictured: Option<u64>,
     ) -> Result<Self, Failure> {
         let folder = OutputFolder::create(dir)?;
         let motion = MotionCsv::new(
             folder.file("motion.csv")?,
-            &tree.skeleton,
+            &model.skeleton,
             config.export.metres_per_px,
         )?;
         let tracks = TracksCsv::new(folder.file("tracks.csv")?)?;
         Ok(Self {
             folder,
-            tree: tree.clone(),
-            retrace: Retrace::new(tree, config),
+            replay: PoseReplay::new(model, config),
             motion,
             tracks,
             sets: None,
-            held: HeldSets::default(),
-            early: false,
+            undecided: TrackLog::new(LONGEST_TRIAL_S),
+            rejected: BTreeSet::new(),
+            early_rows_written: false,
             poses: VecDeque::new(),
             animation_s: config.export.animation_s,
             pictured,
             pose_in_picture: None,
             misses: Histogram::default(),
-            log: FilmLog::new(config.dynamics.window_s),
         })
     }
 
-    /// Writes all rows up to where `spool` ends; each set calls `wrote`, which may answer `false`
-    /// to have it given up.
+    /// Writes all rows up to where `log` ends, or until `cancel` ends it.
     ///
     /// # Errors
     /// Whatever the file system says, a full disk among it.
-    pub fn catch_up(
-        &mut self,
-        spool: &SpoolReader,
-        wrote: impl Fn() -> bool,
-    ) -> Result<(), Failure> {
-        let mut sets = self.sets.take().unwrap_or_else(|| spool.sets());
-        sets.until(spool);
-        for set in sets.by_ref() {
-            let set = set.map_err(Failure::Spool)?;
+    pub fn catch_up(&mut self, log: &TrackFileReader, cancel: &CancelToken) -> Result<(), Failure> {
+        let mut sets = self.sets.take().unwrap_or_else(|| log.sets());
+        sets.until(log);
+        let built = self.replay.model().frame;
+        while !cancel.is_cancelled() {
+            let Some(set) = sets.next() else { break };
+            let set = set.map_err(Failure::Log)?;
             self.pose(&set)?;
-            // A track's node is decided when it has passed its trial; of those that were there when
+            if !self.early_rows_written {
+                self.rejected.extend(&set.rejected);
+            }
+            // A track's node is known when it has passed its trial; of those that were there when
             // the tree was built, then.
-            if set.frame > self.tree.frame {
-                self.held.push(set);
-            } else {
-                self.held.note(&set);
+            let mut decided = self.undecided.push(set);
+            decided.retain(|set| set.frame > built);
+            if !decided.is_empty() {
+                self.early_rows(log, cancel)?;
             }
-            while let Some(set) = self.held.decided() {
-                self.early_rows(spool, &wrote)?;
+            for set in decided {
                 self.rows(&set)?;
-            }
-            if !wrote() {
-                break;
             }
         }
         self.sets = Some(sets);
         Ok(())
     }
 
-    /// Whether nothing is left that grows with the length of the film: `tracks.csv` begins only
-    /// when the last trial from before the tree is over.
-    pub fn is_abreast(&self) -> bool {
-        self.early
-    }
-
     /// Ends both tables, the last rows of which are those that [`catch_up`](Self::catch_up) has
-    /// written; each set calls
-    /// `wrote` as there.
+    /// written.
     ///
     /// # Errors
     /// Whatever the file system says.
-    pub fn finish(
-        mut self,
-        spool: &SpoolReader,
-        wrote: impl Fn() -> bool,
-    ) -> Result<Done, Failure> {
-        self.held.close();
-        self.early_rows(spool, &wrote)?;
-        while let Some(set) = self.held.next() {
-            wrote();
-            self.rows(&set)?;
+    pub fn finish(mut self, log: &TrackFileReader, cancel: &CancelToken) -> Result<Done, Failure> {
+        self.rejected.extend(self.undecided.close());
+        self.early_rows(log, cancel)?;
+        let built = self.replay.model().frame;
+        for set in self.undecided.drain() {
+            if set.frame > built {
+                self.rows(&set)?;
+            }
         }
         self.tracks.finish()?;
         self.motion.finish()?;
-        let (poses, pose_in_picture) = (self.poses.into(), self.pose_in_picture);
-        let film = film(&self.log, &self.tree, |id| self.retrace.node_of(id));
         Ok(Done {
             folder: self.folder,
-            tree: self.tree,
-            poses,
-            pose_in_picture,
+            replay: self.replay,
+            poses: self.poses.into(),
+            pose_in_picture: self.pose_in_picture,
             misses: self.misses,
-            film,
         })
     }
 
     /// The points of a frame in which it is decided which are kept.
     fn rows(&mut self, set: &TrackSet) -> Result<(), Failure> {
-        self.log.push(set);
-        Ok(self.tracks.set(set, |id| self.retrace.node_of(id))?)
+        Ok(self.tracks.set(set, |id| self.replay.node_of(id))?)
     }
 
     fn pose(&mut self, set: &TrackSet) -> Result<(), Failure> {
-        let (pose, targets_px) = self.retrace.step(set);
+        let (pose, targets_px) = self.replay.step(set);
         self.motion.pose(&pose)?;
         // The foot is where it is by definition.
         for (joint, target) in pose.joints.iter().zip(&targets_px).skip(1) {
             if let Some(t) = target {
-                let [u, v] = self.tree.skeleton.image_from_model(&joint.position);
+                let skeleton = &self.replay.model().skeleton;
+                let [u, v] = skeleton.image_from_model(&joint.position);
                 self.misses.add((u - t[0]).hypot(v - t[1]));
             }
         }
@@ -191,35 +172,21 @@ impl CaptureTables {
     }
 
     /// The rows of the frames up to the one in which the tree was built, once that has been gone
-    /// through.
-    fn early_rows(
-        &mut self,
-        spool: &SpoolReader,
-        wrote: &impl Fn() -> bool,
-    ) -> Result<(), Failure> {
-        if std::mem::replace(&mut self.early, true) {
+    /// through: which tracks of that time are on the tree is known only then.
+    fn early_rows(&mut self, log: &TrackFileReader, cancel: &CancelToken) -> Result<(), Failure> {
+        if std::mem::replace(&mut self.early_rows_written, true) {
             return Ok(());
         }
-        for set in spool.sets() {
-            let mut set = set.map_err(Failure::Spool)?;
-            if set.frame > self.tree.frame || !wrote() {
+        let built = self.replay.model().frame;
+        for set in log.sets() {
+            let mut set = set.map_err(Failure::Log)?;
+            if set.frame > built || cancel.is_cancelled() {
                 break;
             }
-            self.held.clean(&mut set);
+            set.observations.retain(|o| !self.rejected.contains(&o.id));
             self.rows(&set)?;
         }
+        self.rejected.clear();
         Ok(())
     }
-}
-
-/// The points of `log` on the nodes of `tree`.
-fn film(log: &FilmLog, tree: &Tree, name_of: impl Fn(TrackId) -> Option<NodeName>) -> Film {
-    let names = tree
-        .skeleton
-        .nodes
-        .iter()
-        .enumerate()
-        .map(|(i, n)| (n.name, NodeId(i as u32)));
-    let by_name: BTreeMap<NodeName, NodeId> = names.collect();
-    log.film(&tree.skeleton, |id| by_name.get(&name_of(id)?).copied())
 }

@@ -2,11 +2,10 @@
 
 use super::announce::little_motion;
 use super::capture_tables::{CaptureTables, Done};
-use super::held_sets::{HeldSets, OnTrial};
 use super::meter::Histogram;
 use super::shared::{Failure, Shared};
 use crate::config::Config;
-use crate::dynamics::analyse;
+use crate::dynamics::{Film, analyse};
 use crate::export::capture::{
     AnimationNote, Build, Capture, ModelNote, OutlineNote, PictureNote, Quality as QualityNote,
     Refinement, Software, Source, Timing, json,
@@ -15,10 +14,14 @@ use crate::export::csv::{MotionCsv, TracksCsv, nodes};
 use crate::export::gltf::{KEY_TOLERANCE_PX, Model, glb, provenance};
 use crate::export::picture::{PICTURE_FILE, jpeg};
 use crate::export::{ExportError, OutputFolder};
-use crate::model::{Outline, Picture, Pose, Skeleton, TrackSet, Unidentified};
-use crate::pipeline::{Seen, Tree, dress, flutter};
-use crate::recording::SpoolReader;
+use crate::model::{
+    NodeId, NodeName, Outline, Picture, Pose, Skeleton, Tentative, TrackLog, TrackSet, Unidentified,
+};
+use crate::pipeline::{PoseReplay, Seen, dress, flutter};
+use crate::recording::TrackFileReader;
+use crate::solve::Model as TreeModel;
 use crate::source::SourceInfo;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -32,7 +35,7 @@ const THOROUGH_UP_TO: usize = 100_000;
 pub struct Quality {
     born: u64,
     rejected: u64,
-    on_trial: OnTrial,
+    on_trial: Tentative,
     lost: u64,
     alive: u64,
     first: Option<(u64, f64)>,
@@ -68,9 +71,11 @@ impl Quality {
 /// Everything that a capture is made of; owned, so that it can be written on any thread while
 /// frames go on.
 pub struct CaptureJob {
-    pub tree: Option<Arc<Tree>>,
+    pub tree: Option<Arc<TreeModel>>,
     pub outline: Option<Arc<Outline>>,
-    pub tracks: SpoolReader,
+    pub tracks: TrackFileReader,
+    /// The last seconds of the same.
+    pub log: TrackLog,
     pub config: Config,
     pub info: SourceInfo,
     pub quality: Quality,
@@ -83,7 +88,7 @@ pub struct CaptureJob {
 pub struct Written {
     pub dir: PathBuf,
     /// The tree of its files. After a stop shortly after a refinement it is the one before.
-    pub tree: Option<Arc<Tree>>,
+    pub tree: Option<Arc<TreeModel>>,
 }
 
 /// Writes the capture to `dir`, which appears only when it is complete.
@@ -110,19 +115,17 @@ pub fn write(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
 /// # Errors
 /// As for [`write`].
 pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, Failure> {
-    let wrote = || {
-        job.shared.pulse.wrote();
-        true
-    };
-    tables.catch_up(&job.tracks, wrote)?;
+    let cancel = &job.shared.pulse.writing;
+    tables.catch_up(&job.tracks, cancel)?;
     let Done {
         folder,
-        tree,
+        replay,
         poses,
         pose_in_picture,
         misses,
-        film,
-    } = tables.finish(&job.tracks, wrote)?;
+    } = tables.finish(&job.tracks, cancel)?;
+    let tree = replay.model().clone();
+    let film = film(job, &replay);
     let metres_per_px = job.config.export.metres_per_px;
     // The sway and the model need nothing of each other, and whoever has asked for the end is
     // waiting.
@@ -166,6 +169,20 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
     publish(job, folder, capture, Some(tree))
 }
 
+/// The points of the last seconds on the nodes of the tree.
+fn film(job: &CaptureJob, replay: &PoseReplay) -> Film {
+    let mut log = job.log.clone();
+    log.close();
+    let skeleton = &replay.model().skeleton;
+    let mut by_name: BTreeMap<NodeName, NodeId> = BTreeMap::new();
+    for (i, node) in skeleton.nodes.iter().enumerate() {
+        by_name.insert(node.name, NodeId(i as u32));
+    }
+    Film::from_log(log.last(job.config.dynamics.window_s), skeleton, |id| {
+        by_name.get(&replay.node_of(id)?).copied()
+    })
+}
+
 /// Does both at the same time, the first on a thread of this name, or one after the other where
 /// there is none to be had.
 fn beside<A: Send, B>(
@@ -193,15 +210,17 @@ fn without_tree(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
     let mut tracks = TracksCsv::new(folder.file("tracks.csv")?)?;
     // Which points are void is known for sure only at the end: where the tree did not move, a trial
     // may last for long.
-    let mut held = HeldSets::default();
+    let (mut rejected, mut tentative) = (BTreeSet::new(), Tentative::default());
     for set in job.tracks.sets() {
-        held.note(&set.map_err(Failure::Spool)?);
+        let set = set.map_err(Failure::Log)?;
+        tentative.note(&set);
+        rejected.extend(set.rejected);
         job.shared.pulse.wrote();
     }
-    held.close();
+    rejected.extend(tentative.void());
     for set in job.tracks.sets() {
-        let mut set = set.map_err(Failure::Spool)?;
-        held.clean(&mut set);
+        let mut set = set.map_err(Failure::Log)?;
+        set.observations.retain(|o| !rejected.contains(&o.id));
         tracks.set(&set, |_| None)?;
         job.shared.pulse.wrote();
     }
@@ -220,7 +239,7 @@ fn publish(
     job: &CaptureJob,
     folder: OutputFolder,
     capture: Capture,
-    tree: Option<Arc<Tree>>,
+    tree: Option<Arc<TreeModel>>,
 ) -> Result<Written, Failure> {
     if let Some(picture) = &job.picture {
         folder.write(PICTURE_FILE, &jpeg(&picture.rgb)?)?;
@@ -232,7 +251,7 @@ fn publish(
 
 fn model_of(
     job: &CaptureJob,
-    tree: &Tree,
+    tree: &TreeModel,
     poses: &[Pose],
     pose_in_picture: Option<&Pose>,
 ) -> Result<(Vec<u8>, AnimationNote), ExportError> {
@@ -262,9 +281,9 @@ fn model_of(
     })
 }
 
-fn describe(
+pub(super) fn describe(
     job: &CaptureJob,
-    tree: Option<&Tree>,
+    tree: Option<&TreeModel>,
     notes: Option<(ModelNote, AnimationNote)>,
     median_reprojection_px: Option<f64>,
 ) -> Capture {

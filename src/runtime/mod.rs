@@ -10,11 +10,9 @@
 
 mod angles;
 mod announce;
-mod behind;
 mod capture_tables;
 mod finish;
 mod first_picture;
-mod held_sets;
 mod latest;
 mod losses;
 mod meter;
@@ -33,7 +31,9 @@ mod status;
 mod stream;
 mod sway_watch;
 mod swaying;
+mod table_writer;
 mod track_thread;
+mod unfinished;
 mod watched;
 
 pub use finish::Written;
@@ -43,11 +43,13 @@ pub use record::{RecordJob, RunningRecord, record};
 pub use recorder_thread::{QUEUE_BYTES, RecordTo, Recorded};
 pub use shared::Failure;
 pub use source_thread::Pace;
+pub use unfinished::{finish_unfinished, unfinished_dir};
 
 use crate::config::Config;
 use crate::model::{Control, Snapshot};
 use crate::outline::Given;
-use crate::pipeline::{FrontEnd, Tree};
+use crate::pipeline::FrontEnd;
+use crate::solve::Model;
 use crate::source::Source;
 use crossbeam_channel::{Sender, bounded, unbounded};
 use model_thread::ModelThread;
@@ -91,7 +93,7 @@ pub struct Summary {
     pub moving: usize,
     pub accumulation: f64,
     /// The one that was written, or where nothing was, the last one.
-    pub tree: Option<Arc<Tree>>,
+    pub tree: Option<Arc<Model>>,
     pub written: Option<Written>,
     pub recorded: Option<Recorded>,
     /// Frames that should have been recorded and were not.

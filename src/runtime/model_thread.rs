@@ -2,8 +2,8 @@
 //! and writes the capture at the end.
 
 use super::announce::Announced;
-use super::behind::BehindTree;
-use super::finish::{self, CaptureJob, Quality};
+use super::capture_tables::CaptureTables;
+use super::finish::{self, CaptureJob, Quality, Written};
 use super::pulse::Worker;
 use super::recorder_thread::{Found, Recorded, Recorder};
 use super::refining::Refining;
@@ -12,11 +12,14 @@ use super::status::{Status, median_error_px, median_fb_error_px};
 use super::stream;
 use super::sway_watch::SwayWatch;
 use super::swaying::Ending;
+use super::table_writer::TableWriter;
 use super::track_thread::ToModel;
+use super::unfinished::Unfinished;
 use super::{Job, Pace, Summary};
 use crate::model::{Phase, Picture, Pose, SwayNow};
-use crate::pipeline::{BackEnd, Followed, LEAST_MOVING, Moved};
-use crate::recording::Spool;
+use crate::pipeline::{BackEnd, Followed, Moved};
+use crate::recording::TrackFile;
+use crate::solve::LEAST_MOVING;
 use crate::source::SourceInfo;
 use crossbeam_channel::{Receiver, RecvTimeoutError};
 use std::io::Write;
@@ -32,7 +35,11 @@ const SCREEN_EVERY: Duration = Duration::from_millis(40);
 /// seen to be.
 const IDLE_EVERY: Duration = Duration::from_millis(200);
 /// Film after which the tables of the capture are brought up to date, s.
-const BEHIND_EVERY_S: f64 = 1.0;
+const TABLES_EVERY_S: f64 = 1.0;
+
+/// For so long a disk that is full is tried again, and at this interval.
+const FULL_DISK_FOR: Duration = Duration::from_secs(20);
+const FULL_DISK_EVERY: Duration = Duration::from_millis(500);
 
 /// State of the thread.
 pub struct ModelThread {
@@ -41,13 +48,15 @@ pub struct ModelThread {
     info: SourceInfo,
     shared: Arc<Shared>,
     status: Status,
-    spool: Option<Spool>,
-    behind: BehindTree,
+    /// The track log on disk, in the folder of the unfinished capture if there will be one.
+    file: Option<TrackFile>,
+    unfinished: Option<Unfinished>,
+    tables: Option<TableWriter>,
     refining: Refining,
     /// Only where somebody looks: a screen, or a reader of the stream.
     sway: Option<SwayWatch>,
     /// Sensor time up to which the tables have been asked for, s.
-    behind_s: f64,
+    tables_s: f64,
     picture: Option<Picture>,
     quality: Quality,
     last_screen: Option<Instant>,
@@ -76,11 +85,12 @@ impl ModelThread {
             info,
             shared,
             status,
-            spool: None,
-            behind: BehindTree::default(),
+            file: None,
+            unfinished: None,
+            tables: None,
             refining: Refining::default(),
             sway,
-            behind_s: f64::NEG_INFINITY,
+            tables_s: f64::NEG_INFINITY,
             picture: None,
             quality: Quality::default(),
             last_screen: None,
@@ -89,7 +99,7 @@ impl ModelThread {
             announced: Announced::default(),
             recorder,
         };
-        thread.new_spool();
+        thread.new_log();
         if thread.job.out.is_none() {
             thread
                 .shared
@@ -105,6 +115,7 @@ impl ModelThread {
             let message = match queue.recv_timeout(IDLE_EVERY) {
                 Ok(message) => message,
                 Err(RecvTimeoutError::Timeout) => {
+                    self.keep();
                     self.show(last.as_ref(), false);
                     continue;
                 }
@@ -127,16 +138,19 @@ impl ModelThread {
                 ToModel::Restart => {
                     self.back.restart();
                     self.status.restart();
-                    std::mem::take(&mut self.behind).give_up();
+                    self.tables
+                        .take()
+                        .into_iter()
+                        .for_each(TableWriter::discard);
                     self.refining = Refining::default();
                     self.sway.iter_mut().for_each(SwayWatch::restart);
-                    self.behind_s = f64::NEG_INFINITY;
-                    self.new_spool();
+                    self.tables_s = f64::NEG_INFINITY;
+                    self.new_log();
                     (self.quality, self.announced, last) =
                         (Quality::default(), Announced::default(), None);
                     self.picture = None;
                 }
-                ToModel::BuildNow if self.back.tree().is_some() => {
+                ToModel::BuildNow if self.back.model().is_some() => {
                     self.shared
                         .tell("the tree is built already; r starts again".into());
                 }
@@ -177,13 +191,14 @@ impl ModelThread {
         if !hurry {
             self.refining.begin(&self.back);
         }
-        if let Some(spool) = &mut self.spool
-            && let Err(e) = spool.push(&moved.tracks)
+        if let Some(file) = &mut self.file
+            && let Err(e) = file.push(&moved.tracks)
         {
             // What follows would be lost, and that ends the capture.
-            self.shared.abort(Failure::Spool(e));
+            self.shared.abort(Failure::Log(e));
         }
-        self.write_behind(moved.tracks.time_s);
+        self.keep();
+        self.write_tables(moved.tracks.time_s);
         let tracks = &moved.tracks;
         self.quality
             .note(tracks, median_fb_error_px(tracks), median_error_px(tracks));
@@ -194,7 +209,7 @@ impl ModelThread {
                 pose: moved
                     .pose
                     .clone()
-                    .zip(self.back.tree().map(|tree| tree.skeleton.clone())),
+                    .zip(self.back.model().map(|tree| tree.skeleton.clone())),
             });
         }
         let sway = self
@@ -217,30 +232,33 @@ impl ModelThread {
         moved
     }
 
-    /// Has the tables of the capture written up to here, now and then.
-    fn write_behind(&mut self, time_s: f64) {
-        if time_s - self.behind_s < BEHIND_EVERY_S {
+    /// Has the tables of the capture written up to here, now and then, once the model has settled.
+    fn write_tables(&mut self, time_s: f64) {
+        if time_s - self.tables_s < TABLES_EVERY_S || !self.back.is_settled() {
             return;
         }
-        self.behind_s = time_s;
-        let (Some(tree), Some(dir), Some(spool)) =
-            (self.back.tree(), &self.job.out, &mut self.spool)
-        else {
+        self.tables_s = time_s;
+        let Some(Ok(log)) = self.file.as_mut().map(TrackFile::reader) else {
             return;
         };
-        if let Ok(reader) = spool.reader() {
-            let pictured = self.picture.as_ref().map(|p| p.frame);
-            self.behind.catch_up(
-                tree,
-                reader,
-                (dir, &self.job.config, pictured),
-                &self.shared,
-            );
+        if self.tables.is_none() {
+            self.tables = self.begin_tables();
+        }
+        if let Some(tables) = &self.tables {
+            tables.catch_up(log);
         }
     }
 
+    /// `None` where they cannot be begun; the end will say why.
+    fn begin_tables(&self) -> Option<TableWriter> {
+        let (model, dir) = (self.back.model()?, self.job.out.as_ref()?);
+        let pictured = self.picture.as_ref().map(|p| p.frame);
+        let tables = CaptureTables::create(dir, model, &self.job.config, pictured).ok()?;
+        TableWriter::start(tables, self.shared.clone()).ok()
+    }
+
     fn announce(&mut self) {
-        if let Some(tree) = self.back.tree() {
+        if let Some(tree) = self.back.model() {
             self.announced
                 .tell(tree, self.job.config.accumulate.threshold, &self.shared);
         }
@@ -250,7 +268,9 @@ impl ModelThread {
         let Some(out) = &mut self.job.stream else {
             return;
         };
-        let Some(tree) = self.back.tree() else { return };
+        let Some(tree) = self.back.model() else {
+            return;
+        };
         let lost = self.info.live.then_some(&*self.shared);
         let line = stream::line(
             pose,
@@ -282,32 +302,53 @@ impl ModelThread {
         self.shared.screen.put(snapshot);
     }
 
-    fn new_spool(&mut self) {
-        let folder = self
-            .job
-            .out
-            .as_deref()
-            .and_then(nearest_folder)
-            .unwrap_or_else(std::env::temp_dir);
-        self.spool = match Spool::create(&folder) {
-            Ok(spool) => Some(spool),
+    fn new_log(&mut self) {
+        match self.opened_log() {
+            Ok(file) => self.file = Some(file),
             Err(e) => {
-                self.shared.abort(Failure::Spool(e));
-                None
+                self.file = None;
+                self.shared.abort(e);
             }
+        }
+    }
+
+    fn opened_log(&mut self) -> Result<TrackFile, Failure> {
+        if let Some(unfinished) = &mut self.unfinished {
+            return unfinished.restart();
+        }
+        let Some(out) = &self.job.out else {
+            return TrackFile::nameless(&std::env::temp_dir()).map_err(Failure::Log);
         };
+        let (unfinished, file) = Unfinished::create(out)?;
+        self.unfinished = Some(unfinished);
+        Ok(file)
+    }
+
+    /// Brings to disk what a crash would lose, now and then.
+    fn keep(&mut self) {
+        if self.unfinished.as_ref().is_none_or(|u| !u.is_due()) {
+            return;
+        }
+        let Ok(job) = self.capture_job() else { return };
+        if let (Some(unfinished), Some(file)) = (&mut self.unfinished, &mut self.file)
+            && let Err(e) = unfinished.keep(file, &job)
+        {
+            // What follows would be lost, or could not be written; that ends the capture.
+            self.shared.abort(e);
+        }
     }
 
     fn capture_job(&mut self) -> Result<CaptureJob, Failure> {
-        let Some(spool) = &mut self.spool else {
-            return Err(Failure::Spool(std::io::Error::other(
+        let Some(file) = &mut self.file else {
+            return Err(Failure::Log(std::io::Error::other(
                 "it could not be created",
             )));
         };
         Ok(CaptureJob {
-            tree: self.back.tree().cloned(),
+            tree: self.back.model().cloned(),
             outline: self.back.outline().cloned(),
-            tracks: spool.reader().map_err(Failure::Spool)?,
+            tracks: file.reader().map_err(Failure::Log)?,
+            log: self.back.log().clone(),
             config: self
                 .shared
                 .reloaded()
@@ -346,6 +387,45 @@ impl ModelThread {
         }
     }
 
+    /// Writes the capture, from the tables as far as they have come. A disk that is full is tried
+    /// again for a while; what was filmed is kept in any case.
+    fn write_capture(&mut self, out: &Path) -> Result<Written, Failure> {
+        if let Some(unfinished) = &mut self.unfinished {
+            unfinished.release_space();
+        }
+        let mut tables = self.tables.take().and_then(TableWriter::join);
+        let job = self.capture_job()?;
+        let until = Instant::now() + FULL_DISK_FOR;
+        let written = loop {
+            let written = match tables.take() {
+                Some(tables) => finish::complete(&job, tables),
+                None => finish::write(&job, out),
+            };
+            let is_full = matches!(&written, Err(e) if e.is_full_disk());
+            if !is_full || Instant::now() >= until {
+                break written;
+            }
+            self.shared
+                .warn("the disk is full; the capture is written when there is room".into());
+            self.shared.pulse.wrote();
+            std::thread::sleep(FULL_DISK_EVERY);
+        };
+        let Some(unfinished) = self.unfinished.take() else {
+            return written;
+        };
+        match written {
+            Ok(written) => {
+                unfinished.remove();
+                Ok(written)
+            }
+            Err(why) => Err(Failure::Kept {
+                why: Box::new(why),
+                dir: unfinished.dir().to_owned(),
+                out: out.to_owned(),
+            }),
+        }
+    }
+
     fn finish(&mut self) -> Summary {
         // The source has gone; with this end of the queue the recorder works off what is left and
         // ends its file. Only then it is known what is missing in it.
@@ -358,32 +438,18 @@ impl ModelThread {
         }
         // Without a single frame there is nothing to keep.
         let seen = self.shared.counts.seen.load(Ordering::Relaxed);
-        let hurry = self.shared.hurry.load(Ordering::Relaxed);
-        if !hurry {
-            // A tree that was refined in the last second counts.
-            self.write_behind(f64::INFINITY);
-        }
-        let behind = std::mem::take(&mut self.behind);
-        let written = match (
-            self.job.out.clone().filter(|_| seen > 0),
-            self.capture_job(),
-        ) {
-            (Some(dir), Ok(job)) => match behind.join(hurry).map_or_else(
-                || finish::write(&job, &dir),
-                |tables| finish::complete(&job, tables),
-            ) {
-                Ok(written) => Some(written),
-                Err(e) => {
-                    self.shared.fail(e);
-                    None
-                }
-            },
-            (Some(_), Err(e)) => {
+        let out = self.job.out.clone().filter(|_| seen > 0);
+        let written = out.and_then(|out| match self.write_capture(&out) {
+            Ok(written) => Some(written),
+            Err(e) => {
                 self.shared.fail(e);
                 None
             }
-            (None, _) => None,
-        };
+        });
+        self.unfinished
+            .take()
+            .into_iter()
+            .for_each(Unfinished::remove);
         Summary {
             frames: seen,
             tracks_total: self.quality.tracks_total(),
@@ -392,23 +458,12 @@ impl ModelThread {
             // The one that is in the folder, where there is a folder.
             tree: written
                 .as_ref()
-                .map_or_else(|| self.back.tree().cloned(), |w| w.tree.clone()),
+                .map_or_else(|| self.back.model().cloned(), |w| w.tree.clone()),
             written,
             recorded,
             not_recorded: self.shared.counts.not_recorded.load(Ordering::Relaxed),
         }
     }
-}
-
-/// The folder in which `path` will lie, if it is there already, else the nearest one above it that
-/// is.
-fn nearest_folder(path: &Path) -> Option<PathBuf> {
-    let absolute = std::path::absolute(path).ok()?;
-    absolute
-        .ancestors()
-        .skip(1)
-        .find(|a| a.is_dir())
-        .map(Path::to_path_buf)
 }
 
 /// `wanted-1`, `wanted-2`, ...: the first after number `last` that is not there yet; `last` becomes

@@ -44,6 +44,8 @@ pub struct Pulse {
     /// The work of the end that nobody waits for who asks for the end, and the work that he gives
     /// some seconds. Each look at them is a sign of life, as a frame written is.
     pub optional_work: CancelToken,
+    /// Writing the capture; nobody cancels it but who does not want the capture.
+    pub writing: CancelToken,
     pub closing_work: CancelToken,
 }
 
@@ -86,7 +88,8 @@ impl Pulse {
         done[Worker::Sway as usize] += steps;
         given[Worker::Sway as usize] += steps;
         let [waits, written] = [&self.waits, &self.written].map(|c| c.load(Ordering::Relaxed));
-        let written = written + self.optional_work.checks() + self.closing_work.checks();
+        let tokens = [&self.optional_work, &self.closing_work, &self.writing];
+        let written = written + tokens.map(CancelToken::checks).iter().sum::<u64>();
         Marks {
             frames,
             waits,

@@ -1,13 +1,14 @@
 //! The tree is worked out anew on a thread of its own, while poses go on.
 
 use crate::cancel::CancelToken;
-use crate::pipeline::{BackEnd, Tree};
+use crate::pipeline::BackEnd;
+use crate::solve::Model;
 use std::thread::JoinHandle;
 
 /// A refinement under way, if there is one.
 #[derive(Default)]
 pub struct Refining {
-    work: Option<JoinHandle<Option<Tree>>>,
+    work: Option<JoinHandle<Option<Model>>>,
     /// Nobody waits for it any more: it shall leave the computer to others.
     given_up: CancelToken,
 }
@@ -16,9 +17,9 @@ impl Refining {
     /// Begins what `back` wants worked out. Where no thread can be had, `back` does it itself when
     /// it is due.
     pub fn begin(&mut self, back: &BackEnd) {
-        if let (Some(work), None) = (back.refinement(), &self.work) {
+        if let (Some(work), None) = (back.job(), &self.work) {
             let (work, given_up) = (work.clone(), self.given_up.clone());
-            let run = move || work.run_while(&given_up);
+            let run = move || work.run(&given_up);
             self.work = std::thread::Builder::new()
                 .name("refine".into())
                 .spawn(run)
@@ -33,16 +34,16 @@ impl Refining {
         if hurry {
             self.given_up.cancel();
         }
-        if !back.needs_refinement(time_s) {
+        if !back.needs_model(time_s) {
             return;
         }
         if live && !hurry && self.work.as_ref().is_some_and(|work| !work.is_finished()) {
-            back.put_off_refinement(time_s);
+            back.put_off_model(time_s);
             return;
         }
         match self.work.take().filter(|_| !hurry).map(JoinHandle::join) {
-            Some(Ok(tree)) => back.put_refinement(tree),
-            _ if hurry => back.put_refinement(None),
+            Some(Ok(tree)) => back.put_model(tree),
+            _ if hurry => back.put_model(None),
             _ => {}
         }
     }

@@ -7,8 +7,9 @@ use crate::export::ExportError;
 use crate::export::capture::{Gap, Timing};
 use crate::model::{CameraState, Snapshot};
 use crate::recording::RecordingError;
-use crate::source::{DecodeError, SourceError};
+use crate::source::{ClockKind, DecodeError, SourceError};
 use std::collections::VecDeque;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -30,7 +31,24 @@ pub enum Failure {
     #[error(transparent)]
     Export(#[from] ExportError),
     #[error("cannot keep the tracks: {0}; free some space, or choose another disk with --out")]
-    Spool(std::io::Error),
+    Log(std::io::Error),
+    #[error("{} is there: a run that was cut; complete it with `arborcam finish`, or remove it", .dir.display())]
+    UnfinishedIsThere { dir: PathBuf },
+    #[error("there is nothing to finish: no {}", .dir.display())]
+    NothingUnfinished { dir: PathBuf },
+    #[error("{} is still being filmed; wait for its end", .dir.display())]
+    StillFilming { dir: PathBuf },
+    #[error("{} cannot be finished: {what}", .dir.display())]
+    DamagedUnfinished { dir: PathBuf, what: String },
+    /// The results could not be written; what was filmed is there.
+    #[error("{why}; what was filmed is kept in {}: then run `arborcam finish {}`", .dir.display(), .out.display())]
+    Kept {
+        why: Box<Failure>,
+        dir: PathBuf,
+        out: PathBuf,
+    },
+    #[error("stopped before it was complete; what was filmed is still there")]
+    Stopped,
     /// The recording could not be begun; one that breaks off later is a warning.
     #[error(transparent)]
     Recording(#[from] RecordingError),
@@ -45,6 +63,20 @@ pub enum Failure {
     NothingDecoded(DecodeError),
     #[error("a worker thread of the capture ended unexpectedly; please report this")]
     Panicked,
+}
+
+impl Failure {
+    /// Whether it may go away by itself when there is room on the disk.
+    pub fn is_full_disk(&self) -> bool {
+        match self {
+            Failure::Export(ExportError::DiskFull { .. }) => true,
+            Failure::Log(e) => matches!(
+                e.kind(),
+                std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded
+            ),
+            _ => false,
+        }
+    }
 }
 
 /// Monotonic counts.
@@ -98,6 +130,47 @@ struct Reloaded {
 }
 
 impl Shared {
+    /// The state that a run has left in its note.
+    pub fn restored(timing: &Timing, warnings: &[String]) -> Self {
+        let shared = Self::default();
+        let counts = &shared.counts;
+        for (count, value) in [
+            (&counts.seen, timing.frames_seen),
+            (&counts.lost_in_camera, timing.frames_dropped_camera),
+            (
+                &counts.dropped_before_tracker,
+                timing.frames_dropped_tracker,
+            ),
+            (&counts.undecodable, timing.frames_undecodable),
+            (&counts.before_outline, timing.frames_before_outline),
+            (&counts.not_recorded, timing.frames_not_recorded),
+        ] {
+            count.store(value, Ordering::Relaxed);
+        }
+        let clocks = ClockKind::ALL.map(ClockKind::name);
+        shared.camera(|camera| {
+            camera.lost_by_sequence = timing.frames_dropped_by_sequence;
+            camera.lost_by_time = timing.frames_dropped_by_time;
+            camera.damaged = timing.frames_damaged;
+            camera.stale = timing.frames_stale;
+            camera.reconnects = timing.reconnects;
+            camera.away_s = timing.away_s;
+            camera.clock = clocks
+                .into_iter()
+                .find(|c| *c == timing.clock)
+                .unwrap_or_default();
+        });
+        *shared
+            .last_time_s
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner) = timing.duration_s;
+        *shared.timing.lock().unwrap_or_else(PoisonError::into_inner) = timing.clone();
+        warnings
+            .iter()
+            .for_each(|warning| shared.note(warning.clone()));
+        shared
+    }
+
     pub fn reload(&self, config: Config) {
         *self.reloaded.lock().unwrap_or_else(PoisonError::into_inner) = Reloaded {
             config: Some(config),

@@ -7,8 +7,9 @@ use crate::model::{
     BranchRow, FormatNote, NodeName, Observation, Phase, Rgb, Size, Skeleton, Snapshot, SwayNow,
     TrackSet,
 };
-use crate::pipeline::{BackEnd, Moved, Targets, Tree};
+use crate::pipeline::{BackEnd, Moved, Targets};
 use crate::signal::median;
+use crate::solve::Model;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -124,7 +125,7 @@ impl Status {
             }
             self.fb_history.push_back(error_px);
         }
-        if let Some(tree) = back.tree() {
+        if let Some(tree) = back.model() {
             self.follow_tree(tree, moved);
         }
         let s = &mut self.snapshot;
@@ -200,7 +201,7 @@ impl Status {
         Arc::new(s.clone())
     }
 
-    fn follow_tree(&mut self, tree: &Tree, moved: &Moved) {
+    fn follow_tree(&mut self, tree: &Model, moved: &Moved) {
         if self
             .skeleton
             .as_ref()

@@ -1,13 +1,11 @@
-//! What the sway is told from while it films: the points and the angles of the last seconds.
+//! The sway while it films: when it is analysed, and the angles of the last seconds.
 
 use super::angles::AngleWindow;
 use super::shared::Shared;
 use super::swaying::{Ending, Request, Swaying, analyse};
 use crate::config::Dynamics;
-use crate::dynamics::FilmLog;
-use crate::model::{Angles, Skeleton, SwayNow, TrackId, TrackSet};
+use crate::model::{Angles, Skeleton, SwayNow};
 use crate::pipeline::{BackEnd, Moved};
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// The angles that a screen is shown, s.
@@ -16,10 +14,7 @@ const SHOWN_S: f64 = 20.0;
 /// Keeps the window and asks when it is time.
 pub struct SwayWatch {
     settings: Dynamics,
-    log: FilmLog,
     angles: AngleWindow,
-    /// Points that did not pass their trial, and when: what was seen of them is void.
-    void: BTreeMap<TrackId, f64>,
     skeleton: Option<Arc<Skeleton>>,
     swaying: Swaying,
 }
@@ -29,9 +24,7 @@ impl SwayWatch {
     pub fn new(settings: &Dynamics, waits: bool, shared: Arc<Shared>) -> Self {
         Self {
             settings: settings.clone(),
-            log: FilmLog::new(settings.window_s),
             angles: AngleWindow::new(settings.window_s),
-            void: BTreeMap::new(),
             skeleton: None,
             swaying: Swaying::new(settings.every_s, waits, analyse, shared),
         }
@@ -40,10 +33,7 @@ impl SwayWatch {
     /// Takes the next frame; gives the sway that takes effect with it, of the branches of the
     /// present tree.
     pub fn step(&mut self, moved: &Moved, back: &BackEnd) -> Option<Arc<SwayNow>> {
-        if self.settings.every_s > 0.0 {
-            self.remember(&moved.tracks);
-        }
-        let skeleton = back.tree()?.skeleton.clone();
+        let skeleton = back.model()?.skeleton.clone();
         if self
             .skeleton
             .as_ref()
@@ -59,18 +49,16 @@ impl SwayWatch {
         if let Some(pose) = &moved.pose {
             self.angles.push(pose);
         }
-        let (log, angles, void, settings) = (&self.log, &self.angles, &self.void, &self.settings);
-        let set = &moved.tracks;
+        let (angles, settings, set) = (&self.angles, &self.settings, &moved.tracks);
         let request = || Request {
             frame: set.frame,
             time_s: set.time_s,
             skeleton: skeleton.clone(),
-            log: log.clone(),
+            log: back.log().clone(),
             nodes: back
                 .binding()
                 .into_iter()
-                .flat_map(|b| b.bound())
-                .filter(|(id, ..)| !void.contains_key(id))
+                .flat_map(|binding| binding.bound())
                 .map(|(id, node, _)| (id, node))
                 .collect(),
             angles: angles.last(f64::INFINITY),
@@ -85,23 +73,10 @@ impl SwayWatch {
         Some(Arc::new(found))
     }
 
-    fn remember(&mut self, set: &TrackSet) {
-        self.log.push(set);
-        self.void
-            .extend(set.rejected.iter().map(|id| (*id, set.time_s)));
-        if !set.rejected.is_empty() {
-            // Nothing is left of them in the log by then.
-            let oldest_s = set.time_s - self.settings.window_s;
-            self.void.retain(|_, at_s| *at_s >= oldest_s);
-        }
-    }
-
     /// Forgets tracks and tree.
     pub fn restart(&mut self) {
         self.swaying.restart();
-        self.log = FilmLog::new(self.settings.window_s);
         self.angles = AngleWindow::new(self.settings.window_s);
-        self.void.clear();
         self.skeleton = None;
     }
 

@@ -11,9 +11,10 @@ use super::pulse::{Pulse, Worker};
 use super::shared::Shared;
 use crate::cancel::CancelToken;
 use crate::config::Dynamics;
-use crate::dynamics::{FilmLog, analyse_soon, spectrum};
+use crate::dynamics::{Film, analyse_soon, spectrum};
 use crate::model::{
-    AngleSpectrum, Angles, BranchSway, NodeId, NodeName, Skeleton, SwayNow, TrackId, Unidentified,
+    AngleSpectrum, Angles, BranchSway, NodeId, NodeName, Skeleton, SwayNow, TrackId, TrackLog,
+    Unidentified,
 };
 use crossbeam_channel::{
     Receiver, RecvTimeoutError, SendTimeoutError, Sender, TryRecvError, bounded,
@@ -33,7 +34,7 @@ pub struct Request {
     pub frame: u64,
     pub time_s: f64,
     pub skeleton: Arc<Skeleton>,
-    pub log: FilmLog,
+    pub log: TrackLog,
     /// The deepest node of every point that counts.
     pub nodes: BTreeMap<TrackId, NodeId>,
     pub angles: Angles,
@@ -286,9 +287,9 @@ pub fn analyse(request: &Request, cancel: &CancelToken) -> SwayNow {
         angles,
         ..
     } = request;
-    let film = request
-        .log
-        .film(skeleton, |id| request.nodes.get(&id).copied());
+    let film = Film::from_log(request.log.last(settings.window_s), skeleton, |id| {
+        request.nodes.get(&id).copied()
+    });
     let analysis = analyse_soon(skeleton, &film, settings, cancel);
     let branch = |(i, name): (usize, &NodeName)| {
         // The foot is no branch.

@@ -23,6 +23,14 @@ pub enum ClockKind {
 }
 
 impl ClockKind {
+    pub const ALL: [Self; 5] = [
+        Self::File,
+        Self::Monotonic,
+        Self::Copied,
+        Self::Unknown,
+        Self::Received,
+    ];
+
     pub fn name(self) -> &'static str {
         match self {
             ClockKind::File => "file",

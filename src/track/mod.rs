@@ -7,16 +7,15 @@
 mod anchor;
 mod detect;
 mod flow;
-mod history;
 mod neighbours;
 mod point;
 mod regain;
 mod register;
 mod trial;
 
+pub use crate::model::TrackTable;
 pub use detect::Detector;
 pub use flow::{Flow, OpticalFlow, Pyramid};
-pub use history::{TrackHistory, TrackTable};
 
 use crate::config::{Detect, Track};
 use crate::model::{Frame, Observation, Outline, TrackId, TrackSet};

@@ -4,8 +4,9 @@
 use arborcam::config::Config;
 use arborcam::model::{Outline, Size};
 use arborcam::outline::{self, Given};
-use arborcam::pipeline::{Pipeline, Tree};
+use arborcam::pipeline::Pipeline;
 use arborcam::skeleton::Node2d;
+use arborcam::solve::Model;
 use arborcam::source::{self, Decoder};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -38,7 +39,7 @@ impl Flat {
     }
 
     /// What a tree was stood up from, with its foot where the tree's is.
-    pub fn of_tree(name: &'static str, tree: &Tree) -> Self {
+    pub fn of_tree(name: &'static str, tree: &Model) -> Self {
         let (mut nodes, tracks) = tree.flat(&Config::default());
         nodes[0].position_px = tree.skeleton.foot_px;
         Self {
@@ -109,7 +110,7 @@ impl Flat {
 }
 
 /// The tree that the whole of a clip gives, refined as it is by default.
-pub fn grown(clip: &Path, outline: &Path) -> Arc<Tree> {
+pub fn grown(clip: &Path, outline: &Path) -> Arc<Model> {
     let config = Config::default();
     let mut clip = source::open(clip, &config.camera, None).expect("clip");
     let Given::Region(outline) = outline::load(outline, clip.describe().size).expect("outline")
@@ -138,7 +139,7 @@ pub fn grown(clip: &Path, outline: &Path) -> Arc<Tree> {
         index += 1;
     }
     pipeline.finish();
-    pipeline.back.tree().expect("a tree").clone()
+    pipeline.back.model().expect("a tree").clone()
 }
 
 /// Video and outline of the second public clip, `oak_release` below the folder that ARBORCAM_CLIPS

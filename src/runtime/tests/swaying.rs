@@ -17,7 +17,7 @@ fn request(time_s: f64) -> Request {
             foot_px: [0.0; 2],
             image_size: crate::model::Size::new(64, 64),
         }),
-        log: FilmLog::new(10.0),
+        log: TrackLog::new(10.0),
         nodes: BTreeMap::new(),
         angles: Angles::default(),
         settings: Dynamics::default(),

@@ -1,17 +1,16 @@
-//! Branches that only their own sway tells: a refinement adds them to the tree that stands.
+//! Sub-branches: branches that only their own frequency tells from the branch that carries them.
 //!
-//! Likeness of motion puts a limb's twigs together; after a release their frequencies tell them
+//! The affinity of motion puts a limb's twigs together; after a release their frequencies tell them
 //! apart ([`shoots`]). They are added last of all: push, copies, and whether one tree is better
-//! than another are of the tree without them. So whatever is told of them, the tree itself stands
-//! as it did.
+//! than another are of the tree without them.
 
 use crate::cancel::CancelToken;
 use crate::config::Dynamics;
 use crate::dynamics::{Film, FilmTrack, shoots};
 use crate::hierarchy::rest_position_px;
-use crate::model::{Node, NodeId, NodeName, Skeleton, TrackId};
-use crate::track::TrackTable;
+use crate::model::{Node, NodeId, NodeName, Skeleton, TrackId, TrackTable};
 use nalgebra::{Point3, Vector2, Vector3};
+use std::collections::BTreeSet;
 
 /// Points by which it is told how far a branch reaches: one alone may be off it.
 const FARTHEST: usize = 3;
@@ -27,7 +26,7 @@ const LEFT: usize = 2;
 
 /// A branch that only its own sway tells.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Shoot {
+pub struct SubBranch {
     /// The measured branch that carries it. A tip forks at this share of its length; 1 where it is
     /// none.
     pub on: NodeId,
@@ -40,71 +39,106 @@ pub struct Shoot {
     pub end_px: Option<[f64; 2]>,
 }
 
-/// The shoots that the points of `table` tell, without names; `node_of` says on which measured node
-/// of `skeleton` a point is.
-pub(super) fn told(
+/// The sub-branches that the points of `table` show, without names; `node_of` says on which measured
+/// node of `skeleton` a point is.
+pub(super) fn identify(
     table: &TrackTable,
     skeleton: &Skeleton,
     node_of: impl Fn(TrackId) -> Option<NodeId>,
     config: &Dynamics,
     cancel: &CancelToken,
-) -> Vec<Shoot> {
-    let at = |p: &Option<[f32; 2]>| p.map_or([f64::NAN; 2], |p| p.map(f64::from));
-    let on_tree = |row: usize| Some((row, node_of(table.ids[row])?));
-    let (rows, nodes): (Vec<usize>, Vec<NodeId>) = (0..table.ids.len()).filter_map(on_tree).unzip();
-    let track = |(&row, &node): (&usize, &NodeId)| FilmTrack {
-        node,
-        at_px: table.positions[row].iter().map(at).collect(),
-    };
-    let film = Film::new(&table.times_s, rows.iter().zip(&nodes).map(track).collect());
-    let rest_px: Vec<[f64; 2]> = rows
-        .iter()
-        .map(|&row| rest_position_px(table, row))
-        .collect();
-    let told = shoots(skeleton, &film, config, cancel);
+) -> Vec<SubBranch> {
+    let mut points = Vec::new();
+    let mut tracks = Vec::new();
+    for (row, &id) in table.ids.iter().enumerate() {
+        let Some(node) = node_of(id) else { continue };
+        let rest_px = rest_position_px(table, row);
+        points.push(Point { id, node, rest_px });
+        tracks.push(FilmTrack {
+            node,
+            at_px: table.positions[row].iter().map(place_px).collect(),
+        });
+    }
+    let film = Film::new(&table.times_s, tracks);
+    let found = shoots(skeleton, &film, config, cancel);
     let mut out = Vec::new();
     for on in (0..skeleton.measured() as u32).map(NodeId) {
-        let of_this: Vec<&Vec<usize>> = told
-            .iter()
-            .filter(|s| s.on == on)
-            .map(|s| &s.tracks)
-            .collect();
-        if of_this.is_empty() {
-            continue;
+        let mut groups: Vec<Vec<&Point>> = Vec::new();
+        for group in found.iter().filter(|group| group.on == on) {
+            groups.push(group.tracks.iter().map(|&k| &points[k]).collect());
         }
-        let places = |tracks: &[usize]| tracks.iter().map(|&k| rest_px[k]).collect::<Vec<_>>();
-        let all: Vec<Vec<[f64; 2]>> = of_this.iter().map(|t| places(t)).collect();
-        let fork = if is_tip(skeleton, on) {
-            forks_at(skeleton, on, &all)
-        } else {
-            1.0
-        };
-        let from = skeleton.image_from_model(&along(skeleton, on, fork));
-        let shoot = |tracks: &[usize], end_px: Option<[f64; 2]>| {
-            let mut members: Vec<TrackId> = tracks.iter().map(|&k| table.ids[rows[k]]).collect();
-            members.sort_unstable();
-            Shoot {
-                on,
-                fork,
-                members,
-                name: NodeName(0),
-                end_px,
-            }
-        };
-        out.extend(
-            of_this
-                .iter()
-                .zip(&all)
-                .map(|(tracks, places)| shoot(tracks, Some(end_px(from, places)))),
-        );
-        let left: Vec<usize> = (0..rows.len())
-            .filter(|k| nodes[*k] == on && !of_this.iter().any(|t| t.contains(k)))
-            .collect();
-        if is_tip(skeleton, on) && left.len() >= LEFT {
-            out.push(shoot(&left, None));
+        if !groups.is_empty() {
+            out.extend(branches_on(skeleton, on, &groups, &points));
         }
     }
     out
+}
+
+/// A followed point with its node and its rest place, px.
+struct Point {
+    id: TrackId,
+    node: NodeId,
+    rest_px: [f64; 2],
+}
+
+fn place_px(place: &Option<[f32; 2]>) -> [f64; 2] {
+    match place {
+        Some(px) => px.map(f64::from),
+        None => [f64::NAN; 2],
+    }
+}
+
+/// A sub-branch for each group of points on the branch `on`, and where that is a tip, one that
+/// continues it with the points that are left.
+fn branches_on(
+    skeleton: &Skeleton,
+    on: NodeId,
+    groups: &[Vec<&Point>],
+    points: &[Point],
+) -> Vec<SubBranch> {
+    let mut places: Vec<Vec<[f64; 2]>> = Vec::new();
+    for group in groups {
+        places.push(group.iter().map(|p| p.rest_px).collect());
+    }
+    let is_tip = is_tip(skeleton, on);
+    let fork = if is_tip {
+        forks_at(skeleton, on, &places)
+    } else {
+        1.0
+    };
+    let fork_px = skeleton.image_from_model(&along(skeleton, on, fork));
+    let mut out = Vec::new();
+    for (group, places) in groups.iter().zip(&places) {
+        out.push(SubBranch::new(
+            on,
+            fork,
+            group,
+            Some(end_px(fork_px, places)),
+        ));
+    }
+    let grouped: BTreeSet<TrackId> = groups.iter().flatten().map(|p| p.id).collect();
+    let left: Vec<&Point> = points
+        .iter()
+        .filter(|p| p.node == on && !grouped.contains(&p.id))
+        .collect();
+    if is_tip && left.len() >= LEFT {
+        out.push(SubBranch::new(on, fork, &left, None));
+    }
+    out
+}
+
+impl SubBranch {
+    fn new(on: NodeId, fork: f64, points: &[&Point], end_px: Option<[f64; 2]>) -> Self {
+        let mut members: Vec<TrackId> = points.iter().map(|p| p.id).collect();
+        members.sort_unstable();
+        Self {
+            on,
+            fork,
+            members,
+            name: NodeName(0),
+            end_px,
+        }
+    }
 }
 
 fn is_tip(skeleton: &Skeleton, node: NodeId) -> bool {
@@ -124,89 +158,94 @@ fn along(skeleton: &Skeleton, node: NodeId, share: f64) -> Point3<f64> {
     from + share * (to - from)
 }
 
-/// At which share of its length a tip forks: where the first of the shoots leaves it that have
-/// points at these `places`, px.
+/// At which share of its length a tip forks: where the first of the sub-branches leaves it that
+/// have points at these `places`, px.
 fn forks_at(skeleton: &Skeleton, tip: NodeId, places: &[Vec<[f64; 2]>]) -> f64 {
     let from = begin(skeleton, tip);
-    let (way, [u, v]) = (
-        (skeleton.nodes[tip.index()].position - from).xy(),
-        skeleton.image_from_model(&from),
-    );
-    let share = |at: &[f64; 2]| {
-        Vector2::new(at[0] - u, v - at[1]).dot(&way) / way.norm_squared().max(f64::MIN_POSITIVE)
-    };
-    let leaves = |places: &Vec<[f64; 2]>| {
-        let mut shares: Vec<f64> = places.iter().map(share).collect();
+    let axis = (skeleton.nodes[tip.index()].position - from).xy();
+    let from_px = skeleton.image_from_model(&from);
+    let mut first = FORKS[1];
+    for places in places {
+        let mut shares: Vec<f64> = places
+            .iter()
+            .map(|place_px| share_along(place_px, from_px, &axis))
+            .collect();
         shares.sort_unstable_by(f64::total_cmp);
-        shares
-            .get((BEHIND * shares.len() as f64) as usize)
-            .copied()
-            .unwrap_or(FORKS[1])
-    };
-    places
-        .iter()
-        .map(leaves)
-        .fold(FORKS[1], f64::min)
-        .max(FORKS[0])
-}
-
-/// Where a shoot ends that leaves at `fork`, px: at those of its points that are farthest from
-/// there.
-fn end_px(fork: [f64; 2], places: &[[f64; 2]]) -> [f64; 2] {
-    let way = |p: &[f64; 2]| Vector2::new(p[0] - fork[0], p[1] - fork[1]);
-    let mut ways: Vec<Vector2<f64>> = places.iter().map(way).collect();
-    ways.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
-    ways.truncate(FARTHEST);
-    let way = ways.iter().sum::<Vector2<f64>>() / ways.len().max(1) as f64;
-    [fork[0] + way.x, fork[1] + way.y]
-}
-
-/// `skeleton` with a node for each of `shoots`, after the measured ones, in order; without radii. A
-/// tip that carries some ends at the fork from now on. How deep in space they reach nobody has
-/// seen: they stay as deep as the fork.
-pub(super) fn with(skeleton: &Skeleton, shoots: &[Shoot]) -> Skeleton {
-    let (measured, more) = (skeleton.measured(), shoots.len() as u32);
-    let shifted = |id: NodeId| {
-        if id.index() < measured {
-            id
-        } else {
-            NodeId(id.0 + more)
-        }
-    };
-    let mut nodes: Vec<Node> = skeleton.nodes[..measured].to_vec();
-    for shoot in shoots.iter().filter(|s| is_tip(skeleton, s.on)) {
-        nodes[shoot.on.index()].position = along(skeleton, shoot.on, shoot.fork);
+        let behind = (BEHIND * shares.len() as f64) as usize;
+        first = first.min(shares.get(behind).copied().unwrap_or(FORKS[1]));
     }
-    for shoot in shoots {
-        let on = nodes[shoot.on.index()].clone();
-        let position = match shoot.end_px {
+    first.max(FORKS[0])
+}
+
+/// How far along `axis` (model axes, px) from `from_px` a place in the picture is, as a share of
+/// its length.
+fn share_along(place_px: &[f64; 2], from_px: [f64; 2], axis: &Vector2<f64>) -> f64 {
+    let offset = Vector2::new(place_px[0] - from_px[0], from_px[1] - place_px[1]);
+    offset.dot(axis) / axis.norm_squared().max(f64::MIN_POSITIVE)
+}
+
+/// Where a sub-branch ends that leaves at `fork_px`: at those of its points that are farthest from
+/// there.
+fn end_px(fork_px: [f64; 2], places: &[[f64; 2]]) -> [f64; 2] {
+    let mut offsets: Vec<Vector2<f64>> = places
+        .iter()
+        .map(|p| Vector2::new(p[0] - fork_px[0], p[1] - fork_px[1]))
+        .collect();
+    offsets.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
+    offsets.truncate(FARTHEST);
+    let mean = offsets.iter().sum::<Vector2<f64>>() / offsets.len().max(1) as f64;
+    [fork_px[0] + mean.x, fork_px[1] + mean.y]
+}
+
+/// `skeleton` with a node for each of `branches`, after the measured ones, in order; without radii.
+/// A tip that carries some ends at the fork from now on. How deep in space they reach nobody has
+/// seen: they stay as deep as the fork.
+pub(super) fn with(skeleton: &Skeleton, branches: &[SubBranch]) -> Skeleton {
+    let measured = skeleton.measured();
+    let mut nodes: Vec<Node> = skeleton.nodes[..measured].to_vec();
+    for branch in branches.iter().filter(|b| is_tip(skeleton, b.on)) {
+        nodes[branch.on.index()].position = along(skeleton, branch.on, branch.fork);
+    }
+    for branch in branches {
+        let on = nodes[branch.on.index()].clone();
+        let position = match branch.end_px {
             Some(end_px) => reaching(skeleton, &on.position, end_px),
-            None => skeleton.nodes[shoot.on.index()].position,
+            None => skeleton.nodes[branch.on.index()].position,
         };
-        let (level, n_tracks) = (on.level + 1, shoot.members.len() as u32);
         nodes.push(Node {
-            name: shoot.name,
-            parent: Some(shoot.on),
-            level,
+            name: branch.name,
+            parent: Some(branch.on),
+            level: on.level + 1,
             position,
-            n_tracks,
+            n_tracks: branch.members.len() as u32,
             certainty: 0.0,
             ..on
         });
     }
-    let copy = |node: &Node| Node {
-        parent: node.parent.map(shifted),
-        copy_of: node.copy_of.map(shifted),
-        ..node.clone()
-    };
-    nodes.extend(skeleton.nodes[measured..].iter().map(copy));
+    let n_new = branches.len() as u32;
+    for copy in &skeleton.nodes[measured..] {
+        nodes.push(Node {
+            parent: copy.parent.map(|id| shifted(id, measured, n_new)),
+            copy_of: copy.copy_of.map(|id| shifted(id, measured, n_new)),
+            ..copy.clone()
+        });
+    }
     Skeleton {
         nodes,
         ..skeleton.clone()
     }
 }
 
-/// The end of a shoot from `fork` that is seen at `end_px`.
+/// Where a node stands after `n_new` nodes were put in behind the measured ones.
+fn shifted(id: NodeId, measured: usize, n_new: u32) -> NodeId {
+    if id.index() < measured {
+        id
+    } else {
+        NodeId(id.0 + n_new)
+    }
+}
+
+/// The end of a sub-branch from `fork` that is seen at `end_px`.
 fn reaching(skeleton: &Skeleton, fork: &Point3<f64>, end_px: [f64; 2]) -> Point3<f64> {
     let [u, v] = skeleton.image_from_model(fork);
     let way = Vector3::new(end_px[0] - u, v - end_px[1], 0.0);
@@ -259,7 +298,7 @@ mod tests {
     }
 
     /// One with those points, and what the tip goes on as.
-    fn two_shoots() -> [Shoot; 2] {
+    fn two_shoots() -> [SubBranch; 2] {
         let before = skeleton();
         let fork = forks_at(&before, NodeId(2), &[places()]);
         let end_px = end_px(
@@ -267,7 +306,7 @@ mod tests {
             &places(),
         );
         let members = |ids: std::ops::Range<u32>| ids.map(TrackId).collect();
-        [(6, 0..5, Some(end_px)), (7, 7..9, None)].map(|(name, ids, end_px)| Shoot {
+        [(6, 0..5, Some(end_px)), (7, 7..9, None)].map(|(name, ids, end_px)| SubBranch {
             on: NodeId(2),
             fork,
             members: members(ids),

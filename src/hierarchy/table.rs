@@ -1,0 +1,59 @@
+//! A window of the track log as a table, as the hierarchy wants it.
+
+use super::COMPARE_HZ;
+use crate::model::{LogWindow, TrackId, TrackSet, TrackTable};
+use crate::signal::median;
+use std::collections::BTreeMap;
+
+/// Share of a step by which frames may come early: sensor times jitter, and a step of three frames
+/// is to stay one of three.
+const STEP_TOLERANCE: f64 = 0.1;
+
+/// The tracks that count in the newest frame of `window`, also from before they were confirmed, on
+/// frames at the rate at which tracks are compared.
+pub fn table(window: LogWindow) -> TrackTable {
+    let frames = spaced_frames(window, 1.0 / COMPARE_HZ);
+    let Some(newest) = frames.last() else {
+        return TrackTable::default();
+    };
+    let row: BTreeMap<TrackId, usize> = newest
+        .counted()
+        .enumerate()
+        .map(|(i, o)| (o.id, i))
+        .collect();
+    let mut positions = vec![vec![None; frames.len()]; row.len()];
+    let mut errors = vec![Vec::new(); row.len()];
+    for (f, set) in frames.iter().enumerate() {
+        for o in &set.observations {
+            if let Some(&i) = row.get(&o.id) {
+                positions[i][f] = Some([o.u_px, o.v_px]);
+                errors[i].push(o.fb_error_px);
+            }
+        }
+    }
+    TrackTable {
+        ids: row.into_keys().collect(),
+        times_s: frames.iter().map(|s| s.time_s).collect(),
+        positions,
+        fb_errors_px: errors
+            .into_iter()
+            .map(|e| median(e, f32::total_cmp).unwrap_or(0.0))
+            .collect(),
+    }
+}
+
+/// The sets that are at least `step_s` apart, oldest first, the newest always among them.
+fn spaced_frames(window: LogWindow<'_>, step_s: f64) -> Vec<&TrackSet> {
+    let mut frames: Vec<&TrackSet> = Vec::new();
+    for set in window.sets().rev() {
+        let is_next = match frames.last() {
+            Some(later) => later.time_s - set.time_s >= (1.0 - STEP_TOLERANCE) * step_s,
+            None => true,
+        };
+        if is_next {
+            frames.push(set);
+        }
+    }
+    frames.reverse();
+    frames
+}

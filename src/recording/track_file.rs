@@ -1,0 +1,410 @@
+//! The track log on disk: all track sets of a capture, so that memory stays flat however long it
+//! runs, and so that a capture that was cut can be finished.
+//!
+//! The file begins with a mark of its kind and version. Each set is a record of its length, its
+//! checksum and its bytes; a file that was cut anywhere is read up to its last whole record. All
+//! numbers are little-endian.
+
+use crate::model::{Observation, TrackId, TrackSet};
+use std::fs::{File, OpenOptions};
+use std::io::{self, BufReader, BufWriter, Read, Write};
+use std::os::unix::fs::FileExt;
+use std::path::Path;
+use std::sync::Arc;
+
+/// What the file begins with: its kind and version.
+const MARK: [u8; 12] = *b"arborlog\x01\0\0\0";
+/// Bytes of the length and the checksum before each set.
+const RECORD_HEAD: usize = 4 + 4;
+/// Bytes of the head of a set (frame, time, lost, born, two counts) and of one observation.
+const HEAD: usize = 8 + 8 + 4 + 4 + 4 + 4;
+const OBSERVATION: usize = 21;
+/// A longer record is damage, bytes: some millions of points in one frame.
+const LONGEST_RECORD: u32 = 1 << 28;
+const BUFFER: usize = 1 << 16;
+
+/// Writing end.
+pub struct TrackFile {
+    file: Arc<File>,
+    writer: BufWriter<Appender>,
+    buffer: Vec<u8>,
+    sets: u64,
+}
+
+/// Writes at its own offset, so that readers of the same file do not disturb it.
+struct Appender {
+    file: Arc<File>,
+    at: u64,
+}
+
+impl Write for Appender {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let n = self.file.write_at(bytes, self.at)?;
+        self.at += n as u64;
+        Ok(n)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl TrackFile {
+    /// Creates a nameless file in `folder`, which vanishes with the program.
+    ///
+    /// # Errors
+    /// Whatever the file system says.
+    pub fn nameless(folder: &Path) -> io::Result<Self> {
+        Self::begin(tempfile::tempfile_in(folder)?)
+    }
+
+    /// Creates the file at `path`, in place of one that is there. It is locked for as long as it is
+    /// written, see [`TrackFileReader::open`].
+    ///
+    /// # Errors
+    /// Whatever the file system says.
+    pub fn create(path: &Path) -> io::Result<Self> {
+        // Readers of a file that was there keep it; nobody else can have locked the new one.
+        match std::fs::remove_file(path) {
+            Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
+            _ => {}
+        }
+        let file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create_new(true)
+            .open(path)?;
+        file.lock()?;
+        Self::begin(file)
+    }
+
+    fn begin(file: File) -> io::Result<Self> {
+        let file = Arc::new(file);
+        let appender = Appender {
+            file: file.clone(),
+            at: 0,
+        };
+        let mut writer = BufWriter::with_capacity(BUFFER, appender);
+        writer.write_all(&MARK)?;
+        Ok(Self {
+            file,
+            writer,
+            buffer: Vec::new(),
+            sets: 0,
+        })
+    }
+
+    /// Appends a set.
+    ///
+    /// # Errors
+    /// Whatever the file system says, a full disk among it.
+    pub fn push(&mut self, set: &TrackSet) -> io::Result<()> {
+        self.buffer.clear();
+        encode(set, &mut self.buffer);
+        let length = self.buffer.len() as u32;
+        self.writer.write_all(&length.to_le_bytes())?;
+        let checksum = crc32fast::hash(&self.buffer);
+        self.writer.write_all(&checksum.to_le_bytes())?;
+        self.writer.write_all(&self.buffer)?;
+        self.sets += 1;
+        Ok(())
+    }
+
+    /// Size of what has been pushed so far, bytes.
+    pub fn bytes(&self) -> u64 {
+        self.writer.get_ref().at + self.writer.buffer().len() as u64
+    }
+
+    /// Hands all that was pushed to the system: from now on it outlives the program.
+    ///
+    /// # Errors
+    /// Whatever the file system says, a full disk among it.
+    pub fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush()
+    }
+
+    /// A reader of what has been pushed so far.
+    ///
+    /// # Errors
+    /// Whatever the file system says.
+    pub fn reader(&mut self) -> io::Result<TrackFileReader> {
+        self.flush()?;
+        Ok(TrackFileReader {
+            file: self.file.clone(),
+            sets: self.sets,
+        })
+    }
+}
+
+/// Reads a track file from the start, as often as wanted, up to where it was when the reader was
+/// made.
+#[derive(Clone, Debug)]
+pub struct TrackFileReader {
+    file: Arc<File>,
+    sets: u64,
+}
+
+impl TrackFileReader {
+    /// Opens a file that nobody writes any more; it ends before the first record that is not whole.
+    ///
+    /// # Errors
+    /// It cannot be read, it is no track file (`InvalidData`), or it is still being written
+    /// (`WouldBlock`).
+    pub fn open(path: &Path) -> io::Result<Self> {
+        let file = File::open(path)?;
+        file.try_lock().map_err(io::Error::from)?;
+        let mut all = Self {
+            file: Arc::new(file),
+            sets: u64::MAX,
+        };
+        let mut mark = [0; MARK.len()];
+        let is_whole = all.file.read_exact_at(&mut mark, 0).is_ok();
+        if !is_whole || mark != MARK {
+            let what = "it is no track log of this version of arborcam";
+            return Err(io::Error::new(io::ErrorKind::InvalidData, what));
+        }
+        all.sets = all.sets().take_while(Result::is_ok).count() as u64;
+        Ok(all)
+    }
+
+    /// Number of sets.
+    pub fn len(&self) -> u64 {
+        self.sets
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.sets == 0
+    }
+
+    /// The sets in their order.
+    pub fn sets(&self) -> Sets {
+        let place = Place {
+            file: self.file.clone(),
+            at: MARK.len() as u64,
+        };
+        Sets {
+            reader: BufReader::with_capacity(BUFFER, place),
+            next: 0,
+            end: self.sets,
+        }
+    }
+}
+
+/// The sets of a track file, from the first on.
+pub struct Sets {
+    reader: BufReader<Place>,
+    next: u64,
+    end: u64,
+}
+
+impl Sets {
+    /// Goes on to the end of a later reader of the same file.
+    pub fn until(&mut self, later: &TrackFileReader) {
+        self.end = later.sets;
+    }
+}
+
+impl Iterator for Sets {
+    type Item = io::Result<TrackSet>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.next >= self.end {
+            return None;
+        }
+        self.next += 1;
+        Some(read_record(&mut self.reader))
+    }
+}
+
+/// Reads at its own offset.
+struct Place {
+    file: Arc<File>,
+    at: u64,
+}
+
+impl Read for Place {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let n = self.file.read_at(into, self.at)?;
+        self.at += n as u64;
+        Ok(n)
+    }
+}
+
+fn read_record(reader: &mut impl Read) -> io::Result<TrackSet> {
+    let mut head = [0; RECORD_HEAD];
+    reader.read_exact(&mut head)?;
+    let [length, checksum] = [0, 4].map(|at| u32_at(&head, at));
+    if length > LONGEST_RECORD {
+        return Err(damaged());
+    }
+    let mut bytes = vec![0; length as usize];
+    reader.read_exact(&mut bytes)?;
+    if crc32fast::hash(&bytes) != checksum {
+        return Err(damaged());
+    }
+    decode(&bytes).ok_or_else(damaged)
+}
+
+fn damaged() -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, "the track log is damaged")
+}
+
+fn encode(set: &TrackSet, out: &mut Vec<u8>) {
+    out.extend(set.frame.to_le_bytes());
+    out.extend(set.time_s.to_le_bytes());
+    out.extend(set.lost.to_le_bytes());
+    out.extend(set.born.to_le_bytes());
+    out.extend((set.observations.len() as u32).to_le_bytes());
+    out.extend((set.rejected.len() as u32).to_le_bytes());
+    for o in &set.observations {
+        out.extend(o.id.0.to_le_bytes());
+        let error_px = o.error_px.unwrap_or(f32::NAN);
+        for x in [o.u_px, o.v_px, o.fb_error_px, error_px] {
+            out.extend(x.to_le_bytes());
+        }
+        out.push(u8::from(o.confirmed));
+    }
+    for id in &set.rejected {
+        out.extend(id.0.to_le_bytes());
+    }
+}
+
+/// `None` where the counts do not fit the length.
+fn decode(bytes: &[u8]) -> Option<TrackSet> {
+    let (head, rest) = bytes.split_at_checked(HEAD)?;
+    let n_observations = u32_at(head, 24) as usize;
+    let n_rejected = u32_at(head, 28) as usize;
+    let (observations, rejected) =
+        rest.split_at_checked(n_observations.checked_mul(OBSERVATION)?)?;
+    if rejected.len() != n_rejected.checked_mul(4)? {
+        return None;
+    }
+    Some(TrackSet {
+        frame: u64_at(head, 0),
+        time_s: f64::from_bits(u64_at(head, 8)),
+        lost: u32_at(head, 16),
+        born: u32_at(head, 20),
+        observations: observations
+            .chunks_exact(OBSERVATION)
+            .map(observation)
+            .collect(),
+        rejected: rejected
+            .chunks_exact(4)
+            .map(|id| TrackId(u32_at(id, 0)))
+            .collect(),
+    })
+}
+
+fn observation(bytes: &[u8]) -> Observation {
+    let [u_px, v_px, fb_error_px, error_px] =
+        [4, 8, 12, 16].map(|at| f32::from_bits(u32_at(bytes, at)));
+    Observation {
+        id: TrackId(u32_at(bytes, 0)),
+        u_px,
+        v_px,
+        fb_error_px,
+        error_px: (!error_px.is_nan()).then_some(error_px),
+        confirmed: bytes[20] != 0,
+    }
+}
+
+fn u32_at(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes(std::array::from_fn(|k| bytes[at + k]))
+}
+
+fn u64_at(bytes: &[u8], at: usize) -> u64 {
+    u64::from_le_bytes(std::array::from_fn(|k| bytes[at + k]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn set(frame: u64, n: u32) -> TrackSet {
+        let at = |k: u32| Observation {
+            id: TrackId(k * 3 + 1),
+            u_px: k as f32 * 1.25,
+            v_px: -(frame as f32) / 3.0,
+            fb_error_px: 0.125,
+            error_px: (k > 20).then_some(k as f32),
+            confirmed: k.is_multiple_of(2),
+        };
+        let observations = (0..n).map(at).collect();
+        let rejected = (0..n / 20).map(TrackId).collect();
+        TrackSet {
+            frame,
+            time_s: frame as f64 / 30.0,
+            observations,
+            lost: 2,
+            born: n,
+            rejected,
+        }
+    }
+
+    /// An export in the middle of a capture reads what was there and does not disturb what comes
+    /// after.
+    #[test]
+    fn what_is_pushed_is_read_back_also_while_writing_goes_on() {
+        let mut log = TrackFile::nameless(&std::env::temp_dir()).unwrap();
+        let sets: Vec<TrackSet> = (0..2000).map(|f| set(f, (f % 7) as u32 * 10)).collect();
+        let same = |a: &TrackSet, b: &TrackSet| {
+            (a.frame, a.time_s, a.lost, a.born) == (b.frame, b.time_s, b.lost, b.born)
+                && (&a.observations, &a.rejected) == (&b.observations, &b.rejected)
+        };
+        let check = |reader: TrackFileReader, n: usize| {
+            let read: Vec<TrackSet> = reader.sets().map(Result::unwrap).collect();
+            assert_eq!(read.len(), n);
+            assert!(read.iter().zip(&sets).all(|(a, b)| same(a, b)));
+        };
+        sets[..1000].iter().for_each(|s| log.push(s).unwrap());
+        let half = log.reader().unwrap();
+        sets[1000..1500].iter().for_each(|s| log.push(s).unwrap());
+        check(half.clone(), 1000);
+        // One who reads along goes on where they were.
+        let mut along = half.sets();
+        assert_eq!(along.by_ref().count(), 1000);
+        sets[1500..].iter().for_each(|s| log.push(s).unwrap());
+        let all = log.reader().unwrap();
+        along.until(&all);
+        assert!(
+            along
+                .map(Result::unwrap)
+                .zip(&sets[1000..])
+                .all(|(a, b)| same(&a, b))
+        );
+        check(all, 2000);
+        check(half, 1000);
+    }
+
+    /// A power cut or `kill -9` ends the file anywhere.
+    #[test]
+    fn a_file_cut_or_damaged_anywhere_is_read_up_to_its_last_whole_set() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("tracks.log");
+        let mut log = TrackFile::create(&path).unwrap();
+        (0..20).for_each(|f| log.push(&set(f, 30)).unwrap());
+        log.flush().unwrap();
+        let busy = TrackFileReader::open(&path).unwrap_err();
+        assert_eq!(busy.kind(), io::ErrorKind::WouldBlock, "{busy}");
+        drop(log);
+        let whole = std::fs::read(&path).unwrap();
+        let record = (whole.len() - MARK.len()) / 20;
+        for cut in 0..whole.len() {
+            std::fs::write(&path, &whole[..cut]).unwrap();
+            let Some(body) = cut.checked_sub(MARK.len()) else {
+                let error = TrackFileReader::open(&path).unwrap_err();
+                assert_eq!(error.kind(), io::ErrorKind::InvalidData);
+                continue;
+            };
+            let read = TrackFileReader::open(&path).unwrap();
+            assert_eq!(read.len(), (body / record) as u64, "cut at {cut}");
+        }
+        for at in (MARK.len()..whole.len()).step_by(37) {
+            let mut damaged = whole.clone();
+            damaged[at] ^= 0x5a;
+            std::fs::write(&path, &damaged).unwrap();
+            let read = TrackFileReader::open(&path).unwrap();
+            assert_eq!(read.len(), ((at - MARK.len()) / record) as u64, "at {at}");
+        }
+    }
+}

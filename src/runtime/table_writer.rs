@@ -1,0 +1,74 @@
+//! The tables of a capture, written on a thread of their own while the film goes on.
+//!
+//! Every frame of a capture has its pose by the model that it ends with, so the tables begin when
+//! the model has settled (see [`BackEnd::is_settled`]), from the first frame on. Before that they
+//! are short, and are written at the end.
+//!
+//! [`BackEnd::is_settled`]: crate::pipeline::BackEnd::is_settled
+
+use super::capture_tables::CaptureTables;
+use super::shared::{Failure, Shared};
+use crate::cancel::CancelToken;
+use crate::recording::TrackFileReader;
+use crossbeam_channel::{Receiver, Sender, bounded};
+use std::sync::Arc;
+use std::thread::JoinHandle;
+
+/// The tables, and the thread that brings them up to date.
+pub struct TableWriter {
+    logs: Sender<TrackFileReader>,
+    cancel: CancelToken,
+    thread: JoinHandle<Result<CaptureTables, Failure>>,
+}
+
+impl TableWriter {
+    /// # Errors
+    /// The thread cannot be started.
+    pub fn start(tables: CaptureTables, shared: Arc<Shared>) -> std::io::Result<Self> {
+        let (logs, queue) = bounded(1);
+        let cancel = shared.pulse.writing.child();
+        let token = cancel.clone();
+        let run = move || write(tables, &queue, &token, &shared);
+        let thread = std::thread::Builder::new()
+            .name("write".into())
+            .spawn(run)?;
+        Ok(Self {
+            logs,
+            cancel,
+            thread,
+        })
+    }
+
+    /// There is more to be written. What comes while the thread is busy is left for the next time.
+    pub fn catch_up(&self, log: TrackFileReader) {
+        let _ = self.logs.try_send(log);
+    }
+
+    /// The tables as far as they are; `None` if they could not be written.
+    pub fn join(self) -> Option<CaptureTables> {
+        drop(self.logs);
+        self.thread.join().ok()?.ok()
+    }
+
+    /// Nobody wants the tables any more; nothing is left of them.
+    pub fn discard(self) {
+        self.cancel.cancel();
+        drop(self.join());
+    }
+}
+
+fn write(
+    mut tables: CaptureTables,
+    logs: &Receiver<TrackFileReader>,
+    cancel: &CancelToken,
+    shared: &Shared,
+) -> Result<CaptureTables, Failure> {
+    for log in logs {
+        if let Err(e) = tables.catch_up(&log, cancel) {
+            // Said while something can be done about it; at the end all is tried again.
+            shared.news(format!("the capture cannot be written at present: {e}"));
+            return Err(e);
+        }
+    }
+    Ok(tables)
+}

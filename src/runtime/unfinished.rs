@@ -1,0 +1,264 @@
+//! A capture that is not written yet: the folder `DIR.unfinished`.
+//!
+//! The track log is the capture; everything else is derived from it. So the log is on disk while
+//! the film goes on, with a note of the source and the settings, and a run that was cut by a crash
+//! or by a full disk is completed from there.
+
+use super::finish::{self, CaptureJob, Quality, Written};
+use super::shared::{Failure, Shared};
+use super::status::{median_error_px, median_fb_error_px};
+use crate::cancel::CancelToken;
+use crate::capture::Captured;
+use crate::export::capture::{Capture, json};
+use crate::export::picture::{PICTURE_FILE, jpeg};
+use crate::model::{FormatNote, Outline, Picture, Size};
+use crate::pipeline::{BackEnd, Followed};
+use crate::recording::{SpaceReserve, TrackFile, TrackFileReader};
+use crate::source::SourceInfo;
+use std::ffi::OsString;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// What is appended to the name of a capture's folder until it is written.
+const SUFFIX: &str = ".unfinished";
+const LOG_FILE: &str = "tracks.log";
+const NOTE_FILE: &str = "capture.json";
+const RESERVE_FILE: &str = "reserve";
+/// The log and its note are brought to disk at this interval: a crash costs no more.
+const KEPT_EVERY: Duration = Duration::from_millis(500);
+/// Space that is held back for the results of the shortest film, bytes: the model, the picture.
+const LEAST_RESERVE: u64 = 8 << 20;
+/// Size of the results beside that of the log: both tables are text.
+const RESULTS_PER_LOG: u64 = 4;
+
+/// The folder of a running capture.
+pub struct Unfinished {
+    dir: PathBuf,
+    reserve: SpaceReserve,
+    kept: Option<Instant>,
+    picture_is_kept: bool,
+}
+
+/// Where the capture `out` lies until it is written.
+pub fn unfinished_dir(out: &Path) -> PathBuf {
+    let mut name = OsString::from(out);
+    name.push(SUFFIX);
+    PathBuf::from(name)
+}
+
+impl Unfinished {
+    /// Makes the folder for the capture `out`, with the log in it, and holds back space for the
+    /// results.
+    ///
+    /// # Errors
+    /// There is one already, the disk is full, or whatever else the file system says.
+    pub fn create(out: &Path) -> Result<(Self, TrackFile), Failure> {
+        let dir = unfinished_dir(out);
+        if let Some(above) = dir.parent() {
+            std::fs::create_dir_all(above).map_err(Failure::Log)?;
+        }
+        std::fs::create_dir(&dir).map_err(|e| match e.kind() {
+            io::ErrorKind::AlreadyExists => Failure::UnfinishedIsThere { dir: dir.clone() },
+            _ => Failure::Log(e),
+        })?;
+        let opened = SpaceReserve::create(&dir.join(RESERVE_FILE), LEAST_RESERVE)
+            .and_then(|reserve| Ok((reserve, TrackFile::create(&dir.join(LOG_FILE))?)));
+        match opened {
+            Ok((reserve, log)) => {
+                let unfinished = Self {
+                    dir,
+                    reserve,
+                    kept: None,
+                    picture_is_kept: false,
+                };
+                Ok((unfinished, log))
+            }
+            Err(e) => {
+                let _ = std::fs::remove_dir_all(&dir);
+                Err(Failure::Log(e))
+            }
+        }
+    }
+
+    /// A new log in place of the old one: the capture starts again.
+    ///
+    /// # Errors
+    /// Whatever the file system says.
+    pub fn restart(&mut self) -> Result<TrackFile, Failure> {
+        self.picture_is_kept = false;
+        self.kept = None;
+        TrackFile::create(&self.dir.join(LOG_FILE)).map_err(Failure::Log)
+    }
+
+    /// Whether it is time for [`keep`](Self::keep).
+    pub fn is_due(&self) -> bool {
+        self.kept.is_none_or(|at| at.elapsed() >= KEPT_EVERY)
+    }
+
+    /// Brings to disk what a crash would lose, and holds back space for what has been filmed.
+    ///
+    /// # Errors
+    /// The disk is full, or whatever else the file system says.
+    pub fn keep(&mut self, log: &mut TrackFile, job: &CaptureJob) -> Result<(), Failure> {
+        self.kept = Some(Instant::now());
+        log.flush().map_err(Failure::Log)?;
+        let results = LEAST_RESERVE + RESULTS_PER_LOG * log.bytes();
+        self.reserve.grow_to(results).map_err(Failure::Log)?;
+        let note = json(&finish::describe(job, None, None, None))?;
+        self.replace(NOTE_FILE, &note)?;
+        if let Some(picture) = job.picture.as_ref().filter(|_| !self.picture_is_kept) {
+            self.replace(PICTURE_FILE, &jpeg(&picture.rgb)?)?;
+            self.picture_is_kept = true;
+        }
+        Ok(())
+    }
+
+    fn replace(&self, name: &str, bytes: &[u8]) -> Result<(), Failure> {
+        let partial = self.dir.join(format!("{name}.partial"));
+        std::fs::write(&partial, bytes)
+            .and_then(|()| std::fs::rename(&partial, self.dir.join(name)))
+            .map_err(Failure::Log)
+    }
+
+    /// Gives the space back that was held for the results.
+    pub fn release_space(&mut self) {
+        self.reserve.release();
+        let _ = std::fs::remove_file(self.dir.join(RESERVE_FILE));
+    }
+
+    /// The capture is written, or there is nothing to keep.
+    pub fn remove(self) {
+        let _ = std::fs::remove_dir_all(&self.dir);
+    }
+
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+}
+
+/// Completes the capture `out` from what its run has left.
+///
+/// The tree is built from the log as a replay would build it. `frames` is told the number of each
+/// frame that is worked off.
+///
+/// # Errors
+/// There is nothing to finish, it is still being filmed, it is damaged, or the capture cannot be
+/// written; what was left stays as it is then.
+pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Failure> {
+    let out = named(out);
+    let dir = unfinished_dir(&out);
+    let tracks = TrackFileReader::open(&dir.join(LOG_FILE)).map_err(|e| cannot_open(&dir, e))?;
+    let note = read_note(&dir)?;
+    let picture = read_picture(&dir, &note);
+    let outline = outline_of(&note);
+    let shared = Arc::new(Shared::restored(&note.timing, &note.warnings));
+    let mut back = BackEnd::new(&note.config);
+    let mut quality = Quality::default();
+    for set in tracks.sets() {
+        if cancel.is_cancelled() {
+            return Err(Failure::Stopped);
+        }
+        let tracks = set.map_err(Failure::Log)?;
+        quality.note(
+            &tracks,
+            median_fb_error_px(&tracks),
+            median_error_px(&tracks),
+        );
+        back.step(Followed {
+            tracks,
+            outline: outline.clone(),
+            preview: None,
+            received: Instant::now(),
+        });
+    }
+    back.finish(cancel);
+    let _ = std::fs::remove_file(dir.join(RESERVE_FILE));
+    let job = CaptureJob {
+        tree: back.model().cloned(),
+        outline: back.outline().cloned(),
+        tracks,
+        log: back.log().clone(),
+        info: info_of(&note),
+        config: note.config,
+        quality,
+        picture,
+        shared,
+    };
+    let written = finish::write(&job, &out)?;
+    let _ = std::fs::remove_dir_all(&dir);
+    Ok(written)
+}
+
+/// The name of the capture, where that of its unfinished folder was given.
+fn named(out: &Path) -> PathBuf {
+    let text = out.to_string_lossy();
+    let text = text.trim_end_matches('/');
+    PathBuf::from(text.strip_suffix(SUFFIX).unwrap_or(text))
+}
+
+fn cannot_open(dir: &Path, e: io::Error) -> Failure {
+    let dir = dir.to_owned();
+    match e.kind() {
+        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
+            Failure::NothingUnfinished { dir }
+        }
+        io::ErrorKind::WouldBlock => Failure::StillFilming { dir },
+        _ => Failure::DamagedUnfinished {
+            dir,
+            what: e.to_string(),
+        },
+    }
+}
+
+fn read_note(dir: &Path) -> Result<Capture, Failure> {
+    let damaged = |what: String| Failure::DamagedUnfinished {
+        dir: dir.to_owned(),
+        what,
+    };
+    Captured::note(dir).map_err(|e| damaged(e.to_string()))
+}
+
+/// `None` where there is none or it cannot be read: the model then has no colours of its own.
+fn read_picture(dir: &Path, note: &Capture) -> Option<Picture> {
+    let note = note.picture.as_ref()?;
+    let bytes = std::fs::read(dir.join(PICTURE_FILE)).ok()?;
+    let rgb = image::load_from_memory(&bytes).ok()?.into_rgb8();
+    let size = Size::new(rgb.width(), rgb.height());
+    Some(Picture {
+        rgb: Arc::new(crate::model::Rgb {
+            size,
+            pixels: rgb.into_raw(),
+        }),
+        frame: note.frame,
+        time_s: note.time_s,
+    })
+}
+
+/// The outline as it was noted, or the whole picture.
+fn outline_of(note: &Capture) -> Arc<Outline> {
+    let whole = Size::new(note.source.width, note.source.height);
+    let noted = note.outline.as_ref().and_then(|o| {
+        let mut corners_px: Vec<[f64; 2]> = Vec::new();
+        for [u, v] in &o.polygon_px {
+            corners_px.push([f64::from(*u), f64::from(*v)]);
+        }
+        crate::outline::from_polygon(&corners_px, Size::new(o.width, o.height)).ok()
+    });
+    Arc::new(noted.unwrap_or_else(|| crate::outline::whole(whole)))
+}
+
+fn info_of(note: &Capture) -> SourceInfo {
+    SourceInfo {
+        name: note.source.name.clone(),
+        format: FormatNote {
+            asked: note.source.format_asked.clone(),
+            given: note.source.format_given.clone(),
+        },
+        size: Size::new(note.source.width, note.source.height),
+        nominal_rate_hz: note.timing.nominal_rate_hz,
+        frames_total: None,
+        live: false,
+    }
+}

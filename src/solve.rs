@@ -1,0 +1,176 @@
+//! The whole algorithm on one screen: a log of points becomes a model of the tree.
+//!
+//! [`solve`] is the only maker of models, whoever asks: the pipeline while it films, the end of a
+//! film, a log that is finished after a crash, and programs with tracks of their own. It does no
+//! I/O, starts no threads and reads no clock.
+
+mod model;
+mod refine;
+mod sub_branches;
+
+pub use model::{First, Model, Moment};
+pub use sub_branches::SubBranch;
+
+use crate::cancel::CancelToken;
+use crate::config::Config;
+use crate::hierarchy::{self, Evidence};
+use crate::model::{MotionHierarchy, Outline, Skeleton, TrackLog, TrackTable};
+use crate::pipeline::{Bounds, room};
+use crate::{shape, skeleton};
+use refine::Refinement;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Fewer moving points than this make no tree, whatever is asked.
+pub const LEAST_MOVING: usize = 16;
+/// Share of the outline's width at the foot that is trunk, where none can be measured above it.
+const TRUNK_SHARE: f64 = 0.5;
+
+/// Builds the tree from the points that `log` remembers (the last `accumulate.window_s`), within
+/// `outline`.
+///
+/// With a `prior` model of the same tree the new one keeps its node names, places and sides, and
+/// comes about only if it is borne out by the motion at least as well; where it is not, the prior
+/// with the sub-branches that are identified by now may be the answer.
+///
+/// `None` where fewer than [`LEAST_MOVING`] points move, where a prior model stays the better one,
+/// or where `cancel` ends the work before.
+pub fn solve(
+    log: &TrackLog,
+    outline: &Arc<Outline>,
+    prior: Option<&Model>,
+    config: &Config,
+    cancel: &CancelToken,
+) -> Option<Model> {
+    if let Some(prior) = prior {
+        return Refinement::of(log, prior, config)?.run(cancel);
+    }
+    let window = log.last(config.accumulate.window_s);
+    let table = Arc::new(hierarchy::table(window));
+    let evidence = hierarchy::evidence(&table, &config.accumulate);
+    let is_enough = evidence.measure >= config.accumulate.threshold
+        && window.span_s() >= config.accumulate.min_s;
+    let moment = Moment {
+        forced: !is_enough,
+        ..Moment::of(window)?
+    };
+    build(&table, evidence, outline, config, moment)
+}
+
+/// The prior model with the sub-branches that its frequencies identify by now; `None` where they
+/// are those that it has, where too little motion is seen, or where `cancel` ends the work before.
+pub fn identify_sub_branches(
+    log: &TrackLog,
+    prior: &Model,
+    config: &Config,
+    cancel: &CancelToken,
+) -> Option<Model> {
+    Refinement::of(log, prior, config)?.sub_branches_only(cancel)
+}
+
+/// Where the crown is, from the left, px: the mean of the points that move.
+fn crown_u(table: &TrackTable, moving: &[usize]) -> Option<f64> {
+    let sum: f64 = moving
+        .iter()
+        .map(|&row| hierarchy::rest_position_px(table, row)[0])
+        .sum();
+    (!moving.is_empty()).then(|| sum / moving.len() as f64)
+}
+
+/// The skeleton in the picture, and the number of points on every node.
+fn flat(
+    hierarchy: &MotionHierarchy,
+    outline: &Outline,
+    config: &Config,
+) -> (Vec<skeleton::Node2d>, Vec<u32>) {
+    let flat = skeleton::build(hierarchy, outline, &config.skeleton);
+    let mut n_tracks = Vec::with_capacity(flat.len());
+    for node in &flat {
+        // The foot carries all.
+        let cluster = node.cluster.map_or(0, |c| c.0 as usize);
+        let cluster = hierarchy.clusters.get(cluster);
+        n_tracks.push(cluster.map_or(0, |c| c.members.len() as u32));
+    }
+    (flat, n_tracks)
+}
+
+/// Radii, from the trunk's as it was given or as the outline shows it.
+pub fn assign_radii(skeleton: &mut Skeleton, outline: &Outline, config: &Config) {
+    let wood = &config.wood;
+    let top_px = skeleton.nodes.get(1).map_or(skeleton.foot_px, |top| {
+        skeleton.image_from_model(&top.position)
+    });
+    let measured = shape::trunk_radius_px(outline, skeleton.foot_px, top_px);
+    let trunk_px = if wood.trunk_width_px > 0.0 {
+        0.5 * wood.trunk_width_px
+    } else if let Some(measured_px) = measured {
+        measured_px
+    } else {
+        TRUNK_SHARE * skeleton::Foot::of(outline, None).half_width_px
+    };
+    let trunk_px = trunk_px.max(2.0 * shape::TIP_RADIUS_PX);
+    let room = room(
+        skeleton,
+        Some(outline),
+        Bounds::Filmed(config.shape.envelope),
+    );
+    shape::thicken(skeleton, trunk_px, &room, wood, wood.seed.into());
+}
+
+/// Hierarchy, 2D skeleton, 3D skeleton. `None` if too few points move.
+fn build(
+    table: &Arc<TrackTable>,
+    evidence: Evidence,
+    outline: &Arc<Outline>,
+    config: &Config,
+    moment: Moment,
+) -> Option<Model> {
+    if evidence.moving.len() < LEAST_MOVING {
+        return None;
+    }
+    let foot_px = skeleton::Foot::of(outline, crown_u(table, &evidence.moving)).position_px;
+    let hierarchy = hierarchy::build(table, &evidence.moving, foot_px, &config.hierarchy);
+    if hierarchy.members().len() < LEAST_MOVING {
+        return None;
+    }
+    let skeleton = Arc::new(lift_to_3d(&hierarchy, outline, config));
+    let mut rest_px = BTreeMap::new();
+    for (row, id) in table.ids.iter().enumerate() {
+        rest_px.insert(*id, hierarchy::rest_position_px(table, row));
+    }
+    let first = First {
+        frame: moment.frame,
+        time_s: moment.time_s,
+        measure: evidence.measure,
+        moving: evidence.moving.len(),
+        forced: moment.forced,
+    };
+    Some(Model {
+        rest_px,
+        hierarchy,
+        table: table.clone(),
+        first,
+        refinements: 0,
+        names: skeleton.nodes.len() as u32,
+        kept: 0,
+        joined: BTreeMap::new(),
+        plain: skeleton.clone(),
+        skeleton,
+        sub_branches: Vec::new(),
+        outline: outline.clone(),
+        followed_from: moment.followed_from,
+        frame: moment.frame,
+        time_s: moment.time_s,
+        shown_from: moment.frame,
+        evidence,
+        forced: moment.forced,
+    })
+}
+
+/// Hierarchy to tree in space, with its thickness.
+pub fn lift_to_3d(hierarchy: &MotionHierarchy, outline: &Outline, config: &Config) -> Skeleton {
+    let (flat, tracks) = flat(hierarchy, outline, config);
+    let mut skeleton = shape::build(&flat, &tracks, outline, &config.shape);
+    assign_radii(&mut skeleton, outline, config);
+    skeleton
+}

@@ -1,0 +1,170 @@
+//! What was found out about a tree.
+
+use super::sub_branches::{self, SubBranch};
+use crate::config::Config;
+use crate::hierarchy::Evidence;
+use crate::model::{LogWindow, MotionHierarchy, NodeId, Outline, Skeleton, TrackId, TrackTable};
+use crate::motion::Binding;
+use crate::shape::PushFigures;
+use crate::skeleton;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A tree as far as film has shown it: immutable, and replaced by a newer version as a whole.
+#[derive(Clone, Debug)]
+pub struct Model {
+    pub hierarchy: MotionHierarchy,
+    /// The hierarchy in space.
+    pub plain: Arc<Skeleton>,
+    /// The same with the sub-branches: the tree as it is shown and written.
+    pub skeleton: Arc<Skeleton>,
+    /// Branches that only their frequency tells; their nodes come after those of the hierarchy.
+    pub sub_branches: Vec<SubBranch>,
+    /// Rest position of every track that was there when the tree was built, px.
+    pub rest_px: BTreeMap<TrackId, [f64; 2]>,
+    /// Tracks that the tree was not built from, with node and rest place, px: those of an older
+    /// tree, and those that were found since.
+    pub joined: BTreeMap<TrackId, (NodeId, [f64; 2])>,
+    pub outline: Arc<Outline>,
+    /// The tracks that it was built from, and what they are worth.
+    pub table: Arc<TrackTable>,
+    pub evidence: Evidence,
+    /// First frame that was remembered when it was built: the pose is followed from there on.
+    pub followed_from: u64,
+    /// Frame after which it was built, and its time.
+    pub frame: u64,
+    pub time_s: f64,
+    /// First frame that was posed by it live.
+    pub shown_from: u64,
+    /// Built before the measure reached its threshold: asked for, or at the end of the frames.
+    pub forced: bool,
+    /// How the first tree of the capture came about: this one, unless it was refined.
+    pub first: First,
+    /// How often the tree was built anew.
+    pub refinements: u32,
+    /// How many names nodes have been given so far.
+    pub names: u32,
+    /// How many of the measured nodes have their name from the tree before.
+    pub kept: usize,
+}
+
+/// How the first tree of a capture came about.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct First {
+    pub frame: u64,
+    pub time_s: f64,
+    pub measure: f64,
+    pub moving: usize,
+    pub forced: bool,
+}
+
+/// The film that a tree is built from: the first frame that is remembered, the newest, its time (s)
+/// and whether the tree is wanted before there is enough motion.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Moment {
+    pub followed_from: u64,
+    pub frame: u64,
+    pub time_s: f64,
+    pub forced: bool,
+}
+
+impl Moment {
+    /// That of the newest frame of `window`; `None` where nothing is remembered.
+    pub(super) fn of(window: LogWindow) -> Option<Self> {
+        let (first, newest) = (window.first()?, window.newest()?);
+        Some(Self {
+            followed_from: first.frame,
+            frame: newest.frame,
+            time_s: newest.time_s,
+            forced: false,
+        })
+    }
+}
+
+impl Model {
+    /// Which track moves which node.
+    pub fn binding(&self) -> Binding {
+        let mut binding = Binding::new(&self.hierarchy, &self.rest_px, &self.skeleton);
+        binding.inherit(&self.joined);
+        binding.inherit(&self.on_sub_branches());
+        binding
+    }
+
+    /// The model with all tracks that `binding` knows by now.
+    pub fn joined_by(&self, binding: &Binding) -> Self {
+        let built_from = self.hierarchy.members();
+        let mut joined = BTreeMap::new();
+        for (id, node, rest_px) in binding.bound() {
+            if !built_from.contains(&id) {
+                joined.insert(id, (self.carrier(node), rest_px));
+            }
+        }
+        Self {
+            joined,
+            ..self.clone()
+        }
+    }
+
+    /// The node itself, or the measured one that carries it if it is a sub-branch.
+    pub(super) fn carrier(&self, node: NodeId) -> NodeId {
+        match node.index().checked_sub(self.plain.measured()) {
+            Some(k) => self.sub_branches[k].on,
+            None => node,
+        }
+    }
+
+    /// The points of the sub-branches with node and rest place, px.
+    fn on_sub_branches(&self) -> BTreeMap<TrackId, (NodeId, [f64; 2])> {
+        let mut out = BTreeMap::new();
+        let first = self.plain.measured() as u32;
+        for (node, branch) in (first..).map(NodeId).zip(&self.sub_branches) {
+            for id in &branch.members {
+                if let Some(rest_px) = self.rest_px_of(*id) {
+                    out.insert(*id, (node, rest_px));
+                }
+            }
+        }
+        out
+    }
+
+    fn rest_px_of(&self, id: TrackId) -> Option<[f64; 2]> {
+        match self.joined.get(&id) {
+            Some((_, rest_px)) => Some(*rest_px),
+            None => self.rest_px.get(&id).copied(),
+        }
+    }
+
+    /// Puts `sub_branches` on in place of those that it has.
+    pub(super) fn set_sub_branches(&mut self, sub_branches: Vec<SubBranch>, config: &Config) {
+        self.sub_branches = sub_branches;
+        let mut skeleton = sub_branches::with(&self.plain, &self.sub_branches);
+        super::assign_radii(&mut skeleton, &self.outline, config);
+        self.skeleton = Arc::new(skeleton);
+    }
+
+    /// The skeleton in the picture that it was pushed into space from, with the number of points on
+    /// every node.
+    pub fn flat(&self, config: &Config) -> (Vec<skeleton::Node2d>, Vec<u32>) {
+        super::flat(&self.hierarchy, &self.outline, config)
+    }
+
+    /// The same with its foot at `foot_px`: that of a capture's first tree stays.
+    pub(super) fn flat_on(
+        &self,
+        foot_px: [f64; 2],
+        config: &Config,
+    ) -> (Vec<skeleton::Node2d>, Vec<u32>) {
+        let (mut flat, tracks) = self.flat(config);
+        if let Some(foot) = flat.first_mut() {
+            foot.position_px = foot_px;
+        }
+        (flat, tracks)
+    }
+
+    /// How well its push fills the envelope, and how likely its angles are, beside the one-sided
+    /// ways; without sub-branches, which are not pushed.
+    pub fn push_figures(&self, config: &Config) -> PushFigures {
+        let (flat, tracks) = self.flat_on(self.plain.foot_px, config);
+        PushFigures::of(&self.plain, &flat, &tracks, &self.outline, &config.shape)
+    }
+}
