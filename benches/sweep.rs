@@ -9,12 +9,12 @@
 mod branches;
 
 use arborcam::config::{Affinity, Config};
+use arborcam::hierarchy::TrackHistory;
 use arborcam::hierarchy::{COMPARE_HZ, evidence};
 use arborcam::model::{Frame, Luma};
 use arborcam::outline::Given;
 use arborcam::pipeline::{self, Moment, Pipeline};
 use arborcam::source::{self, Decoder};
-use arborcam::track::TrackHistory;
 use branches::{Births, Truth, triplets};
 use std::path::Path;
 use std::sync::Arc;

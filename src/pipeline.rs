@@ -15,9 +15,9 @@ mod reshape;
 mod retrace;
 mod shoots;
 
-pub use back::{BackEnd, Moved};
+pub use back::{BackEnd, Followed, Moved};
 pub use dress::{Seen, dress, flutter};
-pub use front::{Followed, FrontEnd};
+pub use front::FrontEnd;
 pub use leaves::seeds as leaf_seeds;
 pub use refine::Refinement;
 pub use reshape::{MOST_RESHAPED, cut_to, reshape};
@@ -26,11 +26,12 @@ pub use shoots::Shoot;
 
 use crate::cancel::CancelToken;
 use crate::config::Config;
-use crate::hierarchy::{self, Evidence};
-use crate::model::{Frame, MotionHierarchy, NodeId, Outline, Pose, Skeleton, TrackId, TrackSet};
+use crate::hierarchy::{self, Evidence, TrackHistory};
+use crate::model::{
+    Frame, MotionHierarchy, NodeId, Outline, Pose, Skeleton, TrackId, TrackSet, TrackTable,
+};
 use crate::motion::{Binding, PoseEstimator};
 use crate::shape::PushFigures;
-use crate::track::{TrackHistory, TrackTable};
 use crate::{shape, skeleton};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -276,10 +277,10 @@ fn thicken(skeleton: &mut Skeleton, outline: &Outline, config: &Config) {
         .or(measured)
         .unwrap_or_else(at_foot)
         .max(2.0 * shape::TIP_RADIUS_PX);
-    let room = dress::room(
+    let room = shape::room(
         skeleton,
         Some(outline),
-        dress::Bounds::Filmed(config.shape.envelope),
+        shape::Bounds::Filmed(config.shape.envelope),
     );
     shape::thicken(skeleton, trunk_px, &room, wood, wood.seed.into());
 }

@@ -17,17 +17,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("source", &["model", "config", "recording", "caught"]),
     ("outline", &["model", "config", "signal"]),
     ("track", &["model", "config", "signal"]),
-    // The table of positions that the hierarchy is cut from is the tracker's.
-    (
-        "hierarchy",
-        &[
-            "model",
-            "config",
-            "track::TrackTable",
-            "track::TrackHistory",
-            "signal",
-        ],
-    ),
+    ("hierarchy", &["model", "config", "signal"]),
     ("skeleton", &["model", "config"]),
     // The flat node that is stood up in space.
     ("shape", &["model", "config", "skeleton::Node2d"]),

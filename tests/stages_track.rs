@@ -1,10 +1,11 @@
 //! Following points, on pictures whose motion is known.
 
 use arborcam::config::{Accumulate, Detect, Track};
+use arborcam::hierarchy::TrackHistory;
 use arborcam::hierarchy::evidence_of;
 use arborcam::model::{Frame, LONGEST_TRIAL_S, Luma, Observation, Size, TrackId, TrackSet};
 use arborcam::outline::whole;
-use arborcam::track::{TrackHistory, Tracker};
+use arborcam::track::Tracker;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use std::time::Instant;

@@ -1,9 +1,10 @@
 //! When enough motion has been seen to build the tree, judged from the tracks alone.
 
+use super::TrackHistory;
 use super::signals::Signals;
 use crate::config::Accumulate;
+use crate::model::TrackTable;
 use crate::signal::along_principal_direction;
-use crate::track::{TrackHistory, TrackTable};
 
 /// Rate at which tracks are compared, Hz: velocities over longer steps stand out better from
 /// tracking noise.

@@ -20,6 +20,7 @@ mod rest;
 mod signals;
 mod stems;
 mod support;
+mod table;
 mod zeng;
 
 pub use accumulate::{COMPARE_HZ, Evidence, evidence, evidence_of};
@@ -27,10 +28,11 @@ pub use ncut::{Cut, normalised_cut};
 pub use persist::persisting;
 pub use rest::rest_position_px;
 pub use support::{Gain, OnBoth, gain};
+pub use table::TrackHistory;
 
 use crate::config::{Affinity, Hierarchy};
+use crate::model::TrackTable;
 use crate::model::{Cluster, ClusterId, MotionHierarchy};
-use crate::track::TrackTable;
 use agreement::in_agreement;
 use arrange::arranged;
 use binary::Binary;

@@ -14,6 +14,7 @@ mod snapshot;
 mod sway;
 mod sway_now;
 mod track;
+mod track_table;
 
 pub use control::Control;
 pub use frame::{Frame, Luma, Picture, PixelFormat, RawFrame, Rgb, Size, nanoseconds, seconds};
@@ -25,3 +26,4 @@ pub use snapshot::{BranchRow, CameraState, FormatNote, Phase, Snapshot};
 pub use sway::{Excitation, Interval, Sway, Swaying, Unidentified};
 pub use sway_now::{AngleSpectrum, Angles, BranchSway, SwayNow};
 pub use track::{LONGEST_TRIAL_S, Observation, TrackId, TrackSet};
+pub use track_table::TrackTable;

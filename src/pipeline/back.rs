@@ -1,13 +1,12 @@
 //! The back end: tracks to tree and poses.
 
 use super::refiner::Refiner;
-use super::{Followed, Moment, Poser, Refinement, Targets, Tree, build};
+use super::{Moment, Poser, Refinement, Targets, Tree, build};
 use crate::cancel::CancelToken;
 use crate::config::Config;
-use crate::hierarchy::{self, Evidence};
-use crate::model::{Outline, Phase, Pose, Rgb, TrackSet};
+use crate::hierarchy::{self, Evidence, TrackHistory};
+use crate::model::{Outline, Phase, Pose, Rgb, TrackSet, TrackTable};
 use crate::motion::Binding;
-use crate::track::{TrackHistory, TrackTable};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -15,6 +14,15 @@ use std::time::Instant;
 const JUDGE_EVERY_S: f64 = 0.5;
 /// At the end of the frames no tree is built from less evidence than this (accumulation measure).
 pub const LEAST_MEASURE: f64 = 0.1;
+
+/// A frame that has been through the front end.
+#[derive(Clone, Debug)]
+pub struct Followed {
+    pub tracks: TrackSet,
+    pub outline: Arc<Outline>,
+    pub preview: Option<Arc<Rgb>>,
+    pub received: Instant,
+}
 
 /// A frame that has been through the back end.
 #[derive(Clone, Debug)]

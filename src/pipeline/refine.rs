@@ -4,11 +4,10 @@ use super::back::Live;
 use super::{Moment, Shoot, Tree, build, shoots, thicken};
 use crate::cancel::CancelToken;
 use crate::config::Config;
-use crate::hierarchy::{self, Evidence, Gain, OnBoth};
-use crate::model::{MotionHierarchy, NodeId, NodeName, Skeleton, TrackId};
+use crate::hierarchy::{self, Evidence, Gain, OnBoth, TrackHistory};
+use crate::model::{MotionHierarchy, NodeId, NodeName, Skeleton, TrackId, TrackTable};
 use crate::shape::{Prototype, Twin, go_on, on_foot, twins};
 use crate::signal::median;
-use crate::track::{TrackHistory, TrackTable};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 

@@ -5,8 +5,8 @@ use super::back::Live;
 use super::refine::Refinement;
 use super::{Poser, Targets, Tree};
 use crate::config::Config;
+use crate::hierarchy::TrackHistory;
 use crate::model::Pose;
-use crate::track::TrackHistory;
 use std::sync::Arc;
 
 /// The tree is built anew each time that film has grown by this factor: the error of a correlation

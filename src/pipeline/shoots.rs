@@ -9,8 +9,8 @@ use crate::cancel::CancelToken;
 use crate::config::Dynamics;
 use crate::dynamics::{Film, FilmTrack, shoots};
 use crate::hierarchy::rest_position_px;
+use crate::model::TrackTable;
 use crate::model::{Node, NodeId, NodeName, Skeleton, TrackId};
-use crate::track::TrackTable;
 use nalgebra::{Point3, Vector2, Vector3};
 
 /// Points by which it is told how far a branch reaches: one alone may be off it.

@@ -7,7 +7,6 @@
 mod anchor;
 mod detect;
 mod flow;
-mod history;
 mod neighbours;
 mod point;
 mod regain;
@@ -16,7 +15,6 @@ mod trial;
 
 pub use detect::Detector;
 pub use flow::{Flow, OpticalFlow, Pyramid};
-pub use history::{TrackHistory, TrackTable};
 
 use crate::config::{Detect, Track};
 use crate::model::{Frame, Observation, Outline, TrackId, TrackSet};

@@ -1,6 +1,6 @@
 //! The tracks of the last seconds, and their table as the hierarchy wants it.
 
-use crate::model::{TrackId, TrackSet};
+use crate::model::{TrackId, TrackSet, TrackTable};
 use crate::signal::median;
 use std::collections::{BTreeMap, VecDeque};
 
@@ -8,18 +8,6 @@ use std::collections::{BTreeMap, VecDeque};
 pub struct TrackHistory {
     window_s: f64,
     sets: VecDeque<TrackSet>,
-}
-
-/// Positions of all tracks on common frames.
-#[derive(Clone, Debug, Default)]
-pub struct TrackTable {
-    pub ids: Vec<TrackId>,
-    /// Sensor time of each frame, s.
-    pub times_s: Vec<f64>,
-    /// `positions[track][frame]`, px; `None` where the track was not seen.
-    pub positions: Vec<Vec<Option<[f32; 2]>>>,
-    /// Median forward-backward error of each track, px.
-    pub fb_errors_px: Vec<f32>,
 }
 
 impl TrackHistory {
