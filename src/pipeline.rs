@@ -7,31 +7,37 @@
 mod back;
 mod bark;
 mod dress;
+#[cfg(feature = "opencv")]
 mod front;
 mod leaves;
 mod refine;
 mod refiner;
 mod reshape;
 mod retrace;
+#[cfg(feature = "opencv")]
+mod seeds;
 mod shoots;
 
 pub use back::{BackEnd, Followed, Moved};
 pub use dress::{Seen, dress, flutter};
+#[cfg(feature = "opencv")]
 pub use front::FrontEnd;
-pub use leaves::seeds as leaf_seeds;
 pub use refine::Refinement;
 pub use reshape::{MOST_RESHAPED, cut_to, reshape};
 pub use retrace::Retrace;
+#[cfg(feature = "opencv")]
+pub use seeds::seeds as leaf_seeds;
 pub use shoots::Shoot;
 
-use crate::cancel::CancelToken;
 use crate::config::Config;
 use crate::hierarchy::{self, Evidence, TrackHistory};
 use crate::model::{
-    Frame, MotionHierarchy, NodeId, Outline, Pose, Skeleton, TrackId, TrackSet, TrackTable,
+    MotionHierarchy, NodeId, Outline, Pose, Skeleton, TrackId, TrackSet, TrackTable,
 };
 use crate::motion::{Binding, PoseEstimator};
 use crate::shape::PushFigures;
+#[cfg(feature = "opencv")]
+use crate::{cancel::CancelToken, model::Frame};
 use crate::{shape, skeleton};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -42,11 +48,13 @@ pub const LEAST_MOVING: usize = 16;
 const TRUNK_SHARE: f64 = 0.5;
 
 /// Both halves in one thread.
+#[cfg(feature = "opencv")]
 pub struct Pipeline {
     pub front: FrontEnd,
     pub back: BackEnd,
 }
 
+#[cfg(feature = "opencv")]
 impl Pipeline {
     pub fn new(config: &Config, outline: Option<Outline>) -> Self {
         Self {
