@@ -29,14 +29,21 @@ pub fn room<'a>(
     move |from: &Point3<f64>, to: &Point3<f64>| match (&envelope, outline) {
         (Some(envelope), Some(outline)) => {
             let middle = nalgebra::center(from, to);
-            let seen = |p: &Point3<f64>| outline.contains(foot_px[0] + p.x, foot_px[1] - p.y);
+            let from_is_seen = appears_within(outline, foot_px, from);
             // A branch that is outside itself, as a copy may be, is no barer for it.
             envelope.contains(to)
                 && envelope.contains(&middle)
-                && (!seen(from) || (seen(to) && seen(&middle)))
+                && (!from_is_seen
+                    || (appears_within(outline, foot_px, to)
+                        && appears_within(outline, foot_px, &middle)))
         }
         _ => true,
     }
+}
+
+/// Whether a point (model axes, px) is within the outline as seen from the front.
+fn appears_within(outline: &Outline, foot_px: [f64; 2], p: &Point3<f64>) -> bool {
+    outline.contains(foot_px[0] + p.x, foot_px[1] - p.y)
 }
 
 /// Where the measured nodes are, model axes, px.
