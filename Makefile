@@ -1,7 +1,8 @@
-# make demo: from a fresh machine to a moving tree in out/demo. make test: every test. make bench: the figures.
+# make demo: from a fresh machine to a moving tree in out/demo. make test: from a fresh machine through every test. Both
+# install what is missing (scripts/setup.sh). make bench: the figures.
 # make pictures: those of README and docs (CLIPS=folder for the oak too).
 # make install, make uninstall: program and service, below DESTDIR (for packages) and PREFIX.
-.PHONY: demo pictures build viewer test test-v4l2 test-real bench sweep lint setup install uninstall
+.PHONY: demo pictures build viewer test test-v4l2 test-real bench sweep lint core setup install uninstall
 
 demo: setup build
 	@scripts/demo.sh
@@ -23,8 +24,9 @@ viewer:
 
 # The V4L2 tests take a virtual machine (tests/vm); what could not be run is said at the end.
 test:
+	@scripts/setup.sh --tests
 	@rm -f target/vm-runs/absent
-	@scripts/build-viewer.sh && scripts/test-modules.sh || echo "test: goes on without the tests of the HTML viewer" >&2
+	@scripts/build-viewer.sh || echo "test: goes on without the tests of the HTML viewer" >&2
 	cargo test --release --locked
 	@! test -s target/vm-runs/absent || cat target/vm-runs/absent >&2
 
@@ -44,9 +46,14 @@ bench:
 sweep:
 	cargo bench --locked --bench sweep -- $(CLIP)
 
-lint:
+lint: core
 	cargo fmt --check
 	cargo clippy --locked --all-targets -- -D warnings
+
+# The library without OpenCV, camera and terminal, with the example that uses it; the program without nokhwa.
+core:
+	cargo check --locked --no-default-features --lib --example tree_from_tracks
+	cargo clippy --locked --no-default-features --features terminal -- -D warnings
 
 PREFIX ?= /usr/local
 # Where the system looks for its parts; below /usr/local it reads neither udev rules nor all of the others.

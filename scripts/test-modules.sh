@@ -10,4 +10,8 @@ out=$(realpath -m "${CARGO_TARGET_DIR:-target}")/test-npm
 mkdir -p "$out"
 cp tests/npm/package.json tests/npm/package-lock.json "$out/"
 cd "$out"
-npm ci --ignore-scripts --no-audit --no-fund --loglevel=error
+# Fetched once for each lock file.
+if ! cmp -s package-lock.json node_modules/.arborcam-lock; then
+    npm ci --ignore-scripts --no-audit --no-fund --loglevel=error
+    cp package-lock.json node_modules/.arborcam-lock
+fi

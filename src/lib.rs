@@ -1,5 +1,5 @@
-//! arborcam films a swaying tree with an ordinary camera and turns it, while it films, into a 3D
-//! tree that moves as the real one does, after Li, Deussen, Song, Willis and Hall, "Modeling and
+//! arborcam films a swaying tree with one ordinary camera and builds, while it films, a 3D model of
+//! it that moves as the real tree does, after Li, Deussen, Song, Willis and Hall, "Modeling and
 //! Generating Moving Trees from Video" (2011), and Zeng's variant of it (2015).
 //!
 //! # The way of the data
@@ -15,25 +15,40 @@
 //! ```
 //!
 //! [`pipeline`] is that picture as code: a front end (frame to tracks) and a back end (tracks to
-//! tree and pose). [`runtime`] runs the two on threads between a source and the screen.
+//! tree and pose). `runtime` runs the two on threads between a source and the screen.
 //!
 //! # The modules in reading order
 //!
-//! [`model`] the nouns · [`source`] where frames come from · [`outline`] which pixels are tree ·
-//! [`track`] points followed · [`hierarchy`] who moves with whom · [`skeleton`] in the picture ·
-//! [`shape`] in space · [`motion`] the pose of every frame · [`dynamics`] what the motion says ·
-//! [`animate`] motion that nobody filmed · [`signal`] small common mathematics · [`caught`] other
-//! people's panics · [`draw`] pictures of it · [`pipeline`] all of it · [`runtime`] on threads ·
-//! [`recording`] kept on disk · [`export`] files for others · [`capture`] those files read back ·
-//! [`report`] what the sway of one or several of them says · [`tui`] the screen · [`doctor`]
-//! whether this machine can · [`cli`] the commands · [`config`] what can be set.
+//! [`model`] shared data types · `source` where frames come from · `outline` which pixels are tree ·
+//! `track` points followed · [`hierarchy`] which points move together · [`skeleton`] in the picture ·
+//! [`shape`] in space · [`motion`] the pose in every frame · [`dynamics`] frequency and damping ·
+//! [`animate`] motion that was not filmed · [`signal`] common mathematics · [`caught`] panics of
+//! other crates · [`draw`] pictures of the model · [`pipeline`] all of it, step by step · `runtime`
+//! on threads · `recording` frames on disk · [`export`] files for other programs · `capture` those
+//! files read back · [`report`] tables and plots of the sway · `tui` the screen · `doctor` checks of
+//! the machine · `cli` the commands · [`config`] the settings · [`cancel`] stops long work.
+//!
+//! # Features
+//!
+//! All are on by default. Without them only the core is built: everything from tracks to the model,
+//! its motion, its frequencies and its files. `examples/tree_from_tracks.rs` uses it.
+//!
+//! | feature | adds | modules |
+//! |---|---|---|
+//! | `opencv` | pictures to tracks | `outline`, `track`, `capture`, front end of [`pipeline`] |
+//! | `camera` | cameras, recordings, videos | `source`, `recording` |
+//! | `nokhwa` | a second way to read cameras | inside of `source` |
+//! | `terminal` | the program; needs `opencv` and `camera` | `runtime`, `tui`, `doctor`, `cli` |
 
 pub mod animate;
 pub mod cancel;
+#[cfg(feature = "opencv")]
 pub mod capture;
 pub mod caught;
+#[cfg(feature = "terminal")]
 pub mod cli;
 pub mod config;
+#[cfg(feature = "terminal")]
 pub mod doctor;
 pub mod draw;
 pub mod dynamics;
@@ -41,15 +56,21 @@ pub mod export;
 pub mod hierarchy;
 pub mod model;
 pub mod motion;
+#[cfg(feature = "opencv")]
 pub mod outline;
 pub mod pipeline;
+#[cfg(feature = "camera")]
 pub mod recording;
 pub mod report;
+#[cfg(feature = "terminal")]
 pub mod runtime;
 pub mod shape;
 pub mod signal;
 pub mod skeleton;
 pub mod solve;
+#[cfg(feature = "camera")]
 pub mod source;
+#[cfg(feature = "opencv")]
 pub mod track;
+#[cfg(feature = "terminal")]
 pub mod tui;

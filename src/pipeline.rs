@@ -9,31 +9,40 @@
 mod back;
 mod bark;
 mod dress;
+#[cfg(feature = "opencv")]
 mod front;
 mod leaves;
 mod pose_tracker;
 mod refiner;
 mod reshape;
+#[cfg(feature = "opencv")]
+mod seeds;
 
-pub use back::{BackEnd, Moved};
-pub(crate) use dress::{Bounds, room};
+pub use back::{BackEnd, Followed, Moved};
 pub use dress::{Seen, dress, flutter};
-pub use front::{Followed, FrontEnd};
-pub use leaves::seeds as leaf_seeds;
+#[cfg(feature = "opencv")]
+pub use front::FrontEnd;
 pub use pose_tracker::{PoseReplay, PoseTracker, Targets};
 pub use refiner::SolveJob;
 pub use reshape::{MOST_RESHAPED, cut_to, reshape};
+#[cfg(feature = "opencv")]
+pub use seeds::seeds as leaf_seeds;
 
-use crate::cancel::CancelToken;
-use crate::config::Config;
-use crate::model::{Frame, Outline};
+#[cfg(feature = "opencv")]
+use crate::{
+    cancel::CancelToken,
+    config::Config,
+    model::{Frame, Outline},
+};
 
 /// Both halves in one thread.
+#[cfg(feature = "opencv")]
 pub struct Pipeline {
     pub front: FrontEnd,
     pub back: BackEnd,
 }
 
+#[cfg(feature = "opencv")]
 impl Pipeline {
     pub fn new(config: &Config, outline: Option<Outline>) -> Self {
         Self {

@@ -15,7 +15,6 @@ use crate::cancel::CancelToken;
 use crate::config::Config;
 use crate::hierarchy::{self, Evidence};
 use crate::model::{MotionHierarchy, Outline, Skeleton, TrackLog, TrackTable};
-use crate::pipeline::{Bounds, room};
 use crate::{shape, skeleton};
 use refine::Refinement;
 use std::collections::BTreeMap;
@@ -109,10 +108,10 @@ pub fn assign_radii(skeleton: &mut Skeleton, outline: &Outline, config: &Config)
         TRUNK_SHARE * skeleton::Foot::of(outline, None).half_width_px
     };
     let trunk_px = trunk_px.max(2.0 * shape::TIP_RADIUS_PX);
-    let room = room(
+    let room = shape::room(
         skeleton,
         Some(outline),
-        Bounds::Filmed(config.shape.envelope),
+        shape::Bounds::Filmed(config.shape.envelope),
     );
     shape::thicken(skeleton, trunk_px, &room, wood, wood.seed.into());
 }

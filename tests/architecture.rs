@@ -17,11 +17,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("source", &["model", "config", "recording", "caught"]),
     ("outline", &["model", "config", "signal"]),
     ("track", &["model", "config", "signal"]),
-    // The table of positions that the hierarchy is cut from is the tracker's.
-    (
-        "hierarchy",
-        &["model", "config", "track::TrackTable", "signal"],
-    ),
+    ("hierarchy", &["model", "config", "signal"]),
     ("skeleton", &["model", "config"]),
     // The flat node that is stood up in space.
     ("shape", &["model", "config", "skeleton::Node2d"]),
@@ -267,7 +263,7 @@ fn read(path: PathBuf) -> Source {
     Source { path, module, code }
 }
 
-/// `track::TrackTable` for every mention of `crate::track::TrackTable` or of what stands in
+/// `track::TrackTable` for every mention of `crate::model::TrackTable` or of what stands in
 /// `crate::track::{…}`.
 fn uses(code: &str) -> Vec<String> {
     let mut found = Vec::new();

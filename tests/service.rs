@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::os::unix::fs::PermissionsExt;
+use std::os::unix::fs::{PermissionsExt, chown, symlink};
 use std::os::unix::net::UnixDatagram;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
@@ -76,6 +76,11 @@ impl Manager {
             .args(["replay", CLIP, "--outline", OUTLINE, "--headless", "--out"])
             .arg(self.at("out"))
             .args(more);
+        self.spawn(&mut command)
+    }
+
+    /// Starts a program as the service manager would.
+    fn spawn(&self, command: &mut Command) -> Running {
         command
             .env("NOTIFY_SOCKET", self.at("notify"))
             .env("WATCHDOG_USEC", "4000000")
@@ -287,6 +292,14 @@ impl Helper {
     fn state(&self) -> PathBuf {
         self.dir.path().join("state/usb-A_cam-video-index0")
     }
+
+    /// What is in the camera's folder.
+    fn names(&self) -> BTreeSet<String> {
+        let entries = fs::read_dir(self.state()).expect("folder").flatten();
+        entries
+            .map(|e| e.file_name().to_string_lossy().into_owned())
+            .collect()
+    }
 }
 
 #[test]
@@ -346,23 +359,20 @@ fn the_oldest_captures_make_room_and_nothing_else_does() {
     fs::write(helper.state().join("2024-01-01T00-00-00Z.mcap"), "").expect("file");
     // Some capture that was killed before it was written has left a recording alone.
     fs::write(helper.state().join("2023-12-31T00-00-00Z.mcap"), "").expect("file");
-    let names = || -> BTreeSet<String> {
-        let entries = fs::read_dir(helper.state()).expect("folder").flatten();
-        entries
-            .map(|e| e.file_name().to_string_lossy().into_owned())
-            .collect()
-    };
     helper.run("before", &[("ARBORCAM_KEEP_FREE_MB", "1")]);
     assert_eq!(
-        names().len(),
+        helper.names().len(),
         7,
         "there is room, and only the half-written one goes: {:?}",
-        names()
+        helper.names()
     );
     helper.run("before", &[("ARBORCAM_KEEP_FREE_MB", "0")]);
-    assert_eq!(names().len(), 7, "told to remove nothing");
+    assert_eq!(helper.names().len(), 7, "told to remove nothing");
     let output = helper.run("before", &[("ARBORCAM_KEEP_FREE_MB", "999999999999")]);
-    assert_eq!(names(), kept.iter().map(|k| (*k).to_owned()).collect());
+    assert_eq!(
+        helper.names(),
+        kept.iter().map(|k| (*k).to_owned()).collect()
+    );
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     let at = |what: &str| {
         said.find(what)
@@ -373,6 +383,121 @@ fn the_oldest_captures_make_room_and_nothing_else_does() {
         "oldest first: {said}"
     );
     assert!(said.contains("no older capture is left"), "{said}");
+}
+
+/// What the service made is removed by its exact name; whatever else begins like it is the user's.
+#[test]
+fn only_names_that_the_service_gave_are_removed() {
+    let helper = Helper::new();
+    let elsewhere = helper.dir.path().join("elsewhere");
+    let own_folders = [
+        "2024-01-01T00-00-00Z",
+        ".2024-01-03T00-00-00Z.partial-17",
+        ".2024-01-03T00-00-00Z.partial-17-2",
+    ];
+    let own_files = [
+        "2024-01-01T00-00-00Z.mcap",
+        "2024-01-01T00-00-00Z-1.mcap",
+        "2024-01-01T00-00-00Z-12.mcap",
+    ];
+    let kept_folders = [
+        "2024-01-01T00-00-00Z keep",
+        "2024-01-01T00-00-00Z-1",
+        "storm 2024-01-01T00-00-00Z",
+        // A recording is a file.
+        "2024-01-04T00-00-00Z.mcap",
+        ".notes.partial-1",
+        ".2024-01-01T00-00-00Z.partial-mine",
+        ".2024-01-01T00-00-00Z.partial-17-mine",
+    ];
+    let kept_files = [
+        "2024-01-01T00-00-00Z keep.mcap",
+        "2024-01-01T00-00-00Z-storm.mcap",
+        "2024-01-01T00-00-00Z-1-storm.mcap",
+        "2024-01-01T00-00-00Z-01.mcap",
+        "2024-01-01T00-00-00Z-.mcap",
+        "2024-01-01T00-00-00Z_1.mcap",
+        "2024-01-01T00-00-00Z.mcap.mcap",
+        "2024-01-01T00-00-00Z.mcap\n2024-01-01T00-00-00Z.mcap",
+        // No time of the day.
+        "2024-01-01T99-00-00Z.mcap",
+        // A capture is a folder.
+        "2024-01-05T00-00-00Z",
+        ".2024-01-05T00-00-00Z.partial-17",
+    ];
+    let kept_links = [
+        "2024-01-06T00-00-00Z",
+        "2024-01-06T00-00-00Z.mcap",
+        ".2024-01-06T00-00-00Z.partial-17",
+    ];
+    for name in own_folders.iter().chain(&kept_folders) {
+        fs::create_dir_all(helper.state().join(name)).expect("folder");
+    }
+    for name in own_files.iter().chain(&kept_files) {
+        fs::write(helper.state().join(name), "film").expect("file");
+    }
+    fs::create_dir(&elsewhere).expect("folder");
+    fs::write(elsewhere.join("film"), "film").expect("file");
+    for name in kept_links {
+        symlink(&elsewhere, helper.state().join(name)).expect("link");
+    }
+    let mut kept: BTreeSet<String> = [&kept_folders[..], &kept_files, &kept_links]
+        .concat()
+        .into_iter()
+        .map(str::to_owned)
+        .collect();
+    // Only root can give a file to somebody else.
+    let foreign = "2024-01-07T00-00-00Z.mcap";
+    fs::write(helper.state().join(foreign), "film").expect("file");
+    if chown(helper.state().join(foreign), Some(65_534), None).is_ok() {
+        kept.insert(foreign.to_owned());
+    }
+    helper.run("before", &[("ARBORCAM_KEEP_FREE_MB", "999999999999")]);
+    assert_eq!(helper.names(), kept);
+    assert!(elsewhere.join("film").is_file(), "a link was followed");
+}
+
+/// The helper knows the names of the program: what a killed run leaves is found again.
+#[test]
+fn what_a_killed_program_leaves_is_removed() {
+    let manager = Manager::new();
+    let helper = Helper::new();
+    let start = helper.state().join("2024-01-01T00-00-00Z");
+    let recording = helper.state().join("2024-01-01T00-00-00Z.mcap");
+    fs::create_dir(helper.state()).expect("folder");
+    let arguments = [
+        "replay",
+        CLIP,
+        "--outline",
+        OUTLINE,
+        "--headless",
+        "--max-time",
+        "1s",
+    ];
+    let running = manager.spawn(
+        Command::new(env!("CARGO_BIN_EXE_arborcam"))
+            .args(arguments)
+            .arg("--out")
+            .arg(&start)
+            .arg("--record")
+            .arg(&recording),
+    );
+    manager.hear(Some("READY=1"), PATIENCE);
+    // The hidden folder is made with the first tree.
+    let until = Instant::now() + PATIENCE;
+    while !helper.names().iter().any(|name| name.starts_with('.')) {
+        assert!(Instant::now() < until, "{}", manager.stderr());
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    running.signal("-KILL");
+    running.end();
+    let left = helper.names();
+    assert!(left.contains("2024-01-01T00-00-00Z-1.mcap"), "{left:?}");
+    helper.run("before", &[("ARBORCAM_KEEP_FREE_MB", "0")]);
+    let left = helper.names();
+    assert!(left.iter().all(|name| name.ends_with(".mcap")), "{left:?}");
+    helper.run("before", &[("ARBORCAM_KEEP_FREE_MB", "999999999999")]);
+    assert_eq!(helper.names(), BTreeSet::new());
 }
 
 /// The pause grows as long as starts fail, and a long run or a good end makes an end of it.

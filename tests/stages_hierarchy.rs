@@ -2,8 +2,8 @@
 
 use arborcam::config::{Accumulate, Affinity, Hierarchy};
 use arborcam::hierarchy;
+use arborcam::model::TrackTable;
 use arborcam::model::{Cluster, MotionHierarchy, TrackId};
-use arborcam::track::TrackTable;
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 

@@ -2,11 +2,11 @@
 
 use arborcam::config;
 use arborcam::hierarchy;
+use arborcam::model::TrackTable;
 use arborcam::model::{Cluster, ClusterId, MotionHierarchy, Outline, Size, Skeleton, TrackId};
 use arborcam::motion::{PoseEstimator, Problem, deterministic_direction};
 use arborcam::shape::{self, Envelope, Terms};
 use arborcam::skeleton::{self, Node2d};
-use arborcam::track::TrackTable;
 use nalgebra::{Point3, Rotation3, Unit, UnitQuaternion, Vector3};
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;

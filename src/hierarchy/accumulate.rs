@@ -2,8 +2,8 @@
 
 use super::signals::Signals;
 use crate::config::Accumulate;
+use crate::model::TrackTable;
 use crate::signal::along_principal_direction;
-use crate::track::TrackTable;
 
 /// Rate at which tracks are compared, Hz: velocities over longer steps stand out better from
 /// tracking noise.

@@ -134,7 +134,7 @@ impl Votes {
 mod tests {
     use super::*;
     use crate::model::TrackId;
-    use crate::track::TrackTable;
+    use crate::model::TrackTable;
 
     /// Two pairs of points that swing at different rates, seen at `times_s`, and how sure it is
     /// that they are two.

@@ -31,8 +31,8 @@ pub use support::{Gain, OnBoth, gain};
 pub use table::table;
 
 use crate::config::{Affinity, Hierarchy};
+use crate::model::TrackTable;
 use crate::model::{Cluster, ClusterId, MotionHierarchy};
-use crate::track::TrackTable;
 use agreement::in_agreement;
 use arrange::arranged;
 use binary::Binary;

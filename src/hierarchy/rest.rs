@@ -1,7 +1,7 @@
 //! Where points rest, and who is near whom.
 
+use crate::model::TrackTable;
 use crate::signal::median;
-use crate::track::TrackTable;
 
 /// Median position of a track: where the tree rests, whatever pose it was first seen in.
 pub fn rest_position_px(table: &TrackTable, row: usize) -> [f64; 2] {

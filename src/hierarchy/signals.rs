@@ -1,7 +1,7 @@
 //! What is compared between points: their motion on common steps in time.
 
 use super::rest::rest_position_px;
-use crate::track::TrackTable;
+use crate::model::TrackTable;
 use nalgebra::DMatrix;
 
 /// Steps on either side over which a displacement is averaged: tracking noise is not to decide who

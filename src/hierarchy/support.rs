@@ -1,7 +1,7 @@
 //! Which of two trees is better borne out by the motion of their points.
 
 use super::signals::Signals;
-use crate::track::TrackTable;
+use crate::model::TrackTable;
 
 /// Points that are compared in threes; more say the same at a higher price (64 make 41,664
 /// triplets).

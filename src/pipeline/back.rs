@@ -1,6 +1,5 @@
 //! The back end: tracks to tree and poses.
 
-use super::Followed;
 use super::pose_tracker::{PoseTracker, Targets};
 use super::refiner::{Refiner, SolveJob, Taken};
 use crate::cancel::CancelToken;
@@ -16,6 +15,15 @@ use std::time::Instant;
 const JUDGE_EVERY_S: f64 = 0.5;
 /// At the end of the frames no tree is built from less evidence than this (accumulation measure).
 pub const LEAST_MEASURE: f64 = 0.1;
+
+/// A frame that has been through the front end.
+#[derive(Clone, Debug)]
+pub struct Followed {
+    pub tracks: TrackSet,
+    pub outline: Arc<Outline>,
+    pub preview: Option<Arc<Rgb>>,
+    pub received: Instant,
+}
 
 /// A frame that has been through the back end.
 #[derive(Clone, Debug)]

@@ -2,11 +2,10 @@
 
 use super::bark;
 use super::leaves::InLeaf;
-use crate::config::{Config, EnvelopeKind};
+use crate::config::Config;
 use crate::model::{Luma, NodeId, Outline, Pose, Rgb, Skeleton};
 use crate::motion;
-use crate::shape::{Dressed, Envelope, Template, limbs, wood_levels};
-use nalgebra::Point3;
+use crate::shape::{Bounds, Dressed, Template, limbs, room, wood_levels};
 
 /// What the film shows of the tree apart from its motion.
 #[derive(Clone, Copy, Debug, Default)]
@@ -62,46 +61,4 @@ pub fn dress(skeleton: &Skeleton, seen: Seen, config: &Config) -> Dressed {
         foliage,
         bark_rgb: bark.unwrap_or(bark::PLAIN),
     }
-}
-
-/// What an outline says about the space that the tree stands in.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Bounds {
-    /// It is a drawn shape that the tree was cut to.
-    Drawn,
-    Filmed(EnvelopeKind),
-}
-
-/// Where twigs may grow (from and to, model axes, px): within the envelope that the branches were
-/// pushed to fill or were cut to, and not out of the outline itself as seen from the front;
-/// everywhere where there is no outline.
-pub(crate) fn room<'a>(
-    skeleton: &Skeleton,
-    outline: Option<&'a Outline>,
-    bounds: Bounds,
-) -> impl Fn(&Point3<f64>, &Point3<f64>) -> bool + use<'a> {
-    let foot_px = skeleton.foot_px;
-    let envelope = outline.map(|outline| match bounds {
-        Bounds::Drawn => Envelope::of_drawn(outline, foot_px),
-        Bounds::Filmed(kind) => Envelope::of_filmed(kind, outline, foot_px, &places(skeleton)),
-    });
-    move |from: &Point3<f64>, to: &Point3<f64>| match (&envelope, outline) {
-        (Some(envelope), Some(outline)) => {
-            let middle = nalgebra::center(from, to);
-            let seen = |p: &Point3<f64>| outline.contains(foot_px[0] + p.x, foot_px[1] - p.y);
-            // A branch that is outside itself, as a copy may be, is no barer for it.
-            envelope.contains(to)
-                && envelope.contains(&middle)
-                && (!seen(from) || (seen(to) && seen(&middle)))
-        }
-        _ => true,
-    }
-}
-
-/// Where the measured nodes are, model axes, px.
-pub(super) fn places(skeleton: &Skeleton) -> Vec<Point3<f64>> {
-    skeleton.nodes[..skeleton.measured()]
-        .iter()
-        .map(|n| n.position)
-        .collect()
 }

@@ -1,27 +1,18 @@
 //! The front end: frame to tracks.
 
+use super::Followed;
 use crate::config::Config;
-use crate::model::{Frame, Luma, Outline, Rgb, TrackSet};
+use crate::model::{Frame, Luma, Outline};
 use crate::outline::{AutoOutline, Found};
 use crate::track::Tracker;
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::time::Instant;
 
 /// Frames kept while the outline is not known yet take at most so many bytes; beyond that the
 /// oldest is let go.
 const HELD_BYTES: usize = 80 << 20;
 /// Frames worked off in one step while held ones remain: catches up without a long pause.
 const FRAMES_PER_STEP: usize = 3;
-
-/// A frame that has been through the front end.
-#[derive(Clone, Debug)]
-pub struct Followed {
-    pub tracks: TrackSet,
-    pub outline: Arc<Outline>,
-    pub preview: Option<Arc<Rgb>>,
-    pub received: Instant,
-}
 
 /// Frame to tracks: outline, detection, tracking.
 pub struct FrontEnd {

@@ -2,15 +2,11 @@
 //! stand.
 
 use super::Seen;
+#[cfg(feature = "opencv")]
+use super::seeds::seeds;
 use crate::config::{self, LeafShow};
 use crate::model::{Luma, Outline, Rgb, Skeleton};
 use crate::shape::{self, Foliage, LeafView, Limb, Template};
-use crate::track::Detector;
-
-/// Corners may lie nearer together than points that are followed, px at 640 px picture width, and
-/// be weaker: each is a leaf.
-const SEED_DISTANCE_PX: f64 = 3.0;
-const SEED_QUALITY: f64 = 1e-4;
 
 /// What is to be known of the leaves before they grow.
 pub(super) struct InLeaf {
@@ -138,24 +134,9 @@ fn in_leaf(skeleton: &Skeleton, picture: Option<&Rgb>, outline: Option<&Outline>
     season.is_some_and(|s| s.in_leaf >= 0.5)
 }
 
-/// Harris corners of a whole frame inside the outline, px, strongest first.
-pub fn seeds(picture: &Rgb, outline: &Outline, count: u32) -> Vec<[f32; 2]> {
-    if picture.pixels.len() != 3 * picture.size.area() || outline.mask.len() != outline.size.area()
-    {
-        return Vec::new();
-    }
-    let detect = config::Detect {
-        points: count,
-        min_distance_px: SEED_DISTANCE_PX,
-        quality: SEED_QUALITY,
-        border_px: 0.0,
-    };
-    let grey = |c: &[u8]| {
-        ((299 * u32::from(c[0]) + 587 * u32::from(c[1]) + 114 * u32::from(c[2]) + 500) / 1000) as u8
-    };
-    let luma = Luma {
-        size: picture.size,
-        pixels: picture.pixels.chunks_exact(3).map(grey).collect(),
-    };
-    Detector::new(&detect, outline).detect(&luma, &[], count as usize)
+/// Corners are found by OpenCV. Without it there are none, and leaves stand where the picture has
+/// their colour.
+#[cfg(not(feature = "opencv"))]
+fn seeds(_picture: &Rgb, _outline: &Outline, _count: u32) -> Vec<[f32; 2]> {
+    Vec::new()
 }

@@ -1,6 +1,5 @@
 //! Another shape in space for a tree that has been measured.
 
-use super::dress;
 use crate::config::Config;
 use crate::model::{ClusterId, NodeName, Outline, Skeleton};
 use crate::shape::{Drawn, Topiary, TopiaryError};
@@ -67,10 +66,10 @@ pub fn cut_to(
             .nodes
             .get(1)
             .map_or(shape::TIP_RADIUS_PX, |top| top.radius);
-        let room = dress::room(
+        let room = shape::room(
             &topiary.skeleton,
             Some(&topiary.shape),
-            dress::Bounds::Drawn,
+            shape::Bounds::Drawn,
         );
         shape::thicken(
             &mut topiary.skeleton,

@@ -1,6 +1,7 @@
 //! From the flat skeleton to a tree in space (Li et al. section 3).
 
 mod angles;
+mod bounds;
 mod chain;
 mod chance;
 mod curl;
@@ -30,6 +31,7 @@ mod tube;
 mod twigs;
 
 pub use angles::{Angles, expected_branching_angle};
+pub use bounds::{Bounds, room};
 pub use chance::Chance;
 pub use curl::CURL_BOUND;
 pub use cylinders::{Cylinder, cylinders};

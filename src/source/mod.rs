@@ -15,6 +15,7 @@ mod loopback;
 mod opened;
 mod probe;
 mod recording;
+#[cfg(feature = "nokhwa")]
 mod through_nokhwa;
 mod v4l2;
 mod video;
@@ -137,10 +138,7 @@ pub fn open(
         .map_err(|e| SourceError::of_file(input, &e))?
         .file_type();
     if kind.is_char_device() {
-        Ok(match config.backend {
-            config::Backend::V4l2 => Box::new(v4l2::Camera::open(input, config)?),
-            config::Backend::Nokhwa => Box::new(through_nokhwa::NokhwaCamera::open(input, config)?),
-        })
+        open_camera(input, config)
     } else if kind.is_dir() {
         Ok(Box::new(images::Images::open(input, fps.unwrap_or(30.0))?))
     } else if !kind.is_file() {
@@ -153,5 +151,41 @@ pub fn open(
         Ok(Box::new(recording::Recording::open(input)?))
     } else {
         Ok(Box::new(video::Video::open(input)?))
+    }
+}
+
+fn open_camera(path: &Path, config: &config::Camera) -> Result<Box<dyn Source>, SourceError> {
+    match config.backend {
+        config::Backend::V4l2 => Ok(Box::new(v4l2::Camera::open(path, config)?)),
+        #[cfg(feature = "nokhwa")]
+        config::Backend::Nokhwa => Ok(Box::new(through_nokhwa::NokhwaCamera::open(path, config)?)),
+        #[cfg(not(feature = "nokhwa"))]
+        config::Backend::Nokhwa => Err(SourceError::BadFormat {
+            input: path.display().to_string(),
+            what: "the backend \"nokhwa\" was left out of this build; use --backend v4l2, \
+                   or build with the cargo feature nokhwa"
+                .to_owned(),
+        }),
+    }
+}
+
+#[cfg(all(test, not(feature = "nokhwa")))]
+mod tests {
+    use super::*;
+    use crate::config::{Backend, Config};
+
+    #[test]
+    fn a_backend_that_was_left_out_is_named() {
+        let camera = config::Camera {
+            backend: Backend::Nokhwa,
+            ..Config::default().camera
+        };
+        // Any character device; it is not even opened.
+        let refused = open(Path::new("/dev/null"), &camera, None).err();
+        let said = refused.map(|e| e.to_string()).unwrap_or_default();
+        assert!(
+            said.contains("\"nokhwa\" was left out of this build"),
+            "{said}"
+        );
     }
 }

@@ -13,7 +13,6 @@ mod regain;
 mod register;
 mod trial;
 
-pub use crate::model::TrackTable;
 pub use detect::Detector;
 pub use flow::{Flow, OpticalFlow, Pyramid};
 
