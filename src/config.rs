@@ -5,14 +5,14 @@
 //! documentation and help texts are derived from that.
 
 mod declare;
-mod document;
 mod load;
+mod reference;
 mod reload;
 mod setting;
 mod settings;
 
-pub use document::{default_file, help, tables};
 pub use load::ConfigError;
+pub use reference::{default_file, help, tables};
 pub use reload::{Change, effect};
 pub use setting::{Choice, Effect, Range, Section, Setting};
 pub use settings::{
