@@ -6,7 +6,7 @@ mod options;
 pub use options::AnimateArgs;
 
 use super::export::page;
-use super::hangup::Hangup;
+use super::hangup::SighupAction;
 use super::render::{self, RenderArgs, drawn, failed};
 use super::session::stop_on_signals;
 use super::shaping::Made;
@@ -85,7 +85,7 @@ fn live(args: &AnimateArgs) -> Result<(), Ended> {
             Box::new(InWind::new(&made, animator))
         }
     };
-    let stop = stop_on_signals(Hangup::of_this_process() != Hangup::Ignored)?;
+    let stop = stop_on_signals(SighupAction::ends_this_process())?;
     tui::watch(&mut *moving, tui::Options::from_env(), &stop)
         .map_err(|e| Ended::BadUsage(e.into()))?;
     if stop.load(Ordering::SeqCst) {

@@ -1,24 +1,20 @@
-//! What can be asked of a camera on the command line, whatever is done with its frames.
+//! The options on the camera, of every command that films.
 
 use crate::config::{self, Backend};
 use clap::Args;
 
 #[derive(Debug, Args)]
 pub struct CameraArgs {
-    /// Take what the camera gives where it is not what was asked for.
-    #[arg(long)]
+    #[arg(long, help = config::help("camera.accept_format"))]
     accept_format: bool,
-    /// A camera that is silent for so many seconds counts as hung.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", help = config::help("camera.timeout_s"))]
     device_timeout: Option<f64>,
-    /// A lost camera that is there again but does not start is tried again after so many seconds.
-    #[arg(long, value_name = "S", conflicts_with = "once")]
+    #[arg(long, value_name = "S", conflicts_with = "once", help = config::help("camera.retry_delay_s"))]
     retry_delay: Option<f64>,
     /// End when the camera is lost, instead of waiting for it.
     #[arg(long)]
     once: bool,
-    /// What the camera is read through; see docs/camera.md.
-    #[arg(long, value_name = "v4l2|nokhwa", value_parser = backend)]
+    #[arg(long, value_name = "v4l2|nokhwa", value_parser = backend, help = config::help("camera.backend"))]
     backend: Option<Backend>,
 }
 
@@ -31,7 +27,7 @@ fn backend(name: &str) -> Result<Backend, String> {
 }
 
 impl CameraArgs {
-    /// The command line goes before the file.
+    /// The command line overrides the file.
     pub fn set(&self, camera: &mut config::Camera) {
         camera.accept_format |= self.accept_format;
         camera.reconnect &= !self.once;

@@ -4,7 +4,6 @@ use super::camera::CameraArgs;
 use super::recording::RecordOption;
 use super::session::{self, Plan};
 use super::{Common, Ended};
-use crate::config::Config;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -22,14 +21,13 @@ pub struct CaptureArgs {
 }
 
 pub fn run(args: &CaptureArgs) -> Result<(), Ended> {
-    let set = |config: &mut Config| args.camera.set(&mut config.camera);
     session::run(
         &args.common,
         Plan {
             input: &args.device,
             fps: None,
             pace: None,
-            set: &set,
+            camera: Some(&args.camera),
             record: &args.record,
         },
     )

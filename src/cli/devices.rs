@@ -1,10 +1,9 @@
 //! `arborcam devices`: the cameras that are plugged in.
 
-use super::Ended;
+use super::{Ended, print};
 use crate::config::Config;
 use crate::source::{self, Device, Mode, Places};
 use clap::Args;
-use std::io::Write;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -18,10 +17,7 @@ pub struct DevicesArgs {
 }
 
 pub fn run(args: &DevicesArgs) -> Result<(), Ended> {
-    let config = match &args.config {
-        Some(path) => Config::load(path).map_err(|e| Ended::BadUsage(e.into()))?,
-        None => Config::default(),
-    };
+    let config = Config::default().layered(args.config.as_deref(), |_| {})?;
     let devices = source::list_for(&config.camera, &Places::default());
     let text = if args.json {
         format!(
@@ -31,30 +27,25 @@ pub fn run(args: &DevicesArgs) -> Result<(), Ended> {
     } else {
         devices.iter().map(shown).collect()
     };
-    let written = std::io::stdout().lock().write_all(text.as_bytes());
+    let printed = print(&text);
     if devices.is_empty() {
         return Err(Ended::NoInput(anyhow::anyhow!(
             "no camera found; plug one in, and look whether /dev/video0 appears"
         )));
     }
-    // Whoever closed standard output early has seen what they wanted.
-    written
-        .or_else(|e| {
-            if e.kind() == std::io::ErrorKind::BrokenPipe {
-                Ok(())
-            } else {
-                Err(e)
-            }
-        })
-        .map_err(|e| Ended::Failed(e.into()))
+    printed
+}
+
+fn mode_json(m: &Mode) -> serde_json::Value {
+    serde_json::json!({
+        "format": m.format.fourcc(),
+        "width": m.size.width,
+        "height": m.size.height,
+        "rates_hz": m.rates_hz,
+    })
 }
 
 fn json(d: &Device) -> serde_json::Value {
-    let mode = |m: &Mode| {
-        serde_json::json!({
-            "format": m.format.fourcc(), "width": m.size.width, "height": m.size.height, "rates_hz": m.rates_hz,
-        })
-    };
     let identity = d.identity.as_ref();
     serde_json::json!({
         "path": d.path,
@@ -66,7 +57,7 @@ fn json(d: &Device) -> serde_json::Value {
         "serial": identity.and_then(|i| i.serial.as_ref()),
         "link": d.link,
         "films": d.films,
-        "modes": d.modes.iter().map(mode).collect::<Vec<_>>(),
+        "modes": d.modes.iter().map(mode_json).collect::<Vec<_>>(),
         "chosen": d.chosen.as_ref().map(|(mode, why)| serde_json::json!({ "mode": mode, "why": why })),
         "closed": d.closed,
     })
@@ -80,30 +71,31 @@ fn shown(d: &Device) -> String {
         d.name,
         d.description
     );
-    let mut line = |name: &str, what: &str| text.push_str(&format!("    {name:<9} {what}\n"));
     if let Some(identity) = &d.identity {
         let serial = identity
             .serial
             .as_ref()
             .map_or(String::new(), |s| format!(", serial number {s}"));
-        line(
-            "identity",
-            &format!("{} ({}{serial})", identity.id, identity.port),
-        );
+        let known = format!("{} ({}{serial})", identity.id, identity.port);
+        text += &detail("identity", &known);
     }
     if let Some(link) = &d.link {
-        line("link", &link.display().to_string());
+        text += &detail("link", &link.display().to_string());
     }
     for row in rows(&d.modes) {
-        line("offers", &row);
+        text += &detail("offers", &row);
     }
     if let Some((mode, why)) = &d.chosen {
-        line("would be", &format!("{mode}: {why}"));
+        text += &detail("would be", &format!("{mode}: {why}"));
     }
     if let Some(closed) = &d.closed {
-        line("closed", closed);
+        text += &detail("closed", closed);
     }
     text
+}
+
+fn detail(name: &str, what: &str) -> String {
+    format!("    {name:<9} {what}\n")
 }
 
 /// `MJPG 1280x720 @ 60 30, 640x480 @ 30`: one row a format.
@@ -135,13 +127,16 @@ mod tests {
     use super::*;
     use crate::model::{PixelFormat, Size};
 
-    #[test]
-    fn a_camera_is_shown_with_all_that_is_needed_to_name_and_to_choose_it() {
-        let mode = |format, width, height, rates_hz: &[f64]| Mode {
+    fn mode(format: PixelFormat, width: u32, height: u32, rates_hz: &[f64]) -> Mode {
+        Mode {
             format,
             size: Size::new(width, height),
             rates_hz: rates_hz.to_vec(),
-        };
+        }
+    }
+
+    #[test]
+    fn a_camera_is_shown_with_all_that_is_needed_to_name_and_to_choose_it() {
         let modes = vec![
             mode(PixelFormat::Mjpeg, 1280, 720, &[30.0, 29.97]),
             mode(PixelFormat::Yuyv, 640, 480, &[]),

@@ -1,11 +1,10 @@
 //! `arborcam doctor`: what is wrong with this machine, and what to do about it.
 
-use super::Ended;
+use super::{Ended, print};
 use crate::config::Config;
 use crate::doctor::{self, Asked, Screen, Verdict};
 use crate::tui::{self, Depth};
 use clap::Args;
-use std::io::Write;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -24,10 +23,9 @@ pub struct DoctorArgs {
 }
 
 pub fn run(args: &DoctorArgs) -> Result<(), Ended> {
-    let config = match &args.config {
-        Some(path) => Config::load(path).map_err(|e| e.to_string()),
-        None => Ok(Config::default()),
-    };
+    let config = Config::default()
+        .layered(args.config.as_deref(), |_| {})
+        .map_err(|e| e.to_string());
     let wanted = args.out.clone().unwrap_or_else(|| PathBuf::from("."));
     // A capture makes its own folder; the one above it is what counts.
     let there = std::path::absolute(&wanted)
@@ -46,17 +44,7 @@ pub fn run(args: &DoctorArgs) -> Result<(), Ended> {
     } else {
         checks.iter().map(|check| format!("{check}\n")).collect()
     };
-    std::io::stdout()
-        .lock()
-        .write_all(text.as_bytes())
-        .or_else(|e| {
-            if e.kind() == std::io::ErrorKind::BrokenPipe {
-                Ok(())
-            } else {
-                Err(e)
-            }
-        })
-        .map_err(|e| Ended::Failed(e.into()))?;
+    print(&text)?;
     match failed {
         0 => Ok(()),
         _ => Err(Ended::Failed(anyhow::anyhow!(
@@ -70,13 +58,7 @@ fn screen() -> Screen {
     let Some(found) = tui::abilities() else {
         return Screen::default();
     };
-    let set = |name: &str| std::env::var(name).ok().filter(|v| !v.is_empty());
-    // The first that is set counts, by the rules of locales.
-    let locale = ["LC_ALL", "LC_CTYPE", "LANG"]
-        .into_iter()
-        .find_map(set)
-        .unwrap_or_default()
-        .to_lowercase();
+    let locale = locale().to_lowercase();
     Screen {
         cells: Some(found.cells),
         utf8: locale.contains("utf-8") || locale.contains("utf8"),
@@ -87,4 +69,15 @@ fn screen() -> Screen {
         },
         pictures: found.pictures,
     }
+}
+
+/// The name of the locale; of the variables that hold one, the first that is set counts.
+fn locale() -> String {
+    for name in ["LC_ALL", "LC_CTYPE", "LANG"] {
+        match std::env::var(name) {
+            Ok(locale) if !locale.is_empty() => return locale,
+            _ => {}
+        }
+    }
+    String::new()
 }

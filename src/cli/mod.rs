@@ -21,12 +21,14 @@ mod session;
 mod shape;
 mod shaping;
 mod stop;
+mod supervisor;
 
 use crate::config::{Config, ConfigError};
 use crate::outline::OutlineSpec;
 use crate::runtime::Failure;
+use camera::CameraArgs;
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -107,18 +109,16 @@ enum Stream {
 }
 
 impl Common {
-    /// The file over the defaults, and over both what the command line says; `set` is for the
-    /// command's own arguments.
-    fn config(&self, set: &dyn Fn(&mut Config)) -> Result<Config, ConfigError> {
-        let mut config = match &self.config {
-            Some(path) => Config::load(path)?,
-            None => Config::default(),
-        };
-        self.scale.set(&mut config);
-        self.shape.set(&mut config);
-        set(&mut config);
-        config.check()?;
-        Ok(config)
+    /// The file over the defaults, and over both what the command line says; `camera` are the
+    /// arguments of a command that films.
+    fn config(&self, camera: Option<&CameraArgs>) -> Result<Config, ConfigError> {
+        Config::default().layered(self.config.as_deref(), |config| {
+            self.scale.set(config);
+            self.shape.set(config);
+            if let Some(camera) = camera {
+                camera.set(&mut config.camera);
+            }
+        })
     }
 }
 
@@ -136,6 +136,12 @@ enum Ended {
     BadUsage(anyhow::Error),
     NoInput(anyhow::Error),
     Stopped,
+}
+
+impl From<ConfigError> for Ended {
+    fn from(e: ConfigError) -> Self {
+        Ended::BadUsage(e.into())
+    }
 }
 
 impl From<Failure> for Ended {
@@ -204,7 +210,38 @@ fn one_line(error: &anyhow::Error) -> String {
     line.replace('\n', " ")
 }
 
+/// Writes `text` to standard output. A reader that closed it early has seen what it needed.
+fn print(text: &str) -> Result<(), Ended> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Ended::Failed(e.into())),
+        _ => Ok(()),
+    }
+}
+
 /// A line on standard error; if nobody reads it any more, that is no reason to fail.
 fn say(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    /// Help texts that come from the settings are empty if the key is misspelt.
+    #[test]
+    fn every_option_has_a_help_text() {
+        let cli = Cli::command();
+        for command in cli.get_subcommands() {
+            for option in command.get_arguments() {
+                let text = option.get_help().map(ToString::to_string);
+                assert!(
+                    text.is_some_and(|text| !text.is_empty()),
+                    "{} {}",
+                    command.get_name(),
+                    option.get_id()
+                );
+            }
+        }
+    }
 }

@@ -1,6 +1,6 @@
 //! `arborcam play INPUT --to /dev/videoN`: a recording becomes a camera.
 
-use super::hangup::Hangup;
+use super::hangup::SighupAction;
 use super::session::{init_log, no_input, stop_on_signals};
 use super::{Ended, say};
 use crate::config;
@@ -31,8 +31,7 @@ pub fn run(args: &PlayArgs) -> Result<(), Ended> {
             args.fps
         )));
     }
-    // There are no settings to read again: whoever hangs up on it wants it to end.
-    let stop = stop_on_signals(Hangup::of_this_process() != Hangup::Ignored)?;
+    let stop = stop_on_signals(SighupAction::ends_this_process())?;
     init_log(true);
     let mut output = None;
     let mut frames = 0;
@@ -41,8 +40,12 @@ pub fn run(args: &PlayArgs) -> Result<(), Ended> {
         let mut source = source::open(&args.input, &camera, Some(args.fps)).map_err(no_input)?;
         source.stop_when(stop.clone());
         let rate_hz = source.describe().nominal_rate_hz;
-        let open = |first: &crate::model::RawFrame| Loopback::open(&args.to, first, rate_hz);
-        let played = runtime::play(source.as_mut(), &mut output, open, &stop);
+        let played = runtime::play(
+            source.as_mut(),
+            &mut output,
+            |first| Loopback::open(&args.to, first, rate_hz),
+            &stop,
+        );
         for warning in source.warnings() {
             say(&format!("arborcam: warning: {warning}"));
         }

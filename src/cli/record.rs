@@ -1,16 +1,16 @@
 //! `arborcam record DEVICE FILE.mcap`: frames into a file, and nothing else.
 
 use super::camera::CameraArgs;
-use super::hangup::Hangup;
+use super::hangup::SighupAction;
 use super::recording::{self, LimitArgs, parse_time_ns};
-use super::session::{init_log, no_input, stop_on_signals};
+use super::session::{init_log, no_input, stop_on_signals, warn_of_other_format};
 use super::{Ended, say};
 use crate::config::Config;
-use crate::runtime::{self, Failure, Pace, RecordJob};
+use crate::runtime::{self, Failure, Pace, RecordJob, RunningRecord};
 use crate::source;
 use clap::Args;
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// Time between two looks at what is going on.
@@ -37,24 +37,15 @@ pub struct RecordArgs {
 }
 
 pub fn run(args: &RecordArgs) -> Result<(), Ended> {
-    let mut config = match &args.config {
-        Some(path) => Config::load(path).map_err(|e| Ended::BadUsage(e.into()))?,
-        None => Config::default(),
-    };
-    args.camera.set(&mut config.camera);
-    config.check().map_err(|e| Ended::BadUsage(e.into()))?;
+    let config = Config::default().layered(args.config.as_deref(), |config| {
+        args.camera.set(&mut config.camera);
+    })?;
     recording::refuse_unfit(&args.file)?;
     let source = source::open(&args.device, &config.camera, None).map_err(no_input)?;
     let info = source.describe();
-    // There are no settings to read again: whoever hangs up on it wants it to end.
-    let stop = stop_on_signals(Hangup::of_this_process() != Hangup::Ignored)?;
+    let stop = stop_on_signals(SighupAction::ends_this_process())?;
     init_log(true);
-    if info.live && info.format.asked != info.format.given {
-        say(&format!(
-            "arborcam: asked for {}, the camera gives {}",
-            info.format.asked, info.format.given
-        ));
-    }
+    warn_of_other_format(&info);
     let pace = if info.live {
         Pace::Live
     } else {
@@ -66,24 +57,34 @@ pub fn run(args: &RecordArgs) -> Result<(), Ended> {
         camera: config.camera,
     };
     let running = runtime::record(source, job)?;
+    watch(&running, args.duration, &stop);
+    report(running, stop.load(Ordering::SeqCst))
+}
+
+/// Waits for the end, and asks for it when the time is over or the user or a full disk wants it.
+fn watch(running: &RunningRecord, duration_ns: Option<u64>, stop: &AtomicBool) {
+    let limit_ns = duration_ns.map_or(f64::INFINITY, |ns| ns as f64);
     while !running.finished() {
         let (_, _, time_s, _) = running.counts();
-        let over = args
-            .duration
-            .is_some_and(|limit| time_s * 1e9 >= limit as f64);
-        if over || running.broken() || stop.load(Ordering::SeqCst) {
+        if time_s * 1e9 >= limit_ns || running.broken() || stop.load(Ordering::SeqCst) {
             running.stop();
         }
-        // At once: whoever films in a field is to hear of a full disk while it can still be helped.
-        for line in running.news() {
-            say(&format!("arborcam: {line}"));
-        }
+        // At once: a full disk can still be helped while the camera films.
+        print_news(running);
         std::thread::sleep(TICK);
     }
-    let (seen, lost, time_s, missing) = running.counts();
+    print_news(running);
+}
+
+fn print_news(running: &RunningRecord) {
     for line in running.news() {
         say(&format!("arborcam: {line}"));
     }
+}
+
+/// The closing lines, and the exit status.
+fn report(running: RunningRecord, stopped: bool) -> Result<(), Ended> {
+    let (seen, lost, time_s, missing) = running.counts();
     let (recorded, failure) = running.join();
     let lost = if lost > 0 {
         format!(", {lost} lost in the camera")
@@ -91,9 +92,9 @@ pub fn run(args: &RecordArgs) -> Result<(), Ended> {
         String::new()
     };
     say(&format!("{seen} frames in {time_s:.1} s{lost}"));
-    recorded
-        .iter()
-        .for_each(|recorded| say(&recording::closing_line(recorded, missing)));
+    if let Some(recorded) = &recorded {
+        say(&recording::closing_line(recorded, missing));
+    }
     let broken = recorded.is_some_and(|r| r.stopped);
     match failure {
         Some(Failure::Source(e)) if seen == 0 => Err(no_input(e)),
@@ -101,7 +102,7 @@ pub fn run(args: &RecordArgs) -> Result<(), Ended> {
         None if broken => Err(Ended::Failed(anyhow::anyhow!(
             "the recording is not complete; see the warning above"
         ))),
-        None if stop.load(Ordering::SeqCst) => Err(Ended::Stopped),
+        None if stopped => Err(Ended::Stopped),
         None => Ok(()),
     }
 }

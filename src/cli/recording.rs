@@ -139,21 +139,22 @@ fn split(text: &str) -> Option<(f64, String)> {
     (number > 0.0 && number.is_finite()).then(|| (number, text[at..].trim().to_lowercase()))
 }
 
+fn bytes_in(unit: &str) -> Option<f64> {
+    Some(match unit {
+        "b" => 1.0,
+        "kb" | "k" => 1e3,
+        "mb" | "m" => 1e6,
+        "gb" | "g" => 1e9,
+        "tb" | "t" => 1e12,
+        "kib" => 1024.0,
+        "mib" => 1024.0 * 1024.0,
+        "gib" => 1024.0 * 1024.0 * 1024.0,
+        _ => return None,
+    })
+}
+
 fn parse_size(text: &str) -> Result<u64, String> {
-    let factor = |unit: &str| {
-        Some(match unit {
-            "b" => 1.0,
-            "kb" | "k" => 1e3,
-            "mb" | "m" => 1e6,
-            "gb" | "g" => 1e9,
-            "tb" | "t" => 1e12,
-            "kib" => 1024.0,
-            "mib" => 1024.0 * 1024.0,
-            "gib" => 1024.0 * 1024.0 * 1024.0,
-            _ => return None,
-        })
-    };
-    let bytes = split(text).and_then(|(number, unit)| Some(number * factor(&unit)?));
+    let bytes = split(text).and_then(|(number, unit)| Some(number * bytes_in(&unit)?));
     match bytes {
         Some(bytes) if bytes >= 1e6 => Ok(bytes as u64),
         Some(_) => Err("a file must be allowed at least 1MB".into()),
@@ -161,17 +162,18 @@ fn parse_size(text: &str) -> Result<u64, String> {
     }
 }
 
+fn seconds_in(unit: &str) -> Option<f64> {
+    Some(match unit {
+        "s" | "sec" => 1.0,
+        "min" | "m" => 60.0,
+        "h" => 3600.0,
+        "d" => 86_400.0,
+        _ => return None,
+    })
+}
+
 pub fn parse_time_ns(text: &str) -> Result<u64, String> {
-    let factor = |unit: &str| {
-        Some(match unit {
-            "s" | "sec" => 1.0,
-            "min" | "m" => 60.0,
-            "h" => 3600.0,
-            "d" => 86_400.0,
-            _ => return None,
-        })
-    };
-    let seconds = split(text).and_then(|(number, unit)| Some(number * factor(&unit)?));
+    let seconds = split(text).and_then(|(number, unit)| Some(number * seconds_in(&unit)?));
     match seconds {
         Some(seconds) if (1.0..1e10).contains(&seconds) => Ok((seconds * 1e9) as u64),
         Some(_) => Err("give at least 1s".into()),

@@ -43,7 +43,7 @@ pub fn run(args: &ReplayArgs) -> Result<(), Ended> {
             input: &args.input,
             fps: Some(args.fps),
             pace: Some(pace),
-            set: &|_| {},
+            camera: None,
             record: &args.record,
         },
     )

@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 
 /// Time between two looks where no watchdog asks for more.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
-/// By so much a time limit of the manager for start or end is put off with every sign of life.
-const PUT_OFF: Duration = Duration::from_secs(30);
+/// A time limit of the manager for start or end is extended by this with every sign of life.
+const EXTENSION: Duration = Duration::from_secs(30);
 
 /// The line to the service manager.
 pub struct Service {
@@ -62,22 +62,29 @@ impl Service {
         }
     }
 
-    /// To be called again and again; looks after the capture when it is time to.
+    /// To be called again and again; looks at the capture when it is time to.
     pub fn tick(&mut self, running: &Running, snapshot: Option<&Snapshot>) {
         if let Some(snapshot) = snapshot {
             self.status = status(snapshot);
         }
         let marks = running.marks();
-        let first = !self.ready && marks.flowed();
-        let last = !self.stopping && marks.ends();
-        if Instant::now() < self.next && !first && !last {
+        let begins = !self.ready && marks.flowed();
+        let ends = !self.stopping && marks.ends();
+        if Instant::now() < self.next && !begins && !ends {
             return;
         }
         self.next = Instant::now() + self.every;
-        let put_off = NotifyState::ExtendTimeoutUsec(PUT_OFF.as_micros() as u32);
-        match self.vigil.look(marks) {
-            Sign::Flows if marks.flowed() => {
-                if first {
+        let flowed = marks.flowed();
+        let sign = self.vigil.look(marks);
+        self.notify(sign, flowed);
+    }
+
+    /// Sends what the manager is to know of this `sign`; `flowed`: there has been a whole frame.
+    fn notify(&mut self, sign: Sign, flowed: bool) {
+        let extend = NotifyState::ExtendTimeoutUsec(EXTENSION.as_micros() as u32);
+        match sign {
+            Sign::Flows if flowed => {
+                if !self.ready {
                     self.ready = true;
                     send(&[NotifyState::Ready]);
                 }
@@ -86,32 +93,26 @@ impl Service {
             // Every frame so far was damaged: alive, and of no use yet.
             Sign::Flows => send(&[NotifyState::Status("no whole frame yet")]),
             Sign::Waits => {
-                send(&[
-                    NotifyState::Watchdog,
-                    NotifyState::Status("waiting for the camera"),
-                ]);
+                let waiting = NotifyState::Status("waiting for the camera");
+                send(&[NotifyState::Watchdog, waiting]);
                 if !self.ready {
-                    send(&[put_off]);
+                    send(&[extend]);
                 }
             }
             Sign::Ends => {
-                if !std::mem::replace(&mut self.stopping, true) {
-                    send(&[
-                        NotifyState::Stopping,
-                        NotifyState::Status("writing the capture"),
-                    ]);
+                if !self.stopping {
+                    self.stopping = true;
+                    let writing = NotifyState::Status("writing the capture");
+                    send(&[NotifyState::Stopping, writing]);
                 }
-                send(&[put_off]);
+                send(&[extend]);
             }
-            Sign::Stalls(thread) => {
-                if !self.stalled {
-                    tracing::debug!("no sign of life: {thread} does not get on");
-                }
-                self.stalled = true;
-                return;
+            Sign::Stalls(thread) if !self.stalled => {
+                tracing::debug!("no sign of life: {thread} does not get on");
             }
+            Sign::Stalls(_) => {}
         }
-        self.stalled = false;
+        self.stalled = matches!(sign, Sign::Stalls(_));
     }
 
     /// Settings are read again: between the two messages the manager does not count us as ready.

@@ -1,6 +1,6 @@
 //! Ctrl-C in commands that work something out and write it to a file.
 
-use super::hangup::Hangup;
+use super::hangup::SighupAction;
 use super::session::stop_on_signals;
 use super::{Ended, STOPPED};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -19,7 +19,7 @@ impl Stop {
     /// The signals cannot be caught.
     pub fn on_signals() -> Result<Self, Ended> {
         let at_once = Arc::new(AtomicBool::new(true));
-        let by_hangup = Hangup::of_this_process() != Hangup::Ignored;
+        let by_hangup = SighupAction::ends_this_process();
         for signal in [SIGINT, SIGTERM]
             .into_iter()
             .chain(by_hangup.then_some(SIGHUP))

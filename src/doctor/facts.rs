@@ -106,30 +106,44 @@ fn ffmpeg() -> Option<String> {
 }
 
 fn load(config: &Config) -> Load {
-    let number = |path: &Path| {
-        std::fs::read_to_string(path)
-            .ok()?
-            .trim()
-            .parse::<f64>()
-            .ok()
-    };
-    let zones = std::fs::read_dir("/sys/class/thermal")
-        .into_iter()
-        .flatten()
-        .flatten();
-    let zones = zones.filter(|z| z.file_name().to_string_lossy().starts_with("thermal_zone"));
-    let clock = Path::new("/sys/devices/system/cpu/cpu0/cpufreq");
-    let [now, able] =
-        ["scaling_max_freq", "cpuinfo_max_freq"].map(|name| number(&clock.join(name)));
     let frames_per_s = measure::frames_per_s(config);
     Load {
         cores: std::thread::available_parallelism().map_or(1, usize::from),
         frames_per_s,
         // Read after the work, when it is warm.
-        celsius: zones
-            .filter_map(|z| number(&z.path().join("temp")))
-            .map(|m| m / 1000.0)
-            .reduce(f64::max),
-        clock_share: now.zip(able).map(|(now, able)| now / able.max(1.0)),
+        celsius: hottest_celsius(),
+        clock_share: clock_share(),
     }
+}
+
+/// The highest of the kernel's thermal zones.
+fn hottest_celsius() -> Option<f64> {
+    let mut hottest: Option<f64> = None;
+    for zone in std::fs::read_dir("/sys/class/thermal").ok()?.flatten() {
+        if !zone
+            .file_name()
+            .to_string_lossy()
+            .starts_with("thermal_zone")
+        {
+            continue;
+        }
+        if let Some(millidegrees) = number_in(&zone.path().join("temp")) {
+            let celsius = millidegrees / 1000.0;
+            hottest = Some(hottest.map_or(celsius, |other| other.max(celsius)));
+        }
+    }
+    hottest
+}
+
+/// The present limit of the first core's clock, as a share of the highest.
+fn clock_share() -> Option<f64> {
+    let clock = Path::new("/sys/devices/system/cpu/cpu0/cpufreq");
+    let limit = number_in(&clock.join("scaling_max_freq"))?;
+    let highest = number_in(&clock.join("cpuinfo_max_freq"))?;
+    Some(limit / highest.max(1.0))
+}
+
+/// The number that a file of the kernel holds.
+fn number_in(path: &Path) -> Option<f64> {
+    std::fs::read_to_string(path).ok()?.trim().parse().ok()
 }

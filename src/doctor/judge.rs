@@ -18,8 +18,11 @@ const CAPTURE_BYTES_PER_S: f64 = 1e6;
 const JPEG_BYTES_PER_PX: f64 = 0.4;
 /// A board slows itself down from about here, degrees Celsius.
 const HOT: f64 = 80.0;
-/// The least screen that anything can be drawn on, and the one that it is made for.
-const CELLS: [(u16, u16); 2] = [(60, 16), (80, 24)];
+/// The least screen that anything can be drawn on, and the one that it is made for, cells.
+const LEAST_COLUMNS: u16 = 60;
+const LEAST_ROWS: u16 = 16;
+const GOOD_COLUMNS: u16 = 80;
+const GOOD_ROWS: u16 = 24;
 
 /// One finding for each subject, in the order in which a capture needs them.
 pub fn judge(facts: &Facts) -> Vec<Check> {
@@ -248,14 +251,13 @@ fn disk(disk: &Result<Disk, String>, film: Option<&Film>, config: &Config) -> Ch
     };
     let need = need_bytes_per_s(film, config);
     let room_s = disk.free_bytes as f64 / need;
-    let mb = |bytes: f64| format!("{:.0} MB/s", bytes / 1e6);
     let found = format!(
-        "{}: {:.1} GB free, {:.0} min of film; writes {}, {} are needed",
+        "{}: {:.1} GB free, {:.0} min of film; writes {:.0} MB/s, {:.0} MB/s are needed",
         disk.folder,
         disk.free_bytes as f64 / 1e9,
         room_s / 60.0,
-        mb(disk.bytes_per_s),
-        mb(need)
+        disk.bytes_per_s / 1e6,
+        need / 1e6
     );
     let slow = "take another disk, mjpeg, a smaller picture, or film without --record";
     let small = "free some space, or choose another disk with --out";
@@ -316,8 +318,7 @@ fn terminal(screen: &Screen) -> Check {
         "{columns}x{rows}, colours: {}, pictures: {}",
         screen.colours, screen.pictures
     );
-    let smaller = |(c, r): (u16, u16)| columns < c || rows < r;
-    if smaller(CELLS[0]) {
+    if columns < LEAST_COLUMNS || rows < LEAST_ROWS {
         return Check::warn(
             "terminal",
             found,
@@ -338,7 +339,7 @@ fn terminal(screen: &Screen) -> Check {
             "unset NO_COLOR to see pictures in colour",
         );
     }
-    if smaller(CELLS[1]) {
+    if columns < GOOD_COLUMNS || rows < GOOD_ROWS {
         return Check::warn("terminal", found, "it is made for 80x24");
     }
     Check::ok("terminal", found)

@@ -56,43 +56,48 @@ pub fn frames_per_s(config: &Config) -> f64 {
     let size = Size::new(config.camera.width, config.camera.height);
     let mut front = FrontEnd::new(config, Some(whole(size)));
     let pictures = [0, 1].map(|shift| texture(size, shift));
-    let mut step = |k: u64| {
+    // The first frame is for detection, which comes once and does not have to keep up.
+    let (mut began, mut n) = (Instant::now(), 0_u64);
+    loop {
         let mut luma = front.spare().unwrap_or(Luma {
             size,
             pixels: Vec::new(),
         });
         luma.pixels.clear();
-        luma.pixels.extend_from_slice(&pictures[k as usize % 2]);
-        let time_s = k as f64 / f64::from(config.camera.rate_hz);
+        luma.pixels.extend_from_slice(&pictures[n as usize % 2]);
         drop(front.step(Frame {
-            index: k,
-            time_s,
+            index: n,
+            time_s: n as f64 / f64::from(config.camera.rate_hz),
             received: Instant::now(),
             luma,
             preview: None::<Arc<_>>,
         }));
-    };
-    // Detection comes once, and is not what has to keep up.
-    step(0);
-    let (began, mut n) = (Instant::now(), 0);
-    while began.elapsed() < SPAN {
+        if n == 0 {
+            began = Instant::now();
+        } else if began.elapsed() >= SPAN {
+            return n as f64 / began.elapsed().as_secs_f64();
+        }
         n += 1;
-        step(n);
     }
-    n as f64 / began.elapsed().as_secs_f64()
 }
 
 /// Blocks of pseudo-random brightness, full of corners, moved by `shift` px.
 fn texture(size: Size, shift: usize) -> Vec<u8> {
-    let brightness = |u: usize, v: usize| {
-        let mixed =
-            ((u / 8) as u32).wrapping_mul(0x9e37_79b1) ^ ((v / 8) as u32).wrapping_mul(0x85eb_ca6b);
-        (mixed.wrapping_mul(0xc2b2_ae35) >> 24) as u8
-    };
     let (width, height) = (size.width as usize, size.height as usize);
-    (0..height)
-        .flat_map(|v| (0..width).map(move |u| brightness(u + shift, v)))
-        .collect()
+    let mut pixels = Vec::with_capacity(width * height);
+    for v in 0..height {
+        for u in 0..width {
+            pixels.push(block_brightness(u + shift, v));
+        }
+    }
+    pixels
+}
+
+/// Brightness of the block of 8 by 8 pixels that holds pixel (u, v): a hash of its place.
+fn block_brightness(u: usize, v: usize) -> u8 {
+    let mixed =
+        ((u / 8) as u32).wrapping_mul(0x9e37_79b1) ^ ((v / 8) as u32).wrapping_mul(0x85eb_ca6b);
+    (mixed.wrapping_mul(0xc2b2_ae35) >> 24) as u8
 }
 
 /// A disk that is to be written to.

@@ -1,7 +1,8 @@
 //! The parts of the service that should be on this system, against those that this program brings.
 
+use std::collections::BTreeSet;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Places in which systemd looks, the one that goes before the others first.
 const UNIT_FOLDERS: [&str; 4] = [
@@ -40,34 +41,34 @@ pub struct Installed {
 
 /// Looks below `root`, which is `/` but for tests.
 pub fn installed(root: &Path) -> Installed {
-    let read = |path: &str| fs::read_to_string(root.join(path.trim_start_matches('/'))).ok();
-    let unit = UNIT_FOLDERS
-        .iter()
-        .find_map(|folder| read(&format!("{folder}/arborcam@.service")));
+    let unit = first_file(root, &UNIT_FOLDERS, "arborcam@.service");
+    let rule = first_file(root, &RULE_FOLDERS, "70-arborcam.rules");
     // The unit itself says where the rest is.
-    let prefix = unit
-        .as_deref()
-        .and_then(prefix)
-        .unwrap_or("/usr/local")
-        .to_owned();
-    let compare = |found: Option<String>, ours: &str| match found {
-        None => Part::Missing,
-        Some(text) if text == ours.replace("@PREFIX@", &prefix) => Part::Same,
-        Some(_) => Part::Differs,
-    };
+    let prefix = unit.as_deref().and_then(prefix).unwrap_or("/usr/local");
+    let helper_folder = format!("{prefix}/lib/arborcam");
+    let helper = first_file(root, &[&helper_folder], "arborcam-service");
     Installed {
-        helper: compare(
-            read(&format!("{prefix}/lib/arborcam/arborcam-service")),
-            HELPER,
-        ),
-        rule: compare(
-            RULE_FOLDERS
-                .iter()
-                .find_map(|folder| read(&format!("{folder}/70-arborcam.rules"))),
-            RULE,
-        ),
+        unit: compare(unit.as_deref(), UNIT, prefix),
+        helper: compare(helper.as_deref(), HELPER, prefix),
+        rule: compare(rule.as_deref(), RULE, prefix),
         enabled: enabled(&root.join("etc/systemd/system")),
-        unit: compare(unit, UNIT),
+    }
+}
+
+/// The file of this name in the first of the folders below `root` that has it.
+fn first_file(root: &Path, folders: &[&str], name: &str) -> Option<String> {
+    folders.iter().find_map(|folder| {
+        let folder = root.join(folder.trim_start_matches('/'));
+        fs::read_to_string(folder.join(name)).ok()
+    })
+}
+
+/// An installed file against ours, in which `@PREFIX@` stands for the folder of installation.
+fn compare(found: Option<&str>, ours: &str, prefix: &str) -> Part {
+    match found {
+        None => Part::Missing,
+        Some(text) if text == ours.replace("@PREFIX@", prefix) => Part::Same,
+        Some(_) => Part::Differs,
     }
 }
 
@@ -79,20 +80,26 @@ fn prefix(unit: &str) -> Option<&str> {
 }
 
 fn enabled(folder: &Path) -> Vec<String> {
-    let list = |folder: &Path| {
-        fs::read_dir(folder)
-            .into_iter()
-            .flatten()
-            .flatten()
-            .map(|e| e.path())
+    let mut names = BTreeSet::new();
+    for target in entries(folder) {
+        if target.extension().is_none_or(|e| e != "wants") {
+            continue;
+        }
+        for instance in entries(&target) {
+            let name = instance.file_name().and_then(|name| name.to_str());
+            names.extend(
+                name.filter(|n| n.starts_with("arborcam@"))
+                    .map(str::to_owned),
+            );
+        }
+    }
+    names.into_iter().collect()
+}
+
+/// What a folder holds; nothing if it cannot be read.
+fn entries(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = fs::read_dir(folder) else {
+        return Vec::new();
     };
-    let wants = list(folder).filter(|p| p.extension().is_some_and(|e| e == "wants"));
-    let names = wants.flat_map(|w| list(&w).collect::<Vec<_>>());
-    let mut names: Vec<String> = names
-        .filter_map(|p| p.file_name()?.to_str().map(str::to_owned))
-        .collect();
-    names.retain(|name| name.starts_with("arborcam@"));
-    names.sort();
-    names.dedup();
-    names
+    entries.flatten().map(|entry| entry.path()).collect()
 }
