@@ -7,7 +7,6 @@ use super::session::{init_log, no_input, stop_on_signals};
 use super::{Ended, say};
 use crate::config::Config;
 use crate::runtime::{self, Failure, Pace, RecordJob};
-use crate::source;
 use clap::Args;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -44,7 +43,7 @@ pub fn run(args: &RecordArgs) -> Result<(), Ended> {
     args.camera.set(&mut config.camera);
     config.check().map_err(|e| Ended::BadUsage(e.into()))?;
     recording::refuse_unfit(&args.file)?;
-    let source = source::open(&args.device, &config.camera, None).map_err(no_input)?;
+    let source = runtime::open(&args.device, &config.camera, None).map_err(no_input)?;
     let info = source.describe();
     // There are no settings to read again: whoever hangs up on it wants it to end.
     let stop = stop_on_signals(Hangup::of_this_process() != Hangup::Ignored)?;

@@ -9,7 +9,7 @@ use crate::export::OutputFolder;
 use crate::model::{Control, Snapshot};
 use crate::outline::{self, OutlineSpec};
 use crate::runtime::{self, Failure, Job, Pace, Running, Summary};
-use crate::source::{self, SourceError};
+use crate::source::SourceError;
 use crate::tui;
 use anyhow::anyhow;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -48,7 +48,7 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
     common.shape.refuse_drawn()?;
     refuse_unfit_out(common.out.as_deref())?;
     plan.record.refuse_unfit()?;
-    let source = source::open(plan.input, &config.camera, plan.fps).map_err(no_input)?;
+    let source = runtime::open(plan.input, &config.camera, plan.fps).map_err(no_input)?;
     let info = source.describe();
     common.shape.fits(info.size)?;
     common.scale.fits(info.size)?;
