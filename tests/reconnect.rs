@@ -9,11 +9,11 @@ use arborcam::recording::{Head, Limits};
 use arborcam::runtime::{
     self, Failure, Job, Pace, QUEUE_BYTES, RecordJob, RecordTo, Running, Summary,
 };
-use arborcam::source::{Decoder, Health, Source, SourceError, SourceInfo};
+use arborcam::source::{Decoder, Health, Source, SourceError, SourceInfo, Successor};
 use arborcam::track::Tracker;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use support::{SIZE, recording};
@@ -693,8 +693,8 @@ fn a_wait_that_is_switched_off_meanwhile_ends_with_what_was_captured() {
     assert_eq!(log.lock().expect("log").reopened.len(), 1);
 }
 
-/// A camera read by a crate that waits without a limit: it hangs for good, or panics when it is
-/// closed.
+/// A camera whose driver hangs for good, or that is read by a crate which panics when it is opened
+/// again.
 struct Careless {
     camera: Box<Camera>,
     hangs: bool,
@@ -720,10 +720,6 @@ impl Source for Careless {
 
     fn reopen(&mut self) -> Result<(), SourceError> {
         panic!("of this test, on purpose");
-    }
-
-    fn waits_without_limit(&self) -> Option<Duration> {
-        Some(Duration::from_secs(2))
     }
 }
 
@@ -783,6 +779,256 @@ fn recording_alone_gives_up_a_camera_that_hangs() {
         matches!(failure, Some(Failure::Source(SourceError::Timeout { .. }))),
         "{failure:?}"
     );
+}
+
+/// Where the driver of a made-up camera hangs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Hang {
+    Dequeue,
+    Close,
+    /// The kernel ends the thread while it closes the device: nothing is unwound, nothing dropped.
+    ClosedByTheKernel,
+    Reopen,
+    /// Every attempt does, also on the node that comes next.
+    EveryReopen,
+}
+
+/// What the test and all openings of a [`Stuck`] camera know.
+#[derive(Default)]
+struct Driver {
+    /// Frames delivered so far.
+    next: AtomicU64,
+    /// Calls that hang now.
+    hanging: AtomicU64,
+    released: AtomicBool,
+}
+
+impl Driver {
+    /// A call that does not return before the test lets it.
+    fn hang(&self) {
+        self.hanging.fetch_add(1, Ordering::SeqCst);
+        while !self.released.load(Ordering::SeqCst) {
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        self.hanging.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
+/// A camera that is lost at frame [`Stuck::LOST_AT`] with a call to its driver hanging; only its
+/// next node is well.
+struct Stuck {
+    hang: Hang,
+    driver: Arc<Driver>,
+    /// Whether this is the node that it was first opened by.
+    first: bool,
+    open: bool,
+    stop: Arc<AtomicBool>,
+}
+
+impl Stuck {
+    const LOST_AT: u64 = 150;
+
+    fn new(hang: Hang) -> (Box<Self>, Arc<Driver>) {
+        let driver = Arc::new(Driver::default());
+        let camera = Self {
+            hang,
+            driver: driver.clone(),
+            first: true,
+            open: true,
+            stop: Arc::default(),
+        };
+        (Box::new(camera), driver)
+    }
+}
+
+impl Source for Stuck {
+    fn next_frame(&mut self) -> Result<Option<RawFrame>, SourceError> {
+        let n = self.driver.next.load(Ordering::SeqCst);
+        if self.first && n == Self::LOST_AT {
+            if self.hang == Hang::Dequeue {
+                self.driver.hang();
+            }
+            return Err(unplugged());
+        }
+        if !self.open {
+            return Err(unplugged());
+        }
+        if self.stop.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
+        std::thread::sleep(Duration::from_millis(33 / HURRY));
+        self.driver.next.fetch_add(1, Ordering::SeqCst);
+        let clip = recording();
+        let mut raw = clip[n as usize % clip.len()].clone();
+        let away_s = if self.first { 0.0 } else { 2.0 };
+        (raw.sequence, raw.sensor_time_s) = (Some(n), 1000.0 + n as f64 / 30.0 + away_s);
+        Ok(Some(raw))
+    }
+
+    fn describe(&self) -> SourceInfo {
+        SourceInfo {
+            name: "stuck".into(),
+            format: FormatNote::default(),
+            size: SIZE,
+            nominal_rate_hz: Some(30.0),
+            frames_total: None,
+            live: true,
+        }
+    }
+
+    fn stop_when(&mut self, stop: Arc<AtomicBool>) {
+        self.stop = stop;
+    }
+
+    fn returns(&self) -> bool {
+        true
+    }
+
+    fn close(&mut self) {
+        self.open = false;
+        match self.hang {
+            Hang::Close if self.first => self.driver.hang(),
+            // SAFETY: ends this thread alone, as the kernel does with one that is in a faulty
+            // driver; it shares nothing that somebody else would free.
+            Hang::ClosedByTheKernel if self.first => unsafe {
+                libc::syscall(libc::SYS_exit, 0);
+            },
+            _ => {}
+        }
+    }
+
+    fn reopen(&mut self) -> Result<(), SourceError> {
+        let hangs = match self.hang {
+            Hang::Reopen => self.first,
+            Hang::EveryReopen => true,
+            _ => false,
+        };
+        if hangs {
+            self.driver.hang();
+        }
+        if self.first {
+            return Err(absent());
+        }
+        self.open = true;
+        Ok(())
+    }
+
+    fn successor(&self) -> Option<Successor> {
+        let (hang, driver) = (self.hang, self.driver.clone());
+        Some(Box::new(move || {
+            Box::new(Stuck {
+                hang,
+                driver: driver.clone(),
+                first: false,
+                open: false,
+                stop: Arc::default(),
+            })
+        }))
+    }
+}
+
+/// Until `line` has been told.
+fn wait_for_news(running: &Running, news: &mut Vec<String>, line: &str) {
+    let since = Instant::now();
+    while !news.iter().any(|told| told.contains(line)) {
+        assert!(since.elapsed() < HANGS, "{line:?} is not told: {news:?}");
+        news.extend(running.news());
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// Whatever hangs in the driver is said in time, and left behind: the capture goes on with the
+/// camera's next node, and a request to stop writes it, while the call hangs still.
+#[test]
+fn a_call_to_the_driver_that_never_returns_is_left_behind() {
+    for hang in [
+        Hang::Dequeue,
+        Hang::Close,
+        Hang::ClosedByTheKernel,
+        Hang::Reopen,
+    ] {
+        let _alone = alone();
+        let dir = tempfile::tempdir().expect("tempdir");
+        let out = dir.path().join("out");
+        let mut job = job(Some(&out));
+        job.config.camera.timeout_s = 0.5;
+        let (camera, driver) = Stuck::new(hang);
+        let running = runtime::start(camera, job).expect("start");
+        let since = Instant::now();
+        while driver.next.load(Ordering::SeqCst) < Stuck::LOST_AT {
+            assert!(since.elapsed() < HANGS, "{hang:?}: it never films");
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        let (lost, mut news) = (Instant::now(), Vec::new());
+        wait_for_news(&running, &mut news, "the camera was lost at 5.0 s");
+        let told = lost.elapsed();
+        assert!(
+            told < Duration::from_secs(3),
+            "{hang:?}: told {told:?} late"
+        );
+        wait_for_news(&running, &mut news, "the camera is back");
+        while driver.next.load(Ordering::SeqCst) < Stuck::LOST_AT + 30 {
+            assert!(since.elapsed() < HANGS, "{hang:?}: no more frames");
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        running.send(Control::Quit);
+        let (summary, failure, more) = ended(running, &Mutex::default());
+        news.extend(more);
+        assert!(failure.is_none() && summary.written.is_some(), "{hang:?}");
+        let hanging = u64::from(hang != Hang::ClosedByTheKernel);
+        assert_eq!(driver.hanging.load(Ordering::SeqCst), hanging, "{hang:?}");
+        let timing = &capture(&out)["timing"];
+        let gap = &timing["gaps"][0];
+        assert_eq!(
+            (
+                gap["after_frame"].as_u64(),
+                gap["missing"].as_u64(),
+                timing["reconnects"].as_u64()
+            ),
+            (Some(Stuck::LOST_AT - 1), Some(60), Some(1)),
+            "{hang:?}: {timing}"
+        );
+        driver.released.store(true, Ordering::SeqCst);
+    }
+}
+
+/// Where every attempt hangs there is an end to the threads that wait in the driver; they take no
+/// part in the end of the capture; and when they return the capture goes on.
+#[test]
+fn calls_that_hang_do_not_pile_up() {
+    let _alone = alone();
+    for released in [false, true] {
+        let dir = tempfile::tempdir().expect("tempdir");
+        let out = dir.path().join("out");
+        let mut job = job(Some(&out));
+        (job.config.camera.timeout_s, job.config.camera.retry_delay_s) = (0.05, 0.05);
+        let (camera, driver) = Stuck::new(Hang::EveryReopen);
+        let running = runtime::start(camera, job).expect("start");
+        let mut news = Vec::new();
+        let line = "the camera cannot go on yet: 8 calls to its driver have not returned";
+        wait_for_news(&running, &mut news, line);
+        std::thread::sleep(Duration::from_millis(500));
+        // Those left behind, and the one whose turn it is.
+        assert_eq!(driver.hanging.load(Ordering::SeqCst), 9);
+        if released {
+            driver.released.store(true, Ordering::SeqCst);
+            wait_for_news(&running, &mut news, "the camera is back");
+            let since = Instant::now();
+            while driver.hanging.load(Ordering::SeqCst) > 0 {
+                assert!(since.elapsed() < HANGS, "a thread does not end");
+                std::thread::sleep(Duration::from_millis(2));
+            }
+        }
+        running.send(Control::Quit);
+        let (summary, failure, _) = ended(running, &Mutex::default());
+        assert!(
+            failure.is_none() && summary.written.is_some(),
+            "{failure:?}"
+        );
+        let reconnects = &capture(&out)["timing"]["reconnects"];
+        assert_eq!(reconnects.as_u64(), Some(u64::from(released)));
+        driver.released.store(true, Ordering::SeqCst);
+    }
 }
 
 /// Follows the frames, `skipped` left out; the points of each of the others.

@@ -7,7 +7,6 @@ use super::session::{init_log, no_input, stop_on_signals, warn_of_other_format};
 use super::{Ended, say};
 use crate::config::Config;
 use crate::runtime::{self, Failure, Pace, RecordJob, RunningRecord};
-use crate::source;
 use clap::Args;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -41,7 +40,7 @@ pub fn run(args: &RecordArgs) -> Result<(), Ended> {
         args.camera.set(&mut config.camera);
     })?;
     recording::refuse_unfit(&args.file)?;
-    let source = source::open(&args.device, &config.camera, None).map_err(no_input)?;
+    let source = runtime::open(&args.device, &config.camera, None).map_err(no_input)?;
     let info = source.describe();
     let stop = stop_on_signals(SighupAction::ends_this_process())?;
     init_log(true);

@@ -10,7 +10,7 @@ use crate::config::Config;
 use crate::export::OutputFolder;
 use crate::outline::{self, OutlineSpec};
 use crate::runtime::{self, Failure, Job, Pace, Running, Summary};
-use crate::source::{self, Source, SourceError, SourceInfo};
+use crate::source::{Source, SourceError, SourceInfo};
 use crate::tui;
 use anyhow::anyhow;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -50,7 +50,7 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
     let config = common.config(plan.camera)?;
     let headless = common.headless || common.stream.is_some();
     refuse_unfit(common, &plan, headless)?;
-    let source = source::open(plan.input, &config.camera, plan.fps).map_err(no_input)?;
+    let source = runtime::open(plan.input, &config.camera, plan.fps).map_err(no_input)?;
     let job = job(common, &plan, config, &*source, headless)?;
     let action = SighupAction::of_this_process();
     let stop = stop_on_signals(action == SighupAction::Stop)?;
@@ -268,7 +268,7 @@ fn closing_lines(s: &Summary) -> Vec<String> {
     lines
 }
 
-fn tree_line(tree: &crate::pipeline::Tree) -> String {
+fn tree_line(tree: &crate::solve::Model) -> String {
     let (nodes, points) = (tree.skeleton.measured(), tree.skeleton.nodes[0].n_tracks);
     let copies = tree.skeleton.nodes.len() - nodes;
     let first = &tree.first;

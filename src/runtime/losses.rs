@@ -101,73 +101,33 @@ impl Losses {
     /// A frame has come; `broken` came before it and were of no use.
     pub fn arrived(&mut self, sequence: Option<u64>, time_s: f64, broken: u64) -> Arrival {
         self.seen += 1;
-        let mut gaps = Vec::new();
+        let first = Tick {
+            index: 0,
+            time_s,
+            broken,
+            numbered: false,
+        };
         if let Some((last, cause)) = self.before_away.take() {
-            let length_s = time_s - last.time_s;
-            let interval_s = self
-                .interval_s()
-                .or(self.nominal_s)
-                .unwrap_or(f64::INFINITY);
-            // `as` saturates, and makes 0 of what is no number.
-            let step = ((length_s / interval_s).round() as u64).max(1);
-            gaps.push(Gap {
-                after_frame: last.index,
-                time_s: last.time_s,
-                missing: step - 1,
-                cause,
-                length_s,
-            });
-            self.ticks.clear();
-            self.begin(
-                Tick {
-                    index: last.index + step,
-                    time_s,
-                    broken,
-                    numbered: false,
-                },
-                sequence,
-            );
-            return Arrival {
-                index: last.index + step,
-                gaps,
-            };
+            return self.arrived_after(last, cause, first, sequence);
         }
         let Some(&last) = self.ticks.back() else {
-            self.begin(
-                Tick {
-                    index: 0,
-                    time_s,
-                    broken,
-                    numbered: false,
-                },
-                sequence,
-            );
-            return Arrival { index: 0, gaps };
+            self.begin(first, sequence);
+            return Arrival {
+                index: 0,
+                gaps: Vec::new(),
+            };
         };
-        let hole = sequence
-            .zip(self.last_number)
-            .map(|(now, (number, since))| {
-                now.saturating_sub(number)
-                    .saturating_sub(1 + since + broken)
-            });
-        self.last_number = match (sequence, self.last_number) {
-            (Some(now), _) => Some((now, 0)),
-            (None, Some((number, since))) => Some((number, since + 1 + broken)),
-            (None, None) => None,
-        };
+        let hole = self.number(sequence, broken);
         let missing = hole.unwrap_or(0);
-        if hole.is_some() {
-            *self.totals.by_sequence.get_or_insert(0) += missing;
-        }
         let index = last.index + 1 + broken + missing;
+        let mut gaps = Vec::new();
         if missing > 0 {
-            let length_s = time_s - last.time_s;
             gaps.push(Gap {
                 after_frame: last.index,
                 time_s: last.time_s,
                 missing,
                 cause: GapCause::Dropped,
-                length_s,
+                length_s: time_s - last.time_s,
             });
         }
         self.ticks.push_back(Tick {
@@ -185,6 +145,54 @@ impl Losses {
         }
         self.reconcile();
         Arrival { index, gaps }
+    }
+
+    /// The first frame after the source was away, which it was since `last`.
+    fn arrived_after(
+        &mut self,
+        last: Tick,
+        cause: GapCause,
+        mut tick: Tick,
+        sequence: Option<u64>,
+    ) -> Arrival {
+        let length_s = tick.time_s - last.time_s;
+        let interval_s = self
+            .interval_s()
+            .or(self.nominal_s)
+            .unwrap_or(f64::INFINITY);
+        // `as` saturates, and makes 0 of what is no number.
+        let step = ((length_s / interval_s).round() as u64).max(1);
+        let gap = Gap {
+            after_frame: last.index,
+            time_s: last.time_s,
+            missing: step - 1,
+            cause,
+            length_s,
+        };
+        tick.index = last.index + step;
+        self.ticks.clear();
+        self.begin(tick, sequence);
+        Arrival {
+            index: tick.index,
+            gaps: vec![gap],
+        }
+    }
+
+    /// Takes a frame's number in: how many are missing before it by the numbers, `None` where there
+    /// are no two to compare.
+    fn number(&mut self, sequence: Option<u64>, broken: u64) -> Option<u64> {
+        let Some((last, since)) = self.last_number else {
+            self.last_number = sequence.map(|now| (now, 0));
+            return None;
+        };
+        let Some(now) = sequence else {
+            self.last_number = Some((last, since + 1 + broken));
+            return None;
+        };
+        self.last_number = Some((now, 0));
+        let missing = now.saturating_sub(last).saturating_sub(1 + since + broken);
+        *self.totals.by_sequence.get_or_insert(0) += missing;
+        Some(missing)
     }
 
     fn begin(&mut self, tick: Tick, sequence: Option<u64>) {
@@ -238,26 +246,24 @@ impl Losses {
             (Some(a), Some(b)) => a.max(b),
             (a, b) => a.or(b)?,
         };
-        let tick = |i: usize| self.ticks.get(i);
-        let between = |from: usize, to: usize| {
-            let steps = ((tick(to)?.time_s - tick(from)?.time_s) / interval_s).round();
-            let broken: u64 = (from + 1..=to).filter_map(|i| Some(tick(i)?.broken)).sum();
-            Some((steps.max(0.0) as u64).saturating_sub((to - from) as u64 + broken))
-        };
-        let later = (0..MADE_UP)
-            .filter_map(|k| between(at - 1, at + k))
-            .min()
-            .unwrap_or(0);
-        let sooner = (0..MADE_UP)
-            .filter_map(|k| between((at - 1).checked_sub(k)?, at))
-            .min()
-            .unwrap_or(0);
+        let (mut later, mut sooner) = (u64::MAX, u64::MAX);
+        for k in 0..MADE_UP {
+            if let Some(missing) = self.missing_between(at - 1, at + k, interval_s) {
+                later = later.min(missing);
+            }
+            if let Some(from) = (at - 1).checked_sub(k)
+                && let Some(missing) = self.missing_between(from, at, interval_s)
+            {
+                sooner = sooner.min(missing);
+            }
+        }
+        // Both have the step itself.
         let missing = later.min(sooner);
         if missing == 0 {
             return None;
         }
         self.totals.by_time += missing;
-        let (last, this) = (*tick(at - 1)?, *tick(at)?);
+        let (last, this) = (*self.ticks.get(at - 1)?, *self.ticks.get(at)?);
         if this.numbered {
             return None;
         }
@@ -270,6 +276,14 @@ impl Losses {
             cause: GapCause::Dropped,
             length_s,
         })
+    }
+
+    /// Frames missing from one tick to another by their times.
+    fn missing_between(&self, from: usize, to: usize, interval_s: f64) -> Option<u64> {
+        let (first, last) = (self.ticks.get(from)?, self.ticks.get(to)?);
+        let steps = ((last.time_s - first.time_s) / interval_s).round();
+        let broken: u64 = self.ticks.range(from + 1..=to).map(|t| t.broken).sum();
+        Some((steps.max(0.0) as u64).saturating_sub((to - from) as u64 + broken))
     }
 
     /// Time from frame to frame among the ticks from `from` to before `to`, however many were lost
@@ -287,14 +301,12 @@ impl Losses {
         }
         steps_s.sort_unstable_by(f64::total_cmp);
         let short_s = steps_s[steps_s.len() / 5];
-        let frames = |s: f64, interval_s: f64| (s / interval_s).round().max(1.0);
-        let mut singles_s: Vec<f64> = steps_s.iter().map(|s| s / frames(*s, short_s)).collect();
+        let mut singles_s: Vec<f64> = steps_s.iter().map(|s| s / frames_in(*s, short_s)).collect();
         singles_s.sort_unstable_by(f64::total_cmp);
         // Over the whole of it jitter weighs next to nothing.
         let single_s = singles_s[singles_s.len() / 2];
-        Some(
-            steps_s.iter().sum::<f64>() / steps_s.iter().map(|s| frames(*s, single_s)).sum::<f64>(),
-        )
+        let frames: f64 = steps_s.iter().map(|s| frames_in(*s, single_s)).sum();
+        Some(steps_s.iter().sum::<f64>() / frames)
     }
 
     fn reconcile(&mut self) {
@@ -308,6 +320,11 @@ impl Losses {
         };
         t.reconciled = t.reconciled.max(now);
     }
+}
+
+/// Frames that a step stands for, one at least.
+fn frames_in(step_s: f64, interval_s: f64) -> f64 {
+    (step_s / interval_s).round().max(1.0)
 }
 
 #[cfg(test)]

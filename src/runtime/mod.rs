@@ -44,6 +44,7 @@ pub use recorder_thread::{QUEUE_BYTES, RecordTo, Recorded};
 pub use shared::Failure;
 pub use source_thread::Pace;
 pub use unfinished::{finish_unfinished, unfinished_dir};
+pub use watched::open;
 
 use crate::config::Config;
 use crate::model::{Control, Snapshot};
@@ -124,7 +125,8 @@ impl Drop for StopAll<'_> {
 /// # Errors
 /// A thread cannot be started, there is no decoder, or the recording cannot be made.
 pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> {
-    let source = Watched::if_needed(source).map_err(Failure::Thread)?;
+    let limit = job.config.camera.time_limit();
+    let source = Watched::if_live(source, limit).map_err(Failure::Thread)?;
     let shared = Arc::new(Shared::default());
     let info = source.describe();
     let live = info.live;

@@ -49,50 +49,16 @@ pub fn wait(
         "the camera was lost at {at_s:.1} s ({reason}); waiting for it, what was captured is kept"
     ));
     shared.camera(|c| c.away = Some(reason.clone()));
-    let mut said = reason;
-    let mut denied_since = None;
+    let mut attempts = Attempts {
+        said: reason,
+        denied_since: None,
+    };
     // One that delivers a frame and fails, over and over, is not opened more often than one that
     // never delivers.
-    let mut pause = returned.map_or(Duration::ZERO, |at| {
+    let pause = returned.map_or(Duration::ZERO, |at| {
         retry_delay(camera).saturating_sub(at.elapsed())
     });
-    let waited = loop {
-        if !sleep(pause, shared) {
-            break Waited::Stopped;
-        }
-        adopt_new_settings(source, camera, shared);
-        if !camera.reconnect {
-            break Waited::Unwanted;
-        }
-        // It is back when it delivers: one that starts and falls silent again is not.
-        let e = match source.reopen().and_then(|()| source.next_frame()) {
-            Ok(Some(first)) => break Waited::Back(first),
-            Ok(None) => break Waited::Stopped,
-            Err(e) => e,
-        };
-        if !source.returns() {
-            break Waited::Hopeless(e);
-        }
-        let unsettled = match e {
-            SourceError::Denied { .. } => {
-                denied_since.get_or_insert_with(Instant::now).elapsed() < SETTLES
-            }
-            _ => {
-                denied_since = None;
-                false
-            }
-        };
-        if unsettled || matches!(e, SourceError::Absent { .. }) {
-            pause = LOOK_EVERY;
-            continue;
-        }
-        pause = retry_delay(camera);
-        let why = e.brief();
-        if why != said {
-            shared.news(format!("the camera cannot go on yet: {why}"));
-            said = why;
-        }
-    };
+    let waited = attempts.until_back(source, camera, pause, shared);
     let is_back = matches!(waited, Waited::Back(_));
     shared.camera(|c| {
         c.away = None;
@@ -105,6 +71,68 @@ pub fn wait(
         ));
     }
     waited
+}
+
+/// The attempts of one wait.
+struct Attempts {
+    /// Why the camera cannot go on, as it was last told.
+    said: String,
+    denied_since: Option<Instant>,
+}
+
+impl Attempts {
+    /// The first attempt is made after `pause`.
+    fn until_back(
+        &mut self,
+        source: &mut dyn Source,
+        camera: &mut config::Camera,
+        mut pause: Duration,
+        shared: &Shared,
+    ) -> Waited {
+        loop {
+            if !sleep(pause, shared) {
+                return Waited::Stopped;
+            }
+            adopt_new_settings(source, camera, shared);
+            if !camera.reconnect {
+                return Waited::Unwanted;
+            }
+            // It is back when it delivers: one that starts and falls silent again is not.
+            let e = match source.reopen().and_then(|()| source.next_frame()) {
+                Ok(Some(first)) => return Waited::Back(first),
+                Ok(None) => return Waited::Stopped,
+                Err(e) => e,
+            };
+            if !source.returns() {
+                return Waited::Hopeless(e);
+            }
+            pause = if self.is_on_its_way(&e) {
+                LOOK_EVERY
+            } else {
+                self.tell(&e, shared);
+                retry_delay(camera)
+            };
+        }
+    }
+
+    /// Not there yet, or not yet given to its group: nothing to tell.
+    fn is_on_its_way(&mut self, e: &SourceError) -> bool {
+        if !matches!(e, SourceError::Denied { .. }) {
+            self.denied_since = None;
+            return matches!(e, SourceError::Absent { .. });
+        }
+        let since = self.denied_since.get_or_insert_with(Instant::now);
+        since.elapsed() < SETTLES
+    }
+
+    fn tell(&mut self, e: &SourceError, shared: &Shared) {
+        // An attempt that a request to stop has cut short says nothing of the camera.
+        let why = e.brief();
+        if why != self.said && !shared.stopped() {
+            shared.news(format!("the camera cannot go on yet: {why}"));
+            self.said = why;
+        }
+    }
 }
 
 fn retry_delay(camera: &config::Camera) -> Duration {

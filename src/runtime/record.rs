@@ -32,7 +32,7 @@ pub struct RunningRecord {
 /// # Errors
 /// The file cannot be made, or a thread cannot be started.
 pub fn record(source: Box<dyn Source>, job: RecordJob) -> Result<RunningRecord, Failure> {
-    let source = Watched::if_needed(source).map_err(Failure::Thread)?;
+    let source = Watched::if_live(source, job.camera.time_limit()).map_err(Failure::Thread)?;
     let shared = Arc::new(Shared::default());
     let (recorder, recording) = recorder_thread::start(job.to, source.describe().live, &shared)?;
     let (frames_in, frames_out) = bounded::<source_thread::Timed>(FRAME_QUEUE);
@@ -89,12 +89,11 @@ impl RunningRecord {
     /// missing in the recording.
     pub fn counts(&self) -> (u64, u64, f64, u64) {
         let counts = &self.shared.counts;
-        let load = |c: &std::sync::atomic::AtomicU64| c.load(Ordering::Relaxed);
         (
-            load(&counts.seen),
-            load(&counts.lost_in_camera),
+            counts.seen.load(Ordering::Relaxed),
+            counts.lost_in_camera.load(Ordering::Relaxed),
             self.shared.last_time_s(),
-            load(&counts.not_recorded),
+            counts.not_recorded.load(Ordering::Relaxed),
         )
     }
 

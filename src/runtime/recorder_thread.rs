@@ -118,18 +118,19 @@ fn now_ns() -> u64 {
 }
 
 impl Recorder {
+    /// Whether there is no room for so many bytes more. What is larger than the whole queue is let
+    /// in alone.
+    fn is_full(&self, bytes: usize) -> bool {
+        self.waiting.load(Ordering::Relaxed) + bytes > self.queue_bytes && !self.queue.is_empty()
+    }
+
     /// Offers a frame with its place in the capture.
     pub fn offer(&self, raw: &Arc<RawFrame>, index: u64) {
         let bytes = raw.bytes.len();
-        // One that is larger than the whole queue is let in alone.
-        let full = || {
-            self.waiting.load(Ordering::Relaxed) + bytes > self.queue_bytes
-                && !self.queue.is_empty()
-        };
-        while !self.live && full() && !self.shared.stopped() {
+        while !self.live && self.is_full(bytes) && !self.shared.stopped() {
             std::thread::sleep(NAP);
         }
-        let refused = self.live && full();
+        let refused = self.live && self.is_full(bytes);
         self.waiting.fetch_add(bytes, Ordering::Relaxed);
         self.shared.pulse.give(Worker::Record);
         if refused || !self.put(Item::Frame(raw.clone(), index)) {

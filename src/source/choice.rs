@@ -102,23 +102,27 @@ pub(super) fn rate(hz: f64) -> f64 {
 
 /// The best of `modes`, and why; `None` if there is none that can be read.
 pub(super) fn choose(modes: &[Mode], wish: &Wish, usb: bool) -> Option<(Granted, String)> {
-    let of_format = |m: &&Mode| wish.format.is_none_or(|f| f == m.format);
-    let nearest = |all: &[Granted]| {
-        all.iter().copied().min_by(|a, b| {
-            cost(a, wish, usb)
-                .partial_cmp(&cost(b, wish, usb))
-                .unwrap_or(std::cmp::Ordering::Equal)
+    let all: Vec<Granted> = modes
+        .iter()
+        .map(|m| Granted {
+            format: m.format,
+            size: m.size,
+            rate_hz: nearest_rate(&m.rates_hz, wish.rate_hz),
         })
-    };
-    let with_rate = |m: &Mode| Granted {
-        format: m.format,
-        size: m.size,
-        rate_hz: nearest_rate(&m.rates_hz, wish.rate_hz),
-    };
-    let fitting: Vec<Granted> = modes.iter().filter(of_format).map(with_rate).collect();
-    let all: Vec<Granted> = modes.iter().map(with_rate).collect();
-    let chosen = nearest(&fitting).or_else(|| nearest(&all))?;
+        .collect();
+    let mut fitting = all.clone();
+    fitting.retain(|g| wish.format.is_none_or(|f| f == g.format));
+    let chosen = cheapest(&fitting, wish, usb).or_else(|| cheapest(&all, wish, usb))?;
     Some((chosen, why(&chosen, wish, usb)))
+}
+
+/// The first of those with the least [`cost`].
+fn cheapest(all: &[Granted], wish: &Wish, usb: bool) -> Option<Granted> {
+    all.iter().copied().min_by(|a, b| {
+        cost(a, wish, usb)
+            .partial_cmp(&cost(b, wish, usb))
+            .unwrap_or(std::cmp::Ordering::Equal)
+    })
 }
 
 /// The slowest rate that reaches the one asked for, else the fastest.
@@ -132,10 +136,15 @@ fn nearest_rate(rates_hz: &[f64], asked_hz: f64) -> Option<f64> {
         .or_else(|| rates_hz.iter().copied().max_by(f64::total_cmp))
 }
 
+/// Absolute logarithm of the ratio of two lengths in pixels.
+fn log_ratio(a: u32, b: u32) -> f64 {
+    (f64::from(a.max(1)) / f64::from(b.max(1))).ln().abs()
+}
+
 /// Smaller is better, from the first entry to the last.
 fn cost(g: &Granted, wish: &Wish, usb: bool) -> (f64, f64, bool, usize) {
-    let apart = |a: u32, b: u32| (f64::from(a.max(1)) / f64::from(b.max(1))).ln().abs();
-    let size = apart(g.size.width, wish.size.width) + apart(g.size.height, wish.size.height);
+    let size =
+        log_ratio(g.size.width, wish.size.width) + log_ratio(g.size.height, wish.size.height);
     let hz = g.rate_hz.unwrap_or(wish.rate_hz);
     // Too slow is worse than any surplus.
     let rate = if is_same_rate(hz, wish.rate_hz) {
@@ -219,111 +228,62 @@ mod tests {
         ]
     }
 
+    const HD: Size = Size {
+        width: 1280,
+        height: 720,
+    };
+    const VGA: Size = Size {
+        width: 640,
+        height: 480,
+    };
+
+    /// What is chosen of `modes` for these wishes and 30 frames a second; `usb` says on which bus.
+    fn chosen(modes: &[Mode], format: Option<PixelFormat>, size: Size, usb: bool) -> String {
+        let wish = Wish {
+            format,
+            size,
+            rate_hz: 30.0,
+        };
+        let (chosen, why) = choose(modes, &wish, usb).expect("something");
+        assert!(!why.is_empty());
+        chosen.to_string()
+    }
+
     #[test]
-    fn size_then_rate_then_cost() {
-        let slow_only = vec![mode(Yuyv, 1280, 720, &[10.0, 5.0])];
-        let silent = vec![mode(Grey, 1280, 720, &[]), mode(Nv12, 1280, 720, &[])];
-        let both = vec![
+    fn the_size_decides_and_then_the_rate() {
+        let webcam = webcam();
+        assert_eq!(chosen(&webcam, None, HD, true), "MJPG 1280x720 @ 30");
+        let larger = Size::new(1920, 1080);
+        assert_eq!(chosen(&webcam, None, larger, true), "MJPG 1280x720 @ 30");
+        // What is asked for by name is taken, slow as it is.
+        let by_name = chosen(&webcam, Some(Yuyv), HD, true);
+        assert_eq!(by_name, "YUYV 1280x720 @ 10");
+        let slow = [mode(Yuyv, 1280, 720, &[10.0, 5.0])];
+        assert_eq!(chosen(&slow, None, HD, true), "YUYV 1280x720 @ 10");
+        // Too fast is better than too slow.
+        let fast = [mode(Mjpeg, 1280, 720, &[120.0, 60.0])];
+        assert_eq!(chosen(&fast, None, HD, true), "MJPG 1280x720 @ 60");
+    }
+
+    #[test]
+    fn of_equals_the_cheapest_is_taken() {
+        // 18 MB/s are no burden for USB, 55 are; another bus carries them.
+        assert_eq!(chosen(&webcam(), None, VGA, true), "YUYV 640x480 @ 30");
+        let both = [
             mode(Yuyv, 1280, 720, &[30.0]),
             mode(Mjpeg, 1280, 720, &[30.0]),
         ];
-        let fast = vec![mode(Mjpeg, 1280, 720, &[120.0, 60.0])];
-        // Modes, format and size asked for, over USB, and what is chosen.
-        type Case = (
-            &'static str,
-            Vec<Mode>,
-            Option<PixelFormat>,
-            (u32, u32),
-            bool,
-            &'static str,
-        );
-        let cases: [Case; 9] = [
-            (
-                "the rate decides",
-                webcam(),
-                None,
-                (1280, 720),
-                true,
-                "MJPG 1280x720 @ 30",
-            ),
-            (
-                "18 MB/s are no burden",
-                webcam(),
-                None,
-                (640, 480),
-                true,
-                "YUYV 640x480 @ 30",
-            ),
-            (
-                "55 MB/s are",
-                both.clone(),
-                None,
-                (1280, 720),
-                true,
-                "MJPG 1280x720 @ 30",
-            ),
-            (
-                "but not on another bus",
-                both,
-                None,
-                (1280, 720),
-                false,
-                "YUYV 1280x720 @ 30",
-            ),
-            (
-                "asked for is asked for",
-                webcam(),
-                Some(Yuyv),
-                (1280, 720),
-                true,
-                "YUYV 1280x720 @ 10",
-            ),
-            (
-                "slow is better than nothing",
-                slow_only,
-                None,
-                (1280, 720),
-                true,
-                "YUYV 1280x720 @ 10",
-            ),
-            (
-                "no rates",
-                silent,
-                None,
-                (1280, 720),
-                false,
-                "NV12 1280x720",
-            ),
-            (
-                "no such size",
-                webcam(),
-                None,
-                (1920, 1080),
-                true,
-                "MJPG 1280x720 @ 30",
-            ),
-            (
-                "too fast is better than too slow",
-                fast,
-                None,
-                (1280, 720),
-                true,
-                "MJPG 1280x720 @ 60",
-            ),
-        ];
-        for (name, modes, format, (width, height), usb, expected) in cases {
-            let wish = Wish {
-                format,
-                size: Size::new(width, height),
-                rate_hz: 30.0,
-            };
-            let (chosen, why) = choose(&modes, &wish, usb).expect(name);
-            assert_eq!(chosen.to_string(), expected, "{name}");
-            assert!(!why.is_empty());
-        }
+        assert_eq!(chosen(&both, None, HD, true), "MJPG 1280x720 @ 30");
+        assert_eq!(chosen(&both, None, HD, false), "YUYV 1280x720 @ 30");
+        let without_rates = [mode(Grey, 1280, 720, &[]), mode(Nv12, 1280, 720, &[])];
+        assert_eq!(chosen(&without_rates, None, HD, false), "NV12 1280x720");
+    }
+
+    #[test]
+    fn a_format_that_is_not_offered_is_replaced_and_said() {
         let wish = Wish {
             format: Some(Nv12),
-            size: Size::new(640, 480),
+            size: VGA,
             rate_hz: 30.0,
         };
         assert_eq!(choose(&[], &wish, true), None);

@@ -54,7 +54,7 @@ const FAR_S: f64 = 4e9;
 const LEAST_STEP_S: f64 = 1e-4;
 
 /// Turns the driver's count and time into ours.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Clock {
     kind: ClockKind,
     /// Whether the driver counts at all.

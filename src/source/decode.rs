@@ -258,10 +258,14 @@ fn colour_of(raw: &RawFrame) -> impl Fn(u32, u32) -> [u8; 3] {
     }
 }
 
+/// Grey where there is none.
+fn chroma(c: Option<&u8>) -> f32 {
+    c.map_or(0.0, |&c| f32::from(c) - 128.0)
+}
+
 /// BT.601 with the limited range of video.
 fn rgb_of(luma: u8, cb: Option<&u8>, cr: Option<&u8>) -> [u8; 3] {
-    let shift = |c: Option<&u8>| c.map_or(0.0, |&c| f32::from(c) - 128.0);
-    let (y, cb, cr) = (1.164 * (f32::from(luma) - 16.0), shift(cb), shift(cr));
+    let (y, cb, cr) = (1.164 * (f32::from(luma) - 16.0), chroma(cb), chroma(cr));
     // `as u8` saturates.
     [y + 1.596 * cr, y - 0.392 * cb - 0.813 * cr, y + 2.017 * cb].map(|c| (c + 0.5) as u8)
 }

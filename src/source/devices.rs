@@ -39,46 +39,50 @@ pub fn list() -> Vec<Device> {
 
 /// The same with these settings, on a system whose `/sys` and `/dev` are at `places`.
 pub fn list_for(config: &config::Camera, places: &Places) -> Vec<Device> {
-    let device = |node: Node| {
-        let link = link(places, &node.path);
-        let (path, identity) = (node.path, node.identity);
-        let port = identity
-            .as_ref()
-            .map_or_else(|| "nothing is known of it".to_owned(), |i| i.port.clone());
-        match prospect(&path, config) {
-            Ok(p) => {
-                let kind = if p.films { "" } else { ", does not film" };
-                Device {
-                    name: p.card,
-                    description: format!("{} at {}{kind}", p.driver, p.bus),
-                    films: p.films,
-                    modes: p.modes,
-                    chosen: p.chosen.map(|(granted, why)| (granted.to_string(), why)),
-                    closed: None,
-                    path,
-                    identity,
-                    link,
-                }
-            }
-            Err(e) => Device {
-                name: if node.name.is_empty() {
-                    "?".into()
-                } else {
-                    node.name
-                },
-                description: port,
-                // Nobody can know; whoever may open it will see.
-                films: true,
-                modes: Vec::new(),
-                chosen: None,
-                closed: Some(e.to_string()),
+    nodes(places)
+        .into_iter()
+        .map(|node| device(node, config, places))
+        .collect()
+}
+
+fn device(node: Node, config: &config::Camera, places: &Places) -> Device {
+    let link = link(places, &node.path);
+    let (path, identity) = (node.path, node.identity);
+    let port = identity
+        .as_ref()
+        .map_or_else(|| "nothing is known of it".to_owned(), |i| i.port.clone());
+    match prospect(&path, config) {
+        Ok(p) => {
+            let kind = if p.films { "" } else { ", does not film" };
+            Device {
+                name: p.card,
+                description: format!("{} at {}{kind}", p.driver, p.bus),
+                films: p.films,
+                modes: p.modes,
+                chosen: p.chosen.map(|(granted, why)| (granted.to_string(), why)),
+                closed: None,
                 path,
                 identity,
                 link,
-            },
+            }
         }
-    };
-    nodes(places).into_iter().map(device).collect()
+        Err(e) => Device {
+            name: if node.name.is_empty() {
+                "?".into()
+            } else {
+                node.name
+            },
+            description: port,
+            // Nobody can know; whoever may open it will see.
+            films: true,
+            modes: Vec::new(),
+            chosen: None,
+            closed: Some(e.to_string()),
+            path,
+            identity,
+            link,
+        },
+    }
 }
 
 /// Where the camera of this identity is now.
@@ -96,19 +100,7 @@ pub(super) fn by_identity(id: &str, places: &Places) -> Result<PathBuf, SourceEr
         }
         [only] => Ok(only.path.clone()),
         twins => {
-            let other_name = |n: &Node| {
-                let port = n
-                    .identity
-                    .as_ref()
-                    .map_or(String::new(), |i| format!(" ({})", i.port));
-                format!(
-                    "{}{port}",
-                    link_by_path(places, &n.path)
-                        .unwrap_or_else(|| n.path.clone())
-                        .display()
-                )
-            };
-            let names: Vec<String> = twins.iter().map(other_name).collect();
+            let names: Vec<String> = twins.iter().map(|n| unique_name(n, places)).collect();
             let what = format!(
                 "{} cameras go by this name; name the one that is meant: {}",
                 twins.len(),
@@ -116,6 +108,15 @@ pub(super) fn by_identity(id: &str, places: &Places) -> Result<PathBuf, SourceEr
             );
             Err(SourceError::BadFormat { input, what })
         }
+    }
+}
+
+/// What to name a camera by that shares its identity with others.
+fn unique_name(node: &Node, places: &Places) -> String {
+    let path = link_by_path(places, &node.path).unwrap_or_else(|| node.path.clone());
+    match &node.identity {
+        Some(identity) => format!("{} ({})", path.display(), identity.port),
+        None => path.display().to_string(),
     }
 }
 

@@ -46,6 +46,14 @@ pub enum SourceError {
 }
 
 impl SourceError {
+    /// `path` cannot be read as frames; `what` says why, and what to do.
+    pub(super) fn bad_format(path: &Path, what: impl Into<String>) -> Self {
+        SourceError::BadFormat {
+            input: path.display().to_string(),
+            what: what.into(),
+        }
+    }
+
     /// What it means that the file, folder or device `path` could not be opened or read.
     pub(super) fn of_file(path: &Path, e: &std::io::Error) -> Self {
         let input = path.display().to_string();
@@ -78,6 +86,11 @@ impl SourceError {
             SourceError::Absent { .. } => "it is not there".to_owned(),
             other => other.to_string(),
         }
+    }
+
+    /// [`of_driver`](Self::of_driver) for a `map_err`.
+    pub(super) fn refused(path: &Path, doing: &'static str) -> impl Fn(std::io::Error) -> Self {
+        move |e| SourceError::of_driver(path, doing, &e)
     }
 
     /// What it means that the driver of `path` refused while we were `doing` something.
@@ -149,18 +162,19 @@ fn holder(path: &Path) -> Option<String> {
         let Ok(open) = std::fs::read_dir(process.path().join("fd")) else {
             continue;
         };
-        // Only what is named like a device is looked at: asking a dead network file system could
-        // hang.
-        let holds = |fd: std::fs::DirEntry| {
-            std::fs::read_link(fd.path()).is_ok_and(|target| target.starts_with("/dev"))
-                && std::fs::metadata(fd.path()).is_ok_and(|m| m.rdev() == device)
-        };
-        if pid != own && open.flatten().any(holds) {
+        if pid != own && open.flatten().any(|fd| leads_to(&fd.path(), device)) {
             let name = std::fs::read_to_string(process.path().join("comm")).unwrap_or_default();
             return Some(format!("{} (process {pid})", name.trim()));
         }
     }
     None
+}
+
+/// Whether this open file is the device. Only what is named like one is looked at: asking a dead
+/// network file system could hang.
+fn leads_to(fd: &Path, device: u64) -> bool {
+    std::fs::read_link(fd).is_ok_and(|target| target.starts_with("/dev"))
+        && std::fs::metadata(fd).is_ok_and(|m| m.rdev() == device)
 }
 
 #[cfg(test)]

@@ -45,24 +45,24 @@ pub(super) struct Node {
 
 /// All video devices, by number. A system without sysfs still has its nodes.
 pub(super) fn nodes(places: &Places) -> Vec<Node> {
-    let numbers = |folder: PathBuf| {
-        let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-        entries.filter_map(|e| {
-            e.file_name()
-                .to_str()?
-                .strip_prefix("video")?
-                .parse::<u32>()
-                .ok()
-        })
-    };
-    let mut all: Vec<u32> = numbers(places.sys.join("class/video4linux"))
-        .chain(numbers(places.dev.clone()))
-        .collect();
+    let mut all = numbers(&places.sys.join("class/video4linux"));
+    all.extend(numbers(&places.dev));
     all.sort_unstable();
     all.dedup();
     all.into_iter()
         .map(|n| node(places, &format!("video{n}")))
         .collect()
+}
+
+/// Of the entries `videoN`.
+fn numbers(folder: &Path) -> Vec<u32> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let number = name.to_str().and_then(|n| n.strip_prefix("video"));
+        found.extend(number.and_then(|n| n.parse::<u32>().ok()));
+    }
+    found
 }
 
 fn node(places: &Places, name: &str) -> Node {
@@ -86,7 +86,6 @@ fn attribute(device: &Path, name: &str) -> Option<String> {
 
 /// Reads what `device` (`…/1-1.2/1-1.2:1.0/video4linux/video0`) and the folders above it say.
 fn identify(device: &Path, card: &str) -> Option<Identity> {
-    let name = |p: &Path| p.file_name().map(|n| n.to_string_lossy().into_owned());
     let index = attribute(device, "index").unwrap_or_else(|| "0".into());
     let parent = device.parent()?.parent()?;
     if let Some(usb) = parent.ancestors().find(|a| a.join("idVendor").exists()) {
@@ -95,7 +94,7 @@ fn identify(device: &Path, card: &str) -> Option<Identity> {
             attribute(usb, "idVendor")?,
             attribute(usb, "idProduct")?
         );
-        let (serial, socket) = (attribute(usb, "serial"), name(usb)?);
+        let (serial, socket) = (attribute(usb, "serial"), base_name(usb)?);
         // One camera may have two of them: the number of the interface tells, and the same after
         // every plugging in.
         let part = attribute(parent, "bInterfaceNumber")
@@ -112,25 +111,29 @@ fn identify(device: &Path, card: &str) -> Option<Identity> {
         });
     }
     let (product, serial) = (None, None);
-    if name(parent)? == "virtual" {
+    if base_name(parent)? == "virtual" {
         // Nothing is plugged in anywhere; the number is the only socket there is.
         return Some(Identity {
             id: format!("virtual-{}-{index}", plain(card)),
-            port: name(device)?,
+            port: base_name(device)?,
             product,
             serial,
         });
     }
     let bus = std::fs::canonicalize(parent.join("subsystem"))
         .ok()
-        .and_then(|s| name(&s));
-    let (bus, socket) = (bus.unwrap_or_else(|| "bus".into()), name(parent)?);
+        .and_then(|s| base_name(&s));
+    let (bus, socket) = (bus.unwrap_or_else(|| "bus".into()), base_name(parent)?);
     Some(Identity {
         id: format!("{bus}-{}-{index}", plain(&socket)),
         port: format!("{bus} {socket}"),
         product,
         serial,
     })
+}
+
+fn base_name(path: &Path) -> Option<String> {
+    path.file_name().map(|n| n.to_string_lossy().into_owned())
 }
 
 /// The text with everything that a shell might take for something else made `_`.
@@ -187,17 +190,14 @@ impl Known {
             .iter()
             .find(|n| n.path == path)
             .and_then(|n| n.identity.clone());
-        let is_twin = |n: &&Node| {
-            n.path != path && n.identity.as_ref().map(|i| &i.id) == identity.as_ref().map(|i| &i.id)
-        };
-        let twins = match identity {
-            Some(_) => all
-                .iter()
-                .filter(is_twin)
-                .filter_map(|n| Some(n.identity.as_ref()?.port.clone()))
-                .collect(),
-            None => Vec::new(),
-        };
+        let mut twins = Vec::new();
+        for node in all.iter().filter(|n| n.path != path) {
+            if let (Some(own), Some(other)) = (&identity, &node.identity)
+                && own.id == other.id
+            {
+                twins.push(other.port.clone());
+            }
+        }
         Self {
             places,
             path,
@@ -210,22 +210,38 @@ impl Known {
         self.identity.as_ref()
     }
 
+    /// The folder below /sys of the USB interface that `node` belongs to: it vanishes when the
+    /// kernel is done with taking an unplugged device away. `None` for what is not on USB.
+    pub(super) fn interface_of(&self, node: &Path) -> Option<PathBuf> {
+        let node = std::fs::canonicalize(node).unwrap_or_else(|_| node.to_owned());
+        let class = self
+            .places
+            .sys
+            .join("class/video4linux")
+            .join(node.file_name()?);
+        let device = std::fs::canonicalize(class).ok()?;
+        let interface = device.parent()?.parent()?;
+        interface
+            .join("bInterfaceNumber")
+            .exists()
+            .then(|| interface.to_owned())
+    }
+
     /// Where it is now: it may have got another number. Without an identity the path is all that is
     /// known of it.
     pub(super) fn find(&self) -> Option<PathBuf> {
         let Some(known) = &self.identity else {
             return self.path.exists().then(|| self.path.clone());
         };
-        let same = |n: &Node| {
-            n.identity
-                .as_ref()
-                .filter(|i| i.id == known.id && !self.twins.contains(&i.port))
-                .cloned()
-        };
-        let found: Vec<(PathBuf, Identity)> = nodes(&self.places)
-            .into_iter()
-            .filter_map(|n| Some((n.path.clone(), same(&n)?)))
-            .collect();
+        let mut found: Vec<(PathBuf, Identity)> = Vec::new();
+        for node in nodes(&self.places) {
+            if let Some(identity) = node.identity
+                && identity.id == known.id
+                && !self.twins.contains(&identity.port)
+            {
+                found.push((node.path, identity));
+            }
+        }
         let at_its_port = found.iter().find(|(_, i)| i.port == known.port);
         at_its_port.or(found.first()).map(|(path, _)| path.clone())
     }
@@ -324,6 +340,18 @@ mod tests {
                 .id
                 .clone()
         }
+    }
+
+    #[test]
+    fn the_interface_of_a_usb_camera_is_a_folder_that_goes_with_it() {
+        let system = System::new();
+        system.usb("1-1", 0, None);
+        let usb = system.known(0);
+        assert_eq!(usb.interface_of(&system.dev(0)), None, "not on USB");
+        let interface = system.places.sys.join("devices/pci0/usb1/1-1/1-1:1.0");
+        fs::write(interface.join("bInterfaceNumber"), "00\n").expect("attribute");
+        assert_eq!(usb.interface_of(&system.dev(0)), Some(interface));
+        assert_eq!(usb.interface_of(&system.dev(1)), None, "no such node");
     }
 
     #[test]

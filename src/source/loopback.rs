@@ -39,13 +39,6 @@ impl Loopback {
     /// # Errors
     /// It is not there, takes no frames, is in use, or takes no frames of that format or size.
     pub fn open(path: &Path, first: &RawFrame, rate_hz: Option<f64>) -> Result<Self, SourceError> {
-        let input = path.display().to_string();
-        let failed =
-            |doing: &'static str| move |e: io::Error| SourceError::of_driver(path, doing, &e);
-        let bad = |what: String| SourceError::BadFormat {
-            input: input.clone(),
-            what,
-        };
         let device = Device::with_path(path).map_err(|e| {
             match SourceError::of_driver(path, "opening it", &e) {
                 SourceError::Absent { input, .. } => SourceError::Absent {
@@ -57,10 +50,10 @@ impl Loopback {
         })?;
         let caps = device
             .query_caps()
-            .map_err(failed("asking for its abilities"))?;
+            .map_err(SourceError::refused(path, "asking for its abilities"))?;
         if !caps.capabilities.contains(Caps::VIDEO_OUTPUT) {
             let what = "it takes no frames; give a device made with `sudo modprobe v4l2loopback` that nothing feeds yet";
-            return Err(bad(what.to_owned()));
+            return Err(SourceError::bad_format(path, what));
         }
         let fourcc: [u8; 4] = first
             .format
@@ -71,15 +64,13 @@ impl Loopback {
         let wanted = Format::new(first.size.width, first.size.height, FourCC::new(&fourcc));
         let granted = device
             .set_format(&wanted)
-            .map_err(failed("setting the picture format"))?;
+            .map_err(SourceError::refused(path, "setting the picture format"))?;
         if (granted.width, granted.height, granted.fourcc)
             != (wanted.width, wanted.height, wanted.fourcc)
         {
             let given = format!("{} {}x{}", granted.fourcc, granted.width, granted.height);
-            return Err(bad(format!(
-                "it takes {given} and not {} {}",
-                first.format, first.size
-            )));
+            let what = format!("it takes {given} and not {} {}", first.format, first.size);
+            return Err(SourceError::bad_format(path, what));
         }
         if let Some(hz) = rate_hz.filter(|hz| (1.0..=1000.0).contains(hz)) {
             // Only what readers are told; the frames' own times pace them.
@@ -94,7 +85,9 @@ impl Loopback {
             format,
             size,
         };
-        output.map_buffers().map_err(failed("asking for buffers"))?;
+        output
+            .map_buffers()
+            .map_err(SourceError::refused(path, "asking for buffers"))?;
         Ok(output)
     }
 
@@ -145,18 +138,15 @@ impl Loopback {
     /// # Errors
     /// The device refuses, or the frame is none of those it was opened for.
     pub fn put(&mut self, raw: &RawFrame) -> Result<(), SourceError> {
-        let bad = |what: String| SourceError::BadFormat {
-            input: self.path.display().to_string(),
-            what,
-        };
+        const DOING: &str = "handing over a frame";
         if (raw.format, raw.size) != (self.format, self.size) {
             let (format, size) = (self.format, self.size);
-            return Err(bad(format!(
+            let what = format!(
                 "frames change from {format} {size} to {} {}",
                 raw.format, raw.size
-            )));
+            );
+            return Err(SourceError::bad_format(&self.path, what));
         }
-        let failed = |e: io::Error| SourceError::of_driver(&self.path, "handing over a frame", &e);
         let mut buffer = v4l2_buffer {
             index: self.frames as u32,
             ..described()
@@ -165,14 +155,13 @@ impl Loopback {
         // longest ago.
         if self.frames >= self.buffers.len() as u64 {
             self.call(vidioc::VIDIOC_DQBUF, &mut buffer)
-                .map_err(failed)?;
+                .map_err(SourceError::refused(&self.path, DOING))?;
         }
         let mapped = self.buffers.get(buffer.index as usize).copied();
         let Some(mapped) = mapped.filter(|m| m.len() >= raw.bytes.len()) else {
-            return Err(bad(format!(
-                "a frame of {} bytes does not fit into its buffers",
-                raw.bytes.len()
-            )));
+            let length = raw.bytes.len();
+            let what = format!("a frame of {length} bytes does not fit into its buffers");
+            return Err(SourceError::bad_format(&self.path, what));
         };
         // SAFETY: the mapping lasts as long as `self`, is as long as was just compared, and the
         // driver has given the buffer to us. Other programs may read it; a torn picture is all that
@@ -190,10 +179,10 @@ impl Loopback {
         if self.frames == 0 {
             let mut kind = OUTPUT;
             self.call(vidioc::VIDIOC_STREAMON, &mut kind)
-                .map_err(failed)?;
+                .map_err(SourceError::refused(&self.path, DOING))?;
         }
         self.call(vidioc::VIDIOC_QBUF, &mut buffer)
-            .map_err(failed)?;
+            .map_err(SourceError::refused(&self.path, DOING))?;
         self.frames += 1;
         Ok(())
     }

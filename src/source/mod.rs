@@ -34,7 +34,6 @@ use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::time::Duration;
 
 /// What was opened and what is to be expected of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,7 +60,12 @@ pub struct Health {
     pub clock: ClockKind,
 }
 
-/// A sequence of frames.
+/// Makes the same camera once more: closed, and with the counts and the clock of the first one as
+/// they are at that moment.
+pub type Successor = Box<dyn Fn() -> Box<dyn Source> + Send>;
+
+/// A sequence of frames. Any call to a live one may block for as long as its driver does, or for
+/// ever; `runtime` makes them on a thread that it can leave behind.
 pub trait Source: Send {
     /// Waits for the next frame; `None` is the end, and stays it.
     ///
@@ -97,11 +101,12 @@ pub trait Source: Send {
         })
     }
 
-    /// The time after which silence is a failure, of a source that cannot keep to it by itself:
-    /// [`next_frame`] may then wait for ever, and belongs on a thread of its own.
-    ///
-    /// [`next_frame`]: Self::next_frame
-    fn waits_without_limit(&self) -> Option<Duration> {
+    /// Gives the device back after a failure, so that it can go and come back.
+    fn close(&mut self) {}
+
+    /// How to go on with the same camera if a call to its driver never returns; `None` where there
+    /// is no other way than to wait for that call.
+    fn successor(&self) -> Option<Successor> {
         None
     }
 

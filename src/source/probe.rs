@@ -46,16 +46,31 @@ pub(super) fn spawn_error(program: &str, path: &Path, e: &std::io::Error) -> Sou
 
 /// Asks ffprobe, which is called `program`.
 pub(super) fn probe(path: &Path, program: &str) -> Result<Probe, SourceError> {
-    let bad = |what: String| SourceError::BadFormat {
-        input: path.display().to_string(),
-        what,
-    };
     let (length, cut) = look_into(path).map_err(|e| SourceError::of_file(path, &e))?;
     if length == 0 {
-        return Err(bad(
-            "the file has no content; film again, or name another file".to_owned(),
-        ));
+        let what = "the file has no content; film again, or name another file";
+        return Err(SourceError::bad_format(path, what));
     }
+    let output = ffprobe(path, program, length <= COUNTED_BYTES)
+        .output()
+        .map_err(|e| spawn_error(program, path, &e))?;
+    if !output.status.success() {
+        let said = String::from_utf8_lossy(&output.stderr);
+        let hint = if said.contains("moov atom not found") {
+            " (an .mp4 that was cut short)"
+        } else {
+            ""
+        };
+        let what =
+            format!("it is no video that ffmpeg can read{hint}; try to play it with `ffplay`");
+        return Err(SourceError::bad_format(path, what));
+    }
+    let said = serde_json::from_slice(&output.stdout)
+        .map_err(|e| SourceError::bad_format(path, format!("{program} gives no answer: {e}")))?;
+    first_stream(&said, cut).map_err(|what| SourceError::bad_format(path, what))
+}
+
+fn ffprobe(path: &Path, program: &str, counts: bool) -> Command {
     let mut command = Command::new(program);
     // Only V: a picture of a sleeve in a sound file is a video stream, too, but not one that moves.
     command.args([
@@ -68,65 +83,48 @@ pub(super) fn probe(path: &Path, program: &str) -> Result<Probe, SourceError> {
         "-of",
         "json",
     ]);
-    if length <= COUNTED_BYTES {
+    if counts {
         command.arg("-count_packets");
     }
-    command.args([
-        "-show_entries",
-        "stream=codec_name,nb_frames,nb_read_packets,duration,avg_frame_rate:stream_tags",
-    ]);
     command
+        .args([
+            "-show_entries",
+            "stream=codec_name,nb_frames,nb_read_packets,duration,avg_frame_rate:stream_tags",
+        ])
         .args([
             "-show_entries",
             "format=format_name,nb_streams,duration,start_time",
             "-i",
         ])
-        .arg(file_url(path));
-    let output = command
-        .stdin(Stdio::null())
-        .output()
-        .map_err(|e| spawn_error(program, path, &e))?;
-    if !output.status.success() {
-        let said = String::from_utf8_lossy(&output.stderr);
-        let hint = if said.contains("moov atom not found") {
-            " (an .mp4 that was cut short)"
-        } else {
-            ""
-        };
-        return Err(bad(format!(
-            "it is no video that ffmpeg can read{hint}; try to play it with `ffplay`"
-        )));
-    }
-    let said: serde_json::Value = serde_json::from_slice(&output.stdout)
-        .map_err(|e| bad(format!("{program} gives no answer: {e}")))?;
+        .arg(file_url(path))
+        .stdin(Stdio::null());
+    command
+}
+
+/// What ffprobe has said of the first video stream; the error says why there is none.
+fn first_stream(said: &serde_json::Value, cut: bool) -> Result<Probe, &'static str> {
     let (stream, format) = (&said["streams"][0], &said["format"]);
     let container = format["format_name"].as_str().unwrap_or_default();
-    let is_picture = container == "image2" || container.ends_with("_pipe");
-    // Other containers only guess; for MJPEG in AVI it may be twice the number.
-    let indexed = || {
-        if container.contains("mp4") {
-            number(&stream["nb_frames"])
-        } else {
-            None
-        }
-    };
-    // ffmpeg plays a text file as a typewriter, which nobody wants to see here.
-    let is_text = container == "tty" || stream["codec_name"] == "ansi";
-    match stream["codec_name"].as_str() {
-        _ if is_picture => Err(bad(
-            "it is a single picture; give the folder of pictures, or a video".to_owned(),
-        )),
-        Some(codec) if !is_text => Ok(Probe {
-            codec: codec.to_owned(),
-            rate_hz: ratio(stream["avg_frame_rate"].as_str().unwrap_or_default()),
-            frames: number(&stream["nb_read_packets"])
-                .or_else(indexed)
-                .map(|n| n as u64),
-            cut,
-            duration_s: duration(stream, format),
-        }),
-        _ => Err(bad("there is no video in it".to_owned())),
+    if container == "image2" || container.ends_with("_pipe") {
+        return Err("it is a single picture; give the folder of pictures, or a video");
     }
+    let codec = stream["codec_name"].as_str().unwrap_or_default();
+    // ffmpeg plays a text file as a typewriter, which nobody wants to see here.
+    if codec.is_empty() || codec == "ansi" || container == "tty" {
+        return Err("there is no video in it");
+    }
+    let mut frames = number(&stream["nb_read_packets"]);
+    // Other containers only guess; for MJPEG in AVI it may be twice the number.
+    if frames.is_none() && container.contains("mp4") {
+        frames = number(&stream["nb_frames"]);
+    }
+    Ok(Probe {
+        codec: codec.to_owned(),
+        rate_hz: ratio(stream["avg_frame_rate"].as_str().unwrap_or_default()),
+        frames: frames.map(|n| n as u64),
+        cut,
+        duration_s: duration_s(stream, format),
+    })
 }
 
 /// Length of the file, and whether its RIFF head promises more. A head that promises nothing is not
@@ -160,18 +158,20 @@ pub(super) fn ratio(text: &str) -> Option<f64> {
     (value.is_finite() && value > 0.0).then_some(value)
 }
 
-fn duration(stream: &serde_json::Value, format: &serde_json::Value) -> Option<f64> {
-    let tagged = || {
-        let mut parts = stream["tags"]["DURATION"]
-            .as_str()?
-            .split(':')
-            .map(|p| p.parse::<f64>().ok());
-        Some(3600.0 * parts.next()?? + 60.0 * parts.next()?? + parts.next()??)
-    };
-    // The whole file may be longer than its picture, unless there is nothing else in it.
-    let whole = || match format["nb_streams"].as_u64() {
-        Some(1) => number(&format["duration"]),
-        _ => None,
-    };
-    number(&stream["duration"]).or_else(tagged).or_else(whole)
+/// Length of the stream, s, by its own entry, by its tag, or by that of the file. The whole file
+/// may be longer than its picture, unless there is nothing else in it.
+fn duration_s(stream: &serde_json::Value, format: &serde_json::Value) -> Option<f64> {
+    let alone = format["nb_streams"].as_u64() == Some(1);
+    number(&stream["duration"])
+        .or_else(|| tagged_s(stream))
+        .or_else(|| number(&format["duration"]).filter(|_| alone))
+}
+
+/// `00:00:11.000` of Matroska, s.
+fn tagged_s(stream: &serde_json::Value) -> Option<f64> {
+    let mut parts = stream["tags"]["DURATION"].as_str()?.split(':');
+    let hours: f64 = parts.next()?.parse().ok()?;
+    let minutes: f64 = parts.next()?.parse().ok()?;
+    let seconds: f64 = parts.next()?.parse().ok()?;
+    Some(3600.0 * hours + 60.0 * minutes + seconds)
 }

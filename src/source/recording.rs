@@ -101,6 +101,11 @@ impl Recording {
         }
     }
 
+    /// A length that the recording's own head says.
+    fn pixels(&self, key: &str) -> Option<u32> {
+        self.reader.about().get(key)?.parse().ok()
+    }
+
     /// Size, format and bytes as a camera gives them.
     fn unpack(&self, encoding: Encoding, bytes: Vec<u8>) -> Option<(Size, PixelFormat, Vec<u8>)> {
         if let Encoding::Pixels(format, size) = encoding {
@@ -108,9 +113,9 @@ impl Recording {
         }
         // A picture that was damaged before it was recorded is counted where a camera's is: by the
         // decoder.
-        let told = |key: &str| self.reader.about().get(key).and_then(|n| n.parse().ok());
-        let known = told("width")
-            .zip(told("height"))
+        let known = self
+            .pixels("width")
+            .zip(self.pixels("height"))
             .map(|(w, h)| Size::new(w, h))
             .or(self.size);
         match known {
@@ -134,15 +139,16 @@ impl Source for Recording {
 
     fn describe(&self) -> SourceInfo {
         let about = self.reader.about();
-        let told = |key: &str| about.get(key).cloned().unwrap_or_default();
         let size = self.size.unwrap_or(Size::new(0, 0));
         let first = self
             .pending
             .front()
             .map_or(PixelFormat::Mjpeg, |f| f.format);
-        let given = Some(told("format_given"))
+        let given = about
+            .get("format_given")
             .filter(|f| !f.is_empty())
-            .unwrap_or(format!("{first} {size}"));
+            .cloned()
+            .unwrap_or_else(|| format!("{first} {size}"));
         SourceInfo {
             name: self.path.display().to_string(),
             format: FormatNote {

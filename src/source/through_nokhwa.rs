@@ -1,13 +1,13 @@
 //! A camera read through the nokhwa crate, for those that fail with our own way. It waits for a
 //! frame without a limit, and tells neither numbers nor flags nor times: the time is that of
-//! reception, and whoever runs it must watch it.
+//! reception.
 
 use super::choice::{Granted, Wish};
 use super::clock::ClockKind;
 use super::identity::{Known, Places};
 use super::opened::{describe, same_again};
 use super::v4l2::prospect;
-use super::{Health, Source, SourceError, SourceInfo};
+use super::{Health, Source, SourceError, SourceInfo, Successor};
 use crate::caught::caught;
 use crate::config;
 use crate::model::{PixelFormat, RawFrame, Size};
@@ -17,20 +17,35 @@ use nokhwa::utils::{
 };
 use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// A camera that films through nokhwa.
-pub(super) struct NokhwaCamera {
+/// What a camera is known by, and what was agreed with it.
+#[derive(Clone)]
+struct Agreed {
     known: Known,
     path: PathBuf,
     name: String,
     asked: Wish,
     granted: Granted,
-    camera: Opened,
     timeout: Duration,
+    /// Zero of the frames' times.
     opened: Instant,
+}
+
+/// What goes on from one opening to the next.
+#[derive(Clone, Default)]
+struct Progress {
     last_s: f64,
     damaged: u64,
+}
+
+/// A camera that films through nokhwa.
+pub(super) struct NokhwaCamera {
+    agreed: Agreed,
+    /// Its successor reads this while a call to nokhwa hangs: never locked during one.
+    progress: Arc<Mutex<Progress>>,
+    camera: Opened,
 }
 
 impl NokhwaCamera {
@@ -45,34 +60,53 @@ impl NokhwaCamera {
             size: asked.size,
             rate_hz: Some(asked.rate_hz),
         });
-        let accept = |offered: &Granted| {
-            if asked.is_met_by(offered) || config.accept_format {
-                return Ok(());
-            }
-            let what =
-                format!("asked for {asked}, it offers {offered}; take that with --accept-format");
-            Err(SourceError::BadFormat {
-                input: path.display().to_string(),
-                what,
-            })
-        };
-        accept(&wanted)?;
+        accept(path, config, &asked, &wanted)?;
         let known = Known::new(Places::default(), path);
         let (camera, granted) = start(path, &wanted, asked.rate_hz)?;
-        accept(&granted)?;
+        accept(path, config, &asked, &granted)?;
         Ok(Self {
-            known,
-            path: path.to_owned(),
-            name: prospect.card,
-            asked,
-            granted,
+            agreed: Agreed {
+                known,
+                path: path.to_owned(),
+                name: prospect.card,
+                asked,
+                granted,
+                timeout: config.time_limit(),
+                opened: Instant::now(),
+            },
+            progress: Arc::default(),
             camera,
-            timeout: config.time_limit(),
-            opened: Instant::now(),
-            last_s: 0.0,
-            damaged: 0,
         })
     }
+
+    fn progress(&self) -> MutexGuard<'_, Progress> {
+        lock(&self.progress)
+    }
+
+    fn disconnected(&self, reason: String) -> SourceError {
+        SourceError::Disconnected {
+            input: self.agreed.path.display().to_string(),
+            reason,
+        }
+    }
+}
+
+fn lock(progress: &Mutex<Progress>) -> MutexGuard<'_, Progress> {
+    progress.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Refuses what was not asked for, unless the settings take whatever comes.
+fn accept(
+    path: &Path,
+    config: &config::Camera,
+    asked: &Wish,
+    offered: &Granted,
+) -> Result<(), SourceError> {
+    if asked.is_met_by(offered) || config.accept_format {
+        return Ok(());
+    }
+    let what = format!("asked for {asked}, it offers {offered}; take that with --accept-format");
+    Err(SourceError::bad_format(path, what))
 }
 
 /// The crate panics, too, where a driver does not take back what it gave, as one does that is gone.
@@ -93,49 +127,62 @@ impl Drop for Opened {
 
 impl Source for NokhwaCamera {
     fn next_frame(&mut self) -> Result<Option<RawFrame>, SourceError> {
-        let Granted { format, size, .. } = self.granted;
-        let shown = self.path.display().to_string();
+        let Granted { format, size, .. } = self.agreed.granted;
         let Some(camera) = &mut self.camera.0 else {
-            return Err(SourceError::Disconnected {
-                input: shown,
-                reason: "it is closed".into(),
-            });
+            return Err(self.disconnected("it is closed".into()));
         };
-        let take = || {
-            guarded(|| {
-                camera
-                    .frame_raw()
-                    .map(|bytes| picture(&bytes, format, size))
-            })
-        };
-        let failed = match first_usable(take, self.timeout, &mut self.damaged) {
+        let mut damaged = 0;
+        let taken = first_usable(
+            || {
+                guarded(|| {
+                    let bytes = camera.frame_raw()?;
+                    Ok(picture(&bytes, format, size))
+                })
+            },
+            self.agreed.timeout,
+            &mut damaged,
+        );
+        let received_s = self.agreed.opened.elapsed().as_secs_f64();
+        let mut progress = self.progress();
+        progress.damaged += damaged;
+        match taken {
             Ok(Some(bytes)) => {
                 // Two frames that come at once are told apart by the least step.
-                self.last_s = self.opened.elapsed().as_secs_f64().max(self.last_s + 1e-4);
-                return Ok(Some(RawFrame {
+                progress.last_s = received_s.max(progress.last_s + 1e-4);
+                Ok(Some(RawFrame {
                     sequence: None,
-                    sensor_time_s: self.last_s,
+                    sensor_time_s: progress.last_s,
                     size,
                     format,
                     bytes,
-                }));
+                }))
             }
-            Ok(None) => SourceError::Timeout {
-                input: shown,
-                seconds: self.timeout.as_secs_f64(),
-            },
-            Err(reason) => SourceError::Disconnected {
-                input: shown,
-                reason,
-            },
-        };
-        self.camera.close();
-        Err(failed)
+            Ok(None) => Err(SourceError::Timeout {
+                input: self.agreed.path.display().to_string(),
+                seconds: self.agreed.timeout.as_secs_f64(),
+            }),
+            Err(reason) => Err(self.disconnected(reason)),
+        }
     }
 
     fn describe(&self) -> SourceInfo {
-        let name = format!("{}, through nokhwa", self.name);
-        describe(&self.path, &name, &self.known, &self.asked, &self.granted)
+        let agreed = &self.agreed;
+        let name = format!("{}, through nokhwa", agreed.name);
+        describe(
+            &agreed.path,
+            &name,
+            &agreed.known,
+            &agreed.asked,
+            &agreed.granted,
+        )
+    }
+
+    fn adopt(&mut self, config: &config::Camera) {
+        self.agreed.timeout = config.time_limit();
+    }
+
+    fn close(&mut self) {
+        self.camera.close();
     }
 
     fn returns(&self) -> bool {
@@ -143,28 +190,37 @@ impl Source for NokhwaCamera {
     }
 
     fn reopen(&mut self) -> Result<(), SourceError> {
-        self.camera.close();
-        let absent = || SourceError::Absent {
-            input: self.path.display().to_string(),
+        self.close();
+        let agreed = &self.agreed;
+        let path = agreed.known.find().ok_or_else(|| SourceError::Absent {
+            input: agreed.path.display().to_string(),
             hint: "plug it in again",
-        };
-        let path = self.known.find().ok_or_else(absent)?;
-        let (camera, granted) = start(&path, &self.granted, self.asked.rate_hz)?;
-        same_again(&path, &self.granted, &granted)?;
-        (self.camera, self.path) = (camera, path);
+        })?;
+        let (camera, granted) = start(&path, &agreed.granted, agreed.asked.rate_hz)?;
+        same_again(&path, &agreed.granted, &granted)?;
+        self.camera = camera;
+        self.agreed.path = path;
         Ok(())
+    }
+
+    fn successor(&self) -> Option<Successor> {
+        let (agreed, progress) = (self.agreed.clone(), self.progress.clone());
+        Some(Box::new(move || {
+            let so_far = lock(&progress).clone();
+            Box::new(NokhwaCamera {
+                agreed: agreed.clone(),
+                progress: Arc::new(Mutex::new(so_far)),
+                camera: Opened(None),
+            })
+        }))
     }
 
     fn health(&self) -> Health {
         Health {
-            damaged: self.damaged,
+            damaged: self.progress().damaged,
             stale: 0,
             clock: ClockKind::Received,
         }
-    }
-
-    fn waits_without_limit(&self) -> Option<Duration> {
-        Some(self.timeout)
     }
 }
 
@@ -177,25 +233,22 @@ fn guarded<T>(call: impl FnOnce() -> Result<T, nokhwa::NokhwaError>) -> Result<T
 }
 
 fn start(path: &Path, wanted: &Granted, rate_hz: f64) -> Result<(Opened, Granted), SourceError> {
-    let input = path.display().to_string();
-    let bad = |what: String| SourceError::BadFormat {
-        input: input.clone(),
-        what,
-    };
     let target = std::fs::canonicalize(path).map_err(|e| SourceError::of_file(path, &e))?;
     let number = target
         .file_name()
         .and_then(|n| n.to_str()?.strip_prefix("video")?.parse().ok());
-    let number = number.ok_or_else(|| bad("nokhwa takes /dev/videoN only".into()))?;
+    let number =
+        number.ok_or_else(|| SourceError::bad_format(path, "nokhwa takes /dev/videoN only"))?;
     // nokhwa gives no reason that could be told from another: one that may not be opened yet is to
     // be looked at again.
     let may_open = OpenOptions::new().read(true).write(true).open(&target);
     may_open.map_err(|e| SourceError::of_driver(path, "opening it", &e))?;
     let format = frame_format(wanted.format).ok_or_else(|| {
-        bad(format!(
+        let what = format!(
             "nokhwa does not read {}; set camera.format, or use --backend v4l2",
             wanted.format
-        ))
+        );
+        SourceError::bad_format(path, what)
     })?;
     let size = Resolution::new(wanted.size.width, wanted.size.height);
     let exact = CameraFormat::new(
@@ -214,10 +267,9 @@ fn start(path: &Path, wanted: &Granted, rate_hz: f64) -> Result<(Opened, Granted
         camera.open_stream()?;
         Ok(camera)
     });
-    let camera =
-        Opened(Some(opened.map_err(|e| {
-            bad(format!("nokhwa: {e}; try --backend v4l2"))
-        })?));
+    let camera = Opened(Some(opened.map_err(|e| {
+        SourceError::bad_format(path, format!("nokhwa: {e}; try --backend v4l2"))
+    })?));
     let given = camera
         .0
         .as_ref()
@@ -228,9 +280,8 @@ fn start(path: &Path, wanted: &Granted, rate_hz: f64) -> Result<(Opened, Granted
         rate_hz: Some(f64::from(given.frame_rate())),
     };
     if given.format() != format || granted.size != wanted.size {
-        return Err(bad(format!(
-            "nokhwa gives {given} where {wanted} was asked; use --backend v4l2"
-        )));
+        let what = format!("nokhwa gives {given} where {wanted} was asked; use --backend v4l2");
+        return Err(SourceError::bad_format(path, what));
     }
     Ok((camera, granted))
 }

@@ -24,6 +24,36 @@ const MAX_FRAME_BYTES: usize = 1 << 30;
 /// standard output.
 const OUTPUTS: &str = "[f=framecrc:flush_packets=1]pipe:0|[f=rawvideo:flush_packets=1]pipe:1";
 
+/// What it means that the child's pipes cannot be made.
+fn no_pipe(ffmpeg: &str, path: &Path, e: &std::io::Error) -> SourceError {
+    // Never the kind of a program that is not there.
+    spawn_error(ffmpeg, path, &std::io::Error::other(e.to_string()))
+}
+
+/// Writes the frames of `path` in `format`, and a line for each.
+fn reader(path: &Path, ffmpeg: &str, format: PixelFormat) -> Command {
+    let mut command = Command::new(ffmpeg);
+    command
+        .args(["-nostdin", "-hide_banner", "-v", "error"])
+        .args(["-protocol_whitelist", "file"])
+        .args(["-fflags", "+discardcorrupt", "-copyts", "-i"])
+        .arg(file_url(path))
+        .args(["-map", "0:V:0"]);
+    match format {
+        PixelFormat::Mjpeg => command.args(["-c:v", "copy"]),
+        // Two pixels share their colour in YUYV: an odd column at the right is cut off. Without
+        // `-enc_time_base` and `-vsync` the times would be rounded to a nominal rate.
+        _ => command
+            .args(["-vf", "format=yuyv422,crop=trunc(iw/2)*2:ih:0:0"])
+            .args(["-c:v", "rawvideo", "-pix_fmt", "yuyv422"])
+            .args(["-vsync", "passthrough", "-enc_time_base", "-1"]),
+    };
+    // A group of its own: Ctrl-C at the terminal is for us, and would look like the clip's end if
+    // ffmpeg got it.
+    command.args(["-f", "tee", OUTPUTS]).process_group(0);
+    command
+}
+
 /// A video file that is being read.
 pub(super) struct Video {
     path: PathBuf,
@@ -60,51 +90,19 @@ impl Video {
         } else {
             PixelFormat::Yuyv
         };
-        let local =
-            |e: std::io::Error| spawn_error(ffmpeg, path, &std::io::Error::other(e.to_string()));
-        let (lines, lines_end) = std::io::pipe().map_err(local)?;
-        let log = tempfile::tempfile().map_err(local)?;
-        let mut command = Command::new(ffmpeg);
-        command.args([
-            "-nostdin",
-            "-hide_banner",
-            "-v",
-            "error",
-            "-protocol_whitelist",
-            "file",
-        ]);
-        command
-            .args(["-fflags", "+discardcorrupt", "-copyts", "-i"])
-            .arg(file_url(path))
-            .args(["-map", "0:V:0"]);
-        match format {
-            PixelFormat::Mjpeg => command.args(["-c:v", "copy"]),
-            // Two pixels share their colour in YUYV: an odd column at the right is cut off. Without
-            // `-enc_time_base` and `-vsync` the times would be rounded to a nominal rate.
-            _ => command
-                .args([
-                    "-vf",
-                    "format=yuyv422,crop=trunc(iw/2)*2:ih:0:0",
-                    "-c:v",
-                    "rawvideo",
-                    "-pix_fmt",
-                    "yuyv422",
-                ])
-                .args(["-vsync", "passthrough", "-enc_time_base", "-1"]),
-        };
-        command.args(["-f", "tee", OUTPUTS]);
+        let (lines, lines_end) = std::io::pipe().map_err(|e| no_pipe(ffmpeg, path, &e))?;
+        let log = tempfile::tempfile().map_err(|e| no_pipe(ffmpeg, path, &e))?;
+        let complaints = log.try_clone().map_err(|e| no_pipe(ffmpeg, path, &e))?;
+        let mut command = reader(path, ffmpeg, format);
         command
             .stdin(lines_end)
             .stdout(Stdio::piped())
-            .stderr(log.try_clone().map_err(local)?);
-        // A group of its own: Ctrl-C at the terminal is for us, and would look like the clip's end
-        // if ffmpeg got it.
-        command.process_group(0);
+            .stderr(complaints);
         let mut child = command.spawn().map_err(|e| spawn_error(ffmpeg, path, &e))?;
         // The command still holds the pipe's other end, and with it the end of the stream.
         drop(command);
         let Some(data) = child.stdout.take() else {
-            return Err(local(std::io::Error::other("no pipe")));
+            return Err(no_pipe(ffmpeg, path, &std::io::Error::other("no pipe")));
         };
         let mut video = Self {
             path: path.to_owned(),
@@ -126,22 +124,27 @@ impl Video {
             warnings: Vec::new(),
         };
         video.pending = std::iter::from_fn(|| video.read_frame()).take(2).collect();
-        let input = path.display().to_string();
         match video.pending.len() {
-            0 => {}
-            1 => return Err(SourceError::SingleFrame { input }),
-            _ => return Ok(video),
+            0 => Err(video.unreadable()),
+            1 => Err(SourceError::SingleFrame {
+                input: path.display().to_string(),
+            }),
+            _ => Ok(video),
         }
-        Err(match video.complaint() {
+    }
+
+    /// Why there is no frame at all.
+    fn unreadable(&mut self) -> SourceError {
+        match self.complaint() {
             None => SourceError::Empty {
-                input,
+                input: self.path.display().to_string(),
                 what: "the video has no frame; film again, or name another file",
             },
-            Some(what) => SourceError::BadFormat {
-                input,
-                what: format!("no frame of it can be read (ffmpeg: {what})"),
-            },
-        })
+            Some(what) => {
+                let what = format!("no frame of it can be read (ffmpeg: {what})");
+                SourceError::bad_format(&self.path, what)
+            }
+        }
     }
 
     /// The next frame whose time is later than the last one's, `None` at the end.

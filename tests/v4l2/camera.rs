@@ -5,7 +5,8 @@
 //!     usb-camera CLIP.mjpg WIDTH HEIGHT FPS SERIAL PORT GATE
 //!
 //! It delivers the pictures of CLIP over and over, as they are, while the file GATE is there;
-//! without it, it is a camera that answers and films nothing.
+//! without it, it is a camera that answers and films nothing. While GATE.deaf is there it answers
+//! nothing at all, and whoever closes it waits in the kernel until it is pulled out.
 
 mod descriptors;
 mod usbip;
@@ -136,7 +137,12 @@ struct Camera {
 impl Camera {
     fn run(mut self) -> io::Result<()> {
         self.probe = descriptors::probe(&self.mode);
+        let deaf = self.gate.with_extension("deaf");
         loop {
+            if deaf.exists() {
+                std::thread::sleep(IDLE);
+                continue;
+            }
             self.deliver()?;
             let nap = self.filming.as_ref().map_or(IDLE, |f| self.due(f));
             self.socket

@@ -9,7 +9,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::Mutex;
+use std::sync::{Mutex, Once};
 
 const PREPARE: &str = "tests/vm/prepare.sh";
 const RUN: &str = "tests/vm/run";
@@ -115,10 +115,11 @@ impl Guest {
                 "{}",
                 String::from_utf8_lossy(&ran.stdout)
             );
-            return Ok(Results { folder });
+            return Ok(Results::of(folder));
         }
         // Once, not with every case.
         let _ = writeln!(std::io::stderr(), "{said}");
+        Results::of(folder.clone()).say_stacks();
         Err(format!(
             "the guest's script failed; what it left is in {}",
             folder.display()
@@ -135,9 +136,26 @@ fn demanded() -> bool {
 /// What a group's script wrote to its folder, `/vm` in the guest.
 pub struct Results {
     folder: PathBuf,
+    stacks: Once,
 }
 
 impl Results {
+    fn of(folder: PathBuf) -> Self {
+        Self {
+            folder,
+            stacks: Once::new(),
+        }
+    }
+
+    /// Where every thread was when something stood still in the guest, once, on the real standard
+    /// error: what went wrong is rarely seen again when it is looked for.
+    pub fn say_stacks(&self) {
+        self.stacks.call_once(|| {
+            let text = fs::read(self.path("stacks")).unwrap_or_default();
+            let _ = std::io::stderr().write_all(&text);
+        });
+    }
+
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
     }

@@ -52,7 +52,7 @@ fn main() -> ExitCode {
                 results
                     .as_ref()
                     .map_err(Clone::clone)
-                    .and_then(judge)
+                    .and_then(|results| judge(results).inspect_err(|_| results.say_stacks()))
                     .map_err(Into::into)
             })
             .with_ignored_flag(ignored)

@@ -14,7 +14,7 @@ pub const GROUP: Group = Group {
     name: "replug",
     script: "replug.sh",
     first: "script",
-    limit_s: 240,
+    limit_s: 400,
     provide: clip,
     cases: &[
         (
@@ -31,6 +31,10 @@ pub const GROUP: Group = Group {
         (
             "a_camera_that_hangs_ends_a_capture_that_is_to_end_with_it",
             hang_once,
+        ),
+        (
+            "a_camera_that_answers_nothing_does_not_keep_the_capture",
+            deaf,
         ),
         ("a_camera_is_known_by_its_serial_number", identity),
     ],
@@ -165,6 +169,21 @@ fn hang_once(r: &Results) -> Result<(), String> {
         format!("status {status}: {said}")
     })?;
     r.capture("hang-once").map(drop)
+}
+
+fn deaf(r: &Results) -> Result<(), String> {
+    let (status, said) = (r.status("deaf")?, r.messages("deaf")?);
+    claim(status == "130" && said.contains("no frame for 1 s"), || {
+        format!("status {status}: {said}")
+    })?;
+    let took = r.seconds("deaf", "asked", "written")?;
+    claim(took <= END_S * slack(), || {
+        format!("written {took} s after the wish: {said}")
+    })?;
+    let away_s = r.capture("deaf")?["timing"]["away_s"].as_f64();
+    claim(away_s.is_some_and(|s| s > 5.0), || {
+        format!("the lost time is not counted: {away_s:?}")
+    })
 }
 
 fn identity(r: &Results) -> Result<(), String> {

@@ -8,42 +8,61 @@ use super::choice::{Granted, Mode, Wish, choose};
 use super::clock::Clock;
 use super::identity::{Known, Places};
 use super::opened::{describe, same_again};
-use super::{Health, Source, SourceError, SourceInfo};
+use super::{Health, Source, SourceError, SourceInfo, Successor};
 use crate::config;
 use crate::model::{PixelFormat, RawFrame, Size};
 use offers::{Negotiated, negotiate};
 use session::{Session, Taken, Waited};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
-use v4l::buffer::Flags;
+use v4l::buffer::{Flags, Metadata};
 use v4l::capability::{Capabilities, Flags as Caps};
 
 /// The first picture of this driver is what happens to lie in its buffer, with a fresh time on it;
 /// and it does not count.
 const LOOPBACK: &str = "v4l2 loopback";
 
-/// A camera that films, or did until a moment ago.
-pub(super) struct Camera {
+/// What a camera is known by, and what was agreed with it.
+#[derive(Clone)]
+struct Agreed {
     known: Known,
     path: PathBuf,
     name: String,
     asked: Wish,
     granted: Granted,
+    /// Bytes from the start of a line to the next.
     stride: usize,
-    /// `None` between a failure and the next attempt to open it.
-    session: Option<Session>,
     timeout: Duration,
-    clock: Clock,
-    opened: Instant,
-    /// Frames still to be left out at the beginning.
-    leave_out: u32,
     loopback: bool,
-    stop: Arc<AtomicBool>,
+    /// Zero of the times of reception.
+    opened: Instant,
+}
+
+/// What goes on from one opening to the next.
+#[derive(Clone)]
+struct Progress {
+    clock: Clock,
     damaged: u64,
     stale: u64,
+}
+
+/// A camera that films, or did until a moment ago.
+pub(super) struct Camera {
+    agreed: Agreed,
+    /// Its successor reads this while a call to the driver hangs: never locked during one.
+    progress: Arc<Mutex<Progress>>,
+    /// `None` between a failure and the next attempt to open it.
+    session: Option<Session>,
+    /// Its folder below /sys, which says when it is gone for good; only on USB.
+    interface: Option<PathBuf>,
+    /// The driver says that the device is gone, or behaves like it.
+    vanishing: bool,
+    /// Frames still to be left out at the beginning.
+    leave_out: u32,
+    stop: Arc<AtomicBool>,
 }
 
 /// A device that has been opened and has granted a format.
@@ -67,35 +86,59 @@ impl Camera {
             modes,
         } = negotiated;
         if !asked.is_met_by(&granted) && !config.accept_format {
-            let what = refusal(&asked, &granted, &modes);
-            return Err(SourceError::BadFormat {
-                input: path.display().to_string(),
-                what,
-            });
+            return Err(SourceError::bad_format(
+                path,
+                refusal(&asked, &granted, &modes),
+            ));
         }
         let session = start(path, &device)?;
         let loopback = caps.driver == LOOPBACK;
-        Ok(Self {
+        let agreed = Agreed {
             known: Known::new(Places::default(), path),
             path: path.to_owned(),
             name: caps.card.trim().to_owned(),
             asked,
             granted,
             stride: stride.max(line_bytes(granted.format, granted.size)),
-            session: Some(session),
             timeout: config.time_limit(),
-            clock: Clock::new(!loopback),
-            opened: Instant::now(),
-            leave_out: u32::from(loopback),
             loopback,
-            stop: Arc::default(),
+            opened: Instant::now(),
+        };
+        let progress = Progress {
+            clock: Clock::new(!loopback),
             damaged: 0,
             stale: 0,
-        })
+        };
+        let mut camera = Self::closed(agreed, progress);
+        camera.filming(session);
+        Ok(camera)
+    }
+
+    fn closed(agreed: Agreed, progress: Progress) -> Self {
+        Self {
+            agreed,
+            progress: Arc::new(Mutex::new(progress)),
+            session: None,
+            interface: None,
+            vanishing: false,
+            leave_out: 0,
+            stop: Arc::default(),
+        }
+    }
+
+    fn filming(&mut self, session: Session) {
+        self.session = Some(session);
+        self.interface = self.agreed.known.interface_of(&self.agreed.path);
+        self.vanishing = false;
+        self.leave_out = u32::from(self.agreed.loopback);
+    }
+
+    fn progress(&self) -> MutexGuard<'_, Progress> {
+        lock(&self.progress)
     }
 
     fn shown(&self) -> String {
-        self.path.display().to_string()
+        self.agreed.path.display().to_string()
     }
 
     /// `Ok(None)`: asked to stop meanwhile.
@@ -105,10 +148,10 @@ impl Camera {
             Ok(Waited::Stopped) => Ok(None),
             Ok(Waited::Silent) => Err(SourceError::Timeout {
                 input: self.shown(),
-                seconds: self.timeout.as_secs_f64(),
+                seconds: self.agreed.timeout.as_secs_f64(),
             }),
             Err(e) => Err(SourceError::of_driver(
-                &self.path,
+                &self.agreed.path,
                 "waiting for a frame",
                 &e,
             )),
@@ -116,20 +159,19 @@ impl Camera {
     }
 
     fn next_of(&mut self, session: &mut Session) -> Result<Option<RawFrame>, SourceError> {
-        let until = Instant::now() + self.timeout;
-        let failed = |e: io::Error| SourceError::of_driver(&self.path, "taking a frame", &e);
+        let until = Instant::now() + self.agreed.timeout;
         loop {
             if self.wait(session, until)?.is_none() {
                 return Ok(None);
             }
-            let (used, meta) = match session.take().map_err(failed)? {
+            let (used, meta) = match session.take().map_err(|e| self.untaken(&e))? {
                 Taken::Frame(used, meta) => (used, meta),
                 Taken::Nothing => {
                     if self.wait(session, until)?.is_none() {
                         return Ok(None);
                     }
-                    session.take_lost().map_err(failed)?;
-                    self.damaged += 1;
+                    session.take_lost().map_err(|e| self.untaken(&e))?;
+                    self.progress().damaged += 1;
                     continue;
                 }
             };
@@ -137,31 +179,43 @@ impl Camera {
                 self.leave_out -= 1;
                 continue;
             }
-            // A damaged frame's number is not taken in: it shows up as a hole in the count, as
-            // frames that were lost do, and is told from them by the count of damaged ones.
-            let whole = !meta.flags.contains(Flags::ERROR);
-            let bytes = whole.then(|| {
-                without_padding(used, self.granted.format, self.granted.size, self.stride)
-            });
-            let Some(bytes) = bytes.flatten() else {
-                self.damaged += 1;
-                continue;
-            };
-            let Some((sequence, sensor_time_s)) =
-                self.clock.take(meta, self.opened.elapsed().as_secs_f64())
-            else {
-                self.stale += 1;
-                continue;
-            };
-            let (size, format) = (self.granted.size, self.granted.format);
-            return Ok(Some(RawFrame {
-                sequence,
-                sensor_time_s,
-                size,
-                format,
-                bytes,
-            }));
+            if let Some(frame) = self.accept(used, meta) {
+                return Ok(Some(frame));
+            }
         }
+    }
+
+    fn untaken(&self, e: &io::Error) -> SourceError {
+        SourceError::of_driver(&self.agreed.path, "taking a frame", e)
+    }
+
+    /// The frame, if it is whole and later than the one before; else it is counted.
+    fn accept(&self, used: &[u8], meta: &Metadata) -> Option<RawFrame> {
+        let Granted { format, size, .. } = self.agreed.granted;
+        // A damaged frame's number is not taken in: it shows up as a hole in the count, as frames
+        // that were lost do, and is told from them by the count of damaged ones.
+        let bytes = if meta.flags.contains(Flags::ERROR) {
+            None
+        } else {
+            without_padding(used, format, size, self.agreed.stride)
+        };
+        let Some(bytes) = bytes else {
+            self.progress().damaged += 1;
+            return None;
+        };
+        let received_s = self.agreed.opened.elapsed().as_secs_f64();
+        let mut progress = self.progress();
+        let Some((sequence, sensor_time_s)) = progress.clock.take(meta, received_s) else {
+            progress.stale += 1;
+            return None;
+        };
+        Some(RawFrame {
+            sequence,
+            sensor_time_s,
+            size,
+            format,
+            bytes,
+        })
     }
 }
 
@@ -174,9 +228,18 @@ impl Source for Camera {
             });
         };
         let next = self.next_of(&mut session);
-        // After an error the device is closed, so that it can go and come back.
-        self.session = next.is_ok().then_some(session);
+        self.vanishing = matches!(next, Err(SourceError::Disconnected { .. }));
+        self.session = Some(session);
         next
+    }
+
+    fn close(&mut self) {
+        let Some(session) = self.session.take() else {
+            return;
+        };
+        if self.vanishing {
+            session.close_lost(self.interface.as_deref());
+        }
     }
 
     fn returns(&self) -> bool {
@@ -184,38 +247,50 @@ impl Source for Camera {
     }
 
     fn reopen(&mut self) -> Result<(), SourceError> {
-        self.session = None;
+        self.close();
         let hint = "plug it in again";
-        let path = self.known.find().ok_or_else(|| SourceError::Absent {
-            input: self.shown(),
-            hint,
-        })?;
+        let path = self
+            .agreed
+            .known
+            .find()
+            .ok_or_else(|| SourceError::Absent {
+                input: self.shown(),
+                hint,
+            })?;
         // Exactly what was granted, and not what was asked for: the pictures must stay as they
         // were.
         let Granted {
             format,
             size,
             rate_hz,
-        } = self.granted;
+        } = self.agreed.granted;
         let wish = Wish {
             format: Some(format),
             size,
-            rate_hz: rate_hz.unwrap_or(self.asked.rate_hz),
+            rate_hz: rate_hz.unwrap_or(self.agreed.asked.rate_hz),
         };
         let Opened {
             negotiated, device, ..
         } = open(&path, &wish)?;
-        same_again(&path, &self.granted, &negotiated.granted)?;
-        self.stride = negotiated.stride.max(line_bytes(format, size));
-        self.session = Some(start(&path, &device)?);
-        self.path = path;
-        self.leave_out = u32::from(self.loopback);
-        self.clock.returned();
+        same_again(&path, &self.agreed.granted, &negotiated.granted)?;
+        self.agreed.stride = negotiated.stride.max(line_bytes(format, size));
+        let session = start(&path, &device)?;
+        self.agreed.path = path;
+        self.filming(session);
+        self.progress().clock.returned();
         Ok(())
     }
 
+    fn successor(&self) -> Option<Successor> {
+        let (agreed, progress) = (self.agreed.clone(), self.progress.clone());
+        Some(Box::new(move || {
+            let so_far = lock(&progress).clone();
+            Box::new(Camera::closed(agreed.clone(), so_far))
+        }))
+    }
+
     fn adopt(&mut self, config: &config::Camera) {
-        self.timeout = config.time_limit();
+        self.agreed.timeout = config.time_limit();
     }
 
     fn stop_when(&mut self, stop: Arc<AtomicBool>) {
@@ -223,59 +298,70 @@ impl Source for Camera {
     }
 
     fn describe(&self) -> SourceInfo {
+        let agreed = &self.agreed;
         describe(
-            &self.path,
-            &self.name,
-            &self.known,
-            &self.asked,
-            &self.granted,
+            &agreed.path,
+            &agreed.name,
+            &agreed.known,
+            &agreed.asked,
+            &agreed.granted,
         )
     }
 
     fn health(&self) -> Health {
+        let progress = self.progress();
         Health {
-            damaged: self.damaged,
-            stale: self.stale,
-            clock: self.clock.kind(),
+            damaged: progress.damaged,
+            stale: progress.stale,
+            clock: progress.clock.kind(),
         }
     }
 }
 
+fn lock(progress: &Mutex<Progress>) -> MutexGuard<'_, Progress> {
+    progress.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// Opens the device and negotiates.
 fn open(path: &Path, wish: &Wish) -> Result<Opened, SourceError> {
-    let bad = |what: String| SourceError::BadFormat {
-        input: path.display().to_string(),
-        what,
-    };
-    let failed = |doing: &'static str| move |e: io::Error| SourceError::of_driver(path, doing, &e);
-    let device = v4l::Device::with_path(path).map_err(failed("opening it"))?;
-    let caps = device
-        .query_caps()
-        .map_err(failed("asking for its abilities"))?;
-    if !caps
-        .capabilities
-        .contains(Caps::VIDEO_CAPTURE | Caps::STREAMING)
-    {
+    let (device, caps) = open_device(path)?;
+    if !films(&caps) {
         let what = "it does not film (or nothing feeds it yet); `arborcam devices` lists what does";
-        return Err(bad(what.to_owned()));
+        return Err(SourceError::bad_format(path, what.to_owned()));
     }
     let negotiated = negotiate(&device, wish, is_usb(&caps)).map_err(|e| match e {
-        Ok(name) => bad(format!(
-            "it delivers {name}, which is none of the formats that can be read"
-        )),
-        Err(e) => failed("setting the picture format")(e),
+        Ok(name) => SourceError::bad_format(
+            path,
+            format!("it delivers {name}, which is none of the formats that can be read"),
+        ),
+        Err(e) => SourceError::of_driver(path, "setting the picture format", &e),
     })?;
     if !negotiated.granted.size.width.is_multiple_of(2) {
-        return Err(bad(format!(
+        let what = format!(
             "its pictures have an odd width ({})",
             negotiated.granted.size
-        )));
+        );
+        return Err(SourceError::bad_format(path, what));
     }
     Ok(Opened {
         caps,
         negotiated,
         device,
     })
+}
+
+fn open_device(path: &Path) -> Result<(v4l::Device, Capabilities), SourceError> {
+    let device =
+        v4l::Device::with_path(path).map_err(|e| SourceError::of_driver(path, "opening it", &e))?;
+    let caps = device
+        .query_caps()
+        .map_err(SourceError::refused(path, "asking for its abilities"))?;
+    Ok((device, caps))
+}
+
+fn films(caps: &Capabilities) -> bool {
+    caps.capabilities
+        .contains(Caps::VIDEO_CAPTURE | Caps::STREAMING)
 }
 
 fn start(path: &Path, device: &v4l::Device) -> Result<Session, SourceError> {
@@ -321,14 +407,8 @@ pub(super) struct Prospect {
 
 /// Asks the device without changing anything about it.
 pub(super) fn prospect(path: &Path, config: &config::Camera) -> Result<Prospect, SourceError> {
-    let failed = |doing: &'static str| move |e: io::Error| SourceError::of_driver(path, doing, &e);
-    let device = v4l::Device::with_path(path).map_err(failed("opening it"))?;
-    let caps = device
-        .query_caps()
-        .map_err(failed("asking for its abilities"))?;
-    let films = caps
-        .capabilities
-        .contains(Caps::VIDEO_CAPTURE | Caps::STREAMING);
+    let (device, caps) = open_device(path)?;
+    let films = films(&caps);
     let wish = Wish::of(config);
     let modes = if films {
         offers::modes(&device, &wish)
@@ -336,11 +416,10 @@ pub(super) fn prospect(path: &Path, config: &config::Camera) -> Result<Prospect,
         Vec::new()
     };
     let chosen = choose(&modes, &wish, is_usb(&caps));
-    let text = |s: &str| s.trim().to_owned();
     Ok(Prospect {
-        card: text(&caps.card),
-        driver: text(&caps.driver),
-        bus: text(&caps.bus),
+        card: caps.card.trim().to_owned(),
+        driver: caps.driver.trim().to_owned(),
+        bus: caps.bus.trim().to_owned(),
         films,
         modes,
         chosen,

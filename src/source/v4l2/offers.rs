@@ -56,18 +56,20 @@ pub(super) fn modes(device: &Device, wish: &Wish) -> Vec<Mode> {
     modes
 }
 
+/// The largest step of the range that is not beyond `x`.
+fn on_step(x: u32, min: u32, max: u32, step: u32) -> u32 {
+    let x = x.clamp(min, max.max(min));
+    min + (x - min) / step.max(1) * step.max(1)
+}
+
 fn sizes(device: &Device, code: FourCC, wish: Size) -> Vec<Size> {
     let mut sizes = Vec::new();
     for listed in device.enum_framesizes(code).unwrap_or_default() {
         match listed.size {
             FrameSizeEnum::Discrete(d) => sizes.push(Size::new(d.width, d.height)),
             FrameSizeEnum::Stepwise(s) => {
-                let within = |x: u32, min: u32, max: u32, step: u32| {
-                    let x = x.clamp(min, max.max(min));
-                    min + (x - min) / step.max(1) * step.max(1)
-                };
-                let width = within(wish.width, s.min_width, s.max_width, s.step_width);
-                let height = within(wish.height, s.min_height, s.max_height, s.step_height);
+                let width = on_step(wish.width, s.min_width, s.max_width, s.step_width);
+                let height = on_step(wish.height, s.min_height, s.max_height, s.step_height);
                 sizes.push(Size::new(width, height));
                 sizes.push(Size::new(s.min_width, s.min_height));
                 sizes.push(Size::new(s.max_width, s.max_height));
@@ -121,15 +123,12 @@ pub(super) fn negotiate(
     usb: bool,
 ) -> Result<Negotiated, Result<String, io::Error>> {
     let modes = modes(device, wish);
-    let ask = |format, size: Size| {
-        device.set_format(&Format::new(size.width, size.height, fourcc(format)))
-    };
     let granted = match choose(&modes, wish, usb) {
-        Some((best, _)) => ask(best.format, best.size),
+        Some((best, _)) => ask(device, best.format, best.size),
         None => {
             let mut answer = Err(io::Error::from_raw_os_error(libc::EINVAL));
             for format in wish.format.map_or(UNLISTED.to_vec(), |f| vec![f]) {
-                let next = ask(format, wish.size);
+                let next = ask(device, format, wish.size);
                 let taken = next.as_ref().is_ok_and(|g| g.fourcc == fourcc(format));
                 // A device with a fixed format refuses all, or answers with what it has.
                 answer = next.or(answer);
@@ -160,6 +159,10 @@ pub(super) fn negotiate(
         stride: granted.stride as usize,
         modes,
     })
+}
+
+fn ask(device: &Device, format: PixelFormat, size: Size) -> io::Result<Format> {
+    device.set_format(&Format::new(size.width, size.height, fourcc(format)))
 }
 
 /// 1/30 for 30, 1001/30000 for 29.97.

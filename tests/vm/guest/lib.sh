@@ -18,6 +18,24 @@ until_ok() {
     done
 }
 
+# What every thread of the case begun last does, and every thread of the system that the kernel does not let be woken:
+# state, where it waits, the call it is in, and the kernel's stack. Goes to /vm/stacks, for whoever looks for a fault.
+stacks() {
+    local task
+    {
+        echo "== $name at $(now) s: $*"
+        for task in "/proc/$pid"/task/* /proc/[0-9]*; do
+            [[ $task == */task/* ]] || grep -qs '^State:.D' "$task/status" || continue
+            echo "-- $(cat "$task/comm") ${task##*/}: $(grep ^State: "$task/status")," \
+                "in $(cat "$task/wchan"), call $(cut -d' ' -f1 "$task/syscall")"
+            cat "$task/stack"
+        done
+        echo "-- open: $(readlink "/proc/$pid"/fd/* | grep /dev/video | tr '\n' ' ')"
+        echo "-- the kernel's last words"
+        dmesg | tail -n 30
+    } >>/vm/stacks 2>/dev/null
+}
+
 # Runs the program in the background as case NAME: its output, and afterwards its status, go to /vm/NAME/.
 begin() {
     name=$1
@@ -34,9 +52,11 @@ end() {
     local left=$(($1 * 20)) status=0
     while kill -0 "$pid" 2>/dev/null; do
         if ((left-- <= 0)); then
-            kill -KILL "$pid"
-            wait "$pid" 2>/dev/null
             echo hung >"/vm/$name/status"
+            stacks "does not end"
+            kill -KILL "$pid"
+            # One that hangs in the kernel cannot be killed; the other cases need not wait for it.
+            until_ok 5 eval "! kill -0 $pid" || stacks "cannot be killed"
             return
         fi
         sleep 0.05

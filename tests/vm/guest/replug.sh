@@ -32,9 +32,9 @@ for ((n = 0; n < cycles; n++)); do
     fi
     before=$(frames)
     plug_in one
-    until_ok 5 plugged
+    until_ok 5 plugged || stacks "the kernel does not have the camera back"
     back=$(now)
-    until_ok 10 more_frames "$before" || true
+    until_ok 10 more_frames "$before" || stacks "no frame after return $n"
     echo "$pulled $back $(now) $before $(frames) $(devices)" >>/vm/cycles
     sleep 0.4
 done
@@ -55,4 +55,17 @@ sleep 2
 rm "$gate"
 end 15
 "$bin" devices --json >/vm/devices.json 2>/vm/devices.err
+# Not even what is asked of it when it is closed is answered: the capture is written all the same, and only the process
+# itself waits for the kernel, which waits for the camera.
+touch "$gate"
+begin deaf capture "$(ls /dev/video* | head -1)" --headless "${usb_settings[@]}" --out "$work/deaf" --device-timeout 1
+until_ok 5 filming "$pid"
+sleep 3
+touch "$gate.deaf"
+sleep 6
+now >/vm/deaf/asked
+kill -INT "$pid"
+until_ok 20 test -e "$work/deaf/capture.json" || stacks "the capture is not written"
+now >/vm/deaf/written
 pull_out
+end 20
