@@ -83,6 +83,7 @@ fn one_node() -> String {
         parent: None,
         copy_of: None,
         level: 0,
+        main_branch: None,
         n_tracks: 0,
         end: [0.0; 3],
         sway: None,
@@ -98,6 +99,7 @@ fn one_node() -> String {
         picture_time_s: None,
         start_s: 0.0,
         times_s: Vec::new(),
+        main_branch_rgb: arborcam::model::MAIN_BRANCH_RGB,
         branches: vec![branch],
     };
     let mut json =

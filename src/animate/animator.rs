@@ -23,7 +23,7 @@ struct Branch {
     load: Load,
     /// From the parent node to its own at rest, px.
     way: Vector3<f64>,
-    /// The local axes u and w (002 fig. 13) that it bends about; v, along it, is left out: it
+    /// The local axes u and w (Hu et al. fig. 13) that it bends about; v, along it, is left out: it
     /// neither stretches nor twists.
     axes: [Vector3<f64>; 2],
     tuning: Tuning,
@@ -33,6 +33,26 @@ struct Branch {
     held_at: [f64; 2],
     /// Tells its eddies from those of others, s.
     own_s: f64,
+}
+
+impl Branch {
+    fn at_rest(skeleton: &Skeleton, i: usize, tuning: Tuning, load: Load, seed: u32) -> Self {
+        let node = &skeleton.nodes[i];
+        let parent = node.parent.map_or(i, |p| p.index()).min(i);
+        let way = node.position - skeleton.nodes[parent].position;
+        let own_seed = Chance::part(seed.into(), 1000 + u64::from(node.name.0));
+        Self {
+            parent,
+            load,
+            way,
+            axes: across(&way),
+            tuning,
+            transition: Transition::new(tuning.frequency_hz, tuning.damping_ratio, 0.0),
+            state: [Oscillation::default(); 2],
+            held_at: [0.0; 2],
+            own_s: Chance::new(own_seed).between(0.0, 1000.0),
+        }
+    }
 }
 
 /// Force on all that a branch carries, and its first moment about the branch's base.
@@ -61,7 +81,7 @@ enum Answer {
     Settle,
 }
 
-/// Moves a tree (002 eq. 7 for each branch).
+/// Moves a tree (Hu et al. eq. 7 for each branch).
 #[derive(Clone)]
 pub struct Animator {
     skeleton: Arc<Skeleton>,
@@ -88,34 +108,13 @@ impl Animator {
     ) -> Self {
         let tuning = tune(&skeleton, known, settings);
         let loads = loads(&skeleton, &tuning, settings.bend_deg);
-        let branch = |(i, (tuning, load)): (usize, (Tuning, Load))| {
-            let node = &skeleton.nodes[i];
-            let parent = node.parent.map_or(i, |p| p.index()).min(i);
-            let way = node.position - skeleton.nodes[parent].position;
-            let mut chance = Chance::new(Chance::part(
-                settings.seed.into(),
-                1000 + u64::from(node.name.0),
-            ));
-            Branch {
-                parent,
-                load,
-                way,
-                axes: across(&way),
-                tuning,
-                transition: Transition::new(tuning.frequency_hz, tuning.damping_ratio, 0.0),
-                state: [Oscillation::default(); 2],
-                held_at: [0.0; 2],
-                own_s: chance.between(0.0, 1000.0),
-            }
-        };
         let n = skeleton.nodes.len();
+        let mut branches = Vec::with_capacity(n);
+        for (i, (tuning, load)) in tuning.into_iter().zip(loads).enumerate() {
+            branches.push(Branch::at_rest(&skeleton, i, tuning, load, settings.seed));
+        }
         Self {
-            branches: tuning
-                .into_iter()
-                .zip(loads)
-                .enumerate()
-                .map(branch)
-                .collect(),
+            branches,
             joints: skeleton.nodes.iter().map(|n| at_rest(n.position)).collect(),
             turned: vec![Matrix3::identity(); n],
             borne: vec![Borne::default(); n],
@@ -152,7 +151,7 @@ impl Animator {
         self.pull
     }
 
-    /// Pulls at a node from now on, or lets go.
+    /// Pulls at a node from now on; releases it for `None`.
     pub fn pull(&mut self, pull: Option<Pull>) {
         self.pull = pull;
         self.answer(Answer::Stay);

@@ -2,6 +2,7 @@
 
 use super::tune::Tuning;
 use crate::model::Skeleton;
+use crate::signal::median;
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::TAU;
 
@@ -26,7 +27,7 @@ pub struct Load {
     pub lever: Vector3<f64>,
     /// Area that the wind finds, px².
     pub sail: f64,
-    /// By how much it bends under a bending moment, rad: Hooke's law (002 section 6). 0 where it
+    /// By how much it bends under a bending moment, rad: Hooke's law (Hu et al. sect. 6). 0 where it
     /// does not.
     pub yields: f64,
 }
@@ -37,17 +38,38 @@ pub struct Load {
 /// The stiffness of a branch is the square of its frequency times the moment of inertia of all that
 /// it carries; the moment that bends it is that of the wind on all that it carries.
 pub fn loads(skeleton: &Skeleton, tuning: &[Tuning], bend_deg: f64) -> Vec<Load> {
+    let (mut loads, bends) = unscaled(skeleton, tuning);
+    let (mut known_bends, mut radii_px) = (Vec::new(), Vec::new());
+    for (i, node) in skeleton.nodes.iter().enumerate() {
+        if loads[i].yields > 0.0 {
+            known_bends.push(bends[i]);
+            radii_px.push(radius(node.radius));
+        }
+    }
+    let Some(bend) = median(known_bends, f64::total_cmp).filter(|m| *m > 0.0) else {
+        return loads;
+    };
+    let radius_px = median(radii_px, f64::total_cmp).unwrap_or(THINNEST_PX);
+    let scale = bend_deg.to_radians() / bend;
+    let yielding = loads.iter_mut().enumerate().filter(|(_, l)| l.yields > 0.0);
+    for (i, load) in yielding {
+        let unlike = bends[i] / bend;
+        let thicker = radius(skeleton.nodes[i].radius) / radius_px;
+        let believed = (unlike * thicker.powf(-THICKER)).clamp(1.0 / UNLIKE, UNLIKE);
+        load.yields *= scale * believed / unlike.max(1e-12);
+    }
+    loads
+}
+
+/// The loads with `yields` in one unknown unit, and how far steady wind bends each branch in that
+/// unit.
+fn unscaled(skeleton: &Skeleton, tuning: &[Tuning]) -> (Vec<Load>, Vec<f64>) {
     let nodes = &skeleton.nodes;
     let sections: Vec<f64> = nodes.iter().map(|n| radius(n.radius).powi(2)).collect();
-    let mut ends_here = sections.clone();
-    for (i, node) in nodes.iter().enumerate() {
-        node.parent
-            .filter(|p| p.index() < i)
-            .into_iter()
-            .for_each(|p| ends_here[p.index()] -= sections[i]);
-    }
-    let mut out = vec![Load::default(); nodes.len()];
+    let ends_here = ending_sections(skeleton, &sections);
+    let mut loads = vec![Load::default(); nodes.len()];
     let mut carried = vec![Carried::default(); nodes.len()];
+    let mut bends = vec![0.0; nodes.len()];
     for i in (0..nodes.len()).rev() {
         let Some(p) = nodes[i].parent.map(|p| p.index()).filter(|&p| p < i) else {
             continue;
@@ -59,51 +81,38 @@ pub fn loads(skeleton: &Skeleton, tuning: &[Tuning], bend_deg: f64) -> Vec<Load>
         }
         let (length, middle) = (way.norm(), base + 0.5 * way);
         let sail = 2.0 * radius(nodes[i].radius) * length + SAIL_BY_SECTION * ends_here[i].max(0.0);
-        out[i] = Load {
-            base,
-            lever: 0.5 * way,
-            sail,
-            yields: 0.0,
-        };
         carried[i].add(&Carried::of(&middle, sections[i] * length, sail));
         let all = carried[i];
         carried[p].add(&all);
-        // How far steady wind would bend it, and how far a unit of moment does, both in one unknown
-        // unit.
         let inertia = all
             .inertia_about(&base)
             .max(sections[i] * length.powi(3) / 3.0);
         let stiff = inertia * (TAU * tuning.get(i).map_or(1.0, |t| t.frequency_hz)).powi(2);
-        out[i].yields = if length > 1e-6 && stiff > 0.0 {
+        let yields = if length > 1e-6 && stiff > 0.0 {
             1.0 / stiff
         } else {
             0.0
         };
-        carried[i].bends = all.moment_about(&base) * out[i].yields;
+        loads[i] = Load {
+            base,
+            lever: 0.5 * way,
+            sail,
+            yields,
+        };
+        bends[i] = all.moment_about(&base) * yields;
     }
-    let bends = || {
-        carried
-            .iter()
-            .zip(&out)
-            .filter(|(_, l)| l.yields > 0.0)
-            .map(|(c, _)| c.bends)
-    };
-    let median = crate::signal::median(bends().collect(), f64::total_cmp).filter(|m| *m > 0.0);
-    let Some(median) = median else { return out };
-    let scale = bend_deg.to_radians() / median;
-    let bent = || (0..nodes.len()).filter(|&i| out[i].yields > 0.0);
-    let middle_px = crate::signal::median(
-        bent().map(|i| radius(nodes[i].radius)).collect(),
-        f64::total_cmp,
-    );
-    let middle_px = middle_px.unwrap_or(THINNEST_PX);
-    for (i, load) in out.iter_mut().enumerate().filter(|(_, l)| l.yields > 0.0) {
-        let unlike = carried[i].bends / median;
-        let thicker = radius(nodes[i].radius) / middle_px;
-        let believed = (unlike * thicker.powf(-THICKER)).clamp(1.0 / UNLIKE, UNLIKE);
-        load.yields *= scale * believed / unlike.max(1e-12);
+    (loads, bends)
+}
+
+/// What of the cross-section of each branch no child of it takes over: it feeds twigs and leaves.
+fn ending_sections(skeleton: &Skeleton, sections: &[f64]) -> Vec<f64> {
+    let mut ends_here = sections.to_vec();
+    for (i, node) in skeleton.nodes.iter().enumerate() {
+        if let Some(parent) = node.parent.filter(|p| p.index() < i) {
+            ends_here[parent.index()] -= sections[i];
+        }
     }
-    out
+    ends_here
 }
 
 fn radius(px: f64) -> f64 {
@@ -122,8 +131,6 @@ struct Carried {
     mass_square: f64,
     sail: f64,
     sail_place: Vector3<f64>,
-    /// By how much steady wind bends the branch.
-    bends: f64,
 }
 
 impl Carried {
@@ -136,7 +143,6 @@ impl Carried {
             mass_square,
             sail,
             sail_place: sail * place,
-            bends: 0.0,
         }
     }
 

@@ -1,7 +1,7 @@
 //! The captured motion made larger or smaller, as a whole or in one band of frequencies, at another
 //! speed.
 
-use super::soft;
+use super::{soft, there_and_back};
 use crate::model::{JointPose, Pose, Skeleton};
 use nalgebra::{UnitQuaternion, Vector3};
 use realfft::RealFftPlanner;
@@ -67,8 +67,10 @@ pub fn magnify(
     fps: f64,
     count: u64,
 ) -> Result<Vec<Pose>, MagnifyError> {
-    let sound = |p: &&Pose| p.joints.len() == skeleton.nodes.len();
-    let poses: Vec<&Pose> = poses.iter().filter(sound).collect();
+    let poses: Vec<&Pose> = poses
+        .iter()
+        .filter(|p| p.joints.len() == skeleton.nodes.len())
+        .collect();
     if poses.len() < 8 {
         return Err(MagnifyError::TooShort(poses.len()));
     }
@@ -90,8 +92,7 @@ pub fn magnify(
     let turns: Vec<Vec<Vector3<f64>>> = (0..skeleton.nodes.len())
         .map(|i| changed(&own_turns(skeleton, &poses, i), &times, wanted))
         .collect();
-    let film_s = |k: u64| k as f64 / fps * wanted.speed;
-    let whole_s = film_s(count);
+    let whole_s = count as f64 / fps * wanted.speed;
     let seam_s = (length_s - whole_s).min(SEAM * whole_s);
     if wanted.looped && seam_s < LEAST_SEAM_S.min(SEAM * whole_s) {
         let needed_s = whole_s + LEAST_SEAM_S.min(SEAM * whole_s);
@@ -101,26 +102,53 @@ pub fn magnify(
             length_s,
         });
     }
-    let at = |k: u64| -> Vec<Vector3<f64>> {
-        let moment = |s: f64| Moment::of(&times, s);
-        if !wanted.looped {
-            let here = moment(there_and_back(film_s(k), length_s));
-            return turns.iter().map(|t| here.value(t)).collect();
-        }
-        let from_s = length_s - whole_s;
-        let here = moment(from_s + film_s(k));
-        // Towards the end it goes over into the film that led up to the beginning.
-        let share = 1.0 - ((whole_s - film_s(k)) / seam_s).clamp(0.0, 1.0);
+    let film = TurnedFilm {
+        times,
+        turns,
+        length_s,
+    };
+    let mut out = Vec::with_capacity(count as usize + 1);
+    for k in 0..=count {
+        let film_s = k as f64 / fps * wanted.speed;
+        let turns = if wanted.looped {
+            film.at_in_loop(film_s, whole_s, seam_s)
+        } else {
+            film.at(there_and_back(film_s, length_s))
+        };
+        out.push(posed(skeleton, &turns, k, k as f64 / fps));
+    }
+    Ok(out)
+}
+
+/// How every branch turns over the film.
+struct TurnedFilm {
+    /// Since the first pose, s.
+    times: Vec<f64>,
+    /// By node, in every pose: an axis times an angle.
+    turns: Vec<Vec<Vector3<f64>>>,
+    length_s: f64,
+}
+
+impl TurnedFilm {
+    /// The turn of every branch at a time of the film.
+    fn at(&self, film_s: f64) -> Vec<Vector3<f64>> {
+        let here = Moment::of(&self.times, film_s);
+        self.turns.iter().map(|t| here.value(t)).collect()
+    }
+
+    /// At a time of the loop that the last `whole_s` of the film make. Over its last `seam_s` it
+    /// goes over into the film that led up to its beginning.
+    fn at_in_loop(&self, loop_s: f64, whole_s: f64, seam_s: f64) -> Vec<Vector3<f64>> {
+        let from_s = self.length_s - whole_s;
+        let here = Moment::of(&self.times, from_s + loop_s);
+        let share = 1.0 - ((whole_s - loop_s) / seam_s).clamp(0.0, 1.0);
         let share = share * share * (3.0 - 2.0 * share);
-        let before = moment((from_s + film_s(k) - whole_s).max(0.0));
-        turns
+        let before = Moment::of(&self.times, (from_s + loop_s - whole_s).max(0.0));
+        self.turns
             .iter()
             .map(|t| here.value(t) * (1.0 - share) + before.value(t) * share)
             .collect()
-    };
-    Ok((0..=count)
-        .map(|k| posed(skeleton, &at(k), k, k as f64 / fps))
-        .collect())
+    }
 }
 
 /// How branch `i` had turned against the one that carries it, as an axis times an angle, in every
@@ -130,18 +158,19 @@ fn own_turns(skeleton: &Skeleton, poses: &[&Pose], i: usize) -> Vec<Vector3<f64>
         .parent
         .map(|p| p.index())
         .filter(|&p| p < i);
-    let own = |pose: &&Pose| {
+    let mut turns = Vec::with_capacity(poses.len());
+    for pose in poses {
         let turned = pose.joints[i].rotation;
         let own = parent
             .map_or(turned, |p| pose.joints[p].rotation.inverse() * turned)
             .scaled_axis();
-        if own.iter().all(|x| x.is_finite()) {
+        turns.push(if own.iter().all(|x| x.is_finite()) {
             own
         } else {
             Vector3::zeros()
-        }
-    };
-    poses.iter().map(own).collect()
+        });
+    }
+    turns
 }
 
 /// The same with its changes about the mean, or the part of them in the band, magnified and
@@ -156,11 +185,12 @@ fn changed(turns: &[Vector3<f64>], times: &[f64], wanted: &Magnify) -> Vec<Vecto
     let farthest = turns.iter().map(Vector3::norm).fold(0.0, f64::max);
     let knee = farthest.max(0.5 * wanted.most_rad);
     let most = wanted.most_rad.max(1.25 * knee);
-    let change = |(turn, part): (&Vector3<f64>, &Vector3<f64>)| {
+    let mut out = Vec::with_capacity(turns.len());
+    for (turn, part) in turns.iter().zip(&part) {
         let turn = turn + part * (wanted.by - 1.0);
-        turn * soft(turn.norm(), knee, most)
-    };
-    turns.iter().zip(&part).map(change).collect()
+        out.push(turn * soft(turn.norm(), knee, most));
+    }
+    out
 }
 
 /// What of the values lies within a band of frequencies, Hz. The film is continued by its mirror
@@ -172,7 +202,10 @@ fn in_band(
 ) -> Vec<Vector3<f64>> {
     let n = values.len();
     let length_s = times[n - 1];
-    let even_s = |k: usize| length_s * k as f64 / (n - 1) as f64;
+    // Even times, as the Fourier transform needs them.
+    let even_times: Vec<f64> = (0..n)
+        .map(|k| length_s * k as f64 / (n - 1) as f64)
+        .collect();
     // Forth and back, the ends once.
     let long = 2 * (n - 1);
     let mut planner = RealFftPlanner::<f64>::new();
@@ -182,8 +215,9 @@ fn in_band(
     );
     let mut parts: [Vec<f64>; 3] = Default::default();
     for (axis, part) in parts.iter_mut().enumerate() {
-        let even: Vec<f64> = (0..n)
-            .map(|k| Moment::of(times, even_s(k)).value(values)[axis])
+        let even: Vec<f64> = even_times
+            .iter()
+            .map(|s| Moment::of(times, *s).value(values)[axis])
             .collect();
         let mut signal: Vec<f64> = even
             .iter()
@@ -206,7 +240,6 @@ fn in_band(
     let even: Vec<Vector3<f64>> = (0..n)
         .map(|k| Vector3::new(parts[0][k], parts[1][k], parts[2][k]))
         .collect();
-    let even_times: Vec<f64> = (0..n).map(even_s).collect();
     times
         .iter()
         .map(|t| Moment::of(&even_times, *t).value(&even))
@@ -215,12 +248,18 @@ fn in_band(
 
 /// 1 within the band, 0 outside, half at its ends.
 fn passes(frequency_hz: f64, low_hz: f64, high_hz: f64) -> f64 {
-    let step = |edge: f64| {
-        let across = ((frequency_hz / edge.max(1e-9) - 1.0) / EDGE).clamp(-1.0, 1.0);
-        0.5 + 0.5 * (0.5 * std::f64::consts::PI * across).sin()
+    let over = if low_hz > 0.0 {
+        step(frequency_hz, low_hz)
+    } else {
+        1.0
     };
-    let over = if low_hz > 0.0 { step(low_hz) } else { 1.0 };
-    over * (1.0 - step(high_hz))
+    over * (1.0 - step(frequency_hz, high_hz))
+}
+
+/// 0 below an edge, 1 above it, soft between.
+fn step(frequency_hz: f64, edge_hz: f64) -> f64 {
+    let across = ((frequency_hz / edge_hz.max(1e-9) - 1.0) / EDGE).clamp(-1.0, 1.0);
+    0.5 + 0.5 * (0.5 * std::f64::consts::PI * across).sin()
 }
 
 /// A place between two of the film's frames.
@@ -272,15 +311,5 @@ fn posed(skeleton: &Skeleton, turns: &[Vector3<f64>], frame: u64, time_s: f64) -
         frame,
         time_s,
         joints,
-    }
-}
-
-/// Where someone is after `way` who goes to and fro over a stretch of `length`.
-fn there_and_back(way: f64, length: f64) -> f64 {
-    let along = way.rem_euclid(2.0 * length);
-    if along > length {
-        2.0 * length - along
-    } else {
-        along
     }
 }

@@ -1,7 +1,7 @@
-//! Making a measured tree move: in a wind that nobody filmed, pulled and let go, or as it was
+//! Making a measured tree move: in a wind that nobody filmed, pulled and released, or as it was
 //! filmed but more so.
 //!
-//! Every branch is the oscillator of 002 eq. 7 with the frequency and the damping that were
+//! Every branch is the oscillator of Hu et al. eq. 7 with the frequency and the damping that were
 //! measured on it ([`tune`]), solved exactly ([`Transition`]). What drives it is the moment that
 //! bends it at its base: that of the wind ([`Wind`]) on all that it carries ([`loads`]), in its own
 //! axes, in which it bends and neither stretches nor twists. A limb is a chain of such branches, so
@@ -28,6 +28,20 @@ pub use pull::place_to_pull;
 pub use sound::{Loudness, SoundError};
 pub use tune::{Tuning, tune};
 pub use wind::{Air, Wind, speed_m_s};
+
+/// Place (0 to `length`) after `way` of going to and fro over a stretch of that length, both in one
+/// unit; 0 on a stretch without length.
+pub fn there_and_back(way: f64, length: f64) -> f64 {
+    if length <= 0.0 {
+        return 0.0;
+    }
+    let along = way.rem_euclid(2.0 * length);
+    if along > length {
+        2.0 * length - along
+    } else {
+        along
+    }
+}
 
 /// By how much an angle is to be multiplied so that it never exceeds `most` (same unit): not at all
 /// up to `knee`, beyond it more and more.

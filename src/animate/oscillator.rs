@@ -1,4 +1,4 @@
-//! The sway of one branch about one axis, solved exactly (002 eq. 7).
+//! The sway of one branch about one axis, solved exactly (Hu et al. eq. 7).
 
 /// Where an oscillator is, in the unit of what drives it, and its speed per second.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -7,9 +7,9 @@ pub struct Oscillation {
     pub v: f64,
 }
 
-/// One step of `x'' + 4 pi xi f x' + 4 pi^2 f^2 x = F(t) / m` (002 eq. 7).
+/// One step of `x'' + 4 pi xi f x' + 4 pi^2 f^2 x = F(t) / m` (Hu et al. eq. 7).
 ///
-/// The force is told as the place `u = F / (4 pi^2 f^2 m)` at which it would hold the branch still,
+/// The force is given as the place `u = F / (4 pi^2 f^2 m)` at which it would hold the branch still,
 /// and goes evenly from one value to the next. For such a force the step is the solution itself,
 /// not an approximation as explicit Euler is: nothing is gained or lost however long the step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,17 +97,23 @@ impl Transition {
 
 /// Square and multiply.
 fn power(mut base: [[f64; 2]; 2], mut exponent: u64) -> [[f64; 2]; 2] {
-    let times = |a: [[f64; 2]; 2], b: [[f64; 2]; 2]| {
-        let cell = |i: usize, j: usize| a[i][0] * b[0][j] + a[i][1] * b[1][j];
-        [[cell(0, 0), cell(0, 1)], [cell(1, 0), cell(1, 1)]]
-    };
     let mut out = [[1.0, 0.0], [0.0, 1.0]];
     while exponent > 0 {
         if exponent & 1 == 1 {
-            out = times(out, base);
+            out = product(out, base);
         }
-        base = times(base, base);
+        base = product(base, base);
         exponent >>= 1;
+    }
+    out
+}
+
+fn product(a: [[f64; 2]; 2], b: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
+    let mut out = [[0.0; 2]; 2];
+    for (row, [left, right]) in out.iter_mut().zip(a) {
+        for (j, cell) in row.iter_mut().enumerate() {
+            *cell = left * b[0][j] + right * b[1][j];
+        }
     }
     out
 }

@@ -17,14 +17,18 @@ const TIED_ABOVE: f64 = 0.45;
 pub fn place_to_pull(skeleton: &Skeleton) -> NodeId {
     let nodes = &skeleton.nodes;
     let height = nodes.iter().map(|n| n.position.y).fold(0.0, f64::max);
-    let above =
-        |&i: &usize| nodes[i].position.y >= TIED_ABOVE * height && nodes[i].copy_of.is_none();
-    let stout = |i: usize| (nodes[i].radius, nodes[i].position.y);
-    let better = |&a: &usize, &b: &usize| {
-        let ((ra, ya), (rb, yb)) = (stout(a), stout(b));
-        ra.total_cmp(&rb).then(ya.total_cmp(&yb))
-    };
-    NodeId((1..nodes.len()).filter(above).max_by(better).unwrap_or(0) as u32)
+    let thickest = nodes
+        .iter()
+        .enumerate()
+        .skip(1)
+        .filter(|(_, n)| n.position.y >= TIED_ABOVE * height && n.copy_of.is_none())
+        .max_by(|(_, a), (_, b)| {
+            a.radius
+                .total_cmp(&b.radius)
+                .then(a.position.y.total_cmp(&b.position.y))
+        })
+        .map_or(0, |(i, _)| i);
+    NodeId(thickest as u32)
 }
 
 impl Animator {
@@ -35,29 +39,29 @@ impl Animator {
     pub fn pull_aside(&mut self, node: NodeId, direction_deg: f64, lean_deg: f64) -> f64 {
         let (sin, cos) = direction_deg.to_radians().sin_cos();
         let towards = Vector3::new(cos, 0.0, -sin);
-        let lean = |animator: &mut Self, force: f64| {
-            animator.pull(Some(Pull {
-                node,
-                force: towards * force,
-            }));
-            animator.settle();
-            animator.lean_deg(node)
-        };
         let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..DOUBLINGS {
-            if lean(self, high) >= lean_deg {
+            if self.lean_under(node, towards * high) >= lean_deg {
                 break;
             }
             (low, high) = (high, 2.0 * high);
         }
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);
-            if lean(self, middle) < lean_deg {
+            if self.lean_under(node, towards * middle) < lean_deg {
                 low = middle
             } else {
                 high = middle
             }
         }
-        lean(self, high)
+        self.lean_under(node, towards * high)
+    }
+
+    /// How far the line from the foot to the node leans when the tree hangs still in this force,
+    /// degrees.
+    fn lean_under(&mut self, node: NodeId, force: Vector3<f64>) -> f64 {
+        self.pull(Some(Pull { node, force }));
+        self.settle();
+        self.lean_deg(node)
     }
 }

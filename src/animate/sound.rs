@@ -40,7 +40,6 @@ impl Loudness {
     /// # Errors
     /// It is no WAV, damaged, empty, silent or too long, or a sample is no number.
     pub fn of_wav(bytes: &[u8]) -> Result<Self, SoundError> {
-        let unreadable = |e: hound::Error| SoundError::Unreadable(e.to_string());
         let mut reader = hound::WavReader::new(Cursor::new(bytes)).map_err(unreadable)?;
         let spec = reader.spec();
         if spec.sample_rate == 0 || spec.channels == 0 {
@@ -86,13 +85,14 @@ impl Loudness {
         }
         let count = ((samples.len() as f64 / per_s * RATE_HZ).ceil() as usize).max(1);
         let reach = 0.5 * SMOOTHED_S * per_s;
-        let loud = |k: usize| {
+        let mut values = Vec::with_capacity(count);
+        for k in 0..count {
             let middle = k as f64 * per_s / RATE_HZ;
             let from = ((middle - reach).max(0.0) as usize).min(samples.len() - 1);
             let to = ((middle + reach) as usize + 1).clamp(from + 1, samples.len());
-            ((power_until[to] - power_until[from]).max(0.0) / (to - from) as f64).sqrt()
-        };
-        let mut values: Vec<f64> = (0..count).map(loud).collect();
+            let power = (power_until[to] - power_until[from]).max(0.0) / (to - from) as f64;
+            values.push(power.sqrt());
+        }
         let rms = (values.iter().map(|v| v * v).sum::<f64>() / count as f64).sqrt();
         let largest = samples.iter().fold(0.0f64, |m, s| m.max(s.abs()));
         if rms <= 1e-9 * largest || rms <= 0.0 {
@@ -108,22 +108,18 @@ impl Loudness {
         let count = ((period_s * RATE_HZ).round() as usize).max(1);
         let seam = SEAM * count as f64;
         let first = self.values.first().copied().unwrap_or(0.0);
-        let value = |k: usize| {
-            let here = self
-                .values
-                .get(k % self.values.len().max(1))
-                .copied()
-                .unwrap_or(0.0);
+        let mut values = Vec::with_capacity(count);
+        for k in 0..count {
+            let repeated = self.values.get(k % self.values.len().max(1));
+            let here = repeated.copied().unwrap_or(0.0);
             let left = (count - k) as f64 / seam;
-            if left < 1.0 {
+            values.push(if left < 1.0 {
                 first + (here - first) * left
             } else {
                 here
-            }
-        };
-        Self {
-            values: (0..count).map(value).collect(),
+            });
         }
+        Self { values }
     }
 
     /// Length, s.
@@ -143,4 +139,8 @@ impl Loudness {
         let (a, b) = (self.values[k % n], self.values[(k + 1) % n]);
         a + (b - a) * (place - k as f64)
     }
+}
+
+fn unreadable(error: hound::Error) -> SoundError {
+    SoundError::Unreadable(error.to_string())
 }

@@ -38,65 +38,135 @@ pub struct Tuning {
 /// `settings.trunk_hz`.
 pub fn tune(skeleton: &Skeleton, known: &[Known], settings: &config::Wind) -> Vec<Tuning> {
     let nodes = &skeleton.nodes;
-    let rods = rods(skeleton);
-    let thickness = |i: usize| nodes[i].radius.max(1e-3).ln() / LEVEL_BY_THICKNESS.ln();
-    let within = |x: f64, (low, high): (f64, f64)| x.is_finite() && (low..=high).contains(&x);
-    let of = |i: usize| known.get(i).copied().unwrap_or_default();
-    let own = |i: usize| nodes[i].copy_of.is_none() && nodes[i].parent.is_some();
-    let frequency = |i: usize| {
-        of(i)
-            .frequency_hz
-            .filter(|f| own(i) && within(*f, FREQUENCIES_HZ))
-    };
-    let damping = |i: usize| {
-        of(i)
-            .damping_ratio
-            .filter(|d| own(i) && d.is_finite() && *d > 0.0)
-    };
-    let off: Vec<(usize, f64)> = (0..nodes.len())
-        .filter_map(|i| Some((i, frequency(i)?.ln() - rods[i])))
-        .collect();
-    let damped: Vec<(usize, f64)> = (0..nodes.len())
-        .filter_map(|i| Some((i, damping(i)?.ln())))
-        .collect();
-    let likely = |i: usize, from: &[(usize, f64)], else_: f64| {
-        let weight = |j: usize| {
-            let levels = f64::from(nodes[i].level) - f64::from(nodes[j].level);
-            let apart = levels * levels + (thickness(i) - thickness(j)).powi(2);
-            (0.5 + apart).powi(-2)
-        };
-        let (sum, all) = from.iter().fold((0.0, 0.0), |(s, w), &(j, x)| {
-            (s + weight(j) * x, w + weight(j))
-        });
-        if all > 0.0 { sum / all } else { else_ }
-    };
-    let trunk = nodes.iter().position(|n| n.parent.is_some()).unwrap_or(0);
-    let untold = settings.trunk_hz.ln() - rods.get(trunk).copied().unwrap_or(0.0);
-    let guessed = |i: usize| (rods[i] + likely(i, &off, untold)).exp();
-    let base = frequency(trunk).unwrap_or_else(|| {
-        if nodes.is_empty() {
-            1.0
-        } else {
-            guessed(trunk)
-        }
-    });
-    let base = base.clamp(FREQUENCIES_HZ.0, HIGHEST_HZ);
+    if nodes.is_empty() {
+        return Vec::new();
+    }
+    let tuner = Tuner::new(skeleton, known, settings);
+    let trunk_hz = tuner
+        .measured_hz(tuner.trunk)
+        .unwrap_or_else(|| tuner.likely_hz(tuner.trunk))
+        .clamp(FREQUENCIES_HZ.0, HIGHEST_HZ);
     let mut out: Vec<Tuning> = Vec::with_capacity(nodes.len());
     for (i, node) in nodes.iter().enumerate() {
         let original = node.copy_of.and_then(|o| out.get(o.index()).copied());
-        let tuning = original.unwrap_or_else(|| Tuning {
-            frequency_hz: frequency(i).unwrap_or_else(|| {
-                let high = HIGHEST_HZ.min(HIGHEST_BY_TRUNK * base);
-                guessed(i).clamp(LOWEST_BY_TRUNK * base.min(high), high)
-            }),
-            damping_ratio: damping(i)
-                .unwrap_or_else(|| likely(i, &damped, settings.damping_ratio.ln()).exp())
-                .clamp(DAMPING.0, DAMPING.1),
-            measured: frequency(i).is_some(),
-        });
-        out.push(tuning);
+        out.push(original.unwrap_or_else(|| tuner.tuning(i, trunk_hz)));
     }
     out
+}
+
+/// What was measured of a tree and what follows from it for its other branches.
+struct Tuner<'a> {
+    skeleton: &'a Skeleton,
+    known: &'a [Known],
+    settings: &'a config::Wind,
+    /// Logarithm of the rule's frequency for every node.
+    rods: Vec<f64>,
+    /// The first node that ends a branch.
+    trunk: usize,
+    /// Each measured branch with the logarithm of its frequency over the rule's.
+    off_rule: Vec<(usize, f64)>,
+    /// Each branch with a measured damping ratio, and its logarithm.
+    damped: Vec<(usize, f64)>,
+}
+
+impl<'a> Tuner<'a> {
+    fn new(skeleton: &'a Skeleton, known: &'a [Known], settings: &'a config::Wind) -> Self {
+        let nodes = &skeleton.nodes;
+        let mut tuner = Self {
+            skeleton,
+            known,
+            settings,
+            rods: rods(skeleton),
+            trunk: nodes.iter().position(|n| n.parent.is_some()).unwrap_or(0),
+            off_rule: Vec::new(),
+            damped: Vec::new(),
+        };
+        for i in 0..nodes.len() {
+            if let Some(frequency_hz) = tuner.measured_hz(i) {
+                let off = frequency_hz.ln() - tuner.rods[i];
+                tuner.off_rule.push((i, off));
+            }
+            if let Some(damping_ratio) = tuner.measured_damping(i) {
+                tuner.damped.push((i, damping_ratio.ln()));
+            }
+        }
+        tuner
+    }
+
+    /// What was measured on a branch itself: nothing on a copy or the foot.
+    fn measured(&self, i: usize) -> Known {
+        let node = &self.skeleton.nodes[i];
+        if node.copy_of.is_some() || node.parent.is_none() {
+            return Known::default();
+        }
+        self.known.get(i).copied().unwrap_or_default()
+    }
+
+    fn measured_hz(&self, i: usize) -> Option<f64> {
+        let (low, high) = FREQUENCIES_HZ;
+        self.measured(i)
+            .frequency_hz
+            .filter(|f| (low..=high).contains(f))
+    }
+
+    fn measured_damping(&self, i: usize) -> Option<f64> {
+        self.measured(i)
+            .damping_ratio
+            .filter(|d| d.is_finite() && *d > 0.0)
+    }
+
+    /// Thickness in steps that make branches as unlike as a level does.
+    fn thickness(&self, i: usize) -> f64 {
+        self.skeleton.nodes[i].radius.max(1e-3).ln() / LEVEL_BY_THICKNESS.ln()
+    }
+
+    /// How much branch `j` says about branch `i`, by likeness in level and thickness.
+    fn weight(&self, i: usize, j: usize) -> f64 {
+        let nodes = &self.skeleton.nodes;
+        let levels = f64::from(nodes[i].level) - f64::from(nodes[j].level);
+        let apart = levels * levels + (self.thickness(i) - self.thickness(j)).powi(2);
+        (0.5 + apart).powi(-2)
+    }
+
+    /// Weighted mean of values measured on other branches; `otherwise` where there is none.
+    fn mean_for(&self, i: usize, values: &[(usize, f64)], otherwise: f64) -> f64 {
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for &(j, value) in values {
+            let weight = self.weight(i, j);
+            sum += weight * value;
+            weights += weight;
+        }
+        if weights > 0.0 {
+            sum / weights
+        } else {
+            otherwise
+        }
+    }
+
+    /// By the rule of rods, moved by what the measured branches are off it.
+    fn likely_hz(&self, i: usize) -> f64 {
+        let by_trunk = self.settings.trunk_hz.ln() - self.rods[self.trunk];
+        (self.rods[i] + self.mean_for(i, &self.off_rule, by_trunk)).exp()
+    }
+
+    /// The tuning of a branch that is no copy.
+    fn tuning(&self, i: usize, trunk_hz: f64) -> Tuning {
+        let measured_hz = self.measured_hz(i);
+        let frequency_hz = measured_hz.unwrap_or_else(|| {
+            let high = HIGHEST_HZ.min(HIGHEST_BY_TRUNK * trunk_hz);
+            self.likely_hz(i)
+                .clamp(LOWEST_BY_TRUNK * trunk_hz.min(high), high)
+        });
+        let damping_ratio = self.measured_damping(i).unwrap_or_else(|| {
+            let otherwise = self.settings.damping_ratio.ln();
+            self.mean_for(i, &self.damped, otherwise).exp()
+        });
+        Tuning {
+            frequency_hz,
+            damping_ratio: damping_ratio.clamp(DAMPING.0, DAMPING.1),
+            measured: measured_hz.is_some(),
+        }
+    }
 }
 
 /// The logarithm of `sqrt(r) / l` for every node.
@@ -117,13 +187,14 @@ fn rods(skeleton: &Skeleton) -> Vec<f64> {
         .map(|n| n.position.y)
         .filter(|y| y.is_finite())
         .fold(1.0, f64::max);
-    let rod = |(node, reach): (&crate::model::Node, &f64)| {
+    let mut rods = Vec::with_capacity(nodes.len());
+    for (node, reach) in nodes.iter().zip(&reach) {
         let radius = if node.radius.is_finite() {
             node.radius.max(1e-3)
         } else {
             1.0
         };
-        0.5 * radius.ln() - reach.max(SHORTEST * height).ln()
-    };
-    nodes.iter().zip(&reach).map(rod).collect()
+        rods.push(0.5 * radius.ln() - reach.max(SHORTEST * height).ln());
+    }
+    rods
 }

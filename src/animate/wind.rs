@@ -6,7 +6,7 @@ use crate::config;
 use crate::shape::Chance;
 use nalgebra::{Point3, Vector3};
 
-/// Speed in steady wind of force 6, m/s: pressure is told as a multiple of what it is there.
+/// Speed in steady wind of force 6, m/s: pressure is a multiple of what it is there.
 const REFERENCE_M_S: f64 = 12.287;
 /// From about this speed on a crown bends out of the wind and its drag grows less than with the
 /// square of speed, m/s; far beyond with the power 2 - 1/2; Vogel found -0.4 to -0.9 for leaves and
@@ -66,20 +66,13 @@ impl Wind {
     /// Wind that repeats itself after `period_s`, about a tree with a pixel of so many metres.
     pub fn new(settings: &config::Wind, period_s: f64, metres_per_px: f64) -> Self {
         let seed = u64::from(settings.seed);
-        let noise = |part: u64, slowest_s: f64| {
-            Noise::new(
-                period_s,
-                settings.beta,
-                1.0 / slowest_s.max(1e-3),
-                Chance::part(seed, part),
-            )
-        };
+        let [beta, gust_s] = [settings.beta, settings.gust_s];
         let mean_m_s = velocity(settings.force, settings.direction_deg);
         Self {
-            gusts: Gusts::Noise(noise(1, settings.gust_s)),
-            across: noise(2, settings.gust_s),
-            rise: noise(3, settings.gust_s),
-            eddies: noise(4, EDDY_S.min(settings.gust_s)),
+            gusts: Gusts::Noise(noise(period_s, beta, gust_s, Chance::part(seed, 1))),
+            across: noise(period_s, beta, gust_s, Chance::part(seed, 2)),
+            rise: noise(period_s, beta, gust_s, Chance::part(seed, 3)),
+            eddies: noise(period_s, beta, EDDY_S.min(gust_s), Chance::part(seed, 4)),
             strength: settings.gusts,
             period_s,
             metres_per_px,
@@ -138,15 +131,25 @@ impl Wind {
             }
         };
         let vary = vary * self.strength;
-        let eddy = |k: f64| EDDY * self.eddies.at(air.time_s + own_s + k * self.period_s / 3.0);
+        let eddies_s = air.time_s + own_s;
         let (ahead, aside, up) = (
-            mean + vary * eddy(0.0),
-            vary * (ACROSS * self.across.at(here_s) + eddy(1.0)),
-            vary * (RISE * self.rise.at(here_s) + eddy(2.0)),
+            mean + vary * self.eddy(eddies_s, 0.0),
+            vary * (ACROSS * self.across.at(here_s) + self.eddy(eddies_s, 1.0)),
+            vary * (RISE * self.rise.at(here_s) + self.eddy(eddies_s, 2.0)),
         );
         let share = air.along * ahead + air.across * aside + Vector3::new(0.0, up, 0.0);
         drag(share * air.speed_m_s)
     }
+
+    /// Eddies along (0), across (1) and up (2): one noise, read a third of its period apart.
+    fn eddy(&self, time_s: f64, part: f64) -> f64 {
+        EDDY * self.eddies.at(time_s + part * self.period_s / 3.0)
+    }
+}
+
+/// Noise that is flat below the rate of its slowest changes.
+fn noise(period_s: f64, beta: f64, slowest_s: f64, seed: u64) -> Noise {
+    Noise::new(period_s, beta, 1.0 / slowest_s.max(1e-3), seed)
 }
 
 /// Of the mean wind, m/s in model axes.

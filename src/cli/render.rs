@@ -8,6 +8,7 @@ use super::export;
 use super::shaping::Made;
 use super::stop::Stop;
 use super::{Ended, say};
+use crate::animate::there_and_back;
 use crate::draw::{Bounds, Camera, Look, Model, Posed, Rgba, Texture};
 use crate::export::{ExportError, Film, OutputFile, refuse_taken};
 use crate::model::{Pose, Size};
@@ -282,19 +283,6 @@ fn nearest(poses: &[Pose], time_s: f64) -> Option<usize> {
     let after = poses.partition_point(|p| p.time_s < time_s);
     let away = |k: &usize| (poses[*k].time_s - time_s).abs();
     (after.saturating_sub(1)..poses.len().min(after + 1)).min_by(|a, b| away(a).total_cmp(&away(b)))
-}
-
-/// Where someone is after `way` who goes to and fro over a stretch of `length`.
-fn there_and_back(way: f64, length: f64) -> f64 {
-    if length <= 0.0 {
-        return 0.0;
-    }
-    let along = way.rem_euclid(2.0 * length);
-    if along > length {
-        2.0 * length - along
-    } else {
-        along
-    }
 }
 
 #[cfg(test)]

@@ -37,8 +37,7 @@ impl View {
     }
 }
 
-/// The upright cylinder about the trunk's foot that holds a tree: whoever walks round it sees it in
-/// one size.
+/// The upright cylinder about the trunk's foot that holds a tree: it has one size from all sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     pub low: Point3<f64>,
@@ -74,16 +73,11 @@ impl Bounds {
     }
 
     fn corners(&self) -> impl Iterator<Item = Point3<f64>> {
-        let pick = |bit: usize, axis: usize| {
-            if bit == 0 {
-                self.low[axis]
-            } else {
-                self.high[axis]
-            }
-        };
-        let corner =
-            move |i: usize| Point3::new(pick(i & 1, 0), pick(i >> 1 & 1, 1), pick(i >> 2 & 1, 2));
-        [0, 1, 2, 3, 4, 5, 6, 7].map(corner).into_iter()
+        let ends = [self.low, self.high];
+        (0..8).map(move |i: usize| {
+            let [x, y, z] = [ends[i & 1], ends[i >> 1 & 1], ends[i >> 2 & 1]];
+            Point3::new(x.x, y.y, z.z)
+        })
     }
 }
 
@@ -109,14 +103,10 @@ impl Camera {
     pub fn fitting(bounds: &Bounds, view: View, steady: bool, size: Size) -> Self {
         let [right, up, _] = view.axes();
         let mut aim = nalgebra::center(&bounds.low, &bounds.high);
-        let span = |axis: &Vector3<f64>| {
-            let along = bounds
-                .corners()
-                .map(|c| (c - aim).dot(axis))
-                .fold(0.0, f64::max);
-            2.0 * along
-        };
-        let (mut across, mut high) = (span(&right), span(&up));
+        let [mut across, mut high] = [right, up].map(|axis| {
+            let along = bounds.corners().map(|c| (c - aim).dot(&axis));
+            2.0 * along.fold(0.0, f64::max)
+        });
         if steady {
             (aim.x, aim.z) = (0.0, 0.0);
             across = 2.0 * bounds.radius;
@@ -144,8 +134,9 @@ impl Camera {
     /// The film's own camera: what it draws lies over the filmed frame drawn at this size.
     pub fn of_film(skeleton: &Skeleton, size: Size) -> Self {
         let film = skeleton.image_size;
-        let fit = |out: u32, of: u32| f64::from(out) / f64::from(of.max(1));
-        let scale = fit(size.width, film.width).min(fit(size.height, film.height));
+        let across = f64::from(size.width) / f64::from(film.width.max(1));
+        let down = f64::from(size.height) / f64::from(film.height.max(1));
+        let scale = across.min(down);
         let left = (f64::from(size.width) - scale * f64::from(film.width)) / 2.0;
         let top = (f64::from(size.height) - scale * f64::from(film.height)) / 2.0;
         // The centre of the film's first pixel is 0, its corner -0.5.

@@ -3,6 +3,7 @@
 use super::rgba::Rgba;
 use super::texture::Texture;
 use crate::model::Size;
+use std::ops::Range;
 
 /// A corner of a triangle as it is to be drawn.
 #[derive(Clone, Copy, Debug)]
@@ -56,74 +57,26 @@ impl Canvas {
 
     /// Draws one triangle; its back only if `two_sided`. Corners that are no numbers or far outside
     /// are left out.
-    pub fn triangle(
-        &mut self,
-        [a, mut b, mut c]: [Corner; 3],
-        two_sided: bool,
-        texture: Option<&Texture>,
-    ) {
-        let sound = |p: &Corner| p.x.abs() < FAR && p.y.abs() < FAR && p.z.is_finite();
-        if ![a, b, c].iter().all(sound) {
+    pub fn triangle(&mut self, corners: [Corner; 3], two_sided: bool, texture: Option<&Texture>) {
+        let Some(triangle) = Triangle::new(corners, two_sided) else {
             return;
-        }
-        let mut area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-        // Counter-clockwise from outside; rows run downwards, so that a face that is seen has a
-        // negative area.
-        if area > 0.0 && !two_sided {
-            return;
-        }
-        if area < 0.0 {
-            (b, c, area) = (c, b, -area);
-        }
-        if area.is_nan() || area <= 0.0 {
-            return;
-        }
-        // A sample is drawn if its middle lies inside.
-        let span = |p: f32, q: f32, r: f32, n: usize| {
-            let (low, high) = (p.min(q).min(r) - 0.5, p.max(q).max(r) - 0.5);
-            (
-                low.ceil().max(0.0) as usize,
-                ((high.floor() + 1.0).max(0.0) as usize).min(n),
-            )
         };
-        let (left, right) = span(a.x, b.x, c.x, self.width);
-        let (top, bottom) = span(a.y, b.y, c.y, self.height);
-        let share = |p: &Corner, q: &Corner, x: f32, y: f32| {
-            ((q.x - p.x) * (y - p.y) - (q.y - p.y) * (x - p.x)) / area
-        };
-        for row in top..bottom {
-            let y = row as f32 + 0.5;
-            for column in left..right {
-                let x = column as f32 + 0.5;
-                let (wa, wb) = (share(&b, &c, x, y), share(&c, &a, x, y));
-                let wc = 1.0 - wa - wb;
-                if wa < 0.0 || wb < 0.0 || wc < 0.0 {
+        let rows = covered(corners.map(|p| p.y), self.height);
+        let columns = covered(corners.map(|p| p.x), self.width);
+        for row in rows {
+            for column in columns.clone() {
+                let Some(shares) = triangle.shares(column as f32 + 0.5, row as f32 + 0.5) else {
                     continue;
-                }
+                };
                 let at = row * self.width + column;
-                let z = wa * a.z + wb * b.z + wc * c.z;
+                let z = triangle.mix(shares, |p| p.z);
                 if z <= self.depth[at] {
                     continue;
                 }
-                let mix = |of: fn(&Corner, usize) -> f32, i| {
-                    wa * of(&a, i) + wb * of(&b, i) + wc * of(&c, i)
-                };
-                let mut rgb = [0, 1, 2].map(|i| mix(|p, i| p.rgb[i], i));
-                if let Some(texture) = texture {
-                    let [r, g, b, alpha] =
-                        texture.at(mix(|p, _| p.uv[0], 0), mix(|p, _| p.uv[1], 0));
-                    if alpha < CUT {
-                        continue;
-                    }
-                    rgb = [
-                        rgb[0] * f32::from(r),
-                        rgb[1] * f32::from(g),
-                        rgb[2] * f32::from(b),
-                    ]
-                    .map(|c| c / 255.0);
+                if let Some(rgb) = triangle.colour(shares, texture) {
+                    self.depth[at] = z;
+                    self.colour[at] = rgb;
                 }
-                self.depth[at] = z;
-                self.colour[at] = rgb.map(|c| (c + 0.5) as u8);
             }
         }
     }
@@ -153,6 +106,83 @@ impl Canvas {
         }
         out
     }
+}
+
+/// A triangle whose corners run so that its area is positive.
+struct Triangle {
+    corners: [Corner; 3],
+    /// Twice the area, samples².
+    area: f32,
+}
+
+impl Triangle {
+    /// `None` for what is not drawn: a back unless `two_sided`, no area, or corners that are no
+    /// numbers or far outside.
+    fn new([a, b, c]: [Corner; 3], two_sided: bool) -> Option<Self> {
+        for p in [a, b, c] {
+            if !(p.x.abs() < FAR && p.y.abs() < FAR && p.z.is_finite()) {
+                return None;
+            }
+        }
+        // Counter-clockwise from outside; rows run downwards, so that a face that is seen has a
+        // negative area.
+        let area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+        if area < 0.0 {
+            Some(Self {
+                corners: [a, c, b],
+                area: -area,
+            })
+        } else if area > 0.0 && two_sided {
+            Some(Self {
+                corners: [a, b, c],
+                area,
+            })
+        } else {
+            None
+        }
+    }
+
+    /// Shares of the corners at a place (barycentric coordinates); `None` outside.
+    fn shares(&self, x: f32, y: f32) -> Option<[f32; 3]> {
+        let [a, b, c] = &self.corners;
+        let (wa, wb) = (self.share(b, c, x, y), self.share(c, a, x, y));
+        let wc = 1.0 - wa - wb;
+        let inside = !(wa < 0.0 || wb < 0.0 || wc < 0.0);
+        inside.then_some([wa, wb, wc])
+    }
+
+    /// Share of the corner across from the edge `p` to `q`.
+    fn share(&self, p: &Corner, q: &Corner, x: f32, y: f32) -> f32 {
+        ((q.x - p.x) * (y - p.y) - (q.y - p.y) * (x - p.x)) / self.area
+    }
+
+    fn mix(&self, [wa, wb, wc]: [f32; 3], value: impl Fn(&Corner) -> f32) -> f32 {
+        let [a, b, c] = &self.corners;
+        wa * value(a) + wb * value(b) + wc * value(c)
+    }
+
+    /// `None` where the texture is cut away.
+    fn colour(&self, shares: [f32; 3], texture: Option<&Texture>) -> Option<[u8; 3]> {
+        let mut rgb = [0, 1, 2].map(|i| self.mix(shares, |p| p.rgb[i]));
+        if let Some(texture) = texture {
+            let [u, v] = [0, 1].map(|i| self.mix(shares, |p| p.uv[i]));
+            let [r, g, b, alpha] = texture.at(u, v);
+            if alpha < CUT {
+                return None;
+            }
+            rgb[0] = rgb[0] * f32::from(r) / 255.0;
+            rgb[1] = rgb[1] * f32::from(g) / 255.0;
+            rgb[2] = rgb[2] * f32::from(b) / 255.0;
+        }
+        Some(rgb.map(|c| (c + 0.5) as u8))
+    }
+}
+
+/// Samples of a side of `n` whose middles may lie between the corners.
+fn covered([p, q, r]: [f32; 3], n: usize) -> Range<usize> {
+    let (low, high) = (p.min(q).min(r) - 0.5, p.max(q).max(r) - 0.5);
+    let end = ((high.floor() + 1.0).max(0.0) as usize).min(n);
+    low.ceil().max(0.0) as usize..end
 }
 
 #[cfg(test)]

@@ -120,12 +120,19 @@ fn draw(part: &Part, eye: &Eye, canvas: &mut Canvas) {
             }
         })
         .collect();
-    for t in part.indices.chunks_exact(3) {
-        let at = |k: usize| corners.get(t[k] as usize).copied();
-        if let (Some(a), Some(b), Some(c)) = (at(0), at(1), at(2)) {
-            canvas.triangle([a, b, c], part.two_sided, part.texture);
-        }
+    for triangle in triangles(part, &corners) {
+        canvas.triangle(triangle, part.two_sided, part.texture);
     }
+}
+
+/// The triangles of a part whose corners all are there.
+fn triangles<'a>(part: &'a Part, corners: &'a [Corner]) -> impl Iterator<Item = [Corner; 3]> + 'a {
+    part.indices.chunks_exact(3).filter_map(|t| {
+        let a = *corners.get(t[0] as usize)?;
+        let b = *corners.get(t[1] as usize)?;
+        let c = *corners.get(t[2] as usize)?;
+        Some([a, b, c])
+    })
 }
 
 /// Share of its colour that a surface shows. Leaves let light through, and theirs has the film's
@@ -159,11 +166,8 @@ fn shadow(tree: &Posed, camera: &Camera) -> Rgba {
                 }
             })
             .collect();
-        for t in part.indices.chunks_exact(3) {
-            let at = |k: usize| corners.get(t[k] as usize).copied();
-            if let (Some(a), Some(b), Some(c)) = (at(0), at(1), at(2)) {
-                canvas.triangle([a, b, c], true, None);
-            }
+        for triangle in triangles(part, &corners) {
+            canvas.triangle(triangle, true, None);
         }
     }
     let mut picture = canvas.picture();
@@ -191,15 +195,17 @@ fn shadow(tree: &Posed, camera: &Camera) -> Rgba {
 fn blur(values: &mut [f32], n: usize, lines: usize, radius: usize, step: usize, next: usize) {
     let mut line = vec![0.0_f32; n];
     for l in 0..lines {
-        let at = |i: usize| l * next + i * step;
-        (0..n).for_each(|i| line[i] = values[at(i)]);
+        let first = l * next;
+        for i in 0..n {
+            line[i] = values[first + i * step];
+        }
         let mut sum: f64 = line.iter().take(radius).map(|v| f64::from(*v)).sum();
         for i in 0..n {
             sum += line.get(i + radius).map_or(0.0, |v| f64::from(*v));
             sum -= i
                 .checked_sub(radius + 1)
                 .map_or(0.0, |k| f64::from(line[k]));
-            values[at(i)] = (sum / (2 * radius + 1) as f64) as f32;
+            values[first + i * step] = (sum / (2 * radius + 1) as f64) as f32;
         }
     }
 }

@@ -62,15 +62,14 @@ impl<'a> Model<'a> {
     pub fn posed(&self, pose: Option<&Pose>, sway: &[[f32; 2]]) -> Posed<'_> {
         let joints = Joints::new(self.skeleton, pose);
         let (positions, normals) = joints.wood(self.wood);
-        let of_joint = |joint: u16| {
-            self.branch_rgb
-                .get(usize::from(joint))
-                .copied()
-                .unwrap_or(self.bark_rgb)
-        };
         let colours = match self.branch_rgb {
             [] => vec![self.bark_rgb; positions.len()],
-            _ => self.wood.joints.iter().map(|j| of_joint(j[0])).collect(),
+            _ => self
+                .wood
+                .joints
+                .iter()
+                .map(|j| self.wood_rgb(j[0]))
+                .collect(),
         };
         let (uvs, indices) = (self.wood.uvs.as_slice(), self.wood.indices.as_slice());
         let mut parts = vec![Part {
@@ -100,6 +99,12 @@ impl<'a> Model<'a> {
             });
         }
         Posed { parts }
+    }
+
+    /// Colour of wood that moves with a joint.
+    fn wood_rgb(&self, joint: u16) -> [u8; 3] {
+        let own = self.branch_rgb.get(usize::from(joint)).copied();
+        own.unwrap_or(self.bark_rgb)
     }
 }
 

@@ -1,6 +1,7 @@
 //! What was drawn.
 
 use crate::model::{Rgb, Size};
+use std::ops::Range;
 
 /// Four bytes a pixel, red first, row by row; alpha is not multiplied in.
 #[derive(Clone, Debug, PartialEq)]
@@ -103,13 +104,16 @@ impl Rgba {
     }
 }
 
+/// Pixels of a side of `n` that lie within `half` of `c`; at least one.
+fn pixels_about(c: f64, half: f64, n: u32) -> Range<usize> {
+    let low = ((c - half).round().max(0.0) as usize).min(n as usize - 1);
+    low..((c + half).round() as usize).clamp(low + 1, n as usize)
+}
+
 /// Mean over a square about (`u`, `v`), whose sides are twice `half`.
 fn mean(frame: &Rgb, u: f64, v: f64, half: f64) -> [u8; 3] {
-    let span = |c: f64, n: u32| {
-        let low = ((c - half).round().max(0.0) as usize).min(n as usize - 1);
-        low..((c + half).round() as usize).clamp(low + 1, n as usize)
-    };
-    let (columns, rows) = (span(u, frame.size.width), span(v, frame.size.height));
+    let columns = pixels_about(u, half, frame.size.width);
+    let rows = pixels_about(v, half, frame.size.height);
     let mut sum = [0u64; 3];
     for row in rows.clone() {
         let at = 3 * (row * frame.size.width as usize);
@@ -123,26 +127,26 @@ fn mean(frame: &Rgb, u: f64, v: f64, half: f64) -> [u8; 3] {
 
 /// Linear between the four pixels about (`u`, `v`), whose centres are whole numbers.
 fn between(frame: &Rgb, u: f64, v: f64) -> [u8; 3] {
-    let split = |c: f64, n: u32| {
-        let c = c.clamp(0.0, f64::from(n - 1));
-        let low = c.floor();
-        (
-            low as usize,
-            (low as usize + 1).min(n as usize - 1),
-            c - low,
-        )
-    };
-    let ((x0, x1, fx), (y0, y1, fy)) = (split(u, frame.size.width), split(v, frame.size.height));
-    let at = |x: usize, y: usize, c: usize| {
-        f64::from(frame.pixels[3 * (y * frame.size.width as usize + x) + c])
-    };
-    [0, 1, 2].map(|c| {
-        let (above, below) = (
-            at(x0, y0, c) * (1.0 - fx) + at(x1, y0, c) * fx,
-            at(x0, y1, c) * (1.0 - fx) + at(x1, y1, c) * fx,
-        );
-        (above * (1.0 - fy) + below * fy).round() as u8
-    })
+    let (x0, x1, fx) = neighbours(u, frame.size.width);
+    let (y0, y1, fy) = neighbours(v, frame.size.height);
+    let [above, below] = [y0, y1].map(|y| {
+        let (left, right) = (pixel(frame, x0, y), pixel(frame, x1, y));
+        [0, 1, 2].map(|c| left[c] * (1.0 - fx) + right[c] * fx)
+    });
+    [0, 1, 2].map(|c| (above[c] * (1.0 - fy) + below[c] * fy).round() as u8)
+}
+
+/// The two pixels of a side of `n` about `c`, and the share of the second.
+fn neighbours(c: f64, n: u32) -> (usize, usize, f64) {
+    let c = c.clamp(0.0, f64::from(n - 1));
+    let low = c.floor();
+    let next = (low as usize + 1).min(n as usize - 1);
+    (low as usize, next, c - low)
+}
+
+fn pixel(frame: &Rgb, x: usize, y: usize) -> [f64; 3] {
+    let at = 3 * (y * frame.size.width as usize + x);
+    [0, 1, 2].map(|c| f64::from(frame.pixels[at + c]))
 }
 
 #[cfg(test)]

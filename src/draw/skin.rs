@@ -16,28 +16,13 @@ impl Joints {
     pub fn new(skeleton: &Skeleton, pose: Option<&Pose>) -> Self {
         let pose = pose.filter(|p| p.joints.len() == skeleton.nodes.len());
         let still = (Matrix3::identity(), Vector3::zeros());
-        let joint = |i: usize| {
-            let (node, pose) = (skeleton.nodes.get(i)?, pose?);
-            let pivot = node.parent?.index();
-            let (rest, now) = (
-                skeleton.nodes.get(pivot)?.position,
-                pose.joints.get(pivot)?.position,
-            );
-            let turn = pose
-                .joints
-                .get(i)?
-                .rotation
-                .to_rotation_matrix()
-                .into_inner();
-            let shift = now.coords - turn * rest.coords;
-            let sound = turn.iter().chain(shift.iter()).all(|c| c.is_finite());
-            sound.then(|| (turn.cast::<f32>(), shift.cast::<f32>()))
-        };
-        Self(
-            (0..skeleton.nodes.len().max(1))
-                .map(|i| joint(i).unwrap_or(still))
-                .collect(),
-        )
+        let mut joints = vec![still; skeleton.nodes.len().max(1)];
+        if let Some(pose) = pose {
+            for (i, joint) in joints.iter_mut().enumerate() {
+                *joint = motion(skeleton, pose, i).unwrap_or(still);
+            }
+        }
+        Self(joints)
     }
 
     /// Moves a vertex and its normal by the shares of its joints (linear blend skinning).
@@ -70,13 +55,10 @@ impl Joints {
         group: &FoliageGroup,
         [sine, cosine]: [f32; 2],
     ) -> (Vec<[f32; 3]>, Vec<[f32; 3]>) {
-        let part = |of: &[[f32; 3]], i: usize| {
-            of.get(i).map_or_else(Vector3::zeros, |d| Vector3::from(*d))
-        };
         self.all(&group.mesh, |i| {
             Vector3::from(group.mesh.positions[i])
-                + part(&group.sine, i) * sine
-                + part(&group.cosine, i) * cosine
+                + displacement(&group.sine, i) * sine
+                + displacement(&group.cosine, i) * cosine
         })
     }
 
@@ -98,4 +80,22 @@ impl Joints {
         });
         moved.unzip()
     }
+}
+
+/// How joint `i` turns and shifts what hangs on it; `None` if it has no parent or a number is
+/// missing.
+fn motion(skeleton: &Skeleton, pose: &Pose, i: usize) -> Option<(Matrix3<f32>, Vector3<f32>)> {
+    let pivot = skeleton.nodes.get(i)?.parent?.index();
+    let rest = skeleton.nodes.get(pivot)?.position;
+    let now = pose.joints.get(pivot)?.position;
+    let rotation = pose.joints.get(i)?.rotation;
+    let turn = rotation.to_rotation_matrix().into_inner();
+    let shift = now.coords - turn * rest.coords;
+    let sound = turn.iter().chain(shift.iter()).all(|c| c.is_finite());
+    sound.then(|| (turn.cast::<f32>(), shift.cast::<f32>()))
+}
+
+/// Displacement of a vertex; none where there are fewer than vertices.
+fn displacement(of: &[[f32; 3]], i: usize) -> Vector3<f32> {
+    of.get(i).map_or_else(Vector3::zeros, |d| Vector3::from(*d))
 }

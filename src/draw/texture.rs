@@ -41,7 +41,6 @@ impl Texture {
     /// The texel at (`u`, `v`), 0 to 1 across and down, repeated beyond that as glTF does by
     /// default.
     pub fn at(&self, u: f32, v: f32) -> [u8; 4] {
-        let texel = |c: f32, n: usize| (((c - c.floor()) * n as f32) as usize).min(n - 1);
         let at = 4 * (texel(v, self.height) * self.width + texel(u, self.width));
         [
             self.rgba[at],
@@ -50,6 +49,11 @@ impl Texture {
             self.rgba[at + 3],
         ]
     }
+}
+
+/// Number of the texel at `c` along a side of `n` texels.
+fn texel(c: f32, n: usize) -> usize {
+    (((c - c.floor()) * n as f32) as usize).min(n - 1)
 }
 
 #[cfg(test)]

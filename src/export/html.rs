@@ -156,6 +156,7 @@ mod tests {
             picture_time_s: None,
             start_s: 0.0,
             times_s: Vec::new(),
+            main_branch_rgb: crate::model::MAIN_BRANCH_RGB,
             branches: Vec::new(),
         }
     }

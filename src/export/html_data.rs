@@ -3,7 +3,7 @@
 use super::capture::Capture;
 use super::sway::Columns;
 use crate::dynamics::angle_to_parent_deg;
-use crate::model::{NodeId, Pose, Skeleton, Swaying};
+use crate::model::{MAIN_BRANCH_RGB, NodeId, Pose, Skeleton, Swaying};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
@@ -28,6 +28,8 @@ pub struct Data {
     /// The animation's begin, s since the first frame, and the time of every pose since then, s.
     pub start_s: f64,
     pub times_s: Vec<f64>,
+    /// Colours of main branches (sRGB), taken again from the start after the last one.
+    pub main_branch_rgb: [[u8; 3]; MAIN_BRANCH_RGB.len()],
     /// Parents before children, the first without a parent: the foot.
     pub branches: Vec<Branch>,
 }
@@ -40,6 +42,8 @@ pub struct Branch {
     /// The measured branch that this one repeats.
     pub copy_of: Option<u32>,
     pub level: u8,
+    /// Number of the main branch that it belongs to; `None` for the trunk.
+    pub main_branch: Option<u8>,
     pub n_tracks: u32,
     /// Its end at rest, model axes, px.
     pub end: [f64; 3],
@@ -91,14 +95,27 @@ impl Data {
                 .iter()
                 .map(|p| rounded(p.time_s - start_s, 1e6))
                 .collect(),
-            branches: (0..skeleton.nodes.len())
-                .map(|i| branch(skeleton, poses, sway, i))
-                .collect(),
+            main_branch_rgb: MAIN_BRANCH_RGB,
+            branches: branches(skeleton, poses, sway),
         }
     }
 }
 
-fn branch(skeleton: &Skeleton, poses: &[Pose], sway: &[Swaying], i: usize) -> Branch {
+fn branches(skeleton: &Skeleton, poses: &[Pose], sway: &[Swaying]) -> Vec<Branch> {
+    let mut branches = Vec::with_capacity(skeleton.nodes.len());
+    for (i, main_branch) in skeleton.main_branches().into_iter().enumerate() {
+        branches.push(branch(skeleton, poses, sway, i, main_branch));
+    }
+    branches
+}
+
+fn branch(
+    skeleton: &Skeleton,
+    poses: &[Pose],
+    sway: &[Swaying],
+    i: usize,
+    main_branch: Option<u8>,
+) -> Branch {
     let node = &skeleton.nodes[i];
     let name = |id: NodeId| skeleton.name_of(id).map(|n| n.0);
     let measured = node.parent.is_some() && node.copy_of.is_none();
@@ -108,6 +125,7 @@ fn branch(skeleton: &Skeleton, poses: &[Pose], sway: &[Swaying], i: usize) -> Br
         parent: node.parent.and_then(name),
         copy_of: node.copy_of.and_then(name),
         level: node.level,
+        main_branch,
         n_tracks: node.n_tracks,
         end: [node.position.x, node.position.y, node.position.z].map(|x| rounded(x, 1e4)),
         sway,
@@ -138,6 +156,43 @@ fn packed(angles_deg: &[f64]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::{Node, NodeName, Size, Snapshot};
+    use nalgebra::Point3;
+    use std::sync::Arc;
+
+    /// The colour on the page is that on the screens of `capture` and `animate`, which show what
+    /// [`Snapshot::show_tree`] makes.
+    #[test]
+    fn a_branch_has_one_colour_on_the_page_and_on_the_screens() {
+        // Two main branches on a trunk of three nodes, and a copy of the second.
+        let parents = [None, Some(0), Some(1), Some(2), Some(2), Some(3), Some(2)];
+        let mut nodes = Vec::new();
+        for (i, parent) in (0..).zip(parents) {
+            nodes.push(Node {
+                name: NodeName(10 + i),
+                parent: parent.map(NodeId),
+                level: 1,
+                position: Point3::new(f64::from(i), 10.0, 0.0),
+                radius: 1.0,
+                n_tracks: 5,
+                certainty: 1.0,
+                copy_of: (i == 6).then_some(NodeId(4)),
+                plane_angle: 0.0,
+            });
+        }
+        let skeleton = Skeleton {
+            nodes,
+            foot_px: [0.0; 2],
+            image_size: Size::new(64, 48),
+        };
+        let page = branches(&skeleton, &[], &[]);
+        let page: Vec<Option<u8>> = page.iter().map(|b| b.main_branch).collect();
+        let mut screen = Snapshot::default();
+        screen.show_tree(Arc::new(skeleton));
+        assert_eq!(page, *screen.node_colour);
+        let [a, b] = [Some(0), Some(1)];
+        assert_eq!(page, [None, None, None, a, b, a, b]);
+    }
 
     #[test]
     fn angles_are_packed_as_the_page_unpacks_them() {

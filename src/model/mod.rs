@@ -7,6 +7,7 @@
 mod control;
 mod frame;
 mod hierarchy;
+mod main_branch;
 mod outline;
 mod pose;
 mod skeleton;
@@ -20,6 +21,7 @@ mod track_table;
 pub use control::Control;
 pub use frame::{Frame, Luma, Picture, PixelFormat, RawFrame, Rgb, Size, nanoseconds, seconds};
 pub use hierarchy::{Cluster, ClusterId, MotionHierarchy};
+pub use main_branch::MAIN_BRANCH_RGB;
 pub use outline::Outline;
 pub use pose::{JointPose, Pose};
 pub use skeleton::{FARTHEST_PX, Node, NodeId, NodeName, Skeleton};

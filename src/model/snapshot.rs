@@ -144,3 +144,11 @@ pub struct Snapshot {
     /// The source has ended or the user has quit: what is shown is the last state.
     pub ended: bool,
 }
+
+impl Snapshot {
+    /// Shows this tree, its main branches each in a colour of its own.
+    pub fn show_tree(&mut self, skeleton: Arc<Skeleton>) {
+        self.node_colour = Arc::new(skeleton.main_branches());
+        self.skeleton = Some(skeleton);
+    }
+}

@@ -1,5 +1,5 @@
-//! Several captures side by side: the same branch under different force, or several trees (002
-//! section 5.4).
+//! Several captures side by side: the same branch under different force, or several trees (Hu et al.
+//! sect. 5.4).
 
 use super::matching::{Match, matched};
 use super::study::Study;
@@ -52,21 +52,10 @@ impl Change {
     /// Of two values with 95 % intervals that are even on logarithms and independent of each other.
     /// `None` where one is not above 0.
     pub fn between(a: &Interval, b: &Interval) -> Option<Self> {
-        let positive =
-            |i: &Interval| i.lo > 0.0 && i.value > 0.0 && i.hi.is_finite() && i.hi >= i.lo;
-        if !positive(a) || !positive(b) {
-            return None;
-        }
-        let sd = |i: &Interval| (i.hi / i.lo).ln() / (2.0 * Interval::Z);
-        let (ratio, half) = ((b.value / a.value).ln(), Interval::Z * sd(a).hypot(sd(b)));
-        let percent = |log: f64| 100.0 * log.exp_m1();
-        let percent = Interval {
-            value: percent(ratio),
-            lo: percent(ratio - half),
-            hi: percent(ratio + half),
-        };
+        let half = Interval::Z * log_deviation(a)?.hypot(log_deviation(b)?);
+        let ratio = (b.value / a.value).ln();
         Some(Self {
-            percent,
+            percent: percent_of_log(ratio, half),
             beyond: ratio.abs() > half,
         })
     }
@@ -82,6 +71,18 @@ impl Change {
     }
 }
 
+/// Standard deviation of a value's logarithm by its 95 % interval; `None` if it is not above 0.
+fn log_deviation(i: &Interval) -> Option<f64> {
+    let positive = i.lo > 0.0 && i.value > 0.0 && i.hi.is_finite() && i.hi >= i.lo;
+    positive.then(|| (i.hi / i.lo).ln() / (2.0 * Interval::Z))
+}
+
+/// A difference of logarithms, with half its interval, in %.
+pub(super) fn percent_of_log(log: f64, half: f64) -> Interval {
+    let [value, lo, hi] = [log, log - half, log + half].map(|x| 100.0 * x.exp_m1());
+    Interval { value, lo, hi }
+}
+
 /// Compares captures with the first of them; `same_tree` is what the user says. `None` for fewer
 /// than two.
 pub fn compare(studies: &[Study], same_tree: Option<bool>) -> Option<Comparison> {
@@ -89,70 +90,27 @@ pub fn compare(studies: &[Study], same_tree: Option<bool>) -> Option<Comparison>
         .split_first()
         .filter(|(_, others)| !others.is_empty())?;
     let all: Vec<Vec<Match>> = others.iter().map(|other| matched(first, other)).collect();
-    let found = |m: &Vec<Match>| {
-        m.iter()
-            .filter(|m| matches!(m, Match::Found { .. }))
-            .count()
-    };
-    let fewer = |other: &Study| first.branches.len().min(other.branches.len());
-    let share = |(m, other): (&Vec<Match>, &Study)| found(m) as f64 / fewer(other).max(1) as f64;
-    let shares: Vec<f64> = all.iter().zip(others).map(share).collect();
-    let told: Vec<Option<bool>> = shares
-        .iter()
-        .zip(others)
-        .map(|(share, other)| told(*share, fewer(other)))
-        .collect();
-    // One that is another tree is enough for trees to be several.
-    let by_places = if told.contains(&Some(false)) {
-        Some(false)
-    } else {
-        told.iter().all(|t| *t == Some(true)).then_some(true)
-    };
-    let same = same_tree.or(by_places);
-    let row = |(i, branch): (usize, &super::Branch)| Row {
-        name: branch.name,
-        first: i,
-        others: all.iter().map(|m| m[i]).collect(),
-    };
-    let trunk = |other: &Study| {
-        let at = other.branches.iter().position(|b| b.parent.is_none());
-        at.map_or(Match::Missing, |branch| Match::Found { branch, off: 0.0 })
-    };
-    let rows: Vec<Row> = match same {
-        Some(true) => first.branches.iter().enumerate().map(row).collect(),
-        Some(false) => {
-            let trunks = first
-                .branches
-                .iter()
-                .enumerate()
-                .filter(|(_, b)| b.parent.is_none())
-                .take(1);
-            trunks
-                .map(|(i, b)| Row {
-                    name: b.name,
-                    first: i,
-                    others: others.iter().map(trunk).collect(),
-                })
-                .collect()
-        }
+    let (mut shares, mut by_places) = (Vec::new(), Vec::new());
+    for (matches, other) in all.iter().zip(others) {
+        let found = matches.iter().filter(|m| m.branch().is_some()).count();
+        let fewer = first.branches.len().min(other.branches.len());
+        let share = found as f64 / fewer.max(1) as f64;
+        shares.push(share);
+        by_places.push(told(share, fewer));
+    }
+    let same = same_tree.or(all_one_tree(&by_places));
+    let rows = match same {
+        Some(true) => branch_rows(first, &all),
+        Some(false) => trunk_row(first, others).into_iter().collect(),
         None => Vec::new(),
     };
-    let left_over = others
-        .iter()
-        .enumerate()
-        .map(|(k, other)| {
-            let taken = |j: usize| {
-                rows.iter()
-                    .any(|r| matches!(r.others[k], Match::Found { branch, .. } if branch == j))
-            };
-            let left = other
-                .branches
-                .iter()
-                .enumerate()
-                .filter(|(j, _)| same == Some(true) && !taken(*j));
-            left.map(|(_, b)| b.name).collect()
-        })
-        .collect();
+    let mut left_over = Vec::with_capacity(others.len());
+    for (k, other) in others.iter().enumerate() {
+        left_over.push(match same {
+            Some(true) => in_no_row(&rows, k, other),
+            _ => Vec::new(),
+        });
+    }
     Some(Comparison {
         same_tree: same,
         said: same_tree.is_some(),
@@ -160,6 +118,59 @@ pub fn compare(studies: &[Study], same_tree: Option<bool>) -> Option<Comparison>
         rows,
         left_over,
     })
+}
+
+/// Whether all captures are of the first one's tree: one that is of another is enough for trees to
+/// be several.
+fn all_one_tree(told: &[Option<bool>]) -> Option<bool> {
+    if told.contains(&Some(false)) {
+        return Some(false);
+    }
+    told.iter().all(|t| *t == Some(true)).then_some(true)
+}
+
+/// A row for each branch of the first capture; `matches` are those of each other capture.
+fn branch_rows(first: &Study, matches: &[Vec<Match>]) -> Vec<Row> {
+    let mut rows = Vec::with_capacity(first.branches.len());
+    for (i, branch) in first.branches.iter().enumerate() {
+        rows.push(Row {
+            name: branch.name,
+            first: i,
+            others: matches.iter().map(|m| m[i]).collect(),
+        });
+    }
+    rows
+}
+
+/// The trunks of several trees.
+fn trunk_row(first: &Study, others: &[Study]) -> Option<Row> {
+    let trunk = trunk_of(first)?;
+    let mut found = Vec::with_capacity(others.len());
+    for other in others {
+        found.push(match trunk_of(other) {
+            Some(branch) => Match::Found { branch, off: 0.0 },
+            None => Match::Missing,
+        });
+    }
+    Some(Row {
+        name: first.branches[trunk].name,
+        first: trunk,
+        others: found,
+    })
+}
+
+/// Index of the branch that nothing carries.
+fn trunk_of(study: &Study) -> Option<usize> {
+    study.branches.iter().position(|b| b.parent.is_none())
+}
+
+/// Names of the branches of capture `k` after the first that stand in no row.
+fn in_no_row(rows: &[Row], k: usize, other: &Study) -> Vec<u32> {
+    let taken: Vec<usize> = rows.iter().filter_map(|r| r.others[k].branch()).collect();
+    let left = other.branches.iter().enumerate();
+    left.filter(|(j, _)| !taken.contains(j))
+        .map(|(_, b)| b.name)
+        .collect()
 }
 
 /// Whether two captures are of one tree, by the share of `branches` that stand in the same place;
@@ -179,10 +190,7 @@ impl Row {
         let study = studies.get(k)?;
         match k.checked_sub(1) {
             None => study.branches.get(self.first),
-            Some(other) => match self.others.get(other)? {
-                Match::Found { branch, .. } => study.branches.get(*branch),
-                Match::Missing | Match::Unclear => None,
-            },
+            Some(other) => study.branches.get(self.others.get(other)?.branch()?),
         }
     }
 
@@ -212,14 +220,21 @@ mod tests {
         assert_eq!((told(1.0, 3), told(0.0, 1)), (None, None));
     }
 
-    #[test]
-    fn a_difference_counts_only_beyond_both_intervals() {
-        let at = |value: f64, half: f64| Interval {
+    /// An interval that goes half of its length on logarithms either way.
+    fn at(value: f64, half: f64) -> Interval {
+        Interval {
             value,
             lo: value * (-half).exp(),
             hi: value * half.exp(),
-        };
-        let change = |a, b| Change::between(&a, &b).unwrap();
+        }
+    }
+
+    fn change(a: Interval, b: Interval) -> Change {
+        Change::between(&a, &b).unwrap()
+    }
+
+    #[test]
+    fn a_difference_counts_only_beyond_both_intervals() {
         // Half intervals of 3 and 4 % make one of 5 %.
         assert!(!change(at(1.0, 0.03), at(1.049, 0.04)).beyond);
         let far = change(at(1.0, 0.03), at(1.06, 0.04));

@@ -27,29 +27,17 @@ pub fn decaying(
     own: &Sway,
     others: &[Sway],
 ) -> Option<Decaying> {
-    let own_hz = own.frequency_hz.value;
-    let apart = |s: &&Sway| (s.frequency_hz.value / own_hz).ln().abs() > SAME;
-    let modes: Vec<(f64, f64)> = std::iter::once(own)
-        .chain(others.iter().filter(apart))
-        .filter_map(|s| Some((s.frequency_hz.value, s.damping_ratio?.value)))
-        .filter(|(hz, damping)| *hz > 0.0 && (0.0..1.0).contains(damping))
-        .collect();
-    own.damping_ratio?;
-    let wave = |(hz, damping): (f64, f64), t: f64| {
-        let (size, phase) = (
-            (-damping * TAU * hz * t).exp(),
-            (1.0 - damping * damping).sqrt() * TAU * hz * t,
-        );
-        [size * phase.cos(), size * phase.sin()]
-    };
-    let row = |t: f64| -> Vec<f64> {
-        std::iter::once(1.0)
-            .chain(modes.iter().flat_map(|&mode| wave(mode, t - released_s)))
-            .collect()
-    };
-    let within = |t: f64| used_s[0] <= t && t <= used_s[1];
+    let own_mode = Mode::of(own)?;
+    let mut modes: Vec<Mode> = own_mode.sound().into_iter().collect();
+    for other in others {
+        let apart = (other.frequency_hz.value / own_mode.frequency_hz)
+            .ln()
+            .abs()
+            > SAME;
+        modes.extend(Mode::of(other).filter(|_| apart).and_then(|m| m.sound()));
+    }
     let rows: Vec<usize> = (0..times_s.len().min(angle_deg.len()))
-        .filter(|&k| within(times_s[k]) && angle_deg[k].is_finite())
+        .filter(|&k| is_within(times_s[k], used_s) && angle_deg[k].is_finite())
         .collect();
     let columns = 1 + 2 * modes.len();
     if rows.len() < 2 * columns || columns < 3 {
@@ -58,20 +46,61 @@ pub fn decaying(
     let mut squares = DMatrix::<f64>::zeros(columns, columns);
     let mut products = DVector::<f64>::zeros(columns);
     for &k in &rows {
-        let x = DVector::from_vec(row(times_s[k]));
+        let mut row = vec![1.0];
+        for mode in &modes {
+            row.extend(mode.wave(times_s[k] - released_s));
+        }
+        let x = DVector::from_vec(row);
         squares += &x * x.transpose();
         products += x * angle_deg[k];
     }
     let factors = squares.cholesky()?.solve(&products);
     let [cosine, sine] = [factors[1], factors[2]];
-    let own_part = |t: f64| {
-        let [c, s] = wave(modes[0], t - released_s);
-        cosine * c + sine * s
-    };
-    let at = |t: &f64| if within(*t) { own_part(*t) } else { f64::NAN };
+    let mut curve_deg = vec![f64::NAN; times_s.len()];
+    for (deg, t) in curve_deg.iter_mut().zip(times_s) {
+        if is_within(*t, used_s) {
+            let [c, s] = modes[0].wave(t - released_s);
+            *deg = cosine * c + sine * s;
+        }
+    }
     let amplitude_deg = cosine.hypot(sine);
-    amplitude_deg.is_finite().then(|| Decaying {
-        curve_deg: times_s.iter().map(at).collect(),
+    amplitude_deg.is_finite().then_some(Decaying {
+        curve_deg,
         amplitude_deg,
     })
+}
+
+fn is_within(t: f64, [from, to]: [f64; 2]) -> bool {
+    from <= t && t <= to
+}
+
+/// A damped oscillation.
+#[derive(Clone, Copy)]
+struct Mode {
+    frequency_hz: f64,
+    damping_ratio: f64,
+}
+
+impl Mode {
+    /// `None` without a damping.
+    fn of(sway: &Sway) -> Option<Self> {
+        Some(Self {
+            frequency_hz: sway.frequency_hz.value,
+            damping_ratio: sway.damping_ratio?.value,
+        })
+    }
+
+    /// Itself, if it can oscillate.
+    fn sound(self) -> Option<Self> {
+        let sound = self.frequency_hz > 0.0 && (0.0..1.0).contains(&self.damping_ratio);
+        sound.then_some(self)
+    }
+
+    /// Its cosine and its sine at a time since the release, s.
+    fn wave(&self, t: f64) -> [f64; 2] {
+        let size = (-self.damping_ratio * TAU * self.frequency_hz * t).exp();
+        let damped = (1.0 - self.damping_ratio * self.damping_ratio).sqrt();
+        let phase = damped * TAU * self.frequency_hz * t;
+        [size * phase.cos(), size * phase.sin()]
+    }
 }

@@ -1,12 +1,12 @@
 //! The same for programs.
 
-use super::compare::{Change, Comparison};
+use super::compare::{Change, Comparison, Row};
 use super::levels::{Growth, Spread, growth, levels};
 use super::matching::Match;
 use super::study::{Branch, Study};
 use crate::dynamics::Start;
 use crate::model::{Interval, Unidentified};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 /// One object: `captures`, and `comparison`, which is `null` for one capture. What is not known is
 /// `null`.
@@ -74,37 +74,50 @@ fn branch(study: &Study, branch: &Branch) -> Value {
 }
 
 fn compared(studies: &[Study], comparison: &Comparison) -> Value {
-    let row = |row: &super::Row| {
-        let cell = |k: usize| {
-            let found = k.checked_sub(1).and_then(|k| row.others.get(k));
-            let off = found.and_then(|m| {
-                if let Match::Found { off, .. } = m {
-                    Some(*off)
-                } else {
-                    None
-                }
-            });
-            let (first, here) = (row.sway(studies, 0), row.sway(studies, k));
-            let both = first.zip(here).filter(|_| k > 0);
-            json!({
-                "capture": studies[k].name,
-                "node_id": row.branch(studies, k).map(|b| b.name),
-                "unclear": matches!(found, Some(Match::Unclear)),
-                "off": off,
-                "frequency_change_percent": both.and_then(|(a, b)| Change::of_frequency(&a, &b)).map(|c| change(&c)),
-                "damping_change_percent": both.and_then(|(a, b)| Change::of_damping(&a, &b)).map(|c| change(&c)),
-            })
-        };
-        json!({ "node_id": row.name, "in": (0..studies.len()).map(cell).collect::<Vec<Value>>() })
-    };
-    let by_name = |k: usize, value: Value| (studies[k + 1].name.clone(), value);
+    let rows: Vec<Value> = comparison
+        .rows
+        .iter()
+        .map(|row| compared_row(studies, row))
+        .collect();
+    let (mut found_again, mut not_matched) = (Map::new(), Map::new());
+    for (study, share) in studies[1..].iter().zip(&comparison.shares) {
+        found_again.insert(study.name.clone(), (*share).into());
+    }
+    for (study, names) in studies[1..].iter().zip(&comparison.left_over) {
+        not_matched.insert(study.name.clone(), names.clone().into());
+    }
     json!({
         "same_tree": comparison.same_tree,
         "same_tree_given": comparison.said,
-        "found_again": comparison.shares.iter().enumerate().map(|(k, s)| by_name(k, (*s).into())).collect::<serde_json::Map<_, _>>(),
-        "branches": comparison.rows.iter().map(row).collect::<Vec<Value>>(),
-        "not_matched": comparison.left_over.iter().enumerate()
-            .map(|(k, names)| by_name(k, names.clone().into())).collect::<serde_json::Map<_, _>>(),
+        "found_again": found_again,
+        "branches": rows,
+        "not_matched": not_matched,
+    })
+}
+
+fn compared_row(studies: &[Study], row: &Row) -> Value {
+    let captures: Vec<Value> = (0..studies.len())
+        .map(|k| compared_cell(studies, row, k))
+        .collect();
+    json!({ "node_id": row.name, "in": captures })
+}
+
+/// A branch of the first capture in capture `k`.
+fn compared_cell(studies: &[Study], row: &Row, k: usize) -> Value {
+    let found = k.checked_sub(1).and_then(|k| row.others.get(k));
+    let off = match found {
+        Some(Match::Found { off, .. }) => Some(*off),
+        _ => None,
+    };
+    let first = row.sway(studies, 0).filter(|_| k > 0);
+    let both = first.zip(row.sway(studies, k));
+    json!({
+        "capture": studies[k].name,
+        "node_id": row.branch(studies, k).map(|b| b.name),
+        "unclear": matches!(found, Some(Match::Unclear)),
+        "off": off,
+        "frequency_change_percent": both.and_then(|(a, b)| Change::of_frequency(&a, &b)).map(|c| change(&c)),
+        "damping_change_percent": both.and_then(|(a, b)| Change::of_damping(&a, &b)).map(|c| change(&c)),
     })
 }
 

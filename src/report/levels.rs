@@ -1,9 +1,10 @@
-//! The pattern of frequency and damping across the levels of a tree (002 section 5.4).
+//! The pattern of frequency and damping across the levels of a tree (Hu et al. sect. 5.4).
 
+use super::compare::percent_of_log;
 use super::study::Study;
 use crate::model::{Interval, Sway};
 
-/// Branches that a trend is told from, at least.
+/// Branches that a trend is estimated from, at least.
 const LEAST: usize = 4;
 
 /// The branches of one level.
@@ -38,16 +39,18 @@ pub struct Growth {
 impl Spread {
     /// Of some values; `None` of none.
     pub fn of(values: &[f64]) -> Option<Self> {
-        let fold = |f: fn(f64, f64) -> f64| values.iter().copied().reduce(f);
+        let n = values.len();
+        if n == 0 {
+            return None;
+        }
         let mut sorted = values.to_vec();
         sorted.sort_unstable_by(f64::total_cmp);
-        let middle = |k: usize| sorted.get(k).copied();
-        let median = 0.5 * (middle(values.len() / 2)? + middle((values.len() - 1) / 2)?);
         Some(Self {
-            n: values.len(),
-            median,
-            least: fold(f64::min)?,
-            largest: fold(f64::max)?,
+            n,
+            // Of an even number the mean of the middle two.
+            median: 0.5 * (sorted[n / 2] + sorted[(n - 1) / 2]),
+            least: values.iter().copied().reduce(f64::min)?,
+            largest: values.iter().copied().reduce(f64::max)?,
         })
     }
 }
@@ -57,23 +60,24 @@ pub fn levels(study: &Study) -> Vec<Level> {
     let mut numbers: Vec<u8> = study.branches.iter().map(|b| b.level).collect();
     numbers.sort_unstable();
     numbers.dedup();
-    let level = |level: u8| {
-        let of = || study.branches.iter().filter(move |b| b.level == level);
-        let known: Vec<Sway> = of().filter_map(|b| b.known()).collect();
-        let frequencies: Vec<f64> = known.iter().map(|s| s.frequency_hz.value).collect();
-        let dampings: Vec<f64> = known
-            .iter()
-            .filter_map(|s| Some(s.damping_ratio?.value))
-            .collect();
-        Level {
-            level,
-            branches: of().count(),
-            answers: known.len(),
-            frequency_hz: Spread::of(&frequencies),
-            damping_ratio: Spread::of(&dampings),
-        }
-    };
-    numbers.into_iter().map(level).collect()
+    numbers.into_iter().map(|n| level(study, n)).collect()
+}
+
+fn level(study: &Study, level: u8) -> Level {
+    let branches = study.branches.iter().filter(|b| b.level == level);
+    let known: Vec<Sway> = branches.clone().filter_map(|b| b.known()).collect();
+    let frequencies: Vec<f64> = known.iter().map(|s| s.frequency_hz.value).collect();
+    let dampings: Vec<f64> = known
+        .iter()
+        .filter_map(|s| Some(s.damping_ratio?.value))
+        .collect();
+    Level {
+        level,
+        branches: branches.count(),
+        answers: known.len(),
+        frequency_hz: Spread::of(&frequencies),
+        damping_ratio: Spread::of(&dampings),
+    }
 }
 
 /// How `value` grows from level to level: a straight line through its logarithms. `None` for fewer
@@ -96,22 +100,22 @@ pub fn growth(study: &Study, value: impl Fn(&Sway) -> Option<f64>) -> Option<Gro
     let mean = points
         .iter()
         .fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
-    let sum = |f: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(f).sum::<f64>();
-    let wide = sum(&|p| (p.0 - mean.0).powi(2));
-    if wide <= 0.0 {
+    let (mut squares, mut products) = (0.0, 0.0);
+    for (level, log) in &points {
+        squares += (level - mean.0).powi(2);
+        products += (level - mean.0) * (log - mean.1);
+    }
+    if squares <= 0.0 {
         return None;
     }
-    let slope = sum(&|p| (p.0 - mean.0) * (p.1 - mean.1)) / wide;
-    let left = sum(&|p| (p.1 - mean.1 - slope * (p.0 - mean.0)).powi(2));
-    let half = students_975(n - 2.0) * (left / (n - 2.0) / wide).sqrt();
-    let percent = |x: f64| 100.0 * x.exp_m1();
-    let percent = Interval {
-        value: percent(slope),
-        lo: percent(slope - half),
-        hi: percent(slope + half),
-    };
+    let slope = products / squares;
+    let mut left = 0.0;
+    for (level, log) in &points {
+        left += (log - mean.1 - slope * (level - mean.0)).powi(2);
+    }
+    let half = students_975(n - 2.0) * (left / (n - 2.0) / squares).sqrt();
     Some(Growth {
-        percent,
+        percent: percent_of_log(slope, half),
         branches: points.len(),
     })
 }

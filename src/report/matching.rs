@@ -34,6 +34,16 @@ pub enum Match {
     Unclear,
 }
 
+impl Match {
+    /// The branch that was found.
+    pub fn branch(&self) -> Option<usize> {
+        match self {
+            Self::Found { branch, .. } => Some(*branch),
+            Self::Missing | Self::Unclear => None,
+        }
+    }
+}
+
 /// What became of every branch of `first` in `other`; no branch of `other` stands twice.
 pub fn matched(first: &Study, other: &Study) -> Vec<Match> {
     let size_px = first.size_px();
@@ -91,29 +101,22 @@ impl Frame {
     /// The scale and shift by which the branches that were found lie on each other best; the same
     /// for few of them.
     fn refined(&self, first: &Study, other: &Study, found: &[Match]) -> Self {
-        let pairs: Vec<Pair> = found
-            .iter()
-            .enumerate()
-            .filter_map(|(i, m)| match m {
-                Match::Found { branch, .. } => {
-                    Some((first.branches[i].tip, other.branches[*branch].tip))
-                }
-                _ => None,
-            })
-            .collect();
+        let mut pairs: Vec<Pair> = Vec::new();
+        for (branch, m) in first.branches.iter().zip(found) {
+            if let Some(there) = m.branch() {
+                pairs.push((branch.tip, other.branches[there].tip));
+            }
+        }
         let n = pairs.len() as f64;
-        let mean = |of: &dyn Fn(&Pair) -> f64| pairs.iter().map(of).sum::<f64>() / n;
-        let (a, b) = (
-            [0, 1].map(|c| mean(&|p| p.0[c])),
-            [0, 1].map(|c| mean(&|p| p.1[c])),
-        );
-        let product = |p: &Pair| {
-            (0..2)
-                .map(|c| (p.0[c] - a[c]) * (p.1[c] - b[c]))
-                .sum::<f64>()
-        };
-        let square = |p: &Pair| (0..2).map(|c| (p.1[c] - b[c]).powi(2)).sum::<f64>();
-        let scale = mean(&product) / mean(&square);
+        let a = [0, 1].map(|c| pairs.iter().map(|p| p.0[c]).sum::<f64>() / n);
+        let b = [0, 1].map(|c| pairs.iter().map(|p| p.1[c]).sum::<f64>() / n);
+        let (mut products, mut squares) = (0.0, 0.0);
+        for (p, q) in &pairs {
+            let (p, q) = ([p[0] - a[0], p[1] - a[1]], [q[0] - b[0], q[1] - b[1]]);
+            products += p[0] * q[0] + p[1] * q[1];
+            squares += q[0].powi(2) + q[1].powi(2);
+        }
+        let scale = (products / n) / (squares / n);
         if pairs.len() < LEAST_PAIRS || !scale.is_finite() || scale <= 0.0 {
             return Self { ..*self };
         }
@@ -122,29 +125,38 @@ impl Frame {
             shift: [0, 1].map(|c| a[c] - scale * b[c]),
         }
     }
+
+    /// How far two branches lie from each other, tips and bases, as a share of the tree's size.
+    fn off(&self, a: &Branch, b: &Branch, size_px: f64) -> f64 {
+        let tips = self.distance_px(a.tip, b.tip) / size_px;
+        let bases = self.distance_px(a.base, b.base) / size_px;
+        tips.hypot(BASE * bases)
+    }
+
+    /// From a place in the first capture to one in the other.
+    fn distance_px(&self, p: [f64; 2], q: [f64; 2]) -> f64 {
+        let q = self.place(q);
+        (p[0] - q[0]).hypot(p[1] - q[1])
+    }
+}
+
+/// Whether a branch that is `d` away makes it unclear that the one `off` away is meant.
+fn is_rival(d: f64, off: f64) -> bool {
+    d < AS_NEAR * off && off > NEAR
 }
 
 /// What became of the branches if the other capture's picture lies so on the first one's; nearest
 /// pairs first.
 fn seen_from(first: &Study, other: &Study, frame: &Frame, size_px: f64) -> Vec<Match> {
-    let off = |a: &Branch, b: &Branch| {
-        let far = |p: [f64; 2], q: [f64; 2]| {
-            let q = frame.place(q);
-            (p[0] - q[0]).hypot(p[1] - q[1]) / size_px
-        };
-        far(a.tip, b.tip).hypot(BASE * far(a.base, b.base))
-    };
-    let table: Vec<Vec<f64>> = first
-        .branches
-        .iter()
-        .map(|a| other.branches.iter().map(|b| off(a, b)).collect())
-        .collect();
-    let mut pairs: Vec<(f64, usize, usize)> = table
-        .iter()
-        .enumerate()
-        .flat_map(|(i, row)| row.iter().enumerate().map(move |(j, &d)| (d, i, j)))
-        .filter(|(d, _, _)| *d <= FARTHEST)
-        .collect();
+    let mut table: Vec<Vec<f64>> = Vec::with_capacity(first.branches.len());
+    let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
+    for (i, a) in first.branches.iter().enumerate() {
+        let row = other.branches.iter().map(|b| frame.off(a, b, size_px));
+        let row: Vec<f64> = row.collect();
+        let near = row.iter().enumerate().filter(|(_, d)| **d <= FARTHEST);
+        pairs.extend(near.map(|(j, &d)| (d, i, j)));
+        table.push(row);
+    }
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
     let mut out = vec![Match::Missing; first.branches.len()];
     let mut taken = vec![false; other.branches.len()];
@@ -152,10 +164,9 @@ fn seen_from(first: &Study, other: &Study, frame: &Frame, size_px: f64) -> Vec<M
         if out[i] != Match::Missing || taken[j] {
             continue;
         }
-        let rival = |d: f64| d < AS_NEAR * off && off > NEAR;
-        let others_i = (0..taken.len()).any(|k| k != j && !taken[k] && rival(table[i][k]));
-        let others_j =
-            (0..out.len()).any(|k| k != i && out[k] == Match::Missing && rival(table[k][j]));
+        let others_i = (0..taken.len()).any(|k| k != j && !taken[k] && is_rival(table[i][k], off));
+        let others_j = (0..out.len())
+            .any(|k| k != i && out[k] == Match::Missing && is_rival(table[k][j], off));
         if others_i || others_j {
             out[i] = Match::Unclear;
         } else {
@@ -173,7 +184,7 @@ mod tests {
 
     /// A tree whose branches end at `tips`, each carried by the trunk.
     fn study(tips: &[[f64; 2]]) -> Study {
-        let branch = |(i, tip): (usize, &[f64; 2])| Branch {
+        let branches = tips.iter().enumerate().map(|(i, tip)| Branch {
             name: i as u32 + 1,
             parent: (i > 0).then_some(1),
             level: if i > 0 { 2 } else { 1 },
@@ -192,7 +203,7 @@ mod tests {
             spectrum: None,
             reference: None,
             way_px: Vec::new(),
-        };
+        });
         Study {
             name: String::new(),
             source: String::new(),
@@ -208,20 +219,13 @@ mod tests {
             foot_px: [320.0, 340.0],
             outline_px: Vec::new(),
             picture: None,
-            branches: tips.iter().enumerate().map(branch).collect(),
+            branches: branches.collect(),
             notes: Vec::new(),
         }
     }
 
     fn found(matches: &[Match]) -> Vec<Option<usize>> {
-        let found = |m: &Match| {
-            if let Match::Found { branch, .. } = m {
-                Some(*branch)
-            } else {
-                None
-            }
-        };
-        matches.iter().map(found).collect()
+        matches.iter().map(Match::branch).collect()
     }
 
     const TREE: [[f64; 2]; 6] = [

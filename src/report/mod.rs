@@ -1,5 +1,5 @@
-//! What a film says of a tree's sway, told to people and programs: a table as text, JSON, and one
-//! HTML page with plots after Hu et al. (002 figures 3, 6, 7, 9 to 12 and 15). Pure: what goes in
+//! What a film says of a tree's sway, for people and programs: a table as text, JSON, and one
+//! HTML page with plots after Hu et al. (figs. 3, 6, 7, 9 to 12 and 15). Pure: what goes in
 //! is analysed already, what comes out is text.
 
 mod columns;

@@ -11,34 +11,40 @@ pub use levels::levels_part;
 pub use table::{not_said, table_part};
 
 use super::plot::escaped;
+use crate::model::{Interval, Sway};
 
 /// A drawing with what it shows; nothing without one. `caption` is HTML.
 fn figure(svg: Option<String>, caption: &str) -> String {
-    let class = |svg: &str| {
-        if svg.starts_with("<svg class=\"broad\"") {
-            " class=\"broad\""
-        } else {
-            ""
-        }
+    let Some(svg) = svg else {
+        return String::new();
     };
-    svg.map_or(String::new(), |svg| {
-        format!(
-            "<figure{}>{svg}<figcaption>{caption}</figcaption></figure>",
-            class(&svg)
-        )
-    })
+    let class = if svg.starts_with("<svg class=\"broad\"") {
+        " class=\"broad\""
+    } else {
+        ""
+    };
+    format!("<figure{class}>{svg}<figcaption>{caption}</figcaption></figure>")
+}
+
+/// A value of a branch's sway with its interval.
+type ValueOf = fn(&Sway) -> Option<Interval>;
+
+fn frequency_of(sway: &Sway) -> Option<Interval> {
+    Some(sway.frequency_hz)
+}
+
+fn damping_of(sway: &Sway) -> Option<Interval> {
+    sway.damping_ratio
 }
 
 /// Which colour is which capture.
 fn keys<'a>(names: impl Iterator<Item = &'a str>) -> String {
-    let key = |(k, name): (usize, &str)| {
-        format!(
-            "<span class=\"key\"><i class=\"k c{}\"></i>{}</span> ",
-            k % 6,
-            escaped(name)
-        )
-    };
-    names.enumerate().map(key).collect()
+    let mut out = String::new();
+    for (k, name) in names.enumerate() {
+        let (colour, name) = (k % 6, escaped(name));
+        out += &format!("<span class=\"key\"><i class=\"k c{colour}\"></i>{name}</span> ");
+    }
+    out
 }
 
 /// An interval under its value.

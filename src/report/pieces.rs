@@ -27,35 +27,41 @@ pub fn averaged(times_s: &[f64], values: &[f64]) -> Option<Spectrum> {
         return spectrum(times_s, values);
     }
     let count = ((last - first - PIECE_S) / (0.5 * PIECE_S)).floor() as usize + 1;
-    let piece = |k: usize| {
-        let from = first + 0.5 * PIECE_S * k as f64;
-        let rows: Vec<usize> = (0..times_s.len().min(values.len()))
-            .filter(|&i| from <= times_s[i] && times_s[i] < from + PIECE_S)
-            .collect();
-        let of = |all: &[f64]| rows.iter().map(|&i| all[i]).collect::<Vec<f64>>();
-        spectrum(&of(times_s), &of(values))
-    };
-    let mut pieces = (0..count).filter_map(piece);
+    let mut pieces =
+        (0..count).filter_map(|k| piece(times_s, values, first + 0.5 * PIECE_S * k as f64));
     let Spectrum { bin_hz, amplitude } = pieces.next()?;
     let (mut squares, mut n): (Vec<f64>, f64) = (amplitude.iter().map(|a| a * a).collect(), 1.0);
     for other in pieces {
         // Gaps make pieces of fewer frames, with bins of another width.
-        let at = |hz: f64| {
-            let k = hz / other.bin_hz;
-            let (low, share) = (k.floor() as usize, k.fract());
-            let value = |k: usize| other.amplitude.get(k).copied().unwrap_or(0.0);
-            value(low) + share * (value(low + 1) - value(low))
-        };
-        squares
-            .iter_mut()
-            .enumerate()
-            .for_each(|(k, s)| *s += at(k as f64 * bin_hz).powi(2));
+        for (k, square) in squares.iter_mut().enumerate() {
+            *square += amplitude_at(&other, k as f64 * bin_hz).powi(2);
+        }
         n += 1.0;
     }
     Some(Spectrum {
         bin_hz,
         amplitude: squares.into_iter().map(|s| (s / n).sqrt()).collect(),
     })
+}
+
+/// The spectrum of the piece that begins at `from_s`.
+fn piece(times_s: &[f64], values: &[f64], from_s: f64) -> Option<Spectrum> {
+    let (mut piece_times_s, mut piece_values) = (Vec::new(), Vec::new());
+    for (time_s, value) in times_s.iter().zip(values) {
+        if from_s <= *time_s && *time_s < from_s + PIECE_S {
+            piece_times_s.push(*time_s);
+            piece_values.push(*value);
+        }
+    }
+    spectrum(&piece_times_s, &piece_values)
+}
+
+/// The amplitude at a frequency, straight between bins.
+fn amplitude_at(spectrum: &Spectrum, hz: f64) -> f64 {
+    let k = hz / spectrum.bin_hz;
+    let (low, share) = (k.floor() as usize, k.fract());
+    let [below, above] = [low, low + 1].map(|k| spectrum.amplitude.get(k).copied().unwrap_or(0.0));
+    below + share * (above - below)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! One capture, analysed: what the table, the JSON and the page are made from.
 
-use super::decaying::{Decaying, decaying};
+use super::decaying::decaying;
 use super::pieces::{averaged, looked_at_s};
 use crate::dynamics::{
     Analysis, Film, LEAST_PERIODS, Onset, Spectrum, angle_in_space_deg, angle_to_parent_deg,
@@ -11,7 +11,7 @@ use crate::model::{Excitation, NodeId, Pose, Skeleton, Sway, Swaying, Unidentifi
 /// A step from frame to frame that is so many times the usual one is a gap.
 const GAP: f64 = 1.6;
 /// The points and the angle of the model see a branch's amplitude in different ways; farther apart
-/// than so many times, neither is told.
+/// than so many times, neither is shown.
 const AGREE: f64 = 1.5;
 
 /// What a [`Study`] is made from.
@@ -89,7 +89,7 @@ pub struct Branch {
     /// Amplitude of the branch's own oscillation in its angle to the one that carries it, degrees;
     /// no number where unknown.
     pub amplitude_deg: f64,
-    /// What it is told from: by the turn of the points about the place where the branch begins at
+    /// What it is taken from: by the turn of the points about the place where the branch begins at
     /// rest, which a move of that place makes larger or smaller; and after a release by the angle
     /// in the picture's plane, as in [`fitted_deg`](Self::fitted_deg). No numbers where unknown.
     pub by_points_deg: f64,
@@ -97,7 +97,7 @@ pub struct Branch {
     /// What the amplitude is at the branch's end, px in the picture; no number where unknown.
     pub amplitude_px: f64,
     /// When every angle was, s; empty without poses. The angles are to the branch that carries it,
-    /// less their mean, degrees: in the picture's plane and in space (002 eq. 1); no number where
+    /// less their mean, degrees: in the picture's plane and in space (Hu et al. eq. 1); no number where
     /// it has no direction.
     pub times_s: Vec<f64>,
     pub plane_deg: Vec<f64>,
@@ -114,16 +114,16 @@ pub struct Branch {
     pub way_px: Vec<[f64; 2]>,
 }
 
-/// What the spectrum's largest peak says: the method of 002.
+/// What the spectrum's largest peak says: the method of Hu et al.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reference {
     pub peak_hz: f64,
-    /// By its width at half the power, 002 eq. 6.
+    /// By its width at half the power, Hu et al. eq. 6.
     pub damping_ratio: f64,
 }
 
 impl Study {
-    /// Puts together what is told of a capture.
+    /// Puts together what is reported of a capture.
     pub fn of(given: &Given) -> Self {
         let Given {
             skeleton,
@@ -224,94 +224,42 @@ impl Branch {
 /// First and last moment of the frames that an analysis has used, of a film from and to these
 /// `ends`, s.
 fn used_s(onset: &Onset, times_s: &[f64], ends: [f64; 2]) -> [f64; 2] {
-    let at = |k: usize| times_s.get(k).copied();
+    let first = times_s.get(onset.from);
+    let last = times_s.get(onset.to.saturating_sub(1));
     [
-        at(onset.from).unwrap_or(ends[0]),
-        at(onset.to.saturating_sub(1)).unwrap_or(ends[1]),
+        first.copied().unwrap_or(ends[0]),
+        last.copied().unwrap_or(ends[1]),
     ]
 }
 
 fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: [f64; 2]) -> Branch {
-    let Given {
-        skeleton, poses, ..
-    } = *given;
-    let at = &skeleton.nodes[node.index()];
-    let place = |n: NodeId| {
-        let p = skeleton.nodes[n.index()].position;
-        [p.x, p.y]
-    };
+    let (skeleton, poses) = (given.skeleton, given.poses);
+    let own = &skeleton.nodes[node.index()];
     let parent = skeleton.ancestors(node).next().unwrap_or(NodeId(0));
-    let (base, tip) = (place(parent), place(node));
+    let (base, tip) = (place(skeleton, parent), place(skeleton, node));
     let length_px = (tip[0] - base[0]).hypot(tip[1] - base[1]);
-    let of_node = |p: &Pose| {
-        p.joints
-            .get(node.index())
-            .map_or([f64::NAN; 2], |j| [j.position.x, j.position.y])
-    };
     let times_s: Vec<f64> = poses.iter().map(|p| p.time_s).collect();
-    let [plane_deg, space_deg] = [
-        angle_to_parent_deg(skeleton, poses, node),
-        angle_in_space_deg(skeleton, poses, node),
-    ]
-    .map(centred);
-    let used: Vec<usize> = (0..times_s.len())
-        .filter(|&k| used_s[0] <= times_s[k] && times_s[k] <= used_s[1])
-        .collect();
-    let of_used = |all: &[f64]| used.iter().map(|&k| all[k]).collect::<Vec<f64>>();
-    let driven = given
-        .analysis
-        .onset
-        .is_none_or(|o| o.excitation == Excitation::Wind);
-    let (spectrum, reference) = seen(
-        &of_used(&times_s),
-        &of_used(&plane_deg),
-        driven,
-        given.highest_hz,
-    );
-    // Its end is seen to move with what it carries, too.
-    let carried = (0..skeleton.nodes.len() as u32)
-        .map(NodeId)
-        .filter(|n| skeleton.nodes[n.index()].parent == Some(node));
-    let others: Vec<Sway> = skeleton
-        .ancestors(node)
-        .chain(carried)
-        .filter_map(|p| {
-            given
-                .analysis
-                .sway
-                .get(p.index())
-                .copied()
-                .and_then(Result::ok)
-        })
-        .collect();
-    let fitted = sway
-        .ok()
-        .filter(|s| s.excitation == Excitation::Release)
-        .zip(given.analysis.onset)
-        .and_then(|(own, onset)| decaying(&times_s, &plane_deg, used_s, onset.at_s, &own, &others));
+    let plane_deg = centred(angle_to_parent_deg(skeleton, poses, node));
+    let space_deg = centred(angle_in_space_deg(skeleton, poses, node));
+    let (spectrum, reference) = seen_in(given, &times_s, &plane_deg, used_s);
+    let released = sway.ok().filter(|s| s.excitation == Excitation::Release);
+    let fitted = released.zip(given.analysis.onset).and_then(|(own, onset)| {
+        let others = others_seen(given, node);
+        decaying(&times_s, &plane_deg, used_s, onset.at_s, &own, &others)
+    });
     let by_points_deg = sway.map_or(f64::NAN, |s| s.amplitude_deg);
-    let (fitted_deg, in_angle_deg) = fitted.map_or(
-        (None, f64::NAN),
-        |Decaying {
-             curve_deg,
-             amplitude_deg,
-         }| (Some(curve_deg), amplitude_deg),
-    );
-    let in_angle = poses.len() > 1 && sway.is_ok_and(|s| s.excitation == Excitation::Release);
-    let amplitude_deg = if in_angle {
+    let in_angle_deg = fitted.as_ref().map_or(f64::NAN, |f| f.amplitude_deg);
+    let amplitude_deg = if poses.len() > 1 && released.is_some() {
         agreed(by_points_deg, in_angle_deg)
     } else {
         by_points_deg
     };
+    let parent_node = own.parent.and(skeleton.nodes.get(parent.index()));
     Branch {
-        name: at.name.0,
-        parent: at
-            .parent
-            .and(skeleton.nodes.get(parent.index()))
-            .filter(|p| p.parent.is_some())
-            .map(|p| p.name.0),
-        level: at.level,
-        points: at.n_tracks,
+        name: own.name.0,
+        parent: parent_node.filter(|p| p.parent.is_some()).map(|p| p.name.0),
+        level: own.level,
+        points: own.n_tracks,
         base,
         tip,
         sway,
@@ -319,18 +267,68 @@ fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: [f64; 2]) -> Branc
         by_points_deg,
         in_angle_deg,
         amplitude_px: amplitude_deg.to_radians() * length_px,
-        way_px: poses
-            .iter()
-            .map(of_node)
-            .map(|[x, y]| [x - tip[0], y - tip[1]])
-            .collect(),
+        way_px: way_px(poses, node, tip),
         times_s,
         plane_deg,
         space_deg,
-        fitted_deg,
+        fitted_deg: fitted.map(|f| f.curve_deg),
         spectrum,
         reference,
     }
+}
+
+/// Where a node is at rest, px to the right and up from the foot.
+fn place(skeleton: &Skeleton, node: NodeId) -> [f64; 2] {
+    let p = skeleton.nodes[node.index()].position;
+    [p.x, p.y]
+}
+
+/// How far a node was from `rest` in every pose, px to the right and up; no numbers where a pose
+/// lacks it.
+fn way_px(poses: &[Pose], node: NodeId, rest: [f64; 2]) -> Vec<[f64; 2]> {
+    let mut way = Vec::with_capacity(poses.len());
+    for pose in poses {
+        way.push(match pose.joints.get(node.index()) {
+            Some(joint) => [joint.position.x - rest[0], joint.position.y - rest[1]],
+            None => [f64::NAN; 2],
+        });
+    }
+    way
+}
+
+/// Spectrum and reference of an angle over the time that the analysis has used.
+fn seen_in(
+    given: &Given,
+    times_s: &[f64],
+    angle_deg: &[f64],
+    used_s: [f64; 2],
+) -> (Option<Spectrum>, Option<Reference>) {
+    let (mut used_times_s, mut used_deg) = (Vec::new(), Vec::new());
+    for (time_s, deg) in times_s.iter().zip(angle_deg) {
+        if used_s[0] <= *time_s && *time_s <= used_s[1] {
+            used_times_s.push(*time_s);
+            used_deg.push(*deg);
+        }
+    }
+    let onset = given.analysis.onset;
+    let driven = onset.is_none_or(|o| o.excitation == Excitation::Wind);
+    seen(&used_times_s, &used_deg, driven, given.highest_hz)
+}
+
+/// The sways of the branches that carry this one and of those that leave its end, which is seen to
+/// move with them, too.
+fn others_seen(given: &Given, node: NodeId) -> Vec<Sway> {
+    let skeleton = given.skeleton;
+    let carried = (0..skeleton.nodes.len() as u32)
+        .map(NodeId)
+        .filter(|n| skeleton.nodes[n.index()].parent == Some(node));
+    let mut out = Vec::new();
+    for other in skeleton.ancestors(node).chain(carried) {
+        if let Some(Ok(sway)) = given.analysis.sway.get(other.index()) {
+            out.push(*sway);
+        }
+    }
+    out
 }
 
 /// An amplitude that is seen in an angle, if the points do not contradict it.
@@ -375,8 +373,8 @@ fn seen(
 
 /// Less their mean.
 fn centred(mut angles: Vec<f64>) -> Vec<f64> {
-    let seen = || angles.iter().filter(|a| a.is_finite());
-    let mean = seen().sum::<f64>() / (seen().count() as f64).max(1.0);
+    let seen = angles.iter().filter(|a| a.is_finite());
+    let mean = seen.clone().sum::<f64>() / (seen.count() as f64).max(1.0);
     angles.iter_mut().for_each(|a| *a -= mean);
     angles
 }
@@ -384,8 +382,9 @@ fn centred(mut angles: Vec<f64>) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::TAU;
 
-    /// A stub of two points that its carrier takes along seems to turn by 30 degrees: no number
+    /// A stub of two points that its parent takes along seems to turn by 30 degrees: no number
     /// that only one witness gives.
     #[test]
     fn an_amplitude_that_points_and_angle_do_not_agree_on_is_not_told() {
@@ -407,18 +406,15 @@ mod tests {
     #[test]
     fn drift_that_is_as_slow_as_a_piece_is_not_the_reference() {
         let times: Vec<f64> = (0..3600).map(|k| f64::from(k) / 30.0).collect();
-        let wave = |hz: f64, t: f64| (std::f64::consts::TAU * hz * t).sin();
         let angle: Vec<f64> = times
             .iter()
-            .map(|t| 1.5 * wave(0.05, *t) + wave(0.8, *t))
+            .map(|t| 1.5 * (TAU * 0.05 * t).sin() + (TAU * 0.8 * t).sin())
             .collect();
-        let peak_hz = |driven| seen(&times, &angle, driven, 5.0).1.unwrap().peak_hz;
-        assert!((peak_hz(true) - 0.8).abs() < 0.03, "{} Hz", peak_hz(true));
         // In one piece of two minutes it is a sway like any other.
-        assert!(
-            (peak_hz(false) - 0.05).abs() < 0.01,
-            "{} Hz",
-            peak_hz(false)
-        );
+        for (driven, expected_hz, off_hz) in [(true, 0.8, 0.03), (false, 0.05, 0.01)] {
+            let (_, reference) = seen(&times, &angle, driven, 5.0);
+            let peak_hz = reference.unwrap().peak_hz;
+            assert!((peak_hz - expected_hz).abs() < off_hz, "{peak_hz} Hz");
+        }
     }
 }

@@ -83,11 +83,11 @@ fn left_out(heads: &[String]) -> String {
 }
 
 fn row(study: &Study, branch: &Branch) -> Vec<String> {
-    let carrier = branch.parent.map_or("foot".into(), |p| p.to_string());
+    let parent = branch.parent.map_or("foot".into(), |p| p.to_string());
     let mut row = vec![
         branch.name.to_string(),
         branch.level.to_string(),
-        carrier,
+        parent,
         branch.points.to_string(),
     ];
     match branch.sway {
@@ -122,31 +122,43 @@ fn level_table(levels: &[Level], columns: Option<usize>) -> String {
         ("damping ratio", 0),
     ];
     let mut table = Table::new(&heads);
-    let spread = |s: &Option<Spread>| s.as_ref().map_or("-".into(), |s| spread(s, 3));
     for l in levels {
-        let counts =
-            [u64::from(l.level), l.branches as u64, l.answers as u64].map(|n| n.to_string());
-        table.push(
-            counts
-                .into_iter()
-                .chain([spread(&l.frequency_hz), spread(&l.damping_ratio)])
-                .collect(),
-        );
+        table.push(level_cells(l).to_vec());
     }
     format!("{}  (median, least to largest)\n", table.within(columns).0)
 }
 
+/// A row of the table of levels.
+pub fn level_cells(level: &Level) -> [String; 5] {
+    [
+        level.level.to_string(),
+        level.branches.to_string(),
+        level.answers.to_string(),
+        spread_or_dash(level.frequency_hz.as_ref()),
+        spread_or_dash(level.damping_ratio.as_ref()),
+    ]
+}
+
+fn spread_or_dash(of: Option<&Spread>) -> String {
+    of.map_or("-".into(), |s| spread(s, 3))
+}
+
 /// How frequency and damping grow with the level, in words.
 pub fn trends(study: &Study) -> String {
-    let of = |what: &str, g: Option<Growth>| {
-        g.map_or(String::new(), |g| format!("  {}\n", trend(what, &g)))
-    };
-    let frequency = of("frequency", growth(study, |s| Some(s.frequency_hz.value)));
-    frequency
-        + &of(
+    let growths = [
+        ("frequency", growth(study, |s| Some(s.frequency_hz.value))),
+        (
             "damping",
             growth(study, |s| s.damping_ratio.map(|d| d.value)),
-        )
+        ),
+    ];
+    let mut out = String::new();
+    for (what, growth) in growths {
+        if let Some(growth) = growth {
+            out += &format!("  {}\n", trend(what, &growth));
+        }
+    }
+    out
 }
 
 /// `frequency by level: +12 % a level (+5 to +20 %, of 9 branches)`, and whether that is more than
@@ -176,24 +188,19 @@ pub fn changed(change: &Change) -> String {
 /// `+1.2 % (+0.4 to +2.0 %)`.
 pub fn percent(of: &Interval) -> String {
     let decimals = if (of.hi - of.lo).abs() < 10.0 { 1 } else { 0 };
-    let signed = |x: f64| {
-        let text = format!("{x:+.decimals$}");
-        if text
-            .trim_start_matches(['+', '-'])
-            .chars()
-            .all(|c| c == '0' || c == '.')
-        {
-            text[1..].into()
-        } else {
-            text
-        }
-    };
-    format!(
-        "{} % ({} to {} %)",
-        signed(of.value),
-        signed(of.lo),
-        signed(of.hi)
-    )
+    let [value, lo, hi] = [of.value, of.lo, of.hi].map(|x| signed(x, decimals));
+    format!("{value} % ({lo} to {hi} %)")
+}
+
+/// A number with its sign; none for what rounds to 0.
+fn signed(x: f64, decimals: usize) -> String {
+    let text = format!("{x:+.decimals$}");
+    let mut digits = text.trim_start_matches(['+', '-']).chars();
+    if digits.all(|c| c == '0' || c == '.') {
+        text[1..].into()
+    } else {
+        text
+    }
 }
 
 /// `0.700 (0.699 to 0.702)`: digits enough to tell the ends apart.

@@ -4,21 +4,23 @@ use super::study::Study;
 use crate::dynamics::Start;
 use crate::model::{Excitation, Unidentified};
 
-/// What made the tree sway, and how that was told.
+/// What made the tree sway, and how that was judged.
 pub fn excitation(study: &Study) -> String {
     let Some(onset) = study.onset else {
-        return "too little film to tell what made it sway".into();
+        return "unknown: the film is too short to judge it".into();
     };
     let by = match study.given {
         Some(_) => "as --excitation or the settings say",
         None => match (onset.excitation, onset.start) {
             (Excitation::Release, Start::Rest) => {
-                "told by the motion: it begins from rest and dies down"
+                "judged from the motion, which begins from rest and decays"
             }
             (Excitation::Release, Start::Moving) => {
-                "told by the motion: it dies down as free sway does"
+                "judged from the motion, which decays as free vibration does"
             }
-            (Excitation::Wind, _) => "told by the motion: it does not die down as free sway does",
+            (Excitation::Wind, _) => {
+                "judged from the motion, which does not decay as free vibration does"
+            }
         },
     };
     match (onset.excitation, onset.start) {
@@ -93,8 +95,8 @@ pub fn why(reason: Unidentified) -> &'static str {
             "Hardly more motion than the noise of the points: pull harder, wait for more wind, or film from nearer."
         }
         Unidentified::AncestorsSway => {
-            "The points move as those of the carrier do, and nothing beyond that could be told. There is a frequency, and this \
-             film does not show it; pulling at the branch itself may."
+            "The points move with the parent branch, and no motion beyond that was found. The branch has a frequency of its \
+             own, which this film does not show; pulling at the branch itself may."
         }
         Unidentified::AboveSampling => {
             "At this rate of frames a faster sway would look the same: film with more frames a second."
@@ -107,7 +109,7 @@ pub fn why(reason: Unidentified) -> &'static str {
             "There is an oscillation, but the film allows frequencies too far apart: film for longer."
         }
         Unidentified::NotInTime => {
-            "The end of the capture was wanted before this branch was looked at: `arborcam analyze` does it."
+            "The capture ended before this branch was analysed: `arborcam analyze` does it."
         }
     }
 }

@@ -4,19 +4,17 @@ use super::meter::Recent;
 use super::shared::Shared;
 use super::sway_watch::SwayWatch;
 use crate::model::{
-    BranchRow, FormatNote, NodeName, Observation, Phase, Rgb, Size, Skeleton, Snapshot, SwayNow,
-    TrackSet,
+    BranchRow, FormatNote, Observation, Phase, Rgb, Size, Skeleton, Snapshot, SwayNow, TrackSet,
 };
 use crate::pipeline::{BackEnd, Moved, Targets};
 use crate::signal::median;
 use crate::solve::Model;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-/// Level of the nodes by which points are coloured, and the deepest level in the table of branches.
-const MAIN_BRANCH_LEVEL: u8 = 4;
+/// The deepest level in the table of branches.
 const TABLE_LEVEL: u8 = 5;
 /// Time over which rates are taken, and over which the amplitude of a branch is, s.
 const RATE_S: f64 = 5.0;
@@ -43,8 +41,6 @@ pub struct Status {
     table_rest_px: Vec<[f64; 2]>,
     table_made_s: f64,
     skeleton: Option<Arc<Skeleton>>,
-    /// Colours that main branches have been given: they keep them when the tree is refined.
-    colours: BTreeMap<NodeName, u8>,
 }
 
 impl Status {
@@ -69,7 +65,6 @@ impl Status {
             table_rest_px: Vec::new(),
             table_made_s: f64::NEG_INFINITY,
             skeleton: None,
-            colours: BTreeMap::new(),
         }
     }
 
@@ -216,8 +211,7 @@ impl Status {
             self.table_rest_px = self.table_nodes.iter().map(at_rest).collect();
             self.displacements.clear();
             self.table_made_s = f64::NEG_INFINITY;
-            self.snapshot.skeleton = Some(tree.skeleton.clone());
-            self.snapshot.node_colour = Arc::new(main_branches(&tree.skeleton, &mut self.colours));
+            self.snapshot.show_tree(tree.skeleton.clone());
         }
         for (pose, targets_px) in &moved.before {
             self.displaced(pose.time_s, targets_px);
@@ -290,25 +284,6 @@ pub fn median_error_px(tracks: &TrackSet) -> Option<f64> {
         f32::total_cmp,
     )
     .map(f64::from)
-}
-
-/// Number of the main branch of every node; `None` above the main branches. A copy has its
-/// original's, and a branch the one that `given` knows.
-fn main_branches(skeleton: &Skeleton, given: &mut BTreeMap<NodeName, u8>) -> Vec<Option<u8>> {
-    let mut colours: Vec<Option<u8>> = Vec::with_capacity(skeleton.nodes.len());
-    for node in &skeleton.nodes {
-        let colour = match (node.copy_of, node.parent) {
-            (Some(original), _) => colours[original.index()],
-            (None, _) if node.level == MAIN_BRANCH_LEVEL => {
-                let next = given.len() as u8;
-                Some(*given.entry(node.name).or_insert(next))
-            }
-            (None, Some(parent)) => colours[parent.index()],
-            (None, None) => None,
-        };
-        colours.push(colour);
-    }
-    colours
 }
 
 fn rms_px(path: &[[f64; 2]]) -> f64 {

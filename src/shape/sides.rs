@@ -14,8 +14,8 @@ const SEEN: f64 = 0.05;
 /// Shares of the way back that are tried.
 const BACK: [f64; 4] = [1.0, 0.75, 0.5, 0.25];
 
-/// `kept` with the pushes of `anew`, those of each main branch of each plane mirrored if that
-/// brings them nearer to what they were: a mirror image in its plane is as likely by eq. 4.
+/// `kept` with the pushes of `anew`, those of each branch of the trunk in each plane mirrored if
+/// that brings them nearer to what they were: a mirror image in its plane is as likely by eq. 4.
 pub(super) fn turned_as_before(
     kept: &Skeleton,
     held: &[Option<Point3<f64>>],
@@ -24,7 +24,8 @@ pub(super) fn turned_as_before(
 ) -> Skeleton {
     let is_trunk = |i: usize| trunk.get(i).is_some_and(|t| *t);
     let (was, is) = (out_of_planes(kept, trunk), out_of_planes(anew, trunk));
-    let mut main: Vec<usize> = (0..kept.nodes.len()).collect();
+    // The branch of the trunk, or of a copy's plane, that each node is on.
+    let mut of_trunk: Vec<usize> = (0..kept.nodes.len()).collect();
     let mut alike = vec![0.0; kept.nodes.len()];
     for i in 0..kept.nodes.len() {
         if let Some(p) = kept.nodes[i]
@@ -32,10 +33,10 @@ pub(super) fn turned_as_before(
             .map(|p| p.index())
             .filter(|&p| !is_trunk(p))
         {
-            main[i] = main[p];
+            of_trunk[i] = of_trunk[p];
         }
         if held.get(i).is_some_and(Option::is_some) {
-            alike[main[i]] += was[i] * is[i];
+            alike[of_trunk[i]] += was[i] * is[i];
         }
     }
     let mut turned = kept.clone();
@@ -45,7 +46,7 @@ pub(super) fn turned_as_before(
         .enumerate()
         .filter(|(i, _)| !is_trunk(*i))
     {
-        let side = if alike[main[i]] < 0.0 { -1.0 } else { 1.0 };
+        let side = if alike[of_trunk[i]] < 0.0 { -1.0 } else { 1.0 };
         node.position += plane_normal(node.plane_angle) * (side * is[i] - was[i]);
     }
     turned

@@ -39,26 +39,7 @@ pub fn picture(
         raster.darken(0.3);
     }
     if let Some(drawing) = drawing {
-        let points = drawing.points_px();
-        let closed = points.len() >= 3;
-        for (a, b) in edges(points, closed) {
-            raster.line(
-                placed.dot_from_pixel(a),
-                placed.dot_from_pixel(b),
-                fine,
-                DRAWN,
-            );
-        }
-        for p in points {
-            // In a coarse picture a corner with a border would hide what it is set on.
-            if fine > 0 {
-                mark(&mut raster, placed, *p, fine + 1, DRAWN, 1.0);
-            }
-            mark(&mut raster, placed, *p, fine, CURSOR, 1.0);
-        }
-        if let Some(cursor) = drawing.cursor_px() {
-            cross(&mut raster, placed, cursor, fine);
-        }
+        draw_polygon(&mut raster, drawing, placed, fine);
         return Some(raster);
     }
     for (a, b) in edges(&outline(snapshot), true) {
@@ -69,27 +50,39 @@ pub fn picture(
             OUTLINE,
         );
     }
-    for [u, v] in &snapshot.candidates_px {
-        mark(
-            &mut raster,
-            placed,
-            [*u as f64, *v as f64],
-            fine,
-            theme.branch_rgb(None),
-            FAINT * cover,
-        );
+    let on_trial = theme.branch_rgb(None);
+    for p in &snapshot.candidates_px {
+        let pixel = p.map(f64::from);
+        mark(&mut raster, placed, pixel, fine, on_trial, FAINT * cover);
     }
-    for ([u, v], branch) in &snapshot.points {
-        mark(
-            &mut raster,
-            placed,
-            [*u as f64, *v as f64],
-            fine,
-            theme.branch_rgb(*branch),
-            cover,
-        );
+    for (p, branch) in &snapshot.points {
+        let (pixel, colour) = (p.map(f64::from), theme.branch_rgb(*branch));
+        mark(&mut raster, placed, pixel, fine, colour, cover);
     }
     Some(raster)
+}
+
+/// The polygon that the user draws, its corners, and the keyboard's cursor.
+fn draw_polygon(raster: &mut Raster, drawing: &Drawing, placed: &Placed, fine: i64) {
+    let points = drawing.points_px();
+    for (a, b) in edges(points, points.len() >= 3) {
+        raster.line(
+            placed.dot_from_pixel(a),
+            placed.dot_from_pixel(b),
+            fine,
+            DRAWN,
+        );
+    }
+    for p in points {
+        // In a coarse picture a corner with a border would hide what it is set on.
+        if fine > 0 {
+            mark(raster, placed, *p, fine + 1, DRAWN, 1.0);
+        }
+        mark(raster, placed, *p, fine, CURSOR, 1.0);
+    }
+    if let Some(cursor) = drawing.cursor_px() {
+        cross(raster, placed, cursor, fine);
+    }
 }
 
 /// The same as letters, for terminals without colour: a cell is dark or bright, `#` the outline,
@@ -99,49 +92,81 @@ pub fn letters(
     drawing: Option<&Drawing>,
     placed: &Placed,
 ) -> Option<Vec<Vec<char>>> {
-    const RAMP: [char; 6] = [' ', '.', ':', '-', '=', '+'];
     let cells = Size::new(placed.area.width as u32, placed.area.height as u32);
-    let raster = Raster::scaled(snapshot.preview.as_deref()?, cells)?;
-    let shade = |[r, g, b]: [u8; 3]| {
-        RAMP[(2 * r as usize + 5 * g as usize + b as usize) / 8 * RAMP.len() / 256]
+    let mut letters = Letters {
+        placed,
+        cells,
+        rows: shades(&Raster::scaled(snapshot.preview.as_deref()?, cells)?),
     };
-    let mut rows: Vec<Vec<char>> = (0..cells.height)
-        .map(|y| (0..cells.width).map(|x| shade(raster.at(x, y))).collect())
-        .collect();
-    let mut put = |x: i64, y: i64, c: char| {
-        if let Some(cell) = rows
-            .get_mut(y.max(0) as usize)
-            .and_then(|r| r.get_mut(x.max(0) as usize))
-        {
-            *cell = c;
+    let Some(drawing) = drawing else {
+        for (a, b) in edges(&outline(snapshot), true) {
+            letters.line(a, b, '#');
         }
+        for p in &snapshot.candidates_px {
+            letters.point(p.map(f64::from), ',');
+        }
+        for (p, branch) in &snapshot.points {
+            let letter = branch.map_or('o', |b| (b'0' + b % 8) as char);
+            letters.point(p.map(f64::from), letter);
+        }
+        return Some(letters.rows);
     };
-    let cell = |p: [f64; 2]| {
-        let [x, y] = placed.dot_from_pixel(p);
-        [x / placed.cell_dots.0 as f64, y / placed.cell_dots.1 as f64]
-    };
-    let polygon = drawing.map_or_else(|| outline(snapshot), |d| d.points_px().to_vec());
-    for (a, b) in edges(&polygon, drawing.is_none() || polygon.len() >= 3) {
-        walk(cell(a), cell(b), cells, |x, y| put(x, y, '#'));
+    let polygon = drawing.points_px();
+    for (a, b) in edges(polygon, polygon.len() >= 3) {
+        letters.line(a, b, '#');
     }
-    let mut point = |p: [f64; 2], c: char| walk(cell(p), cell(p), cells, |x, y| put(x, y, c));
-    match drawing {
-        Some(drawing) => {
-            polygon.iter().for_each(|p| point(*p, 'O'));
-            drawing.cursor_px().into_iter().for_each(|p| point(p, 'X'));
+    for p in polygon {
+        letters.point(*p, 'O');
+    }
+    if let Some(cursor) = drawing.cursor_px() {
+        letters.point(cursor, 'X');
+    }
+    Some(letters.rows)
+}
+
+/// A letter for each dot, by its brightness.
+fn shades(raster: &Raster) -> Vec<Vec<char>> {
+    const RAMP: [char; 6] = [' ', '.', ':', '-', '=', '+'];
+    let mut rows = Vec::with_capacity(raster.size.height as usize);
+    for y in 0..raster.size.height {
+        let mut row = Vec::with_capacity(raster.size.width as usize);
+        for x in 0..raster.size.width {
+            let [r, g, b] = raster.at(x, y).map(usize::from);
+            row.push(RAMP[(2 * r + 5 * g + b) / 8 * RAMP.len() / 256]);
         }
-        None => {
-            snapshot
-                .candidates_px
-                .iter()
-                .for_each(|p| point(p.map(f64::from), ','));
-            for ([u, v], branch) in &snapshot.points {
-                let c = branch.map_or('o', |b| (b'0' + b % 8) as char);
-                point([*u as f64, *v as f64], c);
+        rows.push(row);
+    }
+    rows
+}
+
+/// A picture of letters, drawn into by places in the picture, px.
+struct Letters<'a> {
+    placed: &'a Placed,
+    cells: Size,
+    rows: Vec<Vec<char>>,
+}
+
+impl Letters<'_> {
+    fn point(&mut self, pixel: [f64; 2], letter: char) {
+        self.line(pixel, pixel, letter);
+    }
+
+    fn line(&mut self, from: [f64; 2], to: [f64; 2], letter: char) {
+        let (from, to) = (self.cell(from), self.cell(to));
+        walk(from, to, self.cells, |x, y| {
+            let row = self.rows.get_mut(y.max(0) as usize);
+            if let Some(cell) = row.and_then(|r| r.get_mut(x.max(0) as usize)) {
+                *cell = letter;
             }
-        }
+        });
     }
-    Some(rows)
+
+    /// The cell that shows a pixel, with fractions.
+    fn cell(&self, pixel: [f64; 2]) -> [f64; 2] {
+        let [x, y] = self.placed.dot_from_pixel(pixel);
+        let (across, down) = self.placed.cell_dots;
+        [x / f64::from(across), y / f64::from(down)]
+    }
 }
 
 fn outline(snapshot: &Snapshot) -> Vec<[f64; 2]> {

@@ -58,29 +58,39 @@ impl Drawing {
 /// Whether two sides of the polygon meet elsewhere than in a common corner.
 fn crosses_itself(polygon: &[[f64; 2]]) -> bool {
     let n = polygon.len();
-    let side = |i: usize| (polygon[i], polygon[(i + 1) % n]);
-    (0..n).any(|i| {
-        let (a, b) = side(i);
-        let (_, c) = side((i + 1) % n);
+    for i in 0..n {
+        let (a, b) = side(polygon, i);
+        let (_, c) = side(polygon, (i + 1) % n);
         // A side that runs back over the one before it encloses nothing.
-        let back = turn(a, b, c) == 0.0
-            && (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1]) < 0.0;
-        back || (i + 2..n)
-            .filter(|j| (j + 1) % n != i)
-            .any(|j| meet(side(i), side(j)))
-    })
+        let along = (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1]);
+        if turn(a, b, c) == 0.0 && along < 0.0 {
+            return true;
+        }
+        let mut others = (i + 2..n).filter(|j| (j + 1) % n != i);
+        if others.any(|j| meet((a, b), side(polygon, j))) {
+            return true;
+        }
+    }
+    false
 }
 
 type Side = ([f64; 2], [f64; 2]);
 
+fn side(polygon: &[[f64; 2]], i: usize) -> Side {
+    (polygon[i], polygon[(i + 1) % polygon.len()])
+}
+
 fn meet((a, b): Side, (c, d): Side) -> bool {
     let (s1, s2, s3, s4) = (turn(a, b, c), turn(a, b, d), turn(c, d, a), turn(c, d, b));
-    let opposite = |x: f64, y: f64| (x > 0.0 && y < 0.0) || (x < 0.0 && y > 0.0);
     (opposite(s1, s2) && opposite(s3, s4))
         || (s1 == 0.0 && between(a, b, c))
         || (s2 == 0.0 && between(a, b, d))
         || (s3 == 0.0 && between(c, d, a))
         || (s4 == 0.0 && between(c, d, b))
+}
+
+fn opposite(x: f64, y: f64) -> bool {
+    (x > 0.0 && y < 0.0) || (x < 0.0 && y > 0.0)
 }
 
 /// Twice the signed area of a triangle; clicks lie on a grid, so a straight run rounds to nearly

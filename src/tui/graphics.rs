@@ -2,7 +2,7 @@
 //! else as letters.
 
 use super::raster::Raster;
-use super::theme::Depth;
+use super::theme::{Depth, is_set};
 use super::tty::{Input, Tty};
 use ratatui::layout::Size;
 use ratatui_image::picker::ProtocolType;
@@ -79,12 +79,11 @@ impl Graphics {
         if depth == Depth::None || wanted == Preview::HalfBlocks {
             return Ok(graphics);
         }
-        let set = |name: &str| std::env::var(name).is_ok_and(|v| !v.is_empty());
         let mut query = QueryStdioOptions {
             kitty_compression: true,
             ..QueryStdioOptions::default()
         };
-        if set("WEZTERM_EXECUTABLE") || set("KONSOLE_VERSION") {
+        if is_set("WEZTERM_EXECUTABLE") || is_set("KONSOLE_VERSION") {
             // Both claim kitty's protocol without its placeholders.
             query.blacklist_protocols = vec![ProtocolType::Kitty, ProtocolType::Sixel];
         }
@@ -95,7 +94,7 @@ impl Graphics {
         out.flush()?;
         let (answers, late) = answers(tty, limit)?;
         graphics.late = late;
-        graphics.pack = answers.contains(&Response::KittyCompression) && set("SSH_CONNECTION");
+        graphics.pack = answers.contains(&Response::KittyCompression) && is_set("SSH_CONNECTION");
         if let Some((kind, cell_dots)) =
             choose(wanted, &answers, iterm2_by_name(), cell_by_window())
         {
@@ -125,14 +124,14 @@ impl Graphics {
         }
     }
 
-    /// What the terminal is told at the end, so that it forgets the pictures.
+    /// What is sent to the terminal at the end, so that it forgets the pictures.
     pub fn farewell(&self) -> String {
-        let forget = |id: &u32| format!("\x1b_Ga=d,d=I,i={id},q=2\x1b\\");
-        if self.kind == Kind::Kitty {
-            KITTY_IDS.iter().map(forget).collect()
-        } else {
-            String::new()
+        if self.kind != Kind::Kitty {
+            return String::new();
         }
+        KITTY_IDS
+            .map(|id| format!("\x1b_Ga=d,d=I,i={id},q=2\x1b\\"))
+            .concat()
     }
 }
 
@@ -166,11 +165,11 @@ fn choose(
     iterm2: bool,
     window_cell: Option<(u16, u16)>,
 ) -> Option<(Kind, (u16, u16))> {
-    let told = answers.iter().find_map(|a| match a {
+    let answered = answers.iter().find_map(|a| match a {
         Response::CellSize(size) => *size,
         _ => None,
     });
-    let cell = told
+    let cell = answered
         .or(window_cell)
         .filter(|(w, h)| (3..=100).contains(w) && (3..=200).contains(h))?;
     let kind = match wanted {
@@ -189,7 +188,6 @@ fn choose(
 /// Terminals with iTerm2's protocol, which cannot be asked for. Inside tmux the name is that of
 /// another terminal.
 fn iterm2_by_name() -> bool {
-    let name = |variable: &str| std::env::var(variable).unwrap_or_default();
     let known = [
         "iTerm",
         "WezTerm",
@@ -199,10 +197,8 @@ fn iterm2_by_name() -> bool {
         "rio",
         "WarpTerminal",
     ];
-    name("TMUX").is_empty()
-        && known
-            .iter()
-            .any(|k| name("TERM_PROGRAM").contains(k) || name("LC_TERMINAL").contains(k))
+    let names = ["TERM_PROGRAM", "LC_TERMINAL"].map(|v| std::env::var(v).unwrap_or_default());
+    !is_set("TMUX") && known.iter().any(|k| names.iter().any(|n| n.contains(k)))
 }
 
 fn cell_by_window() -> Option<(u16, u16)> {

@@ -45,7 +45,7 @@ impl Guard {
         Ok(guard)
     }
 
-    /// What else the terminal must be told at the end.
+    /// What else is sent to the terminal at the end.
     pub fn set_farewell(&mut self, text: String) {
         self.farewell = text;
     }
@@ -79,7 +79,7 @@ impl Guard {
 fn hook_panics() {
     let print = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
-        // Whoever catches it goes on, and so does the screen.
+        // A caught panic ends nothing, and the screen goes on.
         if caught::catching() {
             return;
         }

@@ -64,7 +64,7 @@ pub const fn bind<A>(
     }
 }
 
-/// Keys while watching; those without a short name do what another one is told to do.
+/// Keys while watching; those without a short name repeat what another one does.
 pub const WATCHING: [Binding<Action>; 17] = [
     bind(
         KeyCode::Char('?'),
@@ -139,7 +139,7 @@ pub const WATCHING: [Binding<Action>; 17] = [
     bind(KeyCode::Esc, "", "", "", Action::Camera),
 ];
 
-/// Keys while drawing; those without a short name are told in the help only.
+/// Keys while drawing; those without a short name are in the help only.
 pub const DRAWING: [Binding<Stroke>; 12] = [
     bind(
         KeyCode::Enter,

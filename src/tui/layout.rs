@@ -25,7 +25,7 @@ pub struct Areas {
 
 /// What is to be seen of the chosen branch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wish {
+pub enum BranchView {
     /// There is none.
     Nothing,
     /// It is shown where there is room for all.
@@ -34,7 +34,7 @@ pub enum Wish {
     CloseUp,
 }
 
-impl Wish {
+impl BranchView {
     pub fn of(state: &State) -> Self {
         match (state.snapshot.branches.is_empty(), state.close_up) {
             (true, _) => Self::Nothing,
@@ -56,7 +56,7 @@ impl Areas {
         window: Rect,
         image: Option<Size>,
         cell_dots: (u16, u16),
-        wish: Wish,
+        view: BranchView,
     ) -> Option<Self> {
         if window.width < SMALLEST.0 || window.height < SMALLEST.1 {
             return None;
@@ -78,52 +78,73 @@ impl Areas {
         ])
         .areas(body);
 
-        // One line of title; at least the table's head and some rows must stay below the picture.
-        let table_least = if roomy { 8 } else { (body.height / 4).max(3) };
-        let wanted = image
-            .map_or(body.height, |image| {
-                rows_needed(image, left.width, cell_dots)
-            })
-            .saturating_add(1);
-        let preview_height = wanted.min(body.height.saturating_sub(table_least));
-        let [preview, branches] =
-            Layout::vertical([Constraint::Length(preview_height), Constraint::Min(1)]).areas(left);
-
-        let camera = if body.height < 16 { 6 } else { 8 };
-        let (beside, short) = (
-            body.height.saturating_sub(camera + BRANCH_ROWS + TREE_ROWS),
-            3,
-        );
-        let fits = wish != Wish::Nothing && beside >= short;
-        let tracks = if roomy && !(fits && beside < 6) {
-            6
-        } else {
-            short
-        };
-        let replaced = wish == Wish::CloseUp && !fits;
-        let heights = match (replaced, fits) {
-            (true, _) => [0, 0, camera + tracks],
-            (_, true) => [camera, tracks, BRANCH_ROWS],
-            _ => [camera, tracks, 0],
-        };
-        let [camera, tracks, branch, skeleton] = Layout::vertical(
-            heights
-                .map(Constraint::Length)
-                .into_iter()
-                .chain([Constraint::Min(1)]),
-        )
-        .areas(right);
+        let [preview, branches] = left_column(left, roomy, image, cell_dots);
+        let right = RightColumn::new(right, roomy, view);
         Some(Self {
             header,
             phase,
             preview,
             branches,
-            camera_and_tracks: (!replaced).then_some([camera, tracks]),
-            branch: (replaced || fits).then_some(branch),
-            skeleton,
+            camera_and_tracks: right.camera_and_tracks,
+            branch: right.branch,
+            skeleton: right.skeleton,
             messages,
             keys,
         })
+    }
+}
+
+/// The picture and below it the table of branches.
+fn left_column(left: Rect, roomy: bool, image: Option<Size>, cell_dots: (u16, u16)) -> [Rect; 2] {
+    // One line of title; at least the table's head and some rows must stay below the picture.
+    let table_least = if roomy { 8 } else { (left.height / 4).max(3) };
+    let wanted = image
+        .map_or(left.height, |image| {
+            rows_needed(image, left.width, cell_dots)
+        })
+        .saturating_add(1);
+    let preview_height = wanted.min(left.height.saturating_sub(table_least));
+    Layout::vertical([Constraint::Length(preview_height), Constraint::Min(1)]).areas(left)
+}
+
+/// Camera and points, the chosen branch, and the tree.
+struct RightColumn {
+    camera_and_tracks: Option<[Rect; 2]>,
+    branch: Option<Rect>,
+    skeleton: Rect,
+}
+
+impl RightColumn {
+    fn new(right: Rect, roomy: bool, view: BranchView) -> Self {
+        let camera = if right.height < 16 { 6 } else { 8 };
+        let short = 3;
+        let beside = right
+            .height
+            .saturating_sub(camera + BRANCH_ROWS + TREE_ROWS);
+        let fits = view != BranchView::Nothing && beside >= short;
+        let tracks = if roomy && !(fits && beside < 6) {
+            6
+        } else {
+            short
+        };
+        let replaced = view == BranchView::CloseUp && !fits;
+        let [camera, tracks, branch] = match (replaced, fits) {
+            (true, _) => [0, 0, camera + tracks],
+            (_, true) => [camera, tracks, BRANCH_ROWS],
+            _ => [camera, tracks, 0],
+        };
+        let [camera, tracks, branch, skeleton] = Layout::vertical([
+            Constraint::Length(camera),
+            Constraint::Length(tracks),
+            Constraint::Length(branch),
+            Constraint::Min(1),
+        ])
+        .areas(right);
+        Self {
+            camera_and_tracks: (!replaced).then_some([camera, tracks]),
+            branch: (replaced || fits).then_some(branch),
+            skeleton,
+        }
     }
 }
 
@@ -156,12 +177,12 @@ mod tests {
                 Some(Size::new(1, 10_000)),
                 Some(Size::new(10_000, 1)),
             ];
-            let wishes = [Wish::Nothing, Wish::IfRoom, Wish::CloseUp];
-            for (image, wish) in images.into_iter().flat_map(|i| wishes.map(|w| (i, w))) {
+            let views = [BranchView::Nothing, BranchView::IfRoom, BranchView::CloseUp];
+            for (image, view) in images.into_iter().flat_map(|i| views.map(|v| (i, v))) {
                 let window = Rect::new(0, 0, width, height);
-                let a = Areas::new(window, image, (1, 2), wish).unwrap();
+                let a = Areas::new(window, image, (1, 2), view).unwrap();
                 assert!(
-                    a.branch.is_some() || wish != Wish::CloseUp,
+                    a.branch.is_some() || view != BranchView::CloseUp,
                     "{width}x{height}"
                 );
                 let mut all = vec![
@@ -184,7 +205,12 @@ mod tests {
         }
         for (width, height) in [(0, 0), (1, 1), (59, 60), (200, 15)] {
             assert_eq!(
-                Areas::new(Rect::new(0, 0, width, height), None, (1, 2), Wish::IfRoom),
+                Areas::new(
+                    Rect::new(0, 0, width, height),
+                    None,
+                    (1, 2),
+                    BranchView::IfRoom
+                ),
                 None
             );
         }

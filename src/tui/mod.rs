@@ -30,7 +30,7 @@ mod tty;
 
 pub use abilities::{Abilities, abilities, columns};
 pub use graphics::Preview;
-pub use moving::{Moving, Whim, watch};
+pub use moving::{AnimationCommand, Moving, watch};
 pub use progress::Progress;
 pub use theme::Depth;
 
@@ -61,7 +61,7 @@ pub trait Session {
     /// Newest state, `None` if none is newer than the last one taken.
     fn latest(&mut self) -> Option<Arc<Snapshot>>;
     /// Passes on what the user wants.
-    fn send(&mut self, wish: Control);
+    fn send(&mut self, command: Control);
     /// The capture has ended (source over and files written, or failed): the screen is left.
     fn finished(&self) -> bool;
 }
@@ -184,8 +184,8 @@ impl Screen {
             if Instant::now() < self.deaf_until {
                 continue;
             }
-            if let Some(wish) = input::handle(&event, state, self.preview.placed.as_ref()) {
-                session.send(wish);
+            if let Some(command) = input::handle(&event, state, self.preview.placed.as_ref()) {
+                session.send(command);
             }
         }
         Some(heard)

@@ -25,21 +25,21 @@ pub trait Moving {
     fn skeleton(&self) -> Arc<Skeleton>;
     /// The pose after so many more seconds.
     fn pose(&mut self, elapsed_s: f64) -> Pose;
-    fn change(&mut self, whim: Whim);
-    /// What moves it now, in a line.
-    fn told(&self) -> String;
+    fn change(&mut self, command: AnimationCommand);
+    /// What moves it now, in one line.
+    fn description(&self) -> String;
 }
 
 /// What the user wants of the tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Whim {
+pub enum AnimationCommand {
     /// Wind stronger by so much on the Beaufort scale.
     Stronger(i8),
     /// Wind from another side, by so many degrees.
     Veer(i16),
     /// Motion larger by so many steps.
     Larger(i8),
-    /// Ties the rope, or lets go.
+    /// Pulls at the rope, or releases it.
     Pull,
 }
 
@@ -48,7 +48,7 @@ pub enum Whim {
 pub(super) enum Action {
     Quit,
     Pause,
-    Change(Whim),
+    Change(AnimationCommand),
     /// Walks round the tree.
     Turn(i8),
     Mesh,
@@ -61,28 +61,28 @@ pub(super) const KEYS: [Binding<Action>; 12] = [
         "↑↓",
         "wind",
         "",
-        Action::Change(Whim::Stronger(1)),
+        Action::Change(AnimationCommand::Stronger(1)),
     ),
     bind(
         KeyCode::Right,
         "←→",
         "direction",
         "",
-        Action::Change(Whim::Veer(15)),
+        Action::Change(AnimationCommand::Veer(15)),
     ),
     bind(
         KeyCode::Char('+'),
         "+-",
         "magnify",
         "",
-        Action::Change(Whim::Larger(1)),
+        Action::Change(AnimationCommand::Larger(1)),
     ),
     bind(
         KeyCode::Char('p'),
         "p",
-        "pull, let go",
+        "pull/release",
         "",
-        Action::Change(Whim::Pull),
+        Action::Change(AnimationCommand::Pull),
     ),
     bind(KeyCode::Char(' '), "space", "pause", "", Action::Pause),
     bind(KeyCode::Char('h'), "h l", "turn", "", Action::Turn(-1)),
@@ -92,15 +92,21 @@ pub(super) const KEYS: [Binding<Action>; 12] = [
         "",
         "",
         "",
-        Action::Change(Whim::Stronger(-1)),
+        Action::Change(AnimationCommand::Stronger(-1)),
     ),
-    bind(KeyCode::Left, "", "", "", Action::Change(Whim::Veer(-15))),
+    bind(
+        KeyCode::Left,
+        "",
+        "",
+        "",
+        Action::Change(AnimationCommand::Veer(-15)),
+    ),
     bind(
         KeyCode::Char('-'),
         "",
         "",
         "",
-        Action::Change(Whim::Larger(-1)),
+        Action::Change(AnimationCommand::Larger(-1)),
     ),
     bind(KeyCode::Char('l'), "", "", "", Action::Turn(1)),
 ];
@@ -114,12 +120,8 @@ pub(super) struct Stage {
 
 impl Stage {
     pub fn new(moving: &dyn Moving) -> Self {
-        let skeleton = moving.skeleton();
-        let still = Snapshot {
-            node_colour: Arc::new(colours(&skeleton)),
-            skeleton: Some(skeleton),
-            ..Snapshot::default()
-        };
+        let mut still = Snapshot::default();
+        still.show_tree(moving.skeleton());
         Self {
             state: State::default(),
             paused: false,
@@ -148,7 +150,7 @@ impl Stage {
         match KEYS.iter().find(|b| b.key == key.code).map(|b| b.action) {
             Some(Action::Quit) => return false,
             Some(Action::Pause) => self.paused = !self.paused,
-            Some(Action::Change(whim)) => moving.change(whim),
+            Some(Action::Change(command)) => moving.change(command),
             Some(Action::Turn(steps)) => self.state.turn(steps.into()),
             Some(Action::Mesh) => self.state.switch_mesh(),
             None => {}
@@ -156,7 +158,7 @@ impl Stage {
         true
     }
 
-    pub fn render(&self, frame: &mut Frame, told: &str, theme: Theme) {
+    pub fn render(&self, frame: &mut Frame, description: &str, theme: Theme) {
         let [line, tree, keys] = Layout::vertical([
             Constraint::Length(1),
             Constraint::Fill(1),
@@ -165,33 +167,12 @@ impl Stage {
         .areas(frame.area());
         let paused = if self.paused { "  paused" } else { "" };
         frame.render_widget(
-            Line::styled(format!(" arborcam  {told}{paused}"), theme.strong()),
+            Line::styled(format!(" arborcam  {description}{paused}"), theme.strong()),
             line,
         );
         skeleton::render(frame, &self.state, tree, theme);
         messages::key_line(frame, KEYS.iter().map(|b| (b.shown, b.short)), keys, theme);
     }
-}
-
-/// The number of the main branch that every node belongs to: those that leave the trunk's top, in
-/// their order.
-fn colours(skeleton: &Skeleton) -> Vec<Option<u8>> {
-    let mut of: Vec<Option<u8>> = vec![None; skeleton.nodes.len()];
-    let mut next = 0;
-    for (i, node) in skeleton.nodes.iter().enumerate() {
-        let original = node
-            .copy_of
-            .and_then(|o| of.get(o.index()).copied().flatten());
-        of[i] = original.or_else(|| match node.parent {
-            Some(p) if p.index() == 1 => {
-                next += 1;
-                Some(next - 1)
-            }
-            Some(p) => of[p.index().min(i)],
-            None => None,
-        });
-    }
-    of
 }
 
 /// Shows the tree and does what keys ask for until the user leaves, `stop` is set or the terminal
@@ -217,7 +198,7 @@ pub fn watch(moving: &mut dyn Moving, options: Options, stop: &AtomicBool) -> Re
         {
             let Some(_lock) = guard.writing() else { break };
             if terminal
-                .draw(|frame| stage.render(frame, &moving.told(), theme))
+                .draw(|frame| stage.render(frame, &moving.description(), theme))
                 .is_err()
             {
                 break;

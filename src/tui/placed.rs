@@ -49,27 +49,11 @@ impl Placed {
         if !self.area.contains(Position::new(column, row)) {
             return None;
         }
-        let along = |cell: u16, start: u16, dots_in_cell: u16, dots: u32, pixels: u32| {
-            let low = (cell - start) as f64 * dots_in_cell as f64;
-            let high = (low + dots_in_cell as f64).min(dots as f64);
-            // The first pixel's centre is 0, its border -0.5.
-            (low < high).then(|| 0.5 * (low + high) / dots as f64 * pixels as f64 - 0.5)
-        };
+        let (across, down) = self.cell_dots;
+        let (x, y) = (column - self.area.x, row - self.area.y);
         Some([
-            along(
-                column,
-                self.area.x,
-                self.cell_dots.0,
-                self.dots.width,
-                self.image.width,
-            )?,
-            along(
-                row,
-                self.area.y,
-                self.cell_dots.1,
-                self.dots.height,
-                self.image.height,
-            )?,
+            pixel_along(x, across, self.dots.width, self.image.width)?,
+            pixel_along(y, down, self.dots.height, self.image.height)?,
         ])
     }
 
@@ -93,6 +77,15 @@ impl Placed {
             )
         })
     }
+}
+
+/// The pixel in the middle of what a cell shows, along one side of the picture of so many `dots`
+/// and `pixels`; `None` for a cell beyond its end.
+fn pixel_along(cell: u16, dots_in_cell: u16, dots: u32, pixels: u32) -> Option<f64> {
+    let low = cell as f64 * dots_in_cell as f64;
+    let high = (low + dots_in_cell as f64).min(dots as f64);
+    // The first pixel's centre is 0, its border -0.5.
+    (low < high).then(|| 0.5 * (low + high) / dots as f64 * pixels as f64 - 0.5)
 }
 
 #[cfg(test)]

@@ -67,9 +67,11 @@ pub fn bars(
 
 /// The largest amplitude between two frequencies (Hz), degrees; between bins that of the nearest.
 pub fn highest(spectrum: &AngleSpectrum, [from_hz, to_hz]: [f64; 2]) -> f64 {
-    let bin = |hz: f64| (hz / spectrum.bin_hz).round().clamp(0.0, 1e9) as usize;
     let last = spectrum.amplitude_deg.len().saturating_sub(1);
-    let (from, to) = (bin(from_hz).min(last), bin(to_hz).min(last));
+    let [from, to] = [from_hz, to_hz].map(|hz| {
+        let bin = (hz / spectrum.bin_hz).round().clamp(0.0, 1e9) as usize;
+        bin.min(last)
+    });
     let bins = spectrum
         .amplitude_deg
         .get(from..=to.max(from))

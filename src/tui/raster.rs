@@ -2,6 +2,7 @@
 //! top.
 
 use crate::model::{Rgb, Size};
+use std::ops::Range;
 
 /// Colour picture whose every drawing routine leaves out what lies outside.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,18 +19,13 @@ impl Raster {
         if from.size.area() == 0 || from.pixels.len() != 3 * from.size.area() {
             return None;
         }
-        let span = |i: u32, dots: u32, pixels: u32| {
-            let low = (i as u64 * pixels as u64 / dots as u64) as usize;
-            let high = ((i as u64 + 1) * pixels as u64 / dots as u64) as usize;
-            low..high.max(low + 1)
-        };
         let columns: Vec<_> = (0..size.width)
-            .map(|x| span(x, size.width, from.size.width))
+            .map(|x| covered(x, size.width, from.size.width))
             .collect();
         let stride = 3 * from.size.width as usize;
         let mut pixels = Vec::with_capacity(3 * size.area());
         for y in 0..size.height {
-            let rows = span(y, size.height, from.size.height);
+            let rows = covered(y, size.height, from.size.height);
             for columns in &columns {
                 let mut sum = [0u64; 3];
                 for row in rows.clone() {
@@ -84,6 +80,13 @@ impl Raster {
     }
 }
 
+/// The pixels that dot `i` of `dots` covers, along one side.
+fn covered(i: u32, dots: u32, pixels: u32) -> Range<usize> {
+    let low = (i as u64 * pixels as u64 / dots as u64) as usize;
+    let high = ((i as u64 + 1) * pixels as u64 / dots as u64) as usize;
+    low..high.max(low + 1)
+}
+
 /// Visits the dots of a line, as far as it lies in a picture of this size; at most one dot past its
 /// far borders.
 pub fn walk(from: [f64; 2], to: [f64; 2], size: Size, mut visit: impl FnMut(i64, i64)) {
@@ -124,13 +127,13 @@ fn clip(from: [f64; 2], to: [f64; 2], high: [f64; 2]) -> Option<([f64; 2], [f64;
         t0 = t0.max(enter);
         t1 = t1.min(leave);
     }
-    let at = |t: f64| {
+    let [a, b] = [t0, t1].map(|t| {
         [
             from[0] + t * (to[0] - from[0]),
             from[1] + t * (to[1] - from[1]),
         ]
-    };
-    (t0 <= t1).then(|| (at(t0), at(t1)))
+    });
+    (t0 <= t1).then_some((a, b))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The whole screen: each panel in its place.
 
-use super::layout::{Areas, SMALLEST, Wish};
+use super::layout::{Areas, BranchView};
 use super::panels::preview::Preview;
 use super::panels::{
     branch, branches, camera, header, help, messages, phase, preview, skeleton, tracks,
@@ -16,10 +16,10 @@ pub fn render(frame: &mut Frame, state: &State, theme: Theme, picture: &mut Prev
         window,
         Preview::image(state),
         picture.graphics.cell_dots,
-        Wish::of(state),
+        BranchView::of(state),
     ) else {
         picture.placed = None;
-        help::too_small(frame, SMALLEST, window);
+        help::too_small(frame, window);
         return;
     };
     header::render(frame, state, areas.header, theme);

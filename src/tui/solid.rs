@@ -31,11 +31,11 @@ impl Solid {
     /// The tree in its present pose, its branches in their colours; transparent where it is not.
     pub fn picture(&self, s: &Snapshot, camera: &draw::Camera, theme: Theme) -> Option<draw::Rgba> {
         let skeleton = self.of.as_deref().filter(|_| camera.size.area() > 0)?;
-        let colour = |i: usize| {
+        let mut colours = Vec::with_capacity(skeleton.nodes.len());
+        for (i, node) in skeleton.nodes.iter().enumerate() {
             let branch = s.node_colour.get(i).copied().flatten();
-            theme.wood_rgb(branch, skeleton.nodes[i].copy_of.is_some())
-        };
-        let colours: Vec<[u8; 3]> = (0..skeleton.nodes.len()).map(colour).collect();
+            colours.push(theme.wood_rgb(branch, node.copy_of.is_some()));
+        }
         let model = draw::Model {
             branch_rgb: &colours,
             ..draw::Model::bare(skeleton, &self.mesh, theme.wood_rgb(None, false))

@@ -21,7 +21,7 @@ pub struct State {
     pub help: bool,
     /// The user has asked for the end and the capture is being written.
     pub quitting: bool,
-    /// Paused as far as the user is concerned: the last wish, until the capture says otherwise.
+    /// Paused as far as the user is concerned: the last command, until the capture says otherwise.
     pub paused: bool,
     /// How far the tree is turned, in steps of [`TURN_DEGREES`], 0 to a whole turn.
     pub turned: u16,
@@ -37,7 +37,7 @@ pub struct State {
 impl State {
     /// Takes over a newer snapshot.
     pub fn take(&mut self, snapshot: Arc<Snapshot>) {
-        // A snapshot from before the wish was honoured must not undo the wish.
+        // A snapshot from before the command was obeyed must not undo it.
         if snapshot.paused != self.snapshot.paused {
             self.paused = snapshot.paused;
         }
@@ -107,7 +107,7 @@ impl State {
         }
     }
 
-    /// Everything to be told, the newest last.
+    /// All messages, the newest last.
     pub fn messages(&self) -> impl DoubleEndedIterator<Item = &str> {
         self.snapshot
             .messages

@@ -1,6 +1,7 @@
 //! Colours: few, of middle brightness so that they can be read on dark and on light, none at all
 //! under `NO_COLOR`.
 
+use crate::model::MAIN_BRANCH_RGB;
 use ratatui::style::{Color, Modifier, Style};
 
 /// How many colours the terminal shows.
@@ -18,13 +19,9 @@ impl Depth {
     /// What the environment says. `TMUX` counts as full colour because tmux itself reduces what the
     /// terminal lacks.
     pub fn from_env() -> Self {
-        let set = |name: &str| std::env::var(name).is_ok_and(|v| !v.is_empty());
-        let holds = |name: &str, parts: &[&str]| {
-            std::env::var(name).is_ok_and(|v| parts.iter().any(|p| v.to_lowercase().contains(p)))
-        };
-        if set("NO_COLOR") {
+        if is_set("NO_COLOR") {
             Depth::None
-        } else if set("TMUX")
+        } else if is_set("TMUX")
             || holds("COLORTERM", &["truecolor", "24bit"])
             || holds(
                 "TERM",
@@ -38,17 +35,16 @@ impl Depth {
     }
 }
 
-/// One colour for each main branch, taken again from the start after the last one.
-const BRANCHES: [[u8; 3]; 8] = [
-    [0x2f, 0x86, 0xff],
-    [0xe8, 0x70, 0x00],
-    [0x1f, 0xa2, 0x3e],
-    [0xe0, 0x35, 0x70],
-    [0xa0, 0x60, 0xf0],
-    [0x00, 0xa0, 0xa8],
-    [0xa8, 0x8e, 0x00],
-    [0xc2, 0x6e, 0x50],
-];
+/// Whether an environment variable has a value.
+pub(super) fn is_set(name: &str) -> bool {
+    std::env::var(name).is_ok_and(|v| !v.is_empty())
+}
+
+/// Whether an environment variable has one of these in it, in small letters or large.
+fn holds(name: &str, parts: &[&str]) -> bool {
+    std::env::var(name).is_ok_and(|v| parts.iter().any(|p| v.to_lowercase().contains(p)))
+}
+
 const GREY: [u8; 3] = [0x80, 0x80, 0x80];
 const WOOD: [u8; 3] = [0xb0, 0x98, 0x78];
 const WARNING: [u8; 3] = [0xd8, 0x60, 0x00];
@@ -77,7 +73,9 @@ impl Theme {
     /// Colour of a main branch as it is mixed into a picture; white where a point belongs to none
     /// yet.
     pub fn branch_rgb(self, branch: Option<u8>) -> [u8; 3] {
-        branch.map_or([0xff; 3], |b| BRANCHES[b as usize % BRANCHES.len()])
+        branch.map_or([0xff; 3], |b| {
+            MAIN_BRANCH_RGB[b as usize % MAIN_BRANCH_RGB.len()]
+        })
     }
 
     /// Colour of a main branch on the terminal's own ground; the ground's text colour for the
@@ -89,8 +87,7 @@ impl Theme {
     /// The same, half way to grey: what was not measured but repeated.
     pub fn branch_faded(self, branch: Option<u8>) -> Color {
         let full = branch.map_or(GREY, |b| self.branch_rgb(Some(b)));
-        let mix = |i: usize| ((full[i] as u16 + 2 * GREY[i] as u16) / 3) as u8;
-        self.colour([mix(0), mix(1), mix(2)])
+        self.colour([0, 1, 2].map(|i| ((full[i] as u16 + 2 * GREY[i] as u16) / 3) as u8))
     }
 
     /// Colour of a branch's wood before light falls on it; the trunk's is that of wood, and what
@@ -107,7 +104,7 @@ impl Theme {
     /// Titles of panels.
     pub fn title(self) -> Style {
         Style::new()
-            .fg(self.colour(BRANCHES[5]))
+            .fg(self.colour(MAIN_BRANCH_RGB[5]))
             .add_modifier(Modifier::BOLD)
     }
 
@@ -131,30 +128,28 @@ impl Theme {
     /// Where the program is now; reversed, so that it shows without colour as well.
     pub fn here(self) -> Style {
         Style::new()
-            .fg(self.colour(BRANCHES[5]))
+            .fg(self.colour(MAIN_BRANCH_RGB[5]))
             .add_modifier(Modifier::BOLD | Modifier::REVERSED)
     }
 }
 
 /// Nearest entry of the 6x6x6 cube or of the grey ramp of the 256 colours.
 fn index_from_rgb(rgb: [u8; 3]) -> u8 {
-    let level = |c: u8| {
-        if c < 48 {
-            0
-        } else {
-            (((c as u16).saturating_sub(35)) / 40).min(5) as u8
-        }
-    };
-    let value = |l: u8| if l == 0 { 0i32 } else { 55 + 40 * l as i32 };
-    let distance = |to: [i32; 3]| (0..3).map(|i| (rgb[i] as i32 - to[i]).pow(2)).sum::<i32>();
-    let cube = rgb.map(level);
-    let mean = (rgb[0] as i32 + rgb[1] as i32 + rgb[2] as i32) / 3;
+    let rgb = rgb.map(i32::from);
+    let cube = rgb.map(|c| if c < 48 { 0 } else { ((c - 35) / 40).min(5) });
+    let of_cube = cube.map(|l| if l == 0 { 0 } else { 55 + 40 * l });
+    let mean = (rgb[0] + rgb[1] + rgb[2]) / 3;
     let step = ((mean - 3) / 10).clamp(0, 23);
-    if distance([8 + 10 * step; 3]) < distance(cube.map(value)) {
+    let of_greys = [8 + 10 * step; 3];
+    if square_distance(rgb, of_greys) < square_distance(rgb, of_cube) {
         232 + step as u8
     } else {
-        16 + 36 * cube[0] + 6 * cube[1] + cube[2]
+        (16 + 36 * cube[0] + 6 * cube[1] + cube[2]) as u8
     }
+}
+
+fn square_distance(a: [i32; 3], b: [i32; 3]) -> i32 {
+    (0..3).map(|i| (a[i] - b[i]).pow(2)).sum()
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::super::shaping::Made;
 use crate::animate::{Animator, Magnify, Pull, magnify, place_to_pull};
 use crate::model::{Pose, Skeleton};
-use crate::tui::{Moving, Whim};
+use crate::tui::{AnimationCommand, Moving};
 use std::sync::Arc;
 
 /// How far the rope pulls, degrees.
@@ -57,17 +57,19 @@ impl Moving for InWind {
         self.animator.pose(self.frame)
     }
 
-    fn change(&mut self, whim: Whim) {
-        match whim {
-            Whim::Stronger(by) => self.force = (self.force + f64::from(by)).clamp(0.0, 12.0),
-            Whim::Veer(by) => {
+    fn change(&mut self, command: AnimationCommand) {
+        match command {
+            AnimationCommand::Stronger(by) => {
+                self.force = (self.force + f64::from(by)).clamp(0.0, 12.0)
+            }
+            AnimationCommand::Veer(by) => {
                 self.direction_deg = (self.direction_deg + f64::from(by)).rem_euclid(360.0)
             }
-            Whim::Larger(by) => {
+            AnimationCommand::Larger(by) => {
                 self.larger = (self.larger + by).clamp(-STEPS, STEPS);
                 self.animator.magnify(LARGER.powi(self.larger.into()));
             }
-            Whim::Pull => {
+            AnimationCommand::Pull => {
                 let rope = if self.animator.pulled().is_some() {
                     None
                 } else {
@@ -79,7 +81,7 @@ impl Moving for InWind {
         self.animator.wind().turn_to(self.force, self.direction_deg);
     }
 
-    fn told(&self) -> String {
+    fn description(&self) -> String {
         let pulled = if self.animator.pulled().is_some() {
             "  pulled"
         } else {
@@ -162,8 +164,8 @@ impl Moving for AsFilmed {
         })
     }
 
-    fn change(&mut self, whim: Whim) {
-        if let Whim::Larger(by) = whim {
+    fn change(&mut self, command: AnimationCommand) {
+        if let AnimationCommand::Larger(by) = command {
             let from = self.wanted.by.max(LARGER.powi((-STEPS).into()));
             self.wanted.by = (from * LARGER.powi(by.into())).min(100.0);
             // It could be made before, with another factor.
@@ -173,7 +175,7 @@ impl Moving for AsFilmed {
         }
     }
 
-    fn told(&self) -> String {
+    fn description(&self) -> String {
         format!(
             "as filmed, magnified {:.2}, speed {:.2}",
             self.wanted.by, self.wanted.speed

@@ -133,26 +133,19 @@ function plain(material) {
   return out;
 }
 
-// Each main limb a hue of its own, its branches lighter and darker shades of it; a copy as its original.
+// Each main branch a hue of its own, the branches on it lighter and darker shades of it; a copy as its original.
 function byBranch(data) {
-  const children = new Map();
-  for (const b of data.branches) {
-    if (b.copy_of === null) children.set(b.parent, [...(children.get(b.parent) ?? []), b]);
-  }
-  let trunk = data.branches.find((b) => b.parent === null);
-  // Up the trunk, to where it first parts.
-  while (trunk && children.get(trunk.id)?.length === 1) [trunk] = children.get(trunk.id);
-  const limbs = children.get(trunk?.id) ?? [];
+  const hues = data.main_branch_rgb.map((rgb) => new THREE.Color(`rgb(${rgb})`).getHSL({}, THREE.SRGBColorSpace));
+  const trunk = new THREE.Color("#5b4a3a");
+  const counts = new Map();
   const colours = new Map();
-  limbs.forEach((limb, k) => {
-    const hue = (150 + (360 * k) / limbs.length) % 360;
-    const below = [limb];
-    for (let i = 0; i < below.length; i++) {
-      below.push(...(children.get(below[i].id) ?? []));
-      const colour = new THREE.Color().setHSL(((hue + 47 * (i % 5) * (1 / limbs.length)) % 360) / 360, 0.72, 0.27 + 0.055 * ((i * 3) % 5));
-      colours.set(below[i].id, colour);
-    }
-  });
-  const bole = new THREE.Color("#5b4a3a");
-  return (branch) => colours.get(data.byId.get(branch.id)?.original.id) ?? bole;
+  for (const b of data.branches) {
+    if (b.copy_of !== null || b.main_branch === null) continue;
+    const i = counts.get(b.main_branch) ?? 0;
+    counts.set(b.main_branch, i + 1);
+    const { h, s, l } = hues[b.main_branch % hues.length];
+    const shade = l * (0.75 + 0.08 * ((i * 3) % 5));
+    colours.set(b.id, new THREE.Color().setHSL(h, s, shade, THREE.SRGBColorSpace));
+  }
+  return (branch) => colours.get(data.byId.get(branch.id)?.original.id) ?? trunk;
 }

@@ -65,7 +65,7 @@ fn at_its_end(study: &Study, branch: &Branch) -> String {
 }
 
 fn plots(study: &Study, branch: &Branch) -> String {
-    let in_time = "Angle to its carrier: <span class=\"key\"><i class=\"k kp\"></i>in the picture</span> \
+    let in_time = "Angle to its parent branch: <span class=\"key\"><i class=\"k kp\"></i>in the picture</span> \
                    <span class=\"key\"><i class=\"k ks\"></i>in space</span>";
     let fitted = branch.fitted_deg.as_ref().map_or(
         "",

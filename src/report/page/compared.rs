@@ -1,9 +1,8 @@
-//! Several captures beside each other (002 figures 9 to 12 and 15, table 1).
+//! Several captures beside each other (Hu et al. figs. 9 to 12 and 15, table 1).
 
 use super::branch::highest_hz;
 use super::levels::by_level;
-use super::{cells, figure, keys, stacked};
-use crate::model::{Interval, Sway};
+use super::{ValueOf, cells, damping_of, figure, frequency_of, keys, stacked};
 use crate::report::compare::{Change, Comparison, Row};
 use crate::report::plot::{Answer, Curve, Mark, Slot, across, escaped, spectra};
 use crate::report::study::{Branch, Study};
@@ -22,109 +21,96 @@ pub fn compared_part(studies: &[Study], comparison: &Comparison) -> String {
     if comparison.same_tree.is_some() {
         out += &table(studies, comparison);
     }
-    if comparison.same_tree == Some(true) {
-        let lists: String = (1..studies.len())
-            .map(|k| unmatched(studies, comparison, k - 1))
-            .collect();
-        let items: String = lists
-            .lines()
-            .map(|line| format!("<li>{}</li>", escaped(line.trim())))
-            .collect();
-        if !items.is_empty() {
-            out += &format!("<p>Not matched:</p><ul>{items}</ul>");
-        }
+    let one_tree = comparison.same_tree == Some(true);
+    if one_tree {
+        out += &not_matched(studies, comparison);
     }
-    let rows: Vec<&Row> = comparison
-        .rows
-        .iter()
-        .filter(|row| row.is_told(studies))
-        .collect();
-    let by_branch = |of: &dyn Fn(&Sway) -> Option<Interval>| -> Vec<Slot> {
-        let mark = |row: &Row, kind: usize| {
-            Some(Mark {
-                of: of(&row.sway(studies, kind)?)?,
-                kind,
-            })
-        };
-        let marks = |row: &Row| (0..studies.len()).filter_map(|k| mark(row, k)).collect();
-        rows.iter()
-            .map(|row| Slot {
-                name: row.name.to_string(),
-                marks: marks(row),
-            })
-            .collect()
-    };
-    let all: Vec<&Study> = studies.iter().collect();
-    let frequency = |s: &Sway| Some(s.frequency_hz);
-    let damping = |s: &Sway| s.damping_ratio;
+    let told = comparison.rows.iter().filter(|row| row.is_told(studies));
+    let rows: Vec<&Row> = told.collect();
     let mut plots = String::new();
-    if comparison.same_tree == Some(true) {
-        let by = format!("branch, as numbered in {}", studies[0].name);
-        plots += &figure(
-            across(
-                &by_branch(&frequency),
-                &by,
-                "frequency, Hz",
-                "Frequency by branch",
-            ),
-            "Frequency of the same branch in every capture.",
-        );
-        plots += &figure(
-            across(
-                &by_branch(&damping),
-                &by,
-                "damping ratio",
-                "Damping by branch",
-            ),
-            "Damping of the same branch in every capture.",
-        );
+    if one_tree {
+        plots += &branch_plots(studies, &rows);
     }
-    plots += &figure(
-        across(
-            &by_level(&all, &frequency),
-            "level",
-            "frequency, Hz",
-            "Frequency by level",
-        ),
-        "Frequency across levels.",
-    );
-    plots += &figure(
-        across(
-            &by_level(&all, &damping),
-            "level",
-            "damping ratio",
-            "Damping by level",
-        ),
-        "Damping across levels.",
-    );
+    let all: Vec<&Study> = studies.iter().collect();
+    plots += &level_plots(&all);
     out += &format!("<div class=\"plots two\">{plots}</div>");
-    let drawn: String = if comparison.same_tree == Some(true) {
-        rows.iter()
-            .map(|row| figure(overlay(studies, row), &format!("Branch {}.", row.name)))
-            .collect()
+    let (what, drawn): (&str, String) = if one_tree {
+        let overlays = rows.iter().map(|row| overlay(studies, row));
+        ("the same branch in every capture", overlays.collect())
     } else {
-        all.iter()
-            .map(|study| of_tree(study, highest_hz(&all)))
-            .collect()
+        let highest_hz = highest_hz(&all);
+        let trees = all.iter().map(|study| of_tree(study, highest_hz));
+        ("tree beside tree", trees.collect())
     };
     if !drawn.is_empty() {
-        let what = if comparison.same_tree == Some(true) {
-            "The same branch in every capture"
-        } else {
-            "Tree beside tree"
-        };
         out += &format!(
-            "<h3>Spectra: {}</h3><p class=\"soft\">Of the angle to the carrier, in the picture; upright lines are the \
-                         frequencies that were identified.</p><div class=\"plots\">{drawn}</div>",
-            what.to_lowercase()
+            "<h3>Spectra: {what}</h3><p class=\"soft\">Of the angle to the parent branch, in the picture; upright lines are the \
+                         frequencies that were identified.</p><div class=\"plots\">{drawn}</div>"
         );
     }
     out + "</section>"
 }
 
+/// Branches that stand for nothing in another capture; nothing if there are none.
+fn not_matched(studies: &[Study], comparison: &Comparison) -> String {
+    let mut items = String::new();
+    for k in 1..studies.len() {
+        for line in unmatched(studies, comparison, k - 1).lines() {
+            items += &format!("<li>{}</li>", escaped(line.trim()));
+        }
+    }
+    if items.is_empty() {
+        return items;
+    }
+    format!("<p>Not matched:</p><ul>{items}</ul>")
+}
+
+/// Frequency and damping of each branch in every capture.
+fn branch_plots(studies: &[Study], rows: &[&Row]) -> String {
+    let by = format!("branch, as numbered in {}", studies[0].name);
+    let frequencies = by_branch(studies, rows, frequency_of);
+    let dampings = by_branch(studies, rows, damping_of);
+    figure(
+        across(&frequencies, &by, "frequency, Hz", "Frequency by branch"),
+        "Frequency of the same branch in every capture.",
+    ) + &figure(
+        across(&dampings, &by, "damping ratio", "Damping by branch"),
+        "Damping of the same branch in every capture.",
+    )
+}
+
+fn by_branch(studies: &[Study], rows: &[&Row], of: ValueOf) -> Vec<Slot> {
+    let mut slots = Vec::with_capacity(rows.len());
+    for row in rows {
+        let mut marks = Vec::new();
+        for kind in 0..studies.len() {
+            if let Some(of) = row.sway(studies, kind).and_then(|sway| of(&sway)) {
+                marks.push(Mark { of, kind });
+            }
+        }
+        slots.push(Slot {
+            name: row.name.to_string(),
+            marks,
+        });
+    }
+    slots
+}
+
+/// Frequency and damping by level in every capture.
+fn level_plots(studies: &[&Study]) -> String {
+    let frequencies = by_level(studies, frequency_of);
+    let dampings = by_level(studies, damping_of);
+    figure(
+        across(&frequencies, "level", "frequency, Hz", "Frequency by level"),
+        "Frequency across levels.",
+    ) + &figure(
+        across(&dampings, "level", "damping ratio", "Damping by level"),
+        "Damping across levels.",
+    )
+}
+
 fn table(studies: &[Study], comparison: &Comparison) -> String {
     let first = escaped(&studies[0].name);
-    let to = |what: &str| format!("{what}<br>against {first}");
     let head = [
         "branch",
         "capture",
@@ -133,17 +119,16 @@ fn table(studies: &[Study], comparison: &Comparison) -> String {
         "damping ratio",
     ]
     .map(String::from);
-    let head = [&head[..], &[to("frequency,"), to("damping,")]].concat();
-    let told = comparison.rows.iter().filter(|row| row.is_told(studies));
-    let rows: String = told
-        .flat_map(|row| (0..studies.len()).map(|k| table_row(studies, row, k)))
-        .collect();
-    let untold: Vec<String> = comparison
-        .rows
-        .iter()
-        .filter(|row| !row.is_told(studies))
-        .map(|row| row.name.to_string())
-        .collect();
+    let against = ["frequency", "damping"].map(|what| format!("{what},<br>against {first}"));
+    let head = [&head[..], &against].concat();
+    let (mut rows, mut untold) = (String::new(), Vec::new());
+    for row in &comparison.rows {
+        if row.is_told(studies) {
+            rows.extend((0..studies.len()).map(|k| table_row(studies, row, k)));
+        } else {
+            untold.push(row.name.to_string());
+        }
+    }
     let untold = if untold.is_empty() {
         String::new()
     } else {
@@ -172,31 +157,26 @@ fn table_row(studies: &[Study], row: &Row, k: usize) -> String {
         String::new()
     };
     let name = escaped(&studies[k].name);
-    let why = |name: String, called: &str, why: &str| {
-        let first = cells("td", "n", &[name]) + &cells("td", "n less", &[called.into()]);
-        format!("{first}<td class=\"why\" colspan=\"4\"><span>{why}</span></td>")
-    };
     let rest = match (row.branch(studies, k), row.sway(studies, k)) {
-        (None, _) => why(name, "-", lost(row, k)),
+        (None, _) => without_values(name, "-", lost(row, k)),
         (Some(b), None) => {
             let reason = b.sway.err().map_or(String::new(), |w| format!("none: {w}"));
-            why(name, &b.name.to_string(), &reason)
+            without_values(name, &b.name.to_string(), &reason)
         }
         (Some(b), Some(sway)) => {
-            let both = row
-                .sway(studies, 0)
-                .filter(|_| k > 0)
-                .map(|first| (first, sway));
-            let cell =
-                |change: Option<Change>| change.map_or("-".to_owned(), |c| stacked(&changed(&c)));
+            let first = row.sway(studies, 0).filter(|_| k > 0);
+            let [frequency, damping] = [Change::of_frequency, Change::of_damping].map(|between| {
+                let change = first.and_then(|first| between(&first, &sway));
+                change.map_or("-".to_owned(), |c| stacked(&changed(&c)))
+            });
             let row = [
                 name,
                 b.name.to_string(),
                 stacked(&interval(&sway.frequency_hz, 3)),
                 sway.damping_ratio
                     .map_or("unknown".into(), |d| stacked(&interval(&d, 3))),
-                cell(both.and_then(|(a, b)| Change::of_frequency(&a, &b))),
-                cell(both.and_then(|(a, b)| Change::of_damping(&a, &b))),
+                frequency,
+                damping,
             ];
             cells("td", "n", &row[..1])
                 + &cells("td", "n less", &row[1..2])
@@ -204,6 +184,12 @@ fn table_row(studies: &[Study], row: &Row, k: usize) -> String {
         }
     };
     format!("<tr>{head}{rest}</tr>")
+}
+
+/// The cells of a branch of capture `name` that has no values there, and why.
+fn without_values(name: String, called: &str, why: &str) -> String {
+    let first = cells("td", "n", &[name]) + &cells("td", "n less", &[called.into()]);
+    format!("{first}<td class=\"why\" colspan=\"4\"><span>{why}</span></td>")
 }
 
 fn curve(branch: &Branch, kind: usize) -> Option<Curve<'_>> {
@@ -220,18 +206,19 @@ fn curve(branch: &Branch, kind: usize) -> Option<Curve<'_>> {
 
 /// The spectra of one branch in all captures: a stronger pull makes a higher peak, the frequency
 /// stays (figure 11).
-fn overlay(studies: &[Study], row: &Row) -> Option<String> {
+fn overlay(studies: &[Study], row: &Row) -> String {
     let curves: Vec<Curve> = (0..studies.len())
         .filter_map(|k| curve(row.branch(studies, k)?, k))
         .collect();
     let all: Vec<&Study> = studies.iter().collect();
-    (curves.len() > 1).then(|| {
-        spectra(
-            &curves,
-            highest_hz(&all),
-            &format!("Spectra of branch {}", row.name),
-        )
-    })?
+    if curves.len() < 2 {
+        return String::new();
+    }
+    let title = format!("Spectra of branch {}", row.name);
+    figure(
+        spectra(&curves, highest_hz(&all), &title),
+        &format!("Branch {}.", row.name),
+    )
 }
 
 /// The branches of a tree that sway most and have an answer, in one plot (figure 10).

@@ -1,11 +1,11 @@
-//! The pattern across the levels of one tree (002 section 5.4).
+//! The pattern across the levels of one tree (Hu et al. sect. 5.4).
 
-use super::{cells, figure};
-use crate::model::{Interval, Sway};
-use crate::report::levels::{Growth, Level, Spread, growth, levels};
+use super::{ValueOf, cells, damping_of, figure, frequency_of};
+use crate::model::Interval;
+use crate::report::levels::{Growth, Level, growth, levels};
 use crate::report::plot::{Mark, Slot, across};
 use crate::report::study::Study;
-use crate::report::text::{spread, trend};
+use crate::report::text::{level_cells, trend};
 
 /// Plots and a table of frequency and damping by level; nothing without answers.
 pub fn levels_part(study: &Study) -> String {
@@ -13,11 +13,9 @@ pub fn levels_part(study: &Study) -> String {
     if study.answers() == 0 {
         return String::new();
     }
-    let frequency = |s: &Sway| Some(s.frequency_hz);
-    let damping = |s: &Sway| s.damping_ratio;
     let plots = figure(
         across(
-            &by_level(&[study], &frequency),
+            &by_level(&[study], frequency_of),
             "level",
             "frequency, Hz",
             "Frequency by level",
@@ -25,7 +23,7 @@ pub fn levels_part(study: &Study) -> String {
         &told("frequency", growth(study, |s| Some(s.frequency_hz.value))),
     ) + &figure(
         across(
-            &by_level(&[study], &damping),
+            &by_level(&[study], damping_of),
             "level",
             "damping ratio",
             "Damping by level",
@@ -42,33 +40,33 @@ pub fn levels_part(study: &Study) -> String {
 }
 
 /// The answers of every level, those of several captures beside each other.
-pub fn by_level(studies: &[&Study], of: &dyn Fn(&Sway) -> Option<Interval>) -> Vec<Slot> {
+pub fn by_level(studies: &[&Study], of: ValueOf) -> Vec<Slot> {
     let highest = studies
         .iter()
         .flat_map(|s| s.branches.iter().map(|b| b.level))
         .max()
         .unwrap_or(0);
-    let marks = |level: u8| {
-        let of_study = |(kind, study): (usize, &&Study)| {
-            let known = study
-                .branches
-                .iter()
-                .filter(|b| b.level == level)
-                .filter_map(|b| of(&b.known()?));
-            let mut all: Vec<Interval> = known.collect();
-            all.sort_by(|a, b| a.value.total_cmp(&b.value));
-            all.into_iter()
-                .map(|of| Mark { of, kind })
-                .collect::<Vec<Mark>>()
-        };
-        studies.iter().enumerate().flat_map(of_study).collect()
-    };
-    (1..=highest)
-        .map(|level| Slot {
+    let mut slots = Vec::with_capacity(highest.into());
+    for level in 1..=highest {
+        let mut marks = Vec::new();
+        for (kind, study) in studies.iter().enumerate() {
+            let known = of_level(study, level, of);
+            marks.extend(known.into_iter().map(|of| Mark { of, kind }));
+        }
+        slots.push(Slot {
             name: level.to_string(),
-            marks: marks(level),
-        })
-        .collect()
+            marks,
+        });
+    }
+    slots
+}
+
+/// The known values of one level, the least first.
+fn of_level(study: &Study, level: u8, of: ValueOf) -> Vec<Interval> {
+    let branches = study.branches.iter().filter(|b| b.level == level);
+    let mut all: Vec<Interval> = branches.filter_map(|b| of(&b.known()?)).collect();
+    all.sort_by(|a, b| a.value.total_cmp(&b.value));
+    all
 }
 
 fn told(what: &str, growth: Option<Growth>) -> String {
@@ -85,20 +83,12 @@ fn table(levels: &[Level]) -> String {
         "damping ratio",
     ]
     .map(String::from);
-    let of = |s: &Option<Spread>| s.as_ref().map_or("-".into(), |s| spread(s, 3));
-    let row = |l: &Level| {
-        let row = [
-            l.level.to_string(),
-            l.branches.to_string(),
-            l.answers.to_string(),
-            of(&l.frequency_hz),
-            of(&l.damping_ratio),
-        ];
-        format!("<tr>{}</tr>", cells("td", "n", &row))
-    };
+    let mut rows = String::new();
+    for level in levels {
+        rows += &format!("<tr>{}</tr>", cells("td", "n", &level_cells(level)));
+    }
     format!(
-        "<div class=\"wide\"><table><caption>Median, and least to largest</caption><tr>{}</tr>{}</table></div>",
+        "<div class=\"wide\"><table><caption>Median, and least to largest</caption><tr>{}</tr>{rows}</table></div>",
         cells("th", "n", &head),
-        levels.iter().map(row).collect::<String>()
     )
 }

@@ -37,13 +37,13 @@ pub fn table_part(study: &Study) -> String {
 }
 
 fn row(study: &Study, branch: &Branch, columns: usize) -> String {
-    let carrier = branch.parent.map_or("foot".into(), |p| p.to_string());
+    let parent = branch.parent.map_or("foot".into(), |p| p.to_string());
     let name = if branch.times_s.is_empty() {
         branch.name.to_string()
     } else {
         format!("<a href=\"#{}\">{}</a>", anchor(study, branch), branch.name)
     };
-    let place = [branch.level.to_string(), carrier, branch.points.to_string()];
+    let place = [branch.level.to_string(), parent, branch.points.to_string()];
     let first = cells("td", "n", &[name]) + &cells("td", "n less", &place);
     let rest = match branch.sway {
         Err(why) => format!(
@@ -73,16 +73,16 @@ fn row(study: &Study, branch: &Branch, columns: usize) -> String {
 
 /// The name of a branch's part within the page.
 pub fn anchor(study: &Study, branch: &Branch) -> String {
-    // Different names stay different.
-    let plain = |c: char| {
+    let mut anchor = String::new();
+    for c in study.name.chars() {
         if c.is_ascii_alphanumeric() {
-            c.to_string()
+            anchor.push(c);
         } else {
-            format!("_{:x}", u32::from(c))
+            // Different names stay different.
+            anchor += &format!("_{:x}", u32::from(c));
         }
-    };
-    let plain: String = study.name.chars().map(plain).collect();
-    format!("{plain}-{}", branch.name)
+    }
+    format!("{anchor}-{}", branch.name)
 }
 
 /// What this does not say: branches without an answer by reason, and what no number here means.

@@ -1,5 +1,5 @@
-//! Values with their intervals side by side: across levels (002 section 5.4) and across captures
-//! (figure 15).
+//! Values with their intervals side by side: across levels (Hu et al. sect. 5.4) and across captures
+//! (fig. 15).
 
 use super::HEIGHT;
 use super::axes::{Axes, range};
@@ -74,13 +74,10 @@ pub fn across(slots: &[Slot], x_label: &str, y_label: &str, label: &str) -> Opti
             let x = middle
                 + (k as f64 - 0.5 * (slot.marks.len() as f64 - 1.0)) * STEP * stretch.min(1.5);
             let class = format!("c{}", mark.kind % 6);
-            let y = |v: f64| axes.y(v.clamp(0.0, 1.1 * top));
-            svg.line(
-                [x, y(mark.of.lo)],
-                [x, y(mark.of.hi)],
-                &format!("{class} bar"),
-            );
-            svg.dot([x, y(mark.of.value)], mark.kind, &format!("{class} dot"));
+            let [lo, value, hi] =
+                [mark.of.lo, mark.of.value, mark.of.hi].map(|v| axes.y(v.clamp(0.0, 1.1 * top)));
+            svg.line([x, lo], [x, hi], &format!("{class} bar"));
+            svg.dot([x, value], mark.kind, &format!("{class} dot"));
         }
         from += need;
     }

@@ -1,4 +1,4 @@
-//! The angle of a branch to the one that carries it over time (002 figure 6).
+//! The angle of a branch to the one that carries it over time (Hu et al. fig. 6).
 
 use super::axes::{Axes, range, thinned};
 use super::svg::Svg;
@@ -33,35 +33,21 @@ pub fn angle(study: &Study, branch: &Branch) -> Option<String> {
         // What comes before the release, after all has died down, or from the next pull on tells
         // nothing of the sway.
         let [left, right] = axes.sides();
-        let at = |t: f64| axes.x(t.clamp(study.span_s[0], study.span_s[1]));
-        svg.rect(
-            [left, axes.top()],
-            [at(onset.at_s), axes.bottom()],
-            "unused",
-        );
-        svg.rect(
-            [at(study.used_s[1]), axes.top()],
-            [right, axes.bottom()],
-            "unused",
-        );
+        let [from, to] = [onset.at_s, study.used_s[1]]
+            .map(|t| axes.x(t.clamp(study.span_s[0], study.span_s[1])));
+        svg.rect([left, axes.top()], [from, axes.bottom()], "unused");
+        svg.rect([to, axes.top()], [right, axes.bottom()], "unused");
     }
     axes.draw(&mut svg, "time, s", "degrees");
-    let mut curve = |angles: &[f64], class: &str| {
-        let points: Vec<[f64; 2]> = branch
-            .times_s
-            .iter()
-            .zip(angles)
-            .map(|(t, a)| [*t, *a])
-            .collect();
-        svg.path(
-            thinned(&points, MOST)
-                .into_iter()
-                .map(|[t, a]| axes.at(t, a)),
-            class,
-        );
-    };
-    curve(&branch.space_deg, "space");
-    curve(&branch.plane_deg, "plane");
-    curve(fitted, "fitted");
+    let curves = [
+        (branch.space_deg.as_slice(), "space"),
+        (&branch.plane_deg, "plane"),
+        (fitted, "fitted"),
+    ];
+    for (angles, class) in curves {
+        let points = branch.times_s.iter().zip(angles).map(|(t, a)| [*t, *a]);
+        let points = thinned(&points.collect::<Vec<_>>(), MOST);
+        svg.path(points.into_iter().map(|[t, a]| axes.at(t, a)), class);
+    }
     Some(svg.finish())
 }

@@ -36,13 +36,9 @@ impl Axes {
         let frame = [LEFT, TOP, size[0] - RIGHT, size[1] - BOTTOM];
         let per =
             ((x[1] - x[0]) / (frame[2] - frame[0])).max((y[1] - y[0]) / (frame[3] - frame[1]));
-        let about = |r: [f64; 2], side: f64| {
-            let middle = 0.5 * (r[0] + r[1]);
-            [middle - 0.5 * per * side, middle + 0.5 * per * side]
-        };
         Self {
-            x: about(x, frame[2] - frame[0]),
-            y: about(y, frame[3] - frame[1]),
+            x: about(x, per * (frame[2] - frame[0])),
+            y: about(y, per * (frame[3] - frame[1])),
             frame,
         }
     }
@@ -133,22 +129,26 @@ fn ticks([lo, hi]: [f64; 2]) -> Vec<(f64, String)> {
         .unwrap_or(rough);
     let decimals = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
     let (first, last) = ((lo / step).ceil() as i64, (hi / step).floor() as i64);
-    let text = |v: f64| {
-        let text = format!("{v:.decimals$}");
-        if text
-            .trim_start_matches('-')
-            .chars()
-            .all(|c| c == '0' || c == '.')
-        {
-            "0".into()
-        } else {
-            text
-        }
-    };
     (first..=last.min(first + 20))
         .map(|k| k as f64 * step)
-        .map(|v| (v, text(v)))
+        .map(|v| (v, tick_text(v, decimals)))
         .collect()
+}
+
+fn tick_text(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let mut digits = text.trim_start_matches('-').chars();
+    if digits.all(|c| c == '0' || c == '.') {
+        "0".into()
+    } else {
+        text
+    }
+}
+
+/// A range of this length about the middle of another.
+fn about([lo, hi]: [f64; 2], length: f64) -> [f64; 2] {
+    let middle = 0.5 * (lo + hi);
+    [middle - 0.5 * length, middle + 0.5 * length]
 }
 
 /// At most `most` points or so of a line: of every stretch its lowest and its highest, so that no
@@ -158,16 +158,21 @@ pub fn thinned(points: &[[f64; 2]], most: usize) -> Vec<[f64; 2]> {
         return points.to_vec();
     }
     let stretch = (2 * points.len()).div_ceil(most.max(2));
-    let ends = |piece: &[[f64; 2]]| {
-        let seen = || (0..piece.len()).filter(|&k| piece[k][1].is_finite());
-        let low = seen().min_by(|&a, &b| piece[a][1].total_cmp(&piece[b][1]));
-        let high = seen().max_by(|&a, &b| piece[a][1].total_cmp(&piece[b][1]));
-        match (low, high) {
-            (Some(low), Some(high)) => vec![piece[low.min(high)], piece[low.max(high)]],
-            _ => vec![[f64::NAN; 2]],
-        }
-    };
-    points.chunks(stretch).flat_map(ends).collect()
+    points.chunks(stretch).flat_map(extremes).collect()
+}
+
+/// The lowest and the highest point in the order of the line; one without numbers where there is
+/// none.
+fn extremes(stretch: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let seen = (0..stretch.len()).filter(|&k| stretch[k][1].is_finite());
+    let low = seen
+        .clone()
+        .min_by(|&a, &b| stretch[a][1].total_cmp(&stretch[b][1]));
+    let high = seen.max_by(|&a, &b| stretch[a][1].total_cmp(&stretch[b][1]));
+    match (low, high) {
+        (Some(low), Some(high)) => vec![stretch[low.min(high)], stretch[low.max(high)]],
+        _ => vec![[f64::NAN; 2]],
+    }
 }
 
 /// The least and the largest of some values; no numbers of none.
@@ -189,10 +194,14 @@ mod tests {
 
     #[test]
     fn scales_have_round_numbers_whatever_they_span() {
-        let texts = |r| ticks(r).into_iter().map(|t| t.1).collect::<Vec<_>>();
-        assert_eq!(texts([0.0, 11.0]), ["0", "5", "10"]);
-        assert_eq!(texts([-0.02, 0.031]), ["-0.02", "0", "0.02"]);
-        assert_eq!(texts([0.0, 1.0]), ["0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
+        for (range, expected) in [
+            ([0.0, 11.0], "0 5 10"),
+            ([-0.02, 0.031], "-0.02 0 0.02"),
+            ([0.0, 1.0], "0 0.2 0.4 0.6 0.8 1.0"),
+        ] {
+            let texts: Vec<String> = ticks(range).into_iter().map(|t| t.1).collect();
+            assert_eq!(texts.join(" "), expected);
+        }
         for odd in [
             [0.0, 0.0],
             [f64::NAN, 1.0],

@@ -1,4 +1,4 @@
-//! Spectra of angles (002 figures 7 and 9 to 12).
+//! Spectra of angles (Hu et al. figs. 7 and 9 to 12).
 
 use super::axes::{Axes, range, thinned};
 use super::svg::Svg;
@@ -30,63 +30,91 @@ pub struct Answer {
 /// Spectra from 0 to `highest_hz`; with one curve, its answer with the interval and the peak's
 /// width at half the power.
 pub fn spectra(curves: &[Curve], highest_hz: f64, label: &str) -> Option<String> {
-    let points = |s: &Spectrum| -> Vec<[f64; 2]> {
-        let all = s
-            .amplitude
-            .iter()
-            .enumerate()
-            .map(|(k, a)| [k as f64 * s.bin_hz, *a]);
-        all.take_while(|p| p[0] <= highest_hz).collect()
-    };
-    let all: Vec<Vec<[f64; 2]>> = curves.iter().map(|c| points(c.spectrum)).collect();
+    let all: Vec<Vec<[f64; 2]>> = curves
+        .iter()
+        .map(|c| points(c.spectrum, highest_hz))
+        .collect();
     let [_, top] = range(all.iter().flatten().map(|p| p[1]));
     if !top.is_finite() || top <= 0.0 {
         return None;
     }
     let mut svg = Svg::new(WIDTH, HEIGHT, label);
     let axes = Axes::new([WIDTH, HEIGHT], [0.0, highest_hz], [0.0, 1.15 * top]);
+    let alone = curves.len() == 1;
     for curve in curves {
         let colour = curve.class.split(' ').next().unwrap_or_default();
-        let class = if curves.len() > 1 { colour } else { "answer" };
-        if let Some(f) = curve.answer.and_then(|a| a.frequency_hz) {
-            // An interval may be narrower than a line.
-            svg.rect(
-                [axes.x(f.lo.max(0.0)), axes.top()],
-                [axes.x(f.hi.min(highest_hz)), axes.bottom()],
-                &format!("{class} band"),
-            );
-            svg.path(
-                [axes.at(f.value, 0.0), axes.at(f.value, 1.15 * top)],
-                &format!("{class} mark"),
-            );
+        let class = if alone { "answer" } else { colour };
+        if let Some(frequency_hz) = curve.answer.and_then(|a| a.frequency_hz) {
+            let top = 1.15 * top;
+            mark_frequency(&mut svg, &axes, &frequency_hz, highest_hz, top, class);
         }
     }
     axes.draw(&mut svg, "frequency, Hz", "degrees");
     for (curve, points) in curves.iter().zip(&all) {
-        svg.path(
-            thinned(points, MOST)
-                .into_iter()
-                .map(|[f, a]| axes.at(f, a)),
-            &curve.class,
-        );
-        if let Some((peak_hz, damping)) = curve
-            .answer
-            .and_then(|a| a.peak)
-            .filter(|_| curves.len() == 1)
-        {
-            let k = (peak_hz / curve.spectrum.bin_hz).round() as usize;
-            let height = curve.spectrum.amplitude.get(k).copied().unwrap_or(f64::NAN)
-                * std::f64::consts::FRAC_1_SQRT_2;
-            // The width at half the power is twice the damping times the frequency, 002 eq. 6.
-            let [left, right] = [1.0 - damping, 1.0 + damping]
-                .map(|side| axes.x((side * peak_hz).clamp(0.0, highest_hz)));
-            let y = axes.y(height);
-            svg.line([left, y], [right, y], "width");
-            // Ends, so that its shape tells it from the answer where colours do not.
-            [left, right]
-                .into_iter()
-                .for_each(|x| svg.line([x, y - END], [x, y + END], "width"));
+        let line = thinned(points, MOST).into_iter();
+        svg.path(line.map(|[f, a]| axes.at(f, a)), &curve.class);
+        let peak = curve.answer.and_then(|a| a.peak).filter(|_| alone);
+        if let Some((peak_hz, damping_ratio)) = peak {
+            let spectrum = curve.spectrum;
+            mark_peak(
+                &mut svg,
+                &axes,
+                spectrum,
+                peak_hz,
+                damping_ratio,
+                highest_hz,
+            );
         }
     }
     Some(svg.finish())
+}
+
+/// Frequency and amplitude of every bin up to `highest_hz`.
+fn points(spectrum: &Spectrum, highest_hz: f64) -> Vec<[f64; 2]> {
+    let bins = spectrum.amplitude.iter().enumerate();
+    bins.map(|(k, amplitude)| [k as f64 * spectrum.bin_hz, *amplitude])
+        .take_while(|p| p[0] <= highest_hz)
+        .collect()
+}
+
+/// A frequency with its interval in a plot that ends at `highest_hz` and `top`.
+fn mark_frequency(
+    svg: &mut Svg,
+    axes: &Axes,
+    frequency_hz: &Interval,
+    highest_hz: f64,
+    top: f64,
+    class: &str,
+) {
+    // An interval may be narrower than a line.
+    svg.rect(
+        [axes.x(frequency_hz.lo.max(0.0)), axes.top()],
+        [axes.x(frequency_hz.hi.min(highest_hz)), axes.bottom()],
+        &format!("{class} band"),
+    );
+    svg.path(
+        [0.0, top].map(|a| axes.at(frequency_hz.value, a)),
+        &format!("{class} mark"),
+    );
+}
+
+/// The width of a peak at half its power: twice the damping times the frequency (Hu et al. eq. 6).
+fn mark_peak(
+    svg: &mut Svg,
+    axes: &Axes,
+    spectrum: &Spectrum,
+    peak_hz: f64,
+    damping_ratio: f64,
+    highest_hz: f64,
+) {
+    let k = (peak_hz / spectrum.bin_hz).round() as usize;
+    let amplitude = spectrum.amplitude.get(k).copied().unwrap_or(f64::NAN);
+    let y = axes.y(amplitude * std::f64::consts::FRAC_1_SQRT_2);
+    let sides = [1.0 - damping_ratio, 1.0 + damping_ratio]
+        .map(|side| axes.x((side * peak_hz).clamp(0.0, highest_hz)));
+    svg.line([sides[0], y], [sides[1], y], "width");
+    // Ends, so that its shape tells it from the answer where colours do not.
+    for x in sides {
+        svg.line([x, y - END], [x, y + END], "width");
+    }
 }

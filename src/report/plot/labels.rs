@@ -53,50 +53,77 @@ type Frame = [f64; 4];
 /// Finds a place for every name in turn; `None` where there is no room. `lines` are drawn as well,
 /// in a drawing of a `size`.
 pub fn placed(wanted: &[Wanted], lines: &[Segment], size: Point) -> Vec<Option<Placed>> {
-    let mut out: Vec<Option<Placed>> = Vec::with_capacity(wanted.len());
+    let mut drawing = Drawing {
+        wanted,
+        lines,
+        size,
+        placed: Vec::with_capacity(wanted.len()),
+    };
     for want in wanted {
-        let free = |p: &Placed| {
-            let inside = frames(want, p)
-                .flatten()
-                .all(|[l, t, r, b]| l >= 0.0 && t >= 0.0 && r <= size[0] && b <= size[1]);
-            let known = wanted
-                .iter()
-                .zip(&out)
-                .filter_map(|(w, p)| Some((w, p.as_ref()?)));
-            inside && known.into_iter().all(|(w, q)| apart((want, p), (w, q)))
-        };
-        let cost = |p: &Placed, ring: f64, turn: f64| {
-            let frame = frame(want, p, want.size);
-            let under = lines.iter().filter(|l| cuts(&frame, l)).count() as f64;
-            let dots = wanted
-                .iter()
-                .filter(|w| touches(&frame, &around(w.at)))
-                .count() as f64;
-            let leads = out.iter().flatten().filter_map(|q| q.leader);
-            let across = leads
-                .filter(|l| p.leader.is_some_and(|own| crosses(&own, l)))
-                .count() as f64;
-            ring + OVER_LINE * under
-                + OVER_PLACE * dots
-                + ACROSS * across
-                + ASIDE * (1.0 - turn.cos())
-        };
-        let own = (want.at[1] - want.from[1]).atan2(want.at[0] - want.from[0]);
-        let tried = RINGS
-            .iter()
-            .filter(|r| **r <= want.farthest)
-            .flat_map(|ring| {
-                (0..DIRECTIONS)
-                    .map(move |k| (*ring, k as f64 * std::f64::consts::TAU / DIRECTIONS as f64))
-            });
-        let best = tried
-            .map(|(ring, turn)| (candidate(want, ring, own + turn), ring, turn))
-            .filter(|(p, ..)| free(p))
-            .map(|(p, ring, turn)| (cost(&p, ring, turn), p))
-            .min_by(|a, b| a.0.total_cmp(&b.0));
-        out.push(best.map(|(_, p)| p));
+        let best = drawing.best(want);
+        drawing.placed.push(best);
     }
-    out
+    drawing.placed
+}
+
+/// What is drawn already: lines, and the first names, in the order of `wanted`.
+struct Drawing<'a> {
+    wanted: &'a [Wanted],
+    lines: &'a [Segment],
+    size: Point,
+    placed: Vec<Option<Placed>>,
+}
+
+impl Drawing<'_> {
+    /// The cheapest free place round its own; the first of equally cheap ones.
+    fn best(&self, want: &Wanted) -> Option<Placed> {
+        let own = (want.at[1] - want.from[1]).atan2(want.at[0] - want.from[0]);
+        let mut best: Option<(f64, Placed)> = None;
+        for ring in RINGS.into_iter().filter(|r| *r <= want.farthest) {
+            for k in 0..DIRECTIONS {
+                let turn = k as f64 * std::f64::consts::TAU / DIRECTIONS as f64;
+                let p = candidate(want, ring, own + turn);
+                if !self.is_free(want, &p) {
+                    continue;
+                }
+                let cost = self.cost(want, &p, ring, turn);
+                if best.is_none_or(|(least, _)| cost.total_cmp(&least).is_lt()) {
+                    best = Some((cost, p));
+                }
+            }
+        }
+        best.map(|(_, p)| p)
+    }
+
+    /// Whether a name would lie inside the drawing and on no other name.
+    fn is_free(&self, want: &Wanted, p: &Placed) -> bool {
+        let [width, height] = self.size;
+        let inside = frames(want, p)
+            .flatten()
+            .all(|[l, t, r, b]| l >= 0.0 && t >= 0.0 && r <= width && b <= height);
+        let mut others = self.wanted.iter().zip(&self.placed);
+        inside && others.all(|(w, q)| q.is_none_or(|q| apart(want, p, w, &q)))
+    }
+
+    /// What a place costs, by its distance, what the name would lie on, what its leader would
+    /// cross, and its turn from the branch's own direction.
+    fn cost(&self, want: &Wanted, p: &Placed, ring: f64, turn: f64) -> f64 {
+        let frame = frame(want, p, want.size);
+        let under = self.lines.iter().filter(|l| cuts(&frame, l)).count();
+        let dots = self
+            .wanted
+            .iter()
+            .filter(|w| touches(&frame, &around(w.at)))
+            .count();
+        let leaders = self.placed.iter().flatten().filter_map(|q| q.leader);
+        let across = leaders
+            .filter(|l| p.leader.is_some_and(|own| crosses(&own, l)))
+            .count();
+        ring + OVER_LINE * under as f64
+            + OVER_PLACE * dots as f64
+            + ACROSS * across as f64
+            + ASIDE * (1.0 - turn.cos())
+    }
 }
 
 /// A name whose frame is `ring` away from its place.
@@ -145,11 +172,12 @@ fn frames(want: &Wanted, p: &Placed) -> impl Iterator<Item = Option<Frame>> {
 }
 
 /// Whether neither name lies on the other, nor on the line that leads to it, on any screen.
-fn apart((a, p): (&Wanted, &Placed), (b, q): (&Wanted, &Placed)) -> bool {
+fn apart(a: &Wanted, p: &Placed, b: &Wanted, q: &Placed) -> bool {
     frames(a, p).zip(frames(b, q)).all(|(f, g)| {
         let Some((f, g)) = f.zip(g) else { return true };
-        let over = |frame: &Frame, leader: Option<Segment>| leader.is_some_and(|l| cuts(frame, &l));
-        !touches(&f, &g) && !over(&f, q.leader) && !over(&g, p.leader)
+        !touches(&f, &g)
+            && q.leader.is_none_or(|l| !cuts(&f, &l))
+            && p.leader.is_none_or(|l| !cuts(&g, &l))
     })
 }
 
@@ -182,10 +210,12 @@ fn cuts(frame: &Frame, [a, b]: &Segment) -> bool {
 }
 
 fn crosses([a, b]: &Segment, [c, d]: &Segment) -> bool {
-    let side = |p: &Point, q: &Point, r: &Point| {
-        (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
-    };
     side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0
+}
+
+/// On which side of the line from `p` to `q` a place `r` lies, by its sign.
+fn side(p: &Point, q: &Point, r: &Point) -> f64 {
+    (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
 }
 
 #[cfg(test)]
@@ -226,7 +256,7 @@ mod tests {
             for (j, q) in found.iter().enumerate().skip(i + 1) {
                 if let Some(q) = q {
                     assert!(
-                        apart((&all[i], p), (&all[j], q)),
+                        apart(&all[i], p, &all[j], q),
                         "{i} lies on {j}: {p:?} {q:?}"
                     );
                 }

@@ -21,8 +21,7 @@ pub struct Map {
     pub unnamed: Vec<u32>,
 }
 
-/// Every branch from where it begins to where it ends; which have a frequency is told by how they
-/// are drawn.
+/// Every branch from where it begins to where it ends, those with a frequency drawn in another way.
 pub fn map(study: &Study) -> Map {
     let [w, h] = study.size.map(|s| f64::from(s.max(1)));
     let scale = SIDE / w.max(h);
@@ -32,62 +31,46 @@ pub fn map(study: &Study) -> Map {
         study.name
     );
     let mut svg = Svg::new(size[0], size[1], &label);
-    if let Some(picture) = &study.picture {
-        svg.image(size, picture);
-        svg.rect([0.0, 0.0], size, "veil");
-    }
-    let mut outline: Vec<[f64; 2]> = study
-        .outline_px
-        .iter()
-        .map(|p| p.map(|x| f64::from(x) * scale))
-        .collect();
-    outline.extend(outline.first().copied());
-    svg.path(outline, "outline");
-    let at = |p: [f64; 2]| {
-        [
-            (study.foot_px[0] + p[0]) * scale,
-            (study.foot_px[1] - p[1]) * scale,
-        ]
-    };
-    let class = |b: &Branch| if b.sway.is_ok() { "told" } else { "untold" };
-    // Those with an answer lie above the others.
-    let lowest_first = || {
-        [false, true]
-            .into_iter()
-            .flat_map(|ok| study.branches.iter().filter(move |b| b.sway.is_ok() == ok))
-    };
-    lowest_first().for_each(|b| svg.line(at(b.base), at(b.tip), class(b)));
-    // They come first: where it is crowded, their numbers are the ones that are read.
-    let (told, others): (Vec<&Branch>, Vec<&Branch>) =
-        study.branches.iter().partition(|b| b.sway.is_ok());
-    let named: Vec<&Branch> = told.into_iter().chain(others).collect();
-    let wanted: Vec<Wanted> = named
-        .iter()
-        .map(|b| wanted(b, at(b.tip), at(b.base)))
-        .collect();
+    background(&mut svg, study, scale, size);
     let lines: Vec<[[f64; 2]; 2]> = study
         .branches
         .iter()
-        .map(|b| [at(b.base), at(b.tip)])
+        .map(|b| [b.base, b.tip].map(|p| in_drawing(study, scale, p)))
+        .collect();
+    // Those with an answer lie above the others.
+    let mut lowest_first: Vec<usize> = (0..lines.len()).collect();
+    lowest_first.sort_by_key(|&k| study.branches[k].sway.is_ok());
+    for &k in &lowest_first {
+        let [base, tip] = lines[k];
+        svg.line(base, tip, class(&study.branches[k]));
+    }
+    // Here they come first: where it is crowded, their numbers are the ones that are read.
+    let mut named: Vec<usize> = (0..lines.len()).collect();
+    named.sort_by_key(|&k| study.branches[k].sway.is_err());
+    let wanted: Vec<Wanted> = named
+        .iter()
+        .map(|&k| wanted(&study.branches[k], lines[k]))
         .collect();
     let places = placed(&wanted, &lines, size);
-    for (b, place) in named.iter().zip(&places) {
+    for (&k, place) in named.iter().zip(&places) {
         if let Some([from, to]) = place.and_then(|p| p.leader) {
-            svg.line(from, to, &format!("{} leader", class(b)));
+            let class = class(&study.branches[k]);
+            svg.line(from, to, &format!("{class} leader"));
         }
     }
-    lowest_first().for_each(|b| svg.dot(at(b.tip), 0, &format!("{} end", class(b))));
+    for &k in &lowest_first {
+        let class = class(&study.branches[k]);
+        svg.dot(lines[k][1], 0, &format!("{class} end"));
+    }
     let mut unnamed = Vec::new();
-    for (b, place) in named.iter().zip(&places) {
-        match place {
-            Some(p) => svg.text(
-                p.at,
-                Anchor::Middle,
-                &format!("{} name", class(b)),
-                &b.name.to_string(),
-            ),
-            None => unnamed.push(b.name),
-        }
+    for (&k, place) in named.iter().zip(&places) {
+        let branch = &study.branches[k];
+        let Some(place) = place else {
+            unnamed.push(branch.name);
+            continue;
+        };
+        let class = format!("{} name", class(branch));
+        svg.text(place.at, Anchor::Middle, &class, &branch.name.to_string());
     }
     unnamed.sort_unstable();
     Map {
@@ -96,7 +79,35 @@ pub fn map(study: &Study) -> Map {
     }
 }
 
-fn wanted(branch: &Branch, at: [f64; 2], from: [f64; 2]) -> Wanted {
+/// The picture, if there is one, and the outline.
+fn background(svg: &mut Svg, study: &Study, scale: f64, size: [f64; 2]) {
+    if let Some(picture) = &study.picture {
+        svg.image(size, picture);
+        svg.rect([0.0, 0.0], size, "veil");
+    }
+    let corners = study.outline_px.iter();
+    let mut outline: Vec<[f64; 2]> = corners.map(|p| p.map(|x| f64::from(x) * scale)).collect();
+    outline.extend(outline.first().copied());
+    svg.path(outline, "outline");
+}
+
+/// A place from the foot, px to the right and up, in a drawing of this scale.
+fn in_drawing(study: &Study, scale: f64, p: [f64; 2]) -> [f64; 2] {
+    [
+        (study.foot_px[0] + p[0]) * scale,
+        (study.foot_px[1] - p[1]) * scale,
+    ]
+}
+
+fn class(branch: &Branch) -> &'static str {
+    if branch.sway.is_ok() {
+        "told"
+    } else {
+        "untold"
+    }
+}
+
+fn wanted(branch: &Branch, [from, at]: [[f64; 2]; 2]) -> Wanted {
     let letters = branch.name.to_string().len();
     match branch.sway {
         Ok(_) => Wanted {

@@ -1,4 +1,4 @@
-//! Where the end of a branch went (002 figure 3).
+//! Where the end of a branch went (Hu et al. fig. 3).
 
 use super::HEIGHT;
 use super::axes::{Axes, range};
@@ -19,26 +19,32 @@ pub fn way(study: &Study, branch: &Branch) -> Option<String> {
     if !(x[0].is_finite() && y[0].is_finite()) {
         return None;
     }
-    let wide = |[lo, hi]: [f64; 2]| [lo - 0.06 * (hi - lo), hi + 0.06 * (hi - lo)];
     let mut svg = Svg::new(
         WIDTH,
         HEIGHT,
         &format!("Way of the end of branch {}", branch.name),
     );
-    let axes = Axes::even([WIDTH, HEIGHT], wide(x), wide(y));
+    let axes = Axes::even([WIDTH, HEIGHT], widened(x), widened(y));
     axes.draw(&mut svg, "to the right, px", "up, px");
     let every = branch.way_px.len().div_ceil(MOST).max(1);
-    let at = |p: &[f64; 2]| [axes.x(p[0]), axes.y(p[1])];
-    svg.path(branch.way_px.iter().step_by(every).map(at), "way");
+    let way: Vec<[f64; 2]> = branch
+        .way_px
+        .iter()
+        .map(|p| [axes.x(p[0]), axes.y(p[1])])
+        .collect();
+    svg.path(way.iter().copied().step_by(every), "way");
     let begin_s = study.onset.map_or(study.span_s[0], |o| o.at_s);
     let first = branch
         .times_s
         .iter()
         .position(|t| *t >= begin_s)
         .unwrap_or(0);
-    svg.path(
-        branch.way_px.iter().skip(first).take(FIRST).map(at),
-        "first",
-    );
+    svg.path(way.into_iter().skip(first).take(FIRST), "first");
     Some(svg.finish())
+}
+
+/// A range with some room on either side.
+fn widened([lo, hi]: [f64; 2]) -> [f64; 2] {
+    let room = 0.06 * (hi - lo);
+    [lo - room, hi + room]
 }

@@ -15,56 +15,21 @@ pub fn compared(studies: &[Study], comparison: &Comparison, columns: Option<usiz
         return out;
     }
     out.push('\n');
-    let first = &studies[0].name;
-    let [frequency, damping] =
-        ["frequency", "damping"].map(|what| format!("{what} against {first}"));
-    let mut whole = Table::new(&[
-        ("branch", 0),
-        ("capture", 0),
-        ("called", 0),
-        ("frequency, Hz", 0),
-        ("damping ratio", 0),
-        (&frequency, 0),
-        (&damping, 0),
-    ]);
-    let told: Vec<&Row> = comparison
-        .rows
-        .iter()
-        .filter(|row| row.is_told(studies))
-        .collect();
-    let all = || {
-        told.iter()
-            .flat_map(|row| (0..studies.len()).map(move |k| (*row, k)))
-    };
-    all().for_each(|(row, k)| whole.push(across(studies, row, k, &[frequency_of, damping_of])));
-    let (whole, _) = whole.within(None);
+    let (told, untold): (Vec<&Row>, Vec<&Row>) =
+        comparison.rows.iter().partition(|row| row.is_told(studies));
+    let mut rows = Vec::with_capacity(told.len() * studies.len());
+    for row in told {
+        rows.extend((0..studies.len()).map(|k| (row, k)));
+    }
+    let whole = whole_table(studies, &rows);
     if columns.is_none_or(|most| whole.lines().all(|line| line.chars().count() <= most)) {
         out += &whole;
     } else {
-        let against = format!("against {first}");
-        for (head, of) in [
-            ("frequency, Hz", frequency_of as Value),
-            ("damping ratio", damping_of),
-        ] {
-            let mut table = Table::new(&[
-                ("branch", 0),
-                ("capture", 0),
-                ("called", 1),
-                (head, 0),
-                (&against, 0),
-            ]);
-            all().for_each(|(row, k)| table.push(across(studies, row, k, &[of])));
-            out += &format!("{}\n", table.within(columns).0);
-        }
+        out += &two_tables(studies, &rows, columns);
     }
-    let untold: Vec<String> = comparison
-        .rows
-        .iter()
-        .filter(|row| !row.is_told(studies))
-        .map(|row| row.name.to_string())
-        .collect();
     let mut notes = String::new();
     if !untold.is_empty() {
+        let untold: Vec<String> = untold.iter().map(|row| row.name.to_string()).collect();
         notes += &format!(
             "  without a frequency in any of them: {}\n",
             untold.join(", ")
@@ -75,6 +40,50 @@ pub fn compared(studies: &[Study], comparison: &Comparison, columns: Option<usiz
     }
     notes += "  * beyond what both 95 % intervals allow; of twenty branches that do not differ, chance marks one\n";
     out + &wrapped(&notes, columns)
+}
+
+/// Frequency and damping beside each other; `rows` are branches and numbers of captures.
+fn whole_table(studies: &[Study], rows: &[(&Row, usize)]) -> String {
+    let first = &studies[0].name;
+    let [frequency, damping] =
+        ["frequency", "damping"].map(|what| format!("{what} against {first}"));
+    let mut table = Table::new(&[
+        ("branch", 0),
+        ("capture", 0),
+        ("called", 0),
+        ("frequency, Hz", 0),
+        ("damping ratio", 0),
+        (&frequency, 0),
+        (&damping, 0),
+    ]);
+    for (row, k) in rows {
+        table.push(across(studies, row, *k, &[frequency_of, damping_of]));
+    }
+    table.within(None).0
+}
+
+/// Frequency and damping under each other.
+fn two_tables(studies: &[Study], rows: &[(&Row, usize)], columns: Option<usize>) -> String {
+    let against = format!("against {}", studies[0].name);
+    let values = [
+        ("frequency, Hz", frequency_of as Value),
+        ("damping ratio", damping_of),
+    ];
+    let mut out = String::new();
+    for (head, of) in values {
+        let mut table = Table::new(&[
+            ("branch", 0),
+            ("capture", 0),
+            ("called", 1),
+            (head, 0),
+            (&against, 0),
+        ]);
+        for (row, k) in rows {
+            table.push(across(studies, row, *k, &[of]));
+        }
+        out += &format!("{}\n", table.within(columns).0);
+    }
+    out
 }
 
 /// What is compared, and by which right; or why nothing is.
@@ -100,7 +109,7 @@ pub fn heading(studies: &[Study], comparison: &Comparison) -> String {
     let by = if comparison.said {
         "as --trees says"
     } else {
-        "told by their places, which --trees overrules"
+        "judged by the places of their branches, which --trees overrides"
     };
     format!(
         "Compared with {} as {what} ({by}; {found})",
@@ -176,40 +185,36 @@ pub fn unmatched(studies: &[Study], comparison: &Comparison, other: usize) -> St
     let Some(study) = studies.get(other + 1) else {
         return String::new();
     };
-    let names = |of: &dyn Fn(&Match) -> bool| -> Vec<u32> {
-        comparison
-            .rows
-            .iter()
-            .filter(|r| r.others.get(other).is_some_and(of))
-            .map(|r| r.name)
-            .collect()
-    };
-    let first = &studies[0].name;
-    let list = |what: String, names: &[u32]| {
-        let names: Vec<String> = names.iter().map(u32::to_string).collect();
-        if names.is_empty() {
-            String::new()
-        } else {
-            format!("  {what}: {}\n", names.join(", "))
+    let (mut missing, mut unclear) = (Vec::new(), Vec::new());
+    for row in &comparison.rows {
+        match row.others.get(other) {
+            Some(Match::Missing) => missing.push(row.name),
+            Some(Match::Unclear) => unclear.push(row.name),
+            _ => {}
         }
-    };
-    let missing = names(&|m| matches!(m, Match::Missing));
-    let unclear = names(&|m| matches!(m, Match::Unclear));
-    let left = comparison
-        .left_over
-        .get(other)
-        .map_or(&[][..], Vec::as_slice);
-    list(
-        format!("branches of {first} that {} does not have", study.name),
-        &missing,
-    ) + &list(
-        format!(
-            "branches of {first} for which two of {} are as near",
-            study.name
+    }
+    let left = comparison.left_over.get(other);
+    let (first, name) = (&studies[0].name, &study.name);
+    let lists = [
+        (
+            format!("branches of {first} that {name} does not have"),
+            missing,
         ),
-        &unclear,
-    ) + &list(
-        format!("branches of {} that {first} does not have", study.name),
-        left,
-    )
+        (
+            format!("branches of {first} for which two of {name} are as near"),
+            unclear,
+        ),
+        (
+            format!("branches of {name} that {first} does not have"),
+            left.cloned().unwrap_or_default(),
+        ),
+    ];
+    let mut out = String::new();
+    for (what, names) in lists {
+        if !names.is_empty() {
+            let names: Vec<String> = names.iter().map(u32::to_string).collect();
+            out += &format!("  {what}: {}\n", names.join(", "));
+        }
+    }
+    out
 }

@@ -1,4 +1,4 @@
-//! Clusters to meshes: one for each main branch, with the two displacements of B.2.
+//! Clusters to meshes: one for each branch of the first fork, with the two displacements of B.2.
 
 use super::cluster::Cluster;
 use super::perch::Perch;
@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 
 /// Meshes of leaves in a tree at most.
 const MOST_GROUPS: usize = 12;
-/// Main branches with fewer of the clusters than this go with the nearest other one.
+/// Branches with fewer of the clusters than this go with the nearest other one.
 const LEAST_SHARE: f64 = 0.02;
 /// Way over which the phase beta of B.2 goes round once, as a share of the tree's height.
 const WAVE: f64 = 0.25;
@@ -34,10 +34,10 @@ pub(super) fn groups(
     template: &Template,
     height: f64,
 ) -> Vec<FoliageGroup> {
-    let main = main_branches(skeleton);
+    let fork_branch = fork_branches(skeleton);
     let of: Vec<usize> = clusters
         .iter()
-        .map(|c| main[perches[c.perch].node.index()])
+        .map(|c| fork_branch[perches[c.perch].node.index()])
         .collect();
     let stands = kept(&of, skeleton);
     let mut nodes: Vec<usize> = stands.clone();
@@ -68,27 +68,28 @@ pub(super) fn groups(
     out
 }
 
-/// For every node the main branch that it is on: the child of the first fork, or itself below that.
-fn main_branches(skeleton: &Skeleton) -> Vec<usize> {
+/// For every node the child of the first fork that it is on, or itself below that. Copies fork, too:
+/// their leaves are meshes of their own, other than by [`Skeleton::main_branches`].
+fn fork_branches(skeleton: &Skeleton) -> Vec<usize> {
     let children = skeleton.children();
     let mut top = 0;
     while let Some([only]) = children.get(top).map(Vec::as_slice) {
         top = only.index();
     }
-    let mut main: Vec<usize> = (0..skeleton.nodes.len()).collect();
+    let mut of_node: Vec<usize> = (0..skeleton.nodes.len()).collect();
     for (i, node) in skeleton.nodes.iter().enumerate() {
         if let Some(parent) = node
             .parent
             .map(|p| p.index())
             .filter(|&p| p != top && p < i && i > top)
         {
-            main[i] = main[parent];
+            of_node[i] = of_node[parent];
         }
     }
-    main
+    of_node
 }
 
-/// For every cluster the main branch whose group it is in: its own, or the nearest that is kept.
+/// For every cluster the branch whose group it is in: its own, or the nearest that is kept.
 fn kept(of: &[usize], skeleton: &Skeleton) -> Vec<usize> {
     let mut counts: Vec<(usize, usize)> = Vec::new();
     for &node in of {

@@ -1,14 +1,14 @@
 //! The chosen branch: how it sways, its angle, and its spectrum with the answer in it.
 
 use super::{titled, waiting};
-use crate::model::{BranchRow, BranchSway, Interval, Snapshot, Sway};
+use crate::model::{BranchRow, BranchSway, Interval, Snapshot};
 use crate::tui::format::{clock, count, plus_minus, value, wrap};
 use crate::tui::plot;
 use crate::tui::state::State;
 use crate::tui::theme::Theme;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
-use ratatui::style::Color;
+use ratatui::style::{Color, Style};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
@@ -67,55 +67,62 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
     ])
     .areas(plots);
     let colour = theme.branch(branch.colour);
-    sways(frame, s, branch, (angle_note, angle), colour, theme);
-    spectrum_of(frame, s, answer, (spectrum, axis), colour, theme);
+    sways(frame, s, branch, angle_note, angle, colour, theme);
+    spectrum_of(frame, s, answer, spectrum, axis, colour, theme);
 }
 
 fn told(s: &Snapshot, answer: Option<&BranchSway>, width: u16, theme: Theme) -> Vec<Line<'static>> {
-    let row = |name: &str, x: String, more: String| {
-        Line::from(vec![
-            Span::styled(format!(" {name:<9}"), theme.faint()),
-            Span::styled(x, theme.strong()),
-            Span::raw(more),
-        ])
-    };
-    let words = |text: &str| -> Vec<Line<'static>> {
-        let lines = wrap(text, width.saturating_sub(2) as usize).into_iter();
-        lines.map(|line| Line::raw(format!(" {line}"))).collect()
-    };
-    match answer.map(|a| a.swaying) {
-        None if s.sway_at_end => words("how it sways is told at the end (dynamics.every_s is 0)"),
-        None => words("how it sways: being looked at"),
-        Some(Err(why)) => words(&format!("no frequency: {why}")),
-        Some(Ok(sway)) => {
-            let damping = match &sway.damping_ratio {
-                Some(damping) => row("damping", plus_minus(damping), String::new()),
-                None => row("damping", "–".into(), "  too uncertain".into()),
-            };
-            vec![
-                row("sways at", plus_minus(&sway.frequency_hz), " Hz".into()),
-                damping,
-                made_by(&sway, row),
-            ]
+    let width = width.saturating_sub(2) as usize;
+    let sway = match answer.map(|a| a.swaying) {
+        None if s.sway_at_end => {
+            return words(
+                "how it sways is told at the end (dynamics.every_s is 0)",
+                width,
+            );
         }
-    }
-}
-
-fn made_by(sway: &Sway, row: impl Fn(&str, String, String) -> Line<'static>) -> Line<'static> {
+        None => return words("how it sways: being looked at", width),
+        Some(Err(why)) => return words(&format!("no frequency: {why}"), width),
+        Some(Ok(sway)) => sway,
+    };
+    let damping = match &sway.damping_ratio {
+        Some(damping) => row("damping", plus_minus(damping), "", theme),
+        None => row("damping", "–".into(), "  too uncertain", theme),
+    };
     // The largest swing of a release; of wind one that is usual.
     let amplitude = match sway.amplitude_deg.is_finite() {
         true => format!(", ±{}°", value(sway.amplitude_deg)),
         false => String::new(),
     };
-    row("made by", sway.excitation.word().to_owned(), amplitude)
+    let cause = sway.excitation.word().to_owned();
+    vec![
+        row("sways at", plus_minus(&sway.frequency_hz), " Hz", theme),
+        damping,
+        row("made by", cause, &amplitude, theme),
+    ]
 }
 
-/// The newest angles that there is room for, the newest at the right.
+fn row(name: &str, value: String, more: &str, theme: Theme) -> Line<'static> {
+    Line::from(vec![
+        Span::styled(format!(" {name:<9}"), theme.faint()),
+        Span::styled(value, theme.strong()),
+        Span::raw(more.to_owned()),
+    ])
+}
+
+fn words(text: &str, width: usize) -> Vec<Line<'static>> {
+    wrap(text, width)
+        .into_iter()
+        .map(|line| Line::raw(format!(" {line}")))
+        .collect()
+}
+
+/// The newest angles that there is room for, the newest at the right; `note` says what they span.
 fn sways(
     frame: &mut Frame,
     s: &Snapshot,
     b: &BranchRow,
-    (note, area): (Rect, Rect),
+    note: Rect,
+    area: Rect,
     colour: Color,
     theme: Theme,
 ) {
@@ -143,14 +150,11 @@ fn sways(
     frame.render_widget(Line::styled(text, theme.faint()), note);
     // Tracking noise must not look like a storm.
     let (low, high) = plot::widened(low, high, 1.0);
-    let at = |(t, a): &(f64, f64)| [1.0 - (newest_s - t) / span_s, (a - low) / (high - low)];
-    plot::curve(
-        frame,
-        &seen.iter().map(at).collect::<Vec<_>>(),
-        GAP_S / span_s,
-        area,
-        colour,
-    );
+    let points: Vec<[f64; 2]> = seen
+        .iter()
+        .map(|(t, a)| [1.0 - (newest_s - t) / span_s, (a - low) / (high - low)])
+        .collect();
+    plot::curve(frame, &points, GAP_S / span_s, area, colour);
 }
 
 /// Bars, those within the answer's interval marked, and the answer on the axis below.
@@ -158,7 +162,8 @@ fn spectrum_of(
     frame: &mut Frame,
     s: &Snapshot,
     answer: Option<&BranchSway>,
-    (area, axis): (Rect, Rect),
+    area: Rect,
+    axis: Rect,
     colour: Color,
     theme: Theme,
 ) {
@@ -168,35 +173,54 @@ fn spectrum_of(
     else {
         return;
     };
-    let top_hz = axis_hz(s, spectrum.bin_hz * spectrum.amplitude_deg.len() as f64);
-    let columns = f64::from(area.width.max(1));
-    let column = |hz: f64| (hz / top_hz * columns).floor().clamp(0.0, columns - 1.0) as u16;
+    let highest_hz = spectrum.bin_hz * spectrum.amplitude_deg.len() as f64;
+    let frequencies = FrequencyAxis {
+        top_hz: axis_hz(s, highest_hz),
+        columns: area.width.max(1),
+    };
     let interval = answer
         .and_then(|a| a.swaying.ok())
         .map(|sway| sway.frequency_hz);
     let bars: Vec<f64> = (0..area.width)
-        .map(|k| {
-            plot::highest(
-                spectrum,
-                [k, k + 1].map(|k| f64::from(k) / columns * top_hz),
-            )
-        })
+        .map(|k| plot::highest(spectrum, [k, k + 1].map(|k| frequencies.hz(k))))
         .collect();
     // Drift makes the lowest frequencies the highest bars, whatever the branch does.
-    let from = column(LEAST_PERIODS / span_s.max(0.1));
+    let from = frequencies.column(LEAST_PERIODS / span_s.max(0.1));
     let most = bars
         .get(usize::from(from)..)
         .unwrap_or(&[])
         .iter()
         .copied()
         .fold(0.0, f64::max);
-    let marked = interval.map(|i| column(i.lo)..=column(i.hi));
+    let marked = interval.map(|i| frequencies.column(i.lo)..=frequencies.column(i.hi));
     plot::bars(frame, &bars, most, area, |k| match &marked {
         Some(marked) if marked.contains(&k) => theme.warning(),
         _ if k < from => theme.faint(),
         _ => colour.into(),
     });
-    axis_below(frame, interval, (top_hz, column), axis, theme);
+    axis_below(frame, interval, &frequencies, axis, theme);
+}
+
+/// Frequencies from 0 to `top_hz` over the columns of a panel.
+struct FrequencyAxis {
+    top_hz: f64,
+    /// At least 1.
+    columns: u16,
+}
+
+impl FrequencyAxis {
+    /// The lower end of a column, Hz.
+    fn hz(&self, column: u16) -> f64 {
+        f64::from(column) / f64::from(self.columns) * self.top_hz
+    }
+
+    /// The column of a frequency; what lies beyond the ends goes into the last ones.
+    fn column(&self, hz: f64) -> u16 {
+        let columns = f64::from(self.columns);
+        (hz / self.top_hz * columns)
+            .floor()
+            .clamp(0.0, columns - 1.0) as u16
+    }
 }
 
 /// `0`, the answer below its bar, and the end of the axis; where they would touch, the answer goes
@@ -204,42 +228,43 @@ fn spectrum_of(
 fn axis_below(
     frame: &mut Frame,
     interval: Option<Interval>,
-    (top_hz, column): (f64, impl Fn(f64) -> u16),
+    frequencies: &FrequencyAxis,
     area: Rect,
     theme: Theme,
 ) {
     // Frames that are few, or a limit that the user has set, end it anywhere.
-    let end = format!("{} Hz", format!("{top_hz:.1}").trim_end_matches(".0"));
+    let top_hz = format!("{:.1}", frequencies.top_hz);
+    let end = format!("{} Hz", top_hz.trim_end_matches(".0"));
     let end_from = area.width.saturating_sub(end.len() as u16);
-    let put = |frame: &mut Frame, x: u16, text: &str, style| {
-        let width = (text.chars().count() as u16).min(area.width.saturating_sub(x));
-        frame.render_widget(
-            Line::styled(text.to_owned(), style),
-            Rect {
-                x: area.x + x,
-                width,
-                ..area
-            },
-        );
-    };
-    put(frame, 0, "0", theme.faint());
+    put(frame, area, 0, "0", theme.faint());
     let mut taken_to = 0;
     if let Some(i) = interval {
-        let at = column(i.value);
+        let at = frequencies.column(i.value);
         let text = value(i.value);
         let room = text.chars().count() as u16;
         taken_to = at + 1;
-        put(frame, at, "▲", theme.warning());
+        put(frame, area, at, "▲", theme.warning());
         if at + 1 + room < end_from {
-            put(frame, at + 1, &text, theme.strong());
+            put(frame, area, at + 1, &text, theme.strong());
             taken_to += room;
         } else if at > room {
-            put(frame, at - room, &text, theme.strong());
+            put(frame, area, at - room, &text, theme.strong());
         }
     }
     if taken_to < end_from {
-        put(frame, end_from, &end, theme.faint());
+        put(frame, area, end_from, &end, theme.faint());
     }
+}
+
+/// Writes from column `x` of an area on, as far as there is room.
+fn put(frame: &mut Frame, area: Rect, x: u16, text: &str, style: Style) {
+    let width = (text.chars().count() as u16).min(area.width.saturating_sub(x));
+    let place = Rect {
+        x: area.x + x,
+        width,
+        ..area
+    };
+    frame.render_widget(Line::styled(text.to_owned(), style), place);
 }
 
 /// The least end of the axis that shows every branch's answer, and not more than `highest_hz`.
@@ -252,10 +277,10 @@ fn axis_hz(s: &Snapshot, highest_hz: f64) -> f64 {
     let most = answers
         .map(|sway| BEYOND * sway.frequency_hz.value)
         .fold(0.0, f64::max);
-    let fits = |hz: &f64| *hz >= if most > 0.0 { most } else { 2.0 };
+    let least_hz = if most > 0.0 { most } else { 2.0 };
     AXES_HZ
         .into_iter()
-        .find(fits)
+        .find(|hz| *hz >= least_hz)
         .unwrap_or(20.0)
         .min(highest_hz.max(0.1))
 }

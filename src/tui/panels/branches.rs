@@ -38,63 +38,80 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         waiting(frame, inner, text, theme);
         return;
     }
-    let lines = area.height.saturating_sub(1).max(1) as usize;
-    // Beside the title there is no room for the names of all columns.
-    let named_below = lines >= NAMED_FROM && area.width >= ALL_FROM;
-    let height = lines - usize::from(named_below);
-    let room = (area.width / (WIDEST + 2)).max(1) as usize;
-    let tables = room.min(total.div_ceil(height));
-    let shown = total.min(tables * height);
-    let chosen = state.chosen().min(total - 1);
-    let first = chosen.saturating_sub(shown / 2).min(total - shown);
-    let title = match total > shown {
-        true => format!("Branches, {}–{} of {total}", first + 1, first + shown),
-        false => format!("Branches, {total}"),
-    };
+    let tables = Tables::new(total, state.chosen().min(total - 1), area);
+    let title = tables.title();
     let inner = titled(frame, area, &title, theme);
     let [head, below] = Layout::vertical([
-        Constraint::Length(u16::from(named_below)),
+        Constraint::Length(u16::from(tables.named_below)),
         Constraint::Min(1),
     ])
     .areas(inner);
-    for (i, rows) in s.branches[first..].chunks(height).take(tables).enumerate() {
+    let all = s.branches[tables.first..].chunks(tables.height);
+    for (i, rows) in all.take(tables.beside).enumerate() {
         let x = below.x + i as u16 * (WIDEST + 2);
         let place = Rect {
             x,
             width: (below.right() - x).min(WIDEST),
             ..below
         };
-        if named_below {
-            names(
-                frame,
-                Rect {
-                    y: head.y,
-                    height: 1,
-                    ..place
-                },
-                0,
-                theme,
-            );
+        let on_title = Rect {
+            y: if tables.named_below { head.y } else { area.y },
+            height: 1,
+            ..place
+        };
+        let taken = if tables.named_below || i > 0 {
+            0
         } else {
-            let taken = if i == 0 {
-                title.chars().count() as u16 + 3
-            } else {
-                0
-            };
-            names(
-                frame,
-                Rect {
-                    y: area.y,
-                    height: 1,
-                    ..place
-                },
-                taken,
-                theme,
-            );
-        }
+            title.chars().count() as u16 + 3
+        };
+        names(frame, on_title, taken, theme);
         for ((k, row), line) in rows.iter().enumerate().zip(place.rows()) {
-            let marked = first + i * height + k == chosen;
+            let marked = tables.first + i * tables.height + k == tables.chosen;
             frame.render_widget(branch(s, row, marked, place.width, theme), line);
+        }
+    }
+}
+
+/// Which branches are shown: in tables side by side, the chosen one among them.
+struct Tables {
+    total: usize,
+    chosen: usize,
+    /// The first branch that is shown, and how many are.
+    first: usize,
+    shown: usize,
+    beside: usize,
+    /// Rows of each.
+    height: usize,
+    /// The names of the columns have a line of their own: beside the title there is no room for
+    /// all of them.
+    named_below: bool,
+}
+
+impl Tables {
+    fn new(total: usize, chosen: usize, area: Rect) -> Self {
+        let lines = area.height.saturating_sub(1).max(1) as usize;
+        let named_below = lines >= NAMED_FROM && area.width >= ALL_FROM;
+        let height = lines - usize::from(named_below);
+        let room = (area.width / (WIDEST + 2)).max(1) as usize;
+        let beside = room.min(total.div_ceil(height));
+        let shown = total.min(beside * height);
+        Self {
+            total,
+            chosen,
+            first: chosen.saturating_sub(shown / 2).min(total - shown),
+            shown,
+            beside,
+            height,
+            named_below,
+        }
+    }
+
+    fn title(&self) -> String {
+        let (first, total) = (self.first, self.total);
+        if total > self.shown {
+            format!("Branches, {}–{} of {total}", first + 1, first + self.shown)
+        } else {
+            format!("Branches, {total}")
         }
     }
 }
@@ -166,7 +183,7 @@ fn in_short(why: Unidentified) -> &'static str {
         Unidentified::NotMeasured => "not measured",
         Unidentified::TooShort => "film too short",
         Unidentified::TooLittleMotion => "too little motion",
-        Unidentified::AncestorsSway => "moves as its carrier",
+        Unidentified::AncestorsSway => "moves with its parent",
         Unidentified::AboveSampling => "too fast for the frames",
         Unidentified::NoOscillation => "no oscillation",
         Unidentified::TooUncertain => "too uncertain",

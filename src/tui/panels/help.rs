@@ -1,6 +1,7 @@
 //! The help, laid over everything else.
 
 use crate::tui::input::{DRAWING, WATCHING};
+use crate::tui::layout::SMALLEST;
 use crate::tui::state::State;
 use crate::tui::theme::Theme;
 use ratatui::Frame;
@@ -23,28 +24,22 @@ const MEANINGS: [(&str, &str); 3] = [
 
 /// All keys, from the same tables that they are read with.
 pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
-    let row = |key: &'static str, help: &'static str| {
-        Line::from(vec![
-            Span::styled(format!("{key:<10}"), theme.title()),
-            Span::raw(help),
-        ])
-    };
     let mut lines: Vec<Line> = WATCHING
         .iter()
         .filter(|b| !b.help.is_empty())
-        .map(|b| row(b.shown, b.help))
+        .map(|b| row(b.shown, b.help, theme))
         .collect();
-    lines.push(Line::styled("What is told of a branch", theme.faint()));
-    lines.extend(MEANINGS.map(|(shown, help)| row(shown, help)));
+    lines.push(Line::styled("What is shown of a branch", theme.faint()));
+    lines.extend(MEANINGS.map(|(shown, help)| row(shown, help, theme)));
     let mut drawing = vec![
         Line::styled("While an outline is drawn", theme.faint()),
-        row("click", "sets a point"),
+        row("click", "sets a point", theme),
     ];
     drawing.extend(
         DRAWING
             .iter()
             .filter(|b| !b.help.is_empty())
-            .map(|b| row(b.shown, b.help)),
+            .map(|b| row(b.shown, b.help, theme)),
     );
     // Where there is no room for both, those that mean something now.
     if lines.len() + drawing.len() + 2 <= area.height as usize {
@@ -63,8 +58,16 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
     frame.render_widget(Paragraph::new(lines).block(block), area);
 }
 
+fn row(key: &'static str, help: &'static str, theme: Theme) -> Line<'static> {
+    Line::from(vec![
+        Span::styled(format!("{key:<10}"), theme.title()),
+        Span::raw(help),
+    ])
+}
+
 /// What is said in a window in which nothing can be shown.
-pub fn too_small(frame: &mut Frame, (width, height): (u16, u16), area: Rect) {
+pub fn too_small(frame: &mut Frame, area: Rect) {
+    let (width, height) = SMALLEST;
     let text = format!("arborcam needs {width}x{height} characters; enlarge the window. q ends.");
     let lines: Vec<Line> = crate::tui::format::wrap(&text, area.width as usize)
         .into_iter()

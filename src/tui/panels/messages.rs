@@ -69,18 +69,22 @@ pub fn keys(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
             );
         }
         None => {
-            let useful = |action: Action| match action {
-                Action::Build => state.snapshot.skeleton.is_none(),
-                Action::Turn(_) | Action::Mesh => state.snapshot.skeleton.is_some(),
-                Action::Choose(_) => !state.snapshot.branches.is_empty(),
-                _ => true,
-            };
             let keys = WATCHING
                 .iter()
-                .filter(|b| useful(b.action))
+                .filter(|b| is_useful(b.action, state))
                 .map(|b| (b.shown, b.short));
             key_line(frame, keys, area, theme);
         }
+    }
+}
+
+/// Whether a key does anything now.
+fn is_useful(action: Action, state: &State) -> bool {
+    match action {
+        Action::Build => state.snapshot.skeleton.is_none(),
+        Action::Turn(_) | Action::Mesh => state.snapshot.skeleton.is_some(),
+        Action::Choose(_) => !state.snapshot.branches.is_empty(),
+        _ => true,
     }
 }
 

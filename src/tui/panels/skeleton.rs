@@ -1,14 +1,14 @@
 //! The tree in 3D, from two sides at right angles, moving.
 
 use super::{titled, waiting};
-use crate::draw::{Camera, View};
+use crate::draw::{Camera, Rgba, View};
 use crate::model::{Phase, Size, Skeleton, Snapshot};
 use crate::tui::solid::{BRAILLE, braille};
 use crate::tui::state::{State, TURN_DEGREES};
 use crate::tui::theme::Theme;
 use nalgebra::Point3;
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Direction, Layout, Rect};
+use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::Color;
 use ratatui::symbols::Marker;
 use ratatui::widgets::canvas::{Canvas, Line};
@@ -26,54 +26,47 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         turn: f64::from(d).to_radians(),
         down: 0.0,
     });
-    let Some(seen) = views
-        .iter()
-        .map(|view| Extent::of(skeleton, *view))
-        .collect::<Option<Vec<_>>>()
-    else {
+    let [Some(first), Some(second)] = views.map(|view| Extent::of(skeleton, view)) else {
         return;
     };
-    // Side by side or one above the other, as the tree comes out larger.
-    let arrange = |direction: Direction| {
-        let layout = Layout::new(direction, [Constraint::Fill(1), Constraint::Fill(1)]).spacing(
-            match direction {
-                Direction::Horizontal => 1,
-                Direction::Vertical => 0,
-            },
-        );
-        let areas: [Rect; 2] = layout.areas(area);
-        let unit = seen
-            .iter()
-            .zip(areas)
-            .map(|(extent, room)| extent.unit(room))
-            .fold(0.0, f64::max);
-        (areas, unit)
-    };
-    let (beside, above) = (arrange(Direction::Horizontal), arrange(Direction::Vertical));
-    let (areas, unit) = if above.1 < beside.1 { above } else { beside };
-    for ((area, view), (extent, degrees)) in
-        areas.into_iter().zip(views).zip(seen.iter().zip(degrees))
-    {
-        let room = titled(frame, area, &name(degrees), theme);
+    let extents = [first, second];
+    let (areas, unit) = arranged(&extents, area);
+    for (i, extent) in extents.iter().enumerate() {
+        let room = titled(frame, areas[i], &name(degrees[i]), theme);
         if unit <= 0.0 || room.is_empty() {
             continue;
         }
-        let camera = extent.camera(view, unit, room);
-        match state
-            .solid
-            .as_ref()
-            .and_then(|solid| solid.picture(s, &camera, theme))
-        {
+        let camera = extent.camera(views[i], unit, room);
+        let solid = state.solid.as_ref();
+        match solid.and_then(|solid| solid.picture(s, &camera, theme)) {
             None => lines(frame, &branches(state, skeleton, theme), &camera, room),
-            Some(picture) => {
-                for (at, cell) in room.positions().zip(braille(&picture)) {
-                    if let (Some((letter, rgb)), Some(onto)) =
-                        (cell, frame.buffer_mut().cell_mut(at))
-                    {
-                        onto.set_char(letter).set_fg(theme.colour(rgb));
-                    }
-                }
-            }
+            Some(picture) => dots_of(frame, &picture, room, theme),
+        }
+    }
+}
+
+/// Places of both views, side by side or one above the other, as the tree comes out larger; and the
+/// size of a dot, model units.
+fn arranged(extents: &[Extent; 2], area: Rect) -> ([Rect; 2], f64) {
+    let halves = [Constraint::Fill(1), Constraint::Fill(1)];
+    let beside = Layout::horizontal(halves).spacing(1).areas(area);
+    let above = Layout::vertical(halves).areas(area);
+    let [beside_unit, above_unit] = [beside, above].map(|rooms: [Rect; 2]| {
+        let units = extents.iter().zip(rooms).map(|(e, room)| e.unit(room));
+        units.fold(0.0, f64::max)
+    });
+    if above_unit < beside_unit {
+        (above, above_unit)
+    } else {
+        (beside, beside_unit)
+    }
+}
+
+/// A picture as dots of braille.
+fn dots_of(frame: &mut Frame, picture: &Rgba, room: Rect, theme: Theme) {
+    for (at, cell) in room.positions().zip(braille(picture)) {
+        if let (Some((letter, rgb)), Some(onto)) = (cell, frame.buffer_mut().cell_mut(at)) {
+            onto.set_char(letter).set_fg(theme.colour(rgb));
         }
     }
 }
@@ -89,21 +82,24 @@ fn name(degrees: u16) -> String {
     }
 }
 
-fn lines(
-    frame: &mut Frame,
-    branches: &[(Point3<f64>, Point3<f64>, Color)],
-    camera: &Camera,
-    room: Rect,
-) {
+/// A branch as a line, model axes.
+struct BranchLine {
+    from: Point3<f64>,
+    to: Point3<f64>,
+    colour: Color,
+}
+
+fn lines(frame: &mut Frame, branches: &[BranchLine], camera: &Camera, room: Rect) {
     let size = [camera.size.width, camera.size.height].map(f64::from);
     let canvas = Canvas::default()
         .marker(Marker::Braille)
         .x_bounds([0.0, size[0]])
         .y_bounds([0.0, size[1]])
         .paint(|context| {
-            for (from, to, color) in branches {
-                let ([x1, y1, _], [x2, y2, _]) = (camera.project(from), camera.project(to));
-                context.draw(&Line::new(x1, size[1] - y1, x2, size[1] - y2, *color));
+            for line in branches {
+                let [x1, y1, _] = camera.project(&line.from);
+                let [x2, y2, _] = camera.project(&line.to);
+                context.draw(&Line::new(x1, size[1] - y1, x2, size[1] - y2, line.colour));
             }
         });
     frame.render_widget(canvas, room);
@@ -111,42 +107,36 @@ fn lines(
 
 /// Branches as lines: the copies first, so that what was measured lies on top; at the very top the
 /// chosen one, in the colour of text, which is none of the branches'.
-fn branches(
-    state: &State,
-    skeleton: &Skeleton,
-    theme: Theme,
-) -> Vec<(Point3<f64>, Point3<f64>, Color)> {
+fn branches(state: &State, skeleton: &Skeleton, theme: Theme) -> Vec<BranchLine> {
     let s = &state.snapshot;
     let chosen = s.branches.get(state.chosen()).map(|b| b.node);
     let pose = s
         .pose
         .as_deref()
         .filter(|pose| pose.joints.len() == skeleton.nodes.len());
-    let at = |i: usize| match pose {
-        Some(pose) => pose.joints.get(i).map(|j| j.position),
-        None => skeleton.nodes.get(i).map(|n| n.position),
+    let places: Vec<Point3<f64>> = match pose {
+        Some(pose) => pose.joints.iter().map(|j| j.position).collect(),
+        None => skeleton.nodes.iter().map(|n| n.position).collect(),
     };
     let mut copies = Vec::new();
     let mut measured = Vec::new();
-    let mut top = None;
+    let mut top = Vec::new();
     for (i, node) in skeleton.nodes.iter().enumerate() {
-        let Some((Some(from), Some(to))) = node.parent.map(|p| (at(p.index()), at(i))) else {
+        let Some(&from) = node.parent.and_then(|p| places.get(p.index())) else {
             continue;
         };
-        if !from
-            .coords
-            .iter()
-            .chain(to.coords.iter())
-            .all(|c| c.is_finite())
-        {
+        let to = places[i];
+        let mut coordinates = from.iter().chain(to.iter());
+        if !coordinates.all(|c| c.is_finite()) {
             continue;
         }
         let branch = s.node_colour.get(i).copied().flatten();
-        match node.copy_of {
-            None if Some(node.name) == chosen => top = Some((from, to, Color::Reset)),
-            Some(_) => copies.push((from, to, theme.branch_faded(branch))),
-            None => measured.push((from, to, theme.branch(branch))),
-        }
+        let (onto, colour) = match node.copy_of {
+            None if Some(node.name) == chosen => (&mut top, Color::Reset),
+            Some(_) => (&mut copies, theme.branch_faded(branch)),
+            None => (&mut measured, theme.branch(branch)),
+        };
+        onto.push(BranchLine { from, to, colour });
     }
     copies.extend(measured.into_iter().chain(top));
     copies
@@ -181,20 +171,16 @@ impl Extent {
             .iter()
             .map(|n| n.position.coords)
             .filter(|p| p.iter().all(|c| c.is_finite()));
-        sound
-            .map(|p| [p.dot(&right), p.dot(&up)])
-            .fold(None, |all, p| {
-                let Some(Self { low, high }) = all else {
-                    return Some(Self { low: p, high: p });
-                };
-                let with = |of: [f64; 2], pick: fn(f64, f64) -> f64| {
-                    [pick(of[0], p[0]), pick(of[1], p[1])]
-                };
-                Some(Self {
-                    low: with(low, f64::min),
-                    high: with(high, f64::max),
-                })
-            })
+        let mut extent: Option<Self> = None;
+        for p in sound {
+            let p = [p.dot(&right), p.dot(&up)];
+            let all = extent.get_or_insert(Self { low: p, high: p });
+            for ((low, high), x) in all.low.iter_mut().zip(&mut all.high).zip(p) {
+                *low = low.min(x);
+                *high = high.max(x);
+            }
+        }
+        extent
     }
 
     /// Least size of a dot with which the tree fits into the panel below its title.
@@ -204,8 +190,9 @@ impl Extent {
             width: panel.width.max(1),
             ..panel
         });
-        let fit = |axis: usize, dots: u32| (self.high[axis] - self.low[axis]) / f64::from(dots);
-        let unit = Self::MARGIN * fit(0, dots.width).max(fit(1, dots.height));
+        let across = (self.high[0] - self.low[0]) / f64::from(dots.width);
+        let upwards = (self.high[1] - self.low[1]) / f64::from(dots.height);
+        let unit = Self::MARGIN * across.max(upwards);
         // A tree without extent is drawn as what it is, a dot.
         if unit.is_finite() && unit > 1e-9 {
             unit

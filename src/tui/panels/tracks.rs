@@ -80,10 +80,10 @@ fn scale_note(history: &[f64], width: u16) -> String {
 }
 
 fn sparkline(frame: &mut Frame, history: &[f64], area: Rect, theme: Theme) {
-    let thousandths = |x: &f64| x.is_finite().then(|| (x * 1000.0).clamp(0.0, 1e12) as u64);
+    // In thousandths of a pixel, as bars are whole numbers.
     let bars: Vec<Option<u64>> = newest(history, area.width)
         .iter()
-        .map(thousandths)
+        .map(|x| x.is_finite().then(|| (x * 1000.0).clamp(0.0, 1e12) as u64))
         .collect();
     let area = Rect {
         x: area.right().saturating_sub(bars.len() as u16).max(area.x),

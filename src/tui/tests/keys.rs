@@ -1,7 +1,8 @@
 //! What keys and clicks do.
 
 use super::made_up::snapshot;
-use crate::model::{Control, NodeName, Phase, Size, Snapshot};
+use crate::model::Control::{self, BuildNow, Export, Pause, Quit, Restart};
+use crate::model::{NodeName, Phase, Size, Snapshot};
 use crate::tui::input::handle;
 use crate::tui::placed::Placed;
 use crate::tui::state::State;
@@ -63,65 +64,28 @@ fn play(placed: Option<Placed>, events: &[Event]) -> Run {
 
 #[test]
 fn keys_send_what_they_say() {
-    use Control::{BuildNow, Export, Pause, Quit, Restart};
-    for (events, expected) in [
-        (vec![letter('q')], vec![Quit]),
-        (vec![ctrl('c')], vec![Quit]),
-        (
-            vec![
-                letter('q'),
-                letter('q'),
-                ctrl('c'),
-                letter('b'),
-                letter('o'),
-            ],
-            vec![Quit],
-        ),
-        (vec![letter(' ')], vec![Pause(true)]),
-        (
-            vec![letter(' '), letter(' ')],
-            vec![Pause(true), Pause(false)],
-        ),
-        (
-            vec![letter('b'), letter('r'), letter('e')],
-            vec![BuildNow, Restart, Export],
-        ),
-        (vec![letter('?'), letter('b')], vec![BuildNow]),
-        (
-            vec![
-                letter('x'),
-                key(KeyCode::Esc),
-                key(KeyCode::Enter),
-                ctrl('q'),
-                click(9, 9),
-            ],
-            vec![],
-        ),
+    for (letters, expected) in [
+        ("q", vec![Quit]),
+        ("qqbo", vec![Quit]),
+        (" ", vec![Pause(true)]),
+        ("  ", vec![Pause(true), Pause(false)]),
+        ("bre", vec![BuildNow, Restart, Export]),
+        ("?b", vec![BuildNow]),
         // While drawing, space sets a point, and a slip does nothing to the capture.
-        (
-            vec![
-                letter('o'),
-                letter(' '),
-                letter('e'),
-                letter('b'),
-                letter('r'),
-                letter('q'),
-            ],
-            vec![],
-        ),
-        (
-            vec![letter('o'), key(KeyCode::Esc), letter('e')],
-            vec![Export],
-        ),
+        ("o ebrq", vec![]),
+        ("hlmjk", vec![]),
+    ] {
+        let events: Vec<Event> = letters.chars().map(letter).collect();
+        assert_eq!(play(Some(wide()), &events).sent, expected, "{letters}");
+    }
+    let (escape, enter) = (key(KeyCode::Esc), key(KeyCode::Enter));
+    for (events, expected) in [
+        (vec![ctrl('c')], vec![Quit]),
+        (vec![letter('q'), ctrl('c')], vec![Quit]),
         (vec![letter('o'), ctrl('c')], vec![Quit]),
+        (vec![letter('o'), escape.clone(), letter('e')], vec![Export]),
         (
-            vec![
-                letter('h'),
-                letter('l'),
-                letter('m'),
-                letter('j'),
-                letter('k'),
-            ],
+            vec![letter('x'), escape, enter, ctrl('q'), click(9, 9)],
             vec![],
         ),
     ] {
@@ -230,16 +194,16 @@ fn drawing_stays_until_it_is_good_or_left() {
 
 #[test]
 fn the_keyboard_reaches_what_the_mouse_reaches() {
-    let arrow = |code| key(code);
     let mut events = vec![letter('o'), letter(' ')];
-    let far = |c: char| std::iter::repeat_n(letter(c), 9);
+    // As far as it goes.
     for (across, down) in [('H', 'K'), ('L', 'K'), ('L', 'J')] {
-        events.extend(far(across).chain(far(down)));
+        events.extend(std::iter::repeat_n(letter(across), 9));
+        events.extend(std::iter::repeat_n(letter(down), 9));
         events.push(letter(' '));
     }
     events.extend([
-        arrow(KeyCode::Left),
-        arrow(KeyCode::Up),
+        key(KeyCode::Left),
+        key(KeyCode::Up),
         letter(' '),
         key(KeyCode::Backspace),
     ]);
@@ -269,45 +233,41 @@ fn there_is_no_drawing_without_a_picture() {
     assert!(run.sent.is_empty() && run.state.drawing.is_some_and(|d| d.points_px().is_empty()));
 }
 
+/// The state after these letters.
+fn after(keys: &str) -> State {
+    play(None, &keys.chars().map(letter).collect::<Vec<_>>()).state
+}
+
 #[test]
 fn the_tree_turns_all_the_way_round_and_shows_its_wood() {
-    let turned = |keys: &str| {
-        play(None, &keys.chars().map(letter).collect::<Vec<_>>())
-            .state
-            .turned
-    };
-    assert_eq!(
-        [turned("l"), turned("h"), turned("lh"), turned("hhh")],
-        [1, 23, 0, 21]
-    );
-    assert_eq!(turned(&"l".repeat(24)), 0);
+    let whole_turn = "l".repeat(24);
+    for (keys, turned) in [
+        ("l", 1),
+        ("h", 23),
+        ("lh", 0),
+        ("hhh", 21),
+        (&whole_turn, 0),
+    ] {
+        assert_eq!(after(keys).turned, turned, "{keys}");
+    }
     let run = play(
         None,
         &[key(KeyCode::Right), key(KeyCode::Right), key(KeyCode::Left)],
     );
     assert_eq!(run.state.turned, 1);
     for (keys, shown) in [("m", true), ("mm", false), ("mqm", false)] {
-        let run = play(None, &keys.chars().map(letter).collect::<Vec<_>>());
-        assert_eq!(run.state.solid.is_some(), shown, "{keys}");
+        assert_eq!(after(keys).solid.is_some(), shown, "{keys}");
     }
 }
 
 #[test]
 fn the_chosen_branch_goes_up_and_down_and_outlives_a_refinement() {
-    let run = |keys: &str| play(None, &keys.chars().map(letter).collect::<Vec<_>>()).state;
-    let chosen = |keys: &str| run(keys).chosen();
-    assert_eq!(
-        [
-            chosen(""),
-            chosen("jj"),
-            chosen("k"),
-            chosen("jjjk"),
-            chosen(&"j".repeat(50))
-        ],
-        [0, 2, 0, 2, 9]
-    );
+    let far_down = "j".repeat(50);
+    for (keys, chosen) in [("", 0), ("jj", 2), ("k", 0), ("jjjk", 2), (&far_down, 9)] {
+        assert_eq!(after(keys).chosen(), chosen, "{keys}");
+    }
     // The tree is refined: the branch is in another row.
-    let mut state = run("jjj");
+    let mut state = after("jjj");
     let mut moved = snapshot(Phase::Live);
     moved.branches.remove(1);
     state.take(Arc::new(moved));
@@ -323,15 +283,14 @@ fn the_chosen_branch_goes_up_and_down_and_outlives_a_refinement() {
 
 #[test]
 fn choosing_a_branch_looks_at_it_and_esc_looks_away() {
-    let esc = || key(KeyCode::Esc);
     for (events, close_up) in [
         (vec![], false),
         (vec![letter('j')], true),
         (vec![key(KeyCode::Up)], true),
-        (vec![letter('j'), esc()], false),
+        (vec![letter('j'), key(KeyCode::Esc)], false),
         // The help goes first.
-        (vec![letter('j'), letter('?'), esc()], true),
-        (vec![letter('j'), letter('q'), esc()], false),
+        (vec![letter('j'), letter('?'), key(KeyCode::Esc)], true),
+        (vec![letter('j'), letter('q'), key(KeyCode::Esc)], false),
     ] {
         assert_eq!(play(None, &events).state.close_up, close_up, "{events:?}");
     }
@@ -352,10 +311,13 @@ fn a_late_snapshot_does_not_undo_a_pause() {
     assert!(!run.state.paused);
 }
 
+fn newest(state: &State) -> String {
+    state.messages().next_back().unwrap_or_default().to_owned()
+}
+
 #[test]
 fn a_notice_goes_when_the_capture_speaks_or_with_time() {
     let mut run = play(None, &[letter('e')]);
-    let newest = |state: &State| state.messages().next_back().unwrap_or_default().to_owned();
     assert!(newest(&run.state).contains("export"));
     (0..1000).for_each(|_| run.state.tick());
     assert!(newest(&run.state).contains("Gathering"));

@@ -25,40 +25,43 @@ pub fn picture(size: Size) -> Arc<Rgb> {
     })
 }
 
-/// A trunk with three forks of two branches each, and a copy of the first fork turned by a right
-/// angle.
-pub fn skeleton() -> Skeleton {
-    let node = |parent: u32, level, x: f64, y: f64, z: f64, copy_of: Option<u32>| Node {
+/// A node at a place; its name, level and radius follow from where it stands.
+fn node(parent: Option<u32>, place: [f64; 3], copy_of: Option<u32>) -> Node {
+    Node {
         name: NodeName(0),
-        parent: (level > 0).then_some(NodeId(parent)),
-        level,
-        position: Point3::new(x, y, z),
-        radius: 8.0 / (1.0 + level as f64),
+        parent: parent.map(NodeId),
+        level: 0,
+        position: Point3::from(place),
+        radius: 8.0,
         n_tracks: if copy_of.is_some() { 0 } else { 40 },
         certainty: 0.75,
         copy_of: copy_of.map(NodeId),
         plane_angle: if copy_of.is_some() { 1.57 } else { 0.0 },
-    };
+    }
+}
+
+/// A trunk with three forks of two branches each, and a copy of the first fork turned by a right
+/// angle.
+pub fn skeleton() -> Skeleton {
     let mut nodes = vec![
-        node(0, 0, 0.0, 0.0, 0.0, None),
-        node(0, 1, 5.0, 150.0, 0.0, None),
+        node(None, [0.0, 0.0, 0.0], None),
+        node(Some(0), [5.0, 150.0, 0.0], None),
     ];
     for (i, x) in [-70.0, 10.0, 80.0].into_iter().enumerate() {
         let fork = nodes.len() as u32;
-        nodes.push(node(
-            1,
-            2,
-            x,
-            220.0 + 30.0 * i as f64,
-            20.0 * i as f64,
-            None,
-        ));
-        nodes.push(node(fork, 3, x - 30.0, 300.0, 40.0, None));
-        nodes.push(node(fork, 3, x + 30.0, 310.0, -30.0, None));
+        let (up, towards) = (220.0 + 30.0 * i as f64, 20.0 * i as f64);
+        nodes.push(node(Some(1), [x, up, towards], None));
+        nodes.push(node(Some(fork), [x - 30.0, 300.0, 40.0], None));
+        nodes.push(node(Some(fork), [x + 30.0, 310.0, -30.0], None));
     }
     let copy = nodes.len() as u32;
-    nodes.push(node(1, 2, 0.0, 220.0, -70.0, Some(2)));
-    nodes.push(node(copy, 3, 40.0, 300.0, -100.0, Some(3)));
+    nodes.push(node(Some(1), [0.0, 220.0, -70.0], Some(2)));
+    nodes.push(node(Some(copy), [40.0, 300.0, -100.0], Some(3)));
+    for i in 1..nodes.len() {
+        let parent = nodes[i].parent.map_or(0, |p| p.index());
+        nodes[i].level = nodes[parent].level + 1;
+        nodes[i].radius = 8.0 / (1.0 + f64::from(nodes[i].level));
+    }
     (0..)
         .zip(&mut nodes)
         .for_each(|(i, n)| n.name = NodeName(i));
@@ -87,25 +90,14 @@ pub fn pose(skeleton: &Skeleton) -> Pose {
     }
 }
 
+/// Whether a phase has come when `now` is.
+fn reached(now: Phase, phase: Phase) -> bool {
+    let order = [now, phase].map(|p| Phase::ALL.iter().position(|q| *q == p));
+    order[0] >= order[1]
+}
+
 /// A state in this phase; what a phase has not reached yet is empty.
 pub fn snapshot(phase: Phase) -> Snapshot {
-    let reached = |p: Phase| {
-        Phase::ALL.iter().position(|q| *q == phase) >= Phase::ALL.iter().position(|q| *q == p)
-    };
-    let skeleton = skeleton();
-    let node_colour = [
-        None,
-        None,
-        Some(0),
-        Some(0),
-        Some(0),
-        Some(1),
-        Some(1),
-        Some(1),
-        Some(2),
-        Some(2),
-        Some(2),
-    ];
     let mut s = Snapshot {
         source: "/dev/video0".to_owned(),
         format: FormatNote {
@@ -130,111 +122,129 @@ pub fn snapshot(phase: Phase) -> Snapshot {
         ],
         ..Snapshot::default()
     };
-    if reached(Phase::Detect) {
+    if reached(phase, Phase::Detect) {
         s.outline_px = vec![[220, 340], [200, 60], [330, 20], [450, 80], [420, 340]];
     }
-    if reached(Phase::Accumulate) {
-        s.tracks_alive = 312;
-        s.lost_per_s = 0.4;
-        s.fb_error_px = 0.12;
-        s.error_px = Some(0.94);
-        s.candidates_px = (0..12)
-            .map(|i| [230.0 + 17.0 * i as f32, 70.0 + (i * 53 % 230) as f32])
-            .collect();
-        s.fb_history_px = (0..120)
-            .map(|i| 0.15 + 0.1 * (i as f64 * 0.3).sin())
-            .collect();
-        let branch = |i: u32| reached(Phase::Live).then_some((i % 3) as u8);
-        s.points = (0..60)
-            .map(|i| {
-                (
-                    [240.0 + 3.0 * i as f32, 60.0 + (i * 37 % 250) as f32],
-                    branch(i),
-                )
-            })
-            .collect();
+    if reached(phase, Phase::Accumulate) {
+        add_points(&mut s);
     }
-    if reached(Phase::Live) {
-        s.branches = (1..11)
-            .map(|node| BranchRow {
-                node: NodeName(node),
-                colour: node_colour[node as usize],
-                level: skeleton.nodes[node as usize].level,
-                n_tracks: 312 / node,
-                amplitude_px: 0.4 * node as f64,
-            })
-            .collect();
-        s.sway = Some(Arc::new(sway()));
-        s.angles = angles();
-        s.pose = Some(Arc::new(pose(&skeleton)));
-        s.skeleton = Some(Arc::new(skeleton));
-        s.node_colour = Arc::new(node_colour.to_vec());
-        s.progress = 1.0;
+    if reached(phase, Phase::Live) {
+        add_tree(&mut s);
     }
     s
 }
 
+/// Points that are followed and how well.
+fn add_points(s: &mut Snapshot) {
+    s.tracks_alive = 312;
+    s.lost_per_s = 0.4;
+    s.fb_error_px = 0.12;
+    s.error_px = Some(0.94);
+    s.candidates_px = (0..12)
+        .map(|i| [230.0 + 17.0 * i as f32, 70.0 + (i * 53 % 230) as f32])
+        .collect();
+    s.fb_history_px = (0..120)
+        .map(|i| 0.15 + 0.1 * (i as f64 * 0.3).sin())
+        .collect();
+    for i in 0..60 {
+        let place = [240.0 + 3.0 * i as f32, 60.0 + (i * 37 % 250) as f32];
+        s.points.push((place, None));
+    }
+}
+
+/// The tree, its pose and its sway.
+fn add_tree(s: &mut Snapshot) {
+    let skeleton = skeleton();
+    for ((_, branch), i) in s.points.iter_mut().zip(0..) {
+        *branch = Some(i % 3);
+    }
+    s.sway = Some(Arc::new(sway()));
+    s.angles = angles();
+    s.pose = Some(Arc::new(pose(&skeleton)));
+    s.show_tree(Arc::new(skeleton.clone()));
+    for (i, node) in skeleton.nodes.iter().enumerate().take(11).skip(1) {
+        s.branches.push(BranchRow {
+            node: node.name,
+            colour: s.node_colour[i],
+            level: node.level,
+            n_tracks: 312 / i as u32,
+            amplitude_px: 0.4 * i as f64,
+        });
+    }
+    s.progress = 1.0;
+}
+
 /// Ten branches, of which some have no frequency, for every reason that there is.
 pub fn sway() -> SwayNow {
-    let about = |value: f64, share: f64| Interval {
-        value,
-        lo: value * (1.0 - share),
-        hi: value * (1.0 + share),
-    };
-    let known = |node: u32| Sway {
-        frequency_hz: about(
-            0.31 + 0.11 * f64::from(node),
-            0.001 * f64::from(node * node),
-        ),
-        damping_ratio: (node != 2).then(|| about(0.02 + 0.003 * f64::from(node), 0.2)),
-        excitation: Excitation::Release,
-        amplitude_deg: 0.7 * f64::from(node),
-    };
-    let branch = |node: u32| {
-        let swaying = match node {
-            1..=3 => Ok(known(node)),
-            _ => Err(Unidentified::ALL[node as usize - 4]),
-        };
-        let at = |hz: f64| {
-            swaying.map_or(0.1, |s| {
-                0.1 + 1.0 / (1.0 + (40.0 * (hz - s.frequency_hz.value)).powi(2))
-            })
-        };
-        let amplitude_deg = (0..160)
-            .map(|k| at(f64::from(k) / 32.0) as f32 + if k < 3 { 2.0 } else { 0.0 })
-            .collect();
-        (
-            NodeName(node),
-            BranchSway {
-                swaying,
-                spectrum: Some(AngleSpectrum {
-                    bin_hz: 1.0 / 32.0,
-                    amplitude_deg,
-                }),
-            },
-        )
-    };
     SwayNow {
         frame: 1200,
         time_s: 40.0,
         span_s: 40.0,
         excitation: Some(Excitation::Release),
-        branches: (1..11).map(branch).collect(),
+        branches: (1..11)
+            .map(|node| (NodeName(node), branch_sway(node)))
+            .collect(),
+    }
+}
+
+fn branch_sway(node: u32) -> BranchSway {
+    let swaying = match node {
+        1..=3 => Ok(known_sway(node)),
+        _ => Err(Unidentified::ALL[node as usize - 4]),
+    };
+    let mut amplitude_deg = Vec::new();
+    for k in 0..160 {
+        let hz = f64::from(k) / 32.0;
+        let peak = swaying.map_or(0.0, |s| {
+            1.0 / (1.0 + (40.0 * (hz - s.frequency_hz.value)).powi(2))
+        });
+        amplitude_deg.push((0.1 + peak) as f32 + if k < 3 { 2.0 } else { 0.0 });
+    }
+    let spectrum = AngleSpectrum {
+        bin_hz: 1.0 / 32.0,
+        amplitude_deg,
+    };
+    BranchSway {
+        swaying,
+        spectrum: Some(spectrum),
+    }
+}
+
+fn known_sway(node: u32) -> Sway {
+    let n = f64::from(node);
+    Sway {
+        frequency_hz: about(0.31 + 0.11 * n, 0.001 * f64::from(node * node)),
+        damping_ratio: (node != 2).then(|| about(0.02 + 0.003 * n, 0.2)),
+        excitation: Excitation::Release,
+        amplitude_deg: 0.7 * n,
+    }
+}
+
+/// A value with an interval of this share of it either way.
+fn about(value: f64, share: f64) -> Interval {
+    Interval {
+        value,
+        lo: value * (1.0 - share),
+        hi: value * (1.0 + share),
     }
 }
 
 /// Ten branches that sway a little faster each.
 fn angles() -> Angles {
-    let row = |k: u32| {
+    let mut rows = Vec::new();
+    for k in 0..601 {
         let t = 21.1 + f64::from(k) / 30.0;
-        let at = |node: u32| {
-            10.0 * f64::from(node) + 4.0 * (f64::from(node) * 0.4 * std::f64::consts::TAU * t).sin()
-        };
-        (t, (1..11).map(|node| at(node) as f32).collect())
-    };
+        let mut angles_deg = Vec::new();
+        for node in 1..11 {
+            let hz = f64::from(node) * 0.4;
+            let sway_deg = 4.0 * (hz * std::f64::consts::TAU * t).sin();
+            angles_deg.push((10.0 * f64::from(node) + sway_deg) as f32);
+        }
+        rows.push((t, angles_deg.into()));
+    }
     Angles {
         nodes: (1..11).map(NodeName).collect(),
-        rows: (0..601).map(row).collect(),
+        rows,
     }
 }
 
@@ -282,6 +292,33 @@ pub fn huge() -> Snapshot {
             amplitude_px: 1e300,
         })
         .collect();
+    s.sway = Some(Arc::new(huge_sway()));
+    let rows = [f32::NAN, f32::INFINITY, 1e30, -1e30]
+        .into_iter()
+        .zip(0..)
+        .map(|(x, t)| (f64::from(t), [x].into()));
+    s.angles = Angles {
+        nodes: [NodeName(u32::MAX)].into(),
+        rows: rows.collect(),
+    };
+    s.pose = Some(Arc::new(Pose {
+        frame: 0,
+        time_s: 0.0,
+        joints: Vec::new(),
+    }));
+    s.show_tree(Arc::new(broken_skeleton()));
+    s
+}
+
+fn broken_skeleton() -> Skeleton {
+    let mut skeleton = skeleton();
+    skeleton.nodes[3].position.x = f64::NAN;
+    skeleton.nodes[4].position.y = 1e300;
+    skeleton.nodes[5].parent = Some(NodeId(u32::MAX));
+    skeleton
+}
+
+fn huge_sway() -> SwayNow {
     let mut sway = sway();
     let mad = Interval {
         value: 1e300,
@@ -306,24 +343,5 @@ pub fn huge() -> Snapshot {
         },
     )]
     .into();
-    s.sway = Some(Arc::new(sway));
-    let rows = [f32::NAN, f32::INFINITY, 1e30, -1e30]
-        .into_iter()
-        .zip(0..)
-        .map(|(x, t)| (f64::from(t), [x].into()));
-    s.angles = Angles {
-        nodes: [NodeName(u32::MAX)].into(),
-        rows: rows.collect(),
-    };
-    let mut skeleton = skeleton();
-    skeleton.nodes[3].position.x = f64::NAN;
-    skeleton.nodes[4].position.y = 1e300;
-    skeleton.nodes[5].parent = Some(NodeId(u32::MAX));
-    s.pose = Some(Arc::new(Pose {
-        frame: 0,
-        time_s: 0.0,
-        joints: Vec::new(),
-    }));
-    s.skeleton = Some(Arc::new(skeleton));
-    s
+    sway
 }

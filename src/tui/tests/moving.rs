@@ -1,8 +1,8 @@
 //! The screen of a tree that is made to move, and its keys.
 
 use super::made_up;
-use crate::model::{Pose, Skeleton};
-use crate::tui::moving::{Moving, Stage, Whim};
+use crate::model::{Phase, Pose, Skeleton};
+use crate::tui::moving::{AnimationCommand, Moving, Stage};
 use crate::tui::theme::{Depth, Theme};
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 struct Puppet {
     skeleton: Arc<Skeleton>,
-    whims: Vec<Whim>,
+    commands: Vec<AnimationCommand>,
     lived_s: f64,
 }
 
@@ -25,11 +25,11 @@ impl Moving for Puppet {
         made_up::pose(&self.skeleton)
     }
 
-    fn change(&mut self, whim: Whim) {
-        self.whims.push(whim);
+    fn change(&mut self, command: AnimationCommand) {
+        self.commands.push(command);
     }
 
-    fn told(&self) -> String {
+    fn description(&self) -> String {
         "wind 4 of 12 (fresh breeze)  to 0°  magnified 1.00".to_owned()
     }
 }
@@ -37,9 +37,13 @@ impl Moving for Puppet {
 fn puppet() -> Puppet {
     Puppet {
         skeleton: Arc::new(made_up::skeleton()),
-        whims: Vec::new(),
+        commands: Vec::new(),
         lived_s: 0.0,
     }
+}
+
+fn press(stage: &mut Stage, puppet: &mut Puppet, key: KeyCode, with: KeyModifiers) -> bool {
+    stage.press(&Event::Key(KeyEvent::new(key, with)), puppet)
 }
 
 #[test]
@@ -50,7 +54,7 @@ fn the_tree_and_what_moves_it_are_seen() {
     for (width, height) in [(80, 24), (120, 40), (1, 1), (20, 3)] {
         let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
         terminal
-            .draw(|frame| stage.render(frame, &puppet.told(), Theme::new(Depth::None)))
+            .draw(|frame| stage.render(frame, &puppet.description(), Theme::new(Depth::None)))
             .unwrap();
         if width >= 80 {
             insta::assert_snapshot!(format!("moving_{width}x{height}"), terminal.backend());
@@ -59,12 +63,21 @@ fn the_tree_and_what_moves_it_are_seen() {
 }
 
 #[test]
+fn main_branches_have_the_colours_that_they_have_in_a_capture() {
+    let mut puppet = puppet();
+    let mut stage = Stage::new(&puppet);
+    stage.go_on(&mut puppet, 0.1);
+    let mut capture = made_up::snapshot(Phase::Live);
+    assert!(capture.node_colour.iter().flatten().max() == Some(&2));
+    assert_eq!(stage.state.snapshot.node_colour, capture.node_colour);
+    capture.show_tree(puppet.skeleton);
+    assert_eq!(stage.state.snapshot.node_colour, capture.node_colour);
+}
+
+#[test]
 fn keys_change_the_wind_and_pause_holds_the_tree() {
     let mut puppet = puppet();
     let mut stage = Stage::new(&puppet);
-    let press = |stage: &mut Stage, puppet: &mut Puppet, key: KeyCode, with: KeyModifiers| {
-        stage.press(&Event::Key(KeyEvent::new(key, with)), puppet)
-    };
     let plain = KeyModifiers::NONE;
     for key in [
         KeyCode::Up,
@@ -76,12 +89,12 @@ fn keys_change_the_wind_and_pause_holds_the_tree() {
         assert!(press(&mut stage, &mut puppet, key, plain));
     }
     assert_eq!(
-        puppet.whims,
+        puppet.commands,
         [
-            Whim::Stronger(1),
-            Whim::Veer(-15),
-            Whim::Larger(-1),
-            Whim::Pull
+            AnimationCommand::Stronger(1),
+            AnimationCommand::Veer(-15),
+            AnimationCommand::Larger(-1),
+            AnimationCommand::Pull
         ]
     );
     stage.go_on(&mut puppet, 0.5);

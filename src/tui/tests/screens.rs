@@ -72,32 +72,7 @@ fn cases() -> Vec<(&'static str, State)> {
     polygon.set_cursor([320.0, 180.0]);
     drawing.say("That is outside the picture.");
     cases.push(("drawing", drawing));
-    let camera = CameraState {
-        away: Some("no frame for 3 s".to_owned()),
-        lost_by_sequence: Some(3),
-        lost_by_time: 2,
-        damaged: 4,
-        ..CameraState::default()
-    };
-    cases.push((
-        "away",
-        state(Snapshot {
-            camera,
-            ..snapshot(Phase::Live)
-        }),
-    ));
-    let slow = CameraState {
-        rate_off: true,
-        ..CameraState::default()
-    };
-    cases.push((
-        "slow",
-        state(Snapshot {
-            camera: slow,
-            sensor_rate_hz: 15.0,
-            ..snapshot(Phase::Live)
-        }),
-    ));
+    cases.extend(camera_cases());
     let mut quitting = state(Snapshot {
         paused: true,
         ..snapshot(Phase::Live)
@@ -106,6 +81,31 @@ fn cases() -> Vec<(&'static str, State)> {
     quitting.say("Ending; writing the capture…");
     cases.push(("quitting", quitting));
     cases
+}
+
+/// A camera that has gone, and one that is too slow.
+fn camera_cases() -> [(&'static str, State); 2] {
+    let away = CameraState {
+        away: Some("no frame for 3 s".to_owned()),
+        lost_by_sequence: Some(3),
+        lost_by_time: 2,
+        damaged: 4,
+        ..CameraState::default()
+    };
+    let away = Snapshot {
+        camera: away,
+        ..snapshot(Phase::Live)
+    };
+    let slow = CameraState {
+        rate_off: true,
+        ..CameraState::default()
+    };
+    let slow = Snapshot {
+        camera: slow,
+        sensor_rate_hz: 15.0,
+        ..snapshot(Phase::Live)
+    };
+    [("away", state(away)), ("slow", state(slow))]
 }
 
 #[test]
@@ -123,8 +123,8 @@ fn looks_as_reviewed() {
     }
 }
 
-#[test]
-fn no_state_and_no_size_brings_it_down() {
+/// Pictures and trees that are empty, torn or without extent.
+fn broken() -> [Snapshot; 7] {
     let torn = Rgb {
         size: Size::new(640, 360),
         pixels: vec![1, 2, 3],
@@ -142,8 +142,7 @@ fn no_state_and_no_size_brings_it_down() {
     flat.nodes
         .iter_mut()
         .for_each(|n| n.position = nalgebra::Point3::origin());
-    let mut all: Vec<State> = cases().into_iter().map(|(_, state)| state).collect();
-    for change in [
+    [
         Snapshot {
             preview: Some(Arc::new(torn)),
             ..snapshot(Phase::Live)
@@ -174,7 +173,13 @@ fn no_state_and_no_size_brings_it_down() {
             progress: f64::NEG_INFINITY,
             ..huge()
         },
-    ] {
+    ]
+}
+
+#[test]
+fn no_state_and_no_size_brings_it_down() {
+    let mut all: Vec<State> = cases().into_iter().map(|(_, state)| state).collect();
+    for change in broken() {
         let mut mesh = state(change.clone());
         mesh.switch_mesh();
         all.extend([state(change), mesh]);
@@ -254,33 +259,34 @@ fn an_unknown_sway_is_told_by_its_reason() {
     }
 }
 
+/// The screen where spectra end at `last_hz` and so many rows of angles are left.
+fn screen_with_scales(last_hz: f64, rows: usize) -> String {
+    let mut s = snapshot(Phase::Live);
+    let mut sway = super::made_up::sway();
+    for branch in sway.branches.values_mut() {
+        if let Some(spectrum) = &mut branch.spectrum {
+            spectrum.bin_hz = last_hz / spectrum.amplitude_deg.len() as f64;
+        }
+    }
+    s.sway = Some(Arc::new(sway));
+    let gone = s.angles.rows.len() - rows;
+    s.angles.rows = s.angles.rows.iter().skip(gone).cloned().collect();
+    let mut state = state(s);
+    // One without an answer, which may stand in the way of the axis' end.
+    state.choose(6);
+    drawn(&state, Depth::None, 200, 60).to_string()
+}
+
 /// Scales say what is drawn: of few frames a second the axis ends below 1 Hz, and a young branch
 /// has few seconds.
 #[test]
 fn the_plots_of_a_branch_have_true_scales() {
-    let text_of = |last_hz: f64, rows: usize| {
-        let mut s = snapshot(Phase::Live);
-        let mut sway = super::made_up::sway();
-        for branch in sway.branches.values_mut() {
-            branch
-                .spectrum
-                .iter_mut()
-                .for_each(|s| s.bin_hz = last_hz / s.amplitude_deg.len() as f64);
-        }
-        s.sway = Some(Arc::new(sway));
-        let gone = s.angles.rows.len() - rows;
-        s.angles.rows = s.angles.rows.iter().skip(gone).cloned().collect();
-        let mut state = state(s);
-        // One without an answer, which may stand in the way of the axis' end.
-        state.choose(6);
-        drawn(&state, Depth::None, 200, 60).to_string()
-    };
     for (last_hz, rows, end, seconds) in [
         (0.4, 151, "0.4 Hz", ", last 5 s "),
         (0.96, 601, " 1 Hz", ", last 20 s "),
         (0.75, 31, " 0.8 Hz", ", last 1 s "),
     ] {
-        let text = text_of(last_hz, rows);
+        let text = screen_with_scales(last_hz, rows);
         assert!(
             text.contains(end) && text.contains(seconds),
             "{end}{seconds}: {text}"
@@ -295,17 +301,16 @@ fn branches_are_coloured_alike_in_picture_table_and_tree() {
     let theme = Theme::new(Depth::True);
     for branch in 0..3 {
         let colour = theme.branch(Some(branch));
-        let used = |pick: fn(&str) -> bool| {
-            screen
-                .buffer()
-                .content
-                .iter()
-                .any(|c| pick(c.symbol()) && (c.fg == colour || c.bg == colour))
-        };
-        assert!(used(|s| s == "▀"), "picture, branch {branch}");
-        assert!(used(|s| s == "●"), "table, branch {branch}");
+        let cells = screen.buffer().content.iter();
+        let symbols: Vec<&str> = cells
+            .filter(|c| c.fg == colour || c.bg == colour)
+            .map(|c| c.symbol())
+            .collect();
+        assert!(symbols.contains(&"▀"), "picture, branch {branch}");
+        assert!(symbols.contains(&"●"), "table, branch {branch}");
+        let braille = "\u{2801}"..="\u{28ff}";
         assert!(
-            used(|s| ("\u{2801}"..="\u{28ff}").contains(&s)),
+            symbols.iter().any(|s| braille.contains(s)),
             "tree, branch {branch}"
         );
     }
