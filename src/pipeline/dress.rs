@@ -88,14 +88,20 @@ pub(super) fn room<'a>(
     move |from: &Point3<f64>, to: &Point3<f64>| match (&envelope, outline) {
         (Some(envelope), Some(outline)) => {
             let middle = nalgebra::center(from, to);
-            let seen = |p: &Point3<f64>| outline.contains(foot_px[0] + p.x, foot_px[1] - p.y);
             // A branch that is outside itself, as a copy may be, is no barer for it.
             envelope.contains(to)
                 && envelope.contains(&middle)
-                && (!seen(from) || (seen(to) && seen(&middle)))
+                && (!is_seen_in(outline, foot_px, from)
+                    || (is_seen_in(outline, foot_px, to) && is_seen_in(outline, foot_px, &middle)))
         }
         _ => true,
     }
+}
+
+/// Whether a place, model axes, px, is seen from the front in the outline of a tree whose foot is
+/// at `foot_px` in the picture.
+fn is_seen_in(outline: &Outline, foot_px: [f64; 2], p: &Point3<f64>) -> bool {
+    outline.contains(foot_px[0] + p.x, foot_px[1] - p.y)
 }
 
 /// Where the measured nodes are, model axes, px.

@@ -120,12 +120,11 @@ fn whole(shape: &Outline) -> Luma {
 
 /// Black outside of the outline.
 fn inside(mut drawn: Luma, outline: &Outline) -> Luma {
-    drawn
-        .pixels
-        .iter_mut()
-        .zip(&outline.mask)
-        .filter(|(_, m)| **m == 0)
-        .for_each(|(p, _)| *p = 0);
+    for (pixel, mask) in drawn.pixels.iter_mut().zip(&outline.mask) {
+        if *mask == 0 {
+            *pixel = 0;
+        }
+    }
     drawn
 }
 
@@ -136,6 +135,12 @@ fn in_leaf(skeleton: &Skeleton, picture: Option<&Rgb>, outline: Option<&Outline>
         .zip(outline)
         .and_then(|(p, o)| shape::season(p, o, skeleton));
     season.is_some_and(|s| s.in_leaf >= 0.5)
+}
+
+/// Luma of a colour (BT.601).
+fn grey([red, green, blue]: [u8; 3]) -> u8 {
+    let sum = 299 * u32::from(red) + 587 * u32::from(green) + 114 * u32::from(blue);
+    ((sum + 500) / 1000) as u8
 }
 
 /// Harris corners of a whole frame inside the outline, px, strongest first.
@@ -150,12 +155,13 @@ pub fn seeds(picture: &Rgb, outline: &Outline, count: u32) -> Vec<[f32; 2]> {
         quality: SEED_QUALITY,
         border_px: 0.0,
     };
-    let grey = |c: &[u8]| {
-        ((299 * u32::from(c[0]) + 587 * u32::from(c[1]) + 114 * u32::from(c[2]) + 500) / 1000) as u8
-    };
     let luma = Luma {
         size: picture.size,
-        pixels: picture.pixels.chunks_exact(3).map(grey).collect(),
+        pixels: picture
+            .pixels
+            .chunks_exact(3)
+            .map(|c| grey([c[0], c[1], c[2]]))
+            .collect(),
     };
     Detector::new(&detect, outline).detect(&luma, &[], count as usize)
 }
