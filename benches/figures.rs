@@ -304,7 +304,6 @@ fn model_file() -> String {
             all_levels: false,
             metres_per_px: 0.0,
             tolerance_px: KEY_TOLERANCE_PX,
-            thorough: &|| true,
             node_extras: &[],
             provenance: &provenance,
         };

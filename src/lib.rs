@@ -24,20 +24,23 @@
 //! [`shape`] in space · [`motion`] the pose of every frame · [`dynamics`] what the motion says ·
 //! [`animate`] motion that nobody filmed · [`signal`] small common mathematics · [`caught`] other
 //! people's panics · [`draw`] pictures of it · [`pipeline`] all of it · [`runtime`] on threads ·
-//! [`recording`] kept on disk · [`export`] files for others · [`capture`] those files read back ·
+//! [`recording`] kept on disk · [`document`] a tree as a folder, written and read · [`files`] that
+//! appear when they are complete · [`export`] bytes for others · [`views`] what is made of a document ·
 //! [`report`] what the sway of one or several of them says · [`tui`] the screen · [`doctor`]
 //! whether this machine can · [`cli`] the commands · [`config`] what can be set.
 
 pub mod animate;
 pub mod cancel;
-pub mod capture;
 pub mod caught;
 pub mod cli;
 pub mod config;
 pub mod doctor;
+pub mod document;
 pub mod draw;
 pub mod dynamics;
 pub mod export;
+mod ffmpeg;
+pub mod files;
 pub mod hierarchy;
 pub mod model;
 pub mod motion;
@@ -52,3 +55,4 @@ pub mod skeleton;
 pub mod source;
 pub mod track;
 pub mod tui;
+pub mod views;

@@ -18,8 +18,8 @@ mod scale;
 mod service;
 mod session;
 mod shape;
-mod shaping;
 mod stop;
+mod tree;
 
 use crate::config::{Config, ConfigError};
 use crate::outline::OutlineSpec;

@@ -5,7 +5,7 @@ use super::recording::{self, RecordOption};
 use super::service::Service;
 use super::{Common, Ended, say};
 use crate::config::Config;
-use crate::export::OutputFolder;
+use crate::files::OutputFolder;
 use crate::model::{Control, Snapshot};
 use crate::outline::{self, OutlineSpec};
 use crate::runtime::{self, Failure, Job, Pace, Running, Summary};

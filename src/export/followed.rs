@@ -1,10 +1,17 @@
 //! One branch of an animation: where a viewer is to show it, and by how much it may be off.
 
 use super::planned_keys::{Between, plan};
-use super::sparse_keys::{Key, unit};
 use super::thin_keys::{Arc, share};
 use crate::model::Node;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
+
+/// A key of one joint: its frame, and the turn, not quite of length 1.
+pub(super) type Key = (usize, Vector4<f64>);
+
+/// The turn of a key.
+pub(super) fn unit(q: &Vector4<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::try_new(Quaternion::from(*q), 1e-9).unwrap_or_default()
+}
 
 /// One branch on its way through all frames, in the axes of its parent branch as a viewer shows
 /// that.
@@ -32,15 +39,19 @@ impl Followed {
         node: &Node,
         way: Vector3<f64>,
     ) -> Self {
-        let back: Vec<UnitQuaternion<f64>> =
-            base.rotation.iter().map(UnitQuaternion::inverse).collect();
-        let every = || wanted.iter().zip(&back).zip(&base.error_px);
+        let n = wanted.len();
+        let (mut targets, mut depth) = (Vec::with_capacity(n), Vec::with_capacity(n));
+        let mut own = Vec::with_capacity(n);
+        for (k, rotation) in wanted.iter().enumerate() {
+            let back = base.rotation[k].inverse();
+            targets.push(back * (rotation * way - base.error_px[k]));
+            depth.push(back * Vector3::z());
+            own.push(back * rotation);
+        }
         Self {
-            targets: every()
-                .map(|((q, back), off)| back * (q * way - off))
-                .collect(),
-            depth: back.iter().map(|back| back * Vector3::z()).collect(),
-            wanted: every().map(|((q, back), _)| back * q).collect(),
+            targets,
+            depth,
+            wanted: own,
             way,
             radius_px: node.radius,
             limit_px: 0.0,
@@ -78,7 +89,6 @@ impl Followed {
     /// there.
     pub fn aim(&self, k: usize) -> UnitQuaternion<f64> {
         let is = self.wanted[k] * self.way;
-        let measure = |v: Vector3<f64>| self.measure(k, v);
         let Some(first) = is
             .cross(&Vector3::x())
             .try_normalize(1e-9)
@@ -87,11 +97,9 @@ impl Followed {
             return self.wanted[k];
         };
         let second = is.cross(&first).normalize();
-        let (a, b, off) = (
-            measure(first),
-            measure(second),
-            measure(self.targets[k] - is),
-        );
+        let a = self.measure(k, first);
+        let b = self.measure(k, second);
+        let off = self.measure(k, self.targets[k] - is);
         // Neither is 0, and they are not parallel: the measure halves one direction at most.
         let (aa, ab, bb) = (a.dot(&a), a.dot(&b), b.dot(&b));
         let (x, y) = (a.dot(&off), b.dot(&off));
@@ -167,17 +175,17 @@ impl Followed {
     }
 
     pub fn shown(&self, base: &Shown, turns: &[UnitQuaternion<f64>]) -> Shown {
-        let off = |(k, turn): (usize, &UnitQuaternion<f64>)| {
-            base.rotation[k] * (turn * self.way - self.targets[k])
+        let mut shown = Shown {
+            rotation: Vec::with_capacity(turns.len()),
+            error_px: Vec::with_capacity(turns.len()),
         };
-        Shown {
-            rotation: turns
-                .iter()
-                .zip(&base.rotation)
-                .map(|(turn, base)| base * turn)
-                .collect(),
-            error_px: turns.iter().enumerate().map(off).collect(),
+        for (k, turn) in turns.iter().enumerate() {
+            let base = &base.rotation[k];
+            shown.rotation.push(base * turn);
+            let off = turn * self.way - self.targets[k];
+            shown.error_px.push(base * off);
         }
+        shown
     }
 }
 

@@ -13,6 +13,7 @@ mod skeleton;
 mod snapshot;
 mod sway;
 mod sway_now;
+mod timing;
 mod track;
 
 pub use control::Control;
@@ -20,8 +21,9 @@ pub use frame::{Frame, Luma, Picture, PixelFormat, RawFrame, Rgb, Size, nanoseco
 pub use hierarchy::{Cluster, ClusterId, MotionHierarchy};
 pub use outline::Outline;
 pub use pose::{JointPose, Pose};
-pub use skeleton::{FARTHEST_PX, Node, NodeId, NodeName, Skeleton};
+pub use skeleton::{FARTHEST_PX, Node, NodeId, NodeKind, NodeName, Skeleton};
 pub use snapshot::{BranchRow, CameraState, FormatNote, Phase, Snapshot};
 pub use sway::{Excitation, Interval, Sway, Swaying, Unidentified};
 pub use sway_now::{AngleSpectrum, Angles, BranchSway, SwayNow};
+pub use timing::{Gap, GapCause, MAX_GAPS, Timing};
 pub use track::{LONGEST_TRIAL_S, Observation, TrackId, TrackSet};

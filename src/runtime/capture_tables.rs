@@ -5,9 +5,9 @@ use super::held_sets::HeldSets;
 use super::meter::Histogram;
 use super::shared::Failure;
 use crate::config::Config;
+use crate::document::{MotionCsv, TracksCsv};
 use crate::dynamics::{Film, FilmLog};
-use crate::export::OutputFolder;
-use crate::export::csv::{MotionCsv, TracksCsv};
+use crate::files::OutputFolder;
 use crate::model::{NodeId, NodeName, Pose, TrackId, TrackSet};
 use crate::pipeline::{Retrace, Tree};
 use crate::recording::{Sets, SpoolReader};
@@ -16,6 +16,10 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 use std::sync::Arc;
+
+/// So much more of the film is kept than its animation shows, s: which poses are in that is decided
+/// by the times as they are written.
+const SLACK_S: f64 = 1.0;
 
 /// Both tables as far as they are written. What is in them does not depend on when and in how many
 /// pieces that is done.
@@ -31,9 +35,9 @@ pub struct CaptureTables {
     held: HeldSets,
     /// Whether the tracks from before the tree was built have their rows.
     early: bool,
-    /// Poses of the last [`animation_s`](Self::animation_s), for the animation.
+    /// Poses of the last [`kept_s`](Self::kept_s), for the animation.
     poses: VecDeque<Pose>,
-    animation_s: f64,
+    kept_s: f64,
     /// The frame of the capture's picture, and the tree's pose in it.
     pictured: Option<u64>,
     pose_in_picture: Option<Pose>,
@@ -84,7 +88,7 @@ impl CaptureTables {
             held: HeldSets::default(),
             early: false,
             poses: VecDeque::new(),
-            animation_s: config.export.animation_s,
+            kept_s: config.export.animation_s + SLACK_S,
             pictured,
             pose_in_picture: None,
             misses: Histogram::default(),
@@ -182,7 +186,7 @@ impl CaptureTables {
         if self.pictured == Some(pose.frame) {
             self.pose_in_picture = Some(pose.clone());
         }
-        let oldest_s = pose.time_s - self.animation_s;
+        let oldest_s = pose.time_s - self.kept_s;
         self.poses.push_back(pose);
         while self.poses.front().is_some_and(|p| p.time_s < oldest_s) {
             self.poses.pop_front();

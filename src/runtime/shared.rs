@@ -3,11 +3,11 @@
 use super::latest::Latest;
 use super::pulse::Pulse;
 use crate::config::Config;
-use crate::export::ExportError;
-use crate::export::capture::{Gap, Timing};
-use crate::model::{CameraState, Snapshot};
+use crate::files::WriteError;
+use crate::model::{CameraState, Gap, Snapshot, Timing};
 use crate::recording::RecordingError;
 use crate::source::{DecodeError, SourceError};
+use crate::views::PrepareError;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -28,7 +28,9 @@ pub enum Failure {
     #[error(transparent)]
     Source(SourceError),
     #[error(transparent)]
-    Export(#[from] ExportError),
+    Write(#[from] WriteError),
+    #[error(transparent)]
+    Document(#[from] PrepareError),
     #[error("cannot keep the tracks: {0}; free some space, or choose another disk with --out")]
     Spool(std::io::Error),
     /// The recording could not be begun; one that breaks off later is a warning.

@@ -38,6 +38,7 @@ pub fn skeleton() -> Skeleton {
         certainty: 0.75,
         copy_of: copy_of.map(NodeId),
         plane_angle: if copy_of.is_some() { 1.57 } else { 0.0 },
+        kind: Default::default(),
     };
     let mut nodes = vec![
         node(0, 0, 0.0, 0.0, 0.0, None),
