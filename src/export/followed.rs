@@ -1,6 +1,5 @@
 //! One branch of an animation: where a viewer is to show it, and by how much it may be off.
 
-use super::planned_keys::{Between, plan};
 use super::thin_keys::{Arc, share};
 use crate::model::Node;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
@@ -109,64 +108,6 @@ impl Followed {
         mend.filter(|q| q.angle() <= 0.5 * self.limit_angle)
             .unwrap_or_default()
             * self.wanted[k]
-    }
-
-    /// The fewest keys beside the path of `aims`, by a rule of thumb: arcs between keys are taken
-    /// for straight, and turns about the branch's own axis for none.
-    pub fn planned(&self, aims: &[Vector4<f64>], times: &[f64]) -> Vec<Key> {
-        let aim = |k: usize| UnitQuaternion::new_unchecked(Quaternion::from(aims[k]));
-        let sides: Vec<[Vector3<f64>; 2]> =
-            (0..aims.len()).map(|k| self.sides(&aim(k), k)).collect();
-        let limit = |k: usize| (1.0 - self.miss(k, &aim(k)).powi(2)).max(0.0).sqrt() as f32;
-        let limits: Vec<f32> = (0..aims.len()).map(limit).collect();
-        let ends: Vec<Vector3<f64>> = (0..aims.len()).map(|k| aim(k) * self.way).collect();
-        let weights: Vec<[Vector3<f64>; 2]> = (0..aims.len())
-            .map(|k| {
-                sides[k].map(|side| self.measure(k, self.measure(k, side)) / self.limit_px.powi(2))
-            })
-            .collect();
-        let between = |a: usize, b: usize, k: usize| {
-            let share = share(times, a, b, k);
-            let off = ends[a] + (ends[b] - ends[a]) * share - ends[k];
-            let off = [0, 1].map(|c| off.dot(&weights[k][c]) as f32);
-            Between {
-                share: share as f32,
-                off,
-                limit: limits[k],
-            }
-        };
-        let key = |(k, off): (usize, [f32; 2])| {
-            let is = aim(k) * self.way;
-            let turn = UnitQuaternion::rotation_between(
-                &is,
-                &(is + sides[k][0] * f64::from(off[0]) + sides[k][1] * f64::from(off[1])),
-            );
-            let turn = (turn.unwrap_or_default() * aim(k)).coords;
-            (
-                k,
-                if turn.dot(&aims[k]) < 0.0 {
-                    -turn
-                } else {
-                    turn
-                },
-            )
-        };
-        plan(&limits, between).into_iter().map(key).collect()
-    }
-
-    /// Two ways off the branch's end, at right angles by the measure of [`miss`](Self::miss), on
-    /// which it grows by 1.
-    fn sides(&self, aim: &UnitQuaternion<f64>, k: usize) -> [Vector3<f64>; 2] {
-        let is = aim * self.way;
-        // The same axis for all frames, so that the ways turn as little as the branch does.
-        let across = Vector3::ith_axis(self.way.iamin());
-        let first = is.cross(&across);
-        let second = is.cross(&first);
-        let unit = |v: Vector3<f64>| v * (self.limit_px / self.measure(k, v).norm().max(1e-9));
-        let first = unit(first);
-        let along = self.measure(k, second).dot(&self.measure(k, first))
-            / self.measure(k, first).norm_squared().max(1e-9);
-        [first, unit(second - first * along)]
     }
 
     /// What `v` counts as: half as much in depth.

@@ -117,29 +117,7 @@ impl Path<'_> {
         let first = self.aim(0);
         let still = (0..n).all(|k| self.branch.miss(k, &first) <= 1.0);
         let kept = thin(n, still, |a, b| self.spans(a, b));
-        let keys: Vec<Key> = kept.into_iter().map(|k| (k, self.aims[k])).collect();
-        if std::env::var("ARBOR_KEYS").is_ok() {
-            let mut planned = self.branch.planned(self.aims, self.times_s);
-            if (self.aims[0] - self.aims[n - 1]).norm() < 1e-7 {
-                if let [first, .., last] = planned.as_mut_slice() {
-                    (first.1, last.1) = (self.aims[first.0], self.aims[last.0]);
-                }
-            }
-            let fits = |from: &Key, to: &Key| {
-                let arc = Arc::new(&unit(&from.1), &unit(&to.1));
-                (from.0..=to.0).all(|k| {
-                    self.branch
-                        .miss(k, &arc.at(share(self.times_s, from.0, to.0, k)))
-                        <= 1.0
-                })
-            };
-            let bad = planned.windows(2).filter(|w| !fits(&w[0], &w[1])).count();
-            eprintln!("KEYS {} {} {bad}", keys.len(), planned.len());
-            if planned.len() < keys.len() && bad == 0 {
-                return planned;
-            }
-        }
-        keys
+        kept.into_iter().map(|k| (k, self.aims[k])).collect()
     }
 
     fn aim(&self, k: usize) -> UnitQuaternion<f64> {

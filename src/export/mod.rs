@@ -14,7 +14,6 @@ pub mod html;
 mod html_data;
 mod joints;
 pub mod picture;
-mod planned_keys;
 mod skinning;
 pub mod still;
 pub mod sway;
