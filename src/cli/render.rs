@@ -8,7 +8,7 @@ use super::Ended;
 use super::export;
 use super::stop::Stop;
 use super::tree::{Tail, warn};
-use crate::files::{WriteError, refuse_taken};
+use crate::files::{OutputFile, WriteError, refuse_taken};
 use crate::views::{PrepareError, PreparedTree, Shot, Studio, VIDEO_S};
 use anyhow::anyhow;
 use std::path::Path;
@@ -46,11 +46,20 @@ pub fn draw(
     stop: &Stop,
 ) -> Result<(), Ended> {
     let studio = Studio::new(tree, shot)?;
-    let drawn = match kind {
-        Kind::Picture => studio.picture(out, stop.while_writing()),
-        Kind::Video => studio.video(out, stop.while_writing()),
-    };
-    drawn.map_err(failed)
+    match kind {
+        Kind::Picture => {
+            let png = studio.picture()?;
+            write_picture(out, &png, stop).map_err(unwritten)
+        }
+        Kind::Video => studio.video(out, stop.while_writing()).map_err(failed),
+    }
+}
+
+fn write_picture(out: &Path, png: &[u8], stop: &Stop) -> Result<(), WriteError> {
+    let stop = stop.while_writing();
+    let file = OutputFile::create(out)?;
+    file.write(png, stop)?;
+    file.publish()
 }
 
 /// How much of the end of the film is to be read: hours of poses would fill the memory.

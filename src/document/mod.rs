@@ -203,36 +203,25 @@ impl Document {
 
     /// Takes the end of a film as reading it back would give it: of `poses`, in the order of time,
     /// those of the last `animation_s` seconds. There should be a second more, as times are
-    /// rounded.
-    ///
-    /// # Errors
-    /// A pose is at no place that can be written.
+    /// rounded. A pose at no place that a table can hold is left out.
     pub fn take_poses(
         &mut self,
         poses: Vec<Pose>,
         pose_in_picture: Option<&Pose>,
         animation_s: f64,
-    ) -> Result<(), DocumentError> {
+    ) {
         let estimator = self.estimator();
         self.poses = Vec::with_capacity(poses.len());
         // One by one: those of a minute take tens of megabytes.
         for pose in poses {
-            self.poses.extend(self.pose_as_read(&pose, &estimator)?);
+            let read = motion::as_read(&pose, &self.skeleton, self.metres_per_px(), &estimator);
+            self.poses.extend(read);
         }
         let oldest_s = self.poses.last().map_or(0.0, |p| p.time_s) - animation_s;
         self.poses.retain(|p| p.time_s >= oldest_s);
-        if let Some(pose) = pose_in_picture {
-            self.pose_in_picture = self.pose_as_read(pose, &estimator)?;
-        }
-        Ok(())
-    }
-
-    fn pose_as_read(
-        &self,
-        pose: &Pose,
-        estimator: &PoseEstimator,
-    ) -> Result<Option<Pose>, DocumentError> {
-        motion::as_read(pose, &self.skeleton, self.metres_per_px(), estimator)
+        self.pose_in_picture = pose_in_picture.and_then(|pose| {
+            motion::as_read(pose, &self.skeleton, self.metres_per_px(), &estimator)
+        });
     }
 
     /// Takes the answers of an analysis, by node index, as reading them back would give them. Nodes

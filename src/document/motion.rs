@@ -227,20 +227,17 @@ pub(super) fn read_end<R: Read>(
 }
 
 /// A pose of `skeleton` as reading it from a file gives it: rounded, its rotations recovered from
-/// the places.
-///
-/// # Errors
-/// A node is at no place that a table can hold.
+/// the places. `None` if a node is at no place that a table can hold.
 pub(super) fn as_read(
     pose: &Pose,
     skeleton: &Arc<Skeleton>,
     metres_per_px: f64,
     estimator: &PoseEstimator,
-) -> Result<Option<Pose>, DocumentError> {
-    let mut written = MotionCsv::new(Vec::new(), skeleton, metres_per_px)?;
-    written.pose(pose)?;
-    let bytes = written.finish()?;
-    let table = TableReader::new(FILE.into(), &*bytes, COLUMNS)?;
-    let posture = PoseReader::of(table, skeleton, metres_per_px).next()?;
-    Ok(posture.map(|p| p.pose(estimator)))
+) -> Option<Pose> {
+    let mut written = MotionCsv::new(Vec::new(), skeleton, metres_per_px).ok()?;
+    written.pose(pose).ok()?;
+    let bytes = written.finish().ok()?;
+    let table = TableReader::new(FILE.into(), &*bytes, COLUMNS).ok()?;
+    let read = PoseReader::of(table, skeleton, metres_per_px).next();
+    read.ok().flatten().map(|p| p.pose(estimator))
 }

@@ -4,7 +4,7 @@ use super::{PrepareError, PreparedTree};
 use crate::document::DocumentError;
 use crate::draw::{Bounds, Camera, Look, Model, Posed, Rgba, Texture, View, picture};
 use crate::export::{ExportError, Film};
-use crate::files::{OutputFile, WriteError};
+use crate::files::WriteError;
 use crate::model::{Pose, Size};
 use std::f64::consts::TAU;
 use std::io::Cursor;
@@ -106,12 +106,11 @@ impl<'a> Studio<'a> {
         })
     }
 
-    /// Writes a picture (PNG) to `out`.
+    /// The bytes of a picture (PNG).
     ///
     /// # Errors
-    /// There is no pose at the wanted moment; the file exists or cannot be written; or it was
-    /// stopped.
-    pub fn picture(&self, out: &Path, stop: &AtomicBool) -> Result<(), PrepareError> {
+    /// There is no pose at the wanted moment.
+    pub fn picture(&self) -> Result<Vec<u8>, PrepareError> {
         let posed = match self.shot.at_s {
             Some(at_s) => self.posed(Some(self.pose_at(at_s)?)),
             None if self.shot.film.is_some() && !self.shot.at_rest => {
@@ -119,15 +118,14 @@ impl<'a> Studio<'a> {
             }
             None => self.posed(None),
         };
-        let file = OutputFile::create(out)?;
-        file.write(&png(&self.draw(&posed, 0.0))?, stop)?;
-        Ok(file.publish()?)
+        Ok(png(&self.draw(&posed, 0.0))?)
     }
 
     /// Writes a video (MP4) to `out`.
     ///
     /// # Errors
-    /// As of [`picture`](Self::picture); or there is no ffmpeg.
+    /// There is no pose at the wanted moment, or no ffmpeg; the file exists or cannot be written; or
+    /// it was stopped.
     pub fn video(&self, out: &Path, stop: &AtomicBool) -> Result<(), PrepareError> {
         let clip = self.clip()?;
         let frames = ((clip.length_s * self.shot.fps).round() as u64).max(1);

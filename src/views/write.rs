@@ -51,7 +51,7 @@ impl DocumentWriter {
             draft.poses,
             draft.pose_in_picture,
             config.export.animation_s,
-        )?;
+        );
         let options = TreeOptions {
             config,
             ..TreeOptions::default()
