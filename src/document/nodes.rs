@@ -246,16 +246,17 @@ impl<R: Read> NodeRows<R> {
 
     /// What a node is that is no copy. All of these come before all copies.
     fn kind(&self, word: &str) -> Result<NodeKind, DocumentError> {
+        let Some(kind) = NodeKind::of_word(word) else {
+            return Err(self.table.bad(format!(
+                "kind is {word:?}, and must be measured, copy, shoot, grown or traced"
+            )));
+        };
         if self.nodes.last().is_some_and(|n| n.copy_of.is_some()) {
             return Err(self
                 .table
                 .bad("it stands after a copy; copies come after all other nodes"));
         }
-        NodeKind::of_word(word).ok_or_else(|| {
-            self.table.bad(format!(
-                "kind is {word:?}, and must be measured, copy, shoot, grown or traced"
-            ))
-        })
+        Ok(kind)
     }
 
     /// Takes in what `node` repeats: a node that is no copy, not the foot, of the same level.
