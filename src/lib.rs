@@ -24,9 +24,11 @@
 //! [`shape`] in space · [`motion`] the pose in every frame · [`dynamics`] frequency and damping ·
 //! [`animate`] motion that was not filmed · [`signal`] common mathematics · [`caught`] panics of
 //! other crates · [`draw`] pictures of the model · [`pipeline`] all of it, step by step · `runtime`
-//! on threads · `recording` frames on disk · [`export`] files for other programs · `capture` those
-//! files read back · [`report`] tables and plots of the sway · `tui` the screen · `doctor` checks of
-//! the machine · `cli` the commands · [`config`] the settings · [`cancel`] stops long work.
+//! on threads · `recording` frames and tracks on disk · [`document`] a tree as a folder, written and
+//! read · [`files`] that appear when they are complete · [`export`] files for other programs ·
+//! [`views`] what is made of a document · [`report`] tables and plots of the sway · `tui` the screen ·
+//! `doctor` checks of the machine · `cli` the commands · [`config`] the settings · [`cancel`] stops
+//! long work.
 //!
 //! # Features
 //!
@@ -42,17 +44,18 @@
 
 pub mod animate;
 pub mod cancel;
-#[cfg(feature = "opencv")]
-pub mod capture;
 pub mod caught;
 #[cfg(feature = "terminal")]
 pub mod cli;
 pub mod config;
 #[cfg(feature = "terminal")]
 pub mod doctor;
+pub mod document;
 pub mod draw;
 pub mod dynamics;
 pub mod export;
+mod ffmpeg;
+pub mod files;
 pub mod hierarchy;
 pub mod model;
 pub mod motion;
@@ -74,3 +77,4 @@ pub mod source;
 pub mod track;
 #[cfg(feature = "terminal")]
 pub mod tui;
+pub mod views;

@@ -6,6 +6,7 @@ use serde_json::Value;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::os::fd::FromRawFd;
+use std::os::unix::fs::PermissionsExt;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -119,7 +120,7 @@ fn the_answers_stand_in_the_table_in_json_and_in_the_capture() {
         }
     });
     let (before, files) = (others(&dir), names_in(&dir));
-    let told = told(&[&dir], &[]);
+    let told = told(&[&dir], &["--update"]);
     let capture = &told["captures"][0];
     assert_eq!(
         (&capture["name"], &capture["excitation"]),
@@ -204,17 +205,18 @@ fn the_answers_stand_in_the_table_in_json_and_in_the_capture() {
             "{row} lacks {told:?}"
         );
     }
-    // Once more: nothing is left to change. --no-write changes nothing either.
-    assert_eq!(
-        fs::read_to_string(dir.join("nodes.csv")).expect("nodes"),
-        text
-    );
-    analyze(&[&dir], &["--no-write", "--excitation", "wind"]);
+    // Once more: nothing is left to change. Unasked nothing is changed either.
+    analyze(&[&dir], &["--update"]);
     assert_eq!(
         fs::read_to_string(dir.join("nodes.csv")).expect("nodes"),
         text
     );
     analyze(&[&dir], &["--excitation", "wind"]);
+    assert_eq!(
+        fs::read_to_string(dir.join("nodes.csv")).expect("nodes"),
+        text
+    );
+    analyze(&[&dir], &["--update", "--excitation", "wind"]);
     assert_ne!(
         fs::read_to_string(dir.join("nodes.csv")).expect("nodes"),
         text
@@ -226,15 +228,7 @@ fn the_part_of_the_film_and_its_cause_can_be_chosen() {
     let (_dir, dir) = captured("tree");
     let part = told(
         &[&dir],
-        &[
-            "--no-write",
-            "--from",
-            "2",
-            "--to",
-            "9",
-            "--excitation",
-            "release",
-        ],
+        &["--from", "2", "--to", "9", "--excitation", "release"],
     );
     let capture = &part["captures"][0];
     assert!(
@@ -245,7 +239,7 @@ fn the_part_of_the_film_and_its_cause_can_be_chosen() {
         (&capture["excitation_given"], &capture["from_rest"]),
         (&true.into(), &false.into())
     );
-    let short = told(&[&dir], &["--no-write", "--to", "0.6"]);
+    let short = told(&[&dir], &["--to", "0.6"]);
     assert!(
         branches(&short)
             .iter()
@@ -253,14 +247,13 @@ fn the_part_of_the_film_and_its_cause_can_be_chosen() {
         "{}",
         short["captures"][0]
     );
-    let text =
-        String::from_utf8(analyze(&[&dir], &["--no-write", "--to", "0.6"]).stdout).expect("text");
+    let text = String::from_utf8(analyze(&[&dir], &["--to", "0.6"]).stdout).expect("text");
     assert!(
         text.contains("none: the film is too short") && text.contains("0.0 to 0.6 s of the film"),
         "{text}"
     );
     // Beyond the end there is no film, and so none that is too long.
-    let beyond = analyze(&[&dir], &["--no-write", "--to", "1000"]);
+    let beyond = analyze(&[&dir], &["--to", "1000"]);
     assert!(
         beyond.status.success() && beyond.stderr.is_empty(),
         "{}",
@@ -272,7 +265,7 @@ fn the_part_of_the_film_and_its_cause_can_be_chosen() {
 fn a_known_length_gives_amplitudes_in_metres() {
     let (_dir, dir) = captured("tree");
     let of = |more: &[&str]| {
-        let told = told(&[&dir], &[&["--no-write"], more].concat());
+        let told = told(&[&dir], more);
         let trunk = branches(&told)[0].clone();
         (
             trunk["amplitude_px"].as_f64().expect("px"),
@@ -301,7 +294,7 @@ fn a_known_length_gives_amplitudes_in_metres() {
     let refused = |more: &[&str]| analyze(&[&dir], more).status.code();
     assert_eq!(refused(&["--metres-per-px", "nan"]), Some(BAD_USAGE));
     assert_eq!(refused(&["--metres-per-px", "1e9"]), Some(BAD_USAGE));
-    let own = told(&[&made], &["--no-write"]);
+    let own = told(&[&made], &[]);
     let trunk = &branches(&own)[0];
     assert!(
         (number(&trunk["amplitude_m"]) / m.expect("metres") - 1.0).abs() < 0.01,
@@ -360,7 +353,7 @@ fn the_same_branch_is_found_again_and_its_frequency_compared() {
     let (gentle, slow) = (first.with_file_name("gentle"), first.with_file_name("slow"));
     again(&first, &gentle, 1.0);
     again(&first, &slow, 1.1);
-    let told = told(&[&first, &gentle, &slow], &["--no-write"]);
+    let told = told(&[&first, &gentle, &slow], &[]);
     let comparison = &told["comparison"];
     assert_eq!(
         (&comparison["same_tree"], &comparison["same_tree_given"]),
@@ -398,7 +391,7 @@ fn the_same_branch_is_found_again_and_its_frequency_compared() {
         let share = number(&comparison["found_again"][name]);
         assert!(share > 0.8, "{share} found again in {name}");
     }
-    let text = String::from_utf8(analyze(&[&first, &slow], &["--no-write"]).stdout).expect("text");
+    let text = String::from_utf8(analyze(&[&first, &slow], &[]).stdout).expect("text");
     assert!(
         text.contains("Compared with hard as one tree")
             && text.contains("% (-")
@@ -418,7 +411,7 @@ fn the_same_branch_is_found_again_and_its_frequency_compared() {
 }
 
 fn told_of_two(a: &Path, b: &Path) -> Value {
-    told(&[a, b], &["--no-write", "--trees", "different"])
+    told(&[a, b], &["--trees", "different"])
 }
 
 /// Every element is closed where it must be, so that a browser shows what was meant.
@@ -453,7 +446,7 @@ fn the_report_is_one_file_that_needs_nothing_else_and_tells_all() {
     let shown = page.display().to_string();
     let told = told(
         &[&first, &second],
-        &["--no-write", "--report", &shown, "--scale", "0,0:0,100=1"],
+        &["--report", &shown, "--scale", "0,0:0,100=1"],
     );
     let html = fs::read_to_string(&page).expect("report");
     for forbidden in [
@@ -496,7 +489,6 @@ fn the_report_is_one_file_that_needs_nothing_else_and_tells_all() {
     analyze(
         &[&first, &second],
         &[
-            "--no-write",
             "--report",
             &again.display().to_string(),
             "--scale",
@@ -509,21 +501,18 @@ fn the_report_is_one_file_that_needs_nothing_else_and_tells_all() {
     );
 }
 
-/// A capture of an older version: no model, no picture, no motion, no columns on what excited it.
+/// A capture without motion, model and picture.
 #[test]
-fn an_older_capture_is_analysed_with_what_it_has() {
+fn what_a_capture_lacks_is_told_and_it_is_analysed_with_the_rest() {
     let (_dir, dir) = captured("old");
     for name in ["motion.csv", "tree.glb", "frame.jpg"] {
         fs::remove_file(dir.join(name)).expect("remove");
     }
-    let text = fs::read_to_string(dir.join("nodes.csv")).expect("nodes");
-    let short: Vec<String> = text
-        .lines()
-        .map(|l| l.split(',').take(17).collect::<Vec<_>>().join(","))
-        .collect();
-    fs::write(dir.join("nodes.csv"), short.join("\r\n") + "\r\n").expect("nodes");
     let page = dir.with_file_name("old.html");
-    let output = analyze(&[&dir], &["--report", &page.display().to_string()]);
+    let output = analyze(
+        &[&dir],
+        &["--update", "--report", &page.display().to_string()],
+    );
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{told}");
     assert!(
@@ -532,16 +521,8 @@ fn an_older_capture_is_analysed_with_what_it_has() {
         "{told}"
     );
     let text = fs::read_to_string(dir.join("nodes.csv")).expect("nodes");
-    assert!(
-        text.lines()
-            .next()
-            .expect("header")
-            .ends_with(",identifiable,excitation,amplitude_deg,unidentified")
-    );
-    assert!(
-        text.contains(",true,release,") && text.ends_with("\r\n"),
-        "{text}"
-    );
+    assert!(text.contains(",true,release,"), "{text}");
+    assert!(!dir.join("tree.glb").exists());
     well_formed(&fs::read_to_string(page).expect("report"));
 }
 
@@ -644,7 +625,7 @@ fn captures_that_may_be_of_one_tree_or_of_two_are_not_compared_by_a_guess() {
     let page = first.with_file_name("page.html");
     let output = analyze(
         &[&first, &other],
-        &["--no-write", "--report", &page.display().to_string()],
+        &["--report", &page.display().to_string()],
     );
     let (text, error) = (
         String::from_utf8_lossy(&output.stdout),
@@ -661,7 +642,7 @@ fn captures_that_may_be_of_one_tree_or_of_two_are_not_compared_by_a_guess() {
     let html = fs::read_to_string(page).expect("report");
     assert!(html.contains("Not compared with tree") && !html.contains("called there"));
     well_formed(&html);
-    let told = told(&[&first, &other], &["--no-write"]);
+    let told = told(&[&first, &other], &[]);
     assert!(
         told["comparison"]["same_tree"].is_null(),
         "{}",
@@ -681,58 +662,112 @@ fn captures_that_may_be_of_one_tree_or_of_two_are_not_compared_by_a_guess() {
     );
 }
 
-/// The tables are new and the model beside them is not: that is said, with the command that makes
-/// one, and that one is new.
+/// The answers stand in the model too, which is the one that `export` makes.
 #[test]
-fn a_model_with_the_former_answers_is_told_of_and_made_anew_by_export() {
-    let (_dir, dir) = captured("it's");
+fn the_model_in_the_capture_is_made_anew_with_the_answers() {
+    let (_dir, dir) = captured("tree");
     edit(&dir.join("nodes.csv"), |name, cell| match (name, cell) {
         ("frequency_hz" | "frequency_lo_hz" | "frequency_hi_hz", c) if !c.is_empty() => {
             "1.5".into()
         }
         _ => cell.into(),
     });
-    let error =
-        |more: &[&str]| String::from_utf8_lossy(&analyze(&[&dir], more).stderr).into_owned();
-    assert_eq!(error(&["--no-write"]), "");
-    let note = error(&[]);
-    let command = note
-        .trim_end()
-        .split("a new one: ")
-        .nth(1)
-        .unwrap_or_else(|| panic!("no command in {note:?}"));
+    let all = |dir: &Path| -> Vec<(String, Vec<u8>)> {
+        let read = |name: String| (name.clone(), fs::read(dir.join(name)).expect("file"));
+        names_in(dir).into_iter().map(read).collect()
+    };
+    // Unasked nothing is written into it.
+    let before = all(&dir);
+    assert!(analyze(&[&dir], &[]).status.success());
+    assert!(before == all(&dir), "something in the capture has changed");
+    let output = analyze(&[&dir], &["--update"]);
     assert!(
-        note.starts_with("arborcam: note: ") && note.lines().count() == 1,
-        "{note}"
+        output.status.success() && output.stderr.is_empty(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
     );
-    // Nothing is new the second time.
-    assert_eq!(error(&[]), "");
-    let made = dir.with_file_name("new.glb");
-    let mut shell = Command::new("sh");
-    shell
-        .args(["-c", &command.replacen("arborcam", "\"$ARBORCAM\"", 1)])
-        .current_dir(dir.parent().expect("folder"));
-    let output = shell
-        .env("ARBORCAM", env!("CARGO_BIN_EXE_arborcam"))
+    let after = all(&dir);
+    let changed: Vec<&str> = before
+        .iter()
+        .zip(&after)
+        .filter(|(a, b)| a != b)
+        .map(|(a, _)| a.0.as_str())
+        .collect();
+    assert_eq!((before.len(), changed[0]), (after.len(), "nodes.csv"));
+    assert!(
+        changed[1..].iter().all(|name| *name == "tree.glb"),
+        "{changed:?}"
+    );
+    analyze(&[&dir], &["--update", "--excitation", "wind"]);
+    let model = fs::read(dir.join("tree.glb")).expect("model");
+    assert!(
+        Some(&("tree.glb".to_owned(), model.clone())) != after.iter().find(|f| f.0 == "tree.glb")
+    );
+    let made = Command::new(env!("CARGO_BIN_EXE_arborcam"))
+        .arg("export")
+        .arg(&dir)
+        .args(["--format", "glb", "--out", "-"])
+        .output()
+        .expect("arborcam");
+    assert!(made.stdout == model, "the model is not that of `export`");
+}
+
+/// A capture from somebody else may hold links to files of the user: none of them is written
+/// through, whatever it is called.
+#[test]
+fn links_in_a_foreign_capture_lead_nowhere() {
+    let (_dir, dir) = captured("tree");
+    let mine = dir.with_file_name("mine");
+    fs::write(&mine, "mine").expect("write");
+    fs::set_permissions(&mine, fs::Permissions::from_mode(0o600)).expect("mode");
+    let to_mine = |at: &Path| std::os::unix::fs::symlink(&mine, at).expect("link");
+    // The name of the file that is made meanwhile must not be known beforehand: here the traps are
+    // set for the process that the shell becomes.
+    let mut command = Command::new("sh");
+    command.args([
+        "-c",
+        "for name in nodes.csv tree.glb; do ln -s \"$2\" \"$1/.$name.partial-$$\"; done; exec \"$0\" analyze \"$1\" --update",
+    ]);
+    let moved = dir.with_file_name("nodes.csv");
+    fs::rename(dir.join("nodes.csv"), &moved).expect("move");
+    std::os::unix::fs::symlink(&moved, dir.join("nodes.csv")).expect("link");
+    fs::remove_file(dir.join("tree.glb")).expect("remove");
+    to_mine(&dir.join("tree.glb"));
+    edit(&moved, |name, cell| {
+        if name.starts_with("frequency") {
+            String::new()
+        } else {
+            cell.into()
+        }
+    });
+    let table = fs::read(&moved).expect("nodes");
+    let output = command
+        .arg(env!("CARGO_BIN_EXE_arborcam"))
+        .arg(&dir)
+        .arg(&mine)
         .output()
         .expect("sh");
     assert!(
         output.status.success(),
-        "{command}: {}",
+        "{}",
         String::from_utf8_lossy(&output.stderr)
     );
-    let bytes = fs::read(made).expect("the model");
-    let told = told(&[&dir], &["--no-write"]);
-    let known = answered(&told);
-    for branch in &known {
-        let hz = number(&branch["frequency_hz"]["value"]);
-        let json = String::from_utf8_lossy(&bytes);
-        assert!(
-            json.contains(&format!("\"frequency_hz\":{:.3}", (hz * 1e3).floor() / 1e3)),
-            "no {hz} in the model"
-        );
+    assert_eq!(fs::read_to_string(&mine).expect("mine"), "mine");
+    let mode = fs::metadata(&mine).expect("mine").permissions().mode();
+    assert_eq!(mode & 0o777, 0o600);
+    // What the link led to is as it was, and a file stands in the place of the link.
+    assert!(fs::read(&moved).expect("nodes") == table);
+    for name in ["nodes.csv", "tree.glb"] {
+        let kind = fs::symlink_metadata(dir.join(name))
+            .expect(name)
+            .file_type();
+        assert!(kind.is_file(), "{name} is {kind:?}");
     }
-    assert!(!known.is_empty());
+    assert!(
+        fs::read_to_string(dir.join("nodes.csv"))
+            .expect("nodes")
+            .contains(",true,release,")
+    );
 }
 
 /// A film in which the tree was let go twice: the answers are of one release at most, and the user
@@ -743,7 +778,7 @@ fn several_releases_in_one_film_are_told_of() {
     // Pulled again while the camera looks away.
     prolong(&dir, 2, 14.0);
     lasts(&dir, 25);
-    let told = told(&[&dir], &["--no-write"]);
+    let told = told(&[&dir], &[]);
     let notes = told["captures"][0]["notes"].to_string();
     assert!(
         notes.contains("let go 2 times, at 0.")
@@ -751,7 +786,7 @@ fn several_releases_in_one_film_are_told_of() {
             && notes.contains("--from and --to"),
         "{notes}"
     );
-    let one = analyze(&[&dir], &["--no-write", "--from", "0", "--to", "10.9"]);
+    let one = analyze(&[&dir], &["--from", "0", "--to", "10.9"]);
     assert!(
         one.stderr.is_empty(),
         "{}",
@@ -782,7 +817,6 @@ fn on_a_terminal(dir: &Path, columns: u16) -> String {
     command
         .arg("analyze")
         .arg(dir)
-        .arg("--no-write")
         .stdout(theirs)
         .stderr(Stdio::null());
     // In a session of its own, so that the terminal of whoever runs the tests is not asked.
@@ -810,7 +844,7 @@ fn on_a_terminal(dir: &Path, columns: u16) -> String {
 #[test]
 fn on_a_narrow_terminal_no_line_is_wider_and_elsewhere_the_table_is_whole() {
     let (_dir, dir) = captured("tree");
-    let whole = String::from_utf8(analyze(&[&dir], &["--no-write"]).stdout).expect("text");
+    let whole = String::from_utf8(analyze(&[&dir], &[]).stdout).expect("text");
     assert!(
         whole.lines().any(|line| line.ends_with("peak, Hz  eq. 6")),
         "{whole}"
@@ -1012,22 +1046,20 @@ fn bad_input_gets_a_line_and_the_right_status() {
 #[test]
 fn where_nothing_can_be_written_the_table_is_printed_all_the_same() {
     let (_dir, dir) = captured("tree");
-    let old = "node_id,parent_id,level,n_tracks,x,y,z,radius\n0,,0,9,0,0,0,3\n1,0,1,9,0,90,0,3\n";
-    fs::write(dir.join("nodes.csv"), old).expect("nodes");
-    edit(&dir.join("tracks.csv"), |name, cell| {
-        if name == "node_id" && !cell.is_empty() {
-            "1".into()
+    edit(&dir.join("nodes.csv"), |name, cell| {
+        if name.starts_with("frequency") {
+            String::new()
         } else {
             cell.into()
         }
     });
-    fs::remove_file(dir.join("motion.csv")).expect("remove");
+    let old = fs::read_to_string(dir.join("nodes.csv")).expect("nodes");
     let before = names_in(&dir);
     // No file may grow: as on a full disk, also for root.
     let mut command = Command::new("sh");
     command.args([
         "-c",
-        "trap '' XFSZ; ulimit -f 0; exec \"$0\" analyze \"$1\"",
+        "trap '' XFSZ; ulimit -f 0; exec \"$0\" analyze \"$1\" --update",
     ]);
     let output = command
         .arg(env!("CARGO_BIN_EXE_arborcam"))
@@ -1085,10 +1117,7 @@ fn of_a_long_film_the_end_is_looked_at_as_the_capture_did() {
     prolong(&dir, 7, 11.0);
     lasts(&dir, 77);
     let part = |more: &[&str]| {
-        let told = told(
-            &[&dir],
-            &[&["--no-write", "--excitation", "release"], more].concat(),
-        );
+        let told = told(&[&dir], &[&["--excitation", "release"], more].concat());
         let capture = &told["captures"][0];
         let noted = capture["notes"]
             .to_string()
@@ -1107,7 +1136,7 @@ fn of_a_long_film_the_end_is_looked_at_as_the_capture_did() {
         part(&["--config", &settings.display().to_string()]),
         ([0.0, 77.0], false)
     );
-    let output = analyze(&[&dir], &["--no-write", "--excitation", "release"]);
+    let output = analyze(&[&dir], &["--excitation", "release"]);
     let text = String::from_utf8_lossy(&output.stdout);
     assert!(text.contains(" to 77.0 s of the film"), "{text}");
 }
@@ -1128,7 +1157,7 @@ fn whoever_stops_it_finds_everything_as_it_was() {
         .arg(&dir)
         .arg("--report")
         .arg(&page)
-        .args(["--excitation", "wind", "--from", "0"]);
+        .args(["--update", "--excitation", "wind", "--from", "0"]);
     let mut child = command
         .stdout(Stdio::null())
         .stderr(Stdio::piped())

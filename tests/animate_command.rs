@@ -2,7 +2,7 @@
 
 mod support;
 
-use arborcam::capture::Captured;
+use arborcam::document::Document;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -47,6 +47,7 @@ fn tuned() -> &'static Path {
                     [hz, 0.99 * hz, 1.01 * hz, 0.05, 0.04, 0.06].map(|x| format!("{x:.4}"));
                 cells[10..16].clone_from_slice(&values);
                 cells[16] = "true".into();
+                cells[17] = "release".into();
             }
             cells.join(",")
         };
@@ -101,7 +102,7 @@ fn the_table_is_as_long_as_asked_and_the_loops_ends_meet() {
     );
     let frames = table(&out);
     assert_eq!(frames.len(), 101);
-    let nodes = Captured::read(replayed(), 0.0)
+    let nodes = Document::read(replayed(), 0.0)
         .expect("capture")
         .skeleton
         .nodes
@@ -410,7 +411,7 @@ fn a_sound_drives_the_tree() {
     let (_dir, out) = animated("a.csv", &["--seconds", "4", "--wind", "7", "--wav", &path]);
     let (frames, rest) = (
         table(&out),
-        Captured::read(replayed(), 0.0).expect("capture").skeleton,
+        Document::read(replayed(), 0.0).expect("capture").skeleton,
     );
     let rest: Vec<[f64; 2]> = rest
         .nodes

@@ -14,7 +14,10 @@ const MAY_USE: &[(&str, &[&str])] = &[
     // caught.
     ("caught", &[]),
     // A recording is a source, read where its format is known.
-    ("source", &["model", "config", "recording", "caught"]),
+    (
+        "source",
+        &["model", "config", "recording", "caught", "ffmpeg"],
+    ),
     ("outline", &["model", "config", "signal"]),
     ("track", &["model", "config", "signal"]),
     ("hierarchy", &["model", "config", "signal"]),
@@ -23,6 +26,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("shape", &["model", "config", "skeleton::Node2d"]),
     ("motion", &["model", "config"]),
     ("dynamics", &["model", "config", "signal"]),
+    ("files", &[]),
+    ("ffmpeg", &[]),
     ("signal", &[]),
     // The seeded chance that twigs and leaves have too.
     ("animate", &["model", "config", "signal", "shape::Chance"]),
@@ -55,25 +60,41 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "shape::FoliageGroup",
         ],
     ),
-    // `capture.json` holds the whole configuration and what the push has achieved; the model's file
-    // holds all that is drawn; the HTML page plots the angles; a user's leaf is read where glTF is
-    // known.
+    // `capture.json` holds the whole configuration and what the push has achieved. Poses are read by
+    // the rule by which they were made, the outline as a file of its own would be, the points as
+    // the sway is told from them.
     (
-        "export",
-        &["model", "config", "shape", "dynamics::angle_to_parent_deg"],
-    ),
-    // A capture's tables back to the nouns: poses by the rule by which they were made, the outline
-    // as a file of its own would be. The points, as the sway is told from them.
-    (
-        "capture",
+        "document",
         &[
             "model",
             "config",
+            "files",
             "motion::PoseEstimator",
             "outline",
-            "export",
+            "shape::PushFigures",
             "dynamics::Film",
             "dynamics::FilmLog",
+        ],
+    ),
+    // The model's file holds all that is drawn; the HTML page plots the angles; a user's leaf is
+    // read where glTF is known.
+    (
+        "export",
+        &[
+            "model",
+            "config",
+            "files",
+            "ffmpeg",
+            "document",
+            "shape",
+            "dynamics::angle_to_parent_deg",
+        ],
+    ),
+    // The tree of a document as it is wanted, and all that is written or drawn of it.
+    (
+        "views",
+        &[
+            "model", "config", "files", "document", "export", "pipeline", "shape", "draw",
         ],
     ),
     // Told from what the sway was told from, and drawn beside it.
@@ -103,7 +124,9 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "signal",
             "pipeline",
             "recording",
-            "export",
+            "files",
+            "document",
+            "views",
         ],
     ),
     // It tries what a capture would use: a camera, the decoder, the front end; the rest of the
@@ -128,20 +151,19 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "pipeline",
             "recording",
             "runtime",
+            "files",
+            "document",
             "export",
-            "capture",
+            "views",
             "animate",
             "draw",
             "report",
             // What `analyze` asks of a capture's film.
             "dynamics::analyse",
-            // The table of cylinders is of the limbs; a drawn shape is read, and what it cut is
-            // told and moves.
-            "shape::cylinders",
+            "dynamics::Film",
+            // A drawn shape is read, and what it cut is told.
             "shape::Cut",
             "shape::Drawn",
-            "shape::Dressed",
-            "shape::Topiary",
             "tui",
             "doctor",
         ],
@@ -172,10 +194,10 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("thread::scope", &["runtime"]),
     ("mpsc::", &["runtime"]),
     // The doctor writes a nameless file to see how fast the disk is.
-    // What ffmpeg says while it writes a video goes into one too.
-    ("tempfile::", &["source", "recording", "doctor", "export"]),
-    ("fs::write", &["export"]),
-    ("File::create", &["export"]),
+    // What ffmpeg says goes into one too. A file that is replaced begins as one.
+    ("tempfile::", &["ffmpeg", "recording", "doctor", "files"]),
+    ("fs::write", &["files"]),
+    ("File::create", &["files"]),
     // Stages know no clock; the pipeline passes one on that it does not look at.
     // The line to the service manager keeps its beat; the doctor measures.
     (

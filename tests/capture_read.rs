@@ -2,8 +2,7 @@
 
 mod support;
 
-use arborcam::capture::{CaptureError, Captured};
-use arborcam::export::capture::Capture;
+use arborcam::document::{CaptureNote, Document, DocumentError};
 use arborcam::model::Skeleton;
 use std::fs;
 use std::path::Path;
@@ -38,7 +37,7 @@ fn lengths(skeleton: &Skeleton, at: impl Fn(usize) -> nalgebra::Point3<f64>) -> 
 /// Whoever exports from a folder must get the tree that was filmed, in every frame.
 #[test]
 fn what_was_written_is_read_again() {
-    let read = Captured::read(made(), WHOLE).expect("capture");
+    let read = Document::read(made(), WHOLE).expect("capture");
     assert_eq!(read.warnings, [""; 0]);
     let note = read.note.model.as_ref().expect("model");
     let copies = read.skeleton.nodes.len() - read.skeleton.measured();
@@ -74,7 +73,7 @@ fn what_was_written_is_read_again() {
 
 #[test]
 fn the_picture_is_the_first_frame_and_the_tree_stands_in_it() {
-    let read = Captured::read(made(), WHOLE).expect("capture");
+    let read = Document::read(made(), WHOLE).expect("capture");
     let picture = read.picture.expect("picture");
     assert_eq!((picture.frame, picture.time_s), (0, 0.0));
     let mut decoder = arborcam::source::Decoder::new().expect("decoder");
@@ -100,76 +99,49 @@ fn the_picture_is_the_first_frame_and_the_tree_stands_in_it() {
 
 #[test]
 fn the_end_of_the_film_is_kept_and_the_pose_of_the_picture_with_it() {
-    let read = Captured::read(made(), 2.0).expect("capture");
+    let read = Document::read(made(), 2.0).expect("capture");
     let (first, last) = (&read.poses[0], read.poses.last().expect("poses"));
     assert_eq!((last.frame, read.poses.len()), (329, 61));
     assert!(last.time_s - first.time_s <= 2.0);
     assert_eq!(read.pose_in_picture.expect("pose").frame, 0);
 }
 
-/// A capture of the version before, in which nothing is said of copies and there is no picture.
+/// A tree without a film is a tree at rest.
 #[test]
-fn an_older_capture_is_read_with_what_it_has() {
+fn a_document_without_a_film_is_read_at_rest() {
     let dir = copy();
-    fs::remove_file(dir.path().join("frame.jpg")).expect("remove");
-    edit(dir.path(), "capture.json", |text| {
-        let mut note: serde_json::Value = serde_json::from_str(&text).expect("json");
-        note.as_object_mut().expect("object").remove("picture");
-        note["model"]
-            .as_object_mut()
-            .expect("object")
-            .remove("copied");
-        note["animation"]
-            .as_object_mut()
-            .expect("object")
-            .remove("raw_keys");
-        note.to_string()
-    });
-    let (new, old) = (
-        Captured::read(made(), WHOLE).expect("new"),
-        Captured::read(dir.path(), WHOLE).expect("old"),
-    );
-    assert!(old.picture.is_none());
-    assert!(
-        matches!(&old.warnings[..], [one] if one.contains("no picture")),
-        "{:?}",
-        old.warnings
-    );
-    for (a, b) in new.skeleton.nodes.iter().zip(&old.skeleton.nodes) {
-        assert!(
-            (a.plane_angle - b.plane_angle).abs() < 1e-9 && a.copy_of == b.copy_of,
-            "{a:?} and {b:?}"
-        );
+    for name in ["motion.csv", "tracks.csv", "tree.glb"] {
+        fs::remove_file(dir.path().join(name)).expect("remove");
     }
-    // Without the model's file nothing is known of the copies: they are where the table has them.
-    fs::remove_file(dir.path().join("tree.glb")).expect("remove");
-    let bare = Captured::read(dir.path(), WHOLE).expect("bare");
-    assert!(bare.skeleton.nodes.iter().all(|n| n.copy_of.is_none()));
+    let read = Document::read(dir.path(), WHOLE).expect("document");
+    assert!(read.poses.is_empty() && read.pose_in_picture.is_none());
     assert!(
-        bare.warnings.iter().any(|w| w.contains("motion.csv")),
+        matches!(&read.warnings[..], [one] if one.contains("at rest")),
         "{:?}",
-        bare.warnings
+        read.warnings
     );
-    for (a, b) in new.poses.iter().zip(&bare.poses) {
-        assert!(
-            a.joints
-                .iter()
-                .zip(&b.joints)
-                .all(|(a, b)| (a.position - b.position).norm() < 0.02)
-        );
-    }
+    let whole = Document::read(made(), WHOLE).expect("capture");
+    assert_eq!(read.skeleton, whole.skeleton);
+    let film = read.film().err().map(|e| e.to_string());
+    assert!(film.is_some_and(|e| e.contains("lacks motion.csv") && !e.contains('\n')));
+    let points = read.tracked_within(60.0, [0.0, 60.0]).err();
+    assert!(points.is_some_and(|e| e.to_string().contains("lacks tracks.csv")));
 }
 
 #[test]
 fn a_model_in_metres_is_read_in_pixels() {
     let dir = tempfile::tempdir().expect("tempdir");
     let out = dir.path().join("out");
+    let settings = dir.path().join("short.toml");
+    fs::write(&settings, "[export]\nanimation_s = 2.5\n").expect("settings");
     let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
     command.args([
         "replay",
         CLIP,
         "--fast",
         "--headless",
+        "--config",
+        settings.to_str().expect("path"),
         "--metres-per-px",
         "0.01",
         "--outline",
@@ -185,18 +157,29 @@ fn a_model_in_metres_is_read_in_pixels() {
             .success()
     );
     let (px, m) = (
-        Captured::read(made(), WHOLE).expect("px"),
-        Captured::read(&out, WHOLE).expect("m"),
+        Document::read(made(), WHOLE).expect("px"),
+        Document::read(&out, WHOLE).expect("m"),
     );
     for (a, b) in px.skeleton.nodes.iter().zip(&m.skeleton.nodes) {
         assert!((a.position - b.position).norm() < 1e-3 && (a.radius - b.radius).abs() < 1e-3);
     }
+    // Its model is that of `export`, with so much of the film as the settings say.
+    let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
+    command.arg("export").arg(&out);
+    let again = command.args(["--format", "glb", "--out", "-"]).output();
+    let own = fs::read(out.join("tree.glb")).expect("model");
+    assert!(
+        again.expect("arborcam").stdout == own,
+        "the model is not that of `export`"
+    );
+    let frames = m.note.animation.expect("animation").frames;
+    assert!((74..=76).contains(&frames), "{frames} frames");
 }
 
 /// Followed anew from the same places in the picture, the same tree moves as before.
 #[test]
 fn a_tree_of_the_same_shape_is_posed_as_it_was() {
-    let read = Captured::read(made(), WHOLE).expect("capture");
+    let read = Document::read(made(), WHOLE).expect("capture");
     let again = read.reposed(&read.skeleton, &read.note.config, &read.poses);
     let mut off: Vec<f64> = Vec::new();
     for (a, b) in read.poses.iter().zip(&again).skip(60) {
@@ -374,7 +357,7 @@ fn damage_is_named_with_file_and_line() {
     for (name, change, word) in cases {
         let dir = copy();
         edit(dir.path(), name, change);
-        let error = Captured::read(dir.path(), WHOLE)
+        let error = Document::read(dir.path(), WHOLE)
             .expect_err(word)
             .to_string();
         assert!(
@@ -382,53 +365,64 @@ fn damage_is_named_with_file_and_line() {
             "{word}: {error}"
         );
     }
-    for name in ["nodes.csv", "motion.csv"] {
-        let dir = copy();
-        fs::remove_file(dir.path().join(name)).expect("remove");
-        let error = Captured::read(dir.path(), WHOLE)
-            .expect_err("missing")
-            .to_string();
-        assert!(error.contains(&format!("lacks {name}")), "{error}");
-    }
-    let nowhere = Captured::read(Path::new("recordings"), WHOLE).expect_err("no capture");
+    let dir = copy();
+    fs::remove_file(dir.path().join("nodes.csv")).expect("remove");
+    let error = Document::read(dir.path(), WHOLE)
+        .expect_err("missing")
+        .to_string();
+    assert!(error.contains("lacks nodes.csv"), "{error}");
+    let nowhere = Document::read(Path::new("recordings"), WHOLE).expect_err("no capture");
     assert!(
-        matches!(nowhere, CaptureError::NotACapture { .. }),
+        matches!(nowhere, DocumentError::NotACapture { .. }),
         "{nowhere}"
     );
 }
 
-/// What is said of copies may be wrong as well: a branch that repeats one of another level could
-/// not be cut with it.
+/// What a table says of copies may be wrong as well: a branch that repeats one of another level, or
+/// a copy, could not be posed, or not be cut with it.
 #[test]
-fn a_copy_of_another_level_is_none() {
-    let dir = copy();
-    edit(dir.path(), "capture.json", |text| {
-        let mut note: Capture = serde_json::from_str(&text).expect("json");
-        let trunk = note.model.as_ref().expect("model").copied[0]
-            .original
-            .min(1);
-        note.model.as_mut().expect("model").copied[0].original = trunk;
-        serde_json::to_string(&note).expect("json")
-    });
-    let read = Captured::read(dir.path(), WHOLE).expect("capture");
-    assert!(
-        read.warnings
-            .iter()
-            .any(|w| w.contains("not known what they repeat")),
-        "{:?}",
-        read.warnings
-    );
-    let nodes = &read.skeleton.nodes;
-    assert!(nodes.iter().all(|n| {
-        n.copy_of
-            .is_none_or(|of| nodes[of.index()].level == n.level)
-    }));
+fn a_copy_of_what_cannot_be_repeated_is_refused() {
+    let table = fs::read_to_string(made().join("nodes.csv")).expect("nodes");
+    let rows: Vec<Vec<&str>> = table.lines().map(|l| l.split(',').collect()).collect();
+    let (copies, level): (Vec<usize>, &str) = {
+        let copies: Vec<usize> = (1..rows.len()).filter(|&i| rows[i][20] == "copy").collect();
+        let level = rows[copies[1]][2];
+        (copies, level)
+    };
+    let other = (2..copies[0])
+        .find(|&i| rows[i][2] != level)
+        .expect("a node of another level");
+    let cases = [
+        (20, "trunk", "kind is \"trunk\""),
+        (20, "measured", "it stands after a copy"),
+        (21, "0", "copy_of is 0, which is no branch"),
+        (21, "4000000", "copy_of is 4000000, which is no branch"),
+        (21, rows[copies[0]][0], "a copy itself or of another level"),
+        (21, rows[other][0], "a copy itself or of another level"),
+        (22, "", "plane_deg is \"\""),
+        (23, "1.5", "certainty is 1.5"),
+    ];
+    for (column, value, words) in cases {
+        let dir = copy();
+        let mut rows = rows.clone();
+        rows[copies[1]][column] = value;
+        let text: String = rows.iter().map(|r| r.join(",") + "\n").collect();
+        fs::write(dir.path().join("nodes.csv"), text).expect("write");
+        let error = Document::read(dir.path(), WHOLE)
+            .expect_err(words)
+            .to_string();
+        let line = format!("nodes.csv, line {}: ", copies[1] + 1);
+        assert!(
+            error.contains(words) && error.contains(&line) && !error.contains('\n'),
+            "{words}: {error}"
+        );
+    }
 }
 
 /// A film of hours is gone through pose by pose; it must be the same film.
 #[test]
 fn the_film_has_every_pose_once() {
-    let read = Captured::read(made(), WHOLE).expect("capture");
+    let read = Document::read(made(), WHOLE).expect("capture");
     let film: Vec<_> = read
         .film()
         .expect("film")
@@ -436,7 +430,7 @@ fn the_film_has_every_pose_once() {
         .expect("poses");
     assert_eq!(film, read.poses);
     let dir = copy();
-    let read = Captured::read(dir.path(), WHOLE).expect("capture");
+    let read = Document::read(dir.path(), WHOLE).expect("capture");
     edit(dir.path(), "motion.csv", |t| {
         t.lines().take(200).map(|l| format!("{l}\n")).collect()
     });
@@ -452,12 +446,12 @@ fn the_film_has_every_pose_once() {
 fn a_film_without_a_tree_is_no_damage() {
     let dir = copy();
     edit(dir.path(), "capture.json", |text| {
-        let mut note: Capture = serde_json::from_str(&text).expect("json");
+        let mut note: CaptureNote = serde_json::from_str(&text).expect("json");
         note.model = None;
         serde_json::to_string(&note).expect("json")
     });
-    let error = Captured::read(dir.path(), WHOLE).expect_err("no tree");
-    assert!(matches!(error, CaptureError::NoTree { .. }), "{error}");
+    let error = Document::read(dir.path(), WHOLE).expect_err("no tree");
+    assert!(matches!(error, DocumentError::NoTree { .. }), "{error}");
 }
 
 mod fuzz {
@@ -493,7 +487,7 @@ mod fuzz {
                 bytes.truncate((cut * bytes.len() as f64) as usize);
             }
             fs::write(&file, &bytes).expect("write");
-            if let Err(e) = Captured::read(dir.path(), 1.0) {
+            if let Err(e) = Document::read(dir.path(), 1.0) {
                 prop_assert!(!e.to_string().contains('\n'), "{}", e);
             }
         }
@@ -544,7 +538,7 @@ mod fuzz {
         ) {
             let dir = copy();
             edit(dir.path(), name, |text| spoilt(name, &text, &picks));
-            let read = match Captured::read(dir.path(), 0.2) {
+            let read = match Document::read(dir.path(), 0.2) {
                 Ok(read) => read,
                 Err(e) => {
                     prop_assert!(!e.to_string().contains('\n'), "{}", e);
@@ -574,7 +568,7 @@ mod fuzz {
     }
 
     /// To a model that opens, or to a refusal of one line.
-    fn exported(read: &Captured, skeleton: &Skeleton, poses: &[Pose], config: &Config) {
+    fn exported(read: &Document, skeleton: &Skeleton, poses: &[Pose], config: &Config) {
         let seen = Seen {
             picture: read.picture.as_ref().map(|p| &*p.rgb),
             outline: read.outline.as_ref(),
@@ -589,7 +583,6 @@ mod fuzz {
             all_levels: false,
             metres_per_px: config.export.metres_per_px,
             tolerance_px: KEY_TOLERANCE_PX,
-            thorough: &|| false,
             node_extras: &[],
             provenance: &serde_json::Value::Null,
         };

@@ -2,7 +2,13 @@
 
 mod support;
 
-use arborcam::capture::Captured;
+use arborcam::document::note::ModelNote;
+use arborcam::document::{CaptureNote, Document};
+use arborcam::model::{
+    Excitation, Interval, Node, NodeId, NodeKind, NodeName, Size, Skeleton, Sway, Timing,
+    Unidentified,
+};
+use arborcam::views::{Draft, write_document};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -61,50 +67,53 @@ fn look(document: &gltf::Document) -> (Vec<String>, usize) {
     )
 }
 
-/// Whoever exports without changes gets the model that lies in the capture.
+/// Whoever exports without changes gets the model that lies in the capture, byte for byte: with the
+/// frequencies and dampings of the table, and their intervals.
 #[test]
 fn the_glb_is_the_captures_own() {
     let (_dir, out) = exported("glb", "tree.glb", &[]);
-    let (own, ours) = (
-        gltf::Gltf::open(made().join("tree.glb")).expect("own"),
-        gltf::Gltf::open(&out).expect("ours"),
-    );
-    assert_eq!(look(&own.document), look(&ours.document));
-    let end_s = |d: &gltf::Gltf| {
-        let ends = d
-            .animations()
-            .flat_map(|a| a.channels().collect::<Vec<_>>());
-        ends.map(|c| {
-            c.sampler().input().max().expect("max")[0]
-                .as_f64()
-                .expect("s")
-        })
-        .fold(0.0, f64::max)
-    };
-    assert!((end_s(&own) - end_s(&ours)).abs() < 1e-4 && end_s(&ours) > 10.9);
-    let bark = |d: &gltf::Gltf| {
-        d.materials()
-            .next()
-            .expect("bark")
-            .pbr_metallic_roughness()
-            .base_color_factor()
-    };
-    let off = bark(&own)
-        .iter()
-        .zip(bark(&ours))
-        .map(|(a, b)| (a - b).abs())
-        .fold(0.0, f32::max);
+    let own = fs::read(made().join("tree.glb")).expect("own");
     assert!(
-        off < 0.05,
-        "the bark is off by {off}: the picture has been through JPEG, no more"
+        own == fs::read(&out).expect("ours"),
+        "the model in the capture is another one"
     );
     // To standard output, and a second time: the same bytes.
     let again = export(made(), "glb", Path::new("-"), &[]);
     assert!(again.status.success());
-    assert!(
-        again.stdout == fs::read(&out).expect("glb"),
-        "standard output differs from the file"
-    );
+    assert!(again.stdout == own, "standard output differs from the file");
+    let model = gltf::Gltf::from_slice(&own).expect("a valid file");
+    let table = fs::read_to_string(made().join("nodes.csv")).expect("nodes");
+    let mut known = 0;
+    for (node, row) in model.nodes().zip(table.lines().skip(1)) {
+        let cells: Vec<&str> = row.split(',').collect();
+        let extras: serde_json::Value =
+            serde_json::from_str(node.extras().as_ref().expect("extras").get()).expect("json");
+        assert!(
+            node.name()
+                .expect("name")
+                .starts_with(&format!("node_{}", cells[0]))
+        );
+        let number = |c: usize| cells[c].parse::<f64>().ok();
+        let told = |name: &str| extras.get(name).and_then(serde_json::Value::as_f64);
+        let interval = |name: &str| {
+            let ends = extras.get(name)?;
+            Some([ends[0].as_f64()?, ends[1].as_f64()?])
+        };
+        assert_eq!(told("frequency_hz"), number(10), "{row}");
+        assert_eq!(
+            interval("frequency_hz_interval_95"),
+            number(11).zip(number(12)).map(|(lo, hi)| [lo, hi]),
+            "{row}"
+        );
+        assert_eq!(told("damping_ratio"), number(13), "{row}");
+        assert_eq!(
+            interval("damping_ratio_interval_95"),
+            number(14).zip(number(15)).map(|(lo, hi)| [lo, hi]),
+            "{row}"
+        );
+        known += usize::from(cells[16] == "true");
+    }
+    assert!(known >= 4, "{known} branches have an answer");
 }
 
 #[test]
@@ -125,7 +134,7 @@ fn gltf_lies_beside_its_parts_whatever_it_is_called() {
     let (document, _, _) = gltf::import(&plain).expect("a glTF with its buffer");
     assert_eq!(
         look(&document).0.len(),
-        Captured::read(made(), 1.0)
+        Document::read(made(), 1.0)
             .expect("capture")
             .skeleton
             .nodes
@@ -242,7 +251,7 @@ fn the_still_tree_opens_as_obj_and_ply() {
 #[test]
 fn another_shape_keeps_what_was_measured() {
     let (_dir, out) = exported("csv", "tables", &["--planes", "5", "--animation-s", "2"]);
-    let read = Captured::read(made(), 60.0).expect("capture");
+    let read = Document::read(made(), 60.0).expect("capture");
     let measured = read.skeleton.measured();
     let rows: Vec<Vec<String>> = fs::read_to_string(out.join("nodes.csv"))
         .expect("nodes")
@@ -301,7 +310,7 @@ fn another_shape_keeps_what_was_measured() {
 #[test]
 fn points_of_branches_that_were_cut_are_on_none() {
     let dir = tempfile::tempdir().expect("tempdir");
-    let read = Captured::read(made(), 1.0).expect("capture");
+    let read = Document::read(made(), 1.0).expect("capture");
     let size = read.skeleton.image_size;
     // The right half of the picture, from the trunk on.
     let trunk_u = read.skeleton.foot_px[0].min(
@@ -400,7 +409,7 @@ fn settings_go_file_over_capture_and_command_line_over_file() {
         - 1;
     assert_eq!(
         nodes,
-        Captured::read(made(), 1.0)
+        Document::read(made(), 1.0)
             .expect("capture")
             .skeleton
             .measured(),
@@ -651,11 +660,6 @@ fn bad_input_gets_one_line_and_leaves_nothing() {
         l.starts_with("frame") || l.split(',').nth(2) == Some("0")
     });
     fs::remove_file(work.join("lone/tree.glb")).expect("remove");
-    let mut note: serde_json::Value =
-        serde_json::from_str(&fs::read_to_string(work.join("lone/capture.json")).expect("note"))
-            .expect("json");
-    note["model"]["copied"] = serde_json::json!([]);
-    fs::write(work.join("lone/capture.json"), note.to_string()).expect("write");
     let lone = export(&work.join("lone"), "glb", Path::new("-"), &[]);
     assert!(
         lone.status.success(),
@@ -705,10 +709,7 @@ fn bad_input_gets_one_line_and_leaves_nothing() {
 /// A capture of `nodes` nodes, each on the one that `parent` says, with a film of two frames.
 fn large(dir: &Path, nodes: usize, parent: impl Fn(usize) -> usize) {
     fs::create_dir(dir).expect("folder");
-    let text = fs::read_to_string(made().join("capture.json")).expect("note");
-    let mut note: serde_json::Value = serde_json::from_str(&text).expect("json");
-    note["model"]["copied"] = serde_json::json!([]);
-    fs::write(dir.join("capture.json"), note.to_string()).expect("write");
+    fs::copy(made().join("capture.json"), dir.join("capture.json")).expect("copy");
     fs::write(
         dir.join("tracks.csv"),
         "track_id,frame,time_s,u_px,v_px,node_id\n",
@@ -727,7 +728,7 @@ fn large(dir: &Path, nodes: usize, parent: impl Fn(usize) -> usize) {
         levels.push(if i == 0 { 0 } else { levels[parent(i)] + 1 });
         let (x, y) = (i % 400, i / 400 + if i == 0 { 0 } else { 50 });
         table.push(format!(
-            "{i},{above},{},1,0,0,{x},{y},{},1,,,,,,,false",
+            "{i},{above},{},1,0,0,{x},{y},{},1,,,,,,,false,,,not_measured,measured,,,0",
             levels[i],
             i % 100
         ));
@@ -771,6 +772,204 @@ fn as_many_nodes_as_can_be_are_exported_or_refused() {
         "{}",
         told(&deep)
     );
+}
+
+fn run(arguments: &[&str]) -> (Option<i32>, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_arborcam"))
+        .args(arguments)
+        .output()
+        .expect("arborcam");
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    (output.status.code(), told)
+}
+
+/// What needs no motion takes the document in `dir`, which has no film; what needs it says so in one
+/// line. `warned`: the document says itself that its film is missing.
+fn goes_without_a_film(dir: &Path, warned: bool) {
+    let place = tempfile::tempdir().expect("tempdir");
+    let at = |name: &str| place.path().join(name).display().to_string();
+    let dir = &dir.display().to_string();
+    let fine: [&[&str]; 9] = [
+        &["export", dir, "--format", "glb", "--out", &at("a.glb")],
+        &["export", dir, "--format", "gltf", "--out", &at("a.gltf")],
+        &["export", dir, "--format", "obj", "--out", &at("a.obj")],
+        &["export", dir, "--format", "ply", "--out", &at("a.ply")],
+        &["export", dir, "--format", "csv", "--out", &at("tables")],
+        &[
+            "export",
+            dir,
+            "--format",
+            "csv",
+            "--planes",
+            "2",
+            "--out",
+            &at("other"),
+        ],
+        &["render", dir, "--out", &at("a.png")],
+        &[
+            "render",
+            dir,
+            "--seconds",
+            "0.1",
+            "--size",
+            "64x48",
+            "--out",
+            &at("a.mp4"),
+        ],
+        &[
+            "animate",
+            dir,
+            "--seconds",
+            "1",
+            "--wind",
+            "6",
+            "--out",
+            &at("a.csv"),
+        ],
+    ];
+    for arguments in fine {
+        let (status, told) = run(arguments);
+        assert_eq!(status, Some(0), "{arguments:?}: {told}");
+        assert_eq!(
+            told.contains("the tree is at rest"),
+            warned,
+            "{arguments:?}: {told}"
+        );
+    }
+    for tables in ["tables", "other"] {
+        let names = names_in(&place.path().join(tables));
+        assert_eq!(names, ["cylinders.csv", "nodes.csv"]);
+    }
+    let (status, told) = run(&["export", dir, "--format", "html", "--out", &at("a.html")]);
+    assert!(
+        status == Some(0) || told.contains("without the HTML viewer"),
+        "{told}"
+    );
+    let film: [(&[&str], &str); 3] = [
+        (
+            &["render", dir, "--at", "1", "--out", &at("b.png")],
+            "motion.csv",
+        ),
+        (
+            &["animate", dir, "--magnify", "2", "--out", &at("b.csv")],
+            "motion.csv",
+        ),
+        (&["analyze", dir], "tracks.csv"),
+    ];
+    for (arguments, file) in film {
+        let (status, told) = run(arguments);
+        assert_eq!(status, Some(NO_INPUT), "{arguments:?}: {told}");
+        assert!(
+            told.contains(&format!("lacks {file}: it holds no film")) && told.lines().count() == 1,
+            "{arguments:?}: {told}"
+        );
+    }
+}
+
+#[test]
+fn a_tree_whose_film_was_removed_is_exported_drawn_and_moved_by_wind() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let bare = dir.path().join("bare");
+    fs::create_dir(&bare).expect("folder");
+    for name in ["capture.json", "nodes.csv", "frame.jpg", "tree.glb"] {
+        fs::copy(made().join(name), bare.join(name)).expect("copy");
+    }
+    goes_without_a_film(&bare, true);
+}
+
+/// A tree that nobody filmed: a fork, a shoot and a copy.
+fn made_up() -> Skeleton {
+    let node = |name, parent: Option<u32>, level, at: [f64; 3]| Node {
+        name: NodeName(name),
+        parent: parent.map(NodeId),
+        level,
+        position: at.into(),
+        radius: 6.0 / f64::from(1 + level),
+        n_tracks: 0,
+        kind: NodeKind::Grown,
+        certainty: 0.123_456,
+        copy_of: None,
+        plane_angle: 0.0,
+    };
+    let mut nodes = vec![
+        node(0, None, 0, [0.0; 3]),
+        node(1, Some(0), 1, [3.0, 120.123_456, 1.0]),
+        node(2, Some(1), 2, [-60.0, 180.0, 20.0]),
+        node(3, Some(1), 2, [70.0, 190.0, -30.0]),
+        node(9, Some(1), 2, [0.0, 190.0, -75.0]),
+    ];
+    nodes[3].kind = NodeKind::Shoot;
+    nodes[4].copy_of = Some(NodeId(2));
+    nodes[4].kind = NodeKind::Grown;
+    nodes[4].plane_angle = 1.1;
+    Skeleton {
+        nodes,
+        foot_px: [320.25, 340.5],
+        image_size: Size::new(640, 360),
+    }
+}
+
+#[test]
+fn a_tree_that_was_not_filmed_is_written_read_and_exported() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let tree = made_up();
+    let filmed = Document::note(made()).expect("note");
+    for metres_per_px in [0.0, 0.0123] {
+        let mut note = CaptureNote {
+            timing: Timing::default(),
+            model: Some(ModelNote::of(&tree, metres_per_px)),
+            picture: None,
+            build: None,
+            refinement: None,
+            animation: None,
+            ..filmed.clone()
+        };
+        note.config.export.metres_per_px = metres_per_px;
+        let draft = Draft {
+            note,
+            skeleton: &tree,
+            picture: None,
+            poses: Vec::new(),
+            pose_in_picture: None,
+        };
+        let around = |value: f64| Interval {
+            value,
+            lo: 0.9 * value,
+            hi: 1.1 * value,
+        };
+        let sway = [
+            Err(Unidentified::NotMeasured),
+            Ok(Sway {
+                frequency_hz: around(0.123_456_789),
+                damping_ratio: Some(around(0.05)),
+                excitation: Excitation::Wind,
+                amplitude_deg: f64::NAN,
+            }),
+        ];
+        let at = dir.path().join(format!("tree-{metres_per_px}"));
+        assert_eq!(write_document(&at, draft, &sway).expect("written"), at);
+        assert_eq!(names_in(&at), ["capture.json", "nodes.csv", "tree.glb"]);
+        let read = Document::read(&at, 60.0).expect("document");
+        assert_eq!(read.warnings, [""; 0]);
+        assert_eq!(read.sway[1].expect("known").frequency_hz.value, 0.12346);
+        for (a, b) in tree.nodes.iter().zip(&read.skeleton.nodes) {
+            assert!((a.position - b.position).norm() < 1e-3, "{a:?} and {b:?}");
+            assert_eq!(
+                (a.name, a.parent, a.level, a.copy_of),
+                (b.name, b.parent, b.level, b.copy_of)
+            );
+            assert!(
+                (a.plane_angle - b.plane_angle).abs() < 1e-5,
+                "{a:?} and {b:?}"
+            );
+            assert!((a.certainty - b.certainty).abs() < 1e-4, "{a:?} and {b:?}");
+            assert_eq!(a.kind, b.kind);
+        }
+        let own = fs::read(at.join("tree.glb")).expect("model");
+        let again = export(&at, "glb", Path::new("-"), &[]);
+        assert!(again.stdout == own, "the model is not that of `export`");
+        goes_without_a_film(&at, false);
+    }
 }
 
 /// Ctrl-C while an export is worked out and while it is written: nothing is left, and the shell can

@@ -3,13 +3,12 @@
 mod synthetic;
 
 use arborcam::config::Config;
-use arborcam::export::capture::{
-    self, Capture, Gap, MAX_GAPS, ModelNote, Quality, SCHEMA_VERSION, Timing,
-};
-use arborcam::export::csv::{MotionCsv, TracksCsv, nodes};
-use arborcam::export::{ExportError, OutputFolder};
+use arborcam::document::note::{ModelNote, Quality, json};
+use arborcam::document::{CaptureNote, MotionCsv, SCHEMA_VERSION, TracksCsv, nodes};
+use arborcam::files::{OutputFolder, WriteError};
 use arborcam::model::{
-    Excitation, Interval, NodeId, NodeName, Observation, Sway, TrackId, TrackSet, Unidentified,
+    Excitation, Gap, Interval, MAX_GAPS, NodeId, NodeName, Observation, Sway, Timing, TrackId,
+    TrackSet, Unidentified,
 };
 use std::collections::HashMap;
 use std::fs;
@@ -75,23 +74,24 @@ fn nodes_say_what_is_not_identifiable() {
     let out = text(nodes(Vec::new(), &skeleton, &all, 0.0).unwrap());
     let lines: Vec<&str> = out.lines().collect();
     let header = "node_id,parent_id,level,n_tracks,u_px,v_px,x,y,z,radius,frequency_hz,frequency_lo_hz,\
-                  frequency_hi_hz,damping_ratio,damping_lo,damping_hi,identifiable,excitation,amplitude_deg,unidentified";
+                  frequency_hi_hz,damping_ratio,damping_lo,damping_hi,identifiable,excitation,amplitude_deg,unidentified,\
+                  kind,copy_of,plane_deg,certainty";
     assert_eq!(lines[0], header);
     assert_eq!(
         lines[1],
-        "0,,0,400,640,700,0,0,0,14,,,,,,,false,,,not_measured"
+        "0,,0,400,640,700,0,0,0,14,,,,,,,false,,,not_measured,measured,,,0.75"
     );
     assert_eq!(
         lines[2],
-        "1,0,1,200,644,540,4,160,0,14,0.51234,0.5,0.53,0.04,0.02,0.07,true,release,1.5,"
+        "1,0,1,200,644,540,4,160,0,14,0.51234,0.5,0.53,0.04,0.02,0.07,true,release,1.5,,measured,,,0.75"
     );
     assert!(
-        lines[3].ends_with(",0.51234,0.5,0.53,,,,true,wind,1.5,"),
+        lines[3].ends_with(",0.51234,0.5,0.53,,,,true,wind,1.5,,measured,,,0.75"),
         "{}",
         lines[3]
     );
     assert!(
-        lines[4].ends_with(",,,,,,,false,,,too_short"),
+        lines[4].ends_with(",,,,,,,false,,,too_short,measured,,,0.75"),
         "{}",
         lines[4]
     );
@@ -160,7 +160,7 @@ fn a_capture_reads_back_as_it_was_written_and_is_the_same_every_time() {
         });
     }
     assert_eq!((timing.gaps.len(), timing.gaps_not_listed), (MAX_GAPS, 5));
-    let capture = Capture {
+    let capture = CaptureNote {
         schema_version: SCHEMA_VERSION,
         software: Default::default(),
         captured_at: None,
@@ -179,9 +179,12 @@ fn a_capture_reads_back_as_it_was_written_and_is_the_same_every_time() {
         animation: None,
         warnings: vec!["the camera dropped 3 frames".into()],
     };
-    let bytes = capture::json(&capture).unwrap();
-    assert_eq!(bytes, capture::json(&capture).unwrap());
-    assert_eq!(serde_json::from_slice::<Capture>(&bytes).unwrap(), capture);
+    let bytes = json(&capture).unwrap();
+    assert_eq!(bytes, json(&capture).unwrap());
+    assert_eq!(
+        serde_json::from_slice::<CaptureNote>(&bytes).unwrap(),
+        capture
+    );
     assert!(!text(bytes).contains("captured_at"));
 }
 
@@ -206,7 +209,7 @@ fn a_folder_appears_only_when_it_is_complete() {
     assert_eq!(fs::read(dir.join("capture.json")).unwrap(), b"{}");
     // A second capture that began before the first was finished must not replace it.
     again.write("capture.json", b"other").unwrap();
-    assert!(matches!(again.publish(), Err(ExportError::Exists { .. })));
+    assert!(matches!(again.publish(), Err(WriteError::Exists { .. })));
     assert_eq!(fs::read(dir.join("capture.json")).unwrap(), b"{}");
     assert_eq!(names_in(&home.path().join("new/deep")), ["oak"]);
 }
@@ -229,7 +232,7 @@ fn what_exists_is_never_touched_and_the_message_says_what_to_do() {
     for taken in ["file", "empty", "link"] {
         let error = OutputFolder::create(&home.path().join(taken)).unwrap_err();
         assert!(
-            matches!(error, ExportError::Exists { .. }),
+            matches!(error, WriteError::Exists { .. }),
             "{taken}: {error}"
         );
         let line = error.to_string();
@@ -240,7 +243,7 @@ fn what_exists_is_never_touched_and_the_message_says_what_to_do() {
     }
     let below_a_file = OutputFolder::create(&home.path().join("file/oak")).unwrap_err();
     assert!(
-        matches!(below_a_file, ExportError::NotAFolder { .. }),
+        matches!(below_a_file, WriteError::NotAFolder { .. }),
         "{below_a_file}"
     );
     assert!(OutputFolder::create(Path::new("")).is_err());
@@ -263,9 +266,9 @@ fn a_full_disk_is_named_by_the_row_writers() {
         .iter()
         .find_map(|p| csv.pose(p).err())
         .expect("nothing fits on a full disk");
-    assert!(matches!(error, ExportError::DiskFull { .. }), "{error}");
+    assert!(matches!(error, WriteError::DiskFull { .. }), "{error}");
     let short = TracksCsv::new(full()).unwrap().finish().unwrap_err();
-    assert!(matches!(short, ExportError::DiskFull { .. }), "{short}");
+    assert!(matches!(short, WriteError::DiskFull { .. }), "{short}");
 }
 
 /// Needs a small file system of its own, which only root can mount.
@@ -295,7 +298,7 @@ fn a_full_disk_leaves_no_half_written_folder() {
     assert!(
         matches!(
             error,
-            ExportError::DiskFull {
+            WriteError::DiskFull {
                 bytes: 1_100_000,
                 ..
             }

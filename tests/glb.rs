@@ -58,7 +58,6 @@ fn model<'a>(
         all_levels: false,
         metres_per_px,
         tolerance_px,
-        thorough: &|| true,
         node_extras: &[],
         provenance,
     }

@@ -37,7 +37,6 @@ fn model<'a>(
         all_levels: false,
         metres_per_px: 0.0,
         tolerance_px: KEY_TOLERANCE_PX,
-        thorough: &|| true,
         node_extras: &[],
         provenance,
     }

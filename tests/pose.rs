@@ -126,6 +126,7 @@ fn tree() -> Skeleton {
         certainty: 1.0,
         copy_of: None,
         plane_angle: 0.0,
+        kind: Default::default(),
     };
     let top = Point3::new(0.0, 100.0, 0.0);
     let branch = Vector3::new(60f64.to_radians().sin(), 60f64.to_radians().cos(), 0.0) * 80.0;

@@ -35,6 +35,7 @@ fn tree() -> Skeleton {
         certainty: 1.0,
         copy_of: None,
         plane_angle: 0.0,
+        kind: Default::default(),
     };
     let mut chance = Chance(3);
     let mut nodes = vec![

@@ -2,7 +2,7 @@
 
 mod support;
 
-use arborcam::capture::Captured;
+use arborcam::document::Document;
 use image::RgbaImage;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -87,7 +87,7 @@ fn the_front_view_lies_over_the_filmed_frame() {
         "the frame as it is"
     );
     assert_eq!(beside.get_pixel(1279, 0).0, [255, 0, 255, 255]);
-    let captured = Captured::read(Path::new(capture()), 0.0).unwrap();
+    let captured = Document::read(Path::new(capture()), 0.0).unwrap();
     let pose = captured.pose_in_picture.as_ref().unwrap();
     // Forks: between them branches curl, and a tip is thinner than a pixel.
     let children = captured.skeleton.children();

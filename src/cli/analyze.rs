@@ -7,31 +7,30 @@ mod written;
 use super::stop::Stop;
 use super::{Ended, say};
 use crate::cancel::CancelToken;
-use crate::capture::Captured;
-use crate::config::Excited;
-use crate::dynamics::analyse;
+use crate::config::{Config, Excited};
+use crate::document::{Document, DocumentError};
+use crate::dynamics::{Film, analyse};
 use crate::export::picture::data_address;
-use crate::export::{ExportError, refuse_taken};
-use crate::model::{Excitation, NodeName, Skeleton, Swaying};
-use crate::report::{Given, Study, compare, hints, json, page, text};
+use crate::files::refuse_taken;
+use crate::model::{Excitation, Pose, Skeleton, Swaying};
+use crate::report::{Comparison, Given, Study, compare, hints, json, page, text};
 use crate::tui::columns;
+use crate::views::update;
 use anyhow::anyhow;
 pub use options::AnalyzeArgs;
-use std::collections::BTreeMap;
 use std::io::{IsTerminal, Write};
-use std::path::PathBuf;
-use written::{differs, put_beside, put_into, stale};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+use written::{answers, put_beside};
 
 /// Film that is analysed at most, s, where a part is chosen: the end of a longer one. Points of
 /// hours would fill the memory.
 const LONGEST_S: f64 = 600.0;
 
-/// One capture and what is to be written into it.
+/// One capture, and the answers for its tables by node index.
 struct Analysed {
     study: Study,
-    sway: BTreeMap<NodeName, Swaying>,
-    /// Whether that is not what stood there.
-    differs: bool,
+    sway: Vec<Swaying>,
 }
 
 pub fn run(args: &AnalyzeArgs) -> Result<(), Ended> {
@@ -42,198 +41,203 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), Ended> {
     let stop = Stop::on_signals()?;
     let names = names(&args.dirs);
     // Before the first is worked on: a mistyped name is told at once.
-    let read: Vec<Captured> = args
-        .dirs
-        .iter()
-        .map(|dir| Captured::tree(dir))
-        .collect::<Result<_, _>>()?;
-    read.iter()
-        .try_for_each(|captured| args.scale.fits(captured.skeleton.image_size))?;
-    let all: Vec<Analysed> = read
-        .iter()
-        .zip(&names)
-        .map(|(captured, name)| analysed(args, captured, name))
-        .collect::<Result<_, _>>()?;
-    let (studies, answers): (Vec<Study>, Vec<_>) = all
-        .into_iter()
-        .map(|a| (a.study, (a.sway, a.differs)))
-        .unzip();
+    let mut documents = Vec::with_capacity(args.dirs.len());
+    for dir in &args.dirs {
+        let document = Document::tree(dir)?;
+        args.scale.fits(document.skeleton.image_size)?;
+        documents.push(document);
+    }
+    let (mut studies, mut answers) = (Vec::new(), Vec::new());
+    for (document, name) in documents.iter().zip(&names) {
+        let analysed = analysed(args, document, name)?;
+        studies.push(analysed.study);
+        answers.push(analysed.sway);
+    }
     let comparison = compare(&studies, args.trees.same());
     if comparison.as_ref().is_some_and(|c| c.same_tree.is_none()) {
         say(
             "arborcam: warning: nothing is compared: it cannot be told whether these are films of one tree; say --trees same or different",
         );
     }
-    let told = if args.json {
-        format!("{}\n", json(&studies, comparison.as_ref()))
-    } else {
-        text(&studies, comparison.as_ref(), columns().map(usize::from))
-    };
-    print(&told)?;
+    print(&table(args, &studies, comparison.as_ref()))?;
     let stop = stop.while_writing();
-    let mut failures: Vec<ExportError> = Vec::new();
-    if !args.no_write {
-        for (dir, (sway, differs)) in args.dirs.iter().zip(&answers) {
-            match put_into(dir, sway, stop) {
-                Ok(()) if *differs && dir.join("tree.glb").exists() => say(&stale(dir)),
-                Ok(()) => {}
-                Err(e) => failures.push(e),
-            }
+    let mut failures = Vec::new();
+    if args.update {
+        for (dir, sway) in args.dirs.iter().zip(&answers) {
+            failures.extend(update(dir, sway, stop).err().map(Ended::from));
         }
     }
     if let Some(path) = &args.report {
         let html = page(&studies, comparison.as_ref());
-        match put_beside(path, html, stop) {
-            Ok(()) => say(&format!("report:  {}", path.display())),
-            Err(e) => failures.push(e),
-        }
+        failures.extend(report(path, html, stop).err());
     }
-    if failures.iter().any(|e| matches!(e, ExportError::Stopped)) {
-        return Err(Ended::Stopped);
-    }
-    match failures.pop() {
-        None => Ok(()),
-        Some(last) => {
-            failures.iter().for_each(|e| say(&format!("arborcam: {e}")));
-            Err(Ended::Failed(last.into()))
-        }
+    ended(failures)
+}
+
+/// What is printed.
+fn table(args: &AnalyzeArgs, studies: &[Study], comparison: Option<&Comparison>) -> String {
+    if args.json {
+        format!("{}\n", json(studies, comparison))
+    } else {
+        text(studies, comparison, columns().map(usize::from))
     }
 }
 
-fn analysed(args: &AnalyzeArgs, captured: &Captured, name: &str) -> Result<Analysed, Ended> {
-    let mut own = captured.note.config.clone();
-    // What its tables are in.
-    own.export.metres_per_px = captured.metres_per_px();
-    let config = args.config(&own)?;
-    let dynamics = &config.dynamics;
-    // As at the end of a capture: points do not live for ever, and of those that are gone nothing
-    // is said.
-    let chosen = args.from.is_some() || args.to.is_some();
-    let longest_s = if chosen { LONGEST_S } else { dynamics.window_s };
-    let film = captured.tracked_within(longest_s, args.within_s())?;
-    let mut notes: Vec<String> = captured.note.warnings.clone();
-    let mut tell = |kind: &str, what: String| {
-        say(&format!("arborcam: {kind}: {name}: {what}"));
-        notes.push(what);
+fn report(path: &Path, html: String, stop: &AtomicBool) -> Result<(), Ended> {
+    put_beside(path, html, stop).map_err(super::export::unwritten)?;
+    say(&format!("report:  {}", path.display()));
+    Ok(())
+}
+
+/// The last failure ends the command; those before it are told here.
+fn ended(mut failures: Vec<Ended>) -> Result<(), Ended> {
+    if failures.iter().any(|e| matches!(e, Ended::Stopped)) {
+        return Err(Ended::Stopped);
+    }
+    let Some(last) = failures.pop() else {
+        return Ok(());
     };
-    captured
-        .warnings
-        .iter()
-        .for_each(|what| tell("warning", what.clone()));
-    let ends = film
-        .times_s
-        .first()
-        .copied()
-        .zip(film.times_s.last().copied());
-    let [from_s, to_s] = ends.map_or([0.0; 2], |(a, b)| [a, b]);
-    let duration_s = captured.note.timing.duration_s;
-    if let Some(from) = args
-        .from
-        .filter(|from| film.times_s.is_empty() && *from > duration_s)
-    {
-        let what = format!(
-            "--from {from} is after the end of {name}, which is {duration_s:.1} s long; choose an earlier part"
-        );
-        return Err(Ended::BadUsage(anyhow!(what)));
+    for failure in &failures {
+        if let Ended::Failed(e) | Ended::BadUsage(e) | Ended::NoInput(e) = failure {
+            say(&format!("arborcam: {e}"));
+        }
     }
-    let wanted_s = args.to.map_or(duration_s, |to| to.min(duration_s)) - args.from.unwrap_or(0.0);
-    if wanted_s > longest_s + 1.0 {
-        let (kind, what) = match chosen {
-            true => (
-                "warning",
-                format!(
-                    "the film is longer than {LONGEST_S:.0} s; its end is analysed; choose another part"
-                ),
-            ),
-            false => (
-                "note",
-                format!(
-                    "of {duration_s:.0} s of film the last {longest_s:.0} (dynamics.window_s) are analysed; choose others"
-                ),
-            ),
-        };
-        tell(kind, format!("{what} with --from and --to"));
+    Err(last)
+}
+
+/// What is said of a capture, at once and in its report.
+struct Notes<'a> {
+    name: &'a str,
+    all: Vec<String>,
+}
+
+impl Notes<'_> {
+    fn tell(&mut self, kind: &str, what: String) {
+        say(&format!("arborcam: {kind}: {}: {what}", self.name));
+        self.all.push(what);
     }
+}
+
+fn analysed(args: &AnalyzeArgs, document: &Document, name: &str) -> Result<Analysed, Ended> {
+    let mut own = document.note.config.clone();
+    // What its tables are in.
+    own.export.metres_per_px = document.metres_per_px();
+    let config = args.config(&own)?;
+    let mut notes = Notes {
+        name,
+        all: document.note.warnings.clone(),
+    };
+    for warning in &document.warnings {
+        notes.tell("warning", warning.clone());
+    }
+    let film = film(args, document, &config, &mut notes)?;
     // Nothing was measured on copies.
     let skeleton = Skeleton {
-        nodes: captured.skeleton.nodes[..captured.skeleton.measured()].to_vec(),
-        ..(*captured.skeleton).clone()
+        nodes: document.skeleton.nodes[..document.skeleton.measured()].to_vec(),
+        ..(*document.skeleton).clone()
     };
     let progress = Progress::begin(name, skeleton.nodes.len().saturating_sub(1));
-    let analysis = analyse(&skeleton, &film, dynamics, &CancelToken::new());
+    let analysis = analyse(&skeleton, &film, &config.dynamics, &CancelToken::new());
     drop(progress);
-    let given = dynamics.excitation != Excited::Auto;
-    hints(&film, &analysis, given)
-        .into_iter()
-        .for_each(|what| tell("note", what));
-    let mut poses = Vec::new();
-    let all = captured.film().map(|film| {
-        film.filter(|p| {
-            p.as_ref()
-                .map_or(true, |p| from_s <= p.time_s && p.time_s <= to_s)
-        })
-        .try_for_each(|pose| {
-            let mut pose = pose?;
-            pose.joints.truncate(skeleton.nodes.len());
-            poses.push(pose);
-            Ok(())
-        })
-    });
-    if let Err(e) = all.and_then(|done| done) {
-        tell(
+    let given = config.dynamics.excitation != Excited::Auto;
+    for hint in hints(&film, &analysis, given) {
+        notes.tell("note", hint);
+    }
+    let poses = poses_of(document, &film, skeleton.nodes.len()).unwrap_or_else(|e| {
+        notes.tell(
             "warning",
             format!("there are no plots of angles and spectra: {e}"),
         );
-        poses.clear();
-    }
-    let picture = captured.picture.as_ref().filter(|_| args.report.is_some());
+        Vec::new()
+    });
+    let picture = document.picture.as_ref().filter(|_| args.report.is_some());
     let picture = picture.and_then(|p| data_address(&p.rgb).ok());
-    let outline_px = captured
-        .note
-        .outline
-        .as_ref()
-        .map_or(&[][..], |o| &o.polygon_px);
-    let excitation = match dynamics.excitation {
-        Excited::Auto => None,
-        Excited::Release => Some(Excitation::Release),
-        Excited::Wind => Some(Excitation::Wind),
-    };
+    let outline = document.note.outline.as_ref();
     let study = Study::of(&Given {
         name,
-        source: &captured.note.source.name,
+        source: &document.note.source.name,
         skeleton: &skeleton,
         film: &film,
         poses: &poses,
         analysis: &analysis,
-        excitation,
+        excitation: excitation(config.dynamics.excitation),
         metres_per_px: config.export.metres_per_px,
-        highest_hz: dynamics.highest_hz,
-        outline_px,
+        highest_hz: config.dynamics.highest_hz,
+        outline_px: outline.map_or(&[][..], |o| &o.polygon_px),
         picture: picture.as_deref(),
-        notes: &notes,
+        notes: &notes.all,
     });
-    let differs = captured
-        .sway
-        .iter()
-        .zip(&analysis.sway)
-        .any(|(old, new)| differs(old, new));
-    let mut sway: BTreeMap<NodeName, Swaying> = skeleton
-        .nodes
-        .iter()
-        .map(|n| n.name)
-        .zip(analysis.sway)
-        .collect();
-    for branch in &study.branches {
-        // The file says what the table says.
-        if let Some(Ok(sway)) = sway.get_mut(&NodeName(branch.name)) {
-            sway.amplitude_deg = branch.amplitude_deg;
+    Ok(Analysed {
+        sway: answers(&skeleton, analysis.sway, &study),
+        study,
+    })
+}
+
+fn excitation(setting: Excited) -> Option<Excitation> {
+    match setting {
+        Excited::Auto => None,
+        Excited::Release => Some(Excitation::Release),
+        Excited::Wind => Some(Excitation::Wind),
+    }
+}
+
+/// The points that are analysed. As at the end of a capture these are of the last seconds: points
+/// do not live for ever, and of those that are gone nothing is said.
+fn film(
+    args: &AnalyzeArgs,
+    document: &Document,
+    config: &Config,
+    notes: &mut Notes,
+) -> Result<Film, Ended> {
+    let chosen = args.from.is_some() || args.to.is_some();
+    let window_s = config.dynamics.window_s;
+    let longest_s = if chosen { LONGEST_S } else { window_s };
+    let film = document.tracked_within(longest_s, args.within_s())?;
+    let duration_s = document.note.timing.duration_s;
+    if let Some(from) = args.from
+        && film.times_s.is_empty()
+        && from > duration_s
+    {
+        return Err(Ended::BadUsage(anyhow!(
+            "--from {from} is after the end of {}, which is {duration_s:.1} s long; choose an earlier part",
+            notes.name
+        )));
+    }
+    let to_s = args.to.map_or(duration_s, |to| to.min(duration_s));
+    if to_s - args.from.unwrap_or(0.0) <= longest_s + 1.0 {
+        return Ok(film);
+    }
+    if chosen {
+        notes.tell(
+            "warning",
+            format!(
+                "the film is longer than {LONGEST_S:.0} s; its end is analysed; choose another part with --from and --to"
+            ),
+        );
+    } else {
+        notes.tell(
+            "note",
+            format!(
+                "of {duration_s:.0} s of film the last {longest_s:.0} (dynamics.window_s) are analysed; choose others with --from and --to"
+            ),
+        );
+    }
+    Ok(film)
+}
+
+/// The poses of the first `nodes` nodes in the time of `film`.
+fn poses_of(document: &Document, film: &Film, nodes: usize) -> Result<Vec<Pose>, DocumentError> {
+    let from_s = film.times_s.first().copied().unwrap_or(0.0);
+    let to_s = film.times_s.last().copied().unwrap_or(0.0);
+    let mut poses = Vec::new();
+    for pose in document.film()? {
+        let mut pose = pose?;
+        if from_s <= pose.time_s && pose.time_s <= to_s {
+            pose.joints.truncate(nodes);
+            poses.push(pose);
         }
     }
-    Ok(Analysed {
-        study,
-        sway,
-        differs,
-    })
+    Ok(poses)
 }
 
 /// A line on the terminal while a capture is analysed, gone when this is dropped.
@@ -262,41 +266,51 @@ impl Drop for Progress {
 /// What the captures are called: the names of their folders, with as much of the way to them as
 /// tells them apart.
 fn names(dirs: &[PathBuf]) -> Vec<String> {
-    let parts = |dir: &PathBuf| -> Vec<String> {
-        let dir = std::path::absolute(dir).unwrap_or_else(|_| dir.clone());
-        let dir = dir.canonicalize().unwrap_or(dir);
-        dir.components()
-            .map(|c| c.as_os_str().to_string_lossy().into_owned())
-            .collect()
-    };
-    let all: Vec<Vec<String>> = dirs.iter().map(parts).collect();
-    let end = |parts: &[String], n: usize| parts[parts.len().saturating_sub(n)..].join("/");
+    let all: Vec<Vec<String>> = dirs.iter().map(|dir| parts(dir)).collect();
     let longest = all.iter().map(Vec::len).max().unwrap_or(1);
-    let name = |parts: &Vec<String>| {
-        let alone = |n: &usize| {
-            all.iter()
-                .filter(|other| end(other, *n) == end(parts, *n))
-                .count()
-                == 1
-        };
-        end(parts, (1..=longest).find(alone).unwrap_or(longest))
-    };
-    all.iter().map(name).collect()
+    let mut names = Vec::with_capacity(all.len());
+    for own in &all {
+        let mut length = 1;
+        while length < longest && is_shared(&all, own, length) {
+            length += 1;
+        }
+        names.push(end(own, length));
+    }
+    names
+}
+
+/// The folders that lead to `dir`, and its name.
+fn parts(dir: &Path) -> Vec<String> {
+    let dir = std::path::absolute(dir).unwrap_or_else(|_| dir.to_owned());
+    let dir = dir.canonicalize().unwrap_or(dir);
+    dir.components()
+        .map(|c| c.as_os_str().to_string_lossy().into_owned())
+        .collect()
+}
+
+/// The last `length` parts of a path.
+fn end(parts: &[String], length: usize) -> String {
+    parts[parts.len().saturating_sub(length)..].join("/")
+}
+
+/// Whether the last `length` parts are those of several paths.
+fn is_shared(all: &[Vec<String>], own: &[String], length: usize) -> bool {
+    let same = all
+        .iter()
+        .filter(|other| end(other, length) == end(own, length));
+    same.count() > 1
 }
 
 fn print(text: &str) -> Result<(), Ended> {
     let mut out = std::io::stdout().lock();
     let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
-    // Whoever closed standard output early has seen what they wanted.
-    written
-        .or_else(|e| {
-            if e.kind() == std::io::ErrorKind::BrokenPipe {
-                Ok(())
-            } else {
-                Err(e)
-            }
-        })
-        .map_err(|e| Ended::Failed(anyhow!("cannot write to standard output: {e}")))
+    match written {
+        // A reader that closed it early has seen what it wanted.
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Ended::Failed(anyhow!(
+            "cannot write to standard output: {e}"
+        ))),
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]

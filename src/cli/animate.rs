@@ -5,24 +5,27 @@ mod options;
 
 pub use options::AnimateArgs;
 
-use super::export::page;
+use super::export::failed;
 use super::hangup::SighupAction;
-use super::render::{self, RenderArgs, drawn, failed};
+use super::render::{self, unwritten};
 use super::session::stop_on_signals;
-use super::shaping::Made;
 use super::stop::Stop;
+use super::tree::{Tail, warn};
 use super::{Ended, say};
 use crate::animate::{Animator, Known, Loudness, Magnify, Wind, magnify, place_to_pull};
 use crate::config::Config;
-use crate::export::csv::MotionCsv;
+use crate::document::{DocumentError, MotionCsv};
 use crate::export::gltf::{NamedBytes, glb, gltf_files};
-use crate::export::{ExportError, html, refuse_taken, write_files};
+use crate::export::{ExportError, html};
+use crate::files::{refuse_taken, write_files};
 use crate::model::{NodeId, Pose, Swaying};
 use crate::tui;
+use crate::views::{PreparedTree, Shot};
 use anyhow::{Context, anyhow};
 use live::{AsFilmed, InWind};
 use options::Kind;
 use serde_json::{Value, json};
+use std::ffi::OsStr;
 use std::io::IsTerminal;
 use std::path::Path;
 use std::sync::atomic::Ordering;
@@ -39,19 +42,19 @@ pub fn run(args: &AnimateArgs) -> Result<(), Ended> {
     let kind = args
         .check(out)
         .map_err(|why| Ended::BadUsage(anyhow!(why)))?;
-    refuse_taken(out).map_err(failed)?;
+    refuse_taken(out).map_err(unwritten)?;
     if kind == Kind::Html {
         html::built_in().map_err(failed)?;
     }
     let stop = Stop::on_signals()?;
     let sound = args.wav.as_deref().map(sound).transpose()?;
-    let mut made = made(args)?;
+    let mut tree = tree(args)?;
     let (poses, what) = match args.magnify {
         Some(by) => {
             let poses = magnify(
-                &made.skeleton,
-                &made.poses,
-                &magnified(args, &made, by),
+                &tree.skeleton,
+                &tree.poses,
+                &magnified(args, &tree, by),
                 args.fps,
                 args.count(),
             );
@@ -60,10 +63,10 @@ pub fn run(args: &AnimateArgs) -> Result<(), Ended> {
                 json!({ "captured": { "times": by, "speed": args.speed } }),
             )
         }
-        None => blown(args, &made, sound)?,
+        None => blown(args, &tree, sound)?,
     };
-    made.animate(poses, args.looped, what);
-    write(args, out, kind, &made, &stop)
+    tree.animate(poses, args.looped, what);
+    write(args, out, kind, &tree, &stop)
 }
 
 /// On the terminal, until the user leaves.
@@ -73,16 +76,16 @@ fn live(args: &AnimateArgs) -> Result<(), Ended> {
         return Err(Ended::BadUsage(anyhow!(why)));
     }
     let sound = args.wav.as_deref().map(sound).transpose()?;
-    let made = made(args)?;
+    let tree = tree(args)?;
     let mut moving: Box<dyn tui::Moving> = match args.magnify {
         Some(by) => {
-            let wanted = magnified(args, &made, by);
-            Box::new(AsFilmed::new(&made, wanted).map_err(|e| Ended::Failed(e.into()))?)
+            let wanted = magnified(args, &tree, by);
+            Box::new(AsFilmed::new(&tree, wanted).map_err(|e| Ended::Failed(e.into()))?)
         }
         None => {
-            let mut animator = animator(&made, sound, PERIOD_S);
+            let mut animator = animator(&tree, sound, PERIOD_S);
             animator.warm_up();
-            Box::new(InWind::new(&made, animator))
+            Box::new(InWind::new(&tree, animator))
         }
     };
     let stop = stop_on_signals(SighupAction::ends_this_process())?;
@@ -96,34 +99,35 @@ fn live(args: &AnimateArgs) -> Result<(), Ended> {
 }
 
 /// The tree, with the wind that is asked for, and all of its film where that is to be changed.
-fn made(args: &AnimateArgs) -> Result<Made, Ended> {
-    let film_s = |film_s: f64| {
-        Some(if args.magnify.is_some() {
-            film_s + 1.0
-        } else {
-            0.0
-        })
+fn tree(args: &AnimateArgs) -> Result<PreparedTree, Ended> {
+    let tail = match args.magnify {
+        Some(_) => Tail::Whole,
+        None => Tail::Seconds(0.0),
     };
-    let mut made = args.shaping.made_with(&args.dir, film_s)?;
-    args.set(&mut made.config)
-        .map_err(|e| Ended::BadUsage(e.into()))?;
-    for warning in &made.captured.warnings {
-        say(&format!("arborcam: warning: {warning}"));
+    let mut tree = args.tree.prepare(&args.dir, tail)?;
+    if args.magnify.is_some() && !tree.document.has_motion() {
+        return Err(DocumentError::NoFilm {
+            dir: args.dir.clone(),
+            file: "motion.csv",
+        }
+        .into());
     }
-    Ok(made)
+    args.set(&mut tree.config)
+        .map_err(|e| Ended::BadUsage(e.into()))?;
+    warn(&tree);
+    Ok(tree)
 }
 
 /// The loudness of a WAV file.
 fn sound(path: &Path) -> Result<Loudness, Ended> {
-    let unfit = |e: anyhow::Error| Ended::BadUsage(e.context(format!("--wav {}", path.display())));
-    let bytes = std::fs::read(path)
+    let sound = std::fs::read(path)
         .context("cannot read it")
-        .map_err(unfit)?;
-    Loudness::of_wav(&bytes).map_err(|e| unfit(e.into()))
+        .and_then(|bytes| Ok(Loudness::of_wav(&bytes)?));
+    sound.map_err(|e| Ended::BadUsage(e.context(format!("--wav {}", path.display()))))
 }
 
-fn magnified(args: &AnimateArgs, made: &Made, by: f64) -> Magnify {
-    let most_rad = made.config.wind.max_bend_deg.to_radians();
+fn magnified(args: &AnimateArgs, tree: &PreparedTree, by: f64) -> Magnify {
+    let most_rad = tree.config.wind.max_bend_deg.to_radians();
     Magnify {
         by,
         speed: args.speed,
@@ -134,14 +138,14 @@ fn magnified(args: &AnimateArgs, made: &Made, by: f64) -> Magnify {
 }
 
 /// The tree at rest in its wind, which comes back after `period_s`.
-fn animator(made: &Made, sound: Option<Loudness>, period_s: f64) -> Animator {
-    let settings = &made.config.wind;
-    let mut wind = Wind::new(settings, period_s, metres_per_px(made));
+fn animator(tree: &PreparedTree, sound: Option<Loudness>, period_s: f64) -> Animator {
+    let settings = &tree.config.wind;
+    let mut wind = Wind::new(settings, period_s, metres_per_px(tree));
     if let Some(sound) = sound {
         wind = wind.driven_by(sound);
     }
-    let known: Vec<Known> = made.sway.iter().map(known).collect();
-    let animator = Animator::new(made.skeleton.clone(), &known, settings, wind);
+    let known: Vec<Known> = tree.sway.iter().map(known).collect();
+    let animator = Animator::new(tree.skeleton.clone(), &known, settings, wind);
     if animator.tuning().all(|t| !t.measured) {
         say(&format!(
             "arborcam: warning: the capture has no frequency of any branch; they are taken from thickness and length, the \
@@ -155,7 +159,7 @@ fn animator(made: &Made, sound: Option<Loudness>, period_s: f64) -> Animator {
 /// The tree in the wind, or pulled and let go.
 fn blown(
     args: &AnimateArgs,
-    made: &Made,
+    tree: &PreparedTree,
     sound: Option<Loudness>,
 ) -> Result<(Vec<Pose>, Value), Ended> {
     let count = args.count();
@@ -172,11 +176,11 @@ fn blown(
         ));
     }
     let sound = sound.map(|s| if args.looped { s.looped(length_s) } else { s });
-    let mut animator = animator(made, sound, period_s);
+    let mut animator = animator(tree, sound, period_s);
     if args.looped {
         animator.close(length_s, args.fps);
     } else if let Some(lean_deg) = args.pull {
-        pull(args, made, &mut animator, lean_deg)?;
+        pull(args, tree, &mut animator, lean_deg)?;
     } else {
         animator.warm_up();
     }
@@ -197,7 +201,7 @@ fn blown(
         }
     }
     let what = json!({
-        "wind": made.config.wind,
+        "wind": tree.config.wind,
         "pull_deg": args.pull,
         "loop": args.looped,
         "branches": animator.tuning().len() - 1,
@@ -209,27 +213,25 @@ fn blown(
 /// Hangs the tree in its rope.
 fn pull(
     args: &AnimateArgs,
-    made: &Made,
+    tree: &PreparedTree,
     animator: &mut Animator,
     lean_deg: f64,
 ) -> Result<(), Ended> {
-    let nodes = &made.skeleton.nodes;
+    let nodes = &tree.skeleton.nodes;
     let node = match args.pull_node {
         Some(name) => {
-            let unknown = || {
+            let found = (1..nodes.len()).find(|&i| nodes[i].name.0 == name);
+            found.ok_or_else(|| {
                 Ended::BadUsage(anyhow!(
                     "--pull-node {name} is no node of this tree; see nodes.csv"
                 ))
-            };
-            (1..nodes.len())
-                .find(|&i| nodes[i].name.0 == name)
-                .ok_or_else(unknown)?
+            })?
         }
-        None => place_to_pull(&made.skeleton).index(),
+        None => place_to_pull(&tree.skeleton).index(),
     };
     let reached_deg = animator.pull_aside(
         NodeId(node as u32),
-        made.config.wind.direction_deg,
+        tree.config.wind.direction_deg,
         lean_deg,
     );
     if reached_deg < lean_deg - 0.1 {
@@ -252,9 +254,9 @@ fn known(sway: &Swaying) -> Known {
 }
 
 /// The capture's scale, or that of a tree of the height that the configuration says.
-fn metres_per_px(made: &Made) -> f64 {
-    let given = made.config.export.metres_per_px;
-    let height_px = made
+fn metres_per_px(tree: &PreparedTree) -> f64 {
+    let given = tree.config.export.metres_per_px;
+    let height_px = tree
         .skeleton
         .nodes
         .iter()
@@ -263,7 +265,7 @@ fn metres_per_px(made: &Made) -> f64 {
     if given > 0.0 {
         given
     } else {
-        made.config.wind.tree_height_m / height_px
+        tree.config.wind.tree_height_m / height_px
     }
 }
 
@@ -271,63 +273,50 @@ fn write(
     args: &AnimateArgs,
     out: &Path,
     kind: Kind,
-    made: &Made,
+    tree: &PreparedTree,
     stop: &Stop,
 ) -> Result<(), Ended> {
-    let part = |of: Option<&std::ffi::OsStr>| of.unwrap_or_default().to_string_lossy().into_owned();
-    let (name, stem) = (part(out.file_name()), part(out.file_stem()));
-    let model = made.model();
+    let name = text(out.file_name());
+    let stem = text(out.file_stem());
+    let model = tree.model();
     let files: Result<Vec<NamedBytes>, ExportError> = match kind {
         Kind::Glb => glb(&model).map(|(bytes, _)| vec![(name, bytes)]),
         Kind::Gltf => gltf_files(&model, &stem).map(|(files, _)| files),
-        Kind::Html => page(made, &model, &stem).map(|bytes| vec![(name, bytes)]),
-        Kind::Csv => table(made).map(|bytes| vec![(name, bytes)]),
-        Kind::Video => return drawn(&picture(args, out), render::Kind::Video, made, stop),
-        Kind::Picture => return drawn(&picture(args, out), render::Kind::Picture, made, stop),
+        Kind::Html => tree.page(&model, &stem).map(|bytes| vec![(name, bytes)]),
+        Kind::Csv => table(tree).map(|bytes| vec![(name, bytes)]),
+        Kind::Video => return render::draw(tree, &args.shot(), render::Kind::Video, out, stop),
+        Kind::Picture => {
+            // Of the end.
+            let shot = Shot {
+                at_s: Some(args.length_s()),
+                ..args.shot()
+            };
+            return render::draw(tree, &shot, render::Kind::Picture, out, stop);
+        }
     };
     let files = files.map_err(failed)?;
     let size: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();
-    write_files(
-        out.parent().unwrap_or(Path::new("")),
-        &files,
-        stop.while_writing(),
-    )
-    .map_err(failed)?;
+    let folder = out.parent().unwrap_or(Path::new(""));
+    write_files(folder, &files, stop.while_writing()).map_err(unwritten)?;
     say(&format!(
         "{}: {} poses, {:.1} MB",
         out.display(),
-        made.poses.len(),
+        tree.poses.len(),
         size as f64 / 1e6
     ));
     Ok(())
 }
 
-/// The motion in the form of a capture's `motion.csv`.
-fn table(made: &Made) -> Result<Vec<u8>, ExportError> {
-    let mut motion = MotionCsv::new(Vec::new(), &made.skeleton, made.config.export.metres_per_px)?;
-    made.poses.iter().try_for_each(|pose| motion.pose(pose))?;
-    motion.finish()
+fn text(part: Option<&OsStr>) -> String {
+    part.unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// As `render` would be asked; a picture is of the end.
-fn picture(args: &AnimateArgs, out: &Path) -> RenderArgs {
-    let length_s = args.count() as f64 / args.fps;
-    let video = out
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("mp4"));
-    RenderArgs {
-        dir: args.dir.clone(),
-        view: args.view,
-        turn: 0.0,
-        out: out.to_owned(),
-        at: (!video).then_some(length_s),
-        pose: None,
-        size: args.size,
-        background: args.background,
-        film: None,
-        bare: args.bare,
-        seconds: video.then_some(length_s),
-        fps: args.fps,
-        shaping: super::shaping::Shaping::default(),
+/// The motion in the form of a capture's `motion.csv`.
+fn table(tree: &PreparedTree) -> Result<Vec<u8>, ExportError> {
+    let metres_per_px = tree.config.export.metres_per_px;
+    let mut motion = MotionCsv::new(Vec::new(), &tree.skeleton, metres_per_px)?;
+    for pose in &tree.poses {
+        motion.pose(pose)?;
     }
+    Ok(motion.finish()?)
 }

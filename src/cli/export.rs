@@ -1,21 +1,17 @@
 //! `arborcam export DIR --format F --out PATH`: a capture's tree as a file for other programs.
 
-use super::shaping::{Made, Shaping};
 use super::stop::Stop;
+use super::tree::{Tail, TreeArgs, warn};
 use super::{Ended, idle, say};
-use crate::export::csv::{MotionCsv, nodes};
-use crate::export::cylinders::cylinders;
 use crate::export::gltf::{KEY_TOLERANCE_PX, Model, NamedBytes, glb, gltf_files};
 use crate::export::still::{obj_files, ply};
-use crate::export::{ExportError, OutputFolder, html, refuse_taken, tracks_of, write_files};
-use crate::model::NodeName;
-use crate::shape::cylinders as cylinders_of;
+use crate::export::{ExportError, html};
+use crate::files::{WriteError, refuse_taken, write_files};
+use crate::views::PreparedTree;
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
-use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
 
 /// Where the data goes instead of into a file.
 const STDOUT: &str = "-";
@@ -41,7 +37,7 @@ pub struct ExportArgs {
     #[arg(long)]
     lods: bool,
     #[command(flatten)]
-    shaping: Shaping,
+    tree: TreeArgs,
 }
 
 impl ExportArgs {
@@ -78,62 +74,78 @@ fn tolerance(text: &str) -> Result<f64, String> {
 
 pub fn run(args: &ExportArgs) -> Result<(), Ended> {
     let target = Target::of(args)?;
-    target.refuse_taken().map_err(failed)?;
+    target.refuse_taken().map_err(unwritten)?;
     if args.format == Format::Html {
         html::built_in().map_err(failed)?;
     }
     let stop = Stop::on_signals()?;
-    let made = args.shaping.made(&args.dir)?;
-    for warning in &made.captured.warnings {
-        say(&format!("arborcam: warning: {warning}"));
-    }
+    let tree = args.tree.prepare(&args.dir, Tail::Animation)?;
+    warn(&tree);
     args.tell_idle();
+    if args.format == Format::Csv {
+        return tables(args, &tree, &stop);
+    }
     let model = Model {
         tolerance_px: args.tolerance_px,
         all_levels: args.lods && args.format != Format::Html,
-        ..made.model()
+        ..tree.model()
     };
-    let metres_per_px = made.config.export.metres_per_px;
-    let stem = target.stem();
-    let files = match args.format {
-        Format::Csv => return tables(args, &made, &stop),
-        Format::Html => page(&made, &model, &stem).map(|bytes| vec![(target.name(), bytes)]),
-        Format::Glb => glb(&model).map(|(bytes, _)| vec![(target.name(), bytes)]),
-        Format::Gltf => gltf_files(&model, &stem).map(|(files, _)| files),
-        Format::Obj => obj_files(&made.dressed, &stem, metres_per_px),
-        Format::Ply => ply(&made.dressed, metres_per_px).map(|bytes| vec![(target.name(), bytes)]),
-    };
-    target.write(files.map_err(failed)?, &stop)
+    let files = files(args.format, &tree, &model, &target).map_err(failed)?;
+    target.write(files, &stop)
 }
 
-/// The model as a page that shows it.
-pub fn page(made: &Made, model: &Model, title: &str) -> Result<Vec<u8>, ExportError> {
-    let (model, _) = glb(model)?;
-    let captured = &made.captured;
-    let metres_per_px = made.config.export.metres_per_px;
-    let data = html::Data::of(
-        &captured.note,
-        &made.skeleton,
-        &made.poses,
-        &made.sway,
-        metres_per_px,
-    );
-    let picture = captured.picture.as_ref().map(|p| &*p.rgb);
-    html::page(&html::Page {
-        title,
-        glb: &model,
-        data: &data,
-        picture,
-    })
-    .map(String::into_bytes)
+/// The files of all formats but tables.
+fn files(
+    format: Format,
+    tree: &PreparedTree,
+    model: &Model,
+    target: &Target,
+) -> Result<Vec<NamedBytes>, ExportError> {
+    let (stem, metres_per_px) = (target.stem(), model.metres_per_px);
+    let bytes = match format {
+        Format::Gltf => return gltf_files(model, &stem).map(|(files, _)| files),
+        Format::Obj => return obj_files(&tree.dressed, &stem, metres_per_px),
+        Format::Html => tree.page(model, &stem)?,
+        Format::Ply => ply(&tree.dressed, metres_per_px)?,
+        Format::Glb | Format::Csv => glb(model)?.0,
+    };
+    Ok(vec![(target.name(), bytes)])
+}
+
+/// The tables, as they are or of the changed tree, and the wood as cylinders.
+fn tables(args: &ExportArgs, tree: &PreparedTree, stop: &Stop) -> Result<(), Ended> {
+    let written = tree.write_tables(&args.out, stop.while_writing())?;
+    let film = if written.film {
+        "nodes, motion and tracks"
+    } else {
+        "nodes (there is no film)"
+    };
+    say(&format!(
+        "{}: {film}, {} cylinders",
+        written.dir.display(),
+        written.cylinders
+    ));
+    Ok(())
+}
+
+/// How a command ends whose files could not be made.
+pub fn failed(e: ExportError) -> Ended {
+    match e {
+        ExportError::Write(e) => unwritten(e),
+        e => Ended::Failed(e.into()),
+    }
 }
 
 /// How a command ends whose files could not be written.
-pub fn failed(e: ExportError) -> Ended {
+pub fn unwritten(e: WriteError) -> Ended {
     match e {
-        ExportError::Stopped => Ended::Stopped,
+        WriteError::Stopped => Ended::Stopped,
         e => Ended::Failed(e.into()),
     }
+}
+
+fn bad_usage<T>(why: String) -> Result<T, Ended> {
+    Err(Ended::BadUsage(anyhow!(why)))
 }
 
 /// The file that was asked for; others may come beside it.
@@ -144,16 +156,15 @@ enum Target<'a> {
 
 impl<'a> Target<'a> {
     fn of(args: &'a ExportArgs) -> Result<Self, Ended> {
-        let unfit = |why: String| Err(Ended::BadUsage(anyhow!(why)));
         let shown = args.out.display();
         if args.out.as_os_str() == STDOUT {
             return match args.format {
                 Format::Glb | Format::Html | Format::Ply => Ok(Self::Stdout),
-                _ => unfit("--out -: this format is more than one file; give a path".into()),
+                _ => bad_usage("--out -: this format is more than one file; give a path".into()),
             };
         }
         if args.out.file_name().is_none() {
-            return unfit(format!(
+            return bad_usage(format!(
                 "--out {shown} is no name for a file; choose another"
             ));
         }
@@ -170,7 +181,7 @@ impl<'a> Target<'a> {
             .extension()
             .is_none_or(|e| !e.eq_ignore_ascii_case(ending))
         {
-            return unfit(format!(
+            return bad_usage(format!(
                 "--out {shown} does not end in .{ending}, as this format must"
             ));
         }
@@ -200,7 +211,7 @@ impl<'a> Target<'a> {
     }
 
     /// Told before anything is worked out.
-    fn refuse_taken(&self) -> Result<(), ExportError> {
+    fn refuse_taken(&self) -> Result<(), WriteError> {
         match self {
             Self::Stdout => Ok(()),
             Self::Beside(path) => refuse_taken(path),
@@ -220,65 +231,10 @@ impl<'a> Target<'a> {
             Self::Beside(path) => {
                 let size: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();
                 let folder = path.parent().unwrap_or(Path::new(""));
-                write_files(folder, &files, stop.while_writing()).map_err(failed)?;
+                write_files(folder, &files, stop.while_writing()).map_err(unwritten)?;
                 say(&format!("{}: {:.1} MB", path.display(), size as f64 / 1e6));
                 Ok(())
             }
         }
     }
-}
-
-/// The tables of the capture, as they are or of the changed tree, and the wood as cylinders.
-fn tables(args: &ExportArgs, made: &Made, stop: &Stop) -> Result<(), Ended> {
-    let rows = cylinders_of(&made.dressed.limbs);
-    let stop = stop.while_writing();
-    let folder = OutputFolder::create(&args.out).map_err(failed)?;
-    let metres_per_px = made.config.export.metres_per_px;
-    let names: BTreeSet<NodeName> = made.skeleton.nodes.iter().map(|n| n.name).collect();
-    // Nothing was measured on copies.
-    if made
-        .captured
-        .skeleton
-        .nodes
-        .iter()
-        .all(|n| n.copy_of.is_some() || names.contains(&n.name))
-    {
-        folder.copy("tracks.csv", &args.dir, stop).map_err(failed)?;
-    } else {
-        tracks_of(&folder, &args.dir, &names, stop).map_err(failed)?;
-    }
-    if !made.reshaped && metres_per_px == made.captured.note.config.export.metres_per_px {
-        folder.copy("nodes.csv", &args.dir, stop).map_err(failed)?;
-        folder.copy("motion.csv", &args.dir, stop).map_err(failed)?;
-    } else {
-        let file = |name| folder.file(name).map_err(failed);
-        nodes(
-            file("nodes.csv")?,
-            &made.skeleton,
-            &made.sway,
-            metres_per_px,
-        )
-        .map_err(failed)?;
-        let mut motion =
-            MotionCsv::new(file("motion.csv")?, &made.skeleton, metres_per_px).map_err(failed)?;
-        // Not only the poses of the animation: `tracks.csv` beside it is of the whole film.
-        for pose in made.film()? {
-            if stop.load(Ordering::SeqCst) {
-                return Err(Ended::Stopped);
-            }
-            motion.pose(&pose?).map_err(failed)?;
-        }
-        motion.finish().map_err(failed)?;
-    }
-    let write_rows = || cylinders(folder.file("cylinders.csv")?, &rows, metres_per_px).map(drop);
-    write_rows()
-        .and_then(|()| folder.publish())
-        .map_err(failed)
-        .map(|dir| {
-            say(&format!(
-                "{}: nodes, motion and tracks, {} cylinders",
-                dir.display(),
-                rows.len()
-            ));
-        })
 }

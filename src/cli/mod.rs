@@ -19,9 +19,9 @@ mod scale;
 mod service;
 mod session;
 mod shape;
-mod shaping;
 mod stop;
 mod supervisor;
+mod tree;
 
 use crate::config::{Config, ConfigError};
 use crate::outline::OutlineSpec;

@@ -43,34 +43,23 @@ impl ScaleArgs {
 
     /// Refuses a known length that was not measured in a picture of this size.
     pub fn fits(&self, size: Size) -> Result<(), Ended> {
-        let sides = [size.width, size.height].map(f64::from);
-        // To the rim of the last pixel, as a mouse may tell it.
-        let within = |p: &[f64; 2]| (0..2).all(|c| (-0.5..=sides[c]).contains(&p[c]));
-        match self
-            .scale
-            .iter()
-            .flat_map(|known| known.ends)
-            .find(|p| !within(p))
-        {
-            None => Ok(()),
-            Some([u, v]) => Err(Ended::BadUsage(anyhow!(
-                "--scale: {u},{v} lies off the picture, which is {size} pixels; give two points of a frame of this film"
-            ))),
+        for [u, v] in self.scale.iter().flat_map(|known| known.ends) {
+            // To the rim of the last pixel, as a mouse may tell it.
+            let inside = (-0.5..=f64::from(size.width)).contains(&u)
+                && (-0.5..=f64::from(size.height)).contains(&v);
+            if !inside {
+                return Err(Ended::BadUsage(anyhow!(
+                    "--scale: {u},{v} lies off the picture, which is {size} pixels; give two points of a frame of this film"
+                )));
+            }
         }
+        Ok(())
     }
 }
 
 fn length(text: &str) -> Result<Known, String> {
-    let how = || "give two points and their distance in metres, like 310,340:305,80=2.6".to_owned();
-    let number = |t: &str| t.trim().parse().ok().filter(|x: &f64| x.is_finite());
-    let point = |t: &str| {
-        let (u, v) = t.split_once(',')?;
-        Some([number(u)?, number(v)?])
-    };
-    let (points, metres) = text.split_once('=').ok_or_else(how)?;
-    let (a, b) = points.split_once(':').ok_or_else(how)?;
-    let (a, b) = point(a).zip(point(b)).ok_or_else(how)?;
-    let metres = number(metres.trim().trim_end_matches('m')).ok_or_else(how)?;
+    let ([a, b], metres) = drawn(text)
+        .ok_or("give two points and their distance in metres, like 310,340:305,80=2.6")?;
     let px = (a[0] - b[0]).hypot(a[1] - b[1]);
     if px < 1.0 {
         return Err("the two points must be at least a pixel apart".into());
@@ -84,6 +73,23 @@ fn length(text: &str) -> Result<Known, String> {
     } else {
         Err("the distance must be more than 0 metres".into())
     }
+}
+
+/// Two points, px, and how far they are apart, m.
+fn drawn(text: &str) -> Option<([[f64; 2]; 2], f64)> {
+    let (points, metres) = text.split_once('=')?;
+    let (a, b) = points.split_once(':')?;
+    let metres = number(metres.trim().trim_end_matches('m'))?;
+    Some(([point(a)?, point(b)?], metres))
+}
+
+fn point(text: &str) -> Option<[f64; 2]> {
+    let (u, v) = text.split_once(',')?;
+    Some([number(u)?, number(v)?])
+}
+
+fn number(text: &str) -> Option<f64> {
+    text.trim().parse().ok().filter(|x: &f64| x.is_finite())
 }
 
 #[cfg(test)]

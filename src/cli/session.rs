@@ -7,7 +7,7 @@ use super::service::Service;
 use super::supervisor::CaptureSupervisor;
 use super::{Common, Ended, say};
 use crate::config::Config;
-use crate::export::OutputFolder;
+use crate::files::OutputFolder;
 use crate::outline::{self, OutlineSpec};
 use crate::runtime::{self, Failure, Job, Pace, Running, Summary};
 use crate::source::{Source, SourceError, SourceInfo};

@@ -142,6 +142,7 @@ mod tests {
             certainty: 1.0,
             copy_of: None,
             plane_angle: 0.0,
+            kind: Default::default(),
         };
         let nodes = at.iter().enumerate().map(node).collect();
         Skeleton {

@@ -1,7 +1,7 @@
 //! `cylinders.csv`: the wood as the tools for quantitative structure models exchange it.
 
-use super::ExportError;
-use super::csv::{Table, unit};
+use crate::document::{TableWriter, unit};
+use crate::files::WriteError;
 use crate::shape::Cylinder;
 use std::io::Write;
 
@@ -13,28 +13,22 @@ length,branch,branch_order";
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn cylinders<W: Write>(
-    out: W,
-    rows: &[Cylinder],
-    metres_per_px: f64,
-) -> Result<W, ExportError> {
-    let mut table = Table::new("cylinders.csv", CYLINDERS_HEADER, out)?;
+pub fn cylinders<W: Write>(out: W, rows: &[Cylinder], metres_per_px: f64) -> Result<W, WriteError> {
+    let mut table = TableWriter::new("cylinders.csv", CYLINDERS_HEADER, out)?;
     let (scale, more) = unit(metres_per_px);
     for (id, row) in (1_u64..).zip(rows) {
         table.count(id);
         table.count(row.parent.map_or(0, |p| p as u64 + 1));
-        row.start
-            .iter()
-            .chain(row.end.iter())
-            .for_each(|x| table.number(x * scale, 4 + more));
+        for x in row.start.iter().chain(row.end.iter()) {
+            table.number(x * scale, 4 + more);
+        }
         let way = row.end - row.start;
-        way.try_normalize(1e-12)
-            .unwrap_or_default()
-            .iter()
-            .for_each(|x| table.number(*x, 6));
-        [row.radius, way.norm()]
-            .iter()
-            .for_each(|x| table.number(x * scale, 4 + more));
+        for x in way.try_normalize(1e-12).unwrap_or_default().iter() {
+            table.number(*x, 6);
+        }
+        for length in [row.radius, way.norm()] {
+            table.number(length * scale, 4 + more);
+        }
         table.count(row.branch as u64 + 1);
         table.count(row.order);
         table.end_row()?;

@@ -1,23 +1,55 @@
 //! Pictures as a video, through ffmpeg as a child process (H.264 in MP4, which everything plays).
 
-use super::{ExportError, OutputFile};
+use super::ExportError;
+use crate::ffmpeg::{Ffmpeg, plain};
+use crate::files::OutputFile;
 use crate::model::Size;
 use std::ffi::OsString;
-use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read, Seek, Write};
-use std::os::unix::process::CommandExt;
+use std::io::{self, Write};
 use std::path::Path;
-use std::process::{Child, ChildStdin, Command, Stdio};
+use std::process::{ChildStdin, Command, Stdio};
+
+/// The pictures come as they are; their number a second and their size are told before.
+const INPUT: [&str; 8] = [
+    "-hide_banner",
+    "-v",
+    "error",
+    "-y",
+    "-f",
+    "rawvideo",
+    "-pix_fmt",
+    "rgb24",
+];
+const ENCODER: [&str; 8] = [
+    "-vf",
+    "pad=ceil(iw/2)*2:ceil(ih/2)*2",
+    "-c:v",
+    "libx264",
+    "-crf",
+    "20",
+    "-pix_fmt",
+    "yuv420p",
+];
+/// With more threads, and with the version in the file, the bytes would depend on the machine.
+const REPRODUCIBLE: [&str; 6] = [
+    "-threads",
+    "1",
+    "-fflags",
+    "+bitexact",
+    "-flags:v",
+    "+bitexact",
+];
+const CONTAINER: [&str; 4] = ["-movflags", "+faststart", "-f", "mp4"];
 
 /// A video while it is written. Dropped without [`Film::finish`], it leaves nothing behind.
 #[derive(Debug)]
 pub struct Film {
+    // In this order they are dropped: ffmpeg must have ended when its file is taken away.
+    ffmpeg: Ffmpeg,
+    input: Option<ChildStdin>,
     /// `None` once it has its name.
     file: Option<OutputFile>,
-    child: Child,
-    input: Option<ChildStdin>,
-    /// What ffmpeg complains about; a file, for a pipe would want to be read.
-    log: File,
+    /// Of a picture.
     bytes: usize,
 }
 
@@ -31,70 +63,30 @@ impl Film {
         Self::begin_with(path, size, fps, "ffmpeg")
     }
 
-    fn begin_with(path: &Path, size: Size, fps: f64, ffmpeg: &str) -> Result<Self, ExportError> {
+    fn begin_with(path: &Path, size: Size, fps: f64, program: &str) -> Result<Self, ExportError> {
         let file = OutputFile::create(path)?;
-        let log = tempfile::tempfile().map_err(|e| file.explain(0, e))?;
-        let mut command = Command::new(ffmpeg);
-        command.args([
-            "-hide_banner",
-            "-v",
-            "error",
-            "-y",
-            "-f",
-            "rawvideo",
-            "-pix_fmt",
-            "rgb24",
-        ]);
-        command.args([
-            "-s",
-            &size.to_string(),
-            "-r",
-            &fps.to_string(),
-            "-i",
-            "pipe:0",
-        ]);
-        command.args([
-            "-vf",
-            "pad=ceil(iw/2)*2:ceil(ih/2)*2",
-            "-c:v",
-            "libx264",
-            "-crf",
-            "20",
-            "-pix_fmt",
-            "yuv420p",
-        ]);
-        // With more threads, and with the version in the file, the bytes would depend on the
-        // machine.
-        command.args([
-            "-threads",
-            "1",
-            "-fflags",
-            "+bitexact",
-            "-flags:v",
-            "+bitexact",
-        ]);
         let mut target = OsString::from("file:");
         target.push(file.partial());
+        let (side, rate) = (size.to_string(), fps.to_string());
+        let mut command = Command::new(program);
         command
-            .args(["-movflags", "+faststart", "-f", "mp4"])
-            .arg(target);
-        let errors = log.try_clone().map_err(|e| file.explain(0, e))?;
-        command
+            .args(INPUT)
+            .args(["-s", &side, "-r", &rate, "-i", "pipe:0"])
+            .args(ENCODER)
+            .args(REPRODUCIBLE)
+            .args(CONTAINER)
+            .arg(target)
             .stdin(Stdio::piped())
-            .stdout(Stdio::null())
-            .stderr(errors);
-        // A group of its own: Ctrl-C at the terminal is for us.
-        command.process_group(0);
-        let mut child = command.spawn().map_err(|e| match e.kind() {
+            .stdout(Stdio::null());
+        let started = Ffmpeg::start(&mut command);
+        let mut ffmpeg = started.map_err(|e| match e.kind() {
             io::ErrorKind::NotFound => ExportError::NoFfmpeg,
-            _ => file.explain(0, e),
+            _ => file.explain(0, e).into(),
         })?;
-        let input = child.stdin.take();
         Ok(Self {
             file: Some(file),
-            child,
-            input,
-            log,
+            input: ffmpeg.input(),
+            ffmpeg,
             bytes: 3 * size.area(),
         })
     }
@@ -121,54 +113,43 @@ impl Film {
     pub fn finish(mut self) -> Result<(), ExportError> {
         // ffmpeg ends with its input.
         drop(self.input.take());
-        let status = match self.child.wait() {
+        let status = match self.ffmpeg.wait() {
             Ok(status) => status,
             Err(e) => return Err(self.failure(e)),
         };
         if !status.success() {
             return Err(self.failure(io::Error::other(format!("ffmpeg ended with {status}"))));
         }
-        self.file.take().map_or(Ok(()), OutputFile::publish)
+        match self.file.take() {
+            Some(file) => Ok(file.publish()?),
+            None => Ok(()),
+        }
     }
 
     /// What went wrong: what ffmpeg said, else `e`.
     fn failure(&mut self, e: io::Error) -> ExportError {
         drop(self.input.take());
-        let _ = self.child.wait();
-        let _ = self.log.rewind();
-        let lines = BufReader::new((&self.log).take(1 << 16))
-            .lines()
-            .map_while(Result::ok);
-        let said: Vec<String> = lines.filter(|l| !l.trim().is_empty()).collect();
-        let holds = |words: &str| said.iter().any(|l| l.contains(words));
-        let full = holds("No space left") || holds("Disk quota");
-        if holds("Unknown encoder") {
+        let _ = self.ffmpeg.wait();
+        let said = self.ffmpeg.complaints();
+        if mentions(&said, "Unknown encoder") {
             return ExportError::NoFfmpeg;
         }
-        // `[libx264 @ 0x5581] ...`: the address tells nobody anything.
-        let line = said.first().map(|l| {
-            l.split_once("] ")
-                .map_or(l.as_str(), |(_, rest)| rest)
-                .trim()
-                .to_owned()
-        });
-        let said = line.map_or(e, |said| io::Error::other(format!("ffmpeg: {said}")));
-        let e = if full {
-            io::ErrorKind::StorageFull.into()
-        } else {
-            said
+        let e = match said.first() {
+            _ if mentions(&said, "No space left") || mentions(&said, "Disk quota") => {
+                io::ErrorKind::StorageFull.into()
+            }
+            Some(line) => io::Error::other(format!("ffmpeg: {}", plain(line))),
+            None => e,
         };
-        self.file
-            .as_ref()
-            .map_or(ExportError::NoFfmpeg, |file| file.explain(0, e))
+        match &self.file {
+            Some(file) => file.explain(0, e).into(),
+            None => ExportError::NoFfmpeg,
+        }
     }
 }
 
-impl Drop for Film {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
+fn mentions(said: &[String], words: &str) -> bool {
+    said.iter().any(|line| line.contains(words))
 }
 
 #[cfg(test)]

@@ -1,10 +1,16 @@
 //! One branch of an animation: where a viewer is to show it, and by how much it may be off.
 
-use super::planned_keys::{Between, plan};
-use super::sparse_keys::{Key, unit};
 use super::thin_keys::{Arc, share};
 use crate::model::Node;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
+
+/// A key of one joint: its frame, and the turn, not quite of length 1.
+pub(super) type Key = (usize, Vector4<f64>);
+
+/// The turn of a key.
+pub(super) fn unit(q: &Vector4<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::try_new(Quaternion::from(*q), 1e-9).unwrap_or_default()
+}
 
 /// One branch on its way through all frames, in the axes of its parent branch as a viewer shows
 /// that.
@@ -32,15 +38,19 @@ impl Followed {
         node: &Node,
         way: Vector3<f64>,
     ) -> Self {
-        let back: Vec<UnitQuaternion<f64>> =
-            base.rotation.iter().map(UnitQuaternion::inverse).collect();
-        let every = || wanted.iter().zip(&back).zip(&base.error_px);
+        let n = wanted.len();
+        let (mut targets, mut depth) = (Vec::with_capacity(n), Vec::with_capacity(n));
+        let mut own = Vec::with_capacity(n);
+        for (k, rotation) in wanted.iter().enumerate() {
+            let back = base.rotation[k].inverse();
+            targets.push(back * (rotation * way - base.error_px[k]));
+            depth.push(back * Vector3::z());
+            own.push(back * rotation);
+        }
         Self {
-            targets: every()
-                .map(|((q, back), off)| back * (q * way - off))
-                .collect(),
-            depth: back.iter().map(|back| back * Vector3::z()).collect(),
-            wanted: every().map(|((q, back), _)| back * q).collect(),
+            targets,
+            depth,
+            wanted: own,
             way,
             radius_px: node.radius,
             limit_px: 0.0,
@@ -78,7 +88,6 @@ impl Followed {
     /// there.
     pub fn aim(&self, k: usize) -> UnitQuaternion<f64> {
         let is = self.wanted[k] * self.way;
-        let measure = |v: Vector3<f64>| self.measure(k, v);
         let Some(first) = is
             .cross(&Vector3::x())
             .try_normalize(1e-9)
@@ -87,11 +96,9 @@ impl Followed {
             return self.wanted[k];
         };
         let second = is.cross(&first).normalize();
-        let (a, b, off) = (
-            measure(first),
-            measure(second),
-            measure(self.targets[k] - is),
-        );
+        let a = self.measure(k, first);
+        let b = self.measure(k, second);
+        let off = self.measure(k, self.targets[k] - is);
         // Neither is 0, and they are not parallel: the measure halves one direction at most.
         let (aa, ab, bb) = (a.dot(&a), a.dot(&b), b.dot(&b));
         let (x, y) = (a.dot(&off), b.dot(&off));
@@ -103,81 +110,23 @@ impl Followed {
             * self.wanted[k]
     }
 
-    /// The fewest keys beside the path of `aims`, by a rule of thumb: arcs between keys are taken
-    /// for straight, and turns about the branch's own axis for none.
-    pub fn planned(&self, aims: &[Vector4<f64>], times: &[f64]) -> Vec<Key> {
-        let aim = |k: usize| UnitQuaternion::new_unchecked(Quaternion::from(aims[k]));
-        let sides: Vec<[Vector3<f64>; 2]> =
-            (0..aims.len()).map(|k| self.sides(&aim(k), k)).collect();
-        let limit = |k: usize| (1.0 - self.miss(k, &aim(k)).powi(2)).max(0.0).sqrt() as f32;
-        let limits: Vec<f32> = (0..aims.len()).map(limit).collect();
-        let ends: Vec<Vector3<f64>> = (0..aims.len()).map(|k| aim(k) * self.way).collect();
-        let weights: Vec<[Vector3<f64>; 2]> = (0..aims.len())
-            .map(|k| {
-                sides[k].map(|side| self.measure(k, self.measure(k, side)) / self.limit_px.powi(2))
-            })
-            .collect();
-        let between = |a: usize, b: usize, k: usize| {
-            let share = share(times, a, b, k);
-            let off = ends[a] + (ends[b] - ends[a]) * share - ends[k];
-            let off = [0, 1].map(|c| off.dot(&weights[k][c]) as f32);
-            Between {
-                share: share as f32,
-                off,
-                limit: limits[k],
-            }
-        };
-        let key = |(k, off): (usize, [f32; 2])| {
-            let is = aim(k) * self.way;
-            let turn = UnitQuaternion::rotation_between(
-                &is,
-                &(is + sides[k][0] * f64::from(off[0]) + sides[k][1] * f64::from(off[1])),
-            );
-            let turn = (turn.unwrap_or_default() * aim(k)).coords;
-            (
-                k,
-                if turn.dot(&aims[k]) < 0.0 {
-                    -turn
-                } else {
-                    turn
-                },
-            )
-        };
-        plan(&limits, between).into_iter().map(key).collect()
-    }
-
-    /// Two ways off the branch's end, at right angles by the measure of [`miss`](Self::miss), on
-    /// which it grows by 1.
-    fn sides(&self, aim: &UnitQuaternion<f64>, k: usize) -> [Vector3<f64>; 2] {
-        let is = aim * self.way;
-        // The same axis for all frames, so that the ways turn as little as the branch does.
-        let across = Vector3::ith_axis(self.way.iamin());
-        let first = is.cross(&across);
-        let second = is.cross(&first);
-        let unit = |v: Vector3<f64>| v * (self.limit_px / self.measure(k, v).norm().max(1e-9));
-        let first = unit(first);
-        let along = self.measure(k, second).dot(&self.measure(k, first))
-            / self.measure(k, first).norm_squared().max(1e-9);
-        [first, unit(second - first * along)]
-    }
-
     /// What `v` counts as: half as much in depth.
     fn measure(&self, k: usize, v: Vector3<f64>) -> Vector3<f64> {
         v - self.depth[k] * (0.5 * v.dot(&self.depth[k]))
     }
 
     pub fn shown(&self, base: &Shown, turns: &[UnitQuaternion<f64>]) -> Shown {
-        let off = |(k, turn): (usize, &UnitQuaternion<f64>)| {
-            base.rotation[k] * (turn * self.way - self.targets[k])
+        let mut shown = Shown {
+            rotation: Vec::with_capacity(turns.len()),
+            error_px: Vec::with_capacity(turns.len()),
         };
-        Shown {
-            rotation: turns
-                .iter()
-                .zip(&base.rotation)
-                .map(|(turn, base)| base * turn)
-                .collect(),
-            error_px: turns.iter().enumerate().map(off).collect(),
+        for (k, turn) in turns.iter().enumerate() {
+            let base = &base.rotation[k];
+            shown.rotation.push(base * turn);
+            let off = turn * self.way - self.targets[k];
+            shown.error_px.push(base * off);
         }
+        shown
     }
 }
 

@@ -2,17 +2,17 @@
 //! more, leaves, and one animation.
 
 use super::ExportError;
-use super::capture::{AnimationNote, Software};
 use super::gltf_animation::push_animation;
 use super::gltf_buffer::BufferBuilder;
 use super::gltf_check::check;
-use super::gltf_look::{bark, leaf};
+use super::gltf_look::{LeafPicture, bark, leaf};
 use super::gltf_mesh::{Skinned, push_mesh, push_skin};
 use super::joints::Moving;
+use crate::document::note::{AnimationNote, Software};
 use crate::model::{Pose, Skeleton};
-use crate::shape::Dressed;
+use crate::shape::{Dressed, Mesh};
 use gltf_json::extras::RawValue;
-use gltf_json::{Asset, Index, Node, Root, Scene};
+use gltf_json::{Asset, Index, Node, Root, Scene, Skin};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 
@@ -50,9 +50,6 @@ pub struct Model<'a> {
     pub metres_per_px: f64,
     /// See [`KEY_TOLERANCE_PX`].
     pub tolerance_px: f64,
-    /// Whether to look for the fewest keys, which takes some times as long: half a second for 100
-    /// joints in 1000 frames. Asked before every joint.
-    pub thorough: &'a dyn Fn() -> bool,
     /// One JSON object a node, added to `level`, `n_tracks` and `copy_of`; may be shorter than the
     /// skeleton.
     pub node_extras: &'a [Value],
@@ -161,12 +158,7 @@ struct Assembled {
 
 fn assemble(model: &Model, texture_apart: bool) -> Result<Assembled, ExportError> {
     check(model)?;
-    let moving = Moving::new(
-        model.skeleton,
-        model.poses,
-        model.tolerance_px,
-        model.thorough,
-    );
+    let moving = Moving::new(model.skeleton, model.poses, model.tolerance_px);
     let mut root = Root::default();
     let mut buffer = BufferBuilder::default();
     root.asset = Asset {
@@ -175,78 +167,105 @@ fn assemble(model: &Model, texture_apart: bool) -> Result<Assembled, ExportError
         ..Asset::default()
     };
     push_joints(&mut root, model)?;
-    let Dressed {
-        wood,
-        foliage,
-        bark_rgb,
-        ..
-    } = model.dressed;
-    let drawn = wood
-        .iter()
-        .chain(foliage.groups.iter().map(|g| &g.mesh))
-        .any(|mesh| !mesh.indices.is_empty());
-    let mut texture = None;
-    let (mut levels, mut leaves) = (Vec::new(), Vec::new());
-    if drawn {
+    let Dressed { wood, foliage, .. } = model.dressed;
+    let mut meshes = wood.iter().chain(foliage.groups.iter().map(|g| &g.mesh));
+    let mut drawn = Drawn::default();
+    if meshes.any(is_drawn) {
         let skin = push_skin(&mut root, &mut buffer, model);
-        let material = root.push(bark(*bark_rgb));
-        let wanted = if model.all_levels { wood.len() } else { 1 };
-        for (k, mesh) in wood
-            .iter()
-            .take(wanted)
-            .enumerate()
-            .filter(|(_, mesh)| !mesh.indices.is_empty())
-        {
-            let name = if k == 0 {
-                "tree".to_owned()
-            } else {
-                format!("tree_lod{k}")
-            };
-            levels.push(push_mesh(
-                &mut root,
-                &mut buffer,
-                model,
-                Skinned::wood(mesh, material, skin, name),
-            )?);
-        }
-        let shown = || {
-            foliage
-                .groups
-                .iter()
-                .enumerate()
-                .filter(|(_, group)| !group.mesh.indices.is_empty())
-        };
-        if shown().next().is_some() {
-            let material;
-            let beyond = |[u, v]: &[f32; 2]| u.min(*v) < -0.01 || u.max(*v) > 1.01;
-            let tiled = foliage.groups.iter().any(|g| g.mesh.uvs.iter().any(beyond));
-            (material, texture) = leaf(
-                &mut root,
-                &mut buffer,
-                foliage.texture.as_ref(),
-                tiled,
-                texture_apart,
-            )?;
-            for (k, group) in shown() {
-                let branch = model.skeleton.name_of(group.node);
-                let what = Skinned::leaves(group, material, skin, format!("leaves_{k}"), branch);
-                leaves.push((k, push_mesh(&mut root, &mut buffer, model, what)?));
-            }
-        }
+        drawn.levels = push_wood(&mut root, &mut buffer, model, skin)?;
+        drawn.leaves = push_leaves(&mut root, &mut buffer, model, skin, texture_apart)?;
     }
-    push_animation(&mut root, &mut buffer, model, &moving, &leaves);
-    push_scenes(&mut root, &levels, leaves.iter().map(|(_, node)| *node));
+    push_animation(&mut root, &mut buffer, model, &moving, &drawn.leaves);
+    let leaves = drawn.leaves.iter().map(|(_, node)| *node);
+    push_scenes(&mut root, &drawn.levels, leaves);
     let animation = AnimationNote {
         first_frame: model.poses.first().map_or(0, |p| p.frame),
         frames: model.poses.len() as u64,
         keys: moving.keys(),
         raw_keys: moving.raw_keys(),
     };
+    let texture = match leaf_picture(model, texture_apart) {
+        Some(picture) if texture_apart && !drawn.leaves.is_empty() => {
+            Some((picture.ending()?, picture.texture.1.clone()))
+        }
+        _ => None,
+    };
     Ok(Assembled {
         root,
         buffer,
         animation,
         texture,
+    })
+}
+
+/// The nodes that show meshes.
+#[derive(Default)]
+struct Drawn {
+    /// The wood, a node for every level of detail.
+    levels: Vec<Index<Node>>,
+    /// The leaves, with the place of their group among all.
+    leaves: Vec<(usize, Index<Node>)>,
+}
+
+fn is_drawn(mesh: &Mesh) -> bool {
+    !mesh.indices.is_empty()
+}
+
+fn push_wood(
+    root: &mut Root,
+    buffer: &mut BufferBuilder,
+    model: &Model,
+    skin: Index<Skin>,
+) -> Result<Vec<Index<Node>>, ExportError> {
+    let material = root.push(bark(model.dressed.bark_rgb));
+    let wood = &model.dressed.wood;
+    let wanted = if model.all_levels { wood.len() } else { 1 };
+    let mut levels = Vec::new();
+    for (k, mesh) in wood.iter().take(wanted).enumerate() {
+        if !is_drawn(mesh) {
+            continue;
+        }
+        let name = if k == 0 {
+            "tree".to_owned()
+        } else {
+            format!("tree_lod{k}")
+        };
+        let what = Skinned::wood(mesh, material, skin, name);
+        levels.push(push_mesh(root, buffer, model, what)?);
+    }
+    Ok(levels)
+}
+
+fn push_leaves(
+    root: &mut Root,
+    buffer: &mut BufferBuilder,
+    model: &Model,
+    skin: Index<Skin>,
+    texture_apart: bool,
+) -> Result<Vec<(usize, Index<Node>)>, ExportError> {
+    let groups = &model.dressed.foliage.groups;
+    let mut leaves = Vec::new();
+    if !groups.iter().any(|g| is_drawn(&g.mesh)) {
+        return Ok(leaves);
+    }
+    let material = leaf(root, buffer, leaf_picture(model, texture_apart))?;
+    for (k, group) in groups.iter().enumerate() {
+        if is_drawn(&group.mesh) {
+            let branch = model.skeleton.name_of(group.node);
+            let what = Skinned::leaves(group, material, skin, format!("leaves_{k}"), branch);
+            leaves.push((k, push_mesh(root, buffer, model, what)?));
+        }
+    }
+    Ok(leaves)
+}
+
+fn leaf_picture<'a>(model: &Model<'a>, apart: bool) -> Option<LeafPicture<'a>> {
+    let foliage = &model.dressed.foliage;
+    let mut uvs = foliage.groups.iter().flat_map(|g| &g.mesh.uvs);
+    Some(LeafPicture {
+        texture: foliage.texture.as_ref()?,
+        tiled: uvs.any(|[u, v]| u.min(*v) < -0.01 || u.max(*v) > 1.01),
+        apart,
     })
 }
 
@@ -325,14 +344,13 @@ fn push_scenes(
 
 /// A name as a relative link.
 fn percent(name: &str) -> String {
-    let plain = |b: u8| b.is_ascii_alphanumeric() || b"-._~".contains(&b);
-    name.bytes()
-        .map(|b| {
-            if plain(b) {
-                char::from(b).to_string()
-            } else {
-                format!("%{b:02X}")
-            }
-        })
-        .collect()
+    let mut link = String::with_capacity(name.len());
+    for byte in name.bytes() {
+        if byte.is_ascii_alphanumeric() || b"-._~".contains(&byte) {
+            link.push(char::from(byte));
+        } else {
+            link.push_str(&format!("%{byte:02X}"));
+        }
+    }
+    link
 }

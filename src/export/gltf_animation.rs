@@ -75,27 +75,57 @@ fn swing(model: &Model, moving: &Moving, group: usize, node: Index<Node>) -> Opt
         return None;
     }
     let group = &model.dressed.foliage.groups[group];
-    let length = |d: &[f32; 3]| f64::from(d.iter().map(|x| x * x).sum::<f32>().sqrt());
-    let reach = |by: &[[f32; 3]]| by.iter().map(length).fold(0.0, f64::max);
-    let reach_px = [reach(&group.sine), reach(&group.cosine)];
-    let times = &moving.times_s;
-    let fits = |a: usize, b: usize, k: usize| {
-        let x = share(times, a, b, k);
-        let off = |c: usize| {
-            let [a, b, k] = [a, b, k].map(|i| f64::from(weights[i][c]));
-            (a + (b - a) * x - k).abs() * reach_px[c]
-        };
-        off(0) + off(1) <= model.tolerance_px
+    let swing = Swing {
+        reach_px: [longest(&group.sine), longest(&group.cosine)],
+        times_s: &moving.times_s,
+        tolerance_px: model.tolerance_px,
+        weights,
     };
-    let still = (0..weights.len()).all(|k| fits(0, 0, k));
-    let kept = thin(weights.len(), still, |a, b| {
-        (a + 1..b).all(|k| fits(a, b, k))
-    });
+    let kept = swing.thinned();
     Some(Track {
         node,
-        times_s: kept.iter().map(|&k| times[k] as f32).collect(),
-        values: kept.iter().map(|&k| weights[k]).collect(),
+        times_s: kept.iter().map(|&k| swing.times_s[k] as f32).collect(),
+        values: kept.iter().map(|&k| swing.weights[k]).collect(),
     })
+}
+
+/// How one group of leaves swings.
+struct Swing<'a> {
+    /// In every frame.
+    weights: Vec<[f32; 2]>,
+    times_s: &'a [f64],
+    /// The farthest that a leaf goes by each of the two displacements.
+    reach_px: [f64; 2],
+    tolerance_px: f64,
+}
+
+impl Swing<'_> {
+    /// The frames of the keys that are kept.
+    fn thinned(&self) -> Vec<usize> {
+        let n = self.weights.len();
+        let still = (0..n).all(|k| self.fits(0, 0, k));
+        thin(n, still, |a, b| (a + 1..b).all(|k| self.fits(a, b, k)))
+    }
+
+    /// Whether frame `k` is near enough to the line between keys of frames `a` and `b`.
+    fn fits(&self, a: usize, b: usize, k: usize) -> bool {
+        let share = share(self.times_s, a, b, k);
+        let mut off_px = 0.0;
+        for c in 0..2 {
+            let [a, b, k] = [a, b, k].map(|i| f64::from(self.weights[i][c]));
+            off_px += (a + (b - a) * share - k).abs() * self.reach_px[c];
+        }
+        off_px <= self.tolerance_px
+    }
+}
+
+/// Length of the longest of these ways.
+fn longest(ways: &[[f32; 3]]) -> f64 {
+    let mut longest = 0.0_f64;
+    for [x, y, z] in ways {
+        longest = longest.max(f64::from((x * x + y * y + z * z).sqrt()));
+    }
+    longest
 }
 
 /// All times lie in one view and all values in another.

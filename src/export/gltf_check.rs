@@ -4,127 +4,129 @@ use super::ExportError;
 use super::gltf::Model;
 use crate::shape::{FoliageGroup, Mesh};
 
+/// Joints of a skin are numbered with two bytes.
+const MOST_NODES: usize = 1 + u16::MAX as usize;
+
 /// # Errors
 /// The first thing that no file can hold.
 pub(super) fn check(model: &Model) -> Result<(), ExportError> {
+    check_nodes(model)?;
+    check_poses(model)?;
+    for mesh in &model.dressed.wood {
+        check_mesh(model, mesh)?;
+    }
+    for (k, group) in model.dressed.foliage.groups.iter().enumerate() {
+        check_mesh(model, &group.mesh)?;
+        check_leaves(model, k, group)?;
+    }
+    Ok(())
+}
+
+fn check_nodes(model: &Model) -> Result<(), ExportError> {
     let nodes = &model.skeleton.nodes;
     if nodes.is_empty() {
         return Err(ExportError::unfit("it has no nodes"));
     }
-    if nodes.len() > 1 + usize::from(u16::MAX) {
+    if nodes.len() > MOST_NODES {
         return Err(ExportError::unfit(format!(
-            "{} nodes are more than the 65536 joints of a skin",
+            "{} nodes are more than the {MOST_NODES} joints of a skin",
             nodes.len()
         )));
     }
     for (i, node) in nodes.iter().enumerate() {
-        if node.parent.map(|p| p.index()).is_some_and(|p| p >= i)
-            || (i > 0) != node.parent.is_some()
-        {
+        let after_parent = match node.parent {
+            Some(parent) => parent.index() < i,
+            None => i == 0,
+        };
+        if !after_parent {
             return Err(ExportError::unfit(format!(
                 "node {i} does not come after its parent"
             )));
         }
-        if !node
-            .position
-            .coords
-            .iter()
-            .all(|x| ((x * model.scale()) as f32).is_finite())
-        {
+        if !node.position.iter().all(|x| has_place(model, *x)) {
             return Err(ExportError::unfit(format!(
                 "the position of node {i} is no number"
-            )));
-        }
-    }
-    if let Some(p) = model.poses.iter().find(|p| p.joints.len() != nodes.len()) {
-        let why = format!(
-            "the pose of frame {} has {} joints, the tree {}",
-            p.frame,
-            p.joints.len(),
-            nodes.len()
-        );
-        return Err(ExportError::unfit(why));
-    }
-    model
-        .dressed
-        .wood
-        .iter()
-        .try_for_each(|mesh| check_mesh(model, mesh))?;
-    for (k, group) in model.dressed.foliage.groups.iter().enumerate() {
-        check_mesh(model, &group.mesh)?;
-        let n = group.mesh.positions.len();
-        let FoliageGroup {
-            colours,
-            sine,
-            cosine,
-            ..
-        } = group;
-        if colours.len() != n || sine.len() != n || cosine.len() != n {
-            return Err(ExportError::unfit(format!(
-                "group {k} of its leaves has vectors of different lengths"
-            )));
-        }
-        if !sine
-            .iter()
-            .chain(cosine)
-            .flatten()
-            .all(|x| ((f64::from(*x) * model.scale()) as f32).is_finite())
-        {
-            return Err(ExportError::unfit(format!(
-                "group {k} of its leaves moves by what is no number"
-            )));
-        }
-        let swings = model.flutter.get(k);
-        if swings.is_some_and(|s| {
-            s.len() != model.poses.len() || !s.iter().flatten().all(|x| x.is_finite())
-        }) {
-            return Err(ExportError::unfit(format!(
-                "group {k} of its leaves swings in other frames than the tree"
             )));
         }
     }
     Ok(())
 }
 
+/// Whether a length, px, is a number in the file.
+fn has_place(model: &Model, length_px: f64) -> bool {
+    ((length_px * model.scale()) as f32).is_finite()
+}
+
+fn check_poses(model: &Model) -> Result<(), ExportError> {
+    let nodes = model.skeleton.nodes.len();
+    match model.poses.iter().find(|p| p.joints.len() != nodes) {
+        None => Ok(()),
+        Some(pose) => Err(ExportError::unfit(format!(
+            "the pose of frame {} has {} joints, the tree {nodes}",
+            pose.frame,
+            pose.joints.len()
+        ))),
+    }
+}
+
+/// What group `k` of the leaves has beside its mesh.
+fn check_leaves(model: &Model, k: usize, group: &FoliageGroup) -> Result<(), ExportError> {
+    let n = group.mesh.positions.len();
+    let lengths = [group.colours.len(), group.sine.len(), group.cosine.len()];
+    if lengths != [n; 3] {
+        return Err(ExportError::unfit(format!(
+            "group {k} of its leaves has vectors of different lengths"
+        )));
+    }
+    let mut ways = group.sine.iter().chain(&group.cosine).flatten();
+    if !ways.all(|x| has_place(model, (*x).into())) {
+        return Err(ExportError::unfit(format!(
+            "group {k} of its leaves moves by what is no number"
+        )));
+    }
+    let Some(swings) = model.flutter.get(k) else {
+        return Ok(());
+    };
+    if swings.len() != model.poses.len() || !swings.iter().flatten().all(|x| x.is_finite()) {
+        return Err(ExportError::unfit(format!(
+            "group {k} of its leaves swings in other frames than the tree"
+        )));
+    }
+    Ok(())
+}
+
 fn check_mesh(model: &Model, mesh: &Mesh) -> Result<(), ExportError> {
     let n = mesh.positions.len();
-    let same = [
+    let lengths = [
         mesh.normals.len(),
         mesh.uvs.len(),
         mesh.joints.len(),
         mesh.weights.len(),
-    ]
-    .iter()
-    .all(|&m| m == n);
-    if !same
-        || !mesh.indices.len().is_multiple_of(3)
-        || mesh.indices.iter().any(|&i| i as usize >= n)
-    {
+    ];
+    let whole = mesh.indices.len().is_multiple_of(3);
+    if lengths != [n; 4] || !whole || mesh.indices.iter().any(|&i| i as usize >= n) {
         return Err(ExportError::unfit(
             "its mesh has vectors of different lengths or indices beyond them",
         ));
     }
-    let numbers = mesh
-        .normals
+    let joints = model.skeleton.nodes.len();
+    let of_tree = mesh
+        .joints
         .iter()
         .flatten()
-        .chain(mesh.uvs.iter().flatten())
-        .chain(mesh.weights.iter().flatten());
-    if !mesh
-        .positions
-        .iter()
-        .flatten()
-        .all(|x| ((f64::from(*x) * model.scale()) as f32).is_finite())
-        || !mesh
-            .joints
-            .iter()
-            .flatten()
-            .all(|&j| usize::from(j) < model.skeleton.nodes.len())
-        || !numbers.copied().all(f32::is_finite)
-    {
+        .all(|&j| usize::from(j) < joints);
+    if !of_tree || !is_of_numbers(model, mesh) {
         return Err(ExportError::unfit(
             "its mesh has positions that are no numbers or joints of another tree",
         ));
     }
     Ok(())
+}
+
+fn is_of_numbers(model: &Model, mesh: &Mesh) -> bool {
+    let mut positions = mesh.positions.iter().flatten();
+    positions.all(|x| has_place(model, (*x).into()))
+        && mesh.normals.iter().flatten().all(|x| x.is_finite())
+        && mesh.uvs.iter().flatten().all(|x| x.is_finite())
+        && mesh.weights.iter().flatten().all(|x| x.is_finite())
 }

@@ -36,17 +36,43 @@ pub(super) fn bark(rgb: [u8; 3]) -> Material {
     }
 }
 
-/// Leaves take their colour from their vertices, and shape and veins from the texture, where there
-/// is one: seen from both sides, cut out where it is clear, repeated where it is `tiled`. With
-/// `apart` the picture is given back with its file's ending instead of being put into the buffer.
-#[allow(clippy::type_complexity)]
+/// How the picture of a leaf goes into the file.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LeafPicture<'a> {
+    /// Kind (MIME) and bytes of the file.
+    pub texture: &'a (&'static str, Vec<u8>),
+    /// Repeated beyond its edges.
+    pub tiled: bool,
+    /// In a file of its own, not in the buffer.
+    pub apart: bool,
+}
+
+impl LeafPicture<'_> {
+    /// The ending of its file's name.
+    ///
+    /// # Errors
+    /// It is of a kind that the format does not know.
+    pub fn ending(&self) -> Result<&'static str, ExportError> {
+        match self.texture.0 {
+            "image/png" => Ok("png"),
+            "image/jpeg" => Ok("jpg"),
+            other => Err(ExportError::unfit(format!(
+                "{other} is no texture for a model, only PNG and JPEG are"
+            ))),
+        }
+    }
+}
+
+/// Leaves take their colour from their vertices, and shape and veins from the picture, where there
+/// is one: seen from both sides, cut out where it is clear.
+///
+/// # Errors
+/// The picture is of a kind that the format does not know.
 pub(super) fn leaf(
     root: &mut Root,
     buffer: &mut BufferBuilder,
-    texture: Option<&(&'static str, Vec<u8>)>,
-    tiled: bool,
-    apart: bool,
-) -> Result<(Index<Material>, Option<(&'static str, Vec<u8>)>), ExportError> {
+    picture: Option<LeafPicture>,
+) -> Result<Index<Material>, ExportError> {
     let mut material = Material {
         name: Some("leaf".to_string()),
         double_sided: true,
@@ -57,52 +83,10 @@ pub(super) fn leaf(
         },
         ..Material::default()
     };
-    let mut file = None;
-    if let Some((kind, bytes)) = texture {
-        let ending = match *kind {
-            "image/png" => "png",
-            "image/jpeg" => "jpg",
-            other => {
-                return Err(ExportError::unfit(format!(
-                    "{other} is no texture for a model, only PNG and JPEG are"
-                )));
-            }
-        };
-        let buffer_view = (!apart).then(|| buffer.view(root, bytes.iter().copied(), None));
-        file = apart.then(|| (ending, bytes.clone()));
-        let source = root.push(Image {
-            buffer_view,
-            mime_type: (!apart).then(|| MimeType((*kind).to_owned())),
-            name: Some("leaf".to_string()),
-            uri: None,
-            extensions: None,
-            extras: None,
-        });
-        // A picture of one leaf must not come in again at its other edge.
-        let wrap = if tiled {
-            WrappingMode::Repeat
-        } else {
-            WrappingMode::ClampToEdge
-        };
-        let sampler = root.push(Sampler {
-            mag_filter: Some(Valid(MagFilter::Linear)),
-            min_filter: Some(Valid(MinFilter::LinearMipmapLinear)),
-            name: None,
-            wrap_s: Valid(wrap),
-            wrap_t: Valid(wrap),
-            extensions: None,
-            extras: None,
-        });
-        let name = Some("leaf".to_string());
-        let texture = root.push(Texture {
-            name,
-            sampler: Some(sampler),
-            source,
-            extensions: None,
-            extras: None,
-        });
+    if let Some(picture) = picture {
+        picture.ending()?;
         let info = Info {
-            index: texture,
+            index: push_texture(root, buffer, &picture),
             tex_coord: 0,
             extensions: None,
             extras: None,
@@ -111,5 +95,45 @@ pub(super) fn leaf(
         material.alpha_mode = Valid(AlphaMode::Mask);
         material.alpha_cutoff = Some(AlphaCutoff(0.5));
     }
-    Ok((root.push(material), file))
+    Ok(root.push(material))
+}
+
+fn push_texture(
+    root: &mut Root,
+    buffer: &mut BufferBuilder,
+    picture: &LeafPicture,
+) -> Index<Texture> {
+    let (kind, bytes) = picture.texture;
+    let inside = !picture.apart;
+    let buffer_view = inside.then(|| buffer.view(root, bytes.iter().copied(), None));
+    let source = root.push(Image {
+        buffer_view,
+        mime_type: inside.then(|| MimeType((*kind).to_owned())),
+        name: Some("leaf".to_string()),
+        uri: None,
+        extensions: None,
+        extras: None,
+    });
+    // A picture of one leaf must not come in again at its other edge.
+    let wrap = if picture.tiled {
+        WrappingMode::Repeat
+    } else {
+        WrappingMode::ClampToEdge
+    };
+    let sampler = root.push(Sampler {
+        mag_filter: Some(Valid(MagFilter::Linear)),
+        min_filter: Some(Valid(MinFilter::LinearMipmapLinear)),
+        name: None,
+        wrap_s: Valid(wrap),
+        wrap_t: Valid(wrap),
+        extensions: None,
+        extras: None,
+    });
+    root.push(Texture {
+        name: Some("leaf".to_string()),
+        sampler: Some(sampler),
+        source,
+        extensions: None,
+        extras: None,
+    })
 }

@@ -3,6 +3,7 @@
 use super::ExportError;
 use super::gltf::{Model, raw};
 use super::gltf_buffer::{BufferBuilder, Layout, bounds, le_f32};
+use super::gltf_look::linear;
 use super::skinning::{Skinning, skinning};
 use crate::model::NodeName;
 use crate::shape::{FoliageGroup, Mesh};
@@ -10,7 +11,7 @@ use gltf_json::accessor::{ComponentType, Type};
 use gltf_json::buffer::Target::{ArrayBuffer, ElementArrayBuffer};
 use gltf_json::material::Material;
 use gltf_json::mesh::{Mode, MorphTarget, Primitive, Semantic};
-use gltf_json::validation::Checked::Valid;
+use gltf_json::validation::Checked::{self, Valid};
 use gltf_json::{Accessor, Index, Node, Root, Skin};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -75,9 +76,61 @@ pub(super) fn push_mesh(
     model: &Model,
     what: Skinned,
 ) -> Result<Index<Node>, ExportError> {
+    let attributes = push_vertices(root, buffer, model, &what);
+    let mut targets = Vec::with_capacity(what.targets.len());
+    for by in &what.targets {
+        targets.push(MorphTarget {
+            positions: Some(push_places(root, buffer, by, model.scale())),
+            normals: None,
+            tangents: None,
+        });
+    }
+    let indices = push_indices(root, buffer, what.mesh);
+    let at_rest = vec![0.0; targets.len()];
+    let names = if targets.is_empty() {
+        Value::Null
+    } else {
+        json!({"targetNames": ["sine", "cosine"]})
+    };
+    let primitive = Primitive {
+        attributes,
+        extensions: None,
+        extras: None,
+        indices: Some(indices),
+        material: Some(what.material),
+        mode: Valid(Mode::Triangles),
+        targets: (!targets.is_empty()).then_some(targets),
+    };
+    let mesh = root.push(gltf_json::Mesh {
+        extensions: None,
+        extras: raw(&names)?,
+        name: Some(what.name.clone()),
+        primitives: vec![primitive],
+        weights: (!at_rest.is_empty()).then_some(at_rest),
+    });
+    let extras = raw(&what.extras)?;
+    Ok(root.push(Node {
+        mesh: Some(mesh),
+        skin: Some(what.skin),
+        name: Some(what.name),
+        extras,
+        ..Node::default()
+    }))
+}
+
+/// What every vertex has.
+type Attributes = BTreeMap<Checked<Semantic>, Index<Accessor>>;
+
+/// Adds places, normals, texture coordinates, colours, joints and weights, in this order.
+fn push_vertices(
+    root: &mut Root,
+    buffer: &mut BufferBuilder,
+    model: &Model,
+    what: &Skinned,
+) -> Attributes {
     let mesh = what.mesh;
     let (n, vertices) = (mesh.positions.len(), Some(ArrayBuffer));
-    let mut attributes = BTreeMap::new();
+    let mut attributes = Attributes::new();
     let position = push_places(root, buffer, &mesh.positions, model.scale());
     attributes.insert(Valid(Semantic::Positions), position);
     let normals: Vec<[f32; 3]> = mesh.normals.iter().map(unit).collect();
@@ -92,81 +145,41 @@ pub(super) fn push_mesh(
     );
     attributes.insert(Valid(Semantic::TexCoords(0)), uv);
     if !what.colours.is_empty() {
-        // Two bytes a channel: the linear scale has too few dark steps in one.
-        let bytes = what.colours.iter().flat_map(|c| {
-            let [r, g, b] = c.map(|c| (super::gltf_look::linear(c) * 65535.0).round() as u16);
-            [r, g, b, u16::MAX].into_iter().flat_map(u16::to_le_bytes)
-        });
+        let bytes = what.colours.iter().flat_map(|c| le_linear(*c));
         let layout = Layout::normalized(ComponentType::U16, Type::Vec4);
-        attributes.insert(
-            Valid(Semantic::Colors(0)),
-            buffer.accessor(root, layout, n, bytes, vertices),
-        );
+        let colours = buffer.accessor(root, layout, n, bytes, vertices);
+        attributes.insert(Valid(Semantic::Colors(0)), colours);
     }
     let Skinning { joints, weights } = skinning(mesh);
-    let layout = |size: usize| {
-        if size == 1 {
-            ComponentType::U8
-        } else {
-            ComponentType::U16
-        }
-    };
     let (size, bytes) = joints.le_bytes();
-    let joints = Layout {
-        component: layout(size),
+    let layout = Layout {
+        component: unsigned(size),
         shape: Type::Vec4,
         normalized: false,
     };
-    attributes.insert(
-        Valid(Semantic::Joints(0)),
-        buffer.accessor(root, joints, n, bytes.into_iter(), vertices),
-    );
+    let joints = buffer.accessor(root, layout, n, bytes.into_iter(), vertices);
+    attributes.insert(Valid(Semantic::Joints(0)), joints);
     let (size, bytes) = weights.le_bytes();
-    let weights = Layout::normalized(layout(size), Type::Vec4);
-    attributes.insert(
-        Valid(Semantic::Weights(0)),
-        buffer.accessor(root, weights, n, bytes.into_iter(), vertices),
-    );
-    let targets: Vec<MorphTarget> = what
-        .targets
-        .iter()
-        .map(|by| push_places(root, buffer, by, model.scale()))
-        .map(|by| MorphTarget {
-            positions: Some(by),
-            normals: None,
-            tangents: None,
-        })
-        .collect();
-    let indices = push_indices(root, buffer, mesh);
-    let at_rest = vec![0.0; targets.len()];
-    let primitive = Primitive {
-        attributes,
-        extensions: None,
-        extras: None,
-        indices: Some(indices),
-        material: Some(what.material),
-        mode: Valid(Mode::Triangles),
-        targets: (!targets.is_empty()).then_some(targets),
-    };
-    let mesh = root.push(gltf_json::Mesh {
-        extensions: None,
-        extras: if at_rest.is_empty() {
-            None
-        } else {
-            raw(&json!({"targetNames": ["sine", "cosine"]}))?
-        },
-        name: Some(what.name.clone()),
-        primitives: vec![primitive],
-        weights: (!at_rest.is_empty()).then_some(at_rest),
-    });
-    let extras = raw(&what.extras)?;
-    Ok(root.push(Node {
-        mesh: Some(mesh),
-        skin: Some(what.skin),
-        name: Some(what.name),
-        extras,
-        ..Node::default()
-    }))
+    let layout = Layout::normalized(unsigned(size), Type::Vec4);
+    let weights = buffer.accessor(root, layout, n, bytes.into_iter(), vertices);
+    attributes.insert(Valid(Semantic::Weights(0)), weights);
+    attributes
+}
+
+/// Whole numbers of so many bytes.
+fn unsigned(size: usize) -> ComponentType {
+    if size == 1 {
+        ComponentType::U8
+    } else {
+        ComponentType::U16
+    }
+}
+
+/// A colour (sRGB) as the file has it. Two bytes a channel: the linear scale has too few dark steps
+/// in one.
+fn le_linear(rgb: [u8; 3]) -> impl Iterator<Item = u8> {
+    let [r, g, b] = rgb.map(|c| (linear(c) * 65535.0).round() as u16);
+    [r, g, b, u16::MAX].into_iter().flat_map(u16::to_le_bytes)
 }
 
 /// Places or ways, px in the model, with the bounds that the format asks for.
@@ -204,17 +217,20 @@ fn unit(normal: &[f32; 3]) -> [f32; 3] {
 fn push_indices(root: &mut Root, buffer: &mut BufferBuilder, mesh: &Mesh) -> Index<Accessor> {
     let target = Some(ElementArrayBuffer);
     let count = mesh.indices.len();
-    let layout = |component| Layout {
+    if mesh.positions.len() <= usize::from(u16::MAX) {
+        let bytes = mesh.indices.iter().flat_map(|&i| (i as u16).to_le_bytes());
+        buffer.accessor(root, scalar(ComponentType::U16), count, bytes, target)
+    } else {
+        let bytes = mesh.indices.iter().flat_map(|i| i.to_le_bytes());
+        buffer.accessor(root, scalar(ComponentType::U32), count, bytes, target)
+    }
+}
+
+fn scalar(component: ComponentType) -> Layout {
+    Layout {
         component,
         shape: Type::Scalar,
         normalized: false,
-    };
-    if mesh.positions.len() <= usize::from(u16::MAX) {
-        let bytes = mesh.indices.iter().flat_map(|&i| (i as u16).to_le_bytes());
-        buffer.accessor(root, layout(ComponentType::U16), count, bytes, target)
-    } else {
-        let bytes = mesh.indices.iter().flat_map(|i| i.to_le_bytes());
-        buffer.accessor(root, layout(ComponentType::U32), count, bytes, target)
     }
 }
 

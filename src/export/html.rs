@@ -6,7 +6,8 @@
 pub use super::html_data::{Branch, Data};
 
 use super::ExportError;
-use super::picture::jpeg;
+use crate::document::jpeg;
+use crate::files::WriteError;
 use crate::model::{Rgb, Size};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -123,10 +124,10 @@ fn light(picture: &Rgb) -> Result<Vec<u8>, ExportError> {
     let small = image::DynamicImage::from(pixels)
         .resize(PICTURE_SIDE, PICTURE_SIDE, FilterType::Triangle)
         .into_rgb8();
-    jpeg(&Rgb {
+    Ok(jpeg(&Rgb {
         size: Size::new(small.width(), small.height()),
         pixels: small.into_raw(),
-    })
+    })?)
 }
 
 /// Makes up for what base64 adds. No time of day goes into it.
@@ -135,7 +136,7 @@ fn gzip(bytes: &[u8]) -> Result<Vec<u8>, ExportError> {
     packer
         .write_all(bytes)
         .and_then(|()| packer.finish())
-        .map_err(|e| ExportError::from_io("the page", 0, e))
+        .map_err(|e| WriteError::from_io("the page", 0, e).into())
 }
 
 #[cfg(test)]

@@ -1,7 +1,6 @@
 //! What the HTML page knows of the tree apart from its model.
 
-use super::capture::Capture;
-use super::sway::Columns;
+use crate::document::{CaptureNote, Columns};
 use crate::dynamics::angle_to_parent_deg;
 use crate::model::{MAIN_BRANCH_RGB, NodeId, Pose, Skeleton, Swaying};
 use base64::Engine;
@@ -61,7 +60,7 @@ impl Data {
     /// `nodes.csv`, and may be shorter than the skeleton; `metres_per_px` is that of the model's
     /// file.
     pub fn of(
-        capture: &Capture,
+        capture: &CaptureNote,
         skeleton: &Skeleton,
         poses: &[Pose],
         sway: &[Swaying],
@@ -117,13 +116,15 @@ fn branch(
     main_branch: Option<u8>,
 ) -> Branch {
     let node = &skeleton.nodes[i];
-    let name = |id: NodeId| skeleton.name_of(id).map(|n| n.0);
     let measured = node.parent.is_some() && node.copy_of.is_none();
     let sway = sway.get(i).filter(|s| s.is_ok()).map(Columns::of);
     Branch {
         id: node.name.0,
-        parent: node.parent.and_then(name),
-        copy_of: node.copy_of.and_then(name),
+        parent: node.parent.and_then(|id| skeleton.name_of(id)).map(|n| n.0),
+        copy_of: node
+            .copy_of
+            .and_then(|id| skeleton.name_of(id))
+            .map(|n| n.0),
         level: node.level,
         main_branch,
         n_tracks: node.n_tracks,
@@ -141,16 +142,19 @@ fn rounded(x: f64, scale: f64) -> f64 {
 }
 
 fn packed(angles_deg: &[f64]) -> String {
-    let hundredths = |a: &f64| match (100.0 * a).round() {
-        x if x.is_finite() => x.clamp(f64::from(-i16::MAX), f64::from(i16::MAX)) as i16,
-        _ => i16::MIN,
-    };
-    STANDARD.encode(
-        angles_deg
-            .iter()
-            .flat_map(|a| hundredths(a).to_le_bytes())
-            .collect::<Vec<u8>>(),
-    )
+    let mut bytes = Vec::with_capacity(2 * angles_deg.len());
+    for angle_deg in angles_deg {
+        bytes.extend(hundredths(*angle_deg).to_le_bytes());
+    }
+    STANDARD.encode(bytes)
+}
+
+fn hundredths(angle_deg: f64) -> i16 {
+    let hundredths = (100.0 * angle_deg).round();
+    if !hundredths.is_finite() {
+        return i16::MIN;
+    }
+    hundredths.clamp(f64::from(-i16::MAX), f64::from(i16::MAX)) as i16
 }
 
 #[cfg(test)]
@@ -178,6 +182,7 @@ mod tests {
                 certainty: 1.0,
                 copy_of: (i == 6).then_some(NodeId(4)),
                 plane_angle: 0.0,
+                kind: Default::default(),
             });
         }
         let skeleton = Skeleton {

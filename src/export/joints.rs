@@ -5,8 +5,7 @@
 //! then a point x of the branch at rest is skinned to p_P(i)(t) + Q_i(t) (x - rest_P(i)), which is
 //! what `JointPose` means. The foot's joint stands still.
 
-use super::followed::{Followed, Shown, played};
-use super::sparse_keys::{Path, unit};
+use super::followed::{Followed, Key, Shown, played, unit};
 use super::thin_keys::{Arc, share, thin};
 use crate::model::{Pose, Skeleton};
 use nalgebra::{Quaternion, UnitQuaternion, Vector4};
@@ -38,18 +37,13 @@ impl Moving {
     /// a joint also makes good its parent's error. The tolerance grows towards the tips: a node may
     /// be wrong by `tolerance sqrt(depth / depth of the deepest tip above)`, of which its parent
     /// has used only a part.
-    pub fn new(
-        skeleton: &Skeleton,
-        all: &[Pose],
-        tolerance_px: f64,
-        thorough: &dyn Fn() -> bool,
-    ) -> Self {
+    pub fn new(skeleton: &Skeleton, all: &[Pose], tolerance_px: f64) -> Self {
         let (kept, times_s) = usable(all);
         let poses: Vec<&Pose> = kept.iter().map(|&k| &all[k]).collect();
         let joints = if poses.is_empty() {
             Vec::new()
         } else {
-            keys(skeleton, (&poses, &times_s), tolerance_px, thorough)
+            keys(skeleton, &poses, &times_s, tolerance_px)
         };
         Self {
             joints,
@@ -68,76 +62,92 @@ impl Moving {
     }
 }
 
-fn keys(
-    skeleton: &Skeleton,
-    (poses, times): (&[&Pose], &[f64]),
-    tolerance_px: f64,
-    thorough: &dyn Fn() -> bool,
-) -> Vec<Keys> {
+fn keys(skeleton: &Skeleton, poses: &[&Pose], times_s: &[f64], tolerance_px: f64) -> Vec<Keys> {
     let nodes = &skeleton.nodes;
     let budget = budgets(skeleton);
     let mut shown: Vec<Shown> = Vec::with_capacity(nodes.len());
     let mut out = Vec::new();
     for (i, node) in nodes.iter().enumerate() {
         let Some(parent) = node.parent.map(|p| p.index()) else {
-            shown.push(Shown::still(times.len()));
+            shown.push(Shown::still(times_s.len()));
             continue;
         };
-        let base = &shown[parent];
-        let branch = Followed::new(
-            base,
-            &rotations(poses, i),
-            node,
-            node.position - nodes[parent].position,
-        )
-        .within(tolerance_px, budget[i]);
-        let frames = 0..times.len();
-        if frames
-            .clone()
-            .all(|k| branch.miss(k, &UnitQuaternion::identity()) <= 1.0)
-        {
-            shown.push(branch.shown(base, &vec![UnitQuaternion::identity(); times.len()]));
-            continue;
-        }
-        let aims = one_hemisphere(frames.clone().map(|k| branch.aim(k)));
-        let path = Path {
-            times_s: times,
-            aims: &aims,
-            miss: |k: usize, turn: &UnitQuaternion<f64>| branch.miss(k, turn),
+        let way = node.position - nodes[parent].position;
+        let branch = Followed::new(&shown[parent], &rotations(poses, i), node, way)
+            .within(tolerance_px, budget[i]);
+        let keys = turns(&branch, times_s);
+        let turns = match &keys {
+            Some(keys) => played(keys, times_s),
+            None => vec![UnitQuaternion::identity(); times_s.len()],
         };
-        let on_aims = {
-            let aim = |k: usize| UnitQuaternion::new_unchecked(Quaternion::from(aims[k]));
-            let spans = |a: usize, b: usize| {
-                let arc = Arc::new(&aim(a), &aim(b));
-                let fits = |k: usize| branch.miss(k, &arc.at(share(times, a, b, k))) <= 1.0;
-                // The middle first: it is off the farthest, as a rule.
-                let middle = (a + b) / 2;
-                fits(middle) && (a + 1..b).all(|k| k == middle || fits(k))
-            };
-            let one = frames.clone().all(|k| branch.miss(k, &aim(0)) <= 1.0);
-            path.on_aims(&thin(times.len(), one, spans))
-        };
-        let keys = if thorough() {
-            // The plan takes arcs for straight, so even turning is better off on its path.
-            let planned = path
-                .mended(branch.planned(&aims, times))
-                .filter(|keys| keys.len() < on_aims.len());
-            path.fewer(planned.unwrap_or(on_aims))
-        } else {
-            on_aims
-        };
-        shown.push(branch.shown(base, &played(&keys, times)));
-        let rotations = one_hemisphere(keys.iter().map(|(_, turn)| unit(turn)));
-        out.push(Keys {
-            node: i,
-            times_s: keys.iter().map(|(k, _)| times[*k] as f32).collect(),
-            rotations: rotations
-                .iter()
-                .map(|q| [q.x as f32, q.y as f32, q.z as f32, q.w as f32])
-                .collect(),
-        });
+        shown.push(branch.shown(&shown[parent], &turns));
+        out.extend(keys.map(|keys| written(i, &keys, times_s)));
     }
     out
+}
+
+/// The keys of one branch; `None` where it may stay as it is at rest.
+fn turns(branch: &Followed, times_s: &[f64]) -> Option<Vec<Key>> {
+    let n = times_s.len();
+    let rest = UnitQuaternion::identity();
+    if (0..n).all(|k| branch.miss(k, &rest) <= 1.0) {
+        return None;
+    }
+    let aims = one_hemisphere((0..n).map(|k| branch.aim(k)));
+    let path = Path {
+        branch,
+        aims: &aims,
+        times_s,
+    };
+    Some(path.thinned())
+}
+
+/// The way of one branch: a turn for every frame.
+struct Path<'a> {
+    branch: &'a Followed,
+    /// Neighbours lie in one hemisphere.
+    aims: &'a [Vector4<f64>],
+    times_s: &'a [f64],
+}
+
+impl Path<'_> {
+    /// The fewest keys on the path that do.
+    fn thinned(&self) -> Vec<Key> {
+        let n = self.aims.len();
+        let first = self.aim(0);
+        let still = (0..n).all(|k| self.branch.miss(k, &first) <= 1.0);
+        let kept = thin(n, still, |a, b| self.spans(a, b));
+        kept.into_iter().map(|k| (k, self.aims[k])).collect()
+    }
+
+    fn aim(&self, k: usize) -> UnitQuaternion<f64> {
+        UnitQuaternion::new_unchecked(Quaternion::from(self.aims[k]))
+    }
+
+    /// Whether no key is needed between those of frames `a` and `b`.
+    fn spans(&self, a: usize, b: usize) -> bool {
+        let arc = Arc::new(&self.aim(a), &self.aim(b));
+        // The middle first: it is off the farthest, as a rule.
+        let middle = (a + b) / 2;
+        self.fits(&arc, a, b, middle) && (a + 1..b).all(|k| k == middle || self.fits(&arc, a, b, k))
+    }
+
+    fn fits(&self, arc: &Arc, a: usize, b: usize, k: usize) -> bool {
+        self.branch.miss(k, &arc.at(share(self.times_s, a, b, k))) <= 1.0
+    }
+}
+
+/// Keys as they go into the file.
+fn written(node: usize, keys: &[Key], times_s: &[f64]) -> Keys {
+    let rotations = one_hemisphere(keys.iter().map(|(_, turn)| unit(turn)));
+    Keys {
+        node,
+        times_s: keys.iter().map(|(k, _)| times_s[*k] as f32).collect(),
+        rotations: rotations
+            .iter()
+            .map(|q| [q.x as f32, q.y as f32, q.z as f32, q.w as f32])
+            .collect(),
+    }
 }
 
 /// Places of the poses whose time grows, also as `f32`, which is what the file holds; and their
@@ -162,14 +172,15 @@ fn usable(poses: &[Pose]) -> (Vec<usize>, Vec<f64>) {
 /// Rotations of branch `i` in model axes; where a pose has none, the branch keeps its last one.
 fn rotations(poses: &[&Pose], i: usize) -> Vec<UnitQuaternion<f64>> {
     let mut last = UnitQuaternion::identity();
-    let turn = |pose: &&Pose| {
+    let mut rotations = Vec::with_capacity(poses.len());
+    for pose in poses {
         let q = pose.joints[i].rotation;
         if q.coords.iter().all(|c| c.is_finite()) && q.coords.norm() > 0.5 {
             last = UnitQuaternion::new_normalize(q.into_inner());
         }
-        last
-    };
-    poses.iter().map(turn).collect()
+        rotations.push(last);
+    }
+    rotations
 }
 
 /// q and -q are one rotation; a viewer that does not know takes the long way round between them.

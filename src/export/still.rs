@@ -1,8 +1,12 @@
 //! The tree at rest for those who need no motion: OBJ and PLY.
 
+use super::ExportError;
 use super::gltf::NamedBytes;
-use super::{ExportError, number};
+use crate::document::push_number;
 use crate::shape::{Dressed, Mesh};
+
+/// What the wood is called.
+const WOOD: &str = "tree";
 
 /// A mesh with its looks.
 struct Part<'a> {
@@ -29,7 +33,7 @@ impl Part<'_> {
 fn parts(dressed: &Dressed) -> Result<Vec<Part<'_>>, ExportError> {
     let bark = std::slice::from_ref(&dressed.bark_rgb);
     let wood = dressed.wood.first().map(|mesh| Part {
-        name: "tree".into(),
+        name: WOOD.into(),
         mesh,
         colours: bark,
     });
@@ -87,93 +91,88 @@ pub fn obj_files(
     metres_per_px: f64,
 ) -> Result<Vec<NamedBytes>, ExportError> {
     let parts = parts(dressed)?;
-    let (scale, decimals) = (
-        scale(metres_per_px),
-        if metres_per_px > 0.0 { 7 } else { 4 },
-    );
     let mut text = format!(
         "# arborcam {}\nmtllib {stem}.mtl\n",
         env!("CARGO_PKG_VERSION")
     );
-    let row = |text: &mut String, kind: &str, values: &mut dyn Iterator<Item = (f64, usize)>| {
-        text.push_str(kind);
-        for (x, decimals) in values {
-            text.push(' ');
-            number::push(text, x, decimals);
-        }
-        text.push('\n');
-    };
     let mut before = 1;
     for part in &parts {
-        let mesh = part.mesh;
-        text.push_str(&format!(
-            "o {}\nusemtl {}\n",
-            part.name,
-            if part.name == "tree" { "bark" } else { "leaf" }
-        ));
-        for (k, p) in mesh.positions.iter().enumerate() {
-            // Colours after the place: few programs know them, and none minds.
-            let colour = part.colour(k).map(|c| (f64::from(c) / 255.0, 3));
-            row(
-                &mut text,
-                "v",
-                &mut p
-                    .iter()
-                    .map(|&x| (f64::from(x) * scale, decimals))
-                    .chain(colour),
-            );
-        }
-        mesh.uvs.iter().for_each(|t| {
-            row(
-                &mut text,
-                "vt",
-                &mut [t[0], 1.0 - t[1]].iter().map(|&x| (f64::from(x), 5)),
-            )
-        });
-        mesh.normals
-            .iter()
-            .for_each(|n| row(&mut text, "vn", &mut n.iter().map(|&x| (f64::from(x), 4))));
-        for t in mesh.indices.chunks_exact(3) {
-            let [a, b, c] = [t[0], t[1], t[2]].map(|i| i as usize + before);
-            text.push_str(&format!("f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}\n"));
-        }
-        before += mesh.positions.len();
+        push_part(&mut text, part, metres_per_px, before);
+        before += part.mesh.positions.len();
     }
-    let mut materials = String::new();
-    let mut material = |name: &str, rgb: [u8; 3], map: Option<&str>| {
-        materials.push_str(&format!("newmtl {name}\nKd"));
-        for c in rgb {
-            materials.push(' ');
-            number::push(&mut materials, f64::from(c) / 255.0, 3);
-        }
-        materials.push_str("\nKs 0 0 0\nillum 1\n");
-        map.iter()
-            .for_each(|file| materials.push_str(&format!("map_Kd {file}\nmap_d {file}\n")));
-    };
-    material("bark", dressed.bark_rgb, None);
     let texture = dressed.foliage.texture.as_ref().map(|(kind, bytes)| {
         let ending = if *kind == "image/png" { "png" } else { "jpg" };
         (format!("{stem}_leaf.{ending}"), bytes.clone())
     });
-    if parts.len() > 1 || parts.first().is_some_and(|p| p.name != "tree") {
-        let leaves = dressed.foliage.groups.iter().flat_map(|g| &g.colours);
-        let (mut sum, mut n) = ([0_u64; 3], 0_u64);
-        for c in leaves {
-            sum.iter_mut().zip(c).for_each(|(s, c)| *s += u64::from(*c));
-            n += 1;
-        }
-        material(
-            "leaf",
-            sum.map(|s| (s / n.max(1)) as u8),
-            texture.as_ref().map(|(name, _)| name.as_str()),
-        );
+    let mut materials = String::new();
+    push_material(&mut materials, "bark", dressed.bark_rgb, None);
+    if parts.iter().any(|p| p.name != WOOD) {
+        let file = texture.as_ref().map(|(name, _)| name.as_str());
+        push_material(&mut materials, "leaf", mean_colour(dressed), file);
     }
-    let mtl = (format!("{stem}.mtl"), materials.into_bytes());
-    Ok([mtl]
-        .into_iter()
-        .chain(texture)
-        .chain([(format!("{stem}.obj"), text.into_bytes())])
-        .collect())
+    let mut files = vec![(format!("{stem}.mtl"), materials.into_bytes())];
+    files.extend(texture);
+    files.push((format!("{stem}.obj"), text.into_bytes()));
+    Ok(files)
+}
+
+/// The text of one object; its vertices are numbered from `first` on.
+fn push_part(text: &mut String, part: &Part, metres_per_px: f64, first: usize) {
+    let mesh = part.mesh;
+    let scale = scale(metres_per_px);
+    let decimals = if metres_per_px > 0.0 { 7 } else { 4 };
+    let material = if part.name == WOOD { "bark" } else { "leaf" };
+    text.push_str(&format!("o {}\nusemtl {material}\n", part.name));
+    for (k, p) in mesh.positions.iter().enumerate() {
+        text.push('v');
+        push_row(text, p.map(|x| f64::from(x) * scale), decimals);
+        // Colours after the place: few programs know them, and none minds.
+        push_row(text, part.colour(k).map(|c| f64::from(c) / 255.0), 3);
+        text.push('\n');
+    }
+    for [u, v] in &mesh.uvs {
+        text.push_str("vt");
+        push_row(text, [f64::from(*u), f64::from(1.0 - *v)], 5);
+        text.push('\n');
+    }
+    for normal in &mesh.normals {
+        text.push_str("vn");
+        push_row(text, normal.map(f64::from), 4);
+        text.push('\n');
+    }
+    for t in mesh.indices.chunks_exact(3) {
+        let [a, b, c] = [t[0], t[1], t[2]].map(|i| i as usize + first);
+        text.push_str(&format!("f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}\n"));
+    }
+}
+
+/// Each with a blank before it.
+fn push_row<const N: usize>(text: &mut String, values: [f64; N], decimals: usize) {
+    for x in values {
+        text.push(' ');
+        push_number(text, x, decimals);
+    }
+}
+
+fn push_material(text: &mut String, name: &str, rgb: [u8; 3], map: Option<&str>) {
+    text.push_str(&format!("newmtl {name}\nKd"));
+    push_row(text, rgb.map(|c| f64::from(c) / 255.0), 3);
+    text.push_str("\nKs 0 0 0\nillum 1\n");
+    if let Some(file) = map {
+        text.push_str(&format!("map_Kd {file}\nmap_d {file}\n"));
+    }
+}
+
+/// Of all leaves, sRGB.
+fn mean_colour(dressed: &Dressed) -> [u8; 3] {
+    let (mut sum, mut n) = ([0_u64; 3], 0_u64);
+    for colour in dressed.foliage.groups.iter().flat_map(|g| &g.colours) {
+        for (sum, channel) in sum.iter_mut().zip(colour) {
+            *sum += u64::from(*channel);
+        }
+        n += 1;
+    }
+    sum.map(|s| (s / n.max(1)) as u8)
 }
 
 /// One binary PLY with places, normals and colours.
@@ -183,8 +182,8 @@ pub fn obj_files(
 pub fn ply(dressed: &Dressed, metres_per_px: f64) -> Result<Vec<u8>, ExportError> {
     let parts = parts(dressed)?;
     let scale = scale(metres_per_px);
-    let count = |of: fn(&Mesh) -> usize| parts.iter().map(|p| of(p.mesh)).sum::<usize>();
-    let (vertices, faces) = (count(|m| m.positions.len()), count(|m| m.indices.len() / 3));
+    let vertices: usize = parts.iter().map(|p| p.mesh.positions.len()).sum();
+    let faces: usize = parts.iter().map(|p| p.mesh.indices.len() / 3).sum();
     let floats: String = ["x", "y", "z", "nx", "ny", "nz"]
         .map(|c| format!("property float {c}\n"))
         .concat();

@@ -9,6 +9,8 @@ use std::path::{Path, PathBuf};
 /// number of times.
 const LARGEST_IN_ALL: u64 = 3 * LARGEST;
 
+const NOT_BESIDE: &str = "it refers to something that is not a file beside it";
+
 /// What has been taken for one template.
 pub(super) struct Taken<'a> {
     path: &'a Path,
@@ -45,31 +47,30 @@ impl<'a> Taken<'a> {
         Ok(())
     }
 
+    fn no_gltf(&self, what: impl Into<String>) -> TemplateError {
+        TemplateError::NoGltf {
+            path: self.path.into(),
+            what: what.into(),
+        }
+    }
+
     /// What a URI in the file refers to: data in it, or a file beside it.
     ///
     /// # Errors
     /// It is neither, cannot be read, or is too large.
     pub fn referred(&mut self, uri: &str) -> Result<Vec<u8>, TemplateError> {
-        let no_gltf = |what: String| TemplateError::NoGltf {
-            path: self.path.into(),
-            what,
-        };
         let bytes = if uri.starts_with("data:") {
             let data = gltf::buffer::Data::from_source(gltf::buffer::Source::Uri(uri), None);
             data.map(|d| d.0)
-                .map_err(|e| no_gltf(format!("data in it cannot be read ({e})")))?
+                .map_err(|e| self.no_gltf(format!("data in it cannot be read ({e})")))?
         } else if uri.contains(['/', '\\', ':', '%']) || uri.starts_with('.') {
             // Nobody's other files are read because a leaf from somewhere says so.
-            return Err(no_gltf(
-                "it refers to something that is not a file beside it".into(),
-            ));
+            return Err(self.no_gltf(NOT_BESIDE));
         } else {
             let beside: PathBuf = self.path.with_file_name(uri);
             // A pipe beside it would be waited for.
             if std::fs::metadata(&beside).is_ok_and(|m| !m.is_file()) {
-                return Err(no_gltf(
-                    "it refers to something that is not a file beside it".into(),
-                ));
+                return Err(self.no_gltf(NOT_BESIDE));
             }
             bounded(&beside)?
         };

@@ -9,7 +9,7 @@ const TRIED: usize = 3;
 /// Frames from one key to the next, as far as the fewest are looked for: a branch that hangs still
 /// at the end of a film would do with fewer, but to try ever longer spans takes time with the cube
 /// of their length, and somebody is waiting for that end.
-pub(super) const LONGEST: usize = 32;
+const LONGEST: usize = 32;
 
 /// Cosine of half a turn of 0.1 rad. On a shorter way the straight line is ahead or behind by a few
 /// millionths of a radian, and the sines cost most of the time.

@@ -106,6 +106,7 @@ mod tests {
                 certainty: 0.0,
                 copy_of: None,
                 plane_angle: 0.0,
+                kind: Default::default(),
             });
         }
         Skeleton {

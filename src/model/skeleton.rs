@@ -22,6 +22,39 @@ impl NodeId {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct NodeName(pub u32);
 
+/// Where a branch comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum NodeKind {
+    /// Points that move together were followed on it.
+    #[default]
+    Measured,
+    /// The modal analysis found it at the end of a measured branch.
+    Shoot,
+    /// A generator made it up.
+    Grown,
+    /// It was drawn or seen in a still picture.
+    Traced,
+}
+
+impl NodeKind {
+    pub const ALL: [Self; 4] = [Self::Measured, Self::Shoot, Self::Grown, Self::Traced];
+
+    /// One word for files.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Measured => "measured",
+            Self::Shoot => "shoot",
+            Self::Grown => "grown",
+            Self::Traced => "traced",
+        }
+    }
+
+    /// The kind of that [`word`](Self::word).
+    pub fn of_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.word() == word)
+    }
+}
+
 /// The end of a branch. The branch itself runs from the parent node to this one; the first node is
 /// the trunk's foot.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,6 +73,8 @@ pub struct Node {
     /// Points that move with this node or one below it; 0 for a copy, which nothing was measured
     /// on.
     pub n_tracks: u32,
+    /// Where it comes from; a copy says what its original does.
+    pub kind: NodeKind,
     /// How sure it is that the branches above part here, 0 to 1; 0 at a tip, and at the foot, which
     /// nothing parts from.
     pub certainty: f32,

@@ -45,8 +45,8 @@ pub struct Sway {
 /// Why a branch has no frequency of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unidentified {
-    /// Nothing was measured on it: the foot, a branch that no point follows, a capture of an older
-    /// version.
+    /// Nothing was measured on it: the foot, a branch that no point follows, a tree that was
+    /// not filmed.
     NotMeasured,
     /// Too few frames, or too few periods of its sway.
     TooShort,

@@ -50,6 +50,7 @@ mod tests {
             certainty: 1.0,
             copy_of: None,
             plane_angle: 0.0,
+            kind: Default::default(),
         };
         let nodes = vec![
             node(0, None, Point3::origin()),

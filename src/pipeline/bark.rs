@@ -11,6 +11,9 @@ const LOWER: f64 = 0.3;
 /// Share of the outline's width there: drawn by hand it is often twice as wide as the trunk.
 const MIDDLE: f64 = 0.2;
 
+/// Places that are looked at along it.
+const PLACES: u32 = 50;
+
 /// Median colour of the picture along the lower trunk; `None` where no trunk is in it.
 pub fn colour(seen: &Seen, skeleton: &Skeleton) -> Option<[u8; 3]> {
     let picture = seen
@@ -22,8 +25,11 @@ pub fn colour(seen: &Seen, skeleton: &Skeleton) -> Option<[u8; 3]> {
         .and_then(|p| p.joints.get(1))
         .map_or(top, |joint| joint.position);
     let (foot, top) = (skeleton.foot_px, skeleton.image_from_model(&top));
-    let along = |s: f64| [0, 1].map(|c| foot[c] + LOWER * s * (top[c] - foot[c]));
-    let places: Vec<[f64; 2]> = (1..=50).map(|k| along(f64::from(k) / 50.0)).collect();
+    let mut places: Vec<[f64; 2]> = Vec::with_capacity(PLACES as usize);
+    for k in 1..=PLACES {
+        let share = f64::from(k) / f64::from(PLACES);
+        places.push([0, 1].map(|c| foot[c] + LOWER * share * (top[c] - foot[c])));
+    }
     // The line from node to node may pass by the trunk; the middle of the outline does not.
     let drawn: Vec<[f64; 2]> = seen.outline.map_or(Vec::new(), |outline| {
         places
@@ -40,21 +46,28 @@ pub fn colour(seen: &Seen, skeleton: &Skeleton) -> Option<[u8; 3]> {
 
 /// The middle of the outline's row at `v_px`, where it is above the foot at `u_px`.
 fn middle(outline: &Outline, u_px: f64, v_px: f64) -> Vec<[f64; 2]> {
-    let inside = |u: f64| outline.contains(u, v_px);
-    if !inside(u_px) {
+    if !outline.contains(u_px, v_px) {
         return Vec::new();
     }
-    let reach = |step: f64| {
-        (1..)
-            .map(|k| u_px + step * f64::from(k))
-            .find(|u| !inside(*u))
-            .unwrap_or(u_px)
-    };
-    let (left, right) = (reach(-1.0), reach(1.0));
-    let share = |k: i32| 0.5 + MIDDLE * (f64::from(k) / 4.0 - 0.5);
-    (0..5)
-        .map(|k| [left + (right - left) * share(k), v_px])
-        .collect()
+    let left = border(outline, u_px, v_px, -1.0);
+    let right = border(outline, u_px, v_px, 1.0);
+    let mut places = Vec::with_capacity(5);
+    for k in 0..5 {
+        let share = 0.5 + MIDDLE * (f64::from(k) / 4.0 - 0.5);
+        places.push([left + (right - left) * share, v_px]);
+    }
+    places
+}
+
+/// The first place in steps of `step_px` from a place in the outline that is outside of it, px.
+fn border(outline: &Outline, u_px: f64, v_px: f64, step_px: f64) -> f64 {
+    let mut u = u_px + step_px;
+    let mut steps = 1;
+    while outline.contains(u, v_px) {
+        steps += 1;
+        u = u_px + step_px * f64::from(steps);
+    }
+    u
 }
 
 fn median(picture: &Rgb, skeleton: &Skeleton, places: &[[f64; 2]]) -> Option<[u8; 3]> {
@@ -63,14 +76,15 @@ fn median(picture: &Rgb, skeleton: &Skeleton, places: &[[f64; 2]]) -> Option<[u8
     for at in places.iter().map(|p| p.map(|x| (x * scale).round())) {
         if picture.size.contains(at[0], at[1]) {
             let colour = picture.at(at[0].max(0.0) as u32, at[1].max(0.0) as u32);
-            channels.iter_mut().zip(colour).for_each(|(c, x)| c.push(x));
+            for (channel, value) in channels.iter_mut().zip(colour) {
+                channel.push(value);
+            }
         }
     }
-    channels.iter_mut().for_each(|c| c.sort_unstable());
-    let median = |c: &Vec<u8>| c.get(c.len() / 2).copied();
-    Some([
-        median(&channels[0])?,
-        median(&channels[1])?,
-        median(&channels[2])?,
-    ])
+    let mut medians = [0; 3];
+    for (median, channel) in medians.iter_mut().zip(&mut channels) {
+        channel.sort_unstable();
+        *median = *channel.get(channel.len() / 2)?;
+    }
+    Some(medians)
 }

@@ -116,12 +116,11 @@ fn whole(shape: &Outline) -> Luma {
 
 /// Black outside of the outline.
 fn inside(mut drawn: Luma, outline: &Outline) -> Luma {
-    drawn
-        .pixels
-        .iter_mut()
-        .zip(&outline.mask)
-        .filter(|(_, m)| **m == 0)
-        .for_each(|(p, _)| *p = 0);
+    for (pixel, mask) in drawn.pixels.iter_mut().zip(&outline.mask) {
+        if *mask == 0 {
+            *pixel = 0;
+        }
+    }
     drawn
 }
 

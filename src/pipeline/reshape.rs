@@ -35,12 +35,12 @@ pub fn reshape(old: &Skeleton, outline: &Outline, config: &Config) -> Skeleton {
         .max()
         .map_or(0, |n| n.saturating_add(1));
     let (kept, copies) = new.nodes.split_at_mut(measured.len());
-    kept.iter_mut()
-        .zip(measured)
-        .for_each(|(new, old)| new.name = old.name);
-    (unused..)
-        .zip(copies)
-        .for_each(|(name, copy)| copy.name = NodeName(name));
+    for (new, old) in kept.iter_mut().zip(measured) {
+        (new.name, new.kind) = (old.name, old.kind);
+    }
+    for (name, copy) in (unused..).zip(copies) {
+        copy.name = NodeName(name);
+    }
     new
 }
 

@@ -148,6 +148,7 @@ mod tests {
             certainty: 1.0,
             copy_of: None,
             plane_angle: 0.0,
+            kind: Default::default(),
         };
         let skeleton = Skeleton {
             nodes: vec![node(0), node(1)],

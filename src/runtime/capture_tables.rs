@@ -1,12 +1,11 @@
-//! `tracks.csv` and `motion.csv`, written behind the capture while it runs, so that little is left
-//! to do at its end: a service is given two seconds to stop.
+//! `tracks.csv` and `motion.csv`, written from the log as far as it goes.
 
 use super::meter::Histogram;
 use super::shared::Failure;
 use crate::cancel::CancelToken;
 use crate::config::Config;
-use crate::export::OutputFolder;
-use crate::export::csv::{MotionCsv, TracksCsv};
+use crate::document::{MotionCsv, TracksCsv};
+use crate::files::OutputFolder;
 use crate::model::{LONGEST_TRIAL_S, Pose, TrackId, TrackLog, TrackSet};
 use crate::pipeline::PoseReplay;
 use crate::recording::{Sets, TrackFileReader};
@@ -16,6 +15,10 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 use std::sync::Arc;
+
+/// So much more of the film is kept than its animation shows, s: which poses are in that is decided
+/// by the times as they are written.
+const SLACK_S: f64 = 1.0;
 
 /// Both tables as far as they are written. What is in them does not depend on when and in how many
 /// pieces that is done.
@@ -32,9 +35,9 @@ pub struct CaptureTables {
     rejected: BTreeSet<TrackId>,
     /// Whether the frames up to the one in which the tree was built have their rows.
     early_rows_written: bool,
-    /// Poses of the last `animation_s`, for the animation.
+    /// Poses of the last [`kept_s`](Self::kept_s), for the animation.
     poses: VecDeque<Pose>,
-    animation_s: f64,
+    kept_s: f64,
     /// The frame of the capture's picture, and the tree's pose in it.
     pictured: Option<u64>,
     pose_in_picture: Option<Pose>,
@@ -82,7 +85,7 @@ impl CaptureTables {
             rejected: BTreeSet::new(),
             early_rows_written: false,
             poses: VecDeque::new(),
-            animation_s: config.export.animation_s,
+            kept_s: config.export.animation_s + SLACK_S,
             pictured,
             pose_in_picture: None,
             misses: Histogram::default(),
@@ -163,7 +166,7 @@ impl CaptureTables {
         if self.pictured == Some(pose.frame) {
             self.pose_in_picture = Some(pose.clone());
         }
-        let oldest_s = pose.time_s - self.animation_s;
+        let oldest_s = pose.time_s - self.kept_s;
         self.poses.push_back(pose);
         while self.poses.front().is_some_and(|p| p.time_s < oldest_s) {
             self.poses.pop_front();

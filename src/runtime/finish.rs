@@ -5,30 +5,27 @@ use super::capture_tables::{CaptureTables, Done};
 use super::meter::Histogram;
 use super::shared::{Failure, Shared};
 use crate::config::Config;
+use crate::document::note::{
+    Build, ModelNote, OutlineNote, PictureNote, Quality as QualityNote, Refinement, Software,
+    Source, json,
+};
+use crate::document::{
+    CaptureNote, MotionCsv, PICTURE_FILE, SCHEMA_VERSION, TracksCsv, jpeg, nodes,
+};
 use crate::dynamics::{Film, analyse};
-use crate::export::capture::{
-    AnimationNote, Build, Capture, ModelNote, OutlineNote, PictureNote, Quality as QualityNote,
-    Refinement, Software, Source, Timing, json,
-};
-use crate::export::csv::{MotionCsv, TracksCsv, nodes};
-use crate::export::gltf::{KEY_TOLERANCE_PX, Model, glb, provenance};
-use crate::export::picture::{PICTURE_FILE, jpeg};
-use crate::export::{ExportError, OutputFolder};
+use crate::files::OutputFolder;
 use crate::model::{
-    NodeId, NodeName, Outline, Picture, Pose, Skeleton, Tentative, TrackLog, TrackSet, Unidentified,
+    NodeId, NodeName, Outline, Picture, Pose, Skeleton, Swaying, Tentative, Timing, TrackLog,
+    TrackSet, Unidentified,
 };
-use crate::pipeline::{PoseReplay, Seen, dress, flutter};
 use crate::recording::TrackFileReader;
-use crate::solve::Model as TreeModel;
+use crate::solve::Model;
 use crate::source::SourceInfo;
+use crate::views::{DocumentWriter, Draft};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
-
-/// Joints times frames up to which the fewest keys of the animation are looked for: a service is
-/// given two seconds to stop.
-const THOROUGH_UP_TO: usize = 100_000;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Figures of the tracking, gathered frame by frame.
 #[derive(Clone, Debug, Default)]
@@ -61,6 +58,20 @@ impl Quality {
         }
     }
 
+    fn figures(&self, tree: Option<&Model>) -> QualityNote {
+        let tracked_s = self.last_s - self.first.map_or(self.last_s, |(_, s)| s);
+        QualityNote {
+            tracks_total: self.tracks_total(),
+            tracks_rejected: self.rejected,
+            tracks_alive_end: self.alive,
+            median_fb_error_px: self.fb_error_px.median(),
+            median_error_px: self.error_px.median(),
+            lost_per_s: (tracked_s > 0.0).then(|| self.lost as f64 / tracked_s),
+            median_certainty: tree.and_then(|tree| tree.hierarchy.median_certainty()),
+            median_reprojection_px: None,
+        }
+    }
+
     /// Points followed that count: those that have passed their trial, or all while none has.
     pub fn tracks_total(&self) -> u64 {
         self.born
@@ -71,7 +82,7 @@ impl Quality {
 /// Everything that a capture is made of; owned, so that it can be written on any thread while
 /// frames go on.
 pub struct CaptureJob {
-    pub tree: Option<Arc<TreeModel>>,
+    pub tree: Option<Arc<Model>>,
     pub outline: Option<Arc<Outline>>,
     pub tracks: TrackFileReader,
     /// The last seconds of the same.
@@ -87,8 +98,8 @@ pub struct CaptureJob {
 #[derive(Clone, Debug)]
 pub struct Written {
     pub dir: PathBuf,
-    /// The tree of its files. After a stop shortly after a refinement it is the one before.
-    pub tree: Option<Arc<TreeModel>>,
+    /// The model of its files.
+    pub tree: Option<Arc<Model>>,
 }
 
 /// Writes the capture to `dir`, which appears only when it is complete.
@@ -117,70 +128,73 @@ pub fn write(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
 pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, Failure> {
     let cancel = &job.shared.pulse.writing;
     tables.catch_up(&job.tracks, cancel)?;
-    let Done {
-        folder,
-        replay,
-        poses,
-        pose_in_picture,
-        misses,
-    } = tables.finish(&job.tracks, cancel)?;
-    let tree = replay.model().clone();
-    let film = film(job, &replay);
-    let metres_per_px = job.config.export.metres_per_px;
-    // The sway and the model need nothing of each other, and whoever has asked for the end is
-    // waiting.
-    let (sway, (model, push)) = beside(
+    let mut done = tables.finish(&job.tracks, cancel)?;
+    let model = done.replay.model().clone();
+    let film = film(job, &done);
+    let poses = std::mem::take(&mut done.poses);
+    // Most of the document needs no sway, and the user who has asked for the end is waiting.
+    let (sway, writer) = beside(
         "sway",
         || {
             let cancel = &job.shared.pulse.closing_work;
-            analyse(&tree.skeleton, &film, &job.config.dynamics, cancel).sway
+            analyse(&model.skeleton, &film, &job.config.dynamics, cancel).sway
         },
-        || {
-            (
-                model_of(job, &tree, &poses, pose_in_picture.as_ref()),
-                tree.push_figures(&job.config),
-            )
-        },
+        || draft(job, &done, poses),
     );
-    let (bytes, animation) = model?;
-    let untold = sway
-        .iter()
-        .filter(|s| matches!(s, Err(Unidentified::NotInTime)))
-        .count();
-    if untold > 0 {
-        let of = tree.skeleton.measured() - 1;
-        job.shared.warn(format!(
-            "the sway of {untold} of {of} branches was not looked at, as the end was wanted: `arborcam analyze DIR` tells it"
-        ));
-    }
-    nodes(
-        folder.file("nodes.csv")?,
-        &tree.skeleton,
-        &sway,
-        metres_per_px,
-    )?;
-    folder.write("tree.glb", &bytes)?;
-    let push = Some(push);
-    let model = ModelNote {
-        push,
-        ..ModelNote::of(&tree.skeleton, metres_per_px)
-    };
-    let capture = describe(job, Some(&tree), Some((model, animation)), misses.median());
-    publish(job, folder, capture, Some(tree))
+    warn_of_unanalysed(job, &model, &sway);
+    let warnings = warnings(job, Some(&model));
+    writer?.write(&done.folder, &sway, warnings)?;
+    let dir = done.folder.publish()?;
+    Ok(Written {
+        dir,
+        tree: Some(model),
+    })
 }
 
 /// The points of the last seconds on the nodes of the tree.
-fn film(job: &CaptureJob, replay: &PoseReplay) -> Film {
+fn film(job: &CaptureJob, done: &Done) -> Film {
     let mut log = job.log.clone();
     log.close();
-    let skeleton = &replay.model().skeleton;
+    let skeleton = &done.replay.model().skeleton;
     let mut by_name: BTreeMap<NodeName, NodeId> = BTreeMap::new();
     for (i, node) in skeleton.nodes.iter().enumerate() {
         by_name.insert(node.name, NodeId(i as u32));
     }
     Film::from_log(log.last(job.config.dynamics.window_s), skeleton, |id| {
-        by_name.get(&replay.node_of(id)?).copied()
+        by_name.get(&done.replay.node_of(id)?).copied()
     })
+}
+
+/// The document but for its sway.
+fn draft(job: &CaptureJob, done: &Done, poses: Vec<Pose>) -> Result<DocumentWriter, Failure> {
+    let tree = &**done.replay.model();
+    let model = ModelNote {
+        push: Some(tree.push_figures(&job.config)),
+        ..ModelNote::of(&tree.skeleton, job.config.export.metres_per_px)
+    };
+    let mut note = describe(job, Some(tree), Some(model));
+    note.quality.median_reprojection_px = done.misses.median();
+    Ok(DocumentWriter::new(Draft {
+        note,
+        skeleton: &tree.skeleton,
+        picture: job.picture.as_ref(),
+        poses,
+        pose_in_picture: done.pose_in_picture.as_ref(),
+    })?)
+}
+
+/// Says how many branches were not analysed because the end was wanted.
+fn warn_of_unanalysed(job: &CaptureJob, tree: &Model, sway: &[Swaying]) {
+    let missing = sway
+        .iter()
+        .filter(|s| matches!(s, Err(Unidentified::NotInTime)))
+        .count();
+    if missing > 0 {
+        let of = tree.skeleton.measured() - 1;
+        job.shared.warn(format!(
+            "the sway of {missing} of {of} branches was not looked at, as the end was wanted: `arborcam analyze DIR` tells it"
+        ));
+    }
 }
 
 /// Does both at the same time, the first on a thread of this name, or one after the other where
@@ -207,7 +221,32 @@ fn beside<A: Send, B>(
 fn without_tree(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
     let folder = OutputFolder::create(dir)?;
     let metres_per_px = job.config.export.metres_per_px;
-    let mut tracks = TracksCsv::new(folder.file("tracks.csv")?)?;
+    write_tracks(job, TracksCsv::new(folder.file("tracks.csv")?)?)?;
+    let foot_only = Arc::new(Skeleton {
+        nodes: Vec::new(),
+        foot_px: [0.0; 2],
+        image_size: job.info.size,
+    });
+    nodes(folder.file("nodes.csv")?, &foot_only, &[], metres_per_px)?;
+    MotionCsv::new(folder.file("motion.csv")?, &foot_only, metres_per_px)?.finish()?;
+    describe_without_tree(job, &folder)?;
+    let dir = folder.publish()?;
+    Ok(Written { dir, tree: None })
+}
+
+fn describe_without_tree(job: &CaptureJob, folder: &OutputFolder) -> Result<(), Failure> {
+    if let Some(picture) = &job.picture {
+        folder.write(PICTURE_FILE, &jpeg(&picture.rgb)?)?;
+    }
+    let note = describe(job, None, None);
+    Ok(folder.write("capture.json", &json(&note)?)?)
+}
+
+/// The points of a film in which no tree was built: those that have passed their trial.
+fn write_tracks(
+    job: &CaptureJob,
+    mut table: TracksCsv<impl std::io::Write>,
+) -> Result<(), Failure> {
     // Which points are void is known for sure only at the end: where the tree did not move, a trial
     // may last for long.
     let (mut rejected, mut tentative) = (BTreeSet::new(), Tentative::default());
@@ -221,83 +260,64 @@ fn without_tree(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
     for set in job.tracks.sets() {
         let mut set = set.map_err(Failure::Log)?;
         set.observations.retain(|o| !rejected.contains(&o.id));
-        tracks.set(&set, |_| None)?;
+        table.set(&set, |_| None)?;
         job.shared.pulse.wrote();
     }
-    tracks.finish()?;
-    let foot_only = Arc::new(Skeleton {
-        nodes: Vec::new(),
-        foot_px: [0.0; 2],
-        image_size: job.info.size,
-    });
-    nodes(folder.file("nodes.csv")?, &foot_only, &[], metres_per_px)?;
-    MotionCsv::new(folder.file("motion.csv")?, &foot_only, metres_per_px)?.finish()?;
-    publish(job, folder, describe(job, None, None, None), None)
+    table.finish()?;
+    Ok(())
 }
 
-fn publish(
-    job: &CaptureJob,
-    folder: OutputFolder,
-    capture: Capture,
-    tree: Option<Arc<TreeModel>>,
-) -> Result<Written, Failure> {
-    if let Some(picture) = &job.picture {
-        folder.write(PICTURE_FILE, &jpeg(&picture.rgb)?)?;
-    }
-    folder.write("capture.json", &json(&capture)?)?;
-    let dir = folder.publish()?;
-    Ok(Written { dir, tree })
-}
-
-fn model_of(
-    job: &CaptureJob,
-    tree: &TreeModel,
-    poses: &[Pose],
-    pose_in_picture: Option<&Pose>,
-) -> Result<(Vec<u8>, AnimationNote), ExportError> {
-    let skeleton = &tree.skeleton;
-    let picture = job.picture.as_ref().map(|p| &*p.rgb);
-    let seen = Seen {
-        picture,
-        pose: pose_in_picture,
-        outline: Some(&tree.outline),
-        ..Seen::default()
-    };
-    let dressed = dress(skeleton, seen, &job.config);
-    let flutter = flutter(&dressed, poses, skeleton, &job.config);
-    let provenance = provenance(&job.info.name, &Software::default(), poses);
-    let large = skeleton.nodes.len() * poses.len() > THOROUGH_UP_TO;
-    glb(&Model {
-        skeleton,
-        dressed: &dressed,
-        poses,
-        flutter: &flutter,
-        all_levels: false,
-        metres_per_px: job.config.export.metres_per_px,
-        tolerance_px: KEY_TOLERANCE_PX,
-        thorough: &|| !large && !job.shared.pulse.closing_work.is_cancelled(),
-        node_extras: &[],
-        provenance: &provenance,
-    })
-}
-
+/// What goes into `capture.json`, but for what is known only when the model's file is made.
 pub(super) fn describe(
     job: &CaptureJob,
-    tree: Option<&TreeModel>,
-    notes: Option<(ModelNote, AnimationNote)>,
-    median_reprojection_px: Option<f64>,
-) -> Capture {
-    let (model, animation) = notes.unzip();
+    tree: Option<&Model>,
+    model: Option<ModelNote>,
+) -> CaptureNote {
+    CaptureNote {
+        schema_version: SCHEMA_VERSION,
+        software: Software::default(),
+        captured_at: None,
+        source: Source {
+            name: job.info.name.clone(),
+            format_asked: job.info.format.asked.clone(),
+            format_given: job.info.format.given.clone(),
+            width: job.info.size.width,
+            height: job.info.size.height,
+        },
+        timing: timing(job),
+        config: job.config.clone(),
+        outline: job.outline.as_ref().map(|o| OutlineNote {
+            frame: job.quality.first.map_or(0, |(frame, _)| frame),
+            width: o.size.width,
+            height: o.size.height,
+            polygon_px: o.polygon_px.clone(),
+        }),
+        picture: job.picture.as_ref().map(|p| PictureNote {
+            file: PICTURE_FILE.into(),
+            frame: p.frame,
+            time_s: p.time_s,
+        }),
+        build: tree.map(first_build),
+        refinement: tree.and_then(refinement),
+        quality: job.quality.figures(tree),
+        model,
+        animation: None,
+        warnings: warnings(job, tree),
+    }
+}
+
+fn count(counter: &AtomicU64) -> u64 {
+    counter.load(Ordering::Relaxed)
+}
+
+fn timing(job: &CaptureJob) -> Timing {
     let counts = &job.shared.counts;
-    let count = |c: &std::sync::atomic::AtomicU64| c.load(Ordering::Relaxed);
     let (seen, duration_s) = (count(&counts.seen), job.shared.last_time_s());
     let camera = job.shared.camera_state();
     // Each absence is one of the steps from frame to frame.
-    let (steps, filmed_s) = (
-        seen.saturating_sub(1 + camera.reconnects),
-        duration_s - camera.away_s,
-    );
-    let timing = Timing {
+    let steps = seen.saturating_sub(1 + camera.reconnects);
+    let filmed_s = duration_s - camera.away_s;
+    Timing {
         nominal_rate_hz: job.info.nominal_rate_hz,
         measured_rate_hz: (steps > 0 && filmed_s > 0.0).then(|| steps as f64 / filmed_s),
         frames_seen: seen,
@@ -315,67 +335,39 @@ pub(super) fn describe(
         frames_not_recorded: count(&counts.not_recorded),
         duration_s,
         ..job.shared.gaps()
-    };
-    let quality = &job.quality;
+    }
+}
+
+/// What the user should know before trusting the result.
+fn warnings(job: &CaptureJob, tree: Option<&Model>) -> Vec<String> {
     let mut warnings = job.shared.warnings();
     // Withdrawn when the tree was refined, and this may be the one before.
     let little = tree.and_then(|tree| little_motion(tree, job.config.accumulate.threshold));
-    warnings.extend(little.filter(|w| !job.shared.warnings().contains(w)));
-    let tracked_s = quality.last_s - quality.first.map_or(quality.last_s, |(_, s)| s);
-    Capture {
-        schema_version: crate::export::capture::SCHEMA_VERSION,
-        software: Software::default(),
-        captured_at: None,
-        source: Source {
-            name: job.info.name.clone(),
-            format_asked: job.info.format.asked.clone(),
-            format_given: job.info.format.given.clone(),
-            width: job.info.size.width,
-            height: job.info.size.height,
-        },
-        timing,
-        config: job.config.clone(),
-        outline: job.outline.as_ref().map(|o| OutlineNote {
-            frame: quality.first.map_or(0, |(frame, _)| frame),
-            width: o.size.width,
-            height: o.size.height,
-            polygon_px: o.polygon_px.clone(),
-        }),
-        picture: job.picture.as_ref().map(|p| PictureNote {
-            file: PICTURE_FILE.into(),
-            frame: p.frame,
-            time_s: p.time_s,
-        }),
-        build: tree.map(|tree| Build {
-            frame: tree.first.frame,
-            time_s: tree.first.time_s,
-            accumulation: tree.first.measure,
-            moving_points: tree.first.moving as u32,
-            forced: tree.first.forced,
-        }),
-        refinement: tree
-            .filter(|tree| tree.refinements > 0)
-            .map(|tree| Refinement {
-                count: tree.refinements,
-                frame: tree.frame,
-                time_s: tree.time_s,
-                accumulation: tree.evidence.measure,
-                moving_points: tree.evidence.moving.len() as u32,
-                shown_from: tree.shown_from,
-                nodes_kept: tree.kept as u32,
-            }),
-        quality: QualityNote {
-            tracks_total: quality.tracks_total(),
-            tracks_rejected: quality.rejected,
-            tracks_alive_end: quality.alive,
-            median_fb_error_px: quality.fb_error_px.median(),
-            median_error_px: quality.error_px.median(),
-            lost_per_s: (tracked_s > 0.0).then(|| quality.lost as f64 / tracked_s),
-            median_certainty: tree.and_then(|tree| tree.hierarchy.median_certainty()),
-            median_reprojection_px,
-        },
-        model,
-        animation,
-        warnings,
+    if let Some(little) = little.filter(|w| !warnings.contains(w)) {
+        warnings.push(little);
     }
+    warnings
+}
+
+fn first_build(tree: &Model) -> Build {
+    Build {
+        frame: tree.first.frame,
+        time_s: tree.first.time_s,
+        accumulation: tree.first.measure,
+        moving_points: tree.first.moving as u32,
+        forced: tree.first.forced,
+    }
+}
+
+/// `None` for the tree that was built first.
+fn refinement(tree: &Model) -> Option<Refinement> {
+    (tree.refinements > 0).then(|| Refinement {
+        count: tree.refinements,
+        frame: tree.frame,
+        time_s: tree.time_s,
+        accumulation: tree.evidence.measure,
+        moving_points: tree.evidence.moving.len() as u32,
+        shown_from: tree.shown_from,
+        nodes_kept: tree.kept as u32,
+    })
 }

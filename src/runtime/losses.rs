@@ -6,7 +6,7 @@
 //! the frames around it are known: one that the frames before or after make up for was jitter, and
 //! one as long as all the steps on either side is a slower rate.
 
-use crate::export::capture::{Gap, GapCause};
+use crate::model::{Gap, GapCause};
 use std::collections::VecDeque;
 
 /// Steps on either side of the one that is judged.

@@ -3,8 +3,7 @@
 use super::nap::NAP;
 use super::shared::Shared;
 use crate::config;
-use crate::export::capture::GapCause;
-use crate::model::RawFrame;
+use crate::model::{GapCause, RawFrame};
 use crate::source::{Source, SourceError};
 use std::time::{Duration, Instant};
 

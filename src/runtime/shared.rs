@@ -3,11 +3,11 @@
 use super::latest::Latest;
 use super::pulse::Pulse;
 use crate::config::Config;
-use crate::export::ExportError;
-use crate::export::capture::{Gap, Timing};
-use crate::model::{CameraState, Snapshot};
+use crate::files::WriteError;
+use crate::model::{CameraState, Gap, Snapshot, Timing};
 use crate::recording::RecordingError;
 use crate::source::{ClockKind, DecodeError, SourceError};
+use crate::views::PrepareError;
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -29,7 +29,9 @@ pub enum Failure {
     #[error(transparent)]
     Source(SourceError),
     #[error(transparent)]
-    Export(#[from] ExportError),
+    Write(#[from] WriteError),
+    #[error(transparent)]
+    Document(#[from] PrepareError),
     #[error("cannot keep the tracks: {0}; free some space, or choose another disk with --out")]
     Log(std::io::Error),
     #[error("{} is there: a run that was cut; complete it with `arborcam finish`, or remove it", .dir.display())]
@@ -69,7 +71,7 @@ impl Failure {
     /// Whether it may go away by itself when there is room on the disk.
     pub fn is_full_disk(&self) -> bool {
         match self {
-            Failure::Export(ExportError::DiskFull { .. }) => true,
+            Failure::Write(WriteError::DiskFull { .. }) => true,
             Failure::Log(e) => matches!(
                 e.kind(),
                 std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded

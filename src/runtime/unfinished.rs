@@ -8,10 +8,9 @@ use super::finish::{self, CaptureJob, Quality, Written};
 use super::shared::{Failure, Shared};
 use super::status::{median_error_px, median_fb_error_px};
 use crate::cancel::CancelToken;
-use crate::capture::Captured;
-use crate::export::capture::{Capture, json};
-use crate::export::picture::{PICTURE_FILE, jpeg};
-use crate::model::{FormatNote, Outline, Picture, Size};
+use crate::document::note::json;
+use crate::document::{Begun, CaptureNote, PICTURE_FILE, jpeg};
+use crate::model::{FormatNote, Size};
 use crate::pipeline::{BackEnd, Followed};
 use crate::recording::{SpaceReserve, TrackFile, TrackFileReader};
 use crate::source::SourceInfo;
@@ -106,7 +105,7 @@ impl Unfinished {
         log.flush().map_err(Failure::Log)?;
         let results = LEAST_RESERVE + RESULTS_PER_LOG * log.bytes();
         self.reserve.grow_to(results).map_err(Failure::Log)?;
-        let note = json(&finish::describe(job, None, None, None))?;
+        let note = json(&finish::describe(job, None, None))?;
         self.replace(NOTE_FILE, &note)?;
         if let Some(picture) = job.picture.as_ref().filter(|_| !self.picture_is_kept) {
             self.replace(PICTURE_FILE, &jpeg(&picture.rgb)?)?;
@@ -150,9 +149,16 @@ pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Fa
     let out = named(out);
     let dir = unfinished_dir(&out);
     let tracks = TrackFileReader::open(&dir.join(LOG_FILE)).map_err(|e| cannot_open(&dir, e))?;
-    let note = read_note(&dir)?;
-    let picture = read_picture(&dir, &note);
-    let outline = outline_of(&note);
+    let Begun {
+        note,
+        picture,
+        outline,
+    } = Begun::read(&dir).map_err(|e| Failure::DamagedUnfinished {
+        dir: dir.clone(),
+        what: e.to_string(),
+    })?;
+    let info = info_of(&note);
+    let outline = Arc::new(outline.unwrap_or_else(|| crate::outline::whole(info.size)));
     let shared = Arc::new(Shared::restored(&note.timing, &note.warnings));
     let mut back = BackEnd::new(&note.config);
     let mut quality = Quality::default();
@@ -180,7 +186,7 @@ pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Fa
         outline: back.outline().cloned(),
         tracks,
         log: back.log().clone(),
-        info: info_of(&note),
+        info,
         config: note.config,
         quality,
         picture,
@@ -212,44 +218,7 @@ fn cannot_open(dir: &Path, e: io::Error) -> Failure {
     }
 }
 
-fn read_note(dir: &Path) -> Result<Capture, Failure> {
-    let damaged = |what: String| Failure::DamagedUnfinished {
-        dir: dir.to_owned(),
-        what,
-    };
-    Captured::note(dir).map_err(|e| damaged(e.to_string()))
-}
-
-/// `None` where there is none or it cannot be read: the model then has no colours of its own.
-fn read_picture(dir: &Path, note: &Capture) -> Option<Picture> {
-    let note = note.picture.as_ref()?;
-    let bytes = std::fs::read(dir.join(PICTURE_FILE)).ok()?;
-    let rgb = image::load_from_memory(&bytes).ok()?.into_rgb8();
-    let size = Size::new(rgb.width(), rgb.height());
-    Some(Picture {
-        rgb: Arc::new(crate::model::Rgb {
-            size,
-            pixels: rgb.into_raw(),
-        }),
-        frame: note.frame,
-        time_s: note.time_s,
-    })
-}
-
-/// The outline as it was noted, or the whole picture.
-fn outline_of(note: &Capture) -> Arc<Outline> {
-    let whole = Size::new(note.source.width, note.source.height);
-    let noted = note.outline.as_ref().and_then(|o| {
-        let mut corners_px: Vec<[f64; 2]> = Vec::new();
-        for [u, v] in &o.polygon_px {
-            corners_px.push([f64::from(*u), f64::from(*v)]);
-        }
-        crate::outline::from_polygon(&corners_px, Size::new(o.width, o.height)).ok()
-    });
-    Arc::new(noted.unwrap_or_else(|| crate::outline::whole(whole)))
-}
-
-fn info_of(note: &Capture) -> SourceInfo {
+fn info_of(note: &CaptureNote) -> SourceInfo {
     SourceInfo {
         name: note.source.name.clone(),
         format: FormatNote {

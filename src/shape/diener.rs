@@ -37,6 +37,7 @@ pub fn diener(flat: &[Node2d], tracks: &[u32], trunk: &[bool], outline: &Outline
         certainty: n.certainty,
         copy_of: None,
         plane_angle: 0.0,
+        kind: Default::default(),
     };
     let mut nodes: Vec<Node> = flat.iter().enumerate().map(node).collect();
     let mut copy_id: Vec<NodeId> = (0..flat.len() as u32).map(NodeId).collect();

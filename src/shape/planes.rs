@@ -2,7 +2,7 @@
 //! al. section 3).
 
 use super::envelope::Envelope;
-use crate::model::{Node, NodeId, NodeName, Outline, Skeleton};
+use crate::model::{Node, NodeId, NodeKind, NodeName, Outline, Skeleton};
 use crate::skeleton::Node2d;
 use nalgebra::{Point3, Rotation3, Vector3};
 use std::f64::consts::PI;
@@ -36,6 +36,7 @@ pub fn copy_to_planes(
             certainty: n.certainty,
             copy_of: None,
             plane_angle: 0.0,
+            kind: NodeKind::Measured,
         })
         .collect();
     place(&mut nodes, envelope);

@@ -8,7 +8,7 @@ use crate::cancel::CancelToken;
 use crate::config::Dynamics;
 use crate::dynamics::{Film, FilmTrack, shoots};
 use crate::hierarchy::rest_position_px;
-use crate::model::{Node, NodeId, NodeName, Skeleton, TrackId, TrackTable};
+use crate::model::{Node, NodeId, NodeKind, NodeName, Skeleton, TrackId, TrackTable};
 use nalgebra::{Point3, Vector2, Vector3};
 use std::collections::BTreeSet;
 
@@ -219,6 +219,7 @@ pub(super) fn with(skeleton: &Skeleton, branches: &[SubBranch]) -> Skeleton {
             position,
             n_tracks: branch.members.len() as u32,
             certainty: 0.0,
+            kind: NodeKind::Shoot,
             ..on
         });
     }
@@ -271,6 +272,7 @@ mod tests {
             certainty: 0.5,
             copy_of: copy_of.map(NodeId),
             plane_angle: copy_of.map_or(0.0, |_| 1.0),
+            kind: Default::default(),
         };
         let nodes = vec![
             node(0, None, [0.0, 0.0, 0.0], None),

@@ -10,12 +10,12 @@
 
 use super::probe::{Probe, file_url, probe, ratio, spawn_error};
 use super::{Source, SourceError, SourceInfo};
+use crate::ffmpeg::{Ffmpeg, plain};
 use crate::model::{FormatNote, PixelFormat, RawFrame, Size, nanoseconds, seconds};
 use std::collections::VecDeque;
-use std::io::{BufRead, BufReader, PipeReader, Read, Seek};
-use std::os::unix::process::CommandExt;
+use std::io::{BufRead, BufReader, PipeReader, Read};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdout, Command, Stdio};
+use std::process::{ChildStdout, Command, Stdio};
 
 /// No frame of a size that we can work with is longer; what is comes from a broken file.
 const MAX_FRAME_BYTES: usize = 1 << 30;
@@ -48,9 +48,7 @@ fn reader(path: &Path, ffmpeg: &str, format: PixelFormat) -> Command {
             .args(["-c:v", "rawvideo", "-pix_fmt", "yuyv422"])
             .args(["-vsync", "passthrough", "-enc_time_base", "-1"]),
     };
-    // A group of its own: Ctrl-C at the terminal is for us, and would look like the clip's end if
-    // ffmpeg got it.
-    command.args(["-f", "tee", OUTPUTS]).process_group(0);
+    command.args(["-f", "tee", OUTPUTS]);
     command
 }
 
@@ -58,11 +56,9 @@ fn reader(path: &Path, ffmpeg: &str, format: PixelFormat) -> Command {
 pub(super) struct Video {
     path: PathBuf,
     probe: Probe,
-    child: Child,
     lines: BufReader<PipeReader>,
     data: ChildStdout,
-    /// What ffmpeg complains about; a file, for a pipe would want to be read.
-    log: std::fs::File,
+    child: Ffmpeg,
     size: Size,
     format: PixelFormat,
     tick_s: f64,
@@ -91,26 +87,20 @@ impl Video {
             PixelFormat::Yuyv
         };
         let (lines, lines_end) = std::io::pipe().map_err(|e| no_pipe(ffmpeg, path, &e))?;
-        let log = tempfile::tempfile().map_err(|e| no_pipe(ffmpeg, path, &e))?;
-        let complaints = log.try_clone().map_err(|e| no_pipe(ffmpeg, path, &e))?;
         let mut command = reader(path, ffmpeg, format);
-        command
-            .stdin(lines_end)
-            .stdout(Stdio::piped())
-            .stderr(complaints);
-        let mut child = command.spawn().map_err(|e| spawn_error(ffmpeg, path, &e))?;
+        command.stdin(lines_end).stdout(Stdio::piped());
+        let mut child = Ffmpeg::start(&mut command).map_err(|e| spawn_error(ffmpeg, path, &e))?;
         // The command still holds the pipe's other end, and with it the end of the stream.
         drop(command);
-        let Some(data) = child.stdout.take() else {
+        let Some(data) = child.output() else {
             return Err(no_pipe(ffmpeg, path, &std::io::Error::other("no pipe")));
         };
         let mut video = Self {
             path: path.to_owned(),
             probe,
-            child,
             lines: BufReader::new(lines),
             data,
-            log,
+            child,
             size: Size::new(0, 0),
             format,
             tick_s: 0.0,
@@ -212,19 +202,9 @@ impl Video {
 
     /// The first thing that ffmpeg complained about. Ends the child if it runs.
     fn complaint(&mut self) -> Option<String> {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-        let mut said = String::new();
-        let _ = self.log.rewind();
-        let _ = (&self.log).take(1 << 16).read_to_string(&mut said);
-        // `[matroska,webm @ 0x5581] File ended prematurely`: the address tells nobody anything.
-        let line = said.lines().find(|l| !l.trim().is_empty())?;
-        Some(
-            line.split_once("] ")
-                .map_or(line, |(_, rest)| rest)
-                .trim()
-                .to_owned(),
-        )
+        self.child.kill();
+        let said = self.child.complaints();
+        said.first().map(|line| plain(line).to_owned())
     }
 
     /// Works out what is to be said when no more frames come.
@@ -302,13 +282,6 @@ impl Source for Video {
 
     fn warnings(&mut self) -> Vec<String> {
         std::mem::take(&mut self.warnings)
-    }
-}
-
-impl Drop for Video {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
 }
 

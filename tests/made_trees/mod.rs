@@ -325,6 +325,7 @@ fn skeleton(branches: &[MadeBranch]) -> Skeleton {
         certainty: 1.0,
         copy_of: None,
         plane_angle: 0.0,
+        kind: Default::default(),
     };
     let foot = node(0, None, Vector3::zeros(), 0);
     let ends = branches.iter().enumerate().map(|(k, b)| {

@@ -31,6 +31,7 @@ pub fn tree(levels: u8, planes: usize) -> Skeleton {
         certainty: 0.75,
         copy_of: None,
         plane_angle: 0.0,
+        kind: Default::default(),
     };
     let mut nodes = vec![
         node(None, 0, Point3::origin()),

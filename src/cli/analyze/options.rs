@@ -20,9 +20,10 @@ pub struct AnalyzeArgs {
     /// Also write a page with plots (HTML, one file); it must not exist.
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
-    /// Leave the nodes.csv of the captures as they are.
+    /// Put the answers into the captures: into nodes.csv, and into the model that shows them
+    /// (tree.glb). Without it nothing is written into a capture.
     #[arg(long)]
-    pub no_write: bool,
+    pub update: bool,
     /// What made the tree sway; `auto` looks at the motion.
     #[arg(long, value_name = "WHAT")]
     excitation: Option<Cause>,
@@ -75,7 +76,6 @@ impl AnalyzeArgs {
     /// # Errors
     /// A folder is given twice; the film would end before it begins; the report has no name.
     pub fn check(&self) -> Result<(), Ended> {
-        let unfit = |what: String| Err(Ended::BadUsage(anyhow!(what)));
         let mut seen = BTreeSet::new();
         for dir in &self.dirs {
             if !seen.insert(dir.canonicalize().unwrap_or_else(|_| dir.clone())) {
@@ -129,6 +129,10 @@ impl AnalyzeArgs {
         config.check().map_err(|e| Ended::BadUsage(e.into()))?;
         Ok(config)
     }
+}
+
+fn unfit(what: String) -> Result<(), Ended> {
+    Err(Ended::BadUsage(anyhow!(what)))
 }
 
 fn moment(text: &str) -> Result<f64, String> {

@@ -1,9 +1,9 @@
 //! The animation on the terminal, with keys for the wind.
 
-use super::super::shaping::Made;
 use crate::animate::{Animator, Magnify, Pull, magnify, place_to_pull};
 use crate::model::{Pose, Skeleton};
 use crate::tui::{AnimationCommand, Moving};
+use crate::views::PreparedTree;
 use std::sync::Arc;
 
 /// How far the rope pulls, degrees.
@@ -27,13 +27,13 @@ pub struct InWind {
 }
 
 impl InWind {
-    /// `animator` in wind as the configuration of `made` has it.
-    pub fn new(made: &Made, animator: Animator) -> Self {
-        let wind = &made.config.wind;
+    /// `animator` in wind as the configuration of `tree` has it.
+    pub fn new(tree: &PreparedTree, animator: Animator) -> Self {
+        let wind = &tree.config.wind;
         let mut still = animator.clone();
-        still.pull_aside(place_to_pull(&made.skeleton), wind.direction_deg, LEAN_DEG);
+        still.pull_aside(place_to_pull(&tree.skeleton), wind.direction_deg, LEAN_DEG);
         Self {
-            skeleton: made.skeleton.clone(),
+            skeleton: tree.skeleton.clone(),
             rope: still.pulled(),
             animator,
             force: wind.force,
@@ -123,10 +123,10 @@ pub struct AsFilmed {
 impl AsFilmed {
     /// # Errors
     /// As of [`magnify`].
-    pub fn new(made: &Made, wanted: Magnify) -> Result<Self, crate::animate::MagnifyError> {
+    pub fn new(tree: &PreparedTree, wanted: Magnify) -> Result<Self, crate::animate::MagnifyError> {
         let mut new = Self {
-            skeleton: made.skeleton.clone(),
-            film: made.poses.clone(),
+            skeleton: tree.skeleton.clone(),
+            film: tree.poses.clone(),
             wanted: Magnify {
                 looped: false,
                 ..wanted

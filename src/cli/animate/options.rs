@@ -1,9 +1,10 @@
 //! What `arborcam animate` is asked for.
 
-use super::super::render::{ViewName, background, rate, size};
-use super::super::shaping::Shaping;
+use super::super::render::{ViewName, WHITE, background, rate, size};
+use super::super::tree::TreeArgs;
 use crate::config::{Config, ConfigError};
 use crate::model::Size;
+use crate::views::Shot;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -82,7 +83,7 @@ pub struct AnimateArgs {
     #[arg(long)]
     pub bare: bool,
     #[command(flatten)]
-    pub shaping: Shaping,
+    pub tree: TreeArgs,
 }
 
 /// What kind of file is asked for.
@@ -142,13 +143,34 @@ impl AnimateArgs {
     /// It is out of range.
     pub fn set(&self, config: &mut Config) -> Result<(), ConfigError> {
         let wind = &mut config.wind;
-        let set =
-            |value: &mut f64, wanted: Option<f64>| wanted.into_iter().for_each(|w| *value = w);
-        set(&mut wind.force, self.wind.or(self.pull.map(|_| 0.0)));
-        set(&mut wind.direction_deg, self.direction);
-        set(&mut wind.gusts, self.gusts);
-        set(&mut wind.beta, self.beta);
+        let still = self.pull.map(|_| 0.0);
+        wind.force = self.wind.or(still).unwrap_or(wind.force);
+        wind.direction_deg = self.direction.unwrap_or(wind.direction_deg);
+        wind.gusts = self.gusts.unwrap_or(wind.gusts);
+        wind.beta = self.beta.unwrap_or(wind.beta);
         config.check()
+    }
+
+    /// How a video of it is drawn.
+    pub fn shot(&self) -> Shot {
+        Shot {
+            view: self.view.view(),
+            turntable: self.view == ViewName::Turntable,
+            as_filmed: false,
+            size: self.size,
+            background: self.background.unwrap_or(WHITE),
+            film: None,
+            bare: self.bare,
+            at_s: None,
+            at_rest: false,
+            length_s: Some(self.length_s()),
+            fps: self.fps,
+        }
+    }
+
+    /// Time of the last pose, s.
+    pub fn length_s(&self) -> f64 {
+        self.count() as f64 / self.fps
     }
 
     /// Number of poses after the first; at least one.
@@ -186,16 +208,15 @@ fn moment(text: &str) -> Result<f64, String> {
 }
 
 fn band(text: &str) -> Result<[f64; 2], String> {
-    let number = |part: &str| {
-        part.trim()
-            .parse::<f64>()
-            .ok()
-            .filter(|x| (0.0..=1000.0).contains(x))
-    };
     let parsed = text
         .split_once("..")
-        .and_then(|(low, high)| Some([number(low)?, number(high)?]));
+        .and_then(|(low, high)| Some([frequency_hz(low)?, frequency_hz(high)?]));
     parsed
         .filter(|[low, high]| low < high)
         .ok_or_else(|| "give two frequencies in Hz, as 0.5..2".to_owned())
+}
+
+fn frequency_hz(text: &str) -> Option<f64> {
+    let parsed: Option<f64> = text.trim().parse().ok();
+    parsed.filter(|hz| (0.0..=1000.0).contains(hz))
 }

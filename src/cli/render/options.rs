@@ -1,10 +1,16 @@
 //! What `arborcam render` is asked for.
 
-use super::super::shaping::Shaping;
+use super::super::tree::TreeArgs;
 use crate::draw::View;
 use crate::model::Size;
+use crate::views::{FilmPlace, Shot};
+use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
+use std::f64::consts::PI;
 use std::path::PathBuf;
+
+/// What is behind the tree if nothing is said.
+pub const WHITE: [u8; 4] = [255; 4];
 
 /// The largest side of a picture, px.
 const LARGEST: u32 = 4096;
@@ -48,7 +54,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "RATE", default_value_t = 30.0, value_parser = rate)]
     pub fps: f64,
     #[command(flatten)]
-    pub shaping: Shaping,
+    pub tree: TreeArgs,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -69,10 +75,17 @@ pub enum PoseName {
     Rest,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum FilmPlace {
-    Behind,
-    Beside,
+impl ValueEnum for FilmPlace {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[Self::Behind, Self::Beside]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(match self {
+            Self::Behind => "behind",
+            Self::Beside => "beside",
+        }))
+    }
 }
 
 /// What kind of file is asked for.
@@ -131,52 +144,73 @@ impl RenderArgs {
         Ok(kind)
     }
 
-    /// The view after `share` of a video, 0 to 1.
-    pub fn view_at(&self, share: f64) -> View {
-        let from = match self.view {
-            ViewName::Front => View::FRONT,
-            ViewName::Side => View::SIDE,
-            ViewName::Back => View {
-                turn: std::f64::consts::PI,
+    /// What is to be drawn.
+    pub fn shot(&self) -> Shot {
+        let from = self.view.view();
+        Shot {
+            view: View {
+                turn: from.turn + self.turn.to_radians(),
+                ..from
+            },
+            turntable: self.view == ViewName::Turntable,
+            as_filmed: self.view == ViewName::Front && self.turn == 0.0,
+            size: self.size,
+            background: self.background.unwrap_or(WHITE),
+            film: self.film,
+            bare: self.bare,
+            at_s: self.at,
+            at_rest: self.pose.is_some(),
+            length_s: self.seconds,
+            fps: self.fps,
+        }
+    }
+}
+
+impl ViewName {
+    /// Where it begins.
+    pub fn view(self) -> View {
+        match self {
+            Self::Front => View::FRONT,
+            Self::Side => View::SIDE,
+            Self::Back => View {
+                turn: PI,
                 down: 0.0,
             },
-            ViewName::Top => View::TOP,
-            ViewName::Turntable => View {
-                turn: std::f64::consts::TAU * share,
+            Self::Top => View::TOP,
+            Self::Turntable => View {
+                turn: 0.0,
                 down: 0.2,
             },
-        };
-        View {
-            turn: from.turn + self.turn.to_radians(),
-            ..from
         }
     }
 }
 
 pub fn size(text: &str) -> Result<Size, String> {
-    let whole = |part: &str| {
-        part.parse::<u32>()
-            .ok()
-            .filter(|n| (1..=LARGEST).contains(n))
-    };
     let parsed = text
         .split_once(['x', 'X'])
-        .and_then(|(w, h)| Some(Size::new(whole(w)?, whole(h)?)));
+        .and_then(|(w, h)| Some(Size::new(side(w)?, side(h)?)));
     parsed
         .ok_or_else(|| format!("give width and height in pixels, as 640x480; each 1 to {LARGEST}"))
 }
 
+/// A side of a picture, px.
+fn side(text: &str) -> Option<u32> {
+    text.parse().ok().filter(|n| (1..=LARGEST).contains(n))
+}
+
+/// The opaque colour of six hexadecimal digits.
+fn colour(hex: &str) -> Option<[u8; 4]> {
+    if hex.len() != 6 || !hex.bytes().all(|b| b.is_ascii_hexdigit()) {
+        return None;
+    }
+    let [_, red, green, blue] = u32::from_str_radix(hex, 16).ok()?.to_be_bytes();
+    Some([red, green, blue, 255])
+}
+
 pub fn background(text: &str) -> Result<[u8; 4], String> {
-    let colour = |hex: &str| {
-        let sound = hex.len() == 6 && hex.bytes().all(|b| b.is_ascii_hexdigit());
-        let part = |i: usize| u8::from_str_radix(&hex[i..i + 2], 16).ok();
-        sound
-            .then(|| Some([part(0)?, part(2)?, part(4)?, 255]))
-            .flatten()
-    };
     match text {
         "transparent" => Ok([0; 4]),
-        "white" => Ok([255; 4]),
+        "white" => Ok(WHITE),
         _ => text
             .strip_prefix('#')
             .and_then(colour)

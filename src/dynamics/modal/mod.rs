@@ -359,6 +359,7 @@ mod tests {
             certainty: 1.0,
             copy_of: None,
             plane_angle: 0.0,
+            kind: Default::default(),
         };
         let nodes = (0..3).map(node).collect();
         (

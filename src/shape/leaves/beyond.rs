@@ -71,6 +71,7 @@ mod tests {
             certainty: 1.0,
             copy_of: copied.then_some(NodeId(1)),
             plane_angle: 0.0,
+            kind: Default::default(),
         };
         let nodes = vec![
             node(0, None, [0.0; 3], false),

@@ -194,6 +194,7 @@ fn shoot(
             certainty: 0.0,
             copy_of: Some(NodeId(i as u32)),
             plane_angle,
+            kind: original.kind,
         });
     }
     (!out.is_empty()).then_some(out)

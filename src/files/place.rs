@@ -1,7 +1,7 @@
 //! Things that appear under their name only when they are complete: what files and folders have in
 //! common.
 
-use super::ExportError;
+use super::WriteError;
 use std::ffi::CString;
 use std::fs::{self, File};
 use std::io;
@@ -32,15 +32,11 @@ impl Place {
         path: &Path,
         make: fn(&Path) -> io::Result<()>,
         remove: fn(&Path) -> io::Result<()>,
-    ) -> Result<Self, ExportError> {
+    ) -> Result<Self, WriteError> {
         refuse_taken(path)?;
-        let failed = |e: io::Error| ExportError::from_io(path.display().to_string(), 0, e);
-        let no_name = || ExportError::NotAFolder {
-            path: path.to_path_buf(),
-        };
         let name = path
             .file_name()
-            .ok_or_else(no_name)?
+            .ok_or_else(|| no_name(path))?
             .to_string_lossy()
             .into_owned();
         let above = above(path);
@@ -58,8 +54,8 @@ impl Place {
             kept: false,
         };
         fs::create_dir_all(above).map_err(|e| match e.kind() {
-            io::ErrorKind::AlreadyExists | io::ErrorKind::NotADirectory => no_name(),
-            _ => failed(e),
+            io::ErrorKind::AlreadyExists | io::ErrorKind::NotADirectory => no_name(path),
+            _ => failed(path, e),
         })?;
         let pid = std::process::id();
         let mut partial = above.join(format!(".{name}.partial-{pid}"));
@@ -69,7 +65,7 @@ impl Place {
                 Err(e) if e.kind() == io::ErrorKind::AlreadyExists && attempt < 100 => {
                     partial = above.join(format!(".{name}.partial-{pid}-{attempt}"));
                 }
-                Err(e) => return Err(failed(e)),
+                Err(e) => return Err(failed(path, e)),
                 Ok(()) => break,
             }
         }
@@ -123,15 +119,25 @@ impl Drop for Place {
 
 /// # Errors
 /// There is something at `path`: a file, a folder, or a link, be it one that leads nowhere.
-pub fn refuse_taken(path: &Path) -> Result<(), ExportError> {
+pub fn refuse_taken(path: &Path) -> Result<(), WriteError> {
     // Not `exists()`: that is false for a link to nowhere.
     match fs::symlink_metadata(path) {
-        Ok(_) => Err(ExportError::Exists {
+        Ok(_) => Err(WriteError::Exists {
             path: path.to_path_buf(),
         }),
         Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(()),
-        Err(e) => Err(ExportError::from_io(path.display().to_string(), 0, e)),
+        Err(e) => Err(failed(path, e)),
     }
+}
+
+fn no_name(path: &Path) -> WriteError {
+    WriteError::NotAFolder {
+        path: path.to_path_buf(),
+    }
+}
+
+fn failed(path: &Path, e: io::Error) -> WriteError {
+    WriteError::from_io(path.display().to_string(), 0, e)
 }
 
 fn above(path: &Path) -> &Path {
@@ -142,8 +148,8 @@ fn above(path: &Path) -> &Path {
 
 /// Renames without ever replacing what has taken the name meanwhile.
 fn rename_new(from: &Path, to: &Path) -> io::Result<()> {
-    let c_string = |p: &Path| CString::new(p.as_os_str().as_bytes());
-    let (from_c, to_c) = (c_string(from)?, c_string(to)?);
+    let from_c = CString::new(from.as_os_str().as_bytes())?;
+    let to_c = CString::new(to.as_os_str().as_bytes())?;
     let here = libc::AT_FDCWD;
     // SAFETY: both are strings that end with a zero, and outlive the call, which keeps neither.
     let done = unsafe {

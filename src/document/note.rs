@@ -1,19 +1,28 @@
-//! `capture.json`: what was filmed, with what, how well. No date of today, so that a replay gives
+//! `capture.json`: what was filmed, with what, how well; written and read. No date of today, so that a replay gives
 //! the same file.
 
-use super::ExportError;
+use super::DocumentError;
 use crate::config::Config;
+use crate::files::WriteError;
+use crate::model::Timing;
 use serde::{Deserialize, Serialize};
+use std::io::ErrorKind;
+use std::path::Path;
+
+const FILE: &str = "capture.json";
+
+/// A picture wider or higher than this is not believed, px.
+const LARGEST_SIDE: u32 = 16384;
+
+/// The trunk's foot is not believed to be so many picture sizes away from the picture's corner.
+const FARTHEST_FOOT: f64 = 4.0;
 
 /// Grows when a reader of older files would misread a newer one.
 pub const SCHEMA_VERSION: u32 = 1;
 
-/// At most so many gaps are listed; the counts in [`Timing`] are complete.
-pub const MAX_GAPS: usize = 1000;
-
 /// The whole of `capture.json`. Numbers that are not known are `null`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Capture {
+pub struct CaptureNote {
     pub schema_version: u32,
     pub software: Software,
     /// When the capture began, RFC 3339, if the caller wants it in the file; a replay leaves it
@@ -27,12 +36,10 @@ pub struct Capture {
     /// The region that was tracked, in the form of an outline file, so that it can be used again.
     pub outline: Option<OutlineNote>,
     /// `None` where nothing was tracked, or no frame could be decoded in colour.
-    #[serde(default)]
     pub picture: Option<PictureNote>,
     /// `None` if the capture ended before the tree was built.
     pub build: Option<Build>,
     /// `None` if the tree is the one that was built first.
-    #[serde(default)]
     pub refinement: Option<Refinement>,
     pub quality: Quality,
     pub model: Option<ModelNote>,
@@ -66,94 +73,6 @@ pub struct Source {
     /// Size of the picture, px.
     pub width: u32,
     pub height: u32,
-}
-
-/// Frames and time, by the sensor's own clock.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Timing {
-    /// What the source says, and what its timestamps say of the time in which it filmed, Hz.
-    pub nominal_rate_hz: Option<f64>,
-    pub measured_rate_hz: Option<f64>,
-    pub frames_seen: u64,
-    /// Lost before us: what is to be believed of the two counts that follow. The driver's numbers
-    /// where it numbers its frames; the times where it does not, starts anew, or numbers only what
-    /// it delivers.
-    pub frames_dropped_camera: u64,
-    /// Holes in the driver's numbers; `None` where it does not number its frames.
-    #[serde(default)]
-    pub frames_dropped_by_sequence: Option<u64>,
-    /// Holes in the frames' times, jitter and changes of the rate left out.
-    #[serde(default)]
-    pub frames_dropped_by_time: u64,
-    /// Came damaged, short or with the driver's error flag, and were left out.
-    #[serde(default)]
-    pub frames_damaged: u64,
-    /// Came with a time that was not later than the one before, and were left out.
-    #[serde(default)]
-    pub frames_stale: u64,
-    /// What the times are by: `file`, `monotonic` (the system's clock, read by the driver),
-    /// `copied` (from whoever feeds the device), `unknown`, or `received` (the moment of
-    /// reception).
-    #[serde(default)]
-    pub clock: String,
-    /// How often the camera was lost and came back, and for how long it was away, s.
-    #[serde(default)]
-    pub reconnects: u64,
-    #[serde(default)]
-    pub away_s: f64,
-    /// Not taken by the tracker, which was busy.
-    pub frames_dropped_tracker: u64,
-    pub frames_undecodable: u64,
-    /// Seen before there was an outline, and not tracked.
-    pub frames_before_outline: u64,
-    /// Missing in the recording that was made meanwhile; 0 where none was.
-    #[serde(default)]
-    pub frames_not_recorded: u64,
-    /// The first [`MAX_GAPS`] holes, in the order in which they were found.
-    pub gaps: Vec<Gap>,
-    pub gaps_not_listed: u64,
-    /// From the first frame to the last, s.
-    pub duration_s: f64,
-}
-
-impl Timing {
-    /// Notes a hole; the list stays bounded however long the capture runs.
-    pub fn push_gap(&mut self, gap: Gap) {
-        if self.gaps.len() < MAX_GAPS {
-            self.gaps.push(gap);
-        } else {
-            self.gaps_not_listed += 1;
-        }
-    }
-}
-
-/// A time from which there are no frames.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Gap {
-    /// The last frame before the hole, and its time, s.
-    pub after_frame: u64,
-    pub time_s: f64,
-    /// Number of frames missing; where the camera was away, as many as it would have delivered, and
-    /// 0 where it did not come back.
-    pub missing: u64,
-    #[serde(default)]
-    pub cause: GapCause,
-    /// From the last frame before the hole to the first after it, or to the end of the capture, s.
-    #[serde(default)]
-    pub length_s: f64,
-}
-
-/// Why frames are missing.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum GapCause {
-    /// Lost on the way from the sensor to us.
-    #[default]
-    Dropped,
-    /// The camera was unplugged or its driver failed.
-    Disconnected,
-    /// The camera was there and delivered nothing.
-    Silent,
 }
 
 /// An outline file: `{"frame": 0, "width": W, "height": H, "polygon_px": [[u, v], ...]}`.
@@ -209,7 +128,6 @@ pub struct Quality {
     pub tracks_total: u64,
     /// Candidates that turned out not to be points that can be followed; they are not in the
     /// tables.
-    #[serde(default)]
     pub tracks_rejected: u64,
     pub tracks_alive_end: u64,
     /// Distance by which tracking forward and back misses the start, px.
@@ -217,11 +135,9 @@ pub struct Quality {
     /// How far a point is expected to be from the one that it was when it was found, by its
     /// likeness to that and by what its neighbours say, px: the median over the frames of the
     /// median over the points.
-    #[serde(default)]
     pub median_error_px: Option<f64>,
     pub lost_per_s: Option<f64>,
     /// How sure the forks of the tree are, 0 to 1: the median over the forks.
-    #[serde(default)]
     pub median_certainty: Option<f64>,
     /// Median distance between where the points put a node in the picture and where the 3D pose
     /// does, px.
@@ -241,37 +157,15 @@ pub struct ModelNote {
     pub metres_per_px: f64,
     /// The trunk's foot in the picture, px: the origin of the model.
     pub foot_px: [f64; 2],
-    /// What the push out of the picture's plane has achieved; `None` in a capture of an older
-    /// version.
+    /// What the push out of the picture's plane has achieved, where the tree was pushed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub push: Option<crate::shape::PushFigures>,
-    /// What every copy repeats; by their numbers in `nodes.csv`. Empty in captures of older
-    /// versions.
-    #[serde(default)]
-    pub copied: Vec<Copied>,
-}
-
-/// A node that repeats a measured one on another plane.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Copied {
-    pub node: u32,
-    pub original: u32,
-    /// By which the plane is turned about the y axis, degrees.
-    pub plane_angle_deg: f64,
 }
 
 impl ModelNote {
     /// The note for a skeleton that is written with this scale (0: pixels).
     pub fn of(skeleton: &crate::model::Skeleton, metres_per_px: f64) -> Self {
         let nodes = skeleton.nodes.len();
-        let copied = skeleton.nodes.iter().filter_map(|n| {
-            let original = skeleton.name_of(n.copy_of?)?.0;
-            Some(Copied {
-                node: n.name.0,
-                original,
-                plane_angle_deg: n.plane_angle.to_degrees(),
-            })
-        });
         Self {
             nodes: nodes as u32,
             copies: (nodes - skeleton.measured()) as u32,
@@ -281,7 +175,6 @@ impl ModelNote {
             metres_per_px,
             foot_px: skeleton.foot_px,
             push: None,
-            copied: copied.collect(),
         }
     }
 }
@@ -295,7 +188,6 @@ pub struct AnimationNote {
     /// Rotation keys that were left after thinning, and how many there were before: a key a joint
     /// that moves and frame.
     pub keys: u64,
-    #[serde(default)]
     pub raw_keys: u64,
 }
 
@@ -303,9 +195,93 @@ pub struct AnimationNote {
 ///
 /// # Errors
 /// None in practice: every field has a JSON form.
-pub fn json(capture: &Capture) -> Result<Vec<u8>, ExportError> {
-    let mut text =
-        serde_json::to_vec_pretty(capture).map_err(|e| ExportError::unfit(e.to_string()))?;
+pub fn json(note: &CaptureNote) -> Result<Vec<u8>, WriteError> {
+    let mut text = serde_json::to_vec_pretty(note).map_err(|e| WriteError::no_form(FILE, e))?;
     text.push(b'\n');
     Ok(text)
+}
+
+/// Reads `capture.json` in `dir`.
+///
+/// # Errors
+/// The folder is no document, was written by a newer version, or the file is damaged.
+pub(super) fn read(dir: &Path) -> Result<CaptureNote, DocumentError> {
+    let file = dir.join(FILE);
+    match std::fs::read(&file) {
+        Ok(text) => parse(&file, &text),
+        Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
+            Err(DocumentError::NotACapture {
+                dir: dir.to_owned(),
+            })
+        }
+        Err(source) => Err(DocumentError::Unreadable { file, source }),
+    }
+}
+
+/// The note that a text holds; messages call it `file`.
+///
+/// # Errors
+/// It was written by a newer version, or is damaged.
+pub(super) fn parse(file: &Path, text: &[u8]) -> Result<CaptureNote, DocumentError> {
+    let value: serde_json::Value =
+        serde_json::from_slice(text).map_err(|e| DocumentError::note(file, e.to_string()))?;
+    // Looked at first: a newer file would be refused for the wrong reason.
+    let version = value
+        .get("schema_version")
+        .and_then(serde_json::Value::as_u64);
+    if let Some(version) = version.filter(|v| *v > SCHEMA_VERSION.into()) {
+        return Err(DocumentError::Newer {
+            file: file.to_owned(),
+            what: format!("schema_version {version}"),
+        });
+    }
+    let note: CaptureNote = serde_json::from_value(value).map_err(|e| unread(file, e))?;
+    note.check()
+        .map_err(|what| DocumentError::note(file, what))?;
+    Ok(note)
+}
+
+/// A setting that we do not know is one of a newer version.
+fn unread(file: &Path, e: serde_json::Error) -> DocumentError {
+    let what = e.to_string();
+    if what.starts_with("unknown field") {
+        return DocumentError::Newer {
+            file: file.to_owned(),
+            what,
+        };
+    }
+    DocumentError::note(file, what)
+}
+
+impl CaptureNote {
+    /// What is wrong with its numbers.
+    fn check(&self) -> Result<(), String> {
+        self.config.check().map_err(|e| e.to_string())?;
+        let outline = self.outline.iter().flat_map(|o| [o.width, o.height]);
+        for side in outline.chain([self.source.width, self.source.height]) {
+            if side == 0 || side > LARGEST_SIDE {
+                return Err("a picture of this size cannot be".into());
+            }
+        }
+        match &self.model {
+            Some(model) => model.check(&self.source),
+            None => Ok(()),
+        }
+    }
+}
+
+impl ModelNote {
+    fn check(&self, source: &Source) -> Result<(), String> {
+        let scale = self.metres_per_px;
+        if !(scale.is_finite() && scale >= 0.0 && self.foot_px.iter().all(|x| x.is_finite())) {
+            return Err("metres_per_px or foot_px is no number".into());
+        }
+        let [u_px, v_px] = self.foot_px.map(f64::abs);
+        if u_px > FARTHEST_FOOT * f64::from(source.width)
+            || v_px > FARTHEST_FOOT * f64::from(source.height)
+        {
+            return Err("foot_px is far from the picture".into());
+        }
+        Ok(())
+    }
 }

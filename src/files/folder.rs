@@ -1,7 +1,7 @@
 //! A folder that appears only when it is complete.
 
-use super::ExportError;
-use super::appear::Place;
+use super::WriteError;
+use super::place::Place;
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ impl OutputFolder {
     /// # Errors
     /// `dir` exists, be it as a file, a folder or a link; it cannot be a folder; it may not be
     /// written; the disk is full.
-    pub fn create(dir: &Path) -> Result<Self, ExportError> {
+    pub fn create(dir: &Path) -> Result<Self, WriteError> {
         Place::prepare(dir, |p| fs::create_dir(p), |p| fs::remove_dir_all(p)).map(Self)
     }
 
@@ -34,7 +34,7 @@ impl OutputFolder {
     ///
     /// # Errors
     /// The file cannot be made.
-    pub fn file(&self, name: &str) -> Result<io::BufWriter<File>, ExportError> {
+    pub fn file(&self, name: &str) -> Result<io::BufWriter<File>, WriteError> {
         let file = File::create(self.path(name)).map_err(|e| self.explain(name, 0, e))?;
         Ok(io::BufWriter::with_capacity(1 << 16, file))
     }
@@ -43,27 +43,25 @@ impl OutputFolder {
     ///
     /// # Errors
     /// The file cannot be made or not be written to its end.
-    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), ExportError> {
-        let write = || File::create(self.path(name))?.write_all(bytes);
-        write().map_err(|e| self.explain(name, bytes.len() as u64, e))
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), WriteError> {
+        let created = File::create(self.path(name));
+        created
+            .and_then(|mut file| file.write_all(bytes))
+            .map_err(|e| self.explain(name, bytes.len() as u64, e))
     }
 
     /// Copies a file into the folder under the same name, unless `stop` is set meanwhile.
     ///
     /// # Errors
     /// It cannot be read or not be written to its end, or was stopped.
-    pub fn copy(&self, name: &str, from: &Path, stop: &AtomicBool) -> Result<(), ExportError> {
-        let explain = |e| self.explain(name, 0, e);
-        let (from, mut to) = (
-            File::open(from.join(name)).map_err(explain)?,
-            self.file(name)?,
-        );
-        while !stop.load(Ordering::SeqCst) {
-            if io::copy(&mut (&from).take(PIECE), &mut to).map_err(explain)? == 0 {
-                return to.flush().map_err(explain);
-            }
+    pub fn copy(&self, name: &str, from: &Path, stop: &AtomicBool) -> Result<(), WriteError> {
+        let mut to = self.file(name)?;
+        let copied = File::open(from.join(name)).and_then(|from| copy(&from, &mut to, stop));
+        match copied {
+            Ok(true) => Ok(()),
+            Ok(false) => Err(WriteError::Stopped),
+            Err(e) => Err(self.explain(name, 0, e)),
         }
-        Err(ExportError::Stopped)
     }
 
     /// Puts everything on the disk and gives the folder its name, which it returns.
@@ -71,7 +69,7 @@ impl OutputFolder {
     /// # Errors
     /// The disk is full, or something else has taken the name meanwhile; then nothing is left of
     /// the folder.
-    pub fn publish(mut self) -> Result<PathBuf, ExportError> {
+    pub fn publish(mut self) -> Result<PathBuf, WriteError> {
         let entries = fs::read_dir(self.0.at()).map_err(|e| self.explain("the folder", 0, e))?;
         for entry in entries {
             let entry = entry.map_err(|e| self.explain("the folder", 0, e))?;
@@ -85,7 +83,7 @@ impl OutputFolder {
         self.0.appear().map_err(|e| match e.kind() {
             io::ErrorKind::AlreadyExists
             | io::ErrorKind::DirectoryNotEmpty
-            | io::ErrorKind::NotADirectory => ExportError::Exists { path: dir.clone() },
+            | io::ErrorKind::NotADirectory => WriteError::Exists { path: dir.clone() },
             _ => self.explain("the folder", 0, e),
         })?;
         self.0.keep();
@@ -94,17 +92,28 @@ impl OutputFolder {
     }
 
     /// Adds what is written already, because all of it is what the disk must have room for.
-    pub(super) fn explain(&self, name: &str, bytes: u64, e: io::Error) -> ExportError {
+    pub fn explain(&self, name: &str, bytes: u64, e: io::Error) -> WriteError {
         let others = fs::read_dir(self.0.at()).into_iter().flatten().flatten();
         let written: u64 = others
             .filter(|f| f.file_name() != name)
             .filter_map(|f| f.metadata().ok())
             .map(|m| m.len())
             .sum();
-        ExportError::from_io(
+        WriteError::from_io(
             self.0.path().join(name).display().to_string(),
             written + bytes,
             e,
         )
     }
+}
+
+/// Copies a file to its end; `false` if `stop` was set before.
+fn copy(from: &File, to: &mut impl Write, stop: &AtomicBool) -> io::Result<bool> {
+    while !stop.load(Ordering::SeqCst) {
+        if io::copy(&mut from.take(PIECE), to)? == 0 {
+            to.flush()?;
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }

@@ -2,7 +2,7 @@
 
 /// Appends `x` with at most `decimals` digits after the point, no trailing zeros, no exponent and
 /// no negative zero; nothing at all for what is no number.
-pub(super) fn push(out: &mut String, x: f64, decimals: usize) {
+pub fn push(out: &mut String, x: f64, decimals: usize) {
     use std::fmt::Write;
     if !x.is_finite() {
         return;
@@ -22,6 +22,13 @@ pub(super) fn push(out: &mut String, x: f64, decimals: usize) {
     if &out[start..] == "-0" {
         out.remove(start);
     }
+}
+
+/// The same as a text of its own.
+pub(super) fn text(x: f64, decimals: usize) -> String {
+    let mut text = String::new();
+    push(&mut text, x, decimals);
+    text
 }
 
 #[cfg(test)]

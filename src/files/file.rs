@@ -1,9 +1,10 @@
 //! Files that appear only when they are complete.
 
-use super::ExportError;
-use super::appear::Place;
+use super::WriteError;
+use super::place::Place;
 use std::fs::{self, File};
 use std::io::{self, Write};
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -25,19 +26,9 @@ pub fn write_files(
     dir: &Path,
     files: &[(String, Vec<u8>)],
     stop: &AtomicBool,
-) -> Result<(), ExportError> {
+) -> Result<(), WriteError> {
     let mut prepared = Vec::with_capacity(files.len());
-    let mut write = || {
-        for (name, bytes) in files {
-            let file = OutputFile::create(&dir.join(name))?;
-            prepared.push(file);
-            prepared
-                .last()
-                .map_or(Ok(()), |file| file.write(bytes, stop))?;
-        }
-        prepared.iter_mut().try_for_each(OutputFile::show)
-    };
-    let written = write();
+    let written = show_files(dir, files, stop, &mut prepared);
     match written {
         Ok(()) => prepared.iter_mut().for_each(|file| file.0.keep()),
         // The first one has made the folder, and can take it away when the others have gone.
@@ -46,12 +37,31 @@ pub fn write_files(
     written
 }
 
+/// Writes them all before the first appears; `prepared` takes what was made.
+fn show_files(
+    dir: &Path,
+    files: &[(String, Vec<u8>)],
+    stop: &AtomicBool,
+    prepared: &mut Vec<OutputFile>,
+) -> Result<(), WriteError> {
+    for (name, bytes) in files {
+        let file = OutputFile::create(&dir.join(name))?;
+        let written = file.write(bytes, stop);
+        prepared.push(file);
+        written?;
+    }
+    for file in prepared {
+        file.show()?;
+    }
+    Ok(())
+}
+
 impl OutputFile {
     /// Prepares the file `path`, and the folders above it where they are missing.
     ///
     /// # Errors
     /// `path` exists, be it as a file, a folder or a link; it may not be written; the disk is full.
-    pub fn create(path: &Path) -> Result<Self, ExportError> {
+    pub fn create(path: &Path) -> Result<Self, WriteError> {
         Place::prepare(
             path,
             |p| File::create_new(p).map(drop),
@@ -69,16 +79,29 @@ impl OutputFile {
     ///
     /// # Errors
     /// It cannot be written to its end, or was stopped.
-    pub fn write(&self, bytes: &[u8], stop: &AtomicBool) -> Result<(), ExportError> {
-        let explain = |e| self.explain(bytes.len() as u64, e);
-        let mut file = File::create(self.0.at()).map_err(explain)?;
+    pub fn write(&self, bytes: &[u8], stop: &AtomicBool) -> Result<(), WriteError> {
+        match self.write_pieces(bytes, stop) {
+            Ok(true) => Ok(()),
+            Ok(false) => Err(WriteError::Stopped),
+            Err(e) => Err(self.explain(bytes.len() as u64, e)),
+        }
+    }
+
+    /// `false` if `stop` was set before all was written.
+    fn write_pieces(&self, bytes: &[u8], stop: &AtomicBool) -> io::Result<bool> {
+        // What has taken its hidden name meanwhile is not followed.
+        let mut file = File::options()
+            .write(true)
+            .truncate(true)
+            .custom_flags(libc::O_NOFOLLOW)
+            .open(self.0.at())?;
         for piece in bytes.chunks(PIECE) {
             if stop.load(Ordering::SeqCst) {
-                return Err(ExportError::Stopped);
+                return Ok(false);
             }
-            file.write_all(piece).map_err(explain)?;
+            file.write_all(piece)?;
         }
-        Ok(())
+        Ok(true)
     }
 
     /// Puts everything on the disk and gives the file its name.
@@ -86,20 +109,20 @@ impl OutputFile {
     /// # Errors
     /// The disk is full, or something else has taken the name meanwhile; then nothing is left of
     /// the file.
-    pub fn publish(mut self) -> Result<(), ExportError> {
+    pub fn publish(mut self) -> Result<(), WriteError> {
         self.show()?;
         self.0.keep();
         Ok(())
     }
 
     /// Under its name, and still to go if it is dropped.
-    fn show(&mut self) -> Result<(), ExportError> {
+    fn show(&mut self) -> Result<(), WriteError> {
         // Some file systems find out only now that there is no space.
         File::open(self.0.at())
             .and_then(|f| f.sync_all())
             .map_err(|e| self.explain(0, e))?;
         self.0.appear().map_err(|e| match e.kind() {
-            io::ErrorKind::AlreadyExists => ExportError::Exists {
+            io::ErrorKind::AlreadyExists => WriteError::Exists {
                 path: self.0.path().to_path_buf(),
             },
             _ => self.explain(0, e),
@@ -108,9 +131,9 @@ impl OutputFile {
 
     /// Sorts an error of writing; `bytes` is how much was to be written, 0 if only what lies there
     /// already is known.
-    pub fn explain(&self, bytes: u64, e: io::Error) -> ExportError {
+    pub fn explain(&self, bytes: u64, e: io::Error) -> WriteError {
         let written = fs::metadata(self.0.at()).map_or(0, |m| m.len());
-        ExportError::from_io(self.0.path().display().to_string(), bytes.max(written), e)
+        WriteError::from_io(self.0.path().display().to_string(), bytes.max(written), e)
     }
 }
 
@@ -135,11 +158,11 @@ mod tests {
         assert_eq!(fs::read(&path).unwrap(), b"abc");
         assert!(matches!(
             OutputFile::create(&path),
-            Err(ExportError::Exists { .. })
+            Err(WriteError::Exists { .. })
         ));
         assert!(matches!(
             OutputFile::create(&path.join("below.png")),
-            Err(ExportError::NotAFolder { .. })
+            Err(WriteError::NotAFolder { .. })
         ));
     }
 
@@ -156,7 +179,7 @@ mod tests {
         fs::remove_file(below.join("a.bin")).unwrap();
         assert!(matches!(
             write_files(&below, &files("a.gltf"), &GO_ON),
-            Err(ExportError::Exists { .. })
+            Err(WriteError::Exists { .. })
         ));
         assert_eq!(fs::read_dir(&below).unwrap().count(), 1);
     }
@@ -170,7 +193,7 @@ mod tests {
             ("a.gltf".to_owned(), vec![2]),
         ];
         let stopped = write_files(&dir.path().join("new"), &files, &AtomicBool::new(true));
-        assert!(matches!(stopped, Err(ExportError::Stopped)));
+        assert!(matches!(stopped, Err(WriteError::Stopped)));
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
     }
 }

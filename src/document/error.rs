@@ -1,11 +1,12 @@
-//! Why a capture could not be read back, by what the caller can do about it.
+//! Why a document could not be read, by what the caller can do about it.
 
+use crate::files::WriteError;
 use std::io;
 use std::path::{Path, PathBuf};
 
 /// Each message is one line that says what to do.
 #[derive(Debug, thiserror::Error)]
-pub enum CaptureError {
+pub enum DocumentError {
     #[error("{} is no capture: there is no capture.json in it; give a folder that `--out` has made", .dir.display())]
     NotACapture { dir: PathBuf },
     /// A table without which there is nothing to show.
@@ -24,11 +25,23 @@ pub enum CaptureError {
     /// A capture that is sound, of a film in which no tree was built.
     #[error("{} holds tracks but no tree; film for longer or in more wind, and make the capture anew", .dir.display())]
     NoTree { dir: PathBuf },
+    /// A tree without the film that a command needs.
+    #[error("{} lacks {file}: it holds no film; give a capture with its film", .dir.display())]
+    NoFilm { dir: PathBuf, file: &'static str },
+    #[error(transparent)]
+    Unwritten(#[from] WriteError),
     #[error("cannot read {}: {source}", .file.display())]
     Unreadable { file: PathBuf, source: io::Error },
 }
 
-impl CaptureError {
+impl DocumentError {
+    pub(super) fn note(file: &Path, what: impl Into<String>) -> Self {
+        Self::BadNote {
+            file: file.to_owned(),
+            what: what.into(),
+        }
+    }
+
     pub(super) fn row(file: &Path, line: u64, what: impl Into<String>) -> Self {
         Self::BadRow {
             file: file.to_owned(),

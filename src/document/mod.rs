@@ -1,0 +1,370 @@
+//! A document: one tree with all that is known of it, as a folder of open files. This module reads
+//! and writes it; everything that is made from it is a view (see `export`).
+//!
+//! `capture.json` says what was filmed and how, `nodes.csv` holds the whole model, `frame.jpg` one
+//! picture of it. A tree that was filmed has `tracks.csv`, the points, and `motion.csv`, the poses.
+
+mod error;
+mod motion;
+mod nodes;
+pub mod note;
+mod number;
+mod picture;
+mod sway;
+mod table;
+mod tracks;
+
+pub use error::DocumentError;
+pub use motion::{MOTION_HEADER, MotionCsv};
+pub use nodes::{NODES_HEADER, nodes};
+pub use note::{CaptureNote, SCHEMA_VERSION};
+pub use number::push as push_number;
+pub use picture::{PICTURE_FILE, jpeg};
+pub use sway::Columns;
+pub use table::{TableWriter, unit};
+pub use tracks::{TRACKS_HEADER, TracksCsv, tracks_of};
+
+use crate::config::Config;
+use crate::dynamics::Film;
+use crate::model::{Outline, Picture, Pose, Size, Skeleton, Swaying, Unidentified};
+use crate::motion::PoseEstimator;
+use crate::outline;
+use motion::PoseReader;
+use nodes::NodesRead;
+use note::{ModelNote, OutlineNote};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A document that has been read.
+#[derive(Clone, Debug)]
+pub struct Document {
+    pub dir: PathBuf,
+    /// `capture.json`.
+    pub note: CaptureNote,
+    pub skeleton: Arc<Skeleton>,
+    /// How the nodes sway, by node index.
+    pub sway: Vec<Swaying>,
+    /// Poses of the end of the film, by frame; at most as long as was asked for. None where the
+    /// tree was not filmed.
+    pub poses: Vec<Pose>,
+    /// The picture in the folder and the pose in it.
+    pub picture: Option<Picture>,
+    pub pose_in_picture: Option<Pose>,
+    pub outline: Option<Outline>,
+    /// What the user should know: parts that are missing. One sentence each.
+    pub warnings: Vec<String>,
+}
+
+impl Document {
+    /// Reads `capture.json` alone: the settings of a document are needed before they can be
+    /// changed.
+    ///
+    /// # Errors
+    /// The folder is no document, or was written by a newer version.
+    pub fn note(dir: &Path) -> Result<CaptureNote, DocumentError> {
+        note::read(dir)
+    }
+
+    /// Reads the document in `dir`, with the poses of the last `animation_s` seconds of its film.
+    ///
+    /// # Errors
+    /// The folder is no document or holds no tree, or one of its tables is missing or damaged.
+    pub fn read(dir: &Path, animation_s: f64) -> Result<Self, DocumentError> {
+        let mut document = Self::tree(dir)?;
+        if !document.has_motion() {
+            let filmed = document.note.animation.is_some_and(|a| a.frames > 0);
+            document.warnings.extend(
+                filmed.then(|| format!("{} is not there: the tree is at rest", motion::FILE)),
+            );
+            return Ok(document);
+        }
+        let end = motion::read_end(
+            PoseReader::open(dir, &document.skeleton, document.metres_per_px())?,
+            &document.estimator(),
+            animation_s,
+            document.pictured(),
+        )?;
+        (document.poses, document.pose_in_picture) = (end.poses, end.pose_in_picture);
+        Ok(document)
+    }
+
+    /// The same without any pose.
+    ///
+    /// # Errors
+    /// The folder is no document or holds no tree, or `nodes.csv` is missing or damaged.
+    pub fn tree(dir: &Path) -> Result<Self, DocumentError> {
+        let note = Self::note(dir)?;
+        let model = model(dir, &note)?;
+        let nodes = nodes::read(dir, model, size(&note))?;
+        let picture = note.picture.as_ref().map(|p| picture::bytes(dir, p));
+        Self::of_parts(dir, note, nodes, picture)
+    }
+
+    /// The document that would be read from a folder to which these were written; without poses.
+    /// `picture_jpg` is the file that the note speaks of.
+    ///
+    /// # Errors
+    /// The tree cannot be read back, as it is empty or reaches too far.
+    pub fn as_read(
+        note: &CaptureNote,
+        skeleton: &Skeleton,
+        sway: &[Swaying],
+        picture_jpg: Option<&[u8]>,
+    ) -> Result<Self, DocumentError> {
+        let dir = Path::new("");
+        let note = note::parse(Path::new("capture.json"), &note::json(note)?)?;
+        let model = model(dir, &note)?;
+        let table = nodes::nodes(Vec::new(), skeleton, sway, model.metres_per_px)?;
+        let nodes = nodes::read_from(&table, model, size(&note))?;
+        let picture = picture_jpg.map(|bytes| Ok(bytes.to_vec()));
+        Self::of_parts(dir, note, nodes, picture)
+    }
+
+    fn of_parts(
+        dir: &Path,
+        note: CaptureNote,
+        nodes: NodesRead,
+        picture_jpg: Option<Result<Vec<u8>, String>>,
+    ) -> Result<Self, DocumentError> {
+        if nodes.skeleton.nodes.is_empty() {
+            return Err(DocumentError::NoTree {
+                dir: dir.to_owned(),
+            });
+        }
+        let mut document = Self {
+            dir: dir.to_owned(),
+            note,
+            skeleton: Arc::new(nodes.skeleton),
+            sway: nodes.sway,
+            poses: Vec::new(),
+            picture: None,
+            pose_in_picture: None,
+            outline: None,
+            warnings: Vec::new(),
+        };
+        document.picture = document.picture_of(picture_jpg);
+        document.outline = document.outline_of();
+        Ok(document)
+    }
+
+    fn picture_of(&mut self, bytes: Option<Result<Vec<u8>, String>>) -> Option<Picture> {
+        let (Some(note), Some(bytes)) = (&self.note.picture, bytes) else {
+            let filmed = self.note.timing.frames_seen > 0;
+            self.warnings.extend(filmed.then(|| {
+                "the capture holds no picture: no frame could be decoded in colour".into()
+            }));
+            return None;
+        };
+        let size = size(&self.note);
+        match bytes.and_then(|bytes| picture::decoded(&bytes, note, size)) {
+            Ok(picture) => Some(picture),
+            Err(why) => {
+                self.warnings
+                    .push(format!("the picture of the capture is left out: {why}"));
+                None
+            }
+        }
+    }
+
+    fn outline_of(&mut self) -> Option<Outline> {
+        match outline(self.note.outline.as_ref()?) {
+            Ok(outline) => Some(outline),
+            Err(why) => {
+                self.warnings
+                    .push(format!("the outline of the capture is left out: {why}"));
+                None
+            }
+        }
+    }
+
+    /// Metres in a pixel; 0 where the document knows none.
+    pub fn metres_per_px(&self) -> f64 {
+        self.note.model.as_ref().map_or(0.0, |m| m.metres_per_px)
+    }
+
+    /// Whether the motion of the tree is in the folder.
+    pub fn has_motion(&self) -> bool {
+        self.dir.join(motion::FILE).exists()
+    }
+
+    /// Whether the points that were followed are in the folder.
+    pub fn has_tracks(&self) -> bool {
+        self.dir.join(tracks::FILE).exists()
+    }
+
+    /// The frame of the picture.
+    fn pictured(&self) -> Option<u64> {
+        self.note.picture.as_ref().map(|p| p.frame)
+    }
+
+    fn estimator(&self) -> PoseEstimator {
+        PoseEstimator::new(self.skeleton.clone(), &self.note.config.motion)
+    }
+
+    /// Takes the end of a film as reading it back would give it: of `poses`, in the order of time,
+    /// those of the last `animation_s` seconds. There should be a second more, as times are
+    /// rounded. A pose at no place that a table can hold is left out.
+    pub fn take_poses(
+        &mut self,
+        poses: Vec<Pose>,
+        pose_in_picture: Option<&Pose>,
+        animation_s: f64,
+    ) {
+        let estimator = self.estimator();
+        self.poses = Vec::with_capacity(poses.len());
+        // One by one: those of a minute take tens of megabytes.
+        for pose in poses {
+            let read = motion::as_read(&pose, &self.skeleton, self.metres_per_px(), &estimator);
+            self.poses.extend(read);
+        }
+        let oldest_s = self.poses.last().map_or(0.0, |p| p.time_s) - animation_s;
+        self.poses.retain(|p| p.time_s >= oldest_s);
+        self.pose_in_picture = pose_in_picture.and_then(|pose| {
+            motion::as_read(pose, &self.skeleton, self.metres_per_px(), &estimator)
+        });
+    }
+
+    /// Takes the answers of an analysis, by node index, as reading them back would give them. Nodes
+    /// beyond them were not measured.
+    pub fn take_sway(&mut self, sway: &[Swaying]) {
+        for (i, own) in self.sway.iter_mut().enumerate() {
+            let new = sway.get(i).unwrap_or(&Err(Unidentified::NotMeasured));
+            let cells = sway::cells(new);
+            let read = sway::read(std::array::from_fn(|c| cells[c].as_str()));
+            *own = read.unwrap_or(Err(Unidentified::NotMeasured));
+        }
+    }
+
+    /// The text of `nodes.csv`; the same bytes as were read, where nothing was changed.
+    ///
+    /// # Errors
+    /// None in practice: it is written to memory.
+    pub fn nodes_csv(&self) -> Result<Vec<u8>, DocumentError> {
+        let metres_per_px = self.metres_per_px();
+        Ok(nodes(
+            Vec::new(),
+            &self.skeleton,
+            &self.sway,
+            metres_per_px,
+        )?)
+    }
+
+    /// The points of the film between two times, s; of them the last `window_s` seconds.
+    ///
+    /// # Errors
+    /// `tracks.csv` is missing or damaged.
+    pub fn tracked_within(&self, window_s: f64, within_s: [f64; 2]) -> Result<Film, DocumentError> {
+        if !self.has_tracks() {
+            return Err(self.no_film(tracks::FILE));
+        }
+        tracks::read_film(&self.dir, &self.skeleton, window_s, within_s)
+    }
+
+    /// All poses of the film in their order, read anew, one at a time: those of hours would fill
+    /// the memory.
+    ///
+    /// # Errors
+    /// `motion.csv` is missing or damaged; after an error the film is over.
+    pub fn film(
+        &self,
+    ) -> Result<impl Iterator<Item = Result<Pose, DocumentError>> + use<>, DocumentError> {
+        if !self.has_motion() {
+            return Err(self.no_film(motion::FILE));
+        }
+        let mut reader = PoseReader::open(&self.dir, &self.skeleton, self.metres_per_px())?;
+        let estimator = self.estimator();
+        let mut over = false;
+        Ok(std::iter::from_fn(move || {
+            let next = if over { Ok(None) } else { reader.next() };
+            over |= next.is_err();
+            next.map(|posture| posture.map(|p| p.pose(&estimator)))
+                .transpose()
+        }))
+    }
+
+    fn no_film(&self, file: &'static str) -> DocumentError {
+        DocumentError::NoFilm {
+            dir: self.dir.clone(),
+            file,
+        }
+    }
+
+    /// What poses this tree in the order of time as another one whose measured nodes are the same,
+    /// e.g. one of another shape.
+    pub fn reposer(&self, skeleton: &Arc<Skeleton>, config: &Config) -> Reposer {
+        Reposer {
+            from: self.skeleton.clone(),
+            estimator: PoseEstimator::new(skeleton.clone(), &config.motion),
+            measured: self.skeleton.measured().min(skeleton.measured()),
+        }
+    }
+
+    /// `poses` by a [`reposer`](Self::reposer) of their own.
+    pub fn reposed(&self, skeleton: &Arc<Skeleton>, config: &Config, poses: &[Pose]) -> Vec<Pose> {
+        let mut reposer = self.reposer(skeleton, config);
+        poses.iter().map(|pose| reposer.pose(pose)).collect()
+    }
+}
+
+/// Poses of one tree as those of another one: its nodes follow the same places in the picture.
+pub struct Reposer {
+    from: Arc<Skeleton>,
+    estimator: PoseEstimator,
+    measured: usize,
+}
+
+impl Reposer {
+    /// The pose of the other tree; poses must come in the order of time.
+    pub fn pose(&mut self, pose: &Pose) -> Pose {
+        let joints = &pose.joints[..self.measured];
+        let targets_px: Vec<Option<[f64; 2]>> = joints
+            .iter()
+            .map(|joint| Some(self.from.image_from_model(&joint.position)))
+            .collect();
+        self.estimator.step(pose.frame, pose.time_s, &targets_px)
+    }
+}
+
+/// What the folder of a document holds before there is a tree.
+pub struct Begun {
+    pub note: CaptureNote,
+    pub picture: Option<Picture>,
+    pub outline: Option<Outline>,
+}
+
+impl Begun {
+    /// Reads it from `dir`. A picture or an outline that cannot be read is left out.
+    ///
+    /// # Errors
+    /// There is no `capture.json`, it is damaged, or was written by a newer version.
+    pub fn read(dir: &Path) -> Result<Self, DocumentError> {
+        let note = Document::note(dir)?;
+        let picture = note.picture.as_ref().and_then(|picture| {
+            let bytes = picture::bytes(dir, picture).ok()?;
+            picture::decoded(&bytes, picture, size(&note)).ok()
+        });
+        let noted = note.outline.as_ref();
+        Ok(Self {
+            picture,
+            outline: noted.and_then(|noted| outline(noted).ok()),
+            note,
+        })
+    }
+}
+
+/// Size of the film's picture.
+fn size(note: &CaptureNote) -> Size {
+    Size::new(note.source.width, note.source.height)
+}
+
+/// What the note says of the tree.
+fn model<'a>(dir: &Path, note: &'a CaptureNote) -> Result<&'a ModelNote, DocumentError> {
+    note.model.as_ref().ok_or_else(|| DocumentError::NoTree {
+        dir: dir.to_owned(),
+    })
+}
+
+fn outline(note: &OutlineNote) -> Result<Outline, outline::OutlineError> {
+    let corners_px: Vec<[f64; 2]> = note.polygon_px.iter().map(|p| p.map(f64::from)).collect();
+    outline::from_polygon(&corners_px, Size::new(note.width, note.height))
+}

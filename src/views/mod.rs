@@ -1,0 +1,16 @@
+//! What is made of a document: its tree as it is wanted, ready for files and pictures. Whoever
+//! writes a view of a tree, be it at the end of a film or later, does it through
+//! [`PreparedTree`]; so a view says the same whenever it is made.
+
+mod error;
+mod loops;
+mod prepared;
+mod studio;
+mod tables;
+mod write;
+
+pub use error::PrepareError;
+pub use prepared::{PreparedTree, TreeOptions};
+pub use studio::{FilmPlace, Shot, Studio, VIDEO_S};
+pub use tables::TablesWritten;
+pub use write::{DocumentWriter, Draft, update, write_document};

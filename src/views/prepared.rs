@@ -1,0 +1,307 @@
+//! A document's tree as it is wanted: of another shape, cut, in leaf, moved otherwise.
+
+use super::PrepareError;
+use super::loops::looped_flutter;
+use crate::config::Config;
+use crate::document::note::Software;
+use crate::document::{Document, DocumentError, Reposer};
+use crate::export::gltf::{KEY_TOLERANCE_PX, Model, glb, provenance};
+use crate::export::sway::extras;
+use crate::export::{ExportError, html};
+use crate::model::{Luma, Outline, Pose, Skeleton, Swaying, Unidentified};
+use crate::pipeline::{MOST_RESHAPED, Seen, cut_to, dress, flutter, reshape};
+use crate::shape::{Cut, Drawn, Dressed, Template, Topiary};
+use serde_json::Value;
+use std::sync::Arc;
+
+/// What may be changed of a document's tree.
+#[derive(Clone, Debug, Default)]
+pub struct TreeOptions {
+    /// The document's own settings, or others.
+    pub config: Config,
+    /// The shape that the tree is cut to.
+    pub cut_to: Option<Drawn>,
+    /// A leaf in place of the built-in one.
+    pub leaf: Option<Template>,
+    /// How dense the leaves are, of the film's size.
+    pub density: Option<Luma>,
+}
+
+/// A tree that is ready to be written or drawn.
+pub struct PreparedTree {
+    /// What it was made from, but for its poses, which are in [`poses`](Self::poses).
+    pub document: Document,
+    pub config: Config,
+    pub skeleton: Arc<Skeleton>,
+    /// In the order of time; none where the tree is at rest.
+    pub poses: Vec<Pose>,
+    /// The pose in the picture of the document.
+    pub pose_in_picture: Option<Pose>,
+    /// Everything that is drawn of it.
+    pub dressed: Dressed,
+    /// How far each group of leaves swings in every pose.
+    pub flutter: Vec<Vec<[f32; 2]>>,
+    /// What is known of the sway of every node.
+    pub sway: Vec<Swaying>,
+    /// Whether it differs from the tree in the tables.
+    pub reshaped: bool,
+    /// What the drawn shape did to it.
+    pub cut: Option<Cut>,
+    node_extras: Vec<Value>,
+    provenance: Value,
+    transforms: AppliedTransforms,
+}
+
+/// What was done to the document's tree, for all further poses of it.
+#[derive(Default)]
+struct AppliedTransforms {
+    /// The tree of the new shape.
+    reshaped: Option<Arc<Skeleton>>,
+    /// The tree before it was cut, and the cut one.
+    cut: Option<(Arc<Skeleton>, Topiary)>,
+}
+
+/// The skeleton in its new shape, before anything is drawn on it.
+struct Posed {
+    skeleton: Arc<Skeleton>,
+    poses: Vec<Pose>,
+    pose_in_picture: Option<Pose>,
+    sway: Vec<Swaying>,
+    /// The drawn shape in the picture.
+    cut_to: Option<Outline>,
+    cut: Option<Cut>,
+    transforms: AppliedTransforms,
+}
+
+impl PreparedTree {
+    /// Prepares the tree of `document`.
+    ///
+    /// # Errors
+    /// The document lacks what a new shape is made from, the tree is too large for one, or the
+    /// drawn shape lies off the tree.
+    pub fn new(mut document: Document, options: TreeOptions) -> Result<Self, PrepareError> {
+        let TreeOptions {
+            config,
+            cut_to,
+            leaf,
+            density,
+        } = options;
+        let mut posed = Posed::as_captured(&mut document);
+        let reshaped = config.shape != document.note.config.shape;
+        let changed = reshaped || cut_to.is_some();
+        if changed {
+            posed.refuse_large(reshaped.then_some(config.shape.planes))?;
+        }
+        if reshaped {
+            posed.reshape(&document, &config)?;
+        }
+        if let Some(drawn) = &cut_to {
+            posed.cut(&document, drawn, &config)?;
+        }
+        let seen = Seen {
+            picture: document.picture.as_ref().map(|p| &*p.rgb),
+            pose: posed.pose_in_picture.as_ref(),
+            outline: document.outline.as_ref(),
+            cut_to: posed.cut_to.as_ref(),
+            leaf: leaf.as_ref(),
+            density: density.as_ref(),
+        };
+        let dressed = dress(&posed.skeleton, seen, &config);
+        let flutter = flutter(&dressed, &posed.poses, &posed.skeleton, &config);
+        let provenance = provenance(
+            &document.note.source.name,
+            &Software::default(),
+            &posed.poses,
+        );
+        Ok(Self {
+            node_extras: posed.sway.iter().map(extras).collect(),
+            reshaped: changed,
+            document,
+            config,
+            skeleton: posed.skeleton,
+            poses: posed.poses,
+            pose_in_picture: posed.pose_in_picture,
+            dressed,
+            flutter,
+            sway: posed.sway,
+            cut: posed.cut,
+            provenance,
+            transforms: posed.transforms,
+        })
+    }
+
+    /// Takes other answers on the sway than those of the document, as reading them back would give
+    /// them. Only for a tree of the document's own shape: it is by node index.
+    pub fn take_sway(&mut self, sway: &[Swaying]) {
+        self.document.take_sway(sway);
+        self.sway.clone_from(&self.document.sway);
+        self.node_extras = self.sway.iter().map(extras).collect();
+    }
+
+    /// Takes other poses than those of the film, at even times; `looped`: the last is the first
+    /// again. `what` says for the file's own notes where they come from.
+    pub fn animate(&mut self, poses: Vec<Pose>, looped: bool, what: Value) {
+        self.flutter = if looped {
+            looped_flutter(&self.dressed, &poses, &self.skeleton, &self.config)
+        } else {
+            flutter(&self.dressed, &poses, &self.skeleton, &self.config)
+        };
+        let source = &self.document.note.source.name;
+        self.provenance = provenance(source, &Software::default(), &poses);
+        if let Some(notes) = self.provenance.as_object_mut() {
+            notes.insert("animated".into(), what);
+        }
+        self.poses = poses;
+    }
+
+    /// All poses of the film, of the tree as it is; read anew, one at a time.
+    ///
+    /// # Errors
+    /// `motion.csv` is missing or damaged.
+    pub fn film(&self) -> Result<impl Iterator<Item = Result<Pose, DocumentError>>, DocumentError> {
+        let mut reposer = self.reposer();
+        let film = self.document.film()?;
+        Ok(film.map(move |pose| Ok(self.posed_as_wanted(pose?, reposer.as_mut()))))
+    }
+
+    fn reposer(&self) -> Option<Reposer> {
+        let skeleton = self.transforms.reshaped.as_ref()?;
+        Some(self.document.reposer(skeleton, &self.config))
+    }
+
+    /// A pose of the document as one of this tree.
+    fn posed_as_wanted(&self, pose: Pose, reposer: Option<&mut Reposer>) -> Pose {
+        let pose = match reposer {
+            Some(reposer) => reposer.pose(&pose),
+            None => pose,
+        };
+        match &self.transforms.cut {
+            Some((whole, topiary)) => topiary.pose(whole, &pose),
+            None => pose,
+        }
+    }
+
+    /// What goes into a model's file.
+    pub fn model(&self) -> Model<'_> {
+        Model {
+            skeleton: &self.skeleton,
+            dressed: &self.dressed,
+            poses: &self.poses,
+            flutter: &self.flutter,
+            all_levels: false,
+            metres_per_px: self.config.export.metres_per_px,
+            tolerance_px: KEY_TOLERANCE_PX,
+            node_extras: &self.node_extras,
+            provenance: &self.provenance,
+        }
+    }
+
+    /// A page that shows `model`, which is [`model`](Self::model) or one with other keys.
+    ///
+    /// # Errors
+    /// As of [`glb`] and [`html::page`].
+    pub fn page(&self, model: &Model, title: &str) -> Result<Vec<u8>, ExportError> {
+        let (bytes, _) = glb(model)?;
+        let data = html::Data::of(
+            &self.document.note,
+            &self.skeleton,
+            &self.poses,
+            &self.sway,
+            self.config.export.metres_per_px,
+        );
+        let picture = self.document.picture.as_ref().map(|p| &*p.rgb);
+        let page = html::page(&html::Page {
+            title,
+            glb: &bytes,
+            data: &data,
+            picture,
+        })?;
+        Ok(page.into_bytes())
+    }
+}
+
+impl Posed {
+    /// Takes the poses out of `document`: those of a minute take tens of megabytes.
+    fn as_captured(document: &mut Document) -> Self {
+        Self {
+            skeleton: document.skeleton.clone(),
+            poses: std::mem::take(&mut document.poses),
+            pose_in_picture: document.pose_in_picture.clone(),
+            sway: document.sway.clone(),
+            cut_to: None,
+            cut: None,
+            transforms: AppliedTransforms::default(),
+        }
+    }
+
+    /// Refuses a tree that would take hours to be given another shape, with so many planes if these
+    /// are new.
+    fn refuse_large(&self, planes: Option<u32>) -> Result<(), PrepareError> {
+        let planes = planes.unwrap_or(0) as usize;
+        let of_planes = planes.saturating_mul(self.skeleton.measured());
+        let nodes = self.skeleton.nodes.len().max(of_planes);
+        if nodes > MOST_RESHAPED {
+            return Err(PrepareError::TooManyNodes { nodes });
+        }
+        Ok(())
+    }
+
+    /// Gives the measured nodes another depth and other copies, as `config` says.
+    fn reshape(&mut self, document: &Document, config: &Config) -> Result<(), PrepareError> {
+        let outline = outline_of(document)?;
+        self.skeleton = Arc::new(reshape(&document.skeleton, outline, config));
+        self.poses = document.reposed(&self.skeleton, config, &self.poses);
+        let in_picture = document.pose_in_picture.as_slice();
+        self.pose_in_picture = document.reposed(&self.skeleton, config, in_picture).pop();
+        // Copies come last; nothing was measured on them.
+        self.sway.truncate(document.skeleton.measured());
+        self.sway
+            .resize(self.skeleton.nodes.len(), Err(Unidentified::NotMeasured));
+        self.transforms.reshaped = Some(self.skeleton.clone());
+        Ok(())
+    }
+
+    /// Cuts the tree to a drawn shape.
+    fn cut(
+        &mut self,
+        document: &Document,
+        drawn: &Drawn,
+        config: &Config,
+    ) -> Result<(), PrepareError> {
+        let topiary = cut_to(&self.skeleton, outline_of(document)?, drawn, config)?;
+        self.cut = Some(topiary.cut);
+        if topiary.cut.larger {
+            return Ok(());
+        }
+        let whole = self.skeleton.clone();
+        for pose in self.poses.iter_mut().chain(&mut self.pose_in_picture) {
+            *pose = topiary.pose(&whole, pose);
+        }
+        self.sway = sway_of_cut(&self.sway, &topiary);
+        self.skeleton = Arc::new(topiary.skeleton.clone());
+        self.cut_to = Some(topiary.shape.clone());
+        self.transforms.cut = Some((whole, topiary));
+        Ok(())
+    }
+}
+
+/// How the nodes of a tree sway that was cut; nothing was measured on those that it added.
+fn sway_of_cut(sway: &[Swaying], topiary: &Topiary) -> Vec<Swaying> {
+    let mut all = Vec::with_capacity(topiary.skeleton.nodes.len());
+    for (node, of) in topiary.skeleton.nodes.iter().zip(&topiary.moves_as) {
+        all.push(match sway.get(of.index()) {
+            Some(sway) if node.copy_of.is_none() => *sway,
+            _ => Err(Unidentified::NotMeasured),
+        });
+    }
+    all
+}
+
+fn outline_of(document: &Document) -> Result<&Outline, PrepareError> {
+    document
+        .outline
+        .as_ref()
+        .ok_or_else(|| PrepareError::NoOutline {
+            dir: document.dir.clone(),
+        })
+}

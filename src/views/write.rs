@@ -1,0 +1,135 @@
+//! A whole document with its model's file: at the end of a film, of a tree that was not filmed, and
+//! of one that was analysed anew.
+
+use super::{PrepareError, PreparedTree, TreeOptions};
+use crate::document::note::{CaptureNote, json};
+use crate::document::{Document, PICTURE_FILE, jpeg};
+use crate::export::gltf::glb;
+use crate::files::{OutputFolder, WriteError, replace};
+use crate::model::{Picture, Pose, Skeleton, Swaying};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// Name of the model's file.
+const MODEL_FILE: &str = "tree.glb";
+
+/// A tree that is to become a document.
+#[derive(Clone, Debug)]
+pub struct Draft<'a> {
+    /// What goes into `capture.json`; it must have a model. `animation` is filled in when it is
+    /// known.
+    pub note: CaptureNote,
+    pub skeleton: &'a Skeleton,
+    /// What the note's picture is; the note must have one then.
+    pub picture: Option<&'a Picture>,
+    /// The end of the film in the order of time, `export.animation_s` and a second more; none for a
+    /// tree that was not filmed.
+    pub poses: Vec<Pose>,
+    pub pose_in_picture: Option<&'a Pose>,
+}
+
+/// A document on its way to the disk.
+///
+/// The views are made of what reading the files back gives, so that those made later are the same,
+/// byte for byte.
+pub struct DocumentWriter {
+    tree: PreparedTree,
+    picture_jpg: Option<Vec<u8>>,
+}
+
+impl DocumentWriter {
+    /// Prepares all that needs no sway, which is most of the work.
+    ///
+    /// # Errors
+    /// The tree cannot be written or not be read back.
+    pub fn new(draft: Draft) -> Result<Self, PrepareError> {
+        let picture_jpg = draft.picture.map(|p| jpeg(&p.rgb)).transpose()?;
+        let mut document =
+            Document::as_read(&draft.note, draft.skeleton, &[], picture_jpg.as_deref())?;
+        let config = document.note.config.clone();
+        document.take_poses(
+            draft.poses,
+            draft.pose_in_picture,
+            config.export.animation_s,
+        );
+        let options = TreeOptions {
+            config,
+            ..TreeOptions::default()
+        };
+        Ok(Self {
+            tree: PreparedTree::new(document, options)?,
+            picture_jpg,
+        })
+    }
+
+    /// Writes `nodes.csv`, `tree.glb`, the picture and `capture.json` with these `warnings`. `sway`
+    /// is by node index.
+    ///
+    /// # Errors
+    /// A file cannot be written, or the tree is none for a model's file.
+    pub fn write(
+        mut self,
+        folder: &OutputFolder,
+        sway: &[Swaying],
+        warnings: Vec<String>,
+    ) -> Result<(), PrepareError> {
+        self.tree.take_sway(sway);
+        folder.write("nodes.csv", &self.tree.document.nodes_csv()?)?;
+        let (model, animation) = glb(&self.tree.model())?;
+        folder.write(MODEL_FILE, &model)?;
+        if let Some(bytes) = &self.picture_jpg {
+            folder.write(PICTURE_FILE, bytes)?;
+        }
+        let note = CaptureNote {
+            animation: Some(animation),
+            warnings,
+            ..self.tree.document.note
+        };
+        folder.write("capture.json", &json(&note)?)?;
+        Ok(())
+    }
+}
+
+/// Writes a document without tables of a film to `dir`, which appears when it is complete.
+///
+/// # Errors
+/// `dir` is there already, a file cannot be written, or the tree is none for a model's file.
+pub fn write_document(dir: &Path, draft: Draft, sway: &[Swaying]) -> Result<PathBuf, PrepareError> {
+    let folder = OutputFolder::create(dir)?;
+    let warnings = draft.note.warnings.clone();
+    DocumentWriter::new(draft)?.write(&folder, sway, warnings)?;
+    Ok(folder.publish()?)
+}
+
+/// Puts other answers on the sway, by node index, into the document in `dir`: into `nodes.csv`, and
+/// into the model's file where there is one.
+///
+/// # Errors
+/// The document cannot be read; a file cannot be written, or it was stopped. A file is as it was or
+/// new, never half-written.
+pub fn update(dir: &Path, sway: &[Swaying], stop: &AtomicBool) -> Result<(), PrepareError> {
+    let config = Document::note(dir)?.config;
+    let document = Document::read(dir, config.export.animation_s)?;
+    let options = TreeOptions {
+        config,
+        ..TreeOptions::default()
+    };
+    let mut tree = PreparedTree::new(document, options)?;
+    tree.take_sway(sway);
+    let table = tree.document.nodes_csv()?;
+    let (model, _) = glb(&tree.model())?;
+    put(&dir.join("nodes.csv"), &table, stop)?;
+    let file = dir.join(MODEL_FILE);
+    if std::fs::symlink_metadata(&file).is_ok() {
+        put(&file, &model, stop)?;
+    }
+    Ok(())
+}
+
+/// Replaces a file, unless it holds these bytes already.
+fn put(file: &Path, bytes: &[u8], stop: &AtomicBool) -> Result<(), WriteError> {
+    if std::fs::read(file).is_ok_and(|old| old == bytes) {
+        return Ok(());
+    }
+    replace(file, bytes, stop)
+}
