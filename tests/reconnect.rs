@@ -1001,7 +1001,7 @@ fn calls_that_hang_do_not_pile_up() {
         let dir = tempfile::tempdir().expect("tempdir");
         let out = dir.path().join("out");
         let mut job = job(Some(&out));
-        (job.config.camera.timeout_s, job.config.camera.retry_delay_s) = (0.05, 0.05);
+        (job.config.camera.timeout_s, job.config.camera.retry_delay_s) = (0.4, 0.05);
         let (camera, driver) = Stuck::new(Hang::EveryReopen);
         let running = runtime::start(camera, job).expect("start");
         let mut news = Vec::new();

@@ -24,23 +24,9 @@ const CLOSES_WITHIN: Duration = Duration::from_millis(1500);
 /// Opening may take so many times the limit for a frame before it is left behind: a camera that has
 /// to wake up takes seconds, and one behind a bad hub lets every request time out.
 const OPENING_LIMITS: u32 = 3;
-/// Threads left behind at a time. Each holds a device and its buffers, some 4 MB; with so many of
-/// them hanging another attempt would hang as well, and none is made until one of them returns.
+/// Threads left behind at a time. Each holds a device and its buffers, some 7 MB at 1280x720. With
+/// so many of them hanging another attempt would hang as well: none is made until one returns.
 const LEFT_BEHIND: usize = 8;
-
-#[derive(Clone, Copy)]
-enum Call {
-    Next,
-    Reopen,
-    Close,
-}
-
-/// What a call came to.
-enum Outcome {
-    Next(Result<Option<RawFrame>, SourceError>),
-    Reopened(Result<(), SourceError>),
-    Closed,
-}
 
 /// Opens `input` as [`source::open`] does, but gives a camera up whose driver hangs.
 ///
@@ -79,6 +65,20 @@ pub fn open(
             reason: "its thread has ended".into(),
         }),
     }
+}
+
+#[derive(Clone, Copy)]
+enum Call {
+    Next,
+    Reopen,
+    Close,
+}
+
+/// What a call came to.
+enum Outcome {
+    Next(Result<Option<RawFrame>, SourceError>),
+    Reopened(Result<(), SourceError>),
+    Closed,
 }
 
 /// Why a call has not come to anything.
