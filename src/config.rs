@@ -99,7 +99,7 @@ pub struct Outline {
     pub give_up_s: f64,
 }
 
-/// Harris corners (000 appendix A, 003 section 5.3.2).
+/// Harris corners (Li 2011 app. A, Zeng 2015 sect. 5.3.2).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Detect {
@@ -147,7 +147,7 @@ pub struct Accumulate {
     pub refine_s: f64,
 }
 
-/// 2D skeleton (000 appendix A).
+/// 2D skeleton (Li 2011 app. A).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Skeleton {
@@ -155,7 +155,7 @@ pub struct Skeleton {
     pub fold: f64,
 }
 
-/// 3D pose (000 section 4).
+/// 3D pose (Li 2011 sect. 4).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Motion {

@@ -23,7 +23,7 @@ struct Branch {
     load: Load,
     /// From the parent node to its own at rest, px.
     way: Vector3<f64>,
-    /// The local axes u and w (002 fig. 13) that it bends about; v, along it, is left out: it
+    /// The local axes u and w (Hu et al. fig. 13) that it bends about; v, along it, is left out: it
     /// neither stretches nor twists.
     axes: [Vector3<f64>; 2],
     tuning: Tuning,
@@ -61,7 +61,7 @@ enum Answer {
     Settle,
 }
 
-/// Moves a tree (002 eq. 7 for each branch).
+/// Moves a tree (Hu et al. eq. 7 for each branch).
 #[derive(Clone)]
 pub struct Animator {
     skeleton: Arc<Skeleton>,

@@ -1,7 +1,7 @@
 //! Making a measured tree move: in a wind that nobody filmed, pulled and let go, or as it was
 //! filmed but more so.
 //!
-//! Every branch is the oscillator of 002 eq. 7 with the frequency and the damping that were
+//! Every branch is the oscillator of Hu et al. eq. 7 with the frequency and the damping that were
 //! measured on it ([`tune`]), solved exactly ([`Transition`]). What drives it is the moment that
 //! bends it at its base: that of the wind ([`Wind`]) on all that it carries ([`loads`]), in its own
 //! axes, in which it bends and neither stretches nor twists. A limb is a chain of such branches, so

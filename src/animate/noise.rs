@@ -12,7 +12,7 @@ const RATE_HZ: f64 = 64.0;
 const FASTEST_HZ: f64 = 12.0;
 
 /// Noise of mean 0 and variance 1 whose power falls as `1 / (corner^2 + f^2)^(beta / 2)`: flat
-/// below the corner, 1/f^beta above (002 section 7).
+/// below the corner, 1/f^beta above (Hu et al. sect. 7).
 #[derive(Clone, Debug)]
 pub struct Noise {
     /// Many trees have many tables, and each is read all over: half the size is half the misses.

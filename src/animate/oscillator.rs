@@ -1,4 +1,4 @@
-//! The sway of one branch about one axis, solved exactly (002 eq. 7).
+//! The sway of one branch about one axis, solved exactly (Hu et al. eq. 7).
 
 /// Where an oscillator is, in the unit of what drives it, and its speed per second.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -7,7 +7,7 @@ pub struct Oscillation {
     pub v: f64,
 }
 
-/// One step of `x'' + 4 pi xi f x' + 4 pi^2 f^2 x = F(t) / m` (002 eq. 7).
+/// One step of `x'' + 4 pi xi f x' + 4 pi^2 f^2 x = F(t) / m` (Hu et al. eq. 7).
 ///
 /// The force is told as the place `u = F / (4 pi^2 f^2 m)` at which it would hold the branch still,
 /// and goes evenly from one value to the next. For such a force the step is the solution itself,

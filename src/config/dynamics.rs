@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Sway frequency and damping of every branch (002 section 5).
+/// Sway frequency and damping of every branch (Hu et al. sect. 5).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Dynamics {

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Who moves with whom: average linkage, or recursive normalised cuts (000 appendix A, 003 section
-/// 5.4.1).
+/// Which points move together: average linkage, or recursive normalised cuts (Li 2011 app. A, Zeng
+/// 2015 sect. 5.4.1).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Hierarchy {

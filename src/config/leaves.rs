@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Leaves: where, how many, how they swing (000 appendix B and section 6).
+/// Leaves: where, how many, how they swing (Li 2011 app. B and sect. 6).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Leaves {

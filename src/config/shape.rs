@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// 3D skeleton (000 section 3).
+/// 3D skeleton (Li 2011 sect. 3).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Shape {
@@ -30,13 +30,13 @@ pub struct Shape {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum EnvelopeKind {
-    /// The outline, turned about its axis (000 section 3).
+    /// The outline, turned about its axis (Li 2011 sect. 3).
     Revolution,
-    /// The convex hull of the flat skeleton, turned about its axis (003 section 5.5).
+    /// The convex hull of the flat skeleton, turned about its axis (Zeng 2015 sect. 5.5).
     Hull,
 }
 
-/// The trunk beyond its top: conifers have one up to the tip (000 figure 9).
+/// The trunk beyond its top: conifers have one up to the tip (Li 2011 fig. 9).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Leader {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Wind, and how a tree answers to it (002 section 6).
+/// Wind, and how a tree answers to it (Hu et al. sect. 6).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Wind {

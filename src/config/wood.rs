@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Curl, twigs, thickness and mesh (000 section 3, end).
+/// Curl, twigs, thickness and mesh (Li 2011 sect. 3, end).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Wood {

@@ -1,4 +1,4 @@
-//! The pattern of frequency and damping across the levels of a tree (002 section 5.4).
+//! The pattern of frequency and damping across the levels of a tree (Hu et al. sect. 5.4).
 
 use super::study::Study;
 use crate::model::{Interval, Sway};

@@ -1,6 +1,6 @@
 //! What a film says of a tree's sway, told to people and programs: a table as text, JSON, and one
-//! HTML page with plots after Hu et al. (002 figures 3, 6, 7, 9 to 12 and 15). Pure: what goes in
-//! is analysed already, what comes out is text.
+//! HTML page with plots after Hu et al. (figures 3, 6, 7, 9 to 12 and 15). Pure: what goes in is
+//! analysed already, what comes out is text.
 
 mod columns;
 mod compare;

@@ -97,8 +97,8 @@ pub struct Branch {
     /// What the amplitude is at the branch's end, px in the picture; no number where unknown.
     pub amplitude_px: f64,
     /// When every angle was, s; empty without poses. The angles are to the branch that carries it,
-    /// less their mean, degrees: in the picture's plane and in space (002 eq. 1); no number where
-    /// it has no direction.
+    /// less their mean, degrees: in the picture's plane and in space (Hu et al. eq. 1); no number
+    /// where it has no direction.
     pub times_s: Vec<f64>,
     pub plane_deg: Vec<f64>,
     pub space_deg: Vec<f64>,
@@ -114,11 +114,11 @@ pub struct Branch {
     pub way_px: Vec<[f64; 2]>,
 }
 
-/// What the spectrum's largest peak says: the method of 002.
+/// What the spectrum's largest peak says: the method of Hu et al.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reference {
     pub peak_hz: f64,
-    /// By its width at half the power, 002 eq. 6.
+    /// By its width at half the power, Hu et al. eq. 6.
     pub damping_ratio: f64,
 }
 

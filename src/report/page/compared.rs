@@ -1,4 +1,4 @@
-//! Several captures beside each other (002 figures 9 to 12 and 15, table 1).
+//! Several captures beside each other (Hu et al. figures 9 to 12 and 15, table 1).
 
 use super::branch::highest_hz;
 use super::levels::by_level;

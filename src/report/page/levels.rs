@@ -1,4 +1,4 @@
-//! The pattern across the levels of one tree (002 section 5.4).
+//! The pattern across the levels of one tree (Hu et al. sect. 5.4).
 
 use super::{cells, figure};
 use crate::model::{Interval, Sway};

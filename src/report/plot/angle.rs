@@ -1,4 +1,4 @@
-//! The angle of a branch to the one that carries it over time (002 figure 6).
+//! The angle of a branch to the one that carries it over time (Hu et al. fig. 6).
 
 use super::axes::{Axes, range, thinned};
 use super::svg::Svg;

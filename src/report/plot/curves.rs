@@ -1,4 +1,4 @@
-//! Spectra of angles (002 figures 7 and 9 to 12).
+//! Spectra of angles (Hu et al. figures 7 and 9 to 12).
 
 use super::axes::{Axes, range, thinned};
 use super::svg::Svg;
@@ -77,7 +77,8 @@ pub fn spectra(curves: &[Curve], highest_hz: f64, label: &str) -> Option<String>
             let k = (peak_hz / curve.spectrum.bin_hz).round() as usize;
             let height = curve.spectrum.amplitude.get(k).copied().unwrap_or(f64::NAN)
                 * std::f64::consts::FRAC_1_SQRT_2;
-            // The width at half the power is twice the damping times the frequency, 002 eq. 6.
+            // The width at half the power is twice the damping times the frequency (Hu et al.
+            // eq. 6).
             let [left, right] = [1.0 - damping, 1.0 + damping]
                 .map(|side| axes.x((side * peak_hz).clamp(0.0, highest_hz)));
             let y = axes.y(height);

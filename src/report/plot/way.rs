@@ -1,4 +1,4 @@
-//! Where the end of a branch went (002 figure 3).
+//! Where the end of a branch went (Hu et al. fig. 3).
 
 use super::HEIGHT;
 use super::axes::{Axes, range};
