@@ -24,7 +24,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("skeleton", &["model", "config"]),
     // The flat node that is stood up in space.
     ("shape", &["model", "config", "skeleton::Node2d"]),
-    ("motion", &["model", "config"]),
+    ("motion", &["model", "config", "signal"]),
     ("dynamics", &["model", "config", "signal"]),
     ("files", &[]),
     ("ffmpeg", &[]),

@@ -28,8 +28,11 @@ fn outness(k: usize, at: [f64; 2]) -> f64 {
 
 /// Dark and light, with edges in all directions, as feathers or fingers have them.
 fn brightness(x: f64, y: f64) -> f64 {
-    let wave = |k: f64| (0.45 * (x * (2.4 * k).cos() + y * (2.4 * k).sin()) + 1.7 * k * k).sin();
-    95.0 + 28.0 * (1..=5).map(|k| wave(f64::from(k))).sum::<f64>()
+    let mut sum = 0.0;
+    for k in (1..=5).map(f64::from) {
+        sum += (0.45 * (x * (2.4 * k).cos() + y * (2.4 * k).sin()) + 1.7 * k * k).sin();
+    }
+    95.0 + 28.0 * sum
 }
 
 fn cover(frame: &mut Frame, k: usize) {
@@ -48,18 +51,20 @@ fn follow(covered: bool) -> Places {
     let config = Config::default();
     let mut tracker = Tracker::new(&config.detect, &config.track, &support::outline(), 0);
     let mut decoder = Decoder::new().expect("decoder");
-    let step = |k: usize| {
+    let mut places = Vec::new();
+    for k in 0..=AFTER {
         let mut frame = support::decoded(&mut decoder, k);
         if covered && PASSES.contains(&k) {
             cover(&mut frame, k);
         }
         let set = tracker.step(&frame);
-        set.observations
-            .iter()
-            .map(|o| (o.id, [f64::from(o.u_px), f64::from(o.v_px)]))
-            .collect()
-    };
-    (0..=AFTER).map(step).collect()
+        let seen = set.observations.iter();
+        places.push(
+            seen.map(|o| (o.id, [f64::from(o.u_px), f64::from(o.v_px)]))
+                .collect(),
+        );
+    }
+    places
 }
 
 #[test]
@@ -77,18 +82,16 @@ fn tracks_do_not_go_with_what_passes_before_them_and_come_back() {
             }
         }
     }
-    let away = |id: &TrackId| {
-        let (at, there) = (free[AFTER].get(id)?, covered[AFTER].get(id)?);
-        Some((there[0] - at[0]).hypot(there[1] - at[1]))
-    };
     let there: Vec<&TrackId> = were_hidden
         .iter()
         .filter(|id| free[AFTER].contains_key(*id))
         .collect();
-    let back = there
-        .iter()
-        .filter(|id| away(id).is_some_and(|px| px < 3.0))
-        .count();
+    let mut back = 0;
+    for &id in &there {
+        if let (Some(at), Some(there)) = (free[AFTER].get(id), covered[AFTER].get(id)) {
+            back += usize::from((there[0] - at[0]).hypot(there[1] - at[1]) < 3.0);
+        }
+    }
     let (n, hidden) = (there.len(), hidden as f64);
     println!(
         "{n} tracks were hidden in {hidden} observations: {reported} reported, {dragged} dragged; {back} are back"

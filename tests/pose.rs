@@ -114,9 +114,8 @@ fn the_search_finds_what_trying_everything_finds_or_better() {
     }
 }
 
-/// Foot, upright trunk, a branch at 60 degrees to it, a twig on that, and a copy of both.
-fn tree() -> Skeleton {
-    let node = |k: u32, parent: Option<u32>, position| Node {
+fn node(k: u32, parent: Option<u32>, position: Point3<f64>) -> Node {
+    Node {
         name: NodeName(k),
         parent: parent.map(NodeId),
         level: [0, 1, 2, 3, 2, 3][k as usize],
@@ -127,7 +126,11 @@ fn tree() -> Skeleton {
         copy_of: None,
         plane_angle: 0.0,
         kind: Default::default(),
-    };
+    }
+}
+
+/// Foot, upright trunk, a branch at 60 degrees to it, a twig on that, and a copy of both.
+fn tree() -> Skeleton {
     let top = Point3::new(0.0, 100.0, 0.0);
     let branch = Vector3::new(60f64.to_radians().sin(), 60f64.to_radians().cos(), 0.0) * 80.0;
     let twig = Vector3::new(10.0, 40.0, 12.0);
@@ -169,14 +172,14 @@ fn no_joint_turns_faster_or_farther_than_its_bounds_whatever_is_seen() {
     let mut before: Option<Pose> = None;
     let (mut fastest, mut farthest) = (0.0_f64, 0.0_f64);
     for k in 0..400u64 {
-        let wild = |node: &Node, chance: &mut Chance| {
+        let mut targets = Vec::new();
+        for node in &tree.nodes[..4] {
             let [u, v] = tree.image_from_model(&node.position);
-            (chance.even() < 0.8).then(|| [u + 90.0 * chance.normal(), v + 90.0 * chance.normal()])
-        };
-        let targets: Vec<_> = tree.nodes[..4]
-            .iter()
-            .map(|n| wild(n, &mut chance))
-            .collect();
+            targets.push(
+                (chance.even() < 0.8)
+                    .then(|| [u + 90.0 * chance.normal(), v + 90.0 * chance.normal()]),
+            );
+        }
         let pose = estimator.step(k, k as f64 / 30.0, &targets);
         for i in 1..tree.nodes.len() {
             let now = own(&tree, &pose, i);
@@ -199,29 +202,30 @@ fn no_joint_turns_faster_or_farther_than_its_bounds_whatever_is_seen() {
     );
 }
 
+/// Where the first nodes are seen if the branch is turned by `angle`.
+fn targets_px(tree: &Skeleton, angle: f64) -> Vec<Option<[f64; 2]>> {
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
+    let (top, tip) = (tree.nodes[1].position, tree.nodes[2].position);
+    [tree.nodes[0].position, top, top + turn * (tip - top)]
+        .map(|p| Some(tree.image_from_model(&p)))
+        .to_vec()
+}
+
+/// By how much the branch turns, degrees, after so many missing frames in which it was turned by
+/// 0.8 radians.
+fn turned_by(frames_missing: u64) -> f64 {
+    let tree = Arc::new(tree());
+    let mut estimator = PoseEstimator::new(tree.clone(), &Motion::default());
+    let first = estimator.step(0, 0.0, &targets_px(&tree, 0.0));
+    let frame = 1 + frames_missing;
+    let then = estimator.step(frame, frame as f64 / 30.0, &targets_px(&tree, 0.8));
+    own(&tree, &first, 2)
+        .angle_to(&own(&tree, &then, 2))
+        .to_degrees()
+}
+
 #[test]
 fn after_a_gap_a_branch_may_have_gone_farther() {
-    let tree = Arc::new(tree());
-    let turned_by = |frames_missing: u64| {
-        let mut estimator = PoseEstimator::new(tree.clone(), &Motion::default());
-        let place = |angle: f64| {
-            let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
-            let moved =
-                tree.nodes[1].position + turn * (tree.nodes[2].position - tree.nodes[1].position);
-            let mut targets: Vec<_> = tree.nodes[..3]
-                .iter()
-                .map(|n| Some(tree.image_from_model(&n.position)))
-                .collect();
-            targets[2] = Some(tree.image_from_model(&moved));
-            targets
-        };
-        let first = estimator.step(0, 0.0, &place(0.0));
-        let frame = 1 + frames_missing;
-        let then = estimator.step(frame, frame as f64 / 30.0, &place(0.8));
-        own(&tree, &first, 2)
-            .angle_to(&own(&tree, &then, 2))
-            .to_degrees()
-    };
     assert!(turned_by(0) < 20.001, "{}", turned_by(0));
     assert!(
         (turned_by(3) - 45.8).abs() < 3.0,
@@ -230,61 +234,61 @@ fn after_a_gap_a_branch_may_have_gone_farther() {
     );
 }
 
-/// Figure 6c: a branch whose parent lies along an axis may turn about that axis for ever, a little
-/// in each frame, and eq. 10 does not mind, as the angle to the parent stays the same. The
+/// How far a branch goes from its rest, and how far round its parent, degrees. The trunk leans to
+/// the viewer, so that the near side of a turn about it is seen lower than the far side; tracks
+/// slide round it by 6 degrees a frame, which the bound on steps allows, twice.
+fn spin(max_total: f64) -> (f64, f64) {
+    let lean = 75f64.to_radians();
+    let rest = Unit::new_normalize(Vector3::new(lean.sin(), lean.cos(), 0.0));
+    let mut p = Problem {
+        parent_rotation: UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.6),
+        length: 80.0,
+        target: None,
+        parent_direction: Some(Vector3::y_axis()),
+        rest_direction: rest,
+        previous_direction: rest,
+        sigma_track_px: 1.0,
+        sigma_shape: 0.3,
+        sigma_depth: None,
+        sigma_lean: None,
+        max_step: 20f64.to_radians(),
+        max_total,
+    };
+    let (mut farthest, mut most_round, mut round, mut azimuth) = (0.0_f64, 0.0_f64, 0.0, 0.0_f64);
+    for k in 1..=120 {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -f64::from(k) * TAU / 60.0);
+        let at = p.parent_rotation * (turn * rest.into_inner()) * 80.0;
+        p.target = Some([at.x, at.y]);
+        let d = p.solve();
+        farthest = farthest.max(rest.angle(&d));
+        let now = d.z.atan2(d.x);
+        round += (now - azimuth + 3.0 * PI).rem_euclid(TAU) - PI;
+        most_round = most_round.max(round.abs());
+        azimuth = now;
+        p.previous_direction = d;
+    }
+    (farthest.to_degrees(), most_round.to_degrees())
+}
+
+/// Li 2011 fig. 6c: a branch whose parent lies along an axis may turn about that axis for ever, a
+/// little in each frame, and eq. 10 does not mind, as the angle to the parent stays the same. The
 /// accumulated bound stops it.
 #[test]
 fn the_accumulated_bound_prevents_the_spin_about_the_parent() {
-    let rest = Unit::new_normalize(Vector3::new(
-        75f64.to_radians().sin(),
-        75f64.to_radians().cos(),
-        0.0,
-    ));
-    // The trunk leans to the viewer, so that the near side of a turn about it is seen lower than
-    // the far side; tracks slide round it by 6 degrees a frame, which the bound on steps allows,
-    // twice.
-    let farthest = |max_total: f64| {
-        let mut p = Problem {
-            parent_rotation: UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.6),
-            length: 80.0,
-            target: None,
-            parent_direction: Some(Vector3::y_axis()),
-            rest_direction: rest,
-            previous_direction: rest,
-            sigma_track_px: 1.0,
-            sigma_shape: 0.3,
-            sigma_depth: None,
-            sigma_lean: None,
-            max_step: 20f64.to_radians(),
-            max_total,
-        };
-        let (mut farthest, mut most_round, mut round, mut azimuth) =
-            (0.0_f64, 0.0_f64, 0.0, 0.0_f64);
-        for k in 1..=120 {
-            let turn =
-                UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -f64::from(k) * TAU / 60.0);
-            let at = p.parent_rotation * (turn * rest.into_inner()) * 80.0;
-            p.target = Some([at.x, at.y]);
-            let d = p.solve();
-            farthest = farthest.max(rest.angle(&d));
-            let now = d.z.atan2(d.x);
-            round += (now - azimuth + 3.0 * PI).rem_euclid(TAU) - PI;
-            most_round = most_round.max(round.abs());
-            azimuth = now;
-            p.previous_direction = d;
-        }
-        (farthest.to_degrees(), most_round.to_degrees())
-    };
-    let (angle, round) = farthest(PI);
+    let (angle, round) = spin(PI);
     assert!(
         angle > 110.0 && round > 700.0,
         "without the bound it spins: {angle}, {round} degrees round"
     );
-    let (angle, round) = farthest(70f64.to_radians());
+    let (angle, round) = spin(70f64.to_radians());
     assert!(
         angle <= 70.001 && round < 90.0,
         "with it, it does not: {angle}, {round} degrees round"
     );
+}
+
+fn towards_viewer(angle: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -angle)
 }
 
 /// Depths of the branch's end, as found and as they are, px, and how far it is projected beside,
@@ -293,9 +297,8 @@ fn the_accumulated_bound_prevents_the_spin_about_the_parent() {
 fn swing_to_the_viewer(lean: f64, swing: f64, method: MotionMethod) -> Vec<(f64, f64, f64)> {
     let mut tree = tree();
     let top = tree.nodes[1].position;
-    let towards = |angle: f64| UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -angle);
     let way = tree.nodes[2].position - top;
-    tree.nodes[2].position = top + towards(lean) * way;
+    tree.nodes[2].position = top + towards_viewer(lean) * way;
     let tree = Arc::new(tree);
     let mut estimator = PoseEstimator::new(
         tree.clone(),
@@ -304,8 +307,10 @@ fn swing_to_the_viewer(lean: f64, swing: f64, method: MotionMethod) -> Vec<(f64,
             ..Motion::default()
         },
     );
-    let frame = |k: u64| {
-        let truth = top + towards(lean + swing * 0.5 * (1.0 - (TAU * k as f64 / 60.0).cos())) * way;
+    let mut depths = Vec::new();
+    for k in 0..120 {
+        let swung = swing * 0.5 * (1.0 - (TAU * k as f64 / 60.0).cos());
+        let truth = top + towards_viewer(lean + swung) * way;
         let mut targets: Vec<_> = tree.nodes[..4]
             .iter()
             .map(|n| Some(tree.image_from_model(&n.position)))
@@ -314,13 +319,10 @@ fn swing_to_the_viewer(lean: f64, swing: f64, method: MotionMethod) -> Vec<(f64,
         (targets[2], targets[3]) = (Some(target), None);
         let is = estimator.step(k, k as f64 / 30.0, &targets).joints[2].position;
         let seen = tree.image_from_model(&is);
-        (
-            is.z,
-            truth.z,
-            (seen[0] - target[0]).hypot(seen[1] - target[1]),
-        )
-    };
-    (0..120).map(frame).collect()
+        let beside = (seen[0] - target[0]).hypot(seen[1] - target[1]);
+        depths.push((is.z, truth.z, beside));
+    }
+    depths
 }
 
 /// Seen from the front a branch that swings towards the camera only gets shorter.

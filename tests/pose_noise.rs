@@ -23,9 +23,8 @@ const POINTS: usize = 4;
 /// Share of the observations that are missing.
 const MISSING: f64 = 0.3;
 
-/// Foot, trunk, and two branches at every node up to level [`LEVELS`]: 32 nodes, all measured.
-fn tree() -> Skeleton {
-    let node = |k: usize, parent: Option<usize>, level, position| Node {
+fn node(k: usize, parent: Option<usize>, level: u8, position: Point3<f64>) -> Node {
+    Node {
         name: NodeName(k as u32),
         parent: parent.map(|p| NodeId(p as u32)),
         level,
@@ -36,7 +35,11 @@ fn tree() -> Skeleton {
         copy_of: None,
         plane_angle: 0.0,
         kind: Default::default(),
-    };
+    }
+}
+
+/// Foot, trunk, and two branches at every node up to level [`LEVELS`]: 32 nodes, all measured.
+fn tree() -> Skeleton {
     let mut chance = Chance(3);
     let mut nodes = vec![
         node(0, None, 0, Point3::origin()),
@@ -79,14 +82,12 @@ fn moved(tree: &Skeleton, frame: usize) -> Pose {
             continue;
         };
         let level = f64::from(node.level);
-        let sway = |k: f64| {
-            let (hz, phase) = (
-                0.5 + 0.35 * level + 0.05 * (k * 1.7 + i as f64).sin(),
-                k * 2.1 + i as f64 * 0.9,
-            );
+        let [sway_x, sway_z] = [1.0, 2.0].map(|k| {
+            let hz = 0.5 + 0.35 * level + 0.05 * (k * 1.7 + i as f64).sin();
+            let phase = k * 2.1 + i as f64 * 0.9;
             (TAU * hz * time_s + phase).sin()
-        };
-        let turn = Vector3::new(0.02 * sway(1.0), 0.0, 0.04 * sway(2.0)) * level;
+        });
+        let turn = Vector3::new(0.02 * sway_x, 0.0, 0.04 * sway_z) * level;
         let rotation = joints[parent].rotation * UnitQuaternion::from_scaled_axis(turn);
         let way = node.position - tree.nodes[parent].position;
         joints.push(JointPose {
@@ -122,41 +123,29 @@ fn points(tree: &Skeleton) -> (MotionHierarchy, BTreeMap<TrackId, [f64; 2]>) {
             })
             .collect(),
     };
-    let branches = 1..tree.nodes.len();
-    let ids = |node: usize| (0..POINTS).map(move |k| TrackId((node * POINTS + k) as u32));
-    let inside = |node: usize, of: usize| {
-        std::iter::successors(Some(node), |&n| tree.nodes[n].parent.map(NodeId::index))
-            .any(|n| n == of)
-    };
-    let cluster = |of: usize| Cluster {
-        parent: (of > 1).then(|| ClusterId(tree.nodes[of].parent.unwrap().0 - 1)),
-        level: tree.nodes[of].level - 1,
-        members: branches
-            .clone()
-            .filter(|&n| inside(n, of))
-            .flat_map(ids)
-            .collect(),
-        centroid_px: [0.0; 2],
-        end_px: None,
-        certainty: 1.0,
-    };
-    let place = |(n, k): (usize, usize)| {
-        (
-            TrackId((n * POINTS + k) as u32),
-            on_branch(tree, &rest, n, (k + 1) as f64 / POINTS as f64),
-        )
-    };
-    let places = branches
-        .clone()
-        .flat_map(|n| (0..POINTS).map(move |k| (n, k)))
-        .map(place)
-        .collect();
-    (
-        MotionHierarchy {
-            clusters: branches.clone().map(cluster).collect(),
-        },
-        places,
-    )
+    let (mut clusters, mut places) = (Vec::new(), BTreeMap::new());
+    for n in 1..tree.nodes.len() {
+        clusters.push(Cluster {
+            parent: (n > 1).then(|| ClusterId(tree.nodes[n].parent.unwrap().0 - 1)),
+            level: tree.nodes[n].level - 1,
+            members: Vec::new(),
+            centroid_px: [0.0; 2],
+            end_px: None,
+            certainty: 1.0,
+        });
+        for k in 0..POINTS {
+            let id = TrackId((n * POINTS + k) as u32);
+            let share = (k + 1) as f64 / POINTS as f64;
+            places.insert(id, on_branch(tree, &rest, n, share));
+            // A point is in the cluster of its branch and in those of all branches below.
+            let mut at = n;
+            while at > 0 {
+                clusters[at - 1].members.push(id);
+                at = tree.nodes[at].parent.unwrap().index();
+            }
+        }
+    }
+    (MotionHierarchy { clusters }, places)
 }
 
 fn seen(tree: &Skeleton, truth: &Pose, noise_px: f64, chance: &mut Chance) -> TrackSet {
@@ -243,11 +232,11 @@ fn both(noise_px: f64) -> [Off; 2] {
                 ..Motion::default()
             },
         );
-        let pose = |truth: &Pose| {
+        let mut poses = Vec::with_capacity(truth.len());
+        for truth in &truth {
             let set = seen(&tree, truth, noise_px, &mut chance);
-            estimator.step(set.frame, set.time_s, &binding.targets_px(&set))
-        };
-        let poses: Vec<Pose> = truth.iter().map(pose).collect();
+            poses.push(estimator.step(set.frame, set.time_s, &binding.targets_px(&set)));
+        }
         off(&tree, &poses, &truth)
     })
 }

@@ -300,56 +300,62 @@ fn what_is_no_recording_is_refused_in_words() {
     }
 }
 
+/// A recording by another program: ten pictures on each of the topics.
+fn file_by_another_program(topics: &[&str], compression: Option<mcap::Compression>) -> Vec<u8> {
+    let jpeg = &support::recording()[0].bytes;
+    let mut bytes = Vec::new();
+    let mut writer = mcap::WriteOptions::new()
+        .compression(compression)
+        .create(Cursor::new(&mut bytes))
+        .expect("writer");
+    let schema = writer
+        .add_schema("foxglove.CompressedImage", "protobuf", b"")
+        .expect("schema");
+    for n in 0..10u32 {
+        for topic in topics {
+            let channel = writer
+                .add_channel(schema, topic, "protobuf", &Default::default())
+                .expect("channel");
+            // data = 2, format = 3
+            let mut data = vec![0x12];
+            let mut count = jpeg.len();
+            while count >= 0x80 {
+                data.push(count as u8 | 0x80);
+                count >>= 7;
+            }
+            data.push(count as u8);
+            data.extend(jpeg);
+            data.extend(b"\x1a\x04jpeg");
+            let times = u64::from(n + 1) * 40_000_000;
+            let header = mcap::records::MessageHeader {
+                channel_id: channel,
+                sequence: 0,
+                log_time: times,
+                publish_time: 0,
+            };
+            writer
+                .write_to_known_channel(&header, &data)
+                .expect("message");
+        }
+    }
+    writer.finish().expect("finish");
+    drop(writer);
+    bytes
+}
+
 /// A file by another program: its picture topic is used; where it has two, they are named.
 #[test]
 fn other_programs_files_are_read_or_refused_with_their_topics() {
     let jpeg = &support::recording()[0].bytes;
-    let file = |topics: &[&str], compression: Option<mcap::Compression>| {
-        let mut bytes = Vec::new();
-        let mut writer = mcap::WriteOptions::new()
-            .compression(compression)
-            .create(Cursor::new(&mut bytes))
-            .expect("writer");
-        let schema = writer
-            .add_schema("foxglove.CompressedImage", "protobuf", b"")
-            .expect("schema");
-        for n in 0..10u32 {
-            for topic in topics {
-                let channel = writer
-                    .add_channel(schema, topic, "protobuf", &Default::default())
-                    .expect("channel");
-                // data = 2, format = 3
-                let mut data = vec![0x12];
-                let mut count = jpeg.len();
-                while count >= 0x80 {
-                    data.push(count as u8 | 0x80);
-                    count >>= 7;
-                }
-                data.push(count as u8);
-                data.extend(jpeg);
-                data.extend(b"\x1a\x04jpeg");
-                let times = u64::from(n + 1) * 40_000_000;
-                let header = mcap::records::MessageHeader {
-                    channel_id: channel,
-                    sequence: 0,
-                    log_time: times,
-                    publish_time: 0,
-                };
-                writer
-                    .write_to_known_channel(&header, &data)
-                    .expect("message");
-            }
-        }
-        writer.finish().expect("finish");
-        drop(writer);
-        bytes
-    };
     for compression in [
         None,
         Some(mcap::Compression::Lz4),
         Some(mcap::Compression::Zstd),
     ] {
-        let (_dir, path) = files_with("other.mcap", &file(&["/cam/image"], compression));
+        let (_dir, path) = files_with(
+            "other.mcap",
+            &file_by_another_program(&["/cam/image"], compression),
+        );
         let mut source = source::open(&path, &config::Camera::default(), None).expect("opened");
         assert_eq!(
             (source.describe().frames_total, source.describe().size),
@@ -365,7 +371,10 @@ fn other_programs_files_are_read_or_refused_with_their_topics() {
         );
         assert!((frames[9].sensor_time_s - frames[0].sensor_time_s - 0.36).abs() < 1e-9);
     }
-    let (_dir, path) = files_with("two.mcap", &file(&["/left", "/right"], None));
+    let (_dir, path) = files_with(
+        "two.mcap",
+        &file_by_another_program(&["/left", "/right"], None),
+    );
     let said = refusal(&path);
     assert!(
         said.contains("/left") && said.contains("/right") && said.contains("mcap filter"),
@@ -443,6 +452,23 @@ fn run(source: Box<dyn Source>, out: &Path, record: Option<RecordTo>) -> runtime
     summary.expect("a summary")
 }
 
+/// What `capture.json` says about time.
+fn timing(dir: &Path) -> serde_json::Value {
+    let text = std::fs::read(dir.join("capture.json")).expect("capture.json");
+    serde_json::from_slice::<serde_json::Value>(&text).expect("json")["timing"].clone()
+}
+
+fn message_count(summary: &mcap::Summary, topic: &str) -> u64 {
+    let channel = summary
+        .channels
+        .values()
+        .find(|c| c.topic == topic)
+        .unwrap_or_else(|| panic!("no {topic}"));
+    let statistics = summary.stats.as_ref().expect("statistics");
+    let counts = &statistics.channel_message_counts;
+    counts.get(&channel.id).copied().unwrap_or(0)
+}
+
 /// The run that records and the replay of what it recorded: the same tracks, the same tree, the
 /// same poses, and the camera's losses are losses again.
 #[test]
@@ -469,13 +495,9 @@ fn a_replay_of_a_recording_is_the_run_that_made_it() {
         None,
     );
     for name in ["tracks.csv", "nodes.csv", "motion.csv", "tree.glb"] {
-        let read = |dir: &Path| std::fs::read(dir.join(name)).expect(name);
-        assert!(read(&first) == read(&second), "{name} differs");
+        let [live, again] = [&first, &second].map(|dir| std::fs::read(dir.join(name)));
+        assert!(live.expect(name) == again.expect(name), "{name} differs");
     }
-    let timing = |dir: &Path| {
-        let text = std::fs::read(dir.join("capture.json")).expect("capture.json");
-        serde_json::from_slice::<serde_json::Value>(&text).expect("json")["timing"].clone()
-    };
     assert_eq!(timing(&second)["frames_dropped_camera"], 3);
     assert_eq!(timing(&first)["gaps"], timing(&second)["gaps"]);
     // What was found is in it as well, under the names that viewers know.
@@ -483,22 +505,14 @@ fn a_replay_of_a_recording_is_the_run_that_made_it() {
     let summary = mcap::Summary::read(&bytes)
         .expect("summary")
         .expect("a summary");
-    let counts = summary.stats.expect("statistics").channel_message_counts;
-    let count = |topic: &str| {
-        let channel = summary
-            .channels
-            .values()
-            .find(|c| c.topic == topic)
-            .unwrap_or_else(|| panic!("no {topic}"));
-        counts.get(&channel.id).copied().unwrap_or(0)
-    };
-    assert_eq!(
-        ["/camera/image", "/tree/points", "/tree/tracks"].map(count),
-        [330; 3]
-    );
+    for topic in ["/camera/image", "/tree/points", "/tree/tracks"] {
+        assert_eq!(message_count(&summary, topic), 330, "{topic}");
+    }
     // The tree as it was built, and as it was refined.
-    assert_eq!(["/tree/outline", "/tree/skeleton"].map(count), [1, 2]);
-    assert!(count("/tree/scene") > 80 && count("/tree/scene") == count("/tree/poses"));
+    assert_eq!(message_count(&summary, "/tree/outline"), 1);
+    assert_eq!(message_count(&summary, "/tree/skeleton"), 2);
+    let scenes = message_count(&summary, "/tree/scene");
+    assert!(scenes > 80 && scenes == message_count(&summary, "/tree/poses"));
 }
 
 /// A camera is not made to wait for the disk: what does not fit into the queue is missing, and

@@ -57,47 +57,52 @@ fn along(i: usize) -> f64 {
     0.15 + 0.85 * ((i / 5) as f64 * 0.618_034).fract()
 }
 
+/// Where point `i`, which is on `branch`, is at a time, px.
+fn place_px(i: usize, mut branch: usize, sway: Sway, time_s: f64) -> [f64; 2] {
+    let along = along(i);
+    let (_, joint, tip) = BRANCHES[branch];
+    let mut at = [
+        joint[0] + along * (tip[0] - joint[0]) + 3.0 * noise(i),
+        joint[1] + along * (tip[1] - joint[1]),
+    ];
+    loop {
+        let (parent, joint, _) = BRANCHES[branch];
+        let (sin, cos) = sway(branch, time_s).sin_cos();
+        let d = [at[0] - joint[0], at[1] - joint[1]];
+        if branch == 0 {
+            // A trunk bends: what is higher moves farther, and all to the same side.
+            at[0] -= sin * d[1];
+            return at;
+        }
+        at = [
+            joint[0] + cos * d[0] - sin * d[1],
+            joint[1] + sin * d[0] + cos * d[1],
+        ];
+        branch = parent;
+    }
+}
+
 /// A trunk (0) with three branches, leaving at three heights, to the left, right and left; the
 /// right one (2) has two of its own (3, 4). The points lie along the branches; every point of a
 /// branch turns about its joint, on top of what its parent does. `of` holds each row's branch.
 fn tree(points: usize, sway: Sway, noise_px: f64) -> (TrackTable, Vec<usize>) {
     let times_s: Vec<f64> = (0..150).map(|k| f64::from(k) / 15.0).collect();
     let of: Vec<usize> = (0..points).map(|i| i % 5).collect();
-    let path = |i: usize| {
-        let along = along(i);
-        let (_, joint, tip) = BRANCHES[of[i]];
-        let aside = 3.0 * noise(i);
-        let rest = [
-            joint[0] + along * (tip[0] - joint[0]) + aside,
-            joint[1] + along * (tip[1] - joint[1]),
-        ];
-        let place = |(k, &t): (usize, &f64)| {
-            let (mut at, mut branch) = (rest, of[i]);
-            loop {
-                let (parent, joint, _) = BRANCHES[branch];
-                let (sin, cos) = sway(branch, t).sin_cos();
-                let d = [at[0] - joint[0], at[1] - joint[1]];
-                if branch == 0 {
-                    // A trunk bends: what is higher moves farther, and all to the same side.
-                    at[0] -= sin * d[1];
-                    break;
-                }
-                at = [
-                    joint[0] + cos * d[0] - sin * d[1],
-                    joint[1] + sin * d[0] + cos * d[1],
-                ];
-                branch = parent;
-            }
-            let shake = |c: usize| noise_px * noise(2 * (i * 1000 + k) + c);
+    let mut positions = Vec::with_capacity(points);
+    for i in 0..points {
+        let mut path = Vec::with_capacity(times_s.len());
+        for (k, &time_s) in times_s.iter().enumerate() {
+            let at = place_px(i, of[i], sway, time_s);
+            let shaken = [0, 1].map(|c| at[c] + noise_px * noise(2 * (i * 1000 + k) + c));
             // Now and then a point is not seen.
             let seen = !(i * 31 + k).is_multiple_of(37);
-            seen.then(|| [(at[0] + shake(0)) as f32, (at[1] + shake(1)) as f32])
-        };
-        times_s.iter().enumerate().map(place).collect()
-    };
+            path.push(seen.then_some(shaken.map(|x| x as f32)));
+        }
+        positions.push(path);
+    }
     let table = TrackTable {
         ids: (0..points as u32).map(TrackId).collect(),
-        positions: (0..points).map(path).collect(),
+        positions,
         fb_errors_px: vec![noise_px.max(0.01) as f32; points],
         times_s: times_s.clone(),
     };
@@ -122,8 +127,11 @@ fn assert_sound(tree: &MotionHierarchy, settings: &Hierarchy) {
             c.certainty
         );
         assert!(u32::from(c.level) < settings.levels, "level of {k}");
-        let of_k = |c: &&Cluster| c.parent.is_some_and(|p| p.0 as usize == k);
-        let children: Vec<_> = tree.clusters.iter().filter(of_k).collect();
+        let children: Vec<&Cluster> = tree
+            .clusters
+            .iter()
+            .filter(|c| c.parent.is_some_and(|p| p.0 as usize == k))
+            .collect();
         let most = if settings.affinity == Affinity::Zeng {
             64
         } else {
@@ -153,9 +161,12 @@ fn assert_sound(tree: &MotionHierarchy, settings: &Hierarchy) {
     }
 }
 
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
 /// The way of point `i` from the foot: the branches that it leads along, and how far, px.
 fn way(i: usize, of: &[usize]) -> Vec<(usize, f64)> {
-    let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
     let (mut branch, mut end) = (of[i], None);
     let mut way = Vec::new();
     loop {
@@ -174,6 +185,23 @@ fn way(i: usize, of: &[usize]) -> Vec<(usize, f64)> {
     }
 }
 
+/// How far the ways of two points from the foot run together, px.
+fn shared_px(a: usize, b: usize, of: &[usize]) -> f64 {
+    let mut px = 0.0;
+    for ((x, p), (y, q)) in way(a, of).into_iter().zip(way(b, of)) {
+        px += if x == y { p.min(q) } else { 0.0 };
+        if x != y || p != q {
+            break;
+        }
+    }
+    px
+}
+
+/// How many clusters two points are in together, of those that each is in.
+fn shared_depth(a: &[usize], b: &[usize]) -> usize {
+    a.iter().zip(b).take_while(|(x, y)| x == y).count()
+}
+
 /// Share of triplets whose closest pair, by the way from the foot that it shares, parts last in the
 /// hierarchy; what part at once share the point. Chance is 1/3.
 fn triplets_in_order(tree: &MotionHierarchy, of: &[usize]) -> f64 {
@@ -183,23 +211,6 @@ fn triplets_in_order(tree: &MotionHierarchy, of: &[usize]) -> f64 {
             .iter()
             .for_each(|id| clusters[id.0 as usize].push(k));
     }
-    let depth = |a: usize, b: usize| {
-        clusters[a]
-            .iter()
-            .zip(&clusters[b])
-            .take_while(|(x, y)| x == y)
-            .count()
-    };
-    let shared = |a: usize, b: usize| {
-        let mut px = 0.0;
-        for ((x, p), (y, q)) in way(a, of).into_iter().zip(way(b, of)) {
-            px += if x == y { p.min(q) } else { 0.0 };
-            if x != y || p != q {
-                break;
-            }
-        }
-        px
-    };
     let placed: Vec<usize> = tree.clusters[0]
         .members
         .iter()
@@ -210,13 +221,13 @@ fn triplets_in_order(tree: &MotionHierarchy, of: &[usize]) -> f64 {
     for k in 0..20_000 {
         let [a, b, c] = [k * 7 + k / n, k * 13 + 1, k * 29 + 2].map(|x| placed[x % n]);
         let pairs = [(a, b), (a, c), (b, c)];
-        let ways = pairs.map(|(i, j)| shared(i, j));
+        let ways = pairs.map(|(i, j)| shared_px(i, j, of));
         let mut sorted = ways;
         sorted.sort_by(f64::total_cmp);
         if a == b || a == c || b == c || sorted[2] - sorted[1] < 12.0 {
             continue;
         }
-        let depths = pairs.map(|(i, j)| depth(i, j));
+        let depths = pairs.map(|(i, j)| shared_depth(&clusters[i], &clusters[j]));
         let last = depths.iter().max().expect("three pairs");
         let closest = (0..3)
             .find(|&k| ways[k] == sorted[2])
@@ -249,24 +260,16 @@ fn points_of_a_branch_come_together_after_a_release_and_in_wind() {
             tree.clusters.len()
         );
         // The twigs of the right branch part from each other later than from the left one.
-        let side = |c: &Cluster| {
-            let mut count = [0usize; 5];
-            c.members
-                .iter()
-                .for_each(|id| count[of[id.0 as usize]] += 1);
-            count
-        };
-        let right = tree
-            .clusters
+        let mut counts = vec![[0usize; 5]; tree.clusters.len()];
+        for (count, cluster) in counts.iter_mut().zip(&tree.clusters) {
+            for id in &cluster.members {
+                count[of[id.0 as usize]] += 1;
+            }
+        }
+        let right = counts[1..]
             .iter()
-            .skip(1)
-            .map(side)
             .any(|n| n[3] > 20 && n[4] > 20 && n[1] == 0);
-        assert!(
-            right,
-            "{name}: {:?}",
-            tree.clusters.iter().map(side).collect::<Vec<_>>()
-        );
+        assert!(right, "{name}: {counts:?}");
     }
 }
 
@@ -352,18 +355,22 @@ fn the_same_tracks_give_the_same_tree() {
     assert_eq!(built(&table, &settings), built(&table, &settings));
 }
 
-/// Whatever a tracker may hand over: nothing, one point, points never seen, all in one place, far
-/// outside the picture.
-#[test]
-fn useless_tracks_give_a_small_tree_or_none_and_no_failure() {
-    let times_s: Vec<f64> = (0..30).map(|k| f64::from(k) / 15.0).collect();
-    let place = |kind: usize, i: usize, k: usize| match kind {
+/// Where point `i` is in frame `k`, of five kinds of nonsense.
+fn useless_px(kind: usize, i: usize, k: usize) -> Option<[f32; 2]> {
+    match kind {
         0 => None,
         1 => Some([5.0, 5.0]),
         2 => (k == i).then_some([1.0, 2.0]),
         3 => Some([1e7 + i as f32, k as f32 * 1e6]),
         _ => Some([f32::NAN, f32::INFINITY]),
-    };
+    }
+}
+
+/// Whatever a tracker may hand over: nothing, one point, points never seen, all in one place, far
+/// outside the picture.
+#[test]
+fn useless_tracks_give_a_small_tree_or_none_and_no_failure() {
+    let times_s: Vec<f64> = (0..30).map(|k| f64::from(k) / 15.0).collect();
     for affinity in [Affinity::Path, Affinity::Zeng] {
         let settings = Hierarchy {
             affinity,
@@ -378,7 +385,7 @@ fn useless_tracks_give_a_small_tree_or_none_and_no_failure() {
                         ids: (0..n as u32).map(TrackId).collect(),
                         times_s: times_s[..times].to_vec(),
                         positions: (0..n)
-                            .map(|i| (0..times).map(|k| place(kind, i, k)).collect())
+                            .map(|i| (0..times).map(|k| useless_px(kind, i, k)).collect())
                             .collect(),
                         fb_errors_px: vec![0.0; n],
                     };

@@ -32,35 +32,39 @@ fn outline() -> Outline {
     arborcam::outline::from_polygon(&crown, SIZE).expect("outline")
 }
 
+/// Where point `i` of [`pendulums`] is.
+fn pendulum_px(i: usize, time_s: f64) -> [f32; 2] {
+    let (column, row) = (i % 10 % 5, i / 10);
+    let left = [
+        60.0 + 8.0 * column as f64,
+        60.0 + 12.0 * (row % 2) as f64 + 6.0 * (i % 2) as f64,
+    ];
+    let (rest, hz) = match row {
+        0 | 1 => (left, 1.1),
+        2 | 3 => ([left[0] + 60.0, left[1]], 1.6),
+        _ => ([100.0, 40.0 + 8.0 * (i % 10) as f64], 0.0),
+    };
+    let u = rest[0] + 5.0 * (TAU * hz * time_s).sin();
+    [u as f32, rest[1] as f32]
+}
+
 /// Two pendulums side by side, of 1.1 and 1.6 Hz, 20 points each, and 10 points between them that
 /// stand still.
 fn pendulums() -> TrackTable {
     let times_s: Vec<f64> = (0..90).map(|k| f64::from(k) / 15.0).collect();
-    let path = |i: usize| {
-        let (column, row) = (i % 10 % 5, i / 10);
-        let left = [
-            60.0 + 8.0 * column as f64,
-            60.0 + 12.0 * (row % 2) as f64 + 6.0 * (i % 2) as f64,
-        ];
-        let (rest, hz) = match row {
-            0 | 1 => (left, 1.1),
-            2 | 3 => ([left[0] + 60.0, left[1]], 1.6),
-            _ => ([100.0, 40.0 + 8.0 * (i % 10) as f64], 0.0),
-        };
-        let at = |t: &f64| {
-            Some([
-                (rest[0] + 5.0 * (TAU * hz * t).sin()) as f32,
-                rest[1] as f32,
-            ])
-        };
-        times_s.iter().map(at).collect()
-    };
     TrackTable {
         ids: (0..50).map(TrackId).collect(),
-        positions: (0..50).map(path).collect(),
+        positions: (0..50)
+            .map(|i| times_s.iter().map(|&t| Some(pendulum_px(i, t))).collect())
+            .collect(),
         fb_errors_px: vec![0.02; 50],
         times_s: times_s.clone(),
     }
+}
+
+/// The pendulums that a cluster has points of.
+fn sides(c: &Cluster) -> BTreeSet<u32> {
+    c.members.iter().map(|id| id.0 / 20).collect()
 }
 
 #[test]
@@ -78,16 +82,10 @@ fn what_moves_differently_is_cut_apart_and_what_stands_still_takes_no_part() {
         [100.0, 230.0],
         &config::Hierarchy::default(),
     );
-    let side = |c: &Cluster| {
-        c.members
-            .iter()
-            .map(|id| id.0 / 20)
-            .collect::<BTreeSet<u32>>()
-    };
     let first: Vec<&Cluster> = tree.clusters.iter().filter(|c| c.level == 1).collect();
     assert_eq!(first.len(), 2);
     assert!(
-        first.iter().all(|c| side(c).len() == 1),
+        first.iter().all(|c| sides(c).len() == 1),
         "the first cut goes between the pendulums: {first:?}"
     );
     for (k, c) in tree.clusters.iter().enumerate().skip(1) {
@@ -139,21 +137,23 @@ fn flat() -> Vec<Node2d> {
 #[test]
 fn the_skeleton_is_folded_by_two_fifths_and_stands_on_the_foot() {
     let nodes = flat();
-    let near = |i: usize, at: [f64; 2]| {
+    assert_eq!(nodes.len(), 8);
+    let expected = [
+        [100.0, 230.0],
+        // Root to tip, towards the parent where that has gone: 130 + 0.4 * (230 - 130) = 170.
+        [100.0, 170.0],
+        [82.0, 122.0],
+        [118.0, 122.0],
+        // Tips stay, lest the tree shrinks.
+        [55.0, 70.0],
+    ];
+    for (i, at) in expected.into_iter().enumerate() {
         let p = nodes[i].position_px;
         assert!(
             (p[0] - at[0]).hypot(p[1] - at[1]) < 1e-9,
             "node {i} is at {p:?} and not at {at:?}"
         );
-    };
-    assert_eq!(nodes.len(), 8);
-    near(0, [100.0, 230.0]);
-    // Root to tip, towards the parent where that has gone: 130 + 0.4 * (230 - 130) = 170.
-    near(1, [100.0, 170.0]);
-    near(2, [82.0, 122.0]);
-    near(3, [118.0, 122.0]);
-    // Tips stay, lest the tree shrinks.
-    near(4, [55.0, 70.0]);
+    }
     assert!(
         nodes
             .iter()
@@ -246,8 +246,8 @@ fn pushing_brings_the_tree_nearer_to_its_envelope() {
         &envelope,
         settings.planes,
     );
-    let distance =
-        |tree: &Skeleton| shape::envelope_distance(tree, &envelope, settings.attractors as usize);
+    let attractors = settings.attractors as usize;
+    let before = shape::envelope_distance(&prototype, &envelope, attractors);
     for terms in [
         Terms::Both {
             weight: 1.0,
@@ -258,7 +258,8 @@ fn pushing_brings_the_tree_nearer_to_its_envelope() {
     ] {
         let mut pushed = prototype.clone();
         shape::push(&mut pushed, &trunk, &envelope, &settings, terms);
-        assert!(distance(&pushed) < distance(&prototype), "{terms:?}");
+        let after = shape::envelope_distance(&pushed, &envelope, attractors);
+        assert!(after < before, "{terms:?}");
     }
 }
 
@@ -267,14 +268,15 @@ fn pushing_brings_the_tree_nearer_to_its_envelope() {
 fn swung(tree: &Skeleton, axis: Vector3<f64>, angle: f64) -> Vec<Point3<f64>> {
     let turn = Rotation3::from_axis_angle(&Unit::new_normalize(axis), angle);
     let top = tree.nodes[1].position;
-    let moved = |n: &arborcam::model::Node| {
-        if n.level < 2 {
-            n.position
+    let mut places = Vec::new();
+    for node in &tree.nodes[..tree.measured()] {
+        places.push(if node.level < 2 {
+            node.position
         } else {
-            top + turn * (n.position - top)
-        }
-    };
-    tree.nodes[..tree.measured()].iter().map(moved).collect()
+            top + turn * (node.position - top)
+        });
+    }
+    places
 }
 
 fn seen(tree: &Skeleton, at: &[Point3<f64>]) -> Vec<Option<[f64; 2]>> {
@@ -288,32 +290,28 @@ fn settings(method: config::MotionMethod) -> config::Motion {
     }
 }
 
+/// Where node `i` is seen in frame `k`, if it is: jumping about, and missing in every fifth.
+fn wild_px(tree: &Skeleton, i: usize, k: u64) -> Option<[f64; 2]> {
+    let [du, dv] = [1.3, 2.1].map(|a| 60.0 * (i as f64 * 3.7 + k as f64 * a).sin());
+    let [u, v] = tree.image_from_model(&tree.nodes[i].position);
+    (!(i as u64 + k).is_multiple_of(5)).then_some([u + du, v + dv])
+}
+
 #[test]
 fn branches_keep_their_lengths_whatever_is_seen() {
     let tree = Arc::new(built());
-    let length = |at: &dyn Fn(usize) -> Point3<f64>, i: usize| {
-        tree.nodes[i]
-            .parent
-            .map_or(0.0, |p| (at(i) - at(p.index())).norm())
-    };
     for method in [
         config::MotionMethod::Probabilistic,
         config::MotionMethod::Deterministic,
     ] {
         let mut estimator = PoseEstimator::new(tree.clone(), &settings(method));
         for k in 0..40u64 {
-            let wild = |i: usize| {
-                let jump = |a: f64| 60.0 * ((i as f64 * 3.7 + k as f64 * a).sin());
-                let [u, v] = tree.image_from_model(&tree.nodes[i].position);
-                (!(i as u64 + k).is_multiple_of(5)).then_some([u + jump(1.3), v + jump(2.1)])
-            };
-            let targets: Vec<_> = (0..tree.measured()).map(wild).collect();
+            let targets: Vec<_> = (0..tree.measured()).map(|i| wild_px(&tree, i, k)).collect();
             let pose = estimator.step(k, k as f64 / 30.0, &targets);
             for i in 1..tree.nodes.len() {
-                let (is, was) = (
-                    length(&|j| pose.joints[j].position, i),
-                    length(&|j| tree.nodes[j].position, i),
-                );
+                let parent = tree.nodes[i].parent.expect("a parent").index();
+                let is = (pose.joints[i].position - pose.joints[parent].position).norm();
+                let was = (tree.nodes[i].position - tree.nodes[parent].position).norm();
                 assert!(
                     (is - was).abs() < 1e-6 * was.max(1.0),
                     "{method:?}, frame {k}, branch {i}: {was} became {is}"
@@ -380,9 +378,9 @@ fn a_swing_towards_the_camera_is_recovered() {
         let truth = swung(&tree, Vector3::x(), 0.5 * (TAU * k as f64 / 80.0).sin());
         let pose = estimator.step(k, k as f64 / 30.0, &seen(&tree, &truth));
         if k == 20 {
-            let depth = |p: &Point3<f64>, i: usize| p.z - tree.nodes[i].position.z;
             for i in (1..tree.measured()).filter(|&i| tree.nodes[i].level == 2) {
-                let (found, true_depth) = (depth(&pose.joints[i].position, i), depth(&truth[i], i));
+                let rest = tree.nodes[i].position.z;
+                let (found, true_depth) = (pose.joints[i].position.z - rest, truth[i].z - rest);
                 assert!(
                     true_depth > 10.0 && (found / true_depth - 1.0).abs() < 0.4,
                     "node {i}: {found:.1} of {true_depth:.1} px"

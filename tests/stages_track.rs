@@ -1,7 +1,7 @@
 //! Following points, on pictures whose motion is known.
 
 use arborcam::config::{Accumulate, Detect, Track};
-use arborcam::hierarchy::{self, evidence};
+use arborcam::hierarchy::{self, Evidence, evidence};
 use arborcam::model::{
     Frame, LONGEST_TRIAL_S, Luma, Observation, Size, TrackId, TrackLog, TrackSet,
 };
@@ -18,24 +18,26 @@ const SIZE: Size = Size {
 
 /// Brightness of a smooth random texture anywhere, also between pixels.
 fn texture(u: f64, v: f64) -> f64 {
-    let wave = |k: usize| {
-        let share = |a: f64| (k as f64 * a).fract();
-        // Structure of all sizes, as in a photograph: a pyramid of pictures needs the large ones,
-        // too.
-        let (angle, length) = (TAU * share(0.618), 7.0 * 1.19f64.powi(k as i32));
-        (TAU * (u * angle.cos() + v * angle.sin()) / length + TAU * share(0.569)).sin()
-    };
-    128.0 + 16.0 * (1..=16).map(wave).sum::<f64>()
+    128.0 + 16.0 * (1..=16).map(|k| wave(k, u, v)).sum::<f64>()
+}
+
+/// One of the waves of [`texture`]. Structure of all sizes, as in a photograph: a pyramid of
+/// pictures needs the large ones, too.
+fn wave(k: i32, u: f64, v: f64) -> f64 {
+    let [direction, phase] = [0.618, 0.569].map(|a| TAU * (f64::from(k) * a).fract());
+    let length = 7.0 * 1.19f64.powi(k);
+    (TAU * (u * direction.cos() + v * direction.sin()) / length + phase).sin()
 }
 
 /// Picture `k`, brightness by place.
 fn frame(k: u64, at: impl Fn(f64, f64) -> f64) -> Frame {
-    let pixel = |i: u32| {
-        at(f64::from(i % SIZE.width), f64::from(i / SIZE.width))
-            .round()
-            .clamp(0.0, 255.0) as u8
-    };
-    let pixels = (0..SIZE.width * SIZE.height).map(pixel).collect();
+    let mut pixels = Vec::with_capacity(SIZE.area());
+    for v in 0..SIZE.height {
+        for u in 0..SIZE.width {
+            let brightness = at(f64::from(u), f64::from(v));
+            pixels.push(brightness.round().clamp(0.0, 255.0) as u8);
+        }
+    }
     let luma = Luma { size: SIZE, pixels };
     Frame {
         index: k,
@@ -192,6 +194,10 @@ fn the_choice_of_points_waits_for_wind() {
     );
 }
 
+fn on_small_tree(p: &[f64; 2]) -> bool {
+    (110.0..170.0).contains(&p[0]) && (90.0..150.0).contains(&p[1])
+}
+
 /// The whole picture for an outline, and a small tree: its points are few of all, but enough to
 /// build from, and the choice must not wait for the wall behind it to move.
 #[test]
@@ -202,25 +208,21 @@ fn a_small_tree_in_a_wide_outline_stirs_too() {
         ..Detect::default()
     };
     let mut tracker = Tracker::new(&detect, &Track::default(), &whole(SIZE), 0);
-    let tree = |u: f64, v: f64| (110.0..170.0).contains(&u) && (90.0..150.0).contains(&v);
     let mut decided_s = None;
     for k in 0..100u64 {
         let time_s = k as f64 / 10.0;
         let du = 5.0 * (TAU * time_s / 2.0).sin();
-        let at = |u: f64, v: f64| {
-            if tree(u, v) {
+        let picture = frame(k, |u, v| {
+            if on_small_tree(&[u, v]) {
                 texture(u - du, v)
             } else {
                 texture(u, v)
             }
-        };
-        let set = tracker.step(&Frame {
-            time_s,
-            ..frame(k, at)
         });
+        let set = tracker.step(&Frame { time_s, ..picture });
         let seen = places(&set);
         if k == 0 {
-            let inside = seen.values().filter(|p| tree(p[0], p[1])).count();
+            let inside = seen.values().filter(|p| on_small_tree(p)).count();
             assert!(
                 inside >= 20 && 12 * inside < seen.len(),
                 "{inside} of {}",
@@ -229,7 +231,7 @@ fn a_small_tree_in_a_wide_outline_stirs_too() {
         }
         if decided_s.is_none() && set.observations.iter().all(|o| o.confirmed) {
             decided_s = Some(time_s);
-            let inside = seen.values().filter(|p| tree(p[0], p[1])).count();
+            let inside = seen.values().filter(|p| on_small_tree(p)).count();
             assert!(inside >= 10, "{inside} of the tree's points are left");
         }
     }
@@ -266,35 +268,41 @@ fn points_that_hardly_move_pass_their_trial_by_time() {
     );
 }
 
-/// A bird flies by: who is behind it is not reported, and has its old name afterwards.
+/// Whether a place is behind the bird, so far from its edge, px.
+fn behind_bird(p: &[f64; 2], inside_px: f64) -> bool {
+    (110.0 + inside_px..170.0 - inside_px).contains(&p[0])
+        && (80.0 + inside_px..140.0 - inside_px).contains(&p[1])
+}
+
+/// A bird flies by: a point behind it is not reported, and has its old name afterwards.
 #[test]
 fn hidden_points_come_back_with_their_names_in_the_right_place() {
     let mut tracker = tracker();
-    let hidden = |u: f64, v: f64| (110.0..170.0).contains(&u) && (80.0..140.0).contains(&v);
-    let middle = |p: &[f64; 2]| (122.0..158.0).contains(&p[0]) && (92.0..128.0).contains(&p[1]);
     let mut first = BTreeMap::new();
     let mut seen_behind = 0;
     for k in 0..40 {
         let [du, dv] = shift(k);
         let covered = (10..16).contains(&k);
-        let at = |u: f64, v: f64| match covered && hidden(u, v) {
-            true => 40.0,
-            false => texture(u - du, v - dv),
-        };
-        let now = places(&tracker.step(&frame(k, at)));
+        let now = places(&tracker.step(&frame(k, |u, v| {
+            if covered && behind_bird(&[u, v], 0.0) {
+                40.0
+            } else {
+                texture(u - du, v - dv)
+            }
+        })));
         if k == 0 {
             first.clone_from(&now);
         }
         if k == 13 {
-            seen_behind = now.values().filter(|p| middle(p)).count();
+            seen_behind = now.values().filter(|p| behind_bird(p, 12.0)).count();
         }
         if k == 39 {
-            let behind: Vec<_> = first.iter().filter(|(_, p)| middle(p)).collect();
-            let back = |(id, from): &&(&TrackId, &[f64; 2])| {
-                now.get(id)
+            let behind: Vec<_> = first.iter().filter(|(_, p)| behind_bird(p, 12.0)).collect();
+            let back = behind.iter().filter(|(id, from)| {
+                now.get(*id)
                     .is_some_and(|at| (at[0] - from[0] - du).hypot(at[1] - from[1] - dv) < 0.3)
-            };
-            let n = behind.iter().filter(back).count();
+            });
+            let n = back.count();
             assert!(
                 behind.len() >= 2 && 2 * n >= behind.len(),
                 "{n} of {} points came back",
@@ -343,34 +351,34 @@ fn names_are_never_given_twice() {
     assert_eq!(births, last.len() as u64);
 }
 
+/// Point `i` of [`log`] in frame `k`.
+fn observation(i: u32, k: u64, amplitude_px: f64) -> Observation {
+    let [noise_u, noise_v] = [78.233, 39.425]
+        .map(|a| 0.1 * ((f64::from(i) * 12.9898 + k as f64 * a).sin() * 43758.5453).fract());
+    // Higher points sway more, and each row a little later.
+    let (row, column) = (f64::from(i / 6), f64::from(i % 6));
+    let phase = TAU * (k as f64 / 30.0) / 1.7 + 0.4 * row;
+    let sway = amplitude_px * (0.3 + row / 9.0) * phase.sin();
+    Observation {
+        id: TrackId(i),
+        u_px: (40.0 * column + sway + noise_u) as f32,
+        v_px: (20.0 * row + noise_v) as f32,
+        fb_error_px: 0.05,
+        error_px: Some(0.1),
+        confirmed: true,
+    }
+}
+
 /// A log of 60 points that sway by `amplitude_px`, each measured with an error of about 0.05
 /// px.
 fn log(amplitude_px: f64, seconds: f64) -> TrackLog {
     let mut log = TrackLog::new(20.0);
     for k in 0..(30.0 * seconds) as u64 {
         let time_s = k as f64 / 30.0;
-        let at = |i: u32| {
-            let noise =
-                |a: f64| 0.1 * ((f64::from(i) * 12.9898 + k as f64 * a).sin() * 43758.5453).fract();
-            // Higher points sway more, and each row a little later.
-            let (row, column) = (i / 6, i % 6);
-            let sway = amplitude_px
-                * (0.3 + f64::from(row) / 9.0)
-                * (TAU * time_s / 1.7 + 0.4 * f64::from(row)).sin();
-            Observation {
-                id: TrackId(i),
-                u_px: (40.0 * f64::from(column) + sway + noise(78.233)) as f32,
-                v_px: (20.0 * f64::from(row) + noise(39.425)) as f32,
-                fb_error_px: 0.05,
-                error_px: Some(0.1),
-                confirmed: true,
-            }
-        };
-        let observations = (0..60).map(at).collect();
         log.push(TrackSet {
             frame: k,
             time_s,
-            observations,
+            observations: (0..60).map(|i| observation(i, k, amplitude_px)).collect(),
             lost: 0,
             born: 0,
             rejected: Vec::new(),
@@ -379,14 +387,13 @@ fn log(amplitude_px: f64, seconds: f64) -> TrackLog {
     log
 }
 
+fn measure(amplitude_px: f64, seconds: f64) -> Evidence {
+    let log = log(amplitude_px, seconds);
+    evidence(&hierarchy::table(log.all()), &Accumulate::default())
+}
+
 #[test]
 fn the_accumulation_measure_grows_with_motion_and_stays_low_on_noise() {
-    let measure = |amplitude_px: f64, seconds: f64| {
-        evidence(
-            &hierarchy::table(log(amplitude_px, seconds).all()),
-            &Accumulate::default(),
-        )
-    };
     let noise = measure(0.0, 6.0);
     assert!(noise.measure < 0.02 && noise.moving.is_empty(), "{noise:?}");
     let growing: Vec<f64> = [0.5, 1.5, 4.0, 10.0]

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 const SHORTEST_PX: f64 = 1e-6;
 
 /// The angle between the branch that ends in `node` and its parent branch in every pose, degrees:
-/// that of Zhang et al. (seed 002, eq. 1) in the picture's plane, where it is measured, and signed,
+/// that of Hu et al. eq. 1 in the picture's plane, where it is measured, and signed,
 /// counterclockwise for the viewer. It is continuous in time, so that it may leave ±180°.
 ///
 /// The parent branch is the nearest one below that has a length in the picture at rest; upright,
@@ -68,8 +68,9 @@ impl AngleToParent {
 }
 
 /// The same angle in space: how far the branch has turned from where its carrier would have taken
-/// it, degrees, signed along the direction in which it sways most. Unlike the arc cosine of 002 eq.
-/// 1 it tells the two sides of a branch that goes on straight. NaN for poses of another skeleton.
+/// it, degrees, signed along the direction in which it sways most. Unlike the arc cosine of Hu et
+/// al. eq. 1 it tells the two sides of a branch that goes on straight. NaN for poses of another
+/// skeleton.
 pub fn angle_in_space_deg(skeleton: &Skeleton, poses: &[Pose], node: NodeId) -> Vec<f64> {
     let Some(parent) = skeleton.ancestors(node).next() else {
         return vec![f64::NAN; poses.len()];

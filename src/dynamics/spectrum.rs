@@ -49,9 +49,9 @@ pub fn spectrum(times_s: &[f64], values: &[f64]) -> Option<Spectrum> {
 
 impl Spectrum {
     /// Frequency (Hz) of the largest peak within `[lowest, highest]` and its half-power damping
-    /// ratio: width of the peak at 1/√2 of its amplitude over twice its frequency (002 eq. 6). The
-    /// width of a short film's bin comes on top of the tree's, so that it errs to the high side.
-    /// `None` where there is no peak, or one that does not come down.
+    /// ratio: width of the peak at 1/√2 of its amplitude over twice its frequency
+    /// (Hu et al. eq. 6). The width of a short film's bin comes on top of the tree's, so that it
+    /// errs to the high side. `None` where there is no peak, or one that does not come down.
     pub fn half_power(&self, [lowest_hz, highest_hz]: [f64; 2]) -> Option<(f64, f64)> {
         let a = &self.amplitude;
         let last = ((highest_hz / self.bin_hz) as usize).min(a.len().saturating_sub(2));

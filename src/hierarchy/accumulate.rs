@@ -1,9 +1,10 @@
 //! When enough motion has been seen to build the tree, judged from the tracks alone.
 
+use super::rest::distance_sq;
 use super::signals::Signals;
 use crate::config::Accumulate;
 use crate::model::TrackTable;
-use crate::signal::along_principal_direction;
+use crate::signal::{along_principal_direction, median};
 
 /// Rate at which tracks are compared, Hz: velocities over longer steps stand out better from
 /// tracking noise.
@@ -59,9 +60,9 @@ pub fn evidence(table: &TrackTable, settings: &Accumulate) -> Evidence {
             ..Evidence::default()
         };
     }
-    let mut of_moving: Vec<f64> = moving.iter().map(|&i| snr[i]).collect();
-    of_moving.sort_unstable_by(f64::total_cmp);
-    let motion = 1.0 - (-of_moving[of_moving.len() / 2] / SNR_SCALE).exp();
+    let of_moving = moving.iter().map(|&i| snr[i]).collect();
+    let median_snr = median(of_moving, f64::total_cmp).unwrap_or(0.0);
+    let motion = 1.0 - (-median_snr / SNR_SCALE).exp();
     let stability = stability(table, &moving);
     let sway = 1.0 - (-sways(table, &moving) / SWAYS_SCALE).exp();
     let enough = (moving.len() as f64 / ENOUGH_MOVING).min(1.0);
@@ -76,18 +77,18 @@ pub fn evidence(table: &TrackTable, settings: &Accumulate) -> Evidence {
 
 /// Root mean square distance of a track from its mean position, px.
 fn displacement_px(table: &TrackTable, row: usize) -> f64 {
-    let seen = || table.positions[row].iter().flatten();
-    let n = seen().count() as f64;
+    let seen: Vec<[f64; 2]> = table.positions[row]
+        .iter()
+        .flatten()
+        .map(|p| p.map(f64::from))
+        .collect();
+    let n = seen.len() as f64;
     if n < 4.0 {
         return 0.0;
     }
-    let mean = |c: usize| seen().map(|p| f64::from(p[c])).sum::<f64>() / n;
-    let (mu, mv) = (mean(0), mean(1));
-    (seen()
-        .map(|p| (f64::from(p[0]) - mu).powi(2) + (f64::from(p[1]) - mv).powi(2))
-        .sum::<f64>()
-        / n)
-        .sqrt()
+    let mean = [0, 1].map(|c| seen.iter().map(|p| p[c]).sum::<f64>() / n);
+    let sum_sq: f64 = seen.iter().map(|&p| distance_sq(p, mean)).sum();
+    (sum_sq / n).sqrt()
 }
 
 /// What tracking itself admits: the median forward-backward error, not less than the floor.
@@ -118,25 +119,26 @@ fn sways(table: &TrackTable, moving: &[usize]) -> f64 {
     f64::from(crossings) / 2.0
 }
 
+/// Correlation of the affinities by the even blocks of time with those by the odd ones, 0 to 1.
 fn stability(table: &TrackTable, moving: &[usize]) -> f64 {
     let stride = moving.len().div_ceil(COMPARED);
     let some: Vec<usize> = moving.iter().copied().step_by(stride).collect();
-    let start_s = table.times_s.first().copied().unwrap_or(0.0);
-    let half = |k: usize| (((table.times_s[k] - start_s) / BLOCK_S) as u64).is_multiple_of(2);
-    let (even, odd) = (
-        Signals::velocities(table, &some, half),
-        Signals::velocities(table, &some, |k| !half(k)),
-    );
-    let pairs = (0..some.len()).flat_map(|a| (a + 1..some.len()).map(move |b| (a, b)));
-    let (x, y): (Vec<f64>, Vec<f64>) = pairs
-        .map(|(a, b)| {
-            (
-                f64::from(even.correlation(a, b)),
-                f64::from(odd.correlation(a, b)),
-            )
-        })
-        .unzip();
-    pearson(&x, &y).max(0.0)
+    let even = Signals::velocities(table, &some, |k| in_even_block(table, k));
+    let odd = Signals::velocities(table, &some, |k| !in_even_block(table, k));
+    let (mut by_even, mut by_odd) = (Vec::new(), Vec::new());
+    for a in 0..some.len() {
+        for b in a + 1..some.len() {
+            by_even.push(f64::from(even.correlation(a, b)));
+            by_odd.push(f64::from(odd.correlation(a, b)));
+        }
+    }
+    pearson(&by_even, &by_odd).max(0.0)
+}
+
+/// Whether a frame of the table is in the first, third, ... block of time.
+fn in_even_block(table: &TrackTable, frame: usize) -> bool {
+    let since_start_s = table.times_s[frame] - table.times_s[0];
+    ((since_start_s / BLOCK_S) as u64).is_multiple_of(2)
 }
 
 fn pearson(x: &[f64], y: &[f64]) -> f64 {

@@ -2,33 +2,37 @@
 
 use super::rest::distance_sq;
 use super::signals::Signals;
+use crate::signal::median;
 
-/// Points around a point that are asked whether it moves as they do.
+/// Points around a point with which its motion is compared.
 const NEIGHBOURS: usize = 8;
 
 /// Indices of the points that move as those around them do: in the median their correlation with
 /// the [`NEIGHBOURS`] nearest is at least `agreement`. The others slid along a branch, hang on the
 /// background or on two layers at once; where they were put would be chance.
 pub fn in_agreement(velocities: &Signals, rest_px: &[[f64; 2]], agreement: f64) -> Vec<usize> {
-    let n = rest_px.len();
-    let agrees = |i: &usize| {
-        let mut others: Vec<usize> = (0..n).filter(|j| j != i).collect();
-        let nearer = |a: &usize, b: &usize| {
-            distance_sq(rest_px[*i], rest_px[*a])
-                .total_cmp(&distance_sq(rest_px[*i], rest_px[*b]))
-                .then(a.cmp(b))
-        };
-        if others.len() > NEIGHBOURS {
-            others.select_nth_unstable_by(NEIGHBOURS - 1, nearer);
-            others.truncate(NEIGHBOURS);
+    let mut kept = Vec::new();
+    for point in 0..rest_px.len() {
+        let near = nearest(rest_px, point);
+        let correlations = near.iter().map(|&j| velocities.correlation(point, j));
+        let middle = median(correlations.collect(), f32::total_cmp);
+        if middle.is_some_and(|rho| f64::from(rho) >= agreement) {
+            kept.push(point);
         }
-        let mut near: Vec<f32> = others
-            .iter()
-            .map(|&j| velocities.correlation(*i, j))
-            .collect();
-        near.sort_unstable_by(f32::total_cmp);
-        near.get(near.len() / 2)
-            .is_some_and(|&median| f64::from(median) >= agreement)
-    };
-    (0..n).filter(agrees).collect()
+    }
+    kept
+}
+
+/// The [`NEIGHBOURS`] points nearest to `point`, in any order; all others where there are fewer.
+fn nearest(rest_px: &[[f64; 2]], point: usize) -> Vec<usize> {
+    let mut others: Vec<usize> = (0..rest_px.len()).filter(|&j| j != point).collect();
+    if others.len() > NEIGHBOURS {
+        others.select_nth_unstable_by(NEIGHBOURS - 1, |&a, &b| {
+            distance_sq(rest_px[point], rest_px[a])
+                .total_cmp(&distance_sq(rest_px[point], rest_px[b]))
+                .then(a.cmp(&b))
+        });
+        others.truncate(NEIGHBOURS);
+    }
+    others
 }

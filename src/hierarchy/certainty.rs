@@ -1,6 +1,6 @@
-//! How sure it is that two parts of a tree move apart.
+//! Certainty that the two halves of a part of the dendrogram move differently.
 
-use super::binary::Binary;
+use super::dendrogram::Dendrogram;
 use super::signals::Signals;
 
 /// Time over which one vote is taken, s: longer than the slowest tracking error, shorter than most
@@ -10,64 +10,76 @@ const VOTE_S: f64 = 1.0;
 /// points apart, the best split found among very many stands out by up to so many.
 const CHANCE_ERRORS: f64 = 3.0;
 
-/// For every part of `tree` how sure it is that its halves move apart, 0 to 1; 0 for one without
-/// halves, or with a half of one point, of which nothing can be said.
+/// For every part of `tree` the certainty that its halves move differently, 0 to 1; 0 for one
+/// without halves, or with a half of one point, of which nothing can be said.
 ///
-/// In every second that was seen the points of the halves are more like each other within the
-/// halves than across, or not. With t the mean of that contrast over its standard error, it is t^2
-/// / (t^2 + 9) for positive t: 0.5 where chance alone might give the same, 0.8 at twice as many
-/// standard errors.
-pub fn certainties(tree: &Binary, signals: &Signals, times_s: &[f64]) -> Vec<f32> {
+/// In every second that was seen the points of the halves are more alike within the halves than
+/// across, or not. With t the mean of that contrast over its standard error, it is t^2 / (t^2 + 9)
+/// for positive t: 0.5 where chance alone might give the same, 0.8 at twice as many standard
+/// errors.
+pub fn certainties(tree: &Dendrogram, signals: &Signals, times_s: &[f64]) -> Vec<f32> {
     let votes = Votes::new(times_s, signals.steps());
     let mut sums: Vec<Option<Sums>> = vec![None; tree.parts.len()];
     let mut certain = vec![0.0; tree.parts.len()];
     for (k, part) in tree.parts.iter().enumerate().rev() {
-        let Some(halves) = part.halves else {
-            let mut sum = vec![[0.0f32; 2]; signals.steps()];
-            let mut own = vec![0.0f32; votes.count];
-            for &i in tree.points(k) {
-                let unit = signals.unit(i);
-                own.iter_mut()
-                    .zip(votes.products(&unit, &unit))
-                    .for_each(|(o, e)| *o += e);
-                add(&mut sum, &unit);
-            }
-            sums[k] = Some((sum, own));
+        let Some([a, b]) = part.halves else {
+            sums[k] = Some(Sums::of(tree.points(k), signals, &votes));
             continue;
         };
         // Each part is a half of one other only, so that what it kept is used up here.
-        let (Some((mut a, mut own_a)), Some((b, own_b))) =
-            (sums[halves[0]].take(), sums[halves[1]].take())
-        else {
+        let (Some(mut in_a), Some(in_b)) = (sums[a].take(), sums[b].take()) else {
             continue;
         };
-        let [n_a, n_b] = halves.map(|h| tree.parts[h].len() as f32);
-        if n_a > 1.0 && n_b > 1.0 {
-            let within = |sum: &[[f32; 2]], own: &[f32], n: f32| -> Vec<f32> {
-                votes
-                    .products(sum, sum)
-                    .iter()
-                    .zip(own)
-                    .map(|(all, own)| (all - own) / (n * (n - 1.0)))
-                    .collect()
-            };
-            let (in_a, in_b) = (within(&a, &own_a, n_a), within(&b, &own_b, n_b));
-            let across = votes.products(&a, &b);
-            let contrast = (0..votes.count)
-                .map(|v| f64::from((in_a[v] + in_b[v]) / 2.0 - across[v] / (n_a * n_b)))
-                .collect::<Vec<f64>>();
-            certain[k] = certainty(&contrast);
+        if in_a.points > 1.0 && in_b.points > 1.0 {
+            certain[k] = certainty(&votes.contrast(&in_a, &in_b));
         }
-        add(&mut a, &b);
-        own_a.iter_mut().zip(&own_b).for_each(|(x, y)| *x += y);
-        sums[k] = Some((a, own_a));
+        in_a.add(&in_b);
+        sums[k] = Some(in_a);
     }
     certain
 }
 
-/// Sum of the motion of a part's points, step by step, and of their energies, vote by vote.
-type Sums = (Vec<[f32; 2]>, Vec<f32>);
+/// Sums over the points of a part.
+#[derive(Clone)]
+struct Sums {
+    /// Number of points.
+    points: f32,
+    /// Of their motion, step by step.
+    motion: Vec<[f32; 2]>,
+    /// Of their energies, vote by vote.
+    energy: Vec<f32>,
+}
 
+impl Sums {
+    fn of(points: &[usize], signals: &Signals, votes: &Votes) -> Self {
+        let mut sums = Self {
+            points: 0.0,
+            motion: vec![[0.0; 2]; signals.steps()],
+            energy: vec![0.0; votes.count],
+        };
+        for &point in points {
+            let motion = signals.unit(point);
+            sums.add(&Self {
+                points: 1.0,
+                energy: votes.products(&motion, &motion),
+                motion,
+            });
+        }
+        sums
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.points += other.points;
+        for (sum, more) in self.motion.iter_mut().zip(&other.motion) {
+            *sum = [sum[0] + more[0], sum[1] + more[1]];
+        }
+        for (sum, more) in self.energy.iter_mut().zip(&other.energy) {
+            *sum += more;
+        }
+    }
+}
+
+/// t^2 / (t^2 + 9) of one contrast per vote.
 fn certainty(contrast: &[f64]) -> f32 {
     let n = contrast.len() as f64;
     if n < 2.0 {
@@ -82,12 +94,6 @@ fn certainty(contrast: &[f64]) -> f32 {
     } else {
         1.0
     }
-}
-
-fn add(sum: &mut [[f32; 2]], more: &[[f32; 2]]) {
-    sum.iter_mut()
-        .zip(more)
-        .for_each(|(s, m)| *s = [s[0] + m[0], s[1] + m[1]]);
 }
 
 /// The steps dealt to the votes.
@@ -107,17 +113,35 @@ impl Votes {
         );
         let span_s = end_s - start_s;
         let spans = (span_s / VOTE_S).floor().max(2.0);
-        let (mut count, mut last) = (0, None);
-        let of = |&time_s: &f64| {
+        let (mut of_step, mut count, mut last) = (Vec::with_capacity(steps), 0, None);
+        for time_s in times_s.iter().take(steps) {
             let span = ((time_s - start_s) * spans / span_s).clamp(0.0, spans - 1.0) as u64;
             count += usize::from(last != Some(span));
             last = Some(span);
-            count.max(1) - 1
-        };
-        Self {
-            of_step: times_s.iter().take(steps).map(of).collect(),
-            count,
+            of_step.push(count - 1);
         }
+        Self { of_step, count }
+    }
+
+    /// Vote by vote the mean similarity of the points within the two parts less that across; each
+    /// part has more than one point.
+    fn contrast(&self, a: &Sums, b: &Sums) -> Vec<f64> {
+        let (in_a, in_b) = (self.mean_within(a), self.mean_within(b));
+        let mut contrast = self.products(&a.motion, &b.motion);
+        for (v, across) in contrast.iter_mut().enumerate() {
+            *across = (in_a[v] + in_b[v]) / 2.0 - *across / (a.points * b.points);
+        }
+        contrast.into_iter().map(f64::from).collect()
+    }
+
+    /// Vote by vote the mean product of the motions of two different points of a part.
+    fn mean_within(&self, part: &Sums) -> Vec<f32> {
+        let pairs = part.points * (part.points - 1.0);
+        let mut mean = self.products(&part.motion, &part.motion);
+        for (product, energy) in mean.iter_mut().zip(&part.energy) {
+            *product = (*product - energy) / pairs;
+        }
+        mean
     }
 
     /// Sums of the products of two motions, vote by vote.
@@ -136,26 +160,25 @@ mod tests {
     use crate::model::TrackId;
     use crate::model::TrackTable;
 
+    fn place_px(point: usize, time_s: f64) -> [f32; 2] {
+        let noise = (((point * 7919) as f64 + time_s * 78.233).sin() * 43758.5453).fract();
+        let rate = if point < 2 { 0.3 } else { 0.7 };
+        let u = 100.0 * point as f64 + 5.0 * (rate * time_s).sin() + noise;
+        [u as f32, 50.0]
+    }
+
     /// Two pairs of points that swing at different rates, seen at `times_s`, and how sure it is
     /// that they are two.
     fn certain(times_s: Vec<f64>) -> f32 {
-        let at = |i: usize, t: f64| {
-            let noise = (((i * 7919) as f64 + t * 78.233).sin() * 43758.5453).fract();
-            let rate = if i < 2 { 0.3 } else { 0.7 };
-            Some([
-                (100.0 * i as f64 + 5.0 * (rate * t).sin() + noise) as f32,
-                50.0,
-            ])
-        };
         let table = TrackTable {
             ids: (0..4).map(TrackId).collect(),
             positions: (0..4)
-                .map(|i| times_s.iter().map(|&t| at(i, t)).collect())
+                .map(|i| times_s.iter().map(|&t| Some(place_px(i, t))).collect())
                 .collect(),
             times_s,
             fb_errors_px: vec![0.1; 4],
         };
-        let tree = Binary::divided((0..4).collect(), |_, depth| {
+        let tree = Dendrogram::divided((0..4).collect(), |_, depth| {
             (depth == 0).then(|| vec![true, true, false, false])
         });
         let signals = Signals::displacements(&table, &[0, 1, 2, 3]);

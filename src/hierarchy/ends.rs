@@ -1,31 +1,33 @@
 //! Where the branches end: at the place where their children part, or at their tip.
 
-use super::arrange::Node;
-use super::binary::Binary;
+use super::cut::Node;
+use super::dendrogram::Dendrogram;
 use super::rest::{centroid, crown_begins, distance_sq};
+use super::root_paths::Edge;
 
-/// Points of a way over which its end is evened out: one alone may sit on either edge of its
+/// Points of a path over which its end is averaged: one alone may sit on either edge of its
 /// branch.
 const EVENED: usize = 3;
-/// A branch is no shorter than this share of the way from the foot to the farthest point, or it
-/// could not be told from its fork.
+/// A branch is no shorter than this share of the distance from the foot to the farthest point, or
+/// it could not be told from its fork.
 const SHORTEST: f64 = 0.06;
 
 /// The end of every node's branch, px.
 ///
-/// The spanning tree of all points (`reached`, see [`Ways`](super::common_way::Ways)) runs along
-/// the branches. More than half of the ways from the foot to a cluster's points run together for a
-/// while: that is the way to the cluster. A branch ends where the ways to its children part;
-/// without children it goes on to its tip by the way that most of its points are on. So forks and
-/// tips lie on branches that are seen, not between them.
+/// The spanning tree of all points (`edges`, see
+/// [`RootPaths`](super::root_paths::RootPaths)) runs along the branches. More than half of the
+/// paths from the foot to a cluster's points run together for a while: that is the path to the
+/// cluster. A branch ends where the paths to its children part; without children it goes on to its
+/// tip by the path that most of its points are on. So forks and tips lie on branches that are seen,
+/// not between them.
 ///
 /// The papers put nodes at the centroids of clusters that are cut into halves side by side. Here a
 /// cluster is often a low branch and all that is above it; between their centroids, or above the
 /// branch, nothing parts.
 pub fn ends_px(
     nodes: &[Node],
-    tree: &Binary,
-    reached: &[(usize, Option<usize>)],
+    tree: &Dendrogram,
+    edges: &[Edge],
     rest_px: &[[f64; 2]],
     foot_px: [f64; 2],
 ) -> Vec<[f64; 2]> {
@@ -34,56 +36,66 @@ pub fn ends_px(
         .map(|&p| distance_sq(p, foot_px))
         .fold(1.0, f64::max)
         .sqrt();
-    let ways: Vec<Vec<usize>> = nodes
+    let paths: Vec<Vec<usize>> = nodes
         .iter()
-        .map(|n| way(tree.points(n.part), reached, true))
+        .map(|n| path_to(tree.points(n.part), edges))
         .collect();
     let mut ends: Vec<[f64; 2]> = Vec::with_capacity(nodes.len());
     for (k, node) in nodes.iter().enumerate() {
+        if k == 0
+            && let Some(top) = crown_begins(rest_px, foot_px)
+        {
+            ends.push(top);
+            continue;
+        }
         let begin = node.parent.map_or(foot_px, |p| ends[p]);
         let children: Vec<usize> = (0..nodes.len())
             .filter(|&c| nodes[c].parent == Some(k))
             .collect();
-        let along = match children.split_first() {
-            Some((&first, others)) => {
-                let shared =
-                    |i: usize| others.iter().all(|&c| ways[c].get(i) == ways[first].get(i));
-                let parted = (0..ways[first].len())
-                    .find(|&i| !shared(i))
-                    .unwrap_or(ways[first].len());
-                ways[first][..parted].to_vec()
-            }
-            None => way(tree.points(node.part), reached, false),
+        let path = if children.is_empty() {
+            path_to_tip(tree.points(node.part), edges)
+        } else {
+            common_start(&paths, &children)
         };
-        let last = &along[along.len().saturating_sub(EVENED)..];
+        let last = &path[path.len().saturating_sub(EVENED)..];
         let end = centroid(rest_px, last);
         let far_enough = !last.is_empty() && distance_sq(end, begin).sqrt() >= SHORTEST * farthest;
-        let bare_trunk = crown_begins(rest_px, foot_px).filter(|_| k == 0);
-        ends.push(match bare_trunk {
-            Some(top) => top,
-            None if far_enough => end,
-            None => by_distance(&children, nodes, tree, node, rest_px, begin),
+        ends.push(if far_enough {
+            end
+        } else if children.is_empty() {
+            outermost(tree.points(node.part), rest_px, |p| -distance_sq(p, begin))
+        } else {
+            fork_by_distance(&children, nodes, tree, rest_px, begin)
         });
     }
     ends
 }
 
-/// The points on the way from the foot to `points`, in its order: those through which more than
-/// half of the ways to them run, or, not only the `shared` part, at each fork the way to most of
-/// them up to the last.
-fn way(points: &[usize], reached: &[(usize, Option<usize>)], shared: bool) -> Vec<usize> {
-    let n = reached.len();
+/// The points on the path from the foot to `points`, in its order: those through which more than
+/// half of the paths to them run.
+fn path_to(points: &[usize], edges: &[Edge]) -> Vec<usize> {
+    busiest_path(points, edges, points.len() / 2 + 1)
+}
+
+/// As [`path_to`], and on from there to the end: at each fork by the path to most of the points.
+fn path_to_tip(points: &[usize], edges: &[Edge]) -> Vec<usize> {
+    busiest_path(points, edges, 1)
+}
+
+/// From the foot at each fork by the path to most of `points`, as long as it leads to `least` of
+/// them.
+fn busiest_path(points: &[usize], edges: &[Edge], least: usize) -> Vec<usize> {
+    let n = edges.len();
     let mut beyond = vec![0usize; n];
     points.iter().for_each(|&p| beyond[p] += 1);
-    for &(point, from) in reached.iter().rev() {
-        if let Some(from) = from {
-            beyond[from] += beyond[point];
+    for edge in edges.iter().rev() {
+        if let Some(from) = edge.from {
+            beyond[from] += beyond[edge.point];
         }
     }
-    let least = if shared { points.len() / 2 + 1 } else { 1 };
     let mut next: Vec<Option<usize>> = vec![None; n];
     let mut first: Option<usize> = None;
-    for &(point, from) in reached {
+    for &Edge { point, from } in edges {
         let best = from.map_or(&mut first, |from| &mut next[from]);
         if beyond[point] >= least && best.is_none_or(|b| beyond[point] > beyond[b]) {
             *best = Some(point);
@@ -92,34 +104,41 @@ fn way(points: &[usize], reached: &[(usize, Option<usize>)], shared: bool) -> Ve
     std::iter::successors(first, |&p| next[p]).collect()
 }
 
+/// What the paths to all `children` begin with.
+fn common_start(paths: &[Vec<usize>], children: &[usize]) -> Vec<usize> {
+    let Some((&first, others)) = children.split_first() else {
+        return Vec::new();
+    };
+    let mut length = paths[first].len();
+    for &other in others {
+        let same = paths[first].iter().zip(&paths[other]);
+        length = length.min(same.take_while(|(a, b)| a == b).count());
+    }
+    paths[first][..length].to_vec()
+}
+
 /// Share of a cluster's points, those nearest to or farthest from where its branch begins, that
 /// mark its end.
 const SHARE: f64 = 0.15;
 /// Fewer points than this mark nothing: one alone may be a bad track.
 const LEAST: usize = 2;
 
-/// Where the ways do not tell: halfway between those points of each child that are nearest to the
-/// beginning, or out at the farthest points.
-fn by_distance(
+/// Where the paths do not tell: halfway between those points of each child that are nearest to the
+/// beginning of the branch.
+fn fork_by_distance(
     children: &[usize],
     nodes: &[Node],
-    tree: &Binary,
-    node: &Node,
+    tree: &Dendrogram,
     rest_px: &[[f64; 2]],
     begin: [f64; 2],
 ) -> [f64; 2] {
-    if children.is_empty() {
-        return outermost(tree.points(node.part), rest_px, |p| -distance_sq(p, begin));
+    let mut begins: Vec<[f64; 2]> = Vec::with_capacity(children.len());
+    for &child in children {
+        let points = tree.points(nodes[child].part);
+        begins.push(outermost(points, rest_px, |p| distance_sq(p, begin)));
     }
-    let begins: Vec<[f64; 2]> = children
-        .iter()
-        .map(|&c| {
-            outermost(tree.points(nodes[c].part), rest_px, |p| {
-                distance_sq(p, begin)
-            })
-        })
-        .collect();
-    centroid(&begins, &(0..begins.len()).collect::<Vec<usize>>())
+    let all: Vec<usize> = (0..begins.len()).collect();
+    centroid(&begins, &all)
 }
 
 /// Mean of the points of least `rank`.
@@ -132,7 +151,7 @@ fn outermost(points: &[usize], rest_px: &[[f64; 2]], rank: impl Fn([f64; 2]) -> 
 
 #[cfg(test)]
 mod tests {
-    use super::super::binary::Part;
+    use super::super::dendrogram::Part;
     use super::*;
 
     const FOOT: [f64; 2] = [100.0, 200.0];
@@ -144,51 +163,41 @@ mod tests {
     /// Ends of a tree whose root holds all points, and which has a child for each limb that is a
     /// branch.
     fn ends(foot_px: [f64; 2], limbs: &[Limb]) -> Vec<[f64; 2]> {
-        let (mut rest_px, mut reached, mut branches) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut rest_px, mut edges, mut branches) = (Vec::new(), Vec::new(), Vec::new());
         for &(mut from, points, is_branch) in limbs {
             let first = rest_px.len();
             for p in points {
-                reached.push((rest_px.len(), from));
-                from = Some(rest_px.len());
+                let point = rest_px.len();
+                edges.push(Edge { point, from });
+                from = Some(point);
                 rest_px.push(*p);
             }
             if is_branch {
-                branches.push((first, rest_px.len()));
+                branches.push(Part::undivided(first, rest_px.len()));
             }
         }
         let n = rest_px.len();
-        let whole = Part {
-            from: 0,
-            to: n,
-            halves: None,
-        };
-        let part = |&(from, to): &(usize, usize)| Part {
-            from,
-            to,
-            halves: None,
-        };
-        let tree = Binary {
-            order: (0..n).collect(),
-            parts: std::iter::once(whole)
-                .chain(branches.iter().map(part))
-                .collect(),
-        };
-        let root = Node {
+        let mut nodes = vec![Node {
             parent: None,
             level: 0,
             part: 0,
             certainty: 1.0,
+        }];
+        for part in 1..=branches.len() {
+            nodes.push(Node {
+                parent: Some(0),
+                level: 1,
+                part,
+                certainty: 0.0,
+            });
+        }
+        let mut parts = vec![Part::undivided(0, n)];
+        parts.append(&mut branches);
+        let tree = Dendrogram {
+            order: (0..n).collect(),
+            parts,
         };
-        let child = |k: usize| Node {
-            parent: Some(0),
-            level: 1,
-            part: k + 1,
-            certainty: 0.0,
-        };
-        let nodes: Vec<Node> = std::iter::once(root)
-            .chain((0..branches.len()).map(child))
-            .collect();
-        ends_px(&nodes, &tree, &reached, &rest_px, foot_px)
+        ends_px(&nodes, &tree, &edges, &rest_px, foot_px)
     }
 
     fn line(from: [f64; 2], step: [f64; 2], n: usize) -> Vec<[f64; 2]> {
@@ -275,7 +284,7 @@ mod tests {
     /// A branch of no length has no direction, and could not be posed.
     #[test]
     fn no_branch_ends_where_it_begins() {
-        // The way to the right branch is told by its first points alone, right at the fork.
+        // The path to the right branch is known from its first points alone, right at the fork.
         let trunk = line([100.0, 190.0], [0.0, -10.0], 8);
         let (left, right) = (
             line([90.0, 110.0], [-10.0, -10.0], 6),

@@ -6,9 +6,8 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 /// Krylov dimension; the wanted vector belongs to an end of the spectrum and converges well before.
 const STEPS: usize = 60;
 
-/// Eigenvector of the second largest eigenvalue of the symmetric matrix `m`, whose largest
-/// eigenvalue's eigenvector
-/// `first` (any length) is known: it is projected out, and the largest that is left is sought.
+/// Eigenvector of the second largest eigenvalue of the symmetric matrix `m`. That of the largest,
+/// `first` (any length), is known: it is projected out, and the largest that is left is sought.
 ///
 /// Full reorthogonalisation: rounding would otherwise bring copies of converged vectors back.
 pub fn second_eigenvector(m: &DMatrix<f32>, first: &DVector<f32>) -> DVector<f32> {
@@ -78,20 +77,16 @@ fn orthogonalised(
 mod tests {
     use super::*;
 
+    /// Affinity of the vertices `i` and `j` of a random graph.
+    fn weight(i: usize, j: usize) -> f32 {
+        let [a, b] = [i, j].map(|k| [0.754_877, 0.569_84].map(|step| (k as f32 * step).fract()));
+        (-((a[0] - b[0]).powi(2) * 3.0 + (a[1] - b[1]).powi(2)) / 0.1).exp()
+    }
+
     /// Against the dense solver on random affinity graphs of several sizes.
     #[test]
     fn agrees_with_the_dense_solver() {
         for n in [3usize, 10, 57, 200] {
-            let point = |i: usize| {
-                (
-                    (i as f32 * 0.754_877).fract(),
-                    (i as f32 * 0.569_84).fract(),
-                )
-            };
-            let weight = |i: usize, j: usize| {
-                let (a, b) = (point(i), point(j));
-                (-((a.0 - b.0).powi(2) * 3.0 + (a.1 - b.1).powi(2)) / 0.1).exp()
-            };
             let w = DMatrix::from_fn(n, n, |i, j| if i == j { 0.0 } else { weight(i, j) });
             let root = DVector::from_fn(n, |i, _| w.row(i).iter().sum::<f32>().sqrt());
             let m = DMatrix::from_fn(n, n, |i, j| w[(i, j)] / (root[i] * root[j]));

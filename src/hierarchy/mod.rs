@@ -1,15 +1,15 @@
 //! From tracks to the motion hierarchy: which points move together, and where they part.
 //!
-//! By default average linkage over the likeness of [`path`]. `affinity = "zeng"` is the papers'
-//! method: recursive two-way normalised cuts on nearness and likeness of motion (Li et al. appendix
-//! A, Zeng section 5.4.1).
+//! By default average linkage over the affinity of [`path`]. `affinity = "zeng"` is the papers'
+//! method: recursive two-way normalised cuts on nearness and correlation of motion (Li 2011 app. A,
+//! Zeng 2015 sect. 5.4.1).
 
 mod accumulate;
 mod agreement;
-mod arrange;
-mod binary;
+mod axis;
 mod certainty;
-mod common_way;
+mod cut;
+mod dendrogram;
 mod ends;
 mod lanczos;
 mod linkage;
@@ -17,8 +17,8 @@ mod ncut;
 mod path;
 mod persist;
 mod rest;
+mod root_paths;
 mod signals;
-mod stems;
 mod support;
 mod table;
 mod zeng;
@@ -31,16 +31,12 @@ pub use support::{Gain, OnBoth, gain};
 pub use table::table;
 
 use crate::config::{Affinity, Hierarchy};
-use crate::model::TrackTable;
-use crate::model::{Cluster, ClusterId, MotionHierarchy};
+use crate::model::{Cluster, ClusterId, MotionHierarchy, TrackId, TrackTable};
 use agreement::in_agreement;
-use arrange::arranged;
-use binary::Binary;
+use cut::{MIN_SIDE, cut_dendrogram};
+use dendrogram::Dendrogram;
 use rest::centroid;
 use signals::Signals;
-
-/// Fewest points on either side of a cut: one alone is more likely a bad track than a branch.
-const MIN_SIDE: usize = 2;
 
 /// Puts those of the points `moving` (rows of `table`) that agree with their neighbours into a
 /// hierarchy; empty if there are none. `foot_px` is where the tree leaves the ground.
@@ -50,67 +46,85 @@ pub fn build(
     foot_px: [f64; 2],
     settings: &Hierarchy,
 ) -> MotionHierarchy {
-    let rest_px: Vec<[f64; 2]> = moving
-        .iter()
-        .map(|&row| rest_position_px(table, row))
-        .collect();
-    let velocities = Signals::velocities(table, moving, |_| true);
-    // Indices into `moving`.
-    let kept = in_agreement(&velocities, &rest_px, settings.agreement);
-    if kept.is_empty() {
+    let points = Points::in_agreement(table, moving, settings.agreement);
+    if points.rows.is_empty() {
         return MotionHierarchy::default();
     }
-    let rows: Vec<usize> = kept.iter().map(|&i| moving[i]).collect();
-    let rest_px: Vec<[f64; 2]> = kept.iter().map(|&i| rest_px[i]).collect();
-    let displacements = Signals::displacements(table, &rows);
-    let (tree, stems, reached) = match settings.affinity {
+    let displacements = Signals::displacements(table, &points.rows);
+    let (tree, paths) = match settings.affinity {
         Affinity::Path => {
-            let (likeness, ways) = path::likeness(&displacements, &rest_px, foot_px, settings);
-            let tree = Binary::merged(rows.len(), &linkage::average_linkage(likeness));
-            let stems = stems::stems(&tree, &ways.common);
-            (tree, stems, ways.reached)
+            let (affinity, paths) =
+                path::affinity(&displacements, &points.rest_px, foot_px, settings);
+            let merges = linkage::average_linkage(affinity);
+            (Dendrogram::merged(points.rows.len(), &merges), Some(paths))
         }
         Affinity::Zeng => {
-            let tree = cut_in_two(
-                &Signals::velocities(table, &rows, |_| true),
-                &rest_px,
-                settings,
-            );
-            let stems = vec![false; tree.parts.len()];
-            (tree, stems, Vec::new())
+            let velocities = Signals::velocities(table, &points.rows, |_| true);
+            (cut_in_two(&velocities, &points.rest_px, settings), None)
         }
+    };
+    let axis = match &paths {
+        Some(paths) => axis::axis_parts(&tree, &paths.shared),
+        None => vec![false; tree.parts.len()],
     };
     let certain = certainty::certainties(&tree, &displacements, &table.times_s);
-    let nodes = arranged(&tree, &certain, &stems, settings);
-    let ends_px = match settings.affinity {
-        Affinity::Path => ends::ends_px(&nodes, &tree, &reached, &rest_px, foot_px)
-            .into_iter()
-            .map(Some)
-            .collect(),
-        Affinity::Zeng => vec![None; nodes.len()],
+    let nodes = cut_dendrogram(&tree, &certain, &axis, settings);
+    let ends_px = match &paths {
+        Some(paths) => {
+            let ends_px = ends::ends_px(&nodes, &tree, &paths.edges, &points.rest_px, foot_px);
+            ends_px.into_iter().map(Some).collect()
+        }
+        None => vec![None; nodes.len()],
     };
-    let cluster = |(node, end_px): (arrange::Node, Option<[f64; 2]>)| {
-        let points = tree.points(node.part);
-        let mut members: Vec<_> = points.iter().map(|&i| table.ids[rows[i]]).collect();
-        members.sort_unstable();
-        Cluster {
+    let mut clusters = Vec::with_capacity(nodes.len());
+    for (node, end_px) in nodes.into_iter().zip(ends_px) {
+        let of_node = tree.points(node.part);
+        clusters.push(Cluster {
             parent: node.parent.map(|p| ClusterId(p as u32)),
             level: node.level,
-            members,
-            centroid_px: centroid(&rest_px, points),
+            members: points.ids(of_node, table),
+            centroid_px: centroid(&points.rest_px, of_node),
             end_px,
             certainty: node.certainty,
+        });
+    }
+    MotionHierarchy { clusters }
+}
+
+/// The points that a hierarchy is built from.
+struct Points {
+    /// Their rows of the table.
+    rows: Vec<usize>,
+    rest_px: Vec<[f64; 2]>,
+}
+
+impl Points {
+    /// Those of the rows `moving` that move as their neighbours do, see [`in_agreement`].
+    fn in_agreement(table: &TrackTable, moving: &[usize], agreement: f64) -> Self {
+        let rest_px: Vec<[f64; 2]> = moving
+            .iter()
+            .map(|&row| rest_position_px(table, row))
+            .collect();
+        let velocities = Signals::velocities(table, moving, |_| true);
+        let kept = in_agreement(&velocities, &rest_px, agreement);
+        Self {
+            rows: kept.iter().map(|&i| moving[i]).collect(),
+            rest_px: kept.iter().map(|&i| rest_px[i]).collect(),
         }
-    };
-    MotionHierarchy {
-        clusters: nodes.into_iter().zip(ends_px).map(cluster).collect(),
+    }
+
+    /// Ids of some of them, in ascending order.
+    fn ids(&self, points: &[usize], table: &TrackTable) -> Vec<TrackId> {
+        let mut ids: Vec<TrackId> = points.iter().map(|&i| table.ids[self.rows[i]]).collect();
+        ids.sort_unstable();
+        ids
     }
 }
 
 /// The papers' recursive normalised cuts.
-fn cut_in_two(velocities: &Signals, rest_px: &[[f64; 2]], settings: &Hierarchy) -> Binary {
+fn cut_in_two(velocities: &Signals, rest_px: &[[f64; 2]], settings: &Hierarchy) -> Dendrogram {
     let rho = velocities.correlations();
-    Binary::divided((0..rest_px.len()).collect(), |points, depth| {
+    Dendrogram::divided((0..rest_px.len()).collect(), |points, depth| {
         if depth + 1 >= settings.levels || points.len() < settings.min_points as usize {
             return None;
         }

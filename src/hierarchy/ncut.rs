@@ -1,4 +1,4 @@
-//! The two-way normalised cut (Shi and Malik 2000; Zeng eq. 2.21-2.24).
+//! The two-way normalised cut (Shi and Malik 2000; Zeng 2015 eq. 2.21-2.24).
 
 use super::lanczos::second_eigenvector;
 use nalgebra::{DMatrix, DVector};
@@ -8,14 +8,13 @@ use nalgebra::{DMatrix, DVector};
 pub struct Cut {
     /// For each vertex whether it is on the first side.
     pub first_side: Vec<bool>,
-    /// Ncut(A, B) of Zeng eq. 2.22: 0 for parts without any tie, at most 2.
+    /// Ncut(A, B) of Zeng 2015 eq. 2.22: 0 for parts without any tie, at most 2.
     pub ncut: f64,
 }
 
 /// The best threshold cut along the second eigenvector of D^-1/2 W D^-1/2 in which each side keeps
-/// at least
-/// `min_side` vertices; `None` if there are too few. `w` is symmetric with positive weights off the
-/// diagonal.
+/// at least `min_side` vertices; `None` if there are too few. `w` is symmetric with positive
+/// weights off the diagonal.
 pub fn normalised_cut(w: &DMatrix<f32>, min_side: usize) -> Option<Cut> {
     let n = w.nrows();
     if n < 2 * min_side.max(1) {
@@ -77,11 +76,11 @@ mod tests {
     #[test]
     fn weakly_tied_groups_are_separated() {
         for (n, split) in [(10, 5), (40, 8), (100, 63)] {
-            let group = |i: usize| (i * 7 % n) < split;
-            let w = DMatrix::from_fn(n, n, |i, j| if group(i) == group(j) { 1.0 } else { 0.02 });
+            let group: Vec<bool> = (0..n).map(|i| (i * 7 % n) < split).collect();
+            let w = DMatrix::from_fn(n, n, |i, j| if group[i] == group[j] { 1.0 } else { 0.02 });
             let cut = normalised_cut(&w, 2).unwrap();
-            let same = (0..n).all(|i| cut.first_side[i] == group(i));
-            let swapped = (0..n).all(|i| cut.first_side[i] != group(i));
+            let same = (0..n).all(|i| cut.first_side[i] == group[i]);
+            let swapped = (0..n).all(|i| cut.first_side[i] != group[i]);
             assert!(
                 same || swapped,
                 "{n} points, {split} in the first group: {:?}",

@@ -1,18 +1,14 @@
-//! Where points rest, and who is near whom.
+//! Rest positions of points, and distances between them.
 
 use crate::model::TrackTable;
 use crate::signal::median;
 
 /// Median position of a track: where the tree rests, whatever pose it was first seen in.
 pub fn rest_position_px(table: &TrackTable, row: usize) -> [f64; 2] {
-    let values = |c: usize| {
-        table.positions[row]
-            .iter()
-            .flatten()
-            .map(|p| p[c])
-            .collect()
-    };
-    [0, 1].map(|c| median(values(c), f32::total_cmp).map_or(0.0, f64::from))
+    [0, 1].map(|c| {
+        let values = table.positions[row].iter().flatten().map(|p| p[c]);
+        median(values.collect(), f32::total_cmp).map_or(0.0, f64::from)
+    })
 }
 
 /// Mean of the rest positions of `members`, px.
@@ -36,11 +32,12 @@ pub fn extent_px(rest_px: &[[f64; 2]], members: &[usize]) -> f64 {
     2.0 * variance.sqrt()
 }
 
+/// Squared distance, px^2.
 pub fn distance_sq(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2)
 }
 
-/// A trunk bears no points if none is nearer to the foot than this share of the way to the
+/// A trunk bears no points if none is nearer to the foot than this share of the distance of the
 /// farthest.
 const BARE_TRUNK: f64 = 0.2;
 /// Share of the points, the lowest ones, below which a crown is taken to begin.
@@ -50,13 +47,12 @@ const LOWEST: f64 = 0.05;
 /// of all points, as high as the lowest of them. `None` where there are points on the trunk, which
 /// say better where it goes.
 pub fn crown_begins(rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> Option<[f64; 2]> {
-    let way = |p: &[f64; 2]| distance_sq(*p, foot_px).sqrt();
-    let (nearest, farthest) = rest_px
-        .iter()
-        .map(way)
-        .fold((f64::INFINITY, 0.0_f64), |(low, high), d| {
-            (low.min(d), high.max(d))
-        });
+    let (mut nearest, mut farthest) = (f64::INFINITY, 0.0_f64);
+    for p in rest_px {
+        let distance_px = distance_sq(*p, foot_px).sqrt();
+        nearest = nearest.min(distance_px);
+        farthest = farthest.max(distance_px);
+    }
     if nearest.is_infinite() || nearest <= BARE_TRUNK * farthest {
         return None;
     }
@@ -78,15 +74,13 @@ mod tests {
 
     /// Two limbs that part at `fork`.
     fn crown(fork: [f64; 2]) -> Vec<[f64; 2]> {
-        let limb = |side: f64| {
-            (1..=10).map(move |k| {
-                [
-                    fork[0] + side * 5.0 * f64::from(k),
-                    fork[1] - 6.0 * f64::from(k),
-                ]
-            })
-        };
-        limb(-1.0).chain(limb(1.0)).collect()
+        let mut points = Vec::new();
+        for side in [-1.0, 1.0] {
+            for k in (1..=10).map(f64::from) {
+                points.push([fork[0] + side * 5.0 * k, fork[1] - 6.0 * k]);
+            }
+        }
+        points
     }
 
     #[test]

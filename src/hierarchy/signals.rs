@@ -4,14 +4,15 @@ use super::rest::rest_position_px;
 use crate::model::TrackTable;
 use nalgebra::DMatrix;
 
-/// Steps on either side over which a displacement is averaged: tracking noise is not to decide who
-/// belongs to whom.
+/// Steps on either side over which a displacement is averaged: tracking noise is not to decide
+/// which points belong together.
 const SMOOTH_STEPS: usize = 1;
-/// Time over which the liveliness of a moment is taken, s: about a period of what sways.
-const LIVELINESS_S: f64 = 1.0;
+/// Time over which the root mean square of the motion at a moment is taken, s: about a period of
+/// what sways.
+const RMS_WINDOW_S: f64 = 1.0;
 /// Mean square displacement that tracking alone may show, px^2: quieter moments than this count
 /// less, as noise is most of them.
-const LIVELINESS_FLOOR: f32 = 0.09;
+const NOISE_FLOOR_PX2: f32 = 0.09;
 /// Independent sums per lane let the compiler use vector instructions, and fix the order of
 /// addition.
 const LANES: usize = 8;
@@ -26,8 +27,7 @@ pub struct Signals {
 
 impl Signals {
     /// Velocities: differences between the frames of `table` for which `use_step(step)` holds, of
-    /// the points in
-    /// `rows`, px per step; seen where both frames are.
+    /// the points in `rows`, px per step; seen where both frames are.
     pub fn velocities(
         table: &TrackTable,
         rows: &[usize],
@@ -43,8 +43,8 @@ impl Signals {
         })
     }
 
-    /// Displacements from the mean, px, in which every moment counts alike: divided by how lively
-    /// the points are at that time. After a release all branches swing together first, and
+    /// Displacements from the mean, divided by the root mean square of all points at that time, so
+    /// that every moment counts alike. After a release all branches swing together first, and
     /// strongly; which of them belong together shows later, when those of different frequency and
     /// damping have come apart.
     pub fn displacements(table: &TrackTable, rows: &[usize]) -> Self {
@@ -55,27 +55,10 @@ impl Signals {
             .iter()
             .map(|&row| rest_position_px(table, row))
             .collect();
-        let smooth = |i: usize, s: usize| {
-            let around = s.saturating_sub(SMOOTH_STEPS)..=(s + SMOOTH_STEPS).min(steps - 1);
-            let p = &table.positions[rows[i]];
-            p[s]?;
-            let rest = rest_px[i];
-            let (sum, n) = p[around]
-                .iter()
-                .flatten()
-                .fold(([0.0f64; 2], 0.0), |(sum, n), q| {
-                    (
-                        [
-                            sum[0] + f64::from(q[0]) - rest[0],
-                            sum[1] + f64::from(q[1]) - rest[1],
-                        ],
-                        n + 1.0,
-                    )
-                });
-            Some([(sum[0] / n) as f32, (sum[1] / n) as f32])
-        };
-        let mut signals = Self::new(rows.len(), steps, smooth);
-        signals.weigh_moments_alike(&table.times_s);
+        let mut signals = Self::new(rows.len(), steps, |i, s| {
+            smoothed(&table.positions[rows[i]], s, rest_px[i])
+        });
+        signals.normalise_by_instantaneous_rms(&table.times_s);
         signals
     }
 
@@ -99,26 +82,22 @@ impl Signals {
         Self { u, v, seen }
     }
 
-    fn weigh_moments_alike(&mut self, times_s: &[f64]) {
-        let energy: Vec<f32> = (0..self.steps())
-            .map(|s| {
-                let n = self.seen.row(s).sum().max(1.0);
-                (self.u.row(s).norm_squared() + self.v.row(s).norm_squared()) / n
-            })
-            .collect();
-        let lively: Vec<f32> = times_s
-            .iter()
-            .map(|t| {
-                let near = times_s
-                    .iter()
-                    .zip(&energy)
-                    .filter(|(o, _)| (*o - t).abs() <= LIVELINESS_S / 2.0);
-                let (sum, n) = near.fold((0.0, 0.0), |(sum, n), (_, e)| (sum + e, n + 1.0f32));
-                sum / n.max(1.0)
-            })
-            .collect();
-        for (s, e) in lively.iter().enumerate() {
-            let weight = 1.0 / (e + LIVELINESS_FLOOR).sqrt();
+    /// Divides by the root mean square of all points within [`RMS_WINDOW_S`] around each step.
+    fn normalise_by_instantaneous_rms(&mut self, times_s: &[f64]) {
+        let mut mean_sq: Vec<f32> = Vec::with_capacity(self.steps());
+        for s in 0..self.steps() {
+            let n = self.seen.row(s).sum().max(1.0);
+            mean_sq.push((self.u.row(s).norm_squared() + self.v.row(s).norm_squared()) / n);
+        }
+        for (s, time_s) in times_s.iter().enumerate() {
+            let (mut sum, mut n) = (0.0, 0.0f32);
+            for (other_s, mean_sq) in times_s.iter().zip(&mean_sq) {
+                if (other_s - time_s).abs() <= RMS_WINDOW_S / 2.0 {
+                    sum += mean_sq;
+                    n += 1.0;
+                }
+            }
+            let weight = 1.0 / (sum / n.max(1.0) + NOISE_FLOOR_PX2).sqrt();
             self.u.row_mut(s).scale_mut(weight);
             self.v.row_mut(s).scale_mut(weight);
         }
@@ -150,18 +129,16 @@ impl Signals {
 
     /// Mean over the points that were seen, step by step.
     pub fn mean(&self) -> Vec<[f64; 2]> {
-        let of_step = |s: usize| {
+        let mut mean = Vec::with_capacity(self.steps());
+        for s in 0..self.steps() {
             let n = f64::from(self.seen.row(s).sum()).max(1.0);
-            [
-                f64::from(self.u.row(s).sum()) / n,
-                f64::from(self.v.row(s).sum()) / n,
-            ]
-        };
-        (0..self.steps()).map(of_step).collect()
+            mean.push([&self.u, &self.v].map(|m| f64::from(m.row(s).sum()) / n));
+        }
+        mean
     }
 
-    /// Real part of rho of Zeng eq. 2.20 for points `a` and `b`, over the steps in which both were
-    /// seen, -1 to 1.
+    /// Real part of rho of Zeng 2015 eq. 2.20 for points `a` and `b`, over the steps in which both
+    /// were seen, -1 to 1.
     ///
     /// The equation as printed multiplies the complex velocities without conjugating one of them,
     /// by which two equal circular motions would come out as unrelated; Liu et al. take the
@@ -170,15 +147,9 @@ impl Signals {
     /// different branches.
     pub fn correlation(&self, a: usize, b: usize) -> f32 {
         let (mut re, mut ea, mut eb) = ([0.0f32; LANES], [0.0f32; LANES], [0.0f32; LANES]);
-        let of = |point: usize| {
-            let at = point * self.steps()..(point + 1) * self.steps();
-            (
-                &self.u.as_slice()[at.clone()],
-                &self.v.as_slice()[at.clone()],
-                &self.seen.as_slice()[at],
-            )
-        };
-        let ((a_u, a_v, a_seen), (b_u, b_v, b_seen)) = (of(a), of(b));
+        let (a_u, b_u) = (column(&self.u, a), column(&self.u, b));
+        let (a_v, b_v) = (column(&self.v, a), column(&self.v, b));
+        let (a_seen, b_seen) = (column(&self.seen, a), column(&self.seen, b));
         for s in 0..self.steps() {
             let l = s % LANES;
             let (au, av, sa) = (a_u[s], a_v[s], a_seen[s]);
@@ -187,8 +158,8 @@ impl Signals {
             ea[l] += sb * (au * au + av * av);
             eb[l] += sa * (bu * bu + bv * bv);
         }
-        let sum = |x: [f32; LANES]| x.iter().sum::<f32>();
-        normalised(sum(re), sum(ea) * sum(eb))
+        let [re, ea, eb] = [re, ea, eb].map(|lanes| lanes.iter().sum::<f32>());
+        normalised(re, ea * eb)
     }
 
     /// The correlations of all pairs: as [`correlation`](Self::correlation), by products of
@@ -241,6 +212,25 @@ impl Signals {
     }
 }
 
+/// Displacement from `rest_px` at a step, px: the mean over [`SMOOTH_STEPS`] to either side; `None`
+/// where the point is not seen at the step itself.
+fn smoothed(track: &[Option<[f32; 2]>], step: usize, rest_px: [f64; 2]) -> Option<[f32; 2]> {
+    track[step]?;
+    let around = step.saturating_sub(SMOOTH_STEPS)..=(step + SMOOTH_STEPS).min(track.len() - 1);
+    let (mut sum, mut n) = ([0.0f64; 2], 0.0);
+    for p in track[around].iter().flatten() {
+        sum = [0, 1].map(|c| sum[c] + f64::from(p[c]) - rest_px[c]);
+        n += 1.0;
+    }
+    Some(sum.map(|x| (x / n) as f32))
+}
+
+/// The values of a point, step by step.
+fn column(m: &DMatrix<f32>, point: usize) -> &[f32] {
+    &m.as_slice()[point * m.nrows()..(point + 1) * m.nrows()]
+}
+
+/// The correlation, of a scalar product and the product of both energies, -1 to 1.
 fn normalised(product: f32, energies: f32) -> f32 {
     if energies > 0.0 {
         (product / energies.sqrt()).clamp(-1.0, 1.0)
@@ -254,28 +244,26 @@ mod tests {
     use super::*;
     use crate::model::TrackId;
 
+    fn place_px(point: usize, frame: usize) -> Option<[f32; 2]> {
+        if (frame * 7 + point * 3).is_multiple_of(5) {
+            return None;
+        }
+        let t = frame as f32 / 15.0;
+        let u = 100.0 + (3.0 * t + point as f32).sin();
+        let v = 50.0 + (4.0 * t * (1.0 + point as f32)).cos();
+        Some([u, v])
+    }
+
     /// Gaps differ from point to point: the fast way must leave the same steps out as the plain
     /// one.
     #[test]
     fn all_pairs_at_once_are_the_single_pairs() {
-        let path = |i: usize| {
-            (0..40usize)
-                .map(|k| {
-                    let t = k as f32 / 15.0;
-                    let seen = !(k * 7 + i * 3).is_multiple_of(5);
-                    seen.then(|| {
-                        [
-                            100.0 + (3.0 * t + i as f32).sin(),
-                            50.0 + (4.0 * t * (1.0 + i as f32)).cos(),
-                        ]
-                    })
-                })
-                .collect()
-        };
         let table = TrackTable {
             ids: (0..6).map(TrackId).collect(),
             times_s: (0..40).map(|k| f64::from(k) / 15.0).collect(),
-            positions: (0..6).map(path).collect(),
+            positions: (0..6)
+                .map(|i| (0..40).map(|k| place_px(i, k)).collect())
+                .collect(),
             fb_errors_px: vec![0.1; 6],
         };
         let rows: Vec<usize> = (0..6).collect();

@@ -1,4 +1,4 @@
-//! Which of two trees is better borne out by the motion of their points.
+//! Which of two trees is better supported by the motion of their points.
 
 use super::signals::Signals;
 use crate::model::TrackTable;
@@ -15,7 +15,7 @@ pub struct OnBoth {
     pub new: Vec<u32>,
 }
 
-/// How much better one tree is borne out than another.
+/// How much better one tree is supported than another.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Gain {
     /// Share of triplets that the new tree has right and the old one has not, less the reverse, -1
@@ -38,54 +38,65 @@ pub fn gain(table: &TrackTable, points: &[OnBoth]) -> Gain {
         .iter()
         .step_by(points.len().div_ceil(COMPARED).max(1))
         .collect();
-    let rows: Vec<usize> = some.iter().map(|p| p.row).collect();
-    let alike = Signals::displacements(table, &rows).correlations();
-    let n = some.len();
-    let depths = |chain: fn(&OnBoth) -> &[u32]| -> Vec<Vec<usize>> {
-        let shared = |a: &OnBoth, b: &OnBoth| {
-            chain(a)
-                .iter()
-                .zip(chain(b))
-                .take_while(|(p, q)| p == q)
-                .count()
-        };
-        some.iter()
-            .map(|a| some.iter().map(|b| shared(a, b)).collect())
-            .collect()
-    };
-    let (old, new) = (depths(|p| &p.old), depths(|p| &p.new));
-    let mut triplets: Vec<([usize; 3], f64, f64)> = Vec::new();
-    for a in 0..n {
-        for b in a + 1..n {
-            for c in b + 1..n {
-                let pairs = [(a, b), (a, c), (b, c)];
-                let rho = pairs.map(|p| f64::from(alike[p]));
-                let best = (0..3).fold(0, |m, k| if rho[k] > rho[m] { k } else { m });
-                let second = (0..3)
-                    .filter(|&k| k != best)
-                    .map(|k| rho[k])
-                    .fold(f64::NEG_INFINITY, f64::max);
-                let credit =
-                    |depths: &[Vec<usize>]| share_of(best, pairs.map(|(i, j)| depths[i][j]));
-                triplets.push(([a, b, c], rho[best] - second, credit(&new) - credit(&old)));
-            }
-        }
-    }
-    let weight: f64 = triplets.iter().map(|t| t.1).sum();
+    let triplets = triplets(table, &some);
+    let weight: f64 = triplets.iter().map(|t| t.weight).sum();
     if weight <= 0.0 {
         return Gain::default();
     }
-    let gain = triplets.iter().map(|t| t.1 * t.2).sum::<f64>() / weight;
-    let mut influence = vec![0.0; n];
-    for (points, clear, better) in &triplets {
-        points
-            .iter()
-            .for_each(|&i| influence[i] += clear * (better - gain) / weight);
+    let gain = triplets.iter().map(|t| t.weight * t.gain).sum::<f64>() / weight;
+    let mut influence = vec![0.0; some.len()];
+    for t in &triplets {
+        for &point in &t.points {
+            influence[point] += t.weight * (t.gain - gain) / weight;
+        }
     }
     Gain {
         gain,
         error: influence.iter().map(|i| i * i).sum::<f64>().sqrt(),
     }
+}
+
+/// Three points, and what they say of the two trees.
+struct Triplet {
+    points: [usize; 3],
+    /// By how much the correlation of the nearest pair exceeds the next.
+    weight: f64,
+    /// 1 if the new tree puts the nearest pair together and the old one does not, -1 if the
+    /// reverse; shares where a tree holds pairs equally near.
+    gain: f64,
+}
+
+fn triplets(table: &TrackTable, points: &[&OnBoth]) -> Vec<Triplet> {
+    let rows: Vec<usize> = points.iter().map(|p| p.row).collect();
+    let rho = Signals::displacements(table, &rows).correlations();
+    let n = points.len();
+    let mut triplets = Vec::new();
+    for a in 0..n {
+        for b in a + 1..n {
+            for c in b + 1..n {
+                let pairs = [(a, b), (a, c), (b, c)];
+                let rho = pairs.map(|p| f64::from(rho[p]));
+                let best = (0..3).fold(0, |m, k| if rho[k] > rho[m] { k } else { m });
+                let second = (0..3)
+                    .filter(|&k| k != best)
+                    .map(|k| rho[k])
+                    .fold(f64::NEG_INFINITY, f64::max);
+                let old = pairs.map(|(i, j)| shared_depth(&points[i].old, &points[j].old));
+                let new = pairs.map(|(i, j)| shared_depth(&points[i].new, &points[j].new));
+                triplets.push(Triplet {
+                    points: [a, b, c],
+                    weight: rho[best] - second,
+                    gain: share_of(best, new) - share_of(best, old),
+                });
+            }
+        }
+    }
+    triplets
+}
+
+/// How many branches, from the trunk up, two points are both on.
+fn shared_depth(a: &[u32], b: &[u32]) -> usize {
+    a.iter().zip(b).take_while(|(p, q)| p == q).count()
 }
 
 /// What pair `best` gets if the deepest of three wins and equals share.
@@ -103,22 +114,24 @@ fn share_of(best: usize, depths: [usize; 3]) -> f64 {
 mod tests {
     use super::*;
     use crate::model::TrackId;
+    use std::f64::consts::TAU;
+
+    fn place_px(point: usize, time_s: f64) -> [f32; 2] {
+        let branch_hz = [0.5, 0.8][point / 6];
+        let twig_hz = [1.3, 1.9, 2.4, 3.1][point / 3];
+        let [branch, twig] = [branch_hz, twig_hz].map(|hz| (TAU * hz * time_s).sin());
+        [(4.0 * branch + twig) as f32, 0.0]
+    }
 
     /// Twelve points on two branches that sway at rates of their own, on each of which two twigs do
     /// the same on top.
     fn table() -> TrackTable {
         let times_s: Vec<f64> = (0..150).map(|k| f64::from(k) / 15.0).collect();
-        let path = |i: usize| {
-            let sway = |hz: f64, t: f64| (std::f64::consts::TAU * hz * t).sin();
-            let (branch, twig) = ([0.5, 0.8][i / 6], [1.3, 1.9, 2.4, 3.1][i / 3]);
-            times_s
-                .iter()
-                .map(|&t| Some([(4.0 * sway(branch, t) + sway(twig, t)) as f32, 0.0]))
-                .collect()
-        };
         TrackTable {
             ids: (0..12).map(TrackId).collect(),
-            positions: (0..12).map(path).collect(),
+            positions: (0..12)
+                .map(|i| times_s.iter().map(|&t| Some(place_px(i, t))).collect())
+                .collect(),
             fb_errors_px: vec![0.02; 12],
             times_s: times_s.clone(),
         }

@@ -1,5 +1,5 @@
-//! How alike two points are in the papers: how near they are, times how alike they move (Zeng eq.
-//! 2.20 after Liu et al. 2005).
+//! The affinity of the papers: how near two points are, times the correlation of their velocities
+//! (Zeng 2015 eq. 2.20 after Liu et al. 2005).
 
 use super::rest::{distance_sq, extent_px};
 use nalgebra::DMatrix;

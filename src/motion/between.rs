@@ -38,9 +38,8 @@ mod tests {
     use nalgebra::{Point3, UnitQuaternion, Vector3};
     use std::f64::consts::PI;
 
-    /// Foot, trunk and a branch to the side.
-    fn skeleton() -> Skeleton {
-        let node = |k: u32, parent: Option<u32>, position| Node {
+    fn node(k: u32, parent: Option<u32>, position: Point3<f64>) -> Node {
+        Node {
             name: NodeName(k),
             parent: parent.map(NodeId),
             level: k as u8,
@@ -51,7 +50,11 @@ mod tests {
             copy_of: None,
             plane_angle: 0.0,
             kind: Default::default(),
-        };
+        }
+    }
+
+    /// Foot, trunk and a branch to the side.
+    fn skeleton() -> Skeleton {
         let nodes = vec![
             node(0, None, Point3::origin()),
             node(1, Some(0), Point3::new(0.0, 100.0, 0.0)),

@@ -65,22 +65,13 @@ impl Binding {
             .iter()
             .map(|n| skeleton.image_from_model(&n.position))
             .collect();
-        let at = |t: NodeId| rest[t.index()];
-        let nearest = |t: &NodeId| {
-            tips.iter()
-                .filter(|o| *o != t)
-                .map(|o| distance(at(*t), at(*o)))
-                .fold(f64::INFINITY, f64::min)
-        };
-        let gaps: Vec<f64> = tips.iter().map(nearest).filter(|d| d.is_finite()).collect();
-        let reach_px = REACH * gaps.iter().sum::<f64>() / gaps.len().max(1) as f64;
         Self {
+            reach_px: REACH * mean_gap(&tips, &rest),
             tracks,
             parents: nodes.iter().map(|n| n.parent).collect(),
             collected: vec![Vec::new(); nodes.len()],
             rest_px: rest,
             tips,
-            reach_px,
             least_px: LEAST * f64::from(skeleton.image_size.width),
         }
     }
@@ -88,16 +79,9 @@ impl Binding {
     /// Takes over tracks that an older tree knew, with the node and the rest place (px) that each
     /// has here.
     pub fn inherit(&mut self, tracks: &BTreeMap<TrackId, (NodeId, [f64; 2])>) {
-        let bound = |(id, (node, rest_px)): (&TrackId, &(NodeId, [f64; 2]))| {
-            (
-                *id,
-                Some(Bound {
-                    node: *node,
-                    rest_px: *rest_px,
-                }),
-            )
-        };
-        self.tracks.extend(tracks.iter().map(bound));
+        for (&id, &(node, rest_px)) in tracks {
+            self.tracks.insert(id, Some(Bound { node, rest_px }));
+        }
     }
 
     /// Every bound track with its deepest node and its rest place, px; those that have been lost
@@ -128,42 +112,52 @@ impl Binding {
                 local::displacement(d, self.least_px).map(|d| [rest[0] + d[0], rest[1] + d[1]])
             })
             .collect();
-        let new = set
-            .observations
-            .iter()
-            .filter(|o| o.confirmed && !self.tracks.contains_key(&o.id));
-        // A tip that has lost all its tracks is where the nearest branch below it that is seen
-        // would carry it.
-        let expected = |tip: NodeId| {
-            let seen = |n: &NodeId| targets[n.index()].is_some();
-            let carrier =
-                std::iter::successors(Some(tip), |n| self.parents[n.index()]).find(seen)?;
-            let (target, rest, own) = (
-                targets[carrier.index()]?,
-                self.rest_px[carrier.index()],
-                self.rest_px[tip.index()],
-            );
-            Some([own[0] + target[0] - rest[0], own[1] + target[1] - rest[1]])
-        };
-        // Decided once: a point of the background stays unbound when a branch swings near it later.
-        let born: Vec<(TrackId, Option<Bound>)> = new
-            .filter_map(|o| {
+        for o in &set.observations {
+            if o.confirmed && !self.tracks.contains_key(&o.id) {
                 let at = [f64::from(o.u_px), f64::from(o.v_px)];
-                let placed = self.tips.iter().filter_map(|t| Some((*t, expected(*t)?)));
-                let (tip, target) =
-                    placed.min_by(|a, b| distance(at, a.1).total_cmp(&distance(at, b.1)))?;
-                let rest = self.rest_px[tip.index()];
-                let rest_px = [at[0] - target[0] + rest[0], at[1] - target[1] + rest[1]];
-                let bound =
-                    (distance(at, target) <= self.reach_px).then_some(Bound { node: tip, rest_px });
-                Some((o.id, bound))
-            })
-            .collect();
-        self.tracks.extend(born);
+                // Decided once: a point of the background stays unbound when a branch swings near
+                // it later.
+                if let Some((tip, target)) = self.nearest_tip(at, &targets) {
+                    let rest = self.rest_px[tip.index()];
+                    let rest_px = [at[0] - target[0] + rest[0], at[1] - target[1] + rest[1]];
+                    let near = distance(at, target) <= self.reach_px;
+                    let bound = near.then_some(Bound { node: tip, rest_px });
+                    self.tracks.insert(o.id, bound);
+                }
+            }
+        }
         if let Some(foot) = targets.first_mut() {
             *foot = self.rest_px.first().copied();
         }
         targets
+    }
+
+    /// The tip nearest to the place `at`, px, and where it is in this frame; `None` if no tip's
+    /// place is known.
+    fn nearest_tip(
+        &self,
+        at: [f64; 2],
+        targets: &[Option<[f64; 2]>],
+    ) -> Option<(NodeId, [f64; 2])> {
+        let placed = self
+            .tips
+            .iter()
+            .filter_map(|&tip| Some((tip, self.expected_px(tip, targets)?)));
+        placed.min_by(|a, b| distance(at, a.1).total_cmp(&distance(at, b.1)))
+    }
+
+    /// Where a tip is, px. One that has lost all its tracks is where the nearest branch below it
+    /// that is seen would carry it.
+    fn expected_px(&self, tip: NodeId, targets: &[Option<[f64; 2]>]) -> Option<[f64; 2]> {
+        let mut carrier = tip;
+        let target = loop {
+            match targets[carrier.index()] {
+                Some(target) => break target,
+                None => carrier = self.parents[carrier.index()]?,
+            }
+        };
+        let (rest, own) = (self.rest_px[carrier.index()], self.rest_px[tip.index()]);
+        Some([own[0] + target[0] - rest[0], own[1] + target[1] - rest[1]])
     }
 
     /// Every track's displacement goes to its node and to all nodes above it.
@@ -189,6 +183,22 @@ impl Binding {
             }
         }
     }
+}
+
+/// Mean distance of the tips from the nearest other tip, px; 0 for less than two.
+fn mean_gap(tips: &[NodeId], rest_px: &[[f64; 2]]) -> f64 {
+    let (mut sum, mut count) = (0.0, 0usize);
+    for tip in tips {
+        let others = tips.iter().filter(|other| *other != tip);
+        let nearest = others
+            .map(|other| distance(rest_px[tip.index()], rest_px[other.index()]))
+            .fold(f64::INFINITY, f64::min);
+        if nearest.is_finite() {
+            sum += nearest;
+            count += 1;
+        }
+    }
+    sum / count.max(1) as f64
 }
 
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {

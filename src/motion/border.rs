@@ -1,7 +1,7 @@
 //! The best direction on the borders of what is allowed.
 
-use super::search::tangents;
-use nalgebra::{Unit, UnitVector3};
+use super::rotation::tangents;
+use nalgebra::{Unit, UnitVector3, Vector3};
 use std::f64::consts::TAU;
 
 /// Places that are looked at all round a border before the best ones are refined.
@@ -18,22 +18,18 @@ pub(super) fn best(
 ) -> Option<(UnitVector3<f64>, f64)> {
     let mut best: Option<(UnitVector3<f64>, f64)> = None;
     for (centre, angle) in circles {
-        let (a, b) = tangents(centre);
-        let at = |turn: f64| {
-            let d =
-                centre.into_inner() * angle.cos() + (a * turn.cos() + b * turn.sin()) * angle.sin();
-            within(&Unit::new_normalize(d))
-        };
+        let circle = Circle::new(centre, *angle);
         let step = TAU / PLACES as f64;
-        let costs: [f64; PLACES] = std::array::from_fn(|k| at(k as f64 * step).1);
+        let costs: [f64; PLACES] = std::array::from_fn(|k| within(&circle.at(k as f64 * step)).1);
         for k in 0..PLACES {
             let beside = [costs[(k + PLACES - 1) % PLACES], costs[(k + 1) % PLACES]];
             if beside.iter().all(|c| costs[k] <= *c) {
-                let found = at(lowest(
-                    |turn| at(turn).1,
+                let turn = lowest(
+                    |turn| within(&circle.at(turn)).1,
                     (k as f64 - 1.0) * step,
                     (k as f64 + 1.0) * step,
-                ));
+                );
+                let found = within(&circle.at(turn));
                 if best.is_none_or(|b| found.1 < b.1) {
                     best = Some(found);
                 }
@@ -41,6 +37,32 @@ pub(super) fn best(
         }
     }
     best
+}
+
+/// All directions at one angle from a centre.
+struct Circle {
+    /// What all directions have along the centre.
+    along: Vector3<f64>,
+    /// Two unit vectors at right angles to the centre and to each other.
+    across: (Vector3<f64>, Vector3<f64>),
+    /// The circle's radius: the sine of its angle.
+    radius: f64,
+}
+
+impl Circle {
+    fn new(centre: &UnitVector3<f64>, angle: f64) -> Self {
+        Self {
+            along: centre.into_inner() * angle.cos(),
+            across: tangents(centre),
+            radius: angle.sin(),
+        }
+    }
+
+    /// The direction at `turn` radians round the circle.
+    fn at(&self, turn: f64) -> UnitVector3<f64> {
+        let (a, b) = self.across;
+        Unit::new_normalize(self.along + (a * turn.cos() + b * turn.sin()) * self.radius)
+    }
 }
 
 /// Where `cost` is lowest between two ends (golden section).

@@ -1,12 +1,11 @@
 //! The deterministic solution: the line of sight through the tracked point meets the sphere on
-//! which the branch's end can move (Li et al. section 4.1).
+//! which the branch's end can move (Li 2011 sect. 4.1).
 
 use nalgebra::{Point3, Unit, Vector3};
 
 /// Direction from the local root `root` to the node, which stays at distance `length` from it and
-/// is to project onto
-/// `target`; `now` is where the node is before it turns itself. Positions in model axes (projection
-/// is along z), px.
+/// is to project onto `target`; `now` is where the node is before it turns itself. Positions in
+/// model axes (projection is along z), px.
 ///
 /// Of two meeting points the nearer to `now` is taken; where there is none, the target is shifted
 /// towards `now` until there is.
@@ -20,7 +19,8 @@ pub fn direction(
     let wanted = [target[0] - root.x, target[1] - root.y];
     let start = [now.x - root.x, now.y - root.y];
     let along = [wanted[0] - start[0], wanted[1] - start[1]];
-    // |start + s along| = length for the largest s in [0, 1]: `now` itself lies on the sphere, so there is one.
+    // |start + s along| = length for the largest s in [0, 1]: `now` itself lies on the sphere, so
+    // there is one.
     let (a, b) = (
         along[0].powi(2) + along[1].powi(2),
         start[0] * along[0] + start[1] * along[1],

@@ -1,4 +1,4 @@
-//! How far leaves swing in every frame (Li et al. appendix B.2).
+//! How far leaves swing in every frame (Li 2011 app. B.2).
 
 use crate::config::Leaves;
 use crate::model::{NodeId, Pose, Skeleton};
@@ -20,29 +20,34 @@ pub fn flutter(
     settings: &Leaves,
 ) -> Vec<Vec<[f32; 2]>> {
     let height = height(skeleton);
-    let most = settings.swing_deg.to_radians();
-    let weights = |group: &NodeId| {
+    let mut of_groups = Vec::with_capacity(groups.len());
+    for group in groups {
         let members = above(skeleton, *group);
-        let steps: Vec<f64> = (0..poses.len())
+        let speeds: Vec<f64> = (0..poses.len())
             .map(|k| speed(poses, k, &members) / height)
             .collect();
-        let weight = |k: usize| {
-            let speed = smoothed(poses, &steps, k);
-            // tanh 0.973 = 3/4; beyond it grows no more than leaves can turn.
-            let amplitude = most * (0.973 * speed / settings.swing_speed.max(1e-6)).tanh();
-            let phase = TAU * settings.frequency_hz * (poses[k].time_s - poses[0].time_s);
-            if phase.is_finite() && amplitude.is_finite() {
+        let mut weights = Vec::with_capacity(poses.len());
+        for (k, pose) in poses.iter().enumerate() {
+            let amplitude = amplitude(smoothed(poses, &speeds, k), settings);
+            let phase = TAU * settings.frequency_hz * (pose.time_s - poses[0].time_s);
+            weights.push(if phase.is_finite() && amplitude.is_finite() {
                 [
                     (amplitude * phase.sin()) as f32,
                     (amplitude * phase.cos()) as f32,
                 ]
             } else {
                 [0.0; 2]
-            }
-        };
-        (0..poses.len()).map(weight).collect()
-    };
-    groups.iter().map(weights).collect()
+            });
+        }
+        of_groups.push(weights);
+    }
+    of_groups
+}
+
+/// Of leaves on branches that move at `speed` tree heights per second, radians.
+fn amplitude(speed: f64, settings: &Leaves) -> f64 {
+    // tanh 0.973 = 3/4; beyond it grows no more than leaves can turn.
+    settings.swing_deg.to_radians() * (0.973 * speed / settings.swing_speed.max(1e-6)).tanh()
 }
 
 /// The node and all above it; all nodes for one that is not there.
@@ -61,11 +66,13 @@ fn speed(poses: &[Pose], k: usize, members: &[usize]) -> f64 {
         return 0.0;
     };
     let elapsed_s = poses[k].time_s - before.time_s;
-    let way = |&i: &usize| {
-        Some((poses[k].joints.get(i)?.position - before.joints.get(i)?.position).norm())
-    };
-    let ways: f64 = members.iter().filter_map(way).sum();
-    let speed = ways / members.len().max(1) as f64 / elapsed_s;
+    let mut sum_px = 0.0;
+    for &i in members {
+        if let (Some(is), Some(was)) = (poses[k].joints.get(i), before.joints.get(i)) {
+            sum_px += (is.position - was.position).norm();
+        }
+    }
+    let speed = sum_px / members.len().max(1) as f64 / elapsed_s;
     if elapsed_s > 0.0 && speed.is_finite() {
         speed
     } else {
@@ -73,19 +80,21 @@ fn speed(poses: &[Pose], k: usize, members: &[usize]) -> f64 {
     }
 }
 
-/// Mean of the steps that end within half of [`SMOOTHED_S`] of pose `k`.
-fn smoothed(poses: &[Pose], steps: &[f64], k: usize) -> f64 {
-    let near = |j: &usize| (poses[*j].time_s - poses[k].time_s).abs() <= 0.5 * SMOOTHED_S + 1e-9;
-    let (mut sum, mut count) = (steps[k], 1.0);
-    for j in (0..k)
-        .rev()
-        .take_while(near)
-        .chain((k + 1..steps.len()).take_while(near))
-    {
-        sum += steps[j];
+/// Mean of the speeds of the poses near pose `k`.
+fn smoothed(poses: &[Pose], speeds: &[f64], k: usize) -> f64 {
+    let before = (0..k).rev().take_while(|&j| near(poses, j, k));
+    let after = (k + 1..speeds.len()).take_while(|&j| near(poses, j, k));
+    let (mut sum, mut count) = (speeds[k], 1.0);
+    for j in before.chain(after) {
+        sum += speeds[j];
         count += 1.0;
     }
     sum / count
+}
+
+/// Whether poses `j` and `k` are within half of [`SMOOTHED_S`] of each other.
+fn near(poses: &[Pose], j: usize, k: usize) -> bool {
+    (poses[j].time_s - poses[k].time_s).abs() <= 0.5 * SMOOTHED_S + 1e-9
 }
 
 fn height(skeleton: &Skeleton) -> f64 {

@@ -1,5 +1,8 @@
 //! How a place moves, by the points around it.
 
+use crate::signal::median;
+use std::cmp::Ordering;
+
 /// A point's displacement in a frame, and where it rests as seen from the place, px.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Nearby {
@@ -27,8 +30,7 @@ const FLOOR_PX: f64 = 0.05;
 
 /// Displacement of the place, px: that of a field that is linear in the picture, fitted to the
 /// points around it with weights that fall off as a normal distribution; `None` without points.
-/// `least_px`: no weights are narrower. Reorders
-/// `points`.
+/// `least_px`: no weights are narrower. Reorders `points`.
 ///
 /// A branch that turns moves its points the farther the farther out they are. Their mean is the
 /// motion of their middle, and the node, a fork or a tip, stands at their edge; the slopes take it
@@ -38,13 +40,12 @@ pub(super) fn displacement(points: &mut [Nearby], least_px: f64) -> Option<[f64;
     if used == 0 {
         return None;
     }
-    let by_distance = |a: &Nearby, b: &Nearby| a.distance_sq().total_cmp(&b.distance_sq());
     if used < points.len() {
-        points.select_nth_unstable_by(used - 1, by_distance);
+        points.select_nth_unstable_by(used - 1, nearer);
     }
     let points = &mut points[..used];
     let rank = used.min(POINTS) - 1;
-    points.select_nth_unstable_by(rank, by_distance);
+    points.select_nth_unstable_by(rank, nearer);
     let variance = points[rank]
         .distance_sq()
         .max(least_px * least_px)
@@ -57,23 +58,25 @@ pub(super) fn displacement(points: &mut [Nearby], least_px: f64) -> Option<[f64;
     let mut field = fitted(points, &weights, variance);
     for _ in 1..ROUNDS {
         for (miss, p) in misses.iter_mut().zip(points.iter()) {
-            let off = |c: usize| {
-                p.displacement[c]
-                    - field[c][0]
-                    - field[c][1] * p.offset[0]
-                    - field[c][2] * p.offset[1]
-            };
-            *miss = (off(0).powi(2) + off(1).powi(2)).sqrt();
+            let off = [0, 1].map(|c| {
+                let [at, slope_u, slope_v] = field[c];
+                p.displacement[c] - at - slope_u * p.offset[0] - slope_v * p.offset[1]
+            });
+            *miss = (off[0].powi(2) + off[1].powi(2)).sqrt();
         }
-        let mut sorted = misses;
-        let (_, median, _) = sorted[..used].select_nth_unstable_by(used / 2, f64::total_cmp);
-        let scale = HALF_AT * *median + FLOOR_PX;
+        let median = median(misses[..used].to_vec(), f64::total_cmp)?;
+        let scale = HALF_AT * median + FLOOR_PX;
         for ((weight, near), miss) in weights.iter_mut().zip(&near).zip(&misses) {
             *weight = near / (1.0 + (miss / scale).powi(2));
         }
         field = fitted(points, &weights, variance);
     }
     Some([field[0][0], field[1][0]])
+}
+
+/// The order of points by their distance from the place.
+fn nearer(a: &Nearby, b: &Nearby) -> Ordering {
+    a.distance_sq().total_cmp(&b.distance_sq())
 }
 
 /// For either coordinate: displacement at the place, and its slopes along u and v.
@@ -116,14 +119,15 @@ mod tests {
     /// Points along a branch that begins at the place `from` px below it and turns by `angle` about
     /// its beginning.
     fn branch(n: usize, from: f64, angle: f64) -> Vec<Nearby> {
-        let point = |k: usize| {
+        let mut points = Vec::with_capacity(n);
+        for k in 1..=n {
             let out = from * k as f64 / n as f64;
-            Nearby {
+            points.push(Nearby {
                 displacement: [angle * out, 0.0],
                 offset: [0.0, from - out],
-            }
-        };
-        (1..=n).map(point).collect()
+            });
+        }
+        points
     }
 
     #[test]

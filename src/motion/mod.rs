@@ -1,4 +1,4 @@
-//! From tracks to the 3D pose of every frame (Li et al. section 4): root to tip, each branch turns
+//! From tracks to the 3D pose of every frame (Li 2011 sect. 4): root to tip, each branch turns
 //! about its local root and carries all that hangs on it. Lengths never change, as only rotations
 //! are applied.
 
@@ -10,6 +10,7 @@ mod flutter;
 mod local;
 mod probabilistic;
 mod recover;
+mod rotation;
 mod search;
 
 pub use between::between;
@@ -19,9 +20,9 @@ pub use flutter::flutter;
 pub use probabilistic::Problem;
 
 use crate::config::{Motion, MotionMethod};
-use crate::model::{JointPose, NodeId, Pose, Skeleton};
+use crate::model::{JointPose, Node, NodeId, Pose, Skeleton};
 use nalgebra::{Unit, UnitQuaternion, UnitVector3, Vector3};
-use probabilistic::shortest_rotation;
+use rotation::shortest_rotation;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -42,10 +43,36 @@ struct Branch {
     /// Of the parent's own branch.
     parent_direction: Option<UnitVector3<f64>>,
     sigma_shape: f64,
-    copy: Option<(NodeId, UnitQuaternion<f64>)>,
+    copy: Option<CopyOf>,
+}
+
+/// Whose copy a branch is.
+struct CopyOf {
+    original: NodeId,
+    /// From the original's plane to the copy's.
+    turn: UnitQuaternion<f64>,
 }
 
 impl Branch {
+    /// The branch that ends in `node`; `None` for the foot. `sigma_shape` in radians.
+    fn at_rest(skeleton: &Skeleton, node: &Node, sigma_shape: f64) -> Option<Self> {
+        let parent = node.parent?;
+        let vector = vector_of(skeleton, node)?;
+        let above = vector_of(skeleton, &skeleton.nodes[parent.index()]);
+        Some(Self {
+            parent: parent.index(),
+            vector,
+            direction: Unit::try_new(vector, 1e-9).unwrap_or(Vector3::y_axis()),
+            length: vector.norm(),
+            parent_direction: above.and_then(|v| Unit::try_new(v, 1e-9)),
+            sigma_shape,
+            copy: node.copy_of.map(|original| CopyOf {
+                original,
+                turn: UnitQuaternion::from_axis_angle(&Vector3::y_axis(), node.plane_angle),
+            }),
+        })
+    }
+
     /// Where it ends when it turns by `own` in the axes of its parent branch.
     fn turned(&self, parent: &JointPose, own: UnitQuaternion<f64>) -> JointPose {
         let rotation = UnitQuaternion::new_normalize((parent.rotation * own).into_inner());
@@ -53,6 +80,19 @@ impl Branch {
             position: parent.position + rotation * self.vector,
             rotation,
         }
+    }
+}
+
+/// From a node's parent to the node, px; `None` for the foot.
+fn vector_of(skeleton: &Skeleton, node: &Node) -> Option<Vector3<f64>> {
+    let parent = node.parent?;
+    Some(node.position - skeleton.nodes[parent.index()].position)
+}
+
+fn resting(node: &Node) -> JointPose {
+    JointPose {
+        position: node.position,
+        rotation: UnitQuaternion::identity(),
     }
 }
 
@@ -78,38 +118,16 @@ impl PoseEstimator {
                 .unwrap_or(1)
                 .max(2),
         );
-        let vector_of = |i: usize| {
-            let node = &skeleton.nodes[i];
-            node.parent
-                .map(|p| node.position - skeleton.nodes[p.index()].position)
-        };
-        let branches = (0..skeleton.nodes.len()).map(|i| {
-            let node = &skeleton.nodes[i];
-            let parent = node.parent?.index();
-            let vector = vector_of(i)?;
-            // A wider tolerance towards the tips, which bend more easily (eq. 10).
+        let branches = skeleton.nodes.iter().map(|node| {
+            // A wider tolerance towards the tips, which bend more easily (Li 2011 eq. 10).
             let depth = (f64::from(node.level) - 1.0) / (deepest - 1.0);
             let (root, tip) = (settings.sigma_shape_root_deg, settings.sigma_shape_tip_deg);
-            Some(Branch {
-                parent,
-                vector,
-                direction: Unit::try_new(vector, 1e-9).unwrap_or(Vector3::y_axis()),
-                length: vector.norm(),
-                parent_direction: vector_of(parent).and_then(|v| Unit::try_new(v, 1e-9)),
-                sigma_shape: (root + depth * (tip - root)).to_radians(),
-                copy: node.copy_of.map(|o| {
-                    (
-                        o,
-                        UnitQuaternion::from_axis_angle(&Vector3::y_axis(), node.plane_angle),
-                    )
-                }),
-            })
+            Branch::at_rest(&skeleton, node, (root + depth * (tip - root)).to_radians())
         });
-        let branches = branches.collect();
         Self {
+            branches: branches.collect(),
             skeleton,
             settings: settings.clone(),
-            branches,
             previous: None,
             previous_s: 0.0,
         }
@@ -120,11 +138,7 @@ impl PoseEstimator {
         // A clock that stands still must not forbid all motion.
         let elapsed_s = (time_s - self.previous_s).max(1e-3);
         self.previous_s = time_s;
-        let rest = |n: &crate::model::Node| JointPose {
-            position: n.position,
-            rotation: UnitQuaternion::identity(),
-        };
-        let mut joints: Vec<JointPose> = self.skeleton.nodes.iter().map(rest).collect();
+        let mut joints: Vec<JointPose> = self.skeleton.nodes.iter().map(resting).collect();
         let mut directions: Vec<UnitVector3<f64>> = Vec::with_capacity(self.skeleton.nodes.len());
         for i in 0..joints.len() {
             let Some(branch) = &self.branches[i] else {
@@ -133,13 +147,14 @@ impl PoseEstimator {
             };
             let parent = joints[branch.parent];
             let own = match &branch.copy {
-                Some(copied) => {
+                Some(copy) => {
                     directions.push(branch.direction);
-                    self.turn_of_copy(copied, &joints)
+                    self.turn_of_copy(copy, &joints)
                 }
                 None => {
                     let target_px = targets_px.get(i).copied().flatten();
-                    let d = self.direction((i, branch), &parent, target_px, elapsed_s);
+                    let previous = self.previous.as_ref().map(|p| p[i]);
+                    let d = self.direction(branch, previous, &parent, target_px, elapsed_s);
                     directions.push(d);
                     shortest_rotation(&branch.direction, &d)
                 }
@@ -155,20 +170,18 @@ impl PoseEstimator {
     }
 
     /// The copy turns in its plane as the original does in its own.
-    fn turn_of_copy(
-        &self,
-        (original, turn): &(NodeId, UnitQuaternion<f64>),
-        joints: &[JointPose],
-    ) -> UnitQuaternion<f64> {
-        let above = self.skeleton.nodes[original.index()].parent;
-        let parent_rotation =
-            above.map_or(UnitQuaternion::identity(), |p| joints[p.index()].rotation);
-        turn * (parent_rotation.inverse() * joints[original.index()].rotation) * turn.inverse()
+    fn turn_of_copy(&self, copy: &CopyOf, joints: &[JointPose]) -> UnitQuaternion<f64> {
+        let original = copy.original.index();
+        let parent_rotation = self.skeleton.nodes[original]
+            .parent
+            .map_or(UnitQuaternion::identity(), |p| joints[p.index()].rotation);
+        let own = parent_rotation.inverse() * joints[original].rotation;
+        copy.turn * own * copy.turn.inverse()
     }
 
     /// By how much the direction of a branch may change that was `turned` from its rest, so that
-    /// the branch turns by no more than
-    /// `max_step_deg` in a frame, or in 1/30 s where frames are rarer.
+    /// the branch turns by no more than `max_step_deg` in a frame, or in 1/30 s where frames are
+    /// rarer.
     ///
     /// The turn from rest to a direction is the shortest one. Between two directions up to an angle
     /// theta from the rest these turns differ by up to 1 / cos(theta / 2) times the angle between
@@ -184,15 +197,15 @@ impl PoseEstimator {
                 .max(0.5)
     }
 
-    /// Direction of branch `i` in the axes of its parent branch at rest.
+    /// Direction of a branch in the axes of its parent branch at rest, from the `previous` one.
     fn direction(
         &self,
-        (i, branch): (usize, &Branch),
+        branch: &Branch,
+        previous: Option<UnitVector3<f64>>,
         parent: &JointPose,
         target_px: Option<[f64; 2]>,
         elapsed_s: f64,
     ) -> UnitVector3<f64> {
-        let previous = self.previous.as_ref().map(|p| p[i]);
         let foot = self.skeleton.foot_px;
         let target = target_px.map(|t| [t[0] - foot[0], foot[1] - t[1]]);
         if branch.length < 1e-6 {

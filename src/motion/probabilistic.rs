@@ -1,8 +1,7 @@
 //! The probabilistic solution: the rotation that best trades the tracked position against the
-//! branch's own shape, within bounds (Li et al. section 4.2, eq. 7-10).
+//! branch's own shape, within bounds (Li 2011 sect. 4.2, eq. 7-10).
 
-use super::search::{self, tangents};
-use nalgebra::{Rotation3, Unit, UnitQuaternion, UnitVector3, Vector2};
+use nalgebra::{UnitQuaternion, UnitVector3, Vector2};
 
 /// What is known of one branch in one frame. Directions are in the axes of the parent branch at
 /// rest.
@@ -54,29 +53,17 @@ impl Problem {
         let shape = self.parent_direction.map_or(0.0, |p| {
             (p.angle(d) - p.angle(&self.rest_direction)) / self.sigma_shape
         });
-        let from = |sigma: Option<f64>, d0: &UnitVector3<f64>| {
-            sigma.map_or(0.0, |s| {
-                (y.z - (self.parent_rotation * d0.into_inner()).z) / s
-            })
-        };
-        let depth = from(self.sigma_depth, &self.previous_direction);
-        let lean = from(self.sigma_lean, &self.rest_direction);
+        let depth = self.sigma_depth.map_or(0.0, |sigma| {
+            (y.z - self.depth_of(&self.previous_direction)) / sigma
+        });
+        let lean = self.sigma_lean.map_or(0.0, |sigma| {
+            (y.z - self.depth_of(&self.rest_direction)) / sigma
+        });
         0.5 * (track + shape * shape + depth * depth + lean * lean)
     }
 
-    /// The most probable direction. (The paper tries values exhaustively.)
-    pub fn solve(&self) -> UnitVector3<f64> {
-        search::best(self)
+    /// Component of a direction along the line of sight, to the viewer.
+    fn depth_of(&self, direction: &UnitVector3<f64>) -> f64 {
+        (self.parent_rotation * direction.into_inner()).z
     }
-}
-
-/// The rotation that takes `from` to `to` without twist about the branch.
-pub fn shortest_rotation(from: &UnitVector3<f64>, to: &UnitVector3<f64>) -> UnitQuaternion<f64> {
-    UnitQuaternion::rotation_between_axis(from, to).unwrap_or_else(|| {
-        let (axis, _) = tangents(from);
-        UnitQuaternion::from_rotation_matrix(&Rotation3::from_axis_angle(
-            &Unit::new_normalize(axis),
-            std::f64::consts::PI,
-        ))
-    })
 }

@@ -1,7 +1,7 @@
 //! The rotations of a pose of which only the places are known, as in a table that was written.
 
 use super::PoseEstimator;
-use super::probabilistic::shortest_rotation;
+use super::rotation::shortest_rotation;
 use crate::model::{JointPose, Pose};
 use nalgebra::{Point3, Unit, UnitQuaternion};
 
@@ -23,7 +23,7 @@ impl PoseEstimator {
             };
             let parent = joints[branch.parent];
             let own = match &branch.copy {
-                Some(copied) => self.turn_of_copy(copied, &joints),
+                Some(copy) => self.turn_of_copy(copy, &joints),
                 None => places
                     .get(i)
                     .zip(places.get(branch.parent))

@@ -10,6 +10,7 @@
 
 use super::border;
 use super::probabilistic::Problem;
+use super::rotation::tangents;
 use nalgebra::{Unit, UnitVector3, Vector2, Vector3};
 
 /// Steps at most; it ends when the cost no longer falls, mostly after three to five.
@@ -17,8 +18,15 @@ const ITERATIONS: usize = 40;
 /// A start as near as this to where one has led before, radians, leads there, too.
 const SAME: f64 = 1e-3;
 
-/// The most probable direction, in the axes of the parent branch at rest.
-pub(super) fn best(problem: &Problem) -> UnitVector3<f64> {
+impl Problem {
+    /// The most probable direction, in the axes of the parent branch at rest. (The paper tries
+    /// values exhaustively.)
+    pub fn solve(&self) -> UnitVector3<f64> {
+        best(self)
+    }
+}
+
+fn best(problem: &Problem) -> UnitVector3<f64> {
     let back = problem.parent_rotation.inverse();
     let Some(target) = problem.target else {
         // Nothing was seen: eq. 10 alone is satisfied by the branch keeping its angle.
@@ -58,8 +66,7 @@ struct Search {
     length: f64,
     previous: UnitVector3<f64>,
     rest: UnitVector3<f64>,
-    /// Direction of the parent branch, and the angle to it at rest.
-    parent: Option<(Vector3<f64>, f64)>,
+    parent: Option<Parent>,
     /// One over the standard deviations: of the place, px, of the angle, and of both priors on the
     /// depth together.
     per_track: f64,
@@ -69,6 +76,13 @@ struct Search {
     depth: f64,
     max_step: f64,
     max_total: f64,
+}
+
+/// The parent branch.
+struct Parent {
+    direction: Vector3<f64>,
+    /// Angle of the branch to it at rest.
+    rest_angle: f64,
 }
 
 /// What a direction is off by, in standard deviations.
@@ -87,16 +101,15 @@ impl Off {
 
 impl Search {
     fn new(problem: &Problem, target: [f64; 2]) -> Self {
-        let turned = |d: &UnitVector3<f64>| problem.parent_rotation * d;
-        let (previous, rest) = (
-            turned(&problem.previous_direction),
-            turned(&problem.rest_direction),
-        );
-        let weight = |sigma: Option<f64>| sigma.map_or(0.0, |s| 1.0 / (s * s));
+        let previous = problem.parent_rotation * problem.previous_direction;
+        let rest = problem.parent_rotation * problem.rest_direction;
         let (rate, lean) = (weight(problem.sigma_depth), weight(problem.sigma_lean));
         let parent = problem.parent_direction.map(|p| {
-            let parent = turned(&p).into_inner();
-            (parent, parent.dot(&rest).clamp(-1.0, 1.0).acos())
+            let direction = (problem.parent_rotation * p).into_inner();
+            Parent {
+                direction,
+                rest_angle: direction.dot(&rest).clamp(-1.0, 1.0).acos(),
+            }
         });
         Self {
             target: Vector2::new(target[0], target[1]),
@@ -114,12 +127,12 @@ impl Search {
     }
 
     fn at(&self, d: &UnitVector3<f64>) -> Off {
-        let shape = |&(parent, rest): &(Vector3<f64>, f64)| {
-            (parent.dot(d).clamp(-1.0, 1.0).acos() - rest) * self.per_shape
-        };
         Off {
             track: (d.xy() * self.length - self.target) * self.per_track,
-            shape: self.parent.as_ref().map_or(0.0, shape),
+            shape: self.parent.as_ref().map_or(0.0, |parent| {
+                let angle = parent.direction.dot(d).clamp(-1.0, 1.0).acos();
+                (angle - parent.rest_angle) * self.per_shape
+            }),
             depth: (d.z - self.depth) * self.per_depth,
         }
     }
@@ -146,7 +159,7 @@ impl Search {
             // d(alpha)/d(d) = -p / sin(alpha); where the branch goes straight on alpha has no
             // slope.
             let (sa, sb) = match &self.parent {
-                Some((p, _)) if p.cross(&d).norm_squared() > 1e-6 => {
+                Some(Parent { direction: p, .. }) if p.cross(&d).norm_squared() > 1e-6 => {
                     let slope = -self.per_shape / p.cross(&d).norm();
                     (slope * p.dot(&a), slope * p.dot(&b))
                 }
@@ -205,6 +218,11 @@ impl Search {
     }
 }
 
+/// One over the variance; 0 for none.
+fn weight(sigma: Option<f64>) -> f64 {
+    sigma.map_or(0.0, |s| 1.0 / (s * s))
+}
+
 /// `d`, or where it is more than `angle` away from `centre`, the direction on the way to it that is
 /// not.
 fn within(d: &UnitVector3<f64>, centre: &UnitVector3<f64>, angle: f64) -> UnitVector3<f64> {
@@ -214,15 +232,4 @@ fn within(d: &UnitVector3<f64>, centre: &UnitVector3<f64>, angle: f64) -> UnitVe
     }
     // Opposite directions have no shortest way; any is as good, and staying is safest.
     centre.try_slerp(d, angle / apart, 1e-9).unwrap_or(*centre)
-}
-
-/// Two unit vectors at right angles to `d` and to each other.
-pub(super) fn tangents(d: &UnitVector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    let other = if d.x.abs() < 0.6 {
-        Vector3::x()
-    } else {
-        Vector3::y()
-    };
-    let a = d.cross(&other).normalize();
-    (a, d.cross(&a))
 }

@@ -5,6 +5,7 @@ use super::steady::steadiness;
 use super::{region, trunk};
 use crate::config;
 use crate::model::{Luma, Outline, Size};
+use crate::signal::median;
 
 /// Width to which pictures are reduced, px: sway of a pixel or two is then still seen, single-pixel
 /// noise is not.
@@ -152,25 +153,10 @@ impl AutoOutline {
     }
 
     fn reduced_region(&self) -> opencv::Result<Option<Outline>> {
-        let (size, px) = (self.reduced, |share: f64| {
-            (share * f64::from(self.reduced.width)).round() as u32
-        });
-        let Some((first, _)) = self.kept.split_first().filter(|_| self.count >= 2.0) else {
+        let size = self.reduced;
+        let Some(mut mask) = self.moving_tree() else {
             return Ok(None);
         };
-        let moving = self.moving();
-        if (moving.iter().filter(|m| **m).count() as f64) < LEAST_MOVING * size.area() as f64 {
-            return Ok(None);
-        }
-        let median = self.median();
-        let was_tree = |(i, &moves): (usize, &bool)| {
-            moves && first.1.pixels[i].abs_diff(median[i]) >= OFF_MEDIAN
-        };
-        let mut mask: Vec<u8> = moving
-            .iter()
-            .enumerate()
-            .map(|m| if was_tree(m) { 255 } else { 0 })
-            .collect();
         region::without_specks(size, &mut mask, SPECK_GAP_PX, SPECK_SHARE)?;
         let step = self.kept.len().div_ceil(COMPARED);
         let compared: Vec<&Luma> = self
@@ -179,36 +165,42 @@ impl AutoOutline {
             .step_by(step)
             .map(|(_, picture)| picture)
             .collect();
-        let stands = trunk::stand(size, &mut mask, &steadiness(&compared));
-        let Some(mut one) = region::close_to_one(size, &mask, px(CLOSE_SHARE))? else {
+        let trunk = trunk::stand(size, &mut mask, &steadiness(&compared));
+        let Some(one) = closed(size, &mask)? else {
             return Ok(None);
         };
-        let mut share = CLOSE_SHARE + CLOSE_STEP;
-        while share <= CLOSE_MOST && held(&mask, &one) < NEARLY_ALL {
-            if let Some(joined) = region::close_to_one(size, &mask, px(share))?
-                .filter(|o| held(&mask, o) >= NEARLY_ALL)
-            {
-                one = joined;
-            }
-            share += CLOSE_STEP;
-        }
-        let mut wide = region::grown(size, &one.mask, px(MARGIN_SHARE))?;
-        if let Some(trunk) = stands {
+        let mut wide = region::grown(size, &one.mask, share_px(size, MARGIN_SHARE))?;
+        if let Some(trunk) = trunk {
             let below = trunk.waist * size.width as usize;
             wide[below..].copy_from_slice(&one.mask[below..]);
         }
         Ok(region::close_to_one(size, &wide, 0)?.filter(|o| o.coverage() >= LEAST_COVERAGE))
     }
 
+    /// The pixels that move and were tree in the first picture, 255 there and 0 elsewhere; `None`
+    /// if hardly anything moves.
+    fn moving_tree(&self) -> Option<Vec<u8>> {
+        let (_, first) = self.kept.first().filter(|_| self.count >= 2.0)?;
+        let moving = self.moving();
+        let count = moving.iter().filter(|m| **m).count();
+        if (count as f64) < LEAST_MOVING * self.reduced.area() as f64 {
+            return None;
+        }
+        let mut mask = self.median_over_time();
+        for ((pixel, first), moves) in mask.iter_mut().zip(&first.pixels).zip(moving) {
+            let was_tree = moves && first.abs_diff(*pixel) >= OFF_MEDIAN;
+            *pixel = if was_tree { 255 } else { 0 };
+        }
+        Some(mask)
+    }
+
     /// Which pixels change more than noise does.
     fn moving(&self) -> Vec<bool> {
-        let sway = |(s, c): (&f32, &f32)| ((s - 0.5 * c) / (self.count - 1.0)).max(0.0).sqrt();
-        let deviation: Vec<f32> = self
-            .sum_sq
-            .iter()
-            .zip(&self.sum_change_sq)
-            .map(sway)
-            .collect();
+        let mut deviation: Vec<f32> = Vec::with_capacity(self.sum_sq.len());
+        for (sum_sq, sum_change_sq) in self.sum_sq.iter().zip(&self.sum_change_sq) {
+            let variance = (sum_sq - 0.5 * sum_change_sq) / (self.count - 1.0);
+            deviation.push(variance.max(0.0).sqrt());
+        }
         let mut sorted = deviation.clone();
         let quarter = sorted.len() / 4;
         let quiet = *sorted.select_nth_unstable_by(quarter, f32::total_cmp).1;
@@ -217,17 +209,13 @@ impl AutoOutline {
     }
 
     /// Median of every pixel over time.
-    fn median(&self) -> Vec<u8> {
-        let mut values = vec![0; self.kept.len()];
-        let of = |i: usize| {
-            values
-                .iter_mut()
-                .zip(&self.kept)
-                .for_each(|(value, (_, picture))| *value = picture.pixels[i]);
-            let middle = values.len() / 2;
-            *values.select_nth_unstable(middle).1
-        };
-        (0..self.reduced.area()).map(of).collect()
+    fn median_over_time(&self) -> Vec<u8> {
+        let mut medians = Vec::with_capacity(self.reduced.area());
+        for i in 0..self.reduced.area() {
+            let values = self.kept.iter().map(|(_, picture)| picture.pixels[i]);
+            medians.push(median(values.collect(), u8::cmp).unwrap_or(0));
+        }
+        medians
     }
 
     fn keep(&mut self, picture: Luma, time_s: f64) {
@@ -290,6 +278,28 @@ pub fn whole(size: Size) -> Outline {
         polygon_px: vec![[0, 0], [w, 0], [w, h], [0, h]],
         matte: None,
     }
+}
+
+/// One region of what is in a mask; `None` where it is empty. Wider gaps are closed only if one
+/// piece then has nearly all.
+fn closed(size: Size, mask: &[u8]) -> opencv::Result<Option<Outline>> {
+    let Some(mut one) = region::close_to_one(size, mask, share_px(size, CLOSE_SHARE))? else {
+        return Ok(None);
+    };
+    let mut share = CLOSE_SHARE + CLOSE_STEP;
+    while share <= CLOSE_MOST && held(mask, &one) < NEARLY_ALL {
+        let joined = region::close_to_one(size, mask, share_px(size, share))?;
+        if let Some(joined) = joined.filter(|o| held(mask, o) >= NEARLY_ALL) {
+            one = joined;
+        }
+        share += CLOSE_STEP;
+    }
+    Ok(Some(one))
+}
+
+/// A share of the picture's width, px.
+fn share_px(size: Size, share: f64) -> u32 {
+    (share * f64::from(size.width)).round() as u32
 }
 
 /// Share of a mask that an outline holds.

@@ -31,22 +31,13 @@ pub enum DensityError {
 /// It cannot be read, is of another size, or has nothing in it.
 pub fn density(path: &Path, size: Size) -> Result<Luma, DensityError> {
     let name = path.display().to_string();
-    let unreadable = |what: String| DensityError::Unreadable {
-        name: name.clone(),
-        what,
+    let picture = match decode(path) {
+        Ok(picture) => picture.into_luma_alpha8(),
+        Err(e) => {
+            let what = e.to_string();
+            return Err(DensityError::Unreadable { name, what });
+        }
     };
-    let reader = image::ImageReader::open(path).map_err(|e| unreadable(e.to_string()))?;
-    let mut reader = reader
-        .with_guessed_format()
-        .map_err(|e| unreadable(e.to_string()))?;
-    let mut limits = image::Limits::default();
-    limits.max_image_width = Some(16384);
-    limits.max_image_height = Some(16384);
-    reader.limits(limits);
-    let picture = reader
-        .decode()
-        .map_err(|e| unreadable(e.to_string()))?
-        .into_luma_alpha8();
     let found = Size::new(picture.width(), picture.height());
     if found != size {
         return Err(DensityError::WrongSize {
@@ -55,11 +46,22 @@ pub fn density(path: &Path, size: Size) -> Result<Luma, DensityError> {
             wanted: size,
         });
     }
-    let seen = |p: &image::LumaA<u8>| (u16::from(p.0[0]) * u16::from(p.0[1]) / 255) as u8;
-    let pixels: Vec<u8> = picture.pixels().map(seen).collect();
+    let pixels: Vec<u8> = picture
+        .pixels()
+        .map(|p| (u16::from(p.0[0]) * u16::from(p.0[1]) / 255) as u8)
+        .collect();
     let mean = pixels.iter().map(|&p| f64::from(p)).sum::<f64>() / pixels.len().max(1) as f64;
     if mean < LEAST_MEAN {
         return Err(DensityError::Empty { name });
     }
     Ok(Luma { size, pixels })
+}
+
+fn decode(path: &Path) -> image::ImageResult<image::DynamicImage> {
+    let mut reader = image::ImageReader::open(path)?.with_guessed_format()?;
+    let mut limits = image::Limits::default();
+    limits.max_image_width = Some(16384);
+    limits.max_image_height = Some(16384);
+    reader.limits(limits);
+    reader.decode()
 }

@@ -1,4 +1,4 @@
-//! The matting Laplacian as a matrix of bands (Levin et al. 2008; Zeng eq. 2.4 and 2.6).
+//! The matting Laplacian as a matrix of bands (Levin et al. 2008; Zeng 2015 eq. 2.4 and 2.6).
 
 use super::scribbles::Mark;
 
@@ -11,8 +11,7 @@ pub const NEIGHBOURS: usize = 12;
 const WINDOW: usize = 9;
 
 /// A symmetric matrix over the pixels of a picture, of which row `i` holds its diagonal and the
-/// columns
-/// `i - steps[k]`.
+/// columns `i - steps[k]`.
 pub struct Banded {
     /// Ascending.
     pub steps: [usize; NEIGHBOURS],
@@ -44,14 +43,14 @@ pub fn of(colours: &[[f64; 3]], marks: &[Mark], width: usize) -> Banded {
         diagonal: vec![0.0; n],
     };
     let place: [usize; WINDOW] = std::array::from_fn(|p| p / 3 * width + p % 3);
-    let band = |p: usize, q: usize| {
-        steps
-            .iter()
-            .position(|&s| q < p && s == place[p] - place[q])
-            .unwrap_or(0)
-    };
-    let bands: [[usize; WINDOW]; WINDOW] =
-        std::array::from_fn(|p| std::array::from_fn(|q| band(p, q)));
+    // For the pixels p and q < p of a window the band that holds their entry.
+    let mut bands = [[0; WINDOW]; WINDOW];
+    for p in 0..WINDOW {
+        for (q, earlier) in place[..p].iter().enumerate() {
+            let band = steps.iter().position(|&s| s == place[p] - earlier);
+            bands[p][q] = band.unwrap_or(0);
+        }
+    }
     for v in 0..n / width - 2 {
         for u in 0..width - 2 {
             let at = place.map(|p| v * width + u + p);
@@ -70,9 +69,9 @@ pub fn of(colours: &[[f64; 3]], marks: &[Mark], width: usize) -> Banded {
     matrix
 }
 
-/// What is taken off the Kronecker delta in eq. 2.4, for the pairs of a window: (1 + (I_i - mu)'
-/// C^-1 (I_j - mu)) / 9, with C the covariance of its colours plus epsilon / 9. Only the lower
-/// triangle is filled.
+/// What is taken off the Kronecker delta in Zeng 2015 eq. 2.4, for the pairs of a window:
+/// (1 + (I_i - mu)' C^-1 (I_j - mu)) / 9, with C the covariance of its colours plus epsilon / 9.
+/// Only the lower triangle is filled.
 fn shares(colours: &[[f64; 3]; WINDOW]) -> [[f64; WINDOW]; WINDOW] {
     let ninth = 1.0 / WINDOW as f64;
     let mean: [f64; 3] = std::array::from_fn(|c| colours.iter().map(|p| p[c]).sum::<f64>() * ninth);
@@ -97,11 +96,15 @@ fn shares(colours: &[[f64; 3]; WINDOW]) -> [[f64; WINDOW]; WINDOW] {
     share
 }
 
+/// Opacity of a decided pixel; 0 for the others.
+fn value(mark: Mark) -> f64 {
+    f64::from(u8::from(mark == Mark::Tree))
+}
+
 impl Banded {
     /// Takes the decided pixels out of the unknowns: their rows become those of the identity, and
     /// what they say of the others goes to the right-hand side, which is returned.
     pub fn decide(&mut self, marks: &[Mark]) -> Vec<f64> {
-        let value = |mark: Mark| f64::from(u8::from(mark == Mark::Tree));
         let mut right: Vec<f64> = marks.iter().map(|&m| value(m)).collect();
         for i in 0..marks.len() {
             for (entry, step) in self.before[i].iter_mut().zip(self.steps) {

@@ -1,7 +1,9 @@
-//! Scribbles solved by closed-form matting (Levin, Lischinski and Weiss 2008; Zeng eq. 2.1 to 2.6).
+//! Scribbles solved by closed-form matting (Levin, Lischinski and Weiss 2008; Zeng 2015 eq. 2.1 to
+//! 2.6).
 
+use super::error::OutlineError;
 use super::scribbles::{Mark, Scribbles};
-use super::{OutlineError, laplacian, region, solve};
+use super::{laplacian, region, solve};
 use crate::model::{Outline, Rgb, Size};
 
 /// Gaps between branches up to this share of the picture's width are in the region.
@@ -20,39 +22,47 @@ const ENOUGH: f64 = 5e-5;
 /// # Errors
 /// The picture is too small, or OpenCV fails.
 pub fn outline(scribbles: &Scribbles, picture: &Rgb) -> Result<Outline, OutlineError> {
-    let bad = |what: String| OutlineError::BadFile {
-        name: scribbles.name.clone(),
-        what,
-    };
     let (small, size) = (picture.size, scribbles.size);
-    let solved = solved(picture, scribbles)
-        .ok_or_else(|| bad(format!("a {small} picture is too small for scribbles")))?;
-    let tree: Vec<u8> = solved
-        .iter()
-        .map(|&a| if a >= 0.5 { 255 } else { 0 })
-        .collect();
+    let Some(solved) = solved(picture, scribbles) else {
+        let what = format!("a {small} picture is too small for scribbles");
+        return Err(OutlineError::bad_file(&scribbles.name, what));
+    };
+    let one = one_region(&solved, small, size)
+        .map_err(|e| OutlineError::bad_file(&scribbles.name, e))?
+        .ok_or_else(|| {
+            let what = "the scribbles leave no tree; draw more white strokes on it";
+            OutlineError::bad_file(&scribbles.name, what)
+        })?;
+    Ok(Outline {
+        matte: Some(opacity(&enlarged(&solved, small, size))),
+        ..one
+    })
+}
+
+/// The region of `size` in which the opacity `solved` at the size `small` is at least half; `None`
+/// where there is none.
+fn one_region(solved: &[f64], small: Size, size: Size) -> opencv::Result<Option<Outline>> {
     let close_px = (CLOSE_SHARE * f64::from(small.width)).round() as u32;
     // Closed where it was solved: the time of that grows with the fourth power of the picture's
     // width.
-    let one = region::close_to_one(small, &tree, close_px).map_err(|e| bad(e.to_string()))?;
-    let none = || bad("the scribbles leave no tree; draw more white strokes on it".into());
-    let one = one.ok_or_else(none)?;
+    let Some(one) = region::close_to_one(small, &at_least_half(solved), close_px)? else {
+        return Ok(None);
+    };
     let inside: Vec<f64> = one
         .mask
         .iter()
         .map(|&m| if m == 0 { 0.0 } else { 1.0 })
         .collect();
-    let mask: Vec<u8> = enlarged(&inside, small, size)
+    let mask = at_least_half(&enlarged(&inside, small, size));
+    region::close_to_one(size, &mask, 0)
+}
+
+/// 255 where the opacity is at least half, else 0.
+fn at_least_half(alpha: &[f64]) -> Vec<u8> {
+    alpha
         .iter()
         .map(|&a| if a >= 0.5 { 255 } else { 0 })
-        .collect();
-    let one = region::close_to_one(size, &mask, 0)
-        .map_err(|e| bad(e.to_string()))?
-        .ok_or_else(none)?;
-    Ok(Outline {
-        matte: Some(opacity(&enlarged(&solved, small, size))),
-        ..one
-    })
+        .collect()
 }
 
 /// Opacity of the tree at every pixel of the scribbles, 0 to 255; `None` where the picture is too
@@ -180,12 +190,16 @@ fn reduced(marks: &[Mark], from: Size, to: Size) -> Vec<Mark> {
         *tree += u32::from(*mark == Mark::Tree);
         *background += u32::from(*mark == Mark::Background);
     }
-    let winner = |&(tree, background): &(u32, u32)| match (tree, background) {
+    votes.into_iter().map(majority).collect()
+}
+
+/// What most of the decided pixels are, by the votes for tree and for background.
+fn majority((tree, background): (u32, u32)) -> Mark {
+    match (tree, background) {
         (0, 0) => Mark::Undecided,
         _ if tree >= background => Mark::Tree,
         _ => Mark::Background,
-    };
-    votes.iter().map(winner).collect()
+    }
 }
 
 /// Values at a larger size, bilinear.
@@ -193,31 +207,43 @@ fn enlarged(values: &[f64], from: Size, to: Size) -> Vec<f64> {
     if from == to {
         return values.to_vec();
     }
-    let place = |i: u32, from: u32, to: u32| {
-        let at = (f64::from(i) + 0.5) * f64::from(from) / f64::from(to) - 0.5;
-        let at = at.clamp(0.0, f64::from(from - 1));
-        (
-            at as usize,
-            (at as usize + 1).min(from as usize - 1),
-            at.fract(),
-        )
-    };
-    let columns: Vec<(usize, usize, f64)> = (0..to.width)
-        .map(|u| place(u, from.width, to.width))
+    let columns: Vec<Between> = (0..to.width)
+        .map(|u| Between::of(u, from.width, to.width))
         .collect();
+    let width = from.width as usize;
     let mut into = Vec::with_capacity(to.area());
     for v in 0..to.height {
-        let (above, below, down) = place(v, from.height, to.height);
-        let row = |v: usize| &values[v * from.width as usize..][..from.width as usize];
-        let (above, below) = (row(above), row(below));
-        let between = |row: &[f64], (left, right, over): (usize, usize, f64)| {
-            row[left] * (1.0 - over) + row[right] * over
-        };
-        into.extend(
-            columns
-                .iter()
-                .map(|&c| between(above, c) * (1.0 - down) + between(below, c) * down),
-        );
+        let rows = Between::of(v, from.height, to.height);
+        let [above, below] = [rows.low, rows.high].map(|v| &values[v * width..][..width]);
+        for column in &columns {
+            let (upper, lower) = (column.mix(above), column.mix(below));
+            into.push(upper * (1.0 - rows.share) + lower * rows.share);
+        }
     }
     into
+}
+
+/// A place between two pixels of a smaller picture.
+struct Between {
+    low: usize,
+    high: usize,
+    /// How far it is from the low one to the high one, 0 to 1.
+    share: f64,
+}
+
+impl Between {
+    /// Where pixel `i` of `to` is among `from` pixels.
+    fn of(i: u32, from: u32, to: u32) -> Self {
+        let at = (f64::from(i) + 0.5) * f64::from(from) / f64::from(to) - 0.5;
+        let at = at.clamp(0.0, f64::from(from - 1));
+        Self {
+            low: at as usize,
+            high: (at as usize + 1).min(from as usize - 1),
+            share: at.fract(),
+        }
+    }
+
+    fn mix(&self, values: &[f64]) -> f64 {
+        values[self.low] * (1.0 - self.share) + values[self.high] * self.share
+    }
 }

@@ -2,6 +2,7 @@
 
 mod auto;
 mod density;
+mod error;
 mod laplacian;
 mod matting;
 mod polygon;
@@ -13,36 +14,13 @@ mod trunk;
 
 pub use auto::{AutoOutline, Found, whole};
 pub use density::{DensityError, density};
+pub use error::OutlineError;
 pub use matting::{alpha, outline as from_scribbles};
 pub use polygon::{PolygonFile, crossing, outline as from_polygon};
-pub use scribbles::{Mark, Scribbles};
+pub use scribbles::{Given, Mark, Scribbles};
 
 use crate::model::{Outline, Size};
 use std::path::{Path, PathBuf};
-
-/// Why an outline was not taken.
-#[derive(Debug, thiserror::Error)]
-pub enum OutlineError {
-    #[error(
-        "cannot read outline {name}: {source}; check the name, or leave --outline out to find the tree by its motion"
-    )]
-    Unreadable {
-        name: String,
-        source: std::io::Error,
-    },
-    #[error("outline {name}: {what}; draw it on a frame of this clip, or leave --outline out")]
-    BadFile { name: String, what: String },
-    #[error(
-        "outline {name} is for {found}, the picture is {wanted}; draw it on a frame of this clip"
-    )]
-    WrongSize {
-        name: String,
-        found: Size,
-        wanted: Size,
-    },
-    #[error("the outline is no usable polygon: {what}")]
-    BadPolygon { what: String },
-}
 
 /// Where the outline comes from.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -62,21 +40,6 @@ impl std::str::FromStr for OutlineSpec {
         } else {
             OutlineSpec::File(s.into())
         })
-    }
-}
-
-/// An outline as a person gave it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Given {
-    /// The region itself.
-    Region(Outline),
-    /// What it is to be solved from, once the first picture is there ([`from_scribbles`]).
-    Scribbles(Scribbles),
-}
-
-impl From<Outline> for Given {
-    fn from(outline: Outline) -> Self {
-        Given::Region(outline)
     }
 }
 

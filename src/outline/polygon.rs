@@ -1,6 +1,7 @@
 //! Outlines drawn as polygons, in a file or on the screen.
 
-use super::{OutlineError, region};
+use super::error::OutlineError;
+use super::region;
 use crate::model::{Outline, Size};
 use serde::Deserialize;
 
@@ -18,10 +19,7 @@ pub struct PolygonFile {
 /// # Errors
 /// The text is no such JSON.
 pub fn parse(text: &str, name: &str) -> Result<PolygonFile, OutlineError> {
-    serde_json::from_str(text).map_err(|e| OutlineError::BadFile {
-        name: name.into(),
-        what: e.to_string(),
-    })
+    serde_json::from_str(text).map_err(|e| OutlineError::bad_file(name, e))
 }
 
 /// The region inside a polygon (px, in a picture of `size`).
@@ -29,14 +27,17 @@ pub fn parse(text: &str, name: &str) -> Result<PolygonFile, OutlineError> {
 /// # Errors
 /// Fewer than three different corners, a corner outside the picture, edges that cross, or no area.
 pub fn outline(polygon_px: &[[f64; 2]], size: Size) -> Result<Outline, OutlineError> {
-    let bad = |what: String| Err(OutlineError::BadPolygon { what });
+    let corners = corners(polygon_px, size).map_err(OutlineError::bad_polygon)?;
+    region::fill(size, &corners).map_err(OutlineError::bad_polygon)
+}
+
+/// The different corners of a polygon that can be an outline, or why it cannot.
+fn corners(polygon_px: &[[f64; 2]], size: Size) -> Result<Vec<[f64; 2]>, String> {
     let mut corners: Vec<[f64; 2]> = Vec::with_capacity(polygon_px.len());
     for &p in polygon_px {
-        if !(p[0].is_finite() && p[1].is_finite() && size.contains(p[0], p[1])) {
-            return bad(format!(
-                "corner ({}, {}) lies outside the {size} picture",
-                p[0], p[1]
-            ));
+        let [u, v] = p;
+        if !(u.is_finite() && v.is_finite() && size.contains(u, v)) {
+            return Err(format!("corner ({u}, {v}) lies outside the {size} picture"));
         }
         if corners.last() != Some(&p) {
             corners.push(p);
@@ -46,48 +47,46 @@ pub fn outline(polygon_px: &[[f64; 2]], size: Size) -> Result<Outline, OutlineEr
         corners.pop(); // closed by repeating the first corner
     }
     if corners.len() < 3 {
-        return bad(format!(
-            "it has {} different corners, at least 3 are needed",
-            corners.len()
+        let n = corners.len();
+        return Err(format!(
+            "it has {n} different corners, at least 3 are needed"
         ));
     }
     if let Some((a, b)) = crossing(&corners) {
-        return bad(format!(
-            "it crosses itself: edge {} cuts edge {}",
-            a + 1,
-            b + 1
-        ));
+        let (a, b) = (a + 1, b + 1);
+        return Err(format!("it crosses itself: edge {a} cuts edge {b}"));
     }
     if area(&corners) < 16.0 {
-        return bad("it encloses less than 16 pixels".into());
+        return Err("it encloses less than 16 pixels".into());
     }
-    region::fill(size, &corners).map_err(|e| OutlineError::BadPolygon {
-        what: e.to_string(),
-    })
+    Ok(corners)
 }
 
 /// The first two edges (numbered from their first corner) that cross each other.
 pub fn crossing(corners: &[[f64; 2]]) -> Option<(usize, usize)> {
     let n = corners.len();
-    let edge = |i: usize| (corners[i], corners[(i + 1) % n]);
-    (0..n).find_map(|i| {
-        let others = (i + 1..n).filter(|&j| j != i + 1 && (j + 1) % n != i);
-        others
-            .into_iter()
-            .find(|&j| edges_cross(edge(i), edge(j)))
-            .map(|j| (i, j))
-    })
+    for i in 0..n {
+        for j in i + 2..n {
+            let (a, b) = (corners[i], corners[i + 1]);
+            let (c, d) = (corners[j], corners[(j + 1) % n]);
+            // The last edge and the first are neighbours.
+            if (j + 1) % n != i && edges_cross(a, b, c, d) {
+                return Some((i, j));
+            }
+        }
+    }
+    None
 }
 
-type Edge = ([f64; 2], [f64; 2]);
-
-fn edges_cross((a, b): Edge, (c, d): Edge) -> bool {
-    // Edges that only touch are no harm: the pixels inside are the same whichever way one goes
-    // round.
-    let side = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| {
-        (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
-    };
+/// Whether the edge from `a` to `b` crosses that from `c` to `d`. Edges that only touch are no
+/// harm: the pixels inside are the same whichever way one goes round.
+fn edges_cross(a: [f64; 2], b: [f64; 2], c: [f64; 2], d: [f64; 2]) -> bool {
     side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0
+}
+
+/// Positive and negative on the two sides of the line from `p` to `q`.
+fn side(p: [f64; 2], q: [f64; 2], r: [f64; 2]) -> f64 {
+    (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
 }
 
 fn area(corners: &[[f64; 2]]) -> f64 {

@@ -12,8 +12,10 @@ use opencv::prelude::*;
 
 /// The pixels inside a polygon (px, at least three corners), its border included.
 pub fn fill(size: Size, polygon_px: &[[f64; 2]]) -> opencv::Result<Outline> {
-    let corner = |p: &[f64; 2]| Point::new(p[0].round() as i32, p[1].round() as i32);
-    let corners: Vector<Point> = polygon_px.iter().map(corner).collect();
+    let corners: Vector<Point> = polygon_px
+        .iter()
+        .map(|p| Point::new(p[0].round() as i32, p[1].round() as i32))
+        .collect();
     let mut mask = Mat::new_rows_cols_with_default(
         size.height as i32,
         size.width as i32,

@@ -1,8 +1,9 @@
 //! Outlines drawn as a picture: a mask, white on black, or scribbles, white and black strokes on
 //! undecided ground.
 
-use super::{Given, OutlineError, region};
-use crate::model::Size;
+use super::error::OutlineError;
+use super::region;
+use crate::model::{Outline, Size};
 use crate::signal::median;
 use image::RgbaImage;
 use std::path::Path;
@@ -31,7 +32,7 @@ pub enum Mark {
 }
 
 /// Strokes of a person who marked some of the tree and some of the background in the first frame
-/// (Zeng section 5.3.1).
+/// (Zeng 2015 sect. 5.3.1).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Scribbles {
     /// Name of the file, for messages.
@@ -39,6 +40,22 @@ pub struct Scribbles {
     pub size: Size,
     /// One for each pixel, row by row.
     pub marks: Vec<Mark>,
+}
+
+/// An outline as a person gave it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Given {
+    /// The region itself.
+    Region(Outline),
+    /// What it is to be solved from, once the first picture is there
+    /// ([`from_scribbles`](super::from_scribbles)).
+    Scribbles(Scribbles),
+}
+
+impl From<Outline> for Given {
+    fn from(outline: Outline) -> Self {
+        Given::Region(outline)
+    }
 }
 
 /// Reads a mask or scribbles (PNG, JPEG, BMP). They are told apart by what they hold: a mask is
@@ -50,12 +67,11 @@ pub struct Scribbles {
 /// scribbles.
 pub fn read(path: &Path, size: Size) -> Result<Given, OutlineError> {
     let name = path.display().to_string();
-    let bad = |what: String| OutlineError::BadFile {
-        name: name.clone(),
-        what,
-    };
     let picture = image::open(path)
-        .map_err(|e| bad(format!("it is neither a JSON polygon nor a picture ({e})")))?
+        .map_err(|e| {
+            let what = format!("it is neither a JSON polygon nor a picture ({e})");
+            OutlineError::bad_file(&name, what)
+        })?
         .into_rgba8();
     let found = Size::new(picture.width(), picture.height());
     if found != size {
@@ -77,12 +93,14 @@ pub fn read(path: &Path, size: Size) -> Result<Given, OutlineError> {
             .iter()
             .map(|s| if s.is_some_and(|s| s >= 128) { 255 } else { 0 })
             .collect();
-        let one = region::close_to_one(size, &mask, 0).map_err(|e| bad(e.to_string()))?;
-        return one
-            .map(Given::Region)
-            .ok_or_else(|| bad("nothing in it is white, and white is tree".into()));
+        let one = region::close_to_one(size, &mask, 0)
+            .map_err(|e| OutlineError::bad_file(&name, e))?
+            .ok_or_else(|| {
+                OutlineError::bad_file(&name, "nothing in it is white, and white is tree")
+            })?;
+        return Ok(Given::Region(one));
     }
-    check(&picture, &marks).map_err(|what| bad(what.into()))?;
+    check(&picture, &marks).map_err(|what| OutlineError::bad_file(&name, what))?;
     Ok(Given::Scribbles(Scribbles { name, size, marks }))
 }
 
@@ -103,19 +121,22 @@ fn mark(shade: Option<u8>) -> Mark {
 /// Whether it is a mask, also one with soft edges, in grey or in opacity.
 fn is_mask(picture: &RgbaImage, shades: &[Option<u8>], marks: &[Mark]) -> bool {
     let most = MOST_UNDECIDED * marks.len() as f64;
-    let few = |n: usize| n as f64 <= most;
-    let count = |mark: Mark| marks.iter().filter(|m| **m == mark).count();
-    if few(count(Mark::Undecided)) {
+    if count(marks, Mark::Undecided) as f64 <= most {
         return true;
     }
     let grey = shades.iter().flatten().filter(|s| GREY.contains(s)).count();
+    let little_grey = grey as f64 <= most;
     if shades.iter().all(Option::is_some) {
         // What is between black and white is of all shades at soft edges, and of one in scribbles.
-        return few(grey) && !one_shade(picture, marks);
+        return little_grey && !one_shade(picture, marks);
     }
     // White on nothing, cut out elsewhere: scribbles have black.
     let black = shades.iter().flatten().any(|s| *s < *GREY.start());
-    count(Mark::Tree) > 0 && !black && few(grey)
+    count(marks, Mark::Tree) > 0 && !black && little_grey
+}
+
+fn count(marks: &[Mark], wanted: Mark) -> usize {
+    marks.iter().filter(|m| **m == wanted).count()
 }
 
 /// Whether what is undecided and opaque is of one shade, but for the edges of strokes.
@@ -126,18 +147,22 @@ fn one_shade(picture: &RgbaImage, marks: &[Mark]) -> bool {
         .filter(|(p, m)| **m == Mark::Undecided && p.0[3] >= 128)
         .map(|(p, _)| p.0)
         .collect();
-    let values = |channel: usize| rest.iter().map(|p| p[channel]).collect();
-    let middle = [0, 1, 2].map(|channel| median(values(channel), u8::cmp).unwrap_or(0));
-    let near = |p: &&[u8; 4]| (0..3).all(|c| p[c].abs_diff(middle[c]) <= ONE_SHADE);
-    rest.iter().filter(near).count() as f64 >= MOST_OF_REST * rest.len() as f64
+    let middle = [0, 1, 2].map(|channel| {
+        let values = rest.iter().map(|p| p[channel]).collect();
+        median(values, u8::cmp).unwrap_or(0)
+    });
+    let near = rest
+        .iter()
+        .filter(|p| (0..3).all(|c| p[c].abs_diff(middle[c]) <= ONE_SHADE));
+    near.count() as f64 >= MOST_OF_REST * rest.len() as f64
 }
 
 /// Why scribbles cannot be solved.
 fn check(picture: &RgbaImage, marks: &[Mark]) -> Result<(), &'static str> {
     if !one_shade(picture, marks) {
         return Err(
-            "it is neither a mask (black and white) nor scribbles (white tree, black background, the rest one grey \
-                    or transparent)",
+            "it is neither a mask (black and white) nor scribbles (white tree, black background, \
+             the rest one grey or transparent)",
         );
     }
     match (
@@ -190,26 +215,26 @@ mod tests {
             [128, 128, 128, 255],
             [255, 255, 255, 0],
         );
-        let masked = |given: Result<Given, String>| match given {
-            Ok(Given::Region(outline)) => outline.mask.iter().filter(|m| **m != 0).count(),
-            other => panic!("{other:?}"),
-        };
-        assert_eq!(masked(given(black, &[(white, 9)])), 180);
-        // Saved without a ground.
-        assert_eq!(masked(given(clear, &[(white, 9)])), 180);
-        assert_eq!(masked(given([0; 4], &[(white, 9)])), 180);
+        // On black, and saved without a ground.
+        for ground in [black, clear, [0; 4]] {
+            let Ok(Given::Region(outline)) = given(ground, &[(white, 9)]) else {
+                panic!("{ground:?}")
+            };
+            assert_eq!(outline.mask.iter().filter(|m| **m != 0).count(), 180);
+        }
         for ground in [grey, clear, [200, 190, 210, 255]] {
             let Ok(Given::Scribbles(s)) = given(ground, &[(white, 9), (black, 40)]) else {
                 panic!("{ground:?}")
             };
-            let count = |mark| s.marks.iter().filter(|m| **m == mark).count();
-            assert_eq!(
-                (count(Mark::Tree), count(Mark::Background)),
-                (180, 180),
-                "{ground:?}"
-            );
+            for mark in [Mark::Tree, Mark::Background] {
+                assert_eq!(count(&s.marks, mark), 180, "{mark:?} on {ground:?}");
+            }
         }
     }
+
+    const SOFT_STRIPE: [u8; 20] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 10, 50, 128, 205, 255, 255, 255, 255, 200, 55, 8, 0,
+    ];
 
     /// A bare tree as a segmentation tool gives it is a lot of edge, fading in grey or in opacity.
     #[test]
@@ -219,19 +244,15 @@ mod tests {
             .tempfile()
             .expect("file");
         for by_opacity in [false, true] {
-            let pixel = |u: u32, _: u32| {
-                let soft = [
-                    0, 0, 0, 0, 0, 0, 0, 0, 10, 50, 128, 205, 255, 255, 255, 255, 200, 55, 8, 0,
-                ][u as usize % 20];
+            let picture = image::RgbaImage::from_fn(SIZE.width, SIZE.height, |u, _| {
+                let soft = SOFT_STRIPE[u as usize % 20];
                 image::Rgba(if by_opacity {
                     [255, 255, 255, soft]
                 } else {
                     [soft, soft, soft, 255]
                 })
-            };
-            image::RgbaImage::from_fn(SIZE.width, SIZE.height, pixel)
-                .save(file.path())
-                .expect("picture");
+            });
+            picture.save(file.path()).expect("picture");
             let outline = match read(file.path(), SIZE) {
                 Ok(Given::Region(outline)) => outline,
                 other => panic!("{other:?}"),
@@ -250,10 +271,10 @@ mod tests {
             .suffix(".png")
             .tempfile()
             .expect("file");
-        let pixel = |u: u32, v: u32| image::Rgb([(4 * u) as u8, (6 * v) as u8, (4 * u) as u8]);
-        image::RgbImage::from_fn(SIZE.width, SIZE.height, pixel)
-            .save(file.path())
-            .expect("picture");
+        let photograph = image::RgbImage::from_fn(SIZE.width, SIZE.height, |u, v| {
+            image::Rgb([(4 * u) as u8, (6 * v) as u8, (4 * u) as u8])
+        });
+        photograph.save(file.path()).expect("picture");
         let message = read(file.path(), SIZE)
             .map(drop)
             .expect_err("a photograph")

@@ -79,13 +79,18 @@ pub fn conjugate_gradients(
     }
     let left = dot(&residual, &residual).sqrt();
     tracing::warn!(
-        "the scribbles are not solved to the end: {MOST_ITERATIONS} steps leave {left:.1e} of {enough:.1e}; look at the \
-         outline, and draw more strokes if it is wrong"
+        "the scribbles are not solved to the end: {MOST_ITERATIONS} steps leave {left:.1e} of \
+         {enough:.1e}; look at the outline, and draw more strokes if it is wrong"
     );
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// The band in which the entries `step` before the diagonal are.
+fn band(steps: &[usize; FILLED], step: usize) -> Option<usize> {
+    steps.iter().position(|&s| s == step)
 }
 
 impl Factor {
@@ -94,23 +99,24 @@ impl Factor {
     fn of(matrix: &Banded, width: usize, raised: f64) -> Option<Self> {
         let n = matrix.diagonal.len();
         let steps: [usize; FILLED] = steps_back(width, ROWS, COLUMNS);
-        let band = |step: usize| steps.iter().position(|&s| s == step);
         let mut before = vec![[0f32; FILLED]; n];
-        for (k, own) in matrix
-            .steps
-            .iter()
-            .enumerate()
-            .filter_map(|(k, &s)| Some((k, band(s)?)))
-        {
-            before
-                .iter_mut()
-                .zip(&matrix.before)
-                .for_each(|(to, from)| to[own] = from[k] as f32);
+        for (k, &step) in matrix.steps.iter().enumerate() {
+            let Some(own) = band(&steps, step) else {
+                continue;
+            };
+            for (to, from) in before.iter_mut().zip(&matrix.before) {
+                to[own] = from[k] as f32;
+            }
         }
-        // The column's entries p and q meet in row p; in this band of it, or in none.
-        let meet = steps.map(|p| steps.map(|q| p.checked_sub(q).filter(|d| *d > 0).and_then(band)));
-        let met: [Vec<(usize, usize)>; FILLED] =
-            std::array::from_fn(|p| (0..p).filter_map(|q| Some((q, meet[p][q]?))).collect());
+        // The column's entries p and q < p meet in row p; in this band of it, or in none.
+        let mut met: [Vec<(usize, usize)>; FILLED] = std::array::from_fn(|_| Vec::new());
+        for p in 0..FILLED {
+            for q in 0..p {
+                if let Some(to) = band(&steps, steps[p] - steps[q]) {
+                    met[p].push((q, to));
+                }
+            }
+        }
         let mut diagonal: Vec<f64> = matrix.diagonal.iter().map(|d| d * (1.0 + raised)).collect();
         let mut inverse = vec![0.0; n];
         let mut column = [0f32; FILLED];
@@ -193,16 +199,17 @@ mod tests {
     fn the_solution_is_that_of_a_direct_solver() {
         let (width, height) = (14, 11);
         let n = width * height;
-        let noise = |i: usize, c: usize| ((i * 7919 + c * 104_729 + 31) as f64 * 0.618_034).fract();
         let colours: Vec<[f64; 3]> = (0..n)
-            .map(|i| std::array::from_fn(|c| noise(i, c)))
+            .map(|i| [0, 1, 2].map(|c| ((i * 7919 + c * 104_729 + 31) as f64 * 0.618_034).fract()))
             .collect();
-        let mark = |i: usize| match i % 37 {
-            0 => Mark::Tree,
-            5 => Mark::Background,
-            _ => Mark::Undecided,
-        };
-        let marks: Vec<Mark> = (0..n).map(mark).collect();
+        let mut marks = vec![Mark::Undecided; n];
+        for i in 0..n {
+            match i % 37 {
+                0 => marks[i] = Mark::Tree,
+                5 => marks[i] = Mark::Background,
+                _ => {}
+            }
+        }
         let mut matrix = laplacian::of(&colours, &marks, width);
         let right = matrix.decide(&marks);
         let mut full = nalgebra::DMatrix::<f64>::zeros(n, n);

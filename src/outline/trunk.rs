@@ -1,6 +1,7 @@
 //! The tree's shadow on the ground taken off, and its trunk put where it stands.
 
 use crate::model::Size;
+use crate::signal::median;
 
 /// A row is judged with so many above and below it.
 const ROWS_ABOUT: usize = 2;
@@ -38,36 +39,23 @@ pub fn stand(size: Size, mask: &mut [u8], steady: &[f32]) -> Option<Trunk> {
         })
         .collect();
     let spans: Vec<Option<(usize, usize)>> = (0..rows.len()).map(|v| span(&rows, v)).collect();
-    let wide = |v: usize| spans[v].map_or(0.0, |(left, right)| (right - left + 1) as f64);
     let crown = crown_row(width, mask, steady)?;
-    let mut widest_below = 0.0f64;
-    let mut waist: Option<(f64, usize)> = None;
-    for v in (crown + 1..rows.len()).rev() {
-        if spans[v].is_some() {
-            let widens = widest_below / wide(v);
-            if waist.is_none_or(|(most, _)| widens > most) {
-                waist = Some((widens, v));
-            }
-        }
-        widest_below = widest_below.max(wide(v));
-    }
-    let (_, waist) = waist.filter(|(widens, _)| *widens >= WIDENS)?;
+    let waist = waist_row(&spans, crown)?;
     let (left, right) = spans[waist]?;
     let trunk = left..=right;
-    let below = || (waist + 1..rows.len()).flat_map(|v| rows[v].iter().map(move |&u| (u, v)));
-    let mut beside: Vec<f32> = below()
-        .filter(|(u, _)| !trunk.contains(u))
-        .map(|(u, v)| steady[v * width + u])
-        .collect();
-    beside.sort_unstable_by(f32::total_cmp);
-    if *beside.get(beside.len() / 2)? <= STEADY {
+    let (mut beside, mut foot) = (Vec::new(), waist);
+    for (v, row) in rows.iter().enumerate().skip(waist + 1) {
+        for u in row {
+            if trunk.contains(u) {
+                foot = v;
+            } else {
+                beside.push(steady[v * width + u]);
+            }
+        }
+    }
+    if median(beside, f32::total_cmp)? <= STEADY {
         return None;
     }
-    let foot = below()
-        .filter(|(u, _)| trunk.contains(u))
-        .map(|(_, v)| v)
-        .max()
-        .unwrap_or(waist);
     for (v, row) in mask.chunks_exact_mut(width).enumerate().skip(waist + 1) {
         row.fill(0);
         if v <= foot {
@@ -75,6 +63,26 @@ pub fn stand(size: Size, mask: &mut [u8], steady: &[f32]) -> Option<Trunk> {
         }
     }
     Some(Trunk { waist })
+}
+
+/// The row below `crown` from which on down it widens most; `None` if it widens by less than
+/// [`WIDENS`].
+fn waist_row(spans: &[Option<(usize, usize)>], crown: usize) -> Option<usize> {
+    let mut widest_below = 0.0f64;
+    let mut waist: Option<(f64, usize)> = None;
+    for v in (crown + 1..spans.len()).rev() {
+        let Some((left, right)) = spans[v] else {
+            continue;
+        };
+        let width = (right - left + 1) as f64;
+        let widens = widest_below / width;
+        if waist.is_none_or(|(most, _)| widens > most) {
+            waist = Some((widens, v));
+        }
+        widest_below = widest_below.max(width);
+    }
+    let (widens, row) = waist?;
+    (widens >= WIDENS).then_some(row)
 }
 
 /// First and last column of what changes in the rows about `v`.
@@ -91,14 +99,18 @@ fn span(rows: &[Vec<usize>], v: usize) -> Option<(usize, usize)> {
 
 /// The middle row of what changes its structure, or of all that changes.
 fn crown_row(width: usize, mask: &[u8], steady: &[f32]) -> Option<usize> {
-    let middle = |moves: &dyn Fn(f32) -> bool| {
-        let of: Vec<usize> = (0..mask.len())
-            .filter(|&i| mask[i] != 0 && moves(steady[i]))
-            .map(|i| i / width)
-            .collect();
-        of.get(of.len() / 2).copied()
+    let changing: Vec<usize> = (0..mask.len()).filter(|&i| mask[i] != 0).collect();
+    let swaying: Vec<usize> = changing
+        .iter()
+        .copied()
+        .filter(|&i| steady[i] < STEADY)
+        .collect();
+    let judged = if swaying.is_empty() {
+        changing
+    } else {
+        swaying
     };
-    middle(&|s| s < STEADY).or_else(|| middle(&|_| true))
+    Some(judged.get(judged.len() / 2)? / width)
 }
 
 #[cfg(test)]

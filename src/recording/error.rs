@@ -27,6 +27,20 @@ pub enum RecordingError {
 }
 
 impl RecordingError {
+    pub(super) fn unreadable(path: &Path, source: io::Error) -> Self {
+        Self::Unreadable {
+            path: path.to_owned(),
+            source,
+        }
+    }
+
+    pub(super) fn unusable(path: &Path, what: impl Into<String>) -> Self {
+        Self::Unusable {
+            path: path.to_owned(),
+            what: what.into(),
+        }
+    }
+
     pub(super) fn of_place(path: &Path, source: io::Error) -> Self {
         let path = path.to_owned();
         match source.kind() {

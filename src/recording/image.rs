@@ -7,6 +7,9 @@ use crate::model::{PixelFormat, RawFrame, Size};
 /// Frame of reference that images and annotations name.
 pub(super) const CAMERA: &str = "camera";
 
+/// Longest side of a picture that is taken, px.
+const MAX_SIDE_PX: u32 = 1 << 15;
+
 /// How the bytes of a [`Picture`] are to be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Encoding {
@@ -95,49 +98,100 @@ pub(super) fn encode(raw: &RawFrame, log_time_ns: u64, into: &mut Vec<u8>) {
     }
 }
 
-/// The picture in a message of the schema, with the time that the message gives itself, ns; `None`
-/// if there is none that can be used.
-pub(super) fn decode(schema: &str, message: &[u8]) -> Option<(Encoding, Option<i64>, Vec<u8>)> {
-    let raw = schema == RAW_IMAGE;
-    if !raw && schema != COMPRESSED_IMAGE {
-        return None;
+/// What a message holds.
+pub(super) struct Decoded {
+    pub encoding: Encoding,
+    /// The time that the message gives itself, ns.
+    pub time_ns: Option<i64>,
+    pub bytes: Vec<u8>,
+}
+
+/// The picture in a message of the schema; `None` if there is none that can be used.
+pub(super) fn decode(schema: &str, message: &[u8]) -> Option<Decoded> {
+    match schema {
+        COMPRESSED_IMAGE => decode_compressed(message),
+        RAW_IMAGE => decode_raw(message),
+        _ => None,
     }
-    let (mut name, mut data, mut time_ns) = ("", None, None);
-    let (mut width, mut height, mut given_step) = (0, 0, 0);
+}
+
+fn decode_compressed(message: &[u8]) -> Option<Decoded> {
+    let (mut time_ns, mut data, mut name) = (None, None, "");
     for (field, value) in Fields(message) {
-        match (raw, field, value) {
-            (_, 1, Value::Bytes(t)) => time_ns = timestamp(t),
-            (false, 2, Value::Bytes(d)) | (true, 6, Value::Bytes(d)) => data = Some(d),
-            (false, 3, Value::Bytes(n)) | (true, 4, Value::Bytes(n)) => {
-                name = std::str::from_utf8(n).ok()?
-            }
-            (true, 2, Value::Number(n)) => width = u32::try_from(n).ok()?,
-            (true, 3, Value::Number(n)) => height = u32::try_from(n).ok()?,
-            (true, 5, Value::Number(n)) => given_step = n as usize,
+        match (field, value) {
+            (1, Value::Bytes(t)) => time_ns = timestamp(t),
+            (2, Value::Bytes(d)) => data = Some(d),
+            (3, Value::Bytes(n)) => name = std::str::from_utf8(n).ok()?,
             _ => {}
         }
     }
-    let data = data?;
-    if !raw {
-        return Some((Encoding::File(name.to_owned()), time_ns, data.to_vec()));
+    Some(Decoded {
+        encoding: Encoding::File(name.to_owned()),
+        time_ns,
+        bytes: data?.to_vec(),
+    })
+}
+
+/// The fields of [`RAW_IMAGE`].
+#[derive(Default)]
+struct Raw<'a> {
+    time_ns: Option<i64>,
+    width: u32,
+    height: u32,
+    /// Name of the layout.
+    name: &'a str,
+    /// Bytes from one line to the next.
+    step: usize,
+    data: Option<&'a [u8]>,
+}
+
+fn decode_raw(message: &[u8]) -> Option<Decoded> {
+    let mut raw = Raw::default();
+    for (field, value) in Fields(message) {
+        match (field, value) {
+            (1, Value::Bytes(t)) => raw.time_ns = timestamp(t),
+            (2, Value::Number(n)) => raw.width = u32::try_from(n).ok()?,
+            (3, Value::Number(n)) => raw.height = u32::try_from(n).ok()?,
+            (4, Value::Bytes(n)) => raw.name = std::str::from_utf8(n).ok()?,
+            (5, Value::Number(n)) => raw.step = n as usize,
+            (6, Value::Bytes(d)) => raw.data = Some(d),
+            _ => {}
+        }
     }
-    let format = format_of(name)?;
-    if width == 0 || height == 0 || width > 1 << 15 || height > 1 << 15 {
-        return None;
+    raw.decoded()
+}
+
+impl Raw<'_> {
+    fn decoded(&self) -> Option<Decoded> {
+        let data = self.data?;
+        let format = format_of(self.name)?;
+        let sides = 1..=MAX_SIDE_PX;
+        if !sides.contains(&self.width) || !sides.contains(&self.height) {
+            return None;
+        }
+        let size = Size::new(self.width, self.height);
+        let line = step(format, size) as usize;
+        // Lines of another program's file may be padded.
+        let bytes = if self.step > line && format != PixelFormat::Nv12 {
+            unpadded(data, self.step, line, size.height as usize)
+        } else {
+            data.to_vec()
+        };
+        Some(Decoded {
+            encoding: Encoding::Pixels(format, size),
+            time_ns: self.time_ns,
+            bytes,
+        })
     }
-    let size = Size::new(width, height);
-    let line = step(format, size) as usize;
-    // Somebody else's lines may be padded.
-    let bytes = if given_step > line && format != PixelFormat::Nv12 {
-        data.chunks(given_step)
-            .take(height as usize)
-            .flat_map(|l| &l[..l.len().min(line)])
-            .copied()
-            .collect()
-    } else {
-        data.to_vec()
-    };
-    Some((Encoding::Pixels(format, size), time_ns, bytes))
+}
+
+/// The first `line` bytes of every `step`, `count` times.
+fn unpadded(data: &[u8], step: usize, line: usize, count: usize) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for padded in data.chunks(step).take(count) {
+        bytes.extend_from_slice(&padded[..padded.len().min(line)]);
+    }
+    bytes
 }
 
 fn timestamp(message: &[u8]) -> Option<i64> {

@@ -51,10 +51,7 @@ impl Reader {
     /// # Errors
     /// It cannot be read, is no recording, or holds several series of pictures.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
-        let file = File::open(path).map_err(|source| RecordingError::Unreadable {
-            path: path.to_owned(),
-            source,
-        })?;
+        let file = File::open(path).map_err(|e| RecordingError::unreadable(path, e))?;
         Self::new(path, file)
     }
 }
@@ -65,20 +62,15 @@ impl<R: Read + Seek> Reader<R> {
     /// # Errors
     /// As for [`Reader::open`].
     pub fn new(path: &Path, mut file: R) -> Result<Self, RecordingError> {
-        let unreadable = |source| RecordingError::Unreadable {
-            path: path.to_owned(),
-            source,
-        };
-        let unusable = |what: String| RecordingError::Unusable {
-            path: path.to_owned(),
-            what,
-        };
-        // What is told at the end is a help, not a condition.
-        let summary = summary(&mut file).map_err(unreadable)?.unwrap_or_default();
-        let Some(walk) = Walk::new(file).map_err(unreadable)? else {
-            return Err(unusable(
-                "it does not begin as a recording (MCAP) does; give a file that `record` made"
-                    .into(),
+        // The summary at the end is a help, not a condition.
+        let summary = summary(&mut file)
+            .map_err(|source| RecordingError::unreadable(path, source))?
+            .unwrap_or_default();
+        let walk = Walk::new(file).map_err(|source| RecordingError::unreadable(path, source))?;
+        let Some(walk) = walk else {
+            return Err(RecordingError::unusable(
+                path,
+                "it does not begin as a recording (MCAP) does; give a file that `record` made",
             ));
         };
         let mut reader = Self {
@@ -106,9 +98,11 @@ impl<R: Read + Seek> Reader<R> {
             .collect();
         if foreign.len() > 1 {
             let topics = foreign.into_iter().collect::<Vec<_>>().join(", ");
-            return Err(unusable(format!(
-                "it has several series of pictures ({topics}); keep one, e.g. with `mcap filter -y TOPIC`"
-            )));
+            let what = format!(
+                "it has several series of pictures ({topics}); keep one, e.g. with \
+                 `mcap filter -y TOPIC`"
+            );
+            return Err(RecordingError::unusable(path, what));
         }
         Ok(reader)
     }
@@ -120,13 +114,11 @@ impl<R: Read + Seek> Reader<R> {
 
     /// Pictures in the file, if it was ended properly.
     pub fn pictures_total(&self) -> Option<u64> {
-        let of = |(id, count): (&u16, &u64)| {
-            self.channels
-                .get(id)
-                .filter(|c| c.is_picture())
-                .map(|_| *count)
-        };
-        let total: u64 = self.counts.iter().filter_map(of).sum();
+        let of_pictures = self
+            .counts
+            .iter()
+            .filter(|(id, _)| self.channels.get(id).is_some_and(Channel::is_picture));
+        let total: u64 = of_pictures.map(|(_, count)| *count).sum();
         (total > 0).then_some(total)
     }
 
@@ -163,49 +155,60 @@ impl<R: Read + Seek> Reader<R> {
     /// The picture in the message that was just found, if it is one and wanted.
     fn picture(&mut self) -> Option<Picture> {
         let mut body = Cursor(self.walk.body());
-        let (id, number, log_ns, publish_ns) = (body.u16()?, body.u32()?, body.u64()?, body.u64()?);
-        let channel = self.channels.get(&id).filter(|c| c.is_picture())?;
-        if channel.counted.is_none()
-            && *self.chosen.get_or_insert_with(|| channel.topic.clone()) != channel.topic
-        {
-            self.others.insert(channel.topic.clone());
+        let head = MessageHead::read(&mut body)?;
+        let channel = self.channels.get(&head.channel)?;
+        if !channel.is_picture() {
             return None;
         }
-        let Some((encoding, own_ns, bytes)) = decode(&channel.schema, body.0) else {
+        let counted = channel.counted;
+        if counted.is_none() {
+            let chosen = self.chosen.get_or_insert_with(|| channel.topic.clone());
+            if *chosen != channel.topic {
+                self.others.insert(channel.topic.clone());
+                return None;
+            }
+        }
+        let Some(decoded) = decode(&channel.schema, body.0) else {
             self.unreadable += 1;
             return None;
         };
-        let shift_ns: i64 = self
-            .about
-            .get(SHIFT_NS)
-            .and_then(|n| n.parse().ok())
-            .unwrap_or(0);
-        let sensor_time_ns = match channel.counted {
-            Some(_) => i64::try_from(publish_ns).ok()?.checked_sub(shift_ns)?,
+        let sensor_time_ns = match counted {
+            Some(_) => self.sensor_time_ns(head.publish_ns)?,
             // What other programs mean by their times differs; the picture's own is the nearest to
             // the sensor's.
-            None => own_ns
+            None => decoded
+                .time_ns
                 .filter(|ns| *ns != 0)
-                .or(i64::try_from(log_ns).ok())?,
+                .or(i64::try_from(head.log_ns).ok())?,
         };
-        let sequence = (channel.counted == Some(true)).then(|| {
-            // 32 bits are in the file.
-            let first = || {
-                self.about
-                    .get(FIRST_SEQUENCE)
-                    .and_then(|n| n.parse().ok())
-                    .unwrap_or(u64::from(number))
-            };
-            let before = self.sequence.unwrap_or_else(first);
-            before.saturating_add(u64::from(number.wrapping_sub(before as u32)))
-        });
+        let sequence = (counted == Some(true)).then(|| self.whole_sequence(head.number));
         self.sequence = sequence.or(self.sequence);
         Some(Picture {
             sequence,
             sensor_time_ns,
-            encoding,
-            bytes,
+            encoding: decoded.encoding,
+            bytes: decoded.bytes,
         })
+    }
+
+    /// Of a time in one of our own files.
+    fn sensor_time_ns(&self, publish_ns: u64) -> Option<i64> {
+        let shift_ns = self.number(SHIFT_NS).unwrap_or(0);
+        i64::try_from(publish_ns).ok()?.checked_sub(shift_ns)
+    }
+
+    /// The driver's number of a picture, of which the file holds 32 bits.
+    fn whole_sequence(&self, number: u32) -> u64 {
+        let before = self
+            .sequence
+            .or_else(|| self.number(FIRST_SEQUENCE))
+            .unwrap_or(u64::from(number));
+        before.saturating_add(u64::from(number.wrapping_sub(before as u32)))
+    }
+
+    /// A number that the recording tells of itself.
+    fn number<T: std::str::FromStr>(&self, key: &str) -> Option<T> {
+        self.about.get(key)?.parse().ok()
     }
 
     /// Takes in a record that is no message.
@@ -314,6 +317,25 @@ impl<R: Read + Seek> Reader<R> {
             ));
         }
         lines
+    }
+}
+
+/// The head of a message.
+struct MessageHead {
+    channel: u16,
+    number: u32,
+    log_ns: u64,
+    publish_ns: u64,
+}
+
+impl MessageHead {
+    fn read(body: &mut Cursor) -> Option<Self> {
+        Some(Self {
+            channel: body.u16()?,
+            number: body.u32()?,
+            log_ns: body.u64()?,
+            publish_ns: body.u64()?,
+        })
     }
 }
 

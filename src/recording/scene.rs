@@ -81,13 +81,8 @@ pub(super) fn transforms(skeleton: &Skeleton, pose: &Pose, time_ns: u64, into: &
     let mut message = Message(into);
     // A quarter turn about x: the tree's y is the world's z.
     let half = std::f64::consts::FRAC_1_SQRT_2;
-    transform(
-        &mut message,
-        (WORLD, TREE),
-        time_ns,
-        [0.0; 3],
-        [half, 0.0, 0.0, half],
-    );
+    let upright = [half, 0.0, 0.0, half];
+    transform(&mut message, WORLD, TREE, time_ns, [0.0; 3], upright);
     for (node, joint) in skeleton.nodes[..skeleton.measured()]
         .iter()
         .zip(&pose.joints)
@@ -96,7 +91,8 @@ pub(super) fn transforms(skeleton: &Skeleton, pose: &Pose, time_ns: u64, into: &
         let name = format!("node_{}", node.name.0);
         transform(
             &mut message,
-            (TREE, &name),
+            TREE,
+            &name,
             time_ns,
             joint.position.coords.into(),
             [q.x, q.y, q.z, q.w],
@@ -106,7 +102,8 @@ pub(super) fn transforms(skeleton: &Skeleton, pose: &Pose, time_ns: u64, into: &
 
 fn transform(
     message: &mut Message,
-    (parent, child): (&str, &str),
+    parent: &str,
+    child: &str,
     time_ns: u64,
     translation: [f64; 3],
     rotation: [f64; 4],
@@ -184,36 +181,35 @@ struct NodeJson {
 /// The tree at rest with all that is known of its nodes.
 pub(super) fn skeleton_json(
     skeleton: &Skeleton,
-    (frame, time_s): (u64, f64),
+    frame: u64,
+    time_s: f64,
     into: &mut Vec<u8>,
 ) -> Result<(), serde_json::Error> {
-    let nodes = skeleton.nodes.iter().map(|n| {
-        let id_of = |n: Option<NodeId>| n.and_then(|n| skeleton.name_of(n)).map(|name| name.0);
-        let (id, parent, copy_of, p) = (n.name.0, id_of(n.parent), id_of(n.copy_of), n.position);
-        let (n_tracks, certainty) = (n.n_tracks, n.certainty);
-        NodeJson {
-            id,
-            parent,
-            level: n.level,
-            x: p.x,
-            y: p.y,
-            z: p.z,
-            radius: n.radius,
-            n_tracks,
-            certainty,
-            copy_of,
-        }
+    let nodes = skeleton.nodes.iter().map(|n| NodeJson {
+        id: n.name.0,
+        parent: id_of(skeleton, n.parent),
+        level: n.level,
+        x: n.position.x,
+        y: n.position.y,
+        z: n.position.z,
+        radius: n.radius,
+        n_tracks: n.n_tracks,
+        certainty: n.certainty,
+        copy_of: id_of(skeleton, n.copy_of),
     });
-    let size = skeleton.image_size;
-    let foot_px = skeleton.foot_px;
     let all = SkeletonJson {
         frame,
         time_s,
-        foot_px,
-        width: size.width,
-        height: size.height,
+        foot_px: skeleton.foot_px,
+        width: skeleton.image_size.width,
+        height: skeleton.image_size.height,
         nodes: nodes.collect(),
     };
     into.clear();
     serde_json::to_writer(into, &all)
+}
+
+/// The name of a node, by which files call it.
+fn id_of(skeleton: &Skeleton, node: Option<NodeId>) -> Option<u32> {
+    Some(skeleton.name_of(node?)?.0)
 }

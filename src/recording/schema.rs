@@ -42,22 +42,28 @@ pub(super) const ABOUT: &str = "arborcam";
 pub(super) const SHIFT_NS: &str = "publish_time_minus_sensor_time_ns";
 pub(super) const FIRST_SEQUENCE: &str = "first_sequence";
 
+fn protobuf(topic: &'static str, schema: &'static str, definition: &'static [u8]) -> Channel {
+    Channel {
+        topic,
+        schema,
+        schema_encoding: "protobuf",
+        definition,
+        message_encoding: "protobuf",
+    }
+}
+
+fn json(topic: &'static str, schema: &'static str, definition: &'static str) -> Channel {
+    Channel {
+        topic,
+        schema,
+        schema_encoding: "jsonschema",
+        definition: definition.as_bytes(),
+        message_encoding: "json",
+    }
+}
+
 impl Topic {
     pub fn channel(self) -> Channel {
-        let protobuf = |topic, schema, definition| Channel {
-            topic,
-            schema,
-            schema_encoding: "protobuf",
-            definition,
-            message_encoding: "protobuf",
-        };
-        let json = |topic, schema, definition: &'static str| Channel {
-            topic,
-            schema,
-            schema_encoding: "jsonschema",
-            definition: definition.as_bytes(),
-            message_encoding: "json",
-        };
         match self {
             Topic::Image | Topic::ImageUncounted => protobuf(
                 "/camera/image",

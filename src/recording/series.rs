@@ -46,12 +46,16 @@ struct Clock {
 
 impl Clock {
     fn times(self, sensor_ns: i64) -> Times {
-        let to = |offset: i64| u64::try_from(sensor_ns.saturating_add(offset)).unwrap_or(0);
         Times {
-            log: to(self.log_minus_sensor_ns),
-            publish: to(self.publish_minus_sensor_ns),
+            log: shifted_ns(sensor_ns, self.log_minus_sensor_ns),
+            publish: shifted_ns(sensor_ns, self.publish_minus_sensor_ns),
         }
     }
+}
+
+/// A time of the file, which has no negative ones.
+fn shifted_ns(sensor_ns: i64, offset_ns: i64) -> u64 {
+    u64::try_from(sensor_ns.saturating_add(offset_ns)).unwrap_or(0)
 }
 
 /// A recording that is being written.
@@ -73,8 +77,16 @@ pub struct Series {
     frames: u64,
     recent: VecDeque<(u64, i64)>,
     outline: Option<Arc<Outline>>,
-    tree: Option<(Arc<Skeleton>, u64, f64)>,
+    tree: Option<FoundTree>,
     buffer: Vec<u8>,
+}
+
+/// The newest tree, and the frame from which on it is there.
+#[derive(Clone)]
+struct FoundTree {
+    skeleton: Arc<Skeleton>,
+    frame: u64,
+    time_s: f64,
 }
 
 impl Series {
@@ -198,32 +210,33 @@ impl Series {
     fn begin(&mut self, clock: Clock, first: &RawFrame) -> Result<(), RecordingError> {
         let head = &self.head;
         let size = head.size.unwrap_or(first.size);
-        let mut entries = BTreeMap::new();
-        let mut put = |key: &str, value: String| drop(entries.insert(key.to_owned(), value));
-        put(
-            "software",
-            concat!("arborcam ", env!("CARGO_PKG_VERSION")).to_owned(),
-        );
-        put("source", head.source.clone());
-        put("format_asked", head.format.asked.clone());
-        put("format_given", head.format.given.clone());
-        put("fourcc", first.format.fourcc().to_owned());
-        put("width", size.width.to_string());
-        put("height", size.height.to_string());
-        head.nominal_rate_hz
-            .into_iter()
-            .for_each(|hz| put("nominal_rate_hz", hz.to_string()));
-        put("clock", head.clock.clone());
-        put(
-            "log_time_minus_sensor_time_ns",
-            clock.log_minus_sensor_ns.to_string(),
-        );
-        put(SHIFT_NS, clock.publish_minus_sensor_ns.to_string());
-        first
-            .sequence
-            .into_iter()
-            .for_each(|n| put(FIRST_SEQUENCE, n.to_string()));
-        put("file", self.part.to_string());
+        let software = concat!("arborcam ", env!("CARGO_PKG_VERSION"));
+        let mut entries = vec![
+            ("software", software.to_owned()),
+            ("source", head.source.clone()),
+            ("format_asked", head.format.asked.clone()),
+            ("format_given", head.format.given.clone()),
+            ("fourcc", first.format.fourcc().to_owned()),
+            ("width", size.width.to_string()),
+            ("height", size.height.to_string()),
+            ("clock", head.clock.clone()),
+            (
+                "log_time_minus_sensor_time_ns",
+                clock.log_minus_sensor_ns.to_string(),
+            ),
+            (SHIFT_NS, clock.publish_minus_sensor_ns.to_string()),
+            ("file", self.part.to_string()),
+        ];
+        if let Some(hz) = head.nominal_rate_hz {
+            entries.push(("nominal_rate_hz", hz.to_string()));
+        }
+        if let Some(number) = first.sequence {
+            entries.push((FIRST_SEQUENCE, number.to_string()));
+        }
+        let entries = entries.into_iter();
+        let entries: BTreeMap<String, String> = entries
+            .map(|(key, value)| (key.to_owned(), value))
+            .collect();
         self.writer.about(entries)?;
         let times = clock.times(nanoseconds(first.sensor_time_s));
         if let Some(outline) = &self.outline {
@@ -231,8 +244,8 @@ impl Series {
             self.writer
                 .message(Topic::Outline, 0, times, &self.buffer)?;
         }
-        if let Some((skeleton, frame, time_s)) = self.tree.clone() {
-            self.write_skeleton(&skeleton, (frame, time_s), times)?;
+        if let Some(tree) = self.tree.clone() {
+            self.write_skeleton(&tree, times)?;
         }
         Ok(())
     }
@@ -299,10 +312,15 @@ impl Series {
         if self
             .tree
             .as_ref()
-            .is_none_or(|(known, ..)| !Arc::ptr_eq(known, skeleton))
+            .is_none_or(|known| !Arc::ptr_eq(&known.skeleton, skeleton))
         {
-            self.tree = Some((skeleton.clone(), pose.frame, pose.time_s));
-            self.write_skeleton(skeleton, (pose.frame, pose.time_s), times)?;
+            let tree = FoundTree {
+                skeleton: skeleton.clone(),
+                frame: pose.frame,
+                time_s: pose.time_s,
+            };
+            self.tree = Some(tree.clone());
+            self.write_skeleton(&tree, times)?;
         }
         scene::scene(skeleton, pose, times.log, &mut self.buffer);
         self.writer
@@ -312,16 +330,11 @@ impl Series {
             .message(Topic::Transforms, pose.frame as u32, times, &self.buffer)
     }
 
-    fn write_skeleton(
-        &mut self,
-        skeleton: &Skeleton,
-        at: (u64, f64),
-        times: Times,
-    ) -> Result<(), RecordingError> {
-        match scene::skeleton_json(skeleton, at, &mut self.buffer) {
+    fn write_skeleton(&mut self, tree: &FoundTree, times: Times) -> Result<(), RecordingError> {
+        match scene::skeleton_json(&tree.skeleton, tree.frame, tree.time_s, &mut self.buffer) {
             Ok(()) => self
                 .writer
-                .message(Topic::Skeleton, at.0 as u32, times, &self.buffer),
+                .message(Topic::Skeleton, tree.frame as u32, times, &self.buffer),
             Err(_) => Ok(()),
         }
     }

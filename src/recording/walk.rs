@@ -52,6 +52,35 @@ enum Content {
     Packed(Box<LinearReader>, u64),
 }
 
+/// What to do with a record outside chunks.
+enum Next {
+    Chunk,
+    /// The file was ended properly.
+    End,
+    /// It is given out.
+    Record,
+    Skipped,
+    Damaged,
+}
+
+impl Next {
+    /// By the record's kind and length; `fits` unless the length cannot be true.
+    fn of(kind: u8, length: u64, fits: bool) -> Self {
+        match kind {
+            op::CHUNK if fits && length >= CHUNK_HEAD => Self::Chunk,
+            op::DATA_END if length == 4 => Self::End,
+            op::FOOTER if length == 20 => Self::End,
+            op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA
+                if fits && length <= MAX_RECORD =>
+            {
+                Self::Record
+            }
+            op::MESSAGE_INDEX..=op::SUMMARY_OFFSET | 0x80.. if fits => Self::Skipped,
+            _ => Self::Damaged,
+        }
+    }
+}
+
 impl<R: Read + Seek> Walk<R> {
     /// `None` if the file does not begin as a recording does.
     pub fn new(mut file: R) -> io::Result<Option<Self>> {
@@ -156,6 +185,7 @@ impl<R: Read + Seek> Walk<R> {
         Ok(None)
     }
 
+    /// Takes the next record outside chunks; its kind, if it is one that is given out.
     fn outside(&mut self) -> io::Result<Option<u8>> {
         let mut head = [0; HEAD as usize];
         let start = self.at;
@@ -168,23 +198,20 @@ impl<R: Read + Seek> Walk<R> {
         let fits = length <= self.length.saturating_sub(start + HEAD);
         // A chunk has a checksum; of all else, a length that lies could lead past whole chunks.
         let fits = fits && (kind == op::CHUNK || self.leads_to_a_record(length)?);
-        match kind {
-            op::CHUNK if fits && length >= CHUNK_HEAD => self.open_chunk(start, &head, length)?,
-            op::DATA_END if length == 4 => self.ended = true,
-            op::FOOTER if length == 20 => self.ended = true,
-            op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA
-                if fits && length <= MAX_RECORD =>
-            {
+        match Next::of(kind, length, fits) {
+            Next::Chunk => self.open_chunk(start, &head, length)?,
+            Next::End => self.ended = true,
+            Next::Record => {
                 self.body.resize(length as usize, 0);
                 self.file.read_exact(&mut self.body)?;
                 self.at = start + HEAD + length;
                 return Ok(Some(kind));
             }
-            op::MESSAGE_INDEX..=op::SUMMARY_OFFSET | 0x80.. if fits => {
+            Next::Skipped => {
                 self.at = start + HEAD + length;
                 self.file.seek_relative(length as i64)?;
             }
-            _ => self.find_chunk(start)?,
+            Next::Damaged => self.find_chunk(start)?,
         }
         Ok(None)
     }
@@ -253,10 +280,11 @@ impl<R: Read + Seek> Walk<R> {
             if read < head_bytes {
                 break;
             }
-            let room = |i: usize| self.length - (at + i as u64);
-            if let Some(found) = (0..=read - head_bytes)
-                .find(|&i| window[i] == op::CHUNK && is_chunk(&window[i + 1..], room(i)))
-            {
+            let found = (0..=read - head_bytes).find(|&i| {
+                let room = self.length - (at + i as u64);
+                window[i] == op::CHUNK && is_chunk(&window[i + 1..], room)
+            });
+            if let Some(found) = found {
                 self.at = at + found as u64;
                 self.file.seek(SeekFrom::Start(self.at))?;
                 self.damage.parts += 1;
@@ -275,9 +303,8 @@ impl<R: Read + Seek> Walk<R> {
 /// its beginning.
 fn is_chunk(bytes: &[u8], room: u64) -> bool {
     let mut cursor = Cursor(bytes);
-    let mut number = || cursor.u64();
     let (Some(length), Some(start), Some(end), Some(uncompressed)) =
-        (number(), number(), number(), number())
+        (cursor.u64(), cursor.u64(), cursor.u64(), cursor.u64())
     else {
         return false;
     };

@@ -1,4 +1,4 @@
-//! From the motion hierarchy to a flat skeleton in the picture (Li et al. appendix A).
+//! From the motion hierarchy to a flat skeleton in the picture (Li 2011 app. A).
 
 use crate::config;
 use crate::model::{ClusterId, MotionHierarchy, Outline};
@@ -17,7 +17,7 @@ pub struct Node2d {
     pub certainty: f32,
 }
 
-/// The 2D skeleton T' of the paper. Node 0 is the foot, node k + 1 belongs to cluster k.
+/// The 2D skeleton T' of Li 2011. Node 0 is the foot, node k + 1 belongs to cluster k.
 ///
 /// A node is where its cluster's branch ends; where that is not known, at the centroid, folded as
 /// in the paper.
@@ -94,15 +94,15 @@ impl Foot {
         let height = f64::from(bottom - top + 1);
         let rows = (FOOT_ROWS * height) as u32;
         let width = outline.size.width as usize;
-        let lowest = || {
-            outline
-                .mask
-                .chunks_exact(width)
-                .take(bottom as usize + 1)
-                .skip((bottom - rows) as usize)
-        };
-        let inside = |u: u32| lowest().any(|row| row[u as usize] != 0);
-        let columns: Vec<u32> = (left..=right).filter(|&u| inside(u)).collect();
+        let lowest: Vec<&[u8]> = outline
+            .mask
+            .chunks_exact(width)
+            .take(bottom as usize + 1)
+            .skip((bottom - rows) as usize)
+            .collect();
+        let columns: Vec<u32> = (left..=right)
+            .filter(|&u| lowest.iter().any(|row| row[u as usize] != 0))
+            .collect();
         let (Some(&first), Some(&last)) = (columns.first(), columns.last()) else {
             return Self {
                 position_px: [0.0, 0.0],

@@ -1,5 +1,4 @@
-//! Harris corners inside the outline, none on its border (Li et al. appendix A, Zeng section
-//! 5.3.2).
+//! Harris corners inside the outline, none on its border (Li 2011 app. A, Zeng 2015 sect. 5.3.2).
 
 use crate::config::Detect;
 use crate::model::{Luma, Outline};
@@ -13,12 +12,13 @@ use opencv::imgproc::{
 };
 use opencv::prelude::*;
 
-/// Harris' constant k of det(A) - k trace(A)^2, with A the structure tensor (Zeng eq. 2.11).
+/// Harris' constant k of det(A) - k trace(A)^2, with A the structure tensor (Zeng 2015
+/// eq. 2.11).
 const HARRIS_K: f64 = 0.04;
 /// Side of the window over which the structure tensor is averaged, and of the Sobel derivative, px.
 const BLOCK_PX: i32 = 3;
 
-/// Above this a pixel of a matte is rather tree than background.
+/// Above this a pixel of a matte is taken for tree.
 const HALF: f64 = 127.0;
 
 /// Finds corners in an outline.

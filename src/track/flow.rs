@@ -24,8 +24,8 @@ impl Pyramid {
     pub fn rebuild(&mut self, luma: &Luma, window_px: u32, levels: u32) {
         let (rows, cols) = (luma.size.height as i32, luma.size.width as i32);
         let built = Mat::new_rows_cols_with_data(rows, cols, &luma.pixels).and_then(|mat| {
-            // Without derivatives OpenCV would take the input itself as level 0; it must outlive
-            // this frame, so it is told not to (`try_reuse_input_image = false`).
+            // Without derivatives OpenCV would take the input itself as level 0, but level 0 must
+            // outlive this frame: hence `try_reuse_input_image = false`.
             let border = opencv::core::BORDER_REFLECT_101;
             let constant = opencv::core::BORDER_CONSTANT;
             let window = square(window_px);
@@ -78,16 +78,13 @@ impl OpticalFlow {
     /// `levels` down; the search starts where the point was.
     pub fn track(
         &mut self,
-        (a, b): (&Pyramid, &Pyramid),
+        a: &Pyramid,
+        b: &Pyramid,
         points: &[[f32; 2]],
         levels: u32,
         out: &mut Vec<Flow>,
     ) {
         out.clear();
-        let lost = |p: &[f32; 2]| Flow {
-            to: *p,
-            found: false,
-        };
         if points.is_empty() || a.0.is_empty() || b.0.is_empty() {
             out.extend(points.iter().map(lost));
             return;
@@ -121,6 +118,14 @@ impl OpticalFlow {
             to: [p.x, p.y],
             found,
         }));
+    }
+}
+
+/// A point that was not found stays where it was.
+fn lost(point: &[f32; 2]) -> Flow {
+    Flow {
+        to: *point,
+        found: false,
     }
 }
 

@@ -1,10 +1,11 @@
 //! Points inside the outline, followed from frame to frame.
 //!
-//! Each frame: flow forward and back; who does not come home rides on its neighbours for a while; a
-//! part of the points is put back on its first patch; who is lost is replaced. Ids are never used
-//! twice.
+//! Each frame: flow forward and back; a point that does not lead back to its start is carried along
+//! by its neighbours for a while; a part of the points is put back on its first patch; lost points
+//! are replaced. Ids are never used twice.
 
 mod anchor;
+mod carry;
 mod detect;
 mod flow;
 mod neighbours;
@@ -14,17 +15,17 @@ mod register;
 mod trial;
 
 pub use detect::Detector;
-pub use flow::{Flow, OpticalFlow, Pyramid};
 
 use crate::config::{Detect, Track};
 use crate::model::{Frame, Observation, Outline, TrackId, TrackSet};
-use anchor::{Anchoring, Keyframe, distance};
+use anchor::Anchors;
+use carry::{carry_hidden, neighbour_fits};
+use flow::{Flow, OpticalFlow, Pyramid};
 use neighbours::Fit;
-use point::{Point, Record};
-use trial::{Trial, Trials};
+use point::{Point, Record, Trial, distance};
+use regain::Gaps;
+use trial::Selection;
 
-/// Pictures kept to put points back on; the oldest but the first gives way.
-const KEYFRAMES: usize = 4;
 /// New points are looked for when so great a share of the wanted ones is missing, and not more
 /// often than this.
 const REFILL_SHARE: f64 = 0.1;
@@ -38,23 +39,16 @@ pub struct Tracker {
     wanted: usize,
     detector: Detector,
     flow: OpticalFlow,
-    anchoring: Anchoring,
+    anchors: Anchors,
     previous: Pyramid,
     present: Pyramid,
-    /// Number and picture; numbers grow.
-    keyframes: Vec<(u32, Keyframe)>,
     /// Ordered by id.
     points: Vec<Point>,
     next_id: u32,
-    next_keyframe: u32,
     frames: u64,
     detected_s: f64,
-    gaps: regain::Gaps,
-    trials: Option<Trials>,
-    /// Expected error that points of later trials must not exceed, px; known after the first.
-    bar_px: Option<f32>,
-    /// Number of points after the last trial, the wanted number before.
-    settled: usize,
+    gaps: Gaps,
+    selection: Selection,
     /// What the neighbours of each point say in this frame.
     fits: Vec<Option<Fit>>,
     buffers: Buffers,
@@ -76,18 +70,14 @@ impl Tracker {
             wanted: detect.points as usize,
             detector: Detector::new(detect, outline),
             flow: OpticalFlow::new(track.window_px),
-            anchoring: Anchoring::new(track),
+            anchors: Anchors::new(track),
             previous: Pyramid::default(),
             present: Pyramid::default(),
-            keyframes: Vec::new(),
             points: Vec::new(),
             next_id: first_id,
-            next_keyframe: 0,
             frames: 0,
-            gaps: regain::Gaps::default(),
-            trials: None,
-            bar_px: None,
-            settled: detect.points as usize,
+            gaps: Gaps::default(),
+            selection: Selection::new(detect.points as usize),
             detected_s: 0.0,
             fits: Vec::new(),
             buffers: Buffers::default(),
@@ -112,35 +102,24 @@ impl Tracker {
                 self.regain(frame);
             } else {
                 self.follow();
-                self.undo_drift(&frame.luma);
+                self.anchors
+                    .undo_drift(&frame.luma, &mut self.points, &self.fits, self.frames);
             }
             self.give_up(frame, &mut rejected);
         }
         let lost = (before - self.points.len() - rejected.len()) as u32;
-        rejected.extend(self.judge(frame.time_s));
+        rejected.extend(self.selection.judge(&mut self.points, frame.time_s));
         let born = if self.refill_due(frame.time_s) {
             self.refill(frame)
         } else {
             0
         };
         self.frames += 1;
-        let observations = self
-            .points
-            .iter()
-            .filter(|p| p.coasting == 0)
-            .map(|p| Observation {
-                id: p.id,
-                u_px: p.now_px[0],
-                v_px: p.now_px[1],
-                fb_error_px: p.fb_error_px,
-                error_px: p.record.error_px(),
-                confirmed: p.trial.is_none(),
-            })
-            .collect();
+        let seen = self.points.iter().filter(|p| p.coasting == 0);
         TrackSet {
             frame: frame.index,
             time_s: frame.time_s,
-            observations,
+            observations: seen.map(observation).collect(),
             lost,
             born,
             rejected,
@@ -150,12 +129,12 @@ impl Tracker {
     /// Drops the points that were not seen for too long or have left the picture; those on trial
     /// have not passed it.
     fn give_up(&mut self, frame: &Frame, rejected: &mut Vec<TrackId>) {
-        let (size, time_s, patience_s) = (frame.luma.size, frame.time_s, self.settings.coast_s);
+        let (size, time_s, coast_s) = (frame.luma.size, frame.time_s, self.settings.coast_s);
         self.points.retain_mut(|p| {
             if p.coasting == 0 {
                 p.seen_s = time_s;
             }
-            let keep = time_s - p.seen_s <= patience_s
+            let keep = time_s - p.seen_s <= coast_s
                 && size.contains(f64::from(p.now_px[0]), f64::from(p.now_px[1]));
             if !keep && p.trial.is_some() {
                 rejected.push(p.id);
@@ -164,56 +143,77 @@ impl Tracker {
         });
     }
 
-    /// Lucas-Kanade forward and back; who misses its start by too much is moved with its
+    /// Lucas-Kanade forward and back; a point that misses its start by too much is moved with its
     /// neighbours.
     fn follow(&mut self) {
-        let b = &mut self.buffers;
-        let pictures = (&self.previous, &self.present);
-        // What flow finds where a hidden point is thought to be may be whatever hides it: that it
-        // is the point its first patch must tell.
-        let blind = self.settings.anchor_every == 0;
-        let followed = |p: &Point| p.coasting == 0 || blind;
+        // What flow finds where a hidden point is thought to be may be whatever hides it: only a
+        // comparison with the first patch tells whether it is the point.
+        let follow_hidden = self.settings.anchor_every == 0;
+        let followed: Vec<usize> = (0..self.points.len())
+            .filter(|&i| self.points[i].coasting == 0 || follow_hidden)
+            .collect();
+        let (levels, b) = (self.settings.levels, &mut self.buffers);
         b.from.clear();
         b.from
-            .extend(self.points.iter().filter(|p| followed(p)).map(|p| p.now_px));
+            .extend(followed.iter().map(|&i| self.points[i].now_px));
+        let (previous, present) = (&self.previous, &self.present);
         self.flow
-            .track(pictures, &b.from, self.settings.levels, &mut b.forward);
+            .track(previous, present, &b.from, levels, &mut b.forward);
         b.to.clear();
         b.to.extend(b.forward.iter().map(|f| f.to));
-        self.flow.track(
-            (pictures.1, pictures.0),
-            &b.to,
-            self.settings.levels,
-            &mut b.backward,
-        );
-        let limit = self.settings.fb_limit_px as f32;
-        let mut flows = b.from.iter().zip(b.forward.iter().zip(&b.backward));
+        self.flow
+            .track(present, previous, &b.to, levels, &mut b.backward);
+        let limit_px = self.settings.fb_limit_px as f32;
         for p in &mut self.points {
-            let flow = if followed(p) { flows.next() } else { None };
-            let closed = flow.and_then(|(from, (forward, backward))| {
-                let error = distance(backward.to, *from);
-                (forward.found && backward.found && error < limit).then_some((forward.to, error))
-            });
-            match closed {
-                Some((to, error)) => (p.now_px, p.fb_error_px, p.coasting) = (to, error, 0),
-                None => p.coasting += 1,
+            p.coasting += 1;
+        }
+        for (i, (forward, backward)) in followed.into_iter().zip(b.forward.iter().zip(&b.backward))
+        {
+            let p = &mut self.points[i];
+            let error_px = distance(backward.to, p.now_px);
+            if forward.found && backward.found && error_px < limit_px {
+                (p.now_px, p.fb_error_px, p.coasting) = (forward.to, error_px, 0);
             }
         }
-        self.ask_neighbours();
-        self.ride();
+        self.carry_hidden();
+    }
+
+    /// Looks for every point by its first picture; those that are not found are carried along by
+    /// those that are.
+    fn regain(&mut self, frame: &Frame) {
+        // A point that was not seen for a while is not given up for it: it could not be seen.
+        for p in &mut self.points {
+            (p.coasting, p.seen_s) = (1, frame.time_s);
+        }
+        self.anchors
+            .find_again(&frame.luma, &self.present, &mut self.points);
+        self.carry_hidden();
+        let found = self.points.iter().filter(|p| p.coasting == 0).count();
+        self.gaps.found(found, self.points.len());
+    }
+
+    /// Asks the neighbours of all points, and moves those that are hidden with them.
+    fn carry_hidden(&mut self) {
+        self.fits = neighbour_fits(&self.points, self.settings.anchor_every, self.frames);
+        carry_hidden(&mut self.points, &self.fits);
     }
 
     /// Whether points are to be looked for: so many of those that there were are lost, or it is
     /// worth another try.
     fn refill_due(&self, time_s: f64) -> bool {
-        let few = |of: usize| {
-            of.saturating_sub(self.points.len()) as f64 >= REFILL_SHARE * self.wanted as f64
-        };
-        let rested = time_s >= self.detected_s + REFILL_S;
-        let again = few(self.wanted) && time_s >= self.detected_s + TRY_AGAIN_S;
-        // While the tree rests, a trial may be long, and the light may take points away.
-        let free = self.trials.as_ref().is_none_or(Trials::at_rest);
-        self.frames == 0 || (free && rested && (few(self.settled) || again))
+        if self.frames == 0 {
+            return true;
+        }
+        let lost_many = self.misses_many(self.selection.settled());
+        let again = self.misses_many(self.wanted) && time_s >= self.detected_s + TRY_AGAIN_S;
+        self.selection.is_open() && time_s >= self.detected_s + REFILL_S && (lost_many || again)
+    }
+
+    /// Whether so many of the points are missing, of which there should be `expected`, that it is
+    /// worth looking for more.
+    fn misses_many(&self, expected: usize) -> bool {
+        let missing = expected.saturating_sub(self.points.len());
+        missing as f64 >= REFILL_SHARE * self.wanted as f64
     }
 
     /// Detects points where there are none; returns how many.
@@ -228,31 +228,23 @@ impl Tracker {
         if found.is_empty() {
             return 0;
         }
-        if self.keyframes.len() == KEYFRAMES {
-            self.keyframes.remove(1);
+        let keyframe = self.anchors.add_keyframe(&frame.luma);
+        let (mut known_ids, mut known_px) = (Vec::new(), Vec::new());
+        for p in self.points.iter().filter(|p| p.coasting == 0) {
+            known_ids.push(p.id);
+            known_px.push(p.now_px);
         }
-        self.keyframes.push((
-            self.next_keyframe,
-            Keyframe::new(&frame.luma, &self.settings),
-        ));
-        let known_ids: Vec<TrackId> =
-            (self.points.iter().filter(|p| p.coasting == 0).map(|p| p.id))
-                .chain((0..found.len() as u32).map(|k| TrackId(self.next_id + k)))
-                .collect();
-        let known_px: Vec<[f32; 2]> = (self
-            .points
-            .iter()
-            .filter(|p| p.coasting == 0)
-            .map(|p| p.now_px))
-        .chain(found.iter().copied())
-        .collect();
+        for (id, at) in (self.next_id..).zip(&found) {
+            known_ids.push(TrackId(id));
+            known_px.push(*at);
+        }
         for (at, near) in found.iter().zip(neighbours::nearest(&found, &known_px)) {
             self.points.push(Point {
                 id: TrackId(self.next_id),
-                keyframe: self.next_keyframe,
+                keyframe,
                 born_px: *at,
                 now_px: *at,
-                patch: self.anchoring.registration.patch(&frame.luma, *at),
+                patch: self.anchors.patch(&frame.luma, *at),
                 fb_error_px: 0.0,
                 coasting: 0,
                 seen_s: frame.time_s,
@@ -265,14 +257,20 @@ impl Tracker {
             });
             self.next_id += 1;
         }
-        self.next_keyframe += 1;
-        if on_trial && self.trials.is_none() {
-            self.trials = Some(Trials::new(
-                frame.time_s,
-                self.bar_px.is_none(),
-                found.len(),
-            ));
+        if on_trial {
+            self.selection.begin(frame.time_s, found.len());
         }
         found.len() as u32
+    }
+}
+
+fn observation(p: &Point) -> Observation {
+    Observation {
+        id: p.id,
+        u_px: p.now_px[0],
+        v_px: p.now_px[1],
+        fb_error_px: p.fb_error_px,
+        error_px: p.record.error_px(),
+        confirmed: p.trial.is_none(),
     }
 }

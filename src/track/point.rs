@@ -1,27 +1,26 @@
 //! One followed point and what is known of it.
 
-use super::anchor::distance;
 use super::neighbours::Fit;
 use super::register::Patch;
-use super::trial::Trial;
 use crate::model::TrackId;
 
 /// Share that one more comparison has at least in a [`Record`].
 const NEWEST: f32 = 0.1;
-/// Likeness below which a neighbour is hardly believed.
+/// Correlation with its first patch below which a neighbour hardly counts.
 const DOUBTFUL: f32 = 0.5;
 /// A point is hidden where it looks less like its first patch than this share of what is usual for
 /// it, and there again from that share on.
 const HIDDEN: f32 = 0.2;
 const THERE_AGAIN: f32 = 0.8;
-/// The same where no neighbour vouches for the place: the share of what is usual, and not less than
-/// is asked of all.
+/// The same where there are no neighbours to confirm the place: the share of what is usual, and not
+/// less than is asked of all.
 const SURELY_THERE: f32 = 0.9;
-/// Expected error = 4.7 px exp(-1.9 likeness) sqrt(distance from the neighbours' place + 0.2 px):
+/// Expected error = 4.7 px exp(-1.9 ncc) sqrt(distance from the neighbours' place + 0.2 px), with
+/// ncc the correlation with the first patch:
 /// least squares on the logarithms of true errors on two rendered clips of known motion, all points
 /// that were tried. Of those kept it tells good from bad only roughly (docs/method.md).
 const ERROR_PX: f32 = 4.7;
-const PER_LIKENESS: f32 = -1.9;
+const PER_NCC: f32 = -1.9;
 const APART_FLOOR_PX: f32 = 0.2;
 
 /// One followed point.
@@ -47,9 +46,9 @@ pub struct Point {
 }
 
 impl Point {
-    /// How far its motion is believed when it is asked about a neighbour's, above 0 to 1.
-    pub fn trust(&self) -> f64 {
-        f64::from(((self.usual_likeness() - DOUBTFUL) / (1.0 - DOUBTFUL)).clamp(0.02, 1.0))
+    /// Weight of its motion in what it says of a neighbour's, above 0 to 1.
+    pub fn weight(&self) -> f64 {
+        f64::from(((self.usual_ncc() - DOUBTFUL) / (1.0 - DOUBTFUL)).clamp(0.02, 1.0))
     }
 
     /// Whether it is compared with its first patch in frame `frame`, where each is in one of
@@ -58,28 +57,28 @@ impl Point {
         every > 0 && u64::from(self.id.0) % u64::from(every) == frame % u64::from(every)
     }
 
-    /// Likeness below which something else is before it.
+    /// Correlation below which something else is before it.
     pub fn hidden_below(&self) -> f32 {
-        HIDDEN * self.usual_likeness()
+        HIDDEN * self.usual_ncc()
     }
 
-    /// Likeness above which it is found again. Not more than `enough`, for foliage never looks the
-    /// same twice; but not less than nearly usual where it is hidden and no neighbour vouches for
-    /// the place.
-    pub fn found_above(&self, enough: f32, vouched: bool) -> f32 {
-        let usual = self.usual_likeness();
-        if self.coasting > 0 && !vouched {
+    /// Correlation above which it is found again. Not more than `enough`, for foliage never looks
+    /// the same twice; but not less than nearly usual where it is hidden and the place is not
+    /// `confirmed` by its neighbours.
+    pub fn found_above(&self, enough: f32, confirmed: bool) -> f32 {
+        let usual = self.usual_ncc();
+        if self.coasting > 0 && !confirmed {
             enough.max(SURELY_THERE * usual)
         } else {
             enough.min(THERE_AGAIN * usual)
         }
     }
 
-    fn usual_likeness(&self) -> f32 {
+    fn usual_ncc(&self) -> f32 {
         if self.record.comparisons == 0 {
             1.0
         } else {
-            self.record.likeness
+            self.record.mean_ncc
         }
     }
 
@@ -88,14 +87,22 @@ impl Point {
         [0, 1].map(|c| self.born_px[c] + fit.displacement[c] as f32)
     }
 
-    /// Takes note of a comparison with its first patch.
-    pub fn compared(&mut self, likeness: f32, fit: Option<&Fit>) {
+    /// Takes note of a comparison with its first patch, of which `ncc` is the correlation.
+    pub fn compared(&mut self, ncc: f32, fit: Option<&Fit>) {
         let apart_px = fit.map_or(0.0, |fit| distance(self.now_px, self.predicted_px(fit)));
-        self.record.note(likeness, apart_px, NEWEST);
+        self.record.note(ncc, apart_px, NEWEST);
         if let Some(trial) = &mut self.trial {
-            trial.record.note(likeness, apart_px, 0.0);
+            trial.record.note(ncc, apart_px, 0.0);
         }
     }
+}
+
+/// What is known of one point on trial.
+#[derive(Debug, Default)]
+pub struct Trial {
+    pub record: Record,
+    /// How far it has been from where it was found, px.
+    pub reach_px: f32,
 }
 
 /// How a point compared with its first patch and with its neighbours.
@@ -103,17 +110,17 @@ impl Point {
 pub struct Record {
     comparisons: u32,
     /// Mean correlation with its first patch, -1 to 1.
-    likeness: f32,
+    mean_ncc: f32,
     /// Mean logarithm of its distance from where the neighbours say that it is.
     ln_apart: f32,
 }
 
 impl Record {
     /// Adds a comparison; it counts as much as each of the others, but at least `newest`.
-    fn note(&mut self, likeness: f32, apart_px: f32, newest: f32) {
+    fn note(&mut self, ncc: f32, apart_px: f32, newest: f32) {
         self.comparisons = self.comparisons.saturating_add(1);
         let share = (1.0 / self.comparisons as f32).max(newest);
-        self.likeness += share * (likeness - self.likeness);
+        self.mean_ncc += share * (ncc - self.mean_ncc);
         self.ln_apart += share * ((apart_px + APART_FLOOR_PX).ln() - self.ln_apart);
     }
 
@@ -121,6 +128,12 @@ impl Record {
     /// first comparison.
     pub fn error_px(&self) -> Option<f32> {
         (self.comparisons > 0)
-            .then(|| ERROR_PX * (PER_LIKENESS * self.likeness + 0.5 * self.ln_apart).exp())
+            .then(|| ERROR_PX * (PER_NCC * self.mean_ncc + 0.5 * self.ln_apart).exp())
     }
+}
+
+/// Distance between two places, px.
+pub fn distance(a: [f32; 2], b: [f32; 2]) -> f32 {
+    let [u, v] = [a[0] - b[0], a[1] - b[1]];
+    (u * u + v * v).sqrt()
 }

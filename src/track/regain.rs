@@ -4,16 +4,12 @@
 //! points slide onto others that look alike; a camera that has just started shows pictures that are
 //! too dark or too bright to be compared at all.
 
-use super::Tracker;
-use super::point::Point;
-use crate::model::Frame;
-
 /// A step is a gap when it is longer than this, s, and than so many of the steps before.
 const GAP_S: f64 = 0.5;
 const GAP_STEPS: f64 = 5.0;
 /// Points are looked for in this way until so great a share of them is found, or for so long, s.
 const ENOUGH: f64 = 0.5;
-const PATIENCE_S: f64 = 5.0;
+const LIMIT_S: f64 = 5.0;
 
 /// Notices gaps by the frames' times.
 #[derive(Debug, Default)]
@@ -32,7 +28,7 @@ impl Gaps {
                 .step_s
                 .is_some_and(|usual_s| step_s > (GAP_STEPS * usual_s).max(GAP_S))
             {
-                self.until_s = Some(time_s + PATIENCE_S);
+                self.until_s = Some(time_s + LIMIT_S);
             } else {
                 self.step_s = Some(step_s);
             }
@@ -40,38 +36,12 @@ impl Gaps {
         self.until_s = self.until_s.filter(|until_s| time_s < *until_s);
         self.until_s.is_some()
     }
-}
 
-impl Tracker {
-    /// Looks for every point by its first picture; those that are not found ride on those that are.
-    pub(super) fn regain(&mut self, frame: &Frame) {
-        // One that was not seen for a while is not given up for it: it had no chance.
-        self.points
-            .iter_mut()
-            .for_each(|p| (p.coasting, p.seen_s) = (1, frame.time_s));
-        for (number, keyframe) in &self.keyframes {
-            let indices: Vec<usize> = (0..self.points.len())
-                .filter(|&i| self.points[i].keyframe == *number)
-                .collect();
-            let points: Vec<&Point> = indices.iter().map(|&i| &self.points[i]).collect();
-            let found = self.anchoring.search(
-                keyframe,
-                (&frame.luma, &self.present),
-                &points,
-                self.settings.levels,
-            );
-            for (i, at) in indices.into_iter().zip(found) {
-                if let Some(at) = at {
-                    let p = &mut self.points[i];
-                    (p.now_px, p.coasting, p.fb_error_px) = (at, 0, 0.0);
-                }
-            }
-        }
-        self.ask_neighbours();
-        self.ride();
-        let seen = self.points.iter().filter(|p| p.coasting == 0).count();
-        if seen as f64 >= ENOUGH * self.points.len() as f64 {
-            self.gaps.until_s = None;
+    /// Takes how many of the `wanted` points were found in the frame; the search ends when they
+    /// are enough.
+    pub fn found(&mut self, found: usize, wanted: usize) {
+        if found as f64 >= ENOUGH * wanted as f64 {
+            self.until_s = None;
         }
     }
 }

@@ -53,8 +53,8 @@ pub struct Patch {
 pub struct Match {
     pub at_px: [f32; 2],
     /// Normalised cross-correlation under the weights there, and where the search began; -1 to 1.
-    pub likeness: f32,
-    pub likeness_at_start: f32,
+    pub ncc: f32,
+    pub ncc_at_start: f32,
     pub converged: bool,
 }
 
@@ -82,35 +82,25 @@ impl Registration {
     pub fn patch(&self, luma: &Luma, at: [f32; 2]) -> Patch {
         let (mut values, mut slopes) = ([0.0; FILLED], [[0.0; FILLED]; 2]);
         sample(luma, at, &UPRIGHT, &mut values);
-        let mean =
-            |of: &[f32; FILLED]| self.weights.iter().zip(of).map(|(w, v)| w * v).sum::<f32>();
-        let centre = |of: &mut [f32; FILLED]| {
-            let mean = mean(of);
-            of[..N].iter_mut().for_each(|v| *v -= mean);
-        };
-        centre(&mut values);
-        let scale = scale(mean(&values.map(|v| v * v)));
+        self.remove_mean(&mut values);
+        let scale = scale(self.mean(&values.map(|v| v * v)));
         values.iter_mut().for_each(|v| *v *= scale);
         for (k, (x, y)) in offsets().enumerate() {
-            let at = |dx: f32, dy: f32| bilinear(luma, at[0] + x + dx, at[1] + y + dy);
+            let [u, v] = [at[0] + x, at[1] + y];
             let half = 0.5 * scale;
-            slopes[0][k] = half * (at(1.0, 0.0) - at(-1.0, 0.0));
-            slopes[1][k] = half * (at(0.0, 1.0) - at(0.0, -1.0));
+            slopes[0][k] = half * (bilinear(luma, u + 1.0, v) - bilinear(luma, u - 1.0, v));
+            slopes[1][k] = half * (bilinear(luma, u, v + 1.0) - bilinear(luma, u, v - 1.0));
         }
         // Brightness is compared less its mean, so that its slopes count less their means, too.
-        slopes.iter_mut().for_each(centre);
-        let product = |a: &[f32; FILLED], b: &[f32; FILLED]| {
-            self.weights
-                .iter()
-                .zip(a)
-                .zip(b)
-                .map(|((w, a), b)| w * a * b)
-                .sum::<f32>()
-        };
+        for slopes in &mut slopes {
+            self.remove_mean(slopes);
+        }
         let [x, y] = &slopes;
-        let (xx, xy, yy) = (product(x, x) + 1e-4, product(x, y), product(y, y) + 1e-4);
+        let xx = self.product(x, x) + 1e-4;
+        let xy = self.product(x, y);
+        let yy = self.product(y, y) + 1e-4;
         let determinant = (xx * yy - xy * xy).max(1e-8);
-        let at_home = [product(x, &values), product(y, &values)];
+        let at_home = [self.product(x, &values), self.product(y, &values)];
         for of in [&mut values].into_iter().chain(&mut slopes) {
             of.iter_mut().zip(&self.weights).for_each(|(v, w)| *v *= w);
         }
@@ -122,8 +112,24 @@ impl Registration {
         }
     }
 
-    /// How alike `patch` and the picture around `at` are, -1 to 1.
-    pub fn likeness(&self, patch: &Patch, luma: &Luma, at: [f32; 2], warp: &Warp) -> f32 {
+    /// Weighted mean.
+    fn mean(&self, of: &[f32; FILLED]) -> f32 {
+        self.weights.iter().zip(of).map(|(w, v)| w * v).sum()
+    }
+
+    fn remove_mean(&self, of: &mut [f32; FILLED]) {
+        let mean = self.mean(of);
+        of[..N].iter_mut().for_each(|v| *v -= mean);
+    }
+
+    /// Weighted scalar product.
+    fn product(&self, a: &[f32; FILLED], b: &[f32; FILLED]) -> f32 {
+        let pairs = self.weights.iter().zip(a).zip(b);
+        pairs.map(|((w, a), b)| w * a * b).sum()
+    }
+
+    /// Normalised cross-correlation of `patch` and the picture around `at`, -1 to 1.
+    pub fn ncc(&self, patch: &Patch, luma: &Luma, at: [f32; 2], warp: &Warp) -> f32 {
         let mut values = [0.0; FILLED];
         sample(luma, at, warp, &mut values);
         self.compare(patch, &values).0
@@ -134,16 +140,16 @@ impl Registration {
         let mut values = [0.0; FILLED];
         let mut found = Match {
             at_px: start,
-            likeness: 0.0,
-            likeness_at_start: 0.0,
+            ncc: 0.0,
+            ncc_at_start: 0.0,
             converged: false,
         };
         for k in 0..STEPS {
             sample(luma, found.at_px, warp, &mut values);
-            let (likeness, right) = self.compare(patch, &values);
-            found.likeness = likeness;
+            let (ncc, right) = self.compare(patch, &values);
+            found.ncc = ncc;
             if k == 0 {
-                found.likeness_at_start = likeness;
+                found.ncc_at_start = ncc;
             }
             let [xx, xy, yy] = patch.inverse;
             let shift = [xx * right[0] + xy * right[1], xy * right[0] + yy * right[1]];
@@ -168,8 +174,6 @@ impl Registration {
         // From a value near the mean, or the variance would be lost in the digits.
         let near = values[N / 2];
         let mut sums = [[0.0f32; LANES]; 5];
-        let lanes =
-            |of: &[f32; FILLED], k: usize| -> [f32; LANES] { std::array::from_fn(|l| of[k + l]) };
         for k in (0..FILLED).step_by(LANES) {
             let (w, v) = (lanes(&self.weights, k), lanes(values, k).map(|v| v - near));
             let (p, x, y) = (
@@ -195,6 +199,12 @@ impl Registration {
     }
 }
 
+/// The values from number `k` on.
+#[inline]
+fn lanes(of: &[f32; FILLED], k: usize) -> [f32; LANES] {
+    std::array::from_fn(|l| of[k + l])
+}
+
 /// What brings brightness to unit variance; 0 where there is no texture: that is like nothing.
 fn scale(variance: f32) -> f32 {
     if variance < LEAST_VARIANCE {
@@ -211,32 +221,45 @@ fn offsets() -> impl Iterator<Item = (f32, f32)> {
 
 /// Brightness of the picture under the patch's pixels.
 fn sample(luma: &Luma, at: [f32; 2], warp: &Warp, into: &mut [f32; FILLED]) {
-    let size = [luma.size.width, luma.size.height].map(|s| s as f32);
-    let half = HALF_PX as f32;
-    let reach = [0, 1].map(|c| half * (warp[c][0].abs() + warp[c][1].abs()));
-    // Rounding may put the outermost a hair farther out.
-    let inside =
-        |c: usize| at[c] - reach[c] >= 1.0 && at[c] + reach[c] < (size[c] - 2.0).min(WIDEST_PX);
-    if !(inside(0) && inside(1)) {
-        for (value, (x, y)) in into.iter_mut().zip(offsets()) {
-            let to = [0, 1].map(|c| at[c] + warp[c][0] * x + warp[c][1] * y);
-            *value = bilinear(luma, to[0], to[1]);
-        }
+    if lies_inside(luma, at, warp) {
+        sample_inside(luma, at, warp, into);
         return;
     }
-    let fixed = |px: f32| (px * (1 << PIXEL_BITS) as f32) as i32;
-    let mix = |p: i32| (p >> (PIXEL_BITS - MIX_BITS)) & ((1 << MIX_BITS) - 1);
-    let (step, width) = ([0, 1].map(|c| fixed(warp[c][0])), luma.size.width as usize);
+    for (value, (x, y)) in into.iter_mut().zip(offsets()) {
+        let to = [0, 1].map(|c| at[c] + warp[c][0] * x + warp[c][1] * y);
+        *value = bilinear(luma, to[0], to[1]);
+    }
+}
+
+/// Whether the whole patch lies within the picture, and fixed point holds its places.
+fn lies_inside(luma: &Luma, at: [f32; 2], warp: &Warp) -> bool {
+    let size = [luma.size.width, luma.size.height].map(|s| s as f32);
+    let half = HALF_PX as f32;
+    let inside = [0, 1].map(|c| {
+        let reach = half * (warp[c][0].abs() + warp[c][1].abs());
+        // Rounding may put the outermost a hair farther out.
+        at[c] - reach >= 1.0 && at[c] + reach < (size[c] - 2.0).min(WIDEST_PX)
+    });
+    inside == [true; 2]
+}
+
+/// [`sample`] of a patch that lies inside the picture, in fixed point.
+fn sample_inside(luma: &Luma, at: [f32; 2], warp: &Warp, into: &mut [f32; FILLED]) {
+    let half = HALF_PX as f32;
+    let step = [0, 1].map(|c| to_fixed(warp[c][0]));
+    let width = luma.size.width as usize;
     for (row, y) in into[..N].chunks_exact_mut(SIDE).zip(-HALF_PX..=HALF_PX) {
         let [mut u, mut v] =
-            [0, 1].map(|c| fixed(at[c] + warp[c][1] * y as f32 - warp[c][0] * half));
+            [0, 1].map(|c| to_fixed(at[c] + warp[c][1] * y as f32 - warp[c][0] * half));
         for value in row {
             let upper = (v >> PIXEL_BITS) as usize * width + (u >> PIXEL_BITS) as usize;
-            let pair = |from: usize| luma.pixels.get(from..).and_then(|p| p.first_chunk::<2>());
-            let (Some(above), Some(below)) = (pair(upper), pair(upper + width)) else {
+            let (Some(above), Some(below)) = (
+                pixel_pair(&luma.pixels, upper),
+                pixel_pair(&luma.pixels, upper + width),
+            ) else {
                 continue;
             };
-            let (a, b) = (mix(u), mix(v));
+            let (a, b) = (mix_bits(u), mix_bits(v));
             let [above, below] = [above, below].map(|p| {
                 let [left, right] = p.map(i32::from);
                 (left << MIX_BITS) + a * (right - left)
@@ -248,6 +271,24 @@ fn sample(luma: &Luma, at: [f32; 2], warp: &Warp, into: &mut [f32; FILLED]) {
     }
 }
 
+/// A place, px, in fixed point.
+#[inline]
+fn to_fixed(px: f32) -> i32 {
+    (px * (1 << PIXEL_BITS) as f32) as i32
+}
+
+/// The bits of a place between two pixels that brightness is mixed by.
+#[inline]
+fn mix_bits(place: i32) -> i32 {
+    (place >> (PIXEL_BITS - MIX_BITS)) & ((1 << MIX_BITS) - 1)
+}
+
+/// A pixel and the next one.
+#[inline]
+fn pixel_pair(pixels: &[u8], at: usize) -> Option<&[u8; 2]> {
+    pixels.get(at..)?.first_chunk()
+}
+
 /// Brightness between pixels; beyond the edge the edge goes on.
 fn bilinear(luma: &Luma, u_px: f32, v_px: f32) -> f32 {
     let (w, h) = (luma.size.width as i32, luma.size.height as i32);
@@ -256,7 +297,9 @@ fn bilinear(luma: &Luma, u_px: f32, v_px: f32) -> f32 {
     let (u0, v0) = (u as i32, v as i32);
     let (u1, v1) = ((u0 + 1).min(w - 1), (v0 + 1).min(h - 1));
     let (fu, fv) = (u - u0 as f32, v - v0 as f32);
-    let at = |u: i32, v: i32| f32::from(luma.pixels[(v * w + u) as usize]);
-    (at(u0, v0) * (1.0 - fu) + at(u1, v0) * fu) * (1.0 - fv)
-        + (at(u0, v1) * (1.0 - fu) + at(u1, v1) * fu) * fv
+    let [upper, lower] = [v0, v1].map(|row| {
+        let [left, right] = [u0, u1].map(|u| f32::from(luma.pixels[(row * w + u) as usize]));
+        left * (1.0 - fu) + right * fu
+    });
+    upper * (1.0 - fv) + lower * fv
 }

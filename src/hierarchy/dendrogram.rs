@@ -1,15 +1,24 @@
-//! Trees in two, from whichever method: the common form in which they are judged and arranged.
+//! The dendrogram: a binary tree of groups of points, the common form of both methods.
 
 /// A part of the points, and the two that it comes apart into.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
-    /// Range of [`Binary::order`] that holds the points of the part.
+    /// Range of [`Dendrogram::order`] that holds the points of the part.
     pub from: usize,
     pub to: usize,
     pub halves: Option<[usize; 2]>,
 }
 
 impl Part {
+    /// The points `from..to` of the order, not divided.
+    pub fn undivided(from: usize, to: usize) -> Self {
+        Self {
+            from,
+            to,
+            halves: None,
+        }
+    }
+
     /// Number of points.
     pub fn len(&self) -> usize {
         self.to - self.from
@@ -18,13 +27,13 @@ impl Part {
 
 /// A tree of parts; the first is everything, each stands before its halves.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Binary {
+pub struct Dendrogram {
     /// The points, those of every part next to each other.
     pub order: Vec<usize>,
     pub parts: Vec<Part>,
 }
 
-impl Binary {
+impl Dendrogram {
     /// Divides `points` again and again; `halve` says for each of some points whether it is in the
     /// first half, or nothing if they are not to be divided. It is given the depth as well, 0 for
     /// all points.
@@ -32,33 +41,22 @@ impl Binary {
         points: Vec<usize>,
         mut halve: impl FnMut(&[usize], u32) -> Option<Vec<bool>>,
     ) -> Self {
-        let mut parts = vec![Part {
-            from: 0,
-            to: points.len(),
-            halves: None,
-        }];
+        let mut parts = vec![Part::undivided(0, points.len())];
         let (mut order, mut depths, mut next) = (points, vec![0u32], 0);
         while next < parts.len() {
             let (from, to, depth) = (parts[next].from, parts[next].to, depths[next]);
-            if let Some(first) = halve(&order[from..to], depth) {
-                let side = |want: bool| {
-                    order[from..to]
-                        .iter()
-                        .zip(&first)
-                        .filter(move |(_, f)| **f == want)
-                };
-                let split: Vec<usize> = side(true).chain(side(false)).map(|(&i, _)| i).collect();
-                let middle = from + first.iter().filter(|f| **f).count();
-                order[from..to].copy_from_slice(&split);
-                parts[next].halves = Some([parts.len(), parts.len() + 1]);
-                for (from, to) in [(from, middle), (middle, to)] {
-                    parts.push(Part {
-                        from,
-                        to,
-                        halves: None,
-                    });
-                    depths.push(depth + 1);
+            if let Some(in_first) = halve(&order[from..to], depth) {
+                let (mut first, mut second) = (Vec::new(), Vec::new());
+                for (&point, in_first) in order[from..to].iter().zip(in_first) {
+                    let half = if in_first { &mut first } else { &mut second };
+                    half.push(point);
                 }
+                let middle = from + first.len();
+                order[from..middle].copy_from_slice(&first);
+                order[middle..to].copy_from_slice(&second);
+                parts[next].halves = Some([parts.len(), parts.len() + 1]);
+                parts.extend([Part::undivided(from, middle), Part::undivided(middle, to)]);
+                depths.extend([depth + 1; 2]);
             }
             next += 1;
         }
@@ -79,11 +77,7 @@ impl Binary {
             };
         };
         let mut order = vec![0; n];
-        let mut parts = vec![Part {
-            from: 0,
-            to: n,
-            halves: None,
-        }];
+        let mut parts = vec![Part::undivided(0, n)];
         let mut ids = vec![top];
         let mut next = 0;
         while next < parts.len() {
@@ -94,16 +88,7 @@ impl Binary {
                 let [a, b] = merges[id - n];
                 let middle = from + sizes[a];
                 parts[next].halves = Some([parts.len(), parts.len() + 1]);
-                parts.push(Part {
-                    from,
-                    to: middle,
-                    halves: None,
-                });
-                parts.push(Part {
-                    from: middle,
-                    to,
-                    halves: None,
-                });
+                parts.extend([Part::undivided(from, middle), Part::undivided(middle, to)]);
                 ids.extend([a, b]);
             }
             next += 1;
