@@ -22,8 +22,9 @@
 //! [`model`] the nouns · [`source`] where frames come from · [`outline`] which pixels are tree ·
 //! [`track`] points followed · [`hierarchy`] who moves with whom · [`skeleton`] in the picture ·
 //! [`shape`] in space · [`motion`] the pose of every frame · [`dynamics`] what the motion says ·
-//! [`animate`] motion that nobody filmed · [`signal`] small common mathematics · [`caught`] other
-//! people's panics · [`draw`] pictures of it · [`pipeline`] all of it · [`runtime`] on threads ·
+//! [`animate`] motion that nobody filmed · [`signal`] small common mathematics · [`random`] seeded
+//! random numbers · [`caught`] other people's panics · [`draw`] pictures of it · [`pipeline`] all
+//! of it · [`runtime`] on threads ·
 //! [`recording`] kept on disk · [`export`] files for others · [`capture`] those files read back ·
 //! [`report`] what the sway of one or several of them says · [`tui`] the screen · [`doctor`]
 //! whether this machine can · [`cli`] the commands · [`config`] what can be set.
@@ -43,6 +44,7 @@ pub mod model;
 pub mod motion;
 pub mod outline;
 pub mod pipeline;
+pub mod random;
 pub mod recording;
 pub mod report;
 pub mod runtime;

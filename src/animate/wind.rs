@@ -3,7 +3,7 @@
 use super::noise::Noise;
 use super::sound::Loudness;
 use crate::config;
-use crate::shape::Chance;
+use crate::random::seed_of_part;
 use nalgebra::{Point3, Vector3};
 
 /// Speed in steady wind of force 6, m/s: pressure is told as a multiple of what it is there.
@@ -71,7 +71,7 @@ impl Wind {
                 period_s,
                 settings.beta,
                 1.0 / slowest_s.max(1e-3),
-                Chance::part(seed, part),
+                seed_of_part(seed, part),
             )
         };
         let mean_m_s = velocity(settings.force, settings.direction_deg);

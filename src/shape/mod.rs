@@ -2,7 +2,6 @@
 
 mod angles;
 mod chain;
-mod chance;
 mod curl;
 mod cylinders;
 mod diener;
@@ -30,7 +29,6 @@ mod tube;
 mod twigs;
 
 pub use angles::{Angles, expected_branching_angle};
-pub use chance::Chance;
 pub use curl::CURL_BOUND;
 pub use cylinders::{Cylinder, cylinders};
 pub use diener::diener;
