@@ -12,13 +12,18 @@
 //! trunk.
 
 use super::rest::{crown_begins, distance_sq};
+use crate::random::generator;
 use crate::signal::median;
 use nalgebra::DMatrix;
+use rand::RngExt;
+use rand::seq::IndexedRandom;
 
 /// Trees drawn; the first from all points.
-const TREES: u32 = 20;
+const TREES: u64 = 20;
 /// Share of the points that each of the others is drawn from.
 const SHARE: f64 = 0.7;
+/// The trees are the same in every run.
+const SEED: u64 = 0;
 /// Standard deviation of the logarithm of what a cost is off by.
 const COST_DEVIATION: f64 = 0.3;
 
@@ -43,14 +48,14 @@ pub fn ways(apart: &DMatrix<f32>, rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> Wa
     let off_by = off_by_table();
     let (mut sum, mut count) = (DMatrix::<f32>::zeros(n, n), DMatrix::<f32>::zeros(n, n));
     for tree in 0..TREES {
+        let mut random = generator(SEED, tree);
         let drawn: Vec<usize> = (0..n)
-            .filter(|&i| tree == 0 || below(hash(tree, i, i), SHARE))
+            .filter(|_| tree == 0 || random.random_bool(SHARE))
             .collect();
-        let cost = |a: usize, b: usize| {
-            let chance = hash(tree, a.min(b), a.max(b)) as usize % off_by.len();
-            costs[(a, b)] * off_by[chance]
-        };
-        let common = common_ways(&spanning_tree(&drawn, n, cost));
+        // The spanning tree asks for the cost of each step once.
+        let common = common_ways(&spanning_tree(&drawn, n, |a, b| {
+            costs[(a, b)] * off_by.choose(&mut random).copied().unwrap_or(1.0)
+        }));
         for (k, &b) in drawn.iter().enumerate() {
             for (j, &a) in drawn.iter().enumerate() {
                 sum[(a, b)] += common[(j, k)];
@@ -115,7 +120,11 @@ struct Reached {
 
 /// The minimum spanning tree of the points `drawn` and the root (Prim), in the order in which they
 /// are reached.
-fn spanning_tree(drawn: &[usize], root: usize, cost: impl Fn(usize, usize) -> f32) -> Vec<Reached> {
+fn spanning_tree(
+    drawn: &[usize],
+    root: usize,
+    mut cost: impl FnMut(usize, usize) -> f32,
+) -> Vec<Reached> {
     let mut reached: Vec<Reached> = Vec::with_capacity(drawn.len());
     // For every point that is left: the cheapest step to it, and from where.
     let mut left: Vec<(usize, f32, Option<usize>)> = drawn
@@ -170,20 +179,6 @@ fn off_by_table() -> Vec<f32> {
     (0..SIDE * SIDE * SIDE)
         .map(|k| (COST_DEVIATION * normal(k)).exp() as f32)
         .collect()
-}
-
-fn below(hash: u64, share: f64) -> bool {
-    (hash as f64) < share * u64::MAX as f64
-}
-
-/// Chance that is the same at every run and in any order: the finaliser of splitmix64.
-fn hash(tree: u32, a: usize, b: usize) -> u64 {
-    let mut x = (u64::from(tree) << 48) ^ ((a as u64) << 24) ^ b as u64;
-    x = (x ^ (x >> 30))
-        .wrapping_add(0x9e37_79b9_7f4a_7c15)
-        .wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ (x >> 31)
 }
 
 #[cfg(test)]
