@@ -22,7 +22,7 @@
 //! [`model`] shared data types · `source` where frames come from · `outline` which pixels are tree ·
 //! `track` points followed · [`hierarchy`] which points move together · [`skeleton`] in the picture ·
 //! [`shape`] in space · [`motion`] the pose in every frame · [`dynamics`] frequency and damping ·
-//! [`animate`] motion that was not filmed · [`signal`] common mathematics · [`caught`] panics of
+//! [`animate`] motion that was not filmed · [`signal`] common mathematics · [`random`] seeded random numbers · [`caught`] panics of
 //! other crates · [`draw`] pictures of the model · [`pipeline`] all of it, step by step · `runtime`
 //! on threads · `recording` frames and tracks on disk · [`document`] a tree as a folder, written and
 //! read · [`files`] that appear when they are complete · [`export`] files for other programs ·
@@ -62,6 +62,7 @@ pub mod motion;
 #[cfg(feature = "opencv")]
 pub mod outline;
 pub mod pipeline;
+pub mod random;
 #[cfg(feature = "camera")]
 pub mod recording;
 pub mod report;

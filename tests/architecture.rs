@@ -23,14 +23,14 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("hierarchy", &["model", "config", "signal"]),
     ("skeleton", &["model", "config"]),
     // The flat node that is stood up in space.
-    ("shape", &["model", "config", "skeleton::Node2d"]),
+    ("shape", &["model", "config", "skeleton::Node2d", "random"]),
     ("motion", &["model", "config", "signal"]),
     ("dynamics", &["model", "config", "signal"]),
     ("files", &[]),
     ("ffmpeg", &[]),
     ("signal", &[]),
-    // The seeded chance that twigs and leaves have too.
-    ("animate", &["model", "config", "signal", "shape::Chance"]),
+    ("random", &[]),
+    ("animate", &["model", "config", "signal", "random"]),
     // Branches that only their own sway tells.
     (
         "pipeline",

@@ -1,9 +1,13 @@
 //! The fuzzers' seeds and some hundred seeded mutations of them, on stable: no panic, and an end.
 //! `fuzz/` goes further.
 
+#[path = "support/chance.rs"]
+mod chance;
+
 use arborcam::config::Config;
 use arborcam::model::{PixelFormat, RawFrame, Size};
 use arborcam::recording::{Head, Limits, Reader, Series};
+use chance::Chance;
 use std::fs;
 use std::io::Cursor;
 use std::path::Path;
@@ -11,23 +15,10 @@ use std::path::Path;
 /// Mutations of each seed.
 const TRIES: u64 = 200;
 
-/// A small generator, the same numbers on every machine.
-struct Chance(u64);
-
-impl Chance {
-    fn below(&mut self, bound: usize) -> usize {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as usize % bound.max(1)
-    }
-}
-
 /// What befalls files: flipped bits, lengths that lie, pieces cut out, repeated, or the end
 /// missing.
 fn mutated(seed: &[u8], number: u64) -> Vec<u8> {
-    let mut chance = Chance(number);
+    let mut chance = Chance::new(number);
     let mut bytes = seed.to_vec();
     for _ in 0..=chance.below(4) {
         if bytes.is_empty() {

@@ -85,7 +85,7 @@ fn exhaustive(p: &Problem) -> f64 {
 #[test]
 fn the_search_finds_what_trying_everything_finds_or_better() {
     for ours in [false, true] {
-        let mut chance = Chance(7);
+        let mut chance = Chance::new(7);
         let (mut better, mut on_bounds) = (0, 0);
         for k in 0..500 {
             let p = some_problem(&mut chance, ours);
@@ -168,7 +168,7 @@ fn no_joint_turns_faster_or_farther_than_its_bounds_whatever_is_seen() {
         settings.max_total_deg.to_radians(),
     );
     let mut estimator = PoseEstimator::new(tree.clone(), &settings);
-    let mut chance = Chance(5);
+    let mut chance = Chance::new(5);
     let mut before: Option<Pose> = None;
     let (mut fastest, mut farthest) = (0.0_f64, 0.0_f64);
     for k in 0..400u64 {

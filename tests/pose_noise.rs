@@ -40,7 +40,7 @@ fn node(k: usize, parent: Option<usize>, level: u8, position: Point3<f64>) -> No
 
 /// Foot, trunk, and two branches at every node up to level [`LEVELS`]: 32 nodes, all measured.
 fn tree() -> Skeleton {
-    let mut chance = Chance(3);
+    let mut chance = Chance::new(3);
     let mut nodes = vec![
         node(0, None, 0, Point3::origin()),
         node(1, Some(0), 1, Point3::new(3.0, 90.0, 0.0)),
@@ -223,7 +223,7 @@ fn both(noise_px: f64) -> [Off; 2] {
     let truth: Vec<Pose> = (0..FRAMES).map(|k| moved(&tree, k)).collect();
     let (hierarchy, rest_px) = points(&tree);
     [MotionMethod::Deterministic, MotionMethod::Probabilistic].map(|method| {
-        let mut chance = Chance(11);
+        let mut chance = Chance::new(11);
         let mut binding = Binding::new(&hierarchy, &rest_px, &tree);
         let mut estimator = PoseEstimator::new(
             tree.clone(),

@@ -7,8 +7,9 @@ use super::wind::Wind;
 use super::{Known, soft};
 use crate::config;
 use crate::model::{JointPose, NodeId, Pose, Skeleton};
-use crate::shape::Chance;
+use crate::random::generator;
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
+use rand::RngExt;
 use std::sync::Arc;
 
 /// Forces go evenly from step to step; gusts need so many steps a second to be told.
@@ -40,7 +41,7 @@ impl Branch {
         let node = &skeleton.nodes[i];
         let parent = node.parent.map_or(i, |p| p.index()).min(i);
         let way = node.position - skeleton.nodes[parent].position;
-        let own_seed = Chance::part(seed.into(), 1000 + u64::from(node.name.0));
+        let mut random = generator(seed.into(), 1000 + u64::from(node.name.0));
         Self {
             parent,
             load,
@@ -50,7 +51,7 @@ impl Branch {
             transition: Transition::new(tuning.frequency_hz, tuning.damping_ratio, 0.0),
             state: [Oscillation::default(); 2],
             held_at: [0.0; 2],
-            own_s: Chance::new(own_seed).between(0.0, 1000.0),
+            own_s: random.random_range(0.0..1000.0),
         }
     }
 }

@@ -1,7 +1,8 @@
 //! 1/f^beta noise that comes round to its beginning.
 
 use super::fraction;
-use crate::shape::Chance;
+use crate::random::generator;
+use rand::RngExt;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
 use std::f64::consts::TAU;
@@ -24,7 +25,7 @@ impl Noise {
     /// Noise that repeats itself after `period_s` (above 0) without a seam.
     pub fn new(period_s: f64, beta: f64, corner_hz: f64, seed: u64) -> Self {
         let n = ((period_s * RATE_HZ).ceil() as usize).max(8);
-        let mut chance = Chance::new(seed);
+        let mut random = generator(seed, 0);
         let mut planner = RealFftPlanner::<f64>::new();
         let inverse = planner.plan_fft_inverse(n);
         let mut spectrum: Vec<Complex<f64>> = inverse.make_input_vec();
@@ -33,7 +34,7 @@ impl Noise {
         let last = (n - 1) / 2;
         for (k, entry) in spectrum.iter_mut().enumerate().take(last + 1).skip(1) {
             let frequency_hz = k as f64 / period_s;
-            let phase = TAU * chance.share();
+            let phase = TAU * random.random::<f64>();
             if frequency_hz > FASTEST_HZ && k > 1 {
                 break;
             }

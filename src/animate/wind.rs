@@ -3,7 +3,7 @@
 use super::noise::Noise;
 use super::sound::Loudness;
 use crate::config;
-use crate::shape::Chance;
+use crate::random::seed_of_part;
 use nalgebra::{Point3, Vector3};
 
 /// Speed in steady wind of force 6, m/s: pressure is a multiple of what it is there.
@@ -69,10 +69,10 @@ impl Wind {
         let [beta, gust_s] = [settings.beta, settings.gust_s];
         let mean_m_s = velocity(settings.force, settings.direction_deg);
         Self {
-            gusts: Gusts::Noise(noise(period_s, beta, gust_s, Chance::part(seed, 1))),
-            across: noise(period_s, beta, gust_s, Chance::part(seed, 2)),
-            rise: noise(period_s, beta, gust_s, Chance::part(seed, 3)),
-            eddies: noise(period_s, beta, EDDY_S.min(gust_s), Chance::part(seed, 4)),
+            gusts: Gusts::Noise(noise(period_s, beta, gust_s, seed_of_part(seed, 1))),
+            across: noise(period_s, beta, gust_s, seed_of_part(seed, 2)),
+            rise: noise(period_s, beta, gust_s, seed_of_part(seed, 3)),
+            eddies: noise(period_s, beta, EDDY_S.min(gust_s), seed_of_part(seed, 4)),
             strength: settings.gusts,
             period_s,
             metres_per_px,

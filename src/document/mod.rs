@@ -28,7 +28,6 @@ use crate::config::Config;
 use crate::dynamics::Film;
 use crate::model::{Outline, Picture, Pose, Size, Skeleton, Swaying, Unidentified};
 use crate::motion::PoseEstimator;
-use crate::outline;
 use motion::PoseReader;
 use nodes::NodesRead;
 use note::{ModelNote, OutlineNote};
@@ -364,7 +363,15 @@ fn model<'a>(dir: &Path, note: &'a CaptureNote) -> Result<&'a ModelNote, Documen
     })
 }
 
-fn outline(note: &OutlineNote) -> Result<Outline, outline::OutlineError> {
+#[cfg(feature = "opencv")]
+fn outline(note: &OutlineNote) -> Result<Outline, String> {
     let corners_px: Vec<[f64; 2]> = note.polygon_px.iter().map(|p| p.map(f64::from)).collect();
-    outline::from_polygon(&corners_px, Size::new(note.width, note.height))
+    let size = Size::new(note.width, note.height);
+    crate::outline::from_polygon(&corners_px, size).map_err(|e| e.to_string())
+}
+
+/// The mask of a polygon is filled by OpenCV.
+#[cfg(not(feature = "opencv"))]
+fn outline(_note: &OutlineNote) -> Result<Outline, String> {
+    Err("this build has no OpenCV".into())
 }

@@ -91,6 +91,7 @@ pub(super) fn excess_hz(signals: &[(Periodogram, Vec<Part>, f64)]) -> Option<f64
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::RngExt;
 
     /// The large sway of the carrier, which is expected, does not hide the small one of the branch.
     #[test]
@@ -98,17 +99,11 @@ mod tests {
         let times: Vec<f64> = (0..900)
             .map(|k| 0.066 * f64::from(k) + 0.01 * (f64::from(k) * 1.7).sin())
             .collect();
-        let mut seed = 7_u64;
-        let mut even = || {
-            seed = seed
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (seed >> 40) as f64 / f64::from(1 << 24) - 0.5
-        };
+        let mut random = crate::random::generator(7, 0);
         let wave = |hz: f64, t: f64| (TAU * hz * t).sin();
         let signal: Vec<f64> = times
             .iter()
-            .map(|t| 10.0 * wave(0.5, *t) + wave(0.9, *t) + even())
+            .map(|t| 10.0 * wave(0.5, *t) + wave(0.9, *t) + random.random_range(-0.5..0.5))
             .collect();
         let known = Part::Oscillator {
             variance: 50.0,

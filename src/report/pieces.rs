@@ -67,6 +67,7 @@ fn amplitude_at(spectrum: &Spectrum, hz: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::RngExt;
 
     /// An oscillator that chance drives for long: one spectrum of it all would give a damping of
     /// about nothing.
@@ -74,13 +75,11 @@ mod tests {
     fn the_half_power_damping_of_a_driven_oscillator_is_of_its_size() {
         let (hz, damping, step) = (0.8, 0.06, 1.0 / 30.0);
         let omega = std::f64::consts::TAU * hz;
-        let (mut x, mut v, mut seed) = (0.0_f64, 0.0_f64, 1_u64);
+        let (mut x, mut v) = (0.0_f64, 0.0_f64);
+        let mut random = crate::random::generator(1, 0);
         let (mut times, mut values) = (Vec::new(), Vec::new());
         for k in 0..18_000 {
-            seed = seed
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            let push = (seed >> 33) as f64 / f64::from(1_u32 << 31) - 0.5;
+            let push = random.random_range(-0.5..0.5);
             v += step * (push * 100.0 - 2.0 * damping * omega * v - omega * omega * x);
             x += step * v;
             times.push(f64::from(k) * step);

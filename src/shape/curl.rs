@@ -6,8 +6,10 @@
 //! is linear in the positions, so sums of such paths are such paths again: one between the ends
 //! with the directions there, and one excursion for each via point.
 
-use super::chance::Chance;
+use crate::random::Generator;
 use nalgebra::{Point3, Vector3};
+use rand::RngExt;
+use std::f64::consts::TAU;
 
 /// Greatest distance of a middle line from the straight line between its ends, as a share of their
 /// distance, at curl 1: [`BOW`] for each of the two directions at the ends, and both excursions.
@@ -78,34 +80,32 @@ impl Bend {
 
 impl Curve {
     /// From `from` to `to`, leaving along `leaves` and arriving along `arrives` (of length 1) as
-    /// nearly as `curl` (0 to 1) lets it; the excursions are drawn from `chance`.
+    /// nearly as `curl` (0 to 1) lets it; the excursions are drawn from `random`.
     pub fn new(
         ends: [Point3<f64>; 2],
         leaves: Vector3<f64>,
         arrives: Vector3<f64>,
         curl: f64,
-        chance: Chance,
+        random: &mut Generator,
     ) -> Self {
         let chord = ends[1] - ends[0];
         let length = chord.norm();
         let along = chord / length.max(1e-12);
         let curl = curl.clamp(0.0, 1.0);
-        let bend = |wanted| Bend::new(wanted, chord, (2.0 * curl).min(1.0));
-        let mut chance = chance;
-        let mut excursion = || {
-            let (turn, far) = (
-                chance.between(0.0, std::f64::consts::TAU),
-                chance.share().sqrt(),
-            );
-            let side = square_to(along);
-            length * curl * EXCURSION * far * (side * turn.cos() + along.cross(&side) * turn.sin())
-        };
+        let share = (2.0 * curl).min(1.0);
+        let longest = length * curl * EXCURSION;
         Self {
             from: ends[0],
             to: ends[1],
             chord,
-            ends: [bend(leaves), bend(arrives)],
-            via: [excursion(), excursion()],
+            ends: [
+                Bend::new(leaves, chord, share),
+                Bend::new(arrives, chord, share),
+            ],
+            via: [
+                across(along, random) * longest,
+                across(along, random) * longest,
+            ],
         }
     }
 
@@ -150,6 +150,14 @@ fn passing(via: f64, t: f64) -> f64 {
     before / 720.0 + pi * (t - a).max(0.0).powi(5) / 120.0
 }
 
+/// A point drawn evenly from the disc of radius 1 that is square to `along` (of length 1).
+fn across(along: Vector3<f64>, random: &mut Generator) -> Vector3<f64> {
+    let turn = random.random_range(0.0..TAU);
+    let far = random.random::<f64>().sqrt();
+    let side = square_to(along);
+    (side * turn.cos() + along.cross(&side) * turn.sin()) * far
+}
+
 /// Some direction square to `along`, always the same one.
 pub(super) fn square_to(along: Vector3<f64>) -> Vector3<f64> {
     let axis = if along.z.abs() < 0.9 {
@@ -165,6 +173,7 @@ pub(super) fn square_to(along: Vector3<f64>) -> Vector3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::generator;
 
     #[test]
     fn the_path_through_a_point_is_there_in_time_and_smooth_on_the_way() {
@@ -182,19 +191,21 @@ mod tests {
         }
     }
 
+    fn direction(random: &mut Generator) -> Vector3<f64> {
+        Vector3::from_fn(|_, _| random.random_range(-1.0..1.0))
+            .try_normalize(1e-9)
+            .unwrap_or_else(Vector3::x)
+    }
+
     #[test]
     fn ends_stay_and_the_bound_holds() {
         let (a, b) = (Point3::new(3.0, 5.0, -2.0), Point3::new(40.0, 60.0, 9.0));
         let along = (b - a).normalize();
         for k in 0..500 {
-            let mut chance = Chance::new(k);
-            let mut any = || {
-                Vector3::from_fn(|_, _| chance.between(-1.0, 1.0))
-                    .try_normalize(1e-9)
-                    .unwrap_or_else(Vector3::x)
-            };
-            let (leaves, arrives, curl) = (any(), any(), (k % 5) as f64 / 4.0);
-            let curve = Curve::new([a, b], leaves, arrives, curl, Chance::new(k));
+            let mut random = generator(k, 0);
+            let (leaves, arrives) = (direction(&mut random), direction(&mut random));
+            let curl = (k % 5) as f64 / 4.0;
+            let curve = Curve::new([a, b], leaves, arrives, curl, &mut random);
             assert!((curve.at(0.0) - a).norm() < 1e-9 && (curve.at(1.0) - b).norm() < 1e-9);
             for t in 1..100 {
                 let way = curve.at(f64::from(t) / 100.0) - a;

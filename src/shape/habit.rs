@@ -3,10 +3,12 @@
 //! Li et al. section 3 after Shlyakhter et al. 2001, Tan et al. 2007 and Chen et al. 2008: a twig
 //! is a small, turned copy of a part of the tree itself.
 
-use super::chance::Chance;
 use super::limb::{continuations, way};
 use crate::model::Skeleton;
+use crate::random::Generator;
 use nalgebra::{UnitQuaternion, Vector3};
+use rand::RngExt;
+use rand::seq::IndexedRandom;
 use std::f64::consts::FRAC_PI_2;
 
 /// Angles between a branch and what leaves it that are believed, rad; others are noise of the
@@ -95,12 +97,12 @@ impl Habit {
         }
     }
 
-    pub fn angle(&self, chance: &mut Chance) -> f64 {
-        chance.one_of(&self.angles).copied().unwrap_or(0.75)
+    pub fn angle(&self, random: &mut Generator) -> f64 {
+        self.angles.choose(random).copied().unwrap_or(0.75)
     }
 
-    pub fn ratio(&self, chance: &mut Chance) -> f64 {
-        chance.one_of(&self.ratios).copied().unwrap_or(0.45) * chance.between(0.75, 1.25)
+    pub fn ratio(&self, random: &mut Generator) -> f64 {
+        self.ratios.choose(random).copied().unwrap_or(0.45) * random.random_range(0.75..1.25)
     }
 }
 

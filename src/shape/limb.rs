@@ -1,10 +1,10 @@
 //! Limbs: what is drawn of a tree as wood, as middle lines with a thickness.
 
-use super::chance::Chance;
 use super::curl::Curve;
 use super::{radius, twigs};
 use crate::config;
 use crate::model::{FARTHEST_PX, NodeId, Skeleton};
+use crate::random::generator;
 use nalgebra::{Point3, Vector3};
 
 /// Which joints move a point, and their shares: joint `i` is node `i` of the skeleton.
@@ -230,13 +230,12 @@ fn branches(skeleton: &Skeleton, curl: f64, seed: u64) -> Vec<Grown> {
                 .try_normalize(0.1)
                 .unwrap_or(along),
         };
-        let chance = Chance::new(Chance::part(seed, node.name.0.into()));
         let curve = Curve::new(
             [nodes[parent.index()].position, node.position],
             leaves,
             arrives[i],
             curl,
-            chance,
+            &mut generator(seed, node.name.0.into()),
         );
         // A trunk was filmed all along, and is as straight as it looks.
         let curve = if limb_of[parent.index()].is_none() {

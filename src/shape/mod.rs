@@ -3,7 +3,6 @@
 mod angles;
 mod bounds;
 mod chain;
-mod chance;
 mod curl;
 mod cylinders;
 mod diener;
@@ -32,7 +31,6 @@ mod twigs;
 
 pub use angles::{Angles, expected_branching_angle};
 pub use bounds::{Bounds, room};
-pub use chance::Chance;
 pub use curl::CURL_BOUND;
 pub use cylinders::{Cylinder, cylinders};
 pub use diener::diener;

@@ -1,13 +1,15 @@
 //! Twigs by self-similarity: small, turned copies of the tree's own parts along its branches and at
 //! their ends.
 
-use super::chance::Chance;
 use super::curl::{Curve, square_to};
 use super::habit::{Habit, Part};
 use super::limb::{Grown, Limb, Room, Station};
 use crate::config;
 use crate::model::Skeleton;
+use crate::random::{Generator, generator, seed_of_part};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
+use rand::RngExt;
+use rand::seq::IndexedRandom;
 use std::collections::BinaryHeap;
 use std::f64::consts::{PI, TAU};
 
@@ -77,7 +79,7 @@ pub(super) fn add(
                 k,
                 beyond_px,
                 whole_px,
-                Chance::part(seed, (1 << 32) + u64::from(node.name.0)),
+                seed_of_part(seed, (1 << 32) + u64::from(node.name.0)),
                 &mut buds,
             );
         }
@@ -88,7 +90,7 @@ pub(super) fn add(
         let reaches = maker.grow(bud, grown);
         grown.truncate(most);
         for (k, beyond_px) in (first..grown.len()).zip(reaches) {
-            let seed = Chance::part(bud.seed, k as u64 - first as u64);
+            let seed = seed_of_part(bud.seed, k as u64 - first as u64);
             maker.buds(&grown[k].limb, k, beyond_px, f64::INFINITY, seed, &mut buds);
         }
     }
@@ -120,8 +122,8 @@ impl Maker<'_> {
         if length_px + beyond_px < 2.0 * self.least_px {
             return;
         }
-        let mut chance = Chance::new(seed);
-        let mut turn = chance.between(0.0, TAU);
+        let mut random = generator(seed, 0);
+        let mut turn = random.random_range(0.0..TAU);
         let mut way_px = 0.15 * length_px;
         let mut bud = |reach_px: f64, at: f64, turn: f64, k: u64| {
             into.push(Bud {
@@ -129,16 +131,16 @@ impl Maker<'_> {
                 host,
                 at,
                 turn,
-                seed: Chance::part(seed, k),
+                seed: seed_of_part(seed, k),
             });
         };
         for k in 0.. {
             let above_px = length_px - way_px + beyond_px;
-            let reach_px = (self.habit.ratio(&mut chance) * above_px)
-                .min(self.longest_px * chance.between(0.7, 1.0));
-            way_px += (SPACING * reach_px).max(0.4 * self.least_px) * chance.between(0.5, 1.5);
-            turn += GOLDEN + chance.between(-0.4, 0.4);
-            let shaded = chance.share() < above_px / whole_px;
+            let reach_px = (self.habit.ratio(&mut random) * above_px)
+                .min(self.longest_px * random.random_range(0.7..1.0));
+            way_px += (SPACING * reach_px).max(0.4 * self.least_px) * random.random_range(0.5..1.5);
+            turn += GOLDEN + random.random_range(-0.4..0.4);
+            let shaded = random.random::<f64>() < above_px / whole_px;
             if way_px >= length_px {
                 break;
             }
@@ -169,11 +171,12 @@ impl Maker<'_> {
             a.riding.towards(b.riding, s as f32),
             host.node,
         );
-        let mut chance = Chance::new(bud.seed);
+        let mut random = generator(bud.seed, 0);
         let plain = bud.reach_px < 2.0 * self.least_px;
-        let part = chance.one_of(&self.habit.parts).filter(|_| !plain);
-        let angle = self.habit.angle(&mut chance) * if bud.at >= 1.0 { 0.5 } else { 1.0 };
-        let roll = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), chance.between(0.0, TAU));
+        let part = self.habit.parts.choose(&mut random).filter(|_| !plain);
+        let angle = self.habit.angle(&mut random) * if bud.at >= 1.0 { 0.5 } else { 1.0 };
+        let roll =
+            UnitQuaternion::from_axis_angle(&Vector3::y_axis(), random.random_range(0.0..TAU));
         for k in 0..TRIES {
             let reach_px = bud.reach_px * 0.85f64.powi(k as i32);
             let (sin, cos) = (bud.turn + f64::from(k) * GOLDEN).sin_cos();
@@ -197,7 +200,7 @@ impl Maker<'_> {
                         riding,
                         node,
                     },
-                    chance,
+                    &mut random,
                     grown,
                 );
             }
@@ -247,12 +250,12 @@ impl Maker<'_> {
         &self,
         twig: &[(Option<usize>, Point3<f64>)],
         stem: &Stem,
-        mut chance: Chance,
+        random: &mut Generator,
         grown: &mut Vec<Grown>,
     ) -> Vec<f64> {
         let first = grown.len();
         let mut reaches = vec![0.0_f64; twig.len()];
-        for (k, &(before, to)) in twig.iter().enumerate() {
+        for &(before, to) in twig {
             let from = before.map_or(stem.from, |b| twig[b].1);
             let came = before.map_or(stem.along, |b| grown[first + b].limb.arrives());
             let along = (to - from).normalize();
@@ -263,8 +266,7 @@ impl Maker<'_> {
             let arrives = (along + Vector3::y() * (0.3 * self.habit.lift))
                 .try_normalize(0.1)
                 .unwrap_or(along);
-            let seed = Chance::part((chance.share() * 2f64.powi(53)) as u64, k as u64);
-            let curve = Curve::new([from, to], leaves, arrives, self.curl, Chance::new(seed));
+            let curve = Curve::new([from, to], leaves, arrives, self.curl, random);
             let station = |i: u32| {
                 let at = curve.at(f64::from(i) / f64::from(PIECES));
                 Station {

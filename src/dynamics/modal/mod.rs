@@ -308,6 +308,8 @@ mod tests {
     use crate::dynamics::{FilmTrack, analyse, free};
     use crate::model::{Node, NodeName, Size};
     use nalgebra::Point3;
+    use rand::RngExt;
+    use rand_distr::StandardNormal;
     use std::f64::consts::TAU;
 
     /// A trunk of 0.6 Hz that is let go after 0.5 s with 8 points on it, and a tip with `branches`:
@@ -323,17 +325,8 @@ mod tests {
             let root = (1.0 - z * z).sqrt();
             (-z * w * t).exp() * ((w * root * t).cos() + z / root * (w * root * t).sin())
         };
-        let mut chance = 9_u64;
-        let mut noise = || {
-            let mut sum = 0.0;
-            for _ in 0..12 {
-                chance = chance
-                    .wrapping_mul(6_364_136_223_846_793_005)
-                    .wrapping_add(1_442_695_040_888_963_407);
-                sum += (chance >> 11) as f64 / (1_u64 << 53) as f64;
-            }
-            0.1 * (sum - 6.0)
-        };
+        let mut random = crate::random::generator(9, 0);
+        let mut noise = || 0.1 * random.sample::<f64, _>(StandardNormal);
         let mut track = |node: u32, trunk: f64, own: Option<(f64, f64)>| {
             let at = |&t: &f64| {
                 let sway = trunk * decay(0.6, t) + own.map_or(0.0, |(hz, arm)| arm * decay(hz, t));

@@ -24,26 +24,24 @@ impl Cluster {
 }
 
 /// How a cluster stands, by where it is (Li et al. B.1): it grows away from its branch and on along
-/// it, outwards and up; its leaves face outwards and to the sky. `axis` is the trunk; `chance` are
-/// three numbers of mean 0.
+/// it, outwards and up; its leaves face outwards and to the sky. `axis` is the trunk; `off` is drawn
+/// from a normal distribution, mean 0 and deviation 1.
 pub(super) fn stand(
     perch: &Perch,
     centre: &Point3<f64>,
     axis: &Point3<f64>,
-    chance: [f64; 3],
+    off: Vector3<f64>,
 ) -> Rotation3<f64> {
     let across = Vector3::new(centre.x - axis.x, 0.0, centre.z - axis.z);
     let outwards = across.try_normalize(1e-9).unwrap_or(Vector3::z());
     let from_branch = (centre - perch.at).try_normalize(1e-9).unwrap_or(outwards);
-    let chance = Vector3::from(chance);
     let main: Vector3<f64> = 0.6 * perch.direction
         + 0.6 * from_branch
         + 0.5 * outwards
         + 0.25 * Vector3::y()
-        + 0.35 * chance;
+        + 0.35 * off;
     let main = main.try_normalize(1e-9).unwrap_or(outwards);
-    let face: Vector3<f64> =
-        outwards + 0.5 * Vector3::y() + 0.35 * Vector3::new(chance.y, chance.z, chance.x);
+    let face: Vector3<f64> = outwards + 0.5 * Vector3::y() + 0.35 * off.yzx();
     let face = face - main * face.dot(&main);
     let face = face.try_normalize(1e-3).unwrap_or_else(|| {
         let any = if main.z.abs() < 0.9 {

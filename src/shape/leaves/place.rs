@@ -6,9 +6,12 @@ use super::hidden::emptiest;
 use super::perch::{Perch, Perches, Side};
 use super::target::Target;
 use super::template::Template;
-use crate::shape::chance::Chance;
+use crate::random::{Generator, generator};
 use crate::shape::leaves::Sampling;
 use nalgebra::{Point3, Vector3};
+use rand::RngExt;
+use rand::seq::IndexedRandom;
+use rand_distr::StandardNormal;
 
 /// Layers of leaves one behind the other that a size is first tried with.
 const LAYERS: f64 = 2.0;
@@ -112,7 +115,7 @@ impl Planter<'_> {
 
     fn attempt_before(&mut self, wood: &[f32], size: f64) -> (Vec<Cluster>, Vec<f32>) {
         let mut work = Work {
-            chance: Chance::new(self.seed),
+            random: generator(self.seed, 0),
             clusters: Vec::with_capacity(self.count),
             cover: Cover::new(self.target.grid, wood),
         };
@@ -206,12 +209,12 @@ impl Planter<'_> {
         if sum <= 0.0 {
             return;
         }
-        let first = work.chance.share();
+        let first = work.random.random::<f64>();
         for k in 0..count {
             let at = sum * (first + k as f64 * GOLDEN).fract();
             let square = squares.partition_point(|&s| s <= at).min(squares.len() - 1);
             let corner = [square % across * side, square / across * side];
-            let cell = corner.map(|c| c as f64 - 0.5 + side as f64 * work.chance.share());
+            let cell = corner.map(|c| c as f64 - 0.5 + side as f64 * work.random.random::<f64>());
             if grid.index(cell).is_some() {
                 let side = if hiding {
                     self.before_wood(cell, work.cover.before)
@@ -239,12 +242,14 @@ impl Planter<'_> {
         for i in emptiest(&self.perches.all, hidden, leaves, CUBE * size, left) {
             let perch = &self.perches.all[i];
             let aside = grid.length(ASIDE * self.height);
-            let side = if work.chance.share() < 0.5 {
+            let side = if work.random.random::<f64>() < 0.5 {
                 Side::Front
             } else {
                 Side::Back
             };
-            let cell = perch.cell.map(|c| c + aside * work.chance.either());
+            let cell = perch
+                .cell
+                .map(|c| c + aside * work.random.random_range(-1.0..1.0));
             self.hang(i, cell, aside, side, size, work);
         }
     }
@@ -270,7 +275,7 @@ impl Planter<'_> {
         let grid = &self.target.grid;
         let far = (distance / grid.length(1.0).max(1e-9)).min(DEEPEST * self.height);
         // Off the bark at least, on the side that it is lit from or not.
-        let off = far * work.chance.share() + perch.radius + 0.2 * size;
+        let off = far * work.random.random::<f64>() + perch.radius + 0.2 * size;
         let depth = match side {
             Side::Front => perch.depth + off,
             Side::Back => perch.depth - off,
@@ -287,7 +292,9 @@ impl Planter<'_> {
         let share = grid
             .index(cell)
             .map_or(0.0, |c| f64::from(self.target.density[c]));
-        let size = size * (0.5 + 0.6 * share).clamp(0.5, 1.1) * (1.0 + 0.15 * work.chance.either());
+        let size = size
+            * (0.5 + 0.6 * share).clamp(0.5, 1.1)
+            * (1.0 + 0.15 * work.random.random_range(-1.0..1.0));
         let centre = perch.carried.to_rest(&posed);
         self.put(
             Cluster {
@@ -307,16 +314,12 @@ impl Planter<'_> {
             .filter(|&i| !self.perches.all[i].thick)
             .collect();
         for _ in 0..self.count {
-            let Some(&i) = work.chance.one_of(&bearing) else {
+            let Some(&i) = bearing.choose(&mut work.random) else {
                 return;
             };
-            let off = Vector3::new(
-                work.chance.normal(),
-                work.chance.normal(),
-                work.chance.normal(),
-            );
+            let off = normal_vector(&mut work.random);
             let centre = self.perches.all[i].at + off * (spread * self.height);
-            let size = size * (1.0 + 0.15 * work.chance.either());
+            let size = size * (1.0 + 0.15 * work.random.random_range(-1.0..1.0));
             self.put(
                 Cluster {
                     perch: i,
@@ -331,12 +334,8 @@ impl Planter<'_> {
 
     fn put(&self, mut cluster: Cluster, work: &mut Work<'_>) {
         let perch = &self.perches.all[cluster.perch];
-        let chance = [
-            work.chance.normal(),
-            work.chance.normal(),
-            work.chance.normal(),
-        ];
-        cluster.turn = stand(perch, &cluster.centre, &self.axis, chance);
+        let off = normal_vector(&mut work.random);
+        cluster.turn = stand(perch, &cluster.centre, &self.axis, off);
         if !cluster.centre.coords.iter().all(|x| x.is_finite()) {
             return;
         }
@@ -355,9 +354,13 @@ impl Planter<'_> {
 
 /// What has been planted so far.
 struct Work<'a> {
-    chance: Chance,
+    random: Generator,
     clusters: Vec<Cluster>,
     cover: Cover<'a>,
+}
+
+fn normal_vector(random: &mut Generator) -> Vector3<f64> {
+    Vector3::from_fn(|_, _| random.sample(StandardNormal))
 }
 
 /// How like the densities of what is covered and of what is wanted are: their correlation over the

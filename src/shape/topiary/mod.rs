@@ -1,4 +1,4 @@
-//! Topiary: the tree in a drawn shape (Li et al. section 6 and figure 11, Zeng section 6.4).
+//! Topiary: the tree in a drawn shape (Li 2011 sect. 6 and fig. 11, Zeng 2015 sect. 6.4).
 
 mod cover;
 mod cut;
@@ -8,9 +8,12 @@ mod grow;
 pub use cover::coverage;
 pub use drawn::{Drawn, TopiaryError};
 
-use super::{Envelope, fuse, is_trunk};
+use super::envelope::Envelope;
+use super::fuse::fuse;
+use super::trunk::is_trunk;
 use crate::config;
 use crate::model::{JointPose, NodeId, Outline, Pose, Skeleton};
+use grow::DrawnSpace;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
 /// A shape that leaves out no more of the outline than this share holds the tree: nobody draws to
@@ -43,9 +46,9 @@ pub struct Cut {
 }
 
 /// Cuts `skeleton` to what of it is inside `drawn`, pushes the rest to fill the shape, and adds
-/// smaller copies of the tree's own subtrees where the shape is still bare. The trunk stays. Chance
-/// (which of the subtrees, how deep) comes from
-/// `seed`. A shape that holds the whole `outline` of the tree changes nothing (Zeng section 6.4).
+/// smaller copies of the tree's own subtrees where the shape is still bare. The trunk stays. What
+/// is drawn at random (which of the subtrees, how deep) comes from `seed`. A shape that holds the
+/// whole `outline` of the tree changes nothing (Zeng 2015 sect. 6.4).
 ///
 /// # Errors
 /// The shape lies off the tree.
@@ -57,28 +60,8 @@ pub fn topiary(
     seed: u64,
 ) -> Result<Topiary, TopiaryError> {
     let shape = drawn.placed(outline, skeleton.foot_px)?;
-    let itself = |i: usize| skeleton.nodes[i].copy_of.unwrap_or(NodeId(i as u32));
-    let tree = outline.mask.iter().filter(|m| **m != 0).count();
-    let outside = outline
-        .mask
-        .iter()
-        .zip(&shape.mask)
-        .filter(|(tree, shape)| **tree != 0 && **shape == 0)
-        .count();
-    if outside as f64 <= LARGER * tree as f64 {
-        let coverage = coverage(skeleton, &shape);
-        let moves_as = (0..skeleton.nodes.len()).map(itself).collect();
-        let cut = Cut {
-            larger: true,
-            coverage,
-            ..Cut::default()
-        };
-        return Ok(Topiary {
-            skeleton: skeleton.clone(),
-            shape,
-            cut,
-            moves_as,
-        });
+    if holds(&shape, outline) {
+        return Ok(unchanged(skeleton, shape));
     }
     let envelope = Envelope::of_drawn(&shape, skeleton.foot_px);
     let cut::Pruned {
@@ -92,12 +75,11 @@ pub fn topiary(
     let left = pruned.nodes.len();
     // What was cut keeps its number: no other branch gets it.
     let last = skeleton.nodes.iter().map(|n| n.name.0).max().unwrap_or(0);
-    grow::grow(&mut pruned, (&envelope, &shape), last, settings, seed);
-    let moves_as = |n: usize| match (pruned.nodes[n].copy_of, kept.get(n)) {
-        (Some(original), _) => NodeId(kept.get(original.index()).map_or(0, |&k| k as u32)),
-        (None, Some(&i)) => itself(i),
-        (None, None) => NodeId(0),
+    let space = DrawnSpace {
+        shape: &shape,
+        envelope: &envelope,
     };
+    grow::grow(&mut pruned, &space, last, settings, seed);
     let cut = Cut {
         larger: false,
         gone: skeleton.nodes.len() - left,
@@ -106,11 +88,59 @@ pub fn topiary(
         coverage: coverage(&pruned, &shape),
     };
     Ok(Topiary {
-        moves_as: (0..pruned.nodes.len()).map(moves_as).collect(),
+        moves_as: moves_as(skeleton, &pruned, &kept),
         skeleton: pruned,
         shape,
         cut,
     })
+}
+
+/// Whether `shape` holds all of `outline` but [`LARGER`] of it.
+fn holds(shape: &Outline, outline: &Outline) -> bool {
+    let tree = outline.mask.iter().filter(|m| **m != 0).count();
+    let outside = outline
+        .mask
+        .iter()
+        .zip(&shape.mask)
+        .filter(|(tree, shape)| **tree != 0 && **shape == 0)
+        .count();
+    outside as f64 <= LARGER * tree as f64
+}
+
+/// The tree as it is, in a shape that holds all of it.
+fn unchanged(skeleton: &Skeleton, shape: Outline) -> Topiary {
+    let cut = Cut {
+        larger: true,
+        coverage: coverage(skeleton, &shape),
+        ..Cut::default()
+    };
+    Topiary {
+        skeleton: skeleton.clone(),
+        shape,
+        cut,
+        moves_as: (0..skeleton.nodes.len())
+            .map(|i| measured_of(skeleton, i))
+            .collect(),
+    }
+}
+
+/// The measured node that node `i` is a copy of, or itself.
+fn measured_of(skeleton: &Skeleton, i: usize) -> NodeId {
+    skeleton.nodes[i].copy_of.unwrap_or(NodeId(i as u32))
+}
+
+/// For every node of `cut` the measured node of the tree before, `skeleton`, that it moves as.
+/// `kept` says which node of that each of the first ones was.
+fn moves_as(skeleton: &Skeleton, cut: &Skeleton, kept: &[usize]) -> Vec<NodeId> {
+    let mut moves_as = Vec::with_capacity(cut.nodes.len());
+    for (n, node) in cut.nodes.iter().enumerate() {
+        moves_as.push(match (node.copy_of, kept.get(n)) {
+            (Some(original), _) => NodeId(kept.get(original.index()).map_or(0, |&k| k as u32)),
+            (None, Some(&i)) => measured_of(skeleton, i),
+            (None, None) => NodeId(0),
+        });
+    }
+    moves_as
 }
 
 impl Topiary {
@@ -122,7 +152,6 @@ impl Topiary {
             position: Point3::origin(),
             rotation: UnitQuaternion::identity(),
         };
-        let rotation = |i: usize| whole.joints.get(i).map_or(still.rotation, |j| j.rotation);
         let mut joints: Vec<JointPose> = Vec::with_capacity(self.skeleton.nodes.len());
         for (node, original) in self.skeleton.nodes.iter().zip(&self.moves_as) {
             let Some(parent) = node.parent.filter(|p| p.index() < joints.len()) else {
@@ -135,8 +164,9 @@ impl Topiary {
                 .and_then(|n| n.parent)
                 .map_or(0, |p| p.index());
             let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), node.plane_angle);
-            let own =
-                turn * (rotation(above).inverse() * rotation(original.index())) * turn.inverse();
+            let against_parent =
+                rotation(whole, above).inverse() * rotation(whole, original.index());
+            let own = turn * against_parent * turn.inverse();
             let parent_joint = joints[parent.index()];
             let rotation =
                 UnitQuaternion::new_normalize((parent_joint.rotation * own).into_inner());
@@ -152,4 +182,11 @@ impl Topiary {
             joints,
         }
     }
+}
+
+/// Rotation of joint `i`; none where the pose does not have it.
+fn rotation(pose: &Pose, i: usize) -> UnitQuaternion<f64> {
+    pose.joints
+        .get(i)
+        .map_or_else(UnitQuaternion::identity, |j| j.rotation)
 }
