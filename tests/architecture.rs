@@ -145,6 +145,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "report",
             // What `analyze` asks of a capture's film.
             "dynamics::analyse",
+            "dynamics::Depth",
             // The table of cylinders is of the limbs; a drawn shape is read, and what it cut is
             // told and moves.
             "shape::cylinders",

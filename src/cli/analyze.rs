@@ -9,7 +9,7 @@ use super::{Ended, say};
 use crate::cancel::CancelToken;
 use crate::capture::Captured;
 use crate::config::Excited;
-use crate::dynamics::analyse;
+use crate::dynamics::{Depth, analyse};
 use crate::export::picture::data_address;
 use crate::export::{ExportError, refuse_taken};
 use crate::model::{Excitation, NodeName, Skeleton, Swaying};
@@ -160,7 +160,7 @@ fn analysed(args: &AnalyzeArgs, captured: &Captured, name: &str) -> Result<Analy
         ..(*captured.skeleton).clone()
     };
     let progress = Progress::begin(name, skeleton.nodes.len().saturating_sub(1));
-    let analysis = analyse(&skeleton, &film, dynamics, &CancelToken::new());
+    let analysis = analyse(&skeleton, &film, dynamics, Depth::Full, &CancelToken::new());
     drop(progress);
     let given = dynamics.excitation != Excited::Auto;
     hints(&film, &analysis, given)

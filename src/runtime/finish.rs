@@ -6,7 +6,7 @@ use super::held_sets::{HeldSets, OnTrial};
 use super::meter::Histogram;
 use super::shared::{Failure, Shared};
 use crate::config::Config;
-use crate::dynamics::analyse;
+use crate::dynamics::{Depth, analyse};
 use crate::export::capture::{
     AnimationNote, Build, Capture, ModelNote, OutlineNote, PictureNote, Quality as QualityNote,
     Refinement, Software, Source, Timing, json,
@@ -130,7 +130,14 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
         "sway",
         || {
             let cancel = &job.shared.pulse.closing_work;
-            analyse(&tree.skeleton, &film, &job.config.dynamics, cancel).sway
+            analyse(
+                &tree.skeleton,
+                &film,
+                &job.config.dynamics,
+                Depth::Full,
+                cancel,
+            )
+            .sway
         },
         || {
             (

@@ -11,7 +11,7 @@ use super::pulse::{Pulse, Worker};
 use super::shared::Shared;
 use crate::cancel::CancelToken;
 use crate::config::Dynamics;
-use crate::dynamics::{FilmLog, analyse_soon, spectrum};
+use crate::dynamics::{self, Depth, FilmLog, spectrum};
 use crate::model::{
     AngleSpectrum, Angles, BranchSway, NodeId, NodeName, Skeleton, SwayNow, TrackId, Unidentified,
 };
@@ -289,7 +289,7 @@ pub fn analyse(request: &Request, cancel: &CancelToken) -> SwayNow {
     let film = request
         .log
         .film(skeleton, |id| request.nodes.get(&id).copied());
-    let analysis = analyse_soon(skeleton, &film, settings, cancel);
+    let analysis = dynamics::analyse(skeleton, &film, settings, Depth::Quick, cancel);
     let branch = |(i, name): (usize, &NodeName)| {
         // The foot is no branch.
         let swaying = analysis
