@@ -40,8 +40,8 @@ impl<'a> Extension<'a> {
         let mut products = symmetric(n, |a, b| {
             dot(&columns[a], &columns[b]) - dot(&on_present[a], &on_present[b])
         });
-        for k in 0..n {
-            let before = dot(&columns[k], &columns[k]);
+        for (k, column) in columns.iter().enumerate() {
+            let before = dot(column, column);
             if products[(k, k)] <= MIN_LENGTH_LEFT * MIN_LENGTH_LEFT * before {
                 products.row_mut(k).fill(0.0);
                 products.column_mut(k).fill(0.0);

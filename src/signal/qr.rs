@@ -3,7 +3,8 @@
 //! Not nalgebra's QR, as columns may depend on those before them (modes that are alike, a signal
 //! that is a multiple of another): such a column must get the factor 0 and leave the others as they
 //! are. A Householder QR puts an arbitrary direction in its place, which then takes part of every
-//! signal, and the pivoted one may drop an earlier column instead.
+//! signal, and the pivoted one may drop an earlier column instead. Nor is nalgebra's faster: 36 us
+//! for 9 columns of 360 rows and one signal, where this takes 23.
 
 use super::vectors::{dot, subtract_scaled};
 

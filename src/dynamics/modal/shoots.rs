@@ -49,8 +49,10 @@ pub fn shoots(
         return Vec::new();
     }
     let sways = free_decay::sways(skeleton, &film, &members, &onset, &limits, cancel);
-    let solution = ModalSolution::of(skeleton, &film, &onset, &limits, &sways, cancel);
-    solution.map_or_else(Vec::new, |solution| solution.shoots(skeleton, &sways))
+    match ModalSolution::of(skeleton, &film, &onset, &limits, &sways, cancel) {
+        Some(solution) => solution.shoots(skeleton, &sways),
+        None => Vec::new(),
+    }
 }
 
 impl ModalSolution {
