@@ -7,7 +7,7 @@ mod made_trees;
 
 use arborcam::cancel::CancelToken;
 use arborcam::config::Dynamics;
-use arborcam::dynamics::analyse;
+use arborcam::dynamics::{Depth, analyse};
 use made_trees::{Drive, Filming, MadeTree};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -42,6 +42,7 @@ fn main() {
                 &tree.skeleton,
                 &tree.film,
                 &Dynamics::default(),
+                Depth::Full,
                 &CancelToken::new(),
             )
             .sway;

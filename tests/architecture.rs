@@ -160,6 +160,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "report",
             // What `analyze` asks of a capture's film.
             "dynamics::analyse",
+            "dynamics::Depth",
             "dynamics::Film",
             // A drawn shape is read, and what it cut is told.
             "shape::Cut",

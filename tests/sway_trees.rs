@@ -5,7 +5,7 @@ mod made_trees;
 
 use arborcam::cancel::CancelToken;
 use arborcam::config::{Dynamics, Excited};
-use arborcam::dynamics::{Film, FilmTrack, analyse};
+use arborcam::dynamics::{Depth, Film, FilmTrack, analyse};
 use arborcam::model::{Excitation, NodeId, Unidentified};
 use made_trees::{Drive, Filming, MadeTree};
 
@@ -42,6 +42,7 @@ fn run_with(
             &tree.skeleton,
             &tree.film,
             &Dynamics::default(),
+            Depth::Full,
             &CancelToken::new(),
         );
         let wind = analysis
@@ -209,7 +210,7 @@ fn wind() {
     );
 }
 
-/// Whoever films for longer is told more, and more exactly.
+/// A longer film gives more answers, and more exact ones.
 #[test]
 fn two_minutes_of_wind() {
     let filming = Filming {
@@ -263,6 +264,7 @@ fn a_film_of_few_frames_a_second_claims_nothing() {
                 &tree.skeleton,
                 &tree.film,
                 &Dynamics::default(),
+                Depth::Full,
                 &CancelToken::new(),
             )
             .sway
@@ -331,7 +333,14 @@ fn what_carries_no_answer_gets_a_reason() {
         };
         for (i, (at, times, allowed)) in cases.iter().enumerate() {
             let (tree, film) = lone(at, times);
-            let sway = analyse(&tree.skeleton, &film, &config, &CancelToken::new()).sway;
+            let sway = analyse(
+                &tree.skeleton,
+                &film,
+                &config,
+                Depth::Full,
+                &CancelToken::new(),
+            )
+            .sway;
             assert_eq!(sway.len(), tree.skeleton.measured());
             match sway[1] {
                 Err(why) => assert!(allowed.contains(&why), "case {i}: {why:?}"),
@@ -346,14 +355,21 @@ fn what_carries_no_answer_gets_a_reason() {
     }
 }
 
-/// Whoever wants the end gets what was told until then, the rest named as what it is, and the
+/// An analysis that is cancelled gives the answers until then, the rest named as what it is, and the
 /// answers are those of a whole analysis.
 #[test]
 fn what_is_broken_off_says_so() {
     for drive in [Drive::Release(0.5), Drive::Wind] {
         let tree = MadeTree::new(3, drive, &Filming::default());
         let config = Dynamics::default();
-        let whole = analyse(&tree.skeleton, &tree.film, &config, &CancelToken::new()).sway;
+        let whole = analyse(
+            &tree.skeleton,
+            &tree.film,
+            &config,
+            Depth::Full,
+            &CancelToken::new(),
+        )
+        .sway;
         let cancel = CancelToken::new();
         let part = std::thread::scope(|scope| {
             scope.spawn(|| {
@@ -362,7 +378,7 @@ fn what_is_broken_off_says_so() {
                 }
                 cancel.cancel();
             });
-            analyse(&tree.skeleton, &tree.film, &config, &cancel).sway
+            analyse(&tree.skeleton, &tree.film, &config, Depth::Full, &cancel).sway
         });
         assert!(
             part.iter()
@@ -407,6 +423,7 @@ fn one_branch_with_half_of_its_frames() {
         &tree.skeleton,
         &film,
         &Dynamics::default(),
+        Depth::Full,
         &CancelToken::new(),
     )
     .sway[1]

@@ -9,7 +9,7 @@ use super::{Ended, say};
 use crate::cancel::CancelToken;
 use crate::config::{Config, Excited};
 use crate::document::{Document, DocumentError};
-use crate::dynamics::{Film, analyse};
+use crate::dynamics::{Depth, Film, analyse};
 use crate::export::picture::data_address;
 use crate::files::refuse_taken;
 use crate::model::{Excitation, Pose, Skeleton, Swaying};
@@ -137,7 +137,13 @@ fn analysed(args: &AnalyzeArgs, document: &Document, name: &str) -> Result<Analy
         ..(*document.skeleton).clone()
     };
     let progress = Progress::begin(name, skeleton.nodes.len().saturating_sub(1));
-    let analysis = analyse(&skeleton, &film, &config.dynamics, &CancelToken::new());
+    let analysis = analyse(
+        &skeleton,
+        &film,
+        &config.dynamics,
+        Depth::Full,
+        &CancelToken::new(),
+    );
     drop(progress);
     let given = config.dynamics.excitation != Excited::Auto;
     for hint in hints(&film, &analysis, given) {

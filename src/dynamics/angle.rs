@@ -1,7 +1,8 @@
 //! How a branch turns against the one that carries it, as it is seen in the picture.
 
 use crate::model::{NodeId, Pose, Skeleton};
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use crate::signal::principal::{PrincipalComponents, symmetric};
+use nalgebra::{UnitQuaternion, Vector3};
 
 /// Projections shorter than this have no direction, px.
 const SHORTEST_PX: f64 = 1e-6;
@@ -48,10 +49,10 @@ impl AngleToParent {
         let Some([parent, node]) = self.own.filter(|_| pose.joints.len() == self.nodes) else {
             return f64::NAN;
         };
-        let at = |n: NodeId| pose.joints[n.index()].position;
-        let way = |from: NodeId, to: NodeId| [at(to).x - at(from).x, at(to).y - at(from).y];
-        let base = self.carrier.map_or([0.0, 1.0], |(from, to)| way(from, to));
-        let own = way(parent, node);
+        let base = self.carrier.map_or([0.0, 1.0], |(from, to)| {
+            direction_in_picture(pose, from, to)
+        });
+        let own = direction_in_picture(pose, parent, node);
         let shortest = base[0].hypot(base[1]).min(own[0].hypot(own[1]));
         if !shortest.is_finite() || shortest < SHORTEST_PX {
             return f64::NAN;
@@ -76,40 +77,54 @@ pub fn angle_in_space_deg(skeleton: &Skeleton, poses: &[Pose], node: NodeId) -> 
         return vec![f64::NAN; poses.len()];
     };
     let own = skeleton.nodes[node.index()].position - skeleton.nodes[parent.index()].position;
-    let grand = skeleton.ancestors(parent).next().map(|_| parent);
-    let turns: Vec<Option<Vector3<f64>>> = poses
-        .iter()
-        .map(|pose| {
-            let joint = |n: NodeId| {
-                pose.joints
-                    .get(n.index())
-                    .filter(|_| pose.joints.len() == skeleton.nodes.len())
-            };
-            let now = joint(node)?.position - joint(parent)?.position;
-            // What the branch does beyond being carried.
-            let carried = match grand {
-                Some(carrier) => joint(carrier)?.rotation.inverse() * now,
-                None => now,
-            };
-            UnitQuaternion::rotation_between(&own, &carried)
-                .map(|q| q.scaled_axis())
-                .filter(|v| v.iter().all(|x| x.is_finite()))
-        })
-        .collect();
+    let carrier = skeleton.ancestors(parent).next().map(|_| parent);
+    let mut turns: Vec<Option<Vector3<f64>>> = Vec::with_capacity(poses.len());
+    for pose in poses {
+        let is_of_skeleton = pose.joints.len() == skeleton.nodes.len();
+        let carried = is_of_skeleton.then(|| carried_direction(pose, parent, node, carrier));
+        turns.push(carried.and_then(|carried| turn(&own, &carried)));
+    }
     let seen: Vec<Vector3<f64>> = turns.iter().copied().flatten().collect();
     let mean = seen.iter().sum::<Vector3<f64>>() / (seen.len() as f64).max(1.0);
-    let spread: Matrix3<f64> = seen
-        .iter()
-        .map(|v| (v - mean) * (v - mean).transpose())
-        .sum();
-    let eigen = spread.symmetric_eigen();
-    let axis: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into();
+    let spread = symmetric(3, |a, b| {
+        seen.iter()
+            .map(|v| (v[a] - mean[a]) * (v[b] - mean[b]))
+            .sum()
+    });
+    let main = &PrincipalComponents::of_products(spread).directions[0];
+    let axis = Vector3::new(main[0], main[1], main[2]);
     // Towards the viewer, as counterclockwise is in the picture.
     let axis = if axis.z < 0.0 { -axis } else { axis };
     turns
         .iter()
         .map(|t| t.map_or(f64::NAN, |t| t.dot(&axis).to_degrees()))
         .collect()
+}
+
+fn direction_in_picture(pose: &Pose, from: NodeId, to: NodeId) -> [f64; 2] {
+    let [from, to] = [from, to].map(|n| pose.joints[n.index()].position);
+    [to.x - from.x, to.y - from.y]
+}
+
+/// The branch from `from` to `to` as it would be if its carrier, if it has one, did not turn.
+fn carried_direction(
+    pose: &Pose,
+    from: NodeId,
+    to: NodeId,
+    carrier: Option<NodeId>,
+) -> Vector3<f64> {
+    let now = pose.joints[to.index()].position - pose.joints[from.index()].position;
+    match carrier {
+        Some(carrier) => pose.joints[carrier.index()].rotation.inverse() * now,
+        None => now,
+    }
+}
+
+/// The rotation between two directions as a vector along its axis.
+fn turn(from: &Vector3<f64>, to: &Vector3<f64>) -> Option<Vector3<f64>> {
+    UnitQuaternion::rotation_between(from, to)
+        .map(|q| q.scaled_axis())
+        .filter(|v| v.iter().all(|x| x.is_finite()))
 }
 
 /// The nearest branch at or below the one that ends in `node` that has a direction in the picture.
@@ -133,19 +148,21 @@ mod tests {
 
     /// A chain of nodes from the foot up.
     fn chain(at: &[[f64; 3]]) -> Skeleton {
-        let node = |(i, p): (usize, &[f64; 3])| Node {
-            name: NodeName(i as u32),
-            parent: i.checked_sub(1).map(|p| NodeId(p as u32)),
-            level: i as u8,
-            position: Point3::from(*p),
-            radius: 1.0,
-            n_tracks: 1,
-            certainty: 1.0,
-            copy_of: None,
-            plane_angle: 0.0,
-            kind: Default::default(),
-        };
-        let nodes = at.iter().enumerate().map(node).collect();
+        let mut nodes = Vec::new();
+        for (i, p) in at.iter().enumerate() {
+            nodes.push(Node {
+                name: NodeName(i as u32),
+                parent: i.checked_sub(1).map(|p| NodeId(p as u32)),
+                level: i as u8,
+                position: Point3::from(*p),
+                radius: 1.0,
+                n_tracks: 1,
+                certainty: 1.0,
+                copy_of: None,
+                plane_angle: 0.0,
+                kind: Default::default(),
+            });
+        }
         Skeleton {
             nodes,
             foot_px: [0.0, 0.0],
@@ -157,14 +174,17 @@ mod tests {
     }
 
     fn pose(at: &[[f64; 3]]) -> Pose {
-        let joint = |p: &[f64; 3]| JointPose {
-            position: Point3::from(*p),
-            rotation: UnitQuaternion::identity(),
-        };
+        let mut joints = Vec::new();
+        for p in at {
+            joints.push(JointPose {
+                position: Point3::from(*p),
+                rotation: UnitQuaternion::identity(),
+            });
+        }
         Pose {
             frame: 0,
             time_s: 0.0,
-            joints: at.iter().map(joint).collect(),
+            joints,
         }
     }
 
@@ -194,11 +214,12 @@ mod tests {
     fn a_sway_in_depth_is_an_angle_in_space() {
         let rest = [[0.0; 3], [0.0, 10.0, 0.0], [0.0, 20.0, 0.0]];
         let tree = chain(&rest);
-        let at = |deg: f64| {
+        let mut poses = Vec::new();
+        for deg in [0.0_f64, 8.0, -8.0, 3.0] {
             let (s, c) = deg.to_radians().sin_cos();
-            pose(&[[0.0; 3], [0.0, 10.0, 0.0], [0.0, 10.0 + 10.0 * c, 10.0 * s]])
-        };
-        let poses: Vec<Pose> = [0.0, 8.0, -8.0, 3.0].map(at).into();
+            let end = [0.0, 10.0 + 10.0 * c, 10.0 * s];
+            poses.push(pose(&[[0.0; 3], [0.0, 10.0, 0.0], end]));
+        }
         let (space, plane) = (
             angle_in_space_deg(&tree, &poses, NodeId(2)),
             angle_to_parent_deg(&tree, &poses, NodeId(2)),
@@ -213,18 +234,14 @@ mod tests {
 
     #[test]
     fn an_angle_that_passes_180_degrees_does_not_jump() {
-        let at = |deg: f64| {
-            let (s, c) = deg.to_radians().sin_cos();
-            pose(&[
-                [0.0; 3],
-                [0.0, 10.0, 0.0],
-                [-10.0 * s, 10.0 + 10.0 * c, 0.0],
-            ])
-        };
         let tree = chain(&[[0.0; 3], [0.0, 10.0, 0.0], [-1.0, 0.0, 0.0]]);
         let angles = angle_to_parent_deg(
             &tree,
-            &[at(170.0), at(178.0), at(186.0), at(175.0)],
+            &[170.0_f64, 178.0, 186.0, 175.0].map(|deg| {
+                let (s, c) = deg.to_radians().sin_cos();
+                let end = [-10.0 * s, 10.0 + 10.0 * c, 0.0];
+                pose(&[[0.0; 3], [0.0, 10.0, 0.0], end])
+            }),
             NodeId(2),
         );
         for (found, wanted) in angles.iter().zip([170.0, 178.0, 186.0, 175.0]) {

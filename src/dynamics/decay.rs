@@ -3,9 +3,13 @@
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 
+/// Damping ratio that is usual of branches, and the standard deviation of its logarithm: some
+/// hundredths of the critical damping. A weak prior where the film is too short to tell.
+pub(super) const USUAL_DAMPING: f64 = 0.05;
+const LN_DAMPING_SD: f64 = 0.7;
 /// What a step between two frames may be off the one before, times the rate of a mode, for a short
 /// series to tell it.
-const ALIKE: f64 = 0.05;
+const MAX_SERIES_ARGUMENT: f64 = 0.05;
 
 /// One mode: undamped frequency in Hz and damping ratio.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,7 +21,7 @@ pub struct Mode {
 /// How the decay begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Start {
-    /// Let go from rest at time 0: the phase of every mode is known, which tells modes apart that
+    /// Released from rest at time 0: the phase of every mode is known, which tells modes apart that
     /// are close together.
     Rest,
     /// In the middle of the motion: any phase.
@@ -76,28 +80,34 @@ impl Mode {
         let root = (1.0 - self.damping * self.damping).sqrt();
         let omega = TAU * self.frequency_hz;
         let by_damping = -self.damping * omega * Complex::new(1.0, self.damping / root);
-        let of = |f: &dyn Fn(f64, Complex<f64>) -> Complex<f64>| -> Vec<f64> {
-            times_s
-                .iter()
-                .zip(&waves)
-                .map(|(t, z)| f(*t, *z).re)
-                .collect()
-        };
-        let column = |[a, slope]: &[Complex<f64>; 2]| {
-            let (faster, damped, later) = (a * pole, a * by_damping, -a * pole);
-            let by_mode = [
-                of(&|t, z| faster * z * t),
-                of(&|t, z| (slope + damped * t) * z),
-            ];
-            (
-                of(&|_, z| a * z),
-                Slopes {
-                    by_mode,
-                    by_moment: of(&|_, z| later * z),
-                },
-            )
-        };
-        self.weights(start).iter().map(column).collect()
+        let mut out = Vec::new();
+        for [weight, slope] in self.weights(start) {
+            let (faster, damped, later) = (weight * pole, weight * by_damping, -weight * pole);
+            let n = times_s.len();
+            let mut column = Vec::with_capacity(n);
+            let mut slopes = Slopes {
+                by_mode: [Vec::with_capacity(n), Vec::with_capacity(n)],
+                by_moment: Vec::with_capacity(n),
+            };
+            for (t, z) in times_s.iter().zip(&waves) {
+                column.push((weight * z).re);
+                slopes.by_mode[0].push((faster * z * t).re);
+                slopes.by_mode[1].push(((slope + damped * t) * z).re);
+                slopes.by_moment.push((later * z).re);
+            }
+            out.push((column, slopes));
+        }
+        out
+    }
+
+    /// Whether the frequencies of two modes are no farther apart than this share.
+    pub(super) fn has_frequency_of(&self, other: &Mode, tolerance: f64) -> bool {
+        self.ln_frequency_ratio(other).abs() < tolerance
+    }
+
+    /// Logarithm of this frequency over another one's.
+    pub(super) fn ln_frequency_ratio(&self, other: &Mode) -> f64 {
+        (self.frequency_hz / other.frequency_hz).ln()
     }
 
     pub(super) fn parameters(&self) -> [f64; 2] {
@@ -111,6 +121,14 @@ impl Mode {
         }
     }
 }
+
+/// What the prior on the damping adds to minus twice a logarithm of likelihood.
+pub(super) fn damping_penalty(ln_damping: f64) -> f64 {
+    ((ln_damping - USUAL_DAMPING.ln()) / LN_DAMPING_SD).powi(2)
+}
+
+/// Weight of that prior in normal equations: one over the variance.
+pub(super) const LN_DAMPING_WEIGHT: f64 = 1.0 / (LN_DAMPING_SD * LN_DAMPING_SD);
 
 /// exp(λ t) at growing times: each value is the one before times a factor, which is most of the
 /// work of a fit.
@@ -134,7 +152,7 @@ pub(super) fn each_step(times_s: &[f64], pole: Complex<f64>, mut take: impl FnMu
     for pair in times_s.windows(2) {
         let dt = pair[1] - pair[0];
         let off = pole * (dt - step_s);
-        if off.norm_sqr() <= ALIKE * ALIKE {
+        if off.norm_sqr() <= MAX_SERIES_ARGUMENT * MAX_SERIES_ARGUMENT {
             take(factor * short_exp(off));
         } else {
             (step_s, factor) = (dt, (pole * dt).exp());
@@ -200,6 +218,16 @@ mod tests {
         }
     }
 
+    /// With other logarithms of frequency and damping.
+    fn moved(mode: &Mode, by: [f64; 2]) -> Mode {
+        let x = mode.parameters();
+        Mode::of_parameters(&[x[0] + by[0], x[1] + by[1]])
+    }
+
+    fn earlier(by_s: f64) -> Vec<f64> {
+        times().iter().map(|t| t - by_s).collect()
+    }
+
     #[test]
     fn slopes_are_those_of_the_columns() {
         let mode = Mode {
@@ -214,24 +242,26 @@ mod tests {
                 .enumerate()
             {
                 assert_eq!(column, mode.columns(&times(), start)[c]);
-                let moved = |by: [f64; 2]| {
-                    let x = mode.parameters();
-                    Mode::of_parameters(&[x[0] + by[0], x[1] + by[1]])
-                        .columns(&times(), start)
-                        .swap_remove(c)
-                };
-                let shifted = |by: f64| {
-                    let later: Vec<f64> = times().iter().map(|t| t - by).collect();
-                    mode.columns(&later, start).swap_remove(c)
-                };
                 let pairs = [
-                    (&slopes.by_mode[0], moved([step, 0.0]), moved([-step, 0.0])),
-                    (&slopes.by_mode[1], moved([0.0, step]), moved([0.0, -step])),
-                    (&slopes.by_moment, shifted(step), shifted(-step)),
+                    (
+                        &slopes.by_mode[0],
+                        moved(&mode, [step, 0.0]).columns(&times(), start),
+                        moved(&mode, [-step, 0.0]).columns(&times(), start),
+                    ),
+                    (
+                        &slopes.by_mode[1],
+                        moved(&mode, [0.0, step]).columns(&times(), start),
+                        moved(&mode, [0.0, -step]).columns(&times(), start),
+                    ),
+                    (
+                        &slopes.by_moment,
+                        mode.columns(&earlier(step), start),
+                        mode.columns(&earlier(-step), start),
+                    ),
                 ];
                 for (slope, up, down) in pairs {
                     for (k, s) in slope.iter().enumerate() {
-                        let wanted = (up[k] - down[k]) / (2.0 * step);
+                        let wanted = (up[c][k] - down[c][k]) / (2.0 * step);
                         assert!(
                             (s - wanted).abs() < 1e-5 * (1.0 + wanted.abs()),
                             "{s}, not {wanted}"

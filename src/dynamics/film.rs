@@ -1,6 +1,7 @@
 //! The points of a film, by the branch that they are on: what sway is measured from.
 
 use crate::model::{LogWindow, NodeId, Skeleton, TrackId, TrackSet};
+use crate::signal::statistics::nth_smallest;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::Range;
@@ -13,6 +14,20 @@ pub struct FilmTrack {
     pub node: NodeId,
     /// Where it was in every frame of the film, px; no numbers where it was not seen.
     pub at_px: Vec<[f64; 2]>,
+}
+
+impl FilmTrack {
+    /// Some of the frames; not seen in those that it does not have.
+    fn in_frames(&self, frames: &[usize]) -> Self {
+        let mut at_px = Vec::with_capacity(frames.len());
+        for &k in frames {
+            at_px.push(self.at_px.get(k).copied().unwrap_or([f64::NAN; 2]));
+        }
+        Self {
+            node: self.node,
+            at_px,
+        }
+    }
 }
 
 /// The points of a film in all its frames. Times are those of the sensor: they need not be even,
@@ -28,22 +43,16 @@ impl Film {
     /// Frames whose time is no number, or not later than the one before, are left out: nothing can
     /// be said of them.
     pub fn new(times_s: &[f64], tracks: Vec<FilmTrack>) -> Self {
-        let mut last = f64::NEG_INFINITY;
-        let kept: Vec<usize> = (0..times_s.len())
-            .filter(|&k| {
-                let later = times_s[k].is_finite() && times_s[k] > last;
-                last = if later { times_s[k] } else { last };
-                later
-            })
-            .collect();
-        let at = |t: &FilmTrack, k: usize| t.at_px.get(k).copied().unwrap_or([f64::NAN; 2]);
-        let thin = |t: FilmTrack| FilmTrack {
-            node: t.node,
-            at_px: kept.iter().map(|&k| at(&t, k)).collect(),
-        };
+        let mut kept: Vec<usize> = Vec::with_capacity(times_s.len());
+        for (k, time_s) in times_s.iter().enumerate() {
+            let last_s = kept.last().map_or(f64::NEG_INFINITY, |&k| times_s[k]);
+            if time_s.is_finite() && *time_s > last_s {
+                kept.push(k);
+            }
+        }
         Self {
             times_s: kept.iter().map(|&k| times_s[k]).collect(),
-            tracks: tracks.into_iter().map(thin).collect(),
+            tracks: tracks.iter().map(|t| t.in_frames(&kept)).collect(),
         }
     }
 
@@ -91,14 +100,22 @@ impl Film {
 
     /// Some of the frames.
     pub(super) fn part(&self, frames: Range<usize>) -> Self {
-        let part = |t: &FilmTrack| FilmTrack {
-            node: t.node,
-            at_px: t.at_px[frames.clone()].to_vec(),
-        };
-        Self {
-            times_s: self.times_s[frames.clone()].to_vec(),
-            tracks: self.tracks.iter().map(part).collect(),
+        let mut tracks = Vec::with_capacity(self.tracks.len());
+        for track in &self.tracks {
+            tracks.push(FilmTrack {
+                node: track.node,
+                at_px: track.at_px[frames.clone()].to_vec(),
+            });
         }
+        Self {
+            times_s: self.times_s[frames].to_vec(),
+            tracks,
+        }
+    }
+
+    /// Number of frames in a period of `rate_hz`, with its fraction.
+    pub(super) fn frames_per_period(&self, rate_hz: f64) -> f64 {
+        1.0 / (rate_hz * self.step_s())
     }
 
     /// Some of the frames by `every` neighbours; those between which frames are missing are not put
@@ -127,12 +144,9 @@ impl Film {
     /// Time that three quarters of the frames are not farther apart than, s; infinite for less than
     /// two frames.
     pub fn step_s(&self) -> f64 {
-        let mut steps: Vec<f64> = self.times_s.windows(2).map(|w| w[1] - w[0]).collect();
-        steps.sort_unstable_by(f64::total_cmp);
-        steps
-            .get(3 * steps.len() / 4)
-            .copied()
-            .unwrap_or(f64::INFINITY)
+        let steps: Vec<f64> = self.times_s.windows(2).map(|w| w[1] - w[0]).collect();
+        let three_quarters = 3 * steps.len() / 4;
+        nth_smallest(steps, three_quarters).unwrap_or(f64::INFINITY)
     }
 }
 

@@ -1,9 +1,9 @@
 //! What signals have of one oscillation among others: Wiener's filter, at any times.
 //!
 //! The covariance of the sum is inverted and that of the part multiplied in a time that grows with
-//! the number of values only, by the same factor as the likelihood's (`process.rs`).
+//! the number of values only, by the same factor as the likelihood's (`celerite.rs`).
 
-use super::process::{Part, Ranks, Times};
+use super::celerite::{Part, Ranks, Times};
 
 /// A filter for one part of a sum.
 pub(super) struct Filter {
@@ -130,33 +130,35 @@ impl Filter {
 mod tests {
     use super::*;
 
+    fn wave(times_s: &[f64], hz: f64) -> Vec<f64> {
+        let phases = times_s.iter().map(|t| std::f64::consts::TAU * hz * t);
+        phases.map(f64::sin).collect()
+    }
+
+    fn oscillator(frequency_hz: f64, variance: f64) -> Part {
+        Part::Oscillator {
+            variance,
+            frequency_hz,
+            damping: 0.01,
+            gusts_per_s: 1e3,
+        }
+    }
+
     /// Two sways close together in one signal: each comes out as it went in.
     #[test]
     fn a_sway_is_told_from_another_one_beside_it() {
         let times: Vec<f64> = (0..900)
             .map(|k| 0.066 * f64::from(k) + 0.01 * (f64::from(k) * 1.7).sin())
             .collect();
-        let wave = |hz: f64| {
-            times
-                .iter()
-                .map(|t| (std::f64::consts::TAU * hz * t).sin())
-                .collect::<Vec<f64>>()
-        };
-        let (slow, fast) = (wave(0.6), wave(0.8));
+        let (slow, fast) = (wave(&times, 0.6), wave(&times, 0.8));
         let both: Vec<f64> = slow.iter().zip(&fast).map(|(a, b)| a + 2.0 * b).collect();
-        let part = |frequency_hz: f64, variance: f64| Part::Oscillator {
-            variance,
-            frequency_hz,
-            damping: 0.01,
-            gusts_per_s: 1e3,
-        };
         let parts = [
-            part(0.6, 0.5),
+            oscillator(0.6, 0.5),
             Part::Drift {
                 variance: 0.01,
                 rate_per_s: 0.1,
             },
-            part(0.8, 2.0),
+            oscillator(0.8, 2.0),
         ];
         let times = Times::new(times.clone());
         for (of, wanted, size) in [(0, &slow, 1.0), (2, &fast, 2.0)] {

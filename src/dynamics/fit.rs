@@ -1,109 +1,123 @@
-//! The nonlinear fit of damped cosines to many signals at once.
-//!
-//! Factors come from a linear fit inside the nonlinear one: variable projection (Golub and Pereyra
-//! 1973) with Kaufman's Jacobian (1975), all of it by normal equations, so that a step costs
-//! products of columns with signals and little else. After a release the moment of it, which all
-//! modes share, is fitted too.
+//! The nonlinear fit of damped cosines to many signals at once: variable projection by
+//! Levenberg-Marquardt. After a release the moment of it, which all modes share, is fitted too.
 
-use super::columns::dot;
+use super::branches::BranchMode;
 use super::decay::{Mode, Slopes, Start};
-use super::normal::{Factored, products};
-use super::signals::{Explained, Fit, Group, Signals, slices};
-use nalgebra::{DMatrix, DVector};
+use super::signals::{Fit, Signals};
+use crate::signal::gram::{GramCholesky, gram};
+use crate::signal::least_squares::{
+    LeastSquares, NormalEquations, ParameterLimits, Stopping, levenberg_marquardt,
+};
+use crate::signal::variable_projection::{Basis, Explained, Slope, Weighted};
 
-/// Iterations of the fit at most, and the relative change of the sum of squares at which it ends.
-const MAX_STEPS: usize = 30;
-const DONE: f64 = 1e-4;
+/// When a fit is done.
+const STOPPING: Stopping = Stopping {
+    max_steps: 30,
+    min_gain: 0.0,
+    min_relative_gain: 1e-4,
+};
+/// Change of a logarithm in one step, and of the moment of a release, s.
+const MAX_STEP: f64 = 0.3;
 /// Damping ratios that are tried.
 const DAMPING: [f64; 2] = [0.002, 0.45];
+/// Variances below this are none.
+const MIN_VARIANCE: f64 = 1e-12;
 
-/// What is known of a mode beforehand, with the standard deviations of the logarithms of its
-/// frequency and damping.
-pub(super) type Prior = Option<(Mode, [f64; 2])>;
+/// What is known of a mode beforehand.
+pub(super) type Prior = Option<BranchMode>;
 
-/// Everything that a step needs.
-pub(super) struct Linear {
-    pub hessian: DMatrix<f64>,
-    pub gradient: DVector<f64>,
+/// A fit of signals with what is known of its modes.
+struct DecayFit<'a> {
+    signals: &'a Signals,
+    priors: &'a [Prior],
+}
+
+impl LeastSquares for DecayFit<'_> {
+    /// The squares that are left with what the priors add: a prior weighs as much as the noise of
+    /// one value allows.
+    fn cost(&self, x: &[f64]) -> f64 {
+        let mut of_priors = 0.0;
+        for (m, prior) in self.priors.iter().enumerate() {
+            let Some(BranchMode { mode, ln_sd }) = prior else {
+                continue;
+            };
+            for (i, at) in mode.parameters().into_iter().enumerate() {
+                of_priors += (at - x[2 * m + i]).powi(2) / ln_sd[i].powi(2).max(MIN_VARIANCE);
+            }
+        }
+        if self.signals.start == Start::Rest {
+            of_priors += x[x.len() - 1].powi(2) / self.signals.moment_variance();
+        }
+        let rss = self.signals.rss(&self.signals.fit_of(x));
+        rss * (1.0 + of_priors / (self.signals.values as f64).max(1.0))
+    }
+
+    fn normal_equations(&self, x: &[f64]) -> NormalEquations {
+        self.signals.linearized(x, self.priors).normal
+    }
+}
+
+/// A fit near its minimum.
+pub(super) struct Linearized {
+    pub normal: NormalEquations,
     pub rss: f64,
-}
-
-/// Columns of a fit, and how they change with its parameters.
-struct Basis {
-    columns: Vec<Vec<f64>>,
-    slopes: Vec<Slope>,
-}
-
-struct Slope {
-    parameter: usize,
-    column: usize,
-    values: Vec<f64>,
 }
 
 impl Signals {
     fn fit_of(&self, x: &[f64]) -> Fit {
-        let modes = x.chunks_exact(2).map(Mode::of_parameters).collect();
+        let moment_s = match self.start {
+            Start::Rest => x[x.len() - 1],
+            Start::Moving => 0.0,
+        };
         Fit {
-            modes,
-            moment_s: if x.len() % 2 == 1 {
-                x[x.len() - 1]
-            } else {
-                0.0
-            },
+            modes: x.chunks_exact(2).map(Mode::of_parameters).collect(),
+            moment_s,
             rss: f64::NAN,
         }
     }
 
     /// Logarithms of frequency and damping of each mode; after a release from rest its moment, s.
     pub fn parameters(&self, fit: &Fit) -> Vec<f64> {
-        let moment = (self.start == Start::Rest).then_some(fit.moment_s);
-        fit.modes
-            .iter()
-            .flat_map(Mode::parameters)
-            .chain(moment)
-            .collect()
+        let mut x: Vec<f64> = fit.modes.iter().flat_map(Mode::parameters).collect();
+        if self.start == Start::Rest {
+            x.push(fit.moment_s);
+        }
+        x
+    }
+
+    fn parameter_limits(&self, modes: usize) -> Vec<ParameterLimits> {
+        let mut out = Vec::with_capacity(2 * modes + 1);
+        for _ in 0..modes {
+            for bounds in [self.frequencies_hz, DAMPING] {
+                out.push(ParameterLimits {
+                    bounds: bounds.map(f64::ln),
+                    max_step: MAX_STEP,
+                });
+            }
+        }
+        if self.start == Start::Rest {
+            out.push(ParameterLimits {
+                bounds: [f64::NEG_INFINITY, f64::INFINITY],
+                max_step: MAX_STEP,
+            });
+        }
+        out
+    }
+
+    /// Variance of the moment of the release, s².
+    pub fn moment_variance(&self) -> f64 {
+        self.moment_sd_s.powi(2).max(MIN_VARIANCE)
     }
 
     /// Fits all of `modes`; those that have a prior are held near it by its standard deviations (of
     /// the logarithms of frequency and damping).
     pub fn fit(&self, from: &Fit, priors: &[Prior]) -> Fit {
-        let mut x = self.parameters(from);
-        let mut now = self.linearized(&x, priors);
-        let mut cost = self.cost(&x, now.rss, priors);
-        let mut lambda = 1e-3;
-        for _ in 0..MAX_STEPS {
-            let mut better = false;
-            for _ in 0..6 {
-                let mut h = now.hessian.clone();
-                (0..h.nrows()).for_each(|i| h[(i, i)] *= 1.0 + lambda);
-                let Some(step) = h.lu().solve(&now.gradient) else {
-                    break;
-                };
-                let mut next: Vec<f64> = x
-                    .iter()
-                    .zip(step.iter())
-                    .map(|(x, d)| x + d.clamp(-0.3, 0.3))
-                    .collect();
-                next.chunks_exact_mut(2).for_each(|p| {
-                    p[0] = p[0].clamp(self.frequencies_hz[0].ln(), self.frequencies_hz[1].ln());
-                    p[1] = p[1].clamp(DAMPING[0].ln(), DAMPING[1].ln());
-                });
-                let there = self.cost(&next, self.rss(&self.fit_of(&next)), priors);
-                if there < cost {
-                    better = cost - there > DONE * cost;
-                    if better {
-                        now = self.linearized(&next, priors);
-                    }
-                    (x, cost) = (next, there);
-                    lambda *= 0.2;
-                    break;
-                }
-                lambda = (lambda * 5.0).max(1e-6);
-            }
-            if !better {
-                break;
-            }
-        }
+        let problem = DecayFit {
+            signals: self,
+            priors,
+        };
+        let limits = self.parameter_limits(from.modes.len());
+        let x = levenberg_marquardt(&problem, self.parameters(from), &limits, &STOPPING);
         let fit = self.fit_of(&x);
         Fit {
             rss: self.rss(&fit),
@@ -113,58 +127,38 @@ impl Signals {
 
     /// Whether a mode stands where the search ends: what it describes lies beyond.
     pub fn at_limit(&self, mode: &Mode) -> bool {
-        let at = |x: f64, limits: [f64; 2]| limits.iter().any(|l| (x / l).ln().abs() < 1e-6);
-        at(mode.frequency_hz, self.frequencies_hz) || at(mode.damping, DAMPING)
+        is_at(mode.frequency_hz, self.frequencies_hz) || is_at(mode.damping, DAMPING)
     }
 
-    /// The squares that are left with what the priors add: a prior weighs as much as the noise of
-    /// one value allows.
-    fn cost(&self, x: &[f64], rss: f64, priors: &[Prior]) -> f64 {
-        let off = |(m, prior): (usize, &Prior)| {
-            let Some((mode, sd)) = prior else { return 0.0 };
-            let at = mode.parameters();
-            (0..2)
-                .map(|i| (at[i] - x[2 * m + i]).powi(2) / (sd[i] * sd[i]).max(1e-12))
-                .sum::<f64>()
-        };
-        let of_modes: f64 = priors.iter().enumerate().map(off).sum();
-        let of_moment = match self.start {
-            Start::Rest => x[x.len() - 1].powi(2) / self.moment_sd_s.powi(2).max(1e-12),
-            Start::Moving => 0.0,
-        };
-        rss * (1.0 + (of_modes + of_moment) / (self.values as f64).max(1.0))
-    }
-
-    /// Everything that a step needs at `x`.
-    pub fn linearized(&self, x: &[f64], priors: &[Prior]) -> Linear {
-        let p = x.len();
-        let mut out = Linear {
-            hessian: DMatrix::zeros(p, p),
-            gradient: DVector::zeros(p),
-            rss: 0.0,
-        };
+    /// The normal equations at `x`.
+    pub fn linearized(&self, x: &[f64], priors: &[Prior]) -> Linearized {
+        let mut normal = NormalEquations::zeros(x.len());
+        let mut rss = 0.0;
         let basis = self.basis(&self.fit_of(x));
-        let all = basis.all();
-        let of_all = products(&all);
-        for g in &self.groups {
-            out.add(g, &g.products(&of_all, &all), &basis, &all);
+        let all = basis.columns_and_slopes();
+        let of_all = gram(&all);
+        for group in &self.groups {
+            let signals = group.values.iter().map(|values| Weighted {
+                values,
+                weight: 1.0,
+            });
+            rss += normal.add_signals(&basis, &group.gram(&of_all, &all), signals);
         }
-        let noise = out.rss / (self.values as f64).max(1.0);
+        let noise = rss / (self.values as f64).max(1.0);
         for (m, prior) in priors.iter().enumerate() {
-            let Some((mode, sd)) = prior else { continue };
+            let Some(BranchMode { mode, ln_sd }) = prior else {
+                continue;
+            };
             for (i, at) in mode.parameters().into_iter().enumerate() {
                 let k = 2 * m + i;
-                let weight = noise / (sd[i] * sd[i]).max(1e-12);
-                out.hessian[(k, k)] += weight;
-                out.gradient[k] += weight * (at - x[k]);
+                normal.add_prior(k, at - x[k], noise / ln_sd[i].powi(2).max(MIN_VARIANCE));
             }
         }
         if self.start == Start::Rest {
-            let weight = noise / self.moment_sd_s.powi(2).max(1e-12);
-            out.hessian[(p - 1, p - 1)] += weight;
-            out.gradient[p - 1] -= weight * x[p - 1];
+            let last = x.len() - 1;
+            normal.add_prior(last, -x[last], noise / self.moment_variance());
         }
-        out
+        Linearized { normal, rss }
     }
 
     fn basis(&self, fit: &Fit) -> Basis {
@@ -174,23 +168,24 @@ impl Signals {
             slopes: Vec::new(),
         };
         for (m, mode) in fit.modes.iter().enumerate() {
-            for (values, Slopes { by_mode, by_moment }) in
-                mode.columns_and_slopes(&times, self.start)
-            {
+            for (values, slopes) in mode.columns_and_slopes(&times, self.start) {
                 let column = basis.columns.len();
                 basis.columns.push(values);
-                let of_mode = by_mode
-                    .into_iter()
-                    .enumerate()
-                    .map(|(i, values)| (2 * m + i, values));
-                let of_moment =
-                    (self.start == Start::Rest).then_some((2 * fit.modes.len(), by_moment));
-                let slopes = of_mode.chain(of_moment);
-                basis.slopes.extend(slopes.map(|(parameter, values)| Slope {
-                    parameter,
-                    column,
-                    values,
-                }));
+                let Slopes { by_mode, by_moment } = slopes;
+                for (i, values) in by_mode.into_iter().enumerate() {
+                    basis.slopes.push(Slope {
+                        parameter: 2 * m + i,
+                        column,
+                        values,
+                    });
+                }
+                if self.start == Start::Rest {
+                    basis.slopes.push(Slope {
+                        parameter: 2 * fit.modes.len(),
+                        column,
+                        values: by_moment,
+                    });
+                }
             }
         }
         basis
@@ -200,82 +195,40 @@ impl Signals {
     /// frames that it lacks.
     pub fn scores(&self, fit: &Fit) -> Vec<Vec<Vec<f64>>> {
         let basis = self.basis(fit);
-        let all = basis.all();
-        let (of_all, n, p) = (
-            products(&all),
-            basis.columns.len(),
-            self.parameters(fit).len(),
-        );
-        let of_group = |g: &Group| {
-            let products = g.products(&of_all, &all);
-            let factored = Factored::new(&products, n);
-            // What the columns do not span of their slopes.
-            let off = |(s, slope): (usize, &Slope)| {
-                let by: Vec<f64> = (0..n).map(|c| products[(c, n + s)]).collect();
-                g.rest(&slope.values, &all[..n], &factored.solve(&by))
-            };
-            let slopes: Vec<Vec<f64>> = basis.slopes.iter().enumerate().map(off).collect();
-            let signal = |y: &Vec<f64>| {
-                let factors = Explained::new(y, &all[..n], &factored).factors;
-                let rest = g.rest(y, &all[..n], &factors);
-                let mut scores = vec![vec![0.0; rest.len()]; p];
-                for (slope, values) in basis.slopes.iter().zip(&slopes) {
-                    let factor = factors[slope.column];
-                    let of = scores[slope.parameter]
-                        .iter_mut()
-                        .zip(rest.iter().zip(values));
-                    of.for_each(|(score, (r, s))| *score += r * factor * s);
-                }
-                scores
-            };
-            g.values.iter().map(signal).collect::<Vec<_>>()
-        };
-        self.groups.iter().flat_map(of_group).collect()
-    }
-}
-
-impl Basis {
-    /// The columns, then their slopes.
-    fn all(&self) -> Vec<&[f64]> {
-        let mut all = slices(&self.columns);
-        all.extend(self.slopes.iter().map(|s| s.values.as_slice()));
-        all
-    }
-}
-
-impl Linear {
-    /// Adds a group's share. Kaufman's Jacobian is slopes (without what the columns span of them)
-    /// times factors, so that products of columns and of factors are enough, and the Jacobian
-    /// itself is never made.
-    fn add(&mut self, group: &Group, products: &DMatrix<f64>, basis: &Basis, all: &[&[f64]]) {
+        let all = basis.columns_and_slopes();
+        let of_all = gram(&all);
+        let parameters = self.parameters(fit).len();
         let n = basis.columns.len();
-        let factored = Factored::new(products, n);
-        let explained: Vec<Explained> = group
-            .values
-            .iter()
-            .map(|y| Explained::new(y, all, &factored))
-            .collect();
-        let alike = DMatrix::from_fn(n, n, |a, b| {
-            explained
-                .iter()
-                .map(|e| e.factors[a] * e.factors[b])
-                .sum::<f64>()
-        });
-        let on_columns = |s: usize| (0..n).map(|c| products[(c, n + s)]).collect::<Vec<f64>>();
-        for (s, slope) in basis.slopes.iter().enumerate() {
-            let by = on_columns(s);
-            let spanned = factored.solve(&by);
-            for (t, other) in basis.slopes.iter().enumerate() {
-                let left = products[(n + s, n + t)]
-                    - (0..n)
-                        .map(|c| spanned[c] * products[(c, n + t)])
-                        .sum::<f64>();
-                self.hessian[(slope.parameter, other.parameter)] +=
-                    left * alike[(slope.column, other.column)];
+        let mut out = Vec::new();
+        for group in &self.groups {
+            let products = group.gram(&of_all, &all);
+            let factored = GramCholesky::new(&products, n);
+            // What the columns do not span of their slopes.
+            let mut unspanned: Vec<Vec<f64>> = Vec::with_capacity(basis.slopes.len());
+            for (s, slope) in basis.slopes.iter().enumerate() {
+                let on_columns: Vec<f64> = (0..n).map(|c| products[(c, n + s)]).collect();
+                let spanned = factored.solve(&on_columns);
+                unspanned.push(group.rest(&slope.values, &all[..n], &spanned));
             }
-            let of = |e: &Explained| e.factors[slope.column] * (e.by[n + s] - dot(&by, &e.factors));
-            self.gradient[slope.parameter] += explained.iter().map(of).sum::<f64>();
+            for signal in &group.values {
+                let factors = Explained::new(signal, &all[..n], &factored).factors;
+                let rest = group.rest(signal, &all[..n], &factors);
+                let mut scores = vec![vec![0.0; rest.len()]; parameters];
+                for (slope, values) in basis.slopes.iter().zip(&unspanned) {
+                    let factor = factors[slope.column];
+                    let scores = scores[slope.parameter].iter_mut();
+                    for (score, (r, s)) in scores.zip(rest.iter().zip(values)) {
+                        *score += r * factor * s;
+                    }
+                }
+                out.push(scores);
+            }
         }
-        self.rss += explained.iter().map(|e| e.left).sum::<f64>();
+        out
     }
+}
+
+/// Whether `x` is one of `limits`.
+fn is_at(x: f64, limits: [f64; 2]) -> bool {
+    limits.iter().any(|l| (x / l).ln().abs() < 1e-6)
 }

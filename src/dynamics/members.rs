@@ -2,14 +2,15 @@
 
 use super::film::Film;
 use crate::model::Skeleton;
+use crate::signal::statistics::{noise_variance, rms};
 
 /// Points of a branch at most that are fitted; more cost time and tell little more.
-const MOST: usize = 20;
+const MAX_POINTS: usize = 20;
 /// So many points that were always seen are enough, if they are half of all.
-const ENOUGH: usize = 12;
+const ENOUGH_WHOLE: usize = 12;
 /// A point must have been seen in this share of the frames, and in so many.
-const SEEN: f64 = 0.5;
-const LEAST_FRAMES: usize = 24;
+const MIN_SEEN_SHARE: f64 = 0.5;
+const MIN_SEEN_FRAMES: usize = 24;
 
 /// The signals of some points from some frame on, two a point.
 pub(super) struct Points {
@@ -38,52 +39,66 @@ impl Points {
     /// Of those of `tracks` that were seen for long enough, in the film's frames from `from` on.
     pub fn of(film: &Film, tracks: &[usize], from: usize) -> Self {
         let rows = film.times_s.len() - from;
-        let least = ((SEEN * rows as f64) as usize).max(LEAST_FRAMES);
-        let seen = |k: &usize| {
-            film.tracks[*k].at_px[from..]
-                .iter()
-                .filter(|p| is_seen(p))
-                .count()
-                >= least
-        };
-        let mut all: Vec<usize> = tracks.iter().copied().filter(seen).collect();
-        let whole: Vec<usize> = all
-            .iter()
-            .copied()
-            .filter(|&k| film.tracks[k].at_px[from..].iter().all(is_seen))
-            .collect();
+        let least = ((MIN_SEEN_SHARE * rows as f64) as usize).max(MIN_SEEN_FRAMES);
+        let (mut all, mut whole) = (Vec::new(), Vec::new());
+        for &k in tracks {
+            let seen = count_seen(&film.tracks[k].at_px[from..]);
+            if seen >= least {
+                all.push(k);
+            }
+            if seen >= least && seen == rows {
+                whole.push(k);
+            }
+        }
         // Points with gaps cost a fit of their own each.
-        if whole.len() >= ENOUGH && 2 * whole.len() >= all.len() {
+        if whole.len() >= ENOUGH_WHOLE && 2 * whole.len() >= all.len() {
             all = whole;
         }
-        let n = all.len().min(MOST);
-        let tracks: Vec<usize> = (0..n).map(|i| all[i * all.len() / n]).collect();
-        let signals = tracks
-            .iter()
-            .flat_map(|&k| centred(&film.tracks[k].at_px[from..]))
-            .collect();
+        let tracks = evenly_chosen(&all, MAX_POINTS);
+        let mut signals = Vec::with_capacity(2 * tracks.len());
+        for &k in &tracks {
+            signals.extend(centred(&film.tracks[k].at_px[from..]));
+        }
         Self { tracks, signals }
     }
 
     /// Squares that noise makes in all signals, px²: of what every frame shows against its
     /// neighbours, in which a sway changes little.
     pub fn noise(&self) -> f64 {
-        let of = |s: &Vec<f64>| {
-            let third = |w: &[f64]| w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0];
-            let thirds: Vec<f64> = s.windows(4).map(third).filter(|d| d.is_finite()).collect();
-            let seen = s.iter().filter(|x| x.is_finite()).count() as f64;
-            // The squares of 1, 3, 3, 1 make 20.
-            seen * thirds.iter().map(|d| d * d).sum::<f64>()
-                / (20.0 * (thirds.len() as f64).max(1.0))
-        };
-        self.signals.iter().map(of).sum()
+        let mut sum = 0.0;
+        for signal in &self.signals {
+            let seen = signal.iter().filter(|x| x.is_finite()).count() as f64;
+            sum += seen * noise_variance([signal.as_slice()]);
+        }
+        sum
+    }
+
+    /// All values that were seen, px.
+    pub fn seen_values(&self) -> impl Iterator<Item = f64> {
+        let values = self.signals.iter().flatten().copied();
+        values.filter(|x| x.is_finite())
     }
 
     /// Root of the mean square of all signals, px.
     pub fn rms_px(&self) -> f64 {
-        let all = || self.signals.iter().flatten().filter(|x| x.is_finite());
-        (all().map(|x| x * x).sum::<f64>() / (all().count() as f64).max(1.0)).sqrt()
+        rms(self.seen_values())
     }
+
+    /// Sum of the squares of all signals, px².
+    pub fn squares(&self) -> f64 {
+        self.seen_values().map(|x| x * x).sum()
+    }
+}
+
+/// At most `most` of some indices, evenly from all of them.
+pub(super) fn evenly_chosen(all: &[usize], most: usize) -> Vec<usize> {
+    let n = all.len().min(most);
+    (0..n).map(|i| all[i * all.len() / n]).collect()
+}
+
+/// Number of frames in which a point was seen.
+pub(super) fn count_seen(at_px: &[[f64; 2]]) -> usize {
+    at_px.iter().filter(|p| is_seen(p)).count()
 }
 
 pub(super) fn is_seen(p: &[f64; 2]) -> bool {
@@ -92,7 +107,7 @@ pub(super) fn is_seen(p: &[f64; 2]) -> bool {
 
 /// Mean of the places at which a point was seen, px.
 pub(super) fn mean_px(at_px: &[[f64; 2]]) -> [f64; 2] {
-    let n = at_px.iter().filter(|p| is_seen(p)).count().max(1) as f64;
+    let n = count_seen(at_px).max(1) as f64;
     at_px
         .iter()
         .filter(|p| is_seen(p))

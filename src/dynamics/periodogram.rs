@@ -1,13 +1,13 @@
 //! Where a signal has more power than is expected of it.
 
+use super::celerite::Part;
 use super::decay::powers;
-use super::process::Part;
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
 
 /// Half the width of the bands that are compared, as a share of their frequency: that of usual
 /// sways.
-const BAND: f64 = 0.04;
+const HALF_BAND: f64 = 0.04;
 
 /// Power of a signal at frequencies that are one over the film's length apart.
 pub(super) struct Periodogram {
@@ -35,63 +35,81 @@ impl Periodogram {
             (lowest_hz / step_hz).ceil() as usize,
             (highest_hz / step_hz).floor() as usize,
         );
-        let power = |k: usize| {
+        let mut power = Vec::new();
+        for k in first..=last.max(first) {
             let waves = powers(times_s, Complex::new(0.0, TAU * step_hz * k as f64));
-            let sum: Complex<f64> = waves
-                .iter()
-                .zip(signal.iter().zip(&window))
-                .map(|(z, (x, w))| z * (x * w))
-                .sum();
-            sum.norm_sqr() / squares * of_noise
-        };
+            let mut sum = Complex::from(0.0);
+            for ((z, x), w) in waves.iter().zip(signal).zip(&window) {
+                sum += z * (x * w);
+            }
+            power.push(sum.norm_sqr() / squares * of_noise);
+        }
         Self {
             step_hz,
             first,
-            power: (first..=last.max(first)).map(power).collect(),
+            power,
             of_noise,
         }
     }
 }
 
-/// The frequency about which signals most likely have more power than a sum of parts and noise of
-/// some variance, which are given with each; `None` if there is none. By Whittle's likelihood, with
-/// each band's power as it is rather than as is expected.
-pub(super) fn excess_hz(signals: &[(Periodogram, Vec<Part>, f64)]) -> Option<f64> {
-    let (first, _, _) = signals.first()?;
-    let ratios: Vec<Vec<f64>> = signals
-        .iter()
-        .map(|(p, parts, noise)| {
-            let expected =
-                |hz: f64| noise * p.of_noise + parts.iter().map(|part| part.power(hz)).sum::<f64>();
-            let of =
-                |(k, x): (usize, &f64)| x / expected((p.first + k) as f64 * p.step_hz).max(1e-300);
-            p.power.iter().enumerate().map(of).collect()
-        })
-        .collect();
-    let gain = |k: usize| -> f64 {
-        let half = ((BAND * (first.first + k) as f64).round() as usize).max(1);
-        let of = |r: &Vec<f64>| {
-            let band = &r[k.saturating_sub(half)..(k + half + 1).min(r.len())];
-            let mean = band.iter().sum::<f64>() / band.len() as f64;
-            if mean > 1.0 {
-                band.len() as f64 * (mean - 1.0 - mean.ln())
-            } else {
-                0.0
-            }
-        };
-        ratios.iter().map(of).sum()
-    };
-    let gains = (0..first.power.len()).map(|k| (k, gain(k)));
-    let (k, _) = gains
-        .filter(|(_, g)| g.is_finite() && *g > 0.0)
-        .max_by(|a, b| a.1.total_cmp(&b.1))?;
-    Some((first.first + k) as f64 * first.step_hz)
+/// The power of a signal, and what is expected of it: a sum of parts, and noise of this variance in
+/// every value.
+pub(super) struct Observed {
+    pub power: Periodogram,
+    pub expected: Vec<Part>,
+    pub noise: f64,
+}
+
+impl Observed {
+    /// Power at every frequency over what is expected there.
+    fn ratios(&self) -> Vec<f64> {
+        let of = &self.power;
+        let mut out = Vec::with_capacity(of.power.len());
+        for (k, power) in of.power.iter().enumerate() {
+            let hz = (of.first + k) as f64 * of.step_hz;
+            let parts: f64 = self.expected.iter().map(|part| part.power(hz)).sum();
+            out.push(power / (self.noise * of.of_noise + parts).max(1e-300));
+        }
+        out
+    }
+}
+
+/// The frequency about which signals most likely have more power than is expected; `None` if there
+/// is none. By Whittle's likelihood, with each band's power as it is rather than as is expected.
+pub(super) fn excess_hz(signals: &[Observed]) -> Option<f64> {
+    let power = &signals.first()?.power;
+    let ratios: Vec<Vec<f64>> = signals.iter().map(Observed::ratios).collect();
+    let mut best: Option<(f64, usize)> = None;
+    for k in 0..power.power.len() {
+        let half = ((HALF_BAND * (power.first + k) as f64).round() as usize).max(1);
+        let gain: f64 = ratios.iter().map(|r| gain_of_band(r, k, half)).sum();
+        if gain.is_finite() && gain > 0.0 && best.is_none_or(|(most, _)| gain >= most) {
+            best = Some((gain, k));
+        }
+    }
+    best.map(|(_, k)| (power.first + k) as f64 * power.step_hz)
+}
+
+/// Gain of likelihood by the mean of a band about `k` as it is.
+fn gain_of_band(ratios: &[f64], k: usize, half: usize) -> f64 {
+    let band = &ratios[k.saturating_sub(half)..(k + half + 1).min(ratios.len())];
+    let mean = band.iter().sum::<f64>() / band.len() as f64;
+    if mean > 1.0 {
+        band.len() as f64 * (mean - 1.0 - mean.ln())
+    } else {
+        0.0
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use rand::RngExt;
+
+    fn wave(hz: f64, t: f64) -> f64 {
+        (TAU * hz * t).sin()
+    }
 
     /// The large sway of the carrier, which is expected, does not hide the small one of the branch.
     #[test]
@@ -100,26 +118,28 @@ mod tests {
             .map(|k| 0.066 * f64::from(k) + 0.01 * (f64::from(k) * 1.7).sin())
             .collect();
         let mut random = crate::random::generator(7, 0);
-        let wave = |hz: f64, t: f64| (TAU * hz * t).sin();
-        let signal: Vec<f64> = times
-            .iter()
-            .map(|t| 10.0 * wave(0.5, *t) + wave(0.9, *t) + random.random_range(-0.5..0.5))
-            .collect();
+        let mut signal = Vec::with_capacity(times.len());
+        for t in &times {
+            signal.push(10.0 * wave(0.5, *t) + wave(0.9, *t) + random.random_range(-0.5..0.5));
+        }
         let known = Part::Oscillator {
             variance: 50.0,
             frequency_hz: 0.5,
             damping: 0.03,
             gusts_per_s: 10.0,
         };
-        let found = |parts: Vec<Part>| {
-            let power = Periodogram::new(&times, &signal, [0.05, 3.0]);
-            excess_hz(&[(power, parts, 1.0 / 12.0)]).unwrap()
-        };
-        assert!((found(Vec::new()) - 0.5).abs() < 0.03);
-        assert!(
-            (found(vec![known]) - 0.9).abs() < 0.05,
-            "{}",
-            found(vec![known])
-        );
+        for (expected, wanted_hz, tolerance) in [(Vec::new(), 0.5, 0.03), (vec![known], 0.9, 0.05)]
+        {
+            let observed = Observed {
+                power: Periodogram::new(&times, &signal, [0.05, 3.0]),
+                expected,
+                noise: 1.0 / 12.0,
+            };
+            let found = excess_hz(&[observed]).unwrap();
+            assert!(
+                (found - wanted_hz).abs() < tolerance,
+                "{found}, not {wanted_hz}"
+            );
+        }
     }
 }

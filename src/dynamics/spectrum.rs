@@ -1,5 +1,6 @@
 //! Spectra of angles, and the half-power damping: the reference method, and what is drawn.
 
+use crate::signal::interpolation::linear;
 use realfft::RealFftPlanner;
 
 /// Fewer samples than this carry no answer.
@@ -19,13 +20,14 @@ pub struct Spectrum {
 /// For the eye and as a reference: the FFT needs even times, so that what is missing is drawn
 /// straight between its neighbours. `None` for less than 32 values.
 pub fn spectrum(times_s: &[f64], values: &[f64]) -> Option<Spectrum> {
-    let mut last = f64::NEG_INFINITY;
-    let seen = times_s.iter().zip(values).filter(|(t, x)| {
-        let take = t.is_finite() && x.is_finite() && **t > last;
-        last = if take { **t } else { last };
-        take
-    });
-    let (times, seen): (Vec<f64>, Vec<f64>) = seen.unzip();
+    let (mut times, mut seen) = (Vec::new(), Vec::new());
+    for (t, x) in times_s.iter().zip(values) {
+        let is_later = times.last().is_none_or(|last| t > last);
+        if t.is_finite() && x.is_finite() && is_later {
+            times.push(*t);
+            seen.push(*x);
+        }
+    }
     let n = times.len();
     if n < MIN_SAMPLES {
         return None;
@@ -61,11 +63,10 @@ impl Spectrum {
             return None;
         }
         let level = a[peak] * std::f64::consts::FRAC_1_SQRT_2;
-        let between = |inner: usize, outer: usize| (a[inner] - level) / (a[inner] - a[outer]);
         let right = (peak + 1..a.len()).find(|&k| a[k] < level)?;
         let left = (0..peak).rev().find(|&k| a[k] < level)?;
-        let right = (right - 1) as f64 + between(right - 1, right);
-        let left = (left + 1) as f64 - between(left + 1, left);
+        let right = (right - 1) as f64 + share_to(level, a[right - 1], a[right]);
+        let left = (left + 1) as f64 - share_to(level, a[left + 1], a[left]);
         Some((
             peak as f64 * self.bin_hz,
             (right - left) / (2.0 * peak as f64),
@@ -73,26 +74,17 @@ impl Spectrum {
     }
 }
 
+/// How far `level` is on the way from one value to another.
+fn share_to(level: f64, from: f64, to: f64) -> f64 {
+    (from - level) / (from - to)
+}
+
 /// Linear interpolation at as many evenly spaced times.
 fn even_grid(times_s: &[f64], values: &[f64]) -> Vec<f64> {
     let n = times_s.len();
     let step = (times_s[n - 1] - times_s[0]) / (n - 1) as f64;
-    let mut j = 0;
-    (0..n)
-        .map(|k| {
-            let t = times_s[0] + step * k as f64;
-            while j + 2 < n && times_s[j + 1] < t {
-                j += 1;
-            }
-            let width = times_s[j + 1] - times_s[j];
-            let share = if width > 0.0 {
-                ((t - times_s[j]) / width).clamp(0.0, 1.0)
-            } else {
-                0.0
-            };
-            values[j] + share * (values[j + 1] - values[j])
-        })
-        .collect()
+    let even = (0..n).map(|k| times_s[0] + step * k as f64);
+    even.map(|t| linear(times_s, values, t)).collect()
 }
 
 #[cfg(test)]

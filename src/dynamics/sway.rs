@@ -1,7 +1,8 @@
 //! Frequency and damping of every branch of a film.
 
+use super::branches::SearchLimits;
 use super::film::Film;
-use super::free::{self, Demands};
+use super::free_decay;
 use super::members::members;
 use super::modal;
 use super::release::{Onset, onset};
@@ -18,6 +19,15 @@ pub(super) const BELOW_NYQUIST: f64 = 0.9;
 /// Periods that a film must have of the lowest frequency that is looked for in it.
 pub const LEAST_PERIODS: f64 = 1.5;
 
+/// How much work an analysis may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Depth {
+    /// In a time that a screen can wait for: one branch after the other.
+    Quick,
+    /// All branches at once besides, which takes several times as long and answers for a few more.
+    Full,
+}
+
 /// What a film says of the sway of its tree.
 #[derive(Clone, Debug)]
 pub struct Analysis {
@@ -25,7 +35,7 @@ pub struct Analysis {
     pub sway: Vec<Swaying>,
     /// What made the tree sway; `None` where there is too little film to tell.
     pub onset: Option<Onset>,
-    /// When it was let go, s, where that was more than once: the answers are of one of them, the
+    /// When it was released, s, where that was more than once: the answers are of one of them, the
     /// onset's.
     pub releases_s: Vec<f64>,
 }
@@ -39,63 +49,28 @@ pub fn analyse(
     skeleton: &Skeleton,
     film: &Film,
     config: &Dynamics,
+    depth: Depth,
     cancel: &CancelToken,
 ) -> Analysis {
-    looked_at(skeleton, film, config, true, cancel)
-}
-
-/// The same in a time that a screen can wait for: one branch after the other, and not all of them
-/// at once besides, which takes several times as long and answers for a few more.
-pub fn analyse_soon(
-    skeleton: &Skeleton,
-    film: &Film,
-    config: &Dynamics,
-    cancel: &CancelToken,
-) -> Analysis {
-    looked_at(skeleton, film, config, false, cancel)
-}
-
-fn looked_at(
-    skeleton: &Skeleton,
-    film: &Film,
-    config: &Dynamics,
-    at_once: bool,
-    cancel: &CancelToken,
-) -> Analysis {
-    let Some(Begun {
+    let Some(usable) = UsableFilm::of(skeleton, film, config) else {
+        return without_film(skeleton, film);
+    };
+    let UsableFilm {
         members,
         onset,
         releases_s,
-        demands,
+        limits,
         film,
-    }) = begun(skeleton, film, config)
-    else {
-        let of = |m: &Vec<usize>| {
-            Err(if m.is_empty() {
-                Unidentified::NotMeasured
-            } else {
-                Unidentified::TooShort
-            })
-        };
-        let mut sway: Vec<Swaying> = members(skeleton, film).iter().map(of).collect();
-        sway.iter_mut()
-            .take(1)
-            .for_each(|foot| *foot = Err(Unidentified::NotMeasured));
-        return Analysis {
-            sway,
-            onset: None,
-            releases_s: Vec::new(),
-        };
-    };
+    } = usable;
     let sway = match onset.excitation {
+        Excitation::Wind => wind::sways(skeleton, &film, &members, &limits, cancel),
         Excitation::Release => {
-            let mut sways = free::sways(skeleton, &film, &members, &onset, &demands, cancel);
-            if at_once {
-                modal::answer(skeleton, &film, &onset, &demands, &mut sways, cancel);
+            let mut sways = free_decay::sways(skeleton, &film, &members, &onset, &limits, cancel);
+            if depth == Depth::Full {
+                modal::answer(skeleton, &film, &onset, &limits, &mut sways, cancel);
             }
             sways
         }
-        Excitation::Wind => wind::sways(skeleton, &film, &members, &demands, cancel),
     };
     Analysis {
         sway,
@@ -104,57 +79,67 @@ fn looked_at(
     }
 }
 
+/// Of a film that is too short.
+fn without_film(skeleton: &Skeleton, film: &Film) -> Analysis {
+    let mut sway: Vec<Swaying> = Vec::with_capacity(skeleton.measured());
+    for (i, members) in members(skeleton, film).iter().enumerate() {
+        sway.push(Err(if i == 0 || members.is_empty() {
+            Unidentified::NotMeasured
+        } else {
+            Unidentified::TooShort
+        }));
+    }
+    Analysis {
+        sway,
+        onset: None,
+        releases_s: Vec::new(),
+    }
+}
+
 /// A film that is long enough to be looked at, and what made its tree sway.
-pub(super) struct Begun<'a> {
+pub(super) struct UsableFilm<'a> {
     /// Points of every measured node and of all above it.
     pub members: Vec<Vec<usize>>,
     pub onset: Onset,
     pub releases_s: Vec<f64>,
-    pub demands: Demands,
+    pub limits: SearchLimits,
     /// As far as it is used.
     pub film: Cow<'a, Film>,
 }
 
-/// `None` where there is too little film.
-pub(super) fn begun<'a>(
-    skeleton: &Skeleton,
-    film: &'a Film,
-    config: &Dynamics,
-) -> Option<Begun<'a>> {
-    if film.times_s.len() < LEAST_FRAMES || film.span_s() <= 0.0 {
-        return None;
+impl<'a> UsableFilm<'a> {
+    /// `None` where there is too little film.
+    pub fn of(skeleton: &Skeleton, film: &'a Film, config: &Dynamics) -> Option<Self> {
+        if film.times_s.len() < LEAST_FRAMES || film.span_s() <= 0.0 {
+            return None;
+        }
+        let highest_hz = (BELOW_NYQUIST * 0.5 / film.step_s()).min(config.highest_hz);
+        let frequencies_hz = [LEAST_PERIODS / film.span_s(), highest_hz];
+        if frequencies_hz[0] >= frequencies_hz[1] {
+            return None;
+        }
+        let given = match config.excitation {
+            Excited::Auto => None,
+            Excited::Release => Some(Excitation::Release),
+            Excited::Wind => Some(Excitation::Wind),
+        };
+        let members = members(skeleton, film);
+        let of_tree: &[usize] = members.get(1).map_or(&[], Vec::as_slice);
+        let (onset, releases_s) = onset(film, of_tree, given, frequencies_hz);
+        let film = film.until(onset.to);
+        if film.times_s.len() - onset.from < LEAST_FRAMES {
+            return None;
+        }
+        Some(Self {
+            members,
+            onset,
+            releases_s,
+            limits: SearchLimits {
+                frequencies_hz,
+                highest_hz: config.highest_hz,
+                max_relative_ci: config.widest,
+            },
+            film,
+        })
     }
-    let highest_hz = (BELOW_NYQUIST * 0.5 / film.step_s()).min(config.highest_hz);
-    let frequencies_hz = [LEAST_PERIODS / film.span_s(), highest_hz];
-    if frequencies_hz[0] >= frequencies_hz[1] {
-        return None;
-    }
-    let demands = Demands {
-        frequencies_hz,
-        highest_hz: config.highest_hz,
-        widest: config.widest,
-    };
-    let given = match config.excitation {
-        Excited::Auto => None,
-        Excited::Release => Some(Excitation::Release),
-        Excited::Wind => Some(Excitation::Wind),
-    };
-    let members = members(skeleton, film);
-    let (onset, releases_s) = onset(
-        film,
-        members.get(1).map_or(&[], Vec::as_slice),
-        given,
-        frequencies_hz,
-    );
-    let film = film.until(onset.to);
-    if film.times_s.len() - onset.from < LEAST_FRAMES {
-        return None;
-    }
-    Some(Begun {
-        members,
-        onset,
-        releases_s,
-        demands,
-        film,
-    })
 }

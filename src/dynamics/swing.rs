@@ -1,10 +1,13 @@
 //! How a mode swings a branch: what its points do about the branch's base, in the picture.
 
-use super::columns::dot;
 use super::film::Film;
 use super::members::{Points, mean_px};
 use super::signals::Factor;
-use nalgebra::{DMatrix, SymmetricEigen};
+use crate::signal::principal::{PrincipalComponents, symmetric};
+use crate::signal::vectors::{add_scaled, dot};
+
+/// Share of the mean lever that is more than a trace of a motion.
+const MIN_LEVER: f64 = 0.3;
 
 /// Places of a branch's points from its base, in the mean over time.
 pub(super) struct Arms(Vec<[f64; 2]>);
@@ -39,7 +42,7 @@ impl Arms {
     pub fn one_swing(&self, factors: &[Vec<Factor>], m: usize) -> f64 {
         let (mut sum, mut lengths, mut squares) = ([0.0; 4], 0.0, 0.0);
         for f in of(factors, m) {
-            sum.iter_mut().zip(f).for_each(|(s, f)| *s += f);
+            add_scaled(&mut sum, 1.0, &f);
             lengths += square(&f).sqrt();
             squares += square(&f);
         }
@@ -77,29 +80,34 @@ impl Arms {
     }
 }
 
-/// How much `signals` (of u and v of each point in turn) are one motion in time that every point
-/// makes by a lever of its own, as a share of the squares; and the share of the points that have
-/// more than a trace of it, all the same way.
-pub(super) fn levers(signals: &[Vec<f64>]) -> (f64, f64) {
-    const TRACE: f64 = 0.3;
+/// How much signals are one motion, 0 to 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct RankOne {
+    /// Share of the squares that one motion in time makes, by a lever of each point's own.
+    pub of_squares: f64,
+    /// Share of the points that have more than a trace of it, all the same way.
+    pub of_points: f64,
+}
+
+/// Of `signals` of u and v of each point in turn.
+pub(super) fn rank_one_fraction(signals: &[Vec<f64>]) -> RankOne {
     let points: Vec<&[Vec<f64>]> = signals.chunks_exact(2).collect();
-    let n = points.len();
-    let product =
-        |a: usize, b: usize| dot(&points[a][0], &points[b][0]) + dot(&points[a][1], &points[b][1]);
-    let products = DMatrix::from_fn(n, n, |a, b| product(a.max(b), a.min(b)));
+    let products = symmetric(points.len(), |a, b| {
+        dot(&points[a][0], &points[b][0]) + dot(&points[a][1], &points[b][1])
+    });
     let all = products.trace();
-    if n == 0 || all <= 0.0 || !all.is_finite() {
-        return (0.0, 0.0);
+    if points.is_empty() || all <= 0.0 || !all.is_finite() {
+        return RankOne::default();
     }
-    let eigen = SymmetricEigen::new(products);
-    let first = eigen.eigenvalues.imax();
-    let lever = eigen.eigenvectors.column(first);
-    let least = TRACE * lever.sum().signum() / (n as f64).sqrt();
-    let has = lever
-        .iter()
-        .filter(|l| **l * least.signum() > least.abs())
-        .count();
-    (eigen.eigenvalues[first] / all, has as f64 / n as f64)
+    let components = PrincipalComponents::of_products(products);
+    let levers = &components.directions[0];
+    let sign = levers.iter().sum::<f64>().signum();
+    let least = MIN_LEVER / (points.len() as f64).sqrt();
+    let have = levers.iter().filter(|l| **l * sign > least).count();
+    RankOne {
+        of_squares: components.variances[0] / all,
+        of_points: have as f64 / points.len() as f64,
+    }
 }
 
 fn of(factors: &[Vec<Factor>], m: usize) -> impl Iterator<Item = Factors> {
@@ -123,13 +131,8 @@ mod tests {
 
     /// Points at `arms` that are moved by so much to the right and down.
     fn one_swing(arms: &[[f64; 2]], moved: &[[f64; 2]]) -> f64 {
-        let factor = |cosine: f64| {
-            vec![Factor {
-                cosine,
-                ..Factor::default()
-            }]
-        };
-        let factors: Vec<Vec<Factor>> = moved.iter().flatten().map(|x| factor(*x)).collect();
+        let cosines = moved.iter().flatten();
+        let factors: Vec<Vec<Factor>> = cosines.map(|x| vec![Factor::of(&[*x])]).collect();
         Arms(arms.to_vec()).one_swing(&factors, 0)
     }
 
@@ -169,31 +172,27 @@ mod tests {
         assert_eq!(one_swing(&arms, &[[0.0; 2]; 4]), 0.0);
     }
 
+    /// Four points with levers of 1 to 4, and half of that to the side.
+    fn branch(rates: [f64; 2]) -> Vec<Vec<f64>> {
+        let mut out = Vec::new();
+        for lever in 1..=4 {
+            for (rate, share) in rates.into_iter().zip([1.0_f64, 0.5]) {
+                let size = share * f64::from(lever);
+                let times = (0..600).map(|k| 0.1 * f64::from(k));
+                out.push(times.map(|t| size * (rate * t).sin()).collect());
+            }
+        }
+        out
+    }
+
     /// In wind a branch swings both ways at once: its points go along with it, each as far as it is
     /// from the base.
     #[test]
     fn points_that_move_alike_in_time_are_one_swing_and_those_of_two_branches_are_not() {
-        let wave = |hz: f64| {
-            (0..600)
-                .map(|k| (hz * 0.1 * f64::from(k)).sin())
-                .collect::<Vec<f64>>()
-        };
-        let ways = [wave(1.0), wave(1.37), wave(1.71), wave(0.83)];
-        let moved =
-            |lever: f64, way: usize| ways[way].iter().map(|x| lever * x).collect::<Vec<f64>>();
-        let branch = |n: usize, way: usize| {
-            (1..=n)
-                .flat_map(|i| [moved(i as f64, way), moved(0.5 * i as f64, way + 1)])
-                .collect::<Vec<_>>()
-        };
-        let (one_swing, shared) = levers(&branch(4, 0));
-        assert!(one_swing > 0.999 && shared >= 0.75, "{one_swing}, {shared}");
-        let two = [branch(4, 0), branch(4, 2)].concat();
-        assert!(
-            levers(&two).0 < 0.7 && levers(&two).1 < 0.75,
-            "{:?}",
-            levers(&two)
-        );
-        assert_eq!(levers(&[]), (0.0, 0.0));
+        let one = rank_one_fraction(&branch([1.0, 1.37]));
+        assert!(one.of_squares > 0.999 && one.of_points >= 0.75, "{one:?}");
+        let two = rank_one_fraction(&[branch([1.0, 1.37]), branch([1.71, 0.83])].concat());
+        assert!(two.of_squares < 0.7 && two.of_points < 0.75, "{two:?}");
+        assert_eq!(rank_one_fraction(&[]), RankOne::default());
     }
 }

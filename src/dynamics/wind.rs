@@ -3,87 +3,100 @@
 //! In wind nothing decays: a branch is an oscillator that chance keeps driving. Every motion that
 //! its carrier's points show is taken off (any multiple of each, so that no lever arm need be
 //! known), and the rest is the sum of its own oscillator, what is left of its ancestors', drift and
-//! noise. The likelihood of that sum tells frequency and damping, at the real times (`gusts.rs`).
-//! It is the branch's own if its points move with it as one swing.
+//! noise. The likelihood of that sum tells frequency and damping, at the real times
+//! (`driven_oscillators.rs`). It is the branch's own if its points move with it as one swing.
 
-use super::columns::{Qr, dot};
-use super::common::{Common, along, enough, principal};
-use super::decay::Mode;
+use super::branches::{
+    BranchEstimator, BranchInFilm, BranchMode, Estimate, SearchLimits, from_the_trunk_up,
+};
+use super::celerite::Times;
+use super::driven_oscillators::{Fitted, Oscillator, Problem};
 use super::film::Film;
-use super::free::{Demands, Z, interval};
-use super::gusts::{Oscillator, Problem};
+use super::gap_free::{GapFree, enough_seen};
 use super::members::{Points, mean_px};
-use super::process::Times;
-use super::swing::levers;
+use super::swing::rank_one_fraction;
 use crate::cancel::CancelToken;
 use crate::model::{Excitation, NodeId, Skeleton, Sway, Swaying, Unidentified};
+use crate::signal::principal::{PrincipalComponents, along};
+use crate::signal::qr::Qr;
+use crate::signal::vectors::dot;
 use std::cell::RefCell;
 
 /// Points of a branch and of its carrier that are needed.
-const LEAST_POINTS: usize = 2;
+const MIN_POINTS: usize = 2;
 /// So many points that are on a branch and on none that it carries speak for it alone.
-const ENOUGH_OWN: usize = 3;
+const ENOUGH_OWN_POINTS: usize = 3;
 /// Ancestors that are kept.
-const ANCESTORS: usize = 2;
+const MAX_ANCESTORS: usize = 2;
 /// Motions of the carrier's points that are taken off at most. Each, and a second motion of the
 /// branch, must have so many times the variance of noise, and the second such a share of the first.
-const MOST_CARRIED: usize = 4;
-const CLEAR: f64 = 10.0;
-const SECOND: f64 = 0.02;
+const MAX_CARRIED_MOTIONS: usize = 4;
+const MIN_VARIANCE_OVER_NOISE: f64 = 10.0;
+const MIN_SECOND_VARIANCE: f64 = 0.02;
 /// Frames a period of the highest frequency beyond which neighbours are taken together as their
 /// mean: they cost time and tell little.
 const FRAMES_PER_PERIOD: f64 = 3.0;
 /// Longer films, in frames that are left, are thinned to so many a second, if there are as many;
 /// and frequencies are looked for up to this share of the rate. A mean over neighbours hides what
 /// is faster, and does not show it as something slower.
-const LONG: usize = 900;
-const LONG_HZ: f64 = 7.5;
-const OF_RATE: f64 = 0.3;
-const LEAST_FRAMES: usize = 48;
+const LONG_FILM_FRAMES: usize = 900;
+const LONG_FILM_HZ: f64 = 7.5;
+const MAX_FREQ_OF_RATE: f64 = 0.3;
+const MIN_FRAMES: usize = 48;
 /// Motion that is taken for noise, px.
 const NOISE_PX: f64 = 0.15;
 /// Variance of the trunk's oscillator at least, as a share of the largest in the whole tree's
 /// motion.
-const LEAST_OF_TRUNK: f64 = 0.1;
+const MIN_VARIANCE_OF_TRUNK: f64 = 0.1;
 /// A frequency that is nearer to an ancestor's than so many standard deviations is the ancestor's.
-const APART: f64 = 2.0;
-/// An oscillator is one swing if its points move alike in time, each by a lever of its own, to this
-/// share of the squares ([`levers`]), and if such a share of them has it.
-const SHARED: f64 = 0.75;
+/// After a release a share of the frequency bounds the same (free_decay.rs): there frequencies are
+/// known ten times as well, and what errs is the branches' points.
+const SAME_FREQ_SIGMAS: f64 = 2.0;
+/// An oscillator is one swing if its points move alike in time, each by a lever of its own, to a
+/// share of the squares ([`rank_one_fraction`]), and if such a share of them has it.
+const MIN_POINTS_SHARE: f64 = 0.75;
 /// What drifts forgets itself so often in a film.
-const DRIFTS: f64 = 4.0;
+const DRIFTS_PER_FILM: f64 = 4.0;
 /// The curvature of the likelihood is that at its top, and gusts are no exact process: intervals
 /// are so much wider. Found on made-up trees (tests/sway_trees.rs).
-const WIDER: f64 = 1.1;
+const CI_INFLATION: f64 = 1.1;
 /// A mode whose interval is so many times wider than is asked for is no answer, but serves to tell
 /// those of the branches on it.
-const SERVES: f64 = 2.0;
+const MAX_CI_TO_SERVE: f64 = 2.0;
 
 /// What is asked of an answer, by the points that it comes from. Found on made-up trees
 /// (tests/sway_trees.rs).
-struct Asked {
-    one_swing: f64,
+struct AcceptanceCriteria {
+    /// Share of the squares that is one swing.
+    min_rank_one: f64,
     /// Standard deviations of the logarithms of frequency and damping below which none is believed,
     /// however long the film is: what the carrier's points show is not all that it does.
-    least_sd: [f64; 2],
+    min_ln_sd: [f64; 2],
 }
 
 /// Where a branch and its carrier have points of their own.
-const ALONE: Asked = Asked {
-    one_swing: 0.85,
-    least_sd: [0.008, 0.25],
+const OWN_POINTS: AcceptanceCriteria = AcceptanceCriteria {
+    min_rank_one: 0.85,
+    min_ln_sd: [0.008, 0.25],
 };
 /// Where those of the branches on them must serve: they sway by themselves besides.
-const MIXED: Asked = Asked {
-    one_swing: 0.87,
-    least_sd: [0.015, 0.25],
+const SHARED_POINTS: AcceptanceCriteria = AcceptanceCriteria {
+    min_rank_one: 0.87,
+    min_ln_sd: [0.015, 0.25],
 };
 
-/// A branch's own oscillator.
-#[derive(Clone, Copy)]
-struct Own {
-    mode: Mode,
-    sd: [f64; 2],
+impl AcceptanceCriteria {
+    /// An oscillator as a branch's mode, with the standard deviations that are believed.
+    fn mode_of(&self, oscillator: &Oscillator) -> BranchMode {
+        let mut ln_sd = oscillator.ln_sd;
+        for (sd, least) in ln_sd.iter_mut().zip(self.min_ln_sd) {
+            *sd = (CI_INFLATION * *sd).hypot(least);
+        }
+        BranchMode {
+            mode: oscillator.mode,
+            ln_sd,
+        }
+    }
 }
 
 /// The sway of every measured node.
@@ -91,244 +104,337 @@ pub(super) fn sways(
     skeleton: &Skeleton,
     film: &Film,
     members: &[Vec<usize>],
-    demands: &Demands,
+    limits: &SearchLimits,
     cancel: &CancelToken,
 ) -> Vec<Swaying> {
-    let mut own: Vec<Option<Own>> = vec![None; members.len()];
-    let mut out = vec![Err(Unidentified::NotMeasured); members.len()];
-    let mut untold = vec![false; members.len()];
-    for (i, tracks) in members.iter().enumerate().skip(1) {
-        if tracks.is_empty() {
-            continue;
+    let mut estimator = InWind {
+        skeleton,
+        film,
+        members,
+        limits,
+        known: vec![Known::Nothing; members.len()],
+    };
+    from_the_trunk_up(skeleton, members, cancel, &mut estimator)
+}
+
+/// What the analysis of a branch leaves for those on it.
+#[derive(Clone, Copy)]
+enum Known {
+    Nothing,
+    /// It moves only as its ancestors do.
+    HasNoneOfItsOwn,
+    Mode(BranchMode),
+}
+
+struct InWind<'a> {
+    skeleton: &'a Skeleton,
+    film: &'a Film,
+    members: &'a [Vec<usize>],
+    limits: &'a SearchLimits,
+    /// By node.
+    known: Vec<Known>,
+}
+
+/// Points that stand for a branch.
+struct Speaking {
+    tracks: Vec<usize>,
+    /// Whether none of them is on a branch that it carries.
+    are_its_own: bool,
+}
+
+impl BranchEstimator for InWind<'_> {
+    fn estimate(&mut self, branch: &BranchInFilm) -> Swaying {
+        let speaking = self.speaking(branch.node, branch.tracks);
+        let points = Points::of(self.film, &speaking.tracks, 0);
+        if points.tracks.len() < MIN_POINTS {
+            return Err(Unidentified::NotMeasured);
         }
-        if cancel.is_cancelled() {
-            out[i] = Err(Unidentified::NotInTime);
-            continue;
-        }
-        let node = NodeId(i as u32);
-        let parent = skeleton.ancestors(node).next().unwrap_or(NodeId(0)).index();
-        let ancestors: Vec<Own> = skeleton
-            .ancestors(node)
-            .filter_map(|a| own[a.index()])
-            .take(ANCESTORS)
-            .collect();
-        let (speaking_of, alone) = speaking(film, i, tracks);
-        let points = Points::of(film, &speaking_of, 0);
-        if points.tracks.len() < LEAST_POINTS {
-            continue;
-        }
-        let beside: Vec<usize> = match parent {
-            0 => Vec::new(),
-            _ => members[parent]
-                .iter()
-                .copied()
-                .filter(|k| !tracks.contains(k))
-                .collect(),
-        };
-        let (beside, carrier_alone) = speaking(film, parent, &beside);
-        let carrier = Points::of(film, &beside, 0);
-        let asked = if alone && (parent == 0 || carrier_alone) {
-            ALONE
-        } else {
-            MIXED
-        };
+        let of_carrier = self.speaking(branch.parent, &self.beside(branch));
+        let carrier = Points::of(self.film, &of_carrier.tracks, 0);
         // What a carrier's own sway is must be known, or be none, and its motion seen, for that of
         // the branch to be told from it.
-        let told = own[parent].is_some()
-            || out[parent] == Err(Unidentified::AncestorsSway) && !untold[parent];
-        if parent > 0 && (!told || carrier.tracks.len() < LEAST_POINTS) {
-            out[i] = Err(Unidentified::AncestorsSway);
-            untold[i] = true;
-            continue;
+        let carrier_is_unknown = matches!(self.known[branch.parent.index()], Known::Nothing)
+            || carrier.tracks.len() < MIN_POINTS;
+        if !branch.is_on_foot() && carrier_is_unknown {
+            return Err(Unidentified::AncestorsSway);
         }
-        let base_px = skeleton.image_from_model(&skeleton.nodes[parent].position);
-        out[i] = branch(
-            film,
-            &points,
-            &carrier,
-            &ancestors,
-            base_px,
-            (demands, &asked),
-        )
-        .and_then(|(found, sway)| {
-            own[i] = Some(found);
-            sway
-        });
-    }
-    out
-}
-
-/// Those of a branch's points that are on none of the branches that it carries, if they are enough,
-/// else all; and whether it is the former.
-fn speaking(film: &Film, i: usize, tracks: &[usize]) -> (Vec<usize>, bool) {
-    let own: Vec<usize> = tracks
-        .iter()
-        .copied()
-        .filter(|&k| film.tracks[k].node.index() == i)
-        .collect();
-    if own.len() >= ENOUGH_OWN || own.len() == tracks.len() {
-        (own, true)
-    } else {
-        (tracks.to_vec(), false)
+        let own_points = speaking.are_its_own && (branch.is_on_foot() || of_carrier.are_its_own);
+        let criteria = if own_points {
+            OWN_POINTS
+        } else {
+            SHARED_POINTS
+        };
+        let found = self.estimate_from(branch, &points, &carrier, &criteria);
+        self.known[branch.node.index()] = match &found {
+            Ok(estimate) => Known::Mode(estimate.mode),
+            Err(Unidentified::AncestorsSway) => Known::HasNoneOfItsOwn,
+            Err(_) => Known::Nothing,
+        };
+        found?.sway
     }
 }
 
-/// The oscillator that a branch has beyond its ancestors', for the branches on it, and its sway if
-/// that can be told.
-fn branch(
-    film: &Film,
-    points: &Points,
-    carrier: &Points,
-    ancestors: &[Own],
-    base_px: [f64; 2],
-    (demands, asked): (&Demands, &Asked),
-) -> Result<(Own, Swaying), Unidentified> {
-    let at_rate = |hz: f64| ((1.0 / film.step_s()) / hz).round().max(1.0) as usize;
-    let fine = at_rate(FRAMES_PER_PERIOD * demands.highest_hz);
-    let every = if film.times_s.len() / fine > LONG {
-        at_rate(LONG_HZ).max(fine)
-    } else {
-        fine
-    };
-    let mut frames = film.neighbours(0..film.times_s.len(), every);
-    frames.retain(|of| enough(points, of) && enough(carrier, of));
-    if frames.len() < LEAST_FRAMES {
-        return Err(Unidentified::TooShort);
-    }
-    let times_s: Vec<f64> = frames.iter().map(|of| film.mean_s(of)).collect();
-    let (common, carried) = (Common::of(points, &frames), Common::of(carrier, &frames));
-    let of_carrier = principal(&carried.signals);
-    let clear = of_carrier
-        .ways
-        .iter()
-        .zip(&of_carrier.variances)
-        .filter(|(_, v)| **v > CLEAR * carried.noise);
-    let mut known = vec![vec![1.0; frames.len()]];
-    known.extend(
-        clear
-            .take(MOST_CARRIED)
-            .map(|(way, _)| along(&carried.signals, way)),
-    );
-    let qr = Qr::new(known.clone());
-    let rest: Vec<Vec<f64>> = common.signals.iter().map(|s| qr.solve(s).0).collect();
-    let of_rest = principal(&rest);
-    let values = (points.tracks.len() * frames.len()) as f64;
-    let rms_px =
-        |signals: &[Vec<f64>]| (signals.iter().map(|s| dot(s, s)).sum::<f64>() / values).sqrt();
-    if rms_px(&common.signals) < NOISE_PX {
-        return Err(Unidentified::TooLittleMotion);
-    }
-    if rms_px(&rest) < NOISE_PX {
-        return Err(Unidentified::AncestorsSway);
-    }
-    let second = (SECOND * of_rest.variances[0]).max(CLEAR * common.noise);
-    let motions = if of_rest.variances.get(1).is_some_and(|v| *v > second) {
-        2
-    } else {
-        1
-    };
-    let motions = &of_rest.ways[..motions];
-    let [lowest_hz, highest_hz] = demands.frequencies_hz;
-    let frequencies_hz = match every {
-        1 => demands.frequencies_hz,
-        _ => [
-            lowest_hz,
-            highest_hz.min(OF_RATE / (every as f64 * film.step_s())),
-        ],
-    };
-    let left: Vec<Vec<f64>> = motions.iter().map(|way| along(&rest, way)).collect();
-    let problem = Problem {
-        times: Times::new(times_s),
-        motions: motions
-            .iter()
-            .map(|way| along(&common.signals, way))
-            .collect(),
-        known,
-        ancestors: ancestors.iter().map(|a| a.mode).collect(),
-        drift_per_s: DRIFTS / film.span_s(),
-        had: RefCell::default(),
-    };
-    let fitted = problem.fit(&left, common.noise, frequencies_hz);
-    let found = fitted.oscillators();
-    if found.is_empty() {
-        return Err(if ancestors.is_empty() {
-            Unidentified::NoOscillation
+impl InWind<'_> {
+    /// Those of a branch's points that are on none of the branches that it carries, if they are
+    /// enough, else all.
+    fn speaking(&self, node: NodeId, tracks: &[usize]) -> Speaking {
+        let own = tracks.iter().copied();
+        let own: Vec<usize> = own.filter(|&k| self.film.tracks[k].node == node).collect();
+        if own.len() >= ENOUGH_OWN_POINTS || own.len() == tracks.len() {
+            Speaking {
+                tracks: own,
+                are_its_own: true,
+            }
         } else {
-            Unidentified::AncestorsSway
-        });
+            Speaking {
+                tracks: tracks.to_vec(),
+                are_its_own: false,
+            }
+        }
     }
-    let wider = |sd: [f64; 2]| [0, 1].map(|i| (WIDER * sd[i]).hypot(asked.least_sd[i]));
-    let same = |o: &Oscillator, a: &Own| {
-        (a.mode.frequency_hz / o.mode.frequency_hz).ln().abs()
-            < APART * a.sd[0].hypot(wider(o.sd)[0])
-    };
-    let of_ancestor = |o: &Oscillator| ancestors.iter().any(|a| same(o, a));
-    let Some(k) = order(&found, ancestors.is_empty())
-        .into_iter()
-        .find(|&k| !found[k].at_limit && !of_ancestor(&found[k]))
-    else {
-        let of_ancestors = found.iter().any(|o| !o.at_limit && of_ancestor(o));
-        return Err(if of_ancestors {
-            Unidentified::AncestorsSway
-        } else {
-            Unidentified::NoOscillation
-        });
-    };
-    let (mode, sd) = (found[k].mode, wider(found[k].sd));
-    if !(found[k].sd[0] > 0.0 && Z * sd[0] <= SERVES * demands.widest) {
-        return Err(Unidentified::TooUncertain);
+
+    /// Points on a branch's carrier that are not on the branch.
+    fn beside(&self, branch: &BranchInFilm) -> Vec<usize> {
+        if branch.is_on_foot() {
+            return Vec::new();
+        }
+        let of_carrier = self.members[branch.parent.index()].iter().copied();
+        of_carrier.filter(|k| !branch.tracks.contains(k)).collect()
     }
-    let filter = fitted
-        .filter(k, common.noise)
-        .ok_or(Unidentified::TooUncertain)?;
-    let (one_swing, shared) = levers(&rest.iter().map(|s| filter.of(s)).collect::<Vec<_>>());
-    if one_swing < asked.one_swing || shared < SHARED {
-        return Err(Unidentified::NoOscillation);
+
+    /// The modes of the nearest ancestors that have one.
+    fn ancestors(&self, node: NodeId) -> Vec<BranchMode> {
+        let mut out = Vec::new();
+        for above in self.skeleton.ancestors(node) {
+            if let Known::Mode(mode) = self.known[above.index()] {
+                out.push(mode);
+            }
+        }
+        out.truncate(MAX_ANCESTORS);
+        out
     }
-    // Gusts are not known well enough for a likelihood to tell a frequency from its mirror image at
-    // such a rate.
-    if 1.0 / film.step_s() - mode.frequency_hz <= demands.highest_hz {
-        return Err(Unidentified::AboveSampling);
-    }
-    let arm = |k: &usize| {
-        let at = mean_px(&film.tracks[*k].at_px);
-        (at[0] - base_px[0]).powi(2) + (at[1] - base_px[1]).powi(2)
-    };
-    let arms: f64 = points.tracks.iter().map(arm).sum();
-    let sway = Sway {
-        frequency_hz: interval(mode.frequency_hz, sd[0]),
-        damping_ratio: (found[k].sd[1] > 0.0 && Z * sd[1] <= 1.0)
-            .then(|| interval(mode.damping, sd[1])),
-        excitation: Excitation::Wind,
-        amplitude_deg: (2.0 * found[k].variance)
-            .sqrt()
-            .atan2(arms.sqrt())
-            .to_degrees(),
-    };
-    let sure = Z * sd[0] <= demands.widest;
-    Ok((
-        Own { mode, sd },
-        if sure {
+
+    /// The oscillator that a branch has beyond its ancestors', and its sway if that can be told.
+    fn estimate_from(
+        &self,
+        branch: &BranchInFilm,
+        points: &Points,
+        carrier: &Points,
+        criteria: &AcceptanceCriteria,
+    ) -> Result<Estimate, Unidentified> {
+        let every = self.frames_per_mean();
+        let mut frames = self.film.neighbours(0..self.film.times_s.len(), every);
+        frames.retain(|of| enough_seen(points, of) && enough_seen(carrier, of));
+        if frames.len() < MIN_FRAMES {
+            return Err(Unidentified::TooShort);
+        }
+        let ancestors = self.ancestors(branch.node);
+        let motion = OwnMotion::of(points, carrier, &frames)?;
+        let problem = Problem {
+            times: Times::new(frames.iter().map(|of| self.film.mean_s(of)).collect()),
+            motions: motion.along_directions(&motion.all),
+            known: motion.carried.clone(),
+            ancestors: ancestors.iter().map(|a| a.mode).collect(),
+            drift_per_s: DRIFTS_PER_FILM / self.film.span_s(),
+            had: RefCell::default(),
+        };
+        let left = motion.along_directions(&motion.own);
+        let fitted = problem.fit(&left, motion.noise, self.frequencies_hz(every));
+        let found = fitted.oscillators();
+        let k = own_oscillator(&found, &ancestors, criteria)?;
+        let mode = criteria.mode_of(&found[k]);
+        let max_relative_ci = self.limits.max_relative_ci;
+        if found[k].ln_sd[0] <= 0.0 || !mode.is_within(MAX_CI_TO_SERVE * max_relative_ci) {
+            return Err(Unidentified::TooUncertain);
+        }
+        motion.check_one_swing(&fitted, k, criteria)?;
+        // Gusts are not known well enough for a likelihood to tell a frequency from its mirror image
+        // at such a rate.
+        if self
+            .limits
+            .may_be_aliased(mode.mode.frequency_hz, self.film)
+        {
+            return Err(Unidentified::AboveSampling);
+        }
+        let has_damping = found[k].ln_sd[1] > 0.0;
+        let sway = Sway {
+            frequency_hz: mode.frequency_hz(),
+            damping_ratio: mode.damping_ratio().filter(|_| has_damping),
+            excitation: Excitation::Wind,
+            amplitude_deg: self.amplitude_deg(branch, points, found[k].variance),
+        };
+        let sway = if mode.is_within(max_relative_ci) {
             Ok(sway)
         } else {
             Err(Unidentified::TooUncertain)
-        },
-    ))
+        };
+        Ok(Estimate { mode, sway })
+    }
+
+    /// Neighbouring frames that are taken together.
+    fn frames_per_mean(&self) -> usize {
+        let fine = self.nearest_to_rate(FRAMES_PER_PERIOD * self.limits.highest_hz);
+        if self.film.times_s.len() / fine > LONG_FILM_FRAMES {
+            self.nearest_to_rate(LONG_FILM_HZ).max(fine)
+        } else {
+            fine
+        }
+    }
+
+    /// Frames whose means come at about this rate.
+    fn nearest_to_rate(&self, rate_hz: f64) -> usize {
+        self.film.frames_per_period(rate_hz).round().max(1.0) as usize
+    }
+
+    /// Frequencies that are looked for in means of so many frames.
+    fn frequencies_hz(&self, every: usize) -> [f64; 2] {
+        let [lowest_hz, highest_hz] = self.limits.frequencies_hz;
+        if every == 1 {
+            return [lowest_hz, highest_hz];
+        }
+        let of_rate = MAX_FREQ_OF_RATE / (every as f64 * self.film.step_s());
+        [lowest_hz, highest_hz.min(of_rate)]
+    }
+
+    /// Of an oscillator of this variance in all of the points together, px².
+    fn amplitude_deg(&self, branch: &BranchInFilm, points: &Points, variance: f64) -> f64 {
+        let mut arms = 0.0;
+        for &k in &points.tracks {
+            let at_px = mean_px(&self.film.tracks[k].at_px);
+            let [u, v] = [0, 1].map(|c| at_px[c] - branch.base_px[c]);
+            arms += u * u + v * v;
+        }
+        (2.0 * variance).sqrt().atan2(arms.sqrt()).to_degrees()
+    }
+}
+
+/// What a branch's points do beyond those of its carrier.
+struct OwnMotion {
+    /// All that the points do, two signals a point.
+    all: Vec<Vec<f64>>,
+    /// What of it is no multiple of the carrier's motions.
+    own: Vec<Vec<f64>>,
+    /// A constant, and the motions of the carrier's points.
+    carried: Vec<Vec<f64>>,
+    /// The one or two directions, in all signals at once, in which most of the own motion is.
+    directions: Vec<Vec<f64>>,
+    /// Variance of noise in every value, px².
+    noise: f64,
+}
+
+impl OwnMotion {
+    /// In some frames, each some neighbours taken together; the reason where there is none.
+    fn of(points: &Points, carrier: &Points, frames: &[Vec<usize>]) -> Result<Self, Unidentified> {
+        let GapFree {
+            signals: all,
+            noise,
+        } = GapFree::of(points, frames);
+        let carrier = GapFree::of(carrier, frames);
+        let mut carried = vec![vec![1.0; frames.len()]];
+        let of_carrier = PrincipalComponents::of_signals(&carrier.signals);
+        for (direction, variance) in of_carrier.directions.iter().zip(&of_carrier.variances) {
+            let is_clear = *variance > MIN_VARIANCE_OVER_NOISE * carrier.noise;
+            if is_clear && carried.len() <= MAX_CARRIED_MOTIONS {
+                carried.push(along(&carrier.signals, direction));
+            }
+        }
+        let qr = Qr::new(carried.clone());
+        let own: Vec<Vec<f64>> = all.iter().map(|s| qr.solve(s).0).collect();
+        let values = (points.tracks.len() * frames.len()) as f64;
+        if rms_px(&all, values) < NOISE_PX {
+            return Err(Unidentified::TooLittleMotion);
+        }
+        if rms_px(&own, values) < NOISE_PX {
+            return Err(Unidentified::AncestorsSway);
+        }
+        let PrincipalComponents {
+            variances,
+            mut directions,
+        } = PrincipalComponents::of_signals(&own);
+        let least = (MIN_SECOND_VARIANCE * variances[0]).max(MIN_VARIANCE_OVER_NOISE * noise);
+        let has_second = variances.get(1).is_some_and(|v| *v > least);
+        directions.truncate(if has_second { 2 } else { 1 });
+        Ok(Self {
+            all,
+            own,
+            carried,
+            directions,
+            noise,
+        })
+    }
+
+    fn along_directions(&self, signals: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        self.directions.iter().map(|d| along(signals, d)).collect()
+    }
+
+    /// Whether an oscillator moves the points as one swing.
+    fn check_one_swing(
+        &self,
+        fitted: &Fitted,
+        oscillator: usize,
+        criteria: &AcceptanceCriteria,
+    ) -> Result<(), Unidentified> {
+        let filter = fitted
+            .filter(oscillator, self.noise)
+            .ok_or(Unidentified::TooUncertain)?;
+        let filtered: Vec<Vec<f64>> = self.own.iter().map(|s| filter.of(s)).collect();
+        let swing = rank_one_fraction(&filtered);
+        if swing.of_squares < criteria.min_rank_one || swing.of_points < MIN_POINTS_SHARE {
+            return Err(Unidentified::NoOscillation);
+        }
+        Ok(())
+    }
+}
+
+/// Root of the mean square displacement of a point.
+fn rms_px(signals: &[Vec<f64>], values: f64) -> f64 {
+    (signals.iter().map(|s| dot(s, s)).sum::<f64>() / values).sqrt()
+}
+
+/// Which of the oscillators is the branch's own, and no ancestor's; the reason where none is.
+fn own_oscillator(
+    found: &[Oscillator],
+    ancestors: &[BranchMode],
+    criteria: &AcceptanceCriteria,
+) -> Result<usize, Unidentified> {
+    if found.is_empty() && !ancestors.is_empty() {
+        return Err(Unidentified::AncestorsSway);
+    }
+    let mut reason = Unidentified::NoOscillation;
+    for k in by_variance(found, ancestors.is_empty()) {
+        if found[k].at_limit {
+            continue;
+        }
+        if !is_of_ancestor(&criteria.mode_of(&found[k]), ancestors) {
+            return Ok(k);
+        }
+    }
+    for oscillator in found.iter().filter(|o| !o.at_limit) {
+        if is_of_ancestor(&criteria.mode_of(oscillator), ancestors) {
+            reason = Unidentified::AncestorsSway;
+        }
+    }
+    Err(reason)
+}
+
+fn is_of_ancestor(mode: &BranchMode, ancestors: &[BranchMode]) -> bool {
+    ancestors.iter().any(|a| {
+        let sd = a.ln_sd[0].hypot(mode.ln_sd[0]);
+        a.mode.has_frequency_of(&mode.mode, SAME_FREQ_SIGMAS * sd)
+    })
 }
 
 /// The largest first. Of the trunk the slowest of the larger ones: it carries all, and all else
 /// sways faster than the whole tree.
-fn order(found: &[Oscillator], trunk: bool) -> Vec<usize> {
+fn by_variance(found: &[Oscillator], is_trunk: bool) -> Vec<usize> {
     let mut order: Vec<usize> = (0..found.len()).collect();
     order.sort_by(|a, b| found[*b].variance.total_cmp(&found[*a].variance));
-    if trunk {
-        let strong = LEAST_OF_TRUNK * found[order[0]].variance;
+    if is_trunk && !order.is_empty() {
+        let strong = MIN_VARIANCE_OF_TRUNK * found[order[0]].variance;
         order.retain(|&k| found[k].variance >= strong);
         order.sort_by(|a, b| {
-            found[*a]
-                .mode
-                .frequency_hz
-                .total_cmp(&found[*b].mode.frequency_hz)
+            let [a, b] = [a, b].map(|k| found[*k].mode.frequency_hz);
+            a.total_cmp(&b)
         });
     }
     order

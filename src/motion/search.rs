@@ -6,6 +6,10 @@
 //! the best of these lies on a bound, along which such steps cannot slide, both borders are
 //! searched all round. `tests/pose.rs` holds it against trying everything, as the paper does.
 //!
+//! It does not use the solver of the sway (`signal/least_squares.rs`): that one has boxes as bounds
+//! and one set of parameters, while here every step has axes of its own on the sphere, is turned
+//! back into two cones, and counts the bend of the sphere in the curvature.
+//!
 //! All is in model axes, so that nothing has to be turned on the way.
 
 use super::border;

@@ -1,19 +1,8 @@
 //! What the motion says of releases that its analysis did not use: one before the part that was
 //! looked at, or others in it.
 
-use crate::dynamics::{Analysis, Film, energy};
+use crate::dynamics::{Analysis, Film, fades_as_a_free_decay};
 use crate::model::Excitation;
-
-/// Time over which speeds are taken, s.
-const OVER_S: f64 = 0.12;
-/// The film in pieces whose energy falls from each to the next: by so much at the most it may grow,
-/// to this share of itself it falls in all, and its logarithm lies so near to a straight line
-/// (share of the variance). Of 216 parts of windy films of 5 to 10 s 8 did so, of 57 parts that
-/// begin after a release 27.
-const PIECES: usize = 4;
-const GROWS: f64 = 1.15;
-const FALLS: f64 = 0.3;
-const STRAIGHT: f64 = 0.85;
 
 /// What the user should try, a sentence each. `given` is whether the user says what made the tree
 /// sway.
@@ -36,8 +25,7 @@ pub fn hints(
             onset.at_s
         )];
     }
-    let fades = || energy(film, OVER_S).is_some_and(|energy| dies_down(&energy));
-    if onset.excitation == Excitation::Wind && !given && fades() {
+    if onset.excitation == Excitation::Wind && !given && fades_as_a_free_decay(film) {
         return vec![
             "the motion dies down from begin to end: if the tree was let go before, say --excitation release, or begin with the \
              release itself (--from and --to)"
@@ -47,38 +35,12 @@ pub fn hints(
     Vec::new()
 }
 
-/// Whether the motion grows less from begin to end, as evenly as a free sway does.
-fn dies_down(energy: &[[f64; 2]]) -> bool {
-    let mean =
-        |piece: &[[f64; 2]]| piece.iter().map(|e| e[1]).sum::<f64>() / piece.len().max(1) as f64;
-    let ends: Vec<usize> = (0..=PIECES).map(|k| k * energy.len() / PIECES).collect();
-    let means: Vec<f64> = ends.windows(2).map(|w| mean(&energy[w[0]..w[1]])).collect();
-    if means.iter().any(|m| *m <= 0.0) || means.windows(2).any(|w| w[1] > GROWS * w[0]) {
-        return false;
-    }
-    let logs: Vec<f64> = means.iter().map(|m| m.ln()).collect();
-    let middle = 0.5 * (PIECES - 1) as f64;
-    let average = logs.iter().sum::<f64>() / PIECES as f64;
-    let product = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
-        logs.iter()
-            .enumerate()
-            .map(|(k, y)| of(k as f64 - middle, y - average))
-            .sum()
-    };
-    let (xx, xy, yy) = (
-        product(&|x, _| x * x),
-        product(&|x, y| x * y),
-        product(&|_, y| y * y),
-    );
-    xy / xx * (PIECES - 1) as f64 <= FALLS.ln() && xy * xy >= STRAIGHT * xx * yy
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::cancel::CancelToken;
     use crate::config::Dynamics;
-    use crate::dynamics::{FilmTrack, Onset, Start, analyse};
+    use crate::dynamics::{Depth, FilmTrack, Onset, Start, analyse};
     use crate::model::{Node, NodeId, NodeName, Size, Skeleton};
     use crate::random::generator;
     use nalgebra::Point3;
@@ -91,7 +53,8 @@ mod tests {
             .map(|k| f64::from(k) / 30.0)
             .collect();
         let mut random = generator(5, 0);
-        let track = |i: u32| {
+        let mut tracks = Vec::new();
+        for i in 0..9 {
             let factor = 0.5 + 0.1 * f64::from(i);
             let at_px = times
                 .iter()
@@ -102,22 +65,39 @@ mod tests {
                     ]
                 })
                 .collect();
-            FilmTrack {
+            tracks.push(FilmTrack {
                 node: NodeId(1),
                 at_px,
-            }
-        };
-        let tracks = (0..9).map(track).collect();
+            });
+        }
         Film::new(&times, tracks)
     }
 
-    /// Let go at 0: two modes.
+    /// Released at 0: two modes.
     fn free(t: f64) -> f64 {
-        let mode = |hz: f64, px: f64| px * (-0.05 * TAU * hz * t).exp() * (TAU * hz * t).cos();
         if t < 0.0 {
             12.0
         } else {
-            mode(0.6, 9.0) + mode(0.9, 3.0)
+            decay(0.6, 9.0, t) + decay(0.9, 3.0, t)
+        }
+    }
+
+    fn decay(hz: f64, px: f64, t: f64) -> f64 {
+        px * (-0.05 * TAU * hz * t).exp() * (TAU * hz * t).cos()
+    }
+
+    fn node(k: u32) -> Node {
+        Node {
+            name: NodeName(k),
+            parent: k.checked_sub(1).map(NodeId),
+            level: k as u8,
+            position: Point3::new(0.0, 100.0 * f64::from(k), 0.0),
+            radius: 1.0,
+            n_tracks: 9,
+            certainty: 1.0,
+            copy_of: None,
+            plane_angle: 0.0,
+            kind: Default::default(),
         }
     }
 
@@ -136,20 +116,8 @@ mod tests {
         }
     }
 
-    /// What is told of a film of a trunk.
+    /// The analysis of a film of a trunk.
     fn analysed(film: &Film) -> Analysis {
-        let node = |k: u32| Node {
-            name: NodeName(k),
-            parent: k.checked_sub(1).map(NodeId),
-            level: k as u8,
-            position: Point3::new(0.0, 100.0 * f64::from(k), 0.0),
-            radius: 1.0,
-            n_tracks: 9,
-            certainty: 1.0,
-            copy_of: None,
-            plane_angle: 0.0,
-            kind: Default::default(),
-        };
         let skeleton = Skeleton {
             nodes: vec![node(0), node(1)],
             foot_px: [100.0; 2],
@@ -158,7 +126,13 @@ mod tests {
                 height: 360,
             },
         };
-        analyse(&skeleton, film, &Dynamics::default(), &CancelToken::new())
+        analyse(
+            &skeleton,
+            film,
+            &Dynamics::default(),
+            Depth::Full,
+            &CancelToken::new(),
+        )
     }
 
     /// Where an oscillator of 0.6 Hz is in `n` frames that wind shakes in those that are `windy`.
@@ -166,14 +140,15 @@ mod tests {
         let omega = TAU * 0.6;
         let (mut x, mut v) = (0.0, 0.0);
         let mut random = generator(seed, 0);
-        let mut step = |k: usize| {
+        let mut out = Vec::with_capacity(n);
+        for k in 0..n {
             let gust = 2000.0 * random.random_range(-0.5..0.5);
             let drive = if windy(k) { gust } else { 0.0 };
             v += (drive - 2.0 * damping * omega * v - omega * omega * x) / 30.0;
             x += v / 30.0;
-            x
-        };
-        (0..n).map(&mut step).collect()
+            out.push(x);
+        }
+        out
     }
 
     /// Wind all the time.
@@ -227,14 +202,13 @@ mod tests {
     fn of_several_releases_in_a_film_one_is_analysed_and_all_are_told() {
         let once = film(11.0, |t| free(t - 1.0));
         assert!(hints(&once, &analysed(&once), false).is_empty());
-        // Pulled again slowly, or with a jerk, held, let go.
+        // Pulled again slowly, or with a jerk, held, released.
         for pulls_s in [2.0, 0.3] {
-            let twice = |t: f64| match t - 14.0 {
+            let twice = film(27.0, |t| match t - 14.0 {
                 t if t < 0.0 => free(t + 13.0),
                 t if t < pulls_s => free(13.0 + t) + (12.0 - free(13.0 + pulls_s)) * t / pulls_s,
                 t => free(t - 3.0),
-            };
-            let twice = film(27.0, twice);
+            });
             let found = analysed(&twice);
             let hint = hints(&twice, &found, false);
             assert!(
@@ -259,14 +233,11 @@ mod tests {
     /// A hand that jerks is no release, in a film with one either.
     #[test]
     fn a_pull_with_a_jerk_before_the_release_is_no_release() {
-        let pulled = |t: f64| {
-            if t < 1.0 {
-                0.0
-            } else {
-                (t - 1.0).min(0.3) * 40.0
-            }
-        };
-        let once = film(16.0, |t| if t < 4.0 { pulled(t) } else { free(t - 4.0) });
+        let once = film(16.0, |t| match t {
+            t if t < 1.0 => 0.0,
+            t if t < 4.0 => (t - 1.0).min(0.3) * 40.0,
+            t => free(t - 4.0),
+        });
         let found = analysed(&once);
         assert!(
             hints(&once, &found, false).is_empty(),

@@ -12,7 +12,7 @@ use crate::document::note::{
 use crate::document::{
     CaptureNote, MotionCsv, PICTURE_FILE, SCHEMA_VERSION, TracksCsv, jpeg, nodes,
 };
-use crate::dynamics::{Film, analyse};
+use crate::dynamics::{Depth, Film, analyse};
 use crate::files::OutputFolder;
 use crate::model::{
     NodeId, NodeName, Outline, Picture, Pose, Skeleton, Swaying, Tentative, Timing, TrackLog,
@@ -137,7 +137,8 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
         "sway",
         || {
             let cancel = &job.shared.pulse.closing_work;
-            analyse(&model.skeleton, &film, &job.config.dynamics, cancel).sway
+            let settings = &job.config.dynamics;
+            analyse(&model.skeleton, &film, settings, Depth::Full, cancel).sway
         },
         || draft(job, &done, poses),
     );

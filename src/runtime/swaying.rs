@@ -11,7 +11,7 @@ use super::pulse::{Pulse, Worker};
 use super::shared::Shared;
 use crate::cancel::CancelToken;
 use crate::config::Dynamics;
-use crate::dynamics::{Film, analyse_soon, spectrum};
+use crate::dynamics::{self, Depth, Film, spectrum};
 use crate::model::{
     AngleSpectrum, Angles, BranchSway, NodeId, NodeName, Skeleton, SwayNow, TrackId, TrackLog,
     Unidentified,
@@ -290,7 +290,7 @@ pub fn analyse(request: &Request, cancel: &CancelToken) -> SwayNow {
     let film = Film::from_log(request.log.last(settings.window_s), skeleton, |id| {
         request.nodes.get(&id).copied()
     });
-    let analysis = analyse_soon(skeleton, &film, settings, cancel);
+    let analysis = dynamics::analyse(skeleton, &film, settings, Depth::Quick, cancel);
     let branch = |(i, name): (usize, &NodeName)| {
         // The foot is no branch.
         let swaying = analysis

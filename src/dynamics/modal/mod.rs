@@ -1,119 +1,119 @@
-//! Branches told by their modes, after a release.
+//! Branches identified by their modes, after a release.
 //!
-//! Going down the tree one branch at a time (free.rs) takes the captured tree as it is, and a mode
-//! that is told wrongly misleads what is below. Here all points and all modes have their say at
-//! once: a point has the modes of the branch that it is on and of those that carry it, and no
+//! Going up the tree one branch at a time (free_decay.rs) takes the captured tree as it is, and a
+//! mode that is identified wrongly misleads the branches on it. Here all points and all modes are
+//! fitted at once: a point has the modes of the branch that it is on and of those that carry it, and no
 //! others; modes are fitted together, points may go to another branch, branches come off others, as
 //! long as what the film shows becomes likelier by more than what it costs. What comes out answers
-//! for the captured branches that have mostly the same points, and had no answer; and it tells
+//! for the captured branches that have mostly the same points, and had no answer; and it separates
 //! branches that were captured as one with another ([`shoots`]).
 
 mod moves;
+mod points;
 mod read;
 mod refit;
 mod search;
 mod shoots;
 mod tree;
 
-use super::decay::Mode;
+use super::branches::{BranchMode, SearchLimits};
+use super::decay::{Mode, USUAL_DAMPING};
 use super::film::Film;
-use super::free::{Demands, LEAST_PERIODS, Z, interval};
-use super::members::{is_seen, mean_px};
+use super::free_decay::MIN_PERIODS;
 use super::release::Onset;
 use super::sway::BELOW_NYQUIST;
 use crate::cancel::CancelToken;
 use crate::model::{Excitation, NodeId, Skeleton, Sway, Swaying, Unidentified};
-use read::Reading;
-use search::LEAST;
+use points::ThinnedFilm;
+use read::ModeEstimate;
+use search::MIN_POINTS;
 pub use shoots::{Shoot, shoots};
-use tree::{Branch, Decay, Point, Tree};
+use tree::{Branch, Decay, Tree};
 
-/// Frames a second that are enough: neighbours are taken together as their mean.
-const ENOUGH_HZ: f64 = 15.0;
-/// And what comes later after a release says little, s.
-const ENOUGH_S: f64 = 20.0;
-/// A point must have been seen in this share of the frames.
-const SEEN: f64 = 0.8;
-/// Damping of a branch whose own is not known.
-const DAMPING: f64 = 0.05;
-const LEAST_NOISE_PX: f64 = 0.03;
 /// A mode is clear if its points gain so much by it, each (but for a quarter of them) and together;
 /// if its frequency is known to this standard deviation of the logarithm, and changes by less than
 /// this one where some of the points are left out; and if it is damped less than this.
-const CLEAR: f64 = 25.0;
-const CLEAR_TOGETHER: f64 = 120.0;
-const SURE: f64 = 0.009;
-const ALIKE: f64 = 0.0045;
-const HARDLY: f64 = 0.15;
+const MIN_GAIN: f64 = 25.0;
+const MIN_GAIN_TOGETHER: f64 = 120.0;
+const MAX_LN_FREQUENCY_SD: f64 = 0.009;
+const MAX_JACKKNIFE_SD: f64 = 0.0045;
+const MAX_DAMPING: f64 = 0.15;
 /// It is a captured branch's own if it is in so much of its points, and so much of the points that
 /// have it are on that.
-const OF_BRANCH: f64 = 0.75;
-const OF_MODE: f64 = 0.6;
-/// Frequencies that are no farther apart than this share are one.
-const ONE: f64 = 0.012;
+const MIN_SHARE_OF_BRANCH: f64 = 0.75;
+const MIN_SHARE_OF_MODE: f64 = 0.6;
+/// A mode that is no farther from a carrier's than this share is the carrier's. Somewhat more than
+/// one branch at a time needs (free_decay.rs): these frequencies are known less well.
+const CARRIER_FREQ_TOLERANCE: f64 = 0.012;
 /// Intervals are so much wider than the curvature says, and no narrower than these standard
 /// deviations. Found on clips of our own (docs/dynamics.md).
-const WIDER: f64 = 2.0;
-const LEAST_SD: [f64; 2] = [0.003, 0.1];
+const CI_INFLATION: f64 = 2.0;
+const MIN_LN_SD: [f64; 2] = [0.003, 0.1];
 
 /// Answers for branches of `sways` that have none, by all points at once.
 pub(super) fn answer(
     skeleton: &Skeleton,
     film: &Film,
     onset: &Onset,
-    demands: &Demands,
+    limits: &SearchLimits,
     sways: &mut [Swaying],
     cancel: &CancelToken,
 ) {
-    let open = |sway: &Swaying| {
-        matches!(
-            sway,
-            Err(Unidentified::NoOscillation
-                | Unidentified::AncestorsSway
-                | Unidentified::TooUncertain)
-        )
-    };
-    if !sways.iter().any(open) {
+    if !sways.iter().any(is_open) {
         return;
     }
-    let Some(told) = told(skeleton, film, onset, demands, sways, cancel) else {
+    let Some(solution) = ModalSolution::of(skeleton, film, onset, limits, sways, cancel) else {
         if cancel.is_cancelled() {
-            sways
-                .iter_mut()
-                .filter(|s| open(s))
-                .for_each(|s| *s = Err(Unidentified::NotInTime));
+            for sway in sways.iter_mut().filter(|s| is_open(s)) {
+                *sway = Err(Unidentified::NotInTime);
+            }
         }
         return;
     };
     for b in 2..sways.len() {
-        if !open(&sways[b]) {
+        if !is_open(&sways[b]) {
             continue;
         }
-        let above: Vec<f64> = skeleton
-            .ancestors(NodeId(b as u32))
-            .filter_map(|a| sways[a.index()].as_ref().ok().map(|s| s.frequency_hz.value))
-            .collect();
-        let fits = |r: &&Reading| {
-            let new = above
-                .iter()
-                .all(|f| (f / r.mode.frequency_hz).ln().abs() >= ONE);
-            told.alike(b, r).filter(|_| new)
-        };
-        let best = told
-            .readings
-            .iter()
-            .filter_map(|r| Some((fits(&r)?, r)))
-            .max_by(|a, b| a.0.total_cmp(&b.0));
-        if let Some(sway) = best.and_then(|(_, r)| sway(r, demands)) {
+        let carriers = known_modes(skeleton.ancestors(NodeId(b as u32)), sways);
+        let estimate = solution.estimate_of(b, &carriers);
+        if let Some(sway) = estimate.and_then(|e| e.sway(limits)) {
             sways[b] = Ok(sway);
         }
     }
 }
 
+/// Whether a branch has no answer, but might have one.
+fn is_open(sway: &Swaying) -> bool {
+    matches!(
+        sway,
+        Err(Unidentified::NoOscillation | Unidentified::AncestorsSway | Unidentified::TooUncertain)
+    )
+}
+
+/// The mode that an answer stands for.
+fn mode_of(sway: &Sway) -> Mode {
+    Mode {
+        frequency_hz: sway.frequency_hz.value,
+        damping: sway.damping_ratio.map_or(USUAL_DAMPING, |d| d.value),
+    }
+}
+
+/// Of those of some nodes that have an answer.
+fn known_modes(nodes: impl Iterator<Item = NodeId>, sways: &[Swaying]) -> Vec<Mode> {
+    let known = nodes.filter_map(|node| sways[node.index()].as_ref().ok());
+    known.map(mode_of).collect()
+}
+
+/// Whether a mode is the same as one of its carriers'.
+fn is_of_carrier(mode: &Mode, carriers: &[Mode]) -> bool {
+    let mut carriers = carriers.iter();
+    carriers.any(|c| c.has_frequency_of(mode, CARRIER_FREQ_TOLERANCE))
+}
+
 /// What the points say of all branches at once.
-struct Told {
+struct ModalSolution {
     /// The branches that can be told.
-    readings: Vec<Reading>,
+    estimates: Vec<ModeEstimate>,
     /// The points on every captured branch and on what it carries, in order.
     on: Vec<Vec<usize>>,
     /// Of every point: the captured branch that it is on, and its track of the film.
@@ -121,94 +121,126 @@ struct Told {
     tracks: Vec<usize>,
 }
 
-impl Told {
-    /// Points of a reading that are on captured branch `b`.
-    fn both(&self, b: usize, reading: &Reading) -> usize {
-        reading
-            .points
-            .iter()
-            .filter(|p| self.on[b].binary_search(p).is_ok())
-            .count()
+impl ModalSolution {
+    /// `None` where too little is seen, or `cancel` ends it before.
+    fn of(
+        skeleton: &Skeleton,
+        film: &Film,
+        onset: &Onset,
+        limits: &SearchLimits,
+        sways: &[Swaying],
+        cancel: &CancelToken,
+    ) -> Option<Self> {
+        // All points have the trunk's sway: without it nothing is sure.
+        if !sways.get(1).is_some_and(Result::is_ok) {
+            return None;
+        }
+        let thinned = ThinnedFilm::of(film, onset);
+        let span_s = thinned.span_s();
+        if thinned.points.len() < MIN_POINTS || span_s <= 0.0 {
+            return None;
+        }
+        let below_nyquist_hz = 0.5 * BELOW_NYQUIST * thinned.rate_hz();
+        let frequencies_hz = [
+            MIN_PERIODS / span_s,
+            below_nyquist_hz.min(limits.frequencies_hz[1]),
+        ];
+        if frequencies_hz[0] >= frequencies_hz[1] {
+            return None;
+        }
+        let ThinnedFilm {
+            times_s,
+            points,
+            tracks,
+        } = thinned;
+        let decay = Decay::new(times_s, onset.start, frequencies_hz, points);
+        let nodes = tracks.iter().map(|&k| film.tracks[k].node);
+        let branch_of: Vec<usize> = nodes.map(NodeId::index).collect();
+        let captured = captured(skeleton, sways, &decay, branch_of.clone());
+        let on: Vec<Vec<usize>> = (0..sways.len()).map(|b| captured.all(b)).collect();
+        let tree = captured.grown(cancel)?;
+        let mut estimates = tree.estimates();
+        estimates.retain(|e| {
+            e.is_clear()
+                && e.mode.frequency_hz * span_s > MIN_PERIODS
+                && !limits.may_be_aliased(e.mode.frequency_hz, film)
+        });
+        Some(Self {
+            estimates,
+            on,
+            branch_of,
+            tracks,
+        })
     }
 
-    /// How alike the points of a reading and those of captured branch `b` are, 0 to 1, if they are
-    /// of one branch.
-    fn alike(&self, b: usize, reading: &Reading) -> Option<f64> {
-        let both = self.both(b, reading);
-        let (here, there) = (self.on[b].len() as f64, reading.points.len() as f64);
+    /// Points of an estimate that are on captured branch `b`.
+    fn points_on(&self, b: usize, estimate: &ModeEstimate) -> usize {
+        let mut on = 0;
+        for point in &estimate.points {
+            on += usize::from(self.on[b].binary_search(point).is_ok());
+        }
+        on
+    }
+
+    /// How alike the points of an estimate and those of captured branch `b` are, 0 to 1, if they
+    /// are of one branch.
+    fn similarity(&self, b: usize, estimate: &ModeEstimate) -> Option<f64> {
+        let both = self.points_on(b, estimate);
+        let (here, there) = (self.on[b].len() as f64, estimate.points.len() as f64);
         let share = both as f64;
-        (both >= LEAST && share >= OF_BRANCH * here && share >= OF_MODE * there)
-            .then(|| share / (here + there - share))
+        let is_one = both >= MIN_POINTS
+            && share >= MIN_SHARE_OF_BRANCH * here
+            && share >= MIN_SHARE_OF_MODE * there;
+        is_one.then(|| share / (here + there - share))
+    }
+
+    /// The estimate that is most likely captured branch `b`'s.
+    fn estimate_of(&self, b: usize, carriers: &[Mode]) -> Option<&ModeEstimate> {
+        let mut best: Option<(f64, &ModeEstimate)> = None;
+        for estimate in &self.estimates {
+            let Some(similarity) = self.similarity(b, estimate) else {
+                continue;
+            };
+            if is_of_carrier(&estimate.mode, carriers) {
+                continue;
+            }
+            if best.is_none_or(|(most, _)| similarity >= most) {
+                best = Some((similarity, estimate));
+            }
+        }
+        best.map(|(_, estimate)| estimate)
     }
 }
 
-/// `None` where too little is seen, or `cancel` ends it before.
-fn told(
-    skeleton: &Skeleton,
-    film: &Film,
-    onset: &Onset,
-    demands: &Demands,
-    sways: &[Swaying],
-    cancel: &CancelToken,
-) -> Option<Told> {
-    // All points have the trunk's sway: without it nothing is sure.
-    if !sways.get(1).is_some_and(Result::is_ok) {
-        return None;
+impl ModeEstimate {
+    fn gain_together(&self) -> f64 {
+        self.gain * self.points.len() as f64
     }
-    let (times_s, points, tracks) = thinned(film, onset);
-    let span_s = times_s
-        .last()
-        .zip(times_s.first())
-        .map_or(0.0, |(b, a)| b - a);
-    if points.len() < LEAST || span_s <= 0.0 {
-        return None;
-    }
-    let rate_hz = (times_s.len() - 1) as f64 / span_s;
-    let frequencies_hz = [
-        LEAST_PERIODS / span_s,
-        (0.5 * BELOW_NYQUIST * rate_hz).min(demands.frequencies_hz[1]),
-    ];
-    if frequencies_hz[0] >= frequencies_hz[1] {
-        return None;
-    }
-    let decay = Decay::new(times_s, onset.start, frequencies_hz, points);
-    let branch_of: Vec<usize> = tracks
-        .iter()
-        .map(|&k| film.tracks[k].node.index())
-        .collect();
-    let captured = captured(skeleton, sways, &decay, branch_of.clone());
-    let on: Vec<Vec<usize>> = (0..sways.len()).map(|b| captured.all(b)).collect();
-    let tree = captured.grown(cancel)?;
-    let clear = |r: &Reading| {
-        r.gain >= CLEAR
-            && r.gain * r.points.len() as f64 >= CLEAR_TOGETHER
-            && r.sd[0] <= SURE
-            && r.spread <= ALIKE
-            && r.mode.damping <= HARDLY
-            && r.mode.frequency_hz * span_s > LEAST_PERIODS
-            // Films of few frames a second show a fast sway as a slow one.
-            && 1.0 / film.step_s() - r.mode.frequency_hz > demands.highest_hz
-    };
-    let readings = tree.readings().into_iter().filter(clear).collect();
-    Some(Told {
-        readings,
-        on,
-        branch_of,
-        tracks,
-    })
-}
 
-fn sway(reading: &Reading, demands: &Demands) -> Option<Sway> {
-    let sd = [0, 1].map(|i| (WIDER * reading.sd[i]).hypot(LEAST_SD[i]));
-    if Z * sd[0] > demands.widest {
-        return None;
+    fn is_clear(&self) -> bool {
+        self.gain >= MIN_GAIN
+            && self.gain_together() >= MIN_GAIN_TOGETHER
+            && self.ln_sd[0] <= MAX_LN_FREQUENCY_SD
+            && self.jackknife_sd <= MAX_JACKKNIFE_SD
+            && self.mode.damping <= MAX_DAMPING
     }
-    Some(Sway {
-        frequency_hz: interval(reading.mode.frequency_hz, sd[0]),
-        damping_ratio: (Z * sd[1] <= 1.0).then(|| interval(reading.mode.damping, sd[1])),
-        excitation: Excitation::Release,
-        amplitude_deg: reading.amplitude_deg,
-    })
+
+    fn sway(&self, limits: &SearchLimits) -> Option<Sway> {
+        let mut ln_sd = self.ln_sd;
+        for (sd, least) in ln_sd.iter_mut().zip(MIN_LN_SD) {
+            *sd = (CI_INFLATION * *sd).hypot(least);
+        }
+        let mode = BranchMode {
+            mode: self.mode,
+            ln_sd,
+        };
+        mode.is_within(limits.max_relative_ci).then(|| Sway {
+            frequency_hz: mode.frequency_hz(),
+            damping_ratio: mode.damping_ratio(),
+            excitation: Excitation::Release,
+            amplitude_deg: self.amplitude_deg,
+        })
+    }
 }
 
 /// The tree as it was captured, with the modes that are known.
@@ -218,131 +250,101 @@ fn captured<'a>(
     decay: &'a Decay,
     branch_of: Vec<usize>,
 ) -> Tree<'a> {
-    let branch = |(b, sway): (usize, &Swaying)| {
-        let node = &skeleton.nodes[b];
-        let mode = sway.as_ref().ok().map(|s| Mode {
-            frequency_hz: s.frequency_hz.value,
-            damping: s.damping_ratio.map_or(DAMPING, |d| d.value),
-        });
-        Branch {
-            parent: node.parent.map(|p| p.index()),
-            mode,
+    let mut branches = Vec::with_capacity(sways.len());
+    for (node, sway) in skeleton.nodes.iter().zip(sways) {
+        branches.push(Branch {
+            parent: node.parent.map(NodeId::index),
+            mode: sway.as_ref().ok().map(mode_of),
             end_px: skeleton.image_from_model(&node.position),
-        }
-    };
+        });
+    }
     let mut tree = Tree {
         decay,
-        branches: sways.iter().enumerate().map(branch).collect(),
+        branches,
         branch_of,
     };
     for b in 0..tree.branches.len() {
-        if tree.all(b).len() < LEAST {
+        if tree.all(b).len() < MIN_POINTS {
             tree.branches[b].mode = None;
         }
     }
     tree
 }
 
-/// Times from the release on, s, the points that were seen nearly always, and which tracks they
-/// are. Neighbouring frames are taken together, and short gaps bridged by straight lines: to tell
-/// whose a mode is.
-fn thinned(film: &Film, onset: &Onset) -> (Vec<f64>, Vec<Point>, Vec<usize>) {
-    let together = ((1.0 / (ENOUGH_HZ * film.step_s()) + 0.01) as usize).max(1);
-    let until = film
-        .times_s
-        .partition_point(|t| *t <= onset.at_s + ENOUGH_S);
-    let mut rows = film.neighbours(onset.from..until, together);
-    rows.retain(|row| row.len() == together);
-    let times_s: Vec<f64> = rows
-        .iter()
-        .map(|row| film.mean_s(row) - onset.at_s)
-        .collect();
-    let (mut points, mut tracks) = (Vec::new(), Vec::new());
-    for (k, track) in film.tracks.iter().enumerate() {
-        let mean = |row: &Vec<usize>| {
-            let at: Vec<[f64; 2]> = row.iter().map(|&k| track.at_px[k]).collect();
-            if at.iter().all(is_seen) {
-                mean_px(&at)
-            } else {
-                [f64::NAN; 2]
-            }
-        };
-        let at: Vec<[f64; 2]> = rows.iter().map(mean).collect();
-        let Some(values) = bridged(&times_s, &at) else {
-            continue;
-        };
-        points.push(Point::new(values, mean_px(&at), LEAST_NOISE_PX));
-        tracks.push(k);
-    }
-    (times_s, points, tracks)
-}
-
-/// Displacement from the mean, px; nothing for a point that was seen too little.
-fn bridged(times_s: &[f64], at_px: &[[f64; 2]]) -> Option<[Vec<f64>; 2]> {
-    let seen: Vec<usize> = (0..at_px.len()).filter(|&k| is_seen(&at_px[k])).collect();
-    if seen.is_empty() || (seen.len() as f64) < SEEN * at_px.len() as f64 {
-        return None;
-    }
-    let mean = mean_px(at_px);
-    let line = |c: usize| {
-        let value = |k: usize| {
-            let next = seen.partition_point(|s| *s < k);
-            let (before, after) = (seen[next.saturating_sub(1)], seen[next.min(seen.len() - 1)]);
-            if seen.get(next) == Some(&k) || after <= before {
-                return at_px[after][c] - mean[c];
-            }
-            let share = ((times_s[k] - times_s[before]) / (times_s[after] - times_s[before]))
-                .clamp(0.0, 1.0);
-            at_px[before][c] + share * (at_px[after][c] - at_px[before][c]) - mean[c]
-        };
-        (0..at_px.len()).map(value).collect()
-    };
-    Some([line(0), line(1)])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::config::Dynamics;
-    use crate::dynamics::sway::{Begun, begun};
-    use crate::dynamics::{FilmTrack, analyse, free};
+    use crate::dynamics::sway::UsableFilm;
+    use crate::dynamics::{Depth, FilmTrack, analyse, free_decay};
     use crate::model::{Node, NodeName, Size};
+    use crate::random::Generator;
     use nalgebra::Point3;
     use rand::RngExt;
     use rand_distr::StandardNormal;
     use std::f64::consts::TAU;
 
-    /// A trunk of 0.6 Hz that is let go after 0.5 s with 8 points on it, and a tip with `branches`:
+    /// A trunk of 0.6 Hz that is released after 0.5 s with 8 points on it, and a tip with `branches`:
     /// the frequency and the lever arms of the points of each. Noise of 0.1 px.
     fn filmed(branches: &[(f64, &[f64])]) -> (Skeleton, Film) {
         let times: Vec<f64> = (0..150).map(|k| f64::from(k) / 15.0).collect();
-        let decay = |hz: f64, t: f64| {
-            let t = t - 0.5;
-            if t <= 0.0 {
-                return 1.0;
-            }
-            let (z, w) = (0.03_f64, TAU * hz);
-            let root = (1.0 - z * z).sqrt();
-            (-z * w * t).exp() * ((w * root * t).cos() + z / root * (w * root * t).sin())
-        };
-        let mut random = crate::random::generator(9, 0);
-        let mut noise = || 0.1 * random.sample::<f64, _>(StandardNormal);
-        let mut track = |node: u32, trunk: f64, own: Option<(f64, f64)>| {
-            let at = |&t: &f64| {
-                let sway = trunk * decay(0.6, t) + own.map_or(0.0, |(hz, arm)| arm * decay(hz, t));
-                [100.0 + sway + noise(), 100.0 + 0.3 * sway + noise()]
-            };
-            FilmTrack {
-                node: NodeId(node),
-                at_px: times.iter().map(at).collect(),
-            }
-        };
-        let mut tracks: Vec<FilmTrack> =
-            (0..8).map(|k| track(1, 6.0 + f64::from(k), None)).collect();
-        for (hz, arms) in branches {
-            tracks.extend(arms.iter().map(|arm| track(2, 15.0, Some((*hz, *arm)))));
+        let mut chance = crate::random::generator(9, 0);
+        let mut tracks: Vec<FilmTrack> = Vec::new();
+        for k in 0..8 {
+            tracks.push(track(&times, 1, 6.0 + f64::from(k), None, &mut chance));
         }
-        let node = |i: u32| Node {
+        for (hz, arms) in branches {
+            for arm in *arms {
+                tracks.push(track(&times, 2, 15.0, Some((*hz, *arm)), &mut chance));
+            }
+        }
+        let skeleton = Skeleton {
+            nodes: (0..3).map(node).collect(),
+            foot_px: [0.0; 2],
+            image_size: Size {
+                width: 64,
+                height: 64,
+            },
+        };
+        (skeleton, Film::new(&times, tracks))
+    }
+
+    fn decay(hz: f64, t: f64) -> f64 {
+        let t = t - 0.5;
+        if t <= 0.0 {
+            return 1.0;
+        }
+        let (z, w) = (0.03_f64, TAU * hz);
+        let root = (1.0 - z * z).sqrt();
+        (-z * w * t).exp() * ((w * root * t).cos() + z / root * (w * root * t).sin())
+    }
+
+    fn noise(chance: &mut Generator) -> f64 {
+        0.1 * chance.sample::<f64, _>(StandardNormal)
+    }
+
+    /// With so much of the trunk's sway, and a frequency and size of its own.
+    fn track(
+        times: &[f64],
+        node: u32,
+        trunk: f64,
+        own: Option<(f64, f64)>,
+        chance: &mut Generator,
+    ) -> FilmTrack {
+        let mut at_px = Vec::with_capacity(times.len());
+        for t in times {
+            let sway = trunk * decay(0.6, *t) + own.map_or(0.0, |(hz, arm)| arm * decay(hz, *t));
+            let u = 100.0 + sway + noise(chance);
+            at_px.push([u, 100.0 + 0.3 * sway + noise(chance)]);
+        }
+        FilmTrack {
+            node: NodeId(node),
+            at_px,
+        }
+    }
+
+    fn node(i: u32) -> Node {
+        Node {
             name: NodeName(i),
             parent: i.checked_sub(1).map(NodeId),
             level: i as u8,
@@ -353,19 +355,13 @@ mod tests {
             copy_of: None,
             plane_angle: 0.0,
             kind: Default::default(),
-        };
-        let nodes = (0..3).map(node).collect();
-        (
-            Skeleton {
-                nodes,
-                foot_px: [0.0; 2],
-                image_size: Size {
-                    width: 64,
-                    height: 64,
-                },
-            },
-            Film::new(&times, tracks),
-        )
+        }
+    }
+
+    /// All branches at once of a film.
+    fn analysed(skeleton: &Skeleton, film: &Film) -> Vec<Swaying> {
+        let config = Dynamics::default();
+        analyse(skeleton, film, &config, Depth::Full, &CancelToken::new()).sway
     }
 
     /// Two points of eight are of another branch, which is no reason to say nothing of the six.
@@ -373,8 +369,7 @@ mod tests {
     fn a_branch_with_a_few_strangers_gets_its_answer() {
         let (skeleton, film) =
             filmed(&[(1.10, &[4.0, 5.0, 3.5, 4.5, 5.5, 5.0]), (1.6, &[3.0, 4.0])]);
-        let sway =
-            analyse(&skeleton, &film, &Dynamics::default(), &CancelToken::new()).sway[2].unwrap();
+        let sway = analysed(&skeleton, &film)[2].unwrap();
         assert!(sway.frequency_hz.holds(1.10), "{sway:?}");
         assert!(
             sway.damping_ratio.is_some_and(|d| d.holds(0.03)),
@@ -382,42 +377,30 @@ mod tests {
         );
     }
 
-    /// The points of the branches that are told beside the trunk and the tip as a whole.
+    /// The points of the branches that are found beside the trunk and the tip as a whole.
     fn groups(skeleton: &Skeleton, film: &Film) -> Vec<Vec<usize>> {
-        let Some(Begun {
+        let Some(UsableFilm {
             members,
             onset,
-            demands,
+            limits,
             film,
             ..
-        }) = begun(skeleton, film, &Dynamics::default())
+        }) = UsableFilm::of(skeleton, film, &Dynamics::default())
         else {
             return Vec::new();
         };
-        let sways = free::sways(
-            skeleton,
-            &film,
-            &members,
-            &onset,
-            &demands,
-            &CancelToken::new(),
-        );
-        let Some(told) = told(
-            skeleton,
-            &film,
-            &onset,
-            &demands,
-            &sways,
-            &CancelToken::new(),
-        ) else {
+        let cancel = CancelToken::new();
+        let sways = free_decay::sways(skeleton, &film, &members, &onset, &limits, &cancel);
+        let Some(solution) = ModalSolution::of(skeleton, &film, &onset, &limits, &sways, &cancel)
+        else {
             return Vec::new();
         };
-        let own = told
-            .readings
+        let own = solution
+            .estimates
             .iter()
-            .filter(|r| r.points.len() < told.on[2].len());
+            .filter(|e| e.points.len() < solution.on[2].len());
         let mut groups: Vec<Vec<usize>> = own
-            .map(|r| r.points.iter().map(|&p| told.tracks[p]).collect())
+            .map(|r| r.points.iter().map(|&p| solution.tracks[p]).collect())
             .collect();
         groups.sort();
         groups
@@ -428,7 +411,7 @@ mod tests {
         groups(&skeleton, &film)
     }
 
-    /// Two branches of 1.10 and 1.15 Hz in one tip: a hidden frequency for whoever looks at either.
+    /// Two branches of 1.10 and 1.15 Hz in one tip: each hides the frequency of the other.
     #[test]
     fn two_branches_in_one_tip_come_apart_by_their_modes() {
         let groups = found(&[
@@ -464,7 +447,7 @@ mod tests {
         groups
     }
 
-    /// Whoever films wants the frequency of each, and a tip that has both cannot have it.
+    /// Each has a frequency of its own, and a tip that has both cannot have it.
     #[test]
     fn branches_that_only_their_modes_tell_are_shoots_of_their_tip() {
         let two: &[(f64, &[f64])] = &[

@@ -2,31 +2,33 @@
 //! branches, as long as it is worth it.
 
 use super::super::decay::Mode;
-use super::search::{CLEAR, LEAST, Tried};
-use super::tree::{Branch, PER_MODE, Tree};
+use super::super::members::mean_px;
+use super::search::{MIN_CLEAR_GAIN, MIN_POINTS, Tried};
+use super::tree::{Branch, COST_PER_MODE, Tree};
 use crate::cancel::CancelToken;
+use crate::signal::vectors::add_scaled;
 
 /// What a change must be worth.
-const WORTH: f64 = 10.0;
+const MIN_GAIN: f64 = 10.0;
 /// Rounds of all changes, of fits after one, and of fits of everything.
-const ROUNDS: usize = 3;
-const AFTER: usize = 5;
-const OF_ALL: usize = 6;
+const MAX_ROUNDS: usize = 3;
+const MAX_STEPS_AFTER_CHANGE: usize = 5;
+const MAX_STEPS_OF_ALL: usize = 6;
 /// Branches that may come off one in a round.
-const SHOOTS: usize = 4;
+const MAX_NEW_BRANCHES: usize = 4;
 /// Points that a tip must have to be tried as two, and how far apart those are put: share of the
 /// frequency either way.
-const FOR_TWO: usize = 8;
-const APART: [f64; 2] = [0.03, 0.08];
+const MIN_POINTS_FOR_TWO: usize = 8;
+const LN_FREQUENCIES_APART: [f64; 2] = [0.03, 0.08];
 /// Rounds in which points choose between the two, and modes are fitted, in turn.
-const CHOOSE: usize = 3;
+const ROUNDS_OF_TWO: usize = 3;
 
 impl<'a> Tree<'a> {
     /// The best tree that the changes lead to; `None` if `cancel` ends it before.
     pub fn grown(mut self, cancel: &CancelToken) -> Option<Self> {
         let tried = Tried::new(self.decay);
         self.fit_all();
-        for _ in 0..ROUNDS {
+        for _ in 0..MAX_ROUNDS {
             let mut changed = false;
             for branch in 1..self.branches.len() {
                 if cancel.is_cancelled() {
@@ -52,7 +54,7 @@ impl<'a> Tree<'a> {
             changed |= self.choose(&all, &(0..self.branch_of.len()).collect::<Vec<_>>());
             self.fit_all();
             for b in 1..self.branches.len() {
-                if self.all(b).len() < LEAST - 1 {
+                if self.all(b).len() < MIN_POINTS - 1 {
                     self.branches[b].mode = None;
                 }
             }
@@ -65,14 +67,14 @@ impl<'a> Tree<'a> {
 
     fn fit_all(&mut self) {
         let all: Vec<usize> = (0..self.branches.len()).collect();
-        self.refit(&all, &all, OF_ALL);
+        self.refit(&all, &all, MAX_STEPS_OF_ALL);
     }
 
     /// Takes `other` if what is within `root` costs less there.
     fn take(&mut self, mut other: Tree<'a>, root: usize) -> bool {
         let there = other.within(root);
-        other.refit(&there, &there, AFTER);
-        let better = other.cost(&there) < self.cost(&self.within(root)) - WORTH;
+        other.refit(&there, &there, MAX_STEPS_AFTER_CHANGE);
+        let better = other.cost(&there) < self.cost(&self.within(root)) - MIN_GAIN;
         if better {
             *self = other;
         }
@@ -82,54 +84,56 @@ impl<'a> Tree<'a> {
     /// The mode of a branch is tried on what carries it, in exchange; left out; and looked for
     /// anew.
     fn rearrange(&mut self, branch: usize, tried: &Tried) -> bool {
-        if self.all(branch).len() < LEAST {
+        if self.all(branch).len() < MIN_POINTS {
             self.branches[branch].mode = None;
             return false;
         }
         let mut changed = false;
-        let with = |tree: &Self, at: usize, mode: Option<Mode>| {
-            let mut other = tree.clone();
-            other.branches[at].mode = mode;
-            other
-        };
         if let (Some(mode), Some(parent)) = (
             self.branches[branch].mode,
             self.branches[branch].parent.filter(|&p| p > 0),
         ) {
-            let mut other = with(self, branch, self.branches[parent].mode);
+            let mut other = self.with_mode(branch, self.branches[parent].mode);
             other.branches[parent].mode = Some(mode);
             changed |= self.take(other, parent);
         }
         if self.branches[branch].mode.is_some() {
-            changed |= self.take(with(self, branch, None), branch);
+            changed |= self.take(self.with_mode(branch, None), branch);
         }
-        let without = with(self, branch, None);
+        let without = self.with_mode(branch, None);
         if let Some(mode) = without.common_mode(branch, tried) {
-            changed |= self.take(with(&without, branch, Some(mode)), branch);
+            changed |= self.take(without.with_mode(branch, Some(mode)), branch);
         }
         changed
+    }
+
+    /// The same tree with another mode of one branch.
+    fn with_mode(&self, branch: usize, mode: Option<Mode>) -> Self {
+        let mut other = self.clone();
+        other.branches[branch].mode = mode;
+        other
     }
 
     /// New branches on `branch`, of those of its own points that have a mode in common.
     fn shoot(&mut self, branch: usize, tried: &Tried) -> bool {
         let mut changed = false;
-        for _ in 0..SHOOTS {
+        for _ in 0..MAX_NEW_BRANCHES {
             let points = self.own(branch);
-            if points.len() < LEAST {
+            if points.len() < MIN_POINTS {
                 break;
             }
             let Some(found) = self
                 .mode_of_some(branch, points, tried)
-                .filter(|f| f.worth >= PER_MODE)
+                .filter(|f| f.worth >= COST_PER_MODE)
             else {
                 break;
             };
             let mut other = self.clone();
             let new = other.add(branch, Some(found.mode), &found.points);
-            other.refit(&[new], &[new], AFTER);
+            other.refit(&[new], &[new], MAX_STEPS_AFTER_CHANGE);
             let within = other.within(branch);
             other.choose(&within, &other.all(branch));
-            if other.all(new).len() < LEAST - 1 || !self.take(other, branch) {
+            if other.all(new).len() < MIN_POINTS - 1 || !self.take(other, branch) {
                 break;
             }
             changed = true;
@@ -145,33 +149,31 @@ impl<'a> Tree<'a> {
         else {
             return false;
         };
-        if points.len() < FOR_TWO || within.len() > 1 {
+        if points.len() < MIN_POINTS_FOR_TWO || within.len() > 1 {
             return false;
         }
-        for apart in APART {
+        for apart in LN_FREQUENCIES_APART {
             let mut other = self.clone();
-            let at = |share: f64| {
-                Some(Mode {
-                    frequency_hz: mode.frequency_hz * share,
-                    ..mode
-                })
-            };
-            other.branches[branch].mode = at((-apart).exp());
-            let new = other.add(parent, at(apart.exp()), &[]);
+            let [slower, faster] = [-apart, apart].map(|apart: f64| Mode {
+                frequency_hz: mode.frequency_hz * apart.exp(),
+                ..mode
+            });
+            other.branches[branch].mode = Some(slower);
+            let new = other.add(parent, Some(faster), &[]);
             let both = [branch, new];
             let mut large_enough = true;
-            for _ in 0..CHOOSE {
+            for _ in 0..ROUNDS_OF_TWO {
                 let [here, there] = both.map(|b| other.costs(b, &points));
                 for (k, &p) in points.iter().enumerate() {
                     other.branch_of[p] = if here[k] <= there[k] { branch } else { new };
                 }
-                large_enough = both.iter().all(|&b| other.own(b).len() >= LEAST);
+                large_enough = both.iter().all(|&b| other.own(b).len() >= MIN_POINTS);
                 if !large_enough {
                     break;
                 }
-                other.refit(&both, &both, AFTER);
+                other.refit(&both, &both, MAX_STEPS_AFTER_CHANGE);
             }
-            if large_enough && other.cost(&both) < self.cost(&[branch]) - WORTH {
+            if large_enough && other.cost(&both) < self.cost(&[branch]) - MIN_GAIN {
                 *self = other;
                 return true;
             }
@@ -182,23 +184,19 @@ impl<'a> Tree<'a> {
     /// Every one of `points` may go to that of `branches` where it costs clearly least; tells
     /// whether one did.
     fn choose(&mut self, branches: &[usize], points: &[usize]) -> bool {
-        let costs: Vec<Vec<f64>> = branches
-            .iter()
-            .map(|&b| {
-                self.costs(b, points)
-                    .iter()
-                    .zip(self.far(b, points))
-                    .map(|(c, f)| c + f)
-                    .collect()
-            })
-            .collect();
+        let mut costs: Vec<Vec<f64>> = Vec::with_capacity(branches.len());
+        for &b in branches {
+            let mut of_branch = self.costs(b, points);
+            add_scaled(&mut of_branch, 1.0, &self.far(b, points));
+            costs.push(of_branch);
+        }
         let mut moved = false;
         for (k, &p) in points.iter().enumerate() {
             let Some(now) = branches.iter().position(|&b| b == self.branch_of[p]) else {
                 continue;
             };
             let best = (0..branches.len()).min_by(|&a, &b| costs[a][k].total_cmp(&costs[b][k]));
-            if let Some(best) = best.filter(|&b| costs[b][k] < costs[now][k] - CLEAR) {
+            if let Some(best) = best.filter(|&b| costs[b][k] < costs[now][k] - MIN_CLEAR_GAIN) {
                 self.branch_of[p] = branches[best];
                 moved = true;
             }
@@ -208,18 +206,11 @@ impl<'a> Tree<'a> {
 
     fn add(&mut self, parent: usize, mode: Option<Mode>, points: &[usize]) -> usize {
         let new = self.branches.len();
-        let n = (points.len() as f64).max(1.0);
-        let mean = |c: usize| {
-            points
-                .iter()
-                .map(|&p| self.decay.points[p].at_px[c])
-                .sum::<f64>()
-                / n
-        };
         let end_px = if points.is_empty() {
             self.branches[parent].end_px
         } else {
-            [mean(0), mean(1)]
+            let at_px: Vec<[f64; 2]> = points.iter().map(|&p| self.decay.points[p].at_px).collect();
+            mean_px(&at_px)
         };
         self.branches.push(Branch {
             parent: Some(parent),

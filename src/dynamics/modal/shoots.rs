@@ -1,20 +1,20 @@
 //! Branches that were captured as one with another, and that their modes tell apart.
 
 use super::super::film::Film;
-use super::super::free;
-use super::super::sway::{Begun, begun};
-use super::{ONE, Reading, told};
+use super::super::free_decay;
+use super::super::sway::UsableFilm;
+use super::{ModalSolution, ModeEstimate, is_of_carrier, known_modes};
 use crate::cancel::CancelToken;
 use crate::config::Dynamics;
-use crate::model::{Excitation, NodeId, Skeleton, Sway};
+use crate::model::{Excitation, NodeId, Skeleton, Swaying};
 
 /// A branch is on the captured one that has this share of its points, and begins with those that
 /// are on no branch of that.
-const MOST: f64 = 0.75;
-const OWN: f64 = 0.6;
+const MIN_SHARE_ON_CARRIER: f64 = 0.75;
+const MIN_SHARE_OF_ITS_OWN: f64 = 0.6;
 /// Points that one must have. Nothing but its mode tells of it, and four agree by chance more often
 /// than five.
-const FEWEST: usize = 5;
+const MIN_POINTS: usize = 5;
 
 /// A branch of its own on a captured one that is not known to fork there: some of its points have a
 /// mode in common that the others have not.
@@ -35,59 +35,77 @@ pub fn shoots(
     config: &Dynamics,
     cancel: &CancelToken,
 ) -> Vec<Shoot> {
-    let Some(Begun {
+    let Some(UsableFilm {
         members,
         onset,
-        demands,
+        limits,
         film,
         ..
-    }) = begun(skeleton, film, config)
+    }) = UsableFilm::of(skeleton, film, config)
     else {
         return Vec::new();
     };
     if onset.excitation != Excitation::Release {
         return Vec::new();
     }
-    let sways = free::sways(skeleton, &film, &members, &onset, &demands, cancel);
-    let Some(mut told) = told(skeleton, &film, &onset, &demands, &sways, cancel) else {
-        return Vec::new();
-    };
-    let mut readings = std::mem::take(&mut told.readings);
-    let clearness = |r: &Reading| r.gain * r.points.len() as f64;
-    readings.sort_by(|a, b| clearness(b).total_cmp(&clearness(a)));
-    let mut taken = vec![false; told.tracks.len()];
-    let mut out = Vec::new();
-    for reading in &readings {
-        let all = reading.points.len() as f64;
-        let captured = 1..told.on.len();
-        if captured.clone().any(|b| told.alike(b, reading).is_some()) {
-            continue;
-        }
-        let carries = |b: &usize| told.both(*b, reading) as f64 >= MOST * all;
-        let Some(on) = captured.filter(carries).min_by_key(|&b| told.on[b].len()) else {
-            continue;
-        };
-        let own = |p: &usize| told.branch_of[*p] == on && !taken[*p];
-        let points: Vec<usize> = reading.points.iter().copied().filter(own).collect();
-        let carriers =
-            std::iter::once(NodeId(on as u32)).chain(skeleton.ancestors(NodeId(on as u32)));
-        let known = |s: &Sway| {
-            (s.frequency_hz.value / reading.mode.frequency_hz)
-                .ln()
-                .abs()
-                < ONE
-        };
-        let theirs = carriers
-            .filter_map(|b| sways[b.index()].as_ref().ok())
-            .any(known);
-        if points.len() < FEWEST || (points.len() as f64) < OWN * all || theirs {
-            continue;
-        }
-        points.iter().for_each(|&p| taken[p] = true);
-        out.push(Shoot {
-            on: NodeId(on as u32),
-            tracks: points.iter().map(|&p| told.tracks[p]).collect(),
-        });
+    let sways = free_decay::sways(skeleton, &film, &members, &onset, &limits, cancel);
+    match ModalSolution::of(skeleton, &film, &onset, &limits, &sways, cancel) {
+        Some(solution) => solution.shoots(skeleton, &sways),
+        None => Vec::new(),
     }
-    out
+}
+
+impl ModalSolution {
+    fn shoots(&self, skeleton: &Skeleton, sways: &[Swaying]) -> Vec<Shoot> {
+        let mut estimates: Vec<&ModeEstimate> = self.estimates.iter().collect();
+        estimates.sort_by(|a, b| b.gain_together().total_cmp(&a.gain_together()));
+        let mut taken = vec![false; self.tracks.len()];
+        let mut out = Vec::new();
+        for estimate in estimates {
+            let Some(on) = self.carrier_of(estimate) else {
+                continue;
+            };
+            let node = NodeId(on as u32);
+            let points = self.own_points(estimate, on, &taken);
+            let all = estimate.points.len() as f64;
+            if points.len() < MIN_POINTS || (points.len() as f64) < MIN_SHARE_OF_ITS_OWN * all {
+                continue;
+            }
+            let carriers = std::iter::once(node).chain(skeleton.ancestors(node));
+            if is_of_carrier(&estimate.mode, &known_modes(carriers, sways)) {
+                continue;
+            }
+            let mut tracks = Vec::with_capacity(points.len());
+            for p in points {
+                taken[p] = true;
+                tracks.push(self.tracks[p]);
+            }
+            out.push(Shoot { on: node, tracks });
+        }
+        out
+    }
+
+    /// The smallest captured branch that has most of an estimate's points; `None` where there is
+    /// none, or the estimate is that of a captured branch.
+    fn carrier_of(&self, estimate: &ModeEstimate) -> Option<usize> {
+        let captured = 1..self.on.len();
+        if captured
+            .clone()
+            .any(|b| self.similarity(b, estimate).is_some())
+        {
+            return None;
+        }
+        let least = MIN_SHARE_ON_CARRIER * estimate.points.len() as f64;
+        captured
+            .filter(|&b| self.points_on(b, estimate) as f64 >= least)
+            .min_by_key(|&b| self.on[b].len())
+    }
+
+    /// Points of an estimate that lie on captured branch `on` itself, and are not taken.
+    fn own_points(&self, estimate: &ModeEstimate, on: usize, taken: &[bool]) -> Vec<usize> {
+        let points = estimate.points.iter().copied();
+        points
+            .filter(|&p| self.branch_of[p] == on && !taken[p])
+            .collect()
+    }
 }

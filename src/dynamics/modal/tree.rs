@@ -1,26 +1,26 @@
 //! Points, the tree that they are on, and what it costs to say so.
 
-use super::super::columns::{Qr, dot};
-use super::super::decay::{Mode, Start};
+use super::super::decay::{Mode, Start, damping_penalty};
+use crate::signal::median;
+use crate::signal::qr::Qr;
+use crate::signal::statistics::noise_variance;
+use crate::signal::vectors::dot;
 
 /// Values that count as one, of a point: what is left of it is branches that are not told and what
 /// is not linear, alike from frame to frame.
-pub(super) const VALUES: f64 = 80.0;
+pub(super) const EFFECTIVE_VALUES: f64 = 80.0;
 /// What a point must gain by each mode that it has, and a mode by being there: twice logarithms of
 /// likelihood.
-pub(super) const PER_POINT: f64 = 8.0;
-pub(super) const PER_MODE: f64 = 30.0;
-/// Damping of branches: median, and standard deviation of the logarithm.
-const USUAL_DAMPING: f64 = 0.05;
-const DAMPING_SD: f64 = 0.8;
+pub(super) const COST_PER_POINT: f64 = 8.0;
+pub(super) const COST_PER_MODE: f64 = 30.0;
 /// What it costs a point to be farther from the others of a branch than is usual: per square of the
 /// distance, and at most; and where there are no others.
-const FAR: f64 = 4.0;
-const FARTHEST: f64 = 9.0;
-const ALONE: f64 = 200.0;
-/// The neighbour by which distance is told, and what is usual of it.
+const COST_PER_DISTANCE: f64 = 4.0;
+const MAX_SQUARE_DISTANCE: f64 = 9.0;
+const COST_ALONE: f64 = 200.0;
+/// The neighbour that distance is measured to, and how many times its median is usual.
 const NEIGHBOUR: usize = 3;
-const USUAL: f64 = 2.5;
+const USUAL_OF_MEDIAN: f64 = 2.5;
 
 /// One point.
 pub(super) struct Point {
@@ -35,11 +35,7 @@ pub(super) struct Point {
 
 impl Point {
     pub fn new(values: [Vec<f64>; 2], at_px: [f64; 2], least_noise_px: f64) -> Self {
-        let third = |w: &[f64]| w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0];
-        let thirds = || values.iter().flat_map(|v| v.windows(4).map(third));
-        // The squares of 1, 3, 3, 1 make 20.
-        let noise =
-            thirds().map(|d| d * d).sum::<f64>() / (20.0 * (thirds().count() as f64).max(1.0));
+        let noise = noise_variance(values.iter().map(Vec::as_slice));
         let floor = 2.0 * (2 * values[0].len()) as f64 * noise.max(least_noise_px * least_noise_px);
         let squares = values.iter().map(|v| dot(v, v)).sum();
         Self {
@@ -77,12 +73,11 @@ impl Decay {
             usual_px: 1.0,
         };
         let all: Vec<usize> = (0..decay.points.len()).collect();
-        let mut near: Vec<f64> = all
+        let distances = all
             .iter()
-            .map(|&p| decay.distance_px(p, &all, NEIGHBOUR + 1))
-            .collect();
-        near.sort_unstable_by(f64::total_cmp);
-        decay.usual_px = USUAL * near.get(near.len() / 2).copied().unwrap_or(1.0).max(1.0);
+            .map(|&p| decay.distance_px(p, &all, NEIGHBOUR + 1));
+        let middle_px = median(distances.collect(), f64::total_cmp).unwrap_or(1.0);
+        decay.usual_px = USUAL_OF_MEDIAN * middle_px.max(1.0);
         decay
     }
 
@@ -174,22 +169,24 @@ impl Tree<'_> {
 
     pub fn design(&self, branch: usize) -> Design {
         let of = self.modes_of(branch);
-        let ones = std::iter::once(vec![1.0; self.decay.times_s.len()]);
-        let modes = of.iter().filter_map(|b| self.branches[*b].mode.as_ref());
-        let columns = ones
-            .chain(modes.flat_map(|m| self.decay.columns(m)))
-            .collect();
-        Design {
-            of,
-            qr: Qr::new(columns),
+        let qr = Qr::new(self.columns_of(&of));
+        Design { of, qr }
+    }
+
+    /// A column of ones, then those of the modes of some branches.
+    pub fn columns_of(&self, branches: &[usize]) -> Vec<Vec<f64>> {
+        let mut columns = vec![vec![1.0; self.decay.times_s.len()]];
+        for mode in branches.iter().filter_map(|b| self.branches[*b].mode) {
+            columns.extend(self.decay.columns(&mode));
         }
+        columns
     }
 
     /// Squares of a point that a design leaves, with those of noise, px².
     pub fn left(&self, design: &Design, point: usize) -> f64 {
         let point = &self.decay.points[point];
-        let taken = |y: &Vec<f64>| design.qr.q.iter().map(|q| dot(q, y).powi(2)).sum::<f64>();
-        (point.squares - point.values.iter().map(taken).sum::<f64>()).max(0.0) + point.floor
+        let taken: f64 = point.values.iter().map(|y| design.qr.explained(y)).sum();
+        (point.squares - taken).max(0.0) + point.floor
     }
 
     /// What it costs `points` to be on `branch`.
@@ -198,47 +195,36 @@ impl Tree<'_> {
         let modes = design.of.len() as f64;
         points
             .iter()
-            .map(|&p| VALUES * self.left(&design, p).ln() + PER_POINT * modes)
+            .map(|&p| EFFECTIVE_VALUES * self.left(&design, p).ln() + COST_PER_POINT * modes)
             .collect()
     }
 
     /// What some branches cost with their own points and modes.
     pub fn cost(&self, branches: &[usize]) -> f64 {
-        let of = |&b: &usize| {
+        let mut cost = 0.0;
+        for &b in branches {
             let points = self.own(b);
-            let own: f64 = if points.is_empty() {
-                0.0
-            } else {
-                self.costs(b, &points).iter().sum()
-            };
-            own + self.branches[b]
-                .mode
-                .map_or(0.0, |m| PER_MODE + unusual(&m))
-        };
-        branches.iter().map(of).sum()
+            if !points.is_empty() {
+                cost += self.costs(b, &points).iter().sum::<f64>();
+            }
+            if let Some(mode) = self.branches[b].mode {
+                cost += COST_PER_MODE + damping_penalty(mode.damping.ln());
+            }
+        }
+        cost
     }
 
     /// What it costs points to be where they are in the picture if they are on `branch`.
     pub fn far(&self, branch: usize, points: &[usize]) -> Vec<f64> {
         let others = self.all(branch);
-        let of = |&p: &usize| {
-            if others.is_empty() {
-                return ALONE;
-            }
+        if others.is_empty() {
+            return vec![COST_ALONE; points.len()];
+        }
+        let mut costs = Vec::with_capacity(points.len());
+        for &p in points {
             let d = self.decay.distance_px(p, &others, NEIGHBOUR) / self.decay.usual_px;
-            FAR * (d * d).min(FARTHEST)
-        };
-        points.iter().map(of).collect()
+            costs.push(COST_PER_DISTANCE * (d * d).min(MAX_SQUARE_DISTANCE));
+        }
+        costs
     }
-}
-
-/// What a damping costs that branches hardly have.
-pub(super) fn unusual(mode: &Mode) -> f64 {
-    ((mode.damping / USUAL_DAMPING).ln() / DAMPING_SD).powi(2)
-}
-
-/// How that changes with the logarithm of the damping, by half: slope and curvature.
-pub(super) fn unusual_slope(mode: &Mode) -> [f64; 2] {
-    let curvature = 1.0 / (DAMPING_SD * DAMPING_SD);
-    [(mode.damping / USUAL_DAMPING).ln() * curvature, curvature]
 }

@@ -1,4 +1,4 @@
-//! Likelihood of oscillators that are driven by chance, at any times.
+//! Likelihood of oscillators that are driven by chance, at any times: celerite.
 //!
 //! A damped oscillator driven by gusts is a Gaussian process whose covariance is a sum of
 //! exponentials of the time between two values. The covariance matrix of such sums has a factor
@@ -7,6 +7,8 @@
 //! applications to astronomical time series" (2017), eqs. 9, 20, 33-43.
 
 use super::decay::{each_step, powers};
+use crate::signal::gram::GramCholesky;
+use crate::signal::principal::symmetric;
 use nalgebra::Complex;
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -61,10 +63,9 @@ impl Waves {
             fade.push(factor.re)
         });
         let turn = powers(times_s, Complex::new(0.0, term.d));
-        let of = |f: &dyn Fn(&Complex<f64>) -> f64| turn.iter().map(f).collect::<Vec<f64>>();
         Self {
-            cos: of(&|t| t.re),
-            sin: of(&|t| t.im),
+            cos: turn.iter().map(|t| t.re).collect(),
+            sin: turn.iter().map(|t| t.im).collect(),
             fade,
         }
     }
@@ -139,17 +140,22 @@ impl Part {
     /// Its power at `hz`, the transform of its covariance, per Hz on both sides.
     pub fn power(&self, hz: f64) -> f64 {
         let omega = TAU * hz;
-        let at = |t: &Term, by: f64| (t.a * t.c + t.b * by) / (t.c * t.c + by * by);
-        self.terms()
-            .iter()
-            .map(|t| at(t, t.d + omega) + at(t, t.d - omega))
-            .sum()
+        let mut power = 0.0;
+        for term in self.terms() {
+            power += term.power(term.d + omega) + term.power(term.d - omega);
+        }
+        power
     }
 }
 
 impl Term {
     fn ranks(&self) -> usize {
         if self.d == 0.0 { 1 } else { 2 }
+    }
+
+    /// Half of its transform, `by` from its frequency, 1/s.
+    fn power(&self, by: f64) -> f64 {
+        (self.a * self.c + self.b * by) / (self.c * self.c + by * by)
     }
 }
 
@@ -167,13 +173,11 @@ impl Part {
             } => {
                 let omega = TAU * frequency_hz;
                 let p = Complex::new(-damping * omega, omega * (1.0 - damping * damping).sqrt());
-                let of = |s: Complex<f64>| {
-                    (s * s + s * (2.0 * damping * omega) + omega * omega) * (s + g)
-                };
-                let pair = 2.0 / ((p - p.conj()) * (p + g) * of(-p));
                 let gust = Complex::new(-g, 0.0);
-                let single = 1.0
-                    / ((gust * gust + gust * (2.0 * damping * omega) + omega * omega) * of(-gust));
+                let [at_p, at_gust, at_minus_gust] =
+                    [-p, gust, -gust].map(|s| s * s + s * (2.0 * damping * omega) + omega * omega);
+                let pair = 2.0 / ((p - p.conj()) * (p + g) * (at_p * (g - p)));
+                let single = 1.0 / (at_gust * (at_minus_gust * (g - gust)));
                 let unit = variance / (pair.re + single.re);
                 vec![
                     Term {
@@ -288,40 +292,28 @@ fn likelihood<const J: usize>(
             }
         }
     }
-    log_determinant + squares_left(gram, n)
+    log_determinant + squares_left(&gram, n)
 }
 
 /// What is left of the first signal's squares when the others have been fitted to it: `gram` holds
-/// the products below its diagonal. Cholesky with the first signal last.
-fn squares_left(gram: Vec<f64>, n: usize) -> f64 {
-    let product = |i: usize, k: usize| gram[i.max(k) * n + i.min(k)];
-    let order: Vec<usize> = (1..n).chain([0]).collect();
-    let mut l = vec![0.0; n * n];
-    for i in 0..n {
-        for k in 0..=i {
-            let sum: f64 = product(order[i], order[k])
-                - (0..k).map(|m| l[i * n + m] * l[k * n + m]).sum::<f64>();
-            l[i * n + k] = if i == n - 1 && k == i {
-                return sum;
-            } else if k == i {
-                // A signal that is a multiple of others adds nothing.
-                if sum > 1e-10 * product(order[i], order[i]) {
-                    sum.sqrt()
-                } else {
-                    f64::INFINITY
-                }
-            } else {
-                sum / l[k * n + k]
-            };
-        }
-    }
-    f64::INFINITY
+/// the products below its diagonal.
+fn squares_left(gram: &[f64], n: usize) -> f64 {
+    let others = symmetric(n - 1, |i, k| gram[(i + 1) * n + k + 1]);
+    let products: Vec<f64> = (1..n).map(|i| gram[i * n]).collect();
+    gram[0] - GramCholesky::new(&others, n - 1).explained(&products)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use nalgebra::{DMatrix, DVector};
+
+    fn covariance(t: f64) -> f64 {
+        let (w, z) = (TAU * 0.5, 0.06_f64);
+        let wd = w * (1.0 - z * z).sqrt();
+        0.7 * (-z * w * t).exp() * ((wd * t).cos() + z * w / wd * (wd * t).sin())
+            + 0.2 * (-0.4 * t).exp()
+    }
 
     /// Against the definition, with a full matrix, at uneven times.
     #[test]
@@ -351,12 +343,6 @@ mod tests {
                 rate_per_s: 0.4,
             },
         ];
-        let covariance = |t: f64| {
-            let (w, z) = (TAU * 0.5, 0.06_f64);
-            let wd = w * (1.0 - z * z).sqrt();
-            0.7 * (-z * w * t).exp() * ((wd * t).cos() + z * w / wd * (wd * t).sin())
-                + 0.2 * (-0.4 * t).exp()
-        };
         let k = DMatrix::from_fn(40, 40, |i, j| {
             covariance((times[i] - times[j]).abs()) + if i == j { 0.01 } else { 0.0 }
         });

@@ -1,17 +1,21 @@
-//! Normal equations: what a few columns explain of many signals, from the products of all with all.
+//! Linear least squares by normal equations: what a few columns explain of many signals, from the
+//! products of all with all.
 //!
 //! Signals that lack other frames than their neighbours do not need columns of their own: the
 //! products over all frames are had once, and those over the frames that are lacking are taken off.
+//!
+//! Not nalgebra's Cholesky, which fails as a whole where a column depends on others: here that
+//! column gets the factor 0. Where a matrix is definite, nalgebra's is used.
 
-use super::columns::dot;
+use super::vectors::dot;
 use nalgebra::DMatrix;
 
 /// Of a column whose square is less than this share of what it was before the others were taken off
 /// nothing is left: the others span it.
-const SPANNED: f64 = 1e-10;
+const MIN_SQUARE_LEFT: f64 = 1e-10;
 
 /// Products of `columns` with each other.
-pub(super) fn products(columns: &[&[f64]]) -> DMatrix<f64> {
+pub fn gram(columns: &[&[f64]]) -> DMatrix<f64> {
     let n = columns.len();
     let mut out = DMatrix::zeros(n, n);
     for i in 0..n {
@@ -24,15 +28,13 @@ pub(super) fn products(columns: &[&[f64]]) -> DMatrix<f64> {
 }
 
 /// The same without `rows`.
-pub(super) fn products_without(
-    all: &DMatrix<f64>,
-    columns: &[&[f64]],
-    rows: &[usize],
-) -> DMatrix<f64> {
+pub fn gram_without(all: &DMatrix<f64>, columns: &[&[f64]], rows: &[usize]) -> DMatrix<f64> {
     let mut out = all.clone();
     let n = columns.len();
-    let of = |column: &&[f64]| rows.iter().map(|&r| column[r]).collect::<Vec<f64>>();
-    let lacking: Vec<Vec<f64>> = columns.iter().map(of).collect();
+    let mut lacking: Vec<Vec<f64>> = Vec::with_capacity(n);
+    for column in columns {
+        lacking.push(rows.iter().map(|&r| column[r]).collect());
+    }
     for i in 0..n {
         for k in 0..=i {
             let product = out[(i, k)] - dot(&lacking[i], &lacking[k]);
@@ -43,18 +45,18 @@ pub(super) fn products_without(
 }
 
 /// Products C = L Lᵀ of the first columns.
-pub(super) struct Factored {
+pub struct GramCholesky {
     l: DMatrix<f64>,
 }
 
-impl Factored {
+impl GramCholesky {
     /// Of the first `n` columns of `products`.
     pub fn new(products: &DMatrix<f64>, n: usize) -> Self {
         let mut l = DMatrix::<f64>::zeros(n, n);
         for k in 0..n {
             let left = products[(k, k)] - (0..k).map(|m| l[(k, m)] * l[(k, m)]).sum::<f64>();
             // A column that others span gets no factor: its part of L stays 0.
-            if left.is_nan() || left <= SPANNED * products[(k, k)] {
+            if left.is_nan() || left <= MIN_SQUARE_LEFT * products[(k, k)] {
                 continue;
             }
             l[(k, k)] = left.sqrt();
@@ -66,24 +68,42 @@ impl Factored {
         Self { l }
     }
 
-    /// C⁻¹ x, of the columns that have factors; 0 for the others.
-    pub fn solve(&self, x: &[f64]) -> Vec<f64> {
+    /// L⁻¹ x, of the columns that have factors; 0 for the others.
+    fn forward(&self, x: &[f64]) -> Vec<f64> {
         let (n, l) = (self.l.nrows(), &self.l);
         let mut out = vec![0.0; n];
         for k in (0..n).filter(|&k| l[(k, k)] > 0.0) {
             out[k] = (x[k] - (0..k).map(|m| l[(k, m)] * out[m]).sum::<f64>()) / l[(k, k)];
         }
+        out
+    }
+
+    /// C⁻¹ x, of the columns that have factors; 0 for the others.
+    pub fn solve(&self, x: &[f64]) -> Vec<f64> {
+        let (n, l) = (self.l.nrows(), &self.l);
+        let mut out = self.forward(x);
         for k in (0..n).rev().filter(|&k| l[(k, k)] > 0.0) {
             out[k] = (out[k] - (k + 1..n).map(|m| l[(m, k)] * out[m]).sum::<f64>()) / l[(k, k)];
         }
         out
     }
 
+    /// x' C⁻¹ x: squares that the columns explain of a signal whose products with them are `x`.
+    pub fn explained(&self, x: &[f64]) -> f64 {
+        self.forward(x).iter().map(|x| x * x).sum()
+    }
+
     /// Diagonal of C⁻¹: variances of the factors for noise of variance 1.
     pub fn variances(&self) -> Vec<f64> {
         let n = self.l.nrows();
-        let unit = |k: usize| (0..n).map(|i| f64::from(i == k)).collect::<Vec<f64>>();
-        (0..n).map(|k| self.solve(&unit(k))[k]).collect()
+        let mut unit = vec![0.0; n];
+        let mut out = Vec::with_capacity(n);
+        for k in 0..n {
+            unit[k] = 1.0;
+            out.push(self.solve(&unit)[k]);
+            unit[k] = 0.0;
+        }
+        out
     }
 }
 
@@ -103,9 +123,9 @@ mod tests {
             .take(4)
             .chain([0.0])
             .collect();
-        let products = products_without(&products(&columns), &columns, &[4]);
+        let products = gram_without(&gram(&columns), &columns, &[4]);
         let by: Vec<f64> = columns.iter().map(|c| dot(c, &y)).collect();
-        let factored = Factored::new(&products, 3);
+        let factored = GramCholesky::new(&products, 3);
         let factors = factored.solve(&by);
         assert!(
             (factors[0] - 3.0).abs() < 1e-9 && (factors[1] + 0.5).abs() < 1e-9 && factors[2] == 0.0,

@@ -1,28 +1,25 @@
 //! Oscillators in wind: how many a branch's motion carries, at what frequency and damping, and how
 //! sure that is.
 
-use super::columns::dot;
-use super::decay::Mode;
+use super::celerite::{Part, Times, minus_2_log_likelihood};
+use super::decay::{Mode, USUAL_DAMPING, damping_penalty};
 use super::filter::Filter;
-use super::minimum::{curvature, minimum};
-use super::periodogram::{Periodogram, excess_hz};
-use super::process::{Part, Times, minus_2_log_likelihood};
+use super::periodogram::{Observed, Periodogram, excess_hz};
+use crate::signal::bfgs::{curvature, minimum};
+use crate::signal::vectors::dot;
+use nalgebra::DMatrix;
 use std::cell::RefCell;
 use std::collections::VecDeque;
 
 /// Oscillators that are looked for beyond the ancestors'.
-const MOST_NEW: usize = 3;
+const MAX_NEW: usize = 3;
 /// How often the gusts of a wind forget themselves, 1/s, at the least and at the most, which is
 /// white noise to a tree.
 const GUSTS_PER_S: [f64; 2] = [0.1, 60.0];
 const DAMPING: [f64; 2] = [0.003, 0.4];
-/// Trees are damped by some hundredths of the critical: a weak prior for films that are too short
-/// to tell, as the standard deviation of a logarithm.
-const USUAL_DAMPING: f64 = 0.05;
-const DAMPING_SD: f64 = 0.7;
 /// Likelihoods that are kept: a step in a number that only one motion has leaves the other's as it
 /// was.
-const KEPT: usize = 64;
+const MAX_KEPT: usize = 64;
 
 /// Motions, their parameters and likelihoods.
 type Had = RefCell<VecDeque<(usize, Vec<f64>, f64)>>;
@@ -45,7 +42,7 @@ pub(super) struct Oscillator {
     pub mode: Mode,
     /// Of the logarithms of its frequency and damping, by the curvature of the likelihood; infinite
     /// where that has none.
-    pub sd: [f64; 2],
+    pub ln_sd: [f64; 2],
     /// Of all motions together, px².
     pub variance: f64,
     /// Whether it stands where the search ends.
@@ -71,15 +68,12 @@ impl Problem {
     /// Of logarithms: noise, the drift's variance, the rate of the gusts; the ancestors' variances
     /// in each motion; then frequency, damping and the variances of each new oscillator.
     fn cost(&self, x: &[f64]) -> f64 {
-        let off = |p: &[f64]| (p[1] - USUAL_DAMPING.ln()) / DAMPING_SD;
-        let prior: f64 = x[self.first_new()..]
-            .chunks(self.per_new())
-            .map(|p| off(p).powi(2))
-            .sum();
-        prior
-            + (0..self.motions.len())
-                .map(|m| self.cost_of(m, x))
-                .sum::<f64>()
+        let mut prior = 0.0;
+        for oscillator in x[self.first_new()..].chunks(self.per_new()) {
+            prior += damping_penalty(oscillator[1]);
+        }
+        let motions = 0..self.motions.len();
+        prior + motions.map(|m| self.cost_of(m, x)).sum::<f64>()
     }
 
     fn cost_of(&self, m: usize, x: &[f64]) -> f64 {
@@ -98,7 +92,7 @@ impl Problem {
             .map(Vec::as_slice)
             .collect();
         let value = minus_2_log_likelihood(&self.times, &signals, &parts, own[0].exp());
-        if had.len() == KEPT {
+        if had.len() == MAX_KEPT {
             had.pop_front();
         }
         had.push_back((m, own, value));
@@ -122,78 +116,70 @@ impl Problem {
 
     fn parts(&self, x: &[f64]) -> Vec<Part> {
         let (of_ancestors, of_new) = x[3..].split_at(self.ancestors.len());
-        let drift = Part::Drift {
+        let gusts_per_s = x[2].exp();
+        let mut out = vec![Part::Drift {
             variance: x[1].exp(),
             rate_per_s: self.drift_per_s,
-        };
-        let oscillator = |variance: f64, frequency_hz: f64, damping: f64| Part::Oscillator {
-            variance,
-            frequency_hz,
-            damping,
-            gusts_per_s: x[2].exp(),
-        };
-        let old = self
-            .ancestors
-            .iter()
-            .zip(of_ancestors)
-            .map(|(m, v)| oscillator(v.exp(), m.frequency_hz, m.damping));
-        let new = of_new
-            .chunks(3)
-            .map(|p| oscillator(p[0].exp(), p[1].exp(), p[2].exp()));
-        std::iter::once(drift).chain(old).chain(new).collect()
+        }];
+        for (mode, ln_variance) in self.ancestors.iter().zip(of_ancestors) {
+            out.push(Part::Oscillator {
+                variance: ln_variance.exp(),
+                frequency_hz: mode.frequency_hz,
+                damping: mode.damping,
+                gusts_per_s,
+            });
+        }
+        for p in of_new.chunks(3) {
+            out.push(Part::Oscillator {
+                variance: p[0].exp(),
+                frequency_hz: p[1].exp(),
+                damping: p[2].exp(),
+                gusts_per_s,
+            });
+        }
+        out
     }
 
     /// With as many new oscillators as the data carry (Schwarz 1978), within `frequencies_hz`.
     /// `left` are the motions without what is known of them; noise has about the variance `noise`
     /// in them.
     pub fn fit(&self, left: &[Vec<f64>], noise: f64, frequencies_hz: [f64; 2]) -> Fitted<'_> {
-        let variances: Vec<f64> = left.iter().map(|s| dot(s, s) / s.len() as f64).collect();
-        let level = variances[0].ln();
-        let of_variance = [level - 16.0, level + 4.0];
-        let mut bounds = vec![
-            [level - 16.0, level + 1.0],
-            of_variance,
-            GUSTS_PER_S.map(f64::ln),
-        ];
-        let mut start = vec![noise.max(1e-12).ln(), level - 4.0, 0.0];
-        for v in &variances {
-            bounds.extend(self.ancestors.iter().map(|_| of_variance));
-            start.extend(self.ancestors.iter().map(|_| v.ln() - 2.0));
-        }
-        let cost = |x: &[f64]| self.cost(x);
-        let (x, value) = minimum(cost, &start, &bounds);
+        let scale = Scale::of(left);
+        let start = self.start(&scale, noise);
+        let mut bounds = self.bounds(&scale);
+        let (x, mut value) = minimum(|x| self.cost(x), &start, &bounds);
         let mut found = Fitted {
             problem: self,
             x,
             bounds: bounds.clone(),
         };
-        let mut value = value;
         let penalty = (self.times.s.len() as f64).ln() * self.per_new() as f64;
-        let mut powers: Vec<(Periodogram, Vec<Part>, f64)> = left
-            .iter()
-            .map(|s| {
-                (
-                    Periodogram::new(&self.times.s, s, frequencies_hz),
-                    Vec::new(),
-                    0.0,
-                )
-            })
-            .collect();
-        for _ in 0..MOST_NEW {
-            for (m, (_, parts, noise)) in powers.iter_mut().enumerate() {
+        let mut observed: Vec<Observed> = Vec::with_capacity(left.len());
+        for signal in left {
+            observed.push(Observed {
+                power: Periodogram::new(&self.times.s, signal, frequencies_hz),
+                expected: Vec::new(),
+                noise: 0.0,
+            });
+        }
+        for _ in 0..MAX_NEW {
+            for (m, observed) in observed.iter_mut().enumerate() {
                 let own = self.of_motion(m, &found.x);
-                (*parts, *noise) = (self.parts(&own), own[0].exp());
+                observed.expected = self.parts(&own);
+                observed.noise = own[0].exp();
             }
-            let Some(hz) = excess_hz(&powers) else { break };
+            let Some(hz) = excess_hz(&observed) else {
+                break;
+            };
             // What was there may have taken the new one's place: only the oscillators stay where
             // they were.
             let mut x = start.clone();
             x.extend(&found.x[self.first_new()..]);
             x.extend([hz.ln(), USUAL_DAMPING.ln()]);
-            x.extend(variances.iter().map(|v| v.ln() - 1.0));
+            x.extend(scale.ln_variances.iter().map(|v| v - 1.0));
             bounds.extend([frequencies_hz.map(f64::ln), DAMPING.map(f64::ln)]);
-            bounds.extend(variances.iter().map(|_| of_variance));
-            let (x, there) = minimum(cost, &x, &bounds);
+            bounds.extend(scale.ln_variances.iter().map(|_| scale.bounds()));
+            let (x, there) = minimum(|x| self.cost(x), &x, &bounds);
             if there + penalty >= value {
                 break;
             }
@@ -206,6 +192,51 @@ impl Problem {
         }
         found
     }
+
+    /// Where a fit without new oscillators begins.
+    fn start(&self, scale: &Scale, noise: f64) -> Vec<f64> {
+        let mut start = vec![noise.max(1e-12).ln(), scale.level() - 4.0, 0.0];
+        for v in &scale.ln_variances {
+            start.extend(self.ancestors.iter().map(|_| v - 2.0));
+        }
+        start
+    }
+
+    /// And within which bounds it stays.
+    fn bounds(&self, scale: &Scale) -> Vec<[f64; 2]> {
+        let level = scale.level();
+        let of_noise = [level - 16.0, level + 1.0];
+        let mut bounds = vec![of_noise, scale.bounds(), GUSTS_PER_S.map(f64::ln)];
+        let of_ancestors = self.ancestors.len() * scale.ln_variances.len();
+        bounds.extend((0..of_ancestors).map(|_| scale.bounds()));
+        bounds
+    }
+}
+
+/// How large the motions are.
+struct Scale {
+    /// Logarithms of their variances.
+    ln_variances: Vec<f64>,
+}
+
+impl Scale {
+    fn of(motions: &[Vec<f64>]) -> Self {
+        let mut ln_variances = Vec::with_capacity(motions.len());
+        for s in motions {
+            ln_variances.push((dot(s, s) / s.len() as f64).ln());
+        }
+        Self { ln_variances }
+    }
+
+    /// Of the first.
+    fn level(&self) -> f64 {
+        self.ln_variances[0]
+    }
+
+    /// Of the logarithm of the variance of any part of them.
+    fn bounds(&self) -> [f64; 2] {
+        [self.level() - 16.0, self.level() + 4.0]
+    }
 }
 
 impl Fitted<'_> {
@@ -216,21 +247,20 @@ impl Fitted<'_> {
             return Vec::new();
         }
         let covariance = (0.5 * curvature(|x| self.problem.cost(x), &self.x)).try_inverse();
-        let sd = |i: usize| {
-            covariance
-                .as_ref()
-                .map_or(f64::INFINITY, |c| c[(i, i)])
-                .max(0.0)
-                .sqrt()
-        };
-        let at_limit = |i: usize| self.bounds[i].iter().any(|b| (self.x[i] - b).abs() < 1e-6);
-        let of = |i: usize| Oscillator {
-            mode: Mode::of_parameters(&self.x[i..]),
-            sd: [sd(i), sd(i + 1)],
-            variance: self.x[i + 2..i + per].iter().map(|v| v.exp()).sum(),
-            at_limit: at_limit(i) || at_limit(i + 1),
-        };
-        (first..self.x.len()).step_by(per).map(of).collect()
+        let mut out = Vec::new();
+        for i in (first..self.x.len()).step_by(per) {
+            out.push(Oscillator {
+                mode: Mode::of_parameters(&self.x[i..]),
+                ln_sd: [i, i + 1].map(|i| deviation(covariance.as_ref(), i)),
+                variance: self.x[i + 2..i + per].iter().map(|v| v.exp()).sum(),
+                at_limit: self.is_at_limit(i) || self.is_at_limit(i + 1),
+            });
+        }
+        out
+    }
+
+    fn is_at_limit(&self, i: usize) -> bool {
+        self.bounds[i].iter().any(|b| (self.x[i] - b).abs() < 1e-6)
     }
 
     /// What lets through the oscillator of this number, in signals whose noise has at least the
@@ -248,4 +278,12 @@ impl Fitted<'_> {
             of,
         )
     }
+}
+
+/// Infinite where there is no covariance.
+fn deviation(covariance: Option<&DMatrix<f64>>, i: usize) -> f64 {
+    covariance
+        .map_or(f64::INFINITY, |c| c[(i, i)])
+        .max(0.0)
+        .sqrt()
 }

@@ -1,29 +1,16 @@
-//! Columns of numbers over the frames: the little linear algebra that fits of a few columns to many
-//! signals need.
+//! Orthonormal columns that span given ones: Gram-Schmidt, each column taken off twice.
+//!
+//! Not nalgebra's QR, as columns may depend on those before them (modes that are alike, a signal
+//! that is a multiple of another): such a column must get the factor 0 and leave the others as they
+//! are. A Householder QR puts an arbitrary direction in its place, which then takes part of every
+//! signal, and the pivoted one may drop an earlier column instead. Nor is nalgebra's faster: 36 us
+//! for 9 columns of 360 rows and one signal, where this takes 23.
+
+use super::vectors::{dot, subtract_scaled};
 
 /// Columns shorter than this share of what they were before the others were taken off count as
 /// none: the others span them.
-const SPANNED: f64 = 1e-5;
-
-/// Sum of the products. In lanes, or the order of the sum would keep the processor from doing
-/// several at once.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    const LANES: usize = 8;
-    let mut sums = [0.0; LANES];
-    let (whole_a, whole_b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
-    let rest: f64 = whole_a
-        .remainder()
-        .iter()
-        .zip(whole_b.remainder())
-        .map(|(x, y)| x * y)
-        .sum();
-    for (x, y) in whole_a.zip(whole_b) {
-        for ((sum, x), y) in sums.iter_mut().zip(x).zip(y) {
-            *sum += x * y;
-        }
-    }
-    sums.iter().sum::<f64>() + rest
-}
+const MIN_LENGTH_LEFT: f64 = 1e-5;
 
 /// Takes from `x` what the orthonormal `q` span of it, twice for accuracy, and adds the shares to
 /// `into`.
@@ -31,14 +18,15 @@ fn take_off(x: &mut [f64], q: &[Vec<f64>], into: &mut [f64]) {
     for _ in 0..2 {
         for (column, share) in q.iter().zip(into.iter_mut()) {
             let s = dot(x, column);
-            x.iter_mut().zip(column).for_each(|(x, c)| *x -= s * c);
+            subtract_scaled(x, s, column);
             *share += s;
         }
     }
 }
 
 /// Columns B = Q R with Q orthonormal.
-pub(super) struct Qr {
+pub struct Qr {
+    /// The orthonormal columns; all 0 where a column depends on those before it.
     pub q: Vec<Vec<f64>>,
     /// Column k of R in `r[k]`; its k-th number is 0 where column k of B depends on those before
     /// it.
@@ -46,6 +34,7 @@ pub(super) struct Qr {
 }
 
 impl Qr {
+    /// Of columns of one length.
     pub fn new(columns: Vec<Vec<f64>>) -> Self {
         let (mut q, mut r): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
         for mut column in columns {
@@ -53,7 +42,7 @@ impl Qr {
             let mut shares = vec![0.0; q.len()];
             take_off(&mut column, &q, &mut shares);
             let norm = dot(&column, &column).sqrt();
-            if norm > SPANNED * before && norm.is_finite() {
+            if norm > MIN_LENGTH_LEFT * before && norm.is_finite() {
                 column.iter_mut().for_each(|x| *x /= norm);
                 shares.push(norm);
             } else {
@@ -64,6 +53,16 @@ impl Qr {
             r.push(shares);
         }
         Self { q, r }
+    }
+
+    /// Products of the orthonormal columns with `y`.
+    pub fn products(&self, y: &[f64]) -> Vec<f64> {
+        self.q.iter().map(|q| dot(q, y)).collect()
+    }
+
+    /// Squares of `y` that the columns explain.
+    pub fn explained(&self, y: &[f64]) -> f64 {
+        self.q.iter().map(|q| dot(q, y).powi(2)).sum()
     }
 
     /// What the columns leave of `y`, and the factors of the columns.

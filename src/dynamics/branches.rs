@@ -1,0 +1,123 @@
+//! The way through a tree from the trunk up, which the analyses of a release and of wind share, and
+//! what either says of one branch.
+//!
+//! In the picture a branch moves with everything that carries it, so that the modes of its
+//! ancestors must be known when its turn comes.
+
+use super::decay::Mode;
+use super::film::Film;
+use crate::cancel::CancelToken;
+use crate::model::{Interval, NodeId, Skeleton, Swaying, Unidentified};
+
+/// Where modes are looked for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SearchLimits {
+    /// Frequencies that are looked for in a film of this length and rate, Hz.
+    pub frequencies_hz: [f64; 2],
+    /// Highest frequency that a tree may have, Hz.
+    pub highest_hz: f64,
+    /// Half a 95 % interval of the frequency at most, as a share of it.
+    pub max_relative_ci: f64,
+}
+
+impl SearchLimits {
+    /// Whether what is seen at `frequency_hz` may be a faster sway: films of few frames a second
+    /// show it as a slow one.
+    pub fn may_be_aliased(&self, frequency_hz: f64, film: &Film) -> bool {
+        1.0 / film.step_s() - frequency_hz <= self.highest_hz
+    }
+}
+
+/// A branch's own mode, with the standard deviations of the logarithms of its frequency and
+/// damping.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BranchMode {
+    pub mode: Mode,
+    pub ln_sd: [f64; 2],
+}
+
+impl BranchMode {
+    /// Whether half the 95 % interval of the frequency is at most this share of it.
+    pub fn is_within(&self, max_relative_ci: f64) -> bool {
+        Interval::Z * self.ln_sd[0] <= max_relative_ci
+    }
+
+    pub fn frequency_hz(&self) -> Interval {
+        interval(self.mode.frequency_hz, self.ln_sd[0])
+    }
+
+    /// `None` where the film says nothing of it: half the interval is longer than the value.
+    pub fn damping_ratio(&self) -> Option<Interval> {
+        let known = self.ln_sd[1] > 0.0 && Interval::Z * self.ln_sd[1] <= 1.0;
+        known.then(|| interval(self.mode.damping, self.ln_sd[1]))
+    }
+}
+
+/// 95 % interval of a value whose logarithm has this standard deviation.
+fn interval(value: f64, ln_sd: f64) -> Interval {
+    Interval {
+        value,
+        lo: value * (-Interval::Z * ln_sd).exp(),
+        hi: value * (Interval::Z * ln_sd).exp(),
+    }
+}
+
+/// What was found for a branch: a mode, for the branches on it, and its sway if that can be told.
+pub(super) struct Estimate {
+    pub mode: BranchMode,
+    pub sway: Swaying,
+}
+
+/// A branch whose turn it is.
+pub(super) struct BranchInFilm<'a> {
+    pub node: NodeId,
+    pub parent: NodeId,
+    /// Points on it and on all that it carries, as indices of the film's tracks.
+    pub tracks: &'a [usize],
+    /// Where it begins at rest, px.
+    pub base_px: [f64; 2],
+}
+
+impl BranchInFilm<'_> {
+    pub fn is_trunk(&self) -> bool {
+        self.node == NodeId(1)
+    }
+
+    pub fn is_on_foot(&self) -> bool {
+        self.parent == NodeId(0)
+    }
+}
+
+/// A way to tell the sway of one branch after the other; it keeps what it needs of those below.
+pub(super) trait BranchEstimator {
+    fn estimate(&mut self, branch: &BranchInFilm) -> Swaying;
+}
+
+/// The sway of every measured node, the nearest to the foot first; `members` are the points of each
+/// and of all above it.
+pub(super) fn from_the_trunk_up(
+    skeleton: &Skeleton,
+    members: &[Vec<usize>],
+    cancel: &CancelToken,
+    estimator: &mut impl BranchEstimator,
+) -> Vec<Swaying> {
+    let mut out = vec![Err(Unidentified::NotMeasured); members.len()];
+    for (i, tracks) in members.iter().enumerate().skip(1) {
+        if tracks.is_empty() {
+            continue;
+        }
+        if cancel.is_cancelled() {
+            out[i] = Err(Unidentified::NotInTime);
+            continue;
+        }
+        let node = NodeId(i as u32);
+        let parent = skeleton.ancestors(node).next().unwrap_or(NodeId(0));
+        out[i] = estimator.estimate(&BranchInFilm {
+            node,
+            parent,
+            tracks,
+            base_px: skeleton.image_from_model(&skeleton.nodes[parent.index()].position),
+        });
+    }
+    out
+}

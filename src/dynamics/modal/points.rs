@@ -1,0 +1,98 @@
+//! The points of a film for the analysis of all branches at once: thinned, and without gaps.
+
+use super::super::film::{Film, FilmTrack};
+use super::super::members::{count_seen, is_seen, mean_px};
+use super::super::release::Onset;
+use super::tree::Point;
+use crate::signal::interpolation::linear;
+
+/// Frames a second that are enough: neighbours are taken together as their mean.
+const ENOUGH_HZ: f64 = 15.0;
+/// Share of a frame by which a camera's rate may be off.
+const RATE_TOLERANCE: f64 = 0.01;
+/// And what comes later after a release says little, s.
+const ENOUGH_S: f64 = 20.0;
+/// A point must have been seen in this share of the frames.
+const MIN_SEEN_SHARE: f64 = 0.8;
+const MIN_NOISE_PX: f64 = 0.03;
+
+/// A film from its release on.
+pub(super) struct ThinnedFilm {
+    /// From the release on, s.
+    pub times_s: Vec<f64>,
+    /// Those that were seen nearly always.
+    pub points: Vec<Point>,
+    /// Which tracks of the film they are.
+    pub tracks: Vec<usize>,
+}
+
+impl ThinnedFilm {
+    /// Neighbouring frames are taken together, so that no fewer than enough are left, and short
+    /// gaps bridged by straight lines: to tell whose a mode is.
+    pub fn of(film: &Film, onset: &Onset) -> Self {
+        let together = ((film.frames_per_period(ENOUGH_HZ) + RATE_TOLERANCE) as usize).max(1);
+        let until = film
+            .times_s
+            .partition_point(|t| *t <= onset.at_s + ENOUGH_S);
+        let mut rows = film.neighbours(onset.from..until, together);
+        rows.retain(|row| row.len() == together);
+        let mut out = Self {
+            times_s: rows
+                .iter()
+                .map(|row| film.mean_s(row) - onset.at_s)
+                .collect(),
+            points: Vec::new(),
+            tracks: Vec::new(),
+        };
+        for (k, track) in film.tracks.iter().enumerate() {
+            let at_px: Vec<[f64; 2]> = rows.iter().map(|row| mean_of_all(track, row)).collect();
+            if let Some(values) = bridged(&out.times_s, &at_px) {
+                out.points
+                    .push(Point::new(values, mean_px(&at_px), MIN_NOISE_PX));
+                out.tracks.push(k);
+            }
+        }
+        out
+    }
+
+    pub fn span_s(&self) -> f64 {
+        let ends = self.times_s.last().zip(self.times_s.first());
+        ends.map_or(0.0, |(last, first)| last - first)
+    }
+
+    pub fn rate_hz(&self) -> f64 {
+        (self.times_s.len() - 1) as f64 / self.span_s()
+    }
+}
+
+/// Mean place in some frames, px; not seen where one of them does not show it.
+fn mean_of_all(track: &FilmTrack, frames: &[usize]) -> [f64; 2] {
+    let at_px: Vec<[f64; 2]> = frames.iter().map(|&k| track.at_px[k]).collect();
+    if at_px.iter().all(is_seen) {
+        mean_px(&at_px)
+    } else {
+        [f64::NAN; 2]
+    }
+}
+
+/// Displacement from the mean, px; nothing for a point that was seen too little.
+fn bridged(times_s: &[f64], at_px: &[[f64; 2]]) -> Option<[Vec<f64>; 2]> {
+    let seen = count_seen(at_px);
+    if seen == 0 || (seen as f64) < MIN_SEEN_SHARE * at_px.len() as f64 {
+        return None;
+    }
+    let mean = mean_px(at_px);
+    let mut seen_s = Vec::with_capacity(seen);
+    let mut displacements = [Vec::with_capacity(seen), Vec::with_capacity(seen)];
+    for (time_s, at) in times_s.iter().zip(at_px) {
+        if is_seen(at) {
+            seen_s.push(*time_s);
+            displacements[0].push(at[0] - mean[0]);
+            displacements[1].push(at[1] - mean[1]);
+        }
+    }
+    Some(displacements.map(|values| {
+        let times = times_s.iter();
+        times.map(|t| linear(&seen_s, &values, *t)).collect()
+    }))
+}

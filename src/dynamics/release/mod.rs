@@ -1,0 +1,261 @@
+//! Was the tree released, when, and how often: the signal tells release from wind.
+//!
+//! Four questions are asked of a film, each in a file of its own. How often was the tree pulled and
+//! released (`repeated.rs`)? Where does the greatest motion begin and end (`motion.rs`)? Is what is
+//! between the sum of a few decays, and does it die down (here)? And, where the answer is wind, may
+//! it be the later part of a decay all the same (`fading.rs`, a hint only)?
+
+mod energy;
+mod fading;
+mod motion;
+mod repeated;
+
+use super::decay::Start;
+use super::film::Film;
+use super::members::{Points, evenly_chosen};
+use super::signals::{Fit, Signals};
+use crate::model::Excitation;
+pub use fading::fades_as_a_free_decay;
+use motion::{Motion, greatest_motion};
+use repeated::{REST_S, parts};
+
+/// Points that are looked at.
+const MAX_POINTS: usize = 24;
+/// Modes by which a decay of the whole tree is described here.
+const MODES: usize = 3;
+/// What a motion must do to be a free decay, where it is not seen from rest on and where it is.
+/// Wind that happens to fade is not rare in a short film.
+const FROM_MOTION: DecayCriteria = DecayCriteria {
+    max_left: 0.15,
+    max_energy_ratio: 0.35,
+};
+const FROM_REST: DecayCriteria = DecayCriteria {
+    max_left: 0.25,
+    max_energy_ratio: 0.5,
+};
+/// Rest is believed as the start if its fit leaves at most so many times the squares that a free
+/// one does.
+const MAX_RSS_FROM_REST: f64 = 1.3;
+/// Noise is at most this share of the motion; and at least this share of the noise counts as left
+/// by a free fit.
+const MAX_NOISE_SHARE: f64 = 0.5;
+const MIN_LEFT_OF_NOISE: f64 = 0.1;
+/// Standard deviation of the moment of a release, in frames, before all modes have their say in it.
+pub(super) const RELEASE_SD_FRAMES: f64 = 0.7;
+/// A film's last part tells whether it is a decay or wind if it is so long, s: before, a slow tree
+/// has hardly died down.
+const TELLS_S: f64 = 10.0;
+/// Frames that a decay must have.
+const MIN_FRAMES: usize = 32;
+
+/// What a free decay is known by.
+struct DecayCriteria {
+    /// Share of the motion that its modes leave at most.
+    max_left: f64,
+    /// Energy of the last third against that of the first, at most.
+    max_energy_ratio: f64,
+}
+
+/// What made a film's tree sway.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Onset {
+    pub excitation: Excitation,
+    /// Whether a release is seen from rest on.
+    pub start: Start,
+    /// Time of the release, or of the first frame, s.
+    pub at_s: f64,
+    /// First frame of the film that is used, and the one after the last.
+    pub from: usize,
+    pub to: usize,
+}
+
+/// Looks at the points of the whole tree; `given` is what the user says. Frequencies of the tree
+/// lie within
+/// `frequencies_hz`. Where the tree was released several times, each from rest, it is the time with
+/// the greatest motion, until the next pull; and when each was, s.
+pub(super) fn onset(
+    film: &Film,
+    tracks: &[usize],
+    given: Option<Excitation>,
+    frequencies_hz: [f64; 2],
+) -> (Onset, Vec<f64>) {
+    if given != Some(Excitation::Wind)
+        && let Some(found) = of_parts(film, tracks, given, frequencies_hz)
+    {
+        return found;
+    }
+    (of_one(film, tracks, given, frequencies_hz), Vec::new())
+}
+
+/// The same of the parts that hold a release each; `None` where there are none, or one of them is
+/// wind.
+fn of_parts(
+    film: &Film,
+    tracks: &[usize],
+    given: Option<Excitation>,
+    frequencies_hz: [f64; 2],
+) -> Option<(Onset, Vec<f64>)> {
+    let mut greatest: Option<(f64, Onset)> = None;
+    let mut times_s = Vec::new();
+    for frames in parts(film) {
+        let part = film.part(frames.clone());
+        // As with the whole film, less than a wave shows no frequency.
+        let lowest_hz = frequencies_hz[0] * film.span_s() / part.span_s();
+        let frequencies_hz = [lowest_hz.min(frequencies_hz[1]), frequencies_hz[1]];
+        let onset = of_one(&part, tracks, None, frequencies_hz);
+        if onset.excitation == Excitation::Wind {
+            // Wind, too, may rest and come again. Where the film ends soon after, it does not tell.
+            let tells = frames.end < film.times_s.len() || part.span_s() >= TELLS_S;
+            if given.is_none() && tells {
+                return None;
+            }
+            times_s.push(part.times_s[0] + REST_S);
+            continue;
+        }
+        times_s.push(onset.at_s);
+        let motion = of_some(&part.until(onset.to), tracks, onset.from).squares();
+        if greatest.as_ref().is_none_or(|(most, _)| motion >= *most) {
+            let [from, to] = [onset.from, onset.to].map(|k| frames.start + k);
+            greatest = Some((motion, Onset { from, to, ..onset }));
+        }
+    }
+    let (_, greatest) = greatest?;
+    if times_s.len() < 2 {
+        times_s.clear();
+    }
+    Some((greatest, times_s))
+}
+
+/// Of a film with one release at most.
+fn of_one(
+    film: &Film,
+    tracks: &[usize],
+    given: Option<Excitation>,
+    frequencies_hz: [f64; 2],
+) -> Onset {
+    let wind = Onset {
+        excitation: Excitation::Wind,
+        start: Start::Moving,
+        at_s: film.times_s.first().copied().unwrap_or(0.0),
+        from: 0,
+        to: film.times_s.len(),
+    };
+    let whole = of_some(film, tracks, 0);
+    if given == Some(Excitation::Wind) || whole.tracks.is_empty() {
+        return wind;
+    }
+    let motion = greatest_motion(film, &whole);
+    // What comes after it has died down must not come back either.
+    let later = since(film, &motion);
+    let energy_ratio = energy_ratio(&of_some(film, tracks, motion.from), &later);
+    let film = &film.until(motion.to);
+    let decay = Decay {
+        points: of_some(film, tracks, motion.from),
+        times_s: since(film, &motion),
+        release_sd_s: RELEASE_SD_FRAMES * film.step_s(),
+        frequencies_hz,
+    };
+    if decay.times_s.len() < MIN_FRAMES || decay.points.tracks.is_empty() {
+        return wind;
+    }
+    let Some(left) = decay.left_by(Start::Moving, MODES) else {
+        return wind;
+    };
+    let criteria = if motion.rested {
+        FROM_REST
+    } else {
+        FROM_MOTION
+    };
+    let all = decay.points.squares();
+    let noise = decay.points.noise().min(MAX_NOISE_SHARE * all);
+    let dies_down = energy_ratio < criteria.max_energy_ratio;
+    let is_described = left - noise < criteria.max_left * (all - noise);
+    if given.is_none() && !(dies_down && is_described) {
+        return wind;
+    }
+    Onset {
+        excitation: Excitation::Release,
+        start: if motion.rested && decay.fits_rest(left, noise) {
+            Start::Rest
+        } else {
+            Start::Moving
+        },
+        at_s: motion.at_s,
+        from: motion.from,
+        to: motion.to,
+    }
+}
+
+/// Times from the begin of a motion on, s.
+fn since(film: &Film, motion: &Motion) -> Vec<f64> {
+    let times_s = film.times_s[motion.from..].iter();
+    times_s.map(|t| t - motion.at_s).collect()
+}
+
+/// What may be a free decay.
+struct Decay {
+    points: Points,
+    /// From its begin on.
+    times_s: Vec<f64>,
+    release_sd_s: f64,
+    frequencies_hz: [f64; 2],
+}
+
+impl Decay {
+    /// What `n` modes that describe most of the motion leave of it, px².
+    fn left_by(&self, start: Start, n: usize) -> Option<f64> {
+        let signals = Signals::new(
+            self.times_s.clone(),
+            &self.points.signals,
+            start,
+            self.release_sd_s,
+            self.frequencies_hz,
+        );
+        let mut fit = Fit::default();
+        for _ in 0..n {
+            let new = signals.search(&fit)?;
+            fit.modes.push(new);
+            fit = signals.fit(&fit, &[]);
+        }
+        Some(fit.rss)
+    }
+
+    /// Whether modes that all start from rest describe it as well as free ones, which leave
+    /// `left`.
+    fn fits_rest(&self, left: f64, noise: f64) -> bool {
+        // As many columns as the free fit has.
+        let Some(from_rest) = self.left_by(Start::Rest, 2 * MODES) else {
+            return false;
+        };
+        let least = (left - noise).max(MIN_LEFT_OF_NOISE * noise);
+        from_rest - noise < MAX_RSS_FROM_REST * least
+    }
+}
+
+/// Some of the points.
+fn of_some(film: &Film, tracks: &[usize], from: usize) -> Points {
+    Points::of(film, &evenly_chosen(tracks, MAX_POINTS), from)
+}
+
+/// Energy of the last third of some signals against that of the first.
+fn energy_ratio(points: &Points, times_s: &[f64]) -> f64 {
+    let (Some(first), Some(last)) = (times_s.first(), times_s.last()) else {
+        return 1.0;
+    };
+    let third_s = (last - first) / 3.0;
+    let end_of_first = times_s.partition_point(|t| *t <= first + third_s);
+    let begin_of_last = times_s.partition_point(|t| *t < last - third_s);
+    let [mut early, mut late] = [0.0; 2];
+    for signal in &points.signals {
+        early += variance_of_seen(&signal[..end_of_first]);
+        late += variance_of_seen(&signal[begin_of_last..]);
+    }
+    late / early
+}
+
+fn variance_of_seen(values: &[f64]) -> f64 {
+    let seen: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
+    let n = (seen.len() as f64).max(1.0);
+    let mean = seen.iter().sum::<f64>() / n;
+    seen.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n
+}

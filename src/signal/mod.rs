@@ -1,0 +1,16 @@
+//! Mathematics that several stages need, one way of each: statistics, principal components, linear
+//! and nonlinear least squares, minimisation. It imports nothing else of the crate.
+
+pub mod bfgs;
+pub mod extension;
+pub mod gram;
+pub mod interpolation;
+pub mod least_squares;
+pub mod principal;
+pub mod qr;
+pub mod statistics;
+pub mod variable_projection;
+pub mod vectors;
+
+pub use principal::along_principal_direction;
+pub use statistics::median;

@@ -1,0 +1,83 @@
+//! Order statistics, and the noise in a signal.
+
+use std::cmp::Ordering;
+
+/// The middle of `values` by `order`, which must be total: of an even number the upper of the two;
+/// `None` of none.
+pub fn median<T: Copy>(mut values: Vec<T>, order: impl Fn(&T, &T) -> Ordering) -> Option<T> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, order).1)
+}
+
+/// The value that `n` of `values` come before in growing order; `None` where there are not so many.
+pub fn nth_smallest(mut values: Vec<f64>, n: usize) -> Option<f64> {
+    (n < values.len()).then(|| *values.select_nth_unstable_by(n, f64::total_cmp).1)
+}
+
+/// The value that the share `share` (0 to 1) of `values` does not exceed, without interpolation;
+/// `None` of none.
+pub fn quantile(values: Vec<f64>, share: f64) -> Option<f64> {
+    let last = values.len().saturating_sub(1);
+    nth_smallest(values, (share * last as f64) as usize)
+}
+
+/// Root of the mean square; 0 of none.
+pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0_u32);
+    for x in values {
+        sum += x * x;
+        count += 1;
+    }
+    (sum / f64::from(count.max(1))).sqrt()
+}
+
+/// Variance of white noise in some signals, from their third differences, in which a smooth motion
+/// leaves little. Values that are no numbers are left out; 0 where there are too few.
+pub fn noise_variance<'a>(signals: impl IntoIterator<Item = &'a [f64]>) -> f64 {
+    let (mut squares, mut count) = (0.0, 0_u32);
+    for signal in signals {
+        for w in signal.windows(4) {
+            let third = w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0];
+            if third.is_finite() {
+                squares += third * third;
+                count += 1;
+            }
+        }
+    }
+    // The squares of 1, 3, 3, 1 make 20.
+    squares / (20.0 * f64::from(count.max(1)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn order_statistics_of_a_few_values() {
+        let values = vec![4.0, 1.0, 3.0, 2.0];
+        assert_eq!(median(values.clone(), f64::total_cmp), Some(3.0));
+        assert_eq!(nth_smallest(values.clone(), 1), Some(2.0));
+        assert_eq!(nth_smallest(values.clone(), 4), None);
+        assert_eq!(quantile(values.clone(), 0.0), Some(1.0));
+        assert_eq!(quantile(values.clone(), 0.5), Some(2.0));
+        assert_eq!(quantile(values, 1.0), Some(4.0));
+        assert_eq!(quantile(Vec::new(), 0.5), None);
+    }
+
+    fn alternating(k: usize) -> f64 {
+        if k % 2 == 0 { 0.1 } else { -0.1 }
+    }
+
+    #[test]
+    fn noise_is_told_from_a_slow_motion_and_over_a_gap() {
+        let mut signal: Vec<f64> = (0..200)
+            .map(|k| 30.0 * (0.02 * k as f64).sin() + alternating(k))
+            .collect();
+        signal[50] = f64::NAN;
+        // Alternating noise has third differences of 8 times itself, white noise of √20.
+        let wanted = 64.0 * 0.01 / 20.0;
+        let found = noise_variance([signal.as_slice()]);
+        assert!((found / wanted - 1.0).abs() < 0.01, "{found}, not {wanted}");
+        assert_eq!(noise_variance([[1.0, 2.0].as_slice()]), 0.0);
+    }
+}
