@@ -65,7 +65,7 @@ mod tests {
     }
 
     fn alternating(k: usize) -> f64 {
-        if k % 2 == 0 { 0.1 } else { -0.1 }
+        if k.is_multiple_of(2) { 0.1 } else { -0.1 }
     }
 
     #[test]
