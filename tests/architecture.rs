@@ -174,6 +174,8 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("mcap::", &["recording"]),
     ("crc32fast::", &["recording"]),
     ("hound::", &["animate"]),
+    // All draw from the one generator.
+    ("rand_chacha::", &["random"]),
     ("clap::", &["cli"]),
     ("anyhow::", &["cli"]),
     ("sd_notify::", &["cli"]),
