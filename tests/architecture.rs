@@ -31,7 +31,22 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("signal", &[]),
     ("random", &[]),
     ("animate", &["model", "config", "signal", "random"]),
-    // Branches that only their own sway tells.
+    // Branches that only their own frequency tells.
+    (
+        "solve",
+        &[
+            "model",
+            "config",
+            "hierarchy",
+            "skeleton",
+            "shape",
+            "motion",
+            "signal",
+            "dynamics::shoots",
+            "dynamics::Film",
+            "dynamics::FilmTrack",
+        ],
+    ),
     (
         "pipeline",
         &[
@@ -44,9 +59,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "shape",
             "motion",
             "signal",
-            "dynamics::shoots",
-            "dynamics::Film",
-            "dynamics::FilmTrack",
+            "solve",
         ],
     ),
     ("recording", &["model"]),
@@ -123,6 +136,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "dynamics",
             "signal",
             "pipeline",
+            "solve",
             "recording",
             "files",
             "document",
@@ -158,6 +172,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "animate",
             "draw",
             "report",
+            "solve::Model",
+            "solve::LEAST_MOVING",
             // What `analyze` asks of a capture's film.
             "dynamics::analyse",
             "dynamics::Depth",
@@ -186,6 +202,8 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("mcap::", &["recording"]),
     ("crc32fast::", &["recording"]),
     ("hound::", &["animate"]),
+    // All draw from the one generator.
+    ("rand_chacha::", &["random"]),
     ("clap::", &["cli"]),
     ("anyhow::", &["cli"]),
     ("sd_notify::", &["cli"]),
@@ -203,7 +221,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     // The line to the service manager keeps its beat; the doctor measures.
     (
         "Instant::now",
-        &["runtime", "tui", "source", "cli", "doctor"],
+        &["runtime", "tui", "source", "cli", "doctor", "cancel"],
     ),
     // When a recording began, for those who look for it in a calendar.
     ("SystemTime", &["runtime"]),

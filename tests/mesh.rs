@@ -4,7 +4,7 @@ mod synthetic;
 
 use arborcam::config::Wood;
 use arborcam::model::{NodeId, Skeleton};
-use arborcam::shape::{LEVELS, Limb, Mesh, Riding, Station, wood, wood_levels};
+use arborcam::shape::{CenterlineSample, LEVELS, Limb, Mesh, SkinWeights, wood, wood_levels};
 use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
 use std::collections::HashMap;
@@ -86,7 +86,7 @@ fn the_skin_is_whole_from_every_side() {
     let all = synthetic::limbs_of(&skeleton, &synthetic::bare());
     let is_buried = |at: Vector3<f64>| {
         all.iter()
-            .flat_map(|l| l.stations.windows(2))
+            .flat_map(|l| l.samples.windows(2))
             .any(|s| is_within(at, s))
     };
     let (mut seen_inward, mut inward, mut area, mut flat) = (0.0, 0, 0.0, 0);
@@ -124,11 +124,11 @@ fn the_skin_is_whole_from_every_side() {
     );
 }
 
-/// Whether a point lies inside the wood between two stations, clearly below the surface.
-fn is_within(at: Vector3<f64>, stations: &[Station]) -> bool {
-    let (from, way) = (stations[0].at.coords, stations[1].at - stations[0].at);
+/// Whether a point lies inside the wood between two samples, clearly below the surface.
+fn is_within(at: Vector3<f64>, samples: &[CenterlineSample]) -> bool {
+    let (from, way) = (samples[0].at.coords, samples[1].at - samples[0].at);
     let t = (at - from).dot(&way) / way.norm_squared();
-    let radius = stations[0].radius + (stations[1].radius - stations[0].radius) * t;
+    let radius = samples[0].radius + (samples[1].radius - samples[0].radius) * t;
     (0.0..=1.0).contains(&t) && (at - from - way * t).norm() < 0.98 * radius
 }
 
@@ -299,17 +299,17 @@ fn degenerate_skeletons_give_no_nan_and_no_panic() {
 
 #[test]
 fn limbs_from_anywhere_are_drawn_or_left_out() {
-    let riding = Riding::between(NodeId(0), NodeId(1), 0.5);
-    let at = |x: f64, radius: f64| Station {
+    let skin = SkinWeights::between(NodeId(0), NodeId(1), 0.5);
+    let at = |x: f64, radius: f64| CenterlineSample {
         at: Point3::new(x, 2.0 * x, 0.0),
         radius,
-        riding,
+        skin,
     };
-    let limb = |parent, stations| Limb {
+    let limb = |parent, samples| Limb {
         node: NodeId(1),
         parent,
         twig: false,
-        stations,
+        samples,
     };
     let limbs = [
         limb(None, vec![]),
@@ -352,7 +352,7 @@ proptest! {
         let settings = Wood { curl, twig_px, max_twigs: 300, ..Wood::default() };
         let limbs = synthetic::limbs_of(&skeleton, &settings);
         for limb in &limbs {
-            prop_assert!(limb.stations.iter().all(|s| s.at.iter().all(|x| x.is_finite()) && s.radius >= 0.0));
+            prop_assert!(limb.samples.iter().all(|s| s.at.iter().all(|x| x.is_finite()) && s.radius >= 0.0));
         }
         check(&wood(&limbs, budget), &skeleton);
     }

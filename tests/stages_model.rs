@@ -251,7 +251,7 @@ fn pushing_brings_the_tree_nearer_to_its_envelope() {
     for terms in [
         Terms::Both {
             weight: 1.0,
-            no_gain: 0.02,
+            gain_floor: 0.02,
             spread_first: false,
         },
         Terms::Global,
@@ -355,7 +355,7 @@ fn leaning() -> Skeleton {
     let mut prototype = shape::Prototype::of(&flat(), &[2; 8], &outline(), &settings);
     let papers = Terms::Both {
         weight: 1.0,
-        no_gain: 0.0,
+        gain_floor: 0.0,
         spread_first: false,
     };
     shape::push(

@@ -478,7 +478,7 @@ fn twigs_keep_to_the_shape_that_the_tree_was_made_to_fill() {
         limbs
             .iter()
             .filter(|l| l.twig)
-            .map(|l| l.stations[l.stations.len() - 1].at)
+            .map(|l| l.samples[l.samples.len() - 1].at)
             .collect::<Vec<_>>()
     };
     for name in ["heart", "vase"] {

@@ -12,10 +12,7 @@ fn anywhere(_: &Point3<f64>, _: &Point3<f64>) -> bool {
 }
 
 fn base_and_end(limb: &Limb) -> (Point3<f64>, Point3<f64>) {
-    (
-        limb.stations[0].at,
-        limb.stations[limb.stations.len() - 1].at,
-    )
+    (limb.samples[0].at, limb.samples[limb.samples.len() - 1].at)
 }
 
 #[test]
@@ -40,7 +37,7 @@ fn nodes_stay_where_they_were_filmed_and_curl_keeps_its_bound() {
                 )
             );
             let chord = end - base;
-            for s in &limb.stations {
+            for s in &limb.samples {
                 let way = s.at - base;
                 bent = bent.max(
                     (way - chord * (way.dot(&chord) / chord.norm_squared())).norm() / chord.norm(),
@@ -61,21 +58,21 @@ fn a_limb_begins_on_what_carries_it_and_is_no_thicker() {
         let Some(parent) = limb.parent.map(|p| &all[p]) else {
             continue;
         };
-        let base = &limb.stations[0];
-        let off = |pair: &[arborcam::shape::Station]| {
+        let base = &limb.samples[0];
+        let off = |pair: &[arborcam::shape::CenterlineSample]| {
             let way = pair[1].at - pair[0].at;
             let t = ((base.at - pair[0].at).dot(&way) / way.norm_squared()).clamp(0.0, 1.0);
             (pair[0].at + way * t - base.at).norm()
         };
         let off = parent
-            .stations
+            .samples
             .windows(2)
             .map(off)
             .fold(f64::INFINITY, f64::min);
         assert!(off < 1e-6, "a limb begins {off} px beside its parent");
-        let thickest = parent.stations.iter().map(|s| s.radius).fold(0.0, f64::max);
-        assert!(limb.stations.iter().all(|s| s.radius <= thickest + 1e-9));
-        for pair in limb.stations.windows(2) {
+        let thickest = parent.samples.iter().map(|s| s.radius).fold(0.0, f64::max);
+        assert!(limb.samples.iter().all(|s| s.radius <= thickest + 1e-9));
+        for pair in limb.samples.windows(2) {
             assert!(
                 pair[1].radius <= pair[0].radius + 1e-9,
                 "a limb grows thicker on its way"
@@ -87,7 +84,7 @@ fn a_limb_begins_on_what_carries_it_and_is_no_thicker() {
                 "a twig is carried by the branch that it stands on"
             );
             assert!(
-                limb.stations.iter().all(|s| s.riding == base.riding),
+                limb.samples.iter().all(|s| s.skin == base.skin),
                 "a twig that bends on its own"
             );
         }
@@ -110,7 +107,7 @@ fn pipes_add_up() {
     );
     // At its end, as its base may still be as thick as the fork: only of limbs that go on, as
     // others run out.
-    let own_px = |k: usize| all[k].stations[all[k].stations.len() - 1].radius;
+    let own_px = |k: usize| all[k].samples[all[k].samples.len() - 1].radius;
     let inner: Vec<(usize, Vec<usize>)> = (0..all.len())
         .map(|p| {
             (
@@ -152,12 +149,12 @@ fn twigs_make_the_last_branches_thin_and_leave_the_trunk_as_it_is() {
     let all = synthetic::limbs_of(&skeleton, &Wood::default());
     let tip = TIP_RADIUS_PX * 2.0; // the picture is 1280 px wide
     for limb in all.iter().filter(|l| l.twig) {
-        let base = limb.stations[0].radius;
+        let base = limb.samples[0].radius;
         assert!(base >= tip - 1e-9, "a twig begins {base} px thick");
     }
     let tips = (0..all.len()).filter(|&k| all.iter().all(|l| l.parent != Some(k)));
     for k in tips {
-        let end = all[k].stations[all[k].stations.len() - 1].radius;
+        let end = all[k].samples[all[k].samples.len() - 1].radius;
         assert!(
             (0.3 * tip..0.5 * tip).contains(&end),
             "a tip ends {end} px thick"
@@ -198,13 +195,13 @@ fn with_more_planes_the_trunk_stays_and_its_limbs_share_it() {
 fn a_limb_is_thick_up_to_its_fork_and_what_goes_on_there_begins_as_thick() {
     let all = synthetic::limbs_of(&synthetic::tree(5, 3), &synthetic::bare());
     for (p, limb) in all.iter().enumerate() {
-        let end = limb.stations[limb.stations.len() - 1].radius;
+        let end = limb.samples[limb.samples.len() - 1].radius;
         let bases: Vec<f64> = all
             .iter()
             .filter(|l| l.parent == Some(p))
-            .map(|l| l.stations[0].radius)
+            .map(|l| l.samples[0].radius)
             .collect();
-        let middle = limb.stations[limb.stations.len() / 2].radius;
+        let middle = limb.samples[limb.samples.len() / 2].radius;
         assert!(
             bases.is_empty() || end > 0.99 * middle,
             "{middle} px thick, {end} px at the fork"
@@ -236,14 +233,14 @@ fn sharp_turns_make_no_loops() {
         let off = |at: Point3<f64>| {
             ((at - base) - chord * ((at - base).dot(&chord) / straight.powi(2))).norm()
         };
-        let bent = limb.stations.iter().map(|s| off(s.at)).fold(0.0, f64::max) / straight;
+        let bent = limb.samples.iter().map(|s| off(s.at)).fold(0.0, f64::max) / straight;
         assert!(
             bent < 0.12 && limb.length() < 1.1 * straight,
             "off by {bent}, {} for {straight}",
             limb.length()
         );
-        let ahead = |s: &[arborcam::shape::Station]| (s[1].at - s[0].at).dot(&chord) > 0.0;
-        assert!(limb.stations.windows(2).all(ahead), "turns back");
+        let ahead = |s: &[arborcam::shape::CenterlineSample]| (s[1].at - s[0].at).dot(&chord) > 0.0;
+        assert!(limb.samples.windows(2).all(ahead), "turns back");
     }
 }
 
@@ -418,15 +415,15 @@ fn a_bent_branch_is_the_elastic_line_of_a_beam_and_meets_the_next_without_a_crea
             let k = usize::from(joint);
             base[k] + turn(joint) * (at - Point3::new(0.0, rest[k], 0.0))
         };
-        let point = |s: &arborcam::shape::Station| {
-            let parts = s.riding.joints.iter().zip(s.riding.weights);
+        let point = |s: &arborcam::shape::CenterlineSample| {
+            let parts = s.skin.joints.iter().zip(s.skin.weights);
             Point3::from(
                 parts
                     .map(|(&j, w)| place(j, &s.at).coords * f64::from(w))
                     .sum::<nalgebra::Vector3<f64>>(),
             )
         };
-        limb.stations.iter().map(point).collect()
+        limb.samples.iter().map(point).collect()
     };
     let lean = |p: &[Point3<f64>]| ((p[1].x - p[0].x) / (p[1].y - p[0].y)).atan();
     let (lower, upper) = (posed(&limbs[0]), posed(&limbs[1]));

@@ -1,4 +1,4 @@
-//! Branching angles and how likely they are (Li et al. eq. 4).
+//! Branching angles and how likely they are (Li 2011 eq. 4).
 
 use crate::config;
 use crate::model::Skeleton;
@@ -40,18 +40,20 @@ impl Angles {
     /// Geometric mean of eq. 4 over all branches of `skeleton` above the trunk, 0 to 1: how likely
     /// its angles are.
     pub fn likelihood(&self, skeleton: &Skeleton) -> f64 {
-        let above_trunk = |i: &usize| skeleton.nodes[*i].level >= 2;
-        let ln = |i: usize| {
-            Some(self.ln_likelihood(skeleton.nodes[i].level, branching_angle(skeleton, i)?))
-        };
-        let all: Vec<f64> = (0..skeleton.nodes.len())
-            .filter(above_trunk)
-            .filter_map(ln)
-            .collect();
-        if all.is_empty() {
+        let (mut sum, mut count) = (0.0, 0);
+        for (i, node) in skeleton.nodes.iter().enumerate() {
+            if node.level < 2 {
+                continue;
+            }
+            if let Some(angle) = branching_angle(skeleton, i) {
+                sum += self.ln_likelihood(node.level, angle);
+                count += 1;
+            }
+        }
+        if count == 0 {
             1.0
         } else {
-            (all.iter().sum::<f64>() / all.len() as f64).exp()
+            (sum / f64::from(count)).exp()
         }
     }
 }
@@ -67,30 +69,37 @@ pub(super) fn angle_between(a: &Point3<f64>, b: &Point3<f64>, c: &Point3<f64>) -
 /// fork that was found some pixels off turns a short branch right round, and a few such angles of
 /// 150 degrees and more would make zigzags the likeliest of branches.
 pub fn expected_branching_angle(skeleton: &Skeleton) -> f64 {
-    let length = |i: usize| {
-        let node = &skeleton.nodes[i];
-        node.parent.map_or(0.0, |p| {
-            (node.position - skeleton.nodes[p.index()].position).norm()
-        })
-    };
-    let shorter = |i: usize| {
-        skeleton.nodes[i]
-            .parent
-            .map_or(0.0, |p| length(i).min(length(p.index())))
-    };
-    let measured = (0..skeleton.nodes.len()).filter(|&i| skeleton.nodes[i].copy_of.is_none());
-    let mut angles: Vec<(f64, f64)> = measured
-        .filter_map(|i| Some((branching_angle(skeleton, i)?, shorter(i))))
-        .filter(|a| a.1 > 0.0)
-        .collect();
+    let mut angles: Vec<(f64, f64)> = Vec::new();
+    for (i, node) in skeleton.nodes.iter().enumerate() {
+        if node.copy_of.is_some() {
+            continue;
+        }
+        let (Some(angle), Some(parent)) = (branching_angle(skeleton, i), node.parent) else {
+            continue;
+        };
+        let shorter = length(skeleton, i).min(length(skeleton, parent.index()));
+        if shorter > 0.0 {
+            angles.push((angle, shorter));
+        }
+    }
     angles.sort_by(|a, b| a.0.total_cmp(&b.0));
     let half: f64 = angles.iter().map(|a| a.1).sum::<f64>() / 2.0;
     let mut below = 0.0;
-    let middle = angles.iter().find(|(_, weight)| {
+    for (angle, weight) in angles {
         below += weight;
-        below >= half
-    });
-    middle.map_or(PI / 4.0, |a| a.0)
+        if below >= half {
+            return angle;
+        }
+    }
+    PI / 4.0
+}
+
+/// Of branch `i`, px; 0 for the foot.
+fn length(skeleton: &Skeleton, i: usize) -> f64 {
+    let node = &skeleton.nodes[i];
+    node.parent.map_or(0.0, |p| {
+        (node.position - skeleton.nodes[p.index()].position).norm()
+    })
 }
 
 /// By how much branches turn by more than a right angle, in the mean over all of them, radians. Eq.

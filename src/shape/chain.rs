@@ -1,6 +1,6 @@
 //! Chains: limbs that go on in one another, drawn as one tube without a seam.
 
-use super::limb::{Limb, Station};
+use super::limb::{CenterlineSample, Limb};
 use crate::model::FARTHEST_PX;
 use nalgebra::Vector3;
 
@@ -14,7 +14,7 @@ const FAN_STEP: f64 = 0.4;
 /// One limb's share of a chain.
 #[derive(Clone, Debug)]
 pub(super) struct Link<'a> {
-    pub stations: &'a [Station],
+    pub samples: &'a [CenterlineSample],
     /// Rings that it needs at density 1.
     need: f64,
     is_twig: bool,
@@ -51,27 +51,15 @@ impl Link<'_> {
         }
     }
 
-    /// The station at share `t` of the link, 0 to 1, and the direction there: a cubic through the
-    /// stations, whose slopes are those of their neighbours.
-    pub fn at(&self, t: f64) -> (Station, Vector3<f64>) {
-        let s = self.stations;
+    /// The sample at share `t` of the link, 0 to 1, and the direction there: a cubic through the
+    /// samples, whose slopes are those of their neighbours.
+    pub fn at(&self, t: f64) -> (CenterlineSample, Vector3<f64>) {
+        let s = self.samples;
         let place = t.clamp(0.0, 1.0) * (s.len() - 1) as f64;
         let k = (place as usize).min(s.len() - 2);
         let (a, b, x) = (&s[k], &s[k + 1], place - k as f64);
         let chord = b.at - a.at;
-        // At the ends the slope that makes the curvature go on evenly, so that straight stays
-        // straight.
-        let slope = |i: usize| match (i.checked_sub(1).map(|j| s[j].at), s.get(i + 1)) {
-            (Some(before), Some(after)) => (after.at - before) * 0.5,
-            (None, Some(after)) if s.len() > 2 => {
-                (after.at - s[i].at) * 2.0 - (s[2].at - s[0].at) * 0.5
-            }
-            (Some(before), None) if s.len() > 2 => {
-                (s[i].at - before) * 2.0 - (s[i].at - s[i - 2].at) * 0.5
-            }
-            _ => chord,
-        };
-        let (m0, m1) = (slope(k), slope(k + 1));
+        let (m0, m1) = (slope(s, k), slope(s, k + 1));
         let (x2, x3) = (x * x, x * x * x);
         let at = a.at + m0 * (x3 - 2.0 * x2 + x) + chord * (3.0 * x2 - 2.0 * x3) + m1 * (x3 - x2);
         let way =
@@ -82,13 +70,29 @@ impl Link<'_> {
             .unwrap_or_else(Vector3::y);
         let radius = a.radius + (b.radius - a.radius) * x;
         (
-            Station {
+            CenterlineSample {
                 at,
                 radius,
-                riding: a.riding.towards(b.riding, x as f32),
+                skin: a.skin.towards(b.skin, x as f32),
             },
             way,
         )
+    }
+}
+
+/// Slope of the curve through `samples` at sample `i`, px a sample: half the way between its
+/// neighbours. At the ends the one that makes the curvature go on evenly, so that straight stays
+/// straight.
+fn slope(samples: &[CenterlineSample], i: usize) -> Vector3<f64> {
+    let (last, at) = (samples.len() - 1, samples[i].at);
+    if samples.len() == 2 {
+        samples[1].at - samples[0].at
+    } else if i == 0 {
+        (samples[1].at - at) * 2.0 - (samples[2].at - at) * 0.5
+    } else if i == last {
+        (at - samples[i - 1].at) * 2.0 - (at - samples[i - 2].at) * 0.5
+    } else {
+        (samples[i + 1].at - samples[i - 1].at) * 0.5
     }
 }
 
@@ -142,10 +146,10 @@ pub(super) fn continuations(limbs: &[Limb]) -> Vec<Option<usize>> {
         let Some(p) = limb.parent.filter(|&p| p < i && good[p]) else {
             continue;
         };
-        let (Some(end), base) = (limbs[p].stations.last(), &limb.stations[0]) else {
+        let (Some(end), base) = (limbs[p].samples.last(), &limb.samples[0]) else {
             continue;
         };
-        let score = base.radius * (2.0 + limbs[p].arrives().dot(&leaves(limb)));
+        let score = base.radius * (2.0 + limbs[p].arrives().dot(&limb.departs()));
         let at_end = (end.at - base.at).norm() <= 1e-9 * (1.0 + end.at.coords.norm());
         if at_end && best[p].is_none_or(|(most, _)| score > most) {
             best[p] = Some((score, i));
@@ -155,34 +159,30 @@ pub(super) fn continuations(limbs: &[Limb]) -> Vec<Option<usize>> {
 }
 
 fn is_good(limb: &Limb) -> bool {
-    let near = |s: &Station| s.at.iter().all(|x| x.abs() <= 2.0 * FARTHEST_PX);
-    let finite = |s: &Station| near(s) && (0.0..=FARTHEST_PX).contains(&s.radius);
-    limb.stations.len() >= 2
-        && limb.stations.iter().all(finite)
-        && limb.stations.iter().any(|s| s.radius > 1e-6)
+    limb.samples.len() >= 2
+        && limb.samples.iter().all(is_sound)
+        && limb.samples.iter().any(|s| s.radius > 1e-6)
         && limb.length() > 1e-6
 }
 
-/// Radius of `parent` at the station next to the base of `limb`.
-fn radius_near(parent: &Limb, limb: &Limb) -> Option<f64> {
-    let base = limb.stations.first()?.at;
-    let away = |s: &&Station| (s.at - base).norm_squared();
-    parent
-        .stations
-        .iter()
-        .min_by(|a, b| away(a).total_cmp(&away(b)))
-        .map(|s| s.radius)
+fn is_sound(sample: &CenterlineSample) -> bool {
+    sample.at.iter().all(|x| x.abs() <= 2.0 * FARTHEST_PX)
+        && (0.0..=FARTHEST_PX).contains(&sample.radius)
 }
 
-/// Direction in which a limb begins, of length 1; up where it has none. It has two stations.
-pub(super) fn leaves(limb: &Limb) -> Vector3<f64> {
-    (limb.stations[1].at - limb.stations[0].at)
-        .try_normalize(1e-12)
-        .unwrap_or_else(Vector3::y)
+/// Radius of `parent` at the sample next to the base of `limb`.
+fn radius_near(parent: &Limb, limb: &Limb) -> Option<f64> {
+    let base = limb.samples.first()?.at;
+    parent
+        .samples
+        .iter()
+        .map(|s| ((s.at - base).norm_squared(), s.radius))
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, radius)| radius)
 }
 
 fn link(limb: &Limb) -> Link<'_> {
-    let s = &limb.stations;
+    let s = &limb.samples;
     let mut need = 0.0;
     let mut before: Option<Vector3<f64>> = None;
     for pair in s.windows(2) {
@@ -198,7 +198,7 @@ fn link(limb: &Limb) -> Link<'_> {
         before = Some(way);
     }
     Link {
-        stations: s,
+        samples: s,
         need,
         is_twig: limb.twig,
     }

@@ -1,6 +1,7 @@
 //! The wood as cylinders, as tools for tree models from laser scans tell it (TreeQSM, Raumonen et
 //! al. 2013; SimpleTree).
 
+use super::chain::continuations;
 use super::limb::Limb;
 use nalgebra::Point3;
 
@@ -29,7 +30,7 @@ pub fn cylinders(limbs: &[Limb]) -> Vec<Cylinder> {
     // The cylinders of every limb, and its branch with its order.
     let mut of_limb: Vec<std::ops::Range<usize>> = Vec::with_capacity(limbs.len());
     let mut branch_of: Vec<(usize, u32)> = Vec::with_capacity(limbs.len());
-    let goes_on = super::chain::continuations(limbs);
+    let goes_on = continuations(limbs);
     let mut branches = 0;
     for (i, limb) in limbs.iter().enumerate() {
         let parent = limb.parent.filter(|&p| p < i);
@@ -43,26 +44,20 @@ pub fn cylinders(limbs: &[Limb]) -> Vec<Cylinder> {
         branch_of.push((branch, order));
         let first = out.len();
         let mut before = parent.and_then(|p| nearest(&out, of_limb[p].clone(), limb));
-        for pair in limb.stations.windows(2) {
-            let (start, end, radius) = (
-                pair[0].at,
-                pair[1].at,
-                0.5 * (pair[0].radius + pair[1].radius),
-            );
-            let length = (end - start).norm();
-            if !(length > 1e-9 && length.is_finite() && radius.is_finite()) {
-                continue;
-            }
-            out.push(Cylinder {
+        for pair in limb.samples.windows(2) {
+            let cylinder = Cylinder {
                 parent: before,
-                start,
-                end,
-                radius,
+                start: pair[0].at,
+                end: pair[1].at,
+                radius: 0.5 * (pair[0].radius + pair[1].radius),
                 branch,
                 order,
                 limb: i,
-            });
-            before = Some(out.len() - 1);
+            };
+            if cylinder.is_sound() {
+                before = Some(out.len());
+                out.push(cylinder);
+            }
         }
         // A limb that has none hands on its parent's.
         let own = if out.len() > first {
@@ -75,14 +70,24 @@ pub fn cylinders(limbs: &[Limb]) -> Vec<Cylinder> {
     out
 }
 
+impl Cylinder {
+    fn is_sound(&self) -> bool {
+        let length = (self.end - self.start).norm();
+        length > 1e-9 && length.is_finite() && self.radius.is_finite()
+    }
+
+    fn distance_to(&self, place: &Point3<f64>) -> f64 {
+        let way = self.end - self.start;
+        let t = ((place - self.start).dot(&way) / way.norm_squared()).clamp(0.0, 1.0);
+        (self.start + way * t - place).norm()
+    }
+}
+
 /// The cylinder of `range` on which `limb` begins.
 fn nearest(cylinders: &[Cylinder], range: std::ops::Range<usize>, limb: &Limb) -> Option<usize> {
-    let base = limb.stations.first()?.at;
-    let off = |k: &usize| {
-        let c = &cylinders[*k];
-        let way = c.end - c.start;
-        let t = ((base - c.start).dot(&way) / way.norm_squared()).clamp(0.0, 1.0);
-        (c.start + way * t - base).norm()
-    };
-    range.min_by(|a, b| off(a).total_cmp(&off(b)))
+    let base = limb.samples.first()?.at;
+    range
+        .map(|k| (cylinders[k].distance_to(&base), k))
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, k)| k)
 }

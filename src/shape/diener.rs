@@ -1,6 +1,8 @@
 //! The skeleton on the front and the back of an ellipsoid (Diener et al. 2006), to compare with (Li
-//! et al. figure 4 a).
+//! 2011 fig. 4 a).
 
+use super::planes::model_from_image;
+use super::trunk::in_trunk;
 use crate::model::{Node, NodeId, NodeName, Outline, Skeleton};
 use crate::skeleton::Node2d;
 use nalgebra::Point3;
@@ -10,40 +12,41 @@ use nalgebra::Point3;
 /// originals in depth.
 pub fn diener(flat: &[Node2d], tracks: &[u32], trunk: &[bool], outline: &Outline) -> Skeleton {
     let foot_px = flat.first().map_or([0.0, 0.0], |n| n.position_px);
-    let place = |n: &Node2d| {
-        Point3::new(
-            n.position_px[0] - foot_px[0],
-            foot_px[1] - n.position_px[1],
-            0.0,
-        )
-    };
-    let is_trunk = |i: usize| trunk.get(i).is_some_and(|t| *t);
-    let crown: Vec<Point3<f64>> = (0..flat.len())
-        .filter(|&i| !is_trunk(i))
-        .map(|i| place(&flat[i]))
+    let places: Vec<Point3<f64>> = flat
+        .iter()
+        .map(|n| model_from_image(n.position_px, foot_px))
         .collect();
-    let depth = ellipsoid(&crown);
-    let node = |(i, n): (usize, &Node2d)| Node {
-        name: NodeName(i as u32),
-        parent: n.parent.map(|p| NodeId(p as u32)),
-        level: n.level,
-        position: if is_trunk(i) {
-            place(n)
-        } else {
-            Point3::new(place(n).x, place(n).y, depth(&place(n)))
-        },
-        radius: 1.0,
-        n_tracks: tracks.get(i).copied().unwrap_or(0),
-        certainty: n.certainty,
-        copy_of: None,
-        plane_angle: 0.0,
-        kind: Default::default(),
-    };
-    let mut nodes: Vec<Node> = flat.iter().enumerate().map(node).collect();
+    let crown: Vec<Point3<f64>> = (0..flat.len())
+        .filter(|&i| !in_trunk(trunk, i))
+        .map(|i| places[i])
+        .collect();
+    let ellipsoid = Ellipsoid::around(&crown);
+    let mut nodes = Vec::with_capacity(2 * flat.len());
+    for (i, n) in flat.iter().enumerate() {
+        let mut position = places[i];
+        if !in_trunk(trunk, i) {
+            position.z = ellipsoid.depth(&position);
+        }
+        nodes.push(Node {
+            name: NodeName(i as u32),
+            parent: n.parent.map(|p| NodeId(p as u32)),
+            level: n.level,
+            position,
+            radius: 1.0,
+            n_tracks: tracks.get(i).copied().unwrap_or(0),
+            certainty: n.certainty,
+            copy_of: None,
+            plane_angle: 0.0,
+            kind: Default::default(),
+        });
+    }
     let mut copy_id: Vec<NodeId> = (0..flat.len() as u32).map(NodeId).collect();
-    for i in (0..flat.len()).filter(|&i| !is_trunk(i)) {
+    for i in 0..flat.len() {
+        if in_trunk(trunk, i) {
+            continue;
+        }
         copy_id[i] = NodeId(nodes.len() as u32);
-        let mut copy = nodes[i].clone();
+        let mut copy: Node = nodes[i].clone();
         copy.name = NodeName(nodes.len() as u32);
         copy.parent = copy.parent.map(|p| copy_id[p.index()]);
         copy.position.z = -copy.position.z;
@@ -57,25 +60,48 @@ pub fn diener(flat: &[Node2d], tracks: &[u32], trunk: &[bool], outline: &Outline
     }
 }
 
-/// Depth of the near side over every point of the crown: the ellipse has the proportions of the
-/// crown's box and is as large as it must be for all points to be inside.
-fn ellipsoid(crown: &[Point3<f64>]) -> impl Fn(&Point3<f64>) -> f64 {
-    let ends = |c: usize| {
-        let values = || crown.iter().map(move |p| p[c]);
-        (
-            values().fold(f64::INFINITY, f64::min),
-            values().fold(f64::NEG_INFINITY, f64::max),
-        )
-    };
-    let ((left, right), (low, high)) = (ends(0), ends(1));
-    let centre = [(left + right) / 2.0, (low + high) / 2.0];
-    let half = [
-        ((right - left) / 2.0).max(1.0),
-        ((high - low) / 2.0).max(1.0),
-    ];
-    let off_sq = move |p: &Point3<f64>| {
-        ((p.x - centre[0]) / half[0]).powi(2) + ((p.y - centre[1]) / half[1]).powi(2)
-    };
-    let farthest_sq = crown.iter().map(off_sq).fold(1.0, f64::max);
-    move |p| half[0] * (farthest_sq - off_sq(p)).max(0.0).sqrt()
+/// An ellipsoid of revolution about the vertical, px.
+struct Ellipsoid {
+    centre: [f64; 2],
+    /// Half of its width and of its height, but for the factor below.
+    half: [f64; 2],
+    /// Square of the factor that makes it hold all points.
+    farthest_sq: f64,
+}
+
+impl Ellipsoid {
+    /// In the proportions of the box around `crown`, and as large as it must be for all of it to be
+    /// inside.
+    fn around(crown: &[Point3<f64>]) -> Self {
+        let (mut low, mut high) = (
+            Point3::from([f64::INFINITY; 3]),
+            Point3::from([f64::NEG_INFINITY; 3]),
+        );
+        for point in crown {
+            (low, high) = (low.inf(point), high.sup(point));
+        }
+        let mut ellipsoid = Self {
+            centre: [(low.x + high.x) / 2.0, (low.y + high.y) / 2.0],
+            half: [
+                ((high.x - low.x) / 2.0).max(1.0),
+                ((high.y - low.y) / 2.0).max(1.0),
+            ],
+            farthest_sq: 1.0,
+        };
+        for point in crown {
+            ellipsoid.farthest_sq = ellipsoid.farthest_sq.max(ellipsoid.off_sq(point));
+        }
+        ellipsoid
+    }
+
+    /// Square of the distance from the centre, 1 on the ellipse of the box.
+    fn off_sq(&self, p: &Point3<f64>) -> f64 {
+        ((p.x - self.centre[0]) / self.half[0]).powi(2)
+            + ((p.y - self.centre[1]) / self.half[1]).powi(2)
+    }
+
+    /// Depth of the near side at a point of the crown, px.
+    fn depth(&self, p: &Point3<f64>) -> f64 {
+        self.half[0] * (self.farthest_sq - self.off_sq(p)).max(0.0).sqrt()
+    }
 }

@@ -1,6 +1,8 @@
 //! A tree as it is drawn.
 
-use super::{Foliage, Limb, Mesh};
+use super::foliage::Foliage;
+use super::limb::Limb;
+use super::mesh::Mesh;
 
 /// Everything that is drawn of a tree at rest.
 #[derive(Clone, Debug, Default)]

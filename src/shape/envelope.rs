@@ -1,5 +1,5 @@
-//! The envelope: the outline turned about its axis (surface of revolution, Li et al. section 3
-//! after Okabe et al.), the hull of the skeleton turned (Zeng section 5.5), or a drawn shape.
+//! The envelope: the outline turned about its axis (surface of revolution, Li 2011 sect. 3 after
+//! Okabe et al.), the hull of the skeleton turned (Zeng 2015 sect. 5.5), or a drawn shape.
 
 use super::hull::{convex_hull, crossed};
 use crate::config::EnvelopeKind;
@@ -76,26 +76,23 @@ impl Envelope {
             .filter(|p| p.iter().all(|c| c.abs() <= FARTHEST_OF_HULL))
             .collect();
         let hull = convex_hull(&flat);
-        let ys = || hull.iter().map(|p| p[1]);
-        let (bottom, top) = (
-            ys().fold(f64::INFINITY, f64::min).floor(),
-            ys().fold(f64::NEG_INFINITY, f64::max).ceil(),
-        );
+        let (mut bottom, mut top) = (f64::INFINITY, f64::NEG_INFINITY);
+        for corner in &hull {
+            bottom = bottom.min(corner[1].floor());
+            top = top.max(corner[1].ceil());
+        }
         if bottom > top {
-            return Self {
-                bottom_y: 0.0,
-                discs: Vec::new(),
-                stretches: Vec::new(),
-            };
+            return Self::empty();
         }
         let rows = (top - bottom) as usize + 1;
-        let disc = |k: usize| {
+        let mut discs = Vec::with_capacity(rows);
+        for k in 0..rows {
             let (left, right) = crossed(&hull, bottom + k as f64);
-            Disc::between(left - 0.5, right + 0.5)
-        };
+            discs.push(Disc::between(left - 0.5, right + 0.5));
+        }
         Self {
             bottom_y: bottom,
-            discs: (0..rows).map(disc).collect(),
+            discs,
             stretches: Vec::new(),
         }
     }
@@ -114,13 +111,17 @@ impl Envelope {
         }
     }
 
+    fn empty() -> Self {
+        Self {
+            bottom_y: 0.0,
+            discs: Vec::new(),
+            stretches: Vec::new(),
+        }
+    }
+
     fn turned(bounds: Option<[u32; 4]>, width: usize, mask: &[u8], foot_px: [f64; 2]) -> Self {
         let Some([_, top, _, bottom]) = bounds else {
-            return Self {
-                bottom_y: 0.0,
-                discs: Vec::new(),
-                stretches: Vec::new(),
-            };
+            return Self::empty();
         };
         let mut discs = Vec::new();
         let mut last = Disc {

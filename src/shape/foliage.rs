@@ -1,11 +1,11 @@
-//! Leaves as meshes, ready for a file (Li et al. appendix B).
+//! Leaves as meshes, ready for a file (Li 2011 app. B).
 
 use super::mesh::Mesh;
 use crate::model::NodeId;
 
 /// The leaves that oscillate together: those of one main branch.
 ///
-/// A cluster of leaves turns about its main axis by `A(t) sin(omega t + beta)` (appendix B.2). For
+/// A cluster of leaves turns about its main axis by `A(t) sin(omega t + beta)` (app. B.2). For
 /// small angles that is
 /// `A(t) sin(omega t)` times one displacement of its vertices plus `A(t) cos(omega t)` times
 /// another, which every vertex carries with the phase `beta` of its cluster in it.

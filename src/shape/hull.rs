@@ -34,23 +34,25 @@ fn half<'a>(points: impl Iterator<Item = &'a [f64; 2]>) -> Vec<[f64; 2]> {
 /// Where the horizontal line at `y` enters and leaves a convex polygon; beyond its ends, as at its
 /// nearest corner.
 pub(super) fn crossed(hull: &[[f64; 2]], y: f64) -> (f64, f64) {
-    let sides = || hull.iter().zip(hull.iter().cycle().skip(1));
-    let crossing = |(a, b): (&[f64; 2], &[f64; 2])| {
-        let between = (a[1].min(b[1])..=a[1].max(b[1])).contains(&y);
+    let mut ends: Option<(f64, f64)> = None;
+    for (a, b) in hull.iter().zip(hull.iter().cycle().skip(1)) {
+        if !(a[1].min(b[1])..=a[1].max(b[1])).contains(&y) {
+            continue;
+        }
+        // Of a level side both corners; the second is the first of the next side.
         let t = if a[1] == b[1] {
             0.0
         } else {
             (y - a[1]) / (b[1] - a[1])
         };
-        between.then(|| a[0] + t * (b[0] - a[0]))
-    };
-    let level = |(a, b): (&[f64; 2], &[f64; 2])| (a[1] == y && b[1] == y).then(|| b[0]);
-    let xs: Vec<f64> = sides()
-        .filter_map(crossing)
-        .chain(sides().filter_map(level))
-        .collect();
-    if let Some(low) = xs.iter().copied().min_by(f64::total_cmp) {
-        return (low, xs.iter().copied().fold(low, f64::max));
+        let x = a[0] + t * (b[0] - a[0]);
+        ends = Some(match ends {
+            Some((left, right)) => (left.min(x), right.max(x)),
+            None => (x, x),
+        });
+    }
+    if let Some(ends) = ends {
+        return ends;
     }
     let corner = hull
         .iter()

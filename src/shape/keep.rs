@@ -2,7 +2,7 @@
 
 use super::angles::angle_between;
 use super::envelope::Envelope;
-use crate::model::{Node, NodeId, Skeleton};
+use crate::model::{NodeId, Skeleton};
 use nalgebra::{Point3, Rotation3, Vector3};
 use std::f64::consts::FRAC_PI_2;
 
@@ -21,22 +21,28 @@ const HALVINGS: u32 = 8;
 /// For every node of `new` its twin in `old`, copies included: the copy of a node's twin on the
 /// same plane.
 pub fn twins(new: &Skeleton, old: &Skeleton, measured: &[Option<Twin>]) -> Vec<Option<Twin>> {
-    let of = |i: usize| match new.nodes[i].copy_of {
-        None => measured.get(i).copied().flatten(),
-        Some(original) => {
-            let twin = measured.get(original.index()).copied().flatten()?;
-            let angle = new.nodes[i].plane_angle;
-            let same = |n: &crate::model::Node| {
-                n.copy_of == Some(twin.old) && (n.plane_angle - angle).abs() < 1e-9
-            };
-            let copy = old.nodes.iter().position(same)?;
-            Some(Twin {
-                old: NodeId(copy as u32),
-                ..twin
-            })
-        }
-    };
-    (0..new.nodes.len()).map(of).collect()
+    let mut twins = Vec::with_capacity(new.nodes.len());
+    for (i, node) in new.nodes.iter().enumerate() {
+        let original = node.copy_of.map_or(i, |o| o.index());
+        let twin = measured.get(original).copied().flatten();
+        twins.push(match (twin, node.copy_of) {
+            (Some(twin), Some(_)) => copy_on_plane(old, twin, node.plane_angle),
+            _ => twin,
+        });
+    }
+    twins
+}
+
+/// The copy of the node `twin` on the plane at `plane_angle`, radians.
+fn copy_on_plane(old: &Skeleton, twin: Twin, plane_angle: f64) -> Option<Twin> {
+    let copy = old
+        .nodes
+        .iter()
+        .position(|n| n.copy_of == Some(twin.old) && (n.plane_angle - plane_angle).abs() < 1e-9)?;
+    Some(Twin {
+        old: NodeId(copy as u32),
+        ..twin
+    })
 }
 
 /// The same tree with its foot, and with it the model's axes, at `foot_px`; all else stays where it
@@ -47,11 +53,9 @@ pub fn on_foot(mut skeleton: Skeleton, foot_px: [f64; 2]) -> Skeleton {
         foot_px[1] - skeleton.foot_px[1],
         0.0,
     );
-    skeleton
-        .nodes
-        .iter_mut()
-        .skip(1)
-        .for_each(|n| n.position += way);
+    for node in skeleton.nodes.iter_mut().skip(1) {
+        node.position += way;
+    }
     skeleton.foot_px = foot_px;
     skeleton
 }
@@ -66,23 +70,14 @@ pub fn on_foot(mut skeleton: Skeleton, foot_px: [f64; 2]) -> Skeleton {
 /// the same branches leave from there and they do not turn back: that their turns of more than a
 /// right angle exceed it by `turned_back_rad` more than at the new place, in all. Else the node
 /// goes to the new fork, and only its depth stays.
-pub fn stand_as_before(
+pub(super) fn carry_over_positions(
     new: &mut Skeleton,
     old: &Skeleton,
     twins: &[Option<Twin>],
     envelope: &Envelope,
     turned_back_rad: f64,
 ) -> Vec<Option<Point3<f64>>> {
-    let twin = |i: usize| twins.get(i).copied().flatten();
-    let stood = |(i, node): (usize, &Node)| {
-        let Twin {
-            old: twin,
-            moved_px: [du, dv],
-        } = twin(i)?;
-        let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), node.plane_angle);
-        Some(old.nodes[twin.index()].position + turn * Vector3::new(du, -dv, 0.0))
-    };
-    let stood: Vec<Option<Point3<f64>>> = new.nodes.iter().enumerate().map(stood).collect();
+    let stood = old_places(new, old, twins);
     let stays = staying(new, &stood, same_forks(new, old, twins), turned_back_rad);
     // By how much each node is off the place at which it was built.
     let mut carried: Vec<Vector3<f64>> = Vec::with_capacity(new.nodes.len());
@@ -109,11 +104,30 @@ pub fn stand_as_before(
                 drawn_in(built, built + way, envelope)
             }
         };
-        held[i] = stood[i].filter(|_| stays[i] || !copy).map(|_| place);
+        if stood[i].is_some() && (stays[i] || !copy) {
+            held[i] = Some(place);
+        }
         carried.push(place - built);
         new.nodes[i].position = place;
     }
     held
+}
+
+/// Where every node of `new` stood as its twin in `old`, moved with what the picture shows.
+fn old_places(new: &Skeleton, old: &Skeleton, twins: &[Option<Twin>]) -> Vec<Option<Point3<f64>>> {
+    let mut places = vec![None; new.nodes.len()];
+    for ((place, node), twin) in places.iter_mut().zip(&new.nodes).zip(twins) {
+        if let Some(Twin {
+            old: twin,
+            moved_px: [du, dv],
+        }) = *twin
+        {
+            let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), node.plane_angle);
+            let moved = turn * Vector3::new(du, -dv, 0.0);
+            *place = Some(old.nodes[twin.index()].position + moved);
+        }
+    }
+    places
 }
 
 /// Which nodes stay where their twins stood: those from which the same branches leave, unless that
@@ -126,73 +140,98 @@ fn staying(
     turned_back_rad: f64,
 ) -> Vec<bool> {
     let mut stays = same_fork;
-    stays
-        .iter_mut()
-        .take(2)
-        .for_each(|foot_or_trunk| *foot_or_trunk = true);
-    let in_picture = |p: &Point3<f64>| Point3::new(p.x, p.y, 0.0);
-    let built = |i: usize| in_picture(&new.nodes[i].position);
-    let mut at: Vec<Point3<f64>> = (0..stood.len())
-        .map(|i| {
-            stood[i]
-                .filter(|_| stays[i])
-                .map_or_else(|| built(i), |p| in_picture(&p))
-        })
-        .collect();
-    let children = new.children();
-    let parent = |i: usize| new.nodes[i].parent.map(|p| p.index());
+    for foot_or_trunk in stays.iter_mut().take(2) {
+        *foot_or_trunk = true;
+    }
+    let mut picture = Picture::new(new, stood, &stays);
     for i in 1..new.measured() {
-        let (Some(before), Some(below)) = (stood[i].filter(|_| stays[i]), parent(i)) else {
+        let (Some(before), true) = (stood[i], stays[i]) else {
             continue;
         };
-        // By how much the branches that meet there turn back, in all.
-        let back = |place: &Point3<f64>| {
-            let own = parent(below).map(|grand| angle_between(&at[grand], &at[below], place));
-            let leaving = children[i]
-                .iter()
-                .filter(|c| new.nodes[c.index()].copy_of.is_none());
-            let leaving = leaving.map(|c| angle_between(&at[below], place, &at[c.index()]));
-            leaving
-                .chain(own)
-                .map(|turn| (turn - FRAC_PI_2).max(0.0))
-                .sum::<f64>()
+        let Some(below) = new.nodes[i].parent.map(|p| p.index()) else {
+            continue;
         };
-        if back(&in_picture(&before)) > back(&built(i)) + turned_back_rad {
-            (stays[i], at[i]) = (false, built(i));
+        let built = in_picture(&new.nodes[i].position);
+        let at_old = picture.turning_back(i, below, &in_picture(&before));
+        if at_old > picture.turning_back(i, below, &built) + turned_back_rad {
+            (stays[i], picture.at[i]) = (false, built);
         }
     }
     for i in new.measured()..stays.len() {
-        stays[i] &= new.nodes[i]
-            .copy_of
-            .is_none_or(|original| stays[original.index()]);
+        if let Some(original) = new.nodes[i].copy_of {
+            stays[i] &= stays[original.index()];
+        }
     }
     stays
+}
+
+/// The front view of a tree some of whose nodes stay where they stood.
+struct Picture<'a> {
+    tree: &'a Skeleton,
+    children: Vec<Vec<NodeId>>,
+    at: Vec<Point3<f64>>,
+}
+
+impl<'a> Picture<'a> {
+    fn new(tree: &'a Skeleton, stood: &[Option<Point3<f64>>], stays: &[bool]) -> Self {
+        let mut at = Vec::with_capacity(stood.len());
+        for (i, node) in tree.nodes.iter().enumerate() {
+            let place = stood[i].filter(|_| stays[i]).unwrap_or(node.position);
+            at.push(in_picture(&place));
+        }
+        Self {
+            tree,
+            children: tree.children(),
+            at,
+        }
+    }
+
+    /// By how much the measured branches that meet in node `i`, which grows from `below`, turn by
+    /// more than a right angle if it is at `place`, in all, radians.
+    fn turning_back(&self, i: usize, below: usize, place: &Point3<f64>) -> f64 {
+        let mut sum = 0.0;
+        for child in &self.children[i] {
+            if self.tree.nodes[child.index()].copy_of.is_none() {
+                let turn = angle_between(&self.at[below], place, &self.at[child.index()]);
+                sum += (turn - FRAC_PI_2).max(0.0);
+            }
+        }
+        if let Some(grand) = self.tree.nodes[below].parent {
+            let turn = angle_between(&self.at[grand.index()], &self.at[below], place);
+            sum += (turn - FRAC_PI_2).max(0.0);
+        }
+        sum
+    }
+}
+
+fn in_picture(place: &Point3<f64>) -> Point3<f64> {
+    Point3::new(place.x, place.y, 0.0)
 }
 
 /// For every node of `new` whether the branches that leave from it are those that left from its
 /// twin.
 fn same_forks(new: &Skeleton, old: &Skeleton, twins: &[Option<Twin>]) -> Vec<bool> {
     let (leave, left) = (new.children(), old.children());
-    let twin = |i: usize| twins.get(i).copied().flatten().map(|t| t.old);
-    let same = |i: usize| {
-        let mut found: Vec<Option<NodeId>> = leave[i].iter().map(|c| twin(c.index())).collect();
+    let twins: Vec<Option<NodeId>> = (0..new.nodes.len())
+        .map(|i| twins.get(i).copied().flatten().map(|t| t.old))
+        .collect();
+    let mut same = vec![false; new.nodes.len()];
+    for (i, twin) in twins.iter().enumerate() {
+        let Some(twin) = twin else { continue };
+        let mut found: Vec<Option<NodeId>> = leave[i].iter().map(|c| twins[c.index()]).collect();
         found.sort_unstable();
-        twin(i).is_some_and(|t| {
-            found
-                .iter()
-                .copied()
-                .eq(left[t.index()].iter().map(|&c| Some(c)))
-        })
-    };
-    (0..new.nodes.len()).map(same).collect()
+        same[i] = found
+            .into_iter()
+            .eq(left[twin.index()].iter().map(|&c| Some(c)));
+    }
+    same
 }
 
 /// `wanted`, or as much of the way there from `built` as stays in the envelope.
 fn drawn_in(built: Point3<f64>, wanted: Point3<f64>, envelope: &Envelope) -> Point3<f64> {
     let way = wanted - built;
-    let options = (0..HALVINGS).map(|k| built + way / f64::from(1u32 << k));
-    options
-        .into_iter()
+    (0..HALVINGS)
+        .map(|k| built + way / f64::from(1u32 << k))
         .find(|p| envelope.contains(p))
         .unwrap_or(built)
 }

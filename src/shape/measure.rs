@@ -1,8 +1,11 @@
 //! How well a tree fills its envelope and how likely its angles are, beside the one-sided variants
-//! of Li et al. figure 3 and the mirrored ellipsoid of figure 4 a.
+//! of Li 2011 fig. 3 and the mirrored ellipsoid of fig. 4 a.
 
-use super::fuse::one_sided;
-use super::{Angles, Prototype, Terms, diener, envelope_distance};
+use super::angles::Angles;
+use super::diener::diener;
+use super::prototype::Prototype;
+use super::push::{Terms, envelope_distance};
+use super::term_weights::by_one_term;
 use crate::config;
 use crate::model::{Outline, Skeleton};
 use crate::skeleton::Node2d;
@@ -56,22 +59,20 @@ impl PushFigures {
             trunk,
         } = Prototype::of(flat, tracks, outline, settings);
         let angles = Angles::of(&rest, settings);
-        let pushed = |terms: Terms| one_sided(&rest, &trunk, &envelope, settings, terms);
-        let (global, local) = (pushed(Terms::Global), pushed(Terms::Local));
-        let diener = diener(flat, tracks, &trunk, outline);
-        let all = |of: &dyn Fn(&Skeleton) -> f64| Variants {
-            rest: of(&rest),
-            global_only: of(&global),
-            local_only: of(&local),
-            fused: of(fused),
-            diener: of(&diener),
+        let trees = Trees {
+            rest: &rest,
+            global_only: &by_one_term(&rest, &trunk, &envelope, settings, Terms::Global),
+            local_only: &by_one_term(&rest, &trunk, &envelope, settings, Terms::Local),
+            fused,
+            diener: &diener(flat, tracks, &trunk, outline),
         };
+        let attractors = settings.attractors as usize;
         Self {
             attractors: settings.attractors,
             expected_angle_deg: angles.expected.to_degrees(),
-            distance_px: all(&|s| envelope_distance(s, &envelope, settings.attractors as usize)),
-            angle_likelihood: all(&|s| angles.likelihood(s)),
-            side_symmetry: all(&side_symmetry),
+            distance_px: trees.measured(|tree| envelope_distance(tree, &envelope, attractors)),
+            angle_likelihood: trees.measured(|tree| angles.likelihood(tree)),
+            side_symmetry: trees.measured(side_symmetry),
         }
     }
 
@@ -88,25 +89,50 @@ impl PushFigures {
     }
 }
 
+/// The tree by every way to push.
+struct Trees<'a> {
+    rest: &'a Skeleton,
+    global_only: &'a Skeleton,
+    local_only: &'a Skeleton,
+    fused: &'a Skeleton,
+    diener: &'a Skeleton,
+}
+
+impl Trees<'_> {
+    fn measured(&self, figure: impl Fn(&Skeleton) -> f64) -> Variants {
+        Variants {
+            rest: figure(self.rest),
+            global_only: figure(self.global_only),
+            local_only: figure(self.local_only),
+            fused: figure(self.fused),
+            diener: figure(self.diener),
+        }
+    }
+}
+
 /// Share of the nodes whose mirror image in the side view (z to -z, at the same height) lies within
 /// a hundredth of the tree's height of a node; nodes nearer than that to the middle, which are
 /// their own images, are left out. 1 is a mirror image through and through; 0 where no node is off
 /// the middle.
 pub fn side_symmetry(skeleton: &Skeleton) -> f64 {
-    let places: Vec<[f64; 2]> = skeleton
-        .nodes
-        .iter()
-        .map(|n| [n.position.z, n.position.y])
-        .collect();
-    let heights = || places.iter().map(|p| p[1]);
-    let height =
-        heights().fold(f64::NEG_INFINITY, f64::max) - heights().fold(f64::INFINITY, f64::min);
-    let near = MIRRORED * height;
-    let off: Vec<&[f64; 2]> = places.iter().filter(|p| p[0].abs() > near).collect();
-    let has_image = |p: &&&[f64; 2]| {
-        places
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for node in &skeleton.nodes {
+        low = low.min(node.position.y);
+        high = high.max(node.position.y);
+    }
+    let near = MIRRORED * (high - low);
+    let (mut off, mut mirrored) = (0usize, 0usize);
+    for node in &skeleton.nodes {
+        let p = node.position;
+        if p.z.abs() <= near {
+            continue;
+        }
+        off += 1;
+        let has_image = skeleton
+            .nodes
             .iter()
-            .any(|q| (q[0] + p[0]).hypot(q[1] - p[1]) <= near)
-    };
-    off.iter().filter(has_image).count() as f64 / off.len().max(1) as f64
+            .any(|n| (n.position.z + p.z).hypot(n.position.y - p.y) <= near);
+        mirrored += usize::from(has_image);
+    }
+    mirrored as f64 / off.max(1) as f64
 }

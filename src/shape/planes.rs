@@ -1,7 +1,8 @@
-//! From the flat skeleton to a prototype in space: copies on planes turned about the trunk (Li et
-//! al. section 3).
+//! From the flat skeleton to a prototype in space: copies on planes turned about the trunk (Li 2011
+//! sect. 3).
 
 use super::envelope::Envelope;
+use super::trunk::in_trunk;
 use crate::model::{Node, NodeId, NodeKind, NodeName, Outline, Skeleton};
 use crate::skeleton::Node2d;
 use nalgebra::{Point3, Rotation3, Vector3};
@@ -21,55 +22,30 @@ pub fn copy_to_planes(
     planes: u32,
 ) -> Skeleton {
     let foot_px = flat.first().map_or([0.0, 0.0], |n| n.position_px);
-    let model = |p: [f64; 2]| Point3::new(p[0] - foot_px[0], foot_px[1] - p[1], 0.0);
-    let mut nodes: Vec<Node> = flat
-        .iter()
-        .zip(tracks)
-        .enumerate()
-        .map(|(i, (n, &n_tracks))| Node {
-            name: NodeName(i as u32),
-            parent: n.parent.map(|p| NodeId(p as u32)),
-            level: n.level,
-            position: model(n.position_px),
-            radius: 1.0,
-            n_tracks,
-            certainty: n.certainty,
-            copy_of: None,
-            plane_angle: 0.0,
-            kind: NodeKind::Measured,
-        })
-        .collect();
+    let mut nodes = measured_nodes(flat, tracks, foot_px);
     place(&mut nodes, envelope);
+    let axes = axes(&nodes, trunk);
     let measured = nodes.len();
-    let is_trunk = |i: usize| trunk.get(i).is_some_and(|t| *t);
-    // A leader may lean: a branch that leaves high up must turn about it, and not about its foot.
-    let mut axes: Vec<Vector3<f64>> = Vec::with_capacity(measured);
-    for node in &nodes {
-        let parent = node.parent.map_or(0, |p| p.index());
-        let leaves = Vector3::new(nodes[parent].position.x, 0.0, 0.0);
-        axes.push(
-            axes.get(parent)
-                .copied()
-                .filter(|_| !is_trunk(parent))
-                .unwrap_or(leaves),
-        );
-    }
     for plane in 1..planes {
-        let angle = PI * f64::from(plane) / f64::from(planes);
-        let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), angle);
+        let plane_angle = PI * f64::from(plane) / f64::from(planes);
+        let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), plane_angle);
         let mut copy_id: Vec<NodeId> = (0..measured as u32).map(NodeId).collect();
         for original in 0..measured {
-            if is_trunk(original) {
+            if in_trunk(trunk, original) {
                 continue; // the trunk is one
             }
             copy_id[original] = NodeId(nodes.len() as u32);
-            let mut copy = nodes[original].clone();
-            copy.name = NodeName(nodes.len() as u32);
-            copy.parent = copy.parent.map(|p| copy_id[p.index()]);
-            copy.position =
-                envelope.clamp(&(turn * (copy.position - axes[original]) + axes[original]));
-            (copy.n_tracks, copy.copy_of, copy.plane_angle) =
-                (0, Some(NodeId(original as u32)), angle);
+            let node = &nodes[original];
+            let turned = turn * (node.position - axes[original]) + axes[original];
+            let copy = Node {
+                name: NodeName(nodes.len() as u32),
+                parent: node.parent.map(|p| copy_id[p.index()]),
+                position: envelope.clamp(&turned),
+                n_tracks: 0,
+                copy_of: Some(NodeId(original as u32)),
+                plane_angle,
+                ..node.clone()
+            };
             nodes.push(copy);
         }
     }
@@ -78,6 +54,52 @@ pub fn copy_to_planes(
         foot_px,
         image_size: outline.size,
     }
+}
+
+/// A place in the picture in model axes, in the plane z = 0 through the foot, px.
+pub(super) fn model_from_image(position_px: [f64; 2], foot_px: [f64; 2]) -> Point3<f64> {
+    Point3::new(
+        position_px[0] - foot_px[0],
+        foot_px[1] - position_px[1],
+        0.0,
+    )
+}
+
+/// The nodes of `flat` in the plane z = 0.
+fn measured_nodes(flat: &[Node2d], tracks: &[u32], foot_px: [f64; 2]) -> Vec<Node> {
+    let mut nodes = Vec::with_capacity(flat.len());
+    for (i, (node, &n_tracks)) in flat.iter().zip(tracks).enumerate() {
+        nodes.push(Node {
+            name: NodeName(i as u32),
+            parent: node.parent.map(|p| NodeId(p as u32)),
+            level: node.level,
+            position: model_from_image(node.position_px, foot_px),
+            radius: 1.0,
+            n_tracks,
+            certainty: node.certainty,
+            copy_of: None,
+            plane_angle: 0.0,
+            kind: NodeKind::Measured,
+        });
+    }
+    nodes
+}
+
+/// For every node a point of the vertical about which its copies turn: the place where its branch
+/// leaves the trunk. A leader may lean, and a branch that leaves high up must turn about it and not
+/// about its foot.
+fn axes(nodes: &[Node], trunk: &[bool]) -> Vec<Vector3<f64>> {
+    let mut axes: Vec<Vector3<f64>> = Vec::with_capacity(nodes.len());
+    for node in nodes {
+        let parent = node.parent.map_or(0, |p| p.index());
+        let leaves = Vector3::new(nodes[parent].position.x, 0.0, 0.0);
+        let axis = match axes.get(parent) {
+            Some(&below) if !in_trunk(trunk, parent) => below,
+            _ => leaves,
+        };
+        axes.push(axis);
+    }
+    axes
 }
 
 /// Brings the measured nodes into the envelope, the foot to the origin, and what has no place to

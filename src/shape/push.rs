@@ -1,9 +1,10 @@
 //! The Bayesian push: branches leave their planes to fill the envelope while their angles stay
-//! likely (Li et al. section 3, eq. 2-6).
+//! likely (Li 2011 sect. 3, eq. 2-6).
 
 use super::angles::{Angles, angle_between};
 use super::envelope::Envelope;
 use super::search::Search;
+use super::trunk::in_trunk;
 use crate::config;
 use crate::model::Skeleton;
 use nalgebra::{Point3, Vector3};
@@ -22,7 +23,7 @@ pub enum Terms {
         /// nothing. It is added to every gain in eq. 6, which else is -inf in logarithms for a push
         /// without gain, and would bend a twig out of all likelihood for a hundredth of a pixel.
         /// The paper's is 0.
-        no_gain: f64,
+        gain_floor: f64,
         /// Of several traversals the first only spreads the tree, and the later ones mend its
         /// angles.
         spread_first: bool,
@@ -34,9 +35,9 @@ pub enum Terms {
 }
 
 impl Terms {
-    fn no_gain(self) -> f64 {
-        if let Terms::Both { no_gain, .. } = self {
-            no_gain
+    fn gain_floor(self) -> f64 {
+        if let Terms::Both { gain_floor, .. } = self {
+            gain_floor
         } else {
             0.0
         }
@@ -72,7 +73,7 @@ pub fn push(
 /// the normal of its plane, a third factor of eq. 2. What moves in the picture, as copies do, is
 /// seen; it is held three times as tightly.
 #[derive(Clone, Copy, Debug)]
-pub struct Tether<'a> {
+pub struct PositionPrior<'a> {
     /// Where each node stood, model axes, px; `None` for a new one, of which nothing was known.
     pub stood: &'a [Option<Point3<f64>>],
     /// Deviation in depth, px.
@@ -93,12 +94,12 @@ pub fn push_on(
     envelope: &Envelope,
     settings: &config::Shape,
     terms: Terms,
-    tether: Tether,
+    prior: PositionPrior,
 ) {
     let pushed = (0..skeleton.nodes.len())
         .map(|i| own_push(skeleton, i))
         .collect();
-    let mut pusher = Pusher::new(skeleton, envelope, settings, pushed, Some(tether));
+    let mut pusher = Pusher::new(skeleton, envelope, settings, pushed, Some(prior));
     for pass in 0..settings.passes.max(1) {
         pusher.weigh(terms, pass == 0 && settings.passes > 1);
         for i in pusher.order(trunk) {
@@ -119,9 +120,11 @@ fn own_push(skeleton: &Skeleton, i: usize) -> f64 {
 /// How far every node is out of its plane, px: the sum of its own push and those below it. The
 /// trunk is in all planes.
 pub(super) fn out_of_planes(skeleton: &Skeleton, trunk: &[bool]) -> Vec<f64> {
-    let is_trunk = |i: usize| trunk.get(i).is_some_and(|t| *t);
     let mut out = vec![0.0; skeleton.nodes.len()];
-    for i in (0..skeleton.nodes.len()).filter(|&i| !is_trunk(i)) {
+    for i in 0..skeleton.nodes.len() {
+        if in_trunk(trunk, i) {
+            continue;
+        }
         let below = skeleton.nodes[i].parent.map_or(0.0, |p| out[p.index()]);
         out[i] = below + own_push(skeleton, i);
     }
@@ -140,7 +143,7 @@ struct Pusher<'a> {
     envelope: &'a Envelope,
     settings: &'a config::Shape,
     terms: Terms,
-    tether: Option<Tether<'a>>,
+    prior: Option<PositionPrior<'a>>,
     angles: Angles,
     search: Search,
     subtrees: Vec<Vec<usize>>,
@@ -148,7 +151,29 @@ struct Pusher<'a> {
     /// How far each node has been pushed itself, px.
     pushed: Vec<f64>,
     delta: f64,
-    no_gain: f64,
+    gain_floor: f64,
+}
+
+/// A node that is to be pushed.
+struct Step<'a> {
+    node: usize,
+    parent: usize,
+    what: Moved,
+    /// All nodes that move with it, itself included.
+    moved: &'a [usize],
+    /// Of its plane.
+    normal: Vector3<f64>,
+    /// How far it has been pushed so far, px.
+    at: f64,
+    /// Whether the angles of the branches that leave from it count.
+    with_children: bool,
+}
+
+impl Step<'_> {
+    /// By how much it moves if it is pushed `push` px in all.
+    fn offset(&self, push: f64) -> Vector3<f64> {
+        self.normal * (push - self.at)
+    }
 }
 
 /// One push that was tried: its length, ln of eq. 4 and of the prior, and E of eq. 6.
@@ -165,7 +190,7 @@ impl<'a> Pusher<'a> {
         envelope: &'a Envelope,
         settings: &'a config::Shape,
         pushed: Vec<f64>,
-        tether: Option<Tether<'a>>,
+        prior: Option<PositionPrior<'a>>,
     ) -> Self {
         Self {
             search: Search::new(skeleton, &envelope.attractors(settings.attractors as usize)),
@@ -174,21 +199,19 @@ impl<'a> Pusher<'a> {
             children: children(skeleton),
             pushed,
             delta: settings.push_range * envelope.width(),
-            no_gain: 0.0,
+            gain_floor: 0.0,
             terms: Terms::Local,
             skeleton,
             envelope,
             settings,
-            tether,
+            prior,
         }
     }
 
     /// Nodes that may be pushed, from the root up.
     fn order(&self, trunk: &[bool]) -> Vec<usize> {
         let nodes = &self.skeleton.nodes;
-        let mut order: Vec<usize> = (0..nodes.len())
-            .filter(|&i| !trunk.get(i).is_some_and(|t| *t))
-            .collect();
+        let mut order: Vec<usize> = (0..nodes.len()).filter(|&i| !in_trunk(trunk, i)).collect();
         order.sort_by_key(|&i| (nodes[i].level, i));
         order
     }
@@ -204,9 +227,11 @@ impl<'a> Pusher<'a> {
                 }
             );
         self.terms = if spread { Terms::Global } else { terms };
-        self.no_gain = self.terms.no_gain() * self.envelope.width();
+        self.gain_floor = self.terms.gain_floor() * self.envelope.width();
     }
 
+    /// Pushes node `i` to the most probable of the options. `with_children` says that the angles of
+    /// the branches which leave from it count as well.
     fn push_one(&mut self, i: usize, what: Moved, with_children: bool) {
         let moved = match what {
             Moved::WithAllOnIt => self.subtrees[i].clone(),
@@ -217,26 +242,17 @@ impl<'a> Pusher<'a> {
             return;
         };
         let normal = plane_normal(self.skeleton.nodes[i].plane_angle);
-        let without = self.search.distances_without(&moved);
         let at = self.pushed[i];
-        let distance = |push: f64| {
-            self.search
-                .total_distance(&without, &moved, normal * (push - at))
-        };
-        let before = distance(0.0);
-        let n = self.settings.push_options;
-        let stays = self.tether.map(|_| at);
-        let options = (0..n).map(|l| self.delta * option(l, n)).chain(stays);
-        let candidates: Vec<Candidate> = options
-            .filter(|&push| push == at || self.may_go(i, &moved, normal, push - at))
-            .map(|push| Candidate {
-                push,
-                local: self.local(i, parent, normal * (push - at), what, with_children),
-                prior: self.prior(&moved, normal * (push - at)),
-                gain: (before - distance(push)).max(0.0),
-            })
-            .collect();
-        let Some(best) = most_probable(&candidates, self.terms, self.no_gain) else {
+        let candidates = self.candidates(&Step {
+            node: i,
+            parent,
+            what,
+            moved: &moved,
+            normal,
+            at,
+            with_children,
+        });
+        let Some(best) = most_probable(&candidates, self.terms, self.gain_floor) else {
             return;
         };
         let way = normal * (best - at);
@@ -252,99 +268,176 @@ impl<'a> Pusher<'a> {
         self.search.moved(self.skeleton, &moved);
     }
 
+    /// The pushes that are possible, and with a prior the one that leaves all where it is.
+    fn candidates(&self, step: &Step) -> Vec<Candidate> {
+        let without = self.search.distances_without(step.moved);
+        let before = self
+            .search
+            .total_distance(&without, step.moved, step.offset(0.0));
+        let n = self.settings.push_options;
+        let mut pushes: Vec<f64> = (0..n).map(|l| self.delta * option(l, n)).collect();
+        if self.prior.is_some() {
+            pushes.push(step.at);
+        }
+        let mut candidates = Vec::with_capacity(pushes.len());
+        for push in pushes {
+            if push != step.at && !self.is_possible(step, push) {
+                continue;
+            }
+            let offset = step.offset(push);
+            let distance = self.search.total_distance(&without, step.moved, offset);
+            candidates.push(Candidate {
+                push,
+                local: self.ln_likelihood(step, offset),
+                prior: self.ln_prior(step.moved, offset),
+                gain: (before - distance).max(0.0),
+            });
+        }
+        candidates
+    }
+
     /// Outside of the envelope the probability is 0, and for the pushes that it leaves to the
     /// children beyond delta as well, unless they get smaller.
-    fn may_go(&self, i: usize, moved: &[usize], normal: Vector3<f64>, way: f64) -> bool {
-        let inside = |&k: &usize| {
-            self.envelope
-                .contains(&(self.skeleton.nodes[k].position + normal * way))
-        };
-        let left = |&k: &usize| {
-            let (before, after) = (self.pushed[k].abs(), (self.pushed[k] - way).abs());
+    fn is_possible(&self, step: &Step, push: f64) -> bool {
+        let offset = step.offset(push);
+        for &k in step.moved {
+            let position = self.skeleton.nodes[k].position + offset;
+            if !self.envelope.contains(&position) {
+                return false;
+            }
+        }
+        if step.moved.len() == self.subtrees[step.node].len() {
+            return true;
+        }
+        self.children[step.node].iter().all(|&k| {
+            let before = self.pushed[k].abs();
+            let after = (self.pushed[k] - (push - step.at)).abs();
             after <= self.delta.max(before)
-        };
-        moved.iter().all(inside)
-            && (moved.len() == self.subtrees[i].len() || self.children[i].iter().all(left))
+        })
     }
 
-    /// ln of the prior on where the nodes `moved` by `offset` stood.
-    fn prior(&self, moved: &[usize], offset: Vector3<f64>) -> f64 {
-        let Some(Tether { stood, sigma_px }) = self.tether else {
+    /// ln of the prior on where the nodes `moved` by `offset` stood; 0 without a prior.
+    fn ln_prior(&self, moved: &[usize], offset: Vector3<f64>) -> f64 {
+        let Some(PositionPrior { stood, sigma_px }) = self.prior else {
             return 0.0;
         };
-        let one = |&k: &usize| {
+        let mut sum = 0.0;
+        for &k in moved {
+            let Some(stood) = stood.get(k).copied().flatten() else {
+                continue;
+            };
             let node = &self.skeleton.nodes[k];
-            let stood = stood.get(k).copied().flatten()?;
             let normal = plane_normal(node.plane_angle);
             let off = normal * (node.position + offset - stood).dot(&normal);
-            Some(-squared_way(off) / (2.0 * sigma_px * sigma_px))
-        };
-        moved.iter().filter_map(one).sum()
+            sum -= squared_way(off) / (2.0 * sigma_px * sigma_px);
+        }
+        sum
     }
 
-    /// ln of eq. 4 for node `i` moved by `offset`, and for the branches that it carries.
-    fn local(
+    /// ln of eq. 4 for the node of `step` moved by `offset`, and for the branches that it carries.
+    fn ln_likelihood(&self, step: &Step, offset: Vector3<f64>) -> f64 {
+        let nodes = &self.skeleton.nodes;
+        let from = nodes[step.parent].position;
+        let at = nodes[step.node].position + offset;
+        let own = nodes[step.parent].parent.map_or(0.0, |grand| {
+            let angle = angle_between(&nodes[grand.index()].position, &from, &at);
+            self.angles.ln_likelihood(nodes[step.node].level, angle)
+        });
+        if !step.with_children {
+            return own;
+        }
+        let carried: f64 = self.children[step.node]
+            .iter()
+            .map(|&k| self.ln_likelihood_carried(step, k, at, offset))
+            .sum();
+        own + carried
+    }
+
+    /// ln of eq. 4 for branch `k`, which leaves from the node of `step` while that is at `at`, and
+    /// for those beyond where it turns against them.
+    fn ln_likelihood_carried(
         &self,
-        i: usize,
-        parent: usize,
+        step: &Step,
+        k: usize,
+        at: Point3<f64>,
         offset: Vector3<f64>,
-        what: Moved,
-        with_children: bool,
     ) -> f64 {
         let nodes = &self.skeleton.nodes;
-        let (from, at): (Point3<f64>, Point3<f64>) =
-            (nodes[parent].position, nodes[i].position + offset);
-        let own = nodes[parent].parent.map_or(0.0, |grand| {
-            let angle = angle_between(&nodes[grand.index()].position, &from, &at);
-            self.angles.ln_likelihood(nodes[i].level, angle)
-        });
-        let carried = |&k: &usize| {
-            let (end, beyond) = match what {
-                Moved::WithAllOnIt => (nodes[k].position + offset, &[][..]),
-                Moved::Alone => (nodes[k].position, &self.children[k][..]),
-            };
-            let on = |&m: &usize| {
+        let from = nodes[step.parent].position;
+        let (end, beyond) = match step.what {
+            Moved::WithAllOnIt => (nodes[k].position + offset, &[][..]),
+            Moved::Alone => (nodes[k].position, &self.children[k][..]),
+        };
+        let own = self
+            .angles
+            .ln_likelihood(nodes[k].level, angle_between(&from, &at, &end));
+        let beyond: f64 = beyond
+            .iter()
+            .map(|&m| {
                 let angle = angle_between(&at, &end, &nodes[m].position);
                 self.angles.ln_likelihood(nodes[m].level, angle)
-            };
-            self.angles
-                .ln_likelihood(nodes[k].level, angle_between(&from, &at, &end))
-                + beyond.iter().map(on).sum::<f64>()
-        };
-        own + if with_children {
-            self.children[i].iter().map(carried).sum()
-        } else {
-            0.0
-        }
+            })
+            .sum();
+        own + beyond
     }
 }
 
 /// The push with the highest posterior; of equals the smallest, so that nothing moves for nothing.
-fn most_probable(options: &[Candidate], terms: Terms, no_gain: f64) -> Option<f64> {
-    let sum: f64 = options.iter().map(|c| c.gain).sum();
-    // Eq. 6 is 0 for every option where none brings the tree nearer to the envelope: it then says
-    // nothing.
-    let global_speaks = sum > 0.0 && terms != Terms::Local;
-    let all = sum + no_gain * options.len() as f64;
-    let weight = if let Terms::Both { weight, .. } = terms {
-        weight
-    } else {
-        1.0
-    };
-    let score = |c: &Candidate| {
-        let global = if global_speaks {
-            weight * ((c.gain + no_gain) / all).ln()
-        } else {
-            0.0
+fn most_probable(options: &[Candidate], terms: Terms, gain_floor: f64) -> Option<f64> {
+    let posterior = Posterior::over(options, terms, gain_floor);
+    let mut best: Option<(f64, f64)> = None;
+    for option in options {
+        let (ln, push) = (posterior.ln(option), option.push);
+        let is_better = best.is_none_or(|(best_ln, best_push)| {
+            ln.total_cmp(&best_ln)
+                .then(best_push.abs().total_cmp(&push.abs()))
+                .is_ge()
+        });
+        if is_better {
+            best = Some((ln, push));
+        }
+    }
+    best.map(|(_, push)| push)
+}
+
+/// Eq. 2 over all options of a push.
+struct Posterior {
+    terms: Terms,
+    /// Power of eq. 6.
+    weight: f64,
+    gain_floor: f64,
+    /// Sum of all gains with their floors; `None` where no option brings the tree nearer to the
+    /// envelope: eq. 6 is 0 for all of them then, and says nothing.
+    all_gains: Option<f64>,
+}
+
+impl Posterior {
+    fn over(options: &[Candidate], terms: Terms, gain_floor: f64) -> Self {
+        let sum: f64 = options.iter().map(|c| c.gain).sum();
+        let speaks = sum > 0.0 && terms != Terms::Local;
+        Self {
+            terms,
+            weight: match terms {
+                Terms::Both { weight, .. } => weight,
+                Terms::Local | Terms::Global => 1.0,
+            },
+            gain_floor,
+            all_gains: speaks.then_some(sum + gain_floor * options.len() as f64),
+        }
+    }
+
+    /// ln of the posterior, but for a constant.
+    fn ln(&self, option: &Candidate) -> f64 {
+        let global = match self.all_gains {
+            Some(all) => self.weight * ((option.gain + self.gain_floor) / all).ln(),
+            None => 0.0,
         };
-        global + c.prior + if terms == Terms::Global { 0.0 } else { c.local }
-    };
-    let better = |a: &&Candidate, b: &&Candidate| {
-        score(a)
-            .total_cmp(&score(b))
-            .then(b.push.abs().total_cmp(&a.push.abs()))
-    };
-    options.iter().max_by(better).map(|c| c.push)
+        let local = match self.terms {
+            Terms::Global => 0.0,
+            Terms::Local | Terms::Both { .. } => option.local,
+        };
+        global + option.prior + local
+    }
 }
 
 /// Option `l` of `n` values spread evenly over [-1, 1]; an odd `n` holds 0.
@@ -364,14 +457,16 @@ pub(super) fn plane_normal(angle: f64) -> Vector3<f64> {
 /// D of eq. 5: sum over the attractors of the distance to the nearest node, px.
 pub fn envelope_distance(skeleton: &Skeleton, envelope: &Envelope, attractors: usize) -> f64 {
     let attractors = envelope.attractors(attractors);
-    let nearest = |w: &Point3<f64>| {
-        skeleton
-            .nodes
-            .iter()
-            .map(|n| (w - n.position).norm())
-            .fold(f64::INFINITY, f64::min)
-    };
-    attractors.iter().map(nearest).sum()
+    attractors.iter().map(|a| nearest_node(skeleton, a)).sum()
+}
+
+/// Distance from `place` to the nearest node, px.
+fn nearest_node(skeleton: &Skeleton, place: &Point3<f64>) -> f64 {
+    skeleton
+        .nodes
+        .iter()
+        .map(|n| (place - n.position).norm())
+        .fold(f64::INFINITY, f64::min)
 }
 
 fn children(skeleton: &Skeleton) -> Vec<Vec<usize>> {

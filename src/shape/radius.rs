@@ -1,8 +1,6 @@
 //! How thick the branches are: the pipe model.
 
-use super::chain::leaves;
-use super::limb::{Grown, Room, limbs};
-use crate::config;
+use super::limb::{Grown, Limb};
 use crate::model::Skeleton;
 
 /// Exponent e of `r_parent^e = sum r_child^e`, from and to. Shinozaki's pipes and Leonardo's rule
@@ -25,37 +23,12 @@ const TIP_END: f64 = 0.4;
 const ROOT_FLARE: f64 = 0.3;
 const FLARE_WITHIN: f64 = 0.2;
 
-/// Gives every node the radius (px) of the branch that ends there, at the middle of its length:
-/// `trunk_radius_px` for the trunk, thinner with every branch and twig that leaves, never below
-/// [`TIP_RADIUS_PX`] unless the trunk is. Twigs count as pipes: they are those that [`limbs`] adds
-/// with the same arguments.
-pub fn thicken(
-    skeleton: &mut Skeleton,
-    trunk_radius_px: f64,
-    room: Room,
-    wood: &config::Wood,
-    seed: u64,
-) {
-    let trunk = if trunk_radius_px.is_finite() {
-        trunk_radius_px.max(0.0)
+/// A radius as it was measured; 0 for what is no number.
+pub(super) fn sound(radius_px: f64) -> f64 {
+    if radius_px.is_finite() {
+        radius_px.max(0.0)
     } else {
         0.0
-    };
-    skeleton.nodes.iter_mut().for_each(|n| n.radius = trunk);
-    for limb in limbs(skeleton, room, wood, seed).iter().filter(|l| !l.twig) {
-        if let Some(node) = skeleton
-            .nodes
-            .get_mut(limb.node.index())
-            .filter(|n| n.level > 1)
-        {
-            node.radius = limb.stations[limb.stations.len() / 2].radius;
-        }
-    }
-    for i in 0..skeleton.nodes.len() {
-        let parent = skeleton.nodes[i].parent.filter(|p| p.index() < i);
-        if let Some(parent) = parent.map(|p| skeleton.nodes[p.index()].radius) {
-            skeleton.nodes[i].radius = skeleton.nodes[i].radius.min(parent);
-        }
     }
 }
 
@@ -67,60 +40,96 @@ pub fn thicken(
 /// Copies count as what they are drawn as: a trunk whose copies were left out would be too thin for
 /// all that it carries, and its branches, as thick as if there were one plane, too thick for it.
 pub(super) fn by_pipes(grown: &mut [Grown], skeleton: &Skeleton, trunk_radius_px: f64) {
-    let trunk = if trunk_radius_px.is_finite() {
-        trunk_radius_px.max(0.0)
-    } else {
-        0.0
-    };
-    let tip = (TIP_RADIUS_PX * f64::from(skeleton.image_size.width) / 640.0).min(trunk);
-    let mut bearing = vec![Bearing::default(); grown.len()];
-    for i in (0..grown.len()).rev() {
-        let limb = &grown[i].limb;
-        // A branch that was followed is seen, so it is no hair, even where no twig has room on it.
-        let alone_px = PIPE_PX * f64::from(skeleton.image_size.width) / 640.0;
-        let least = if limb.twig {
-            1.0
-        } else {
-            (limb.length() / alone_px).max(1.0)
-        };
-        let own = bearing[i].settle(least);
-        let Some(p) = grown[i].limb.parent.filter(|&p| p < i) else {
-            continue;
-        };
-        bearing[p].leaving.push(Leaving {
-            at: grown[i].at,
-            pipes: own,
-        });
+    let width_px = f64::from(skeleton.image_size.width);
+    let bearing = bearings(grown, PIPE_PX * width_px / 640.0);
+    let mut total = 1.0;
+    for (g, bearing) in grown.iter().zip(&bearing) {
+        if g.limb.parent.is_none() {
+            total = f64::max(total, bearing.pipes(0.0));
+        }
     }
-    let roots = grown
-        .iter()
-        .zip(&bearing)
-        .filter(|(g, _)| g.limb.parent.is_none());
-    let total = roots.map(|(_, b)| b.pipes(0.0)).fold(1.0, f64::max);
-    // The exponent with which one pipe is as thick as the last twig.
-    let fits = total.max(1.1).ln() / (trunk / tip.max(1e-9)).max(1.1).ln();
-    let exponent = fits.clamp(PIPE_EXPONENTS[0], PIPE_EXPONENTS[1]);
-    let thick = |pipes: f64| (trunk * (pipes / total).powf(1.0 / exponent)).max(tip);
-    let end = TIP_END * tip;
-    let goes_on_from = heirs(grown, |k| thick(bearing[k].pipes(0.0)));
+    let model = PipeModel::new(
+        sound(trunk_radius_px),
+        TIP_RADIUS_PX * width_px / 640.0,
+        total,
+    );
+    let goes_on_from = heirs(grown, &bearing, &model);
     for (i, bearing) in bearing.iter().enumerate() {
         let (earlier, rest) = grown.split_at_mut(i);
         let Some(Grown { limb, at }) = rest.first_mut() else {
             continue;
         };
-        let most = limb
-            .parent
-            .and_then(|p| earlier.get(p))
-            .map(|p| p.limb.radius_at(*at));
-        let last = limb.stations.len().saturating_sub(1).max(1) as f64;
-        let own = thick(bearing.pipes(0.0));
-        let shoulder = most
-            .filter(|_| goes_on_from[i])
-            .map_or(0.0, |most| (most - own).max(0.0));
+        let parent = limb.parent.and_then(|p| earlier.get(p));
+        let most = parent.map(|p| p.limb.radius_at(*at));
+        model.assign_radii(limb, bearing, most, goes_on_from[i]);
+    }
+}
+
+/// What every limb carries; a branch at whose end no twig stands counts as a pipe for each
+/// `pipe_px` of its length.
+fn bearings(grown: &[Grown], pipe_px: f64) -> Vec<Bearing> {
+    let mut bearing = vec![Bearing::default(); grown.len()];
+    for (i, Grown { limb, at }) in grown.iter().enumerate().rev() {
+        // A branch that was followed is seen, so it is no hair, even where no twig has room on it.
+        let alone = if limb.twig {
+            1.0
+        } else {
+            (limb.length() / pipe_px).max(1.0)
+        };
+        let pipes = bearing[i].settle(alone);
+        if let Some(p) = limb.parent.filter(|&p| p < i) {
+            bearing[p].leaving.push(Leaving { at: *at, pipes });
+        }
+    }
+    bearing
+}
+
+/// From pipes to radii, px.
+struct PipeModel {
+    trunk: f64,
+    tip: f64,
+    /// Pipes of the whole tree.
+    total: f64,
+    exponent: f64,
+}
+
+impl PipeModel {
+    fn new(trunk: f64, tip: f64, total: f64) -> Self {
+        let tip = tip.min(trunk);
+        // The exponent with which one pipe is as thick as the last twig.
+        let fits = total.max(1.1).ln() / (trunk / tip.max(1e-9)).max(1.1).ln();
+        Self {
+            trunk,
+            tip,
+            total,
+            exponent: fits.clamp(PIPE_EXPONENTS[0], PIPE_EXPONENTS[1]),
+        }
+    }
+
+    fn radius(&self, pipes: f64) -> f64 {
+        (self.trunk * (pipes / self.total).powf(1.0 / self.exponent)).max(self.tip)
+    }
+
+    /// Gives every sample of `limb` its radius. `most` is that of what it grows from, where it
+    /// does; `is_continuation` says that its parent goes on in it.
+    fn assign_radii(
+        &self,
+        limb: &mut Limb,
+        bearing: &Bearing,
+        most: Option<f64>,
+        is_continuation: bool,
+    ) {
+        let own = self.radius(bearing.pipes(0.0));
+        let shoulder = match most {
+            Some(most) if is_continuation => (most - own).max(0.0),
+            _ => 0.0,
+        };
         let within = (SHOULDER_RADII * (own + shoulder) / limb.length().max(1e-9)).clamp(1e-9, 0.5);
-        for (k, station) in limb.stations.iter_mut().enumerate() {
+        let end = TIP_END * self.tip;
+        let last = limb.samples.len().saturating_sub(1).max(1) as f64;
+        for (k, sample) in limb.samples.iter_mut().enumerate() {
             let t = k as f64 / last;
-            let mut radius = thick(bearing.pipes(t));
+            let mut radius = self.radius(bearing.pipes(t));
             if !bearing.goes_on {
                 radius = end + (radius - end) * (1.0 - t).powf(TIP_TAPER);
             }
@@ -129,30 +138,32 @@ pub(super) fn by_pipes(grown: &mut [Grown], skeleton: &Skeleton, trunk_radius_px
             }
             radius += shoulder * (1.0 - t / within).max(0.0).powi(2);
             // No thicker than what it grows from.
-            station.radius = most.map_or(radius, |most| radius.min(most));
+            sample.radius = most.map_or(radius, |most| radius.min(most));
         }
     }
 }
 
 /// Whether each limb is the one that another goes on in, as chains are put together: a thick one
 /// that is straight.
-fn heirs(grown: &[Grown], thick: impl Fn(usize) -> f64) -> Vec<bool> {
+fn heirs(grown: &[Grown], bearing: &[Bearing], model: &PipeModel) -> Vec<bool> {
     let mut best: Vec<Option<(f64, usize)>> = vec![None; grown.len()];
-    for (i, Grown { limb, .. }) in grown
-        .iter()
-        .enumerate()
-        .filter(|(_, g)| g.at >= 1.0 && g.limb.stations.len() >= 2)
-    {
+    for (i, Grown { limb, at }) in grown.iter().enumerate() {
+        if *at < 1.0 || limb.samples.len() < 2 {
+            continue;
+        }
         let Some(p) = limb.parent.filter(|&p| p < i) else {
             continue;
         };
-        let score = thick(i) * (2.0 + grown[p].limb.arrives().dot(&leaves(limb)));
+        let thick = model.radius(bearing[i].pipes(0.0));
+        let score = thick * (2.0 + grown[p].limb.arrives().dot(&limb.departs()));
         if best[p].is_none_or(|(most, _)| score > most) {
             best[p] = Some((score, i));
         }
     }
     let mut out = vec![false; grown.len()];
-    best.into_iter().flatten().for_each(|(_, i)| out[i] = true);
+    for (_, i) in best.into_iter().flatten() {
+        out[i] = true;
+    }
     out
 }
 
@@ -176,25 +187,30 @@ impl Bearing {
     /// Takes what is at the end out of what leaves, once all is known, and gives the pipes at the
     /// base; an end where nothing goes on has `alone`.
     fn settle(&mut self, alone: f64) -> f64 {
-        let at_end = |l: &Leaving| l.at >= 1.0;
-        self.goes_on = self.leaving.iter().any(at_end);
-        let end: f64 = self
-            .leaving
-            .iter()
-            .filter(|l| at_end(l))
-            .map(|l| l.pipes)
-            .sum();
-        self.end = if self.goes_on { end } else { alone };
-        self.leaving.retain(|l| !at_end(l));
+        let (at_end, on_the_way): (Vec<Leaving>, Vec<Leaving>) =
+            self.leaving.iter().copied().partition(|l| l.at >= 1.0);
+        self.goes_on = !at_end.is_empty();
+        self.end = if self.goes_on {
+            at_end.iter().map(|l| l.pipes).sum()
+        } else {
+            alone
+        };
+        self.leaving = on_the_way;
         self.pipes(0.0)
     }
 
     /// Pipes at share `t` of the limb.
     fn pipes(&self, t: f64) -> f64 {
+        let on_the_way: f64 = self.leaving.iter().map(|l| l.joined(t)).sum();
+        self.end + on_the_way
+    }
+}
+
+impl Leaving {
+    /// How many of the pipes are still in the limb at share `t` of it.
+    fn joined(&self, t: f64) -> f64 {
         let half = 0.5 * JOINS_WITHIN;
-        let joined = |l: &Leaving| {
-            l.pipes * ((l.at.clamp(half, 1.0 - half) - t) / JOINS_WITHIN + 0.5).clamp(0.0, 1.0)
-        };
-        self.end + self.leaving.iter().map(joined).sum::<f64>()
+        let share = (self.at.clamp(half, 1.0 - half) - t) / JOINS_WITHIN + 0.5;
+        self.pipes * share.clamp(0.0, 1.0)
     }
 }

@@ -3,8 +3,9 @@
 
 use super::envelope::Envelope;
 use super::push::{out_of_planes, plane_normal, subtrees};
+use super::trunk::in_trunk;
 use crate::model::Skeleton;
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 /// A node so near to its plane stands on neither side, as a share of the tree's width.
 const ON_PLANE: f64 = 0.02;
@@ -22,17 +23,13 @@ pub(super) fn turned_as_before(
     anew: &Skeleton,
     trunk: &[bool],
 ) -> Skeleton {
-    let is_trunk = |i: usize| trunk.get(i).is_some_and(|t| *t);
     let (was, is) = (out_of_planes(kept, trunk), out_of_planes(anew, trunk));
     // The branch of the trunk, or of a copy's plane, that each node is on.
     let mut of_trunk: Vec<usize> = (0..kept.nodes.len()).collect();
     let mut alike = vec![0.0; kept.nodes.len()];
-    for i in 0..kept.nodes.len() {
-        if let Some(p) = kept.nodes[i]
-            .parent
-            .map(|p| p.index())
-            .filter(|&p| !is_trunk(p))
-        {
+    for (i, node) in kept.nodes.iter().enumerate() {
+        let parent = node.parent.map(|p| p.index());
+        if let Some(p) = parent.filter(|&p| !in_trunk(trunk, p)) {
             of_trunk[i] = of_trunk[p];
         }
         if held.get(i).is_some_and(Option::is_some) {
@@ -40,12 +37,10 @@ pub(super) fn turned_as_before(
         }
     }
     let mut turned = kept.clone();
-    for (i, node) in turned
-        .nodes
-        .iter_mut()
-        .enumerate()
-        .filter(|(i, _)| !is_trunk(*i))
-    {
+    for (i, node) in turned.nodes.iter_mut().enumerate() {
+        if in_trunk(trunk, i) {
+            continue;
+        }
         let side = if alike[of_trunk[i]] < 0.0 { -1.0 } else { 1.0 };
         node.position += plane_normal(node.plane_angle) * (side * is[i] - was[i]);
     }
@@ -61,10 +56,9 @@ pub(super) fn back_to_sides(
     envelope: &Envelope,
     good_enough: impl Fn(&Skeleton) -> bool,
 ) {
-    let (near_px, seen_px) = (ON_PLANE * envelope.width(), SEEN * envelope.width());
     let subtrees = subtrees(tree);
     let mut order: Vec<usize> = (0..tree.nodes.len())
-        .filter(|&i| !trunk.get(i).is_some_and(|t| *t))
+        .filter(|&i| !in_trunk(trunk, i))
         .collect();
     order.sort_by_key(|&i| (tree.nodes[i].level, i));
     for i in order {
@@ -72,36 +66,79 @@ pub(super) fn back_to_sides(
             continue;
         };
         let normal = plane_normal(tree.nodes[i].plane_angle);
-        let way_px = (stood - tree.nodes[i].position).dot(&normal);
         let is_px = out_of_planes(tree, trunk)[i];
-        let changed = is_px * (is_px + way_px) < 0.0 && way_px.abs() >= near_px;
-        // The planes of copies are seen at an angle, and what is pushed along their normals moves
-        // in the picture.
-        let jumps = (way_px * normal.x).abs() > seen_px;
-        if !changed && !jumps {
+        let back = WayBack::new(&tree.nodes[i].position, &stood, normal, is_px, envelope);
+        if !back.changed_sides && !back.jumps {
             continue;
         }
-        let ways = BACK
-            .iter()
-            .filter(|&&share| !changed || (is_px + share * way_px) * is_px <= 0.0);
-        let tries = ways.flat_map(|&share| [(share, &subtrees[i][..]), (share, &subtrees[i][..1])]);
-        let back = tries.map(|(share, moved)| {
-            let mut tried = tree.clone();
-            moved
-                .iter()
-                .for_each(|&k| tried.nodes[k].position += normal * (share * way_px));
-            (tried, moved)
-        });
-        let inside = |tried: &Skeleton, moved: &[usize]| {
-            moved
-                .iter()
-                .all(|&k| envelope.contains(&tried.nodes[k].position))
-        };
-        let found = back
-            .filter(|(tried, moved)| inside(tried, moved))
-            .find(|(tried, _)| good_enough(tried));
-        if let Some((tried, _)) = found {
-            *tree = tried;
+        if let Some(better) = gone_back(tree, &back, &subtrees[i], envelope, &good_enough) {
+            *tree = better;
         }
     }
+}
+
+/// From where a node is to where it stood, along the normal of its plane.
+struct WayBack {
+    normal: Vector3<f64>,
+    /// How far the node is out of its plane, and the way back, px.
+    is_px: f64,
+    way_px: f64,
+    changed_sides: bool,
+    /// Whether it is seen to jump: the planes of copies are seen at an angle, and what is pushed
+    /// along their normals moves in the picture.
+    jumps: bool,
+}
+
+impl WayBack {
+    fn new(
+        at: &Point3<f64>,
+        stood: &Point3<f64>,
+        normal: Vector3<f64>,
+        is_px: f64,
+        envelope: &Envelope,
+    ) -> Self {
+        let (near_px, seen_px) = (ON_PLANE * envelope.width(), SEEN * envelope.width());
+        let way_px = (stood - at).dot(&normal);
+        Self {
+            normal,
+            is_px,
+            way_px,
+            changed_sides: is_px * (is_px + way_px) < 0.0 && way_px.abs() >= near_px,
+            jumps: (way_px * normal.x).abs() > seen_px,
+        }
+    }
+
+    /// Whether `share` of the way back leaves the node on the side where it stood.
+    fn is_far_enough(&self, share: f64) -> bool {
+        !self.changed_sides || (self.is_px + share * self.way_px) * self.is_px <= 0.0
+    }
+}
+
+/// The tree with as much of the way back as it allows, taken by all of `subtree` or else by its
+/// first node alone; `None` where it allows none.
+fn gone_back(
+    tree: &Skeleton,
+    back: &WayBack,
+    subtree: &[usize],
+    envelope: &Envelope,
+    good_enough: &impl Fn(&Skeleton) -> bool,
+) -> Option<Skeleton> {
+    for share in BACK {
+        if !back.is_far_enough(share) {
+            continue;
+        }
+        for moved in [subtree, &subtree[..1]] {
+            let mut tried = tree.clone();
+            for &k in moved {
+                tried.nodes[k].position += back.normal * (share * back.way_px);
+            }
+            let inside = moved
+                .iter()
+                .all(|&k| envelope.contains(&tried.nodes[k].position));
+            if inside && good_enough(&tried) {
+                return Some(tried);
+            }
+        }
+    }
+    None
 }

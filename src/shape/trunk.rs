@@ -1,4 +1,4 @@
-//! The trunk: one, neither copied nor pushed (Li et al. section 3 and figure 9).
+//! The trunk: one, neither copied nor pushed (Li 2011 sect. 3 and fig. 9).
 
 use crate::config::Leader;
 use crate::model::Skeleton;
@@ -27,27 +27,24 @@ pub fn trunk(flat: &[Node2d], leader: Leader, leader_px: &[[f64; 2]]) -> Vec<boo
     while let Some(from) = at {
         let children =
             (0..flat.len()).filter(|&i| flat[i].parent == Some(from) && flat[i].level >= 2);
-        let next = match leader {
+        at = match leader {
             Leader::None => None,
             Leader::Drawn => nearest(
-                children.map(|i| (i, way_from(flat[i].position_px, leader_px))),
+                children.map(|i| (i, distance_to_line(flat[i].position_px, leader_px))),
                 reach,
             ),
             Leader::Auto => {
-                let (here, before) = (
-                    flat[from].position_px,
-                    flat[from].parent.map_or(foot, |p| flat[p].position_px),
-                );
+                let here = flat[from].position_px;
+                let before = flat[from].parent.map_or(foot, |p| flat[p].position_px);
                 nearest(
                     children.map(|i| (i, turn(before, here, flat[i].position_px))),
                     STRAIGHT,
                 )
             }
         };
-        if let Some(i) = next {
+        if let Some(i) = at {
             trunk[i] = true;
         }
-        at = next;
     }
     trunk
 }
@@ -60,10 +57,16 @@ pub fn is_trunk(skeleton: &Skeleton) -> Vec<bool> {
         copied[original.index()] = true;
     }
     let any = copied.contains(&true);
-    let trunk = |(i, n): (usize, &crate::model::Node)| {
-        n.level < 2 || any && n.copy_of.is_none() && !copied[i]
-    };
-    skeleton.nodes.iter().enumerate().map(trunk).collect()
+    let mut trunk = Vec::with_capacity(skeleton.nodes.len());
+    for (node, copied) in skeleton.nodes.iter().zip(copied) {
+        trunk.push(node.level < 2 || any && node.copy_of.is_none() && !copied);
+    }
+    trunk
+}
+
+/// Whether `trunk` holds for node `i`; copies, which come after the measured nodes, are no trunk.
+pub(super) fn in_trunk(trunk: &[bool], i: usize) -> bool {
+    trunk.get(i).is_some_and(|t| *t)
 }
 
 /// The item with the smallest value below `limit`; the first of equals.
@@ -75,24 +78,24 @@ fn nearest(items: impl Iterator<Item = (usize, f64)>, limit: f64) -> Option<usiz
 }
 
 /// Distance of `p` from a line of several pieces, px.
-fn way_from(p: [f64; 2], line: &[[f64; 2]]) -> f64 {
-    let from_piece = |w: &[[f64; 2]]| {
-        let (along, to) = (
-            [w[1][0] - w[0][0], w[1][1] - w[0][1]],
-            [p[0] - w[0][0], p[1] - w[0][1]],
-        );
-        let length_sq = along[0].powi(2) + along[1].powi(2);
-        let t = if length_sq > 0.0 {
-            (along[0] * to[0] + along[1] * to[1]) / length_sq
-        } else {
-            0.0
-        }
-        .clamp(0.0, 1.0);
-        (to[0] - t * along[0]).hypot(to[1] - t * along[1])
-    };
+fn distance_to_line(p: [f64; 2], line: &[[f64; 2]]) -> f64 {
     line.windows(2)
-        .map(from_piece)
+        .map(|ends| distance_to_piece(p, ends[0], ends[1]))
         .fold(f64::INFINITY, f64::min)
+}
+
+/// Distance of `p` from the straight line between `from` and `to`, px.
+fn distance_to_piece(p: [f64; 2], from: [f64; 2], to: [f64; 2]) -> f64 {
+    let along = [to[0] - from[0], to[1] - from[1]];
+    let way = [p[0] - from[0], p[1] - from[1]];
+    let length_sq = along[0].powi(2) + along[1].powi(2);
+    let t = if length_sq > 0.0 {
+        (along[0] * way[0] + along[1] * way[1]) / length_sq
+    } else {
+        0.0
+    };
+    let t = t.clamp(0.0, 1.0);
+    (way[0] - t * along[0]).hypot(way[1] - t * along[1])
 }
 
 /// By how much the way a-b-c turns at b, radians.

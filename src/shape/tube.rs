@@ -2,7 +2,7 @@
 
 use super::chain::{self, Chain};
 use super::curl::square_to;
-use super::limb::Station;
+use super::limb::CenterlineSample;
 use super::mesh::Mesh;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
@@ -19,7 +19,7 @@ const COLLAR_OF_PARENT: f64 = 0.9;
 
 /// A ring of a tube.
 struct Ring {
-    station: Station,
+    sample: CenterlineSample,
     tangent: Vector3<f64>,
     sides: usize,
 }
@@ -28,8 +28,8 @@ struct Ring {
 pub(super) fn triangles(chain: &Chain, density: f64) -> usize {
     let mut count = 0;
     let mut before: Option<usize> = None;
-    walk(chain, density, |station, last| {
-        let sides = sides_of(station.radius, density);
+    walk(chain, density, |sample, last| {
+        let sides = sides_of(sample.radius, density);
         match before {
             None => count += sides - 2,
             Some(before) if last => count += before,
@@ -46,17 +46,17 @@ fn sides_of(radius: f64, density: f64) -> usize {
     SIDES[above.saturating_sub(1)]
 }
 
-/// Calls `at` with every ring's station; the last one is the tip.
-fn walk(chain: &Chain, density: f64, mut at: impl FnMut(&Station, bool)) {
+/// Calls `at` with every ring's sample; the last one is the tip.
+fn walk(chain: &Chain, density: f64, mut at: impl FnMut(&CenterlineSample, bool)) {
     if let Some(first) = chain.links.first() {
-        at(&first.stations[0], false);
+        at(&first.samples[0], false);
     }
     let end = chain.links.len() - 1;
     for (k, link) in chain.links.iter().enumerate() {
         let n = link.rings(density);
         let joint = chain.links.get(k + 1).map_or(1, |next| link.rings_to(next));
         for i in (1..=n).chain(std::iter::repeat_n(n, joint - 1)) {
-            // How thick it is there is all that counting needs, and the same stations are drawn.
+            // How thick it is there is all that counting needs, and the same samples are drawn.
             at(&link.at(i as f64 / n as f64).0, k == end && i == n);
         }
     }
@@ -66,63 +66,112 @@ fn walk(chain: &Chain, density: f64, mut at: impl FnMut(&Station, bool)) {
 pub(super) fn append(chain: &Chain, density: f64, mesh: &mut Mesh) {
     let rings = rings(chain, density);
     let Some(first) = rings.first() else { return };
-    let mut across = square_to(first.tangent);
-    close_base(mesh, first, across);
-    let widest = chain.grows_from_px.map_or(0.0, |px| COLLAR_OF_PARENT * px);
-    let widened = |s: f64, radius: f64| {
-        let wide =
-            radius * (1.0 + COLLAR * (-s / (COLLAR_RADII * first.station.radius).max(1e-9)).exp());
-        wide.min(widest.max(radius))
+    let collar = Collar::of(chain, first.sample.radius);
+    let mut frame = Frame {
+        across: square_to(first.tangent),
+        way_px: 0.0,
+        v: 0.0,
     };
-    let (mut s, mut v) = (0.0, 0.0);
-    let mut before: Option<(u32, usize)> = None;
+    close_base(mesh, first, frame.across);
+    let mut below: Option<RingStart> = None;
     for (k, ring) in rings.iter().enumerate() {
         if let Some(last) = k.checked_sub(1).map(|j| &rings[j]) {
-            let step = (ring.station.at - last.station.at).norm();
-            s += step;
-            v += step / (TAU * (0.5 * (ring.station.radius + last.station.radius)).max(1e-6));
-            across = carried(across, last.tangent, ring.tangent);
+            frame.carry(last, ring);
         }
-        let tangent = ring.tangent;
         let is_tip = k + 1 == rings.len();
-        let slope = slope(&rings, k);
-        let start = mesh.positions.len() as u32;
-        let sides = if is_tip {
-            before.map_or(ring.sides, |(_, sides)| sides)
-        } else {
-            ring.sides
+        let sides = match below {
+            Some(below) if is_tip => below.sides,
+            _ => ring.sides,
         };
-        // A side branch is wider at its base, but never wider than what it grows from, which it
-        // starts in the middle of.
+        // A side branch starts in the middle of what it grows from.
         let radius = if is_tip {
             0.0
         } else if k == 0 {
-            ring.station.radius
+            ring.sample.radius
         } else {
-            widened(s, ring.station.radius)
+            collar.widened(ring.sample.radius, frame.way_px)
         };
-        for j in 0..=sides {
-            let (sin, cos) = (TAU * (j % sides) as f64 / sides as f64).sin_cos();
-            let outward = across * cos + tangent.cross(&across) * sin;
-            let normal = (outward - tangent * slope).normalize();
-            let at = ring.station.at.coords + outward * radius;
-            vertex(
-                mesh,
-                at,
-                normal,
-                [j as f64 / sides as f64, v],
-                &ring.station,
-            );
+        let start = RingStart {
+            vertex: mesh.positions.len() as u32,
+            sides,
+        };
+        add_ring(mesh, ring, &frame, sides, radius, slope(&rings, k));
+        match below {
+            Some(below) if is_tip => close_tip(mesh, below, start.vertex),
+            Some(below) => join(mesh, below, start),
+            None => {}
         }
-        if let Some((below, below_sides)) = before {
-            if is_tip {
-                (0..sides as u32)
-                    .for_each(|j| mesh.indices.extend([below + j, below + j + 1, start + j]));
-            } else {
-                join(mesh, (below, below_sides), (start, sides));
-            }
+        below = Some(start);
+    }
+}
+
+/// The vertices of a ring: the first of them, and the number of its sides.
+#[derive(Clone, Copy)]
+struct RingStart {
+    vertex: u32,
+    sides: usize,
+}
+
+/// What is carried along a tube from ring to ring.
+struct Frame {
+    /// Where a ring begins, square to its tangent, of length 1.
+    across: Vector3<f64>,
+    /// Way from the base, px and in circumferences.
+    way_px: f64,
+    v: f64,
+}
+
+impl Frame {
+    fn carry(&mut self, last: &Ring, ring: &Ring) {
+        let step = (ring.sample.at - last.sample.at).norm();
+        let radius = 0.5 * (ring.sample.radius + last.sample.radius);
+        self.way_px += step;
+        self.v += step / (TAU * radius.max(1e-6));
+        self.across = carried(self.across, last.tangent, ring.tangent);
+    }
+}
+
+/// How a branch widens towards its base: never wider than what it grows from.
+struct Collar {
+    /// Radius of the base, px.
+    base: f64,
+    widest: f64,
+}
+
+impl Collar {
+    fn of(chain: &Chain, base: f64) -> Self {
+        Self {
+            base,
+            widest: chain.grows_from_px.map_or(0.0, |px| COLLAR_OF_PARENT * px),
         }
-        before = Some((start, sides));
+    }
+
+    fn widened(&self, radius: f64, way_px: f64) -> f64 {
+        let lost = (-way_px / (COLLAR_RADII * self.base).max(1e-9)).exp();
+        let wide = radius * (1.0 + COLLAR * lost);
+        wide.min(self.widest.max(radius))
+    }
+}
+
+/// The vertices of one ring, the first of them once more at the end; `slope` is by how much the
+/// radius grows along the way.
+fn add_ring(mesh: &mut Mesh, ring: &Ring, frame: &Frame, sides: usize, radius: f64, slope: f64) {
+    let third = ring.tangent.cross(&frame.across);
+    for j in 0..=sides {
+        let (sin, cos) = (TAU * (j % sides) as f64 / sides as f64).sin_cos();
+        let outward = frame.across * cos + third * sin;
+        let normal = (outward - ring.tangent * slope).normalize();
+        let at = ring.sample.at.coords + outward * radius;
+        let uv = [j as f64 / sides as f64, frame.v];
+        vertex(mesh, at, normal, uv, &ring.sample);
+    }
+}
+
+/// Triangles from a ring to the tip, all of whose vertices lie in one point.
+fn close_tip(mesh: &mut Mesh, below: RingStart, tip: u32) {
+    for j in 0..below.sides as u32 {
+        mesh.indices
+            .extend([below.vertex + j, below.vertex + j + 1, tip + j]);
     }
 }
 
@@ -140,13 +189,13 @@ fn rings(chain: &Chain, density: f64) -> Vec<Ring> {
     for (k, link) in chain.links.iter().enumerate() {
         let n = link.rings(density);
         for i in (if k == 0 { 0 } else { 1 })..=n {
-            let (station, tangent) = link.at(i as f64 / n as f64);
-            let sides = sides_of(station.radius, density);
+            let (sample, tangent) = link.at(i as f64 / n as f64);
+            let sides = sides_of(sample.radius, density);
             let Some(next) = chain.links.get(k + 1).filter(|_| i == n) else {
                 out.push(Ring {
                     tangent,
                     sides,
-                    station,
+                    sample,
                 });
                 continue;
             };
@@ -164,7 +213,7 @@ fn rings(chain: &Chain, density: f64) -> Vec<Ring> {
                 out.push(Ring {
                     tangent: turn.powf(share) * tangent,
                     sides,
-                    station,
+                    sample,
                 });
             }
         }
@@ -174,25 +223,28 @@ fn rings(chain: &Chain, density: f64) -> Vec<Ring> {
 
 /// By how much the radius grows along the way, at ring `k`.
 fn slope(rings: &[Ring], k: usize) -> f64 {
-    let radius = |j: usize| {
-        if j + 1 == rings.len() {
-            0.0
-        } else {
-            rings[j].station.radius
-        }
-    };
     let (a, b) = (k.saturating_sub(1), (k + 1).min(rings.len() - 1));
     let way: f64 = (a..b)
-        .map(|j| (rings[j + 1].station.at - rings[j].station.at).norm())
+        .map(|j| (rings[j + 1].sample.at - rings[j].sample.at).norm())
         .sum();
-    ((radius(b) - radius(a)) / way.max(1e-9)).clamp(-2.0, 2.0)
+    ((drawn_radius(rings, b) - drawn_radius(rings, a)) / way.max(1e-9)).clamp(-2.0, 2.0)
+}
+
+/// Of ring `j`, px; the last one is the tip.
+fn drawn_radius(rings: &[Ring], j: usize) -> f64 {
+    if j + 1 == rings.len() {
+        0.0
+    } else {
+        rings[j].sample.radius
+    }
 }
 
 /// Triangles between two rings whose numbers of sides may differ: whichever ring is behind goes on.
-fn join(mesh: &mut Mesh, (below, m): (u32, usize), (above, n): (u32, usize)) {
+fn join(mesh: &mut Mesh, below: RingStart, above: RingStart) {
+    let (m, n) = (below.sides, above.sides);
     let (mut i, mut j) = (0, 0);
     while i < m || j < n {
-        let (a, b) = (below + i as u32, above + j as u32);
+        let (a, b) = (below.vertex + i as u32, above.vertex + j as u32);
         if j == n || (i < m && (i + 1) * n <= (j + 1) * m) {
             mesh.indices.extend([a, a + 1, b]);
             i += 1;
@@ -210,13 +262,13 @@ fn close_base(mesh: &mut Mesh, ring: &Ring, across: Vector3<f64>) {
     let third = ring.tangent.cross(&across);
     for j in 0..ring.sides {
         let (sin, cos) = (TAU * j as f64 / ring.sides as f64).sin_cos();
-        let rim = ring.station.at.coords + (across * cos + third * sin) * ring.station.radius;
+        let rim = ring.sample.at.coords + (across * cos + third * sin) * ring.sample.radius;
         vertex(
             mesh,
             rim,
             -ring.tangent,
             [0.5 + 0.5 * cos, 0.5 + 0.5 * sin],
-            &ring.station,
+            &ring.sample,
         );
     }
     for j in 1..ring.sides as u32 - 1 {
@@ -229,12 +281,12 @@ fn vertex(
     at: Vector3<f64>,
     normal: Vector3<f64>,
     uv: [f64; 2],
-    station: &Station,
+    sample: &CenterlineSample,
 ) {
     mesh.positions.push([at.x as f32, at.y as f32, at.z as f32]);
     mesh.normals
         .push([normal.x as f32, normal.y as f32, normal.z as f32]);
     mesh.uvs.push([uv[0] as f32, uv[1] as f32]);
-    mesh.joints.push(station.riding.joints);
-    mesh.weights.push(station.riding.weights);
+    mesh.joints.push(sample.skin.joints);
+    mesh.weights.push(sample.skin.weights);
 }

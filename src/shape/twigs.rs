@@ -1,11 +1,13 @@
 //! Twigs by self-similarity: small, turned copies of the tree's own parts along its branches and at
 //! their ends.
 
+use super::branches::side_departure;
+use super::branching::{BranchingStatistics, Part};
 use super::curl::{Curve, square_to};
-use super::habit::{Habit, Part};
-use super::limb::{Grown, Limb, Room, Station};
+use super::limb::{CenterlineSample, Grown, Limb};
+use super::skin::SkinWeights;
 use crate::config;
-use crate::model::Skeleton;
+use crate::model::{NodeId, Skeleton};
 use crate::random::{Generator, generator, seed_of_part};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use rand::RngExt;
@@ -38,8 +40,8 @@ struct Bud {
 impl Eq for Bud {}
 impl Ord for Bud {
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        let by_place = || (other.host, other.seed).cmp(&(self.host, self.seed));
-        self.reach_px.total_cmp(&other.reach_px).then_with(by_place)
+        let by_place = (other.host, other.seed).cmp(&(self.host, self.seed));
+        self.reach_px.total_cmp(&other.reach_px).then(by_place)
     }
 }
 impl PartialOrd for Bud {
@@ -48,11 +50,14 @@ impl PartialOrd for Bud {
     }
 }
 
+/// Whether a twig may grow from one point to another, model axes at rest, px.
+pub type GrowthConstraint<'a> = &'a dyn Fn(&Point3<f64>, &Point3<f64>) -> bool;
+
 /// Adds twigs to the branches of `skeleton`, which are `grown`.
 pub(super) fn add(
     grown: &mut Vec<Grown>,
     skeleton: &Skeleton,
-    room: Room,
+    room: GrowthConstraint,
     wood: &config::Wood,
     seed: u64,
 ) {
@@ -60,28 +65,28 @@ pub(super) fn add(
     if least_px <= 0.0 || !least_px.is_finite() {
         return;
     }
-    let habit = Habit::of(skeleton);
-    let whole_px = habit.reach_px.first().copied().unwrap_or(0.0);
+    let branching = BranchingStatistics::of(skeleton);
+    let whole_px = branching.reach_px.first().copied().unwrap_or(0.0);
     let maker = Maker {
-        habit: &habit,
+        branching: &branching,
         least_px,
         longest_px: LONGEST * whole_px,
         curl: wood.curl,
         room,
     };
     let mut buds = BinaryHeap::new();
-    for (k, host) in grown.iter().enumerate() {
-        let node = &skeleton.nodes[host.limb.node.index()];
+    for (k, branch) in grown.iter().enumerate() {
+        let id = branch.limb.node.index();
+        let node = &skeleton.nodes[id];
         if node.level > 1 {
-            let beyond_px = habit.reach_px[host.limb.node.index()];
-            maker.buds(
-                &host.limb,
-                k,
-                beyond_px,
+            let host = Host {
+                limb: &branch.limb,
+                index: k,
+                beyond_px: branching.reach_px[id],
                 whole_px,
-                seed_of_part(seed, (1 << 32) + u64::from(node.name.0)),
-                &mut buds,
-            );
+            };
+            let seed = seed_of_part(seed, (1 << 32) + u64::from(node.name.0));
+            maker.add_buds(&host, seed, &mut buds);
         }
     }
     let most = grown.len() + wood.max_twigs as usize;
@@ -90,157 +95,152 @@ pub(super) fn add(
         let reaches = maker.grow(bud, grown);
         grown.truncate(most);
         for (k, beyond_px) in (first..grown.len()).zip(reaches) {
-            let seed = seed_of_part(bud.seed, k as u64 - first as u64);
-            maker.buds(&grown[k].limb, k, beyond_px, f64::INFINITY, seed, &mut buds);
+            let host = Host {
+                limb: &grown[k].limb,
+                index: k,
+                beyond_px,
+                whole_px: f64::INFINITY,
+            };
+            maker.add_buds(&host, seed_of_part(bud.seed, (k - first) as u64), &mut buds);
+        }
+    }
+}
+
+/// A limb that may carry twigs.
+struct Host<'a> {
+    limb: &'a Limb,
+    index: usize,
+    /// How far the tree reaches above it, px.
+    beyond_px: f64,
+    /// How far the whole tree does, px. Where most of it is still above, most places stay empty: in
+    /// the shade of the crown twigs are shed. Infinite for what has no shade.
+    whole_px: f64,
+}
+
+impl Host<'_> {
+    fn bud(&self, reach_px: f64, at: f64, turn: f64, seed: u64) -> Bud {
+        Bud {
+            reach_px,
+            host: self.index,
+            at,
+            turn,
+            seed,
         }
     }
 }
 
 struct Maker<'a> {
-    habit: &'a Habit,
+    branching: &'a BranchingStatistics,
     /// Reach of the shortest and of the longest twig, px.
     least_px: f64,
     longest_px: f64,
     curl: f64,
-    room: Room<'a>,
+    room: GrowthConstraint<'a>,
 }
 
 impl Maker<'_> {
-    /// Places for twigs along `limb` and at its end, with `beyond_px` of tree above it; where most
-    /// of the tree, `whole_px`, is still above, most places stay empty: in the shade of the crown
-    /// twigs are shed.
-    fn buds(
-        &self,
-        limb: &Limb,
-        host: usize,
-        beyond_px: f64,
-        whole_px: f64,
-        seed: u64,
-        into: &mut BinaryHeap<Bud>,
-    ) {
-        let length_px = limb.length();
+    /// Places for twigs along a limb and at its end.
+    fn add_buds(&self, host: &Host, seed: u64, into: &mut BinaryHeap<Bud>) {
+        let length_px = host.limb.length();
+        let beyond_px = host.beyond_px;
         if length_px + beyond_px < 2.0 * self.least_px {
             return;
         }
         let mut random = generator(seed, 0);
         let mut turn = random.random_range(0.0..TAU);
         let mut way_px = 0.15 * length_px;
-        let mut bud = |reach_px: f64, at: f64, turn: f64, k: u64| {
-            into.push(Bud {
-                reach_px,
-                host,
-                at,
-                turn,
-                seed: seed_of_part(seed, k),
-            });
-        };
         for k in 0.. {
             let above_px = length_px - way_px + beyond_px;
-            let reach_px = (self.habit.ratio(&mut random) * above_px)
+            let reach_px = (self.branching.ratio(&mut random) * above_px)
                 .min(self.longest_px * random.random_range(0.7..1.0));
             way_px += (SPACING * reach_px).max(0.4 * self.least_px) * random.random_range(0.5..1.5);
             turn += GOLDEN + random.random_range(-0.4..0.4);
-            let shaded = random.random::<f64>() < above_px / whole_px;
+            let shaded = random.random::<f64>() < above_px / host.whole_px;
             if way_px >= length_px {
                 break;
             }
             if reach_px >= self.least_px && !shaded {
-                bud(reach_px, way_px / length_px, turn, k);
+                into.push(host.bud(reach_px, way_px / length_px, turn, seed_of_part(seed, k)));
             }
         }
         if beyond_px <= 0.0 {
             let reach_px = (0.3 * length_px)
                 .min(self.longest_px)
                 .max(1.2 * self.least_px);
-            bud(reach_px, 1.0, turn, u64::MAX);
-            bud(0.8 * reach_px, 1.0, turn + PI, u64::MAX - 1);
+            let seeds = [u64::MAX, u64::MAX - 1].map(|part| seed_of_part(seed, part));
+            into.push(host.bud(reach_px, 1.0, turn, seeds[0]));
+            into.push(host.bud(0.8 * reach_px, 1.0, turn + PI, seeds[1]));
         }
     }
 
     /// Grows a twig from `bud` and gives how far the tree reaches beyond each of its pieces, px.
     fn grow(&self, bud: Bud, grown: &mut Vec<Grown>) -> Vec<f64> {
-        let host = &grown[bud.host].limb;
-        let Some((a, b, s)) = host.between(bud.at) else {
+        let Some(stem) = Stem::of(bud, &grown[bud.host].limb) else {
             return Vec::new();
         };
-        let Some(along) = (b.at - a.at).try_normalize(1e-9) else {
-            return Vec::new();
-        };
-        let (from, riding, node) = (
-            a.at + (b.at - a.at) * s,
-            a.riding.towards(b.riding, s as f32),
-            host.node,
-        );
         let mut random = generator(bud.seed, 0);
         let plain = bud.reach_px < 2.0 * self.least_px;
-        let part = self.habit.parts.choose(&mut random).filter(|_| !plain);
-        let angle = self.habit.angle(&mut random) * if bud.at >= 1.0 { 0.5 } else { 1.0 };
+        let part = self.branching.parts.choose(&mut random).filter(|_| !plain);
+        let angle = self.branching.angle(&mut random) * if bud.at >= 1.0 { 0.5 } else { 1.0 };
         let roll =
             UnitQuaternion::from_axis_angle(&Vector3::y_axis(), random.random_range(0.0..TAU));
         for k in 0..TRIES {
             let reach_px = bud.reach_px * 0.85f64.powi(k as i32);
-            let (sin, cos) = (bud.turn + f64::from(k) * GOLDEN).sin_cos();
-            let side = square_to(along);
-            let out = side * cos + along.cross(&side) * sin;
-            let straight = along * angle.cos() + out * angle.sin();
-            let Some(way) = (straight + Vector3::y() * (0.4 * self.habit.lift)).try_normalize(0.1)
-            else {
+            let straight = stem.leaving_at(angle, bud.turn + f64::from(k) * GOLDEN);
+            let lifted = straight + Vector3::y() * (0.4 * self.branching.lift);
+            let Some(way) = lifted.try_normalize(0.1) else {
                 continue;
             };
             let turn = UnitQuaternion::rotation_between(&Vector3::y(), &way)
                 .unwrap_or_else(UnitQuaternion::identity);
-            let twig = self.placed(part, from, turn * roll, reach_px, way);
+            let twig = match part {
+                Some(part) => self.placed(part, stem.from, turn * roll, reach_px),
+                None => self.placed_alone(stem.from, way, reach_px),
+            };
             if !twig.is_empty() {
-                return self.append(
-                    &twig,
-                    &Stem {
-                        bud,
-                        from,
-                        along,
-                        riding,
-                        node,
-                    },
-                    &mut random,
-                    grown,
-                );
+                return self.append(&twig, &stem, &mut random, grown);
             }
         }
         Vec::new()
     }
 
-    /// Ends of the twig's pieces with their parents; without those that are too short or outside,
+    /// A twig of one piece, if there is room for it.
+    fn placed_alone(&self, from: Point3<f64>, way: Vector3<f64>, reach_px: f64) -> Vec<TwigPiece> {
+        let to = from + way * reach_px;
+        if reach_px >= self.least_px && (self.room)(&from, &to) {
+            vec![TwigPiece { parent: None, to }]
+        } else {
+            Vec::new()
+        }
+    }
+
+    /// The pieces of a twig that is a copy of `part`; without those that are too short or outside,
     /// and what they carry.
     fn placed(
         &self,
-        part: Option<&Part>,
+        part: &Part,
         from: Point3<f64>,
         turn: UnitQuaternion<f64>,
         reach_px: f64,
-        way: Vector3<f64>,
-    ) -> Vec<(Option<usize>, Point3<f64>)> {
-        let fits = |a: Point3<f64>, b: Point3<f64>| (self.room)(&a, &b);
-        let Some(part) = part else {
-            let to = from + way * reach_px;
-            return if reach_px >= self.least_px && fits(from, to) {
-                vec![(None, to)]
-            } else {
-                Vec::new()
-            };
-        };
-        let mut out: Vec<(Option<usize>, Point3<f64>)> = Vec::new();
+    ) -> Vec<TwigPiece> {
+        let mut out: Vec<TwigPiece> = Vec::new();
         let mut place: Vec<Option<usize>> = Vec::new();
         for piece in &part.pieces {
-            let before = piece.parent.map(|p| place[p]);
-            let start = match before {
+            let parent = piece.parent.map(|p| place[p]);
+            let start = match parent {
                 None => Some(from),
-                Some(before) => before.map(|k| out[k].1),
+                Some(parent) => parent.map(|k| out[k].to),
             };
             let to = from + turn * piece.to * reach_px;
-            let kept =
-                start.filter(|&start| fits(start, to) && (to - start).norm() >= self.least_px);
-            place.push(kept.map(|_| out.len()));
-            if kept.is_some() {
-                out.push((before.flatten(), to));
+            let fits = start.is_some_and(|start| {
+                (self.room)(&start, &to) && (to - start).norm() >= self.least_px
+            });
+            place.push(fits.then_some(out.len()));
+            if fits {
+                out.push(TwigPiece {
+                    parent: parent.flatten(),
+                    to,
+                });
             }
         }
         out
@@ -248,48 +248,37 @@ impl Maker<'_> {
 
     fn append(
         &self,
-        twig: &[(Option<usize>, Point3<f64>)],
+        twig: &[TwigPiece],
         stem: &Stem,
         random: &mut Generator,
         grown: &mut Vec<Grown>,
     ) -> Vec<f64> {
         let first = grown.len();
-        let mut reaches = vec![0.0_f64; twig.len()];
-        for &(before, to) in twig {
-            let from = before.map_or(stem.from, |b| twig[b].1);
-            let came = before.map_or(stem.along, |b| grown[first + b].limb.arrives());
+        for &TwigPiece { parent, to } in twig {
+            let from = parent.map_or(stem.from, |b| twig[b].to);
+            let came = parent.map_or(stem.along, |b| grown[first + b].limb.arrives());
             let along = (to - from).normalize();
-            let leaves = (along + came * (0.5 * along.dot(&came).max(0.0)))
-                .try_normalize(0.1)
-                .unwrap_or(along);
+            let leaves = side_departure(along, came);
             // Twigs turn up to the light.
-            let arrives = (along + Vector3::y() * (0.3 * self.habit.lift))
+            let arrives = (along + Vector3::y() * (0.3 * self.branching.lift))
                 .try_normalize(0.1)
                 .unwrap_or(along);
             let curve = Curve::new([from, to], leaves, arrives, self.curl, random);
-            let station = |i: u32| {
-                let at = curve.at(f64::from(i) / f64::from(PIECES));
-                Station {
-                    at,
-                    radius: 0.0,
-                    riding: stem.riding,
-                }
-            };
-            let (parent, at) = before.map_or((stem.bud.host, stem.bud.at), |b| (first + b, 1.0));
-            let stations = (0..=PIECES).map(station).collect();
+            let (parent, at) = parent.map_or((stem.bud.host, stem.bud.at), |b| (first + b, 1.0));
             grown.push(Grown {
                 limb: Limb {
                     node: stem.node,
                     parent: Some(parent),
                     twig: true,
-                    stations,
+                    samples: centerline(&curve, stem.skin),
                 },
                 at,
             });
         }
-        for (k, &(before, _)) in twig.iter().enumerate().rev() {
+        let mut reaches = vec![0.0_f64; twig.len()];
+        for (k, piece) in twig.iter().enumerate().rev() {
             let through = grown[first + k].limb.length() + reaches[k];
-            if let Some(b) = before {
+            if let Some(b) = piece.parent {
                 reaches[b] = reaches[b].max(through);
             }
         }
@@ -297,11 +286,55 @@ impl Maker<'_> {
     }
 }
 
+/// A piece of a twig: where it ends, and the earlier piece that it grows from the end of.
+#[derive(Clone, Copy, Debug)]
+struct TwigPiece {
+    parent: Option<usize>,
+    to: Point3<f64>,
+}
+
+/// The middle line of a piece of a twig, all of which moves with `skin`; how thick it is is not
+/// known yet.
+fn centerline(curve: &Curve, skin: SkinWeights) -> Vec<CenterlineSample> {
+    let mut samples = Vec::with_capacity(PIECES as usize + 1);
+    for i in 0..=PIECES {
+        samples.push(CenterlineSample {
+            at: curve.at(f64::from(i) / f64::from(PIECES)),
+            radius: 0.0,
+            skin,
+        });
+    }
+    samples
+}
+
 /// Where a twig leaves what carries it.
 struct Stem {
     bud: Bud,
     from: Point3<f64>,
+    /// Direction of the carrier there, of length 1.
     along: Vector3<f64>,
-    riding: super::limb::Riding,
-    node: crate::model::NodeId,
+    skin: SkinWeights,
+    node: NodeId,
+}
+
+impl Stem {
+    /// `None` where the carrier has no direction.
+    fn of(bud: Bud, host: &Limb) -> Option<Self> {
+        let (a, b, s) = host.between(bud.at)?;
+        Some(Self {
+            bud,
+            from: a.at + (b.at - a.at) * s,
+            along: (b.at - a.at).try_normalize(1e-9)?,
+            skin: a.skin.towards(b.skin, s as f32),
+            node: host.node,
+        })
+    }
+
+    /// The direction at `angle` to the carrier, `turn` around it, radians.
+    fn leaving_at(&self, angle: f64, turn: f64) -> Vector3<f64> {
+        let (sin, cos) = turn.sin_cos();
+        let side = square_to(self.along);
+        let out = side * cos + self.along.cross(&side) * sin;
+        self.along * angle.cos() + out * angle.sin()
+    }
 }

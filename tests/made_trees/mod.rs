@@ -15,7 +15,7 @@ use chance::Chance;
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::TAU;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Drive {
     /// Held still, and let go at this time, s.
     Release(f64),

@@ -1,10 +1,10 @@
 //! Wood that is invented must not stand out of the crown that the film shows in leaf.
 
-use super::LeafView;
 use super::carry::Carried;
 use super::target::Target;
+use super::view::{LeafView, tree_height};
 use crate::model::Skeleton;
-use crate::shape::Limb;
+use crate::shape::limb::Limb;
 
 /// Less of the smoothed density than this is beyond the leaves: it is a half at their edge.
 const EDGE: f32 = 0.4;
@@ -17,24 +17,12 @@ pub fn within_leaves(limbs: Vec<Limb>, skeleton: &Skeleton, view: &LeafView) -> 
     if view.density.is_some() {
         return limbs;
     }
-    let Some(target) = Target::new(skeleton, view, super::height(skeleton)) else {
+    let Some(target) = Target::new(skeleton, view, tree_height(skeleton)) else {
         return limbs;
     };
     let mut stays: Vec<bool> = limbs
         .iter()
-        .map(|limb| {
-            let invented = limb.twig
-                || skeleton
-                    .nodes
-                    .get(limb.node.index())
-                    .is_some_and(|n| n.copy_of.is_some());
-            let Some(tip) = limb.stations.last().filter(|_| invented) else {
-                return true;
-            };
-            let seen = Carried::by(&tip.riding, skeleton, view.pose).posed(&tip.at);
-            let cell = target.grid.index(target.grid.cell_of(&seen));
-            cell.is_some_and(|i| target.density[i] >= EDGE)
-        })
+        .map(|limb| !is_invented(limb, skeleton) || ends_in_leaves(limb, skeleton, view, &target))
         .collect();
     // What carries a limb comes before it.
     for k in (0..limbs.len()).rev() {
@@ -52,16 +40,30 @@ pub fn within_leaves(limbs: Vec<Limb>, skeleton: &Skeleton, view: &LeafView) -> 
     kept
 }
 
+fn is_invented(limb: &Limb, skeleton: &Skeleton) -> bool {
+    let node = skeleton.nodes.get(limb.node.index());
+    limb.twig || node.is_some_and(|n| n.copy_of.is_some())
+}
+
+fn ends_in_leaves(limb: &Limb, skeleton: &Skeleton, view: &LeafView, target: &Target) -> bool {
+    let Some(tip) = limb.samples.last() else {
+        return true;
+    };
+    let seen = Carried::by(&tip.skin, skeleton, view.pose).posed(&tip.at);
+    let cell = target.grid.index(target.grid.cell_of(&seen));
+    cell.is_some_and(|i| target.density[i] >= EDGE)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::model::{Node, NodeId, NodeName, Outline, Rgb, Size};
-    use crate::shape::{Riding, Station};
+    use crate::shape::limb::CenterlineSample;
+    use crate::shape::skin::SkinWeights;
     use nalgebra::Point3;
 
-    /// A trunk with two branches to the sides of a green square; `copied` of them are invented.
-    fn tree(copied: [bool; 2]) -> (Skeleton, Vec<Limb>) {
-        let node = |i: u32, parent: Option<u32>, at: [f64; 3], copied: bool| Node {
+    fn node(i: u32, parent: Option<u32>, at: [f64; 3], copied: bool) -> Node {
+        Node {
             name: NodeName(i),
             parent: parent.map(NodeId),
             level: parent.map_or(0, |p| if p == 0 { 1 } else { 2 }),
@@ -72,29 +74,38 @@ mod tests {
             copy_of: copied.then_some(NodeId(1)),
             plane_angle: 0.0,
             kind: Default::default(),
-        };
+        }
+    }
+
+    /// The branch that ends in node `k` as a straight limb.
+    fn limb(nodes: &[Node], k: usize, parent: Option<usize>) -> Limb {
+        let from = nodes[k].parent.map_or(0, |p| p.index());
+        let samples = [from, k].map(|i| CenterlineSample {
+            at: nodes[i].position,
+            radius: 1.0,
+            skin: SkinWeights::between(NodeId(from as u32), NodeId(k as u32), 1.0),
+        });
+        Limb {
+            node: NodeId(k as u32),
+            parent,
+            twig: false,
+            samples: samples.into(),
+        }
+    }
+
+    /// A trunk with two branches to the sides of a green square; `copied` of them are invented.
+    fn tree(copied: [bool; 2]) -> (Skeleton, Vec<Limb>) {
         let nodes = vec![
             node(0, None, [0.0; 3], false),
             node(1, Some(0), [0.0, 40.0, 0.0], false),
             node(2, Some(1), [0.0, 80.0, 10.0], copied[0]),
             node(3, Some(1), [45.0, 60.0, 10.0], copied[1]),
         ];
-        let limb = |k: usize, parent: Option<usize>| {
-            let from = nodes[k].parent.map_or(0, |p| p.index());
-            let station = |at: Point3<f64>| Station {
-                at,
-                radius: 1.0,
-                riding: Riding::between(NodeId(from as u32), NodeId(k as u32), 1.0),
-            };
-            let stations = vec![station(nodes[from].position), station(nodes[k].position)];
-            Limb {
-                node: NodeId(k as u32),
-                parent,
-                twig: false,
-                stations,
-            }
-        };
-        let limbs = vec![limb(1, None), limb(3, Some(0)), limb(2, Some(0))];
+        let limbs = vec![
+            limb(&nodes, 1, None),
+            limb(&nodes, 3, Some(0)),
+            limb(&nodes, 2, Some(0)),
+        ];
         (
             Skeleton {
                 nodes,
@@ -109,25 +120,15 @@ mod tests {
         let (skeleton, limbs) = tree(copied);
         // Leaves from the crown's top down to its middle, and not out at the side; sky elsewhere.
         let size = Size::new(100, 101);
-        let colour = |i: usize| {
-            if (30..70).contains(&(i % 100)) && i / 100 < 60 {
-                [60, 110, 40]
-            } else {
-                [150, 180, 230]
-            }
-        };
-        let picture = Rgb {
-            size,
-            pixels: (0..size.area()).flat_map(colour).collect(),
-        };
-        let inside = |i: usize| {
-            if (5..97).contains(&(i % 100)) && (2..70).contains(&(i / 100)) {
-                255
-            } else {
-                0
-            }
-        };
-        let mask = (0..size.area()).map(inside).collect();
+        let (mut pixels, mut mask) = (Vec::new(), Vec::new());
+        for i in 0..size.area() {
+            let (u, v) = (i % 100, i / 100);
+            let leaf = (30..70).contains(&u) && v < 60;
+            let inside = (5..97).contains(&u) && (2..70).contains(&v);
+            pixels.extend(if leaf { [60, 110, 40] } else { [150, 180, 230] });
+            mask.push(if inside { 255 } else { 0 });
+        }
+        let picture = Rgb { size, pixels };
         let outline = Outline {
             size,
             mask,

@@ -2,6 +2,7 @@
 
 use crate::model::{Outline, Rgb, Size, Skeleton};
 use nalgebra::Point3;
+use std::ops::Range;
 
 /// Wider pictures are counted at a whole part of their width: leaves are chosen by their density,
 /// not by the pixel.
@@ -80,28 +81,30 @@ impl Grid {
             return Some(pixels.to_vec());
         }
         let (cw, ch) = (self.size.width as usize, self.size.height as usize);
-        let span = |k: usize, from: usize, to: usize| {
-            let first = k * from / to;
-            first..((k + 1) * from / to).clamp(first + 1, from.max(first + 1))
-        };
         let mut out = Vec::with_capacity(channels * cw * ch);
         for v in 0..ch {
             for u in 0..cw {
-                let (rows, columns) = (span(v, h, ch), span(u, w, cw));
+                let (rows, columns) = (pixels_of(v, ch, h), pixels_of(u, cw, w));
                 let n = (rows.len() * columns.len()) as u32;
                 for c in 0..channels {
-                    let row = |y: usize| columns.clone().map(move |x| channels * (y * w + x) + c);
-                    let sum: u32 = rows
-                        .clone()
-                        .flat_map(row)
-                        .map(|i| u32::from(pixels[i]))
-                        .sum();
+                    let mut sum = 0u32;
+                    for y in rows.clone() {
+                        for x in columns.clone() {
+                            sum += u32::from(pixels[channels * (y * w + x) + c]);
+                        }
+                    }
                     out.push(((sum + n / 2) / n) as u8);
                 }
             }
         }
         Some(out)
     }
+}
+
+/// The pixels of a row or column of `count` that lie in cell `k` of `cells`.
+fn pixels_of(k: usize, cells: usize, count: usize) -> Range<usize> {
+    let first = k * count / cells;
+    first..((k + 1) * count / cells).clamp(first + 1, count.max(first + 1))
 }
 
 /// Picture and outline on the grid.
@@ -140,11 +143,9 @@ impl Canvas {
     /// First and last row with something inside.
     pub fn rows(&self) -> (usize, usize) {
         let w = self.grid.size.width as usize;
-        let row = |i: Option<usize>| i.map_or(0, |i| i / w);
-        (
-            row(self.inside.iter().position(|&m| m)),
-            row(self.inside.iter().rposition(|&m| m)),
-        )
+        let first = self.inside.iter().position(|&m| m).unwrap_or(0);
+        let last = self.inside.iter().rposition(|&m| m).unwrap_or(0);
+        (first / w, last / w)
     }
 }
 

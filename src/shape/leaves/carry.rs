@@ -1,7 +1,7 @@
 //! Where a pose carries what sits on the tree: linear blend skinning, as every viewer does it.
 
 use crate::model::{Pose, Skeleton};
-use crate::shape::Riding;
+use crate::shape::skin::SkinWeights;
 use nalgebra::{Matrix3, Point3, Vector3};
 
 /// A point at rest goes to `turn` times it plus `way`.
@@ -12,7 +12,7 @@ pub(super) struct Carried {
 }
 
 impl Carried {
-    pub fn by(riding: &Riding, skeleton: &Skeleton, pose: Option<&Pose>) -> Self {
+    pub fn by(skin: &SkinWeights, skeleton: &Skeleton, pose: Option<&Pose>) -> Self {
         let still = Self {
             turn: Matrix3::identity(),
             way: Vector3::zeros(),
@@ -21,10 +21,10 @@ impl Carried {
             return still;
         };
         let (mut turn, mut way) = (Matrix3::zeros(), Vector3::zeros());
-        for (&joint, &weight) in riding
+        for (&joint, &weight) in skin
             .joints
             .iter()
-            .zip(&riding.weights)
+            .zip(&skin.weights)
             .filter(|(_, w)| **w > 0.0)
         {
             let Some(node) = skeleton.nodes.get(usize::from(joint)) else {
@@ -61,14 +61,14 @@ impl Carried {
     }
 }
 
-/// Between two ways of riding, with share `t` (0 to 1) of the second.
-pub(super) fn between(a: &Riding, b: &Riding, t: f64) -> Riding {
+/// Between two skins, with share `t` (0 to 1) of the second.
+pub(super) fn between(a: &SkinWeights, b: &SkinWeights, t: f64) -> SkinWeights {
     let mut shares: Vec<(u16, f32)> = Vec::with_capacity(8);
-    for (riding, part) in [(a, 1.0 - t as f32), (b, t as f32)] {
-        for (&joint, &weight) in riding
+    for (skin, part) in [(a, 1.0 - t as f32), (b, t as f32)] {
+        for (&joint, &weight) in skin
             .joints
             .iter()
-            .zip(&riding.weights)
+            .zip(&skin.weights)
             .filter(|(_, w)| **w * part > 1e-4)
         {
             match shares.iter_mut().find(|(j, _)| *j == joint) {
@@ -80,12 +80,12 @@ pub(super) fn between(a: &Riding, b: &Riding, t: f64) -> Riding {
     shares.sort_by(|x, y| y.1.total_cmp(&x.1).then(x.0.cmp(&y.0)));
     shares.truncate(4);
     let sum: f32 = shares.iter().map(|s| s.1).sum();
-    let mut riding = Riding {
+    let mut skin = SkinWeights {
         joints: [0; 4],
         weights: [0.0; 4],
     };
     for (k, (joint, share)) in shares.into_iter().enumerate() {
-        (riding.joints[k], riding.weights[k]) = (joint, share / sum.max(f32::MIN_POSITIVE));
+        (skin.joints[k], skin.weights[k]) = (joint, share / sum.max(f32::MIN_POSITIVE));
     }
-    riding
+    skin
 }

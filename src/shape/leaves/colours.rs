@@ -43,9 +43,9 @@ pub(super) fn shares(canvas: &Canvas) -> Shares {
     Shares { tree, leaf }
 }
 
-fn bin([r, g, b]: [u8; 3]) -> u16 {
-    let step = |c: u8| usize::from(c) * STEPS / 256;
-    ((step(r) * STEPS + step(g)) * STEPS + step(b)) as u16
+fn bin(colour: [u8; 3]) -> u16 {
+    let [r, g, b] = colour.map(|c| usize::from(c) * STEPS / 256);
+    ((r * STEPS + g) * STEPS + b) as u16
 }
 
 fn tree(canvas: &Canvas, bins: &[u16]) -> Vec<f32> {
@@ -53,19 +53,20 @@ fn tree(canvas: &Canvas, bins: &[u16]) -> Vec<f32> {
     let (top, bottom) = canvas.rows();
     let height = (bottom + 1 - top) as f64;
     let away = distance_outside(&canvas.inside, width);
-    let near = |i: usize| away[i] > 2.0 && f64::from(away[i]) < REACH * height;
     let step = height / (BANDS - 1) as f64;
     let mut share = vec![0.0f32; bins.len()];
     for k in 0..BANDS {
-        let middle = top as f64 + step * k as f64;
-        let weight_at =
-            |v: usize, reach: f64| (1.0 - (v as f64 - middle).abs() / (reach * step)).max(0.0);
+        let band = Band {
+            middle: top as f64 + step * k as f64,
+            step,
+        };
         let (mut inside, mut outside) = (Histogram::default(), Histogram::default());
         for (i, &bin) in bins.iter().enumerate() {
-            let weight = weight_at(i / width, 1.5);
+            let weight = band.weight(i / width, 1.5);
+            let near = away[i] > 2.0 && f64::from(away[i]) < REACH * height;
             if weight > 0.0 && canvas.inside[i] {
                 inside.add(bin, weight);
-            } else if weight > 0.0 && near(i) {
+            } else if weight > 0.0 && near {
                 outside.add(bin, weight);
             }
         }
@@ -73,7 +74,7 @@ fn tree(canvas: &Canvas, bins: &[u16]) -> Vec<f32> {
         for (i, &bin) in bins.iter().enumerate().filter(|(i, _)| canvas.inside[*i]) {
             // Bands pass into each other; above the first and below the last there is nothing
             // inside.
-            let weight = weight_at(i / width, 1.0);
+            let weight = band.weight(i / width, 1.0);
             if weight > 0.0 {
                 share[i] += (weight * (1.0 - background.at(bin))) as f32;
             }
@@ -81,6 +82,20 @@ fn tree(canvas: &Canvas, bins: &[u16]) -> Vec<f32> {
     }
     // What is half one and half the other is mostly a colour that both have.
     share.iter().map(|&p| smooth_step(0.2, 0.8, p)).collect()
+}
+
+/// Heights of which the background is learned together, rows.
+struct Band {
+    middle: f64,
+    /// To the next band.
+    step: f64,
+}
+
+impl Band {
+    /// How much row `v` belongs to it, 0 to 1: nothing farther than `reach` steps from its middle.
+    fn weight(&self, v: usize, reach: f64) -> f64 {
+        (1.0 - (v as f64 - self.middle).abs() / (reach * self.step)).max(0.0)
+    }
 }
 
 /// Tree that has not the trunk's colours.
@@ -152,11 +167,11 @@ impl Histogram {
             let before = values.clone();
             for (i, value) in values.iter_mut().enumerate() {
                 let at = (i / stride) % STEPS;
-                let tap = |k: usize| {
+                *value = 0.0;
+                for (k, weight) in KERNEL.iter().enumerate() {
                     let to = (at + k).saturating_sub(2).min(STEPS - 1);
-                    before[i - at * stride + to * stride] * KERNEL[k]
-                };
-                *value = (0..5).map(tap).sum();
+                    *value += before[i - at * stride + to * stride] * weight;
+                }
             }
         }
         let sum: f64 = values.iter().sum();
@@ -202,42 +217,35 @@ impl Histogram {
 
 /// Way of every cell to the inside, in cells (chamfer 3-4, Borgefors 1986).
 fn distance_outside(inside: &[bool], width: usize) -> Vec<f32> {
-    let height = inside.len() / width.max(1);
     let mut way: Vec<f32> = inside.iter().map(|&m| if m { 0.0 } else { 1e9 }).collect();
-    let reach = |way: &mut [f32], i: usize, j: usize, cost: f32| way[i] = way[i].min(way[j] + cost);
-    for v in 0..height {
-        for u in 0..width {
-            let i = v * width + u;
-            if u > 0 {
-                reach(&mut way, i, i - 1, 1.0);
-            }
-            if v > 0 {
-                reach(&mut way, i, i - width, 1.0);
-                if u > 0 {
-                    reach(&mut way, i, i - width - 1, 4.0 / 3.0);
-                }
-                if u + 1 < width {
-                    reach(&mut way, i, i - width + 1, 4.0 / 3.0);
-                }
-            }
-        }
+    for i in 0..way.len() {
+        way[i] = shortest_behind(&way, width, i);
     }
-    for v in (0..height).rev() {
-        for u in (0..width).rev() {
-            let i = v * width + u;
-            if u + 1 < width {
-                reach(&mut way, i, i + 1, 1.0);
-            }
-            if v + 1 < height {
-                reach(&mut way, i, i + width, 1.0);
-                if u > 0 {
-                    reach(&mut way, i, i + width - 1, 4.0 / 3.0);
-                }
-                if u + 1 < width {
-                    reach(&mut way, i, i + width + 1, 4.0 / 3.0);
-                }
-            }
-        }
+    // From the last cell to the first the same is at work with all directions turned round.
+    way.reverse();
+    for i in 0..way.len() {
+        way[i] = shortest_behind(&way, width, i);
     }
+    way.reverse();
     way
+}
+
+/// The way from cell `i`, its own or by one of the four neighbours that come before it.
+fn shortest_behind(way: &[f32], width: usize, i: usize) -> f32 {
+    const DIAGONAL: f32 = 4.0 / 3.0;
+    let (u, has_row_before) = (i % width, i >= width);
+    let mut shortest = way[i];
+    if u > 0 {
+        shortest = shortest.min(way[i - 1] + 1.0);
+    }
+    if has_row_before {
+        shortest = shortest.min(way[i - width] + 1.0);
+    }
+    if has_row_before && u > 0 {
+        shortest = shortest.min(way[i - width - 1] + DIAGONAL);
+    }
+    if has_row_before && u + 1 < width {
+        shortest = shortest.min(way[i - width + 1] + DIAGONAL);
+    }
+    shortest
 }

@@ -1,6 +1,7 @@
 //! Density: which share of the picture around a place is covered.
 
 use super::canvas::Grid;
+use std::ops::Range;
 
 /// A density map is smoothed over this share of the tree's height (standard deviation): some
 /// leaves, not one.
@@ -42,26 +43,30 @@ fn mean_along(row: &mut [f32], radius: usize) {
 fn mean_down(values: &mut [f32], width: usize, radius: usize) {
     let before = values.to_vec();
     let share = 1.0 / (2 * radius + 1) as f64;
-    let row = |v: usize| before.get(v * width..(v + 1) * width).unwrap_or_default();
     let mut sums = vec![0.0f64; width];
     for v in 0..radius {
-        sums.iter_mut()
-            .zip(row(v))
-            .for_each(|(s, &x)| *s += f64::from(x));
-    }
-    for (v, out) in values.chunks_exact_mut(width).enumerate() {
-        sums.iter_mut()
-            .zip(row(v + radius))
-            .for_each(|(s, &x)| *s += f64::from(x));
-        out.iter_mut()
-            .zip(&sums)
-            .for_each(|(o, s)| *o = (s * share) as f32);
-        if let Some(first) = v.checked_sub(radius) {
-            sums.iter_mut()
-                .zip(row(first))
-                .for_each(|(s, &x)| *s -= f64::from(x));
+        for (sum, &x) in sums.iter_mut().zip(row(&before, width, v)) {
+            *sum += f64::from(x);
         }
     }
+    for (v, out) in values.chunks_exact_mut(width).enumerate() {
+        for (sum, &x) in sums.iter_mut().zip(row(&before, width, v + radius)) {
+            *sum += f64::from(x);
+        }
+        for (out, sum) in out.iter_mut().zip(&sums) {
+            *out = (sum * share) as f32;
+        }
+        if let Some(first) = v.checked_sub(radius) {
+            for (sum, &x) in sums.iter_mut().zip(row(&before, width, first)) {
+                *sum -= f64::from(x);
+            }
+        }
+    }
+}
+
+/// Row `v`; nothing beyond the last one.
+fn row(values: &[f32], width: usize, v: usize) -> &[f32] {
+    values.get(v * width..(v + 1) * width).unwrap_or_default()
 }
 
 /// Correlation (Pearson) of two maps over the cells where `counts`; 0 where one of them is the same
@@ -115,23 +120,15 @@ impl<'a> Cover<'a> {
         if area == 0.0 || !area.is_finite() {
             return;
         }
-        let (width, height) = (
-            f64::from(self.grid.size.width),
-            f64::from(self.grid.size.height),
-        );
-        let low = |k: usize| a[k].min(b[k]).min(c[k]).ceil().max(0.0);
-        let high = |k: usize, most: f64| a[k].max(b[k]).max(c[k]).floor().min(most - 1.0);
-        let (left, right, top, bottom) = (low(0), high(0, width), low(1), high(1, height));
-        if left > right || top > bottom {
-            return;
-        }
-        let side = |p: [f64; 2], q: [f64; 2], u: f64, v: f64| {
-            ((q[0] - p[0]) * (v - p[1]) - (q[1] - p[1]) * (u - p[0])) * area.signum()
-        };
-        for v in top as usize..=bottom as usize {
-            for u in left as usize..=right as usize {
-                let (x, y) = (u as f64, v as f64);
-                if side(a, b, x, y) >= 0.0 && side(b, c, x, y) >= 0.0 && side(c, a, x, y) >= 0.0 {
+        let columns = cells_between([a[0], b[0], c[0]], self.grid.size.width);
+        let rows = cells_between([a[1], b[1], c[1]], self.grid.size.height);
+        for v in rows {
+            for u in columns.clone() {
+                let at = [u as f64, v as f64];
+                let inside = [(a, b), (b, c), (c, a)]
+                    .into_iter()
+                    .all(|(p, q)| side(p, q, at) * area.signum() >= 0.0);
+                if inside {
                     let i = v * self.grid.size.width as usize + u;
                     if self
                         .before
@@ -146,6 +143,24 @@ impl<'a> Cover<'a> {
     }
 }
 
+/// On which side of the line from `p` to `q` a place is: positive to the left, 0 on it.
+fn side(p: [f64; 2], q: [f64; 2], at: [f64; 2]) -> f64 {
+    (q[0] - p[0]) * (at[1] - p[1]) - (q[1] - p[1]) * (at[0] - p[0])
+}
+
+/// Those of `count` cells in a row whose middles lie within the stretch that holds all of `ends`;
+/// none may.
+fn cells_between(ends: [f64; 3], count: u32) -> Range<usize> {
+    let [a, b, c] = ends;
+    let low = a.min(b).min(c).ceil().max(0.0);
+    let high = a.max(b).max(c).floor().min(f64::from(count) - 1.0);
+    if low <= high {
+        low as usize..high as usize + 1
+    } else {
+        0..0
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -157,8 +172,10 @@ mod tests {
         one[50 * 101 + 50] = 1.0;
         let out = smoothed(&one, 101, 6.0);
         let sum: f64 = out.iter().map(|&x| f64::from(x)).sum();
-        let spread = |i: usize, x: &f32| f64::from(*x) * ((i % 101) as f64 - 50.0).powi(2);
-        let variance: f64 = out.iter().enumerate().map(|(i, x)| spread(i, x)).sum();
+        let mut variance = 0.0;
+        for (i, x) in out.iter().enumerate() {
+            variance += f64::from(*x) * ((i % 101) as f64 - 50.0).powi(2);
+        }
         assert!((sum - 1.0).abs() < 1e-4, "{sum}");
         assert!((variance.sqrt() - 6.0).abs() < 0.5, "{}", variance.sqrt());
     }

@@ -1,11 +1,12 @@
 //! Clusters to meshes: one for each branch of the first fork, with the two displacements of B.2.
 
+use super::attachment::AttachmentPoint;
 use super::cluster::Cluster;
-use super::perch::Perch;
 use super::target::Target;
 use super::template::Template;
+use super::view::PLAIN;
 use crate::model::{NodeId, Skeleton};
-use crate::shape::FoliageGroup;
+use crate::shape::foliage::FoliageGroup;
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::TAU;
 
@@ -28,7 +29,7 @@ const LOW: f64 = 0.1;
 /// The meshes of all clusters.
 pub(super) fn groups(
     clusters: &[Cluster],
-    perches: &[Perch],
+    attachments: &[AttachmentPoint],
     skeleton: &Skeleton,
     target: Option<&Target>,
     template: &Template,
@@ -37,7 +38,7 @@ pub(super) fn groups(
     let fork_branch = fork_branches(skeleton);
     let of: Vec<usize> = clusters
         .iter()
-        .map(|c| fork_branch[perches[c.perch].node.index()])
+        .map(|c| fork_branch[attachments[c.attachment].node.index()])
         .collect();
     let stands = kept(&of, skeleton);
     let mut nodes: Vec<usize> = stands.clone();
@@ -62,7 +63,7 @@ pub(super) fn groups(
     };
     for (cluster, stand) in clusters.iter().zip(&stands) {
         if let Ok(k) = nodes.binary_search(stand) {
-            drawer.draw(cluster, &perches[cluster.perch], &mut out[k]);
+            drawer.draw(cluster, &attachments[cluster.attachment], &mut out[k]);
         }
     }
     out
@@ -106,19 +107,25 @@ fn kept(of: &[usize], skeleton: &Skeleton) -> Vec<usize> {
         .filter(|(k, c)| *k == 0 || *k < MOST_GROUPS && c.0 > least)
         .map(|(_, c)| c.1)
         .collect();
-    let place = |n: usize| skeleton.nodes[n].position;
-    let nearest = |&node: &usize| {
-        if large.contains(&node) {
-            return node;
-        }
-        let way = |n: &usize| (place(*n) - place(node)).norm();
-        large
-            .iter()
-            .copied()
-            .min_by(|a, b| way(a).total_cmp(&way(b)))
-            .unwrap_or(node)
-    };
-    of.iter().map(nearest).collect()
+    of.iter()
+        .map(|&node| {
+            if large.contains(&node) {
+                node
+            } else {
+                nearest(&large, node, skeleton).unwrap_or(node)
+            }
+        })
+        .collect()
+}
+
+/// Of the nodes `among` the one nearest to `node`.
+fn nearest(among: &[usize], node: usize, skeleton: &Skeleton) -> Option<usize> {
+    let at = skeleton.nodes[node].position;
+    among
+        .iter()
+        .map(|&n| ((skeleton.nodes[n].position - at).norm(), n))
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, n)| n)
 }
 
 struct Drawer<'a> {
@@ -131,10 +138,24 @@ struct Drawer<'a> {
 }
 
 impl Drawer<'_> {
-    fn draw(&self, cluster: &Cluster, perch: &Perch, group: &mut FoliageGroup) {
+    /// Colour of a leaf that is seen at `posed` in a cluster of `size` px (sRGB).
+    fn colour(&self, posed: &Point3<f64>, size: f64) -> [u8; 3] {
+        let film = match self.target {
+            Some(target) => {
+                let radius = (0.15 * target.grid.length(size)).max(1.0);
+                target.soft_colour(target.grid.cell_of(posed), radius)
+            }
+            None => PLAIN.map(f64::from),
+        };
+        // Colour times texture is to be what the film shows.
+        let texture = self.template.texture_mean;
+        [0, 1, 2].map(|k| (film[k] / texture[k].max(0.05)).round().clamp(0.0, 255.0) as u8)
+    }
+
+    fn draw(&self, cluster: &Cluster, attachment: &AttachmentPoint, group: &mut FoliageGroup) {
         let template = self.template;
         let first = group.mesh.positions.len() as u32;
-        let node = self.skeleton.nodes[perch.node.index()].position;
+        let node = self.skeleton.nodes[attachment.node.index()].position;
         // beta of B.2: later the farther from the branch's node.
         let way = (cluster.centre - node).norm();
         let beta = if way.is_finite() {
@@ -143,7 +164,7 @@ impl Drawer<'_> {
             0.0
         };
         let axis = cluster.turn * Vector3::y();
-        let leaves = Leaves::of(self, cluster, perch);
+        let leaves = Leaves::of(self, cluster, attachment);
         for (i, p) in template.positions.iter().enumerate() {
             let leaf = template.leaf_of[i] as usize;
             let at = cluster.at(template, p);
@@ -166,8 +187,8 @@ impl Drawer<'_> {
                 .push(at.coords.map(|x| x as f32).into());
             group.mesh.normals.push(normal.map(|x| x as f32).into());
             group.mesh.uvs.push(template.uvs[i]);
-            group.mesh.joints.push(perch.riding.joints);
-            group.mesh.weights.push(perch.riding.weights);
+            group.mesh.joints.push(attachment.skin.joints);
+            group.mesh.weights.push(attachment.skin.weights);
             group.colours.push(leaves.colours[leaf]);
             group.sine.push(sine.map(|x| x as f32).into());
             group.cosine.push(cosine.map(|x| x as f32).into());
@@ -189,7 +210,7 @@ struct Leaves {
 }
 
 impl Leaves {
-    fn of(drawer: &Drawer, cluster: &Cluster, perch: &Perch) -> Self {
+    fn of(drawer: &Drawer, cluster: &Cluster, attachment: &AttachmentPoint) -> Self {
         let template = drawer.template;
         let count = template.apices.len();
         let (mut sums, mut sizes) = (vec![Vector3::zeros(); count], vec![0.0; count]);
@@ -207,23 +228,12 @@ impl Leaves {
             .iter()
             .map(|a| cluster.at(template, a))
             .collect();
-        let stalk = |(m, a): (&Point3<f64>, &Point3<f64>)| {
-            (m - a).try_normalize(1e-9).unwrap_or(Vector3::zeros())
-        };
-        let stalks = middles.iter().zip(&apices).map(stalk).collect();
-        let colour = |middle: &Point3<f64>| {
-            let film = drawer.target.map_or(super::PLAIN.map(f64::from), |t| {
-                let cell = t.grid.cell_of(&perch.carried.posed(middle));
-                t.soft_colour(cell, (0.15 * t.grid.length(cluster.size)).max(1.0))
-            });
-            // Colour times texture is to be what the film shows.
-            std::array::from_fn(|k| {
-                (film[k] / template.texture_mean[k].max(0.05))
-                    .round()
-                    .clamp(0.0, 255.0) as u8
-            })
-        };
-        let colours = middles.iter().map(colour).collect();
+        let (mut stalks, mut colours) = (Vec::new(), Vec::new());
+        for (middle, apex) in middles.iter().zip(&apices) {
+            let stalk = (middle - apex).try_normalize(1e-9);
+            stalks.push(stalk.unwrap_or_else(Vector3::zeros));
+            colours.push(drawer.colour(&attachment.carried.posed(middle), cluster.size));
+        }
         Self {
             apices,
             stalks,

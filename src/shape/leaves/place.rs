@@ -1,13 +1,13 @@
 //! Where clusters stand and how large they are, so that their density is that of the picture.
 
-use super::cluster::{Cluster, stand};
+use super::attachment::{AttachmentPoint, AttachmentPoints, Side};
+use super::cluster::{Cluster, orientation};
 use super::density::{Cover, correlation, smoothed};
 use super::hidden::emptiest;
-use super::perch::{Perch, Perches, Side};
 use super::target::Target;
 use super::template::Template;
+use super::view::Sampling;
 use crate::random::{Generator, generator};
-use crate::shape::leaves::Sampling;
 use nalgebra::{Point3, Vector3};
 use rand::RngExt;
 use rand::seq::IndexedRandom;
@@ -40,8 +40,8 @@ const CUBE: f64 = 1.5;
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// All that decides where a cluster goes.
-pub(super) struct Planter<'a> {
-    pub perches: Perches,
+pub(super) struct LeafPlacer<'a> {
+    pub attachments: AttachmentPoints,
     /// Depth of the foremost wood in every cell.
     pub wood: Vec<f32>,
     pub target: &'a Target,
@@ -57,12 +57,12 @@ pub(super) struct Planter<'a> {
     pub sampling: Sampling,
 }
 
-impl Planter<'_> {
+impl LeafPlacer<'_> {
     /// Of the sizes tried, the clusters whose density is most like the target's.
     pub fn plant(&mut self) -> Vec<Cluster> {
         let wanted: f64 = self.target.wanted.iter().map(|&w| f64::from(w)).sum();
         let cells = self.target.grid.length(1.0).max(1e-9).powi(2);
-        if self.perches.all.is_empty() || self.count == 0 || wanted < 1.0 {
+        if self.attachments.all.is_empty() || self.count == 0 || wanted < 1.0 {
             return Vec::new();
         }
         let one = self.template.mean_area().max(1e-9);
@@ -72,13 +72,10 @@ impl Planter<'_> {
             let (clusters, covered) = self.attempt(size);
             let width = self.target.grid.size.width as usize;
             let density = smoothed(&covered, width, self.target.sigma);
-            let likeness = -density
-                .iter()
-                .zip(&self.target.density)
-                .map(|(a, b)| f64::from(a - b).powi(2))
-                .sum::<f64>();
-            if best.as_ref().is_none_or(|(before, _)| likeness > *before) {
-                best = Some((likeness, clusters));
+            let pairs = density.iter().zip(&self.target.density);
+            let off: f64 = pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum();
+            if best.as_ref().is_none_or(|(before, _)| off < *before) {
+                best = Some((off, clusters));
             }
             let covered: f64 = covered.iter().map(|&c| f64::from(c)).sum();
             let next = self.bounded(size * (wanted / covered.max(1.0)).powf(0.8).clamp(0.6, 1.7));
@@ -92,7 +89,7 @@ impl Planter<'_> {
 
     /// Clusters of one size, whatever they cover.
     pub fn plant_of_size(&mut self, size: f64) -> Vec<Cluster> {
-        if self.perches.all.is_empty() {
+        if self.attachments.all.is_empty() {
             Vec::new()
         } else {
             self.attempt(self.bounded(size)).0
@@ -106,7 +103,7 @@ impl Planter<'_> {
 
     /// The clusters, and which cells are covered by leaves that no wood hides.
     fn attempt(&mut self, size: f64) -> (Vec<Cluster>, Vec<f32>) {
-        self.perches.clear();
+        self.attachments.clear();
         let wood = std::mem::take(&mut self.wood);
         let found = self.attempt_before(&wood, size);
         self.wood = wood;
@@ -124,30 +121,39 @@ impl Planter<'_> {
             return (work.clusters, work.cover.covered);
         }
         let most = ((SEEDED * self.count as f64).ceil() as usize).min(self.count);
-        let kept = |cell: &&[f64; 2]| {
-            self.target
-                .grid
-                .index(**cell)
-                .is_some_and(|i| self.target.density[i] > LEAST_DENSITY)
-        };
-        let seeds: Vec<[f64; 2]> = self.seeds.iter().filter(kept).copied().collect();
+        let seeds: Vec<[f64; 2]> = self
+            .seeds
+            .iter()
+            .copied()
+            .filter(|cell| self.density_at(*cell).is_some_and(|d| d > LEAST_DENSITY))
+            .collect();
         // Every n-th: the strongest corners all lie on the border, before the sky.
         let used = seeds.len().min(most);
         for k in 0..used {
             let cell = seeds[k * seeds.len() / used];
             self.add(cell, self.half(cell), size, &mut work);
         }
-        let wanted = |(w, _): (&f32, &f32)| *w;
-        self.spread(BY_DENSITY, wanted, false, size, &mut work);
+        self.spread(BY_DENSITY, Missing::Density, size, &mut work);
         self.fill(BEFORE_GAPS, size, &mut work);
         for round in 1..=ROUNDS {
             let share = BEFORE_GAPS + (1.0 - BEFORE_GAPS) * round as f64 / ROUNDS as f64;
-            self.spread(share, |(w, c)| w * (1.0 - c), true, size, &mut work);
+            self.spread(share, Missing::Gaps, size, &mut work);
         }
         (work.clusters, work.cover.covered)
     }
 
-    /// Bright leaves are in front (Li et al. B.1).
+    /// The density wanted at a cell of the picture.
+    fn density_at(&self, cell: [f64; 2]) -> Option<f32> {
+        let i = self.target.grid.index(cell)?;
+        Some(self.target.density[i])
+    }
+
+    /// How many clusters are missing until there are `share` of all.
+    fn missing(&self, share: f64, work: &Work) -> usize {
+        ((share * self.count as f64).round() as usize).saturating_sub(work.clusters.len())
+    }
+
+    /// Bright leaves are in front (Li 2011 app. B.1).
     fn half(&self, cell: [f64; 2]) -> Side {
         if self.target.is_bright(cell) {
             Side::Front
@@ -173,42 +179,18 @@ impl Planter<'_> {
         }
     }
 
-    /// Clusters where `weight` of what is wanted and what is covered is, until there are `share` of
-    /// all; `hiding` the wood that stands there.
-    fn spread(
-        &mut self,
-        share: f64,
-        weight: impl Fn((&f32, &f32)) -> f32,
-        hiding: bool,
-        size: f64,
-        work: &mut Work<'_>,
-    ) {
-        let count =
-            ((share * self.count as f64).round() as usize).saturating_sub(work.clusters.len());
+    /// Clusters where something is `missing`, until there are `share` of all.
+    fn spread(&mut self, share: f64, missing: Missing, size: f64, work: &mut Work<'_>) {
+        let count = self.missing(share, work);
         // By squares of about a cluster's size: a gap that large counts, specks between leaves do
         // not.
         let grid = self.target.grid;
         let side = (0.5 * grid.length(size)).round().max(1.0) as usize;
-        let width = grid.size.width as usize;
-        let across = width.div_ceil(side);
-        let mut squares = vec![0.0f64; across * (grid.size.height as usize).div_ceil(side)];
-        for (i, pair) in self
-            .target
-            .wanted
-            .iter()
-            .zip(&work.cover.covered)
-            .enumerate()
-        {
-            squares[i / width / side * across + i % width / side] += f64::from(weight(pair));
-        }
-        let mut sum = 0.0;
-        squares.iter_mut().for_each(|s| {
-            sum += *s * *s;
-            *s = sum;
-        });
-        if sum <= 0.0 {
+        let across = (grid.size.width as usize).div_ceil(side);
+        let squares = cumulative(&self.missing_by_square(missing, side, work));
+        let Some(&sum) = squares.last().filter(|sum| **sum > 0.0) else {
             return;
-        }
+        };
         let first = work.random.random::<f64>();
         for k in 0..count {
             let at = sum * (first + k as f64 * GOLDEN).fract();
@@ -216,140 +198,160 @@ impl Planter<'_> {
             let corner = [square % across * side, square / across * side];
             let cell = corner.map(|c| c as f64 - 0.5 + side as f64 * work.random.random::<f64>());
             if grid.index(cell).is_some() {
-                let side = if hiding {
-                    self.before_wood(cell, work.cover.before)
-                } else {
-                    self.half(cell)
+                let half = match missing {
+                    Missing::Density => self.half(cell),
+                    Missing::Gaps => self.before_wood(cell, work.cover.before),
                 };
-                self.add(cell, side, size, work);
+                self.add(cell, half, size, work);
             }
         }
+    }
+
+    /// How much is missing in each square of `side` cells, row by row.
+    fn missing_by_square(&self, missing: Missing, side: usize, work: &Work) -> Vec<f64> {
+        let grid = self.target.grid;
+        let width = grid.size.width as usize;
+        let across = width.div_ceil(side);
+        let mut squares = vec![0.0; across * (grid.size.height as usize).div_ceil(side)];
+        let cells = self.target.wanted.iter().zip(&work.cover.covered);
+        for (i, (wanted, covered)) in cells.enumerate() {
+            let amount = match missing {
+                Missing::Density => *wanted,
+                Missing::Gaps => wanted * (1.0 - covered),
+            };
+            squares[i / width / side * across + i % width / side] += f64::from(amount);
+        }
+        squares
     }
 
     /// Clusters on branches where the crown is emptiest and the picture's leaves hide them, until
     /// there are `share` of all.
     fn fill(&mut self, share: f64, size: f64, work: &mut Work<'_>) {
         let grid = self.target.grid;
-        let hidden = |p: &Perch| {
-            !p.thick
-                && grid
-                    .index(p.cell)
-                    .is_some_and(|c| self.target.density[c] > HIDING)
-        };
-        let left =
-            ((share * self.count as f64).round() as usize).saturating_sub(work.clusters.len());
-        let leaves = work.clusters.iter().map(|c| c.centre);
-        for i in emptiest(&self.perches.all, hidden, leaves, CUBE * size, left) {
-            let perch = &self.perches.all[i];
+        let left = self.missing(share, work);
+        let leaves: Vec<Point3<f64>> = work.clusters.iter().map(|c| c.centre).collect();
+        let all = &self.attachments.all;
+        for i in emptiest(all, |p| self.is_hidden(p), &leaves, CUBE * size, left) {
+            let attachment = &self.attachments.all[i];
             let aside = grid.length(ASIDE * self.height);
             let side = if work.random.random::<f64>() < 0.5 {
                 Side::Front
             } else {
                 Side::Back
             };
-            let cell = perch
+            let cell = attachment
                 .cell
                 .map(|c| c + aside * work.random.random_range(-1.0..1.0));
-            self.hang(i, cell, aside, side, size, work);
+            let sight = Sight {
+                cell,
+                distance: aside,
+                side,
+            };
+            self.place(i, &sight, size, work);
         }
+    }
+
+    /// Whether a thin branch is behind leaves that the picture shows.
+    fn is_hidden(&self, attachment: &AttachmentPoint) -> bool {
+        let density = self.density_at(attachment.cell);
+        !attachment.thick && density.is_some_and(|d| d > HIDING)
     }
 
     /// A cluster that is seen at `cell`, on a branch of that side of the tree.
     fn add(&mut self, cell: [f64; 2], side: Side, size: f64, work: &mut Work<'_>) {
-        if let Some((i, distance)) = self.perches.seat(cell, side) {
-            self.hang(i, cell, distance, side, size, work);
+        if let Some((i, distance)) = self.attachments.seat(cell, side) {
+            let sight = Sight {
+                cell,
+                distance,
+                side,
+            };
+            self.place(i, &sight, size, work);
         }
     }
 
-    /// A cluster on branch place `i`, seen at `cell`, `distance` cells from it.
-    fn hang(
-        &self,
-        i: usize,
-        cell: [f64; 2],
-        distance: f64,
-        side: Side,
-        size: f64,
-        work: &mut Work<'_>,
-    ) {
-        let perch = &self.perches.all[i];
+    /// A cluster on branch place `i`.
+    fn place(&self, i: usize, sight: &Sight, size: f64, work: &mut Work<'_>) {
+        let &Sight {
+            cell,
+            distance,
+            side,
+        } = sight;
+        let attachment = &self.attachments.all[i];
         let grid = &self.target.grid;
         let far = (distance / grid.length(1.0).max(1e-9)).min(DEEPEST * self.height);
         // Off the bark at least, on the side that it is lit from or not.
-        let off = far * work.random.random::<f64>() + perch.radius + 0.2 * size;
+        let off = far * work.random.random::<f64>() + attachment.radius + 0.2 * size;
         let depth = match side {
-            Side::Front => perch.depth + off,
-            Side::Back => perch.depth - off,
+            Side::Front => attachment.depth + off,
+            Side::Back => attachment.depth - off,
             Side::Before(wood) => {
                 let clear = wood + 0.5 * DEEPEST * self.height + 0.5 * size;
-                clear.clamp(
-                    perch.depth + off,
-                    (perch.depth + off).max(perch.depth + DEEPEST * self.height + size),
-                )
+                let nearest = attachment.depth + off;
+                let farthest = nearest.max(attachment.depth + DEEPEST * self.height + size);
+                clear.clamp(nearest, farthest)
             }
         };
         let posed = grid.model_at(cell, depth);
         // At the crown's border a whole cluster would stand out of it.
-        let share = grid
-            .index(cell)
-            .map_or(0.0, |c| f64::from(self.target.density[c]));
-        let size = size
-            * (0.5 + 0.6 * share).clamp(0.5, 1.1)
-            * (1.0 + 0.15 * work.random.random_range(-1.0..1.0));
-        let centre = perch.carried.to_rest(&posed);
-        self.put(
-            Cluster {
-                perch: i,
-                centre,
-                turn: nalgebra::Rotation3::identity(),
-                size,
-            },
-            work,
-        );
+        let share = self.density_at(cell).map_or(0.0, f64::from);
+        let varied = 1.0 + 0.15 * work.random.random_range(-1.0..1.0);
+        let size = size * (0.5 + 0.6 * share).clamp(0.5, 1.1) * varied;
+        let centre = attachment.carried.to_rest(&posed);
+        self.put(Cluster::upright(i, centre, size), work);
     }
 
     /// As leaves are sampled without a picture: about the branches, with a deviation of `spread`
     /// tree heights.
     fn at_random(&mut self, spread: f64, size: f64, work: &mut Work<'_>) {
-        let bearing: Vec<usize> = (0..self.perches.all.len())
-            .filter(|&i| !self.perches.all[i].thick)
+        let bearing: Vec<usize> = (0..self.attachments.all.len())
+            .filter(|&i| !self.attachments.all[i].thick)
             .collect();
         for _ in 0..self.count {
             let Some(&i) = bearing.choose(&mut work.random) else {
                 return;
             };
             let off = normal_vector(&mut work.random);
-            let centre = self.perches.all[i].at + off * (spread * self.height);
+            let centre = self.attachments.all[i].at + off * (spread * self.height);
             let size = size * (1.0 + 0.15 * work.random.random_range(-1.0..1.0));
-            self.put(
-                Cluster {
-                    perch: i,
-                    centre,
-                    turn: nalgebra::Rotation3::identity(),
-                    size,
-                },
-                work,
-            );
+            self.put(Cluster::upright(i, centre, size), work);
         }
     }
 
+    /// Orients a cluster and notes what it covers.
     fn put(&self, mut cluster: Cluster, work: &mut Work<'_>) {
-        let perch = &self.perches.all[cluster.perch];
+        let attachment = &self.attachments.all[cluster.attachment];
         let off = normal_vector(&mut work.random);
-        cluster.turn = stand(perch, &cluster.centre, &self.axis, off);
+        cluster.turn = orientation(attachment, &cluster.centre, &self.axis, off);
         if !cluster.centre.coords.iter().all(|x| x.is_finite()) {
             return;
         }
-        let seen = |p: &Point3<f64>| {
-            let posed = perch.carried.posed(&cluster.at(self.template, p));
-            (self.target.grid.cell_of(&posed), posed.z)
-        };
-        let cells: Vec<([f64; 2], f64)> = self.template.positions.iter().map(seen).collect();
+        let mut seen: Vec<([f64; 2], f64)> = Vec::with_capacity(self.template.positions.len());
+        for p in &self.template.positions {
+            let posed = attachment.carried.posed(&cluster.at(self.template, p));
+            seen.push((self.target.grid.cell_of(&posed), posed.z));
+        }
         for t in self.template.indices.chunks_exact(3) {
-            let [a, b, c] = [t[0], t[1], t[2]].map(|i| cells[i as usize]);
+            let [a, b, c] = [t[0], t[1], t[2]].map(|i| seen[i as usize]);
             work.cover.add([a.0, b.0, c.0], (a.1 + b.1 + c.1) / 3.0);
         }
         work.clusters.push(cluster);
     }
+}
+
+/// Where more clusters are put.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Missing {
+    /// By the density that is wanted, whatever is covered already.
+    Density,
+    /// Where what is wanted is not covered yet; the wood that is seen there is hidden.
+    Gaps,
+}
+
+/// How a cluster is seen: at which cell, how far from its branch (cells), on which side.
+struct Sight {
+    cell: [f64; 2],
+    distance: f64,
+    side: Side,
 }
 
 /// What has been planted so far.
@@ -359,25 +361,35 @@ struct Work<'a> {
     cover: Cover<'a>,
 }
 
+/// The sums of all values up to each.
+fn cumulative(values: &[f64]) -> Vec<f64> {
+    let mut sum = 0.0;
+    let mut sums = Vec::with_capacity(values.len());
+    for value in values {
+        sum += value;
+        sums.push(sum);
+    }
+    sums
+}
+
 fn normal_vector(random: &mut Generator) -> Vector3<f64> {
     Vector3::from_fn(|_, _| random.sample(StandardNormal))
 }
 
 /// How like the densities of what is covered and of what is wanted are: their correlation over the
 /// target's bounding box.
-pub(super) fn likeness(target: &Target, covered: &[f32]) -> f64 {
+pub(super) fn similarity(target: &Target, covered: &[f32]) -> f64 {
     let width = target.grid.size.width as usize;
     let density = smoothed(covered, width, target.sigma);
-    let there = |i: usize| target.wanted[i] > 0.5 || covered[i] > 0.5;
-    let cells = (0..target.wanted.len())
-        .filter(|&i| there(i))
-        .map(|i| (i % width, i / width));
-    let bounds = cells.fold((usize::MAX, 0, usize::MAX, 0), |(l, r, t, b), (u, v)| {
-        (l.min(u), r.max(u), t.min(v), b.max(v))
-    });
-    let inside = |i: usize| {
-        let (u, v) = (i % width, i / width);
-        (bounds.0..=bounds.1).contains(&u) && (bounds.2..=bounds.3).contains(&v)
-    };
-    correlation(&density, &target.density, inside)
+    let (mut left, mut right, mut top, mut bottom) = (usize::MAX, 0, usize::MAX, 0);
+    for (i, (wanted, covered)) in target.wanted.iter().zip(covered).enumerate() {
+        if *wanted > 0.5 || *covered > 0.5 {
+            let (u, v) = (i % width, i / width);
+            (left, right) = (left.min(u), right.max(u));
+            (top, bottom) = (top.min(v), bottom.max(v));
+        }
+    }
+    correlation(&density, &target.density, |i| {
+        (left..=right).contains(&(i % width)) && (top..=bottom).contains(&(i / width))
+    })
 }

@@ -39,8 +39,12 @@ pub(super) fn of_tree(canvas: &Canvas, tree: &[f32]) -> Option<Season> {
     let height = (bottom + 1 - top) as f64;
     let limit = bottom as f64 - CROWN_SHARE * height;
     let around = smoothed(tree, width, SCALE * height);
-    let crown = |i: &usize| ((i / width) as f64) < limit && tree[*i] > 0.5;
-    let mut found: Vec<f32> = (0..tree.len()).filter(crown).map(|i| around[i]).collect();
+    let mut found: Vec<f32> = Vec::new();
+    for (i, share) in tree.iter().enumerate() {
+        if ((i / width) as f64) < limit && *share > 0.5 {
+            found.push(around[i]);
+        }
+    }
     found.sort_unstable_by(f32::total_cmp);
     let density = f64::from(*found.get(found.len() / 2)?);
     Some(Season {

@@ -1,9 +1,9 @@
 //! The density that the leaves are to have: the frame's, or a drawn one.
 
 use super::canvas::{Canvas, Grid, luma};
-use super::colours::{Shares, shares, smooth_step};
+use super::colours::{shares, smooth_step};
 use super::density::{SCALE, smoothed};
-use super::{LeafView, PLAIN};
+use super::view::{LeafView, PLAIN};
 use crate::model::Skeleton;
 
 /// Share of leaf from which on a cell's colour is that of leaves.
@@ -30,7 +30,7 @@ pub(super) struct Target {
     /// Colours with how much they are of leaves alone; empty without a picture.
     colours: Vec<([u8; 3], f32)>,
     mean: [u8; 3],
-    /// Half of the leaves are darker (Li et al. B.1).
+    /// Half of the leaves are darker (Li 2011 app. B.1).
     middle_luma: f64,
     mean_luma: f64,
     /// What gives softened colours the mean of the film's back.
@@ -45,54 +45,28 @@ impl Target {
             .picture
             .zip(view.outline)
             .and_then(|(p, o)| Canvas::new(grid, p, o));
-        let seen: Option<Shares> = canvas.as_ref().map(shares);
-        let drawn = view
-            .density
-            .and_then(|d| grid.reduced(&d.pixels, d.size, 1));
-        let wanted: Vec<f32> = match (&drawn, &seen) {
-            (Some(drawn), _) => drawn.iter().map(|&d| f32::from(d) / 255.0).collect(),
-            (None, Some(seen)) => {
-                let around = smoothed(&seen.leaf, grid.size.width as usize, 1.0);
-                around
-                    .iter()
-                    .map(|&p| smooth_step(DOUBT[0], DOUBT[1], p))
-                    .collect()
-            }
-            (None, None) => return None,
+        let leaf = canvas.as_ref().map(|canvas| shares(canvas).leaf);
+        let wanted = match drawn_density(view, &grid) {
+            Some(drawn) => drawn,
+            None => filmed_density(leaf.as_ref()?, &grid),
         };
         let sigma = grid.length(SCALE * height);
         let density = smoothed(&wanted, grid.size.width as usize, sigma);
-        let colours: Vec<([u8; 3], f32)> = match (&canvas, seen) {
-            (Some(canvas), Some(seen)) => {
-                let pure = pure(&seen.leaf, grid.size.width as usize);
-                let mut colours: Vec<_> = canvas.colours.iter().copied().zip(pure).collect();
-                without_strangers(&mut colours);
-                colours
-            }
+        let colours = match (canvas, leaf) {
+            (Some(canvas), Some(leaf)) => leaf_colours(&canvas, &leaf),
             _ => Vec::new(),
         };
-        let mut lumas: Vec<f64> = colours
-            .iter()
-            .filter(|c| c.1 > 0.5)
-            .map(|c| luma(c.0))
-            .collect();
-        lumas.sort_unstable_by(f64::total_cmp);
-        let middle_luma = lumas.get(lumas.len() / 2).copied().unwrap_or(0.0);
-        let mean_luma = lumas.iter().sum::<f64>() / lumas.len().max(1) as f64;
-        let soft: f64 =
-            lumas.iter().map(|l| softened(*l, mean_luma)).sum::<f64>() / lumas.len().max(1) as f64;
-        let brighter = if soft > 0.0 { mean_luma / soft } else { 1.0 };
-        let mean = mean(colours.iter()).unwrap_or(PLAIN);
+        let lumas = Lumas::of(&colours);
         Some(Self {
             grid,
             wanted,
             density,
             sigma,
+            mean: mean(colours.iter()).unwrap_or(PLAIN),
             colours,
-            mean,
-            middle_luma,
-            mean_luma,
-            brighter,
+            middle_luma: lumas.middle,
+            mean_luma: lumas.mean,
+            brighter: lumas.brighter,
         })
     }
 
@@ -151,22 +125,76 @@ impl Target {
     }
 }
 
+/// The density that was drawn, 0 to 1.
+fn drawn_density(view: &LeafView, grid: &Grid) -> Option<Vec<f32>> {
+    let drawn = view.density?;
+    let cells = grid.reduced(&drawn.pixels, drawn.size, 1)?;
+    Some(cells.iter().map(|&d| f32::from(d) / 255.0).collect())
+}
+
+/// The density of what is `leaf` in the picture, without what is so with some doubt.
+fn filmed_density(leaf: &[f32], grid: &Grid) -> Vec<f32> {
+    smoothed(leaf, grid.size.width as usize, 1.0)
+        .iter()
+        .map(|&p| smooth_step(DOUBT[0], DOUBT[1], p))
+        .collect()
+}
+
+/// The colour of every cell with how much it is of leaves alone.
+fn leaf_colours(canvas: &Canvas, leaf: &[f32]) -> Vec<([u8; 3], f32)> {
+    let pure = pure(leaf, canvas.grid.size.width as usize);
+    let mut colours: Vec<([u8; 3], f32)> = canvas.colours.iter().copied().zip(pure).collect();
+    without_strangers(&mut colours);
+    colours
+}
+
+/// How bright the leaves are.
+struct Lumas {
+    middle: f64,
+    mean: f64,
+    /// What gives softened colours the mean of the film's back.
+    brighter: f64,
+}
+
+impl Lumas {
+    fn of(colours: &[([u8; 3], f32)]) -> Self {
+        let mut lumas: Vec<f64> = colours
+            .iter()
+            .filter(|c| c.1 > 0.5)
+            .map(|c| luma(c.0))
+            .collect();
+        lumas.sort_unstable_by(f64::total_cmp);
+        let count = lumas.len().max(1) as f64;
+        let mean = lumas.iter().sum::<f64>() / count;
+        let soft = lumas.iter().map(|l| softened(*l, mean)).sum::<f64>() / count;
+        Self {
+            middle: lumas.get(lumas.len() / 2).copied().unwrap_or(0.0),
+            mean,
+            brighter: if soft > 0.0 { mean / soft } else { 1.0 },
+        }
+    }
+}
+
 /// How much of each cell and of the four beside it is leaf, 0 where that is less than [`PURE`]: at
 /// a leaf's edge the camera mixes the sky in, and many cells that are hardly leaf would add up to a
 /// blue one.
 fn pure(leaf: &[f32], width: usize) -> Vec<f32> {
-    let at = |i: Option<usize>| i.and_then(|i| leaf.get(i)).copied().unwrap_or(0.0);
-    let least = |i: usize| {
+    let mut pure = Vec::with_capacity(leaf.len());
+    for (i, &own) in leaf.iter().enumerate() {
         let beside = [
             i.checked_sub(1),
             Some(i + 1),
             i.checked_sub(width),
             Some(i + width),
         ];
-        let least = beside.into_iter().map(at).fold(leaf[i], f32::min);
-        if least < PURE { 0.0 } else { least }
-    };
-    (0..leaf.len()).map(least).collect()
+        let mut least = own;
+        for cell in beside {
+            let share = cell.and_then(|k| leaf.get(k)).copied().unwrap_or(0.0);
+            least = least.min(share);
+        }
+        pure.push(if least < PURE { 0.0 } else { least });
+    }
+    pure
 }
 
 fn softened(luma: f64, mean: f64) -> f64 {
@@ -177,10 +205,6 @@ fn softened(luma: f64, mean: f64) -> f64 {
 /// colours that are found nowhere outside. By median and median deviation, so that autumn may have
 /// all of its hues.
 fn without_strangers(colours: &mut [([u8; 3], f32)]) {
-    let hue = |[r, g, b]: [u8; 3]| {
-        let [r, g, b] = [r, g, b].map(|c| f64::from(c) + 4.0);
-        [(r - g) / (r + g + b), (b - g) / (r + g + b)]
-    };
     for k in 0..2 {
         let mut hues: Vec<f64> = colours
             .iter()
@@ -190,15 +214,25 @@ fn without_strangers(colours: &mut [([u8; 3], f32)]) {
         let Some(middle) = median(&mut hues) else {
             return;
         };
-        hues.iter_mut().for_each(|h| *h = (*h - middle).abs());
+        for hue in &mut hues {
+            *hue = (*hue - middle).abs();
+        }
         // 1.4826: from the median deviation to the standard one of a normal distribution; below a
         // step of 8 bits all is noise.
         let most = STRANGE * (1.4826 * median(&mut hues).unwrap_or(0.0)).max(0.02);
-        colours
-            .iter_mut()
-            .filter(|c| (hue(c.0)[k] - middle).abs() > most)
-            .for_each(|c| c.1 = 0.0);
+        for (colour, weight) in colours.iter_mut() {
+            if (hue(*colour)[k] - middle).abs() > most {
+                *weight = 0.0;
+            }
+        }
     }
+}
+
+/// How much redder and bluer than green a colour is, as shares of its brightness; of dark colours,
+/// whose hue is noise, less.
+fn hue(colour: [u8; 3]) -> [f64; 2] {
+    let [r, g, b] = colour.map(|c| f64::from(c) + 4.0);
+    [(r - g) / (r + g + b), (b - g) / (r + g + b)]
 }
 
 fn median(values: &mut [f64]) -> Option<f64> {
@@ -211,10 +245,9 @@ fn mean<'a>(colours: impl Iterator<Item = &'a ([u8; 3], f32)>) -> Option<[u8; 3]
     let (mut sum, mut weight) = ([0.0f64; 3], 0.0);
     for (colour, w) in colours {
         weight += f64::from(*w);
-        colour
-            .iter()
-            .zip(&mut sum)
-            .for_each(|(&c, s)| *s += f64::from(*w) * f64::from(c));
+        for (s, &c) in sum.iter_mut().zip(colour) {
+            *s += f64::from(*w) * f64::from(c);
+        }
     }
     (weight > 0.5).then(|| sum.map(|s| (s / weight).round() as u8))
 }

@@ -1,4 +1,4 @@
-//! The mesh that stands at every seed: a cluster of leaves, ours or the user's (Li et al. appendix
+//! The mesh that stands at every seed: a cluster of leaves, ours or the user's (Li 2011 app.
 //! B.1).
 
 use super::texture;
@@ -104,86 +104,32 @@ impl Template {
     /// # Errors
     /// What [`TemplateFault`] names.
     pub fn new(mut mesh: TemplateMesh) -> Result<Self, TemplateFault> {
-        let n = mesh.positions.len();
-        let triangles = mesh.indices.len() / 3;
-        if triangles == 0 || n == 0 {
-            return Err(TemplateFault::Empty);
-        }
-        if triangles > Self::MOST_TRIANGLES {
-            return Err(TemplateFault::TooMany(triangles));
-        }
-        let same = |m: usize| m == 0 || m == n;
-        if !same(mesh.normals.len())
-            || !same(mesh.uvs.len())
-            || mesh.indices.iter().any(|&i| i as usize >= n)
-        {
-            return Err(TemplateFault::Torn);
-        }
-        mesh.indices.truncate(3 * triangles);
+        check_counts(&mesh)?;
+        mesh.indices.truncate(mesh.indices.len() / 3 * 3);
         keep_used(&mut mesh);
-        let n = mesh.positions.len();
-        let numbers = mesh
-            .positions
-            .iter()
-            .chain(&mesh.normals)
-            .flatten()
-            .chain(mesh.uvs.iter().flatten());
-        if !numbers.into_iter().all(|x| x.is_finite() && x.abs() < 1e12) {
+        if !all_numbers(&mesh) {
             return Err(TemplateFault::NoNumbers);
         }
-        let given: Vec<Point3<f64>> = mesh
-            .positions
-            .iter()
-            .map(|p| Point3::from(p.map(f64::from)))
-            .collect();
-        let (low, high) = given.iter().fold((given[0], given[0]), |(low, high), p| {
-            (low.inf(p), high.sup(p))
-        });
-        let side = (high - low).max();
-        if side <= 1e-12 {
-            return Err(TemplateFault::Flat);
-        }
-        let near_end: Vec<&Point3<f64>> = given
-            .iter()
-            .filter(|p| p.y <= low.y + 0.02 * side)
-            .collect();
-        let sum: Vector3<f64> = near_end.iter().map(|p| p.coords).sum();
-        let base = Point3::from(sum / near_end.len().max(1) as f64);
-        let positions: Vec<Point3<f64>> = given
-            .iter()
-            .map(|p| Point3::from((p - base) / side))
-            .collect();
+        let positions = normalised(&mesh.positions)?;
         let texture_mean = match &mesh.texture {
             Some((_, bytes)) => mean_colour(bytes).ok_or(TemplateFault::BadTexture)?,
             None => [1.0; 3],
         };
-        let normals = normals(&mesh, &positions);
+        let n = positions.len();
+        let sum: Vector3<f64> = positions.iter().map(|p| p.coords).sum();
         let leaf_of = pieces(n, &mesh.indices);
-        let leaves = leaf_of.iter().max().map_or(0, |&m| m as usize + 1);
-        let mut apices = vec![Point3::new(f64::MAX, f64::MAX, f64::MAX); leaves];
-        for (p, &leaf) in positions.iter().zip(&leaf_of) {
-            let apex = &mut apices[leaf as usize];
-            if p.coords.norm_squared() < apex.coords.norm_squared() {
-                *apex = *p;
-            }
+        if mesh.uvs.is_empty() {
+            mesh.uvs = vec![[0.5; 2]; n];
         }
-        let centre =
-            Point3::from(positions.iter().map(|p| p.coords).sum::<Vector3<f64>>() / n as f64);
-        let uvs = if mesh.uvs.is_empty() {
-            vec![[0.5; 2]; n]
-        } else {
-            mesh.uvs
-        };
-        let (indices, texture) = (mesh.indices, mesh.texture);
         Ok(Self {
+            normals: normals(&mesh, &positions),
+            apices: apices(&positions, &leaf_of),
+            centre: Point3::from(sum / n as f64),
             positions,
-            normals,
-            uvs,
-            indices,
+            uvs: mesh.uvs,
+            indices: mesh.indices,
             leaf_of,
-            apices,
-            centre,
-            texture,
+            texture: mesh.texture,
             texture_mean,
         })
     }
@@ -196,12 +142,79 @@ impl Template {
     /// Mean area of the cluster's silhouette over all directions at size 1, were no leaf before
     /// another (Cauchy): a quarter of both faces' area.
     pub(super) fn mean_area(&self) -> f64 {
-        let area = |t: &[u32]| {
+        let mut area = 0.0;
+        for t in self.indices.chunks_exact(3) {
             let [a, b, c] = [0, 1, 2].map(|k| self.positions[t[k] as usize]);
-            (b - a).cross(&(c - a)).norm() / 2.0
-        };
-        self.indices.chunks_exact(3).map(area).sum::<f64>() / 2.0
+            area += (b - a).cross(&(c - a)).norm() / 2.0;
+        }
+        area / 2.0
     }
+}
+
+/// Whether there are triangles, not too many, and all vectors fit each other.
+fn check_counts(mesh: &TemplateMesh) -> Result<(), TemplateFault> {
+    let n = mesh.positions.len();
+    let triangles = mesh.indices.len() / 3;
+    if triangles == 0 || n == 0 {
+        return Err(TemplateFault::Empty);
+    }
+    if triangles > Template::MOST_TRIANGLES {
+        return Err(TemplateFault::TooMany(triangles));
+    }
+    let torn = [mesh.normals.len(), mesh.uvs.len()]
+        .into_iter()
+        .any(|m| m != 0 && m != n);
+    if torn || mesh.indices.iter().any(|&i| i as usize >= n) {
+        return Err(TemplateFault::Torn);
+    }
+    Ok(())
+}
+
+fn all_numbers(mesh: &TemplateMesh) -> bool {
+    let places = mesh.positions.iter().chain(&mesh.normals).flatten();
+    places
+        .chain(mesh.uvs.iter().flatten())
+        .all(|x| x.is_finite() && x.abs() < 1e12)
+}
+
+/// The positions scaled so that the longest side of their box is 1, with the middle of its lowest
+/// end at the origin.
+fn normalised(positions: &[[f32; 3]]) -> Result<Vec<Point3<f64>>, TemplateFault> {
+    let given: Vec<Point3<f64>> = positions
+        .iter()
+        .map(|p| Point3::from(p.map(f64::from)))
+        .collect();
+    let (mut low, mut high) = (given[0], given[0]);
+    for p in &given {
+        (low, high) = (low.inf(p), high.sup(p));
+    }
+    let side = (high - low).max();
+    if side <= 1e-12 {
+        return Err(TemplateFault::Flat);
+    }
+    let near_end: Vec<&Point3<f64>> = given
+        .iter()
+        .filter(|p| p.y <= low.y + 0.02 * side)
+        .collect();
+    let sum: Vector3<f64> = near_end.iter().map(|p| p.coords).sum();
+    let base = Point3::from(sum / near_end.len().max(1) as f64);
+    Ok(given
+        .iter()
+        .map(|p| Point3::from((p - base) / side))
+        .collect())
+}
+
+/// Where each leaf is held: its vertex next to the origin.
+fn apices(positions: &[Point3<f64>], leaf_of: &[u32]) -> Vec<Point3<f64>> {
+    let leaves = leaf_of.iter().max().map_or(0, |&m| m as usize + 1);
+    let mut apices = vec![Point3::new(f64::MAX, f64::MAX, f64::MAX); leaves];
+    for (p, &leaf) in positions.iter().zip(leaf_of) {
+        let apex = &mut apices[leaf as usize];
+        if p.coords.norm_squared() < apex.coords.norm_squared() {
+            *apex = *p;
+        }
+    }
+    apices
 }
 
 /// One leaf of length `length` along `stand` times y from `from`: 6 vertices, 4 triangles.
@@ -253,48 +266,50 @@ fn normals(mesh: &TemplateMesh, positions: &[Point3<f64>]) -> Vec<Vector3<f64>> 
         let face = (positions[b] - positions[a]).cross(&(positions[c] - positions[a]));
         [a, b, c].into_iter().for_each(|i| around[i] += face);
     }
-    let given = |i: usize| {
-        mesh.normals
-            .get(i)
-            .and_then(|v| Vector3::from(v.map(f64::from)).try_normalize(1e-12))
-    };
-    let own =
-        |(i, v): (usize, Vector3<f64>)| given(i).or(v.try_normalize(1e-12)).unwrap_or(Vector3::z());
-    around.into_iter().enumerate().map(own).collect()
+    let mut normals = Vec::with_capacity(positions.len());
+    for (i, face) in around.into_iter().enumerate() {
+        let given = mesh.normals.get(i).map(|v| Vector3::from(v.map(f64::from)));
+        let normal = given.and_then(|v| v.try_normalize(1e-12));
+        normals.push(
+            normal
+                .or(face.try_normalize(1e-12))
+                .unwrap_or_else(Vector3::z),
+        );
+    }
+    normals
 }
 
 /// Numbers the pieces that hang together, in the order of their first vertex.
 fn pieces(n: usize, indices: &[u32]) -> Vec<u32> {
     let mut root: Vec<usize> = (0..n).collect();
-    fn find(root: &mut [usize], mut i: usize) -> usize {
-        while root[i] != i {
-            root[i] = root[root[i]];
-            i = root[i];
-        }
-        i
-    }
     for t in indices.chunks_exact(3) {
         for k in [1, 2] {
-            let (a, b) = (
-                find(&mut root, t[0] as usize),
-                find(&mut root, t[k] as usize),
-            );
-            let (low, high) = (a.min(b), a.max(b));
-            root[high] = low;
+            let a = find_root(&mut root, t[0] as usize);
+            let b = find_root(&mut root, t[k] as usize);
+            root[a.max(b)] = a.min(b);
         }
     }
     let mut number = vec![u32::MAX; n];
     let mut next = 0;
-    (0..n)
-        .map(|i| {
-            let r = find(&mut root, i);
-            if number[r] == u32::MAX {
-                number[r] = next;
-                next += 1;
-            }
-            number[r]
-        })
-        .collect()
+    let mut pieces = Vec::with_capacity(n);
+    for i in 0..n {
+        let r = find_root(&mut root, i);
+        if number[r] == u32::MAX {
+            number[r] = next;
+            next += 1;
+        }
+        pieces.push(number[r]);
+    }
+    pieces
+}
+
+/// The first vertex of the piece of `i` in a union-find forest; shortens the way there.
+fn find_root(root: &mut [usize], mut i: usize) -> usize {
+    while root[i] != i {
+        root[i] = root[root[i]];
+        i = root[i];
+    }
+    i
 }
 
 /// Mean of what can be seen of a picture, 0 to 1; `None` if it cannot be read or is too large.
@@ -341,19 +356,23 @@ mod tests {
         assert!(ours.normals.iter().all(|n| (n.norm() - 1.0).abs() < 1e-9));
     }
 
-    #[test]
-    fn what_is_no_template_is_refused() {
-        let good = TemplateMesh {
+    fn good() -> TemplateMesh {
+        TemplateMesh {
             positions: vec![[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 4.0, 0.0]],
             indices: vec![0, 1, 2],
             ..TemplateMesh::default()
-        };
-        assert!(Template::new(good.clone()).is_ok());
-        let refused = |change: fn(&mut TemplateMesh)| {
-            let mut mesh = good.clone();
-            change(&mut mesh);
-            Template::new(mesh).expect_err("no template")
-        };
+        }
+    }
+
+    fn refused(change: fn(&mut TemplateMesh)) -> TemplateFault {
+        let mut mesh = good();
+        change(&mut mesh);
+        Template::new(mesh).expect_err("no template")
+    }
+
+    #[test]
+    fn what_is_no_template_is_refused() {
+        assert!(Template::new(good()).is_ok());
         assert_eq!(refused(|m| m.indices.clear()), TemplateFault::Empty);
         assert_eq!(refused(|m| m.indices[2] = 3), TemplateFault::Torn);
         assert_eq!(refused(|m| m.uvs.push([0.0; 2])), TemplateFault::Torn);

@@ -3,7 +3,8 @@
 use super::canvas::Grid;
 use super::carry::Carried;
 use crate::model::{Pose, Skeleton};
-use crate::shape::Limb;
+use crate::shape::limb::Limb;
+use std::ops::Range;
 
 /// Wider wood than this is no tree's, cells.
 const WIDEST: f64 = 200.0;
@@ -19,58 +20,87 @@ pub(super) fn front(
     let mut depth = vec![f32::NEG_INFINITY; grid.area()];
     let cell_px = 1.0 / grid.length(1.0).max(1e-9);
     for limb in limbs {
-        let posed = limb.stations.iter().map(|s| {
-            let p = Carried::by(&s.riding, skeleton, pose).posed(&s.at);
-            (grid.cell_of(&p), p.z, s.radius.max(0.0))
-        });
-        let posed: Vec<([f64; 2], f64, f64)> = posed.collect();
-        for pair in posed.windows(2) {
-            let ((a, az, ar), (b, bz, br)) = (pair[0], pair[1]);
-            let way = (b[0] - a[0]).hypot(b[1] - a[1]);
-            let sound = way.is_finite() && [az, bz, ar, br].iter().all(|x| x.is_finite());
-            // A limb as long as the picture is wide is drawn; one that a torn file makes longer is
-            // not.
-            if !sound || way > f64::from(grid.size.width.max(grid.size.height)) {
-                continue;
+        let mut before: Option<Ball> = None;
+        for sample in &limb.samples {
+            let posed = Carried::by(&sample.skin, skeleton, pose).posed(&sample.at);
+            let ball = Ball {
+                cell: grid.cell_of(&posed),
+                z: posed.z,
+                radius_px: sample.radius.max(0.0),
+            };
+            if let Some(before) = before {
+                draw_between(&mut depth, grid, &before, &ball, cell_px);
             }
-            let steps = (2.0 * way).ceil().max(1.0) as usize;
-            for k in 0..=steps {
-                let t = k as f64 / steps as f64;
-                let at = [0, 1].map(|c| a[c] + (b[c] - a[c]) * t);
-                ball(
-                    &mut depth,
-                    grid,
-                    at,
-                    az + (bz - az) * t,
-                    ar + (br - ar) * t,
-                    cell_px,
-                );
-            }
+            before = Some(ball);
         }
     }
     depth
 }
 
-fn ball(depth: &mut [f32], grid: &Grid, at: [f64; 2], z: f64, radius_px: f64, cell_px: f64) {
-    let radius = (radius_px / cell_px).clamp(0.5, WIDEST);
-    let reach = |k: usize, most: u32| {
-        let (low, high) = (
-            (at[k] - radius).ceil().max(0.0),
-            (at[k] + radius).floor().min(f64::from(most) - 1.0),
-        );
-        (low <= high).then_some(low as usize..=high as usize)
-    };
-    let (Some(across), Some(down)) = (reach(0, grid.size.width), reach(1, grid.size.height)) else {
-        return;
-    };
-    for v in down {
-        for u in across.clone() {
-            let off =
-                1.0 - ((u as f64 - at[0]).powi(2) + (v as f64 - at[1]).powi(2)) / (radius * radius);
-            if off >= 0.0 {
-                let cell = &mut depth[v * grid.size.width as usize + u];
-                *cell = cell.max((z + off.sqrt() * radius_px) as f32);
+/// A ball of wood as it is seen.
+#[derive(Clone, Copy)]
+struct Ball {
+    cell: [f64; 2],
+    /// Of its middle, px.
+    z: f64,
+    radius_px: f64,
+}
+
+impl Ball {
+    fn is_sound(&self) -> bool {
+        [self.cell[0], self.cell[1], self.z, self.radius_px]
+            .iter()
+            .all(|x| x.is_finite())
+    }
+
+    /// Share `t` of the way from `self` to `other`.
+    fn towards(&self, other: &Self, t: f64) -> Self {
+        Self {
+            cell: [0, 1].map(|c| self.cell[c] + (other.cell[c] - self.cell[c]) * t),
+            z: self.z + (other.z - self.z) * t,
+            radius_px: self.radius_px + (other.radius_px - self.radius_px) * t,
+        }
+    }
+
+    fn draw(&self, depth: &mut [f32], grid: &Grid, cell_px: f64) {
+        let radius = (self.radius_px / cell_px).clamp(0.5, WIDEST);
+        let across = cells_within(self.cell[0], radius, grid.size.width);
+        let down = cells_within(self.cell[1], radius, grid.size.height);
+        for v in down {
+            for u in across.clone() {
+                let off_sq = (u as f64 - self.cell[0]).powi(2) + (v as f64 - self.cell[1]).powi(2);
+                let height_sq = 1.0 - off_sq / (radius * radius);
+                if height_sq >= 0.0 {
+                    let cell = &mut depth[v * grid.size.width as usize + u];
+                    *cell = cell.max((self.z + height_sq.sqrt() * self.radius_px) as f32);
+                }
             }
         }
+    }
+}
+
+/// Balls from `a` to `b`, half a cell apart.
+fn draw_between(depth: &mut [f32], grid: &Grid, a: &Ball, b: &Ball, cell_px: f64) {
+    let way = (b.cell[0] - a.cell[0]).hypot(b.cell[1] - a.cell[1]);
+    // A limb as long as the picture is wide is drawn; one that a torn file makes longer is not.
+    let longest = f64::from(grid.size.width.max(grid.size.height));
+    if !a.is_sound() || !b.is_sound() || way > longest {
+        return;
+    }
+    let steps = (2.0 * way).ceil().max(1.0) as usize;
+    for k in 0..=steps {
+        let t = k as f64 / steps as f64;
+        a.towards(b, t).draw(depth, grid, cell_px);
+    }
+}
+
+/// Those of `count` cells in a row that lie within `radius` of `at`; none may.
+fn cells_within(at: f64, radius: f64, count: u32) -> Range<usize> {
+    let low = (at - radius).ceil().max(0.0);
+    let high = (at + radius).floor().min(f64::from(count) - 1.0);
+    if low <= high {
+        low as usize..high as usize + 1
+    } else {
+        0..0
     }
 }

@@ -1,6 +1,7 @@
 //! How much of a shape the tree covers, seen from the front.
 
 use crate::model::{Outline, Skeleton};
+use std::ops::Range;
 
 /// A branch covers what is nearer to it than this share of the shape's larger side: about as far as
 /// the leaves on it reach.
@@ -44,12 +45,13 @@ impl Cover {
         let cell = size.width.max(size.height).div_ceil(LONGEST_SIDE).max(1) as usize;
         let (width, height) = (size.width as usize / cell, size.height as usize / cell);
         // The pixel in the middle of a cell speaks for it.
-        let pixel = |k: usize| {
-            (k / width * cell + cell / 2) * size.width as usize + k % width * cell + cell / 2
-        };
-        let bare: Vec<u8> = (0..width * height)
-            .map(|k| u8::from(shape.mask[pixel(k)] != 0))
-            .collect();
+        let mut bare: Vec<u8> = Vec::with_capacity(width * height);
+        for row in 0..height {
+            let first = (row * cell + cell / 2) * size.width as usize + cell / 2;
+            for column in 0..width {
+                bare.push(u8::from(shape.mask[first + column * cell] != 0));
+            }
+        }
         let all = bare.iter().filter(|b| **b != 0).count();
         let reach = (REACH * f64::from(larger) / cell as f64).max(1.0);
         Self {
@@ -70,51 +72,44 @@ impl Cover {
 
     /// Marks what a branch covers; its ends in px.
     pub fn add(&mut self, branch: [[f64; 2]; 2]) {
-        let mut newly = Vec::new();
-        self.near(branch, self.reach, |k| newly.push(k));
-        newly.into_iter().for_each(|k| self.cover(k));
+        for k in self.near(branch, self.reach) {
+            self.bare_count -= usize::from(self.bare[k]);
+            self.bare[k] = 0;
+        }
     }
 
     /// Bare cells that a branch would cover; its ends in px.
     pub fn gain(&self, branch: [[f64; 2]; 2]) -> usize {
-        let mut count = 0;
-        self.near(branch, self.reach, |k| count += usize::from(self.bare[k]));
-        count
+        let near = self.near(branch, self.reach);
+        near.into_iter().map(|k| usize::from(self.bare[k])).sum()
     }
 
     /// Notes the bare cells near `at`, px, where nothing can be done.
     pub fn give_up(&self, at: [f64; 2], given_up: &mut Vec<usize>) {
-        let mut near = Vec::new();
-        self.near([at, at], 0.5 * self.reach, |k| near.push(k));
+        let near = self.near([at, at], 0.5 * self.reach);
         given_up.extend(near.into_iter().filter(|&k| self.bare[k] != 0));
     }
 
-    fn cover(&mut self, k: usize) {
-        self.bare_count -= usize::from(self.bare[k]);
-        self.bare[k] = 0;
-    }
-
-    fn near(&self, ends_px: [[f64; 2]; 2], reach: f64, mut each: impl FnMut(usize)) {
+    /// Cells within `reach` cells of a line, its ends in px.
+    fn near(&self, ends_px: [[f64; 2]; 2], reach: f64) -> Vec<usize> {
+        let mut near = Vec::new();
         let [a, b] = ends_px.map(|end| end.map(|x| (x - self.middle()) / self.cell as f64));
         if !a.iter().chain(&b).all(|x| x.is_finite()) {
-            return;
+            return near;
         }
-        let range = |c: usize, size: usize| {
-            let (low, high) = (a[c].min(b[c]) - reach, a[c].max(b[c]) + reach);
-            (low.ceil().max(0.0) as usize)..((high.floor() + 1.0).clamp(0.0, size as f64) as usize)
-        };
-        let (along, columns) = ([b[0] - a[0], b[1] - a[1]], range(0, self.width));
+        let along = [b[0] - a[0], b[1] - a[1]];
         let length_sq = (along[0].powi(2) + along[1].powi(2)).max(1e-12);
-        for v in range(1, self.height) {
-            for u in columns.clone() {
+        for v in cells_about(a[1], b[1], reach, self.height) {
+            for u in cells_about(a[0], b[0], reach, self.width) {
                 let to = [u as f64 - a[0], v as f64 - a[1]];
                 let t = ((along[0] * to[0] + along[1] * to[1]) / length_sq).clamp(0.0, 1.0);
                 if (to[0] - t * along[0]).powi(2) + (to[1] - t * along[1]).powi(2) <= reach * reach
                 {
-                    each(v * self.width + u);
+                    near.push(v * self.width + u);
                 }
             }
         }
+        near
     }
 
     /// Of the pixel of a cell that speaks for it, from the cell's first, px.
@@ -131,11 +126,11 @@ impl Cover {
             .iter()
             .map(|b| if *b != 0 { u32::MAX } else { 0 })
             .collect();
-        given_up.iter().for_each(|&k| far[k] = 0);
-        let edge = |u: usize, v: usize| u == 0 || v == 0 || u + 1 == w || v + 1 == h;
+        for &k in given_up {
+            far[k] = 0;
+        }
         for k in 0..far.len() {
-            let (u, v) = (k % w, k / w);
-            let before = if edge(u, v) {
+            let before = if is_edge(k, w, h) {
                 0
             } else {
                 far[k - 1].min(far[k - w])
@@ -143,8 +138,7 @@ impl Cover {
             far[k] = far[k].min(before.saturating_add(1));
         }
         for k in (0..far.len()).rev() {
-            let (u, v) = (k % w, k / w);
-            let after = if edge(u, v) {
+            let after = if is_edge(k, w, h) {
                 0
             } else {
                 far[k + 1].min(far[k + w])
@@ -160,6 +154,19 @@ impl Cover {
     }
 }
 
+/// Cells of a row or column of `count` within `reach` of the stretch between `a` and `b`.
+fn cells_about(a: f64, b: f64, reach: f64, count: usize) -> Range<usize> {
+    let (low, high) = (a.min(b) - reach, a.max(b) + reach);
+    let end = (high.floor() + 1.0).clamp(0.0, count as f64);
+    low.ceil().max(0.0) as usize..end as usize
+}
+
+/// Whether cell `k` of `w` by `h` is on the border.
+fn is_edge(k: usize, w: usize, h: usize) -> bool {
+    let (u, v) = (k % w, k / w);
+    u == 0 || v == 0 || u + 1 == w || v + 1 == h
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -167,16 +174,14 @@ mod tests {
 
     /// A disc, four fifths as high as the picture, in a picture of `side` px.
     fn disc(side: u32) -> Outline {
-        let inside = |k: u32| {
-            let (x, y) = (
-                f64::from(k % side) - f64::from(side) / 2.0,
-                f64::from(k / side) - f64::from(side) / 2.0,
-            );
-            x.hypot(y) <= 0.4 * f64::from(side)
-        };
-        let mask = (0..side * side)
-            .map(|k| u8::from(inside(k)) * 255)
-            .collect();
+        let middle = f64::from(side) / 2.0;
+        let mut mask = Vec::new();
+        for v in 0..side {
+            for u in 0..side {
+                let off = (f64::from(u) - middle).hypot(f64::from(v) - middle);
+                mask.push(u8::from(off <= 0.8 * middle) * 255);
+            }
+        }
         Outline {
             size: Size::new(side, side),
             mask,
@@ -185,19 +190,22 @@ mod tests {
         }
     }
 
+    /// Number of cells, the barest place as shares of the side, and the share that a branch across
+    /// the middle covers.
+    fn covered(side: u32) -> (usize, [f64; 2], f64) {
+        let mut cover = Cover::of(&disc(side));
+        let px = f64::from(side);
+        let barest = cover.barest(&[]).unwrap().map(|x| x / px);
+        cover.add([[0.3 * px, 0.5 * px], [0.7 * px, 0.5 * px]]);
+        (cover.bare.len(), barest, cover.share())
+    }
+
     /// A film in 4K has nine times the pixels of one in HD, and every branch that is added looks at
     /// all.
     #[test]
     fn a_large_picture_is_looked_at_coarsely_and_gives_the_same() {
-        let of = |side: u32| {
-            let mut cover = Cover::of(&disc(side));
-            let px = f64::from(side);
-            let barest = cover.barest(&[]).unwrap().map(|x| x / px);
-            cover.add([[0.3 * px, 0.5 * px], [0.7 * px, 0.5 * px]]);
-            (cover.bare.len(), barest, cover.share())
-        };
-        let ((cells, barest, share), (cells_large, barest_large, share_large)) =
-            (of(600), of(4200));
+        let (cells, barest, share) = covered(600);
+        let (cells_large, barest_large, share_large) = covered(4200);
         assert_eq!((cells, cells_large), (600 * 600, 600 * 600));
         assert!(
             (share / share_large - 1.0).abs() < 0.1 && share > 0.03,

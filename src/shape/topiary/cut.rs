@@ -1,8 +1,8 @@
 //! Branches outside of a shape are cut.
 
-use super::TopiaryError;
+use super::drawn::TopiaryError;
 use crate::model::{NodeId, Skeleton};
-use crate::shape::Envelope;
+use crate::shape::envelope::Envelope;
 use nalgebra::Point3;
 
 /// A branch of which less than this share is inside is not worth keeping.
@@ -51,21 +51,26 @@ pub fn cut(skeleton: &Skeleton, envelope: &Envelope) -> Result<Pruned, TopiaryEr
         }
     }
     let kept: Vec<usize> = (0..nodes.len()).filter(|&i| is_left[i]).collect();
-    let new_id = |old: NodeId| NodeId(kept.partition_point(|&k| k < old.index()) as u32);
-    let nodes = kept.iter().map(|&i| {
+    let mut left = Vec::with_capacity(kept.len());
+    for &i in &kept {
         let mut node = nodes[i].clone();
-        (node.parent, node.copy_of) = (node.parent.map(new_id), node.copy_of.map(new_id));
-        node
-    });
-    let nodes = nodes.collect();
+        node.parent = node.parent.map(|p| new_id(&kept, p));
+        node.copy_of = node.copy_of.map(|c| new_id(&kept, c));
+        left.push(node);
+    }
     Ok(Pruned {
         skeleton: Skeleton {
-            nodes,
+            nodes: left,
             ..skeleton.clone()
         },
         kept,
         shortened,
     })
+}
+
+/// What node `old` is among the nodes that are `kept`.
+fn new_id(kept: &[usize], old: NodeId) -> NodeId {
+    NodeId(kept.partition_point(|&k| k < old.index()) as u32)
 }
 
 /// Where the trunk ends: at its top if that is inside, else where it leaves the shape; a shape that
@@ -78,9 +83,11 @@ fn trunk_top(
     if envelope.contains(at) {
         return Ok(*at);
     }
-    let along = |k: u32| from + (at - from) * (f64::from(k) / f64::from(STEPS));
-    if let Some(inside) = (1..=STEPS).rev().map(along).find(|p| envelope.contains(p)) {
-        return Ok(inside);
+    for k in (1..=STEPS).rev() {
+        let along = step(from, at, k);
+        if envelope.contains(&along) {
+            return Ok(along);
+        }
     }
     let led_on = envelope.clamp(at);
     let near = (led_on - at).norm() <= LED_ON * envelope.height() && envelope.contains(&led_on);
@@ -93,10 +100,13 @@ fn trunk_top(
 
 /// Share of the way from `from` to `at` that lies inside without a break.
 fn inside_share(from: &Point3<f64>, at: &Point3<f64>, envelope: &Envelope) -> f64 {
-    let inside =
-        |k: &u32| envelope.contains(&(from + (at - from) * (f64::from(*k) / f64::from(STEPS))));
     (1..=STEPS)
-        .take_while(inside)
+        .take_while(|&k| envelope.contains(&step(from, at, k)))
         .last()
         .map_or(0.0, |k| f64::from(k) / f64::from(STEPS))
+}
+
+/// The place after step `k` of [`STEPS`] from `from` to `at`.
+fn step(from: &Point3<f64>, at: &Point3<f64>, k: u32) -> Point3<f64> {
+    from + (at - from) * (f64::from(k) / f64::from(STEPS))
 }

@@ -113,20 +113,22 @@ impl Drawn {
         let [left, top, right, bottom] = self.bounds;
         let scale = (f64::from(into[0]) / f64::from(right - left + 1))
             .min(f64::from(into[1]) / f64::from(bottom - top + 1));
-        let lowest = || (left..=right).filter(|&u| self.contains(u.into(), bottom.into()));
-        let middle =
-            f64::from(lowest().min().unwrap_or(left) + lowest().max().unwrap_or(right)) / 2.0;
-        let inside = |u: u32, v: u32| {
-            let at = [
-                middle + (f64::from(u) - foot_px[0]) / scale,
-                // The lowest row of the shape on the foot's row.
-                f64::from(bottom) + 0.5 + (f64::from(v) - foot_px[1] - 0.5) / scale,
-            ];
-            self.contains(at[0].round() as i64, at[1].round() as i64)
+        let mut lowest = (left..=right).filter(|&u| self.contains(u.into(), bottom.into()));
+        let first = lowest.next();
+        let middle = match (first, lowest.last().or(first)) {
+            (Some(first), Some(last)) => f64::from(first + last) / 2.0,
+            _ => f64::from(left + right) / 2.0,
         };
-        (0..size.height)
-            .flat_map(|v| (0..size.width).map(move |u| (u, v)))
-            .map(|(u, v)| u8::from(inside(u, v)) * 255)
-            .collect()
+        let mut mask = Vec::with_capacity(size.area());
+        for v in 0..size.height {
+            // The lowest row of the shape on the foot's row.
+            let y = f64::from(bottom) + 0.5 + (f64::from(v) - foot_px[1] - 0.5) / scale;
+            for u in 0..size.width {
+                let x = middle + (f64::from(u) - foot_px[0]) / scale;
+                let inside = self.contains(x.round() as i64, y.round() as i64);
+                mask.push(u8::from(inside) * 255);
+            }
+        }
+        mask
     }
 }

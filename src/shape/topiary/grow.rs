@@ -198,8 +198,7 @@ impl Site<'_> {
             if !is_inside(self.envelope, &parent.position, &position) {
                 continue;
             }
-            new_id.push((i, base + nodes.len()));
-            nodes.push(Node {
+            let node = Node {
                 name: NodeName(0),
                 parent: Some(NodeId(parent_id as u32)),
                 level: parent.level.saturating_add(1),
@@ -210,7 +209,9 @@ impl Site<'_> {
                 copy_of: Some(NodeId(i as u32)),
                 plane_angle: placement.plane_angle,
                 kind: original.kind,
-            });
+            };
+            new_id.push((i, base + nodes.len()));
+            nodes.push(node);
         }
         let score = self.score(&nodes)?;
         Some(Shoot { nodes, score })

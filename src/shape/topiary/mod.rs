@@ -9,7 +9,7 @@ pub use cover::coverage;
 pub use drawn::{Drawn, TopiaryError};
 
 use super::envelope::Envelope;
-use super::fuse::fuse;
+use super::term_weights::tune_term_weights;
 use super::trunk::is_trunk;
 use crate::config;
 use crate::model::{JointPose, NodeId, Outline, Pose, Skeleton};
@@ -71,7 +71,7 @@ pub fn topiary(
     } = cut::cut(skeleton, &envelope)?;
     let was_trunk = is_trunk(skeleton);
     let trunk: Vec<bool> = kept.iter().map(|&i| was_trunk[i]).collect();
-    fuse(&mut pruned, &trunk, &envelope, settings);
+    tune_term_weights(&mut pruned, &trunk, &envelope, settings);
     let left = pruned.nodes.len();
     // What was cut keeps its number: no other branch gets it.
     let last = skeleton.nodes.iter().map(|n| n.name.0).max().unwrap_or(0);

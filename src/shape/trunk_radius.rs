@@ -21,48 +21,40 @@ const THICKEST: f64 = 0.12;
 /// lower quartile of their widths counts: half of it, or where the outline has a matte, what is
 /// opaque of it.
 pub fn trunk_radius_px(outline: &Outline, foot_px: [f64; 2], top_px: [f64; 2]) -> Option<f64> {
-    let width = outline.size.width as usize;
     let rise = foot_px[1] - top_px[1];
     if !(foot_px.iter().chain(&top_px).all(|x| x.is_finite()) && rise > 0.0) {
         return None;
     }
-    let trunk_in = |v: usize| {
+    let mut widths: Vec<f64> = Vec::new();
+    for v in 0..outline.size.height as usize {
         let share = (foot_px[1] - v as f64) / rise;
         let u = foot_px[0] + share * (top_px[0] - foot_px[0]);
-        if !LOOKED_AT.contains(&share) || !outline.contains(u, v as f64) {
-            return None;
+        if LOOKED_AT.contains(&share) && outline.contains(u, v as f64) {
+            widths.push(width_in_row(outline, u.round() as usize, v));
         }
-        let (row, u) = (
-            &outline.mask[v * width..(v + 1) * width],
-            u.round() as usize,
-        );
-        let left = row[..u].iter().rposition(|&m| m == 0).map_or(0, |k| k + 1);
-        let right = row[u..]
-            .iter()
-            .position(|&m| m == 0)
-            .map_or(width, |k| u + k);
-        let opaque = |matte: &Vec<u8>| {
-            matte
-                .get(v * width + left..v * width + right)
-                .map(opaque_px)
-        };
-        Some(
-            outline
-                .matte
-                .as_ref()
-                .and_then(opaque)
-                .unwrap_or(TRUNK_SHARE * (right - left) as f64),
-        )
-    };
-    let mut widths: Vec<f64> = (0..outline.size.height as usize)
-        .filter_map(trunk_in)
-        .collect();
+    }
     widths.sort_unstable_by(f64::total_cmp);
     let narrow = *widths
         .get(widths.len() / 4)
         .filter(|_| widths.len() >= LEAST_ROWS)?;
     let tall = foot_px[1] - f64::from(outline.bounds_px()?[1]);
     (narrow > 0.0 && narrow <= THICKEST * tall).then_some(0.5 * narrow)
+}
+
+/// Width of the trunk in row `v`, where the outline has it at column `u`, px.
+fn width_in_row(outline: &Outline, u: usize, v: usize) -> f64 {
+    let width = outline.size.width as usize;
+    let row = &outline.mask[v * width..(v + 1) * width];
+    let left = row[..u].iter().rposition(|&m| m == 0).map_or(0, |k| k + 1);
+    let right = row[u..]
+        .iter()
+        .position(|&m| m == 0)
+        .map_or(width, |k| u + k);
+    let matte = outline.matte.as_ref();
+    match matte.and_then(|m| m.get(v * width + left..v * width + right)) {
+        Some(alpha) => opaque_px(alpha),
+        None => TRUNK_SHARE * (right - left) as f64,
+    }
 }
 
 fn opaque_px(alpha: &[u8]) -> f64 {

@@ -1,0 +1,59 @@
+//! The tree in space: copies on planes, pushed to fill the envelope.
+
+use super::envelope::Envelope;
+use super::planes::{copy_to_planes, model_from_image};
+use super::term_weights::tune_term_weights;
+use super::trunk::trunk;
+use crate::config;
+use crate::model::{Outline, Skeleton};
+use crate::skeleton::Node2d;
+use nalgebra::Point3;
+
+/// The 3D skeleton of `flat`, with `tracks` points on each of its nodes: copied to planes, then
+/// pushed.
+pub fn build(
+    flat: &[Node2d],
+    tracks: &[u32],
+    outline: &Outline,
+    settings: &config::Shape,
+) -> Skeleton {
+    let Prototype {
+        mut skeleton,
+        envelope,
+        trunk,
+    } = Prototype::of(flat, tracks, outline, settings);
+    tune_term_weights(&mut skeleton, &trunk, &envelope, settings);
+    skeleton
+}
+
+/// What is pushed: copies on their planes, and what bounds them.
+pub struct Prototype {
+    pub skeleton: Skeleton,
+    pub envelope: Envelope,
+    /// Which of the measured nodes are trunk.
+    pub trunk: Vec<bool>,
+}
+
+impl Prototype {
+    /// Copies `flat` to its planes in the envelope that the settings name.
+    pub fn of(
+        flat: &[Node2d],
+        tracks: &[u32],
+        outline: &Outline,
+        settings: &config::Shape,
+    ) -> Self {
+        let foot_px = flat.first().map_or([0.0, 0.0], |n| n.position_px);
+        let places: Vec<Point3<f64>> = flat
+            .iter()
+            .map(|n| model_from_image(n.position_px, foot_px))
+            .collect();
+        let envelope = Envelope::of_filmed(settings.envelope, outline, foot_px, &places);
+        let trunk = trunk(flat, settings.leader, &settings.leader_px);
+        let skeleton = copy_to_planes(flat, tracks, &trunk, outline, &envelope, settings.planes);
+        Self {
+            skeleton,
+            envelope,
+            trunk,
+        }
+    }
+}
