@@ -392,6 +392,7 @@ fn only_names_that_the_service_gave_are_removed() {
     let elsewhere = helper.dir.path().join("elsewhere");
     let own_folders = [
         "2024-01-01T00-00-00Z",
+        "2024-01-02T00-00-00Z.unfinished",
         ".2024-01-03T00-00-00Z.partial-17",
         ".2024-01-03T00-00-00Z.partial-17-2",
     ];
@@ -402,6 +403,8 @@ fn only_names_that_the_service_gave_are_removed() {
     ];
     let kept_folders = [
         "2024-01-01T00-00-00Z keep",
+        "2024-01-02T00-00-00Z keep.unfinished",
+        "2024-01-02T00-00-00Z.unfinished-1",
         "2024-01-01T00-00-00Z-1",
         "storm 2024-01-01T00-00-00Z",
         // A recording is a file.
@@ -457,9 +460,9 @@ fn only_names_that_the_service_gave_are_removed() {
     assert!(elsewhere.join("film").is_file(), "a link was followed");
 }
 
-/// The helper knows the names of the program: what a killed run leaves is found again.
+/// The helper knows the names of the program: what a killed run leaves is found again and completed.
 #[test]
-fn what_a_killed_program_leaves_is_removed() {
+fn what_a_killed_program_has_filmed_is_completed() {
     let manager = Manager::new();
     let helper = Helper::new();
     let start = helper.state().join("2024-01-01T00-00-00Z");
@@ -483,18 +486,22 @@ fn what_a_killed_program_leaves_is_removed() {
             .arg(&recording),
     );
     manager.hear(Some("READY=1"), PATIENCE);
-    // The hidden folder is made with the first tree.
+    let note = helper
+        .state()
+        .join("2024-01-01T00-00-00Z.unfinished/capture.json");
+    let second_file = helper.state().join("2024-01-01T00-00-00Z-1.mcap");
     let until = Instant::now() + PATIENCE;
-    while !helper.names().iter().any(|name| name.starts_with('.')) {
+    while !(note.exists() && second_file.exists()) {
         assert!(Instant::now() < until, "{}", manager.stderr());
         std::thread::sleep(Duration::from_millis(50));
     }
     running.signal("-KILL");
     running.end();
-    let left = helper.names();
-    assert!(left.contains("2024-01-01T00-00-00Z-1.mcap"), "{left:?}");
-    helper.run("before", &[("ARBORCAM_KEEP_FREE_MB", "0")]);
-    let left = helper.names();
+    let program = ("ARBORCAM_BIN", env!("CARGO_BIN_EXE_arborcam"));
+    helper.run("before", &[("ARBORCAM_KEEP_FREE_MB", "0"), program]);
+    assert!(start.join("tracks.csv").is_file(), "{:?}", helper.names());
+    let mut left = helper.names();
+    left.remove("2024-01-01T00-00-00Z");
     assert!(left.iter().all(|name| name.ends_with(".mcap")), "{left:?}");
     helper.run("before", &[("ARBORCAM_KEEP_FREE_MB", "999999999999")]);
     assert_eq!(helper.names(), BTreeSet::new());
