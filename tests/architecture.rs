@@ -86,7 +86,6 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "outline",
             "shape::PushFigures",
             "dynamics::Film",
-            "dynamics::FilmLog",
         ],
     ),
     // The model's file holds all that is drawn; the HTML page plots the angles; a user's leaf is

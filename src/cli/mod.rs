@@ -160,7 +160,14 @@ pub fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(e) => return refused(&e),
     };
-    let result = match &cli.command {
+    match run(&cli.command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(ended) => status(&ended),
+    }
+}
+
+fn run(command: &Command) -> Result<(), Ended> {
+    match command {
         Command::Capture(args) => capture::run(args),
         Command::Replay(args) => replay::run(args),
         Command::Record(args) => record::run(args),
@@ -172,15 +179,18 @@ pub fn main() -> ExitCode {
         Command::Finish(args) => finish::run(args),
         Command::Devices(args) => devices::run(args),
         Command::Doctor(args) => doctor::run(args),
+    }
+}
+
+/// Says why a command did not end well, and gives the exit status of the contract.
+fn status(ended: &Ended) -> ExitCode {
+    let (status, error) = match ended {
+        Ended::Failed(e) => (FAILED, e),
+        Ended::BadUsage(e) => (BAD_USAGE, e),
+        Ended::NoInput(e) => (NO_INPUT, e),
+        Ended::Stopped => return ExitCode::from(STOPPED),
     };
-    let (status, error) = match result {
-        Ok(()) => return ExitCode::SUCCESS,
-        Err(Ended::Failed(e)) => (FAILED, e),
-        Err(Ended::BadUsage(e)) => (BAD_USAGE, e),
-        Err(Ended::NoInput(e)) => (NO_INPUT, e),
-        Err(Ended::Stopped) => return ExitCode::from(STOPPED),
-    };
-    say(&format!("arborcam: {}", one_line(&error)));
+    say(&format!("arborcam: {}", one_line(error)));
     ExitCode::from(status)
 }
 

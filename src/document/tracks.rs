@@ -2,9 +2,9 @@
 
 use super::DocumentError;
 use super::table::{TableReader, TableWriter};
-use crate::dynamics::{Film, FilmLog};
+use crate::dynamics::Film;
 use crate::files::{OutputFolder, WriteError};
-use crate::model::{NodeId, NodeName, Skeleton, TrackId, TrackSet};
+use crate::model::{NodeId, NodeName, Observation, Skeleton, TrackId, TrackLog, TrackSet};
 use csv::{ReaderBuilder, StringRecord, Writer};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
@@ -97,8 +97,8 @@ pub(super) fn read_film(
         .map(|(i, n)| (n.name, NodeId(i as u32)))
         .collect();
     let mut node_of: BTreeMap<TrackId, NodeId> = BTreeMap::new();
-    let mut log = FilmLog::new(window_s);
-    let (mut frame_s, mut points) = (f64::NEG_INFINITY, Vec::new());
+    let mut log = TrackLog::new(window_s);
+    let (mut frame_s, mut observations) = (f64::NEG_INFINITY, Vec::new());
     while table.next()? {
         let id = TrackId(table.whole(0, "track_id")?);
         let time_s = table.number(2, "time_s")?;
@@ -111,13 +111,20 @@ pub(super) fn read_film(
             )));
         }
         if time_s > frame_s {
-            push(&mut log, frame_s, &mut points);
+            push(&mut log, frame_s, &mut observations);
             frame_s = time_s;
         }
         // A point that is nowhere has no place, as it was not seen.
-        let at = [table.cell(3), table.cell(4)].map(|c| c.parse().unwrap_or(f32::NAN));
+        let [u_px, v_px] = [table.cell(3), table.cell(4)].map(|c| c.parse().unwrap_or(f32::NAN));
         if from_s <= time_s && time_s <= to_s {
-            points.push((id, at));
+            observations.push(Observation {
+                id,
+                u_px,
+                v_px,
+                fb_error_px: 0.0,
+                error_px: None,
+                confirmed: true,
+            });
         }
         if !table.cell(5).is_empty() {
             let name = NodeName(table.whole(5, "node_id")?);
@@ -127,14 +134,20 @@ pub(super) fn read_film(
             node_of.insert(id, *node);
         }
     }
-    push(&mut log, frame_s, &mut points);
-    Ok(log.film(skeleton, |id| node_of.get(&id).copied()))
+    push(&mut log, frame_s, &mut observations);
+    Ok(Film::from_log(log.all(), skeleton, |id| {
+        node_of.get(&id).copied()
+    }))
 }
 
 /// Hands a frame's points over; a frame without any was not filmed.
-fn push(log: &mut FilmLog, time_s: f64, points: &mut Vec<(TrackId, [f32; 2])>) {
-    if !points.is_empty() {
-        log.push_points(time_s, points.drain(..));
+fn push(log: &mut TrackLog, time_s: f64, observations: &mut Vec<Observation>) {
+    if !observations.is_empty() {
+        log.push(TrackSet {
+            time_s,
+            observations: std::mem::take(observations),
+            ..TrackSet::default()
+        });
     }
 }
 

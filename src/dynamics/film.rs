@@ -1,11 +1,10 @@
 //! The points of a film, by the branch that they are on: what sway is measured from.
 
-use crate::model::{LogWindow, NodeId, Skeleton, TrackId, TrackSet};
+use crate::model::{LogWindow, NodeId, Skeleton, TrackId};
 use crate::signal::statistics::nth_smallest;
 use std::borrow::Cow;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::ops::Range;
-use std::sync::Arc;
 
 /// One followed point.
 #[derive(Clone, Debug, PartialEq)]
@@ -147,74 +146,6 @@ impl Film {
         let steps: Vec<f64> = self.times_s.windows(2).map(|w| w[1] - w[0]).collect();
         let three_quarters = 3 * steps.len() / 4;
         nth_smallest(steps, three_quarters).unwrap_or(f64::INFINITY)
-    }
-}
-
-/// Where points were in one frame, px; shared, so that a copy of a whole log costs next to nothing.
-type Places = Arc<[(TrackId, [f32; 2])]>;
-
-/// The last seconds of a film that goes on. A copy is cheap: it can be taken while the film goes on
-/// and be worked on elsewhere.
-#[derive(Clone, Debug)]
-pub struct FilmLog {
-    window_s: f64,
-    sets: VecDeque<(f64, Places)>,
-}
-
-impl FilmLog {
-    /// Keeps `window_s` seconds.
-    pub fn new(window_s: f64) -> Self {
-        Self {
-            window_s,
-            sets: VecDeque::new(),
-        }
-    }
-
-    /// Takes the points of the next frame.
-    pub fn push(&mut self, set: &TrackSet) {
-        self.push_points(
-            set.time_s,
-            set.observations.iter().map(|o| (o.id, [o.u_px, o.v_px])),
-        );
-    }
-
-    /// Takes the points of the next frame, px; what comes with the same time is of the same frame.
-    pub fn push_points(&mut self, time_s: f64, points: impl Iterator<Item = (TrackId, [f32; 2])>) {
-        match self.sets.back_mut() {
-            Some((last, all)) if *last == time_s => {
-                *all = all.iter().copied().chain(points).collect()
-            }
-            _ => self.sets.push_back((time_s, points.collect())),
-        }
-        while self
-            .sets
-            .front()
-            .is_some_and(|(t, _)| time_s - t > self.window_s)
-        {
-            self.sets.pop_front();
-        }
-    }
-
-    /// The film so far; `node_of` says on which measured node of `skeleton` a point is.
-    pub fn film(&self, skeleton: &Skeleton, node_of: impl Fn(TrackId) -> Option<NodeId>) -> Film {
-        let measured = skeleton.measured();
-        let mut by_id: BTreeMap<TrackId, Option<FilmTrack>> = BTreeMap::new();
-        for (k, (_, points)) in self.sets.iter().enumerate() {
-            for (id, [u, v]) in points.iter() {
-                let track = by_id.entry(*id).or_insert_with(|| {
-                    let node = node_of(*id).filter(|n| n.index() < measured)?;
-                    Some(FilmTrack {
-                        node,
-                        at_px: vec![[f64::NAN; 2]; self.sets.len()],
-                    })
-                });
-                if let Some(track) = track {
-                    track.at_px[k] = [f64::from(*u), f64::from(*v)];
-                }
-            }
-        }
-        let times: Vec<f64> = self.sets.iter().map(|(t, _)| *t).collect();
-        Film::new(&times, by_id.into_values().flatten().collect())
     }
 }
 

@@ -47,8 +47,8 @@ pub use unfinished::{finish_unfinished, unfinished_dir};
 pub use watched::open;
 
 use crate::config::Config;
-use crate::model::{Control, Snapshot};
-use crate::outline::Given;
+use crate::model::{Control, Outline, Snapshot};
+use crate::outline::{Given, Scribbles};
 use crate::pipeline::FrontEnd;
 use crate::solve::Model;
 use crate::source::Source;
@@ -120,6 +120,14 @@ impl Drop for StopAll<'_> {
     }
 }
 
+fn spawn<T: Send + 'static>(
+    name: &str,
+    run: impl FnOnce() -> T + Send + 'static,
+) -> Result<JoinHandle<T>, Failure> {
+    let thread = std::thread::Builder::new().name(name.into());
+    thread.spawn(run).map_err(Failure::Thread)
+}
+
 /// Starts the threads.
 ///
 /// # Errors
@@ -134,32 +142,24 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
     let (model_in, model_out) = bounded(MODEL_QUEUE);
     // Wishes are typed by a person; they cannot pile up.
     let (controls, wishes) = unbounded();
-    let (region, scribbles) = match job.outline.take() {
-        Some(Given::Region(region)) => (Some(region), None),
-        Some(Given::Scribbles(scribbles)) => (None, Some(scribbles)),
-        None => (None, None),
-    };
+    let (region, scribbles) = parted(job.outline.take());
     let front = FrontEnd::new(&job.config, region);
     let (pace, preview_every, camera) = (job.pace, job.preview_every, job.config.camera.clone());
 
-    let (recorder, recording) = match job.record.take() {
-        Some(to) => {
-            let (recorder, handle) = recorder_thread::start(to, info.live, &shared)?;
-            (Some(recorder), Some(handle))
-        }
-        None => (None, None),
+    let recording = match job.record.take() {
+        Some(to) => Some(recorder_thread::start(to, info.live, &shared)?),
+        None => None,
     };
+    let recorder = recording.as_ref().map(|(recorder, _)| recorder.clone());
 
-    let thread = |name: &str| std::thread::Builder::new().name(name.into());
-    let failed = Failure::Thread;
     let model = {
-        let model = ModelThread::new(job, info, shared.clone(), recorder.clone().zip(recording));
+        let model = ModelThread::new(job, info, shared.clone(), recording);
         let on_end = shared.clone();
         let run = move || {
             let _ends_all = StopAll(&on_end);
             model.run(&model_out)
         };
-        thread("model").spawn(run).map_err(failed)?
+        spawn("model", run)?
     };
     let track = {
         let (shared, frames_out) = (shared.clone(), frames_out.clone());
@@ -170,7 +170,7 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
                 Err(e) => shared.fail(Failure::NoDecoder(e)),
             }
         };
-        thread("track").spawn(run).map_err(failed)?
+        spawn("track", run)?
     };
     let source = {
         let shared = shared.clone();
@@ -179,7 +179,7 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
             out_of: frames_out,
         };
         let run = move || source_thread::run(source, pace, camera, queue, recorder, &shared);
-        thread("source").spawn(run).map_err(failed)?
+        spawn("source", run)?
     };
     Ok(Running {
         shared,
@@ -188,6 +188,15 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
         track: Some(track),
         model: Some(model),
     })
+}
+
+/// A region, or scribbles that have to be solved on a picture first.
+fn parted(outline: Option<Given>) -> (Option<Outline>, Option<Scribbles>) {
+    match outline {
+        Some(Given::Region(region)) => (Some(region), None),
+        Some(Given::Scribbles(scribbles)) => (None, Some(scribbles)),
+        None => (None, None),
+    }
 }
 
 impl Running {

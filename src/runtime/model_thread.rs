@@ -121,52 +121,69 @@ impl ModelThread {
                 }
                 Err(RecvTimeoutError::Disconnected) => break,
             };
-            match message {
-                ToModel::Picture(picture) => self.picture = Some(picture),
-                ToModel::Followed(followed) => last = Some(self.step(followed)),
-                ToModel::Searching {
-                    progress,
-                    preview,
-                    size,
-                    frame,
-                    time_s,
-                } => {
-                    self.status
-                        .searching(progress, preview, size, (frame, time_s));
-                    self.show(None, false);
-                }
-                ToModel::Restart => {
-                    self.back.restart();
-                    self.status.restart();
-                    self.tables
-                        .take()
-                        .into_iter()
-                        .for_each(TableWriter::discard);
-                    self.refining = Refining::default();
-                    self.sway.iter_mut().for_each(SwayWatch::restart);
-                    self.tables_s = f64::NEG_INFINITY;
-                    self.new_log();
-                    (self.quality, self.announced, last) =
-                        (Quality::default(), Announced::default(), None);
-                    self.picture = None;
-                }
-                ToModel::BuildNow if self.back.model().is_some() => {
-                    self.shared
-                        .tell("the tree is built already; r starts again".into());
-                }
-                ToModel::BuildNow => {
-                    self.back.build_now();
-                    self.shared
-                        .tell("building the tree from what has been seen so far".into());
-                }
-                ToModel::Export => self.export_now(),
-            }
+            self.handle(message, &mut last);
             self.shared.pulse.done(Worker::Model);
         }
+        self.end(last.as_ref())
+    }
+
+    /// Takes a message of the tracker; `last` is the newest frame that was posed.
+    fn handle(&mut self, message: ToModel, last: &mut Option<Moved>) {
+        match message {
+            ToModel::Picture(picture) => self.picture = Some(picture),
+            ToModel::Followed(followed) => *last = Some(self.step(followed)),
+            ToModel::Searching {
+                progress,
+                preview,
+                size,
+                frame,
+                time_s,
+            } => {
+                self.status
+                    .searching(progress, preview, size, (frame, time_s));
+                self.show(None, false);
+            }
+            ToModel::Restart => {
+                self.restart();
+                *last = None;
+            }
+            ToModel::BuildNow if self.back.model().is_some() => {
+                self.shared
+                    .tell("the tree is built already; r starts again".into());
+            }
+            ToModel::BuildNow => {
+                self.back.build_now();
+                self.shared
+                    .tell("building the tree from what has been seen so far".into());
+            }
+            ToModel::Export => self.export_now(),
+        }
+    }
+
+    /// Forgets tracks and tree.
+    fn restart(&mut self) {
+        self.back.restart();
+        self.status.restart();
+        if let Some(tables) = self.tables.take() {
+            tables.discard();
+        }
+        self.refining = Refining::default();
+        if let Some(sway) = &mut self.sway {
+            sway.restart();
+        }
+        self.tables_s = f64::NEG_INFINITY;
+        self.new_log();
+        self.quality = Quality::default();
+        self.announced = Announced::default();
+        self.picture = None;
+    }
+
+    /// No more frames: finishes the tree and writes the capture.
+    fn end(mut self, last: Option<&Moved>) -> Summary {
         let swaying = self.sway.as_mut().map(SwayWatch::end);
         // Shown while the tree is finished and the capture is written.
         self.shared.ended.store(true, Ordering::Relaxed);
-        self.show(last.as_ref(), true);
+        self.show(last, true);
         // No frame is left that could need what is under way.
         self.refining = Refining::default();
         self.back.finish(&self.shared.pulse.optional_work);

@@ -164,6 +164,19 @@ impl<'a> TrackThread<'a> {
     }
 
     fn follow(&mut self, timed: &Timed) -> bool {
+        match self.decode(timed) {
+            Ok(Some(luma)) => self.follow_decoded(timed, luma),
+            Ok(None) => true,
+            Err(error) => {
+                let frame = timed.index;
+                self.shared.abort(Failure::Frame { frame, error });
+                false
+            }
+        }
+    }
+
+    /// The frame's luma; `None` where it is damaged and left out.
+    fn decode(&mut self, timed: &Timed) -> Result<Option<Luma>, DecodeError> {
         let mut luma = self.front.spare().unwrap_or(Luma {
             size: timed.raw.size,
             pixels: Vec::new(),
@@ -176,7 +189,10 @@ impl<'a> TrackThread<'a> {
             _ => self.decoder.luma(&timed.raw, &mut luma),
         };
         match decoded {
-            Ok(()) => (self.size, self.other_sizes) = (Some(luma.size), 0),
+            Ok(()) => {
+                (self.size, self.other_sizes) = (Some(luma.size), 0);
+                Ok(Some(luma))
+            }
             // Damage can hit the size that a picture gives itself; a camera that really changes it
             // keeps to that.
             Err(e @ DecodeError::SizeChanged { .. })
@@ -184,20 +200,17 @@ impl<'a> TrackThread<'a> {
             {
                 self.other_sizes += 1;
                 self.leave_out(timed, e);
-                return true;
+                Ok(None)
             }
             Err(e @ DecodeError::Damaged { .. }) => {
                 self.leave_out(timed, e);
-                return true;
+                Ok(None)
             }
-            Err(e) => {
-                self.shared.abort(Failure::Frame {
-                    frame: timed.index,
-                    error: e,
-                });
-                return false;
-            }
+            Err(e) => Err(e),
         }
+    }
+
+    fn follow_decoded(&mut self, timed: &Timed, luma: Luma) -> bool {
         let preview = self.preview(timed);
         self.picture
             .see(timed, self.front.oldest_held(), &mut self.decoder);
