@@ -314,7 +314,7 @@ fn again(dir: &Path, to: &Path, slower: f64) {
         )
     };
     let number = |c: &str| c.parse::<f64>().expect("number");
-    let is_id = |name: &str| name == "node_id" || name == "parent_id";
+    let is_id = |name: &str| ["node_id", "parent_id", "copy_of"].contains(&name);
     let time = |c: &str| format!("{:.6}", number(c) * slower);
     edit(&to.join("nodes.csv"), |name, cell| match name {
         name if is_id(name) => renamed(cell),
@@ -333,18 +333,6 @@ fn again(dir: &Path, to: &Path, slower: f64) {
         "u_px" | "v_px" => format!("{:.3}", 0.5 * number(cell) + 100.0),
         _ => cell.into(),
     });
-    // Which nodes are copies is told by their numbers.
-    let text = fs::read_to_string(to.join("capture.json")).expect("note");
-    let mut note: Value = serde_json::from_str(&text).expect("JSON");
-    for copied in note["model"]["copied"].as_array_mut().expect("copies") {
-        for key in ["node", "original"] {
-            copied[key] = renamed(&copied[key].to_string())
-                .parse::<u32>()
-                .expect("number")
-                .into();
-        }
-    }
-    fs::write(to.join("capture.json"), note.to_string()).expect("note");
 }
 
 #[test]

@@ -42,28 +42,28 @@ mod tests {
     use crate::config::Dynamics;
     use crate::dynamics::{Depth, FilmTrack, Onset, Start, analyse};
     use crate::model::{Node, NodeId, NodeName, Size, Skeleton};
-    use crate::random::generator;
     use nalgebra::Point3;
-    use rand::RngExt;
     use std::f64::consts::TAU;
+
+    fn chance(seed: &mut u64) -> f64 {
+        *seed = seed
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (*seed >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
+    }
 
     /// Nine points that move as `sway` says, px, each by another factor, with noise.
     fn film(seconds: f64, sway: impl Fn(f64) -> f64) -> Film {
         let times: Vec<f64> = (0..(30.0 * seconds) as u32)
             .map(|k| f64::from(k) / 30.0)
             .collect();
-        let mut random = generator(5, 0);
+        let mut seed = 5;
         let mut tracks = Vec::new();
         for i in 0..9 {
             let factor = 0.5 + 0.1 * f64::from(i);
             let at_px = times
                 .iter()
-                .map(|t| {
-                    [
-                        100.0 + factor * sway(*t),
-                        50.0 + 0.3 * random.random_range(-0.5..0.5),
-                    ]
-                })
+                .map(|t| [100.0 + factor * sway(*t), 50.0 + 0.3 * chance(&mut seed)])
                 .collect();
             tracks.push(FilmTrack {
                 node: NodeId(1),
@@ -136,13 +136,12 @@ mod tests {
     }
 
     /// Where an oscillator of 0.6 Hz is in `n` frames that wind shakes in those that are `windy`.
-    fn shaken(seed: u64, n: usize, damping: f64, windy: impl Fn(usize) -> bool) -> Vec<f64> {
+    fn shaken(mut seed: u64, n: usize, damping: f64, windy: impl Fn(usize) -> bool) -> Vec<f64> {
         let omega = TAU * 0.6;
         let (mut x, mut v) = (0.0, 0.0);
-        let mut random = generator(seed, 0);
         let mut out = Vec::with_capacity(n);
         for k in 0..n {
-            let gust = 2000.0 * random.random_range(-0.5..0.5);
+            let gust = 2000.0 * chance(&mut seed);
             let drive = if windy(k) { gust } else { 0.0 };
             v += (drive - 2.0 * damping * omega * v - omega * omega * x) / 30.0;
             x += v / 30.0;

@@ -6,14 +6,37 @@
 
 #![allow(dead_code)]
 
-#[path = "../support/chance.rs"]
-mod chance;
-
 use arborcam::dynamics::{Film, FilmTrack};
 use arborcam::model::{Node, NodeId, NodeName, Size, Skeleton};
-use chance::Chance;
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::TAU;
+
+/// Random numbers (SplitMix64). The trees of these tests, and with them the figures in
+/// docs/dynamics.md, are drawn from it: they stay the same whatever the program draws from.
+pub struct Chance(u64);
+
+impl Chance {
+    pub fn new(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x1234_5678_9ABC_DEF1)
+    }
+
+    /// Evenly within 0 to 1.
+    pub fn even(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.even()
+    }
+
+    pub fn normal(&mut self) -> f64 {
+        (-2.0 * self.even().max(1e-300).ln()).sqrt() * (TAU * self.even()).cos()
+    }
+}
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Drive {
