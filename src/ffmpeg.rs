@@ -3,7 +3,9 @@
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek};
 use std::os::unix::process::CommandExt;
-use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus};
+#[cfg(feature = "camera")]
+use std::process::ChildStdout;
+use std::process::{Child, ChildStdin, Command, ExitStatus};
 
 /// So much of what ffmpeg says is looked at, bytes.
 const LOOKED_AT: u64 = 1 << 16;
@@ -38,6 +40,7 @@ impl Ffmpeg {
     }
 
     /// Its standard output, if it is a pipe and was not taken yet.
+    #[cfg(feature = "camera")]
     pub fn output(&mut self) -> Option<ChildStdout> {
         self.child.stdout.take()
     }

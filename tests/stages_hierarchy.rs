@@ -89,10 +89,10 @@ fn tree(points: usize, sway: Sway, noise_px: f64) -> (TrackTable, Vec<usize>) {
     let times_s: Vec<f64> = (0..150).map(|k| f64::from(k) / 15.0).collect();
     let of: Vec<usize> = (0..points).map(|i| i % 5).collect();
     let mut positions = Vec::with_capacity(points);
-    for i in 0..points {
+    for (i, &branch) in of.iter().enumerate() {
         let mut path = Vec::with_capacity(times_s.len());
         for (k, &time_s) in times_s.iter().enumerate() {
-            let at = place_px(i, of[i], sway, time_s);
+            let at = place_px(i, branch, sway, time_s);
             let shaken = [0, 1].map(|c| at[c] + noise_px * noise(2 * (i * 1000 + k) + c));
             // Now and then a point is not seen.
             let seen = !(i * 31 + k).is_multiple_of(37);

@@ -203,10 +203,10 @@ mod tests {
             .map(|i| [0, 1, 2].map(|c| ((i * 7919 + c * 104_729 + 31) as f64 * 0.618_034).fract()))
             .collect();
         let mut marks = vec![Mark::Undecided; n];
-        for i in 0..n {
+        for (i, mark) in marks.iter_mut().enumerate() {
             match i % 37 {
-                0 => marks[i] = Mark::Tree,
-                5 => marks[i] = Mark::Background,
+                0 => *mark = Mark::Tree,
+                5 => *mark = Mark::Background,
                 _ => {}
             }
         }

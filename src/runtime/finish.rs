@@ -362,7 +362,7 @@ fn first_build(tree: &Model) -> Build {
 
 /// `None` for the tree that was built first.
 fn refinement(tree: &Model) -> Option<Refinement> {
-    (tree.refinements > 0).then(|| Refinement {
+    (tree.refinements > 0).then_some(Refinement {
         count: tree.refinements,
         frame: tree.frame,
         time_s: tree.time_s,

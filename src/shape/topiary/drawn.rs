@@ -115,7 +115,7 @@ impl Drawn {
             .min(f64::from(into[1]) / f64::from(bottom - top + 1));
         let mut lowest = (left..=right).filter(|&u| self.contains(u.into(), bottom.into()));
         let first = lowest.next();
-        let middle = match (first, lowest.last().or(first)) {
+        let middle = match (first, lowest.next_back().or(first)) {
             (Some(first), Some(last)) => f64::from(first + last) / 2.0,
             _ => f64::from(left + right) / 2.0,
         };
