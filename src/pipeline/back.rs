@@ -283,11 +283,6 @@ impl BackEnd {
         self.tracker.as_ref().map(PoseTracker::model)
     }
 
-    /// There is a model, and it stays as it is until the end.
-    pub fn is_settled(&self) -> bool {
-        self.tracker.is_some() && self.refiner.is_none()
-    }
-
     /// The binding of tracks to nodes, later tracks included.
     pub fn binding(&self) -> Option<&Binding> {
         self.tracker.as_ref().map(PoseTracker::binding)

@@ -19,7 +19,7 @@ use super::{Job, Pace, Summary};
 use crate::model::{Phase, Picture, Pose, SwayNow};
 use crate::pipeline::{BackEnd, Followed, Moved};
 use crate::recording::TrackFile;
-use crate::solve::LEAST_MOVING;
+use crate::solve::{LEAST_MOVING, Model};
 use crate::source::SourceInfo;
 use crossbeam_channel::{Receiver, RecvTimeoutError};
 use std::io::Write;
@@ -249,29 +249,34 @@ impl ModelThread {
         moved
     }
 
-    /// Has the tables of the capture written up to here, now and then, once the model has settled.
+    /// Has the tables of the capture written up to here, now and then, once there is a model.
     fn write_tables(&mut self, time_s: f64) {
-        if time_s - self.tables_s < TABLES_EVERY_S || !self.back.is_settled() {
+        if time_s - self.tables_s < TABLES_EVERY_S {
             return;
         }
         self.tables_s = time_s;
-        let Some(Ok(log)) = self.file.as_mut().map(TrackFile::reader) else {
+        let Some(model) = self.back.model().cloned() else {
             return;
         };
-        if self.tables.is_none() {
-            self.tables = self.begin_tables();
+        if let Some(outdated) = self.tables.take_if(|tables| !tables.is_of(&model)) {
+            outdated.discard();
         }
-        if let Some(tables) = &self.tables {
+        if self.tables.is_none() {
+            self.tables = self.begin_tables(&model);
+        }
+        if let (Some(tables), Some(Ok(log))) =
+            (&self.tables, self.file.as_mut().map(TrackFile::reader))
+        {
             tables.catch_up(log);
         }
     }
 
     /// `None` where they cannot be begun; the end will say why.
-    fn begin_tables(&self) -> Option<TableWriter> {
-        let (model, dir) = (self.back.model()?, self.job.out.as_ref()?);
+    fn begin_tables(&self, model: &Arc<Model>) -> Option<TableWriter> {
+        let dir = self.job.out.as_ref()?;
         let pictured = self.picture.as_ref().map(|p| p.frame);
         let tables = CaptureTables::create(dir, model, &self.job.config, pictured).ok()?;
-        TableWriter::start(tables, self.shared.clone()).ok()
+        TableWriter::start(tables, model, self.shared.clone()).ok()
     }
 
     fn announce(&mut self) {
@@ -410,8 +415,15 @@ impl ModelThread {
         if let Some(unfinished) = &mut self.unfinished {
             unfinished.release_space();
         }
-        let mut tables = self.tables.take().and_then(TableWriter::join);
         let job = self.capture_job()?;
+        let tables = self.tables.take();
+        let mut tables = match (tables, &job.tree) {
+            (Some(tables), Some(model)) if tables.is_of(model) => tables.join(),
+            (outdated, _) => {
+                outdated.into_iter().for_each(TableWriter::discard);
+                None
+            }
+        };
         let until = Instant::now() + FULL_DISK_FOR;
         let written = loop {
             let written = match tables.take() {

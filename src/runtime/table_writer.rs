@@ -1,21 +1,21 @@
 //! The tables of a capture, written on a thread of their own while the film goes on.
 //!
-//! Every frame of a capture has its pose by the model that it ends with, so the tables begin when
-//! the model has settled (see [`BackEnd::is_settled`]), from the first frame on. Before that they
-//! are short, and are written at the end.
-//!
-//! [`BackEnd::is_settled`]: crate::pipeline::BackEnd::is_settled
+//! Every frame of a capture has its pose by the model that it ends with, so tables of a model that
+//! is replaced are discarded, and begin anew from the first frame. That ends when the model has
+//! settled, two minutes after the build; from then on nothing is written twice.
 
 use super::capture_tables::CaptureTables;
 use super::shared::{Failure, Shared};
 use crate::cancel::CancelToken;
 use crate::recording::TrackFileReader;
+use crate::solve::Model;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 
 /// The tables, and the thread that brings them up to date.
 pub struct TableWriter {
+    model: Arc<Model>,
     logs: Sender<TrackFileReader>,
     cancel: CancelToken,
     thread: JoinHandle<Result<CaptureTables, Failure>>,
@@ -24,7 +24,11 @@ pub struct TableWriter {
 impl TableWriter {
     /// # Errors
     /// The thread cannot be started.
-    pub fn start(tables: CaptureTables, shared: Arc<Shared>) -> std::io::Result<Self> {
+    pub fn start(
+        tables: CaptureTables,
+        model: &Arc<Model>,
+        shared: Arc<Shared>,
+    ) -> std::io::Result<Self> {
         let (logs, queue) = bounded(1);
         let cancel = shared.pulse.writing.child();
         let token = cancel.clone();
@@ -33,10 +37,16 @@ impl TableWriter {
             .name("write".into())
             .spawn(run)?;
         Ok(Self {
+            model: model.clone(),
             logs,
             cancel,
             thread,
         })
+    }
+
+    /// Whether the tables are of this model.
+    pub fn is_of(&self, model: &Arc<Model>) -> bool {
+        Arc::ptr_eq(&self.model, model)
     }
 
     /// There is more to be written. What comes while the thread is busy is left for the next time.
