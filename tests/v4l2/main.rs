@@ -34,7 +34,10 @@ fn main() -> ExitCode {
     if args.get(1).is_some_and(|a| a == "usb-camera") {
         return camera::main(&args[2..]);
     }
-    let args = Arguments::from_args();
+    let mut args = Arguments::from_args();
+    // A guest takes all processors of a small machine, the more so an emulated one: two at a time
+    // would film each other's load.
+    args.test_threads.get_or_insert(1);
     let guest = if args.list {
         Guest::unused()
     } else {
