@@ -6,7 +6,7 @@ pub const GROUP: Group = Group {
     name: "faults",
     script: "faults.sh",
     first: "script",
-    limit_s: 240,
+    limit_s: 400,
     provide: |_| Ok(()),
     cases: &[
         ("a_camera_without_faults_loses_nothing", clean),

@@ -10,7 +10,8 @@ pub const GROUP: Group = Group {
     name: "parity",
     script: "parity.sh",
     first: "script",
-    limit_s: 300,
+    // An emulated guest on a busy host takes a minute to boot, and as long for each replay.
+    limit_s: 500,
     provide,
     cases: &[
         ("mjpeg_has_the_luma_of_the_file", |r| luma(r, "mjpeg")),

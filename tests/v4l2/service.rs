@@ -9,7 +9,7 @@ pub const GROUP: Group = Group {
     name: "service",
     script: "service.sh",
     first: "systemd",
-    limit_s: 240,
+    limit_s: 400,
     provide,
     cases: &[
         ("it_starts_when_the_camera_appears", starts),
