@@ -4,8 +4,9 @@
 mod options;
 mod written;
 
+use super::ended::{Ended, unwritten};
+use super::output::say;
 use super::stop::Stop;
-use super::{Ended, say};
 use crate::cancel::CancelToken;
 use crate::config::{Config, Excited};
 use crate::document::{Document, DocumentError};
@@ -84,7 +85,7 @@ fn table(args: &AnalyzeArgs, studies: &[Study], comparison: Option<&Comparison>)
 }
 
 fn report(path: &Path, html: String, stop: &AtomicBool) -> Result<(), Ended> {
-    put_beside(path, html, stop).map_err(super::export::unwritten)?;
+    put_beside(path, html, stop).map_err(unwritten)?;
     say(&format!("report:  {}", path.display()));
     Ok(())
 }

@@ -5,13 +5,13 @@ mod options;
 
 pub use options::AnimateArgs;
 
-use super::export::failed;
+use super::ended::{Ended, failed};
 use super::hangup::SighupAction;
+use super::output::say;
 use super::render::{self, unwritten};
 use super::session::stop_on_signals;
 use super::stop::Stop;
 use super::tree::{Tail, warn};
-use super::{Ended, say};
 use crate::animate::{Animator, Known, Loudness, Magnify, Wind, magnify, place_to_pull};
 use crate::config::Config;
 use crate::document::{DocumentError, MotionCsv};

@@ -1,6 +1,6 @@
 //! How large a pixel is at the tree.
 
-use super::Ended;
+use super::ended::Ended;
 use crate::config::Config;
 use crate::model::Size;
 use anyhow::anyhow;

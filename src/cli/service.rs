@@ -3,7 +3,7 @@
 //!
 //! Nothing is sent where nobody asked for it (`NOTIFY_SOCKET`), so this runs in every capture.
 
-use super::say;
+use super::output::say;
 use crate::model::Snapshot;
 use crate::runtime::{Running, Sign, Vigil};
 use sd_notify::NotifyState;

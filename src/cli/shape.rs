@@ -1,6 +1,6 @@
 //! What the user draws for the tree's shape: the trunk that it keeps, the space that it fills.
 
-use super::Ended;
+use super::ended::Ended;
 use crate::config::{Config, EnvelopeKind, Leader};
 use crate::model::Size;
 use anyhow::anyhow;

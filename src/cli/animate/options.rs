@@ -1,5 +1,6 @@
 //! What `arborcam animate` is asked for.
 
+use super::super::common::seconds;
 use super::super::render::{ViewName, WHITE, background, rate, size};
 use super::super::tree::TreeArgs;
 use crate::config::{Config, ConfigError};
@@ -17,7 +18,7 @@ pub struct AnimateArgs {
     /// A capture: a folder that `--out` of capture or replay has made.
     pub dir: PathBuf,
     /// Length of the animation, s.
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = super::super::seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
     pub seconds: f64,
     /// What to write, by its ending: a model (.glb, .gltf), a page (.html), the motion as a table
     /// (.csv), a video (.mp4), or a picture of the end (.png). It must not exist. Without it the
