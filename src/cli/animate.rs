@@ -13,7 +13,6 @@ use super::session::stop_on_signals;
 use super::stop::Stop;
 use super::tree::{Tail, warn};
 use crate::animate::{Animator, Known, Loudness, Magnify, Wind, magnify, place_to_pull};
-use crate::config::Config;
 use crate::document::{DocumentError, MotionCsv};
 use crate::export::gltf::{NamedBytes, glb, gltf_files};
 use crate::export::{ExportError, html};
@@ -34,8 +33,6 @@ use std::sync::atomic::Ordering;
 const PERIOD_S: f64 = 128.0;
 
 pub fn run(args: &AnimateArgs) -> Result<(), Ended> {
-    args.set(&mut Config::default())
-        .map_err(|e| Ended::BadUsage(e.into()))?;
     let Some(out) = &args.out else {
         return live(args);
     };
@@ -104,7 +101,9 @@ fn tree(args: &AnimateArgs) -> Result<PreparedTree, Ended> {
         Some(_) => Tail::Whole,
         None => Tail::Seconds(0.0),
     };
-    let mut tree = args.tree.prepare(&args.dir, tail)?;
+    let tree = args
+        .tree
+        .prepare(&args.dir, tail, |config| args.set(config))?;
     if args.magnify.is_some() && !tree.document.has_motion() {
         return Err(DocumentError::NoFilm {
             dir: args.dir.clone(),
@@ -112,8 +111,6 @@ fn tree(args: &AnimateArgs) -> Result<PreparedTree, Ended> {
         }
         .into());
     }
-    args.set(&mut tree.config)
-        .map_err(|e| Ended::BadUsage(e.into()))?;
     warn(&tree);
     Ok(tree)
 }

@@ -81,7 +81,7 @@ pub fn run(args: &ExportArgs) -> Result<(), Ended> {
         html::built_in().map_err(failed)?;
     }
     let stop = Stop::on_signals()?;
-    let tree = args.tree.prepare(&args.dir, Tail::Animation)?;
+    let tree = args.tree.prepare(&args.dir, Tail::Animation, |_| {})?;
     warn(&tree);
     args.tell_idle();
     if args.format == Format::Csv {

@@ -24,7 +24,7 @@ pub fn run(args: &RenderArgs) -> Result<(), Ended> {
     }
     refuse_taken(&args.out).map_err(unwritten)?;
     let stop = Stop::on_signals()?;
-    let tree = args.tree.prepare(&args.dir, tail(args, kind))?;
+    let tree = args.tree.prepare(&args.dir, tail(args, kind), |_| {})?;
     if args.film.is_some() && tree.document.picture.is_none() {
         return Err(Ended::Failed(anyhow!(
             "the capture holds no frame of the film; leave --film out"

@@ -5,7 +5,7 @@ use super::idle;
 use super::output::say;
 use super::scale::ScaleArgs;
 use super::shape::ShapeArgs;
-use crate::config::{Config, ConfigError, LeafShow};
+use crate::config::{Config, LeafShow};
 use crate::document::Document;
 use crate::export::read_template;
 use crate::model::{Luma, Size};
@@ -82,14 +82,9 @@ impl Tail {
 }
 
 impl TreeArgs {
-    /// The settings of the capture with what is to be changed of them: the file over the capture's,
-    /// the command line over both.
-    fn config(&self, own: &Config) -> Result<Config, ConfigError> {
-        let mut config = match &self.config {
-            Some(path) => own.overlaid(path)?,
-            None => own.clone(),
-        };
-        self.shape.set(&mut config);
+    /// Applies the options of the command line.
+    fn set(&self, config: &mut Config) {
+        self.shape.set(config);
         if let Some(planes) = self.planes {
             config.shape.planes = planes;
         }
@@ -109,20 +104,26 @@ impl TreeArgs {
         if let Some(animation_s) = self.animation_s {
             config.export.animation_s = animation_s;
         }
-        self.scale.set(&mut config);
-        config.check()?;
-        Ok(config)
+        self.scale.set(config);
     }
 
     /// Reads the document in `dir`, with the poses of the end of its film, and prepares the tree
-    /// that these options ask for.
+    /// that these options ask for. `set` applies the options that only the calling command has.
     ///
     /// # Errors
     /// The document or a file of an option cannot be read, a setting is out of range, or the
     /// document lacks what a new shape is made from.
-    pub fn prepare(&self, dir: &Path, tail: Tail) -> Result<PreparedTree, Ended> {
+    pub fn prepare(
+        &self,
+        dir: &Path,
+        tail: Tail,
+        set: impl FnOnce(&mut Config),
+    ) -> Result<PreparedTree, Ended> {
         let note = Document::note(dir)?;
-        let config = self.config(&note.config).map_err(bad_usage)?;
+        let config = note.config.layered(self.config.as_deref(), |config| {
+            self.set(config);
+            set(config);
+        })?;
         if let Some(file) = &self.config {
             idle::settings(file, &note.config, &config);
         }

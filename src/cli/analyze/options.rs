@@ -2,7 +2,7 @@
 
 use super::super::ended::Ended;
 use super::super::scale::ScaleArgs;
-use crate::config::{Config, Excited};
+use crate::config::{Config, ConfigError, Excited};
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
 use std::collections::BTreeSet;
@@ -108,16 +108,16 @@ impl AnalyzeArgs {
         ]
     }
 
-    /// A capture's own settings with what is to be changed of them.
+    /// The settings for a capture: command line over configuration file over the capture's `own`.
     ///
     /// # Errors
-    /// The file of settings cannot be read, or a setting is out of range.
-    pub fn config(&self, own: &Config) -> Result<Config, Ended> {
-        let overlaid = self
-            .config
-            .as_ref()
-            .map_or_else(|| Ok(own.clone()), |path| own.overlaid(path));
-        let mut config = overlaid.map_err(|e| Ended::BadUsage(e.into()))?;
+    /// The configuration file cannot be read, or a setting is out of range.
+    pub fn config(&self, own: &Config) -> Result<Config, ConfigError> {
+        own.layered(self.config.as_deref(), |config| self.set(config))
+    }
+
+    /// Applies the options of the command line.
+    fn set(&self, config: &mut Config) {
         if let Some(cause) = self.excitation {
             config.dynamics.excitation = match cause {
                 Cause::Auto => Excited::Auto,
@@ -125,9 +125,7 @@ impl AnalyzeArgs {
                 Cause::Wind => Excited::Wind,
             };
         }
-        self.scale.set(&mut config);
-        config.check().map_err(|e| Ended::BadUsage(e.into()))?;
-        Ok(config)
+        self.scale.set(config);
     }
 }
 

@@ -3,7 +3,7 @@
 use super::super::common::seconds;
 use super::super::render::{ViewName, WHITE, background, rate, size};
 use super::super::tree::TreeArgs;
-use crate::config::{Config, ConfigError};
+use crate::config::Config;
 use crate::model::Size;
 use crate::views::Shot;
 use clap::Args;
@@ -138,18 +138,14 @@ impl AnimateArgs {
         Ok(kind)
     }
 
-    /// The wind that is asked for in place of the configuration's.
-    ///
-    /// # Errors
-    /// It is out of range.
-    pub fn set(&self, config: &mut Config) -> Result<(), ConfigError> {
+    /// Applies the options on the wind. With `--pull` and without `--wind` the air is still.
+    pub fn set(&self, config: &mut Config) {
         let wind = &mut config.wind;
         let still = self.pull.map(|_| 0.0);
         wind.force = self.wind.or(still).unwrap_or(wind.force);
         wind.direction_deg = self.direction.unwrap_or(wind.direction_deg);
         wind.gusts = self.gusts.unwrap_or(wind.gusts);
         wind.beta = self.beta.unwrap_or(wind.beta);
-        config.check()
     }
 
     /// How a video of it is drawn.
