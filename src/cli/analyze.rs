@@ -4,7 +4,7 @@
 mod options;
 mod written;
 
-use super::ended::{Ended, unwritten};
+use super::command_error::CommandError;
 use super::output::say;
 use super::stop::Stop;
 use crate::cancel::CancelToken;
@@ -34,10 +34,10 @@ struct Analysed {
     sway: Vec<Swaying>,
 }
 
-pub fn run(args: &AnalyzeArgs) -> Result<(), Ended> {
+pub fn run(args: &AnalyzeArgs) -> Result<(), CommandError> {
     args.check()?;
     if let Some(path) = &args.report {
-        refuse_taken(path).map_err(|e| Ended::Failed(e.into()))?;
+        refuse_taken(path).map_err(CommandError::failed)?;
     }
     let stop = Stop::on_signals()?;
     let names = names(&args.dirs);
@@ -65,7 +65,7 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), Ended> {
     let mut failures = Vec::new();
     if args.update {
         for (dir, sway) in args.dirs.iter().zip(&answers) {
-            failures.extend(update(dir, sway, stop).err().map(Ended::from));
+            failures.extend(update(dir, sway, stop).err().map(CommandError::from));
         }
     }
     if let Some(path) = &args.report {
@@ -84,22 +84,24 @@ fn table(args: &AnalyzeArgs, studies: &[Study], comparison: Option<&Comparison>)
     }
 }
 
-fn report(path: &Path, html: String, stop: &AtomicBool) -> Result<(), Ended> {
-    put_beside(path, html, stop).map_err(unwritten)?;
+fn report(path: &Path, html: String, stop: &AtomicBool) -> Result<(), CommandError> {
+    put_beside(path, html, stop)?;
     say(&format!("report:  {}", path.display()));
     Ok(())
 }
 
 /// The last failure ends the command; those before it are told here.
-fn ended(mut failures: Vec<Ended>) -> Result<(), Ended> {
-    if failures.iter().any(|e| matches!(e, Ended::Stopped)) {
-        return Err(Ended::Stopped);
+fn ended(mut failures: Vec<CommandError>) -> Result<(), CommandError> {
+    if failures.iter().any(|e| matches!(e, CommandError::Stopped)) {
+        return Err(CommandError::Stopped);
     }
     let Some(last) = failures.pop() else {
         return Ok(());
     };
     for failure in &failures {
-        if let Ended::Failed(e) | Ended::BadUsage(e) | Ended::NoInput(e) = failure {
+        if let CommandError::Failed(e) | CommandError::BadUsage(e) | CommandError::NoInput(e) =
+            failure
+        {
             say(&format!("arborcam: {e}"));
         }
     }
@@ -119,7 +121,7 @@ impl Notes<'_> {
     }
 }
 
-fn analysed(args: &AnalyzeArgs, document: &Document, name: &str) -> Result<Analysed, Ended> {
+fn analysed(args: &AnalyzeArgs, document: &Document, name: &str) -> Result<Analysed, CommandError> {
     let mut own = document.note.config.clone();
     // What its tables are in.
     own.export.metres_per_px = document.metres_per_px();
@@ -195,7 +197,7 @@ fn film(
     document: &Document,
     config: &Config,
     notes: &mut Notes,
-) -> Result<Film, Ended> {
+) -> Result<Film, CommandError> {
     let chosen = args.from.is_some() || args.to.is_some();
     let window_s = config.dynamics.window_s;
     let longest_s = if chosen { LONGEST_S } else { window_s };
@@ -205,7 +207,7 @@ fn film(
         && film.times_s.is_empty()
         && from > duration_s
     {
-        return Err(Ended::BadUsage(anyhow!(
+        return Err(CommandError::BadUsage(anyhow!(
             "--from {from} is after the end of {}, which is {duration_s:.1} s long; choose an earlier part",
             notes.name
         )));
@@ -308,12 +310,12 @@ fn is_shared(all: &[Vec<String>], own: &[String], length: usize) -> bool {
     same.count() > 1
 }
 
-fn print(text: &str) -> Result<(), Ended> {
+fn print(text: &str) -> Result<(), CommandError> {
     let mut out = std::io::stdout().lock();
     let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
     match written {
         // A reader that closed it early has seen what it wanted.
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Ended::Failed(anyhow!(
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(CommandError::Failed(anyhow!(
             "cannot write to standard output: {e}"
         ))),
         _ => Ok(()),

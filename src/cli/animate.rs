@@ -5,7 +5,7 @@ mod options;
 
 pub use options::AnimateArgs;
 
-use super::ended::{Ended, failed};
+use super::command_error::CommandError;
 use super::hangup::SighupAction;
 use super::output::say;
 use super::render::{self, unwritten};
@@ -32,16 +32,16 @@ use std::sync::atomic::Ordering;
 /// Wind that is not looped comes back after so much more than the animation at the least, s.
 const PERIOD_S: f64 = 128.0;
 
-pub fn run(args: &AnimateArgs) -> Result<(), Ended> {
+pub fn run(args: &AnimateArgs) -> Result<(), CommandError> {
     let Some(out) = &args.out else {
         return live(args);
     };
     let kind = args
         .check(out)
-        .map_err(|why| Ended::BadUsage(anyhow!(why)))?;
+        .map_err(|why| CommandError::BadUsage(anyhow!(why)))?;
     refuse_taken(out).map_err(unwritten)?;
     if kind == Kind::Html {
-        html::built_in().map_err(failed)?;
+        html::built_in()?;
     }
     let stop = Stop::on_signals()?;
     let sound = args.wav.as_deref().map(sound).transpose()?;
@@ -56,7 +56,7 @@ pub fn run(args: &AnimateArgs) -> Result<(), Ended> {
                 args.count(),
             );
             (
-                poses.map_err(|e| Ended::Failed(e.into()))?,
+                poses.map_err(CommandError::failed)?,
                 json!({ "captured": { "times": by, "speed": args.speed } }),
             )
         }
@@ -67,17 +67,17 @@ pub fn run(args: &AnimateArgs) -> Result<(), Ended> {
 }
 
 /// On the terminal, until the user leaves.
-fn live(args: &AnimateArgs) -> Result<(), Ended> {
+fn live(args: &AnimateArgs) -> Result<(), CommandError> {
     if !std::io::stdout().is_terminal() {
         let why = "there is no terminal to show the tree on; give --out FILE (.glb, .html, .csv, .mp4 or .png)";
-        return Err(Ended::BadUsage(anyhow!(why)));
+        return Err(CommandError::BadUsage(anyhow!(why)));
     }
     let sound = args.wav.as_deref().map(sound).transpose()?;
     let tree = tree(args)?;
     let mut moving: Box<dyn tui::Moving> = match args.magnify {
         Some(by) => {
             let wanted = magnified(args, &tree, by);
-            Box::new(AsFilmed::new(&tree, wanted).map_err(|e| Ended::Failed(e.into()))?)
+            Box::new(AsFilmed::new(&tree, wanted).map_err(CommandError::failed)?)
         }
         None => {
             let mut animator = animator(&tree, sound, PERIOD_S);
@@ -86,17 +86,16 @@ fn live(args: &AnimateArgs) -> Result<(), Ended> {
         }
     };
     let stop = stop_on_signals(SighupAction::ends_this_process())?;
-    tui::watch(&mut *moving, tui::Options::from_env(), &stop)
-        .map_err(|e| Ended::BadUsage(e.into()))?;
+    tui::watch(&mut *moving, tui::Options::from_env(), &stop).map_err(CommandError::bad_usage)?;
     if stop.load(Ordering::SeqCst) {
-        Err(Ended::Stopped)
+        Err(CommandError::Stopped)
     } else {
         Ok(())
     }
 }
 
 /// The tree, with the wind that is asked for, and all of its film where that is to be changed.
-fn tree(args: &AnimateArgs) -> Result<PreparedTree, Ended> {
+fn tree(args: &AnimateArgs) -> Result<PreparedTree, CommandError> {
     let tail = match args.magnify {
         Some(_) => Tail::Whole,
         None => Tail::Seconds(0.0),
@@ -116,11 +115,11 @@ fn tree(args: &AnimateArgs) -> Result<PreparedTree, Ended> {
 }
 
 /// The loudness of a WAV file.
-fn sound(path: &Path) -> Result<Loudness, Ended> {
+fn sound(path: &Path) -> Result<Loudness, CommandError> {
     let sound = std::fs::read(path)
         .context("cannot read it")
         .and_then(|bytes| Ok(Loudness::of_wav(&bytes)?));
-    sound.map_err(|e| Ended::BadUsage(e.context(format!("--wav {}", path.display()))))
+    sound.map_err(|e| CommandError::BadUsage(e.context(format!("--wav {}", path.display()))))
 }
 
 fn magnified(args: &AnimateArgs, tree: &PreparedTree, by: f64) -> Magnify {
@@ -158,7 +157,7 @@ fn blown(
     args: &AnimateArgs,
     tree: &PreparedTree,
     sound: Option<Loudness>,
-) -> Result<(Vec<Pose>, Value), Ended> {
+) -> Result<(Vec<Pose>, Value), CommandError> {
     let count = args.count();
     let length_s = count as f64 / args.fps;
     let period_s = if args.looped {
@@ -213,13 +212,13 @@ fn pull(
     tree: &PreparedTree,
     animator: &mut Animator,
     lean_deg: f64,
-) -> Result<(), Ended> {
+) -> Result<(), CommandError> {
     let nodes = &tree.skeleton.nodes;
     let node = match args.pull_node {
         Some(name) => {
             let found = (1..nodes.len()).find(|&i| nodes[i].name.0 == name);
             found.ok_or_else(|| {
-                Ended::BadUsage(anyhow!(
+                CommandError::BadUsage(anyhow!(
                     "--pull-node {name} is no node of this tree; see nodes.csv"
                 ))
             })?
@@ -272,7 +271,7 @@ fn write(
     kind: Kind,
     tree: &PreparedTree,
     stop: &Stop,
-) -> Result<(), Ended> {
+) -> Result<(), CommandError> {
     let name = text(out.file_name());
     let stem = text(out.file_stem());
     let model = tree.model();
@@ -291,7 +290,7 @@ fn write(
             return render::draw(tree, &shot, render::Kind::Picture, out, stop);
         }
     };
-    let files = files.map_err(failed)?;
+    let files = files?;
     let size: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();
     let folder = out.parent().unwrap_or(Path::new(""));
     write_files(folder, &files, stop.while_writing()).map_err(unwritten)?;

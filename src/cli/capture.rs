@@ -1,8 +1,8 @@
 //! `arborcam capture DEVICE`: the whole way, live.
 
 use super::camera::CameraArgs;
+use super::command_error::CommandError;
 use super::common::Common;
-use super::ended::Ended;
 use super::recording::RecordOption;
 use super::session::{self, Plan};
 use clap::Args;
@@ -21,7 +21,7 @@ pub struct CaptureArgs {
     record: RecordOption,
 }
 
-pub fn run(args: &CaptureArgs) -> Result<(), Ended> {
+pub fn run(args: &CaptureArgs) -> Result<(), CommandError> {
     session::run(
         &args.common,
         Plan {

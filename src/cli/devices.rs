@@ -1,6 +1,6 @@
 //! `arborcam devices`: the cameras that are plugged in.
 
-use super::ended::Ended;
+use super::command_error::CommandError;
 use super::output::print;
 use crate::config::Config;
 use crate::source::{self, Device, Mode, Places};
@@ -17,7 +17,7 @@ pub struct DevicesArgs {
     config: Option<PathBuf>,
 }
 
-pub fn run(args: &DevicesArgs) -> Result<(), Ended> {
+pub fn run(args: &DevicesArgs) -> Result<(), CommandError> {
     let config = Config::default().layered(args.config.as_deref(), |_| {})?;
     let devices = source::list_for(&config.camera, &Places::default());
     let text = if args.json {
@@ -30,7 +30,7 @@ pub fn run(args: &DevicesArgs) -> Result<(), Ended> {
     };
     let printed = print(&text);
     if devices.is_empty() {
-        return Err(Ended::NoInput(anyhow::anyhow!(
+        return Err(CommandError::NoInput(anyhow::anyhow!(
             "no camera found; plug one in, and look whether /dev/video0 appears"
         )));
     }

@@ -1,6 +1,6 @@
 //! `arborcam doctor`: what is wrong with this machine, and what to do about it.
 
-use super::ended::Ended;
+use super::command_error::CommandError;
 use super::output::print;
 use crate::config::Config;
 use crate::doctor::{self, Asked, Screen, Verdict};
@@ -23,7 +23,7 @@ pub struct DoctorArgs {
     json: bool,
 }
 
-pub fn run(args: &DoctorArgs) -> Result<(), Ended> {
+pub fn run(args: &DoctorArgs) -> Result<(), CommandError> {
     let config = Config::default()
         .layered(args.config.as_deref(), |_| {})
         .map_err(|e| e.to_string());
@@ -41,14 +41,14 @@ pub fn run(args: &DoctorArgs) -> Result<(), Ended> {
     let checks = doctor::judge(&doctor::gather(asked));
     let failed = checks.iter().filter(|c| c.verdict == Verdict::Fail).count();
     let text = if args.json {
-        serde_json::to_string(&checks).map_err(|e| Ended::Failed(e.into()))? + "\n"
+        serde_json::to_string(&checks).map_err(CommandError::failed)? + "\n"
     } else {
         checks.iter().map(|check| format!("{check}\n")).collect()
     };
     print(&text)?;
     match failed {
         0 => Ok(()),
-        _ => Err(Ended::Failed(anyhow::anyhow!(
+        _ => Err(CommandError::Failed(anyhow::anyhow!(
             "{failed} of {} checks failed; each says what to do",
             checks.len()
         ))),

@@ -1,6 +1,6 @@
 //! `arborcam export DIR --format F --out PATH`: a capture's tree as a file for other programs.
 
-use super::ended::{Ended, failed, unwritten};
+use super::command_error::CommandError;
 use super::idle;
 use super::output::say;
 use super::stop::Stop;
@@ -74,11 +74,11 @@ fn tolerance(text: &str) -> Result<f64, String> {
     px.ok_or_else(|| "give a number of pixels from 0.001 to 100".to_owned())
 }
 
-pub fn run(args: &ExportArgs) -> Result<(), Ended> {
+pub fn run(args: &ExportArgs) -> Result<(), CommandError> {
     let target = Target::of(args)?;
-    target.refuse_taken().map_err(unwritten)?;
+    target.refuse_taken()?;
     if args.format == Format::Html {
-        html::built_in().map_err(failed)?;
+        html::built_in()?;
     }
     let stop = Stop::on_signals()?;
     let tree = args.tree.prepare(&args.dir, Tail::Animation, |_| {})?;
@@ -92,7 +92,7 @@ pub fn run(args: &ExportArgs) -> Result<(), Ended> {
         all_levels: args.lods && args.format != Format::Html,
         ..tree.model()
     };
-    let files = files(args.format, &tree, &model, &target).map_err(failed)?;
+    let files = files(args.format, &tree, &model, &target)?;
     target.write(files, &stop)
 }
 
@@ -115,7 +115,7 @@ fn files(
 }
 
 /// The tables, as they are or of the changed tree, and the wood as cylinders.
-fn tables(args: &ExportArgs, tree: &PreparedTree, stop: &Stop) -> Result<(), Ended> {
+fn tables(args: &ExportArgs, tree: &PreparedTree, stop: &Stop) -> Result<(), CommandError> {
     let written = tree.write_tables(&args.out, stop.while_writing())?;
     let film = if written.film {
         "nodes, motion and tracks"
@@ -130,8 +130,8 @@ fn tables(args: &ExportArgs, tree: &PreparedTree, stop: &Stop) -> Result<(), End
     Ok(())
 }
 
-fn bad_usage<T>(why: String) -> Result<T, Ended> {
-    Err(Ended::BadUsage(anyhow!(why)))
+fn bad_usage<T>(why: String) -> Result<T, CommandError> {
+    Err(CommandError::BadUsage(anyhow!(why)))
 }
 
 /// The file that was asked for; others may come beside it.
@@ -141,7 +141,7 @@ enum Target<'a> {
 }
 
 impl<'a> Target<'a> {
-    fn of(args: &'a ExportArgs) -> Result<Self, Ended> {
+    fn of(args: &'a ExportArgs) -> Result<Self, CommandError> {
         let shown = args.out.display();
         if args.out.as_os_str() == STDOUT {
             return match args.format {
@@ -204,7 +204,7 @@ impl<'a> Target<'a> {
         }
     }
 
-    fn write(&self, files: Vec<NamedBytes>, stop: &Stop) -> Result<(), Ended> {
+    fn write(&self, files: Vec<NamedBytes>, stop: &Stop) -> Result<(), CommandError> {
         match self {
             Self::Stdout => {
                 let mut out = std::io::stdout().lock();
@@ -212,12 +212,14 @@ impl<'a> Target<'a> {
                     .iter()
                     .try_for_each(|(_, bytes)| out.write_all(bytes))
                     .and_then(|()| out.flush());
-                written.map_err(|e| Ended::Failed(anyhow!("cannot write to standard output: {e}")))
+                written.map_err(|e| {
+                    CommandError::Failed(anyhow!("cannot write to standard output: {e}"))
+                })
             }
             Self::Beside(path) => {
                 let size: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();
                 let folder = path.parent().unwrap_or(Path::new(""));
-                write_files(folder, &files, stop.while_writing()).map_err(unwritten)?;
+                write_files(folder, &files, stop.while_writing())?;
                 say(&format!("{}: {:.1} MB", path.display(), size as f64 / 1e6));
                 Ok(())
             }

@@ -1,6 +1,6 @@
 //! `arborcam finish DIR`: completes a capture whose run was cut.
 
-use super::ended::Ended;
+use super::command_error::CommandError;
 use super::output::say;
 use super::stop::Stop;
 use crate::cancel::CancelToken;
@@ -14,7 +14,7 @@ pub struct FinishArgs {
     dir: PathBuf,
 }
 
-pub fn run(args: &FinishArgs) -> Result<(), Ended> {
+pub fn run(args: &FinishArgs) -> Result<(), CommandError> {
     // Nothing is taken away before the capture is there, so a signal may end it at any time.
     let _stop = Stop::on_signals()?;
     let written = runtime::finish_unfinished(&args.dir, &CancelToken::new())?;

@@ -4,10 +4,10 @@ mod analyze;
 mod animate;
 mod camera;
 mod capture;
+mod command_error;
 mod common;
 mod devices;
 mod doctor;
-mod ended;
 mod export;
 mod finish;
 mod hangup;
@@ -27,7 +27,7 @@ mod supervisor;
 mod tree;
 
 use clap::{Parser, Subcommand};
-use ended::{BAD_USAGE, Ended, FAILED, NO_INPUT, STOPPED};
+use command_error::{BAD_USAGE, CommandError, FAILED, NO_INPUT, STOPPED};
 use output::say;
 use std::process::ExitCode;
 
@@ -76,11 +76,11 @@ pub fn main() -> ExitCode {
     };
     match run(&cli.command) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(ended) => status(&ended),
+        Err(e) => status(&e),
     }
 }
 
-fn run(command: &Command) -> Result<(), Ended> {
+fn run(command: &Command) -> Result<(), CommandError> {
     match command {
         Command::Capture(args) => capture::run(args),
         Command::Replay(args) => replay::run(args),
@@ -96,15 +96,15 @@ fn run(command: &Command) -> Result<(), Ended> {
     }
 }
 
-/// Says why a command did not end well, and gives the exit status of the contract.
-fn status(ended: &Ended) -> ExitCode {
-    let (status, error) = match ended {
-        Ended::Failed(e) => (FAILED, e),
-        Ended::BadUsage(e) => (BAD_USAGE, e),
-        Ended::NoInput(e) => (NO_INPUT, e),
-        Ended::Stopped => return ExitCode::from(STOPPED),
+/// Prints why a command did not succeed, and returns its exit status.
+fn status(error: &CommandError) -> ExitCode {
+    let (status, cause) = match error {
+        CommandError::Failed(e) => (FAILED, e),
+        CommandError::BadUsage(e) => (BAD_USAGE, e),
+        CommandError::NoInput(e) => (NO_INPUT, e),
+        CommandError::Stopped => return ExitCode::from(STOPPED),
     };
-    say(&format!("arborcam: {}", one_line(error)));
+    say(&format!("arborcam: {}", one_line(cause)));
     ExitCode::from(status)
 }
 

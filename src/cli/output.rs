@@ -1,12 +1,12 @@
 //! Lines on standard output and standard error.
 
-use super::ended::Ended;
+use super::command_error::CommandError;
 use std::io::{ErrorKind, Write};
 
 /// Writes `text` to standard output. A reader that closed it early has seen what it needed.
-pub fn print(text: &str) -> Result<(), Ended> {
+pub fn print(text: &str) -> Result<(), CommandError> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Ended::Failed(e.into())),
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(CommandError::failed(e)),
         _ => Ok(()),
     }
 }

@@ -1,9 +1,9 @@
 //! `arborcam play INPUT --to /dev/videoN`: a recording becomes a camera.
 
-use super::ended::Ended;
+use super::command_error::CommandError;
 use super::hangup::SighupAction;
 use super::output::say;
-use super::session::{init_log, no_input, stop_on_signals};
+use super::session::{init_log, stop_on_signals};
 use crate::config;
 use crate::runtime;
 use crate::source::{self, Loopback};
@@ -25,9 +25,9 @@ pub struct PlayArgs {
     fps: f64,
 }
 
-pub fn run(args: &PlayArgs) -> Result<(), Ended> {
+pub fn run(args: &PlayArgs) -> Result<(), CommandError> {
     if !(args.fps.is_finite() && args.fps > 0.0) {
-        return Err(Ended::BadUsage(anyhow::anyhow!(
+        return Err(CommandError::BadUsage(anyhow::anyhow!(
             "--fps {} is no rate; give a number above 0",
             args.fps
         )));
@@ -38,7 +38,8 @@ pub fn run(args: &PlayArgs) -> Result<(), Ended> {
     let mut frames = 0;
     let stopped = loop {
         let camera = config::Camera::default();
-        let mut source = source::open(&args.input, &camera, Some(args.fps)).map_err(no_input)?;
+        let mut source =
+            source::open(&args.input, &camera, Some(args.fps)).map_err(CommandError::no_input)?;
         source.stop_when(stop.clone());
         let rate_hz = source.describe().nominal_rate_hz;
         let played = runtime::play(
@@ -52,9 +53,9 @@ pub fn run(args: &PlayArgs) -> Result<(), Ended> {
         }
         let played = played.map_err(|e| {
             if frames == 0 {
-                no_input(e)
+                CommandError::no_input(e)
             } else {
-                Ended::Failed(e.into())
+                CommandError::failed(e)
             }
         })?;
         frames += played.frames;
@@ -63,5 +64,9 @@ pub fn run(args: &PlayArgs) -> Result<(), Ended> {
         }
     };
     say(&format!("{frames} frames played to {}", args.to.display()));
-    if stopped { Err(Ended::Stopped) } else { Ok(()) }
+    if stopped {
+        Err(CommandError::Stopped)
+    } else {
+        Ok(())
+    }
 }

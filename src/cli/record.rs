@@ -1,11 +1,11 @@
 //! `arborcam record DEVICE FILE.mcap`: frames into a file, and nothing else.
 
 use super::camera::CameraArgs;
-use super::ended::Ended;
+use super::command_error::CommandError;
 use super::hangup::SighupAction;
 use super::output::say;
 use super::recording::{self, LimitArgs, parse_time_ns};
-use super::session::{init_log, no_input, stop_on_signals, warn_of_other_format};
+use super::session::{init_log, stop_on_signals, warn_of_other_format};
 use crate::config::Config;
 use crate::runtime::{self, Failure, Pace, RecordJob, RunningRecord};
 use clap::Args;
@@ -36,12 +36,13 @@ pub struct RecordArgs {
     config: Option<PathBuf>,
 }
 
-pub fn run(args: &RecordArgs) -> Result<(), Ended> {
+pub fn run(args: &RecordArgs) -> Result<(), CommandError> {
     let config = Config::default().layered(args.config.as_deref(), |config| {
         args.camera.set(&mut config.camera);
     })?;
     recording::refuse_unfit(&args.file)?;
-    let source = runtime::open(&args.device, &config.camera, None).map_err(no_input)?;
+    let source =
+        runtime::open(&args.device, &config.camera, None).map_err(CommandError::no_input)?;
     let info = source.describe();
     let stop = stop_on_signals(SighupAction::ends_this_process())?;
     init_log(true);
@@ -83,7 +84,7 @@ fn print_news(running: &RunningRecord) {
 }
 
 /// The closing lines, and the exit status.
-fn report(running: RunningRecord, stopped: bool) -> Result<(), Ended> {
+fn report(running: RunningRecord, stopped: bool) -> Result<(), CommandError> {
     let (seen, lost, time_s, missing) = running.counts();
     let (recorded, failure) = running.join();
     let lost = if lost > 0 {
@@ -97,12 +98,12 @@ fn report(running: RunningRecord, stopped: bool) -> Result<(), Ended> {
     }
     let broken = recorded.is_some_and(|r| r.stopped);
     match failure {
-        Some(Failure::Source(e)) if seen == 0 => Err(no_input(e)),
+        Some(Failure::Source(e)) if seen == 0 => Err(CommandError::no_input(e)),
         Some(failure) => Err(failure.into()),
-        None if broken => Err(Ended::Failed(anyhow::anyhow!(
+        None if broken => Err(CommandError::Failed(anyhow::anyhow!(
             "the recording is not complete; see the warning above"
         ))),
-        None if stopped => Err(Ended::Stopped),
+        None if stopped => Err(CommandError::Stopped),
         None => Ok(()),
     }
 }

@@ -1,6 +1,6 @@
 //! What the commands that record have in common: options, refusals, the closing line.
 
-use super::ended::{Ended, unbegun};
+use super::command_error::CommandError;
 use crate::recording::{Head, Limits, RecordingError};
 use crate::runtime::{QUEUE_BYTES, RecordTo, Recorded};
 use crate::source::Source;
@@ -40,11 +40,11 @@ impl LimitArgs {
 
 impl RecordOption {
     /// Told before anything is filmed, not after.
-    pub fn refuse_unfit(&self) -> Result<(), Ended> {
+    pub fn refuse_unfit(&self) -> Result<(), CommandError> {
         match &self.record {
             Some(path) => refuse_unfit(path),
             None if self.limits.limits() == Limits::default() => Ok(()),
-            None => Err(Ended::BadUsage(anyhow::anyhow!(
+            None => Err(CommandError::BadUsage(anyhow::anyhow!(
                 "--max-size and --max-time go with --record FILE; add it"
             ))),
         }
@@ -76,19 +76,19 @@ pub fn target(path: &Path, limits: Limits, source: &dyn Source) -> RecordTo {
 }
 
 /// Nothing is ever overwritten, and another ending would not be known again.
-pub fn refuse_unfit(path: &Path) -> Result<(), Ended> {
+pub fn refuse_unfit(path: &Path) -> Result<(), CommandError> {
     if !path
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("mcap"))
     {
         let shown = path.display();
-        return Err(Ended::BadUsage(anyhow::anyhow!(
+        return Err(CommandError::BadUsage(anyhow::anyhow!(
             "{shown} does not end in .mcap, which a recording must"
         )));
     }
     // A link that leads nowhere is something that is there, too.
     if path.symlink_metadata().is_ok() {
-        return Err(unbegun(RecordingError::Exists {
+        return Err(CommandError::from(RecordingError::Exists {
             path: path.to_owned(),
         }));
     }

@@ -4,7 +4,7 @@ mod options;
 
 pub use options::{Kind, RenderArgs, ViewName, WHITE, background, rate, size};
 
-use super::ended::{self, Ended};
+use super::command_error::CommandError;
 use super::stop::Stop;
 use super::tree::{Tail, warn};
 use crate::files::{OutputFile, WriteError, refuse_taken};
@@ -15,10 +15,12 @@ use std::path::Path;
 /// Length of any video, s.
 const LONGEST_S: f64 = 600.0;
 
-pub fn run(args: &RenderArgs) -> Result<(), Ended> {
-    let kind = args.check().map_err(|why| Ended::BadUsage(anyhow!(why)))?;
+pub fn run(args: &RenderArgs) -> Result<(), CommandError> {
+    let kind = args
+        .check()
+        .map_err(|why| CommandError::BadUsage(anyhow!(why)))?;
     if args.seconds.is_some_and(|s| s > LONGEST_S) {
-        return Err(Ended::BadUsage(anyhow!(
+        return Err(CommandError::BadUsage(anyhow!(
             "--seconds is more than {LONGEST_S}; give less"
         )));
     }
@@ -26,7 +28,7 @@ pub fn run(args: &RenderArgs) -> Result<(), Ended> {
     let stop = Stop::on_signals()?;
     let tree = args.tree.prepare(&args.dir, tail(args, kind), |_| {})?;
     if args.film.is_some() && tree.document.picture.is_none() {
-        return Err(Ended::Failed(anyhow!(
+        return Err(CommandError::Failed(anyhow!(
             "the capture holds no frame of the film; leave --film out"
         )));
     }
@@ -43,7 +45,7 @@ pub fn draw(
     kind: Kind,
     out: &Path,
     stop: &Stop,
-) -> Result<(), Ended> {
+) -> Result<(), CommandError> {
     let studio = Studio::new(tree, shot)?;
     match kind {
         Kind::Picture => {
@@ -70,7 +72,7 @@ fn tail(args: &RenderArgs, kind: Kind) -> Tail {
     }
 }
 
-fn failed(e: PrepareError) -> Ended {
+fn failed(e: PrepareError) -> CommandError {
     match e {
         PrepareError::Export(crate::export::ExportError::Write(e)) => unwritten(e),
         e => e.into(),
@@ -78,13 +80,13 @@ fn failed(e: PrepareError) -> Ended {
 }
 
 /// How a command ends whose one file could not be written.
-pub fn unwritten(e: WriteError) -> Ended {
+pub fn unwritten(e: WriteError) -> CommandError {
     match e {
-        WriteError::Exists { path } => Ended::Failed(anyhow!(
+        WriteError::Exists { path } => CommandError::Failed(anyhow!(
             "{} exists already; choose another file, or remove it first",
             path.display()
         )),
-        e => ended::unwritten(e),
+        e => e.into(),
     }
 }
 
@@ -95,12 +97,15 @@ mod tests {
     /// Status 130, by which a script tells Ctrl-C from a failure.
     #[test]
     fn who_was_stopped_has_not_failed() {
-        assert!(matches!(unwritten(WriteError::Stopped), Ended::Stopped));
+        assert!(matches!(
+            unwritten(WriteError::Stopped),
+            CommandError::Stopped
+        ));
         let taken = WriteError::Exists {
             path: "a.png".into(),
         };
         assert!(
-            matches!(unwritten(taken), Ended::Failed(e) if e.to_string().contains("another file"))
+            matches!(unwritten(taken), CommandError::Failed(e) if e.to_string().contains("another file"))
         );
     }
 }

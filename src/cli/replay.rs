@@ -1,7 +1,7 @@
 //! `arborcam replay INPUT`: the whole way from a recording.
 
+use super::command_error::CommandError;
 use super::common::Common;
-use super::ended::Ended;
 use super::recording::RecordOption;
 use super::session::{self, Plan};
 use crate::runtime::Pace;
@@ -26,9 +26,9 @@ pub struct ReplayArgs {
     record: RecordOption,
 }
 
-pub fn run(args: &ReplayArgs) -> Result<(), Ended> {
+pub fn run(args: &ReplayArgs) -> Result<(), CommandError> {
     if !(args.fps.is_finite() && args.fps > 0.0) {
-        return Err(Ended::BadUsage(anyhow::anyhow!(
+        return Err(CommandError::BadUsage(anyhow::anyhow!(
             "--fps {} is no rate; give a number above 0",
             args.fps
         )));

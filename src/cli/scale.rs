@@ -1,6 +1,6 @@
 //! How large a pixel is at the tree.
 
-use super::ended::Ended;
+use super::command_error::CommandError;
 use crate::config::Config;
 use crate::model::Size;
 use anyhow::anyhow;
@@ -42,13 +42,13 @@ impl ScaleArgs {
     }
 
     /// Refuses a known length that was not measured in a picture of this size.
-    pub fn fits(&self, size: Size) -> Result<(), Ended> {
+    pub fn fits(&self, size: Size) -> Result<(), CommandError> {
         for [u, v] in self.scale.iter().flat_map(|known| known.ends) {
             // To the rim of the last pixel, as a mouse may tell it.
             let inside = (-0.5..=f64::from(size.width)).contains(&u)
                 && (-0.5..=f64::from(size.height)).contains(&v);
             if !inside {
-                return Err(Ended::BadUsage(anyhow!(
+                return Err(CommandError::BadUsage(anyhow!(
                     "--scale: {u},{v} lies off the picture, which is {size} pixels; give two points of a frame of this film"
                 )));
             }

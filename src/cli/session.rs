@@ -1,8 +1,8 @@
 //! One capture or replay from the command line: open, run, show, report.
 
 use super::camera::CameraArgs;
+use super::command_error::{CommandError, FAILED};
 use super::common::Common;
-use super::ended::{Ended, FAILED};
 use super::hangup::{Reload, SighupAction};
 use super::output::say;
 use super::recording::{self, RecordOption};
@@ -12,7 +12,7 @@ use crate::config::Config;
 use crate::files::OutputFolder;
 use crate::outline::{self, OutlineSpec};
 use crate::runtime::{self, Failure, Job, Pace, Running, Summary};
-use crate::source::{Source, SourceError, SourceInfo};
+use crate::source::{Source, SourceInfo};
 use crate::tui;
 use anyhow::anyhow;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -48,11 +48,12 @@ impl Plan<'_> {
 }
 
 /// Runs a capture from the first frame to the last line.
-pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
+pub fn run(common: &Common, plan: Plan) -> Result<(), CommandError> {
     let config = common.config(plan.camera)?;
     let headless = common.headless || common.stream.is_some();
     refuse_unfit(common, &plan, headless)?;
-    let source = runtime::open(plan.input, &config.camera, plan.fps).map_err(no_input)?;
+    let source =
+        runtime::open(plan.input, &config.camera, plan.fps).map_err(CommandError::no_input)?;
     let job = job(common, &plan, config, &*source, headless)?;
     let action = SighupAction::of_this_process();
     let stop = stop_on_signals(action == SighupAction::Stop)?;
@@ -61,8 +62,8 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
     }
     warn_of_no_output(common, headless);
     init_log(headless);
-    let reload = Reload::new(common, plan.camera, &job.config, action)
-        .map_err(|e| Ended::Failed(e.into()))?;
+    let reload =
+        Reload::new(common, plan.camera, &job.config, action).map_err(CommandError::failed)?;
     let service = Service::from_env(job.config.camera.timeout_s);
     let running = runtime::start(source, job)?;
     let mut supervisor = CaptureSupervisor {
@@ -87,14 +88,16 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
 }
 
 /// Refuses, before anything is filmed, arguments that could not be followed in the end.
-fn refuse_unfit(common: &Common, plan: &Plan, headless: bool) -> Result<(), Ended> {
+fn refuse_unfit(common: &Common, plan: &Plan, headless: bool) -> Result<(), CommandError> {
     if !headless && !std::io::stdout().is_terminal() {
-        return Err(Ended::BadUsage(tui::TuiError::NoTerminal(None).into()));
+        return Err(CommandError::BadUsage(
+            tui::TuiError::NoTerminal(None).into(),
+        ));
     }
     common.shape.refuse_drawn()?;
     if let Some(dir) = &common.out {
         // Created and dropped: nothing of it is left.
-        OutputFolder::create(dir).map_err(|e| Ended::Failed(e.into()))?;
+        OutputFolder::create(dir).map_err(CommandError::failed)?;
         let unfinished = runtime::unfinished_dir(dir);
         if unfinished.exists() {
             return Err(Failure::UnfinishedIsThere { dir: unfinished }.into());
@@ -113,14 +116,14 @@ fn job(
     config: Config,
     source: &dyn Source,
     headless: bool,
-) -> Result<Job, Ended> {
+) -> Result<Job, CommandError> {
     let info = source.describe();
     common.shape.fits(info.size)?;
     common.scale.fits(info.size)?;
     let outline = match &common.outline {
         OutlineSpec::Auto => None,
         OutlineSpec::File(path) => {
-            Some(outline::load(path, info.size).map_err(|e| Ended::BadUsage(e.into()))?)
+            Some(outline::load(path, info.size).map_err(CommandError::bad_usage)?)
         }
     };
     Ok(Job {
@@ -174,7 +177,7 @@ fn last_messages(running: &Running, headless: bool) -> Vec<String> {
 
 /// A flag that is set when the user or the system asks for the end; by SIGHUP as well if
 /// `by_hangup`.
-pub fn stop_on_signals(by_hangup: bool) -> Result<Arc<AtomicBool>, Ended> {
+pub fn stop_on_signals(by_hangup: bool) -> Result<Arc<AtomicBool>, CommandError> {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM]
         .into_iter()
@@ -184,13 +187,9 @@ pub fn stop_on_signals(by_hangup: bool) -> Result<Arc<AtomicBool>, Ended> {
         // the program immortal.
         signal_hook::flag::register_conditional_shutdown(signal, i32::from(FAILED), stop.clone())
             .and_then(|_| signal_hook::flag::register(signal, stop.clone()))
-            .map_err(|e| Ended::Failed(e.into()))?;
+            .map_err(CommandError::failed)?;
     }
     Ok(stop)
-}
-
-pub fn no_input(e: SourceError) -> Ended {
-    Ended::NoInput(e.into())
 }
 
 /// Messages to standard error where there is no screen that they would spoil.
@@ -208,7 +207,11 @@ pub fn init_log(headless: bool) {
 }
 
 /// The closing lines, and the exit status.
-fn report(summary: Option<&Summary>, failure: Option<Failure>, stopped: bool) -> Result<(), Ended> {
+fn report(
+    summary: Option<&Summary>,
+    failure: Option<Failure>,
+    stopped: bool,
+) -> Result<(), CommandError> {
     if let Some(s) = summary {
         for line in closing_lines(s) {
             say(&line);
@@ -219,13 +222,15 @@ fn report(summary: Option<&Summary>, failure: Option<Failure>, stopped: bool) ->
     }
     match failure {
         // Not one frame: there was no usable camera, whatever it said when it was opened.
-        Some(Failure::Source(e)) if summary.is_none_or(|s| s.frames == 0) => Err(no_input(e)),
+        Some(Failure::Source(e)) if summary.is_none_or(|s| s.frames == 0) => {
+            Err(CommandError::no_input(e))
+        }
         Some(failure) => Err(failure.into()),
-        None if stopped => Err(Ended::Stopped),
+        None if stopped => Err(CommandError::Stopped),
         // Tracks alone are not what was asked for; whoever looks for tree.glb is to learn it from
         // the status.
         None => match summary.filter(|s| s.tree.is_none()) {
-            Some(s) => Err(Ended::Failed(no_tree(s))),
+            Some(s) => Err(CommandError::Failed(no_tree(s))),
             None => Ok(()),
         },
     }

@@ -1,6 +1,6 @@
 //! What the user draws for the tree's shape: the trunk that it keeps, the space that it fills.
 
-use super::ended::Ended;
+use super::command_error::CommandError;
 use crate::config::{Config, EnvelopeKind, Leader};
 use crate::model::Size;
 use anyhow::anyhow;
@@ -47,9 +47,9 @@ impl ShapeArgs {
     }
 
     /// Refuses a drawn shape where the tree is only being filmed.
-    pub fn refuse_drawn(&self) -> Result<(), Ended> {
+    pub fn refuse_drawn(&self) -> Result<(), CommandError> {
         self.drawn().map_or(Ok(()), |path| {
-            Err(Ended::BadUsage(anyhow!(
+            Err(CommandError::BadUsage(anyhow!(
                 "--envelope takes revolution or hull here; `arborcam export` and `render` cut the captured tree to {}",
                 path.display()
             )))
@@ -57,10 +57,10 @@ impl ShapeArgs {
     }
 
     /// Refuses a trunk that was drawn on a picture of another size.
-    pub fn fits(&self, size: Size) -> Result<(), Ended> {
+    pub fn fits(&self, size: Size) -> Result<(), CommandError> {
         match &self.trunk {
             Some(Trunk::Drawn(line)) if Size::new(line.width, line.height) != size => {
-                Err(Ended::BadUsage(anyhow!(
+                Err(CommandError::BadUsage(anyhow!(
                     "--trunk is for a picture of {}x{}, this one is {size}; draw it on a frame of this clip",
                     line.width,
                     line.height

@@ -1,6 +1,6 @@
 //! Ctrl-C in commands that work something out and write it to a file.
 
-use super::ended::{Ended, STOPPED};
+use super::command_error::{CommandError, STOPPED};
 use super::hangup::SighupAction;
 use super::session::stop_on_signals;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -17,7 +17,7 @@ pub struct Stop {
 impl Stop {
     /// # Errors
     /// The signals cannot be caught.
-    pub fn on_signals() -> Result<Self, Ended> {
+    pub fn on_signals() -> Result<Self, CommandError> {
         let at_once = Arc::new(AtomicBool::new(true));
         let by_hangup = SighupAction::ends_this_process();
         for signal in [SIGINT, SIGTERM]
@@ -29,7 +29,7 @@ impl Stop {
                 i32::from(STOPPED),
                 at_once.clone(),
             )
-            .map_err(|e| Ended::Failed(e.into()))?;
+            .map_err(CommandError::failed)?;
         }
         Ok(Self {
             at_once,

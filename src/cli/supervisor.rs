@@ -1,7 +1,7 @@
 //! Looks after a running capture, with and without a screen: its length, its settings, the service
 //! manager.
 
-use super::ended::Ended;
+use super::command_error::CommandError;
 use super::hangup::Reload;
 use super::service::Service;
 use crate::model::{Control, Snapshot};
@@ -46,7 +46,7 @@ impl CaptureSupervisor<'_> {
     ///
     /// # Errors
     /// The terminal cannot be used.
-    pub fn show(&mut self, stop: &AtomicBool) -> Result<(), Ended> {
+    pub fn show(&mut self, stop: &AtomicBool) -> Result<(), CommandError> {
         let shown = tui::run(self, tui::Options::from_env(), stop);
         if shown.is_err() {
             self.running.stop();
@@ -55,7 +55,7 @@ impl CaptureSupervisor<'_> {
             self.look();
             std::thread::sleep(HEADLESS_TICK);
         }
-        shown.map_err(|e| Ended::BadUsage(e.into()))
+        shown.map_err(CommandError::bad_usage)
     }
 
     /// Newest state, if there is a new one.

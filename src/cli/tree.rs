@@ -1,6 +1,6 @@
 //! The options on what a command may change of a document's tree.
 
-use super::ended::Ended;
+use super::command_error::CommandError;
 use super::idle;
 use super::output::say;
 use super::scale::ScaleArgs;
@@ -118,7 +118,7 @@ impl TreeArgs {
         dir: &Path,
         tail: Tail,
         set: impl FnOnce(&mut Config),
-    ) -> Result<PreparedTree, Ended> {
+    ) -> Result<PreparedTree, CommandError> {
         let note = Document::note(dir)?;
         let config = note.config.layered(self.config.as_deref(), |config| {
             self.set(config);
@@ -139,7 +139,7 @@ impl TreeArgs {
                 .as_deref()
                 .map(read_template)
                 .transpose()
-                .map_err(bad_usage)?,
+                .map_err(CommandError::bad_usage)?,
             density: self.density(size)?,
             config,
         };
@@ -149,7 +149,7 @@ impl TreeArgs {
     }
 
     /// The drawn shape that the tree is to be cut to.
-    fn drawn(&self) -> Result<Option<Drawn>, Ended> {
+    fn drawn(&self) -> Result<Option<Drawn>, CommandError> {
         let Some(path) = self.shape.drawn() else {
             return Ok(None);
         };
@@ -162,15 +162,17 @@ impl TreeArgs {
         }
     }
 
-    fn density(&self, size: Size) -> Result<Option<Luma>, Ended> {
+    fn density(&self, size: Size) -> Result<Option<Luma>, CommandError> {
         let Some(path) = self.density.as_deref() else {
             return Ok(None);
         };
-        outline::density(path, size).map(Some).map_err(bad_usage)
+        outline::density(path, size)
+            .map(Some)
+            .map_err(CommandError::bad_usage)
     }
 
     /// Names the option that a shape comes from.
-    fn unfit(&self, e: PrepareError) -> Ended {
+    fn unfit(&self, e: PrepareError) -> CommandError {
         match (e, self.shape.drawn()) {
             (PrepareError::Shape(e), Some(path)) => of_envelope(path, e.into()),
             (e, _) => e.into(),
@@ -191,12 +193,8 @@ impl TreeArgs {
     }
 }
 
-fn bad_usage(e: impl Into<anyhow::Error>) -> Ended {
-    Ended::BadUsage(e.into())
-}
-
-fn of_envelope(path: &Path, e: anyhow::Error) -> Ended {
-    Ended::BadUsage(e.context(format!("--envelope {}", path.display())))
+fn of_envelope(path: &Path, e: anyhow::Error) -> CommandError {
+    CommandError::BadUsage(e.context(format!("--envelope {}", path.display())))
 }
 
 fn told(cut: &Cut) -> String {

@@ -1,6 +1,6 @@
 //! What `arborcam analyze` is asked for.
 
-use super::super::ended::Ended;
+use super::super::command_error::CommandError;
 use super::super::scale::ScaleArgs;
 use crate::config::{Config, ConfigError, Excited};
 use anyhow::anyhow;
@@ -75,7 +75,7 @@ impl AnalyzeArgs {
     ///
     /// # Errors
     /// A folder is given twice; the film would end before it begins; the report has no name.
-    pub fn check(&self) -> Result<(), Ended> {
+    pub fn check(&self) -> Result<(), CommandError> {
         let mut seen = BTreeSet::new();
         for dir in &self.dirs {
             if !seen.insert(dir.canonicalize().unwrap_or_else(|_| dir.clone())) {
@@ -129,8 +129,8 @@ impl AnalyzeArgs {
     }
 }
 
-fn unfit(what: String) -> Result<(), Ended> {
-    Err(Ended::BadUsage(anyhow!(what)))
+fn unfit(what: String) -> Result<(), CommandError> {
+    Err(CommandError::BadUsage(anyhow!(what)))
 }
 
 fn moment(text: &str) -> Result<f64, String> {
