@@ -1,4 +1,4 @@
-//! `arborcam capture DEVICE`: the whole way, live.
+//! `arborcam capture DEVICE`: from a camera to a moving tree, live.
 
 use super::camera::CameraArgs;
 use super::command_error::CommandError;
@@ -10,8 +10,8 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub struct CaptureArgs {
-    /// The camera: /dev/video0, a link to it, or the name that stays, all as `arborcam devices`
-    /// lists them. A recording is taken at its own pace.
+    /// The camera: /dev/video0, a link to it, or its permanent name, as listed by
+    /// `arborcam devices`. A recording is played at its own pace.
     device: PathBuf,
     #[command(flatten)]
     camera: CameraArgs,

@@ -1,4 +1,4 @@
-//! `arborcam devices`: the cameras that are plugged in.
+//! `arborcam devices`: lists the connected cameras.
 
 use super::command_error::CommandError;
 use super::output::print;
@@ -12,7 +12,7 @@ pub struct DevicesArgs {
     /// Print JSON.
     #[arg(long)]
     json: bool,
-    /// Settings that differ from the defaults: they decide what would be filmed.
+    /// Settings that differ from the defaults (TOML); they decide which format would be used.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
 }
@@ -64,7 +64,7 @@ fn json(d: &Device) -> serde_json::Value {
     })
 }
 
-/// One line for the camera, below it what stays of it, what it can do and what would be filmed.
+/// A line for the camera; below it its identity, its formats and the format that would be used.
 fn shown(d: &Device) -> String {
     let mut text = format!(
         "{:<14} {}  ({})\n",
@@ -99,7 +99,7 @@ fn detail(name: &str, what: &str) -> String {
     format!("    {name:<9} {what}\n")
 }
 
-/// `MJPG 1280x720 @ 60 30, 640x480 @ 30`: one row a format.
+/// A row for each pixel format, e.g. `MJPG 1280x720 @ 60 30, 640x480 @ 30`.
 fn rows(modes: &[Mode]) -> Vec<String> {
     let mut rows: Vec<(&str, String)> = Vec::new();
     for mode in modes {

@@ -1,4 +1,4 @@
-//! How large a pixel is at the tree.
+//! The scale of the picture at the tree, m/px.
 
 use super::command_error::CommandError;
 use crate::config::Config;
@@ -6,17 +6,17 @@ use crate::model::Size;
 use anyhow::anyhow;
 use clap::Args;
 
-/// The largest size of a pixel that is believed, m.
-const LARGEST_M: f64 = 1e6;
+/// Largest plausible size of a pixel, m.
+const MAX_METRES_PER_PX: f64 = 1e6;
 
-/// The options on the scale.
+/// The options for the scale.
 #[derive(Clone, Debug, Default, Args)]
 pub struct ScaleArgs {
-    /// Metres in a pixel at the tree; lengths are then in metres. 0 for pixels.
+    /// Size of a pixel at the tree, m; lengths are then in metres. 0: lengths are in pixels.
     #[arg(long, value_name = "M")]
     metres_per_px: Option<f64>,
-    /// The same by a known length: two points of the picture (px from the left and from the top)
-    /// and how far they are apart at the tree, e.g. 310,340:305,80=2.6
+    /// The same from a known length: two points of the picture (px from the left and from the top)
+    /// and their distance at the tree, m, e.g. 310,340:305,80=2.6
     #[arg(long, value_name = "U,V:U,V=METRES", value_parser = length, conflicts_with = "metres_per_px")]
     scale: Option<Known>,
 }
@@ -24,13 +24,13 @@ pub struct ScaleArgs {
 /// A known length in the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Known {
-    /// Its ends, px.
+    /// Its end points, px.
     ends: [[f64; 2]; 2],
     metres_per_px: f64,
 }
 
 impl ScaleArgs {
-    /// The command line over the settings.
+    /// Applies the options of the command line.
     pub fn set(&self, config: &mut Config) {
         if let Some(metres) = self
             .scale
@@ -41,10 +41,13 @@ impl ScaleArgs {
         }
     }
 
-    /// Refuses a known length that was not measured in a picture of this size.
-    pub fn fits(&self, size: Size) -> Result<(), CommandError> {
+    /// Checks that the known length was measured in a picture of this size.
+    ///
+    /// # Errors
+    /// A point lies outside of the picture.
+    pub fn check_size(&self, size: Size) -> Result<(), CommandError> {
         for [u, v] in self.scale.iter().flat_map(|known| known.ends) {
-            // To the rim of the last pixel, as a mouse may tell it.
+            // A mouse position may be up to the outer edge of the last pixel.
             let inside = (-0.5..=f64::from(size.width)).contains(&u)
                 && (-0.5..=f64::from(size.height)).contains(&v);
             if !inside {
@@ -57,15 +60,16 @@ impl ScaleArgs {
     }
 }
 
+/// Parses `U,V:U,V=METRES`.
 fn length(text: &str) -> Result<Known, String> {
-    let ([a, b], metres) = drawn(text)
+    let ([a, b], metres) = points_and_distance(text)
         .ok_or("give two points and their distance in metres, like 310,340:305,80=2.6")?;
     let px = (a[0] - b[0]).hypot(a[1] - b[1]);
     if px < 1.0 {
         return Err("the two points must be at least a pixel apart".into());
     }
     let metres_per_px = metres / px;
-    if metres_per_px > 0.0 && metres_per_px <= LARGEST_M {
+    if metres_per_px > 0.0 && metres_per_px <= MAX_METRES_PER_PX {
         Ok(Known {
             ends: [a, b],
             metres_per_px,
@@ -75,8 +79,8 @@ fn length(text: &str) -> Result<Known, String> {
     }
 }
 
-/// Two points, px, and how far they are apart, m.
-fn drawn(text: &str) -> Option<([[f64; 2]; 2], f64)> {
+/// Splits `U,V:U,V=METRES` into two points, px, and their distance, m.
+fn points_and_distance(text: &str) -> Option<([[f64; 2]; 2], f64)> {
     let (points, metres) = text.split_once('=')?;
     let (a, b) = points.split_once(':')?;
     let metres = number(metres.trim().trim_end_matches('m'))?;
@@ -124,17 +128,19 @@ mod tests {
         }
     }
 
+    /// Whether a known length is accepted for a picture of 640x360.
+    fn fits(text: &str) -> bool {
+        let args = ScaleArgs {
+            metres_per_px: None,
+            scale: length(text).ok(),
+        };
+        args.check_size(Size::new(640, 360)).is_ok()
+    }
+
     #[test]
     fn a_length_off_the_picture_is_refused() {
-        let fits = |text| {
-            ScaleArgs {
-                metres_per_px: None,
-                scale: length(text).ok(),
-            }
-            .fits(Size::new(640, 360))
-            .is_ok()
-        };
-        assert!(fits("0,0:640,360=1") && ScaleArgs::default().fits(Size::new(1, 1)).is_ok());
+        assert!(fits("0,0:640,360=1"));
+        assert!(ScaleArgs::default().check_size(Size::new(1, 1)).is_ok());
         assert!(
             !fits("0,0:641,10=1")
                 && !fits("10,361:20,20=1")
