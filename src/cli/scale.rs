@@ -5,6 +5,7 @@ use crate::config::Config;
 use crate::model::Size;
 use anyhow::anyhow;
 use clap::Args;
+use nalgebra::Point2;
 
 /// Largest plausible size of a pixel, m.
 const MAX_METRES_PER_PX: f64 = 1e6;
@@ -25,7 +26,7 @@ pub struct ScaleArgs {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Known {
     /// Its end points, px.
-    ends: [[f64; 2]; 2],
+    ends: [Point2<f64>; 2],
     metres_per_px: f64,
 }
 
@@ -46,7 +47,8 @@ impl ScaleArgs {
     /// # Errors
     /// A point lies outside of the picture.
     pub fn check_size(&self, size: Size) -> Result<(), CommandError> {
-        for [u, v] in self.scale.iter().flat_map(|known| known.ends) {
+        for end in self.scale.iter().flat_map(|known| known.ends) {
+            let (u, v) = (end.x, end.y);
             // A mouse position may be up to the outer edge of the last pixel.
             let inside = (-0.5..=f64::from(size.width)).contains(&u)
                 && (-0.5..=f64::from(size.height)).contains(&v);
@@ -64,7 +66,7 @@ impl ScaleArgs {
 fn length(text: &str) -> Result<Known, String> {
     let ([a, b], metres) = points_and_distance(text)
         .ok_or("give two points and their distance in metres, like 310,340:305,80=2.6")?;
-    let px = (a[0] - b[0]).hypot(a[1] - b[1]);
+    let px = (a.x - b.x).hypot(a.y - b.y);
     if px < 1.0 {
         return Err("the two points must be at least a pixel apart".into());
     }
@@ -80,16 +82,17 @@ fn length(text: &str) -> Result<Known, String> {
 }
 
 /// Splits `U,V:U,V=METRES` into two points, px, and their distance, m.
-fn points_and_distance(text: &str) -> Option<([[f64; 2]; 2], f64)> {
+fn points_and_distance(text: &str) -> Option<([Point2<f64>; 2], f64)> {
     let (points, metres) = text.split_once('=')?;
     let (a, b) = points.split_once(':')?;
     let metres = number(metres.trim().trim_end_matches('m'))?;
     Some(([point(a)?, point(b)?], metres))
 }
 
-fn point(text: &str) -> Option<[f64; 2]> {
+/// Parses `U,V`, px.
+fn point(text: &str) -> Option<Point2<f64>> {
     let (u, v) = text.split_once(',')?;
-    Some([number(u)?, number(v)?])
+    Some(Point2::new(number(u)?, number(v)?))
 }
 
 fn number(text: &str) -> Option<f64> {
@@ -105,7 +108,7 @@ mod tests {
         assert_eq!(
             length("0,0:30,40=2.5"),
             Ok(Known {
-                ends: [[0.0, 0.0], [30.0, 40.0]],
+                ends: [Point2::new(0.0, 0.0), Point2::new(30.0, 40.0)],
                 metres_per_px: 0.05
             })
         );
