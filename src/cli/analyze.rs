@@ -52,7 +52,8 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), CommandError> {
     let comparison = compare(&studies, args.trees.same());
     if comparison.as_ref().is_some_and(|c| c.same_tree.is_none()) {
         eprint_line(
-            "arborcam: warning: nothing is compared: it cannot be told whether these are films of one tree; say --trees same or different",
+            "arborcam: warning: nothing is compared: it cannot be told whether these are films of \
+             one tree; say --trees same or different",
         );
     }
     print(&table(args, &studies, comparison.as_ref()))?;
@@ -220,7 +221,8 @@ fn film(
         && from > duration_s
     {
         return Err(CommandError::BadUsage(anyhow!(
-            "--from {from} is after the end of {}, which is {duration_s:.1} s long; choose an earlier part",
+            "--from {from} is after the end of {}, which is {duration_s:.1} s long; choose an \
+             earlier part",
             notes.name
         )));
     }
@@ -232,14 +234,16 @@ fn film(
         notes.add(
             "warning",
             format!(
-                "the film is longer than {MAX_PART_S:.0} s; its end is analysed; choose another part with --from and --to"
+                "the film is longer than {MAX_PART_S:.0} s; its end is analysed; choose another \
+                 part with --from and --to"
             ),
         );
     } else {
         notes.add(
             "note",
             format!(
-                "of {duration_s:.0} s of film the last {longest_s:.0} (dynamics.window_s) are analysed; choose others with --from and --to"
+                "of {duration_s:.0} s of film the last {longest_s:.0} (dynamics.window_s) are \
+                 analysed; choose others with --from and --to"
             ),
         );
     }

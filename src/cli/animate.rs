@@ -58,7 +58,8 @@ pub fn run(args: &AnimateArgs) -> Result<(), CommandError> {
 /// Shows the tree on the terminal until the user leaves.
 fn show_live(args: &AnimateArgs) -> Result<(), CommandError> {
     if !std::io::stdout().is_terminal() {
-        let why = "there is no terminal to show the tree on; give --out FILE (.glb, .html, .csv, .mp4 or .png)";
+        let why = "there is no terminal to show the tree on; give --out FILE (.glb, .html, .csv, \
+                   .mp4 or .png)";
         return Err(CommandError::BadUsage(anyhow!(why)));
     }
     let sound = args.wav.as_deref().map(read_wav).transpose()?;
@@ -151,8 +152,8 @@ fn animator(tree: &PreparedTree, sound: Option<Loudness>, period_s: f64) -> Anim
     let animator = Animator::new(tree.skeleton.clone(), &measured, settings, wind);
     if animator.tuning().all(|t| !t.measured) {
         eprint_line(&format!(
-            "arborcam: warning: the capture has no frequency of any branch; they are taken from thickness and length, the \
-             trunk's from wind.trunk_hz ({} Hz)",
+            "arborcam: warning: the capture has no frequency of any branch; they are taken from \
+             thickness and length, the trunk's from wind.trunk_hz ({} Hz)",
             settings.trunk_hz
         ));
     }
@@ -254,7 +255,8 @@ fn pull_aside(
     );
     if reached_deg < lean_deg - 0.1 {
         eprint_line(&format!(
-            "arborcam: warning: pulled so far it leans by {reached_deg:.1} degrees; it does not give way farther"
+            "arborcam: warning: pulled so far it leans by {reached_deg:.1} degrees; it does not \
+             give way farther"
         ));
     }
     Ok(())

@@ -54,8 +54,9 @@ impl Service {
             .filter(|limit| limit.as_secs_f64() <= timeout_s)
         {
             eprint_line(&format!(
-                "arborcam: warning: the watchdog's limit of {} s is not above camera.timeout_s = {timeout_s}; a silent \
-                 camera will look like a hung program: raise WatchdogSec, or lower camera.timeout_s",
+                "arborcam: warning: the watchdog's limit of {} s is not above camera.timeout_s = \
+                 {timeout_s}; a silent camera will look like a hung program: raise WatchdogSec, \
+                 or lower camera.timeout_s",
                 limit.as_secs_f64()
             ));
         }

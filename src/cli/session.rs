@@ -247,15 +247,15 @@ fn report(
 fn no_tree(s: &Summary) -> anyhow::Error {
     if s.moving >= crate::solve::LEAST_MOVING {
         return anyhow!(
-            "no tree: {} points moved, but not enough to tell branches apart (accumulation {:.2}); film for longer, at \
-             least ten seconds, or in more wind",
+            "no tree: {} points moved, but not enough to tell branches apart (accumulation \
+             {:.2}); film for longer, at least ten seconds, or in more wind",
             s.moving,
             s.accumulation
         );
     }
     anyhow!(
-        "no tree: {} points moved, and at least {} must; wait for wind, come nearer, keep the camera still, or draw the \
-         outline closer (--outline)",
+        "no tree: {} points moved, and at least {} must; wait for wind, come nearer, keep the \
+         camera still, or draw the outline closer (--outline)",
         s.moving,
         crate::solve::LEAST_MOVING
     )
@@ -294,8 +294,8 @@ fn tree_line(tree: &crate::solve::Model) -> String {
         n => format!(", refined {n} times until {:.1} s", tree.time_s),
     };
     format!(
-        "tree: {nodes} nodes (from {points} moving points) and {copies} copies, {when} at {:.1} s (accumulation \
-         {:.2}){refined}",
+        "tree: {nodes} nodes (from {points} moving points) and {copies} copies, {when} at {:.1} s \
+         (accumulation {:.2}){refined}",
         first.time_s, first.measure
     )
 }

@@ -54,7 +54,8 @@ impl ShapeArgs {
         match self.image() {
             None => Ok(()),
             Some(path) => Err(CommandError::BadUsage(anyhow!(
-                "--envelope takes revolution or hull here; `arborcam export` and `render` cut the captured tree to {}",
+                "--envelope takes revolution or hull here; `arborcam export` and `render` cut the \
+                 captured tree to {}",
                 path.display()
             ))),
         }
@@ -68,7 +69,8 @@ impl ShapeArgs {
         match &self.trunk {
             Some(Trunk::Drawn(line)) if Size::new(line.width, line.height) != size => {
                 Err(CommandError::BadUsage(anyhow!(
-                    "--trunk is for a picture of {}x{}, this one is {size}; draw it on a frame of this clip",
+                    "--trunk is for a picture of {}x{}, this one is {size}; draw it on a frame of \
+                     this clip",
                     line.width,
                     line.height
                 )))

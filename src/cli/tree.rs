@@ -204,7 +204,8 @@ fn cut_summary(cut: &Cut) -> String {
             .to_owned();
     }
     format!(
-        "arborcam: cut to the shape: {} branches gone, {} shortened, {} added; {:.0} % of the shape is covered",
+        "arborcam: cut to the shape: {} branches gone, {} shortened, {} added; {:.0} % of the \
+         shape is covered",
         cut.gone,
         cut.shortened,
         cut.grown,

@@ -62,7 +62,10 @@ pub struct AnimateArgs {
     pub release: f64,
     /// Magnify the filmed motion by this factor, instead of wind; 0: no motion, 1: as filmed.
     #[arg(
-        long, value_name = "TIMES", value_parser = factor, conflicts_with_all = ["wind", "gusts", "beta", "wav", "pull", "direction"]
+        long,
+        value_name = "TIMES",
+        value_parser = factor,
+        conflicts_with_all = ["wind", "gusts", "beta", "wav", "pull", "direction"]
     )]
     pub magnify: Option<f64>,
     /// Speed of the filmed motion, 0.01 to 100; at 0.5 it takes twice as long.

@@ -24,7 +24,13 @@ pub struct RenderArgs {
     #[arg(long, value_name = "VIEW", default_value = "front")]
     pub view: ViewName,
     /// Rotates the view to the right about the trunk, degrees.
-    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = degrees, allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "DEGREES",
+        default_value_t = 0.0,
+        value_parser = degrees,
+        allow_negative_numbers = true
+    )]
     pub turn: f64,
     /// The picture (.png) or the video (.mp4); it must not exist.
     #[arg(long, value_name = "FILE")]
@@ -131,16 +137,19 @@ impl RenderArgs {
             && (self.view != ViewName::Front || self.turn != 0.0)
         {
             return Err(
-                "--film behind goes with the front view only, from where it was filmed; use --film beside".into()
+                "--film behind goes with the front view only, from where it was filmed; use \
+                 --film beside"
+                    .into(),
             );
         }
         if self.film == Some(FilmPlace::Behind)
             && (self.at.is_some() || self.pose.is_some() || kind == Kind::Video)
         {
-            let one = "--film behind lays the tree over the one frame that the capture holds, as it was in it";
-            return Err(format!(
-                "{one}; leave out --at and --pose, and make a picture, or use --film beside"
-            ));
+            return Err(
+                "--film behind lays the tree over the one frame that the capture holds, as it was \
+                 in it; leave out --at and --pose, and make a picture, or use --film beside"
+                    .into(),
+            );
         }
         Ok(kind)
     }
