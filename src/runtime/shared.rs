@@ -212,6 +212,15 @@ impl Shared {
             .get_or_insert(failure);
     }
 
+    /// The capture could not be written: the user must read where it is. An earlier failure becomes
+    /// a warning beside it.
+    pub fn fail_at_end(&self, failure: Failure) {
+        if let Some(earlier) = self.take_failure() {
+            self.warn(earlier.to_string());
+        }
+        self.fail(failure);
+    }
+
     pub fn take_failure(&self) -> Option<Failure> {
         self.failure
             .lock()

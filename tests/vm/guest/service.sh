@@ -58,7 +58,8 @@ now >/vm/ended
 systemctl stop "$unit"
 note stopping "$(property Result) $(property ExecMainStatus)"
 ls -t /var/lib/arborcam/video0 >/vm/folders
-newest=$(ls -dt /var/lib/arborcam/video0/*Z | head -1)
+# By name: an older one may have been completed since.
+newest=$(ls -d /var/lib/arborcam/video0/*Z | tail -n 1)
 cp -r "$newest" /vm/capture
 
 systemctl start "$unit" --no-block
