@@ -1,7 +1,7 @@
 //! Whether a model can be put into a file that every viewer takes.
 
 use super::ExportError;
-use super::gltf::Model;
+use super::gltf_model::Model;
 use crate::shape::{FoliageGroup, Mesh};
 
 /// Joints of a skin are numbered with two bytes.
