@@ -6,9 +6,10 @@ mod session;
 
 use super::choice::{Granted, Mode, Wish, choose};
 use super::clock::Clock;
+use super::error::SourceError;
 use super::identity::{Known, Places};
+use super::interface::{Health, Source, SourceInfo, Successor};
 use super::opened::{describe, same_again};
-use super::{Health, Source, SourceError, SourceInfo, Successor};
 use crate::config;
 use crate::model::{PixelFormat, RawFrame, Size};
 use offers::{Negotiated, negotiate};
