@@ -388,6 +388,16 @@ impl Notices {
     }
 }
 
+/// Stops the source when the tracker or the model is done for, be it by a panic: the source holds
+/// both ends of its queue, and would never learn otherwise that nobody takes from it.
+pub struct StopAll<'a>(pub &'a Shared);
+
+impl Drop for StopAll<'_> {
+    fn drop(&mut self) {
+        self.0.stop.store(true, Ordering::Relaxed);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
