@@ -1,6 +1,6 @@
 //! The front end: frame to tracks.
 
-use super::Followed;
+use super::back::Followed;
 use crate::config::Config;
 use crate::model::{Frame, Luma, Outline};
 use crate::outline::{AutoOutline, Found};

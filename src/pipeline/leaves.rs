@@ -1,9 +1,9 @@
 //! The leaves of a tree as a picture shows them: whether there are any, their seeds, and where they
 //! stand.
 
-use super::Seen;
 #[cfg(feature = "opencv")]
 use super::seeds::seeds;
+use super::seen::Seen;
 use crate::config::{self, LeafShow};
 use crate::model::{Luma, Outline, Rgb, Skeleton};
 use crate::shape::{self, Foliage, LeafView, Limb, Template};

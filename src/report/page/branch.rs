@@ -4,7 +4,7 @@ use super::figure;
 use super::table::anchor;
 use crate::report::plot::{Answer, Curve, angle, escaped, spectra, way};
 use crate::report::study::{Branch, Study};
-use crate::report::text::{interval, number};
+use crate::report::values::{interval, number};
 
 /// Frequencies are drawn up to so many times the highest that was found, and at least to this, Hz.
 const BEYOND: f64 = 1.6;

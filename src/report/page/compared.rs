@@ -6,7 +6,8 @@ use super::{ValueOf, cells, damping_of, figure, frequency_of, keys, stacked};
 use crate::report::compare::{Change, Comparison, Row};
 use crate::report::plot::{Answer, Curve, Mark, Slot, across, escaped, spectra};
 use crate::report::study::{Branch, Study};
-use crate::report::text::{changed, heading, interval, lost, unmatched};
+use crate::report::text::{heading, lost, unmatched};
+use crate::report::values::{changed, interval};
 
 /// Branches of a tree whose spectra are drawn together, as in figure 10.
 const TOGETHER: usize = 4;

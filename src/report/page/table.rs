@@ -3,7 +3,7 @@
 use super::{cells, stacked};
 use crate::model::Unidentified;
 use crate::report::study::{Branch, Study};
-use crate::report::text::{interval, number};
+use crate::report::values::{interval, number};
 use crate::report::words;
 
 /// Every branch in a row.

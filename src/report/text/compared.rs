@@ -1,11 +1,11 @@
 //! Several captures beside each other, as text.
 
-use super::{changed, interval};
 use crate::model::Sway;
 use crate::report::columns::{Table, wrapped};
 use crate::report::compare::{Change, Comparison, Row};
 use crate::report::matching::Match;
 use crate::report::study::Study;
+use crate::report::values::{changed, interval};
 
 /// What the captures have in common and where they differ; on a narrow terminal frequency and
 /// damping under each other.
