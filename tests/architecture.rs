@@ -106,7 +106,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "views",
         &[
-            "model", "config", "files", "document", "export", "pipeline", "shape", "draw",
+            "model", "config", "files", "document", "export", "pipeline", "shape", "draw", "signal",
         ],
     ),
     // Told from what the sway was told from, and drawn beside it.
