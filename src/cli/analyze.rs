@@ -57,7 +57,8 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), Ended> {
     let comparison = compare(&studies, args.trees.same());
     if comparison.as_ref().is_some_and(|c| c.same_tree.is_none()) {
         say(
-            "arborcam: warning: nothing is compared: it cannot be told whether these are films of one tree; say --trees same or different",
+            "arborcam: warning: nothing is compared: it cannot be told whether these are films of \
+             one tree; say --trees same or different",
         );
     }
     print(&table(args, &studies, comparison.as_ref()))?;
@@ -218,14 +219,16 @@ fn film(
         notes.tell(
             "warning",
             format!(
-                "the film is longer than {LONGEST_S:.0} s; its end is analysed; choose another part with --from and --to"
+                "the film is longer than {LONGEST_S:.0} s; its end is analysed; choose another \
+                 part with --from and --to"
             ),
         );
     } else {
         notes.tell(
             "note",
             format!(
-                "of {duration_s:.0} s of film the last {longest_s:.0} (dynamics.window_s) are analysed; choose others with --from and --to"
+                "of {duration_s:.0} s of film the last {longest_s:.0} (dynamics.window_s) are \
+                 analysed; choose others with --from and --to"
             ),
         );
     }

@@ -148,8 +148,8 @@ fn animator(tree: &PreparedTree, sound: Option<Loudness>, period_s: f64) -> Anim
     let animator = Animator::new(tree.skeleton.clone(), &known, settings, wind);
     if animator.tuning().all(|t| !t.measured) {
         say(&format!(
-            "arborcam: warning: the capture has no frequency of any branch; they are taken from thickness and length, the \
-             trunk's from wind.trunk_hz ({} Hz)",
+            "arborcam: warning: the capture has no frequency of any branch; they are taken from \
+             thickness and length, the trunk's from wind.trunk_hz ({} Hz)",
             settings.trunk_hz
         ));
     }

@@ -241,8 +241,8 @@ fn no_tree(s: &Summary) -> anyhow::Error {
         );
     }
     anyhow!(
-        "no tree: {} points moved, and at least {} must; wait for wind, come nearer, keep the camera still, or draw the \
-         outline closer (--outline)",
+        "no tree: {} points moved, and at least {} must; wait for wind, come nearer, keep the \
+         camera still, or draw the outline closer (--outline)",
         s.moving,
         crate::solve::LEAST_MOVING
     )

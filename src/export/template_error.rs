@@ -15,12 +15,16 @@ pub enum TemplateError {
         source: std::io::Error,
     },
     #[error(
-        "leaf template {} is too large: at most {LARGEST} bytes are taken of a file, and three times that in all; make its \
-         texture smaller",
+        "leaf template {} is too large: at most {LARGEST} bytes are taken of a file, and three \
+         times that in all; make its texture smaller",
         .path.display()
     )]
     TooLarge { path: PathBuf },
-    #[error("leaf template {} is no glTF 2.0 file that can be used: {what}; export it as GLB with its texture inside", .path.display())]
+    #[error(
+        "leaf template {} is no glTF 2.0 file that can be used: {what}; export it as GLB with its \
+         texture inside",
+        .path.display()
+    )]
     NoGltf { path: PathBuf, what: String },
     #[error("leaf template {} has no mesh of triangles; export a leaf or a small cluster of leaves", .path.display())]
     NoMesh { path: PathBuf },

@@ -50,7 +50,8 @@ fn one(study: &Study, columns: Option<usize>) -> String {
     let (table, without) = table.within(columns);
     let mut notes = String::new();
     if !without.iter().any(|head| head == "eq. 6") {
-        notes += "  peak and eq. 6: the largest peak of the angle's spectrum and its half-power damping, for reference\n";
+        notes += "  peak and eq. 6: the largest peak of the angle's spectrum and its half-power \
+                  damping, for reference\n";
     }
     if branches
         .iter()

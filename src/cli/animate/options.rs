@@ -62,7 +62,10 @@ pub struct AnimateArgs {
     /// The captured motion instead of wind, so many times as large; 0 holds the tree still, 1 is as
     /// filmed.
     #[arg(
-        long, value_name = "TIMES", value_parser = times, conflicts_with_all = ["wind", "gusts", "beta", "wav", "pull", "direction"]
+        long,
+        value_name = "TIMES",
+        value_parser = times,
+        conflicts_with_all = ["wind", "gusts", "beta", "wav", "pull", "direction"]
     )]
     pub magnify: Option<f64>,
     /// The captured motion at another speed, 0.01 to 100; 0.5 takes twice as long.

@@ -45,8 +45,9 @@ pub fn compared_part(studies: &[Study], comparison: &Comparison) -> String {
     };
     if !drawn.is_empty() {
         out += &format!(
-            "<h3>Spectra: {what}</h3><p class=\"soft\">Of the angle to the parent branch, in the picture; upright lines are the \
-                         frequencies that were identified.</p><div class=\"plots\">{drawn}</div>"
+            "<h3>Spectra: {what}</h3><p class=\"soft\">Of the angle to the parent branch, in the \
+             picture; upright lines are the frequencies that were identified.</p>\
+             <div class=\"plots\">{drawn}</div>"
         );
     }
     out + "</section>"
@@ -139,8 +140,9 @@ fn table(studies: &[Study], comparison: &Comparison) -> String {
         )
     };
     format!(
-        "<div class=\"wide\"><table><tr>{}</tr>{rows}</table></div><p class=\"soft\">With a star: beyond what both 95 % intervals \
-         allow. Of twenty branches that do not differ, chance marks one.</p>{untold}",
+        "<div class=\"wide\"><table><tr>{}</tr>{rows}</table></div>\
+         <p class=\"soft\">With a star: beyond what both 95 % intervals allow. Of twenty branches \
+         that do not differ, chance marks one.</p>{untold}",
         cells("th", "n", &head[..2])
             + &cells("th", "n less", &head[2..3])
             + &cells("th", "n", &head[3..])

@@ -100,8 +100,8 @@ pub fn heading(studies: &[Study], comparison: &Comparison) -> String {
         Some(false) => "several trees, by their trunks",
         None => {
             return format!(
-                "Not compared with {}: these may be films of one tree or of several ({found}); say which with --trees same or \
-                 --trees different",
+                "Not compared with {}: these may be films of one tree or of several ({found}); say \
+                 which with --trees same or --trees different",
                 studies[0].name
             );
         }

@@ -391,8 +391,8 @@ fn refusal(asked: &Wish, granted: &Granted, modes: &[Mode]) -> String {
         format!(" (it lists {})", listed.join(", "))
     };
     format!(
-        "asked for {asked}, it offers {granted}{more}; take that with --accept-format, or set camera.format, width, height and \
-         rate_hz to what `arborcam devices` lists"
+        "asked for {asked}, it offers {granted}{more}; take that with --accept-format, or set \
+         camera.format, width, height and rate_hz to what `arborcam devices` lists"
     )
 }
 
