@@ -1,7 +1,7 @@
 //! The whole algorithm on one screen: a log of points becomes a model of the tree.
 //!
-//! [`solve`] is the only maker of models, whoever asks: the pipeline while it films, the end of a
-//! film, a log that is finished after a crash, and programs with tracks of their own. It does no
+//! [`solve`] is the only maker of models, for every caller: the pipeline while it films, the end of
+//! a film, a log that is finished after a crash, and programs with tracks of their own. It does no
 //! I/O, starts no threads and reads no clock.
 
 mod lift;

@@ -41,7 +41,7 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), Ended> {
     }
     let stop = Stop::on_signals()?;
     let names = names(&args.dirs);
-    // Before the first is worked on: a mistyped name is told at once.
+    // Before the first is worked on: a mistyped name is reported at once.
     let mut documents = Vec::with_capacity(args.dirs.len());
     for dir in &args.dirs {
         let document = Document::tree(dir)?;

@@ -156,7 +156,7 @@ fn animator(tree: &PreparedTree, sound: Option<Loudness>, period_s: f64) -> Anim
     animator
 }
 
-/// The tree in the wind, or pulled and let go.
+/// The tree in the wind, or pulled and released.
 fn blown(
     args: &AnimateArgs,
     tree: &PreparedTree,

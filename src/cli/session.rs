@@ -222,8 +222,8 @@ fn report(summary: Option<&Summary>, failure: Option<Failure>, stopped: bool) ->
         Some(Failure::Source(e)) if summary.is_none_or(|s| s.frames == 0) => Err(no_input(e)),
         Some(failure) => Err(failure.into()),
         None if stopped => Err(Ended::Stopped),
-        // Tracks alone are not what was asked for; whoever looks for tree.glb is to learn it from
-        // the status.
+        // Tracks alone are not what was asked for; a script that looks for tree.glb is to
+        // learn it from the status.
         None => match summary.filter(|s| s.tree.is_none()) {
             Some(s) => Err(Ended::Failed(no_tree(s))),
             None => Ok(()),

@@ -37,7 +37,7 @@ impl Stop {
         })
     }
 
-    /// From now on there is something to be taken away again; whoever writes looks at what this
+    /// From now on there is something to be taken away again; the writer looks at what this
     /// gives.
     pub fn while_writing(&self) -> &AtomicBool {
         self.at_once.store(false, Ordering::SeqCst);

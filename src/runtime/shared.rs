@@ -101,7 +101,8 @@ pub struct Counts {
 pub struct Shared {
     /// Take no more frames, finish.
     pub stop: Arc<AtomicBool>,
-    /// The user, or whoever speaks for him, wants it over: what is not needed is not waited for.
+    /// The user, or the service manager in his place, wants it over: what is not needed is not
+    /// waited for.
     pub hurry: AtomicBool,
     pub paused: AtomicBool,
     pub ended: AtomicBool,

@@ -255,7 +255,7 @@ fn join(mesh: &mut Mesh, below: RingStart, above: RingStart) {
     }
 }
 
-/// The end of the tube: under a trunk for whoever looks from below, of a branch inside what it
+/// The end of the tube: under a trunk for a view from below, of a branch inside what it
 /// grows from.
 fn close_base(mesh: &mut Mesh, ring: &Ring, across: Vector3<f64>) {
     let first = mesh.positions.len() as u32;

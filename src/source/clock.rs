@@ -14,7 +14,7 @@ pub enum ClockKind {
     File,
     /// The system's monotonic clock, read by the driver when the picture was taken.
     Monotonic,
-    /// Handed through from whoever feeds the device.
+    /// Handed through from the program that feeds the device.
     Copied,
     /// The driver does not say which.
     Unknown,
@@ -316,7 +316,7 @@ mod tests {
             &[(0.0, 0.0, 0.0), (9e6, 33.0, 33.0), (9e6 + 33.0, 70.0, 66.0)],
             ClockKind::Monotonic,
         );
-        // Whoever feeds a loopback device faster than it was filmed has times of their own.
+        // A program that feeds a loopback device faster than it was filmed has its own times.
         let fast: Vec<_> = (0..2000)
             .map(|i| (33.0 * f64::from(i), f64::from(i), 33.0 * f64::from(i)))
             .collect();

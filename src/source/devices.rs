@@ -73,7 +73,7 @@ fn device(node: Node, config: &config::Camera, places: &Places) -> Device {
                 node.name
             },
             description: port,
-            // Nobody can know; whoever may open it will see.
+            // Only a program that may open it can know.
             films: true,
             modes: Vec::new(),
             chosen: None,

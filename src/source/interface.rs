@@ -59,7 +59,7 @@ pub trait Source: Send {
         false
     }
 
-    /// One attempt to go on after a failure: the same camera, the same format. Whoever calls
+    /// One attempt to go on after a failure: the same camera, the same format. The caller
     /// decides when to try again; the source only says why it is not yet. Its frames go on with
     /// times that fit those before.
     ///

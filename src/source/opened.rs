@@ -1,4 +1,4 @@
-//! What is told of a camera that has been opened, whichever way it is read.
+//! What is reported of a camera that has been opened, whichever way it is read.
 
 use super::choice::{Granted, Wish, is_same_rate};
 use super::error::SourceError;

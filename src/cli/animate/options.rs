@@ -56,7 +56,7 @@ pub struct AnimateArgs {
     /// ground.
     #[arg(long, value_name = "NODE", requires = "pull")]
     pub pull_node: Option<u32>,
-    /// When it is let go, s.
+    /// When it is released, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.5, requires = "pull", value_parser = moment)]
     pub release: f64,
     /// The captured motion instead of wind, so many times as large; 0 holds the tree still, 1 is as

@@ -194,7 +194,7 @@ impl Camera {
     fn accept(&self, used: &[u8], meta: &Metadata) -> Option<RawFrame> {
         let Granted { format, size, .. } = self.agreed.granted;
         // A damaged frame's number is not taken in: it shows up as a hole in the count, as frames
-        // that were lost do, and is told from them by the count of damaged ones.
+        // that were lost do, and differs from them by the count of damaged ones.
         let bytes = if meta.flags.contains(Flags::ERROR) {
             None
         } else {
