@@ -2,7 +2,7 @@
 
 use super::ExportError;
 use super::gltf_model::Model;
-use crate::shape::{FoliageGroup, Mesh};
+use crate::geometry::{FoliageGroup, Mesh};
 
 /// Joints of a skin are numbered with two bytes.
 const MOST_NODES: usize = 1 + u16::MAX as usize;

@@ -1,8 +1,8 @@
 //! What goes into a glTF file.
 
 use super::ExportError;
+use crate::geometry::Dressed;
 use crate::model::{Pose, Skeleton};
-use crate::shape::Dressed;
 use gltf_json::extras::RawValue;
 use serde_json::Value;
 

@@ -2,7 +2,7 @@
 
 use super::template_bytes::Taken;
 use super::template_error::TemplateError;
-use crate::shape::{Template, TemplateFault, TemplateMesh};
+use crate::geometry::{Template, TemplateFault, TemplateMesh};
 use gltf::accessor::{DataType, Dimensions};
 use gltf::mesh::Mode;
 use gltf::{Accessor, Gltf, Semantic};

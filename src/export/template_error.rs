@@ -1,6 +1,6 @@
 //! Why a file is no leaf template.
 
-use crate::shape::TemplateFault;
+use crate::geometry::TemplateFault;
 use std::path::PathBuf;
 
 /// Larger files are refused, and so are larger files that they refer to, bytes.

@@ -4,9 +4,10 @@ use super::bark;
 use super::leaves::InLeaf;
 use super::seen::Seen;
 use crate::config::Config;
+use crate::geometry::{Dressed, wood_levels};
 use crate::model::{NodeId, Pose, Skeleton};
 use crate::motion;
-use crate::shape::{Bounds, Dressed, limbs, room, wood_levels};
+use crate::shape::{Bounds, limbs, room};
 
 /// How far each group of leaves swings in every pose, see [`flutter`](crate::motion::flutter).
 pub fn flutter(

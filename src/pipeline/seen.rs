@@ -1,7 +1,7 @@
 //! What the film shows of a tree apart from its motion.
 
+use crate::geometry::Template;
 use crate::model::{Luma, Outline, Pose, Rgb};
-use crate::shape::Template;
 
 /// What the film shows of the tree apart from its motion.
 #[derive(Clone, Copy, Debug, Default)]

@@ -1,9 +1,8 @@
 //! One closed tube along a chain of limbs, with frames carried along without twist.
 
 use super::chain::{self, Chain};
-use super::curl::square_to;
-use super::limb::CenterlineSample;
 use super::mesh::Mesh;
+use crate::shape::{CenterlineSample, square_to};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
