@@ -139,8 +139,8 @@ impl Unfinished {
 
 /// Completes the capture `out` from what its run has left.
 ///
-/// The tree is built from the log as a replay would build it. `frames` is called with the number
-/// of each frame that is worked off.
+/// The tree is built from the log as a replay would build it. `frames` is told the number of each
+/// frame that is worked off.
 ///
 /// # Errors
 /// There is nothing to finish, it is still being filmed, it is damaged, or the capture cannot be
