@@ -4,8 +4,9 @@
 mod options;
 mod written;
 
+use super::ended::{Ended, unwritten};
+use super::output::say;
 use super::stop::Stop;
-use super::{Ended, say};
 use crate::cancel::CancelToken;
 use crate::config::{Config, Excited};
 use crate::document::{Document, DocumentError};
@@ -40,7 +41,7 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), Ended> {
     }
     let stop = Stop::on_signals()?;
     let names = names(&args.dirs);
-    // Before the first is worked on: a mistyped name is told at once.
+    // Before the first is worked on: a mistyped name is reported at once.
     let mut documents = Vec::with_capacity(args.dirs.len());
     for dir in &args.dirs {
         let document = Document::tree(dir)?;
@@ -56,7 +57,8 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), Ended> {
     let comparison = compare(&studies, args.trees.same());
     if comparison.as_ref().is_some_and(|c| c.same_tree.is_none()) {
         say(
-            "arborcam: warning: nothing is compared: it cannot be told whether these are films of one tree; say --trees same or different",
+            "arborcam: warning: nothing is compared: it cannot be told whether these are films of \
+             one tree; say --trees same or different",
         );
     }
     print(&table(args, &studies, comparison.as_ref()))?;
@@ -84,7 +86,7 @@ fn table(args: &AnalyzeArgs, studies: &[Study], comparison: Option<&Comparison>)
 }
 
 fn report(path: &Path, html: String, stop: &AtomicBool) -> Result<(), Ended> {
-    put_beside(path, html, stop).map_err(super::export::unwritten)?;
+    put_beside(path, html, stop).map_err(unwritten)?;
     say(&format!("report:  {}", path.display()));
     Ok(())
 }
@@ -217,14 +219,16 @@ fn film(
         notes.tell(
             "warning",
             format!(
-                "the film is longer than {LONGEST_S:.0} s; its end is analysed; choose another part with --from and --to"
+                "the film is longer than {LONGEST_S:.0} s; its end is analysed; choose another \
+                 part with --from and --to"
             ),
         );
     } else {
         notes.tell(
             "note",
             format!(
-                "of {duration_s:.0} s of film the last {longest_s:.0} (dynamics.window_s) are analysed; choose others with --from and --to"
+                "of {duration_s:.0} s of film the last {longest_s:.0} (dynamics.window_s) are \
+                 analysed; choose others with --from and --to"
             ),
         );
     }

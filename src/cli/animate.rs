@@ -5,13 +5,13 @@ mod options;
 
 pub use options::AnimateArgs;
 
-use super::export::failed;
+use super::ended::{Ended, failed};
 use super::hangup::SighupAction;
+use super::output::say;
 use super::render::{self, unwritten};
 use super::session::stop_on_signals;
 use super::stop::Stop;
 use super::tree::{Tail, warn};
-use super::{Ended, say};
 use crate::animate::{Animator, Known, Loudness, Magnify, Wind, magnify, place_to_pull};
 use crate::config::Config;
 use crate::document::{DocumentError, MotionCsv};
@@ -148,15 +148,15 @@ fn animator(tree: &PreparedTree, sound: Option<Loudness>, period_s: f64) -> Anim
     let animator = Animator::new(tree.skeleton.clone(), &known, settings, wind);
     if animator.tuning().all(|t| !t.measured) {
         say(&format!(
-            "arborcam: warning: the capture has no frequency of any branch; they are taken from thickness and length, the \
-             trunk's from wind.trunk_hz ({} Hz)",
+            "arborcam: warning: the capture has no frequency of any branch; they are taken from \
+             thickness and length, the trunk's from wind.trunk_hz ({} Hz)",
             settings.trunk_hz
         ));
     }
     animator
 }
 
-/// The tree in the wind, or pulled and let go.
+/// The tree in the wind, or pulled and released.
 fn blown(
     args: &AnimateArgs,
     tree: &PreparedTree,

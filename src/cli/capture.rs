@@ -1,9 +1,10 @@
 //! `arborcam capture DEVICE`: the whole way, live.
 
 use super::camera::CameraArgs;
+use super::common::Common;
+use super::ended::Ended;
 use super::recording::RecordOption;
 use super::session::{self, Plan};
-use super::{Common, Ended};
 use clap::Args;
 use std::path::PathBuf;
 

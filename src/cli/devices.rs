@@ -1,6 +1,7 @@
 //! `arborcam devices`: the cameras that are plugged in.
 
-use super::{Ended, print};
+use super::ended::Ended;
+use super::output::print;
 use crate::config::Config;
 use crate::source::{self, Device, Mode, Places};
 use clap::Args;

@@ -1,6 +1,7 @@
 //! `arborcam doctor`: what is wrong with this machine, and what to do about it.
 
-use super::{Ended, print};
+use super::ended::Ended;
+use super::output::print;
 use crate::config::Config;
 use crate::doctor::{self, Asked, Screen, Verdict};
 use crate::tui::{self, Depth};

@@ -1,8 +1,10 @@
 //! `arborcam export DIR --format F --out PATH`: a capture's tree as a file for other programs.
 
+use super::ended::{Ended, failed, unwritten};
+use super::idle;
+use super::output::say;
 use super::stop::Stop;
 use super::tree::{Tail, TreeArgs, warn};
-use super::{Ended, idle, say};
 use crate::export::gltf::{KEY_TOLERANCE_PX, Model, NamedBytes, glb, gltf_files};
 use crate::export::still::{obj_files, ply};
 use crate::export::{ExportError, html};
@@ -126,22 +128,6 @@ fn tables(args: &ExportArgs, tree: &PreparedTree, stop: &Stop) -> Result<(), End
         written.cylinders
     ));
     Ok(())
-}
-
-/// How a command ends whose files could not be made.
-pub fn failed(e: ExportError) -> Ended {
-    match e {
-        ExportError::Write(e) => unwritten(e),
-        e => Ended::Failed(e.into()),
-    }
-}
-
-/// How a command ends whose files could not be written.
-pub fn unwritten(e: WriteError) -> Ended {
-    match e {
-        WriteError::Stopped => Ended::Stopped,
-        e => Ended::Failed(e.into()),
-    }
 }
 
 fn bad_usage<T>(why: String) -> Result<T, Ended> {

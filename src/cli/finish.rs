@@ -1,7 +1,8 @@
 //! `arborcam finish DIR`: completes a capture whose run was cut.
 
+use super::ended::Ended;
+use super::output::say;
 use super::stop::Stop;
-use super::{Ended, say};
 use crate::cancel::CancelToken;
 use crate::runtime;
 use clap::Args;

@@ -2,7 +2,8 @@
 //! settings are to be read again.
 
 use super::camera::CameraArgs;
-use super::{Common, say};
+use super::common::Common;
+use super::output::say;
 use crate::config::{Change, Config};
 use crate::runtime::Running;
 use signal_hook::consts::SIGHUP;

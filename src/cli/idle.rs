@@ -1,6 +1,6 @@
 //! What was asked for and changes nothing is said, so that nobody looks for it in the result.
 
-use super::say;
+use super::output::say;
 use crate::config::Config;
 use serde_json::{Value, to_value};
 use std::path::Path;

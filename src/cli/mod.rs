@@ -1,15 +1,18 @@
-//! The commands: one file each. Here, what they have in common: arguments, exit status, messages.
+//! The commands: one file each. Here, the command line as a whole, and the exit status.
 
 mod analyze;
 mod animate;
 mod camera;
 mod capture;
+mod common;
 mod devices;
 mod doctor;
+mod ended;
 mod export;
 mod finish;
 mod hangup;
 mod idle;
+mod output;
 mod play;
 mod record;
 mod recording;
@@ -23,20 +26,10 @@ mod stop;
 mod supervisor;
 mod tree;
 
-use crate::config::{Config, ConfigError};
-use crate::outline::OutlineSpec;
-use crate::runtime::Failure;
-use camera::CameraArgs;
-use clap::{Args, Parser, Subcommand, ValueEnum};
-use std::io::{ErrorKind, Write};
-use std::path::PathBuf;
+use clap::{Parser, Subcommand};
+use ended::{BAD_USAGE, Ended, FAILED, NO_INPUT, STOPPED};
+use output::say;
 use std::process::ExitCode;
-
-/// Exit status of the contract.
-const FAILED: u8 = 1;
-const BAD_USAGE: u8 = 2;
-const NO_INPUT: u8 = 3;
-const STOPPED: u8 = 130;
 
 /// Films a swaying tree and turns it, while it films, into a moving 3D tree.
 #[derive(Debug, Parser)]
@@ -73,85 +66,6 @@ enum Command {
     Devices(devices::DevicesArgs),
     /// Find out what is wrong with this machine, and what to do about it.
     Doctor(doctor::DoctorArgs),
-}
-
-/// What `capture` and `replay` share.
-#[derive(Debug, Args)]
-struct Common {
-    /// Where the tree is: a JSON polygon, a mask image (white = tree), a scribble image (white =
-    /// tree, black = background, rest grey or transparent), or `auto` to find it by its motion.
-    #[arg(long, value_name = "FILE|auto", default_value = "auto")]
-    outline: OutlineSpec,
-    /// Folder for the result; it must not exist, and appears when it is complete.
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Run without the terminal UI.
-    #[arg(long)]
-    headless: bool,
-    /// Print each pose on standard output, as a line of JSON; implies --headless.
-    #[arg(long, value_name = "FORMAT")]
-    stream: Option<Stream>,
-    /// Settings that differ from the defaults (TOML; see config/arborcam.toml).
-    #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
-    /// End by itself after so many seconds of film.
-    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
-    for_s: Option<f64>,
-    #[command(flatten)]
-    scale: scale::ScaleArgs,
-    #[command(flatten)]
-    shape: shape::ShapeArgs,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Stream {
-    Ndjson,
-}
-
-impl Common {
-    /// The file over the defaults, and over both what the command line says; `camera` are the
-    /// arguments of a command that films.
-    fn config(&self, camera: Option<&CameraArgs>) -> Result<Config, ConfigError> {
-        Config::default().layered(self.config.as_deref(), |config| {
-            self.scale.set(config);
-            self.shape.set(config);
-            if let Some(camera) = camera {
-                camera.set(&mut config.camera);
-            }
-        })
-    }
-}
-
-fn seconds(text: &str) -> Result<f64, String> {
-    let seconds = text
-        .parse()
-        .ok()
-        .filter(|s: &f64| s.is_finite() && *s > 0.0);
-    seconds.ok_or_else(|| "give a number of seconds above 0".to_owned())
-}
-
-/// Why a command did not end well; decides the exit status.
-enum Ended {
-    Failed(anyhow::Error),
-    BadUsage(anyhow::Error),
-    NoInput(anyhow::Error),
-    Stopped,
-}
-
-impl From<ConfigError> for Ended {
-    fn from(e: ConfigError) -> Self {
-        Ended::BadUsage(e.into())
-    }
-}
-
-impl From<Failure> for Ended {
-    fn from(failure: Failure) -> Self {
-        match failure {
-            Failure::NothingDecoded(_) => Ended::NoInput(failure.into()),
-            Failure::Recording(e) => recording::refused(e),
-            other => Ended::Failed(other.into()),
-        }
-    }
 }
 
 /// Runs the command line.
@@ -218,19 +132,6 @@ fn one_line(error: &anyhow::Error) -> String {
         }
     }
     line.replace('\n', " ")
-}
-
-/// Writes `text` to standard output. A reader that closed it early has seen what it needed.
-fn print(text: &str) -> Result<(), Ended> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Ended::Failed(e.into())),
-        _ => Ok(()),
-    }
-}
-
-/// A line on standard error; if nobody reads it any more, that is no reason to fail.
-fn say(line: &str) {
-    let _ = writeln!(std::io::stderr(), "{line}");
 }
 
 #[cfg(test)]

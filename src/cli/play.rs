@@ -1,8 +1,9 @@
 //! `arborcam play INPUT --to /dev/videoN`: a recording becomes a camera.
 
+use super::ended::Ended;
 use super::hangup::SighupAction;
+use super::output::say;
 use super::session::{init_log, no_input, stop_on_signals};
-use super::{Ended, say};
 use crate::config;
 use crate::runtime;
 use crate::source::{self, Loopback};

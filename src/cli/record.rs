@@ -1,10 +1,11 @@
 //! `arborcam record DEVICE FILE.mcap`: frames into a file, and nothing else.
 
 use super::camera::CameraArgs;
+use super::ended::Ended;
 use super::hangup::SighupAction;
+use super::output::say;
 use super::recording::{self, LimitArgs, parse_time_ns};
 use super::session::{init_log, no_input, stop_on_signals, warn_of_other_format};
-use super::{Ended, say};
 use crate::config::Config;
 use crate::runtime::{self, Failure, Pace, RecordJob, RunningRecord};
 use clap::Args;

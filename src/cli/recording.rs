@@ -1,6 +1,6 @@
 //! What the commands that record have in common: options, refusals, the closing line.
 
-use super::Ended;
+use super::ended::{Ended, unbegun};
 use crate::recording::{Head, Limits, RecordingError};
 use crate::runtime::{QUEUE_BYTES, RecordTo, Recorded};
 use crate::source::Source;
@@ -88,19 +88,11 @@ pub fn refuse_unfit(path: &Path) -> Result<(), Ended> {
     }
     // A link that leads nowhere is something that is there, too.
     if path.symlink_metadata().is_ok() {
-        return Err(refused(RecordingError::Exists {
+        return Err(unbegun(RecordingError::Exists {
             path: path.to_owned(),
         }));
     }
     Ok(())
-}
-
-/// A recording that could not be begun.
-pub fn refused(e: RecordingError) -> Ended {
-    match e {
-        RecordingError::Exists { .. } => Ended::BadUsage(e.into()),
-        _ => Ended::Failed(e.into()),
-    }
 }
 
 /// What was recorded, for the end.

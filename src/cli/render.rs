@@ -4,8 +4,7 @@ mod options;
 
 pub use options::{Kind, RenderArgs, ViewName, WHITE, background, rate, size};
 
-use super::Ended;
-use super::export;
+use super::ended::{self, Ended};
 use super::stop::Stop;
 use super::tree::{Tail, warn};
 use crate::files::{OutputFile, WriteError, refuse_taken};
@@ -85,7 +84,7 @@ pub fn unwritten(e: WriteError) -> Ended {
             "{} exists already; choose another file, or remove it first",
             path.display()
         )),
-        e => export::unwritten(e),
+        e => ended::unwritten(e),
     }
 }
 

@@ -1,8 +1,9 @@
 //! `arborcam replay INPUT`: the whole way from a recording.
 
+use super::common::Common;
+use super::ended::Ended;
 use super::recording::RecordOption;
 use super::session::{self, Plan};
-use super::{Common, Ended};
 use crate::runtime::Pace;
 use clap::Args;
 use std::path::PathBuf;

@@ -1,6 +1,6 @@
 //! How large a pixel is at the tree.
 
-use super::Ended;
+use super::ended::Ended;
 use crate::config::Config;
 use crate::model::Size;
 use anyhow::anyhow;
@@ -49,7 +49,8 @@ impl ScaleArgs {
                 && (-0.5..=f64::from(size.height)).contains(&v);
             if !inside {
                 return Err(Ended::BadUsage(anyhow!(
-                    "--scale: {u},{v} lies off the picture, which is {size} pixels; give two points of a frame of this film"
+                    "--scale: {u},{v} lies off the picture, which is {size} pixels; give two \
+                     points of a frame of this film"
                 )));
             }
         }

@@ -1,9 +1,9 @@
-//! What a service manager is told (sd_notify): ready when frames flow, alive as long as they do,
-//! one line of state.
+//! What is reported to a service manager (sd_notify): ready when frames flow, alive as long as they
+//! do, one line of state.
 //!
 //! Nothing is sent where nobody asked for it (`NOTIFY_SOCKET`), so this runs in every capture.
 
-use super::say;
+use super::output::say;
 use crate::model::Snapshot;
 use crate::runtime::{Running, Sign, Vigil};
 use sd_notify::NotifyState;

@@ -1,11 +1,13 @@
 //! One capture or replay from the command line: open, run, show, report.
 
 use super::camera::CameraArgs;
+use super::common::Common;
+use super::ended::{Ended, FAILED};
 use super::hangup::{Reload, SighupAction};
+use super::output::say;
 use super::recording::{self, RecordOption};
 use super::service::Service;
 use super::supervisor::CaptureSupervisor;
-use super::{Common, Ended, say};
 use crate::config::Config;
 use crate::files::OutputFolder;
 use crate::outline::{self, OutlineSpec};
@@ -180,13 +182,9 @@ pub fn stop_on_signals(by_hangup: bool) -> Result<Arc<AtomicBool>, Ended> {
     {
         // Twice the same signal ends at once, without a capture: a disk that hangs must not make
         // the program immortal.
-        signal_hook::flag::register_conditional_shutdown(
-            signal,
-            i32::from(super::FAILED),
-            stop.clone(),
-        )
-        .and_then(|_| signal_hook::flag::register(signal, stop.clone()))
-        .map_err(|e| Ended::Failed(e.into()))?;
+        signal_hook::flag::register_conditional_shutdown(signal, i32::from(FAILED), stop.clone())
+            .and_then(|_| signal_hook::flag::register(signal, stop.clone()))
+            .map_err(|e| Ended::Failed(e.into()))?;
     }
     Ok(stop)
 }
@@ -224,8 +222,8 @@ fn report(summary: Option<&Summary>, failure: Option<Failure>, stopped: bool) ->
         Some(Failure::Source(e)) if summary.is_none_or(|s| s.frames == 0) => Err(no_input(e)),
         Some(failure) => Err(failure.into()),
         None if stopped => Err(Ended::Stopped),
-        // Tracks alone are not what was asked for; whoever looks for tree.glb is to learn it from
-        // the status.
+        // Tracks alone are not what was asked for; a script that looks for tree.glb is to
+        // learn it from the status.
         None => match summary.filter(|s| s.tree.is_none()) {
             Some(s) => Err(Ended::Failed(no_tree(s))),
             None => Ok(()),
@@ -243,8 +241,8 @@ fn no_tree(s: &Summary) -> anyhow::Error {
         );
     }
     anyhow!(
-        "no tree: {} points moved, and at least {} must; wait for wind, come nearer, keep the camera still, or draw the \
-         outline closer (--outline)",
+        "no tree: {} points moved, and at least {} must; wait for wind, come nearer, keep the \
+         camera still, or draw the outline closer (--outline)",
         s.moving,
         crate::solve::LEAST_MOVING
     )

@@ -1,6 +1,6 @@
 //! What the user draws for the tree's shape: the trunk that it keeps, the space that it fills.
 
-use super::Ended;
+use super::ended::Ended;
 use crate::config::{Config, EnvelopeKind, Leader};
 use crate::model::Size;
 use anyhow::anyhow;
@@ -145,7 +145,7 @@ mod tests {
         }
     }
 
-    /// Whoever draws a trunk from the top down means the same trunk.
+    /// A trunk drawn from the top down is the same trunk.
     #[test]
     fn a_trunk_may_be_drawn_from_either_end() {
         let up = parsed("[[30, 40], [31, 20], [29, 4]]");

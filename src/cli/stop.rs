@@ -1,8 +1,8 @@
 //! Ctrl-C in commands that work something out and write it to a file.
 
+use super::ended::{Ended, STOPPED};
 use super::hangup::SighupAction;
 use super::session::stop_on_signals;
-use super::{Ended, STOPPED};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -37,7 +37,7 @@ impl Stop {
         })
     }
 
-    /// From now on there is something to be taken away again; whoever writes looks at what this
+    /// From now on there is something to be taken away again; the writer looks at what this
     /// gives.
     pub fn while_writing(&self) -> &AtomicBool {
         self.at_once.store(false, Ordering::SeqCst);

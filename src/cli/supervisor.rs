@@ -1,7 +1,7 @@
 //! Looks after a running capture, with and without a screen: its length, its settings, the service
 //! manager.
 
-use super::Ended;
+use super::ended::Ended;
 use super::hangup::Reload;
 use super::service::Service;
 use crate::model::{Control, Snapshot};

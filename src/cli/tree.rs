@@ -1,10 +1,12 @@
 //! The options on what a command may change of a document's tree.
 
+use super::ended::Ended;
+use super::idle;
+use super::output::say;
 use super::scale::ScaleArgs;
 use super::shape::ShapeArgs;
-use super::{Ended, idle, say};
 use crate::config::{Config, ConfigError, LeafShow};
-use crate::document::{Document, DocumentError};
+use crate::document::Document;
 use crate::export::read_template;
 use crate::model::{Luma, Size};
 use crate::outline;
@@ -75,28 +77,6 @@ impl Tail {
             // The last frame's own time is a little less than the film's.
             Self::From(at_s) => (film_s - at_s).max(0.0) + 2.0,
             Self::Whole => film_s + 1.0,
-        }
-    }
-}
-
-impl From<DocumentError> for Ended {
-    fn from(e: DocumentError) -> Self {
-        match e {
-            // A sound document of a film in which there was no tree.
-            DocumentError::NoTree { .. } => Ended::Failed(e.into()),
-            _ => Ended::NoInput(e.into()),
-        }
-    }
-}
-
-impl From<PrepareError> for Ended {
-    fn from(e: PrepareError) -> Self {
-        match e {
-            PrepareError::Document(e) => e.into(),
-            PrepareError::Export(e) => super::export::failed(e),
-            PrepareError::Shape(e) => Ended::BadUsage(e.into()),
-            PrepareError::NoPose { .. } => Ended::BadUsage(e.into()),
-            e => Ended::Failed(e.into()),
         }
     }
 }

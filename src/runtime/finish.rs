@@ -187,7 +187,8 @@ fn warn_of_unanalysed(job: &CaptureJob, tree: &Model, sway: &[Swaying]) {
     if missing > 0 {
         let of = tree.skeleton.measured() - 1;
         job.shared.warn(format!(
-            "the sway of {missing} of {of} branches was not looked at, as the end was wanted: `arborcam analyze DIR` tells it"
+            "the sway of {missing} of {of} branches was not looked at, as the end was wanted: \
+             `arborcam analyze DIR` tells it"
         ));
     }
 }

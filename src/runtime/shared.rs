@@ -101,7 +101,8 @@ pub struct Counts {
 pub struct Shared {
     /// Take no more frames, finish.
     pub stop: Arc<AtomicBool>,
-    /// The user, or whoever speaks for him, wants it over: what is not needed is not waited for.
+    /// The user, or the service manager in his place, wants it over: what is not needed is not
+    /// waited for.
     pub hurry: AtomicBool,
     pub paused: AtomicBool,
     pub ended: AtomicBool,
@@ -394,6 +395,16 @@ impl Notices {
         // An answer takes the place of all, another line that of others.
         self.0.retain(|(_, is_answer)| *is_answer && !answer);
         self.0.push((line, answer));
+    }
+}
+
+/// Stops the source when the tracker or the model is done for, be it by a panic: the source holds
+/// both ends of its queue, and would never learn otherwise that nobody takes from it.
+pub struct StopAll<'a>(pub &'a Shared);
+
+impl Drop for StopAll<'_> {
+    fn drop(&mut self) {
+        self.0.stop.store(true, Ordering::Relaxed);
     }
 }
 

@@ -1,6 +1,6 @@
 //! What `arborcam analyze` is asked for.
 
-use super::super::Ended;
+use super::super::ended::Ended;
 use super::super::scale::ScaleArgs;
 use crate::config::{Config, Excited};
 use anyhow::anyhow;

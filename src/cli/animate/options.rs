@@ -1,5 +1,6 @@
 //! What `arborcam animate` is asked for.
 
+use super::super::common::seconds;
 use super::super::render::{ViewName, WHITE, background, rate, size};
 use super::super::tree::TreeArgs;
 use crate::config::{Config, ConfigError};
@@ -17,7 +18,7 @@ pub struct AnimateArgs {
     /// A capture: a folder that `--out` of capture or replay has made.
     pub dir: PathBuf,
     /// Length of the animation, s.
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = super::super::seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
     pub seconds: f64,
     /// What to write, by its ending: a model (.glb, .gltf), a page (.html), the motion as a table
     /// (.csv), a video (.mp4), or a picture of the end (.png). It must not exist. Without it the
@@ -55,13 +56,16 @@ pub struct AnimateArgs {
     /// ground.
     #[arg(long, value_name = "NODE", requires = "pull")]
     pub pull_node: Option<u32>,
-    /// When it is let go, s.
+    /// When it is released, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.5, requires = "pull", value_parser = moment)]
     pub release: f64,
     /// The captured motion instead of wind, so many times as large; 0 holds the tree still, 1 is as
     /// filmed.
     #[arg(
-        long, value_name = "TIMES", value_parser = times, conflicts_with_all = ["wind", "gusts", "beta", "wav", "pull", "direction"]
+        long,
+        value_name = "TIMES",
+        value_parser = times,
+        conflicts_with_all = ["wind", "gusts", "beta", "wav", "pull", "direction"]
     )]
     pub magnify: Option<f64>,
     /// The captured motion at another speed, 0.01 to 100; 0.5 takes twice as long.

@@ -1,5 +1,6 @@
 //! What `arborcam render` is asked for.
 
+use super::super::common::seconds;
 use super::super::tree::TreeArgs;
 use crate::draw::View;
 use crate::model::Size;
@@ -48,7 +49,7 @@ pub struct RenderArgs {
     #[arg(long)]
     pub bare: bool,
     /// Length of a video, s; if not given that of the film, at most 10.
-    #[arg(long, value_name = "SECONDS", value_parser = super::super::seconds)]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub seconds: Option<f64>,
     /// Pictures a second of a video, 1 to 120.
     #[arg(long, value_name = "RATE", default_value_t = 30.0, value_parser = rate)]
