@@ -43,13 +43,20 @@ sleep 3
 
 # Hung: only the watchdog can tell.
 main=$(property MainPID)
+cut=$(ls -d /var/lib/arborcam/video0/*.unfinished | tail -n 1)
 now >/vm/stopped
 kill -STOP "$main"
 until_ok 40 is_another "$main"
 now >/vm/restarted
 note restarts "$(property NRestarts)"
-sleep 4
+main=$(property MainPID)
+until_ok 60 test ! -e "$cut"
+note completing "$(property MainPID) $main"
+cp -r "${cut%.unfinished}" /vm/completed
 
+systemctl restart "$unit" --no-block
+until_ok 60 is_another "$main"
+sleep 4
 main=$(property MainPID)
 now >/vm/asked
 kill -TERM "$main"
