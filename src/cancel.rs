@@ -6,7 +6,7 @@ use std::time::Instant;
 
 /// Asks long work to end before it is done.
 ///
-/// Whoever works calls [`is_cancelled`](Self::is_cancelled) between steps of less than a second,
+/// The worker calls [`is_cancelled`](Self::is_cancelled) between steps of less than a second,
 /// and returns early where it says so. Each call is counted, so that a supervisor can tell work
 /// that goes on from work that hangs. Clones are the same token.
 #[derive(Clone, Debug, Default)]

@@ -1,4 +1,4 @@
-//! Panics in other people's code that are caught, and known as such to whoever else hears of
+//! Panics in other people's code that are caught, and known as such to other handlers of
 //! panics.
 
 use std::cell::Cell;

@@ -19,16 +19,17 @@
 //!
 //! # The modules in reading order
 //!
-//! [`model`] shared data types · `source` where frames come from · `outline` which pixels are tree ·
-//! `track` points followed · [`hierarchy`] which points move together · [`skeleton`] in the picture ·
-//! [`shape`] in space · [`motion`] the pose in every frame · [`dynamics`] frequency and damping ·
-//! [`animate`] motion that was not filmed · [`signal`] common mathematics · [`random`] seeded random numbers · [`caught`] panics of
-//! other crates · [`draw`] pictures of the model · [`pipeline`] all of it, step by step · `runtime`
-//! on threads · `recording` frames and tracks on disk · [`document`] a tree as a folder, written and
+//! [`model`] shared data types · `source` where frames come from · `outline` which pixels are tree
+//! · `track` points followed · [`hierarchy`] which points move together · [`skeleton`] in the
+//! picture · [`shape`] in space · [`geometry`] its wood and leaves as meshes · [`motion`] the pose
+//! in every frame · [`dynamics`] frequency and damping · [`animate`] motion that was not filmed ·
+//! [`signal`] common mathematics · [`random`] seeded random numbers · [`caught`] panics of other
+//! crates · [`draw`] pictures of the model · [`pipeline`] all of it, step by step · `runtime` on
+//! threads · `recording` frames and tracks on disk · [`document`] a tree as a folder, written and
 //! read · [`files`] that appear when they are complete · [`export`] files for other programs ·
-//! [`views`] what is made of a document · [`report`] tables and plots of the sway · `tui` the screen ·
-//! `doctor` checks of the machine · `cli` the commands · [`config`] the settings · [`cancel`] stops
-//! long work.
+//! [`views`] what is made of a document · [`report`] tables and plots of the sway · `tui` the
+//! screen · `doctor` checks of the machine · `cli` the commands · [`config`] the settings ·
+//! [`cancel`] stops long work.
 //!
 //! # Features
 //!
@@ -56,6 +57,7 @@ pub mod dynamics;
 pub mod export;
 mod ffmpeg;
 pub mod files;
+pub mod geometry;
 pub mod hierarchy;
 pub mod model;
 pub mod motion;

@@ -17,9 +17,10 @@ mod refiner;
 mod reshape;
 #[cfg(feature = "opencv")]
 mod seeds;
+mod seen;
 
 pub use back::{BackEnd, Followed, Moved};
-pub use dress::{Seen, dress, flutter};
+pub use dress::{dress, flutter};
 #[cfg(feature = "opencv")]
 pub use front::FrontEnd;
 pub use pose_tracker::{PoseReplay, PoseTracker, Targets};
@@ -27,6 +28,7 @@ pub use refiner::SolveJob;
 pub use reshape::{MOST_RESHAPED, cut_to, reshape};
 #[cfg(feature = "opencv")]
 pub use seeds::seeds as leaf_seeds;
+pub use seen::Seen;
 
 #[cfg(feature = "opencv")]
 use crate::{

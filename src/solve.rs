@@ -1,29 +1,29 @@
 //! The whole algorithm on one screen: a log of points becomes a model of the tree.
 //!
-//! [`solve`] is the only maker of models, whoever asks: the pipeline while it films, the end of a
-//! film, a log that is finished after a crash, and programs with tracks of their own. It does no
+//! [`solve`] is the only maker of models, for every caller: the pipeline while it films, the end of
+//! a film, a log that is finished after a crash, and programs with tracks of their own. It does no
 //! I/O, starts no threads and reads no clock.
 
+mod lift;
 mod model;
 mod refine;
 mod sub_branches;
 
+pub use lift::{assign_radii, lift_to_3d};
 pub use model::{First, Model, Moment};
 pub use sub_branches::SubBranch;
 
 use crate::cancel::CancelToken;
 use crate::config::Config;
 use crate::hierarchy::{self, Evidence};
-use crate::model::{MotionHierarchy, Outline, Skeleton, TrackLog, TrackTable};
-use crate::{shape, skeleton};
+use crate::model::{Outline, TrackLog, TrackTable};
+use crate::skeleton;
 use refine::Refinement;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Fewer moving points than this make no tree, whatever is asked.
 pub const LEAST_MOVING: usize = 16;
-/// Share of the outline's width at the foot that is trunk, where none can be measured above it.
-const TRUNK_SHARE: f64 = 0.5;
 
 /// Builds the tree from the points that `log` remembers (the last `accumulate.window_s`), within
 /// `outline`.
@@ -42,7 +42,11 @@ pub fn solve(
     cancel: &CancelToken,
 ) -> Option<Model> {
     if let Some(prior) = prior {
-        return Refinement::of(log, prior, config)?.run(cancel);
+        let refinement = Refinement::of(log, prior, config)?;
+        let evidence = refinement.evidence()?;
+        let (table, moment) = (&refinement.table, refinement.moment);
+        let new = build(table, evidence, &prior.outline, config, moment)?;
+        return refinement.better(new, cancel);
     }
     let window = log.last(config.accumulate.window_s);
     let table = Arc::new(hierarchy::table(window));
@@ -74,46 +78,6 @@ fn crown_u(table: &TrackTable, moving: &[usize]) -> Option<f64> {
         .map(|&row| hierarchy::rest_position_px(table, row)[0])
         .sum();
     (!moving.is_empty()).then(|| sum / moving.len() as f64)
-}
-
-/// The skeleton in the picture, and the number of points on every node.
-fn flat(
-    hierarchy: &MotionHierarchy,
-    outline: &Outline,
-    config: &Config,
-) -> (Vec<skeleton::Node2d>, Vec<u32>) {
-    let flat = skeleton::build(hierarchy, outline, &config.skeleton);
-    let mut n_tracks = Vec::with_capacity(flat.len());
-    for node in &flat {
-        // The foot carries all.
-        let cluster = node.cluster.map_or(0, |c| c.0 as usize);
-        let cluster = hierarchy.clusters.get(cluster);
-        n_tracks.push(cluster.map_or(0, |c| c.members.len() as u32));
-    }
-    (flat, n_tracks)
-}
-
-/// Radii, from the trunk's as it was given or as the outline shows it.
-pub fn assign_radii(skeleton: &mut Skeleton, outline: &Outline, config: &Config) {
-    let wood = &config.wood;
-    let top_px = skeleton.nodes.get(1).map_or(skeleton.foot_px, |top| {
-        skeleton.image_from_model(&top.position)
-    });
-    let measured = shape::trunk_radius_px(outline, skeleton.foot_px, top_px);
-    let trunk_px = if wood.trunk_width_px > 0.0 {
-        0.5 * wood.trunk_width_px
-    } else if let Some(measured_px) = measured {
-        measured_px
-    } else {
-        TRUNK_SHARE * skeleton::Foot::of(outline, None).half_width_px
-    };
-    let trunk_px = trunk_px.max(2.0 * shape::TIP_RADIUS_PX);
-    let room = shape::room(
-        skeleton,
-        Some(outline),
-        shape::Bounds::Filmed(config.shape.envelope),
-    );
-    shape::thicken(skeleton, trunk_px, &room, wood, wood.seed.into());
 }
 
 /// Hierarchy, 2D skeleton, 3D skeleton. `None` if too few points move.
@@ -164,12 +128,4 @@ fn build(
         evidence,
         forced: moment.forced,
     })
-}
-
-/// Hierarchy to tree in space, with its thickness.
-pub fn lift_to_3d(hierarchy: &MotionHierarchy, outline: &Outline, config: &Config) -> Skeleton {
-    let (flat, tracks) = flat(hierarchy, outline, config);
-    let mut skeleton = shape::build(&flat, &tracks, outline, &config.shape);
-    assign_radii(&mut skeleton, outline, config);
-    skeleton
 }

@@ -24,6 +24,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("skeleton", &["model", "config"]),
     // The flat node that is stood up in space.
     ("shape", &["model", "config", "skeleton::Node2d", "random"]),
+    // Limbs become meshes, and leaves stand on them.
+    ("geometry", &["model", "config", "shape", "random"]),
     ("motion", &["model", "config", "signal"]),
     ("dynamics", &["model", "config", "signal"]),
     ("files", &[]),
@@ -57,6 +59,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "hierarchy",
             "skeleton",
             "shape",
+            "geometry",
             "motion",
             "signal",
             "solve",
@@ -68,9 +71,9 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "draw",
         &[
             "model",
-            "shape::Mesh",
-            "shape::Foliage",
-            "shape::FoliageGroup",
+            "geometry::Mesh",
+            "geometry::Foliage",
+            "geometry::FoliageGroup",
         ],
     ),
     // `capture.json` holds the whole configuration and what the push has achieved. Poses are read by
@@ -98,7 +101,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "files",
             "ffmpeg",
             "document",
-            "shape",
+            "geometry",
             "dynamics::angle_to_parent_deg",
         ],
     ),
@@ -106,7 +109,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "views",
         &[
-            "model", "config", "files", "document", "export", "pipeline", "shape", "draw",
+            "model", "config", "files", "document", "export", "pipeline", "shape", "geometry",
+            "draw", "signal",
         ],
     ),
     // Told from what the sway was told from, and drawn beside it.
@@ -120,8 +124,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "outline::crossing",
             "caught",
             "draw",
-            "shape::Mesh",
-            "shape::bare_wood",
+            "geometry::Mesh",
+            "geometry::bare_wood",
         ],
     ),
     (
@@ -131,7 +135,6 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "config",
             "source",
             "outline",
-            "shape",
             "dynamics",
             "signal",
             "pipeline",

@@ -3,8 +3,8 @@
 mod synthetic;
 
 use arborcam::draw::{Bounds, Camera, Look, Model, Posed, Rgba, Texture, View, picture};
+use arborcam::geometry::{Foliage, FoliageGroup, Mesh, bare_wood};
 use arborcam::model::{JointPose, NodeId, Pose, Size, Skeleton};
-use arborcam::shape::{Foliage, FoliageGroup, Mesh, bare_wood};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use synthetic::{sway, tree};
 

@@ -6,6 +6,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use support::{CLIP, OUTLINE};
 use tempfile::TempDir;
@@ -156,9 +157,8 @@ impl Drop for Mounted {
     }
 }
 
-/// Something else fills the disk while a tree is filmed: the results have their space.
-#[test]
-fn a_disk_that_fills_up_ends_the_film_and_not_the_capture() {
+/// A disk of 100 MB; `None` where only root may mount one.
+fn small_disk() -> Option<(TempDir, Mounted)> {
     let dir = tempfile::tempdir().expect("tempdir");
     let mount = Command::new("mount")
         .args(["-t", "tmpfs", "-o", "size=100m", "arborcam"])
@@ -166,21 +166,76 @@ fn a_disk_that_fills_up_ends_the_film_and_not_the_capture() {
         .output();
     if !mount.is_ok_and(|o| o.status.success()) {
         eprintln!("SKIPPED: full disk: a small disk can be mounted by root only");
-        return;
+        return None;
     }
     let disk = Mounted(dir.path().to_owned());
+    Some((dir, disk))
+}
+
+/// Fills the disk to its last page.
+fn fill(filler: &mut fs::File) {
+    while filler.write_all(&[0; 1 << 12]).is_ok() {}
+}
+
+/// Something else fills the disk while a tree is filmed: the results have their space.
+#[test]
+fn a_disk_that_fills_up_ends_the_film_and_not_the_capture() {
+    let Some((_dir, disk)) = small_disk() else {
+        return;
+    };
     let out = disk.0.join("out");
     let run = Run::start(&out, &[]);
     run.wait_until_it_films();
     std::thread::sleep(Duration::from_secs(10));
-    let mut filler = fs::File::create(disk.0.join("filler")).expect("filler");
-    while filler.write_all(&[0; 1 << 12]).is_ok() {}
+    fill(&mut fs::File::create(disk.0.join("filler")).expect("filler"));
     let unfinished = run.unfinished();
     let output = run.end();
     assert_eq!(output.status.code(), Some(1), "{}", said(&output));
     assert!(said(&output).contains("No space left"), "{}", said(&output));
     assert!(out.join("tree.glb").is_file(), "{}", said(&output));
-    assert!(filmed_s(&out) > 8.0 && !unfinished.exists());
+    let filmed_s = filmed_s(&out);
+    assert!(filmed_s > 8.0, "{filmed_s}: {}", said(&output));
+    assert!(!unfinished.exists(), "{}", said(&output));
+}
+
+/// The other program takes whatever is given free, until the capture has given up: what was filmed
+/// is there when the disk has room again.
+#[test]
+fn a_disk_that_stays_full_costs_nothing_that_was_filmed() {
+    let Some((_dir, disk)) = small_disk() else {
+        return;
+    };
+    let out = disk.0.join("out");
+    let run = Run::start(&out, &[]);
+    run.wait_until_it_films();
+    std::thread::sleep(Duration::from_secs(10));
+    let ended = AtomicBool::new(false);
+    let filler_path = disk.0.join("filler");
+    let unfinished = run.unfinished();
+    let output = std::thread::scope(|scope| {
+        scope.spawn(|| {
+            let mut filler = fs::File::create(&filler_path).expect("filler");
+            while !ended.load(Ordering::SeqCst) {
+                fill(&mut filler);
+                std::thread::yield_now();
+            }
+        });
+        let output = run.end();
+        ended.store(true, Ordering::SeqCst);
+        output
+    });
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    assert!(
+        said(&output).contains("what was filmed is kept"),
+        "{}",
+        said(&output)
+    );
+    assert!(unfinished.is_dir() && !out.exists(), "{}", said(&output));
+    fs::remove_file(&filler_path).expect("filler");
+    let done = finish(&out);
+    assert!(done.status.success(), "{}", said(&done));
+    let filmed_s = filmed_s(&out);
+    assert!(filmed_s > 8.0, "{filmed_s}: {}", said(&output));
 }
 
 #[test]

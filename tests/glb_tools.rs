@@ -6,8 +6,8 @@ mod synthetic;
 mod tools;
 
 use arborcam::export::gltf::{KEY_TOLERANCE_PX, Model, glb, gltf_files};
+use arborcam::geometry::{Dressed, Foliage, Mesh, bare_wood};
 use arborcam::model::{Pose, Skeleton};
-use arborcam::shape::{Dressed, Foliage, Mesh, bare_wood};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -6,12 +6,12 @@ mod synthetic;
 
 use arborcam::config::{Config, LeafShow, Leaves};
 use arborcam::draw::{Camera, Look, Model, View, picture};
+use arborcam::geometry::{
+    Foliage, LeafView, Sampling, Template, density_match, foliage, foliage_by, leaf_cover, season,
+};
 use arborcam::model::{JointPose, Luma, NodeId, Outline, Pose, Rgb, Size, Skeleton};
 use arborcam::motion::flutter;
 use arborcam::pipeline::{Pipeline, PoseTracker, Seen, dress, leaf_seeds};
-use arborcam::shape::{
-    Foliage, LeafView, Sampling, Template, density_match, foliage, foliage_by, leaf_cover, season,
-};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use std::path::{Path, PathBuf};
 

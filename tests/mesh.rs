@@ -3,8 +3,9 @@
 mod synthetic;
 
 use arborcam::config::Wood;
+use arborcam::geometry::{LEVELS, Mesh, wood, wood_levels};
 use arborcam::model::{NodeId, Skeleton};
-use arborcam::shape::{CenterlineSample, LEVELS, Limb, Mesh, SkinWeights, wood, wood_levels};
+use arborcam::shape::{CenterlineSample, Limb, SkinWeights};
 use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
 use std::collections::HashMap;

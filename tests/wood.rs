@@ -3,8 +3,9 @@
 mod synthetic;
 
 use arborcam::config::Wood;
+use arborcam::geometry::cylinders;
 use arborcam::model::{NodeId, Skeleton};
-use arborcam::shape::{CURL_BOUND, Limb, PIPE_EXPONENTS, TIP_RADIUS_PX, cylinders, limbs, thicken};
+use arborcam::shape::{CURL_BOUND, Limb, PIPE_EXPONENTS, TIP_RADIUS_PX, limbs, thicken};
 use nalgebra::Point3;
 
 fn anywhere(_: &Point3<f64>, _: &Point3<f64>) -> bool {

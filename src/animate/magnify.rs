@@ -1,8 +1,9 @@
 //! The captured motion made larger or smaller, as a whole or in one band of frequencies, at another
 //! speed.
 
-use super::{soft, there_and_back};
+use super::soft;
 use crate::model::{JointPose, Pose, Skeleton};
+use crate::signal::reflection::there_and_back;
 use nalgebra::{UnitQuaternion, Vector3};
 use realfft::RealFftPlanner;
 
@@ -46,7 +47,8 @@ pub enum MagnifyError {
         length_s: f64,
     },
     #[error(
-        "the film shows {rate_hz:.1} frames a second: nothing between {low_hz} and {high_hz} Hz can be told; give a lower --band"
+        "the film shows {rate_hz:.1} frames a second: nothing between {low_hz} and {high_hz} Hz \
+         can be told; give a lower --band"
     )]
     BandTooHigh {
         rate_hz: f64,

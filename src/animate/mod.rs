@@ -29,20 +29,6 @@ pub use sound::{Loudness, SoundError};
 pub use tune::{Tuning, tune};
 pub use wind::{Air, Wind, speed_m_s};
 
-/// Place (0 to `length`) after `way` of going to and fro over a stretch of that length, both in one
-/// unit; 0 on a stretch without length.
-pub fn there_and_back(way: f64, length: f64) -> f64 {
-    if length <= 0.0 {
-        return 0.0;
-    }
-    let along = way.rem_euclid(2.0 * length);
-    if along > length {
-        2.0 * length - along
-    } else {
-        along
-    }
-}
-
 /// By how much an angle is to be multiplied so that it never exceeds `most` (same unit): not at all
 /// up to `knee`, beyond it more and more.
 fn soft(angle: f64, knee: f64, most: f64) -> f64 {

@@ -18,7 +18,7 @@ const WOOD: Effect = NextStart("the branches' thickness comes from it, and is in
 const LEAVES: Effect = NextStart("the tree would have to be dressed anew");
 const POSES: Effect = NextStart("the poses before and after would not fit together");
 const DYNAMICS: Effect = NextStart("one capture has one rule by which a sway counts as known");
-const ANIMATION: Effect = NextStart("older poses have been let go already");
+const ANIMATION: Effect = NextStart("older poses have been discarded already");
 const SCALE: Effect = NextStart("one capture has one scale");
 
 settings! {

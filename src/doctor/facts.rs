@@ -16,7 +16,7 @@ pub struct Asked {
     pub config: Result<Config, String>,
     /// Where captures will go.
     pub folder: PathBuf,
-    /// What was learned of the terminal by whoever may ask it.
+    /// What was learned of the terminal by the caller, which may ask it.
     pub screen: Screen,
 }
 

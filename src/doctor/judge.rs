@@ -152,7 +152,8 @@ fn frames(film: Option<&Film>, config: &Config) -> Check {
                 return Check::warn(
                     name,
                     format!("{given}, but {rate:.1} a second come"),
-                    "give it more light or lock the exposure (docs/camera.md); on USB 2 ask for mjpeg or a smaller picture",
+                    "give it more light or lock the exposure (docs/camera.md); on USB 2 ask for \
+                     mjpeg or a smaller picture",
                 );
             }
             if asked != given {

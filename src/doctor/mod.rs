@@ -41,13 +41,22 @@ pub struct Check {
 }
 
 impl Check {
-    pub(crate) fn ok(name: &'static str, found: impl Into<String>) -> Self {
+    fn of(
+        name: &'static str,
+        verdict: Verdict,
+        found: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Self {
         Self {
             name,
-            verdict: Verdict::Ok,
+            verdict,
             found: found.into(),
-            remedy: String::new(),
+            remedy: remedy.into(),
         }
+    }
+
+    pub(crate) fn ok(name: &'static str, found: impl Into<String>) -> Self {
+        Self::of(name, Verdict::Ok, found, "")
     }
 
     pub(crate) fn warn(
@@ -55,12 +64,7 @@ impl Check {
         found: impl Into<String>,
         remedy: impl Into<String>,
     ) -> Self {
-        Self {
-            name,
-            verdict: Verdict::Warn,
-            found: found.into(),
-            remedy: remedy.into(),
-        }
+        Self::of(name, Verdict::Warn, found, remedy)
     }
 
     pub(crate) fn fail(
@@ -68,12 +72,7 @@ impl Check {
         found: impl Into<String>,
         remedy: impl Into<String>,
     ) -> Self {
-        Self {
-            name,
-            verdict: Verdict::Fail,
-            found: found.into(),
-            remedy: remedy.into(),
-        }
+        Self::of(name, Verdict::Fail, found, remedy)
     }
 }
 

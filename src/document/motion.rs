@@ -1,6 +1,6 @@
 //! `motion.csv`: the places of all nodes in every frame.
 
-use super::DocumentError;
+use super::error::DocumentError;
 use super::table::{TableReader, TableWriter, px_in_unit, unit};
 use crate::files::WriteError;
 use crate::model::{Pose, Skeleton};

@@ -1,8 +1,9 @@
 //! `nodes.csv`: the tree. Every node with its parent, place, thickness and sway, and what it is.
 
+use super::error::DocumentError;
 use super::note::ModelNote;
+use super::sway;
 use super::table::{TableReader, TableWriter, px_in_unit, unit};
-use super::{DocumentError, sway};
 use crate::files::WriteError;
 use crate::model::{Node, NodeId, NodeKind, NodeName, Size, Skeleton, Swaying, Unidentified};
 use std::collections::BTreeMap;

@@ -1,7 +1,7 @@
 //! `capture.json`: what was filmed, with what, how well; written and read. No date of today, so that a replay gives
 //! the same file.
 
-use super::DocumentError;
+use super::error::DocumentError;
 use crate::config::Config;
 use crate::files::WriteError;
 use crate::model::Timing;

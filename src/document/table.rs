@@ -3,7 +3,8 @@
 //! Times are seconds with up to 6 decimals, pixels up to 3, lengths in the model up to 4. Unknown
 //! is an empty cell.
 
-use super::{DocumentError, number};
+use super::error::DocumentError;
+use super::number;
 use crate::files::WriteError;
 use crate::model::{FARTHEST_PX, NodeName};
 use csv::{ErrorKind, Position, Reader, ReaderBuilder, StringRecord};

@@ -1,6 +1,6 @@
 //! `tracks.csv`: every point in every frame in which it was seen.
 
-use super::DocumentError;
+use super::error::DocumentError;
 use super::table::{TableReader, TableWriter};
 use crate::dynamics::Film;
 use crate::files::{OutputFolder, WriteError};

@@ -3,8 +3,8 @@
 use super::camera::Bounds;
 use super::skin::Joints;
 use super::texture::Texture;
+use crate::geometry::{Foliage, Mesh};
 use crate::model::{Pose, Skeleton};
-use crate::shape::{Foliage, Mesh};
 use nalgebra::Point3;
 
 /// A tree to be drawn, in any pose.
@@ -58,7 +58,7 @@ impl<'a> Model<'a> {
     }
 
     /// The tree in a pose, `None` for its rest. `sway` is how far the leaves of each group swing,
-    /// rad; see [`crate::shape::FoliageGroup`]; it may be shorter than the groups.
+    /// rad; see [`crate::geometry::FoliageGroup`]; it may be shorter than the groups.
     pub fn posed(&self, pose: Option<&Pose>, sway: &[[f32; 2]]) -> Posed<'_> {
         let joints = Joints::new(self.skeleton, pose);
         let (positions, normals) = joints.wood(self.wood);

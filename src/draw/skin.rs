@@ -1,7 +1,7 @@
 //! Skin and leaves in one pose.
 
+use crate::geometry::{FoliageGroup, Mesh};
 use crate::model::{Pose, Skeleton};
-use crate::shape::{FoliageGroup, Mesh};
 use nalgebra::{Matrix3, Vector3};
 
 /// How every joint moves what hangs on it: `p` goes to `turn p + shift`.

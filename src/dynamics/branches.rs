@@ -9,6 +9,9 @@ use super::film::Film;
 use crate::cancel::CancelToken;
 use crate::model::{Interval, NodeId, Skeleton, Swaying, Unidentified};
 
+/// Share of half the rate of the frames up to which frequencies are looked for.
+pub(super) const BELOW_NYQUIST: f64 = 0.9;
+
 /// Where modes are looked for.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SearchLimits {

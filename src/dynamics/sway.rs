@@ -1,6 +1,6 @@
 //! Frequency and damping of every branch of a film.
 
-use super::branches::SearchLimits;
+use super::branches::{BELOW_NYQUIST, SearchLimits};
 use super::film::Film;
 use super::free_decay;
 use super::members::members;
@@ -14,8 +14,6 @@ use std::borrow::Cow;
 
 /// Fewer frames than this say nothing.
 const LEAST_FRAMES: usize = 32;
-/// Share of half the rate of the frames up to which frequencies are looked for.
-pub(super) const BELOW_NYQUIST: f64 = 0.9;
 /// Periods that a film must have of the lowest frequency that is looked for in it.
 pub const LEAST_PERIODS: f64 = 1.5;
 

@@ -2,7 +2,7 @@
 
 use crate::document::{TableWriter, unit};
 use crate::files::WriteError;
-use crate::shape::Cylinder;
+use crate::geometry::Cylinder;
 use std::io::Write;
 
 pub const CYLINDERS_HEADER: &str = "ID,parentID,start_x,start_y,start_z,end_x,end_y,end_z,axis_x,axis_y,axis_z,radius,\

@@ -7,19 +7,16 @@ use super::gltf_buffer::BufferBuilder;
 use super::gltf_check::check;
 use super::gltf_look::{LeafPicture, bark, leaf};
 use super::gltf_mesh::{Skinned, push_mesh, push_skin};
+use super::gltf_model::raw;
 use super::joints::Moving;
 use crate::document::note::{AnimationNote, Software};
-use crate::model::{Pose, Skeleton};
-use crate::shape::{Dressed, Mesh};
-use gltf_json::extras::RawValue;
+use crate::geometry::{Dressed, Mesh};
+use crate::model::Pose;
 use gltf_json::{Asset, Index, Node, Root, Scene, Skin};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 
-/// Keys are thinned so that no node is farther than this from its pose in any frame as seen in its
-/// own plane (the picture's for measured nodes), px; across it, where depth was estimated and not
-/// seen, it may be twice as far.
-pub const KEY_TOLERANCE_PX: f64 = 0.2;
+pub use super::gltf_model::{KEY_TOLERANCE_PX, Model};
 
 /// Where the model comes from, for the file's own notes.
 pub fn provenance(source: &str, software: &Software, poses: &[Pose]) -> Value {
@@ -30,51 +27,6 @@ pub fn provenance(source: &str, software: &Software, poses: &[Pose]) -> Value {
         "frames": poses.len(),
         "measured": "front view: tracked points; depth and copied planes: estimated (Li et al. 2011)",
     })
-}
-
-/// Everything that goes into the file.
-#[derive(Clone, Copy)]
-pub struct Model<'a> {
-    pub skeleton: &'a Skeleton,
-    /// Its meshes may be empty: then the file holds the joints alone.
-    pub dressed: &'a Dressed,
-    /// In the order of time; the rest pose stands for none.
-    pub poses: &'a [Pose],
-    /// How far each group of leaves swings in every pose: the weights of its two displacements.
-    /// Empty: not at all.
-    pub flutter: &'a [Vec<[f32; 2]>],
-    /// All levels of detail of the wood, as scenes `lod0`, `lod1`, ... on the same joints, instead
-    /// of the first alone.
-    pub all_levels: bool,
-    /// Metres in a pixel; 0 leaves the model in pixels.
-    pub metres_per_px: f64,
-    /// See [`KEY_TOLERANCE_PX`].
-    pub tolerance_px: f64,
-    /// One JSON object a node, added to `level`, `n_tracks` and `copy_of`; may be shorter than the
-    /// skeleton.
-    pub node_extras: &'a [Value],
-    /// Software version, name of the source, frames: the `extras` of the asset.
-    pub provenance: &'a Value,
-}
-
-impl Model<'_> {
-    pub(super) fn scale(&self) -> f64 {
-        if self.metres_per_px > 0.0 {
-            self.metres_per_px
-        } else {
-            1.0
-        }
-    }
-
-    /// Where the joint of node `i` rests, in the file's unit: at the parent node, about which the
-    /// branch turns.
-    pub(super) fn pivot(&self, i: usize) -> nalgebra::Vector3<f64> {
-        let nodes = &self.skeleton.nodes;
-        nodes[nodes[i].parent.map_or(i, |p| p.index())]
-            .position
-            .coords
-            * self.scale()
-    }
 }
 
 /// A file and its bytes.
@@ -267,14 +219,6 @@ fn leaf_picture<'a>(model: &Model<'a>, apart: bool) -> Option<LeafPicture<'a>> {
         tiled: uvs.any(|[u, v]| u.min(*v) < -0.01 || u.max(*v) > 1.01),
         apart,
     })
-}
-
-/// JSON text that is written as it stands; `null` is left out.
-pub(super) fn raw(value: &Value) -> Result<Option<Box<RawValue>>, ExportError> {
-    let text = (!value.is_null()).then(|| value.to_string());
-    text.map(RawValue::from_string)
-        .transpose()
-        .map_err(|e| ExportError::unfit(e.to_string()))
 }
 
 /// One glTF node a skeleton node, in the same order, so that the indices agree.

@@ -1,7 +1,7 @@
 //! The one animation of a glTF file: turns of joints, and the swing of leaves.
 
-use super::gltf::Model;
 use super::gltf_buffer::{BufferBuilder, Layout, accessor, le_f32};
+use super::gltf_model::Model;
 use super::joints::Moving;
 use super::thin_keys::{share, thin};
 use gltf_json::accessor::Type;

@@ -1,8 +1,8 @@
 //! Whether a model can be put into a file that every viewer takes.
 
 use super::ExportError;
-use super::gltf::Model;
-use crate::shape::{FoliageGroup, Mesh};
+use super::gltf_model::Model;
+use crate::geometry::{FoliageGroup, Mesh};
 
 /// Joints of a skin are numbered with two bytes.
 const MOST_NODES: usize = 1 + u16::MAX as usize;

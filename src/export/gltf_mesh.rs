@@ -1,12 +1,12 @@
 //! Skinned meshes of a glTF file: wood and leaves.
 
 use super::ExportError;
-use super::gltf::{Model, raw};
 use super::gltf_buffer::{BufferBuilder, Layout, bounds, le_f32};
 use super::gltf_look::linear;
+use super::gltf_model::{Model, raw};
 use super::skinning::{Skinning, skinning};
+use crate::geometry::{FoliageGroup, Mesh};
 use crate::model::NodeName;
-use crate::shape::{FoliageGroup, Mesh};
 use gltf_json::accessor::{ComponentType, Type};
 use gltf_json::buffer::Target::{ArrayBuffer, ElementArrayBuffer};
 use gltf_json::material::Material;

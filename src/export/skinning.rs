@@ -1,7 +1,7 @@
 //! Joints and weights of a mesh as small whole numbers: a quarter of the room that numbers with a
 //! point take.
 
-use crate::shape::Mesh;
+use crate::geometry::Mesh;
 
 /// The share that is the whole.
 const WHOLE: u16 = u16::MAX;

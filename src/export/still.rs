@@ -3,7 +3,7 @@
 use super::ExportError;
 use super::gltf::NamedBytes;
 use crate::document::push_number;
-use crate::shape::{Dressed, Mesh};
+use crate::geometry::{Dressed, Mesh};
 
 /// What the wood is called.
 const WOOD: &str = "tree";

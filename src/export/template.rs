@@ -1,40 +1,17 @@
 //! A user's own leaf: the meshes of a glTF file as the template that stands at every seed.
 
 use super::template_bytes::Taken;
-use crate::shape::{Template, TemplateFault, TemplateMesh};
+use super::template_error::TemplateError;
+use crate::geometry::{Template, TemplateFault, TemplateMesh};
 use gltf::accessor::{DataType, Dimensions};
 use gltf::mesh::Mode;
 use gltf::{Accessor, Gltf, Semantic};
 use nalgebra::{Matrix4, Point3, Vector3};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// Larger files are refused, and so are larger files that they refer to, bytes.
-pub(super) const LARGEST: u64 = 16 << 20;
 /// Vertices that are read before it is known which of them the triangles use.
 const MOST_VERTICES: usize = 65_536;
 const CUT_OFF: &str = "a mesh is cut off";
-
-/// Why a file is no leaf template; each message is one line that says what to do.
-#[derive(Debug, thiserror::Error)]
-pub enum TemplateError {
-    #[error("cannot read leaf template {}: {source}; check the name", .path.display())]
-    Unreadable {
-        path: PathBuf,
-        source: std::io::Error,
-    },
-    #[error(
-        "leaf template {} is too large: at most {LARGEST} bytes are taken of a file, and three times that in all; make its \
-         texture smaller",
-        .path.display()
-    )]
-    TooLarge { path: PathBuf },
-    #[error("leaf template {} is no glTF 2.0 file that can be used: {what}; export it as GLB with its texture inside", .path.display())]
-    NoGltf { path: PathBuf, what: String },
-    #[error("leaf template {} has no mesh of triangles; export a leaf or a small cluster of leaves", .path.display())]
-    NoMesh { path: PathBuf },
-    #[error("leaf template {} cannot be used: {fault}; export a leaf or a small cluster of leaves", .path.display())]
-    Unfit { path: PathBuf, fault: TemplateFault },
-}
 
 /// Reads a leaf template from a `.glb` or `.gltf`: all triangles of its scene, where they stand,
 /// and the base colour texture of the first mesh that has one. Files beside it are read by plain

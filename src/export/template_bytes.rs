@@ -1,6 +1,6 @@
 //! The bytes of a leaf template: of its file, and of what that refers to.
 
-use super::template::{LARGEST, TemplateError};
+use super::template_error::{LARGEST, TemplateError};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};

@@ -13,7 +13,11 @@ pub enum WriteError {
     #[error("{} cannot be a folder: part of the path is a file or no name; choose another", .path.display())]
     NotAFolder { path: PathBuf },
     /// `bytes` is how much was to be written in all, as far as is known at this point.
-    #[error("the disk is full: {what} needs at least {} of free space; free some, or choose another disk", size(*.bytes))]
+    #[error(
+        "the disk is full: {what} needs at least {} of free space; free some, or choose another \
+         disk",
+        size(*.bytes)
+    )]
     DiskFull { what: String, bytes: u64 },
     #[error(
         "not allowed to write {what}; choose a place of your own, or ask for the right to write there"

@@ -91,14 +91,24 @@ impl OutputFolder {
         Ok(dir)
     }
 
-    /// Adds what is written already, because all of it is what the disk must have room for.
-    pub fn explain(&self, name: &str, bytes: u64, e: io::Error) -> WriteError {
-        let others = fs::read_dir(self.0.at()).into_iter().flatten().flatten();
-        let written: u64 = others
-            .filter(|f| f.file_name() != name)
+    /// Size of its files up to now, without `except`, bytes.
+    fn bytes_without(&self, except: Option<&str>) -> u64 {
+        let files = fs::read_dir(self.0.at()).into_iter().flatten().flatten();
+        files
+            .filter(|f| except.is_none_or(|name| f.file_name() != name))
             .filter_map(|f| f.metadata().ok())
             .map(|m| m.len())
-            .sum();
+            .sum()
+    }
+
+    /// Size of its files up to now, bytes.
+    pub fn bytes(&self) -> u64 {
+        self.bytes_without(None)
+    }
+
+    /// Adds what is written already, because all of it is what the disk must have room for.
+    pub fn explain(&self, name: &str, bytes: u64, e: io::Error) -> WriteError {
+        let written = self.bytes_without(Some(name));
         WriteError::from_io(
             self.0.path().join(name).display().to_string(),
             written + bytes,

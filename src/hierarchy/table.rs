@@ -1,6 +1,6 @@
 //! A window of the track log as a table, as the hierarchy wants it.
 
-use super::COMPARE_HZ;
+use super::accumulate::COMPARE_HZ;
 use crate::model::{LogWindow, TrackId, TrackSet, TrackTable};
 use crate::signal::median;
 use std::collections::BTreeMap;

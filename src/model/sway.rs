@@ -23,7 +23,7 @@ impl Interval {
 /// What made the tree sway.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Excitation {
-    /// Pulled and let go: the sway decays freely.
+    /// Pulled and released: the sway decays freely.
     Release,
     /// Driven all the time by something irregular.
     Wind,

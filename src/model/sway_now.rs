@@ -1,4 +1,4 @@
-//! What is told of the sway while it films.
+//! What is reported of the sway while it films.
 
 use super::{Excitation, NodeName, Swaying};
 use std::collections::BTreeMap;

@@ -25,7 +25,7 @@ pub struct Timing {
     /// Came with a time that was not later than the one before, and were left out.
     pub frames_stale: u64,
     /// What the times are by: `file`, `monotonic` (the system's clock, read by the driver),
-    /// `copied` (from whoever feeds the device), `unknown`, or `received` (the moment of
+    /// `copied` (from the program that feeds the device), `unknown`, or `received` (the moment of
     /// reception).
     pub clock: String,
     /// How often the camera was lost and came back, and for how long it was away, s.

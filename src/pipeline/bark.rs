@@ -1,6 +1,6 @@
 //! The colour of the bark.
 
-use super::Seen;
+use super::seen::Seen;
 use crate::model::{Outline, Rgb, Skeleton};
 
 /// Where no picture has been seen (sRGB).

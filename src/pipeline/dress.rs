@@ -2,26 +2,12 @@
 
 use super::bark;
 use super::leaves::InLeaf;
+use super::seen::Seen;
 use crate::config::Config;
-use crate::model::{Luma, NodeId, Outline, Pose, Rgb, Skeleton};
+use crate::geometry::{Dressed, wood_levels};
+use crate::model::{NodeId, Pose, Skeleton};
 use crate::motion;
-use crate::shape::{Bounds, Dressed, Template, limbs, room, wood_levels};
-
-/// What the film shows of the tree apart from its motion.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Seen<'a> {
-    /// A whole frame in colour, and the tree's pose in it (`None`: the rest pose).
-    pub picture: Option<&'a Rgb>,
-    pub pose: Option<&'a Pose>,
-    pub outline: Option<&'a Outline>,
-    /// The drawn shape, in the picture, that the tree was cut to. It stands in the tree's place at
-    /// rest.
-    pub cut_to: Option<&'a Outline>,
-    /// A leaf of the user's own, and a drawn density of the leaves, which goes before the
-    /// picture's.
-    pub leaf: Option<&'a Template>,
-    pub density: Option<&'a Luma>,
-}
+use crate::shape::{Bounds, limbs, room};
 
 /// How far each group of leaves swings in every pose, see [`flutter`](crate::motion::flutter).
 pub fn flutter(

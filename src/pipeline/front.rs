@@ -1,6 +1,6 @@
 //! The front end: frame to tracks.
 
-use super::Followed;
+use super::back::Followed;
 use crate::config::Config;
 use crate::model::{Frame, Luma, Outline};
 use crate::outline::{AutoOutline, Found};
@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// Frames kept while the outline is not known yet take at most so many bytes; beyond that the
-/// oldest is let go.
+/// oldest is discarded.
 const HELD_BYTES: usize = 80 << 20;
 /// Frames worked off in one step while held ones remain: catches up without a long pause.
 const FRAMES_PER_STEP: usize = 3;

@@ -1,12 +1,13 @@
 //! The leaves of a tree as a picture shows them: whether there are any, their seeds, and where they
 //! stand.
 
-use super::Seen;
 #[cfg(feature = "opencv")]
 use super::seeds::seeds;
+use super::seen::Seen;
 use crate::config::{self, LeafShow};
+use crate::geometry::{self, Foliage, LeafView, Template};
 use crate::model::{Luma, Outline, Rgb, Skeleton};
-use crate::shape::{self, Foliage, LeafView, Limb, Template};
+use crate::shape::Limb;
 
 /// What is to be known of the leaves before they grow.
 pub(super) struct InLeaf {
@@ -65,7 +66,7 @@ impl InLeaf {
     /// them wood, may be.
     pub fn wood(&self, limbs: Vec<Limb>, skeleton: &Skeleton, seen: &Seen) -> Vec<Limb> {
         if self.filmed {
-            shape::within_leaves(limbs, skeleton, &self.view(seen))
+            geometry::within_leaves(limbs, skeleton, &self.view(seen))
         } else {
             limbs
         }
@@ -87,7 +88,7 @@ impl InLeaf {
                 &ours
             }
         };
-        shape::foliage(limbs, skeleton, &self.view(seen), template, settings, seed)
+        geometry::foliage(limbs, skeleton, &self.view(seen), template, settings, seed)
     }
 
     fn view<'a>(&'a self, seen: &Seen<'a>) -> LeafView<'a> {
@@ -129,7 +130,7 @@ fn inside(mut drawn: Luma, outline: &Outline) -> Luma {
 fn in_leaf(skeleton: &Skeleton, picture: Option<&Rgb>, outline: Option<&Outline>) -> bool {
     let season = picture
         .zip(outline)
-        .and_then(|(p, o)| shape::season(p, o, skeleton));
+        .and_then(|(p, o)| geometry::season(p, o, skeleton));
     season.is_some_and(|s| s.in_leaf >= 0.5)
 }
 

@@ -1,7 +1,7 @@
 //! Tracks to poses: the one way from a model and a log to where the tree was.
 
 use crate::config::Config;
-use crate::model::{NodeName, Pose, TrackId, TrackSet};
+use crate::model::{NodeId, NodeName, Pose, TrackId, TrackSet};
 use crate::motion::{self, Binding, PoseEstimator};
 use crate::solve::Model;
 use std::sync::Arc;
@@ -97,10 +97,14 @@ impl PoseReplay {
         (blended, targets_px)
     }
 
-    /// The name of the deepest node that a track belongs to, as known after the last step.
-    pub fn node_of(&self, track: TrackId) -> Option<NodeName> {
+    /// The deepest node that a track belongs to, as known after the last step.
+    pub fn node_of(&self, track: TrackId) -> Option<NodeId> {
         let bindings = [&self.after.binding, &self.before.binding];
-        let node = bindings.iter().find_map(|b| b.node_of(track))?;
-        self.after.model.skeleton.name_of(node)
+        bindings.iter().find_map(|b| b.node_of(track))
+    }
+
+    /// Its name.
+    pub fn node_name_of(&self, track: TrackId) -> Option<NodeName> {
+        self.model().skeleton.name_of(self.node_of(track)?)
     }
 }

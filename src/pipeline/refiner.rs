@@ -220,7 +220,7 @@ impl Refiner {
         })
     }
 
-    /// A job to be worked out, which whoever asks may do meanwhile; else it is done when it is due.
+    /// A job to be worked out, which the caller may do meanwhile; else it is done when it is due.
     pub fn job(&self) -> Option<&Arc<SolveJob>> {
         match &self.stage {
             Stage::Solving(Solving {

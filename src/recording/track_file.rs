@@ -27,8 +27,11 @@ const BUFFER: usize = 1 << 16;
 pub struct TrackFile {
     file: Arc<File>,
     writer: BufWriter<Appender>,
-    buffer: Vec<u8>,
+    /// The record that is being written.
+    record: Vec<u8>,
     sets: u64,
+    /// A record could not be written whole; what came after it could not be read.
+    is_broken: bool,
 }
 
 /// Writes at its own offset, so that readers of the same file do not disturb it.
@@ -89,46 +92,38 @@ impl TrackFile {
         Ok(Self {
             file,
             writer,
-            buffer: Vec::new(),
+            record: Vec::new(),
             sets: 0,
+            is_broken: false,
         })
     }
 
-    /// Appends a set.
+    /// Appends a set. After a failure the file ends with the set before it, and takes no more.
     ///
     /// # Errors
-    /// Whatever the file system says, a full disk among it.
+    /// Whatever the file system says, a full disk among it; `BrokenPipe` after an earlier failure.
     pub fn push(&mut self, set: &TrackSet) -> io::Result<()> {
-        self.buffer.clear();
-        encode(set, &mut self.buffer);
-        let length = self.buffer.len() as u32;
-        self.writer.write_all(&length.to_le_bytes())?;
-        let checksum = crc32fast::hash(&self.buffer);
-        self.writer.write_all(&checksum.to_le_bytes())?;
-        self.writer.write_all(&self.buffer)?;
+        if self.is_broken {
+            let what = "an earlier write has failed";
+            return Err(io::Error::new(io::ErrorKind::BrokenPipe, what));
+        }
+        self.record.clear();
+        encode_record(set, &mut self.record);
+        if let Err(e) = self.writer.write_all(&self.record) {
+            self.is_broken = true;
+            return Err(e);
+        }
         self.sets += 1;
         Ok(())
     }
 
-    /// Size of what has been pushed so far, bytes.
-    pub fn bytes(&self) -> u64 {
-        self.writer.get_ref().at + self.writer.buffer().len() as u64
-    }
-
-    /// Hands all that was pushed to the system: from now on it outlives the program.
+    /// A reader of what has been pushed so far. All that is handed to the system: from now on it
+    /// outlives the program.
     ///
     /// # Errors
     /// Whatever the file system says, a full disk among it.
-    pub fn flush(&mut self) -> io::Result<()> {
-        self.writer.flush()
-    }
-
-    /// A reader of what has been pushed so far.
-    ///
-    /// # Errors
-    /// Whatever the file system says.
     pub fn reader(&mut self) -> io::Result<TrackFileReader> {
-        self.flush()?;
+        self.writer.flush()?;
         Ok(TrackFileReader {
             file: self.file.clone(),
             sets: self.sets,
@@ -174,6 +169,14 @@ impl TrackFileReader {
 
     pub fn is_empty(&self) -> bool {
         self.sets == 0
+    }
+
+    /// Size of the file, bytes.
+    ///
+    /// # Errors
+    /// Whatever the file system says.
+    pub fn bytes(&self) -> io::Result<u64> {
+        Ok(self.file.metadata()?.len())
     }
 
     /// The sets in their order.
@@ -247,6 +250,16 @@ fn read_record(reader: &mut impl Read) -> io::Result<TrackSet> {
 
 fn damaged() -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, "the track log is damaged")
+}
+
+/// Length, checksum, set.
+fn encode_record(set: &TrackSet, out: &mut Vec<u8>) {
+    out.extend([0; RECORD_HEAD]);
+    encode(set, out);
+    let (head, bytes) = out.split_at_mut(RECORD_HEAD);
+    let (length, checksum) = head.split_at_mut(4);
+    length.copy_from_slice(&(bytes.len() as u32).to_le_bytes());
+    checksum.copy_from_slice(&crc32fast::hash(bytes).to_le_bytes());
 }
 
 fn encode(set: &TrackSet, out: &mut Vec<u8>) {
@@ -383,7 +396,7 @@ mod tests {
         let path = dir.path().join("tracks.log");
         let mut log = TrackFile::create(&path).unwrap();
         (0..20).for_each(|f| log.push(&set(f, 30)).unwrap());
-        log.flush().unwrap();
+        log.reader().unwrap();
         let busy = TrackFileReader::open(&path).unwrap_err();
         assert_eq!(busy.kind(), io::ErrorKind::WouldBlock, "{busy}");
         drop(log);

@@ -156,7 +156,11 @@ mod tests {
         assert_eq!(table().within(Some(46)).1, ["eq. 6"]);
         let (text, without) = table().within(Some(20));
         assert_eq!(without, ["eq. 6", "points"]);
-        let narrow = "  branch               frequency\n       1  0.501 (0.498 to 0.504)\n      12    none: too short\n";
+        let narrow = concat!(
+            "  branch               frequency\n",
+            "       1  0.501 (0.498 to 0.504)\n",
+            "      12    none: too short\n",
+        );
         assert_eq!(text, narrow);
     }
 

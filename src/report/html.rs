@@ -73,9 +73,10 @@ fn one(k: usize, study: &Study, several: bool) -> String {
         }
     };
     out += &format!(
-        "<figure class=\"map\">{svg}<figcaption>Branches as they were measured, at rest: <span class=\"key\"><i class=\"k kp\"></i>\
-         with a frequency</span> <span class=\"key\"><i class=\"k ks\"></i>without</span> <span>The dashed line is the region \
-         that was tracked.</span>{unnamed}</figcaption></figure>"
+        "<figure class=\"map\">{svg}<figcaption>Branches as they were measured, at rest: \
+         <span class=\"key\"><i class=\"k kp\"></i>with a frequency</span> \
+         <span class=\"key\"><i class=\"k ks\"></i>without</span> \
+         <span>The dashed line is the region that was tracked.</span>{unnamed}</figcaption></figure>"
     );
     out += &table_part(study);
     out += &levels_part(study);
@@ -142,17 +143,21 @@ fn significant(x: f64) -> String {
 }
 
 const HOW_TO_READ: &str = "<section><h2>How to read this</h2>\
-<p><b>Frequency</b> is the undamped natural frequency of a branch against the one that carries it, <b>damping ratio</b> its share \
-of critical damping. Both are fitted to all points on the branch in all frames at their real times. The <b>interval</b> in \
-brackets is meant to hold the true value in 95 of 100 cases.</p>\
-<p><b>Sway</b> is the amplitude of the branch's own oscillation in its angle to the parent branch. After a release it is that of the \
-dashed curve at the moment of release. The points on the branch are a second witness: how far they turn about the place where it \
-begins. On short branches of few points that is mostly the move of that place. Where the two are more than 1.5 times apart, the \
-film does not show how far the branch sways, and there is a dash. In wind, and without poses, it comes from the points alone: in \
-wind the square root of 2 times the root mean square. <b>End</b> is what it makes at the branch's end, in the picture.</p>\
-<p><b>Peak</b> and <b>half-power damping</b> (Hu et al., equation 6) are what the largest peak of the angle's spectrum says. They are \
-for reference. A short film's peak is as wide as one over its length, so that this damping is too high, and the largest peak may \
-be that of a parent branch or of the whole tree. Of a long film in wind, the spectrum is a mean over pieces of 20 s.</p>\
-<p>In the plots of the angle the mean is taken off; the grey part before a release is not used. The dashed curve is the part of \
-the angle that has the branch's own frequency and damping; what is beyond it is the sway of others and noise. The angle in \
-space rests on an estimated depth.</p></section>";
+<p><b>Frequency</b> is the undamped natural frequency of a branch against the one that carries it, \
+<b>damping ratio</b> its share of critical damping. Both are fitted to all points on the branch in all \
+frames at their real times. The <b>interval</b> in brackets is meant to hold the true value in 95 of 100 \
+cases.</p>\
+<p><b>Sway</b> is the amplitude of the branch's own oscillation in its angle to the parent branch. After a \
+release it is that of the dashed curve at the moment of release. The points on the branch are a second \
+witness: how far they turn about the place where it begins. On short branches of few points that is mostly \
+the move of that place. Where the two are more than 1.5 times apart, the film does not show how far the \
+branch sways, and there is a dash. In wind, and without poses, it comes from the points alone: in wind the \
+square root of 2 times the root mean square. <b>End</b> is what it makes at the branch's end, in the \
+picture.</p>\
+<p><b>Peak</b> and <b>half-power damping</b> (Hu et al., equation 6) are what the largest peak of the \
+angle's spectrum says. They are for reference. A short film's peak is as wide as one over its length, so \
+that this damping is too high, and the largest peak may be that of a parent branch or of the whole tree. Of \
+a long film in wind, the spectrum is a mean over pieces of 20 s.</p>\
+<p>In the plots of the angle the mean is taken off; the grey part before a release is not used. The dashed \
+curve is the part of the angle that has the branch's own frequency and damping; what is beyond it is the \
+sway of others and noise. The angle in space rests on an estimated depth.</p></section>";

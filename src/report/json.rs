@@ -17,6 +17,10 @@ pub fn json(studies: &[Study], comparison: Option<&Comparison>) -> Value {
     })
 }
 
+fn gap([after_s, length_s]: &[f64; 2]) -> Value {
+    json!({ "after_s": after_s, "length_s": length_s })
+}
+
 fn capture(study: &Study) -> Value {
     let onset = study.onset;
     json!({
@@ -26,7 +30,7 @@ fn capture(study: &Study) -> Value {
         "to_s": study.span_s[1],
         "frames": study.frames,
         "rate_hz": study.rate_hz(),
-        "gaps": study.gaps_s.iter().map(|[after, long]| json!({ "after_s": after, "length_s": long })).collect::<Vec<_>>(),
+        "gaps": study.gaps_s.iter().map(gap).collect::<Vec<Value>>(),
         "excitation": onset.map(|o| o.excitation.word()),
         "excitation_given": study.given.is_some(),
         "from_rest": onset.map(|o| o.start == Start::Rest),

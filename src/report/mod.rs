@@ -15,6 +15,7 @@ mod plot;
 mod released;
 mod study;
 mod text;
+mod values;
 mod words;
 
 pub use compare::{Change, Comparison, Row, compare};

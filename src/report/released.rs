@@ -19,7 +19,8 @@ pub fn hints(
     if releases_s.len() > 1 {
         let times: Vec<String> = releases_s.iter().map(|t| format!("{t:.1}")).collect();
         return vec![format!(
-            "the tree was let go {} times, at {} s; the answers are of the one at {:.1} s, and --from and --to choose another",
+            "the tree was let go {} times, at {} s; the answers are of the one at {:.1} s, and \
+             --from and --to choose another",
             times.len(),
             times.join(", "),
             onset.at_s
@@ -27,8 +28,8 @@ pub fn hints(
     }
     if onset.excitation == Excitation::Wind && !given && fades_as_a_free_decay(film) {
         return vec![
-            "the motion dies down from begin to end: if the tree was let go before, say --excitation release, or begin with the \
-             release itself (--from and --to)"
+            "the motion dies down from begin to end: if the tree was let go before, say \
+             --excitation release, or begin with the release itself (--from and --to)"
                 .into(),
         ];
     }

@@ -3,11 +3,11 @@
 mod compared;
 
 use super::columns::{Table, wrapped};
-use super::compare::{Change, Comparison};
+use super::compare::Comparison;
 use super::levels::{Growth, Level, Spread, growth, levels};
 use super::study::{Branch, Study};
+use super::values::{interval, number, percent, spread};
 use super::words;
-use crate::model::Interval;
 pub use compared::{heading, lost, unmatched};
 
 /// Everything as text, a table a capture, and what compares them; for a terminal of `columns`, if
@@ -50,7 +50,8 @@ fn one(study: &Study, columns: Option<usize>) -> String {
     let (table, without) = table.within(columns);
     let mut notes = String::new();
     if !without.iter().any(|head| head == "eq. 6") {
-        notes += "  peak and eq. 6: the largest peak of the angle's spectrum and its half-power damping, for reference\n";
+        notes += "  peak and eq. 6: the largest peak of the angle's spectrum and its half-power \
+                  damping, for reference\n";
     }
     if branches
         .iter()
@@ -174,67 +175,4 @@ pub fn trend(what: &str, growth: &Growth) -> String {
         percent(&growth.percent),
         growth.branches
     )
-}
-
-/// `+1.2 % (0.4 to 2.0 %)`, with a star where it counts.
-pub fn changed(change: &Change) -> String {
-    format!(
-        "{}{}",
-        percent(&change.percent),
-        if change.beyond { " *" } else { "" }
-    )
-}
-
-/// `+1.2 % (+0.4 to +2.0 %)`.
-pub fn percent(of: &Interval) -> String {
-    let decimals = if (of.hi - of.lo).abs() < 10.0 { 1 } else { 0 };
-    let [value, lo, hi] = [of.value, of.lo, of.hi].map(|x| signed(x, decimals));
-    format!("{value} % ({lo} to {hi} %)")
-}
-
-/// A number with its sign; none for what rounds to 0.
-fn signed(x: f64, decimals: usize) -> String {
-    let text = format!("{x:+.decimals$}");
-    let mut digits = text.trim_start_matches(['+', '-']).chars();
-    if digits.all(|c| c == '0' || c == '.') {
-        text[1..].into()
-    } else {
-        text
-    }
-}
-
-/// `0.700 (0.699 to 0.702)`: digits enough to tell the ends apart.
-pub fn interval(of: &Interval, decimals: usize) -> String {
-    let decimals = if (of.hi - of.lo) < 4.0 * 10.0_f64.powi(-(decimals as i32)) {
-        decimals + 1
-    } else {
-        decimals
-    };
-    format!(
-        "{:.decimals$} ({:.decimals$} to {:.decimals$})",
-        of.value, of.lo, of.hi
-    )
-}
-
-/// `1.23 (0.70 to 2.10)`; the value alone where there is just one.
-pub fn spread(of: &Spread, decimals: usize) -> String {
-    let Spread {
-        n,
-        median,
-        least,
-        largest,
-    } = of;
-    if *n < 2 {
-        return format!("{median:.decimals$}");
-    }
-    format!("{median:.decimals$} ({least:.decimals$} to {largest:.decimals$})")
-}
-
-/// A number for people; `-` for none.
-pub fn number(x: f64, decimals: usize) -> String {
-    if x.is_finite() {
-        format!("{x:.decimals$}")
-    } else {
-        "-".into()
-    }
 }

@@ -95,15 +95,16 @@ pub fn why(reason: Unidentified) -> &'static str {
             "Hardly more motion than the noise of the points: pull harder, wait for more wind, or film from nearer."
         }
         Unidentified::AncestorsSway => {
-            "The points move with the parent branch, and no motion beyond that was found. The branch has a frequency of its \
-             own, which this film does not show; pulling at the branch itself may."
+            "The points move with the parent branch, and no motion beyond that was found. The \
+             branch has a frequency of its own, which this film does not show; pulling at the \
+             branch itself may."
         }
         Unidentified::AboveSampling => {
             "At this rate of frames a faster sway would look the same: film with more frames a second."
         }
         Unidentified::NoOscillation => {
-            "There is motion, but the points do not share one oscillation: they may lie on several branches, or be few and \
-             noisy."
+            "There is motion, but the points do not share one oscillation: they may lie on several \
+             branches, or be few and noisy."
         }
         Unidentified::TooUncertain => {
             "There is an oscillation, but the film allows frequencies too far apart: film for longer."

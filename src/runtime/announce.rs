@@ -59,8 +59,8 @@ pub fn little_motion(tree: &Model, threshold: f64) -> Option<String> {
     let measure = tree.evidence.measure;
     (tree.forced && measure < threshold).then(|| {
         format!(
-            "the tree was built from little motion (accumulation {measure:.2} of {threshold}); branches may be wrong: film \
-             longer, or in more wind"
+            "the tree was built from little motion (accumulation {measure:.2} of {threshold}); \
+             branches may be wrong: film longer, or in more wind"
         )
     })
 }

@@ -122,6 +122,11 @@ impl CaptureTables {
         Ok(())
     }
 
+    /// Size of both files up to now, bytes.
+    pub fn bytes(&self) -> u64 {
+        self.folder.bytes()
+    }
+
     /// Ends both tables, the last rows of which are those that [`catch_up`](Self::catch_up) has
     /// written.
     ///
@@ -149,7 +154,7 @@ impl CaptureTables {
 
     /// The points of a frame in which it is decided which are kept.
     fn rows(&mut self, set: &TrackSet) -> Result<(), Failure> {
-        Ok(self.tracks.set(set, |id| self.replay.node_of(id))?)
+        Ok(self.tracks.set(set, |id| self.replay.node_name_of(id))?)
     }
 
     fn pose(&mut self, set: &TrackSet) -> Result<(), Failure> {

@@ -15,14 +15,13 @@ use crate::document::{
 use crate::dynamics::{Depth, Film, analyse};
 use crate::files::OutputFolder;
 use crate::model::{
-    NodeId, NodeName, Outline, Picture, Pose, Skeleton, Swaying, Tentative, Timing, TrackLog,
-    TrackSet, Unidentified,
+    Outline, Picture, Pose, Skeleton, Swaying, Tentative, Timing, TrackLog, TrackSet, Unidentified,
 };
 use crate::recording::TrackFileReader;
 use crate::solve::Model;
 use crate::source::SourceInfo;
 use crate::views::{DocumentWriter, Draft};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -157,13 +156,8 @@ fn film(job: &CaptureJob, done: &Done) -> Film {
     let mut log = job.log.clone();
     log.close();
     let skeleton = &done.replay.model().skeleton;
-    let mut by_name: BTreeMap<NodeName, NodeId> = BTreeMap::new();
-    for (i, node) in skeleton.nodes.iter().enumerate() {
-        by_name.insert(node.name, NodeId(i as u32));
-    }
-    Film::from_log(log.last(job.config.dynamics.window_s), skeleton, |id| {
-        by_name.get(&done.replay.node_of(id)?).copied()
-    })
+    let window = log.last(job.config.dynamics.window_s);
+    Film::from_log(window, skeleton, |id| done.replay.node_of(id))
 }
 
 /// The document but for its sway.
@@ -193,7 +187,8 @@ fn warn_of_unanalysed(job: &CaptureJob, tree: &Model, sway: &[Swaying]) {
     if missing > 0 {
         let of = tree.skeleton.measured() - 1;
         job.shared.warn(format!(
-            "the sway of {missing} of {of} branches was not looked at, as the end was wanted: `arborcam analyze DIR` tells it"
+            "the sway of {missing} of {of} branches was not looked at, as the end was wanted: \
+             `arborcam analyze DIR` tells it"
         ));
     }
 }

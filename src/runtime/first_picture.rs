@@ -8,8 +8,8 @@ use std::sync::Arc;
 /// Decodes one frame in colour and hands it out when that frame is followed.
 ///
 /// Frames are held back while the outline is looked for, and only the first of them is kept in
-/// colour: all would take four times the room. If it is let go, the newest is taken in its place,
-/// and the picture is then not quite the first.
+/// colour: all would take four times the room. If it is discarded, the newest is taken in its
+/// place, and the picture is then not quite the first.
 #[derive(Default)]
 pub struct FirstPicture {
     kept: Option<Picture>,

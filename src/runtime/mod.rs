@@ -13,6 +13,7 @@ mod announce;
 mod capture_tables;
 mod finish;
 mod first_picture;
+mod job;
 mod latest;
 mod losses;
 mod meter;
@@ -37,6 +38,7 @@ mod unfinished;
 mod watched;
 
 pub use finish::Written;
+pub use job::{Job, Summary};
 pub use play::{Played, play};
 pub use pulse::{Marks, Sign, Vigil};
 pub use record::{RecordJob, RunningRecord, record};
@@ -50,56 +52,19 @@ use crate::config::Config;
 use crate::model::{Control, Outline, Snapshot};
 use crate::outline::{Given, Scribbles};
 use crate::pipeline::FrontEnd;
-use crate::solve::Model;
 use crate::source::Source;
 use crossbeam_channel::{Sender, bounded, unbounded};
 use model_thread::ModelThread;
-use shared::Shared;
-use std::io::Write;
-use std::path::PathBuf;
+use shared::{Shared, StopAll};
+use source_thread::FRAME_QUEUE;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
-use std::time::Duration;
 use track_thread::TrackThread;
 use watched::Watched;
 
-/// Frames that may wait for the tracker, and track sets that may wait for the model (two seconds at
-/// 30 a second, more than a build takes).
-const FRAME_QUEUE: usize = 4;
+/// Track sets that may wait for the model: two seconds at 30 a second, more than a build takes.
 const MODEL_QUEUE: usize = 64;
-
-/// What is to be done with a source.
-pub struct Job {
-    pub config: Config,
-    /// `None` finds it by motion.
-    pub outline: Option<Given>,
-    pub pace: Pace,
-    /// Gets a JSON line per pose.
-    pub stream: Option<Box<dyn Write + Send>>,
-    /// Folder of the capture; must not exist.
-    pub out: Option<PathBuf>,
-    /// Recording of the frames and of what is found in them.
-    pub record: Option<RecordTo>,
-    /// Time between two pictures for the screen; [`Duration::MAX`] where there is none.
-    pub preview_every: Duration,
-}
-
-/// What came out.
-#[derive(Clone, Debug)]
-pub struct Summary {
-    pub frames: u64,
-    pub tracks_total: u64,
-    /// Points that moved when evidence was last judged, and the accumulation measure then.
-    pub moving: usize,
-    pub accumulation: f64,
-    /// The one that was written, or where nothing was, the last one.
-    pub tree: Option<Arc<Model>>,
-    pub written: Option<Written>,
-    pub recorded: Option<Recorded>,
-    /// Frames that should have been recorded and were not.
-    pub not_recorded: u64,
-}
 
 /// A capture under way.
 pub struct Running {
@@ -108,16 +73,6 @@ pub struct Running {
     source: Option<JoinHandle<()>>,
     track: Option<JoinHandle<()>>,
     model: Option<JoinHandle<Summary>>,
-}
-
-/// Stops the source when the tracker or the model is done for, be it by a panic: the source holds
-/// both ends of its queue, and would never learn otherwise that nobody takes from it.
-struct StopAll<'a>(&'a Shared);
-
-impl Drop for StopAll<'_> {
-    fn drop(&mut self) {
-        self.0.stop.store(true, Ordering::Relaxed);
-    }
 }
 
 fn spawn<T: Send + 'static>(

@@ -4,10 +4,12 @@
 use super::announce::Announced;
 use super::capture_tables::CaptureTables;
 use super::finish::{self, CaptureJob, Quality, Written};
+use super::job::{Job, Summary};
 use super::pulse::Worker;
 use super::recorder_thread::{Found, Recorded, Recorder};
 use super::refining::Refining;
 use super::shared::{Failure, Shared};
+use super::source_thread::Pace;
 use super::status::{Status, median_error_px, median_fb_error_px};
 use super::stream;
 use super::sway_watch::SwayWatch;
@@ -15,7 +17,6 @@ use super::swaying::Ending;
 use super::table_writer::TableWriter;
 use super::track_thread::ToModel;
 use super::unfinished::Unfinished;
-use super::{Job, Pace, Summary};
 use crate::model::{Phase, Picture, Pose, SwayNow};
 use crate::pipeline::{BackEnd, Followed, Moved};
 use crate::recording::TrackFile;
@@ -351,10 +352,14 @@ impl ModelThread {
         if self.unfinished.as_ref().is_none_or(|u| !u.is_due()) {
             return;
         }
-        let Ok(job) = self.capture_job() else { return };
-        if let (Some(unfinished), Some(file)) = (&mut self.unfinished, &mut self.file)
-            && let Err(e) = unfinished.keep(file, &job)
-        {
+        let kept = self.capture_job().and_then(|job| {
+            let tables_bytes = self.tables.as_ref().map_or(0, TableWriter::bytes);
+            match &mut self.unfinished {
+                Some(unfinished) => unfinished.keep(&job, tables_bytes),
+                None => Ok(()),
+            }
+        });
+        if let Err(e) = kept {
             // What follows would be lost, or could not be written; that ends the capture.
             self.shared.abort(e);
         }
@@ -409,36 +414,9 @@ impl ModelThread {
         }
     }
 
-    /// Writes the capture, from the tables as far as they have come. A disk that is full is tried
-    /// again for a while; what was filmed is kept in any case.
+    /// Writes the capture; if that cannot be done, what was filmed is kept.
     fn write_capture(&mut self, out: &Path) -> Result<Written, Failure> {
-        if let Some(unfinished) = &mut self.unfinished {
-            unfinished.release_space();
-        }
-        let job = self.capture_job()?;
-        let tables = self.tables.take();
-        let mut tables = match (tables, &job.tree) {
-            (Some(tables), Some(model)) if tables.is_of(model) => tables.join(),
-            (outdated, _) => {
-                outdated.into_iter().for_each(TableWriter::discard);
-                None
-            }
-        };
-        let until = Instant::now() + FULL_DISK_FOR;
-        let written = loop {
-            let written = match tables.take() {
-                Some(tables) => finish::complete(&job, tables),
-                None => finish::write(&job, out),
-            };
-            let is_full = matches!(&written, Err(e) if e.is_full_disk());
-            if !is_full || Instant::now() >= until {
-                break written;
-            }
-            self.shared
-                .warn("the disk is full; the capture is written when there is room".into());
-            self.shared.pulse.wrote();
-            std::thread::sleep(FULL_DISK_EVERY);
-        };
+        let written = self.try_to_write(out);
         let Some(unfinished) = self.unfinished.take() else {
             return written;
         };
@@ -455,6 +433,41 @@ impl ModelThread {
         }
     }
 
+    /// Writes the capture. A disk that is full is tried again for a while.
+    fn try_to_write(&mut self, out: &Path) -> Result<Written, Failure> {
+        if let Some(unfinished) = &mut self.unfinished {
+            unfinished.release_space();
+        }
+        let until = Instant::now() + FULL_DISK_FOR;
+        loop {
+            let written = self.write_once(out);
+            let is_full = matches!(&written, Err(e) if e.is_full_disk());
+            if !is_full || Instant::now() >= until {
+                return written;
+            }
+            self.shared
+                .warn("the disk is full; the capture is written when there is room".into());
+            self.shared.pulse.wrote();
+            std::thread::sleep(FULL_DISK_EVERY);
+        }
+    }
+
+    /// Writes the capture, from the tables as far as they have come.
+    fn write_once(&mut self, out: &Path) -> Result<Written, Failure> {
+        let job = self.capture_job()?;
+        let tables = self.tables.take();
+        match (tables, &job.tree) {
+            (Some(tables), Some(model)) if tables.is_of(model) => match tables.join() {
+                Some(tables) => finish::complete(&job, tables),
+                None => finish::write(&job, out),
+            },
+            (outdated, _) => {
+                outdated.into_iter().for_each(TableWriter::discard);
+                finish::write(&job, out)
+            }
+        }
+    }
+
     fn finish(&mut self) -> Summary {
         // The source has gone; with this end of the queue the recorder works off what is left and
         // ends its file. Only then it is known what is missing in it.
@@ -465,20 +478,18 @@ impl ModelThread {
         for export in self.exports.drain(..) {
             let _ = export.join();
         }
-        // Without a single frame there is nothing to keep.
         let seen = self.shared.counts.seen.load(Ordering::Relaxed);
-        let out = self.job.out.clone().filter(|_| seen > 0);
-        let written = out.and_then(|out| match self.write_capture(&out) {
-            Ok(written) => Some(written),
-            Err(e) => {
-                self.shared.fail(e);
+        let written = match self.job.out.clone() {
+            Some(out) if seen > 0 => self
+                .write_capture(&out)
+                .map_err(|e| self.shared.fail_at_end(e))
+                .ok(),
+            // Without a single frame there is nothing to keep.
+            _ => {
+                self.unfinished.take().map(Unfinished::remove);
                 None
             }
-        });
-        self.unfinished
-            .take()
-            .into_iter()
-            .for_each(Unfinished::remove);
+        };
         Summary {
             frames: seen,
             tracks_total: self.quality.tracks_total(),

@@ -46,8 +46,8 @@ impl RateWatch {
         (self.off, self.since_s) = (!self.off, None);
         self.off.then(|| {
             format!(
-                "the camera delivers {measured_hz:.1} frames a second and not {nominal_hz:.1}: long exposure or a crowded bus; \
-                 more light or a fixed exposure helps"
+                "the camera delivers {measured_hz:.1} frames a second and not {nominal_hz:.1}: \
+                 long exposure or a crowded bus; more light or a fixed exposure helps"
             )
         })
     }

@@ -1,10 +1,9 @@
 //! Frames into a file and nothing else: source and recorder, without tracker and model.
 
 use super::recorder_thread::{self, RecordTo, Recorded};
-use super::shared::{Failure, Shared};
-use super::source_thread::{self, Pace};
+use super::shared::{Failure, Shared, StopAll};
+use super::source_thread::{self, FRAME_QUEUE, Pace};
 use super::watched::Watched;
-use super::{FRAME_QUEUE, StopAll};
 use crate::config;
 use crate::source::Source;
 use crossbeam_channel::bounded;

@@ -1,5 +1,6 @@
 //! The recorder's thread. It takes what it is offered out of a bounded queue; who offers never
-//! waits for the disk while a camera films. What does not fit is counted, and the count is told.
+//! waits for the disk while a camera films. What does not fit is counted, and the count
+//! is reported.
 
 use super::pulse::Worker;
 use super::shared::Shared;
@@ -273,7 +274,7 @@ impl Thread {
         }
     }
 
-    /// The first failure ends the recording, and is told; the capture goes on.
+    /// The first failure ends the recording, and is reported; the capture goes on.
     fn note(&mut self, done: Result<(), RecordingError>) {
         if let Err(e) = done
             && !std::mem::replace(&mut self.broken, true)

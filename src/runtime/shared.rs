@@ -101,7 +101,8 @@ pub struct Counts {
 pub struct Shared {
     /// Take no more frames, finish.
     pub stop: Arc<AtomicBool>,
-    /// The user, or whoever speaks for him, wants it over: what is not needed is not waited for.
+    /// The user, or the service manager in his place, wants it over: what is not needed is not
+    /// waited for.
     pub hurry: AtomicBool,
     pub paused: AtomicBool,
     pub ended: AtomicBool,
@@ -210,6 +211,15 @@ impl Shared {
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .get_or_insert(failure);
+    }
+
+    /// The capture could not be written: the user must read where it is. An earlier failure becomes
+    /// a warning beside it.
+    pub fn fail_at_end(&self, failure: Failure) {
+        if let Some(earlier) = self.take_failure() {
+            self.warn(earlier.to_string());
+        }
+        self.fail(failure);
     }
 
     pub fn take_failure(&self) -> Option<Failure> {
@@ -385,6 +395,16 @@ impl Notices {
         // An answer takes the place of all, another line that of others.
         self.0.retain(|(_, is_answer)| *is_answer && !answer);
         self.0.push((line, answer));
+    }
+}
+
+/// Stops the source when the tracker or the model is done for, be it by a panic: the source holds
+/// both ends of its queue, and would never learn otherwise that nobody takes from it.
+pub struct StopAll<'a>(pub &'a Shared);
+
+impl Drop for StopAll<'_> {
+    fn drop(&mut self) {
+        self.0.stop.store(true, Ordering::Relaxed);
     }
 }
 

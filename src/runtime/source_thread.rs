@@ -17,6 +17,9 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
+/// Frames that may wait for the tracker.
+pub const FRAME_QUEUE: usize = 4;
+
 /// A raw frame with its place in this capture.
 pub struct Timed {
     pub raw: Arc<RawFrame>,

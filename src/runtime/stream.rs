@@ -56,7 +56,8 @@ fn told(sway: &SwayNow) -> String {
         .excitation
         .map_or_else(|| "null".to_owned(), |e| format!("\"{}\"", e.word()));
     format!(
-        ",\"sway\":{{\"frame\":{},\"time_s\":{:.6},\"span_s\":{:.3},\"excitation\":{excitation},\"branches\":{branches}}}",
+        ",\"sway\":{{\"frame\":{},\"time_s\":{:.6},\"span_s\":{:.3},\
+         \"excitation\":{excitation},\"branches\":{branches}}}",
         sway.frame, sway.time_s, sway.span_s
     )
 }

@@ -1,4 +1,4 @@
-//! The sway is told anew again and again on a thread of its own, while the film goes on.
+//! The sway is analysed again and again on a thread of its own, while the film goes on.
 //!
 //! A request is made when so much film has passed, and its result takes effect when the next one is
 //! due: at a moment of film, not of the clock. A fast replay waits for it there, so that the same
@@ -187,7 +187,7 @@ impl Swaying {
                 Ok(thread) => self.thread = Some((errands, thread)),
                 Err(e) => {
                     self.shared.warn(format!(
-                        "the sway is told only at the end: a thread cannot be started: {e}"
+                        "the sway is reported only at the end: a thread cannot be started: {e}"
                     ));
                     self.every_s = 0.0;
                 }

@@ -11,6 +11,7 @@ use crate::recording::TrackFileReader;
 use crate::solve::Model;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::JoinHandle;
 
 /// The tables, and the thread that brings them up to date.
@@ -18,6 +19,7 @@ pub struct TableWriter {
     model: Arc<Model>,
     logs: Sender<TrackFileReader>,
     cancel: CancelToken,
+    bytes: Arc<AtomicU64>,
     thread: JoinHandle<Result<CaptureTables, Failure>>,
 }
 
@@ -32,7 +34,9 @@ impl TableWriter {
         let (logs, queue) = bounded(1);
         let cancel = shared.pulse.writing.child();
         let token = cancel.clone();
-        let run = move || write(tables, &queue, &token, &shared);
+        let bytes = Arc::new(AtomicU64::new(0));
+        let written = bytes.clone();
+        let run = move || write(tables, &queue, &token, &written, &shared);
         let thread = std::thread::Builder::new()
             .name("write".into())
             .spawn(run)?;
@@ -40,6 +44,7 @@ impl TableWriter {
             model: model.clone(),
             logs,
             cancel,
+            bytes,
             thread,
         })
     }
@@ -52,6 +57,11 @@ impl TableWriter {
     /// There is more to be written. What comes while the thread is busy is left for the next time.
     pub fn catch_up(&self, log: TrackFileReader) {
         let _ = self.logs.try_send(log);
+    }
+
+    /// Size of the tables on the disk, bytes.
+    pub fn bytes(&self) -> u64 {
+        self.bytes.load(Ordering::Relaxed)
     }
 
     /// The tables as far as they are; `None` if they could not be written.
@@ -71,6 +81,7 @@ fn write(
     mut tables: CaptureTables,
     logs: &Receiver<TrackFileReader>,
     cancel: &CancelToken,
+    written_bytes: &AtomicU64,
     shared: &Shared,
 ) -> Result<CaptureTables, Failure> {
     for log in logs {
@@ -79,6 +90,7 @@ fn write(
             shared.news(format!("the capture cannot be written at present: {e}"));
             return Err(e);
         }
+        written_bytes.store(tables.bytes(), Ordering::Relaxed);
     }
     Ok(tables)
 }

@@ -96,15 +96,16 @@ impl Unfinished {
         self.kept.is_none_or(|at| at.elapsed() >= KEPT_EVERY)
     }
 
-    /// Brings to disk what a crash would lose, and holds back space for what has been filmed.
+    /// Brings to disk what a crash would lose beside the log, and holds back space for those
+    /// results of the film up to now that are not among the `written_bytes` of its tables.
     ///
     /// # Errors
     /// The disk is full, or whatever else the file system says.
-    pub fn keep(&mut self, log: &mut TrackFile, job: &CaptureJob) -> Result<(), Failure> {
+    pub fn keep(&mut self, job: &CaptureJob, written_bytes: u64) -> Result<(), Failure> {
         self.kept = Some(Instant::now());
-        log.flush().map_err(Failure::Log)?;
-        let results = LEAST_RESERVE + RESULTS_PER_LOG * log.bytes();
-        self.reserve.grow_to(results).map_err(Failure::Log)?;
+        let results = RESULTS_PER_LOG * job.tracks.bytes().map_err(Failure::Log)?;
+        let missing = LEAST_RESERVE + results.saturating_sub(written_bytes);
+        self.reserve.grow_to(missing).map_err(Failure::Log)?;
         let note = json(&finish::describe(job, None, None))?;
         self.replace(NOTE_FILE, &note)?;
         if let Some(picture) = job.picture.as_ref().filter(|_| !self.picture_is_kept) {
@@ -139,8 +140,7 @@ impl Unfinished {
 
 /// Completes the capture `out` from what its run has left.
 ///
-/// The tree is built from the log as a replay would build it. `frames` is told the number of each
-/// frame that is worked off.
+/// The tree is built from the log as a replay would build it.
 ///
 /// # Errors
 /// There is nothing to finish, it is still being filmed, it is damaged, or the capture cannot be

@@ -301,7 +301,7 @@ impl Source for Watched {
             match self.wait(self.limit + ANSWERS_AFTER) {
                 Ok(Outcome::Next(next)) => {
                     if next.is_err() {
-                        // The loss is told while the device is closed.
+                        // The loss is reported while the device is closed.
                         self.begin(Call::Close);
                     }
                     return next;
@@ -403,7 +403,7 @@ mod tests {
     use super::*;
     use crate::model::{FormatNote, PixelFormat, Size};
 
-    /// Hangs at its third frame until it is let go, fails at the fifth, and can be opened again.
+    /// Hangs at its third frame until it is released, fails at the fifth, and can be opened again.
     struct Hanging {
         next: u64,
         go_on: Receiver<()>,

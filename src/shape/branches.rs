@@ -7,7 +7,7 @@ use crate::model::{FARTHEST_PX, NodeId, Skeleton};
 use crate::random::generator;
 use nalgebra::Vector3;
 
-/// Straight pieces that the middle line of a branch is told in.
+/// Straight pieces of the middle line of a branch.
 const PIECES: u32 = 12;
 /// Share of its excursions that a trunk keeps: it was filmed all along, and is as straight as it
 /// looks.

@@ -159,7 +159,7 @@ fn across(along: Vector3<f64>, random: &mut Generator) -> Vector3<f64> {
 }
 
 /// Some direction square to `along`, always the same one.
-pub(super) fn square_to(along: Vector3<f64>) -> Vector3<f64> {
+pub(crate) fn square_to(along: Vector3<f64>) -> Vector3<f64> {
     let axis = if along.z.abs() < 0.9 {
         Vector3::z()
     } else {

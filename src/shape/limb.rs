@@ -37,20 +37,20 @@ impl Limb {
     }
 
     /// Radius at share `t` (0 to 1) of its samples, px.
-    pub(super) fn radius_at(&self, t: f64) -> f64 {
+    pub(crate) fn radius_at(&self, t: f64) -> f64 {
         self.between(t)
             .map_or(0.0, |(a, b, s)| a.radius + (b.radius - a.radius) * s)
     }
 
     /// The samples about share `t` (0 to 1), and how far it is from the one to the other.
-    pub(super) fn between(&self, t: f64) -> Option<(&CenterlineSample, &CenterlineSample, f64)> {
+    pub(crate) fn between(&self, t: f64) -> Option<(&CenterlineSample, &CenterlineSample, f64)> {
         let place = t.clamp(0.0, 1.0) * self.samples.len().checked_sub(1)? as f64;
         let k = (place as usize).min(self.samples.len().checked_sub(2)?);
         Some((&self.samples[k], &self.samples[k + 1], place - k as f64))
     }
 
     /// Direction in which it begins, of length 1; up where it has none.
-    pub(super) fn departs(&self) -> Vector3<f64> {
+    pub(crate) fn departs(&self) -> Vector3<f64> {
         match &self.samples[..] {
             [first, second, ..] => (second.at - first.at)
                 .try_normalize(1e-12)
@@ -60,7 +60,7 @@ impl Limb {
     }
 
     /// Direction in which it ends, of length 1; up where it has none.
-    pub(super) fn arrives(&self) -> Vector3<f64> {
+    pub(crate) fn arrives(&self) -> Vector3<f64> {
         match &self.samples[..] {
             [.., before, last] => (last.at - before.at)
                 .try_normalize(1e-12)

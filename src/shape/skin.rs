@@ -30,7 +30,7 @@ impl SkinWeights {
 
     /// Share `t` of the way from `self` to `other`, where they name the same joints or one each;
     /// else the nearer one.
-    pub(super) fn towards(self, other: Self, t: f32) -> Self {
+    pub(crate) fn towards(self, other: Self, t: f32) -> Self {
         if self == other || t <= 0.0 {
             return self;
         }

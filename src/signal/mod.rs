@@ -8,6 +8,7 @@ pub mod interpolation;
 pub mod least_squares;
 pub mod principal;
 pub mod qr;
+pub mod reflection;
 pub mod statistics;
 pub mod variable_projection;
 pub mod vectors;

@@ -1,5 +1,6 @@
 //! What was found out about a tree.
 
+use super::lift::{assign_radii, flat};
 use super::sub_branches::{self, SubBranch};
 use crate::config::Config;
 use crate::hierarchy::Evidence;
@@ -138,14 +139,14 @@ impl Model {
     pub(super) fn set_sub_branches(&mut self, sub_branches: Vec<SubBranch>, config: &Config) {
         self.sub_branches = sub_branches;
         let mut skeleton = sub_branches::with(&self.plain, &self.sub_branches);
-        super::assign_radii(&mut skeleton, &self.outline, config);
+        assign_radii(&mut skeleton, &self.outline, config);
         self.skeleton = Arc::new(skeleton);
     }
 
     /// The skeleton in the picture that it was pushed into space from, with the number of points on
     /// every node.
     pub fn flat(&self, config: &Config) -> (Vec<skeleton::Node2d>, Vec<u32>) {
-        super::flat(&self.hierarchy, &self.outline, config)
+        flat(&self.hierarchy, &self.outline, config)
     }
 
     /// The same with its foot at `foot_px`: that of a capture's first tree stays.

@@ -1,11 +1,13 @@
 //! The tree once more, from what has been seen since: which node is which, and whether the new one
 //! is better.
 
-use super::{Model, Moment, SubBranch, assign_radii, build, sub_branches};
+use super::lift::assign_radii;
+use super::model::{Model, Moment};
+use super::sub_branches::{self, SubBranch};
 use crate::cancel::CancelToken;
 use crate::config::Config;
 use crate::hierarchy::{self, Evidence, Gain, OnBoth};
-use crate::model::{NodeId, NodeName, Outline, Skeleton, TrackId, TrackLog, TrackTable};
+use crate::model::{NodeId, NodeName, Skeleton, TrackId, TrackLog, TrackTable};
 use crate::shape::{Prototype, Twin, go_on, on_foot, twins};
 use crate::signal::median;
 use std::collections::{BTreeMap, BTreeSet};
@@ -20,13 +22,13 @@ const ERRORS: f64 = 2.0;
 
 /// A prior model held against what has been seen since.
 pub(super) struct Refinement<'a> {
-    table: Arc<TrackTable>,
+    pub table: Arc<TrackTable>,
     prior: &'a Model,
     /// Every track that the prior model knows, with its deepest node that is no sub-branch and its
     /// rest place, px.
     bound: BTreeMap<TrackId, (NodeId, [f64; 2])>,
     config: &'a Config,
-    moment: Moment,
+    pub moment: Moment,
 }
 
 impl<'a> Refinement<'a> {
@@ -47,20 +49,18 @@ impl<'a> Refinement<'a> {
         })
     }
 
-    /// The new tree with the prior one's names and place, if it is the better one.
+    /// The `new` tree, built from this evidence, with the prior one's names and place, if it is the
+    /// better one.
     ///
     /// It is taken if the motion seen is enough for a build of its own (else a calm spell would
     /// undo what wind has shown), and if it is not worse than the prior one by more than chance.
     /// Each of them is held against what both were built from: on its own evidence any tree looks
     /// good.
-    pub fn run(&self, cancel: &CancelToken) -> Option<Model> {
-        let evidence = self.evidence()?;
-        let (frame, measure) = (self.moment.frame, evidence.measure);
-        let outline: &Arc<Outline> = &self.prior.outline;
-        let mut model = build(&self.table, evidence, outline, self.config, self.moment)?;
+    pub fn better(&self, mut new: Model, cancel: &CancelToken) -> Option<Model> {
+        let (frame, measure) = (self.moment.frame, new.evidence.measure);
         let (before, since) = (
-            self.gain(&self.prior.table, &model),
-            self.gain(&self.table, &model),
+            self.gain(&self.prior.table, &new),
+            self.gain(&self.table, &new),
         );
         let (gain, error) = (before.gain + since.gain, before.error.hypot(since.error));
         let taken = gain >= -ERRORS * error;
@@ -76,17 +76,17 @@ impl<'a> Refinement<'a> {
         if !taken {
             return self.with_other_sub_branches(cancel);
         }
-        self.adopt(&mut model);
-        let binding = model.binding();
+        self.adopt(&mut new);
+        let binding = new.binding();
         let found = sub_branches::identify(
             &self.table,
-            &model.plain,
+            &new.plain,
             |id| binding.node_of(id),
             &self.config.dynamics,
             cancel,
         );
-        self.put_on(&mut model, found);
-        Some(model)
+        self.put_on(&mut new, found);
+        Some(new)
     }
 
     /// The prior model with the sub-branches that are identified by now, if they are others, and
@@ -97,7 +97,7 @@ impl<'a> Refinement<'a> {
     }
 
     /// The motion seen, if it is enough for a build of its own.
-    fn evidence(&self) -> Option<Evidence> {
+    pub fn evidence(&self) -> Option<Evidence> {
         let evidence = hierarchy::evidence(&self.table, &self.config.accumulate);
         let enough = self
             .config

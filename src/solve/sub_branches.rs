@@ -12,7 +12,7 @@ use crate::model::{Node, NodeId, NodeKind, NodeName, Skeleton, TrackId, TrackTab
 use nalgebra::{Point3, Vector2, Vector3};
 use std::collections::BTreeSet;
 
-/// Points by which it is told how far a branch reaches: one alone may be off it.
+/// Points that decide how far a branch reaches: one alone may be off it.
 const FARTHEST: usize = 3;
 /// A branch is no shorter than this share of the picture's width: it could not be told from its
 /// fork.

@@ -1,8 +1,8 @@
 //! Cameras that are plugged in: which they are, what they can do, and what would be filmed with
 //! them.
 
-use super::SourceError;
 use super::choice::Mode;
+use super::error::SourceError;
 use super::identity::{Identity, Node, Places, link, link_by_path, nodes};
 use super::v4l2::prospect;
 use crate::config;
@@ -73,7 +73,7 @@ fn device(node: Node, config: &config::Camera, places: &Places) -> Device {
                 node.name
             },
             description: port,
-            // Nobody can know; whoever may open it will see.
+            // Only a program that may open it can know.
             films: true,
             modes: Vec::new(),
             chosen: None,

@@ -77,7 +77,7 @@ impl SourceError {
         }
     }
 
-    /// The reason alone, for whoever knows already which camera it is and waits for it.
+    /// The reason alone, for a caller that knows already which camera it is and waits for it.
     pub fn brief(&self) -> String {
         match self {
             SourceError::Timeout { seconds, .. } => format!("no frame for {seconds} s"),

@@ -1,7 +1,8 @@
 //! Which camera is which, whatever number the system gave it today: by sysfs.
 //!
-//! `/dev/videoN` goes to whoever is plugged in first. A USB camera is known by vendor, product and
-//! serial number; one without a serial number, and any other, by the socket that it sits in.
+//! `/dev/videoN` goes to the camera that is plugged in first. A USB camera is known by
+//! vendor, product and serial number; one without a serial number, and any other, by the socket
+//! that it sits in.
 
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,7 @@
 //! A folder of consecutive pictures, in the order of their names.
 
-use super::{Source, SourceError, SourceInfo};
+use super::error::SourceError;
+use super::interface::{Source, SourceInfo};
 use crate::model::{FormatNote, PixelFormat, RawFrame, Size, nanoseconds, seconds};
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};

@@ -3,7 +3,7 @@
 //! its feeder goes. The `v4l` crate's stream takes each buffer back as soon as it has handed it
 //! over, and would overwrite what others still read; so this keeps a ring.
 
-use super::SourceError;
+use super::error::SourceError;
 use crate::model::{PixelFormat, RawFrame, Size};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -52,7 +52,8 @@ impl Loopback {
             .query_caps()
             .map_err(SourceError::refused(path, "asking for its abilities"))?;
         if !caps.capabilities.contains(Caps::VIDEO_OUTPUT) {
-            let what = "it takes no frames; give a device made with `sudo modprobe v4l2loopback` that nothing feeds yet";
+            let what = "it takes no frames; give a device made with `sudo modprobe v4l2loopback` \
+                        that nothing feeds yet";
             return Err(SourceError::bad_format(path, what));
         }
         let fourcc: [u8; 4] = first

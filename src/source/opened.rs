@@ -1,8 +1,9 @@
-//! What is told of a camera that has been opened, whichever way it is read.
+//! What is reported of a camera that has been opened, whichever way it is read.
 
 use super::choice::{Granted, Wish, is_same_rate};
+use super::error::SourceError;
 use super::identity::Known;
-use super::{SourceError, SourceInfo};
+use super::interface::SourceInfo;
 use crate::model::FormatNote;
 use std::path::Path;
 

@@ -1,6 +1,6 @@
 //! What a video file says of itself, by ffprobe.
 
-use super::SourceError;
+use super::error::SourceError;
 use std::ffi::OsString;
 use std::io::Read;
 use std::path::Path;

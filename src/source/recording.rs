@@ -1,7 +1,8 @@
 //! A recording as a source: its own frames, numbers and times.
 
+use super::error::SourceError;
 use super::images::picture;
-use super::{Source, SourceError, SourceInfo};
+use super::interface::{Source, SourceInfo};
 use crate::model::{FormatNote, PixelFormat, RawFrame, Size, seconds};
 use crate::recording::{Encoding, Picture, Reader, RecordingError};
 use std::collections::VecDeque;

@@ -4,10 +4,11 @@
 
 use super::choice::{Granted, Wish};
 use super::clock::ClockKind;
+use super::error::SourceError;
 use super::identity::{Known, Places};
+use super::interface::{Health, Source, SourceInfo, Successor};
 use super::opened::{describe, same_again};
 use super::v4l2::prospect;
-use super::{Health, Source, SourceError, SourceInfo, Successor};
 use crate::caught::caught;
 use crate::config;
 use crate::model::{PixelFormat, RawFrame, Size};

@@ -8,8 +8,9 @@
 //! MJPEG is only taken out of its container, every other codec is decoded to YUYV. Times are those
 //! in the file.
 
+use super::error::SourceError;
+use super::interface::{Source, SourceInfo};
 use super::probe::{Probe, file_url, probe, ratio, spawn_error};
-use super::{Source, SourceError, SourceInfo};
 use crate::ffmpeg::{Ffmpeg, plain};
 use crate::model::{FormatNote, PixelFormat, RawFrame, Size, nanoseconds, seconds};
 use std::collections::VecDeque;

@@ -1,8 +1,9 @@
 //! What the terminal can do, without drawing on it.
 
 use super::graphics::{Graphics, Kind};
+use super::opened::{ASK, Options};
+use super::theme::Depth;
 use super::tty::Tty;
-use super::{ASK, Depth, Options};
 use ratatui::crossterm::terminal;
 use std::io::{IsTerminal, stdout};
 

@@ -31,6 +31,7 @@ mod tty;
 pub use abilities::{Abilities, abilities, columns};
 pub use graphics::Preview;
 pub use moving::{AnimationCommand, Moving, watch};
+pub use opened::{Options, TuiError};
 pub use progress::Progress;
 pub use theme::Depth;
 
@@ -51,10 +52,6 @@ use tty::{Input, Tty};
 
 /// Time between two redraws.
 const TICK: Duration = Duration::from_millis(50);
-/// Time that the terminal has to say what it can show; even a slow network answers within it.
-const ASK: Duration = Duration::from_millis(400);
-/// Time for which a terminal that did not answer is not listened to.
-const DEAF: Duration = Duration::from_millis(1500);
 
 /// The screen's side of a running capture.
 pub trait Session {
@@ -64,45 +61,6 @@ pub trait Session {
     fn send(&mut self, command: Control);
     /// The capture has ended (source over and files written, or failed): the screen is left.
     fn finished(&self) -> bool;
-}
-
-/// What the user may choose about the screen.
-#[derive(Clone, Copy, Debug)]
-pub struct Options {
-    pub preview: Preview,
-    pub depth: Depth,
-}
-
-impl Options {
-    /// `ARBORCAM_PREVIEW` is `halfblocks`, `kitty`, `sixel`, `iterm2` or anything else for
-    /// automatic; colours follow
-    /// `NO_COLOR`, `COLORTERM` and `TERM`.
-    pub fn from_env() -> Self {
-        let preview = match std::env::var("ARBORCAM_PREVIEW")
-            .unwrap_or_default()
-            .to_lowercase()
-            .as_str()
-        {
-            "halfblocks" => Preview::HalfBlocks,
-            "kitty" => Preview::Kitty,
-            "sixel" => Preview::Sixel,
-            "iterm2" => Preview::Iterm2,
-            _ => Preview::Auto,
-        };
-        Self {
-            preview,
-            depth: Depth::from_env(),
-        }
-    }
-}
-
-/// Why there is no screen.
-#[derive(Debug, thiserror::Error)]
-pub enum TuiError {
-    #[error("there is no terminal to draw on; use --headless")]
-    NoTerminal(#[source] Option<std::io::Error>),
-    #[error("cannot prepare the terminal: {0}; use --headless")]
-    Unusable(#[source] std::io::Error),
 }
 
 /// Shows the capture until it has ended, `stop` is set, the terminal has gone or some thread has

@@ -2,8 +2,8 @@
 
 use super::theme::Theme;
 use crate::draw;
+use crate::geometry::{Mesh, bare_wood};
 use crate::model::{Size, Skeleton, Snapshot};
-use crate::shape::{Mesh, bare_wood};
 use std::sync::Arc;
 
 /// A cell has eight dots; more triangles than these would not be seen.

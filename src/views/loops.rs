@@ -1,9 +1,9 @@
 //! The swing of leaves on a tree whose motion is a loop.
 
 use crate::config::Config;
+use crate::geometry::Dressed;
 use crate::model::{Pose, Skeleton};
 use crate::pipeline::flutter;
-use crate::shape::Dressed;
 
 /// How far each group of leaves swings in every pose of a loop, the last of which is the first
 /// again: the leaves come round too.

@@ -1,6 +1,6 @@
-//! What is made of a document: its tree as it is wanted, ready for files and pictures. Whoever
-//! writes a view of a tree, be it at the end of a film or later, does it through
-//! [`PreparedTree`]; so a view says the same whenever it is made.
+//! What is made of a document: its tree as it is wanted, ready for files and pictures. Every
+//! view of a tree, be it at the end of a film or later, is written through [`PreparedTree`]; so a
+//! view says the same whenever it is made.
 
 mod error;
 mod loops;

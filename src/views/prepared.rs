@@ -8,9 +8,10 @@ use crate::document::{Document, DocumentError, Reposer};
 use crate::export::gltf::{KEY_TOLERANCE_PX, Model, glb, provenance};
 use crate::export::sway::extras;
 use crate::export::{ExportError, html};
+use crate::geometry::{Dressed, Template};
 use crate::model::{Luma, Outline, Pose, Skeleton, Swaying, Unidentified};
 use crate::pipeline::{MOST_RESHAPED, Seen, cut_to, dress, flutter, reshape};
-use crate::shape::{Cut, Drawn, Dressed, Template, Topiary};
+use crate::shape::{Cut, Drawn, Topiary};
 use serde_json::Value;
 use std::sync::Arc;
 

@@ -6,6 +6,7 @@ use crate::draw::{Bounds, Camera, Look, Model, Posed, Rgba, Texture, View, pictu
 use crate::export::{ExportError, Film};
 use crate::files::WriteError;
 use crate::model::{Pose, Size};
+use crate::signal::reflection::there_and_back;
 use std::f64::consts::TAU;
 use std::io::Cursor;
 use std::path::Path;
@@ -302,17 +303,4 @@ fn nearest(poses: &[Pose], time_s: f64) -> Option<usize> {
         let [a, b] = [a, b].map(|k| (poses[*k].time_s - time_s).abs());
         a.total_cmp(&b)
     })
-}
-
-/// Position after `way` on a walk to and fro over a stretch of `length`.
-fn there_and_back(way: f64, length: f64) -> f64 {
-    if length <= 0.0 {
-        return 0.0;
-    }
-    let along = way.rem_euclid(2.0 * length);
-    if along > length {
-        2.0 * length - along
-    } else {
-        along
-    }
 }

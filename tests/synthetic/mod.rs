@@ -4,8 +4,9 @@
 #![allow(dead_code)]
 
 use arborcam::config::Wood;
+use arborcam::geometry::{Foliage, FoliageGroup, Mesh, wood};
 use arborcam::model::{JointPose, Node, NodeId, NodeName, Pose, Size, Skeleton};
-use arborcam::shape::{Foliage, FoliageGroup, Limb, Mesh, limbs, thicken, wood};
+use arborcam::shape::{Limb, limbs, thicken};
 use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
 
 /// A number in -1..1 that is always the same for the same arguments.

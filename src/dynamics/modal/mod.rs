@@ -16,12 +16,11 @@ mod search;
 mod shoots;
 mod tree;
 
-use super::branches::{BranchMode, SearchLimits};
+use super::branches::{BELOW_NYQUIST, BranchMode, SearchLimits};
 use super::decay::{Mode, USUAL_DAMPING};
 use super::film::Film;
 use super::free_decay::MIN_PERIODS;
 use super::release::Onset;
-use super::sway::BELOW_NYQUIST;
 use crate::cancel::CancelToken;
 use crate::model::{Excitation, NodeId, Skeleton, Sway, Swaying, Unidentified};
 use points::ThinnedFilm;

@@ -4,7 +4,7 @@ use super::figure;
 use super::table::anchor;
 use crate::report::plot::{Answer, Curve, angle, escaped, spectra, way};
 use crate::report::study::{Branch, Study};
-use crate::report::text::{interval, number};
+use crate::report::values::{interval, number};
 
 /// Frequencies are drawn up to so many times the highest that was found, and at least to this, Hz.
 const BEYOND: f64 = 1.6;
@@ -67,19 +67,19 @@ fn at_its_end(study: &Study, branch: &Branch) -> String {
 fn plots(study: &Study, branch: &Branch) -> String {
     let in_time = "Angle to its parent branch: <span class=\"key\"><i class=\"k kp\"></i>in the picture</span> \
                    <span class=\"key\"><i class=\"k ks\"></i>in space</span>";
-    let fitted = branch.fitted_deg.as_ref().map_or(
-        "",
-        |_| " <span class=\"key\"><i class=\"k kf\"></i>the part of the first that has its own frequency and damping</span>",
-    );
+    let fitted = branch.fitted_deg.as_ref().map_or("", |_| {
+        " <span class=\"key\"><i class=\"k kf\"></i>the part of the first that has its own \
+         frequency and damping</span>"
+    });
     let drawn = spectrum(study, branch);
-    let answer = branch.known().map_or(
-        "",
-        |_| " <span class=\"key\"><i class=\"k kb\"></i>the branch's frequency (line) with its interval (shaded)</span>",
-    );
+    let answer = branch.known().map_or("", |_| {
+        " <span class=\"key\"><i class=\"k kb\"></i>the branch's frequency (line) with its \
+         interval (shaded)</span>"
+    });
     let peak = branch.reference.map_or(String::new(), |r| {
         format!(
-            " <span class=\"key\"><i class=\"k kw\"></i>for reference: width at half the power of the largest peak, at {:.2} Hz; damping \
-             by it {:.3} (eq. 6)</span>",
+            " <span class=\"key\"><i class=\"k kw\"></i>for reference: width at half the power of \
+             the largest peak, at {:.2} Hz; damping by it {:.3} (eq. 6)</span>",
             r.peak_hz, r.damping_ratio
         )
     });
@@ -92,8 +92,9 @@ fn plots(study: &Study, branch: &Branch) -> String {
         ),
         figure(
             way(study, branch),
-            "Way of its end in the picture, from its place at rest: <span class=\"key\"><i class=\"k kp\"></i>the first 80 \
-             frames</span> <span class=\"key\"><i class=\"k ks\"></i>all</span>"
+            "Way of its end in the picture, from its place at rest: \
+             <span class=\"key\"><i class=\"k kp\"></i>the first 80 frames</span> \
+             <span class=\"key\"><i class=\"k ks\"></i>all</span>"
         ),
     )
 }

@@ -6,7 +6,8 @@ use super::{ValueOf, cells, damping_of, figure, frequency_of, keys, stacked};
 use crate::report::compare::{Change, Comparison, Row};
 use crate::report::plot::{Answer, Curve, Mark, Slot, across, escaped, spectra};
 use crate::report::study::{Branch, Study};
-use crate::report::text::{changed, heading, interval, lost, unmatched};
+use crate::report::text::{heading, lost, unmatched};
+use crate::report::values::{changed, interval};
 
 /// Branches of a tree whose spectra are drawn together, as in figure 10.
 const TOGETHER: usize = 4;
@@ -44,8 +45,9 @@ pub fn compared_part(studies: &[Study], comparison: &Comparison) -> String {
     };
     if !drawn.is_empty() {
         out += &format!(
-            "<h3>Spectra: {what}</h3><p class=\"soft\">Of the angle to the parent branch, in the picture; upright lines are the \
-                         frequencies that were identified.</p><div class=\"plots\">{drawn}</div>"
+            "<h3>Spectra: {what}</h3><p class=\"soft\">Of the angle to the parent branch, in the \
+             picture; upright lines are the frequencies that were identified.</p>\
+             <div class=\"plots\">{drawn}</div>"
         );
     }
     out + "</section>"
@@ -138,8 +140,9 @@ fn table(studies: &[Study], comparison: &Comparison) -> String {
         )
     };
     format!(
-        "<div class=\"wide\"><table><tr>{}</tr>{rows}</table></div><p class=\"soft\">With a star: beyond what both 95 % intervals \
-         allow. Of twenty branches that do not differ, chance marks one.</p>{untold}",
+        "<div class=\"wide\"><table><tr>{}</tr>{rows}</table></div>\
+         <p class=\"soft\">With a star: beyond what both 95 % intervals allow. Of twenty branches \
+         that do not differ, chance marks one.</p>{untold}",
         cells("th", "n", &head[..2])
             + &cells("th", "n less", &head[2..3])
             + &cells("th", "n", &head[3..])

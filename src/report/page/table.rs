@@ -3,7 +3,7 @@
 use super::{cells, stacked};
 use crate::model::Unidentified;
 use crate::report::study::{Branch, Study};
-use crate::report::text::{interval, number};
+use crate::report::values::{interval, number};
 use crate::report::words;
 
 /// Every branch in a row.
@@ -115,13 +115,14 @@ pub fn not_said(study: &Study) -> String {
     {
         items += "<li>Where damping is unknown, the film shows the frequency but not how the sway dies down.</li>";
     }
-    items += "<li>A frequency is that of the tree as it was on that day, with its leaves and the water on them, and for sways of \
-              this size; it says nothing of a storm.</li>";
-    items += "<li>A branch here is what was seen to move as one. Twigs that move with it count to it, and what is hidden behind \
-              others is not in the table.</li>";
+    items += "<li>A frequency is that of the tree as it was on that day, with its leaves and the \
+              water on them, and for sways of this size; it says nothing of a storm.</li>";
+    items += "<li>A branch here is what was seen to move as one. Twigs that move with it count to \
+              it, and what is hidden behind others is not in the table.</li>";
     if study.metres_per_px > 0.0 {
-        items += "<li>Metres hold at the depth of the known length; what hangs nearer to the camera or farther away is as much \
-                  too large or too small. Sway towards the camera is not in the amplitude.</li>";
+        items += "<li>Metres hold at the depth of the known length; what hangs nearer to the \
+                  camera or farther away is as much too large or too small. Sway towards the \
+                  camera is not in the amplitude.</li>";
     }
     format!("<h3>What this does not say</h3><ul>{items}</ul>")
 }

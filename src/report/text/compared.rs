@@ -1,11 +1,11 @@
 //! Several captures beside each other, as text.
 
-use super::{changed, interval};
 use crate::model::Sway;
 use crate::report::columns::{Table, wrapped};
 use crate::report::compare::{Change, Comparison, Row};
 use crate::report::matching::Match;
 use crate::report::study::Study;
+use crate::report::values::{changed, interval};
 
 /// What the captures have in common and where they differ; on a narrow terminal frequency and
 /// damping under each other.
@@ -100,8 +100,8 @@ pub fn heading(studies: &[Study], comparison: &Comparison) -> String {
         Some(false) => "several trees, by their trunks",
         None => {
             return format!(
-                "Not compared with {}: these may be films of one tree or of several ({found}); say which with --trees same or \
-                 --trees different",
+                "Not compared with {}: these may be films of one tree or of several ({found}); say \
+                 which with --trees same or --trees different",
                 studies[0].name
             );
         }

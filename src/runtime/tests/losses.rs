@@ -227,7 +227,12 @@ proptest! {
 
     /// Whatever comes, nothing panics, the index only grows, and no count goes back.
     #[test]
-    fn nothing_that_a_driver_says_upsets_the_counts(frames in prop::collection::vec((any::<Option<u64>>(), 0.0..1e6f64, 0..5u64, 0..30u8), 1..200)) {
+    fn nothing_that_a_driver_says_upsets_the_counts(
+        frames in prop::collection::vec(
+            (any::<Option<u64>>(), 0.0..1e6f64, 0..5u64, 0..30u8),
+            1..200,
+        )
+    ) {
         let mut losses = Losses::new(true, Some(30.0));
         let (mut time_s, mut last, mut before) = (0.0, None, Totals::default());
         for (number, step_s, broken, what) in frames {
@@ -239,7 +244,9 @@ proptest! {
             prop_assert!(Some(arrival.index) > last);
             last = Some(arrival.index);
             let now = losses.totals();
-            prop_assert!(now.by_sequence >= before.by_sequence && now.by_time >= before.by_time && now.reconciled >= before.reconciled);
+            prop_assert!(now.by_sequence >= before.by_sequence);
+            prop_assert!(now.by_time >= before.by_time);
+            prop_assert!(now.reconciled >= before.reconciled);
             before = now;
         }
     }

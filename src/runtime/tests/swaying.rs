@@ -130,7 +130,8 @@ fn a_camera_waits_for_no_answer_and_what_is_passed_over_is_counted() {
             break told;
         }
     };
-    // It is told at a moment at which one is due, and is from the frame in which it was asked for.
+    // It is reported at a moment at which one is due, and is from the frame in which it was
+    // asked for.
     assert_eq!((told.len(), told[0].0 % 30, told[0].1), (1, 0, 0));
     over(swaying);
 }
@@ -179,7 +180,7 @@ fn a_panic_is_not_waited_for() {
         std::thread::sleep(Duration::from_millis(2));
     }
     assert!(Ending(thread).panicked());
-    // Whoever watches over the capture must not take it for one that hangs, and end it.
+    // A supervisor of the capture must not take it for one that hangs, and end it.
     let mut vigil = Vigil::default();
     let looks = [1, 2].map(|frames| vigil.look(shared.pulse.marks(frames, false)));
     assert_eq!(looks[1], Sign::Flows);

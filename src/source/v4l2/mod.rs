@@ -6,9 +6,10 @@ mod session;
 
 use super::choice::{Granted, Mode, Wish, choose};
 use super::clock::Clock;
+use super::error::SourceError;
 use super::identity::{Known, Places};
+use super::interface::{Health, Source, SourceInfo, Successor};
 use super::opened::{describe, same_again};
-use super::{Health, Source, SourceError, SourceInfo, Successor};
 use crate::config;
 use crate::model::{PixelFormat, RawFrame, Size};
 use offers::{Negotiated, negotiate};
@@ -193,7 +194,7 @@ impl Camera {
     fn accept(&self, used: &[u8], meta: &Metadata) -> Option<RawFrame> {
         let Granted { format, size, .. } = self.agreed.granted;
         // A damaged frame's number is not taken in: it shows up as a hole in the count, as frames
-        // that were lost do, and is told from them by the count of damaged ones.
+        // that were lost do, and differs from them by the count of damaged ones.
         let bytes = if meta.flags.contains(Flags::ERROR) {
             None
         } else {
@@ -390,8 +391,8 @@ fn refusal(asked: &Wish, granted: &Granted, modes: &[Mode]) -> String {
         format!(" (it lists {})", listed.join(", "))
     };
     format!(
-        "asked for {asked}, it offers {granted}{more}; take that with --accept-format, or set camera.format, width, height and \
-         rate_hz to what `arborcam devices` lists"
+        "asked for {asked}, it offers {granted}{more}; take that with --accept-format, or set \
+         camera.format, width, height and rate_hz to what `arborcam devices` lists"
     )
 }
 

@@ -76,7 +76,7 @@ fn told(s: &Snapshot, answer: Option<&BranchSway>, width: u16, theme: Theme) -> 
     let sway = match answer.map(|a| a.swaying) {
         None if s.sway_at_end => {
             return words(
-                "how it sways is told at the end (dynamics.every_s is 0)",
+                "how it sways is found at the end (dynamics.every_s is 0)",
                 width,
             );
         }

@@ -124,8 +124,8 @@ fn drawing_stays_until_it_is_good_or_left() {
         key(KeyCode::Esc),
         key(KeyCode::Backspace),
     );
-    // Points left in the drawing (none: not drawing any more), outlines sent, and what the user is
-    // told last.
+    // Points left in the drawing (none: not drawing any more), outlines sent, and what the user
+    // reads last.
     for (events, points, sent, told) in [
         (vec![enter.clone()], Some(0), 0, "at least 3 points"),
         (

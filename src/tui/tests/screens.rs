@@ -223,7 +223,7 @@ fn every_column_of_the_table_of_branches_has_its_head() {
     }
 }
 
-/// Every reason why a branch has no frequency is told in words, and no number stands in its place.
+/// Every reason why a branch has no frequency is given in words, and no number stands in its place.
 #[test]
 fn an_unknown_sway_is_told_by_its_reason() {
     // While it films nothing has come to its end.

@@ -43,13 +43,20 @@ sleep 3
 
 # Hung: only the watchdog can tell.
 main=$(property MainPID)
+cut=$(ls -d /var/lib/arborcam/video0/*.unfinished | tail -n 1)
 now >/vm/stopped
 kill -STOP "$main"
 until_ok 40 is_another "$main"
 now >/vm/restarted
 note restarts "$(property NRestarts)"
-sleep 4
+main=$(property MainPID)
+until_ok 60 test ! -e "$cut"
+note completing "$(property MainPID) $main"
+cp -r "${cut%.unfinished}" /vm/completed
 
+systemctl restart "$unit" --no-block
+until_ok 60 is_another "$main"
+sleep 4
 main=$(property MainPID)
 now >/vm/asked
 kill -TERM "$main"
@@ -58,7 +65,8 @@ now >/vm/ended
 systemctl stop "$unit"
 note stopping "$(property Result) $(property ExecMainStatus)"
 ls -t /var/lib/arborcam/video0 >/vm/folders
-newest=$(ls -dt /var/lib/arborcam/video0/*Z | head -1)
+# By name: an older one may have been completed since.
+newest=$(ls -d /var/lib/arborcam/video0/*Z | tail -n 1)
 cp -r "$newest" /vm/capture
 
 systemctl start "$unit" --no-block

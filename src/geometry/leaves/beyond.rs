@@ -4,7 +4,7 @@ use super::carry::Carried;
 use super::target::Target;
 use super::view::{LeafView, tree_height};
 use crate::model::Skeleton;
-use crate::shape::limb::Limb;
+use crate::shape::Limb;
 
 /// Less of the smoothed density than this is beyond the leaves: it is a half at their edge.
 const EDGE: f32 = 0.4;
@@ -58,8 +58,7 @@ fn ends_in_leaves(limb: &Limb, skeleton: &Skeleton, view: &LeafView, target: &Ta
 mod tests {
     use super::*;
     use crate::model::{Node, NodeId, NodeName, Outline, Rgb, Size};
-    use crate::shape::limb::CenterlineSample;
-    use crate::shape::skin::SkinWeights;
+    use crate::shape::{CenterlineSample, SkinWeights};
     use nalgebra::Point3;
 
     fn node(i: u32, parent: Option<u32>, at: [f64; 3], copied: bool) -> Node {

@@ -2,7 +2,7 @@
 //! al. 2013; SimpleTree).
 
 use super::chain::continuations;
-use super::limb::Limb;
+use crate::shape::Limb;
 use nalgebra::Point3;
 
 /// One straight piece of wood.

@@ -3,7 +3,7 @@
 use super::canvas::Grid;
 use super::carry::Carried;
 use crate::model::{Pose, Skeleton};
-use crate::shape::limb::Limb;
+use crate::shape::Limb;
 use std::ops::Range;
 
 /// Wider wood than this is no tree's, cells.

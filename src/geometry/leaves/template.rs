@@ -42,7 +42,7 @@ pub enum TemplateFault {
     Empty,
     #[error("it has {0} triangles, and at most {most} are taken", most = Template::MOST_TRIANGLES)]
     TooMany(usize),
-    /// Whoever reads a file bounds what of it is looked at.
+    /// The reader of a file bounds what of it is looked at.
     #[error("it has {found} vertices, and at most {most} are looked at")]
     TooManyVertices { found: usize, most: usize },
     #[error("it has vectors of different lengths or indices beyond them")]

@@ -4,12 +4,11 @@
 //! parent with the parent's weights, so both skins meet at the pivot, which neither moves.
 
 use super::chain::{Chain, chains};
-use super::limb::Limb;
-use super::limbs::limbs;
 use super::mesh::Mesh;
 use super::tube;
 use crate::config;
 use crate::model::Skeleton;
+use crate::shape::{Limb, limbs};
 
 /// Triangles of the levels of detail against the finest, falling.
 pub const LEVELS: [f64; 3] = [1.0, 0.5, 0.25];

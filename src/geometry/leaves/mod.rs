@@ -28,10 +28,9 @@ pub use template::{Template, TemplateFault, TemplateMesh};
 pub use view::{LeafView, Sampling};
 
 use super::foliage::Foliage;
-use super::limb::Limb;
-use super::skin::SkinWeights;
 use crate::config;
 use crate::model::{Pose, Skeleton};
+use crate::shape::{Limb, SkinWeights};
 use attachment::AttachmentPoints;
 use canvas::Grid;
 use carry::Carried;

@@ -1,9 +1,8 @@
 //! One closed tube along a chain of limbs, with frames carried along without twist.
 
 use super::chain::{self, Chain};
-use super::curl::square_to;
-use super::limb::CenterlineSample;
 use super::mesh::Mesh;
+use crate::shape::{CenterlineSample, square_to};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
@@ -255,7 +254,7 @@ fn join(mesh: &mut Mesh, below: RingStart, above: RingStart) {
     }
 }
 
-/// The end of the tube: under a trunk for whoever looks from below, of a branch inside what it
+/// The end of the tube: under a trunk for a view from below, of a branch inside what it
 /// grows from.
 fn close_base(mesh: &mut Mesh, ring: &Ring, across: Vector3<f64>) {
     let first = mesh.positions.len() as u32;

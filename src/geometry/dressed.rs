@@ -1,8 +1,8 @@
 //! A tree as it is drawn.
 
 use super::foliage::Foliage;
-use super::limb::Limb;
 use super::mesh::Mesh;
+use crate::shape::Limb;
 
 /// Everything that is drawn of a tree at rest.
 #[derive(Clone, Debug, Default)]

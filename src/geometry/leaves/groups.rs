@@ -5,8 +5,8 @@ use super::cluster::Cluster;
 use super::target::Target;
 use super::template::Template;
 use super::view::PLAIN;
+use crate::geometry::foliage::FoliageGroup;
 use crate::model::{NodeId, Skeleton};
-use crate::shape::foliage::FoliageGroup;
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::TAU;
 

@@ -3,8 +3,7 @@
 use super::canvas::Grid;
 use super::carry::{Carried, between};
 use crate::model::{NodeId, Pose, Skeleton};
-use crate::shape::limb::Limb;
-use crate::shape::skin::SkinWeights;
+use crate::shape::{Limb, SkinWeights};
 use nalgebra::{Point3, Vector3};
 use std::cmp::Ordering;
 

@@ -1,7 +1,7 @@
 //! Where a pose carries what sits on the tree: linear blend skinning, as every viewer does it.
 
 use crate::model::{Pose, Skeleton};
-use crate::shape::skin::SkinWeights;
+use crate::shape::SkinWeights;
 use nalgebra::{Matrix3, Point3, Vector3};
 
 /// A point at rest goes to `turn` times it plus `way`.

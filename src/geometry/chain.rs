@@ -1,7 +1,7 @@
 //! Chains: limbs that go on in one another, drawn as one tube without a seam.
 
-use super::limb::{CenterlineSample, Limb};
 use crate::model::FARTHEST_PX;
+use crate::shape::{CenterlineSample, Limb};
 use nalgebra::Vector3;
 
 /// Edges along a tube are at most so many times as long as those around it.

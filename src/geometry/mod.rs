@@ -1,0 +1,21 @@
+//! What is drawn of a tree in space: its limbs as a mesh or as cylinders, and its leaves (Li 2011
+//! app. B).
+
+mod chain;
+mod cylinders;
+mod dressed;
+mod foliage;
+mod leaves;
+mod mesh;
+mod tube;
+mod wood;
+
+pub use cylinders::{Cylinder, cylinders};
+pub use dressed::Dressed;
+pub use foliage::{Foliage, FoliageGroup};
+pub use leaves::{
+    LeafView, Sampling, Season, Template, TemplateFault, TemplateMesh, density_match, foliage,
+    foliage_by, leaf_cover, season, within_leaves,
+};
+pub use mesh::Mesh;
+pub use wood::{LEVELS, bare_wood, wood, wood_levels};

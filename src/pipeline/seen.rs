@@ -1,0 +1,20 @@
+//! What the film shows of a tree apart from its motion.
+
+use crate::geometry::Template;
+use crate::model::{Luma, Outline, Pose, Rgb};
+
+/// What the film shows of the tree apart from its motion.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Seen<'a> {
+    /// A whole frame in colour, and the tree's pose in it (`None`: the rest pose).
+    pub picture: Option<&'a Rgb>,
+    pub pose: Option<&'a Pose>,
+    pub outline: Option<&'a Outline>,
+    /// The drawn shape, in the picture, that the tree was cut to. It stands in the tree's place at
+    /// rest.
+    pub cut_to: Option<&'a Outline>,
+    /// A leaf of the user's own, and a drawn density of the leaves, which goes before the
+    /// picture's.
+    pub leaf: Option<&'a Template>,
+    pub density: Option<&'a Luma>,
+}

@@ -1,0 +1,44 @@
+//! What a capture is to do, and what came out of it.
+
+use super::finish::Written;
+use super::recorder_thread::{RecordTo, Recorded};
+use super::source_thread::Pace;
+use crate::config::Config;
+use crate::outline::Given;
+use crate::solve::Model;
+use std::io::Write;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// What is to be done with a source.
+pub struct Job {
+    pub config: Config,
+    /// `None` finds it by motion.
+    pub outline: Option<Given>,
+    pub pace: Pace,
+    /// Gets a JSON line per pose.
+    pub stream: Option<Box<dyn Write + Send>>,
+    /// Folder of the capture; must not exist.
+    pub out: Option<PathBuf>,
+    /// Recording of the frames and of what is found in them.
+    pub record: Option<RecordTo>,
+    /// Time between two pictures for the screen; [`Duration::MAX`] where there is none.
+    pub preview_every: Duration,
+}
+
+/// What came out.
+#[derive(Clone, Debug)]
+pub struct Summary {
+    pub frames: u64,
+    pub tracks_total: u64,
+    /// Points that moved when evidence was last judged, and the accumulation measure then.
+    pub moving: usize,
+    pub accumulation: f64,
+    /// The one that was written, or where nothing was, the last one.
+    pub tree: Option<Arc<Model>>,
+    pub written: Option<Written>,
+    pub recorded: Option<Recorded>,
+    /// Frames that should have been recorded and were not.
+    pub not_recorded: u64,
+}

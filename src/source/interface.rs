@@ -1,0 +1,94 @@
+//! What every source offers, whatever its frames come from.
+
+use super::clock::ClockKind;
+use super::error::SourceError;
+use crate::config;
+use crate::model::{FormatNote, RawFrame, Size};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// What was opened and what is to be expected of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SourceInfo {
+    /// The input as the user named it; for a camera its own name as well.
+    pub name: String,
+    pub format: FormatNote,
+    pub size: Size,
+    /// What camera or file says of itself; the frames' own times are what counts.
+    pub nominal_rate_hz: Option<f64>,
+    pub frames_total: Option<u64>,
+    /// A live source does not wait for its reader; any other does.
+    pub live: bool,
+}
+
+/// What a source knows beyond its frames. The counts only ever grow.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Health {
+    /// Frames that came damaged, short or with the driver's error flag, and were left out.
+    pub damaged: u64,
+    /// Frames that were not later than the one before, and were left out.
+    pub stale: u64,
+    /// What the frames' times are by.
+    pub clock: ClockKind,
+}
+
+/// Makes the same camera once more: closed, and with the counts and the clock of the first one as
+/// they are at that moment.
+pub type Successor = Box<dyn Fn() -> Box<dyn Source> + Send>;
+
+/// A sequence of frames. Any call to a live one may block for as long as its driver does, or for
+/// ever; `runtime` makes them on a thread that it can leave behind.
+pub trait Source: Send {
+    /// Waits for the next frame; `None` is the end, and stays it.
+    ///
+    /// # Errors
+    /// The source has failed and will not deliver again, unless it [`returns`](Self::returns) and
+    /// is opened anew.
+    fn next_frame(&mut self) -> Result<Option<RawFrame>, SourceError>;
+
+    fn describe(&self) -> SourceInfo;
+
+    /// A source that may wait long gives up, and returns `None`, soon after this has been set.
+    fn stop_when(&mut self, _stop: Arc<AtomicBool>) {}
+
+    /// Takes over what can be changed of `config` while frames flow: the limits of time.
+    fn adopt(&mut self, _config: &config::Camera) {}
+
+    /// Whether it may come back after a failure, as a camera does that is plugged in again.
+    fn returns(&self) -> bool {
+        false
+    }
+
+    /// One attempt to go on after a failure: the same camera, the same format. The caller
+    /// decides when to try again; the source only says why it is not yet. Its frames go on with
+    /// times that fit those before.
+    ///
+    /// # Errors
+    /// It is not back: `Absent` where it is not even there, which costs next to nothing to find
+    /// out.
+    fn reopen(&mut self) -> Result<(), SourceError> {
+        Err(SourceError::Absent {
+            input: self.describe().name,
+            hint: "it cannot be opened again",
+        })
+    }
+
+    /// Gives the device back after a failure, so that it can go and come back.
+    fn close(&mut self) {}
+
+    /// How to go on with the same camera if a call to its driver never returns; `None` where there
+    /// is no other way than to wait for that call.
+    fn successor(&self) -> Option<Successor> {
+        None
+    }
+
+    fn health(&self) -> Health {
+        Health::default()
+    }
+
+    /// Lines to show to the user since the last call, e.g. that a clip ends early; complete after
+    /// the end.
+    fn warnings(&mut self) -> Vec<String> {
+        Vec::new()
+    }
+}
