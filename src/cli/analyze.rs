@@ -1,14 +1,14 @@
-//! `arborcam analyze DIR...`: how every branch of a capture sways, and what captures have in
-//! common.
+//! `arborcam analyze DIR...`: natural frequency and damping of every branch of a capture, and the
+//! comparison of captures.
 
 mod options;
 mod written;
 
-use super::ended::{Ended, unwritten};
-use super::output::say;
+use super::command_error::CommandError;
+use super::output::{eprint_line, print};
 use super::stop::Stop;
 use crate::cancel::CancelToken;
-use crate::config::{Config, Excited};
+use crate::config::{Config, ConfigError, Excited};
 use crate::document::{Document, DocumentError};
 use crate::dynamics::{Depth, Film, analyse};
 use crate::export::picture::data_address;
@@ -22,41 +22,36 @@ pub use options::AnalyzeArgs;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
-use written::{answers, put_beside};
+use written::{with_amplitudes, write_report};
 
-/// Film that is analysed at most, s, where a part is chosen: the end of a longer one. Points of
-/// hours would fill the memory.
-const LONGEST_S: f64 = 600.0;
+/// Longest part of a film that is analysed if one is chosen, s; of a longer part the end is used.
+/// Points of hours would fill the memory.
+const MAX_PART_S: f64 = 600.0;
 
-/// One capture, and the answers for its tables by node index.
-struct Analysed {
+/// The analysis of one capture.
+struct CaptureAnalysis {
     study: Study,
+    /// The results for its tables, by node index.
     sway: Vec<Swaying>,
 }
 
-pub fn run(args: &AnalyzeArgs) -> Result<(), Ended> {
+pub fn run(args: &AnalyzeArgs) -> Result<(), CommandError> {
     args.check()?;
     if let Some(path) = &args.report {
-        refuse_taken(path).map_err(|e| Ended::Failed(e.into()))?;
+        refuse_taken(path)?;
     }
     let stop = Stop::on_signals()?;
     let names = names(&args.dirs);
-    // Before the first is worked on: a mistyped name is reported at once.
-    let mut documents = Vec::with_capacity(args.dirs.len());
-    for dir in &args.dirs {
-        let document = Document::tree(dir)?;
-        args.scale.fits(document.skeleton.image_size)?;
-        documents.push(document);
-    }
-    let (mut studies, mut answers) = (Vec::new(), Vec::new());
+    let documents = read_documents(args)?;
+    let (mut studies, mut results) = (Vec::new(), Vec::new());
     for (document, name) in documents.iter().zip(&names) {
-        let analysed = analysed(args, document, name)?;
-        studies.push(analysed.study);
-        answers.push(analysed.sway);
+        let analysis = analyse_capture(args, document, name)?;
+        studies.push(analysis.study);
+        results.push(analysis.sway);
     }
     let comparison = compare(&studies, args.trees.same());
     if comparison.as_ref().is_some_and(|c| c.same_tree.is_none()) {
-        say(
+        eprint_line(
             "arborcam: warning: nothing is compared: it cannot be told whether these are films of \
              one tree; say --trees same or different",
         );
@@ -65,18 +60,30 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), Ended> {
     let stop = stop.while_writing();
     let mut failures = Vec::new();
     if args.update {
-        for (dir, sway) in args.dirs.iter().zip(&answers) {
-            failures.extend(update(dir, sway, stop).err().map(Ended::from));
+        for (dir, sway) in args.dirs.iter().zip(&results) {
+            failures.extend(update(dir, sway, stop).err().map(CommandError::from));
         }
     }
     if let Some(path) = &args.report {
         let html = page(&studies, comparison.as_ref());
         failures.extend(report(path, html, stop).err());
     }
-    ended(failures)
+    combined(failures)
 }
 
-/// What is printed.
+/// Reads the trees of all captures before the first one is analysed: a mistyped name is reported at
+/// once.
+fn read_documents(args: &AnalyzeArgs) -> Result<Vec<Document>, CommandError> {
+    let mut documents = Vec::with_capacity(args.dirs.len());
+    for dir in &args.dirs {
+        let document = Document::tree(dir)?;
+        args.scale.check_size(document.skeleton.image_size)?;
+        documents.push(document);
+    }
+    Ok(documents)
+}
+
+/// The text for standard output.
 fn table(args: &AnalyzeArgs, studies: &[Study], comparison: Option<&Comparison>) -> String {
     if args.json {
         format!("{}\n", json(studies, comparison))
@@ -85,55 +92,60 @@ fn table(args: &AnalyzeArgs, studies: &[Study], comparison: Option<&Comparison>)
     }
 }
 
-fn report(path: &Path, html: String, stop: &AtomicBool) -> Result<(), Ended> {
-    put_beside(path, html, stop).map_err(unwritten)?;
-    say(&format!("report:  {}", path.display()));
+/// Writes the report, and prints where.
+fn report(path: &Path, html: String, stop: &AtomicBool) -> Result<(), CommandError> {
+    write_report(path, html, stop)?;
+    eprint_line(&format!("report:  {}", path.display()));
     Ok(())
 }
 
-/// The last failure ends the command; those before it are told here.
-fn ended(mut failures: Vec<Ended>) -> Result<(), Ended> {
-    if failures.iter().any(|e| matches!(e, Ended::Stopped)) {
-        return Err(Ended::Stopped);
+/// The last failure becomes the error of the command; those before it are printed.
+fn combined(mut failures: Vec<CommandError>) -> Result<(), CommandError> {
+    if failures.iter().any(|e| matches!(e, CommandError::Stopped)) {
+        return Err(CommandError::Stopped);
     }
     let Some(last) = failures.pop() else {
         return Ok(());
     };
     for failure in &failures {
-        if let Ended::Failed(e) | Ended::BadUsage(e) | Ended::NoInput(e) = failure {
-            say(&format!("arborcam: {e}"));
+        if let CommandError::Failed(e) | CommandError::BadUsage(e) | CommandError::NoInput(e) =
+            failure
+        {
+            eprint_line(&format!("arborcam: {e}"));
         }
     }
     Err(last)
 }
 
-/// What is said of a capture, at once and in its report.
+/// Warnings and notes on a capture; they are printed at once and go into its report.
 struct Notes<'a> {
     name: &'a str,
     all: Vec<String>,
 }
 
 impl Notes<'_> {
-    fn tell(&mut self, kind: &str, what: String) {
-        say(&format!("arborcam: {kind}: {}: {what}", self.name));
+    fn add(&mut self, kind: &str, what: String) {
+        eprint_line(&format!("arborcam: {kind}: {}: {what}", self.name));
         self.all.push(what);
     }
 }
 
-fn analysed(args: &AnalyzeArgs, document: &Document, name: &str) -> Result<Analysed, Ended> {
-    let mut own = document.note.config.clone();
-    // What its tables are in.
-    own.export.metres_per_px = document.metres_per_px();
-    let config = args.config(&own)?;
+/// Analyses one capture. Warnings and notes are printed, and go into its report.
+fn analyse_capture(
+    args: &AnalyzeArgs,
+    document: &Document,
+    name: &str,
+) -> Result<CaptureAnalysis, CommandError> {
+    let config = config_for(args, document)?;
     let mut notes = Notes {
         name,
         all: document.note.warnings.clone(),
     };
     for warning in &document.warnings {
-        notes.tell("warning", warning.clone());
+        notes.add("warning", warning.clone());
     }
     let film = film(args, document, &config, &mut notes)?;
-    // Nothing was measured on copies.
+    // Copies have no measured points.
     let skeleton = Skeleton {
         nodes: document.skeleton.nodes[..document.skeleton.measured()].to_vec(),
         ..(*document.skeleton).clone()
@@ -147,17 +159,11 @@ fn analysed(args: &AnalyzeArgs, document: &Document, name: &str) -> Result<Analy
         &CancelToken::new(),
     );
     drop(progress);
-    let given = config.dynamics.excitation != Excited::Auto;
-    for hint in hints(&film, &analysis, given) {
-        notes.tell("note", hint);
+    let is_excitation_given = config.dynamics.excitation != Excited::Auto;
+    for hint in hints(&film, &analysis, is_excitation_given) {
+        notes.add("note", hint);
     }
-    let poses = poses_of(document, &film, skeleton.nodes.len()).unwrap_or_else(|e| {
-        notes.tell(
-            "warning",
-            format!("there are no plots of angles and spectra: {e}"),
-        );
-        Vec::new()
-    });
+    let poses = poses_for_plots(document, &film, skeleton.nodes.len(), &mut notes);
     let picture = document.picture.as_ref().filter(|_| args.report.is_some());
     let picture = picture.and_then(|p| data_address(&p.rgb).ok());
     let outline = document.note.outline.as_ref();
@@ -175,10 +181,18 @@ fn analysed(args: &AnalyzeArgs, document: &Document, name: &str) -> Result<Analy
         picture: picture.as_deref(),
         notes: &notes.all,
     });
-    Ok(Analysed {
-        sway: answers(&skeleton, analysis.sway, &study),
+    Ok(CaptureAnalysis {
+        sway: with_amplitudes(&skeleton, analysis.sway, &study),
         study,
     })
+}
+
+/// The settings for a capture: command line over configuration file over those of the capture.
+fn config_for(args: &AnalyzeArgs, document: &Document) -> Result<Config, ConfigError> {
+    let mut own = document.note.config.clone();
+    // The unit of its tables.
+    own.export.metres_per_px = document.metres_per_px();
+    args.config(&own)
 }
 
 fn excitation(setting: Excited) -> Option<Excitation> {
@@ -189,24 +203,24 @@ fn excitation(setting: Excited) -> Option<Excitation> {
     }
 }
 
-/// The points that are analysed. As at the end of a capture these are of the last seconds: points
-/// do not live for ever, and of those that are gone nothing is said.
+/// The tracked points to analyse. As at the end of a capture these are the points of the last
+/// seconds, because points are lost and replaced in the course of a film.
 fn film(
     args: &AnalyzeArgs,
     document: &Document,
     config: &Config,
     notes: &mut Notes,
-) -> Result<Film, Ended> {
+) -> Result<Film, CommandError> {
     let chosen = args.from.is_some() || args.to.is_some();
     let window_s = config.dynamics.window_s;
-    let longest_s = if chosen { LONGEST_S } else { window_s };
+    let longest_s = if chosen { MAX_PART_S } else { window_s };
     let film = document.tracked_within(longest_s, args.within_s())?;
     let duration_s = document.note.timing.duration_s;
     if let Some(from) = args.from
         && film.times_s.is_empty()
         && from > duration_s
     {
-        return Err(Ended::BadUsage(anyhow!(
+        return Err(CommandError::BadUsage(anyhow!(
             "--from {from} is after the end of {}, which is {duration_s:.1} s long; choose an earlier part",
             notes.name
         )));
@@ -216,15 +230,15 @@ fn film(
         return Ok(film);
     }
     if chosen {
-        notes.tell(
+        notes.add(
             "warning",
             format!(
-                "the film is longer than {LONGEST_S:.0} s; its end is analysed; choose another \
+                "the film is longer than {MAX_PART_S:.0} s; its end is analysed; choose another \
                  part with --from and --to"
             ),
         );
     } else {
-        notes.tell(
+        notes.add(
             "note",
             format!(
                 "of {duration_s:.0} s of film the last {longest_s:.0} (dynamics.window_s) are \
@@ -233,6 +247,19 @@ fn film(
         );
     }
     Ok(film)
+}
+
+/// The poses of the first `nodes` nodes in the time of `film`. Without them there are no plots, and
+/// a warning is added.
+fn poses_for_plots(document: &Document, film: &Film, nodes: usize, notes: &mut Notes) -> Vec<Pose> {
+    match poses_of(document, film, nodes) {
+        Ok(poses) => poses,
+        Err(e) => {
+            let why = format!("there are no plots of angles and spectra: {e}");
+            notes.add("warning", why);
+            Vec::new()
+        }
+    }
 }
 
 /// The poses of the first `nodes` nodes in the time of `film`.
@@ -250,7 +277,7 @@ fn poses_of(document: &Document, film: &Film, nodes: usize) -> Result<Vec<Pose>,
     Ok(poses)
 }
 
-/// A line on the terminal while a capture is analysed, gone when this is dropped.
+/// A line on the terminal while a capture is analysed; erased when this is dropped.
 struct Progress {
     shown: bool,
 }
@@ -273,8 +300,7 @@ impl Drop for Progress {
     }
 }
 
-/// What the captures are called: the names of their folders, with as much of the way to them as
-/// tells them apart.
+/// Names of the captures: the ends of their paths, as short as possible, but all different.
 fn names(dirs: &[PathBuf]) -> Vec<String> {
     let all: Vec<Vec<String>> = dirs.iter().map(|dir| parts(dir)).collect();
     let longest = all.iter().map(Vec::len).max().unwrap_or(1);
@@ -289,7 +315,7 @@ fn names(dirs: &[PathBuf]) -> Vec<String> {
     names
 }
 
-/// The folders that lead to `dir`, and its name.
+/// The components of the absolute path of `dir`.
 fn parts(dir: &Path) -> Vec<String> {
     let dir = std::path::absolute(dir).unwrap_or_else(|_| dir.to_owned());
     let dir = dir.canonicalize().unwrap_or(dir);
@@ -298,12 +324,12 @@ fn parts(dir: &Path) -> Vec<String> {
         .collect()
 }
 
-/// The last `length` parts of a path.
+/// The last `length` components of a path.
 fn end(parts: &[String], length: usize) -> String {
     parts[parts.len().saturating_sub(length)..].join("/")
 }
 
-/// Whether the last `length` parts are those of several paths.
+/// Whether several paths have the same last `length` components as `own`.
 fn is_shared(all: &[Vec<String>], own: &[String], length: usize) -> bool {
     let same = all
         .iter()
@@ -311,29 +337,21 @@ fn is_shared(all: &[Vec<String>], own: &[String], length: usize) -> bool {
     same.count() > 1
 }
 
-fn print(text: &str) -> Result<(), Ended> {
-    let mut out = std::io::stdout().lock();
-    let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
-    match written {
-        // A reader that closed it early has seen what it wanted.
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Ended::Failed(anyhow!(
-            "cannot write to standard output: {e}"
-        ))),
-        _ => Ok(()),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn names_of(dirs: &[&str]) -> Vec<String> {
+        let dirs: Vec<PathBuf> = dirs.iter().map(PathBuf::from).collect();
+        names(&dirs)
+    }
+
     #[test]
     fn captures_of_one_name_are_told_apart_by_where_they_lie() {
-        let named = |dirs: &[&str]| names(&dirs.iter().map(PathBuf::from).collect::<Vec<_>>());
         assert_eq!(
-            named(&["/x/calm/oak", "/x/storm/oak/", "/x/elm"]),
+            names_of(&["/x/calm/oak", "/x/storm/oak/", "/x/elm"]),
             ["calm/oak", "storm/oak", "elm"]
         );
-        assert_eq!(named(&["/x/oak"]), ["oak"]);
+        assert_eq!(names_of(&["/x/oak"]), ["oak"]);
     }
 }

@@ -1,19 +1,18 @@
-//! `arborcam animate DIR`: a capture's tree in another motion than the one that was filmed.
+//! `arborcam animate DIR`: animates the tree of a capture with a motion that was not filmed.
 
 mod live;
 mod options;
 
 pub use options::AnimateArgs;
 
-use super::ended::{Ended, failed};
+use super::command_error::CommandError;
 use super::hangup::SighupAction;
-use super::output::say;
-use super::render::{self, unwritten};
+use super::output::eprint_line;
+use super::render::{self, write_error};
 use super::session::stop_on_signals;
 use super::stop::Stop;
-use super::tree::{Tail, warn};
+use super::tree::{Tail, print_warnings};
 use crate::animate::{Animator, Known, Loudness, Magnify, Wind, magnify, place_to_pull};
-use crate::config::Config;
 use crate::document::{DocumentError, MotionCsv};
 use crate::export::gltf::{NamedBytes, glb, gltf_files};
 use crate::export::{ExportError, html};
@@ -22,7 +21,7 @@ use crate::model::{NodeId, Pose, Swaying};
 use crate::tui;
 use crate::views::{PreparedTree, Shot};
 use anyhow::{Context, anyhow};
-use live::{AsFilmed, InWind};
+use live::{FilmAnimation, WindAnimation};
 use options::Kind;
 use serde_json::{Value, json};
 use std::ffi::OsStr;
@@ -30,81 +29,69 @@ use std::io::IsTerminal;
 use std::path::Path;
 use std::sync::atomic::Ordering;
 
-/// Wind that is not looped comes back after so much more than the animation at the least, s.
-const PERIOD_S: f64 = 128.0;
+/// Wind that is not looped has a period of this length, s, doubled until it exceeds the length of
+/// the animation by at least this length.
+const WIND_PERIOD_S: f64 = 128.0;
 
-pub fn run(args: &AnimateArgs) -> Result<(), Ended> {
-    args.set(&mut Config::default())
-        .map_err(|e| Ended::BadUsage(e.into()))?;
+pub fn run(args: &AnimateArgs) -> Result<(), CommandError> {
     let Some(out) = &args.out else {
-        return live(args);
+        return show_live(args);
     };
     let kind = args
         .check(out)
-        .map_err(|why| Ended::BadUsage(anyhow!(why)))?;
-    refuse_taken(out).map_err(unwritten)?;
+        .map_err(|why| CommandError::BadUsage(anyhow!(why)))?;
+    refuse_taken(out).map_err(write_error)?;
     if kind == Kind::Html {
-        html::built_in().map_err(failed)?;
+        html::built_in()?;
     }
     let stop = Stop::on_signals()?;
-    let sound = args.wav.as_deref().map(sound).transpose()?;
-    let mut tree = tree(args)?;
+    let sound = args.wav.as_deref().map(read_wav).transpose()?;
+    let mut tree = prepare_tree(args)?;
     let (poses, what) = match args.magnify {
-        Some(by) => {
-            let poses = magnify(
-                &tree.skeleton,
-                &tree.poses,
-                &magnified(args, &tree, by),
-                args.fps,
-                args.count(),
-            );
-            (
-                poses.map_err(|e| Ended::Failed(e.into()))?,
-                json!({ "captured": { "times": by, "speed": args.speed } }),
-            )
-        }
-        None => blown(args, &tree, sound)?,
+        Some(factor) => magnify_film(args, &tree, factor)?,
+        None => simulate(args, &tree, sound)?,
     };
     tree.animate(poses, args.looped, what);
     write(args, out, kind, &tree, &stop)
 }
 
-/// On the terminal, until the user leaves.
-fn live(args: &AnimateArgs) -> Result<(), Ended> {
+/// Shows the tree on the terminal until the user leaves.
+fn show_live(args: &AnimateArgs) -> Result<(), CommandError> {
     if !std::io::stdout().is_terminal() {
         let why = "there is no terminal to show the tree on; give --out FILE (.glb, .html, .csv, .mp4 or .png)";
-        return Err(Ended::BadUsage(anyhow!(why)));
+        return Err(CommandError::BadUsage(anyhow!(why)));
     }
-    let sound = args.wav.as_deref().map(sound).transpose()?;
-    let tree = tree(args)?;
+    let sound = args.wav.as_deref().map(read_wav).transpose()?;
+    let tree = prepare_tree(args)?;
     let mut moving: Box<dyn tui::Moving> = match args.magnify {
-        Some(by) => {
-            let wanted = magnified(args, &tree, by);
-            Box::new(AsFilmed::new(&tree, wanted).map_err(|e| Ended::Failed(e.into()))?)
+        Some(factor) => {
+            let options = magnify_options(args, &tree, factor);
+            Box::new(FilmAnimation::new(&tree, options).map_err(CommandError::failed)?)
         }
         None => {
-            let mut animator = animator(&tree, sound, PERIOD_S);
+            let mut animator = animator(&tree, sound, WIND_PERIOD_S);
             animator.warm_up();
-            Box::new(InWind::new(&tree, animator))
+            Box::new(WindAnimation::new(&tree, animator))
         }
     };
     let stop = stop_on_signals(SighupAction::ends_this_process())?;
-    tui::watch(&mut *moving, tui::Options::from_env(), &stop)
-        .map_err(|e| Ended::BadUsage(e.into()))?;
+    tui::watch(&mut *moving, tui::Options::from_env(), &stop).map_err(CommandError::bad_usage)?;
     if stop.load(Ordering::SeqCst) {
-        Err(Ended::Stopped)
+        Err(CommandError::Stopped)
     } else {
         Ok(())
     }
 }
 
-/// The tree, with the wind that is asked for, and all of its film where that is to be changed.
-fn tree(args: &AnimateArgs) -> Result<PreparedTree, Ended> {
+/// Reads and prepares the tree; with `--magnify` its whole film as well, else no poses.
+fn prepare_tree(args: &AnimateArgs) -> Result<PreparedTree, CommandError> {
     let tail = match args.magnify {
         Some(_) => Tail::Whole,
         None => Tail::Seconds(0.0),
     };
-    let mut tree = args.tree.prepare(&args.dir, tail)?;
+    let tree = args
+        .tree
+        .prepare(&args.dir, tail, |config| args.set(config))?;
     if args.magnify.is_some() && !tree.document.has_motion() {
         return Err(DocumentError::NoFilm {
             dir: args.dir.clone(),
@@ -112,24 +99,40 @@ fn tree(args: &AnimateArgs) -> Result<PreparedTree, Ended> {
         }
         .into());
     }
-    args.set(&mut tree.config)
-        .map_err(|e| Ended::BadUsage(e.into()))?;
-    warn(&tree);
+    print_warnings(&tree);
     Ok(tree)
 }
 
-/// The loudness of a WAV file.
-fn sound(path: &Path) -> Result<Loudness, Ended> {
-    let sound = std::fs::read(path)
+/// Reads the loudness of a WAV file.
+fn read_wav(path: &Path) -> Result<Loudness, CommandError> {
+    let loudness = std::fs::read(path)
         .context("cannot read it")
         .and_then(|bytes| Ok(Loudness::of_wav(&bytes)?));
-    sound.map_err(|e| Ended::BadUsage(e.context(format!("--wav {}", path.display()))))
+    loudness.map_err(|e| CommandError::BadUsage(e.context(format!("--wav {}", path.display()))))
 }
 
-fn magnified(args: &AnimateArgs, tree: &PreparedTree, by: f64) -> Magnify {
+/// Magnifies the filmed motion. Returns the poses, and a description for the file.
+fn magnify_film(
+    args: &AnimateArgs,
+    tree: &PreparedTree,
+    factor: f64,
+) -> Result<(Vec<Pose>, Value), CommandError> {
+    let options = magnify_options(args, tree, factor);
+    let poses = magnify(
+        &tree.skeleton,
+        &tree.poses,
+        &options,
+        args.fps,
+        args.count(),
+    );
+    let what = json!({ "captured": { "times": factor, "speed": args.speed } });
+    Ok((poses.map_err(CommandError::failed)?, what))
+}
+
+fn magnify_options(args: &AnimateArgs, tree: &PreparedTree, factor: f64) -> Magnify {
     let most_rad = tree.config.wind.max_bend_deg.to_radians();
     Magnify {
-        by,
+        by: factor,
         speed: args.speed,
         band_hz: args.band,
         most_rad,
@@ -137,17 +140,17 @@ fn magnified(args: &AnimateArgs, tree: &PreparedTree, by: f64) -> Magnify {
     }
 }
 
-/// The tree at rest in its wind, which comes back after `period_s`.
+/// A simulation of the tree at rest, in wind with the period `period_s`.
 fn animator(tree: &PreparedTree, sound: Option<Loudness>, period_s: f64) -> Animator {
     let settings = &tree.config.wind;
     let mut wind = Wind::new(settings, period_s, metres_per_px(tree));
     if let Some(sound) = sound {
         wind = wind.driven_by(sound);
     }
-    let known: Vec<Known> = tree.sway.iter().map(known).collect();
-    let animator = Animator::new(tree.skeleton.clone(), &known, settings, wind);
+    let measured: Vec<Known> = tree.sway.iter().map(measured).collect();
+    let animator = Animator::new(tree.skeleton.clone(), &measured, settings, wind);
     if animator.tuning().all(|t| !t.measured) {
-        say(&format!(
+        eprint_line(&format!(
             "arborcam: warning: the capture has no frequency of any branch; they are taken from \
              thickness and length, the trunk's from wind.trunk_hz ({} Hz)",
             settings.trunk_hz
@@ -156,49 +159,37 @@ fn animator(tree: &PreparedTree, sound: Option<Loudness>, period_s: f64) -> Anim
     animator
 }
 
-/// The tree in the wind, or pulled and released.
-fn blown(
+/// Simulates the tree in the wind, or pulled and released. Returns the poses, and a description of
+/// the simulation for the file.
+fn simulate(
     args: &AnimateArgs,
     tree: &PreparedTree,
     sound: Option<Loudness>,
-) -> Result<(Vec<Pose>, Value), Ended> {
-    let count = args.count();
-    let length_s = count as f64 / args.fps;
+) -> Result<(Vec<Pose>, Value), CommandError> {
+    let length_s = args.length_s();
     let period_s = if args.looped {
         length_s
     } else {
-        PERIOD_S * (length_s / PERIOD_S + 1.0).log2().ceil().exp2()
+        WIND_PERIOD_S * (length_s / WIND_PERIOD_S + 1.0).log2().ceil().exp2()
     };
-    if let Some(sound) = sound.as_ref().filter(|s| s.length_s() < length_s) {
-        say(&format!(
-            "arborcam: warning: the sound lasts {:.1} s and is repeated",
-            sound.length_s()
-        ));
-    }
-    let sound = sound.map(|s| if args.looped { s.looped(length_s) } else { s });
+    let sound = sound.map(|sound| fit_sound(sound, args));
     let mut animator = animator(tree, sound, period_s);
     if args.looped {
         animator.close(length_s, args.fps);
     } else if let Some(lean_deg) = args.pull {
-        pull(args, tree, &mut animator, lean_deg)?;
+        pull_aside(args, tree, &mut animator, lean_deg)?;
     } else {
         animator.warm_up();
     }
-    let mut poses = Vec::with_capacity(count as usize + 1);
-    for k in 0..=count {
-        // Not the animator's own time: a sum of steps is not quite it.
+    let mut poses = Vec::with_capacity(args.count() as usize + 1);
+    for k in 0..=args.count() {
+        let time_s = k as f64 / args.fps;
+        // Not the animator's own time, which is a sum of steps with rounding errors.
         poses.push(Pose {
-            time_s: k as f64 / args.fps,
+            time_s,
             ..animator.pose(k)
         });
-        let (from_s, step_s) = (k as f64 / args.fps, 1.0 / args.fps);
-        if args.pull.is_some() && (from_s..from_s + step_s).contains(&args.release) {
-            animator.advance(args.release - from_s);
-            animator.pull(None);
-            animator.advance(from_s + step_s - args.release);
-        } else {
-            animator.advance(step_s);
-        }
+        advance_one_pose(args, &mut animator, time_s);
     }
     let what = json!({
         "wind": tree.config.wind,
@@ -210,19 +201,46 @@ fn blown(
     Ok((poses, what))
 }
 
-/// Hangs the tree in its rope.
-fn pull(
+/// A sound as long as the animation if that is a loop. Warns if it must be repeated.
+fn fit_sound(sound: Loudness, args: &AnimateArgs) -> Loudness {
+    if sound.length_s() < args.length_s() {
+        eprint_line(&format!(
+            "arborcam: warning: the sound lasts {:.1} s and is repeated",
+            sound.length_s()
+        ));
+    }
+    if args.looped {
+        sound.looped(args.length_s())
+    } else {
+        sound
+    }
+}
+
+/// Advances the simulation from `from_s` to the next pose; releases a pulled tree at its time.
+fn advance_one_pose(args: &AnimateArgs, animator: &mut Animator, from_s: f64) {
+    let step_s = 1.0 / args.fps;
+    if args.pull.is_some() && (from_s..from_s + step_s).contains(&args.release) {
+        animator.advance(args.release - from_s);
+        animator.pull(None);
+        animator.advance(from_s + step_s - args.release);
+    } else {
+        animator.advance(step_s);
+    }
+}
+
+/// Pulls the tree aside until it leans by `lean_deg`.
+fn pull_aside(
     args: &AnimateArgs,
     tree: &PreparedTree,
     animator: &mut Animator,
     lean_deg: f64,
-) -> Result<(), Ended> {
+) -> Result<(), CommandError> {
     let nodes = &tree.skeleton.nodes;
     let node = match args.pull_node {
         Some(name) => {
             let found = (1..nodes.len()).find(|&i| nodes[i].name.0 == name);
             found.ok_or_else(|| {
-                Ended::BadUsage(anyhow!(
+                CommandError::BadUsage(anyhow!(
                     "--pull-node {name} is no node of this tree; see nodes.csv"
                 ))
             })?
@@ -235,15 +253,15 @@ fn pull(
         lean_deg,
     );
     if reached_deg < lean_deg - 0.1 {
-        say(&format!(
+        eprint_line(&format!(
             "arborcam: warning: pulled so far it leans by {reached_deg:.1} degrees; it does not give way farther"
         ));
     }
     Ok(())
 }
 
-/// What was measured of a branch.
-fn known(sway: &Swaying) -> Known {
+/// The measured frequency and damping of a branch.
+fn measured(sway: &Swaying) -> Known {
     sway.as_ref().map_or_else(
         |_| Known::default(),
         |s| Known {
@@ -253,7 +271,7 @@ fn known(sway: &Swaying) -> Known {
     )
 }
 
-/// The capture's scale, or that of a tree of the height that the configuration says.
+/// The scale of the capture; if it has none, that of a tree of the height `wind.tree_height_m`.
 fn metres_per_px(tree: &PreparedTree) -> f64 {
     let given = tree.config.export.metres_per_px;
     let height_px = tree
@@ -269,24 +287,25 @@ fn metres_per_px(tree: &PreparedTree) -> f64 {
     }
 }
 
+/// Writes the animation to `out`, and prints a line about it.
 fn write(
     args: &AnimateArgs,
     out: &Path,
     kind: Kind,
     tree: &PreparedTree,
     stop: &Stop,
-) -> Result<(), Ended> {
-    let name = text(out.file_name());
-    let stem = text(out.file_stem());
+) -> Result<(), CommandError> {
+    let name = to_string(out.file_name());
+    let stem = to_string(out.file_stem());
     let model = tree.model();
     let files: Result<Vec<NamedBytes>, ExportError> = match kind {
         Kind::Glb => glb(&model).map(|(bytes, _)| vec![(name, bytes)]),
         Kind::Gltf => gltf_files(&model, &stem).map(|(files, _)| files),
         Kind::Html => tree.page(&model, &stem).map(|bytes| vec![(name, bytes)]),
-        Kind::Csv => table(tree).map(|bytes| vec![(name, bytes)]),
+        Kind::Csv => motion_csv(tree).map(|bytes| vec![(name, bytes)]),
         Kind::Video => return render::draw(tree, &args.shot(), render::Kind::Video, out, stop),
         Kind::Picture => {
-            // Of the end.
+            // The last pose.
             let shot = Shot {
                 at_s: Some(args.length_s()),
                 ..args.shot()
@@ -294,11 +313,11 @@ fn write(
             return render::draw(tree, &shot, render::Kind::Picture, out, stop);
         }
     };
-    let files = files.map_err(failed)?;
+    let files = files?;
     let size: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();
     let folder = out.parent().unwrap_or(Path::new(""));
-    write_files(folder, &files, stop.while_writing()).map_err(unwritten)?;
-    say(&format!(
+    write_files(folder, &files, stop.while_writing()).map_err(write_error)?;
+    eprint_line(&format!(
         "{}: {} poses, {:.1} MB",
         out.display(),
         tree.poses.len(),
@@ -307,12 +326,12 @@ fn write(
     Ok(())
 }
 
-fn text(part: Option<&OsStr>) -> String {
+fn to_string(part: Option<&OsStr>) -> String {
     part.unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// The motion in the form of a capture's `motion.csv`.
-fn table(tree: &PreparedTree) -> Result<Vec<u8>, ExportError> {
+/// The motion in the format of `motion.csv`.
+fn motion_csv(tree: &PreparedTree) -> Result<Vec<u8>, ExportError> {
     let metres_per_px = tree.config.export.metres_per_px;
     let mut motion = MotionCsv::new(Vec::new(), &tree.skeleton, metres_per_px)?;
     for pose in &tree.poses {

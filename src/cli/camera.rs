@@ -1,4 +1,4 @@
-//! The options on the camera, of every command that films.
+//! Camera options, for every command that films.
 
 use crate::config::{self, Backend};
 use clap::Args;
@@ -11,7 +11,7 @@ pub struct CameraArgs {
     device_timeout: Option<f64>,
     #[arg(long, value_name = "S", conflicts_with = "once", help = config::help("camera.retry_delay_s"))]
     retry_delay: Option<f64>,
-    /// End when the camera is lost, instead of waiting for it.
+    /// End when the camera is lost, instead of waiting for it to return.
     #[arg(long)]
     once: bool,
     #[arg(long, value_name = "v4l2|nokhwa", value_parser = backend, help = config::help("camera.backend"))]
@@ -27,7 +27,7 @@ fn backend(name: &str) -> Result<Backend, String> {
 }
 
 impl CameraArgs {
-    /// The command line overrides the file.
+    /// Applies the options of the command line.
     pub fn set(&self, camera: &mut config::Camera) {
         camera.accept_format |= self.accept_format;
         camera.reconnect &= !self.once;

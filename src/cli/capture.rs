@@ -1,8 +1,8 @@
-//! `arborcam capture DEVICE`: the whole way, live.
+//! `arborcam capture DEVICE`: from a camera to a moving tree, live.
 
 use super::camera::CameraArgs;
+use super::command_error::CommandError;
 use super::common::Common;
-use super::ended::Ended;
 use super::recording::RecordOption;
 use super::session::{self, Plan};
 use clap::Args;
@@ -10,8 +10,8 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub struct CaptureArgs {
-    /// The camera: /dev/video0, a link to it, or the name that stays, all as `arborcam devices`
-    /// lists them. A recording is taken at its own pace.
+    /// The camera: /dev/video0, a link to it, or its permanent name, as listed by
+    /// `arborcam devices`. A recording is played at its own pace.
     device: PathBuf,
     #[command(flatten)]
     camera: CameraArgs,
@@ -21,7 +21,7 @@ pub struct CaptureArgs {
     record: RecordOption,
 }
 
-pub fn run(args: &CaptureArgs) -> Result<(), Ended> {
+pub fn run(args: &CaptureArgs) -> Result<(), CommandError> {
     session::run(
         &args.common,
         Plan {

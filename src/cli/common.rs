@@ -1,33 +1,37 @@
-//! Arguments that several commands have.
+//! Arguments, and parsers of arguments, that several commands share.
 
 use super::camera::CameraArgs;
+use super::command_error::CommandError;
 use super::scale::ScaleArgs;
 use super::shape::ShapeArgs;
 use crate::config::{Config, ConfigError};
 use crate::outline::OutlineSpec;
+use anyhow::anyhow;
 use clap::{Args, ValueEnum};
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
-/// What `capture` and `replay` share.
+/// Arguments of `capture` and `replay`.
 #[derive(Debug, Args)]
 pub struct Common {
-    /// Where the tree is: a JSON polygon, a mask image (white = tree), a scribble image (white =
-    /// tree, black = background, rest grey or transparent), or `auto` to find it by its motion.
+    /// Region of the tree in the picture: a JSON polygon, a mask image (white = tree), a scribble
+    /// image (white = tree, black = background, rest grey or transparent), or `auto` to find it by
+    /// its motion.
     #[arg(long, value_name = "FILE|auto", default_value = "auto")]
     pub outline: OutlineSpec,
-    /// Folder for the result; it must not exist, and appears when it is complete.
+    /// Folder for the result. It must not exist, and appears when it is complete.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Run without the terminal UI.
+    /// Run without the screen in the terminal.
     #[arg(long)]
     pub headless: bool,
-    /// Print each pose on standard output, as a line of JSON; implies --headless.
+    /// Print each pose to standard output as a line of JSON. Implies --headless.
     #[arg(long, value_name = "FORMAT")]
     pub stream: Option<Stream>,
     /// Settings that differ from the defaults (TOML; see config/arborcam.toml).
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// End by itself after so many seconds of film.
+    /// End after this length of film, s.
     #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
     pub for_s: Option<f64>,
     #[command(flatten)]
@@ -42,8 +46,11 @@ pub enum Stream {
 }
 
 impl Common {
-    /// The file over the defaults, and over both what the command line says; `camera` are the
-    /// arguments of a command that films.
+    /// The settings: command line over configuration file over defaults. `camera` are the arguments
+    /// of a command that films.
+    ///
+    /// # Errors
+    /// The configuration file cannot be read, or a setting is out of range.
     pub fn config(&self, camera: Option<&CameraArgs>) -> Result<Config, ConfigError> {
         Config::default().layered(self.config.as_deref(), |config| {
             self.scale.set(config);
@@ -55,11 +62,37 @@ impl Common {
     }
 }
 
-/// A number of seconds above 0, as an argument.
+/// Parses a duration above 0, s.
 pub fn seconds(text: &str) -> Result<f64, String> {
-    let seconds = text
-        .parse()
-        .ok()
-        .filter(|s: &f64| s.is_finite() && *s > 0.0);
-    seconds.ok_or_else(|| "give a number of seconds above 0".to_owned())
+    parse_within(
+        text,
+        f64::MIN_POSITIVE..=f64::MAX,
+        "give a number of seconds above 0",
+    )
+}
+
+/// Parses a moment of a film, s from its begin.
+pub fn moment(text: &str) -> Result<f64, String> {
+    parse_within(text, 0.0..=f64::MAX, "give a number of seconds, 0 or more")
+}
+
+/// Parses a number in `range`; `hint` is the message for anything else.
+pub fn parse_within(text: &str, range: RangeInclusive<f64>, hint: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(number) if range.contains(&number) => Ok(number),
+        _ => Err(hint.to_owned()),
+    }
+}
+
+/// Checks the rate of a folder of pictures, frames per second.
+///
+/// # Errors
+/// It is not above 0.
+pub fn check_fps(fps: f64) -> Result<(), CommandError> {
+    if fps.is_finite() && fps > 0.0 {
+        return Ok(());
+    }
+    Err(CommandError::BadUsage(anyhow!(
+        "--fps {fps} is no rate; give a number above 0"
+    )))
 }

@@ -1,6 +1,6 @@
-//! `arborcam devices`: the cameras that are plugged in.
+//! `arborcam devices`: lists the connected cameras.
 
-use super::ended::Ended;
+use super::command_error::CommandError;
 use super::output::print;
 use crate::config::Config;
 use crate::source::{self, Device, Mode, Places};
@@ -12,12 +12,12 @@ pub struct DevicesArgs {
     /// Print JSON.
     #[arg(long)]
     json: bool,
-    /// Settings that differ from the defaults: they decide what would be filmed.
+    /// Settings that differ from the defaults (TOML); they decide which format would be used.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
 }
 
-pub fn run(args: &DevicesArgs) -> Result<(), Ended> {
+pub fn run(args: &DevicesArgs) -> Result<(), CommandError> {
     let config = Config::default().layered(args.config.as_deref(), |_| {})?;
     let devices = source::list_for(&config.camera, &Places::default());
     let text = if args.json {
@@ -30,7 +30,7 @@ pub fn run(args: &DevicesArgs) -> Result<(), Ended> {
     };
     let printed = print(&text);
     if devices.is_empty() {
-        return Err(Ended::NoInput(anyhow::anyhow!(
+        return Err(CommandError::NoInput(anyhow::anyhow!(
             "no camera found; plug one in, and look whether /dev/video0 appears"
         )));
     }
@@ -64,7 +64,7 @@ fn json(d: &Device) -> serde_json::Value {
     })
 }
 
-/// One line for the camera, below it what stays of it, what it can do and what would be filmed.
+/// A line for the camera; below it its identity, its formats and the format that would be used.
 fn shown(d: &Device) -> String {
     let mut text = format!(
         "{:<14} {}  ({})\n",
@@ -99,7 +99,7 @@ fn detail(name: &str, what: &str) -> String {
     format!("    {name:<9} {what}\n")
 }
 
-/// `MJPG 1280x720 @ 60 30, 640x480 @ 30`: one row a format.
+/// A row for each pixel format, e.g. `MJPG 1280x720 @ 60 30, 640x480 @ 30`.
 fn rows(modes: &[Mode]) -> Vec<String> {
     let mut rows: Vec<(&str, String)> = Vec::new();
     for mode in modes {

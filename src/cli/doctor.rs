@@ -1,6 +1,6 @@
-//! `arborcam doctor`: what is wrong with this machine, and what to do about it.
+//! `arborcam doctor`: checks this machine, and says how to fix what is wrong.
 
-use super::ended::Ended;
+use super::command_error::CommandError;
 use super::output::print;
 use crate::config::Config;
 use crate::doctor::{self, Asked, Screen, Verdict};
@@ -10,12 +10,12 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub struct DoctorArgs {
-    /// The camera to try; without it the first that films.
+    /// The camera to test; without it the first that can film.
     device: Option<PathBuf>,
-    /// Settings that a capture will have.
+    /// Settings for the captures (TOML; see config/arborcam.toml).
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Folder that captures will be written to; the present one if not given.
+    /// Folder that captures will be written to; default: the current one.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print JSON.
@@ -23,12 +23,12 @@ pub struct DoctorArgs {
     json: bool,
 }
 
-pub fn run(args: &DoctorArgs) -> Result<(), Ended> {
+pub fn run(args: &DoctorArgs) -> Result<(), CommandError> {
     let config = Config::default()
         .layered(args.config.as_deref(), |_| {})
         .map_err(|e| e.to_string());
     let wanted = args.out.clone().unwrap_or_else(|| PathBuf::from("."));
-    // A capture makes its own folder; the one above it is what counts.
+    // A capture creates its own folder: check the nearest folder above that exists.
     let there = std::path::absolute(&wanted)
         .ok()
         .and_then(|p| p.ancestors().find(|a| a.is_dir()).map(PathBuf::from));
@@ -41,14 +41,14 @@ pub fn run(args: &DoctorArgs) -> Result<(), Ended> {
     let checks = doctor::judge(&doctor::gather(asked));
     let failed = checks.iter().filter(|c| c.verdict == Verdict::Fail).count();
     let text = if args.json {
-        serde_json::to_string(&checks).map_err(|e| Ended::Failed(e.into()))? + "\n"
+        serde_json::to_string(&checks).map_err(CommandError::failed)? + "\n"
     } else {
         checks.iter().map(|check| format!("{check}\n")).collect()
     };
     print(&text)?;
     match failed {
         0 => Ok(()),
-        _ => Err(Ended::Failed(anyhow::anyhow!(
+        _ => Err(CommandError::Failed(anyhow::anyhow!(
             "{failed} of {} checks failed; each says what to do",
             checks.len()
         ))),
@@ -72,7 +72,7 @@ fn screen() -> Screen {
     }
 }
 
-/// The name of the locale; of the variables that hold one, the first that is set counts.
+/// The name of the locale: the first of its environment variables that is set.
 fn locale() -> String {
     for name in ["LC_ALL", "LC_CTYPE", "LANG"] {
         match std::env::var(name) {

@@ -1,10 +1,11 @@
-//! `arborcam export DIR --format F --out PATH`: a capture's tree as a file for other programs.
+//! `arborcam export DIR --format F --out PATH`: writes the tree of a capture for other programs.
 
-use super::ended::{Ended, failed, unwritten};
-use super::idle;
-use super::output::say;
+use super::command_error::CommandError;
+use super::common::parse_within;
+use super::output::eprint_line;
 use super::stop::Stop;
-use super::tree::{Tail, TreeArgs, warn};
+use super::tree::{Tail, TreeArgs, print_warnings};
+use super::unused;
 use crate::export::gltf::{KEY_TOLERANCE_PX, Model, NamedBytes, glb, gltf_files};
 use crate::export::still::{obj_files, ply};
 use crate::export::{ExportError, html};
@@ -15,27 +16,27 @@ use clap::{Args, ValueEnum};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Where the data goes instead of into a file.
+/// Value of `--out` for standard output.
 const STDOUT: &str = "-";
 
 #[derive(Debug, Args)]
 pub struct ExportArgs {
-    /// A capture: the folder that --out of `capture` or `replay` has made.
+    /// A capture: the folder written by `capture` or `replay --out`.
     dir: PathBuf,
-    /// What to write. glb: one file, mesh and motion; gltf: the same as .gltf and .bin; csv: a
-    /// folder with the tables and the wood as cylinders; obj and ply: the tree at rest; html: a
-    /// page for a browser, all in one file.
+    /// Format. glb: mesh and motion in one file; gltf: the same as .gltf and .bin; csv: a folder
+    /// with the tables and the wood as cylinders; obj and ply: the tree at rest; html: a page for a
+    /// browser, in one file.
     #[arg(long, value_name = "FORMAT")]
     format: Format,
-    /// File to write, for csv a folder; it must not exist, and appears when it is complete. `-` is
+    /// File to write, for csv a folder. It must not exist, and appears when it is complete. `-`:
     /// standard output (glb, html, ply).
     #[arg(long, value_name = "PATH")]
     out: PathBuf,
-    /// How far a node may be from its pose when keys of the animation are left out, px on the
-    /// screen of the front view; twice that in depth.
+    /// Largest deviation of a node when keys of the animation are left out, px in the front view;
+    /// twice that in depth.
     #[arg(long, value_name = "PX", default_value_t = KEY_TOLERANCE_PX, value_parser = tolerance)]
     tolerance_px: f64,
-    /// All levels of detail, as scenes lod0, lod1, ... on the same bones (glb, gltf).
+    /// Write all levels of detail, as scenes lod0, lod1, ... with the same bones (glb, gltf).
     #[arg(long)]
     lods: bool,
     #[command(flatten)]
@@ -43,15 +44,15 @@ pub struct ExportArgs {
 }
 
 impl ExportArgs {
-    /// Says which options the format has no use for.
-    fn tell_idle(&self) {
+    /// Prints which options have no effect on this format.
+    fn note_unused(&self) {
         if self.lods && !matches!(self.format, Format::Glb | Format::Gltf) {
-            idle::tell("--lods", "only glb and gltf hold levels of detail");
+            unused::note("--lods", "only glb and gltf hold levels of detail");
         }
         if self.tolerance_px != KEY_TOLERANCE_PX
             && matches!(self.format, Format::Csv | Format::Obj | Format::Ply)
         {
-            idle::tell("--tolerance-px", "this format holds no keys");
+            unused::note("--tolerance-px", "this format holds no keys");
         }
     }
 }
@@ -66,37 +67,38 @@ enum Format {
     Ply,
 }
 
+/// Parses `--tolerance-px`, px.
 fn tolerance(text: &str) -> Result<f64, String> {
-    let px = text
-        .parse()
-        .ok()
-        .filter(|px: &f64| (0.001..=100.0).contains(px));
-    px.ok_or_else(|| "give a number of pixels from 0.001 to 100".to_owned())
+    parse_within(
+        text,
+        0.001..=100.0,
+        "give a number of pixels from 0.001 to 100",
+    )
 }
 
-pub fn run(args: &ExportArgs) -> Result<(), Ended> {
+pub fn run(args: &ExportArgs) -> Result<(), CommandError> {
     let target = Target::of(args)?;
-    target.refuse_taken().map_err(unwritten)?;
+    target.refuse_taken()?;
     if args.format == Format::Html {
-        html::built_in().map_err(failed)?;
+        html::built_in()?;
     }
     let stop = Stop::on_signals()?;
-    let tree = args.tree.prepare(&args.dir, Tail::Animation)?;
-    warn(&tree);
-    args.tell_idle();
+    let tree = args.tree.prepare(&args.dir, Tail::Animation, |_| {})?;
+    print_warnings(&tree);
+    args.note_unused();
     if args.format == Format::Csv {
-        return tables(args, &tree, &stop);
+        return write_tables(args, &tree, &stop);
     }
     let model = Model {
         tolerance_px: args.tolerance_px,
         all_levels: args.lods && args.format != Format::Html,
         ..tree.model()
     };
-    let files = files(args.format, &tree, &model, &target).map_err(failed)?;
+    let files = files(args.format, &tree, &model, &target)?;
     target.write(files, &stop)
 }
 
-/// The files of all formats but tables.
+/// The files of all formats except csv.
 fn files(
     format: Format,
     tree: &PreparedTree,
@@ -114,15 +116,15 @@ fn files(
     Ok(vec![(target.name(), bytes)])
 }
 
-/// The tables, as they are or of the changed tree, and the wood as cylinders.
-fn tables(args: &ExportArgs, tree: &PreparedTree, stop: &Stop) -> Result<(), Ended> {
+/// Writes the tables, copied or of the changed tree, and the wood as cylinders.
+fn write_tables(args: &ExportArgs, tree: &PreparedTree, stop: &Stop) -> Result<(), CommandError> {
     let written = tree.write_tables(&args.out, stop.while_writing())?;
     let film = if written.film {
         "nodes, motion and tracks"
     } else {
         "nodes (there is no film)"
     };
-    say(&format!(
+    eprint_line(&format!(
         "{}: {film}, {} cylinders",
         written.dir.display(),
         written.cylinders
@@ -130,18 +132,21 @@ fn tables(args: &ExportArgs, tree: &PreparedTree, stop: &Stop) -> Result<(), End
     Ok(())
 }
 
-fn bad_usage<T>(why: String) -> Result<T, Ended> {
-    Err(Ended::BadUsage(anyhow!(why)))
+fn bad_usage<T>(why: String) -> Result<T, CommandError> {
+    Err(CommandError::BadUsage(anyhow!(why)))
 }
 
-/// The file that was asked for; others may come beside it.
+/// Where the main file of an export goes; other files may be written beside it.
 enum Target<'a> {
     Stdout,
-    Beside(&'a Path),
+    File(&'a Path),
 }
 
 impl<'a> Target<'a> {
-    fn of(args: &'a ExportArgs) -> Result<Self, Ended> {
+    /// # Errors
+    /// The path has no file name or another suffix than the format, or the format is more than one
+    /// file and cannot go to standard output.
+    fn of(args: &'a ExportArgs) -> Result<Self, CommandError> {
         let shown = args.out.display();
         if args.out.as_os_str() == STDOUT {
             return match args.format {
@@ -158,10 +163,10 @@ impl<'a> Target<'a> {
             Format::Gltf => "gltf",
             Format::Obj => "obj",
             Format::Glb | Format::Html | Format::Csv | Format::Ply => {
-                return Ok(Self::Beside(&args.out));
+                return Ok(Self::File(&args.out));
             }
         };
-        // The names of the files beside it are made from it.
+        // The other files are named after it.
         if args
             .out
             .extension()
@@ -171,13 +176,14 @@ impl<'a> Target<'a> {
                 "--out {shown} does not end in .{ending}, as this format must"
             ));
         }
-        Ok(Self::Beside(&args.out))
+        Ok(Self::File(&args.out))
     }
 
+    /// Name of the main file.
     fn name(&self) -> String {
         match self {
             Self::Stdout => "tree".into(),
-            Self::Beside(path) => path
+            Self::File(path) => path
                 .file_name()
                 .unwrap_or_default()
                 .to_string_lossy()
@@ -185,10 +191,11 @@ impl<'a> Target<'a> {
         }
     }
 
+    /// Name of the main file without its suffix.
     fn stem(&self) -> String {
         match self {
             Self::Stdout => "tree".into(),
-            Self::Beside(path) => path
+            Self::File(path) => path
                 .file_stem()
                 .unwrap_or_default()
                 .to_string_lossy()
@@ -196,15 +203,16 @@ impl<'a> Target<'a> {
         }
     }
 
-    /// Told before anything is worked out.
+    /// Checks, before anything is computed, that the file does not exist.
     fn refuse_taken(&self) -> Result<(), WriteError> {
         match self {
             Self::Stdout => Ok(()),
-            Self::Beside(path) => refuse_taken(path),
+            Self::File(path) => refuse_taken(path),
         }
     }
 
-    fn write(&self, files: Vec<NamedBytes>, stop: &Stop) -> Result<(), Ended> {
+    /// Writes all files, or the only one to standard output.
+    fn write(&self, files: Vec<NamedBytes>, stop: &Stop) -> Result<(), CommandError> {
         match self {
             Self::Stdout => {
                 let mut out = std::io::stdout().lock();
@@ -212,13 +220,15 @@ impl<'a> Target<'a> {
                     .iter()
                     .try_for_each(|(_, bytes)| out.write_all(bytes))
                     .and_then(|()| out.flush());
-                written.map_err(|e| Ended::Failed(anyhow!("cannot write to standard output: {e}")))
+                written.map_err(|e| {
+                    CommandError::Failed(anyhow!("cannot write to standard output: {e}"))
+                })
             }
-            Self::Beside(path) => {
+            Self::File(path) => {
                 let size: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();
                 let folder = path.parent().unwrap_or(Path::new(""));
-                write_files(folder, &files, stop.while_writing()).map_err(unwritten)?;
-                say(&format!("{}: {:.1} MB", path.display(), size as f64 / 1e6));
+                write_files(folder, &files, stop.while_writing())?;
+                eprint_line(&format!("{}: {:.1} MB", path.display(), size as f64 / 1e6));
                 Ok(())
             }
         }

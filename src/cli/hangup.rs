@@ -1,43 +1,43 @@
-//! What SIGHUP means: to a program in a terminal that the terminal is gone, to one without that its
-//! settings are to be read again.
+//! The meaning of SIGHUP: a program in a terminal ends, because the terminal is closed; one without
+//! a terminal reads its settings again.
 
 use super::camera::CameraArgs;
 use super::common::Common;
-use super::output::say;
+use super::output::eprint_line;
 use crate::config::{Change, Config};
 use crate::runtime::Running;
 use signal_hook::consts::SIGHUP;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What SIGHUP asks for; decided once, because the terminal may be gone when the signal comes.
+/// What SIGHUP does. Decided at the start, because the terminal may be gone when the signal comes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SighupAction {
-    /// There is no terminal that could hang up: it was sent on purpose, as to a service.
+    /// No terminal: the signal is sent on purpose, e.g. to a service. Read the settings again.
     Reload,
-    /// The terminal is gone: end in good order.
+    /// The terminal is closed: end in order.
     Stop,
-    /// The program was started to outlive the terminal, by `nohup` for example.
+    /// The program was started to outlive its terminal, e.g. by `nohup`.
     Ignored,
 }
 
 impl SighupAction {
-    /// What holds for this process.
+    /// The action for this process.
     pub fn of_this_process() -> Self {
         let stat = std::fs::read_to_string("/proc/self/stat");
         let status = std::fs::read_to_string("/proc/self/status");
         Self::of(&stat.unwrap_or_default(), &status.unwrap_or_default())
     }
 
-    /// Whether it is to end this process, which has no settings that could be read again.
+    /// Whether SIGHUP ends this process, if it has no settings that could be read again.
     pub fn ends_this_process() -> bool {
         Self::of_this_process() != Self::Ignored
     }
 
     /// From the contents of `/proc/self/stat` and `/proc/self/status`.
     fn of(stat: &str, status: &str) -> Self {
-        // The name in brackets may itself hold blanks and brackets; the terminal is the fifth field
-        // after it.
+        // The process name in brackets may contain blanks and brackets itself; the terminal is the
+        // fifth field after it.
         let terminal = stat
             .rsplit_once(')')
             .and_then(|(_, rest)| rest.split_whitespace().nth(4));
@@ -56,17 +56,17 @@ impl SighupAction {
     }
 }
 
-/// Reads the settings again when SIGHUP asks for it.
+/// Reads the settings again after SIGHUP.
 pub struct Reload<'a> {
     common: &'a Common,
     camera: Option<&'a CameraArgs>,
-    wanted: Arc<AtomicBool>,
+    requested: Arc<AtomicBool>,
     current: Config,
 }
 
 impl<'a> Reload<'a> {
-    /// Listens to SIGHUP if `action` says so. `common` and `camera` are the arguments of the
-    /// command, `current` the settings that the capture runs with.
+    /// Catches SIGHUP if `action` is [`SighupAction::Reload`]. `common` and `camera` are the
+    /// arguments of the command, `current` the settings that the capture runs with.
     ///
     /// # Errors
     /// The signal cannot be caught.
@@ -76,34 +76,34 @@ impl<'a> Reload<'a> {
         current: &Config,
         action: SighupAction,
     ) -> std::io::Result<Self> {
-        let wanted = Arc::<AtomicBool>::default();
+        let requested = Arc::<AtomicBool>::default();
         if action == SighupAction::Reload {
-            signal_hook::flag::register(SIGHUP, wanted.clone())?;
+            signal_hook::flag::register(SIGHUP, requested.clone())?;
         }
         Ok(Self {
             common,
             camera,
-            wanted,
+            requested,
             current: current.clone(),
         })
     }
 
-    /// What holds for the camera now.
+    /// The current camera settings.
     pub fn camera(&self) -> &crate::config::Camera {
         &self.current.camera
     }
 
     /// Whether SIGHUP came since the settings were last read.
-    pub fn is_wanted(&self) -> bool {
-        self.wanted.load(Ordering::SeqCst)
+    pub fn is_requested(&self) -> bool {
+        self.requested.load(Ordering::SeqCst)
     }
 
-    /// Reads the settings, applies what can be changed, and prints for every difference what becomes
-    /// of it.
+    /// Reads the settings, applies what can be changed while filming, and prints a line for every
+    /// difference.
     pub fn run(&mut self, running: &Running) {
-        self.wanted.store(false, Ordering::SeqCst);
+        self.requested.store(false, Ordering::SeqCst);
         for line in self.read_again(running) {
-            say(&format!("arborcam: reload: {line}"));
+            eprint_line(&format!("arborcam: reload: {line}"));
         }
     }
 
@@ -145,8 +145,7 @@ mod tests {
                 "{terminal} {mask}"
             );
         }
-        // Without /proc nothing is known, and losing a capture would be worse than not reading
-        // settings.
+        // Without /proc the action is unknown. Losing a capture would be worse than not reloading.
         assert_eq!(SighupAction::of("", ""), SighupAction::Stop);
     }
 }

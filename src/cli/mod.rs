@@ -1,17 +1,17 @@
-//! The commands: one file each. Here, the command line as a whole, and the exit status.
+//! The commands, one file each. This file parses the command line and returns the exit status.
 
 mod analyze;
 mod animate;
 mod camera;
 mod capture;
+mod command_error;
 mod common;
 mod devices;
 mod doctor;
-mod ended;
 mod export;
 mod finish;
 mod hangup;
-mod idle;
+
 mod output;
 mod play;
 mod record;
@@ -25,13 +25,14 @@ mod shape;
 mod stop;
 mod supervisor;
 mod tree;
+mod unused;
 
 use clap::{Parser, Subcommand};
-use ended::{BAD_USAGE, Ended, FAILED, NO_INPUT, STOPPED};
-use output::say;
+use command_error::{BAD_USAGE, CommandError, FAILED, NO_INPUT, STOPPED};
+use output::eprint_line;
 use std::process::ExitCode;
 
-/// Films a swaying tree and turns it, while it films, into a moving 3D tree.
+/// Films a swaying tree and makes a moving 3D tree of it while it films.
 #[derive(Debug, Parser)]
 #[command(name = "arborcam", version, max_term_width = 100)]
 struct Cli {
@@ -41,46 +42,45 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Film with a camera, live.
+    /// Film a tree with a camera, live.
     Capture(capture::CaptureArgs),
-    /// The same from a recording, a video file or a folder of pictures.
+    /// The same as `capture`, from a recording, a video file or a folder of pictures.
     Replay(replay::ReplayArgs),
-    /// Film into a recording (.mcap), frames only.
+    /// Record the frames of a camera to a file (.mcap), without making a tree.
     Record(record::RecordArgs),
-    /// Feed a v4l2loopback device from a recording or a video file; other programs see it as a
+    /// Play a recording or a video file to a v4l2loopback device, which other programs see as a
     /// camera.
     Play(play::PlayArgs),
-    /// Draw a capture's tree: a picture (.png) or a video (.mp4).
+    /// Draw the tree of a capture as a picture (.png) or a video (.mp4).
     Render(render::RenderArgs),
-    /// Write the tree of a capture as a file for other programs.
+    /// Write the tree of a capture in a format of other programs.
     Export(export::ExportArgs),
-    /// Tell at what frequency every branch of a capture sways and how it is damped; compare
-    /// captures.
+    /// Estimate the natural frequency and damping of every branch of a capture; compare captures.
     Analyze(analyze::AnalyzeArgs),
-    /// Make a capture's tree move in a wind that nobody filmed, pull and release it, or magnify its
+    /// Animate the tree of a capture in simulated wind, pull and release it, or magnify its filmed
     /// motion.
     Animate(animate::AnimateArgs),
-    /// Complete a capture whose run was cut, by a crash or a full disk.
+    /// Complete a capture whose run was ended by a crash or a full disk.
     Finish(finish::FinishArgs),
-    /// List the cameras that are plugged in.
+    /// List the connected cameras.
     Devices(devices::DevicesArgs),
-    /// Find out what is wrong with this machine, and what to do about it.
+    /// Check this machine for problems, and say how to fix them.
     Doctor(doctor::DoctorArgs),
 }
 
-/// Runs the command line.
+/// Runs the command that the arguments name.
 pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(e) => return refused(&e),
+        Err(e) => return print_parse_error(&e),
     };
     match run(&cli.command) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(ended) => status(&ended),
+        Err(e) => status(&e),
     }
 }
 
-fn run(command: &Command) -> Result<(), Ended> {
+fn run(command: &Command) -> Result<(), CommandError> {
     match command {
         Command::Capture(args) => capture::run(args),
         Command::Replay(args) => replay::run(args),
@@ -96,24 +96,24 @@ fn run(command: &Command) -> Result<(), Ended> {
     }
 }
 
-/// Says why a command did not end well, and gives the exit status of the contract.
-fn status(ended: &Ended) -> ExitCode {
-    let (status, error) = match ended {
-        Ended::Failed(e) => (FAILED, e),
-        Ended::BadUsage(e) => (BAD_USAGE, e),
-        Ended::NoInput(e) => (NO_INPUT, e),
-        Ended::Stopped => return ExitCode::from(STOPPED),
+/// Prints why a command did not succeed, and returns its exit status.
+fn status(error: &CommandError) -> ExitCode {
+    let (status, cause) = match error {
+        CommandError::Failed(e) => (FAILED, e),
+        CommandError::BadUsage(e) => (BAD_USAGE, e),
+        CommandError::NoInput(e) => (NO_INPUT, e),
+        CommandError::Stopped => return ExitCode::from(STOPPED),
     };
-    say(&format!("arborcam: {}", one_line(error)));
+    eprint_line(&format!("arborcam: {}", one_line(cause)));
     ExitCode::from(status)
 }
 
-/// Arguments that clap does not take, in the form that all our errors have; or help and version,
-/// which were asked for.
-fn refused(e: &clap::Error) -> ExitCode {
+/// Prints an error of the argument parser in the form of all other errors. Help and version are
+/// such "errors" as well; they are printed as they are.
+fn print_parse_error(e: &clap::Error) -> ExitCode {
     let text = e.render().to_string();
     match text.strip_prefix("error: ") {
-        Some(what) => say(&format!("arborcam: {}", what.trim_end())),
+        Some(what) => eprint_line(&format!("arborcam: {}", what.trim_end())),
         None => drop(e.print()),
     }
     if e.use_stderr() {
@@ -123,7 +123,7 @@ fn refused(e: &clap::Error) -> ExitCode {
     }
 }
 
-/// The error with those of its causes that it does not quote already.
+/// The error in one line, followed by those of its causes that it does not quote already.
 fn one_line(error: &anyhow::Error) -> String {
     let mut line = error.to_string();
     for cause in error.chain().skip(1).map(ToString::to_string) {
@@ -139,7 +139,7 @@ mod tests {
     use super::*;
     use clap::CommandFactory;
 
-    /// Help texts that come from the settings are empty if the key is misspelt.
+    /// Help texts taken from the settings are empty if the key is misspelt.
     #[test]
     fn every_option_has_a_help_text() {
         let cli = Cli::command();

@@ -1,17 +1,25 @@
 //! Lines on standard output and standard error.
 
-use super::ended::Ended;
+use super::command_error::CommandError;
+use anyhow::anyhow;
 use std::io::{ErrorKind, Write};
 
-/// Writes `text` to standard output. A reader that closed it early has seen what it needed.
-pub fn print(text: &str) -> Result<(), Ended> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Ended::Failed(e.into())),
+/// Writes `text` to standard output. A closed pipe is no error: its reader has what it needs.
+///
+/// # Errors
+/// Standard output cannot be written for another reason.
+pub fn print(text: &str) -> Result<(), CommandError> {
+    let mut out = std::io::stdout().lock();
+    let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    match written {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(CommandError::Failed(anyhow!(
+            "cannot write to standard output: {e}"
+        ))),
         _ => Ok(()),
     }
 }
 
-/// A line on standard error; if nobody reads it any more, that is no reason to fail.
-pub fn say(line: &str) {
+/// Writes a line to standard error. Errors are ignored: nobody reads it then.
+pub fn eprint_line(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }

@@ -1,11 +1,11 @@
-//! `arborcam record DEVICE FILE.mcap`: frames into a file, and nothing else.
+//! `arborcam record DEVICE FILE.mcap`: records frames to a file, without tracking.
 
 use super::camera::CameraArgs;
-use super::ended::Ended;
+use super::command_error::CommandError;
 use super::hangup::SighupAction;
-use super::output::say;
+use super::output::eprint_line;
 use super::recording::{self, LimitArgs, parse_time_ns};
-use super::session::{init_log, no_input, stop_on_signals, warn_of_other_format};
+use super::session::{init_log, stop_on_signals, warn_of_other_format};
 use crate::config::Config;
 use crate::runtime::{self, Failure, Pace, RecordJob, RunningRecord};
 use clap::Args;
@@ -13,17 +13,17 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Time between two looks at what is going on.
+/// Interval at which the recording is checked.
 const TICK: Duration = Duration::from_millis(20);
 
 #[derive(Debug, Args)]
 pub struct RecordArgs {
-    /// The camera, e.g. /dev/video0; `arborcam devices` lists them. Any other input is taken at its
-    /// own pace.
+    /// The camera, e.g. /dev/video0; `arborcam devices` lists them. Any other input is recorded at
+    /// its own pace.
     device: PathBuf,
-    /// The recording; it must not exist, and ends in .mcap.
+    /// The recording (.mcap); it must not exist.
     file: PathBuf,
-    /// Stop after this time of filming, e.g. 90s, 10min or 2h; without it, record until Ctrl-C.
+    /// Stop after this duration, e.g. 90s, 10min or 2h. Default: record until Ctrl-C.
     #[arg(long, value_name = "TIME", value_parser = parse_time_ns)]
     duration: Option<u64>,
     #[command(flatten)]
@@ -36,12 +36,13 @@ pub struct RecordArgs {
     config: Option<PathBuf>,
 }
 
-pub fn run(args: &RecordArgs) -> Result<(), Ended> {
+pub fn run(args: &RecordArgs) -> Result<(), CommandError> {
     let config = Config::default().layered(args.config.as_deref(), |config| {
         args.camera.set(&mut config.camera);
     })?;
-    recording::refuse_unfit(&args.file)?;
-    let source = runtime::open(&args.device, &config.camera, None).map_err(no_input)?;
+    recording::check_new_file(&args.file)?;
+    let source =
+        runtime::open(&args.device, &config.camera, None).map_err(CommandError::no_input)?;
     let info = source.describe();
     let stop = stop_on_signals(SighupAction::ends_this_process())?;
     init_log(true);
@@ -61,7 +62,8 @@ pub fn run(args: &RecordArgs) -> Result<(), Ended> {
     report(running, stop.load(Ordering::SeqCst))
 }
 
-/// Waits for the end, and asks for it when the time is over or the user or a full disk wants it.
+/// Waits for the end of the recording; ends it after `duration_ns`, on a signal or if the disk is
+/// full.
 fn watch(running: &RunningRecord, duration_ns: Option<u64>, stop: &AtomicBool) {
     let limit_ns = duration_ns.map_or(f64::INFINITY, |ns| ns as f64);
     while !running.finished() {
@@ -69,7 +71,7 @@ fn watch(running: &RunningRecord, duration_ns: Option<u64>, stop: &AtomicBool) {
         if time_s * 1e9 >= limit_ns || running.broken() || stop.load(Ordering::SeqCst) {
             running.stop();
         }
-        // At once: a full disk can still be helped while the camera films.
+        // Printed at once: the user can free disk space while the camera films.
         print_news(running);
         std::thread::sleep(TICK);
     }
@@ -78,12 +80,12 @@ fn watch(running: &RunningRecord, duration_ns: Option<u64>, stop: &AtomicBool) {
 
 fn print_news(running: &RunningRecord) {
     for line in running.news() {
-        say(&format!("arborcam: {line}"));
+        eprint_line(&format!("arborcam: {line}"));
     }
 }
 
-/// The closing lines, and the exit status.
-fn report(running: RunningRecord, stopped: bool) -> Result<(), Ended> {
+/// Prints the closing lines, and returns the error that decides the exit status.
+fn report(running: RunningRecord, stopped: bool) -> Result<(), CommandError> {
     let (seen, lost, time_s, missing) = running.counts();
     let (recorded, failure) = running.join();
     let lost = if lost > 0 {
@@ -91,18 +93,18 @@ fn report(running: RunningRecord, stopped: bool) -> Result<(), Ended> {
     } else {
         String::new()
     };
-    say(&format!("{seen} frames in {time_s:.1} s{lost}"));
+    eprint_line(&format!("{seen} frames in {time_s:.1} s{lost}"));
     if let Some(recorded) = &recorded {
-        say(&recording::closing_line(recorded, missing));
+        eprint_line(&recording::closing_line(recorded, missing));
     }
     let broken = recorded.is_some_and(|r| r.stopped);
     match failure {
-        Some(Failure::Source(e)) if seen == 0 => Err(no_input(e)),
+        Some(Failure::Source(e)) if seen == 0 => Err(CommandError::no_input(e)),
         Some(failure) => Err(failure.into()),
-        None if broken => Err(Ended::Failed(anyhow::anyhow!(
+        None if broken => Err(CommandError::Failed(anyhow::anyhow!(
             "the recording is not complete; see the warning above"
         ))),
-        None if stopped => Err(Ended::Stopped),
+        None if stopped => Err(CommandError::Stopped),
         None => Ok(()),
     }
 }

@@ -1,30 +1,30 @@
-//! What the commands that record have in common: options, refusals, the closing line.
+//! Options, checks and the closing line of the commands that record.
 
-use super::ended::{Ended, unbegun};
+use super::command_error::CommandError;
 use crate::recording::{Head, Limits, RecordingError};
 use crate::runtime::{QUEUE_BYTES, RecordTo, Recorded};
 use crate::source::Source;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
-/// `--record` with its limits.
+/// `--record` and its limits.
 #[derive(Debug, Args)]
 pub struct RecordOption {
-    /// Record the frames as they come, and what is found in them, into a new file (.mcap).
+    /// Record the frames, and what is found in them, to a new file (.mcap).
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     #[command(flatten)]
     limits: LimitArgs,
 }
 
-/// When a recording goes on in a next file.
+/// Limits of each file of a recording.
 #[derive(Clone, Debug, Args)]
 pub struct LimitArgs {
-    /// Go on in a next file (NAME-1.mcap, …) when one has grown to this size, e.g. 2GB, 500MB or
+    /// Start a new file (NAME-1.mcap, …) when the current one has this size, e.g. 2GB, 500MB or
     /// 1GiB.
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     max_size: Option<u64>,
-    /// Go on in a next file after this time, e.g. 10min, 90s or 2h.
+    /// Start a new file after this duration, e.g. 10min, 90s or 2h.
     #[arg(long, value_name = "TIME", value_parser = parse_time_ns)]
     max_time: Option<u64>,
 }
@@ -39,17 +39,21 @@ impl LimitArgs {
 }
 
 impl RecordOption {
-    /// Told before anything is filmed, not after.
-    pub fn refuse_unfit(&self) -> Result<(), Ended> {
+    /// Checks the options before anything is filmed.
+    ///
+    /// # Errors
+    /// The file exists or has another suffix, or there are limits without a file.
+    pub fn check(&self) -> Result<(), CommandError> {
         match &self.record {
-            Some(path) => refuse_unfit(path),
+            Some(path) => check_new_file(path),
             None if self.limits.limits() == Limits::default() => Ok(()),
-            None => Err(Ended::BadUsage(anyhow::anyhow!(
+            None => Err(CommandError::BadUsage(anyhow::anyhow!(
                 "--max-size and --max-time go with --record FILE; add it"
             ))),
         }
     }
 
+    /// Where to record frames of `source` to; `None` without `--record`.
     pub fn target(&self, source: &dyn Source) -> Option<RecordTo> {
         self.record
             .as_ref()
@@ -57,7 +61,7 @@ impl RecordOption {
     }
 }
 
-/// The head of the recording of this source.
+/// Where to record frames of `source` to, with the metadata of the recording.
 pub fn target(path: &Path, limits: Limits, source: &dyn Source) -> RecordTo {
     let info = source.describe();
     let head = Head {
@@ -75,27 +79,31 @@ pub fn target(path: &Path, limits: Limits, source: &dyn Source) -> RecordTo {
     }
 }
 
-/// Nothing is ever overwritten, and another ending would not be known again.
-pub fn refuse_unfit(path: &Path) -> Result<(), Ended> {
+/// Checks the path of a new recording: no file is overwritten, and recordings are recognised by
+/// their suffix.
+///
+/// # Errors
+/// The file exists, or its name does not end in .mcap.
+pub fn check_new_file(path: &Path) -> Result<(), CommandError> {
     if !path
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("mcap"))
     {
         let shown = path.display();
-        return Err(Ended::BadUsage(anyhow::anyhow!(
+        return Err(CommandError::BadUsage(anyhow::anyhow!(
             "{shown} does not end in .mcap, which a recording must"
         )));
     }
-    // A link that leads nowhere is something that is there, too.
+    // A broken symbolic link counts as an existing file, too.
     if path.symlink_metadata().is_ok() {
-        return Err(unbegun(RecordingError::Exists {
+        return Err(CommandError::from(RecordingError::Exists {
             path: path.to_owned(),
         }));
     }
     Ok(())
 }
 
-/// What was recorded, for the end.
+/// The last line of a run that recorded: files, frames and size; `missing` frames were lost.
 pub fn closing_line(recorded: &Recorded, missing: u64) -> String {
     let Recorded {
         frames,
@@ -121,7 +129,7 @@ pub fn closing_line(recorded: &Recorded, missing: u64) -> String {
     format!("recording: {where_to}: {frames} frames, {size}{but}")
 }
 
-/// Number and unit of `10min`.
+/// Splits e.g. `10min` into a positive number and its unit in lower case.
 fn split(text: &str) -> Option<(f64, String)> {
     let text = text.trim();
     let at = text
@@ -131,6 +139,7 @@ fn split(text: &str) -> Option<(f64, String)> {
     (number > 0.0 && number.is_finite()).then(|| (number, text[at..].trim().to_lowercase()))
 }
 
+/// Bytes in a unit.
 fn bytes_in(unit: &str) -> Option<f64> {
     Some(match unit {
         "b" => 1.0,
@@ -145,6 +154,7 @@ fn bytes_in(unit: &str) -> Option<f64> {
     })
 }
 
+/// Parses the size of a file, bytes.
 fn parse_size(text: &str) -> Result<u64, String> {
     let bytes = split(text).and_then(|(number, unit)| Some(number * bytes_in(&unit)?));
     match bytes {
@@ -154,6 +164,7 @@ fn parse_size(text: &str) -> Result<u64, String> {
     }
 }
 
+/// Seconds in a unit.
 fn seconds_in(unit: &str) -> Option<f64> {
     Some(match unit {
         "s" | "sec" => 1.0,
@@ -164,6 +175,7 @@ fn seconds_in(unit: &str) -> Option<f64> {
     })
 }
 
+/// Parses a duration, ns.
 pub fn parse_time_ns(text: &str) -> Result<u64, String> {
     let seconds = split(text).and_then(|(number, unit)| Some(number * seconds_in(&unit)?));
     match seconds {

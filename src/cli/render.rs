@@ -1,56 +1,58 @@
-//! `arborcam render DIR`: pictures and videos of a capture without a browser.
+//! `arborcam render DIR`: draws pictures and videos of a capture.
 
 mod options;
 
 pub use options::{Kind, RenderArgs, ViewName, WHITE, background, rate, size};
 
-use super::ended::{self, Ended};
+use super::command_error::CommandError;
 use super::stop::Stop;
-use super::tree::{Tail, warn};
+use super::tree::{Tail, print_warnings};
 use crate::files::{OutputFile, WriteError, refuse_taken};
 use crate::views::{PrepareError, PreparedTree, Shot, Studio, VIDEO_S};
 use anyhow::anyhow;
 use std::path::Path;
 
-/// Length of any video, s.
-const LONGEST_S: f64 = 600.0;
+/// Longest video, s.
+const MAX_VIDEO_S: f64 = 600.0;
 
-pub fn run(args: &RenderArgs) -> Result<(), Ended> {
-    let kind = args.check().map_err(|why| Ended::BadUsage(anyhow!(why)))?;
-    if args.seconds.is_some_and(|s| s > LONGEST_S) {
-        return Err(Ended::BadUsage(anyhow!(
-            "--seconds is more than {LONGEST_S}; give less"
+pub fn run(args: &RenderArgs) -> Result<(), CommandError> {
+    let kind = args
+        .check()
+        .map_err(|why| CommandError::BadUsage(anyhow!(why)))?;
+    if args.seconds.is_some_and(|s| s > MAX_VIDEO_S) {
+        return Err(CommandError::BadUsage(anyhow!(
+            "--seconds is more than {MAX_VIDEO_S}; give less"
         )));
     }
-    refuse_taken(&args.out).map_err(unwritten)?;
+    refuse_taken(&args.out).map_err(write_error)?;
     let stop = Stop::on_signals()?;
-    let tree = args.tree.prepare(&args.dir, tail(args, kind))?;
+    let tree = args.tree.prepare(&args.dir, tail(args, kind), |_| {})?;
     if args.film.is_some() && tree.document.picture.is_none() {
-        return Err(Ended::Failed(anyhow!(
+        return Err(CommandError::Failed(anyhow!(
             "the capture holds no frame of the film; leave --film out"
         )));
     }
     draw(&tree, &args.shot(), kind, &args.out, &stop)?;
-    // Told last, so that the error, if there is one, is the only line.
-    warn(&tree);
+    // Printed last: if there is an error, it is the only line.
+    print_warnings(&tree);
     Ok(())
 }
 
-/// Draws a tree in its poses to the file `out`.
+/// Draws a picture or video of `tree` to the file `out`.
 pub fn draw(
     tree: &PreparedTree,
     shot: &Shot,
     kind: Kind,
     out: &Path,
     stop: &Stop,
-) -> Result<(), Ended> {
+) -> Result<(), CommandError> {
     let studio = Studio::new(tree, shot)?;
     match kind {
         Kind::Picture => {
             let png = studio.picture()?;
-            write_picture(out, &png, stop).map_err(unwritten)
+            write_picture(out, &png, stop).map_err(write_error)
         }
-        Kind::Video => studio.video(out, stop.while_writing()).map_err(failed),
+        Kind::Video => studio.video(out, stop.while_writing()).map_err(video_error),
     }
 }
 
@@ -61,7 +63,7 @@ fn write_picture(out: &Path, png: &[u8], stop: &Stop) -> Result<(), WriteError> 
     file.publish()
 }
 
-/// How much of the end of the film is to be read: hours of poses would fill the memory.
+/// The part of the film to read: poses of hours would fill the memory.
 fn tail(args: &RenderArgs, kind: Kind) -> Tail {
     match (args.at, kind) {
         (Some(at_s), _) => Tail::From(at_s),
@@ -70,21 +72,21 @@ fn tail(args: &RenderArgs, kind: Kind) -> Tail {
     }
 }
 
-fn failed(e: PrepareError) -> Ended {
+fn video_error(e: PrepareError) -> CommandError {
     match e {
-        PrepareError::Export(crate::export::ExportError::Write(e)) => unwritten(e),
+        PrepareError::Export(crate::export::ExportError::Write(e)) => write_error(e),
         e => e.into(),
     }
 }
 
-/// How a command ends whose one file could not be written.
-pub fn unwritten(e: WriteError) -> Ended {
+/// The error of a command that writes one file; a file that exists gets a message of its own.
+pub fn write_error(e: WriteError) -> CommandError {
     match e {
-        WriteError::Exists { path } => Ended::Failed(anyhow!(
+        WriteError::Exists { path } => CommandError::Failed(anyhow!(
             "{} exists already; choose another file, or remove it first",
             path.display()
         )),
-        e => ended::unwritten(e),
+        e => e.into(),
     }
 }
 
@@ -92,15 +94,18 @@ pub fn unwritten(e: WriteError) -> Ended {
 mod tests {
     use super::*;
 
-    /// Status 130, by which a script tells Ctrl-C from a failure.
+    /// By status 130 a script distinguishes Ctrl-C from a failure.
     #[test]
-    fn who_was_stopped_has_not_failed() {
-        assert!(matches!(unwritten(WriteError::Stopped), Ended::Stopped));
+    fn a_stopped_command_has_not_failed() {
+        assert!(matches!(
+            write_error(WriteError::Stopped),
+            CommandError::Stopped
+        ));
         let taken = WriteError::Exists {
             path: "a.png".into(),
         };
         assert!(
-            matches!(unwritten(taken), Ended::Failed(e) if e.to_string().contains("another file"))
+            matches!(write_error(taken), CommandError::Failed(e) if e.to_string().contains("another file"))
         );
     }
 }

@@ -1,7 +1,7 @@
-//! `arborcam replay INPUT`: the whole way from a recording.
+//! `arborcam replay INPUT`: from a recording to a moving tree.
 
-use super::common::Common;
-use super::ended::Ended;
+use super::command_error::CommandError;
+use super::common::{Common, check_fps};
 use super::recording::RecordOption;
 use super::session::{self, Plan};
 use crate::runtime::Pace;
@@ -13,11 +13,11 @@ pub struct ReplayArgs {
     /// A recording (.mcap), a video file (.mkv .avi .mp4) or a folder of pictures (.png .jpg .bmp,
     /// in name order).
     input: PathBuf,
-    /// As fast as the machine allows; nothing is dropped. Without it the recording's own pace is
-    /// kept.
+    /// Process the frames as fast as the machine can, without dropping any. Without it the
+    /// recording's own pace is kept.
     #[arg(long)]
     fast: bool,
-    /// Rate of a folder of pictures, frames a second.
+    /// Rate of a folder of pictures, frames per second.
     #[arg(long, value_name = "RATE", default_value_t = 30.0)]
     fps: f64,
     #[command(flatten)]
@@ -26,13 +26,8 @@ pub struct ReplayArgs {
     record: RecordOption,
 }
 
-pub fn run(args: &ReplayArgs) -> Result<(), Ended> {
-    if !(args.fps.is_finite() && args.fps > 0.0) {
-        return Err(Ended::BadUsage(anyhow::anyhow!(
-            "--fps {} is no rate; give a number above 0",
-            args.fps
-        )));
-    }
+pub fn run(args: &ReplayArgs) -> Result<(), CommandError> {
+    check_fps(args.fps)?;
     let pace = if args.fast {
         Pace::Fast
     } else {

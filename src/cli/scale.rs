@@ -1,22 +1,23 @@
-//! How large a pixel is at the tree.
+//! The scale of the picture at the tree, m/px.
 
-use super::ended::Ended;
+use super::command_error::CommandError;
 use crate::config::Config;
 use crate::model::Size;
 use anyhow::anyhow;
 use clap::Args;
+use nalgebra::Point2;
 
-/// The largest size of a pixel that is believed, m.
-const LARGEST_M: f64 = 1e6;
+/// Largest plausible size of a pixel, m.
+const MAX_METRES_PER_PX: f64 = 1e6;
 
-/// The options on the scale.
+/// The options for the scale.
 #[derive(Clone, Debug, Default, Args)]
 pub struct ScaleArgs {
-    /// Metres in a pixel at the tree; lengths are then in metres. 0 for pixels.
+    /// Size of a pixel at the tree, m; lengths are then in metres. 0: lengths are in pixels.
     #[arg(long, value_name = "M")]
     metres_per_px: Option<f64>,
-    /// The same by a known length: two points of the picture (px from the left and from the top)
-    /// and how far they are apart at the tree, e.g. 310,340:305,80=2.6
+    /// The same from a known length: two points of the picture (px from the left and from the top)
+    /// and their distance at the tree, m, e.g. 310,340:305,80=2.6
     #[arg(long, value_name = "U,V:U,V=METRES", value_parser = length, conflicts_with = "metres_per_px")]
     scale: Option<Known>,
 }
@@ -24,13 +25,13 @@ pub struct ScaleArgs {
 /// A known length in the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Known {
-    /// Its ends, px.
-    ends: [[f64; 2]; 2],
+    /// Its end points, px.
+    ends: [Point2<f64>; 2],
     metres_per_px: f64,
 }
 
 impl ScaleArgs {
-    /// The command line over the settings.
+    /// Applies the options of the command line.
     pub fn set(&self, config: &mut Config) {
         if let Some(metres) = self
             .scale
@@ -41,14 +42,18 @@ impl ScaleArgs {
         }
     }
 
-    /// Refuses a known length that was not measured in a picture of this size.
-    pub fn fits(&self, size: Size) -> Result<(), Ended> {
-        for [u, v] in self.scale.iter().flat_map(|known| known.ends) {
-            // To the rim of the last pixel, as a mouse may tell it.
+    /// Checks that the known length was measured in a picture of this size.
+    ///
+    /// # Errors
+    /// A point lies outside of the picture.
+    pub fn check_size(&self, size: Size) -> Result<(), CommandError> {
+        for end in self.scale.iter().flat_map(|known| known.ends) {
+            let (u, v) = (end.x, end.y);
+            // A mouse position may be up to the outer edge of the last pixel.
             let inside = (-0.5..=f64::from(size.width)).contains(&u)
                 && (-0.5..=f64::from(size.height)).contains(&v);
             if !inside {
-                return Err(Ended::BadUsage(anyhow!(
+                return Err(CommandError::BadUsage(anyhow!(
                     "--scale: {u},{v} lies off the picture, which is {size} pixels; give two \
                      points of a frame of this film"
                 )));
@@ -58,15 +63,16 @@ impl ScaleArgs {
     }
 }
 
+/// Parses `U,V:U,V=METRES`.
 fn length(text: &str) -> Result<Known, String> {
-    let ([a, b], metres) = drawn(text)
+    let ([a, b], metres) = points_and_distance(text)
         .ok_or("give two points and their distance in metres, like 310,340:305,80=2.6")?;
-    let px = (a[0] - b[0]).hypot(a[1] - b[1]);
+    let px = (a.x - b.x).hypot(a.y - b.y);
     if px < 1.0 {
         return Err("the two points must be at least a pixel apart".into());
     }
     let metres_per_px = metres / px;
-    if metres_per_px > 0.0 && metres_per_px <= LARGEST_M {
+    if metres_per_px > 0.0 && metres_per_px <= MAX_METRES_PER_PX {
         Ok(Known {
             ends: [a, b],
             metres_per_px,
@@ -76,17 +82,18 @@ fn length(text: &str) -> Result<Known, String> {
     }
 }
 
-/// Two points, px, and how far they are apart, m.
-fn drawn(text: &str) -> Option<([[f64; 2]; 2], f64)> {
+/// Splits `U,V:U,V=METRES` into two points, px, and their distance, m.
+fn points_and_distance(text: &str) -> Option<([Point2<f64>; 2], f64)> {
     let (points, metres) = text.split_once('=')?;
     let (a, b) = points.split_once(':')?;
     let metres = number(metres.trim().trim_end_matches('m'))?;
     Some(([point(a)?, point(b)?], metres))
 }
 
-fn point(text: &str) -> Option<[f64; 2]> {
+/// Parses `U,V`, px.
+fn point(text: &str) -> Option<Point2<f64>> {
     let (u, v) = text.split_once(',')?;
-    Some([number(u)?, number(v)?])
+    Some(Point2::new(number(u)?, number(v)?))
 }
 
 fn number(text: &str) -> Option<f64> {
@@ -102,7 +109,7 @@ mod tests {
         assert_eq!(
             length("0,0:30,40=2.5"),
             Ok(Known {
-                ends: [[0.0, 0.0], [30.0, 40.0]],
+                ends: [Point2::new(0.0, 0.0), Point2::new(30.0, 40.0)],
                 metres_per_px: 0.05
             })
         );
@@ -125,17 +132,19 @@ mod tests {
         }
     }
 
+    /// Whether a known length is accepted for a picture of 640x360.
+    fn fits(text: &str) -> bool {
+        let args = ScaleArgs {
+            metres_per_px: None,
+            scale: length(text).ok(),
+        };
+        args.check_size(Size::new(640, 360)).is_ok()
+    }
+
     #[test]
     fn a_length_off_the_picture_is_refused() {
-        let fits = |text| {
-            ScaleArgs {
-                metres_per_px: None,
-                scale: length(text).ok(),
-            }
-            .fits(Size::new(640, 360))
-            .is_ok()
-        };
-        assert!(fits("0,0:640,360=1") && ScaleArgs::default().fits(Size::new(1, 1)).is_ok());
+        assert!(fits("0,0:640,360=1"));
+        assert!(ScaleArgs::default().check_size(Size::new(1, 1)).is_ok());
         assert!(
             !fits("0,0:641,10=1")
                 && !fits("10,361:20,20=1")

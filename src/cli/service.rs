@@ -1,20 +1,20 @@
-//! What is reported to a service manager (sd_notify): ready when frames flow, alive as long as they
-//! do, one line of state.
+//! Notifications to a service manager (sd_notify): ready at the first frame, alive while frames
+//! come, and a line of status.
 //!
-//! Nothing is sent where nobody asked for it (`NOTIFY_SOCKET`), so this runs in every capture.
+//! Every capture runs this; without the environment variable `NOTIFY_SOCKET` nothing is sent.
 
-use super::output::say;
+use super::output::eprint_line;
 use crate::model::Snapshot;
 use crate::runtime::{Running, Sign, Vigil};
 use sd_notify::NotifyState;
 use std::time::{Duration, Instant};
 
-/// Time between two looks where no watchdog asks for more.
-const LOOK_EVERY: Duration = Duration::from_secs(1);
-/// A time limit of the manager for start or end is extended by this with every sign of life.
+/// Interval of notifications, unless a watchdog needs a shorter one.
+const NOTIFY_INTERVAL: Duration = Duration::from_secs(1);
+/// The manager's time limit for start or stop is extended by this with every notification.
 const EXTENSION: Duration = Duration::from_secs(30);
 
-/// The line to the service manager.
+/// Connection to the service manager.
 pub struct Service {
     watchdog: Option<Duration>,
     every: Duration,
@@ -27,12 +27,11 @@ pub struct Service {
 }
 
 impl Service {
-    /// `None` where no service manager listens. `timeout_s` is the silence that a camera is
-    /// allowed.
+    /// `None` without a service manager. `timeout_s` is `camera.timeout_s`.
     pub fn from_env(timeout_s: f64) -> Option<Self> {
         std::env::var_os("NOTIFY_SOCKET")?;
         let watchdog = sd_notify::watchdog_enabled();
-        let every = watchdog.map_or(LOOK_EVERY, |limit| LOOK_EVERY.min(limit / 4));
+        let every = watchdog.map_or(NOTIFY_INTERVAL, |limit| NOTIFY_INTERVAL.min(limit / 4));
         let service = Self {
             watchdog,
             every,
@@ -47,14 +46,14 @@ impl Service {
         Some(service)
     }
 
-    /// Says so if the manager takes a camera that is silent for as long as it may be for a program
-    /// that hangs.
+    /// Warns if the watchdog's limit is not above `timeout_s`: the manager would then take a silent
+    /// camera for a program that hangs.
     pub fn warn_of_limit(&self, timeout_s: f64) {
         if let Some(limit) = self
             .watchdog
             .filter(|limit| limit.as_secs_f64() <= timeout_s)
         {
-            say(&format!(
+            eprint_line(&format!(
                 "arborcam: warning: the watchdog's limit of {} s is not above camera.timeout_s = {timeout_s}; a silent \
                  camera will look like a hung program: raise WatchdogSec, or lower camera.timeout_s",
                 limit.as_secs_f64()
@@ -62,7 +61,7 @@ impl Service {
         }
     }
 
-    /// To be called again and again; looks at the capture when it is time to.
+    /// Notifies the manager when it is time to; to be called often.
     pub fn tick(&mut self, running: &Running, snapshot: Option<&Snapshot>) {
         if let Some(snapshot) = snapshot {
             self.status = status(snapshot);
@@ -79,7 +78,7 @@ impl Service {
         self.notify(sign, flowed);
     }
 
-    /// Sends what the manager is to know of this `sign`; `flowed`: there has been a whole frame.
+    /// Sends the notifications for `sign`; `flowed`: there has been an undamaged frame.
     fn notify(&mut self, sign: Sign, flowed: bool) {
         let extend = NotifyState::ExtendTimeoutUsec(EXTENSION.as_micros() as u32);
         match sign {
@@ -90,7 +89,7 @@ impl Service {
                 }
                 send(&[NotifyState::Watchdog, NotifyState::Status(&self.status)]);
             }
-            // Every frame so far was damaged: alive, and of no use yet.
+            // All frames so far were damaged: alive, but not ready.
             Sign::Flows => send(&[NotifyState::Status("no whole frame yet")]),
             Sign::Waits => {
                 let waiting = NotifyState::Status("waiting for the camera");
@@ -115,7 +114,7 @@ impl Service {
         self.stalled = matches!(sign, Sign::Stalls(_));
     }
 
-    /// Settings are read again: between the two messages the manager does not count us as ready.
+    /// Runs `reload`; the manager counts the program as not ready meanwhile.
     pub fn reloading(&self, reload: impl FnOnce()) {
         if let (true, Ok(now)) = (self.ready, NotifyState::monotonic_usec_now()) {
             send(&[NotifyState::Reloading, now]);
@@ -127,11 +126,12 @@ impl Service {
     }
 }
 
-/// A manager that does not listen any more is no reason to stop filming.
+/// Sends a notification. Errors are ignored: filming goes on without a manager.
 fn send(state: &[NotifyState]) {
     let _ = sd_notify::notify(state);
 }
 
+/// The line of status.
 fn status(s: &Snapshot) -> String {
     let lost = s.lost_in_camera + s.dropped_before_tracker + s.undecodable;
     let frames = format!(

@@ -1,10 +1,10 @@
-//! One capture or replay from the command line: open, run, show, report.
+//! One run of `capture` or `replay`: opens the source, runs the capture, shows it, reports the end.
 
 use super::camera::CameraArgs;
+use super::command_error::{CommandError, FAILED};
 use super::common::Common;
-use super::ended::{Ended, FAILED};
 use super::hangup::{Reload, SighupAction};
-use super::output::say;
+use super::output::eprint_line;
 use super::recording::{self, RecordOption};
 use super::service::Service;
 use super::supervisor::CaptureSupervisor;
@@ -12,7 +12,7 @@ use crate::config::Config;
 use crate::files::OutputFolder;
 use crate::outline::{self, OutlineSpec};
 use crate::runtime::{self, Failure, Job, Pace, Running, Summary};
-use crate::source::{Source, SourceError, SourceInfo};
+use crate::source::{Source, SourceInfo};
 use crate::tui;
 use anyhow::anyhow;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -22,23 +22,24 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Time between two pictures, with and without a screen.
+/// Interval of preview pictures with and without a screen.
 const PREVIEW_SCREEN: Duration = Duration::from_millis(80);
 const PREVIEW_HEADLESS: Duration = Duration::MAX;
 
-/// What a command captures from, and how.
+/// What `capture` and `replay` run with, apart from their common arguments.
 pub struct Plan<'a> {
     pub input: &'a Path,
+    /// Rate of a folder of pictures, frames per second.
     pub fps: Option<f64>,
-    /// `None`: live if the source is, else at its own pace.
+    /// `None`: live for a live source, else the source's own pace.
     pub pace: Option<Pace>,
     pub record: &'a RecordOption,
-    /// The arguments on the camera, for a command that films.
+    /// The camera options, for a command that films.
     pub camera: Option<&'a CameraArgs>,
 }
 
 impl Plan<'_> {
-    /// A camera cannot be slowed down or sped up, whatever the command.
+    /// A live source is always processed live: it cannot be slowed down or sped up.
     fn pace(&self, live: bool) -> Pace {
         if live {
             return Pace::Live;
@@ -47,12 +48,13 @@ impl Plan<'_> {
     }
 }
 
-/// Runs a capture from the first frame to the last line.
-pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
+/// Runs a capture from the first frame to the last message.
+pub fn run(common: &Common, plan: Plan) -> Result<(), CommandError> {
     let config = common.config(plan.camera)?;
     let headless = common.headless || common.stream.is_some();
-    refuse_unfit(common, &plan, headless)?;
-    let source = runtime::open(plan.input, &config.camera, plan.fps).map_err(no_input)?;
+    check_arguments(common, &plan, headless)?;
+    let source =
+        runtime::open(plan.input, &config.camera, plan.fps).map_err(CommandError::no_input)?;
     let job = job(common, &plan, config, &*source, headless)?;
     let action = SighupAction::of_this_process();
     let stop = stop_on_signals(action == SighupAction::Stop)?;
@@ -61,8 +63,8 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
     }
     warn_of_no_output(common, headless);
     init_log(headless);
-    let reload = Reload::new(common, plan.camera, &job.config, action)
-        .map_err(|e| Ended::Failed(e.into()))?;
+    let reload =
+        Reload::new(common, plan.camera, &job.config, action).map_err(CommandError::failed)?;
     let service = Service::from_env(job.config.camera.timeout_s);
     let running = runtime::start(source, job)?;
     let mut supervisor = CaptureSupervisor {
@@ -81,46 +83,48 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), Ended> {
     let (summary, failure) = running.join();
     watched?;
     for line in messages {
-        say(&format!("arborcam: {line}"));
+        eprint_line(&format!("arborcam: {line}"));
     }
     report(summary.as_ref(), failure, stop.load(Ordering::SeqCst))
 }
 
-/// Refuses, before anything is filmed, arguments that could not be followed in the end.
-fn refuse_unfit(common: &Common, plan: &Plan, headless: bool) -> Result<(), Ended> {
+/// Checks, before anything is filmed, what would otherwise only fail at the end.
+fn check_arguments(common: &Common, plan: &Plan, headless: bool) -> Result<(), CommandError> {
     if !headless && !std::io::stdout().is_terminal() {
-        return Err(Ended::BadUsage(tui::TuiError::NoTerminal(None).into()));
+        return Err(CommandError::BadUsage(
+            tui::TuiError::NoTerminal(None).into(),
+        ));
     }
-    common.shape.refuse_drawn()?;
+    common.shape.reject_image_envelope()?;
     if let Some(dir) = &common.out {
-        // Created and dropped: nothing of it is left.
-        OutputFolder::create(dir).map_err(|e| Ended::Failed(e.into()))?;
+        // Created only as a test; dropping it removes it.
+        OutputFolder::create(dir).map_err(CommandError::failed)?;
         let unfinished = runtime::unfinished_dir(dir);
         if unfinished.exists() {
             return Err(Failure::UnfinishedIsThere { dir: unfinished }.into());
         }
     }
-    plan.record.refuse_unfit()
+    plan.record.check()
 }
 
-/// What is to be done with this source.
+/// The job of the runtime for this source.
 ///
 /// # Errors
-/// A file in the arguments is for a picture of another size, or cannot be read.
+/// A file in the arguments cannot be read, or is for another picture size.
 fn job(
     common: &Common,
     plan: &Plan,
     config: Config,
     source: &dyn Source,
     headless: bool,
-) -> Result<Job, Ended> {
+) -> Result<Job, CommandError> {
     let info = source.describe();
-    common.shape.fits(info.size)?;
-    common.scale.fits(info.size)?;
+    common.shape.check_size(info.size)?;
+    common.scale.check_size(info.size)?;
     let outline = match &common.outline {
         OutlineSpec::Auto => None,
         OutlineSpec::File(path) => {
-            Some(outline::load(path, info.size).map_err(|e| Ended::BadUsage(e.into()))?)
+            Some(outline::load(path, info.size).map_err(CommandError::bad_usage)?)
         }
     };
     Ok(Job {
@@ -138,10 +142,10 @@ fn job(
     })
 }
 
-/// Says so if the camera does not give what it was asked for.
+/// Reports a camera format other than the requested one.
 pub fn warn_of_other_format(info: &SourceInfo) {
     if info.live && info.format.asked != info.format.given {
-        say(&format!(
+        eprint_line(&format!(
             "arborcam: asked for {}, the camera gives {}",
             info.format.asked, info.format.given
         ));
@@ -157,13 +161,13 @@ fn warn_of_no_output(common: &Common, headless: bool) {
     } else {
         " but what key e exports"
     };
-    say(&format!(
+    eprint_line(&format!(
         "arborcam: warning: without --out nothing is written{but}"
     ));
 }
 
-/// Messages that are still to be printed; all of them after a screen, which has shown them only as
-/// long as it was there.
+/// Messages still to be printed. After a screen these are all warnings again, because those on the
+/// screen disappear with it.
 fn last_messages(running: &Running, headless: bool) -> Vec<String> {
     if headless {
         return running.news();
@@ -172,28 +176,32 @@ fn last_messages(running: &Running, headless: bool) -> Vec<String> {
     warnings.iter().map(|w| format!("warning: {w}")).collect()
 }
 
-/// A flag that is set when the user or the system asks for the end; by SIGHUP as well if
-/// `by_hangup`.
-pub fn stop_on_signals(by_hangup: bool) -> Result<Arc<AtomicBool>, Ended> {
+/// The signals that end a command; SIGHUP only if `by_hangup`.
+pub fn ending_signals(by_hangup: bool) -> Vec<i32> {
+    let mut signals = vec![SIGINT, SIGTERM];
+    if by_hangup {
+        signals.push(SIGHUP);
+    }
+    signals
+}
+
+/// A flag that is set by the signals that end a command; by SIGHUP only if `by_hangup`.
+///
+/// # Errors
+/// The signals cannot be caught.
+pub fn stop_on_signals(by_hangup: bool) -> Result<Arc<AtomicBool>, CommandError> {
     let stop = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM]
-        .into_iter()
-        .chain(by_hangup.then_some(SIGHUP))
-    {
-        // Twice the same signal ends at once, without a capture: a disk that hangs must not make
-        // the program immortal.
+    for signal in ending_signals(by_hangup) {
+        // A second signal ends the program at once, without a capture: otherwise nothing could end
+        // it while a disk hangs.
         signal_hook::flag::register_conditional_shutdown(signal, i32::from(FAILED), stop.clone())
             .and_then(|_| signal_hook::flag::register(signal, stop.clone()))
-            .map_err(|e| Ended::Failed(e.into()))?;
+            .map_err(CommandError::failed)?;
     }
     Ok(stop)
 }
 
-pub fn no_input(e: SourceError) -> Ended {
-    Ended::NoInput(e.into())
-}
-
-/// Messages to standard error where there is no screen that they would spoil.
+/// Sends log messages to standard error, unless they would overwrite a screen on the terminal.
 pub fn init_log(headless: bool) {
     if headless || !std::io::stderr().is_terminal() {
         let filter = tracing_subscriber::EnvFilter::try_from_env("ARBORCAM_LOG")
@@ -207,25 +215,30 @@ pub fn init_log(headless: bool) {
     }
 }
 
-/// The closing lines, and the exit status.
-fn report(summary: Option<&Summary>, failure: Option<Failure>, stopped: bool) -> Result<(), Ended> {
+/// Prints the closing lines, and returns the error that decides the exit status.
+fn report(
+    summary: Option<&Summary>,
+    failure: Option<Failure>,
+    stopped: bool,
+) -> Result<(), CommandError> {
     if let Some(s) = summary {
         for line in closing_lines(s) {
-            say(&line);
+            eprint_line(&line);
         }
         if let Some(recorded) = &s.recorded {
-            say(&recording::closing_line(recorded, s.not_recorded));
+            eprint_line(&recording::closing_line(recorded, s.not_recorded));
         }
     }
     match failure {
-        // Not one frame: there was no usable camera, whatever it said when it was opened.
-        Some(Failure::Source(e)) if summary.is_none_or(|s| s.frames == 0) => Err(no_input(e)),
+        // No frame at all: the camera is not usable, although it could be opened.
+        Some(Failure::Source(e)) if summary.is_none_or(|s| s.frames == 0) => {
+            Err(CommandError::no_input(e))
+        }
         Some(failure) => Err(failure.into()),
-        None if stopped => Err(Ended::Stopped),
-        // Tracks alone are not what was asked for; a script that looks for tree.glb is to
-        // learn it from the status.
+        None if stopped => Err(CommandError::Stopped),
+        // Without a tree there is no tree.glb: scripts must see that in the exit status.
         None => match summary.filter(|s| s.tree.is_none()) {
-            Some(s) => Err(Ended::Failed(no_tree(s))),
+            Some(s) => Err(CommandError::Failed(no_tree(s))),
             None => Ok(()),
         },
     }

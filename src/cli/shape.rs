@@ -1,6 +1,6 @@
-//! What the user draws for the tree's shape: the trunk that it keeps, the space that it fills.
+//! Options for the shape of the tree: its trunk and the envelope of its branches.
 
-use super::ended::Ended;
+use super::command_error::CommandError;
 use crate::config::{Config, EnvelopeKind, Leader};
 use crate::model::Size;
 use anyhow::anyhow;
@@ -8,22 +8,22 @@ use clap::Args;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// The options of `capture`, `replay` and of the commands that read a capture on the shape.
+/// Shape options of `capture`, `replay` and the commands that read a capture.
 #[derive(Clone, Debug, Default, Args)]
 pub struct ShapeArgs {
-    /// Keeps one trunk up to the tip, as conifers have: the line that was drawn in FILE (JSON:
-    /// width, height, polyline_px from either end), or `auto` for the straightest way up.
+    /// Keep one trunk up to the top, as conifers have: the line in FILE (JSON: width, height,
+    /// polyline_px from either end), or `auto` for the straightest path upwards.
     #[arg(long, value_name = "FILE|auto", value_parser = Trunk::parse)]
     trunk: Option<Trunk>,
-    /// What the branches fill: the outline turned about its axis (`revolution`), the hull of the
-    /// branches seen, turned (`hull`), or for `export` and `render` the opaque part of an image:
-    /// the tree is cut to it.
+    /// Envelope of the branches: the outline rotated about its axis (`revolution`), the rotated
+    /// hull of the visible branches (`hull`), or, for `export` and `render`, an image to whose
+    /// opaque part the tree is cut.
     #[arg(long, value_name = "revolution|hull|IMAGE", value_parser = Envelope::parse)]
     envelope: Option<Envelope>,
 }
 
 impl ShapeArgs {
-    /// The command line over the settings.
+    /// Applies the options of the command line.
     pub fn set(&self, config: &mut Config) {
         match &self.trunk {
             Some(Trunk::Auto) => config.shape.leader = Leader::Auto,
@@ -38,29 +38,36 @@ impl ShapeArgs {
         }
     }
 
-    /// The shape that the tree is to be cut to, if one was drawn.
-    pub fn drawn(&self) -> Option<&Path> {
+    /// The image that the tree is cut to, if one is given.
+    pub fn image(&self) -> Option<&Path> {
         match &self.envelope {
             Some(Envelope::Image(path)) => Some(path),
             _ => None,
         }
     }
 
-    /// Refuses a drawn shape where the tree is only being filmed.
-    pub fn refuse_drawn(&self) -> Result<(), Ended> {
-        self.drawn().map_or(Ok(()), |path| {
-            Err(Ended::BadUsage(anyhow!(
+    /// Checks that the tree is not to be cut to an image, which a command that films cannot do.
+    ///
+    /// # Errors
+    /// An image is given.
+    pub fn reject_image_envelope(&self) -> Result<(), CommandError> {
+        match self.image() {
+            None => Ok(()),
+            Some(path) => Err(CommandError::BadUsage(anyhow!(
                 "--envelope takes revolution or hull here; `arborcam export` and `render` cut the captured tree to {}",
                 path.display()
-            )))
-        })
+            ))),
+        }
     }
 
-    /// Refuses a trunk that was drawn on a picture of another size.
-    pub fn fits(&self, size: Size) -> Result<(), Ended> {
+    /// Checks that the trunk was drawn on a picture of this size.
+    ///
+    /// # Errors
+    /// It was drawn on one of another size.
+    pub fn check_size(&self, size: Size) -> Result<(), CommandError> {
         match &self.trunk {
             Some(Trunk::Drawn(line)) if Size::new(line.width, line.height) != size => {
-                Err(Ended::BadUsage(anyhow!(
+                Err(CommandError::BadUsage(anyhow!(
                     "--trunk is for a picture of {}x{}, this one is {size}; draw it on a frame of this clip",
                     line.width,
                     line.height
@@ -71,19 +78,19 @@ impl ShapeArgs {
     }
 }
 
-/// The trunk that is kept.
+/// Value of `--trunk`.
 #[derive(Clone, Debug)]
 enum Trunk {
     Auto,
     Drawn(Line),
 }
 
-/// A line that was drawn on a picture of this size.
+/// A line in a picture of the given size.
 #[derive(Clone, Debug, Deserialize)]
 struct Line {
     width: u32,
     height: u32,
-    /// From the foot up, once it is read.
+    /// Points of the line (u, v), px; after reading in order from the foot upwards.
     polyline_px: Vec<[f64; 2]>,
 }
 
@@ -101,7 +108,7 @@ impl Trunk {
         let [first, .., last] = line.polyline_px[..] else {
             return Err("polyline_px needs at least two points".into());
         };
-        // Drawn from the top down: v grows downwards, and a trunk stands on its foot.
+        // v grows downwards: this line was drawn from the top.
         if first[1] < last[1] {
             line.polyline_px.reverse();
         }
@@ -109,7 +116,7 @@ impl Trunk {
     }
 }
 
-/// What the branches fill.
+/// Value of `--envelope`.
 #[derive(Clone, Debug)]
 enum Envelope {
     Kind(EnvelopeKind),
@@ -121,7 +128,7 @@ impl Envelope {
         match text {
             "revolution" => Ok(Self::Kind(EnvelopeKind::Revolution)),
             "hull" => Ok(Self::Kind(EnvelopeKind::Hull)),
-            // A word that is no file is more likely a slip of the pen than a picture.
+            // A word that is no existing file is more likely a misspelt keyword.
             path if Path::new(path).is_file() => Ok(Self::Image(path.into())),
             _ => Err("give revolution, hull, or an image that is there".into()),
         }
@@ -145,7 +152,7 @@ mod tests {
         }
     }
 
-    /// A trunk drawn from the top down is the same trunk.
+    /// A line drawn from the top down is the same trunk.
     #[test]
     fn a_trunk_may_be_drawn_from_either_end() {
         let up = parsed("[[30, 40], [31, 20], [29, 4]]");

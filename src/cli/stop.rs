@@ -1,46 +1,41 @@
-//! Ctrl-C in commands that work something out and write it to a file.
+//! Signals in commands that compute something and write it to a file.
 
-use super::ended::{Ended, STOPPED};
+use super::command_error::{CommandError, STOPPED};
 use super::hangup::SighupAction;
-use super::session::stop_on_signals;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use super::session::{ending_signals, stop_on_signals};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// The wish to end. As long as nothing is written it is fulfilled at once, however long a step
-/// takes; from then on it is for the writer, so that nothing half-written is left.
+/// Stops a command by a signal. Before anything is written the signal ends the process at once,
+/// even in a long computation; after that it sets a flag, and the writer removes incomplete files.
 pub struct Stop {
     at_once: Arc<AtomicBool>,
-    wish: Arc<AtomicBool>,
+    requested: Arc<AtomicBool>,
 }
 
 impl Stop {
     /// # Errors
     /// The signals cannot be caught.
-    pub fn on_signals() -> Result<Self, Ended> {
+    pub fn on_signals() -> Result<Self, CommandError> {
         let at_once = Arc::new(AtomicBool::new(true));
         let by_hangup = SighupAction::ends_this_process();
-        for signal in [SIGINT, SIGTERM]
-            .into_iter()
-            .chain(by_hangup.then_some(SIGHUP))
-        {
+        for signal in ending_signals(by_hangup) {
             signal_hook::flag::register_conditional_shutdown(
                 signal,
                 i32::from(STOPPED),
                 at_once.clone(),
             )
-            .map_err(|e| Ended::Failed(e.into()))?;
+            .map_err(CommandError::failed)?;
         }
         Ok(Self {
             at_once,
-            wish: stop_on_signals(by_hangup)?,
+            requested: stop_on_signals(by_hangup)?,
         })
     }
 
-    /// From now on there is something to be taken away again; the writer looks at what this
-    /// gives.
+    /// From now on signals only set the flag that this returns; the writer must check it.
     pub fn while_writing(&self) -> &AtomicBool {
         self.at_once.store(false, Ordering::SeqCst);
-        &self.wish
+        &self.requested
     }
 }

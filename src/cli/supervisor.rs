@@ -1,7 +1,7 @@
-//! Looks after a running capture, with and without a screen: its length, its settings, the service
+//! Supervises a running capture, with or without a screen: its length, its settings, its service
 //! manager.
 
-use super::ended::Ended;
+use super::command_error::CommandError;
 use super::hangup::Reload;
 use super::service::Service;
 use crate::model::{Control, Snapshot};
@@ -11,20 +11,20 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Time between two looks at a capture without a screen.
+/// Interval at which a capture without a screen is checked.
 const HEADLESS_TICK: Duration = Duration::from_millis(20);
 
-/// Looks after a capture from outside until it has ended.
+/// Supervises a capture until it has ended.
 pub struct CaptureSupervisor<'a> {
     pub running: &'a Running,
     pub reload: Reload<'a>,
     pub service: Option<Service>,
-    /// Sensor time of the capture at which it ends, s.
+    /// Sensor time at which the capture ends, s from its begin.
     pub end_s: f64,
 }
 
 impl CaptureSupervisor<'_> {
-    /// Without a screen: messages and progress on standard error.
+    /// Supervises without a screen; prints messages and progress to standard error.
     pub fn watch(&mut self, stop: &AtomicBool) {
         let progress = tui::Progress::new();
         while !self.running.finished() {
@@ -34,7 +34,7 @@ impl CaptureSupervisor<'_> {
             for line in self.running.news() {
                 progress.tell(&format!("arborcam: {line}"));
             }
-            if let Some(snapshot) = self.look() {
+            if let Some(snapshot) = self.check() {
                 progress.update(&snapshot);
             }
             std::thread::sleep(HEADLESS_TICK);
@@ -42,29 +42,30 @@ impl CaptureSupervisor<'_> {
         progress.finish();
     }
 
-    /// With a screen, and after it is left until all is written.
+    /// Supervises with a screen, and after the user has left it until everything is written.
     ///
     /// # Errors
     /// The terminal cannot be used.
-    pub fn show(&mut self, stop: &AtomicBool) -> Result<(), Ended> {
+    pub fn show(&mut self, stop: &AtomicBool) -> Result<(), CommandError> {
         let shown = tui::run(self, tui::Options::from_env(), stop);
         if shown.is_err() {
             self.running.stop();
         }
         while !self.running.finished() {
-            self.look();
+            self.check();
             std::thread::sleep(HEADLESS_TICK);
         }
-        shown.map_err(|e| Ended::BadUsage(e.into()))
+        shown.map_err(CommandError::bad_usage)
     }
 
-    /// Newest state, if there is a new one.
-    fn look(&mut self) -> Option<Arc<Snapshot>> {
+    /// Checks the length, the settings and the service manager; returns the newest state if it is
+    /// new.
+    fn check(&mut self) -> Option<Arc<Snapshot>> {
         let snapshot = self.running.latest();
         if snapshot.as_ref().is_some_and(|s| s.time_s >= self.end_s) {
             self.running.end();
         }
-        if self.reload.is_wanted() {
+        if self.reload.is_requested() {
             self.reload_settings();
         }
         if let Some(service) = &mut self.service {
@@ -85,7 +86,7 @@ impl CaptureSupervisor<'_> {
 
 impl tui::Session for CaptureSupervisor<'_> {
     fn latest(&mut self) -> Option<Arc<Snapshot>> {
-        self.look()
+        self.check()
     }
 
     fn send(&mut self, control: Control) {

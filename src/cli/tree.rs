@@ -1,11 +1,11 @@
-//! The options on what a command may change of a document's tree.
+//! Options for the tree of a capture, for the commands that export, draw or animate it.
 
-use super::ended::Ended;
-use super::idle;
-use super::output::say;
+use super::command_error::CommandError;
+use super::output::eprint_line;
 use super::scale::ScaleArgs;
 use super::shape::ShapeArgs;
-use crate::config::{Config, ConfigError, LeafShow};
+use super::unused;
+use crate::config::{Config, LeafShow};
 use crate::document::Document;
 use crate::export::read_template;
 use crate::model::{Luma, Size};
@@ -16,33 +16,33 @@ use anyhow::Context;
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 
-/// Changes to a capture's own settings.
+/// Options that override the settings of the capture.
 #[derive(Debug, Default, Args)]
 pub struct TreeArgs {
     /// Settings that differ from those of the capture (TOML; see config/arborcam.toml).
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Planes about the trunk on which the tree is repeated, the one that was filmed included.
+    /// Number of planes about the trunk on which the branches are repeated, filmed one included.
     #[arg(long, value_name = "N")]
     planes: Option<u32>,
     #[command(flatten)]
     shape: ShapeArgs,
-    /// Triangles of the wood, 10000 to 100000 for most uses.
+    /// Number of triangles of the wood; 10000 to 100000 for most uses.
     #[arg(long, value_name = "N")]
     triangles: Option<u32>,
-    /// Whether the tree bears leaves; `auto` looks at the film.
+    /// Whether the tree has leaves; `auto` decides by the film.
     #[arg(long, value_name = "WHEN")]
     leaves: Option<Show>,
-    /// A leaf or a small cluster of leaves of your own (.glb, .gltf) instead of the built-in one.
+    /// Model of a leaf or a small cluster of leaves (.glb, .gltf) instead of the built-in one.
     #[arg(long, value_name = "FILE")]
     leaf: Option<PathBuf>,
-    /// How dense the leaves are, as a grey image of the film's size, white where they are densest.
+    /// Density of the leaves as a grey image of the film's size, white where it is highest.
     #[arg(long, value_name = "IMAGE")]
     density: Option<PathBuf>,
-    /// Where chance is involved (curl, twigs, leaves, wind), the same number gives the same tree.
+    /// Seed of the random numbers (curl, twigs, leaves, wind); the same seed gives the same tree.
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
-    /// Length of the animation at most, s; the last so many seconds of the film.
+    /// Longest animation, s; of a longer film the end is used.
     #[arg(long, value_name = "SECONDS")]
     animation_s: Option<f64>,
     #[command(flatten)]
@@ -56,25 +56,25 @@ enum Show {
     Off,
 }
 
-/// How much of the end of a film is read.
+/// The part of a film, up to its end, of which poses are read.
 #[derive(Clone, Copy, Debug)]
 pub enum Tail {
-    /// As much as an animation holds (`export.animation_s`).
+    /// The length of an animation (`export.animation_s`).
     Animation,
-    /// So many seconds.
+    /// The last seconds.
     Seconds(f64),
-    /// From this moment of the film on, s.
+    /// From this moment of the film, s.
     From(f64),
     Whole,
 }
 
 impl Tail {
-    /// Its length in a film of `film_s`, s.
+    /// Its length in a film of length `film_s`, s.
     fn length_s(self, film_s: f64, config: &Config) -> f64 {
         match self {
             Self::Animation => config.export.animation_s,
             Self::Seconds(length_s) => length_s,
-            // The last frame's own time is a little less than the film's.
+            // Two seconds more, because the last frame is earlier than the end of the film.
             Self::From(at_s) => (film_s - at_s).max(0.0) + 2.0,
             Self::Whole => film_s + 1.0,
         }
@@ -82,14 +82,9 @@ impl Tail {
 }
 
 impl TreeArgs {
-    /// The settings of the capture with what is to be changed of them: the file over the capture's,
-    /// the command line over both.
-    fn config(&self, own: &Config) -> Result<Config, ConfigError> {
-        let mut config = match &self.config {
-            Some(path) => own.overlaid(path)?,
-            None => own.clone(),
-        };
-        self.shape.set(&mut config);
+    /// Applies the options of the command line.
+    fn set(&self, config: &mut Config) {
+        self.shape.set(config);
         if let Some(planes) = self.planes {
             config.shape.planes = planes;
         }
@@ -109,47 +104,51 @@ impl TreeArgs {
         if let Some(animation_s) = self.animation_s {
             config.export.animation_s = animation_s;
         }
-        self.scale.set(&mut config);
-        config.check()?;
-        Ok(config)
+        self.scale.set(config);
     }
 
-    /// Reads the document in `dir`, with the poses of the end of its film, and prepares the tree
-    /// that these options ask for.
+    /// Reads the capture in `dir`, with the poses of the end of its film, and prepares its tree as
+    /// these options say. The settings are layered: command line over configuration file over those
+    /// of the capture. `set` applies the options that only the calling command has.
     ///
     /// # Errors
-    /// The document or a file of an option cannot be read, a setting is out of range, or the
-    /// document lacks what a new shape is made from.
-    pub fn prepare(&self, dir: &Path, tail: Tail) -> Result<PreparedTree, Ended> {
+    /// The capture or a file of an option cannot be read, a setting is out of range, or the capture
+    /// lacks the data for another shape.
+    pub fn prepare(
+        &self,
+        dir: &Path,
+        tail: Tail,
+        set: impl FnOnce(&mut Config),
+    ) -> Result<PreparedTree, CommandError> {
         let note = Document::note(dir)?;
-        let config = self.config(&note.config).map_err(bad_usage)?;
+        let config = note.config.layered(self.config.as_deref(), |config| {
+            self.set(config);
+            set(config);
+        })?;
         if let Some(file) = &self.config {
-            idle::settings(file, &note.config, &config);
+            unused::note_film_settings(file, &note.config, &config);
         }
         let length_s = tail.length_s(note.timing.duration_s, &config);
         let document = Document::read(dir, length_s)?;
         let size = document.skeleton.image_size;
-        self.shape.fits(size)?;
-        self.scale.fits(size)?;
+        self.shape.check_size(size)?;
+        self.scale.check_size(size)?;
+        let cut_to = self.read_envelope()?;
+        let leaf = self.leaf.as_deref().map(read_template).transpose();
         let options = TreeOptions {
-            cut_to: self.drawn()?,
-            leaf: self
-                .leaf
-                .as_deref()
-                .map(read_template)
-                .transpose()
-                .map_err(bad_usage)?,
-            density: self.density(size)?,
+            cut_to,
+            leaf: leaf.map_err(CommandError::bad_usage)?,
+            density: self.read_density(size)?,
             config,
         };
-        let tree = PreparedTree::new(document, options).map_err(|e| self.unfit(e))?;
-        self.tell(&tree);
+        let tree = PreparedTree::new(document, options).map_err(|e| self.prepare_error(e))?;
+        self.print_notes(&tree);
         Ok(tree)
     }
 
-    /// The drawn shape that the tree is to be cut to.
-    fn drawn(&self) -> Result<Option<Drawn>, Ended> {
-        let Some(path) = self.shape.drawn() else {
+    /// The shape that the tree is to be cut to.
+    fn read_envelope(&self) -> Result<Option<Drawn>, CommandError> {
+        let Some(path) = self.shape.image() else {
             return Ok(None);
         };
         let drawn = std::fs::read(path)
@@ -157,32 +156,35 @@ impl TreeArgs {
             .and_then(|bytes| Ok(Drawn::of_image(&bytes)?));
         match drawn {
             Ok(drawn) => Ok(Some(drawn)),
-            Err(e) => Err(of_envelope(path, e)),
+            Err(e) => Err(envelope_error(path, e)),
         }
     }
 
-    fn density(&self, size: Size) -> Result<Option<Luma>, Ended> {
+    /// The image of the density of the leaves.
+    fn read_density(&self, size: Size) -> Result<Option<Luma>, CommandError> {
         let Some(path) = self.density.as_deref() else {
             return Ok(None);
         };
-        outline::density(path, size).map(Some).map_err(bad_usage)
+        outline::density(path, size)
+            .map(Some)
+            .map_err(CommandError::bad_usage)
     }
 
-    /// Names the option that a shape comes from.
-    fn unfit(&self, e: PrepareError) -> Ended {
-        match (e, self.shape.drawn()) {
-            (PrepareError::Shape(e), Some(path)) => of_envelope(path, e.into()),
+    /// Adds the option to an error in the shape that it gives.
+    fn prepare_error(&self, e: PrepareError) -> CommandError {
+        match (e, self.shape.image()) {
+            (PrepareError::Shape(e), Some(path)) => envelope_error(path, e.into()),
             (e, _) => e.into(),
         }
     }
 
-    /// What became of the tree, and of an option that changes nothing.
-    fn tell(&self, tree: &PreparedTree) {
+    /// Prints how the tree was cut, and whether `--leaf` has no effect.
+    fn print_notes(&self, tree: &PreparedTree) {
         if let Some(cut) = &tree.cut {
-            say(&told(cut));
+            eprint_line(&cut_summary(cut));
         }
         if self.leaf.is_some() && tree.dressed.foliage.groups.is_empty() {
-            idle::tell(
+            unused::note(
                 "--leaf",
                 "the tree bears no leaves; put them on with --leaves on",
             );
@@ -190,15 +192,13 @@ impl TreeArgs {
     }
 }
 
-fn bad_usage(e: impl Into<anyhow::Error>) -> Ended {
-    Ended::BadUsage(e.into())
+/// An error in the image of `--envelope`.
+fn envelope_error(path: &Path, e: anyhow::Error) -> CommandError {
+    CommandError::BadUsage(e.context(format!("--envelope {}", path.display())))
 }
 
-fn of_envelope(path: &Path, e: anyhow::Error) -> Ended {
-    Ended::BadUsage(e.context(format!("--envelope {}", path.display())))
-}
-
-fn told(cut: &Cut) -> String {
+/// The line that says how the tree was cut.
+fn cut_summary(cut: &Cut) -> String {
     if cut.larger {
         return "arborcam: warning: the shape of --envelope holds the whole tree; nothing is cut"
             .to_owned();
@@ -212,9 +212,9 @@ fn told(cut: &Cut) -> String {
     )
 }
 
-/// Says what the document lacks.
-pub fn warn(tree: &PreparedTree) {
+/// Prints what the capture lacks.
+pub fn print_warnings(tree: &PreparedTree) {
     for warning in &tree.document.warnings {
-        say(&format!("arborcam: warning: {warning}"));
+        eprint_line(&format!("arborcam: warning: {warning}"));
     }
 }

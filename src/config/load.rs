@@ -80,11 +80,9 @@ impl Config {
         Ok(config)
     }
 
-    /// These settings, replaced by those that a TOML file names.
-    ///
-    /// # Errors
-    /// As for [`Config::load`].
-    pub fn overlaid(&self, path: &Path) -> Result<Self, ConfigError> {
+    /// These settings, replaced by those that a TOML file names. The combination of both is not
+    /// checked.
+    fn overlaid(&self, path: &Path) -> Result<Self, ConfigError> {
         let name = path.display().to_string();
         let text = read(path)?;
         // First over the defaults: the error then names the line.
@@ -102,11 +100,8 @@ impl Config {
                 (_, keys) => drop(all.insert(section, keys)),
             }
         }
-        let config: Self = all
-            .try_into()
-            .map_err(|e| ConfigError::bad_entry(&name, 1, &e))?;
-        config.check()?;
-        Ok(config)
+        all.try_into()
+            .map_err(|e| ConfigError::bad_entry(&name, 1, &e))
     }
 
     /// Refuses values with which a stage could not work.

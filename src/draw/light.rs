@@ -4,7 +4,7 @@ use super::camera::{Camera, View};
 use super::canvas::{Canvas, Corner};
 use super::model::{Part, Posed};
 use super::rgba::Rgba;
-use nalgebra::Vector3;
+use nalgebra::{Point2, Vector3};
 
 /// How a picture is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,7 +54,8 @@ pub fn picture(tree: &Posed, camera: &Camera, look: &Look) -> Rgba {
 struct Eye {
     axes: [Vector3<f32>; 3],
     aim: Vector3<f32>,
-    middle: [f32; 2],
+    /// Middle of the picture, samples.
+    middle: Point2<f32>,
     scale: f32,
     sun: Vector3<f32>,
     /// Model units.
@@ -67,7 +68,7 @@ impl Eye {
         Self {
             axes: camera.view.axes().map(|a| a.cast::<f32>()),
             aim: camera.aim.coords.cast::<f32>(),
-            middle: camera.middle_px.map(|m| n * m as f32),
+            middle: Point2::from(camera.middle_px.map(|m| n * m as f32)),
             scale: n * camera.scale as f32,
             sun: sun(camera.view),
             thicker: 0.0,
@@ -78,8 +79,8 @@ impl Eye {
         let d = p - self.aim;
         let [right, up, towards] = &self.axes;
         [
-            self.middle[0] + self.scale * d.dot(right),
-            self.middle[1] - self.scale * d.dot(up),
+            self.middle.x + self.scale * d.dot(right),
+            self.middle.y - self.scale * d.dot(up),
             d.dot(towards),
         ]
     }

@@ -1,8 +1,9 @@
-//! What `arborcam analyze` is asked for.
+//! Options of `arborcam analyze`.
 
-use super::super::ended::Ended;
+use super::super::command_error::CommandError;
+use super::super::common::moment;
 use super::super::scale::ScaleArgs;
-use crate::config::{Config, Excited};
+use crate::config::{Config, ConfigError, Excited};
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
 use std::collections::BTreeSet;
@@ -10,32 +11,32 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub struct AnalyzeArgs {
-    /// Captures: folders that --out of `capture` or `replay` has made. Several are compared with
-    /// the first.
+    /// Captures: folders written by `capture` or `replay --out`. Several captures are compared with
+    /// the first one.
     #[arg(required = true, value_name = "DIR")]
     pub dirs: Vec<PathBuf>,
     /// Print JSON.
     #[arg(long)]
     pub json: bool,
-    /// Also write a page with plots (HTML, one file); it must not exist.
+    /// Also write a page with plots (HTML, in one file); the file must not exist.
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
-    /// Put the answers into the captures: into nodes.csv, and into the model that shows them
-    /// (tree.glb). Without it nothing is written into a capture.
+    /// Write the results to the captures, to nodes.csv and tree.glb. Without it nothing is written
+    /// to a capture.
     #[arg(long)]
     pub update: bool,
-    /// What made the tree sway; `auto` looks at the motion.
+    /// Excitation of the tree; `auto` decides by the motion.
     #[arg(long, value_name = "WHAT")]
-    excitation: Option<Cause>,
-    /// First moment of the film to look at, s; without --from and --to it is the end of it,
-    /// `dynamics.window_s` long.
+    excitation: Option<ExcitationArg>,
+    /// Begin of the analysed part of the film, s. Without --from and --to its end is analysed, of
+    /// the length `dynamics.window_s`.
     #[arg(long, value_name = "SECONDS", value_parser = moment, allow_negative_numbers = true)]
     pub from: Option<f64>,
-    /// Last moment of the film to look at, s.
+    /// End of the analysed part of the film, s.
     #[arg(long, value_name = "SECONDS", value_parser = moment, allow_negative_numbers = true)]
     pub to: Option<f64>,
-    /// Whether several captures are of the same tree; `auto` looks how many branches stand in the
-    /// same place, and compares nothing where that is no evidence.
+    /// Whether several captures are of the same tree. `auto` decides by the number of branches in
+    /// the same place, and compares nothing if that is ambiguous.
     #[arg(long, value_name = "WHICH", default_value = "auto")]
     pub trees: Trees,
     #[command(flatten)]
@@ -46,7 +47,7 @@ pub struct AnalyzeArgs {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Cause {
+enum ExcitationArg {
     Auto,
     Release,
     Wind,
@@ -60,7 +61,7 @@ pub enum Trees {
 }
 
 impl Trees {
-    /// What the user says; `None` for nothing.
+    /// What the user states; `None` for `auto`.
     pub fn same(self) -> Option<bool> {
         match self {
             Self::Auto => None,
@@ -71,15 +72,15 @@ impl Trees {
 }
 
 impl AnalyzeArgs {
-    /// What clap does not look at.
+    /// Checks combinations of options, which clap cannot.
     ///
     /// # Errors
     /// A folder is given twice; the film would end before it begins; the report has no name.
-    pub fn check(&self) -> Result<(), Ended> {
+    pub fn check(&self) -> Result<(), CommandError> {
         let mut seen = BTreeSet::new();
         for dir in &self.dirs {
             if !seen.insert(dir.canonicalize().unwrap_or_else(|_| dir.clone())) {
-                return unfit(format!(
+                return bad_usage(format!(
                     "{} is given twice; give every capture once",
                     dir.display()
                 ));
@@ -87,12 +88,12 @@ impl AnalyzeArgs {
         }
         let [from, to] = self.within_s();
         if from >= to {
-            return unfit(format!(
+            return bad_usage(format!(
                 "--from {from} is not before --to {to}; --from comes first"
             ));
         }
         match &self.report {
-            Some(path) if path.file_name().is_none() => unfit(format!(
+            Some(path) if path.file_name().is_none() => bad_usage(format!(
                 "--report {} is no name for a file; choose another",
                 path.display()
             )),
@@ -100,7 +101,7 @@ impl AnalyzeArgs {
         }
     }
 
-    /// The part of the film that is looked at, s.
+    /// Begin and end of the analysed part of the film, s.
     pub fn within_s(&self) -> [f64; 2] {
         [
             self.from.unwrap_or(f64::NEG_INFINITY),
@@ -108,37 +109,27 @@ impl AnalyzeArgs {
         ]
     }
 
-    /// A capture's own settings with what is to be changed of them.
+    /// The settings for a capture: command line over configuration file over the capture's `own`.
     ///
     /// # Errors
-    /// The file of settings cannot be read, or a setting is out of range.
-    pub fn config(&self, own: &Config) -> Result<Config, Ended> {
-        let overlaid = self
-            .config
-            .as_ref()
-            .map_or_else(|| Ok(own.clone()), |path| own.overlaid(path));
-        let mut config = overlaid.map_err(|e| Ended::BadUsage(e.into()))?;
-        if let Some(cause) = self.excitation {
-            config.dynamics.excitation = match cause {
-                Cause::Auto => Excited::Auto,
-                Cause::Release => Excited::Release,
-                Cause::Wind => Excited::Wind,
+    /// The configuration file cannot be read, or a setting is out of range.
+    pub fn config(&self, own: &Config) -> Result<Config, ConfigError> {
+        own.layered(self.config.as_deref(), |config| self.set(config))
+    }
+
+    /// Applies the options of the command line.
+    fn set(&self, config: &mut Config) {
+        if let Some(excitation) = self.excitation {
+            config.dynamics.excitation = match excitation {
+                ExcitationArg::Auto => Excited::Auto,
+                ExcitationArg::Release => Excited::Release,
+                ExcitationArg::Wind => Excited::Wind,
             };
         }
-        self.scale.set(&mut config);
-        config.check().map_err(|e| Ended::BadUsage(e.into()))?;
-        Ok(config)
+        self.scale.set(config);
     }
 }
 
-fn unfit(what: String) -> Result<(), Ended> {
-    Err(Ended::BadUsage(anyhow!(what)))
-}
-
-fn moment(text: &str) -> Result<f64, String> {
-    let seconds = text
-        .parse()
-        .ok()
-        .filter(|s: &f64| s.is_finite() && *s >= 0.0);
-    seconds.ok_or_else(|| "give a number of seconds, 0 or more".to_owned())
+fn bad_usage(what: String) -> Result<(), CommandError> {
+    Err(CommandError::BadUsage(anyhow!(what)))
 }

@@ -1,4 +1,4 @@
-//! What `arborcam analyze` leaves in files.
+//! What `arborcam analyze` writes to files.
 
 use crate::files::{WriteError, write_files};
 use crate::model::{Skeleton, Swaying};
@@ -6,8 +6,9 @@ use crate::report::Study;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-/// The answers for the document, by node index: the amplitudes are those of the printed table.
-pub fn answers(skeleton: &Skeleton, analysed: Vec<Swaying>, study: &Study) -> Vec<Swaying> {
+/// The results for the tables, by node index: those of the analysis with the amplitudes of the
+/// printed table.
+pub fn with_amplitudes(skeleton: &Skeleton, analysed: Vec<Swaying>, study: &Study) -> Vec<Swaying> {
     let mut sway = analysed;
     for (node, sway) in skeleton.nodes.iter().zip(&mut sway) {
         let branch = study.branches.iter().find(|b| b.name == node.name.0);
@@ -18,11 +19,11 @@ pub fn answers(skeleton: &Skeleton, analysed: Vec<Swaying>, study: &Study) -> Ve
     sway
 }
 
-/// The report as a new file.
+/// Writes the report to a new file.
 ///
 /// # Errors
-/// It cannot be written, or was stopped; there is then none.
-pub fn put_beside(path: &Path, html: String, stop: &AtomicBool) -> Result<(), WriteError> {
+/// It cannot be written, or writing was stopped; no file is left then.
+pub fn write_report(path: &Path, html: String, stop: &AtomicBool) -> Result<(), WriteError> {
     let name = path
         .file_name()
         .unwrap_or_default()

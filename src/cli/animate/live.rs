@@ -1,4 +1,4 @@
-//! The animation on the terminal, with keys for the wind.
+//! Animations on the terminal, controlled by keys.
 
 use crate::animate::{Animator, Magnify, Pull, magnify, place_to_pull};
 use crate::model::{Pose, Skeleton};
@@ -6,28 +6,28 @@ use crate::tui::{AnimationCommand, Moving};
 use crate::views::PreparedTree;
 use std::sync::Arc;
 
-/// How far the rope pulls, degrees.
+/// Lean of a pulled tree, degrees.
 const LEAN_DEG: f64 = 12.0;
-/// The motion is magnified by this with every press, and by its powers from the lowest to the
-/// highest.
-const LARGER: f64 = 1.25;
-const STEPS: i8 = 12;
-/// Poses a second of the captured motion.
+/// Every key press magnifies the motion by this factor.
+const MAGNIFY_STEP: f64 = 1.25;
+/// Largest number of such steps, up or down.
+const MAX_STEPS: i8 = 12;
+/// Poses per second of the filmed motion.
 const FPS: f64 = 30.0;
 
-/// A tree in a wind that the user makes.
-pub struct InWind {
+/// A tree in wind that the user controls.
+pub struct WindAnimation {
     skeleton: Arc<Skeleton>,
     animator: Animator,
     rope: Option<Pull>,
     force: f64,
     direction_deg: f64,
-    larger: i8,
+    magnify_steps: i8,
     frame: u64,
 }
 
-impl InWind {
-    /// `animator` in wind as the configuration of `tree` has it.
+impl WindAnimation {
+    /// `animator` simulates the wind in the configuration of `tree`.
     pub fn new(tree: &PreparedTree, animator: Animator) -> Self {
         let wind = &tree.config.wind;
         let mut still = animator.clone();
@@ -38,13 +38,13 @@ impl InWind {
             animator,
             force: wind.force,
             direction_deg: wind.direction_deg,
-            larger: 0,
+            magnify_steps: 0,
             frame: 0,
         }
     }
 }
 
-impl Moving for InWind {
+impl Moving for WindAnimation {
     fn skeleton(&self) -> Arc<Skeleton> {
         self.skeleton.clone()
     }
@@ -66,8 +66,9 @@ impl Moving for InWind {
                 self.direction_deg = (self.direction_deg + f64::from(by)).rem_euclid(360.0)
             }
             AnimationCommand::Larger(by) => {
-                self.larger = (self.larger + by).clamp(-STEPS, STEPS);
-                self.animator.magnify(LARGER.powi(self.larger.into()));
+                self.magnify_steps = (self.magnify_steps + by).clamp(-MAX_STEPS, MAX_STEPS);
+                self.animator
+                    .magnify(MAGNIFY_STEP.powi(self.magnify_steps.into()));
             }
             AnimationCommand::Pull => {
                 let rope = if self.animator.pulled().is_some() {
@@ -92,12 +93,12 @@ impl Moving for InWind {
             self.force,
             name(self.force),
             self.direction_deg,
-            LARGER.powi(self.larger.into())
+            MAGNIFY_STEP.powi(self.magnify_steps.into())
         )
     }
 }
 
-/// What the wind of a force is called.
+/// Name of a force of wind on the Beaufort scale.
 fn name(force: f64) -> &'static str {
     match force.round() as u8 {
         0 => "still",
@@ -111,25 +112,28 @@ fn name(force: f64) -> &'static str {
     }
 }
 
-/// The captured motion, to and fro, larger or smaller.
-pub struct AsFilmed {
+/// The filmed motion, forwards and backwards, magnified as the user says.
+pub struct FilmAnimation {
     skeleton: Arc<Skeleton>,
     film: Vec<Pose>,
-    wanted: Magnify,
+    options: Magnify,
     shown: Vec<Pose>,
     time_s: f64,
 }
 
-impl AsFilmed {
+impl FilmAnimation {
     /// # Errors
-    /// As of [`magnify`].
-    pub fn new(tree: &PreparedTree, wanted: Magnify) -> Result<Self, crate::animate::MagnifyError> {
+    /// Those of [`magnify`].
+    pub fn new(
+        tree: &PreparedTree,
+        options: Magnify,
+    ) -> Result<Self, crate::animate::MagnifyError> {
         let mut new = Self {
             skeleton: tree.skeleton.clone(),
             film: tree.poses.clone(),
-            wanted: Magnify {
+            options: Magnify {
                 looped: false,
-                ..wanted
+                ..options
             },
             shown: Vec::new(),
             time_s: 0.0,
@@ -138,18 +142,19 @@ impl AsFilmed {
         Ok(new)
     }
 
+    /// The poses of the magnified film, forwards and backwards.
     fn magnified(&self) -> Result<Vec<Pose>, crate::animate::MagnifyError> {
         let length_s = self
             .film
             .last()
             .zip(self.film.first())
             .map_or(0.0, |(b, a)| b.time_s - a.time_s);
-        let count = (2.0 * length_s * FPS / self.wanted.speed).clamp(1.0, 600.0 * FPS) as u64;
-        magnify(&self.skeleton, &self.film, &self.wanted, FPS, count)
+        let count = (2.0 * length_s * FPS / self.options.speed).clamp(1.0, 600.0 * FPS) as u64;
+        magnify(&self.skeleton, &self.film, &self.options, FPS, count)
     }
 }
 
-impl Moving for AsFilmed {
+impl Moving for FilmAnimation {
     fn skeleton(&self) -> Arc<Skeleton> {
         self.skeleton.clone()
     }
@@ -166,9 +171,9 @@ impl Moving for AsFilmed {
 
     fn change(&mut self, command: AnimationCommand) {
         if let AnimationCommand::Larger(by) = command {
-            let from = self.wanted.by.max(LARGER.powi((-STEPS).into()));
-            self.wanted.by = (from * LARGER.powi(by.into())).min(100.0);
-            // It could be made before, with another factor.
+            let from = self.options.by.max(MAGNIFY_STEP.powi((-MAX_STEPS).into()));
+            self.options.by = (from * MAGNIFY_STEP.powi(by.into())).min(100.0);
+            // Cannot fail: it worked with another factor.
             if let Ok(shown) = self.magnified() {
                 self.shown = shown;
             }
@@ -178,7 +183,7 @@ impl Moving for AsFilmed {
     fn description(&self) -> String {
         format!(
             "as filmed, magnified {:.2}, speed {:.2}",
-            self.wanted.by, self.wanted.speed
+            self.options.by, self.options.speed
         )
     }
 }

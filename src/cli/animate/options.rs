@@ -1,96 +1,96 @@
-//! What `arborcam animate` is asked for.
+//! Options of `arborcam animate`.
 
-use super::super::common::seconds;
+use super::super::common::{parse_within, seconds};
 use super::super::render::{ViewName, WHITE, background, rate, size};
 use super::super::tree::TreeArgs;
-use crate::config::{Config, ConfigError};
+use crate::config::Config;
 use crate::model::Size;
 use crate::views::Shot;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
-/// Longest animation, s, and most poses: they are kept in memory.
-const LONGEST_S: f64 = 600.0;
-const MOST_POSES: f64 = 20_000.0;
+/// Longest animation, s.
+const MAX_LENGTH_S: f64 = 600.0;
+/// Largest number of poses, which are kept in memory.
+const MAX_POSES: f64 = 20_000.0;
 
 #[derive(Debug, Args)]
 pub struct AnimateArgs {
-    /// A capture: a folder that `--out` of capture or replay has made.
+    /// A capture: the folder written by `capture` or `replay --out`.
     pub dir: PathBuf,
     /// Length of the animation, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
     pub seconds: f64,
-    /// What to write, by its ending: a model (.glb, .gltf), a page (.html), the motion as a table
-    /// (.csv), a video (.mp4), or a picture of the end (.png). It must not exist. Without it the
-    /// tree moves on the terminal, with keys for the wind.
+    /// File to write, by its suffix: a model (.glb, .gltf), a page (.html), the motion as a table
+    /// (.csv), a video (.mp4), or a picture of the last pose (.png). It must not exist. Without it
+    /// the tree is shown on the terminal, with keys for the wind.
     #[arg(long, value_name = "PATH")]
     pub out: Option<PathBuf>,
-    /// Poses a second, 1 to 120.
+    /// Poses per second, 1 to 120.
     #[arg(long, value_name = "RATE", default_value_t = 30.0, value_parser = rate)]
     pub fps: f64,
     /// Strength of the wind on the Beaufort scale, 0 (still) to 12.
     #[arg(long, value_name = "FORCE", allow_negative_numbers = true)]
     pub wind: Option<f64>,
-    /// Where it blows to, or where --pull pulls to: degrees about the trunk, 0 to the right of the
-    /// picture, 90 away from the camera.
+    /// Direction that the wind blows to or --pull pulls to, degrees about the trunk: 0 to the right
+    /// of the picture, 90 away from the camera.
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     pub direction: Option<f64>,
-    /// How much its speed varies, as a share of the mean, 0 (steady) to 1.
+    /// Variation of the wind speed relative to its mean, 0 (steady) to 1.
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     pub gusts: Option<f64>,
-    /// Power of gusts falls with their frequency to the minus beta, 0 (wild) to 4 (smooth).
+    /// Exponent of the gust spectrum, 0 (rough) to 4 (smooth): power is proportional to frequency
+    /// to the minus beta.
     #[arg(long, value_name = "BETA", allow_negative_numbers = true)]
     pub beta: Option<f64>,
-    /// Ends as it begins, without a seam.
+    /// Make the animation a seamless loop.
     #[arg(long = "loop")]
     pub looped: bool,
-    /// A sound (.wav) that drives the wind: it blows as loud as the sound is, with --wind on
-    /// average.
+    /// A sound (.wav) that controls the wind speed by its loudness; --wind is the mean force.
     #[arg(long, value_name = "FILE")]
     pub wav: Option<PathBuf>,
-    /// Pulls the tree aside until it leans by so many degrees, and lets it go; without --wind in
-    /// still air.
-    #[arg(long, value_name = "DEGREES", value_parser = lean, conflicts_with_all = ["looped", "wav"])]
+    /// Pull the tree aside until it leans by this angle, degrees, and release it; in still air
+    /// unless --wind is given.
+    #[arg(long, value_name = "DEGREES", value_parser = lean_deg, conflicts_with_all = ["looped", "wav"])]
     pub pull: Option<f64>,
-    /// The node of nodes.csv that is pulled at; if not given the thickest of those well above the
+    /// The node of nodes.csv at which the tree is pulled; default: the thickest node well above the
     /// ground.
     #[arg(long, value_name = "NODE", requires = "pull")]
     pub pull_node: Option<u32>,
-    /// When it is released, s.
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.5, requires = "pull", value_parser = moment)]
+    /// Time of the release, s.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.5, requires = "pull", value_parser = release_s)]
     pub release: f64,
-    /// The captured motion instead of wind, so many times as large; 0 holds the tree still, 1 is as
-    /// filmed.
+    /// Magnify the filmed motion by this factor, instead of wind; 0: no motion, 1: as filmed.
     #[arg(
         long,
         value_name = "TIMES",
-        value_parser = times,
+        value_parser = factor,
         conflicts_with_all = ["wind", "gusts", "beta", "wav", "pull", "direction"]
     )]
     pub magnify: Option<f64>,
-    /// The captured motion at another speed, 0.01 to 100; 0.5 takes twice as long.
+    /// Speed of the filmed motion, 0.01 to 100; at 0.5 it takes twice as long.
     #[arg(long, value_name = "TIMES", value_parser = speed, default_value_t = 1.0, requires = "magnify")]
     pub speed: f64,
-    /// Magnifies only what is between these frequencies of the film, Hz.
+    /// Magnify only motion between these frequencies, Hz.
     #[arg(long, value_name = "LO..HI", value_parser = band, requires = "magnify")]
     pub band: Option<[f64; 2]>,
-    /// Where a picture or video is seen from.
+    /// Direction of view of a picture or video.
     #[arg(long, value_name = "VIEW", default_value = "front")]
     pub view: ViewName,
     /// Size of a picture or video, px.
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<Size>,
-    /// What is behind the tree in a picture or video.
+    /// Background of a picture or video.
     #[arg(long, value_name = "transparent|white|#RRGGBB", value_parser = background)]
     pub background: Option<[u8; 4]>,
-    /// Draws no leaves in a picture or video.
+    /// Draw no leaves in a picture or video.
     #[arg(long)]
     pub bare: bool,
     #[command(flatten)]
     pub tree: TreeArgs,
 }
 
-/// What kind of file is asked for.
+/// Kind of the file to write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     Glb,
@@ -102,10 +102,11 @@ pub enum Kind {
 }
 
 impl AnimateArgs {
-    /// Checks what clap cannot.
+    /// Checks combinations of options, which clap cannot; returns the kind of file to write.
     ///
     /// # Errors
-    /// What does not go together or is out of range, for the user to read.
+    /// A message for the user: options that exclude each other or are out of range, or an unknown
+    /// suffix.
     pub fn check(&self, out: &Path) -> Result<Kind, String> {
         let ending = out
             .extension()
@@ -125,12 +126,12 @@ impl AnimateArgs {
                 ));
             }
         };
-        if self.seconds > LONGEST_S {
-            return Err(format!("--seconds is more than {LONGEST_S}; give less"));
+        if self.seconds > MAX_LENGTH_S {
+            return Err(format!("--seconds is more than {MAX_LENGTH_S}; give less"));
         }
-        if self.seconds * self.fps > MOST_POSES {
+        if self.seconds * self.fps > MAX_POSES {
             return Err(format!(
-                "--seconds times --fps is more than {MOST_POSES}; give less of one"
+                "--seconds times --fps is more than {MAX_POSES}; give less of one"
             ));
         }
         if kind == Kind::Video && self.background.is_some_and(|b| b[3] == 0) {
@@ -141,21 +142,17 @@ impl AnimateArgs {
         Ok(kind)
     }
 
-    /// The wind that is asked for in place of the configuration's.
-    ///
-    /// # Errors
-    /// It is out of range.
-    pub fn set(&self, config: &mut Config) -> Result<(), ConfigError> {
+    /// Applies the options on the wind. With `--pull` and without `--wind` the air is still.
+    pub fn set(&self, config: &mut Config) {
         let wind = &mut config.wind;
         let still = self.pull.map(|_| 0.0);
         wind.force = self.wind.or(still).unwrap_or(wind.force);
         wind.direction_deg = self.direction.unwrap_or(wind.direction_deg);
         wind.gusts = self.gusts.unwrap_or(wind.gusts);
         wind.beta = self.beta.unwrap_or(wind.beta);
-        config.check()
     }
 
-    /// How a video of it is drawn.
+    /// How a video is drawn.
     pub fn shot(&self) -> Shot {
         Shot {
             view: self.view.view(),
@@ -183,34 +180,31 @@ impl AnimateArgs {
     }
 }
 
-fn within(text: &str, low: f64, high: f64, else_: &str) -> Result<f64, String> {
-    text.parse()
-        .ok()
-        .filter(|x: &f64| (low..=high).contains(x))
-        .ok_or_else(|| else_.to_owned())
+/// Parses `--pull`, degrees.
+fn lean_deg(text: &str) -> Result<f64, String> {
+    parse_within(text, 0.1..=60.0, "give degrees from 0.1 to 60")
 }
 
-fn lean(text: &str) -> Result<f64, String> {
-    within(text, 0.1, 60.0, "give degrees from 0.1 to 60")
+/// Parses `--magnify`.
+fn factor(text: &str) -> Result<f64, String> {
+    parse_within(text, 0.0..=100.0, "give a number from 0 to 100")
 }
 
-fn times(text: &str) -> Result<f64, String> {
-    within(text, 0.0, 100.0, "give a number from 0 to 100")
-}
-
+/// Parses `--speed`.
 fn speed(text: &str) -> Result<f64, String> {
-    within(text, 0.01, 100.0, "give a number from 0.01 to 100")
+    parse_within(text, 0.01..=100.0, "give a number from 0.01 to 100")
 }
 
-fn moment(text: &str) -> Result<f64, String> {
-    within(
+/// Parses `--release`, s.
+fn release_s(text: &str) -> Result<f64, String> {
+    parse_within(
         text,
-        0.0,
-        LONGEST_S,
+        0.0..=MAX_LENGTH_S,
         "give a number of seconds from 0 to 600",
     )
 }
 
+/// Parses `--band`, Hz.
 fn band(text: &str) -> Result<[f64; 2], String> {
     let parsed = text
         .split_once("..")

@@ -1,6 +1,6 @@
-//! What `arborcam render` is asked for.
+//! Options of `arborcam render`.
 
-use super::super::common::seconds;
+use super::super::common::{moment, parse_within, seconds};
 use super::super::tree::TreeArgs;
 use crate::draw::View;
 use crate::model::Size;
@@ -10,48 +10,48 @@ use clap::{Args, ValueEnum};
 use std::f64::consts::PI;
 use std::path::PathBuf;
 
-/// What is behind the tree if nothing is said.
+/// Default background.
 pub const WHITE: [u8; 4] = [255; 4];
 
-/// The largest side of a picture, px.
-const LARGEST: u32 = 4096;
+/// Largest side of a picture, px.
+const MAX_SIDE_PX: u32 = 4096;
 
 #[derive(Debug, Args)]
 pub struct RenderArgs {
-    /// A capture: a folder that `--out` of capture or replay has made.
+    /// A capture: the folder written by `capture` or `replay --out`.
     pub dir: PathBuf,
-    /// Where the tree is seen from; `turntable` walks round it.
+    /// Direction of view; `turntable` goes once round the tree.
     #[arg(long, value_name = "VIEW", default_value = "front")]
     pub view: ViewName,
-    /// Degrees to walk on round the tree from there, to the right.
-    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = number, allow_negative_numbers = true)]
+    /// Rotates the view to the right about the trunk, degrees.
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = degrees, allow_negative_numbers = true)]
     pub turn: f64,
     /// The picture (.png) or the video (.mp4); it must not exist.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Moment of the film, s. A video begins there. If not given, a picture shows the tree at rest,
-    /// or with --film as it was in that frame, and a video the end of the film.
+    /// Moment of the film, s; a video begins there. By default a picture shows the tree at rest, or
+    /// with --film as it was in that frame, and a video shows the end of the film.
     #[arg(long, value_name = "SECONDS", value_parser = moment, conflicts_with = "pose")]
     pub at: Option<f64>,
-    /// `rest`: the tree at rest, in a video too.
+    /// `rest`: the tree at rest, also in a video.
     #[arg(long, value_name = "POSE")]
     pub pose: Option<PoseName>,
-    /// Size of the picture, px; of each half with `--film beside`.
+    /// Size of the picture, px; with `--film beside` that of each half.
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<Size>,
-    /// What is behind the tree.
+    /// Background of the tree.
     #[arg(long, value_name = "transparent|white|#RRGGBB", value_parser = background)]
     pub background: Option<[u8; 4]>,
-    /// The capture's filmed frame `behind` the front view or `beside` any.
+    /// Show the filmed frame `behind` the tree, in the front view, or `beside` it, in any view.
     #[arg(long, value_name = "PLACE")]
     pub film: Option<FilmPlace>,
-    /// Draws no leaves.
+    /// Draw no leaves.
     #[arg(long)]
     pub bare: bool,
-    /// Length of a video, s; if not given that of the film, at most 10.
+    /// Length of a video, s; default: that of the film, at most 10.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub seconds: Option<f64>,
-    /// Pictures a second of a video, 1 to 120.
+    /// Frame rate of a video, frames per second, 1 to 120.
     #[arg(long, value_name = "RATE", default_value_t = 30.0, value_parser = rate)]
     pub fps: f64,
     #[command(flatten)]
@@ -60,14 +60,14 @@ pub struct RenderArgs {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ViewName {
-    /// As the film saw it.
+    /// As filmed.
     Front,
     /// From the right.
     Side,
     Back,
     /// From above.
     Top,
-    /// Once round, a little from above.
+    /// Once round the tree, seen slightly from above.
     Turntable,
 }
 
@@ -89,7 +89,7 @@ impl ValueEnum for FilmPlace {
     }
 }
 
-/// What kind of file is asked for.
+/// Kind of the file to write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     Picture,
@@ -97,10 +97,10 @@ pub enum Kind {
 }
 
 impl RenderArgs {
-    /// Checks what clap cannot.
+    /// Checks combinations of options, which clap cannot; returns the kind of file to write.
     ///
     /// # Errors
-    /// What does not go together, for the user to read.
+    /// A message for the user: options that exclude each other, or an unknown suffix.
     pub fn check(&self) -> Result<Kind, String> {
         let suffix = self
             .out
@@ -145,7 +145,7 @@ impl RenderArgs {
         Ok(kind)
     }
 
-    /// What is to be drawn.
+    /// What to draw.
     pub fn shot(&self) -> Shot {
         let from = self.view.view();
         Shot {
@@ -168,7 +168,7 @@ impl RenderArgs {
 }
 
 impl ViewName {
-    /// Where it begins.
+    /// The view, of the turntable its begin.
     pub fn view(self) -> View {
         match self {
             Self::Front => View::FRONT,
@@ -186,20 +186,22 @@ impl ViewName {
     }
 }
 
+/// Parses `WxH`, px.
 pub fn size(text: &str) -> Result<Size, String> {
     let parsed = text
         .split_once(['x', 'X'])
         .and_then(|(w, h)| Some(Size::new(side(w)?, side(h)?)));
-    parsed
-        .ok_or_else(|| format!("give width and height in pixels, as 640x480; each 1 to {LARGEST}"))
+    parsed.ok_or_else(|| {
+        format!("give width and height in pixels, as 640x480; each 1 to {MAX_SIDE_PX}")
+    })
 }
 
-/// A side of a picture, px.
+/// Parses a side of a picture, px.
 fn side(text: &str) -> Option<u32> {
-    text.parse().ok().filter(|n| (1..=LARGEST).contains(n))
+    text.parse().ok().filter(|n| (1..=MAX_SIDE_PX).contains(n))
 }
 
-/// The opaque colour of six hexadecimal digits.
+/// An opaque colour from six hexadecimal digits.
 fn colour(hex: &str) -> Option<[u8; 4]> {
     if hex.len() != 6 || !hex.bytes().all(|b| b.is_ascii_hexdigit()) {
         return None;
@@ -208,6 +210,7 @@ fn colour(hex: &str) -> Option<[u8; 4]> {
     Some([red, green, blue, 255])
 }
 
+/// Parses a background: sRGB and opacity.
 pub fn background(text: &str) -> Result<[u8; 4], String> {
     match text {
         "transparent" => Ok([0; 4]),
@@ -219,25 +222,12 @@ pub fn background(text: &str) -> Result<[u8; 4], String> {
     }
 }
 
-fn number(text: &str) -> Result<f64, String> {
-    text.parse()
-        .ok()
-        .filter(|n: &f64| n.is_finite() && n.abs() < 1e6)
-        .ok_or_else(|| "give a number".to_owned())
+/// Parses an angle, degrees.
+fn degrees(text: &str) -> Result<f64, String> {
+    parse_within(text, -1e6..=1e6, "give a number")
 }
 
-fn moment(text: &str) -> Result<f64, String> {
-    let moment = text
-        .parse()
-        .ok()
-        .filter(|s: &f64| s.is_finite() && *s >= 0.0);
-    moment.ok_or_else(|| "give a number of seconds, 0 or more".to_owned())
-}
-
+/// Parses a frame rate, frames per second.
 pub fn rate(text: &str) -> Result<f64, String> {
-    let rate = text
-        .parse()
-        .ok()
-        .filter(|r: &f64| (1.0..=120.0).contains(r));
-    rate.ok_or_else(|| "give pictures a second, 1 to 120".to_owned())
+    parse_within(text, 1.0..=120.0, "give pictures a second, 1 to 120")
 }
