@@ -335,7 +335,7 @@ fn a_film_that_ends_before_a_refinement_gets_its_shoots_at_the_end() {
     assert!(tree.sub_branches.iter().all(|s| {
         s.members
             .iter()
-            .all(|id| retrace.node_of(*id) == Some(s.name))
+            .all(|id| retrace.node_name_of(*id) == Some(s.name))
     }));
     // Whoever does not wait gets the tree as it stands.
     let (standing, tree) = ended(false);

@@ -486,7 +486,9 @@ impl ModelThread {
                 .ok(),
             // Without a single frame there is nothing to keep.
             _ => {
-                self.unfinished.take().map(Unfinished::remove);
+                if let Some(unfinished) = self.unfinished.take() {
+                    unfinished.remove();
+                }
                 None
             }
         };
