@@ -10,6 +10,7 @@
 
 mod angles;
 mod announce;
+mod background;
 mod capture_tables;
 mod finish;
 mod first_picture;
@@ -53,6 +54,7 @@ use crate::model::{Control, Outline, Snapshot};
 use crate::outline::{Given, Scribbles};
 use crate::pipeline::FrontEnd;
 use crate::source::Source;
+use background::Background;
 use crossbeam_channel::{Sender, bounded, unbounded};
 use model_thread::ModelThread;
 use shared::{Shared, StopAll};
@@ -105,10 +107,11 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
         Some(to) => Some(recorder_thread::start(to, info.live, &shared)?),
         None => None,
     };
+    let background = Background::start(job.pace != Pace::Fast, shared.clone())?;
     let recorder = recording.as_ref().map(|(recorder, _)| recorder.clone());
 
     let model = {
-        let model = ModelThread::new(job, info, shared.clone(), recording);
+        let model = ModelThread::new(job, info, shared.clone(), background, recording);
         let on_end = shared.clone();
         let run = move || {
             let _ends_all = StopAll(&on_end);

@@ -2,6 +2,7 @@
 //! and writes the capture at the end.
 
 use super::announce::Announced;
+use super::background::{Background, Pending};
 use super::capture_tables::CaptureTables;
 use super::finish::{self, CaptureJob, Quality, Written};
 use super::job::{Job, Summary};
@@ -13,10 +14,10 @@ use super::source_thread::Pace;
 use super::status::{Status, median_error_px, median_fb_error_px};
 use super::stream;
 use super::sway_watch::SwayWatch;
-use super::swaying::Ending;
 use super::table_writer::TableWriter;
 use super::track_thread::ToModel;
 use super::unfinished::Unfinished;
+use crate::cancel::CancelToken;
 use crate::model::{Phase, Picture, Pose, SwayNow};
 use crate::pipeline::{BackEnd, Followed, Moved};
 use crate::recording::TrackFile;
@@ -48,6 +49,7 @@ pub struct ModelThread {
     job: Job,
     info: SourceInfo,
     shared: Arc<Shared>,
+    background: Background,
     status: Status,
     /// The track log on disk, in the folder of the unfinished capture if there will be one.
     file: Option<TrackFile>,
@@ -61,7 +63,7 @@ pub struct ModelThread {
     picture: Option<Picture>,
     quality: Quality,
     last_screen: Option<Instant>,
-    exports: Vec<JoinHandle<()>>,
+    exports: Vec<Pending<()>>,
     /// Number of the last export; its folder may not be there yet.
     exported: u32,
     announced: Announced,
@@ -73,23 +75,33 @@ impl ModelThread {
         job: Job,
         info: SourceInfo,
         shared: Arc<Shared>,
+        background: Background,
         recorder: Option<(Recorder, JoinHandle<Recorded>)>,
     ) -> Self {
         let status = Status::new(info.name.clone(), info.format.clone(), info.frames_total);
         let back = BackEnd::new(&job.config);
         let looked_at = job.stream.is_some() || job.preview_every < Duration::MAX;
-        let sway = looked_at
-            .then(|| SwayWatch::new(&job.config.dynamics, job.pace == Pace::Fast, shared.clone()));
+        let sway = looked_at.then(|| {
+            let waits = job.pace == Pace::Fast;
+            SwayWatch::new(
+                &job.config.dynamics,
+                waits,
+                background.clone(),
+                shared.clone(),
+            )
+        });
+        let refining = Refining::new(background.clone());
         let mut thread = Self {
             back,
             job,
             info,
             shared,
+            background,
             status,
             file: None,
             unfinished: None,
             tables: None,
-            refining: Refining::default(),
+            refining,
             sway,
             tables_s: f64::NEG_INFINITY,
             picture: None,
@@ -166,9 +178,9 @@ impl ModelThread {
         self.back.restart();
         self.status.restart();
         if let Some(tables) = self.tables.take() {
-            tables.discard();
+            drop(tables.join());
         }
-        self.refining = Refining::default();
+        self.refining.give_up();
         if let Some(sway) = &mut self.sway {
             sway.restart();
         }
@@ -181,20 +193,18 @@ impl ModelThread {
 
     /// No more frames: finishes the tree and writes the capture.
     fn end(mut self, last: Option<&Moved>) -> Summary {
-        let swaying = self.sway.as_mut().map(SwayWatch::end);
+        if let Some(sway) = &mut self.sway {
+            sway.end();
+        }
         // Shown while the tree is finished and the capture is written.
         self.shared.ended.store(true, Ordering::Relaxed);
         self.show(last, true);
         // No frame is left that could need what is under way.
-        self.refining = Refining::default();
+        self.refining.give_up();
         self.back.finish(&self.shared.pulse.optional_work);
         self.announce();
         self.show(None, true);
-        let summary = self.finish();
-        if swaying.is_some_and(Ending::panicked) {
-            self.shared.fail(Failure::Panicked);
-        }
-        summary
+        self.finish()
     }
 
     fn step(&mut self, followed: Followed) -> Moved {
@@ -260,13 +270,13 @@ impl ModelThread {
             return;
         };
         if let Some(outdated) = self.tables.take_if(|tables| !tables.is_of(&model)) {
-            outdated.discard();
+            drop(outdated.join());
         }
         if self.tables.is_none() {
             self.tables = self.begin_tables(&model);
         }
         if let (Some(tables), Some(Ok(log))) =
-            (&self.tables, self.file.as_mut().map(TrackFile::reader))
+            (&mut self.tables, self.file.as_mut().map(TrackFile::reader))
         {
             tables.catch_up(log);
         }
@@ -277,7 +287,13 @@ impl ModelThread {
         let dir = self.job.out.as_ref()?;
         let pictured = self.picture.as_ref().map(|p| p.frame);
         let tables = CaptureTables::create(dir, model, &self.job.config, pictured).ok()?;
-        TableWriter::start(tables, model, self.shared.clone()).ok()
+        let background = self.background.clone();
+        Some(TableWriter::new(
+            tables,
+            model,
+            background,
+            self.shared.clone(),
+        ))
     }
 
     fn announce(&mut self) {
@@ -387,7 +403,7 @@ impl ModelThread {
         })
     }
 
-    /// Writes the capture as it is now beside the final one, on a thread of its own: frames go on.
+    /// Writes the capture as it is now beside the final one, in the background: frames go on.
     fn export_now(&mut self) {
         let wanted = self
             .job
@@ -398,16 +414,15 @@ impl ModelThread {
         match self.capture_job() {
             Ok(job) => {
                 let shared = self.shared.clone();
-                let write = move || match finish::write(&job, &dir) {
+                let write = move |_: &CancelToken| match finish::write(&job, &dir) {
                     Ok(_) => shared.answer(format!("capture written to {}", dir.display())),
                     Err(e) => shared.warn(e.to_string()),
                 };
-                match std::thread::Builder::new()
-                    .name("export".into())
-                    .spawn(write)
-                {
-                    Ok(handle) => self.exports.push(handle),
-                    Err(e) => self.shared.warn(format!("export: {e}")),
+                match self.background.begin(CancelToken::new(), write) {
+                    Some(export) => self.exports.push(export),
+                    None => self
+                        .shared
+                        .tell("exports are still being written; try again later".into()),
                 }
             }
             Err(e) => self.shared.warn(e.to_string()),
@@ -462,7 +477,7 @@ impl ModelThread {
                 None => finish::write(&job, out),
             },
             (outdated, _) => {
-                outdated.into_iter().for_each(TableWriter::discard);
+                drop(outdated.and_then(TableWriter::join));
                 finish::write(&job, out)
             }
         }
@@ -476,7 +491,7 @@ impl ModelThread {
             thread.join().ok()
         });
         for export in self.exports.drain(..) {
-            let _ = export.join();
+            export.wait();
         }
         let seen = self.shared.counts.seen.load(Ordering::Relaxed);
         let written = match self.job.out.clone() {

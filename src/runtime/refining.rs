@@ -1,29 +1,33 @@
-//! The tree is worked out anew on a thread of its own, while poses go on.
+//! The tree is worked out anew in the background, while poses go on.
 
+use super::background::{Background, Pending};
 use crate::cancel::CancelToken;
 use crate::pipeline::BackEnd;
 use crate::solve::Model;
-use std::thread::JoinHandle;
+use crossbeam_channel::RecvTimeoutError;
+use std::time::Duration;
 
 /// A refinement under way, if there is one.
-#[derive(Default)]
 pub struct Refining {
-    work: Option<JoinHandle<Option<Model>>>,
-    /// Nobody waits for it any more: it shall leave the computer to others.
-    given_up: CancelToken,
+    background: Background,
+    work: Option<Pending<Option<Model>>>,
 }
 
 impl Refining {
-    /// Begins what `back` wants worked out. Where no thread can be had, `back` does it itself when
-    /// it is due.
+    pub fn new(background: Background) -> Self {
+        Self {
+            background,
+            work: None,
+        }
+    }
+
+    /// Begins what `back` wants worked out. Where it cannot be begun, `back` does it itself when it
+    /// is due.
     pub fn begin(&mut self, back: &BackEnd) {
-        if let (Some(work), None) = (back.job(), &self.work) {
-            let (work, given_up) = (work.clone(), self.given_up.clone());
-            let run = move || work.run(&given_up);
-            self.work = std::thread::Builder::new()
-                .name("refine".into())
-                .spawn(run)
-                .ok();
+        if let (Some(job), None) = (back.job(), &self.work) {
+            let job = job.clone();
+            let work = move |cancel: &CancelToken| job.run(cancel);
+            self.work = self.background.begin(CancelToken::new(), work);
         }
     }
 
@@ -32,25 +36,33 @@ impl Refining {
     /// (`live`): the frame does without.
     pub fn hand_in(&mut self, back: &mut BackEnd, time_s: f64, live: bool, hurry: bool) {
         if hurry {
-            self.given_up.cancel();
+            self.give_up();
         }
         if !back.needs_model(time_s) {
             return;
         }
-        if live && !hurry && self.work.as_ref().is_some_and(|work| !work.is_finished()) {
-            back.put_off_model(time_s);
+        if hurry {
+            back.put_model(None);
             return;
         }
-        match self.work.take().filter(|_| !hurry).map(JoinHandle::join) {
-            Some(Ok(tree)) => back.put_model(tree),
-            _ if hurry => back.put_model(None),
-            _ => {}
+        // Where it has not begun, `back` is faster.
+        let Some(work) = self.work.take_if(|work| live || work.has_begun()) else {
+            self.give_up();
+            return;
+        };
+        let patience = if live { Duration::ZERO } else { Duration::MAX };
+        match work.answer(patience) {
+            Ok(model) => back.put_model(model),
+            Err(RecvTimeoutError::Timeout) => {
+                self.work = Some(work);
+                back.put_off_model(time_s);
+            }
+            Err(RecvTimeoutError::Disconnected) => {}
         }
     }
-}
 
-impl Drop for Refining {
-    fn drop(&mut self) {
-        self.given_up.cancel();
+    /// Nobody waits for it any more.
+    pub fn give_up(&mut self) {
+        self.work = None;
     }
 }

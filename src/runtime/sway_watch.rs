@@ -1,8 +1,9 @@
 //! The sway while it films: when it is analysed, and the angles of the last seconds.
 
 use super::angles::AngleWindow;
+use super::background::Background;
 use super::shared::Shared;
-use super::swaying::{Ending, Request, Swaying, analyse};
+use super::swaying::{Request, Swaying, analyse};
 use crate::config::Dynamics;
 use crate::model::{Angles, Skeleton, SwayNow};
 use crate::pipeline::{BackEnd, Moved};
@@ -21,12 +22,17 @@ pub struct SwayWatch {
 
 impl SwayWatch {
     /// `waits` for results where they are due, as a replay without a pace of its own does.
-    pub fn new(settings: &Dynamics, waits: bool, shared: Arc<Shared>) -> Self {
+    pub fn new(
+        settings: &Dynamics,
+        waits: bool,
+        background: Background,
+        shared: Arc<Shared>,
+    ) -> Self {
         Self {
             settings: settings.clone(),
             angles: AngleWindow::new(settings.window_s),
             skeleton: None,
-            swaying: Swaying::new(settings.every_s, waits, analyse, shared),
+            swaying: Swaying::new(settings.every_s, waits, analyse, background, shared),
         }
     }
 
@@ -90,13 +96,13 @@ impl SwayWatch {
         self.settings.every_s <= 0.0
     }
 
-    /// How often a request was due and the thread was busy.
+    /// How often a request was due and the last one was still under way.
     pub fn passed_over(&self) -> u64 {
         self.swaying.passed_over()
     }
 
     /// No more frames.
-    pub fn end(&mut self) -> Ending {
-        self.swaying.end()
+    pub fn end(&mut self) {
+        self.swaying.end();
     }
 }

@@ -1,12 +1,12 @@
-//! The sway is analysed again and again on a thread of its own, while the film goes on.
+//! The sway is analysed again and again in the background, while the film goes on.
 //!
 //! A request is made when so much film has passed, and its result takes effect when the next one is
 //! due: at a moment of film, not of the clock. A fast replay waits for it there, so that the same
 //! recording gives the same answers at the same frames whatever the machine. A camera, or a
 //! recording at its own pace, waits for nobody: what is not ready is looked at again when the next
-//! one is due, and the request that finds the thread busy is passed over and counted. The thread
-//! then stands back for all others.
+//! one is due, and the request that finds the last one under way is passed over and counted.
 
+use super::background::{Background, Pending};
 use super::pulse::{Pulse, Worker};
 use super::shared::Shared;
 use crate::cancel::CancelToken;
@@ -16,13 +16,10 @@ use crate::model::{
     AngleSpectrum, Angles, BranchSway, NodeId, NodeName, Skeleton, SwayNow, TrackId, TrackLog,
     Unidentified,
 };
-use crossbeam_channel::{
-    Receiver, RecvTimeoutError, SendTimeoutError, Sender, TryRecvError, bounded,
-};
+use crossbeam_channel::RecvTimeoutError;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// A wait is broken off by a wish to stop within this time.
@@ -44,34 +41,15 @@ pub struct Request {
 /// Works a request off; asks again and again whether to go on, which is its sign of life, too.
 pub type Analyser = fn(&Request, &CancelToken) -> SwayNow;
 
-/// A request on its way to the thread.
-struct Errand {
-    request: Request,
-    wanted: CancelToken,
-    answer: Sender<SwayNow>,
-}
-
-/// A request that has been made; dropped, it is given up.
-struct Pending {
-    wanted: CancelToken,
-    answer: Receiver<SwayNow>,
-}
-
-impl Drop for Pending {
-    fn drop(&mut self) {
-        self.wanted.cancel();
-    }
-}
-
-/// The thread, and when it is asked.
+/// When an analysis is begun, and when its result takes effect.
 pub struct Swaying {
     every_s: f64,
     /// Results are waited for where they are due.
     waits: bool,
     analyser: Analyser,
     shared: Arc<Shared>,
-    thread: Option<(Sender<Errand>, JoinHandle<()>)>,
-    pending: Option<Pending>,
+    background: Background,
+    pending: Option<Pending<SwayNow>>,
     /// Time of film at which the next request is due, s.
     next_s: f64,
     passed_over: u64,
@@ -79,21 +57,27 @@ pub struct Swaying {
 
 impl Swaying {
     /// Asks every `every_s` seconds of film, never if that is 0.
-    pub fn new(every_s: f64, waits: bool, analyser: Analyser, shared: Arc<Shared>) -> Self {
+    pub fn new(
+        every_s: f64,
+        waits: bool,
+        analyser: Analyser,
+        background: Background,
+        shared: Arc<Shared>,
+    ) -> Self {
         let next_s = f64::NEG_INFINITY;
         Self {
             every_s,
             waits,
             analyser,
             shared,
-            thread: None,
+            background,
             pending: None,
             next_s,
             passed_over: 0,
         }
     }
 
-    /// How often a request was due and the thread was busy.
+    /// How often a request was due and the last one was still under way.
     pub fn passed_over(&self) -> u64 {
         self.passed_over
     }
@@ -123,13 +107,13 @@ impl Swaying {
     /// The result of the last request, if it is there or waited for.
     fn take(&mut self) -> Option<SwayNow> {
         let pending = self.pending.take()?;
+        let patience = if self.waits {
+            LOOK_EVERY
+        } else {
+            Duration::ZERO
+        };
         loop {
-            // Without a thread any more there is nothing to come either.
-            match if self.waits {
-                pending.answer.recv_timeout(LOOK_EVERY)
-            } else {
-                look(&pending.answer)
-            } {
+            match pending.answer(patience) {
                 Ok(found) => return Some(found),
                 Err(RecvTimeoutError::Disconnected) => return None,
                 Err(RecvTimeoutError::Timeout) if self.shared.hurry.load(Ordering::Relaxed) => {
@@ -145,124 +129,26 @@ impl Swaying {
     }
 
     fn ask(&mut self, request: Request) {
-        let Some(errands) = self.errands() else {
-            return;
-        };
-        let (answer, answered) = bounded(1);
         let wanted = self.shared.pulse.sway_work.child();
-        let errand = Errand {
-            request,
-            wanted: wanted.clone(),
-            answer,
+        let (analyser, shared) = (self.analyser, self.shared.clone());
+        let work = move |cancel: &CancelToken| {
+            let _at_work = AtWork::new(&shared.pulse);
+            analyser(&request, cancel)
         };
-        let pending = Pending {
-            wanted,
-            answer: answered,
-        };
-        // Full only while one that was given up is not over, and another one waits behind it.
-        let sent = if self.waits {
-            send(&errands, errand, &self.shared)
-        } else {
-            errands.try_send(errand).is_ok()
-        };
-        if sent {
-            self.pending = Some(pending);
-        } else {
+        self.pending = self.background.begin(wanted, work);
+        if self.pending.is_none() {
             self.passed_over += 1;
         }
     }
 
-    /// The way to the thread, which is started for the first request.
-    fn errands(&mut self) -> Option<Sender<Errand>> {
-        if self.thread.is_none() {
-            let (errands, queue) = bounded(1);
-            let (analyser, shared, waited_for) = (self.analyser, self.shared.clone(), self.waits);
-            let run = move || {
-                if !waited_for {
-                    stand_back();
-                }
-                work(&queue, analyser, &shared);
-            };
-            match std::thread::Builder::new().name("sway".into()).spawn(run) {
-                Ok(thread) => self.thread = Some((errands, thread)),
-                Err(e) => {
-                    self.shared.warn(format!(
-                        "the sway is reported only at the end: a thread cannot be started: {e}"
-                    ));
-                    self.every_s = 0.0;
-                }
-            }
-        }
-        self.thread.as_ref().map(|(errands, _)| errands.clone())
-    }
-
-    /// Gives up what is under way; the thread ends by itself, within a branch.
-    pub fn end(&mut self) -> Ending {
+    /// Gives up what is under way; it ends within a branch.
+    pub fn end(&mut self) {
         self.pending = None;
         self.every_s = 0.0;
-        Ending(self.thread.take().map(|(_, thread)| thread))
     }
 }
 
-/// A thread that has nothing more to do.
-#[must_use]
-pub struct Ending(Option<JoinHandle<()>>);
-
-impl Ending {
-    /// Whether it has ended by a panic. One that has not come to its end is not waited for.
-    pub fn panicked(self) -> bool {
-        self.0
-            .filter(JoinHandle::is_finished)
-            .is_some_and(|thread| thread.join().is_err())
-    }
-}
-
-/// Waits until there is room, unless somebody wants the end; whether it was sent.
-fn send(errands: &Sender<Errand>, mut errand: Errand, shared: &Shared) -> bool {
-    loop {
-        match errands.send_timeout(errand, LOOK_EVERY) {
-            Ok(()) => return true,
-            Err(SendTimeoutError::Timeout(back)) if !shared.hurry.load(Ordering::Relaxed) => {
-                errand = back
-            }
-            Err(_) => return false,
-        }
-    }
-}
-
-fn look(answer: &Receiver<SwayNow>) -> Result<SwayNow, RecvTimeoutError> {
-    answer.try_recv().map_err(|e| match e {
-        TryRecvError::Empty => RecvTimeoutError::Timeout,
-        TryRecvError::Disconnected => RecvTimeoutError::Disconnected,
-    })
-}
-
-/// Lets all other threads go first where there is too little processor for all. Where that is
-/// refused, it is not needed for the result.
-fn stand_back() {
-    const NICE: libc::c_int = 10;
-    // SAFETY: it takes numbers only; 0 is the calling thread, as Linux has it.
-    let _ = unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, NICE) };
-}
-
-/// The thread: one request after the other until nobody has any.
-fn work(queue: &Receiver<Errand>, analyser: Analyser, shared: &Shared) {
-    for Errand {
-        request,
-        wanted,
-        answer,
-    } in queue
-    {
-        let _at_work = AtWork::new(&shared.pulse);
-        if !wanted.is_cancelled() {
-            let found = analyser(&request, &wanted);
-            // Nobody may be waiting any more.
-            drop(answer.send(found));
-        }
-    }
-}
-
-/// The thread has work until this is dropped, by a panic too: the capture goes on without it, and
+/// There is work until this is dropped, by a panic too: the capture goes on without it, and
 /// must not be taken for one that stalls.
 struct AtWork<'a>(&'a Pulse);
 

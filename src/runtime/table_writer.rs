@@ -1,52 +1,57 @@
-//! The tables of a capture, written on a thread of their own while the film goes on.
+//! The tables of a capture, written in the background while the film goes on.
 //!
 //! Every frame of a capture has its pose by the model that it ends with, so tables of a model that
 //! is replaced are discarded, and begin anew from the first frame. That ends when the model has
 //! settled, two minutes after the build; from then on nothing is written twice.
 
+use super::background::{Background, Pending};
 use super::capture_tables::CaptureTables;
-use super::shared::{Failure, Shared};
+use super::shared::Shared;
 use crate::cancel::CancelToken;
 use crate::recording::TrackFileReader;
 use crate::solve::Model;
-use crossbeam_channel::{Receiver, Sender, bounded};
-use std::sync::Arc;
+use crossbeam_channel::RecvTimeoutError;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::thread::JoinHandle;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
-/// The tables, and the thread that brings them up to date.
+/// The tables, and the work that brings them up to date.
 pub struct TableWriter {
     model: Arc<Model>,
-    logs: Sender<TrackFileReader>,
+    background: Background,
+    state: Arc<State>,
     cancel: CancelToken,
-    bytes: Arc<AtomicU64>,
-    thread: JoinHandle<Result<CaptureTables, Failure>>,
+    writing: Option<Pending<()>>,
+}
+
+/// What the work and its owner share.
+struct State {
+    /// `None` if they could not be written.
+    tables: Mutex<Option<CaptureTables>>,
+    bytes: AtomicU64,
+    shared: Arc<Shared>,
 }
 
 impl TableWriter {
-    /// # Errors
-    /// The thread cannot be started.
-    pub fn start(
+    pub fn new(
         tables: CaptureTables,
         model: &Arc<Model>,
+        background: Background,
         shared: Arc<Shared>,
-    ) -> std::io::Result<Self> {
-        let (logs, queue) = bounded(1);
+    ) -> Self {
         let cancel = shared.pulse.writing.child();
-        let token = cancel.clone();
-        let bytes = Arc::new(AtomicU64::new(0));
-        let written = bytes.clone();
-        let run = move || write(tables, &queue, &token, &written, &shared);
-        let thread = std::thread::Builder::new()
-            .name("write".into())
-            .spawn(run)?;
-        Ok(Self {
+        let state = State {
+            tables: Mutex::new(Some(tables)),
+            bytes: AtomicU64::new(0),
+            shared,
+        };
+        Self {
             model: model.clone(),
-            logs,
+            background,
+            state: Arc::new(state),
             cancel,
-            bytes,
-            thread,
-        })
+            writing: None,
+        }
     }
 
     /// Whether the tables are of this model.
@@ -54,43 +59,46 @@ impl TableWriter {
         Arc::ptr_eq(&self.model, model)
     }
 
-    /// There is more to be written. What comes while the thread is busy is left for the next time.
-    pub fn catch_up(&self, log: TrackFileReader) {
-        let _ = self.logs.try_send(log);
+    /// There is more to be written. What comes while the last piece is being written is left for
+    /// the next time.
+    pub fn catch_up(&mut self, log: TrackFileReader) {
+        let last = self.writing.as_ref().map(|w| w.answer(Duration::ZERO));
+        if last == Some(Err(RecvTimeoutError::Timeout)) {
+            return;
+        }
+        let state = self.state.clone();
+        let write = move |cancel: &CancelToken| state.catch_up(&log, cancel);
+        self.writing = self.background.begin(self.cancel.child(), write);
     }
 
     /// Size of the tables on the disk, bytes.
     pub fn bytes(&self) -> u64 {
-        self.bytes.load(Ordering::Relaxed)
+        self.state.bytes.load(Ordering::Relaxed)
     }
 
     /// The tables as far as they are; `None` if they could not be written.
     pub fn join(self) -> Option<CaptureTables> {
-        drop(self.logs);
-        self.thread.join().ok()?.ok()
-    }
-
-    /// Nobody wants the tables any more; nothing is left of them.
-    pub fn discard(self) {
         self.cancel.cancel();
-        drop(self.join());
+        // After a panic they are not to be used.
+        self.state.tables.lock().ok()?.take()
     }
 }
 
-fn write(
-    mut tables: CaptureTables,
-    logs: &Receiver<TrackFileReader>,
-    cancel: &CancelToken,
-    written_bytes: &AtomicU64,
-    shared: &Shared,
-) -> Result<CaptureTables, Failure> {
-    for log in logs {
-        if let Err(e) = tables.catch_up(&log, cancel) {
-            // Said while something can be done about it; at the end all is tried again.
-            shared.news(format!("the capture cannot be written at present: {e}"));
-            return Err(e);
+impl State {
+    /// Writes up to the end of `log`.
+    fn catch_up(&self, log: &TrackFileReader, cancel: &CancelToken) {
+        let Ok(mut held) = self.tables.lock() else {
+            return;
+        };
+        let Some(tables) = held.as_mut() else { return };
+        match tables.catch_up(log, cancel) {
+            Ok(()) => self.bytes.store(tables.bytes(), Ordering::Relaxed),
+            Err(e) => {
+                // Said while something can be done about it; at the end all is tried again.
+                self.shared
+                    .news(format!("the capture cannot be written at present: {e}"));
+                *held = None;
+            }
         }
-        written_bytes.store(tables.bytes(), Ordering::Relaxed);
     }
-    Ok(tables)
 }

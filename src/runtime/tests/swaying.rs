@@ -1,6 +1,7 @@
 //! When a sway is asked for and told: with analysers whose slowness is known.
 
 use super::super::pulse::{Sign, Vigil};
+use super::super::shared::Failure;
 use super::*;
 use crate::cancel::CancelToken;
 use std::time::Instant;
@@ -62,7 +63,9 @@ fn takes(time: Duration, cancel: &CancelToken) {
 
 fn of(analyser: Analyser, waits: bool) -> (Swaying, Arc<Shared>) {
     let shared = Arc::new(Shared::default());
-    (Swaying::new(1.0, waits, analyser, shared.clone()), shared)
+    let background = Background::start(false, shared.clone()).expect("a thread");
+    let swaying = Swaying::new(1.0, waits, analyser, background, shared.clone());
+    (swaying, shared)
 }
 
 /// Steps through a film of 30 frames a second; the answers, with the frame at which each took
@@ -80,15 +83,13 @@ fn film(swaying: &mut Swaying, frames: std::ops::Range<u64>) -> Vec<(u64, u64)> 
     told
 }
 
-/// Waits for the thread to be over; fails if it is not.
+/// What was begun has been given up, so that the thread has time for other work; fails if it goes
+/// on.
 fn over(mut swaying: Swaying) {
-    let began = Instant::now();
-    let Ending(thread) = swaying.end();
-    while thread.as_ref().is_some_and(|t| !t.is_finished()) {
-        assert!(began.elapsed() < HANGS, "the thread goes on");
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    assert!(!Ending(thread).panicked(), "giving up is no panic");
+    swaying.end();
+    let next = swaying.background.begin(CancelToken::new(), |_| ());
+    let answer = next.expect("room").answer(HANGS);
+    assert_eq!(answer, Ok(()), "the work goes on");
 }
 
 /// The same recording gives the same answers in the same frames, however slow the machine is.
@@ -164,22 +165,19 @@ fn a_restart_forgets_what_is_under_way() {
 #[test]
 fn without_an_interval_nobody_is_asked() {
     let shared = Arc::new(Shared::default());
-    let mut swaying = Swaying::new(0.0, true, |_, _| panic!("asked"), shared);
+    let background = Background::start(false, shared.clone()).expect("a thread");
+    let mut swaying = Swaying::new(0.0, true, |_, _| panic!("asked"), background, shared);
     assert_eq!(film(&mut swaying, 0..200), []);
     over(swaying);
 }
 
-/// The capture goes on without it, and the end says that something is wrong.
+/// The capture goes on, other work is done, and the end says that something is wrong.
 #[test]
 fn a_panic_is_not_waited_for() {
     let (mut swaying, shared) = of(|_, _| std::panic::resume_unwind(Box::new("broken")), true);
     assert_eq!(film(&mut swaying, 0..100), []);
-    let began = Instant::now();
-    let Ending(thread) = swaying.end();
-    while thread.as_ref().is_some_and(|t| !t.is_finished()) && began.elapsed() < HANGS {
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    assert!(Ending(thread).panicked());
+    over(swaying);
+    assert!(matches!(shared.take_failure(), Some(Failure::Panicked)));
     // A supervisor of the capture must not take it for one that hangs, and end it.
     let mut vigil = Vigil::default();
     let looks = [1, 2].map(|frames| vigil.look(shared.pulse.marks(frames, false)));

@@ -1,0 +1,157 @@
+//! Work that no frame waits for, on one thread: the tree is worked out anew, its sway is analysed,
+//! the tables of the capture are brought up to date, a capture is exported.
+
+use super::shared::{Failure, Shared};
+use crate::cancel::CancelToken;
+use crate::caught::caught;
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// Pieces of work that may wait. Each of those who hand in work has one piece there at a time; a
+/// piece that was given up takes no time.
+const QUEUE: usize = 16;
+
+type Work = Box<dyn FnOnce() + Send>;
+
+/// Where work is handed in; when the last of these is dropped, the thread ends.
+#[derive(Clone)]
+pub struct Background(Sender<Work>);
+
+impl Background {
+    /// Starts the thread. If it `stands_back`, all others go first where there is too little
+    /// processor for all.
+    ///
+    /// # Errors
+    /// The thread cannot be started.
+    pub fn start(stands_back: bool, shared: Arc<Shared>) -> Result<Self, Failure> {
+        let (sender, queue) = bounded(QUEUE);
+        let run = move || {
+            if stands_back {
+                stand_back();
+            }
+            work_off(&queue, &shared);
+        };
+        super::spawn("background", run)?;
+        Ok(Self(sender))
+    }
+
+    /// Hands in work that `wanted` can end; `None` where too much waits already.
+    pub fn begin<T: Send + 'static>(
+        &self,
+        wanted: CancelToken,
+        work: impl FnOnce(&CancelToken) -> T + Send + 'static,
+    ) -> Option<Pending<T>> {
+        let (answer, answered) = bounded(1);
+        let begun = Arc::new(AtomicBool::new(false));
+        let (cancel, begins) = (wanted.clone(), begun.clone());
+        let run = move || {
+            begins.store(true, Ordering::Relaxed);
+            if !cancel.is_cancelled() {
+                // Nobody may be waiting any more.
+                drop(answer.send(work(&cancel)));
+            }
+        };
+        self.0.try_send(Box::new(run)).ok()?;
+        Some(Pending {
+            wanted,
+            begun,
+            answer: answered,
+        })
+    }
+}
+
+/// Work that was handed in; dropped, it is given up.
+pub struct Pending<T> {
+    wanted: CancelToken,
+    begun: Arc<AtomicBool>,
+    answer: Receiver<T>,
+}
+
+impl<T> Pending<T> {
+    /// What came of it, once.
+    ///
+    /// # Errors
+    /// `Timeout`: it is not done within `patience`. `Disconnected`: nothing will come any more.
+    pub fn answer(&self, patience: Duration) -> Result<T, RecvTimeoutError> {
+        self.answer.recv_timeout(patience)
+    }
+
+    /// Whether its turn has come.
+    pub fn has_begun(&self) -> bool {
+        self.begun.load(Ordering::Relaxed)
+    }
+
+    /// Waits until it is done; `None` if it has failed.
+    pub fn wait(self) -> Option<T> {
+        self.answer.recv().ok()
+    }
+}
+
+impl<T> Drop for Pending<T> {
+    fn drop(&mut self) {
+        self.wanted.cancel();
+    }
+}
+
+/// The thread: one piece after the other until nobody can hand in any. The capture goes on after a
+/// panic, and its end reports it.
+fn work_off(queue: &Receiver<Work>, shared: &Shared) {
+    for work in queue {
+        if caught(work).is_none() {
+            shared.fail(Failure::Panicked);
+        }
+    }
+}
+
+/// Lets all other threads go first where there is too little processor for all. Where that is
+/// refused, it is not needed for the result.
+fn stand_back() {
+    const NICE: libc::c_int = 10;
+    // SAFETY: it takes numbers only; 0 is the calling thread, as Linux has it.
+    let _ = unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, NICE) };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What has not come after so long hangs.
+    const HANGS: Duration = Duration::from_secs(20);
+
+    fn begun(background: &Background, gate: Receiver<()>) -> Pending<bool> {
+        let work = move |cancel: &CancelToken| {
+            let _ = gate.recv();
+            cancel.is_cancelled()
+        };
+        background.begin(CancelToken::new(), work).expect("room")
+    }
+
+    /// Work that was given up before its turn takes no time, and what is too much is refused.
+    #[test]
+    fn the_queue_is_bounded_and_given_up_work_is_left_out() {
+        let background = Background::start(false, Arc::default()).expect("a thread");
+        let (open, gate) = bounded(1);
+        let first = begun(&background, gate);
+        while !first.has_begun() {
+            std::thread::yield_now();
+        }
+        let (never, shut) = bounded(1);
+        let waiting: Vec<_> = (0..QUEUE)
+            .map(|_| begun(&background, shut.clone()))
+            .collect();
+        assert!(background.begin(CancelToken::new(), |_| ()).is_none());
+        assert!(waiting.iter().all(|w| !w.has_begun()));
+        drop(waiting);
+        open.send(()).expect("it waits");
+        assert_eq!(first.answer(HANGS), Ok(false));
+        // None of those that would have waited for ever was begun.
+        let mut last = None;
+        while last.is_none() {
+            last = background.begin(CancelToken::new(), |_| 7);
+        }
+        assert_eq!(last.expect("room").answer(HANGS), Ok(7));
+        drop(never);
+    }
+}
