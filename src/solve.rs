@@ -15,6 +15,7 @@ pub use sub_branches::SubBranch;
 
 use crate::cancel::CancelToken;
 use crate::config::Config;
+use crate::dynamics::{Depth, Film, analyse};
 use crate::hierarchy::{self, Evidence};
 use crate::model::{Outline, TrackLog, TrackTable};
 use crate::skeleton;
@@ -58,6 +59,23 @@ pub fn solve(
         ..Moment::of(window)?
     };
     build(&table, evidence, outline, config, moment)
+}
+
+/// The model with its modes: how its branches sway in `film`, whose points are on the nodes of the
+/// model's skeleton. Branches that were not looked at when `cancel` ended the work are
+/// [`NotInTime`](crate::model::Unidentified::NotInTime).
+pub fn with_modes(
+    model: &Model,
+    film: &Film,
+    config: &Config,
+    depth: Depth,
+    cancel: &CancelToken,
+) -> Model {
+    let analysis = analyse(&model.skeleton, film, &config.dynamics, depth, cancel);
+    Model {
+        modes: analysis.sway,
+        ..model.clone()
+    }
 }
 
 /// The prior model with the sub-branches that its frequencies identify by now; `None` where they
@@ -120,6 +138,7 @@ fn build(
         plain: skeleton.clone(),
         skeleton,
         sub_branches: Vec::new(),
+        modes: Vec::new(),
         outline: outline.clone(),
         followed_from: moment.followed_from,
         frame: moment.frame,

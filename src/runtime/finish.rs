@@ -12,13 +12,13 @@ use crate::document::note::{
 use crate::document::{
     CaptureNote, MotionCsv, PICTURE_FILE, SCHEMA_VERSION, TracksCsv, jpeg, nodes,
 };
-use crate::dynamics::{Depth, Film, analyse};
+use crate::dynamics::{Depth, Film};
 use crate::files::OutputFolder;
 use crate::model::{
-    Outline, Picture, Pose, Skeleton, Swaying, Tentative, Timing, TrackLog, TrackSet, Unidentified,
+    Outline, Picture, Pose, Skeleton, Tentative, Timing, TrackLog, TrackSet, Unidentified,
 };
 use crate::recording::TrackFileReader;
-use crate::solve::Model;
+use crate::solve::{Model, with_modes};
 use crate::source::SourceInfo;
 use crate::views::{DocumentWriter, Draft};
 use std::collections::BTreeSet;
@@ -132,22 +132,19 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
     let film = film(job, &done);
     let poses = std::mem::take(&mut done.poses);
     // Most of the document needs no sway, and the user who has asked for the end is waiting.
-    let (sway, writer) = beside(
+    let cancel = &job.shared.pulse.closing_work;
+    let (model, writer) = beside(
         "sway",
-        || {
-            let cancel = &job.shared.pulse.closing_work;
-            let settings = &job.config.dynamics;
-            analyse(&model.skeleton, &film, settings, Depth::Full, cancel).sway
-        },
+        || with_modes(&model, &film, &job.config, Depth::Full, cancel),
         || draft(job, &done, poses),
     );
-    warn_of_unanalysed(job, &model, &sway);
+    warn_of_unanalysed(job, &model);
     let warnings = warnings(job, Some(&model));
-    writer?.write(&done.folder, &sway, warnings)?;
+    writer?.write(&done.folder, &model.modes, warnings)?;
     let dir = done.folder.publish()?;
     Ok(Written {
         dir,
-        tree: Some(model),
+        tree: Some(Arc::new(model)),
     })
 }
 
@@ -179,8 +176,9 @@ fn draft(job: &CaptureJob, done: &Done, poses: Vec<Pose>) -> Result<DocumentWrit
 }
 
 /// Says how many branches were not analysed because the end was wanted.
-fn warn_of_unanalysed(job: &CaptureJob, tree: &Model, sway: &[Swaying]) {
-    let missing = sway
+fn warn_of_unanalysed(job: &CaptureJob, tree: &Model) {
+    let missing = tree
+        .modes
         .iter()
         .filter(|s| matches!(s, Err(Unidentified::NotInTime)))
         .count();

@@ -4,7 +4,9 @@ use super::lift::{assign_radii, flat};
 use super::sub_branches::{self, SubBranch};
 use crate::config::Config;
 use crate::hierarchy::Evidence;
-use crate::model::{LogWindow, MotionHierarchy, NodeId, Outline, Skeleton, TrackId, TrackTable};
+use crate::model::{
+    LogWindow, MotionHierarchy, NodeId, Outline, Skeleton, Swaying, TrackId, TrackTable,
+};
 use crate::motion::Binding;
 use crate::shape::PushFigures;
 use crate::skeleton;
@@ -21,6 +23,8 @@ pub struct Model {
     pub skeleton: Arc<Skeleton>,
     /// Branches that only their frequency tells; their nodes come after those of the hierarchy.
     pub sub_branches: Vec<SubBranch>,
+    /// How each measured branch sways, by node; empty while nobody has asked for it.
+    pub modes: Vec<Swaying>,
     /// Rest position of every track that was there when the tree was built, px.
     pub rest_px: BTreeMap<TrackId, [f64; 2]>,
     /// Tracks that the tree was not built from, with node and rest place, px: those of an older
@@ -138,6 +142,7 @@ impl Model {
     /// Puts `sub_branches` on in place of those that it has.
     pub(super) fn set_sub_branches(&mut self, sub_branches: Vec<SubBranch>, config: &Config) {
         self.sub_branches = sub_branches;
+        self.modes.clear();
         let mut skeleton = sub_branches::with(&self.plain, &self.sub_branches);
         assign_radii(&mut skeleton, &self.outline, config);
         self.skeleton = Arc::new(skeleton);
