@@ -33,7 +33,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("signal", &[]),
     ("random", &[]),
     ("animate", &["model", "config", "signal", "random"]),
-    // Branches that only their own frequency tells.
+    // Sub-branches, which only their own frequency tells, and modes.
     (
         "solve",
         &[
@@ -44,9 +44,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "shape",
             "motion",
             "signal",
-            "dynamics::shoots",
-            "dynamics::Film",
-            "dynamics::FilmTrack",
+            "dynamics",
         ],
     ),
     (
@@ -133,6 +131,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &[
             "model",
             "config",
+            "caught",
             "source",
             "outline",
             "dynamics",
