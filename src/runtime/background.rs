@@ -9,9 +9,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Pieces of work that may wait. Each of those who hand in work has one piece there at a time; a
-/// piece that was given up takes no time.
+/// Pieces of work that may wait. Each of those who hand in work wants one piece at a time; pieces
+/// that were given up keep their place until their turn, and take no time then.
 const QUEUE: usize = 16;
+
+/// A wait for an answer is broken off by a wish to stop within this time.
+pub const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 type Work = Box<dyn FnOnce() + Send>;
 
@@ -89,6 +92,13 @@ impl<T> Pending<T> {
     }
 }
 
+impl Pending<()> {
+    /// Whether it is still to be done.
+    pub fn is_under_way(&self) -> bool {
+        self.answer(Duration::ZERO) == Err(RecvTimeoutError::Timeout)
+    }
+}
+
 impl<T> Drop for Pending<T> {
     fn drop(&mut self) {
         self.wanted.cancel();
@@ -100,7 +110,7 @@ impl<T> Drop for Pending<T> {
 fn work_off(queue: &Receiver<Work>, shared: &Shared) {
     for work in queue {
         if caught(work).is_none() {
-            shared.fail(Failure::Panicked);
+            shared.background_failed();
         }
     }
 }

@@ -33,8 +33,9 @@ pub struct CaptureTables {
     undecided: TrackLog,
     /// Points that did not pass their trial, until the rows from before the tree are written.
     rejected: BTreeSet<TrackId>,
-    /// Whether the frames up to the one in which the tree was built have their rows.
-    early_rows_written: bool,
+    early: EarlyRows,
+    /// Sets whose points are decided and not written yet.
+    decided: VecDeque<Arc<TrackSet>>,
     /// Poses of the last [`kept_s`](Self::kept_s), for the animation.
     poses: VecDeque<Pose>,
     kept_s: f64,
@@ -42,6 +43,16 @@ pub struct CaptureTables {
     pictured: Option<u64>,
     pose_in_picture: Option<Pose>,
     misses: Histogram,
+}
+
+/// Whether the frames up to the one in which the tree was built have their rows.
+#[derive(Default)]
+enum EarlyRows {
+    #[default]
+    NotBegun,
+    /// Those that follow lack theirs.
+    Cut(Sets),
+    Written,
 }
 
 /// What is left when both tables are complete.
@@ -83,7 +94,8 @@ impl CaptureTables {
             sets: None,
             undecided: TrackLog::new(LONGEST_TRIAL_S),
             rejected: BTreeSet::new(),
-            early_rows_written: false,
+            early: EarlyRows::default(),
+            decided: VecDeque::new(),
             poses: VecDeque::new(),
             kept_s: config.export.animation_s + SLACK_S,
             pictured,
@@ -97,6 +109,8 @@ impl CaptureTables {
     /// # Errors
     /// Whatever the file system says, a full disk among it.
     pub fn catch_up(&mut self, log: &TrackFileReader, cancel: &CancelToken) -> Result<(), Failure> {
+        // Where the last call was cut.
+        self.decided_rows(log, cancel)?;
         let mut sets = self.sets.take().unwrap_or_else(|| log.sets());
         sets.until(log);
         let built = self.replay.model().frame;
@@ -104,19 +118,15 @@ impl CaptureTables {
             let Some(set) = sets.next() else { break };
             let set = set.map_err(Failure::Log)?;
             self.pose(&set)?;
-            if !self.early_rows_written {
+            if !matches!(self.early, EarlyRows::Written) {
                 self.rejected.extend(&set.rejected);
             }
             // A track's node is known when it has passed its trial; of those that were there when
             // the tree was built, then.
             let mut decided = self.undecided.push(set);
             decided.retain(|set| set.frame > built);
-            if !decided.is_empty() {
-                self.early_rows(log, cancel)?;
-            }
-            for set in decided {
-                self.rows(&set)?;
-            }
+            self.decided.extend(decided);
+            self.decided_rows(log, cancel)?;
         }
         self.sets = Some(sets);
         Ok(())
@@ -134,12 +144,11 @@ impl CaptureTables {
     /// Whatever the file system says.
     pub fn finish(mut self, log: &TrackFileReader, cancel: &CancelToken) -> Result<Done, Failure> {
         self.rejected.extend(self.undecided.close());
-        self.early_rows(log, cancel)?;
         let built = self.replay.model().frame;
-        for set in self.undecided.drain() {
-            if set.frame > built {
-                self.rows(&set)?;
-            }
+        let rest = self.undecided.drain().into_iter();
+        self.decided.extend(rest.filter(|set| set.frame > built));
+        if self.early_rows(log, cancel)? {
+            self.decided_rows(log, cancel)?;
         }
         self.tracks.finish()?;
         self.motion.finish()?;
@@ -179,22 +188,46 @@ impl CaptureTables {
         Ok(())
     }
 
-    /// The rows of the frames up to the one in which the tree was built, once that has been gone
-    /// through: which tracks of that time are on the tree is known only then.
-    fn early_rows(&mut self, log: &TrackFileReader, cancel: &CancelToken) -> Result<(), Failure> {
-        if std::mem::replace(&mut self.early_rows_written, true) {
+    /// The rows of all sets that are decided.
+    fn decided_rows(&mut self, log: &TrackFileReader, cancel: &CancelToken) -> Result<(), Failure> {
+        if self.decided.is_empty() || !self.early_rows(log, cancel)? {
             return Ok(());
         }
-        let built = self.replay.model().frame;
-        for set in log.sets() {
-            let mut set = set.map_err(Failure::Log)?;
-            if set.frame > built || cancel.is_cancelled() {
-                break;
+        while let Some(set) = self.decided.pop_front() {
+            self.rows(&set)?;
+        }
+        Ok(())
+    }
+
+    /// The rows of the frames up to the one in which the tree was built, once that has been gone
+    /// through: which tracks of that time are on the tree is known only then. Whether all of them
+    /// are written; if `cancel` has cut them, the next call goes on there.
+    fn early_rows(&mut self, log: &TrackFileReader, cancel: &CancelToken) -> Result<bool, Failure> {
+        let mut sets = match std::mem::take(&mut self.early) {
+            EarlyRows::NotBegun => log.sets(),
+            EarlyRows::Cut(sets) => sets,
+            EarlyRows::Written => {
+                self.early = EarlyRows::Written;
+                return Ok(true);
             }
+        };
+        sets.until(log);
+        let built = self.replay.model().frame;
+        while !cancel.is_cancelled() {
+            let next = sets.next().transpose().map_err(Failure::Log)?;
+            let Some(mut set) = next.filter(|set| set.frame <= built) else {
+                self.rejected.clear();
+                self.early = EarlyRows::Written;
+                return Ok(true);
+            };
             set.observations.retain(|o| !self.rejected.contains(&o.id));
             self.rows(&set)?;
         }
-        self.rejected.clear();
-        Ok(())
+        self.early = EarlyRows::Cut(sets);
+        Ok(false)
     }
 }
+
+#[cfg(test)]
+#[path = "tests/capture_tables.rs"]
+mod tests;

@@ -27,6 +27,13 @@ pub struct Job {
     pub preview_every: Duration,
 }
 
+impl Job {
+    /// Whether there is a screen, or a reader of the stream.
+    pub fn is_watched(&self) -> bool {
+        self.stream.is_some() || self.preview_every < Duration::MAX
+    }
+}
+
 /// What came out.
 #[derive(Clone, Debug)]
 pub struct Summary {

@@ -5,6 +5,8 @@
 //!        \--(512 entries, 96 MB; live: what does not fit is counted)--> record <--/
 //! ```
 //!
+//! What no frame waits for, the model hands in to `background` (16 pieces).
+//!
 //! A dropped sender ends the stream: when the source is done, the tracker works off its queue and
 //! ends, then the model does and writes the capture.
 
@@ -107,7 +109,8 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
         Some(to) => Some(recorder_thread::start(to, info.live, &shared)?),
         None => None,
     };
-    let background = Background::start(job.pace != Pace::Fast, shared.clone())?;
+    // The sway is analysed without a pause where somebody looks; a camera's frames come first.
+    let background = Background::start(live && job.is_watched(), shared.clone())?;
     let recorder = recording.as_ref().map(|(recorder, _)| recorder.clone());
 
     let model = {
@@ -224,6 +227,7 @@ impl Running {
             .flatten()
             .any(|handle| handle.join().is_err());
         let summary = self.model.take().and_then(|handle| handle.join().ok());
+        let panicked = panicked || self.shared.panicked.load(Ordering::Relaxed);
         if panicked || summary.is_none() {
             self.shared.fail(Failure::Panicked);
         }

@@ -63,7 +63,7 @@ pub struct ModelThread {
     picture: Option<Picture>,
     quality: Quality,
     last_screen: Option<Instant>,
-    exports: Vec<Pending<()>>,
+    export: Option<Pending<()>>,
     /// Number of the last export; its folder may not be there yet.
     exported: u32,
     announced: Announced,
@@ -80,8 +80,7 @@ impl ModelThread {
     ) -> Self {
         let status = Status::new(info.name.clone(), info.format.clone(), info.frames_total);
         let back = BackEnd::new(&job.config);
-        let looked_at = job.stream.is_some() || job.preview_every < Duration::MAX;
-        let sway = looked_at.then(|| {
+        let sway = job.is_watched().then(|| {
             let waits = job.pace == Pace::Fast;
             SwayWatch::new(
                 &job.config.dynamics,
@@ -90,7 +89,7 @@ impl ModelThread {
                 shared.clone(),
             )
         });
-        let refining = Refining::new(background.clone());
+        let refining = Refining::new(background.clone(), shared.clone());
         let mut thread = Self {
             back,
             job,
@@ -107,7 +106,7 @@ impl ModelThread {
             picture: None,
             quality: Quality::default(),
             last_screen: None,
-            exports: Vec::new(),
+            export: None,
             exported: 0,
             announced: Announced::default(),
             recorder,
@@ -178,7 +177,7 @@ impl ModelThread {
         self.back.restart();
         self.status.restart();
         if let Some(tables) = self.tables.take() {
-            drop(tables.join());
+            drop(tables.into_tables());
         }
         self.refining.give_up();
         if let Some(sway) = &mut self.sway {
@@ -213,7 +212,6 @@ impl ModelThread {
             &mut self.back,
             followed.tracks.time_s,
             self.job.pace == Pace::Live,
-            hurry,
         );
         let moved = self.back.step(followed);
         if !hurry {
@@ -270,7 +268,7 @@ impl ModelThread {
             return;
         };
         if let Some(outdated) = self.tables.take_if(|tables| !tables.is_of(&model)) {
-            drop(outdated.join());
+            drop(outdated.into_tables());
         }
         if self.tables.is_none() {
             self.tables = self.begin_tables(&model);
@@ -405,6 +403,11 @@ impl ModelThread {
 
     /// Writes the capture as it is now beside the final one, in the background: frames go on.
     fn export_now(&mut self) {
+        if self.export.as_ref().is_some_and(Pending::is_under_way) {
+            self.shared
+                .tell("the last export is still being written; press e again after it".into());
+            return;
+        }
         let wanted = self
             .job
             .out
@@ -418,12 +421,7 @@ impl ModelThread {
                     Ok(_) => shared.answer(format!("capture written to {}", dir.display())),
                     Err(e) => shared.warn(e.to_string()),
                 };
-                match self.background.begin(CancelToken::new(), write) {
-                    Some(export) => self.exports.push(export),
-                    None => self
-                        .shared
-                        .tell("exports are still being written; try again later".into()),
-                }
+                self.export = self.background.begin(CancelToken::new(), write);
             }
             Err(e) => self.shared.warn(e.to_string()),
         }
@@ -472,12 +470,12 @@ impl ModelThread {
         let job = self.capture_job()?;
         let tables = self.tables.take();
         match (tables, &job.tree) {
-            (Some(tables), Some(model)) if tables.is_of(model) => match tables.join() {
+            (Some(tables), Some(model)) if tables.is_of(model) => match tables.into_tables() {
                 Some(tables) => finish::complete(&job, tables),
                 None => finish::write(&job, out),
             },
             (outdated, _) => {
-                drop(outdated.and_then(TableWriter::join));
+                drop(outdated.and_then(TableWriter::into_tables));
                 finish::write(&job, out)
             }
         }
@@ -490,16 +488,16 @@ impl ModelThread {
             drop(recorder);
             thread.join().ok()
         });
-        for export in self.exports.drain(..) {
+        if let Some(export) = self.export.take() {
             export.wait();
         }
         let seen = self.shared.counts.seen.load(Ordering::Relaxed);
         let written = match self.job.out.clone() {
-            Some(out) if seen > 0 => self
+            Some(out) if seen > 0 && self.file.is_some() => self
                 .write_capture(&out)
                 .map_err(|e| self.shared.fail_at_end(e))
                 .ok(),
-            // Without a single frame there is nothing to keep.
+            // Without a single frame, or without a log, there is nothing to keep.
             _ => {
                 if let Some(unfinished) = self.unfinished.take() {
                     unfinished.remove();

@@ -39,7 +39,7 @@ pub struct Pulse {
     done: [AtomicU64; Worker::ALL.len()],
     waits: AtomicU64,
     written: AtomicU64,
-    /// What the `sway` thread works on is a child of this token: each look at it is a piece done.
+    /// What the sway is analysed with is a child of this token: each look at it is a piece done.
     pub sway_work: CancelToken,
     /// The work of the end that nobody waits for who asks for the end, and the work that he gives
     /// some seconds. Each look at them is a sign of life, as a frame written is.

@@ -118,6 +118,8 @@ pub struct Shared {
     warnings: Mutex<VecDeque<String>>,
     notice: Mutex<Notices>,
     failure: Mutex<Option<Failure>>,
+    /// A piece of work in the background has panicked.
+    pub panicked: AtomicBool,
     last_time_s: Mutex<f64>,
     reloaded: Mutex<Reloaded>,
     camera: Mutex<CameraState>,
@@ -227,6 +229,13 @@ impl Shared {
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .take()
+    }
+
+    /// A piece of work in the background has panicked; the capture goes on without it.
+    pub fn background_failed(&self) {
+        if !self.panicked.swap(true, Ordering::Relaxed) {
+            self.warn(Failure::Panicked.to_string());
+        }
     }
 
     /// Tells at once, and keeps it for the capture.

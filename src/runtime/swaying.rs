@@ -6,7 +6,7 @@
 //! recording at its own pace, waits for nobody: what is not ready is looked at again when the next
 //! one is due, and the request that finds the last one under way is passed over and counted.
 
-use super::background::{Background, Pending};
+use super::background::{Background, LOOK_EVERY, Pending};
 use super::pulse::{Pulse, Worker};
 use super::shared::Shared;
 use crate::cancel::CancelToken;
@@ -21,9 +21,6 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
-
-/// A wait is broken off by a wish to stop within this time.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// All that an analysis needs, apart from everything that goes on meanwhile.
 pub struct Request {

@@ -10,10 +10,8 @@ use super::shared::Shared;
 use crate::cancel::CancelToken;
 use crate::recording::TrackFileReader;
 use crate::solve::Model;
-use crossbeam_channel::RecvTimeoutError;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
 
 /// The tables, and the work that brings them up to date.
 pub struct TableWriter {
@@ -62,8 +60,7 @@ impl TableWriter {
     /// There is more to be written. What comes while the last piece is being written is left for
     /// the next time.
     pub fn catch_up(&mut self, log: TrackFileReader) {
-        let last = self.writing.as_ref().map(|w| w.answer(Duration::ZERO));
-        if last == Some(Err(RecvTimeoutError::Timeout)) {
+        if self.writing.as_ref().is_some_and(Pending::is_under_way) {
             return;
         }
         let state = self.state.clone();
@@ -73,13 +70,17 @@ impl TableWriter {
 
     /// Size of the tables on the disk, bytes.
     pub fn bytes(&self) -> u64 {
+        // After a panic they are not to be used.
+        if self.state.tables.is_poisoned() {
+            return 0;
+        }
         self.state.bytes.load(Ordering::Relaxed)
     }
 
-    /// The tables as far as they are; `None` if they could not be written.
-    pub fn join(self) -> Option<CaptureTables> {
+    /// The tables as far as they are; `None` if they could not be written. What is being written is
+    /// cut after the next frame, what waits is not begun.
+    pub fn into_tables(self) -> Option<CaptureTables> {
         self.cancel.cancel();
-        // After a panic they are not to be used.
         self.state.tables.lock().ok()?.take()
     }
 }
@@ -98,6 +99,7 @@ impl State {
                 self.shared
                     .news(format!("the capture cannot be written at present: {e}"));
                 *held = None;
+                self.bytes.store(0, Ordering::Relaxed);
             }
         }
     }

@@ -81,6 +81,7 @@ fn hook_panics() {
     std::panic::set_hook(Box::new(move |panic| {
         // A caught panic ends nothing, and the screen goes on.
         if caught::catching() {
+            tracing::error!("{panic}");
             return;
         }
         restore("");

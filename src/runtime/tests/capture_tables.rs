@@ -1,0 +1,122 @@
+//! The tables do not depend on when and in how many pieces they are written.
+
+use super::*;
+use crate::model::{Observation, Outline, Size};
+use crate::recording::TrackFile;
+use crate::solve::solve;
+use std::f64::consts::TAU;
+use std::time::Duration;
+
+const RATE_HZ: f64 = 30.0;
+/// The tree is built with this frame.
+const BUILT: u64 = 200;
+const FRAMES: u64 = 420;
+const FOOT: [f64; 2] = [160.0, 230.0];
+const POINTS_PER_LIMB: u32 = 24;
+/// Tips of the limbs as seen from the foot (px), and the frequencies at which they swing (Hz).
+const LIMBS: [([f64; 2], f64); 3] = [
+    ([0.0, -180.0], 0.5),
+    ([-100.0, -140.0], 1.1),
+    ([110.0, -150.0], 1.6),
+];
+/// Does not pass its trial.
+const REJECTED: TrackId = TrackId(5);
+
+/// Limbs that swing about the foot.
+fn tracks(frame: u64) -> TrackSet {
+    let time_s = frame as f64 / RATE_HZ;
+    let mut observations = Vec::new();
+    for (k, (tip, hz)) in (0..).zip(LIMBS) {
+        let (sin, cos) = (0.08 * (TAU * hz * time_s).sin()).sin_cos();
+        for i in 0..POINTS_PER_LIMB {
+            let share = f64::from(i + 1) / f64::from(POINTS_PER_LIMB);
+            let id = TrackId(k * POINTS_PER_LIMB + i);
+            observations.push(Observation {
+                id,
+                u_px: (FOOT[0] + share * (cos * tip[0] - sin * tip[1])) as f32,
+                v_px: (FOOT[1] + share * (sin * tip[0] + cos * tip[1])) as f32,
+                fb_error_px: 0.05,
+                error_px: None,
+                confirmed: frame > 20 && id != REJECTED,
+            });
+        }
+    }
+    let mut rejected = Vec::new();
+    if frame == 100 {
+        rejected.push(REJECTED);
+    }
+    if frame >= 100 {
+        observations.retain(|o| o.id != REJECTED);
+    }
+    TrackSet {
+        frame,
+        time_s,
+        observations,
+        rejected,
+        ..TrackSet::default()
+    }
+}
+
+fn model(config: &Config) -> Arc<Model> {
+    let size = Size::new(320, 240);
+    let outline = Arc::new(Outline {
+        size,
+        mask: vec![u8::MAX; size.area()],
+        polygon_px: Vec::new(),
+        matte: None,
+    });
+    let mut log = TrackLog::new(config.accumulate.window_s);
+    (0..=BUILT).for_each(|frame| drop(log.push(tracks(frame))));
+    let model = solve(&log, &outline, None, config, &CancelToken::new());
+    Arc::new(model.expect("a tree"))
+}
+
+/// Both tables, after `write` has written what it wanted of them.
+fn written(
+    log: &TrackFileReader,
+    model: &Arc<Model>,
+    config: &Config,
+    write: impl Fn(&mut CaptureTables),
+) -> [Vec<u8>; 2] {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let mut tables =
+        CaptureTables::create(&dir.path().join("out"), model, config, None).expect("tables");
+    write(&mut tables);
+    let cancel = CancelToken::new();
+    tables.catch_up(log, &cancel).expect("rows");
+    let done = tables.finish(log, &cancel).expect("rows");
+    ["tracks.csv", "motion.csv"].map(|name| std::fs::read(done.folder.path(name)).expect(name))
+}
+
+#[test]
+fn tables_that_were_cut_anywhere_are_those_written_at_once() {
+    let config = Config::default();
+    let model = model(&config);
+    let mut file = TrackFile::nameless(&std::env::temp_dir()).expect("file");
+    (0..FRAMES).for_each(|frame| file.push(&tracks(frame)).expect("room"));
+    let log = file.reader().expect("file");
+
+    let whole = written(&log, &model, &config, |_| ());
+    let rows = whole[0].iter().filter(|b| **b == b'\n').count();
+    let per_frame = LIMBS.len() * POINTS_PER_LIMB as usize - 1;
+    assert_eq!(rows, 1 + per_frame * FRAMES as usize);
+
+    let cuts = std::cell::Cell::new((0, 0));
+    let cut = written(&log, &model, &config, |tables| {
+        for k in 0..4000 {
+            let cancel = CancelToken::new();
+            cancel.cancel_at(std::time::Instant::now() + Duration::from_micros(20 + k % 50));
+            tables.catch_up(&log, &cancel).expect("rows");
+            let (mut early, mut late) = cuts.get();
+            match tables.early {
+                EarlyRows::Cut(_) => early += 1,
+                EarlyRows::Written => late += 1,
+                EarlyRows::NotBegun => {}
+            }
+            cuts.set((early, late));
+        }
+    });
+    let (early, late) = cuts.get();
+    assert!(early > 0 && late > 0, "cut {early} and {late} times");
+    assert!(cut == whole, "the tables differ");
+}
