@@ -17,10 +17,6 @@ pub const GROUP: Group = Group {
         ("it_runs_as_its_own_user", own_user),
         ("the_watchdog_restarts_it_when_it_hangs", watchdog),
         (
-            "what_a_cut_run_has_filmed_is_completed_while_the_next_one_films",
-            completed,
-        ),
-        (
             "it_stops_within_two_seconds_with_its_capture_complete",
             stops,
         ),
@@ -86,25 +82,6 @@ fn watchdog(r: &Results) -> Result<(), String> {
     })
 }
 
-fn completed(r: &Results) -> Result<(), String> {
-    let runs = r.text("completing")?;
-    let (now, then) = runs.trim().split_once(' ').unwrap_or_default();
-    claim(!now.is_empty() && now == then, || {
-        format!("run {then}, then run {now}: {}", said(r))
-    })?;
-    is_complete(r, "completed")
-}
-
-/// All tables are there.
-fn is_complete(r: &Results, capture: &str) -> Result<(), String> {
-    for file in ["capture.json", "tracks.csv", "nodes.csv", "motion.csv"] {
-        claim(r.path(capture).join(file).exists(), || {
-            format!("{file} is missing in {capture}: {}", said(r))
-        })?;
-    }
-    Ok(())
-}
-
 fn stops(r: &Results) -> Result<(), String> {
     let took = r.number("ended")? - r.number("asked")?;
     claim(took <= 2.0 * slack(), || {
@@ -114,7 +91,11 @@ fn stops(r: &Results) -> Result<(), String> {
     claim(result.trim() == "success 130", || {
         format!("{result}{}", said(r))
     })?;
-    is_complete(r, "capture")?;
+    for file in ["capture.json", "tracks.csv", "nodes.csv", "motion.csv"] {
+        claim(r.path("capture").join(file).exists(), || {
+            format!("{file} is missing: {}", said(r))
+        })?;
+    }
     let json: serde_json::Value = serde_json::from_str(&r.text("capture/capture.json")?)
         .map_err(|e| format!("capture.json: {e}"))?;
     let seen = json["timing"]["frames_seen"].as_u64().unwrap_or(0);
