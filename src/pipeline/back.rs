@@ -244,7 +244,10 @@ impl BackEnd {
                 self.build();
             }
         }
-        self.identify_sub_branches(cancel);
+        // Nothing would come of it.
+        if !cancel.is_cancelled() {
+            self.identify_sub_branches(cancel);
+        }
     }
 
     fn identify_sub_branches(&mut self, cancel: &CancelToken) {

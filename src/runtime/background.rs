@@ -1,7 +1,9 @@
-//! Work that no frame waits for, on one thread: the tree is worked out anew, its sway is analysed,
-//! the tables of the capture are brought up to date, a capture is exported.
+//! Work that no frame waits for, on a thread beside: the tree is worked out anew, the tables of the
+//! capture are brought up to date, a capture is exported. The sway is analysed on a second one.
 
+use super::job::Job;
 use super::shared::{Failure, Shared};
+use super::source_thread::Pace;
 use crate::cancel::CancelToken;
 use crate::caught::caught;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
@@ -23,12 +25,12 @@ type Work = Box<dyn FnOnce() + Send>;
 pub struct Background(Sender<Work>);
 
 impl Background {
-    /// Starts the thread. If it `stands_back`, all others go first where there is too little
-    /// processor for all.
+    /// Starts the thread `name`. If it `stands_back`, all others go first where there is too little
+    /// processor for all: what is handed in then may take very long.
     ///
     /// # Errors
     /// The thread cannot be started.
-    pub fn start(stands_back: bool, shared: Arc<Shared>) -> Result<Self, Failure> {
+    pub fn start(name: &str, stands_back: bool, shared: Arc<Shared>) -> Result<Self, Failure> {
         let (sender, queue) = bounded(QUEUE);
         let run = move || {
             if stands_back {
@@ -36,7 +38,7 @@ impl Background {
             }
             work_off(&queue, &shared);
         };
-        super::spawn("background", run)?;
+        super::spawn(name, run)?;
         Ok(Self(sender))
     }
 
@@ -61,6 +63,30 @@ impl Background {
             wanted,
             begun,
             answer: answered,
+        })
+    }
+}
+
+/// The threads that work beside those of the frames.
+pub struct Beside {
+    pub background: Background,
+    /// Only where somebody looks: it has work without a pause, and a camera's frames come first.
+    pub sway: Option<Background>,
+}
+
+impl Beside {
+    /// # Errors
+    /// A thread cannot be started.
+    pub fn start(job: &Job, shared: &Arc<Shared>) -> Result<Self, Failure> {
+        let stands_back = job.pace != Pace::Fast;
+        let sway = if job.is_watched() {
+            Some(Background::start("sway", stands_back, shared.clone())?)
+        } else {
+            None
+        };
+        Ok(Self {
+            background: Background::start("background", false, shared.clone())?,
+            sway,
         })
     }
 }
@@ -141,7 +167,7 @@ mod tests {
     /// Work that was given up before its turn takes no time, and what is too much is refused.
     #[test]
     fn the_queue_is_bounded_and_given_up_work_is_left_out() {
-        let background = Background::start(false, Arc::default()).expect("a thread");
+        let background = Background::start("test", false, Arc::default()).expect("a thread");
         let (open, gate) = bounded(1);
         let first = begun(&background, gate);
         while !first.has_begun() {

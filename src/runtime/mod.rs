@@ -5,7 +5,8 @@
 //!        \--(512 entries, 96 MB; live: what does not fit is counted)--> record <--/
 //! ```
 //!
-//! What no frame waits for, the model hands in to `background` (16 pieces).
+//! What no frame waits for, the model hands in to `background`, and where somebody looks to `sway`
+//! (16 pieces each).
 //!
 //! A dropped sender ends the stream: when the source is done, the tracker works off its queue and
 //! ends, then the model does and writes the capture.
@@ -56,7 +57,7 @@ use crate::model::{Control, Outline, Snapshot};
 use crate::outline::{Given, Scribbles};
 use crate::pipeline::FrontEnd;
 use crate::source::Source;
-use background::Background;
+use background::Beside;
 use crossbeam_channel::{Sender, bounded, unbounded};
 use model_thread::ModelThread;
 use shared::{Shared, StopAll};
@@ -109,12 +110,11 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
         Some(to) => Some(recorder_thread::start(to, info.live, &shared)?),
         None => None,
     };
-    // The sway is analysed without a pause where somebody looks; a camera's frames come first.
-    let background = Background::start(live && job.is_watched(), shared.clone())?;
+    let beside = Beside::start(&job, &shared)?;
     let recorder = recording.as_ref().map(|(recorder, _)| recorder.clone());
 
     let model = {
-        let model = ModelThread::new(job, info, shared.clone(), background, recording);
+        let model = ModelThread::new(job, info, shared.clone(), beside, recording);
         let on_end = shared.clone();
         let run = move || {
             let _ends_all = StopAll(&on_end);

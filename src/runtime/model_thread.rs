@@ -2,7 +2,7 @@
 //! and writes the capture at the end.
 
 use super::announce::Announced;
-use super::background::{Background, Pending};
+use super::background::{Background, Beside, Pending};
 use super::capture_tables::CaptureTables;
 use super::finish::{self, CaptureJob, Quality, Written};
 use super::job::{Job, Summary};
@@ -75,20 +75,15 @@ impl ModelThread {
         job: Job,
         info: SourceInfo,
         shared: Arc<Shared>,
-        background: Background,
+        beside: Beside,
         recorder: Option<(Recorder, JoinHandle<Recorded>)>,
     ) -> Self {
         let status = Status::new(info.name.clone(), info.format.clone(), info.frames_total);
         let back = BackEnd::new(&job.config);
-        let sway = job.is_watched().then(|| {
-            let waits = job.pace == Pace::Fast;
-            SwayWatch::new(
-                &job.config.dynamics,
-                waits,
-                background.clone(),
-                shared.clone(),
-            )
-        });
+        let Beside { background, sway } = beside;
+        let waits = job.pace == Pace::Fast;
+        let sway =
+            sway.map(|sway| SwayWatch::new(&job.config.dynamics, waits, sway, shared.clone()));
         let refining = Refining::new(background.clone(), shared.clone());
         let mut thread = Self {
             back,

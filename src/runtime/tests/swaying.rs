@@ -62,7 +62,7 @@ fn takes(time: Duration, cancel: &CancelToken) {
 
 fn of(analyser: Analyser, waits: bool) -> (Swaying, Arc<Shared>) {
     let shared = Arc::new(Shared::default());
-    let background = Background::start(false, shared.clone()).expect("a thread");
+    let background = Background::start("test", false, shared.clone()).expect("a thread");
     let swaying = Swaying::new(1.0, waits, analyser, background, shared.clone());
     (swaying, shared)
 }
@@ -164,7 +164,7 @@ fn a_restart_forgets_what_is_under_way() {
 #[test]
 fn without_an_interval_nobody_is_asked() {
     let shared = Arc::new(Shared::default());
-    let background = Background::start(false, shared.clone()).expect("a thread");
+    let background = Background::start("test", false, shared.clone()).expect("a thread");
     let mut swaying = Swaying::new(0.0, true, |_, _| panic!("asked"), background, shared);
     assert_eq!(film(&mut swaying, 0..200), []);
     over(swaying);
