@@ -4,6 +4,7 @@
 use super::job::Job;
 use super::shared::{Failure, Shared};
 use super::source_thread::Pace;
+use super::spawn::spawn;
 use crate::cancel::CancelToken;
 use crate::caught::caught;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
@@ -38,7 +39,7 @@ impl Background {
             }
             work_off(&queue, &shared);
         };
-        super::spawn(name, run)?;
+        spawn(name, run)?;
         Ok(Self(sender))
     }
 

@@ -32,6 +32,7 @@ mod recorder_thread;
 mod refining;
 mod shared;
 mod source_thread;
+mod spawn;
 mod status;
 mod stream;
 mod sway_watch;
@@ -62,6 +63,7 @@ use crossbeam_channel::{Sender, bounded, unbounded};
 use model_thread::ModelThread;
 use shared::{Shared, StopAll};
 use source_thread::FRAME_QUEUE;
+use spawn::spawn;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
@@ -78,14 +80,6 @@ pub struct Running {
     source: Option<JoinHandle<()>>,
     track: Option<JoinHandle<()>>,
     model: Option<JoinHandle<Summary>>,
-}
-
-fn spawn<T: Send + 'static>(
-    name: &str,
-    run: impl FnOnce() -> T + Send + 'static,
-) -> Result<JoinHandle<T>, Failure> {
-    let thread = std::thread::Builder::new().name(name.into());
-    thread.spawn(run).map_err(Failure::Thread)
 }
 
 /// Starts the threads.

@@ -3,6 +3,7 @@
 use super::recorder_thread::{self, RecordTo, Recorded};
 use super::shared::{Failure, Shared, StopAll};
 use super::source_thread::{self, FRAME_QUEUE, Pace};
+use super::spawn::spawn;
 use super::watched::Watched;
 use crate::config;
 use crate::source::Source;
@@ -35,13 +36,10 @@ pub fn record(source: Box<dyn Source>, job: RecordJob) -> Result<RunningRecord, 
     let shared = Arc::new(Shared::default());
     let (recorder, recording) = recorder_thread::start(job.to, source.describe().live, &shared)?;
     let (frames_in, frames_out) = bounded::<source_thread::Timed>(FRAME_QUEUE);
-    let thread = |name: &str| std::thread::Builder::new().name(name.into());
     // Nobody looks at the frames; the source hands them on as ever.
     let drain = {
         let frames = frames_out.clone();
-        thread("drain")
-            .spawn(move || frames.iter().for_each(drop))
-            .map_err(Failure::Thread)?
+        spawn("drain", move || frames.iter().for_each(drop))?
     };
     let source = {
         let shared = shared.clone();
@@ -53,7 +51,7 @@ pub fn record(source: Box<dyn Source>, job: RecordJob) -> Result<RunningRecord, 
             };
             source_thread::run(source, job.pace, job.camera, queue, Some(recorder), &shared);
         };
-        thread("source").spawn(run).map_err(Failure::Thread)?
+        spawn("source", run)?
     };
     Ok(RunningRecord {
         shared,
