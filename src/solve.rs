@@ -86,6 +86,9 @@ pub fn identify_sub_branches(
     config: &Config,
     cancel: &CancelToken,
 ) -> Option<Model> {
+    if cancel.is_cancelled() {
+        return None;
+    }
     Refinement::of(log, prior, config)?.sub_branches_only(cancel)
 }
 

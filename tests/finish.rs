@@ -149,27 +149,41 @@ fn a_finished_log_is_the_capture_of_the_run() {
     }
 }
 
-struct Mounted(PathBuf);
+/// A disk of 100 MB.
+struct SmallDisk(TempDir);
 
-impl Drop for Mounted {
+impl Drop for SmallDisk {
     fn drop(&mut self) {
-        let _ = Command::new("umount").arg(&self.0).status();
+        let _ = Command::new("umount").arg(self.0.path()).status();
     }
 }
 
-/// A disk of 100 MB; `None` where only root may mount one.
-fn small_disk() -> Option<(TempDir, Mounted)> {
-    let dir = tempfile::tempdir().expect("tempdir");
-    let mount = Command::new("mount")
-        .args(["-t", "tmpfs", "-o", "size=100m", "arborcam"])
-        .arg(dir.path())
-        .output();
-    if !mount.is_ok_and(|o| o.status.success()) {
-        eprintln!("SKIPPED: full disk: a small disk can be mounted by root only");
-        return None;
+impl SmallDisk {
+    /// `None` where only root may mount one.
+    fn mount() -> Option<Self> {
+        let dir = tempfile::tempdir().expect("tempdir");
+        let mount = Command::new("mount")
+            .args(["-t", "tmpfs", "-o", "size=100m", "arborcam"])
+            .arg(dir.path())
+            .output();
+        if !mount.is_ok_and(|o| o.status.success()) {
+            eprintln!("SKIPPED: full disk: a small disk can be mounted by root only");
+            return None;
+        }
+        Some(Self(dir))
     }
-    let disk = Mounted(dir.path().to_owned());
-    Some((dir, disk))
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// A run that has filmed for ten seconds.
+    fn filming(&self) -> Run {
+        let run = Run::start(&self.path("out"), &[]);
+        run.wait_until_it_films();
+        std::thread::sleep(Duration::from_secs(10));
+        run
+    }
 }
 
 /// Fills the disk to its last page.
@@ -180,14 +194,12 @@ fn fill(filler: &mut fs::File) {
 /// Something else fills the disk while a tree is filmed: the results have their space.
 #[test]
 fn a_disk_that_fills_up_ends_the_film_and_not_the_capture() {
-    let Some((_dir, disk)) = small_disk() else {
+    let Some(disk) = SmallDisk::mount() else {
         return;
     };
-    let out = disk.0.join("out");
-    let run = Run::start(&out, &[]);
-    run.wait_until_it_films();
-    std::thread::sleep(Duration::from_secs(10));
-    fill(&mut fs::File::create(disk.0.join("filler")).expect("filler"));
+    let run = disk.filming();
+    let out = run.out.clone();
+    fill(&mut fs::File::create(disk.path("filler")).expect("filler"));
     let unfinished = run.unfinished();
     let output = run.end();
     assert_eq!(output.status.code(), Some(1), "{}", said(&output));
@@ -202,15 +214,13 @@ fn a_disk_that_fills_up_ends_the_film_and_not_the_capture() {
 /// is there when the disk has room again.
 #[test]
 fn a_disk_that_stays_full_costs_nothing_that_was_filmed() {
-    let Some((_dir, disk)) = small_disk() else {
+    let Some(disk) = SmallDisk::mount() else {
         return;
     };
-    let out = disk.0.join("out");
-    let run = Run::start(&out, &[]);
-    run.wait_until_it_films();
-    std::thread::sleep(Duration::from_secs(10));
+    let run = disk.filming();
+    let out = run.out.clone();
     let ended = AtomicBool::new(false);
-    let filler_path = disk.0.join("filler");
+    let filler_path = disk.path("filler");
     let unfinished = run.unfinished();
     let output = std::thread::scope(|scope| {
         scope.spawn(|| {

@@ -244,10 +244,7 @@ impl BackEnd {
                 self.build();
             }
         }
-        // Nothing would come of it.
-        if !cancel.is_cancelled() {
-            self.identify_sub_branches(cancel);
-        }
+        self.identify_sub_branches(cancel);
     }
 
     fn identify_sub_branches(&mut self, cancel: &CancelToken) {

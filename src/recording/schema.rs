@@ -110,8 +110,7 @@ impl Topic {
     }
 }
 
-const TRACKS: &str = concat!(
-    r#"{
+const TRACKS: &str = r#"{
   "title": "arborcam.Tracks", "type": "object",
   "description": "Points followed in one frame. The arrays go together, ordered by id.",
   "properties": {
@@ -122,43 +121,27 @@ const TRACKS: &str = concat!(
     "u_px": {"type": "array", "items": {"type": "number"}},
     "v_px": {"type": "array", "items": {"type": "number"}},
     "fb_error_px": {"type": "array", "items": {"type": "number"}},
-"#,
-    r#"    "error_px": {"type": "array", "items": {"type": ["number", "null"]}, "description": "#,
-    r#""expected distance from the point that it was when it was found"},
+    "error_px": {"type": "array", "items": {"type": ["number", "null"]}, "description": "expected distance from the point that it was when it was found"},
     "confirmed": {"type": "array", "items": {"type": "boolean"}, "description": "false while the point is on trial"},
-"#,
-    r#"    "rejected": {"type": "array", "items": {"type": "integer"}, "description": "ids that "#,
-    r#"did not pass their trial: what was seen of them is void"}
+    "rejected": {"type": "array", "items": {"type": "integer"}, "description": "ids that did not pass their trial: what was seen of them is void"}
   }
-}"#,
-);
+}"#;
 
-const SKELETON: &str = concat!(
-    r#"{
+const SKELETON: &str = r#"{
   "title": "arborcam.Skeleton", "type": "object",
-"#,
-    r#"  "description": "The tree at rest: parents before children, axes x right, y up, z towards "#,
-    r#"the viewer, px, the trunk's foot at the origin. Comes again when the tree is refined; a "#,
-    r#"node that is not in the newest one is no longer there.",
+  "description": "The tree at rest: parents before children, axes x right, y up, z towards the viewer, px, the trunk's foot at the origin. Comes again when the tree is refined; a node that is not in the newest one is no longer there.",
   "properties": {
     "frame": {"type": "integer"}, "time_s": {"type": "number"},
     "foot_px": {"type": "array", "items": {"type": "number"}},
     "width": {"type": "integer"}, "height": {"type": "integer"},
     "nodes": {"type": "array", "items": {"type": "object", "properties": {
-"#,
-    r#"      "id": {"type": "integer", "description": "number of the node, as in nodes.csv; it "#,
-    r#"keeps it when the tree is refined, so numbers have gaps and no order"},
+      "id": {"type": "integer", "description": "number of the node, as in nodes.csv; it keeps it when the tree is refined, so numbers have gaps and no order"},
       "parent": {"type": ["integer", "null"], "description": "id of the node below; null for the foot"},
       "level": {"type": "integer"},
       "x": {"type": "number"}, "y": {"type": "number"}, "z": {"type": "number"},
       "radius": {"type": "number"}, "n_tracks": {"type": "integer"},
-"#,
-    r#"      "certainty": {"type": "number", "description": "how sure it is that the branches "#,
-    r#"above part here, 0 to 1; 0 at a tip"},
-"#,
-    r#"      "copy_of": {"type": ["integer", "null"], "description": "id of the measured node that "#,
-    r#"it is a copy of; null where it is measured"}
+      "certainty": {"type": "number", "description": "how sure it is that the branches above part here, 0 to 1; 0 at a tip"},
+      "copy_of": {"type": ["integer", "null"], "description": "id of the measured node that it is a copy of; null where it is measured"}
     }}}
   }
-}"#,
-);
+}"#;

@@ -7,7 +7,7 @@ use super::source_thread::Pace;
 use super::spawn::spawn;
 use crate::cancel::CancelToken;
 use crate::caught::caught;
-use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, TryRecvError, bounded};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -16,8 +16,8 @@ use std::time::Duration;
 /// that were given up keep their place until their turn, and take no time then.
 const QUEUE: usize = 16;
 
-/// A wait for an answer is broken off by a wish to stop within this time.
-pub const LOOK_EVERY: Duration = Duration::from_millis(20);
+/// A wait for an answer ends within this time when the end of the capture is wanted.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 type Work = Box<dyn FnOnce() + Send>;
 
@@ -92,6 +92,16 @@ impl Beside {
     }
 }
 
+/// Why there is no answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Missing {
+    NotReady,
+    /// The end of the capture is wanted.
+    NotWanted,
+    /// The work has panicked; nothing will come any more.
+    Failed,
+}
+
 /// Work that was handed in; dropped, it is given up.
 pub struct Pending<T> {
     wanted: CancelToken,
@@ -100,12 +110,21 @@ pub struct Pending<T> {
 }
 
 impl<T> Pending<T> {
-    /// What came of it, once.
+    /// What came of it, once; it is waited for if the caller `waits`.
     ///
     /// # Errors
-    /// `Timeout`: it is not done within `patience`. `Disconnected`: nothing will come any more.
-    pub fn answer(&self, patience: Duration) -> Result<T, RecvTimeoutError> {
-        self.answer.recv_timeout(patience)
+    /// There is no answer, see [`Missing`].
+    pub fn answer(&self, waits: bool, shared: &Shared) -> Result<T, Missing> {
+        let patience = if waits { LOOK_EVERY } else { Duration::ZERO };
+        while !shared.hurry.load(Ordering::Relaxed) {
+            match self.answer.recv_timeout(patience) {
+                Ok(answer) => return Ok(answer),
+                Err(RecvTimeoutError::Disconnected) => return Err(Missing::Failed),
+                Err(RecvTimeoutError::Timeout) if waits => {}
+                Err(RecvTimeoutError::Timeout) => return Err(Missing::NotReady),
+            }
+        }
+        Err(Missing::NotWanted)
     }
 
     /// Whether its turn has come.
@@ -122,7 +141,7 @@ impl<T> Pending<T> {
 impl Pending<()> {
     /// Whether it is still to be done.
     pub fn is_under_way(&self) -> bool {
-        self.answer(Duration::ZERO) == Err(RecvTimeoutError::Timeout)
+        self.answer.try_recv() == Err(TryRecvError::Empty)
     }
 }
 
@@ -182,13 +201,13 @@ mod tests {
         assert!(waiting.iter().all(|w| !w.has_begun()));
         drop(waiting);
         open.send(()).expect("it waits");
-        assert_eq!(first.answer(HANGS), Ok(false));
+        assert_eq!(first.answer.recv_timeout(HANGS), Ok(false));
         // None of those that would have waited for ever was begun.
         let mut last = None;
         while last.is_none() {
             last = background.begin(CancelToken::new(), |_| 7);
         }
-        assert_eq!(last.expect("room").answer(HANGS), Ok(7));
+        assert_eq!(last.expect("room").answer.recv_timeout(HANGS), Ok(7));
         drop(never);
     }
 }

@@ -171,9 +171,7 @@ impl ModelThread {
     fn restart(&mut self) {
         self.back.restart();
         self.status.restart();
-        if let Some(tables) = self.tables.take() {
-            drop(tables.into_tables());
-        }
+        self.tables = None;
         self.refining.give_up();
         if let Some(sway) = &mut self.sway {
             sway.restart();
@@ -262,9 +260,8 @@ impl ModelThread {
         let Some(model) = self.back.model().cloned() else {
             return;
         };
-        if let Some(outdated) = self.tables.take_if(|tables| !tables.is_of(&model)) {
-            drop(outdated.into_tables());
-        }
+        // Those of a model that was replaced are discarded.
+        self.tables = self.tables.take().filter(|tables| tables.is_of(&model));
         if self.tables.is_none() {
             self.tables = self.begin_tables(&model);
         }
@@ -463,16 +460,12 @@ impl ModelThread {
     /// Writes the capture, from the tables as far as they have come.
     fn write_once(&mut self, out: &Path) -> Result<Written, Failure> {
         let job = self.capture_job()?;
-        let tables = self.tables.take();
-        match (tables, &job.tree) {
-            (Some(tables), Some(model)) if tables.is_of(model) => match tables.into_tables() {
-                Some(tables) => finish::complete(&job, tables),
-                None => finish::write(&job, out),
-            },
-            (outdated, _) => {
-                drop(outdated.and_then(TableWriter::into_tables));
-                finish::write(&job, out)
-            }
+        let is_current =
+            |tables: &TableWriter| job.tree.as_ref().is_some_and(|model| tables.is_of(model));
+        let tables = self.tables.take().filter(is_current);
+        match tables.and_then(TableWriter::into_tables) {
+            Some(tables) => finish::complete(&job, tables),
+            None => finish::write(&job, out),
         }
     }
 

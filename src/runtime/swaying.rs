@@ -6,7 +6,7 @@
 //! recording at its own pace, waits for nobody: what is not ready is looked at again when the next
 //! one is due, and the request that finds the last one under way is passed over and counted.
 
-use super::background::{Background, LOOK_EVERY, Pending};
+use super::background::{Background, Missing, Pending};
 use super::pulse::{Pulse, Worker};
 use super::shared::Shared;
 use crate::cancel::CancelToken;
@@ -16,11 +16,9 @@ use crate::model::{
     AngleSpectrum, Angles, BranchSway, NodeId, NodeName, Skeleton, SwayNow, TrackId, TrackLog,
     Unidentified,
 };
-use crossbeam_channel::RecvTimeoutError;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::Duration;
 
 /// All that an analysis needs, apart from everything that goes on meanwhile.
 pub struct Request {
@@ -104,25 +102,11 @@ impl Swaying {
     /// The result of the last request, if it is there or waited for.
     fn take(&mut self) -> Option<SwayNow> {
         let pending = self.pending.take()?;
-        let patience = if self.waits {
-            LOOK_EVERY
-        } else {
-            Duration::ZERO
-        };
-        loop {
-            match pending.answer(patience) {
-                Ok(found) => return Some(found),
-                Err(RecvTimeoutError::Disconnected) => return None,
-                Err(RecvTimeoutError::Timeout) if self.shared.hurry.load(Ordering::Relaxed) => {
-                    return None;
-                }
-                Err(RecvTimeoutError::Timeout) if self.waits => {}
-                Err(RecvTimeoutError::Timeout) => {
-                    self.pending = Some(pending);
-                    return None;
-                }
-            }
+        let answer = pending.answer(self.waits, &self.shared);
+        if answer.as_ref().is_err_and(|e| *e == Missing::NotReady) {
+            self.pending = Some(pending);
         }
+        answer.ok()
     }
 
     fn ask(&mut self, request: Request) {

@@ -79,9 +79,20 @@ impl TableWriter {
 
     /// The tables as far as they are; `None` if they could not be written. What is being written is
     /// cut after the next frame, what waits is not begun.
-    pub fn into_tables(self) -> Option<CaptureTables> {
+    pub fn into_tables(mut self) -> Option<CaptureTables> {
+        self.take()
+    }
+
+    fn take(&mut self) -> Option<CaptureTables> {
         self.cancel.cancel();
         self.state.tables.lock().ok()?.take()
+    }
+}
+
+/// Tables that nobody took are discarded; nothing is left of them.
+impl Drop for TableWriter {
+    fn drop(&mut self) {
+        drop(self.take());
     }
 }
 

@@ -76,7 +76,7 @@ fn written(
     log: &TrackFileReader,
     model: &Arc<Model>,
     config: &Config,
-    write: impl Fn(&mut CaptureTables),
+    write: impl FnOnce(&mut CaptureTables),
 ) -> [Vec<u8>; 2] {
     let dir = tempfile::tempdir().expect("tempdir");
     let mut tables =
@@ -101,22 +101,19 @@ fn tables_that_were_cut_anywhere_are_those_written_at_once() {
     let per_frame = LIMBS.len() * POINTS_PER_LIMB as usize - 1;
     assert_eq!(rows, 1 + per_frame * FRAMES as usize);
 
-    let cuts = std::cell::Cell::new((0, 0));
+    let (mut early, mut late) = (0, 0);
     let cut = written(&log, &model, &config, |tables| {
         for k in 0..4000 {
             let cancel = CancelToken::new();
             cancel.cancel_at(std::time::Instant::now() + Duration::from_micros(20 + k % 50));
             tables.catch_up(&log, &cancel).expect("rows");
-            let (mut early, mut late) = cuts.get();
             match tables.early {
                 EarlyRows::Cut(_) => early += 1,
                 EarlyRows::Written => late += 1,
                 EarlyRows::NotBegun => {}
             }
-            cuts.set((early, late));
         }
     });
-    let (early, late) = cuts.get();
     assert!(early > 0 && late > 0, "cut {early} and {late} times");
     assert!(cut == whole, "the tables differ");
 }
