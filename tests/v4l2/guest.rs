@@ -256,12 +256,19 @@ pub fn record(path: &Path, frames: &[RawFrame]) -> Result<(), String> {
     series.close().map_err(|e| e.to_string())
 }
 
+/// From the wish to stop to the end, s: five for what is given up then, which an emulated processor
+/// does not get through before, and the rest for what must be written.
+pub const END_S: f64 = 10.0;
+
 /// By how much a time that holds for a real machine may be exceeded: an emulated processor is many
 /// times slower, and shares the host with whatever else runs there.
 pub fn slack() -> f64 {
-    let emulated =
-        fs::read_to_string("target/vm/accelerator").is_ok_and(|text| text.contains("tcg"));
-    if emulated { 2.0 } else { 1.0 }
+    if is_emulated() { 2.0 } else { 1.0 }
+}
+
+/// Whether the guest's processor is an emulated one.
+pub fn is_emulated() -> bool {
+    fs::read_to_string("target/vm/accelerator").is_ok_and(|text| text.contains("tcg"))
 }
 
 /// Fails with what was found, unless `holds`.

@@ -1,14 +1,11 @@
 //! A USB camera with a serial number, pulled out and plugged in again under a running capture.
 
-use crate::guest::{Group, Results, claim, clip, slack};
+use crate::guest::{END_S, Group, Results, claim, clip, slack};
 
 /// Times that the script unplugs it.
 const CYCLES: usize = 20;
 /// From the device's return to the next pose, s.
 const RECOVERY_S: f64 = 2.0;
-/// From the wish to stop to the end, s: five for what may be given up, the rest for what must be
-/// written.
-const END_S: f64 = 10.0;
 
 pub const GROUP: Group = Group {
     name: "replug",

@@ -24,14 +24,20 @@ film() {
     until_ok 5 filming "$pid"
 }
 
-film clean small
-sleep 4
-stop
+# The camera of an emulated machine does lose frames when its host has other things to do: then it films again.
+for _ in 1 2 3; do
+    rm -rf /vm/clean
+    film clean small
+    sleep 4
+    stop
+    ! grep -q '"frames_dropped_camera": 0' /vm/clean/capture/capture.json || break
+done
 
-for percent in 10 40; do
-    set_control percentage_of_dropped_buffers=$percent
-    film "dropped-$percent" small
-    sleep 6
+# vivid draws lots for each buffer: with so many, the share is off by 0.07 (10 %) or 0.1 (40 %) once in a thousand films.
+for dropped in 10:14 40:20; do
+    set_control percentage_of_dropped_buffers=${dropped%:*}
+    film "dropped-${dropped%:*}" small
+    sleep "${dropped#*:}"
     stop
 done
 set_control percentage_of_dropped_buffers=0

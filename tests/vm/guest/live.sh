@@ -43,8 +43,9 @@ cp -r "$work/live" /vm/live/capture
 cp -r "$work/live-1" /vm/live/exported
 
 begin stream capture /dev/video0 --headless --stream ndjson "${usb_settings[@]}"
-until_ok 60 grep -q '"nodes"' /vm/stream/stdout || true
-sleep 2
+# As many as are asked for, and some more: what is cut by the end is none.
+poses() { (($(grep -c '"nodes"' /vm/stream/stdout) > 12)); }
+until_ok 60 poses || true
 stop
 mux kill-server
 pull_out
