@@ -20,7 +20,6 @@ use arborcam::motion::PoseEstimator;
 use arborcam::outline::{self, Mark, Scribbles};
 use arborcam::pipeline::{self, Pipeline, PoseTracker, Seen, dress};
 use arborcam::solve::{self, lift_to_3d, solve};
-use arborcam::source::Decoder;
 use criterion::Criterion;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -104,12 +103,11 @@ fn scaled(dir: &Path, size: &str) -> PathBuf {
 fn gathered() -> (TrackLog, Arc<Outline>, Vec<TrackSet>) {
     let config = Config::default();
     let outline = support::outline();
-    let mut pipeline = Pipeline::new(&config, Some(outline.clone()));
-    let mut decoder = Decoder::new().expect("decoder");
+    let mut pipeline = Pipeline::new(&config, Some(outline.clone())).expect("decoder");
     let mut log = TrackLog::new(config.accumulate.window_s);
     let mut sets = Vec::new();
     for k in 0..support::recording().len() {
-        for moved in pipeline.step(support::decoded(&mut decoder, k)) {
+        for moved in pipeline.step(&support::timed(k)).expect("picture") {
             if pipeline.back.model().is_none() || log.all().is_empty() {
                 log.push(moved.tracks.clone());
             }

@@ -10,11 +10,11 @@ mod branches;
 
 use arborcam::cancel::CancelToken;
 use arborcam::config::{Affinity, Config};
-use arborcam::model::{Frame, Luma, TrackLog};
+use arborcam::model::{TimedFrame, TrackLog};
 use arborcam::outline::Given;
 use arborcam::pipeline::Pipeline;
 use arborcam::solve::solve;
-use arborcam::source::{self, Decoder};
+use arborcam::source;
 use branches::{Births, Truth, triplets};
 use std::path::Path;
 use std::sync::Arc;
@@ -38,12 +38,11 @@ fn gathered(
     // More points find room only if they may stand closer.
     config.detect.min_distance_px *= (400.0 / f64::from(points)).sqrt().min(1.0);
     let mut source = source::open(clip, &config.camera, None).expect("clip");
-    let mut decoder = Decoder::new().expect("decoder");
     let given = arborcam::outline::load(outline, source.describe().size).expect("outline");
     let Given::Region(outline) = given else {
         panic!("the sweep takes a polygon or a mask, no scribbles")
     };
-    let mut pipeline = Pipeline::new(&config, Some(outline.clone()));
+    let mut pipeline = Pipeline::new(&config, Some(outline.clone())).expect("decoder");
     let mut gathered = Gathered {
         log: TrackLog::new(config.accumulate.window_s),
         born: Births::default(),
@@ -55,20 +54,9 @@ fn gathered(
         if (index - 1) % every != 0 {
             continue;
         }
-        let mut luma = Luma {
-            size: raw.size,
-            pixels: Vec::new(),
-        };
-        decoder.luma(&raw, &mut luma).expect("picture");
-        let time_s = raw.sensor_time_s - *start_s.get_or_insert(raw.sensor_time_s);
-        let frame = Frame {
-            index: (index - 1) as u64,
-            time_s,
-            received: Instant::now(),
-            luma,
-            preview: None,
-        };
-        for moved in pipeline.step(frame) {
+        let start_s = *start_s.get_or_insert(raw.sensor_time_s);
+        let timed = TimedFrame::new(Arc::new(raw), (index - 1) as u64, start_s, Instant::now());
+        for moved in pipeline.step(&timed).expect("picture") {
             gathered.born.take_note(&moved.tracks);
             if pipeline.back.model().is_none() || gathered.built_s == 0.0 {
                 gathered.log.push(moved.tracks);

@@ -9,13 +9,16 @@
 //!                                                     │    once enough motion has accumulated         ▼
 //!                                                     │                          skeleton (2D) ─▶ shape (3D)
 //!                                                     │                                               │ Skeleton
-//!                                                     └──────TrackSet, every frame──────▶ motion ◀────┘
-//!                                                                                           │ Pose
+//!                                                     ├──────TrackSet, every frame──────▶ motion ◀────┤
+//!                                                     │                                     │ Pose      │
+//!                                                     └──────TrackSet, now and then────▶ dynamics ◀───┘
+//!                                                                                           │ SwayNow
 //!                                                     terminal UI, --stream, capture folder ◀
 //! ```
 //!
-//! [`pipeline`] is that picture as code: a front end (frame to tracks) and a back end (tracks to
-//! tree and pose). `runtime` runs the two on threads between a source and the screen.
+//! [`pipeline`] is that picture as code, in four stages: decode, a front end (frame to tracks), a
+//! back end (tracks to tree and pose) and the sway. `runtime` runs them on threads between a source
+//! and the screen.
 //!
 //! # The modules in reading order
 //!
@@ -38,8 +41,8 @@
 //!
 //! | feature | adds | modules |
 //! |---|---|---|
-//! | `opencv` | pictures to tracks | `outline`, `track`, `capture`, front end of [`pipeline`] |
-//! | `camera` | cameras, recordings, videos | `source`, `recording` |
+//! | `opencv` | pictures to tracks | `outline`, `track`, front end of [`pipeline`] |
+//! | `camera` | cameras, recordings, videos | `source`, `recording`, decoding in [`pipeline`] |
 //! | `nokhwa` | a second way to read cameras | inside of `source` |
 //! | `terminal` | the program; needs `opencv` and `camera` | `runtime`, `tui`, `doctor`, `cli` |
 

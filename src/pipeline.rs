@@ -1,13 +1,17 @@
-//! What runs, on one screen: one synchronous step per frame, from the picture to the pose.
+//! What runs, on one screen: one synchronous step per frame, from the camera's bytes to the pose.
 //!
-//! The front end finds the outline and follows points; the back end logs them, has [`solve`] make
-//! the model of the tree, and from then on poses it and now and then solves anew. `runtime` runs
-//! the same two halves on threads of their own.
+//! Four stages. `DecodeStage` makes a picture of the bytes. The front end finds the outline and follows
+//! points. The back end logs them, has [`solve`] make the model of the tree, and from then on poses
+//! it and now and then solves anew. [`SwayStage`] tells how the branches of the model sway. `runtime` runs
+//! the same stages on threads of their own.
 //!
 //! [`solve`]: crate::solve::solve
 
+mod angles;
 mod back;
 mod bark;
+#[cfg(feature = "camera")]
+mod decode;
 mod dress;
 #[cfg(feature = "opencv")]
 mod front;
@@ -18,8 +22,11 @@ mod reshape;
 #[cfg(feature = "opencv")]
 mod seeds;
 mod seen;
+mod sway;
 
 pub use back::{BackEnd, Followed, Moved};
+#[cfg(feature = "camera")]
+pub use decode::{DecodeStage, Undecoded};
 pub use dress::{dress, flutter};
 #[cfg(feature = "opencv")]
 pub use front::FrontEnd;
@@ -29,41 +36,74 @@ pub use reshape::{MOST_RESHAPED, cut_to, reshape};
 #[cfg(feature = "opencv")]
 pub use seeds::seeds as leaf_seeds;
 pub use seen::Seen;
+pub use sway::{SwayJob, SwayStage};
 
-#[cfg(feature = "opencv")]
+#[cfg(all(feature = "camera", feature = "opencv"))]
 use crate::{
     cancel::CancelToken,
     config::Config,
-    model::{Frame, Outline},
+    model::{Outline, SwayNow, TimedFrame},
+    source::DecodeError,
 };
 
-/// Both halves in one thread.
-#[cfg(feature = "opencv")]
+/// All stages in one thread.
+#[cfg(all(feature = "camera", feature = "opencv"))]
 pub struct Pipeline {
+    pub decode: DecodeStage,
     pub front: FrontEnd,
     pub back: BackEnd,
+    pub sway: SwayStage,
 }
 
-#[cfg(feature = "opencv")]
+#[cfg(all(feature = "camera", feature = "opencv"))]
 impl Pipeline {
-    pub fn new(config: &Config, outline: Option<Outline>) -> Self {
-        Self {
+    /// For a film that is read, not for a live camera, and without pictures for a screen.
+    ///
+    /// # Errors
+    /// There is no decoder.
+    pub fn new(config: &Config, outline: Option<Outline>) -> Result<Self, DecodeError> {
+        Ok(Self {
+            decode: DecodeStage::new(false, None)?,
             front: FrontEnd::new(config, outline),
             back: BackEnd::new(config),
-        }
+            sway: SwayStage::new(&config.dynamics),
+        })
     }
 
     /// One frame in; what became of it and of frames held back before, in order.
-    pub fn step(&mut self, frame: Frame) -> Vec<Moved> {
+    ///
+    /// # Errors
+    /// The frame is damaged, or of another size than those before it. After one that is left out
+    /// the next can be given.
+    pub fn step(&mut self, timed: &TimedFrame) -> Result<Vec<Moved>, Undecoded> {
+        let spare = self.front.spare();
+        let frame = self.decode.step(timed, spare)?;
         let followed = self.front.step(frame);
-        followed.into_iter().map(|f| self.back.step(f)).collect()
+        Ok(self.pose(followed))
     }
 
     /// No more frames: works off what is held and builds from what there is.
     pub fn finish(&mut self) -> Vec<Moved> {
         let followed = self.front.flush();
-        let moved = followed.into_iter().map(|f| self.back.step(f)).collect();
+        let moved = self.pose(followed);
         self.back.finish(&CancelToken::new());
         moved
+    }
+
+    /// How the branches sway up to the frame of `moved`, the last that [`step`](Self::step) gave;
+    /// `None` while there is no tree.
+    pub fn sway(&self, moved: &Moved, cancel: &CancelToken) -> Option<SwayNow> {
+        let job = self.sway.job(moved, &self.back)?;
+        Some(job.run(cancel))
+    }
+
+    fn pose(&mut self, followed: Vec<Followed>) -> Vec<Moved> {
+        let mut all = Vec::with_capacity(followed.len());
+        for followed in followed {
+            let moved = self.back.step(followed);
+            self.sway.step(&moved, &self.back);
+            all.push(moved);
+        }
+        all
     }
 }

@@ -7,17 +7,15 @@ mod support;
 use arborcam::config::{Affinity, Config};
 use arborcam::model::MotionHierarchy;
 use arborcam::pipeline::Pipeline;
-use arborcam::source::Decoder;
 use branches::{BRANCHES, Births, Truth, triplets};
 use std::path::Path;
 
 /// The tree that a capture with `config` builds, and where its tracks were born.
 fn tree(config: &Config) -> (MotionHierarchy, Births) {
-    let mut pipeline = Pipeline::new(config, Some(support::outline()));
-    let mut decoder = Decoder::new().expect("decoder");
+    let mut pipeline = Pipeline::new(config, Some(support::outline())).expect("decoder");
     let mut born = Births::default();
     for k in 0..support::recording().len() {
-        for moved in pipeline.step(support::decoded(&mut decoder, k)) {
+        for moved in pipeline.step(&support::timed(k)).expect("picture") {
             born.take_note(&moved.tracks);
         }
     }

@@ -52,6 +52,10 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &[
             "model",
             "config",
+            // The first of its stages makes pictures of bytes, the last tells the sway.
+            "source::Decoder",
+            "source::DecodeError",
+            "dynamics",
             "outline",
             "track",
             "hierarchy",

@@ -676,8 +676,8 @@ fn the_winter_tree_is_bare() {
 
 /// The tree of a clip, its pose in the first frame, and that frame in colour.
 fn posed_clip(clip: &Path, outline: &Path) -> (Skeleton, Pose, Rgb, Outline) {
-    use arborcam::model::Frame;
-    use arborcam::source::{self, Decoder};
+    use arborcam::model::TimedFrame;
+    use arborcam::source;
     let config = Config::default();
     let mut source = source::open(clip, &config.camera, None).expect("clip");
     let frames: Vec<_> = std::iter::from_fn(|| source.next_frame().expect("frame")).collect();
@@ -685,24 +685,18 @@ fn posed_clip(clip: &Path, outline: &Path) -> (Skeleton, Pose, Rgb, Outline) {
         arborcam::outline::Given::Region(outline) => outline,
         arborcam::outline::Given::Scribbles(_) => panic!("a polygon"),
     };
-    let mut decoder = Decoder::new().expect("decoder");
-    let mut pipeline = Pipeline::new(&config, Some(outline.clone()));
+    let mut pipeline = Pipeline::new(&config, Some(outline.clone())).expect("decoder");
     let mut sets = Vec::new();
     for (k, raw) in frames.iter().enumerate() {
-        let mut luma = Luma {
-            size: raw.size,
-            pixels: Vec::new(),
-        };
-        decoder.luma(raw, &mut luma).expect("picture");
-        let time_s = raw.sensor_time_s - frames[0].sensor_time_s;
-        let frame = Frame {
-            index: k as u64,
-            time_s,
-            received: std::time::Instant::now(),
-            luma,
-            preview: None,
-        };
-        sets.extend(pipeline.step(frame).into_iter().map(|m| m.tracks));
+        let first_s = frames[0].sensor_time_s;
+        let timed = TimedFrame::new(
+            raw.clone().into(),
+            k as u64,
+            first_s,
+            std::time::Instant::now(),
+        );
+        let moved = pipeline.step(&timed).expect("picture");
+        sets.extend(moved.into_iter().map(|m| m.tracks));
     }
     sets.extend(pipeline.finish().into_iter().map(|m| m.tracks));
     let tree = pipeline.back.model().expect("a tree").clone();

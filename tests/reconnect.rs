@@ -211,7 +211,7 @@ fn job(out: Option<&Path>) -> Job {
         stream: None,
         out: out.map(Path::to_path_buf),
         record: None,
-        preview_every: Duration::from_secs(2),
+        preview_every: Some(Duration::from_secs(2)),
     }
 }
 

@@ -7,7 +7,6 @@ use arborcam::config::Config;
 use arborcam::model::{NodeName, Pose};
 use arborcam::pipeline::{BackEnd, Followed, Pipeline, PoseReplay};
 use arborcam::solve::Model;
-use arborcam::source::Decoder;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
@@ -26,11 +25,10 @@ fn run() -> &'static Run {
     RUN.get_or_init(|| {
         let mut config = Config::default();
         (config.accumulate.min_s, config.accumulate.threshold) = (4.0, 0.2);
-        let mut pipeline = Pipeline::new(&config, Some(support::outline()));
-        let mut decoder = Decoder::new().expect("decoder");
+        let mut pipeline = Pipeline::new(&config, Some(support::outline())).expect("decoder");
         let (mut frames, mut sets) = (Vec::new(), Vec::new());
         for k in 0..support::recording().len() {
-            for moved in pipeline.step(support::decoded(&mut decoder, k)) {
+            for moved in pipeline.step(&support::timed(k)).expect("picture") {
                 sets.push(moved.tracks);
                 frames.extend(pipeline.back.model().cloned().zip(moved.pose));
             }

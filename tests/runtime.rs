@@ -3,12 +3,16 @@
 
 mod support;
 
+use arborcam::cancel::CancelToken;
 use arborcam::config::{Config, Dynamics};
-use arborcam::model::{Control, FormatNote, Outline, PixelFormat, RawFrame, Size};
+use arborcam::model::{
+    Control, FormatNote, NodeName, Outline, PixelFormat, RawFrame, Size, SwayNow, Swaying,
+};
 use arborcam::outline::{Given, Mark, Scribbles};
 use arborcam::pipeline::Pipeline;
 use arborcam::runtime::{self, Failure, Job, Pace, Running, Summary};
-use arborcam::source::{Decoder, Source, SourceError, SourceInfo};
+use arborcam::source::{Source, SourceError, SourceInfo};
+use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -115,7 +119,7 @@ fn job(outline: Option<Outline>, out: Option<&Path>) -> Job {
         stream: None,
         out: out.map(Path::to_path_buf),
         record: None,
-        preview_every: Duration::from_secs(2),
+        preview_every: Some(Duration::from_secs(2)),
     }
 }
 
@@ -166,15 +170,101 @@ fn tracks(out: &Path) -> Vec<(u64, u64)> {
         .collect()
 }
 
+/// The sways of a stream, by the frame up to which each was analysed.
+fn told_sways(stream: &str) -> BTreeMap<u64, serde_json::Value> {
+    let mut told = BTreeMap::new();
+    for line in stream.lines() {
+        let line: serde_json::Value = serde_json::from_str(line).expect("JSON");
+        if let Some(frame) = line["sway"]["frame"].as_u64() {
+            told.insert(frame, line["sway"].clone());
+        }
+    }
+    told
+}
+
+/// The same numbers to the digits that are told, or the same reason why there are none.
+fn same_swaying(told: &serde_json::Value, found: Swaying) {
+    match found {
+        Ok(sway) => {
+            let damping = sway.damping_ratio.map(|d| d.value);
+            let numbers = [
+                ("frequency_hz", Some(sway.frequency_hz.value)),
+                ("frequency_lo_hz", Some(sway.frequency_hz.lo)),
+                ("damping_ratio", damping),
+                ("amplitude_deg", Some(sway.amplitude_deg)),
+            ];
+            for (name, expected) in numbers {
+                let off = told[name].as_f64().zip(expected).map(|(a, b)| a - b);
+                let is_same = match off {
+                    Some(off) => off.abs() < 1e-5,
+                    None => told[name].is_null() && expected.is_none_or(|x| !x.is_finite()),
+                };
+                assert!(is_same, "{name} {expected:?} is told as {told}");
+            }
+        }
+        Err(why) => assert_eq!(told["unidentified"], why.word(), "{told}"),
+    }
+}
+
+/// The last stage, too: what is told was found up to the frame that is named with it.
+#[test]
+fn threads_tell_the_same_sway_as_none() {
+    let mut config = Config::default();
+    config.dynamics.every_s = 0.5;
+    let lines = Lines::default();
+    let streamed = Job {
+        config: config.clone(),
+        stream: Some(Box::new(lines.clone())),
+        ..job(Some(support::outline()), None)
+    };
+    let (_, failure, _) = run(fake(false, |n| Ok(frame(n))), streamed);
+    assert!(failure.is_none(), "{failure:?}");
+    let text = String::from_utf8(lines.0.lock().expect("lines").clone()).expect("text");
+    let told = told_sways(&text);
+
+    let mut pipeline = Pipeline::new(&config, Some(support::outline())).expect("decoder");
+    let (mut compared, mut identified) = (0, 0);
+    for k in 0..recording().len() {
+        for moved in pipeline.step(&support::timed(k)).expect("picture") {
+            let Some(told) = told.get(&moved.tracks.frame) else {
+                continue;
+            };
+            let sway = pipeline.sway(&moved, &CancelToken::new()).expect("a tree");
+            assert_eq!(told["excitation"], excitation_word(&sway), "{told}");
+            for branch in told["branches"].as_array().expect("branches") {
+                let name = NodeName(branch["node_id"].as_u64().expect("a number") as u32);
+                let found = sway.branches[&name].swaying;
+                same_swaying(branch, found);
+                compared += 1;
+                identified += usize::from(found.is_ok());
+            }
+        }
+    }
+    assert!(told.len() > 2 && compared > 10, "{compared} branches");
+    assert!(identified > 2, "{identified} of {compared} branches");
+}
+
+fn excitation_word(sway: &SwayNow) -> serde_json::Value {
+    sway.excitation.map(|e| e.word()).into()
+}
+
 /// What the program means is one synchronous step a frame; threads must not change it.
 #[test]
 fn threads_give_the_same_poses_as_none() {
     for outline in [Some(support::outline()), None] {
-        let mut pipeline = Pipeline::new(&Config::default(), outline.clone());
-        let mut decoder = Decoder::new().expect("decoder");
+        let lines = Lines::default();
+        let streamed = Job {
+            stream: Some(Box::new(lines.clone())),
+            ..job(outline.clone(), None)
+        };
+        let (summary, failure, _) = run(fake(false, |n| Ok(frame(n))), streamed);
+        assert!(failure.is_none(), "{failure:?}");
+        let text = String::from_utf8(lines.0.lock().expect("lines").clone()).expect("text");
+
+        let mut pipeline = Pipeline::new(&Config::default(), outline.clone()).expect("decoder");
         let (mut moved, mut trees) = (Vec::new(), Vec::new());
         for k in 0..recording().len() {
-            let done = pipeline.step(support::decoded(&mut decoder, k));
+            let done = pipeline.step(&support::timed(k)).expect("picture");
             trees.extend(done.iter().map(|_| pipeline.back.model().cloned()));
             moved.extend(done);
         }
@@ -188,13 +278,6 @@ fn threads_give_the_same_poses_as_none() {
             "every frame, in order"
         );
 
-        let lines = Lines::default();
-        let streamed = Job {
-            stream: Some(Box::new(lines.clone())),
-            ..job(outline, None)
-        };
-        let (summary, failure, _) = run(fake(false, |n| Ok(frame(n))), streamed);
-        assert!(failure.is_none(), "{failure:?}");
         let (tree, threaded) = (
             pipeline.back.model().expect("tree"),
             summary.and_then(|s| s.tree).expect("tree"),
@@ -210,7 +293,6 @@ fn threads_give_the_same_poses_as_none() {
             tree.refinements
         );
 
-        let text = String::from_utf8(lines.0.lock().expect("lines").clone()).expect("text");
         let mut lines = text.lines();
         let mut poses = 0;
         for (pose, tree) in moved
@@ -234,7 +316,6 @@ fn threads_give_the_same_poses_as_none() {
                 pose.time_s,
                 nodes.join(",")
             );
-            // What follows the poses is the sway, which the pipeline does not know.
             let line = lines.next().unwrap_or_default();
             let alone = line
                 .split_once(",\"sway\":")

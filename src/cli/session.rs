@@ -24,7 +24,6 @@ use std::time::Duration;
 
 /// Interval of preview pictures with and without a screen.
 const PREVIEW_SCREEN: Duration = Duration::from_millis(80);
-const PREVIEW_HEADLESS: Duration = Duration::MAX;
 
 /// What `capture` and `replay` run with, apart from their common arguments.
 pub struct Plan<'a> {
@@ -134,11 +133,7 @@ fn job(
         stream: common.stream.map(|_| Box::new(std::io::stdout()) as _),
         out: common.out.clone(),
         record: plan.record.target(source),
-        preview_every: if headless {
-            PREVIEW_HEADLESS
-        } else {
-            PREVIEW_SCREEN
-        },
+        preview_every: (!headless).then_some(PREVIEW_SCREEN),
     })
 }
 

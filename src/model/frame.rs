@@ -1,6 +1,7 @@
 //! Pictures, as the camera delivered them and as the tracker wants them.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 /// Width and height of a picture in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -114,6 +115,30 @@ pub struct RawFrame {
     pub bytes: Vec<u8>,
 }
 
+/// A raw frame with its place in the film.
+#[derive(Clone, Debug)]
+pub struct TimedFrame {
+    pub raw: Arc<RawFrame>,
+    /// Frames since the first one, those that were lost before us included.
+    pub index: u64,
+    /// Seconds since the first frame, by the sensor's clock.
+    pub time_s: f64,
+    /// When the program received the frame, for latency figures only.
+    pub received: Instant,
+}
+
+impl TimedFrame {
+    /// Frame `index` of a film whose first frame has the sensor time `first_s`, s.
+    pub fn new(raw: Arc<RawFrame>, index: u64, first_s: f64, received: Instant) -> Self {
+        Self {
+            time_s: raw.sensor_time_s - first_s,
+            raw,
+            index,
+            received,
+        }
+    }
+}
+
 /// Whole nanoseconds of a time in seconds: what a recording keeps of it. Times beyond 292 years are
 /// cut to that.
 pub fn nanoseconds(time_s: f64) -> i64 {
@@ -174,7 +199,7 @@ pub struct Frame {
     /// Seconds since the first frame of this capture, by the sensor's clock.
     pub time_s: f64,
     /// When the program received the frame, for latency figures only.
-    pub received: std::time::Instant,
+    pub received: Instant,
     pub luma: Luma,
     /// A smaller picture in colour for the screen, made for some frames only.
     pub preview: Option<Arc<Rgb>>,

@@ -20,7 +20,9 @@ mod track_log;
 mod track_table;
 
 pub use control::Control;
-pub use frame::{Frame, Luma, Picture, PixelFormat, RawFrame, Rgb, Size, nanoseconds, seconds};
+pub use frame::{
+    Frame, Luma, Picture, PixelFormat, RawFrame, Rgb, Size, TimedFrame, nanoseconds, seconds,
+};
 pub use hierarchy::{Cluster, ClusterId, MotionHierarchy};
 pub use main_branch::MAIN_BRANCH_RGB;
 pub use outline::Outline;

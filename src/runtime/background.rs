@@ -98,7 +98,7 @@ pub enum Missing {
     NotReady,
     /// The end of the capture is wanted.
     NotWanted,
-    /// The work has panicked; nothing will come any more.
+    /// Nothing will come any more: the work has panicked, or was cancelled before its turn.
     Failed,
 }
 

@@ -1,8 +1,7 @@
 //! The picture that goes into the capture: the first frame that is followed, whole and in colour.
 
-use super::source_thread::Timed;
-use crate::model::{Picture, TrackSet};
-use crate::source::Decoder;
+use crate::model::{Picture, TimedFrame, TrackSet};
+use crate::pipeline::DecodeStage;
 use std::sync::Arc;
 
 /// Decodes one frame in colour and hands it out when that frame is followed.
@@ -19,7 +18,7 @@ pub struct FirstPicture {
 impl FirstPicture {
     /// Looks at a frame that is about to be followed; `oldest_held` is the oldest that still waits
     /// for that.
-    pub fn see(&mut self, timed: &Timed, oldest_held: Option<u64>, decoder: &mut Decoder) {
+    pub fn see(&mut self, timed: &TimedFrame, oldest_held: Option<u64>, decode: &mut DecodeStage) {
         if self.handed_out {
             return;
         }
@@ -29,7 +28,7 @@ impl FirstPicture {
             .is_some_and(|p| oldest_held.is_none_or(|oldest| p.frame < oldest));
         if self.kept.is_none() || lost {
             // A frame that cannot be decoded in colour is passed over; the next may be whole.
-            let rgb = decoder.preview(&timed.raw, timed.raw.size.width).ok();
+            let rgb = decode.colour(&timed.raw, timed.raw.size.width);
             self.kept = rgb.map(|rgb| Picture {
                 rgb: Arc::new(rgb),
                 frame: timed.index,

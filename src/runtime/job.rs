@@ -23,14 +23,14 @@ pub struct Job {
     pub out: Option<PathBuf>,
     /// Recording of the frames and of what is found in them.
     pub record: Option<RecordTo>,
-    /// Time between two pictures for the screen; [`Duration::MAX`] where there is none.
-    pub preview_every: Duration,
+    /// Time between two pictures for the screen; `None` where there is none.
+    pub preview_every: Option<Duration>,
 }
 
 impl Job {
     /// Whether there is a screen, or a reader of the stream.
     pub fn is_watched(&self) -> bool {
-        self.stream.is_some() || self.preview_every < Duration::MAX
+        self.stream.is_some() || self.preview_every.is_some()
     }
 }
 

@@ -11,7 +11,6 @@
 //! A dropped sender ends the stream: when the source is done, the tracker works off its queue and
 //! ends, then the model does and writes the capture.
 
-mod angles;
 mod announce;
 mod background;
 mod capture_tables;
@@ -56,7 +55,7 @@ pub use watched::open;
 use crate::config::Config;
 use crate::model::{Control, Outline, Snapshot};
 use crate::outline::{Given, Scribbles};
-use crate::pipeline::FrontEnd;
+use crate::pipeline::{DecodeStage, FrontEnd};
 use crate::source::Source;
 use background::Beside;
 use crossbeam_channel::{Sender, bounded, unbounded};
@@ -91,14 +90,14 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
     let source = Watched::if_live(source, limit).map_err(Failure::Thread)?;
     let shared = Arc::new(Shared::default());
     let info = source.describe();
-    let live = info.live;
     let (frames_in, frames_out) = bounded(FRAME_QUEUE);
     let (model_in, model_out) = bounded(MODEL_QUEUE);
     // Wishes are typed by a person; they cannot pile up.
     let (controls, wishes) = unbounded();
     let (region, scribbles) = parted(job.outline.take());
+    let decode = DecodeStage::new(info.live, job.preview_every).map_err(Failure::NoDecoder)?;
     let front = FrontEnd::new(&job.config, region);
-    let (pace, preview_every, camera) = (job.pace, job.preview_every, job.config.camera.clone());
+    let (pace, camera) = (job.pace, job.config.camera.clone());
 
     let recording = match job.record.take() {
         Some(to) => Some(recorder_thread::start(to, info.live, &shared)?),
@@ -120,10 +119,7 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
         let (shared, frames_out) = (shared.clone(), frames_out.clone());
         let run = move || {
             let _ends_all = StopAll(&shared);
-            match TrackThread::new((front, scribbles), model_in, preview_every, live, &shared) {
-                Ok(track) => track.run(&frames_out, &wishes),
-                Err(e) => shared.fail(Failure::NoDecoder(e)),
-            }
+            TrackThread::new(decode, front, scribbles, model_in, &shared).run(&frames_out, &wishes);
         };
         spawn("track", run)?
     };

@@ -6,6 +6,7 @@ use super::source_thread::{self, FRAME_QUEUE, Pace};
 use super::spawn::spawn;
 use super::watched::Watched;
 use crate::config;
+use crate::model::TimedFrame;
 use crate::source::Source;
 use crossbeam_channel::bounded;
 use std::sync::Arc;
@@ -35,7 +36,7 @@ pub fn record(source: Box<dyn Source>, job: RecordJob) -> Result<RunningRecord, 
     let source = Watched::if_live(source, job.camera.time_limit()).map_err(Failure::Thread)?;
     let shared = Arc::new(Shared::default());
     let (recorder, recording) = recorder_thread::start(job.to, source.describe().live, &shared)?;
-    let (frames_in, frames_out) = bounded::<source_thread::Timed>(FRAME_QUEUE);
+    let (frames_in, frames_out) = bounded::<TimedFrame>(FRAME_QUEUE);
     // Nobody looks at the frames; the source hands them on as ever.
     let drain = {
         let frames = frames_out.clone();

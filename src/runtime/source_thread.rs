@@ -10,7 +10,7 @@ use super::reconnect::{self, Waited};
 use super::recorder_thread::Recorder;
 use super::shared::{Failure, Shared};
 use crate::config;
-use crate::model::{Gap, GapCause, RawFrame, nanoseconds, seconds};
+use crate::model::{Gap, GapCause, RawFrame, TimedFrame, nanoseconds, seconds};
 use crate::source::{Source, SourceError};
 use crossbeam_channel::{Receiver, Sender, TrySendError};
 use std::sync::Arc;
@@ -19,15 +19,6 @@ use std::time::{Duration, Instant};
 
 /// Frames that may wait for the tracker.
 pub const FRAME_QUEUE: usize = 4;
-
-/// A raw frame with its place in this capture.
-pub struct Timed {
-    pub raw: Arc<RawFrame>,
-    /// Frames since the first, losses before us included; seconds since the first, by the sensor.
-    pub index: u64,
-    pub time_s: f64,
-    pub received: Instant,
-}
 
 /// How a source is worked off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,8 +34,8 @@ pub enum Pace {
 /// Both ends of the queue to the tracker: where a live source finds it full, the oldest frame is
 /// taken out again.
 pub struct Queue {
-    pub into: Sender<Timed>,
-    pub out_of: Receiver<Timed>,
+    pub into: Sender<TimedFrame>,
+    pub out_of: Receiver<TimedFrame>,
 }
 
 /// Runs until the source ends or fails for good, or `shared.stop` is set.
@@ -147,11 +138,12 @@ impl Feed<'_> {
     }
 
     /// Gives a frame its place in the capture and counts what was lost before it.
-    fn stamp(&mut self, mut raw: RawFrame, source: &dyn Source) -> Timed {
+    fn stamp(&mut self, mut raw: RawFrame, source: &dyn Source) -> TimedFrame {
         // A recording keeps whole nanoseconds; what is worked with must be what is kept, whatever
         // the source gave.
         raw.sensor_time_s = seconds(nanoseconds(raw.sensor_time_s));
-        let time_s = raw.sensor_time_s - *self.first_time_s.get_or_insert(raw.sensor_time_s);
+        let first_s = *self.first_time_s.get_or_insert(raw.sensor_time_s);
+        let time_s = raw.sensor_time_s - first_s;
         let health = source.health();
         let broken = (health.damaged + health.stale).saturating_sub(self.broken);
         self.broken += broken;
@@ -170,18 +162,13 @@ impl Feed<'_> {
         self.recorder
             .iter()
             .for_each(|recorder| recorder.offer(&raw, arrival.index));
-        let received = Instant::now();
-        self.last_frame = Some(received);
-        Timed {
-            raw,
-            index: arrival.index,
-            time_s,
-            received,
-        }
+        let timed = TimedFrame::new(raw, arrival.index, first_s, Instant::now());
+        self.last_frame = Some(timed.received);
+        timed
     }
 
     /// `false` when nobody takes frames any more.
-    fn hand_on(&mut self, mut timed: Timed) -> bool {
+    fn hand_on(&mut self, mut timed: TimedFrame) -> bool {
         if self.pace == Pace::Recorded {
             self.wait_for(&timed);
             timed.received = Instant::now();
@@ -207,7 +194,7 @@ impl Feed<'_> {
 
     /// Waits for room, but not beyond a wish to stop; `false` when the frame could not be handed
     /// on.
-    fn send_blocking(&self, mut timed: Timed) -> bool {
+    fn send_blocking(&self, mut timed: TimedFrame) -> bool {
         self.shared.pulse.give(Worker::Track);
         loop {
             match self.queue.into.send_timeout(timed, NAP) {
@@ -218,7 +205,7 @@ impl Feed<'_> {
         }
     }
 
-    fn wait_for(&mut self, timed: &Timed) {
+    fn wait_for(&mut self, timed: &TimedFrame) {
         let (start, start_s) = *self.due.get_or_insert((Instant::now(), timed.time_s));
         let due = start + Duration::from_secs_f64((timed.time_s - start_s).clamp(0.0, 1e6));
         nap::until(due, &self.shared.stop);

@@ -10,31 +10,13 @@ use super::background::{Background, Missing, Pending};
 use super::pulse::{Pulse, Worker};
 use super::shared::Shared;
 use crate::cancel::CancelToken;
-use crate::config::Dynamics;
-use crate::dynamics::{self, Depth, Film, spectrum};
-use crate::model::{
-    AngleSpectrum, Angles, BranchSway, NodeId, NodeName, Skeleton, SwayNow, TrackId, TrackLog,
-    Unidentified,
-};
-use std::collections::BTreeMap;
+use crate::model::SwayNow;
+use crate::pipeline::SwayJob;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-/// All that an analysis needs, apart from everything that goes on meanwhile.
-pub struct Request {
-    /// The newest frame and its time, s.
-    pub frame: u64,
-    pub time_s: f64,
-    pub skeleton: Arc<Skeleton>,
-    pub log: TrackLog,
-    /// The deepest node of every point that counts.
-    pub nodes: BTreeMap<TrackId, NodeId>,
-    pub angles: Angles,
-    pub settings: Dynamics,
-}
-
-/// Works a request off; asks again and again whether to go on, which is its sign of life, too.
-pub type Analyser = fn(&Request, &CancelToken) -> SwayNow;
+/// Works a job off; asks again and again whether to go on, which is its sign of life, too.
+pub type Analyser = fn(&SwayJob, &CancelToken) -> SwayNow;
 
 /// When an analysis is begun, and when its result takes effect.
 pub struct Swaying {
@@ -84,7 +66,7 @@ impl Swaying {
 
     /// At the frame of this time: the result that takes effect with it, if there is one, and the
     /// next request, if one is due.
-    pub fn step(&mut self, time_s: f64, request: impl FnOnce() -> Request) -> Option<SwayNow> {
+    pub fn step(&mut self, time_s: f64, job: impl FnOnce() -> Option<SwayJob>) -> Option<SwayNow> {
         if self.every_s <= 0.0 || time_s < self.next_s || self.shared.hurry.load(Ordering::Relaxed)
         {
             return None;
@@ -93,8 +75,8 @@ impl Swaying {
         let found = self.take();
         if self.pending.is_some() {
             self.passed_over += 1;
-        } else {
-            self.ask(request());
+        } else if let Some(job) = job() {
+            self.ask(job);
         }
         found
     }
@@ -109,12 +91,12 @@ impl Swaying {
         answer.ok()
     }
 
-    fn ask(&mut self, request: Request) {
+    fn ask(&mut self, job: SwayJob) {
         let wanted = self.shared.pulse.sway_work.child();
         let (analyser, shared) = (self.analyser, self.shared.clone());
         let work = move |cancel: &CancelToken| {
             let _at_work = AtWork::new(&shared.pulse);
-            analyser(&request, cancel)
+            analyser(&job, cancel)
         };
         self.pending = self.background.begin(wanted, work);
         if self.pending.is_none() {
@@ -144,59 +126,6 @@ impl Drop for AtWork<'_> {
     fn drop(&mut self) {
         self.0.done(Worker::Sway);
     }
-}
-
-/// The sway of every branch, and the spectra of the angles.
-pub fn analyse(request: &Request, cancel: &CancelToken) -> SwayNow {
-    let Request {
-        skeleton,
-        settings,
-        angles,
-        ..
-    } = request;
-    let film = Film::from_log(request.log.last(settings.window_s), skeleton, |id| {
-        request.nodes.get(&id).copied()
-    });
-    let analysis = dynamics::analyse(skeleton, &film, settings, Depth::Quick, cancel);
-    let branch = |(i, name): (usize, &NodeName)| {
-        // The foot is no branch.
-        let swaying = analysis
-            .sway
-            .get(i + 1)
-            .copied()
-            .unwrap_or(Err(Unidentified::NotMeasured));
-        (
-            *name,
-            BranchSway {
-                swaying,
-                spectrum: spectrum_of(angles, *name, settings.highest_hz),
-            },
-        )
-    };
-    SwayNow {
-        frame: request.frame,
-        time_s: request.time_s,
-        span_s: film.span_s(),
-        excitation: analysis.onset.map(|o| o.excitation),
-        branches: angles.nodes.iter().enumerate().map(branch).collect(),
-    }
-}
-
-/// Up to `highest_hz`.
-fn spectrum_of(angles: &Angles, node: NodeName, highest_hz: f64) -> Option<AngleSpectrum> {
-    let (times, values): (Vec<f64>, Vec<f64>) = angles.of(node).unzip();
-    let whole = spectrum(&times, &values)?;
-    let bins = (highest_hz / whole.bin_hz).ceil() as usize + 1;
-    let amplitude_deg = whole
-        .amplitude
-        .into_iter()
-        .take(bins)
-        .map(|a| a as f32)
-        .collect();
-    Some(AngleSpectrum {
-        bin_hz: whole.bin_hz,
-        amplitude_deg,
-    })
 }
 
 #[cfg(test)]

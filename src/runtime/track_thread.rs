@@ -4,25 +4,19 @@
 use super::first_picture::FirstPicture;
 use super::pulse::Worker;
 use super::shared::{Failure, Shared};
-use super::source_thread::Timed;
-use crate::model::{Control, Frame, Luma, Outline, Picture, Rgb, Size};
+use crate::model::{Control, Frame, Outline, Picture, Rgb, Size, TimedFrame};
 use crate::outline::{self, Scribbles};
-use crate::pipeline::{Followed, FrontEnd};
-use crate::source::{DecodeError, Decoder};
+use crate::pipeline::{DecodeStage, Followed, FrontEnd, Undecoded};
+use crate::source::DecodeError;
 use crossbeam_channel::{Receiver, Sender, select};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::Duration;
 
-/// Width of the pictures for the screen, px.
-const PREVIEW_WIDTH: u32 = 640;
 /// Scribbles are solved on pictures no wider than this, px: a larger one would take seconds, and
 /// shows no more branches.
 const MATTING_WIDTH: u32 = 960;
 /// Damaged frames that are reported one by one; further ones are only counted.
 const DAMAGE_REPORTED: u64 = 5;
-/// Pictures of another size in a row that are taken for damage when a camera films.
-const OTHER_SIZES: u32 = 5;
 
 /// What the model thread gets.
 pub enum ToModel {
@@ -45,52 +39,37 @@ pub enum ToModel {
 
 /// Runs until the queue's other end is gone.
 pub struct TrackThread<'a> {
+    decode: DecodeStage,
     front: FrontEnd,
     /// Waiting for the first picture.
     scribbles: Option<Scribbles>,
-    decoder: Decoder,
     to_model: Sender<ToModel>,
     shared: &'a Shared,
-    preview_every: Duration,
-    /// Sensor time of the last picture for the screen, s.
-    last_preview_s: Option<f64>,
-    size: Option<Size>,
     last_damage: Option<DecodeError>,
-    live: bool,
-    other_sizes: u32,
     picture: FirstPicture,
 }
 
 impl<'a> TrackThread<'a> {
-    /// # Errors
-    /// There is no decoder.
     pub fn new(
-        (front, scribbles): (FrontEnd, Option<Scribbles>),
+        decode: DecodeStage,
+        front: FrontEnd,
+        scribbles: Option<Scribbles>,
         to_model: Sender<ToModel>,
-        preview_every: Duration,
-        live: bool,
         shared: &'a Shared,
-    ) -> Result<Self, DecodeError> {
-        let decoder = Decoder::new()?;
-        let (last_preview_s, size, last_damage, other_sizes) = (None, None, None, 0);
-        Ok(Self {
+    ) -> Self {
+        Self {
+            decode,
             front,
             scribbles,
-            decoder,
             to_model,
             shared,
-            preview_every,
-            last_preview_s,
-            size,
-            last_damage,
-            live,
-            other_sizes,
+            last_damage: None,
             picture: FirstPicture::default(),
-        })
+        }
     }
 
     /// Works off frames and wishes; a wish that has arrived is honoured before the next frame.
-    pub fn run(mut self, frames: &Receiver<Timed>, controls: &Receiver<Control>) {
+    pub fn run(mut self, frames: &Receiver<TimedFrame>, controls: &Receiver<Control>) {
         loop {
             while let Ok(wish) = controls.try_recv() {
                 self.honour(wish);
@@ -124,7 +103,8 @@ impl<'a> TrackThread<'a> {
     fn honour(&mut self, wish: Control) {
         match wish {
             Control::SetOutline(polygon_px) => match self
-                .size
+                .decode
+                .size()
                 .map(|size| outline::from_polygon(&polygon_px, size))
             {
                 Some(Ok(outline)) => self.restart(Some(outline)),
@@ -157,17 +137,21 @@ impl<'a> TrackThread<'a> {
     }
 
     /// `false` when nothing further can be done.
-    fn work_off(&mut self, timed: &Timed) -> bool {
+    fn work_off(&mut self, timed: &TimedFrame) -> bool {
         let go_on = self.follow(timed);
         self.shared.pulse.done(Worker::Track);
         go_on
     }
 
-    fn follow(&mut self, timed: &Timed) -> bool {
-        match self.decode(timed) {
-            Ok(Some(luma)) => self.follow_decoded(timed, luma),
-            Ok(None) => true,
-            Err(error) => {
+    fn follow(&mut self, timed: &TimedFrame) -> bool {
+        let spare = self.front.spare();
+        match self.decode.step(timed, spare) {
+            Ok(frame) => self.follow_decoded(timed, frame),
+            Err(Undecoded::LeftOut(error)) => {
+                self.leave_out(timed, error);
+                true
+            }
+            Err(Undecoded::EndsFilm(error)) => {
                 let frame = timed.index;
                 self.shared.abort(Failure::Frame { frame, error });
                 false
@@ -175,52 +159,10 @@ impl<'a> TrackThread<'a> {
         }
     }
 
-    /// The frame's luma; `None` where it is damaged and left out.
-    fn decode(&mut self, timed: &Timed) -> Result<Option<Luma>, DecodeError> {
-        let mut luma = self.front.spare().unwrap_or(Luma {
-            size: timed.raw.size,
-            pixels: Vec::new(),
-        });
-        let decoded = match self.size {
-            Some(expected) if expected != timed.raw.size => Err(DecodeError::SizeChanged {
-                expected,
-                found: timed.raw.size,
-            }),
-            _ => self.decoder.luma(&timed.raw, &mut luma),
-        };
-        match decoded {
-            Ok(()) => {
-                (self.size, self.other_sizes) = (Some(luma.size), 0);
-                Ok(Some(luma))
-            }
-            // Damage can hit the size that a picture gives itself; a camera that really changes it
-            // keeps to that.
-            Err(e @ DecodeError::SizeChanged { .. })
-                if self.live && self.other_sizes < OTHER_SIZES =>
-            {
-                self.other_sizes += 1;
-                self.leave_out(timed, e);
-                Ok(None)
-            }
-            Err(e @ DecodeError::Damaged { .. }) => {
-                self.leave_out(timed, e);
-                Ok(None)
-            }
-            Err(e) => Err(e),
-        }
-    }
-
-    fn follow_decoded(&mut self, timed: &Timed, luma: Luma) -> bool {
-        let preview = self.preview(timed);
+    fn follow_decoded(&mut self, timed: &TimedFrame, frame: Frame) -> bool {
+        let preview = frame.preview.clone();
         self.picture
-            .see(timed, self.front.oldest_held(), &mut self.decoder);
-        let frame = Frame {
-            index: timed.index,
-            time_s: timed.time_s,
-            received: timed.received,
-            luma,
-            preview: preview.clone(),
-        };
+            .see(timed, self.front.oldest_held(), &mut self.decode);
         self.solve_scribbles(timed, preview.clone());
         let done = self.front.step(frame);
         self.report();
@@ -247,11 +189,11 @@ impl<'a> TrackThread<'a> {
     /// Scribbles are drawn on the first picture, and solved as soon as it is there. That takes a
     /// second or two, in which the screen shows the picture and what is going on; frames of a live
     /// camera that find no room meanwhile are counted.
-    fn solve_scribbles(&mut self, timed: &Timed, preview: Option<Arc<Rgb>>) {
+    fn solve_scribbles(&mut self, timed: &TimedFrame, preview: Option<Arc<Rgb>>) {
         if self.scribbles.is_none() {
             return;
         }
-        let Ok(picture) = self.decoder.preview(&timed.raw, MATTING_WIDTH) else {
+        let Some(picture) = self.decode.colour(&timed.raw, MATTING_WIDTH) else {
             return;
         };
         let Some(scribbles) = self.scribbles.take() else {
@@ -275,22 +217,7 @@ impl<'a> TrackThread<'a> {
         }
     }
 
-    /// A picture for the screen, if one is due by the sensor's clock.
-    fn preview(&mut self, timed: &Timed) -> Option<Arc<Rgb>> {
-        if self
-            .last_preview_s
-            .is_some_and(|s| timed.time_s - s < self.preview_every.as_secs_f64())
-        {
-            return None;
-        }
-        self.last_preview_s = Some(timed.time_s);
-        self.decoder
-            .preview(&timed.raw, PREVIEW_WIDTH)
-            .ok()
-            .map(Arc::new)
-    }
-
-    fn leave_out(&mut self, timed: &Timed, e: DecodeError) {
+    fn leave_out(&mut self, timed: &TimedFrame, e: DecodeError) {
         let n = self
             .shared
             .counts
@@ -315,7 +242,7 @@ impl<'a> TrackThread<'a> {
                     .into(),
             );
         }
-        let decoded = self.size.is_some();
+        let decoded = self.decode.size().is_some();
         if let (false, Some(e)) = (decoded, &self.last_damage)
             && self.shared.counts.undecodable.load(Ordering::Relaxed) > 0
         {

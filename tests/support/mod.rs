@@ -2,12 +2,12 @@
 #![allow(dead_code)] // not every test file needs all of it
 
 use arborcam::config;
-use arborcam::model::{Frame, Luma, Outline, RawFrame, Size};
+use arborcam::model::{Frame, Luma, Outline, RawFrame, Size, TimedFrame};
 use arborcam::outline::Given;
 use arborcam::source::{self, Decoder};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 use tempfile::TempDir;
 
@@ -25,6 +25,13 @@ pub fn recording() -> &'static [RawFrame] {
             source::open(Path::new(CLIP), &config::Camera::default(), None).expect("clip");
         std::iter::from_fn(|| clip.next_frame().expect("frame")).collect()
     })
+}
+
+/// Frame `k` of the recording as it comes from the source.
+pub fn timed(k: usize) -> TimedFrame {
+    let first_s = recording()[0].sensor_time_s;
+    let raw = Arc::new(recording()[k].clone());
+    TimedFrame::new(raw, k as u64, first_s, Instant::now())
 }
 
 /// Frame `k` of the recording as the tracker gets it.

@@ -2,14 +2,15 @@
 #![allow(dead_code)] // not every test file needs all of it
 
 use arborcam::config::Config;
-use arborcam::model::{Outline, Size};
+use arborcam::model::{Outline, Size, TimedFrame};
 use arborcam::outline::{self, Given};
 use arborcam::pipeline::Pipeline;
 use arborcam::skeleton::Node2d;
 use arborcam::solve::Model;
-use arborcam::source::{self, Decoder};
+use arborcam::source;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Instant;
 
 /// What a tree is stood up from.
 pub struct Flat {
@@ -117,25 +118,12 @@ pub fn grown(clip: &Path, outline: &Path) -> Arc<Model> {
     else {
         panic!("a polygon");
     };
-    let mut pipeline = Pipeline::new(&config, Some(outline));
-    let mut decoder = Decoder::new().expect("decoder");
+    let mut pipeline = Pipeline::new(&config, Some(outline)).expect("decoder");
     let (mut first_s, mut index) = (None, 0);
     while let Some(raw) = clip.next_frame().expect("frame") {
         let first_s = *first_s.get_or_insert(raw.sensor_time_s);
-        let mut luma = arborcam::model::Luma {
-            size: raw.size,
-            pixels: Vec::new(),
-        };
-        decoder.luma(&raw, &mut luma).expect("picture");
-        let time_s = raw.sensor_time_s - first_s;
-        let received = std::time::Instant::now();
-        pipeline.step(arborcam::model::Frame {
-            index,
-            time_s,
-            received,
-            luma,
-            preview: None,
-        });
+        let timed = TimedFrame::new(Arc::new(raw), index, first_s, Instant::now());
+        pipeline.step(&timed).expect("picture");
         index += 1;
     }
     pipeline.finish();

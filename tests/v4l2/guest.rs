@@ -256,9 +256,11 @@ pub fn record(path: &Path, frames: &[RawFrame]) -> Result<(), String> {
     series.close().map_err(|e| e.to_string())
 }
 
-/// From the wish to stop to the end, s: five for what is given up then, which an emulated processor
-/// does not get through before, and the rest for what must be written.
-pub const END_S: f64 = 10.0;
+/// From the wish to stop to the end, s: five for what may be given up, the rest for what must be
+/// built and written. The scripts wait twice as long, so that it can be measured.
+pub fn end_limit_s() -> f64 {
+    10.0 * slack()
+}
 
 /// By how much a time that holds for a real machine may be exceeded: an emulated processor is many
 /// times slower, and shares the host with whatever else runs there.

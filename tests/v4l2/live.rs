@@ -1,13 +1,13 @@
 //! A capture in a real terminal: what it shows, what its keys do, and what it leaves of the
 //! terminal.
 
-use crate::guest::{Group, Results, claim, clip};
+use crate::guest::{Group, Results, claim, clip, end_limit_s};
 
 pub const GROUP: Group = Group {
     name: "live",
     script: "live.sh",
     first: "script",
-    limit_s: 240,
+    limit_s: 400,
     provide: clip,
     cases: &[
         ("the_screen_while_it_gathers_motion", |r| {
@@ -158,7 +158,9 @@ fn quit(r: &Results) -> Result<(), String> {
             r.text("after.screen").unwrap_or_default()
         )
     })?;
-    claim(took < 10.0, || format!("{took} s from q to the end"))?;
+    claim(took < end_limit_s(), || {
+        format!("{took} s from q to the end")
+    })?;
     claim(r.path("live/capture/tree.glb").exists(), || {
         "no model".into()
     })

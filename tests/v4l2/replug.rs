@@ -1,6 +1,6 @@
 //! A USB camera with a serial number, pulled out and plugged in again under a running capture.
 
-use crate::guest::{END_S, Group, Results, claim, clip, slack};
+use crate::guest::{Group, Results, claim, clip, end_limit_s, slack};
 
 /// Times that the script unplugs it.
 const CYCLES: usize = 20;
@@ -132,7 +132,7 @@ fn one_tree(r: &Results) -> Result<(), String> {
 
 fn ends(r: &Results) -> Result<(), String> {
     let took = r.seconds("replug", "asked", "ended")?;
-    claim(took <= END_S * slack(), || {
+    claim(took <= end_limit_s(), || {
         format!("ended {took} s after the wish: {}", said(r))
     })
 }
@@ -174,7 +174,7 @@ fn deaf(r: &Results) -> Result<(), String> {
         format!("status {status}: {said}")
     })?;
     let took = r.seconds("deaf", "asked", "written")?;
-    claim(took <= END_S * slack(), || {
+    claim(took <= end_limit_s(), || {
         format!("written {took} s after the wish: {said}")
     })?;
     let away_s = r.capture("deaf")?["timing"]["away_s"].as_f64();

@@ -1,7 +1,7 @@
 //! The service as it is installed, under a real systemd, with a camera that appears, is silent, and
 //! hangs.
 
-use crate::guest::{END_S, Group, Results, claim, clip, is_emulated};
+use crate::guest::{Group, Results, claim, clip, end_limit_s, is_emulated};
 use std::path::Path;
 use std::process::Command;
 
@@ -84,7 +84,7 @@ fn watchdog(r: &Results) -> Result<(), String> {
 
 fn stops(r: &Results) -> Result<(), String> {
     let took = r.number("ended")? - r.number("asked")?;
-    let limit_s = if is_emulated() { END_S } else { 2.0 };
+    let limit_s = if is_emulated() { end_limit_s() } else { 2.0 };
     claim(took <= limit_s, || {
         format!("ended {took} s after SIGTERM: {}", said(r))
     })?;

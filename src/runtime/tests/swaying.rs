@@ -3,13 +3,16 @@
 use super::super::pulse::{Sign, Vigil};
 use super::*;
 use crate::cancel::CancelToken;
+use crate::config::Dynamics;
+use crate::model::{Angles, Skeleton, TrackLog};
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 /// What hangs has not come back after so long.
 const HANGS: Duration = Duration::from_secs(20);
 
-fn request(time_s: f64) -> Request {
-    Request {
+fn job(time_s: f64) -> SwayJob {
+    SwayJob {
         frame: (30.0 * time_s).round() as u64,
         time_s,
         skeleton: Arc::new(Skeleton {
@@ -24,32 +27,32 @@ fn request(time_s: f64) -> Request {
     }
 }
 
-fn answer(request: &Request) -> SwayNow {
+fn answer(job: &SwayJob) -> SwayNow {
     SwayNow {
-        frame: request.frame,
-        time_s: request.time_s,
+        frame: job.frame,
+        time_s: job.time_s,
         ..SwayNow::default()
     }
 }
 
-fn at_once(request: &Request, _: &CancelToken) -> SwayNow {
-    answer(request)
+fn at_once(job: &SwayJob, _: &CancelToken) -> SwayNow {
+    answer(job)
 }
 
-fn slow(request: &Request, cancel: &CancelToken) -> SwayNow {
+fn slow(job: &SwayJob, cancel: &CancelToken) -> SwayNow {
     takes(Duration::from_millis(300), cancel);
-    answer(request)
+    answer(job)
 }
 
 /// Slower than the machine that looks at it, however busy that is.
-fn very_slow(request: &Request, cancel: &CancelToken) -> SwayNow {
+fn very_slow(job: &SwayJob, cancel: &CancelToken) -> SwayNow {
     takes(Duration::from_secs(3), cancel);
-    answer(request)
+    answer(job)
 }
 
-fn endless(request: &Request, cancel: &CancelToken) -> SwayNow {
+fn endless(job: &SwayJob, cancel: &CancelToken) -> SwayNow {
     takes(Duration::MAX, cancel);
-    answer(request)
+    answer(job)
 }
 
 /// So long, or until it is given up.
@@ -75,7 +78,7 @@ fn film(swaying: &mut Swaying, frames: std::ops::Range<u64>) -> Vec<(u64, u64)> 
         let time_s = frame as f64 / 30.0;
         told.extend(
             swaying
-                .step(time_s, || request(time_s))
+                .step(time_s, || Some(job(time_s)))
                 .map(|found| (frame, found.frame)),
         );
     }

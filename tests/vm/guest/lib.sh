@@ -72,7 +72,7 @@ end() {
 stop() {
     now >"/vm/$name/asked"
     kill -INT "$pid" 2>/dev/null
-    end 20
+    end 40
 }
 
 running() { kill -0 "$pid" 2>/dev/null; }

@@ -33,7 +33,7 @@ until_ok 20 shows 'capture written to' || true
 screen exported
 now >/vm/live/asked
 press q
-until_ok 20 test -s /vm/live/status || true
+until_ok 40 test -s /vm/live/status || true
 now >/vm/live/ended
 sleep 0.5
 screen after

@@ -65,7 +65,7 @@ touch "$gate.deaf"
 sleep 6
 now >/vm/deaf/asked
 kill -INT "$pid"
-until_ok 20 test -e "$work/deaf/capture.json" || stacks "the capture is not written"
+until_ok 40 test -e "$work/deaf/capture.json" || stacks "the capture is not written"
 now >/vm/deaf/written
 pull_out
 end 20

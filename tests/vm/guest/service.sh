@@ -57,7 +57,7 @@ sleep 4
 main=$(property MainPID)
 now >/vm/asked
 kill -TERM "$main"
-until_ok 20 test ! -e "/proc/$main"
+until_ok 40 test ! -e "/proc/$main"
 now >/vm/ended
 systemctl stop "$unit"
 note stopping "$(property Result) $(property ExecMainStatus)"
