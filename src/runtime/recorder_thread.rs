@@ -78,37 +78,40 @@ pub fn start(
     live: bool,
     shared: &Arc<Shared>,
 ) -> Result<(Recorder, JoinHandle<Recorded>), RecordingError> {
+    let path = to.path.clone();
+    let (recorder, thread, items) = two_ends(to, live, shared)?;
+    shared.recording.store(true, Ordering::Relaxed);
+    let handle = std::thread::Builder::new()
+        .name("record".into())
+        .spawn(move || thread.run(&items))
+        .map_err(|source| RecordingError::Place { path, source })?;
+    Ok((recorder, handle))
+}
+
+/// Makes the file; the two ends of the queue, before anybody takes out of it.
+fn two_ends(
+    to: RecordTo,
+    live: bool,
+    shared: &Arc<Shared>,
+) -> Result<(Recorder, Thread, Receiver<Item>), RecordingError> {
     let series = Series::create(&to.path, to.head, to.limits, now_ns)?;
     let (queue, items) = bounded(QUEUE);
     let waiting = Arc::new(AtomicUsize::new(0));
-    let queue_bytes = to.queue_bytes;
     let recorder = Recorder {
         queue,
         waiting: waiting.clone(),
-        queue_bytes,
+        queue_bytes: to.queue_bytes,
         shared: shared.clone(),
         live,
     };
-    shared.recording.store(true, Ordering::Relaxed);
-    let shared = shared.clone();
-    let run = move || {
-        Thread {
-            series,
-            waiting,
-            shared,
-            broken: false,
-            oldest: None,
-        }
-        .run(&items)
+    let thread = Thread {
+        series,
+        waiting,
+        shared: shared.clone(),
+        broken: false,
+        oldest: None,
     };
-    let handle = std::thread::Builder::new()
-        .name("record".into())
-        .spawn(run)
-        .map_err(|source| RecordingError::Place {
-            path: to.path,
-            source,
-        })?;
-    Ok((recorder, handle))
+    Ok((recorder, thread, items))
 }
 
 fn now_ns() -> u64 {
@@ -290,5 +293,51 @@ impl Thread {
                 .fetch_add(self.series.open_frames(), Ordering::Relaxed);
             self.shared.warn(e.to_string());
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{PixelFormat, Size};
+    use crate::recording::Reader;
+
+    /// A camera is not made to wait for a disk that takes nothing for a while: what does not fit
+    /// into the queue is missing, and every one is counted.
+    #[test]
+    fn what_finds_no_room_is_counted_and_the_rest_is_recorded() {
+        let dir = tempfile::tempdir().expect("tempdir");
+        let path = dir.path().join("full.mcap");
+        let size = Size::new(10, 10);
+        let to = RecordTo {
+            path: path.clone(),
+            limits: Limits::default(),
+            head: Head::default(),
+            // Room for two.
+            queue_bytes: 2 * size.area(),
+        };
+        let shared = Arc::new(Shared::default());
+        let (recorder, thread, items) = two_ends(to, true, &shared).expect("a file");
+        for index in 0..7 {
+            let raw = RawFrame {
+                sequence: Some(index),
+                sensor_time_s: index as f64 / 30.0,
+                size,
+                format: PixelFormat::Grey,
+                bytes: vec![index as u8; size.area()],
+            };
+            recorder.offer(&Arc::new(raw), index);
+        }
+        drop(recorder);
+        let recorded = thread.run(&items);
+        assert_eq!((recorded.frames, recorded.stopped), (2, false));
+        assert_eq!(shared.counts.not_recorded.load(Ordering::Relaxed), 5);
+        let warnings = shared.warnings();
+        assert!(
+            warnings.len() == 1 && warnings[0].contains("does not keep up"),
+            "{warnings:?}"
+        );
+        let mut reader = Reader::open(&path).expect("opened");
+        assert_eq!(std::iter::from_fn(|| reader.next_picture()).count(), 2);
     }
 }
