@@ -1,9 +1,9 @@
 //! What runs, on one screen: one synchronous step per frame, from the camera's bytes to the pose.
 //!
-//! Four stages. `DecodeStage` makes a picture of the bytes. The front end finds the outline and follows
-//! points. The back end logs them, has [`solve`] make the model of the tree, and from then on poses
-//! it and now and then solves anew. [`SwayStage`] tells how the branches of the model sway. `runtime` runs
-//! the same stages on threads of their own.
+//! Four stages. `DecodeStage` makes a picture of the bytes. The front end finds the outline and
+//! follows points. The back end logs them, has [`solve`] make the model of the tree, and from then
+//! on poses it and now and then solves anew. [`SwayStage`] analyses how the branches of the model
+//! sway. `runtime` runs the same stages on threads of their own.
 //!
 //! [`solve`]: crate::solve::solve
 

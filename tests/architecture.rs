@@ -52,7 +52,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &[
             "model",
             "config",
-            // The first of its stages makes pictures of bytes, the last tells the sway.
+            // The first of its stages makes pictures of bytes, the last analyses the sway.
             "source::Decoder",
             "source::DecodeError",
             "dynamics",

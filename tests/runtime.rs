@@ -171,7 +171,7 @@ fn tracks(out: &Path) -> Vec<(u64, u64)> {
 }
 
 /// The sways of a stream, by the frame up to which each was analysed.
-fn told_sways(stream: &str) -> BTreeMap<u64, serde_json::Value> {
+fn streamed_sways(stream: &str) -> BTreeMap<u64, serde_json::Value> {
     let mut told = BTreeMap::new();
     for line in stream.lines() {
         let line: serde_json::Value = serde_json::from_str(line).expect("JSON");
@@ -182,7 +182,7 @@ fn told_sways(stream: &str) -> BTreeMap<u64, serde_json::Value> {
     told
 }
 
-/// The same numbers to the digits that are told, or the same reason why there are none.
+/// The same numbers to the digits of the stream, or the same reason why there are none.
 fn same_swaying(told: &serde_json::Value, found: Swaying) {
     match found {
         Ok(sway) => {
@@ -199,16 +199,16 @@ fn same_swaying(told: &serde_json::Value, found: Swaying) {
                     Some(off) => off.abs() < 1e-5,
                     None => told[name].is_null() && expected.is_none_or(|x| !x.is_finite()),
                 };
-                assert!(is_same, "{name} {expected:?} is told as {told}");
+                assert!(is_same, "{name} is {expected:?}, the stream has {told}");
             }
         }
         Err(why) => assert_eq!(told["unidentified"], why.word(), "{told}"),
     }
 }
 
-/// The last stage, too: what is told was found up to the frame that is named with it.
+/// The last stage, too: the stream has the answer of the analysis up to the frame that it names.
 #[test]
-fn threads_tell_the_same_sway_as_none() {
+fn threads_stream_the_same_sway_as_none() {
     let mut config = Config::default();
     config.dynamics.every_s = 0.5;
     let lines = Lines::default();
@@ -220,7 +220,7 @@ fn threads_tell_the_same_sway_as_none() {
     let (_, failure, _) = run(fake(false, |n| Ok(frame(n))), streamed);
     assert!(failure.is_none(), "{failure:?}");
     let text = String::from_utf8(lines.0.lock().expect("lines").clone()).expect("text");
-    let told = told_sways(&text);
+    let told = streamed_sways(&text);
 
     let mut pipeline = Pipeline::new(&config, Some(support::outline())).expect("decoder");
     let (mut compared, mut identified) = (0, 0);

@@ -30,6 +30,11 @@ impl SwayStage {
         }
     }
 
+    /// The settings of the analysis.
+    pub fn settings(&self) -> &Dynamics {
+        &self.settings
+    }
+
     /// Takes the frame that `back` has just posed.
     pub fn step(&mut self, moved: &Moved, back: &BackEnd) {
         let Some(model) = back.model() else {

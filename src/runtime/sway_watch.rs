@@ -1,4 +1,4 @@
-//! The sway while it films, for whoever looks at it.
+//! The sway during the film, for the screen and the stream.
 
 use super::background::Background;
 use super::shared::Shared;
@@ -15,7 +15,6 @@ const SHOWN_S: f64 = 20.0;
 pub struct SwayWatch {
     stage: SwayStage,
     swaying: Swaying,
-    is_at_end: bool,
 }
 
 impl SwayWatch {
@@ -29,7 +28,6 @@ impl SwayWatch {
         Self {
             stage: SwayStage::new(settings),
             swaying: Swaying::new(settings.every_s, waits, SwayJob::run, background, shared),
-            is_at_end: settings.every_s <= 0.0,
         }
     }
 
@@ -63,7 +61,7 @@ impl SwayWatch {
 
     /// Nobody is asked before the end.
     pub fn is_at_end(&self) -> bool {
-        self.is_at_end
+        self.stage.settings().every_s <= 0.0
     }
 
     /// How often a request was due and the last one was still under way.

@@ -5,12 +5,12 @@ modprobe v4l2loopback devices=1 video_nr=0 card_label=replay exclusive_caps=1
 printf '{"frame":0,"width":320,"height":180,"polygon_px":%s}' '[[126,0],[120,10],[126,52],[122,74],[107,68],[102,58],[93,71],[109,101],
 [105,115],[136,122],[149,130],[153,165],[170,168],[172,149],[198,116],[233,91],[230,69],[238,51],[222,44],[224,26],
 [207,10],[197,31],[177,58],[158,64],[151,34],[142,16],[135,0]]' >"$work/outline.json"
-cp /vm/clip-*.mcap "$work/"
 
 fed() { v4l2-ctl -d /dev/video0 -D | grep -q "Video Capture"; }
 
 # Plays the clip in a format at RATE_HZ and films it: 160 frames of it.
 film_live() {
+    cp "/vm/clip-$format-$1.mcap" "$work/"
     "$bin" play "$work/clip-$format-$1.mcap" --to /dev/video0 --loop 2>"/vm/play-$format" &
     player=$!
     until_ok 10 fed
@@ -24,6 +24,7 @@ film_live() {
     stop
     kill -INT $player
     wait $player || true
+    rm "$work/clip-$format-$1.mcap"
 }
 had_time_for_every_frame() { grep -q '"frames_dropped_tracker": 0' "/vm/live-$format/capture/capture.json"; }
 
