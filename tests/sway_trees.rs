@@ -6,7 +6,7 @@ mod made_trees;
 use arborcam::cancel::CancelToken;
 use arborcam::config::{Dynamics, Excited};
 use arborcam::dynamics::{Depth, Film, FilmTrack, analyse};
-use arborcam::model::{Excitation, NodeId, Unidentified};
+use arborcam::model::{Excitation, NodeId, Swaying, Unidentified};
 use made_trees::{Drive, Filming, MadeTree};
 
 /// What came out for some trees.
@@ -355,56 +355,50 @@ fn what_carries_no_answer_gets_a_reason() {
     }
 }
 
-/// An analysis that is cancelled gives the answers until then, the rest named as what it is, and the
-/// answers are those of a whole analysis.
+/// An analysis that is cancelled at any moment gives the answers until then, from the trunk up, the
+/// rest named as what it is, and the answers are those of a whole analysis.
 #[test]
 fn what_is_broken_off_says_so() {
     for drive in [Drive::Release(0.5), Drive::Wind] {
         let tree = MadeTree::new(3, drive, &Filming::default());
-        let config = Dynamics::default();
-        let whole = analyse(
-            &tree.skeleton,
-            &tree.film,
-            &config,
-            Depth::Full,
-            &CancelToken::new(),
-        )
-        .sway;
-        let cancel = CancelToken::new();
-        // In wind the other branches fall silent with their trunk, sooner than a thread can act.
-        if drive == Drive::Wind {
-            cancel.cancel();
-        }
-        let part = std::thread::scope(|scope| {
-            scope.spawn(|| {
-                while cancel.checks() < 2 {
-                    std::hint::spin_loop();
-                }
-                cancel.cancel();
-            });
-            analyse(&tree.skeleton, &tree.film, &config, Depth::Full, &cancel).sway
-        });
-        assert!(
-            part.iter()
-                .filter(|s| **s == Err(Unidentified::NotInTime))
-                .count()
-                > 1,
-            "{part:?}"
-        );
-        for (part, whole) in part
-            .iter()
-            .zip(&whole)
-            .filter(|(part, _)| **part != Err(Unidentified::NotInTime))
-        {
-            assert_eq!(part, whole);
-        }
-        if drive != Drive::Wind {
+        let whole = sways(&tree, &CancelToken::new());
+        for checks in [0, 2, 6, 12, 25] {
+            let part = sways_until(&tree, checks);
+            let late: Vec<bool> = part
+                .iter()
+                .map(|s| *s == Err(Unidentified::NotInTime))
+                .collect();
+            for ((part, whole), late) in part.iter().zip(&whole).zip(&late) {
+                assert!(*late || part == whole, "{part:?} is not {whole:?}");
+            }
             assert!(
-                part[1].is_ok() || whole[1].is_err(),
-                "the trunk comes first"
+                !late[1] || late[1..].iter().all(|late| *late),
+                "the trunk comes first: {part:?}"
             );
+            assert!(checks > 0 || late[1], "{part:?}");
         }
     }
+}
+
+fn sways(tree: &MadeTree, cancel: &CancelToken) -> Vec<Swaying> {
+    let config = Dynamics::default();
+    analyse(&tree.skeleton, &tree.film, &config, Depth::Full, cancel).sway
+}
+
+/// Cancelled once it has asked so often.
+fn sways_until(tree: &MadeTree, checks: u64) -> Vec<Swaying> {
+    let cancel = CancelToken::new();
+    if checks == 0 {
+        cancel.cancel();
+    }
+    std::thread::scope(|scope| {
+        let work = scope.spawn(|| sways(tree, &cancel));
+        while cancel.checks() < checks && !work.is_finished() {
+            std::hint::spin_loop();
+        }
+        cancel.cancel();
+        work.join().expect("an analysis")
+    })
 }
 
 /// One branch alone, as clean as can be: frequency and damping as they went in, with half of the

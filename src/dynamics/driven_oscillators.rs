@@ -5,6 +5,7 @@ use super::celerite::{Part, Times, minus_2_log_likelihood};
 use super::decay::{Mode, USUAL_DAMPING, damping_penalty};
 use super::filter::Filter;
 use super::periodogram::{Observed, Periodogram, excess_hz};
+use crate::cancel::CancelToken;
 use crate::signal::bfgs::{curvature, minimum};
 use crate::signal::vectors::dot;
 use nalgebra::DMatrix;
@@ -142,12 +143,18 @@ impl Problem {
 
     /// With as many new oscillators as the data carry (Schwarz 1978), within `frequencies_hz`.
     /// `left` are the motions without what is known of them; noise has about the variance `noise`
-    /// in them.
-    pub fn fit(&self, left: &[Vec<f64>], noise: f64, frequencies_hz: [f64; 2]) -> Fitted<'_> {
+    /// in them. Nothing is to be made of it where `cancel` has ended it.
+    pub fn fit(
+        &self,
+        left: &[Vec<f64>],
+        noise: f64,
+        frequencies_hz: [f64; 2],
+        cancel: &CancelToken,
+    ) -> Fitted<'_> {
         let scale = Scale::of(left);
         let start = self.start(&scale, noise);
         let mut bounds = self.bounds(&scale);
-        let (x, mut value) = minimum(|x| self.cost(x), &start, &bounds);
+        let (x, mut value) = minimum(|x| self.cost(x), &start, &bounds, cancel);
         let mut found = Fitted {
             problem: self,
             x,
@@ -163,6 +170,9 @@ impl Problem {
             });
         }
         for _ in 0..MAX_NEW {
+            if cancel.is_cancelled() {
+                break;
+            }
             for (m, observed) in observed.iter_mut().enumerate() {
                 let own = self.of_motion(m, &found.x);
                 observed.expected = self.parts(&own);
@@ -179,7 +189,7 @@ impl Problem {
             x.extend(scale.ln_variances.iter().map(|v| v - 1.0));
             bounds.extend([frequencies_hz.map(f64::ln), DAMPING.map(f64::ln)]);
             bounds.extend(scale.ln_variances.iter().map(|_| scale.bounds()));
-            let (x, there) = minimum(|x| self.cost(x), &x, &bounds);
+            let (x, there) = minimum(|x| self.cost(x), &x, &bounds, cancel);
             if there + penalty >= value {
                 break;
             }

@@ -41,8 +41,7 @@ pub struct Analysis {
 /// The sway of every measured node of `skeleton` (its foot among them, which has none) in `film`.
 ///
 /// Never fails: what the film does not carry is [`Unidentified`].
-/// `cancel` is looked at before every branch, as many of them take a while: those that are left by
-/// then are [`Unidentified::NotInTime`].
+/// The branches that are left when `cancel` ends the work are [`Unidentified::NotInTime`].
 pub fn analyse(
     skeleton: &Skeleton,
     film: &Film,
@@ -50,16 +49,16 @@ pub fn analyse(
     depth: Depth,
     cancel: &CancelToken,
 ) -> Analysis {
-    let Some(usable) = UsableFilm::of(skeleton, film, config) else {
-        return without_film(skeleton, film);
-    };
     let UsableFilm {
         members,
         onset,
         releases_s,
         limits,
         film,
-    } = usable;
+    } = match UsableFilm::of(skeleton, film, config, cancel) {
+        Ok(usable) => usable,
+        Err(reason) => return without_answers(skeleton, film, reason),
+    };
     let sway = match onset.excitation {
         Excitation::Wind => wind::sways(skeleton, &film, &members, &limits, cancel),
         Excitation::Release => {
@@ -77,14 +76,14 @@ pub fn analyse(
     }
 }
 
-/// Of a film that is too short.
-fn without_film(skeleton: &Skeleton, film: &Film) -> Analysis {
+/// Of a film that cannot be used, for one reason.
+fn without_answers(skeleton: &Skeleton, film: &Film, reason: Unidentified) -> Analysis {
     let mut sway: Vec<Swaying> = Vec::with_capacity(skeleton.measured());
     for (i, members) in members(skeleton, film).iter().enumerate() {
         sway.push(Err(if i == 0 || members.is_empty() {
             Unidentified::NotMeasured
         } else {
-            Unidentified::TooShort
+            reason
         }));
     }
     Analysis {
@@ -106,15 +105,20 @@ pub(super) struct UsableFilm<'a> {
 }
 
 impl<'a> UsableFilm<'a> {
-    /// `None` where there is too little film.
-    pub fn of(skeleton: &Skeleton, film: &'a Film, config: &Dynamics) -> Option<Self> {
+    /// An error where there is too little film, or `cancel` ends the work before.
+    pub fn of(
+        skeleton: &Skeleton,
+        film: &'a Film,
+        config: &Dynamics,
+        cancel: &CancelToken,
+    ) -> Result<Self, Unidentified> {
         if film.times_s.len() < LEAST_FRAMES || film.span_s() <= 0.0 {
-            return None;
+            return Err(Unidentified::TooShort);
         }
         let highest_hz = (BELOW_NYQUIST * 0.5 / film.step_s()).min(config.highest_hz);
         let frequencies_hz = [LEAST_PERIODS / film.span_s(), highest_hz];
         if frequencies_hz[0] >= frequencies_hz[1] {
-            return None;
+            return Err(Unidentified::TooShort);
         }
         let given = match config.excitation {
             Excited::Auto => None,
@@ -123,12 +127,15 @@ impl<'a> UsableFilm<'a> {
         };
         let members = members(skeleton, film);
         let of_tree: &[usize] = members.get(1).map_or(&[], Vec::as_slice);
-        let (onset, releases_s) = onset(film, of_tree, given, frequencies_hz);
+        let (onset, releases_s) = onset(film, of_tree, given, frequencies_hz, cancel);
+        if cancel.is_cancelled() {
+            return Err(Unidentified::NotInTime);
+        }
         let film = film.until(onset.to);
         if film.times_s.len() - onset.from < LEAST_FRAMES {
-            return None;
+            return Err(Unidentified::TooShort);
         }
-        Some(Self {
+        Ok(Self {
             members,
             onset,
             releases_s,

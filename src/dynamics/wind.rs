@@ -113,6 +113,7 @@ pub(super) fn sways(
         members,
         limits,
         known: vec![Known::Nothing; members.len()],
+        cancel,
     };
     from_the_trunk_up(skeleton, members, cancel, &mut estimator)
 }
@@ -133,6 +134,7 @@ struct InWind<'a> {
     limits: &'a SearchLimits,
     /// By node.
     known: Vec<Known>,
+    cancel: &'a CancelToken,
 }
 
 /// Points that stand for a branch.
@@ -239,7 +241,11 @@ impl InWind<'_> {
             had: RefCell::default(),
         };
         let left = motion.along_directions(&motion.own);
-        let fitted = problem.fit(&left, motion.noise, self.frequencies_hz(every));
+        let frequencies_hz = self.frequencies_hz(every);
+        let fitted = problem.fit(&left, motion.noise, frequencies_hz, self.cancel);
+        if self.cancel.is_cancelled() {
+            return Err(Unidentified::NotInTime);
+        }
         let found = fitted.oscillators();
         let k = own_oscillator(&found, &ancestors, criteria)?;
         let mode = criteria.mode_of(&found[k]);

@@ -1,5 +1,6 @@
 //! The minimum of a smooth function of a few numbers, and how sharp it is.
 
+use crate::cancel::CancelToken;
 use nalgebra::{DMatrix, DVector};
 
 const MAX_STEPS: usize = 60;
@@ -17,8 +18,13 @@ const MIN_GAIN: f64 = 1e-2;
 const SECOND_DIFFERENCE: f64 = 1e-2;
 
 /// Minimum of `f` near `from` within `bounds`, by BFGS (Broyden, Fletcher, Goldfarb and Shanno 1970)
-/// with differences: the place and the value.
-pub fn minimum(f: impl Fn(&[f64]) -> f64, from: &[f64], bounds: &[[f64; 2]]) -> (Vec<f64>, f64) {
+/// with differences: the place and the value, or how far it has come when `cancel` ends it.
+pub fn minimum(
+    f: impl Fn(&[f64]) -> f64,
+    from: &[f64],
+    bounds: &[[f64; 2]],
+    cancel: &CancelToken,
+) -> (Vec<f64>, f64) {
     let n = from.len();
     let mut x = from.to_vec();
     clamp(&mut x, bounds);
@@ -26,6 +32,9 @@ pub fn minimum(f: impl Fn(&[f64]) -> f64, from: &[f64], bounds: &[[f64; 2]]) -> 
     let mut inverse = DMatrix::<f64>::identity(n, n) * FIRST_INVERSE;
     let mut gradient = slope(&f, &x, value);
     for _ in 0..MAX_STEPS {
+        if cancel.is_cancelled() {
+            break;
+        }
         let direction = descent(&mut inverse, &gradient);
         let Some((next, next_value)) = line_search(&f, &x, value, &direction, bounds) else {
             break;
@@ -153,12 +162,21 @@ mod tests {
 
     #[test]
     fn a_bent_valley_is_followed_to_its_lowest_place() {
-        let (x, value) = minimum(bent_valley, &[-1.0, 1.0], &[[-3.0, 3.0]; 2]);
+        let cancel = CancelToken::new();
+        let (x, value) = minimum(bent_valley, &[-1.0, 1.0], &[[-3.0, 3.0]; 2], &cancel);
         assert!(value < 1e-2 && (x[0] - 1.0).abs() < 0.1, "{x:?}: {value}");
         let h = curvature(bent_valley, &[1.0, 1.0]);
         assert!(
             (h[(0, 0)] - 242.0).abs() < 1.0 && (h[(1, 1)] - 60.0).abs() < 0.1,
             "{h}"
         );
+    }
+
+    #[test]
+    fn what_is_not_wanted_any_more_takes_no_step() {
+        let cancel = CancelToken::new();
+        cancel.cancel();
+        let (x, value) = minimum(bent_valley, &[-1.0, 1.0], &[[-3.0, 3.0]; 2], &cancel);
+        assert_eq!((x, value), (vec![-1.0, 1.0], 4.0));
     }
 }

@@ -378,17 +378,17 @@ mod tests {
 
     /// The points of the branches that are found beside the trunk and the tip as a whole.
     fn groups(skeleton: &Skeleton, film: &Film) -> Vec<Vec<usize>> {
-        let Some(UsableFilm {
+        let cancel = CancelToken::new();
+        let Ok(UsableFilm {
             members,
             onset,
             limits,
             film,
             ..
-        }) = UsableFilm::of(skeleton, film, &Dynamics::default())
+        }) = UsableFilm::of(skeleton, film, &Dynamics::default(), &cancel)
         else {
             return Vec::new();
         };
-        let cancel = CancelToken::new();
         let sways = free_decay::sways(skeleton, &film, &members, &onset, &limits, &cancel);
         let Some(solution) = ModalSolution::of(skeleton, &film, &onset, &limits, &sways, &cancel)
         else {

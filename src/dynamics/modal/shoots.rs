@@ -35,13 +35,13 @@ pub fn shoots(
     config: &Dynamics,
     cancel: &CancelToken,
 ) -> Vec<Shoot> {
-    let Some(UsableFilm {
+    let Ok(UsableFilm {
         members,
         onset,
         limits,
         film,
         ..
-    }) = UsableFilm::of(skeleton, film, config)
+    }) = UsableFilm::of(skeleton, film, config, cancel)
     else {
         return Vec::new();
     };

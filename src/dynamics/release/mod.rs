@@ -14,6 +14,7 @@ use super::decay::Start;
 use super::film::Film;
 use super::members::{Points, evenly_chosen};
 use super::signals::{Fit, Signals};
+use crate::cancel::CancelToken;
 use crate::model::Excitation;
 pub use fading::fades_as_a_free_decay;
 use motion::{Motion, greatest_motion};
@@ -70,21 +71,25 @@ pub struct Onset {
 }
 
 /// Looks at the points of the whole tree; `given` is what the user says. Frequencies of the tree
-/// lie within
-/// `frequencies_hz`. Where the tree was released several times, each from rest, it is the time with
-/// the greatest motion, until the next pull; and when each was, s.
+/// lie within `frequencies_hz`. Where the tree was released several times, each from rest, it is the time with
+/// the greatest motion, until the next pull; and when each was, s. Nothing is to be made of it
+/// where `cancel` has ended it.
 pub(super) fn onset(
     film: &Film,
     tracks: &[usize],
     given: Option<Excitation>,
     frequencies_hz: [f64; 2],
+    cancel: &CancelToken,
 ) -> (Onset, Vec<f64>) {
     if given != Some(Excitation::Wind)
-        && let Some(found) = of_parts(film, tracks, given, frequencies_hz)
+        && let Some(found) = of_parts(film, tracks, given, frequencies_hz, cancel)
     {
         return found;
     }
-    (of_one(film, tracks, given, frequencies_hz), Vec::new())
+    (
+        of_one(film, tracks, given, frequencies_hz, cancel),
+        Vec::new(),
+    )
 }
 
 /// The same of the parts that hold a release each; `None` where there are none, or one of them is
@@ -94,6 +99,7 @@ fn of_parts(
     tracks: &[usize],
     given: Option<Excitation>,
     frequencies_hz: [f64; 2],
+    cancel: &CancelToken,
 ) -> Option<(Onset, Vec<f64>)> {
     let mut greatest: Option<(f64, Onset)> = None;
     let mut times_s = Vec::new();
@@ -102,7 +108,7 @@ fn of_parts(
         // As with the whole film, less than a wave shows no frequency.
         let lowest_hz = frequencies_hz[0] * film.span_s() / part.span_s();
         let frequencies_hz = [lowest_hz.min(frequencies_hz[1]), frequencies_hz[1]];
-        let onset = of_one(&part, tracks, None, frequencies_hz);
+        let onset = of_one(&part, tracks, None, frequencies_hz, cancel);
         if onset.excitation == Excitation::Wind {
             // Wind, too, may rest and come again. Where the film ends soon after, it does not tell.
             let tells = frames.end < film.times_s.len() || part.span_s() >= TELLS_S;
@@ -132,6 +138,7 @@ fn of_one(
     tracks: &[usize],
     given: Option<Excitation>,
     frequencies_hz: [f64; 2],
+    cancel: &CancelToken,
 ) -> Onset {
     let wind = Onset {
         excitation: Excitation::Wind,
@@ -154,6 +161,7 @@ fn of_one(
         times_s: since(film, &motion),
         release_sd_s: RELEASE_SD_FRAMES * film.step_s(),
         frequencies_hz,
+        cancel,
     };
     if decay.times_s.len() < MIN_FRAMES || decay.points.tracks.is_empty() {
         return wind;
@@ -193,16 +201,18 @@ fn since(film: &Film, motion: &Motion) -> Vec<f64> {
 }
 
 /// What may be a free decay.
-struct Decay {
+struct Decay<'a> {
     points: Points,
     /// From its begin on.
     times_s: Vec<f64>,
     release_sd_s: f64,
     frequencies_hz: [f64; 2],
+    cancel: &'a CancelToken,
 }
 
-impl Decay {
-    /// What `n` modes that describe most of the motion leave of it, px².
+impl Decay<'_> {
+    /// What `n` modes that describe most of the motion leave of it, px²; `None` where there are not
+    /// so many, or `cancel` ends the search before.
     fn left_by(&self, start: Start, n: usize) -> Option<f64> {
         let signals = Signals::new(
             self.times_s.clone(),
@@ -213,6 +223,9 @@ impl Decay {
         );
         let mut fit = Fit::default();
         for _ in 0..n {
+            if self.cancel.is_cancelled() {
+                return None;
+            }
             let new = signals.search(&fit)?;
             fit.modes.push(new);
             fit = signals.fit(&fit, &[]);
