@@ -32,7 +32,7 @@
 //! read · [`files`] that appear when they are complete · [`export`] files for other programs ·
 //! [`views`] what is made of a document · [`report`] tables and plots of the sway · `tui` the
 //! screen · `doctor` checks of the machine · `cli` the commands · [`config`] the settings ·
-//! [`cancel`] stops long work.
+//! [`cancel`] stops long work · [`bounds`] a stretch of the number line.
 //!
 //! # Features
 //!
@@ -47,6 +47,7 @@
 //! | `terminal` | the program; needs `opencv` and `camera` | `runtime`, `tui`, `doctor`, `cli` |
 
 pub mod animate;
+pub mod bounds;
 pub mod cancel;
 pub mod caught;
 #[cfg(feature = "terminal")]
