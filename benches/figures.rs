@@ -21,6 +21,7 @@ use arborcam::outline::{self, Mark, Scribbles};
 use arborcam::pipeline::{self, Pipeline, PoseTracker, Seen, dress};
 use arborcam::solve::{self, lift_to_3d, solve};
 use criterion::Criterion;
+use nalgebra::Point2;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
@@ -159,7 +160,14 @@ fn build(criterion: &mut Criterion, points: usize, bound_ms: u32) -> String {
     let table = hierarchy::table(log.all());
     let evidence = evidence(&table, &config.accumulate);
     let whole = || built(&log, &outline);
-    let parting = || hierarchy::build(&table, &evidence.moving, [300.0, 330.0], &config.hierarchy);
+    let parting = || {
+        hierarchy::build(
+            &table,
+            &evidence.moving,
+            Point2::new(300.0, 330.0),
+            &config.hierarchy,
+        )
+    };
     criterion.bench_function(&format!("build of the tree, {points} points"), |b| {
         b.iter(whole)
     });
@@ -247,7 +255,7 @@ fn pose_of_127() -> String {
     let seen = |pose: &Pose| -> Vec<Option<[f64; 2]>> {
         pose.joints[..skeleton.measured()]
             .iter()
-            .map(|j| Some(skeleton.image_from_model(&j.position)))
+            .map(|j| Some(skeleton.image_from_model(&j.position).into()))
             .collect()
     };
     let targets: Vec<_> = truth.iter().map(seen).collect();

@@ -96,7 +96,7 @@ pub fn identify_sub_branches(
 fn crown_u(table: &TrackTable, moving: &[usize]) -> Option<f64> {
     let sum: f64 = moving
         .iter()
-        .map(|&row| hierarchy::rest_position_px(table, row)[0])
+        .map(|&row| hierarchy::rest_position_px(table, row).x)
         .sum();
     (!moving.is_empty()).then(|| sum / moving.len() as f64)
 }

@@ -359,7 +359,7 @@ fn chain(ways: &[Vector3<f64>]) -> Skeleton {
     }
     Skeleton {
         nodes,
-        foot_px: [320.0, 340.0],
+        foot_px: [320.0, 340.0].into(),
         image_size: Size::new(640, 360),
     }
 }

@@ -3,6 +3,7 @@
 mod support;
 
 use arborcam::document::Document;
+use nalgebra::Point2;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -70,11 +71,11 @@ fn animated(name: &str, more: &[&str]) -> (TempDir, PathBuf) {
 }
 
 /// Place in the picture of every node in every frame.
-fn table(path: &Path) -> BTreeMap<u64, Vec<[f64; 2]>> {
+fn table(path: &Path) -> BTreeMap<u64, Vec<Point2<f64>>> {
     let text = fs::read_to_string(path).expect("table");
     let mut lines = text.lines();
     assert_eq!(lines.next(), Some("frame,time_s,node_id,x,y,z,u_px,v_px"));
-    let mut out: BTreeMap<u64, Vec<[f64; 2]>> = BTreeMap::new();
+    let mut out: BTreeMap<u64, Vec<Point2<f64>>> = BTreeMap::new();
     for line in lines {
         let cells: Vec<f64> = line
             .split(',')
@@ -82,15 +83,15 @@ fn table(path: &Path) -> BTreeMap<u64, Vec<[f64; 2]>> {
             .collect();
         out.entry(cells[0] as u64)
             .or_default()
-            .push([cells[6], cells[7]]);
+            .push(Point2::new(cells[6], cells[7]));
     }
     out
 }
 
-fn apart_px(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
+fn apart_px(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
     a.iter()
         .zip(b)
-        .map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
+        .map(|(a, b)| (a.x - b.x).hypot(a.y - b.y))
         .fold(0.0, f64::max)
 }
 
@@ -413,7 +414,7 @@ fn a_sound_drives_the_tree() {
         table(&out),
         Document::read(replayed(), 0.0).expect("capture").skeleton,
     );
-    let rest: Vec<[f64; 2]> = rest
+    let rest: Vec<Point2<f64>> = rest
         .nodes
         .iter()
         .map(|n| rest.image_from_model(&n.position))

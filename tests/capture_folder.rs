@@ -6,6 +6,7 @@ use arborcam::config::Config;
 use arborcam::model::Unidentified;
 use arborcam::outline::{AutoOutline, Found};
 use arborcam::source::Decoder;
+use nalgebra::Point2;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::PathBuf;
@@ -70,7 +71,7 @@ struct Moved {
     time_s: f64,
     node: usize,
     at: [f64; 3],
-    seen_px: [f64; 2],
+    seen_px: Point2<f64>,
 }
 
 impl Moved {
@@ -81,7 +82,7 @@ impl Moved {
             time_s,
             node: index(&row[2]),
             at: [x, y, z],
-            seen_px: [u, v],
+            seen_px: Point2::new(u, v),
         }
     }
 }
@@ -193,7 +194,7 @@ fn every_node_is_posed_in_every_frame_those_before_the_build_among_them() {
     let sway = |frames: std::ops::Range<usize>| {
         let of_node = |n: usize| frames.clone().map(move |f| f * nodes + n);
         let reach = |n: usize| {
-            let us: Vec<f64> = of_node(n).map(|k| motion[k].seen_px[0]).collect();
+            let us: Vec<f64> = of_node(n).map(|k| motion[k].seen_px.x).collect();
             us.iter().copied().fold(f64::MIN, f64::max)
                 - us.iter().copied().fold(f64::MAX, f64::min)
         };
@@ -229,10 +230,8 @@ fn the_projection_is_the_models_seen_from_the_front() {
     let foot = &made().capture()["model"]["foot_px"];
     let foot = [0, 1].map(|c| foot[c].as_f64().expect("foot_px"));
     for row in made().motion() {
-        let expected = [foot[0] + row.at[0], foot[1] - row.at[1]];
-        let off = (0..2)
-            .map(|c| (row.seen_px[c] - expected[c]).abs())
-            .fold(0.0, f64::max);
+        let expected = Point2::new(foot[0] + row.at[0], foot[1] - row.at[1]);
+        let off = (row.seen_px - expected).amax();
         assert!(
             off < 0.002,
             "frame {} node {}: {:?} instead of {expected:?}",

@@ -2,6 +2,7 @@
 
 mod support;
 
+use arborcam::bounds::Bounds;
 use arborcam::document::{CaptureNote, Document, DocumentError};
 use arborcam::model::Skeleton;
 use std::fs;
@@ -124,7 +125,7 @@ fn a_document_without_a_film_is_read_at_rest() {
     assert_eq!(read.skeleton, whole.skeleton);
     let film = read.film().err().map(|e| e.to_string());
     assert!(film.is_some_and(|e| e.contains("lacks motion.csv") && !e.contains('\n')));
-    let points = read.tracked_within(60.0, [0.0, 60.0]).err();
+    let points = read.tracked_within(60.0, Bounds::new(0.0, 60.0)).err();
     assert!(points.is_some_and(|e| e.to_string().contains("lacks tracks.csv")));
 }
 

@@ -173,7 +173,9 @@ fn leaves_swing_and_are_cut_out() {
         ..Model::bare(&skeleton, &mesh, BARK)
     };
     let camera = Camera::of_film(&skeleton, Size::new(1280, 720));
-    let [u, v] = skeleton.image_from_model(&skeleton.nodes[1].position);
+    let [u, v] = skeleton
+        .image_from_model(&skeleton.nodes[1].position)
+        .into();
     let green = |picture: &Rgba, dx: f64, dy: f64| {
         let [r, g, _, a] = picture.at((u + dx) as u32, (v + dy) as u32);
         a > 0 && g > r

@@ -269,7 +269,7 @@ fn another_shape_keeps_what_was_measured() {
     let mut names: Vec<&str> = rows.iter().map(|r| r[0].as_str()).collect();
     for (row, node) in rows.iter().zip(&read.skeleton.nodes[..measured]) {
         assert_eq!(row[0], node.name.0.to_string());
-        let [u, v] = read.skeleton.image_from_model(&node.position);
+        let [u, v] = read.skeleton.image_from_model(&node.position).into();
         let px = |c: usize| row[c].parse::<f64>().expect("px");
         assert!(
             (px(4) - u).abs() < 0.51 && (px(5) - v).abs() < 0.51,
@@ -298,7 +298,7 @@ fn another_shape_keeps_what_was_measured() {
     let pose = read.poses.iter().find(|p| p.frame == first).expect("pose");
     for (row, joint) in motion.lines().skip(1).zip(&pose.joints[..measured]) {
         let cells: Vec<f64> = row.split(',').map(|c| c.parse().expect("number")).collect();
-        let [u, v] = read.skeleton.image_from_model(&joint.position);
+        let [u, v] = read.skeleton.image_from_model(&joint.position).into();
         assert!(
             (cells[6] - u).hypot(cells[7] - v) < 8.0,
             "{row} was at {u}, {v}"
@@ -904,7 +904,7 @@ fn made_up() -> Skeleton {
     nodes[4].plane_angle = 1.1;
     Skeleton {
         nodes,
-        foot_px: [320.25, 340.5],
+        foot_px: [320.25, 340.5].into(),
         image_size: Size::new(640, 360),
     }
 }

@@ -10,6 +10,7 @@ use arborcam::model::{
     Excitation, Gap, Interval, MAX_GAPS, NodeId, NodeName, Observation, Sway, Timing, TrackId,
     TrackSet, Unidentified,
 };
+use nalgebra::Point2;
 use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
@@ -37,7 +38,7 @@ fn tracks_have_the_agreed_columns_and_an_empty_cell_where_no_node_is() {
     };
     csv.set(&set, |id| (id == TrackId(1)).then_some(NodeName(5)))
         .unwrap();
-    csv.row(TrackId(9), 4, 1.0 / 3.0, [f64::NAN, -0.0], None)
+    csv.row(TrackId(9), 4, 1.0 / 3.0, Point2::new(f64::NAN, -0.0), None)
         .unwrap();
     let expected = "track_id,frame,time_s,u_px,v_px,node_id\n1,3,0.1,10.25,7,5\n2,3,0.1,0,7,\n9,4,0.333333,,0,\n";
     assert_eq!(text(csv.finish().unwrap()), expected);

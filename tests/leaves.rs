@@ -32,7 +32,7 @@ const SIZE: Size = Size {
 /// Clumps of leaves about the tips of the branches that the front view shows, or none.
 fn still(in_leaf: bool) -> Still {
     let mut skeleton = synthetic::tree(6, 3);
-    (skeleton.foot_px, skeleton.image_size) = ([320.0, 470.0], SIZE);
+    (skeleton.foot_px, skeleton.image_size) = ([320.0, 470.0].into(), SIZE);
     for node in &mut skeleton.nodes {
         (node.position, node.radius) = (node.position * 0.8, node.radius * 0.8);
     }
@@ -67,8 +67,8 @@ fn still(in_leaf: bool) -> Still {
             let at = skeleton.image_from_model(
                 &(from.position + (to.position - from.position) * (k as f64 / 60.0)),
             );
-            disc(at, (0.7 * node.radius).max(0.7)).for_each(|i| pixels[i] = [96, 80, 68]);
-            disc(at, 22.0).for_each(|i| outside[i] = false);
+            disc(at.into(), (0.7 * node.radius).max(0.7)).for_each(|i| pixels[i] = [96, 80, 68]);
+            disc(at.into(), 22.0).for_each(|i| outside[i] = false);
         }
     }
     let mut leaf = vec![0.0; w * h];
@@ -121,6 +121,7 @@ impl Still {
 
     fn leaves(&self, settings: &Leaves) -> Foliage {
         let seeds = leaf_seeds(&self.picture, &self.outline, settings.seeds);
+        let seeds: Vec<_> = seeds.into_iter().map(Into::into).collect();
         foliage(
             &synthetic::limbs_of(&self.skeleton, &synthetic::bare()),
             &self.skeleton,
@@ -204,6 +205,7 @@ fn correlation(a: &[f64], b: &[f64], width: usize) -> f64 {
 fn better_than_chance(still: &Still, pose: Option<&Pose>, leaf: &[f32]) -> [f64; 3] {
     let settings = Leaves::default();
     let seeds = leaf_seeds(&still.picture, &still.outline, settings.seeds);
+    let seeds: Vec<_> = seeds.into_iter().map(Into::into).collect();
     let view = LeafView {
         pose,
         ..still.view(&seeds)

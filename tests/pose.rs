@@ -148,7 +148,7 @@ fn tree() -> Skeleton {
     }
     Skeleton {
         nodes,
-        foot_px: [200.0, 300.0],
+        foot_px: [200.0, 300.0].into(),
         image_size: Size::new(400, 320),
     }
 }
@@ -174,7 +174,7 @@ fn no_joint_turns_faster_or_farther_than_its_bounds_whatever_is_seen() {
     for k in 0..400u64 {
         let mut targets = Vec::new();
         for node in &tree.nodes[..4] {
-            let [u, v] = tree.image_from_model(&node.position);
+            let [u, v] = tree.image_from_model(&node.position).into();
             targets.push(
                 (chance.even() < 0.8)
                     .then(|| [u + 90.0 * chance.normal(), v + 90.0 * chance.normal()]),
@@ -207,7 +207,7 @@ fn targets_px(tree: &Skeleton, angle: f64) -> Vec<Option<[f64; 2]>> {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
     let (top, tip) = (tree.nodes[1].position, tree.nodes[2].position);
     [tree.nodes[0].position, top, top + turn * (tip - top)]
-        .map(|p| Some(tree.image_from_model(&p)))
+        .map(|p| Some(tree.image_from_model(&p).into()))
         .to_vec()
 }
 
@@ -313,10 +313,10 @@ fn swing_to_the_viewer(lean: f64, swing: f64, method: MotionMethod) -> Vec<(f64,
         let truth = top + towards_viewer(lean + swung) * way;
         let mut targets: Vec<_> = tree.nodes[..4]
             .iter()
-            .map(|n| Some(tree.image_from_model(&n.position)))
+            .map(|n| Some(tree.image_from_model(&n.position).into()))
             .collect();
         let target = tree.image_from_model(&truth);
-        (targets[2], targets[3]) = (Some(target), None);
+        (targets[2], targets[3]) = (Some(target.into()), None);
         let is = estimator.step(k, k as f64 / 30.0, &targets).joints[2].position;
         let seen = tree.image_from_model(&is);
         let beside = (seen[0] - target[0]).hypot(seen[1] - target[1]);

@@ -64,7 +64,7 @@ fn tree() -> Skeleton {
     }
     Skeleton {
         nodes,
-        foot_px: [320.0, 340.0],
+        foot_px: [320.0, 340.0].into(),
         image_size: Size::new(640, 360),
     }
 }
@@ -106,7 +106,7 @@ fn moved(tree: &Skeleton, frame: usize) -> Pose {
 fn on_branch(tree: &Skeleton, pose: &Pose, node: usize, share: f64) -> [f64; 2] {
     let parent = tree.nodes[node].parent.unwrap().index();
     let (from, to) = (pose.joints[parent].position, pose.joints[node].position);
-    tree.image_from_model(&(from + (to - from) * share))
+    tree.image_from_model(&(from + (to - from) * share)).into()
 }
 
 /// The tree's points: each branch's own, and where they rest.
@@ -129,7 +129,7 @@ fn points(tree: &Skeleton) -> (MotionHierarchy, BTreeMap<TrackId, [f64; 2]>) {
             parent: (n > 1).then(|| ClusterId(tree.nodes[n].parent.unwrap().0 - 1)),
             level: tree.nodes[n].level - 1,
             members: Vec::new(),
-            centroid_px: [0.0; 2],
+            centroid_px: [0.0; 2].into(),
             end_px: None,
             certainty: 1.0,
         });
@@ -276,7 +276,7 @@ fn the_pose_smooths_nothing_that_the_film_shows() {
         let targets: Vec<_> = truth
             .joints
             .iter()
-            .map(|j| Some(tree.image_from_model(&j.position)))
+            .map(|j| Some(tree.image_from_model(&j.position).into()))
             .collect();
         let pose = estimator.step(k as u64, truth.time_s, &targets);
         for (i, node) in tree.nodes.iter().enumerate() {

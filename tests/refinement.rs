@@ -56,8 +56,8 @@ fn names(tree: &Model) -> BTreeSet<NodeName> {
 fn places(tree: &Model, pose: &Pose) -> BTreeMap<NodeName, [f64; 3]> {
     let skeleton = &tree.skeleton;
     let place = |(n, j): (&arborcam::model::Node, &arborcam::model::JointPose)| {
-        let [u, v] = skeleton.image_from_model(&j.position);
-        (n.name, [u, v, j.position.z])
+        let at = skeleton.image_from_model(&j.position);
+        (n.name, [at.x, at.y, j.position.z])
     };
     skeleton.nodes.iter().zip(&pose.joints).map(place).collect()
 }

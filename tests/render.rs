@@ -98,7 +98,7 @@ fn the_front_view_lies_over_the_filmed_frame() {
         .skip(1)
         .filter(|(i, _)| !children[*i].is_empty())
     {
-        let [u, v] = captured.skeleton.image_from_model(&joint.position);
+        let [u, v] = captured.skeleton.image_from_model(&joint.position).into();
         let covered = (-3..=3).any(|dy| {
             (-3..=3).any(|dx| {
                 let (x, y) = (

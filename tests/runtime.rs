@@ -12,6 +12,7 @@ use arborcam::outline::{Given, Mark, Scribbles};
 use arborcam::pipeline::Pipeline;
 use arborcam::runtime::{self, Failure, Job, Pace, Running, Summary};
 use arborcam::source::{Source, SourceError, SourceInfo};
+use nalgebra::Point2;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::Path;
@@ -425,7 +426,7 @@ fn restart_starts_over_with_new_ids() {
 #[test]
 fn a_new_outline_is_used_and_a_bad_one_is_refused_in_words() {
     let dir = tempfile::tempdir().expect("tempdir");
-    let bad = Control::SetOutline(vec![[10.0, 10.0], [90.0, 90.0]]);
+    let bad = Control::SetOutline(vec![Point2::new(10.0, 10.0), Point2::new(90.0, 90.0)]);
     let (summary, warnings) = wish(20, &[bad], &dir.path().join("bad"));
     assert!(
         warnings.iter().any(|w| w.contains("at least 3")),
@@ -441,7 +442,8 @@ fn a_new_outline_is_used_and_a_bad_one_is_refused_in_words() {
         "what was followed is kept"
     );
 
-    let crown = vec![[240.0, 0.0], [480.0, 0.0], [480.0, 250.0], [240.0, 250.0]];
+    let crown = [[240.0, 0.0], [480.0, 0.0], [480.0, 250.0], [240.0, 250.0]];
+    let crown = crown.map(Point2::from).to_vec();
     let (summary, warnings) = wish(20, &[Control::SetOutline(crown)], &dir.path().join("good"));
     assert_eq!(warnings, Vec::<String>::new());
     assert_eq!(

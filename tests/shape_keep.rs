@@ -65,8 +65,8 @@ fn found_later(old: &Flat, seed: u64) -> (Flat, Vec<Option<Twin>>) {
     let chance = |k: usize, what: u64| ((k as u64 * 13 + what + 97 * seed) as f64 * 78.233).sin();
     let mut nodes = old.nodes.clone();
     for k in 2..nodes.len() {
-        let [u, v] = nodes[k].position_px;
-        nodes[k].position_px = [u + 6.0 * chance(k, 1), v + 6.0 * chance(k, 2)];
+        let [u, v] = nodes[k].position_px.into();
+        nodes[k].position_px = [u + 6.0 * chance(k, 1), v + 6.0 * chance(k, 2)].into();
         let grand = nodes[k]
             .parent
             .filter(|&p| p > 1)
@@ -86,9 +86,9 @@ fn found_later(old: &Flat, seed: u64) -> (Flat, Vec<Option<Twin>>) {
         })
         .collect();
     for k in (2..old.nodes.len()).filter(|&k| chance(k, 4) > 0.6) {
-        let [u, v] = nodes[k].position_px;
+        let [u, v] = nodes[k].position_px.into();
         for side in [-1.0, 1.0] {
-            let position_px = [u + side * 9.0, v - 14.0];
+            let position_px = [u + side * 9.0, v - 14.0].into();
             nodes.push(Node2d {
                 parent: Some(k),
                 level: nodes[k].level + 1,
@@ -225,15 +225,15 @@ fn no_branch_is_held_where_it_would_turn_back() {
         outline: Flat::generated(3).outline,
     };
     let foot = [
-        node(None, 0, [320.0, 340.0]),
-        node(Some(0), 1, [318.0, 260.0]),
+        node(None, 0, [320.0, 340.0].into()),
+        node(Some(0), 1, [318.0, 260.0].into()),
     ];
     // The limb's fork was taken to be high up, where it is low, with two branches that begin there.
     let of = |limb: [f64; 2]| {
         let crown = [
-            node(Some(1), 2, limb),
-            node(Some(2), 3, [280.0, 140.0]),
-            node(Some(2), 3, [360.0, 150.0]),
+            node(Some(1), 2, limb.into()),
+            node(Some(2), 3, [280.0, 140.0].into()),
+            node(Some(2), 3, [360.0, 150.0].into()),
         ];
         with(foot.iter().cloned().chain(crown).collect())
     };
@@ -249,11 +249,11 @@ fn no_branch_is_held_where_it_would_turn_back() {
         .collect();
     let GoesOn { tree, .. } = go_on(&after, &old, &measured);
     let fork = tree.image_from_model(&tree.nodes[2].position);
-    assert_eq!(fork, [318.0, 200.0]);
+    assert_eq!(fork, [318.0, 200.0].into());
     // A little sooner or later it ends where it ended.
     let near = of([318.0, 66.0]);
     let fork = go_on(&near, &old, &measured).tree.nodes[2].position;
-    assert_eq!(tree.image_from_model(&fork), [318.0, 60.0]);
+    assert_eq!(tree.image_from_model(&fork), [318.0, 60.0].into());
 }
 
 /// The tree that a clip's capture is written with has been refined or not; who takes it away shall

@@ -77,8 +77,8 @@ fn conifer() -> Flat {
         certainty: 0.5,
     };
     let mut nodes = vec![
-        node(None, 0, [100.0, 230.0]),
-        node(Some(0), 1, [100.0, 180.0]),
+        node(None, 0, [100.0, 230.0].into()),
+        node(Some(0), 1, [100.0, 180.0].into()),
     ];
     let mut at = 1;
     for step in 0..4u8 {
@@ -87,13 +87,13 @@ fn conifer() -> Flat {
             nodes.push(node(
                 Some(at),
                 step + 2,
-                [100.0 + side * (60.0 - 12.0 * f64::from(step)), v - 10.0],
+                [100.0 + side * (60.0 - 12.0 * f64::from(step)), v - 10.0].into(),
             ));
         }
         nodes.push(node(
             Some(at),
             step + 2,
-            [100.0 + f64::from(step), v - 35.0],
+            [100.0 + f64::from(step), v - 35.0].into(),
         ));
         at = nodes.len() - 1;
     }
@@ -212,11 +212,11 @@ fn trees_that_are_hardly_trees_are_stood_up_all_the_same() {
         position_px,
         certainty: 0.0,
     };
-    let foot = node(None, 0, [320.0, 340.0]);
-    let top = node(Some(0), 1, [320.0, 240.0]);
-    let nan = node(Some(1), 2, [f64::NAN, 100.0]);
-    let on_top = node(Some(1), 2, [320.0, 240.0]);
-    let beyond = node(Some(2), 3, [310.0, 200.0]);
+    let foot = node(None, 0, [320.0, 340.0].into());
+    let top = node(Some(0), 1, [320.0, 240.0].into());
+    let nan = node(Some(1), 2, [f64::NAN, 100.0].into());
+    let on_top = node(Some(1), 2, [320.0, 240.0].into());
+    let beyond = node(Some(2), 3, [310.0, 200.0].into());
     let nothing = Outline {
         mask: vec![0; outline.mask.len()],
         ..outline.clone()
@@ -262,7 +262,7 @@ proptest! {
             let parent = (i > 0).then(|| if i == 1 { 0 } else { 1 + parent % (i - 1) });
             let level = parent.map_or(0, |p| nodes[p].level + 1);
             let u = if broken && i % 5 == 4 { f64::INFINITY } else { u };
-            nodes.push(Node2d { parent, level, cluster: None, position_px: [u, v], certainty: 0.5 });
+            nodes.push(Node2d { parent, level, cluster: None, position_px: [u, v].into(), certainty: 0.5 });
         }
         let settings = config::Shape { planes, attractors: 40, passes: 2, push_options: 7, ..config::Shape::default() };
         let model = shape::build(&nodes, &vec![1; nodes.len()], &Flat::generated(2).outline, &settings);

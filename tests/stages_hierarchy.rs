@@ -4,17 +4,18 @@ use arborcam::config::{Accumulate, Affinity, Hierarchy};
 use arborcam::hierarchy;
 use arborcam::model::TrackTable;
 use arborcam::model::{Cluster, MotionHierarchy, TrackId};
+use nalgebra::Point2;
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
-const FOOT: [f64; 2] = [150.0, 300.0];
+const FOOT: Point2<f64> = Point2::new(150.0, 300.0);
 /// Parent, joint and tip of every branch, px; the trunk is its own parent.
-const BRANCHES: [(usize, [f64; 2], [f64; 2]); 5] = [
-    (0, FOOT, [150.0, 60.0]),
-    (0, [150.0, 220.0], [60.0, 150.0]),
-    (0, [150.0, 170.0], [215.0, 120.0]),
-    (2, [215.0, 120.0], [215.0, 40.0]),
-    (2, [215.0, 120.0], [280.0, 110.0]),
+const BRANCHES: [(usize, Point2<f64>, Point2<f64>); 5] = [
+    (0, FOOT, Point2::new(150.0, 60.0)),
+    (0, Point2::new(150.0, 220.0), Point2::new(60.0, 150.0)),
+    (0, Point2::new(150.0, 170.0), Point2::new(215.0, 120.0)),
+    (2, Point2::new(215.0, 120.0), Point2::new(215.0, 40.0)),
+    (2, Point2::new(215.0, 120.0), Point2::new(280.0, 110.0)),
 ];
 
 /// What the wind or a release does to a branch: an angle in radians at a time in seconds.
@@ -58,26 +59,24 @@ fn along(i: usize) -> f64 {
 }
 
 /// Where point `i`, which is on `branch`, is at a time, px.
-fn place_px(i: usize, mut branch: usize, sway: Sway, time_s: f64) -> [f64; 2] {
+fn place_px(i: usize, mut branch: usize, sway: Sway, time_s: f64) -> Point2<f64> {
     let along = along(i);
     let (_, joint, tip) = BRANCHES[branch];
-    let mut at = [
-        joint[0] + along * (tip[0] - joint[0]) + 3.0 * noise(i),
-        joint[1] + along * (tip[1] - joint[1]),
-    ];
+    let mut at = joint + along * (tip - joint);
+    at.x += 3.0 * noise(i);
     loop {
         let (parent, joint, _) = BRANCHES[branch];
         let (sin, cos) = sway(branch, time_s).sin_cos();
-        let d = [at[0] - joint[0], at[1] - joint[1]];
+        let d = at - joint;
         if branch == 0 {
             // A trunk bends: what is higher moves farther, and all to the same side.
-            at[0] -= sin * d[1];
+            at.x -= sin * d.y;
             return at;
         }
-        at = [
-            joint[0] + cos * d[0] - sin * d[1],
-            joint[1] + sin * d[0] + cos * d[1],
-        ];
+        at = Point2::new(
+            joint.x + cos * d.x - sin * d.y,
+            joint.y + sin * d.x + cos * d.y,
+        );
         branch = parent;
     }
 }
@@ -96,7 +95,7 @@ fn tree(points: usize, sway: Sway, noise_px: f64) -> (TrackTable, Vec<usize>) {
             let shaken = [0, 1].map(|c| at[c] + noise_px * noise(2 * (i * 1000 + k) + c));
             // Now and then a point is not seen.
             let seen = !(i * 31 + k).is_multiple_of(37);
-            path.push(seen.then_some(shaken.map(|x| x as f32)));
+            path.push(seen.then_some(Point2::from(shaken).cast()));
         }
         positions.push(path);
     }
@@ -161,8 +160,8 @@ fn assert_sound(tree: &MotionHierarchy, settings: &Hierarchy) {
     }
 }
 
-fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
+fn distance(a: Point2<f64>, b: Point2<f64>) -> f64 {
+    (a.x - b.x).hypot(a.y - b.y)
 }
 
 /// The way of point `i` from the foot: the branches that it leads along, and how far, px.
@@ -356,13 +355,13 @@ fn the_same_tracks_give_the_same_tree() {
 }
 
 /// Where point `i` is in frame `k`, of five kinds of nonsense.
-fn useless_px(kind: usize, i: usize, k: usize) -> Option<[f32; 2]> {
+fn useless_px(kind: usize, i: usize, k: usize) -> Option<Point2<f32>> {
     match kind {
         0 => None,
-        1 => Some([5.0, 5.0]),
-        2 => (k == i).then_some([1.0, 2.0]),
-        3 => Some([1e7 + i as f32, k as f32 * 1e6]),
-        _ => Some([f32::NAN, f32::INFINITY]),
+        1 => Some(Point2::new(5.0, 5.0)),
+        2 => (k == i).then_some(Point2::new(1.0, 2.0)),
+        3 => Some(Point2::new(1e7 + i as f32, k as f32 * 1e6)),
+        _ => Some(Point2::new(f32::NAN, f32::INFINITY)),
     }
 }
 

@@ -7,7 +7,7 @@ use arborcam::model::{Cluster, ClusterId, MotionHierarchy, Outline, Size, Skelet
 use arborcam::motion::{PoseEstimator, Problem, deterministic_direction};
 use arborcam::shape::{self, Envelope, Terms};
 use arborcam::skeleton::{self, Node2d};
-use nalgebra::{Point3, Rotation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Point2, Point3, Rotation3, Unit, UnitQuaternion, Vector2, Vector3};
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -33,19 +33,19 @@ fn outline() -> Outline {
 }
 
 /// Where point `i` of [`pendulums`] is.
-fn pendulum_px(i: usize, time_s: f64) -> [f32; 2] {
+fn pendulum_px(i: usize, time_s: f64) -> Point2<f32> {
     let (column, row) = (i % 10 % 5, i / 10);
-    let left = [
+    let left = Point2::new(
         60.0 + 8.0 * column as f64,
         60.0 + 12.0 * (row % 2) as f64 + 6.0 * (i % 2) as f64,
-    ];
+    );
     let (rest, hz) = match row {
         0 | 1 => (left, 1.1),
-        2 | 3 => ([left[0] + 60.0, left[1]], 1.6),
-        _ => ([100.0, 40.0 + 8.0 * (i % 10) as f64], 0.0),
+        2 | 3 => (left + Vector2::new(60.0, 0.0), 1.6),
+        _ => (Point2::new(100.0, 40.0 + 8.0 * (i % 10) as f64), 0.0),
     };
-    let u = rest[0] + 5.0 * (TAU * hz * time_s).sin();
-    [u as f32, rest[1] as f32]
+    let u = rest.x + 5.0 * (TAU * hz * time_s).sin();
+    Point2::new(u as f32, rest.y as f32)
 }
 
 /// Two pendulums side by side, of 1.1 and 1.6 Hz, 20 points each, and 10 points between them that
@@ -79,7 +79,7 @@ fn what_moves_differently_is_cut_apart_and_what_stands_still_takes_no_part() {
     let tree = hierarchy::build(
         &table,
         &evidence.moving,
-        [100.0, 230.0],
+        Point2::new(100.0, 230.0),
         &config::Hierarchy::default(),
     );
     let first: Vec<&Cluster> = tree.clusters.iter().filter(|c| c.level == 1).collect();
@@ -100,7 +100,7 @@ fn what_moves_differently_is_cut_apart_and_what_stands_still_takes_no_part() {
     }
 }
 
-fn cluster(parent: Option<u32>, level: u8, centroid_px: [f64; 2]) -> Cluster {
+fn cluster(parent: Option<u32>, level: u8, centroid_px: Point2<f64>) -> Cluster {
     Cluster {
         parent: parent.map(ClusterId),
         level,
@@ -115,13 +115,13 @@ fn cluster(parent: Option<u32>, level: u8, centroid_px: [f64; 2]) -> Cluster {
 fn hierarchy_of_seven() -> MotionHierarchy {
     MotionHierarchy {
         clusters: vec![
-            cluster(None, 0, [100.0, 130.0]),
-            cluster(Some(0), 1, [70.0, 90.0]),
-            cluster(Some(0), 1, [130.0, 90.0]),
-            cluster(Some(1), 2, [55.0, 70.0]),
-            cluster(Some(1), 2, [85.0, 60.0]),
-            cluster(Some(2), 2, [120.0, 50.0]),
-            cluster(Some(2), 2, [150.0, 85.0]),
+            cluster(None, 0, Point2::new(100.0, 130.0)),
+            cluster(Some(0), 1, Point2::new(70.0, 90.0)),
+            cluster(Some(0), 1, Point2::new(130.0, 90.0)),
+            cluster(Some(1), 2, Point2::new(55.0, 70.0)),
+            cluster(Some(1), 2, Point2::new(85.0, 60.0)),
+            cluster(Some(2), 2, Point2::new(120.0, 50.0)),
+            cluster(Some(2), 2, Point2::new(150.0, 85.0)),
         ],
     }
 }
@@ -172,7 +172,7 @@ fn built() -> Skeleton {
 #[test]
 fn the_tree_in_space_stays_in_its_envelope_on_one_trunk() {
     let (tree, settings) = (built(), config::Shape::default());
-    let envelope = Envelope::of_revolution(&outline(), tree.foot_px);
+    let envelope = Envelope::of_revolution(&outline(), tree.foot_px.into());
     for (i, node) in tree.nodes.iter().enumerate() {
         assert!(
             envelope.contains(&node.position),
@@ -204,7 +204,7 @@ fn the_tree_in_space_stays_in_its_envelope_on_one_trunk() {
 #[test]
 fn attractors_lie_on_the_surface() {
     let foot = skeleton::Foot::of(&outline(), None).position_px;
-    let envelope = Envelope::of_revolution(&outline(), foot);
+    let envelope = Envelope::of_revolution(&outline(), foot.into());
     let points = envelope.attractors(256);
     assert_eq!(points.len(), 256);
     for p in &points {
@@ -235,8 +235,10 @@ fn attractors_lie_on_the_surface() {
 #[test]
 fn pushing_brings_the_tree_nearer_to_its_envelope() {
     let (settings, outline) = (config::Shape::default(), outline());
-    let envelope =
-        Envelope::of_revolution(&outline, skeleton::Foot::of(&outline, None).position_px);
+    let envelope = Envelope::of_revolution(
+        &outline,
+        skeleton::Foot::of(&outline, None).position_px.into(),
+    );
     let trunk = shape::trunk(&flat(), config::Leader::None, &[]);
     let prototype = shape::copy_to_planes(
         &flat(),
@@ -280,7 +282,9 @@ fn swung(tree: &Skeleton, axis: Vector3<f64>, angle: f64) -> Vec<Point3<f64>> {
 }
 
 fn seen(tree: &Skeleton, at: &[Point3<f64>]) -> Vec<Option<[f64; 2]>> {
-    at.iter().map(|p| Some(tree.image_from_model(p))).collect()
+    at.iter()
+        .map(|p| Some(tree.image_from_model(p).into()))
+        .collect()
 }
 
 fn settings(method: config::MotionMethod) -> config::Motion {
@@ -293,7 +297,7 @@ fn settings(method: config::MotionMethod) -> config::Motion {
 /// Where node `i` is seen in frame `k`, if it is: jumping about, and missing in every fifth.
 fn wild_px(tree: &Skeleton, i: usize, k: u64) -> Option<[f64; 2]> {
     let [du, dv] = [1.3, 2.1].map(|a| 60.0 * (i as f64 * 3.7 + k as f64 * a).sin());
-    let [u, v] = tree.image_from_model(&tree.nodes[i].position);
+    let [u, v] = tree.image_from_model(&tree.nodes[i].position).into();
     (!(i as u64 + k).is_multiple_of(5)).then_some([u + du, v + dv])
 }
 

@@ -24,6 +24,7 @@ pub use sway::Columns;
 pub use table::{TableWriter, unit};
 pub use tracks::{TRACKS_HEADER, TracksCsv, tracks_of};
 
+use crate::bounds::Bounds;
 use crate::config::Config;
 use crate::dynamics::Film;
 use crate::model::{Outline, Picture, Pose, Size, Skeleton, Swaying, Unidentified};
@@ -252,7 +253,7 @@ impl Document {
     ///
     /// # Errors
     /// `tracks.csv` is missing or damaged.
-    pub fn tracked_within(&self, window_s: f64, within_s: [f64; 2]) -> Result<Film, DocumentError> {
+    pub fn tracked_within(&self, window_s: f64, within_s: Bounds) -> Result<Film, DocumentError> {
         if !self.has_tracks() {
             return Err(self.no_film(tracks::FILE));
         }
@@ -316,9 +317,9 @@ impl Reposer {
     /// The pose of the other tree; poses must come in the order of time.
     pub fn pose(&mut self, pose: &Pose) -> Pose {
         let joints = &pose.joints[..self.measured];
-        let targets_px: Vec<Option<[f64; 2]>> = joints
+        let targets_px: Vec<_> = joints
             .iter()
-            .map(|joint| Some(self.from.image_from_model(&joint.position)))
+            .map(|joint| Some(self.from.image_from_model(&joint.position).into()))
             .collect();
         self.estimator.step(pose.frame, pose.time_s, &targets_px)
     }

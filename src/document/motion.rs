@@ -58,8 +58,8 @@ impl<W: Write> MotionCsv<W> {
                 .for_each(|x| self.table.number(x * self.scale, self.decimals));
             self.skeleton
                 .image_from_model(&joint.position)
-                .into_iter()
-                .for_each(|x| self.table.number(x, 3));
+                .iter()
+                .for_each(|x| self.table.number(*x, 3));
             self.table.end_row()?;
         }
         Ok(())

@@ -60,8 +60,8 @@ pub fn nodes<W: Write>(
         table.id(node.parent.and_then(|p| skeleton.name_of(p)));
         table.count(node.level);
         table.count(node.n_tracks);
-        for px in skeleton.image_from_model(&node.position) {
-            table.number(px, 3);
+        for px in skeleton.image_from_model(&node.position).iter() {
+            table.number(*px, 3);
         }
         for length in node.position.iter().chain([&node.radius]) {
             table.number(length * scale, 4 + more);
@@ -158,7 +158,7 @@ impl<R: Read> NodeRows<R> {
         Ok(NodesRead {
             skeleton: Skeleton {
                 nodes: self.nodes,
-                foot_px: note.foot_px,
+                foot_px: note.foot_px.into(),
                 image_size,
             },
             sway: self.sway,

@@ -173,7 +173,7 @@ impl ModelNote {
                 .into(),
             unit: if metres_per_px > 0.0 { "m" } else { "px" }.into(),
             metres_per_px,
-            foot_px: skeleton.foot_px,
+            foot_px: skeleton.foot_px.into(),
             push: None,
         }
     }

@@ -2,10 +2,12 @@
 
 use super::error::DocumentError;
 use super::table::{TableReader, TableWriter};
+use crate::bounds::Bounds;
 use crate::dynamics::Film;
 use crate::files::{OutputFolder, WriteError};
 use crate::model::{NodeId, NodeName, Observation, Skeleton, TrackId, TrackLog, TrackSet};
 use csv::{ReaderBuilder, StringRecord, Writer};
+use nalgebra::Point2;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
 use std::path::Path;
@@ -34,13 +36,13 @@ impl<W: Write> TracksCsv<W> {
         track: TrackId,
         frame: u64,
         time_s: f64,
-        position_px: [f64; 2],
+        position_px: Point2<f64>,
         node: Option<NodeName>,
     ) -> Result<(), WriteError> {
         self.0.count(track.0);
         self.0.count(frame);
         self.0.number(time_s, 6);
-        position_px.into_iter().for_each(|x| self.0.number(x, 3));
+        position_px.iter().for_each(|x| self.0.number(*x, 3));
         self.0.id(node);
         self.0.end_row()
     }
@@ -59,7 +61,7 @@ impl<W: Write> TracksCsv<W> {
                 o.id,
                 set.frame,
                 set.time_s,
-                [o.u_px.into(), o.v_px.into()],
+                Point2::new(o.u_px, o.v_px).cast(),
                 node_of(o.id),
             )?;
         }
@@ -87,7 +89,7 @@ pub(super) fn read_film(
     dir: &Path,
     skeleton: &Skeleton,
     window_s: f64,
-    [from_s, to_s]: [f64; 2],
+    within_s: Bounds,
 ) -> Result<Film, DocumentError> {
     let mut table = TableReader::open(dir, FILE, COLUMNS)?;
     let by_name: BTreeMap<NodeName, NodeId> = skeleton
@@ -116,7 +118,7 @@ pub(super) fn read_film(
         }
         // A point that is nowhere has no place, as it was not seen.
         let [u_px, v_px] = [table.cell(3), table.cell(4)].map(|c| c.parse().unwrap_or(f32::NAN));
-        if from_s <= time_s && time_s <= to_s {
+        if within_s.contains(time_s) {
             observations.push(Observation {
                 id,
                 u_px,

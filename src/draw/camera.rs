@@ -245,13 +245,13 @@ mod tests {
     fn the_films_camera_puts_a_node_on_its_own_pixel() {
         let skeleton = Skeleton {
             nodes: Vec::new(),
-            foot_px: [325.5, 336.0],
+            foot_px: [325.5, 336.0].into(),
             image_size: Size::new(640, 360),
         };
         // Twice as large, with bars above and below.
         let camera = Camera::of_film(&skeleton, Size::new(1280, 800));
         let p = Point3::new(8.0, 78.0, 5.0);
-        let [u, v] = skeleton.image_from_model(&p);
+        let [u, v] = skeleton.image_from_model(&p).into();
         let [x, y, _] = camera.project(&p);
         assert!(
             (x - 2.0 * (u + 0.5)).abs() < 1e-9 && (y - 40.0 - 2.0 * (v + 0.5)).abs() < 1e-9,

@@ -165,7 +165,7 @@ mod tests {
         }
         Skeleton {
             nodes,
-            foot_px: [0.0, 0.0],
+            foot_px: [0.0, 0.0].into(),
             image_size: Size {
                 width: 64,
                 height: 64,

@@ -119,7 +119,9 @@ pub(super) fn from_the_trunk_up(
             node,
             parent,
             tracks,
-            base_px: skeleton.image_from_model(&skeleton.nodes[parent.index()].position),
+            base_px: skeleton
+                .image_from_model(&skeleton.nodes[parent.index()].position)
+                .into(),
         });
     }
     out

@@ -83,7 +83,7 @@ impl Data {
             software: format!("{} {}", capture.software.name, capture.software.version),
             metres_per_px,
             image: [size.width, size.height],
-            foot_px: skeleton.foot_px,
+            foot_px: skeleton.foot_px.into(),
             outline_px: capture
                 .outline
                 .as_ref()
@@ -187,7 +187,7 @@ mod tests {
         }
         let skeleton = Skeleton {
             nodes,
-            foot_px: [0.0; 2],
+            foot_px: [0.0; 2].into(),
             image_size: Size::new(64, 48),
         };
         let page = branches(&skeleton, &[], &[]);

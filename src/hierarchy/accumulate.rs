@@ -1,10 +1,10 @@
 //! When enough motion has been seen to build the tree, judged from the tracks alone.
 
-use super::rest::distance_sq;
 use super::signals::Signals;
 use crate::config::Accumulate;
 use crate::model::TrackTable;
 use crate::signal::{along_principal_direction, median};
+use nalgebra::{Point2, Vector2};
 
 /// Rate at which tracks are compared, Hz: velocities over longer steps stand out better from
 /// tracking noise.
@@ -77,17 +77,18 @@ pub fn evidence(table: &TrackTable, settings: &Accumulate) -> Evidence {
 
 /// Root mean square distance of a track from its mean position, px.
 fn displacement_px(table: &TrackTable, row: usize) -> f64 {
-    let seen: Vec<[f64; 2]> = table.positions[row]
+    let seen: Vec<Point2<f64>> = table.positions[row]
         .iter()
         .flatten()
-        .map(|p| p.map(f64::from))
+        .map(|p| p.cast())
         .collect();
     let n = seen.len() as f64;
     if n < 4.0 {
         return 0.0;
     }
-    let mean = [0, 1].map(|c| seen.iter().map(|p| p[c]).sum::<f64>() / n);
-    let sum_sq: f64 = seen.iter().map(|&p| distance_sq(p, mean)).sum();
+    let sum: Vector2<f64> = seen.iter().map(|p| p.coords).sum();
+    let mean = Point2::from(sum / n);
+    let sum_sq: f64 = seen.iter().map(|p| (p - mean).norm_squared()).sum();
     (sum_sq / n).sqrt()
 }
 
@@ -99,12 +100,12 @@ fn noise_px(table: &TrackTable, row: usize) -> f64 {
 /// How often the mean of the moving points has swung to and fro along its principal direction.
 fn sways(table: &TrackTable, moving: &[usize]) -> f64 {
     let steps = Signals::velocities(table, moving, |_| true).mean();
-    let mut at = [0.0; 2];
-    let path: Vec<[f64; 2]> = steps
+    let mut at = Vector2::zeros();
+    let path: Vec<_> = steps
         .iter()
         .map(|v| {
-            at = [at[0] + v[0], at[1] + v[1]];
-            at
+            at += v;
+            at.into()
         })
         .collect();
     let along = along_principal_direction(&path);

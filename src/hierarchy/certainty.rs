@@ -2,6 +2,7 @@
 
 use super::dendrogram::Dendrogram;
 use super::signals::Signals;
+use nalgebra::Vector2;
 
 /// Time over which one vote is taken, s: longer than the slowest tracking error, shorter than most
 /// periods.
@@ -45,7 +46,7 @@ struct Sums {
     /// Number of points.
     points: f32,
     /// Of their motion, step by step.
-    motion: Vec<[f32; 2]>,
+    motion: Vec<Vector2<f32>>,
     /// Of their energies, vote by vote.
     energy: Vec<f32>,
 }
@@ -54,7 +55,7 @@ impl Sums {
     fn of(points: &[usize], signals: &Signals, votes: &Votes) -> Self {
         let mut sums = Self {
             points: 0.0,
-            motion: vec![[0.0; 2]; signals.steps()],
+            motion: vec![Vector2::zeros(); signals.steps()],
             energy: vec![0.0; votes.count],
         };
         for &point in points {
@@ -71,7 +72,7 @@ impl Sums {
     fn add(&mut self, other: &Self) {
         self.points += other.points;
         for (sum, more) in self.motion.iter_mut().zip(&other.motion) {
-            *sum = [sum[0] + more[0], sum[1] + more[1]];
+            *sum += more;
         }
         for (sum, more) in self.energy.iter_mut().zip(&other.energy) {
             *sum += more;
@@ -145,10 +146,10 @@ impl Votes {
     }
 
     /// Sums of the products of two motions, vote by vote.
-    fn products(&self, a: &[[f32; 2]], b: &[[f32; 2]]) -> Vec<f32> {
+    fn products(&self, a: &[Vector2<f32>], b: &[Vector2<f32>]) -> Vec<f32> {
         let mut out = vec![0.0; self.count];
         for ((x, y), &vote) in a.iter().zip(b).zip(&self.of_step) {
-            out[vote] += x[0] * y[0] + x[1] * y[1];
+            out[vote] += x.dot(y);
         }
         out
     }
@@ -159,12 +160,13 @@ mod tests {
     use super::*;
     use crate::model::TrackId;
     use crate::model::TrackTable;
+    use nalgebra::Point2;
 
-    fn place_px(point: usize, time_s: f64) -> [f32; 2] {
+    fn place_px(point: usize, time_s: f64) -> Point2<f32> {
         let noise = (((point * 7919) as f64 + time_s * 78.233).sin() * 43758.5453).fract();
         let rate = if point < 2 { 0.3 } else { 0.7 };
         let u = 100.0 * point as f64 + 5.0 * (rate * time_s).sin() + noise;
-        [u as f32, 50.0]
+        Point2::new(u as f32, 50.0)
     }
 
     /// Two pairs of points that swing at different rates, seen at `times_s`, and how sure it is

@@ -2,8 +2,9 @@
 
 use super::cut::Node;
 use super::dendrogram::Dendrogram;
-use super::rest::{centroid, crown_begins, distance_sq};
+use super::rest::{centroid, crown_begins};
 use super::root_paths::Edge;
+use nalgebra::Point2;
 
 /// Points of a path over which its end is averaged: one alone may sit on either edge of its
 /// branch.
@@ -28,19 +29,19 @@ pub fn ends_px(
     nodes: &[Node],
     tree: &Dendrogram,
     edges: &[Edge],
-    rest_px: &[[f64; 2]],
-    foot_px: [f64; 2],
-) -> Vec<[f64; 2]> {
+    rest_px: &[Point2<f64>],
+    foot_px: Point2<f64>,
+) -> Vec<Point2<f64>> {
     let farthest = rest_px
         .iter()
-        .map(|&p| distance_sq(p, foot_px))
+        .map(|p| (p - foot_px).norm_squared())
         .fold(1.0, f64::max)
         .sqrt();
     let paths: Vec<Vec<usize>> = nodes
         .iter()
         .map(|n| path_to(tree.points(n.part), edges))
         .collect();
-    let mut ends: Vec<[f64; 2]> = Vec::with_capacity(nodes.len());
+    let mut ends: Vec<Point2<f64>> = Vec::with_capacity(nodes.len());
     for (k, node) in nodes.iter().enumerate() {
         if k == 0
             && let Some(top) = crown_begins(rest_px, foot_px)
@@ -59,11 +60,13 @@ pub fn ends_px(
         };
         let last = &path[path.len().saturating_sub(EVENED)..];
         let end = centroid(rest_px, last);
-        let far_enough = !last.is_empty() && distance_sq(end, begin).sqrt() >= SHORTEST * farthest;
+        let far_enough = !last.is_empty() && (end - begin).norm() >= SHORTEST * farthest;
         ends.push(if far_enough {
             end
         } else if children.is_empty() {
-            outermost(tree.points(node.part), rest_px, |p| -distance_sq(p, begin))
+            outermost(tree.points(node.part), rest_px, |p| {
+                -(p - begin).norm_squared()
+            })
         } else {
             fork_by_distance(&children, nodes, tree, rest_px, begin)
         });
@@ -129,20 +132,24 @@ fn fork_by_distance(
     children: &[usize],
     nodes: &[Node],
     tree: &Dendrogram,
-    rest_px: &[[f64; 2]],
-    begin: [f64; 2],
-) -> [f64; 2] {
-    let mut begins: Vec<[f64; 2]> = Vec::with_capacity(children.len());
+    rest_px: &[Point2<f64>],
+    begin: Point2<f64>,
+) -> Point2<f64> {
+    let mut begins: Vec<Point2<f64>> = Vec::with_capacity(children.len());
     for &child in children {
         let points = tree.points(nodes[child].part);
-        begins.push(outermost(points, rest_px, |p| distance_sq(p, begin)));
+        begins.push(outermost(points, rest_px, |p| (p - begin).norm_squared()));
     }
     let all: Vec<usize> = (0..begins.len()).collect();
     centroid(&begins, &all)
 }
 
 /// Mean of the points of least `rank`.
-fn outermost(points: &[usize], rest_px: &[[f64; 2]], rank: impl Fn([f64; 2]) -> f64) -> [f64; 2] {
+fn outermost(
+    points: &[usize],
+    rest_px: &[Point2<f64>],
+    rank: impl Fn(Point2<f64>) -> f64,
+) -> Point2<f64> {
     let mut points = points.to_vec();
     points.sort_by(|&a, &b| rank(rest_px[a]).total_cmp(&rank(rest_px[b])));
     points.truncate(((SHARE * points.len() as f64) as usize).max(LEAST));
@@ -153,16 +160,17 @@ fn outermost(points: &[usize], rest_px: &[[f64; 2]], rank: impl Fn([f64; 2]) -> 
 mod tests {
     use super::super::dendrogram::Part;
     use super::*;
+    use nalgebra::Vector2;
 
-    const FOOT: [f64; 2] = [100.0, 200.0];
+    const FOOT: Point2<f64> = Point2::new(100.0, 200.0);
 
     /// A limb for each entry: the point from which it leaves (`None`: the foot), its points, and
     /// whether they are a branch.
-    type Limb<'a> = (Option<usize>, &'a [[f64; 2]], bool);
+    type Limb<'a> = (Option<usize>, &'a [Point2<f64>], bool);
 
     /// Ends of a tree whose root holds all points, and which has a child for each limb that is a
     /// branch.
-    fn ends(foot_px: [f64; 2], limbs: &[Limb]) -> Vec<[f64; 2]> {
+    fn ends(foot_px: Point2<f64>, limbs: &[Limb]) -> Vec<Point2<f64>> {
         let (mut rest_px, mut edges, mut branches) = (Vec::new(), Vec::new(), Vec::new());
         for &(mut from, points, is_branch) in limbs {
             let first = rest_px.len();
@@ -200,19 +208,17 @@ mod tests {
         ends_px(&nodes, &tree, &edges, &rest_px, foot_px)
     }
 
-    fn line(from: [f64; 2], step: [f64; 2], n: usize) -> Vec<[f64; 2]> {
-        (0..n)
-            .map(|k| [from[0] + step[0] * k as f64, from[1] + step[1] * k as f64])
-            .collect()
+    fn line(from: Point2<f64>, step: Vector2<f64>, n: usize) -> Vec<Point2<f64>> {
+        (0..n).map(|k| from + step * k as f64).collect()
     }
 
     /// Else the picture would show a fork in the air between two limbs.
     #[test]
     fn a_fork_lies_on_the_stem_and_tips_on_their_limbs() {
-        let trunk = line([100.0, 190.0], [0.0, -10.0], 8);
+        let trunk = line(Point2::new(100.0, 190.0), Vector2::new(0.0, -10.0), 8);
         let (left, right) = (
-            line([90.0, 110.0], [-10.0, -10.0], 6),
-            line([110.0, 112.0], [12.0, -8.0], 6),
+            line(Point2::new(90.0, 110.0), Vector2::new(-10.0, -10.0), 6),
+            line(Point2::new(110.0, 112.0), Vector2::new(12.0, -8.0), 6),
         );
         let ends = ends(
             FOOT,
@@ -224,17 +230,17 @@ mod tests {
         );
         assert_eq!(ends.len(), 3);
         assert!(
-            ends[0][0] == 100.0 && (115.0..140.0).contains(&ends[0][1]),
+            ends[0].x == 100.0 && (115.0..140.0).contains(&ends[0].y),
             "fork: {:?}",
             ends[0]
         );
         let (tip, near) = (ends[1], left[4]);
         assert!(
-            (tip[0] - near[0]).hypot(tip[1] - near[1]) < 1e-9,
+            (tip.x - near.x).hypot(tip.y - near.y) < 1e-9,
             "left tip: {tip:?}"
         );
         assert!(
-            (ends[2][0] - right[4][0]).hypot(ends[2][1] - right[4][1]) < 1e-9,
+            (ends[2].x - right[4].x).hypot(ends[2].y - right[4].y) < 1e-9,
             "right tip: {:?}",
             ends[2]
         );
@@ -244,9 +250,9 @@ mod tests {
     /// nothing parts.
     #[test]
     fn a_low_branch_leaves_the_trunk_where_it_does_and_not_halfway_up_the_crown() {
-        let trunk = line([100.0, 190.0], [0.0, -10.0], 4);
-        let low = line([90.0, 158.0], [-10.0, -3.0], 5);
-        let above = line([100.0, 150.0], [0.0, -10.0], 14);
+        let trunk = line(Point2::new(100.0, 190.0), Vector2::new(0.0, -10.0), 4);
+        let low = line(Point2::new(90.0, 158.0), Vector2::new(-10.0, -3.0), 5);
+        let above = line(Point2::new(100.0, 150.0), Vector2::new(0.0, -10.0), 14);
         let ends = ends(
             FOOT,
             &[
@@ -256,12 +262,12 @@ mod tests {
             ],
         );
         assert!(
-            ends[0][0] == 100.0 && (158.0..182.0).contains(&ends[0][1]),
+            ends[0].x == 100.0 && (158.0..182.0).contains(&ends[0].y),
             "fork: {:?}",
             ends[0]
         );
         assert!(
-            ends[2][1] < 40.0,
+            ends[2].y < 40.0,
             "the crown goes on to its top: {:?}",
             ends[2]
         );
@@ -270,12 +276,12 @@ mod tests {
     #[test]
     fn a_trunk_without_points_ends_where_the_crown_begins() {
         let (left, right) = (
-            line([90.0, 100.0], [-8.0, -8.0], 6),
-            line([110.0, 100.0], [8.0, -8.0], 6),
+            line(Point2::new(90.0, 100.0), Vector2::new(-8.0, -8.0), 6),
+            line(Point2::new(110.0, 100.0), Vector2::new(8.0, -8.0), 6),
         );
         let ends = ends(FOOT, &[(None, &left, true), (None, &right, true)]);
         assert!(
-            (ends[0][0] - 100.0).abs() < 1.0 && (90.0..=110.0).contains(&ends[0][1]),
+            (ends[0].x - 100.0).abs() < 1.0 && (90.0..=110.0).contains(&ends[0].y),
             "top: {:?}",
             ends[0]
         );
@@ -285,10 +291,10 @@ mod tests {
     #[test]
     fn no_branch_ends_where_it_begins() {
         // The path to the right branch is known from its first points alone, right at the fork.
-        let trunk = line([100.0, 190.0], [0.0, -10.0], 8);
+        let trunk = line(Point2::new(100.0, 190.0), Vector2::new(0.0, -10.0), 8);
         let (left, right) = (
-            line([90.0, 110.0], [-10.0, -10.0], 6),
-            [[101.0, 121.0], [99.0, 119.0], [104.0, 90.0]],
+            line(Point2::new(90.0, 110.0), Vector2::new(-10.0, -10.0), 6),
+            [[101.0, 121.0], [99.0, 119.0], [104.0, 90.0]].map(Point2::from),
         );
         let ends = ends(
             FOOT,
@@ -300,7 +306,7 @@ mod tests {
         );
         for tip in &ends[1..] {
             assert!(
-                (tip[0] - ends[0][0]).hypot(tip[1] - ends[0][1]) > 10.0,
+                (tip.x - ends[0].x).hypot(tip.y - ends[0].y) > 10.0,
                 "{tip:?} at the fork {:?}",
                 ends[0]
             );

@@ -35,6 +35,7 @@ use crate::model::{Cluster, ClusterId, MotionHierarchy, TrackId, TrackTable};
 use agreement::in_agreement;
 use cut::{MIN_SIDE, cut_dendrogram};
 use dendrogram::Dendrogram;
+use nalgebra::Point2;
 use rest::centroid;
 use signals::Signals;
 
@@ -43,7 +44,7 @@ use signals::Signals;
 pub fn build(
     table: &TrackTable,
     moving: &[usize],
-    foot_px: [f64; 2],
+    foot_px: Point2<f64>,
     settings: &Hierarchy,
 ) -> MotionHierarchy {
     let points = Points::in_agreement(table, moving, settings.agreement);
@@ -95,13 +96,13 @@ pub fn build(
 struct Points {
     /// Their rows of the table.
     rows: Vec<usize>,
-    rest_px: Vec<[f64; 2]>,
+    rest_px: Vec<Point2<f64>>,
 }
 
 impl Points {
     /// Those of the rows `moving` that move as their neighbours do, see [`in_agreement`].
     fn in_agreement(table: &TrackTable, moving: &[usize], agreement: f64) -> Self {
-        let rest_px: Vec<[f64; 2]> = moving
+        let rest_px: Vec<Point2<f64>> = moving
             .iter()
             .map(|&row| rest_position_px(table, row))
             .collect();
@@ -122,7 +123,7 @@ impl Points {
 }
 
 /// The papers' recursive normalised cuts.
-fn cut_in_two(velocities: &Signals, rest_px: &[[f64; 2]], settings: &Hierarchy) -> Dendrogram {
+fn cut_in_two(velocities: &Signals, rest_px: &[Point2<f64>], settings: &Hierarchy) -> Dendrogram {
     let rho = velocities.correlations();
     Dendrogram::divided((0..rest_px.len()).collect(), |points, depth| {
         if depth + 1 >= settings.levels || points.len() < settings.min_points as usize {

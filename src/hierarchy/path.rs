@@ -4,7 +4,7 @@ use super::root_paths::{RootPaths, root_paths};
 use super::signals::Signals;
 use crate::config::Hierarchy;
 use crate::signal::median;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Point2};
 
 /// Affinity of all pairs, and the paths from the foot: max(rho, 0)^motion_power + path_weight * s,
 /// with rho the correlation of displacements and s the shared path length over the median length of
@@ -16,8 +16,8 @@ use nalgebra::DMatrix;
 ///   in their correlation: the trunk below is the same for all. There the shared path counts.
 pub fn affinity(
     displacements: &Signals,
-    rest_px: &[[f64; 2]],
-    foot_px: [f64; 2],
+    rest_px: &[Point2<f64>],
+    foot_px: Point2<f64>,
     settings: &Hierarchy,
 ) -> (DMatrix<f32>, RootPaths) {
     let (rho, differences) = displacements.compared();

@@ -1,40 +1,34 @@
-//! Rest positions of points, and distances between them.
+//! Rest positions of points.
 
 use crate::model::TrackTable;
 use crate::signal::median;
+use nalgebra::{Point2, Vector2};
 
 /// Median position of a track: where the tree rests, whatever pose it was first seen in.
-pub fn rest_position_px(table: &TrackTable, row: usize) -> [f64; 2] {
-    [0, 1].map(|c| {
+pub fn rest_position_px(table: &TrackTable, row: usize) -> Point2<f64> {
+    Point2::from([0, 1].map(|c| {
         let values = table.positions[row].iter().flatten().map(|p| p[c]);
         median(values.collect(), f32::total_cmp).map_or(0.0, f64::from)
-    })
+    }))
 }
 
 /// Mean of the rest positions of `members`, px.
-pub fn centroid(rest_px: &[[f64; 2]], members: &[usize]) -> [f64; 2] {
+pub fn centroid(rest_px: &[Point2<f64>], members: &[usize]) -> Point2<f64> {
     let n = members.len().max(1) as f64;
-    let sum = members.iter().fold([0.0; 2], |s, &i| {
-        [s[0] + rest_px[i][0], s[1] + rest_px[i][1]]
-    });
-    [sum[0] / n, sum[1] / n]
+    let sum: Vector2<f64> = members.iter().map(|&i| rest_px[i].coords).sum();
+    Point2::from(sum / n)
 }
 
 /// Twice the root mean square distance of `members` from their centroid, px: about 1.4 times the
 /// radius of an evenly filled disc.
-pub fn extent_px(rest_px: &[[f64; 2]], members: &[usize]) -> f64 {
+pub fn extent_px(rest_px: &[Point2<f64>], members: &[usize]) -> f64 {
     let centre = centroid(rest_px, members);
     let variance = members
         .iter()
-        .map(|&i| distance_sq(rest_px[i], centre))
+        .map(|&i| (rest_px[i] - centre).norm_squared())
         .sum::<f64>()
         / members.len().max(1) as f64;
     2.0 * variance.sqrt()
-}
-
-/// Squared distance, px^2.
-pub fn distance_sq(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2)
 }
 
 /// A trunk bears no points if none is nearer to the foot than this share of the distance of the
@@ -46,10 +40,10 @@ const LOWEST: f64 = 0.05;
 /// Where a trunk that bears no points enters the crown, px: on the line from the foot to the middle
 /// of all points, as high as the lowest of them. `None` where there are points on the trunk, which
 /// say better where it goes.
-pub fn crown_begins(rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> Option<[f64; 2]> {
+pub fn crown_begins(rest_px: &[Point2<f64>], foot_px: Point2<f64>) -> Option<Point2<f64>> {
     let (mut nearest, mut farthest) = (f64::INFINITY, 0.0_f64);
     for p in rest_px {
-        let distance_px = distance_sq(*p, foot_px).sqrt();
+        let distance_px = (p - foot_px).norm();
         nearest = nearest.min(distance_px);
         farthest = farthest.max(distance_px);
     }
@@ -58,14 +52,14 @@ pub fn crown_begins(rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> Option<[f64; 2]>
     }
     let all: Vec<usize> = (0..rest_px.len()).collect();
     let middle = centroid(rest_px, &all);
-    let mut heights: Vec<f64> = rest_px.iter().map(|p| foot_px[1] - p[1]).collect();
+    let mut heights: Vec<f64> = rest_px.iter().map(|p| foot_px.y - p.y).collect();
     heights.sort_unstable_by(f64::total_cmp);
     let lowest = heights
         .get((LOWEST * heights.len() as f64) as usize)
         .copied()
         .unwrap_or(0.0);
-    let share = (lowest / (foot_px[1] - middle[1]).max(1.0)).clamp(0.0, 1.0);
-    Some([0, 1].map(|c| foot_px[c] + share * (middle[c] - foot_px[c])))
+    let share = (lowest / (foot_px.y - middle.y).max(1.0)).clamp(0.0, 1.0);
+    Some(foot_px + share * (middle - foot_px))
 }
 
 #[cfg(test)]
@@ -73,50 +67,47 @@ mod tests {
     use super::*;
 
     /// Two limbs that part at `fork`.
-    fn crown(fork: [f64; 2]) -> Vec<[f64; 2]> {
+    fn crown(fork: Point2<f64>) -> Vec<Point2<f64>> {
         let mut points = Vec::new();
         for side in [-1.0, 1.0] {
             for k in (1..=10).map(f64::from) {
-                points.push([fork[0] + side * 5.0 * k, fork[1] - 6.0 * k]);
+                points.push(fork + Vector2::new(side * 5.0 * k, -6.0 * k));
             }
         }
         points
     }
 
+    const FOOT: Point2<f64> = Point2::new(100.0, 200.0);
+    const FORK: Point2<f64> = Point2::new(100.0, 100.0);
+
     #[test]
     fn a_bare_trunk_is_as_high_as_the_lowest_of_the_crown() {
-        let top = crown_begins(&crown([100.0, 100.0]), [100.0, 200.0]).expect("a bare trunk");
+        let top = crown_begins(&crown(FORK), FOOT).expect("a bare trunk");
         assert!(
-            (top[0] - 100.0).abs() < 1e-9 && (90.0..=100.0).contains(&top[1]),
+            (top.x - 100.0).abs() < 1e-9 && (90.0..=100.0).contains(&top.y),
             "{top:?}"
         );
         // One track that has gone astray must not pull the crown down to the ground.
-        let mut astray: Vec<[f64; 2]> = crown([100.0, 100.0])
-            .into_iter()
-            .chain(crown([100.0, 100.0]))
-            .collect();
-        astray.push([160.0, 195.0]);
-        let top = crown_begins(&astray, [100.0, 200.0]).expect("a bare trunk");
-        assert!((85.0..=110.0).contains(&top[1]), "{top:?}");
+        let mut astray: Vec<Point2<f64>> = crown(FORK).into_iter().chain(crown(FORK)).collect();
+        astray.push(Point2::new(160.0, 195.0));
+        let top = crown_begins(&astray, FOOT).expect("a bare trunk");
+        assert!((85.0..=110.0).contains(&top.y), "{top:?}");
     }
 
     #[test]
     fn points_on_the_trunk_say_better_where_it_goes() {
-        let mut points = crown([100.0, 100.0]);
-        points.push([101.0, 185.0]);
-        assert_eq!(crown_begins(&points, [100.0, 200.0]), None);
-        assert_eq!(crown_begins(&[], [100.0, 200.0]), None);
+        let mut points = crown(FORK);
+        points.push(Point2::new(101.0, 185.0));
+        assert_eq!(crown_begins(&points, FOOT), None);
+        assert_eq!(crown_begins(&[], FOOT), None);
     }
 
     #[test]
     fn a_crown_below_the_foot_puts_the_top_on_the_foot() {
         // A tree that hangs from a cliff: nothing is above the foot, and the trunk must not leave
         // the picture.
-        let hanging = crown([100.0, 330.0]);
-        let top = crown_begins(&hanging, [100.0, 200.0]).expect("no points near the foot");
-        assert!(
-            top.iter().all(|c| c.is_finite()) && top == [100.0, 200.0],
-            "{top:?}"
-        );
+        let hanging = crown(Point2::new(100.0, 330.0));
+        let top = crown_begins(&hanging, FOOT).expect("no points near the foot");
+        assert!(top.iter().all(|c| c.is_finite()) && top == FOOT, "{top:?}");
     }
 }

@@ -12,9 +12,9 @@
 //! shortest paths in place of the spanning tree all did worse on trees whose branches leave one
 //! trunk.
 
-use super::rest::{crown_begins, distance_sq};
+use super::rest::crown_begins;
 use crate::signal::median;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Point2};
 
 /// Trees drawn; the first from all points.
 const TREES: u32 = 20;
@@ -47,7 +47,11 @@ pub struct Edge {
 /// that of a point's own motion, in whatever unit. A step between two points costs sqrt(d^2 + (h
 /// m)^2), with d their distance, h the distance from the foot to the farthest point and m their
 /// difference over the median of the diagonal.
-pub fn root_paths(apart: &DMatrix<f32>, rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> RootPaths {
+pub fn root_paths(
+    apart: &DMatrix<f32>,
+    rest_px: &[Point2<f64>],
+    foot_px: Point2<f64>,
+) -> RootPaths {
     let n = rest_px.len();
     let costs = costs(apart, rest_px, foot_px);
     let factors = perturbation_quantiles();
@@ -72,7 +76,7 @@ pub fn root_paths(apart: &DMatrix<f32>, rest_px: &[[f64; 2]], foot_px: [f64; 2])
     // Over a trunk without points the path that costs least leads to whatever moves least.
     let top = crown_begins(rest_px, foot_px);
     let tree = spanning_tree(&all, n, |a, b| match top {
-        Some(top) if a == n => distance_sq(top, rest_px[b]).sqrt() as f32,
+        Some(top) if a == n => (top - rest_px[b]).norm() as f32,
         _ => costs[(a, b)],
     });
     let edges = tree.iter().map(|reached| Edge {
@@ -86,7 +90,7 @@ pub fn root_paths(apart: &DMatrix<f32>, rest_px: &[[f64; 2]], foot_px: [f64; 2])
 }
 
 /// Costs of all steps; the last row and column are the foot, which rests.
-fn costs(apart: &DMatrix<f32>, rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> DMatrix<f32> {
+fn costs(apart: &DMatrix<f32>, rest_px: &[Point2<f64>], foot_px: Point2<f64>) -> DMatrix<f32> {
     let n = rest_px.len();
     let own: Vec<f32> = (0..n).map(|i| apart[(i, i)]).collect();
     let median = median(own, f32::total_cmp)
@@ -94,7 +98,7 @@ fn costs(apart: &DMatrix<f32>, rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> DMatr
         .max(f64::MIN_POSITIVE);
     let height = rest_px
         .iter()
-        .map(|&p| distance_sq(p, foot_px).sqrt())
+        .map(|p| (p - foot_px).norm())
         .fold(1.0, f64::max);
     let px_of = height / median;
     let mut places_px = rest_px.to_vec();
@@ -106,7 +110,7 @@ fn costs(apart: &DMatrix<f32>, rest_px: &[[f64; 2]], foot_px: [f64; 2]) -> DMatr
             (false, true) => apart[(b, b)],
             (false, false) => 0.0,
         };
-        let distance_sq = distance_sq(places_px[a], places_px[b]);
+        let distance_sq = (places_px[a] - places_px[b]).norm_squared();
         let cost = (distance_sq + (px_of * f64::from(motion)).powi(2)).sqrt() as f32;
         // A cost that is not a number would end the tree early; a very high one is never taken.
         if cost.is_finite() {
@@ -227,27 +231,37 @@ fn hash(tree: u32, a: usize, b: usize) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector2;
 
     /// Places and motion of the points of a branch to the `side`.
-    fn branch(side: f64, motion: [f32; 2]) -> impl Iterator<Item = ([f64; 2], [f32; 2])> {
+    fn branch(
+        side: f64,
+        motion: Vector2<f32>,
+    ) -> impl Iterator<Item = (Point2<f64>, Vector2<f32>)> {
         (1..12).map(move |k| {
             let out = f64::from(if k < 6 { k } else { 11 - k });
-            let place = [side * (8.0 * out + 3.0), -70.0 - 8.0 * f64::from(k)];
+            let place = Point2::new(side * (8.0 * out + 3.0), -70.0 - 8.0 * f64::from(k));
             (place, motion)
         })
     }
 
     /// A trunk with a branch to each side whose tips come near each other again; the branches move
     /// differently.
-    fn two_branches() -> (DMatrix<f32>, Vec<[f64; 2]>) {
-        let trunk = (1..8).map(|k| ([0.0, -10.0 * f64::from(k)], [0.1f32, 0.0]));
-        let points: Vec<([f64; 2], [f32; 2])> = trunk
-            .chain(branch(-1.0, [1.0, 0.0]))
-            .chain(branch(1.0, [0.0, 1.0]))
+    fn two_branches() -> (DMatrix<f32>, Vec<Point2<f64>>) {
+        let trunk = (1..8).map(|k| {
+            (
+                Point2::new(0.0, -10.0 * f64::from(k)),
+                Vector2::new(0.1, 0.0),
+            )
+        });
+        let points: Vec<(Point2<f64>, Vector2<f32>)> = trunk
+            .chain(branch(-1.0, Vector2::x()))
+            .chain(branch(1.0, Vector2::y()))
             .collect();
         let apart = DMatrix::from_fn(points.len(), points.len(), |a, b| {
-            let (p, q) = (points[a].1, if a == b { [0.0; 2] } else { points[b].1 });
-            ((p[0] - q[0]).powi(2) + (p[1] - q[1]).powi(2)).sqrt()
+            let rest = Vector2::zeros();
+            let (p, q) = (points[a].1, if a == b { rest } else { points[b].1 });
+            (p - q).norm()
         });
         (apart, points.iter().map(|p| p.0).collect())
     }
@@ -255,7 +269,7 @@ mod tests {
     #[test]
     fn tips_that_touch_are_not_related_if_they_move_differently() {
         let (apart, rest_px) = two_branches();
-        let shared = root_paths(&apart, &rest_px, [0.0, 0.0]).shared;
+        let shared = root_paths(&apart, &rest_px, Point2::origin()).shared;
         let (left_tip, right_tip, left_base) = (7 + 10, 7 + 11 + 10, 7 + 1);
         assert!(shared[(left_tip, left_base)] > 1.2 * shared[(left_tip, right_tip)]);
         // Everything on the branches has the trunk in common, which its own lower points have not.
@@ -265,8 +279,8 @@ mod tests {
     #[test]
     fn the_same_points_give_the_same_numbers() {
         let (apart, rest_px) = two_branches();
-        let once = root_paths(&apart, &rest_px, [0.0, 0.0]).shared;
-        let again = root_paths(&apart, &rest_px, [0.0, 0.0]).shared;
+        let once = root_paths(&apart, &rest_px, Point2::origin()).shared;
+        let again = root_paths(&apart, &rest_px, Point2::origin()).shared;
         assert_eq!(once, again);
     }
 
@@ -277,7 +291,12 @@ mod tests {
         for value in [0.0, f32::NAN, f32::INFINITY] {
             for n in 0..4 {
                 let motion = DMatrix::from_element(n, n, value);
-                let shared = root_paths(&motion, &vec![[5.0, 5.0]; n], [5.0, 9.0]).shared;
+                let shared = root_paths(
+                    &motion,
+                    &vec![Point2::new(5.0, 5.0); n],
+                    Point2::new(5.0, 9.0),
+                )
+                .shared;
                 assert!(
                     shared.iter().all(|c| c.is_finite()),
                     "{n} points of {value}"

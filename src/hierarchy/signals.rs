@@ -2,7 +2,7 @@
 
 use super::rest::rest_position_px;
 use crate::model::TrackTable;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Point2, Vector2};
 
 /// Steps on either side over which a displacement is averaged: tracking noise is not to decide
 /// which points belong together.
@@ -39,7 +39,7 @@ impl Signals {
         Self::new(rows.len(), steps.len(), |i, s| {
             let p = &table.positions[rows[i]];
             let (a, b) = (p[steps[s]]?, p[steps[s] + 1]?);
-            Some([b[0] - a[0], b[1] - a[1]])
+            Some(b - a)
         })
     }
 
@@ -51,7 +51,7 @@ impl Signals {
         let steps = table.times_s.len();
         // Less the rest position first: single precision is short of digits for a slow sway far
         // from the origin.
-        let rest_px: Vec<[f64; 2]> = rows
+        let rest_px: Vec<Point2<f64>> = rows
             .iter()
             .map(|&row| rest_position_px(table, row))
             .collect();
@@ -62,21 +62,25 @@ impl Signals {
         signals
     }
 
-    fn new(points: usize, steps: usize, value: impl Fn(usize, usize) -> Option<[f32; 2]>) -> Self {
+    fn new(
+        points: usize,
+        steps: usize,
+        value: impl Fn(usize, usize) -> Option<Vector2<f32>>,
+    ) -> Self {
         let zero = DMatrix::zeros(steps, points);
         let (mut u, mut v, mut seen) = (zero.clone(), zero.clone(), zero);
         for i in 0..points {
-            let (mut sum, mut count) = ([0.0f32; 2], 0.0f32);
+            let (mut sum, mut count) = (Vector2::zeros(), 0.0f32);
             for s in 0..steps {
                 if let Some(d) = value(i, s) {
-                    (u[(s, i)], v[(s, i)], seen[(s, i)]) = (d[0], d[1], 1.0);
-                    sum = [sum[0] + d[0], sum[1] + d[1]];
+                    (u[(s, i)], v[(s, i)], seen[(s, i)]) = (d.x, d.y, 1.0);
+                    sum += d;
                     count += 1.0;
                 }
             }
             for s in 0..steps {
-                u[(s, i)] -= seen[(s, i)] * sum[0] / count.max(1.0);
-                v[(s, i)] -= seen[(s, i)] * sum[1] / count.max(1.0);
+                u[(s, i)] -= seen[(s, i)] * sum.x / count.max(1.0);
+                v[(s, i)] -= seen[(s, i)] * sum.y / count.max(1.0);
             }
         }
         Self { u, v, seen }
@@ -115,7 +119,7 @@ impl Signals {
 
     /// The two coordinates of a point, step by step, scaled so that their squares add up to 1;
     /// zeros for a point that never moved.
-    pub fn unit(&self, point: usize) -> Vec<[f32; 2]> {
+    pub fn unit(&self, point: usize) -> Vec<Vector2<f32>> {
         let energy = self.u.column(point).norm_squared() + self.v.column(point).norm_squared();
         let scale = if energy > 0.0 {
             1.0 / energy.sqrt()
@@ -123,16 +127,17 @@ impl Signals {
             0.0
         };
         (0..self.steps())
-            .map(|s| [scale * self.u[(s, point)], scale * self.v[(s, point)]])
+            .map(|s| scale * Vector2::new(self.u[(s, point)], self.v[(s, point)]))
             .collect()
     }
 
     /// Mean over the points that were seen, step by step.
-    pub fn mean(&self) -> Vec<[f64; 2]> {
+    pub fn mean(&self) -> Vec<Vector2<f64>> {
         let mut mean = Vec::with_capacity(self.steps());
         for s in 0..self.steps() {
             let n = f64::from(self.seen.row(s).sum()).max(1.0);
-            mean.push([&self.u, &self.v].map(|m| f64::from(m.row(s).sum()) / n));
+            let sum = [&self.u, &self.v].map(|m| f64::from(m.row(s).sum()));
+            mean.push(Vector2::from(sum) / n);
         }
         mean
     }
@@ -214,15 +219,19 @@ impl Signals {
 
 /// Displacement from `rest_px` at a step, px: the mean over [`SMOOTH_STEPS`] to either side; `None`
 /// where the point is not seen at the step itself.
-fn smoothed(track: &[Option<[f32; 2]>], step: usize, rest_px: [f64; 2]) -> Option<[f32; 2]> {
+fn smoothed(
+    track: &[Option<Point2<f32>>],
+    step: usize,
+    rest_px: Point2<f64>,
+) -> Option<Vector2<f32>> {
     track[step]?;
     let around = step.saturating_sub(SMOOTH_STEPS)..=(step + SMOOTH_STEPS).min(track.len() - 1);
-    let (mut sum, mut n) = ([0.0f64; 2], 0.0);
+    let (mut sum, mut n) = (Vector2::<f64>::zeros(), 0.0);
     for p in track[around].iter().flatten() {
-        sum = [0, 1].map(|c| sum[c] + f64::from(p[c]) - rest_px[c]);
+        sum = sum + p.coords.cast() - rest_px.coords;
         n += 1.0;
     }
-    Some(sum.map(|x| (x / n) as f32))
+    Some((sum / n).cast())
 }
 
 /// The values of a point, step by step.
@@ -244,14 +253,14 @@ mod tests {
     use super::*;
     use crate::model::TrackId;
 
-    fn place_px(point: usize, frame: usize) -> Option<[f32; 2]> {
+    fn place_px(point: usize, frame: usize) -> Option<Point2<f32>> {
         if (frame * 7 + point * 3).is_multiple_of(5) {
             return None;
         }
         let t = frame as f32 / 15.0;
         let u = 100.0 + (3.0 * t + point as f32).sin();
         let v = 50.0 + (4.0 * t * (1.0 + point as f32)).cos();
-        Some([u, v])
+        Some(Point2::new(u, v))
     }
 
     /// Gaps differ from point to point: the fast way must leave the same steps out as the plain

@@ -114,13 +114,14 @@ fn share_of(best: usize, depths: [usize; 3]) -> f64 {
 mod tests {
     use super::*;
     use crate::model::TrackId;
+    use nalgebra::Point2;
     use std::f64::consts::TAU;
 
-    fn place_px(point: usize, time_s: f64) -> [f32; 2] {
+    fn place_px(point: usize, time_s: f64) -> Point2<f32> {
         let branch_hz = [0.5, 0.8][point / 6];
         let twig_hz = [1.3, 1.9, 2.4, 3.1][point / 3];
         let [branch, twig] = [branch_hz, twig_hz].map(|hz| (TAU * hz * time_s).sin());
-        [(4.0 * branch + twig) as f32, 0.0]
+        Point2::new((4.0 * branch + twig) as f32, 0.0)
     }
 
     /// Twelve points on two branches that sway at rates of their own, on each of which two twigs do

@@ -3,6 +3,7 @@
 use super::accumulate::COMPARE_HZ;
 use crate::model::{LogWindow, TrackId, TrackSet, TrackTable};
 use crate::signal::median;
+use nalgebra::Point2;
 use std::collections::BTreeMap;
 
 /// Share of a step by which frames may come early: sensor times jitter, and a step of three frames
@@ -26,7 +27,7 @@ pub fn table(window: LogWindow) -> TrackTable {
     for (f, set) in frames.iter().enumerate() {
         for o in &set.observations {
             if let Some(&i) = row.get(&o.id) {
-                positions[i][f] = Some([o.u_px, o.v_px]);
+                positions[i][f] = Some(Point2::new(o.u_px, o.v_px));
                 errors[i].push(o.fb_error_px);
             }
         }

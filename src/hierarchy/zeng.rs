@@ -1,14 +1,14 @@
 //! The affinity of the papers: how near two points are, times the correlation of their velocities
 //! (Zeng 2015 eq. 2.20 after Liu et al. 2005).
 
-use super::rest::{distance_sq, extent_px};
-use nalgebra::DMatrix;
+use super::rest::extent_px;
+use nalgebra::{DMatrix, Point2};
 
 /// Affinity of the points `members`: exp(-d^2 / 2s^2) * max(rho, 0)^power, with s a share of the
 /// members' own extent.
 pub fn affinity(
     rho: &DMatrix<f32>,
-    rest_px: &[[f64; 2]],
+    rest_px: &[Point2<f64>],
     members: &[usize],
     distance_scale: f64,
     power: f64,
@@ -18,8 +18,8 @@ pub fn affinity(
     let mut w = DMatrix::zeros(n, n);
     for a in 0..n {
         for b in a + 1..n {
-            let near =
-                (-distance_sq(rest_px[members[a]], rest_px[members[b]]) / (2.0 * s * s)).exp();
+            let apart_px = rest_px[members[a]] - rest_px[members[b]];
+            let near = (-apart_px.norm_squared() / (2.0 * s * s)).exp();
             let alike = f64::from(rho[(members[a], members[b])].max(0.0)).powf(power);
             // A floor keeps the graph connected, so that its second eigenvector exists and means a
             // cut.

@@ -1,10 +1,12 @@
 //! What a person at the terminal can ask of a running capture.
 
+use nalgebra::Point2;
+
 /// One wish; it is honoured before the next frame is taken.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Control {
     /// Use this polygon (px, at least three points) as the outline and start again from here.
-    SetOutline(Vec<[f64; 2]>),
+    SetOutline(Vec<Point2<f64>>),
     /// Build the tree from the motion seen so far.
     BuildNow,
     /// Forget tracks and tree, keep the outline rule, start again.

@@ -1,6 +1,7 @@
 //! Which points move together: the tree as the motion shows it.
 
 use super::TrackId;
+use nalgebra::Point2;
 use std::collections::BTreeSet;
 
 /// Index into [`MotionHierarchy::clusters`].
@@ -17,10 +18,10 @@ pub struct Cluster {
     /// no child: those that sit on the branch itself, below all of its forks.
     pub members: Vec<TrackId>,
     /// Mean rest position of the members, px.
-    pub centroid_px: [f64; 2],
+    pub centroid_px: Point2<f64>,
     /// Where the cluster's branch ends at rest, px: where its children part, or at its tip. `None`
     /// where all that is known is the centroid.
-    pub end_px: Option<[f64; 2]>,
+    pub end_px: Option<Point2<f64>>,
     /// How sure it is that the children part here, 0 (not at all) to 1; 0 for a cluster without
     /// children.
     pub certainty: f32,

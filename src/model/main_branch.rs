@@ -90,7 +90,7 @@ impl Skeleton {
 #[cfg(test)]
 mod tests {
     use crate::model::{Node, NodeId, NodeName, Size, Skeleton};
-    use nalgebra::Point3;
+    use nalgebra::{Point2, Point3};
 
     /// Nodes by parent; a name is the index unless given.
     fn tree(parents: &[Option<u32>]) -> Skeleton {
@@ -111,7 +111,7 @@ mod tests {
         }
         Skeleton {
             nodes,
-            foot_px: [0.0; 2],
+            foot_px: Point2::origin(),
             image_size: Size::new(1, 1),
         }
     }

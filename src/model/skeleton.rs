@@ -1,7 +1,7 @@
 //! The tree as joints and branches in 3D.
 
 use super::Size;
-use nalgebra::Point3;
+use nalgebra::{Point2, Point3};
 
 /// What lies farther from the foot than this, or at a place that is no number, is neither read nor
 /// drawn, px.
@@ -89,7 +89,7 @@ pub struct Node {
 pub struct Skeleton {
     pub nodes: Vec<Node>,
     /// The trunk's foot in the picture, px: the origin of the model.
-    pub foot_px: [f64; 2],
+    pub foot_px: Point2<f64>,
     /// Size of the picture that the model was taken from.
     pub image_size: Size,
 }
@@ -104,8 +104,8 @@ impl Skeleton {
     }
 
     /// Orthographic projection of a point in model axes to the picture, px.
-    pub fn image_from_model(&self, p: &Point3<f64>) -> [f64; 2] {
-        [self.foot_px[0] + p.x, self.foot_px[1] - p.y]
+    pub fn image_from_model(&self, p: &Point3<f64>) -> Point2<f64> {
+        Point2::new(self.foot_px.x + p.x, self.foot_px.y - p.y)
     }
 
     /// The name of a node of this skeleton.

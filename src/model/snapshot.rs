@@ -2,6 +2,7 @@
 //! changed.
 
 use super::{Angles, NodeName, Pose, Rgb, Size, Skeleton, SwayNow};
+use nalgebra::Point2;
 use std::sync::Arc;
 
 /// How far the capture has come.
@@ -124,9 +125,9 @@ pub struct Snapshot {
     pub outline_px: Vec<[i32; 2]>,
     /// Points of this frame, px, each with the number of its main branch, `None` before the tree is
     /// built.
-    pub points: Vec<([f32; 2], Option<u8>)>,
+    pub points: Vec<(Point2<f32>, Option<u8>)>,
     /// Points on trial, px.
-    pub candidates_px: Vec<[f32; 2]>,
+    pub candidates_px: Vec<Point2<f32>>,
     pub skeleton: Option<Arc<Skeleton>>,
     pub pose: Option<Arc<Pose>>,
     /// Main branch of every node of the skeleton, by node index; the same numbers as in `points`.

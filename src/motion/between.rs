@@ -62,7 +62,7 @@ mod tests {
         ];
         Skeleton {
             nodes,
-            foot_px: [50.0, 200.0],
+            foot_px: [50.0, 200.0].into(),
             image_size: Size::new(100, 220),
         }
     }

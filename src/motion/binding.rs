@@ -63,7 +63,7 @@ impl Binding {
             .collect();
         let rest: Vec<[f64; 2]> = nodes
             .iter()
-            .map(|n| skeleton.image_from_model(&n.position))
+            .map(|n| skeleton.image_from_model(&n.position).into())
             .collect();
         Self {
             reach_px: REACH * mean_gap(&tips, &rest),

@@ -68,7 +68,7 @@ mod tests {
     use super::*;
     use crate::dynamics::angle_to_parent_deg;
     use crate::model::{JointPose, Node, Size};
-    use nalgebra::{Point3, UnitQuaternion, Vector3};
+    use nalgebra::{Point2, Point3, UnitQuaternion, Vector3};
 
     /// A trunk and a branch that sways on it for `seconds`.
     fn film(seconds: u32) -> (Skeleton, Vec<Pose>) {
@@ -87,7 +87,7 @@ mod tests {
         };
         let skeleton = Skeleton {
             nodes: (0..3).map(node).collect(),
-            foot_px: [0.0; 2],
+            foot_px: Point2::origin(),
             image_size: Size::new(64, 64),
         };
         let pose = |k: u32| {

@@ -2,6 +2,7 @@
 
 use super::seen::Seen;
 use crate::model::{Outline, Rgb, Skeleton};
+use nalgebra::Point2;
 
 /// Where no picture has been seen (sRGB).
 pub const PLAIN: [u8; 3] = [104, 84, 66];
@@ -25,16 +26,16 @@ pub fn colour(seen: &Seen, skeleton: &Skeleton) -> Option<[u8; 3]> {
         .and_then(|p| p.joints.get(1))
         .map_or(top, |joint| joint.position);
     let (foot, top) = (skeleton.foot_px, skeleton.image_from_model(&top));
-    let mut places: Vec<[f64; 2]> = Vec::with_capacity(PLACES as usize);
+    let mut places: Vec<Point2<f64>> = Vec::with_capacity(PLACES as usize);
     for k in 1..=PLACES {
         let share = f64::from(k) / f64::from(PLACES);
-        places.push([0, 1].map(|c| foot[c] + LOWER * share * (top[c] - foot[c])));
+        places.push(foot + LOWER * share * (top - foot));
     }
     // The line from node to node may pass by the trunk; the middle of the outline does not.
-    let drawn: Vec<[f64; 2]> = seen.outline.map_or(Vec::new(), |outline| {
+    let drawn: Vec<Point2<f64>> = seen.outline.map_or(Vec::new(), |outline| {
         places
             .iter()
-            .flat_map(|p| middle(outline, foot[0], p[1]))
+            .flat_map(|p| middle(outline, foot.x, p.y))
             .collect()
     });
     median(
@@ -45,7 +46,7 @@ pub fn colour(seen: &Seen, skeleton: &Skeleton) -> Option<[u8; 3]> {
 }
 
 /// The middle of the outline's row at `v_px`, where it is above the foot at `u_px`.
-fn middle(outline: &Outline, u_px: f64, v_px: f64) -> Vec<[f64; 2]> {
+fn middle(outline: &Outline, u_px: f64, v_px: f64) -> Vec<Point2<f64>> {
     if !outline.contains(u_px, v_px) {
         return Vec::new();
     }
@@ -54,7 +55,7 @@ fn middle(outline: &Outline, u_px: f64, v_px: f64) -> Vec<[f64; 2]> {
     let mut places = Vec::with_capacity(5);
     for k in 0..5 {
         let share = 0.5 + MIDDLE * (f64::from(k) / 4.0 - 0.5);
-        places.push([left + (right - left) * share, v_px]);
+        places.push(Point2::new(left + (right - left) * share, v_px));
     }
     places
 }
@@ -70,12 +71,12 @@ fn border(outline: &Outline, u_px: f64, v_px: f64, step_px: f64) -> f64 {
     u
 }
 
-fn median(picture: &Rgb, skeleton: &Skeleton, places: &[[f64; 2]]) -> Option<[u8; 3]> {
+fn median(picture: &Rgb, skeleton: &Skeleton, places: &[Point2<f64>]) -> Option<[u8; 3]> {
     let scale = f64::from(picture.size.width) / f64::from(skeleton.image_size.width.max(1));
     let mut channels: [Vec<u8>; 3] = Default::default();
-    for at in places.iter().map(|p| p.map(|x| (x * scale).round())) {
-        if picture.size.contains(at[0], at[1]) {
-            let colour = picture.at(at[0].max(0.0) as u32, at[1].max(0.0) as u32);
+    for at in places.iter().map(|p| (p * scale).map(f64::round)) {
+        if picture.size.contains(at.x, at.y) {
+            let colour = picture.at(at.x.max(0.0) as u32, at.y.max(0.0) as u32);
             for (channel, value) in channels.iter_mut().zip(colour) {
                 channel.push(value);
             }

@@ -38,7 +38,7 @@ impl InLeaf {
             _ => Vec::new(),
         };
         if let Some(shape) = seen.cut_to {
-            seeds.retain(|[u, v]| shape.contains(f64::from(*u), f64::from(*v)));
+            seeds.retain(|p| shape.contains(f64::from(p.x), f64::from(p.y)));
         }
         let density = seen
             .density
@@ -56,7 +56,7 @@ impl InLeaf {
                 }
             });
         Some(Self {
-            seeds,
+            seeds: seeds.into_iter().map(Into::into).collect(),
             filmed,
             density,
         })
@@ -137,6 +137,6 @@ fn in_leaf(skeleton: &Skeleton, picture: Option<&Rgb>, outline: Option<&Outline>
 /// Corners are found by OpenCV. Without it there are none, and leaves stand where the picture has
 /// their colour.
 #[cfg(not(feature = "opencv"))]
-fn seeds(_picture: &Rgb, _outline: &Outline, _count: u32) -> Vec<[f32; 2]> {
+fn seeds(_picture: &Rgb, _outline: &Outline, _count: u32) -> Vec<nalgebra::Point2<f32>> {
     Vec::new()
 }

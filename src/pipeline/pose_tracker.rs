@@ -4,10 +4,11 @@ use crate::config::Config;
 use crate::model::{NodeId, NodeName, Pose, TrackId, TrackSet};
 use crate::motion::{self, Binding, PoseEstimator};
 use crate::solve::Model;
+use nalgebra::Point2;
 use std::sync::Arc;
 
 /// Where the tracks put each measured node, px; `None` for a node none of whose tracks was seen.
-pub type Targets = Vec<Option<[f64; 2]>>;
+pub type Targets = Vec<Option<Point2<f64>>>;
 
 /// Follows the pose of a model from frame to frame, from its rest pose on.
 pub struct PoseTracker {
@@ -31,7 +32,8 @@ impl PoseTracker {
         let pose = self
             .estimator
             .step(tracks.frame, tracks.time_s, &targets_px);
-        (pose, targets_px)
+        let targets_px = targets_px.into_iter().map(|p| p.map(Into::into));
+        (pose, targets_px.collect())
     }
 
     pub fn model(&self) -> &Arc<Model> {

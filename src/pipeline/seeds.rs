@@ -3,6 +3,7 @@
 use crate::config;
 use crate::model::{Luma, Outline, Rgb};
 use crate::track::Detector;
+use nalgebra::Point2;
 
 /// Corners may lie nearer together than points that are followed, px at 640 px picture width, and
 /// be weaker: each is a leaf.
@@ -10,7 +11,7 @@ const SEED_DISTANCE_PX: f64 = 3.0;
 const SEED_QUALITY: f64 = 1e-4;
 
 /// Harris corners of a whole frame inside the outline, px, strongest first.
-pub fn seeds(picture: &Rgb, outline: &Outline, count: u32) -> Vec<[f32; 2]> {
+pub fn seeds(picture: &Rgb, outline: &Outline, count: u32) -> Vec<Point2<f32>> {
     if picture.pixels.len() != 3 * picture.size.area() || outline.mask.len() != outline.size.area()
     {
         return Vec::new();
@@ -25,7 +26,8 @@ pub fn seeds(picture: &Rgb, outline: &Outline, count: u32) -> Vec<[f32; 2]> {
         size: picture.size,
         pixels: picture.pixels.chunks_exact(3).map(grey).collect(),
     };
-    Detector::new(&detect, outline).detect(&luma, &[], count as usize)
+    let seeds = Detector::new(&detect, outline).detect(&luma, &[], count as usize);
+    seeds.into_iter().map(Into::into).collect()
 }
 
 /// Luma of a pixel of red, green and blue (ITU-R BT.601), 0 to 255.

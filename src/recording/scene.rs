@@ -2,6 +2,7 @@
 
 use super::wire::Message;
 use crate::model::{NodeId, Outline, Pose, Skeleton, TrackSet};
+use nalgebra::Point2;
 use serde::Serialize;
 
 /// Frames of reference: what viewers stand on (z up), and the tree's own axes (y up).
@@ -17,7 +18,7 @@ const LINE_LOOP: i64 = 2;
 const LINE_LIST: i64 = 2;
 
 pub(super) fn outline(outline: &Outline, time_ns: u64, into: &mut Vec<u8>) {
-    let corners = outline.polygon_px.iter().map(|p| p.map(f64::from));
+    let corners = outline.polygon_px.iter().map(|p| Point2::from(*p).cast());
     annotation(LINE_LOOP, corners, OUTLINE_COLOUR, 2.0, time_ns, into);
 }
 
@@ -25,13 +26,13 @@ pub(super) fn points(tracks: &TrackSet, time_ns: u64, into: &mut Vec<u8>) {
     let points = tracks
         .observations
         .iter()
-        .map(|o| [f64::from(o.u_px), f64::from(o.v_px)]);
+        .map(|o| Point2::new(o.u_px, o.v_px).cast());
     annotation(POINTS, points, POINT_COLOUR, 4.0, time_ns, into);
 }
 
 fn annotation(
     kind: i64,
-    points: impl Iterator<Item = [f64; 2]>,
+    points: impl Iterator<Item = Point2<f64>>,
     colour: [f64; 4],
     thickness: f64,
     time_ns: u64,
@@ -43,7 +44,7 @@ fn annotation(
     message.sub(2, |a| {
         a.timestamp(1, time_ns);
         a.int(2, kind);
-        points.for_each(|p| a.doubles(3, &p));
+        points.for_each(|p| a.doubles(3, p.coords.as_slice()));
         a.doubles(4, &colour);
         a.double(7, thickness);
     });
@@ -200,7 +201,7 @@ pub(super) fn skeleton_json(
     let all = SkeletonJson {
         frame,
         time_s,
-        foot_px: skeleton.foot_px,
+        foot_px: skeleton.foot_px.into(),
         width: skeleton.image_size.width,
         height: skeleton.image_size.height,
         nodes: nodes.collect(),

@@ -121,7 +121,7 @@ mod tests {
     fn analysed(film: &Film) -> Analysis {
         let skeleton = Skeleton {
             nodes: vec![node(0), node(1)],
-            foot_px: [100.0; 2],
+            foot_px: [100.0; 2].into(),
             image_size: Size {
                 width: 640,
                 height: 360,

@@ -173,8 +173,8 @@ impl CaptureTables {
         for (joint, target) in pose.joints.iter().zip(&targets_px).skip(1) {
             if let Some(t) = target {
                 let skeleton = &self.replay.model().skeleton;
-                let [u, v] = skeleton.image_from_model(&joint.position);
-                self.misses.add((u - t[0]).hypot(v - t[1]));
+                let miss_px = skeleton.image_from_model(&joint.position) - t;
+                self.misses.add(miss_px.x.hypot(miss_px.y));
             }
         }
         if self.pictured == Some(pose.frame) {

@@ -21,6 +21,7 @@ use crate::recording::TrackFileReader;
 use crate::solve::{Model, with_modes};
 use crate::source::SourceInfo;
 use crate::views::{DocumentWriter, Draft};
+use nalgebra::Point2;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -218,7 +219,7 @@ fn without_tree(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
     write_tracks(job, TracksCsv::new(folder.file("tracks.csv")?)?)?;
     let foot_only = Arc::new(Skeleton {
         nodes: Vec::new(),
-        foot_px: [0.0; 2],
+        foot_px: Point2::origin(),
         image_size: job.info.size,
     });
     nodes(folder.file("nodes.csv")?, &foot_only, &[], metres_per_px)?;

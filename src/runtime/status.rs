@@ -9,6 +9,7 @@ use crate::model::{
 use crate::pipeline::{BackEnd, Moved, Targets};
 use crate::signal::median;
 use crate::solve::Model;
+use nalgebra::Point2;
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -36,9 +37,9 @@ pub struct Status {
     lost: Recent,
     fb_history: VecDeque<f64>,
     fb_noted_s: f64,
-    displacements: VecDeque<(f64, Vec<[f64; 2]>)>,
+    displacements: VecDeque<(f64, Vec<Point2<f64>>)>,
     table_nodes: Vec<usize>,
-    table_rest_px: Vec<[f64; 2]>,
+    table_rest_px: Vec<Point2<f64>>,
     table_made_s: f64,
     skeleton: Option<Arc<Skeleton>>,
 }
@@ -167,9 +168,12 @@ impl Status {
                 moved.tracks.observations.iter().partition(|o| o.confirmed);
             s.points = passed
                 .into_iter()
-                .map(|o| ([o.u_px, o.v_px], colour(o.id)))
+                .map(|o| (Point2::new(o.u_px, o.v_px), colour(o.id)))
                 .collect();
-            s.candidates_px = on_trial.into_iter().map(|o| [o.u_px, o.v_px]).collect();
+            s.candidates_px = on_trial
+                .into_iter()
+                .map(|o| Point2::new(o.u_px, o.v_px))
+                .collect();
         }
         s.sensor_rate_hz = self.sensor.rate_hz();
         s.work_rate_hz = self.work.rate_hz();
@@ -254,7 +258,7 @@ impl Status {
 
     fn table(&self, skeleton: &Skeleton) -> Vec<BranchRow> {
         let row = |(k, &node): (usize, &usize)| {
-            let path: Vec<[f64; 2]> = self.displacements.iter().map(|(_, d)| d[k]).collect();
+            let path: Vec<Point2<f64>> = self.displacements.iter().map(|(_, d)| d[k]).collect();
             let n = &skeleton.nodes[node];
             BranchRow {
                 node: n.name,
@@ -286,15 +290,10 @@ pub fn median_error_px(tracks: &TrackSet) -> Option<f64> {
     .map(f64::from)
 }
 
-fn rms_px(path: &[[f64; 2]]) -> f64 {
+fn rms_px(path: &[Point2<f64>]) -> f64 {
     let n = path.len().max(1) as f64;
     let mean = path
         .iter()
-        .fold([0.0; 2], |m, p| [m[0] + p[0] / n, m[1] + p[1] / n]);
-    (path
-        .iter()
-        .map(|p| (p[0] - mean[0]).powi(2) + (p[1] - mean[1]).powi(2))
-        .sum::<f64>()
-        / n)
-        .sqrt()
+        .fold(Point2::origin(), |mean, p| mean + p.coords / n);
+    (path.iter().map(|p| (p - mean).norm_squared()).sum::<f64>() / n).sqrt()
 }

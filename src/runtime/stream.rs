@@ -116,6 +116,7 @@ fn counts(shared: &Shared) -> String {
 mod tests {
     use super::*;
     use crate::model::{Excitation, Size, Sway, Unidentified};
+    use nalgebra::Point2;
     use serde_json::{Value, json};
 
     fn swaying(branches: Vec<(u32, crate::model::Swaying)>) -> SwayNow {
@@ -160,7 +161,7 @@ mod tests {
         ]);
         let skeleton = Skeleton {
             nodes: Vec::new(),
-            foot_px: [0.0; 2],
+            foot_px: Point2::origin(),
             image_size: Size::new(64, 64),
         };
         let pose = Pose {

@@ -21,7 +21,7 @@ pub fn room<'a>(
     outline: Option<&'a Outline>,
     bounds: Bounds,
 ) -> impl Fn(&Point3<f64>, &Point3<f64>) -> bool + use<'a> {
-    let foot_px = skeleton.foot_px;
+    let foot_px = skeleton.foot_px.into();
     let envelope = outline.map(|outline| match bounds {
         Bounds::Drawn => Envelope::of_drawn(outline, foot_px),
         Bounds::Filmed(kind) => Envelope::of_filmed(kind, outline, foot_px, &places(skeleton)),

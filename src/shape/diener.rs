@@ -11,10 +11,10 @@ use nalgebra::Point3;
 /// about the vertical that holds the crown's nodes; the copies are the mirror image of the
 /// originals in depth.
 pub fn diener(flat: &[Node2d], tracks: &[u32], trunk: &[bool], outline: &Outline) -> Skeleton {
-    let foot_px = flat.first().map_or([0.0, 0.0], |n| n.position_px);
+    let foot_px = flat.first().map_or([0.0, 0.0], |n| n.position_px.into());
     let places: Vec<Point3<f64>> = flat
         .iter()
-        .map(|n| model_from_image(n.position_px, foot_px))
+        .map(|n| model_from_image(n.position_px.into(), foot_px))
         .collect();
     let crown: Vec<Point3<f64>> = (0..flat.len())
         .filter(|&i| !in_trunk(trunk, i))
@@ -55,7 +55,7 @@ pub fn diener(flat: &[Node2d], tracks: &[u32], trunk: &[bool], outline: &Outline
     }
     Skeleton {
         nodes,
-        foot_px,
+        foot_px: foot_px.into(),
         image_size: outline.size,
     }
 }

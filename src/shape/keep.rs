@@ -56,7 +56,7 @@ pub fn on_foot(mut skeleton: Skeleton, foot_px: [f64; 2]) -> Skeleton {
     for node in skeleton.nodes.iter_mut().skip(1) {
         node.position += way;
     }
-    skeleton.foot_px = foot_px;
+    skeleton.foot_px = foot_px.into();
     skeleton
 }
 

@@ -21,7 +21,7 @@ pub fn copy_to_planes(
     envelope: &Envelope,
     planes: u32,
 ) -> Skeleton {
-    let foot_px = flat.first().map_or([0.0, 0.0], |n| n.position_px);
+    let foot_px = flat.first().map_or([0.0, 0.0], |n| n.position_px.into());
     let mut nodes = measured_nodes(flat, tracks, foot_px);
     place(&mut nodes, envelope);
     let axes = axes(&nodes, trunk);
@@ -51,7 +51,7 @@ pub fn copy_to_planes(
     }
     Skeleton {
         nodes,
-        foot_px,
+        foot_px: foot_px.into(),
         image_size: outline.size,
     }
 }
@@ -73,7 +73,7 @@ fn measured_nodes(flat: &[Node2d], tracks: &[u32], foot_px: [f64; 2]) -> Vec<Nod
             name: NodeName(i as u32),
             parent: node.parent.map(|p| NodeId(p as u32)),
             level: node.level,
-            position: model_from_image(node.position_px, foot_px),
+            position: model_from_image(node.position_px.into(), foot_px),
             radius: 1.0,
             n_tracks,
             certainty: node.certainty,

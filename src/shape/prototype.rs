@@ -42,10 +42,10 @@ impl Prototype {
         outline: &Outline,
         settings: &config::Shape,
     ) -> Self {
-        let foot_px = flat.first().map_or([0.0, 0.0], |n| n.position_px);
+        let foot_px = flat.first().map_or([0.0, 0.0], |n| n.position_px.into());
         let places: Vec<Point3<f64>> = flat
             .iter()
-            .map(|n| model_from_image(n.position_px, foot_px))
+            .map(|n| model_from_image(n.position_px.into(), foot_px))
             .collect();
         let envelope = Envelope::of_filmed(settings.envelope, outline, foot_px, &places);
         let trunk = trunk(flat, settings.leader, &settings.leader_px);

@@ -2,6 +2,7 @@
 
 use crate::config;
 use crate::model::{ClusterId, MotionHierarchy, Outline};
+use nalgebra::Point2;
 
 /// Node of the skeleton in the picture; the branch runs from the parent to it.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,7 +13,7 @@ pub struct Node2d {
     pub level: u8,
     /// The cluster that moves the node; `None` for the foot, which stands still.
     pub cluster: Option<ClusterId>,
-    pub position_px: [f64; 2],
+    pub position_px: Point2<f64>,
     /// As [`Cluster::certainty`](crate::model::Cluster::certainty).
     pub certainty: f32,
 }
@@ -26,7 +27,7 @@ pub fn build(
     outline: &Outline,
     settings: &config::Skeleton,
 ) -> Vec<Node2d> {
-    let crown_u = hierarchy.clusters.first().map(|all| all.centroid_px[0]);
+    let crown_u = hierarchy.clusters.first().map(|all| all.centroid_px.x);
     let position_px = Foot::of(outline, crown_u).position_px;
     let foot = Node2d {
         parent: None,
@@ -56,10 +57,7 @@ pub fn build(
         if let Some(parent) = nodes[i].parent.filter(|_| has_children[i] && at_centroid) {
             let towards = nodes[parent].position_px;
             let p = &mut nodes[i].position_px;
-            *p = [
-                p[0] + settings.fold * (towards[0] - p[0]),
-                p[1] + settings.fold * (towards[1] - p[1]),
-            ];
+            *p += settings.fold * (towards - *p);
         }
     }
     nodes
@@ -73,7 +71,7 @@ const FOOT_ROWS: f64 = 1.0 / 30.0;
 /// Where the trunk leaves the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Foot {
-    pub position_px: [f64; 2],
+    pub position_px: Point2<f64>,
     /// Half the outline's width there, px: an upper bound of the trunk's radius, as outlines are
     /// drawn wide.
     pub half_width_px: f64,
@@ -87,7 +85,7 @@ impl Foot {
     pub fn of(outline: &Outline, crown_u: Option<f64>) -> Self {
         let Some([left, top, right, bottom]) = outline.bounds_px() else {
             return Self {
-                position_px: [0.0, 0.0],
+                position_px: Point2::origin(),
                 half_width_px: 1.0,
             };
         };
@@ -105,7 +103,7 @@ impl Foot {
             .collect();
         let (Some(&first), Some(&last)) = (columns.first(), columns.last()) else {
             return Self {
-                position_px: [0.0, 0.0],
+                position_px: Point2::origin(),
                 half_width_px: 1.0,
             };
         };
@@ -120,7 +118,7 @@ impl Foot {
                 .clamp(f64::from(first), f64::from(last))
         };
         Self {
-            position_px: [u, f64::from(bottom)],
+            position_px: Point2::new(u, f64::from(bottom)),
             half_width_px: half_width_px.min(thickest_px),
         }
     }

@@ -10,6 +10,7 @@ use crate::model::{
 use crate::motion::Binding;
 use crate::shape::PushFigures;
 use crate::skeleton;
+use nalgebra::Point2;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -26,10 +27,10 @@ pub struct Model {
     /// How each measured branch sways, by node; empty while nobody has asked for it.
     pub modes: Vec<Swaying>,
     /// Rest position of every track that was there when the tree was built, px.
-    pub rest_px: BTreeMap<TrackId, [f64; 2]>,
+    pub rest_px: BTreeMap<TrackId, Point2<f64>>,
     /// Tracks that the tree was not built from, with node and rest place, px: those of an older
     /// tree, and those that were found since.
-    pub joined: BTreeMap<TrackId, (NodeId, [f64; 2])>,
+    pub joined: BTreeMap<TrackId, (NodeId, Point2<f64>)>,
     pub outline: Arc<Outline>,
     /// The tracks that it was built from, and what they are worth.
     pub table: Arc<TrackTable>,
@@ -89,9 +90,12 @@ impl Moment {
 impl Model {
     /// Which track moves which node.
     pub fn binding(&self) -> Binding {
-        let mut binding = Binding::new(&self.hierarchy, &self.rest_px, &self.skeleton);
-        binding.inherit(&self.joined);
-        binding.inherit(&self.on_sub_branches());
+        let rest_px = self.rest_px.iter().map(|(id, p)| (*id, (*p).into()));
+        let mut binding = Binding::new(&self.hierarchy, &rest_px.collect(), &self.skeleton);
+        for known in [&self.joined, &self.on_sub_branches()] {
+            let known = known.iter().map(|(id, (n, p))| (*id, (*n, (*p).into())));
+            binding.inherit(&known.collect());
+        }
         binding
     }
 
@@ -101,7 +105,7 @@ impl Model {
         let mut joined = BTreeMap::new();
         for (id, node, rest_px) in binding.bound() {
             if !built_from.contains(&id) {
-                joined.insert(id, (self.carrier(node), rest_px));
+                joined.insert(id, (self.carrier(node), rest_px.into()));
             }
         }
         Self {
@@ -119,7 +123,7 @@ impl Model {
     }
 
     /// The points of the sub-branches with node and rest place, px.
-    fn on_sub_branches(&self) -> BTreeMap<TrackId, (NodeId, [f64; 2])> {
+    fn on_sub_branches(&self) -> BTreeMap<TrackId, (NodeId, Point2<f64>)> {
         let mut out = BTreeMap::new();
         let first = self.plain.measured() as u32;
         for (node, branch) in (first..).map(NodeId).zip(&self.sub_branches) {
@@ -132,7 +136,7 @@ impl Model {
         out
     }
 
-    fn rest_px_of(&self, id: TrackId) -> Option<[f64; 2]> {
+    fn rest_px_of(&self, id: TrackId) -> Option<Point2<f64>> {
         match self.joined.get(&id) {
             Some((_, rest_px)) => Some(*rest_px),
             None => self.rest_px.get(&id).copied(),
@@ -157,7 +161,7 @@ impl Model {
     /// The same with its foot at `foot_px`: that of a capture's first tree stays.
     pub(super) fn flat_on(
         &self,
-        foot_px: [f64; 2],
+        foot_px: Point2<f64>,
         config: &Config,
     ) -> (Vec<skeleton::Node2d>, Vec<u32>) {
         let (mut flat, tracks) = self.flat(config);

@@ -10,6 +10,7 @@ use crate::hierarchy::{self, Evidence, Gain, OnBoth};
 use crate::model::{NodeId, NodeName, Skeleton, TrackId, TrackLog, TrackTable};
 use crate::shape::{Prototype, Twin, go_on, on_foot, twins};
 use crate::signal::median;
+use nalgebra::{Point2, Vector2};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -26,7 +27,7 @@ pub(super) struct Refinement<'a> {
     prior: &'a Model,
     /// Every track that the prior model knows, with its deepest node that is no sub-branch and its
     /// rest place, px.
-    bound: BTreeMap<TrackId, (NodeId, [f64; 2])>,
+    bound: BTreeMap<TrackId, (NodeId, Point2<f64>)>,
     config: &'a Config,
     pub moment: Moment,
 }
@@ -38,7 +39,7 @@ impl<'a> Refinement<'a> {
         let moment = Moment::of(window)?;
         let mut bound = BTreeMap::new();
         for (id, node, rest_px) in prior.binding().bound() {
-            bound.insert(id, (prior.carrier(node), rest_px));
+            bound.insert(id, (prior.carrier(node), rest_px.into()));
         }
         Some(Self {
             table: Arc::new(hierarchy::table(window)),
@@ -195,7 +196,7 @@ impl<'a> Refinement<'a> {
     fn adopt(&self, model: &mut Model) {
         let old = &self.prior.plain;
         let matches = self.match_measured_nodes(model);
-        let anew = on_foot((*model.plain).clone(), old.foot_px);
+        let anew = on_foot((*model.plain).clone(), old.foot_px.into());
         let twins = twins(&anew, old, &matches);
         let (flat, tracks) = model.flat_on(old.foot_px, self.config);
         let prototype = Prototype::of(&flat, &tracks, &model.outline, &self.config.shape);
@@ -248,23 +249,23 @@ impl<'a> Refinement<'a> {
         for (node, cluster) in matches.into_iter().filter(|(node, _)| *node < old.len()) {
             out[cluster + 1] = Some(Twin {
                 old: NodeId(node as u32),
-                moved_px: self.moved_px(model, &old[node], new[cluster]),
+                moved_px: self.moved_px(model, &old[node], new[cluster]).into(),
             });
         }
         out
     }
 
     /// By how much the rest places of the points that `old` and `new` share have moved, px.
-    fn moved_px(&self, model: &Model, old: &[TrackId], new: &[TrackId]) -> [f64; 2] {
+    fn moved_px(&self, model: &Model, old: &[TrackId], new: &[TrackId]) -> Vector2<f64> {
         let old: BTreeSet<TrackId> = old.iter().copied().collect();
         let (mut du_px, mut dv_px) = (Vec::new(), Vec::new());
         for id in new.iter().filter(|id| old.contains(id)) {
             if let (Some((_, was)), Some(is)) = (self.bound.get(id), model.rest_px.get(id)) {
-                du_px.push(is[0] - was[0]);
-                dv_px.push(is[1] - was[1]);
+                du_px.push(is.x - was.x);
+                dv_px.push(is.y - was.y);
             }
         }
-        [du_px, dv_px].map(|d| median(d, f64::total_cmp).unwrap_or(0.0))
+        Vector2::from([du_px, dv_px].map(|d| median(d, f64::total_cmp).unwrap_or(0.0)))
     }
 
     /// Tracks that the new tree was not built from, on the branch that theirs has become or grows
@@ -273,7 +274,7 @@ impl<'a> Refinement<'a> {
         &self,
         model: &Model,
         matches: &[Option<Twin>],
-    ) -> BTreeMap<TrackId, (NodeId, [f64; 2])> {
+    ) -> BTreeMap<TrackId, (NodeId, Point2<f64>)> {
         let old = &self.prior.plain;
         let mut goes_on = vec![None; old.measured()];
         for (k, twin) in matches.iter().enumerate() {

@@ -4,12 +4,13 @@
 //! apart ([`shoots`]). They are added last of all: push, copies, and whether one tree is better
 //! than another are of the tree without them.
 
+use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::config::Dynamics;
 use crate::dynamics::{Film, FilmTrack, shoots};
 use crate::hierarchy::rest_position_px;
 use crate::model::{Node, NodeId, NodeKind, NodeName, Skeleton, TrackId, TrackTable};
-use nalgebra::{Point3, Vector2, Vector3};
+use nalgebra::{Point2, Point3, Vector2, Vector3};
 use std::collections::BTreeSet;
 
 /// Points that decide how far a branch reaches: one alone may be off it.
@@ -20,7 +21,7 @@ const SHORTEST: f64 = 0.01;
 /// A tip forks where this share of its first shoot's points is behind, between these shares of its
 /// length.
 const BEHIND: f64 = 0.25;
-const FORKS: [f64; 2] = [0.3, 0.9];
+const FORKS: Bounds = Bounds::new(0.3, 0.9);
 /// So many points that are left on a tip are what it goes on as beyond its fork.
 const LEFT: usize = 2;
 
@@ -36,7 +37,7 @@ pub struct SubBranch {
     pub name: NodeName,
     /// Where it ends, px. `None` for what a tip goes on as beyond its fork, with the points that
     /// are left: it ends where the tip did.
-    pub end_px: Option<[f64; 2]>,
+    pub end_px: Option<Point2<f64>>,
 }
 
 /// The sub-branches that the points of `table` show, without names; `node_of` says on which measured
@@ -56,7 +57,10 @@ pub(super) fn identify(
         points.push(Point { id, node, rest_px });
         tracks.push(FilmTrack {
             node,
-            at_px: table.positions[row].iter().map(place_px).collect(),
+            at_px: table.positions[row]
+                .iter()
+                .map(|place| place_px(place).into())
+                .collect(),
         });
     }
     let film = Film::new(&table.times_s, tracks);
@@ -78,13 +82,13 @@ pub(super) fn identify(
 struct Point {
     id: TrackId,
     node: NodeId,
-    rest_px: [f64; 2],
+    rest_px: Point2<f64>,
 }
 
-fn place_px(place: &Option<[f32; 2]>) -> [f64; 2] {
+fn place_px(place: &Option<Point2<f32>>) -> Point2<f64> {
     match place {
-        Some(px) => px.map(f64::from),
-        None => [f64::NAN; 2],
+        Some(px) => px.cast(),
+        None => Point2::new(f64::NAN, f64::NAN),
     }
 }
 
@@ -96,7 +100,7 @@ fn branches_on(
     groups: &[Vec<&Point>],
     points: &[Point],
 ) -> Vec<SubBranch> {
-    let mut places: Vec<Vec<[f64; 2]>> = Vec::new();
+    let mut places: Vec<Vec<Point2<f64>>> = Vec::new();
     for group in groups {
         places.push(group.iter().map(|p| p.rest_px).collect());
     }
@@ -128,7 +132,7 @@ fn branches_on(
 }
 
 impl SubBranch {
-    fn new(on: NodeId, fork: f64, points: &[&Point], end_px: Option<[f64; 2]>) -> Self {
+    fn new(on: NodeId, fork: f64, points: &[&Point], end_px: Option<Point2<f64>>) -> Self {
         let mut members: Vec<TrackId> = points.iter().map(|p| p.id).collect();
         members.sort_unstable();
         Self {
@@ -160,11 +164,11 @@ fn along(skeleton: &Skeleton, node: NodeId, share: f64) -> Point3<f64> {
 
 /// At which share of its length a tip forks: where the first of the sub-branches leaves it that
 /// have points at these `places`, px.
-fn forks_at(skeleton: &Skeleton, tip: NodeId, places: &[Vec<[f64; 2]>]) -> f64 {
+fn forks_at(skeleton: &Skeleton, tip: NodeId, places: &[Vec<Point2<f64>>]) -> f64 {
     let from = begin(skeleton, tip);
     let axis = (skeleton.nodes[tip.index()].position - from).xy();
     let from_px = skeleton.image_from_model(&from);
-    let mut first = FORKS[1];
+    let mut first = FORKS.hi;
     for places in places {
         let mut shares: Vec<f64> = places
             .iter()
@@ -172,29 +176,26 @@ fn forks_at(skeleton: &Skeleton, tip: NodeId, places: &[Vec<[f64; 2]>]) -> f64 {
             .collect();
         shares.sort_unstable_by(f64::total_cmp);
         let behind = (BEHIND * shares.len() as f64) as usize;
-        first = first.min(shares.get(behind).copied().unwrap_or(FORKS[1]));
+        first = first.min(shares.get(behind).copied().unwrap_or(FORKS.hi));
     }
-    first.max(FORKS[0])
+    first.max(FORKS.lo)
 }
 
 /// How far along `axis` (model axes, px) from `from_px` a place in the picture is, as a share of
 /// its length.
-fn share_along(place_px: &[f64; 2], from_px: [f64; 2], axis: &Vector2<f64>) -> f64 {
-    let offset = Vector2::new(place_px[0] - from_px[0], from_px[1] - place_px[1]);
+fn share_along(place_px: &Point2<f64>, from_px: Point2<f64>, axis: &Vector2<f64>) -> f64 {
+    let offset = Vector2::new(place_px.x - from_px.x, from_px.y - place_px.y);
     offset.dot(axis) / axis.norm_squared().max(f64::MIN_POSITIVE)
 }
 
 /// Where a sub-branch ends that leaves at `fork_px`: at those of its points that are farthest from
 /// there.
-fn end_px(fork_px: [f64; 2], places: &[[f64; 2]]) -> [f64; 2] {
-    let mut offsets: Vec<Vector2<f64>> = places
-        .iter()
-        .map(|p| Vector2::new(p[0] - fork_px[0], p[1] - fork_px[1]))
-        .collect();
+fn end_px(fork_px: Point2<f64>, places: &[Point2<f64>]) -> Point2<f64> {
+    let mut offsets: Vec<Vector2<f64>> = places.iter().map(|p| p - fork_px).collect();
     offsets.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
     offsets.truncate(FARTHEST);
     let mean = offsets.iter().sum::<Vector2<f64>>() / offsets.len().max(1) as f64;
-    [fork_px[0] + mean.x, fork_px[1] + mean.y]
+    fork_px + mean
 }
 
 /// `skeleton` with a node for each of `branches`, after the measured ones, in order; without radii.
@@ -247,9 +248,9 @@ fn shifted(id: NodeId, measured: usize, n_new: u32) -> NodeId {
 }
 
 /// The end of a sub-branch from `fork` that is seen at `end_px`.
-fn reaching(skeleton: &Skeleton, fork: &Point3<f64>, end_px: [f64; 2]) -> Point3<f64> {
-    let [u, v] = skeleton.image_from_model(fork);
-    let way = Vector3::new(end_px[0] - u, v - end_px[1], 0.0);
+fn reaching(skeleton: &Skeleton, fork: &Point3<f64>, end_px: Point2<f64>) -> Point3<f64> {
+    let fork_px = skeleton.image_from_model(fork);
+    let way = Vector3::new(end_px.x - fork_px.x, fork_px.y - end_px.y, 0.0);
     let least = SHORTEST * f64::from(skeleton.image_size.width);
     fork + way.try_normalize(1e-9).unwrap_or_else(Vector3::y) * way.norm().max(least)
 }
@@ -284,7 +285,7 @@ mod tests {
         ];
         Skeleton {
             nodes,
-            foot_px: [300.0, 300.0],
+            foot_px: Point2::new(300.0, 300.0),
             image_size: Size {
                 width: 640,
                 height: 360,
@@ -293,9 +294,9 @@ mod tests {
     }
 
     /// Points that leave the first tip in its middle, upwards.
-    fn places() -> Vec<[f64; 2]> {
+    fn places() -> Vec<Point2<f64>> {
         (0..5)
-            .map(|k| [350.0 + f64::from(k), 200.0 - 10.0 * f64::from(k)])
+            .map(|k| Point2::new(350.0 + f64::from(k), 200.0 - 10.0 * f64::from(k)))
             .collect()
     }
 
@@ -372,9 +373,11 @@ mod tests {
     /// could not be posed.
     #[test]
     fn no_shoot_is_without_length() {
-        for places in [&[[351.0, 200.0]; 5][..], &[], &[[f64::MAX, f64::MIN]]] {
+        let at_one = [Point2::new(351.0, 200.0); 5];
+        let far_away = [Point2::new(f64::MAX, f64::MIN)];
+        for places in [&at_one[..], &[], &far_away] {
             let fork = forks_at(&skeleton(), NodeId(2), &[places.to_vec()]);
-            assert!((FORKS[0]..=FORKS[1]).contains(&fork), "{fork}");
+            assert!(FORKS.contains(fork), "{fork}");
         }
         let [mut shoot, _] = two_shoots();
         shoot.end_px =
@@ -382,6 +385,6 @@ mod tests {
         let after = with(&skeleton(), &[shoot]);
         let length = (after.nodes[4].position - after.nodes[2].position).norm();
         assert!((length - 6.4).abs() < 1e-9, "{length}");
-        assert_eq!(end_px([5.0, 6.0], &[]), [5.0, 6.0]);
+        assert_eq!(end_px(Point2::new(5.0, 6.0), &[]), Point2::new(5.0, 6.0));
     }
 }

@@ -53,11 +53,18 @@ pub fn picture(
     let on_trial = theme.branch_rgb(None);
     for p in &snapshot.candidates_px {
         let pixel = p.map(f64::from);
-        mark(&mut raster, placed, pixel, fine, on_trial, FAINT * cover);
+        mark(
+            &mut raster,
+            placed,
+            pixel.into(),
+            fine,
+            on_trial,
+            FAINT * cover,
+        );
     }
     for (p, branch) in &snapshot.points {
         let (pixel, colour) = (p.map(f64::from), theme.branch_rgb(*branch));
-        mark(&mut raster, placed, pixel, fine, colour, cover);
+        mark(&mut raster, placed, pixel.into(), fine, colour, cover);
     }
     Some(raster)
 }
@@ -103,11 +110,11 @@ pub fn letters(
             letters.line(a, b, '#');
         }
         for p in &snapshot.candidates_px {
-            letters.point(p.map(f64::from), ',');
+            letters.point(p.map(f64::from).into(), ',');
         }
         for (p, branch) in &snapshot.points {
             let letter = branch.map_or('o', |b| (b'0' + b % 8) as char);
-            letters.point(p.map(f64::from), letter);
+            letters.point(p.map(f64::from).into(), letter);
         }
         return Some(letters.rows);
     };

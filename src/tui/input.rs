@@ -322,7 +322,8 @@ fn draw(
                     "Starting with your outline of {} points.",
                     polygon.len()
                 ));
-                return Some(Control::SetOutline(polygon));
+                let corners_px = polygon.into_iter().map(Into::into);
+                return Some(Control::SetOutline(corners_px.collect()));
             }
             Err(why) => state.say(why),
         },

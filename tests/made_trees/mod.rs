@@ -8,7 +8,7 @@
 
 use arborcam::dynamics::{Film, FilmTrack};
 use arborcam::model::{Node, NodeId, NodeName, Size, Skeleton};
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point2, Point3, Vector3};
 use std::f64::consts::TAU;
 
 /// Random numbers (SplitMix64). The trees of these tests, and with them the figures in
@@ -341,7 +341,7 @@ fn skeleton(branches: &[MadeBranch]) -> Skeleton {
     let nodes = std::iter::once(foot).chain(ends).collect();
     Skeleton {
         nodes,
-        foot_px: [320.0, 340.0],
+        foot_px: Point2::new(320.0, 340.0),
         image_size: Size {
             width: 640,
             height: 360,

@@ -8,6 +8,7 @@ use arborcam::pipeline::Pipeline;
 use arborcam::skeleton::Node2d;
 use arborcam::solve::Model;
 use arborcam::source;
+use nalgebra::Point2;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -66,8 +67,8 @@ impl Flat {
             certainty: 0.8,
         };
         let mut nodes = vec![
-            node(None, 0, [320.0, 340.0]),
-            node(Some(0), 1, [316.0, 240.0]),
+            node(None, 0, Point2::new(320.0, 340.0)),
+            node(Some(0), 1, Point2::new(316.0, 240.0)),
         ];
         let mut i = 1;
         while i < nodes.len() {
@@ -82,7 +83,7 @@ impl Flat {
                 nodes.push(node(
                     Some(i),
                     level + 1,
-                    [at[0] + length * turn.sin(), at[1] - length * turn.cos()],
+                    Point2::new(at.x + length * turn.sin(), at.y - length * turn.cos()),
                 ));
             }
             i += 1;

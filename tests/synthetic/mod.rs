@@ -7,7 +7,7 @@ use arborcam::config::Wood;
 use arborcam::geometry::{Foliage, FoliageGroup, Mesh, wood};
 use arborcam::model::{JointPose, Node, NodeId, NodeName, Pose, Size, Skeleton};
 use arborcam::shape::{Limb, limbs, thicken};
-use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Point2, Point3, Rotation3, UnitQuaternion, Vector3};
 
 /// A number in -1..1 that is always the same for the same arguments.
 pub fn noise(a: usize, b: usize) -> f64 {
@@ -81,7 +81,7 @@ pub fn tree(levels: u8, planes: usize) -> Skeleton {
         .for_each(|(i, n)| n.name = NodeName(i));
     let mut skeleton = Skeleton {
         nodes,
-        foot_px: [640.0, 700.0],
+        foot_px: Point2::new(640.0, 700.0),
         image_size: Size::new(1280, 720),
     };
     thicken(&mut skeleton, 14.0, &|_, _| true, &bare(), 1);

@@ -3,6 +3,7 @@
 use super::super::command_error::CommandError;
 use super::super::common::moment;
 use super::super::scale::ScaleArgs;
+use crate::bounds::Bounds;
 use crate::config::{Config, ConfigError, Excited};
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
@@ -86,7 +87,7 @@ impl AnalyzeArgs {
                 ));
             }
         }
-        let [from, to] = self.within_s();
+        let Bounds { lo: from, hi: to } = self.within_s();
         if from >= to {
             return bad_usage(format!(
                 "--from {from} is not before --to {to}; --from comes first"
@@ -102,11 +103,11 @@ impl AnalyzeArgs {
     }
 
     /// Begin and end of the analysed part of the film, s.
-    pub fn within_s(&self) -> [f64; 2] {
-        [
+    pub fn within_s(&self) -> Bounds {
+        Bounds::new(
             self.from.unwrap_or(f64::NEG_INFINITY),
             self.to.unwrap_or(f64::INFINITY),
-        ]
+        )
     }
 
     /// The settings for a capture: command line over configuration file over the capture's `own`.

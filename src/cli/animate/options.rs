@@ -3,6 +3,7 @@
 use super::super::common::{parse_within, seconds};
 use super::super::render::{ViewName, WHITE, background, rate, size};
 use super::super::tree::TreeArgs;
+use crate::bounds::Bounds;
 use crate::config::Config;
 use crate::model::Size;
 use crate::views::Shot;
@@ -73,7 +74,7 @@ pub struct AnimateArgs {
     pub speed: f64,
     /// Magnify only motion between these frequencies, Hz.
     #[arg(long, value_name = "LO..HI", value_parser = band, requires = "magnify")]
-    pub band: Option<[f64; 2]>,
+    pub band: Option<Bounds>,
     /// Direction of view of a picture or video.
     #[arg(long, value_name = "VIEW", default_value = "front")]
     pub view: ViewName,
@@ -205,12 +206,12 @@ fn release_s(text: &str) -> Result<f64, String> {
 }
 
 /// Parses `--band`, Hz.
-fn band(text: &str) -> Result<[f64; 2], String> {
+fn band(text: &str) -> Result<Bounds, String> {
     let parsed = text
         .split_once("..")
-        .and_then(|(low, high)| Some([frequency_hz(low)?, frequency_hz(high)?]));
+        .and_then(|(low, high)| Some(Bounds::new(frequency_hz(low)?, frequency_hz(high)?)));
     parsed
-        .filter(|[low, high]| low < high)
+        .filter(|band_hz| band_hz.lo < band_hz.hi)
         .ok_or_else(|| "give two frequencies in Hz, as 0.5..2".to_owned())
 }
 

@@ -254,7 +254,7 @@ fn captured<'a>(
         branches.push(Branch {
             parent: node.parent.map(NodeId::index),
             mode: sway.as_ref().ok().map(mode_of),
-            end_px: skeleton.image_from_model(&node.position),
+            end_px: skeleton.image_from_model(&node.position).into(),
         });
     }
     let mut tree = Tree {
@@ -299,7 +299,7 @@ mod tests {
         }
         let skeleton = Skeleton {
             nodes: (0..3).map(node).collect(),
-            foot_px: [0.0; 2],
+            foot_px: [0.0; 2].into(),
             image_size: Size {
                 width: 64,
                 height: 64,

@@ -108,7 +108,7 @@ mod tests {
         (
             Skeleton {
                 nodes,
-                foot_px: [50.0, 100.0],
+                foot_px: [50.0, 100.0].into(),
                 image_size: Size::new(100, 101),
             },
             limbs,

@@ -4,6 +4,7 @@ use super::*;
 use crate::model::{Observation, Outline, Size};
 use crate::recording::TrackFile;
 use crate::solve::solve;
+use nalgebra::{Point2, Vector2};
 use std::f64::consts::TAU;
 use std::time::Duration;
 
@@ -11,13 +12,13 @@ const RATE_HZ: f64 = 30.0;
 /// The tree is built with this frame.
 const BUILT: u64 = 200;
 const FRAMES: u64 = 420;
-const FOOT: [f64; 2] = [160.0, 230.0];
+const FOOT: Point2<f64> = Point2::new(160.0, 230.0);
 const POINTS_PER_LIMB: u32 = 24;
 /// Tips of the limbs as seen from the foot (px), and the frequencies at which they swing (Hz).
-const LIMBS: [([f64; 2], f64); 3] = [
-    ([0.0, -180.0], 0.5),
-    ([-100.0, -140.0], 1.1),
-    ([110.0, -150.0], 1.6),
+const LIMBS: [(Vector2<f64>, f64); 3] = [
+    (Vector2::new(0.0, -180.0), 0.5),
+    (Vector2::new(-100.0, -140.0), 1.1),
+    (Vector2::new(110.0, -150.0), 1.6),
 ];
 /// Does not pass its trial.
 const REJECTED: TrackId = TrackId(5);
@@ -33,8 +34,8 @@ fn tracks(frame: u64) -> TrackSet {
             let id = TrackId(k * POINTS_PER_LIMB + i);
             observations.push(Observation {
                 id,
-                u_px: (FOOT[0] + share * (cos * tip[0] - sin * tip[1])) as f32,
-                v_px: (FOOT[1] + share * (sin * tip[0] + cos * tip[1])) as f32,
+                u_px: (FOOT.x + share * (cos * tip.x - sin * tip.y)) as f32,
+                v_px: (FOOT.y + share * (sin * tip.x + cos * tip.y)) as f32,
                 fb_error_px: 0.05,
                 error_px: None,
                 confirmed: frame > 20 && id != REJECTED,

@@ -5,6 +5,7 @@ use super::*;
 use crate::cancel::CancelToken;
 use crate::config::Dynamics;
 use crate::model::{Angles, Skeleton, TrackLog};
+use nalgebra::Point2;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
@@ -17,7 +18,7 @@ fn job(time_s: f64) -> SwayJob {
         time_s,
         skeleton: Arc::new(Skeleton {
             nodes: Vec::new(),
-            foot_px: [0.0; 2],
+            foot_px: Point2::origin(),
             image_size: crate::model::Size::new(64, 64),
         }),
         log: TrackLog::new(10.0),

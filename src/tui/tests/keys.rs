@@ -111,7 +111,10 @@ fn clicks_make_a_polygon_of_the_pixels_below_them() {
         events.extend(clicks.map(|(column, row)| click(column, row)));
         events.push(key(KeyCode::Enter));
         let run = play(Some(placed), &events);
-        assert_eq!(run.sent, [Control::SetOutline(polygon.to_vec())]);
+        assert_eq!(
+            run.sent,
+            [Control::SetOutline(polygon.map(Into::into).to_vec())]
+        );
         assert_eq!(run.state.drawing, None);
     }
 }
@@ -212,9 +215,9 @@ fn the_keyboard_reaches_what_the_mouse_reaches() {
     assert_eq!(
         run.sent,
         [Control::SetOutline(vec![
-            [9.5, 19.5],
-            [629.5, 19.5],
-            [629.5, 339.5]
+            [9.5, 19.5].into(),
+            [629.5, 19.5].into(),
+            [629.5, 339.5].into()
         ])]
     );
 }

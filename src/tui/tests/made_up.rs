@@ -68,7 +68,7 @@ pub fn skeleton() -> Skeleton {
         .for_each(|(i, n)| n.name = NodeName(i));
     Skeleton {
         nodes,
-        foot_px: [320.0, 350.0],
+        foot_px: [320.0, 350.0].into(),
         image_size: Size::new(640, 360),
     }
 }
@@ -142,14 +142,14 @@ fn add_points(s: &mut Snapshot) {
     s.fb_error_px = 0.12;
     s.error_px = Some(0.94);
     s.candidates_px = (0..12)
-        .map(|i| [230.0 + 17.0 * i as f32, 70.0 + (i * 53 % 230) as f32])
+        .map(|i| [230.0 + 17.0 * i as f32, 70.0 + (i * 53 % 230) as f32].into())
         .collect();
     s.fb_history_px = (0..120)
         .map(|i| 0.15 + 0.1 * (i as f64 * 0.3).sin())
         .collect();
     for i in 0..60 {
         let place = [240.0 + 3.0 * i as f32, 60.0 + (i * 37 % 250) as f32];
-        s.points.push((place, None));
+        s.points.push((place.into(), None));
     }
 }
 
@@ -274,13 +274,13 @@ pub fn huge() -> Snapshot {
     (s.latency_p50_ms, s.latency_p99_ms) = (123_456.0, 1e99);
     (s.tracks_alive, s.lost_per_s, s.fb_error_px) = (u32::MAX, 1e7, f64::NAN);
     s.error_px = Some(f64::INFINITY);
-    s.candidates_px = vec![[f32::NAN, f32::INFINITY], [-1e30, 1e30]];
+    s.candidates_px = vec![[f32::NAN, f32::INFINITY].into(), [-1e30, 1e30].into()];
     s.fb_history_px = vec![f64::NAN, 1e300, -1.0, f64::INFINITY, 3.0];
     s.progress = f64::NAN;
     s.points = vec![
-        ([f32::NAN, 1.0], Some(255)),
-        ([1e30, -1e30], Some(7)),
-        ([f32::INFINITY, 0.0], None),
+        ([f32::NAN, 1.0].into(), Some(255)),
+        ([1e30, -1e30].into(), Some(7)),
+        ([f32::INFINITY, 0.0].into(), None),
     ];
     s.outline_px = vec![[i32::MIN, i32::MAX], [i32::MAX, i32::MAX], [0, i32::MIN]];
     s.messages = vec!["word ".repeat(200), "x".repeat(500)];

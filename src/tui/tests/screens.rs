@@ -135,7 +135,7 @@ fn broken() -> [Snapshot; 7] {
     };
     let bare = Skeleton {
         nodes: Vec::new(),
-        foot_px: [0.0; 2],
+        foot_px: [0.0; 2].into(),
         image_size: Size::new(0, 0),
     };
     let mut flat = super::made_up::skeleton();
