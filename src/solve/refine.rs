@@ -195,7 +195,7 @@ impl<'a> Refinement<'a> {
     fn adopt(&self, model: &mut Model) {
         let old = &self.prior.plain;
         let matches = self.match_measured_nodes(model);
-        let anew = on_foot((*model.plain).clone(), old.foot_px);
+        let anew = on_foot((*model.plain).clone(), old.foot_px.into());
         let twins = twins(&anew, old, &matches);
         let (flat, tracks) = model.flat_on(old.foot_px, self.config);
         let prototype = Prototype::of(&flat, &tracks, &model.outline, &self.config.shape);
@@ -231,7 +231,7 @@ impl<'a> Refinement<'a> {
         let mut out: Vec<Option<Twin>> = vec![None; new.len() + 1];
         out[0] = Some(Twin {
             old: NodeId(0),
-            moved_px: [0.0; 2],
+            moved_px: nalgebra::Vector2::zeros(),
         });
         // Node 1 is the trunk, and belongs to the cluster of all points.
         let above_old: Vec<Vec<TrackId>> = old.iter().skip(2).cloned().collect();
@@ -248,7 +248,7 @@ impl<'a> Refinement<'a> {
         for (node, cluster) in matches.into_iter().filter(|(node, _)| *node < old.len()) {
             out[cluster + 1] = Some(Twin {
                 old: NodeId(node as u32),
-                moved_px: self.moved_px(model, &old[node], new[cluster]),
+                moved_px: self.moved_px(model, &old[node], new[cluster]).into(),
             });
         }
         out

@@ -59,11 +59,11 @@ pub fn topiary(
     settings: &config::Shape,
     seed: u64,
 ) -> Result<Topiary, TopiaryError> {
-    let shape = drawn.placed(outline, skeleton.foot_px)?;
+    let shape = drawn.placed(outline, skeleton.foot_px.into())?;
     if holds(&shape, outline) {
         return Ok(unchanged(skeleton, shape));
     }
-    let envelope = Envelope::of_drawn(&shape, skeleton.foot_px);
+    let envelope = Envelope::of_drawn(&shape, skeleton.foot_px.into());
     let cut::Pruned {
         skeleton: mut pruned,
         kept,
