@@ -4,8 +4,8 @@ mod synthetic;
 
 use arborcam::draw::{Bounds, Camera, Look, Model, Posed, Rgba, Texture, View, picture};
 use arborcam::geometry::{Foliage, FoliageGroup, Mesh, bare_wood};
-use arborcam::model::{JointPose, NodeId, Pose, Size, Skeleton};
-use nalgebra::{Point3, UnitQuaternion, Vector3};
+use arborcam::model::{JointPose, LeafSwing, NodeId, Pose, Size, Skeleton};
+use nalgebra::{Point2, Point3, UnitQuaternion, Vector3};
 use synthetic::{sway, tree};
 
 const BARK: [u8; 3] = [104, 84, 66];
@@ -173,20 +173,19 @@ fn leaves_swing_and_are_cut_out() {
         ..Model::bare(&skeleton, &mesh, BARK)
     };
     let camera = Camera::of_film(&skeleton, Size::new(1280, 720));
-    let [u, v] = skeleton
-        .image_from_model(&skeleton.nodes[1].position)
-        .into();
+    let at = Point2::from(skeleton.image_from_model(&skeleton.nodes[1].position));
     let green = |picture: &Rgba, dx: f64, dy: f64| {
-        let [r, g, _, a] = picture.at((u + dx) as u32, (v + dy) as u32);
+        let [r, g, _, a] = picture.at((at.x + dx) as u32, (at.y + dy) as u32);
         a > 0 && g > r
     };
-    for (parts, dx, dy) in [
-        ([0.0, 0.0], 0.0, 0.0),
-        ([1.0, 0.0], 40.0, 0.0),
-        ([0.0, -1.0], 0.0, 40.0),
+    for (sine, cosine, dx, dy) in [
+        (0.0, 0.0, 0.0, 0.0),
+        (1.0, 0.0, 40.0, 0.0),
+        (0.0, -1.0, 0.0, 40.0),
     ] {
-        let drawn = picture(&model.posed(None, &[parts]), &camera, &LOOK);
-        assert!(green(&drawn, dx, dy), "{parts:?}");
+        let swing = LeafSwing { sine, cosine };
+        let drawn = picture(&model.posed(None, &[swing]), &camera, &LOOK);
+        assert!(green(&drawn, dx, dy), "{swing:?}");
     }
     let behind = Camera {
         view: View {
@@ -199,7 +198,7 @@ fn leaves_swing_and_are_cut_out() {
     let seen = picture(
         &posed,
         &Camera {
-            middle_px: [640.0, 700.0],
+            middle_px: Point2::new(640.0, 700.0),
             ..behind
         },
         &LOOK,
@@ -289,7 +288,11 @@ fn nothing_that_a_file_may_hold_brings_it_down() {
     };
     let whole = Bounds::of([Point3::origin(), Point3::new(100.0, 300.0, 50.0)]).unwrap();
     for pose in &poses {
-        let posed = model.posed(Some(pose), &[[f32::NAN; 2]]);
+        let swing = LeafSwing {
+            sine: f32::NAN,
+            cosine: f32::NAN,
+        };
+        let posed = model.posed(Some(pose), &[swing]);
         let _ = posed.bounds();
         for size in [SIZE, Size::new(1, 1), Size::new(0, 0), Size::new(0, 7)] {
             picture(

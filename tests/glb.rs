@@ -372,7 +372,7 @@ fn the_bark_has_the_colour_of_the_trunk() {
             .flat_map(|_| (0..size.width).flat_map(colour))
             .collect(),
     };
-    let corner = |du: f64, v: f64| [foot[0] + du, v];
+    let corner = |du: f64, v: f64| nalgebra::Point2::new(foot[0] + du, v);
     let corners = [
         corner(-18.0, 200.0),
         corner(18.0, 200.0),

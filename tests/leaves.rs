@@ -12,7 +12,7 @@ use arborcam::geometry::{
 use arborcam::model::{JointPose, Luma, NodeId, Outline, Pose, Rgb, Size, Skeleton};
 use arborcam::motion::flutter;
 use arborcam::pipeline::{Pipeline, PoseTracker, Seen, dress, leaf_seeds};
-use nalgebra::{Point3, UnitQuaternion, Vector3};
+use nalgebra::{Point2, Point3, UnitQuaternion, Vector2, Vector3};
 use std::path::{Path, PathBuf};
 
 /// A made-up film still: a tree before sky and a wall, drawn by code, with what is leaf known for
@@ -48,15 +48,15 @@ fn still(in_leaf: bool) -> Still {
         };
         *p = base.map(|c| (c + grain).clamp(0, 255) as u8);
     }
-    let disc = |at: [f64; 2], r: f64| {
-        let (l, t) = ((at[0] - r).max(0.0) as usize, (at[1] - r).max(0.0) as usize);
+    let disc = |at: Point2<f64>, r: f64| {
+        let (l, t) = ((at.x - r).max(0.0) as usize, (at.y - r).max(0.0) as usize);
         let (right, bottom) = (
-            ((at[0] + r) as usize + 1).min(w),
-            ((at[1] + r) as usize + 1).min(h),
+            ((at.x + r) as usize + 1).min(w),
+            ((at.y + r) as usize + 1).min(h),
         );
         let cells = (t..bottom).flat_map(move |v| (l..right).map(move |u| (u, v)));
         cells
-            .filter(move |(u, v)| (*u as f64 - at[0]).hypot(*v as f64 - at[1]) <= r)
+            .filter(move |(u, v)| (*u as f64 - at.x).hypot(*v as f64 - at.y) <= r)
             .map(move |(u, v)| v * w + u)
     };
     let measured = skeleton.measured();
@@ -64,11 +64,10 @@ fn still(in_leaf: bool) -> Still {
     for node in &skeleton.nodes[1..measured] {
         let (from, to) = (&skeleton.nodes[node.parent.unwrap().index()], node);
         for k in 0..=60 {
-            let at = skeleton.image_from_model(
-                &(from.position + (to.position - from.position) * (k as f64 / 60.0)),
-            );
-            disc(at.into(), (0.7 * node.radius).max(0.7)).for_each(|i| pixels[i] = [96, 80, 68]);
-            disc(at.into(), 22.0).for_each(|i| outside[i] = false);
+            let at = from.position + (to.position - from.position) * (k as f64 / 60.0);
+            let at = Point2::from(skeleton.image_from_model(&at));
+            disc(at, (0.7 * node.radius).max(0.7)).for_each(|i| pixels[i] = [96, 80, 68]);
+            disc(at, 22.0).for_each(|i| outside[i] = false);
         }
     }
     let mut leaf = vec![0.0; w * h];
@@ -78,14 +77,14 @@ fn still(in_leaf: bool) -> Still {
         .filter(|(_, n)| in_leaf && n.level >= 5)
     {
         for j in 0..30 {
-            let off = [
+            let off = Vector2::new(
                 16.0 * synthetic::noise(k, j),
                 16.0 * synthetic::noise(k, j + 50),
-            ];
-            let at = skeleton.image_from_model(&node.position);
+            );
+            let at = Point2::from(skeleton.image_from_model(&node.position));
             let shade = 1.0 + 0.45 * synthetic::noise(k, j + 90);
             let colour = [70.0, 110.0, 40.0].map(|c: f64| (c * shade) as u8);
-            disc([at[0] + off[0], at[1] + off[1]], 5.0).for_each(|i| {
+            disc(at + off, 5.0).for_each(|i| {
                 (pixels[i], leaf[i]) = (colour, 1.0);
                 outside[i] = false;
             });
@@ -110,7 +109,7 @@ fn still(in_leaf: bool) -> Still {
 }
 
 impl Still {
-    fn view<'a>(&'a self, seeds: &'a [[f32; 2]]) -> LeafView<'a> {
+    fn view<'a>(&'a self, seeds: &'a [Point2<f32>]) -> LeafView<'a> {
         LeafView {
             picture: Some(&self.picture),
             outline: Some(&self.outline),
@@ -119,9 +118,13 @@ impl Still {
         }
     }
 
-    fn leaves(&self, settings: &Leaves) -> Foliage {
+    fn seeds(&self, settings: &Leaves) -> Vec<Point2<f32>> {
         let seeds = leaf_seeds(&self.picture, &self.outline, settings.seeds);
-        let seeds: Vec<_> = seeds.into_iter().map(Into::into).collect();
+        seeds.into_iter().map(Point2::from).collect()
+    }
+
+    fn leaves(&self, settings: &Leaves) -> Foliage {
+        let seeds = self.seeds(settings);
         foliage(
             &synthetic::limbs_of(&self.skeleton, &synthetic::bare()),
             &self.skeleton,
@@ -204,8 +207,7 @@ fn correlation(a: &[f64], b: &[f64], width: usize) -> f64 {
 /// Li's fig. 5: ours is like the picture, and both samplings by chance are less so.
 fn better_than_chance(still: &Still, pose: Option<&Pose>, leaf: &[f32]) -> [f64; 3] {
     let settings = Leaves::default();
-    let seeds = leaf_seeds(&still.picture, &still.outline, settings.seeds);
-    let seeds: Vec<_> = seeds.into_iter().map(Into::into).collect();
+    let seeds = still.seeds(&settings);
     let view = LeafView {
         pose,
         ..still.view(&seeds)

@@ -104,7 +104,8 @@ fn conifer() -> Flat {
         [102.0, 20.0],
         [98.0, 20.0],
         [25.0, 180.0],
-    ];
+    ]
+    .map(nalgebra::Point2::from);
     let outline = arborcam::outline::from_polygon(&border, Size::new(200, 240)).expect("outline");
     Flat {
         name: "conifer",

@@ -28,7 +28,8 @@ fn outline() -> Outline {
         [70.0, 20.0],
         [30.0, 100.0],
         [95.0, 150.0],
-    ];
+    ]
+    .map(Point2::from);
     arborcam::outline::from_polygon(&crown, SIZE).expect("outline")
 }
 
@@ -203,17 +204,17 @@ fn the_tree_in_space_stays_in_its_envelope_on_one_trunk() {
 
 #[test]
 fn attractors_lie_on_the_surface() {
-    let foot = skeleton::Foot::of(&outline(), None).position_px;
-    let envelope = Envelope::of_revolution(&outline(), foot.into());
+    let foot = Point2::from(skeleton::Foot::of(&outline(), None).position_px);
+    let envelope = Envelope::of_revolution(&outline(), foot);
     let points = envelope.attractors(256);
     assert_eq!(points.len(), 256);
     for p in &points {
-        let row = outline().size.width as usize * (foot[1] - p.y).round() as usize;
+        let row = outline().size.width as usize * (foot.y - p.y).round() as usize;
         let inside: Vec<usize> = (0..SIZE.width as usize)
             .filter(|u| outline().mask[row + u] != 0)
             .collect();
         let (left, right) = (inside[0] as f64, inside[inside.len() - 1] as f64);
-        let (centre, radius) = ((left + right) / 2.0 - foot[0], (right - left + 1.0) / 2.0);
+        let (centre, radius) = ((left + right) / 2.0 - foot.x, (right - left + 1.0) / 2.0);
         assert!(
             ((p.x - centre).hypot(p.z) - radius).abs() < 1e-6,
             "{p} is not on a circle of {radius}"
@@ -235,10 +236,8 @@ fn attractors_lie_on_the_surface() {
 #[test]
 fn pushing_brings_the_tree_nearer_to_its_envelope() {
     let (settings, outline) = (config::Shape::default(), outline());
-    let envelope = Envelope::of_revolution(
-        &outline,
-        skeleton::Foot::of(&outline, None).position_px.into(),
-    );
+    let foot_px = skeleton::Foot::of(&outline, None).position_px;
+    let envelope = Envelope::of_revolution(&outline, foot_px.into());
     let trunk = shape::trunk(&flat(), config::Leader::None, &[]);
     let prototype = shape::copy_to_planes(
         &flat(),

@@ -10,7 +10,7 @@ use arborcam::draw;
 use arborcam::model::{JointPose, NodeId, Outline, Pose, Rgb, Size, Skeleton};
 use arborcam::pipeline::{Seen, cut_to, dress};
 use arborcam::shape::{self, Drawn, Topiary, TopiaryError};
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Point2, UnitQuaternion, Vector3};
 use std::path::Path;
 use trees::Flat;
 
@@ -57,10 +57,10 @@ fn cut(tree: &Flat, drawn: &Drawn) -> Result<Topiary, TopiaryError> {
     )
 }
 
-fn is_inside(shape: &Outline, at: [f64; 2]) -> bool {
+fn is_inside(shape: &Outline, at: Point2<f64>) -> bool {
     [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]]
         .iter()
-        .any(|d| shape.contains(at[0] + d[0], at[1] + d[1]))
+        .any(|d| shape.contains(at.x + d[0], at.y + d[1]))
 }
 
 #[test]
@@ -91,12 +91,8 @@ fn every_tree_fills_every_shape_and_stays_in_it() {
                     "{}",
                     what()
                 );
-                let at = skeleton.image_from_model(&node.position);
-                assert!(
-                    is_inside(&shape, at.into()),
-                    "{}: at {at:?} it is outside",
-                    what()
-                );
+                let at = skeleton.image_from_model(&node.position).into();
+                assert!(is_inside(&shape, at), "{}: at {at:?} it is outside", what());
                 assert!(
                     node.radius <= skeleton.nodes[node.parent.expect("a parent").index()].radius,
                     "{}",

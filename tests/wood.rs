@@ -126,12 +126,8 @@ fn pipes_add_up() {
         })
         .collect();
     assert!(inner.len() > 5);
-    let exponent = PIPE_EXPONENTS
-        .iter()
-        .map(|e| e * 1000.0)
-        .map(|e| e as u32)
-        .collect::<Vec<_>>();
-    let fits = (exponent[0]..=exponent[1])
+    let thousandths = PIPE_EXPONENTS * 1000.0;
+    let fits = (thousandths.lo as u32..=thousandths.hi as u32)
         .map(|e| f64::from(e) / 1000.0)
         .any(|e| {
             inner.iter().all(|(p, children)| {

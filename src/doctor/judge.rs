@@ -10,8 +10,9 @@ use crate::config::Config;
 /// Share by which a machine should be faster than it must: other programs run as well, and trees
 /// differ.
 const MARGIN: f64 = 1.5;
-/// Film for which there should be room, and must be, s.
-const ROOM_S: [f64; 2] = [3600.0, 60.0];
+/// Film for which there must be room, and should be, s.
+const LEAST_ROOM_S: f64 = 60.0;
+const GOOD_ROOM_S: f64 = 3600.0;
 /// A capture's own files, bytes a second (60 MB a minute at 400 points and 30 frames a second).
 const CAPTURE_BYTES_PER_S: f64 = 1e6;
 /// Bytes that JPEG takes for a pixel of a tree, generously.
@@ -264,9 +265,9 @@ fn disk(disk: &Result<Disk, String>, film: Option<&Film>, config: &Config) -> Ch
     let small = "free some space, or choose another disk with --out";
     match () {
         () if disk.bytes_per_s < need => Check::fail("disk", found, slow),
-        () if room_s < ROOM_S[1] => Check::fail("disk", found, small),
+        () if room_s < LEAST_ROOM_S => Check::fail("disk", found, small),
         () if disk.bytes_per_s < 2.0 * need => Check::warn("disk", found, slow),
-        () if room_s < ROOM_S[0] => Check::warn("disk", found, small),
+        () if room_s < GOOD_ROOM_S => Check::warn("disk", found, small),
         () => Check::ok("disk", found),
     }
 }

@@ -366,7 +366,11 @@ fn model<'a>(dir: &Path, note: &'a CaptureNote) -> Result<&'a ModelNote, Documen
 
 #[cfg(feature = "opencv")]
 fn outline(note: &OutlineNote) -> Result<Outline, String> {
-    let corners_px: Vec<[f64; 2]> = note.polygon_px.iter().map(|p| p.map(f64::from)).collect();
+    let corners_px: Vec<nalgebra::Point2<f64>> = note
+        .polygon_px
+        .iter()
+        .map(|p| p.map(f64::from).into())
+        .collect();
     let size = Size::new(note.width, note.height);
     crate::outline::from_polygon(&corners_px, size).map_err(|e| e.to_string())
 }

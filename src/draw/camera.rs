@@ -1,7 +1,7 @@
 //! Where the tree is seen from: orthographic, as the film is taken to be.
 
 use crate::model::{Size, Skeleton};
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point2, Point3, Vector3};
 
 /// A direction to look from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,7 +88,7 @@ pub struct Camera {
     /// The point of the model that is shown at `middle_px`.
     pub aim: Point3<f64>,
     /// Rgba pixels, the top left corner of the picture being (0, 0).
-    pub middle_px: [f64; 2],
+    pub middle_px: Point2<f64>,
     /// Rgba pixels for one unit of the model.
     pub scale: f64,
     pub size: Size,
@@ -125,7 +125,7 @@ impl Camera {
         Self {
             view,
             aim,
-            middle_px: [f64::from(size.width) / 2.0, f64::from(size.height) / 2.0],
+            middle_px: Point2::new(f64::from(size.width) / 2.0, f64::from(size.height) / 2.0),
             scale,
             size,
         }
@@ -140,10 +140,11 @@ impl Camera {
         let left = (f64::from(size.width) - scale * f64::from(film.width)) / 2.0;
         let top = (f64::from(size.height) - scale * f64::from(film.height)) / 2.0;
         // The centre of the film's first pixel is 0, its corner -0.5.
-        let middle_px = [
-            left + scale * (skeleton.foot_px[0] + 0.5),
-            top + scale * (skeleton.foot_px[1] + 0.5),
-        ];
+        let foot_px = Point2::from(skeleton.foot_px);
+        let middle_px = Point2::new(
+            left + scale * (foot_px.x + 0.5),
+            top + scale * (foot_px.y + 0.5),
+        );
         Self {
             view: View::FRONT,
             aim: Point3::origin(),
@@ -159,8 +160,8 @@ impl Camera {
         let [right, up, towards] = self.view.axes();
         let d = p - self.aim;
         [
-            self.middle_px[0] + self.scale * d.dot(&right),
-            self.middle_px[1] - self.scale * d.dot(&up),
+            self.middle_px.x + self.scale * d.dot(&right),
+            self.middle_px.y - self.scale * d.dot(&up),
             d.dot(&towards),
         ]
     }
@@ -191,7 +192,7 @@ mod tests {
             let camera = Camera {
                 view,
                 aim: Point3::origin(),
-                middle_px: [0.0; 2],
+                middle_px: Point2::origin(),
                 scale: 1.0,
                 size: Size::new(10, 10),
             };
@@ -251,10 +252,11 @@ mod tests {
         // Twice as large, with bars above and below.
         let camera = Camera::of_film(&skeleton, Size::new(1280, 800));
         let p = Point3::new(8.0, 78.0, 5.0);
-        let [u, v] = skeleton.image_from_model(&p).into();
+        let seen_px = Point2::from(skeleton.image_from_model(&p));
         let [x, y, _] = camera.project(&p);
         assert!(
-            (x - 2.0 * (u + 0.5)).abs() < 1e-9 && (y - 40.0 - 2.0 * (v + 0.5)).abs() < 1e-9,
+            (x - 2.0 * (seen_px.x + 0.5)).abs() < 1e-9
+                && (y - 40.0 - 2.0 * (seen_px.y + 0.5)).abs() < 1e-9,
             "{x} {y}"
         );
     }

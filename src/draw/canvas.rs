@@ -3,6 +3,7 @@
 use super::rgba::Rgba;
 use super::texture::Texture;
 use crate::model::Size;
+use nalgebra::Point2;
 use std::ops::Range;
 
 /// A corner of a triangle as it is to be drawn.
@@ -15,7 +16,7 @@ pub(super) struct Corner {
     pub z: f32,
     /// 0 to 255.
     pub rgb: [f32; 3],
-    pub uv: [f32; 2],
+    pub uv: Point2<f32>,
 }
 
 /// Leaves are cut out of their texture where its alpha is less than this, as the model's file says.
@@ -165,7 +166,8 @@ impl Triangle {
     fn colour(&self, shares: [f32; 3], texture: Option<&Texture>) -> Option<[u8; 3]> {
         let mut rgb = [0, 1, 2].map(|i| self.mix(shares, |p| p.rgb[i]));
         if let Some(texture) = texture {
-            let [u, v] = [0, 1].map(|i| self.mix(shares, |p| p.uv[i]));
+            let u = self.mix(shares, |p| p.uv.x);
+            let v = self.mix(shares, |p| p.uv.y);
             let [r, g, b, alpha] = texture.at(u, v);
             if alpha < CUT {
                 return None;
@@ -195,7 +197,7 @@ mod tests {
             y,
             z,
             rgb,
-            uv: [0.0; 2],
+            uv: Point2::origin(),
         }
     }
 

@@ -68,7 +68,7 @@ impl Eye {
         Self {
             axes: camera.view.axes().map(|a| a.cast::<f32>()),
             aim: camera.aim.coords.cast::<f32>(),
-            middle: Point2::from(camera.middle_px.map(|m| n * m as f32)),
+            middle: camera.middle_px.map(|m| n * m as f32),
             scale: n * camera.scale as f32,
             sun: sun(camera.view),
             thicker: 0.0,
@@ -111,7 +111,7 @@ fn draw(part: &Part, eye: &Eye, canvas: &mut Canvas) {
             let light = lit(normal, eye.sun, part.two_sided);
             let thicker = if part.two_sided { 0.0 } else { eye.thicker };
             let [x, y, z] = eye.place(Vector3::from(*p) + normal * thicker);
-            let uv = part.uvs.get(i).copied().unwrap_or_default();
+            let uv = Point2::from(part.uvs.get(i).copied().unwrap_or_default());
             Corner {
                 x,
                 y,
@@ -163,7 +163,7 @@ fn shadow(tree: &Posed, camera: &Camera) -> Rgba {
                     y,
                     z: 0.0,
                     rgb: [0.0; 3],
-                    uv: [0.0; 2],
+                    uv: Point2::origin(),
                 }
             })
             .collect();

@@ -4,7 +4,7 @@ use super::camera::Bounds;
 use super::skin::Joints;
 use super::texture::Texture;
 use crate::geometry::{Foliage, Mesh};
-use crate::model::{Pose, Skeleton};
+use crate::model::{LeafSwing, Pose, Skeleton};
 use nalgebra::Point3;
 
 /// A tree to be drawn, in any pose.
@@ -57,9 +57,9 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// The tree in a pose, `None` for its rest. `sway` is how far the leaves of each group swing,
-    /// rad; see [`crate::geometry::FoliageGroup`]; it may be shorter than the groups.
-    pub fn posed(&self, pose: Option<&Pose>, sway: &[[f32; 2]]) -> Posed<'_> {
+    /// The tree in a pose, `None` for its rest. `sway` is how far the leaves of each group swing;
+    /// see [`crate::geometry::FoliageGroup`]; it may be shorter than the groups.
+    pub fn posed(&self, pose: Option<&Pose>, sway: &[LeafSwing]) -> Posed<'_> {
         let joints = Joints::new(self.skeleton, pose);
         let (positions, normals) = joints.wood(self.wood);
         let colours = match self.branch_rgb {

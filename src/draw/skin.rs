@@ -1,7 +1,7 @@
 //! Skin and leaves in one pose.
 
 use crate::geometry::{FoliageGroup, Mesh};
-use crate::model::{Pose, Skeleton};
+use crate::model::{LeafSwing, Pose, Skeleton};
 use nalgebra::{Matrix3, Vector3};
 
 /// How every joint moves what hangs on it: `p` goes to `turn p + shift`.
@@ -50,15 +50,11 @@ impl Joints {
     }
 
     /// The same of leaves, swung by their two parts (see [`FoliageGroup`]), rad.
-    pub fn leaves(
-        &self,
-        group: &FoliageGroup,
-        [sine, cosine]: [f32; 2],
-    ) -> (Vec<[f32; 3]>, Vec<[f32; 3]>) {
+    pub fn leaves(&self, group: &FoliageGroup, swing: LeafSwing) -> (Vec<[f32; 3]>, Vec<[f32; 3]>) {
         self.all(&group.mesh, |i| {
             Vector3::from(group.mesh.positions[i])
-                + displacement(&group.sine, i) * sine
-                + displacement(&group.cosine, i) * cosine
+                + displacement(&group.sine, i) * swing.sine
+                + displacement(&group.cosine, i) * swing.cosine
         })
     }
 

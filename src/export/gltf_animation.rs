@@ -4,6 +4,7 @@ use super::gltf_buffer::{BufferBuilder, Layout, accessor, le_f32};
 use super::gltf_model::Model;
 use super::joints::Moving;
 use super::thin_keys::{share, thin};
+use crate::model::LeafSwing;
 use gltf_json::accessor::Type;
 use gltf_json::animation::{Animation, Channel, Interpolation, Property, Sampler, Target};
 use gltf_json::validation::Checked::Valid;
@@ -65,18 +66,19 @@ pub(super) fn push_animation(
 /// tolerance; `None` where it never swings.
 fn swing(model: &Model, moving: &Moving, group: usize, node: Index<Node>) -> Option<Track<2>> {
     let all = model.flutter.get(group)?;
-    let weights: Vec<[f32; 2]> = moving
+    let weights: Vec<LeafSwing> = moving
         .kept
         .iter()
         .filter_map(|&k| all.get(k))
         .copied()
         .collect();
-    if weights.iter().flatten().all(|w| *w == 0.0) {
+    if weights.iter().all(|w| *w == LeafSwing::default()) {
         return None;
     }
     let group = &model.dressed.foliage.groups[group];
     let swing = Swing {
-        reach_px: [longest(&group.sine), longest(&group.cosine)],
+        sine_reach_px: longest(&group.sine),
+        cosine_reach_px: longest(&group.cosine),
         times_s: &moving.times_s,
         tolerance_px: model.tolerance_px,
         weights,
@@ -85,17 +87,21 @@ fn swing(model: &Model, moving: &Moving, group: usize, node: Index<Node>) -> Opt
     Some(Track {
         node,
         times_s: kept.iter().map(|&k| swing.times_s[k] as f32).collect(),
-        values: kept.iter().map(|&k| swing.weights[k]).collect(),
+        values: kept
+            .iter()
+            .map(|&k| [swing.weights[k].sine, swing.weights[k].cosine])
+            .collect(),
     })
 }
 
 /// How one group of leaves swings.
 struct Swing<'a> {
     /// In every frame.
-    weights: Vec<[f32; 2]>,
+    weights: Vec<LeafSwing>,
     times_s: &'a [f64],
     /// The farthest that a leaf goes by each of the two displacements.
-    reach_px: [f64; 2],
+    sine_reach_px: f64,
+    cosine_reach_px: f64,
     tolerance_px: f64,
 }
 
@@ -110,13 +116,17 @@ impl Swing<'_> {
     /// Whether frame `k` is near enough to the line between keys of frames `a` and `b`.
     fn fits(&self, a: usize, b: usize, k: usize) -> bool {
         let share = share(self.times_s, a, b, k);
-        let mut off_px = 0.0;
-        for c in 0..2 {
-            let [a, b, k] = [a, b, k].map(|i| f64::from(self.weights[i][c]));
-            off_px += (a + (b - a) * share - k).abs() * self.reach_px[c];
-        }
+        let [a, b, k] = [a, b, k].map(|i| self.weights[i]);
+        let off_px = off_line(a.sine, b.sine, k.sine, share) * self.sine_reach_px
+            + off_line(a.cosine, b.cosine, k.cosine, share) * self.cosine_reach_px;
         off_px <= self.tolerance_px
     }
+}
+
+/// By how much `k` is off what lies at `share` of the way from `a` to `b`.
+fn off_line(a: f32, b: f32, k: f32, share: f64) -> f64 {
+    let [a, b, k] = [a, b, k].map(f64::from);
+    (a + (b - a) * share - k).abs()
 }
 
 /// Length of the longest of these ways.

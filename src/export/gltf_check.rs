@@ -87,7 +87,10 @@ fn check_leaves(model: &Model, k: usize, group: &FoliageGroup) -> Result<(), Exp
     let Some(swings) = model.flutter.get(k) else {
         return Ok(());
     };
-    if swings.len() != model.poses.len() || !swings.iter().flatten().all(|x| x.is_finite()) {
+    let sound = swings
+        .iter()
+        .all(|s| s.sine.is_finite() && s.cosine.is_finite());
+    if swings.len() != model.poses.len() || !sound {
         return Err(ExportError::unfit(format!(
             "group {k} of its leaves swings in other frames than the tree"
         )));

@@ -2,7 +2,7 @@
 
 use super::ExportError;
 use crate::geometry::Dressed;
-use crate::model::{Pose, Skeleton};
+use crate::model::{LeafSwing, Pose, Skeleton};
 use gltf_json::extras::RawValue;
 use serde_json::Value;
 
@@ -21,7 +21,7 @@ pub struct Model<'a> {
     pub poses: &'a [Pose],
     /// How far each group of leaves swings in every pose: the weights of its two displacements.
     /// Empty: not at all.
-    pub flutter: &'a [Vec<[f32; 2]>],
+    pub flutter: &'a [Vec<LeafSwing>],
     /// All levels of detail of the wood, as scenes `lod0`, `lod1`, ... on the same joints, instead
     /// of the first alone.
     pub all_levels: bool,

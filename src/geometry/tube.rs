@@ -3,7 +3,7 @@
 use super::chain::{self, Chain};
 use super::mesh::Mesh;
 use crate::shape::{CenterlineSample, square_to};
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Point2, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
 /// Numbers of sides that are used: few steps, so that few rings differ from the next.
@@ -161,7 +161,7 @@ fn add_ring(mesh: &mut Mesh, ring: &Ring, frame: &Frame, sides: usize, radius: f
         let outward = frame.across * cos + third * sin;
         let normal = (outward - ring.tangent * slope).normalize();
         let at = ring.sample.at.coords + outward * radius;
-        let uv = [j as f64 / sides as f64, frame.v];
+        let uv = Point2::new(j as f64 / sides as f64, frame.v);
         vertex(mesh, at, normal, uv, &ring.sample);
     }
 }
@@ -266,7 +266,7 @@ fn close_base(mesh: &mut Mesh, ring: &Ring, across: Vector3<f64>) {
             mesh,
             rim,
             -ring.tangent,
-            [0.5 + 0.5 * cos, 0.5 + 0.5 * sin],
+            Point2::new(0.5 + 0.5 * cos, 0.5 + 0.5 * sin),
             &ring.sample,
         );
     }
@@ -279,13 +279,13 @@ fn vertex(
     mesh: &mut Mesh,
     at: Vector3<f64>,
     normal: Vector3<f64>,
-    uv: [f64; 2],
+    uv: Point2<f64>,
     sample: &CenterlineSample,
 ) {
     mesh.positions.push([at.x as f32, at.y as f32, at.z as f32]);
     mesh.normals
         .push([normal.x as f32, normal.y as f32, normal.z as f32]);
-    mesh.uvs.push([uv[0] as f32, uv[1] as f32]);
+    mesh.uvs.push([uv.x as f32, uv.y as f32]);
     mesh.joints.push(sample.skin.joints);
     mesh.weights.push(sample.skin.weights);
 }

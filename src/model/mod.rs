@@ -7,6 +7,7 @@
 mod control;
 mod frame;
 mod hierarchy;
+mod leaf_swing;
 mod main_branch;
 mod outline;
 mod pose;
@@ -24,6 +25,7 @@ pub use frame::{
     Frame, Luma, Picture, PixelFormat, RawFrame, Rgb, Size, TimedFrame, nanoseconds, seconds,
 };
 pub use hierarchy::{Cluster, ClusterId, MotionHierarchy};
+pub use leaf_swing::LeafSwing;
 pub use main_branch::MAIN_BRANCH_RGB;
 pub use outline::Outline;
 pub use pose::{JointPose, Pose};

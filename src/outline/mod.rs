@@ -20,6 +20,7 @@ pub use polygon::{PolygonFile, crossing, outline as from_polygon};
 pub use scribbles::{Given, Mark, Scribbles};
 
 use crate::model::{Outline, Size};
+use nalgebra::Point2;
 use std::path::{Path, PathBuf};
 
 /// Where the outline comes from.
@@ -74,7 +75,8 @@ pub fn parse(text: &str, name: String, size: Size) -> Result<Outline, OutlineErr
             wanted: size,
         });
     }
-    polygon::outline(&file.polygon_px, size).map_err(|e| match e {
+    let polygon_px: Vec<Point2<f64>> = file.polygon_px.into_iter().map(Point2::from).collect();
+    polygon::outline(&polygon_px, size).map_err(|e| match e {
         OutlineError::BadPolygon { what } => OutlineError::BadFile { name, what },
         other => other,
     })

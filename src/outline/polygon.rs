@@ -3,6 +3,7 @@
 use super::error::OutlineError;
 use super::region;
 use crate::model::{Outline, Size};
+use nalgebra::Point2;
 use serde::Deserialize;
 
 /// The outline file of the contract: `{"frame": 0, "width": W, "height": H, "polygon_px": [[u, v],
@@ -26,16 +27,16 @@ pub fn parse(text: &str, name: &str) -> Result<PolygonFile, OutlineError> {
 ///
 /// # Errors
 /// Fewer than three different corners, a corner outside the picture, edges that cross, or no area.
-pub fn outline(polygon_px: &[[f64; 2]], size: Size) -> Result<Outline, OutlineError> {
+pub fn outline(polygon_px: &[Point2<f64>], size: Size) -> Result<Outline, OutlineError> {
     let corners = corners(polygon_px, size).map_err(OutlineError::bad_polygon)?;
     region::fill(size, &corners).map_err(OutlineError::bad_polygon)
 }
 
 /// The different corners of a polygon that can be an outline, or why it cannot.
-fn corners(polygon_px: &[[f64; 2]], size: Size) -> Result<Vec<[f64; 2]>, String> {
-    let mut corners: Vec<[f64; 2]> = Vec::with_capacity(polygon_px.len());
+fn corners(polygon_px: &[Point2<f64>], size: Size) -> Result<Vec<Point2<f64>>, String> {
+    let mut corners: Vec<Point2<f64>> = Vec::with_capacity(polygon_px.len());
     for &p in polygon_px {
-        let [u, v] = p;
+        let (u, v) = (p.x, p.y);
         if !(u.is_finite() && v.is_finite() && size.contains(u, v)) {
             return Err(format!("corner ({u}, {v}) lies outside the {size} picture"));
         }
@@ -63,7 +64,7 @@ fn corners(polygon_px: &[[f64; 2]], size: Size) -> Result<Vec<[f64; 2]>, String>
 }
 
 /// The first two edges (numbered from their first corner) that cross each other.
-pub fn crossing(corners: &[[f64; 2]]) -> Option<(usize, usize)> {
+pub fn crossing(corners: &[Point2<f64>]) -> Option<(usize, usize)> {
     let n = corners.len();
     for i in 0..n {
         for j in i + 2..n {
@@ -80,21 +81,17 @@ pub fn crossing(corners: &[[f64; 2]]) -> Option<(usize, usize)> {
 
 /// Whether the edge from `a` to `b` crosses that from `c` to `d`. Edges that only touch are no
 /// harm: the pixels inside are the same whichever way one goes round.
-fn edges_cross(a: [f64; 2], b: [f64; 2], c: [f64; 2], d: [f64; 2]) -> bool {
-    side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0
+fn edges_cross(a: Point2<f64>, b: Point2<f64>, c: Point2<f64>, d: Point2<f64>) -> bool {
+    let (ab, cd) = (b - a, d - c);
+    ab.perp(&(c - a)) * ab.perp(&(d - a)) < 0.0 && cd.perp(&(a - c)) * cd.perp(&(b - c)) < 0.0
 }
 
-/// Positive and negative on the two sides of the line from `p` to `q`.
-fn side(p: [f64; 2], q: [f64; 2], r: [f64; 2]) -> f64 {
-    (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
-}
-
-fn area(corners: &[[f64; 2]]) -> f64 {
+fn area(corners: &[Point2<f64>]) -> f64 {
     let next = corners.iter().cycle().skip(1);
     corners
         .iter()
         .zip(next)
-        .map(|(a, b)| a[0] * b[1] - b[0] * a[1])
+        .map(|(a, b)| a.coords.perp(&b.coords))
         .sum::<f64>()
         .abs()
         / 2.0
@@ -125,7 +122,8 @@ mod tests {
             (&[[f64::NAN, 1.0], [3.0, 1.0], [2.0, 3.0]], "outside"),
         ];
         for (polygon, expected) in cases {
-            let message = outline(polygon, size).unwrap_err().to_string();
+            let polygon: Vec<Point2<f64>> = polygon.iter().map(|p| Point2::from(*p)).collect();
+            let message = outline(&polygon, size).unwrap_err().to_string();
             assert!(message.contains(expected), "{polygon:?}: {message}");
         }
     }
@@ -139,7 +137,8 @@ mod tests {
                 [40.0, 60.0],
                 [10.0, 60.0],
                 [10.0, 10.0],
-            ],
+            ]
+            .map(Point2::from),
             Size::new(100, 80),
         );
         let o = o.unwrap();

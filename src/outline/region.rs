@@ -2,6 +2,7 @@
 //! (OpenCV).
 
 use crate::model::{Outline, Size};
+use nalgebra::Point2;
 use opencv::core::{Mat, Point, Scalar, Size as CvSize, ToInputArray, Vector};
 use opencv::imgproc::{
     CHAIN_APPROX_SIMPLE, FILLED, LINE_8, MORPH_CLOSE, MORPH_DILATE, MORPH_ELLIPSE, RETR_EXTERNAL,
@@ -11,10 +12,10 @@ use opencv::imgproc::{
 use opencv::prelude::*;
 
 /// The pixels inside a polygon (px, at least three corners), its border included.
-pub fn fill(size: Size, polygon_px: &[[f64; 2]]) -> opencv::Result<Outline> {
+pub fn fill(size: Size, polygon_px: &[Point2<f64>]) -> opencv::Result<Outline> {
     let corners: Vector<Point> = polygon_px
         .iter()
-        .map(|p| Point::new(p[0].round() as i32, p[1].round() as i32))
+        .map(|p| Point::new(p.x.round() as i32, p.y.round() as i32))
         .collect();
     let mut mask = Mat::new_rows_cols_with_default(
         size.height as i32,

@@ -5,7 +5,7 @@ use super::leaves::InLeaf;
 use super::seen::Seen;
 use crate::config::Config;
 use crate::geometry::{Dressed, wood_levels};
-use crate::model::{NodeId, Pose, Skeleton};
+use crate::model::{LeafSwing, NodeId, Pose, Skeleton};
 use crate::motion;
 use crate::shape::{Bounds, limbs, room};
 
@@ -15,9 +15,18 @@ pub fn flutter(
     poses: &[Pose],
     skeleton: &Skeleton,
     config: &Config,
-) -> Vec<Vec<[f32; 2]>> {
+) -> Vec<Vec<LeafSwing>> {
     let groups: Vec<NodeId> = dressed.foliage.groups.iter().map(|g| g.node).collect();
-    motion::flutter(poses, skeleton, &groups, &config.leaves)
+    let mut of_groups = Vec::with_capacity(groups.len());
+    for weights in motion::flutter(poses, skeleton, &groups, &config.leaves) {
+        let swings = weights.into_iter();
+        of_groups.push(
+            swings
+                .map(|[sine, cosine]| LeafSwing { sine, cosine })
+                .collect(),
+        );
+    }
+    of_groups
 }
 
 /// Dresses a skeleton.

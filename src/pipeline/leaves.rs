@@ -11,7 +11,7 @@ use crate::shape::Limb;
 
 /// What is to be known of the leaves before they grow.
 pub(super) struct InLeaf {
-    seeds: Vec<[f32; 2]>,
+    seeds: Vec<nalgebra::Point2<f32>>,
     /// The picture shows them.
     filmed: bool,
     /// A drawn density, where there is one: nothing grows outside of the outline, or of the shape

@@ -103,8 +103,7 @@ impl<'a> TrackThread<'a> {
     fn honour(&mut self, wish: Control) {
         match wish {
             Control::SetOutline(polygon_px) => match self.decode.size().map(|size| {
-                let corners_px: Vec<_> = polygon_px.iter().map(|p| (*p).into()).collect();
-                outline::from_polygon(&corners_px, size)
+                outline::from_polygon(&polygon_px, size)
             }) {
                 Some(Ok(outline)) => self.restart(Some(outline)),
                 Some(Err(e)) => self.shared.warn(e.to_string()),

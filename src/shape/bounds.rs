@@ -3,7 +3,7 @@
 use super::Envelope;
 use crate::config::EnvelopeKind;
 use crate::model::{Outline, Skeleton};
-use nalgebra::Point3;
+use nalgebra::{Point2, Point3};
 
 /// What an outline says about the space that the tree stands in.
 #[derive(Clone, Copy, Debug)]
@@ -21,7 +21,7 @@ pub fn room<'a>(
     outline: Option<&'a Outline>,
     bounds: Bounds,
 ) -> impl Fn(&Point3<f64>, &Point3<f64>) -> bool + use<'a> {
-    let foot_px = skeleton.foot_px.into();
+    let foot_px = Point2::from(skeleton.foot_px);
     let envelope = outline.map(|outline| match bounds {
         Bounds::Drawn => Envelope::of_drawn(outline, foot_px),
         Bounds::Filmed(kind) => Envelope::of_filmed(kind, outline, foot_px, &places(skeleton)),
@@ -42,8 +42,8 @@ pub fn room<'a>(
 }
 
 /// Whether a point (model axes, px) is within the outline as seen from the front.
-fn appears_within(outline: &Outline, foot_px: [f64; 2], p: &Point3<f64>) -> bool {
-    outline.contains(foot_px[0] + p.x, foot_px[1] - p.y)
+fn appears_within(outline: &Outline, foot_px: Point2<f64>, p: &Point3<f64>) -> bool {
+    outline.contains(foot_px.x + p.x, foot_px.y - p.y)
 }
 
 /// Where the measured nodes are, model axes, px.

@@ -4,6 +4,7 @@
 //! is a small, turned copy of a part of the tree itself.
 
 use super::branches::{continuations, direction};
+use crate::bounds::Bounds;
 use crate::model::Skeleton;
 use crate::random::Generator;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -13,9 +14,9 @@ use std::f64::consts::FRAC_PI_2;
 
 /// Angles between a branch and what leaves it that are believed, rad; others are noise of the
 /// skeleton.
-const ANGLES: [f64; 2] = [0.35, 1.15];
+const ANGLES: Bounds = Bounds::new(0.35, 1.15);
 /// Reaches of side branches against that of what they leave that are believed.
-const RATIOS: [f64; 2] = [0.25, 0.6];
+const RATIOS: Bounds = Bounds::new(0.25, 0.6);
 /// Both where the skeleton shows none.
 const ANGLE_RAD: f64 = 0.75;
 const RATIO: f64 = 0.45;
@@ -105,8 +106,8 @@ impl BranchingStatistics {
             };
             if goes_on[p].is_none_or(|on| on.index() != i) {
                 let ratio = measured.whole_reach_px(i) / measured.reach_px[p];
-                angles.push(own.angle(&before).clamp(ANGLES[0], ANGLES[1]));
-                ratios.push(ratio.clamp(RATIOS[0], RATIOS[1]));
+                angles.push(ANGLES.clamp(own.angle(&before)));
+                ratios.push(RATIOS.clamp(ratio));
             }
             if measured.children[i].is_empty() {
                 slopes.push(own.y);

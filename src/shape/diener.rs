@@ -5,13 +5,15 @@ use super::planes::model_from_image;
 use super::trunk::in_trunk;
 use crate::model::{Node, NodeId, NodeName, Outline, Skeleton};
 use crate::skeleton::Node2d;
-use nalgebra::Point3;
+use nalgebra::{Point2, Point3, Vector2};
 
 /// Every node of the crown twice, on the near and on the far side of the ellipsoid of revolution
 /// about the vertical that holds the crown's nodes; the copies are the mirror image of the
 /// originals in depth.
 pub fn diener(flat: &[Node2d], tracks: &[u32], trunk: &[bool], outline: &Outline) -> Skeleton {
-    let foot_px = flat.first().map_or([0.0, 0.0], |n| n.position_px.into());
+    let foot_px = flat
+        .first()
+        .map_or(Point2::origin(), |n| n.position_px.into());
     let places: Vec<Point3<f64>> = flat
         .iter()
         .map(|n| model_from_image(n.position_px.into(), foot_px))
@@ -62,9 +64,9 @@ pub fn diener(flat: &[Node2d], tracks: &[u32], trunk: &[bool], outline: &Outline
 
 /// An ellipsoid of revolution about the vertical, px.
 struct Ellipsoid {
-    centre: [f64; 2],
+    centre: Point2<f64>,
     /// Half of its width and of its height, but for the factor below.
-    half: [f64; 2],
+    half: Vector2<f64>,
     /// Square of the factor that makes it hold all points.
     farthest_sq: f64,
 }
@@ -81,11 +83,11 @@ impl Ellipsoid {
             (low, high) = (low.inf(point), high.sup(point));
         }
         let mut ellipsoid = Self {
-            centre: [(low.x + high.x) / 2.0, (low.y + high.y) / 2.0],
-            half: [
+            centre: Point2::new((low.x + high.x) / 2.0, (low.y + high.y) / 2.0),
+            half: Vector2::new(
                 ((high.x - low.x) / 2.0).max(1.0),
                 ((high.y - low.y) / 2.0).max(1.0),
-            ],
+            ),
             farthest_sq: 1.0,
         };
         for point in crown {
@@ -96,12 +98,13 @@ impl Ellipsoid {
 
     /// Square of the distance from the centre, 1 on the ellipse of the box.
     fn off_sq(&self, p: &Point3<f64>) -> f64 {
-        ((p.x - self.centre[0]) / self.half[0]).powi(2)
-            + ((p.y - self.centre[1]) / self.half[1]).powi(2)
+        (p.xy() - self.centre)
+            .component_div(&self.half)
+            .norm_squared()
     }
 
     /// Depth of the near side at a point of the crown, px.
     fn depth(&self, p: &Point3<f64>) -> f64 {
-        self.half[0] * (self.farthest_sq - self.off_sq(p)).max(0.0).sqrt()
+        self.half.x * (self.farthest_sq - self.off_sq(p)).max(0.0).sqrt()
     }
 }

@@ -2,9 +2,10 @@
 //! Okabe et al.), the hull of the skeleton turned (Zeng 2015 sect. 5.5), or a drawn shape.
 
 use super::hull::{convex_hull, crossed};
+use crate::bounds::Bounds;
 use crate::config::EnvelopeKind;
 use crate::model::Outline;
-use nalgebra::Point3;
+use nalgebra::{Point2, Point3};
 
 /// Farthest from the foot that a point of a hull is, px: there is a disc for every pixel of its
 /// height.
@@ -19,7 +20,7 @@ pub struct Envelope {
     bottom_y: f64,
     discs: Vec<Disc>,
     /// Stretches of x of every disc that are inside, from left to right; empty: all is.
-    stretches: Vec<Vec<[f64; 2]>>,
+    stretches: Vec<Vec<Bounds>>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,10 +30,10 @@ struct Disc {
 }
 
 impl Disc {
-    fn between(left: f64, right: f64) -> Self {
+    fn between(ends: Bounds) -> Self {
         Self {
-            centre_x: (left + right) / 2.0,
-            radius: (right - left) / 2.0,
+            centre_x: (ends.lo + ends.hi) / 2.0,
+            radius: ends.length() / 2.0,
         }
     }
 }
@@ -40,7 +41,7 @@ impl Disc {
 impl Envelope {
     /// Turns `outline` about the middle of each of its rows; rows that the region does not touch
     /// are bridged.
-    pub fn of_revolution(outline: &Outline, foot_px: [f64; 2]) -> Self {
+    pub fn of_revolution(outline: &Outline, foot_px: Point2<f64>) -> Self {
         Self::turned(
             outline.bounds_px(),
             outline.size.width as usize,
@@ -53,7 +54,7 @@ impl Envelope {
     /// of the shape has gaps, as between the lobes of a heart, so has the envelope through its
     /// whole depth. The depth is that of the whole row, as lobes that were turned each for itself
     /// would meet in a step.
-    pub fn of_drawn(outline: &Outline, foot_px: [f64; 2]) -> Self {
+    pub fn of_drawn(outline: &Outline, foot_px: Point2<f64>) -> Self {
         let mut envelope = Self::of_revolution(outline, foot_px);
         let width = outline.size.width as usize;
         // Not from the heights: those of a foot that is far away are not exact.
@@ -63,23 +64,23 @@ impl Envelope {
         let rows = (top..=bottom)
             .rev()
             .map(|v| &outline.mask[v as usize * width..][..width]);
-        envelope.stretches = rows.map(|row| stretches(row, foot_px[0])).collect();
+        envelope.stretches = rows.map(|row| stretches(row, foot_px.x)).collect();
         envelope
     }
 
     /// Turns the convex hull of `points` (model axes, px; z is not looked at), half a pixel wider
     /// all around. Points farther from the foot than any picture is large are left out.
     pub fn of_hull(points: &[Point3<f64>]) -> Self {
-        let flat: Vec<[f64; 2]> = points
+        let flat: Vec<Point2<f64>> = points
             .iter()
-            .map(|p| [p.x, p.y])
+            .map(|p| p.xy())
             .filter(|p| p.iter().all(|c| c.abs() <= FARTHEST_OF_HULL))
             .collect();
         let hull = convex_hull(&flat);
         let (mut bottom, mut top) = (f64::INFINITY, f64::NEG_INFINITY);
         for corner in &hull {
-            bottom = bottom.min(corner[1].floor());
-            top = top.max(corner[1].ceil());
+            bottom = bottom.min(corner.y.floor());
+            top = top.max(corner.y.ceil());
         }
         if bottom > top {
             return Self::empty();
@@ -87,8 +88,8 @@ impl Envelope {
         let rows = (top - bottom) as usize + 1;
         let mut discs = Vec::with_capacity(rows);
         for k in 0..rows {
-            let (left, right) = crossed(&hull, bottom + k as f64);
-            discs.push(Disc::between(left - 0.5, right + 0.5));
+            let ends = crossed(&hull, bottom + k as f64);
+            discs.push(Disc::between(Bounds::new(ends.lo - 0.5, ends.hi + 0.5)));
         }
         Self {
             bottom_y: bottom,
@@ -102,7 +103,7 @@ impl Envelope {
     pub fn of_filmed(
         kind: EnvelopeKind,
         outline: &Outline,
-        foot_px: [f64; 2],
+        foot_px: Point2<f64>,
         places: &[Point3<f64>],
     ) -> Self {
         match kind {
@@ -119,7 +120,7 @@ impl Envelope {
         }
     }
 
-    fn turned(bounds: Option<[u32; 4]>, width: usize, mask: &[u8], foot_px: [f64; 2]) -> Self {
+    fn turned(bounds: Option<[u32; 4]>, width: usize, mask: &[u8], foot_px: Point2<f64>) -> Self {
         let Some([_, top, _, bottom]) = bounds else {
             return Self::empty();
         };
@@ -135,15 +136,15 @@ impl Envelope {
                 .position(|&m| m != 0)
                 .zip(row.iter().rposition(|&m| m != 0));
             if let Some((left, right)) = ends {
-                last = Disc::between(
-                    left as f64 - 0.5 - foot_px[0],
-                    right as f64 + 0.5 - foot_px[0],
-                );
+                last = Disc::between(Bounds::new(
+                    left as f64 - 0.5 - foot_px.x,
+                    right as f64 + 0.5 - foot_px.x,
+                ));
             }
             discs.push(last);
         }
         Self {
-            bottom_y: foot_px[1] - f64::from(bottom),
+            bottom_y: foot_px.y - f64::from(bottom),
             discs,
             stretches: Vec::new(),
         }
@@ -180,7 +181,7 @@ impl Envelope {
     fn is_seen_inside(&self, row: usize, x: f64) -> bool {
         self.stretches
             .get(row)
-            .is_none_or(|of| of.iter().any(|[left, right]| (*left..=*right).contains(&x)))
+            .is_none_or(|of| of.iter().any(|stretch| stretch.contains(x)))
     }
 
     /// How deep the envelope is at (`x`, `y`): it reaches from -depth to depth in z; `None`
@@ -217,7 +218,7 @@ impl Envelope {
 
     fn nearest_inside(&self, row: usize, x: f64) -> f64 {
         let stretches = self.stretches.get(row).map_or(&[][..], Vec::as_slice);
-        let clamped = stretches.iter().map(|[left, right]| x.clamp(*left, *right));
+        let clamped = stretches.iter().map(|stretch| stretch.clamp(x));
         clamped
             .min_by(|a, b| (a - x).abs().total_cmp(&(b - x).abs()))
             .unwrap_or(x)
@@ -252,14 +253,14 @@ impl Envelope {
 }
 
 /// What of a row of a mask is inside, x from the foot, px.
-fn stretches(row: &[u8], foot_u: f64) -> Vec<[f64; 2]> {
-    let mut out: Vec<[f64; 2]> = Vec::new();
+fn stretches(row: &[u8], foot_u: f64) -> Vec<Bounds> {
+    let mut out: Vec<Bounds> = Vec::new();
     let mut open = false;
     for (u, &m) in row.iter().enumerate() {
         let x = u as f64 - foot_u;
         match out.last_mut().filter(|_| open) {
-            Some(last) if m != 0 => last[1] = x + 0.5,
-            None if m != 0 => out.push([x - 0.5, x + 0.5]),
+            Some(last) if m != 0 => last.hi = x + 0.5,
+            None if m != 0 => out.push(Bounds::new(x - 0.5, x + 0.5)),
             _ => {}
         }
         open = m != 0;
@@ -283,7 +284,7 @@ mod tests {
             matte: None,
         };
         for foot in [1e18, -1e18, 7.5] {
-            let envelope = Envelope::of_drawn(&outline, [foot, foot]);
+            let envelope = Envelope::of_drawn(&outline, Point2::new(foot, foot));
             assert_eq!((envelope.discs.len(), envelope.stretches.len()), (6, 6));
         }
         let far = [

@@ -1,10 +1,13 @@
 //! Convex hull of points in the plane.
 
+use crate::bounds::Bounds;
+use nalgebra::Point2;
+
 /// Corners of the convex hull, counter-clockwise, by Andrew's monotone chain; fewer than three
 /// where all points lie on a line. Coordinates must be numbers.
-pub(super) fn convex_hull(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+pub(super) fn convex_hull(points: &[Point2<f64>]) -> Vec<Point2<f64>> {
     let mut sorted = points.to_vec();
-    sorted.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    sorted.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     sorted.dedup();
     if sorted.len() < 3 {
         return sorted;
@@ -17,11 +20,11 @@ pub(super) fn convex_hull(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
 }
 
 /// One side of the hull of sorted points, both ends included.
-fn half<'a>(points: impl Iterator<Item = &'a [f64; 2]>) -> Vec<[f64; 2]> {
-    let mut side: Vec<[f64; 2]> = Vec::new();
+fn half<'a>(points: impl Iterator<Item = &'a Point2<f64>>) -> Vec<Point2<f64>> {
+    let mut side: Vec<Point2<f64>> = Vec::new();
     for &p in points {
         while let [.., a, b] = side[..] {
-            if (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) > 0.0 {
+            if (b - a).perp(&(p - a)) > 0.0 {
                 break;
             }
             side.pop();
@@ -33,22 +36,22 @@ fn half<'a>(points: impl Iterator<Item = &'a [f64; 2]>) -> Vec<[f64; 2]> {
 
 /// Where the horizontal line at `y` enters and leaves a convex polygon; beyond its ends, as at its
 /// nearest corner.
-pub(super) fn crossed(hull: &[[f64; 2]], y: f64) -> (f64, f64) {
-    let mut ends: Option<(f64, f64)> = None;
+pub(super) fn crossed(hull: &[Point2<f64>], y: f64) -> Bounds {
+    let mut ends: Option<Bounds> = None;
     for (a, b) in hull.iter().zip(hull.iter().cycle().skip(1)) {
-        if !(a[1].min(b[1])..=a[1].max(b[1])).contains(&y) {
+        if !(a.y.min(b.y)..=a.y.max(b.y)).contains(&y) {
             continue;
         }
         // Of a level side both corners; the second is the first of the next side.
-        let t = if a[1] == b[1] {
+        let t = if a.y == b.y {
             0.0
         } else {
-            (y - a[1]) / (b[1] - a[1])
+            (y - a.y) / (b.y - a.y)
         };
-        let x = a[0] + t * (b[0] - a[0]);
+        let x = a.x + t * (b.x - a.x);
         ends = Some(match ends {
-            Some((left, right)) => (left.min(x), right.max(x)),
-            None => (x, x),
+            Some(ends) => Bounds::new(ends.lo.min(x), ends.hi.max(x)),
+            None => Bounds::new(x, x),
         });
     }
     if let Some(ends) = ends {
@@ -56,6 +59,6 @@ pub(super) fn crossed(hull: &[[f64; 2]], y: f64) -> (f64, f64) {
     }
     let corner = hull
         .iter()
-        .min_by(|a, b| (a[1] - y).abs().total_cmp(&(b[1] - y).abs()));
-    corner.map_or((0.0, 0.0), |c| (c[0], c[0]))
+        .min_by(|a, b| (a.y - y).abs().total_cmp(&(b.y - y).abs()));
+    corner.map_or(Bounds::default(), |c| Bounds::new(c.x, c.x))
 }

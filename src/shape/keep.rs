@@ -3,7 +3,7 @@
 use super::angles::angle_between;
 use super::envelope::Envelope;
 use crate::model::{NodeId, Skeleton};
-use nalgebra::{Point3, Rotation3, Vector3};
+use nalgebra::{Point2, Point3, Rotation3, Vector2, Vector3};
 use std::f64::consts::FRAC_PI_2;
 
 /// A node of the old tree that goes on in the new one.
@@ -12,7 +12,7 @@ pub struct Twin {
     pub old: NodeId,
     /// By how much the rest places of the points that both trees share have moved in the picture,
     /// px: the node moves with them.
-    pub moved_px: [f64; 2],
+    pub moved_px: Vector2<f64>,
 }
 
 /// Halvings of a push that would leave the envelope before it is given up.
@@ -47,12 +47,9 @@ fn copy_on_plane(old: &Skeleton, twin: Twin, plane_angle: f64) -> Option<Twin> {
 
 /// The same tree with its foot, and with it the model's axes, at `foot_px`; all else stays where it
 /// is in the picture.
-pub fn on_foot(mut skeleton: Skeleton, foot_px: [f64; 2]) -> Skeleton {
-    let way = Vector3::new(
-        skeleton.foot_px[0] - foot_px[0],
-        foot_px[1] - skeleton.foot_px[1],
-        0.0,
-    );
+pub fn on_foot(mut skeleton: Skeleton, foot_px: Point2<f64>) -> Skeleton {
+    let was_px = Point2::from(skeleton.foot_px);
+    let way = Vector3::new(was_px.x - foot_px.x, foot_px.y - was_px.y, 0.0);
     for node in skeleton.nodes.iter_mut().skip(1) {
         node.position += way;
     }
@@ -119,11 +116,11 @@ fn old_places(new: &Skeleton, old: &Skeleton, twins: &[Option<Twin>]) -> Vec<Opt
     for ((place, node), twin) in places.iter_mut().zip(&new.nodes).zip(twins) {
         if let Some(Twin {
             old: twin,
-            moved_px: [du, dv],
+            moved_px,
         }) = *twin
         {
             let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), node.plane_angle);
-            let moved = turn * Vector3::new(du, -dv, 0.0);
+            let moved = turn * Vector3::new(moved_px.x, -moved_px.y, 0.0);
             *place = Some(old.nodes[twin.index()].position + moved);
         }
     }

@@ -5,7 +5,7 @@ use super::envelope::Envelope;
 use super::trunk::in_trunk;
 use crate::model::{Node, NodeId, NodeKind, NodeName, Outline, Skeleton};
 use crate::skeleton::Node2d;
-use nalgebra::{Point3, Rotation3, Vector3};
+use nalgebra::{Point2, Point3, Rotation3, Vector3};
 use std::f64::consts::PI;
 
 /// Stands the 2D skeleton in the plane z = 0 and repeats all that is not `trunk` on `planes - 1`
@@ -21,7 +21,9 @@ pub fn copy_to_planes(
     envelope: &Envelope,
     planes: u32,
 ) -> Skeleton {
-    let foot_px = flat.first().map_or([0.0, 0.0], |n| n.position_px.into());
+    let foot_px = flat
+        .first()
+        .map_or(Point2::origin(), |n| n.position_px.into());
     let mut nodes = measured_nodes(flat, tracks, foot_px);
     place(&mut nodes, envelope);
     let axes = axes(&nodes, trunk);
@@ -57,16 +59,12 @@ pub fn copy_to_planes(
 }
 
 /// A place in the picture in model axes, in the plane z = 0 through the foot, px.
-pub(super) fn model_from_image(position_px: [f64; 2], foot_px: [f64; 2]) -> Point3<f64> {
-    Point3::new(
-        position_px[0] - foot_px[0],
-        foot_px[1] - position_px[1],
-        0.0,
-    )
+pub(super) fn model_from_image(position_px: Point2<f64>, foot_px: Point2<f64>) -> Point3<f64> {
+    Point3::new(position_px.x - foot_px.x, foot_px.y - position_px.y, 0.0)
 }
 
 /// The nodes of `flat` in the plane z = 0.
-fn measured_nodes(flat: &[Node2d], tracks: &[u32], foot_px: [f64; 2]) -> Vec<Node> {
+fn measured_nodes(flat: &[Node2d], tracks: &[u32], foot_px: Point2<f64>) -> Vec<Node> {
     let mut nodes = Vec::with_capacity(flat.len());
     for (i, (node, &n_tracks)) in flat.iter().zip(tracks).enumerate() {
         nodes.push(Node {

@@ -7,7 +7,7 @@ use super::trunk::trunk;
 use crate::config;
 use crate::model::{Outline, Skeleton};
 use crate::skeleton::Node2d;
-use nalgebra::Point3;
+use nalgebra::{Point2, Point3};
 
 /// The 3D skeleton of `flat`, with `tracks` points on each of its nodes: copied to planes, then
 /// pushed.
@@ -42,13 +42,20 @@ impl Prototype {
         outline: &Outline,
         settings: &config::Shape,
     ) -> Self {
-        let foot_px = flat.first().map_or([0.0, 0.0], |n| n.position_px.into());
+        let foot_px = flat
+            .first()
+            .map_or(Point2::origin(), |n| n.position_px.into());
         let places: Vec<Point3<f64>> = flat
             .iter()
             .map(|n| model_from_image(n.position_px.into(), foot_px))
             .collect();
         let envelope = Envelope::of_filmed(settings.envelope, outline, foot_px, &places);
-        let trunk = trunk(flat, settings.leader, &settings.leader_px);
+        let leader_px: Vec<Point2<f64>> = settings
+            .leader_px
+            .iter()
+            .map(|p| Point2::from(*p))
+            .collect();
+        let trunk = trunk(flat, settings.leader, &leader_px);
         let skeleton = copy_to_planes(flat, tracks, &trunk, outline, &envelope, settings.planes);
         Self {
             skeleton,

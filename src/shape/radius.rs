@@ -1,11 +1,12 @@
 //! How thick the branches are: the pipe model.
 
 use super::limb::{Grown, Limb};
+use crate::bounds::Bounds;
 use crate::model::Skeleton;
 
 /// Exponent e of `r_parent^e = sum r_child^e`, from and to. Shinozaki's pipes and Leonardo's rule
 /// give 2, measured trees 2 to 3.
-pub const PIPE_EXPONENTS: [f64; 2] = [1.8, 3.0];
+pub const PIPE_EXPONENTS: Bounds = Bounds::new(1.8, 3.0);
 /// Radius of the last twig, px at 640 px picture width.
 pub const TIP_RADIUS_PX: f64 = 0.6;
 /// A branch at whose end no twig stands counts as a pipe for each so many px of its length at 640
@@ -102,7 +103,7 @@ impl PipeModel {
             trunk,
             tip,
             total,
-            exponent: fits.clamp(PIPE_EXPONENTS[0], PIPE_EXPONENTS[1]),
+            exponent: PIPE_EXPONENTS.clamp(fits),
         }
     }
 

@@ -3,6 +3,7 @@
 use crate::config::Leader;
 use crate::model::Skeleton;
 use crate::skeleton::Node2d;
+use nalgebra::Point2;
 
 /// A node belongs to a drawn leader if it lies within this share of the tree's height from it.
 const REACH: f64 = 0.06;
@@ -12,17 +13,17 @@ const STRAIGHT: f64 = std::f64::consts::FRAC_PI_4;
 /// Which nodes of the flat skeleton are trunk: the foot, the trunk's top, and with a leader the
 /// chain that goes on from there along it. `leader_px` is the line that was drawn, from the foot
 /// up, px; it counts only with [`Leader::Drawn`].
-pub fn trunk(flat: &[Node2d], leader: Leader, leader_px: &[[f64; 2]]) -> Vec<bool> {
+pub fn trunk(flat: &[Node2d], leader: Leader, leader_px: &[Point2<f64>]) -> Vec<bool> {
     let mut trunk: Vec<bool> = flat.iter().map(|n| n.level < 2).collect();
-    let Some(foot) = flat.first().map(|n| n.position_px) else {
+    let Some(foot) = flat.first().map(|n| Point2::from(n.position_px)) else {
         return trunk;
     };
     let top_v = flat
         .iter()
-        .map(|n| n.position_px[1])
+        .map(|n| Point2::from(n.position_px).y)
         .filter(|v| v.is_finite())
-        .fold(foot[1], f64::min);
-    let reach = REACH * (foot[1] - top_v);
+        .fold(foot.y, f64::min);
+    let reach = REACH * (foot.y - top_v);
     let mut at = flat.iter().position(|n| n.level == 1);
     while let Some(from) = at {
         let children =
@@ -34,15 +35,12 @@ pub fn trunk(flat: &[Node2d], leader: Leader, leader_px: &[[f64; 2]]) -> Vec<boo
                 reach,
             ),
             Leader::Auto => {
-                let here = flat[from].position_px;
-                let before = flat[from].parent.map_or(foot, |p| flat[p].position_px);
+                let here = flat[from].position_px.into();
+                let before = flat[from]
+                    .parent
+                    .map_or(foot, |p| flat[p].position_px.into());
                 nearest(
-                    children.map(|i| {
-                        (
-                            i,
-                            turn(before.into(), here.into(), flat[i].position_px.into()),
-                        )
-                    }),
+                    children.map(|i| (i, turn(before, here, flat[i].position_px.into()))),
                     STRAIGHT,
                 )
             }
@@ -83,30 +81,28 @@ fn nearest(items: impl Iterator<Item = (usize, f64)>, limit: f64) -> Option<usiz
 }
 
 /// Distance of `p` from a line of several pieces, px.
-fn distance_to_line(p: [f64; 2], line: &[[f64; 2]]) -> f64 {
+fn distance_to_line(p: Point2<f64>, line: &[Point2<f64>]) -> f64 {
     line.windows(2)
         .map(|ends| distance_to_piece(p, ends[0], ends[1]))
         .fold(f64::INFINITY, f64::min)
 }
 
 /// Distance of `p` from the straight line between `from` and `to`, px.
-fn distance_to_piece(p: [f64; 2], from: [f64; 2], to: [f64; 2]) -> f64 {
-    let along = [to[0] - from[0], to[1] - from[1]];
-    let way = [p[0] - from[0], p[1] - from[1]];
-    let length_sq = along[0].powi(2) + along[1].powi(2);
+fn distance_to_piece(p: Point2<f64>, from: Point2<f64>, to: Point2<f64>) -> f64 {
+    let along = to - from;
+    let way = p - from;
+    let length_sq = along.norm_squared();
     let t = if length_sq > 0.0 {
-        (along[0] * way[0] + along[1] * way[1]) / length_sq
+        along.dot(&way) / length_sq
     } else {
         0.0
     };
-    let t = t.clamp(0.0, 1.0);
-    (way[0] - t * along[0]).hypot(way[1] - t * along[1])
+    let off = way - along * t.clamp(0.0, 1.0);
+    off.x.hypot(off.y)
 }
 
 /// By how much the way a-b-c turns at b, radians.
-fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
-    let (u, v) = ([b[0] - a[0], b[1] - a[1]], [c[0] - b[0], c[1] - b[1]]);
-    (u[0] * v[1] - u[1] * v[0])
-        .atan2(u[0] * v[0] + u[1] * v[1])
-        .abs()
+fn turn(a: Point2<f64>, b: Point2<f64>, c: Point2<f64>) -> f64 {
+    let (u, v) = (b - a, c - b);
+    u.perp(&v).atan2(u.dot(&v)).abs()
 }

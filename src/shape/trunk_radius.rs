@@ -1,6 +1,7 @@
 //! How thick the trunk is, as far as the outline tells.
 
 use crate::model::Outline;
+use nalgebra::Point2;
 
 /// Share of the outline's width that is trunk: outlines are drawn wide, masks that are found by
 /// motion are wider still.
@@ -20,15 +21,19 @@ const THICKEST: f64 = 0.12;
 /// wider than the trunk for many reasons, a fork or a low branch, and narrower for none, so the
 /// lower quartile of their widths counts: half of it, or where the outline has a matte, what is
 /// opaque of it.
-pub fn trunk_radius_px(outline: &Outline, foot_px: [f64; 2], top_px: [f64; 2]) -> Option<f64> {
-    let rise = foot_px[1] - top_px[1];
-    if !(foot_px.iter().chain(&top_px).all(|x| x.is_finite()) && rise > 0.0) {
+pub fn trunk_radius_px(
+    outline: &Outline,
+    foot_px: Point2<f64>,
+    top_px: Point2<f64>,
+) -> Option<f64> {
+    let rise = foot_px.y - top_px.y;
+    if !(foot_px.iter().chain(top_px.iter()).all(|x| x.is_finite()) && rise > 0.0) {
         return None;
     }
     let mut widths: Vec<f64> = Vec::new();
     for v in 0..outline.size.height as usize {
-        let share = (foot_px[1] - v as f64) / rise;
-        let u = foot_px[0] + share * (top_px[0] - foot_px[0]);
+        let share = (foot_px.y - v as f64) / rise;
+        let u = foot_px.x + share * (top_px.x - foot_px.x);
         if LOOKED_AT.contains(&share) && outline.contains(u, v as f64) {
             widths.push(width_in_row(outline, u.round() as usize, v));
         }
@@ -37,7 +42,7 @@ pub fn trunk_radius_px(outline: &Outline, foot_px: [f64; 2], top_px: [f64; 2]) -
     let narrow = *widths
         .get(widths.len() / 4)
         .filter(|_| widths.len() >= LEAST_ROWS)?;
-    let tall = foot_px[1] - f64::from(outline.bounds_px()?[1]);
+    let tall = foot_px.y - f64::from(outline.bounds_px()?[1]);
     (narrow > 0.0 && narrow <= THICKEST * tall).then_some(0.5 * narrow)
 }
 
@@ -92,7 +97,7 @@ mod tests {
 
     #[test]
     fn a_matte_gives_the_width_itself_and_an_outline_half_of_its_own() {
-        let (foot, top) = ([100.0, 199.0], [100.0, 90.0]);
+        let (foot, top) = (Point2::new(100.0, 199.0), Point2::new(100.0, 90.0));
         assert_eq!(trunk_radius_px(&outline(10, true), foot, top), Some(5.0));
         let drawn = trunk_radius_px(&outline(10, false), foot, top).expect("a trunk");
         assert!((drawn - 27.0 / 4.0).abs() < 0.6, "{drawn}");
@@ -102,21 +107,25 @@ mod tests {
     fn where_there_is_no_trunk_nothing_is_made_up() {
         let wide = outline(120, false);
         assert_eq!(
-            trunk_radius_px(&wide, [100.0, 199.0], [100.0, 90.0]),
+            trunk_radius_px(&wide, Point2::new(100.0, 199.0), Point2::new(100.0, 90.0)),
             None,
             "wider than a trunk can be"
         );
         assert_eq!(
-            trunk_radius_px(&wide, [100.0, 90.0], [100.0, 199.0]),
+            trunk_radius_px(&wide, Point2::new(100.0, 90.0), Point2::new(100.0, 199.0)),
             None,
             "upside down"
         );
         assert_eq!(
-            trunk_radius_px(&wide, [f64::NAN, 199.0], [100.0, 90.0]),
+            trunk_radius_px(
+                &wide,
+                Point2::new(f64::NAN, 199.0),
+                Point2::new(100.0, 90.0)
+            ),
             None
         );
         assert_eq!(
-            trunk_radius_px(&wide, [900.0, 199.0], [900.0, 90.0]),
+            trunk_radius_px(&wide, Point2::new(900.0, 199.0), Point2::new(900.0, 90.0)),
             None,
             "beside the picture"
         );

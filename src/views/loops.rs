@@ -2,7 +2,7 @@
 
 use crate::config::Config;
 use crate::geometry::Dressed;
-use crate::model::{Pose, Skeleton};
+use crate::model::{LeafSwing, Pose, Skeleton};
 use crate::pipeline::flutter;
 
 /// How far each group of leaves swings in every pose of a loop, the last of which is the first
@@ -12,7 +12,7 @@ pub(super) fn looped_flutter(
     poses: &[Pose],
     skeleton: &Skeleton,
     config: &Config,
-) -> Vec<Vec<[f32; 2]>> {
+) -> Vec<Vec<LeafSwing>> {
     let Some(laps) = Laps::of(poses) else {
         return flutter(dressed, poses, skeleton, config);
     };

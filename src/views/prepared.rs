@@ -9,7 +9,7 @@ use crate::export::gltf::{KEY_TOLERANCE_PX, Model, glb, provenance};
 use crate::export::sway::extras;
 use crate::export::{ExportError, html};
 use crate::geometry::{Dressed, Template};
-use crate::model::{Luma, Outline, Pose, Skeleton, Swaying, Unidentified};
+use crate::model::{LeafSwing, Luma, Outline, Pose, Skeleton, Swaying, Unidentified};
 use crate::pipeline::{MOST_RESHAPED, Seen, cut_to, dress, flutter, reshape};
 use crate::shape::{Cut, Drawn, Topiary};
 use serde_json::Value;
@@ -41,7 +41,7 @@ pub struct PreparedTree {
     /// Everything that is drawn of it.
     pub dressed: Dressed,
     /// How far each group of leaves swings in every pose.
-    pub flutter: Vec<Vec<[f32; 2]>>,
+    pub flutter: Vec<Vec<LeafSwing>>,
     /// What is known of the sway of every node.
     pub sway: Vec<Swaying>,
     /// Whether it differs from the tree in the tables.

@@ -5,7 +5,7 @@ use crate::document::DocumentError;
 use crate::draw::{Bounds, Camera, Look, Model, Posed, Rgba, Texture, View, picture};
 use crate::export::{ExportError, Film};
 use crate::files::WriteError;
-use crate::model::{Pose, Size};
+use crate::model::{LeafSwing, Pose, Size};
 use crate::signal::reflection::there_and_back;
 use std::f64::consts::TAU;
 use std::io::Cursor;
@@ -213,7 +213,7 @@ impl<'a> Studio<'a> {
             return self.model.posed(None, &[]);
         };
         let groups = self.tree.flutter.iter();
-        let swing: Vec<[f32; 2]> = groups
+        let swing: Vec<LeafSwing> = groups
             .map(|all| all.get(k).copied().unwrap_or_default())
             .collect();
         self.model.posed(self.tree.poses.get(k), &swing)

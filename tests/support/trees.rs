@@ -90,11 +90,15 @@ impl Flat {
         }
         let round = |k: usize| {
             let (sin, cos) = (std::f64::consts::TAU * k as f64 / 48.0).sin_cos();
-            [316.0 + 165.0 * sin, 170.0 + 150.0 * cos]
+            Point2::new(316.0 + 165.0 * sin, 170.0 + 150.0 * cos)
         };
-        let mut border = vec![[308.0, 340.0], [332.0, 340.0], [332.0, 315.0]];
+        let mut border = vec![
+            Point2::new(308.0, 340.0),
+            Point2::new(332.0, 340.0),
+            Point2::new(332.0, 315.0),
+        ];
         border.extend((2..47).map(round));
-        border.push([308.0, 315.0]);
+        border.push(Point2::new(308.0, 315.0));
         let outline = outline::from_polygon(&border, Size::new(640, 360)).expect("outline");
         Self {
             name: "generated",

@@ -5,7 +5,7 @@
 
 use arborcam::config::Wood;
 use arborcam::geometry::{Foliage, FoliageGroup, Mesh, wood};
-use arborcam::model::{JointPose, Node, NodeId, NodeName, Pose, Size, Skeleton};
+use arborcam::model::{JointPose, LeafSwing, Node, NodeId, NodeName, Pose, Size, Skeleton};
 use arborcam::shape::{Limb, limbs, thicken};
 use nalgebra::{Point2, Point3, Rotation3, UnitQuaternion, Vector3};
 
@@ -206,10 +206,13 @@ pub fn leaves(skeleton: &Skeleton) -> Foliage {
 }
 
 /// The weights with which they swing in every pose.
-pub fn flutter(foliage: &Foliage, poses: &[Pose]) -> Vec<Vec<[f32; 2]>> {
+pub fn flutter(foliage: &Foliage, poses: &[Pose]) -> Vec<Vec<LeafSwing>> {
     let swing = |p: &Pose| {
         let phase = std::f64::consts::TAU * foliage.frequency_hz * p.time_s;
-        [(0.3 * phase.sin()) as f32, (0.3 * phase.cos()) as f32]
+        LeafSwing {
+            sine: (0.3 * phase.sin()) as f32,
+            cosine: (0.3 * phase.cos()) as f32,
+        }
     };
     vec![poses.iter().map(swing).collect(); foliage.groups.len()]
 }

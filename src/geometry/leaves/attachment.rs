@@ -4,7 +4,7 @@ use super::canvas::Grid;
 use super::carry::{Carried, between};
 use crate::model::{NodeId, Pose, Skeleton};
 use crate::shape::{Limb, SkinWeights};
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point2, Point3, Vector3};
 use std::cmp::Ordering;
 
 /// Leaves sit where a limb is thinner than this share of the thickest.
@@ -31,7 +31,7 @@ pub(super) struct AttachmentPoint {
     /// Of the limb, px.
     pub radius: f64,
     /// Where the picture shows it.
-    pub cell: [f64; 2],
+    pub cell: Point2<f64>,
     /// Clusters that sit there.
     pub load: f64,
     /// On a limb that is too thick to bear leaves: only where there is no other way to hide it.
@@ -116,7 +116,7 @@ impl AttachmentPoints {
     /// several are all but equally near, on one of the front half of the tree if it is bright, of
     /// the back half if not, and there on the one that has fewest (Li 2011 app. B.1). Returns the
     /// place and how far it is in the picture, cells.
-    pub fn seat(&mut self, cell: [f64; 2], side: Side) -> Option<(usize, f64)> {
+    pub fn seat(&mut self, cell: Point2<f64>, side: Side) -> Option<(usize, f64)> {
         let hides = matches!(side, Side::Before(_));
         let near = self.near(cell, hides);
         let least = near.iter().map(|n| n.1).fold(f64::MAX, f64::min);
@@ -152,7 +152,7 @@ impl AttachmentPoints {
 
     /// Places within reach of a cell with their distance; if there are none, those of the first
     /// ring of squares that has some.
-    fn near(&self, cell: [f64; 2], thick: bool) -> Vec<(usize, f64)> {
+    fn near(&self, cell: Point2<f64>, thick: bool) -> Vec<(usize, f64)> {
         let [x, y] = square(cell, self.reach, [self.across, self.down]);
         let mut found = Vec::new();
         for ring in 1..=self.across.max(self.down) {
@@ -173,15 +173,15 @@ impl AttachmentPoints {
     fn add_in_square(
         &self,
         square: &[u32],
-        cell: [f64; 2],
+        cell: Point2<f64>,
         thick: bool,
         found: &mut Vec<(usize, f64)>,
     ) {
         for &i in square {
             let attachment = &self.all[i as usize];
             if thick || !attachment.thick {
-                let [u, v] = attachment.cell;
-                found.push((i as usize, (u - cell[0]).hypot(v - cell[1])));
+                let way = attachment.cell - cell;
+                found.push((i as usize, way.x.hypot(way.y)));
             }
         }
     }
@@ -202,7 +202,7 @@ impl Cost {
     }
 }
 
-fn square(cell: [f64; 2], side: f64, count: [usize; 2]) -> [usize; 2] {
+fn square(cell: Point2<f64>, side: f64, count: [usize; 2]) -> [usize; 2] {
     [0, 1].map(|k| ((cell[k] / side).max(0.0) as usize).min(count[k] - 1))
 }
 

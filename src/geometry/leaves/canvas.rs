@@ -1,7 +1,7 @@
 //! The grid on which colour and density are counted: the picture, made smaller where it is large.
 
 use crate::model::{Outline, Rgb, Size, Skeleton};
-use nalgebra::Point3;
+use nalgebra::{Point2, Point3, Vector2};
 use std::ops::Range;
 
 /// Wider pictures are counted at a whole part of their width: leaves are chosen by their density,
@@ -13,8 +13,8 @@ const LARGEST_PX: u32 = 800;
 pub(super) struct Grid {
     pub size: Size,
     /// Cells in a pixel of the source image, across and down.
-    scale: [f64; 2],
-    foot_px: [f64; 2],
+    scale: Vector2<f64>,
+    foot_px: Point2<f64>,
 }
 
 impl Grid {
@@ -22,10 +22,10 @@ impl Grid {
         let Size { width, height } = skeleton.image_size;
         let part = width.max(height).div_ceil(LARGEST_PX).max(1);
         let size = Size::new((width / part).max(1), (height / part).max(1));
-        let scale = [
+        let scale = Vector2::new(
             f64::from(size.width) / f64::from(width.max(1)),
             f64::from(size.height) / f64::from(height.max(1)),
-        ];
+        );
         Self {
             size,
             scale,
@@ -35,24 +35,28 @@ impl Grid {
 
     /// The place in the grid of a pixel of the source image; the centre of the first cell is (0,
     /// 0).
-    pub fn cell_of_pixel(&self, p: [f64; 2]) -> [f64; 2] {
-        [0, 1].map(|k| (p[k] + 0.5) * self.scale[k] - 0.5)
+    pub fn cell_of_pixel(&self, p: Point2<f64>) -> Point2<f64> {
+        Point2::new(
+            (p.x + 0.5) * self.scale.x - 0.5,
+            (p.y + 0.5) * self.scale.y - 0.5,
+        )
     }
 
     /// The point in model axes that is seen at `cell`, at depth `z`.
-    pub fn model_at(&self, cell: [f64; 2], z: f64) -> Point3<f64> {
-        let [u, v] = [0, 1].map(|k| (cell[k] + 0.5) / self.scale[k] - 0.5);
-        Point3::new(u - self.foot_px[0], self.foot_px[1] - v, z)
+    pub fn model_at(&self, cell: Point2<f64>, z: f64) -> Point3<f64> {
+        let u = (cell.x + 0.5) / self.scale.x - 0.5;
+        let v = (cell.y + 0.5) / self.scale.y - 0.5;
+        Point3::new(u - self.foot_px.x, self.foot_px.y - v, z)
     }
 
     /// The front view of a point in model axes.
-    pub fn cell_of(&self, p: &Point3<f64>) -> [f64; 2] {
-        self.cell_of_pixel([self.foot_px[0] + p.x, self.foot_px[1] - p.y])
+    pub fn cell_of(&self, p: &Point3<f64>) -> Point2<f64> {
+        self.cell_of_pixel(Point2::new(self.foot_px.x + p.x, self.foot_px.y - p.y))
     }
 
     /// Pixels of the source image to cells.
     pub fn length(&self, px: f64) -> f64 {
-        px * self.scale[0]
+        px * self.scale.x
     }
 
     pub fn area(&self) -> usize {
@@ -60,12 +64,12 @@ impl Grid {
     }
 
     /// The cell that holds a place, if one does.
-    pub fn index(&self, cell: [f64; 2]) -> Option<usize> {
-        let ok = cell[0].is_finite() && cell[1].is_finite() && self.size.contains(cell[0], cell[1]);
+    pub fn index(&self, cell: Point2<f64>) -> Option<usize> {
+        let ok = cell.x.is_finite() && cell.y.is_finite() && self.size.contains(cell.x, cell.y);
         ok.then(|| {
             let (u, v) = (
-                cell[0].round().max(0.0) as usize,
-                cell[1].round().max(0.0) as usize,
+                cell.x.round().max(0.0) as usize,
+                cell.y.round().max(0.0) as usize,
             );
             v * self.size.width as usize + u
         })

@@ -1,6 +1,7 @@
 //! Density: which share of the picture around a place is covered.
 
 use super::canvas::Grid;
+use nalgebra::Point2;
 use std::ops::Range;
 
 /// A density map is smoothed over this share of the tree's height (standard deviation): some
@@ -115,19 +116,19 @@ impl<'a> Cover<'a> {
 
     /// Marks the cells whose centre lies in the triangle, whichever way it faces, unless something
     /// is before it; its corners in cells and its depth.
-    pub fn add(&mut self, [a, b, c]: [[f64; 2]; 3], depth: f64) {
-        let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    pub fn add(&mut self, [a, b, c]: [Point2<f64>; 3], depth: f64) {
+        let area = (b - a).perp(&(c - a));
         if area == 0.0 || !area.is_finite() {
             return;
         }
-        let columns = cells_between([a[0], b[0], c[0]], self.grid.size.width);
-        let rows = cells_between([a[1], b[1], c[1]], self.grid.size.height);
+        let columns = cells_between([a.x, b.x, c.x], self.grid.size.width);
+        let rows = cells_between([a.y, b.y, c.y], self.grid.size.height);
         for v in rows {
             for u in columns.clone() {
-                let at = [u as f64, v as f64];
+                let at = Point2::new(u as f64, v as f64);
                 let inside = [(a, b), (b, c), (c, a)]
                     .into_iter()
-                    .all(|(p, q)| side(p, q, at) * area.signum() >= 0.0);
+                    .all(|(p, q)| (q - p).perp(&(at - p)) * area.signum() >= 0.0);
                 if inside {
                     let i = v * self.grid.size.width as usize + u;
                     if self
@@ -141,11 +142,6 @@ impl<'a> Cover<'a> {
             }
         }
     }
-}
-
-/// On which side of the line from `p` to `q` a place is: positive to the left, 0 on it.
-fn side(p: [f64; 2], q: [f64; 2], at: [f64; 2]) -> f64 {
-    (q[0] - p[0]) * (at[1] - p[1]) - (q[1] - p[1]) * (at[0] - p[0])
 }
 
 /// Those of `count` cells in a row whose middles lie within the stretch that holds all of `ends`;

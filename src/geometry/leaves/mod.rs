@@ -36,7 +36,7 @@ use canvas::Grid;
 use carry::Carried;
 use cluster::Cluster;
 use groups::groups;
-use nalgebra::Point3;
+use nalgebra::{Point2, Point3};
 use place::LeafPlacer;
 use target::Target;
 use view::tree_height;
@@ -193,7 +193,7 @@ fn front_cover(
     let mut cover = density::Cover::new(grid, &[]);
     for group in &foliage.groups {
         let mesh = &group.mesh;
-        let mut cells: Vec<[f64; 2]> = Vec::with_capacity(mesh.positions.len());
+        let mut cells: Vec<Point2<f64>> = Vec::with_capacity(mesh.positions.len());
         for (i, position) in mesh.positions.iter().enumerate() {
             let skin = SkinWeights {
                 joints: mesh.joints[i],

@@ -8,7 +8,7 @@ use super::target::Target;
 use super::template::Template;
 use super::view::Sampling;
 use crate::random::{Generator, generator};
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point2, Point3, Vector3};
 use rand::RngExt;
 use rand::seq::IndexedRandom;
 use rand_distr::StandardNormal;
@@ -47,7 +47,7 @@ pub(super) struct LeafPlacer<'a> {
     pub target: &'a Target,
     pub template: &'a Template,
     /// In cells, strongest first.
-    pub seeds: Vec<[f64; 2]>,
+    pub seeds: Vec<Point2<f64>>,
     /// The trunk's top at rest.
     pub axis: Point3<f64>,
     pub height: f64,
@@ -121,7 +121,7 @@ impl LeafPlacer<'_> {
             return (work.clusters, work.cover.covered);
         }
         let most = ((SEEDED * self.count as f64).ceil() as usize).min(self.count);
-        let seeds: Vec<[f64; 2]> = self
+        let seeds: Vec<Point2<f64>> = self
             .seeds
             .iter()
             .copied()
@@ -143,7 +143,7 @@ impl LeafPlacer<'_> {
     }
 
     /// The density wanted at a cell of the picture.
-    fn density_at(&self, cell: [f64; 2]) -> Option<f32> {
+    fn density_at(&self, cell: Point2<f64>) -> Option<f32> {
         let i = self.target.grid.index(cell)?;
         Some(self.target.density[i])
     }
@@ -154,7 +154,7 @@ impl LeafPlacer<'_> {
     }
 
     /// Bright leaves are in front (Li 2011 app. B.1).
-    fn half(&self, cell: [f64; 2]) -> Side {
+    fn half(&self, cell: Point2<f64>) -> Side {
         if self.target.is_bright(cell) {
             Side::Front
         } else {
@@ -164,7 +164,7 @@ impl LeafPlacer<'_> {
 
     /// Before the wood that is seen at a cell, or in the half that its colour says where there is
     /// none.
-    fn before_wood(&self, cell: [f64; 2], wood: &[f32]) -> Side {
+    fn before_wood(&self, cell: Point2<f64>, wood: &[f32]) -> Side {
         let depth = self
             .target
             .grid
@@ -195,7 +195,7 @@ impl LeafPlacer<'_> {
         for k in 0..count {
             let at = sum * (first + k as f64 * GOLDEN).fract();
             let square = squares.partition_point(|&s| s <= at).min(squares.len() - 1);
-            let corner = [square % across * side, square / across * side];
+            let corner = Point2::new(square % across * side, square / across * side);
             let cell = corner.map(|c| c as f64 - 0.5 + side as f64 * work.random.random::<f64>());
             if grid.index(cell).is_some() {
                 let half = match missing {
@@ -258,7 +258,7 @@ impl LeafPlacer<'_> {
     }
 
     /// A cluster that is seen at `cell`, on a branch of that side of the tree.
-    fn add(&mut self, cell: [f64; 2], side: Side, size: f64, work: &mut Work<'_>) {
+    fn add(&mut self, cell: Point2<f64>, side: Side, size: f64, work: &mut Work<'_>) {
         if let Some((i, distance)) = self.attachments.seat(cell, side) {
             let sight = Sight {
                 cell,
@@ -325,7 +325,7 @@ impl LeafPlacer<'_> {
         if !cluster.centre.coords.iter().all(|x| x.is_finite()) {
             return;
         }
-        let mut seen: Vec<([f64; 2], f64)> = Vec::with_capacity(self.template.positions.len());
+        let mut seen: Vec<(Point2<f64>, f64)> = Vec::with_capacity(self.template.positions.len());
         for p in &self.template.positions {
             let posed = attachment.carried.posed(&cluster.at(self.template, p));
             seen.push((self.target.grid.cell_of(&posed), posed.z));
@@ -349,7 +349,7 @@ enum Missing {
 
 /// How a cluster is seen: at which cell, how far from its branch (cells), on which side.
 struct Sight {
-    cell: [f64; 2],
+    cell: Point2<f64>,
     distance: f64,
     side: Side,
 }

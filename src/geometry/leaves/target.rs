@@ -5,12 +5,14 @@ use super::colours::{shares, smooth_step};
 use super::density::{SCALE, smoothed};
 use super::view::{LeafView, PLAIN};
 use crate::model::Skeleton;
+use nalgebra::{Point2, Vector2};
 
 /// Share of leaf from which on a cell's colour is that of leaves.
 const PURE: f32 = 0.6;
 /// Colour tells a cell apart with some doubt, and the sum of the doubts would be missing: what is
-/// by this share leaf in a cell and those around it is not leaf, or wholly.
-const DOUBT: [f32; 2] = [0.3, 0.6];
+/// these shares leaf in a cell and those around it is not leaf, or wholly.
+const NOT_LEAF: f32 = 0.3;
+const WHOLLY_LEAF: f32 = 0.6;
 /// Hues farther from the leaves' middle one than so many deviations belong to what is seen between
 /// them.
 const STRANGE: f64 = 3.5;
@@ -87,14 +89,14 @@ impl Target {
     }
 
     /// Colour of the leaves around a cell (sRGB); that of all where there are none.
-    pub fn colour(&self, cell: [f64; 2], radius: f64) -> [u8; 3] {
+    pub fn colour(&self, cell: Point2<f64>, radius: f64) -> [u8; 3] {
         if self.colours.is_empty() {
             return self.mean;
         }
         let (w, h) = (self.grid.size.width as i64, self.grid.size.height as i64);
         let (u, v, radius) = (
-            cell[0].round() as i64,
-            cell[1].round() as i64,
+            cell.x.round() as i64,
+            cell.y.round() as i64,
             radius.round().clamp(0.0, 20.0) as i64,
         );
         let found = [radius, 2 * radius + 2].into_iter().find_map(|r| {
@@ -108,7 +110,7 @@ impl Target {
     }
 
     /// The colour around a cell with its light and shade softened, channels 0 to 255.
-    pub fn soft_colour(&self, cell: [f64; 2], radius: f64) -> [f64; 3] {
+    pub fn soft_colour(&self, cell: Point2<f64>, radius: f64) -> [f64; 3] {
         let colour = self.colour(cell, radius);
         let luma = luma(colour).max(1.0);
         let share = if self.mean_luma > 0.0 {
@@ -120,7 +122,7 @@ impl Target {
     }
 
     /// Whether a leaf seen there is of the brighter half.
-    pub fn is_bright(&self, cell: [f64; 2]) -> bool {
+    pub fn is_bright(&self, cell: Point2<f64>) -> bool {
         luma(self.colour(cell, 1.0)) > self.middle_luma
     }
 }
@@ -136,7 +138,7 @@ fn drawn_density(view: &LeafView, grid: &Grid) -> Option<Vec<f32>> {
 fn filmed_density(leaf: &[f32], grid: &Grid) -> Vec<f32> {
     smoothed(leaf, grid.size.width as usize, 1.0)
         .iter()
-        .map(|&p| smooth_step(DOUBT[0], DOUBT[1], p))
+        .map(|&p| smooth_step(NOT_LEAF, WHOLLY_LEAF, p))
         .collect()
 }
 
@@ -230,9 +232,9 @@ fn without_strangers(colours: &mut [([u8; 3], f32)]) {
 
 /// How much redder and bluer than green a colour is, as shares of its brightness; of dark colours,
 /// whose hue is noise, less.
-fn hue(colour: [u8; 3]) -> [f64; 2] {
+fn hue(colour: [u8; 3]) -> Vector2<f64> {
     let [r, g, b] = colour.map(|c| f64::from(c) + 4.0);
-    [(r - g) / (r + g + b), (b - g) / (r + g + b)]
+    Vector2::new((r - g) / (r + g + b), (b - g) / (r + g + b))
 }
 
 fn median(values: &mut [f64]) -> Option<f64> {

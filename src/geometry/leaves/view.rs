@@ -1,6 +1,7 @@
 //! What is known of the leaves, and how places are found for them.
 
 use crate::model::{Luma, Outline, Pose, Rgb, Skeleton};
+use nalgebra::Point2;
 
 /// Colour of leaves where no picture shows any (sRGB).
 pub(super) const PLAIN: [u8; 3] = [86, 110, 50];
@@ -16,7 +17,7 @@ pub struct LeafView<'a> {
     /// for the whole picture.
     pub density: Option<&'a Luma>,
     /// Corners in the picture, px, strongest first.
-    pub seeds: &'a [[f32; 2]],
+    pub seeds: &'a [Point2<f32>],
 }
 
 /// How places are found for leaves.

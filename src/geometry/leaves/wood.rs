@@ -4,6 +4,7 @@ use super::canvas::Grid;
 use super::carry::Carried;
 use crate::model::{Pose, Skeleton};
 use crate::shape::Limb;
+use nalgebra::Point2;
 use std::ops::Range;
 
 /// Wider wood than this is no tree's, cells.
@@ -40,7 +41,7 @@ pub(super) fn front(
 /// A ball of wood as it is seen.
 #[derive(Clone, Copy)]
 struct Ball {
-    cell: [f64; 2],
+    cell: Point2<f64>,
     /// Of its middle, px.
     z: f64,
     radius_px: f64,
@@ -48,7 +49,7 @@ struct Ball {
 
 impl Ball {
     fn is_sound(&self) -> bool {
-        [self.cell[0], self.cell[1], self.z, self.radius_px]
+        [self.cell.x, self.cell.y, self.z, self.radius_px]
             .iter()
             .all(|x| x.is_finite())
     }
@@ -56,7 +57,7 @@ impl Ball {
     /// Share `t` of the way from `self` to `other`.
     fn towards(&self, other: &Self, t: f64) -> Self {
         Self {
-            cell: [0, 1].map(|c| self.cell[c] + (other.cell[c] - self.cell[c]) * t),
+            cell: self.cell + (other.cell - self.cell) * t,
             z: self.z + (other.z - self.z) * t,
             radius_px: self.radius_px + (other.radius_px - self.radius_px) * t,
         }
@@ -64,11 +65,11 @@ impl Ball {
 
     fn draw(&self, depth: &mut [f32], grid: &Grid, cell_px: f64) {
         let radius = (self.radius_px / cell_px).clamp(0.5, WIDEST);
-        let across = cells_within(self.cell[0], radius, grid.size.width);
-        let down = cells_within(self.cell[1], radius, grid.size.height);
+        let across = cells_within(self.cell.x, radius, grid.size.width);
+        let down = cells_within(self.cell.y, radius, grid.size.height);
         for v in down {
             for u in across.clone() {
-                let off_sq = (u as f64 - self.cell[0]).powi(2) + (v as f64 - self.cell[1]).powi(2);
+                let off_sq = (Point2::new(u as f64, v as f64) - self.cell).norm_squared();
                 let height_sq = 1.0 - off_sq / (radius * radius);
                 if height_sq >= 0.0 {
                     let cell = &mut depth[v * grid.size.width as usize + u];
@@ -81,7 +82,8 @@ impl Ball {
 
 /// Balls from `a` to `b`, half a cell apart.
 fn draw_between(depth: &mut [f32], grid: &Grid, a: &Ball, b: &Ball, cell_px: f64) {
-    let way = (b.cell[0] - a.cell[0]).hypot(b.cell[1] - a.cell[1]);
+    let way = b.cell - a.cell;
+    let way = way.x.hypot(way.y);
     // A limb as long as the picture is wide is drawn; one that a torn file makes longer is not.
     let longest = f64::from(grid.size.width.max(grid.size.height));
     if !a.is_sound() || !b.is_sound() || way > longest {

@@ -1,6 +1,7 @@
 //! How much of a shape the tree covers, seen from the front.
 
 use crate::model::{Outline, Skeleton};
+use nalgebra::Point2;
 use std::ops::Range;
 
 /// A branch covers what is nearer to it than this share of the shape's larger side: about as far as
@@ -71,7 +72,7 @@ impl Cover {
     }
 
     /// Marks what a branch covers; its ends in px.
-    pub fn add(&mut self, branch: [[f64; 2]; 2]) {
+    pub fn add(&mut self, branch: [Point2<f64>; 2]) {
         for k in self.near(branch, self.reach) {
             self.bare_count -= usize::from(self.bare[k]);
             self.bare[k] = 0;
@@ -79,32 +80,31 @@ impl Cover {
     }
 
     /// Bare cells that a branch would cover; its ends in px.
-    pub fn gain(&self, branch: [[f64; 2]; 2]) -> usize {
+    pub fn gain(&self, branch: [Point2<f64>; 2]) -> usize {
         let near = self.near(branch, self.reach);
         near.into_iter().map(|k| usize::from(self.bare[k])).sum()
     }
 
     /// Notes the bare cells near `at`, px, where nothing can be done.
-    pub fn give_up(&self, at: [f64; 2], given_up: &mut Vec<usize>) {
+    pub fn give_up(&self, at: Point2<f64>, given_up: &mut Vec<usize>) {
         let near = self.near([at, at], 0.5 * self.reach);
         given_up.extend(near.into_iter().filter(|&k| self.bare[k] != 0));
     }
 
     /// Cells within `reach` cells of a line, its ends in px.
-    fn near(&self, ends_px: [[f64; 2]; 2], reach: f64) -> Vec<usize> {
+    fn near(&self, ends_px: [Point2<f64>; 2], reach: f64) -> Vec<usize> {
         let mut near = Vec::new();
         let [a, b] = ends_px.map(|end| end.map(|x| (x - self.middle()) / self.cell as f64));
-        if !a.iter().chain(&b).all(|x| x.is_finite()) {
+        if !a.iter().chain(b.iter()).all(|x| x.is_finite()) {
             return near;
         }
-        let along = [b[0] - a[0], b[1] - a[1]];
-        let length_sq = (along[0].powi(2) + along[1].powi(2)).max(1e-12);
-        for v in cells_about(a[1], b[1], reach, self.height) {
-            for u in cells_about(a[0], b[0], reach, self.width) {
-                let to = [u as f64 - a[0], v as f64 - a[1]];
-                let t = ((along[0] * to[0] + along[1] * to[1]) / length_sq).clamp(0.0, 1.0);
-                if (to[0] - t * along[0]).powi(2) + (to[1] - t * along[1]).powi(2) <= reach * reach
-                {
+        let along = b - a;
+        let length_sq = along.norm_squared().max(1e-12);
+        for v in cells_about(a.y, b.y, reach, self.height) {
+            for u in cells_about(a.x, b.x, reach, self.width) {
+                let to = Point2::new(u as f64, v as f64) - a;
+                let t = (along.dot(&to) / length_sq).clamp(0.0, 1.0);
+                if (to - along * t).norm_squared() <= reach * reach {
                     near.push(v * self.width + u);
                 }
             }
@@ -119,7 +119,7 @@ impl Cover {
 
     /// The bare cell that is farthest from what is covered or outside (city blocks), those in
     /// `given_up` left out: its middle, px. `None` if no cell is bare.
-    pub fn barest(&self, given_up: &[usize]) -> Option<[f64; 2]> {
+    pub fn barest(&self, given_up: &[usize]) -> Option<Point2<f64>> {
         let (w, h) = (self.width, self.height);
         let mut far: Vec<u32> = self
             .bare
@@ -150,7 +150,7 @@ impl Cover {
             .enumerate()
             .filter(|(_, d)| **d > 0)
             .max_by(|a, b| a.1.cmp(b.1).then(b.0.cmp(&a.0)))?;
-        Some([k % w, k / w].map(|x| (x * self.cell) as f64 + self.middle()))
+        Some(Point2::new(k % w, k / w).map(|x| (x * self.cell) as f64 + self.middle()))
     }
 }
 
@@ -192,11 +192,11 @@ mod tests {
 
     /// Number of cells, the barest place as shares of the side, and the share that a branch across
     /// the middle covers.
-    fn covered(side: u32) -> (usize, [f64; 2], f64) {
+    fn covered(side: u32) -> (usize, Point2<f64>, f64) {
         let mut cover = Cover::of(&disc(side));
         let px = f64::from(side);
         let barest = cover.barest(&[]).unwrap().map(|x| x / px);
-        cover.add([[0.3 * px, 0.5 * px], [0.7 * px, 0.5 * px]]);
+        cover.add([Point2::new(0.3, 0.5) * px, Point2::new(0.7, 0.5) * px]);
         (cover.bare.len(), barest, cover.share())
     }
 
@@ -212,9 +212,9 @@ mod tests {
             "{share} and {share_large}"
         );
         assert!(
-            (0..2).all(|c| (barest[c] - barest_large[c]).abs() < 0.01),
+            (barest - barest_large).iter().all(|c| c.abs() < 0.01),
             "{barest:?} and {barest_large:?}"
         );
-        assert!((0..2).all(|c| (barest[c] - 0.5).abs() < 0.01), "{barest:?}");
+        assert!(barest.iter().all(|c| (c - 0.5).abs() < 0.01), "{barest:?}");
     }
 }

@@ -1,6 +1,7 @@
 //! A drawn shape, and where it stands in the picture.
 
 use crate::model::{Outline, Size};
+use nalgebra::Point2;
 
 /// Alpha from which on a pixel is inside.
 const INSIDE: u8 = 128;
@@ -90,7 +91,7 @@ impl Drawn {
     ///
     /// # Errors
     /// Nothing of it lies in the picture.
-    pub fn placed(&self, outline: &Outline, foot_px: [f64; 2]) -> Result<Outline, TopiaryError> {
+    pub fn placed(&self, outline: &Outline, foot_px: Point2<f64>) -> Result<Outline, TopiaryError> {
         let size = outline.size;
         let mask = if self.size == size {
             self.inside.iter().map(|i| u8::from(*i) * 255).collect()
@@ -109,7 +110,7 @@ impl Drawn {
             .map_or(Err(TopiaryError::OffTree), |_| Ok(placed))
     }
 
-    fn scaled(&self, size: Size, into: [u32; 2], foot_px: [f64; 2]) -> Vec<u8> {
+    fn scaled(&self, size: Size, into: [u32; 2], foot_px: Point2<f64>) -> Vec<u8> {
         let [left, top, right, bottom] = self.bounds;
         let scale = (f64::from(into[0]) / f64::from(right - left + 1))
             .min(f64::from(into[1]) / f64::from(bottom - top + 1));
@@ -122,9 +123,9 @@ impl Drawn {
         let mut mask = Vec::with_capacity(size.area());
         for v in 0..size.height {
             // The lowest row of the shape on the foot's row.
-            let y = f64::from(bottom) + 0.5 + (f64::from(v) - foot_px[1] - 0.5) / scale;
+            let y = f64::from(bottom) + 0.5 + (f64::from(v) - foot_px.y - 0.5) / scale;
             for u in 0..size.width {
-                let x = middle + (f64::from(u) - foot_px[0]) / scale;
+                let x = middle + (f64::from(u) - foot_px.x) / scale;
                 let inside = self.contains(x.round() as i64, y.round() as i64);
                 mask.push(u8::from(inside) * 255);
             }

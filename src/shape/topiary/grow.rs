@@ -7,7 +7,7 @@ use crate::random::{Generator, generator};
 use crate::shape::angles::{Angles, angle_between};
 use crate::shape::envelope::Envelope;
 use crate::shape::push::subtrees;
-use nalgebra::{Point3, Rotation3, Unit, Vector3};
+use nalgebra::{Point2, Point3, Rotation3, Unit, Vector3};
 use rand::RngExt;
 use std::f64::consts::PI;
 
@@ -107,7 +107,7 @@ fn templates(skeleton: &Skeleton, measured: usize) -> Vec<Vec<usize>> {
 }
 
 /// Both ends of the branch that ends in `node`, px.
-fn branch_in_picture(skeleton: &Skeleton, node: &Node) -> [[f64; 2]; 2] {
+fn branch_in_picture(skeleton: &Skeleton, node: &Node) -> [Point2<f64>; 2] {
     let parent = node
         .parent
         .map_or(node.position, |p| skeleton.nodes[p.index()].position);
@@ -128,7 +128,7 @@ impl Site<'_> {
     fn best_shoot(
         &self,
         templates: &[Vec<usize>],
-        bare_px: [f64; 2],
+        bare_px: Point2<f64>,
         random: &mut Generator,
     ) -> Option<Shoot> {
         let target = self.place_seen_at(bare_px, random.random_range(-1.0..1.0));
@@ -152,9 +152,9 @@ impl Site<'_> {
     }
 
     /// A place in space that is seen at `bare_px`, at `deep` (-1 to 1) of the depth there.
-    fn place_seen_at(&self, bare_px: [f64; 2], deep: f64) -> Point3<f64> {
-        let foot_px = self.skeleton.foot_px;
-        let (x, y) = (bare_px[0] - foot_px[0], foot_px[1] - bare_px[1]);
+    fn place_seen_at(&self, bare_px: Point2<f64>, deep: f64) -> Point3<f64> {
+        let foot_px = Point2::from(self.skeleton.foot_px);
+        let (x, y) = (bare_px.x - foot_px.x, foot_px.y - bare_px.y);
         Point3::new(
             x,
             y,

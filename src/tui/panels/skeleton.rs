@@ -212,7 +212,7 @@ impl Extent {
         Camera {
             view,
             aim: Point3::origin(),
-            middle_px,
+            middle_px: middle_px.into(),
             scale,
             size,
         }
