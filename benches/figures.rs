@@ -21,6 +21,7 @@ use arborcam::outline::{self, Mark, Scribbles};
 use arborcam::pipeline::{self, Pipeline, PoseTracker, Seen, dress};
 use arborcam::solve::{self, lift_to_3d, solve};
 use criterion::Criterion;
+use nalgebra::Point2;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
@@ -244,10 +245,10 @@ fn pose(criterion: &mut Criterion) -> String {
 fn pose_of_127() -> String {
     let skeleton = Arc::new(synthetic::tree(7, 3));
     let truth = synthetic::sway(&skeleton, 330);
-    let seen = |pose: &Pose| -> Vec<Option<[f64; 2]>> {
+    let seen = |pose: &Pose| -> Vec<Option<Point2<f64>>> {
         pose.joints[..skeleton.measured()]
             .iter()
-            .map(|j| Some(skeleton.image_from_model(&j.position)))
+            .map(|j| Some(skeleton.image_from_model(&j.position).into()))
             .collect()
     };
     let targets: Vec<_> = truth.iter().map(seen).collect();

@@ -11,6 +11,7 @@ use arborcam::runtime::{
 };
 use arborcam::source::{Decoder, Health, Source, SourceError, SourceInfo, Successor};
 use arborcam::track::Tracker;
+use nalgebra::Point2;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -1080,10 +1081,10 @@ fn points_are_found_again_after_a_gap_under_their_names_and_in_their_places() {
         // Two seconds after the camera is back, of which the first may have been dark.
         let k = back + 60;
         let set = &with_gap[k - gap.len()];
-        let truth: BTreeMap<TrackId, [f32; 2]> = whole[k]
+        let truth: BTreeMap<TrackId, Point2<f32>> = whole[k]
             .observations
             .iter()
-            .map(|o| (o.id, [o.u_px, o.v_px]))
+            .map(|o| (o.id, Point2::new(o.u_px, o.v_px)))
             .collect();
         let kept: Vec<_> = set
             .observations
@@ -1099,7 +1100,8 @@ fn points_are_found_again_after_a_gap_under_their_names_and_in_their_places() {
             before.len()
         );
         let off = |o: &&Observation| {
-            Some((o.u_px - truth.get(&o.id)?[0]).hypot(o.v_px - truth[&o.id][1]))
+            let truth = truth.get(&o.id)?;
+            Some((o.u_px - truth.x).hypot(o.v_px - truth.y))
         };
         let off_px: Vec<f32> = kept.into_iter().filter_map(|o| off(&o)).collect();
         let right = off_px.iter().filter(|d| **d < 2.0).count();

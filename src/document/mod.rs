@@ -316,9 +316,9 @@ impl Reposer {
     /// The pose of the other tree; poses must come in the order of time.
     pub fn pose(&mut self, pose: &Pose) -> Pose {
         let joints = &pose.joints[..self.measured];
-        let targets_px: Vec<Option<[f64; 2]>> = joints
+        let targets_px: Vec<_> = joints
             .iter()
-            .map(|joint| Some(self.from.image_from_model(&joint.position)))
+            .map(|joint| Some(self.from.image_from_model(&joint.position).into()))
             .collect();
         self.estimator.step(pose.frame, pose.time_s, &targets_px)
     }

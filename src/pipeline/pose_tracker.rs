@@ -31,7 +31,7 @@ impl PoseTracker {
         let pose = self
             .estimator
             .step(tracks.frame, tracks.time_s, &targets_px);
-        (pose, targets_px)
+        (pose, targets_px.iter().map(|t| t.map(Into::into)).collect())
     }
 
     pub fn model(&self) -> &Arc<Model> {

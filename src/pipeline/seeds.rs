@@ -25,7 +25,8 @@ pub fn seeds(picture: &Rgb, outline: &Outline, count: u32) -> Vec<[f32; 2]> {
         size: picture.size,
         pixels: picture.pixels.chunks_exact(3).map(grey).collect(),
     };
-    Detector::new(&detect, outline).detect(&luma, &[], count as usize)
+    let seeds = Detector::new(&detect, outline).detect(&luma, &[], count as usize);
+    seeds.into_iter().map(Into::into).collect()
 }
 
 /// Luma of a pixel of red, green and blue (ITU-R BT.601), 0 to 255.

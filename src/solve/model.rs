@@ -89,9 +89,14 @@ impl Moment {
 impl Model {
     /// Which track moves which node.
     pub fn binding(&self) -> Binding {
-        let mut binding = Binding::new(&self.hierarchy, &self.rest_px, &self.skeleton);
-        binding.inherit(&self.joined);
-        binding.inherit(&self.on_sub_branches());
+        let rest_px = self.rest_px.iter().map(|(id, p)| (*id, (*p).into()));
+        let mut binding = Binding::new(&self.hierarchy, &rest_px.collect(), &self.skeleton);
+        for joined in [&self.joined, &self.on_sub_branches()] {
+            let joined = joined
+                .iter()
+                .map(|(id, (node, p))| (*id, (*node, (*p).into())));
+            binding.inherit(&joined.collect());
+        }
         binding
     }
 
@@ -101,7 +106,7 @@ impl Model {
         let mut joined = BTreeMap::new();
         for (id, node, rest_px) in binding.bound() {
             if !built_from.contains(&id) {
-                joined.insert(id, (self.carrier(node), rest_px));
+                joined.insert(id, (self.carrier(node), rest_px.into()));
             }
         }
         Self {

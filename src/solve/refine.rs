@@ -38,7 +38,7 @@ impl<'a> Refinement<'a> {
         let moment = Moment::of(window)?;
         let mut bound = BTreeMap::new();
         for (id, node, rest_px) in prior.binding().bound() {
-            bound.insert(id, (prior.carrier(node), rest_px));
+            bound.insert(id, (prior.carrier(node), rest_px.into()));
         }
         Some(Self {
             table: Arc::new(hierarchy::table(window)),

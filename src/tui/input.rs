@@ -322,6 +322,7 @@ fn draw(
                     "Starting with your outline of {} points.",
                     polygon.len()
                 ));
+                let polygon = polygon.into_iter().map(Into::into).collect();
                 return Some(Control::SetOutline(polygon));
             }
             Err(why) => state.say(why),
