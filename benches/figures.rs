@@ -252,7 +252,7 @@ fn pose(criterion: &mut Criterion) -> String {
 fn pose_of_127() -> String {
     let skeleton = Arc::new(synthetic::tree(7, 3));
     let truth = synthetic::sway(&skeleton, 330);
-    let seen = |pose: &Pose| -> Vec<Option<[f64; 2]>> {
+    let seen = |pose: &Pose| -> Vec<Option<Point2<f64>>> {
         pose.joints[..skeleton.measured()]
             .iter()
             .map(|j| Some(skeleton.image_from_model(&j.position).into()))

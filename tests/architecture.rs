@@ -124,6 +124,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "tui",
         &[
             "model",
+            "bounds",
             "outline::crossing",
             "caught",
             "draw",

@@ -5,6 +5,7 @@ use arborcam::config::Detect;
 use arborcam::model::{Luma, Outline, Rgb, Size};
 use arborcam::outline::{self, Given, Mark, Scribbles};
 use arborcam::track::Detector;
+use nalgebra::Point2;
 use std::path::Path;
 
 fn picture() -> Rgb {
@@ -117,7 +118,7 @@ fn luma(picture: &Rgb) -> Luma {
 }
 
 /// Corners with a wide border left out.
-fn detect(outline: &Outline) -> Vec<[f32; 2]> {
+fn detect(outline: &Outline) -> Vec<Point2<f32>> {
     let settings = Detect {
         border_px: 20.0,
         ..Detect::default()
@@ -132,7 +133,7 @@ fn no_point_is_looked_for_in_the_sky() {
     let points = detect(&outline);
     assert!(points.len() >= 100, "{} points", points.len());
     for p in points {
-        let [u, v] = p.map(|x| x.round() as usize);
+        let (u, v) = (p.x.round() as usize, p.y.round() as usize);
         let rows = matte.chunks_exact(outline.size.width as usize);
         let mut around = rows.skip(v - 2).take(5).flat_map(|row| &row[u - 2..=u + 2]);
         assert!(around.any(|alpha| *alpha > 127), "{p:?} is in the sky");
@@ -153,8 +154,8 @@ fn crown(size: Size) -> Vec<u8> {
 }
 
 /// Whether a point is on the border of the crown.
-fn on_border(p: &[f32; 2]) -> bool {
-    p[0] < 68.0 || p[0] > 191.0 || p[1] < 58.0 || p[1] > 191.0
+fn on_border(p: &Point2<f32>) -> bool {
+    p.x < 68.0 || p.x > 191.0 || p.y < 58.0 || p.y > 191.0
 }
 
 /// A window on the matte's border holds background that does not move with the tree (Zeng 2015
@@ -196,7 +197,7 @@ fn no_point_is_looked_for_outside_the_outline_that_is_shown() {
         ..outline
     });
     assert!(points.len() >= 5, "{} points", points.len());
-    assert!(points.iter().all(|p| p[0] < 131.5), "{points:?}");
+    assert!(points.iter().all(|p| p.x < 131.5), "{points:?}");
 }
 
 #[test]

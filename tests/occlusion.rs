@@ -6,31 +6,32 @@ use arborcam::config::Config;
 use arborcam::model::{Frame, TrackId};
 use arborcam::source::Decoder;
 use arborcam::track::Tracker;
+use nalgebra::{Point2, Vector2};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The size of a hand, half axes of an ellipse, px; it crosses the crown in two seconds.
-const HALF_PX: [f64; 2] = [44.0, 34.0];
+const HALF_PX: Vector2<f64> = Vector2::new(44.0, 34.0);
 const PASSES: std::ops::Range<usize> = 150..215;
 /// When it is judged who is back.
 const AFTER: usize = 225;
 
 /// Its middle in frame `k`, px.
-fn middle(k: usize) -> [f64; 2] {
+fn middle(k: usize) -> Point2<f64> {
     let t = (k - PASSES.start) as f64;
-    [420.0 - 4.0 * t, 60.0 + 0.8 * t]
+    Point2::new(420.0 - 4.0 * t, 60.0 + 0.8 * t)
 }
 
 /// How far out of its middle a place is: 1 at its edge.
-fn outness(k: usize, at: [f64; 2]) -> f64 {
-    let m = middle(k);
-    ((at[0] - m[0]) / HALF_PX[0]).hypot((at[1] - m[1]) / HALF_PX[1])
+fn outness(k: usize, at: Point2<f64>) -> f64 {
+    let out = (at - middle(k)).component_div(&HALF_PX);
+    out.x.hypot(out.y)
 }
 
 /// Dark and light, with edges in all directions, as feathers or fingers have them.
-fn brightness(x: f64, y: f64) -> f64 {
+fn brightness(at: Vector2<f64>) -> f64 {
     let mut sum = 0.0;
     for k in (1..=5).map(f64::from) {
-        sum += (0.45 * (x * (2.4 * k).cos() + y * (2.4 * k).sin()) + 1.7 * k * k).sin();
+        sum += (0.45 * (at.x * (2.4 * k).cos() + at.y * (2.4 * k).sin()) + 1.7 * k * k).sin();
     }
     95.0 + 28.0 * sum
 }
@@ -38,14 +39,14 @@ fn brightness(x: f64, y: f64) -> f64 {
 fn cover(frame: &mut Frame, k: usize) {
     let (width, m) = (frame.luma.size.width as usize, middle(k));
     for (i, pixel) in frame.luma.pixels.iter_mut().enumerate() {
-        let at = [(i % width) as f64, (i / width) as f64];
+        let at = Point2::new((i % width) as f64, (i / width) as f64);
         if outness(k, at) < 1.0 {
-            *pixel = brightness(at[0] - m[0], at[1] - m[1]).clamp(0.0, 255.0) as u8;
+            *pixel = brightness(at - m).clamp(0.0, 255.0) as u8;
         }
     }
 }
 
-type Places = Vec<BTreeMap<TrackId, [f64; 2]>>;
+type Places = Vec<BTreeMap<TrackId, Point2<f64>>>;
 
 fn follow(covered: bool) -> Places {
     let config = Config::default();
@@ -60,7 +61,7 @@ fn follow(covered: bool) -> Places {
         let set = tracker.step(&frame);
         let seen = set.observations.iter();
         places.push(
-            seen.map(|o| (o.id, [f64::from(o.u_px), f64::from(o.v_px)]))
+            seen.map(|o| (o.id, Point2::new(f64::from(o.u_px), f64::from(o.v_px))))
                 .collect(),
         );
     }
@@ -78,7 +79,7 @@ fn tracks_do_not_go_with_what_passes_before_them_and_come_back() {
             were_hidden.insert(*id);
             if let Some(there) = covered[k].get(id) {
                 reported += 1;
-                dragged += usize::from((there[0] - at[0]).hypot(there[1] - at[1]) > 4.0);
+                dragged += usize::from((there.x - at.x).hypot(there.y - at.y) > 4.0);
             }
         }
     }
@@ -89,7 +90,7 @@ fn tracks_do_not_go_with_what_passes_before_them_and_come_back() {
     let mut back = 0;
     for &id in &there {
         if let (Some(at), Some(there)) = (free[AFTER].get(id), covered[AFTER].get(id)) {
-            back += usize::from((there[0] - at[0]).hypot(there[1] - at[1]) < 3.0);
+            back += usize::from((there.x - at.x).hypot(there.y - at.y) < 3.0);
         }
     }
     let (n, hidden) = (there.len(), hidden as f64);

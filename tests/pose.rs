@@ -7,7 +7,7 @@ use arborcam::config::{Motion, MotionMethod};
 use arborcam::model::{Node, NodeId, NodeName, Pose, Size, Skeleton};
 use arborcam::motion::{PoseEstimator, Problem};
 use chance::Chance;
-use nalgebra::{Point3, Unit, UnitQuaternion, UnitVector3, Vector3};
+use nalgebra::{Point2, Point3, Unit, UnitQuaternion, UnitVector3, Vector2, Vector3};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -46,10 +46,10 @@ fn some_problem(chance: &mut Chance, ours: bool) -> Problem {
     Problem {
         parent_rotation,
         length,
-        target: Some([
+        target: Some(Vector2::new(
             end.x + noise_px * chance.normal(),
             end.y + noise_px * chance.normal(),
-        ]),
+        )),
         parent_direction: (chance.even() < 0.9).then(|| beside(chance, &rest_direction, apart)),
         rest_direction,
         previous_direction,
@@ -174,10 +174,10 @@ fn no_joint_turns_faster_or_farther_than_its_bounds_whatever_is_seen() {
     for k in 0..400u64 {
         let mut targets = Vec::new();
         for node in &tree.nodes[..4] {
-            let [u, v] = tree.image_from_model(&node.position).into();
+            let at = Point2::from(tree.image_from_model(&node.position));
+            let is_seen = chance.even() < 0.8;
             targets.push(
-                (chance.even() < 0.8)
-                    .then(|| [u + 90.0 * chance.normal(), v + 90.0 * chance.normal()]),
+                is_seen.then(|| at + Vector2::new(90.0 * chance.normal(), 90.0 * chance.normal())),
             );
         }
         let pose = estimator.step(k, k as f64 / 30.0, &targets);
@@ -203,7 +203,7 @@ fn no_joint_turns_faster_or_farther_than_its_bounds_whatever_is_seen() {
 }
 
 /// Where the first nodes are seen if the branch is turned by `angle`.
-fn targets_px(tree: &Skeleton, angle: f64) -> Vec<Option<[f64; 2]>> {
+fn targets_px(tree: &Skeleton, angle: f64) -> Vec<Option<Point2<f64>>> {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
     let (top, tip) = (tree.nodes[1].position, tree.nodes[2].position);
     [tree.nodes[0].position, top, top + turn * (tip - top)]
@@ -258,7 +258,7 @@ fn spin(max_total: f64) -> (f64, f64) {
     for k in 1..=120 {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -f64::from(k) * TAU / 60.0);
         let at = p.parent_rotation * (turn * rest.into_inner()) * 80.0;
-        p.target = Some([at.x, at.y]);
+        p.target = Some(at.xy());
         let d = p.solve();
         farthest = farthest.max(rest.angle(&d));
         let now = d.z.atan2(d.x);
@@ -315,11 +315,11 @@ fn swing_to_the_viewer(lean: f64, swing: f64, method: MotionMethod) -> Vec<(f64,
             .iter()
             .map(|n| Some(tree.image_from_model(&n.position).into()))
             .collect();
-        let target = tree.image_from_model(&truth);
-        (targets[2], targets[3]) = (Some(target.into()), None);
+        let target = Point2::from(tree.image_from_model(&truth));
+        (targets[2], targets[3]) = (Some(target), None);
         let is = estimator.step(k, k as f64 / 30.0, &targets).joints[2].position;
-        let seen = tree.image_from_model(&is);
-        let beside = (seen[0] - target[0]).hypot(seen[1] - target[1]);
+        let seen = Point2::from(tree.image_from_model(&is));
+        let beside = (seen.x - target.x).hypot(seen.y - target.y);
         depths.push((is.z, truth.z, beside));
     }
     depths

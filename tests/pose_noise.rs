@@ -11,7 +11,7 @@ use arborcam::model::{
 };
 use arborcam::motion::{Binding, PoseEstimator};
 use chance::Chance;
-use nalgebra::{Point3, UnitQuaternion, Vector3};
+use nalgebra::{Point2, Point3, UnitQuaternion, Vector2, Vector3, distance_squared};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -103,14 +103,14 @@ fn moved(tree: &Skeleton, frame: usize) -> Pose {
 }
 
 /// A place on a branch, from its beginning (0) to its end (1), in a pose.
-fn on_branch(tree: &Skeleton, pose: &Pose, node: usize, share: f64) -> [f64; 2] {
+fn on_branch(tree: &Skeleton, pose: &Pose, node: usize, share: f64) -> Point2<f64> {
     let parent = tree.nodes[node].parent.unwrap().index();
     let (from, to) = (pose.joints[parent].position, pose.joints[node].position);
     tree.image_from_model(&(from + (to - from) * share)).into()
 }
 
 /// The tree's points: each branch's own, and where they rest.
-fn points(tree: &Skeleton) -> (MotionHierarchy, BTreeMap<TrackId, [f64; 2]>) {
+fn points(tree: &Skeleton) -> (MotionHierarchy, BTreeMap<TrackId, Point2<f64>>) {
     let rest = Pose {
         frame: 0,
         time_s: 0.0,
@@ -152,18 +152,15 @@ fn seen(tree: &Skeleton, truth: &Pose, noise_px: f64, chance: &mut Chance) -> Tr
     let mut observations = Vec::new();
     for node in 1..tree.nodes.len() {
         for k in 0..POINTS {
-            let [u, v] = on_branch(tree, truth, node, (k + 1) as f64 / POINTS as f64);
-            let at = [
-                u + noise_px * chance.normal(),
-                v + noise_px * chance.normal(),
-            ];
+            let place = on_branch(tree, truth, node, (k + 1) as f64 / POINTS as f64);
+            let at = place + noise_px * Vector2::new(chance.normal(), chance.normal());
             if chance.even() < MISSING {
                 continue;
             }
             observations.push(Observation {
                 id: TrackId((node * POINTS + k) as u32),
-                u_px: at[0] as f32,
-                v_px: at[1] as f32,
+                u_px: at.x as f32,
+                v_px: at.y as f32,
                 fb_error_px: 0.0,
                 error_px: None,
                 confirmed: true,
@@ -198,10 +195,10 @@ fn off(tree: &Skeleton, poses: &[Pose], truth: &[Pose]) -> Off {
     for (pose, truth) in poses.iter().zip(truth) {
         for i in 1..tree.nodes.len() {
             let (is, was) = (
-                tree.image_from_model(&pose.joints[i].position),
-                tree.image_from_model(&truth.joints[i].position),
+                Point2::from(tree.image_from_model(&pose.joints[i].position)),
+                Point2::from(tree.image_from_model(&truth.joints[i].position)),
             );
-            motion += (is[0] - was[0]).powi(2) + (is[1] - was[1]).powi(2);
+            motion += distance_squared(&is, &was);
             nodes += 1.0;
             let now = angle(tree, &|k| pose.joints[k].position, i);
             let rest = angle(tree, &|k| tree.nodes[k].position, i);
@@ -285,9 +282,9 @@ fn the_pose_smooths_nothing_that_the_film_shows() {
                 truth.joints[i].position,
                 node.position,
             ]
-            .map(|p| tree.image_from_model(&p));
-            off_px += (is[0] - should[0]).powi(2) + (is[1] - should[1]).powi(2);
-            moved_px += (rest[0] - should[0]).powi(2) + (rest[1] - should[1]).powi(2);
+            .map(|p| Point2::from(tree.image_from_model(&p)));
+            off_px += distance_squared(&is, &should);
+            moved_px += distance_squared(&rest, &should);
         }
     }
     let share = (off_px / moved_px).sqrt();

@@ -280,7 +280,7 @@ fn swung(tree: &Skeleton, axis: Vector3<f64>, angle: f64) -> Vec<Point3<f64>> {
     places
 }
 
-fn seen(tree: &Skeleton, at: &[Point3<f64>]) -> Vec<Option<[f64; 2]>> {
+fn seen(tree: &Skeleton, at: &[Point3<f64>]) -> Vec<Option<Point2<f64>>> {
     at.iter()
         .map(|p| Some(tree.image_from_model(p).into()))
         .collect()
@@ -294,10 +294,10 @@ fn settings(method: config::MotionMethod) -> config::Motion {
 }
 
 /// Where node `i` is seen in frame `k`, if it is: jumping about, and missing in every fifth.
-fn wild_px(tree: &Skeleton, i: usize, k: u64) -> Option<[f64; 2]> {
-    let [du, dv] = [1.3, 2.1].map(|a| 60.0 * (i as f64 * 3.7 + k as f64 * a).sin());
-    let [u, v] = tree.image_from_model(&tree.nodes[i].position).into();
-    (!(i as u64 + k).is_multiple_of(5)).then_some([u + du, v + dv])
+fn wild_px(tree: &Skeleton, i: usize, k: u64) -> Option<Point2<f64>> {
+    let off = Vector2::new(1.3, 2.1).map(|a| 60.0 * (i as f64 * 3.7 + k as f64 * a).sin());
+    let at = Point2::from(tree.image_from_model(&tree.nodes[i].position));
+    (!(i as u64 + k).is_multiple_of(5)).then_some(at + off)
 }
 
 #[test]
@@ -393,7 +393,7 @@ fn a_swing_towards_the_camera_is_recovered() {
     }
 }
 
-fn problem(target: Option<[f64; 2]>) -> Problem {
+fn problem(target: Option<Vector2<f64>>) -> Problem {
     Problem {
         parent_rotation: UnitQuaternion::identity(),
         length: 50.0,
@@ -413,11 +413,11 @@ fn problem(target: Option<[f64; 2]>) -> Problem {
 #[test]
 fn a_branch_turns_no_further_than_its_bounds() {
     for target in [
-        [50.0, 0.0],
-        [-50.0, 0.0],
-        [30.0, 40.0],
-        [0.0, -50.0],
-        [500.0, 500.0],
+        Vector2::new(50.0, 0.0),
+        Vector2::new(-50.0, 0.0),
+        Vector2::new(30.0, 40.0),
+        Vector2::new(0.0, -50.0),
+        Vector2::new(500.0, 500.0),
     ] {
         let mut p = problem(Some(target));
         for step in 0..10 {
@@ -434,7 +434,7 @@ fn a_branch_turns_no_further_than_its_bounds() {
         }
         let turned = p.rest_direction.angle(&p.previous_direction);
         assert!(
-            target[0] == 0.0 || turned > 0.4,
+            target.x == 0.0 || turned > 0.4,
             "{target:?}: it must try to get there, and turned by {turned}"
         );
     }
@@ -449,17 +449,17 @@ fn a_branch_turns_no_further_than_its_bounds() {
 fn a_target_out_of_reach_is_shifted_until_the_branch_reaches_it() {
     let (root, now) = (Point3::new(10.0, 20.0, 5.0), Point3::new(10.0, 50.0, 45.0));
     for target in [
-        [30.0, 40.0],
-        [200.0, 20.0],
-        [-300.0, 900.0],
-        [10.0, 20.0],
-        [60.0, 20.0],
+        Point2::new(30.0, 40.0),
+        Point2::new(200.0, 20.0),
+        Point2::new(-300.0, 900.0),
+        Point2::new(10.0, 20.0),
+        Point2::new(60.0, 20.0),
     ] {
         let d = deterministic_direction(&root, 50.0, &now, target);
         let end = root + d.into_inner() * 50.0;
-        let wanted = [target[0] - root.x, target[1] - root.y];
-        let off = (end.x - target[0]).hypot(end.y - target[1]);
-        if wanted[0].hypot(wanted[1]) <= 50.0 {
+        let wanted = target - root.xy();
+        let off = (end.x - target.x).hypot(end.y - target.y);
+        if wanted.x.hypot(wanted.y) <= 50.0 {
             assert!(off < 1e-6, "{target:?} is within reach: {end}");
             assert!(
                 end.z >= root.z,
@@ -468,9 +468,8 @@ fn a_target_out_of_reach_is_shifted_until_the_branch_reaches_it() {
         } else {
             // On the silhouette, on the way from where it was seen to the target.
             assert!((end.z - root.z).abs() < 1e-3, "{target:?}: {end}");
-            let way = [target[0] - now.x, target[1] - now.y];
-            let off_line =
-                (way[0] * (end.y - now.y) - way[1] * (end.x - now.x)) / way[0].hypot(way[1]);
+            let way = target - now.xy();
+            let off_line = way.perp(&(end.xy() - now.xy())) / way.x.hypot(way.y);
             assert!(
                 off_line.abs() < 1e-6,
                 "{target:?}: {off_line} px off the way"

@@ -7,6 +7,7 @@ use arborcam::model::{
 };
 use arborcam::outline::whole;
 use arborcam::track::Tracker;
+use nalgebra::{Point2, Vector2};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use std::time::Instant;
@@ -61,17 +62,17 @@ fn tracker() -> Tracker {
     )
 }
 
-fn places(set: &TrackSet) -> BTreeMap<TrackId, [f64; 2]> {
+fn places(set: &TrackSet) -> BTreeMap<TrackId, Point2<f64>> {
     set.observations
         .iter()
-        .map(|o| (o.id, [f64::from(o.u_px), f64::from(o.v_px)]))
+        .map(|o| (o.id, Point2::new(f64::from(o.u_px), f64::from(o.v_px))))
         .collect()
 }
 
 /// Shift of the picture in frame `k`, px: a sway of a few pixels.
-fn shift(k: u64) -> [f64; 2] {
+fn shift(k: u64) -> Vector2<f64> {
     let phase = TAU * k as f64 / 40.0;
-    [6.3 * phase.sin(), 2.1 * (1.7 * phase).sin()]
+    Vector2::new(6.3 * phase.sin(), 2.1 * (1.7 * phase).sin())
 }
 
 #[test]
@@ -80,14 +81,14 @@ fn a_known_motion_is_followed_to_a_tenth_of_a_pixel() {
     let first = places(&tracker.step(&frame(0, texture)));
     assert!(first.len() >= 80, "{} points", first.len());
     for k in 1..40 {
-        let [du, dv] = shift(k);
-        let now = places(&tracker.step(&frame(k, |u, v| texture(u - du, v - dv))));
+        let d = shift(k);
+        let now = places(&tracker.step(&frame(k, |u, v| texture(u - d.x, v - d.y))));
         let mut errors: Vec<f64> = now
             .iter()
             .filter_map(|(id, at)| {
                 first
                     .get(id)
-                    .map(|from| (at[0] - from[0] - du).hypot(at[1] - from[1] - dv))
+                    .map(|from| (at.x - from.x - d.x).hypot(at.y - from.y - d.y))
             })
             .collect();
         errors.sort_by(f64::total_cmp);
@@ -117,7 +118,7 @@ fn a_static_picture_stays_where_it_is() {
         assert_eq!(now.len(), first.len(), "none is lost in frame {k}");
         for (id, at) in &now {
             assert!(
-                (at[0] - first[id][0]).hypot(at[1] - first[id][1]) < 0.01,
+                (at.x - first[id].x).hypot(at.y - first[id].y) < 0.01,
                 "{id:?} drifts"
             );
         }
@@ -194,8 +195,8 @@ fn the_choice_of_points_waits_for_wind() {
     );
 }
 
-fn on_small_tree(p: &[f64; 2]) -> bool {
-    (110.0..170.0).contains(&p[0]) && (90.0..150.0).contains(&p[1])
+fn on_small_tree(p: &Point2<f64>) -> bool {
+    (110.0..170.0).contains(&p.x) && (90.0..150.0).contains(&p.y)
 }
 
 /// The whole picture for an outline, and a small tree: its points are few of all, but enough to
@@ -213,7 +214,7 @@ fn a_small_tree_in_a_wide_outline_stirs_too() {
         let time_s = k as f64 / 10.0;
         let du = 5.0 * (TAU * time_s / 2.0).sin();
         let picture = frame(k, |u, v| {
-            if on_small_tree(&[u, v]) {
+            if on_small_tree(&Point2::new(u, v)) {
                 texture(u - du, v)
             } else {
                 texture(u, v)
@@ -269,9 +270,9 @@ fn points_that_hardly_move_pass_their_trial_by_time() {
 }
 
 /// Whether a place is behind the bird, so far from its edge, px.
-fn behind_bird(p: &[f64; 2], inside_px: f64) -> bool {
-    (110.0 + inside_px..170.0 - inside_px).contains(&p[0])
-        && (80.0 + inside_px..140.0 - inside_px).contains(&p[1])
+fn behind_bird(p: &Point2<f64>, inside_px: f64) -> bool {
+    (110.0 + inside_px..170.0 - inside_px).contains(&p.x)
+        && (80.0 + inside_px..140.0 - inside_px).contains(&p.y)
 }
 
 /// A bird flies by: a point behind it is not reported, and has its old name afterwards.
@@ -281,13 +282,13 @@ fn hidden_points_come_back_with_their_names_in_the_right_place() {
     let mut first = BTreeMap::new();
     let mut seen_behind = 0;
     for k in 0..40 {
-        let [du, dv] = shift(k);
+        let d = shift(k);
         let covered = (10..16).contains(&k);
         let now = places(&tracker.step(&frame(k, |u, v| {
-            if covered && behind_bird(&[u, v], 0.0) {
+            if covered && behind_bird(&Point2::new(u, v), 0.0) {
                 40.0
             } else {
-                texture(u - du, v - dv)
+                texture(u - d.x, v - d.y)
             }
         })));
         if k == 0 {
@@ -300,7 +301,7 @@ fn hidden_points_come_back_with_their_names_in_the_right_place() {
             let behind: Vec<_> = first.iter().filter(|(_, p)| behind_bird(p, 12.0)).collect();
             let back = behind.iter().filter(|(id, from)| {
                 now.get(*id)
-                    .is_some_and(|at| (at[0] - from[0] - du).hypot(at[1] - from[1] - dv) < 0.3)
+                    .is_some_and(|at| (at.x - from.x - d.x).hypot(at.y - from.y - d.y) < 0.3)
             });
             let n = back.count();
             assert!(

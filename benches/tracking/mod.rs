@@ -12,6 +12,7 @@ use arborcam::model::{Frame, Luma, Outline, TrackId};
 use arborcam::outline::whole;
 use arborcam::source::{self, Decoder};
 use arborcam::track::{Detector, Tracker};
+use nalgebra::Point2;
 use opencv::boxed_ref::BoxedRef;
 use opencv::core::{Mat, Point2f, Size as CvSize, TermCriteria, Vector};
 use opencv::video::{OPTFLOW_USE_INITIAL_FLOW, calc_optical_flow_pyr_lk};
@@ -207,7 +208,7 @@ fn textbook() -> Places {
     let mut places = Places::new();
     for k in 0..support::recording().len() {
         let now = support::decoded(&mut decoder, k).luma;
-        let from: Vector<Point2f> = points.iter().map(|p| Point2f::new(p[0], p[1])).collect();
+        let from: Vector<Point2f> = points.iter().map(|p| Point2f::new(p.x, p.y)).collect();
         let (to, closed) = there_and_back(&before, &now, &from);
         let kept: Vec<usize> = (0..points.len()).filter(|&i| closed[i]).collect();
         ids = kept.iter().map(|&i| ids[i]).collect();
@@ -225,7 +226,7 @@ fn textbook() -> Places {
 
 /// Where points go from picture `a` to picture `b`, and whether the way back ends within 1 px of
 /// where they were.
-fn there_and_back(a: &Luma, b: &Luma, from: &Vector<Point2f>) -> (Vec<[f32; 2]>, Vec<bool>) {
+fn there_and_back(a: &Luma, b: &Luma, from: &Vector<Point2f>) -> (Vec<Point2<f32>>, Vec<bool>) {
     let (rows, cols) = (a.size.height as i32, a.size.width as i32);
     let [a, b] = [a, b].map(|l| Mat::new_rows_cols_with_data(rows, cols, &l.pixels).expect("mat"));
     let flow = |a: &BoxedRef<Mat>, b: &BoxedRef<Mat>, from: &Vector<Point2f>| {
@@ -258,7 +259,10 @@ fn there_and_back(a: &Luma, b: &Luma, from: &Vector<Point2f>) -> (Vec<[f32; 2]>,
     let closed = missed_px
         .zip(there.iter().zip(back.iter()))
         .map(|(px, (s, t))| px < 1.0 && s != 0 && t != 0);
-    (to.iter().map(|p| [p.x, p.y]).collect(), closed.collect())
+    (
+        to.iter().map(|p| Point2::new(p.x, p.y)).collect(),
+        closed.collect(),
+    )
 }
 
 pub fn timed_ms<T>(work: impl FnOnce() -> T) -> (f64, T) {

@@ -2,6 +2,7 @@
 
 use super::local::{self, Nearby};
 use crate::model::{MotionHierarchy, NodeId, Skeleton, TrackId, TrackSet};
+use nalgebra::Point2;
 use std::collections::BTreeMap;
 
 /// A later track is given to the nearest tip only within so many times the mean distance between
@@ -14,7 +15,7 @@ const LEAST: f64 = 0.01;
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Bound {
     node: NodeId,
-    rest_px: [f64; 2],
+    rest_px: Point2<f64>,
 }
 
 /// Tracks bound to the measured nodes of a skeleton.
@@ -22,7 +23,7 @@ pub struct Binding {
     tracks: BTreeMap<TrackId, Option<Bound>>,
     parents: Vec<Option<NodeId>>,
     /// Projection of each measured node at rest, px.
-    rest_px: Vec<[f64; 2]>,
+    rest_px: Vec<Point2<f64>>,
     tips: Vec<NodeId>,
     reach_px: f64,
     least_px: f64,
@@ -37,7 +38,7 @@ impl Binding {
     /// unbound.
     pub fn new(
         hierarchy: &MotionHierarchy,
-        rest_px: &BTreeMap<TrackId, [f64; 2]>,
+        rest_px: &BTreeMap<TrackId, Point2<f64>>,
         skeleton: &Skeleton,
     ) -> Self {
         let nodes = &skeleton.nodes[..skeleton.measured()];
@@ -61,7 +62,7 @@ impl Binding {
             .filter(|&i| is_tip[i])
             .map(|i| NodeId(i as u32))
             .collect();
-        let rest: Vec<[f64; 2]> = nodes
+        let rest: Vec<Point2<f64>> = nodes
             .iter()
             .map(|n| skeleton.image_from_model(&n.position).into())
             .collect();
@@ -78,7 +79,7 @@ impl Binding {
 
     /// Takes over tracks that an older tree knew, with the node and the rest place (px) that each
     /// has here.
-    pub fn inherit(&mut self, tracks: &BTreeMap<TrackId, (NodeId, [f64; 2])>) {
+    pub fn inherit(&mut self, tracks: &BTreeMap<TrackId, (NodeId, Point2<f64>)>) {
         for (&id, &(node, rest_px)) in tracks {
             self.tracks.insert(id, Some(Bound { node, rest_px }));
         }
@@ -86,7 +87,7 @@ impl Binding {
 
     /// Every bound track with its deepest node and its rest place, px; those that have been lost
     /// among them.
-    pub fn bound(&self) -> impl Iterator<Item = (TrackId, NodeId, [f64; 2])> {
+    pub fn bound(&self) -> impl Iterator<Item = (TrackId, NodeId, Point2<f64>)> {
         self.tracks
             .iter()
             .filter_map(|(id, bound)| bound.map(|b| (*id, b.node, b.rest_px)))
@@ -102,24 +103,21 @@ impl Binding {
     ///
     /// Tracks that are new and confirmed are bound to the tip that is nearest to them in this
     /// frame, if one is near enough.
-    pub fn targets_px(&mut self, set: &TrackSet) -> Vec<Option<[f64; 2]>> {
+    pub fn targets_px(&mut self, set: &TrackSet) -> Vec<Option<Point2<f64>>> {
         self.collect(set);
-        let mut targets: Vec<Option<[f64; 2]>> = self
+        let mut targets: Vec<Option<Point2<f64>>> = self
             .collected
             .iter_mut()
             .zip(&self.rest_px)
-            .map(|(d, rest)| {
-                local::displacement(d, self.least_px).map(|d| [rest[0] + d[0], rest[1] + d[1]])
-            })
+            .map(|(d, rest)| local::displacement(d, self.least_px).map(|d| rest + d))
             .collect();
         for o in &set.observations {
             if o.confirmed && !self.tracks.contains_key(&o.id) {
-                let at = [f64::from(o.u_px), f64::from(o.v_px)];
+                let at = Point2::new(f64::from(o.u_px), f64::from(o.v_px));
                 // Decided once: a point of the background stays unbound when a branch swings near
                 // it later.
                 if let Some((tip, target)) = self.nearest_tip(at, &targets) {
-                    let rest = self.rest_px[tip.index()];
-                    let rest_px = [at[0] - target[0] + rest[0], at[1] - target[1] + rest[1]];
+                    let rest_px = self.rest_px[tip.index()] + (at - target);
                     let near = distance(at, target) <= self.reach_px;
                     let bound = near.then_some(Bound { node: tip, rest_px });
                     self.tracks.insert(o.id, bound);
@@ -136,9 +134,9 @@ impl Binding {
     /// place is known.
     fn nearest_tip(
         &self,
-        at: [f64; 2],
-        targets: &[Option<[f64; 2]>],
-    ) -> Option<(NodeId, [f64; 2])> {
+        at: Point2<f64>,
+        targets: &[Option<Point2<f64>>],
+    ) -> Option<(NodeId, Point2<f64>)> {
         let placed = self
             .tips
             .iter()
@@ -148,7 +146,7 @@ impl Binding {
 
     /// Where a tip is, px. One that has lost all its tracks is where the nearest branch below it
     /// that is seen would carry it.
-    fn expected_px(&self, tip: NodeId, targets: &[Option<[f64; 2]>]) -> Option<[f64; 2]> {
+    fn expected_px(&self, tip: NodeId, targets: &[Option<Point2<f64>>]) -> Option<Point2<f64>> {
         let mut carrier = tip;
         let target = loop {
             match targets[carrier.index()] {
@@ -157,7 +155,7 @@ impl Binding {
             }
         };
         let (rest, own) = (self.rest_px[carrier.index()], self.rest_px[tip.index()]);
-        Some([own[0] + target[0] - rest[0], own[1] + target[1] - rest[1]])
+        Some(own + target.coords - rest.coords)
     }
 
     /// Every track's displacement goes to its node and to all nodes above it.
@@ -167,17 +165,12 @@ impl Binding {
             let Some(Some(bound)) = self.tracks.get(&o.id) else {
                 continue;
             };
-            let d = [
-                f64::from(o.u_px) - bound.rest_px[0],
-                f64::from(o.v_px) - bound.rest_px[1],
-            ];
+            let displacement = Point2::new(f64::from(o.u_px), f64::from(o.v_px)) - bound.rest_px;
             let mut at = Some(bound.node);
             while let Some(node) = at {
-                let rest = self.rest_px[node.index()];
-                let offset = [bound.rest_px[0] - rest[0], bound.rest_px[1] - rest[1]];
                 self.collected[node.index()].push(Nearby {
-                    displacement: d,
-                    offset,
+                    displacement,
+                    offset: bound.rest_px - self.rest_px[node.index()],
                 });
                 at = self.parents[node.index()];
             }
@@ -186,7 +179,7 @@ impl Binding {
 }
 
 /// Mean distance of the tips from the nearest other tip, px; 0 for less than two.
-fn mean_gap(tips: &[NodeId], rest_px: &[[f64; 2]]) -> f64 {
+fn mean_gap(tips: &[NodeId], rest_px: &[Point2<f64>]) -> f64 {
     let (mut sum, mut count) = (0.0, 0usize);
     for tip in tips {
         let others = tips.iter().filter(|other| *other != tip);
@@ -201,6 +194,6 @@ fn mean_gap(tips: &[NodeId], rest_px: &[[f64; 2]]) -> f64 {
     sum / count.max(1) as f64
 }
 
-fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
+fn distance(a: Point2<f64>, b: Point2<f64>) -> f64 {
+    (a.x - b.x).hypot(a.y - b.y)
 }

@@ -1,19 +1,14 @@
 //! How a place moves, by the points around it.
 
 use crate::signal::median;
+use nalgebra::Vector2;
 use std::cmp::Ordering;
 
 /// A point's displacement in a frame, and where it rests as seen from the place, px.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Nearby {
-    pub displacement: [f64; 2],
-    pub offset: [f64; 2],
-}
-
-impl Nearby {
-    fn distance_sq(&self) -> f64 {
-        self.offset[0] * self.offset[0] + self.offset[1] * self.offset[1]
-    }
+    pub displacement: Vector2<f64>,
+    pub offset: Vector2<f64>,
 }
 
 /// So many points are within one standard deviation of the weights, and twice as many count.
@@ -35,7 +30,7 @@ const FLOOR_PX: f64 = 0.05;
 /// A branch that turns moves its points the farther the farther out they are. Their mean is the
 /// motion of their middle, and the node, a fork or a tip, stands at their edge; the slopes take it
 /// there.
-pub(super) fn displacement(points: &mut [Nearby], least_px: f64) -> Option<[f64; 2]> {
+pub(super) fn displacement(points: &mut [Nearby], least_px: f64) -> Option<Vector2<f64>> {
     let used = points.len().min(2 * POINTS);
     if used == 0 {
         return None;
@@ -47,22 +42,23 @@ pub(super) fn displacement(points: &mut [Nearby], least_px: f64) -> Option<[f64;
     let rank = used.min(POINTS) - 1;
     points.select_nth_unstable_by(rank, nearer);
     let variance = points[rank]
-        .distance_sq()
+        .offset
+        .norm_squared()
         .max(least_px * least_px)
         .max(1e-6);
     let mut near = [0.0; 2 * POINTS];
     for (weight, p) in near.iter_mut().zip(points.iter()) {
-        *weight = (-0.5 * p.distance_sq() / variance).exp();
+        *weight = (-0.5 * p.offset.norm_squared() / variance).exp();
     }
     let (mut weights, mut misses) = (near, [0.0; 2 * POINTS]);
     let mut field = fitted(points, &weights, variance);
     for _ in 1..ROUNDS {
         for (miss, p) in misses.iter_mut().zip(points.iter()) {
-            let off = [0, 1].map(|c| {
+            let off = Vector2::from_fn(|c, _| {
                 let [at, slope_u, slope_v] = field[c];
-                p.displacement[c] - at - slope_u * p.offset[0] - slope_v * p.offset[1]
+                p.displacement[c] - at - slope_u * p.offset.x - slope_v * p.offset.y
             });
-            *miss = (off[0].powi(2) + off[1].powi(2)).sqrt();
+            *miss = off.norm();
         }
         let median = median(misses[..used].to_vec(), f64::total_cmp)?;
         let scale = HALF_AT * median + FLOOR_PX;
@@ -71,12 +67,12 @@ pub(super) fn displacement(points: &mut [Nearby], least_px: f64) -> Option<[f64;
         }
         field = fitted(points, &weights, variance);
     }
-    Some([field[0][0], field[1][0]])
+    Some(Vector2::new(field[0][0], field[1][0]))
 }
 
 /// The order of points by their distance from the place.
 fn nearer(a: &Nearby, b: &Nearby) -> Ordering {
-    a.distance_sq().total_cmp(&b.distance_sq())
+    a.offset.norm_squared().total_cmp(&b.offset.norm_squared())
 }
 
 /// For either coordinate: displacement at the place, and its slopes along u and v.
@@ -85,14 +81,14 @@ fn fitted(points: &[Nearby], weights: &[f64], variance: f64) -> [[f64; 3]; 2] {
         (0.0, 0.0, 0.0, SLOPES * variance, 0.0, SLOPES * variance);
     let mut right = [[0.0; 3]; 2];
     for (p, w) in points.iter().zip(weights) {
-        let [u, v] = p.offset;
+        let (u, v) = (p.offset.x, p.offset.y);
         s += w;
         su += w * u;
         sv += w * v;
         suu += w * u * u;
         suv += w * u * v;
         svv += w * v * v;
-        for (r, d) in right.iter_mut().zip(p.displacement) {
+        for (r, d) in right.iter_mut().zip(&p.displacement) {
             r[0] += w * d;
             r[1] += w * u * d;
             r[2] += w * v * d;
@@ -123,8 +119,8 @@ mod tests {
         for k in 1..=n {
             let out = from * k as f64 / n as f64;
             points.push(Nearby {
-                displacement: [angle * out, 0.0],
-                offset: [0.0, from - out],
+                displacement: Vector2::new(angle * out, 0.0),
+                offset: Vector2::new(0.0, from - out),
             });
         }
         points
@@ -135,7 +131,7 @@ mod tests {
         let moved = displacement(&mut branch(12, 100.0, 0.1), 6.0).expect("points");
         // Their middle moves by 5.4 px.
         assert!(
-            (6.8..=10.0).contains(&moved[0]) && moved[1].abs() < 1e-9,
+            (6.8..=10.0).contains(&moved.x) && moved.y.abs() < 1e-9,
             "{moved:?} of 10 px"
         );
     }
@@ -145,10 +141,10 @@ mod tests {
         let mut points = branch(30, 80.0, 0.0);
         points
             .iter_mut()
-            .for_each(|p| p.displacement = [2.5, -1.25]);
+            .for_each(|p| p.displacement = Vector2::new(2.5, -1.25));
         let moved = displacement(&mut points, 6.0).expect("points");
         assert!(
-            (moved[0] - 2.5).abs() < 1e-9 && (moved[1] + 1.25).abs() < 1e-9,
+            (moved.x - 2.5).abs() < 1e-9 && (moved.y + 1.25).abs() < 1e-9,
             "{moved:?}"
         );
     }
@@ -158,12 +154,13 @@ mod tests {
         let mut points = branch(12, 100.0, 0.1);
         let right = displacement(&mut points.clone(), 6.0).expect("points");
         for k in [1, 6, 9] {
-            points[k].displacement = [-25.0, 40.0];
+            points[k].displacement = Vector2::new(-25.0, 40.0);
         }
         // Their mean would be carried off by 12 px.
         let moved = displacement(&mut points, 6.0).expect("points");
+        let off = moved - right;
         assert!(
-            (moved[0] - right[0]).hypot(moved[1] - right[1]) < 2.5,
+            off.x.hypot(off.y) < 2.5,
             "{moved:?} and without them {right:?}"
         );
     }
@@ -171,24 +168,24 @@ mod tests {
     #[test]
     fn one_point_or_many_in_one_place_are_enough_and_none_is_nothing() {
         let one = Nearby {
-            displacement: [3.0, 4.0],
-            offset: [10.0, 0.0],
+            displacement: Vector2::new(3.0, 4.0),
+            offset: Vector2::new(10.0, 0.0),
         };
         let moved = displacement(&mut [one], 6.0).expect("a point");
         assert!(
-            (moved[0] - 3.0).abs() < 1e-6 && (moved[1] - 4.0).abs() < 1e-6,
+            (moved.x - 3.0).abs() < 1e-6 && (moved.y - 4.0).abs() < 1e-6,
             "{moved:?}"
         );
         let moved = displacement(
             &mut [Nearby {
-                offset: [0.0; 2],
+                offset: Vector2::zeros(),
                 ..one
             }; 40],
             0.0,
         )
         .expect("points");
         assert!(
-            (moved[0] - 3.0).abs() < 1e-6 && (moved[1] - 4.0).abs() < 1e-6,
+            (moved.x - 3.0).abs() < 1e-6 && (moved.y - 4.0).abs() < 1e-6,
             "{moved:?}"
         );
         assert_eq!(displacement(&mut [], 6.0), None);

@@ -21,7 +21,7 @@ pub use probabilistic::Problem;
 
 use crate::config::{Motion, MotionMethod};
 use crate::model::{JointPose, Node, NodeId, Pose, Skeleton};
-use nalgebra::{Unit, UnitQuaternion, UnitVector3, Vector3};
+use nalgebra::{Point2, Unit, UnitQuaternion, UnitVector3, Vector3};
 use rotation::shortest_rotation;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -134,7 +134,7 @@ impl PoseEstimator {
     }
 
     /// The most probable pose, given where the tracks put each measured node (px in the picture).
-    pub fn step(&mut self, frame: u64, time_s: f64, targets_px: &[Option<[f64; 2]>]) -> Pose {
+    pub fn step(&mut self, frame: u64, time_s: f64, targets_px: &[Option<Point2<f64>>]) -> Pose {
         // A clock that stands still must not forbid all motion.
         let elapsed_s = (time_s - self.previous_s).max(1e-3);
         self.previous_s = time_s;
@@ -203,11 +203,11 @@ impl PoseEstimator {
         branch: &Branch,
         previous: Option<UnitVector3<f64>>,
         parent: &JointPose,
-        target_px: Option<[f64; 2]>,
+        target_px: Option<Point2<f64>>,
         elapsed_s: f64,
     ) -> UnitVector3<f64> {
-        let foot = self.skeleton.foot_px;
-        let target = target_px.map(|t| [t[0] - foot[0], foot[1] - t[1]]);
+        let foot = Point2::from(self.skeleton.foot_px);
+        let target = target_px.map(|t| Point2::new(t.x - foot.x, foot.y - t.y));
         if branch.length < 1e-6 {
             return branch.direction;
         }
@@ -215,7 +215,7 @@ impl PoseEstimator {
             MotionMethod::Probabilistic => Problem {
                 parent_rotation: parent.rotation,
                 length: branch.length,
-                target: target.map(|t| [t[0] - parent.position.x, t[1] - parent.position.y]),
+                target: target.map(|t| t - parent.position.xy()),
                 parent_direction: branch.parent_direction,
                 rest_direction: branch.direction,
                 previous_direction: previous.unwrap_or(branch.direction),

@@ -11,7 +11,7 @@ pub struct Problem {
     pub parent_rotation: UnitQuaternion<f64>,
     pub length: f64,
     /// Where the node is seen, relative to the local root, model axes, px; `None` where it is not.
-    pub target: Option<[f64; 2]>,
+    pub target: Option<Vector2<f64>>,
     /// Direction of the parent branch, `None` where there is none.
     pub parent_direction: Option<UnitVector3<f64>>,
     pub rest_direction: UnitVector3<f64>,
@@ -47,8 +47,7 @@ impl Problem {
     pub fn cost(&self, d: &UnitVector3<f64>) -> f64 {
         let y = self.parent_rotation * d.into_inner();
         let track = self.target.map_or(0.0, |t| {
-            Vector2::new(y.x * self.length - t[0], y.y * self.length - t[1]).norm_squared()
-                / self.sigma_track_px.powi(2)
+            (y.xy() * self.length - t).norm_squared() / self.sigma_track_px.powi(2)
         });
         let shape = self.parent_direction.map_or(0.0, |p| {
             (p.angle(d) - p.angle(&self.rest_direction)) / self.sigma_shape

@@ -104,7 +104,7 @@ impl Off {
 }
 
 impl Search {
-    fn new(problem: &Problem, target: [f64; 2]) -> Self {
+    fn new(problem: &Problem, target: Vector2<f64>) -> Self {
         let previous = problem.parent_rotation * problem.previous_direction;
         let rest = problem.parent_rotation * problem.rest_direction;
         let (rate, lean) = (weight(problem.sigma_depth), weight(problem.sigma_lean));
@@ -116,7 +116,7 @@ impl Search {
             }
         });
         Self {
-            target: Vector2::new(target[0], target[1]),
+            target,
             length: problem.length,
             previous,
             rest,

@@ -32,8 +32,7 @@ impl PoseTracker {
         let pose = self
             .estimator
             .step(tracks.frame, tracks.time_s, &targets_px);
-        let targets_px = targets_px.into_iter().map(|p| p.map(Into::into));
-        (pose, targets_px.collect())
+        (pose, targets_px)
     }
 
     pub fn model(&self) -> &Arc<Model> {

@@ -90,11 +90,9 @@ impl Moment {
 impl Model {
     /// Which track moves which node.
     pub fn binding(&self) -> Binding {
-        let rest_px = self.rest_px.iter().map(|(id, p)| (*id, (*p).into()));
-        let mut binding = Binding::new(&self.hierarchy, &rest_px.collect(), &self.skeleton);
-        for known in [&self.joined, &self.on_sub_branches()] {
-            let known = known.iter().map(|(id, (n, p))| (*id, (*n, (*p).into())));
-            binding.inherit(&known.collect());
+        let mut binding = Binding::new(&self.hierarchy, &self.rest_px, &self.skeleton);
+        for joined in [&self.joined, &self.on_sub_branches()] {
+            binding.inherit(joined);
         }
         binding
     }

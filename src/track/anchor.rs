@@ -6,10 +6,11 @@
 
 use super::flow::{Flow, OpticalFlow, Pyramid};
 use super::neighbours::Fit;
-use super::point::{Point, distance};
+use super::point::Point;
 use super::register::{Patch, Registration, UPRIGHT};
 use crate::config::Track;
 use crate::model::Luma;
+use nalgebra::{Point2, distance};
 
 /// Pictures kept to put points back on; the oldest but the first gives way.
 const KEYFRAMES: usize = 4;
@@ -51,7 +52,7 @@ pub struct Anchors {
 /// What the search for a point's first patch has found.
 struct Reanchored {
     /// The best place, px, if it is another than the present one.
-    better_px: Option<[f32; 2]>,
+    better_px: Option<Point2<f32>>,
     /// Correlation of patch and picture there.
     ncc: f32,
 }
@@ -84,7 +85,7 @@ impl Anchors {
     }
 
     /// What a point at `at_px` looks like.
-    pub fn patch(&self, luma: &Luma, at_px: [f32; 2]) -> Patch {
+    pub fn patch(&self, luma: &Luma, at_px: Point2<f32>) -> Patch {
         self.registration.patch(luma, at_px)
     }
 
@@ -130,11 +131,11 @@ impl Anchors {
         } else {
             f32::MIN
         };
-        let elsewhere = (distance(p.now_px, predicted_px) > APART_PX)
+        let elsewhere = (distance(&p.now_px, &predicted_px) > APART_PX)
             .then(|| self.registration.find(&p.patch, luma, predicted_px, &warp));
         for found in std::iter::once(at_start).chain(elsewhere) {
             let score = score(found.ncc, found.at_px, predicted_px);
-            let near = distance(found.at_px, predicted_px) < NEIGHBOUR_LIMIT_PX;
+            let near = distance(&found.at_px, &predicted_px) < NEIGHBOUR_LIMIT_PX;
             if found.converged && near && found.ncc > enough && score > best_score {
                 best_score = score;
                 best = Reanchored {
@@ -148,8 +149,8 @@ impl Anchors {
 
     /// Whether something else is seen where tracking has a point, from its correlation with its
     /// first patch there.
-    fn is_covered(&self, p: &Point, ncc: f32, predicted_px: Option<[f32; 2]>) -> bool {
-        let astray_px = predicted_px.map_or(0.0, |at| distance(p.now_px, at));
+    fn is_covered(&self, p: &Point, ncc: f32, predicted_px: Option<Point2<f32>>) -> bool {
+        let astray_px = predicted_px.map_or(0.0, |at| distance(&p.now_px, &at));
         ncc < p.hidden_below()
             || (ncc < self.min_ncc() && astray_px > ASTRAY_PX)
             || astray_px > FAR_ASTRAY_PX
@@ -163,11 +164,11 @@ impl Anchors {
                 .iter_mut()
                 .filter(|p| p.keyframe == keyframe.number)
                 .collect();
-            let born: Vec<[f32; 2]> = of_keyframe.iter().map(|p| p.born_px).collect();
+            let born: Vec<Point2<f32>> = of_keyframe.iter().map(|p| p.born_px).collect();
             let levels = self.settings.levels;
             self.flow
                 .track(&keyframe.pyramid, pyramid, &born, levels, &mut self.forward);
-            let found: Vec<[f32; 2]> = self.forward.iter().map(|f| f.to).collect();
+            let found: Vec<Point2<f32>> = self.forward.iter().map(|f| f.to).collect();
             self.flow.track(
                 pyramid,
                 &keyframe.pyramid,
@@ -179,7 +180,7 @@ impl Anchors {
             for (p, (forward, backward)) in of_keyframe.into_iter().zip(flows) {
                 let closed = forward.found
                     && backward.found
-                    && distance(backward.to, p.born_px) < FB_LIMIT_PX;
+                    && distance(&backward.to, &p.born_px) < FB_LIMIT_PX;
                 if closed && self.is_like(p, luma, forward.to) {
                     (p.now_px, p.coasting, p.fb_error_px) = (forward.to, 0, 0.0);
                 }
@@ -188,7 +189,7 @@ impl Anchors {
     }
 
     /// Whether the picture at `at_px` looks like a point did when it was first seen.
-    fn is_like(&self, p: &Point, luma: &Luma, at_px: [f32; 2]) -> bool {
+    fn is_like(&self, p: &Point, luma: &Luma, at_px: Point2<f32>) -> bool {
         self.registration.ncc(&p.patch, luma, at_px, &UPRIGHT) > self.min_ncc()
     }
 
@@ -198,6 +199,6 @@ impl Anchors {
 }
 
 /// Correlation of a match, reduced by its distance from where the neighbours say.
-fn score(ncc: f32, at_px: [f32; 2], predicted_px: [f32; 2]) -> f32 {
-    ncc - NCC_PER_PX * distance(at_px, predicted_px)
+fn score(ncc: f32, at_px: Point2<f32>, predicted_px: Point2<f32>) -> f32 {
+    ncc - NCC_PER_PX * distance(&at_px, &predicted_px)
 }

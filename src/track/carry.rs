@@ -3,6 +3,7 @@
 use super::neighbours::{self, Fit, NEIGHBOURS, Witness};
 use super::point::Point;
 use crate::model::TrackId;
+use nalgebra::Point2;
 
 /// How the surroundings of each point have moved, by the places that its neighbours have now; of
 /// every point that is hidden or in its turn in frame number `frame`, see [`Point::in_turn`].
@@ -42,7 +43,7 @@ pub fn carry_hidden(points: &mut [Point], fits: &[Option<Fit>]) {
 struct Seen {
     ids: Vec<TrackId>,
     /// Place, px, and weight of each; `None` for one that is hidden.
-    states: Vec<Option<([f32; 2], f64)>>,
+    states: Vec<Option<(Point2<f32>, f64)>>,
 }
 
 impl Seen {
@@ -58,11 +59,11 @@ impl Seen {
 
     /// What the neighbour `id` says, which was at `then_px` when the point was born at `born_px`;
     /// `None` if it is not seen.
-    fn witness(&self, id: TrackId, then_px: [f32; 2], born_px: [f32; 2]) -> Option<Witness> {
+    fn witness(&self, id: TrackId, then_px: Point2<f32>, born_px: Point2<f32>) -> Option<Witness> {
         let (now_px, weight) = self.states[self.ids.binary_search(&id).ok()?]?;
         Some(Witness {
-            offset: [0, 1].map(|c| f64::from(then_px[c] - born_px[c])),
-            displacement: [0, 1].map(|c| f64::from(now_px[c] - then_px[c])),
+            offset: (then_px - born_px).map(f64::from),
+            displacement: (now_px - then_px).map(f64::from),
             weight,
         })
     }

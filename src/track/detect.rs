@@ -2,6 +2,7 @@
 
 use crate::config::Detect;
 use crate::model::{Luma, Outline};
+use nalgebra::Point2;
 use opencv::core::{
     BORDER_CONSTANT, Mat, Point, Point2f, Rect, Scalar, Size as CvSize, ToInputArray, Vector,
     bitwise_and, bitwise_or, no_array, subtract,
@@ -57,7 +58,7 @@ impl Detector {
     /// At most `wanted` corners (px), strongest first, at the minimum distance from `taken`; as
     /// they are candidates, of which the better half is kept, twice as many find place side by
     /// side.
-    pub fn detect(&self, luma: &Luma, taken: &[[f32; 2]], wanted: usize) -> Vec<[f32; 2]> {
+    pub fn detect(&self, luma: &Luma, taken: &[Point2<f32>], wanted: usize) -> Vec<Point2<f32>> {
         if self.roi.area() == 0 || wanted == 0 {
             return Vec::new();
         }
@@ -74,14 +75,14 @@ impl Detector {
     fn corners(
         &self,
         luma: &Luma,
-        taken: &[[f32; 2]],
+        taken: &[Point2<f32>],
         wanted: usize,
-    ) -> opencv::Result<Vec<[f32; 2]>> {
+    ) -> opencv::Result<Vec<Point2<f32>>> {
         let mut mask = self.allowed.clone();
         for p in taken {
             let centre = Point::new(
-                p[0].round() as i32 - self.roi.x,
-                p[1].round() as i32 - self.roi.y,
+                p.x.round() as i32 - self.roi.x,
+                p.y.round() as i32 - self.roi.y,
             );
             let radius = self.min_distance_px.round() as i32;
             circle(
@@ -114,7 +115,10 @@ impl Detector {
             HARRIS_K,
         )?;
         let (left, top) = (self.roi.x as f32, self.roi.y as f32);
-        Ok(corners.iter().map(|c| [c.x + left, c.y + top]).collect())
+        Ok(corners
+            .iter()
+            .map(|c| Point2::new(c.x + left, c.y + top))
+            .collect())
     }
 }
 

@@ -1,6 +1,7 @@
 //! Sparse optical flow: pyramidal Lucas-Kanade on pyramids that are built once a frame (OpenCV).
 
 use crate::model::Luma;
+use nalgebra::Point2;
 use opencv::core::{
     Mat, Point2f, Size as CvSize, TermCriteria, TermCriteria_Type, Vector, no_array,
 };
@@ -50,7 +51,7 @@ impl Pyramid {
 /// Where a point went.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flow {
-    pub to: [f32; 2],
+    pub to: Point2<f32>,
     /// The window had texture, the search converged and stayed in the picture.
     pub found: bool,
 }
@@ -80,7 +81,7 @@ impl OpticalFlow {
         &mut self,
         a: &Pyramid,
         b: &Pyramid,
-        points: &[[f32; 2]],
+        points: &[Point2<f32>],
         levels: u32,
         out: &mut Vec<Flow>,
     ) {
@@ -115,14 +116,14 @@ impl OpticalFlow {
         }
         let found = self.status.iter().map(|s| s != 0);
         out.extend(self.to.iter().zip(found).map(|(p, found)| Flow {
-            to: [p.x, p.y],
+            to: Point2::new(p.x, p.y),
             found,
         }));
     }
 }
 
 /// A point that was not found stays where it was.
-fn lost(point: &[f32; 2]) -> Flow {
+fn lost(point: &Point2<f32>) -> Flow {
     Flow {
         to: *point,
         found: false,
@@ -133,10 +134,10 @@ fn square(side_px: u32) -> CvSize {
     CvSize::new(side_px as i32, side_px as i32)
 }
 
-fn fill(vector: &mut Vector<Point2f>, points: &[[f32; 2]]) {
+fn fill(vector: &mut Vector<Point2f>, points: &[Point2<f32>]) {
     vector.clear();
     vector.reserve(points.len());
     for p in points {
-        vector.push(Point2f::new(p[0], p[1]));
+        vector.push(Point2f::new(p.x, p.y));
     }
 }

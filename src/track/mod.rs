@@ -21,8 +21,9 @@ use crate::model::{Frame, Observation, Outline, TrackId, TrackSet};
 use anchor::Anchors;
 use carry::{carry_hidden, neighbour_fits};
 use flow::{Flow, OpticalFlow, Pyramid};
+use nalgebra::{Point2, distance};
 use neighbours::Fit;
-use point::{Point, Record, Trial, distance};
+use point::{Point, Record, Trial};
 use regain::Gaps;
 use trial::Selection;
 
@@ -56,8 +57,8 @@ pub struct Tracker {
 
 #[derive(Default)]
 struct Buffers {
-    from: Vec<[f32; 2]>,
-    to: Vec<[f32; 2]>,
+    from: Vec<Point2<f32>>,
+    to: Vec<Point2<f32>>,
     forward: Vec<Flow>,
     backward: Vec<Flow>,
 }
@@ -135,7 +136,7 @@ impl Tracker {
                 p.seen_s = time_s;
             }
             let keep = time_s - p.seen_s <= coast_s
-                && size.contains(f64::from(p.now_px[0]), f64::from(p.now_px[1]));
+                && size.contains(f64::from(p.now_px.x), f64::from(p.now_px.y));
             if !keep && p.trial.is_some() {
                 rejected.push(p.id);
             }
@@ -170,7 +171,7 @@ impl Tracker {
         for (i, (forward, backward)) in followed.into_iter().zip(b.forward.iter().zip(&b.backward))
         {
             let p = &mut self.points[i];
-            let error_px = distance(backward.to, p.now_px);
+            let error_px = distance(&backward.to, &p.now_px);
             if forward.found && backward.found && error_px < limit_px {
                 (p.now_px, p.fb_error_px, p.coasting) = (forward.to, error_px, 0);
             }
@@ -219,7 +220,7 @@ impl Tracker {
     /// Detects points where there are none; returns how many.
     fn refill(&mut self, frame: &Frame) -> u32 {
         self.detected_s = frame.time_s;
-        let taken: Vec<[f32; 2]> = self.points.iter().map(|p| p.now_px).collect();
+        let taken: Vec<Point2<f32>> = self.points.iter().map(|p| p.now_px).collect();
         // Without comparisons nothing would be known of them at the end of a trial.
         let on_trial = self.settings.anchor_every > 0;
         let share = if on_trial { trial::CANDIDATES } else { 1 };
@@ -267,8 +268,8 @@ impl Tracker {
 fn observation(p: &Point) -> Observation {
     Observation {
         id: p.id,
-        u_px: p.now_px[0],
-        v_px: p.now_px[1],
+        u_px: p.now_px.x,
+        v_px: p.now_px.y,
         fb_error_px: p.fb_error_px,
         error_px: p.record.error_px(),
         confirmed: p.trial.is_none(),

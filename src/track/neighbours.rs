@@ -2,7 +2,7 @@
 
 use super::register::Warp;
 use crate::signal::median;
-use nalgebra::{Matrix3, Matrix3x2, RowVector2, Vector3};
+use nalgebra::{Matrix3, Matrix3x2, Point2, Vector2, Vector3, distance_squared};
 use std::cmp::Ordering;
 
 /// Number of neighbours by which the place of a point is predicted.
@@ -16,7 +16,7 @@ const ROUNDS: usize = 4;
 
 /// For every point the indices of its nearest others among all of `known`, at most [`REMEMBERED`],
 /// nearest first. The points themselves are the last of `known`.
-pub fn nearest(points: &[[f32; 2]], known: &[[f32; 2]]) -> Vec<Vec<u32>> {
+pub fn nearest(points: &[Point2<f32>], known: &[Point2<f32>]) -> Vec<Vec<u32>> {
     let before = known.len() - points.len();
     let mut all = Vec::with_capacity(points.len());
     for (i, p) in points.iter().enumerate() {
@@ -34,20 +34,16 @@ pub fn nearest(points: &[[f32; 2]], known: &[[f32; 2]]) -> Vec<Vec<u32>> {
 }
 
 /// The order of `known` points by their distance from `p`.
-fn nearer(p: &[f32; 2], known: &[[f32; 2]], a: u32, b: u32) -> Ordering {
-    distance_sq(p, &known[a as usize]).total_cmp(&distance_sq(p, &known[b as usize]))
-}
-
-fn distance_sq(a: &[f32; 2], b: &[f32; 2]) -> f32 {
-    (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2)
+fn nearer(p: &Point2<f32>, known: &[Point2<f32>], a: u32, b: u32) -> Ordering {
+    distance_squared(p, &known[a as usize]).total_cmp(&distance_squared(p, &known[b as usize]))
 }
 
 /// What a neighbour says.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Witness {
     /// Its offset from the point when that was detected, and its displacement since, px.
-    pub offset: [f64; 2],
-    pub displacement: [f64; 2],
+    pub offset: Vector2<f64>,
+    pub displacement: Vector2<f64>,
     /// Its weight, above 0 to 1.
     pub weight: f64,
 }
@@ -56,7 +52,7 @@ pub struct Witness {
 #[derive(Clone, Copy, Debug)]
 pub struct Fit {
     /// Displacement at the point itself, px.
-    pub displacement: [f64; 2],
+    pub displacement: Vector2<f64>,
     /// How a small offset from the point is turned and stretched.
     pub warp: Warp,
 }
@@ -64,12 +60,12 @@ pub struct Fit {
 impl Witness {
     /// Square of what the displacement differs from `affine` by, px^2.
     fn miss_sq(&self, affine: &Affine) -> f64 {
-        let miss = [0, 1].map(|c| {
+        let miss = Vector2::from_fn(|c, _| {
             let fitted =
-                affine[(0, c)] + affine[(1, c)] * self.offset[0] + affine[(2, c)] * self.offset[1];
+                affine[(0, c)] + affine[(1, c)] * self.offset.x + affine[(2, c)] * self.offset.y;
             self.displacement[c] - fitted
         });
-        miss[0].powi(2) + miss[1].powi(2)
+        miss.norm_squared()
     }
 }
 
@@ -96,13 +92,10 @@ pub fn fit(witnesses: &[Witness]) -> Option<Fit> {
             *w = n.weight * (1.0 + miss_sq / scale_sq).powi(-2);
         }
     }
-    let slopes = [0, 1].map(|of| [1, 2].map(|along| affine[(along, of)] as f32));
+    let slopes = Warp::from_fn(|of, along| affine[(1 + along, of)] as f32);
     Some(Fit {
-        displacement: [affine[(0, 0)], affine[(0, 1)]],
-        warp: [
-            [1.0 + slopes[0][0], slopes[0][1]],
-            [slopes[1][0], 1.0 + slopes[1][1]],
-        ],
+        displacement: affine.row(0).transpose(),
+        warp: Warp::new(1.0 + slopes.m11, slopes.m12, slopes.m21, 1.0 + slopes.m22),
     })
 }
 
@@ -110,10 +103,9 @@ fn weighted_fit(witnesses: &[Witness], weights: &[f64]) -> Option<Affine> {
     let mut normal = Matrix3::from_diagonal(&Vector3::new(1e-3, 30.0, 30.0));
     let mut right = Affine::zeros();
     for (witness, &w) in witnesses.iter().zip(weights) {
-        let [offset_u, offset_v] = witness.offset;
-        let row = Vector3::new(1.0, offset_u, offset_v);
+        let row = Vector3::new(1.0, witness.offset.x, witness.offset.y);
         normal += w * row * row.transpose();
-        right += w * row * RowVector2::from(witness.displacement);
+        right += w * row * witness.displacement.transpose();
     }
     Some(normal.cholesky()?.solve(&right))
 }

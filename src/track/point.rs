@@ -3,6 +3,7 @@
 use super::neighbours::Fit;
 use super::register::Patch;
 use crate::model::TrackId;
+use nalgebra::{Point2, distance};
 
 /// Share that one more comparison has at least in a [`Record`].
 const NEWEST: f32 = 0.1;
@@ -28,8 +29,8 @@ pub struct Point {
     pub id: TrackId,
     /// Number of the keyframe in which it was detected; the keyframe itself may be gone.
     pub keyframe: u32,
-    pub born_px: [f32; 2],
-    pub now_px: [f32; 2],
+    pub born_px: Point2<f32>,
+    pub now_px: Point2<f32>,
     /// What it looked like.
     pub patch: Patch,
     pub fb_error_px: f32,
@@ -38,7 +39,7 @@ pub struct Point {
     /// When it was last seen, s; moved on while there is nothing to be seen at all.
     pub seen_s: f64,
     /// Points nearest to it at birth, and where they were then.
-    pub neighbours: Vec<(TrackId, [f32; 2])>,
+    pub neighbours: Vec<(TrackId, Point2<f32>)>,
     /// How it did lately.
     pub record: Record,
     /// While it is not decided whether it is kept.
@@ -83,13 +84,13 @@ impl Point {
     }
 
     /// Where its neighbours say that it is, px.
-    pub fn predicted_px(&self, fit: &Fit) -> [f32; 2] {
-        [0, 1].map(|c| self.born_px[c] + fit.displacement[c] as f32)
+    pub fn predicted_px(&self, fit: &Fit) -> Point2<f32> {
+        self.born_px + fit.displacement.map(|x| x as f32)
     }
 
     /// Takes note of a comparison with its first patch, of which `ncc` is the correlation.
     pub fn compared(&mut self, ncc: f32, fit: Option<&Fit>) {
-        let apart_px = fit.map_or(0.0, |fit| distance(self.now_px, self.predicted_px(fit)));
+        let apart_px = fit.map_or(0.0, |fit| distance(&self.now_px, &self.predicted_px(fit)));
         self.record.note(ncc, apart_px, NEWEST);
         if let Some(trial) = &mut self.trial {
             trial.record.note(ncc, apart_px, 0.0);
@@ -130,10 +131,4 @@ impl Record {
         (self.comparisons > 0)
             .then(|| ERROR_PX * (PER_NCC * self.mean_ncc + 0.5 * self.ln_apart).exp())
     }
-}
-
-/// Distance between two places, px.
-pub fn distance(a: [f32; 2], b: [f32; 2]) -> f32 {
-    let [u, v] = [a[0] - b[0], a[1] - b[1]];
-    (u * u + v * v).sqrt()
 }

@@ -6,6 +6,7 @@
 //! is the same leaf; weights fall off from the middle, where the point is.
 
 use crate::model::Luma;
+use nalgebra::{Matrix2, Point2, Vector2};
 
 /// Half the side of a patch, px: 11 x 11 pixels.
 const HALF_PX: i32 = 5;
@@ -31,10 +32,10 @@ const LONGEST_STEP_PX: f32 = 1.5;
 /// Variance of brightness below which there is nothing to be recognised.
 const LEAST_VARIANCE: f32 = 1.0;
 
-/// Rows of the matrix that takes offsets in a patch to offsets in the picture.
-pub type Warp = [[f32; 2]; 2];
+/// Takes offsets in a patch to offsets in the picture.
+pub type Warp = Matrix2<f32>;
 /// No turning, no bending.
-pub const UPRIGHT: Warp = [[1.0, 0.0], [0.0, 1.0]];
+pub const UPRIGHT: Warp = Matrix2::new(1.0, 0.0, 0.0, 1.0);
 
 /// What a point looked like when it was detected, made ready to be compared with it.
 pub struct Patch {
@@ -43,7 +44,7 @@ pub struct Patch {
     /// Its slopes along u and v less their means, times the weights.
     slopes: [[f32; FILLED]; 2],
     /// Weighted sum of its slopes times brightness.
-    at_home: [f32; 2],
+    at_home: Vector2<f32>,
     /// Inverse of the weighted sum of products of slopes: xx, xy, yy.
     inverse: [f32; 3],
 }
@@ -51,7 +52,7 @@ pub struct Patch {
 /// Where a patch was found.
 #[derive(Clone, Copy, Debug)]
 pub struct Match {
-    pub at_px: [f32; 2],
+    pub at_px: Point2<f32>,
     /// Normalised cross-correlation under the weights there, and where the search began; -1 to 1.
     pub ncc: f32,
     pub ncc_at_start: f32,
@@ -68,8 +69,8 @@ impl Default for Registration {
     fn default() -> Self {
         let sigma_px = SIGMA * HALF_PX as f32;
         let mut weights = [0.0; FILLED];
-        for (w, (x, y)) in weights.iter_mut().zip(offsets()) {
-            *w = (-(x * x + y * y) / (2.0 * sigma_px * sigma_px)).exp();
+        for (w, offset) in weights.iter_mut().zip(offsets()) {
+            *w = (-offset.norm_squared() / (2.0 * sigma_px * sigma_px)).exp();
         }
         let sum: f32 = weights.iter().sum();
         weights.iter_mut().for_each(|w| *w /= sum);
@@ -79,17 +80,19 @@ impl Default for Registration {
 
 impl Registration {
     /// The patch around `at` (px).
-    pub fn patch(&self, luma: &Luma, at: [f32; 2]) -> Patch {
+    pub fn patch(&self, luma: &Luma, at: Point2<f32>) -> Patch {
         let (mut values, mut slopes) = ([0.0; FILLED], [[0.0; FILLED]; 2]);
         sample(luma, at, &UPRIGHT, &mut values);
         self.remove_mean(&mut values);
         let scale = scale(self.mean(&values.map(|v| v * v)));
         values.iter_mut().for_each(|v| *v *= scale);
-        for (k, (x, y)) in offsets().enumerate() {
-            let [u, v] = [at[0] + x, at[1] + y];
+        for (k, offset) in offsets().enumerate() {
+            let at = at + offset;
             let half = 0.5 * scale;
-            slopes[0][k] = half * (bilinear(luma, u + 1.0, v) - bilinear(luma, u - 1.0, v));
-            slopes[1][k] = half * (bilinear(luma, u, v + 1.0) - bilinear(luma, u, v - 1.0));
+            slopes[0][k] =
+                half * (bilinear(luma, at.x + 1.0, at.y) - bilinear(luma, at.x - 1.0, at.y));
+            slopes[1][k] =
+                half * (bilinear(luma, at.x, at.y + 1.0) - bilinear(luma, at.x, at.y - 1.0));
         }
         // Brightness is compared less its mean, so that its slopes count less their means, too.
         for slopes in &mut slopes {
@@ -100,7 +103,7 @@ impl Registration {
         let xy = self.product(x, y);
         let yy = self.product(y, y) + 1e-4;
         let determinant = (xx * yy - xy * xy).max(1e-8);
-        let at_home = [self.product(x, &values), self.product(y, &values)];
+        let at_home = Vector2::new(self.product(x, &values), self.product(y, &values));
         for of in [&mut values].into_iter().chain(&mut slopes) {
             of.iter_mut().zip(&self.weights).for_each(|(v, w)| *v *= w);
         }
@@ -129,14 +132,14 @@ impl Registration {
     }
 
     /// Normalised cross-correlation of `patch` and the picture around `at`, -1 to 1.
-    pub fn ncc(&self, patch: &Patch, luma: &Luma, at: [f32; 2], warp: &Warp) -> f32 {
+    pub fn ncc(&self, patch: &Patch, luma: &Luma, at: Point2<f32>, warp: &Warp) -> f32 {
         let mut values = [0.0; FILLED];
         sample(luma, at, warp, &mut values);
         self.compare(patch, &values).0
     }
 
     /// Looks for `patch` in `luma` from `start` (px) on.
-    pub fn find(&self, patch: &Patch, luma: &Luma, start: [f32; 2], warp: &Warp) -> Match {
+    pub fn find(&self, patch: &Patch, luma: &Luma, start: Point2<f32>, warp: &Warp) -> Match {
         let mut values = [0.0; FILLED];
         let mut found = Match {
             at_px: start,
@@ -152,13 +155,12 @@ impl Registration {
                 found.ncc_at_start = ncc;
             }
             let [xx, xy, yy] = patch.inverse;
-            let shift = [xx * right[0] + xy * right[1], xy * right[0] + yy * right[1]];
-            let mut step = [0, 1].map(|c| warp[c][0] * shift[0] + warp[c][1] * shift[1]);
-            let length = (step[0] * step[0] + step[1] * step[1]).sqrt();
+            let mut step = warp * (Matrix2::new(xx, xy, xy, yy) * right);
+            let length = step.norm();
             if length > LONGEST_STEP_PX {
-                step = step.map(|x| x * LONGEST_STEP_PX / length);
+                step = step * LONGEST_STEP_PX / length;
             }
-            found.at_px = [found.at_px[0] + step[0], found.at_px[1] + step[1]];
+            found.at_px += step;
             if length < CLOSE_PX {
                 found.converged = true;
                 break;
@@ -170,7 +172,7 @@ impl Registration {
     /// Correlation of patch and `values`, and the weighted sum of the patch's slopes times what it
     /// is brighter by, both at zero mean and unit variance. Patch and slopes have no mean, so that
     /// those of `values` need not be taken out first: all sums come from one pass.
-    fn compare(&self, patch: &Patch, values: &[f32; FILLED]) -> (f32, [f32; 2]) {
+    fn compare(&self, patch: &Patch, values: &[f32; FILLED]) -> (f32, Vector2<f32>) {
         // From a value near the mean, or the variance would be lost in the digits.
         let near = values[N / 2];
         let mut sums = [[0.0f32; LANES]; 5];
@@ -192,10 +194,7 @@ impl Registration {
         }
         let [mean, square, alike, x, y] = sums.map(|s| s.iter().sum::<f32>());
         let scale = scale(square - mean * mean);
-        (
-            scale * alike,
-            [patch.at_home[0] - scale * x, patch.at_home[1] - scale * y],
-        )
+        (scale * alike, patch.at_home - scale * Vector2::new(x, y))
     }
 }
 
@@ -215,28 +214,29 @@ fn scale(variance: f32) -> f32 {
 }
 
 /// Offsets of a patch's pixels from its middle, row by row.
-fn offsets() -> impl Iterator<Item = (f32, f32)> {
-    (-HALF_PX..=HALF_PX).flat_map(|y| (-HALF_PX..=HALF_PX).map(move |x| (x as f32, y as f32)))
+fn offsets() -> impl Iterator<Item = Vector2<f32>> {
+    (-HALF_PX..=HALF_PX)
+        .flat_map(|y| (-HALF_PX..=HALF_PX).map(move |x| Vector2::new(x as f32, y as f32)))
 }
 
 /// Brightness of the picture under the patch's pixels.
-fn sample(luma: &Luma, at: [f32; 2], warp: &Warp, into: &mut [f32; FILLED]) {
+fn sample(luma: &Luma, at: Point2<f32>, warp: &Warp, into: &mut [f32; FILLED]) {
     if lies_inside(luma, at, warp) {
         sample_inside(luma, at, warp, into);
         return;
     }
-    for (value, (x, y)) in into.iter_mut().zip(offsets()) {
-        let to = [0, 1].map(|c| at[c] + warp[c][0] * x + warp[c][1] * y);
-        *value = bilinear(luma, to[0], to[1]);
+    for (value, offset) in into.iter_mut().zip(offsets()) {
+        let to = at + warp.column(0) * offset.x + warp.column(1) * offset.y;
+        *value = bilinear(luma, to.x, to.y);
     }
 }
 
 /// Whether the whole patch lies within the picture, and fixed point holds its places.
-fn lies_inside(luma: &Luma, at: [f32; 2], warp: &Warp) -> bool {
-    let size = [luma.size.width, luma.size.height].map(|s| s as f32);
+fn lies_inside(luma: &Luma, at: Point2<f32>, warp: &Warp) -> bool {
+    let size = Vector2::new(luma.size.width as f32, luma.size.height as f32);
     let half = HALF_PX as f32;
     let inside = [0, 1].map(|c| {
-        let reach = half * (warp[c][0].abs() + warp[c][1].abs());
+        let reach = half * (warp[(c, 0)].abs() + warp[(c, 1)].abs());
         // Rounding may put the outermost a hair farther out.
         at[c] - reach >= 1.0 && at[c] + reach < (size[c] - 2.0).min(WIDEST_PX)
     });
@@ -244,13 +244,13 @@ fn lies_inside(luma: &Luma, at: [f32; 2], warp: &Warp) -> bool {
 }
 
 /// [`sample`] of a patch that lies inside the picture, in fixed point.
-fn sample_inside(luma: &Luma, at: [f32; 2], warp: &Warp, into: &mut [f32; FILLED]) {
+fn sample_inside(luma: &Luma, at: Point2<f32>, warp: &Warp, into: &mut [f32; FILLED]) {
     let half = HALF_PX as f32;
-    let step = [0, 1].map(|c| to_fixed(warp[c][0]));
+    let step = [0, 1].map(|c| to_fixed(warp[(c, 0)]));
     let width = luma.size.width as usize;
     for (row, y) in into[..N].chunks_exact_mut(SIDE).zip(-HALF_PX..=HALF_PX) {
-        let [mut u, mut v] =
-            [0, 1].map(|c| to_fixed(at[c] + warp[c][1] * y as f32 - warp[c][0] * half));
+        let first = at + warp.column(1) * y as f32 - warp.column(0) * half;
+        let (mut u, mut v) = (to_fixed(first.x), to_fixed(first.y));
         for value in row {
             let upper = (v >> PIXEL_BITS) as usize * width + (u >> PIXEL_BITS) as usize;
             let (Some(above), Some(below)) = (

@@ -5,8 +5,9 @@
 //! branch, a leaf over a leaf. No patch can be followed there, and at first sight they cannot be
 //! told from the others; while the tree moves, they can.
 
-use super::point::{Point, distance};
+use super::point::Point;
 use crate::model::{LONGEST_TRIAL_S, TrackId};
+use nalgebra::distance;
 use std::collections::BTreeSet;
 
 /// So many candidates are followed for each point that is wanted.
@@ -129,7 +130,7 @@ fn distances_from_start(points: &mut [Point]) -> Vec<f32> {
     let mut away_px: Vec<f32> = Vec::new();
     for p in points {
         if let Some(trial) = &mut p.trial {
-            let reach_px = distance(p.now_px, p.born_px);
+            let reach_px = distance(&p.now_px, &p.born_px);
             trial.reach_px = trial.reach_px.max(reach_px);
             away_px.push(reach_px);
         }

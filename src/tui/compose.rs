@@ -6,6 +6,7 @@ use super::placed::Placed;
 use super::raster::{Raster, walk};
 use super::theme::Theme;
 use crate::model::{Size, Snapshot};
+use nalgebra::{Point2, Vector2};
 
 const OUTLINE: [u8; 3] = [0xff, 0xd8, 0x30];
 const DRAWN: [u8; 3] = [0xff, 0x40, 0xff];
@@ -53,18 +54,12 @@ pub fn picture(
     let on_trial = theme.branch_rgb(None);
     for p in &snapshot.candidates_px {
         let pixel = p.map(f64::from);
-        mark(
-            &mut raster,
-            placed,
-            pixel.into(),
-            fine,
-            on_trial,
-            FAINT * cover,
-        );
+        mark(&mut raster, placed, pixel, fine, on_trial, FAINT * cover);
     }
     for (p, branch) in &snapshot.points {
-        let (pixel, colour) = (p.map(f64::from), theme.branch_rgb(*branch));
-        mark(&mut raster, placed, pixel.into(), fine, colour, cover);
+        let pixel = p.map(f64::from);
+        let colour = theme.branch_rgb(*branch);
+        mark(&mut raster, placed, pixel, fine, colour, cover);
     }
     Some(raster)
 }
@@ -154,11 +149,11 @@ struct Letters<'a> {
 }
 
 impl Letters<'_> {
-    fn point(&mut self, pixel: [f64; 2], letter: char) {
+    fn point(&mut self, pixel: Point2<f64>, letter: char) {
         self.line(pixel, pixel, letter);
     }
 
-    fn line(&mut self, from: [f64; 2], to: [f64; 2], letter: char) {
+    fn line(&mut self, from: Point2<f64>, to: Point2<f64>, letter: char) {
         let (from, to) = (self.cell(from), self.cell(to));
         walk(from, to, self.cells, |x, y| {
             let row = self.rows.get_mut(y.max(0) as usize);
@@ -169,23 +164,26 @@ impl Letters<'_> {
     }
 
     /// The cell that shows a pixel, with fractions.
-    fn cell(&self, pixel: [f64; 2]) -> [f64; 2] {
-        let [x, y] = self.placed.dot_from_pixel(pixel);
+    fn cell(&self, pixel: Point2<f64>) -> Point2<f64> {
+        let dot = self.placed.dot_from_pixel(pixel);
         let (across, down) = self.placed.cell_dots;
-        [x / f64::from(across), y / f64::from(down)]
+        Point2::new(dot.x / f64::from(across), dot.y / f64::from(down))
     }
 }
 
-fn outline(snapshot: &Snapshot) -> Vec<[f64; 2]> {
+fn outline(snapshot: &Snapshot) -> Vec<Point2<f64>> {
     snapshot
         .outline_px
         .iter()
-        .map(|p| [p[0] as f64, p[1] as f64])
+        .map(|p| Point2::from(p.map(f64::from)))
         .collect()
 }
 
 /// Neighbouring points, the last with the first too if the line is closed.
-fn edges(points: &[[f64; 2]], closed: bool) -> impl Iterator<Item = ([f64; 2], [f64; 2])> + '_ {
+fn edges(
+    points: &[Point2<f64>],
+    closed: bool,
+) -> impl Iterator<Item = (Point2<f64>, Point2<f64>)> + '_ {
     let n = if closed {
         points.len()
     } else {
@@ -197,14 +195,14 @@ fn edges(points: &[[f64; 2]], closed: bool) -> impl Iterator<Item = ([f64; 2], [
 fn mark(
     raster: &mut Raster,
     placed: &Placed,
-    pixel: [f64; 2],
+    pixel: Point2<f64>,
     radius: i64,
     colour: [u8; 3],
     cover: f64,
 ) {
-    let [x, y] = placed.dot_from_pixel(pixel);
-    if x.is_finite() && y.is_finite() {
-        let (x, y) = (x.floor() as i64, y.floor() as i64);
+    let dot = placed.dot_from_pixel(pixel);
+    if dot.x.is_finite() && dot.y.is_finite() {
+        let (x, y) = (dot.x.floor() as i64, dot.y.floor() as i64);
         let below = raster.at(x.max(0) as u32, y.max(0) as u32);
         let mixed =
             [0, 1, 2].map(|c| (cover * colour[c] as f64 + (1.0 - cover) * below[c] as f64) as u8);
@@ -212,9 +210,10 @@ fn mark(
     }
 }
 
-fn cross(raster: &mut Raster, placed: &Placed, pixel: [f64; 2], fine: i64) {
-    let [x, y] = placed.dot_from_pixel(pixel);
-    let arm = 2.0 + 4.0 * fine as f64;
-    raster.line([x - arm, y], [x + arm, y], fine / 2, CURSOR);
-    raster.line([x, y - arm], [x, y + arm], fine / 2, CURSOR);
+fn cross(raster: &mut Raster, placed: &Placed, pixel: Point2<f64>, fine: i64) {
+    let dot = placed.dot_from_pixel(pixel);
+    let length = 2.0 + 4.0 * fine as f64;
+    for arm in [Vector2::new(length, 0.0), Vector2::new(0.0, length)] {
+        raster.line(dot - arm, dot + arm, fine / 2, CURSOR);
+    }
 }

@@ -1,30 +1,32 @@
 //! An outline while the user draws it.
 
+use nalgebra::Point2;
+
 /// Points set so far, in picture pixels, and the keyboard's cursor once an arrow key was used.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Drawing {
-    points_px: Vec<[f64; 2]>,
-    cursor_px: Option<[f64; 2]>,
+    points_px: Vec<Point2<f64>>,
+    cursor_px: Option<Point2<f64>>,
 }
 
 impl Drawing {
     /// The corners set so far.
-    pub fn points_px(&self) -> &[[f64; 2]] {
+    pub fn points_px(&self) -> &[Point2<f64>] {
         &self.points_px
     }
 
     /// Where the keyboard's cursor stands.
-    pub fn cursor_px(&self) -> Option<[f64; 2]> {
+    pub fn cursor_px(&self) -> Option<Point2<f64>> {
         self.cursor_px
     }
 
     /// Puts the keyboard's cursor somewhere.
-    pub fn set_cursor(&mut self, pixel: [f64; 2]) {
+    pub fn set_cursor(&mut self, pixel: Point2<f64>) {
         self.cursor_px = Some(pixel);
     }
 
     /// Adds a corner; the same place twice running is one corner.
-    pub fn add(&mut self, pixel: [f64; 2]) {
+    pub fn add(&mut self, pixel: Point2<f64>) {
         if self.points_px.last() != Some(&pixel) {
             self.points_px.push(pixel);
         }
@@ -39,7 +41,7 @@ impl Drawing {
     ///
     /// # Errors
     /// What is wrong with it, for the user to read.
-    pub fn close(&self) -> Result<Vec<[f64; 2]>, &'static str> {
+    pub fn close(&self) -> Result<Vec<Point2<f64>>, &'static str> {
         let mut polygon = self.points_px.clone();
         // A click on the first corner is a natural way to say "closed".
         if polygon.len() > 1 && polygon.first() == polygon.last() {
@@ -56,13 +58,13 @@ impl Drawing {
 }
 
 /// Whether two sides of the polygon meet elsewhere than in a common corner.
-fn crosses_itself(polygon: &[[f64; 2]]) -> bool {
+fn crosses_itself(polygon: &[Point2<f64>]) -> bool {
     let n = polygon.len();
     for i in 0..n {
         let (a, b) = side(polygon, i);
         let (_, c) = side(polygon, (i + 1) % n);
         // A side that runs back over the one before it encloses nothing.
-        let along = (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1]);
+        let along = (b - a).dot(&(c - b));
         if turn(a, b, c) == 0.0 && along < 0.0 {
             return true;
         }
@@ -74,9 +76,9 @@ fn crosses_itself(polygon: &[[f64; 2]]) -> bool {
     false
 }
 
-type Side = ([f64; 2], [f64; 2]);
+type Side = (Point2<f64>, Point2<f64>);
 
-fn side(polygon: &[[f64; 2]], i: usize) -> Side {
+fn side(polygon: &[Point2<f64>], i: usize) -> Side {
     (polygon[i], polygon[(i + 1) % polygon.len()])
 }
 
@@ -95,13 +97,13 @@ fn opposite(x: f64, y: f64) -> bool {
 
 /// Twice the signed area of a triangle; clicks lie on a grid, so a straight run rounds to nearly
 /// zero.
-fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
-    let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+fn turn(a: Point2<f64>, b: Point2<f64>, c: Point2<f64>) -> f64 {
+    let area = (b - a).perp(&(c - a));
     if area.abs() < 1e-6 { 0.0 } else { area }
 }
 
 /// Whether `p`, known to lie on the line through `a` and `b`, lies between them.
-fn between(a: [f64; 2], b: [f64; 2], p: [f64; 2]) -> bool {
+fn between(a: Point2<f64>, b: Point2<f64>, p: Point2<f64>) -> bool {
     (0..2).all(|i| p[i] >= a[i].min(b[i]) - 1e-9 && p[i] <= a[i].max(b[i]) + 1e-9)
 }
 
@@ -148,7 +150,7 @@ mod tests {
         ];
         for (name, points, good) in cases {
             let mut drawing = Drawing::default();
-            points.iter().for_each(|p| drawing.add(*p));
+            points.iter().for_each(|p| drawing.add(Point2::from(*p)));
             let closed = drawing.close();
             assert_eq!(closed.is_ok(), good, "{name}: {closed:?}");
         }

@@ -322,8 +322,7 @@ fn draw(
                     "Starting with your outline of {} points.",
                     polygon.len()
                 ));
-                let corners_px = polygon.into_iter().map(Into::into);
-                return Some(Control::SetOutline(corners_px.collect()));
+                return Some(Control::SetOutline(polygon));
             }
             Err(why) => state.say(why),
         },

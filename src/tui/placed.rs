@@ -1,6 +1,7 @@
 //! Where on the screen a picture really lies, and which of its pixels a cell shows.
 
 use crate::model::Size;
+use nalgebra::Point2;
 use ratatui::layout::{Position, Rect};
 
 /// A picture fitted into an area: as large as it can be with its sides' ratio kept, in the middle.
@@ -45,35 +46,37 @@ impl Placed {
 
     /// The picture pixel in the middle of what the cell shows of the picture, `None` for a cell
     /// that shows nothing.
-    pub fn pixel_at(&self, column: u16, row: u16) -> Option<[f64; 2]> {
+    pub fn pixel_at(&self, column: u16, row: u16) -> Option<Point2<f64>> {
         if !self.area.contains(Position::new(column, row)) {
             return None;
         }
         let (across, down) = self.cell_dots;
         let (x, y) = (column - self.area.x, row - self.area.y);
-        Some([
+        Some(Point2::new(
             pixel_along(x, across, self.dots.width, self.image.width)?,
             pixel_along(y, down, self.dots.height, self.image.height)?,
-        ])
+        ))
     }
 
     /// The dot that shows a picture pixel, with fractions; it may lie outside.
-    pub fn dot_from_pixel(&self, [u, v]: [f64; 2]) -> [f64; 2] {
-        [
-            (u + 0.5) / self.image.width as f64 * self.dots.width as f64,
-            (v + 0.5) / self.image.height as f64 * self.dots.height as f64,
-        ]
+    pub fn dot_from_pixel(&self, pixel: Point2<f64>) -> Point2<f64> {
+        Point2::new(
+            (pixel.x + 0.5) / self.image.width as f64 * self.dots.width as f64,
+            (pixel.y + 0.5) / self.image.height as f64 * self.dots.height as f64,
+        )
     }
 
     /// The cell that shows a picture pixel.
-    pub fn cell_from_pixel(&self, pixel: [f64; 2]) -> Option<(u16, u16)> {
-        let [x, y] = self.dot_from_pixel(pixel);
-        let inside =
-            x >= 0.0 && y >= 0.0 && x < self.dots.width as f64 && y < self.dots.height as f64;
+    pub fn cell_from_pixel(&self, pixel: Point2<f64>) -> Option<(u16, u16)> {
+        let dot = self.dot_from_pixel(pixel);
+        let inside = dot.x >= 0.0
+            && dot.y >= 0.0
+            && dot.x < self.dots.width as f64
+            && dot.y < self.dots.height as f64;
         inside.then(|| {
             (
-                self.area.x + (x / self.cell_dots.0 as f64) as u16,
-                self.area.y + (y / self.cell_dots.1 as f64) as u16,
+                self.area.x + (dot.x / self.cell_dots.0 as f64) as u16,
+                self.area.y + (dot.y / self.cell_dots.1 as f64) as u16,
             )
         })
     }
@@ -135,7 +138,7 @@ mod tests {
             for row in placed.area.top()..placed.area.bottom() {
                 for column in placed.area.left()..placed.area.right() {
                     let pixel = placed.pixel_at(column, row).unwrap();
-                    prop_assert!(placed.image.contains(pixel[0], pixel[1]));
+                    prop_assert!(placed.image.contains(pixel.x, pixel.y));
                     prop_assert_eq!(placed.cell_from_pixel(pixel), Some((column, row)));
                 }
             }

@@ -1,6 +1,8 @@
 //! Curves and bars in characters.
 
+use crate::bounds::Bounds;
 use crate::model::AngleSpectrum;
+use nalgebra::Point2;
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
@@ -10,31 +12,32 @@ use ratatui::widgets::canvas::{Canvas, Line};
 const EIGHTHS: [&str; 9] = [" ", "▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"];
 
 /// The least and the greatest of all numbers among `values`.
-pub fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+pub fn range(values: impl Iterator<Item = f64>) -> Option<Bounds> {
     values
         .filter(|x| x.is_finite())
-        .fold(None, |all: Option<(f64, f64)>, x| {
-            Some(all.map_or((x, x), |(low, high)| (low.min(x), high.max(x))))
+        .fold(None, |all: Option<Bounds>, x| {
+            let all = all.unwrap_or(Bounds::new(x, x));
+            Some(Bounds::new(all.lo.min(x), all.hi.max(x)))
         })
 }
 
 /// A range that is at least `least` wide, about the same middle.
-pub fn widened(low: f64, high: f64, least: f64) -> (f64, f64) {
-    let more = (0.5 * (least - (high - low))).max(0.0);
-    (low - more, high + more)
+pub fn widened(range: Bounds, least: f64) -> Bounds {
+    let more = (0.5 * (least - range.length())).max(0.0);
+    Bounds::new(range.lo - more, range.hi + more)
 }
 
 /// A curve through `points`, each from the left and from below, 0 to 1; broken where two are
 /// farther apart than `gap`.
-pub fn curve(frame: &mut Frame, points: &[[f64; 2]], gap: f64, area: Rect, colour: Color) {
+pub fn curve(frame: &mut Frame, points: &[Point2<f64>], gap: f64, area: Rect, colour: Color) {
     let canvas = Canvas::default()
         .marker(Marker::Braille)
         .x_bounds([0.0, 1.0])
         .y_bounds([0.0, 1.0])
         .paint(|context| {
-            for pair in points.windows(2).filter(|p| p[1][0] - p[0][0] <= gap) {
-                let ([x1, y1], [x2, y2]) = (pair[0], pair[1]);
-                context.draw(&Line::new(x1, y1, x2, y2, colour));
+            for pair in points.windows(2).filter(|p| p[1].x - p[0].x <= gap) {
+                let (a, b) = (pair[0], pair[1]);
+                context.draw(&Line::new(a.x, a.y, b.x, b.y, colour));
             }
         });
     frame.render_widget(canvas, area);
@@ -65,10 +68,10 @@ pub fn bars(
     }
 }
 
-/// The largest amplitude between two frequencies (Hz), degrees; between bins that of the nearest.
-pub fn highest(spectrum: &AngleSpectrum, [from_hz, to_hz]: [f64; 2]) -> f64 {
+/// The largest amplitude between two frequencies, degrees; between bins that of the nearest.
+pub fn highest(spectrum: &AngleSpectrum, range_hz: Bounds) -> f64 {
     let last = spectrum.amplitude_deg.len().saturating_sub(1);
-    let [from, to] = [from_hz, to_hz].map(|hz| {
+    let [from, to] = [range_hz.lo, range_hz.hi].map(|hz| {
         let bin = (hz / spectrum.bin_hz).round().clamp(0.0, 1e9) as usize;
         bin.min(last)
     });

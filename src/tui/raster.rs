@@ -2,6 +2,7 @@
 //! top.
 
 use crate::model::{Rgb, Size};
+use nalgebra::{Point2, Vector2};
 use std::ops::Range;
 
 /// Colour picture whose every drawing routine leaves out what lies outside.
@@ -69,7 +70,7 @@ impl Raster {
     }
 
     /// Draws a line, `2 * radius + 1` dots thick.
-    pub fn line(&mut self, from: [f64; 2], to: [f64; 2], radius: i64, colour: [u8; 3]) {
+    pub fn line(&mut self, from: Point2<f64>, to: Point2<f64>, radius: i64, colour: [u8; 3]) {
         let size = self.size;
         walk(from, to, size, |x, y| self.dot(x, y, radius, colour));
     }
@@ -89,23 +90,26 @@ fn covered(i: u32, dots: u32, pixels: u32) -> Range<usize> {
 
 /// Visits the dots of a line, as far as it lies in a picture of this size; at most one dot past its
 /// far borders.
-pub fn walk(from: [f64; 2], to: [f64; 2], size: Size, mut visit: impl FnMut(i64, i64)) {
-    let Some((a, b)) = clip(from, to, [size.width as f64, size.height as f64]) else {
+pub fn walk(from: Point2<f64>, to: Point2<f64>, size: Size, mut visit: impl FnMut(i64, i64)) {
+    let high = Vector2::new(size.width as f64, size.height as f64);
+    let Some((a, b)) = clip(from, to, high) else {
         return;
     };
-    let steps = (b[0] - a[0]).abs().max((b[1] - a[1]).abs()).ceil().max(1.0);
+    let way = b - a;
+    let steps = way.x.abs().max(way.y.abs()).ceil().max(1.0);
     for i in 0..=steps as u64 {
-        let t = i as f64 / steps;
-        visit(
-            (a[0] + t * (b[0] - a[0])).floor() as i64,
-            (a[1] + t * (b[1] - a[1])).floor() as i64,
-        );
+        let at = a + i as f64 / steps * way;
+        visit(at.x.floor() as i64, at.y.floor() as i64);
     }
 }
 
 /// The part of a line inside the box from 0 to `high` (Liang and Barsky): a far end must not cost a
 /// million steps.
-fn clip(from: [f64; 2], to: [f64; 2], high: [f64; 2]) -> Option<([f64; 2], [f64; 2])> {
+fn clip(
+    from: Point2<f64>,
+    to: Point2<f64>,
+    high: Vector2<f64>,
+) -> Option<(Point2<f64>, Point2<f64>)> {
     let (mut t0, mut t1) = (0.0f64, 1.0f64);
     for axis in 0..2 {
         let d = to[axis] - from[axis];
@@ -127,12 +131,7 @@ fn clip(from: [f64; 2], to: [f64; 2], high: [f64; 2]) -> Option<([f64; 2], [f64;
         t0 = t0.max(enter);
         t1 = t1.min(leave);
     }
-    let [a, b] = [t0, t1].map(|t| {
-        [
-            from[0] + t * (to[0] - from[0]),
-            from[1] + t * (to[1] - from[1]),
-        ]
-    });
+    let [a, b] = [t0, t1].map(|t| from + t * (to - from));
     (t0 <= t1).then_some((a, b))
 }
 
@@ -175,7 +174,9 @@ mod tests {
             ([1.5, 1.5], [1.5, 1.5], vec![(1, 1)]),
         ] {
             let mut seen = Vec::new();
-            walk(from, to, Size::new(4, 4), |x, y| seen.push((x, y)));
+            walk(from.into(), to.into(), Size::new(4, 4), |x, y| {
+                seen.push((x, y))
+            });
             seen.dedup();
             seen.retain(|(x, _)| *x < 4);
             assert_eq!(seen, expected, "{from:?} {to:?}");

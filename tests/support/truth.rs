@@ -5,6 +5,7 @@ use arborcam::config::Config;
 use arborcam::model::TrackId;
 use arborcam::source::Decoder;
 use arborcam::track::Tracker;
+use nalgebra::Point2;
 use std::collections::{BTreeMap, BTreeSet};
 
 const TRUTH: &str = "recordings/sparse_winter.truth";
@@ -18,11 +19,11 @@ const NEAR_PX: f64 = 2.0;
 /// Positions (px) of each point in the first and in the last second's frames.
 pub struct Truth {
     frames: Vec<u64>,
-    positions: Vec<Vec<[f64; 2]>>,
+    positions: Vec<Vec<Point2<f64>>>,
 }
 
 /// Places (px) of tracks by frame.
-pub type Places = BTreeMap<TrackId, BTreeMap<u64, [f64; 2]>>;
+pub type Places = BTreeMap<TrackId, BTreeMap<u64, Point2<f64>>>;
 
 /// How near to the truth tracks end.
 #[derive(Clone, Copy, Debug)]
@@ -40,11 +41,12 @@ impl Truth {
         let word =
             |i: usize| u32::from_le_bytes(bytes[4 * i..4 * i + 4].try_into().expect("four bytes"));
         let (points, frames) = (word(0) as usize, word(1) as usize);
-        let places: Vec<[f64; 2]> = bytes[4 * (2 + frames)..]
+        let places: Vec<Point2<f64>> = bytes[4 * (2 + frames)..]
             .as_chunks::<4>()
             .0
             .iter()
-            .map(|b| [[b[0], b[1]], [b[2], b[3]]].map(|b| f64::from(u16::from_le_bytes(b)) / 64.0))
+            .map(|b| Point2::new([b[0], b[1]], [b[2], b[3]]))
+            .map(|p| p.map(|b| f64::from(u16::from_le_bytes(b)) / 64.0))
             .collect();
         assert_eq!(places.len(), points * frames);
         Self {
@@ -81,10 +83,7 @@ impl Truth {
                 let Some(&there) = seen.get(frame) else {
                     continue;
                 };
-                let error = distance(
-                    there,
-                    [at[0] + born[0] - start[0], at[1] + born[1] - start[1]],
-                );
+                let error = distance(there, at + born.coords - start.coords);
                 near += usize::from(error < NEAR_PX);
                 errors.push(error);
             }
@@ -97,8 +96,8 @@ impl Truth {
     }
 }
 
-pub fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
+pub fn distance(a: Point2<f64>, b: Point2<f64>) -> f64 {
+    (a.x - b.x).hypot(a.y - b.y)
 }
 
 pub fn median(values: &mut [f64]) -> f64 {
@@ -119,7 +118,7 @@ pub fn tracks() -> (Places, f64) {
             places
                 .entry(o.id)
                 .or_default()
-                .insert(set.frame, [o.u_px.into(), o.v_px.into()]);
+                .insert(set.frame, Point2::new(o.u_px.into(), o.v_px.into()));
         }
         rejected.extend(set.rejected.iter().copied());
         expected = set

@@ -1,11 +1,13 @@
 //! The chosen branch: how it sways, its angle, and its spectrum with the answer in it.
 
 use super::{titled, waiting};
+use crate::bounds::Bounds;
 use crate::model::{BranchRow, BranchSway, Interval, Snapshot};
 use crate::tui::format::{clock, count, plus_minus, value, wrap};
 use crate::tui::plot;
 use crate::tui::state::State;
 use crate::tui::theme::Theme;
+use nalgebra::Point2;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Style};
@@ -133,7 +135,7 @@ fn sways(
         .of(b.node)
         .filter(|(t, a)| newest_s - t <= span_s && a.is_finite())
         .collect();
-    let Some((low, high)) = plot::range(seen.iter().map(|(_, a)| *a)) else {
+    let Some(range) = plot::range(seen.iter().map(|(_, a)| *a)) else {
         frame.render_widget(
             Line::styled(" angle: none in this picture", theme.faint()),
             note,
@@ -144,15 +146,20 @@ fn sways(
     let drawn_s = seen.first().map_or(0.0, |(t, _)| newest_s - t);
     let text = format!(
         " angle {} to {}°, last {drawn_s:.0} s",
-        value(low),
-        value(high)
+        value(range.lo),
+        value(range.hi)
     );
     frame.render_widget(Line::styled(text, theme.faint()), note);
     // Tracking noise must not look like a storm.
-    let (low, high) = plot::widened(low, high, 1.0);
-    let points: Vec<[f64; 2]> = seen
+    let range = plot::widened(range, 1.0);
+    let points: Vec<Point2<f64>> = seen
         .iter()
-        .map(|(t, a)| [1.0 - (newest_s - t) / span_s, (a - low) / (high - low)])
+        .map(|(t, a)| {
+            Point2::new(
+                1.0 - (newest_s - t) / span_s,
+                (a - range.lo) / range.length(),
+            )
+        })
         .collect();
     plot::curve(frame, &points, GAP_S / span_s, area, colour);
 }
@@ -182,7 +189,10 @@ fn spectrum_of(
         .and_then(|a| a.swaying.ok())
         .map(|sway| sway.frequency_hz);
     let bars: Vec<f64> = (0..area.width)
-        .map(|k| plot::highest(spectrum, [k, k + 1].map(|k| frequencies.hz(k))))
+        .map(|k| {
+            let range_hz = Bounds::new(frequencies.hz(k), frequencies.hz(k + 1));
+            plot::highest(spectrum, range_hz)
+        })
         .collect();
     // Drift makes the lowest frequencies the highest bars, whatever the branch does.
     let from = frequencies.column(LEAST_PERIODS / span_s.max(0.1));

@@ -6,7 +6,7 @@ use crate::model::{Phase, Size, Skeleton, Snapshot};
 use crate::tui::solid::{BRAILLE, braille};
 use crate::tui::state::{State, TURN_DEGREES};
 use crate::tui::theme::Theme;
-use nalgebra::Point3;
+use nalgebra::{Point2, Point3, Vector2};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::Color;
@@ -90,16 +90,16 @@ struct BranchLine {
 }
 
 fn lines(frame: &mut Frame, branches: &[BranchLine], camera: &Camera, room: Rect) {
-    let size = [camera.size.width, camera.size.height].map(f64::from);
+    let size = Vector2::new(f64::from(camera.size.width), f64::from(camera.size.height));
     let canvas = Canvas::default()
         .marker(Marker::Braille)
-        .x_bounds([0.0, size[0]])
-        .y_bounds([0.0, size[1]])
+        .x_bounds([0.0, size.x])
+        .y_bounds([0.0, size.y])
         .paint(|context| {
             for line in branches {
                 let [x1, y1, _] = camera.project(&line.from);
                 let [x2, y2, _] = camera.project(&line.to);
-                context.draw(&Line::new(x1, size[1] - y1, x2, size[1] - y2, line.colour));
+                context.draw(&Line::new(x1, size.y - y1, x2, size.y - y2, line.colour));
             }
         });
     frame.render_widget(canvas, room);
@@ -156,8 +156,8 @@ fn reason(s: &Snapshot) -> String {
 /// wind.
 struct Extent {
     /// Model units to the right and up from the foot.
-    low: [f64; 2],
-    high: [f64; 2],
+    low: Vector2<f64>,
+    high: Vector2<f64>,
 }
 
 impl Extent {
@@ -173,12 +173,10 @@ impl Extent {
             .filter(|p| p.iter().all(|c| c.is_finite()));
         let mut extent: Option<Self> = None;
         for p in sound {
-            let p = [p.dot(&right), p.dot(&up)];
+            let p = Vector2::new(p.dot(&right), p.dot(&up));
             let all = extent.get_or_insert(Self { low: p, high: p });
-            for ((low, high), x) in all.low.iter_mut().zip(&mut all.high).zip(p) {
-                *low = low.min(x);
-                *high = high.max(x);
-            }
+            all.low = all.low.zip_map(&p, f64::min);
+            all.high = all.high.zip_map(&p, f64::max);
         }
         extent
     }
@@ -190,8 +188,9 @@ impl Extent {
             width: panel.width.max(1),
             ..panel
         });
-        let across = (self.high[0] - self.low[0]) / f64::from(dots.width);
-        let upwards = (self.high[1] - self.low[1]) / f64::from(dots.height);
+        let extent = self.high - self.low;
+        let across = extent.x / f64::from(dots.width);
+        let upwards = extent.y / f64::from(dots.height);
         let unit = Self::MARGIN * across.max(upwards);
         // A tree without extent is drawn as what it is, a dot.
         if unit.is_finite() && unit > 1e-9 {
@@ -204,11 +203,11 @@ impl Extent {
     /// The camera that shows it in the middle of `room`, one dot a `unit`.
     fn camera(&self, view: View, unit: f64, room: Rect) -> Camera {
         let (size, scale) = (dots(room), 1.0 / unit);
-        let middle = [0, 1].map(|i| scale * (self.low[i] + self.high[i]) / 2.0);
-        let middle_px = [
-            f64::from(size.width) / 2.0 - middle[0],
-            f64::from(size.height) / 2.0 + middle[1],
-        ];
+        let middle = scale * (self.low + self.high) / 2.0;
+        let middle_px = Point2::new(
+            f64::from(size.width) / 2.0 - middle.x,
+            f64::from(size.height) / 2.0 + middle.y,
+        );
         Camera {
             view,
             aim: Point3::origin(),

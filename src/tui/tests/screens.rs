@@ -7,6 +7,7 @@ use crate::tui::panels::preview::Preview;
 use crate::tui::screen;
 use crate::tui::state::State;
 use crate::tui::theme::{Depth, Theme};
+use nalgebra::Point2;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::style::Color;
@@ -68,8 +69,8 @@ fn cases() -> Vec<(&'static str, State)> {
     let polygon = drawing.drawing.get_or_insert_default();
     [[100.0, 50.0], [500.0, 60.0], [300.0, 300.0]]
         .into_iter()
-        .for_each(|p| polygon.add(p));
-    polygon.set_cursor([320.0, 180.0]);
+        .for_each(|p| polygon.add(p.into()));
+    polygon.set_cursor(Point2::new(320.0, 180.0));
     drawing.say("That is outside the picture.");
     cases.push(("drawing", drawing));
     cases.extend(camera_cases());
