@@ -255,7 +255,7 @@ fn pose_of_127() -> String {
     let seen = |pose: &Pose| -> Vec<Option<Point2<f64>>> {
         pose.joints[..skeleton.measured()]
             .iter()
-            .map(|j| Some(skeleton.image_from_model(&j.position).into()))
+            .map(|j| Some(skeleton.image_from_model(&j.position)))
             .collect()
     };
     let targets: Vec<_> = truth.iter().map(seen).collect();

@@ -120,7 +120,7 @@ impl Still {
 
     fn seeds(&self, settings: &Leaves) -> Vec<Point2<f32>> {
         let seeds = leaf_seeds(&self.picture, &self.outline, settings.seeds);
-        seeds.into_iter().map(Point2::from).collect()
+        seeds.into_iter().collect()
     }
 
     fn leaves(&self, settings: &Leaves) -> Foliage {

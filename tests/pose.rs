@@ -207,7 +207,7 @@ fn targets_px(tree: &Skeleton, angle: f64) -> Vec<Option<Point2<f64>>> {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
     let (top, tip) = (tree.nodes[1].position, tree.nodes[2].position);
     [tree.nodes[0].position, top, top + turn * (tip - top)]
-        .map(|p| Some(tree.image_from_model(&p).into()))
+        .map(|p| Some(tree.image_from_model(&p)))
         .to_vec()
 }
 
@@ -313,7 +313,7 @@ fn swing_to_the_viewer(lean: f64, swing: f64, method: MotionMethod) -> Vec<(f64,
         let truth = top + towards_viewer(lean + swung) * way;
         let mut targets: Vec<_> = tree.nodes[..4]
             .iter()
-            .map(|n| Some(tree.image_from_model(&n.position).into()))
+            .map(|n| Some(tree.image_from_model(&n.position)))
             .collect();
         let target = Point2::from(tree.image_from_model(&truth));
         (targets[2], targets[3]) = (Some(target), None);

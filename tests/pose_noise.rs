@@ -106,7 +106,7 @@ fn moved(tree: &Skeleton, frame: usize) -> Pose {
 fn on_branch(tree: &Skeleton, pose: &Pose, node: usize, share: f64) -> Point2<f64> {
     let parent = tree.nodes[node].parent.unwrap().index();
     let (from, to) = (pose.joints[parent].position, pose.joints[node].position);
-    tree.image_from_model(&(from + (to - from) * share)).into()
+    tree.image_from_model(&(from + (to - from) * share))
 }
 
 /// The tree's points: each branch's own, and where they rest.
@@ -273,7 +273,7 @@ fn the_pose_smooths_nothing_that_the_film_shows() {
         let targets: Vec<_> = truth
             .joints
             .iter()
-            .map(|j| Some(tree.image_from_model(&j.position).into()))
+            .map(|j| Some(tree.image_from_model(&j.position)))
             .collect();
         let pose = estimator.step(k as u64, truth.time_s, &targets);
         for (i, node) in tree.nodes.iter().enumerate() {

@@ -173,7 +173,7 @@ fn built() -> Skeleton {
 #[test]
 fn the_tree_in_space_stays_in_its_envelope_on_one_trunk() {
     let (tree, settings) = (built(), config::Shape::default());
-    let envelope = Envelope::of_revolution(&outline(), tree.foot_px.into());
+    let envelope = Envelope::of_revolution(&outline(), tree.foot_px);
     for (i, node) in tree.nodes.iter().enumerate() {
         assert!(
             envelope.contains(&node.position),
@@ -237,7 +237,7 @@ fn attractors_lie_on_the_surface() {
 fn pushing_brings_the_tree_nearer_to_its_envelope() {
     let (settings, outline) = (config::Shape::default(), outline());
     let foot_px = skeleton::Foot::of(&outline, None).position_px;
-    let envelope = Envelope::of_revolution(&outline, foot_px.into());
+    let envelope = Envelope::of_revolution(&outline, foot_px);
     let trunk = shape::trunk(&flat(), config::Leader::None, &[]);
     let prototype = shape::copy_to_planes(
         &flat(),
@@ -281,9 +281,7 @@ fn swung(tree: &Skeleton, axis: Vector3<f64>, angle: f64) -> Vec<Point3<f64>> {
 }
 
 fn seen(tree: &Skeleton, at: &[Point3<f64>]) -> Vec<Option<Point2<f64>>> {
-    at.iter()
-        .map(|p| Some(tree.image_from_model(p).into()))
-        .collect()
+    at.iter().map(|p| Some(tree.image_from_model(p))).collect()
 }
 
 fn settings(method: config::MotionMethod) -> config::Motion {

@@ -91,7 +91,7 @@ fn every_tree_fills_every_shape_and_stays_in_it() {
                     "{}",
                     what()
                 );
-                let at = skeleton.image_from_model(&node.position).into();
+                let at = skeleton.image_from_model(&node.position);
                 assert!(is_inside(&shape, at), "{}: at {at:?} it is outside", what());
                 assert!(
                     node.radius <= skeleton.nodes[node.parent.expect("a parent").index()].radius,
@@ -488,7 +488,7 @@ fn twigs_keep_to_the_shape_that_the_tree_was_made_to_fill() {
             cut_to: Some(&cut.shape),
             ..Seen::default()
         };
-        let envelope = shape::Envelope::of_drawn(&cut.shape, cut.skeleton.foot_px.into());
+        let envelope = shape::Envelope::of_drawn(&cut.shape, cut.skeleton.foot_px);
         let ends = twig_ends(&cut.skeleton, seen, &config);
         assert!(
             ends.len() > 100 && ends.iter().all(|end| envelope.contains(end)),

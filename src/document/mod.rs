@@ -319,7 +319,7 @@ impl Reposer {
         let joints = &pose.joints[..self.measured];
         let targets_px: Vec<_> = joints
             .iter()
-            .map(|joint| Some(self.from.image_from_model(&joint.position).into()))
+            .map(|joint| Some(self.from.image_from_model(&joint.position)))
             .collect();
         self.estimator.step(pose.frame, pose.time_s, &targets_px)
     }

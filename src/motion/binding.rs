@@ -64,7 +64,7 @@ impl Binding {
             .collect();
         let rest: Vec<Point2<f64>> = nodes
             .iter()
-            .map(|n| skeleton.image_from_model(&n.position).into())
+            .map(|n| skeleton.image_from_model(&n.position))
             .collect();
         Self {
             reach_px: REACH * mean_gap(&tips, &rest),

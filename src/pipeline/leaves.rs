@@ -56,7 +56,7 @@ impl InLeaf {
                 }
             });
         Some(Self {
-            seeds: seeds.into_iter().map(Into::into).collect(),
+            seeds: seeds.into_iter().collect(),
             filmed,
             density,
         })

@@ -102,9 +102,11 @@ impl<'a> TrackThread<'a> {
 
     fn honour(&mut self, wish: Control) {
         match wish {
-            Control::SetOutline(polygon_px) => match self.decode.size().map(|size| {
-                outline::from_polygon(&polygon_px, size)
-            }) {
+            Control::SetOutline(polygon_px) => match self
+                .decode
+                .size()
+                .map(|size| outline::from_polygon(&polygon_px, size))
+            {
                 Some(Ok(outline)) => self.restart(Some(outline)),
                 Some(Err(e)) => self.shared.warn(e.to_string()),
                 None => self

@@ -11,12 +11,10 @@ use nalgebra::{Point2, Point3, Vector2};
 /// about the vertical that holds the crown's nodes; the copies are the mirror image of the
 /// originals in depth.
 pub fn diener(flat: &[Node2d], tracks: &[u32], trunk: &[bool], outline: &Outline) -> Skeleton {
-    let foot_px = flat
-        .first()
-        .map_or(Point2::origin(), |n| n.position_px.into());
+    let foot_px = flat.first().map_or(Point2::origin(), |n| n.position_px);
     let places: Vec<Point3<f64>> = flat
         .iter()
-        .map(|n| model_from_image(n.position_px.into(), foot_px))
+        .map(|n| model_from_image(n.position_px, foot_px))
         .collect();
     let crown: Vec<Point3<f64>> = (0..flat.len())
         .filter(|&i| !in_trunk(trunk, i))
@@ -57,7 +55,7 @@ pub fn diener(flat: &[Node2d], tracks: &[u32], trunk: &[bool], outline: &Outline
     }
     Skeleton {
         nodes,
-        foot_px: foot_px.into(),
+        foot_px,
         image_size: outline.size,
     }
 }

@@ -53,7 +53,7 @@ pub fn on_foot(mut skeleton: Skeleton, foot_px: Point2<f64>) -> Skeleton {
     for node in skeleton.nodes.iter_mut().skip(1) {
         node.position += way;
     }
-    skeleton.foot_px = foot_px.into();
+    skeleton.foot_px = foot_px;
     skeleton
 }
 

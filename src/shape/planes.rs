@@ -21,9 +21,7 @@ pub fn copy_to_planes(
     envelope: &Envelope,
     planes: u32,
 ) -> Skeleton {
-    let foot_px = flat
-        .first()
-        .map_or(Point2::origin(), |n| n.position_px.into());
+    let foot_px = flat.first().map_or(Point2::origin(), |n| n.position_px);
     let mut nodes = measured_nodes(flat, tracks, foot_px);
     place(&mut nodes, envelope);
     let axes = axes(&nodes, trunk);
@@ -53,7 +51,7 @@ pub fn copy_to_planes(
     }
     Skeleton {
         nodes,
-        foot_px: foot_px.into(),
+        foot_px,
         image_size: outline.size,
     }
 }
@@ -71,7 +69,7 @@ fn measured_nodes(flat: &[Node2d], tracks: &[u32], foot_px: Point2<f64>) -> Vec<
             name: NodeName(i as u32),
             parent: node.parent.map(|p| NodeId(p as u32)),
             level: node.level,
-            position: model_from_image(node.position_px.into(), foot_px),
+            position: model_from_image(node.position_px, foot_px),
             radius: 1.0,
             n_tracks,
             certainty: node.certainty,

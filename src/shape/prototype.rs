@@ -42,12 +42,10 @@ impl Prototype {
         outline: &Outline,
         settings: &config::Shape,
     ) -> Self {
-        let foot_px = flat
-            .first()
-            .map_or(Point2::origin(), |n| n.position_px.into());
+        let foot_px = flat.first().map_or(Point2::origin(), |n| n.position_px);
         let places: Vec<Point3<f64>> = flat
             .iter()
-            .map(|n| model_from_image(n.position_px.into(), foot_px))
+            .map(|n| model_from_image(n.position_px, foot_px))
             .collect();
         let envelope = Envelope::of_filmed(settings.envelope, outline, foot_px, &places);
         let leader_px: Vec<Point2<f64>> = settings

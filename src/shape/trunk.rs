@@ -31,16 +31,14 @@ pub fn trunk(flat: &[Node2d], leader: Leader, leader_px: &[Point2<f64>]) -> Vec<
         at = match leader {
             Leader::None => None,
             Leader::Drawn => nearest(
-                children.map(|i| (i, distance_to_line(flat[i].position_px.into(), leader_px))),
+                children.map(|i| (i, distance_to_line(flat[i].position_px, leader_px))),
                 reach,
             ),
             Leader::Auto => {
-                let here = flat[from].position_px.into();
-                let before = flat[from]
-                    .parent
-                    .map_or(foot, |p| flat[p].position_px.into());
+                let here = flat[from].position_px;
+                let before = flat[from].parent.map_or(foot, |p| flat[p].position_px);
                 nearest(
-                    children.map(|i| (i, turn(before, here, flat[i].position_px.into()))),
+                    children.map(|i| (i, turn(before, here, flat[i].position_px))),
                     STRAIGHT,
                 )
             }

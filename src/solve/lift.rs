@@ -38,7 +38,7 @@ pub fn assign_radii(skeleton: &mut Skeleton, outline: &Outline, config: &Config)
     let top_px = skeleton.nodes.get(1).map_or(skeleton.foot_px, |top| {
         skeleton.image_from_model(&top.position)
     });
-    let measured = shape::trunk_radius_px(outline, skeleton.foot_px.into(), top_px.into());
+    let measured = shape::trunk_radius_px(outline, skeleton.foot_px, top_px);
     let trunk_px = if wood.trunk_width_px > 0.0 {
         0.5 * wood.trunk_width_px
     } else if let Some(measured_px) = measured {

@@ -103,7 +103,7 @@ impl Model {
         let mut joined = BTreeMap::new();
         for (id, node, rest_px) in binding.bound() {
             if !built_from.contains(&id) {
-                joined.insert(id, (self.carrier(node), rest_px.into()));
+                joined.insert(id, (self.carrier(node), rest_px));
             }
         }
         Self {

@@ -39,7 +39,7 @@ impl<'a> Refinement<'a> {
         let moment = Moment::of(window)?;
         let mut bound = BTreeMap::new();
         for (id, node, rest_px) in prior.binding().bound() {
-            bound.insert(id, (prior.carrier(node), rest_px.into()));
+            bound.insert(id, (prior.carrier(node), rest_px));
         }
         Some(Self {
             table: Arc::new(hierarchy::table(window)),
@@ -196,7 +196,7 @@ impl<'a> Refinement<'a> {
     fn adopt(&self, model: &mut Model) {
         let old = &self.prior.plain;
         let matches = self.match_measured_nodes(model);
-        let anew = on_foot((*model.plain).clone(), old.foot_px.into());
+        let anew = on_foot((*model.plain).clone(), old.foot_px);
         let twins = twins(&anew, old, &matches);
         let (flat, tracks) = model.flat_on(old.foot_px, self.config);
         let prototype = Prototype::of(&flat, &tracks, &model.outline, &self.config.shape);
@@ -249,7 +249,7 @@ impl<'a> Refinement<'a> {
         for (node, cluster) in matches.into_iter().filter(|(node, _)| *node < old.len()) {
             out[cluster + 1] = Some(Twin {
                 old: NodeId(node as u32),
-                moved_px: self.moved_px(model, &old[node], new[cluster]).into(),
+                moved_px: self.moved_px(model, &old[node], new[cluster]),
             });
         }
         out

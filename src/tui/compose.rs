@@ -105,11 +105,11 @@ pub fn letters(
             letters.line(a, b, '#');
         }
         for p in &snapshot.candidates_px {
-            letters.point(p.map(f64::from).into(), ',');
+            letters.point(p.map(f64::from), ',');
         }
         for (p, branch) in &snapshot.points {
             let letter = branch.map_or('o', |b| (b'0' + b % 8) as char);
-            letters.point(p.map(f64::from).into(), letter);
+            letters.point(p.map(f64::from), letter);
         }
         return Some(letters.rows);
     };

@@ -29,7 +29,7 @@ impl Grid {
         Self {
             size,
             scale,
-            foot_px: skeleton.foot_px.into(),
+            foot_px: skeleton.foot_px,
         }
     }
 

@@ -17,7 +17,7 @@ pub fn coverage(skeleton: &Skeleton, shape: &Outline) -> f64 {
     let mut cover = Cover::of(shape);
     for node in &skeleton.nodes {
         if let Some(parent) = node.parent.and_then(|p| skeleton.nodes.get(p.index())) {
-            cover.add([parent, node].map(|n| skeleton.image_from_model(&n.position).into()));
+            cover.add([parent, node].map(|n| skeleton.image_from_model(&n.position)));
         }
     }
     cover.share()

@@ -111,7 +111,7 @@ fn branch_in_picture(skeleton: &Skeleton, node: &Node) -> [Point2<f64>; 2] {
     let parent = node
         .parent
         .map_or(node.position, |p| skeleton.nodes[p.index()].position);
-    [parent, node.position].map(|p| skeleton.image_from_model(&p).into())
+    [parent, node.position].map(|p| skeleton.image_from_model(&p))
 }
 
 /// The tree as it stands, and what a new branch is judged by.
@@ -235,7 +235,7 @@ impl Site<'_> {
             let ends = [parent.position, node.position];
             gain += self
                 .cover
-                .gain(ends.map(|p| self.skeleton.image_from_model(&p).into()));
+                .gain(ends.map(|p| self.skeleton.image_from_model(&p)));
         }
         if gain == 0 {
             return None;

@@ -59,11 +59,11 @@ pub fn topiary(
     settings: &config::Shape,
     seed: u64,
 ) -> Result<Topiary, TopiaryError> {
-    let shape = drawn.placed(outline, skeleton.foot_px.into())?;
+    let shape = drawn.placed(outline, skeleton.foot_px)?;
     if holds(&shape, outline) {
         return Ok(unchanged(skeleton, shape));
     }
-    let envelope = Envelope::of_drawn(&shape, skeleton.foot_px.into());
+    let envelope = Envelope::of_drawn(&shape, skeleton.foot_px);
     let cut::Pruned {
         skeleton: mut pruned,
         kept,

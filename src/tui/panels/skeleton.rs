@@ -211,7 +211,7 @@ impl Extent {
         Camera {
             view,
             aim: Point3::origin(),
-            middle_px: middle_px.into(),
+            middle_px,
             scale,
             size,
         }
