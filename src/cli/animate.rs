@@ -135,7 +135,7 @@ fn magnify_options(args: &AnimateArgs, tree: &PreparedTree, factor: f64) -> Magn
     Magnify {
         by: factor,
         speed: args.speed,
-        band_hz: args.band,
+        band_hz: args.band.map(|[lo, hi]| crate::bounds::Bounds::new(lo, hi)),
         most_rad,
         looped: args.looped,
     }

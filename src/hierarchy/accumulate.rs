@@ -100,11 +100,11 @@ fn noise_px(table: &TrackTable, row: usize) -> f64 {
 fn sways(table: &TrackTable, moving: &[usize]) -> f64 {
     let steps = Signals::velocities(table, moving, |_| true).mean();
     let mut at = [0.0; 2];
-    let path: Vec<[f64; 2]> = steps
+    let path: Vec<nalgebra::Point2<f64>> = steps
         .iter()
         .map(|v| {
             at = [at[0] + v[0], at[1] + v[1]];
-            at
+            at.into()
         })
         .collect();
     let along = along_principal_direction(&path);
