@@ -71,7 +71,7 @@ fn main() {
                 for (p, track) in tree.film.tracks.iter().enumerate() {
                     for (k, (t, at)) in tree.film.times_s.iter().zip(&track.at_px).enumerate() {
                         let _ =
-                            writeln!(text, "{},{k},{t},{p},{},{}", track.node.0 - 1, at[0], at[1]);
+                            writeln!(text, "{},{k},{t},{p},{},{}", track.node.0 - 1, at.x, at.y);
                     }
                 }
                 save(&Path::new(dir).join(format!("{name}_{seed:02}.csv")), &text);

@@ -6,9 +6,10 @@ use arborcam::animate::{
     Animator, Known, Loudness, Magnify, Noise, Oscillation, Pull, SoundError, Transition, Wind,
     magnify, place_to_pull, speed_m_s, tune,
 };
+use arborcam::bounds::Bounds;
 use arborcam::config;
 use arborcam::model::{Node, NodeId, NodeName, Pose, Size, Skeleton};
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, Vector2, Vector3};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -105,29 +106,28 @@ fn a_step_of_any_length_is_what_a_thousand_small_ones_give() {
         for step_s in [0.001, 1.0 / 30.0, 0.5, 3.0] {
             let transition = Transition::new(frequency_hz, damping, step_s);
             let omega = TAU * frequency_hz;
-            let (mut exact, mut fine) = (Oscillation { x: 0.3, v: -1.0 }, [0.3, -1.0]);
+            let (mut exact, mut fine) = (Oscillation { x: 0.3, v: -1.0 }, Vector2::new(0.3, -1.0));
             for k in 0..4 {
                 let (u0, u1) = (synthetic::noise(case, k), synthetic::noise(case, k + 1));
                 exact = transition.step(exact, u0, u1);
                 let parts = (4000.0 * step_s * frequency_hz).ceil().max(1000.0);
                 let h = step_s / parts;
-                let slope = |t: f64, [x, v]: [f64; 2]| {
+                // Of place and speed.
+                let slope = |t: f64, s: Vector2<f64>| {
                     let u = u0 + (u1 - u0) * t / step_s;
-                    [v, omega * omega * (u - x) - 2.0 * damping * omega * v]
+                    Vector2::new(s.y, omega * omega * (u - s.x) - 2.0 * damping * omega * s.y)
                 };
                 for j in 0..parts as u64 {
                     let t = j as f64 * h;
-                    let along = |s: [f64; 2], by: f64| [fine[0] + by * s[0], fine[1] + by * s[1]];
                     let a = slope(t, fine);
-                    let b = slope(t + 0.5 * h, along(a, 0.5 * h));
-                    let c = slope(t + 0.5 * h, along(b, 0.5 * h));
-                    let d = slope(t + h, along(c, h));
-                    fine =
-                        [0, 1].map(|i| fine[i] + h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]));
+                    let b = slope(t + 0.5 * h, fine + 0.5 * h * a);
+                    let c = slope(t + 0.5 * h, fine + 0.5 * h * b);
+                    let d = slope(t + h, fine + h * c);
+                    fine += h / 6.0 * (a + 2.0 * b + 2.0 * c + d);
                 }
-                let off = (exact.x - fine[0])
+                let off = (exact.x - fine.x)
                     .abs()
-                    .max((exact.v - fine[1]).abs() / omega);
+                    .max((exact.v - fine.y).abs() / omega);
                 assert!(
                     off < 1e-7,
                     "{frequency_hz} Hz, damping {damping}, step {step_s} s: off by {off}"
@@ -810,7 +810,7 @@ fn magnified_motion_is_the_filmed_one_but_larger_and_stays_whole() {
         "times that run backwards"
     );
     let high = Magnify {
-        band_hz: Some([20.0, 30.0]),
+        band_hz: Some(Bounds::new(20.0, 30.0)),
         ..as_filmed
     };
     assert!(
@@ -834,7 +834,7 @@ fn a_band_magnifies_what_lies_in_it_and_nothing_else() {
     let wanted = Magnify {
         by: 3.0,
         speed: 1.0,
-        band_hz: Some([1.0, 4.0]),
+        band_hz: Some(Bounds::new(1.0, 4.0)),
         most_rad: 0.7,
         looped: false,
     };

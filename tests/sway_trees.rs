@@ -8,6 +8,7 @@ use arborcam::config::{Dynamics, Excited};
 use arborcam::dynamics::{Depth, Film, FilmTrack, analyse};
 use arborcam::model::{Excitation, NodeId, Swaying, Unidentified};
 use made_trees::{Drive, Filming, MadeTree};
+use nalgebra::Point2;
 
 /// What came out for some trees.
 #[derive(Default)]
@@ -21,6 +22,18 @@ struct Found {
     damping: Vec<(f64, bool)>,
     /// Errors of the trunk's frequency, Hz.
     trunk_hz: Vec<f64>,
+}
+
+/// What is asked of frequencies and of dampings.
+struct Both {
+    frequency: f64,
+    damping: f64,
+}
+
+impl Both {
+    const fn new(frequency: f64, damping: f64) -> Self {
+        Self { frequency, damping }
+    }
 }
 
 fn run(seeds: std::ops::Range<u64>, drive: Drive, filming: &Filming) -> Found {
@@ -112,13 +125,7 @@ impl Found {
 
     /// Medians of the relative errors of frequency and damping at most, and coverages at least.
     #[track_caller]
-    fn holds(
-        &self,
-        told: f64,
-        identified: f64,
-        [frequency, damping]: [f64; 2],
-        [of_frequency, of_damping]: [f64; 2],
-    ) {
+    fn holds(&self, told: f64, identified: f64, errors_wanted: Both, coverages_wanted: Both) {
         assert!(
             self.told as f64 >= told * self.trees as f64,
             "{} of {} told right",
@@ -134,15 +141,15 @@ impl Found {
             quantile(errors(&self.frequency), 0.5),
             quantile(errors(&self.damping), 0.5),
         );
-        assert!(f <= frequency, "frequencies are off by {f}");
-        assert!(d <= damping, "dampings are off by {d}");
+        assert!(f <= errors_wanted.frequency, "frequencies are off by {f}");
+        assert!(d <= errors_wanted.damping, "dampings are off by {d}");
         let (f, d) = (coverage(&self.frequency), coverage(&self.damping));
         assert!(
-            f >= of_frequency,
+            f >= coverages_wanted.frequency,
             "intervals of the frequency hold the truth in {f}"
         );
         assert!(
-            d >= of_damping,
+            d >= coverages_wanted.damping,
             "intervals of the damping hold the truth in {d}"
         );
     }
@@ -152,7 +159,7 @@ impl Found {
 fn release_from_rest() {
     let found = run(0..80, Drive::Release(0.5), &Filming::default());
     found.print("pulled and let go, 12 s");
-    found.holds(0.85, 0.7, [0.002, 0.05], [0.88, 0.88]);
+    found.holds(0.85, 0.7, Both::new(0.002, 0.05), Both::new(0.88, 0.88));
 }
 
 /// Pulled again while it still sways a little: the second pull is no wind, and no part of the first
@@ -165,18 +172,18 @@ fn released_twice_in_a_film() {
     };
     let twice = run(0..20, Drive::Twice([1.0, 25.0]), &filming);
     twice.print("pulled and let go twice, 40 s");
-    twice.holds(0.95, 0.7, [0.002, 0.05], [0.88, 0.88]);
+    twice.holds(0.95, 0.7, Both::new(0.002, 0.05), Both::new(0.88, 0.88));
     // The second has hardly died down when the film ends, and is no reason to doubt the first.
     let late = run(0..10, Drive::Twice([1.0, 35.0]), &filming);
     late.print("the second one late");
-    late.holds(0.95, 0.7, [0.002, 0.05], [0.88, 0.88]);
+    late.holds(0.95, 0.7, Both::new(0.002, 0.05), Both::new(0.88, 0.88));
 }
 
 #[test]
 fn release_before_the_film() {
     let found = run(100..140, Drive::Decay, &Filming::default());
     found.print("already swinging, 12 s");
-    found.holds(0.9, 0.7, [0.003, 0.06], [0.88, 0.88]);
+    found.holds(0.9, 0.7, Both::new(0.003, 0.06), Both::new(0.88, 0.88));
 }
 
 #[test]
@@ -187,7 +194,7 @@ fn release_for_the_trunk_from_30_s() {
     };
     let found = run(200..220, Drive::Release(1.0), &filming);
     found.print("pulled and let go, 30 s");
-    found.holds(0.85, 0.6, [0.002, 0.05], [0.85, 0.85]);
+    found.holds(0.85, 0.6, Both::new(0.002, 0.05), Both::new(0.85, 0.85));
     let worst = quantile(found.trunk_hz.clone(), 0.95);
     assert!(worst < 0.01, "the trunk is off by {worst} Hz");
 }
@@ -202,7 +209,7 @@ fn wind() {
     };
     let found = run(300..360, Drive::Wind, &filming);
     found.print("wind, 30 s");
-    found.holds(0.9, 0.45, [0.013, 0.25], [0.93, 0.93]);
+    found.holds(0.9, 0.45, Both::new(0.013, 0.25), Both::new(0.93, 0.93));
     let [median, most] = [0.5, 0.9].map(|q| quantile(found.trunk_hz.clone(), q));
     assert!(
         median < 0.01 && most < 0.025,
@@ -219,7 +226,7 @@ fn two_minutes_of_wind() {
     };
     let found = run(400..416, Drive::Wind, &filming);
     found.print("wind, 120 s");
-    found.holds(0.9, 0.8, [0.008, 0.22], [0.93, 0.93]);
+    found.holds(0.9, 0.8, Both::new(0.008, 0.22), Both::new(0.93, 0.93));
 }
 
 /// Where the motion was not told apart well, a branch has no points but those of the branches on
@@ -235,7 +242,7 @@ fn wind_where_only_the_tips_have_points() {
         tree.film.tracks.retain(|t| !carries(t.node.index() - 1));
     });
     found.print("wind, 120 s, points on the tips only");
-    found.holds(0.9, 0.3, [0.015, 0.3], [0.88, 0.85]);
+    found.holds(0.9, 0.3, Both::new(0.015, 0.3), Both::new(0.88, 0.85));
     let far = errors(&found.frequency)
         .iter()
         .filter(|e| **e > 0.1)
@@ -275,7 +282,7 @@ fn a_film_of_few_frames_a_second_claims_nothing() {
     }
 }
 
-fn lone(at: impl Fn(f64) -> [f64; 2], times_s: &[f64]) -> (MadeTree, Film) {
+fn lone(at: impl Fn(f64) -> Point2<f64>, times_s: &[f64]) -> (MadeTree, Film) {
     let tree = MadeTree::new(
         1,
         Drive::Decay,
@@ -286,8 +293,8 @@ fn lone(at: impl Fn(f64) -> [f64; 2], times_s: &[f64]) -> (MadeTree, Film) {
     );
     let place = |k: usize| {
         let of = |t: &f64| {
-            let [u, v] = at(*t);
-            [u + 7.0 * k as f64, v + 11.0 * k as f64]
+            let at = at(*t);
+            Point2::new(at.x + 7.0 * k as f64, at.y + 11.0 * k as f64)
         };
         times_s.iter().map(of).collect()
     };
@@ -302,15 +309,19 @@ fn lone(at: impl Fn(f64) -> [f64; 2], times_s: &[f64]) -> (MadeTree, Film) {
 }
 
 /// Where a point is at a time, the times of the film, and the reasons that are as good as any.
-type Case<'a> = (&'a dyn Fn(f64) -> [f64; 2], &'a [f64], &'a [Unidentified]);
+type Case<'a> = (
+    &'a dyn Fn(f64) -> Point2<f64>,
+    &'a [f64],
+    &'a [Unidentified],
+);
 
 #[test]
 fn what_carries_no_answer_gets_a_reason() {
     let even: Vec<f64> = (0..600).map(|k| f64::from(k) / 30.0).collect();
-    let still = |_: f64| [100.0, 50.0];
-    let nowhere = |_: f64| [f64::NAN; 2];
-    let drifting = |t: f64| [100.0 + t, 50.0];
-    let swaying = |t: f64| [100.0 + 5.0 * (-0.2 * t).exp() * (6.0 * t).cos(), 50.0];
+    let still = |_: f64| Point2::new(100.0, 50.0);
+    let nowhere = |_: f64| Point2::new(f64::NAN, f64::NAN);
+    let drifting = |t: f64| Point2::new(100.0 + t, 50.0);
+    let swaying = |t: f64| Point2::new(100.0 + 5.0 * (-0.2 * t).exp() * (6.0 * t).cos(), 50.0);
     let backwards: Vec<f64> = even.iter().rev().copied().collect();
     let nan = vec![f64::NAN; 600];
     let cases: [Case; 7] = [
@@ -413,10 +424,10 @@ fn one_branch_with_half_of_its_frames() {
     let noise = |t: f64, s: f64| 0.1 * (t * 977.0 + s).sin();
     let at = |t: f64| {
         let sway = 6.0 * (-z * w * t).exp() * (w * (1.0 - z * z).sqrt() * t + 0.4).cos();
-        [
+        Point2::new(
             100.0 + sway + noise(t, 0.0),
             50.0 + 0.5 * sway + noise(t, 2.0),
-        ]
+        )
     };
     let (tree, film) = lone(at, &times);
     let sway = analyse(

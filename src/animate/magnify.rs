@@ -2,6 +2,7 @@
 //! speed.
 
 use super::soft;
+use crate::bounds::Bounds;
 use crate::model::{JointPose, Pose, Skeleton};
 use crate::signal::reflection::there_and_back;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -23,7 +24,7 @@ pub struct Magnify {
     /// Seconds of film in a second.
     pub speed: f64,
     /// Only what is between these frequencies (Hz, of the film) is changed.
-    pub band_hz: Option<[f64; 2]>,
+    pub band_hz: Option<Bounds>,
     /// A branch turns at most so far against the one that carries it, rad; farther only if it did
     /// in the film.
     pub most_rad: f64,
@@ -82,13 +83,13 @@ pub fn magnify(
     }
     let length_s = times[times.len() - 1];
     let rate_hz = (times.len() - 1) as f64 / length_s;
-    if let Some([low_hz, high_hz]) = wanted.band_hz
-        && low_hz >= 0.5 * rate_hz
+    if let Some(band_hz) = wanted.band_hz
+        && band_hz.lo >= 0.5 * rate_hz
     {
         return Err(MagnifyError::BandTooHigh {
             rate_hz,
-            low_hz,
-            high_hz,
+            low_hz: band_hz.lo,
+            high_hz: band_hz.hi,
         });
     }
     let turns: Vec<Vec<Vector3<f64>>> = (0..skeleton.nodes.len())
@@ -181,7 +182,7 @@ fn changed(turns: &[Vector3<f64>], times: &[f64], wanted: &Magnify) -> Vec<Vecto
     let mean = turns.iter().sum::<Vector3<f64>>() / turns.len() as f64;
     let changes: Vec<Vector3<f64>> = turns.iter().map(|t| t - mean).collect();
     let part = match wanted.band_hz {
-        Some(band) => in_band(&changes, times, band),
+        Some(band_hz) => in_band(&changes, times, band_hz),
         None => changes,
     };
     let farthest = turns.iter().map(Vector3::norm).fold(0.0, f64::max);
@@ -197,11 +198,7 @@ fn changed(turns: &[Vector3<f64>], times: &[f64], wanted: &Magnify) -> Vec<Vecto
 
 /// What of the values lies within a band of frequencies, Hz. The film is continued by its mirror
 /// image at both ends.
-fn in_band(
-    values: &[Vector3<f64>],
-    times: &[f64],
-    [low_hz, high_hz]: [f64; 2],
-) -> Vec<Vector3<f64>> {
+fn in_band(values: &[Vector3<f64>], times: &[f64], band_hz: Bounds) -> Vec<Vector3<f64>> {
     let n = values.len();
     let length_s = times[n - 1];
     // Even times, as the Fourier transform needs them.
@@ -232,7 +229,7 @@ fn in_band(
             return vec![Vector3::zeros(); n];
         }
         for (k, entry) in spectrum.iter_mut().enumerate() {
-            *entry *= passes(k as f64 / (2.0 * length_s), low_hz, high_hz) / long as f64;
+            *entry *= passes(k as f64 / (2.0 * length_s), band_hz) / long as f64;
         }
         if inverse.process(&mut spectrum, &mut signal).is_err() {
             return vec![Vector3::zeros(); n];
@@ -249,13 +246,13 @@ fn in_band(
 }
 
 /// 1 within the band, 0 outside, half at its ends.
-fn passes(frequency_hz: f64, low_hz: f64, high_hz: f64) -> f64 {
-    let over = if low_hz > 0.0 {
-        step(frequency_hz, low_hz)
+fn passes(frequency_hz: f64, band_hz: Bounds) -> f64 {
+    let over = if band_hz.lo > 0.0 {
+        step(frequency_hz, band_hz.lo)
     } else {
         1.0
     };
-    over * (1.0 - step(frequency_hz, high_hz))
+    over * (1.0 - step(frequency_hz, band_hz.hi))
 }
 
 /// 0 below an edge, 1 above it, soft between.

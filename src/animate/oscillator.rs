@@ -1,5 +1,7 @@
 //! The sway of one branch about one axis, solved exactly (Hu et al. eq. 7).
 
+use nalgebra::Matrix2;
+
 /// Where an oscillator is, in the unit of what drives it, and its speed per second.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Oscillation {
@@ -18,7 +20,7 @@ pub struct Transition {
     /// `2 xi / omega`: by so much, times its slope, the branch lags behind an even force.
     lag_s: f64,
     /// The free motion over the step.
-    free: [[f64; 2]; 2],
+    free: Matrix2<f64>,
 }
 
 impl Transition {
@@ -45,10 +47,12 @@ impl Transition {
             let fade = (-decay * step_s).exp();
             (fade, fade * step_s)
         };
-        let free = [
-            [cos + decay * sin_by_rate, sin_by_rate],
-            [-omega * omega * sin_by_rate, cos - decay * sin_by_rate],
-        ];
+        let free = Matrix2::new(
+            cos + decay * sin_by_rate,
+            sin_by_rate,
+            -omega * omega * sin_by_rate,
+            cos - decay * sin_by_rate,
+        );
         Self {
             step_s,
             lag_s: 2.0 * damping_ratio / omega,
@@ -71,10 +75,10 @@ impl Transition {
         let behind = self.lag_s * slope;
         // About the motion that the even force alone would keep up, it swings freely.
         let (x, v) = (now.x - u0 + behind, now.v - slope);
-        let [[a, b], [c, d]] = self.free;
+        let free = self.free;
         Oscillation {
-            x: a * x + b * v + u1 - behind,
-            v: c * x + d * v + slope,
+            x: free.m11 * x + free.m12 * v + u1 - behind,
+            v: free.m21 * x + free.m22 * v + slope,
         }
     }
 
@@ -82,8 +86,8 @@ impl Transition {
     /// `steps` steps it has moved on by `by`: the solution z of `z - A^steps z = by`. The free
     /// motion must fade within the period.
     pub fn closing(&self, steps: u64, by: Oscillation) -> Oscillation {
-        let [[a, b], [c, d]] = power(self.free, steps);
-        let (p, q, r, s) = (1.0 - a, -b, -c, 1.0 - d);
+        let free = power(self.free, steps);
+        let (p, q, r, s) = (1.0 - free.m11, -free.m12, -free.m21, 1.0 - free.m22);
         let det = p * s - q * r;
         if det.abs() < 1e-12 {
             return Oscillation::default();
@@ -96,24 +100,14 @@ impl Transition {
 }
 
 /// Square and multiply.
-fn power(mut base: [[f64; 2]; 2], mut exponent: u64) -> [[f64; 2]; 2] {
-    let mut out = [[1.0, 0.0], [0.0, 1.0]];
+fn power(mut base: Matrix2<f64>, mut exponent: u64) -> Matrix2<f64> {
+    let mut out = Matrix2::identity();
     while exponent > 0 {
         if exponent & 1 == 1 {
-            out = product(out, base);
+            out *= base;
         }
-        base = product(base, base);
+        base *= base;
         exponent >>= 1;
-    }
-    out
-}
-
-fn product(a: [[f64; 2]; 2], b: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
-    let mut out = [[0.0; 2]; 2];
-    for (row, [left, right]) in out.iter_mut().zip(a) {
-        for (j, cell) in row.iter_mut().enumerate() {
-            *cell = left * b[0][j] + right * b[1][j];
-        }
     }
     out
 }

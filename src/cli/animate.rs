@@ -135,7 +135,7 @@ fn magnify_options(args: &AnimateArgs, tree: &PreparedTree, factor: f64) -> Magn
     Magnify {
         by: factor,
         speed: args.speed,
-        band_hz: args.band.map(|band_hz| [band_hz.lo, band_hz.hi]),
+        band_hz: args.band,
         most_rad,
         looped: args.looped,
     }

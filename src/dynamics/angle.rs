@@ -2,7 +2,7 @@
 
 use crate::model::{NodeId, Pose, Skeleton};
 use crate::signal::principal::{PrincipalComponents, symmetric};
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector2, Vector3};
 
 /// Projections shorter than this have no direction, px.
 const SHORTEST_PX: f64 = 1e-6;
@@ -49,17 +49,15 @@ impl AngleToParent {
         let Some([parent, node]) = self.own.filter(|_| pose.joints.len() == self.nodes) else {
             return f64::NAN;
         };
-        let base = self.carrier.map_or([0.0, 1.0], |(from, to)| {
+        let base = self.carrier.map_or(Vector2::y(), |(from, to)| {
             direction_in_picture(pose, from, to)
         });
         let own = direction_in_picture(pose, parent, node);
-        let shortest = base[0].hypot(base[1]).min(own[0].hypot(own[1]));
+        let shortest = base.x.hypot(base.y).min(own.x.hypot(own.y));
         if !shortest.is_finite() || shortest < SHORTEST_PX {
             return f64::NAN;
         }
-        let sine = base[0] * own[1] - base[1] * own[0];
-        let cosine = base[0] * own[0] + base[1] * own[1];
-        let angle = sine.atan2(cosine).to_degrees();
+        let angle = base.perp(&own).atan2(base.dot(&own)).to_degrees();
         let angle = self.last_deg.map_or(angle, |before| {
             angle - 360.0 * ((angle - before) / 360.0).round()
         });
@@ -101,9 +99,9 @@ pub fn angle_in_space_deg(skeleton: &Skeleton, poses: &[Pose], node: NodeId) -> 
         .collect()
 }
 
-fn direction_in_picture(pose: &Pose, from: NodeId, to: NodeId) -> [f64; 2] {
+fn direction_in_picture(pose: &Pose, from: NodeId, to: NodeId) -> Vector2<f64> {
     let [from, to] = [from, to].map(|n| pose.joints[n.index()].position);
-    [to.x - from.x, to.y - from.y]
+    (to - from).xy()
 }
 
 /// The branch from `from` to `to` as it would be if its carrier, if it has one, did not turn.

@@ -6,8 +6,10 @@
 
 use super::decay::Mode;
 use super::film::Film;
+use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::model::{Interval, NodeId, Skeleton, Swaying, Unidentified};
+use nalgebra::Point2;
 
 /// Share of half the rate of the frames up to which frequencies are looked for.
 pub(super) const BELOW_NYQUIST: f64 = 0.9;
@@ -16,7 +18,7 @@ pub(super) const BELOW_NYQUIST: f64 = 0.9;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SearchLimits {
     /// Frequencies that are looked for in a film of this length and rate, Hz.
-    pub frequencies_hz: [f64; 2],
+    pub frequencies_hz: Bounds,
     /// Highest frequency that a tree may have, Hz.
     pub highest_hz: f64,
     /// Half a 95 % interval of the frequency at most, as a share of it.
@@ -31,28 +33,56 @@ impl SearchLimits {
     }
 }
 
-/// A branch's own mode, with the standard deviations of the logarithms of its frequency and
-/// damping.
+/// Standard deviations of the logarithms of a mode's frequency and damping.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LnDeviations {
+    pub frequency: f64,
+    pub damping: f64,
+}
+
+impl LnDeviations {
+    /// In the order of [`Mode::parameters`].
+    pub fn of_parameters(x: &[f64]) -> Self {
+        Self {
+            frequency: x[0],
+            damping: x[1],
+        }
+    }
+
+    pub fn parameters(&self) -> [f64; 2] {
+        [self.frequency, self.damping]
+    }
+
+    /// So many times as wide, and wider by `least`.
+    pub fn inflated(&self, by: f64, least: &Self) -> Self {
+        Self {
+            frequency: (by * self.frequency).hypot(least.frequency),
+            damping: (by * self.damping).hypot(least.damping),
+        }
+    }
+}
+
+/// A branch's own mode.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BranchMode {
     pub mode: Mode,
-    pub ln_sd: [f64; 2],
+    pub ln_sd: LnDeviations,
 }
 
 impl BranchMode {
     /// Whether half the 95 % interval of the frequency is at most this share of it.
     pub fn is_within(&self, max_relative_ci: f64) -> bool {
-        Interval::Z * self.ln_sd[0] <= max_relative_ci
+        Interval::Z * self.ln_sd.frequency <= max_relative_ci
     }
 
     pub fn frequency_hz(&self) -> Interval {
-        interval(self.mode.frequency_hz, self.ln_sd[0])
+        interval(self.mode.frequency_hz, self.ln_sd.frequency)
     }
 
     /// `None` where the film says nothing of it: half the interval is longer than the value.
     pub fn damping_ratio(&self) -> Option<Interval> {
-        let known = self.ln_sd[1] > 0.0 && Interval::Z * self.ln_sd[1] <= 1.0;
-        known.then(|| interval(self.mode.damping, self.ln_sd[1]))
+        let known = self.ln_sd.damping > 0.0 && Interval::Z * self.ln_sd.damping <= 1.0;
+        known.then(|| interval(self.mode.damping, self.ln_sd.damping))
     }
 }
 
@@ -78,7 +108,7 @@ pub(super) struct BranchInFilm<'a> {
     /// Points on it and on all that it carries, as indices of the film's tracks.
     pub tracks: &'a [usize],
     /// Where it begins at rest, px.
-    pub base_px: [f64; 2],
+    pub base_px: Point2<f64>,
 }
 
 impl BranchInFilm<'_> {

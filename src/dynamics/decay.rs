@@ -219,9 +219,9 @@ mod tests {
     }
 
     /// With other logarithms of frequency and damping.
-    fn moved(mode: &Mode, by: [f64; 2]) -> Mode {
+    fn moved(mode: &Mode, by_ln_frequency: f64, by_ln_damping: f64) -> Mode {
         let x = mode.parameters();
-        Mode::of_parameters(&[x[0] + by[0], x[1] + by[1]])
+        Mode::of_parameters(&[x[0] + by_ln_frequency, x[1] + by_ln_damping])
     }
 
     fn earlier(by_s: f64) -> Vec<f64> {
@@ -245,13 +245,13 @@ mod tests {
                 let pairs = [
                     (
                         &slopes.by_mode[0],
-                        moved(&mode, [step, 0.0]).columns(&times(), start),
-                        moved(&mode, [-step, 0.0]).columns(&times(), start),
+                        moved(&mode, step, 0.0).columns(&times(), start),
+                        moved(&mode, -step, 0.0).columns(&times(), start),
                     ),
                     (
                         &slopes.by_mode[1],
-                        moved(&mode, [0.0, step]).columns(&times(), start),
-                        moved(&mode, [0.0, -step]).columns(&times(), start),
+                        moved(&mode, 0.0, step).columns(&times(), start),
+                        moved(&mode, 0.0, -step).columns(&times(), start),
                     ),
                     (
                         &slopes.by_moment,

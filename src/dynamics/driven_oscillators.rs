@@ -1,10 +1,12 @@
 //! Oscillators in wind: how many a branch's motion carries, at what frequency and damping, and how
 //! sure that is.
 
+use super::branches::LnDeviations;
 use super::celerite::{Part, Times, minus_2_log_likelihood};
 use super::decay::{Mode, USUAL_DAMPING, damping_penalty};
 use super::filter::Filter;
 use super::periodogram::{Observed, Periodogram, excess_hz};
+use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::signal::bfgs::{curvature, minimum};
 use crate::signal::vectors::dot;
@@ -16,8 +18,8 @@ use std::collections::VecDeque;
 const MAX_NEW: usize = 3;
 /// How often the gusts of a wind forget themselves, 1/s, at the least and at the most, which is
 /// white noise to a tree.
-const GUSTS_PER_S: [f64; 2] = [0.1, 60.0];
-const DAMPING: [f64; 2] = [0.003, 0.4];
+const GUSTS_PER_S: Bounds = Bounds::new(0.1, 60.0);
+const DAMPING: Bounds = Bounds::new(0.003, 0.4);
 /// Likelihoods that are kept: a step in a number that only one motion has leaves the other's as it
 /// was.
 const MAX_KEPT: usize = 64;
@@ -41,9 +43,8 @@ pub(super) struct Problem {
 /// An oscillator that is no ancestor's.
 pub(super) struct Oscillator {
     pub mode: Mode,
-    /// Of the logarithms of its frequency and damping, by the curvature of the likelihood; infinite
-    /// where that has none.
-    pub ln_sd: [f64; 2],
+    /// By the curvature of the likelihood; infinite where that has none.
+    pub ln_sd: LnDeviations,
     /// Of all motions together, px².
     pub variance: f64,
     /// Whether it stands where the search ends.
@@ -54,7 +55,7 @@ pub(super) struct Oscillator {
 pub(super) struct Fitted<'a> {
     problem: &'a Problem,
     x: Vec<f64>,
-    bounds: Vec<[f64; 2]>,
+    bounds: Vec<Bounds>,
 }
 
 impl Problem {
@@ -148,7 +149,7 @@ impl Problem {
         &self,
         left: &[Vec<f64>],
         noise: f64,
-        frequencies_hz: [f64; 2],
+        frequencies_hz: Bounds,
         cancel: &CancelToken,
     ) -> Fitted<'_> {
         let scale = Scale::of(left);
@@ -213,9 +214,9 @@ impl Problem {
     }
 
     /// And within which bounds it stays.
-    fn bounds(&self, scale: &Scale) -> Vec<[f64; 2]> {
+    fn bounds(&self, scale: &Scale) -> Vec<Bounds> {
         let level = scale.level();
-        let of_noise = [level - 16.0, level + 1.0];
+        let of_noise = Bounds::new(level - 16.0, level + 1.0);
         let mut bounds = vec![of_noise, scale.bounds(), GUSTS_PER_S.map(f64::ln)];
         let of_ancestors = self.ancestors.len() * scale.ln_variances.len();
         bounds.extend((0..of_ancestors).map(|_| scale.bounds()));
@@ -244,8 +245,8 @@ impl Scale {
     }
 
     /// Of the logarithm of the variance of any part of them.
-    fn bounds(&self) -> [f64; 2] {
-        [self.level() - 16.0, self.level() + 4.0]
+    fn bounds(&self) -> Bounds {
+        Bounds::new(self.level() - 16.0, self.level() + 4.0)
     }
 }
 
@@ -261,7 +262,10 @@ impl Fitted<'_> {
         for i in (first..self.x.len()).step_by(per) {
             out.push(Oscillator {
                 mode: Mode::of_parameters(&self.x[i..]),
-                ln_sd: [i, i + 1].map(|i| deviation(covariance.as_ref(), i)),
+                ln_sd: LnDeviations {
+                    frequency: deviation(covariance.as_ref(), i),
+                    damping: deviation(covariance.as_ref(), i + 1),
+                },
                 variance: self.x[i + 2..i + per].iter().map(|v| v.exp()).sum(),
                 at_limit: self.is_at_limit(i) || self.is_at_limit(i + 1),
             });
@@ -270,7 +274,8 @@ impl Fitted<'_> {
     }
 
     fn is_at_limit(&self, i: usize) -> bool {
-        self.bounds[i].iter().any(|b| (self.x[i] - b).abs() < 1e-6)
+        let Bounds { lo, hi } = self.bounds[i];
+        [lo, hi].iter().any(|b| (self.x[i] - b).abs() < 1e-6)
     }
 
     /// What lets through the oscillator of this number, in signals whose noise has at least the

@@ -2,9 +2,13 @@
 
 use crate::model::{LogWindow, NodeId, Skeleton, TrackId};
 use crate::signal::statistics::nth_smallest;
+use nalgebra::Point2;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
+
+/// The place of a point in a frame that does not show it, px.
+pub(super) const NOT_SEEN: Point2<f64> = Point2::new(f64::NAN, f64::NAN);
 
 /// One followed point.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,7 +16,7 @@ pub struct FilmTrack {
     /// The deepest node that it belongs to.
     pub node: NodeId,
     /// Where it was in every frame of the film, px; no numbers where it was not seen.
-    pub at_px: Vec<[f64; 2]>,
+    pub at_px: Vec<Point2<f64>>,
 }
 
 impl FilmTrack {
@@ -20,7 +24,7 @@ impl FilmTrack {
     fn in_frames(&self, frames: &[usize]) -> Self {
         let mut at_px = Vec::with_capacity(frames.len());
         for &k in frames {
-            at_px.push(self.at_px.get(k).copied().unwrap_or([f64::NAN; 2]));
+            at_px.push(self.at_px.get(k).copied().unwrap_or(NOT_SEEN));
         }
         Self {
             node: self.node,
@@ -68,11 +72,11 @@ impl Film {
             for o in &set.observations {
                 let track = tracks.entry(o.id).or_insert_with(|| {
                     let node = node_of(o.id).filter(|n| n.index() < measured)?;
-                    let at_px = vec![[f64::NAN; 2]; window.len()];
+                    let at_px = vec![NOT_SEEN; window.len()];
                     Some(FilmTrack { node, at_px })
                 });
                 if let Some(track) = track {
-                    track.at_px[k] = [f64::from(o.u_px), f64::from(o.v_px)];
+                    track.at_px[k] = Point2::new(f64::from(o.u_px), f64::from(o.v_px));
                 }
             }
         }
@@ -157,7 +161,7 @@ mod tests {
     /// whole.
     #[test]
     fn only_a_film_that_is_cut_is_copied() {
-        let at_px = (0..4).map(|k| [f64::from(k), 1.0]).collect();
+        let at_px = (0..4).map(|k| Point2::new(f64::from(k), 1.0)).collect();
         let film = Film::new(
             &[0.0, 0.1, 0.2, 0.3],
             vec![FilmTrack {
@@ -171,7 +175,7 @@ mod tests {
         let cut = film.until(3);
         assert_eq!(
             (cut.times_s.len(), cut.tracks[0].at_px.last()),
-            (3, Some(&[2.0, 1.0]))
+            (3, Some(&Point2::new(2.0, 1.0)))
         );
     }
 }

@@ -4,6 +4,7 @@
 use super::branches::BranchMode;
 use super::decay::{Mode, Slopes, Start};
 use super::signals::{Fit, Signals};
+use crate::bounds::Bounds;
 use crate::signal::gram::{GramCholesky, gram};
 use crate::signal::least_squares::{
     LeastSquares, NormalEquations, ParameterLimits, Stopping, levenberg_marquardt,
@@ -19,7 +20,7 @@ const STOPPING: Stopping = Stopping {
 /// Change of a logarithm in one step, and of the moment of a release, s.
 const MAX_STEP: f64 = 0.3;
 /// Damping ratios that are tried.
-const DAMPING: [f64; 2] = [0.002, 0.45];
+const DAMPING: Bounds = Bounds::new(0.002, 0.45);
 /// Variances below this are none.
 const MIN_VARIANCE: f64 = 1e-12;
 
@@ -41,8 +42,9 @@ impl LeastSquares for DecayFit<'_> {
             let Some(BranchMode { mode, ln_sd }) = prior else {
                 continue;
             };
-            for (i, at) in mode.parameters().into_iter().enumerate() {
-                of_priors += (at - x[2 * m + i]).powi(2) / ln_sd[i].powi(2).max(MIN_VARIANCE);
+            let parameters = mode.parameters().into_iter().zip(ln_sd.parameters());
+            for (i, (at, sd)) in parameters.enumerate() {
+                of_priors += (at - x[2 * m + i]).powi(2) / sd.powi(2).max(MIN_VARIANCE);
             }
         }
         if self.signals.start == Start::Rest {
@@ -97,7 +99,7 @@ impl Signals {
         }
         if self.start == Start::Rest {
             out.push(ParameterLimits {
-                bounds: [f64::NEG_INFINITY, f64::INFINITY],
+                bounds: Bounds::new(f64::NEG_INFINITY, f64::INFINITY),
                 max_step: MAX_STEP,
             });
         }
@@ -149,9 +151,10 @@ impl Signals {
             let Some(BranchMode { mode, ln_sd }) = prior else {
                 continue;
             };
-            for (i, at) in mode.parameters().into_iter().enumerate() {
+            let parameters = mode.parameters().into_iter().zip(ln_sd.parameters());
+            for (i, (at, sd)) in parameters.enumerate() {
                 let k = 2 * m + i;
-                normal.add_prior(k, at - x[k], noise / ln_sd[i].powi(2).max(MIN_VARIANCE));
+                normal.add_prior(k, at - x[k], noise / sd.powi(2).max(MIN_VARIANCE));
             }
         }
         if self.start == Start::Rest {
@@ -228,7 +231,9 @@ impl Signals {
     }
 }
 
-/// Whether `x` is one of `limits`.
-fn is_at(x: f64, limits: [f64; 2]) -> bool {
-    limits.iter().any(|l| (x / l).ln().abs() < 1e-6)
+/// Whether `x` is one of the ends of `limits`.
+fn is_at(x: f64, limits: Bounds) -> bool {
+    [limits.lo, limits.hi]
+        .iter()
+        .any(|l| (x / l).ln().abs() < 1e-6)
 }

@@ -5,7 +5,8 @@
 //! comes; what is new is its own if all of its points have it, and else that of a branch above it.
 
 use super::branches::{
-    BranchEstimator, BranchInFilm, BranchMode, Estimate, SearchLimits, from_the_trunk_up,
+    BranchEstimator, BranchInFilm, BranchMode, Estimate, LnDeviations, SearchLimits,
+    from_the_trunk_up,
 };
 use super::decay::Mode;
 use super::film::Film;
@@ -15,10 +16,12 @@ use super::release::{Onset, RELEASE_SD_FRAMES};
 use super::sandwich::deviations;
 use super::signals::{Factor, Fit, Signals};
 use super::swing::Arms;
+use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::model::{Excitation, NodeId, Skeleton, Sway, Swaying, Unidentified};
 use crate::signal::along_principal_direction;
 use crate::signal::statistics::{quantile, rms};
+use nalgebra::Point2;
 
 /// Modes that are looked for beyond those of the ancestors.
 const MAX_NEW_MODES: usize = 5;
@@ -38,7 +41,7 @@ const MIN_SIZE_OF_QUARTER: f64 = 0.3;
 const CLEARNESS_QUANTILE: f64 = 0.3;
 /// Parts of a branch that hold such a share of its points must have its mode, in so many of their
 /// points.
-const PART_SIZE: [f64; 2] = [0.15, 0.85];
+const PART_SIZE: Bounds = Bounds::new(0.15, 0.85);
 const MIN_POINTS_SHARE_OF_PART: f64 = 0.75;
 /// Its parts, or halves, of so many points must give the same frequency: within this share, and so
 /// many standard deviations.
@@ -168,10 +171,10 @@ impl FreeDecay<'_> {
         }
         let mode = BranchMode {
             mode,
-            ln_sd: [
-                (CI_INFLATION * ln_sd[0]).hypot(MIN_LN_FREQUENCY_SD),
-                CI_INFLATION * ln_sd[1],
-            ],
+            ln_sd: LnDeviations {
+                frequency: (CI_INFLATION * ln_sd.frequency).hypot(MIN_LN_FREQUENCY_SD),
+                damping: CI_INFLATION * ln_sd.damping,
+            },
         };
         if !mode.is_within(self.limits.max_relative_ci) {
             return Err(Unidentified::TooUncertain);
@@ -261,7 +264,7 @@ impl FreeDecay<'_> {
                 .first()
                 .is_some_and(|k| branch.tracks.binary_search(k).is_ok());
             let part_size = above.len() as f64 / size;
-            if shares && (PART_SIZE[0]..=PART_SIZE[1]).contains(&part_size) {
+            if shares && PART_SIZE.contains(part_size) {
                 let places = 0..points.tracks.len();
                 out.push(
                     places
@@ -276,7 +279,7 @@ impl FreeDecay<'_> {
     /// The two halves of the points by their place along the direction in which they are spread
     /// most.
     fn halves_of(&self, points: &Points) -> Vec<Vec<usize>> {
-        let mut at_px: Vec<[f64; 2]> = Vec::with_capacity(points.tracks.len());
+        let mut at_px: Vec<Point2<f64>> = Vec::with_capacity(points.tracks.len());
         for &k in &points.tracks {
             at_px.push(mean_px(&self.film.tracks[k].at_px[self.onset.from..]));
         }
@@ -294,10 +297,10 @@ impl FreeDecay<'_> {
         fitted: &FittedModes,
         m: usize,
         spread: &[f64],
-        mut ln_sd: [f64; 2],
+        mut ln_sd: LnDeviations,
         points: &Points,
         parts: &[Vec<usize>],
-    ) -> Result<[f64; 2], Unidentified> {
+    ) -> Result<LnDeviations, Unidentified> {
         let known = fitted.priors_of_others(m, spread);
         let mode = &fitted.fit.modes[m];
         let halves = if parts.is_empty() {
@@ -305,7 +308,7 @@ impl FreeDecay<'_> {
         } else {
             Vec::new()
         };
-        let (mut squares, mut count) = ([0.0; 2], 0.0_f64);
+        let (mut frequency_squares, mut damping_squares, mut count) = (0.0, 0.0, 0.0_f64);
         for part in parts.iter().chain(&halves) {
             if part.len() < MIN_POINTS_OF_PART {
                 continue;
@@ -316,18 +319,20 @@ impl FreeDecay<'_> {
                 continue;
             };
             let off = there.modes[m].ln_frequency_ratio(mode);
-            let sd = spread[2 * m].hypot(ln_sd[0]);
+            let sd = spread[2 * m].hypot(ln_sd.frequency);
             if off.abs() > PART_FREQ_TOLERANCE + PART_FREQ_SIGMAS * sd {
                 return Err(Unidentified::NoOscillation);
             }
             count += 1.0;
-            squares[0] += off * off;
-            squares[1] += (there.modes[m].damping / mode.damping).ln().powi(2);
+            frequency_squares += off * off;
+            damping_squares += (there.modes[m].damping / mode.damping).ln().powi(2);
         }
         if count > 1.0 {
-            for (sd, squares) in ln_sd.iter_mut().zip(squares) {
-                *sd = sd.hypot((squares / (count * (count - 1.0))).sqrt());
-            }
+            let pairs = count * (count - 1.0);
+            ln_sd = LnDeviations {
+                frequency: ln_sd.frequency.hypot((frequency_squares / pairs).sqrt()),
+                damping: ln_sd.damping.hypot((damping_squares / pairs).sqrt()),
+            };
         }
         Ok(ln_sd)
     }
@@ -462,9 +467,9 @@ impl FittedModes {
 
     /// Of the logarithms of frequency and damping of mode `m`: those of the fit with the change
     /// that one more mode makes.
-    fn deviations_with_one_more(&self, m: usize, spread: &[f64]) -> [f64; 2] {
+    fn deviations_with_one_more(&self, m: usize, spread: &[f64]) -> LnDeviations {
         let mode = &self.fit.modes[m];
-        let own = [spread[2 * m], spread[2 * m + 1]];
+        let own = LnDeviations::of_parameters(&spread[2 * m..]);
         let nearest = self.one_more.iter().min_by(|a, b| {
             let [a, b] = [a, b].map(|o| o.ln_frequency_ratio(mode).abs());
             a.total_cmp(&b)
@@ -472,10 +477,10 @@ impl FittedModes {
         let Some(other) = nearest else {
             return own;
         };
-        [
-            own[0].hypot(other.ln_frequency_ratio(mode)),
-            own[1].hypot((other.damping / mode.damping).ln()),
-        ]
+        LnDeviations {
+            frequency: own.frequency.hypot(other.ln_frequency_ratio(mode)),
+            damping: own.damping.hypot((other.damping / mode.damping).ln()),
+        }
     }
 
     /// All modes but `m`, as they were fitted.
@@ -484,7 +489,7 @@ impl FittedModes {
         for (k, mode) in self.fit.modes.iter().enumerate() {
             out.push((k != m).then(|| BranchMode {
                 mode: *mode,
-                ln_sd: [spread[2 * k], spread[2 * k + 1]],
+                ln_sd: LnDeviations::of_parameters(&spread[2 * k..]),
             }));
         }
         out

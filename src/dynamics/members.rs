@@ -3,6 +3,7 @@
 use super::film::Film;
 use crate::model::Skeleton;
 use crate::signal::statistics::{noise_variance, rms};
+use nalgebra::Point2;
 
 /// Points of a branch at most that are fitted; more cost time and tell little more.
 const MAX_POINTS: usize = 20;
@@ -97,24 +98,24 @@ pub(super) fn evenly_chosen(all: &[usize], most: usize) -> Vec<usize> {
 }
 
 /// Number of frames in which a point was seen.
-pub(super) fn count_seen(at_px: &[[f64; 2]]) -> usize {
+pub(super) fn count_seen(at_px: &[Point2<f64>]) -> usize {
     at_px.iter().filter(|p| is_seen(p)).count()
 }
 
-pub(super) fn is_seen(p: &[f64; 2]) -> bool {
-    p[0].is_finite() && p[1].is_finite()
+pub(super) fn is_seen(p: &Point2<f64>) -> bool {
+    p.x.is_finite() && p.y.is_finite()
 }
 
 /// Mean of the places at which a point was seen, px.
-pub(super) fn mean_px(at_px: &[[f64; 2]]) -> [f64; 2] {
+pub(super) fn mean_px(at_px: &[Point2<f64>]) -> Point2<f64> {
     let n = count_seen(at_px).max(1) as f64;
     at_px
         .iter()
         .filter(|p| is_seen(p))
-        .fold([0.0; 2], |m, p| [m[0] + p[0] / n, m[1] + p[1] / n])
+        .fold(Point2::origin(), |m, p| m + p.coords / n)
 }
 
-fn centred(at_px: &[[f64; 2]]) -> [Vec<f64>; 2] {
+fn centred(at_px: &[Point2<f64>]) -> [Vec<f64>; 2] {
     let mean = mean_px(at_px);
     [0, 1].map(|c| {
         at_px

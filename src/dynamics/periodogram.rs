@@ -2,6 +2,7 @@
 
 use super::celerite::Part;
 use super::decay::powers;
+use crate::bounds::Bounds;
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
 
@@ -20,7 +21,7 @@ pub(super) struct Periodogram {
 
 impl Periodogram {
     /// Of `signal` at growing `times_s` within `frequencies_hz`.
-    pub fn new(times_s: &[f64], signal: &[f64], [lowest_hz, highest_hz]: [f64; 2]) -> Self {
+    pub fn new(times_s: &[f64], signal: &[f64], frequencies_hz: Bounds) -> Self {
         let first_s = times_s.first().copied().unwrap_or(0.0);
         let span_s = times_s.last().map_or(1.0, |t| t - first_s).max(1e-9);
         // Hann's window, or strong sways leak into others' bands.
@@ -32,8 +33,8 @@ impl Periodogram {
         let of_noise = span_s / times_s.len().max(1) as f64;
         let step_hz = 1.0 / span_s;
         let (first, last) = (
-            (lowest_hz / step_hz).ceil() as usize,
-            (highest_hz / step_hz).floor() as usize,
+            (frequencies_hz.lo / step_hz).ceil() as usize,
+            (frequencies_hz.hi / step_hz).floor() as usize,
         );
         let mut power = Vec::new();
         for k in first..=last.max(first) {
@@ -131,7 +132,7 @@ mod tests {
         for (expected, wanted_hz, tolerance) in [(Vec::new(), 0.5, 0.03), (vec![known], 0.9, 0.05)]
         {
             let observed = Observed {
-                power: Periodogram::new(&times, &signal, [0.05, 3.0]),
+                power: Periodogram::new(&times, &signal, Bounds::new(0.05, 3.0)),
                 expected,
                 noise: 1.0 / 12.0,
             };

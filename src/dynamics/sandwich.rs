@@ -78,9 +78,9 @@ fn prior_scores(
     let mut out = DMatrix::zeros(p, p);
     for (m, prior) in priors.iter().enumerate() {
         let Some(known) = prior else { continue };
-        for i in 0..2 {
+        for (i, sd) in known.ln_sd.parameters().into_iter().enumerate() {
             let k = 2 * m + i;
-            out[(k, k)] = noise * noise / known.ln_sd[i].powi(2).max(1e-12);
+            out[(k, k)] = noise * noise / sd.powi(2).max(1e-12);
         }
     }
     if p > 2 * fit.modes.len() {

@@ -6,6 +6,7 @@
 
 use super::decay::{Mode, Start};
 use super::mode_search::mode_grid;
+use crate::bounds::Bounds;
 use crate::signal::extension::{Extension, Residual};
 use crate::signal::gram::{GramCholesky, gram, gram_without};
 use crate::signal::qr::Qr;
@@ -38,7 +39,7 @@ pub(super) struct Signals {
     pub groups: Vec<Group>,
     /// Number of values in all signals.
     pub values: usize,
-    pub frequencies_hz: [f64; 2],
+    pub frequencies_hz: Bounds,
 }
 
 /// A fit of modes to signals.
@@ -99,7 +100,7 @@ impl Signals {
         signals: &[Vec<f64>],
         start: Start,
         moment_sd_s: f64,
-        frequencies_hz: [f64; 2],
+        frequencies_hz: Bounds,
     ) -> Self {
         let mut groups: Vec<Group> = Vec::new();
         for (id, signal) in signals.iter().enumerate() {

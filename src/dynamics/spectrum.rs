@@ -1,5 +1,6 @@
 //! Spectra of angles, and the half-power damping: the reference method, and what is drawn.
 
+use crate::bounds::Bounds;
 use crate::signal::interpolation::linear;
 use realfft::RealFftPlanner;
 
@@ -50,14 +51,14 @@ pub fn spectrum(times_s: &[f64], values: &[f64]) -> Option<Spectrum> {
 }
 
 impl Spectrum {
-    /// Frequency (Hz) of the largest peak within `[lowest, highest]` and its half-power damping
+    /// Frequency (Hz) of the largest peak within `frequencies_hz` and its half-power damping
     /// ratio: width of the peak at 1/√2 of its amplitude over twice its frequency
     /// (Hu et al. eq. 6). The width of a short film's bin comes on top of the tree's, so that it
     /// errs to the high side. `None` where there is no peak, or one that does not come down.
-    pub fn half_power(&self, [lowest_hz, highest_hz]: [f64; 2]) -> Option<(f64, f64)> {
+    pub fn half_power(&self, frequencies_hz: Bounds) -> Option<(f64, f64)> {
         let a = &self.amplitude;
-        let last = ((highest_hz / self.bin_hz) as usize).min(a.len().saturating_sub(2));
-        let first = ((lowest_hz / self.bin_hz).ceil() as usize).max(1);
+        let last = ((frequencies_hz.hi / self.bin_hz) as usize).min(a.len().saturating_sub(2));
+        let first = ((frequencies_hz.lo / self.bin_hz).ceil() as usize).max(1);
         let peak = (first..=last).max_by(|&i, &j| a[i].total_cmp(&a[j]))?;
         if a[peak] < a[peak - 1] || a[peak] < a[peak + 1] || a[peak] <= 0.0 {
             return None;
@@ -102,7 +103,7 @@ mod tests {
                 .collect();
             let (found_hz, found) = spectrum(&times, &values)
                 .unwrap()
-                .half_power([0.2, 5.0])
+                .half_power(Bounds::new(0.2, 5.0))
                 .unwrap();
             assert!(
                 (found_hz / hz - 1.0).abs() < 0.01,
@@ -119,7 +120,7 @@ mod tests {
         assert_eq!(
             spectrum(&constant, &[1.0; 64])
                 .unwrap()
-                .half_power([0.05, 0.4]),
+                .half_power(Bounds::new(0.05, 0.4)),
             None
         );
     }

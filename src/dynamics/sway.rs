@@ -7,6 +7,7 @@ use super::members::members;
 use super::modal;
 use super::release::{Onset, onset};
 use super::wind;
+use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::config::{Dynamics, Excited};
 use crate::model::{Excitation, Skeleton, Swaying, Unidentified};
@@ -116,8 +117,8 @@ impl<'a> UsableFilm<'a> {
             return Err(Unidentified::TooShort);
         }
         let highest_hz = (BELOW_NYQUIST * 0.5 / film.step_s()).min(config.highest_hz);
-        let frequencies_hz = [LEAST_PERIODS / film.span_s(), highest_hz];
-        if frequencies_hz[0] >= frequencies_hz[1] {
+        let frequencies_hz = Bounds::new(LEAST_PERIODS / film.span_s(), highest_hz);
+        if frequencies_hz.lo >= frequencies_hz.hi {
             return Err(Unidentified::TooShort);
         }
         let given = match config.excitation {

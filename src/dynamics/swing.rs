@@ -5,18 +5,19 @@ use super::members::{Points, mean_px};
 use super::signals::Factor;
 use crate::signal::principal::{PrincipalComponents, symmetric};
 use crate::signal::vectors::{add_scaled, dot};
+use nalgebra::{Point2, Vector2};
 
 /// Share of the mean lever that is more than a trace of a motion.
 const MIN_LEVER: f64 = 0.3;
 
 /// Places of a branch's points from its base, in the mean over time.
-pub(super) struct Arms(Vec<[f64; 2]>);
+pub(super) struct Arms(Vec<Vector2<f64>>);
 
 /// What one mode does to every point: factors of cosine and sine of u, then of v.
 type Factors = [f64; 4];
 
 impl Arms {
-    pub fn new(film: &Film, points: &Points, from: usize, base_px: [f64; 2]) -> Self {
+    pub fn new(film: &Film, points: &Points, from: usize, base_px: Point2<f64>) -> Self {
         Self::at(
             points
                 .tracks
@@ -27,12 +28,8 @@ impl Arms {
     }
 
     /// Of points at `at_px`.
-    pub fn at(at_px: impl Iterator<Item = [f64; 2]>, base_px: [f64; 2]) -> Self {
-        Self(
-            at_px
-                .map(|at| [at[0] - base_px[0], at[1] - base_px[1]])
-                .collect(),
-        )
+    pub fn at(at_px: impl Iterator<Item = Point2<f64>>, base_px: Point2<f64>) -> Self {
+        Self(at_px.map(|at| at - base_px).collect())
     }
 
     /// How much mode `m` of `factors` (of u and v of each point in turn) is one swing, 0 to 1: all
@@ -49,9 +46,9 @@ impl Arms {
         if squares <= 0.0 {
             return 0.0;
         }
-        let (turn, arms) = self.turn(factors, m);
-        let as_turn = if arms > 0.0 {
-            (turn[0] * turn[0] + turn[1] * turn[1]) / (arms * squares)
+        let turn = self.turn(factors, m);
+        let as_turn = if turn.arms > 0.0 {
+            (turn.cosine * turn.cosine + turn.sine * turn.sine) / (turn.arms * squares)
         } else {
             0.0
         };
@@ -60,24 +57,32 @@ impl Arms {
 
     /// The turn about the base that fits the mode's factors best, degrees.
     pub fn amplitude_deg(&self, factors: &[Vec<Factor>], m: usize) -> f64 {
-        let (turn, arms) = self.turn(factors, m);
-        if arms > 0.0 {
-            (turn[0].hypot(turn[1]) / arms).to_degrees()
+        let turn = self.turn(factors, m);
+        if turn.arms > 0.0 {
+            (turn.cosine.hypot(turn.sine) / turn.arms).to_degrees()
         } else {
             f64::NAN
         }
     }
 
-    /// Of cosine and sine, times the squares of the arms; and those.
-    fn turn(&self, factors: &[Vec<Factor>], m: usize) -> ([f64; 2], f64) {
-        let (mut turn, mut arms) = ([0.0; 2], 0.0);
+    fn turn(&self, factors: &[Vec<Factor>], m: usize) -> Turn {
+        let mut turn = Turn::default();
         for (arm, f) in self.0.iter().zip(of(factors, m)) {
-            arms += arm[0] * arm[0] + arm[1] * arm[1];
-            turn[0] += f[0] * arm[1] - f[2] * arm[0];
-            turn[1] += f[1] * arm[1] - f[3] * arm[0];
+            turn.arms += arm.norm_squared();
+            turn.cosine += f[0] * arm.y - f[2] * arm.x;
+            turn.sine += f[1] * arm.y - f[3] * arm.x;
         }
-        (turn, arms)
+        turn
     }
+}
+
+/// A turn about the base: its cosine and sine, times the squares of the arms.
+#[derive(Default)]
+struct Turn {
+    cosine: f64,
+    sine: f64,
+    /// These squares.
+    arms: f64,
 }
 
 /// How much signals are one motion, 0 to 1.
@@ -130,7 +135,7 @@ mod tests {
     use super::*;
 
     /// Points at `arms` that are moved by so much to the right and down.
-    fn one_swing(arms: &[[f64; 2]], moved: &[[f64; 2]]) -> f64 {
+    fn one_swing(arms: &[Vector2<f64>], moved: &[Vector2<f64>]) -> f64 {
         let cosines = moved.iter().flatten();
         let factors: Vec<Vec<Factor>> = cosines.map(|x| vec![Factor::of(&[*x])]).collect();
         Arms(arms.to_vec()).one_swing(&factors, 0)
@@ -146,8 +151,9 @@ mod tests {
             [-70.0, -40.0],
             [10.0, -120.0],
             [5.0, -10.0],
-        ];
-        let turned = arms.map(|[u, v]| [-0.05 * v, 0.05 * u]);
+        ]
+        .map(Vector2::from);
+        let turned = arms.map(|arm| Vector2::new(-0.05 * arm.y, 0.05 * arm.x));
         assert!(one_swing(&arms, &turned) > 0.999);
     }
 
@@ -155,21 +161,18 @@ mod tests {
     /// picture.
     #[test]
     fn one_direction_is_one_swing_wherever_the_base_is() {
-        let arms = [[40.0, 0.0], [60.0, 2.0], [80.0, -1.0], [100.0, 0.0]];
-        assert!(
-            one_swing(
-                &arms,
-                &[[-1.0, 0.1], [-1.6, 0.0], [-2.0, -0.1], [-2.4, 0.2]]
-            ) > 0.95
-        );
+        let arms = [[40.0, 0.0], [60.0, 2.0], [80.0, -1.0], [100.0, 0.0]].map(Vector2::from);
+        let moved = [[-1.0, 0.1], [-1.6, 0.0], [-2.0, -0.1], [-2.4, 0.2]].map(Vector2::from);
+        assert!(one_swing(&arms, &moved) > 0.95);
     }
 
     #[test]
     fn points_of_two_branches_that_swing_apart_are_not_one() {
-        let arms = [[40.0, -40.0], [60.0, -60.0], [-40.0, -40.0], [-60.0, -60.0]];
-        let apart = [[1.0, 1.0], [1.5, 1.5], [-1.0, 1.0], [-1.6, 1.5]];
+        let arms =
+            [[40.0, -40.0], [60.0, -60.0], [-40.0, -40.0], [-60.0, -60.0]].map(Vector2::from);
+        let apart = [[1.0, 1.0], [1.5, 1.5], [-1.0, 1.0], [-1.6, 1.5]].map(Vector2::from);
         assert!(one_swing(&arms, &apart) < 0.8);
-        assert_eq!(one_swing(&arms, &[[0.0; 2]; 4]), 0.0);
+        assert_eq!(one_swing(&arms, &[Vector2::zeros(); 4]), 0.0);
     }
 
     /// Four points with levers of 1 to 4, and half of that to the side.

@@ -7,7 +7,8 @@
 //! (`driven_oscillators.rs`). It is the branch's own if its points move with it as one swing.
 
 use super::branches::{
-    BranchEstimator, BranchInFilm, BranchMode, Estimate, SearchLimits, from_the_trunk_up,
+    BranchEstimator, BranchInFilm, BranchMode, Estimate, LnDeviations, SearchLimits,
+    from_the_trunk_up,
 };
 use super::celerite::Times;
 use super::driven_oscillators::{Fitted, Oscillator, Problem};
@@ -15,6 +16,7 @@ use super::film::Film;
 use super::gap_free::{GapFree, enough_seen};
 use super::members::{Points, mean_px};
 use super::swing::rank_one_fraction;
+use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::model::{Excitation, NodeId, Skeleton, Sway, Swaying, Unidentified};
 use crate::signal::principal::{PrincipalComponents, along};
@@ -69,32 +71,34 @@ const MAX_CI_TO_SERVE: f64 = 2.0;
 struct AcceptanceCriteria {
     /// Share of the squares that is one swing.
     min_rank_one: f64,
-    /// Standard deviations of the logarithms of frequency and damping below which none is believed,
-    /// however long the film is: what the carrier's points show is not all that it does.
-    min_ln_sd: [f64; 2],
+    /// Below these none is believed, however long the film is: what the carrier's points show is not
+    /// all that it does.
+    min_ln_sd: LnDeviations,
 }
 
 /// Where a branch and its carrier have points of their own.
 const OWN_POINTS: AcceptanceCriteria = AcceptanceCriteria {
     min_rank_one: 0.85,
-    min_ln_sd: [0.008, 0.25],
+    min_ln_sd: LnDeviations {
+        frequency: 0.008,
+        damping: 0.25,
+    },
 };
 /// Where those of the branches on them must serve: they sway by themselves besides.
 const SHARED_POINTS: AcceptanceCriteria = AcceptanceCriteria {
     min_rank_one: 0.87,
-    min_ln_sd: [0.015, 0.25],
+    min_ln_sd: LnDeviations {
+        frequency: 0.015,
+        damping: 0.25,
+    },
 };
 
 impl AcceptanceCriteria {
     /// An oscillator as a branch's mode, with the standard deviations that are believed.
     fn mode_of(&self, oscillator: &Oscillator) -> BranchMode {
-        let mut ln_sd = oscillator.ln_sd;
-        for (sd, least) in ln_sd.iter_mut().zip(self.min_ln_sd) {
-            *sd = (CI_INFLATION * *sd).hypot(least);
-        }
         BranchMode {
             mode: oscillator.mode,
-            ln_sd,
+            ln_sd: oscillator.ln_sd.inflated(CI_INFLATION, &self.min_ln_sd),
         }
     }
 }
@@ -250,7 +254,7 @@ impl InWind<'_> {
         let k = own_oscillator(&found, &ancestors, criteria)?;
         let mode = criteria.mode_of(&found[k]);
         let max_relative_ci = self.limits.max_relative_ci;
-        if found[k].ln_sd[0] <= 0.0 || !mode.is_within(MAX_CI_TO_SERVE * max_relative_ci) {
+        if found[k].ln_sd.frequency <= 0.0 || !mode.is_within(MAX_CI_TO_SERVE * max_relative_ci) {
             return Err(Unidentified::TooUncertain);
         }
         motion.check_one_swing(&fitted, k, criteria)?;
@@ -262,7 +266,7 @@ impl InWind<'_> {
         {
             return Err(Unidentified::AboveSampling);
         }
-        let has_damping = found[k].ln_sd[1] > 0.0;
+        let has_damping = found[k].ln_sd.damping > 0.0;
         let sway = Sway {
             frequency_hz: mode.frequency_hz(),
             damping_ratio: mode.damping_ratio().filter(|_| has_damping),
@@ -293,13 +297,13 @@ impl InWind<'_> {
     }
 
     /// Frequencies that are looked for in means of so many frames.
-    fn frequencies_hz(&self, every: usize) -> [f64; 2] {
-        let [lowest_hz, highest_hz] = self.limits.frequencies_hz;
+    fn frequencies_hz(&self, every: usize) -> Bounds {
+        let frequencies_hz = self.limits.frequencies_hz;
         if every == 1 {
-            return [lowest_hz, highest_hz];
+            return frequencies_hz;
         }
         let of_rate = MAX_FREQ_OF_RATE / (every as f64 * self.film.step_s());
-        [lowest_hz, highest_hz.min(of_rate)]
+        Bounds::new(frequencies_hz.lo, frequencies_hz.hi.min(of_rate))
     }
 
     /// Of an oscillator of this variance in all of the points together, px².
@@ -307,8 +311,7 @@ impl InWind<'_> {
         let mut arms = 0.0;
         for &k in &points.tracks {
             let at_px = mean_px(&self.film.tracks[k].at_px);
-            let [u, v] = [0, 1].map(|c| at_px[c] - branch.base_px[c]);
-            arms += u * u + v * v;
+            arms += (at_px - branch.base_px).norm_squared();
         }
         (2.0 * variance).sqrt().atan2(arms.sqrt()).to_degrees()
     }
@@ -425,7 +428,7 @@ fn own_oscillator(
 
 fn is_of_ancestor(mode: &BranchMode, ancestors: &[BranchMode]) -> bool {
     ancestors.iter().any(|a| {
-        let sd = a.ln_sd[0].hypot(mode.ln_sd[0]);
+        let sd = a.ln_sd.frequency.hypot(mode.ln_sd.frequency);
         a.mode.has_frequency_of(&mode.mode, SAME_FREQ_SIGMAS * sd)
     })
 }

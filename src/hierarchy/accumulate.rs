@@ -100,12 +100,12 @@ fn noise_px(table: &TrackTable, row: usize) -> f64 {
 /// How often the mean of the moving points has swung to and fro along its principal direction.
 fn sways(table: &TrackTable, moving: &[usize]) -> f64 {
     let steps = Signals::velocities(table, moving, |_| true).mean();
-    let mut at = Vector2::zeros();
-    let path: Vec<_> = steps
+    let mut at = Point2::origin();
+    let path: Vec<Point2<f64>> = steps
         .iter()
         .map(|v| {
             at += v;
-            at.into()
+            at
         })
         .collect();
     let along = along_principal_direction(&path);

@@ -1,6 +1,7 @@
 //! The part of an angle that is a branch's own free decay: how far it sways, for the table and for
 //! the eye. Frequency and damping come from the points, not from here.
 
+use crate::bounds::Bounds;
 use crate::model::Sway;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
@@ -16,13 +17,12 @@ pub struct Decaying {
     pub amplitude_deg: f64,
 }
 
-/// The damped cosine of `own` that fits `angle_deg` best between the two times `used_s` (none
-/// elsewhere), beside those of
-/// `others` and a constant. `None` without a damping, or where the angle has too few values.
+/// The damped cosine of `own` that fits `angle_deg` best within `used_s` (none elsewhere), beside
+/// those of `others` and a constant. `None` without a damping, or where the angle has too few values.
 pub fn decaying(
     times_s: &[f64],
     angle_deg: &[f64],
-    used_s: [f64; 2],
+    used_s: Bounds,
     released_s: f64,
     own: &Sway,
     others: &[Sway],
@@ -37,7 +37,7 @@ pub fn decaying(
         modes.extend(Mode::of(other).filter(|_| apart).and_then(|m| m.sound()));
     }
     let rows: Vec<usize> = (0..times_s.len().min(angle_deg.len()))
-        .filter(|&k| is_within(times_s[k], used_s) && angle_deg[k].is_finite())
+        .filter(|&k| used_s.contains(times_s[k]) && angle_deg[k].is_finite())
         .collect();
     let columns = 1 + 2 * modes.len();
     if rows.len() < 2 * columns || columns < 3 {
@@ -48,19 +48,20 @@ pub fn decaying(
     for &k in &rows {
         let mut row = vec![1.0];
         for mode in &modes {
-            row.extend(mode.wave(times_s[k] - released_s));
+            let wave = mode.wave(times_s[k] - released_s);
+            row.extend([wave.cosine, wave.sine]);
         }
         let x = DVector::from_vec(row);
         squares += &x * x.transpose();
         products += x * angle_deg[k];
     }
     let factors = squares.cholesky()?.solve(&products);
-    let [cosine, sine] = [factors[1], factors[2]];
+    let (cosine, sine) = (factors[1], factors[2]);
     let mut curve_deg = vec![f64::NAN; times_s.len()];
     for (deg, t) in curve_deg.iter_mut().zip(times_s) {
-        if is_within(*t, used_s) {
-            let [c, s] = modes[0].wave(t - released_s);
-            *deg = cosine * c + sine * s;
+        if used_s.contains(*t) {
+            let wave = modes[0].wave(t - released_s);
+            *deg = cosine * wave.cosine + sine * wave.sine;
         }
     }
     let amplitude_deg = cosine.hypot(sine);
@@ -70,15 +71,17 @@ pub fn decaying(
     })
 }
 
-fn is_within(t: f64, [from, to]: [f64; 2]) -> bool {
-    from <= t && t <= to
-}
-
 /// A damped oscillation.
 #[derive(Clone, Copy)]
 struct Mode {
     frequency_hz: f64,
     damping_ratio: f64,
+}
+
+/// A damped oscillation's cosine and sine at one time.
+struct Wave {
+    cosine: f64,
+    sine: f64,
 }
 
 impl Mode {
@@ -96,11 +99,14 @@ impl Mode {
         sound.then_some(self)
     }
 
-    /// Its cosine and its sine at a time since the release, s.
-    fn wave(&self, t: f64) -> [f64; 2] {
+    /// At a time since the release, s.
+    fn wave(&self, t: f64) -> Wave {
         let size = (-self.damping_ratio * TAU * self.frequency_hz * t).exp();
         let damped = (1.0 - self.damping_ratio * self.damping_ratio).sqrt();
         let phase = damped * TAU * self.frequency_hz * t;
-        [size * phase.cos(), size * phase.sin()]
+        Wave {
+            cosine: size * phase.cos(),
+            sine: size * phase.sin(),
+        }
     }
 }

@@ -3,7 +3,7 @@
 use super::compare::{Change, Comparison, Row};
 use super::levels::{Growth, Spread, growth, levels};
 use super::matching::Match;
-use super::study::{Branch, Study};
+use super::study::{Branch, Gap, Study};
 use crate::dynamics::Start;
 use crate::model::{Interval, Unidentified};
 use serde_json::{Map, Value, json};
@@ -17,8 +17,8 @@ pub fn json(studies: &[Study], comparison: Option<&Comparison>) -> Value {
     })
 }
 
-fn gap([after_s, length_s]: &[f64; 2]) -> Value {
-    json!({ "after_s": after_s, "length_s": length_s })
+fn gap(gap: &Gap) -> Value {
+    json!({ "after_s": gap.after_s, "length_s": gap.length_s })
 }
 
 fn capture(study: &Study) -> Value {
@@ -26,11 +26,11 @@ fn capture(study: &Study) -> Value {
     json!({
         "name": study.name,
         "source": study.source,
-        "from_s": study.span_s[0],
-        "to_s": study.span_s[1],
+        "from_s": study.span_s.lo,
+        "to_s": study.span_s.hi,
         "frames": study.frames,
         "rate_hz": study.rate_hz(),
-        "gaps": study.gaps_s.iter().map(gap).collect::<Vec<Value>>(),
+        "gaps": study.gaps.iter().map(gap).collect::<Vec<Value>>(),
         "excitation": onset.map(|o| o.excitation.word()),
         "excitation_given": study.given.is_some(),
         "from_rest": onset.map(|o| o.start == Start::Rest),
@@ -60,7 +60,7 @@ fn branch(study: &Study, branch: &Branch) -> Value {
         "parent_id": branch.parent,
         "level": branch.level,
         "points": branch.points,
-        "end_px": [study.foot_px[0] + branch.tip[0], study.foot_px[1] - branch.tip[1]],
+        "end_px": [study.foot_px.x + branch.tip.x, study.foot_px.y - branch.tip.y],
         "length_px": branch.length_px(),
         "identifiable": sway.is_some(),
         "frequency_hz": sway.map(|s| interval(&s.frequency_hz)),

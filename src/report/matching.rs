@@ -5,6 +5,7 @@
 //! that camera and zoom may differ.
 
 use super::study::{Branch, Study};
+use nalgebra::{Point2, Vector2};
 
 /// A branch may have moved by this share of the tree's size from one capture to the next.
 const FARTHEST: f64 = 0.08;
@@ -52,7 +53,7 @@ pub fn matched(first: &Study, other: &Study) -> Vec<Match> {
     let scales = std::iter::once(1.0).chain(SIZES.iter().map(|s| s * ratio));
     let starts = scales.map(|scale| Frame {
         scale,
-        shift: [0.0; 2],
+        shift: Vector2::zeros(),
     });
     let tried = starts.filter(|f| f.scale.is_finite()).map(|start| {
         let mut frame = start;
@@ -80,41 +81,35 @@ pub fn matched(first: &Study, other: &Study) -> Vec<Match> {
     )
 }
 
-/// Where a branch ends in the first capture and in the other one.
-type Pair = ([f64; 2], [f64; 2]);
-
 /// Where the other capture's picture lies on the first one's: its places times `scale` and on by
 /// `shift`, px.
 struct Frame {
     scale: f64,
-    shift: [f64; 2],
+    shift: Vector2<f64>,
 }
 
 impl Frame {
-    fn place(&self, p: [f64; 2]) -> [f64; 2] {
-        [
-            self.scale * p[0] + self.shift[0],
-            self.scale * p[1] + self.shift[1],
-        ]
+    fn place(&self, p: Point2<f64>) -> Point2<f64> {
+        self.scale * p + self.shift
     }
 
     /// The scale and shift by which the branches that were found lie on each other best; the same
     /// for few of them.
     fn refined(&self, first: &Study, other: &Study, found: &[Match]) -> Self {
-        let mut pairs: Vec<Pair> = Vec::new();
+        // Where a branch ends here and there.
+        let mut pairs: Vec<[Point2<f64>; 2]> = Vec::new();
         for (branch, m) in first.branches.iter().zip(found) {
             if let Some(there) = m.branch() {
-                pairs.push((branch.tip, other.branches[there].tip));
+                pairs.push([branch.tip, other.branches[there].tip]);
             }
         }
         let n = pairs.len() as f64;
-        let a = [0, 1].map(|c| pairs.iter().map(|p| p.0[c]).sum::<f64>() / n);
-        let b = [0, 1].map(|c| pairs.iter().map(|p| p.1[c]).sum::<f64>() / n);
+        let [a, b] = [0, 1].map(|k| pairs.iter().map(|p| p[k].coords).sum::<Vector2<f64>>() / n);
         let (mut products, mut squares) = (0.0, 0.0);
-        for (p, q) in &pairs {
-            let (p, q) = ([p[0] - a[0], p[1] - a[1]], [q[0] - b[0], q[1] - b[1]]);
-            products += p[0] * q[0] + p[1] * q[1];
-            squares += q[0].powi(2) + q[1].powi(2);
+        for [p, q] in &pairs {
+            let (p, q) = (p.coords - a, q.coords - b);
+            products += p.dot(&q);
+            squares += q.norm_squared();
         }
         let scale = (products / n) / (squares / n);
         if pairs.len() < LEAST_PAIRS || !scale.is_finite() || scale <= 0.0 {
@@ -122,7 +117,7 @@ impl Frame {
         }
         Self {
             scale,
-            shift: [0, 1].map(|c| a[c] - scale * b[c]),
+            shift: a - scale * b,
         }
     }
 
@@ -134,9 +129,9 @@ impl Frame {
     }
 
     /// From a place in the first capture to one in the other.
-    fn distance_px(&self, p: [f64; 2], q: [f64; 2]) -> f64 {
-        let q = self.place(q);
-        (p[0] - q[0]).hypot(p[1] - q[1])
+    fn distance_px(&self, p: Point2<f64>, q: Point2<f64>) -> f64 {
+        let way = p - self.place(q);
+        way.x.hypot(way.y)
     }
 }
 
@@ -180,16 +175,17 @@ fn seen_from(first: &Study, other: &Study, frame: &Frame, size_px: f64) -> Vec<M
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bounds::Bounds;
     use crate::model::Unidentified;
 
     /// A tree whose branches end at `tips`, each carried by the trunk.
-    fn study(tips: &[[f64; 2]]) -> Study {
+    fn study(tips: &[Point2<f64>]) -> Study {
         let branches = tips.iter().enumerate().map(|(i, tip)| Branch {
             name: i as u32 + 1,
             parent: (i > 0).then_some(1),
             level: if i > 0 { 2 } else { 1 },
             points: 9,
-            base: if i > 0 { tips[0] } else { [0.0; 2] },
+            base: if i > 0 { tips[0] } else { Point2::origin() },
             tip: *tip,
             sway: Err(Unidentified::TooShort),
             amplitude_deg: f64::NAN,
@@ -208,15 +204,15 @@ mod tests {
             name: String::new(),
             source: String::new(),
             size: [640, 360],
-            span_s: [0.0, 1.0],
+            span_s: Bounds::new(0.0, 1.0),
             frames: 30,
-            gaps_s: Vec::new(),
+            gaps: Vec::new(),
             onset: None,
-            used_s: [0.0, 1.0],
+            used_s: Bounds::new(0.0, 1.0),
             given: None,
             metres_per_px: 0.0,
             highest_hz: 5.0,
-            foot_px: [320.0, 340.0],
+            foot_px: Point2::new(320.0, 340.0),
             outline_px: Vec::new(),
             picture: None,
             branches: branches.collect(),
@@ -228,13 +224,13 @@ mod tests {
         matches.iter().map(Match::branch).collect()
     }
 
-    const TREE: [[f64; 2]; 6] = [
-        [0.0, 100.0],
-        [-80.0, 180.0],
-        [-40.0, 240.0],
-        [10.0, 260.0],
-        [70.0, 230.0],
-        [90.0, 150.0],
+    const TREE: [Point2<f64>; 6] = [
+        Point2::new(0.0, 100.0),
+        Point2::new(-80.0, 180.0),
+        Point2::new(-40.0, 240.0),
+        Point2::new(10.0, 260.0),
+        Point2::new(70.0, 230.0),
+        Point2::new(90.0, 150.0),
     ];
 
     /// The second film is from farther away, its outline's foot lies elsewhere, and it was cut into
@@ -242,9 +238,9 @@ mod tests {
     #[test]
     fn a_tree_seen_from_farther_away_and_with_another_foot_is_the_same_tree() {
         let order = [0, 5, 4, 2, 1];
-        let other: Vec<[f64; 2]> = order
+        let other: Vec<Point2<f64>> = order
             .iter()
-            .map(|&k| [0.7 * TREE[k][0] + 6.0, 0.7 * TREE[k][1] - 9.0])
+            .map(|&k| Point2::new(0.7 * TREE[k].x + 6.0, 0.7 * TREE[k].y - 9.0))
             .collect();
         let matches = matched(&study(&TREE), &study(&other));
         assert_eq!(
@@ -258,8 +254,8 @@ mod tests {
     #[test]
     fn a_branch_with_two_as_near_is_unclear() {
         let mut other = TREE.to_vec();
-        other[4] = [58.0, 230.0];
-        other.push([82.0, 231.0]);
+        other[4] = Point2::new(58.0, 230.0);
+        other.push(Point2::new(82.0, 231.0));
         let matches = matched(&study(&TREE), &study(&other));
         assert_eq!(matches[4], Match::Unclear);
         assert_eq!(found(&matches)[..4], [Some(0), Some(1), Some(2), Some(3)]);

@@ -67,6 +67,7 @@ fn amplitude_at(spectrum: &Spectrum, hz: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bounds::Bounds;
     use rand::RngExt;
 
     /// An oscillator that chance drives for long: one spectrum of it all would give a damping of
@@ -87,7 +88,7 @@ mod tests {
         }
         let (found_hz, found) = averaged(&times, &values)
             .unwrap()
-            .half_power([0.2, 5.0])
+            .half_power(Bounds::new(0.2, 5.0))
             .unwrap();
         assert!(
             (found_hz / hz - 1.0).abs() < 0.05 && (0.5..2.0).contains(&(found / damping)),
@@ -95,7 +96,7 @@ mod tests {
         );
         let (_, whole) = spectrum(&times, &values)
             .unwrap()
-            .half_power([0.2, 5.0])
+            .half_power(Bounds::new(0.2, 5.0))
             .unwrap();
         assert!(whole < 0.2 * damping, "{whole}");
     }

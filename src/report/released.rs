@@ -43,7 +43,7 @@ mod tests {
     use crate::config::Dynamics;
     use crate::dynamics::{Depth, FilmTrack, Onset, Start, analyse};
     use crate::model::{Node, NodeId, NodeName, Size, Skeleton};
-    use nalgebra::Point3;
+    use nalgebra::{Point2, Point3};
     use std::f64::consts::TAU;
 
     fn chance(seed: &mut u64) -> f64 {
@@ -64,7 +64,7 @@ mod tests {
             let factor = 0.5 + 0.1 * f64::from(i);
             let at_px = times
                 .iter()
-                .map(|t| [100.0 + factor * sway(*t), 50.0 + 0.3 * chance(&mut seed)])
+                .map(|t| Point2::new(100.0 + factor * sway(*t), 50.0 + 0.3 * chance(&mut seed)))
                 .collect();
             tracks.push(FilmTrack {
                 node: NodeId(1),

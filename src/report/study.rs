@@ -2,11 +2,13 @@
 
 use super::decaying::decaying;
 use super::pieces::{averaged, looked_at_s};
+use crate::bounds::Bounds;
 use crate::dynamics::{
     Analysis, Film, LEAST_PERIODS, Onset, Spectrum, angle_in_space_deg, angle_to_parent_deg,
     spectrum,
 };
 use crate::model::{Excitation, NodeId, Pose, Skeleton, Sway, Swaying, Unidentified};
+use nalgebra::{Point2, Vector2};
 
 /// A step from frame to frame that is so many times the usual one is a gap.
 const GAP: f64 = 1.6;
@@ -51,13 +53,12 @@ pub struct Study {
     pub size: [u32; 2],
     /// First and last frame that were analysed, s since the first of the capture, and how many
     /// there are.
-    pub span_s: [f64; 2],
+    pub span_s: Bounds,
     pub frames: usize,
-    /// Times without frames: after which moment, and how long, s.
-    pub gaps_s: Vec<[f64; 2]>,
+    pub gaps: Vec<Gap>,
     pub onset: Option<Onset>,
     /// First and last moment that the answers come from, s.
-    pub used_s: [f64; 2],
+    pub used_s: Bounds,
     /// What the user says made it sway; `None` where the signal told.
     pub given: Option<Excitation>,
     /// 0 where no scale is known.
@@ -65,11 +66,19 @@ pub struct Study {
     /// Highest frequency that was looked for, Hz.
     pub highest_hz: f64,
     /// The trunk's foot in the picture, px.
-    pub foot_px: [f64; 2],
+    pub foot_px: Point2<f64>,
     pub outline_px: Vec<[i32; 2]>,
     pub picture: Option<String>,
     pub branches: Vec<Branch>,
     pub notes: Vec<String>,
+}
+
+/// A time without frames.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gap {
+    /// The last moment before it.
+    pub after_s: f64,
+    pub length_s: f64,
 }
 
 /// One measured branch. Places are in the picture at rest, px to the right of the trunk's foot and
@@ -83,8 +92,8 @@ pub struct Branch {
     pub level: u8,
     /// Points on it and on all that it carries.
     pub points: u32,
-    pub base: [f64; 2],
-    pub tip: [f64; 2],
+    pub base: Point2<f64>,
+    pub tip: Point2<f64>,
     pub sway: Swaying,
     /// Amplitude of the branch's own oscillation in its angle to the one that carries it, degrees;
     /// no number where unknown.
@@ -111,7 +120,7 @@ pub struct Branch {
     pub reference: Option<Reference>,
     /// Where its end went: to the right of its place at rest and above it, px, by
     /// [`times_s`](Self::times_s).
-    pub way_px: Vec<[f64; 2]>,
+    pub way_px: Vec<Vector2<f64>>,
 }
 
 /// What the spectrum's largest peak says: the method of Hu et al.
@@ -133,15 +142,18 @@ impl Study {
         } = *given;
         let times = &film.times_s;
         let usual_s = film.step_s();
-        let gaps_s = times
+        let gaps = times
             .windows(2)
             .filter(|w| w[1] - w[0] > GAP * usual_s)
-            .map(|w| [w[0], w[1] - w[0]])
+            .map(|w| Gap {
+                after_s: w[0],
+                length_s: w[1] - w[0],
+            })
             .collect();
         let ends = times
             .first()
             .zip(times.last())
-            .map_or([0.0; 2], |(a, b)| [*a, *b]);
+            .map_or(Bounds::default(), |(a, b)| Bounds::new(*a, *b));
         let source = given
             .source
             .rsplit(['/', '\\'])
@@ -153,7 +165,7 @@ impl Study {
             size: [skeleton.image_size.width, skeleton.image_size.height],
             span_s: ends,
             frames: times.len(),
-            gaps_s,
+            gaps,
             onset: analysis.onset,
             used_s: analysis
                 .onset
@@ -182,7 +194,7 @@ impl Study {
 
     /// Frames a second, by their real times; no number for less than two.
     pub fn rate_hz(&self) -> f64 {
-        let span_s = self.span_s[1] - self.span_s[0];
+        let span_s = self.span_s.length();
         if span_s > 0.0 {
             (self.frames.saturating_sub(1)) as f64 / span_s
         } else {
@@ -194,7 +206,7 @@ impl Study {
     pub fn size_px(&self) -> f64 {
         self.branches
             .iter()
-            .map(|b| b.tip[0].hypot(b.tip[1]))
+            .map(|b| b.tip.x.hypot(b.tip.y))
             .fold(0.0, f64::max)
     }
 
@@ -217,27 +229,29 @@ impl Branch {
 
     /// Its length in the picture at rest, px.
     pub fn length_px(&self) -> f64 {
-        (self.tip[0] - self.base[0]).hypot(self.tip[1] - self.base[1])
+        let along = self.tip - self.base;
+        along.x.hypot(along.y)
     }
 }
 
 /// First and last moment of the frames that an analysis has used, of a film from and to these
 /// `ends`, s.
-fn used_s(onset: &Onset, times_s: &[f64], ends: [f64; 2]) -> [f64; 2] {
+fn used_s(onset: &Onset, times_s: &[f64], ends: Bounds) -> Bounds {
     let first = times_s.get(onset.from);
     let last = times_s.get(onset.to.saturating_sub(1));
-    [
-        first.copied().unwrap_or(ends[0]),
-        last.copied().unwrap_or(ends[1]),
-    ]
+    Bounds::new(
+        first.copied().unwrap_or(ends.lo),
+        last.copied().unwrap_or(ends.hi),
+    )
 }
 
-fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: [f64; 2]) -> Branch {
+fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: Bounds) -> Branch {
     let (skeleton, poses) = (given.skeleton, given.poses);
     let own = &skeleton.nodes[node.index()];
     let parent = skeleton.ancestors(node).next().unwrap_or(NodeId(0));
     let (base, tip) = (place(skeleton, parent), place(skeleton, node));
-    let length_px = (tip[0] - base[0]).hypot(tip[1] - base[1]);
+    let along = tip - base;
+    let length_px = along.x.hypot(along.y);
     let times_s: Vec<f64> = poses.iter().map(|p| p.time_s).collect();
     let plane_deg = centred(angle_to_parent_deg(skeleton, poses, node));
     let space_deg = centred(angle_in_space_deg(skeleton, poses, node));
@@ -278,19 +292,18 @@ fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: [f64; 2]) -> Branc
 }
 
 /// Where a node is at rest, px to the right and up from the foot.
-fn place(skeleton: &Skeleton, node: NodeId) -> [f64; 2] {
-    let p = skeleton.nodes[node.index()].position;
-    [p.x, p.y]
+fn place(skeleton: &Skeleton, node: NodeId) -> Point2<f64> {
+    skeleton.nodes[node.index()].position.xy()
 }
 
 /// How far a node was from `rest` in every pose, px to the right and up; no numbers where a pose
 /// lacks it.
-fn way_px(poses: &[Pose], node: NodeId, rest: [f64; 2]) -> Vec<[f64; 2]> {
+fn way_px(poses: &[Pose], node: NodeId, rest: Point2<f64>) -> Vec<Vector2<f64>> {
     let mut way = Vec::with_capacity(poses.len());
     for pose in poses {
         way.push(match pose.joints.get(node.index()) {
-            Some(joint) => [joint.position.x - rest[0], joint.position.y - rest[1]],
-            None => [f64::NAN; 2],
+            Some(joint) => joint.position.xy() - rest,
+            None => Vector2::new(f64::NAN, f64::NAN),
         });
     }
     way
@@ -301,11 +314,11 @@ fn seen_in(
     given: &Given,
     times_s: &[f64],
     angle_deg: &[f64],
-    used_s: [f64; 2],
+    used_s: Bounds,
 ) -> (Option<Spectrum>, Option<Reference>) {
     let (mut used_times_s, mut used_deg) = (Vec::new(), Vec::new());
     for (time_s, deg) in times_s.iter().zip(angle_deg) {
-        if used_s[0] <= *time_s && *time_s <= used_s[1] {
+        if used_s.contains(*time_s) {
             used_times_s.push(*time_s);
             used_deg.push(*deg);
         }
@@ -363,7 +376,7 @@ fn seen(
     let reference = spectrum
         .as_ref()
         .filter(|_| piece_s > 0.0)
-        .and_then(|s| s.half_power([LEAST_PERIODS / piece_s, highest_hz]))
+        .and_then(|s| s.half_power(Bounds::new(LEAST_PERIODS / piece_s, highest_hz)))
         .map(|(peak_hz, damping_ratio)| Reference {
             peak_hz,
             damping_ratio,

@@ -1,6 +1,6 @@
 //! Plain words for what the tables say in one.
 
-use super::study::Study;
+use super::study::{Gap, Study};
 use crate::dynamics::Start;
 use crate::model::{Excitation, Unidentified};
 
@@ -36,7 +36,6 @@ pub fn excitation(study: &Study) -> String {
 
 /// What part of the film was analysed, and how many frames that is.
 pub fn frames(study: &Study) -> String {
-    let [from, to] = study.span_s;
     let rate = study.rate_hz();
     let rate = if rate.is_finite() {
         format!(" at {rate:.1} frames/s")
@@ -44,7 +43,9 @@ pub fn frames(study: &Study) -> String {
         String::new()
     };
     format!(
-        "{from:.1} to {to:.1} s of the film, {}{rate}",
+        "{:.1} to {:.1} s of the film, {}{rate}",
+        study.span_s.lo,
+        study.span_s.hi,
         number_of(study.frames, "frame")
     )
 }
@@ -52,16 +53,15 @@ pub fn frames(study: &Study) -> String {
 /// What is missing between the frames.
 pub fn gaps(study: &Study) -> String {
     let longest = study
-        .gaps_s
+        .gaps
         .iter()
-        .copied()
-        .max_by(|a, b| a[1].total_cmp(&b[1]));
+        .max_by(|a, b| a.length_s.total_cmp(&b.length_s));
     match longest {
         None => "no gaps".into(),
-        Some([at, long]) => {
+        Some(Gap { after_s, length_s }) => {
             format!(
-                "{}, the longest {long:.2} s after {at:.2} s",
-                number_of(study.gaps_s.len(), "gap")
+                "{}, the longest {length_s:.2} s after {after_s:.2} s",
+                number_of(study.gaps.len(), "gap")
             )
         }
     }

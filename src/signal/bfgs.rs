@@ -1,5 +1,6 @@
 //! The minimum of a smooth function of a few numbers, and how sharp it is.
 
+use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use nalgebra::{DMatrix, DVector};
 
@@ -22,7 +23,7 @@ const SECOND_DIFFERENCE: f64 = 1e-2;
 pub fn minimum(
     f: impl Fn(&[f64]) -> f64,
     from: &[f64],
-    bounds: &[[f64; 2]],
+    bounds: &[Bounds],
     cancel: &CancelToken,
 ) -> (Vec<f64>, f64) {
     let n = from.len();
@@ -51,9 +52,9 @@ pub fn minimum(
     (x, value)
 }
 
-fn clamp(x: &mut [f64], bounds: &[[f64; 2]]) {
-    for (x, [lo, hi]) in x.iter_mut().zip(bounds) {
-        *x = x.clamp(*lo, *hi);
+fn clamp(x: &mut [f64], bounds: &[Bounds]) {
+    for (x, bounds) in x.iter_mut().zip(bounds) {
+        *x = bounds.clamp(*x);
     }
 }
 
@@ -78,7 +79,7 @@ fn line_search(
     x: &[f64],
     value: f64,
     direction: &DVector<f64>,
-    bounds: &[[f64; 2]],
+    bounds: &[Bounds],
 ) -> Option<(Vec<f64>, f64)> {
     let mut share = 1.0;
     for _ in 0..TRIES {
@@ -163,7 +164,12 @@ mod tests {
     #[test]
     fn a_bent_valley_is_followed_to_its_lowest_place() {
         let cancel = CancelToken::new();
-        let (x, value) = minimum(bent_valley, &[-1.0, 1.0], &[[-3.0, 3.0]; 2], &cancel);
+        let (x, value) = minimum(
+            bent_valley,
+            &[-1.0, 1.0],
+            &[Bounds::new(-3.0, 3.0); 2],
+            &cancel,
+        );
         assert!(value < 1e-2 && (x[0] - 1.0).abs() < 0.1, "{x:?}: {value}");
         let h = curvature(bent_valley, &[1.0, 1.0]);
         assert!(
@@ -176,7 +182,12 @@ mod tests {
     fn what_is_not_wanted_any_more_takes_no_step() {
         let cancel = CancelToken::new();
         cancel.cancel();
-        let (x, value) = minimum(bent_valley, &[-1.0, 1.0], &[[-3.0, 3.0]; 2], &cancel);
+        let (x, value) = minimum(
+            bent_valley,
+            &[-1.0, 1.0],
+            &[Bounds::new(-3.0, 3.0); 2],
+            &cancel,
+        );
         assert_eq!((x, value), (vec![-1.0, 1.0], 4.0));
     }
 }

@@ -1,5 +1,6 @@
 //! Nonlinear least squares: Levenberg-Marquardt (Marquardt 1963) within bounds.
 
+use crate::bounds::Bounds;
 use nalgebra::{DMatrix, DVector};
 
 /// Damping at first, relative to the diagonal of the normal equations; what a success and a failure
@@ -31,8 +32,8 @@ pub struct NormalEquations {
 /// How far one parameter may go.
 #[derive(Clone, Copy, Debug)]
 pub struct ParameterLimits {
-    /// From and to, both included; infinite where there is none.
-    pub bounds: [f64; 2],
+    /// Infinite where there is none.
+    pub bounds: Bounds,
     /// In one step.
     pub max_step: f64,
 }
@@ -131,7 +132,7 @@ fn stepped(x: &[f64], step: &DVector<f64>, limits: &[ParameterLimits]) -> Vec<f6
     let mut next = x.to_vec();
     for ((x, step), limits) in next.iter_mut().zip(step.iter()).zip(limits) {
         let moved = *x + step.clamp(-limits.max_step, limits.max_step);
-        *x = moved.clamp(limits.bounds[0], limits.bounds[1]);
+        *x = limits.bounds.clamp(moved);
     }
     next
 }
@@ -165,11 +166,11 @@ mod tests {
             min_relative_gain: 1e-9,
         };
         let free = ParameterLimits {
-            bounds: [f64::NEG_INFINITY, f64::INFINITY],
+            bounds: Bounds::new(f64::NEG_INFINITY, f64::INFINITY),
             max_step: 0.5,
         };
         let bounded = ParameterLimits {
-            bounds: [-9.0, 1.0],
+            bounds: Bounds::new(-9.0, 1.0),
             ..free
         };
         for (second, wanted) in [(free, 4.0_f64.ln()), (bounded, 1.0)] {

@@ -1,7 +1,7 @@
 //! Principal components: the few motions that many signals are made of.
 
 use super::vectors::{add_scaled, dot};
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::{DMatrix, Point2, SymmetricEigen, Vector2};
 
 /// Directions in all signals at once, of length 1, and the variance along each, the largest first.
 pub struct PrincipalComponents {
@@ -68,19 +68,19 @@ pub fn along(signals: &[Vec<f64>], direction: &[f64]) -> Vec<f64> {
 ///
 /// Of two coordinates the direction has a closed form, and unlike an eigenvector always the same
 /// sign: within a right angle of the first axis.
-pub fn along_principal_direction(d: &[[f64; 2]]) -> Vec<f64> {
+pub fn along_principal_direction(d: &[Point2<f64>]) -> Vec<f64> {
     let n = d.len() as f64;
-    let mut mean = [0.0; 2];
+    let mut mean = Point2::origin();
     for p in d {
-        mean = [mean[0] + p[0] / n, mean[1] + p[1] / n];
+        mean += p.coords / n;
     }
-    let centred: Vec<[f64; 2]> = d.iter().map(|p| [p[0] - mean[0], p[1] - mean[1]]).collect();
+    let centred: Vec<Vector2<f64>> = d.iter().map(|p| p - mean).collect();
     let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
     for p in &centred {
-        xx += p[0] * p[0];
-        xy += p[0] * p[1];
-        yy += p[1] * p[1];
+        xx += p.x * p.x;
+        xy += p.x * p.y;
+        yy += p.y * p.y;
     }
     let (sin, cos) = (0.5 * (2.0 * xy).atan2(xx - yy)).sin_cos();
-    centred.iter().map(|p| cos * p[0] + sin * p[1]).collect()
+    centred.iter().map(|p| cos * p.x + sin * p.y).collect()
 }

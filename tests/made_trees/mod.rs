@@ -8,7 +8,7 @@
 
 use arborcam::dynamics::{Film, FilmTrack};
 use arborcam::model::{Node, NodeId, NodeName, Size, Skeleton};
-use nalgebra::{Point2, Point3, Vector3};
+use nalgebra::{Point2, Point3, Vector2, Vector3};
 use std::f64::consts::TAU;
 
 /// Random numbers (SplitMix64). The trees of these tests, and with them the figures in
@@ -272,12 +272,12 @@ fn seen(
     frames: usize,
     filming: &Filming,
     chance: &mut Chance,
-) -> Vec<[f64; 2]> {
+) -> Vec<Point2<f64>> {
     let gap = (chance.even() < filming.gaps).then(|| {
         let from = (chance.even() * frames as f64) as usize;
         from..from + frames / 5
     });
-    let mut drift = [0.0; 2];
+    let mut drift = Vector2::zeros();
     (0..frames)
         .map(|k| {
             let mut moved = Vector3::zeros();
@@ -301,16 +301,11 @@ fn seen(
                 .iter_mut()
                 .for_each(|d| *d = 0.95 * *d + 0.3 * filming.noise_px * chance.normal());
             if gap.as_ref().is_some_and(|g| g.contains(&k)) {
-                return [f64::NAN; 2];
+                return Point2::new(f64::NAN, f64::NAN);
             }
-            let noise = [
-                filming.noise_px * chance.normal(),
-                filming.noise_px * chance.normal(),
-            ];
-            [
-                320.0 + at.x + moved.x + noise[0] + drift[0],
-                340.0 - at.y - moved.y + noise[1] + drift[1],
-            ]
+            let noise = Vector2::from_fn(|_, _| filming.noise_px * chance.normal());
+            let place = Point2::new(320.0 + at.x + moved.x, 340.0 - at.y - moved.y);
+            place + noise + drift
         })
         .collect()
 }

@@ -16,11 +16,12 @@ mod search;
 mod shoots;
 mod tree;
 
-use super::branches::{BELOW_NYQUIST, BranchMode, SearchLimits};
+use super::branches::{BELOW_NYQUIST, BranchMode, LnDeviations, SearchLimits};
 use super::decay::{Mode, USUAL_DAMPING};
 use super::film::Film;
 use super::free_decay::MIN_PERIODS;
 use super::release::Onset;
+use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::model::{Excitation, NodeId, Skeleton, Sway, Swaying, Unidentified};
 use points::ThinnedFilm;
@@ -47,7 +48,10 @@ const CARRIER_FREQ_TOLERANCE: f64 = 0.012;
 /// Intervals are so much wider than the curvature says, and no narrower than these standard
 /// deviations. Found on clips of our own (docs/dynamics.md).
 const CI_INFLATION: f64 = 2.0;
-const MIN_LN_SD: [f64; 2] = [0.003, 0.1];
+const MIN_LN_SD: LnDeviations = LnDeviations {
+    frequency: 0.003,
+    damping: 0.1,
+};
 
 /// Answers for branches of `sways` that have none, by all points at once.
 pub(super) fn answer(
@@ -140,11 +144,11 @@ impl ModalSolution {
             return None;
         }
         let below_nyquist_hz = 0.5 * BELOW_NYQUIST * thinned.rate_hz();
-        let frequencies_hz = [
+        let frequencies_hz = Bounds::new(
             MIN_PERIODS / span_s,
-            below_nyquist_hz.min(limits.frequencies_hz[1]),
-        ];
-        if frequencies_hz[0] >= frequencies_hz[1] {
+            below_nyquist_hz.min(limits.frequencies_hz.hi),
+        );
+        if frequencies_hz.lo >= frequencies_hz.hi {
             return None;
         }
         let ThinnedFilm {
@@ -219,19 +223,15 @@ impl ModeEstimate {
     fn is_clear(&self) -> bool {
         self.gain >= MIN_GAIN
             && self.gain_together() >= MIN_GAIN_TOGETHER
-            && self.ln_sd[0] <= MAX_LN_FREQUENCY_SD
+            && self.ln_sd.frequency <= MAX_LN_FREQUENCY_SD
             && self.jackknife_sd <= MAX_JACKKNIFE_SD
             && self.mode.damping <= MAX_DAMPING
     }
 
     fn sway(&self, limits: &SearchLimits) -> Option<Sway> {
-        let mut ln_sd = self.ln_sd;
-        for (sd, least) in ln_sd.iter_mut().zip(MIN_LN_SD) {
-            *sd = (CI_INFLATION * *sd).hypot(least);
-        }
         let mode = BranchMode {
             mode: self.mode,
-            ln_sd,
+            ln_sd: self.ln_sd.inflated(CI_INFLATION, &MIN_LN_SD),
         };
         mode.is_within(limits.max_relative_ci).then(|| Sway {
             frequency_hz: mode.frequency_hz(),
@@ -272,13 +272,14 @@ fn captured<'a>(
 
 #[cfg(test)]
 mod tests {
+    use super::super::film::NOT_SEEN;
     use super::*;
     use crate::config::Dynamics;
     use crate::dynamics::sway::UsableFilm;
     use crate::dynamics::{Depth, FilmTrack, analyse, free_decay};
     use crate::model::{Node, NodeName, Size};
     use crate::random::Generator;
-    use nalgebra::Point3;
+    use nalgebra::{Point2, Point3};
     use rand::RngExt;
     use rand_distr::StandardNormal;
     use std::f64::consts::TAU;
@@ -334,7 +335,7 @@ mod tests {
         for t in times {
             let sway = trunk * decay(0.6, *t) + own.map_or(0.0, |(hz, arm)| arm * decay(hz, *t));
             let u = 100.0 + sway + noise(chance);
-            at_px.push([u, 100.0 + 0.3 * sway + noise(chance)]);
+            at_px.push(Point2::new(u, 100.0 + 0.3 * sway + noise(chance)));
         }
         FilmTrack {
             node: NodeId(node),
@@ -495,11 +496,11 @@ mod tests {
         let (skeleton, mut film) = filmed(&[(1.1, &[4.0; 6]), (1.4, &[4.0; 6])]);
         let short = film.until(20).into_owned();
         assert!(groups(&skeleton, &short).is_empty());
+        film.tracks.iter_mut().for_each(|t| t.at_px.fill(NOT_SEEN));
+        assert!(groups(&skeleton, &film).is_empty());
         film.tracks
             .iter_mut()
-            .for_each(|t| t.at_px.fill([f64::NAN; 2]));
-        assert!(groups(&skeleton, &film).is_empty());
-        film.tracks.iter_mut().for_each(|t| t.at_px.fill([3.0; 2]));
+            .for_each(|t| t.at_px.fill(Point2::new(3.0, 3.0)));
         assert!(groups(&skeleton, &film).is_empty());
     }
 }

@@ -7,6 +7,7 @@ use super::search::{MIN_CLEAR_GAIN, MIN_POINTS, Tried};
 use super::tree::{Branch, COST_PER_MODE, Tree};
 use crate::cancel::CancelToken;
 use crate::signal::vectors::add_scaled;
+use nalgebra::Point2;
 
 /// What a change must be worth.
 const MIN_GAIN: f64 = 10.0;
@@ -209,7 +210,8 @@ impl<'a> Tree<'a> {
         let end_px = if points.is_empty() {
             self.branches[parent].end_px
         } else {
-            let at_px: Vec<[f64; 2]> = points.iter().map(|&p| self.decay.points[p].at_px).collect();
+            let at_px: Vec<Point2<f64>> =
+                points.iter().map(|&p| self.decay.points[p].at_px).collect();
             mean_px(&at_px)
         };
         self.branches.push(Branch {

@@ -1,10 +1,11 @@
 //! The points of a film for the analysis of all branches at once: thinned, and without gaps.
 
-use super::super::film::{Film, FilmTrack};
+use super::super::film::{Film, FilmTrack, NOT_SEEN};
 use super::super::members::{count_seen, is_seen, mean_px};
 use super::super::release::Onset;
 use super::tree::Point;
 use crate::signal::interpolation::linear;
+use nalgebra::Point2;
 
 /// Frames a second that are enough: neighbours are taken together as their mean.
 const ENOUGH_HZ: f64 = 15.0;
@@ -45,7 +46,7 @@ impl ThinnedFilm {
             tracks: Vec::new(),
         };
         for (k, track) in film.tracks.iter().enumerate() {
-            let at_px: Vec<[f64; 2]> = rows.iter().map(|row| mean_of_all(track, row)).collect();
+            let at_px: Vec<Point2<f64>> = rows.iter().map(|row| mean_of_all(track, row)).collect();
             if let Some(values) = bridged(&out.times_s, &at_px) {
                 out.points
                     .push(Point::new(values, mean_px(&at_px), MIN_NOISE_PX));
@@ -66,17 +67,17 @@ impl ThinnedFilm {
 }
 
 /// Mean place in some frames, px; not seen where one of them does not show it.
-fn mean_of_all(track: &FilmTrack, frames: &[usize]) -> [f64; 2] {
-    let at_px: Vec<[f64; 2]> = frames.iter().map(|&k| track.at_px[k]).collect();
+fn mean_of_all(track: &FilmTrack, frames: &[usize]) -> Point2<f64> {
+    let at_px: Vec<Point2<f64>> = frames.iter().map(|&k| track.at_px[k]).collect();
     if at_px.iter().all(is_seen) {
         mean_px(&at_px)
     } else {
-        [f64::NAN; 2]
+        NOT_SEEN
     }
 }
 
 /// Displacement from the mean, px; nothing for a point that was seen too little.
-fn bridged(times_s: &[f64], at_px: &[[f64; 2]]) -> Option<[Vec<f64>; 2]> {
+fn bridged(times_s: &[f64], at_px: &[Point2<f64>]) -> Option<[Vec<f64>; 2]> {
     let seen = count_seen(at_px);
     if seen == 0 || (seen as f64) < MIN_SEEN_SHARE * at_px.len() as f64 {
         return None;
@@ -87,8 +88,8 @@ fn bridged(times_s: &[f64], at_px: &[[f64; 2]]) -> Option<[Vec<f64>; 2]> {
     for (time_s, at) in times_s.iter().zip(at_px) {
         if is_seen(at) {
             seen_s.push(*time_s);
-            displacements[0].push(at[0] - mean[0]);
-            displacements[1].push(at[1] - mean[1]);
+            displacements[0].push(at.x - mean.x);
+            displacements[1].push(at.y - mean.y);
         }
     }
     Some(displacements.map(|values| {

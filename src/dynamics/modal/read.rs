@@ -1,5 +1,6 @@
 //! What a tree of modes says of its branches.
 
+use super::super::branches::LnDeviations;
 use super::super::decay::Mode;
 use super::super::signals::Factor;
 use super::super::swing::Arms;
@@ -8,6 +9,7 @@ use super::tree::{EFFECTIVE_VALUES, Tree};
 use crate::signal::qr::Qr;
 use crate::signal::statistics::nth_smallest;
 use crate::signal::vectors::{add_scaled, dot};
+use nalgebra::Point2;
 use std::ops::Range;
 
 /// What a point must gain by a mode to be taken for one that has it.
@@ -23,8 +25,8 @@ const MAX_STEPS: usize = 8;
 /// A mode and the points that it moves as one swing.
 pub(super) struct ModeEstimate {
     pub mode: Mode,
-    /// Standard deviations of the logarithms of frequency and damping, by the curvature alone.
-    pub ln_sd: [f64; 2],
+    /// By the curvature alone.
+    pub ln_sd: LnDeviations,
     /// Standard deviation of the logarithm of the frequency as the points themselves have it: where
     /// some are left out.
     pub jackknife_sd: f64,
@@ -60,16 +62,16 @@ impl Tree<'_> {
         };
         let mut out = Vec::new();
         for (&branch, ln_sd) in of.iter().zip(deviations.chunks_exact(2)) {
-            out.extend(self.estimate(branch, [ln_sd[0], ln_sd[1]]));
+            out.extend(self.estimate(branch, LnDeviations::of_parameters(ln_sd)));
         }
         out
     }
 
-    fn estimate(&self, branch: usize, ln_sd: [f64; 2]) -> Option<ModeEstimate> {
+    fn estimate(&self, branch: usize, ln_sd: LnDeviations) -> Option<ModeEstimate> {
         let mode = self.branches[branch].mode?;
         let base_px = self.branches[branch]
             .parent
-            .map_or([0.0; 2], |p| self.branches[p].end_px);
+            .map_or(Point2::origin(), |p| self.branches[p].end_px);
         let shares = one_swing(self, self.shares(branch), base_px);
         if shares.len() < MIN_POINTS {
             return None;
@@ -153,7 +155,7 @@ fn factor_of(qr: &Qr, signal: &[f64], own: &Range<usize>) -> Factor {
     Factor::of(&qr.solve(signal).1[own.clone()])
 }
 
-fn swing_of(tree: &Tree, shares: &[&Share], base_px: [f64; 2]) -> (Arms, Vec<Vec<Factor>>) {
+fn swing_of(tree: &Tree, shares: &[&Share], base_px: Point2<f64>) -> (Arms, Vec<Vec<Factor>>) {
     let arms = Arms::at(
         shares.iter().map(|s| tree.decay.points[s.point].at_px),
         base_px,
@@ -168,7 +170,7 @@ fn swing_of(tree: &Tree, shares: &[&Share], base_px: [f64; 2]) -> (Arms, Vec<Vec
 }
 
 /// As many of `shares` as are moved as one swing.
-fn one_swing(tree: &Tree, shares: Vec<Share>, base_px: [f64; 2]) -> Vec<Share> {
+fn one_swing(tree: &Tree, shares: Vec<Share>, base_px: Point2<f64>) -> Vec<Share> {
     let all: Vec<&Share> = shares.iter().collect();
     if is_one_swing(tree, &all, base_px) {
         return shares;
@@ -191,7 +193,7 @@ fn one_swing(tree: &Tree, shares: Vec<Share>, base_px: [f64; 2]) -> Vec<Share> {
         .collect()
 }
 
-fn is_one_swing(tree: &Tree, shares: &[&Share], base_px: [f64; 2]) -> bool {
+fn is_one_swing(tree: &Tree, shares: &[&Share], base_px: Point2<f64>) -> bool {
     let (arms, factors) = swing_of(tree, shares, base_px);
     arms.one_swing(&factors, 0) >= MIN_COLLINEARITY
 }

@@ -3,15 +3,17 @@
 
 use super::super::decay::{LN_DAMPING_WEIGHT, Mode, USUAL_DAMPING, damping_penalty};
 use super::tree::{EFFECTIVE_VALUES, Tree};
+use crate::bounds::Bounds;
 use crate::signal::gram::gram;
 use crate::signal::least_squares::{
     LeastSquares, NormalEquations, ParameterLimits, Stopping, levenberg_marquardt,
 };
 use crate::signal::variable_projection::{Basis, Slope, Weighted};
 
-/// How far a step may go: logarithms of frequency and damping.
-const MAX_STEP: [f64; 2] = [0.05, 0.5];
-const DAMPING: [f64; 2] = [0.003, 0.3];
+/// How far a step may go.
+const MAX_LN_FREQUENCY_STEP: f64 = 0.05;
+const MAX_LN_DAMPING_STEP: f64 = 0.5;
+const DAMPING: Bounds = Bounds::new(0.003, 0.3);
 /// A gain that is worth another step.
 const MIN_GAIN: f64 = 0.5;
 
@@ -70,12 +72,14 @@ impl Tree<'_> {
         }
         let mut limits = Vec::with_capacity(2 * free.len());
         for _ in &free {
-            for (bounds, max_step) in [self.decay.frequencies_hz, DAMPING].iter().zip(MAX_STEP) {
-                limits.push(ParameterLimits {
-                    bounds: bounds.map(f64::ln),
-                    max_step,
-                });
-            }
+            limits.push(ParameterLimits {
+                bounds: self.decay.frequencies_hz.map(f64::ln),
+                max_step: MAX_LN_FREQUENCY_STEP,
+            });
+            limits.push(ParameterLimits {
+                bounds: DAMPING.map(f64::ln),
+                max_step: MAX_LN_DAMPING_STEP,
+            });
         }
         let stopping = Stopping {
             max_steps,
@@ -190,20 +194,21 @@ mod tests {
     use super::super::tree::{Branch, Decay, Point};
     use super::*;
     use crate::dynamics::Start;
+    use nalgebra::Point2;
 
     /// Moved by so much of the trunk's motion and of the branch's.
     fn point((trunk, own): (f64, f64), columns: &[Vec<Vec<f64>>; 2]) -> Point {
         let both = columns[0][0].iter().zip(&columns[1][0]);
         let u: Vec<f64> = both.map(|(a, b)| trunk * a + own * b).collect();
         let v = u.iter().map(|x| 0.2 * x).collect();
-        Point::new([u, v], [trunk, own], 0.03)
+        Point::new([u, v], Point2::new(trunk, own), 0.03)
     }
 
     fn branch(parent: Option<usize>, mode: Option<Mode>) -> Branch {
         Branch {
             parent,
             mode,
-            end_px: [0.0; 2],
+            end_px: Point2::origin(),
         }
     }
 
@@ -234,7 +239,7 @@ mod tests {
                 (7.0, 4.0),
             ];
             let points = arms.map(|arms| point(arms, &columns));
-            let decay = Decay::new(times_s.clone(), from, [0.3, 5.0], points.into());
+            let decay = Decay::new(times_s.clone(), from, Bounds::new(0.3, 5.0), points.into());
             let branches = vec![
                 branch(None, None),
                 branch(Some(0), Some(start(modes[0], 0.97))),

@@ -3,6 +3,7 @@
 use super::super::decay::Mode;
 use super::super::mode_search::mode_grid;
 use super::tree::{COST_PER_POINT, Decay, Design, EFFECTIVE_VALUES, Tree};
+use crate::bounds::Bounds;
 use crate::signal::extension::{Extension, Residual};
 use crate::signal::statistics::quantile;
 
@@ -32,8 +33,8 @@ pub(super) struct Found {
 
 impl Tried {
     pub fn new(decay: &Decay) -> Self {
-        let [lo, hi] = decay.frequencies_hz;
-        let modes = mode_grid([lo, hi.min(HIGHEST_HZ).max(lo)], TRIED_PER_E);
+        let Bounds { lo, hi } = decay.frequencies_hz;
+        let modes = mode_grid(Bounds::new(lo, hi.min(HIGHEST_HZ).max(lo)), TRIED_PER_E);
         Self(modes.into_iter().map(|m| (m, decay.columns(&m))).collect())
     }
 }

@@ -1,10 +1,12 @@
 //! Points, the tree that they are on, and what it costs to say so.
 
 use super::super::decay::{Mode, Start, damping_penalty};
+use crate::bounds::Bounds;
 use crate::signal::median;
 use crate::signal::qr::Qr;
 use crate::signal::statistics::noise_variance;
 use crate::signal::vectors::dot;
+use nalgebra::Point2;
 
 /// Values that count as one, of a point: what is left of it is branches that are not told and what
 /// is not linear, alike from frame to frame.
@@ -30,11 +32,11 @@ pub(super) struct Point {
     squares: f64,
     floor: f64,
     /// Mean place, px.
-    pub at_px: [f64; 2],
+    pub at_px: Point2<f64>,
 }
 
 impl Point {
-    pub fn new(values: [Vec<f64>; 2], at_px: [f64; 2], least_noise_px: f64) -> Self {
+    pub fn new(values: [Vec<f64>; 2], at_px: Point2<f64>, least_noise_px: f64) -> Self {
         let noise = noise_variance(values.iter().map(Vec::as_slice));
         let floor = 2.0 * (2 * values[0].len()) as f64 * noise.max(least_noise_px * least_noise_px);
         let squares = values.iter().map(|v| dot(v, v)).sum();
@@ -52,7 +54,7 @@ pub(super) struct Decay {
     /// From the release, s.
     pub times_s: Vec<f64>,
     pub start: Start,
-    pub frequencies_hz: [f64; 2],
+    pub frequencies_hz: Bounds,
     pub points: Vec<Point>,
     /// Distance at which a point is as far from the others as is usual, px.
     usual_px: f64,
@@ -62,7 +64,7 @@ impl Decay {
     pub fn new(
         times_s: Vec<f64>,
         start: Start,
-        frequencies_hz: [f64; 2],
+        frequencies_hz: Bounds,
         points: Vec<Point>,
     ) -> Self {
         let mut decay = Self {
@@ -85,8 +87,8 @@ impl Decay {
     fn distance_px(&self, p: usize, others: &[usize], k: usize) -> f64 {
         let mut nearest: Vec<f64> = Vec::with_capacity(k + 1);
         for &o in others {
-            let (a, b) = (self.points[p].at_px, self.points[o].at_px);
-            let d = (a[0] - b[0]).hypot(a[1] - b[1]);
+            let way = self.points[p].at_px - self.points[o].at_px;
+            let d = way.x.hypot(way.y);
             nearest.insert(nearest.partition_point(|n| *n <= d), d);
             nearest.truncate(k);
         }
@@ -105,7 +107,7 @@ pub(super) struct Branch {
     pub parent: Option<usize>,
     pub mode: Option<Mode>,
     /// Where it ends, px, and those begin that it carries.
-    pub end_px: [f64; 2],
+    pub end_px: Point2<f64>,
 }
 
 /// Every point on one branch, with the modes of that branch and of all that carry it.

@@ -4,6 +4,7 @@ use super::super::film::Film;
 use super::super::members::count_seen;
 use crate::signal::median;
 use crate::signal::statistics::nth_smallest;
+use nalgebra::Point2;
 
 /// A point counts if it is seen in so much of the film.
 const MIN_SEEN_SHARE: f64 = 0.9;
@@ -26,7 +27,7 @@ pub(super) fn energy(film: &Film, over_s: f64) -> Option<Vec<Energy>> {
     let times = &film.times_s;
     let over = frames_of(film, over_s);
     let least = MIN_SEEN_SHARE * times.len() as f64;
-    let mut tracks: Vec<&[[f64; 2]]> = Vec::new();
+    let mut tracks: Vec<&[Point2<f64>]> = Vec::new();
     for track in &film.tracks {
         if count_seen(&track.at_px) as f64 >= least {
             tracks.push(&track.at_px);
@@ -55,9 +56,9 @@ pub(super) fn energy(film: &Film, over_s: f64) -> Option<Vec<Energy>> {
 }
 
 /// Square of the way between two frames, px².
-fn square(at_px: &[[f64; 2]], from: usize, to: usize) -> Option<f64> {
+fn square(at_px: &[Point2<f64>], from: usize, to: usize) -> Option<f64> {
     let (a, b) = (at_px.get(from)?, at_px.get(to)?);
-    let square = (b[0] - a[0]).powi(2) + (b[1] - a[1]).powi(2);
+    let square = (b - a).norm_squared();
     square.is_finite().then_some(square)
 }
 

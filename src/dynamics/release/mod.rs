@@ -14,6 +14,7 @@ use super::decay::Start;
 use super::film::Film;
 use super::members::{Points, evenly_chosen};
 use super::signals::{Fit, Signals};
+use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::model::Excitation;
 pub use fading::fades_as_a_free_decay;
@@ -78,7 +79,7 @@ pub(super) fn onset(
     film: &Film,
     tracks: &[usize],
     given: Option<Excitation>,
-    frequencies_hz: [f64; 2],
+    frequencies_hz: Bounds,
     cancel: &CancelToken,
 ) -> (Onset, Vec<f64>) {
     if given != Some(Excitation::Wind)
@@ -98,7 +99,7 @@ fn of_parts(
     film: &Film,
     tracks: &[usize],
     given: Option<Excitation>,
-    frequencies_hz: [f64; 2],
+    frequencies_hz: Bounds,
     cancel: &CancelToken,
 ) -> Option<(Onset, Vec<f64>)> {
     let mut greatest: Option<(f64, Onset)> = None;
@@ -106,8 +107,8 @@ fn of_parts(
     for frames in parts(film) {
         let part = film.part(frames.clone());
         // As with the whole film, less than a wave shows no frequency.
-        let lowest_hz = frequencies_hz[0] * film.span_s() / part.span_s();
-        let frequencies_hz = [lowest_hz.min(frequencies_hz[1]), frequencies_hz[1]];
+        let lowest_hz = frequencies_hz.lo * film.span_s() / part.span_s();
+        let frequencies_hz = Bounds::new(lowest_hz.min(frequencies_hz.hi), frequencies_hz.hi);
         let onset = of_one(&part, tracks, None, frequencies_hz, cancel);
         if onset.excitation == Excitation::Wind {
             // Wind, too, may rest and come again. Where the film ends soon after, it does not tell.
@@ -137,7 +138,7 @@ fn of_one(
     film: &Film,
     tracks: &[usize],
     given: Option<Excitation>,
-    frequencies_hz: [f64; 2],
+    frequencies_hz: Bounds,
     cancel: &CancelToken,
 ) -> Onset {
     let wind = Onset {
@@ -206,7 +207,7 @@ struct Decay<'a> {
     /// From its begin on.
     times_s: Vec<f64>,
     release_sd_s: f64,
-    frequencies_hz: [f64; 2],
+    frequencies_hz: Bounds,
     cancel: &'a CancelToken,
 }
 

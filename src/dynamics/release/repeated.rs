@@ -4,6 +4,7 @@ use super::super::film::{Film, FilmTrack};
 use super::super::members::is_seen;
 use super::energy::{Energy, Level, energy};
 use crate::signal::median;
+use nalgebra::{Point2, Vector2};
 use std::ops::Range;
 
 /// Time over which speeds are taken, s: the longer, the less noise is in them.
@@ -113,16 +114,19 @@ pub(super) fn parts(film: &Film) -> Vec<Range<usize>> {
 struct Pull {
     track: usize,
     /// The place about which the point swings, px.
-    rest_px: [f64; 2],
+    rest_px: Point2<f64>,
     /// From there to where it is held.
-    way_px: [f64; 2],
+    way_px: Vector2<f64>,
 }
 
 /// The middle of the places at which a point was seen in some frames, px.
-fn middle_px(at_px: &[[f64; 2]], frames: &[usize]) -> Option<[f64; 2]> {
+fn middle_px(at_px: &[Point2<f64>], frames: &[usize]) -> Option<Point2<f64>> {
     let seen = frames.iter().map(|&k| at_px[k]).filter(is_seen);
-    let (u, v): (Vec<f64>, Vec<f64>) = seen.map(|[u, v]| (u, v)).unzip();
-    Some([median(u, f64::total_cmp)?, median(v, f64::total_cmp)?])
+    let (u, v): (Vec<f64>, Vec<f64>) = seen.map(|p| (p.x, p.y)).unzip();
+    Some(Point2::new(
+        median(u, f64::total_cmp)?,
+        median(v, f64::total_cmp)?,
+    ))
 }
 
 /// How every point is pulled that is seen both `swinging` and held in the frames `holding`.
@@ -134,7 +138,7 @@ fn pulls(film: &Film, swinging: &[usize], holding: &[usize]) -> Vec<Pull> {
             out.push(Pull {
                 track,
                 rest_px,
-                way_px: [held[0] - rest_px[0], held[1] - rest_px[1]],
+                way_px: held - rest_px,
             });
         }
     }
@@ -147,9 +151,8 @@ fn share_of_way(film: &Film, pulls: &[Pull], frame: usize) -> f64 {
     for pull in pulls {
         let at = film.tracks[pull.track].at_px[frame];
         if is_seen(&at) {
-            let [way_u, way_v] = pull.way_px;
-            along += (at[0] - pull.rest_px[0]) * way_u + (at[1] - pull.rest_px[1]) * way_v;
-            all += way_u * way_u + way_v * way_v;
+            along += (at - pull.rest_px).dot(&pull.way_px);
+            all += pull.way_px.norm_squared();
         }
     }
     along / all
@@ -174,7 +177,9 @@ fn pulled_again_s(film: &Film, swinging: &[usize], release_s: f64, next_s: f64) 
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::film::NOT_SEEN;
     use super::*;
+    use crate::bounds::Bounds;
     use crate::model::NodeId;
     use std::f64::consts::TAU;
 
@@ -188,7 +193,7 @@ mod tests {
             let factor = 0.5 + 0.1 * f64::from(i);
             let at = times.iter().map(|&t| {
                 let [u, v] = [t, t + 0.7].map(|t| noise(t, i));
-                [9.0 + factor * sway(t) + u, v]
+                Point2::new(9.0 + factor * sway(t) + u, v)
             });
             tracks.push(FilmTrack {
                 node: NodeId(1),
@@ -202,35 +207,48 @@ mod tests {
         0.2 * (1234.5 * t * f64::from(point + 1)).sin()
     }
 
-    fn decay([at, px]: [f64; 2], t: f64) -> f64 {
-        px * (-0.04 * TAU * 0.6 * (t - at)).exp() * (TAU * 0.6 * (t - at)).cos()
+    /// Pulled aside by `px` and let go at a time.
+    struct Release {
+        at_s: f64,
+        px: f64,
     }
 
-    /// Pulled within a second, held for `holds_s`, and released at each of some times, s, by so many
-    /// px.
-    fn pulled(releases: &[[f64; 2]], holds_s: f64, t: f64) -> f64 {
-        let now = releases.iter().rposition(|r| r[0] <= t);
-        let free = now.map_or(0.0, |k| decay(releases[k], t));
+    impl Release {
+        const fn new(at_s: f64, px: f64) -> Self {
+            Self { at_s, px }
+        }
+
+        fn decay(&self, t: f64) -> f64 {
+            self.px
+                * (-0.04 * TAU * 0.6 * (t - self.at_s)).exp()
+                * (TAU * 0.6 * (t - self.at_s)).cos()
+        }
+    }
+
+    /// Pulled within a second, held for `holds_s`, and released, each time in turn.
+    fn pulled(releases: &[Release], holds_s: f64, t: f64) -> f64 {
+        let now = releases.iter().rposition(|r| r.at_s <= t);
+        let free = now.map_or(0.0, |k| releases[k].decay(t));
         match releases.get(now.map_or(0, |k| k + 1)) {
-            Some([at, px]) if t > at - holds_s => *px,
-            Some([at, px]) if t > at - holds_s - 1.0 => {
-                let share = t - (at - holds_s - 1.0);
-                free * (1.0 - share) + px * share
+            Some(next) if t > next.at_s - holds_s => next.px,
+            Some(next) if t > next.at_s - holds_s - 1.0 => {
+                let share = t - (next.at_s - holds_s - 1.0);
+                free * (1.0 - share) + next.px * share
             }
             _ => free,
         }
     }
 
     /// Of the decay rather too little than any of the pull.
-    fn is_near(is: &[f64; 2], wanted: &[f64; 2]) -> bool {
-        (is[0] - wanted[0]).abs() < 0.3 && (-0.8..0.1).contains(&(is[1] - wanted[1]))
+    fn is_near(is: &Bounds, wanted: &Bounds) -> bool {
+        (is.lo - wanted.lo).abs() < 0.3 && (-0.8..0.1).contains(&(is.hi - wanted.hi))
     }
 
     #[track_caller]
-    fn holds(film: &Film, wanted_s: &[[f64; 2]]) {
-        let parts: Vec<[f64; 2]> = parts(film)
+    fn holds(film: &Film, wanted_s: &[Bounds]) {
+        let parts: Vec<Bounds> = parts(film)
             .iter()
-            .map(|p| [film.times_s[p.start], film.times_s[p.end - 1]])
+            .map(|p| Bounds::new(film.times_s[p.start], film.times_s[p.end - 1]))
             .collect();
         assert!(
             parts.len() == wanted_s.len()
@@ -245,24 +263,32 @@ mod tests {
     /// With the second pull in it, a decay is none.
     #[test]
     fn a_part_begins_with_the_rest_before_a_release_and_ends_with_the_next_pull() {
-        let three = [[1.0, 9.0], [21.0, 8.0], [41.0, 12.0]];
+        let three = [
+            Release::new(1.0, 9.0),
+            Release::new(21.0, 8.0),
+            Release::new(41.0, 12.0),
+        ];
         for rate_hz in [30.0, 12.0] {
             holds(
                 &film(60.0, rate_hz, 0.0..0.0, |t| pulled(&three, 1.0, t)),
-                &[[0.4, 19.0], [20.4, 39.0], [40.4, 60.0]],
+                &[
+                    Bounds::new(0.4, 19.0),
+                    Bounds::new(20.4, 39.0),
+                    Bounds::new(40.4, 60.0),
+                ],
             );
         }
         // Held for longer than it swings.
-        let two = [[1.0, 9.0], [31.0, 9.0]];
+        let two = [Release::new(1.0, 9.0), Release::new(31.0, 9.0)];
         holds(
             &film(40.0, 30.0, 0.0..0.0, |t| pulled(&two, 18.0, t)),
-            &[[0.4, 12.0], [30.4, 40.0]],
+            &[Bounds::new(0.4, 12.0), Bounds::new(30.4, 40.0)],
         );
     }
 
     #[test]
     fn a_film_with_one_release_has_no_parts_nor_one_with_none() {
-        let one = [[1.0, 9.0]];
+        let one = [Release::new(1.0, 9.0)];
         holds(&film(20.0, 30.0, 0.0..0.0, |t| pulled(&one, 1.0, t)), &[]);
         holds(&film(20.0, 30.0, 0.0..0.0, |_| 0.0), &[]);
         holds(&film(1.0, 30.0, 0.0..0.0, |t| pulled(&one, 1.0, t)), &[]);
@@ -271,14 +297,14 @@ mod tests {
         unseen
             .tracks
             .iter_mut()
-            .for_each(|t| t.at_px.fill([f64::NAN; 2]));
+            .for_each(|t| t.at_px.fill(NOT_SEEN));
         holds(&unseen, &[]);
     }
 
     /// A gap shows no rest.
     #[test]
     fn a_gap_in_a_decay_is_no_rest() {
-        let one = [[1.0, 9.0]];
+        let one = [Release::new(1.0, 9.0)];
         for tenths in 5..40 {
             let gap_s = f64::from(tenths) / 10.0;
             holds(

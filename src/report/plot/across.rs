@@ -4,7 +4,9 @@
 use super::HEIGHT;
 use super::axes::{Axes, range};
 use super::svg::{Anchor, Svg};
+use crate::bounds::Bounds;
 use crate::model::Interval;
+use nalgebra::{Point2, Vector2};
 
 /// Room for one value, and between two places.
 const STEP: f64 = 11.0;
@@ -39,10 +41,10 @@ pub fn across(slots: &[Slot], x_label: &str, y_label: &str, label: &str) -> Opti
             .iter()
             .flat_map(|s| s.marks.iter().map(|m| m.of.value)),
     );
-    if !values[0].is_finite() {
+    if !values.lo.is_finite() {
         return None;
     }
-    let top = ends[1].min(1.6 * values[1]);
+    let top = ends.hi.min(1.6 * values.hi);
     let needs: Vec<f64> = slots
         .iter()
         .map(|s| STEP * s.marks.len().max(1) as f64 + BETWEEN)
@@ -51,12 +53,20 @@ pub fn across(slots: &[Slot], x_label: &str, y_label: &str, label: &str) -> Opti
     let width = (sum + BESIDE).max(LEAST_WIDTH);
     let stretch = (width - BESIDE) / sum;
     let mut svg = Svg::new(width, HEIGHT, label);
-    let axes = Axes::new([width, HEIGHT], [0.0, sum], [0.0, 1.1 * top]);
+    let axes = Axes::new(
+        Vector2::new(width, HEIGHT),
+        Bounds::new(0.0, sum),
+        Bounds::new(0.0, 1.1 * top),
+    );
     axes.draw_y(&mut svg, y_label);
-    let [left, right] = axes.sides();
-    svg.line([left, axes.bottom()], [right, axes.bottom()], "axis");
+    let sides = axes.sides();
+    svg.line(
+        Point2::new(sides.lo, axes.bottom()),
+        Point2::new(sides.hi, axes.bottom()),
+        "axis",
+    );
     svg.text(
-        [0.5 * (left + right), axes.bottom() + 27.0],
+        Point2::new(0.5 * (sides.lo + sides.hi), axes.bottom() + 27.0),
         Anchor::Middle,
         "label",
         x_label,
@@ -65,7 +75,7 @@ pub fn across(slots: &[Slot], x_label: &str, y_label: &str, label: &str) -> Opti
     for (slot, need) in slots.iter().zip(&needs) {
         let middle = axes.x(from + 0.5 * need);
         svg.text(
-            [middle, axes.bottom() + 13.0],
+            Point2::new(middle, axes.bottom() + 13.0),
             Anchor::Middle,
             "tick",
             &slot.name,
@@ -76,8 +86,12 @@ pub fn across(slots: &[Slot], x_label: &str, y_label: &str, label: &str) -> Opti
             let class = format!("c{}", mark.kind % 6);
             let [lo, value, hi] =
                 [mark.of.lo, mark.of.value, mark.of.hi].map(|v| axes.y(v.clamp(0.0, 1.1 * top)));
-            svg.line([x, lo], [x, hi], &format!("{class} bar"));
-            svg.dot([x, value], mark.kind, &format!("{class} dot"));
+            svg.line(
+                Point2::new(x, lo),
+                Point2::new(x, hi),
+                &format!("{class} bar"),
+            );
+            svg.dot(Point2::new(x, value), mark.kind, &format!("{class} dot"));
         }
         from += need;
     }

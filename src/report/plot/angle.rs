@@ -3,7 +3,9 @@
 use super::axes::{Axes, range, thinned};
 use super::svg::Svg;
 use super::{HEIGHT, WIDTH};
+use crate::bounds::Bounds;
 use crate::report::study::{Branch, Study};
+use nalgebra::{Point2, Vector2};
 
 /// Points of a curve at most.
 const MOST: usize = 900;
@@ -18,7 +20,7 @@ pub fn angle(study: &Study, branch: &Branch) -> Option<String> {
         .chain(&branch.space_deg)
         .chain(fitted)
         .copied();
-    let [lo, hi] = range(values);
+    let Bounds { lo, hi } = range(values);
     if !(lo.is_finite() && hi.is_finite()) {
         return None;
     }
@@ -28,15 +30,26 @@ pub fn angle(study: &Study, branch: &Branch) -> Option<String> {
         HEIGHT,
         &format!("Angle of branch {} over time", branch.name),
     );
-    let axes = Axes::new([WIDTH, HEIGHT], study.span_s, [lo - room, hi + 2.0 * room]);
+    let axes = Axes::new(
+        Vector2::new(WIDTH, HEIGHT),
+        study.span_s,
+        Bounds::new(lo - room, hi + 2.0 * room),
+    );
     if let Some(onset) = study.onset {
         // What comes before the release, after all has died down, or from the next pull on tells
         // nothing of the sway.
-        let [left, right] = axes.sides();
-        let [from, to] = [onset.at_s, study.used_s[1]]
-            .map(|t| axes.x(t.clamp(study.span_s[0], study.span_s[1])));
-        svg.rect([left, axes.top()], [from, axes.bottom()], "unused");
-        svg.rect([to, axes.top()], [right, axes.bottom()], "unused");
+        let sides = axes.sides();
+        let [from, to] = [onset.at_s, study.used_s.hi].map(|t| axes.x(study.span_s.clamp(t)));
+        svg.rect(
+            Point2::new(sides.lo, axes.top()),
+            Point2::new(from, axes.bottom()),
+            "unused",
+        );
+        svg.rect(
+            Point2::new(to, axes.top()),
+            Point2::new(sides.hi, axes.bottom()),
+            "unused",
+        );
     }
     axes.draw(&mut svg, "time, s", "degrees");
     let curves = [
@@ -45,9 +58,13 @@ pub fn angle(study: &Study, branch: &Branch) -> Option<String> {
         (fitted, "fitted"),
     ];
     for (angles, class) in curves {
-        let points = branch.times_s.iter().zip(angles).map(|(t, a)| [*t, *a]);
+        let points = branch
+            .times_s
+            .iter()
+            .zip(angles)
+            .map(|(t, a)| Point2::new(*t, *a));
         let points = thinned(&points.collect::<Vec<_>>(), MOST);
-        svg.path(points.into_iter().map(|[t, a]| axes.at(t, a)), class);
+        svg.path(points.into_iter().map(|p| axes.at(p.x, p.y)), class);
     }
     Some(svg.finish())
 }

@@ -3,8 +3,10 @@
 use super::axes::{Axes, range, thinned};
 use super::svg::Svg;
 use super::{HEIGHT, WIDTH};
+use crate::bounds::Bounds;
 use crate::dynamics::Spectrum;
 use crate::model::Interval;
+use nalgebra::{Point2, Vector2};
 
 /// Points of a curve at most.
 const MOST: usize = 700;
@@ -30,16 +32,20 @@ pub struct Answer {
 /// Spectra from 0 to `highest_hz`; with one curve, its answer with the interval and the peak's
 /// width at half the power.
 pub fn spectra(curves: &[Curve], highest_hz: f64, label: &str) -> Option<String> {
-    let all: Vec<Vec<[f64; 2]>> = curves
+    let all: Vec<Vec<Point2<f64>>> = curves
         .iter()
         .map(|c| points(c.spectrum, highest_hz))
         .collect();
-    let [_, top] = range(all.iter().flatten().map(|p| p[1]));
+    let top = range(all.iter().flatten().map(|p| p.y)).hi;
     if !top.is_finite() || top <= 0.0 {
         return None;
     }
     let mut svg = Svg::new(WIDTH, HEIGHT, label);
-    let axes = Axes::new([WIDTH, HEIGHT], [0.0, highest_hz], [0.0, 1.15 * top]);
+    let axes = Axes::new(
+        Vector2::new(WIDTH, HEIGHT),
+        Bounds::new(0.0, highest_hz),
+        Bounds::new(0.0, 1.15 * top),
+    );
     let alone = curves.len() == 1;
     for curve in curves {
         let colour = curve.class.split(' ').next().unwrap_or_default();
@@ -52,7 +58,7 @@ pub fn spectra(curves: &[Curve], highest_hz: f64, label: &str) -> Option<String>
     axes.draw(&mut svg, "frequency, Hz", "degrees");
     for (curve, points) in curves.iter().zip(&all) {
         let line = thinned(points, MOST).into_iter();
-        svg.path(line.map(|[f, a]| axes.at(f, a)), &curve.class);
+        svg.path(line.map(|p| axes.at(p.x, p.y)), &curve.class);
         let peak = curve.answer.and_then(|a| a.peak).filter(|_| alone);
         if let Some((peak_hz, damping_ratio)) = peak {
             let spectrum = curve.spectrum;
@@ -70,10 +76,10 @@ pub fn spectra(curves: &[Curve], highest_hz: f64, label: &str) -> Option<String>
 }
 
 /// Frequency and amplitude of every bin up to `highest_hz`.
-fn points(spectrum: &Spectrum, highest_hz: f64) -> Vec<[f64; 2]> {
+fn points(spectrum: &Spectrum, highest_hz: f64) -> Vec<Point2<f64>> {
     let bins = spectrum.amplitude.iter().enumerate();
-    bins.map(|(k, amplitude)| [k as f64 * spectrum.bin_hz, *amplitude])
-        .take_while(|p| p[0] <= highest_hz)
+    bins.map(|(k, amplitude)| Point2::new(k as f64 * spectrum.bin_hz, *amplitude))
+        .take_while(|p| p.x <= highest_hz)
         .collect()
 }
 
@@ -88,8 +94,8 @@ fn mark_frequency(
 ) {
     // An interval may be narrower than a line.
     svg.rect(
-        [axes.x(frequency_hz.lo.max(0.0)), axes.top()],
-        [axes.x(frequency_hz.hi.min(highest_hz)), axes.bottom()],
+        Point2::new(axes.x(frequency_hz.lo.max(0.0)), axes.top()),
+        Point2::new(axes.x(frequency_hz.hi.min(highest_hz)), axes.bottom()),
         &format!("{class} band"),
     );
     svg.path(
@@ -112,9 +118,9 @@ fn mark_peak(
     let y = axes.y(amplitude * std::f64::consts::FRAC_1_SQRT_2);
     let sides = [1.0 - damping_ratio, 1.0 + damping_ratio]
         .map(|side| axes.x((side * peak_hz).clamp(0.0, highest_hz)));
-    svg.line([sides[0], y], [sides[1], y], "width");
+    svg.line(Point2::new(sides[0], y), Point2::new(sides[1], y), "width");
     // Ends, so that its shape tells it from the answer where colours do not.
     for x in sides {
-        svg.line([x, y - END], [x, y + END], "width");
+        svg.line(Point2::new(x, y - END), Point2::new(x, y + END), "width");
     }
 }

@@ -1,6 +1,9 @@
 //! Where the names of crowded places are written: none over another, those that come first nearest
 //! to their place.
 
+use crate::bounds::Bounds;
+use nalgebra::{Point2, Vector2};
+
 /// Widest digit, from the top of a digit to the line that it stands on, and what hangs below, as
 /// shares of the letters' size.
 const DIGIT: f64 = 0.7;
@@ -22,14 +25,13 @@ const ASIDE: f64 = 4.0;
 /// Half the size of the dot that marks a place.
 const DOT: f64 = 4.0;
 
-pub type Point = [f64; 2];
-pub type Segment = [Point; 2];
+pub type Segment = [Point2<f64>; 2];
 
 /// A name that is to be written.
 pub struct Wanted {
     /// Its place, and where the branch that ends there comes from.
-    pub at: Point,
-    pub from: Point,
+    pub at: Point2<f64>,
+    pub from: Point2<f64>,
     pub letters: usize,
     /// Sizes of the letters: on a large screen, and on a small one if it is shown there.
     pub size: f64,
@@ -42,7 +44,7 @@ pub struct Wanted {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placed {
     /// The middle of the line that its letters stand on.
-    pub at: Point,
+    pub at: Point2<f64>,
     /// From its place to the name, if that is not near.
     pub leader: Option<Segment>,
 }
@@ -52,7 +54,7 @@ type Frame = [f64; 4];
 
 /// Finds a place for every name in turn; `None` where there is no room. `lines` are drawn as well,
 /// in a drawing of a `size`.
-pub fn placed(wanted: &[Wanted], lines: &[Segment], size: Point) -> Vec<Option<Placed>> {
+pub fn placed(wanted: &[Wanted], lines: &[Segment], size: Vector2<f64>) -> Vec<Option<Placed>> {
     let mut drawing = Drawing {
         wanted,
         lines,
@@ -70,14 +72,15 @@ pub fn placed(wanted: &[Wanted], lines: &[Segment], size: Point) -> Vec<Option<P
 struct Drawing<'a> {
     wanted: &'a [Wanted],
     lines: &'a [Segment],
-    size: Point,
+    size: Vector2<f64>,
     placed: Vec<Option<Placed>>,
 }
 
 impl Drawing<'_> {
     /// The cheapest free place round its own; the first of equally cheap ones.
     fn best(&self, want: &Wanted) -> Option<Placed> {
-        let own = (want.at[1] - want.from[1]).atan2(want.at[0] - want.from[0]);
+        let way = want.at - want.from;
+        let own = way.y.atan2(way.x);
         let mut best: Option<(f64, Placed)> = None;
         for ring in RINGS.into_iter().filter(|r| *r <= want.farthest) {
             for k in 0..DIRECTIONS {
@@ -97,10 +100,9 @@ impl Drawing<'_> {
 
     /// Whether a name would lie inside the drawing and on no other name.
     fn is_free(&self, want: &Wanted, p: &Placed) -> bool {
-        let [width, height] = self.size;
         let inside = frames(want, p)
             .flatten()
-            .all(|[l, t, r, b]| l >= 0.0 && t >= 0.0 && r <= width && b <= height);
+            .all(|[l, t, r, b]| l >= 0.0 && t >= 0.0 && r <= self.size.x && b <= self.size.y);
         let mut others = self.wanted.iter().zip(&self.placed);
         inside && others.all(|(w, q)| q.is_none_or(|q| apart(want, p, w, &q)))
     }
@@ -129,22 +131,16 @@ impl Drawing<'_> {
 /// A name whose frame is `ring` away from its place.
 fn candidate(want: &Wanted, ring: f64, direction: f64) -> Placed {
     let (sin, cos) = direction.sin_cos();
-    let half = [
+    let towards = Vector2::new(cos, sin);
+    let half = Vector2::new(
         0.5 * width(want, want.size),
         0.5 * (RISE + DROP) * want.size,
-    ];
+    );
     // From the middle of a frame to its rim, that way.
-    let rim = (half[0] / cos.abs().max(1e-9)).min(half[1] / sin.abs().max(1e-9));
-    let far = ring + rim;
-    let middle = [want.at[0] + far * cos, want.at[1] + far * sin];
-    let at = [middle[0], middle[1] + 0.5 * (RISE - DROP) * want.size];
-    let leader = (ring > NEAR).then_some([
-        want.at,
-        [
-            want.at[0] + (ring - ROOM) * cos,
-            want.at[1] + (ring - ROOM) * sin,
-        ],
-    ]);
+    let rim = (half.x / cos.abs().max(1e-9)).min(half.y / sin.abs().max(1e-9));
+    let middle = want.at + (ring + rim) * towards;
+    let at = Point2::new(middle.x, middle.y + 0.5 * (RISE - DROP) * want.size);
+    let leader = (ring > NEAR).then_some([want.at, want.at + (ring - ROOM) * towards]);
     Placed { at, leader }
 }
 
@@ -155,10 +151,10 @@ fn width(want: &Wanted, size: f64) -> f64 {
 fn frame(want: &Wanted, p: &Placed, size: f64) -> Frame {
     let half = 0.5 * width(want, size) + ROOM;
     [
-        p.at[0] - half,
-        p.at[1] - RISE * size - ROOM,
-        p.at[0] + half,
-        p.at[1] + DROP * size + ROOM,
+        p.at.x - half,
+        p.at.y - RISE * size - ROOM,
+        p.at.x + half,
+        p.at.y + DROP * size + ROOM,
     ]
 }
 
@@ -181,8 +177,8 @@ fn apart(a: &Wanted, p: &Placed, b: &Wanted, q: &Placed) -> bool {
     })
 }
 
-fn around([x, y]: Point) -> Frame {
-    [x - DOT, y - DOT, x + DOT, y + DOT]
+fn around(at: Point2<f64>) -> Frame {
+    [at.x - DOT, at.y - DOT, at.x + DOT, at.y + DOT]
 }
 
 fn touches(a: &Frame, b: &Frame) -> bool {
@@ -191,7 +187,7 @@ fn touches(a: &Frame, b: &Frame) -> bool {
 
 /// Whether a line passes through a frame (Liang and Barsky 1984).
 fn cuts(frame: &Frame, [a, b]: &Segment) -> bool {
-    let mut within = [0.0_f64, 1.0_f64];
+    let mut within = Bounds::new(0.0, 1.0);
     for c in 0..2 {
         let (lo, hi, d) = (frame[c] - a[c], frame[c + 2] - a[c], b[c] - a[c]);
         if d == 0.0 {
@@ -200,33 +196,28 @@ fn cuts(frame: &Frame, [a, b]: &Segment) -> bool {
             }
             continue;
         }
-        let ends = [lo / d, hi / d];
-        within = [
-            within[0].max(ends[0].min(ends[1])),
-            within[1].min(ends[0].max(ends[1])),
-        ];
+        let (at_lo, at_hi) = (lo / d, hi / d);
+        within = Bounds::new(
+            within.lo.max(at_lo.min(at_hi)),
+            within.hi.min(at_lo.max(at_hi)),
+        );
     }
-    within[0] < within[1]
+    within.lo < within.hi
 }
 
 fn crosses([a, b]: &Segment, [c, d]: &Segment) -> bool {
-    side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0
-}
-
-/// On which side of the line from `p` to `q` a place `r` lies, by its sign.
-fn side(p: &Point, q: &Point, r: &Point) -> f64 {
-    (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+    let (ab, cd) = (b - a, d - c);
+    ab.perp(&(c - a)) * ab.perp(&(d - a)) < 0.0 && cd.perp(&(a - c)) * cd.perp(&(b - c)) < 0.0
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn wanted(at: Point, farthest: f64) -> Wanted {
-        let from = [at[0], at[1] + 40.0];
+    fn wanted(at: Point2<f64>, farthest: f64) -> Wanted {
         Wanted {
             at,
-            from,
+            from: Point2::new(at.x, at.y + 40.0),
             letters: 2,
             size: 15.0,
             size_on_small: Some(22.0),
@@ -240,11 +231,11 @@ mod tests {
         let all: Vec<Wanted> = (0..30)
             .map(|k| {
                 let (x, y) = (f64::from(k * 37 % 50), f64::from(k * 23 % 50));
-                wanted([300.0 + x, 150.0 + y], 110.0)
+                wanted(Point2::new(300.0 + x, 150.0 + y), 110.0)
             })
             .collect();
         let lines: Vec<Segment> = all.iter().map(|w| [w.from, w.at]).collect();
-        let found = placed(&all, &lines, [720.0, 405.0]);
+        let found = placed(&all, &lines, Vector2::new(720.0, 405.0));
         assert!(found.iter().take(10).all(Option::is_some), "{found:?}");
         for (i, p) in found.iter().enumerate() {
             let Some(p) = p else { continue };
@@ -271,17 +262,19 @@ mod tests {
 
     #[test]
     fn a_name_that_has_room_stands_at_its_place_and_one_that_has_none_is_left_out() {
-        let found = placed(&[wanted([100.0, 100.0], 30.0)], &[], [200.0, 200.0]);
+        let large = Vector2::new(200.0, 200.0);
+        let found = placed(&[wanted(Point2::new(100.0, 100.0), 30.0)], &[], large);
         assert!(
-            found[0].is_some_and(|p| p.leader.is_none() && p.at[1] < 100.0),
+            found[0].is_some_and(|p| p.leader.is_none() && p.at.y < 100.0),
             "{found:?}"
         );
+        let small = Vector2::new(12.0, 12.0);
         assert_eq!(
-            placed(&[wanted([5.0, 5.0], 30.0)], &[], [12.0, 12.0]),
+            placed(&[wanted(Point2::new(5.0, 5.0), 30.0)], &[], small),
             [None]
         );
         assert_eq!(
-            placed(&[wanted([f64::NAN, 5.0], 30.0)], &[], [200.0, 200.0]),
+            placed(&[wanted(Point2::new(f64::NAN, 5.0), 30.0)], &[], large),
             [None]
         );
     }

@@ -3,6 +3,7 @@
 use super::labels::{Wanted, placed};
 use super::svg::{Anchor, Svg};
 use crate::report::study::{Branch, Study};
+use nalgebra::{Point2, Vector2};
 
 /// The picture's longer side in the drawing: letters of the page's size can then be read on it.
 const SIDE: f64 = 720.0;
@@ -25,14 +26,14 @@ pub struct Map {
 pub fn map(study: &Study) -> Map {
     let [w, h] = study.size.map(|s| f64::from(s.max(1)));
     let scale = SIDE / w.max(h);
-    let size = [w * scale, h * scale];
+    let size = Vector2::new(w * scale, h * scale);
     let label = format!(
         "The tree of {} with the numbers of its branches",
         study.name
     );
-    let mut svg = Svg::new(size[0], size[1], &label);
+    let mut svg = Svg::new(size.x, size.y, &label);
     background(&mut svg, study, scale, size);
-    let lines: Vec<[[f64; 2]; 2]> = study
+    let lines: Vec<[Point2<f64>; 2]> = study
         .branches
         .iter()
         .map(|b| [b.base, b.tip].map(|p| in_drawing(study, scale, p)))
@@ -80,23 +81,25 @@ pub fn map(study: &Study) -> Map {
 }
 
 /// The picture, if there is one, and the outline.
-fn background(svg: &mut Svg, study: &Study, scale: f64, size: [f64; 2]) {
+fn background(svg: &mut Svg, study: &Study, scale: f64, size: Vector2<f64>) {
     if let Some(picture) = &study.picture {
         svg.image(size, picture);
-        svg.rect([0.0, 0.0], size, "veil");
+        svg.rect(Point2::origin(), size.into(), "veil");
     }
     let corners = study.outline_px.iter();
-    let mut outline: Vec<[f64; 2]> = corners.map(|p| p.map(|x| f64::from(x) * scale)).collect();
+    let mut outline: Vec<Point2<f64>> = corners
+        .map(|p| p.map(|x| f64::from(x) * scale).into())
+        .collect();
     outline.extend(outline.first().copied());
     svg.path(outline, "outline");
 }
 
 /// A place from the foot, px to the right and up, in a drawing of this scale.
-fn in_drawing(study: &Study, scale: f64, p: [f64; 2]) -> [f64; 2] {
-    [
-        (study.foot_px[0] + p[0]) * scale,
-        (study.foot_px[1] - p[1]) * scale,
-    ]
+fn in_drawing(study: &Study, scale: f64, p: Point2<f64>) -> Point2<f64> {
+    Point2::new(
+        (study.foot_px.x + p.x) * scale,
+        (study.foot_px.y - p.y) * scale,
+    )
 }
 
 fn class(branch: &Branch) -> &'static str {
@@ -107,7 +110,7 @@ fn class(branch: &Branch) -> &'static str {
     }
 }
 
-fn wanted(branch: &Branch, [from, at]: [[f64; 2]; 2]) -> Wanted {
+fn wanted(branch: &Branch, [from, at]: [Point2<f64>; 2]) -> Wanted {
     let letters = branch.name.to_string().len();
     match branch.sway {
         Ok(_) => Wanted {

@@ -1,5 +1,6 @@
 //! SVG, element by element.
 
+use nalgebra::{Point2, Vector2};
 use std::fmt::Write;
 
 /// Wider than this is too wide for half a row.
@@ -41,9 +42,10 @@ impl Svg {
 
     /// A line through points, broken where there is no number; nothing of a point that stands
     /// alone.
-    pub fn path(&mut self, points: impl IntoIterator<Item = [f64; 2]>, class: &str) {
+    pub fn path(&mut self, points: impl IntoIterator<Item = Point2<f64>>, class: &str) {
         let (mut way, mut pen) = (String::new(), false);
-        for [x, y] in points {
+        for p in points {
+            let (x, y) = (p.x, p.y);
             if x.is_finite() && y.is_finite() {
                 // Writing to a string cannot fail.
                 let _ = write!(way, "{}{x:.1} {y:.1}", if pen { "L" } else { "M" });
@@ -57,14 +59,14 @@ impl Svg {
         }
     }
 
-    pub fn line(&mut self, a: [f64; 2], b: [f64; 2], class: &str) {
+    pub fn line(&mut self, a: Point2<f64>, b: Point2<f64>, class: &str) {
         self.path([a, b], class);
     }
 
     /// A rectangle between two corners.
-    pub fn rect(&mut self, a: [f64; 2], b: [f64; 2], class: &str) {
-        let (x, y) = (a[0].min(b[0]), a[1].min(b[1]));
-        let (w, h) = ((b[0] - a[0]).abs(), (b[1] - a[1]).abs());
+    pub fn rect(&mut self, a: Point2<f64>, b: Point2<f64>, class: &str) {
+        let (x, y) = (a.x.min(b.x), a.y.min(b.y));
+        let (w, h) = ((b.x - a.x).abs(), (b.y - a.y).abs());
         if [x, y, w, h].iter().all(|v| v.is_finite()) {
             let _ = write!(
                 self.body,
@@ -74,7 +76,8 @@ impl Svg {
     }
 
     /// A dot; of another shape for every `kind`, so that colours alone need not tell.
-    pub fn dot(&mut self, [x, y]: [f64; 2], kind: usize, class: &str) {
+    pub fn dot(&mut self, at: Point2<f64>, kind: usize, class: &str) {
+        let (x, y) = (at.x, at.y);
         if !(x.is_finite() && y.is_finite()) {
             return;
         }
@@ -110,7 +113,8 @@ impl Svg {
         };
     }
 
-    pub fn text(&mut self, [x, y]: [f64; 2], anchor: Anchor, class: &str, text: &str) {
+    pub fn text(&mut self, at: Point2<f64>, anchor: Anchor, class: &str, text: &str) {
+        let (x, y) = (at.x, at.y);
         let anchor = match anchor {
             Anchor::Start => "start",
             Anchor::Middle => "middle",
@@ -126,8 +130,8 @@ impl Svg {
     }
 
     /// A picture that lies in the page.
-    pub fn image(&mut self, size: [f64; 2], address: &str) {
-        let [w, h] = size;
+    pub fn image(&mut self, size: Vector2<f64>, address: &str) {
+        let (w, h) = (size.x, size.y);
         let _ = write!(
             self.body,
             "<image width=\"{w:.0}\" height=\"{h:.0}\" href=\"{}\"/>",

@@ -3,7 +3,9 @@
 use super::HEIGHT;
 use super::axes::{Axes, range};
 use super::svg::Svg;
+use crate::bounds::Bounds;
 use crate::report::study::{Branch, Study};
+use nalgebra::{Point2, Vector2};
 
 /// Frames that stand out: as many as in the paper's figure.
 const FIRST: usize = 80;
@@ -16,7 +18,7 @@ const WIDTH: f64 = 300.0;
 /// `None` without poses.
 pub fn way(study: &Study, branch: &Branch) -> Option<String> {
     let [x, y] = [0, 1].map(|c| range(branch.way_px.iter().map(|p| p[c])));
-    if !(x[0].is_finite() && y[0].is_finite()) {
+    if !(x.lo.is_finite() && y.lo.is_finite()) {
         return None;
     }
     let mut svg = Svg::new(
@@ -24,16 +26,16 @@ pub fn way(study: &Study, branch: &Branch) -> Option<String> {
         HEIGHT,
         &format!("Way of the end of branch {}", branch.name),
     );
-    let axes = Axes::even([WIDTH, HEIGHT], widened(x), widened(y));
+    let axes = Axes::even(Vector2::new(WIDTH, HEIGHT), widened(x), widened(y));
     axes.draw(&mut svg, "to the right, px", "up, px");
     let every = branch.way_px.len().div_ceil(MOST).max(1);
-    let way: Vec<[f64; 2]> = branch
+    let way: Vec<Point2<f64>> = branch
         .way_px
         .iter()
-        .map(|p| [axes.x(p[0]), axes.y(p[1])])
+        .map(|p| Point2::new(axes.x(p.x), axes.y(p.y)))
         .collect();
     svg.path(way.iter().copied().step_by(every), "way");
-    let begin_s = study.onset.map_or(study.span_s[0], |o| o.at_s);
+    let begin_s = study.onset.map_or(study.span_s.lo, |o| o.at_s);
     let first = branch
         .times_s
         .iter()
@@ -44,7 +46,7 @@ pub fn way(study: &Study, branch: &Branch) -> Option<String> {
 }
 
 /// A range with some room on either side.
-fn widened([lo, hi]: [f64; 2]) -> [f64; 2] {
-    let room = 0.06 * (hi - lo);
-    [lo - room, hi + room]
+fn widened(range: Bounds) -> Bounds {
+    let room = 0.06 * range.length();
+    Bounds::new(range.lo - room, range.hi + room)
 }
