@@ -149,9 +149,7 @@ pub(super) fn from_the_trunk_up(
             node,
             parent,
             tracks,
-            base_px: skeleton
-                .image_from_model(&skeleton.nodes[parent.index()].position)
-                .into(),
+            base_px: skeleton.image_from_model(&skeleton.nodes[parent.index()].position),
         });
     }
     out

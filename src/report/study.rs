@@ -173,7 +173,7 @@ impl Study {
             given: given.excitation,
             metres_per_px: given.metres_per_px,
             highest_hz: given.highest_hz,
-            foot_px: skeleton.foot_px.into(),
+            foot_px: skeleton.foot_px,
             outline_px: given.outline_px.to_vec(),
             picture: given.picture.map(str::to_owned),
             branches: Vec::new(),

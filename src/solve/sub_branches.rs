@@ -57,10 +57,7 @@ pub(super) fn identify(
         points.push(Point { id, node, rest_px });
         tracks.push(FilmTrack {
             node,
-            at_px: table.positions[row]
-                .iter()
-                .map(|place| place_px(place).into())
-                .collect(),
+            at_px: table.positions[row].iter().map(place_px).collect(),
         });
     }
     let film = Film::new(&table.times_s, tracks);

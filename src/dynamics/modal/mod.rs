@@ -254,7 +254,7 @@ fn captured<'a>(
         branches.push(Branch {
             parent: node.parent.map(NodeId::index),
             mode: sway.as_ref().ok().map(mode_of),
-            end_px: skeleton.image_from_model(&node.position).into(),
+            end_px: skeleton.image_from_model(&node.position),
         });
     }
     let mut tree = Tree {
