@@ -9,7 +9,7 @@ use arborcam::draw::{Camera, Look, Model, View, picture};
 use arborcam::geometry::{
     Foliage, LeafView, Sampling, Template, density_match, foliage, foliage_by, leaf_cover, season,
 };
-use arborcam::model::{JointPose, Luma, NodeId, Outline, Pose, Rgb, Size, Skeleton};
+use arborcam::model::{JointPose, LeafSwing, Luma, NodeId, Outline, Pose, Rgb, Size, Skeleton};
 use arborcam::motion::flutter;
 use arborcam::pipeline::{Pipeline, PoseTracker, Seen, dress, leaf_seeds};
 use nalgebra::{Point2, Point3, UnitQuaternion, Vector2, Vector3};
@@ -596,7 +596,7 @@ fn leaves_swing_as_their_branch_moves() {
     let groups = [NodeId(2), NodeId(3)];
     let swung = flutter(&poses, &still.skeleton, &groups, &settings);
     assert_eq!((swung.len(), swung[0].len()), (2, 90));
-    let amplitude = |k: usize| f64::from(swung[0][k][0].hypot(swung[0][k][1])).to_degrees();
+    let amplitude = |k: usize| f64::from(swung[0][k].sine.hypot(swung[0][k].cosine)).to_degrees();
     assert!((0..26).all(|k| amplitude(k) == 0.0));
     let most = (0..90).map(amplitude).fold(0.0, f64::max);
     assert!(most > 2.0 && most <= settings.swing_deg, "{most}");
@@ -604,7 +604,7 @@ fn leaves_swing_as_their_branch_moves() {
         (1..90).all(|k| (amplitude(k) - amplitude(k - 1)).abs() < 0.25 * settings.swing_deg),
         "jerks"
     );
-    let angle = |k: usize| f64::from(swung[0][k][0]).atan2(f64::from(swung[0][k][1]));
+    let angle = |k: usize| f64::from(swung[0][k].sine).atan2(f64::from(swung[0][k].cosine));
     let step = (angle(61) - angle(60)).rem_euclid(std::f64::consts::TAU);
     assert!(
         (step - std::f64::consts::TAU * settings.frequency_hz / 30.0).abs() < 1e-3,
@@ -618,7 +618,7 @@ fn leaves_swing_as_their_branch_moves() {
         flutter(&poses, &still.skeleton, &groups, &off)
             .iter()
             .flatten()
-            .all(|w| *w == [0.0; 2])
+            .all(|swing| *swing == LeafSwing::default())
     );
     assert!(
         flutter(&[], &still.skeleton, &groups, &settings)

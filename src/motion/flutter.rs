@@ -1,14 +1,13 @@
 //! How far leaves swing in every frame (Li 2011 app. B.2).
 
 use crate::config::Leaves;
-use crate::model::{NodeId, Pose, Skeleton};
+use crate::model::{LeafSwing, NodeId, Pose, Skeleton};
 use std::f64::consts::TAU;
 
 /// Speeds are means over so long: leaves do not jerk with the noise of single frames.
 const SMOOTHED_S: f64 = 0.2;
 
-/// For each group of leaves and every pose `A(t) sin(omega t)` and `A(t) cos(omega t)`: the weights
-/// of the two displacements of its vertices, radians.
+/// For each group of leaves, in every pose.
 ///
 /// A grows with the speed of the group's branches, those above `groups[k]`, and stays below
 /// `settings.swing_deg`. A pose of another tree or with a place or a time that is no number counts
@@ -18,7 +17,7 @@ pub fn flutter(
     skeleton: &Skeleton,
     groups: &[NodeId],
     settings: &Leaves,
-) -> Vec<Vec<[f32; 2]>> {
+) -> Vec<Vec<LeafSwing>> {
     let height = height(skeleton);
     let mut of_groups = Vec::with_capacity(groups.len());
     for group in groups {
@@ -31,12 +30,12 @@ pub fn flutter(
             let amplitude = amplitude(smoothed(poses, &speeds, k), settings);
             let phase = TAU * settings.frequency_hz * (pose.time_s - poses[0].time_s);
             weights.push(if phase.is_finite() && amplitude.is_finite() {
-                [
-                    (amplitude * phase.sin()) as f32,
-                    (amplitude * phase.cos()) as f32,
-                ]
+                LeafSwing {
+                    sine: (amplitude * phase.sin()) as f32,
+                    cosine: (amplitude * phase.cos()) as f32,
+                }
             } else {
-                [0.0; 2]
+                LeafSwing::default()
             });
         }
         of_groups.push(weights);

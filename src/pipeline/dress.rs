@@ -17,16 +17,7 @@ pub fn flutter(
     config: &Config,
 ) -> Vec<Vec<LeafSwing>> {
     let groups: Vec<NodeId> = dressed.foliage.groups.iter().map(|g| g.node).collect();
-    let mut of_groups = Vec::with_capacity(groups.len());
-    for weights in motion::flutter(poses, skeleton, &groups, &config.leaves) {
-        let swings = weights.into_iter();
-        of_groups.push(
-            swings
-                .map(|[sine, cosine]| LeafSwing { sine, cosine })
-                .collect(),
-        );
-    }
-    of_groups
+    motion::flutter(poses, skeleton, &groups, &config.leaves)
 }
 
 /// Dresses a skeleton.
