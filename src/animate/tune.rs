@@ -2,12 +2,13 @@
 //! likely to have.
 
 use super::known::Known;
+use crate::bounds::Bounds;
 use crate::config;
 use crate::model::Skeleton;
 
 /// What can be a frequency of a branch, Hz, and a damping ratio.
-const FREQUENCIES_HZ: (f64, f64) = (0.01, 50.0);
-const DAMPING: (f64, f64) = (0.001, 1.0);
+const FREQUENCIES_HZ: Bounds = Bounds::new(0.01, 50.0);
+const DAMPING: Bounds = Bounds::new(0.001, 1.0);
 /// One that was not measured is not higher than this, Hz, nor than so many times the trunk's.
 const HIGHEST_HZ: f64 = 8.0;
 const HIGHEST_BY_TRUNK: f64 = 12.0;
@@ -45,7 +46,7 @@ pub fn tune(skeleton: &Skeleton, known: &[Known], settings: &config::Wind) -> Ve
     let trunk_hz = tuner
         .measured_hz(tuner.trunk)
         .unwrap_or_else(|| tuner.likely_hz(tuner.trunk))
-        .clamp(FREQUENCIES_HZ.0, HIGHEST_HZ);
+        .clamp(FREQUENCIES_HZ.lo, HIGHEST_HZ);
     let mut out: Vec<Tuning> = Vec::with_capacity(nodes.len());
     for (i, node) in nodes.iter().enumerate() {
         let original = node.copy_of.and_then(|o| out.get(o.index()).copied());
@@ -103,10 +104,9 @@ impl<'a> Tuner<'a> {
     }
 
     fn measured_hz(&self, i: usize) -> Option<f64> {
-        let (low, high) = FREQUENCIES_HZ;
         self.measured(i)
             .frequency_hz
-            .filter(|f| (low..=high).contains(f))
+            .filter(|f| FREQUENCIES_HZ.contains(*f))
     }
 
     fn measured_damping(&self, i: usize) -> Option<f64> {
@@ -163,7 +163,7 @@ impl<'a> Tuner<'a> {
         });
         Tuning {
             frequency_hz,
-            damping_ratio: damping_ratio.clamp(DAMPING.0, DAMPING.1),
+            damping_ratio: DAMPING.clamp(damping_ratio),
             measured: measured_hz.is_some(),
         }
     }

@@ -27,5 +27,5 @@ pub use decay::{Mode, Start};
 pub use film::{Film, FilmTrack};
 pub use modal::{Shoot, shoots};
 pub use release::{Onset, fades_as_a_free_decay};
-pub use spectrum::{Spectrum, spectrum};
+pub use spectrum::{HalfPower, Spectrum, spectrum};
 pub use sway::{Analysis, Depth, LEAST_PERIODS, analyse};

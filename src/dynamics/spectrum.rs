@@ -50,12 +50,18 @@ pub fn spectrum(times_s: &[f64], values: &[f64]) -> Option<Spectrum> {
     })
 }
 
+/// What the largest peak of a spectrum says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HalfPower {
+    pub peak_hz: f64,
+    /// Width of the peak at 1/√2 of its amplitude over twice its frequency (Hu et al. eq. 6).
+    pub damping_ratio: f64,
+}
+
 impl Spectrum {
-    /// Frequency (Hz) of the largest peak within `frequencies_hz` and its half-power damping
-    /// ratio: width of the peak at 1/√2 of its amplitude over twice its frequency
-    /// (Hu et al. eq. 6). The width of a short film's bin comes on top of the tree's, so that it
+    /// Of the largest peak within `frequencies_hz`. The width of a short film's bin comes on top of the tree's, so that it
     /// errs to the high side. `None` where there is no peak, or one that does not come down.
-    pub fn half_power(&self, frequencies_hz: Bounds) -> Option<(f64, f64)> {
+    pub fn half_power(&self, frequencies_hz: Bounds) -> Option<HalfPower> {
         let a = &self.amplitude;
         let last = ((frequencies_hz.hi / self.bin_hz) as usize).min(a.len().saturating_sub(2));
         let first = ((frequencies_hz.lo / self.bin_hz).ceil() as usize).max(1);
@@ -68,10 +74,10 @@ impl Spectrum {
         let left = (0..peak).rev().find(|&k| a[k] < level)?;
         let right = (right - 1) as f64 + share_to(level, a[right - 1], a[right]);
         let left = (left + 1) as f64 - share_to(level, a[left + 1], a[left]);
-        Some((
-            peak as f64 * self.bin_hz,
-            (right - left) / (2.0 * peak as f64),
-        ))
+        Some(HalfPower {
+            peak_hz: peak as f64 * self.bin_hz,
+            damping_ratio: (right - left) / (2.0 * peak as f64),
+        })
     }
 }
 
@@ -101,17 +107,17 @@ mod tests {
                 .iter()
                 .map(|t| 3.0 + (-damping * w * t).exp() * (w * t).cos())
                 .collect();
-            let (found_hz, found) = spectrum(&times, &values)
+            let found = spectrum(&times, &values)
                 .unwrap()
                 .half_power(Bounds::new(0.2, 5.0))
                 .unwrap();
             assert!(
-                (found_hz / hz - 1.0).abs() < 0.01,
-                "{found_hz} Hz, not {hz}"
+                (found.peak_hz / hz - 1.0).abs() < 0.01,
+                "{found:?}, not {hz} Hz"
             );
             assert!(
-                (found / damping - 1.0).abs() < 0.15,
-                "{found}, not {damping}"
+                (found.damping_ratio / damping - 1.0).abs() < 0.15,
+                "{found:?}, not {damping}"
             );
         }
         let flat = spectrum(&[0.0; 64], &[1.0; 64]);

@@ -24,5 +24,5 @@ pub use json::json;
 pub use levels::{Growth, Level, Spread, growth, levels};
 pub use matching::{Match, matched};
 pub use released::hints;
-pub use study::{Branch, Gap, Given, Reference, Study};
+pub use study::{Branch, Gap, Given, Study};
 pub use text::text;

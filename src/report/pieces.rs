@@ -86,18 +86,19 @@ mod tests {
             times.push(f64::from(k) * step);
             values.push(x);
         }
-        let (found_hz, found) = averaged(&times, &values)
+        let found = averaged(&times, &values)
             .unwrap()
             .half_power(Bounds::new(0.2, 5.0))
             .unwrap();
         assert!(
-            (found_hz / hz - 1.0).abs() < 0.05 && (0.5..2.0).contains(&(found / damping)),
-            "{found_hz} Hz, {found}"
+            (found.peak_hz / hz - 1.0).abs() < 0.05
+                && (0.5..2.0).contains(&(found.damping_ratio / damping)),
+            "{found:?}"
         );
-        let (_, whole) = spectrum(&times, &values)
+        let whole = spectrum(&times, &values)
             .unwrap()
             .half_power(Bounds::new(0.2, 5.0))
             .unwrap();
-        assert!(whole < 0.2 * damping, "{whole}");
+        assert!(whole.damping_ratio < 0.2 * damping, "{whole:?}");
     }
 }

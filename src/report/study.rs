@@ -4,8 +4,8 @@ use super::decaying::decaying;
 use super::pieces::{averaged, looked_at_s};
 use crate::bounds::Bounds;
 use crate::dynamics::{
-    Analysis, Film, LEAST_PERIODS, Onset, Spectrum, angle_in_space_deg, angle_to_parent_deg,
-    spectrum,
+    Analysis, Film, HalfPower, LEAST_PERIODS, Onset, Spectrum, angle_in_space_deg,
+    angle_to_parent_deg, spectrum,
 };
 use crate::model::{Excitation, NodeId, Pose, Skeleton, Sway, Swaying, Unidentified};
 use nalgebra::{Point2, Vector2};
@@ -117,18 +117,10 @@ pub struct Branch {
     /// Of the angle in the picture's plane, degrees, over the time that the answer comes from; in
     /// wind a mean over pieces.
     pub spectrum: Option<Spectrum>,
-    pub reference: Option<Reference>,
+    pub reference: Option<HalfPower>,
     /// Where its end went: to the right of its place at rest and above it, px, by
     /// [`times_s`](Self::times_s).
     pub way_px: Vec<Vector2<f64>>,
-}
-
-/// What the spectrum's largest peak says: the method of Hu et al.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reference {
-    pub peak_hz: f64,
-    /// By its width at half the power, Hu et al. eq. 6.
-    pub damping_ratio: f64,
 }
 
 impl Study {
@@ -315,7 +307,7 @@ fn seen_in(
     times_s: &[f64],
     angle_deg: &[f64],
     used_s: Bounds,
-) -> (Option<Spectrum>, Option<Reference>) {
+) -> (Option<Spectrum>, Option<HalfPower>) {
     let (mut used_times_s, mut used_deg) = (Vec::new(), Vec::new());
     for (time_s, deg) in times_s.iter().zip(angle_deg) {
         if used_s.contains(*time_s) {
@@ -361,7 +353,7 @@ fn seen(
     angle_deg: &[f64],
     driven: bool,
     highest_hz: f64,
-) -> (Option<Spectrum>, Option<Reference>) {
+) -> (Option<Spectrum>, Option<HalfPower>) {
     let spectrum = if driven {
         averaged(times_s, angle_deg)
     } else {
@@ -376,11 +368,7 @@ fn seen(
     let reference = spectrum
         .as_ref()
         .filter(|_| piece_s > 0.0)
-        .and_then(|s| s.half_power(Bounds::new(LEAST_PERIODS / piece_s, highest_hz)))
-        .map(|(peak_hz, damping_ratio)| Reference {
-            peak_hz,
-            damping_ratio,
-        });
+        .and_then(|s| s.half_power(Bounds::new(LEAST_PERIODS / piece_s, highest_hz)));
     (spectrum, reference)
 }
 

@@ -3,7 +3,8 @@
 //! is reported.
 
 use super::pulse::Worker;
-use super::shared::Shared;
+use super::shared::{Failure, Shared};
+use super::spawn::spawn;
 use crate::model::{Outline, Pose, RawFrame, Skeleton, TrackSet};
 use crate::recording::{Head, Limits, RecordingError, Series};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
@@ -77,14 +78,10 @@ pub fn start(
     to: RecordTo,
     live: bool,
     shared: &Arc<Shared>,
-) -> Result<(Recorder, JoinHandle<Recorded>), RecordingError> {
-    let path = to.path.clone();
+) -> Result<(Recorder, JoinHandle<Recorded>), Failure> {
     let (recorder, thread, items) = two_ends(to, live, shared)?;
+    let handle = spawn("record", move || thread.run(&items))?;
     shared.recording.store(true, Ordering::Relaxed);
-    let handle = std::thread::Builder::new()
-        .name("record".into())
-        .spawn(move || thread.run(&items))
-        .map_err(|source| RecordingError::Place { path, source })?;
     Ok((recorder, handle))
 }
 

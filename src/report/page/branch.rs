@@ -102,7 +102,7 @@ fn plots(study: &Study, branch: &Branch) -> String {
 fn spectrum(study: &Study, branch: &Branch) -> Option<String> {
     let answer = Answer {
         frequency_hz: branch.known().map(|s| s.frequency_hz),
-        peak: branch.reference.map(|r| (r.peak_hz, r.damping_ratio)),
+        peak: branch.reference,
     };
     let curve = Curve {
         spectrum: branch.spectrum.as_ref()?,

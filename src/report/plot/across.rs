@@ -53,24 +53,12 @@ pub fn across(slots: &[Slot], x_label: &str, y_label: &str, label: &str) -> Opti
     let width = (sum + BESIDE).max(LEAST_WIDTH);
     let stretch = (width - BESIDE) / sum;
     let mut svg = Svg::new(width, HEIGHT, label);
-    let axes = Axes::new(
-        Vector2::new(width, HEIGHT),
-        Bounds::new(0.0, sum),
-        Bounds::new(0.0, 1.1 * top),
-    );
+    let shown = Bounds::new(0.0, 1.1 * top);
+    let size = Vector2::new(width, HEIGHT);
+    let axes = Axes::new(size, Bounds::new(0.0, sum), shown);
     axes.draw_y(&mut svg, y_label);
-    let sides = axes.sides();
-    svg.line(
-        Point2::new(sides.lo, axes.bottom()),
-        Point2::new(sides.hi, axes.bottom()),
-        "axis",
-    );
-    svg.text(
-        Point2::new(0.5 * (sides.lo + sides.hi), axes.bottom() + 27.0),
-        Anchor::Middle,
-        "label",
-        x_label,
-    );
+    axes.draw_base(&mut svg, x_label);
+    let apart = STEP * stretch.min(1.5);
     let mut from = 0.0;
     for (slot, need) in slots.iter().zip(&needs) {
         let middle = axes.x(from + 0.5 * need);
@@ -81,19 +69,19 @@ pub fn across(slots: &[Slot], x_label: &str, y_label: &str, label: &str) -> Opti
             &slot.name,
         );
         for (k, mark) in slot.marks.iter().enumerate() {
-            let x = middle
-                + (k as f64 - 0.5 * (slot.marks.len() as f64 - 1.0)) * STEP * stretch.min(1.5);
-            let class = format!("c{}", mark.kind % 6);
-            let [lo, value, hi] =
-                [mark.of.lo, mark.of.value, mark.of.hi].map(|v| axes.y(v.clamp(0.0, 1.1 * top)));
-            svg.line(
-                Point2::new(x, lo),
-                Point2::new(x, hi),
-                &format!("{class} bar"),
-            );
-            svg.dot(Point2::new(x, value), mark.kind, &format!("{class} dot"));
+            let beside = k as f64 - 0.5 * (slot.marks.len() as f64 - 1.0);
+            draw_mark(&mut svg, &axes, mark, shown, middle + beside * apart);
         }
         from += need;
     }
     Some(svg.finish())
+}
+
+/// A value and its interval, as far as they are `shown`, at `x`.
+fn draw_mark(svg: &mut Svg, axes: &Axes, mark: &Mark, shown: Bounds, x: f64) {
+    let class = format!("c{}", mark.kind % 6);
+    let [lo, value, hi] =
+        [mark.of.lo, mark.of.value, mark.of.hi].map(|v| Point2::new(x, axes.y(shown.clamp(v))));
+    svg.line(lo, hi, &format!("{class} bar"));
+    svg.dot(value, mark.kind, &format!("{class} dot"));
 }

@@ -86,12 +86,18 @@ impl Axes {
     }
 
     pub fn draw_x(&self, svg: &mut Svg, label: &str) {
-        let [left, top, right, bottom] = self.frame;
+        let (top, bottom) = (self.top(), self.bottom());
         for (value, text) in ticks(self.x) {
             let x = self.x(value);
             svg.line(Point2::new(x, top), Point2::new(x, bottom), "grid");
             svg.text(Point2::new(x, bottom + 13.0), Anchor::Middle, "tick", &text);
         }
+        self.draw_base(svg, label);
+    }
+
+    /// The line below without numbers, and what it stands for.
+    pub fn draw_base(&self, svg: &mut Svg, label: &str) {
+        let [left, _, right, bottom] = self.frame;
         svg.line(
             Point2::new(left, bottom),
             Point2::new(right, bottom),

@@ -4,7 +4,7 @@ use super::axes::{Axes, range, thinned};
 use super::svg::Svg;
 use super::{HEIGHT, WIDTH};
 use crate::bounds::Bounds;
-use crate::dynamics::Spectrum;
+use crate::dynamics::{HalfPower, Spectrum};
 use crate::model::Interval;
 use nalgebra::{Point2, Vector2};
 
@@ -25,8 +25,8 @@ pub struct Curve<'a> {
 #[derive(Clone, Copy)]
 pub struct Answer {
     pub frequency_hz: Option<Interval>,
-    /// Frequency and half-power damping of the largest peak.
-    pub peak: Option<(f64, f64)>,
+    /// Of the spectrum's largest peak.
+    pub peak: Option<HalfPower>,
 }
 
 /// Spectra from 0 to `highest_hz`; with one curve, its answer with the interval and the peak's
@@ -60,16 +60,8 @@ pub fn spectra(curves: &[Curve], highest_hz: f64, label: &str) -> Option<String>
         let line = thinned(points, MOST).into_iter();
         svg.path(line.map(|p| axes.at(p.x, p.y)), &curve.class);
         let peak = curve.answer.and_then(|a| a.peak).filter(|_| alone);
-        if let Some((peak_hz, damping_ratio)) = peak {
-            let spectrum = curve.spectrum;
-            mark_peak(
-                &mut svg,
-                &axes,
-                spectrum,
-                peak_hz,
-                damping_ratio,
-                highest_hz,
-            );
+        if let Some(peak) = peak {
+            mark_peak(&mut svg, &axes, curve.spectrum, peak, highest_hz);
         }
     }
     Some(svg.finish())
@@ -105,19 +97,12 @@ fn mark_frequency(
 }
 
 /// The width of a peak at half its power: twice the damping times the frequency (Hu et al. eq. 6).
-fn mark_peak(
-    svg: &mut Svg,
-    axes: &Axes,
-    spectrum: &Spectrum,
-    peak_hz: f64,
-    damping_ratio: f64,
-    highest_hz: f64,
-) {
-    let k = (peak_hz / spectrum.bin_hz).round() as usize;
+fn mark_peak(svg: &mut Svg, axes: &Axes, spectrum: &Spectrum, peak: HalfPower, highest_hz: f64) {
+    let k = (peak.peak_hz / spectrum.bin_hz).round() as usize;
     let amplitude = spectrum.amplitude.get(k).copied().unwrap_or(f64::NAN);
     let y = axes.y(amplitude * std::f64::consts::FRAC_1_SQRT_2);
-    let sides = [1.0 - damping_ratio, 1.0 + damping_ratio]
-        .map(|side| axes.x((side * peak_hz).clamp(0.0, highest_hz)));
+    let sides = [1.0 - peak.damping_ratio, 1.0 + peak.damping_ratio]
+        .map(|side| axes.x((side * peak.peak_hz).clamp(0.0, highest_hz)));
     svg.line(Point2::new(sides[0], y), Point2::new(sides[1], y), "width");
     // Ends, so that its shape tells it from the answer where colours do not.
     for x in sides {
