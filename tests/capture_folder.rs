@@ -5,7 +5,6 @@ mod support;
 use arborcam::config::Config;
 use arborcam::model::Unidentified;
 use arborcam::outline::{AutoOutline, Found};
-use arborcam::source::Decoder;
 use nalgebra::Point2;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -595,11 +594,9 @@ fn the_tree_is_found_without_an_outline() {
         bound.len()
     );
 
-    let (mut search, mut decoder) = (
-        AutoOutline::new(&Config::default().outline),
-        Decoder::new().expect("decoder"),
-    );
-    let frames = (0..recording().len()).map(|k| support::decoded(&mut decoder, k));
+    let mut search = AutoOutline::new(&Config::default().outline);
+    let mut decode = support::decoding();
+    let frames = (0..recording().len()).map(|k| support::decoded(&mut decode, k));
     let outline = frames
         .into_iter()
         .find_map(|f| match search.step(&f.luma, f.time_s) {

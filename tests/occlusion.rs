@@ -4,7 +4,6 @@ mod support;
 
 use arborcam::config::Config;
 use arborcam::model::{Frame, TrackId};
-use arborcam::source::Decoder;
 use arborcam::track::Tracker;
 use nalgebra::{Point2, Vector2};
 use std::collections::{BTreeMap, BTreeSet};
@@ -51,10 +50,10 @@ type Places = Vec<BTreeMap<TrackId, Point2<f64>>>;
 fn follow(covered: bool) -> Places {
     let config = Config::default();
     let mut tracker = Tracker::new(&config.detect, &config.track, &support::outline(), 0);
-    let mut decoder = Decoder::new().expect("decoder");
+    let mut decode = support::decoding();
     let mut places = Vec::new();
     for k in 0..=AFTER {
-        let mut frame = support::decoded(&mut decoder, k);
+        let mut frame = support::decoded(&mut decode, k);
         if covered && PASSES.contains(&k) {
             cover(&mut frame, k);
         }

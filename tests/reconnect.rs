@@ -9,7 +9,7 @@ use arborcam::recording::{Head, Limits};
 use arborcam::runtime::{
     self, Failure, Job, Pace, QUEUE_BYTES, RecordJob, RecordTo, Running, Summary,
 };
-use arborcam::source::{Decoder, Health, Source, SourceError, SourceInfo, Successor};
+use arborcam::source::{Health, Source, SourceError, SourceInfo, Successor};
 use arborcam::track::Tracker;
 use nalgebra::Point2;
 use std::collections::{BTreeMap, BTreeSet};
@@ -1039,10 +1039,10 @@ fn followed(
 ) -> Vec<TrackSet> {
     let config = Config::default();
     let mut tracker = Tracker::new(&config.detect, &config.track, &support::outline(), 0);
-    let mut decoder = Decoder::new().expect("decoder");
+    let mut decode = support::decoding();
     let mut sets = Vec::new();
     for k in (0..recording().len()).filter(|k| !skipped.contains(k)) {
-        let mut frame = support::decoded(&mut decoder, k);
+        let mut frame = support::decoded(&mut decode, k);
         adjust(k, &mut frame);
         sets.push(tracker.step(&frame));
     }

@@ -197,8 +197,8 @@ fn accuracy() -> Vec<String> {
 
 fn textbook() -> Places {
     let settings = Config::default();
-    let mut decoder = Decoder::new().expect("decoder");
-    let mut before = support::decoded(&mut decoder, 0).luma;
+    let mut decode = support::decoding();
+    let mut before = support::decoded(&mut decode, 0).luma;
     let mut points = Detector::new(&settings.detect, &support::outline()).detect(
         &before,
         &[],
@@ -207,7 +207,7 @@ fn textbook() -> Places {
     let mut ids: Vec<TrackId> = (0..points.len() as u32).map(TrackId).collect();
     let mut places = Places::new();
     for k in 0..support::recording().len() {
-        let now = support::decoded(&mut decoder, k).luma;
+        let now = support::decoded(&mut decode, k).luma;
         let from: Vector<Point2f> = points.iter().map(|p| Point2f::new(p.x, p.y)).collect();
         let (to, closed) = there_and_back(&before, &now, &from);
         let kept: Vec<usize> = (0..points.len()).filter(|&i| closed[i]).collect();

@@ -2,9 +2,10 @@
 #![allow(dead_code)] // not every test file needs all of it
 
 use arborcam::config;
-use arborcam::model::{Frame, Luma, Outline, RawFrame, Size, TimedFrame};
+use arborcam::model::{Frame, Outline, RawFrame, Size, TimedFrame};
 use arborcam::outline::Given;
-use arborcam::source::{self, Decoder};
+use arborcam::pipeline::DecodeStage;
+use arborcam::source;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Arc, OnceLock};
@@ -34,22 +35,14 @@ pub fn timed(k: usize) -> TimedFrame {
     TimedFrame::new(raw, k as u64, first_s, Instant::now())
 }
 
+/// The first stage, for frames of the recording.
+pub fn decoding() -> DecodeStage {
+    DecodeStage::new(false, None).expect("decoder")
+}
+
 /// Frame `k` of the recording as the tracker gets it.
-pub fn decoded(decoder: &mut Decoder, k: usize) -> Frame {
-    let (raw, first) = (&recording()[k], &recording()[0]);
-    let mut luma = Luma {
-        size: raw.size,
-        pixels: Vec::new(),
-    };
-    decoder.luma(raw, &mut luma).expect("picture");
-    let time_s = raw.sensor_time_s - first.sensor_time_s;
-    Frame {
-        index: k as u64,
-        time_s,
-        received: Instant::now(),
-        luma,
-        preview: None,
-    }
+pub fn decoded(decode: &mut DecodeStage, k: usize) -> Frame {
+    decode.step(&timed(k), None).expect("picture")
 }
 
 pub fn outline() -> Outline {

@@ -3,7 +3,6 @@
 use crate::support;
 use arborcam::config::Config;
 use arborcam::model::TrackId;
-use arborcam::source::Decoder;
 use arborcam::track::Tracker;
 use nalgebra::Point2;
 use std::collections::{BTreeMap, BTreeSet};
@@ -110,10 +109,10 @@ pub fn median(values: &mut [f64]) -> f64 {
 pub fn tracks() -> (Places, f64) {
     let config = Config::default();
     let mut tracker = Tracker::new(&config.detect, &config.track, &support::outline(), 0);
-    let mut decoder = Decoder::new().expect("decoder");
+    let mut decode = support::decoding();
     let (mut places, mut rejected, mut expected) = (Places::new(), BTreeSet::new(), Vec::new());
     for k in 0..support::recording().len() {
-        let set = tracker.step(&support::decoded(&mut decoder, k));
+        let set = tracker.step(&support::decoded(&mut decode, k));
         for o in &set.observations {
             places
                 .entry(o.id)
