@@ -2,7 +2,7 @@
 
 mod synthetic;
 
-use arborcam::draw::{Bounds, Camera, Look, Model, Posed, Rgba, Texture, View, picture};
+use arborcam::draw::{BoundingCylinder, Camera, Look, Model, Posed, Rgba, Texture, View, picture};
 use arborcam::geometry::{Foliage, FoliageGroup, Mesh, bare_wood};
 use arborcam::model::{JointPose, LeafSwing, NodeId, Pose, Size, Skeleton};
 use nalgebra::{Point2, Point3, UnitQuaternion, Vector3};
@@ -23,7 +23,7 @@ fn wood(skeleton: &Skeleton) -> Mesh {
     bare_wood(skeleton, 20_000)
 }
 
-fn bounds(posed: &Posed) -> Bounds {
+fn bounds(posed: &Posed) -> BoundingCylinder {
     posed.bounds().expect("a tree")
 }
 
@@ -173,7 +173,7 @@ fn leaves_swing_and_are_cut_out() {
         ..Model::bare(&skeleton, &mesh, BARK)
     };
     let camera = Camera::of_film(&skeleton, Size::new(1280, 720));
-    let at = Point2::from(skeleton.image_from_model(&skeleton.nodes[1].position));
+    let at = skeleton.image_from_model(&skeleton.nodes[1].position);
     let green = |picture: &Rgba, dx: f64, dy: f64| {
         let [r, g, _, a] = picture.at((at.x + dx) as u32, (at.y + dy) as u32);
         a > 0 && g > r
@@ -286,7 +286,7 @@ fn nothing_that_a_file_may_hold_brings_it_down() {
         foliage: &foliage,
         ..Model::bare(&skeleton, &mesh, BARK)
     };
-    let whole = Bounds::of([Point3::origin(), Point3::new(100.0, 300.0, 50.0)]).unwrap();
+    let whole = BoundingCylinder::of([Point3::origin(), Point3::new(100.0, 300.0, 50.0)]).unwrap();
     for pose in &poses {
         let swing = LeafSwing {
             sine: f32::NAN,

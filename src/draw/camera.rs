@@ -39,14 +39,14 @@ impl View {
 
 /// The upright cylinder about the trunk's foot that holds a tree: it has one size from all sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
+pub struct BoundingCylinder {
     pub low: Point3<f64>,
     pub high: Point3<f64>,
     /// Farthest from the upright line through the foot.
     pub radius: f64,
 }
 
-impl Bounds {
+impl BoundingCylinder {
     /// Of points in model axes; those that are no numbers are left out. `None` if none is left.
     pub fn of(points: impl IntoIterator<Item = Point3<f64>>) -> Option<Self> {
         points
@@ -100,7 +100,7 @@ const MARGIN: f64 = 0.05;
 impl Camera {
     /// Shows all of `bounds`, as large as it fits. With `steady` the tree keeps size and place when
     /// it turns.
-    pub fn fitting(bounds: &Bounds, view: View, steady: bool, size: Size) -> Self {
+    pub fn fitting(bounds: &BoundingCylinder, view: View, steady: bool, size: Size) -> Self {
         let [right, up, _] = view.axes();
         let mut aim = nalgebra::center(&bounds.low, &bounds.high);
         let [mut across, mut high] = [right, up].map(|axis| {
@@ -140,7 +140,7 @@ impl Camera {
         let left = (f64::from(size.width) - scale * f64::from(film.width)) / 2.0;
         let top = (f64::from(size.height) - scale * f64::from(film.height)) / 2.0;
         // The centre of the film's first pixel is 0, its corner -0.5.
-        let foot_px = Point2::from(skeleton.foot_px);
+        let foot_px = skeleton.foot_px;
         let middle_px = Point2::new(
             left + scale * (foot_px.x + 0.5),
             top + scale * (foot_px.y + 0.5),
@@ -221,7 +221,7 @@ mod tests {
             [f64::NAN, 1.0, 1.0],
         ];
         let points = points.map(|[x, y, z]| Point3::new(x, y, z));
-        let bounds = Bounds::of(points).unwrap();
+        let bounds = BoundingCylinder::of(points).unwrap();
         for size in [Size::new(640, 480), Size::new(100, 900)] {
             for step in 0..24 {
                 let turn = std::f64::consts::TAU * f64::from(step) / 24.0;
@@ -252,7 +252,7 @@ mod tests {
         // Twice as large, with bars above and below.
         let camera = Camera::of_film(&skeleton, Size::new(1280, 800));
         let p = Point3::new(8.0, 78.0, 5.0);
-        let seen_px = Point2::from(skeleton.image_from_model(&p));
+        let seen_px = skeleton.image_from_model(&p);
         let [x, y, _] = camera.project(&p);
         assert!(
             (x - 2.0 * (seen_px.x + 0.5)).abs() < 1e-9

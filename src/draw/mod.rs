@@ -12,7 +12,7 @@ mod rgba;
 mod skin;
 mod texture;
 
-pub use camera::{Bounds, Camera, View};
+pub use camera::{BoundingCylinder, Camera, View};
 pub use light::{Look, picture};
 pub use model::{Model, Posed};
 pub use rgba::Rgba;

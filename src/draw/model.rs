@@ -1,6 +1,6 @@
 //! What is drawn: wood and leaves on a skeleton, at rest and in a pose.
 
-use super::camera::Bounds;
+use super::camera::BoundingCylinder;
 use super::skin::Joints;
 use super::texture::Texture;
 use crate::geometry::{Foliage, Mesh};
@@ -110,8 +110,10 @@ impl<'a> Model<'a> {
 
 impl Posed<'_> {
     /// What all of it lies in; `None` for nothing.
-    pub fn bounds(&self) -> Option<Bounds> {
+    pub fn bounds(&self) -> Option<BoundingCylinder> {
         let points = self.parts.iter().flat_map(|p| &p.positions);
-        Bounds::of(points.map(|[x, y, z]| Point3::new(f64::from(*x), f64::from(*y), f64::from(*z))))
+        BoundingCylinder::of(
+            points.map(|[x, y, z]| Point3::new(f64::from(*x), f64::from(*y), f64::from(*z))),
+        )
     }
 }

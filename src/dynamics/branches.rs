@@ -49,6 +49,7 @@ impl LnDeviations {
         }
     }
 
+    /// In the order of [`Mode::parameters`].
     pub fn parameters(&self) -> [f64; 2] {
         [self.frequency, self.damping]
     }

@@ -47,8 +47,8 @@ impl Arms {
             return 0.0;
         }
         let turn = self.turn(factors, m);
-        let as_turn = if turn.arms > 0.0 {
-            (turn.cosine * turn.cosine + turn.sine * turn.sine) / (turn.arms * squares)
+        let as_turn = if turn.squares > 0.0 {
+            (turn.cosine * turn.cosine + turn.sine * turn.sine) / (turn.squares * squares)
         } else {
             0.0
         };
@@ -58,8 +58,8 @@ impl Arms {
     /// The turn about the base that fits the mode's factors best, degrees.
     pub fn amplitude_deg(&self, factors: &[Vec<Factor>], m: usize) -> f64 {
         let turn = self.turn(factors, m);
-        if turn.arms > 0.0 {
-            (turn.cosine.hypot(turn.sine) / turn.arms).to_degrees()
+        if turn.squares > 0.0 {
+            (turn.cosine.hypot(turn.sine) / turn.squares).to_degrees()
         } else {
             f64::NAN
         }
@@ -68,7 +68,7 @@ impl Arms {
     fn turn(&self, factors: &[Vec<Factor>], m: usize) -> Turn {
         let mut turn = Turn::default();
         for (arm, f) in self.0.iter().zip(of(factors, m)) {
-            turn.arms += arm.norm_squared();
+            turn.squares += arm.norm_squared();
             turn.cosine += f[0] * arm.y - f[2] * arm.x;
             turn.sine += f[1] * arm.y - f[3] * arm.x;
         }
@@ -81,8 +81,8 @@ impl Arms {
 struct Turn {
     cosine: f64,
     sine: f64,
-    /// These squares.
-    arms: f64,
+    /// Sum of the squares of the arms, px².
+    squares: f64,
 }
 
 /// How much signals are one motion, 0 to 1.

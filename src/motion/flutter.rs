@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 /// Speeds are means over so long: leaves do not jerk with the noise of single frames.
 const SMOOTHED_S: f64 = 0.2;
 
-/// For each group of leaves, in every pose.
+/// How far each group of leaves swings in every pose.
 ///
 /// A grows with the speed of the group's branches, those above `groups[k]`, and stays below
 /// `settings.swing_deg`. A pose of another tree or with a place or a time that is no number counts

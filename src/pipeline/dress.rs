@@ -7,7 +7,7 @@ use crate::config::Config;
 use crate::geometry::{Dressed, wood_levels};
 use crate::model::{LeafSwing, NodeId, Pose, Skeleton};
 use crate::motion;
-use crate::shape::{Bounds, limbs, room};
+use crate::shape::{Silhouette, limbs, room};
 
 /// How far each group of leaves swings in every pose, see [`flutter`](crate::motion::flutter).
 pub fn flutter(
@@ -24,11 +24,11 @@ pub fn flutter(
 pub fn dress(skeleton: &Skeleton, seen: Seen, config: &Config) -> Dressed {
     let seed = config.wood.seed.into();
     let room = match seen.cut_to {
-        Some(shape) => room(skeleton, Some(shape), Bounds::Drawn),
+        Some(shape) => room(skeleton, Some(shape), Silhouette::Drawn),
         None => room(
             skeleton,
             seen.outline,
-            Bounds::Filmed(config.shape.envelope),
+            Silhouette::Filmed(config.shape.envelope),
         ),
     };
     let in_leaf = InLeaf::of(skeleton, &seen, &config.leaves);

@@ -69,7 +69,7 @@ pub fn cut_to(
         let room = shape::room(
             &topiary.skeleton,
             Some(&topiary.shape),
-            shape::Bounds::Drawn,
+            shape::Silhouette::Drawn,
         );
         shape::thicken(
             &mut topiary.skeleton,

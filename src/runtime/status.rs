@@ -37,7 +37,8 @@ pub struct Status {
     lost: Recent,
     fb_history: VecDeque<f64>,
     fb_noted_s: f64,
-    displacements: VecDeque<(f64, Vec<Point2<f64>>)>,
+    /// Where the nodes of the table were in the last [`BRANCH_S`], by time, s.
+    places_px: VecDeque<(f64, Vec<Point2<f64>>)>,
     table_nodes: Vec<usize>,
     table_rest_px: Vec<Point2<f64>>,
     table_made_s: f64,
@@ -61,7 +62,7 @@ impl Status {
             lost: Recent::new(RATE_S),
             fb_history: VecDeque::new(),
             fb_noted_s: f64::NEG_INFINITY,
-            displacements: VecDeque::new(),
+            places_px: VecDeque::new(),
             table_nodes: Vec::new(),
             table_rest_px: Vec::new(),
             table_made_s: f64::NEG_INFINITY,
@@ -213,15 +214,15 @@ impl Status {
                 .collect();
             let at_rest = |&i: &usize| tree.skeleton.image_from_model(&nodes[i].position);
             self.table_rest_px = self.table_nodes.iter().map(at_rest).collect();
-            self.displacements.clear();
+            self.places_px.clear();
             self.table_made_s = f64::NEG_INFINITY;
             self.snapshot.show_tree(tree.skeleton.clone());
         }
         for (pose, targets_px) in &moved.before {
-            self.displaced(pose.time_s, targets_px);
+            self.note_places(pose.time_s, targets_px);
         }
         let time_s = moved.tracks.time_s;
-        self.displaced(time_s, &moved.targets_px);
+        self.note_places(time_s, &moved.targets_px);
         if time_s - self.table_made_s >= TABLE_EVERY_S {
             self.table_made_s = time_s;
             self.snapshot.branches = self.table(&tree.skeleton);
@@ -229,15 +230,15 @@ impl Status {
     }
 
     /// Remembers where the nodes of the table are.
-    fn displaced(&mut self, time_s: f64, targets_px: &Targets) {
-        let before = self.displacements.back().map(|(_, d)| d);
+    fn note_places(&mut self, time_s: f64, targets_px: &Targets) {
+        let before = self.places_px.back().map(|(_, places)| places);
         let at = |k: usize, node: usize| {
             // A node that no track saw stays where it was, and before that is at rest.
             targets_px
                 .get(node)
                 .copied()
                 .flatten()
-                .or(before.map(|d| d[k]))
+                .or(before.map(|places| places[k]))
                 .unwrap_or(self.table_rest_px[k])
         };
         let row = self
@@ -246,19 +247,20 @@ impl Status {
             .enumerate()
             .map(|(k, &node)| at(k, node))
             .collect();
-        self.displacements.push_back((time_s, row));
+        self.places_px.push_back((time_s, row));
         while self
-            .displacements
+            .places_px
             .front()
             .is_some_and(|(t, _)| *t < time_s - BRANCH_S)
         {
-            self.displacements.pop_front();
+            self.places_px.pop_front();
         }
     }
 
     fn table(&self, skeleton: &Skeleton) -> Vec<BranchRow> {
         let row = |(k, &node): (usize, &usize)| {
-            let path: Vec<Point2<f64>> = self.displacements.iter().map(|(_, d)| d[k]).collect();
+            let path: Vec<Point2<f64>> =
+                self.places_px.iter().map(|(_, places)| places[k]).collect();
             let n = &skeleton.nodes[node];
             BranchRow {
                 node: n.name,

@@ -1,7 +1,6 @@
 //! From the flat skeleton to a tree in space (Li 2011 sect. 3).
 
 mod angles;
-mod bounds;
 mod branches;
 mod branching;
 mod curl;
@@ -16,6 +15,7 @@ mod planes;
 mod prototype;
 mod push;
 mod radius;
+mod room;
 mod search;
 mod settle;
 mod sides;
@@ -27,7 +27,6 @@ mod trunk_radius;
 mod twigs;
 
 pub use angles::{Angles, expected_branching_angle};
-pub use bounds::{Bounds, room};
 pub use curl::CURL_BOUND;
 pub(crate) use curl::square_to;
 pub use diener::diener;
@@ -40,6 +39,7 @@ pub use planes::copy_to_planes;
 pub use prototype::{Prototype, build};
 pub use push::{PositionPrior, Terms, envelope_distance, push, push_on};
 pub use radius::{PIPE_EXPONENTS, TIP_RADIUS_PX};
+pub use room::{Silhouette, room};
 pub use settle::go_on;
 pub use skin::SkinWeights;
 pub use term_weights::tune_term_weights;

@@ -38,20 +38,12 @@ const OF_ANEW: f64 = 0.95;
 const OF_BEST: f64 = 0.9;
 /// A tree that turns back by no more than this in the mean has as good as no hooks, radians.
 const NEXT_TO_STRAIGHT_RAD: f64 = 5.0 * PI / 180.0;
-/// How much branches may be made to turn back by their old places in the picture.
-const TURNED_BACK: TurnedBack = TurnedBack {
-    at_first_rad: PI / 2.0,
-    with_need_rad: PI / 6.0,
-};
+/// How much branches may be made to turn back by their old places in the picture: at first, and
+/// where the score needs less of it, radians.
+const TURNED_BACK_AT_FIRST_RAD: f64 = PI / 2.0;
+const TURNED_BACK_WITH_NEED_RAD: f64 = PI / 6.0;
 /// What is left of either figure, as a share, when branches are brought back to their sides.
 const OF_SETTLED: f64 = 0.95;
-
-/// How much branches may turn back.
-struct TurnedBack {
-    at_first_rad: f64,
-    /// Where the score needs less of it.
-    with_need_rad: f64,
-}
 
 /// Where each node of the old tree stood in the new one; `None` for nodes that nothing holds.
 type Held = [Option<Point3<f64>>];
@@ -66,11 +58,11 @@ pub fn go_on(
     settings: &config::Shape,
 ) -> (Skeleton, Vec<Option<Point3<f64>>>) {
     let optimiser = Optimiser::new(anew, prototype, settings);
-    let first = optimiser.warm_start(old, twins, TURNED_BACK.at_first_rad);
+    let first = optimiser.warm_start(old, twins, TURNED_BACK_AT_FIRST_RAD);
     if first.score >= OF_ANEW {
         return (first.tree, first.held);
     }
-    let second = optimiser.warm_start(old, twins, TURNED_BACK.with_need_rad);
+    let second = optimiser.warm_start(old, twins, TURNED_BACK_WITH_NEED_RAD);
     if second.score > first.score {
         (second.tree, second.held)
     } else {

@@ -68,19 +68,22 @@ pub fn along(signals: &[Vec<f64>], direction: &[f64]) -> Vec<f64> {
 ///
 /// Of two coordinates the direction has a closed form, and unlike an eigenvector always the same
 /// sign: within a right angle of the first axis.
-pub fn along_principal_direction(d: &[Point2<f64>]) -> Vec<f64> {
-    let n = d.len() as f64;
+pub fn along_principal_direction(places: &[Point2<f64>]) -> Vec<f64> {
+    let n = places.len() as f64;
     let mut mean = Point2::origin();
-    for p in d {
-        mean += p.coords / n;
+    for place in places {
+        mean += place.coords / n;
     }
-    let centred: Vec<Vector2<f64>> = d.iter().map(|p| p - mean).collect();
+    let centred: Vec<Vector2<f64>> = places.iter().map(|p| p - mean).collect();
     let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-    for p in &centred {
-        xx += p.x * p.x;
-        xy += p.x * p.y;
-        yy += p.y * p.y;
+    for off in &centred {
+        xx += off.x * off.x;
+        xy += off.x * off.y;
+        yy += off.y * off.y;
     }
     let (sin, cos) = (0.5 * (2.0 * xy).atan2(xx - yy)).sin_cos();
-    centred.iter().map(|p| cos * p.x + sin * p.y).collect()
+    centred
+        .iter()
+        .map(|off| cos * off.x + sin * off.y)
+        .collect()
 }

@@ -50,7 +50,7 @@ pub fn assign_radii(skeleton: &mut Skeleton, outline: &Outline, config: &Config)
     let room = shape::room(
         skeleton,
         Some(outline),
-        shape::Bounds::Filmed(config.shape.envelope),
+        shape::Silhouette::Filmed(config.shape.envelope),
     );
     shape::thicken(skeleton, trunk_px, &room, wood, wood.seed.into());
 }

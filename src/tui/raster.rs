@@ -2,7 +2,7 @@
 //! top.
 
 use crate::model::{Rgb, Size};
-use nalgebra::{Point2, Vector2};
+use nalgebra::Point2;
 use std::ops::Range;
 
 /// Colour picture whose every drawing routine leaves out what lies outside.
@@ -91,8 +91,8 @@ fn covered(i: u32, dots: u32, pixels: u32) -> Range<usize> {
 /// Visits the dots of a line, as far as it lies in a picture of this size; at most one dot past its
 /// far borders.
 pub fn walk(from: Point2<f64>, to: Point2<f64>, size: Size, mut visit: impl FnMut(i64, i64)) {
-    let high = Vector2::new(size.width as f64, size.height as f64);
-    let Some((a, b)) = clip(from, to, high) else {
+    let corner = Point2::new(size.width as f64, size.height as f64);
+    let Some([a, b]) = clip(from, to, corner) else {
         return;
     };
     let way = b - a;
@@ -103,20 +103,16 @@ pub fn walk(from: Point2<f64>, to: Point2<f64>, size: Size, mut visit: impl FnMu
     }
 }
 
-/// The part of a line inside the box from 0 to `high` (Liang and Barsky): a far end must not cost a
-/// million steps.
-fn clip(
-    from: Point2<f64>,
-    to: Point2<f64>,
-    high: Vector2<f64>,
-) -> Option<(Point2<f64>, Point2<f64>)> {
+/// The part of a line inside the box from 0 to its far `corner` (Liang and Barsky): a far end must
+/// not cost a million steps.
+fn clip(from: Point2<f64>, to: Point2<f64>, corner: Point2<f64>) -> Option<[Point2<f64>; 2]> {
     let (mut t0, mut t1) = (0.0f64, 1.0f64);
     for axis in 0..2 {
         let d = to[axis] - from[axis];
         if !d.is_finite() {
             return None;
         }
-        let (low_gap, high_gap) = (-from[axis], high[axis] - from[axis]);
+        let (low_gap, high_gap) = (-from[axis], corner[axis] - from[axis]);
         if d == 0.0 {
             if low_gap > 0.0 || high_gap < 0.0 {
                 return None;
@@ -131,8 +127,7 @@ fn clip(
         t0 = t0.max(enter);
         t1 = t1.min(leave);
     }
-    let [a, b] = [t0, t1].map(|t| from + t * (to - from));
-    (t0 <= t1).then_some((a, b))
+    (t0 <= t1).then(|| [t0, t1].map(|t| from + t * (to - from)))
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use super::{PrepareError, PreparedTree};
 use crate::document::DocumentError;
-use crate::draw::{Bounds, Camera, Look, Model, Posed, Rgba, Texture, View, picture};
+use crate::draw::{BoundingCylinder, Camera, Look, Model, Posed, Rgba, Texture, View, picture};
 use crate::export::{ExportError, Film};
 use crate::files::WriteError;
 use crate::model::{LeafSwing, Pose, Size};
@@ -65,7 +65,7 @@ pub struct Studio<'a> {
     size: Size,
     look: Look,
     /// Holds the tree in all its poses.
-    bounds: Bounds,
+    bounds: BoundingCylinder,
 }
 
 impl<'a> Studio<'a> {
@@ -266,15 +266,15 @@ fn samples(size: Size) -> u32 {
 }
 
 /// The wood at rest, and as far around it as its joints go.
-fn bounds(tree: &PreparedTree, model: &Model) -> Bounds {
-    let empty = Bounds {
+fn bounds(tree: &PreparedTree, model: &Model) -> BoundingCylinder {
+    let empty = BoundingCylinder {
         low: nalgebra::Point3::origin(),
         high: nalgebra::Point3::origin(),
         radius: 0.0,
     };
     let rest = model.posed(None, &[]).bounds().unwrap_or(empty);
     let joints = tree.poses.iter().flat_map(|p| &p.joints);
-    Bounds::of(joints.map(|j| j.position)).map_or(rest, |all| all.with(&rest))
+    BoundingCylinder::of(joints.map(|j| j.position)).map_or(rest, |all| all.with(&rest))
 }
 
 fn rgb(drawn: &Rgba) -> Vec<u8> {

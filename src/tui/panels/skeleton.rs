@@ -156,8 +156,8 @@ fn reason(s: &Snapshot) -> String {
 /// wind.
 struct Extent {
     /// Model units to the right and up from the foot.
-    low: Vector2<f64>,
-    high: Vector2<f64>,
+    low: Point2<f64>,
+    high: Point2<f64>,
 }
 
 impl Extent {
@@ -173,10 +173,10 @@ impl Extent {
             .filter(|p| p.iter().all(|c| c.is_finite()));
         let mut extent: Option<Self> = None;
         for p in sound {
-            let p = Vector2::new(p.dot(&right), p.dot(&up));
+            let p = Point2::new(p.dot(&right), p.dot(&up));
             let all = extent.get_or_insert(Self { low: p, high: p });
-            all.low = all.low.zip_map(&p, f64::min);
-            all.high = all.high.zip_map(&p, f64::max);
+            all.low = all.low.inf(&p);
+            all.high = all.high.sup(&p);
         }
         extent
     }
@@ -203,7 +203,7 @@ impl Extent {
     /// The camera that shows it in the middle of `room`, one dot a `unit`.
     fn camera(&self, view: View, unit: f64, room: Rect) -> Camera {
         let (size, scale) = (dots(room), 1.0 / unit);
-        let middle = scale * (self.low + self.high) / 2.0;
+        let middle = scale * (self.low.coords + self.high.coords) / 2.0;
         let middle_px = Point2::new(
             f64::from(size.width) / 2.0 - middle.x,
             f64::from(size.height) / 2.0 + middle.y,

@@ -7,7 +7,7 @@ use nalgebra::{Point2, Point3};
 
 /// What an outline says about the space that the tree stands in.
 #[derive(Clone, Copy, Debug)]
-pub enum Bounds {
+pub enum Silhouette {
     /// It is a drawn shape that the tree was cut to.
     Drawn,
     Filmed(EnvelopeKind),
@@ -19,12 +19,12 @@ pub enum Bounds {
 pub fn room<'a>(
     skeleton: &Skeleton,
     outline: Option<&'a Outline>,
-    bounds: Bounds,
+    silhouette: Silhouette,
 ) -> impl Fn(&Point3<f64>, &Point3<f64>) -> bool + use<'a> {
-    let foot_px = Point2::from(skeleton.foot_px);
-    let envelope = outline.map(|outline| match bounds {
-        Bounds::Drawn => Envelope::of_drawn(outline, foot_px),
-        Bounds::Filmed(kind) => Envelope::of_filmed(kind, outline, foot_px, &places(skeleton)),
+    let foot_px = skeleton.foot_px;
+    let envelope = outline.map(|outline| match silhouette {
+        Silhouette::Drawn => Envelope::of_drawn(outline, foot_px),
+        Silhouette::Filmed(kind) => Envelope::of_filmed(kind, outline, foot_px, &places(skeleton)),
     });
     move |from: &Point3<f64>, to: &Point3<f64>| match (&envelope, outline) {
         (Some(envelope), Some(outline)) => {
