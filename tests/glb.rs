@@ -9,7 +9,7 @@ use arborcam::geometry::{Dressed, Mesh};
 use arborcam::model::{Pose, Rgb, Skeleton};
 use arborcam::pipeline::{Seen, dress};
 use gltf::animation::util::ReadOutputs;
-use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point2, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde_json::{Value, json};
 use std::collections::HashMap;
 
@@ -372,7 +372,7 @@ fn the_bark_has_the_colour_of_the_trunk() {
             .flat_map(|_| (0..size.width).flat_map(colour))
             .collect(),
     };
-    let corner = |du: f64, v: f64| nalgebra::Point2::new(foot[0] + du, v);
+    let corner = |du: f64, v: f64| Point2::new(foot[0] + du, v);
     let corners = [
         corner(-18.0, 200.0),
         corner(18.0, 200.0),

@@ -65,7 +65,7 @@ fn still(in_leaf: bool) -> Still {
         let (from, to) = (&skeleton.nodes[node.parent.unwrap().index()], node);
         for k in 0..=60 {
             let at = from.position + (to.position - from.position) * (k as f64 / 60.0);
-            let at = Point2::from(skeleton.image_from_model(&at));
+            let at = skeleton.image_from_model(&at);
             disc(at, (0.7 * node.radius).max(0.7)).for_each(|i| pixels[i] = [96, 80, 68]);
             disc(at, 22.0).for_each(|i| outside[i] = false);
         }
@@ -81,7 +81,7 @@ fn still(in_leaf: bool) -> Still {
                 16.0 * synthetic::noise(k, j),
                 16.0 * synthetic::noise(k, j + 50),
             );
-            let at = Point2::from(skeleton.image_from_model(&node.position));
+            let at = skeleton.image_from_model(&node.position);
             let shade = 1.0 + 0.45 * synthetic::noise(k, j + 90);
             let colour = [70.0, 110.0, 40.0].map(|c: f64| (c * shade) as u8);
             disc(at + off, 5.0).for_each(|i| {
@@ -119,8 +119,7 @@ impl Still {
     }
 
     fn seeds(&self, settings: &Leaves) -> Vec<Point2<f32>> {
-        let seeds = leaf_seeds(&self.picture, &self.outline, settings.seeds);
-        seeds.into_iter().collect()
+        leaf_seeds(&self.picture, &self.outline, settings.seeds)
     }
 
     fn leaves(&self, settings: &Leaves) -> Foliage {

@@ -195,8 +195,8 @@ fn off(tree: &Skeleton, poses: &[Pose], truth: &[Pose]) -> Off {
     for (pose, truth) in poses.iter().zip(truth) {
         for i in 1..tree.nodes.len() {
             let (is, was) = (
-                Point2::from(tree.image_from_model(&pose.joints[i].position)),
-                Point2::from(tree.image_from_model(&truth.joints[i].position)),
+                tree.image_from_model(&pose.joints[i].position),
+                tree.image_from_model(&truth.joints[i].position),
             );
             motion += distance_squared(&is, &was);
             nodes += 1.0;
@@ -282,7 +282,7 @@ fn the_pose_smooths_nothing_that_the_film_shows() {
                 truth.joints[i].position,
                 node.position,
             ]
-            .map(|p| Point2::from(tree.image_from_model(&p)));
+            .map(|p| tree.image_from_model(&p));
             off_px += distance_squared(&is, &should);
             moved_px += distance_squared(&rest, &should);
         }

@@ -9,6 +9,7 @@ use arborcam::config::{self, EnvelopeKind, Leader};
 use arborcam::model::{NodeId, Outline, Size, Skeleton};
 use arborcam::shape::{self, Prototype, PushFigures, is_trunk};
 use arborcam::skeleton::Node2d;
+use nalgebra::Point2;
 use proptest::prelude::*;
 use trees::Flat;
 
@@ -105,7 +106,7 @@ fn conifer() -> Flat {
         [98.0, 20.0],
         [25.0, 180.0],
     ]
-    .map(nalgebra::Point2::from);
+    .map(Point2::from);
     let outline = arborcam::outline::from_polygon(&border, Size::new(200, 240)).expect("outline");
     Flat {
         name: "conifer",

@@ -30,6 +30,7 @@ use crate::dynamics::Film;
 use crate::model::{Outline, Picture, Pose, Size, Skeleton, Swaying, Unidentified};
 use crate::motion::PoseEstimator;
 use motion::PoseReader;
+use nalgebra::Point2;
 use nodes::NodesRead;
 use note::{ModelNote, OutlineNote};
 use std::path::{Path, PathBuf};
@@ -317,7 +318,7 @@ impl Reposer {
     /// The pose of the other tree; poses must come in the order of time.
     pub fn pose(&mut self, pose: &Pose) -> Pose {
         let joints = &pose.joints[..self.measured];
-        let targets_px: Vec<_> = joints
+        let targets_px: Vec<Option<Point2<f64>>> = joints
             .iter()
             .map(|joint| Some(self.from.image_from_model(&joint.position)))
             .collect();
@@ -366,7 +367,7 @@ fn model<'a>(dir: &Path, note: &'a CaptureNote) -> Result<&'a ModelNote, Documen
 
 #[cfg(feature = "opencv")]
 fn outline(note: &OutlineNote) -> Result<Outline, String> {
-    let corners_px: Vec<nalgebra::Point2<f64>> = note
+    let corners_px: Vec<Point2<f64>> = note
         .polygon_px
         .iter()
         .map(|p| p.map(f64::from).into())

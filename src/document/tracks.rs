@@ -57,13 +57,7 @@ impl<W: Write> TracksCsv<W> {
         node_of: impl Fn(TrackId) -> Option<NodeName>,
     ) -> Result<(), WriteError> {
         for o in &set.observations {
-            self.row(
-                o.id,
-                set.frame,
-                set.time_s,
-                Point2::new(o.u_px, o.v_px).cast(),
-                node_of(o.id),
-            )?;
+            self.row(o.id, set.frame, set.time_s, o.at_px(), node_of(o.id))?;
         }
         Ok(())
     }

@@ -76,7 +76,7 @@ impl Film {
                     Some(FilmTrack { node, at_px })
                 });
                 if let Some(track) = track {
-                    track.at_px[k] = Point2::new(f64::from(o.u_px), f64::from(o.v_px));
+                    track.at_px[k] = o.at_px();
                 }
             }
         }

@@ -228,6 +228,7 @@ fn smoothed(
     let around = step.saturating_sub(SMOOTH_STEPS)..=(step + SMOOTH_STEPS).min(track.len() - 1);
     let (mut sum, mut n) = (Vector2::<f64>::zeros(), 0.0);
     for p in track[around].iter().flatten() {
+        // The last bits depend on the order of the sum.
         sum = sum + p.coords.cast() - rest_px.coords;
         n += 1.0;
     }

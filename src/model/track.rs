@@ -1,5 +1,7 @@
 //! Points followed from frame to frame.
 
+use nalgebra::Point2;
+
 /// Names one tracked point for good: an id is never given to a second point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct TrackId(pub u32);
@@ -23,6 +25,13 @@ pub struct Observation {
     pub error_px: Option<f32>,
     /// Its trial is over; of those on trial about half will be dropped.
     pub confirmed: bool,
+}
+
+impl Observation {
+    /// Its place in the picture, px.
+    pub fn at_px(&self) -> Point2<f64> {
+        Point2::new(self.u_px, self.v_px).cast()
+    }
 }
 
 /// All points seen in one frame, ordered by id.

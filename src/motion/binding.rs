@@ -113,7 +113,7 @@ impl Binding {
             .collect();
         for o in &set.observations {
             if o.confirmed && !self.tracks.contains_key(&o.id) {
-                let at = Point2::new(f64::from(o.u_px), f64::from(o.v_px));
+                let at = o.at_px();
                 // Decided once: a point of the background stays unbound when a branch swings near
                 // it later.
                 if let Some((tip, target)) = self.nearest_tip(at, &targets) {
@@ -155,6 +155,7 @@ impl Binding {
             }
         };
         let (rest, own) = (self.rest_px[carrier.index()], self.rest_px[tip.index()]);
+        // The last bits depend on the order of the sum.
         Some(own + target.coords - rest.coords)
     }
 
@@ -165,7 +166,7 @@ impl Binding {
             let Some(Some(bound)) = self.tracks.get(&o.id) else {
                 continue;
             };
-            let displacement = Point2::new(f64::from(o.u_px), f64::from(o.v_px)) - bound.rest_px;
+            let displacement = o.at_px() - bound.rest_px;
             let mut at = Some(bound.node);
             while let Some(node) = at {
                 self.collected[node.index()].push(Nearby {

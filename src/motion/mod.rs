@@ -206,7 +206,7 @@ impl PoseEstimator {
         target_px: Option<Point2<f64>>,
         elapsed_s: f64,
     ) -> UnitVector3<f64> {
-        let foot = Point2::from(self.skeleton.foot_px);
+        let foot = self.skeleton.foot_px;
         let target = target_px.map(|t| Point2::new(t.x - foot.x, foot.y - t.y));
         if branch.length < 1e-6 {
             return branch.direction;

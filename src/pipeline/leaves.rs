@@ -8,10 +8,11 @@ use crate::config::{self, LeafShow};
 use crate::geometry::{self, Foliage, LeafView, Template};
 use crate::model::{Luma, Outline, Rgb, Skeleton};
 use crate::shape::Limb;
+use nalgebra::Point2;
 
 /// What is to be known of the leaves before they grow.
 pub(super) struct InLeaf {
-    seeds: Vec<nalgebra::Point2<f32>>,
+    seeds: Vec<Point2<f32>>,
     /// The picture shows them.
     filmed: bool,
     /// A drawn density, where there is one: nothing grows outside of the outline, or of the shape
@@ -56,7 +57,7 @@ impl InLeaf {
                 }
             });
         Some(Self {
-            seeds: seeds.into_iter().collect(),
+            seeds,
             filmed,
             density,
         })
@@ -137,6 +138,6 @@ fn in_leaf(skeleton: &Skeleton, picture: Option<&Rgb>, outline: Option<&Outline>
 /// Corners are found by OpenCV. Without it there are none, and leaves stand where the picture has
 /// their colour.
 #[cfg(not(feature = "opencv"))]
-fn seeds(_picture: &Rgb, _outline: &Outline, _count: u32) -> Vec<nalgebra::Point2<f32>> {
+fn seeds(_picture: &Rgb, _outline: &Outline, _count: u32) -> Vec<Point2<f32>> {
     Vec::new()
 }

@@ -26,8 +26,7 @@ pub fn seeds(picture: &Rgb, outline: &Outline, count: u32) -> Vec<Point2<f32>> {
         size: picture.size,
         pixels: picture.pixels.chunks_exact(3).map(grey).collect(),
     };
-    let seeds = Detector::new(&detect, outline).detect(&luma, &[], count as usize);
-    seeds.into_iter().collect()
+    Detector::new(&detect, outline).detect(&luma, &[], count as usize)
 }
 
 /// Luma of a pixel of red, green and blue (ITU-R BT.601), 0 to 255.

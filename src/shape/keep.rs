@@ -48,7 +48,7 @@ fn copy_on_plane(old: &Skeleton, twin: Twin, plane_angle: f64) -> Option<Twin> {
 /// The same tree with its foot, and with it the model's axes, at `foot_px`; all else stays where it
 /// is in the picture.
 pub fn on_foot(mut skeleton: Skeleton, foot_px: Point2<f64>) -> Skeleton {
-    let was_px = Point2::from(skeleton.foot_px);
+    let was_px = skeleton.foot_px;
     let way = Vector3::new(was_px.x - foot_px.x, foot_px.y - was_px.y, 0.0);
     for node in skeleton.nodes.iter_mut().skip(1) {
         node.position += way;

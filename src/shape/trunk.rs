@@ -15,12 +15,12 @@ const STRAIGHT: f64 = std::f64::consts::FRAC_PI_4;
 /// up, px; it counts only with [`Leader::Drawn`].
 pub fn trunk(flat: &[Node2d], leader: Leader, leader_px: &[Point2<f64>]) -> Vec<bool> {
     let mut trunk: Vec<bool> = flat.iter().map(|n| n.level < 2).collect();
-    let Some(foot) = flat.first().map(|n| Point2::from(n.position_px)) else {
+    let Some(foot) = flat.first().map(|n| n.position_px) else {
         return trunk;
     };
     let top_v = flat
         .iter()
-        .map(|n| Point2::from(n.position_px).y)
+        .map(|n| n.position_px.y)
         .filter(|v| v.is_finite())
         .fold(foot.y, f64::min);
     let reach = REACH * (foot.y - top_v);

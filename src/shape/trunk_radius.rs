@@ -1,5 +1,6 @@
 //! How thick the trunk is, as far as the outline tells.
 
+use crate::bounds::Bounds;
 use crate::model::Outline;
 use nalgebra::Point2;
 
@@ -8,7 +9,7 @@ use nalgebra::Point2;
 const TRUNK_SHARE: f64 = 0.5;
 /// Part of the way from the foot to the trunk's top that is looked at: below it roots and the
 /// ground, above it the fork.
-const LOOKED_AT: std::ops::RangeInclusive<f64> = 0.1..=0.8;
+const LOOKED_AT: Bounds = Bounds::new(0.1, 0.8);
 /// Rows that are enough to measure in.
 const LEAST_ROWS: usize = 4;
 /// No trunk is thicker than this share of the way from its foot to the top of the outline.
@@ -34,7 +35,7 @@ pub fn trunk_radius_px(
     for v in 0..outline.size.height as usize {
         let share = (foot_px.y - v as f64) / rise;
         let u = foot_px.x + share * (top_px.x - foot_px.x);
-        if LOOKED_AT.contains(&share) && outline.contains(u, v as f64) {
+        if LOOKED_AT.contains(share) && outline.contains(u, v as f64) {
             widths.push(width_in_row(outline, u.round() as usize, v));
         }
     }

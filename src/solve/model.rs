@@ -91,9 +91,8 @@ impl Model {
     /// Which track moves which node.
     pub fn binding(&self) -> Binding {
         let mut binding = Binding::new(&self.hierarchy, &self.rest_px, &self.skeleton);
-        for joined in [&self.joined, &self.on_sub_branches()] {
-            binding.inherit(joined);
-        }
+        binding.inherit(&self.joined);
+        binding.inherit(&self.on_sub_branches());
         binding
     }
 

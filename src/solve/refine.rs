@@ -232,7 +232,7 @@ impl<'a> Refinement<'a> {
         let mut out: Vec<Option<Twin>> = vec![None; new.len() + 1];
         out[0] = Some(Twin {
             old: NodeId(0),
-            moved_px: nalgebra::Vector2::zeros(),
+            moved_px: Vector2::zeros(),
         });
         // Node 1 is the trunk, and belongs to the cluster of all points.
         let above_old: Vec<Vec<TrackId>> = old.iter().skip(2).cloned().collect();

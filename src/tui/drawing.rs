@@ -61,28 +61,28 @@ impl Drawing {
 fn crosses_itself(polygon: &[Point2<f64>]) -> bool {
     let n = polygon.len();
     for i in 0..n {
-        let (a, b) = side(polygon, i);
-        let (_, c) = side(polygon, (i + 1) % n);
+        let [a, b] = side(polygon, i);
+        let [_, c] = side(polygon, (i + 1) % n);
         // A side that runs back over the one before it encloses nothing.
         let along = (b - a).dot(&(c - b));
         if turn(a, b, c) == 0.0 && along < 0.0 {
             return true;
         }
         let mut others = (i + 2..n).filter(|j| (j + 1) % n != i);
-        if others.any(|j| meet((a, b), side(polygon, j))) {
+        if others.any(|j| meet([a, b], side(polygon, j))) {
             return true;
         }
     }
     false
 }
 
-type Side = (Point2<f64>, Point2<f64>);
+type Side = [Point2<f64>; 2];
 
 fn side(polygon: &[Point2<f64>], i: usize) -> Side {
-    (polygon[i], polygon[(i + 1) % polygon.len()])
+    [polygon[i], polygon[(i + 1) % polygon.len()]]
 }
 
-fn meet((a, b): Side, (c, d): Side) -> bool {
+fn meet([a, b]: Side, [c, d]: Side) -> bool {
     let (s1, s2, s3, s4) = (turn(a, b, c), turn(a, b, d), turn(c, d, a), turn(c, d, b));
     (opposite(s1, s2) && opposite(s3, s4))
         || (s1 == 0.0 && between(a, b, c))

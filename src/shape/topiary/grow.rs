@@ -1,6 +1,7 @@
 //! Smaller copies of the tree's own subtrees where a shape is bare: growth by self-similarity.
 
 use super::cover::Cover;
+use crate::bounds::Bounds;
 use crate::config;
 use crate::model::{Node, NodeId, NodeName, Outline, Skeleton};
 use crate::random::{Generator, generator};
@@ -22,7 +23,7 @@ const TRIED: usize = 5;
 /// Branches of a subtree that is repeated, at most.
 const LARGEST: usize = 12;
 /// A copy is at most so much larger than its original, and at least so large.
-const SCALE: std::ops::RangeInclusive<f64> = 0.15..=1.25;
+const SCALE: Bounds = Bounds::new(0.15, 1.25);
 /// How far in front or behind the copies end, as a share of the depth that the shape has there.
 const DEPTH: f64 = 0.85;
 
@@ -153,7 +154,7 @@ impl Site<'_> {
 
     /// A place in space that is seen at `bare_px`, at `deep` (-1 to 1) of the depth there.
     fn place_seen_at(&self, bare_px: Point2<f64>, deep: f64) -> Point3<f64> {
-        let foot_px = Point2::from(self.skeleton.foot_px);
+        let foot_px = self.skeleton.foot_px;
         let (x, y) = (bare_px.x - foot_px.x, foot_px.y - bare_px.y);
         Point3::new(
             x,
@@ -275,7 +276,7 @@ impl Placement {
         let is = target - nodes[from].position;
         let scale = is.norm() / was.norm();
         let straight = template.len() == 1;
-        if !scale.is_finite() || scale <= 0.0 || !straight && !SCALE.contains(&scale) {
+        if !scale.is_finite() || scale <= 0.0 || !straight && !SCALE.contains(scale) {
             return None;
         }
         let axis = Unit::try_new(is, 1e-9)?;
