@@ -324,7 +324,7 @@ fn replay(clip: &Path, dir: &Path) -> String {
     let corners: Vec<[i32; 2]> = support::outline()
         .polygon_px
         .iter()
-        .map(|p| [2 * p[0], 2 * p[1]])
+        .map(|p| [2 * p.x, 2 * p.y])
         .collect();
     std::fs::write(
         &outline,

@@ -126,7 +126,7 @@ fn pipes_add_up() {
         })
         .collect();
     assert!(inner.len() > 5);
-    let thousandths = PIPE_EXPONENTS * 1000.0;
+    let thousandths = PIPE_EXPONENTS.map(|e| 1000.0 * e);
     let fits = (thousandths.lo as u32..=thousandths.hi as u32)
         .map(|e| f64::from(e) / 1000.0)
         .any(|e| {

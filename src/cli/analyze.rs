@@ -18,6 +18,7 @@ use crate::report::{Comparison, Given, Study, compare, hints, json, page, text};
 use crate::tui::columns;
 use crate::views::update;
 use anyhow::anyhow;
+use nalgebra::Point2;
 pub use options::AnalyzeArgs;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -166,7 +167,11 @@ fn analyse_capture(
     let poses = poses_for_plots(document, &film, skeleton.nodes.len(), &mut notes);
     let picture = document.picture.as_ref().filter(|_| args.report.is_some());
     let picture = picture.and_then(|p| data_address(&p.rgb).ok());
-    let outline = document.note.outline.as_ref();
+    let outline = document.note.outline.iter();
+    let outline_px: Vec<Point2<i32>> = outline
+        .flat_map(|o| &o.polygon_px)
+        .map(|p| Point2::from(*p))
+        .collect();
     let study = Study::of(&Given {
         name,
         source: &document.note.source.name,
@@ -177,7 +182,7 @@ fn analyse_capture(
         excitation: excitation(config.dynamics.excitation),
         metres_per_px: config.export.metres_per_px,
         highest_hz: config.dynamics.highest_hz,
-        outline_px: outline.map_or(&[][..], |o| &o.polygon_px),
+        outline_px: &outline_px,
         picture: picture.as_deref(),
         notes: &notes.all,
     });

@@ -118,7 +118,7 @@ impl<'a> UsableFilm<'a> {
         }
         let highest_hz = (BELOW_NYQUIST * 0.5 / film.step_s()).min(config.highest_hz);
         let frequencies_hz = Bounds::new(LEAST_PERIODS / film.span_s(), highest_hz);
-        if frequencies_hz.lo >= frequencies_hz.hi {
+        if frequencies_hz.is_empty() {
             return Err(Unidentified::TooShort);
         }
         let given = match config.excitation {

@@ -1,5 +1,6 @@
 //! Pictures, as the camera delivered them and as the tracker wants them.
 
+use nalgebra::Point2;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -20,12 +21,12 @@ impl Size {
         self.width as usize * self.height as usize
     }
 
-    /// Whether the pixel whose centre is nearest to (`u_px`, `v_px`) lies in the picture.
-    pub fn contains(self, u_px: f64, v_px: f64) -> bool {
-        u_px >= -0.5
-            && v_px >= -0.5
-            && u_px < self.width as f64 - 0.5
-            && v_px < self.height as f64 - 0.5
+    /// Whether the pixel whose centre is nearest to `at_px` lies in the picture.
+    pub fn contains(self, at_px: Point2<f64>) -> bool {
+        at_px.x >= -0.5
+            && at_px.y >= -0.5
+            && at_px.x < self.width as f64 - 0.5
+            && at_px.y < self.height as f64 - 0.5
     }
 }
 

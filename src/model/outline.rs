@@ -1,6 +1,7 @@
 //! Which pixels are tree.
 
 use super::Size;
+use nalgebra::Point2;
 
 /// The region of the picture in which the tree stands, as a mask.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -9,7 +10,7 @@ pub struct Outline {
     /// One byte a pixel, row by row: 255 inside, 0 outside.
     pub mask: Vec<u8>,
     /// The region's border in pixels, for drawing; closed, not repeating its first point.
-    pub polygon_px: Vec<[i32; 2]>,
+    pub polygon_px: Vec<Point2<i32>>,
     /// Opacity of the tree, 0 to 255, row by row, where the region was solved from scribbles: the
     /// sky between its branches has none, though it is inside.
     pub matte: Option<Vec<u8>>,
@@ -18,7 +19,7 @@ pub struct Outline {
 impl Outline {
     /// Whether the pixel nearest to (`u_px`, `v_px`) is tree; outside the picture nothing is.
     pub fn contains(&self, u_px: f64, v_px: f64) -> bool {
-        self.size.contains(u_px, v_px) && {
+        self.size.contains(Point2::new(u_px, v_px)) && {
             let (u, v) = (
                 u_px.round().max(0.0) as usize,
                 v_px.round().max(0.0) as usize,

@@ -122,7 +122,7 @@ pub struct Snapshot {
     pub error_px: Option<f64>,
     pub image_size: Option<Size>,
     pub preview: Option<Arc<Rgb>>,
-    pub outline_px: Vec<[i32; 2]>,
+    pub outline_px: Vec<Point2<i32>>,
     /// Points of this frame, px, each with the number of its main branch, `None` before the tree is
     /// built.
     pub points: Vec<(Point2<f32>, Option<u8>)>,

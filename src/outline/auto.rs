@@ -6,6 +6,7 @@ use super::{region, trunk};
 use crate::config;
 use crate::model::{Luma, Outline, Size};
 use crate::signal::median;
+use nalgebra::Point2;
 
 /// Width to which pictures are reduced, px: sway of a pixel or two is then still seen, single-pixel
 /// noise is not.
@@ -275,7 +276,7 @@ pub fn whole(size: Size) -> Outline {
     Outline {
         size,
         mask: vec![255; size.area()],
-        polygon_px: vec![[0, 0], [w, 0], [w, h], [0, h]],
+        polygon_px: [[0, 0], [w, 0], [w, h], [0, h]].map(Point2::from).to_vec(),
         matte: None,
     }
 }

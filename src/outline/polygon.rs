@@ -3,6 +3,7 @@
 use super::error::OutlineError;
 use super::region;
 use crate::model::{Outline, Size};
+use crate::signal::segments_cross;
 use nalgebra::Point2;
 use serde::Deserialize;
 
@@ -37,7 +38,7 @@ fn corners(polygon_px: &[Point2<f64>], size: Size) -> Result<Vec<Point2<f64>>, S
     let mut corners: Vec<Point2<f64>> = Vec::with_capacity(polygon_px.len());
     for &p in polygon_px {
         let (u, v) = (p.x, p.y);
-        if !(u.is_finite() && v.is_finite() && size.contains(u, v)) {
+        if !(u.is_finite() && v.is_finite() && size.contains(p)) {
             return Err(format!("corner ({u}, {v}) lies outside the {size} picture"));
         }
         if corners.last() != Some(&p) {
@@ -63,27 +64,21 @@ fn corners(polygon_px: &[Point2<f64>], size: Size) -> Result<Vec<Point2<f64>>, S
     Ok(corners)
 }
 
-/// The first two edges (numbered from their first corner) that cross each other.
+/// The first two edges (numbered from their first corner) that cross each other. Edges that only
+/// touch are no harm: the pixels inside are the same whichever way one goes round.
 pub fn crossing(corners: &[Point2<f64>]) -> Option<(usize, usize)> {
     let n = corners.len();
     for i in 0..n {
         for j in i + 2..n {
-            let (a, b) = (corners[i], corners[i + 1]);
-            let (c, d) = (corners[j], corners[(j + 1) % n]);
+            let edge = [corners[i], corners[i + 1]];
+            let other = [corners[j], corners[(j + 1) % n]];
             // The last edge and the first are neighbours.
-            if (j + 1) % n != i && edges_cross(a, b, c, d) {
+            if (j + 1) % n != i && segments_cross(&edge, &other) {
                 return Some((i, j));
             }
         }
     }
     None
-}
-
-/// Whether the edge from `a` to `b` crosses that from `c` to `d`. Edges that only touch are no
-/// harm: the pixels inside are the same whichever way one goes round.
-fn edges_cross(a: Point2<f64>, b: Point2<f64>, c: Point2<f64>, d: Point2<f64>) -> bool {
-    let (ab, cd) = (b - a, d - c);
-    ab.perp(&(c - a)) * ab.perp(&(d - a)) < 0.0 && cd.perp(&(a - c)) * cd.perp(&(b - c)) < 0.0
 }
 
 fn area(corners: &[Point2<f64>]) -> f64 {

@@ -35,7 +35,7 @@ pub fn fill(size: Size, polygon_px: &[Point2<f64>]) -> opencv::Result<Outline> {
     Ok(Outline {
         size,
         mask: mask.data_bytes()?.to_vec(),
-        polygon_px: corners.iter().map(|c| [c.x, c.y]).collect(),
+        polygon_px: corners.iter().map(|c| Point2::new(c.x, c.y)).collect(),
         matte: None,
     })
 }
@@ -77,7 +77,11 @@ pub fn close_to_one(size: Size, mask: &[u8], close_px: u32) -> opencv::Result<Op
         0,
         Point::new(0, 0),
     )?;
-    let polygon_px = contours.get(i)?.iter().map(|c| [c.x, c.y]).collect();
+    let polygon_px = contours
+        .get(i)?
+        .iter()
+        .map(|c| Point2::new(c.x, c.y))
+        .collect();
     Ok(Some(Outline {
         size,
         mask: filled.data_bytes()?.to_vec(),

@@ -75,7 +75,7 @@ fn median(picture: &Rgb, skeleton: &Skeleton, places: &[Point2<f64>]) -> Option<
     let scale = f64::from(picture.size.width) / f64::from(skeleton.image_size.width.max(1));
     let mut channels: [Vec<u8>; 3] = Default::default();
     for at in places.iter().map(|p| (p * scale).map(f64::round)) {
-        if picture.size.contains(at.x, at.y) {
+        if picture.size.contains(at) {
             let colour = picture.at(at.x.max(0.0) as u32, at.y.max(0.0) as u32);
             for (channel, value) in channels.iter_mut().zip(colour) {
                 channel.push(value);

@@ -1,7 +1,7 @@
 //! Outline, points, tree and poses as messages that viewers know how to draw.
 
 use super::wire::Message;
-use crate::model::{NodeId, Outline, Pose, Skeleton, TrackSet};
+use crate::model::{NodeId, Observation, Outline, Pose, Skeleton, TrackSet};
 use nalgebra::Point2;
 use serde::Serialize;
 
@@ -18,15 +18,12 @@ const LINE_LOOP: i64 = 2;
 const LINE_LIST: i64 = 2;
 
 pub(super) fn outline(outline: &Outline, time_ns: u64, into: &mut Vec<u8>) {
-    let corners = outline.polygon_px.iter().map(|p| Point2::from(*p).cast());
+    let corners = outline.polygon_px.iter().map(|p| p.cast());
     annotation(LINE_LOOP, corners, OUTLINE_COLOUR, 2.0, time_ns, into);
 }
 
 pub(super) fn points(tracks: &TrackSet, time_ns: u64, into: &mut Vec<u8>) {
-    let points = tracks
-        .observations
-        .iter()
-        .map(|o| Point2::new(o.u_px, o.v_px).cast());
+    let points = tracks.observations.iter().map(Observation::at_px);
     annotation(POINTS, points, POINT_COLOUR, 4.0, time_ns, into);
 }
 

@@ -53,14 +53,14 @@ fn capture(study: &Study) -> Value {
 }
 
 fn branch(study: &Study, branch: &Branch) -> Value {
-    let sway = branch.known();
-    let metres = (study.metres_per_px > 0.0).then_some(branch.amplitude_px * study.metres_per_px);
+    let (sway, tip) = (branch.known(), branch.tip_from_foot_px);
+    let metres = (study.metres_per_px > 0.0).then_some(branch.amplitude_px() * study.metres_per_px);
     json!({
         "node_id": branch.name,
         "parent_id": branch.parent,
         "level": branch.level,
         "points": branch.points,
-        "end_px": [study.foot_px.x + branch.tip.x, study.foot_px.y - branch.tip.y],
+        "end_px": [study.foot_px.x + tip.x, study.foot_px.y - tip.y],
         "length_px": branch.length_px(),
         "identifiable": sway.is_some(),
         "frequency_hz": sway.map(|s| interval(&s.frequency_hz)),
@@ -68,7 +68,7 @@ fn branch(study: &Study, branch: &Branch) -> Value {
         "amplitude_deg": sway.map(|_| branch.amplitude_deg),
         "amplitude_by_points_deg": sway.map(|_| branch.by_points_deg),
         "amplitude_in_angle_deg": sway.map(|_| branch.in_angle_deg),
-        "amplitude_px": sway.map(|_| branch.amplitude_px),
+        "amplitude_px": sway.map(|_| branch.amplitude_px()),
         "amplitude_m": sway.and(metres),
         "spectrum_peak_hz": branch.reference.map(|r| r.peak_hz),
         "half_power_damping": branch.reference.map(|r| r.damping_ratio),

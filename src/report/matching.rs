@@ -5,7 +5,7 @@
 //! that camera and zoom may differ.
 
 use super::study::{Branch, Study};
-use nalgebra::{Point2, Vector2};
+use nalgebra::{Point2, Vector2, distance};
 
 /// A branch may have moved by this share of the tree's size from one capture to the next.
 const FARTHEST: f64 = 0.08;
@@ -100,14 +100,20 @@ impl Frame {
         let mut pairs: Vec<[Point2<f64>; 2]> = Vec::new();
         for (branch, m) in first.branches.iter().zip(found) {
             if let Some(there) = m.branch() {
-                pairs.push([branch.tip, other.branches[there].tip]);
+                pairs.push([
+                    branch.tip_from_foot_px,
+                    other.branches[there].tip_from_foot_px,
+                ]);
             }
         }
         let n = pairs.len() as f64;
-        let [a, b] = [0, 1].map(|k| pairs.iter().map(|p| p[k].coords).sum::<Vector2<f64>>() / n);
+        let [a, b] = [0, 1].map(|k| {
+            let sum: Vector2<f64> = pairs.iter().map(|p| p[k].coords).sum();
+            Point2::from(sum / n)
+        });
         let (mut products, mut squares) = (0.0, 0.0);
         for [p, q] in &pairs {
-            let (p, q) = (p.coords - a, q.coords - b);
+            let (p, q) = (p - a, q - b);
             products += p.dot(&q);
             squares += q.norm_squared();
         }
@@ -123,15 +129,14 @@ impl Frame {
 
     /// How far two branches lie from each other, tips and bases, as a share of the tree's size.
     fn off(&self, a: &Branch, b: &Branch, size_px: f64) -> f64 {
-        let tips = self.distance_px(a.tip, b.tip) / size_px;
-        let bases = self.distance_px(a.base, b.base) / size_px;
+        let tips = self.distance_px(a.tip_from_foot_px, b.tip_from_foot_px) / size_px;
+        let bases = self.distance_px(a.base_from_foot_px, b.base_from_foot_px) / size_px;
         tips.hypot(BASE * bases)
     }
 
     /// From a place in the first capture to one in the other.
     fn distance_px(&self, p: Point2<f64>, q: Point2<f64>) -> f64 {
-        let way = p - self.place(q);
-        way.x.hypot(way.y)
+        distance(&p, &self.place(q))
     }
 }
 
@@ -185,13 +190,12 @@ mod tests {
             parent: (i > 0).then_some(1),
             level: if i > 0 { 2 } else { 1 },
             points: 9,
-            base: if i > 0 { tips[0] } else { Point2::origin() },
-            tip: *tip,
+            base_from_foot_px: if i > 0 { tips[0] } else { Point2::origin() },
+            tip_from_foot_px: *tip,
             sway: Err(Unidentified::TooShort),
             amplitude_deg: f64::NAN,
             by_points_deg: f64::NAN,
             in_angle_deg: f64::NAN,
-            amplitude_px: f64::NAN,
             times_s: Vec::new(),
             plane_deg: Vec::new(),
             space_deg: Vec::new(),

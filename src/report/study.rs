@@ -8,7 +8,7 @@ use crate::dynamics::{
     angle_to_parent_deg, spectrum,
 };
 use crate::model::{Excitation, NodeId, Pose, Skeleton, Sway, Swaying, Unidentified};
-use nalgebra::{Point2, Vector2};
+use nalgebra::{Point2, Vector2, distance};
 
 /// A step from frame to frame that is so many times the usual one is a gap.
 const GAP: f64 = 1.6;
@@ -36,7 +36,7 @@ pub struct Given<'a> {
     /// Highest frequency that is looked for, Hz.
     pub highest_hz: f64,
     /// Corners of the region that was tracked, px; empty if unknown.
-    pub outline_px: &'a [[i32; 2]],
+    pub outline_px: &'a [Point2<i32>],
     /// A frame of the film as a `data:` address.
     pub picture: Option<&'a str>,
     /// What the reader should know, one sentence each.
@@ -67,7 +67,7 @@ pub struct Study {
     pub highest_hz: f64,
     /// The trunk's foot in the picture, px.
     pub foot_px: Point2<f64>,
-    pub outline_px: Vec<[i32; 2]>,
+    pub outline_px: Vec<Point2<i32>>,
     pub picture: Option<String>,
     pub branches: Vec<Branch>,
     pub notes: Vec<String>,
@@ -78,11 +78,11 @@ pub struct Study {
 pub struct Gap {
     /// The last moment before it.
     pub after_s: f64,
+    /// From there to the next frame.
     pub length_s: f64,
 }
 
-/// One measured branch. Places are in the picture at rest, px to the right of the trunk's foot and
-/// above it.
+/// One measured branch.
 #[derive(Clone, Debug)]
 pub struct Branch {
     /// As in `nodes.csv`.
@@ -92,8 +92,10 @@ pub struct Branch {
     pub level: u8,
     /// Points on it and on all that it carries.
     pub points: u32,
-    pub base: Point2<f64>,
-    pub tip: Point2<f64>,
+    /// Where it begins and ends in the picture at rest, px to the right of the trunk's foot and
+    /// above it.
+    pub base_from_foot_px: Point2<f64>,
+    pub tip_from_foot_px: Point2<f64>,
     pub sway: Swaying,
     /// Amplitude of the branch's own oscillation in its angle to the one that carries it, degrees;
     /// no number where unknown.
@@ -103,8 +105,6 @@ pub struct Branch {
     /// in the picture's plane, as in [`fitted_deg`](Self::fitted_deg). No numbers where unknown.
     pub by_points_deg: f64,
     pub in_angle_deg: f64,
-    /// What the amplitude is at the branch's end, px in the picture; no number where unknown.
-    pub amplitude_px: f64,
     /// When every angle was, s; empty without poses. The angles are to the branch that carries it,
     /// less their mean, degrees: in the picture's plane and in space (Hu et al. eq. 1); no number where
     /// it has no direction.
@@ -198,7 +198,7 @@ impl Study {
     pub fn size_px(&self) -> f64 {
         self.branches
             .iter()
-            .map(|b| b.tip.x.hypot(b.tip.y))
+            .map(|b| b.tip_from_foot_px.coords.norm())
             .fold(0.0, f64::max)
     }
 
@@ -221,8 +221,12 @@ impl Branch {
 
     /// Its length in the picture at rest, px.
     pub fn length_px(&self) -> f64 {
-        let along = self.tip - self.base;
-        along.x.hypot(along.y)
+        distance(&self.base_from_foot_px, &self.tip_from_foot_px)
+    }
+
+    /// What the amplitude is at the branch's end, px in the picture; no number where unknown.
+    pub fn amplitude_px(&self) -> f64 {
+        self.amplitude_deg.to_radians() * self.length_px()
     }
 }
 
@@ -242,8 +246,6 @@ fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: Bounds) -> Branch 
     let own = &skeleton.nodes[node.index()];
     let parent = skeleton.ancestors(node).next().unwrap_or(NodeId(0));
     let (base, tip) = (place(skeleton, parent), place(skeleton, node));
-    let along = tip - base;
-    let length_px = along.x.hypot(along.y);
     let times_s: Vec<f64> = poses.iter().map(|p| p.time_s).collect();
     let plane_deg = centred(angle_to_parent_deg(skeleton, poses, node));
     let space_deg = centred(angle_in_space_deg(skeleton, poses, node));
@@ -266,13 +268,12 @@ fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: Bounds) -> Branch 
         parent: parent_node.filter(|p| p.parent.is_some()).map(|p| p.name.0),
         level: own.level,
         points: own.n_tracks,
-        base,
-        tip,
+        base_from_foot_px: base,
+        tip_from_foot_px: tip,
         sway,
         amplitude_deg,
         by_points_deg,
         in_angle_deg,
-        amplitude_px: amplitude_deg.to_radians() * length_px,
         way_px: way_px(poses, node, tip),
         times_s,
         plane_deg,

@@ -100,9 +100,9 @@ fn row(study: &Study, branch: &Branch) -> Vec<String> {
                     .map_or("unknown".into(), |d| interval(&d, 3)),
             );
             row.push(number(branch.amplitude_deg, 2));
-            row.push(number(branch.amplitude_px, 1));
+            row.push(number(branch.amplitude_px(), 1));
             if study.metres_per_px > 0.0 {
-                row.push(number(branch.amplitude_px * study.metres_per_px, 4));
+                row.push(number(branch.amplitude_px() * study.metres_per_px, 4));
             }
             row.push(number(branch.reference.map_or(f64::NAN, |r| r.peak_hz), 2));
             row.push(number(

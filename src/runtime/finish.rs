@@ -285,7 +285,7 @@ pub(super) fn describe(
             frame: job.quality.first.map_or(0, |(frame, _)| frame),
             width: o.size.width,
             height: o.size.height,
-            polygon_px: o.polygon_px.clone(),
+            polygon_px: o.polygon_px.iter().map(|p| (*p).into()).collect(),
         }),
         picture: job.picture.as_ref().map(|p| PictureNote {
             file: PICTURE_FILE.into(),

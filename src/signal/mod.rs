@@ -9,9 +9,11 @@ pub mod least_squares;
 pub mod principal;
 pub mod qr;
 pub mod reflection;
+mod segments;
 pub mod statistics;
 pub mod variable_projection;
 pub mod vectors;
 
 pub use principal::along_principal_direction;
+pub use segments::segments_cross;
 pub use statistics::median;

@@ -135,8 +135,7 @@ impl Tracker {
             if p.coasting == 0 {
                 p.seen_s = time_s;
             }
-            let keep = time_s - p.seen_s <= coast_s
-                && size.contains(f64::from(p.now_px.x), f64::from(p.now_px.y));
+            let keep = time_s - p.seen_s <= coast_s && size.contains(p.now_px.cast());
             if !keep && p.trial.is_some() {
                 rejected.push(p.id);
             }

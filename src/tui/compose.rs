@@ -43,7 +43,7 @@ pub fn picture(
         draw_polygon(&mut raster, drawing, placed, fine);
         return Some(raster);
     }
-    for (a, b) in edges(&outline(snapshot), true) {
+    for [a, b] in edges(&outline(snapshot), true) {
         raster.line(
             placed.dot_from_pixel(a),
             placed.dot_from_pixel(b),
@@ -67,7 +67,7 @@ pub fn picture(
 /// The polygon that the user draws, its corners, and the keyboard's cursor.
 fn draw_polygon(raster: &mut Raster, drawing: &Drawing, placed: &Placed, fine: i64) {
     let points = drawing.points_px();
-    for (a, b) in edges(points, points.len() >= 3) {
+    for [a, b] in edges(points, points.len() >= 3) {
         raster.line(
             placed.dot_from_pixel(a),
             placed.dot_from_pixel(b),
@@ -101,7 +101,7 @@ pub fn letters(
         rows: shades(&Raster::scaled(snapshot.preview.as_deref()?, cells)?),
     };
     let Some(drawing) = drawing else {
-        for (a, b) in edges(&outline(snapshot), true) {
+        for [a, b] in edges(&outline(snapshot), true) {
             letters.line(a, b, '#');
         }
         for p in &snapshot.candidates_px {
@@ -114,7 +114,7 @@ pub fn letters(
         return Some(letters.rows);
     };
     let polygon = drawing.points_px();
-    for (a, b) in edges(polygon, polygon.len() >= 3) {
+    for [a, b] in edges(polygon, polygon.len() >= 3) {
         letters.line(a, b, '#');
     }
     for p in polygon {
@@ -172,24 +172,17 @@ impl Letters<'_> {
 }
 
 fn outline(snapshot: &Snapshot) -> Vec<Point2<f64>> {
-    snapshot
-        .outline_px
-        .iter()
-        .map(|p| Point2::from(p.map(f64::from)))
-        .collect()
+    snapshot.outline_px.iter().map(|p| p.cast()).collect()
 }
 
 /// Neighbouring points, the last with the first too if the line is closed.
-fn edges(
-    points: &[Point2<f64>],
-    closed: bool,
-) -> impl Iterator<Item = (Point2<f64>, Point2<f64>)> + '_ {
+fn edges(points: &[Point2<f64>], closed: bool) -> impl Iterator<Item = [Point2<f64>; 2]> + '_ {
     let n = if closed {
         points.len()
     } else {
         points.len().saturating_sub(1)
     };
-    (0..n).map(|i| (points[i], points[(i + 1) % points.len()]))
+    (0..n).map(|i| [points[i], points[(i + 1) % points.len()]])
 }
 
 fn mark(

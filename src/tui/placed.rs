@@ -138,7 +138,7 @@ mod tests {
             for row in placed.area.top()..placed.area.bottom() {
                 for column in placed.area.left()..placed.area.right() {
                     let pixel = placed.pixel_at(column, row).unwrap();
-                    prop_assert!(placed.image.contains(pixel.x, pixel.y));
+                    prop_assert!(placed.image.contains(pixel));
                     prop_assert_eq!(placed.cell_from_pixel(pixel), Some((column, row)));
                 }
             }

@@ -11,16 +11,6 @@ use ratatui::widgets::canvas::{Canvas, Line};
 
 const EIGHTHS: [&str; 9] = [" ", "▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"];
 
-/// The least and the greatest of all numbers among `values`.
-pub fn range(values: impl Iterator<Item = f64>) -> Option<Bounds> {
-    values
-        .filter(|x| x.is_finite())
-        .fold(None, |all: Option<Bounds>, x| {
-            let all = all.unwrap_or(Bounds::new(x, x));
-            Some(Bounds::new(all.lo.min(x), all.hi.max(x)))
-        })
-}
-
 /// A range that is at least `least` wide, about the same middle.
 pub fn widened(range: Bounds, least: f64) -> Bounds {
     let more = (0.5 * (least - range.length())).max(0.0);

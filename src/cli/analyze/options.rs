@@ -87,10 +87,11 @@ impl AnalyzeArgs {
                 ));
             }
         }
-        let Bounds { lo: from, hi: to } = self.within_s();
-        if from >= to {
+        let within_s = self.within_s();
+        if within_s.is_empty() {
             return bad_usage(format!(
-                "--from {from} is not before --to {to}; --from comes first"
+                "--from {} is not before --to {}; --from comes first",
+                within_s.lo, within_s.hi
             ));
         }
         match &self.report {

@@ -211,7 +211,7 @@ fn band(text: &str) -> Result<Bounds, String> {
         .split_once("..")
         .and_then(|(low, high)| Some(Bounds::new(frequency_hz(low)?, frequency_hz(high)?)));
     parsed
-        .filter(|band_hz| band_hz.lo < band_hz.hi)
+        .filter(|band_hz| !band_hz.is_empty())
         .ok_or_else(|| "give two frequencies in Hz, as 0.5..2".to_owned())
 }
 

@@ -148,7 +148,7 @@ impl ModalSolution {
             MIN_PERIODS / span_s,
             below_nyquist_hz.min(limits.frequencies_hz.hi),
         );
-        if frequencies_hz.lo >= frequencies_hz.hi {
+        if frequencies_hz.is_empty() {
             return None;
         }
         let ThinnedFilm {

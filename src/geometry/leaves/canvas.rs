@@ -65,7 +65,7 @@ impl Grid {
 
     /// The cell that holds a place, if one does.
     pub fn index(&self, cell: Point2<f64>) -> Option<usize> {
-        let ok = cell.x.is_finite() && cell.y.is_finite() && self.size.contains(cell.x, cell.y);
+        let ok = cell.x.is_finite() && cell.y.is_finite() && self.size.contains(cell);
         ok.then(|| {
             let (u, v) = (
                 cell.x.round().max(0.0) as usize,

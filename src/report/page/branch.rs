@@ -56,7 +56,7 @@ fn how_far(branch: &Branch) -> String {
 }
 
 fn at_its_end(study: &Study, branch: &Branch) -> String {
-    let px = branch.amplitude_px;
+    let px = branch.amplitude_px();
     if study.metres_per_px > 0.0 && px.is_finite() {
         format!(", {} m at its end", number(px * study.metres_per_px, 4))
     } else {

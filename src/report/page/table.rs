@@ -56,10 +56,10 @@ fn row(study: &Study, branch: &Branch, columns: usize) -> String {
                 sway.damping_ratio
                     .map_or("unknown".into(), |d| stacked(&interval(&d, 3))),
                 number(branch.amplitude_deg, 2),
-                number(branch.amplitude_px, 1),
+                number(branch.amplitude_px(), 1),
             ];
             if study.metres_per_px > 0.0 {
-                rest.push(number(branch.amplitude_px * study.metres_per_px, 4));
+                rest.push(number(branch.amplitude_px() * study.metres_per_px, 4));
             }
             let reference = [
                 number(branch.reference.map_or(f64::NAN, |r| r.peak_hz), 2),

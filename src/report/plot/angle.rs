@@ -64,7 +64,7 @@ pub fn angle(study: &Study, branch: &Branch) -> Option<String> {
             .zip(angles)
             .map(|(t, a)| Point2::new(*t, *a));
         let points = thinned(&points.collect::<Vec<_>>(), MOST);
-        svg.path(points.into_iter().map(|p| axes.at(p.x, p.y)), class);
+        svg.path(points.into_iter().map(|p| axes.at(p)), class);
     }
     Some(svg.finish())
 }

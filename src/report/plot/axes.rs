@@ -58,11 +58,11 @@ impl Axes {
     }
 
     /// No number outside of the frame's sides.
-    pub fn at(&self, x: f64, y: f64) -> Point2<f64> {
-        if x < self.x.lo || x > self.x.hi {
+    pub fn at(&self, value: Point2<f64>) -> Point2<f64> {
+        if value.x < self.x.lo || value.x > self.x.hi {
             NO_PLACE
         } else {
-            Point2::new(self.x(x), self.y(y))
+            Point2::new(self.x(value.x), self.y(value.y))
         }
     }
 
@@ -201,14 +201,7 @@ fn extremes(stretch: &[Point2<f64>]) -> Vec<Point2<f64>> {
 
 /// The least and the largest of some values; no numbers of none.
 pub fn range(values: impl IntoIterator<Item = f64>) -> Bounds {
-    let seen = values.into_iter().filter(|v| v.is_finite());
-    let none = Bounds::new(f64::INFINITY, f64::NEG_INFINITY);
-    let ends = seen.fold(none, |ends, v| Bounds::new(ends.lo.min(v), ends.hi.max(v)));
-    if ends.lo <= ends.hi {
-        ends
-    } else {
-        Bounds::new(f64::NAN, f64::NAN)
-    }
+    Bounds::of(values).unwrap_or(Bounds::new(f64::NAN, f64::NAN))
 }
 
 #[cfg(test)]

@@ -58,7 +58,7 @@ pub fn spectra(curves: &[Curve], highest_hz: f64, label: &str) -> Option<String>
     axes.draw(&mut svg, "frequency, Hz", "degrees");
     for (curve, points) in curves.iter().zip(&all) {
         let line = thinned(points, MOST).into_iter();
-        svg.path(line.map(|p| axes.at(p.x, p.y)), &curve.class);
+        svg.path(line.map(|p| axes.at(p)), &curve.class);
         let peak = curve.answer.and_then(|a| a.peak).filter(|_| alone);
         if let Some(peak) = peak {
             mark_peak(&mut svg, &axes, curve.spectrum, peak, highest_hz);
@@ -91,7 +91,7 @@ fn mark_frequency(
         &format!("{class} band"),
     );
     svg.path(
-        [0.0, top].map(|a| axes.at(frequency_hz.value, a)),
+        [0.0, top].map(|a| axes.at(Point2::new(frequency_hz.value, a))),
         &format!("{class} mark"),
     );
 }

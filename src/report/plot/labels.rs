@@ -2,6 +2,7 @@
 //! to their place.
 
 use crate::bounds::Bounds;
+use crate::signal::segments_cross;
 use nalgebra::{Point2, Vector2};
 
 /// Widest digit, from the top of a digit to the line that it stands on, and what hangs below, as
@@ -119,7 +120,7 @@ impl Drawing<'_> {
             .count();
         let leaders = self.placed.iter().flatten().filter_map(|q| q.leader);
         let across = leaders
-            .filter(|l| p.leader.is_some_and(|own| crosses(&own, l)))
+            .filter(|l| p.leader.is_some_and(|own| segments_cross(&own, l)))
             .count();
         ring + OVER_LINE * under as f64
             + OVER_PLACE * dots as f64
@@ -202,12 +203,7 @@ fn cuts(frame: &Frame, [a, b]: &Segment) -> bool {
             within.hi.min(at_lo.max(at_hi)),
         );
     }
-    within.lo < within.hi
-}
-
-fn crosses([a, b]: &Segment, [c, d]: &Segment) -> bool {
-    let (ab, cd) = (b - a, d - c);
-    ab.perp(&(c - a)) * ab.perp(&(d - a)) < 0.0 && cd.perp(&(a - c)) * cd.perp(&(b - c)) < 0.0
+    !within.is_empty()
 }
 
 #[cfg(test)]

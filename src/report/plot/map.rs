@@ -36,7 +36,7 @@ pub fn map(study: &Study) -> Map {
     let lines: Vec<[Point2<f64>; 2]> = study
         .branches
         .iter()
-        .map(|b| [b.base, b.tip].map(|p| in_drawing(study, scale, p)))
+        .map(|b| [b.base_from_foot_px, b.tip_from_foot_px].map(|p| in_drawing(study, scale, p)))
         .collect();
     // Those with an answer lie above the others.
     let mut lowest_first: Vec<usize> = (0..lines.len()).collect();
@@ -87,9 +87,7 @@ fn background(svg: &mut Svg, study: &Study, scale: f64, size: Vector2<f64>) {
         svg.rect(Point2::origin(), size.into(), "veil");
     }
     let corners = study.outline_px.iter();
-    let mut outline: Vec<Point2<f64>> = corners
-        .map(|p| p.map(|x| f64::from(x) * scale).into())
-        .collect();
+    let mut outline: Vec<Point2<f64>> = corners.map(|p| p.map(|x| f64::from(x) * scale)).collect();
     outline.extend(outline.first().copied());
     svg.path(outline, "outline");
 }

@@ -135,7 +135,7 @@ fn sways(
         .of(b.node)
         .filter(|(t, a)| newest_s - t <= span_s && a.is_finite())
         .collect();
-    let Some(range) = plot::range(seen.iter().map(|(_, a)| *a)) else {
+    let Some(range) = Bounds::of(seen.iter().map(|(_, a)| *a)) else {
         frame.render_widget(
             Line::styled(" angle: none in this picture", theme.faint()),
             note,

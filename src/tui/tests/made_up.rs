@@ -5,7 +5,7 @@ use crate::model::{
     Node, NodeId, NodeName, Phase, Pose, Rgb, Size, Skeleton, Snapshot, Sway, SwayNow,
     Unidentified,
 };
-use nalgebra::{Point3, UnitQuaternion, Vector3};
+use nalgebra::{Point2, Point3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
 /// A camera picture: bright sky above, dark ground below.
@@ -124,7 +124,9 @@ pub fn snapshot(phase: Phase) -> Snapshot {
         ..Snapshot::default()
     };
     if reached(phase, Phase::Detect) {
-        s.outline_px = vec![[220, 340], [200, 60], [330, 20], [450, 80], [420, 340]];
+        s.outline_px = [[220, 340], [200, 60], [330, 20], [450, 80], [420, 340]]
+            .map(Point2::from)
+            .to_vec();
     }
     if reached(phase, Phase::Accumulate) {
         add_points(&mut s);
@@ -282,7 +284,8 @@ pub fn huge() -> Snapshot {
         ([1e30, -1e30].into(), Some(7)),
         ([f32::INFINITY, 0.0].into(), None),
     ];
-    s.outline_px = vec![[i32::MIN, i32::MAX], [i32::MAX, i32::MAX], [0, i32::MIN]];
+    let (low, high) = (i32::MIN, i32::MAX);
+    s.outline_px = vec![[low, high].into(), [high; 2].into(), [0, low].into()];
     s.messages = vec!["word ".repeat(200), "x".repeat(500)];
     s.branches = (0..5000)
         .map(|node| BranchRow {
