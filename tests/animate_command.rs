@@ -3,7 +3,7 @@
 mod support;
 
 use arborcam::document::Document;
-use nalgebra::Point2;
+use nalgebra::{Point2, distance};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -91,7 +91,7 @@ fn table(path: &Path) -> BTreeMap<u64, Vec<Point2<f64>>> {
 fn apart_px(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
     a.iter()
         .zip(b)
-        .map(|(a, b)| (a.x - b.x).hypot(a.y - b.y))
+        .map(|(a, b)| distance(a, b))
         .fold(0.0, f64::max)
 }
 

@@ -5,6 +5,7 @@ mod support;
 use arborcam::bounds::Bounds;
 use arborcam::document::{CaptureNote, Document, DocumentError};
 use arborcam::model::Skeleton;
+use nalgebra::distance;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -189,10 +190,7 @@ fn a_tree_of_the_same_shape_is_posed_as_it_was() {
             a.joints[..read.skeleton.measured()]
                 .iter()
                 .zip(&b.joints)
-                .map(|(a, b)| {
-                    let (a, b) = (front(a), front(b));
-                    (a[0] - b[0]).hypot(a[1] - b[1])
-                }),
+                .map(|(a, b)| distance(&front(a), &front(b))),
         );
     }
     off.sort_by(f64::total_cmp);

@@ -5,7 +5,7 @@ mod support;
 use arborcam::config::Config;
 use arborcam::model::{Frame, TrackId};
 use arborcam::track::Tracker;
-use nalgebra::{Point2, Vector2};
+use nalgebra::{Point2, Vector2, distance};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The size of a hand, half axes of an ellipse, px; it crosses the crown in two seconds.
@@ -59,10 +59,7 @@ fn follow(covered: bool) -> Places {
         }
         let set = tracker.step(&frame);
         let seen = set.observations.iter();
-        places.push(
-            seen.map(|o| (o.id, Point2::new(f64::from(o.u_px), f64::from(o.v_px))))
-                .collect(),
-        );
+        places.push(seen.map(|o| (o.id, o.at_px())).collect());
     }
     places
 }
@@ -78,7 +75,7 @@ fn tracks_do_not_go_with_what_passes_before_them_and_come_back() {
             were_hidden.insert(*id);
             if let Some(there) = covered[k].get(id) {
                 reported += 1;
-                dragged += usize::from((there.x - at.x).hypot(there.y - at.y) > 4.0);
+                dragged += usize::from(distance(there, at) > 4.0);
             }
         }
     }
@@ -89,7 +86,7 @@ fn tracks_do_not_go_with_what_passes_before_them_and_come_back() {
     let mut back = 0;
     for &id in &there {
         if let (Some(at), Some(there)) = (free[AFTER].get(id), covered[AFTER].get(id)) {
-            back += usize::from((there.x - at.x).hypot(there.y - at.y) < 3.0);
+            back += usize::from(distance(there, at) < 3.0);
         }
     }
     let (n, hidden) = (there.len(), hidden as f64);

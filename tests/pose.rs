@@ -7,7 +7,7 @@ use arborcam::config::{Motion, MotionMethod};
 use arborcam::model::{Node, NodeId, NodeName, Pose, Size, Skeleton};
 use arborcam::motion::{PoseEstimator, Problem};
 use chance::Chance;
-use nalgebra::{Point2, Point3, Unit, UnitQuaternion, UnitVector3, Vector2, Vector3};
+use nalgebra::{Point2, Point3, Unit, UnitQuaternion, UnitVector3, Vector2, Vector3, distance};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -174,7 +174,7 @@ fn no_joint_turns_faster_or_farther_than_its_bounds_whatever_is_seen() {
     for k in 0..400u64 {
         let mut targets = Vec::new();
         for node in &tree.nodes[..4] {
-            let at = Point2::from(tree.image_from_model(&node.position));
+            let at = tree.image_from_model(&node.position);
             let is_seen = chance.even() < 0.8;
             targets.push(
                 is_seen.then(|| at + Vector2::new(90.0 * chance.normal(), 90.0 * chance.normal())),
@@ -315,11 +315,11 @@ fn swing_to_the_viewer(lean: f64, swing: f64, method: MotionMethod) -> Vec<(f64,
             .iter()
             .map(|n| Some(tree.image_from_model(&n.position)))
             .collect();
-        let target = Point2::from(tree.image_from_model(&truth));
+        let target = tree.image_from_model(&truth);
         (targets[2], targets[3]) = (Some(target), None);
         let is = estimator.step(k, k as f64 / 30.0, &targets).joints[2].position;
-        let seen = Point2::from(tree.image_from_model(&is));
-        let beside = (seen.x - target.x).hypot(seen.y - target.y);
+        let seen = tree.image_from_model(&is);
+        let beside = distance(&seen, &target);
         depths.push((is.z, truth.z, beside));
     }
     depths

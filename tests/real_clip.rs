@@ -1,6 +1,7 @@
 //! A real tree before a real webcam, and a hand before the tree: `make test-real` fetches the clip
 //! (OpenCV's tree.avi).
 
+use nalgebra::{Point2, distance};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
@@ -354,30 +355,25 @@ const EDGE_PX: f64 = 4.0;
 
 /// Distance from the edge of the hand in frame `k`, px: above 0 inside; far outside where there is
 /// none.
-fn inside_px(k: usize, at: [f64; 2]) -> f64 {
+fn inside_px(k: usize, at: Point2<f64>) -> f64 {
     let Some((_, hand)) = HAND.iter().find(|(frame, _)| *frame == k) else {
         return f64::MIN;
     };
     let (mut within, mut nearest) = (false, f64::MAX);
     for (i, a) in hand.iter().enumerate() {
-        let [a, b] = [*a, hand[(i + 1) % hand.len()]].map(|p| p.map(f64::from));
-        if (a[1] > at[1]) != (b[1] > at[1])
-            && at[0] < a[0] + (at[1] - a[1]) * (b[0] - a[0]) / (b[1] - a[1])
-        {
+        let [a, b] = [*a, hand[(i + 1) % hand.len()]].map(|p| Point2::from(p).cast::<f64>());
+        if (a.y > at.y) != (b.y > at.y) && at.x < a.x + (at.y - a.y) * (b.x - a.x) / (b.y - a.y) {
             within = !within;
         }
-        let along = [b[0] - a[0], b[1] - a[1]];
-        let length_sq = along[0].powi(2) + along[1].powi(2);
-        let share = ((at[0] - a[0]) * along[0] + (at[1] - a[1]) * along[1]) / length_sq.max(1e-9);
-        let share = share.clamp(0.0, 1.0);
-        nearest =
-            nearest.min((at[0] - a[0] - share * along[0]).hypot(at[1] - a[1] - share * along[1]));
+        let along = b - a;
+        let share = (at - a).dot(&along) / along.norm_squared().max(1e-9);
+        nearest = nearest.min(distance(&at, &(a + share.clamp(0.0, 1.0) * along)));
     }
     if within { nearest } else { -nearest }
 }
 
 /// A track's places by frame.
-type Track = BTreeMap<usize, [f64; 2]>;
+type Track = BTreeMap<usize, Point2<f64>>;
 
 /// Tracks by id, and the time of each frame, s.
 fn replayed() -> (BTreeMap<u32, Track>, BTreeMap<usize, f64>) {
@@ -405,7 +401,7 @@ fn replayed() -> (BTreeMap<u32, Track>, BTreeMap<usize, f64>) {
     for row in tracks.lines().skip(1) {
         let field: Vec<&str> = row.split(',').collect();
         let frame: usize = field[1].parse().expect("frame");
-        let place = [3, 4].map(|c| field[c].parse().expect("px"));
+        let place = Point2::from([3, 4].map(|c| field[c].parse().expect("px")));
         by_id
             .entry(field[0].parse().expect("id"))
             .or_default()
@@ -415,17 +411,13 @@ fn replayed() -> (BTreeMap<u32, Track>, BTreeMap<usize, f64>) {
     (by_id, times_s)
 }
 
-fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
-}
-
 /// The tree hardly moves in this clip: a track belongs where it was before the hand came.
-fn rest(track: &Track) -> [f64; 2] {
-    [0, 1].map(|c| {
+fn rest(track: &Track) -> Point2<f64> {
+    Point2::from([0, 1].map(|c| {
         let mut places: Vec<f64> = track.range(..=BEFORE).map(|(_, p)| p[c]).collect();
         places.sort_by(f64::total_cmp);
         places[places.len() / 2]
-    })
+    }))
 }
 
 #[test]
@@ -449,7 +441,7 @@ fn a_hand_before_a_real_tree_takes_no_track_along() {
         );
     }
 
-    let tracks: Vec<(Track, [f64; 2])> = tracks
+    let tracks: Vec<(Track, Point2<f64>)> = tracks
         .into_values()
         .filter(|t| t.contains_key(&BEFORE))
         .map(|t| (rest(&t), t))
@@ -467,27 +459,27 @@ fn a_hand_before_a_real_tree_takes_no_track_along() {
             } else if hidden_px < -2.0 * EDGE_PX {
                 free += 1;
                 seen += usize::from(now.is_some());
-                off += usize::from(now.is_some_and(|at| distance(*at, *rest) > 6.0));
+                off += usize::from(now.is_some_and(|at| distance(at, rest) > 6.0));
             }
             // On the hand in two frames, in each elsewhere, and where it does not belong.
-            let rides = |at: &[f64; 2]| {
+            let rides = |at: &Point2<f64>| {
                 let before = k
                     .checked_sub(1)
                     .and_then(|k| track.get(&k).filter(|at| inside_px(k, **at) > 0.0));
                 inside_px(k, *at) > EDGE_PX
-                    && before.is_some_and(|b| distance(*at, *b) > EDGE_PX)
-                    && distance(*at, *rest) > EDGE_PX
+                    && before.is_some_and(|b| distance(at, b) > EDGE_PX)
+                    && distance(at, rest) > EDGE_PX
             };
             riding += usize::from(now.is_some_and(rides));
         }
     }
-    let hidden_then = |(_, rest): &&(Track, [f64; 2])| {
+    let hidden_then = |(_, rest): &&(Track, Point2<f64>)| {
         (60..66).any(|k| inside_px(k, *rest) > EDGE_PX) && inside_px(67, *rest) < -2.0 * EDGE_PX
     };
     let were: Vec<_> = tracks.iter().filter(hidden_then).collect();
     let back = were
         .iter()
-        .filter(|(t, rest)| t.get(&67).is_some_and(|at| distance(*at, *rest) < 4.0))
+        .filter(|(t, rest)| t.get(&67).is_some_and(|at| distance(at, rest) < 4.0))
         .count();
     println!(
         "{} tracks; behind the hand {behind}, {reported} of them reported, {riding} riding; free {free}, seen {seen}, \

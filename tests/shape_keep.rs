@@ -8,7 +8,7 @@ use arborcam::config;
 use arborcam::model::{Node, NodeId, Skeleton};
 use arborcam::shape::{self, Prototype, PushFigures, Twin, twins};
 use arborcam::skeleton::Node2d;
-use nalgebra::{Point3, Vector2};
+use nalgebra::{Point2, Point3, Vector2};
 use trees::Flat;
 
 /// A tree that goes on from `old`, where it was held, and the same branches pushed anew.
@@ -241,15 +241,16 @@ fn no_branch_is_held_where_it_would_turn_back() {
         node(Some(0), 1, [318.0, 260.0].into()),
     ];
     // The limb's fork was taken to be high up, where it is low, with two branches that begin there.
-    let of = |limb: [f64; 2]| {
+    let of = |limb: Point2<f64>| {
         let crown = [
-            node(Some(1), 2, limb.into()),
+            node(Some(1), 2, limb),
             node(Some(2), 3, [280.0, 140.0].into()),
             node(Some(2), 3, [360.0, 150.0].into()),
         ];
         with(foot.iter().cloned().chain(crown).collect())
     };
-    let (before, after) = (of([318.0, 60.0]), of([318.0, 200.0]));
+    let (high, low) = (Point2::new(318.0, 60.0), Point2::new(318.0, 200.0));
+    let (before, after) = (of(high), of(low));
     let old = stood_up(&before);
     let measured: Vec<Option<Twin>> = (0..5)
         .map(|k| {
@@ -261,11 +262,11 @@ fn no_branch_is_held_where_it_would_turn_back() {
         .collect();
     let GoesOn { tree, .. } = go_on(&after, &old, &measured);
     let fork = tree.image_from_model(&tree.nodes[2].position);
-    assert_eq!(fork, [318.0, 200.0].into());
+    assert_eq!(fork, low);
     // A little sooner or later it ends where it ended.
-    let near = of([318.0, 66.0]);
+    let near = of(Point2::new(318.0, 66.0));
     let fork = go_on(&near, &old, &measured).tree.nodes[2].position;
-    assert_eq!(tree.image_from_model(&fork), [318.0, 60.0].into());
+    assert_eq!(tree.image_from_model(&fork), high);
 }
 
 /// The tree that a clip's capture is written with has been refined or not; who takes it away shall

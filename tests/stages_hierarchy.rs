@@ -4,7 +4,7 @@ use arborcam::config::{Accumulate, Affinity, Hierarchy};
 use arborcam::hierarchy;
 use arborcam::model::TrackTable;
 use arborcam::model::{Cluster, MotionHierarchy, TrackId};
-use nalgebra::Point2;
+use nalgebra::{Point2, distance};
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
@@ -160,10 +160,6 @@ fn assert_sound(tree: &MotionHierarchy, settings: &Hierarchy) {
     }
 }
 
-fn distance(a: Point2<f64>, b: Point2<f64>) -> f64 {
-    (a.x - b.x).hypot(a.y - b.y)
-}
-
 /// The way of point `i` from the foot: the branches that it leads along, and how far, px.
 fn way(i: usize, of: &[usize]) -> Vec<(usize, f64)> {
     let (mut branch, mut end) = (of[i], None);
@@ -174,7 +170,9 @@ fn way(i: usize, of: &[usize]) -> Vec<(usize, f64)> {
             0,
             (
                 branch,
-                end.map_or(along(i) * distance(joint, tip), |end| distance(joint, end)),
+                end.map_or(along(i) * distance(&joint, &tip), |end| {
+                    distance(&joint, &end)
+                }),
             ),
         );
         if branch == 0 {

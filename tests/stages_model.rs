@@ -7,7 +7,7 @@ use arborcam::model::{Cluster, ClusterId, MotionHierarchy, Outline, Size, Skelet
 use arborcam::motion::{PoseEstimator, Problem, deterministic_direction};
 use arborcam::shape::{self, Envelope, Terms};
 use arborcam::skeleton::{self, Node2d};
-use nalgebra::{Point2, Point3, Rotation3, Unit, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Point2, Point3, Rotation3, Unit, UnitQuaternion, Vector2, Vector3, distance};
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -151,7 +151,7 @@ fn the_skeleton_is_folded_by_two_fifths_and_stands_on_the_foot() {
     for (i, at) in expected.into_iter().enumerate() {
         let p = nodes[i].position_px;
         assert!(
-            (p[0] - at[0]).hypot(p[1] - at[1]) < 1e-9,
+            distance(&p, &at.into()) < 1e-9,
             "node {i} is at {p:?} and not at {at:?}"
         );
     }
@@ -204,7 +204,7 @@ fn the_tree_in_space_stays_in_its_envelope_on_one_trunk() {
 
 #[test]
 fn attractors_lie_on_the_surface() {
-    let foot = Point2::from(skeleton::Foot::of(&outline(), None).position_px);
+    let foot = skeleton::Foot::of(&outline(), None).position_px;
     let envelope = Envelope::of_revolution(&outline(), foot);
     let points = envelope.attractors(256);
     assert_eq!(points.len(), 256);
@@ -294,7 +294,7 @@ fn settings(method: config::MotionMethod) -> config::Motion {
 /// Where node `i` is seen in frame `k`, if it is: jumping about, and missing in every fifth.
 fn wild_px(tree: &Skeleton, i: usize, k: u64) -> Option<Point2<f64>> {
     let off = Vector2::new(1.3, 2.1).map(|a| 60.0 * (i as f64 * 3.7 + k as f64 * a).sin());
-    let at = Point2::from(tree.image_from_model(&tree.nodes[i].position));
+    let at = tree.image_from_model(&tree.nodes[i].position);
     (!(i as u64 + k).is_multiple_of(5)).then_some(at + off)
 }
 
@@ -456,7 +456,7 @@ fn a_target_out_of_reach_is_shifted_until_the_branch_reaches_it() {
         let d = deterministic_direction(&root, 50.0, &now, target);
         let end = root + d.into_inner() * 50.0;
         let wanted = target - root.xy();
-        let off = (end.x - target.x).hypot(end.y - target.y);
+        let off = distance(&end.xy(), &target);
         if wanted.x.hypot(wanted.y) <= 50.0 {
             assert!(off < 1e-6, "{target:?} is within reach: {end}");
             assert!(

@@ -7,7 +7,7 @@ use arborcam::model::{
 };
 use arborcam::outline::whole;
 use arborcam::track::Tracker;
-use nalgebra::{Point2, Vector2};
+use nalgebra::{Point2, Vector2, distance};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use std::time::Instant;
@@ -63,10 +63,7 @@ fn tracker() -> Tracker {
 }
 
 fn places(set: &TrackSet) -> BTreeMap<TrackId, Point2<f64>> {
-    set.observations
-        .iter()
-        .map(|o| (o.id, Point2::new(f64::from(o.u_px), f64::from(o.v_px))))
-        .collect()
+    set.observations.iter().map(|o| (o.id, o.at_px())).collect()
 }
 
 /// Shift of the picture in frame `k`, px: a sway of a few pixels.
@@ -85,11 +82,7 @@ fn a_known_motion_is_followed_to_a_tenth_of_a_pixel() {
         let now = places(&tracker.step(&frame(k, |u, v| texture(u - d.x, v - d.y))));
         let mut errors: Vec<f64> = now
             .iter()
-            .filter_map(|(id, at)| {
-                first
-                    .get(id)
-                    .map(|from| (at.x - from.x - d.x).hypot(at.y - from.y - d.y))
-            })
+            .filter_map(|(id, at)| first.get(id).map(|from| distance(at, &(*from + d))))
             .collect();
         errors.sort_by(f64::total_cmp);
         assert!(
@@ -117,10 +110,7 @@ fn a_static_picture_stays_where_it_is() {
         }));
         assert_eq!(now.len(), first.len(), "none is lost in frame {k}");
         for (id, at) in &now {
-            assert!(
-                (at.x - first[id].x).hypot(at.y - first[id].y) < 0.01,
-                "{id:?} drifts"
-            );
+            assert!(distance(at, &first[id]) < 0.01, "{id:?} drifts");
         }
     }
 }
@@ -301,7 +291,7 @@ fn hidden_points_come_back_with_their_names_in_the_right_place() {
             let behind: Vec<_> = first.iter().filter(|(_, p)| behind_bird(p, 12.0)).collect();
             let back = behind.iter().filter(|(id, from)| {
                 now.get(*id)
-                    .is_some_and(|at| (at.x - from.x - d.x).hypot(at.y - from.y - d.y) < 0.3)
+                    .is_some_and(|at| distance(at, &(*from + d)) < 0.3)
             });
             let n = back.count();
             assert!(

@@ -160,7 +160,7 @@ fn outermost(
 mod tests {
     use super::super::dendrogram::Part;
     use super::*;
-    use nalgebra::Vector2;
+    use nalgebra::{Vector2, distance};
 
     const FOOT: Point2<f64> = Point2::new(100.0, 200.0);
 
@@ -235,12 +235,9 @@ mod tests {
             ends[0]
         );
         let (tip, near) = (ends[1], left[4]);
+        assert!(distance(&tip, &near) < 1e-9, "left tip: {tip:?}");
         assert!(
-            (tip.x - near.x).hypot(tip.y - near.y) < 1e-9,
-            "left tip: {tip:?}"
-        );
-        assert!(
-            (ends[2].x - right[4].x).hypot(ends[2].y - right[4].y) < 1e-9,
+            distance(&ends[2], &right[4]) < 1e-9,
             "right tip: {:?}",
             ends[2]
         );
@@ -306,7 +303,7 @@ mod tests {
         );
         for tip in &ends[1..] {
             assert!(
-                (tip.x - ends[0].x).hypot(tip.y - ends[0].y) > 10.0,
+                distance(tip, &ends[0]) > 10.0,
                 "{tip:?} at the fork {:?}",
                 ends[0]
             );

@@ -2,6 +2,7 @@
 #![allow(dead_code)] // not every user needs all of it
 
 use arborcam::model::{MotionHierarchy, TrackId, TrackSet};
+use nalgebra::{Point2, distance};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -37,11 +38,12 @@ impl Truth {
         serde_json::from_slice(&std::fs::read(path).expect("truth")).expect("JSON")
     }
 
-    fn way(&self, at: [f64; 2], mut branch: usize) -> Way {
+    fn way(&self, at: Point2<f64>, mut branch: usize) -> Way {
         let line = &self.branches[branch].line_px;
-        let nearest =
-            |a: &usize, b: &usize| distance(line[*a], at).total_cmp(&distance(line[*b], at));
-        let vertex = (0..line.len()).min_by(nearest).expect("a line");
+        let apart = |k: usize| distance(&Point2::from(line[k]), &at);
+        let vertex = (0..line.len())
+            .min_by(|a, b| apart(*a).total_cmp(&apart(*b)))
+            .expect("a line");
         let arc = vertex as f64 / (line.len() - 1) as f64 * self.branches[branch].length_m;
         let mut way = vec![(branch, arc)];
         while let Ok(parent) = usize::try_from(self.branches[branch].parent) {
@@ -68,13 +70,9 @@ fn shared_m(a: &Way, b: &Way) -> f64 {
     total
 }
 
-fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
-}
-
 /// Where the tracks that were there from the beginning were born, px.
 #[derive(Default)]
-pub struct Births(BTreeMap<TrackId, [f64; 2]>);
+pub struct Births(BTreeMap<TrackId, Point2<f64>>);
 
 impl Births {
     pub fn take_note(&mut self, set: &TrackSet) {
@@ -83,9 +81,7 @@ impl Births {
             .iter()
             .filter(|_| set.frame <= LATEST_BIRTH)
         {
-            self.0
-                .entry(o.id)
-                .or_insert([f64::from(o.u_px), f64::from(o.v_px)]);
+            self.0.entry(o.id).or_insert(o.at_px());
         }
     }
 }
@@ -105,7 +101,7 @@ pub fn triplets(truth: &Truth, hierarchy: &MotionHierarchy, born: &Births) -> (u
         .iter()
         .filter_map(|(id, nodes)| {
             let at = *born.0.get(id)?;
-            let apart = |p: &(f64, f64, usize)| distance([p.0, p.1], at);
+            let apart = |p: &(f64, f64, usize)| distance(&Point2::new(p.0, p.1), &at);
             let point = truth
                 .points
                 .iter()

@@ -4,7 +4,7 @@ use crate::support;
 use arborcam::config::Config;
 use arborcam::model::TrackId;
 use arborcam::track::Tracker;
-use nalgebra::Point2;
+use nalgebra::{Point2, distance};
 use std::collections::{BTreeMap, BTreeSet};
 
 const TRUTH: &str = "recordings/sparse_winter.truth";
@@ -65,14 +65,14 @@ impl Truth {
                 continue;
             };
             let nearest = |a: &usize, b: &usize| {
-                distance(self.positions[0][*a], born)
-                    .total_cmp(&distance(self.positions[0][*b], born))
+                distance(&self.positions[0][*a], &born)
+                    .total_cmp(&distance(&self.positions[0][*b], &born))
             };
             let point = (0..self.positions[0].len())
                 .min_by(nearest)
                 .expect("points");
             let start = self.positions[0][point];
-            if distance(start, born) > SNAP_PX {
+            if distance(&start, &born) > SNAP_PX {
                 continue;
             }
             scored += 1;
@@ -82,7 +82,7 @@ impl Truth {
                 let Some(&there) = seen.get(frame) else {
                     continue;
                 };
-                let error = distance(there, at + born.coords - start.coords);
+                let error = distance(&there, &(at + born.coords - start.coords));
                 near += usize::from(error < NEAR_PX);
                 errors.push(error);
             }
@@ -93,10 +93,6 @@ impl Truth {
             median_end_px: median(&mut errors),
         }
     }
-}
-
-pub fn distance(a: Point2<f64>, b: Point2<f64>) -> f64 {
-    (a.x - b.x).hypot(a.y - b.y)
 }
 
 pub fn median(values: &mut [f64]) -> f64 {
@@ -114,10 +110,7 @@ pub fn tracks() -> (Places, f64) {
     for k in 0..support::recording().len() {
         let set = tracker.step(&support::decoded(&mut decode, k));
         for o in &set.observations {
-            places
-                .entry(o.id)
-                .or_default()
-                .insert(set.frame, Point2::new(o.u_px.into(), o.v_px.into()));
+            places.entry(o.id).or_default().insert(set.frame, o.at_px());
         }
         rejected.extend(set.rejected.iter().copied());
         expected = set
