@@ -104,7 +104,7 @@ impl Swaying {
         }
     }
 
-    /// Gives up what is under way; it ends within a branch.
+    /// Gives up what is under way; it ends within a step of a fit.
     pub fn end(&mut self) {
         self.pending = None;
         self.every_s = 0.0;
