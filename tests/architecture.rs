@@ -124,7 +124,6 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "tui",
         &[
             "model",
-            "bounds",
             "outline::crossing",
             "caught",
             "draw",

@@ -387,6 +387,10 @@ fn what_is_broken_off_says_so() {
                 "the trunk comes first: {part:?}"
             );
             assert!(checks > 0 || late[1], "{part:?}");
+            // In wind the other branches fall silent with their trunk, sooner than a thread can act.
+            let is_early = checks <= 2 && drive != Drive::Wind;
+            let late = late.iter().filter(|late| **late).count();
+            assert!(!is_early || late > 1, "{part:?}");
         }
     }
 }

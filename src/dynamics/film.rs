@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// The place of a point in a frame that does not show it, px.
-pub(super) const NOT_SEEN: Point2<f64> = Point2::new(f64::NAN, f64::NAN);
+pub const NOT_SEEN: Point2<f64> = Point2::new(f64::NAN, f64::NAN);
 
 /// One followed point.
 #[derive(Clone, Debug, PartialEq)]

@@ -24,7 +24,7 @@ mod wind;
 
 pub use angle::{AngleToParent, angle_in_space_deg, angle_to_parent_deg};
 pub use decay::{Mode, Start};
-pub use film::{Film, FilmTrack};
+pub use film::{Film, FilmTrack, NOT_SEEN};
 pub use modal::{Shoot, shoots};
 pub use release::{Onset, fades_as_a_free_decay};
 pub use spectrum::{HalfPower, Spectrum, spectrum};

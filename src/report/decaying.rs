@@ -18,7 +18,8 @@ pub struct Decaying {
 }
 
 /// The damped cosine of `own` that fits `angle_deg` best within `used_s` (none elsewhere), beside
-/// those of `others` and a constant. `None` without a damping, or where the angle has too few values.
+/// those of `others` and a constant. `None` without a damping, or where the angle has too few
+/// values.
 pub fn decaying(
     times_s: &[f64],
     angle_deg: &[f64],

@@ -37,7 +37,7 @@ fn half<'a>(points: impl Iterator<Item = &'a Point2<f64>>) -> Vec<Point2<f64>> {
 /// Where the horizontal line at `y` enters and leaves a convex polygon; beyond its ends, as at its
 /// nearest corner.
 pub(super) fn crossed(hull: &[Point2<f64>], y: f64) -> Bounds {
-    let mut ends: Option<Bounds> = None;
+    let mut crossings_x = Vec::with_capacity(2);
     for (a, b) in hull.iter().zip(hull.iter().cycle().skip(1)) {
         if !(a.y.min(b.y)..=a.y.max(b.y)).contains(&y) {
             continue;
@@ -48,13 +48,9 @@ pub(super) fn crossed(hull: &[Point2<f64>], y: f64) -> Bounds {
         } else {
             (y - a.y) / (b.y - a.y)
         };
-        let x = a.x + t * (b.x - a.x);
-        ends = Some(match ends {
-            Some(ends) => Bounds::new(ends.lo.min(x), ends.hi.max(x)),
-            None => Bounds::new(x, x),
-        });
+        crossings_x.push(a.x + t * (b.x - a.x));
     }
-    if let Some(ends) = ends {
+    if let Some(ends) = Bounds::of(crossings_x) {
         return ends;
     }
     let corner = hull

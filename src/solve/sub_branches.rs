@@ -7,7 +7,7 @@
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::config::Dynamics;
-use crate::dynamics::{Film, FilmTrack, shoots};
+use crate::dynamics::{Film, FilmTrack, NOT_SEEN, shoots};
 use crate::hierarchy::rest_position_px;
 use crate::model::{Node, NodeId, NodeKind, NodeName, Skeleton, TrackId, TrackTable};
 use nalgebra::{Point2, Point3, Vector2, Vector3};
@@ -85,7 +85,7 @@ struct Point {
 fn place_px(place: &Option<Point2<f32>>) -> Point2<f64> {
     match place {
         Some(px) => px.cast(),
-        None => Point2::new(f64::NAN, f64::NAN),
+        None => NOT_SEEN,
     }
 }
 

@@ -72,9 +72,9 @@ pub struct Onset {
 }
 
 /// Looks at the points of the whole tree; `given` is what the user says. Frequencies of the tree
-/// lie within `frequencies_hz`. Where the tree was released several times, each from rest, it is the time with
-/// the greatest motion, until the next pull; and when each was, s. Nothing is to be made of it
-/// where `cancel` has ended it.
+/// lie within `frequencies_hz`. Where the tree was released several times, each from rest, it is
+/// the time with the greatest motion, until the next pull; and when each was, s. Nothing is to be
+/// made of it where `cancel` has ended it.
 pub(super) fn onset(
     film: &Film,
     tracks: &[usize],

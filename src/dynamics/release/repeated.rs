@@ -207,7 +207,7 @@ mod tests {
         0.2 * (1234.5 * t * f64::from(point + 1)).sin()
     }
 
-    /// Pulled aside by `px` and let go at a time.
+    /// Pulled aside by `px`, and released at a time.
     struct Release {
         at_s: f64,
         px: f64,
