@@ -350,6 +350,7 @@ fn chain(ways: &[Vector3<f64>]) -> Skeleton {
         certainty: 0.5,
         copy_of: None,
         plane_angle: 0.0,
+        moves_with: None,
         kind: Default::default(),
     };
     let mut nodes = vec![node(None, 0, at)];

@@ -890,6 +890,7 @@ fn made_up() -> Skeleton {
         certainty: 0.123_456,
         copy_of: None,
         plane_angle: 0.0,
+        moves_with: None,
     };
     let mut nodes = vec![
         node(0, None, 0, [0.0; 3]),

@@ -125,6 +125,7 @@ fn node(k: u32, parent: Option<u32>, position: Point3<f64>) -> Node {
         certainty: 1.0,
         copy_of: None,
         plane_angle: 0.0,
+        moves_with: None,
         kind: Default::default(),
     }
 }

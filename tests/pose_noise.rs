@@ -34,6 +34,7 @@ fn node(k: usize, parent: Option<usize>, level: u8, position: Point3<f64>) -> No
         certainty: 1.0,
         copy_of: None,
         plane_angle: 0.0,
+        moves_with: None,
         kind: Default::default(),
     }
 }

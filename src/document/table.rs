@@ -130,6 +130,7 @@ pub(super) fn px_in_unit(metres_per_px: f64) -> f64 {
 pub(super) struct TableReader<R: Read, const N: usize> {
     file: PathBuf,
     reader: Reader<R>,
+    header: StringRecord,
     columns: [usize; N],
     row: StringRecord,
 }
@@ -173,6 +174,7 @@ impl<R: Read, const N: usize> TableReader<R, N> {
         Ok(Self {
             file,
             reader,
+            header,
             columns: places,
             row: StringRecord::new(),
         })
@@ -191,6 +193,16 @@ impl<R: Read, const N: usize> TableReader<R, N> {
     /// The cell of the `i`-th column that was asked for; empty where the row is too short.
     pub fn cell(&self, i: usize) -> &str {
         self.row.get(self.columns[i]).unwrap_or("")
+    }
+
+    /// Where the column `name` is, which a file may lack.
+    pub fn optional(&self, name: &str) -> Option<usize> {
+        self.header.iter().position(|column| column == name)
+    }
+
+    /// The cell of an [`optional`](Self::optional) column; empty where the file lacks it.
+    pub fn optional_cell(&self, column: Option<usize>) -> &str {
+        column.and_then(|c| self.row.get(c)).unwrap_or("")
     }
 
     /// A whole number, in the `i`-th column that was asked for.
@@ -253,11 +265,17 @@ impl<R: Read, const N: usize> TableReader<R, N> {
 
     /// What is wrong with the present row.
     pub fn bad(&self, what: impl Into<String>) -> DocumentError {
-        DocumentError::row(
-            &self.file,
-            self.row.position().map_or(0, Position::line),
-            what,
-        )
+        self.bad_at(self.line(), what)
+    }
+
+    /// The line of the present row.
+    pub fn line(&self) -> u64 {
+        self.row.position().map_or(0, Position::line)
+    }
+
+    /// What is wrong with the row in a line that has been read.
+    pub fn bad_at(&self, line: u64, what: impl Into<String>) -> DocumentError {
+        DocumentError::row(&self.file, line, what)
     }
 
     /// What is wrong with the file at its end.

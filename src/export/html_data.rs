@@ -182,6 +182,7 @@ mod tests {
                 certainty: 1.0,
                 copy_of: (i == 6).then_some(NodeId(4)),
                 plane_angle: 0.0,
+                moves_with: None,
                 kind: Default::default(),
             });
         }

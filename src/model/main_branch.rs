@@ -1,6 +1,6 @@
 //! Main branches: the parts of the crown that every screen and page gives one colour each.
 
-use super::Skeleton;
+use super::{MovingBranch, NodeId, Skeleton};
 
 /// Colours of main branches (sRGB), taken again from the start after the last one; few, and of
 /// middle brightness, so that they can be told apart on dark and on light.
@@ -24,51 +24,58 @@ impl Skeleton {
     ///
     /// The trunk runs from the foot to the first real fork, past small branches on its side.
     /// Every branch that leaves the trunk there or below is a main branch, with all that it
-    /// carries. A copy belongs to the main branch of its original. Sizes are counted in measured
-    /// nodes, so that a tree has the same main branches with copies as without.
+    /// carries. A copy belongs to the main branch of its original, and what moves with
+    /// another node to that one's. Sizes are counted in measured nodes that move on their own, so that a tree has the same main branches with copies as without.
     ///
     /// Main branches are numbered in the order of the names of their first nodes. Names survive a
     /// refinement and new ones are larger, so a refined tree keeps the numbers of the main
     /// branches that it keeps, unless an older one has gone. Numbers begin anew after 255.
     pub fn main_branches(&self) -> Vec<Option<u8>> {
-        let trunk = self.trunk();
-        let mut first: Vec<usize> = (0..self.nodes.len())
-            .filter(|&i| !trunk[i] && self.measured_parent(i).is_some_and(|p| trunk[p]))
-            .collect();
-        first.sort_by_key(|&i| self.nodes[i].name);
-        let mut numbers = vec![None; self.nodes.len()];
-        for (number, i) in first.into_iter().enumerate() {
-            numbers[i] = Some((number % 256) as u8);
+        let branches = self.moving_branches();
+        let trunk = self.trunk(&branches);
+        let mut first: Vec<NodeId> = Vec::new();
+        for branch in branches.iter().filter(|b| self.is_measured(b)) {
+            if !trunk[branch.node.index()] && trunk[branch.parent.index()] {
+                first.push(branch.node);
+            }
         }
-        for (i, node) in self.nodes.iter().enumerate() {
-            let followed = node.copy_of.or(node.parent).map(|n| n.index());
-            if let Some(other) = followed.filter(|&o| o < i && !trunk[i] && numbers[i].is_none()) {
-                numbers[i] = numbers[other];
+        first.sort_by_key(|n| self.nodes[n.index()].name);
+        let mut numbers = vec![None; self.nodes.len()];
+        for (number, node) in first.into_iter().enumerate() {
+            numbers[node.index()] = Some((number % 256) as u8);
+        }
+        for branch in &branches {
+            let i = branch.node.index();
+            if !trunk[i] && numbers[i].is_none() {
+                let followed = self.nodes[i].copy_of.unwrap_or(branch.parent);
+                numbers[i] = numbers.get(followed.index()).copied().flatten();
+            }
+            for rider in &branch.riders {
+                numbers[rider.index()] = numbers[i];
             }
         }
         numbers
     }
 
-    /// Which nodes are the trunk's: the foot, and from each the largest measured branch until the
-    /// first real fork.
-    fn trunk(&self) -> Vec<bool> {
+    /// Which nodes the trunk's branches end in: the foot, and from each the largest measured branch
+    /// until the first real fork.
+    fn trunk(&self, branches: &[MovingBranch]) -> Vec<bool> {
         let mut sizes = vec![1usize; self.nodes.len()];
-        let mut branches: Vec<Vec<usize>> = vec![Vec::new(); self.nodes.len()];
-        for i in (0..self.nodes.len()).rev() {
-            if let Some(parent) = self.measured_parent(i) {
-                sizes[parent] += sizes[i];
-                branches[parent].push(i);
-            }
+        let mut carried: Vec<Vec<usize>> = vec![Vec::new(); self.nodes.len()];
+        for branch in branches.iter().rev().filter(|b| self.is_measured(b)) {
+            let (i, parent) = (branch.node.index(), branch.parent.index());
+            sizes[parent] += sizes[i];
+            carried[parent].push(i);
         }
         let mut trunk = vec![false; self.nodes.len()];
         let mut top = 0;
         while top < trunk.len() {
             trunk[top] = true;
-            branches[top].sort_by_key(|&i| std::cmp::Reverse(sizes[i]));
-            let Some(&largest) = branches[top].first() else {
+            carried[top].sort_by_key(|&i| std::cmp::Reverse(sizes[i]));
+            let Some(&largest) = carried[top].first() else {
                 break;
             };
-            if let Some(&second) = branches[top].get(1)
+            if let Some(&second) = carried[top].get(1)
                 && sizes[second] as f64 >= FORK_SHARE * sizes[largest] as f64
             {
                 break;
@@ -78,12 +85,8 @@ impl Skeleton {
         trunk
     }
 
-    /// Index of the parent of a measured node; `None` for the foot, for a copy, and where a file
-    /// puts a parent behind its child.
-    fn measured_parent(&self, i: usize) -> Option<usize> {
-        let node = &self.nodes[i];
-        let parent = node.parent.filter(|_| node.copy_of.is_none())?.index();
-        (parent < i).then_some(parent)
+    fn is_measured(&self, branch: &MovingBranch) -> bool {
+        self.nodes[branch.node.index()].copy_of.is_none()
     }
 }
 
@@ -106,6 +109,7 @@ mod tests {
                 certainty: 0.0,
                 copy_of: None,
                 plane_angle: 0.0,
+                moves_with: None,
                 kind: Default::default(),
             });
         }

@@ -9,6 +9,7 @@ mod frame;
 mod hierarchy;
 mod leaf_swing;
 mod main_branch;
+mod moving_branch;
 mod outline;
 mod pose;
 mod skeleton;
@@ -27,6 +28,7 @@ pub use frame::{
 pub use hierarchy::{Cluster, ClusterId, MotionHierarchy};
 pub use leaf_swing::LeafSwing;
 pub use main_branch::MAIN_BRANCH_RGB;
+pub use moving_branch::MovingBranch;
 pub use outline::Outline;
 pub use pose::{JointPose, Pose};
 pub use skeleton::{FARTHEST_PX, Node, NodeId, NodeKind, NodeName, Skeleton};

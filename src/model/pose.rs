@@ -9,7 +9,8 @@ pub struct JointPose {
     pub position: Point3<f64>,
     /// Rotation of the branch from its rest direction, in model axes; the branch turns about its
     /// parent node, so
-    /// `position = parent.position + rotation * (rest - parent rest)`.
+    /// `position = parent.position + rotation * (rest - parent rest)`. A node that moves with
+    /// another one has the rotation of that.
     pub rotation: UnitQuaternion<f64>,
 }
 

@@ -63,7 +63,9 @@ pub struct Node {
     /// with a refinement.
     pub name: NodeName,
     pub parent: Option<NodeId>,
-    /// 0 at the trunk's foot, 1 at the trunk's top, one more with every cut of the hierarchy.
+    /// 0 at the trunk's foot, 1 at the trunk's top, one more with every cut of the hierarchy: one
+    /// more than the branch that carries this one, [`Skeleton::moving_parent`]. A bend has the
+    /// level of the limb's end, and side wood is one above the branch that it is a part of.
     pub level: u8,
     /// Position at rest in model axes: x right, y up, z towards the viewer, px, the trunk's foot at
     /// the origin.
@@ -82,6 +84,11 @@ pub struct Node {
     pub copy_of: Option<NodeId>,
     /// Angle by which the copy's plane is turned about the y axis, radians; 0 for a measured node.
     pub plane_angle: f64,
+    /// The node of whose branch this one is a rigid part: a bend on the way to it, or side wood on
+    /// which no point was followed. That one moves on its own and is not the foot; its bends stand
+    /// before it, side wood may stand on either side. All parts of a branch hang together, or on
+    /// the place where it begins. `None`: it moves on its own.
+    pub moves_with: Option<NodeId>,
 }
 
 /// Nodes with parents before children, the foot first, all measured nodes before all copies.
@@ -103,6 +110,12 @@ impl Skeleton {
             .count()
     }
 
+    /// The measured nodes that move on their own, in order, without the foot.
+    pub fn measured_branches(&self) -> impl Iterator<Item = NodeId> {
+        let nodes = (1..self.measured().max(1) as u32).map(NodeId);
+        nodes.filter(|n| self.mover(*n) == *n)
+    }
+
     /// Orthographic projection of a point in model axes to the picture, px.
     pub fn image_from_model(&self, p: &Point3<f64>) -> Point2<f64> {
         Point2::new(self.foot_px.x + p.x, self.foot_px.y - p.y)
@@ -120,6 +133,52 @@ impl Skeleton {
         std::iter::successors(below(&node), below)
     }
 
+    /// The node that `node` moves with: itself, unless it is a rigid part of another one's branch.
+    /// What a file says of a node that moves with the foot, or with one that has no motion of its
+    /// own either, does not count.
+    pub fn mover(&self, node: NodeId) -> NodeId {
+        let own = self.nodes.get(node.index()).filter(|n| n.parent.is_some());
+        let moves = |m: &NodeId| {
+            let mover = self.nodes.get(m.index());
+            mover.is_some_and(|m| m.moves_with.is_none() && m.parent.is_some())
+        };
+        own.and_then(|n| n.moves_with).filter(moves).unwrap_or(node)
+    }
+
+    /// Where the branch that `node` is the end or a part of begins, and about which it turns: the
+    /// first node below its end that moves with another one. `None` for the foot, and where the
+    /// branch hangs on nothing.
+    pub fn begin(&self, node: NodeId) -> Option<NodeId> {
+        let mover = self.mover(node);
+        self.ancestors(mover).find(|n| self.mover(*n) != mover)
+    }
+
+    /// The branch that carries the one that `node` is the end or a part of, as the node in which
+    /// that ends. `None` for the foot, and where a file lets branches carry each other.
+    pub fn moving_parent(&self, node: NodeId) -> Option<NodeId> {
+        let begin = self.begin(node)?;
+        let parent = self.mover(begin);
+        // A branch begins above the place where its carrier does.
+        let is_above = self.begin(parent).is_none_or(|of_parent| of_parent < begin);
+        is_above.then_some(parent)
+    }
+
+    /// Whether `node` is a bend: a part of a branch on the way to its end.
+    pub fn is_bend(&self, node: NodeId) -> bool {
+        let mover = self.mover(node);
+        let mut part = self
+            .ancestors(mover)
+            .take_while(|n| self.mover(*n) == mover);
+        part.any(|n| n == node)
+    }
+
+    /// The branches that carry a node's, nearest first, as the nodes in which they end; the foot
+    /// last.
+    pub fn carriers(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
+        let below = |n: &NodeId| self.moving_parent(*n);
+        std::iter::successors(below(&node), below)
+    }
+
     /// Children of every node, by node index.
     pub fn children(&self) -> Vec<Vec<NodeId>> {
         let mut out = vec![Vec::new(); self.nodes.len()];
@@ -129,5 +188,142 @@ impl Skeleton {
             }
         }
         out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Nodes by parent and by what they move with.
+    fn tree(nodes: &[(Option<u32>, Option<u32>)]) -> Skeleton {
+        let mut skeleton = Skeleton {
+            nodes: Vec::new(),
+            foot_px: Point2::origin(),
+            image_size: Size::new(64, 64),
+        };
+        for (i, (parent, mover)) in (0..).zip(nodes) {
+            skeleton.nodes.push(Node {
+                name: NodeName(i),
+                parent: parent.map(NodeId),
+                level: 0,
+                position: Point3::new(0.0, f64::from(i), 0.0),
+                radius: 1.0,
+                n_tracks: 0,
+                kind: NodeKind::Measured,
+                certainty: 0.0,
+                copy_of: None,
+                plane_angle: 0.0,
+                moves_with: mover.map(NodeId),
+            });
+        }
+        skeleton
+    }
+
+    fn begins(skeleton: &Skeleton) -> Vec<Option<u32>> {
+        let nodes = (0..skeleton.nodes.len() as u32).map(NodeId);
+        nodes.map(|n| skeleton.begin(n).map(|b| b.0)).collect()
+    }
+
+    fn parents(skeleton: &Skeleton) -> Vec<Option<u32>> {
+        let nodes = (0..skeleton.nodes.len() as u32).map(NodeId);
+        nodes
+            .map(|n| skeleton.moving_parent(n).map(|p| p.0))
+            .collect()
+    }
+
+    /// Numbers of nodes; 9 stands for none.
+    fn by_number(nodes: [u32; 8]) -> [Option<u32>; 8] {
+        nodes.map(|n| (n != 9).then_some(n))
+    }
+
+    /// Foot, trunk, a limb with two bends (2 and 4) that ends in 5, a branch (3) that leaves it at
+    /// the first and stands before its end, and side wood (6 and 7).
+    fn bent() -> Skeleton {
+        tree(&[
+            (None, None),
+            (Some(0), None),
+            (Some(1), Some(5)),
+            (Some(2), None),
+            (Some(2), Some(5)),
+            (Some(4), None),
+            (Some(4), Some(5)),
+            (Some(6), Some(5)),
+        ])
+    }
+
+    #[test]
+    fn a_branch_begins_below_its_bends_and_is_carried_by_what_moves_it_there() {
+        let tree = bent();
+        assert_eq!(begins(&tree), by_number([9, 0, 1, 2, 1, 1, 1, 1]));
+        assert_eq!(parents(&tree), by_number([9, 0, 1, 5, 1, 1, 1, 1]));
+        let carriers: Vec<u32> = tree.carriers(NodeId(3)).map(|n| n.0).collect();
+        assert_eq!(carriers, [5, 1, 0]);
+        let bends: Vec<u32> = (0..8).filter(|n| tree.is_bend(NodeId(*n))).collect();
+        assert_eq!(bends, [2, 4]);
+        let measured: Vec<u32> = tree.measured_branches().map(|n| n.0).collect();
+        assert_eq!(measured, [1, 3, 5]);
+    }
+
+    /// The limb comes before what it carries, though it stands behind it.
+    #[test]
+    fn branches_come_after_what_carries_them() {
+        let branches = bent().moving_branches();
+        let order: Vec<u32> = branches.iter().map(|b| b.node.0).collect();
+        assert_eq!(order, [1, 5, 3]);
+        assert_eq!(branches[1].riders, [2, 4, 6, 7].map(NodeId));
+        let straight = tree(&[
+            (None, None),
+            (Some(0), None),
+            (Some(0), None),
+            (Some(1), None),
+        ]);
+        let order: Vec<u32> = straight
+            .moving_branches()
+            .iter()
+            .map(|b| b.node.0)
+            .collect();
+        assert_eq!(order, [1, 2, 3]);
+    }
+
+    #[test]
+    fn what_a_file_may_say_neither_hangs_nor_panics() {
+        let odd = [
+            // Movers that move with each other, with themselves, with the foot, with nobody.
+            tree(&[
+                (None, Some(1)),
+                (Some(0), Some(2)),
+                (Some(1), Some(1)),
+                (Some(2), Some(3)),
+                (Some(3), Some(0)),
+                (Some(4), Some(99)),
+            ]),
+            // Branches that carry each other.
+            tree(&[
+                (None, None),
+                (Some(0), Some(4)),
+                (Some(0), Some(3)),
+                (Some(1), None),
+                (Some(2), None),
+            ]),
+            // Parents behind their children, and none at all.
+            tree(&[
+                (Some(3), None),
+                (Some(1), Some(0)),
+                (Some(9), Some(1)),
+                (None, Some(0)),
+            ]),
+            tree(&[]),
+        ];
+        for tree in &odd {
+            let branches = tree.moving_branches();
+            assert!(branches.len() < tree.nodes.len().max(1));
+            for node in (0..12).map(NodeId) {
+                assert_eq!(tree.mover(tree.mover(node)), tree.mover(node));
+                assert!(tree.carriers(node).count() <= tree.nodes.len());
+                tree.is_bend(node);
+            }
+            assert_eq!(tree.main_branches().len(), tree.nodes.len());
+        }
     }
 }

@@ -49,6 +49,7 @@ mod tests {
             certainty: 1.0,
             copy_of: None,
             plane_angle: 0.0,
+            moves_with: None,
             kind: Default::default(),
         }
     }

@@ -37,6 +37,7 @@ pub fn diener(flat: &[Node2d], tracks: &[u32], trunk: &[bool], outline: &Outline
             certainty: n.certainty,
             copy_of: None,
             plane_angle: 0.0,
+            moves_with: None,
             kind: Default::default(),
         });
     }

@@ -75,6 +75,7 @@ fn measured_nodes(flat: &[Node2d], tracks: &[u32], foot_px: Point2<f64>) -> Vec<
             certainty: node.certainty,
             copy_of: None,
             plane_angle: 0.0,
+            moves_with: None,
             kind: NodeKind::Measured,
         });
     }

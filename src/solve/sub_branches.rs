@@ -270,6 +270,7 @@ mod tests {
             certainty: 0.5,
             copy_of: copy_of.map(NodeId),
             plane_angle: copy_of.map_or(0.0, |_| 1.0),
+            moves_with: None,
             kind: Default::default(),
         };
         let nodes = vec![

@@ -321,6 +321,7 @@ fn skeleton(branches: &[MadeBranch]) -> Skeleton {
         certainty: 1.0,
         copy_of: None,
         plane_angle: 0.0,
+        moves_with: None,
         kind: Default::default(),
     };
     let foot = node(0, None, Vector3::zeros(), 0);

@@ -32,6 +32,7 @@ pub fn tree(levels: u8, planes: usize) -> Skeleton {
         certainty: 0.75,
         copy_of: None,
         plane_angle: 0.0,
+        moves_with: None,
         kind: Default::default(),
     };
     let mut nodes = vec![

@@ -72,6 +72,7 @@ mod tests {
             certainty: 1.0,
             copy_of: copied.then_some(NodeId(1)),
             plane_angle: 0.0,
+            moves_with: None,
             kind: Default::default(),
         }
     }

@@ -209,6 +209,8 @@ impl Site<'_> {
                 certainty: 0.0,
                 copy_of: Some(NodeId(i as u32)),
                 plane_angle: placement.plane_angle,
+                // What is rigid turns against nothing: it needs not be told.
+                moves_with: None,
                 kind: original.kind,
             };
             new_id.push((i, base + nodes.len()));

@@ -37,6 +37,7 @@ fn node(parent: Option<u32>, place: [f64; 3], copy_of: Option<u32>) -> Node {
         certainty: 0.75,
         copy_of: copy_of.map(NodeId),
         plane_angle: if copy_of.is_some() { 1.57 } else { 0.0 },
+        moves_with: None,
         kind: Default::default(),
     }
 }
