@@ -1,28 +1,21 @@
 //! A posture between two.
 
 use crate::model::{JointPose, Pose, Skeleton};
+use nalgebra::UnitQuaternion;
 
 /// The pose that is `share` (0 to 1) of the way from `a` to `b`, of frame and time of `a`: every
 /// branch turns evenly, and keeps its length. Joints that one of them lacks are at rest.
 pub fn between(skeleton: &Skeleton, a: &Pose, b: &Pose, share: f64) -> Pose {
     let mut joints: Vec<JointPose> = Vec::with_capacity(skeleton.nodes.len());
     for (i, node) in skeleton.nodes.iter().enumerate() {
-        let turned = a.joints.get(i).zip(b.joints.get(i));
-        // Opposite rotations have no shortest way between them; either is as good.
-        let rotation = turned.map(|(a, b)| {
-            a.rotation
-                .try_slerp(&b.rotation, share, 1e-9)
-                .unwrap_or(a.rotation)
+        joints.push(JointPose {
+            position: a.joints.get(i).map_or(node.position, |j| j.position),
+            rotation: rotation_between(a, b, i, share),
         });
-        let rotation = rotation.unwrap_or_default();
-        let position = match node.parent.filter(|p| p.index() < i) {
-            Some(parent) => {
-                let way = node.position - skeleton.nodes[parent.index()].position;
-                joints[parent.index()].position + rotation * way
-            }
-            None => a.joints.get(i).map_or(node.position, |j| j.position),
-        };
-        joints.push(JointPose { position, rotation });
+    }
+    for branch in skeleton.moving_branches() {
+        let rotation = joints[branch.node.index()].rotation;
+        branch.place(skeleton, rotation, &mut joints);
     }
     Pose {
         frame: a.frame,
@@ -31,11 +24,22 @@ pub fn between(skeleton: &Skeleton, a: &Pose, b: &Pose, share: f64) -> Pose {
     }
 }
 
+/// That of joint `i`; none where a pose lacks it.
+fn rotation_between(a: &Pose, b: &Pose, i: usize, share: f64) -> UnitQuaternion<f64> {
+    let Some((a, b)) = a.joints.get(i).zip(b.joints.get(i)) else {
+        return UnitQuaternion::identity();
+    };
+    // Opposite rotations have no shortest way between them; either is as good.
+    a.rotation
+        .try_slerp(&b.rotation, share, 1e-9)
+        .unwrap_or(a.rotation)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::model::{Node, NodeId, NodeName, Size};
-    use nalgebra::{Point3, UnitQuaternion, Vector3};
+    use nalgebra::{Point3, Vector3};
     use std::f64::consts::PI;
 
     fn node(k: u32, parent: Option<u32>, position: Point3<f64>) -> Node {

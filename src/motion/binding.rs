@@ -21,6 +21,8 @@ struct Bound {
 /// Tracks bound to the measured nodes of a skeleton.
 pub struct Binding {
     tracks: BTreeMap<TrackId, Option<Bound>>,
+    /// Of each measured node the one in which the branch ends that carries it; `None` for those
+    /// that move with another one.
     parents: Vec<Option<NodeId>>,
     /// Projection of each measured node at rest, px.
     rest_px: Vec<Point2<f64>>,
@@ -32,8 +34,8 @@ pub struct Binding {
 }
 
 impl Binding {
-    /// Binds the members of `hierarchy` to the nodes of `skeleton`; node k + 1 belongs to cluster
-    /// k. `rest_px` holds the rest positions of all tracks that were there when the tree was built;
+    /// Binds the members of `hierarchy` to the nodes of `skeleton`; of those that move
+    /// on their own, node k + 1 belongs to cluster k. `rest_px` holds the rest positions of all tracks that were there when the tree was built;
     /// those that are in no cluster did not move or contradicted their neighbours, and stay
     /// unbound.
     pub fn new(
@@ -46,22 +48,23 @@ impl Binding {
             rest_px.keys().map(|id| (*id, None)).collect();
         // Deeper clusters come later and overwrite: each track ends at the deepest node that it
         // belongs to.
-        for (k, cluster) in hierarchy.clusters.iter().enumerate() {
-            let node = NodeId(k as u32 + 1);
+        let moving: Vec<NodeId> = skeleton.measured_branches().collect();
+        for (cluster, &node) in hierarchy.clusters.iter().zip(&moving) {
             for id in &cluster.members {
                 if let Some(&rest_px) = rest_px.get(id) {
                     tracks.insert(*id, Some(Bound { node, rest_px }));
                 }
             }
         }
+        let mut parents: Vec<Option<NodeId>> = vec![None; nodes.len()];
         let mut is_tip = vec![true; nodes.len()];
-        for parent in nodes.iter().filter_map(|n| n.parent) {
-            is_tip[parent.index()] = false;
+        for &node in &moving {
+            parents[node.index()] = skeleton.moving_parent(node);
+            if let Some(parent) = parents[node.index()] {
+                is_tip[parent.index()] = false;
+            }
         }
-        let tips: Vec<NodeId> = (1..nodes.len())
-            .filter(|&i| is_tip[i])
-            .map(|i| NodeId(i as u32))
-            .collect();
+        let tips: Vec<NodeId> = moving.into_iter().filter(|n| is_tip[n.index()]).collect();
         let rest: Vec<Point2<f64>> = nodes
             .iter()
             .map(|n| skeleton.image_from_model(&n.position))
@@ -69,7 +72,7 @@ impl Binding {
         Self {
             reach_px: REACH * mean_gap(&tips, &rest),
             tracks,
-            parents: nodes.iter().map(|n| n.parent).collect(),
+            parents,
             collected: vec![Vec::new(); nodes.len()],
             rest_px: rest,
             tips,

@@ -20,7 +20,7 @@ pub use flutter::flutter;
 pub use probabilistic::Problem;
 
 use crate::config::{Motion, MotionMethod};
-use crate::model::{JointPose, Node, NodeId, Pose, Skeleton};
+use crate::model::{JointPose, MovingBranch, Node, NodeId, Pose, Skeleton};
 use nalgebra::{Point2, Unit, UnitQuaternion, UnitVector3, Vector3};
 use rotation::shortest_rotation;
 use std::f64::consts::PI;
@@ -35,9 +35,7 @@ const LEAN: f64 = 0.2;
 
 /// One branch at rest.
 struct Branch {
-    parent: usize,
-    /// From the parent node to this one, px.
-    vector: Vector3<f64>,
+    way: MovingBranch,
     direction: UnitVector3<f64>,
     length: f64,
     /// Of the parent's own branch.
@@ -49,44 +47,40 @@ struct Branch {
 /// Whose copy a branch is.
 struct CopyOf {
     original: NodeId,
+    /// The branch that carries the original.
+    parent: Option<NodeId>,
     /// From the original's plane to the copy's.
     turn: UnitQuaternion<f64>,
 }
 
 impl Branch {
-    /// The branch that ends in `node`; `None` for the foot. `sigma_shape` in radians.
-    fn at_rest(skeleton: &Skeleton, node: &Node, sigma_shape: f64) -> Option<Self> {
-        let parent = node.parent?;
-        let vector = vector_of(skeleton, node)?;
-        let above = vector_of(skeleton, &skeleton.nodes[parent.index()]);
-        Some(Self {
-            parent: parent.index(),
-            vector,
+    /// `sigma_shape` in radians.
+    fn at_rest(skeleton: &Skeleton, way: MovingBranch, sigma_shape: f64) -> Self {
+        let node = &skeleton.nodes[way.node.index()];
+        let vector = way.vector(skeleton);
+        let above = skeleton.begin(way.parent).map(|begin| {
+            skeleton.nodes[way.parent.index()].position - skeleton.nodes[begin.index()].position
+        });
+        Self {
             direction: Unit::try_new(vector, 1e-9).unwrap_or(Vector3::y_axis()),
             length: vector.norm(),
             parent_direction: above.and_then(|v| Unit::try_new(v, 1e-9)),
             sigma_shape,
             copy: node.copy_of.map(|original| CopyOf {
                 original,
+                parent: skeleton.moving_parent(original),
                 turn: UnitQuaternion::from_axis_angle(&Vector3::y_axis(), node.plane_angle),
             }),
-        })
-    }
-
-    /// Where it ends when it turns by `own` in the axes of its parent branch.
-    fn turned(&self, parent: &JointPose, own: UnitQuaternion<f64>) -> JointPose {
-        let rotation = UnitQuaternion::new_normalize((parent.rotation * own).into_inner());
-        JointPose {
-            position: parent.position + rotation * self.vector,
-            rotation,
+            way,
         }
     }
-}
 
-/// From a node's parent to the node, px; `None` for the foot.
-fn vector_of(skeleton: &Skeleton, node: &Node) -> Option<Vector3<f64>> {
-    let parent = node.parent?;
-    Some(node.position - skeleton.nodes[parent.index()].position)
+    /// Puts it into `joints`, turned by `own` in the axes of its parent branch.
+    fn turn(&self, skeleton: &Skeleton, own: UnitQuaternion<f64>, joints: &mut [JointPose]) {
+        let parent = joints[self.way.parent.index()].rotation;
+        let rotation = UnitQuaternion::new_normalize((parent * own).into_inner());
+        self.way.place(skeleton, rotation, joints);
+    }
 }
 
 fn resting(node: &Node) -> JointPose {
@@ -96,36 +90,43 @@ fn resting(node: &Node) -> JointPose {
     }
 }
 
+/// The copy turns in its plane as the original does in its own.
+fn turn_of_copy(copy: &CopyOf, joints: &[JointPose]) -> UnitQuaternion<f64> {
+    let parent_rotation = copy
+        .parent
+        .map_or(UnitQuaternion::identity(), |p| joints[p.index()].rotation);
+    let own = parent_rotation.inverse() * joints[copy.original.index()].rotation;
+    copy.turn * own * copy.turn.inverse()
+}
+
 /// Follows the pose of a skeleton from frame to frame.
 pub struct PoseEstimator {
     skeleton: Arc<Skeleton>,
     settings: Motion,
-    branches: Vec<Option<Branch>>,
-    /// Direction of each measured branch in the frame before, in the axes of its parent branch at
-    /// rest; `None` before the first frame, which may lie anywhere within the accumulated bound.
+    /// Each after the one that carries it, and after its original.
+    branches: Vec<Branch>,
+    /// Direction of each measured branch in the frame before, by node, in the axes of its parent
+    /// branch at rest; `None` before the first frame, which may lie anywhere within the accumulated bound.
     previous: Option<Vec<UnitVector3<f64>>>,
     previous_s: f64,
 }
 
 impl PoseEstimator {
     pub fn new(skeleton: Arc<Skeleton>, settings: &Motion) -> Self {
-        let deepest = f64::from(
-            skeleton
-                .nodes
-                .iter()
-                .map(|n| n.level)
-                .max()
-                .unwrap_or(1)
-                .max(2),
-        );
-        let branches = skeleton.nodes.iter().map(|node| {
+        let ways = skeleton.moving_branches();
+        let levels = ways.iter().map(|w| skeleton.nodes[w.node.index()].level);
+        let deepest = f64::from(levels.max().unwrap_or(1).max(2));
+        let mut branches = Vec::with_capacity(ways.len());
+        for way in ways {
             // A wider tolerance towards the tips, which bend more easily (Li 2011 eq. 10).
-            let depth = (f64::from(node.level) - 1.0) / (deepest - 1.0);
+            let level = f64::from(skeleton.nodes[way.node.index()].level);
+            let depth = (level - 1.0) / (deepest - 1.0);
             let (root, tip) = (settings.sigma_shape_root_deg, settings.sigma_shape_tip_deg);
-            Branch::at_rest(&skeleton, node, (root + depth * (tip - root)).to_radians())
-        });
+            let sigma_shape = (root + depth * (tip - root)).to_radians();
+            branches.push(Branch::at_rest(&skeleton, way, sigma_shape));
+        }
         Self {
-            branches: branches.collect(),
+            branches,
             skeleton,
             settings: settings.clone(),
             previous: None,
@@ -139,27 +140,27 @@ impl PoseEstimator {
         let elapsed_s = (time_s - self.previous_s).max(1e-3);
         self.previous_s = time_s;
         let mut joints: Vec<JointPose> = self.skeleton.nodes.iter().map(resting).collect();
-        let mut directions: Vec<UnitVector3<f64>> = Vec::with_capacity(self.skeleton.nodes.len());
-        for i in 0..joints.len() {
-            let Some(branch) = &self.branches[i] else {
-                directions.push(Vector3::y_axis());
-                continue;
-            };
-            let parent = joints[branch.parent];
+        let mut directions = vec![Vector3::y_axis(); joints.len()];
+        for branch in &self.branches {
+            let i = branch.way.node.index();
             let own = match &branch.copy {
                 Some(copy) => {
-                    directions.push(branch.direction);
-                    self.turn_of_copy(copy, &joints)
+                    directions[i] = branch.direction;
+                    turn_of_copy(copy, &joints)
                 }
                 None => {
+                    let base = JointPose {
+                        position: joints[branch.way.begin.index()].position,
+                        rotation: joints[branch.way.parent.index()].rotation,
+                    };
                     let target_px = targets_px.get(i).copied().flatten();
                     let previous = self.previous.as_ref().map(|p| p[i]);
-                    let d = self.direction(branch, previous, &parent, target_px, elapsed_s);
-                    directions.push(d);
+                    let d = self.direction(branch, previous, &base, target_px, elapsed_s);
+                    directions[i] = d;
                     shortest_rotation(&branch.direction, &d)
                 }
             };
-            joints[i] = branch.turned(&parent, own);
+            branch.turn(&self.skeleton, own, &mut joints);
         }
         self.previous = Some(directions);
         Pose {
@@ -167,16 +168,6 @@ impl PoseEstimator {
             time_s,
             joints,
         }
-    }
-
-    /// The copy turns in its plane as the original does in its own.
-    fn turn_of_copy(&self, copy: &CopyOf, joints: &[JointPose]) -> UnitQuaternion<f64> {
-        let original = copy.original.index();
-        let parent_rotation = self.skeleton.nodes[original]
-            .parent
-            .map_or(UnitQuaternion::identity(), |p| joints[p.index()].rotation);
-        let own = parent_rotation.inverse() * joints[original].rotation;
-        copy.turn * own * copy.turn.inverse()
     }
 
     /// By how much the direction of a branch may change that was `turned` from its rest, so that
@@ -197,12 +188,13 @@ impl PoseEstimator {
                 .max(0.5)
     }
 
-    /// Direction of a branch in the axes of its parent branch at rest, from the `previous` one.
+    /// Direction of a branch in the axes of its parent branch at rest, from the `previous` one. It
+    /// begins at the place of `base`, whose rotation is the parent branch's.
     fn direction(
         &self,
         branch: &Branch,
         previous: Option<UnitVector3<f64>>,
-        parent: &JointPose,
+        base: &JointPose,
         target_px: Option<Point2<f64>>,
         elapsed_s: f64,
     ) -> UnitVector3<f64> {
@@ -213,9 +205,9 @@ impl PoseEstimator {
         }
         match self.settings.method {
             MotionMethod::Probabilistic => Problem {
-                parent_rotation: parent.rotation,
+                parent_rotation: base.rotation,
                 length: branch.length,
-                target: target.map(|t| t - parent.position.xy()),
+                target: target.map(|t| t - base.position.xy()),
                 parent_direction: branch.parent_direction,
                 rest_direction: branch.direction,
                 previous_direction: previous.unwrap_or(branch.direction),
@@ -234,9 +226,9 @@ impl PoseEstimator {
             MotionMethod::Deterministic => {
                 let own = previous.unwrap_or(branch.direction);
                 let Some(target) = target else { return own };
-                let now = parent.position + parent.rotation * own.into_inner() * branch.length;
-                let d = deterministic_direction(&parent.position, branch.length, &now, target);
-                Unit::new_normalize(parent.rotation.inverse() * d.into_inner())
+                let now = base.position + base.rotation * own.into_inner() * branch.length;
+                let d = deterministic_direction(&base.position, branch.length, &now, target);
+                Unit::new_normalize(base.rotation.inverse() * d.into_inner())
             }
         }
     }

@@ -1,7 +1,7 @@
 //! The rotations of a pose of which only the places are known, as in a table that was written.
 
-use super::PoseEstimator;
 use super::rotation::shortest_rotation;
+use super::{PoseEstimator, resting, turn_of_copy};
 use crate::model::{JointPose, Pose};
 use nalgebra::{Point3, Unit, UnitQuaternion};
 
@@ -11,32 +11,22 @@ impl PoseEstimator {
     /// copy as its original. Lengths are those at rest, whatever `places` says; what is missing or
     /// no number stays as its parent has it.
     pub fn recover(&self, frame: u64, time_s: f64, places: &[Point3<f64>]) -> Pose {
-        let mut joints: Vec<JointPose> = Vec::with_capacity(self.branches.len());
-        for (i, branch) in self.branches.iter().enumerate() {
-            let Some(branch) = branch else {
-                let position = self.skeleton.nodes[i].position;
-                joints.push(JointPose {
-                    position,
-                    rotation: UnitQuaternion::identity(),
-                });
-                continue;
-            };
-            let parent = joints[branch.parent];
+        let mut joints: Vec<JointPose> = self.skeleton.nodes.iter().map(resting).collect();
+        for branch in &self.branches {
+            let parent = joints[branch.way.parent.index()].rotation;
             let own = match &branch.copy {
-                Some(copy) => self.turn_of_copy(copy, &joints),
+                Some(copy) => turn_of_copy(copy, &joints),
                 None => places
-                    .get(i)
-                    .zip(places.get(branch.parent))
+                    .get(branch.way.node.index())
+                    .zip(places.get(branch.way.begin.index()))
                     .filter(|_| branch.length >= 1e-6)
-                    .and_then(|(end, start)| {
-                        Unit::try_new(parent.rotation.inverse() * (end - start), 1e-9)
-                    })
+                    .and_then(|(end, start)| Unit::try_new(parent.inverse() * (end - start), 1e-9))
                     .filter(|d| d.iter().all(|x| x.is_finite()))
                     .map_or_else(UnitQuaternion::identity, |d| {
                         shortest_rotation(&branch.direction, &d)
                     }),
             };
-            joints.push(branch.turned(&parent, own));
+            branch.turn(&self.skeleton, own, &mut joints);
         }
         Pose {
             frame,
