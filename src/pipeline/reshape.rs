@@ -1,7 +1,7 @@
 //! Another shape in space for a tree that has been measured.
 
 use crate::config::Config;
-use crate::model::{ClusterId, NodeName, Outline, Skeleton};
+use crate::model::{ClusterId, Node, NodeId, NodeName, Outline, Skeleton};
 use crate::shape::{Drawn, Topiary, TopiaryError};
 use crate::solve::assign_radii;
 use crate::{shape, skeleton};
@@ -37,11 +37,25 @@ pub fn reshape(old: &Skeleton, outline: &Outline, config: &Config) -> Skeleton {
     let (kept, copies) = new.nodes.split_at_mut(measured.len());
     for (new, old) in kept.iter_mut().zip(measured) {
         (new.name, new.kind) = (old.name, old.kind);
+        new.moves_with = old.moves_with;
     }
     for (name, copy) in (unused..).zip(copies) {
         copy.name = NodeName(name);
     }
+    for i in measured.len()..new.nodes.len() {
+        new.nodes[i].moves_with = mover_of_copy(&new, &new.nodes[i]);
+    }
     new
+}
+
+/// The copy of what a copy's original moves with, on the same plane; where that has none there, the
+/// original's mover itself.
+fn mover_of_copy(skeleton: &Skeleton, copy: &Node) -> Option<NodeId> {
+    let original = skeleton.nodes.get(copy.copy_of?.index())?;
+    let mover = original.moves_with?;
+    let on_plane = |n: &Node| n.copy_of == Some(mover) && n.plane_angle == copy.plane_angle;
+    let place = skeleton.nodes.iter().position(on_plane);
+    Some(place.map_or(mover, |k| NodeId(k as u32)))
 }
 
 /// Cuts the tree to a drawn shape; radii follow from what is left.

@@ -226,6 +226,7 @@ pub(super) fn with(skeleton: &Skeleton, branches: &[SubBranch]) -> Skeleton {
         nodes.push(Node {
             parent: copy.parent.map(|id| shifted(id, measured, n_new)),
             copy_of: copy.copy_of.map(|id| shifted(id, measured, n_new)),
+            moves_with: copy.moves_with.map(|id| shifted(id, measured, n_new)),
             ..copy.clone()
         });
     }

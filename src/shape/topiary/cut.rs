@@ -1,7 +1,7 @@
 //! Branches outside of a shape are cut.
 
 use super::drawn::TopiaryError;
-use crate::model::{NodeId, Skeleton};
+use crate::model::{Node, NodeId, Skeleton};
 use crate::shape::envelope::Envelope;
 use nalgebra::Point3;
 
@@ -50,12 +50,14 @@ pub fn cut(skeleton: &Skeleton, envelope: &Envelope) -> Result<Pruned, TopiaryEr
             shortened += usize::from(is_left[i]);
         }
     }
+    end_in_bends(&mut nodes, skeleton, &mut is_left);
     let kept: Vec<usize> = (0..nodes.len()).filter(|&i| is_left[i]).collect();
     let mut left = Vec::with_capacity(kept.len());
     for &i in &kept {
         let mut node = nodes[i].clone();
         node.parent = node.parent.map(|p| new_id(&kept, p));
         node.copy_of = node.copy_of.map(|c| new_id(&kept, c));
+        node.moves_with = node.moves_with.map(|m| new_id(&kept, m));
         left.push(node);
     }
     Ok(Pruned {
@@ -66,6 +68,27 @@ pub fn cut(skeleton: &Skeleton, envelope: &Envelope) -> Result<Pruned, TopiaryEr
         kept,
         shortened,
     })
+}
+
+/// A limb whose end is gone ends in its last bend that is left; where none is, its side wood is
+/// gone, too, with all that grows from it.
+fn end_in_bends(nodes: &mut [Node], skeleton: &Skeleton, is_left: &mut [bool]) {
+    for branch in skeleton.moving_branches() {
+        if is_left[branch.node.index()] || branch.riders.is_empty() {
+            continue;
+        }
+        let mut bends = skeleton.ancestors(branch.node);
+        let end = bends.find(|n| is_left[n.index()] || *n == branch.begin);
+        let end = end.filter(|n| *n != branch.begin);
+        for rider in &branch.riders {
+            is_left[rider.index()] &= end.is_some();
+            nodes[rider.index()].moves_with = end.filter(|end| end != rider);
+        }
+    }
+    for (i, node) in nodes.iter().enumerate() {
+        let mut holds_on = node.parent.iter().chain(&node.copy_of);
+        is_left[i] &= holds_on.all(|n| is_left[n.index()]);
+    }
 }
 
 /// What node `old` is among the nodes that are `kept`.

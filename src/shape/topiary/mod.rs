@@ -12,7 +12,7 @@ use super::envelope::Envelope;
 use super::term_weights::tune_term_weights;
 use super::trunk::is_trunk;
 use crate::config;
-use crate::model::{JointPose, NodeId, Outline, Pose, Skeleton};
+use crate::model::{JointPose, MovingBranch, NodeId, Outline, Pose, Skeleton};
 use grow::DrawnSpace;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
@@ -152,35 +152,43 @@ impl Topiary {
             position: Point3::origin(),
             rotation: UnitQuaternion::identity(),
         };
-        let mut joints: Vec<JointPose> = Vec::with_capacity(self.skeleton.nodes.len());
-        for (node, original) in self.skeleton.nodes.iter().zip(&self.moves_as) {
-            let Some(parent) = node.parent.filter(|p| p.index() < joints.len()) else {
-                joints.push(whole.joints.first().copied().unwrap_or(still));
-                continue;
-            };
+        let foot = whole.joints.first().copied().unwrap_or(still);
+        let mut joints = vec![foot; self.skeleton.nodes.len()];
+        for branch in self.skeleton.moving_branches() {
+            let node = &self.skeleton.nodes[branch.node.index()];
+            let original = self.original_of(branch.node);
             let above = skeleton
                 .nodes
-                .get(original.index())
+                .get(self.original_of(self.first_part(&branch)).index())
                 .and_then(|n| n.parent)
                 .map_or(0, |p| p.index());
             let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), node.plane_angle);
             let against_parent =
                 rotation(whole, above).inverse() * rotation(whole, original.index());
             let own = turn * against_parent * turn.inverse();
-            let parent_joint = joints[parent.index()];
-            let rotation =
-                UnitQuaternion::new_normalize((parent_joint.rotation * own).into_inner());
-            let way = node.position - self.skeleton.nodes[parent.index()].position;
-            joints.push(JointPose {
-                position: parent_joint.position + rotation * way,
-                rotation,
-            });
+            let parent = joints[branch.parent.index()].rotation;
+            let rotation = UnitQuaternion::new_normalize((parent * own).into_inner());
+            branch.place(&self.skeleton, rotation, &mut joints);
         }
         Pose {
             frame: whole.frame,
             time_s: whole.time_s,
             joints,
         }
+    }
+
+    /// The measured node of the tree before that `node` moves as.
+    fn original_of(&self, node: NodeId) -> NodeId {
+        self.moves_as.get(node.index()).copied().unwrap_or_default()
+    }
+
+    /// The lowest part of a branch on the way to its end: the one that begins where it does.
+    fn first_part(&self, branch: &MovingBranch) -> NodeId {
+        let below = self.skeleton.ancestors(branch.node);
+        below
+            .take_while(|n| *n != branch.begin)
+            .last()
+            .unwrap_or(branch.node)
     }
 }
 
