@@ -32,13 +32,16 @@ pub struct AngleToParent {
 }
 
 impl AngleToParent {
-    /// Follows the branch that ends in `node`.
+    /// Follows the branch that ends in `node`, or that `node` moves with.
     pub fn new(skeleton: &Skeleton, node: NodeId) -> Self {
-        let parent = skeleton.ancestors(node).next();
-        let carrier = parent.and_then(|parent| carrier(skeleton, parent));
+        let end = skeleton.mover(node);
+        let begin = skeleton.begin(end);
+        let carrier = skeleton
+            .moving_parent(end)
+            .and_then(|p| carrier(skeleton, p));
         Self {
             nodes: skeleton.nodes.len(),
-            own: parent.map(|p| [p, node]),
+            own: begin.map(|begin| [begin, end]),
             carrier,
             last_deg: None,
         }
@@ -46,13 +49,13 @@ impl AngleToParent {
 
     /// The angle in the next pose, degrees; NaN where it has none.
     pub fn step(&mut self, pose: &Pose) -> f64 {
-        let Some([parent, node]) = self.own.filter(|_| pose.joints.len() == self.nodes) else {
+        let Some([begin, end]) = self.own.filter(|_| pose.joints.len() == self.nodes) else {
             return f64::NAN;
         };
         let base = self.carrier.map_or(Vector2::y(), |(from, to)| {
             direction_in_picture(pose, from, to)
         });
-        let own = direction_in_picture(pose, parent, node);
+        let own = direction_in_picture(pose, begin, end);
         let shortest = base.x.hypot(base.y).min(own.x.hypot(own.y));
         if !shortest.is_finite() || shortest < SHORTEST_PX {
             return f64::NAN;
@@ -71,15 +74,17 @@ impl AngleToParent {
 /// al. eq. 1 it tells the two sides of a branch that goes on straight. NaN for poses of another
 /// skeleton.
 pub fn angle_in_space_deg(skeleton: &Skeleton, poses: &[Pose], node: NodeId) -> Vec<f64> {
-    let Some(parent) = skeleton.ancestors(node).next() else {
+    let end = skeleton.mover(node);
+    let Some(begin) = skeleton.begin(end) else {
         return vec![f64::NAN; poses.len()];
     };
-    let own = skeleton.nodes[node.index()].position - skeleton.nodes[parent.index()].position;
-    let carrier = skeleton.ancestors(parent).next().map(|_| parent);
+    let own = skeleton.nodes[end.index()].position - skeleton.nodes[begin.index()].position;
+    let parent = skeleton.moving_parent(end);
+    let carrier = parent.filter(|p| skeleton.begin(*p).is_some());
     let mut turns: Vec<Option<Vector3<f64>>> = Vec::with_capacity(poses.len());
     for pose in poses {
         let is_of_skeleton = pose.joints.len() == skeleton.nodes.len();
-        let carried = is_of_skeleton.then(|| carried_direction(pose, parent, node, carrier));
+        let carried = is_of_skeleton.then(|| carried_direction(pose, begin, end, carrier));
         turns.push(carried.and_then(|carried| turn(&own, &carried)));
     }
     let seen: Vec<Vector3<f64>> = turns.iter().copied().flatten().collect();
@@ -128,12 +133,12 @@ fn turn(from: &Vector3<f64>, to: &Vector3<f64>) -> Option<Vector3<f64>> {
 /// The nearest branch at or below the one that ends in `node` that has a direction in the picture.
 fn carrier(skeleton: &Skeleton, node: NodeId) -> Option<(NodeId, NodeId)> {
     let (mut end, nodes) = (node, &skeleton.nodes);
-    while let Some(start) = skeleton.ancestors(end).next() {
-        let way = nodes[end.index()].position - nodes[start.index()].position;
+    while let (Some(begin), Some(parent)) = (skeleton.begin(end), skeleton.moving_parent(end)) {
+        let way = nodes[end.index()].position - nodes[begin.index()].position;
         if way.x.hypot(way.y) > SHORTEST_PX {
-            return Some((start, end));
+            return Some((begin, end));
         }
-        end = start;
+        end = parent;
     }
     None
 }

@@ -4,11 +4,12 @@
 //! In the picture a branch moves with everything that carries it, so that the modes of its
 //! ancestors must be known when its turn comes.
 
+use super::branch_tree::BranchTree;
 use super::decay::Mode;
 use super::film::Film;
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
-use crate::model::{Interval, NodeId, Skeleton, Swaying, Unidentified};
+use crate::model::{Interval, NodeId, Swaying, Unidentified};
 use nalgebra::Point2;
 
 /// Share of half the rate of the frames up to which frequencies are looked for.
@@ -127,16 +128,16 @@ pub(super) trait BranchEstimator {
     fn estimate(&mut self, branch: &BranchInFilm) -> Swaying;
 }
 
-/// The sway of every measured node, the nearest to the foot first; `members` are the points of each
-/// and of all above it.
+/// The sway of every branch, the nearest to the foot first; `members` are the points of each and of
+/// all above it.
 pub(super) fn from_the_trunk_up(
-    skeleton: &Skeleton,
+    tree: &BranchTree,
     members: &[Vec<usize>],
     cancel: &CancelToken,
     estimator: &mut impl BranchEstimator,
 ) -> Vec<Swaying> {
     let mut out = vec![Err(Unidentified::NotMeasured); members.len()];
-    for (i, tracks) in members.iter().enumerate().skip(1) {
+    for (i, (branch, tracks)) in tree.branches.iter().zip(members).enumerate().skip(1) {
         if tracks.is_empty() {
             continue;
         }
@@ -144,13 +145,11 @@ pub(super) fn from_the_trunk_up(
             out[i] = Err(Unidentified::NotInTime);
             continue;
         }
-        let node = NodeId(i as u32);
-        let parent = skeleton.ancestors(node).next().unwrap_or(NodeId(0));
         out[i] = estimator.estimate(&BranchInFilm {
-            node,
-            parent,
+            node: NodeId(i as u32),
+            parent: branch.parent.unwrap_or_default(),
             tracks,
-            base_px: skeleton.image_from_model(&skeleton.nodes[parent.index()].position),
+            base_px: branch.base_px,
         });
     }
     out

@@ -4,6 +4,7 @@
 //! of all its ancestors and have its own besides. The ancestors' modes are known when its turn
 //! comes; what is new is its own if all of its points have it, and else that of a branch above it.
 
+use super::branch_tree::BranchTree;
 use super::branches::{
     BranchEstimator, BranchInFilm, BranchMode, Estimate, LnDeviations, SearchLimits,
     from_the_trunk_up,
@@ -18,7 +19,7 @@ use super::signals::{Factor, Fit, Signals};
 use super::swing::Arms;
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
-use crate::model::{Excitation, NodeId, Skeleton, Sway, Swaying, Unidentified};
+use crate::model::{Excitation, NodeId, Sway, Swaying, Unidentified};
 use crate::signal::along_principal_direction;
 use crate::signal::statistics::{quantile, rms};
 use nalgebra::Point2;
@@ -74,9 +75,9 @@ const CI_INFLATION: f64 = 1.25;
 /// likewise.
 const MIN_LN_FREQUENCY_SD: f64 = 0.0015;
 
-/// The sway of every measured node.
+/// The sway of every branch.
 pub(super) fn sways(
-    skeleton: &Skeleton,
+    tree: &BranchTree,
     film: &Film,
     members: &[Vec<usize>],
     onset: &Onset,
@@ -84,7 +85,7 @@ pub(super) fn sways(
     cancel: &CancelToken,
 ) -> Vec<Swaying> {
     let mut estimator = FreeDecay {
-        skeleton,
+        tree,
         film,
         members,
         onset,
@@ -97,7 +98,7 @@ pub(super) fn sways(
         mixed: vec![None; members.len()],
         trunk_is_known: false,
     };
-    from_the_trunk_up(skeleton, members, cancel, &mut estimator)
+    from_the_trunk_up(tree, members, cancel, &mut estimator)
 }
 
 /// When the tree was released, and how sure that is: the trunk's own fit knows it better than the
@@ -108,15 +109,15 @@ struct ReleaseTime {
 }
 
 struct FreeDecay<'a> {
-    skeleton: &'a Skeleton,
+    tree: &'a BranchTree,
     film: &'a Film,
     members: &'a [Vec<usize>],
     onset: &'a Onset,
     limits: &'a SearchLimits,
     release: ReleaseTime,
-    /// By node: modes that are a branch's own.
+    /// By branch: modes that are a branch's own.
     own: Vec<Option<BranchMode>>,
-    /// By node: modes of branches that may not be theirs alone, but that of a branch on them.
+    /// By branch: modes of branches that may not be theirs alone, but that of a branch on them.
     mixed: Vec<Option<Mode>>,
     /// Whether the trunk's sway, which all points have, could be told.
     trunk_is_known: bool,
@@ -196,7 +197,7 @@ impl FreeDecay<'_> {
     /// Fits the modes of the ancestors and as many more as the points carry.
     fn fit(&self, node: NodeId, points: &Points) -> FittedModes {
         let mut ancestors: Vec<BranchMode> = Vec::new();
-        for above in self.skeleton.ancestors(node) {
+        for above in self.tree.carriers(node) {
             ancestors.extend(self.own[above.index()]);
         }
         let times_s = self.film.times_s[self.onset.from..].iter();
@@ -244,7 +245,7 @@ impl FreeDecay<'_> {
 
     /// Whether a mode is one that is not surely that of an ancestor.
     fn is_doubted(&self, node: NodeId, mode: &Mode) -> bool {
-        for ancestor in self.skeleton.ancestors(node) {
+        for ancestor in self.tree.carriers(node) {
             let doubted = self.mixed[ancestor.index()];
             if doubted.is_some_and(|d| d.has_frequency_of(mode, DOUBT_FREQ_TOLERANCE)) {
                 return true;

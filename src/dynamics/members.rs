@@ -1,7 +1,7 @@
 //! Which points of a film speak for which branch.
 
+use super::branch_tree::BranchTree;
 use super::film::Film;
-use crate::model::Skeleton;
 use crate::signal::statistics::{noise_variance, rms};
 use nalgebra::Point2;
 
@@ -22,12 +22,12 @@ pub(super) struct Points {
     pub signals: Vec<Vec<f64>>,
 }
 
-/// Points of every measured node and of all above it, by node index.
-pub(super) fn members(skeleton: &Skeleton, film: &Film) -> Vec<Vec<usize>> {
-    let mut out = vec![Vec::new(); skeleton.measured()];
+/// Points of every branch and of all that it carries.
+pub(super) fn members(tree: &BranchTree, film: &Film) -> Vec<Vec<usize>> {
+    let mut out = vec![Vec::new(); tree.len()];
     for (k, track) in film.tracks.iter().enumerate() {
-        for node in std::iter::once(track.node).chain(skeleton.ancestors(track.node)) {
-            let Some(members) = out.get_mut(node.index()) else {
+        for branch in std::iter::once(track.node).chain(tree.carriers(track.node)) {
+            let Some(members) = out.get_mut(branch.index()) else {
                 break;
             };
             members.push(k);

@@ -1,6 +1,7 @@
 //! What the motion says of the tree: angles between branches, and how each branch sways.
 
 mod angle;
+mod branch_tree;
 mod branches;
 mod celerite;
 mod decay;

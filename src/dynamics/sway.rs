@@ -1,5 +1,6 @@
 //! Frequency and damping of every branch of a film.
 
+use super::branch_tree::BranchTree;
 use super::branches::{BELOW_NYQUIST, SearchLimits};
 use super::film::Film;
 use super::free_decay;
@@ -30,7 +31,8 @@ pub enum Depth {
 /// What a film says of the sway of its tree.
 #[derive(Clone, Debug)]
 pub struct Analysis {
-    /// By measured node; copies sway as their originals.
+    /// By measured node; copies sway as their originals, and what moves with another node has no
+    /// sway of its own.
     pub sway: Vec<Swaying>,
     /// What made the tree sway; `None` where there is too little film to tell.
     pub onset: Option<Onset>,
@@ -50,37 +52,39 @@ pub fn analyse(
     depth: Depth,
     cancel: &CancelToken,
 ) -> Analysis {
+    let tree = BranchTree::of(skeleton);
+    let film = tree.film(film);
     let UsableFilm {
         members,
         onset,
         releases_s,
         limits,
         film,
-    } = match UsableFilm::of(skeleton, film, config, cancel) {
+    } = match UsableFilm::of(&tree, &film, config, cancel) {
         Ok(usable) => usable,
-        Err(reason) => return without_answers(skeleton, film, reason),
+        Err(reason) => return without_answers(&tree, &film, reason),
     };
     let sway = match onset.excitation {
-        Excitation::Wind => wind::sways(skeleton, &film, &members, &limits, cancel),
+        Excitation::Wind => wind::sways(&tree, &film, &members, &limits, cancel),
         Excitation::Release => {
-            let mut sways = free_decay::sways(skeleton, &film, &members, &onset, &limits, cancel);
+            let mut sways = free_decay::sways(&tree, &film, &members, &onset, &limits, cancel);
             if depth == Depth::Full {
-                modal::answer(skeleton, &film, &onset, &limits, &mut sways, cancel);
+                modal::answer(&tree, &film, &onset, &limits, &mut sways, cancel);
             }
             sways
         }
     };
     Analysis {
-        sway,
+        sway: tree.by_node(&sway),
         onset: Some(onset),
         releases_s,
     }
 }
 
 /// Of a film that cannot be used, for one reason.
-fn without_answers(skeleton: &Skeleton, film: &Film, reason: Unidentified) -> Analysis {
-    let mut sway: Vec<Swaying> = Vec::with_capacity(skeleton.measured());
-    for (i, members) in members(skeleton, film).iter().enumerate() {
+fn without_answers(tree: &BranchTree, film: &Film, reason: Unidentified) -> Analysis {
+    let mut sway: Vec<Swaying> = Vec::with_capacity(tree.len());
+    for (i, members) in members(tree, film).iter().enumerate() {
         sway.push(Err(if i == 0 || members.is_empty() {
             Unidentified::NotMeasured
         } else {
@@ -88,7 +92,7 @@ fn without_answers(skeleton: &Skeleton, film: &Film, reason: Unidentified) -> An
         }));
     }
     Analysis {
-        sway,
+        sway: tree.by_node(&sway),
         onset: None,
         releases_s: Vec::new(),
     }
@@ -96,7 +100,7 @@ fn without_answers(skeleton: &Skeleton, film: &Film, reason: Unidentified) -> An
 
 /// A film that is long enough to be looked at, and what made its tree sway.
 pub(super) struct UsableFilm<'a> {
-    /// Points of every measured node and of all above it.
+    /// Points of every branch and of all that it carries.
     pub members: Vec<Vec<usize>>,
     pub onset: Onset,
     pub releases_s: Vec<f64>,
@@ -108,7 +112,7 @@ pub(super) struct UsableFilm<'a> {
 impl<'a> UsableFilm<'a> {
     /// An error where there is too little film, or `cancel` ends the work before.
     pub fn of(
-        skeleton: &Skeleton,
+        tree: &BranchTree,
         film: &'a Film,
         config: &Dynamics,
         cancel: &CancelToken,
@@ -126,7 +130,7 @@ impl<'a> UsableFilm<'a> {
             Excited::Release => Some(Excitation::Release),
             Excited::Wind => Some(Excitation::Wind),
         };
-        let members = members(skeleton, film);
+        let members = members(tree, film);
         let of_tree: &[usize] = members.get(1).map_or(&[], Vec::as_slice);
         let (onset, releases_s) = onset(film, of_tree, given, frequencies_hz, cancel);
         if cancel.is_cancelled() {

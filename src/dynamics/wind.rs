@@ -6,6 +6,7 @@
 //! noise. The likelihood of that sum tells frequency and damping, at the real times
 //! (`driven_oscillators.rs`). It is the branch's own if its points move with it as one swing.
 
+use super::branch_tree::BranchTree;
 use super::branches::{
     BranchEstimator, BranchInFilm, BranchMode, Estimate, LnDeviations, SearchLimits,
     from_the_trunk_up,
@@ -18,7 +19,7 @@ use super::members::{Points, mean_px};
 use super::swing::rank_one_fraction;
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
-use crate::model::{Excitation, NodeId, Skeleton, Sway, Swaying, Unidentified};
+use crate::model::{Excitation, NodeId, Sway, Swaying, Unidentified};
 use crate::signal::principal::{PrincipalComponents, along};
 use crate::signal::qr::Qr;
 use crate::signal::vectors::dot;
@@ -103,23 +104,23 @@ impl AcceptanceCriteria {
     }
 }
 
-/// The sway of every measured node.
+/// The sway of every branch.
 pub(super) fn sways(
-    skeleton: &Skeleton,
+    tree: &BranchTree,
     film: &Film,
     members: &[Vec<usize>],
     limits: &SearchLimits,
     cancel: &CancelToken,
 ) -> Vec<Swaying> {
     let mut estimator = InWind {
-        skeleton,
+        tree,
         film,
         members,
         limits,
         known: vec![Known::Nothing; members.len()],
         cancel,
     };
-    from_the_trunk_up(skeleton, members, cancel, &mut estimator)
+    from_the_trunk_up(tree, members, cancel, &mut estimator)
 }
 
 /// What the analysis of a branch leaves for those on it.
@@ -132,11 +133,11 @@ enum Known {
 }
 
 struct InWind<'a> {
-    skeleton: &'a Skeleton,
+    tree: &'a BranchTree,
     film: &'a Film,
     members: &'a [Vec<usize>],
     limits: &'a SearchLimits,
-    /// By node.
+    /// By branch.
     known: Vec<Known>,
     cancel: &'a CancelToken,
 }
@@ -211,7 +212,7 @@ impl InWind<'_> {
     /// The modes of the nearest ancestors that have one.
     fn ancestors(&self, node: NodeId) -> Vec<BranchMode> {
         let mut out = Vec::new();
-        for above in self.skeleton.ancestors(node) {
+        for above in self.tree.carriers(node) {
             if let Known::Mode(mode) = self.known[above.index()] {
                 out.push(mode);
             }

@@ -1,7 +1,7 @@
 //! The angles of all branches over the last seconds of film, frame by frame.
 
 use crate::dynamics::AngleToParent;
-use crate::model::{Angles, NodeId, NodeName, Pose, Skeleton};
+use crate::model::{Angles, NodeName, Pose, Skeleton};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -25,12 +25,13 @@ impl AngleWindow {
         }
     }
 
-    /// Begins anew with the measured branches of `skeleton`.
+    /// Begins anew with the measured branches of `skeleton` that move on their own.
     pub fn begin(&mut self, skeleton: &Skeleton) {
-        let measured = &skeleton.nodes[..skeleton.measured()];
-        self.nodes = measured.iter().skip(1).map(|n| n.name).collect();
-        self.followers = (1..measured.len())
-            .map(|i| AngleToParent::new(skeleton, NodeId(i as u32)))
+        let branches = skeleton.measured_branches();
+        self.nodes = branches.filter_map(|n| skeleton.name_of(n)).collect();
+        self.followers = skeleton
+            .measured_branches()
+            .map(|n| AngleToParent::new(skeleton, n))
             .collect();
         self.rows.clear();
     }
@@ -67,7 +68,7 @@ impl AngleWindow {
 mod tests {
     use super::*;
     use crate::dynamics::angle_to_parent_deg;
-    use crate::model::{JointPose, Node, Size};
+    use crate::model::{JointPose, Node, NodeId, Size};
     use nalgebra::{Point2, Point3, UnitQuaternion, Vector3};
 
     /// A trunk and a branch that sways on it for `seconds`.

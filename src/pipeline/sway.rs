@@ -7,7 +7,6 @@ use crate::config::Dynamics;
 use crate::dynamics::{Depth, Film, analyse, spectrum};
 use crate::model::{
     AngleSpectrum, Angles, BranchSway, NodeId, NodeName, Skeleton, SwayNow, TrackId, TrackLog,
-    Unidentified,
 };
 use crate::solve::Model;
 use std::collections::BTreeMap;
@@ -111,14 +110,15 @@ impl SwayJob {
         let film = Film::from_log(window, &self.skeleton, |id| self.nodes.get(&id).copied());
         let analysis = analyse(&self.skeleton, &film, &self.settings, Depth::Quick, cancel);
         let mut branches = BTreeMap::new();
-        // The foot is no branch.
-        for (name, i) in self.angles.nodes.iter().zip(1..) {
-            let swaying = analysis.sway.get(i).copied();
-            let sway = BranchSway {
-                swaying: swaying.unwrap_or(Err(Unidentified::NotMeasured)),
-                spectrum: self.spectrum_of(*name),
-            };
-            branches.insert(*name, sway);
+        for (node, swaying) in self.skeleton.nodes.iter().zip(&analysis.sway) {
+            // The foot is no branch, and what moves with another node is none of its own.
+            if self.angles.nodes.contains(&node.name) {
+                let sway = BranchSway {
+                    swaying: *swaying,
+                    spectrum: self.spectrum_of(node.name),
+                };
+                branches.insert(node.name, sway);
+            }
         }
         SwayNow {
             frame: self.frame,

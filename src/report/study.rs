@@ -171,15 +171,13 @@ impl Study {
             branches: Vec::new(),
             notes: given.notes.to_vec(),
         };
-        for i in 1..skeleton.measured() {
+        for node in skeleton.measured_branches() {
             let sway = analysis
                 .sway
-                .get(i)
+                .get(node.index())
                 .copied()
                 .unwrap_or(Err(Unidentified::NotMeasured));
-            study
-                .branches
-                .push(branch(given, NodeId(i as u32), sway, study.used_s));
+            study.branches.push(branch(given, node, sway, study.used_s));
         }
         study
     }
@@ -244,8 +242,9 @@ fn used_s(onset: &Onset, times_s: &[f64], ends: Bounds) -> Bounds {
 fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: Bounds) -> Branch {
     let (skeleton, poses) = (given.skeleton, given.poses);
     let own = &skeleton.nodes[node.index()];
-    let parent = skeleton.ancestors(node).next().unwrap_or(NodeId(0));
-    let (base, tip) = (place(skeleton, parent), place(skeleton, node));
+    let parent = skeleton.moving_parent(node).unwrap_or_default();
+    let begin = skeleton.begin(node).unwrap_or_default();
+    let (base, tip) = (place(skeleton, begin), place(skeleton, node));
     let times_s: Vec<f64> = poses.iter().map(|p| p.time_s).collect();
     let plane_deg = centred(angle_to_parent_deg(skeleton, poses, node));
     let space_deg = centred(angle_in_space_deg(skeleton, poses, node));
@@ -327,9 +326,10 @@ fn others_seen(given: &Given, node: NodeId) -> Vec<Sway> {
     let skeleton = given.skeleton;
     let carried = (0..skeleton.nodes.len() as u32)
         .map(NodeId)
-        .filter(|n| skeleton.nodes[n.index()].parent == Some(node));
+        .filter(|n| *n != node && skeleton.mover(*n) == *n)
+        .filter(|n| skeleton.begin(*n) == Some(node));
     let mut out = Vec::new();
-    for other in skeleton.ancestors(node).chain(carried) {
+    for other in skeleton.carriers(node).chain(carried) {
         if let Some(Ok(sway)) = given.analysis.sway.get(other.index()) {
             out.push(*sway);
         }

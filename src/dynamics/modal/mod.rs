@@ -16,6 +16,7 @@ mod search;
 mod shoots;
 mod tree;
 
+use super::branch_tree::BranchTree;
 use super::branches::{BELOW_NYQUIST, BranchMode, LnDeviations, SearchLimits};
 use super::decay::{Mode, USUAL_DAMPING};
 use super::film::Film;
@@ -23,7 +24,7 @@ use super::free_decay::MIN_PERIODS;
 use super::release::Onset;
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
-use crate::model::{Excitation, NodeId, Skeleton, Sway, Swaying, Unidentified};
+use crate::model::{Excitation, NodeId, Sway, Swaying, Unidentified};
 use points::ThinnedFilm;
 use read::ModeEstimate;
 use search::MIN_POINTS;
@@ -55,7 +56,7 @@ const MIN_LN_SD: LnDeviations = LnDeviations {
 
 /// Answers for branches of `sways` that have none, by all points at once.
 pub(super) fn answer(
-    skeleton: &Skeleton,
+    tree: &BranchTree,
     film: &Film,
     onset: &Onset,
     limits: &SearchLimits,
@@ -65,7 +66,7 @@ pub(super) fn answer(
     if !sways.iter().any(is_open) {
         return;
     }
-    let Some(solution) = ModalSolution::of(skeleton, film, onset, limits, sways, cancel) else {
+    let Some(solution) = ModalSolution::of(tree, film, onset, limits, sways, cancel) else {
         if cancel.is_cancelled() {
             for sway in sways.iter_mut().filter(|s| is_open(s)) {
                 *sway = Err(Unidentified::NotInTime);
@@ -77,7 +78,7 @@ pub(super) fn answer(
         if !is_open(&sways[b]) {
             continue;
         }
-        let carriers = known_modes(skeleton.ancestors(NodeId(b as u32)), sways);
+        let carriers = known_modes(tree.carriers(NodeId(b as u32)), sways);
         let estimate = solution.estimate_of(b, &carriers);
         if let Some(sway) = estimate.and_then(|e| e.sway(limits)) {
             sways[b] = Ok(sway);
@@ -101,9 +102,9 @@ fn mode_of(sway: &Sway) -> Mode {
     }
 }
 
-/// Of those of some nodes that have an answer.
-fn known_modes(nodes: impl Iterator<Item = NodeId>, sways: &[Swaying]) -> Vec<Mode> {
-    let known = nodes.filter_map(|node| sways[node.index()].as_ref().ok());
+/// Of those of some branches that have an answer.
+fn known_modes(branches: impl Iterator<Item = NodeId>, sways: &[Swaying]) -> Vec<Mode> {
+    let known = branches.filter_map(|b| sways[b.index()].as_ref().ok());
     known.map(mode_of).collect()
 }
 
@@ -127,7 +128,7 @@ struct ModalSolution {
 impl ModalSolution {
     /// `None` where too little is seen, or `cancel` ends it before.
     fn of(
-        skeleton: &Skeleton,
+        tree: &BranchTree,
         film: &Film,
         onset: &Onset,
         limits: &SearchLimits,
@@ -159,7 +160,7 @@ impl ModalSolution {
         let decay = Decay::new(times_s, onset.start, frequencies_hz, points);
         let nodes = tracks.iter().map(|&k| film.tracks[k].node);
         let branch_of: Vec<usize> = nodes.map(NodeId::index).collect();
-        let captured = captured(skeleton, sways, &decay, branch_of.clone());
+        let captured = captured(tree, sways, &decay, branch_of.clone());
         let on: Vec<Vec<usize>> = (0..sways.len()).map(|b| captured.all(b)).collect();
         let tree = captured.grown(cancel)?;
         let mut estimates = tree.estimates();
@@ -244,17 +245,18 @@ impl ModeEstimate {
 
 /// The tree as it was captured, with the modes that are known.
 fn captured<'a>(
-    skeleton: &Skeleton,
+    tree: &BranchTree,
     sways: &[Swaying],
     decay: &'a Decay,
     branch_of: Vec<usize>,
 ) -> Tree<'a> {
     let mut branches = Vec::with_capacity(sways.len());
-    for (node, sway) in skeleton.nodes.iter().zip(sways) {
+    for (branch, sway) in tree.branches.iter().zip(sways) {
         branches.push(Branch {
-            parent: node.parent.map(NodeId::index),
+            parent: branch.parent.map(NodeId::index),
             mode: sway.as_ref().ok().map(mode_of),
-            end_px: skeleton.image_from_model(&node.position),
+            base_px: branch.base_px,
+            end_px: branch.end_px,
         });
     }
     let mut tree = Tree {
@@ -277,7 +279,7 @@ mod tests {
     use crate::config::Dynamics;
     use crate::dynamics::sway::UsableFilm;
     use crate::dynamics::{Depth, FilmTrack, analyse, free_decay};
-    use crate::model::{Node, NodeName, Size};
+    use crate::model::{Node, NodeName, Size, Skeleton};
     use crate::random::Generator;
     use nalgebra::{Point2, Point3};
     use rand::RngExt;
@@ -381,18 +383,19 @@ mod tests {
     /// The points of the branches that are found beside the trunk and the tip as a whole.
     fn groups(skeleton: &Skeleton, film: &Film) -> Vec<Vec<usize>> {
         let cancel = CancelToken::new();
+        let tree = BranchTree::of(skeleton);
         let Ok(UsableFilm {
             members,
             onset,
             limits,
             film,
             ..
-        }) = UsableFilm::of(skeleton, film, &Dynamics::default(), &cancel)
+        }) = UsableFilm::of(&tree, film, &Dynamics::default(), &cancel)
         else {
             return Vec::new();
         };
-        let sways = free_decay::sways(skeleton, &film, &members, &onset, &limits, &cancel);
-        let Some(solution) = ModalSolution::of(skeleton, &film, &onset, &limits, &sways, &cancel)
+        let sways = free_decay::sways(&tree, &film, &members, &onset, &limits, &cancel);
+        let Some(solution) = ModalSolution::of(&tree, &film, &onset, &limits, &sways, &cancel)
         else {
             return Vec::new();
         };

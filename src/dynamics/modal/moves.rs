@@ -130,7 +130,7 @@ impl<'a> Tree<'a> {
                 break;
             };
             let mut other = self.clone();
-            let new = other.add(branch, Some(found.mode), &found.points);
+            let new = other.add_on_end(branch, found.mode, &found.points);
             other.refit(&[new], &[new], MAX_STEPS_AFTER_CHANGE);
             let within = other.within(branch);
             other.choose(&within, &other.all(branch));
@@ -160,7 +160,13 @@ impl<'a> Tree<'a> {
                 ..mode
             });
             other.branches[branch].mode = Some(slower);
-            let new = other.add(parent, Some(faster), &[]);
+            let new = other.branches.len();
+            other.branches.push(Branch {
+                parent: Some(parent),
+                mode: Some(faster),
+                base_px: other.branches[branch].base_px,
+                end_px: other.branches[parent].end_px,
+            });
             let both = [branch, new];
             let mut large_enough = true;
             for _ in 0..ROUNDS_OF_TWO {
@@ -205,19 +211,15 @@ impl<'a> Tree<'a> {
         moved
     }
 
-    fn add(&mut self, parent: usize, mode: Option<Mode>, points: &[usize]) -> usize {
+    /// Adds a branch that begins where `parent` ends, with some points that were on that.
+    fn add_on_end(&mut self, parent: usize, mode: Mode, points: &[usize]) -> usize {
         let new = self.branches.len();
-        let end_px = if points.is_empty() {
-            self.branches[parent].end_px
-        } else {
-            let at_px: Vec<Point2<f64>> =
-                points.iter().map(|&p| self.decay.points[p].at_px).collect();
-            mean_px(&at_px)
-        };
+        let at_px: Vec<Point2<f64>> = points.iter().map(|&p| self.decay.points[p].at_px).collect();
         self.branches.push(Branch {
             parent: Some(parent),
-            mode,
-            end_px,
+            mode: Some(mode),
+            base_px: self.branches[parent].end_px,
+            end_px: mean_px(&at_px),
         });
         points.iter().for_each(|&p| self.branch_of[p] = new);
         new

@@ -69,9 +69,7 @@ impl Tree<'_> {
 
     fn estimate(&self, branch: usize, ln_sd: LnDeviations) -> Option<ModeEstimate> {
         let mode = self.branches[branch].mode?;
-        let base_px = self.branches[branch]
-            .parent
-            .map_or(Point2::origin(), |p| self.branches[p].end_px);
+        let base_px = self.branches[branch].base_px;
         let shares = one_swing(self, self.shares(branch), base_px);
         if shares.len() < MIN_POINTS {
             return None;

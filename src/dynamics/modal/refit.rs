@@ -208,6 +208,7 @@ mod tests {
         Branch {
             parent,
             mode,
+            base_px: Point2::origin(),
             end_px: Point2::origin(),
         }
     }

@@ -1,5 +1,6 @@
 //! Branches that were captured as one with another, and that their modes tell apart.
 
+use super::super::branch_tree::BranchTree;
 use super::super::film::Film;
 use super::super::free_decay;
 use super::super::sway::UsableFilm;
@@ -35,28 +36,30 @@ pub fn shoots(
     config: &Dynamics,
     cancel: &CancelToken,
 ) -> Vec<Shoot> {
+    let tree = BranchTree::of(skeleton);
+    let film = tree.film(film);
     let Ok(UsableFilm {
         members,
         onset,
         limits,
         film,
         ..
-    }) = UsableFilm::of(skeleton, film, config, cancel)
+    }) = UsableFilm::of(&tree, &film, config, cancel)
     else {
         return Vec::new();
     };
     if onset.excitation != Excitation::Release {
         return Vec::new();
     }
-    let sways = free_decay::sways(skeleton, &film, &members, &onset, &limits, cancel);
-    match ModalSolution::of(skeleton, &film, &onset, &limits, &sways, cancel) {
-        Some(solution) => solution.shoots(skeleton, &sways),
+    let sways = free_decay::sways(&tree, &film, &members, &onset, &limits, cancel);
+    match ModalSolution::of(&tree, &film, &onset, &limits, &sways, cancel) {
+        Some(solution) => solution.shoots(&tree, &sways),
         None => Vec::new(),
     }
 }
 
 impl ModalSolution {
-    fn shoots(&self, skeleton: &Skeleton, sways: &[Swaying]) -> Vec<Shoot> {
+    fn shoots(&self, tree: &BranchTree, sways: &[Swaying]) -> Vec<Shoot> {
         let mut estimates: Vec<&ModeEstimate> = self.estimates.iter().collect();
         estimates.sort_by(|a, b| b.gain_together().total_cmp(&a.gain_together()));
         let mut taken = vec![false; self.tracks.len()];
@@ -65,13 +68,13 @@ impl ModalSolution {
             let Some(on) = self.carrier_of(estimate) else {
                 continue;
             };
-            let node = NodeId(on as u32);
+            let branch = NodeId(on as u32);
             let points = self.own_points(estimate, on, &taken);
             let all = estimate.points.len() as f64;
             if points.len() < MIN_POINTS || (points.len() as f64) < MIN_SHARE_OF_ITS_OWN * all {
                 continue;
             }
-            let carriers = std::iter::once(node).chain(skeleton.ancestors(node));
+            let carriers = std::iter::once(branch).chain(tree.carriers(branch));
             if is_of_carrier(&estimate.mode, &known_modes(carriers, sways)) {
                 continue;
             }
@@ -80,6 +83,7 @@ impl ModalSolution {
                 taken[p] = true;
                 tracks.push(self.tracks[p]);
             }
+            let node = tree.branches[on].node;
             out.push(Shoot { on: node, tracks });
         }
         out

@@ -106,7 +106,8 @@ pub(super) struct Branch {
     /// Nothing for the foot, which comes first; every branch comes after the one that carries it.
     pub parent: Option<usize>,
     pub mode: Option<Mode>,
-    /// Where it ends, px, and those begin that it carries.
+    /// Where it begins and ends, px; most that it carries begin at its end.
+    pub base_px: Point2<f64>,
     pub end_px: Point2<f64>,
 }
 
