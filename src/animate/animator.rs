@@ -6,7 +6,7 @@ use super::tune::{Tuning, tune};
 use super::wind::Wind;
 use super::{Known, soft};
 use crate::config;
-use crate::model::{JointPose, NodeId, Pose, Skeleton};
+use crate::model::{JointPose, MovingBranch, NodeId, Pose, Skeleton};
 use crate::random::generator;
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 use rand::RngExt;
@@ -20,10 +20,10 @@ const BEFORE_S: f64 = 30.0;
 /// One branch. What it needs in every step lies together.
 #[derive(Clone)]
 struct Branch {
-    parent: usize,
+    way: MovingBranch,
+    /// From where it begins to each of its parts at rest, its end first, px.
+    vectors: Vec<Vector3<f64>>,
     load: Load,
-    /// From the parent node to its own at rest, px.
-    way: Vector3<f64>,
     /// The local axes u and w (Hu et al. fig. 13) that it bends about; v, along it, is left out: it
     /// neither stretches nor twists.
     axes: [Vector3<f64>; 2],
@@ -37,16 +37,23 @@ struct Branch {
 }
 
 impl Branch {
-    fn at_rest(skeleton: &Skeleton, i: usize, tuning: Tuning, load: Load, seed: u32) -> Self {
-        let node = &skeleton.nodes[i];
-        let parent = node.parent.map_or(i, |p| p.index()).min(i);
-        let way = node.position - skeleton.nodes[parent].position;
-        let mut random = generator(seed.into(), 1000 + u64::from(node.name.0));
+    fn at_rest(
+        skeleton: &Skeleton,
+        way: MovingBranch,
+        tuning: Tuning,
+        load: Load,
+        seed: u32,
+    ) -> Self {
+        let name = skeleton.nodes[way.node.index()].name.0;
+        let begin = skeleton.nodes[way.begin.index()].position;
+        let parts = way.parts();
+        let vectors = parts.map(|n| skeleton.nodes[n.index()].position - begin);
+        let mut random = generator(seed.into(), 1000 + u64::from(name));
         Self {
-            parent,
             load,
+            vectors: vectors.collect(),
+            axes: across(&way.vector(skeleton)),
             way,
-            axes: across(&way),
             tuning,
             transition: Transition::new(tuning.frequency_hz, tuning.damping_ratio, 0.0),
             state: [Oscillation::default(); 2],
@@ -86,7 +93,10 @@ enum Answer {
 #[derive(Clone)]
 pub struct Animator {
     skeleton: Arc<Skeleton>,
+    /// Each after the one that carries it.
     branches: Vec<Branch>,
+    /// Of every node.
+    tuning: Vec<Tuning>,
     wind: Wind,
     pull: Option<Pull>,
     most_rad: f64,
@@ -97,6 +107,8 @@ pub struct Animator {
     /// As a matrix, by joint.
     turned: Vec<Matrix3<f64>>,
     borne: Vec<Borne>,
+    /// Where the branch that ends in each node begins at rest, px; the origin where there is none.
+    bases: Vec<Point3<f64>>,
 }
 
 impl Animator {
@@ -110,15 +122,19 @@ impl Animator {
         let tuning = tune(&skeleton, known, settings);
         let loads = loads(&skeleton, &tuning, settings.bend_deg);
         let n = skeleton.nodes.len();
+        let bases = loads.iter().map(|l| l.base).collect();
         let mut branches = Vec::with_capacity(n);
-        for (i, (tuning, load)) in tuning.into_iter().zip(loads).enumerate() {
-            branches.push(Branch::at_rest(&skeleton, i, tuning, load, settings.seed));
+        for way in skeleton.moving_branches() {
+            let (tuning, load) = (tuning[way.node.index()], loads[way.node.index()]);
+            branches.push(Branch::at_rest(&skeleton, way, tuning, load, settings.seed));
         }
         Self {
             branches,
+            tuning,
             joints: skeleton.nodes.iter().map(|n| at_rest(n.position)).collect(),
             turned: vec![Matrix3::identity(); n],
             borne: vec![Borne::default(); n],
+            bases,
             skeleton,
             wind,
             pull: None,
@@ -128,9 +144,10 @@ impl Animator {
         }
     }
 
-    /// Frequency and damping of every branch, by node index.
+    /// Frequency and damping of every branch, by node index; what moves with another node has that
+    /// one's.
     pub fn tuning(&self) -> impl ExactSizeIterator<Item = &Tuning> {
-        self.branches.iter().map(|b| &b.tuning)
+        self.tuning.iter()
     }
 
     pub fn time_s(&self) -> f64 {
@@ -218,9 +235,9 @@ impl Animator {
     }
 
     fn depth(&self) -> usize {
-        let mut depth = vec![0; self.branches.len()];
-        for (i, b) in self.branches.iter().enumerate() {
-            depth[i] = if b.parent < i { depth[b.parent] + 1 } else { 0 };
+        let mut depth = vec![0; self.joints.len()];
+        for way in self.branches.iter().map(|b| &b.way) {
+            depth[way.node.index()] = depth[way.parent.index()] + 1;
         }
         depth.into_iter().max().unwrap_or(0)
     }
@@ -246,11 +263,9 @@ impl Animator {
     /// the trunk up.
     fn answer(&mut self, answer: Answer) {
         self.gather();
-        for (i, branch) in self.branches.iter_mut().enumerate() {
-            if branch.parent >= i {
-                continue;
-            }
-            let (parent, turned) = (self.joints[branch.parent], &self.turned[branch.parent]);
+        for branch in &mut self.branches {
+            let (i, parent) = (branch.way.node.index(), branch.way.parent.index());
+            let (carried, turned) = (self.joints[parent].rotation, &self.turned[parent]);
             // What a branch carries is taken as it stands at rest in the axes of the one that
             // carries it: the force is turned into these axes, and its part along the branch bends
             // nothing.
@@ -274,13 +289,16 @@ impl Animator {
             let keep = soft((u * u + w * w).sqrt(), 0.5 * self.most_rad, self.most_rad);
             let own =
                 UnitQuaternion::from_scaled_axis((branch.axes[0] * u + branch.axes[1] * w) * keep);
-            let rotation = UnitQuaternion::new_normalize((parent.rotation * own).into_inner());
+            let rotation = UnitQuaternion::new_normalize((carried * own).into_inner());
             let matrix = rotation.to_rotation_matrix().into_inner();
             self.turned[i] = matrix;
-            self.joints[i] = JointPose {
-                position: parent.position + matrix * branch.way,
-                rotation,
-            };
+            let base = self.joints[branch.way.begin.index()].position;
+            for (part, vector) in branch.way.parts().zip(&branch.vectors) {
+                self.joints[part.index()] = JointPose {
+                    position: base + matrix * vector,
+                    rotation,
+                };
+            }
         }
     }
 
@@ -288,33 +306,42 @@ impl Animator {
     fn gather(&mut self) {
         self.borne.fill(Borne::default());
         if let Some(air) = self.wind.at(self.time_s) {
-            for (borne, branch) in self.borne.iter_mut().zip(&self.branches) {
+            for branch in &self.branches {
                 let Load {
                     base, lever, sail, ..
                 } = branch.load;
                 let force = self.wind.pressure(&air, &(base + lever), branch.own_s) * sail;
-                *borne = Borne {
+                self.borne[branch.way.node.index()] = Borne {
                     force,
                     moment: lever * force.transpose(),
                 };
             }
         }
-        if let Some(pull) = self.pull
-            && let Some(borne) = self.borne.get_mut(pull.node.index())
-        {
-            borne.force += pull.force;
-            borne.moment += self.branches[pull.node.index()].way * pull.force.transpose();
+        if let Some(pull) = self.pull {
+            self.bear(&pull);
         }
-        for i in (1..self.borne.len()).rev() {
-            let parent = self.branches[i].parent;
-            if parent < i {
-                let Borne { force, moment } = self.borne[i];
-                let farther = self.branches[i].load.base - self.branches[parent].load.base;
-                let below = &mut self.borne[parent];
-                below.force += force;
-                below.moment += moment + farther * force.transpose();
-            }
+        for branch in self.branches.iter().rev() {
+            let (i, parent) = (branch.way.node.index(), branch.way.parent.index());
+            let Borne { force, moment } = self.borne[i];
+            let farther = self.bases[i] - self.bases[parent];
+            let below = &mut self.borne[parent];
+            below.force += force;
+            below.moment += moment + farther * force.transpose();
         }
+    }
+
+    /// What pulls at a node pulls at the branch that it is a part of.
+    fn bear(&mut self, pull: &Pull) {
+        let Some(at) = self.skeleton.nodes.get(pull.node.index()) else {
+            return;
+        };
+        let mover = self.skeleton.mover(pull.node).index();
+        let arm = match self.skeleton.begin(pull.node) {
+            Some(begin) => at.position - self.skeleton.nodes[begin.index()].position,
+            None => Vector3::zeros(),
+        };
+        self.borne[mover].force += pull.force;
+        self.borne[mover].moment += arm * pull.force.transpose();
     }
 
     /// The pose of now.

@@ -1,7 +1,7 @@
 //! What the wind finds to press on, and how far each branch gives way.
 
 use super::tune::Tuning;
-use crate::model::Skeleton;
+use crate::model::{MovingBranch, Skeleton};
 use crate::signal::median;
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::TAU;
@@ -32,7 +32,8 @@ pub struct Load {
     pub yields: f64,
 }
 
-/// The loads of all nodes, by index. In steady wind of force 6 the median branch bends by
+/// The loads of all branches, by the node that they end in; what moves with that is part of it, and
+/// has none of its own. In steady wind of force 6 the median branch bends by
 /// `bend_deg`.
 ///
 /// The stiffness of a branch is the square of its frequency times the moment of inertia of all that
@@ -70,20 +71,27 @@ fn unscaled(skeleton: &Skeleton, tuning: &[Tuning]) -> (Vec<Load>, Vec<f64>) {
     let mut loads = vec![Load::default(); nodes.len()];
     let mut carried = vec![Carried::default(); nodes.len()];
     let mut bends = vec![0.0; nodes.len()];
-    for i in (0..nodes.len()).rev() {
-        let Some(p) = nodes[i].parent.map(|p| p.index()).filter(|&p| p < i) else {
-            continue;
-        };
-        let (base, end) = (nodes[p].position, nodes[i].position);
-        let way = end - base;
-        if !way.iter().chain(base.iter()).all(|x| x.abs() < 1e9) {
+    for branch in skeleton.moving_branches().iter().rev() {
+        let i = branch.node.index();
+        let base = nodes[branch.begin.index()].position;
+        let pieces = pieces(skeleton, branch);
+        if !pieces.iter().all(Piece::is_sound) {
             continue;
         }
-        let (length, middle) = (way.norm(), base + 0.5 * way);
-        let sail = 2.0 * radius(nodes[i].radius) * length + SAIL_BY_SECTION * ends_here[i].max(0.0);
-        carried[i].add(&Carried::of(&middle, sections[i] * length, sail));
+        let (mut sail, mut turning) = (0.0, Vector3::zeros());
+        for piece in &pieces {
+            let length = piece.way.norm();
+            let own = 2.0 * radius(nodes[piece.end].radius) * length
+                + SAIL_BY_SECTION * ends_here[piece.end].max(0.0);
+            let middle = piece.from + 0.5 * piece.way;
+            carried[i].add(&Carried::of(&middle, sections[piece.end] * length, own));
+            sail += own;
+            turning += (piece.from - base + 0.5 * piece.way) * own;
+        }
         let all = carried[i];
-        carried[p].add(&all);
+        carried[branch.parent.index()].add(&all);
+        let way = branch.vector(skeleton);
+        let length = way.norm();
         let inertia = all
             .inertia_about(&base)
             .max(sections[i] * length.powi(3) / 3.0);
@@ -93,15 +101,53 @@ fn unscaled(skeleton: &Skeleton, tuning: &[Tuning]) -> (Vec<Load>, Vec<f64>) {
         } else {
             0.0
         };
+        // Of one straight piece the middle, to the last bit.
+        let lever = if pieces.len() > 1 && sail > 0.0 {
+            turning / sail
+        } else {
+            0.5 * way
+        };
         loads[i] = Load {
             base,
-            lever: 0.5 * way,
+            lever,
             sail,
             yields,
         };
         bends[i] = all.moment_about(&base) * yields;
     }
     (loads, bends)
+}
+
+/// A straight piece of a branch.
+struct Piece {
+    /// The node that it ends in, by index.
+    end: usize,
+    from: Point3<f64>,
+    way: Vector3<f64>,
+}
+
+impl Piece {
+    fn is_sound(&self) -> bool {
+        let mut coordinates = self.way.iter().chain(self.from.iter());
+        coordinates.all(|x| x.abs() < 1e9)
+    }
+}
+
+/// The pieces of a branch: one from each of its parts down to the node that carries that.
+fn pieces(skeleton: &Skeleton, branch: &MovingBranch) -> Vec<Piece> {
+    let mut pieces = Vec::with_capacity(1 + branch.riders.len());
+    for part in branch.parts() {
+        let Some(below) = skeleton.ancestors(part).next() else {
+            continue;
+        };
+        let from = skeleton.nodes[below.index()].position;
+        pieces.push(Piece {
+            end: part.index(),
+            from,
+            way: skeleton.nodes[part.index()].position - from,
+        });
+    }
+    pieces
 }
 
 /// What of the cross-section of each branch no child of it takes over: it feeds twigs and leaves.

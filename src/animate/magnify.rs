@@ -3,7 +3,7 @@
 
 use super::soft;
 use crate::bounds::Bounds;
-use crate::model::{JointPose, Pose, Skeleton};
+use crate::model::{JointPose, MovingBranch, Pose, Skeleton};
 use crate::signal::reflection::there_and_back;
 use nalgebra::{UnitQuaternion, Vector3};
 use realfft::RealFftPlanner;
@@ -92,8 +92,10 @@ pub fn magnify(
             high_hz: band_hz.hi,
         });
     }
-    let turns: Vec<Vec<Vector3<f64>>> = (0..skeleton.nodes.len())
-        .map(|i| changed(&own_turns(skeleton, &poses, i), &times, wanted))
+    let branches = skeleton.moving_branches();
+    let turns: Vec<Vec<Vector3<f64>>> = branches
+        .iter()
+        .map(|branch| changed(&own_turns(&poses, branch), &times, wanted))
         .collect();
     let whole_s = count as f64 / fps * wanted.speed;
     let seam_s = (length_s - whole_s).min(SEAM * whole_s);
@@ -118,7 +120,7 @@ pub fn magnify(
         } else {
             film.at(there_and_back(film_s, length_s))
         };
-        out.push(posed(skeleton, &turns, k, k as f64 / fps));
+        out.push(posed(skeleton, &branches, &turns, k, k as f64 / fps));
     }
     Ok(out)
 }
@@ -127,7 +129,7 @@ pub fn magnify(
 struct TurnedFilm {
     /// Since the first pose, s.
     times: Vec<f64>,
-    /// By node, in every pose: an axis times an angle.
+    /// By branch, in every pose: an axis times an angle.
     turns: Vec<Vec<Vector3<f64>>>,
     length_s: f64,
 }
@@ -154,19 +156,13 @@ impl TurnedFilm {
     }
 }
 
-/// How branch `i` had turned against the one that carries it, as an axis times an angle, in every
+/// How a branch had turned against the one that carries it, as an axis times an angle, in every
 /// pose.
-fn own_turns(skeleton: &Skeleton, poses: &[&Pose], i: usize) -> Vec<Vector3<f64>> {
-    let parent = skeleton.nodes[i]
-        .parent
-        .map(|p| p.index())
-        .filter(|&p| p < i);
+fn own_turns(poses: &[&Pose], branch: &MovingBranch) -> Vec<Vector3<f64>> {
     let mut turns = Vec::with_capacity(poses.len());
     for pose in poses {
-        let turned = pose.joints[i].rotation;
-        let own = parent
-            .map_or(turned, |p| pose.joints[p].rotation.inverse() * turned)
-            .scaled_axis();
+        let [turned, carried] = [branch.node, branch.parent].map(|n| pose.joints[n.index()]);
+        let own = (carried.rotation.inverse() * turned.rotation).scaled_axis();
         turns.push(if own.iter().all(|x| x.is_finite()) {
             own
         } else {
@@ -285,26 +281,26 @@ impl Moment {
     }
 }
 
-/// The tree with its branches turned so: each turns about its base, and keeps its length.
-fn posed(skeleton: &Skeleton, turns: &[Vector3<f64>], frame: u64, time_s: f64) -> Pose {
-    let mut joints: Vec<JointPose> = Vec::with_capacity(turns.len());
-    for (i, (node, turn)) in skeleton.nodes.iter().zip(turns).enumerate() {
-        let own = UnitQuaternion::from_scaled_axis(*turn);
-        joints.push(match node.parent.map(|p| p.index()).filter(|&p| p < i) {
-            Some(p) => {
-                let rotation =
-                    UnitQuaternion::new_normalize((joints[p].rotation * own).into_inner());
-                let way = node.position - skeleton.nodes[p].position;
-                JointPose {
-                    position: joints[p].position + rotation * way,
-                    rotation,
-                }
-            }
-            None => JointPose {
-                position: node.position,
-                rotation: UnitQuaternion::identity(),
-            },
+/// The tree with its `branches` turned so: each turns about its base, and keeps its length.
+fn posed(
+    skeleton: &Skeleton,
+    branches: &[MovingBranch],
+    turns: &[Vector3<f64>],
+    frame: u64,
+    time_s: f64,
+) -> Pose {
+    let mut joints: Vec<JointPose> = Vec::with_capacity(skeleton.nodes.len());
+    for node in &skeleton.nodes {
+        joints.push(JointPose {
+            position: node.position,
+            rotation: UnitQuaternion::identity(),
         });
+    }
+    for (branch, turn) in branches.iter().zip(turns) {
+        let own = UnitQuaternion::from_scaled_axis(*turn);
+        let carried = joints[branch.parent.index()].rotation;
+        let rotation = UnitQuaternion::new_normalize((carried * own).into_inner());
+        branch.place(skeleton, rotation, &mut joints);
     }
     Pose {
         frame,

@@ -12,7 +12,7 @@ const DOUBLINGS: i32 = 60;
 /// Share of the tree's height above which a rope is tied.
 const TIED_ABOVE: f64 = 0.45;
 
-/// Where one would tie the rope: the thickest branch that ends well above the ground, of equally
+/// Where one would tie the rope: the thickest branch of its own motion that ends well above the ground, of equally
 /// thick ones the highest.
 pub fn place_to_pull(skeleton: &Skeleton) -> NodeId {
     let nodes = &skeleton.nodes;
@@ -22,6 +22,7 @@ pub fn place_to_pull(skeleton: &Skeleton) -> NodeId {
         .enumerate()
         .skip(1)
         .filter(|(_, n)| n.position.y >= TIED_ABOVE * height && n.copy_of.is_none())
+        .filter(|(i, _)| skeleton.mover(NodeId(*i as u32)).index() == *i)
         .max_by(|(_, a), (_, b)| {
             a.radius
                 .total_cmp(&b.radius)

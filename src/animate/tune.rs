@@ -4,7 +4,7 @@
 use super::known::Known;
 use crate::bounds::Bounds;
 use crate::config;
-use crate::model::Skeleton;
+use crate::model::{NodeId, Skeleton};
 
 /// What can be a frequency of a branch, Hz, and a damping ratio.
 const FREQUENCIES_HZ: Bounds = Bounds::new(0.01, 50.0);
@@ -30,7 +30,7 @@ pub struct Tuning {
 }
 
 /// The tuning of every node of the skeleton, by its index. `known` is by node index and may be
-/// shorter.
+/// shorter. What moves with another node has the tuning of that.
 ///
 /// A measured branch keeps what was measured, and a copy has its original's. For the others the
 /// logarithm of the frequency is that of a rod, `f ~ sqrt(r) / l` with the radius r and the reach l
@@ -52,6 +52,9 @@ pub fn tune(skeleton: &Skeleton, known: &[Known], settings: &config::Wind) -> Ve
         let original = node.copy_of.and_then(|o| out.get(o.index()).copied());
         out.push(original.unwrap_or_else(|| tuner.tuning(i, trunk_hz)));
     }
+    for i in 0..nodes.len() {
+        out[i] = out[skeleton.mover(NodeId(i as u32)).index()];
+    }
     out
 }
 
@@ -62,7 +65,7 @@ struct Tuner<'a> {
     settings: &'a config::Wind,
     /// Logarithm of the rule's frequency for every node.
     rods: Vec<f64>,
-    /// The first node that ends a branch.
+    /// The node that the first branch ends in.
     trunk: usize,
     /// Each measured branch with the logarithm of its frequency over the rule's.
     off_rule: Vec<(usize, f64)>,
@@ -78,7 +81,7 @@ impl<'a> Tuner<'a> {
             known,
             settings,
             rods: rods(skeleton),
-            trunk: nodes.iter().position(|n| n.parent.is_some()).unwrap_or(0),
+            trunk: trunk(skeleton).index(),
             off_rule: Vec::new(),
             damped: Vec::new(),
         };
@@ -94,10 +97,12 @@ impl<'a> Tuner<'a> {
         tuner
     }
 
-    /// What was measured on a branch itself: nothing on a copy or the foot.
+    /// What was measured on a branch itself: nothing on a copy, the foot, or what moves with another
+    /// node.
     fn measured(&self, i: usize) -> Known {
         let node = &self.skeleton.nodes[i];
-        if node.copy_of.is_some() || node.parent.is_none() {
+        let moves = self.skeleton.mover(NodeId(i as u32)).index() == i;
+        if node.copy_of.is_some() || node.parent.is_none() || !moves {
             return Known::default();
         }
         self.known.get(i).copied().unwrap_or_default()
@@ -169,6 +174,12 @@ impl<'a> Tuner<'a> {
     }
 }
 
+/// The node that the first branch ends in; the foot where there is none.
+fn trunk(skeleton: &Skeleton) -> NodeId {
+    let first = skeleton.nodes.iter().position(|n| n.parent.is_some());
+    skeleton.mover(NodeId(first.unwrap_or(0) as u32))
+}
+
 /// The logarithm of `sqrt(r) / l` for every node.
 fn rods(skeleton: &Skeleton) -> Vec<f64> {
     let nodes = &skeleton.nodes;
@@ -181,6 +192,12 @@ fn rods(skeleton: &Skeleton) -> Vec<f64> {
         // Here from its base: its own length and what goes on from its end.
         reach[i] += if length.is_finite() { length } else { 0.0 };
         reach[p] = reach[p].max(reach[i]);
+    }
+    for branch in skeleton.moving_branches() {
+        // Of a branch from where it begins, by whichever of its parts goes on farthest.
+        let from_base = |n: &NodeId| nodes[n.index()].parent == Some(branch.begin);
+        let farthest = branch.parts().filter(from_base).map(|n| reach[n.index()]);
+        reach[branch.node.index()] = farthest.fold(0.0, f64::max);
     }
     let height = nodes
         .iter()
