@@ -82,6 +82,7 @@ fn one_node() -> String {
         id: 0,
         parent: None,
         copy_of: None,
+        moves_with: None,
         level: 0,
         main_branch: None,
         n_tracks: 0,

@@ -1,7 +1,6 @@
 //! One branch of an animation: where a viewer is to show it, and by how much it may be off.
 
 use super::thin_keys::{Arc, share};
-use crate::model::Node;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
 
 /// A key of one joint: its frame, and the turn, not quite of length 1.
@@ -31,11 +30,11 @@ pub(super) struct Followed {
 }
 
 impl Followed {
-    /// `wanted`: rotations in model axes.
+    /// `wanted`: rotations in model axes. `way`: to its end at rest.
     pub fn new(
         base: &Shown,
         wanted: &[UnitQuaternion<f64>],
-        node: &Node,
+        radius_px: f64,
         way: Vector3<f64>,
     ) -> Self {
         let n = wanted.len();
@@ -52,7 +51,7 @@ impl Followed {
             depth,
             wanted: own,
             way,
-            radius_px: node.radius,
+            radius_px,
             limit_px: 0.0,
             limit_angle: 0.0,
             limit_cosine: 1.0,
@@ -146,6 +145,7 @@ pub(super) fn played(keys: &[Key], times: &[f64]) -> Vec<UnitQuaternion<f64>> {
 }
 
 /// What a viewer shows of one branch at the time of every pose.
+#[derive(Clone)]
 pub(super) struct Shown {
     /// In model axes.
     rotation: Vec<UnitQuaternion<f64>>,

@@ -239,6 +239,10 @@ fn push_joints(root: &mut Root, model: &Model) -> Result<(), ExportError> {
             "certainty": node.certainty,
             "copy_of": original.map(|c| c.0),
         });
+        let mover = node.moves_with.and_then(|m| model.skeleton.name_of(m));
+        if let (Some(all), Some(mover)) = (extras.as_object_mut(), mover) {
+            all.insert("moves_with".into(), mover.0.into());
+        }
         if let (Some(all), Some(Value::Object(more))) =
             (extras.as_object_mut(), model.node_extras.get(i))
         {

@@ -40,6 +40,8 @@ pub struct Branch {
     pub parent: Option<u32>,
     /// The measured branch that this one repeats.
     pub copy_of: Option<u32>,
+    /// The branch that it is a rigid part of.
+    pub moves_with: Option<u32>,
     pub level: u8,
     /// Number of the main branch that it belongs to; `None` for the trunk.
     pub main_branch: Option<u8>,
@@ -116,13 +118,18 @@ fn branch(
     main_branch: Option<u8>,
 ) -> Branch {
     let node = &skeleton.nodes[i];
-    let measured = node.parent.is_some() && node.copy_of.is_none();
+    let moves = node.parent.is_some() && node.moves_with.is_none();
+    let measured = moves && node.copy_of.is_none();
     let sway = sway.get(i).filter(|s| s.is_ok()).map(Columns::of);
     Branch {
         id: node.name.0,
         parent: node.parent.and_then(|id| skeleton.name_of(id)).map(|n| n.0),
         copy_of: node
             .copy_of
+            .and_then(|id| skeleton.name_of(id))
+            .map(|n| n.0),
+        moves_with: node
+            .moves_with
             .and_then(|id| skeleton.name_of(id))
             .map(|n| n.0),
         level: node.level,

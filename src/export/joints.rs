@@ -3,12 +3,13 @@
 //! Branch `i` turns about its parent node P(i) by Q_i(t), in model axes. Its glTF joint therefore
 //! rests at P(i) with identity rotation, is a child of P(i)'s joint, and turns by Q_P(i)^-1 Q_i;
 //! then a point x of the branch at rest is skinned to p_P(i)(t) + Q_i(t) (x - rest_P(i)), which is
-//! what `JointPose` means. The foot's joint stands still.
+//! what `JointPose` means. The foot's joint stands still. A bend turns by nothing against the part
+//! of its branch that it grows from: it has no keys.
 
 use super::followed::{Followed, Key, Shown, played, unit};
 use super::thin_keys::{Arc, share, thin};
-use crate::model::{Pose, Skeleton};
-use nalgebra::{Quaternion, UnitQuaternion, Vector4};
+use crate::model::{MovingBranch, Pose, Skeleton};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
 
 /// Keys of one joint's local rotation.
 pub(super) struct Keys {
@@ -64,26 +65,61 @@ impl Moving {
 
 fn keys(skeleton: &Skeleton, poses: &[&Pose], times_s: &[f64], tolerance_px: f64) -> Vec<Keys> {
     let nodes = &skeleton.nodes;
-    let budget = budgets(skeleton);
-    let mut shown: Vec<Shown> = Vec::with_capacity(nodes.len());
+    let branches = skeleton.moving_branches();
+    let budget = budgets(skeleton, &branches);
+    let mut shown: Vec<Shown> = vec![Shown::still(times_s.len()); nodes.len()];
     let mut out = Vec::new();
-    for (i, node) in nodes.iter().enumerate() {
-        let Some(parent) = node.parent.map(|p| p.index()) else {
-            shown.push(Shown::still(times_s.len()));
-            continue;
-        };
-        let way = node.position - nodes[parent].position;
-        let branch = Followed::new(&shown[parent], &rotations(poses, i), node, way)
+    for branch in &branches {
+        let i = branch.node.index();
+        let base = shown[branch.begin.index()].clone();
+        let rotations = rotations(poses, i);
+        let reach = Reach::of(skeleton, branch);
+        let farthest = Followed::new(&base, &rotations, reach.radius_px, reach.way)
             .within(tolerance_px, budget[i]);
-        let keys = turns(&branch, times_s);
+        let keys = turns(&farthest, times_s);
         let turns = match &keys {
             Some(keys) => played(keys, times_s),
             None => vec![UnitQuaternion::identity(); times_s.len()],
         };
-        shown.push(branch.shown(&shown[parent], &turns));
-        out.extend(keys.map(|keys| written(i, &keys, times_s)));
+        for part in branch.parts() {
+            let node = &nodes[part.index()];
+            let way = node.position - nodes[branch.begin.index()].position;
+            let part_of = Followed::new(&base, &rotations, node.radius, way);
+            shown[part.index()] = part_of.shown(&base, &turns);
+            // The others turn with the part that they grow from.
+            if let Some(keys) = keys.as_ref().filter(|_| node.parent == Some(branch.begin)) {
+                out.push(written(part.index(), keys, times_s));
+            }
+        }
     }
     out
+}
+
+/// How far a branch reaches from where it begins.
+struct Reach {
+    /// To the part that is farthest from there, px.
+    way: Vector3<f64>,
+    /// Of its thickest part.
+    radius_px: f64,
+}
+
+impl Reach {
+    fn of(skeleton: &Skeleton, branch: &MovingBranch) -> Self {
+        let mut reach = Self {
+            way: branch.vector(skeleton),
+            radius_px: skeleton.nodes[branch.node.index()].radius,
+        };
+        let from = skeleton.nodes[branch.begin.index()].position;
+        for rider in &branch.riders {
+            let node = &skeleton.nodes[rider.index()];
+            let way = node.position - from;
+            if way.norm_squared() > reach.way.norm_squared() {
+                reach.way = way;
+            }
+            reach.radius_px = reach.radius_px.max(node.radius);
+        }
+        reach
+    }
 }
 
 /// The keys of one branch; `None` where it may stay as it is at rest.
@@ -198,18 +234,16 @@ fn one_hemisphere(rotations: impl Iterator<Item = UnitQuaternion<f64>>) -> Vec<V
         .collect()
 }
 
-/// Share of the tolerance that every node may use.
-fn budgets(skeleton: &Skeleton) -> Vec<f64> {
-    let nodes = &skeleton.nodes;
-    let mut depth = vec![0_u32; nodes.len()];
-    for (i, node) in nodes.iter().enumerate() {
-        depth[i] = node.parent.map_or(0, |p| depth[p.index()] + 1);
+/// Share of the tolerance that every branch may use, by the node that it ends in.
+fn budgets(skeleton: &Skeleton, branches: &[MovingBranch]) -> Vec<f64> {
+    let mut depth = vec![0_u32; skeleton.nodes.len()];
+    for branch in branches {
+        depth[branch.node.index()] = depth[branch.parent.index()] + 1;
     }
     let mut deepest = depth.clone();
-    for (i, node) in nodes.iter().enumerate().rev() {
-        if let Some(p) = node.parent {
-            deepest[p.index()] = deepest[p.index()].max(deepest[i]);
-        }
+    for branch in branches.iter().rev() {
+        let (i, p) = (branch.node.index(), branch.parent.index());
+        deepest[p] = deepest[p].max(deepest[i]);
     }
     depth
         .iter()

@@ -67,7 +67,7 @@ function groups(data) {
     element.append(...branches.map((b) => new Option(name(b), b.id)));
     return element;
   };
-  const all = data.branches.filter((b) => b.parent !== null);
+  const all = data.branches.filter((b) => b.parent !== null && b.moves_with === null);
   const [measured, copies] = [all.filter((b) => b.copy_of === null), all.filter((b) => b.copy_of !== null)];
   return [group("Measured", measured), ...(copies.length ? [group("Copies", copies)] : [])];
 }

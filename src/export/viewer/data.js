@@ -21,12 +21,16 @@ function anglesOf(base64) {
 }
 
 // {title, source, image, foot_px, branches, …} as written by src/export/html_data.rs, with
-// `byId` added, and in each branch `angle_deg` as numbers and `original`, the branch that was measured.
+// `byId` added, and in each branch `angle_deg` as numbers and `original`, the branch that was measured: of a copy the
+// one that it repeats, of what moves with another one that one.
 export function readData() {
   const data = JSON.parse(text("arborcam-data"));
   data.byId = new Map(data.branches.map((b) => [b.id, b]));
   for (const b of data.branches) b.angle_deg = b.angle_deg ? anglesOf(b.angle_deg) : null;
-  for (const b of data.branches) b.original = data.byId.get(b.copy_of) ?? b;
+  for (const b of data.branches) {
+    const seen = data.byId.get(b.copy_of) ?? b;
+    b.original = data.byId.get(seen.moves_with) ?? seen;
+  }
   return data;
 }
 

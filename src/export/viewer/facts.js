@@ -8,6 +8,7 @@ export function facts(branch, sway) {
   const original = branch.original;
   const rows = [["Level", `${branch.level}`, ""]];
   if (branch.copy_of !== null) rows.push(["Copy", `repeats branch ${branch.copy_of}`, ""]);
+  if (branch.moves_with !== null) rows.push(["Rigid", `moves with branch ${branch.moves_with}`, ""]);
   else rows.push(["Points followed", `${branch.n_tracks}`, ""]);
   const known = original.sway;
   if (sway.identified) {

@@ -23,7 +23,7 @@ function sorry(text) {
 
 function describe(data) {
   at("title").textContent = document.title = data.title;
-  const measured = data.branches.filter((b) => b.parent !== null && b.copy_of === null).length;
+  const measured = data.branches.filter((b) => b.parent !== null && b.moves_with === null && b.copy_of === null).length;
   const copies = data.branches.filter((b) => b.copy_of !== null).length;
   const parts = [
     `${measured} ${measured === 1 ? "branch" : "branches"}${copies ? `, ${copies} copies` : ""}`,

@@ -140,7 +140,7 @@ function byBranch(data) {
   const counts = new Map();
   const colours = new Map();
   for (const b of data.branches) {
-    if (b.copy_of !== null || b.main_branch === null) continue;
+    if (b.copy_of !== null || b.moves_with !== null || b.main_branch === null) continue;
     const i = counts.get(b.main_branch) ?? 0;
     counts.set(b.main_branch, i + 1);
     const { h, s, l } = hues[b.main_branch % hues.length];
