@@ -184,7 +184,7 @@ fn warn_of_unanalysed(job: &CaptureJob, tree: &Model) {
         .filter(|s| matches!(s, Err(Unidentified::NotInTime)))
         .count();
     if missing > 0 {
-        let of = tree.skeleton.measured() - 1;
+        let of = tree.skeleton.measured_branches().count();
         job.shared.warn(format!(
             "the sway of {missing} of {of} branches was not looked at, as the end was wanted: \
              `arborcam analyze DIR` tells it"

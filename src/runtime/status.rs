@@ -4,7 +4,8 @@ use super::meter::Recent;
 use super::shared::Shared;
 use super::sway_watch::SwayWatch;
 use crate::model::{
-    BranchRow, FormatNote, Observation, Phase, Rgb, Size, Skeleton, Snapshot, SwayNow, TrackSet,
+    BranchRow, FormatNote, NodeId, Observation, Phase, Rgb, Size, Skeleton, Snapshot, SwayNow,
+    TrackSet,
 };
 use crate::pipeline::{BackEnd, Moved, Targets};
 use crate::signal::median;
@@ -209,7 +210,8 @@ impl Status {
         {
             self.skeleton = Some(tree.skeleton.clone());
             let nodes = &tree.skeleton.nodes;
-            self.table_nodes = (1..tree.skeleton.measured())
+            let branches = tree.skeleton.measured_branches().map(NodeId::index);
+            self.table_nodes = branches
                 .filter(|&i| nodes[i].level <= TABLE_LEVEL)
                 .collect();
             let at_rest = |&i: &usize| tree.skeleton.image_from_model(&nodes[i].position);

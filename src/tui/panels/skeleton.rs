@@ -2,7 +2,7 @@
 
 use super::{titled, waiting};
 use crate::draw::{Camera, Rgba, View};
-use crate::model::{Phase, Size, Skeleton, Snapshot};
+use crate::model::{NodeId, Phase, Size, Skeleton, Snapshot};
 use crate::tui::solid::{BRAILLE, braille};
 use crate::tui::state::{State, TURN_DEGREES};
 use crate::tui::theme::Theme;
@@ -130,9 +130,10 @@ fn branches(state: &State, skeleton: &Skeleton, theme: Theme) -> Vec<BranchLine>
         if !coordinates.all(|c| c.is_finite()) {
             continue;
         }
+        let mover = skeleton.mover(NodeId(i as u32));
         let branch = s.node_colour.get(i).copied().flatten();
         let (onto, colour) = match node.copy_of {
-            None if Some(node.name) == chosen => (&mut top, Color::Reset),
+            None if skeleton.name_of(mover) == chosen => (&mut top, Color::Reset),
             Some(_) => (&mut copies, theme.branch_faded(branch)),
             None => (&mut measured, theme.branch(branch)),
         };
