@@ -1,12 +1,13 @@
 //! The written GLB, read back and played by the rules of glTF.
 
+mod bent;
 mod synthetic;
 
 use arborcam::config::Config;
 use arborcam::export::ExportError;
 use arborcam::export::gltf::{KEY_TOLERANCE_PX, Model, glb};
 use arborcam::geometry::{Dressed, Mesh};
-use arborcam::model::{Pose, Rgb, Skeleton};
+use arborcam::model::{JointPose, Node, NodeId, Pose, Rgb, Skeleton};
 use arborcam::pipeline::{Seen, dress};
 use gltf::animation::util::ReadOutputs;
 use nalgebra::{Isometry3, Point2, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
@@ -199,6 +200,53 @@ fn a_viewer_shows_every_branch_where_the_pose_has_it() {
             "{worst} px at a tolerance of {tolerance_px} px"
         );
     }
+}
+
+/// Joints follow the tree as it is drawn; a bend turns against nothing, and has no channel.
+#[test]
+fn bends_and_side_wood_are_shown_where_the_pose_has_them() {
+    let straight = synthetic::tree(5, 2);
+    let moved = synthetic::sway(&straight, 60);
+    for in_the_middle in [false, true] {
+        let skeleton = bent::Bent::of(&straight, in_the_middle);
+        let poses = bent_poses(&skeleton, &moved);
+        let skeleton = skeleton.skeleton;
+        let mesh = synthetic::skin(&skeleton);
+        for (tolerance_px, allowed) in [(0.001, 0.01), (0.2, 0.3)] {
+            let played = Played::parse(&write(&skeleton, &mesh, &poses, tolerance_px, 1.0));
+            let worst = worst_error_px(&played, &skeleton, &poses, 1.0);
+            assert!(worst < allowed, "{worst} px at {tolerance_px} px");
+            for (i, node) in skeleton.nodes.iter().enumerate() {
+                let [own, below] =
+                    [Some(NodeId(i as u32)), node.parent].map(|n| n.map(|n| skeleton.mover(n)));
+                assert!(own != below || !played.channels.contains_key(&i), "{i}");
+            }
+        }
+    }
+}
+
+/// The bent tree with every branch turned as in the poses of the straight one.
+fn bent_poses(bent: &bent::Bent, straight: &[Pose]) -> Vec<Pose> {
+    let mut out = Vec::new();
+    for pose in straight {
+        let at_rest = |n: &Node| JointPose {
+            position: n.position,
+            rotation: UnitQuaternion::identity(),
+        };
+        let mut joints: Vec<JointPose> = bent.skeleton.nodes.iter().map(at_rest).collect();
+        let rotations: Vec<_> = pose.joints.iter().map(|j| j.rotation).collect();
+        let rotations = bent.spread(&rotations, UnitQuaternion::identity());
+        for branch in bent.skeleton.moving_branches() {
+            branch.place(&bent.skeleton, rotations[branch.node.index()], &mut joints);
+        }
+        let pose = Pose {
+            joints,
+            ..pose.clone()
+        };
+        bent::assert_rigid(&bent.skeleton, &pose);
+        out.push(pose);
+    }
+    out
 }
 
 #[test]
