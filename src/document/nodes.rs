@@ -300,8 +300,9 @@ impl<R: Read> NodeRows<R> {
         Ok(kind)
     }
 
-    /// Takes in what `node` repeats: a node that is no copy, not the foot, of the same level.
-    /// Another one could not be posed, or not be cut with it.
+    /// Takes in what `node` repeats: a node that is no copy, not the foot. Another one could not be
+    /// posed. That it is of the same level, or it could not be cut with it, is told when all levels
+    /// are known to be right.
     fn copy(&self, node: &mut Node) -> Result<(), DocumentError> {
         let name: u32 = self.table.whole(9, "copy_of")?;
         let original = self.by_name.get(&name).copied();
@@ -311,10 +312,8 @@ impl<R: Read> NodeRows<R> {
             )));
         };
         let of = &self.nodes[id.index()];
-        if of.copy_of.is_some() || of.level != node.level {
-            return Err(self.table.bad(format!(
-                "copy_of is {name}, which is a copy itself or of another level"
-            )));
+        if of.copy_of.is_some() {
+            return Err(self.table.bad(no_original(name)));
         }
         node.copy_of = Some(id);
         node.kind = of.kind;
@@ -339,11 +338,18 @@ fn check_place(skeleton: &Skeleton, node: NodeId) -> Result<(), String> {
         None => skeleton.moving_parent(node).map_or(0, |p| level_of(p) + 1),
     };
     let level = own.level;
-    if u32::from(level) == expected {
-        Ok(())
-    } else {
-        Err(format!("level is {level}, and must be {expected} there"))
+    if u32::from(level) != expected {
+        return Err(format!("level is {level}, and must be {expected} there"));
     }
+    match own.copy_of.map(|o| &skeleton.nodes[o.index()]) {
+        Some(original) if original.level != level => Err(no_original(original.name.0)),
+        _ => Ok(()),
+    }
+}
+
+/// Why the node of that name cannot be repeated there.
+fn no_original(name: u32) -> String {
+    format!("copy_of is {name}, which is a copy itself or of another level")
 }
 
 /// Whether `node` can be a rigid part of the branch of `mover`.
@@ -470,12 +476,7 @@ mod tests {
             (2, "2,1,2,traced,,,x", 4, "\"x\", which is no node"),
             (2, "2,1,2,traced,,,5", 4, "moves with another node itself"),
             (2, "2,1,2,traced,,,2", 4, "moves with another node itself"),
-            (
-                2,
-                "2,1,3,traced,,,4",
-                8,
-                "a copy itself or of another level",
-            ),
+            (2, "2,1,3,traced,,,4", 4, "level is 3, and must be 2"),
             (3, "3,2,2,measured,,,", 5, "level is 2, and must be 3"),
             (5, "5,2,2,traced,,,4", 7, "level is 2, and must be 3"),
             (5, "5,3,4,traced,,,4", 7, "does not hang on the branch"),
@@ -492,10 +493,5 @@ mod tests {
             let is_told = text.contains(what) && text.contains(&format!("line {line}:"));
             assert!(is_told, "{instead}: {text}");
         }
-        let mut rows = ROWS;
-        rows[2] = "2,1,3,traced,,,4";
-        let error = read_rows(&rows[..6], true).err().map(|e| e.to_string());
-        let told = error.is_some_and(|text| text.contains("line 4: level is 3, and must be 2"));
-        assert!(told, "a bend has the level of its limb's end");
     }
 }
