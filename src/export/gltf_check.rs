@@ -84,6 +84,12 @@ fn check_leaves(model: &Model, k: usize, group: &FoliageGroup) -> Result<(), Exp
             "group {k} of its leaves moves by what is no number"
         )));
     }
+    let against = group.mesh.corners_against_winding();
+    if against > 0 {
+        return Err(ExportError::unfit(format!(
+            "{against} corners in group {k} of its leaves have a normal that points against their triangle"
+        )));
+    }
     let Some(swings) = model.flutter.get(k) else {
         return Ok(());
     };

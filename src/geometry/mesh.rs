@@ -1,5 +1,11 @@
 //! Triangles that move with a skeleton.
 
+use nalgebra::Vector3;
+
+/// A triangle whose height over its longest side is less than this, as a share of the mesh's
+/// farthest coordinate, has no direction that single precision could tell.
+const THINNEST: f64 = 32.0 * f32::EPSILON as f64;
+
 /// Triangles with skinning weights; all vectors but `indices` have one entry a vertex.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
@@ -15,4 +21,61 @@ pub struct Mesh {
     pub weights: Vec<[f32; 4]>,
     /// Three a triangle, counter-clockwise seen from outside.
     pub indices: Vec<u32>,
+}
+
+impl Mesh {
+    /// How many corners of triangles have a normal that points against the winding of the triangle:
+    /// whoever sees the triangle from its front is shown a lit back. Triangles too thin to have a
+    /// direction and corners that are not there do not count.
+    pub fn corners_against_winding(&self) -> usize {
+        let farthest = self.positions.iter().flatten();
+        let farthest = farthest.fold(0.0, |most: f64, x| most.max(f64::from(x.abs())));
+        let mut against = 0;
+        for corners in self.indices.chunks_exact(3) {
+            let Some(face) = self.face(corners, THINNEST * farthest) else {
+                continue;
+            };
+            for &corner in corners {
+                let normal = self.normals.get(corner as usize).copied();
+                let along = normal.map(|n| Vector3::from(n).map(f64::from).dot(&face));
+                against += usize::from(along.is_some_and(|along| along < 0.0));
+            }
+        }
+        against
+    }
+
+    /// The direction that a triangle faces by its winding, of length 1; `None` where it is no
+    /// higher than `least_px` over its longest side.
+    fn face(&self, corners: &[u32], least_px: f64) -> Option<Vector3<f64>> {
+        let mut at = [Vector3::zeros(); 3];
+        for (at, corner) in at.iter_mut().zip(corners) {
+            *at = Vector3::from(*self.positions.get(*corner as usize)?).map(f64::from);
+        }
+        let [a, b, c] = at;
+        let across = (b - a).cross(&(c - a));
+        let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
+        across.try_normalize(longest * least_px)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn corners_are_counted_against_the_winding() {
+        let mut mesh = Mesh {
+            positions: vec![[0.0; 3], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [4.0, 0.0, 0.0]],
+            normals: vec![[0.0, 0.0, 1.0], [0.8, 0.0, 0.6], [0.0, 0.8, -0.6], [0.0; 3]],
+            indices: vec![0, 1, 2, 0, 3, 1],
+            ..Mesh::default()
+        };
+        assert_eq!(
+            mesh.corners_against_winding(),
+            1,
+            "the flat one has no direction"
+        );
+        mesh.indices = vec![0, 2, 1, 7, 1, 2];
+        assert_eq!(mesh.corners_against_winding(), 2, "one triangle is torn");
+    }
 }

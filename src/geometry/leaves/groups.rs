@@ -2,6 +2,7 @@
 
 use super::attachment::AttachmentPoint;
 use super::cluster::Cluster;
+use super::faces::{area_vector, share_along};
 use super::target::Target;
 use super::template::Template;
 use super::view::PLAIN;
@@ -25,6 +26,9 @@ const OUTWARD: f64 = 0.6;
 /// The point that they point away from is below the crown's middle by this share of the tree's
 /// height.
 const LOW: f64 = 0.1;
+
+/// What the areas of a closed body's faces add up to by rounding, for a template of size 1.
+const CLOSED: f64 = 1e-5;
 
 /// The meshes of all clusters.
 pub(super) fn groups(
@@ -165,17 +169,10 @@ impl Drawer<'_> {
         };
         let axis = cluster.turn * Vector3::y();
         let leaves = Leaves::of(self, cluster, attachment);
+        let normals = self.normals(cluster, &leaves);
         for (i, p) in template.positions.iter().enumerate() {
             let leaf = template.leaf_of[i] as usize;
             let at = cluster.at(template, p);
-            let outward = (at - self.middle)
-                .try_normalize(1e-9)
-                .unwrap_or(Vector3::y());
-            let own = cluster.turn * template.normals[i];
-            // A leaf has two faces, and the outer one is lit.
-            let own = if own.dot(&outward) < 0.0 { -own } else { own };
-            let normal = own * (1.0 - OUTWARD) + outward * OUTWARD;
-            let normal = normal.try_normalize(1e-6).unwrap_or(outward);
             let turned = axis.cross(&(at - cluster.centre));
             let fluttered = leaves.stalks[leaf].cross(&(at - leaves.apices[leaf])) * LEAF_SWING;
             let later = beta + LEAF_LATER * (leaf as f64 + 1.0);
@@ -185,7 +182,7 @@ impl Drawer<'_> {
                 .mesh
                 .positions
                 .push(at.coords.map(|x| x as f32).into());
-            group.mesh.normals.push(normal.map(|x| x as f32).into());
+            group.mesh.normals.push(normals[i].map(|x| x as f32).into());
             group.mesh.uvs.push(template.uvs[i]);
             group.mesh.joints.push(attachment.skin.joints);
             group.mesh.weights.push(attachment.skin.weights);
@@ -193,10 +190,52 @@ impl Drawer<'_> {
             group.sine.push(sine.map(|x| x as f32).into());
             group.cosine.push(cosine.map(|x| x as f32).into());
         }
-        group
-            .mesh
-            .indices
-            .extend(template.indices.iter().map(|i| first + i));
+        for corners in template.indices.chunks_exact(3) {
+            let [a, b, c] = [corners[0], corners[1], corners[2]].map(|i| first + i);
+            let wound = if leaves.turned[template.leaf_of[corners[0] as usize] as usize] {
+                [a, c, b]
+            } else {
+                [a, b, c]
+            };
+            group.mesh.indices.extend(wound);
+        }
+    }
+
+    /// Away from the crown's middle, of length 1.
+    fn outward(&self, at: &Point3<f64>) -> Vector3<f64> {
+        (at - self.middle)
+            .try_normalize(1e-9)
+            .unwrap_or(Vector3::y())
+    }
+
+    /// The normal of each vertex: outward as far as that goes along the faces around it, as they
+    /// are wound.
+    fn normals(&self, cluster: &Cluster, leaves: &Leaves) -> Vec<Vector3<f64>> {
+        let template = self.template;
+        let n = template.positions.len();
+        let (mut owns, mut outwards) = (Vec::with_capacity(n), Vec::with_capacity(n));
+        for (i, p) in template.positions.iter().enumerate() {
+            let own = cluster.turn * template.normals[i];
+            let turned = leaves.turned[template.leaf_of[i] as usize];
+            owns.push(if turned { -own } else { own });
+            outwards.push(self.outward(&cluster.at(template, p)));
+        }
+        let mut shares = vec![OUTWARD; n];
+        for (corners, face) in template.indices.chunks_exact(3).zip(&template.faces) {
+            let face = cluster.turn * face;
+            let turned = leaves.turned[template.leaf_of[corners[0] as usize] as usize];
+            let face = if turned { -face } else { face };
+            for &i in corners {
+                let i = i as usize;
+                shares[i] = share_along(&owns[i], &outwards[i], &face, shares[i]);
+            }
+        }
+        let mut normals = Vec::with_capacity(n);
+        for ((own, outward), share) in owns.iter().zip(&outwards).zip(shares) {
+            let normal = own * (1.0 - share) + outward * share;
+            normals.push(normal.try_normalize(1e-6).unwrap_or(*own));
+        }
+        normals
     }
 }
 
@@ -207,6 +246,9 @@ struct Leaves {
     /// From there to its middle, of length 1: what it turns about.
     stalks: Vec<Vector3<f64>>,
     colours: Vec<[u8; 3]>,
+    /// Wound the other way than in the template: a leaf has two faces, and the outer one is the
+    /// front.
+    turned: Vec<bool>,
 }
 
 impl Leaves {
@@ -228,6 +270,16 @@ impl Leaves {
             .iter()
             .map(|a| cluster.at(template, a))
             .collect();
+        let mut areas = vec![Vector3::zeros(); count];
+        for corners in template.indices.chunks_exact(3) {
+            let leaf = template.leaf_of[corners[0] as usize];
+            areas[leaf as usize] += area_vector(&template.positions, corners);
+        }
+        let mut turned = Vec::with_capacity(count);
+        for (area, middle) in areas.iter().zip(&middles) {
+            // A closed body adds up to nothing, and stays as it is.
+            turned.push((cluster.turn * area).dot(&drawer.outward(middle)) < -CLOSED);
+        }
         let (mut stalks, mut colours) = (Vec::new(), Vec::new());
         for (middle, apex) in middles.iter().zip(&apices) {
             let stalk = (middle - apex).try_normalize(1e-9);
@@ -238,6 +290,7 @@ impl Leaves {
             apices,
             stalks,
             colours,
+            turned,
         }
     }
 }

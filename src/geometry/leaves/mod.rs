@@ -12,6 +12,7 @@ mod carry;
 mod cluster;
 mod colours;
 mod density;
+mod faces;
 mod groups;
 mod hidden;
 mod place;

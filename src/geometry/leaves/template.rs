@@ -1,6 +1,7 @@
 //! The mesh that stands at every seed: a cluster of leaves, ours or the user's (Li 2011 app.
 //! B.1).
 
+use super::faces::{Sheets, area_vector};
 use super::texture;
 use nalgebra::{Point3, Rotation3, Vector3};
 
@@ -14,6 +15,9 @@ pub struct Template {
     pub(super) indices: Vec<u32>,
     /// The leaf that each vertex belongs to: what hangs together.
     pub(super) leaf_of: Vec<u32>,
+    /// Direction of each triangle by its winding, of length 1; 0 where it has none. The normals at
+    /// its corners go along it.
+    pub(super) faces: Vec<Vector3<f64>>,
     /// Where each leaf is held, about which it turns.
     pub(super) apices: Vec<Point3<f64>>,
     /// Middle of the whole.
@@ -90,6 +94,7 @@ impl Template {
             uvs: Vec::new(),
             indices: Vec::new(),
             leaf_of: Vec::new(),
+            faces: Vec::new(),
             apices: Vec::new(),
             centre: Point3::origin(),
             texture: None,
@@ -98,8 +103,9 @@ impl Template {
     }
 
     /// A template from a mesh of any size, which is scaled so that its longest side is 1 and moved
-    /// so that the middle of its lowest end is the origin. Missing normals are computed. Vertices
-    /// that no triangle uses are left out: every copy would carry them.
+    /// so that the middle of its lowest end is the origin. Missing normals are computed; those that
+    /// do not agree with the winding are made to. Vertices that no triangle uses are left out: every
+    /// copy would carry them.
     ///
     /// # Errors
     /// What [`TemplateFault`] names.
@@ -110,20 +116,31 @@ impl Template {
         if !all_numbers(&mesh) {
             return Err(TemplateFault::NoNumbers);
         }
-        let positions = normalised(&mesh.positions)?;
+        let mut positions = normalised(&mesh.positions)?;
         let texture_mean = match &mesh.texture {
             Some((_, bytes)) => mean_colour(bytes).ok_or(TemplateFault::BadTexture)?,
             None => [1.0; 3],
         };
         let n = positions.len();
         let sum: Vector3<f64> = positions.iter().map(|p| p.coords).sum();
-        let leaf_of = pieces(n, &mesh.indices);
+        let mut leaf_of = pieces(n, &mesh.indices);
         if mesh.uvs.is_empty() {
             mesh.uvs = vec![[0.5; 2]; n];
         }
+        let apices = apices(&positions, &leaf_of);
+        let mut normals = normals(&mesh, &positions);
+        let faces = Sheets {
+            positions: &mut positions,
+            normals: &mut normals,
+            uvs: &mut mesh.uvs,
+            leaf_of: &mut leaf_of,
+            indices: &mut mesh.indices,
+        }
+        .agree();
         Ok(Self {
-            normals: normals(&mesh, &positions),
-            apices: apices(&positions, &leaf_of),
+            normals,
+            faces,
+            apices,
             centre: Point3::from(sum / n as f64),
             positions,
             uvs: mesh.uvs,
@@ -144,8 +161,7 @@ impl Template {
     pub(super) fn mean_area(&self) -> f64 {
         let mut area = 0.0;
         for t in self.indices.chunks_exact(3) {
-            let [a, b, c] = [0, 1, 2].map(|k| self.positions[t[k] as usize]);
-            area += (b - a).cross(&(c - a)).norm() / 2.0;
+            area += area_vector(&self.positions, t).norm() / 2.0;
         }
         area / 2.0
     }
@@ -262,9 +278,8 @@ fn keep_used(mesh: &mut TemplateMesh) {
 fn normals(mesh: &TemplateMesh, positions: &[Point3<f64>]) -> Vec<Vector3<f64>> {
     let mut around = vec![Vector3::zeros(); positions.len()];
     for t in mesh.indices.chunks_exact(3) {
-        let [a, b, c] = [0, 1, 2].map(|k| t[k] as usize);
-        let face = (positions[b] - positions[a]).cross(&(positions[c] - positions[a]));
-        [a, b, c].into_iter().for_each(|i| around[i] += face);
+        let face = area_vector(positions, t);
+        t.iter().for_each(|&i| around[i as usize] += face);
     }
     let mut normals = Vec::with_capacity(positions.len());
     for (i, face) in around.into_iter().enumerate() {

@@ -1,0 +1,264 @@
+//! How leaves look in the files that others open: which way they face.
+
+#[path = "support/still.rs"]
+mod still;
+mod synthetic;
+
+use arborcam::config::{Config, Leaves};
+use arborcam::export::ExportError;
+use arborcam::export::gltf::{KEY_TOLERANCE_PX, Model, glb};
+use arborcam::export::still::{obj_files, ply};
+use arborcam::geometry::{Dressed, Foliage, LeafView, Template, TemplateMesh, foliage};
+use arborcam::model::Skeleton;
+use arborcam::pipeline::{Seen, dress};
+use nalgebra::Vector3;
+use serde_json::Value;
+use still::{Still, still};
+
+/// Triangle corners of leaves, and how many of them have a normal that points against the winding.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Corners {
+    all: usize,
+    against: usize,
+}
+
+impl Corners {
+    fn add(&mut self, positions: &[[f32; 3]], normals: &[[f32; 3]], corners: [usize; 3]) {
+        let [a, b, c] = corners.map(|i| Vector3::from(positions[i].map(f64::from)));
+        let face = (b - a).cross(&(c - a));
+        for i in corners {
+            self.all += 1;
+            self.against += usize::from(face.dot(&Vector3::from(normals[i].map(f64::from))) < 0.0);
+        }
+    }
+}
+
+fn leafy(still: &Still) -> Dressed {
+    let seen = Seen {
+        picture: Some(&still.picture),
+        outline: Some(&still.outline),
+        ..Seen::default()
+    };
+    dress(&still.skeleton, seen, &Config::default())
+}
+
+fn model<'a>(skeleton: &'a Skeleton, dressed: &'a Dressed) -> Model<'a> {
+    Model {
+        skeleton,
+        dressed,
+        poses: &[],
+        flutter: &[],
+        all_levels: false,
+        metres_per_px: 0.02,
+        tolerance_px: KEY_TOLERANCE_PX,
+        node_extras: &[],
+        provenance: &Value::Null,
+    }
+}
+
+fn in_glb(bytes: &[u8]) -> Corners {
+    let file = gltf::Gltf::from_slice(bytes).expect("glTF");
+    let bin = file.blob.clone().unwrap_or_default();
+    let mut corners = Corners::default();
+    for node in file.nodes() {
+        let (Some(mesh), Some("leaf")) = (node.mesh(), material_of(&node)) else {
+            continue;
+        };
+        let primitive = mesh.primitives().next().expect("a primitive");
+        let reader = primitive.reader(|_| Some(&bin));
+        let positions: Vec<[f32; 3]> = reader.read_positions().expect("places").collect();
+        let normals: Vec<[f32; 3]> = reader.read_normals().expect("normals").collect();
+        let indices = reader.read_indices().expect("indices").into_u32();
+        let indices: Vec<usize> = indices.map(|i| i as usize).collect();
+        for t in indices.chunks_exact(3) {
+            corners.add(&positions, &normals, [t[0], t[1], t[2]]);
+        }
+    }
+    corners
+}
+
+fn material_of<'a>(node: &gltf::Node<'a>) -> Option<&'a str> {
+    node.mesh()?.primitives().next()?.material().name()
+}
+
+fn in_obj(text: &str) -> Corners {
+    let (mut positions, mut normals) = (Vec::new(), Vec::new());
+    let (mut corners, mut leaf) = (Corners::default(), false);
+    for line in text.lines() {
+        let (kind, rest) = line.split_once(' ').unwrap_or((line, ""));
+        let words: Vec<&str> = rest.split(' ').collect();
+        match kind {
+            "v" => positions.push([0, 1, 2].map(|k| words[k].parse().expect("a number"))),
+            "vn" => normals.push([0, 1, 2].map(|k| words[k].parse().expect("a number"))),
+            "usemtl" => leaf = rest == "leaf",
+            "f" if leaf => {
+                let at = [0, 1, 2].map(|k| words[k].split('/').next().expect("an index"));
+                let at = at.map(|i| i.parse::<usize>().expect("an index") - 1);
+                corners.add(&positions, &normals, at);
+            }
+            _ => {}
+        }
+    }
+    corners
+}
+
+/// The leaves of a PLY come after its wood, which has `wood` triangles.
+fn in_ply(bytes: &[u8], wood: usize) -> Corners {
+    const END: &[u8] = b"end_header\n";
+    let head = bytes.windows(END.len()).position(|w| w == END);
+    let head = head.expect("a head") + END.len();
+    let text = String::from_utf8_lossy(&bytes[..head]).into_owned();
+    let vertices = text.lines().find_map(|l| l.strip_prefix("element vertex "));
+    let vertices: usize = vertices.expect("vertices").parse().expect("a number");
+    let (mut positions, mut normals) = (Vec::new(), Vec::new());
+    for row in bytes[head..head + 27 * vertices].chunks_exact(27) {
+        let at = |k: usize| f32::from_le_bytes(row[4 * k..4 * k + 4].try_into().expect("4 bytes"));
+        positions.push([at(0), at(1), at(2)]);
+        normals.push([at(3), at(4), at(5)]);
+    }
+    let mut corners = Corners::default();
+    for row in bytes[head + 27 * vertices..].chunks_exact(13).skip(wood) {
+        let at = |k: usize| {
+            u32::from_le_bytes(row[4 * k + 1..4 * k + 5].try_into().expect("4 bytes")) as usize
+        };
+        corners.add(&positions, &normals, [at(0), at(1), at(2)]);
+    }
+    corners
+}
+
+/// Whoever obeys the file turns the normal round where a leaf's back is seen: one against the
+/// winding is lit from the wrong side.
+#[test]
+fn the_normals_of_leaves_agree_with_their_winding_in_every_file() {
+    let still = still(true);
+    let dressed = leafy(&still);
+    let triangles = |mesh: &arborcam::geometry::Mesh| mesh.indices.len() / 3;
+    let leaves: usize = dressed
+        .foliage
+        .groups
+        .iter()
+        .map(|g| triangles(&g.mesh))
+        .sum();
+    let (bytes, _) = glb(&model(&still.skeleton, &dressed)).expect("GLB");
+    let objects = obj_files(&dressed, "tree", 0.0).expect("OBJ");
+    let (_, obj) = objects.last().expect("files");
+    let obj = String::from_utf8_lossy(obj);
+    let ply = ply(&dressed, 0.02).expect("PLY");
+    let found = [
+        in_glb(&bytes),
+        in_obj(&obj),
+        in_ply(&ply, triangles(&dressed.wood[0])),
+    ];
+    println!("{found:?}");
+    let wanted = Corners {
+        all: 3 * leaves,
+        against: 0,
+    };
+    assert!(leaves > 10_000);
+    assert_eq!(found, [wanted; 3]);
+}
+
+/// The crown is still lit as one body: its normals point away from its middle.
+#[test]
+fn leaves_are_lit_as_a_crown() {
+    let still = still(true);
+    let leaves = still.leaves(&Leaves::default());
+    let places = leaves.groups.iter().flat_map(|g| &g.mesh.positions);
+    let places: Vec<Vector3<f32>> = places.map(|p| Vector3::from(*p)).collect();
+    let middle = places.iter().sum::<Vector3<f32>>() / places.len() as f32;
+    let normals = leaves.groups.iter().flat_map(|g| &g.mesh.normals);
+    let mut outward = 0.0;
+    for (at, normal) in places.iter().zip(normals) {
+        outward += f64::from((at - middle).normalize().dot(&Vector3::from(*normal)));
+    }
+    let mean = outward / places.len() as f64;
+    assert!(mean > 0.8, "{mean}");
+}
+
+/// A leaf of the user's own may be wound either way, be a sheet with two faces on the same corners,
+/// or a body.
+#[test]
+fn leaves_of_any_make_face_as_they_are_wound() {
+    let square = [
+        [-0.5, 0.0, 0.0],
+        [0.5, 0.0, 0.0],
+        [0.5, 1.0, 0.0],
+        [-0.5, 1.0, 0.2],
+    ];
+    let sheet = TemplateMesh {
+        positions: square.to_vec(),
+        indices: vec![0, 1, 2, 0, 2, 3],
+        ..TemplateMesh::default()
+    };
+    let against = TemplateMesh {
+        normals: vec![[0.0, 0.0, -1.0]; 4],
+        ..sheet.clone()
+    };
+    let two_faced = TemplateMesh {
+        indices: vec![0, 1, 2, 0, 2, 3, 0, 2, 1, 0, 3, 2],
+        ..against.clone()
+    };
+    let body = TemplateMesh {
+        positions: vec![
+            [0.0, 0.0, 0.0],
+            [0.6, 0.5, 0.0],
+            [-0.3, 0.5, 0.5],
+            [-0.3, 0.5, -0.5],
+            [0.0, 1.0, 0.0],
+        ],
+        indices: vec![0, 1, 2, 0, 2, 3, 0, 3, 1, 4, 2, 1, 4, 3, 2, 4, 1, 3],
+        ..TemplateMesh::default()
+    };
+    let still = still(true);
+    for (name, mesh) in [
+        ("sheet", sheet),
+        ("against", against),
+        ("two-faced", two_faced),
+        ("body", body),
+    ] {
+        let faces = mesh.indices.len() / 3;
+        let template = Template::new(mesh).expect(name);
+        assert_eq!(template.triangles(), faces, "{name}");
+        let leaves = leaves_of(&still, &template);
+        let (mut found, mut counted) = (Corners::default(), 0);
+        for group in &leaves.groups {
+            let mesh = &group.mesh;
+            counted += mesh.corners_against_winding();
+            for t in mesh.indices.chunks_exact(3) {
+                let t = [t[0], t[1], t[2]].map(|i| i as usize);
+                found.add(&mesh.positions, &mesh.normals, t);
+            }
+        }
+        assert!(found.all > 1000, "{name}: {found:?}");
+        assert_eq!((found.against, counted), (0, 0), "{name}: {found:?}");
+    }
+}
+
+fn leaves_of(still: &Still, template: &Template) -> Foliage {
+    let seeds = still.seeds(&Leaves::default());
+    let view: LeafView = still.view(&seeds);
+    let limbs = synthetic::limbs_of(&still.skeleton, &synthetic::bare());
+    foliage(
+        &limbs,
+        &still.skeleton,
+        &view,
+        template,
+        &Leaves::default(),
+        0,
+    )
+}
+
+/// A model whose leaves would be lit from the wrong side is not written.
+#[test]
+fn leaves_that_face_the_wrong_way_are_refused() {
+    let still = still(true);
+    let mut dressed = leafy(&still);
+    dressed.foliage.groups[1].mesh.indices.swap(1, 2);
+    let refused = glb(&model(&still.skeleton, &dressed)).expect_err("no file");
+    assert!(matches!(refused, ExportError::Unfit { .. }));
+    let line = refused.to_string();
+    assert!(
+        line.contains("3 corners in group 1 of its leaves"),
+        "{line}"
+    );
+}
