@@ -1,13 +1,17 @@
 //! The model in other people's hands: the Khronos validator, and Blender. Where they are absent the
 //! tests say so and do nothing; with `ARBORCAM_REQUIRE_TOOLS=1` they fail.
 
+#[path = "support/still.rs"]
+mod still;
 mod synthetic;
 #[path = "support/tools.rs"]
 mod tools;
 
+use arborcam::config::Config;
 use arborcam::export::gltf::{KEY_TOLERANCE_PX, Model, glb, gltf_files};
 use arborcam::geometry::{Dressed, Foliage, Mesh, bare_wood};
 use arborcam::model::{Pose, Skeleton};
+use arborcam::pipeline::{Seen, dress};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -156,23 +160,17 @@ fn the_khronos_validator_finds_nothing() {
     assert_eq!(told.matches("0 errors, 0 warnings").count(), files.len());
 }
 
-fn imported(blender: &Path, file: &Path) -> Value {
-    let mut import = Command::new(blender);
-    import
-        .args([
-            "-b",
-            "--factory-startup",
-            "-P",
-            "tests/blender_import.py",
-            "--",
-        ])
+/// What a script that is run in Blender says of a file, in its line that begins with `word`.
+fn told_by_blender(blender: &Path, script: &str, file: &Path, word: &str) -> Value {
+    let mut run = Command::new(blender);
+    run.args(["-b", "--factory-startup", "-P", script, "--"])
         .arg(file);
-    let output = import.output().expect("blender");
+    let output = run.output().expect("blender");
     let told = String::from_utf8_lossy(&output.stdout).into_owned();
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     let line = told
         .lines()
-        .find_map(|l| l.strip_prefix("IMPORTED "))
+        .find_map(|l| l.strip_prefix(word))
         .unwrap_or_else(|| panic!("{told}{errors}"));
     assert!(
         !told.contains("Error") && !errors.contains("Traceback"),
@@ -200,7 +198,7 @@ fn blender_gets_every_bone_and_the_whole_animation() {
     })
     .expect("glb");
     fs::write(&file, bytes).expect("write");
-    let there = imported(&blender, &file);
+    let there = told_by_blender(&blender, "tests/blender_import.py", &file, "IMPORTED ");
     println!("{there}");
     let names = skeleton.nodes.iter().map(|n| match n.copy_of {
         Some(original) => format!("node_{}_copy_of_{}", n.name.0, original.0),
@@ -231,4 +229,35 @@ fn blender_gets_every_bone_and_the_whole_animation() {
         "the rest and two swings for every group"
     );
     assert_eq!(there["materials"], json!(["bark", "leaf"]));
+}
+
+/// The crown of a tree as it is filmed in leaf, imported with the importer's own settings and lit by
+/// a sun and a sky: green and not black, from the front and from behind.
+#[test]
+fn blender_shows_a_green_crown() {
+    let Some(blender) = tools::program("blender", "--version") else {
+        return;
+    };
+    let film = still::still(true);
+    let seen = Seen {
+        picture: Some(&film.picture),
+        outline: Some(&film.outline),
+        ..Seen::default()
+    };
+    let dressed = dress(&film.skeleton, seen, &Config::default());
+    let dir = tempfile::tempdir().expect("tempdir");
+    let file = dir.path().join("tree.glb");
+    let (bytes, _) = glb(&model(&film.skeleton, &dressed, &[], &Value::Null)).expect("glb");
+    fs::write(&file, bytes).expect("write");
+    let looks = told_by_blender(&blender, "tests/blender_look.py", &file, "LOOKS ");
+    println!("{looks}");
+    for side in ["front", "back"] {
+        let of = |what: &str| looks[side][what].as_f64().expect("a number");
+        let [r, g, b] = ["red", "green", "blue"].map(of);
+        // The leaves of the picture have 2.6 and 7.4 times as much green as red and blue in linear
+        // light, 0.16 of white; a crown lit from behind its leaves shows a twentieth of that.
+        assert!(of("cover") > 0.1, "{looks}");
+        assert!(g > 1.5 * r && g > 2.0 * b, "{side}: {looks}");
+        assert!(g > 0.025, "{side}: {looks}");
+    }
 }
