@@ -1,4 +1,4 @@
-//! How leaves look in the files that others open: which way they face.
+//! How leaves look in the files that others open: which way they face, and their colour.
 
 #[path = "support/still.rs"]
 mod still;
@@ -9,11 +9,11 @@ use arborcam::export::ExportError;
 use arborcam::export::gltf::{KEY_TOLERANCE_PX, Model, glb};
 use arborcam::export::still::{obj_files, ply};
 use arborcam::geometry::{Dressed, Foliage, LeafView, Template, TemplateMesh, foliage};
-use arborcam::model::Skeleton;
+use arborcam::model::{Rgb, Skeleton};
 use arborcam::pipeline::{Seen, dress};
 use nalgebra::Vector3;
 use serde_json::Value;
-use still::{Still, still};
+use still::{Still, still, still_before};
 
 /// Triangle corners of leaves, and how many of them have a normal that points against the winding.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -261,4 +261,89 @@ fn leaves_that_face_the_wrong_way_are_refused() {
         line.contains("3 corners in group 1 of its leaves"),
         "{line}"
     );
+}
+
+/// A picture as a camera sends it: every pixel has some of those around it, and four by four have
+/// one hue (twice what 4:2:0 does, to tell more).
+fn filmed(picture: &mut Rgb) {
+    let (width, height) = (picture.size.width as usize, picture.size.height as usize);
+    let sharp = picture.pixels.clone();
+    let at = |u: usize, v: usize, k: usize| f64::from(sharp[3 * (v * width + u) + k]);
+    let light = |u: usize, v: usize| (0..3).map(|k| at(u, v, k)).sum::<f64>() / 3.0;
+    for v in 0..height {
+        for u in 0..width {
+            let (mut around, mut n) = (0.0, 0.0);
+            for y in v.saturating_sub(1)..(v + 2).min(height) {
+                for x in u.saturating_sub(1)..(u + 2).min(width) {
+                    around += light(x, y);
+                    n += 1.0;
+                }
+            }
+            for k in 0..3 {
+                let mut hue = 0.0;
+                for place in 0..16 {
+                    let (x, y) = (u / 4 * 4 + place % 4, v / 4 * 4 + place / 4);
+                    hue += (at(x, y, k) - light(x, y)) / 16.0;
+                }
+                let value = (around / n + hue).round().clamp(0.0, 255.0);
+                picture.pixels[3 * (v * width + u) + k] = value as u8;
+            }
+        }
+    }
+}
+
+/// What is behind the leaves, at a pixel (sRGB).
+type Backdrop = fn(usize, usize) -> [i32; 3];
+
+fn sky(_: usize, _: usize) -> [i32; 3] {
+    [90, 140, 220]
+}
+
+fn dusk(_: usize, _: usize) -> [i32; 3] {
+    [14, 22, 52]
+}
+
+fn slate(_: usize, _: usize) -> [i32; 3] {
+    [44, 54, 62]
+}
+
+/// Behind the crown alone, found nowhere beside it.
+fn blue_wall(u: usize, v: usize) -> [i32; 3] {
+    if (230..410).contains(&u) && v < 330 {
+        [18, 30, 70]
+    } else {
+        [190, 205, 226]
+    }
+}
+
+/// Leaves that stand before something blue are green, in a sharp picture and in a film's.
+#[test]
+fn before_blue_leaves_are_green() {
+    let backdrops: [(&str, Backdrop); 4] = [
+        ("sky", sky),
+        ("dusk", dusk),
+        ("slate", slate),
+        ("blue wall", blue_wall),
+    ];
+    for (name, backdrop) in backdrops {
+        for is_film in [false, true] {
+            let mut still = still_before(true, backdrop);
+            if is_film {
+                filmed(&mut still.picture);
+            }
+            let leaves = still.leaves(&Leaves::default());
+            let colours = leaves.groups.iter().flat_map(|g| g.colours.clone());
+            let colours: Vec<[u8; 3]> = colours.collect();
+            let (mut blue, mut mixed) = (0, 0);
+            for [_, g, b] in &colours {
+                blue += usize::from(b >= g);
+                // In the picture leaves have 0.36 times as much blue as green.
+                mixed += usize::from(f64::from(*b) > 0.7 * f64::from(*g));
+            }
+            let share = mixed as f64 / colours.len() as f64;
+            println!("{name}, film {is_film}: {blue} blue, {share:.4} mixed");
+            assert!(!colours.is_empty() && blue == 0, "{name}: {blue} are blue");
+            assert!(share < 0.01, "{name}: {share}");
+        }
+    }
 }

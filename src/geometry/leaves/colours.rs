@@ -14,6 +14,8 @@ const BANDS: usize = 7;
 /// The background is learned from so near to the outline, as a share of the tree's height: what is
 /// farther is another thing.
 const REACH: f64 = 0.25;
+/// Nearer than this to the outline, in cells, a leaf may still stand out of it.
+const BORDER: f32 = 2.0;
 /// Background colours inside are not spread just as outside; so many times their share counts as
 /// background still.
 const MARGIN: f64 = 1.5;
@@ -30,17 +32,29 @@ const MOST_BARK: f64 = 0.5;
 pub(super) struct Shares {
     pub tree: Vec<f32>,
     pub leaf: Vec<f32>,
+    /// Outside of the outline and near to it: what is seen there is no leaf.
+    pub beside: Vec<bool>,
 }
 
 /// Tells tree and leaf apart from all else in the picture.
 pub(super) fn shares(canvas: &Canvas) -> Shares {
     let bins: Vec<u16> = canvas.colours.iter().map(|c| bin(*c)).collect();
+    let beside = beside(canvas);
     let tree = match &canvas.matte {
         Some(matte) => matte.clone(),
-        None => tree(canvas, &bins),
+        None => tree(canvas, &bins, &beside),
     };
     let leaf = leaf(canvas, &bins, &tree);
-    Shares { tree, leaf }
+    Shares { tree, leaf, beside }
+}
+
+fn beside(canvas: &Canvas) -> Vec<bool> {
+    let (top, bottom) = canvas.rows();
+    let reach = REACH * (bottom + 1 - top) as f64;
+    distance_outside(&canvas.inside, canvas.grid.size.width as usize)
+        .iter()
+        .map(|&away| away > BORDER && f64::from(away) < reach)
+        .collect()
 }
 
 fn bin(colour: [u8; 3]) -> u16 {
@@ -48,11 +62,10 @@ fn bin(colour: [u8; 3]) -> u16 {
     ((r * STEPS + g) * STEPS + b) as u16
 }
 
-fn tree(canvas: &Canvas, bins: &[u16]) -> Vec<f32> {
+fn tree(canvas: &Canvas, bins: &[u16], beside: &[bool]) -> Vec<f32> {
     let width = canvas.grid.size.width as usize;
     let (top, bottom) = canvas.rows();
     let height = (bottom + 1 - top) as f64;
-    let away = distance_outside(&canvas.inside, width);
     let step = height / (BANDS - 1) as f64;
     let mut share = vec![0.0f32; bins.len()];
     for k in 0..BANDS {
@@ -63,10 +76,9 @@ fn tree(canvas: &Canvas, bins: &[u16]) -> Vec<f32> {
         let (mut inside, mut outside) = (Histogram::default(), Histogram::default());
         for (i, &bin) in bins.iter().enumerate() {
             let weight = band.weight(i / width, 1.5);
-            let near = away[i] > 2.0 && f64::from(away[i]) < REACH * height;
             if weight > 0.0 && canvas.inside[i] {
                 inside.add(bin, weight);
-            } else if weight > 0.0 && near {
+            } else if weight > 0.0 && beside[i] {
                 outside.add(bin, weight);
             }
         }

@@ -15,6 +15,7 @@ mod density;
 mod faces;
 mod groups;
 mod hidden;
+mod mixture;
 mod place;
 mod season;
 mod target;

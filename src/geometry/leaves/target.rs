@@ -1,8 +1,9 @@
 //! The density that the leaves are to have: the frame's, or a drawn one.
 
 use super::canvas::{Canvas, Grid, luma};
-use super::colours::{shares, smooth_step};
+use super::colours::{Shares, shares, smooth_step};
 use super::density::{SCALE, smoothed};
+use super::mixture::Mixture;
 use super::view::{LeafView, PLAIN};
 use crate::model::Skeleton;
 use nalgebra::{Point2, Vector2};
@@ -13,9 +14,14 @@ const PURE: f32 = 0.6;
 /// these shares leaf in a cell and those around it is not leaf, or wholly.
 const NOT_LEAF: f32 = 0.3;
 const WHOLLY_LEAF: f32 = 0.6;
+/// Where less than this share of the leaves has colours of its own, leaf and background cannot be
+/// told apart by them.
+const LEAST_KEPT: f32 = 0.5;
 /// Hues farther from the leaves' middle one than so many deviations belong to what is seen between
 /// them.
 const STRANGE: f64 = 3.5;
+/// Rounds in which they are looked for at most.
+const MOST_ROUNDS: usize = 5;
 /// The film's light and shade are in the colours already, and a viewer's own come on top: of their
 /// ratio to the mean this power is kept.
 const SHADING: f64 = 0.65;
@@ -47,15 +53,15 @@ impl Target {
             .picture
             .zip(view.outline)
             .and_then(|(p, o)| Canvas::new(grid, p, o));
-        let leaf = canvas.as_ref().map(|canvas| shares(canvas).leaf);
+        let shares = canvas.as_ref().map(shares);
         let wanted = match drawn_density(view, &grid) {
             Some(drawn) => drawn,
-            None => filmed_density(leaf.as_ref()?, &grid),
+            None => filmed_density(&shares.as_ref()?.leaf, &grid),
         };
         let sigma = grid.length(SCALE * height);
         let density = smoothed(&wanted, grid.size.width as usize, sigma);
-        let colours = match (canvas, leaf) {
-            (Some(canvas), Some(leaf)) => leaf_colours(&canvas, &leaf),
+        let colours = match (canvas, shares) {
+            (Some(canvas), Some(shares)) => leaf_colours(&canvas, &shares),
             _ => Vec::new(),
         };
         let lumas = Lumas::of(&colours);
@@ -143,9 +149,10 @@ fn filmed_density(leaf: &[f32], grid: &Grid) -> Vec<f32> {
 }
 
 /// The colour of every cell with how much it is of leaves alone.
-fn leaf_colours(canvas: &Canvas, leaf: &[f32]) -> Vec<([u8; 3], f32)> {
-    let pure = pure(leaf, canvas.grid.size.width as usize);
+fn leaf_colours(canvas: &Canvas, shares: &Shares) -> Vec<([u8; 3], f32)> {
+    let pure = pure(&shares.leaf, canvas.grid.size.width as usize);
     let mut colours: Vec<([u8; 3], f32)> = canvas.colours.iter().copied().zip(pure).collect();
+    without_background(&mut colours, &shares.beside);
     without_strangers(&mut colours);
     colours
 }
@@ -203,31 +210,70 @@ fn softened(luma: f64, mean: f64) -> f64 {
     mean * (luma / mean.max(1.0)).max(0.0).powf(SHADING)
 }
 
+/// Takes the weight of colours that are rather those of what is seen `beside` the tree: a cell that
+/// is told apart by steps of 16 may still be a grey of the wall behind. Where the two have their
+/// colours in common all stay.
+fn without_background(colours: &mut [([u8; 3], f32)], beside: &[bool]) {
+    let leaf = colours.iter().filter(|c| c.1 > 0.5).map(|c| c.0);
+    let background = colours.iter().zip(beside).filter(|(_, b)| **b);
+    let (Some(leaf), Some(background)) = (
+        Mixture::of(leaf.collect()),
+        Mixture::of(background.map(|(c, _)| c.0).collect()),
+    ) else {
+        return;
+    };
+    let mut kept: Vec<f32> = Vec::with_capacity(colours.len());
+    for (colour, weight) in colours.iter() {
+        let is_leaf = *weight > 0.0 && leaf.density(*colour) > background.density(*colour);
+        kept.push(if is_leaf { *weight } else { 0.0 });
+    }
+    let before: f32 = colours.iter().map(|c| c.1).sum();
+    if kept.iter().sum::<f32>() < LEAST_KEPT * before {
+        return;
+    }
+    for (colour, kept) in colours.iter_mut().zip(kept) {
+        colour.1 = kept;
+    }
+}
+
 /// Takes the weight of colours whose hue is none of the leaves': what is seen between them can have
 /// colours that are found nowhere outside. By median and median deviation, so that autumn may have
-/// all of its hues.
+/// all of its hues; again without those that were found, as long as there are any: they widen the
+/// deviation.
 fn without_strangers(colours: &mut [([u8; 3], f32)]) {
     for k in 0..2 {
-        let mut hues: Vec<f64> = colours
-            .iter()
-            .filter(|c| c.1 > 0.5)
-            .map(|c| hue(c.0)[k])
-            .collect();
-        let Some(middle) = median(&mut hues) else {
-            return;
-        };
-        for hue in &mut hues {
-            *hue = (*hue - middle).abs();
-        }
-        // 1.4826: from the median deviation to the standard one of a normal distribution; below a
-        // step of 8 bits all is noise.
-        let most = STRANGE * (1.4826 * median(&mut hues).unwrap_or(0.0)).max(0.02);
-        for (colour, weight) in colours.iter_mut() {
-            if (hue(*colour)[k] - middle).abs() > most {
-                *weight = 0.0;
+        for _ in 0..MOST_ROUNDS {
+            if !take_strangers(colours, k) {
+                break;
             }
         }
     }
+}
+
+/// One round of [`without_strangers`] by part `k` of the hue; whether any were found.
+fn take_strangers(colours: &mut [([u8; 3], f32)], k: usize) -> bool {
+    let mut hues: Vec<f64> = colours
+        .iter()
+        .filter(|c| c.1 > 0.5)
+        .map(|c| hue(c.0)[k])
+        .collect();
+    let Some(middle) = median(&mut hues) else {
+        return false;
+    };
+    for hue in &mut hues {
+        *hue = (*hue - middle).abs();
+    }
+    // 1.4826: from the median deviation to the standard one of a normal distribution; below a
+    // step of 8 bits all is noise.
+    let most = STRANGE * (1.4826 * median(&mut hues).unwrap_or(0.0)).max(0.02);
+    let mut found = false;
+    for (colour, weight) in colours.iter_mut() {
+        if *weight > 0.0 && (hue(*colour)[k] - middle).abs() > most {
+            *weight = 0.0;
+            found = true;
+        }
+    }
+    found
 }
 
 /// How much redder and bluer than green a colour is, as shares of its brightness; of dark colours,
@@ -252,4 +298,52 @@ fn mean<'a>(colours: impl Iterator<Item = &'a ([u8; 3], f32)>) -> Option<[u8; 3]
         }
     }
     (weight > 0.5).then(|| sum.map(|s| (s / weight).round() as u8))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Cells of leaf, of which a few are those of a wall that is seen between them, then the wall
+    /// beside the tree.
+    fn before_wall(leaf: fn(u8) -> [u8; 3], wall: [u8; 3]) -> (Vec<([u8; 3], f32)>, Vec<bool>) {
+        let (mut colours, mut beside) = (Vec::new(), Vec::new());
+        for k in 0..200_u8 {
+            colours.push((leaf(k), 0.9));
+            beside.push(false);
+        }
+        for k in 0..110_u8 {
+            let [r, g, b] = wall;
+            let is_beside = k >= 10;
+            colours.push((
+                [r + k % 5, g + k % 4, b + k % 3],
+                if is_beside { 0.0 } else { 0.7 },
+            ));
+            beside.push(is_beside);
+        }
+        (colours, beside)
+    }
+
+    fn green(k: u8) -> [u8; 3] {
+        [24 + k / 4, 40 + k / 3, 14 + k / 6]
+    }
+
+    #[test]
+    fn the_grey_of_a_wall_is_no_colour_of_leaves() {
+        let (mut colours, beside) = before_wall(green, [40, 50, 44]);
+        without_background(&mut colours, &beside);
+        let kept = |cells: &[([u8; 3], f32)]| cells.iter().filter(|c| c.1 > 0.0).count();
+        assert_eq!(kept(&colours[200..]), 0);
+        assert!(kept(&colours[..200]) > 180, "{}", kept(&colours[..200]));
+    }
+
+    #[test]
+    fn before_what_has_their_colours_leaves_keep_them() {
+        let (mut colours, beside) =
+            before_wall(|k| [40 + k % 5, 50 + k % 4, 44 + k % 3], [40, 50, 44]);
+        let before = colours.clone();
+        without_background(&mut colours, &beside);
+        let weight = |cells: &[([u8; 3], f32)]| cells.iter().map(|c| c.1).sum::<f32>();
+        assert!(weight(&colours) > 0.5 * weight(&before));
+    }
 }
