@@ -4,6 +4,7 @@
 //! number and the sensor time of the picture that it comes from. Trees are flat arrays in which a
 //! parent stands before its children.
 
+mod branch_graph;
 mod control;
 mod frame;
 mod hierarchy;
@@ -21,6 +22,7 @@ mod track;
 mod track_log;
 mod track_table;
 
+pub use branch_graph::{BranchGraph, WoodNode};
 pub use control::Control;
 pub use frame::{
     Frame, Luma, Picture, PixelFormat, RawFrame, Rgb, Size, TimedFrame, nanoseconds, seconds,

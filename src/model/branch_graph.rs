@@ -1,0 +1,112 @@
+//! The wood that pictures show, as centre lines.
+
+use super::Size;
+use nalgebra::Point2;
+
+/// A place is on a piece of wood within so many of its radii, and so many pixels at 640 px picture
+/// width.
+const REACH_RADII: f64 = 1.5;
+const REACH_PX: f64 = 8.0;
+
+/// A joint of a traced branch; the branch runs from the parent to it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WoodNode {
+    /// Index of the parent, smaller than the node's own; `None` for the foot.
+    pub parent: Option<usize>,
+    /// On the centre line at rest, px.
+    pub position_px: Point2<f64>,
+    /// Half the width that is seen there, px.
+    pub radius_px: f64,
+}
+
+/// The branches that a picture shows, joined to one tree: nodes with parents before children, the
+/// first is the trunk's foot.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BranchGraph {
+    pub nodes: Vec<WoodNode>,
+}
+
+impl BranchGraph {
+    /// Length of all branches, px.
+    pub fn length_px(&self) -> f64 {
+        let lengths = self.nodes.iter().filter_map(|node| {
+            let parent = self.nodes.get(node.parent?)?;
+            Some((node.position_px - parent.position_px).norm())
+        });
+        lengths.sum()
+    }
+
+    /// The piece of wood that is nearest to a place, as the node in which it ends; `None` where
+    /// none is near. `size` is that of the picture.
+    pub fn piece_at(&self, at_px: Point2<f64>, size: Size) -> Option<usize> {
+        let reach_px = REACH_PX * f64::from(size.width) / 640.0;
+        let mut nearest: Option<usize> = None;
+        let mut least_px = f64::INFINITY;
+        for (piece, node) in self.nodes.iter().enumerate() {
+            let Some(parent) = node.parent else { continue };
+            let from = self.nodes[parent].position_px;
+            let along = node.position_px - from;
+            let share = (at_px - from).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE);
+            let off_px = (at_px - (from + share.clamp(0.0, 1.0) * along)).norm();
+            if off_px < least_px && off_px <= REACH_RADII * node.radius_px + reach_px {
+                (nearest, least_px) = (Some(piece), off_px);
+            }
+        }
+        nearest
+    }
+
+    /// Children of every node.
+    pub fn children(&self) -> Vec<Vec<usize>> {
+        let mut children = vec![Vec::new(); self.nodes.len()];
+        for (i, node) in self.nodes.iter().enumerate() {
+            if let Some(parent) = node.parent {
+                children[parent].push(i);
+            }
+        }
+        children
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn node(parent: Option<usize>, u: f64, v: f64) -> WoodNode {
+        WoodNode {
+            parent,
+            position_px: Point2::new(u, v),
+            radius_px: 4.0,
+        }
+    }
+
+    /// A trunk of 100 px that forks.
+    fn fork() -> BranchGraph {
+        let nodes = vec![
+            node(None, 100.0, 200.0),
+            node(Some(0), 100.0, 100.0),
+            node(Some(1), 60.0, 70.0),
+            node(Some(1), 140.0, 70.0),
+        ];
+        BranchGraph { nodes }
+    }
+
+    #[test]
+    fn a_place_belongs_to_the_wood_beside_it_and_far_away_to_none() {
+        let size = Size::new(640, 360);
+        let at = |u, v| fork().piece_at(Point2::new(u, v), size);
+        assert_eq!(at(108.0, 150.0), Some(1));
+        assert_eq!(at(75.0, 78.0), Some(2));
+        assert_eq!(at(100.0, 60.0), None);
+        assert_eq!(at(f64::NAN, 0.0), None);
+        assert_eq!(
+            BranchGraph::default().piece_at(Point2::origin(), size),
+            None
+        );
+    }
+
+    #[test]
+    fn all_pieces_together_have_a_length() {
+        assert!((fork().length_px() - 200.0).abs() < 1e-9);
+        assert_eq!(fork().children(), [vec![1], vec![2, 3], vec![], vec![]]);
+    }
+}

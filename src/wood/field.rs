@@ -1,0 +1,186 @@
+//! The motion of followed points, spread over the picture.
+
+use crate::model::Size;
+use nalgebra::{Point2, Vector2};
+
+/// Distance between the places at which the motion is worked out, px. Between them it is
+/// interpolated.
+const STEP_PX: usize = 8;
+/// Points that a place takes its motion from.
+const NEAREST: usize = 10;
+/// Distance at which a point counts half as much as one at the place itself, px.
+const NEAR_PX: f64 = 6.0;
+/// A point that moves otherwise than the others by so much counts half, px.
+const APART_PX: f64 = 1.0;
+/// Rounds of reweighting.
+const ROUNDS: usize = 3;
+
+/// Which points each place of a grid takes its motion from.
+pub struct Spread {
+    size: Size,
+    columns: usize,
+    rows: usize,
+    /// The nearest points of every place, row by row.
+    nearest: Vec<Vec<Near>>,
+}
+
+/// A point near a place.
+#[derive(Clone, Copy, Debug)]
+struct Near {
+    point: usize,
+    weight: f64,
+}
+
+impl Spread {
+    /// For points that rest at `rest_px`; `None` without points.
+    pub fn new(size: Size, rest_px: &[Point2<f64>]) -> Option<Self> {
+        if rest_px.is_empty() {
+            return None;
+        }
+        let columns = size.width as usize / STEP_PX + 2;
+        let rows = size.height as usize / STEP_PX + 2;
+        let mut nearest = Vec::with_capacity(columns * rows);
+        for row in 0..rows {
+            for column in 0..columns {
+                let place = Point2::new((column * STEP_PX) as f64, (row * STEP_PX) as f64);
+                nearest.push(nearest_points(place, rest_px));
+            }
+        }
+        Some(Self {
+            size,
+            columns,
+            rows,
+            nearest,
+        })
+    }
+
+    /// Size of the picture.
+    pub fn size(&self) -> Size {
+        self.size
+    }
+
+    /// Displacement of every pixel from its place at rest, row by row, px. `displacements` are
+    /// those of the points; `None` where one was not seen. Where none of the nearest was, nothing
+    /// moves.
+    pub fn displacements(&self, displacements: &[Option<Vector2<f64>>]) -> Vec<Vector2<f32>> {
+        let mut at_places = Vec::with_capacity(self.nearest.len());
+        for near in &self.nearest {
+            at_places.push(robust_mean(near, displacements).cast::<f32>());
+        }
+        let (width, height) = (self.size.width as usize, self.size.height as usize);
+        let mut field = Vec::with_capacity(width * height);
+        for v in 0..height {
+            for u in 0..width {
+                field.push(self.interpolated(&at_places, u, v));
+            }
+        }
+        field
+    }
+
+    /// Bilinear interpolation at a pixel.
+    fn interpolated(&self, at_places: &[Vector2<f32>], u: usize, v: usize) -> Vector2<f32> {
+        let (column, row) = (u / STEP_PX, v / STEP_PX);
+        debug_assert!(row + 1 < self.rows);
+        let right = (u % STEP_PX) as f32 / STEP_PX as f32;
+        let down = (v % STEP_PX) as f32 / STEP_PX as f32;
+        let first = row * self.columns + column;
+        let above = at_places[first].lerp(&at_places[first + 1], right);
+        let first = first + self.columns;
+        let below = at_places[first].lerp(&at_places[first + 1], right);
+        above.lerp(&below, down)
+    }
+}
+
+/// The nearest points to a place, and how much each counts.
+fn nearest_points(place: Point2<f64>, rest_px: &[Point2<f64>]) -> Vec<Near> {
+    let distance_sq = |point: &usize| (rest_px[*point] - place).norm_squared();
+    let mut points: Vec<usize> = (0..rest_px.len()).collect();
+    if points.len() > NEAREST {
+        points.select_nth_unstable_by(NEAREST, |a, b| distance_sq(a).total_cmp(&distance_sq(b)));
+        points.truncate(NEAREST);
+    }
+    points.sort_unstable();
+    let mut near = Vec::with_capacity(points.len());
+    for point in points {
+        let weight = NEAR_PX / (NEAR_PX + distance_sq(&point).sqrt());
+        near.push(Near { point, weight });
+    }
+    near
+}
+
+/// Mean displacement in which points that move otherwise than most hardly count.
+fn robust_mean(near: &[Near], displacements: &[Option<Vector2<f64>>]) -> Vector2<f64> {
+    let mut mean: Option<Vector2<f64>> = None;
+    for _ in 0..=ROUNDS {
+        let (mut sum, mut weights) = (Vector2::zeros(), 0.0);
+        for Near { point, weight } in near {
+            let Some(displacement) = displacements.get(*point).copied().flatten() else {
+                continue;
+            };
+            let apart = mean.map_or(0.0, |mean| (displacement - mean).norm() / APART_PX);
+            let weight = weight / (1.0 + apart * apart);
+            sum += weight * displacement;
+            weights += weight;
+        }
+        if weights <= 0.0 {
+            return Vector2::zeros();
+        }
+        mean = Some(sum / weights);
+    }
+    mean.unwrap_or_else(Vector2::zeros)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: Size = Size {
+        width: 64,
+        height: 40,
+    };
+
+    /// Points on the left move by 3 px, those on the right by -2 px.
+    fn two_sides() -> (Vec<Point2<f64>>, Vec<Option<Vector2<f64>>>) {
+        let (mut rest_px, mut displacements) = (Vec::new(), Vec::new());
+        for k in 0..12 {
+            let height = 3.0 * f64::from(k);
+            rest_px.push(Point2::new(10.0, height));
+            displacements.push(Some(Vector2::new(3.0, 0.0)));
+            rest_px.push(Point2::new(54.0, height));
+            displacements.push(Some(Vector2::new(-2.0, 0.0)));
+        }
+        (rest_px, displacements)
+    }
+
+    fn at(field: &[Vector2<f32>], u: usize, v: usize) -> Vector2<f32> {
+        field[v * SIZE.width as usize + u]
+    }
+
+    #[test]
+    fn a_pixel_moves_as_the_points_beside_it() {
+        let (rest_px, displacements) = two_sides();
+        let spread = Spread::new(SIZE, &rest_px).expect("points");
+        let field = spread.displacements(&displacements);
+        assert_eq!(field.len(), SIZE.area());
+        assert!((at(&field, 8, 20).x - 3.0).abs() < 0.05);
+        assert!((at(&field, 60, 39).x + 2.0).abs() < 0.05);
+    }
+
+    #[test]
+    fn a_point_that_went_astray_hardly_counts() {
+        let (rest_px, mut displacements) = two_sides();
+        displacements[10] = Some(Vector2::new(40.0, 30.0));
+        displacements[14] = None;
+        let spread = Spread::new(SIZE, &rest_px).expect("points");
+        let moved = at(&spread.displacements(&displacements), 10, 16);
+        assert!((moved - Vector2::new(3.0, 0.0)).norm() < 0.2, "{moved}");
+    }
+
+    #[test]
+    fn without_points_there_is_no_field_and_without_motion_nothing_moves() {
+        assert!(Spread::new(SIZE, &[]).is_none());
+        let spread = Spread::new(SIZE, &[Point2::new(1.0, 1.0)]).expect("a point");
+        let still = spread.displacements(&[None]);
+        assert!(still.iter().all(|d| *d == Vector2::zeros()));
+    }
+}

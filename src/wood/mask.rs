@@ -1,0 +1,461 @@
+//! Which pixels of the picture at rest are wood: colour mixtures and a graph cut (Tan et al. 2008
+//! sect. 2.1; OpenCV's `grabCut`), whose seeds are what moves with the tree and is a ridge.
+
+use super::evidence::Evidence;
+use crate::cancel::CancelToken;
+use crate::model::{Luma, Rgb, Size};
+use nalgebra::Point2;
+use opencv::core::{Mat, Point, Rect, Size as CvSize};
+use opencv::imgproc::{
+    COLOR_RGB2BGR, GC_BGD, GC_EVAL, GC_INIT_WITH_MASK, GC_PR_BGD, GC_PR_FGD, INTER_CUBIC,
+    INTER_LINEAR, MORPH_BLACKHAT, MORPH_ELLIPSE, MORPH_TOPHAT, cvt_color_def, gaussian_blur_def,
+    get_structuring_element, grab_cut, morphology_ex_def, resize,
+};
+use opencv::prelude::*;
+
+/// Pictures narrower than this are worked on at twice their size: a twig is a pixel wide.
+const ENLARGED_BELOW: u32 = 960;
+/// The evidence is evened out by so much, px.
+const EVENED_PX: f64 = 0.7;
+/// Evidence above which a pixel is taken to be tree, and below which to stand still.
+const TREE: f32 = 0.15;
+const STILL: f32 = -0.03;
+/// Largest width of a ridge, px at 640 px picture width.
+const RIDGE_PX: f64 = 15.0;
+/// Wood is darker than what stands behind it, unless its ridges are so many times as high the other
+/// way.
+const BRIGHT: f64 = 1.5;
+/// Share of the threshold between ridges and the rest (Otsu) from which on a pixel may be a ridge.
+const RIDGE: f64 = 0.5;
+/// Rounds of colour mixtures and graph cut.
+const ROUNDS: i32 = 3;
+/// Light that is added to a pixel's before its share of green is taken: dark pixels count as grey.
+const DARK: f32 = 30.0;
+/// No leaf is less green than this, see [`greenness`].
+const GREEN: f64 = 112.0;
+/// A tree is in leaf where so great a share of what moves is leaves.
+const IN_LEAF: f64 = 0.25;
+
+/// The wood of the picture at rest.
+pub struct WoodMask {
+    /// Size of the mask, and how many times larger it is than the picture.
+    pub size: Size,
+    pub scale: u32,
+    /// Row by row, 255 is wood.
+    pub mask: Vec<u8>,
+    /// Row by row, whether it moves with the tree.
+    pub moves: Vec<bool>,
+    pub in_leaf: bool,
+}
+
+impl WoodMask {
+    /// The mask at the size of the picture.
+    pub fn at_picture_size(&self, size: Size) -> Luma {
+        let (width, scale) = (self.size.width as usize, self.scale as usize);
+        let mut pixels = Vec::with_capacity(size.area());
+        for v in 0..size.height as usize {
+            for u in 0..size.width as usize {
+                pixels.push(self.mask[scale * v * width + scale * u]);
+            }
+        }
+        Luma { size, pixels }
+    }
+}
+
+/// Finds the wood within `region` (one byte a pixel of the picture, 0 outside). What is as green as
+/// leaves is none. A bare tree is told from what stands behind it by its ridges as well.
+///
+/// # Errors
+/// OpenCV fails.
+pub fn wood_mask(
+    evidence: &Evidence,
+    region: &[u8],
+    foot_px: Point2<f64>,
+    cancel: &CancelToken,
+) -> opencv::Result<WoodMask> {
+    let size = evidence.rest.size;
+    let scale = if size.width < ENLARGED_BELOW { 2 } else { 1 };
+    let large = Size::new(scale * size.width, scale * size.height);
+    let mut out = WoodMask {
+        size: large,
+        scale,
+        mask: vec![0; large.area()],
+        moves: vec![false; large.area()],
+        in_leaf: false,
+    };
+    let Some(bounds) = bounds(region, size) else {
+        return Ok(out);
+    };
+    let rest = enlarged_picture(&evidence.rest, large)?;
+    let tree = enlarged_evidence(&evidence.tree, size, large)?;
+    let region = enlarged_region(region, size, scale);
+    for (i, moves) in out.moves.iter_mut().enumerate() {
+        *moves = region[i] != 0 && tree[i] > TREE;
+    }
+    let leaves = Leaves::of(&rest, &out.moves)?;
+    out.in_leaf = leaves.share >= IN_LEAF;
+    let is_behind = match out.in_leaf {
+        true => colours_behind(&rest, &out.moves, &region)?,
+        false => Vec::new(),
+    };
+    let ridge_px = RIDGE_PX * f64::from(large.width) / 640.0;
+    let ridges = match out.in_leaf {
+        true => None,
+        false => Some(ridges(&rest, &out.moves, ridge_px)?),
+    };
+    let mut seeds = vec![GC_BGD as u8; large.area()];
+    for (i, seed) in seeds.iter_mut().enumerate() {
+        if region[i] == 0 || tree[i] < STILL {
+            continue;
+        }
+        let is_ridge = ridges.as_ref().is_none_or(|ridges| ridges[i]);
+        *seed = if out.moves[i] && leaves.is_leaf[i] {
+            GC_BGD as u8
+        } else if out.moves[i] && is_ridge && !is_behind.get(i).is_some_and(|behind| *behind) {
+            GC_PR_FGD as u8
+        } else {
+            GC_PR_BGD as u8
+        };
+    }
+    let foot = Part::above_foot(foot_px, bounds, size);
+    for v in scale * foot.top..scale * foot.bottom {
+        for u in scale * foot.left..scale * foot.right {
+            seeds[(v * large.width + u) as usize] = GC_PR_FGD as u8;
+        }
+    }
+    let n_likely = seeds.iter().filter(|&&s| s == GC_PR_FGD as u8).count();
+    let n_other = seeds
+        .iter()
+        .filter(|&&s| s == GC_PR_BGD as u8 || s == GC_BGD as u8)
+        .count();
+    if n_likely < LEAST_SEEDS || n_other < LEAST_SEEDS {
+        return Ok(out);
+    }
+    cut(
+        &rest,
+        &mut seeds,
+        large,
+        bounds.scaled(scale, large),
+        cancel,
+    )?;
+    for (mask, seed) in out.mask.iter_mut().zip(&seeds) {
+        if *seed == GC_PR_FGD as u8 {
+            *mask = 255;
+        }
+    }
+    Ok(out)
+}
+
+/// Above the foot so great a share of the tree's height is taken to be trunk, to both sides by so
+/// great a share of the picture's width.
+const TRUNK_HEIGHT: f64 = 0.08;
+const TRUNK_WIDTH: f64 = 0.005;
+/// Fewer pixels than this make no colour mixture.
+const LEAST_SEEDS: usize = 64;
+/// Room about the region that is shown to the graph cut, px.
+const MARGIN_PX: u32 = 8;
+
+/// A part of a picture, the ends not included, px.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Part {
+    left: u32,
+    top: u32,
+    right: u32,
+    bottom: u32,
+}
+
+impl Part {
+    /// The lowest part of the trunk, whose foot is given: it hardly moves.
+    fn above_foot(foot_px: Point2<f64>, tree: Part, size: Size) -> Self {
+        let height = TRUNK_HEIGHT * f64::from(tree.bottom - tree.top);
+        let half_width = TRUNK_WIDTH * f64::from(size.width);
+        let within = |px: f64, most: u32| px.clamp(0.0, f64::from(most)) as u32;
+        Self {
+            left: within(foot_px.x - half_width, size.width),
+            top: within(foot_px.y - height, size.height),
+            right: within(foot_px.x + half_width, size.width),
+            bottom: within(foot_px.y, size.height),
+        }
+    }
+
+    /// The same in a picture `scale` times as large, with some room about it.
+    fn scaled(self, scale: u32, size: Size) -> Rect {
+        let left = (scale * self.left).saturating_sub(MARGIN_PX);
+        let top = (scale * self.top).saturating_sub(MARGIN_PX);
+        let right = (scale * self.right + MARGIN_PX).min(size.width);
+        let bottom = (scale * self.bottom + MARGIN_PX).min(size.height);
+        Rect::new(
+            left as i32,
+            top as i32,
+            (right - left) as i32,
+            (bottom - top) as i32,
+        )
+    }
+}
+
+/// The smallest part that holds all of the region; `None` where it is empty.
+fn bounds(region: &[u8], size: Size) -> Option<Part> {
+    let width = size.width as usize;
+    let mut part: Option<Part> = None;
+    for (i, _) in region
+        .iter()
+        .enumerate()
+        .filter(|(_, inside)| **inside != 0)
+    {
+        let (u, v) = ((i % width) as u32, (i / width) as u32);
+        let before = part.unwrap_or(Part {
+            left: u,
+            top: v,
+            right: u + 1,
+            bottom: v + 1,
+        });
+        part = Some(Part {
+            left: before.left.min(u),
+            top: before.top.min(v),
+            right: before.right.max(u + 1),
+            bottom: before.bottom.max(v + 1),
+        });
+    }
+    part
+}
+
+/// Mixtures and cut; `seeds` become the labels.
+fn cut(
+    rest: &Mat,
+    seeds: &mut [u8],
+    size: Size,
+    part: Rect,
+    cancel: &CancelToken,
+) -> opencv::Result<()> {
+    let (rows, cols) = (size.height as i32, size.width as i32);
+    let mut labels = Mat::new_rows_cols_with_data(rows, cols, &*seeds)?.clone_pointee();
+    // Only the part about the tree: the time grows with the number of pixels.
+    let picture = rest.roi(part)?.clone_pointee();
+    let mut inner = labels.roi(part)?.clone_pointee();
+    let (mut wood, mut other) = (Mat::default(), Mat::default());
+    opencv::core::set_rng_seed(0)?;
+    for round in 0..ROUNDS {
+        if cancel.is_cancelled() {
+            break;
+        }
+        let mode = if round == 0 {
+            GC_INIT_WITH_MASK
+        } else {
+            GC_EVAL
+        };
+        let whole = Rect::default();
+        grab_cut(&picture, &mut inner, whole, &mut other, &mut wood, 1, mode)?;
+    }
+    let mut target = labels.roi_mut(part)?;
+    inner.copy_to(&mut target)?;
+    drop(target);
+    seeds.copy_from_slice(labels.data_bytes()?);
+    Ok(())
+}
+
+/// The picture at the larger size, blue first, as OpenCV has it.
+fn enlarged_picture(picture: &Rgb, large: Size) -> opencv::Result<Mat> {
+    let (rows, cols) = (picture.size.height as i32, picture.size.width as i32);
+    let bytes = Mat::new_rows_cols_with_data(rows, 3 * cols, &picture.pixels)?;
+    let bytes = bytes.reshape(3, rows)?;
+    let mut bgr = Mat::default();
+    cvt_color_def(&bytes, &mut bgr, COLOR_RGB2BGR)?;
+    let mut out = Mat::default();
+    resize(&bgr, &mut out, cv_size(large), 0.0, 0.0, INTER_CUBIC)?;
+    Ok(out)
+}
+
+fn cv_size(size: Size) -> CvSize {
+    CvSize::new(size.width as i32, size.height as i32)
+}
+
+fn enlarged_evidence(tree: &[f32], size: Size, large: Size) -> opencv::Result<Vec<f32>> {
+    let mat = Mat::new_rows_cols_with_data(size.height as i32, size.width as i32, tree)?;
+    let mut evened = Mat::default();
+    gaussian_blur_def(&mat, &mut evened, CvSize::new(0, 0), EVENED_PX)?;
+    let mut out = Mat::default();
+    resize(&evened, &mut out, cv_size(large), 0.0, 0.0, INTER_LINEAR)?;
+    Ok(out.data_typed::<f32>()?.to_vec())
+}
+
+fn enlarged_region(region: &[u8], size: Size, scale: u32) -> Vec<u8> {
+    let (width, scale) = (size.width as usize, scale as usize);
+    let mut out = Vec::with_capacity(region.len() * scale * scale);
+    for row in region.chunks_exact(width) {
+        for _ in 0..scale {
+            for pixel in row {
+                out.extend(std::iter::repeat_n(*pixel, scale));
+            }
+        }
+    }
+    out
+}
+
+/// Which pixels are on a ridge that is narrower than `width_px`. Whether wood is darker or brighter
+/// than what stands behind it is told by what moves.
+fn ridges(rest: &Mat, moves: &[bool], width_px: f64) -> opencv::Result<Vec<bool>> {
+    let mut grey = Mat::default();
+    cvt_color_def(rest, &mut grey, opencv::imgproc::COLOR_BGR2GRAY)?;
+    let side = (width_px.round() as i32) | 1;
+    let middle = Point::new(-1, -1);
+    let disc = get_structuring_element(MORPH_ELLIPSE, CvSize::new(side, side), middle)?;
+    let dark = Ridges::of(&grey, MORPH_BLACKHAT, &disc, moves)?;
+    let bright = Ridges::of(&grey, MORPH_TOPHAT, &disc, moves)?;
+    let ridges = if bright.mean > BRIGHT * dark.mean {
+        bright
+    } else {
+        dark
+    };
+    Ok(ridges.high())
+}
+
+/// How high the ridges of a picture are.
+struct Ridges {
+    height: Vec<u8>,
+    /// Mean where the tree moves.
+    mean: f64,
+    threshold: f64,
+}
+
+impl Ridges {
+    fn of(grey: &Mat, operation: i32, disc: &Mat, moves: &[bool]) -> opencv::Result<Self> {
+        let mut height = Mat::default();
+        morphology_ex_def(grey, &mut height, operation, disc)?;
+        let height = height.data_bytes()?.to_vec();
+        let histogram = histogram(&height, moves);
+        Ok(Self {
+            height,
+            mean: mean(&histogram),
+            threshold: otsu(&histogram),
+        })
+    }
+
+    fn high(self) -> Vec<bool> {
+        let least = RIDGE * self.threshold;
+        let high = self.height.iter().map(|h| f64::from(*h) > least);
+        high.collect()
+    }
+}
+
+/// Mean of the values that a histogram counts.
+fn mean(histogram: &[u32; 256]) -> f64 {
+    let count: f64 = histogram.iter().map(|&n| f64::from(n)).sum();
+    let sum: f64 = (0..256).map(|v| v as f64 * f64::from(histogram[v])).sum();
+    sum / count.max(1.0)
+}
+
+/// The value that parts a histogram in two so that both parts vary least (Otsu 1979).
+fn otsu(histogram: &[u32; 256]) -> f64 {
+    let count: f64 = histogram.iter().map(|&n| f64::from(n)).sum();
+    let sum = mean(histogram) * count;
+    let (mut below, mut sum_below) = (0.0, 0.0);
+    let (mut best, mut threshold) = (0.0, 0.0);
+    for (value, &n) in histogram.iter().enumerate() {
+        below += f64::from(n);
+        sum_below += value as f64 * f64::from(n);
+        let above = count - below;
+        if below <= 0.0 || above <= 0.0 {
+            continue;
+        }
+        let apart = sum_below / below - (sum - sum_below) / above;
+        let between = below * above * apart * apart;
+        if between > best {
+            (best, threshold) = (between, value as f64);
+        }
+    }
+    threshold
+}
+
+/// Of each pixel, whether its colour is found more often outside of the region than in what moves:
+/// sky between leaves.
+fn colours_behind(rest: &Mat, moves: &[bool], region: &[u8]) -> opencv::Result<Vec<bool>> {
+    let pixels = rest.data_typed::<opencv::core::Vec3b>()?;
+    let mut behind = Colours::default();
+    let mut tree = Colours::default();
+    for ((pixel, moves), inside) in pixels.iter().zip(moves).zip(region) {
+        if *inside == 0 {
+            behind.add(pixel);
+        } else if *moves {
+            tree.add(pixel);
+        }
+    }
+    let is_behind = pixels.iter().map(|p| behind.share(p) > tree.share(p));
+    Ok(is_behind.collect())
+}
+
+/// How often colours occur, in 16 steps of each component.
+struct Colours {
+    counts: Vec<u32>,
+    all: u32,
+}
+
+impl Default for Colours {
+    fn default() -> Self {
+        Self {
+            counts: vec![0; 1 << 12],
+            all: 0,
+        }
+    }
+}
+
+impl Colours {
+    fn bin(pixel: &opencv::core::Vec3b) -> usize {
+        let [blue, green, red] = pixel.0.map(|c| usize::from(c >> 4));
+        (blue << 8) | (green << 4) | red
+    }
+
+    fn add(&mut self, pixel: &opencv::core::Vec3b) {
+        self.counts[Self::bin(pixel)] += 1;
+        self.all += 1;
+    }
+
+    fn share(&self, pixel: &opencv::core::Vec3b) -> f64 {
+        f64::from(self.counts[Self::bin(pixel)]) / f64::from(self.all.max(1))
+    }
+}
+
+/// How often each value occurs where something moves.
+fn histogram(values: &[u8], moves: &[bool]) -> [u32; 256] {
+    let mut histogram = [0; 256];
+    for (value, _) in values.iter().zip(moves).filter(|(_, moves)| **moves) {
+        histogram[usize::from(*value)] += 1;
+    }
+    histogram
+}
+
+/// Which pixels are leaves.
+struct Leaves {
+    is_leaf: Vec<bool>,
+    /// Their share of what moves with the tree.
+    share: f64,
+}
+
+impl Leaves {
+    /// The greener of two groups of pixels (Otsu), as far as it is green.
+    fn of(rest: &Mat, moves: &[bool]) -> opencv::Result<Self> {
+        let mut evened = Mat::default();
+        gaussian_blur_def(rest, &mut evened, CvSize::new(0, 0), 1.0)?;
+        let pixels = evened.data_typed::<opencv::core::Vec3b>()?;
+        let green: Vec<u8> = pixels.iter().map(greenness).collect();
+        let least = otsu(&histogram(&green, moves)).max(GREEN);
+        let is_leaf: Vec<bool> = green.iter().map(|g| f64::from(*g) > least).collect();
+        let n_moving = moves.iter().filter(|moves| **moves).count();
+        let n_leaf = is_leaf
+            .iter()
+            .zip(moves)
+            .filter(|(l, m)| **l && **m)
+            .count();
+        Ok(Self {
+            is_leaf,
+            share: n_leaf as f64 / n_moving.max(1) as f64,
+        })
+    }
+}
+
+/// How much green exceeds the mean of red and blue, 100 where it does not, 200 more for all of the
+/// light.
+fn greenness(pixel: &opencv::core::Vec3b) -> u8 {
+    let [blue, green, red] = pixel.0.map(f32::from);
+    let share = (2.0 * green - red - blue) / (red + green + blue + DARK);
+    (100.0 + 200.0 * share).clamp(0.0, 255.0) as u8
+}

@@ -1,0 +1,545 @@
+//! From a mask to centre lines: the farthest pixel that no branch explains yet is a tip, and its
+//! cheapest way to the foot through the middle of the wood is a branch (Sato et al. 2000,
+//! "TEASAR").
+
+use super::mask::WoodMask;
+use crate::model::{BranchGraph, WoodNode};
+use crate::signal::median;
+use nalgebra::Point2;
+use opencv::core::Mat;
+use opencv::imgproc::{
+    DIST_L2, DIST_MASK_5, MORPH_ELLIPSE, distance_transform_def, get_structuring_element,
+};
+use opencv::prelude::*;
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+/// How much dearer a step along the edge of a branch is than one along its middle.
+const OFF_MIDDLE: f32 = 6.0;
+/// A pixel is as far off the middle as it is nearer to the edge than the best within so many
+/// pixels.
+const MIDDLE_WITHIN_PX: i32 = 21;
+/// A step over a gap costs so much. No gap is wider than twice the reach unless what is in it moves
+/// with the tree.
+const GAP: f32 = 12.0;
+const REACH_PX: f32 = 6.0;
+/// A branch explains the wood within so many of its radii, and so many pixels.
+const EXPLAINED_RADII: f32 = 1.3;
+const EXPLAINED_PX: f32 = 2.0;
+/// A branch is longer than so many radii of what it leaves, and than so many pixels; what is
+/// shorter is the rough edge of a limb.
+const LEAST_RADII: f32 = 1.5;
+const LEAST_PX: f32 = 8.0;
+/// Least share of a branch that is on wood.
+const ON_WOOD: f32 = 0.6;
+/// Deviation of the evening out of centre lines, px.
+const EVENED_PX: f64 = 4.0;
+/// A centre line is drawn by pieces that leave it by no more than this, px.
+const STRAIGHT_PX: f64 = 1.2;
+/// The trunk's foot may lie in the shade or in grass: within this share of the picture's height the
+/// way to it leads over anything.
+const FOOT_SHARE: f64 = 0.3;
+
+/// The branches of the mask, rooted at the foot (px of the picture). Without nodes where no wood
+/// can be reached from there.
+///
+/// # Errors
+/// OpenCV fails.
+pub fn branches(wood: &WoodMask, foot_px: Point2<f64>) -> opencv::Result<BranchGraph> {
+    let grid = Grid::of(wood)?;
+    let scale = f64::from(wood.scale);
+    let foot = grid.nearest(to_mask(foot_px, scale));
+    let ways = Ways::from(&grid, foot);
+    let tracks = tips_first(&grid, &ways);
+    Ok(graph(&grid, &tracks, foot_px, scale))
+}
+
+fn to_mask(at_px: Point2<f64>, scale: f64) -> Point2<f64> {
+    Point2::new((at_px.x + 0.5) * scale - 0.5, (at_px.y + 0.5) * scale - 0.5)
+}
+
+fn to_picture(at: Point2<f64>, scale: f64) -> Point2<f64> {
+    Point2::new((at.x + 0.5) / scale - 0.5, (at.y + 0.5) / scale - 0.5)
+}
+
+/// The mask as a graph of pixels.
+struct Grid {
+    width: usize,
+    height: usize,
+    /// Distance from the edge of the wood, px; 0 outside.
+    inside: Vec<f32>,
+    /// Whether a way may lead there: wood, what is near to it, and what moves with the tree.
+    passable: Vec<bool>,
+    /// Of a step in the pixel.
+    cost: Vec<f32>,
+}
+
+impl Grid {
+    fn of(wood: &WoodMask) -> opencv::Result<Self> {
+        let (rows, cols) = (wood.size.height as i32, wood.size.width as i32);
+        let inside = distances(&wood.mask, rows, cols)?;
+        let inverse: Vec<u8> = wood.mask.iter().map(|m| 255 - m).collect();
+        let outside = distances(&inverse, rows, cols)?;
+        let near = outside.iter().map(|outside| *outside <= REACH_PX);
+        let passable = near.zip(&wood.moves).map(|(near, moves)| near || *moves);
+        let middle = dilated(&inside, rows, cols)?;
+        let mut cost = Vec::with_capacity(inside.len());
+        for (inside, middle) in inside.iter().zip(&middle) {
+            cost.push(if *inside > 0.0 {
+                1.0 + OFF_MIDDLE * (1.0 - inside / middle).powi(2)
+            } else {
+                GAP
+            });
+        }
+        Ok(Self {
+            width: cols as usize,
+            height: rows as usize,
+            inside,
+            passable: passable.collect(),
+            cost,
+        })
+    }
+
+    /// The pixel nearest to a place.
+    fn nearest(&self, at: Point2<f64>) -> usize {
+        let u = at.x.round().clamp(0.0, (self.width - 1) as f64) as usize;
+        let v = at.y.round().clamp(0.0, (self.height - 1) as f64) as usize;
+        v * self.width + u
+    }
+
+    fn place(&self, pixel: usize) -> Point2<f64> {
+        Point2::new((pixel % self.width) as f64, (pixel / self.width) as f64)
+    }
+
+    /// The pixels about `pixel`, and the length of the step to each.
+    fn neighbours(&self, pixel: usize) -> impl Iterator<Item = Neighbour> {
+        const AROUND: [(isize, isize); 8] = [
+            (-1, -1),
+            (0, -1),
+            (1, -1),
+            (-1, 0),
+            (1, 0),
+            (-1, 1),
+            (0, 1),
+            (1, 1),
+        ];
+        let (u, v) = ((pixel % self.width) as isize, (pixel / self.width) as isize);
+        let (width, height) = (self.width as isize, self.height as isize);
+        AROUND.into_iter().filter_map(move |(du, dv)| {
+            let (u, v) = (u + du, v + dv);
+            let is_in = (0..width).contains(&u) && (0..height).contains(&v);
+            is_in.then_some(Neighbour {
+                pixel: (v * width + u) as usize,
+                step: if du != 0 && dv != 0 {
+                    std::f32::consts::SQRT_2
+                } else {
+                    1.0
+                },
+            })
+        })
+    }
+}
+
+struct Neighbour {
+    pixel: usize,
+    step: f32,
+}
+
+/// Distance of every pixel of a mask from its edge, px.
+fn distances(mask: &[u8], rows: i32, cols: i32) -> opencv::Result<Vec<f32>> {
+    let mat = Mat::new_rows_cols_with_data(rows, cols, mask)?;
+    let mut out = Mat::default();
+    distance_transform_def(&mat, &mut out, DIST_L2, DIST_MASK_5)?;
+    Ok(out.data_typed::<f32>()?.to_vec())
+}
+
+/// The greatest value about every pixel.
+fn dilated(values: &[f32], rows: i32, cols: i32) -> opencv::Result<Vec<f32>> {
+    let mat = Mat::new_rows_cols_with_data(rows, cols, values)?;
+    let side = opencv::core::Size::new(MIDDLE_WITHIN_PX, MIDDLE_WITHIN_PX);
+    let middle = opencv::core::Point::new(-1, -1);
+    let disc = get_structuring_element(MORPH_ELLIPSE, side, middle)?;
+    let mut out = Mat::default();
+    opencv::imgproc::dilate_def(&mat, &mut out, &disc)?;
+    Ok(out.data_typed::<f32>()?.to_vec())
+}
+
+/// The cheapest ways from the foot.
+struct Ways {
+    cost: Vec<f32>,
+    from: Vec<usize>,
+}
+
+/// A pixel that has been reached; the cheapest comes first out of a heap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Reached {
+    cost: f32,
+    pixel: usize,
+}
+
+impl Eq for Reached {}
+
+impl Ord for Reached {
+    fn cmp(&self, other: &Self) -> Ordering {
+        let order = other.cost.total_cmp(&self.cost);
+        order.then_with(|| other.pixel.cmp(&self.pixel))
+    }
+}
+
+impl PartialOrd for Reached {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ways {
+    /// Dijkstra's algorithm.
+    fn from(grid: &Grid, foot: usize) -> Self {
+        let mut ways = Self {
+            cost: vec![f32::INFINITY; grid.cost.len()],
+            from: (0..grid.cost.len()).collect(),
+        };
+        let about_foot_px = FOOT_SHARE * grid.height as f64;
+        let foot_at = grid.place(foot);
+        let mut heap = BinaryHeap::from([Reached {
+            cost: 0.0,
+            pixel: foot,
+        }]);
+        ways.cost[foot] = 0.0;
+        while let Some(Reached { cost, pixel }) = heap.pop() {
+            if cost > ways.cost[pixel] {
+                continue;
+            }
+            for Neighbour { pixel: next, step } in grid.neighbours(pixel) {
+                if !grid.passable[next] && (grid.place(next) - foot_at).norm() > about_foot_px {
+                    continue;
+                }
+                let cost = cost + 0.5 * step * (grid.cost[pixel] + grid.cost[next]);
+                if cost < ways.cost[next] {
+                    (ways.cost[next], ways.from[next]) = (cost, pixel);
+                    heap.push(Reached { cost, pixel: next });
+                }
+            }
+        }
+        ways
+    }
+}
+
+/// A branch as pixels from where it leaves an earlier one to its tip; the first also belongs to
+/// that.
+struct Track {
+    pixels: Vec<usize>,
+}
+
+/// All branches, the farthest tips first.
+fn tips_first(grid: &Grid, ways: &Ways) -> Vec<Track> {
+    let is_tip = |pixel: &usize| grid.inside[*pixel] > 0.0 && ways.cost[*pixel].is_finite();
+    let mut tips: Vec<usize> = (0..grid.cost.len()).filter(is_tip).collect();
+    tips.sort_by(|a, b| ways.cost[*b].total_cmp(&ways.cost[*a]));
+    let mut explained = vec![false; grid.cost.len()];
+    let mut on_branch = vec![false; grid.cost.len()];
+    let mut tracks: Vec<Track> = Vec::new();
+    for tip in tips {
+        if explained[tip] {
+            continue;
+        }
+        let pixels = way_to(tip, ways, &on_branch);
+        explain(grid, &pixels, &mut explained);
+        if is_branch(grid, &pixels) {
+            pixels.iter().for_each(|&p| on_branch[p] = true);
+            tracks.push(Track { pixels });
+        }
+    }
+    tracks
+}
+
+/// The way to a tip, from the foot or from the branch that it leaves.
+fn way_to(tip: usize, ways: &Ways, on_branch: &[bool]) -> Vec<usize> {
+    let mut pixels = vec![tip];
+    let mut at = tip;
+    while !on_branch[at] && ways.from[at] != at {
+        at = ways.from[at];
+        pixels.push(at);
+    }
+    pixels.reverse();
+    pixels
+}
+
+/// Marks the wood about a way.
+fn explain(grid: &Grid, pixels: &[usize], explained: &mut [bool]) {
+    for &pixel in pixels {
+        let radius = EXPLAINED_RADII * grid.inside[pixel] + EXPLAINED_PX;
+        let (u, v) = (pixel % grid.width, pixel / grid.width);
+        let reach = radius as usize;
+        for v2 in v.saturating_sub(reach)..=(v + reach).min(grid.height - 1) {
+            for u2 in u.saturating_sub(reach)..=(u + reach).min(grid.width - 1) {
+                let (du, dv) = (u2 as f32 - u as f32, v2 as f32 - v as f32);
+                if du * du + dv * dv <= radius * radius {
+                    explained[v2 * grid.width + u2] = true;
+                }
+            }
+        }
+    }
+}
+
+/// Whether it is long enough, and mostly on wood. What lies before the first wood is the foot, or
+/// the edge of what it leaves.
+fn is_branch(grid: &Grid, pixels: &[usize]) -> bool {
+    let first = pixels.iter().position(|&p| grid.inside[p] > 0.0);
+    let pixels = &pixels[first.unwrap_or(0)..];
+    let leaves_px = pixels.first().map_or(0.0, |&p| grid.inside[p]);
+    let steps = pixels.windows(2);
+    let length: f64 = steps
+        .map(|s| (grid.place(s[1]) - grid.place(s[0])).norm())
+        .sum();
+    let on_wood = pixels.iter().filter(|&&p| grid.inside[p] > 0.0).count();
+    length as f32 >= LEAST_RADII * leaves_px + LEAST_PX
+        && on_wood as f32 >= ON_WOOD * pixels.len() as f32
+}
+
+/// A place of a centre line before it is drawn by few pieces, px of the picture.
+#[derive(Clone, Copy, Debug)]
+struct Sample {
+    at_px: Point2<f64>,
+    radius_px: f64,
+}
+
+/// Evens the tracks out, draws them by few pieces, and joins them.
+fn graph(grid: &Grid, tracks: &[Track], foot_px: Point2<f64>, scale: f64) -> BranchGraph {
+    let mut graph = BranchGraph::default();
+    // The branch of every pixel that is on one, and its place along it.
+    let mut lines: Vec<Vec<Sample>> = Vec::with_capacity(tracks.len());
+    let mut branch_at = std::collections::BTreeMap::new();
+    for (b, track) in tracks.iter().enumerate() {
+        let mut line = evened(grid, track, scale);
+        let leaves = track.pixels.first().and_then(|p| branch_at.get(p));
+        if let (Some(&Along { branch, index }), Some(first)) = (leaves, line.first_mut()) {
+            let on: &Vec<Sample> = &lines[branch];
+            first.at_px = on[index].at_px;
+        } else if let Some(first) = line.first_mut() {
+            first.at_px = foot_px;
+        }
+        for (index, &pixel) in track.pixels.iter().enumerate() {
+            branch_at.entry(pixel).or_insert(Along { branch: b, index });
+        }
+        lines.push(line);
+    }
+    // A branch has a node wherever another leaves it.
+    let mut forks: Vec<Vec<usize>> = vec![Vec::new(); tracks.len()];
+    let mut leaves: Vec<Option<Along>> = Vec::with_capacity(tracks.len());
+    for (b, track) in tracks.iter().enumerate() {
+        let first = track.pixels.first().and_then(|p| branch_at.get(p)).copied();
+        let from = first.filter(|along| along.branch != b);
+        if let Some(Along { branch, index }) = from {
+            forks[branch].push(index);
+        }
+        leaves.push(from);
+    }
+    let mut node_at = std::collections::BTreeMap::new();
+    for (b, line) in lines.iter().enumerate() {
+        let kept = kept_samples(line, &forks[b]);
+        let mut parent = leaves[b].and_then(|along| node_at.get(&along).copied());
+        for (n, &index) in kept.iter().enumerate() {
+            if n == 0 && parent.is_some() {
+                continue;
+            }
+            let from = if n == 0 { 0 } else { kept[n - 1] };
+            graph.nodes.push(WoodNode {
+                parent,
+                position_px: line[index].at_px,
+                radius_px: median_radius(&line[from..=index]),
+            });
+            parent = Some(graph.nodes.len() - 1);
+            node_at.insert(Along { branch: b, index }, graph.nodes.len() - 1);
+        }
+    }
+    graph
+}
+
+/// A place on a branch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Along {
+    branch: usize,
+    index: usize,
+}
+
+fn median_radius(samples: &[Sample]) -> f64 {
+    let radii = samples.iter().map(|s| s.radius_px).filter(|r| *r > 0.0);
+    median(radii.collect(), f64::total_cmp).unwrap_or(0.0)
+}
+
+/// The centre line of a track, evened out along it; its ends stay.
+fn evened(grid: &Grid, track: &Track, scale: f64) -> Vec<Sample> {
+    let n = track.pixels.len();
+    let reach = (3.0 * EVENED_PX) as usize;
+    let mut line = Vec::with_capacity(n);
+    for i in 0..n {
+        // As far to either side as to the nearer end, so that the ends stay.
+        let reach = reach.min(i).min(n - 1 - i);
+        let (mut sum, mut weights) = (nalgebra::Vector2::zeros(), 0.0);
+        for k in i - reach..=i + reach {
+            let apart = k.abs_diff(i) as f64 / EVENED_PX;
+            let weight = (-0.5 * apart * apart).exp();
+            sum += weight * grid.place(track.pixels[k]).coords;
+            weights += weight;
+        }
+        // The edge lies half a pixel beyond the last pixel of the wood.
+        let inside = (grid.inside[track.pixels[i]] - 0.5).max(0.0);
+        line.push(Sample {
+            at_px: to_picture(Point2::from(sum / weights), scale),
+            radius_px: f64::from(inside) / scale,
+        });
+    }
+    line
+}
+
+/// Which samples of a line are drawn: its ends, its `forks`, and as many others as it takes to
+/// follow it (Douglas and Peucker 1973).
+fn kept_samples(line: &[Sample], forks: &[usize]) -> Vec<usize> {
+    let last = line.len().saturating_sub(1);
+    let mut fixed: Vec<usize> = forks.iter().copied().chain([0, last]).collect();
+    fixed.sort_unstable();
+    fixed.dedup();
+    let mut kept = vec![0];
+    for pair in fixed.windows(2) {
+        keep_between(line, pair[0], pair[1], &mut kept);
+        kept.push(pair[1]);
+    }
+    kept
+}
+
+fn keep_between(line: &[Sample], from: usize, to: usize, kept: &mut Vec<usize>) {
+    let mut farthest: Option<usize> = None;
+    let mut most_px = STRAIGHT_PX;
+    for k in from + 1..to {
+        let off_px = off_line(line[k].at_px, line[from].at_px, line[to].at_px);
+        if off_px > most_px {
+            (farthest, most_px) = (Some(k), off_px);
+        }
+    }
+    if let Some(k) = farthest {
+        keep_between(line, from, k, kept);
+        kept.push(k);
+        keep_between(line, k, to, kept);
+    }
+}
+
+/// Distance of a place from the piece of a line between two others.
+fn off_line(at: Point2<f64>, from: Point2<f64>, to: Point2<f64>) -> f64 {
+    let along = to - from;
+    let share = (at - from).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE);
+    (at - (from + share.clamp(0.0, 1.0) * along)).norm()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Size;
+    use nalgebra::distance;
+
+    const SIZE: Size = Size {
+        width: 200,
+        height: 240,
+    };
+    const FOOT: Point2<f64> = Point2::new(100.0, 230.0);
+
+    /// Wood within `radius` of the lines from each place to the next.
+    fn mask(lines: &[[Point2<f64>; 2]], radius: f64) -> WoodMask {
+        let mut mask = vec![0; SIZE.area()];
+        for (i, pixel) in mask.iter_mut().enumerate() {
+            let at = Point2::new((i % 200) as f64, (i / 200) as f64);
+            if lines.iter().any(|[a, b]| off_line(at, *a, *b) <= radius) {
+                *pixel = 255;
+            }
+        }
+        WoodMask {
+            size: SIZE,
+            scale: 1,
+            moves: vec![false; mask.len()],
+            mask,
+            in_leaf: false,
+        }
+    }
+
+    /// A trunk that forks into two limbs.
+    fn fork() -> [[Point2<f64>; 2]; 3] {
+        let (top, left, right) = (
+            Point2::new(100.0, 130.0),
+            Point2::new(40.0, 40.0),
+            Point2::new(170.0, 60.0),
+        );
+        [[FOOT, top], [top, left], [top, right]]
+    }
+
+    #[test]
+    fn a_fork_is_drawn_as_two_branches_that_part_there() {
+        let graph = branches(&mask(&fork(), 4.0), FOOT).expect("opencv");
+        let children = graph.children();
+        let forks: Vec<usize> = (0..children.len())
+            .filter(|&n| children[n].len() > 1)
+            .collect();
+        let tips: Vec<usize> = (0..children.len())
+            .filter(|&n| children[n].is_empty())
+            .collect();
+        assert_eq!((forks.len(), tips.len()), (1, 2), "{graph:?}");
+        let at = |node: usize| graph.nodes[node].position_px;
+        assert!(distance(&at(forks[0]), &Point2::new(100.0, 130.0)) < 9.0);
+        let ends = [Point2::new(40.0, 40.0), Point2::new(170.0, 60.0)];
+        for end in ends {
+            assert!(
+                tips.iter().any(|tip| distance(&at(*tip), &end) < 6.0),
+                "{end}"
+            );
+        }
+        for (i, node) in graph.nodes.iter().enumerate() {
+            assert!(node.parent.is_none_or(|p| p < i));
+            let lines = fork();
+            let off = lines
+                .iter()
+                .map(|[a, b]| off_line(node.position_px, *a, *b));
+            // A tip reaches to the round end of its limb.
+            let most = if tips.contains(&i) { 5.0 } else { 2.0 };
+            assert!(off.fold(f64::INFINITY, f64::min) < most, "{node:?}");
+            let is_between = i > 0 && !tips.contains(&i);
+            assert!(
+                !is_between || (node.radius_px - 4.0).abs() < 1.5,
+                "{node:?}"
+            );
+        }
+    }
+
+    /// The rough edge of a thick limb is none, and what no way leads to is of another tree.
+    #[test]
+    fn knobs_and_far_pieces_are_no_branches() {
+        let mut lines = vec![[FOOT, Point2::new(100.0, 30.0)]];
+        lines.push([Point2::new(100.0, 120.0), Point2::new(112.0, 118.0)]);
+        lines.push([Point2::new(180.0, 20.0), Point2::new(180.0, 120.0)]);
+        let graph = branches(&mask(&lines, 8.0), FOOT).expect("opencv");
+        let tips = graph.children().iter().filter(|c| c.is_empty()).count();
+        assert_eq!(tips, 1, "{graph:?}");
+    }
+
+    #[test]
+    fn a_wide_gap_is_bridged_only_where_what_is_in_it_moves_with_the_tree() {
+        let top = Point2::new(100.0, 20.0);
+        let lines = [
+            [FOOT, Point2::new(100.0, 120.0)],
+            [Point2::new(100.0, 80.0), top],
+        ];
+        let still = mask(&lines, 4.0);
+        let mut moving = mask(&lines, 4.0);
+        moving.moves.fill(true);
+        let highest = |graph: BranchGraph| {
+            let heights = graph.nodes.iter().map(|n| n.position_px.y);
+            heights.fold(f64::INFINITY, f64::min)
+        };
+        assert!(highest(branches(&still, FOOT).expect("opencv")) > 100.0);
+        assert!(highest(branches(&moving, FOOT).expect("opencv")) < 30.0);
+    }
+
+    #[test]
+    fn without_wood_there_is_no_graph() {
+        let graph = branches(&mask(&[], 4.0), FOOT).expect("opencv");
+        assert_eq!(graph.nodes, []);
+    }
+}
