@@ -22,14 +22,15 @@ const FORK_SHARE: f64 = 0.25;
 impl Skeleton {
     /// Number of the main branch that each node belongs to, by node index; `None` for the trunk.
     ///
-    /// The trunk runs from the foot to the first real fork, past small branches on its side.
-    /// Every branch that leaves the trunk there or below is a main branch, with all that it
-    /// carries. A copy belongs to the main branch of its original, and what moves with
-    /// another node to that one's. Sizes are counted in measured nodes that move on their own, so that a tree has the same main branches with copies as without.
+    /// The trunk runs from the foot to the first real fork, past small branches on its side. Every
+    /// branch that leaves the trunk there or below is a main branch, with all that it carries. A
+    /// copy belongs to the main branch of its original, and what moves with another node to that
+    /// one's. Sizes are counted in measured nodes that move on their own, so that a tree has the
+    /// same main branches with copies as without.
     ///
     /// Main branches are numbered in the order of the names of their first nodes. Names survive a
-    /// refinement and new ones are larger, so a refined tree keeps the numbers of the main
-    /// branches that it keeps, unless an older one has gone. Numbers begin anew after 255.
+    /// refinement and new ones are larger, so a refined tree keeps the numbers of the main branches
+    /// that it keeps, unless an older one has gone. Numbers begin anew after 255.
     pub fn main_branches(&self) -> Vec<Option<u8>> {
         let branches = self.moving_branches();
         let trunk = self.trunk(&branches);

@@ -34,10 +34,10 @@ pub struct Binding {
 }
 
 impl Binding {
-    /// Binds the members of `hierarchy` to the nodes of `skeleton`; of those that move
-    /// on their own, node k + 1 belongs to cluster k. `rest_px` holds the rest positions of all tracks that were there when the tree was built;
-    /// those that are in no cluster did not move or contradicted their neighbours, and stay
-    /// unbound.
+    /// Binds the members of `hierarchy` to the nodes of `skeleton`; of those that move on their
+    /// own, node k + 1 belongs to cluster k. `rest_px` holds the rest positions of all tracks that
+    /// were there when the tree was built; those that are in no cluster did not move or
+    /// contradicted their neighbours, and stay unbound.
     pub fn new(
         hierarchy: &MotionHierarchy,
         rest_px: &BTreeMap<TrackId, Point2<f64>>,

@@ -106,7 +106,8 @@ pub struct PoseEstimator {
     /// Each after the one that carries it, and after its original.
     branches: Vec<Branch>,
     /// Direction of each measured branch in the frame before, by node, in the axes of its parent
-    /// branch at rest; `None` before the first frame, which may lie anywhere within the accumulated bound.
+    /// branch at rest; `None` before the first frame, which may lie anywhere within the accumulated
+    /// bound.
     previous: Option<Vec<UnitVector3<f64>>>,
     previous_s: f64,
 }
