@@ -23,9 +23,10 @@
 //! # The modules in reading order
 //!
 //! [`model`] shared data types · `source` where frames come from · `outline` which pixels are tree
-//! · `track` points followed · [`hierarchy`] which points move together · [`skeleton`] in the
-//! picture · [`shape`] in space · [`geometry`] its wood and leaves as meshes · [`motion`] the pose
-//! in every frame · [`dynamics`] frequency and damping · [`animate`] motion that was not filmed ·
+//! · `track` points followed · [`hierarchy`] which points move together · `wood` which pixels are
+//! wood · [`skeleton`] in the picture · [`shape`] in space · [`geometry`] its wood and leaves as
+//! meshes · [`motion`] the pose in every frame · [`dynamics`] frequency and damping · [`animate`]
+//! motion that was not filmed ·
 //! [`signal`] common mathematics · [`random`] seeded random numbers · [`caught`] panics of other
 //! crates · [`draw`] pictures of the model · [`pipeline`] all of it, step by step · `runtime` on
 //! threads · `recording` frames and tracks on disk · [`document`] a tree as a folder, written and
@@ -41,7 +42,7 @@
 //!
 //! | feature | adds | modules |
 //! |---|---|---|
-//! | `opencv` | pictures to tracks | `outline`, `track`, front end of [`pipeline`] |
+//! | `opencv` | pictures to tracks | `outline`, `track`, `wood`, front end of [`pipeline`] |
 //! | `camera` | cameras, recordings, videos | `source`, `recording`, decoding in [`pipeline`] |
 //! | `nokhwa` | a second way to read cameras | inside of `source` |
 //! | `terminal` | the program; needs `opencv` and `camera` | `runtime`, `tui`, `doctor`, `cli` |
@@ -85,3 +86,5 @@ pub mod track;
 #[cfg(feature = "terminal")]
 pub mod tui;
 pub mod views;
+#[cfg(feature = "opencv")]
+pub mod wood;

@@ -13,6 +13,7 @@ mod bark;
 #[cfg(feature = "camera")]
 mod decode;
 mod dress;
+mod film_log;
 #[cfg(feature = "opencv")]
 mod front;
 mod leaves;
@@ -23,11 +24,14 @@ mod reshape;
 mod seeds;
 mod seen;
 mod sway;
+#[cfg(all(feature = "camera", feature = "opencv"))]
+mod wood;
 
 pub use back::{BackEnd, Followed, Moved};
 #[cfg(feature = "camera")]
 pub use decode::{DecodeStage, Undecoded};
 pub use dress::{dress, flutter};
+pub use film_log::{FilmLog, KeptFrame};
 #[cfg(feature = "opencv")]
 pub use front::FrontEnd;
 pub use pose_tracker::{PoseReplay, PoseTracker, Targets};
@@ -37,6 +41,8 @@ pub use reshape::{MOST_RESHAPED, cut_to, reshape};
 pub use seeds::seeds as leaf_seeds;
 pub use seen::Seen;
 pub use sway::{SwayJob, SwayStage};
+#[cfg(all(feature = "camera", feature = "opencv"))]
+pub use wood::find_wood;
 
 #[cfg(all(feature = "camera", feature = "opencv"))]
 use crate::{

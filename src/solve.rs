@@ -4,6 +4,8 @@
 //! a film, a log that is finished after a crash, and programs with tracks of their own. It does no
 //! I/O, starts no threads and reads no clock.
 
+mod along_wood;
+mod labels;
 mod lift;
 mod model;
 mod refine;
@@ -17,7 +19,7 @@ use crate::cancel::CancelToken;
 use crate::config::Config;
 use crate::dynamics::{Depth, Film, analyse};
 use crate::hierarchy::{self, Evidence};
-use crate::model::{Outline, TrackLog, TrackTable};
+use crate::model::{BranchGraph, Outline, TrackLog, TrackTable};
 use crate::skeleton;
 use refine::Refinement;
 use std::collections::BTreeMap;
@@ -76,6 +78,23 @@ pub fn with_modes(
         modes: analysis.sway,
         ..model.clone()
     }
+}
+
+/// The model along the wood that pictures show: where wood is seen, the skeleton runs on it. With a
+/// `prior` model of the same tree, bends that are in the same places keep its names.
+pub fn with_wood(
+    model: &Model,
+    wood: Option<Arc<BranchGraph>>,
+    prior: Option<&Model>,
+    config: &Config,
+) -> Model {
+    let mut model = model.clone();
+    if wood.is_none() && model.wood.is_none() {
+        return model;
+    }
+    let before = prior.map_or_else(|| model.skeleton.clone(), |prior| prior.skeleton.clone());
+    model.set_wood(wood, &before, config);
+    model
 }
 
 /// The prior model with the sub-branches that its frequencies identify by now; `None` where they
@@ -141,6 +160,7 @@ fn build(
         plain: skeleton.clone(),
         skeleton,
         sub_branches: Vec::new(),
+        wood: None,
         modes: Vec::new(),
         outline: outline.clone(),
         followed_from: moment.followed_from,

@@ -303,6 +303,7 @@ fn a_film_that_ends_before_a_refinement_gets_its_shoots_at_the_end() {
                 tracks,
                 outline: outline.clone(),
                 preview: None,
+                raw: None,
                 received: Instant::now(),
             });
         }
@@ -352,6 +353,7 @@ fn a_tree_that_is_built_at_the_end_is_the_first_one_with_its_shoots() {
             tracks,
             outline,
             preview: None,
+            raw: None,
             received: Instant::now(),
         });
     }
@@ -384,6 +386,7 @@ fn a_tree_that_cannot_be_followed_to_the_present_is_not_taken() {
             tracks,
             outline,
             preview: None,
+            raw: None,
             received: Instant::now(),
         });
         if let Some(standing) = &standing {
@@ -425,6 +428,7 @@ fn a_refinement_that_is_late_is_taken_when_it_is_there() {
             tracks: set.clone(),
             outline,
             preview: None,
+            raw: None,
             received: Instant::now(),
         });
         if back.model().is_some_and(|tree| tree.refinements > 0) {

@@ -1,11 +1,12 @@
 //! The back end: tracks to tree and poses.
 
+use super::film_log::FilmLog;
 use super::pose_tracker::{PoseTracker, Targets};
 use super::refiner::{Refiner, SolveJob, Taken};
 use crate::cancel::CancelToken;
 use crate::config::Config;
 use crate::hierarchy::{self, Evidence};
-use crate::model::{Outline, Phase, Pose, Rgb, TrackLog, TrackSet};
+use crate::model::{Outline, Phase, Pose, RawFrame, Rgb, TrackLog, TrackSet};
 use crate::motion::Binding;
 use crate::solve::{Model, identify_sub_branches, solve};
 use std::sync::Arc;
@@ -22,6 +23,8 @@ pub struct Followed {
     pub tracks: TrackSet,
     pub outline: Arc<Outline>,
     pub preview: Option<Arc<Rgb>>,
+    /// The frame as it came, where it is known.
+    pub raw: Option<Arc<RawFrame>>,
     pub received: Instant,
 }
 
@@ -46,6 +49,7 @@ pub struct Moved {
 pub struct BackEnd {
     config: Config,
     log: TrackLog,
+    film: FilmLog,
     evidence: Evidence,
     judged_s: Option<f64>,
     outline: Option<Arc<Outline>>,
@@ -72,6 +76,7 @@ impl BackEnd {
         Self {
             config: config.clone(),
             log: TrackLog::new(remembered_s(config)),
+            film: FilmLog::new(config.accumulate.window_s),
             evidence: Evidence::default(),
             judged_s: None,
             outline: None,
@@ -89,9 +94,13 @@ impl BackEnd {
             tracks,
             outline,
             preview,
+            raw,
             received,
         } = followed;
         self.outline = Some(outline.clone());
+        if let Some(raw) = raw.filter(|_| self.config.skeleton.along_wood) {
+            self.film.push(raw, &tracks);
+        }
         self.log.push(tracks.clone());
         let before = match self.tracker {
             Some(_) => self.refine(),
@@ -185,7 +194,7 @@ impl BackEnd {
         let (Some(mut refiner), Some(standing)) = (self.refiner.take(), &self.tracker) else {
             return Vec::new();
         };
-        let taken = refiner.step(&self.log, standing, &self.config);
+        let taken = refiner.step(&self.log, &self.film, standing, &self.config);
         self.refiner = Some(refiner).filter(|r| !r.is_over());
         let Some(Taken { tracker, before }) = taken else {
             return Vec::new();
@@ -195,9 +204,9 @@ impl BackEnd {
         before
     }
 
-    /// A job that has to be worked out by the time that [`needs_model`](Self::needs_model) says. Who
-    /// can do so meanwhile hands the result in with [`put_model`](Self::put_model); else it is done
-    /// in that frame. The result is the same.
+    /// A job that has to be worked out by the time that [`needs_model`](Self::needs_model) says.
+    /// Who can do so meanwhile hands the result in with [`put_model`](Self::put_model); else it is
+    /// done in that frame. The result is the same.
     pub fn job(&self) -> Option<&Arc<SolveJob>> {
         self.refiner.as_ref()?.job()
     }
@@ -245,6 +254,23 @@ impl BackEnd {
             }
         }
         self.identify_sub_branches(cancel);
+        if !cancel.is_cancelled() {
+            self.look_for_wood(cancel);
+        }
+    }
+
+    /// A tree that was never refined gets the wood that a refinement would give it.
+    fn look_for_wood(&mut self, cancel: &CancelToken) {
+        let Some(tracker) = self.tracker.as_ref() else {
+            return;
+        };
+        if tracker.model().wood.is_some() || self.film.frames().is_empty() {
+            return;
+        }
+        let job = SolveJob::new(&self.log, &self.film, tracker, &self.config);
+        if let Some(model) = job.prior_along_wood(cancel) {
+            self.tracker = Some(PoseTracker::new(Arc::new(model), &self.config));
+        }
     }
 
     fn identify_sub_branches(&mut self, cancel: &CancelToken) {

@@ -72,6 +72,7 @@ impl DecodeStage {
             received: timed.received,
             luma,
             preview: self.preview(timed),
+            raw: Some(timed.raw.clone()),
         })
     }
 

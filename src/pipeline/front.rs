@@ -64,9 +64,7 @@ impl FrontEnd {
         }
         self.held.push_back(frame);
         if self.found.is_none() {
-            let bytes =
-                |f: &Frame| f.luma.pixels.len() + f.preview.as_ref().map_or(0, |p| p.pixels.len());
-            while self.held.iter().map(bytes).sum::<usize>() > HELD_BYTES {
+            while self.held.iter().map(bytes_of).sum::<usize>() > HELD_BYTES {
                 self.held.pop_front();
                 self.let_go += 1;
             }
@@ -139,7 +137,15 @@ impl FrontEnd {
             tracks,
             outline: outline.clone(),
             preview: frame.preview,
+            raw: frame.raw,
             received: frame.received,
         })
     }
+}
+
+/// Memory that a frame takes, bytes.
+fn bytes_of(frame: &Frame) -> usize {
+    let preview = frame.preview.as_ref().map_or(0, |p| p.pixels.len());
+    let raw = frame.raw.as_ref().map_or(0, |raw| raw.bytes.len());
+    frame.luma.pixels.len() + preview + raw
 }

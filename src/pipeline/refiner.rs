@@ -1,11 +1,14 @@
 //! When the model is solved anew, and how the new one takes the old one's place without a pause or
 //! a jump.
 
+use super::film_log::FilmLog;
 use super::pose_tracker::{PoseTracker, Targets};
+#[cfg(all(feature = "camera", feature = "opencv"))]
+use super::wood::find_wood;
 use crate::cancel::CancelToken;
 use crate::config::Config;
-use crate::model::{Outline, Pose, TrackLog};
-use crate::solve::{Model, solve};
+use crate::model::{BranchGraph, LogWindow, Outline, Pose, Skeleton, TrackLog};
+use crate::solve::{Model, solve, with_wood};
 use std::sync::Arc;
 
 /// The tree is built anew each time that film has grown by this factor: the error of a correlation
@@ -25,15 +28,22 @@ const FRAMES_PER_STEP: usize = 30;
 /// thread.
 pub struct SolveJob {
     log: TrackLog,
+    film: FilmLog,
     outline: Arc<Outline>,
     prior: Model,
     config: Config,
 }
 
 impl SolveJob {
-    fn new(log: &TrackLog, standing: &PoseTracker, config: &Config) -> Self {
+    pub(super) fn new(
+        log: &TrackLog,
+        film: &FilmLog,
+        standing: &PoseTracker,
+        config: &Config,
+    ) -> Self {
         Self {
             log: log.clone(),
+            film: film.clone(),
             outline: standing.model().outline.clone(),
             prior: standing.model().joined_by(standing.binding()),
             config: config.clone(),
@@ -47,16 +57,79 @@ impl SolveJob {
         READY_S * (n_points as f64 / POINTS).powi(2).max(1.0)
     }
 
-    /// The better model, if there is one; `None`, too, where `cancel` ends the work before.
+    /// The better model, if there is one; `None`, too, where `cancel` ends the work before. It runs
+    /// along the wood that the kept frames show; where none was found yet and some is now, the
+    /// prior model along that is the better one.
     pub fn run(&self, cancel: &CancelToken) -> Option<Model> {
-        solve(
+        let solved = solve(
             &self.log,
             &self.outline,
             Some(&self.prior),
             &self.config,
             cancel,
-        )
+        );
+        if cancel.is_cancelled() {
+            return None;
+        }
+        let wood = self.wood(cancel);
+        let model = match solved {
+            Some(model) => model,
+            None if self.prior.wood.is_none() && wood.is_some() => self.followed_anew()?,
+            None => return None,
+        };
+        let wood = wood.or_else(|| self.prior.wood.clone());
+        Some(with_wood(&model, wood, Some(&self.prior), &self.config))
     }
+
+    /// The prior model as one that was built just now.
+    fn followed_anew(&self) -> Option<Model> {
+        let window = self.log.last(self.config.accumulate.window_s);
+        let (first, newest) = (window.first()?, window.newest()?);
+        Some(Model {
+            followed_from: first.frame,
+            frame: newest.frame,
+            time_s: newest.time_s,
+            refinements: self.prior.refinements + 1,
+            kept: self.prior.plain.measured(),
+            ..self.prior.clone()
+        })
+    }
+
+    /// The prior model along the wood that the kept frames show; `None` where they show none.
+    pub(super) fn prior_along_wood(&self, cancel: &CancelToken) -> Option<Model> {
+        let wood = self.wood(cancel)?;
+        Some(with_wood(&self.prior, Some(wood), None, &self.config))
+    }
+
+    /// The wood that the kept frames show.
+    fn wood(&self, cancel: &CancelToken) -> Option<Arc<BranchGraph>> {
+        let window = self.log.last(self.config.accumulate.window_s);
+        let prior = &self.prior.plain;
+        branches_in(&self.film, window, &self.outline, prior, cancel).map(Arc::new)
+    }
+}
+
+#[cfg(all(feature = "camera", feature = "opencv"))]
+fn branches_in(
+    film: &FilmLog,
+    window: LogWindow,
+    outline: &Outline,
+    prior: &Skeleton,
+    cancel: &CancelToken,
+) -> Option<BranchGraph> {
+    Some(find_wood(film, window, outline, prior, cancel)?.branches)
+}
+
+/// Frames are decoded by the camera's crates and looked at by OpenCV. Without them no wood is seen.
+#[cfg(not(all(feature = "camera", feature = "opencv")))]
+fn branches_in(
+    _film: &FilmLog,
+    _window: LogWindow,
+    _outline: &Outline,
+    _prior: &Skeleton,
+    _cancel: &CancelToken,
+) -> Option<BranchGraph> {
+    None
 }
 
 /// Looks after the standing model.
@@ -137,13 +210,14 @@ impl Refiner {
     pub fn step(
         &mut self,
         log: &TrackLog,
+        film: &FilmLog,
         standing: &PoseTracker,
         config: &Config,
     ) -> Option<Taken> {
         let now_s = log.all().newest()?.time_s;
         match std::mem::replace(&mut self.stage, Stage::Over) {
             Stage::Waiting(due_s) if now_s >= due_s => {
-                let job = SolveJob::new(log, standing, config);
+                let job = SolveJob::new(log, film, standing, config);
                 self.stage = Stage::Solving(Solving {
                     due_s: now_s + job.ready_s(),
                     job: Arc::new(job),

@@ -51,8 +51,8 @@ impl SwayStage {
         }
     }
 
-    /// All that an analysis needs, up to the frame of `moved`, the last that was taken. `None` while
-    /// there is no tree, and where `back` has another one since.
+    /// All that an analysis needs, up to the frame of `moved`, the last that was taken. `None`
+    /// while there is no tree, and where `back` has another one since.
     pub fn job(&self, moved: &Moved, back: &BackEnd) -> Option<SwayJob> {
         let model = back.model().filter(|model| self.follows(model))?;
         let nodes = match back.binding() {

@@ -176,6 +176,7 @@ pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Fa
             tracks,
             outline: outline.clone(),
             preview: None,
+            raw: None,
             received: Instant::now(),
         });
     }

@@ -3,12 +3,14 @@
 use super::curl::Curve;
 use super::limb::{CenterlineSample, Grown, Limb};
 use super::skin::SkinWeights;
-use crate::model::{FARTHEST_PX, NodeId, Skeleton};
+use crate::model::{FARTHEST_PX, NodeId, NodeKind, Skeleton};
 use crate::random::generator;
 use nalgebra::Vector3;
 
 /// Straight pieces of the middle line of a branch.
 const PIECES: u32 = 12;
+/// The same between two bends that were traced in a picture: they are near each other.
+const TRACED_PIECES: u32 = 3;
 /// Share of its excursions that a trunk keeps: it was filmed all along, and is as straight as it
 /// looks.
 const TRUNK_EXCURSIONS: f64 = 0.3;
@@ -84,21 +86,35 @@ pub(super) fn branches(skeleton: &Skeleton, curl: f64, seed: u64) -> Vec<Grown> 
         let ends = [nodes[parent.index()].position, node.position];
         let mut random = generator(seed, node.name.0.into());
         let mut curve = Curve::new(ends, leaves, arrives[i], curl, &mut random);
-        if grows_from.is_none() {
+        let is_traced = is_along_wood(skeleton, own);
+        if is_traced {
+            curve = curve.calmer(0.0);
+        } else if grows_from.is_none() {
             curve = curve.calmer(TRUNK_EXCURSIONS);
         }
+        let pieces = if is_traced { TRACED_PIECES } else { PIECES };
         limb_of[i] = Some(out.len());
         out.push(Grown {
             limb: Limb {
                 node: own,
                 parent: grows_from,
                 twig: false,
-                samples: centerline(&curve, parent, own),
+                samples: centerline(&curve, parent, own, pieces),
             },
             at: 1.0,
         });
     }
     out
+}
+
+/// Whether the piece of wood that ends in `node` was seen: it ends at a traced node, or begins at
+/// one of the same branch.
+fn is_along_wood(skeleton: &Skeleton, node: NodeId) -> bool {
+    let own = &skeleton.nodes[node.index()];
+    let begins_at_bend = own
+        .parent
+        .is_some_and(|p| skeleton.nodes[p.index()].moves_with == Some(node));
+    own.kind == NodeKind::Traced || begins_at_bend
 }
 
 /// The direction in which a branch ends: halfway between its own and that of the branch that it
@@ -118,10 +134,10 @@ pub(super) fn side_departure(along: Vector3<f64>, before: Vector3<f64>) -> Vecto
 }
 
 /// The middle line of the branch from `parent` to `own`; how thick it is is not known yet.
-fn centerline(curve: &Curve, parent: NodeId, own: NodeId) -> Vec<CenterlineSample> {
-    let mut samples = Vec::with_capacity(PIECES as usize + 1);
-    for k in 0..=PIECES {
-        let t = f64::from(k) / f64::from(PIECES);
+fn centerline(curve: &Curve, parent: NodeId, own: NodeId, pieces: u32) -> Vec<CenterlineSample> {
+    let mut samples = Vec::with_capacity(pieces as usize + 1);
+    for k in 0..=pieces {
+        let t = f64::from(k) / f64::from(pieces);
         samples.push(CenterlineSample {
             at: curve.at(t),
             radius: 0.0,

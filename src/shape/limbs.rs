@@ -24,6 +24,7 @@ pub fn limbs(
     twigs::add(&mut grown, skeleton, room, wood, seed);
     let trunk_px = skeleton.nodes.get(1).map_or(0.0, |top| top.radius);
     radius::by_pipes(&mut grown, skeleton, trunk_px);
+    radius::as_seen(&mut grown, skeleton);
     grown.into_iter().map(|g| g.limb).collect()
 }
 

@@ -2,7 +2,7 @@
 
 use super::limb::{Grown, Limb};
 use crate::bounds::Bounds;
-use crate::model::Skeleton;
+use crate::model::{NodeKind, Skeleton};
 
 /// Exponent e of `r_parent^e = sum r_child^e`, from and to. Shinozaki's pipes and Leonardo's rule
 /// give 2, measured trees 2 to 3.
@@ -63,6 +63,50 @@ pub(super) fn by_pipes(grown: &mut [Grown], skeleton: &Skeleton, trunk_radius_px
         let parent = limb.parent.and_then(|p| earlier.get(p));
         let most = parent.map(|p| p.limb.radius_at(*at));
         model.assign_radii(limb, bearing, most, goes_on_from[i]);
+    }
+}
+
+/// Thickness of the branches whose wood the picture shows: from node to node as the skeleton says.
+/// Twigs are no thicker than what they grow from.
+pub(super) fn as_seen(grown: &mut [Grown], skeleton: &Skeleton) {
+    if skeleton.nodes.iter().all(|n| n.kind != NodeKind::Traced) {
+        return;
+    }
+    let mut is_seen = vec![false; skeleton.nodes.len()];
+    for node in skeleton.nodes.iter().filter(|n| n.kind == NodeKind::Traced) {
+        is_seen[node.parent.map_or(0, |p| p.index())] = true;
+    }
+    for (seen, node) in is_seen.iter_mut().zip(&skeleton.nodes) {
+        *seen |= node.kind == NodeKind::Traced;
+    }
+    for i in 0..grown.len() {
+        let (earlier, rest) = grown.split_at_mut(i);
+        let Some(Grown { limb, at }) = rest.first_mut() else {
+            continue;
+        };
+        let own = skeleton.nodes.get(limb.node.index());
+        match own.filter(|_| !limb.twig && is_seen[limb.node.index()]) {
+            Some(node) => {
+                let parent = node.parent.map(|p| &skeleton.nodes[p.index()]);
+                let from = parent.filter(|p| p.parent.is_some()).unwrap_or(node).radius;
+                taper(limb, from, node.radius);
+            }
+            None => {
+                let parent = limb.parent.and_then(|p| earlier.get(p));
+                let most = parent.map_or(f64::INFINITY, |p| p.limb.radius_at(*at));
+                for sample in &mut limb.samples {
+                    sample.radius = sample.radius.min(most);
+                }
+            }
+        }
+    }
+}
+
+/// Evenly from one radius to another, px.
+fn taper(limb: &mut Limb, from: f64, to: f64) {
+    let last = limb.samples.len().saturating_sub(1).max(1) as f64;
+    for (k, sample) in limb.samples.iter_mut().enumerate() {
+        sample.radius = from + (to - from) * k as f64 / last;
     }
 }
 

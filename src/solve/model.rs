@@ -1,11 +1,13 @@
 //! What was found out about a tree.
 
+use super::along_wood::{Names, PointOn, along_wood};
 use super::lift::{assign_radii, flat};
 use super::sub_branches::{self, SubBranch};
 use crate::config::Config;
 use crate::hierarchy::Evidence;
 use crate::model::{
-    LogWindow, MotionHierarchy, NodeId, Outline, Skeleton, Swaying, TrackId, TrackTable,
+    BranchGraph, LogWindow, MotionHierarchy, NodeId, Outline, Skeleton, Swaying, TrackId,
+    TrackTable,
 };
 use crate::motion::Binding;
 use crate::shape::PushFigures;
@@ -31,6 +33,9 @@ pub struct Model {
     /// Tracks that the tree was not built from, with node and rest place, px: those of an older
     /// tree, and those that were found since.
     pub joined: BTreeMap<TrackId, (NodeId, Point2<f64>)>,
+    /// The wood that the pictures show, where it was looked for and found; the skeleton runs along
+    /// it.
+    pub wood: Option<Arc<BranchGraph>>,
     pub outline: Arc<Outline>,
     /// The tracks that it was built from, and what they are worth.
     pub table: Arc<TrackTable>,
@@ -90,9 +95,15 @@ impl Moment {
 impl Model {
     /// Which track moves which node.
     pub fn binding(&self) -> Binding {
-        let mut binding = Binding::new(&self.hierarchy, &self.rest_px, &self.skeleton);
-        binding.inherit(&self.joined);
-        binding.inherit(&self.on_sub_branches());
+        self.binding_on(&self.skeleton)
+    }
+
+    /// The same on another form of its skeleton: straight, or along the wood.
+    fn binding_on(&self, skeleton: &Skeleton) -> Binding {
+        let mut binding = Binding::new(&self.hierarchy, &self.rest_px, skeleton);
+        let places = places(skeleton);
+        binding.inherit(&moved_to(&self.joined, &places));
+        binding.inherit(&moved_to(&self.on_sub_branches(), &places));
         binding
     }
 
@@ -111,15 +122,20 @@ impl Model {
         }
     }
 
-    /// The node itself, or the measured one that carries it if it is a sub-branch.
+    /// The node of `plain` that `node` of `skeleton` is, or the one that carries it if it is a
+    /// sub-branch.
     pub(super) fn carrier(&self, node: NodeId) -> NodeId {
-        match node.index().checked_sub(self.plain.measured()) {
+        let mover = self.skeleton.mover(node);
+        let place = places(&self.skeleton).iter().position(|n| *n == mover);
+        let place = place.unwrap_or(0);
+        match place.checked_sub(self.plain.measured()) {
             Some(k) => self.sub_branches[k].on,
-            None => node,
+            None => NodeId(place as u32),
         }
     }
 
-    /// The points of the sub-branches with node and rest place, px.
+    /// The points of the sub-branches with rest place, px, and node; sub-branches are counted after
+    /// the nodes of `plain`.
     fn on_sub_branches(&self) -> BTreeMap<TrackId, (NodeId, Point2<f64>)> {
         let mut out = BTreeMap::new();
         let first = self.plain.measured() as u32;
@@ -143,10 +159,44 @@ impl Model {
     /// Puts `sub_branches` on in place of those that it has.
     pub(super) fn set_sub_branches(&mut self, sub_branches: Vec<SubBranch>, config: &Config) {
         self.sub_branches = sub_branches;
+        let before = self.skeleton.clone();
+        self.assemble(&before, config);
+    }
+
+    /// The same tree along the wood that pictures show. Traced nodes go on as those of `before`
+    /// that are in their places.
+    pub(super) fn set_wood(
+        &mut self,
+        wood: Option<Arc<BranchGraph>>,
+        before: &Skeleton,
+        config: &Config,
+    ) {
+        self.wood = wood;
+        self.assemble(before, config);
+    }
+
+    /// The skeleton from its parts: the hierarchy in space, the sub-branches, the wood.
+    fn assemble(&mut self, before: &Skeleton, config: &Config) {
         self.modes.clear();
-        let mut skeleton = sub_branches::with(&self.plain, &self.sub_branches);
-        assign_radii(&mut skeleton, &self.outline, config);
-        self.skeleton = Arc::new(skeleton);
+        let mut straight = sub_branches::with(&self.plain, &self.sub_branches);
+        let Some(wood) = self.wood.clone() else {
+            assign_radii(&mut straight, &self.outline, config);
+            self.skeleton = Arc::new(straight);
+            return;
+        };
+        let mut points = Vec::new();
+        for (_, node, rest_px) in self.binding_on(&straight).bound() {
+            points.push(PointOn { node, rest_px });
+        }
+        let mut names = Names {
+            next: self.names,
+            prior: Some(before),
+        };
+        let mut joined = along_wood(&straight, &wood, &points, &mut names);
+        self.names = names.next;
+        assign_radii(&mut joined.skeleton, &self.outline, config);
+        joined.set_radii();
+        self.skeleton = Arc::new(joined.skeleton);
     }
 
     /// The skeleton in the picture that it was pushed into space from, with the number of points on
@@ -174,4 +224,27 @@ impl Model {
         let (flat, tracks) = self.flat_on(self.plain.foot_px, config);
         PushFigures::of(&self.plain, &flat, &tracks, &self.outline, &config.shape)
     }
+}
+
+/// Where the nodes of the straight tree stand in `skeleton`: the foot, then all measured nodes that
+/// move on their own.
+fn places(skeleton: &Skeleton) -> Vec<NodeId> {
+    [NodeId(0)]
+        .into_iter()
+        .chain(skeleton.measured_branches())
+        .collect()
+}
+
+/// Points on nodes of the straight tree, on those of another form of it.
+fn moved_to(
+    points: &BTreeMap<TrackId, (NodeId, Point2<f64>)>,
+    places: &[NodeId],
+) -> BTreeMap<TrackId, (NodeId, Point2<f64>)> {
+    let mut out = BTreeMap::new();
+    for (id, (node, rest_px)) in points {
+        if let Some(place) = places.get(node.index()) {
+            out.insert(*id, (*place, *rest_px));
+        }
+    }
+    out
 }

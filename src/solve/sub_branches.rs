@@ -40,8 +40,8 @@ pub struct SubBranch {
     pub end_px: Option<Point2<f64>>,
 }
 
-/// The sub-branches that the points of `table` show, without names; `node_of` says on which measured
-/// node of `skeleton` a point is.
+/// The sub-branches that the points of `table` show, without names; `node_of` says on which
+/// measured node of `skeleton` a point is.
 pub(super) fn identify(
     table: &TrackTable,
     skeleton: &Skeleton,

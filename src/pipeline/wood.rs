@@ -1,0 +1,108 @@
+//! The wood that the kept frames show.
+
+use super::film_log::{FilmLog, KeptFrame};
+use crate::cancel::CancelToken;
+use crate::hierarchy;
+use crate::model::{BranchGraph, LogWindow, Outline, Rgb, Skeleton, TrackId, TrackSet};
+use crate::source::Decoder;
+use crate::wood::{self, Displacements, Shot, View, Wood};
+use nalgebra::Point2;
+use std::collections::BTreeMap;
+
+/// A point that was seen in less than this share of the frames has no rest place to rely on.
+const SEEN_SHARE: f64 = 0.5;
+/// Least share of the points that the wood of their tree passes by.
+const ON_WOOD: f64 = 0.7;
+
+/// Looks for the wood of the tree whose joints `skeleton` has, in the frames of `film` whose points
+/// are in `window`. `None` where frames cannot be decoded, or show no wood that the points are on,
+/// and where `cancel` ends the work before.
+pub fn find_wood(
+    film: &FilmLog,
+    window: LogWindow,
+    outline: &Outline,
+    skeleton: &Skeleton,
+    cancel: &CancelToken,
+) -> Option<Wood> {
+    let rest = rest_places(window);
+    let mut frames = Vec::new();
+    let mut motions = Vec::new();
+    for kept in film.frames() {
+        if let Some(tracks) = window.sets().find(|set| set.frame == kept.frame) {
+            frames.push(kept);
+            motions.push(displacements(tracks, &rest));
+        }
+    }
+    let mut decoder = Decoder::new().ok()?;
+    let mut pictures = Vec::new();
+    for k in wood::choose(&motions) {
+        if cancel.is_cancelled() {
+            return None;
+        }
+        if let Some(picture) = in_colour(frames[k], &mut decoder, outline) {
+            pictures.push((picture, &motions[k]));
+        }
+    }
+    let mut shots = Vec::with_capacity(pictures.len());
+    for (picture, displacements) in &pictures {
+        shots.push(Shot {
+            picture,
+            displacements,
+        });
+    }
+    let rest_px: Vec<Point2<f64>> = rest.values().copied().collect();
+    let view = View {
+        shots: &shots,
+        rest_px: &rest_px,
+        outline,
+        foot_px: skeleton.foot_px,
+    };
+    match wood::find(view, cancel) {
+        Ok(wood) => wood.filter(|wood| is_of_points(&wood.branches, &rest_px, outline)),
+        Err(e) => {
+            tracing::warn!("the wood was not looked for: {e}");
+            None
+        }
+    }
+}
+
+/// Whether most of the points are on the wood: they are on the tree. In a crown in leaf they are
+/// not, and where the wood was not told from what stands behind it, neither.
+fn is_of_points(branches: &BranchGraph, rest_px: &[Point2<f64>], outline: &Outline) -> bool {
+    let on_wood = rest_px
+        .iter()
+        .filter(|at| branches.piece_at(**at, outline.size).is_some())
+        .count();
+    let share = on_wood as f64 / rest_px.len().max(1) as f64;
+    tracing::debug!(share, "points on wood");
+    share >= ON_WOOD
+}
+
+/// The whole frame, if it is of the outline's size.
+fn in_colour(kept: &KeptFrame, decoder: &mut Decoder, outline: &Outline) -> Option<Rgb> {
+    let picture = decoder.preview(&kept.raw, kept.raw.size.width).ok()?;
+    (picture.size == outline.size).then_some(picture)
+}
+
+/// Rest places of the points that were seen for long enough, px.
+fn rest_places(window: LogWindow) -> BTreeMap<TrackId, Point2<f64>> {
+    let table = hierarchy::table(window);
+    let mut rest = BTreeMap::new();
+    for (row, id) in table.ids.iter().enumerate() {
+        let seen = table.positions[row].iter().flatten().count();
+        if seen as f64 >= SEEN_SHARE * table.times_s.len() as f64 {
+            rest.insert(*id, hierarchy::rest_position_px(&table, row));
+        }
+    }
+    rest
+}
+
+/// How far every point is from its rest place, in the order of `rest`, px.
+fn displacements(tracks: &TrackSet, rest: &BTreeMap<TrackId, Point2<f64>>) -> Displacements {
+    let mut at = BTreeMap::new();
+    for observation in &tracks.observations {
+        at.insert(observation.id, observation.at_px());
+    }
+    let displaced = rest.iter().map(|(id, rest)| at.get(id).map(|at| at - rest));
+    displaced.collect()
+}
