@@ -3,20 +3,18 @@
 use super::film_log::{FilmLog, KeptFrame};
 use crate::cancel::CancelToken;
 use crate::hierarchy;
-use crate::model::{BranchGraph, LogWindow, Outline, Rgb, Skeleton, TrackId, TrackSet};
+use crate::model::{LogWindow, Outline, Rgb, Skeleton, TrackId, TrackSet};
+use crate::skeleton::Foot;
 use crate::source::Decoder;
-use crate::wood::{self, Displacements, Shot, View, Wood};
+use crate::wood::{self, Displacements, Shot, TrunkFoot, View, Wood};
 use nalgebra::Point2;
 use std::collections::BTreeMap;
 
 /// A point that was seen in less than this share of the frames has no rest place to rely on.
 const SEEN_SHARE: f64 = 0.5;
-/// Least share of the points that the wood of their tree passes by.
-const ON_WOOD: f64 = 0.7;
 
 /// Looks for the wood of the tree whose joints `skeleton` has, in the frames of `film` whose points
-/// are in `window`. `None` where frames cannot be decoded, or show no wood that the points are on,
-/// and where `cancel` ends the work before.
+/// are in `window`. `None` where frames cannot be decoded, or show no wood, and where `cancel` ends the work before.
 pub fn find_wood(
     film: &FilmLog,
     window: LogWindow,
@@ -55,27 +53,18 @@ pub fn find_wood(
         shots: &shots,
         rest_px: &rest_px,
         outline,
-        foot_px: skeleton.foot_px,
+        foot: TrunkFoot {
+            position_px: skeleton.foot_px,
+            half_width_px: Foot::of(outline, None).half_width_px,
+        },
     };
     match wood::find(view, cancel) {
-        Ok(wood) => wood.filter(|wood| is_of_points(&wood.branches, &rest_px, outline)),
+        Ok(wood) => wood,
         Err(e) => {
             tracing::warn!("the wood was not looked for: {e}");
             None
         }
     }
-}
-
-/// Whether most of the points are on the wood: they are on the tree. In a crown in leaf they are
-/// not, and where the wood was not told from what stands behind it, neither.
-fn is_of_points(branches: &BranchGraph, rest_px: &[Point2<f64>], outline: &Outline) -> bool {
-    let on_wood = rest_px
-        .iter()
-        .filter(|at| branches.piece_at(**at, outline.size).is_some())
-        .count();
-    let share = on_wood as f64 / rest_px.len().max(1) as f64;
-    tracing::debug!(share, "points on wood");
-    share >= ON_WOOD
 }
 
 /// The whole frame, if it is of the outline's size.

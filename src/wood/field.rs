@@ -1,4 +1,5 @@
-//! The motion of followed points, spread over the picture.
+//! The motion of followed points, spread over the picture. The foot stands still, and what is nearer
+//! to it than a point moves by as much less: the tree turns about its foot.
 
 use crate::model::Size;
 use nalgebra::{Point2, Vector2};
@@ -29,11 +30,14 @@ pub struct Spread {
 struct Near {
     point: usize,
     weight: f64,
+    /// The place's distance from the foot, in those of the point; 1 where it is farther.
+    share: f64,
 }
 
 impl Spread {
-    /// For points that rest at `rest_px`; `None` without points.
-    pub fn new(size: Size, rest_px: &[Point2<f64>]) -> Option<Self> {
+    /// For points of a tree that stands at `foot_px`, which rest at `rest_px`; `None` without
+    /// points.
+    pub fn new(size: Size, rest_px: &[Point2<f64>], foot_px: Point2<f64>) -> Option<Self> {
         if rest_px.is_empty() {
             return None;
         }
@@ -43,7 +47,7 @@ impl Spread {
         for row in 0..rows {
             for column in 0..columns {
                 let place = Point2::new((column * STEP_PX) as f64, (row * STEP_PX) as f64);
-                nearest.push(nearest_points(place, rest_px));
+                nearest.push(nearest_points(place, rest_px, foot_px));
             }
         }
         Some(Self {
@@ -92,7 +96,7 @@ impl Spread {
 }
 
 /// The nearest points to a place, and how much each counts.
-fn nearest_points(place: Point2<f64>, rest_px: &[Point2<f64>]) -> Vec<Near> {
+fn nearest_points(place: Point2<f64>, rest_px: &[Point2<f64>], foot_px: Point2<f64>) -> Vec<Near> {
     let distance_sq = |point: &usize| (rest_px[*point] - place).norm_squared();
     let mut points: Vec<usize> = (0..rest_px.len()).collect();
     if points.len() > NEAREST {
@@ -103,7 +107,13 @@ fn nearest_points(place: Point2<f64>, rest_px: &[Point2<f64>]) -> Vec<Near> {
     let mut near = Vec::with_capacity(points.len());
     for point in points {
         let weight = NEAR_PX / (NEAR_PX + distance_sq(&point).sqrt());
-        near.push(Near { point, weight });
+        let from_foot_px = (rest_px[point] - foot_px).norm();
+        let share = (place - foot_px).norm() / from_foot_px.max(f64::MIN_POSITIVE);
+        near.push(Near {
+            point,
+            weight,
+            share: share.min(1.0),
+        });
     }
     near
 }
@@ -113,12 +123,13 @@ fn robust_mean(near: &[Near], displacements: &[Option<Vector2<f64>>]) -> Vector2
     let mut mean: Option<Vector2<f64>> = None;
     for _ in 0..=ROUNDS {
         let (mut sum, mut weights) = (Vector2::zeros(), 0.0);
-        for Near { point, weight } in near {
-            let Some(displacement) = displacements.get(*point).copied().flatten() else {
+        for near in near {
+            let Some(displacement) = displacements.get(near.point).copied().flatten() else {
                 continue;
             };
+            let displacement = near.share * displacement;
             let apart = mean.map_or(0.0, |mean| (displacement - mean).norm() / APART_PX);
-            let weight = weight / (1.0 + apart * apart);
+            let weight = near.weight / (1.0 + apart * apart);
             sum += weight * displacement;
             weights += weight;
         }
@@ -138,6 +149,9 @@ mod tests {
         width: 64,
         height: 40,
     };
+
+    /// All places are about as far from it.
+    const FAR_FOOT: Point2<f64> = Point2::new(30.0, 1e5);
 
     /// Points on the left move by 3 px, those on the right by -2 px.
     fn two_sides() -> (Vec<Point2<f64>>, Vec<Option<Vector2<f64>>>) {
@@ -159,7 +173,7 @@ mod tests {
     #[test]
     fn a_pixel_moves_as_the_points_beside_it() {
         let (rest_px, displacements) = two_sides();
-        let spread = Spread::new(SIZE, &rest_px).expect("points");
+        let spread = Spread::new(SIZE, &rest_px, FAR_FOOT).expect("points");
         let field = spread.displacements(&displacements);
         assert_eq!(field.len(), SIZE.area());
         assert!((at(&field, 8, 20).x - 3.0).abs() < 0.05);
@@ -167,19 +181,30 @@ mod tests {
     }
 
     #[test]
+    fn the_foot_stands_still_and_what_is_near_to_it_moves_less() {
+        let foot_px = Point2::new(32.0, 39.0);
+        let rest_px = [Point2::new(32.0, 3.0)];
+        let spread = Spread::new(SIZE, &rest_px, foot_px).expect("a point");
+        let field = spread.displacements(&[Some(Vector2::new(3.0, 0.0))]);
+        assert!((at(&field, 32, 3).x - 3.0).abs() < 0.2);
+        assert!((at(&field, 32, 21).x - 1.5).abs() < 0.2);
+        assert!(at(&field, 32, 39).x < 0.3);
+    }
+
+    #[test]
     fn a_point_that_went_astray_hardly_counts() {
         let (rest_px, mut displacements) = two_sides();
         displacements[10] = Some(Vector2::new(40.0, 30.0));
         displacements[14] = None;
-        let spread = Spread::new(SIZE, &rest_px).expect("points");
+        let spread = Spread::new(SIZE, &rest_px, FAR_FOOT).expect("points");
         let moved = at(&spread.displacements(&displacements), 10, 16);
         assert!((moved - Vector2::new(3.0, 0.0)).norm() < 0.2, "{moved}");
     }
 
     #[test]
     fn without_points_there_is_no_field_and_without_motion_nothing_moves() {
-        assert!(Spread::new(SIZE, &[]).is_none());
-        let spread = Spread::new(SIZE, &[Point2::new(1.0, 1.0)]).expect("a point");
+        assert!(Spread::new(SIZE, &[], FAR_FOOT).is_none());
+        let spread = Spread::new(SIZE, &[Point2::new(1.0, 1.0)], FAR_FOOT).expect("a point");
         let still = spread.displacements(&[None]);
         assert!(still.iter().all(|d| *d == Vector2::zeros()));
     }

@@ -1,15 +1,16 @@
 //! Which pixels of the picture at rest are wood: colour mixtures and a graph cut (Tan et al. 2008
 //! sect. 2.1; OpenCV's `grabCut`), whose seeds are what moves with the tree and is a ridge.
 
+use super::TrunkFoot;
 use super::evidence::Evidence;
 use crate::cancel::CancelToken;
 use crate::model::{Luma, Rgb, Size};
-use nalgebra::Point2;
+use nalgebra::{Matrix3, Vector3};
 use opencv::core::{Mat, Point, Rect, Size as CvSize};
 use opencv::imgproc::{
-    COLOR_RGB2BGR, GC_BGD, GC_EVAL, GC_INIT_WITH_MASK, GC_PR_BGD, GC_PR_FGD, INTER_CUBIC,
-    INTER_LINEAR, MORPH_BLACKHAT, MORPH_ELLIPSE, MORPH_TOPHAT, cvt_color_def, gaussian_blur_def,
-    get_structuring_element, grab_cut, morphology_ex_def, resize,
+    COLOR_RGB2BGR, GC_BGD, GC_EVAL, GC_EVAL_FREEZE_MODEL, GC_FGD, GC_INIT_WITH_MASK, GC_PR_BGD,
+    GC_PR_FGD, INTER_CUBIC, INTER_LINEAR, MORPH_BLACKHAT, MORPH_ELLIPSE, MORPH_OPEN, MORPH_TOPHAT,
+    cvt_color_def, gaussian_blur_def, get_structuring_element, grab_cut, morphology_ex_def, resize,
 };
 use opencv::prelude::*;
 
@@ -22,6 +23,8 @@ const TREE: f32 = 0.15;
 const STILL: f32 = -0.03;
 /// Largest width of a ridge, px at 640 px picture width.
 const RIDGE_PX: f64 = 15.0;
+/// Least width of a limb that is told from leaves, px at 640 px picture width.
+const LIMB_PX: f64 = 4.0;
 /// Wood is darker than what stands behind it, unless its ridges are so many times as high the other
 /// way.
 const BRIGHT: f64 = 1.5;
@@ -70,7 +73,7 @@ impl WoodMask {
 pub fn wood_mask(
     evidence: &Evidence,
     region: &[u8],
-    foot_px: Point2<f64>,
+    foot: TrunkFoot,
     cancel: &CancelToken,
 ) -> opencv::Result<WoodMask> {
     let size = evidence.rest.size;
@@ -94,41 +97,31 @@ pub fn wood_mask(
     }
     let leaves = Leaves::of(&rest, &out.moves)?;
     out.in_leaf = leaves.share >= IN_LEAF;
-    let is_behind = match out.in_leaf {
-        true => colours_behind(&rest, &out.moves, &region)?,
-        false => Vec::new(),
-    };
-    let ridge_px = RIDGE_PX * f64::from(large.width) / 640.0;
-    let ridges = match out.in_leaf {
-        true => None,
-        false => Some(ridges(&rest, &out.moves, ridge_px)?),
+    let low = Part::above_foot(foot, bounds, size).enlarged(scale);
+    let is_trunk = low_trunk(&rest, low, &leaves, large)?;
+    let is_limb = limbs(&rest, &tree, &leaves, &is_trunk, large)?;
+    let is_ridge = match out.in_leaf {
+        true => vec![false; large.area()],
+        false => ridges(&rest, &out.moves, large)?,
     };
     let mut seeds = vec![GC_BGD as u8; large.area()];
     for (i, seed) in seeds.iter_mut().enumerate() {
         if region[i] == 0 || tree[i] < STILL {
             continue;
         }
-        let is_ridge = ridges.as_ref().is_none_or(|ridges| ridges[i]);
-        *seed = if out.moves[i] && leaves.is_leaf[i] {
+        *seed = if is_trunk[i] || is_limb[i] && out.moves[i] && !out.in_leaf {
+            GC_FGD as u8
+        } else if out.moves[i] && leaves.is_leaf[i] {
             GC_BGD as u8
-        } else if out.moves[i] && is_ridge && !is_behind.get(i).is_some_and(|behind| *behind) {
+        } else if is_limb[i] || is_ridge[i] && out.moves[i] {
             GC_PR_FGD as u8
         } else {
             GC_PR_BGD as u8
         };
     }
-    let foot = Part::above_foot(foot_px, bounds, size);
-    for v in scale * foot.top..scale * foot.bottom {
-        for u in scale * foot.left..scale * foot.right {
-            seeds[(v * large.width + u) as usize] = GC_PR_FGD as u8;
-        }
-    }
-    let n_likely = seeds.iter().filter(|&&s| s == GC_PR_FGD as u8).count();
-    let n_other = seeds
-        .iter()
-        .filter(|&&s| s == GC_PR_BGD as u8 || s == GC_BGD as u8)
-        .count();
-    if n_likely < LEAST_SEEDS || n_other < LEAST_SEEDS {
+    let n_wood = seeds.iter().filter(|seed| is_wood(**seed)).count();
+    let n_other = seeds.iter().filter(|s| **s == GC_BGD as u8).count();
+    if n_wood < LEAST_SEEDS || n_other < LEAST_SEEDS {
         return Ok(out);
     }
     cut(
@@ -139,17 +132,26 @@ pub fn wood_mask(
         cancel,
     )?;
     for (mask, seed) in out.mask.iter_mut().zip(&seeds) {
-        if *seed == GC_PR_FGD as u8 {
+        if is_wood(*seed) {
             *mask = 255;
         }
     }
     Ok(out)
 }
 
-/// Above the foot so great a share of the tree's height is taken to be trunk, to both sides by so
-/// great a share of the picture's width.
+/// Whether a label of the cut is wood, for sure or likely.
+fn is_wood(label: u8) -> bool {
+    [GC_FGD, GC_PR_FGD].contains(&i32::from(label))
+}
+
+/// The trunk is looked for by its colour over so great a share of the tree's height above the foot.
 const TRUNK_HEIGHT: f64 = 0.08;
-const TRUNK_WIDTH: f64 = 0.005;
+/// Bark has the colours of the low trunk within so many deviations, to which so much is added for
+/// other light, grey levels.
+const BARK_DEVIATIONS: f64 = 3.0;
+const BARK_NOISE: f64 = 10.0;
+/// A colour is the trunk's if it is so many times as frequent there as beside it.
+const TRUNK_COLOUR: f64 = 2.0;
 /// Fewer pixels than this make no colour mixture.
 const LEAST_SEEDS: usize = 64;
 /// Room about the region that is shown to the graph cut, px.
@@ -165,10 +167,11 @@ struct Part {
 }
 
 impl Part {
-    /// The lowest part of the trunk, whose foot is given: it hardly moves.
-    fn above_foot(foot_px: Point2<f64>, tree: Part, size: Size) -> Self {
+    /// Where the lowest part of the trunk is.
+    fn above_foot(foot: TrunkFoot, tree: Part, size: Size) -> Self {
+        let foot_px = foot.position_px;
         let height = TRUNK_HEIGHT * f64::from(tree.bottom - tree.top);
-        let half_width = TRUNK_WIDTH * f64::from(size.width);
+        let half_width = foot.half_width_px;
         let within = |px: f64, most: u32| px.clamp(0.0, f64::from(most)) as u32;
         Self {
             left: within(foot_px.x - half_width, size.width),
@@ -176,6 +179,27 @@ impl Part {
             right: within(foot_px.x + half_width, size.width),
             bottom: within(foot_px.y, size.height),
         }
+    }
+
+    /// The same in a picture `scale` times as large.
+    fn enlarged(self, scale: u32) -> Self {
+        Self {
+            left: scale * self.left,
+            top: scale * self.top,
+            right: scale * self.right,
+            bottom: scale * self.bottom,
+        }
+    }
+
+    /// Whether it is as high as `v`, and not farther off to the side than its own width.
+    fn is_beside(self, u: u32, v: u32) -> bool {
+        let width = self.right - self.left;
+        let is_near = u + width >= self.left && u < self.right + width;
+        (self.top..self.bottom).contains(&v) && is_near && !self.holds(u, v)
+    }
+
+    fn holds(self, u: u32, v: u32) -> bool {
+        (self.left..self.right).contains(&u) && (self.top..self.bottom).contains(&v)
     }
 
     /// The same in a picture `scale` times as large, with some room about it.
@@ -233,17 +257,28 @@ fn cut(
     let picture = rest.roi(part)?.clone_pointee();
     let mut inner = labels.roi(part)?.clone_pointee();
     let (mut wood, mut other) = (Mat::default(), Mat::default());
+    let whole = Rect::default();
     opencv::core::set_rng_seed(0)?;
+    // The first mixtures are those of the seeds alone: half of what nothing is known of is wood.
+    let (known, mut of_known) = known_pixels(&picture, &inner)?;
+    grab_cut(
+        &known,
+        &mut of_known,
+        whole,
+        &mut other,
+        &mut wood,
+        0,
+        GC_INIT_WITH_MASK,
+    )?;
     for round in 0..ROUNDS {
         if cancel.is_cancelled() {
             break;
         }
         let mode = if round == 0 {
-            GC_INIT_WITH_MASK
+            GC_EVAL_FREEZE_MODEL
         } else {
             GC_EVAL
         };
-        let whole = Rect::default();
         grab_cut(&picture, &mut inner, whole, &mut other, &mut wood, 1, mode)?;
     }
     let mut target = labels.roi_mut(part)?;
@@ -251,6 +286,21 @@ fn cut(
     drop(target);
     seeds.copy_from_slice(labels.data_bytes()?);
     Ok(())
+}
+
+/// The pixels that are seeds, in one row, with their labels.
+fn known_pixels(picture: &Mat, labels: &Mat) -> opencv::Result<(Mat, Mat)> {
+    let (pixels, labels) = (picture.data_typed()?, labels.data_bytes()?);
+    let mut known: Vec<opencv::core::Vec3b> = Vec::new();
+    let mut of_known = Vec::new();
+    for (pixel, label) in pixels.iter().zip(labels) {
+        if i32::from(*label) != GC_PR_BGD {
+            known.push(*pixel);
+            of_known.push(*label);
+        }
+    }
+    let known = Mat::from_slice(&known)?.clone_pointee();
+    Ok((known, Mat::from_slice(&of_known)?.clone_pointee()))
 }
 
 /// The picture at the larger size, blue first, as OpenCV has it.
@@ -291,9 +341,92 @@ fn enlarged_region(region: &[u8], size: Size, scale: u32) -> Vec<u8> {
     out
 }
 
-/// Which pixels are on a ridge that is narrower than `width_px`. Whether wood is darker or brighter
+/// Which pixels have the colours of the low trunk, are no leaves and rather move than stand still,
+/// as far as they are joined to some that surely move (hysteresis, Canny 1986); none where the
+/// trunk is not seen.
+fn limbs(
+    rest: &Mat,
+    tree: &[f32],
+    leaves: &Leaves,
+    is_trunk: &[bool],
+    size: Size,
+) -> opencv::Result<Vec<bool>> {
+    let pixels = rest.data_typed::<opencv::core::Vec3b>()?;
+    let Some(bark) = BarkColour::of(pixels, is_trunk) else {
+        return Ok(vec![false; pixels.len()]);
+    };
+    let mut mask = Vec::with_capacity(pixels.len());
+    for (i, pixel) in pixels.iter().enumerate() {
+        let is_bark = bark.is_like(pixel) && !leaves.is_leaf[i];
+        mask.push(u8::from(is_trunk[i] || is_bark && tree[i] > -STILL));
+    }
+    let wide: Vec<u8> = wide(&mask, size)?.into_iter().map(u8::from).collect();
+    let mat = Mat::new_rows_cols_with_data(size.height as i32, size.width as i32, &wide)?;
+    let mut parts = Mat::default();
+    let n_parts = opencv::imgproc::connected_components(&mat, &mut parts, 8, opencv::core::CV_32S)?;
+    let parts = parts.data_typed::<i32>()?;
+    let mut is_sure = vec![false; n_parts.max(1) as usize];
+    for (i, part) in parts.iter().enumerate() {
+        is_sure[*part as usize] |= is_trunk[i] || tree[i] > TREE;
+    }
+    // Part 0 is all that is not in the mask.
+    is_sure[0] = false;
+    Ok(parts.iter().map(|part| is_sure[*part as usize]).collect())
+}
+
+/// The colour of bark, as a normal distribution.
+struct BarkColour {
+    mean: Vector3<f64>,
+    precision: Matrix3<f64>,
+}
+
+impl BarkColour {
+    /// That of the pixels on the trunk; `None` where there are too few.
+    fn of(pixels: &[opencv::core::Vec3b], is_trunk: &[bool]) -> Option<Self> {
+        let mut colours = Vec::new();
+        for (pixel, _) in pixels.iter().zip(is_trunk).filter(|(_, on)| **on) {
+            colours.push(colour(pixel));
+        }
+        if colours.len() < LEAST_SEEDS {
+            return None;
+        }
+        let count = colours.len() as f64;
+        let mean = colours.iter().sum::<Vector3<f64>>() / count;
+        let mut covariance = BARK_NOISE.powi(2) * Matrix3::identity();
+        for colour in &colours {
+            let off = colour - mean;
+            covariance += off * off.transpose() / count;
+        }
+        let precision = covariance.try_inverse()?;
+        Some(Self { mean, precision })
+    }
+
+    fn is_like(&self, pixel: &opencv::core::Vec3b) -> bool {
+        let off = colour(pixel) - self.mean;
+        off.dot(&(self.precision * off)) <= BARK_DEVIATIONS.powi(2)
+    }
+}
+
+fn colour(pixel: &opencv::core::Vec3b) -> Vector3<f64> {
+    Vector3::from(pixel.0.map(f64::from))
+}
+
+/// What a disc of [`LIMB_PX`] fits into (opening): in leaf, thin wood cannot be told from the mixed
+/// colours at the edges of leaves.
+fn wide(mask: &[u8], size: Size) -> opencv::Result<Vec<bool>> {
+    let mat = Mat::new_rows_cols_with_data(size.height as i32, size.width as i32, mask)?;
+    let side = (LIMB_PX * f64::from(size.width) / 640.0).round() as i32 | 1;
+    let middle = Point::new(-1, -1);
+    let disc = get_structuring_element(MORPH_ELLIPSE, CvSize::new(side, side), middle)?;
+    let mut out = Mat::default();
+    morphology_ex_def(&mat, &mut out, MORPH_OPEN, &disc)?;
+    Ok(out.data_bytes()?.iter().map(|m| *m != 0).collect())
+}
+
+/// Which pixels are on a ridge that is narrower than [`RIDGE_PX`]. Whether wood is darker or brighter
 /// than what stands behind it is told by what moves.
-fn ridges(rest: &Mat, moves: &[bool], width_px: f64) -> opencv::Result<Vec<bool>> {
+fn ridges(rest: &Mat, moves: &[bool], size: Size) -> opencv::Result<Vec<bool>> {
+    let width_px = RIDGE_PX * f64::from(size.width) / 640.0;
     let mut grey = Mat::default();
     cvt_color_def(rest, &mut grey, opencv::imgproc::COLOR_BGR2GRAY)?;
     let side = (width_px.round() as i32) | 1;
@@ -366,21 +499,26 @@ fn otsu(histogram: &[u32; 256]) -> f64 {
     threshold
 }
 
-/// Of each pixel, whether its colour is found more often outside of the region than in what moves:
-/// sky between leaves.
-fn colours_behind(rest: &Mat, moves: &[bool], region: &[u8]) -> opencv::Result<Vec<bool>> {
+/// The pixels of `low` whose colours are found there much more often than beside it, and are not
+/// those of leaves: the lowest part of a trunk hardly moves.
+fn low_trunk(rest: &Mat, low: Part, leaves: &Leaves, size: Size) -> opencv::Result<Vec<bool>> {
     let pixels = rest.data_typed::<opencv::core::Vec3b>()?;
-    let mut behind = Colours::default();
-    let mut tree = Colours::default();
-    for ((pixel, moves), inside) in pixels.iter().zip(moves).zip(region) {
-        if *inside == 0 {
-            behind.add(pixel);
-        } else if *moves {
-            tree.add(pixel);
+    let (mut within, mut beside) = (Colours::default(), Colours::default());
+    for (i, pixel) in pixels.iter().enumerate() {
+        let (u, v) = (i as u32 % size.width, i as u32 / size.width);
+        if low.holds(u, v) {
+            within.add(pixel);
+        } else if low.is_beside(u, v) {
+            beside.add(pixel);
         }
     }
-    let is_behind = pixels.iter().map(|p| behind.share(p) > tree.share(p));
-    Ok(is_behind.collect())
+    let mut mask = Vec::with_capacity(pixels.len());
+    for (i, pixel) in pixels.iter().enumerate() {
+        let (u, v) = (i as u32 % size.width, i as u32 / size.width);
+        let is_trunk = within.share(pixel) > TRUNK_COLOUR * beside.share(pixel);
+        mask.push(u8::from(low.holds(u, v) && is_trunk && !leaves.is_leaf[i]));
+    }
+    wide(&mask, size)
 }
 
 /// How often colours occur, in 16 steps of each component.

@@ -83,8 +83,15 @@ pub struct View<'a> {
     /// Rest places of the followed points, px.
     pub rest_px: &'a [Point2<f64>],
     pub outline: &'a Outline,
-    /// Where the trunk leaves the ground.
-    pub foot_px: Point2<f64>,
+    pub foot: TrunkFoot,
+}
+
+/// Where the trunk leaves the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrunkFoot {
+    pub position_px: Point2<f64>,
+    /// Half of the most that the trunk may be wide there, px.
+    pub half_width_px: f64,
 }
 
 /// Finds the wood. `None` where there are too few frames, or none is seen, and where `cancel` ends
@@ -99,17 +106,17 @@ pub fn find(view: View, cancel: &CancelToken) -> opencv::Result<Option<Wood>> {
     if view.shots.len() < LEAST_SHOTS || !view.shots.iter().all(|shot| is_usable(&shot)) {
         return Ok(None);
     }
-    let Some(spread) = Spread::new(size, view.rest_px) else {
+    let Some(spread) = Spread::new(size, view.rest_px, view.foot.position_px) else {
         return Ok(None);
     };
     let shots = view.shots;
     let evidence = evidence(shots, AT_REST.min(shots.len() / 3), &spread, cancel)?;
     let region = widened(view.outline, farthest_px(shots))?;
-    let mask = mask::wood_mask(&evidence, &region, view.foot_px, cancel)?;
+    let mask = mask::wood_mask(&evidence, &region, view.foot, cancel)?;
     if cancel.is_cancelled() {
         return Ok(None);
     }
-    let branches = paths::branches(&mask, view.foot_px)?;
+    let branches = paths::branches(&mask, view.foot.position_px)?;
     tracing::debug!(
         shots = shots.len(),
         pixels = mask.mask.iter().filter(|m| **m != 0).count(),
@@ -243,7 +250,10 @@ mod tests {
             shots: &shots,
             rest_px: &rest_px,
             outline: &whole(),
-            foot_px: FOOT,
+            foot: TrunkFoot {
+                position_px: FOOT,
+                half_width_px: 10.0,
+            },
         };
         find(view, cancel).expect("opencv")
     }
