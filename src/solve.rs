@@ -10,7 +10,9 @@ mod lift;
 mod model;
 mod refine;
 mod sub_branches;
+mod taper;
 
+pub use along_wood::in_depth_of;
 pub use lift::{assign_radii, lift_to_3d};
 pub use model::{First, Model, Moment};
 pub use sub_branches::SubBranch;

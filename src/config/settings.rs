@@ -145,9 +145,9 @@ settings! {
     skeleton: Skeleton, TREE {
         /// A branching is drawn towards its parent by this share of the way.
         fold: f64 [0 to 0.95] = 0.4;
-        /// Looks for the wood that the frames show, and lets the skeleton run along it. For bare trees;
-        /// where most points are not on wood that is seen, the skeleton is that of the motion.
-        along_wood: bool = false;
+        /// Looks for the wood that the frames show, and lets the skeleton run along it. Where none
+        /// is seen, the skeleton is that of the motion alone.
+        along_wood: bool = true;
     }
 
     /// The skeleton in space: what the camera does not see is estimated (Li 2011 sect. 3).

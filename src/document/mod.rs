@@ -13,6 +13,7 @@ mod picture;
 mod sway;
 mod table;
 mod tracks;
+mod wood;
 
 pub use error::DocumentError;
 pub use motion::{MOTION_HEADER, MotionCsv};
@@ -23,11 +24,12 @@ pub use picture::{PICTURE_FILE, jpeg};
 pub use sway::Columns;
 pub use table::{TableWriter, unit};
 pub use tracks::{TRACKS_HEADER, TracksCsv, tracks_of};
+pub use wood::{WOOD_FILE, read_wood, wood_csv};
 
 use crate::bounds::Bounds;
 use crate::config::Config;
 use crate::dynamics::Film;
-use crate::model::{Outline, Picture, Pose, Size, Skeleton, Swaying, Unidentified};
+use crate::model::{BranchGraph, Outline, Picture, Pose, Size, Skeleton, Swaying, Unidentified};
 use crate::motion::PoseEstimator;
 use motion::PoseReader;
 use nalgebra::Point2;
@@ -331,10 +333,11 @@ pub struct Begun {
     pub note: CaptureNote,
     pub picture: Option<Picture>,
     pub outline: Option<Outline>,
+    pub wood: Option<Arc<BranchGraph>>,
 }
 
 impl Begun {
-    /// Reads it from `dir`. A picture or an outline that cannot be read is left out.
+    /// Reads it from `dir`. A picture, an outline or wood that cannot be read is left out.
     ///
     /// # Errors
     /// There is no `capture.json`, it is damaged, or was written by a newer version.
@@ -348,6 +351,7 @@ impl Begun {
         Ok(Self {
             picture,
             outline: noted.and_then(|noted| outline(noted).ok()),
+            wood: read_wood(dir).ok().map(Arc::new),
             note,
         })
     }

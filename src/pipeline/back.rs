@@ -6,9 +6,9 @@ use super::refiner::{Refiner, SolveJob, Taken};
 use crate::cancel::CancelToken;
 use crate::config::Config;
 use crate::hierarchy::{self, Evidence};
-use crate::model::{Outline, Phase, Pose, RawFrame, Rgb, TrackLog, TrackSet};
+use crate::model::{BranchGraph, Outline, Phase, Pose, RawFrame, Rgb, TrackLog, TrackSet};
 use crate::motion::Binding;
-use crate::solve::{Model, identify_sub_branches, solve};
+use crate::solve::{Model, identify_sub_branches, solve, with_wood};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -269,6 +269,14 @@ impl BackEnd {
         }
         let job = SolveJob::new(&self.log, &self.film, tracker, &self.config);
         if let Some(model) = job.prior_along_wood(cancel) {
+            self.tracker = Some(PoseTracker::new(Arc::new(model), &self.config));
+        }
+    }
+
+    /// Lets the tree run along wood that was found in frames that are no longer there.
+    pub fn put_wood(&mut self, wood: Arc<BranchGraph>) {
+        if let Some(tracker) = &self.tracker {
+            let model = with_wood(tracker.model(), Some(wood), None, &self.config);
             self.tracker = Some(PoseTracker::new(Arc::new(model), &self.config));
         }
     }

@@ -1,9 +1,9 @@
 //! Another shape in space for a tree that has been measured.
 
 use crate::config::Config;
-use crate::model::{ClusterId, Node, NodeId, NodeName, Outline, Skeleton};
+use crate::model::{ClusterId, NodeId, NodeName, Outline, Skeleton};
 use crate::shape::{Drawn, Topiary, TopiaryError};
-use crate::solve::assign_radii;
+use crate::solve::{assign_radii, in_depth_of};
 use crate::{shape, skeleton};
 
 /// Nodes that a tree may have, copies included, to be given another shape: pushing them takes time
@@ -13,49 +13,45 @@ pub const MOST_RESHAPED: usize = 4096;
 /// Stands the measured nodes up anew as `config` says. They keep their places in the picture and
 /// their names; copies get names that no node had before.
 pub fn reshape(old: &Skeleton, outline: &Outline, config: &Config) -> Skeleton {
-    let measured = &old.nodes[..old.measured()];
-    let flat: Vec<skeleton::Node2d> = measured
-        .iter()
-        .enumerate()
-        .map(|(i, n)| skeleton::Node2d {
-            parent: n.parent.map(|p| p.index()),
-            level: n.level,
-            cluster: i.checked_sub(1).map(|k| ClusterId(k as u32)),
-            position_px: old.image_from_model(&n.position),
-            certainty: n.certainty,
-        })
+    let movers: Vec<NodeId> = [NodeId(0)]
+        .into_iter()
+        .chain(old.measured_branches())
         .collect();
-    let tracks: Vec<u32> = measured.iter().map(|n| n.n_tracks).collect();
-    let mut new = shape::build(&flat, &tracks, outline, &config.shape);
-    assign_radii(&mut new, outline, config);
+    let mut flat: Vec<skeleton::Node2d> = Vec::with_capacity(movers.len());
+    let mut tracks: Vec<u32> = Vec::with_capacity(movers.len());
+    for (i, mover) in movers.iter().enumerate() {
+        let node = &old.nodes[mover.index()];
+        let carrier = old.moving_parent(*mover);
+        flat.push(skeleton::Node2d {
+            parent: carrier.and_then(|c| movers.iter().position(|m| *m == c)),
+            level: node.level,
+            cluster: i.checked_sub(1).map(|k| ClusterId(k as u32)),
+            position_px: old.image_from_model(&node.position),
+            certainty: node.certainty,
+        });
+        tracks.push(node.n_tracks);
+    }
+    let mut straight = shape::build(&flat, &tracks, outline, &config.shape);
     let unused = old
         .nodes
         .iter()
         .map(|n| n.name.0)
         .max()
         .map_or(0, |n| n.saturating_add(1));
-    let (kept, copies) = new.nodes.split_at_mut(measured.len());
-    for (new, old) in kept.iter_mut().zip(measured) {
+    let (kept, copies) = straight.nodes.split_at_mut(movers.len());
+    for (new, mover) in kept.iter_mut().zip(&movers) {
+        let old = &old.nodes[mover.index()];
         (new.name, new.kind) = (old.name, old.kind);
-        new.moves_with = old.moves_with;
     }
     for (name, copy) in (unused..).zip(copies) {
         copy.name = NodeName(name);
     }
-    for i in measured.len()..new.nodes.len() {
-        new.nodes[i].moves_with = mover_of_copy(&new, &new.nodes[i]);
+    if movers.len() == old.measured() {
+        assign_radii(&mut straight, outline, config);
+        return straight;
     }
-    new
-}
-
-/// The copy of what a copy's original moves with, on the same plane; where that has none there, the
-/// original's mover itself.
-fn mover_of_copy(skeleton: &Skeleton, copy: &Node) -> Option<NodeId> {
-    let original = skeleton.nodes.get(copy.copy_of?.index())?;
-    let mover = original.moves_with?;
-    let on_plane = |n: &Node| n.copy_of == Some(mover) && n.plane_angle == copy.plane_angle;
-    let place = skeleton.nodes.iter().position(on_plane);
-    Some(place.map_or(mover, |k| NodeId(k as u32)))
+    let next = unused.saturating_add(straight.nodes.len() as u32);
+    in_depth_of(&straight, old, next)
 }
 
 /// Cuts the tree to a drawn shape; radii follow from what is left.

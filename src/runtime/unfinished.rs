@@ -9,8 +9,8 @@ use super::shared::{Failure, Shared};
 use super::status::{median_error_px, median_fb_error_px};
 use crate::cancel::CancelToken;
 use crate::document::note::json;
-use crate::document::{Begun, CaptureNote, PICTURE_FILE, jpeg};
-use crate::model::{FormatNote, Size};
+use crate::document::{Begun, CaptureNote, PICTURE_FILE, WOOD_FILE, jpeg, wood_csv};
+use crate::model::{BranchGraph, FormatNote, Size};
 use crate::pipeline::{BackEnd, Followed};
 use crate::recording::{SpaceReserve, TrackFile, TrackFileReader};
 use crate::source::SourceInfo;
@@ -38,6 +38,7 @@ pub struct Unfinished {
     reserve: SpaceReserve,
     kept: Option<Instant>,
     picture_is_kept: bool,
+    kept_wood: Option<Arc<BranchGraph>>,
 }
 
 /// Where the capture `out` lies until it is written.
@@ -71,6 +72,7 @@ impl Unfinished {
                     reserve,
                     kept: None,
                     picture_is_kept: false,
+                    kept_wood: None,
                 };
                 Ok((unfinished, log))
             }
@@ -88,6 +90,9 @@ impl Unfinished {
     pub fn restart(&mut self) -> Result<TrackFile, Failure> {
         self.picture_is_kept = false;
         self.kept = None;
+        if self.kept_wood.take().is_some() {
+            std::fs::remove_file(self.dir.join(WOOD_FILE)).map_err(Failure::Log)?;
+        }
         TrackFile::create(&self.dir.join(LOG_FILE)).map_err(Failure::Log)
     }
 
@@ -111,6 +116,18 @@ impl Unfinished {
         if let Some(picture) = job.picture.as_ref().filter(|_| !self.picture_is_kept) {
             self.replace(PICTURE_FILE, &jpeg(&picture.rgb)?)?;
             self.picture_is_kept = true;
+        }
+        let wood = job.tree.as_ref().and_then(|tree| tree.wood.as_ref());
+        self.keep_wood(wood)
+    }
+
+    /// The frames are not kept, and with them the wood that they show would be lost.
+    fn keep_wood(&mut self, wood: Option<&Arc<BranchGraph>>) -> Result<(), Failure> {
+        let Some(wood) = wood else { return Ok(()) };
+        let kept = self.kept_wood.as_ref();
+        if !kept.is_some_and(|kept| Arc::ptr_eq(kept, wood)) {
+            self.replace(WOOD_FILE, &wood_csv(wood)?)?;
+            self.kept_wood = Some(wood.clone());
         }
         Ok(())
     }
@@ -153,6 +170,7 @@ pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Fa
         note,
         picture,
         outline,
+        wood,
     } = Begun::read(&dir).map_err(|e| Failure::DamagedUnfinished {
         dir: dir.clone(),
         what: e.to_string(),
@@ -181,6 +199,9 @@ pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Fa
         });
     }
     back.finish(cancel);
+    if let Some(wood) = wood {
+        back.put_wood(wood);
+    }
     let _ = std::fs::remove_file(dir.join(RESERVE_FILE));
     let job = CaptureJob {
         tree: back.model().cloned(),

@@ -8,8 +8,8 @@
 //! it.
 
 use super::labels::{Labels, label};
+use super::taper::taper;
 use crate::model::{BranchGraph, Node, NodeId, NodeKind, NodeName, Skeleton};
-use crate::shape::TIP_RADIUS_PX;
 use nalgebra::{Point2, Point3, UnitQuaternion, Vector3};
 
 /// A followed point on its branch.
@@ -61,6 +61,26 @@ pub(super) fn along_wood(
     }
 }
 
+/// The tree `along` its wood in the depth of `straight`, which has the same branches without their
+/// bends, stood up anew, and copies of its own.
+pub fn in_depth_of(straight: &Skeleton, along: &Skeleton, first_name: u32) -> Skeleton {
+    let wood = BranchGraph::default();
+    let labels = Labels {
+        branch: Vec::new(),
+        end_of: Vec::new(),
+    };
+    let mut build = Build::new(straight, &wood, &labels, &[]);
+    build.again(along);
+    build.copies(&mut Names {
+        next: first_name,
+        prior: None,
+    });
+    Skeleton {
+        nodes: build.nodes,
+        ..along.clone()
+    }
+}
+
 /// A tree along its wood.
 pub(super) struct Joined {
     pub skeleton: Skeleton,
@@ -69,28 +89,9 @@ pub(super) struct Joined {
 }
 
 impl Joined {
-    /// Puts the radii that are seen in the place of those that follow from the pipe model. What is
-    /// not seen is no thinner than what grows from it, and no branch is thicker than what it grows
-    /// from.
+    /// Puts the radii that are seen in the place of those that follow from the pipe model.
     pub fn set_radii(&mut self) {
-        let nodes = &mut self.skeleton.nodes;
-        let seen = |i: usize| self.seen_px.get(i).copied().flatten();
-        for (i, node) in nodes.iter_mut().enumerate() {
-            node.radius = seen(i).unwrap_or(node.radius).max(TIP_RADIUS_PX);
-        }
-        for i in (1..nodes.len()).rev() {
-            let own = nodes[i].radius;
-            if let (Some(parent), Some(_)) = (nodes[i].parent, seen(i))
-                && seen(parent.index()).is_none()
-            {
-                nodes[parent.index()].radius = nodes[parent.index()].radius.max(own);
-            }
-        }
-        for i in 1..nodes.len() {
-            if let Some(parent) = nodes[i].parent.filter(|p| p.index() > 0) {
-                nodes[i].radius = nodes[i].radius.min(nodes[parent.index()].radius);
-            }
-        }
+        taper(&mut self.skeleton.nodes, &self.seen_px);
     }
 }
 
@@ -140,6 +141,38 @@ impl<'a> Build<'a> {
             *foot = Some(NodeId(0));
         }
         build
+    }
+
+    /// The nodes of a tree that is along its wood, with their places in the picture.
+    fn again(&mut self, along: &Skeleton) {
+        let movers: Vec<NodeId> = [NodeId(0)]
+            .into_iter()
+            .chain(along.measured_branches())
+            .collect();
+        let branch_of = |node: NodeId| movers.iter().position(|m| *m == along.mover(node));
+        let is_own = |node: NodeId| along.mover(node) == node || along.is_bend(node);
+        let measured = || (1..along.measured() as u32).map(NodeId);
+        let mut whole_px = vec![0.0; movers.len()];
+        for node in measured().filter(|node| is_own(*node)) {
+            if let Some(branch) = branch_of(node) {
+                whole_px[branch] += way_of(along, node.index()).xy().norm();
+            }
+        }
+        for node in measured() {
+            let branch = branch_of(node).unwrap_or(0);
+            let mut share = 0.0;
+            if is_own(node) {
+                let px = way_of(along, node.index()).xy().norm();
+                let pushed_px = way_of(self.old, branch).norm();
+                let scale = (whole_px[branch] / pushed_px.max(f64::MIN_POSITIVE)).min(1.0);
+                share = scale * px / whole_px[branch].max(f64::MIN_POSITIVE);
+            }
+            let mut new = along.nodes[node.index()].clone();
+            let below = new.parent.and_then(|p| self.nodes.get(p.index()));
+            new.position.z =
+                below.map_or(0.0, |below| below.position.z) + share * way_of(self.old, branch).z;
+            self.push(new, branch, None, share);
+        }
     }
 
     /// The measured nodes in their order, each after the bends on its way.

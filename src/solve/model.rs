@@ -195,7 +195,10 @@ impl Model {
         let mut joined = along_wood(&straight, &wood, &points, &mut names);
         self.names = names.next;
         assign_radii(&mut joined.skeleton, &self.outline, config);
-        joined.set_radii();
+        // A width that the user gives goes before what is seen.
+        if config.wood.trunk_width_px <= 0.0 {
+            joined.set_radii();
+        }
         self.skeleton = Arc::new(joined.skeleton);
     }
 
