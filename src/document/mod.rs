@@ -29,7 +29,7 @@ pub use wood::{WOOD_FILE, read_wood, wood_csv};
 use crate::bounds::Bounds;
 use crate::config::Config;
 use crate::dynamics::Film;
-use crate::model::{BranchGraph, Outline, Picture, Pose, Size, Skeleton, Swaying, Unidentified};
+use crate::model::{Outline, Picture, Pose, Size, Skeleton, Swaying, Unidentified, WoodSeen};
 use crate::motion::PoseEstimator;
 use motion::PoseReader;
 use nalgebra::Point2;
@@ -333,7 +333,7 @@ pub struct Begun {
     pub note: CaptureNote,
     pub picture: Option<Picture>,
     pub outline: Option<Outline>,
-    pub wood: Option<Arc<BranchGraph>>,
+    pub wood: WoodSeen,
 }
 
 impl Begun {
@@ -351,7 +351,7 @@ impl Begun {
         Ok(Self {
             picture,
             outline: noted.and_then(|noted| outline(noted).ok()),
-            wood: read_wood(dir).ok().map(Arc::new),
+            wood: read_wood(dir).unwrap_or_default(),
             note,
         })
     }

@@ -3,32 +3,35 @@
 use super::error::DocumentError;
 use super::table::{TableReader, TableWriter};
 use crate::files::WriteError;
-use crate::model::{BranchGraph, FARTHEST_PX, WoodNode};
+use crate::model::{BranchGraph, FARTHEST_PX, WoodNode, WoodSeen};
 use nalgebra::Point2;
 use std::path::Path;
+use std::sync::Arc;
 
 /// The name of the file.
 pub const WOOD_FILE: &str = "wood.csv";
-const HEADER: &str = "parent,u_px,v_px,radius_px";
-const COLUMNS: [&str; 4] = ["parent", "u_px", "v_px", "radius_px"];
-/// So that nothing of a graph is lost.
-const DECIMALS: usize = 9;
+const HEADER: &str = "frame,parent,u_px,v_px,radius_px";
+const COLUMNS: [&str; 5] = ["frame", "parent", "u_px", "v_px", "radius_px"];
 
-/// The table as bytes: a row for each node, which names its parent by the number of that one's row.
+/// The table as bytes: a row for each node of the wood that was found in a frame, which names its
+/// parent by the number of that one's row. Numbers have all their digits.
 ///
 /// # Errors
 /// Memory cannot be had.
-pub fn wood_csv(wood: &BranchGraph) -> Result<Vec<u8>, WriteError> {
+pub fn wood_csv(seen: &WoodSeen) -> Result<Vec<u8>, WriteError> {
     let mut table = TableWriter::new(WOOD_FILE, HEADER, Vec::new())?;
-    for node in &wood.nodes {
-        match node.parent {
-            Some(parent) => table.count(parent as u64),
-            None => table.text(""),
+    for (frame, wood) in seen {
+        for node in &wood.nodes {
+            table.count(*frame);
+            match node.parent {
+                Some(parent) => table.count(parent as u64),
+                None => table.text(""),
+            }
+            for number in [node.position_px.x, node.position_px.y, node.radius_px] {
+                table.text(&number.to_string());
+            }
+            table.end_row()?;
         }
-        table.number(node.position_px.x, DECIMALS);
-        table.number(node.position_px.y, DECIMALS);
-        table.number(node.radius_px, DECIMALS);
-        table.end_row()?;
     }
     table.finish()
 }
@@ -37,13 +40,14 @@ pub fn wood_csv(wood: &BranchGraph) -> Result<Vec<u8>, WriteError> {
 ///
 /// # Errors
 /// It is missing or damaged, or a row's parent does not stand before it.
-pub fn read_wood(dir: &Path) -> Result<BranchGraph, DocumentError> {
+pub fn read_wood(dir: &Path) -> Result<WoodSeen, DocumentError> {
     let mut table = TableReader::open(dir, WOOD_FILE, COLUMNS)?;
-    let mut wood = BranchGraph::default();
+    let mut graphs = std::collections::BTreeMap::<u64, BranchGraph>::new();
     while table.next()? {
-        let parent = match table.cell(0) {
+        let wood = graphs.entry(table.whole(0, "frame")?).or_default();
+        let parent = match table.cell(1) {
             "" => None,
-            _ => Some(table.whole::<usize>(0, "parent")?),
+            _ => Some(table.whole::<usize>(1, "parent")?),
         };
         let is_root = wood.nodes.is_empty();
         if parent.is_none() != is_root || parent.is_some_and(|p| p >= wood.nodes.len()) {
@@ -51,8 +55,8 @@ pub fn read_wood(dir: &Path) -> Result<BranchGraph, DocumentError> {
         }
         let node = WoodNode {
             parent,
-            position_px: Point2::new(table.number(1, "u_px")?, table.number(2, "v_px")?),
-            radius_px: table.number(3, "radius_px")?,
+            position_px: Point2::new(table.number(2, "u_px")?, table.number(3, "v_px")?),
+            radius_px: table.number(4, "radius_px")?,
         };
         let is_far = node.position_px.iter().any(|x| x.abs() > FARTHEST_PX);
         if is_far || !(0.0..=FARTHEST_PX).contains(&node.radius_px) {
@@ -60,7 +64,10 @@ pub fn read_wood(dir: &Path) -> Result<BranchGraph, DocumentError> {
         }
         wood.nodes.push(node);
     }
-    Ok(wood)
+    let graphs = graphs
+        .into_iter()
+        .map(|(frame, wood)| (frame, Arc::new(wood)));
+    Ok(graphs.collect())
 }
 
 #[cfg(test)]
@@ -75,7 +82,7 @@ mod tests {
         }
     }
 
-    fn read(text: &[u8]) -> Result<BranchGraph, DocumentError> {
+    fn read(text: &[u8]) -> Result<WoodSeen, DocumentError> {
         let dir = tempfile::tempdir().expect("a folder");
         std::fs::write(dir.path().join(WOOD_FILE), text).expect("a file");
         read_wood(dir.path())
@@ -90,25 +97,29 @@ mod tests {
                 node(Some(0), 90.0, 120.0),
             ],
         };
-        let text = wood_csv(&wood).expect("a table");
-        assert_eq!(read(&text).expect("wood"), wood);
+        let later = BranchGraph {
+            nodes: vec![node(None, 0.1 + 0.2, 1.0 / 3.0)],
+        };
+        let seen = WoodSeen::from([(90, Arc::new(wood)), (170, Arc::new(later))]);
+        let text = wood_csv(&seen).expect("a table");
+        assert_eq!(read(&text).expect("wood"), seen);
     }
 
     #[test]
     fn damaged_tables_are_refused() {
-        let head = "parent,u_px,v_px,radius_px\n";
-        let root = ",1,2,3\n";
+        let head = "frame,parent,u_px,v_px,radius_px\n";
+        let root = "7,,1,2,3\n";
         for rows in [
-            "0,1,2,3\n".to_owned(),
-            format!("{root},1,2,3\n"),
-            format!("{root}1,1,2,3\n"),
-            format!("{root}0,1,nan,3\n"),
-            format!("{root}0,1,1e11,3\n"),
-            format!("{root}0,1,2,-1\n"),
-            format!("{root}0,1\n"),
+            "7,0,1,2,3\n".to_owned(),
+            format!("{root}7,,1,2,3\n"),
+            format!("{root}7,1,1,2,3\n"),
+            format!("{root}7,0,1,nan,3\n"),
+            format!("{root}7,0,1,1e11,3\n"),
+            format!("{root}7,0,1,2,-1\n"),
+            format!("{root}7,0,1\n"),
         ] {
             assert!(read(format!("{head}{rows}").as_bytes()).is_err(), "{rows}");
         }
-        assert!(read(b"parent\n").is_err());
+        assert!(read(b"frame,parent\n").is_err());
     }
 }

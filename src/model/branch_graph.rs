@@ -2,6 +2,8 @@
 
 use super::Size;
 use nalgebra::Point2;
+use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// A place is on a piece of wood within so many of its radii, and so many pixels at 640 px picture
 /// width.
@@ -18,6 +20,9 @@ pub struct WoodNode {
     /// Half the width that is seen there, px.
     pub radius_px: f64,
 }
+
+/// The wood that was found while a film went on, by the newest frame that was looked at.
+pub type WoodSeen = BTreeMap<u64, Arc<BranchGraph>>;
 
 /// The branches that a picture shows, joined to one tree: nodes with parents before children, the
 /// first is the trunk's foot.

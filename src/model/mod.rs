@@ -22,7 +22,7 @@ mod track;
 mod track_log;
 mod track_table;
 
-pub use branch_graph::{BranchGraph, WoodNode};
+pub use branch_graph::{BranchGraph, WoodNode, WoodSeen};
 pub use control::Control;
 pub use frame::{
     Frame, Luma, Picture, PixelFormat, RawFrame, Rgb, Size, TimedFrame, nanoseconds, seconds,

@@ -2,13 +2,13 @@
 
 use super::film_log::FilmLog;
 use super::pose_tracker::{PoseTracker, Targets};
-use super::refiner::{Refiner, SolveJob, Taken};
+use super::refiner::{Refiner, Seen, SolveJob, Taken};
 use crate::cancel::CancelToken;
 use crate::config::Config;
 use crate::hierarchy::{self, Evidence};
-use crate::model::{BranchGraph, Outline, Phase, Pose, RawFrame, Rgb, TrackLog, TrackSet};
+use crate::model::{Outline, Phase, Pose, RawFrame, Rgb, TrackLog, TrackSet, WoodSeen};
 use crate::motion::Binding;
-use crate::solve::{Model, identify_sub_branches, solve, with_wood};
+use crate::solve::{Model, identify_sub_branches, solve};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -50,6 +50,7 @@ pub struct BackEnd {
     config: Config,
     log: TrackLog,
     film: FilmLog,
+    wood: WoodSeen,
     evidence: Evidence,
     judged_s: Option<f64>,
     outline: Option<Arc<Outline>>,
@@ -77,6 +78,7 @@ impl BackEnd {
             config: config.clone(),
             log: TrackLog::new(remembered_s(config)),
             film: FilmLog::new(config.accumulate.window_s),
+            wood: WoodSeen::new(),
             evidence: Evidence::default(),
             judged_s: None,
             outline: None,
@@ -194,13 +196,19 @@ impl BackEnd {
         let (Some(mut refiner), Some(standing)) = (self.refiner.take(), &self.tracker) else {
             return Vec::new();
         };
-        let taken = refiner.step(&self.log, &self.film, standing, &self.config);
+        let seen = Seen {
+            film: &self.film,
+            wood: &self.wood,
+        };
+        let taken = refiner.step(&self.log, seen, standing, &self.config);
         self.refiner = Some(refiner).filter(|r| !r.is_over());
         let Some(Taken { tracker, before }) = taken else {
             return Vec::new();
         };
         self.evidence = tracker.model().evidence.clone();
+        let frame = tracker.model().frame;
         self.tracker = Some(tracker);
+        self.note_wood(frame);
         before
     }
 
@@ -264,20 +272,38 @@ impl BackEnd {
         let Some(tracker) = self.tracker.as_ref() else {
             return;
         };
-        if tracker.model().wood.is_some() || self.film.frames().is_empty() {
+        let Some(newest) = self.log.all().newest().map(|set| set.frame) else {
+            return;
+        };
+        if tracker.model().wood.is_some() {
             return;
         }
-        let job = SolveJob::new(&self.log, &self.film, tracker, &self.config);
+        let seen = Seen {
+            film: &self.film,
+            wood: &self.wood,
+        };
+        let job = SolveJob::new(&self.log, seen, tracker, &self.config);
         if let Some(model) = job.prior_along_wood(cancel) {
             self.tracker = Some(PoseTracker::new(Arc::new(model), &self.config));
+            self.note_wood(newest);
         }
     }
 
-    /// Lets the tree run along wood that was found in frames that are no longer there.
-    pub fn put_wood(&mut self, wood: Arc<BranchGraph>) {
-        if let Some(tracker) = &self.tracker {
-            let model = with_wood(tracker.model(), Some(wood), None, &self.config);
-            self.tracker = Some(PoseTracker::new(Arc::new(model), &self.config));
+    /// The wood that was found in this film when it was there.
+    pub fn put_wood(&mut self, wood: WoodSeen) {
+        self.wood = wood;
+    }
+
+    /// The wood that was found.
+    pub fn wood(&self) -> &WoodSeen {
+        &self.wood
+    }
+
+    /// Remembers the wood of a model that has taken effect, which was found with `frame`.
+    fn note_wood(&mut self, frame: u64) {
+        let wood = self.model().and_then(|model| model.wood.clone());
+        if let Some(wood) = wood {
+            self.wood.entry(frame).or_insert(wood);
         }
     }
 

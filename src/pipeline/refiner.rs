@@ -7,7 +7,7 @@ use super::pose_tracker::{PoseTracker, Targets};
 use super::wood::find_wood;
 use crate::cancel::CancelToken;
 use crate::config::Config;
-use crate::model::{BranchGraph, LogWindow, Outline, Pose, Skeleton, TrackLog};
+use crate::model::{BranchGraph, LogWindow, Outline, Pose, Skeleton, TrackLog, WoodSeen};
 use crate::solve::{Model, solve, with_wood};
 use std::sync::Arc;
 
@@ -29,21 +29,30 @@ const FRAMES_PER_STEP: usize = 30;
 pub struct SolveJob {
     log: TrackLog,
     film: FilmLog,
+    /// Wood that was found with the newest frame, or before it, when the film was there.
+    found: Option<Arc<BranchGraph>>,
     outline: Arc<Outline>,
     prior: Model,
     config: Config,
 }
 
+/// What the pictures of a film show: the frames that are kept, or what was found in them when they
+/// were there.
+#[derive(Clone, Copy)]
+pub(super) struct Seen<'a> {
+    pub film: &'a FilmLog,
+    pub wood: &'a WoodSeen,
+}
+
 impl SolveJob {
-    pub(super) fn new(
-        log: &TrackLog,
-        film: &FilmLog,
-        standing: &PoseTracker,
-        config: &Config,
-    ) -> Self {
+    pub(super) fn new(log: &TrackLog, seen: Seen, standing: &PoseTracker, config: &Config) -> Self {
+        let newest = log.all().newest().map_or(0, |set| set.frame);
+        let found = seen.wood.range(..=newest).next_back();
+        let is_gone = seen.film.frames().is_empty();
         Self {
             log: log.clone(),
-            film: film.clone(),
+            film: seen.film.clone(),
+            found: found.filter(|_| is_gone).map(|(_, wood)| wood.clone()),
             outline: standing.model().outline.clone(),
             prior: standing.model().joined_by(standing.binding()),
             config: config.clone(),
@@ -103,6 +112,9 @@ impl SolveJob {
 
     /// The wood that the kept frames show.
     fn wood(&self, cancel: &CancelToken) -> Option<Arc<BranchGraph>> {
+        if self.found.is_some() {
+            return self.found.clone();
+        }
         let window = self.log.last(self.config.accumulate.window_s);
         let prior = &self.prior.plain;
         branches_in(&self.film, window, &self.outline, prior, cancel).map(Arc::new)
@@ -210,14 +222,14 @@ impl Refiner {
     pub fn step(
         &mut self,
         log: &TrackLog,
-        film: &FilmLog,
+        seen: Seen,
         standing: &PoseTracker,
         config: &Config,
     ) -> Option<Taken> {
         let now_s = log.all().newest()?.time_s;
         match std::mem::replace(&mut self.stage, Stage::Over) {
             Stage::Waiting(due_s) if now_s >= due_s => {
-                let job = SolveJob::new(log, film, standing, config);
+                let job = SolveJob::new(log, seen, standing, config);
                 self.stage = Stage::Solving(Solving {
                     due_s: now_s + job.ready_s(),
                     job: Arc::new(job),

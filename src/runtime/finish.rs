@@ -15,7 +15,7 @@ use crate::document::{
 use crate::dynamics::{Depth, Film};
 use crate::files::OutputFolder;
 use crate::model::{
-    Outline, Picture, Pose, Skeleton, Tentative, Timing, TrackLog, TrackSet, Unidentified,
+    Outline, Picture, Pose, Skeleton, Tentative, Timing, TrackLog, TrackSet, Unidentified, WoodSeen,
 };
 use crate::recording::TrackFileReader;
 use crate::solve::{Model, with_modes};
@@ -87,6 +87,8 @@ pub struct CaptureJob {
     pub tracks: TrackFileReader,
     /// The last seconds of the same.
     pub log: TrackLog,
+    /// The wood that was found in its frames.
+    pub wood: WoodSeen,
     pub config: Config,
     pub info: SourceInfo,
     pub quality: Quality,

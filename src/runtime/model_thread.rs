@@ -382,6 +382,7 @@ impl ModelThread {
             outline: self.back.outline().cloned(),
             tracks: file.reader().map_err(Failure::Log)?,
             log: self.back.log().clone(),
+            wood: self.back.wood().clone(),
             config: self
                 .shared
                 .reloaded()

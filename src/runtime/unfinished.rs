@@ -10,7 +10,7 @@ use super::status::{median_error_px, median_fb_error_px};
 use crate::cancel::CancelToken;
 use crate::document::note::json;
 use crate::document::{Begun, CaptureNote, PICTURE_FILE, WOOD_FILE, jpeg, wood_csv};
-use crate::model::{BranchGraph, FormatNote, Size};
+use crate::model::{FormatNote, Size, WoodSeen};
 use crate::pipeline::{BackEnd, Followed};
 use crate::recording::{SpaceReserve, TrackFile, TrackFileReader};
 use crate::source::SourceInfo;
@@ -38,7 +38,8 @@ pub struct Unfinished {
     reserve: SpaceReserve,
     kept: Option<Instant>,
     picture_is_kept: bool,
-    kept_wood: Option<Arc<BranchGraph>>,
+    /// How much of the wood that was found is on disk.
+    kept_wood: usize,
 }
 
 /// Where the capture `out` lies until it is written.
@@ -72,7 +73,7 @@ impl Unfinished {
                     reserve,
                     kept: None,
                     picture_is_kept: false,
-                    kept_wood: None,
+                    kept_wood: 0,
                 };
                 Ok((unfinished, log))
             }
@@ -90,7 +91,7 @@ impl Unfinished {
     pub fn restart(&mut self) -> Result<TrackFile, Failure> {
         self.picture_is_kept = false;
         self.kept = None;
-        if self.kept_wood.take().is_some() {
+        if std::mem::take(&mut self.kept_wood) > 0 {
             std::fs::remove_file(self.dir.join(WOOD_FILE)).map_err(Failure::Log)?;
         }
         TrackFile::create(&self.dir.join(LOG_FILE)).map_err(Failure::Log)
@@ -117,17 +118,14 @@ impl Unfinished {
             self.replace(PICTURE_FILE, &jpeg(&picture.rgb)?)?;
             self.picture_is_kept = true;
         }
-        let wood = job.tree.as_ref().and_then(|tree| tree.wood.as_ref());
-        self.keep_wood(wood)
+        self.keep_wood(&job.wood)
     }
 
     /// The frames are not kept, and with them the wood that they show would be lost.
-    fn keep_wood(&mut self, wood: Option<&Arc<BranchGraph>>) -> Result<(), Failure> {
-        let Some(wood) = wood else { return Ok(()) };
-        let kept = self.kept_wood.as_ref();
-        if !kept.is_some_and(|kept| Arc::ptr_eq(kept, wood)) {
+    fn keep_wood(&mut self, wood: &WoodSeen) -> Result<(), Failure> {
+        if wood.len() > self.kept_wood {
             self.replace(WOOD_FILE, &wood_csv(wood)?)?;
-            self.kept_wood = Some(wood.clone());
+            self.kept_wood = wood.len();
         }
         Ok(())
     }
@@ -179,6 +177,7 @@ pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Fa
     let outline = Arc::new(outline.unwrap_or_else(|| crate::outline::whole(info.size)));
     let shared = Arc::new(Shared::restored(&note.timing, &note.warnings));
     let mut back = BackEnd::new(&note.config);
+    back.put_wood(wood);
     let mut quality = Quality::default();
     for set in tracks.sets() {
         if cancel.is_cancelled() {
@@ -199,15 +198,13 @@ pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Fa
         });
     }
     back.finish(cancel);
-    if let Some(wood) = wood {
-        back.put_wood(wood);
-    }
     let _ = std::fs::remove_file(dir.join(RESERVE_FILE));
     let job = CaptureJob {
         tree: back.model().cloned(),
         outline: back.outline().cloned(),
         tracks,
         log: back.log().clone(),
+        wood: back.wood().clone(),
         info,
         config: note.config,
         quality,
