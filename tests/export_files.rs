@@ -76,7 +76,7 @@ fn nodes_say_what_is_not_identifiable() {
     let lines: Vec<&str> = out.lines().collect();
     let header = "node_id,parent_id,level,n_tracks,u_px,v_px,x,y,z,radius,frequency_hz,frequency_lo_hz,\
                   frequency_hi_hz,damping_ratio,damping_lo,damping_hi,identifiable,excitation,amplitude_deg,unidentified,\
-                  kind,copy_of,plane_deg,certainty,moves_with";
+                  kind,copy_of,plane_deg,certainty,moves_with,branch,order";
     assert_eq!(lines[0], header);
     assert_eq!(
         lines[1],
