@@ -230,6 +230,40 @@ fn blender_gets_every_bone_and_the_whole_animation() {
     assert_eq!(there["materials"], json!(["bark", "leaf"]));
 }
 
+/// Leaves that do not swing on their own: one tree, one armature, one action, nothing beside them.
+#[test]
+fn blender_gets_one_armature_and_one_action() {
+    let Some(blender) = tools::program("blender", "--version") else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("tempdir");
+    let skeleton = synthetic::tree(5, 2);
+    let poses = synthetic::sway(&skeleton, 31);
+    let dressed = dressed(&skeleton, 3, synthetic::leaves(&skeleton));
+    for level in 0..3 {
+        let file = dir.path().join(format!("tree{level}.glb"));
+        let model = Model {
+            level,
+            ..model(&skeleton, &dressed, &poses, &Value::Null)
+        };
+        fs::write(&file, glb(&model).expect("glb").0).expect("write");
+        let there = told_by_blender(&blender, "tests/blender_import.py", &file, "IMPORTED ");
+        println!("{there}");
+        assert_eq!(there["armatures"], json!(["tree"]));
+        assert_eq!(there["actions"].as_array().map(Vec::len), Some(1));
+        assert_eq!(there["empties"], json!([]));
+        assert_eq!(there["meshes"], json!(["leaves", "wood"]));
+        assert_eq!(there["materials"], json!(["bark", "leaf"]));
+        assert_eq!(there["shape_keys"], 0);
+        let bones = there["bones"].as_array().expect("bones");
+        assert!(
+            ["tree", "trunk", "limb_1", "limb_1.1"]
+                .iter()
+                .all(|n| bones.contains(&json!(n)))
+        );
+    }
+}
+
 /// The crown of a tree as it is filmed in leaf, imported with the importer's own settings and lit by
 /// a sun and a sky: green and not black, from the front and from behind.
 #[test]

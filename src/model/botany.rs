@@ -36,8 +36,8 @@ pub struct BotanicalBranches {
 }
 
 impl BotanicalBranches {
-    /// The branch that a node is on; the trunk for a node that is not there.
-    fn of(&self, node: NodeId) -> usize {
+    /// The place among all of the branch that a node is on; the trunk for a node that is not there.
+    pub fn of(&self, node: NodeId) -> usize {
         self.of_node.get(node.index()).copied().unwrap_or(0)
     }
 

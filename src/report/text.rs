@@ -36,7 +36,7 @@ fn one(study: &Study, columns: Option<usize>) -> String {
         "{answers} of {all} have a frequency that this film shows; intervals are 95 %\n\n"
     );
     let metres = study.metres_per_px > 0.0;
-    let mut heads = vec![("branch", 0), ("level", 6), ("on", 1), ("points", 7)];
+    let mut heads = vec![("node", 0), ("branch", 2), ("on", 1), ("points", 7)];
     heads.extend([
         ("frequency, Hz", 0),
         ("damping ratio", 0),
@@ -44,7 +44,7 @@ fn one(study: &Study, columns: Option<usize>) -> String {
         ("end, px", 5),
     ]);
     heads.extend(metres.then_some(("end, m", 4)));
-    heads.extend([("peak, Hz", 8), ("eq. 6", 8)]);
+    heads.extend([("peak, Hz", 8), ("eq. 6", 8), ("level", 9)]);
     let mut table = Table::new(&heads);
     branches.iter().for_each(|b| table.push(row(study, b)));
     let (table, without) = table.within(columns);
@@ -87,7 +87,7 @@ fn row(study: &Study, branch: &Branch) -> Vec<String> {
     let parent = branch.parent.map_or("foot".into(), |p| p.to_string());
     let mut row = vec![
         branch.name.to_string(),
-        branch.level.to_string(),
+        branch.piece.clone(),
         parent,
         branch.points.to_string(),
     ];
@@ -109,6 +109,7 @@ fn row(study: &Study, branch: &Branch) -> Vec<String> {
                 branch.reference.map_or(f64::NAN, |r| r.damping_ratio),
                 3,
             ));
+            row.push(branch.level.to_string());
         }
     }
     row
