@@ -29,6 +29,9 @@ pub fn provenance(source: &str, software: &Software, poses: &[Pose]) -> Value {
     })
 }
 
+/// How many levels of detail there are.
+pub const LEVELS_OF_DETAIL: usize = LEVELS.len();
+
 /// A file and its bytes.
 pub type NamedBytes = (String, Vec<u8>);
 
@@ -82,8 +85,8 @@ pub fn gltf_files(
         texture,
     } = assemble(model, true)?;
     let mut files = Vec::new();
-    // Names in the file are those of links: what a link cannot hold is written as %XX.
-    if let (Some((ending, bytes)), Some(image)) = (texture, root.images.first_mut()) {
+    // The picture of the leaf comes after that of the bark. Names in the file are those of links: what a link cannot hold is written as %XX.
+    if let (Some((ending, bytes)), Some(image)) = (texture, root.images.last_mut()) {
         let name = format!("{stem}_leaf.{ending}");
         image.uri = Some(percent(&name));
         files.push((name, bytes));
@@ -217,7 +220,8 @@ fn push_wood(
     let Some(mesh) = look.wood else {
         return Ok(Vec::new());
     };
-    let material = root.push(bark(model.dressed.bark_rgb));
+    let material = bark(root, buffer, model.dressed);
+    let material = root.push(material);
     let what = Skinned::wood(mesh, material, skin);
     Ok(vec![push_mesh(root, buffer, model, what)?])
 }

@@ -13,6 +13,9 @@ pub struct Dressed {
     pub foliage: Foliage,
     /// Colour of the bark as in a picture (sRGB).
     pub bark_rgb: [u8; 3],
+    /// The filmed bark as a tile that repeats without a seam, PNG: once round a limb, and as far
+    /// along it as it is round. `None` where the film shows too little of the trunk.
+    pub bark_png: Option<Vec<u8>>,
 }
 
 impl Dressed {
