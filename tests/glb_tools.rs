@@ -237,7 +237,7 @@ fn blender_gets_one_armature_and_one_action() {
         return;
     };
     let dir = tempfile::tempdir().expect("tempdir");
-    let skeleton = synthetic::tree(5, 2);
+    let skeleton = synthetic::tree(7, 2);
     let poses = synthetic::sway(&skeleton, 31);
     let dressed = dressed(&skeleton, 3, synthetic::leaves(&skeleton));
     for level in 0..3 {

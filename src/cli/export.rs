@@ -6,11 +6,10 @@ use super::output::eprint_line;
 use super::stop::Stop;
 use super::tree::{Tail, TreeArgs, print_warnings};
 use super::unused;
-use crate::export::gltf::{KEY_TOLERANCE_PX, Model, NamedBytes, glb, gltf_files};
+use crate::export::gltf::{KEY_TOLERANCE_PX, LEVELS_OF_DETAIL, Model, NamedBytes, glb, gltf_files};
 use crate::export::still::{obj_files, ply};
 use crate::export::{ExportError, html};
 use crate::files::{WriteError, refuse_taken, write_files};
-use crate::geometry::LEVELS;
 use crate::views::PreparedTree;
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
@@ -119,7 +118,7 @@ pub fn run(args: &ExportArgs) -> Result<(), CommandError> {
              for the others",
         );
     } else if args.lods && matches!(args.format, Format::Glb | Format::Gltf) {
-        for level in 1..LEVELS.len() {
+        for level in 1..LEVELS_OF_DETAIL {
             let model = Model { level, ..model };
             let stem = format!("{}_lod{level}", target.stem());
             files.extend(match args.format {

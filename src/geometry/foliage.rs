@@ -69,9 +69,11 @@ impl FoliageGroup {
         for (vertex, &leaf) in leaf_of.iter().enumerate() {
             middles[leaf].add(self, vertex);
         }
-        // Evenly among all, which stand in the order in which they were planted.
-        let stays =
-            |leaf: usize| ((leaf + 1) as f64 * share).floor() > (leaf as f64 * share).floor();
+        // Evenly among all, which stand in the order in which they were planted; the first always.
+        let mut stays = vec![true; leaves];
+        for (leaf, stays) in stays.iter_mut().enumerate().skip(1) {
+            *stays = (leaf as f64 * share).floor() > ((leaf - 1) as f64 * share).floor();
+        }
         let larger = share.max(f64::MIN_POSITIVE).sqrt().recip() as f32;
         let mut out = Self {
             node: self.node,
@@ -79,7 +81,7 @@ impl FoliageGroup {
         };
         let mut moved_to: Vec<Option<u32>> = vec![None; leaf_of.len()];
         for (vertex, &leaf) in leaf_of.iter().enumerate() {
-            if stays(leaf) {
+            if stays[leaf] {
                 moved_to[vertex] = Some(out.mesh.positions.len() as u32);
                 out.take(self, vertex, &middles[leaf], larger);
             }

@@ -44,7 +44,7 @@ fn one(study: &Study, columns: Option<usize>) -> String {
         ("end, px", 5),
     ]);
     heads.extend(metres.then_some(("end, m", 4)));
-    heads.extend([("peak, Hz", 8), ("eq. 6", 8), ("level", 9)]);
+    heads.extend([("peak, Hz", 8), ("eq. 6", 8)]);
     let mut table = Table::new(&heads);
     branches.iter().for_each(|b| table.push(row(study, b)));
     let (table, without) = table.within(columns);
@@ -109,7 +109,6 @@ fn row(study: &Study, branch: &Branch) -> Vec<String> {
                 branch.reference.map_or(f64::NAN, |r| r.damping_ratio),
                 3,
             ));
-            row.push(branch.level.to_string());
         }
     }
     row
