@@ -191,11 +191,11 @@ impl<'a> Axes<'a> {
             above[parent].wood_px += own.wood_px;
             above[parent].nodes += own.nodes;
         }
-        for i in 1..n {
-            above[i].wood_px *= self.straightness(i);
+        for (i, claim) in above.iter_mut().enumerate().skip(1) {
+            claim.wood_px *= self.straightness(i);
         }
-        for i in 1..n {
-            if let Some(original) = self.skeleton.nodes[i].copy_of {
+        for (i, node) in self.skeleton.nodes.iter().enumerate().skip(1) {
+            if let Some(original) = node.copy_of {
                 above[i] = above.get(original.index()).copied().unwrap_or_default();
             }
         }

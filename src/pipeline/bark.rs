@@ -60,11 +60,16 @@ fn mirrored(x: u32) -> u32 {
 }
 
 /// Divides every texel by the mean of those around it, so that what is left is bark and not light,
-/// and takes off what stands out: a rope, a leaf, the sky beside the trunk.
+/// and every row by its mean, or what crosses the whole trunk would be rings on every limb; and takes
+/// off what stands out: a rope, a leaf, the sky beside the trunk.
 fn flatten(patch: &mut [f64]) {
     let around = local_means(patch);
     for (x, mean) in patch.iter_mut().zip(around) {
         *x /= mean.max(1.0);
+    }
+    for row in patch.chunks_exact_mut(PATCH as usize) {
+        let mean = row.iter().sum::<f64>() / f64::from(PATCH);
+        row.iter_mut().for_each(|x| *x /= mean.max(1e-3));
     }
     let ends = [STANDS_OUT, 1.0 - STANDS_OUT].map(|share| quantile(patch.to_vec(), share));
     if let [Some(darkest), Some(brightest)] = ends {
