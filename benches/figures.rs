@@ -299,7 +299,7 @@ fn model_file() -> String {
             dressed: &dressed,
             poses: &poses,
             flutter: &flutter,
-            all_levels: false,
+            level: 0,
             metres_per_px: 0.0,
             tolerance_px: KEY_TOLERANCE_PX,
             node_extras: &[],

@@ -15,6 +15,9 @@ print(
     "IMPORTED "
     + json.dumps(
         {
+            "armatures": sorted(a.name for a in armatures),
+            "actions": sorted(a.name for a in bpy.data.actions),
+            "empties": sorted(o.name for o in bpy.data.objects if o.type == "EMPTY"),
             "bones": sorted(b.name for a in armatures for b in a.data.bones),
             "meshes": sorted(o.name for o in meshes),
             "triangles": sum(len(o.data.loop_triangles) or len(o.data.polygons) for o in meshes),

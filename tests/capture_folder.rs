@@ -55,7 +55,7 @@ impl Replay {
             "nodes.csv",
             "node_id,parent_id,level,n_tracks,u_px,v_px,x,y,z,radius,frequency_hz,frequency_lo_hz,frequency_hi_hz,\
              damping_ratio,damping_lo,damping_hi,identifiable,excitation,amplitude_deg,unidentified,\
-             kind,copy_of,plane_deg,certainty,moves_with",
+             kind,copy_of,plane_deg,certainty,moves_with,branch,order",
         )
     }
 

@@ -579,7 +579,7 @@ mod fuzz {
             dressed: &dressed,
             poses,
             flutter: &flutter(&dressed, poses, skeleton, config),
-            all_levels: false,
+            level: 0,
             metres_per_px: config.export.metres_per_px,
             tolerance_px: KEY_TOLERANCE_PX,
             node_extras: &[],

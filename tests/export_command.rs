@@ -88,11 +88,9 @@ fn the_glb_is_the_captures_own() {
         let cells: Vec<&str> = row.split(',').collect();
         let extras: serde_json::Value =
             serde_json::from_str(node.extras().as_ref().expect("extras").get()).expect("json");
-        assert!(
-            node.name()
-                .expect("name")
-                .starts_with(&format!("node_{}", cells[0]))
-        );
+        assert_eq!(extras["node_id"].to_string(), cells[0]);
+        assert_eq!(extras["branch"], cells[25]);
+        assert_eq!(extras["order"].to_string(), cells[26]);
         let number = |c: usize| cells[c].parse::<f64>().ok();
         let told = |name: &str| extras.get(name).and_then(serde_json::Value::as_f64);
         let interval = |name: &str| {
@@ -547,6 +545,52 @@ const TRIANGLE: &str = r#"{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]
         "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}],
     "bufferViews": [{"buffer": 0, "byteLength": 36}],
     "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]}]}"#;
+
+/// All levels of detail, each a model of its own with the same bones; and metres by a height.
+#[test]
+fn levels_are_files_beside_each_other() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("oak.glb");
+    let more = ["--lods", "--leaves", "on", "--height", "7.5"];
+    assert!(export(made(), "glb", &out, &more).status.success());
+    let mut triangles = Vec::new();
+    let mut bones: Vec<Vec<String>> = Vec::new();
+    for name in ["oak.glb", "oak_lod1.glb", "oak_lod2.glb"] {
+        let model = gltf::Gltf::open(dir.path().join(name)).expect("a valid file");
+        assert_eq!((model.scenes().count(), model.animations().count()), (1, 1));
+        let notes = model.as_json().asset.extras.as_ref().expect("notes").get();
+        let notes: serde_json::Value = serde_json::from_str(notes).expect("json");
+        assert_eq!(
+            (&notes["unit"], &notes["scale"]),
+            (&"m".into(), &"height".into())
+        );
+        let mut of: Vec<usize> = Vec::new();
+        let mut highest = 0.0_f32;
+        for primitive in model.meshes().flat_map(|m| m.primitives()) {
+            of.push(primitive.indices().expect("indices").count() / 3);
+            highest = highest.max(primitive.bounding_box().max[1]);
+        }
+        assert_eq!(of.len(), 2, "wood and leaves");
+        assert!(triangles.is_empty() == (name == "oak.glb"));
+        assert!((highest - 7.5).abs() < if triangles.is_empty() { 0.001 } else { 0.3 });
+        triangles.push(of);
+        let skin = model.skins().next().expect("a skin");
+        bones.push(
+            skin.joints()
+                .map(|j| j.name().expect("name").to_owned())
+                .collect(),
+        );
+    }
+    assert!(bones.iter().all(|b| *b == bones[0]));
+    assert_eq!(bones[0][..2], ["tree", "trunk"]);
+    for part in 0..2 {
+        let counts: Vec<usize> = triangles.iter().map(|t| t[part]).collect();
+        assert!(
+            counts[1] < counts[0] * 6 / 10 && counts[2] < counts[1] * 6 / 10,
+            "{counts:?}"
+        );
+    }
+}
 
 /// Whoever asks for what changes nothing is told so, and why, instead of looking for it in the
 /// file.

@@ -76,26 +76,30 @@ fn nodes_say_what_is_not_identifiable() {
     let lines: Vec<&str> = out.lines().collect();
     let header = "node_id,parent_id,level,n_tracks,u_px,v_px,x,y,z,radius,frequency_hz,frequency_lo_hz,\
                   frequency_hi_hz,damping_ratio,damping_lo,damping_hi,identifiable,excitation,amplitude_deg,unidentified,\
-                  kind,copy_of,plane_deg,certainty,moves_with";
+                  kind,copy_of,plane_deg,certainty,moves_with,branch,order";
     assert_eq!(lines[0], header);
     assert_eq!(
         lines[1],
-        "0,,0,400,640,700,0,0,0,14,,,,,,,false,,,not_measured,measured,,,0.75,"
+        "0,,0,400,640,700,0,0,0,14,,,,,,,false,,,not_measured,measured,,,0.75,,trunk,0"
     );
     assert_eq!(
         lines[2],
-        "1,0,1,200,644,540,4,160,0,14,0.51234,0.5,0.53,0.04,0.02,0.07,true,release,1.5,,measured,,,0.75,"
+        "1,0,1,200,644,540,4,160,0,14,0.51234,0.5,0.53,0.04,0.02,0.07,true,release,1.5,,measured,,,0.75,,trunk,0"
     );
     assert!(
-        lines[3].ends_with(",0.51234,0.5,0.53,,,,true,wind,1.5,,measured,,,0.75,"),
+        lines[3].contains(",0.51234,0.5,0.53,,,,true,wind,1.5,,measured,,,0.75,,"),
         "{}",
         lines[3]
     );
     assert!(
-        lines[4].ends_with(",,,,,,,false,,,too_short,measured,,,0.75,"),
+        lines[4].contains(",,,,,,,false,,,too_short,measured,,,0.75,,"),
         "{}",
         lines[4]
     );
+    // Of a fork one goes on with the trunk, the other is a limb.
+    let mut ends = [lines[3], lines[4]].map(|l| l.rsplit_once(",,").expect("a branch").1);
+    ends.sort_unstable();
+    assert_eq!(ends, ["limb_1,1", "trunk,0"]);
     assert_eq!(lines.len(), 5);
 }
 

@@ -56,7 +56,7 @@ fn model<'a>(
         dressed,
         poses,
         flutter: &[],
-        all_levels: false,
+        level: 0,
         metres_per_px,
         tolerance_px,
         node_extras: &[],
@@ -470,16 +470,15 @@ fn names_and_extras_tell_what_was_measured_and_what_was_copied() {
     let asset: Value = serde_json::from_str(root.asset.extras.as_ref().unwrap().get()).unwrap();
     assert_eq!(asset, provenance);
     let nodes: Vec<gltf::Node> = played.document.nodes().collect();
+    let names = skeleton.botanical_branches().piece_names();
     for (i, node) in skeleton.nodes.iter().enumerate() {
         let told: Value = serde_json::from_str(nodes[i].extras().as_ref().unwrap().get()).unwrap();
         assert_eq!(told["level"], json!(node.level));
         assert_eq!(told["copy_of"], json!(node.copy_of.map(|c| c.0)));
-        let name = match node.copy_of {
-            Some(c) => format!("node_{i}_copy_of_{}", c.0),
-            None => format!("node_{i}"),
-        };
-        assert_eq!(nodes[i].name(), Some(name.as_str()));
+        assert_eq!(told["node_id"], json!(node.name.0));
+        assert_eq!(nodes[i].name(), Some(names[i].as_str()));
     }
+    assert_eq!(names[..3], ["tree", "trunk", "trunk-2"]);
     let told: Value = serde_json::from_str(nodes[1].extras().as_ref().unwrap().get()).unwrap();
     assert_eq!(told["frequency_hz"], json!(0.5));
 }

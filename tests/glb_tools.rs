@@ -38,7 +38,7 @@ fn model<'a>(
         dressed,
         poses,
         flutter: &[],
-        all_levels: false,
+        level: 0,
         metres_per_px: 0.0,
         tolerance_px: KEY_TOLERANCE_PX,
         node_extras: &[],
@@ -76,18 +76,21 @@ fn all_kinds(dir: &Path) -> Vec<PathBuf> {
     let short_poses = synthetic::sway(&short, 20);
     let with_leaves = Model {
         flutter: &flutter,
-        all_levels: true,
+        ..model(&skeleton, &leafy, &poses, &note)
+    };
+    let roughest = Model {
+        level: 2,
         ..model(&skeleton, &leafy, &poses, &note)
     };
     let cases = [
         ("bare", model(&skeleton, &bare, &poses, &note)),
         ("still", model(&skeleton, &bare, &[], &note)),
-        ("leaves-and-levels", with_leaves),
+        ("leaves-that-swing", with_leaves),
+        ("roughest-level", roughest),
         (
             "leaves-in-metres",
             Model {
                 metres_per_px: 0.01,
-                all_levels: false,
                 ..with_leaves
             },
         ),
@@ -200,11 +203,7 @@ fn blender_gets_every_bone_and_the_whole_animation() {
     fs::write(&file, bytes).expect("write");
     let there = told_by_blender(&blender, "tests/blender_import.py", &file, "IMPORTED ");
     println!("{there}");
-    let names = skeleton.nodes.iter().map(|n| match n.copy_of {
-        Some(original) => format!("node_{}_copy_of_{}", n.name.0, original.0),
-        None => format!("node_{}", n.name.0),
-    });
-    let names: Vec<String> = names.collect();
+    let names = skeleton.botanical_branches().piece_names();
     let bones: Vec<&str> = there["bones"]
         .as_array()
         .expect("bones")
@@ -214,7 +213,7 @@ fn blender_gets_every_bone_and_the_whole_animation() {
     assert_eq!(bones.len(), names.len());
     assert!(
         names.iter().all(|name| bones.contains(&name.as_str())),
-        "bones are named by their nodes"
+        "bones are named by their branches"
     );
     let end_s = there["end_s"].as_f64().expect("end");
     let length_s = poses[90].time_s - poses[0].time_s;
@@ -229,6 +228,40 @@ fn blender_gets_every_bone_and_the_whole_animation() {
         "the rest and two swings for every group"
     );
     assert_eq!(there["materials"], json!(["bark", "leaf"]));
+}
+
+/// Leaves that do not swing on their own: one tree, one armature, one action, nothing beside them.
+#[test]
+fn blender_gets_one_armature_and_one_action() {
+    let Some(blender) = tools::program("blender", "--version") else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("tempdir");
+    let skeleton = synthetic::tree(7, 2);
+    let poses = synthetic::sway(&skeleton, 31);
+    let dressed = dressed(&skeleton, 3, synthetic::leaves(&skeleton));
+    for level in 0..3 {
+        let file = dir.path().join(format!("tree{level}.glb"));
+        let model = Model {
+            level,
+            ..model(&skeleton, &dressed, &poses, &Value::Null)
+        };
+        fs::write(&file, glb(&model).expect("glb").0).expect("write");
+        let there = told_by_blender(&blender, "tests/blender_import.py", &file, "IMPORTED ");
+        println!("{there}");
+        assert_eq!(there["armatures"], json!(["tree"]));
+        assert_eq!(there["actions"].as_array().map(Vec::len), Some(1));
+        assert_eq!(there["empties"], json!([]));
+        assert_eq!(there["meshes"], json!(["leaves", "wood"]));
+        assert_eq!(there["materials"], json!(["bark", "leaf"]));
+        assert_eq!(there["shape_keys"], 0);
+        let bones = there["bones"].as_array().expect("bones");
+        assert!(
+            ["tree", "trunk", "limb_1", "limb_1.1"]
+                .iter()
+                .all(|n| bones.contains(&json!(n)))
+        );
+    }
 }
 
 /// The crown of a tree as it is filmed in leaf, imported with the importer's own settings and lit by

@@ -48,7 +48,7 @@ fn model<'a>(skeleton: &'a Skeleton, dressed: &'a Dressed) -> Model<'a> {
         dressed,
         poses: &[],
         flutter: &[],
-        all_levels: false,
+        level: 0,
         metres_per_px: 0.02,
         tolerance_px: KEY_TOLERANCE_PX,
         node_extras: &[],

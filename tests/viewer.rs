@@ -80,6 +80,8 @@ fn pages(dir: &Path, clip: &Path, outline: &Path) {
 fn one_node() -> String {
     let branch = Branch {
         id: 0,
+        name: "tree".into(),
+        order: 0,
         parent: None,
         copy_of: None,
         moves_with: None,
@@ -104,7 +106,7 @@ fn one_node() -> String {
         branches: vec![branch],
     };
     let mut json =
-        br#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"name":"node_0"}]}"#.to_vec();
+        br#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"name":"tree","extras":{"node_id":0}}]}"#.to_vec();
     json.resize(json.len().next_multiple_of(4), b' ');
     let number = |n: usize| (n as u32).to_le_bytes();
     let glb = [

@@ -6,7 +6,7 @@ use super::output::eprint_line;
 use super::stop::Stop;
 use super::tree::{Tail, TreeArgs, print_warnings};
 use super::unused;
-use crate::export::gltf::{KEY_TOLERANCE_PX, Model, NamedBytes, glb, gltf_files};
+use crate::export::gltf::{KEY_TOLERANCE_PX, LEVELS_OF_DETAIL, Model, NamedBytes, glb, gltf_files};
 use crate::export::still::{obj_files, ply};
 use crate::export::{ExportError, html};
 use crate::files::{WriteError, refuse_taken, write_files};
@@ -36,9 +36,13 @@ pub struct ExportArgs {
     /// twice that in depth.
     #[arg(long, value_name = "PX", default_value_t = KEY_TOLERANCE_PX, value_parser = tolerance)]
     tolerance_px: f64,
-    /// Write all levels of detail, as scenes lod0, lod1, ... with the same bones (glb, gltf).
+    /// Write all levels of detail of wood and leaves: the finest to PATH, the others beside it as
+    /// NAME_lod1, NAME_lod2 with the same bones and motion (glb, gltf).
     #[arg(long)]
     lods: bool,
+    /// Height of the tree, m, where no scale is known: lengths are then in metres.
+    #[arg(long, value_name = "M", value_parser = height)]
+    height: Option<f64>,
     #[command(flatten)]
     tree: TreeArgs,
 }
@@ -67,6 +71,15 @@ enum Format {
     Ply,
 }
 
+/// Parses `--height`, m.
+fn height(text: &str) -> Result<f64, String> {
+    parse_within(
+        text,
+        1e-3..=1e4,
+        "give a number of metres from 0.001 to 10000",
+    )
+}
+
 /// Parses `--tolerance-px`, px.
 fn tolerance(text: &str) -> Result<f64, String> {
     parse_within(
@@ -83,18 +96,37 @@ pub fn run(args: &ExportArgs) -> Result<(), CommandError> {
         html::built_in()?;
     }
     let stop = Stop::on_signals()?;
-    let tree = args.tree.prepare(&args.dir, Tail::Animation, |_| {})?;
+    let mut tree = args.tree.prepare(&args.dir, Tail::Animation, |_| {})?;
     print_warnings(&tree);
     args.note_unused();
+    if let Some(height_m) = args.height
+        && !tree.set_height(height_m)
+    {
+        unused::note("--height", "the scale of the tree is known");
+    }
     if args.format == Format::Csv {
         return write_tables(args, &tree, &stop);
     }
     let model = Model {
         tolerance_px: args.tolerance_px,
-        all_levels: args.lods && args.format != Format::Html,
         ..tree.model()
     };
-    let files = files(args.format, &tree, &model, &target)?;
+    let mut files = files(args.format, &tree, &model, &target)?;
+    if args.lods && matches!(target, Target::Stdout) && args.format == Format::Glb {
+        eprint_line(
+            "arborcam: warning: standard output takes the finest level alone; give --out a path \
+             for the others",
+        );
+    } else if args.lods && matches!(args.format, Format::Glb | Format::Gltf) {
+        for level in 1..LEVELS_OF_DETAIL {
+            let model = Model { level, ..model };
+            let stem = format!("{}_lod{level}", target.stem());
+            files.extend(match args.format {
+                Format::Gltf => gltf_files(&model, &stem)?.0,
+                _ => vec![(format!("{stem}.glb"), glb(&model)?.0)],
+            });
+        }
+    }
     target.write(files, &stop)
 }
 

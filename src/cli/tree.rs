@@ -36,6 +36,10 @@ pub struct TreeArgs {
     /// Model of a leaf or a small cluster of leaves (.glb, .gltf) instead of the built-in one.
     #[arg(long, value_name = "FILE")]
     leaf: Option<PathBuf>,
+    /// Let leaves swing on their own in the animation of a model's file, not only with their
+    /// branches.
+    #[arg(long)]
+    leaf_swing: bool,
     /// Density of the leaves as a grey image of the film's size, white where it is highest.
     #[arg(long, value_name = "IMAGE")]
     density: Option<PathBuf>,
@@ -103,6 +107,9 @@ impl TreeArgs {
         }
         if let Some(animation_s) = self.animation_s {
             config.export.animation_s = animation_s;
+        }
+        if self.leaf_swing {
+            config.export.leaf_swing = true;
         }
         self.scale.set(config);
     }

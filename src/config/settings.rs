@@ -298,6 +298,10 @@ settings! {
         animation_s: f64 [0.1 to 3600] = 60.0, ANIMATION;
         /// Metres in a pixel at the tree; lengths of the model are then in metres.
         metres_per_px: f64 [0 ("pixels") or more] = 0.0;
+        /// Leaves swing on their own in the animation of a model's file, as morph targets of a mesh
+        /// for each main branch. Otherwise they are one mesh that the branches move, which Blender
+        /// reads with one action. Pictures and videos always show the swing.
+        leaf_swing: bool = false;
     }
 }
 

@@ -13,7 +13,7 @@ use std::path::Path;
 pub(super) const FILE: &str = "nodes.csv";
 pub const NODES_HEADER: &str = "node_id,parent_id,level,n_tracks,u_px,v_px,x,y,z,radius,frequency_hz,\
 frequency_lo_hz,frequency_hi_hz,damping_ratio,damping_lo,damping_hi,identifiable,\
-excitation,amplitude_deg,unidentified,kind,copy_of,plane_deg,certainty,moves_with";
+excitation,amplitude_deg,unidentified,kind,copy_of,plane_deg,certainty,moves_with,branch,order";
 
 /// Joints of a skin are numbered with two bytes.
 const MOST_NODES: usize = 1 << 16;
@@ -44,7 +44,8 @@ const READ: usize = COLUMNS.len() + sway::COLUMNS.len();
 
 /// Writes `nodes.csv`. `sway` is by node index and may be shorter than the tree; `metres_per_px` 0
 /// leaves pixels. A node is identifiable if it has a frequency with its interval; where it is not,
-/// `unidentified` says why.
+/// `unidentified` says why. The names and orders of branches follow from the tree and are not read
+/// back.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -56,7 +57,9 @@ pub fn nodes<W: Write>(
 ) -> Result<W, WriteError> {
     let mut table = TableWriter::new(FILE, NODES_HEADER, out)?;
     let (scale, more) = unit(metres_per_px);
+    let branches = skeleton.botanical_branches();
     for (i, node) in skeleton.nodes.iter().enumerate() {
+        let id = NodeId(i as u32);
         let original = node.copy_of.and_then(|of| skeleton.name_of(of));
         table.count(node.name.0);
         table.id(node.parent.and_then(|p| skeleton.name_of(p)));
@@ -80,6 +83,8 @@ pub fn nodes<W: Write>(
         }
         table.number(node.certainty.into(), 4);
         table.id(node.moves_with.and_then(|m| skeleton.name_of(m)));
+        table.text(&branches.name(id));
+        table.count(branches.order(id));
         table.end_row()?;
     }
     table.finish()

@@ -1,5 +1,5 @@
-//! The moving tree as glTF 2.0 without extensions: joints, one skin, wood in one level of detail or
-//! more, leaves, and one animation.
+//! The moving tree as glTF 2.0 without extensions: joints, one skin, wood and leaves in one level of
+//! detail, and one animation.
 
 use super::ExportError;
 use super::gltf_animation::push_animation;
@@ -10,8 +10,8 @@ use super::gltf_mesh::{Skinned, push_mesh, push_skin};
 use super::gltf_model::raw;
 use super::joints::Moving;
 use crate::document::note::{AnimationNote, Software};
-use crate::geometry::{Dressed, Mesh};
-use crate::model::Pose;
+use crate::geometry::{Dressed, FoliageGroup, LEVELS, Mesh};
+use crate::model::{NodeId, Pose, TREE};
 use gltf_json::{Asset, Index, Node, Root, Scene, Skin};
 use serde_json::{Value, json};
 use std::borrow::Cow;
@@ -28,6 +28,9 @@ pub fn provenance(source: &str, software: &Software, poses: &[Pose]) -> Value {
         "measured": "front view: tracked points; depth and copied planes: estimated (Li et al. 2011)",
     })
 }
+
+/// How many levels of detail there are.
+pub const LEVELS_OF_DETAIL: usize = LEVELS.len();
 
 /// A file and its bytes.
 pub type NamedBytes = (String, Vec<u8>);
@@ -82,8 +85,8 @@ pub fn gltf_files(
         texture,
     } = assemble(model, true)?;
     let mut files = Vec::new();
-    // Names in the file are those of links: what a link cannot hold is written as %XX.
-    if let (Some((ending, bytes)), Some(image)) = (texture, root.images.first_mut()) {
+    // The picture of the leaf comes after that of the bark. Names in the file are those of links: what a link cannot hold is written as %XX.
+    if let (Some((ending, bytes)), Some(image)) = (texture, root.images.last_mut()) {
         let name = format!("{stem}_leaf.{ending}");
         image.uri = Some(percent(&name));
         files.push((name, bytes));
@@ -119,17 +122,23 @@ fn assemble(model: &Model, texture_apart: bool) -> Result<Assembled, ExportError
         ..Asset::default()
     };
     push_joints(&mut root, model)?;
-    let Dressed { wood, foliage, .. } = model.dressed;
-    let mut meshes = wood.iter().chain(foliage.groups.iter().map(|g| &g.mesh));
+    let look = Look::of(model);
     let mut drawn = Drawn::default();
-    if meshes.any(is_drawn) {
+    if look.is_drawn() {
         let skin = push_skin(&mut root, &mut buffer, model);
-        drawn.levels = push_wood(&mut root, &mut buffer, model, skin)?;
-        drawn.leaves = push_leaves(&mut root, &mut buffer, model, skin, texture_apart)?;
+        drawn.meshes = push_wood(&mut root, &mut buffer, model, &look, skin)?;
+        push_leaves(
+            &mut root,
+            &mut buffer,
+            model,
+            &look,
+            skin,
+            texture_apart,
+            &mut drawn,
+        )?;
     }
-    push_animation(&mut root, &mut buffer, model, &moving, &drawn.leaves);
-    let leaves = drawn.leaves.iter().map(|(_, node)| *node);
-    push_scenes(&mut root, &drawn.levels, leaves);
+    push_animation(&mut root, &mut buffer, model, &moving, &drawn.swinging);
+    push_scene(&mut root, &drawn.meshes);
     let animation = AnimationNote {
         first_frame: model.poses.first().map_or(0, |p| p.frame),
         frames: model.poses.len() as u64,
@@ -137,7 +146,7 @@ fn assemble(model: &Model, texture_apart: bool) -> Result<Assembled, ExportError
         raw_keys: moving.raw_keys(),
     };
     let texture = match leaf_picture(model, texture_apart) {
-        Some(picture) if texture_apart && !drawn.leaves.is_empty() => {
+        Some(picture) if texture_apart && look.has_leaves() => {
             Some((picture.ending()?, picture.texture.1.clone()))
         }
         _ => None,
@@ -150,13 +159,51 @@ fn assemble(model: &Model, texture_apart: bool) -> Result<Assembled, ExportError
     })
 }
 
+/// The meshes of one level of detail.
+struct Look<'a> {
+    wood: Option<&'a Mesh>,
+    /// One mesh, or one a group where the groups swing.
+    leaves: Vec<Cow<'a, FoliageGroup>>,
+    swings: bool,
+}
+
+impl<'a> Look<'a> {
+    fn of(model: &Model<'a>) -> Self {
+        let Dressed { wood, foliage, .. } = model.dressed;
+        let level = model.level.min(LEVELS.len() - 1);
+        let swings = !model.flutter.is_empty();
+        let foliage = match level {
+            0 => Cow::Borrowed(foliage),
+            _ => Cow::Owned(foliage.thinned(LEVELS[level])),
+        };
+        let leaves = match foliage {
+            all if !swings => vec![Cow::Owned(all.merged())],
+            Cow::Borrowed(all) => all.groups.iter().map(Cow::Borrowed).collect(),
+            Cow::Owned(all) => all.groups.into_iter().map(Cow::Owned).collect(),
+        };
+        let wood = wood.get(level).or(wood.last());
+        Self {
+            wood: wood.filter(|mesh| is_drawn(mesh)),
+            leaves,
+            swings,
+        }
+    }
+
+    fn has_leaves(&self) -> bool {
+        self.leaves.iter().any(|g| is_drawn(&g.mesh))
+    }
+
+    fn is_drawn(&self) -> bool {
+        self.wood.is_some() || self.has_leaves()
+    }
+}
+
 /// The nodes that show meshes.
 #[derive(Default)]
 struct Drawn {
-    /// The wood, a node for every level of detail.
-    levels: Vec<Index<Node>>,
-    /// The leaves, with the place of their group among all.
-    leaves: Vec<(usize, Index<Node>)>,
+    meshes: Vec<Index<Node>>,
+    /// The leaves that swing, with the place of their group among all.
+    swinging: Vec<(usize, Index<Node>)>,
 }
 
 fn is_drawn(mesh: &Mesh) -> bool {
@@ -167,48 +214,46 @@ fn push_wood(
     root: &mut Root,
     buffer: &mut BufferBuilder,
     model: &Model,
+    look: &Look,
     skin: Index<Skin>,
 ) -> Result<Vec<Index<Node>>, ExportError> {
-    let material = root.push(bark(model.dressed.bark_rgb));
-    let wood = &model.dressed.wood;
-    let wanted = if model.all_levels { wood.len() } else { 1 };
-    let mut levels = Vec::new();
-    for (k, mesh) in wood.iter().take(wanted).enumerate() {
-        if !is_drawn(mesh) {
-            continue;
-        }
-        let name = if k == 0 {
-            "tree".to_owned()
-        } else {
-            format!("tree_lod{k}")
-        };
-        let what = Skinned::wood(mesh, material, skin, name);
-        levels.push(push_mesh(root, buffer, model, what)?);
-    }
-    Ok(levels)
+    let Some(mesh) = look.wood else {
+        return Ok(Vec::new());
+    };
+    let material = bark(root, buffer, model.dressed);
+    let material = root.push(material);
+    let what = Skinned::wood(mesh, material, skin);
+    Ok(vec![push_mesh(root, buffer, model, what)?])
 }
 
 fn push_leaves(
     root: &mut Root,
     buffer: &mut BufferBuilder,
     model: &Model,
+    look: &Look,
     skin: Index<Skin>,
     texture_apart: bool,
-) -> Result<Vec<(usize, Index<Node>)>, ExportError> {
-    let groups = &model.dressed.foliage.groups;
-    let mut leaves = Vec::new();
-    if !groups.iter().any(|g| is_drawn(&g.mesh)) {
-        return Ok(leaves);
+    drawn: &mut Drawn,
+) -> Result<(), ExportError> {
+    if !look.has_leaves() {
+        return Ok(());
     }
     let material = leaf(root, buffer, leaf_picture(model, texture_apart))?;
-    for (k, group) in groups.iter().enumerate() {
-        if is_drawn(&group.mesh) {
-            let branch = model.skeleton.name_of(group.node);
-            let what = Skinned::leaves(group, material, skin, format!("leaves_{k}"), branch);
-            leaves.push((k, push_mesh(root, buffer, model, what)?));
+    for (k, group) in look.leaves.iter().enumerate() {
+        if !is_drawn(&group.mesh) {
+            continue;
         }
+        let what = if look.swings {
+            let branch = model.skeleton.name_of(group.node);
+            Skinned::swinging_leaves(group, material, skin, format!("leaves_{k}"), branch)
+        } else {
+            Skinned::leaves(group, material, skin)
+        };
+        let node = push_mesh(root, buffer, model, what)?;
+        drawn.meshes.push(node);
+        drawn.swinging.extend(look.swings.then_some((k, node)));
     }
-    Ok(leaves)
+    Ok(())
 }
 
 fn leaf_picture<'a>(model: &Model<'a>, apart: bool) -> Option<LeafPicture<'a>> {
@@ -221,19 +266,22 @@ fn leaf_picture<'a>(model: &Model<'a>, apart: bool) -> Option<LeafPicture<'a>> {
     })
 }
 
-/// One glTF node a skeleton node, in the same order, so that the indices agree.
+/// One glTF node a skeleton node, in the same order, so that the indices agree; named by the piece
+/// of a branch that it moves.
 fn push_joints(root: &mut Root, model: &Model) -> Result<(), ExportError> {
     let children = model.skeleton.children();
+    let branches = model.skeleton.botanical_branches();
     for (i, node) in model.skeleton.nodes.iter().enumerate() {
         let parent_pivot = node
             .parent
             .map_or_else(nalgebra::Vector3::zeros, |p| model.pivot(p.index()));
         let t = model.pivot(i) - parent_pivot;
-        let (name, original) = (
-            node.name.0,
-            node.copy_of.and_then(|o| model.skeleton.name_of(o)),
-        );
+        let id = NodeId(i as u32);
+        let original = node.copy_of.and_then(|o| model.skeleton.name_of(o));
         let mut extras = json!({
+            "node_id": node.name.0,
+            "branch": branches.name(id),
+            "order": branches.order(id),
             "level": node.level,
             "n_tracks": node.n_tracks,
             "certainty": node.certainty,
@@ -252,10 +300,7 @@ fn push_joints(root: &mut Root, model: &Model) -> Result<(), ExportError> {
             children: (!children[i].is_empty())
                 .then(|| children[i].iter().map(|c| Index::new(c.0)).collect()),
             extras: raw(&extras)?,
-            name: Some(match original {
-                Some(original) => format!("node_{name}_copy_of_{}", original.0),
-                None => format!("node_{name}"),
-            }),
+            name: Some(branches.piece_name(id)),
             translation: Some([t.x as f32, t.y as f32, t.z as f32]),
             ..Node::default()
         });
@@ -263,30 +308,17 @@ fn push_joints(root: &mut Root, model: &Model) -> Result<(), ExportError> {
     Ok(())
 }
 
-/// A scene for each level of the wood, which stands beside the joints and not below them: a skin is
-/// placed by its joints alone. The first is the one that is shown.
-fn push_scenes(
-    root: &mut Root,
-    levels: &[Index<Node>],
-    leaves: impl Iterator<Item = Index<Node>> + Clone,
-) {
-    for k in 0..levels.len().max(1) {
-        let nodes = std::iter::once(Index::new(0))
-            .chain(levels.get(k).copied())
-            .chain(leaves.clone())
-            .collect();
-        let name = if levels.len() > 1 {
-            format!("lod{k}")
-        } else {
-            "arborcam".to_owned()
-        };
-        root.push(Scene {
-            extensions: None,
-            extras: None,
-            name: Some(name),
-            nodes,
-        });
-    }
+/// The one scene. The meshes stand beside the joints and not below them: a skin is placed by its
+/// joints alone.
+fn push_scene(root: &mut Root, meshes: &[Index<Node>]) {
+    let nodes = std::iter::once(Index::new(0)).chain(meshes.iter().copied());
+    let nodes = nodes.collect();
+    root.push(Scene {
+        extensions: None,
+        extras: None,
+        name: Some(TREE.to_owned()),
+        nodes,
+    });
     root.scene = Some(Index::new(0));
 }
 

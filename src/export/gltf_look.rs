@@ -2,6 +2,7 @@
 
 use super::ExportError;
 use super::gltf_buffer::BufferBuilder;
+use crate::geometry::Dressed;
 use gltf_json::image::MimeType;
 use gltf_json::material::{
     AlphaCutoff, AlphaMode, Material, PbrBaseColorFactor, PbrMetallicRoughness, StrengthFactor,
@@ -21,13 +22,36 @@ pub(super) fn linear(channel: u8) -> f32 {
     }
 }
 
-/// One colour (sRGB).
-pub(super) fn bark(rgb: [u8; 3]) -> Material {
-    let [r, g, b] = rgb.map(linear);
+/// One colour (sRGB), or the filmed bark, a tile that is repeated.
+pub(super) fn bark(root: &mut Root, buffer: &mut BufferBuilder, dressed: &Dressed) -> Material {
+    let [mut r, mut g, mut b] = dressed.bark_rgb.map(linear);
+    let mut texture = None;
+    if let Some(png) = &dressed.bark_png {
+        // In the buffer always: it is small.
+        let view = buffer.view(root, png.iter().copied(), None);
+        let source = root.push(Image {
+            buffer_view: Some(view),
+            mime_type: Some(MimeType("image/png".to_owned())),
+            name: Some("bark".to_string()),
+            uri: None,
+            extensions: None,
+            extras: None,
+        });
+        let index = push_sampled(root, source, "bark", WrappingMode::Repeat);
+        // The tile has the colour.
+        [r, g, b] = [1.0; 3];
+        texture = Some(Info {
+            index,
+            tex_coord: 0,
+            extensions: None,
+            extras: None,
+        });
+    }
     Material {
         name: Some("bark".to_string()),
         pbr_metallic_roughness: PbrMetallicRoughness {
             base_color_factor: PbrBaseColorFactor([r, g, b, 1.0]),
+            base_color_texture: texture,
             metallic_factor: StrengthFactor(0.0),
             roughness_factor: StrengthFactor(0.9),
             ..PbrMetallicRoughness::default()
@@ -120,6 +144,16 @@ fn push_texture(
     } else {
         WrappingMode::ClampToEdge
     };
+    push_sampled(root, source, "leaf", wrap)
+}
+
+/// A picture as a texture of that name.
+fn push_sampled(
+    root: &mut Root,
+    source: Index<Image>,
+    name: &str,
+    wrap: WrappingMode,
+) -> Index<Texture> {
     let sampler = root.push(Sampler {
         mag_filter: Some(Valid(MagFilter::Linear)),
         min_filter: Some(Valid(MinFilter::LinearMipmapLinear)),
@@ -130,7 +164,7 @@ fn push_texture(
         extras: None,
     });
     root.push(Texture {
-        name: Some("leaf".to_string()),
+        name: Some(name.to_owned()),
         sampler: Some(sampler),
         source,
         extensions: None,

@@ -6,7 +6,7 @@ use super::gltf_look::linear;
 use super::gltf_model::{Model, raw};
 use super::skinning::{Skinning, skinning};
 use crate::geometry::{FoliageGroup, Mesh};
-use crate::model::NodeName;
+use crate::model::{NodeName, TREE};
 use gltf_json::accessor::{ComponentType, Type};
 use gltf_json::buffer::Target::{ArrayBuffer, ElementArrayBuffer};
 use gltf_json::material::Material;
@@ -30,25 +30,29 @@ pub(super) struct Skinned<'a> {
 }
 
 impl<'a> Skinned<'a> {
-    pub fn wood(
-        mesh: &'a Mesh,
-        material: Index<Material>,
-        skin: Index<Skin>,
-        name: String,
-    ) -> Self {
+    pub fn wood(mesh: &'a Mesh, material: Index<Material>, skin: Index<Skin>) -> Self {
         Self {
             mesh,
             colours: &[],
             targets: Vec::new(),
             material,
             skin,
-            name,
+            name: "wood".to_owned(),
             extras: Value::Null,
         }
     }
 
+    /// Leaves that the joints alone move.
+    pub fn leaves(group: &'a FoliageGroup, material: Index<Material>, skin: Index<Skin>) -> Self {
+        Self {
+            colours: &group.colours,
+            name: "leaves".to_owned(),
+            ..Self::wood(&group.mesh, material, skin)
+        }
+    }
+
     /// `branch` is the one with which the leaves swing.
-    pub fn leaves(
+    pub fn swinging_leaves(
         group: &'a FoliageGroup,
         material: Index<Material>,
         skin: Index<Skin>,
@@ -252,7 +256,7 @@ pub(super) fn push_skin(root: &mut Root, buffer: &mut BufferBuilder, model: &Mod
         extras: None,
         inverse_bind_matrices: Some(inverse_bind),
         joints: (0..n as u32).map(Index::new).collect(),
-        name: Some("tree".to_string()),
+        name: Some(TREE.to_owned()),
         skeleton: Some(Index::new(0)),
     })
 }

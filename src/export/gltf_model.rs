@@ -20,16 +20,15 @@ pub struct Model<'a> {
     /// In the order of time; the rest pose stands for none.
     pub poses: &'a [Pose],
     /// How far each group of leaves swings in every pose: the weights of its two displacements.
-    /// Empty: not at all.
+    /// Empty: not at all, and all leaves are one mesh that the joints alone move.
     pub flutter: &'a [Vec<LeafSwing>],
-    /// All levels of detail of the wood, as scenes `lod0`, `lod1`, ... on the same joints, instead
-    /// of the first alone.
-    pub all_levels: bool,
+    /// Level of detail of wood and leaves, 0 the finest; beyond the last one the last.
+    pub level: usize,
     /// Metres in a pixel; 0 leaves the model in pixels.
     pub metres_per_px: f64,
     /// See [`KEY_TOLERANCE_PX`].
     pub tolerance_px: f64,
-    /// One JSON object a node, added to `level`, `n_tracks` and `copy_of`; may be shorter than the
+    /// One JSON object a node, added to what the joints say of the tree; may be shorter than the
     /// skeleton.
     pub node_extras: &'a [Value],
     /// Software version, name of the source, frames: the `extras` of the asset.

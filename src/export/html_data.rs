@@ -37,6 +37,10 @@ pub struct Data {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Branch {
     pub id: u32,
+    /// What its piece of a botanical branch is called, as in the model's file.
+    pub name: String,
+    /// Botanical order: 0 for the trunk.
+    pub order: u32,
     pub parent: Option<u32>,
     /// The measured branch that this one repeats.
     pub copy_of: Option<u32>,
@@ -104,25 +108,30 @@ impl Data {
 
 fn branches(skeleton: &Skeleton, poses: &[Pose], sway: &[Swaying]) -> Vec<Branch> {
     let mut branches = Vec::with_capacity(skeleton.nodes.len());
+    let botanical = skeleton.botanical_branches();
     for (i, main_branch) in skeleton.main_branches().into_iter().enumerate() {
-        branches.push(branch(skeleton, poses, sway, i, main_branch));
+        let id = NodeId(i as u32);
+        branches.push(Branch {
+            name: botanical.piece_name(id),
+            order: botanical.order(id),
+            main_branch,
+            ..branch(skeleton, poses, sway, id)
+        });
     }
     branches
 }
 
-fn branch(
-    skeleton: &Skeleton,
-    poses: &[Pose],
-    sway: &[Swaying],
-    i: usize,
-    main_branch: Option<u8>,
-) -> Branch {
+/// A branch but for what it takes all others to know.
+fn branch(skeleton: &Skeleton, poses: &[Pose], sway: &[Swaying], id: NodeId) -> Branch {
+    let i = id.index();
     let node = &skeleton.nodes[i];
     let moves = node.parent.is_some() && node.moves_with.is_none();
     let measured = moves && node.copy_of.is_none();
     let sway = sway.get(i).filter(|s| s.is_ok()).map(Columns::of);
     Branch {
         id: node.name.0,
+        name: String::new(),
+        order: 0,
         parent: node.parent.and_then(|id| skeleton.name_of(id)).map(|n| n.0),
         copy_of: node
             .copy_of
@@ -133,12 +142,11 @@ fn branch(
             .and_then(|id| skeleton.name_of(id))
             .map(|n| n.0),
         level: node.level,
-        main_branch,
+        main_branch: None,
         n_tracks: node.n_tracks,
         end: [node.position.x, node.position.y, node.position.z].map(|x| rounded(x, 1e4)),
         sway,
-        angle_deg: measured
-            .then(|| packed(&angle_to_parent_deg(skeleton, poses, NodeId(i as u32)))),
+        angle_deg: measured.then(|| packed(&angle_to_parent_deg(skeleton, poses, id))),
     }
 }
 

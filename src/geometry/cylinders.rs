@@ -2,6 +2,7 @@
 //! al. 2013; SimpleTree).
 
 use super::chain::continuations;
+use crate::model::Skeleton;
 use crate::shape::Limb;
 use nalgebra::Point3;
 
@@ -26,11 +27,33 @@ pub struct Cylinder {
 /// The limbs as cylinders, parents first; each as thick as its limb is at the middle of the
 /// cylinder. Pieces without length are left out.
 pub fn cylinders(limbs: &[Limb]) -> Vec<Cylinder> {
+    pieces(limbs, &continuations(limbs))
+}
+
+/// The same with the branches and orders of [`Skeleton::botanical_branches`]; a twig goes on in a
+/// branch that ends where it begins, or leaves it.
+pub fn cylinders_by_branch(limbs: &[Limb], skeleton: &Skeleton) -> Vec<Cylinder> {
+    let branches = skeleton.botanical_branches();
+    let mut goes_on = continuations(limbs);
+    for next in &mut goes_on {
+        *next = next.filter(|i| limbs[*i].twig);
+    }
+    for (i, limb) in limbs.iter().enumerate().filter(|(_, l)| !l.twig) {
+        if let Some(p) = limb.parent.filter(|p| *p < i && !limbs[*p].twig)
+            && branches.of(limb.node) == branches.of(limbs[p].node)
+        {
+            goes_on[p] = Some(i);
+        }
+    }
+    pieces(limbs, &goes_on)
+}
+
+/// The cylinders of limbs that go on in one another as told.
+fn pieces(limbs: &[Limb], goes_on: &[Option<usize>]) -> Vec<Cylinder> {
     let mut out: Vec<Cylinder> = Vec::new();
     // The cylinders of every limb, and its branch with its order.
     let mut of_limb: Vec<std::ops::Range<usize>> = Vec::with_capacity(limbs.len());
     let mut branch_of: Vec<(usize, u32)> = Vec::with_capacity(limbs.len());
-    let goes_on = continuations(limbs);
     let mut branches = 0;
     for (i, limb) in limbs.iter().enumerate() {
         let parent = limb.parent.filter(|&p| p < i);

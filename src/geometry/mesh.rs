@@ -44,6 +44,34 @@ impl Mesh {
         against
     }
 
+    /// The connected piece that every vertex belongs to, by vertex, counted from 0 in the order of
+    /// their first vertices. Corners that are not there connect nothing.
+    pub fn pieces(&self) -> Vec<usize> {
+        let n = self.positions.len();
+        let mut joined: Vec<usize> = (0..n).collect();
+        for corners in self.indices.chunks_exact(3) {
+            for pair in corners.windows(2) {
+                let [a, b] = [pair[0] as usize, pair[1] as usize];
+                if a < n && b < n {
+                    let [a, b] = [first_of(&mut joined, a), first_of(&mut joined, b)];
+                    joined[a.max(b)] = a.min(b);
+                }
+            }
+        }
+        let mut number: Vec<usize> = Vec::with_capacity(n);
+        let mut pieces = 0;
+        for vertex in 0..n {
+            let first = first_of(&mut joined, vertex);
+            if first == vertex {
+                number.push(pieces);
+                pieces += 1;
+            } else {
+                number.push(number[first]);
+            }
+        }
+        number
+    }
+
     /// The direction that a triangle faces by its winding, of length 1; `None` where it is no
     /// higher than `least_px` over its longest side.
     fn face(&self, corners: &[u32], least_px: f64) -> Option<Vector3<f64>> {
@@ -58,9 +86,29 @@ impl Mesh {
     }
 }
 
+/// The first vertex of the piece of a vertex; shortens the way there.
+fn first_of(joined: &mut [usize], vertex: usize) -> usize {
+    let mut at = vertex;
+    while joined[at] != at {
+        joined[at] = joined[joined[at]];
+        at = joined[at];
+    }
+    at
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn vertices_of_one_piece_are_those_that_triangles_connect() {
+        let mesh = Mesh {
+            positions: vec![[0.0; 3]; 8],
+            indices: vec![5, 6, 7, 0, 1, 3, 3, 4, 1, 9, 2, 2],
+            ..Mesh::default()
+        };
+        assert_eq!(mesh.pieces(), [0, 0, 1, 0, 0, 2, 2, 2]);
+    }
 
     #[test]
     fn corners_are_counted_against_the_winding() {

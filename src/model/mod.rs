@@ -4,6 +4,7 @@
 //! number and the sensor time of the picture that it comes from. Trees are flat arrays in which a
 //! parent stands before its children.
 
+mod botany;
 mod branch_graph;
 mod control;
 mod frame;
@@ -22,6 +23,7 @@ mod track;
 mod track_log;
 mod track_table;
 
+pub use botany::{BotanicalBranch, BotanicalBranches, TREE, TRUNK};
 pub use branch_graph::{BranchGraph, WoodNode, WoodSeen};
 pub use control::Control;
 pub use frame::{

@@ -74,6 +74,8 @@ pub struct CameraState {
 #[derive(Clone, Debug, PartialEq)]
 pub struct BranchRow {
     pub node: NodeName,
+    /// What its piece of a botanical branch is called, as in [`Snapshot::piece_names`].
+    pub name: String,
     /// The number of its main branch, as in [`Snapshot::node_colour`].
     pub colour: Option<u8>,
     pub level: u8,
@@ -132,6 +134,8 @@ pub struct Snapshot {
     pub pose: Option<Arc<Pose>>,
     /// Main branch of every node of the skeleton, by node index; the same numbers as in `points`.
     pub node_colour: Arc<Vec<Option<u8>>>,
+    /// What the pieces of the tree are called, by node index: `trunk`, `limb_1.2`, ...
+    pub piece_names: Arc<Vec<String>>,
     pub branches: Vec<BranchRow>,
     /// The newest answer of the sway; `None` while there is none.
     pub sway: Option<Arc<SwayNow>>,
@@ -147,9 +151,11 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// Shows this tree, its main branches each in a colour of its own.
+    /// Shows this tree, its main branches each in a colour of its own, and its branches by their
+    /// names.
     pub fn show_tree(&mut self, skeleton: Arc<Skeleton>) {
         self.node_colour = Arc::new(skeleton.main_branches());
+        self.piece_names = Arc::new(skeleton.botanical_branches().piece_names());
         self.skeleton = Some(skeleton);
     }
 }

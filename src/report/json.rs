@@ -57,6 +57,8 @@ fn branch(study: &Study, branch: &Branch) -> Value {
     let metres = (study.metres_per_px > 0.0).then_some(branch.amplitude_px() * study.metres_per_px);
     json!({
         "node_id": branch.name,
+        "branch": branch.piece,
+        "order": branch.order,
         "parent_id": branch.parent,
         "level": branch.level,
         "points": branch.points,

@@ -85,8 +85,12 @@ pub struct Gap {
 /// One measured branch.
 #[derive(Clone, Debug)]
 pub struct Branch {
-    /// As in `nodes.csv`.
+    /// The node that it ends in, as in `nodes.csv`.
     pub name: u32,
+    /// What this piece of a botanical branch is called, as in the model's file; and the order of
+    /// that branch, 0 for the trunk.
+    pub piece: String,
+    pub order: u32,
     /// The branch that carries it; `None` for the trunk.
     pub parent: Option<u32>,
     pub level: u8,
@@ -171,13 +175,18 @@ impl Study {
             branches: Vec::new(),
             notes: given.notes.to_vec(),
         };
+        let botanical = skeleton.botanical_branches();
         for node in skeleton.measured_branches() {
             let sway = analysis
                 .sway
                 .get(node.index())
                 .copied()
                 .unwrap_or(Err(Unidentified::NotMeasured));
-            study.branches.push(branch(given, node, sway, study.used_s));
+            study.branches.push(Branch {
+                piece: botanical.piece_name(node),
+                order: botanical.order(node),
+                ..branch(given, node, sway, study.used_s)
+            });
         }
         study
     }
@@ -239,6 +248,7 @@ fn used_s(onset: &Onset, times_s: &[f64], ends: Bounds) -> Bounds {
     )
 }
 
+/// A branch but for its name, which it takes all others to know.
 fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: Bounds) -> Branch {
     let (skeleton, poses) = (given.skeleton, given.poses);
     let own = &skeleton.nodes[node.index()];
@@ -264,6 +274,8 @@ fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: Bounds) -> Branch 
     let parent_node = own.parent.and(skeleton.nodes.get(parent.index()));
     Branch {
         name: own.name.0,
+        piece: String::new(),
+        order: 0,
         parent: parent_node.filter(|p| p.parent.is_some()).map(|p| p.name.0),
         level: own.level,
         points: own.n_tracks,

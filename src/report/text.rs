@@ -36,7 +36,7 @@ fn one(study: &Study, columns: Option<usize>) -> String {
         "{answers} of {all} have a frequency that this film shows; intervals are 95 %\n\n"
     );
     let metres = study.metres_per_px > 0.0;
-    let mut heads = vec![("branch", 0), ("level", 6), ("on", 1), ("points", 7)];
+    let mut heads = vec![("node", 0), ("branch", 2), ("on", 1), ("points", 7)];
     heads.extend([
         ("frequency, Hz", 0),
         ("damping ratio", 0),
@@ -87,7 +87,7 @@ fn row(study: &Study, branch: &Branch) -> Vec<String> {
     let parent = branch.parent.map_or("foot".into(), |p| p.to_string());
     let mut row = vec![
         branch.name.to_string(),
-        branch.level.to_string(),
+        branch.piece.clone(),
         parent,
         branch.points.to_string(),
     ];

@@ -266,6 +266,12 @@ impl Status {
             let n = &skeleton.nodes[node];
             BranchRow {
                 node: n.name,
+                name: self
+                    .snapshot
+                    .piece_names
+                    .get(node)
+                    .cloned()
+                    .unwrap_or_default(),
                 colour: self.snapshot.node_colour.get(node).copied().flatten(),
                 level: n.level,
                 n_tracks: n.n_tracks,

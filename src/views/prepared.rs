@@ -50,7 +50,28 @@ pub struct PreparedTree {
     pub cut: Option<Cut>,
     node_extras: Vec<Value>,
     provenance: Value,
+    /// Where the scale comes from, if there is one.
+    scale: ScaleFrom,
     transforms: AppliedTransforms,
+}
+
+/// Where the size of a pixel comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum ScaleFrom {
+    /// A length that was measured.
+    Measured,
+    /// The height that was asked for.
+    Height,
+}
+
+impl ScaleFrom {
+    /// One word for files.
+    fn word(self) -> &'static str {
+        match self {
+            Self::Measured => "measured",
+            Self::Height => "height",
+        }
+    }
 }
 
 /// What was done to the document's tree, for all further poses of it.
@@ -114,7 +135,8 @@ impl PreparedTree {
             &Software::default(),
             &posed.poses,
         );
-        Ok(Self {
+        let mut tree = Self {
+            scale: ScaleFrom::Measured,
             node_extras: posed.sway.iter().map(extras).collect(),
             reshaped: changed,
             document,
@@ -128,7 +150,34 @@ impl PreparedTree {
             cut: posed.cut,
             provenance,
             transforms: posed.transforms,
-        })
+        };
+        tree.note_scale();
+        Ok(tree)
+    }
+
+    /// Gives the tree a height from its foot to its top, m, unless its scale is known or nothing of
+    /// it is drawn. Returns whether it did.
+    pub fn set_height(&mut self, height_m: f64) -> bool {
+        let height_px = self.dressed.height_px();
+        if self.config.export.metres_per_px > 0.0 || height_px <= 0.0 {
+            return false;
+        }
+        self.config.export.metres_per_px = height_m / height_px;
+        self.scale = ScaleFrom::Height;
+        self.note_scale();
+        true
+    }
+
+    /// Puts the unit of lengths, and where it comes from, into the file's own notes.
+    fn note_scale(&mut self) {
+        let Some(notes) = self.provenance.as_object_mut() else {
+            return;
+        };
+        let in_metres = self.config.export.metres_per_px > 0.0;
+        notes.insert("unit".into(), if in_metres { "m" } else { "px" }.into());
+        if in_metres {
+            notes.insert("scale".into(), self.scale.word().into());
+        }
     }
 
     /// Takes other answers on the sway than those of the document, as reading them back would give
@@ -152,6 +201,7 @@ impl PreparedTree {
         if let Some(notes) = self.provenance.as_object_mut() {
             notes.insert("animated".into(), what);
         }
+        self.note_scale();
         self.poses = poses;
     }
 
@@ -188,8 +238,12 @@ impl PreparedTree {
             skeleton: &self.skeleton,
             dressed: &self.dressed,
             poses: &self.poses,
-            flutter: &self.flutter,
-            all_levels: false,
+            flutter: if self.config.export.leaf_swing {
+                &self.flutter
+            } else {
+                &[]
+            },
+            level: 0,
             metres_per_px: self.config.export.metres_per_px,
             tolerance_px: KEY_TOLERANCE_PX,
             node_extras: &self.node_extras,

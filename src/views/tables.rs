@@ -4,7 +4,7 @@ use super::{PrepareError, PreparedTree};
 use crate::document::{MotionCsv, nodes, tracks_of};
 use crate::export::cylinders::cylinders;
 use crate::files::{OutputFolder, WriteError};
-use crate::geometry::cylinders as cylinders_of;
+use crate::geometry::cylinders_by_branch;
 use crate::model::NodeName;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -43,7 +43,7 @@ impl PreparedTree {
             )?;
         }
         self.write_motion(&folder, stop)?;
-        let rows = cylinders_of(&self.dressed.limbs);
+        let rows = cylinders_by_branch(&self.dressed.limbs, &self.skeleton);
         let metres_per_px = self.config.export.metres_per_px;
         cylinders(folder.file("cylinders.csv")?, &rows, metres_per_px)?;
         Ok(TablesWritten {

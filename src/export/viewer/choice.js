@@ -73,6 +73,6 @@ function groups(data) {
 }
 
 function name(branch) {
-  if (branch.copy_of !== null) return `${branch.id} · repeats ${branch.copy_of}`;
-  return `${branch.id} · level ${branch.level}`;
+  if (branch.copy_of !== null) return `${branch.name} · repeats ${branch.copy_of}`;
+  return `${branch.name} · node ${branch.id}`;
 }

@@ -6,7 +6,11 @@ const interval = (low, high, digits) =>
 // Pairs of a term and its value, with a small addition or none.
 export function facts(branch, sway) {
   const original = branch.original;
-  const rows = [["Level", `${branch.level}`, ""]];
+  const rows = [
+    ["Branch", branch.name, ` node ${branch.id}`],
+    ["Order", `${branch.order}`, branch.order === 0 ? " trunk" : ""],
+    ["Level", `${branch.level}`, ""],
+  ];
   if (branch.copy_of !== null) rows.push(["Copy", `repeats branch ${branch.copy_of}`, ""]);
   if (branch.moves_with !== null) rows.push(["Rigid", `moves with branch ${branch.moves_with}`, ""]);
   else rows.push(["Points followed", `${branch.n_tracks}`, ""]);

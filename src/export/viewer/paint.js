@@ -88,7 +88,7 @@ export class Paint {
     const out = new Float32Array(3 * position.count);
     const bones = mesh.skeleton?.bones ?? [];
     const colours = bones.map((bone) => {
-      const branch = this.data.byId.get(jointId(bone.name));
+      const branch = this.data.byId.get(jointId(bone));
       // The foot is no branch: what hangs on it belongs to the trunk.
       const own = branch?.parent === null ? this.data.branches.find((b) => b.parent === branch.id) : branch;
       return own ? colourOf(own) : UNKNOWN;

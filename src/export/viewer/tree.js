@@ -17,7 +17,7 @@ export class Tree {
     this.wood = [];
     this.leaves = [];
     gltf.scene.traverse((object) => {
-      const id = jointId(object.name);
+      const id = jointId(object);
       if (id !== null) this.joints.set(id, object);
       if (!object.isMesh) return;
       // The box at rest is not where the tree is in the wind.
@@ -74,8 +74,7 @@ export class Tree {
   }
 }
 
-// `node_17` and `node_31_copy_of_17`; null for what is no joint.
-export function jointId(name) {
-  const match = /^node_(\d+)(_copy_of_\d+)?$/.exec(name ?? "");
-  return match ? Number(match[1]) : null;
+// The node of the table that a joint is; null for what is no joint. The loader changes names that have dots in them.
+export function jointId(object) {
+  return object.userData.node_id ?? null;
 }

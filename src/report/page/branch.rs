@@ -16,7 +16,7 @@ pub fn branch_part(study: &Study, branch: &Branch) -> String {
         .parent
         .map_or("the trunk".into(), |p| format!("carried by {p}"));
     let id = escaped(&anchor(study, branch));
-    let head = format!("Branch {}, {of}", branch.name);
+    let head = format!("Branch {}, {}, {of}", branch.name, branch.piece);
     match branch.sway {
         Ok(sway) => {
             let damping = sway

@@ -9,7 +9,7 @@ use crate::report::words;
 /// Every branch in a row.
 pub fn table_part(study: &Study) -> String {
     let metres = study.metres_per_px > 0.0;
-    let mut head: Vec<String> = ["branch", "level", "carried by", "points"]
+    let mut head: Vec<String> = ["node", "branch", "level", "carried by", "points"]
         .map(String::from)
         .into();
     head.extend(["frequency, Hz", "damping ratio", "sway, deg", "end, px"].map(String::from));
@@ -25,11 +25,11 @@ pub fn table_part(study: &Study) -> String {
         .collect();
     // Narrow screens go without those that stand with each branch as well.
     let (first, less) = (
-        cells("th", "n", &head[..1]),
-        cells("th", "n less", &head[1..4]),
+        cells("th", "n", &head[..2]),
+        cells("th", "n less", &head[2..5]),
     );
     let (most, last) = (
-        cells("th", "n", &head[4..columns - 2]),
+        cells("th", "n", &head[5..columns - 2]),
         cells("th", "n less", &head[columns - 2..]),
     );
     let head = first + &less + &most + &last;
@@ -44,11 +44,11 @@ fn row(study: &Study, branch: &Branch, columns: usize) -> String {
         format!("<a href=\"#{}\">{}</a>", anchor(study, branch), branch.name)
     };
     let place = [branch.level.to_string(), parent, branch.points.to_string()];
-    let first = cells("td", "n", &[name]) + &cells("td", "n less", &place);
+    let first = cells("td", "n", &[name, branch.piece.clone()]) + &cells("td", "n less", &place);
     let rest = match branch.sway {
         Err(why) => format!(
             "<td class=\"why\" colspan=\"{}\"><span>none: {why}</span></td>",
-            columns - 4
+            columns - 5
         ),
         Ok(sway) => {
             let mut rest = vec![

@@ -35,10 +35,7 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         return;
     };
     let points = count(branch.n_tracks.into());
-    let title = format!(
-        "Branch {}, level {}, {points} points",
-        branch.node.0, branch.level
-    );
+    let title = format!("Branch {}, {points} points", branch.name);
     let inner = titled(frame, area, &title, theme);
     let answer = s
         .sway

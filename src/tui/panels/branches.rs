@@ -12,15 +12,14 @@ use ratatui::text::{Line, Span};
 
 /// A wider table would be harder to read along a line; there are as many side by side as there is
 /// room for.
-const WIDEST: u16 = 52;
+const WIDEST: u16 = 60;
 /// Width of a value with its interval.
 const SURE: usize = 13;
 /// What stands between the name and the sway: name and width of the columns, where there is room
 /// for all.
-const COLUMNS: [(&str, usize); 3] = [("lvl", 3), ("pts", 5), ("ampl/px", 7)];
-/// A narrower table says the level in words, as there is no room for the names of columns beside
-/// the title.
-const ALL_FROM: u16 = 50;
+const COLUMNS: [(&str, usize); 2] = [("pts", 5), ("ampl/px", 7)];
+/// A narrower table has the name and the sway alone.
+const ALL_FROM: u16 = 56;
 /// With so many lines one can be spared for the names of the columns.
 const NAMED_FROM: usize = 4;
 
@@ -118,37 +117,38 @@ impl Tables {
 
 fn branch(s: &Snapshot, b: &BranchRow, marked: bool, width: u16, theme: Theme) -> Line<'static> {
     let middle = if width >= ALL_FROM {
-        let cells = [
-            b.level.to_string(),
-            count(b.n_tracks.into()),
-            value(b.amplitude_px),
-        ];
+        let cells = [count(b.n_tracks.into()), value(b.amplitude_px)];
         cells
             .iter()
             .zip(COLUMNS)
             .map(|(text, (_, width))| format!(" {text:>width$}"))
             .collect()
     } else {
-        format!("  level {}", b.level)
+        String::new()
     };
     let (sway, style) = sway(s, b, theme);
-    let name = b.node.0.to_string();
-    let used = name.chars().count() + middle.chars().count() + 2 * (SURE + 1) + 3;
+    let others = middle.chars().count() + 2 * (SURE + 1) + 3;
+    let name = shortened(&b.name, (width as usize).saturating_sub(others));
+    let used = name.chars().count() + others;
     let gap = " ".repeat((width as usize).saturating_sub(used));
-    // In a narrow table the level follows the name, else all columns keep to the right.
-    let (before, after) = if width >= ALL_FROM {
-        (gap, String::new())
-    } else {
-        (String::new(), gap)
-    };
     let style_of_name = if marked { theme.strong() } else { Style::new() };
     Line::from(vec![
         Span::styled(if marked { "▸" } else { " " }, theme.title()),
         Span::styled("● ", theme.branch(b.colour)),
         Span::styled(name, style_of_name),
-        Span::raw(format!("{before}{middle}{after}")),
+        Span::raw(format!("{gap}{middle}")),
         Span::styled(sway, style),
     ])
+}
+
+/// A name in so many letters: of a longer one the end, which tells it from its neighbours.
+fn shortened(name: &str, most: usize) -> String {
+    let letters = name.chars().count();
+    if letters <= most {
+        return name.to_owned();
+    }
+    let end = name.chars().skip(letters - most.saturating_sub(1));
+    std::iter::once('…').chain(end).collect()
 }
 
 /// Frequency and damping with half their intervals, or why there are none.

@@ -169,6 +169,7 @@ fn add_tree(s: &mut Snapshot) {
     for (i, node) in skeleton.nodes.iter().enumerate().take(11).skip(1) {
         s.branches.push(BranchRow {
             node: node.name,
+            name: s.piece_names[i].clone(),
             colour: s.node_colour[i],
             level: node.level,
             n_tracks: 312 / i as u32,
@@ -291,6 +292,7 @@ pub fn huge() -> Snapshot {
     s.branches = (0..5000)
         .map(|node| BranchRow {
             node: NodeName(u32::MAX - node),
+            name: format!("limb_{}-{node}", "4294967295.".repeat(40)),
             colour: None,
             level: 255,
             n_tracks: u32::MAX,

@@ -213,7 +213,7 @@ fn every_column_of_the_table_of_branches_has_its_head() {
         let text = drawn(&state(snapshot(Phase::Live)), Depth::None, width, height).to_string();
         let tables = text.matches("f/Hz").count();
         assert!(tables > 0, "{width}x{height}: {text}");
-        for head in ["lvl", "pts", "ampl/px", "damping"] {
+        for head in ["pts", "ampl/px", "damping"] {
             let found = text
                 .lines()
                 .filter(|l| l.contains("f/Hz"))
