@@ -23,7 +23,8 @@ BAD_KINDS
 
 The steps are in made_films/: tree, motion, surface, scenery, bad_input, picture, truth. A tree is drawn as thousands of
 small coloured facets that ride on its branches, four times too large and averaged down, so that it moves by parts of a
-pixel: the centroid of a drawn facet is within about 0.03 px of where it should be. No cast shadows, no motion blur, no exposure changes.
+pixel: the centroid of a drawn facet is within about 0.03 px of where it should be. No cast shadows, no motion blur, no
+exposure changes.
 
 Needs numpy, scipy, opencv-python-headless and the ffmpeg program. About 10 s of one core for a bare tree, 20 s with leaves.
 """
@@ -40,7 +41,8 @@ DEFAULT_SECONDS = {"release": 11.0, "held": 11.0, "wind": 14.0}
 
 def main():
     kinds = "\n".join(f"  {kind:<14} {what}" for kind, what in bad_input.KINDS.items())
-    parser = argparse.ArgumentParser(description=__doc__.replace("BAD_KINDS", kinds), formatter_class=argparse.RawDescriptionHelpFormatter)
+    about = __doc__.replace("BAD_KINDS", kinds)
+    parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out_dir", type=Path)
     parser.add_argument("name")
     parser.add_argument("seed", type=int)

@@ -39,7 +39,7 @@ class BadInput:
     behind: list = field(default_factory=list)  # OtherTree
     wires: list = field(default_factory=list)  # (N, 2) lines in pixels
     wire_px: float = 2.2
-    shade: np.ndarray = None  # share of the light that is left, as wide as the picture, repeated sideways
+    shade: np.ndarray = None  # share of the light that is left, repeated sideways without a seam
 
     def more_leaves(self, seed, branches, pose, skin):
         if "full_foliage" not in self.kinds:
@@ -79,7 +79,7 @@ class BadInput:
         """The frame as this light shows it."""
         if self.shade is not None:
             shift = SHADE_PX_S * time_s + SHADE_SWAY_PX * np.sin(2 * np.pi * SHADE_SWAY_HZ * time_s)
-            moved = cv2.warpAffine(self.shade, np.float32([[1, 0, shift % WIDTH], [0, 1, 0]]), (WIDTH, HEIGHT),
+            moved = cv2.warpAffine(self.shade, np.float32([[1, 0, shift % (2 * WIDTH)], [0, 1, 0]]), (WIDTH, HEIGHT),
                                    flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
             image = image * moved[..., None]
         if "fog" in self.kinds:
@@ -137,4 +137,5 @@ def wires(rng):
 
 def shade(rng):
     dark = (scenery.noise(rng, HEIGHT, WIDTH, 7) > 0.3).astype(np.float32)
-    return 1 - (1 - SHADE_LEAST) * cv2.GaussianBlur(dark, None, 3.0)
+    light = 1 - (1 - SHADE_LEAST) * cv2.GaussianBlur(dark, None, 3.0)
+    return np.hstack([light, light[:, ::-1]])

@@ -98,7 +98,7 @@ def of_camera(camera):
 
 
 def of_branches(branches, pose, camera, grid_branch, more):
-    """The list in truth.json. A branch is major when at least five points of the grid lie on it. more: further facts of each."""
+    """The list in truth.json; more has further facts of each. A branch is major if five points of the grid lie on it."""
     visible = np.bincount(grid_branch, minlength=len(branches))
     listed = []
     for b in branches:
