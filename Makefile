@@ -1,13 +1,13 @@
 # make demo: from a fresh machine to a moving tree in out/demo. make test: from a fresh machine through every test. Both
 # install what is missing (scripts/setup.sh). make bench: the figures.
-# make pictures: those of README and docs (CLIPS=folder for the oak too).
+# make pictures: those of README and docs (CLIPS=folder for the oak too), and out/CLIP.png, film beside model.
 # make install, make uninstall: program and service, below DESTDIR (for packages) and PREFIX.
 .PHONY: demo pictures build viewer test test-v4l2 test-real bench sweep lint core setup install uninstall
 
 demo: setup build
 	@scripts/demo.sh
 
-# ONLY=views, film, shapes, wind, points, terminal or page for one group.
+# ONLY=views, film, shapes, wind, points, terminal, page or sheets for one group. CLIPS is ARBORCAM_CLIPS if not given.
 pictures: build
 	@CLIPS="$(CLIPS)" ONLY="$(ONLY)" scripts/pictures.sh
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Films of made-up swaying trees whose true motion is known.
 
-  made_films.py OUT_DIR NAME SEED leaves|bare release|held|wind [--seconds S]
+  made_films.py OUT_DIR NAME SEED leaves|bare release|held|wind [--seconds S] [--bad KIND]...
 
 Why: a capture can be scored only against a film whose motion is known, and what is tuned on two films fits those two.
 Each seed is another tree, with frequencies, pull and background of its own; the same seed gives the same film.
@@ -11,57 +11,84 @@ Each seed is another tree, with frequencies, pull and background of its own; the
 Writes to OUT_DIR/NAME, 640x360 at 30 frames/s:
   video.mkv      MJPEG, as a USB camera delivers it
   outline.json   a rough polygon around the tree in frame 0
-  truth.json     camera (orthographic), motion, and of each branch the parent, rest shape (m), undamped Hz, damping ratio
+  truth.json     camera (orthographic), motion, and of each branch the parent, rest shape (m), undamped Hz, damping ratio,
+                 radius at each point of the rest shape (px), whether it is seen there; of a film in wind also the mean shape
+  wood.png       how much of each pixel shows this tree's wood at rest, 0 to 255; leaves.png: the same of its leaves
+  wood_mean.png, leaves_mean.png   of a film in wind, in which the tree is never at rest: the same in its mean pose
   grid.npz       up to 2500 surface points seen in frame 0: pix0 (K, 2), branch (K), pos_2d (frames, K, 2), px
 
 Pixels: the centre of the top left one is (0, 0), u right, v down. Metres: x right, y up, z towards the viewer, foot at 0.
-The steps are in made_films/: tree, motion, surface, scenery, picture, truth. A tree is drawn as thousands of small coloured
-facets that ride on its branches, four times too large and averaged down, so that it moves by parts of a pixel: the
-centroid of a drawn facet is within about 0.03 px of where it should be. No shadows, no motion blur, no exposure changes.
+--bad makes a film hard, and may be given several times. The tree and its motion are those of the seed without it:
+BAD_KINDS
+
+The steps are in made_films/: tree, motion, surface, scenery, bad_input, picture, truth. A tree is drawn as thousands of
+small coloured facets that ride on its branches, four times too large and averaged down, so that it moves by parts of a
+pixel: the centroid of a drawn facet is within about 0.03 px of where it should be. No cast shadows, no motion blur, no
+exposure changes.
 
 Needs numpy, scipy, opencv-python-headless and the ffmpeg program. About 10 s of one core for a bare tree, 20 s with leaves.
 """
 import argparse, json
 from pathlib import Path
 
+import cv2
 import numpy as np
 
-from made_films import motion, picture, scenery, surface, tree, truth
+from made_films import bad_input, motion, picture, scenery, surface, tree, truth
 
 DEFAULT_SECONDS = {"release": 11.0, "held": 11.0, "wind": 14.0}
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    kinds = "\n".join(f"  {kind:<14} {what}" for kind, what in bad_input.KINDS.items())
+    about = __doc__.replace("BAD_KINDS", kinds)
+    parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out_dir", type=Path)
     parser.add_argument("name")
     parser.add_argument("seed", type=int)
     parser.add_argument("look", choices=["leaves", "bare"])
     parser.add_argument("mode", choices=["release", "held", "wind"])
     parser.add_argument("--seconds", type=float)
+    parser.add_argument("--bad", action="append", default=[], choices=bad_input.KINDS)
     args = parser.parse_args()
     seconds = args.seconds or DEFAULT_SECONDS[args.mode]
-    make(args.out_dir / args.name, args.seed, args.look == "leaves", args.mode, round(seconds * picture.FPS))
+    make(args.out_dir / args.name, args.seed, args.look == "leaves", args.mode, round(seconds * picture.FPS), args.bad)
 
 
-def make(folder, seed, leafy, mode, frames):
-    rng = np.random.default_rng(seed)
+def make(folder, seed, leafy, mode, frames, bad_kinds):
+    rng, bad = np.random.default_rng(seed), bad_input.BadInput(bad_kinds, leafy)
     branches, pull_direction = tree.grow(rng, leafy)
     theta_rad, drive = motion.sway(rng, branches, mode, np.arange(frames) / picture.FPS)
     pose = motion.Pose(branches, theta_rad)
     camera = picture.Camera.framing(rng, pose.points_m)
-    skin = surface.cover(rng, branches, pose, leafy)
+    skin = bad.more_leaves(seed, branches, pose, surface.cover(rng, branches, pose, leafy))
     background = scenery.scenery(rng, leafy, picture.WIDTH, picture.HEIGHT)
+    bad.set_up(seed, background, skin, camera, frames)
 
-    seen = truth.facet_map(skin, pose, camera)
+    hidden = bad.hides()
+    seen = truth.facet_map(skin, pose, camera, hidden)
     pix0, branch, pos_2d = truth.grid(rng, skin, pose, camera, seen, frames)
     drive.update(pull_direction=truth.rounded(pull_direction), leaf_flutter_rad=surface.FLUTTER_RAD if leafy else 0.0)
+    calm = surface.without_flutter(skin)
+    rest = motion.Pose(branches, np.zeros((1, len(branches), 2)))
+    seen_at_rest = truth.facet_map(calm, rest, camera, hidden)
+    facts = truth.widths(branches, skin, rest, camera, seen_at_rest)
+    pictures = dict(zip(["wood.png", "leaves.png"], truth.masks(skin, seen_at_rest)))
+    if mode == "wind":
+        mean = motion.Pose(branches, theta_rad.mean(axis=0)[None])
+        seen_in_mean = truth.facet_map(calm, mean, camera, hidden)
+        pictures |= dict(zip(["wood_mean.png", "leaves_mean.png"], truth.masks(skin, seen_in_mean)))
+        for b, fact in zip(branches, facts):
+            fact["mean_polyline"] = truth.rounded(mean.points_m[0, mean.first[b.id] : mean.first[b.id + 1]])
     film = dict(clip=folder.name, renderer="benches/made_films.py", tree=f"made up, seed {seed}", fps=float(picture.FPS),
                 width=picture.WIDTH, height=picture.HEIGHT, n_frames=frames, coordinates=truth.COORDINATES,
-                camera=truth.of_camera(camera), motion=drive, branches=truth.of_branches(branches, pose, camera, branch))
+                camera=truth.of_camera(camera), motion=drive, bad_input=bad_kinds,
+                branches=truth.of_branches(branches, pose, camera, branch, facts))
 
     folder.mkdir(parents=True, exist_ok=True)
-    picture.film(folder / "video.mkv", rng, background, skin, pose, camera, frames)
+    picture.film(folder / "video.mkv", rng, background, skin, pose, camera, frames, bad)
+    for name, mask in pictures.items():
+        cv2.imwrite(str(folder / name), mask)
     np.savez_compressed(folder / "grid.npz", pix0=pix0, branch=branch, pos_2d=pos_2d)
     (folder / "outline.json").write_text(json.dumps(truth.outline(seen)))
     (folder / "truth.json").write_text(json.dumps(film))

@@ -3,7 +3,9 @@
 
     pictures.py terminal SCREEN.txt OUT.png    a screen as `tmux capture-pane -e` gives it
     pictures.py points CAPTURE OUT.png         the capture's frame with outline and points
-    pictures.py shapes DIR                     five shapes to push a tree into, with alpha
+    pictures.py sheet WOOD CAPTURE FRONT.png SIDE.png OUT.png
+                                               film at rest, wood, traced branches, skeleton and model of one clip; WOOD is
+                                               what `cargo bench --bench wood` writes
 """
 
 import csv
@@ -13,7 +15,7 @@ import re
 import sys
 from pathlib import Path
 
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw, ImageFont, ImageOps
 
 FONTS = Path("/usr/share/fonts/truetype/dejavu")
 CELL = (9, 18)  # of the terminal, px
@@ -171,8 +173,66 @@ def points(capture, out):
     save(picture.resize((960, 960 * picture.height // picture.width), Image.LANCZOS), out)
 
 
+KIND_COLOURS = {"measured": (240, 228, 66), "traced": (0, 220, 140), "shoot": (230, 120, 220)}
+
+
+def sheet(wood, capture, front, side, out):
+    wood, capture = Path(wood), Path(capture)
+    note = json.loads((capture / "capture.json").read_text())
+    rest = wood / "rest.png"
+    film = Image.open(rest if rest.is_file() else capture / note["picture"]["file"]).convert("RGB")
+    is_found = (wood / "branches.csv").is_file()
+    none = Image.new("RGB", film.size, GROUND)
+    mask = Image.open(wood / "mask.png").convert("RGB") if is_found else none
+    traced = on_film(film, graph(rows(wood / "branches.csv"), "node", "parent")) if is_found else none
+    seen = [n for n in rows(capture / "nodes.csv") if n["kind"] in KIND_COLOURS]
+    skeleton = on_film(film, graph(seen, "node_id", "parent_id"))
+    models = [ImageOps.pad(Image.open(name).convert("RGB"), film.size, color="white") for name in (front, side)]
+    missing = "" if is_found else ": none was found"
+    moment = "film at rest" if rest.is_file() else "film, first frame"
+    top = [(film, moment), (mask, "wood" + missing), (traced, "traced branches" + missing)]
+    kinds = ", ".join(f"{kind} {sum(n['kind'] == kind for n in seen)}" for kind in KIND_COLOURS)
+    low = [(skeleton, "skeleton: " + kinds), (models[0], "model from the front"), (models[1], "from the side")]
+    canvas = Image.new("RGB", (3 * film.width, 2 * film.height), GROUND)
+    pen, font = ImageDraw.Draw(canvas), ImageFont.truetype(str(FONTS / "DejaVuSansMono.ttf"), 14)
+    for k, cells in enumerate((top, low)):
+        for column, (picture, title) in enumerate(cells):
+            x = column * film.width
+            canvas.paste(picture, (x, k * film.height))
+            box = pen.textbbox((x + 8, k * film.height + 6), title, font=font)
+            pen.rectangle([box[0] - 4, box[1] - 3, box[2] + 4, box[3] + 3], fill=GROUND)
+            pen.text((x + 8, k * film.height + 6), title, font=font, fill=TEXT)
+    canvas.save(out, optimize=True)
+
+
+def rows(path):
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def graph(nodes, name, parent_name):
+    """Pieces of line from node to parent in px, with their colour."""
+    by_name = {n[name]: n for n in nodes}
+    place = lambda n: (float(n["u_px"]), float(n["v_px"]))
+    ends = [(n, by_name[n[parent_name]]) for n in nodes if n[parent_name] in by_name]
+    return [(place(n), place(parent), KIND_COLOURS[n.get("kind", "traced")]) for n, parent in ends]
+
+
+def on_film(film, pieces):
+    """Thin lines over the film, dimmed, with a dot at each node."""
+    large = Image.eval(film.resize((film.width * FINE, film.height * FINE), Image.BICUBIC), lambda grey: grey * 6 // 10)
+    draw = ImageDraw.Draw(large)
+    at = lambda p: tuple((x + 0.5) * FINE for x in p)
+    for p, q, colour in pieces:
+        draw.line([at(p), at(q)], fill=colour, width=3)
+    for p, _, colour in pieces:
+        (x, y), r = at(p), 2.5
+        draw.ellipse([x - r, y - r, x + r, y + r], fill=colour)
+    return large.resize(film.size, Image.LANCZOS)
+
+
 if __name__ == "__main__":
-    commands = {"terminal": (terminal, 2), "points": (points, 2)}
+    commands = {"terminal": (terminal, 2), "points": (points, 2), "sheet": (sheet, 5)}
     command, count = commands.get(sys.argv[1] if len(sys.argv) > 1 else "", (None, 0))
     if command is None or len(sys.argv) != 2 + count:
         sys.exit(__doc__)

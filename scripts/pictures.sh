@@ -1,13 +1,16 @@
 #!/usr/bin/env bash
 # Makes the pictures of README and docs anew: of the shipped clip, and of the oak too if CLIPS names a folder that
-# holds oak_release/video.mkv and outline.json. ONLY=name makes one group: views, film, shapes, wind, points, terminal, page.
-# Needs what scripts/apt-packages-test.txt lists, and `make build` first.
+# holds oak_release/video.mkv and outline.json (by default $ARBORCAM_CLIPS). ONLY=name makes one group: views, film, shapes,
+# wind, points, terminal, page, sheets. The sheets (film, wood, traced branches, skeleton and model of each clip) go to out/;
+# without CLIPS the second is of a film made anew, for which PYTHON (python3) needs numpy, scipy and opencv.
+# WOOD names a built bench `wood`. Needs what scripts/apt-packages-test.txt lists, and `make build` first.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 arborcam=$PWD/target/release/arborcam
 to=$PWD/docs/pictures
-clips=${CLIPS:-}
+clips=${CLIPS:-${ARBORCAM_CLIPS:-}}
+python=${PYTHON:-python3}
 only=${ONLY:-}
 largest=150000 # bytes of a picture
 work=$(mktemp -d)
@@ -18,10 +21,10 @@ fail() {
     exit 1
 }
 
-for tool in ffmpeg tmux python3; do
+for tool in ffmpeg tmux "$python"; do
     command -v "$tool" >/dev/null || fail "$tool is not installed; run scripts/setup.sh --tests"
 done
-python3 -c 'import PIL' 2>/dev/null || fail "python3 has no PIL; run scripts/setup.sh --tests"
+"$python" -c 'import PIL' 2>/dev/null || fail "$python has no PIL; run scripts/setup.sh --tests"
 [[ -x $arborcam ]] || fail "$arborcam is not there; run \`make build\` first"
 mkdir -p "$to"
 
@@ -29,10 +32,10 @@ trees=(winter)
 declare -A film=([winter]=recordings/sparse_winter.mkv) outline=([winter]=recordings/sparse_winter.outline.json)
 if [[ -n $clips ]]; then
     film[oak]=$clips/oak_release/video.mkv outline[oak]=$clips/oak_release/outline.json
-    [[ -r ${film[oak]} && -r ${outline[oak]} ]] || fail "CLIPS=$clips holds no oak_release/video.mkv with outline.json"
+    [[ -r ${film[oak]} && -r ${outline[oak]} ]] || fail "$clips holds no oak_release/video.mkv with outline.json"
     trees+=(oak)
 else
-    echo "pictures: CLIPS is not given; those of the oak stay as they are"
+    echo "pictures: neither CLIPS nor ARBORCAM_CLIPS is given; those of the oak stay as they are"
 fi
 
 # Whether a group of pictures is wanted.
@@ -137,10 +140,55 @@ wind() {
     done
 }
 
+# What `cargo bench --bench wood` finds in the clip in folder $1, into folder $2.
+find_wood() {
+    if [[ -n ${WOOD:-} ]]; then
+        "$WOOD" "$1" "$2"
+    else
+        cargo bench --locked --bench wood -- "$1" "$2"
+    fi
+}
+
+# sheet NAME: of the clip in $work/clip-NAME.
+sheet() {
+    local name=$1 clip=$work/clip-$1 capture=$work/sheet-$1 view
+    printf '[skeleton]\nalong_wood = true\n' >"$work/wood.toml"
+    "$arborcam" replay "$clip/video.mkv" --outline "$clip/outline.json" --config "$work/wood.toml" --fast --headless \
+        --out "$capture" 2>"$capture.log" || fail "the replay of $name failed: $(tail -n 1 "$capture.log")"
+    find_wood "$clip" "$work/wood-$name" >"$capture.wood" 2>&1 || fail "no wood of $name: $(tail -n 1 "$capture.wood")"
+    for view in front side; do
+        "$arborcam" render "$capture" --out "$work/sheet-$name-$view.png" --view $view --pose rest --size 640x360 \
+            --background white 2>"$work/render.log" || fail "render --view $view failed: $(cat "$work/render.log")"
+    done
+    mkdir -p out
+    "$python" scripts/pictures.py sheet "$work/wood-$name" "$capture" "$work/sheet-$name-front.png" \
+        "$work/sheet-$name-side.png" "out/$name.png"
+    printf 'pictures: out/%s.png, %s\n' "$name" "$(grep '^wood:' "$capture.wood" | tail -n 1)"
+}
+
+# Each clip on one sheet: is the tree in the model the tree in the film?
+sheets() {
+    local name
+    if [[ -n $clips ]]; then
+        for name in sparse_winter oak_release; do
+            ln -s "$(realpath "$clips/$name")" "$work/clip-$name"
+            sheet $name
+        done
+        return
+    fi
+    mkdir "$work/clip-sparse_winter"
+    ln -s "$PWD/recordings/sparse_winter.mkv" "$work/clip-sparse_winter/video.mkv"
+    ln -s "$PWD/recordings/sparse_winter.outline.json" "$work/clip-sparse_winter/outline.json"
+    sheet sparse_winter
+    "$python" benches/made_films.py "$work" clip-made_leaves 1 leaves release ||
+        fail "no film could be made; see the head of benches/made_films.py for what PYTHON needs"
+    sheet made_leaves
+}
+
 # A frame with outline and points, coloured by main branch.
 points() {
     capture winter
-    python3 scripts/pictures.py points "$work/winter" "$to/frame.png"
+    "$python" scripts/pictures.py points "$work/winter" "$to/frame.png"
     told "$to/frame.png"
 }
 
@@ -159,7 +207,7 @@ terminal() {
     sleep 1
     tmux -L "$server" capture-pane -e -p >"$work/screen.txt"
     tmux -L "$server" kill-server
-    python3 scripts/pictures.py terminal "$work/screen.txt" "$to/terminal.png"
+    "$python" scripts/pictures.py terminal "$work/screen.txt" "$to/terminal.png"
     told "$to/terminal.png"
 }
 
@@ -181,4 +229,5 @@ wanted wind && wind
 wanted points && points
 wanted terminal && terminal
 wanted page && page
+wanted sheets && sheets
 echo "pictures: $(du -ck "$to"/* | tail -n 1 | cut -f 1) kB in ${to#"$PWD/"}"

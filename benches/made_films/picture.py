@@ -74,19 +74,33 @@ class Film:
             raise SystemExit("ffmpeg could not write the film")
 
 
-def film(path, rng, background, surface, pose, camera, frames):
-    """Write the film. Only the part of the picture that the tree ever reaches is drawn anew in each frame."""
-    colours = [tuple(map(float, c)) for c in np.clip(surface.colour, 0, 255)]
+def film(path, rng, background, surface, pose, camera, frames, bad_input):
+    """Write the film. Only the part of the picture that a tree ever reaches is drawn anew in each frame."""
+    trees = [(t.skin, t.pose, t.camera) for t in bad_input.behind] + [(surface, pose, camera)]
+    colours = [[tuple(map(float, c)) for c in np.clip(skin.colour, 0, 255)] for skin, _, _ in trees]
     clean, out = fine_canvas(background), Film(path, rng)
-    reach = camera.project(pose.points_m).reshape(-1, 2)
-    # Leaves stand off their twig by up to half a metre.
-    x0, y0 = np.maximum(reach.min(0) - 0.6 * camera.px_per_m, 0).astype(int)
-    x1, y1 = np.minimum(reach.max(0) + 0.6 * camera.px_per_m, (WIDTH, HEIGHT)).astype(int)
-    image, canvas = np.clip(background, 0, 255).astype(np.float32), clean.copy()
+    image = np.clip(background, 0, 255).astype(np.float32)
+    if bad_input.wires:
+        bad_input.before_tree(clean)
+        image = cv2.resize(clean, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA).astype(np.float32)
+    canvas = clean.copy()
+    reaches = [reach_px(pose, camera) for _, pose, camera in trees]
+    x0, y0 = np.min([low for low, _ in reaches], axis=0)
+    x1, y1 = np.max([high for _, high in reaches], axis=0)
     box = np.s_[FINE * y0 : FINE * y1, FINE * x0 : FINE * x1]
     for f in range(frames):
         canvas[box] = clean[box]
-        draw(canvas, surface, surface.vertices_m(pose, f, f / FPS), camera, colours)
+        for (skin, pose, camera), colour in zip(trees, colours):
+            draw(canvas, skin, skin.vertices_m(pose, f, f / FPS), camera, colour)
+        bad_input.before_tree(canvas)
         image[y0:y1, x0:x1] = cv2.resize(canvas[box], (x1 - x0, y1 - y0), interpolation=cv2.INTER_AREA)
-        out.add(image)
+        out.add(bad_input.light(image, f / FPS))
     out.close()
+
+
+def reach_px(pose, camera):
+    """The corners (u, v) of the box that the tree never leaves, whole pixels."""
+    reach = camera.project(pose.points_m).reshape(-1, 2)
+    # Leaves stand off their twig by up to half a metre.
+    low = np.maximum(reach.min(0) - 0.6 * camera.px_per_m, 0).astype(int)
+    return low, np.minimum(reach.max(0) + 0.6 * camera.px_per_m, (WIDTH, HEIGHT)).astype(int)

@@ -1,5 +1,5 @@
 """Bark and leaves as small coloured facets of four corners that ride on the branches: the texture moves with the tree."""
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,6 +32,10 @@ class Surface:
         ends = [pose.points_m[frame, n] + np.einsum("vij,vj->vi", pose.turns[frame, n], offset)
                 for n in (self.node, self.node + 1)]
         return (1 - self.weight)[:, None] * ends[0] + self.weight[:, None] * ends[1]
+
+
+def without_flutter(surface):
+    return replace(surface, flutter_m=np.zeros_like(surface.flutter_m))
 
 
 def cover(rng, branches, pose, leafy):
@@ -81,19 +85,19 @@ def grain(rng, rings, sides):
     return rng.normal(0, 0.13, (rings, sides)) + patches + rng.normal(0, 0.10, sides) + scars
 
 
-def foliage(rng, branches, first):
-    share = np.array([b.length_m * LEAFY_PART[b.depth] for b in branches])
-    counts = rng.multinomial(LEAVES, share / share.sum())
+def foliage(rng, branches, first, number=LEAVES, leafy_part=LEAFY_PART):
+    share = np.array([b.length_m * leafy_part[b.depth] for b in branches])
+    counts = rng.multinomial(number, share / share.sum())
     green = np.array([rng.uniform(25, 50), rng.uniform(120, 150), rng.uniform(70, 110)])
     top_m = max(b.nodes_m[-1, 1] for b in branches)
     for b, count in zip(branches, counts):
         for _ in range(count):
-            yield leaf(rng, b, first[b.id], green, top_m)
+            yield leaf(rng, b, first[b.id], green, top_m, leafy_part[b.depth])
 
 
-def leaf(rng, b, first_node, green_bgr, top_m):
+def leaf(rng, b, first_node, green_bgr, top_m, leafy_part):
     """Two halves along the midrib, each of a near and a far facet."""
-    frac = 1 - LEAFY_PART[b.depth] * rng.random()
+    frac = 1 - leafy_part * rng.random()
     segments = len(b.nodes_m) - 1
     node = min(int(frac * segments), segments - 1)
     point, along = b.at(frac)

@@ -9,13 +9,35 @@ GRID_STEP_PX, GRID_POINTS = 2, 2500
 COORDINATES = "x right, y up, z toward viewer; metres; trunk foot = origin. pixels: centre of top-left pixel = (0,0), v down"
 
 
-def facet_map(surface, pose, camera):
-    """(fine height, fine width) facet seen at each fine pixel of frame 0, -1 where there is none."""
+def facet_map(surface, pose, camera, hidden):
+    """(fine height, fine width) facet seen at each fine pixel of the pose's frame 0, -1 where there is none or it is hidden."""
     canvas = np.zeros((FINE * HEIGHT, FINE * WIDTH, 3), np.uint8)
     # The number of a facet, from 1, as a colour.
     numbers = [(float(n & 255), float(n >> 8 & 255), float(n >> 16)) for n in range(1, len(surface.facets) + 1)]
     picture.draw(canvas, surface, surface.vertices_m(pose, 0, 0.0), camera, numbers)
+    canvas[hidden] = 0
     return canvas.astype(np.int64) @ np.array([1, 256, 65536]) - 1
+
+
+def masks(surface, seen):
+    """How much of each pixel shows wood, and how much leaves, 0 to 255; seen is a facet_map."""
+    is_leaf = surface.two_sided[seen]
+    shares = [(seen >= 0) & ~is_leaf, (seen >= 0) & is_leaf]
+    return [cv2.resize(255 * s.astype(np.uint8), (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA) for s in shares]
+
+
+def widths(branches, surface, rest, camera, seen):
+    """Of each branch the radius at its nodes, px, and whether its own bark is seen there at rest."""
+    listed = []
+    for b in branches:
+        nodes_px = camera.project(rest.points_m[0, rest.first[b.id] : rest.first[b.id + 1]])
+        fine = np.round((nodes_px + 0.5) * FINE - 0.5).astype(int)
+        inside = ((fine >= 0) & (fine < (FINE * WIDTH, FINE * HEIGHT))).all(axis=1)
+        facet = np.where(inside, seen[tuple(np.where(inside[:, None], fine, 0).T[::-1])], -1)
+        own = (facet >= 0) & (surface.branch[facet] == b.id) & ~surface.two_sided[facet]
+        frac = np.linspace(0, 1, len(nodes_px))
+        listed.append(dict(rest_radius_px=rounded(camera.px_per_m * b.radius_m(frac)), rest_seen=own.astype(int).tolist()))
+    return listed
 
 
 def grid(rng, surface, pose, camera, seen, frames):
@@ -75,8 +97,8 @@ def of_camera(camera):
                 focal_px=None, projection="u=W/2-.5+s*(x-cx); v=H/2-.5-s*(y-cy); s=px_per_m_at_z0")
 
 
-def of_branches(branches, pose, camera, grid_branch):
-    """The list in truth.json. A branch is major when at least five points of the grid lie on it."""
+def of_branches(branches, pose, camera, grid_branch, more):
+    """The list in truth.json; more has further facts of each. A branch is major if five points of the grid lie on it."""
     visible = np.bincount(grid_branch, minlength=len(branches))
     listed = []
     for b in branches:
@@ -89,5 +111,5 @@ def of_branches(branches, pose, camera, grid_branch):
             damping=rounded(b.damping), e1=rounded(b.e1), e2=rounded(b.e2), theta0=rounded(b.pull_rad),
             rest_base=rounded(b.nodes_m[0]), rest_tip=rounded(b.nodes_m[-1]), rest_polyline=rounded(b.nodes_m),
             rest_base_2d=rounded(ends_px[0]), rest_tip_2d=rounded(ends_px[1]), max_tip_excursion_px=rounded(excursion_px),
-            visible_grid_points_f0=int(visible[b.id]), major=bool(visible[b.id] >= 5)))
+            visible_grid_points_f0=int(visible[b.id]), major=bool(visible[b.id] >= 5)) | more[b.id])
     return listed

@@ -1,0 +1,141 @@
+"""What makes a film hard: things behind, before and on the tree, and bad light. Pixels; colours blue, green, red.
+
+Chance is drawn from a generator of its own: tree, motion and noise of a seed are the same with and without these.
+"""
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+
+from . import motion, picture, scenery, surface, tree
+from .picture import FINE, FPS, HEIGHT, WIDTH
+
+KINDS = {
+    "brown_wall": "a wall behind the tree, as brown as its bark",
+    "fence": "upright and level slats behind the crown, of about the bark's colour",
+    "second_tree": "another tree behind, that sways in wind of its own",
+    "shadow": "blotches of shadow that wander over everything",
+    "wire": "two dark wires in front of the crown",
+    "full_foliage": "leaves on all branches and the trunk, so that hardly any wood is seen",
+    "night": "an eighth of the light, the camera's noise as before",
+    "fog": "a seventh of the contrast, the rest is grey",
+}
+SHADE_LEAST, SHADE_PX_S, SHADE_SWAY_PX, SHADE_SWAY_HZ = 0.5, 12.0, 25.0, 0.35
+CROWN_LEAVES, TRUNK_LEAVES = 5000, 1500
+
+
+@dataclass
+class OtherTree:
+    skin: surface.Surface
+    pose: motion.Pose
+    camera: picture.Camera
+
+
+@dataclass
+class BadInput:
+    """What there is of it in one film."""
+    kinds: list
+    leafy: bool
+    behind: list = field(default_factory=list)  # OtherTree
+    wires: list = field(default_factory=list)  # (N, 2) lines in pixels
+    wire_px: float = 2.2
+    shade: np.ndarray = None  # share of the light that is left, repeated sideways without a seam
+
+    def more_leaves(self, seed, branches, pose, skin):
+        if "full_foliage" not in self.kinds:
+            return skin
+        rng, everywhere = own_rng(seed, "full_foliage"), (1.0,) * 5
+        crown = surface.foliage(rng, branches, pose.first, CROWN_LEAVES, everywhere)
+        trunk = surface.foliage(rng, branches[:1], pose.first, TRUNK_LEAVES, everywhere)
+        return surface.join([skin, *crown, *trunk])
+
+    def set_up(self, seed, background, skin, camera, frames):
+        """Paints what stands still behind the tree into the background, and makes what moves."""
+        bark_bgr = skin.colour[~skin.two_sided].mean(axis=0)
+        if "brown_wall" in self.kinds:
+            wall(own_rng(seed, "brown_wall"), background, bark_bgr)
+        if "fence" in self.kinds:
+            slats(own_rng(seed, "fence"), background, bark_bgr)
+        if "second_tree" in self.kinds:
+            self.behind.append(second_tree(own_rng(seed, "second_tree"), self.leafy, camera, frames))
+        if "wire" in self.kinds:
+            self.wires = wires(own_rng(seed, "wire"))
+        if "shadow" in self.kinds:
+            self.shade = shade(own_rng(seed, "shadow"))
+
+    def before_tree(self, canvas):
+        """Draws what hangs in front on the fine canvas."""
+        for line in self.wires:
+            fixed = np.round(((line + 0.5) * FINE - 0.5) * (1 << picture.SHIFT)).astype(np.int32)
+            cv2.polylines(canvas, [fixed], False, (48, 45, 45), round(self.wire_px * FINE), cv2.LINE_8, picture.SHIFT)
+
+    def hides(self):
+        """(fine height, fine width) where something in front hides the tree."""
+        canvas = np.full((FINE * HEIGHT, FINE * WIDTH, 3), 255, np.uint8)
+        self.before_tree(canvas)
+        return canvas[..., 0] < 255
+
+    def light(self, image, time_s):
+        """The frame as this light shows it."""
+        if self.shade is not None:
+            shift = SHADE_PX_S * time_s + SHADE_SWAY_PX * np.sin(2 * np.pi * SHADE_SWAY_HZ * time_s)
+            moved = cv2.warpAffine(self.shade, np.float32([[1, 0, shift % (2 * WIDTH)], [0, 1, 0]]), (WIDTH, HEIGHT),
+                                   flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
+            image = image * moved[..., None]
+        if "fog" in self.kinds:
+            image = image / 7 + np.array([218, 213, 208]) * 6 / 7
+        if "night" in self.kinds:
+            image = image / 8 * np.array([1.15, 1.0, 0.9]) + 8
+        return image
+
+
+def own_rng(seed, kind):
+    """A generator for one kind, whatever others the film has."""
+    return np.random.default_rng([seed, sorted(KINDS).index(kind)])
+
+
+def wall(rng, img, bark_bgr):
+    """Down to the ground; smears of brightness and a grain as coarse as the bark's."""
+    foot = int(0.74 * HEIGHT)
+    texture = 0.08 * scenery.noise(rng, foot, WIDTH, 8) + 0.10 * scenery.noise(rng, foot, WIDTH, 220, octaves=2)
+    img[:foot] = bark_bgr * (1 + texture)[..., None]
+
+
+def slats(rng, img, bark_bgr):
+    """From above the crown's middle to the ground."""
+    gap, width, top, foot = rng.integers([24, 5, 30, 285], [36, 9, 60, 300])
+    mask = np.zeros(img.shape[:2], bool)
+    for u in range(int(rng.integers(gap)), WIDTH, gap):
+        mask[top:foot, u : u + width] = True
+    for v in np.linspace(top + 12, foot - 12, 4).astype(int):
+        mask[v - width // 2 : v - width // 2 + width] = True
+    hue = bark_bgr * rng.uniform(0.9, 1.2)
+    img[mask] = (hue * (1 + 0.10 * scenery.noise(rng, *mask.shape, 150, octaves=2))[..., None])[mask]
+
+
+def second_tree(rng, leafy, camera, frames):
+    """Farther off, so that it is smaller and its foot is higher; its crown stands behind this one's."""
+    branches, _ = tree.grow(rng, leafy)
+    theta_rad, _ = motion.sway(rng, branches, "wind", np.arange(frames) / FPS)
+    pose = motion.Pose(branches, theta_rad)
+    scale = 0.8 * camera.px_per_m
+    foot_px = camera.project(np.zeros(3)) + (rng.choice([-1, 1]) * rng.uniform(70, 120), -rng.uniform(12, 20))
+    centre = ((WIDTH / 2 - 0.5 - foot_px[0]) / scale, (foot_px[1] - HEIGHT / 2 + 0.5) / scale)
+    return OtherTree(surface.cover(rng, branches, pose, leafy), pose, picture.Camera(float(scale), centre))
+
+
+def wires(rng):
+    """Two that sag a little, from one side of the picture to the other."""
+    u = np.linspace(-10, WIDTH + 10, 60)
+    lines = []
+    for height_px in rng.uniform([70, 140], [120, 200]):
+        slope, sag_px = rng.uniform(-0.12, 0.12), rng.uniform(4, 14)
+        v = height_px + slope * (u - WIDTH / 2) + sag_px * (1 - (2 * u / WIDTH - 1) ** 2)
+        lines.append(np.stack([u, v], axis=-1))
+    return lines
+
+
+def shade(rng):
+    dark = (scenery.noise(rng, HEIGHT, WIDTH, 7) > 0.3).astype(np.float32)
+    light = 1 - (1 - SHADE_LEAST) * cv2.GaussianBlur(dark, None, 3.0)
+    return np.hstack([light, light[:, ::-1]])
