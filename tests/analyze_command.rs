@@ -10,7 +10,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use support::replayed;
+use support::replayed_by_motion;
 use tempfile::TempDir;
 
 const FAILED: i32 = 1;
@@ -49,7 +49,7 @@ fn copy(from: &Path, to: &Path) {
 fn captured(name: &str) -> (TempDir, PathBuf) {
     let dir = tempfile::tempdir().expect("tempdir");
     let to = dir.path().join(name);
-    copy(replayed(), &to);
+    copy(replayed_by_motion(), &to);
     (dir, to)
 }
 

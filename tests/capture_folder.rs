@@ -143,26 +143,41 @@ fn the_tree_stands_on_its_foot_and_parents_come_first() {
         [0.0; 3],
         "the foot is the origin"
     );
+    assert_eq!(index(&nodes[0][0]), 0, "the foot is 0");
+    let trunk = &nodes[place(nodes, "1")];
     assert_eq!(
-        [0, 1].map(|i| index(&nodes[i][0])),
-        [0, 1],
-        "foot and trunk are 0 and 1"
+        [2, 20].map(|c| trunk[c].as_str()),
+        ["1", "measured"],
+        "the trunk is 1"
     );
     for (i, node) in nodes.iter().enumerate() {
-        let place = |id: &str| nodes[..i].iter().position(|n| n[0] == id);
+        let place_of = |id: &str| place(&nodes, id);
+        let before = |id: &str| nodes[..i].iter().position(|n| n[0] == id);
         assert!(
-            place(&node[0]).is_none(),
+            before(&node[0]).is_none(),
             "two nodes are called {}",
             node[0]
         );
-        let parent = place(&node[1]);
+        let parent = before(&node[1]);
         assert!(
             i == 0 || parent.is_some(),
             "node {i} stands before its parent {}",
             node[1]
         );
+        // One above what carries it; a part of a branch has the level of that, or is side wood.
+        let mover = |n: &[String]| {
+            if n[24].is_empty() {
+                n[0].clone()
+            } else {
+                n[24].clone()
+            }
+        };
+        let carrier = parent
+            .map(|p| mover(&nodes[p]))
+            .filter(|m| *m != mover(node));
+        let carrier = carrier.map(|name| index(&nodes[place_of(&name)][2]));
         assert!(
-            parent.is_none_or(|p| index(&node[2]) == index(&nodes[p][2]) + 1),
+            !node[24].is_empty() || carrier.is_none_or(|c| index(&node[2]) == c + 1),
             "level of node {i}"
         );
         assert!(number(&node[9]) > 0.0, "radius of node {i}");

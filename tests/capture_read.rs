@@ -9,7 +9,7 @@ use nalgebra::distance;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-use support::{CLIP, OUTLINE, replayed as made};
+use support::{CLIP, OUTLINE, replayed_by_motion as made};
 use tempfile::TempDir;
 
 const WHOLE: f64 = 60.0;
@@ -135,7 +135,11 @@ fn a_model_in_metres_is_read_in_pixels() {
     let dir = tempfile::tempdir().expect("tempdir");
     let out = dir.path().join("out");
     let settings = dir.path().join("short.toml");
-    fs::write(&settings, "[export]\nanimation_s = 2.5\n").expect("settings");
+    fs::write(
+        &settings,
+        "[export]\nanimation_s = 2.5\n[skeleton]\nalong_wood = false\n",
+    )
+    .expect("settings");
     let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
     command.args([
         "replay",

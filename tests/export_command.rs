@@ -261,7 +261,10 @@ fn another_shape_keeps_what_was_measured() {
         .skeleton
         .nodes
         .iter()
-        .filter(|n| n.level < 2 && n.copy_of.is_none())
+        .take(measured)
+        .enumerate()
+        .map(|(i, _)| read.skeleton.mover(NodeId(i as u32)))
+        .filter(|mover| read.skeleton.nodes[mover.index()].level < 2)
         .count();
     assert_eq!(rows.len(), measured + 4 * (measured - trunk));
     let mut names: Vec<&str> = rows.iter().map(|r| r[0].as_str()).collect();

@@ -24,6 +24,7 @@ fn run() -> &'static Run {
     static RUN: OnceLock<Run> = OnceLock::new();
     RUN.get_or_init(|| {
         let mut config = Config::default();
+        config.skeleton.along_wood = false;
         (config.accumulate.min_s, config.accumulate.threshold) = (4.0, 0.2);
         let mut pipeline = Pipeline::new(&config, Some(support::outline())).expect("decoder");
         let (mut frames, mut sets) = (Vec::new(), Vec::new());

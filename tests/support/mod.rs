@@ -55,28 +55,34 @@ pub fn outline() -> Outline {
 /// The capture folder of one replay of the shipped recording by the program itself.
 pub fn replayed() -> &'static Path {
     static MADE: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
-    let (_, out) = MADE.get_or_init(|| {
-        let dir = tempfile::tempdir().expect("tempdir");
-        let out = dir.path().join("out");
-        let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
-        command
-            .args([
-                "replay",
-                CLIP,
-                "--fast",
-                "--headless",
-                "--outline",
-                OUTLINE,
-                "--out",
-            ])
-            .arg(&out);
-        let output = command.output().expect("arborcam");
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
-        (dir, out)
-    });
-    out
+    &MADE.get_or_init(|| replayed_with("")).1
+}
+
+/// The same with the skeleton of the motion alone: every node moves on its own, so that rows can be
+/// taken out of its tables.
+pub fn replayed_by_motion() -> &'static Path {
+    static MADE: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
+    &MADE
+        .get_or_init(|| replayed_with("[skeleton]\nalong_wood = false\n"))
+        .1
+}
+
+fn replayed_with(settings: &str) -> (TempDir, PathBuf) {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let (config, out) = (dir.path().join("settings.toml"), dir.path().join("out"));
+    std::fs::write(&config, settings).expect("settings");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
+    command
+        .args(["replay", CLIP, "--fast", "--headless", "--outline", OUTLINE])
+        .arg("--config")
+        .arg(&config)
+        .arg("--out")
+        .arg(&out);
+    let output = command.output().expect("arborcam");
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    (dir, out)
 }

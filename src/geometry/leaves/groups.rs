@@ -73,23 +73,27 @@ pub(super) fn groups(
     out
 }
 
-/// For every node the child of the first fork that it is on, or itself below that. Copies fork, too:
-/// their leaves are meshes of their own, other than by [`Skeleton::main_branches`].
+/// For every node the branch of the first fork that it is on, or its own below that. Copies fork,
+/// too: their leaves are meshes of their own, other than by [`Skeleton::main_branches`].
 fn fork_branches(skeleton: &Skeleton) -> Vec<usize> {
-    let children = skeleton.children();
+    let branches = skeleton.moving_branches();
+    let mut children: Vec<Vec<usize>> = vec![Vec::new(); skeleton.nodes.len()];
+    for branch in &branches {
+        children[branch.parent.index()].push(branch.node.index());
+    }
     let mut top = 0;
-    while let Some([only]) = children.get(top).map(Vec::as_slice) {
-        top = only.index();
+    while let [only] = children[top][..] {
+        top = only;
     }
     let mut of_node: Vec<usize> = (0..skeleton.nodes.len()).collect();
-    for (i, node) in skeleton.nodes.iter().enumerate() {
-        if let Some(parent) = node
-            .parent
-            .map(|p| p.index())
-            .filter(|&p| p != top && p < i && i > top)
-        {
-            of_node[i] = of_node[parent];
+    for branch in &branches {
+        let (node, parent) = (branch.node.index(), branch.parent.index());
+        if of_node[parent] != parent || children[top].contains(&parent) {
+            of_node[node] = of_node[parent];
         }
+    }
+    for i in 0..of_node.len() {
+        of_node[i] = of_node[skeleton.mover(NodeId(i as u32)).index()];
     }
     of_node
 }
