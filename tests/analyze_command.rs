@@ -287,6 +287,9 @@ fn a_known_length_gives_amplitudes_in_metres() {
         "--outline",
         support::OUTLINE,
     ]);
+    let settings = dir.with_file_name("motion.toml");
+    fs::write(&settings, "[skeleton]\nalong_wood = false\n").expect("settings");
+    command.arg("--config").arg(&settings);
     command
         .args(["--scale", "10,20:10,120=2", "--out"])
         .arg(&made);

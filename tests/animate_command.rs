@@ -124,7 +124,16 @@ fn the_table_is_as_long_as_asked_and_the_loops_ends_meet() {
 fn the_model_holds_the_motion_and_its_loop_closes() {
     let (_dir, out) = animated(
         "tree.glb",
-        &["--seconds", "4", "--wind", "6", "--loop", "--leaves", "on"],
+        &[
+            "--seconds",
+            "4",
+            "--wind",
+            "6",
+            "--loop",
+            "--leaves",
+            "on",
+            "--leaf-swing",
+        ],
     );
     let (document, buffers, _) = gltf::import(&out).expect("a model");
     let animation = document.animations().next().expect("an animation");

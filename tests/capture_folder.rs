@@ -144,7 +144,7 @@ fn the_tree_stands_on_its_foot_and_parents_come_first() {
         "the foot is the origin"
     );
     assert_eq!(index(&nodes[0][0]), 0, "the foot is 0");
-    let trunk = &nodes[place(nodes, "1")];
+    let trunk = &nodes[place(&nodes, "1")];
     assert_eq!(
         [2, 20].map(|c| trunk[c].as_str()),
         ["1", "measured"],

@@ -461,6 +461,9 @@ impl ModelThread {
     /// Writes the capture, from the tables as far as they have come.
     fn write_once(&mut self, out: &Path) -> Result<Written, Failure> {
         let job = self.capture_job()?;
+        if let Some(unfinished) = &mut self.unfinished {
+            unfinished.keep_wood(&job.wood)?;
+        }
         let is_current =
             |tables: &TableWriter| job.tree.as_ref().is_some_and(|model| tables.is_of(model));
         let tables = self.tables.take().filter(is_current);

@@ -121,8 +121,12 @@ impl Unfinished {
         self.keep_wood(&job.wood)
     }
 
-    /// The frames are not kept, and with them the wood that they show would be lost.
-    fn keep_wood(&mut self, wood: &WoodSeen) -> Result<(), Failure> {
+    /// Brings to disk the wood that was found. The frames are not kept, and with them it would be
+    /// lost.
+    ///
+    /// # Errors
+    /// The disk is full, or whatever else the file system says.
+    pub fn keep_wood(&mut self, wood: &WoodSeen) -> Result<(), Failure> {
         if wood.len() > self.kept_wood {
             self.replace(WOOD_FILE, &wood_csv(wood)?)?;
             self.kept_wood = wood.len();
