@@ -92,9 +92,9 @@ fn axes(nodes: &[Node]) -> Vec<Vec<usize>> {
         }
     }
     let mut axes = Vec::new();
-    for i in 1..nodes.len() {
-        let goes_on = nodes[i].parent.and_then(|p| next[p.index()]) == Some(i);
-        if goes_on && nodes[i].parent != Some(NodeId(0)) {
+    for (i, node) in nodes.iter().enumerate().skip(1) {
+        let goes_on = node.parent.and_then(|p| next[p.index()]) == Some(i);
+        if goes_on && node.parent != Some(NodeId(0)) {
             continue;
         }
         axes.push(std::iter::successors(Some(i), |at| next[*at]).collect());
