@@ -147,7 +147,7 @@ settings! {
         fold: f64 [0 to 0.95] = 0.4;
         /// Looks for the wood that the frames show, and lets the skeleton run along it. Where none
         /// is seen, the skeleton is that of the motion alone.
-        along_wood: bool = true;
+        along_wood: bool = false;
     }
 
     /// The skeleton in space: what the camera does not see is estimated (Li 2011 sect. 3).

@@ -89,6 +89,11 @@ fn still(screen: &str) -> String {
         }
         out.trim_end().to_owned()
     };
+    // Which branch the panel is of, trunk or limb, is another one in every run.
+    let without_name = |line: String| match line.strip_prefix("Branch ") {
+        Some(rest) if rest.ends_with(" points") => "Branch points".to_owned(),
+        _ => line,
+    };
     // A refinement is told when it is through, however long it took.
     let refined = |l: &String| l.starts_with("the tree was refined");
     // Where the two views of the tree stand depends on its shape: they are named last, whichever
@@ -98,6 +103,7 @@ fn still(screen: &str) -> String {
     let (of_views, mut lines): (Vec<String>, Vec<String>) = masked
         .lines()
         .map(squeeze)
+        .map(without_name)
         .filter(|l| !l.is_empty() && !refined(l))
         .partition(is_view);
     lines.extend(
