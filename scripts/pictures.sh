@@ -152,9 +152,8 @@ find_wood() {
 # sheet NAME: of the clip in $work/clip-NAME.
 sheet() {
     local name=$1 clip=$work/clip-$1 capture=$work/sheet-$1 view
-    printf '[skeleton]\nalong_wood = true\n' >"$work/wood.toml"
-    "$arborcam" replay "$clip/video.mkv" --outline "$clip/outline.json" --config "$work/wood.toml" --fast --headless \
-        --out "$capture" 2>"$capture.log" || fail "the replay of $name failed: $(tail -n 1 "$capture.log")"
+    "$arborcam" replay "$clip/video.mkv" --outline "$clip/outline.json" --fast --headless --out "$capture" \
+        2>"$capture.log" || fail "the replay of $name failed: $(tail -n 1 "$capture.log")"
     find_wood "$clip" "$work/wood-$name" >"$capture.wood" 2>&1 || fail "no wood of $name: $(tail -n 1 "$capture.wood")"
     for view in front side; do
         "$arborcam" render "$capture" --out "$work/sheet-$name-$view.png" --view $view --pose rest --size 640x360 \

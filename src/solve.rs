@@ -5,6 +5,8 @@
 //! I/O, starts no threads and reads no clock.
 
 mod along_wood;
+mod bent_tree;
+mod in_depth;
 mod labels;
 mod lift;
 mod model;
@@ -12,7 +14,7 @@ mod refine;
 mod sub_branches;
 mod taper;
 
-pub use along_wood::in_depth_of;
+pub use in_depth::in_depth_of;
 pub use lift::{assign_radii, lift_to_3d};
 pub use model::{First, Model, Moment};
 pub use sub_branches::SubBranch;
@@ -21,8 +23,7 @@ use crate::cancel::CancelToken;
 use crate::config::Config;
 use crate::dynamics::{Depth, Film, analyse};
 use crate::hierarchy::{self, Evidence};
-use crate::model::{BranchGraph, Outline, TrackLog, TrackTable};
-use crate::skeleton;
+use crate::model::{BranchGraph, Foot, Outline, TrackLog, TrackTable};
 use refine::Refinement;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -133,7 +134,7 @@ fn build(
     if evidence.moving.len() < LEAST_MOVING {
         return None;
     }
-    let foot_px = skeleton::Foot::of(outline, crown_u(table, &evidence.moving)).position_px;
+    let foot_px = Foot::of(outline, crown_u(table, &evidence.moving)).position_px;
     let hierarchy = hierarchy::build(table, &evidence.moving, foot_px, &config.hierarchy);
     if hierarchy.members().len() < LEAST_MOVING {
         return None;

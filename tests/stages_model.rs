@@ -3,7 +3,9 @@
 use arborcam::config;
 use arborcam::hierarchy;
 use arborcam::model::TrackTable;
-use arborcam::model::{Cluster, ClusterId, MotionHierarchy, Outline, Size, Skeleton, TrackId};
+use arborcam::model::{
+    Cluster, ClusterId, Foot, MotionHierarchy, Outline, Size, Skeleton, TrackId,
+};
 use arborcam::motion::{PoseEstimator, Problem, deterministic_direction};
 use arborcam::shape::{self, Envelope, Terms};
 use arborcam::skeleton::{self, Node2d};
@@ -204,7 +206,7 @@ fn the_tree_in_space_stays_in_its_envelope_on_one_trunk() {
 
 #[test]
 fn attractors_lie_on_the_surface() {
-    let foot = skeleton::Foot::of(&outline(), None).position_px;
+    let foot = Foot::of(&outline(), None).position_px;
     let envelope = Envelope::of_revolution(&outline(), foot);
     let points = envelope.attractors(256);
     assert_eq!(points.len(), 256);
@@ -236,7 +238,7 @@ fn attractors_lie_on_the_surface() {
 #[test]
 fn pushing_brings_the_tree_nearer_to_its_envelope() {
     let (settings, outline) = (config::Shape::default(), outline());
-    let foot_px = skeleton::Foot::of(&outline, None).position_px;
+    let foot_px = Foot::of(&outline, None).position_px;
     let envelope = Envelope::of_revolution(&outline, foot_px);
     let trunk = shape::trunk(&flat(), config::Leader::None, &[]);
     let prototype = shape::copy_to_planes(

@@ -27,8 +27,8 @@ pub struct Load {
     pub lever: Vector3<f64>,
     /// Area that the wind finds, px².
     pub sail: f64,
-    /// By how much it bends under a bending moment, rad: Hooke's law (Hu et al. sect. 6). 0 where it
-    /// does not.
+    /// By how much it bends under a bending moment, rad: Hooke's law (Hu et al. sect. 6). 0 where
+    /// it does not.
     pub yields: f64,
 }
 

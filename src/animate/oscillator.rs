@@ -11,9 +11,10 @@ pub struct Oscillation {
 
 /// One step of `x'' + 4 pi xi f x' + 4 pi^2 f^2 x = F(t) / m` (Hu et al. eq. 7).
 ///
-/// The force is given as the place `u = F / (4 pi^2 f^2 m)` at which it would hold the branch still,
-/// and goes evenly from one value to the next. For such a force the step is the solution itself,
-/// not an approximation as explicit Euler is: nothing is gained or lost however long the step.
+/// The force is given as the place `u = F / (4 pi^2 f^2 m)` at which it would hold the branch
+/// still, and goes evenly from one value to the next. For such a force the step is the solution
+/// itself, not an approximation as explicit Euler is: nothing is gained or lost however long the
+/// step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transition {
     step_s: f64,

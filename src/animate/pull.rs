@@ -12,8 +12,8 @@ const DOUBLINGS: i32 = 60;
 /// Share of the tree's height above which a rope is tied.
 const TIED_ABOVE: f64 = 0.45;
 
-/// Where one would tie the rope: the thickest branch of its own motion that ends well above the ground, of equally
-/// thick ones the highest.
+/// Where one would tie the rope: the thickest branch of its own motion that ends well above the
+/// ground, of equally thick ones the highest.
 pub fn place_to_pull(skeleton: &Skeleton) -> NodeId {
     let nodes = &skeleton.nodes;
     let height = nodes.iter().map(|n| n.position.y).fold(0.0, f64::max);

@@ -97,8 +97,8 @@ impl<'a> Tuner<'a> {
         tuner
     }
 
-    /// What was measured on a branch itself: nothing on a copy, the foot, or what moves with another
-    /// node.
+    /// What was measured on a branch itself: nothing on a copy, the foot, or what moves with
+    /// another node.
     fn measured(&self, i: usize) -> Known {
         let node = &self.skeleton.nodes[i];
         let moves = self.skeleton.mover(NodeId(i as u32)).index() == i;

@@ -1,5 +1,5 @@
-//! `capture.json`: what was filmed, with what, how well; written and read. No date of today, so that a replay gives
-//! the same file.
+//! `capture.json`: what was filmed, with what, how well; written and read. No date of today, so
+//! that a replay gives the same file.
 
 use super::error::DocumentError;
 use crate::config::Config;

@@ -147,8 +147,8 @@ fn push(log: &mut TrackLog, time_s: f64, observations: &mut Vec<Observation>) {
     }
 }
 
-/// Copies `tracks.csv` of the document in `from`; a point whose node is not among `nodes` any more is
-/// written without one, as points that move nothing are.
+/// Copies `tracks.csv` of the document in `from`; a point whose node is not among `nodes` any more
+/// is written without one, as points that move nothing are.
 ///
 /// # Errors
 /// The table cannot be read, or not be written to its end; `stop` was set meanwhile.

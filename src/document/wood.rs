@@ -74,14 +74,6 @@ pub fn read_wood(dir: &Path) -> Result<WoodSeen, DocumentError> {
 mod tests {
     use super::*;
 
-    fn node(parent: Option<usize>, u: f64, v: f64) -> WoodNode {
-        WoodNode {
-            parent,
-            position_px: Point2::new(u, v),
-            radius_px: 4.25,
-        }
-    }
-
     fn read(text: &[u8]) -> Result<WoodSeen, DocumentError> {
         let dir = tempfile::tempdir().expect("a folder");
         std::fs::write(dir.path().join(WOOD_FILE), text).expect("a file");
@@ -92,13 +84,13 @@ mod tests {
     fn what_was_written_is_read() {
         let wood = BranchGraph {
             nodes: vec![
-                node(None, 100.0, 200.5),
-                node(Some(0), 101.123_456_789, 150.0),
-                node(Some(0), 90.0, 120.0),
+                WoodNode::made_up(None, 100.0, 200.5),
+                WoodNode::made_up(Some(0), 101.123_456_789, 150.0),
+                WoodNode::made_up(Some(0), 90.0, 120.0),
             ],
         };
         let later = BranchGraph {
-            nodes: vec![node(None, 0.1 + 0.2, 1.0 / 3.0)],
+            nodes: vec![WoodNode::made_up(None, 0.1 + 0.2, 1.0 / 3.0)],
         };
         let seen = WoodSeen::from([(90, Arc::new(wood)), (170, Arc::new(later))]);
         let text = wood_csv(&seen).expect("a table");

@@ -146,25 +146,16 @@ fn carrier(skeleton: &Skeleton, node: NodeId) -> Option<(NodeId, NodeId)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{JointPose, Node, NodeName, Size};
+    use crate::model::{JointPose, Node, Size};
     use nalgebra::{Point3, UnitQuaternion};
 
     /// A chain of nodes from the foot up.
     fn chain(at: &[[f64; 3]]) -> Skeleton {
         let mut nodes = Vec::new();
-        for (i, p) in at.iter().enumerate() {
+        for (i, place) in (0_u32..).zip(at) {
             nodes.push(Node {
-                name: NodeName(i as u32),
-                parent: i.checked_sub(1).map(|p| NodeId(p as u32)),
                 level: i as u8,
-                position: Point3::from(*p),
-                radius: 1.0,
-                n_tracks: 1,
-                certainty: 1.0,
-                copy_of: None,
-                plane_angle: 0.0,
-                moves_with: None,
-                kind: Default::default(),
+                ..Node::made_up(i, i.checked_sub(1), *place)
             });
         }
         Skeleton {

@@ -60,8 +60,8 @@ pub struct HalfPower {
 
 impl Spectrum {
     /// Of the largest peak within `frequencies_hz`. The width of a short film's bin comes on top of
-    /// the tree's, so that it errs to the high side. `None` where there is no peak, or one that does
-    /// not come down.
+    /// the tree's, so that it errs to the high side. `None` where there is no peak, or one that
+    /// does not come down.
     pub fn half_power(&self, frequencies_hz: Bounds) -> Option<HalfPower> {
         let a = &self.amplitude;
         let last = ((frequencies_hz.hi / self.bin_hz) as usize).min(a.len().saturating_sub(2));

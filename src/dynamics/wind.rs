@@ -72,8 +72,8 @@ const MAX_CI_TO_SERVE: f64 = 2.0;
 struct AcceptanceCriteria {
     /// Share of the squares that is one swing.
     min_rank_one: f64,
-    /// Below these none is believed, however long the film is: what the carrier's points show is not
-    /// all that it does.
+    /// Below these none is believed, however long the film is: what the carrier's points show is
+    /// not all that it does.
     min_ln_sd: LnDeviations,
 }
 
@@ -259,8 +259,8 @@ impl InWind<'_> {
             return Err(Unidentified::TooUncertain);
         }
         motion.check_one_swing(&fitted, k, criteria)?;
-        // Gusts are not known well enough for a likelihood to tell a frequency from its mirror image
-        // at such a rate.
+        // Gusts are not known well enough for a likelihood to tell a frequency from its mirror
+        // image at such a rate.
         if self
             .limits
             .may_be_aliased(mode.mode.frequency_hz, self.film)

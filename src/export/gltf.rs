@@ -1,5 +1,5 @@
-//! The moving tree as glTF 2.0 without extensions: joints, one skin, wood and leaves in one level of
-//! detail, and one animation.
+//! The moving tree as glTF 2.0 without extensions: joints, one skin, wood and leaves in one level
+//! of detail, and one animation.
 
 use super::ExportError;
 use super::gltf_animation::push_animation;
@@ -85,7 +85,8 @@ pub fn gltf_files(
         texture,
     } = assemble(model, true)?;
     let mut files = Vec::new();
-    // The picture of the leaf comes after that of the bark. Names in the file are those of links: what a link cannot hold is written as %XX.
+    // The picture of the leaf comes after that of the bark. Names in the file are those of links:
+    // what a link cannot hold is written as %XX.
     if let (Some((ending, bytes)), Some(image)) = (texture, root.images.last_mut()) {
         let name = format!("{stem}_leaf.{ending}");
         image.uri = Some(percent(&name));

@@ -2,7 +2,7 @@
 
 use crate::document::{CaptureNote, Columns};
 use crate::dynamics::angle_to_parent_deg;
-use crate::model::{MAIN_BRANCH_RGB, NodeId, Pose, Skeleton, Swaying};
+use crate::model::{BotanicalBranches, MAIN_BRANCH_RGB, NodeId, Pose, Skeleton, Swaying};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
@@ -62,9 +62,8 @@ pub struct Branch {
 
 impl Data {
     /// The page's facts. `poses` are those of the animation in the order of time; `sway` is by node
-    /// index, as for
-    /// `nodes.csv`, and may be shorter than the skeleton; `metres_per_px` is that of the model's
-    /// file.
+    /// index, as for `nodes.csv`, and may be shorter than the skeleton; `metres_per_px` is that of
+    /// the model's file.
     pub fn of(
         capture: &CaptureNote,
         skeleton: &Skeleton,
@@ -107,46 +106,53 @@ impl Data {
 }
 
 fn branches(skeleton: &Skeleton, poses: &[Pose], sway: &[Swaying]) -> Vec<Branch> {
-    let mut branches = Vec::with_capacity(skeleton.nodes.len());
-    let botanical = skeleton.botanical_branches();
-    for (i, main_branch) in skeleton.main_branches().into_iter().enumerate() {
-        let id = NodeId(i as u32);
-        branches.push(Branch {
-            name: botanical.piece_name(id),
-            order: botanical.order(id),
-            main_branch,
-            ..branch(skeleton, poses, sway, id)
-        });
-    }
-    branches
+    let facts = Facts {
+        skeleton,
+        botanical: &skeleton.botanical_branches(),
+        main_branches: &skeleton.main_branches(),
+        poses,
+        sway,
+    };
+    let ids = (0..skeleton.nodes.len() as u32).map(NodeId);
+    ids.map(|id| facts.branch(id)).collect()
 }
 
-/// A branch but for what it takes all others to know.
-fn branch(skeleton: &Skeleton, poses: &[Pose], sway: &[Swaying], id: NodeId) -> Branch {
-    let i = id.index();
-    let node = &skeleton.nodes[i];
-    let moves = node.parent.is_some() && node.moves_with.is_none();
-    let measured = moves && node.copy_of.is_none();
-    let sway = sway.get(i).filter(|s| s.is_ok()).map(Columns::of);
-    Branch {
-        id: node.name.0,
-        name: String::new(),
-        order: 0,
-        parent: node.parent.and_then(|id| skeleton.name_of(id)).map(|n| n.0),
-        copy_of: node
-            .copy_of
-            .and_then(|id| skeleton.name_of(id))
-            .map(|n| n.0),
-        moves_with: node
-            .moves_with
-            .and_then(|id| skeleton.name_of(id))
-            .map(|n| n.0),
-        level: node.level,
-        main_branch: None,
-        n_tracks: node.n_tracks,
-        end: [node.position.x, node.position.y, node.position.z].map(|x| rounded(x, 1e4)),
-        sway,
-        angle_deg: measured.then(|| packed(&angle_to_parent_deg(skeleton, poses, id))),
+/// What is known of all branches.
+struct Facts<'a> {
+    skeleton: &'a Skeleton,
+    botanical: &'a BotanicalBranches,
+    /// By node.
+    main_branches: &'a [Option<u8>],
+    poses: &'a [Pose],
+    sway: &'a [Swaying],
+}
+
+impl Facts<'_> {
+    fn branch(&self, id: NodeId) -> Branch {
+        let i = id.index();
+        let node = &self.skeleton.nodes[i];
+        let moves = node.parent.is_some() && node.moves_with.is_none();
+        let measured = moves && node.copy_of.is_none();
+        Branch {
+            id: node.name.0,
+            name: self.botanical.piece_name(id),
+            order: self.botanical.order(id),
+            parent: self.name_of(node.parent),
+            copy_of: self.name_of(node.copy_of),
+            moves_with: self.name_of(node.moves_with),
+            level: node.level,
+            main_branch: self.main_branches[i],
+            n_tracks: node.n_tracks,
+            end: [node.position.x, node.position.y, node.position.z].map(|x| rounded(x, 1e4)),
+            sway: self.sway.get(i).filter(|s| s.is_ok()).map(Columns::of),
+            angle_deg: measured
+                .then(|| packed(&angle_to_parent_deg(self.skeleton, self.poses, id))),
+        }
+    }
+
+    fn name_of(&self, id: Option<NodeId>) -> Option<u32> {
+        let name = self.skeleton.name_of(id?)?;
+        Some(name.0)
     }
 }
 
@@ -175,8 +181,7 @@ fn hundredths(angle_deg: f64) -> i16 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Node, NodeName, Size, Snapshot};
-    use nalgebra::Point3;
+    use crate::model::{Node, Size, Snapshot};
     use std::sync::Arc;
 
     /// The colour on the page is that on the screens of `capture` and `animate`, which show what
@@ -188,17 +193,8 @@ mod tests {
         let mut nodes = Vec::new();
         for (i, parent) in (0..).zip(parents) {
             nodes.push(Node {
-                name: NodeName(10 + i),
-                parent: parent.map(NodeId),
-                level: 1,
-                position: Point3::new(f64::from(i), 10.0, 0.0),
-                radius: 1.0,
-                n_tracks: 5,
-                certainty: 1.0,
                 copy_of: (i == 6).then_some(NodeId(4)),
-                plane_angle: 0.0,
-                moves_with: None,
-                kind: Default::default(),
+                ..Node::made_up(10 + i, parent, [f64::from(i), 10.0, 0.0])
             });
         }
         let skeleton = Skeleton {

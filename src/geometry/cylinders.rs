@@ -25,13 +25,9 @@ pub struct Cylinder {
 }
 
 /// The limbs as cylinders, parents first; each as thick as its limb is at the middle of the
-/// cylinder. Pieces without length are left out.
-pub fn cylinders(limbs: &[Limb]) -> Vec<Cylinder> {
-    pieces(limbs, &continuations(limbs))
-}
-
-/// The same with the branches and orders of [`Skeleton::botanical_branches`]; a twig goes on in a
-/// branch that ends where it begins, or leaves it.
+/// cylinder. Pieces without length are left out. Branches and orders are those of
+/// [`Skeleton::botanical_branches`]; a twig goes on in a branch that ends where it begins, or
+/// leaves it.
 pub fn cylinders_by_branch(limbs: &[Limb], skeleton: &Skeleton) -> Vec<Cylinder> {
     let branches = skeleton.botanical_branches();
     let mut goes_on = continuations(limbs);
@@ -48,7 +44,7 @@ pub fn cylinders_by_branch(limbs: &[Limb], skeleton: &Skeleton) -> Vec<Cylinder>
     pieces(limbs, &goes_on)
 }
 
-/// The cylinders of limbs that go on in one another as told.
+/// The cylinders of limbs; `goes_on` holds the limb in which each goes on.
 fn pieces(limbs: &[Limb], goes_on: &[Option<usize>]) -> Vec<Cylinder> {
     let mut out: Vec<Cylinder> = Vec::new();
     // The cylinders of every limb, and its branch with its order.

@@ -47,29 +47,7 @@ impl Mesh {
     /// The connected piece that every vertex belongs to, by vertex, counted from 0 in the order of
     /// their first vertices. Corners that are not there connect nothing.
     pub fn pieces(&self) -> Vec<usize> {
-        let n = self.positions.len();
-        let mut joined: Vec<usize> = (0..n).collect();
-        for corners in self.indices.chunks_exact(3) {
-            for pair in corners.windows(2) {
-                let [a, b] = [pair[0] as usize, pair[1] as usize];
-                if a < n && b < n {
-                    let [a, b] = [first_of(&mut joined, a), first_of(&mut joined, b)];
-                    joined[a.max(b)] = a.min(b);
-                }
-            }
-        }
-        let mut number: Vec<usize> = Vec::with_capacity(n);
-        let mut pieces = 0;
-        for vertex in 0..n {
-            let first = first_of(&mut joined, vertex);
-            if first == vertex {
-                number.push(pieces);
-                pieces += 1;
-            } else {
-                number.push(number[first]);
-            }
-        }
-        number
+        pieces(self.positions.len(), &self.indices)
     }
 
     /// The direction that a triangle faces by its winding, of length 1; `None` where it is no
@@ -84,6 +62,32 @@ impl Mesh {
         let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
         across.try_normalize(longest * least_px)
     }
+}
+
+/// As [`Mesh::pieces`], of `n` vertices and the triangles `indices`.
+pub(super) fn pieces(n: usize, indices: &[u32]) -> Vec<usize> {
+    let mut joined: Vec<usize> = (0..n).collect();
+    for corners in indices.chunks_exact(3) {
+        for pair in corners.windows(2) {
+            let [a, b] = [pair[0] as usize, pair[1] as usize];
+            if a < n && b < n {
+                let [a, b] = [first_of(&mut joined, a), first_of(&mut joined, b)];
+                joined[a.max(b)] = a.min(b);
+            }
+        }
+    }
+    let mut number: Vec<usize> = Vec::with_capacity(n);
+    let mut pieces = 0;
+    for vertex in 0..n {
+        let first = first_of(&mut joined, vertex);
+        if first == vertex {
+            number.push(pieces);
+            pieces += 1;
+        } else {
+            number.push(number[first]);
+        }
+    }
+    number
 }
 
 /// The first vertex of the piece of a vertex; shortens the way there.

@@ -10,7 +10,7 @@ mod mesh;
 mod tube;
 mod wood;
 
-pub use cylinders::{Cylinder, cylinders, cylinders_by_branch};
+pub use cylinders::{Cylinder, cylinders_by_branch};
 pub use dressed::Dressed;
 pub use foliage::{Foliage, FoliageGroup};
 pub use leaves::{

@@ -304,25 +304,13 @@ impl<'a> Axes<'a> {
 mod tests {
     use super::*;
     use crate::model::{Node, NodeName, Size};
-    use nalgebra::{Point2, Point3};
+    use nalgebra::Point2;
 
     /// Nodes by parent and place (x, y).
     fn tree(nodes: &[(Option<u32>, [f64; 2])]) -> Skeleton {
         let mut out = Vec::new();
         for (i, (parent, [x, y])) in (0..).zip(nodes) {
-            out.push(Node {
-                name: NodeName(10 + i),
-                parent: parent.map(NodeId),
-                level: 0,
-                position: Point3::new(*x, *y, 0.0),
-                radius: 1.0,
-                n_tracks: 1,
-                kind: Default::default(),
-                certainty: 0.0,
-                copy_of: None,
-                plane_angle: 0.0,
-                moves_with: None,
-            });
+            out.push(Node::made_up(10 + i, *parent, [*x, *y, 0.0]));
         }
         Skeleton {
             nodes: out,

@@ -1,6 +1,7 @@
 //! The wood that pictures show, as centre lines.
 
 use super::Size;
+use crate::signal::distance_to_segment;
 use nalgebra::Point2;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -19,6 +20,18 @@ pub struct WoodNode {
     pub position_px: Point2<f64>,
     /// Half the width that is seen there, px.
     pub radius_px: f64,
+}
+
+#[cfg(test)]
+impl WoodNode {
+    /// A joint for tests, 8.5 px wide.
+    pub(crate) fn made_up(parent: Option<usize>, u_px: f64, v_px: f64) -> Self {
+        Self {
+            parent,
+            position_px: Point2::new(u_px, v_px),
+            radius_px: 4.25,
+        }
+    }
 }
 
 /// The wood that was found while a film went on, by the newest frame that was looked at.
@@ -49,10 +62,8 @@ impl BranchGraph {
         let mut least_px = f64::INFINITY;
         for (piece, node) in self.nodes.iter().enumerate() {
             let Some(parent) = node.parent else { continue };
-            let from = self.nodes[parent].position_px;
-            let along = node.position_px - from;
-            let share = (at_px - from).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE);
-            let off_px = (at_px - (from + share.clamp(0.0, 1.0) * along)).norm();
+            let from_px = self.nodes[parent].position_px;
+            let off_px = distance_to_segment(at_px, from_px, node.position_px);
             if off_px < least_px && off_px <= REACH_RADII * node.radius_px + reach_px {
                 (nearest, least_px) = (Some(piece), off_px);
             }
@@ -76,21 +87,13 @@ impl BranchGraph {
 mod tests {
     use super::*;
 
-    fn node(parent: Option<usize>, u: f64, v: f64) -> WoodNode {
-        WoodNode {
-            parent,
-            position_px: Point2::new(u, v),
-            radius_px: 4.0,
-        }
-    }
-
     /// A trunk of 100 px that forks.
     fn fork() -> BranchGraph {
         let nodes = vec![
-            node(None, 100.0, 200.0),
-            node(Some(0), 100.0, 100.0),
-            node(Some(1), 60.0, 70.0),
-            node(Some(1), 140.0, 70.0),
+            WoodNode::made_up(None, 100.0, 200.0),
+            WoodNode::made_up(Some(0), 100.0, 100.0),
+            WoodNode::made_up(Some(1), 60.0, 70.0),
+            WoodNode::made_up(Some(1), 140.0, 70.0),
         ];
         BranchGraph { nodes }
     }

@@ -94,25 +94,13 @@ impl Skeleton {
 #[cfg(test)]
 mod tests {
     use crate::model::{Node, NodeId, NodeName, Size, Skeleton};
-    use nalgebra::{Point2, Point3};
+    use nalgebra::Point2;
 
     /// Nodes by parent; a name is the index unless given.
     fn tree(parents: &[Option<u32>]) -> Skeleton {
         let mut nodes = Vec::new();
         for (i, parent) in (0..).zip(parents) {
-            nodes.push(Node {
-                name: NodeName(i),
-                parent: parent.map(NodeId),
-                level: 0,
-                position: Point3::origin(),
-                radius: 1.0,
-                n_tracks: 1,
-                certainty: 0.0,
-                copy_of: None,
-                plane_angle: 0.0,
-                moves_with: None,
-                kind: Default::default(),
-            });
+            nodes.push(Node::made_up(i, *parent, [0.0; 3]));
         }
         Skeleton {
             nodes,

@@ -7,6 +7,7 @@
 mod botany;
 mod branch_graph;
 mod control;
+mod foot;
 mod frame;
 mod hierarchy;
 mod leaf_swing;
@@ -26,6 +27,7 @@ mod track_table;
 pub use botany::{BotanicalBranch, BotanicalBranches, TREE, TRUNK};
 pub use branch_graph::{BranchGraph, WoodNode, WoodSeen};
 pub use control::Control;
+pub use foot::Foot;
 pub use frame::{
     Frame, Luma, Picture, PixelFormat, RawFrame, Rgb, Size, TimedFrame, nanoseconds, seconds,
 };
@@ -33,7 +35,7 @@ pub use hierarchy::{Cluster, ClusterId, MotionHierarchy};
 pub use leaf_swing::LeafSwing;
 pub use main_branch::MAIN_BRANCH_RGB;
 pub use moving_branch::MovingBranch;
-pub use outline::Outline;
+pub use outline::{Outline, bounds_px};
 pub use pose::{JointPose, Pose};
 pub use skeleton::{FARTHEST_PX, Node, NodeId, NodeKind, NodeName, Skeleton};
 pub use snapshot::{BranchRow, CameraState, FormatNote, Phase, Snapshot};

@@ -30,26 +30,32 @@ impl Outline {
 
     /// Smallest box `[u_min, v_min, u_max, v_max]` that holds the region, `None` if it is empty.
     pub fn bounds_px(&self) -> Option<[u32; 4]> {
-        let w = self.size.width as usize;
-        let mut bounds: Option<[u32; 4]> = None;
-        for (v, row) in self.mask.chunks_exact(w).enumerate() {
-            let Some(first) = row.iter().position(|&m| m != 0) else {
-                continue;
-            };
-            let last = row.iter().rposition(|&m| m != 0).unwrap_or(first);
-            let b = bounds.get_or_insert([first as u32, v as u32, last as u32, v as u32]);
-            *b = [
-                b[0].min(first as u32),
-                b[1],
-                b[2].max(last as u32),
-                v as u32,
-            ];
-        }
-        bounds
+        bounds_px(&self.mask, self.size)
     }
 
     /// Share of the picture that the region covers, 0 to 1.
     pub fn coverage(&self) -> f64 {
         self.mask.iter().filter(|&&m| m != 0).count() as f64 / self.mask.len().max(1) as f64
     }
+}
+
+/// Smallest box `[u_min, v_min, u_max, v_max]` that holds the pixels of `mask` (one byte a pixel,
+/// row by row) that are not 0, the ends included; `None` if all are 0.
+pub fn bounds_px(mask: &[u8], size: Size) -> Option<[u32; 4]> {
+    let width = (size.width as usize).max(1);
+    let mut bounds: Option<[u32; 4]> = None;
+    for (v, row) in mask.chunks_exact(width).enumerate() {
+        let Some(first) = row.iter().position(|&m| m != 0) else {
+            continue;
+        };
+        let last = row.iter().rposition(|&m| m != 0).unwrap_or(first);
+        let b = bounds.get_or_insert([first as u32, v as u32, last as u32, v as u32]);
+        *b = [
+            b[0].min(first as u32),
+            b[1],
+            b[2].max(last as u32),
+            v as u32,
+        ];
+    }
+    bounds
 }

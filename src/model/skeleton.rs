@@ -91,6 +91,26 @@ pub struct Node {
     pub moves_with: Option<NodeId>,
 }
 
+#[cfg(test)]
+impl Node {
+    /// A measured node for tests, with one point and of level 0.
+    pub(crate) fn made_up(name: u32, parent: Option<u32>, at: [f64; 3]) -> Self {
+        Self {
+            name: NodeName(name),
+            parent: parent.map(NodeId),
+            level: 0,
+            position: at.into(),
+            radius: 1.0,
+            n_tracks: 1,
+            kind: NodeKind::Measured,
+            certainty: 1.0,
+            copy_of: None,
+            plane_angle: 0.0,
+            moves_with: None,
+        }
+    }
+}
+
 /// Nodes with parents before children, the foot first, all measured nodes before all copies.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Skeleton {
@@ -114,6 +134,13 @@ impl Skeleton {
     pub fn measured_branches(&self) -> impl Iterator<Item = NodeId> {
         let nodes = (1..self.measured().max(1) as u32).map(NodeId);
         nodes.filter(|n| self.mover(*n) == *n)
+    }
+
+    /// The foot, then the measured branches in order: where each node of a tree whose branches are
+    /// straight stands in the same tree with bends and side wood.
+    pub fn foot_and_branches(&self) -> Vec<NodeId> {
+        let foot = std::iter::once(NodeId(0));
+        foot.chain(self.measured_branches()).collect()
     }
 
     /// Orthographic projection of a point in model axes to the picture, px.
@@ -204,17 +231,8 @@ mod tests {
         };
         for (i, (parent, mover)) in (0..).zip(nodes) {
             skeleton.nodes.push(Node {
-                name: NodeName(i),
-                parent: parent.map(NodeId),
-                level: 0,
-                position: Point3::new(0.0, f64::from(i), 0.0),
-                radius: 1.0,
-                n_tracks: 0,
-                kind: NodeKind::Measured,
-                certainty: 0.0,
-                copy_of: None,
-                plane_angle: 0.0,
                 moves_with: mover.map(NodeId),
+                ..Node::made_up(i, *parent, [0.0, f64::from(i), 0.0])
             });
         }
         skeleton
@@ -263,6 +281,7 @@ mod tests {
         assert_eq!(bends, [2, 4]);
         let measured: Vec<u32> = tree.measured_branches().map(|n| n.0).collect();
         assert_eq!(measured, [1, 3, 5]);
+        assert_eq!(tree.foot_and_branches(), [0, 1, 3, 5].map(NodeId));
     }
 
     /// The limb comes before what it carries, though it stands behind it.

@@ -38,23 +38,14 @@ fn rotation_between(a: &Pose, b: &Pose, i: usize, share: f64) -> UnitQuaternion<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Node, NodeId, NodeName, Size};
+    use crate::model::{Node, Size};
     use nalgebra::{Point3, Vector3};
     use std::f64::consts::PI;
 
     fn node(k: u32, parent: Option<u32>, position: Point3<f64>) -> Node {
         Node {
-            name: NodeName(k),
-            parent: parent.map(NodeId),
             level: k as u8,
-            position,
-            radius: 1.0,
-            n_tracks: 9,
-            certainty: 1.0,
-            copy_of: None,
-            plane_angle: 0.0,
-            moves_with: None,
-            kind: Default::default(),
+            ..Node::made_up(k, parent, position.into())
         }
     }
 

@@ -1,5 +1,5 @@
-//! Several captures side by side: the same branch under different force, or several trees (Hu et al.
-//! sect. 5.4).
+//! Several captures side by side: the same branch under different force, or several trees (Hu et
+//! al. sect. 5.4).
 
 use super::matching::{Match, matched};
 use super::study::Study;

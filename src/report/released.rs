@@ -42,8 +42,8 @@ mod tests {
     use crate::cancel::CancelToken;
     use crate::config::Dynamics;
     use crate::dynamics::{Depth, FilmTrack, Onset, Start, analyse};
-    use crate::model::{Node, NodeId, NodeName, Size, Skeleton};
-    use nalgebra::{Point2, Point3};
+    use crate::model::{Node, NodeId, Size, Skeleton};
+    use nalgebra::Point2;
     use std::f64::consts::TAU;
 
     fn chance(seed: &mut u64) -> f64 {
@@ -89,17 +89,8 @@ mod tests {
 
     fn node(k: u32) -> Node {
         Node {
-            name: NodeName(k),
-            parent: k.checked_sub(1).map(NodeId),
             level: k as u8,
-            position: Point3::new(0.0, 100.0 * f64::from(k), 0.0),
-            radius: 1.0,
-            n_tracks: 9,
-            certainty: 1.0,
-            copy_of: None,
-            plane_angle: 0.0,
-            moves_with: None,
-            kind: Default::default(),
+            ..Node::made_up(k, k.checked_sub(1), [0.0, 100.0 * f64::from(k), 0.0])
         }
     }
 

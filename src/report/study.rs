@@ -7,7 +7,9 @@ use crate::dynamics::{
     Analysis, Film, HalfPower, LEAST_PERIODS, Onset, Spectrum, angle_in_space_deg,
     angle_to_parent_deg, spectrum,
 };
-use crate::model::{Excitation, NodeId, Pose, Skeleton, Sway, Swaying, Unidentified};
+use crate::model::{
+    BotanicalBranches, Excitation, NodeId, Pose, Skeleton, Sway, Swaying, Unidentified,
+};
 use nalgebra::{Point2, Vector2, distance};
 
 /// A step from frame to frame that is so many times the usual one is a gap.
@@ -110,8 +112,8 @@ pub struct Branch {
     pub by_points_deg: f64,
     pub in_angle_deg: f64,
     /// When every angle was, s; empty without poses. The angles are to the branch that carries it,
-    /// less their mean, degrees: in the picture's plane and in space (Hu et al. eq. 1); no number where
-    /// it has no direction.
+    /// less their mean, degrees: in the picture's plane and in space (Hu et al. eq. 1); no number
+    /// where it has no direction.
     pub times_s: Vec<f64>,
     pub plane_deg: Vec<f64>,
     pub space_deg: Vec<f64>,
@@ -182,11 +184,8 @@ impl Study {
                 .get(node.index())
                 .copied()
                 .unwrap_or(Err(Unidentified::NotMeasured));
-            study.branches.push(Branch {
-                piece: botanical.piece_name(node),
-                order: botanical.order(node),
-                ..branch(given, node, sway, study.used_s)
-            });
+            let branch = branch(given, &botanical, node, sway, study.used_s);
+            study.branches.push(branch);
         }
         study
     }
@@ -248,8 +247,13 @@ fn used_s(onset: &Onset, times_s: &[f64], ends: Bounds) -> Bounds {
     )
 }
 
-/// A branch but for its name, which it takes all others to know.
-fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: Bounds) -> Branch {
+fn branch(
+    given: &Given,
+    botanical: &BotanicalBranches,
+    node: NodeId,
+    sway: Swaying,
+    used_s: Bounds,
+) -> Branch {
     let (skeleton, poses) = (given.skeleton, given.poses);
     let own = &skeleton.nodes[node.index()];
     let parent = skeleton.moving_parent(node).unwrap_or_default();
@@ -274,8 +278,8 @@ fn branch(given: &Given, node: NodeId, sway: Swaying, used_s: Bounds) -> Branch 
     let parent_node = own.parent.and(skeleton.nodes.get(parent.index()));
     Branch {
         name: own.name.0,
-        piece: String::new(),
-        order: 0,
+        piece: botanical.piece_name(node),
+        order: botanical.order(node),
         parent: parent_node.filter(|p| p.parent.is_some()).map(|p| p.name.0),
         level: own.level,
         points: own.n_tracks,

@@ -2,6 +2,7 @@
 
 use crate::config::Leader;
 use crate::model::Skeleton;
+use crate::signal::distance_to_segment;
 use crate::skeleton::Node2d;
 use nalgebra::Point2;
 
@@ -81,22 +82,8 @@ fn nearest(items: impl Iterator<Item = (usize, f64)>, limit: f64) -> Option<usiz
 /// Distance of `p` from a line of several pieces, px.
 fn distance_to_line(p: Point2<f64>, line: &[Point2<f64>]) -> f64 {
     line.windows(2)
-        .map(|ends| distance_to_piece(p, ends[0], ends[1]))
+        .map(|ends| distance_to_segment(p, ends[0], ends[1]))
         .fold(f64::INFINITY, f64::min)
-}
-
-/// Distance of `p` from the straight line between `from` and `to`, px.
-fn distance_to_piece(p: Point2<f64>, from: Point2<f64>, to: Point2<f64>) -> f64 {
-    let along = to - from;
-    let way = p - from;
-    let length_sq = along.norm_squared();
-    let t = if length_sq > 0.0 {
-        along.dot(&way) / length_sq
-    } else {
-        0.0
-    };
-    let off = way - along * t.clamp(0.0, 1.0);
-    off.x.hypot(off.y)
 }
 
 /// By how much the way a-b-c turns at b, radians.

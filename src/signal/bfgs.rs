@@ -18,8 +18,8 @@ const MIN_GAIN: f64 = 1e-2;
 /// Step of the second differences.
 const SECOND_DIFFERENCE: f64 = 1e-2;
 
-/// Minimum of `f` near `from` within `bounds`, by BFGS (Broyden, Fletcher, Goldfarb and Shanno 1970)
-/// with differences: the place and the value, or how far it has come when `cancel` ends it.
+/// Minimum of `f` near `from` within `bounds`, by BFGS (Broyden, Fletcher, Goldfarb and Shanno
+/// 1970) with differences: the place and the value, or how far it has come when `cancel` ends it.
 pub fn minimum(
     f: impl Fn(&[f64]) -> f64,
     from: &[f64],

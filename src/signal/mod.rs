@@ -15,5 +15,5 @@ pub mod variable_projection;
 pub mod vectors;
 
 pub use principal::along_principal_direction;
-pub use segments::segments_cross;
+pub use segments::{distance_to_segment, segments_cross};
 pub use statistics::median;

@@ -8,6 +8,20 @@ pub fn segments_cross([a, b]: &[Point2<f64>; 2], [c, d]: &[Point2<f64>; 2]) -> b
     ab.perp(&(c - a)) * ab.perp(&(d - a)) < 0.0 && cd.perp(&(a - c)) * cd.perp(&(b - c)) < 0.0
 }
 
+/// Distance of `p` from the straight line between `from` and `to`.
+pub fn distance_to_segment(p: Point2<f64>, from: Point2<f64>, to: Point2<f64>) -> f64 {
+    let along = to - from;
+    let way = p - from;
+    let length_sq = along.norm_squared();
+    let share = if length_sq > 0.0 {
+        along.dot(&way) / length_sq
+    } else {
+        0.0
+    };
+    let off = way - along * share.clamp(0.0, 1.0);
+    off.x.hypot(off.y)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

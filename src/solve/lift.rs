@@ -1,7 +1,7 @@
 //! From the hierarchy to the tree in space, with its radii.
 
 use crate::config::Config;
-use crate::model::{MotionHierarchy, Outline, Skeleton};
+use crate::model::{Foot, MotionHierarchy, Outline, Skeleton};
 use crate::{shape, skeleton};
 
 /// Share of the outline's width at the foot that is trunk, where none can be measured above it.
@@ -44,7 +44,7 @@ pub fn assign_radii(skeleton: &mut Skeleton, outline: &Outline, config: &Config)
     } else if let Some(measured_px) = measured {
         measured_px
     } else {
-        TRUNK_SHARE * skeleton::Foot::of(outline, None).half_width_px
+        TRUNK_SHARE * Foot::of(outline, None).half_width_px
     };
     let trunk_px = trunk_px.max(2.0 * shape::TIP_RADIUS_PX);
     let room = shape::room(

@@ -1,8 +1,10 @@
 //! What was found out about a tree.
 
-use super::along_wood::{Names, PointOn, along_wood};
+use super::along_wood::{PointOn, along_wood};
+use super::bent_tree::Names;
 use super::lift::{assign_radii, flat};
 use super::sub_branches::{self, SubBranch};
+use super::taper::taper;
 use crate::config::Config;
 use crate::hierarchy::Evidence;
 use crate::model::{
@@ -101,7 +103,7 @@ impl Model {
     /// The same on another form of its skeleton: straight, or along the wood.
     fn binding_on(&self, skeleton: &Skeleton) -> Binding {
         let mut binding = Binding::new(&self.hierarchy, &self.rest_px, skeleton);
-        let places = places(skeleton);
+        let places = skeleton.foot_and_branches();
         binding.inherit(&moved_to(&self.joined, &places));
         binding.inherit(&moved_to(&self.on_sub_branches(), &places));
         binding
@@ -126,8 +128,8 @@ impl Model {
     /// sub-branch.
     pub(super) fn carrier(&self, node: NodeId) -> NodeId {
         let mover = self.skeleton.mover(node);
-        let place = places(&self.skeleton).iter().position(|n| *n == mover);
-        let place = place.unwrap_or(0);
+        let places = self.skeleton.foot_and_branches();
+        let place = places.iter().position(|n| *n == mover).unwrap_or(0);
         match place.checked_sub(self.plain.measured()) {
             Some(k) => self.sub_branches[k].on,
             None => NodeId(place as u32),
@@ -195,9 +197,10 @@ impl Model {
         let mut joined = along_wood(&straight, &wood, &points, &mut names);
         self.names = names.next;
         assign_radii(&mut joined.skeleton, &self.outline, config);
-        // A width that the user gives goes before what is seen.
+        // Radii that are seen go before those of the pipe model, and a width that the user gives
+        // before both.
         if config.wood.trunk_width_px <= 0.0 {
-            joined.set_radii();
+            taper(&mut joined.skeleton.nodes, &joined.seen_px);
         }
         self.skeleton = Arc::new(joined.skeleton);
     }
@@ -227,15 +230,6 @@ impl Model {
         let (flat, tracks) = self.flat_on(self.plain.foot_px, config);
         PushFigures::of(&self.plain, &flat, &tracks, &self.outline, &config.shape)
     }
-}
-
-/// Where the nodes of the straight tree stand in `skeleton`: the foot, then all measured nodes that
-/// move on their own.
-fn places(skeleton: &Skeleton) -> Vec<NodeId> {
-    [NodeId(0)]
-        .into_iter()
-        .chain(skeleton.measured_branches())
-        .collect()
 }
 
 /// Points on nodes of the straight tree, on those of another form of it.

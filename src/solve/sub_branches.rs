@@ -262,17 +262,10 @@ mod tests {
     /// copy of either.
     fn skeleton() -> Skeleton {
         let node = |name: u32, parent: Option<u32>, at: [f64; 3], copy_of: Option<u32>| Node {
-            name: NodeName(name),
-            parent: parent.map(NodeId),
             level: parent.map_or(0, |p| if p == 0 { 1 } else { 2 }),
-            position: at.into(),
-            radius: 1.0,
-            n_tracks: 9,
-            certainty: 0.5,
             copy_of: copy_of.map(NodeId),
             plane_angle: copy_of.map_or(0.0, |_| 1.0),
-            moves_with: None,
-            kind: Default::default(),
+            ..Node::made_up(name, parent, at)
         };
         let nodes = vec![
             node(0, None, [0.0, 0.0, 0.0], None),

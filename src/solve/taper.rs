@@ -111,23 +111,9 @@ fn edge_px(nodes: &[Node], i: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{NodeKind, NodeName};
-    use nalgebra::Point3;
 
     fn node(parent: Option<u32>, x: f64, y: f64) -> Node {
-        Node {
-            name: NodeName(0),
-            parent: parent.map(NodeId),
-            position: Point3::new(x, y, 0.0),
-            level: 1,
-            radius: 1.0,
-            n_tracks: 0,
-            kind: NodeKind::Traced,
-            certainty: 0.0,
-            copy_of: None,
-            plane_angle: 0.0,
-            moves_with: None,
-        }
+        Node::made_up(0, parent, [x, y, 0.0])
     }
 
     /// A trunk of five pieces and a branch that leaves its third.

@@ -125,8 +125,8 @@ impl<'a> Studio<'a> {
     /// Writes a video (MP4) to `out`.
     ///
     /// # Errors
-    /// There is no pose at the wanted moment, or no ffmpeg; the file exists or cannot be written; or
-    /// it was stopped.
+    /// There is no pose at the wanted moment, or no ffmpeg; the file exists or cannot be written;
+    /// or it was stopped.
     pub fn video(&self, out: &Path, stop: &AtomicBool) -> Result<(), PrepareError> {
         let clip = self.clip()?;
         let frames = ((clip.length_s * self.shot.fps).round() as u64).max(1);

@@ -2,11 +2,11 @@
 //!
 //! Going up the tree one branch at a time (free_decay.rs) takes the captured tree as it is, and a
 //! mode that is identified wrongly misleads the branches on it. Here all points and all modes are
-//! fitted at once: a point has the modes of the branch that it is on and of those that carry it, and no
-//! others; modes are fitted together, points may go to another branch, branches come off others, as
-//! long as what the film shows becomes likelier by more than what it costs. What comes out answers
-//! for the captured branches that have mostly the same points, and had no answer; and it separates
-//! branches that were captured as one with another ([`shoots`]).
+//! fitted at once: a point has the modes of the branch that it is on and of those that carry it,
+//! and no others; modes are fitted together, points may go to another branch, branches come off
+//! others, as long as what the film shows becomes likelier by more than what it costs. What comes
+//! out answers for the captured branches that have mostly the same points, and had no answer; and
+//! it separates branches that were captured as one with another ([`shoots`]).
 
 mod moves;
 mod points;
@@ -279,15 +279,15 @@ mod tests {
     use crate::config::Dynamics;
     use crate::dynamics::sway::UsableFilm;
     use crate::dynamics::{Depth, FilmTrack, analyse, free_decay};
-    use crate::model::{Node, NodeName, Size, Skeleton};
+    use crate::model::{Node, Size, Skeleton};
     use crate::random::Generator;
-    use nalgebra::{Point2, Point3};
+    use nalgebra::Point2;
     use rand::RngExt;
     use rand_distr::StandardNormal;
     use std::f64::consts::TAU;
 
-    /// A trunk of 0.6 Hz that is released after 0.5 s with 8 points on it, and a tip with `branches`:
-    /// the frequency and the lever arms of the points of each. Noise of 0.1 px.
+    /// A trunk of 0.6 Hz that is released after 0.5 s with 8 points on it, and a tip with
+    /// `branches`: the frequency and the lever arms of the points of each. Noise of 0.1 px.
     fn filmed(branches: &[(f64, &[f64])]) -> (Skeleton, Film) {
         let times: Vec<f64> = (0..150).map(|k| f64::from(k) / 15.0).collect();
         let mut chance = crate::random::generator(9, 0);
@@ -347,17 +347,8 @@ mod tests {
 
     fn node(i: u32) -> Node {
         Node {
-            name: NodeName(i),
-            parent: i.checked_sub(1).map(NodeId),
             level: i as u8,
-            position: Point3::new(0.0, 50.0 * f64::from(i), 0.0),
-            radius: 1.0,
-            n_tracks: 1,
-            certainty: 1.0,
-            copy_of: None,
-            plane_angle: 0.0,
-            moves_with: None,
-            kind: Default::default(),
+            ..Node::made_up(i, i.checked_sub(1), [0.0, 50.0 * f64::from(i), 0.0])
         }
     }
 

@@ -120,22 +120,14 @@ fn end_at(limb: &mut Limb, last: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Node, NodeId, NodeName, Outline, Rgb, Size};
+    use crate::model::{Node, NodeId, Outline, Rgb, Size};
     use crate::shape::SkinWeights;
 
     fn node(i: u32, parent: Option<u32>, at: [f64; 3], copied: bool) -> Node {
         Node {
-            name: NodeName(i),
-            parent: parent.map(NodeId),
             level: parent.map_or(0, |p| if p == 0 { 1 } else { 2 }),
-            position: Point3::from(at),
-            radius: 1.0,
-            n_tracks: 1,
-            certainty: 1.0,
             copy_of: copied.then_some(NodeId(1)),
-            plane_angle: 0.0,
-            moves_with: None,
-            kind: Default::default(),
+            ..Node::made_up(i, parent, at)
         }
     }
 

@@ -3,6 +3,7 @@
 
 use super::faces::{Sheets, area_vector};
 use super::texture;
+use crate::geometry::mesh::pieces;
 use nalgebra::{Point3, Rotation3, Vector3};
 
 /// A cluster of leaves of size 1: it grows from the origin along y, its leaves turn their faces to
@@ -104,8 +105,8 @@ impl Template {
 
     /// A template from a mesh of any size, which is scaled so that its longest side is 1 and moved
     /// so that the middle of its lowest end is the origin. Missing normals are computed; those that
-    /// do not agree with the winding are made to. Vertices that no triangle uses are left out: every
-    /// copy would carry them.
+    /// do not agree with the winding are made to. Vertices that no triangle uses are left out:
+    /// every copy would carry them.
     ///
     /// # Errors
     /// What [`TemplateFault`] names.
@@ -123,7 +124,8 @@ impl Template {
         };
         let n = positions.len();
         let sum: Vector3<f64> = positions.iter().map(|p| p.coords).sum();
-        let mut leaf_of = pieces(n, &mesh.indices);
+        let leaves = pieces(n, &mesh.indices).into_iter();
+        let mut leaf_of: Vec<u32> = leaves.map(|leaf| leaf as u32).collect();
         if mesh.uvs.is_empty() {
             mesh.uvs = vec![[0.5; 2]; n];
         }
@@ -292,39 +294,6 @@ fn normals(mesh: &TemplateMesh, positions: &[Point3<f64>]) -> Vec<Vector3<f64>> 
         );
     }
     normals
-}
-
-/// Numbers the pieces that hang together, in the order of their first vertex.
-fn pieces(n: usize, indices: &[u32]) -> Vec<u32> {
-    let mut root: Vec<usize> = (0..n).collect();
-    for t in indices.chunks_exact(3) {
-        for k in [1, 2] {
-            let a = find_root(&mut root, t[0] as usize);
-            let b = find_root(&mut root, t[k] as usize);
-            root[a.max(b)] = a.min(b);
-        }
-    }
-    let mut number = vec![u32::MAX; n];
-    let mut next = 0;
-    let mut pieces = Vec::with_capacity(n);
-    for i in 0..n {
-        let r = find_root(&mut root, i);
-        if number[r] == u32::MAX {
-            number[r] = next;
-            next += 1;
-        }
-        pieces.push(number[r]);
-    }
-    pieces
-}
-
-/// The first vertex of the piece of `i` in a union-find forest; shortens the way there.
-fn find_root(root: &mut [usize], mut i: usize) -> usize {
-    while root[i] != i {
-        root[i] = root[root[i]];
-        i = root[i];
-    }
-    i
 }
 
 /// Mean of what can be seen of a picture, 0 to 1; `None` if it cannot be read or is too large.

@@ -1,5 +1,5 @@
-//! Values with their intervals side by side: across levels (Hu et al. sect. 5.4) and across captures
-//! (fig. 15).
+//! Values with their intervals side by side: across levels (Hu et al. sect. 5.4) and across
+//! captures (fig. 15).
 
 use super::HEIGHT;
 use super::axes::{Axes, range};

@@ -5,7 +5,7 @@ use crate::model::{
     Node, NodeId, NodeName, Phase, Pose, Rgb, Size, Skeleton, Snapshot, Sway, SwayNow,
     Unidentified,
 };
-use nalgebra::{Point2, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Point2, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
 /// A camera picture: bright sky above, dark ground below.
@@ -28,17 +28,12 @@ pub fn picture(size: Size) -> Arc<Rgb> {
 /// A node at a place; its name, level and radius follow from where it stands.
 fn node(parent: Option<u32>, place: [f64; 3], copy_of: Option<u32>) -> Node {
     Node {
-        name: NodeName(0),
-        parent: parent.map(NodeId),
-        level: 0,
-        position: Point3::from(place),
         radius: 8.0,
         n_tracks: if copy_of.is_some() { 0 } else { 40 },
         certainty: 0.75,
         copy_of: copy_of.map(NodeId),
         plane_angle: if copy_of.is_some() { 1.57 } else { 0.0 },
-        moves_with: None,
-        kind: Default::default(),
+        ..Node::made_up(0, parent, place)
     }
 }
 
