@@ -59,7 +59,9 @@ fn look(clip: &Path, out: &Path) {
     };
     let window = pipeline.back.log().last(config.accumulate.window_s);
     let began = Instant::now();
-    let wood = find_wood(&log, window, &outline, &model.plain, &CancelToken::new());
+    let never = CancelToken::new();
+    let settings = &config.skeleton;
+    let wood = find_wood(&log, window, &outline, &model.plain, settings, &never);
     let took_s = began.elapsed().as_secs_f64();
     let Some(wood) = wood else {
         println!("wood: none seen, {took_s:.2} s");

@@ -73,22 +73,14 @@ mod tests {
 
     /// A trunk and a branch that sways on it for `seconds`.
     fn film(seconds: u32) -> (Skeleton, Vec<Pose>) {
-        let at = [[0.0; 3], [0.0, 50.0, 0.0], [20.0, 80.0, 5.0]].map(Point3::from);
-        let node = |i: usize| Node {
-            name: NodeName(i as u32 * 10),
-            parent: i.checked_sub(1).map(|p| NodeId(p as u32)),
+        let places = [[0.0; 3], [0.0, 50.0, 0.0], [20.0, 80.0, 5.0]];
+        let at = places.map(Point3::from);
+        let nodes = (0..).zip(places).map(|(i, place)| Node {
             level: i as u8,
-            position: at[i],
-            radius: 1.0,
-            n_tracks: 1,
-            certainty: 1.0,
-            copy_of: None,
-            plane_angle: 0.0,
-            moves_with: None,
-            kind: Default::default(),
-        };
+            ..Node::made_up(10 * i, i.checked_sub(1), place)
+        });
         let skeleton = Skeleton {
-            nodes: (0..3).map(node).collect(),
+            nodes: nodes.collect(),
             foot_px: Point2::origin(),
             image_size: Size::new(64, 64),
         };

@@ -2,7 +2,7 @@
 
 use super::film_log::FilmLog;
 use super::pose_tracker::{PoseTracker, Targets};
-use super::refiner::{Refiner, Seen, SolveJob, Taken};
+use super::refiner::{Refiner, SolveJob, Taken};
 use crate::cancel::CancelToken;
 use crate::config::Config;
 use crate::hierarchy::{self, Evidence};
@@ -50,7 +50,6 @@ pub struct BackEnd {
     config: Config,
     log: TrackLog,
     film: FilmLog,
-    wood: WoodSeen,
     evidence: Evidence,
     judged_s: Option<f64>,
     outline: Option<Arc<Outline>>,
@@ -72,13 +71,24 @@ enum Why {
     Asked,
 }
 
+/// Whether the wood of the tree is seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum WoodSight {
+    /// There is no tree yet, or nobody wants to know.
+    #[default]
+    NotSought,
+    /// It is being looked for.
+    Sought,
+    Seen,
+    NotSeen,
+}
+
 impl BackEnd {
     pub fn new(config: &Config) -> Self {
         Self {
             config: config.clone(),
             log: TrackLog::new(remembered_s(config)),
             film: FilmLog::new(config.accumulate.window_s),
-            wood: WoodSeen::new(),
             evidence: Evidence::default(),
             judged_s: None,
             outline: None,
@@ -100,7 +110,7 @@ impl BackEnd {
             received,
         } = followed;
         self.outline = Some(outline.clone());
-        if let Some(raw) = raw.filter(|_| self.config.skeleton.along_wood) {
+        if let Some(raw) = raw {
             self.film.push(raw, &tracks);
         }
         self.log.push(tracks.clone());
@@ -176,7 +186,7 @@ impl BackEnd {
             return Vec::new();
         };
         let window = self.log.last(self.config.accumulate.window_s);
-        let refiner = Refiner::new(model.time_s, window.span_s(), &self.config);
+        let mut refiner = Refiner::new(model.time_s, window.span_s(), &self.config);
         let mut tracker = PoseTracker::new(Arc::new(model), &self.config);
         // The pose is followed from the first remembered frame, so that it does not jump where the
         // tree was built. The newest frame is left out: it is about to be worked off as every later
@@ -184,6 +194,9 @@ impl BackEnd {
         let mut before = Vec::with_capacity(window.len());
         for tracks in window.sets().take(window.len() - 1) {
             before.push(tracker.step(tracks));
+        }
+        if self.config.skeleton.along_wood {
+            refiner.seek_wood(&self.log, &self.film, &tracker, &self.config);
         }
         self.tracker = Some(tracker);
         self.refiner = Some(refiner).filter(|r| !r.is_over());
@@ -196,19 +209,13 @@ impl BackEnd {
         let (Some(mut refiner), Some(standing)) = (self.refiner.take(), &self.tracker) else {
             return Vec::new();
         };
-        let seen = Seen {
-            film: &self.film,
-            wood: &self.wood,
-        };
-        let taken = refiner.step(&self.log, seen, standing, &self.config);
+        let taken = refiner.step(&self.log, &self.film, standing, &self.config);
         self.refiner = Some(refiner).filter(|r| !r.is_over());
         let Some(Taken { tracker, before }) = taken else {
             return Vec::new();
         };
         self.evidence = tracker.model().evidence.clone();
-        let frame = tracker.model().frame;
-        self.tracker = Some(tracker);
-        self.note_wood(frame);
+        self.take(tracker);
         before
     }
 
@@ -261,58 +268,52 @@ impl BackEnd {
                 self.build();
             }
         }
-        self.identify_sub_branches(cancel);
-        if !cancel.is_cancelled() {
-            self.look_for_wood(cancel);
+        let refiner = self.refiner.as_mut();
+        if let Some(model) = refiner.and_then(|refiner| refiner.end(cancel)) {
+            self.take(PoseTracker::new(Arc::new(model), &self.config));
         }
+        self.identify_sub_branches(cancel);
     }
 
-    /// A tree that was never refined gets the wood that a refinement would give it.
-    fn look_for_wood(&mut self, cancel: &CancelToken) {
-        let Some(tracker) = self.tracker.as_ref() else {
-            return;
-        };
-        let Some(newest) = self.log.all().newest().map(|set| set.frame) else {
-            return;
-        };
-        if tracker.model().wood.is_some() {
-            return;
+    /// A new model takes effect.
+    fn take(&mut self, tracker: PoseTracker) {
+        let model = tracker.model();
+        if let Some(wood) = &model.wood {
+            self.film.note_wood(model.frame, wood.clone());
         }
-        let seen = Seen {
-            film: &self.film,
-            wood: &self.wood,
+        self.tracker = Some(tracker);
+    }
+
+    /// Whether the wood of the tree is seen.
+    pub fn wood_sight(&self) -> WoodSight {
+        let Some(model) = self.model().filter(|_| self.config.skeleton.along_wood) else {
+            return WoodSight::NotSought;
         };
-        let job = SolveJob::new(&self.log, seen, tracker, &self.config);
-        if let Some(model) = job.prior_along_wood(cancel) {
-            self.tracker = Some(PoseTracker::new(Arc::new(model), &self.config));
-            self.note_wood(newest);
+        if model.wood.is_some() {
+            WoodSight::Seen
+        } else if self.refiner.as_ref().is_some_and(Refiner::seeks_wood) {
+            WoodSight::Sought
+        } else {
+            WoodSight::NotSeen
         }
     }
 
     /// The wood that was found in this film when it was there.
     pub fn put_wood(&mut self, wood: WoodSeen) {
-        self.wood = wood;
+        self.film.put_wood(wood);
     }
 
     /// The wood that was found.
     pub fn wood(&self) -> &WoodSeen {
-        &self.wood
-    }
-
-    /// Remembers the wood of a model that has taken effect, which was found with `frame`.
-    fn note_wood(&mut self, frame: u64) {
-        let wood = self.model().and_then(|model| model.wood.clone());
-        if let Some(wood) = wood {
-            self.wood.entry(frame).or_insert(wood);
-        }
+        self.film.wood()
     }
 
     fn identify_sub_branches(&mut self, cancel: &CancelToken) {
-        let Some(tracker) = self.tracker.as_ref().filter(|_| self.refiner.is_some()) else {
+        let Some(tracker) = &self.tracker else {
             return;
         };
         let standing = tracker.model();
-        if standing.refinements > 0 {
+        if standing.refinements > 0 || self.config.accumulate.refine_s <= 0.0 {
             return;
         }
         let prior = standing.joined_by(tracker.binding());

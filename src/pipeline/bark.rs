@@ -60,8 +60,8 @@ fn mirrored(x: u32) -> u32 {
 }
 
 /// Divides every texel by the mean of those around it, so that what is left is bark and not light,
-/// and every row by its mean, or what crosses the whole trunk would be rings on every limb; and takes
-/// off what stands out: a rope, a leaf, the sky beside the trunk.
+/// and every row by its mean, or what crosses the whole trunk would be rings on every limb; and
+/// takes off what stands out: a rope, a leaf, the sky beside the trunk.
 fn flatten(patch: &mut [f64]) {
     let around = local_means(patch);
     for (x, mean) in patch.iter_mut().zip(around) {
@@ -139,7 +139,8 @@ impl<'a> Trunk<'a> {
         })
     }
 
-    /// How bright the trunk is at a texel of the patch, the lowest row last; `None` off the picture.
+    /// How bright the trunk is at a texel of the patch, the lowest row last; `None` off the
+    /// picture.
     fn brightness(&self, column: u32, row: u32) -> Option<f64> {
         let [x, y] = [column, row].map(|k| (f64::from(k) + 0.5) / f64::from(PATCH));
         let angle = SEEN_HALF * (2.0 * x - 1.0);
@@ -258,8 +259,7 @@ fn median(picture: &Rgb, skeleton: &Skeleton, places: &[Point2<f64>]) -> Option<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Node, NodeId, NodeName, Size};
-    use nalgebra::Point3;
+    use crate::model::{Node, Size};
 
     /// A trunk of radius 12 px, striped along, in light that falls off, before a bright sky.
     fn filmed() -> Rgb {
@@ -285,17 +285,8 @@ mod tests {
         let mut nodes = Vec::new();
         for (i, y) in (0..).zip([0.0, 60.0]) {
             nodes.push(Node {
-                name: NodeName(i),
-                parent: i.checked_sub(1).map(NodeId),
-                level: 0,
-                position: Point3::new(0.0, y, 0.0),
                 radius,
-                n_tracks: 1,
-                kind: Default::default(),
-                certainty: 0.0,
-                copy_of: None,
-                plane_angle: 0.0,
-                moves_with: None,
+                ..Node::made_up(i, i.checked_sub(1), [0.0, y, 0.0])
             });
         }
         Skeleton {

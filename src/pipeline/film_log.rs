@@ -1,6 +1,6 @@
-//! Frames as they came, kept for their colours.
+//! Frames as they came, kept for their colours, and the wood that was found in them.
 
-use crate::model::{RawFrame, TrackSet};
+use crate::model::{BranchGraph, RawFrame, TrackSet, WoodSeen};
 use crate::random::seed_of_part;
 use std::sync::Arc;
 
@@ -11,11 +11,13 @@ const MOST_BYTES: usize = 32 << 20;
 const LEAST: usize = 12;
 
 /// A random choice of the frames of the last seconds: enough to see every pose of the tree, and
-/// whatever its rhythm, not always the same one. Memory is bounded.
+/// whatever its rhythm, not always the same one. Memory is bounded. What was found in frames stays
+/// when they are gone.
 #[derive(Clone, Debug)]
 pub struct FilmLog {
     remembered_s: f64,
     kept: Vec<KeptFrame>,
+    wood: WoodSeen,
 }
 
 /// A frame that is kept.
@@ -35,6 +37,7 @@ impl FilmLog {
         Self {
             remembered_s,
             kept: Vec::new(),
+            wood: WoodSeen::new(),
         }
     }
 
@@ -64,6 +67,27 @@ impl FilmLog {
     /// What is kept, oldest first.
     pub fn frames(&self) -> &[KeptFrame] {
         &self.kept
+    }
+
+    /// The wood that was found, by the newest frame that it was looked for with.
+    pub fn wood(&self) -> &WoodSeen {
+        &self.wood
+    }
+
+    /// That which was found with `frame`, or last before it.
+    pub fn wood_by(&self, frame: u64) -> Option<&Arc<BranchGraph>> {
+        let (_, wood) = self.wood.range(..=frame).next_back()?;
+        Some(wood)
+    }
+
+    /// Remembers what was found with `frame`.
+    pub fn note_wood(&mut self, frame: u64, wood: Arc<BranchGraph>) {
+        self.wood.entry(frame).or_insert(wood);
+    }
+
+    /// Takes what was found in this film when its frames were there.
+    pub fn put_wood(&mut self, wood: WoodSeen) {
+        self.wood = wood;
     }
 }
 

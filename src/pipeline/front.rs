@@ -48,7 +48,10 @@ impl FrontEnd {
 
     /// Takes a frame; gives back up to three that are done, none while the outline is being looked
     /// for.
-    pub fn step(&mut self, frame: Frame) -> Vec<Followed> {
+    pub fn step(&mut self, mut frame: Frame) -> Vec<Followed> {
+        if !self.config.skeleton.along_wood {
+            frame.raw = None;
+        }
         if self.found.is_none() {
             match &self.given {
                 Some(outline) => self.settle(outline.clone()),

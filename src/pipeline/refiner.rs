@@ -6,8 +6,8 @@ use super::pose_tracker::{PoseTracker, Targets};
 #[cfg(all(feature = "camera", feature = "opencv"))]
 use super::wood::find_wood;
 use crate::cancel::CancelToken;
-use crate::config::Config;
-use crate::model::{BranchGraph, LogWindow, Outline, Pose, Skeleton, TrackLog, WoodSeen};
+use crate::config::{self, Config};
+use crate::model::{BranchGraph, LogWindow, Outline, Pose, Skeleton, TrackLog};
 use crate::solve::{Model, solve, with_wood};
 use std::sync::Arc;
 
@@ -21,38 +21,45 @@ const LEAST_SPAN_S: f64 = 1.0;
 /// nothing.
 const READY_S: f64 = 0.5;
 const POINTS: f64 = 400.0;
+/// Film that has to go by, besides, for the wood of a picture of up to [`PIXELS`] pixels, s. Larger
+/// ones take longer by their number of pixels.
+const WOOD_READY_S: f64 = 1.5;
+const PIXELS: f64 = 640.0 * 360.0;
 /// Remembered frames through which the new tree's pose is followed in the time of one frame.
 const FRAMES_PER_STEP: usize = 30;
 
-/// All that [`solve`] needs, apart from everything that goes on meanwhile: it can be done on any
-/// thread.
+/// All that a better model needs, apart from everything that goes on meanwhile: it can be worked
+/// out on any thread.
 pub struct SolveJob {
+    aim: Aim,
     log: TrackLog,
     film: FilmLog,
-    /// Wood that was found with the newest frame, or before it, when the film was there.
-    found: Option<Arc<BranchGraph>>,
     outline: Arc<Outline>,
     prior: Model,
     config: Config,
 }
 
-/// What the pictures of a film show: the frames that are kept, or what was found in them when they
-/// were there.
-#[derive(Clone, Copy)]
-pub(super) struct Seen<'a> {
-    pub film: &'a FilmLog,
-    pub wood: &'a WoodSeen,
+/// What a model is worked out for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Aim {
+    /// The tree that was just built, along the wood that is seen.
+    Wood,
+    /// The tree from all that was seen since.
+    Refinement,
 }
 
 impl SolveJob {
-    pub(super) fn new(log: &TrackLog, seen: Seen, standing: &PoseTracker, config: &Config) -> Self {
-        let newest = log.all().newest().map_or(0, |set| set.frame);
-        let found = seen.wood.range(..=newest).next_back();
-        let is_gone = seen.film.frames().is_empty();
+    fn new(
+        aim: Aim,
+        log: &TrackLog,
+        film: &FilmLog,
+        standing: &PoseTracker,
+        config: &Config,
+    ) -> Self {
         Self {
+            aim,
             log: log.clone(),
-            film: seen.film.clone(),
-            found: found.filter(|_| is_gone).map(|(_, wood)| wood.clone()),
+            film: film.clone(),
             outline: standing.model().outline.clone(),
             prior: standing.model().joined_by(standing.binding()),
             config: config.clone(),
@@ -63,13 +70,31 @@ impl SolveJob {
     fn ready_s(&self) -> f64 {
         let newest = self.log.all().newest();
         let n_points = newest.map_or(0, |set| set.counted().count());
-        READY_S * (n_points as f64 / POINTS).powi(2).max(1.0)
+        let solved_s = READY_S * (n_points as f64 / POINTS).powi(2).max(1.0);
+        let n_pixels = self.outline.size.area() as f64;
+        // Not a matter of the frames: a capture that is finished from its log has none.
+        let wood_s = if self.config.skeleton.along_wood {
+            WOOD_READY_S * (n_pixels / PIXELS).max(1.0)
+        } else {
+            0.0
+        };
+        solved_s + wood_s
     }
 
-    /// The better model, if there is one; `None`, too, where `cancel` ends the work before. It runs
-    /// along the wood that the kept frames show; where none was found yet and some is now, the
-    /// prior model along that is the better one.
+    /// The better model, if there is one; `None`, too, where `cancel` ends the work before.
     pub fn run(&self, cancel: &CancelToken) -> Option<Model> {
+        match self.aim {
+            Aim::Wood => {
+                let wood = self.wood(cancel)?;
+                Some(with_wood(&self.prior, Some(wood), None, &self.config))
+            }
+            Aim::Refinement => self.refined(cancel),
+        }
+    }
+
+    /// The model from all that was seen. It runs along the wood that the kept frames show; where
+    /// none was found yet and some is now, the prior model along that is the better one.
+    fn refined(&self, cancel: &CancelToken) -> Option<Model> {
         let solved = solve(
             &self.log,
             &self.outline,
@@ -104,20 +129,16 @@ impl SolveJob {
         })
     }
 
-    /// The prior model along the wood that the kept frames show; `None` where they show none.
-    pub(super) fn prior_along_wood(&self, cancel: &CancelToken) -> Option<Model> {
-        let wood = self.wood(cancel)?;
-        Some(with_wood(&self.prior, Some(wood), None, &self.config))
-    }
-
-    /// The wood that the kept frames show.
+    /// The wood that the kept frames show; where they are gone, what was found in them.
     fn wood(&self, cancel: &CancelToken) -> Option<Arc<BranchGraph>> {
-        if self.found.is_some() {
-            return self.found.clone();
+        if self.film.frames().is_empty() {
+            let newest = self.log.all().newest()?;
+            return self.film.wood_by(newest.frame).cloned();
         }
         let window = self.log.last(self.config.accumulate.window_s);
         let prior = &self.prior.plain;
-        branches_in(&self.film, window, &self.outline, prior, cancel).map(Arc::new)
+        let settings = &self.config.skeleton;
+        branches_in(&self.film, window, &self.outline, prior, settings, cancel).map(Arc::new)
     }
 }
 
@@ -127,9 +148,10 @@ fn branches_in(
     window: LogWindow,
     outline: &Outline,
     prior: &Skeleton,
+    settings: &config::Skeleton,
     cancel: &CancelToken,
 ) -> Option<BranchGraph> {
-    Some(find_wood(film, window, outline, prior, cancel)?.branches)
+    Some(find_wood(film, window, outline, prior, settings, cancel)?.branches)
 }
 
 /// Frames are decoded by the camera's crates and looked at by OpenCV. Without them no wood is seen.
@@ -139,6 +161,7 @@ fn branches_in(
     _window: LogWindow,
     _outline: &Outline,
     _prior: &Skeleton,
+    _settings: &config::Skeleton,
     _cancel: &CancelToken,
 ) -> Option<BranchGraph> {
     None
@@ -150,6 +173,8 @@ pub(super) struct Refiner {
     built_s: f64,
     span_s: f64,
     stage: Stage,
+    /// The first tree's wood is being looked for, or the tree along it followed.
+    seeks_wood: bool,
 }
 
 enum Stage {
@@ -190,9 +215,36 @@ impl Refiner {
             built_s,
             span_s: span_s.max(LEAST_SPAN_S),
             stage: Stage::Over,
+            seeks_wood: false,
         };
         refiner.wait(built_s, config);
         refiner
+    }
+
+    /// Begins to look for the wood of the tree that was just built.
+    pub fn seek_wood(
+        &mut self,
+        log: &TrackLog,
+        film: &FilmLog,
+        standing: &PoseTracker,
+        config: &Config,
+    ) {
+        self.solve(SolveJob::new(Aim::Wood, log, film, standing, config));
+        self.seeks_wood = true;
+    }
+
+    /// Whether the first tree's wood is being looked for, or the tree along it followed.
+    pub fn seeks_wood(&self) -> bool {
+        self.seeks_wood
+    }
+
+    fn solve(&mut self, job: SolveJob) {
+        let now_s = job.log.all().newest().map_or(0.0, |set| set.time_s);
+        self.stage = Stage::Solving(Solving {
+            due_s: now_s + job.ready_s(),
+            job: Arc::new(job),
+            done: None,
+        });
     }
 
     /// No more refinements: the model stays as it is.
@@ -200,8 +252,28 @@ impl Refiner {
         matches!(self.stage, Stage::Over)
     }
 
+    /// No more frames: the first tree along its wood, if that has not taken effect yet, and
+    /// `cancel` does not end the work before.
+    pub fn end(&mut self, cancel: &CancelToken) -> Option<Model> {
+        let stage = std::mem::replace(&mut self.stage, Stage::Over);
+        if !self.seeks_wood {
+            return None;
+        }
+        let model = match stage {
+            Stage::Solving(Solving {
+                done: Some(model), ..
+            }) => model.map(|model| *model),
+            Stage::Solving(solving) => solving.job.run(cancel),
+            Stage::Following(following) => Some(following.tracker.model().as_ref().clone()),
+            Stage::Waiting(_) | Stage::Over => None,
+        };
+        self.seeks_wood = model.is_none() && cancel.is_cancelled();
+        model
+    }
+
     /// Waits for the next time after `now_s` by which film has grown enough, if there is one.
     fn wait(&mut self, now_s: f64, config: &Config) {
+        self.seeks_wood = false;
         self.stage = Stage::Over;
         let mut growth = GROWTH;
         loop {
@@ -222,19 +294,15 @@ impl Refiner {
     pub fn step(
         &mut self,
         log: &TrackLog,
-        seen: Seen,
+        film: &FilmLog,
         standing: &PoseTracker,
         config: &Config,
     ) -> Option<Taken> {
         let now_s = log.all().newest()?.time_s;
         match std::mem::replace(&mut self.stage, Stage::Over) {
             Stage::Waiting(due_s) if now_s >= due_s => {
-                let job = SolveJob::new(log, seen, standing, config);
-                self.stage = Stage::Solving(Solving {
-                    due_s: now_s + job.ready_s(),
-                    job: Arc::new(job),
-                    done: None,
-                });
+                let aim = Aim::Refinement;
+                self.solve(SolveJob::new(aim, log, film, standing, config));
                 None
             }
             Stage::Solving(solving) if now_s >= solving.due_s => {
@@ -261,8 +329,9 @@ impl Refiner {
         let window = log.last(config.accumulate.window_s);
         let (first, newest) = (window.first()?, window.newest()?);
         // After a long pause nothing is remembered by which a new model's pose could be followed:
-        // it would jump. There will be a better one.
-        let Some(mut model) = model.filter(|model| first.frame <= model.frame) else {
+        // it would jump. There will be a better one; but the wood is not left out for that.
+        let is_in_time = |model: &Model| self.seeks_wood || first.frame <= model.frame;
+        let Some(mut model) = model.filter(is_in_time) else {
             self.wait(newest.time_s, config);
             return None;
         };

@@ -1,7 +1,7 @@
 //! Another shape in space for a tree that has been measured.
 
 use crate::config::Config;
-use crate::model::{ClusterId, NodeId, NodeName, Outline, Skeleton};
+use crate::model::{ClusterId, NodeName, Outline, Skeleton};
 use crate::shape::{Drawn, Topiary, TopiaryError};
 use crate::solve::{assign_radii, in_depth_of};
 use crate::{shape, skeleton};
@@ -13,10 +13,7 @@ pub const MOST_RESHAPED: usize = 4096;
 /// Stands the measured nodes up anew as `config` says. They keep their places in the picture and
 /// their names; copies get names that no node had before.
 pub fn reshape(old: &Skeleton, outline: &Outline, config: &Config) -> Skeleton {
-    let movers: Vec<NodeId> = [NodeId(0)]
-        .into_iter()
-        .chain(old.measured_branches())
-        .collect();
+    let movers = old.foot_and_branches();
     let mut flat: Vec<skeleton::Node2d> = Vec::with_capacity(movers.len());
     let mut tracks: Vec<u32> = Vec::with_capacity(movers.len());
     for (i, mover) in movers.iter().enumerate() {

@@ -2,11 +2,11 @@
 
 use super::film_log::{FilmLog, KeptFrame};
 use crate::cancel::CancelToken;
+use crate::config;
 use crate::hierarchy;
-use crate::model::{LogWindow, Outline, Rgb, Skeleton, TrackId, TrackSet};
-use crate::skeleton::Foot;
+use crate::model::{Foot, LogWindow, Outline, Rgb, Skeleton, TrackId, TrackSet};
 use crate::source::Decoder;
-use crate::wood::{self, Displacements, Shot, TrunkFoot, View, Wood};
+use crate::wood::{self, Displacements, Shot, Stroke, View, Wood};
 use nalgebra::Point2;
 use std::collections::BTreeMap;
 
@@ -14,12 +14,14 @@ use std::collections::BTreeMap;
 const SEEN_SHARE: f64 = 0.5;
 
 /// Looks for the wood of the tree whose joints `skeleton` has, in the frames of `film` whose points
-/// are in `window`. `None` where frames cannot be decoded, or show no wood, and where `cancel` ends the work before.
+/// are in `window`, as `settings` say. `None` where frames cannot be decoded, or show no wood, and where `cancel` ends
+/// the work before.
 pub fn find_wood(
     film: &FilmLog,
     window: LogWindow,
     outline: &Outline,
     skeleton: &Skeleton,
+    settings: &config::Skeleton,
     cancel: &CancelToken,
 ) -> Option<Wood> {
     let rest = rest_places(window);
@@ -49,14 +51,20 @@ pub fn find_wood(
         });
     }
     let rest_px: Vec<Point2<f64>> = rest.values().copied().collect();
+    let mut strokes: Vec<Stroke> = Vec::with_capacity(settings.strokes_px.len());
+    for stroke in &settings.strokes_px {
+        strokes.push(stroke.iter().map(|at| Point2::from(*at)).collect());
+    }
     let view = View {
         shots: &shots,
         rest_px: &rest_px,
         outline,
-        foot: TrunkFoot {
+        foot: Foot {
             position_px: skeleton.foot_px,
-            half_width_px: Foot::of(outline, None).half_width_px,
+            ..Foot::of(outline, None)
         },
+        strokes: &strokes,
+        trace_by: settings.trace_by,
     };
     match wood::find(view, cancel) {
         Ok(wood) => wood,

@@ -1,8 +1,16 @@
 //! What is said when a tree comes into effect.
 
 use super::shared::Shared;
+use crate::pipeline::WoodSight;
 use crate::solve::Model;
 use std::sync::Arc;
+
+/// The warning of a tree in whose film no wood is seen.
+const NO_WOOD: &str = "no wood is seen in the film (leaves, night, fog, or a background of the \
+                       wood's colour): the tree is that of the motion alone";
+/// That of one whose wood was not looked for to the end.
+const TOO_SHORT_FOR_WOOD: &str = "the wood was not looked for, as the end was wanted: the tree is \
+                                  that of the motion alone";
 
 /// The tree that was last told of.
 #[derive(Default)]
@@ -10,6 +18,7 @@ pub struct Announced {
     tree: Option<Arc<Model>>,
     /// The warning that the first one was worth little.
     warned: Option<String>,
+    wood: WoodSight,
 }
 
 impl Announced {
@@ -50,6 +59,23 @@ impl Announced {
             tracing::info!(
                 "tree built at {time_s:.1} s: {nodes} nodes from {points} moving points"
             );
+        }
+    }
+
+    /// Tells whether the tree's wood is seen, where that is another answer than before. At the end
+    /// of the film (`ended`) it is a warning that the search was cut short.
+    pub fn tell_of_wood(&mut self, sight: WoodSight, ended: bool, shared: &Shared) {
+        let was_told = sight == self.wood;
+        self.wood = sight;
+        match sight {
+            WoodSight::Sought if ended => shared.warn(TOO_SHORT_FOR_WOOD.into()),
+            WoodSight::NotSeen if !was_told => shared.warn(NO_WOOD.into()),
+            WoodSight::Seen if !was_told => {
+                shared.withdraw(NO_WOOD);
+                shared.tell("the tree runs along the wood that is seen".into());
+                tracing::info!("tree along the wood that is seen");
+            }
+            _ => {}
         }
     }
 }

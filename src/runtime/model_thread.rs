@@ -290,6 +290,9 @@ impl ModelThread {
         if let Some(tree) = self.back.model() {
             self.announced
                 .tell(tree, self.job.config.accumulate.threshold, &self.shared);
+            let ended = self.shared.ended.load(Ordering::Relaxed);
+            self.announced
+                .tell_of_wood(self.back.wood_sight(), ended, &self.shared);
         }
     }
 

@@ -104,8 +104,8 @@ impl Swaying {
         }
     }
 
-    /// Gives up what is under way. It ends with the step of a fit that it is at, after a release with
-    /// the branch.
+    /// Gives up what is under way. It ends with the step of a fit that it is at, after a release
+    /// with the branch.
     pub fn end(&mut self) {
         self.pending = None;
         self.every_s = 0.0;

@@ -4,6 +4,7 @@
 //! the film goes on, with a note of the source and the settings, and a run that was cut by a crash
 //! or by a full disk is completed from there.
 
+use super::announce::Announced;
 use super::finish::{self, CaptureJob, Quality, Written};
 use super::shared::{Failure, Shared};
 use super::status::{median_error_px, median_fb_error_px};
@@ -202,6 +203,7 @@ pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Fa
         });
     }
     back.finish(cancel);
+    Announced::default().tell_of_wood(back.wood_sight(), true, &shared);
     let _ = std::fs::remove_file(dir.join(RESERVE_FILE));
     let job = CaptureJob {
         tree: back.model().cloned(),

@@ -1,10 +1,10 @@
 //! A camera on a thread of its own, behind one that gives up in time.
 //!
 //! Any call to a driver may block for ever: opening, closing, waiting for a frame. The kernel may
-//! even end the thread inside such a call, where it has a fault of its own. So the capture waits for
-//! an answer with a limit of time, and where none comes it leaves the thread behind and goes on with
-//! the [`Successor`] of its source on a new one. A thread that was left behind closes its device and
-//! ends when its call returns; nobody waits for it, not even the end of the program.
+//! even end the thread inside such a call, where it has a fault of its own. So the capture waits
+//! for an answer with a limit of time, and where none comes it leaves the thread behind and goes on
+//! with the [`Successor`] of its source on a new one. A thread that was left behind closes its
+//! device and ends when its call returns; nobody waits for it, not even the end of the program.
 
 use super::nap::NAP;
 use crate::config;

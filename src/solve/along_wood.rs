@@ -1,4 +1,4 @@
-//! Joins the skeleton that motion tells with the wood that the picture shows.
+//! Joins the skeleton that follows from motion with the wood that the picture shows.
 //!
 //! The wood says where branches run and fork, motion which piece of it belongs to which branch.
 //! Every piece of wood is given a branch, so that along the way from the foot to a tip the branches
@@ -7,10 +7,11 @@
 //! programming. A branch then ends on its wood, and what it passes on the way there are bends of
 //! it.
 
+use super::bent_tree::{BentTree, Names, share_of_push, way_of};
 use super::labels::{Labels, label};
-use super::taper::taper;
 use crate::model::{BranchGraph, Node, NodeId, NodeKind, NodeName, Skeleton};
-use nalgebra::{Point2, Point3, UnitQuaternion, Vector3};
+use crate::signal::distance_to_segment;
+use nalgebra::{Point2, Point3, Vector2};
 
 /// A followed point on its branch.
 #[derive(Clone, Copy, Debug)]
@@ -19,17 +20,13 @@ pub(super) struct PointOn {
     pub rest_px: Point2<f64>,
 }
 
-/// Names for nodes that no tree before had.
-pub(super) struct Names<'a> {
-    /// The next free one.
-    pub next: u32,
-    /// The tree before, whose traced nodes go on where they are the same.
-    pub prior: Option<&'a Skeleton>,
-}
-
 /// A traced node goes on as one of the tree before that is no farther from it, px at 640 px picture
 /// width.
-const SAME_PX: f64 = 4.0;
+const SAME_PX: f64 = 8.0;
+
+/// A straight branch has no joints nearer to each other, or to its ends, than this, px at 640 px
+/// picture width.
+const JOINT_PX: f64 = 4.0;
 
 /// `skeleton`, whose branches are straight, along the `wood`. Its measured nodes keep their order
 /// among themselves.
@@ -51,33 +48,13 @@ pub(super) fn along_wood(
     build.side_wood();
     build.set_levels();
     build.name(names);
-    build.copies(names);
+    build.tree.copy_into_planes(skeleton, names);
     Joined {
         skeleton: Skeleton {
-            nodes: build.nodes,
+            nodes: build.tree.nodes,
             ..skeleton.clone()
         },
-        seen_px: build.seen_px,
-    }
-}
-
-/// The tree `along` its wood in the depth of `straight`, which has the same branches without their
-/// bends, stood up anew, and copies of its own.
-pub fn in_depth_of(straight: &Skeleton, along: &Skeleton, first_name: u32) -> Skeleton {
-    let wood = BranchGraph::default();
-    let labels = Labels {
-        branch: Vec::new(),
-        end_of: Vec::new(),
-    };
-    let mut build = Build::new(straight, &wood, &labels, &[]);
-    build.again(along);
-    build.copies(&mut Names {
-        next: first_name,
-        prior: None,
-    });
-    Skeleton {
-        nodes: build.nodes,
-        ..along.clone()
+        seen_px: build.tree.seen_px,
     }
 }
 
@@ -88,31 +65,24 @@ pub(super) struct Joined {
     pub seen_px: Vec<Option<f64>>,
 }
 
-impl Joined {
-    /// Puts the radii that are seen in the place of those that follow from the pipe model.
-    pub fn set_radii(&mut self) {
-        taper(&mut self.skeleton.nodes, &self.seen_px);
-    }
+/// Pieces of wood that are not in the new tree yet, one after the other.
+struct Way {
+    /// The node that the first leaves.
+    from: NodeId,
+    pieces: Vec<usize>,
 }
 
-/// The new tree while it grows.
+/// Puts the new tree together from branches and wood.
 struct Build<'a> {
     old: &'a Skeleton,
     wood: &'a BranchGraph,
     labels: &'a Labels,
     points: &'a [PointOn],
-    nodes: Vec<Node>,
+    tree: BentTree,
     /// Where each measured node of the old tree stands in the new one.
     place_of: Vec<Option<NodeId>>,
     /// Where each piece of wood ends in the new tree.
     place_of_wood: Vec<Option<NodeId>>,
-    /// The branch, of the old tree, of each node of the new one, and its radius where it is seen,
-    /// px.
-    branch_of: Vec<usize>,
-    seen_px: Vec<Option<f64>>,
-    /// Of each node, the share of its branch's push that is met with on the way to it from its
-    /// parent; 0 for side wood.
-    share: Vec<f64>,
 }
 
 impl<'a> Build<'a> {
@@ -127,12 +97,9 @@ impl<'a> Build<'a> {
             wood,
             labels,
             points,
-            nodes: old.nodes.first().cloned().into_iter().collect(),
+            tree: BentTree::on_foot_of(old),
             place_of: vec![None; old.measured()],
             place_of_wood: vec![None; wood.nodes.len()],
-            branch_of: vec![0],
-            seen_px: vec![None],
-            share: vec![1.0],
         };
         if let Some(foot) = build.place_of.first_mut() {
             *foot = Some(NodeId(0));
@@ -141,38 +108,6 @@ impl<'a> Build<'a> {
             *foot = Some(NodeId(0));
         }
         build
-    }
-
-    /// The nodes of a tree that is along its wood, with their places in the picture.
-    fn again(&mut self, along: &Skeleton) {
-        let movers: Vec<NodeId> = [NodeId(0)]
-            .into_iter()
-            .chain(along.measured_branches())
-            .collect();
-        let branch_of = |node: NodeId| movers.iter().position(|m| *m == along.mover(node));
-        let is_own = |node: NodeId| along.mover(node) == node || along.is_bend(node);
-        let measured = || (1..along.measured() as u32).map(NodeId);
-        let mut whole_px = vec![0.0; movers.len()];
-        for node in measured().filter(|node| is_own(*node)) {
-            if let Some(branch) = branch_of(node) {
-                whole_px[branch] += way_of(along, node.index()).xy().norm();
-            }
-        }
-        for node in measured() {
-            let branch = branch_of(node).unwrap_or(0);
-            let mut share = 0.0;
-            if is_own(node) {
-                let px = way_of(along, node.index()).xy().norm();
-                let pushed_px = way_of(self.old, branch).norm();
-                let scale = (whole_px[branch] / pushed_px.max(f64::MIN_POSITIVE)).min(1.0);
-                share = scale * px / whole_px[branch].max(f64::MIN_POSITIVE);
-            }
-            let mut new = along.nodes[node.index()].clone();
-            let below = new.parent.and_then(|p| self.nodes.get(p.index()));
-            new.position.z =
-                below.map_or(0.0, |below| below.position.z) + share * way_of(self.old, branch).z;
-            self.push(new, branch, None, share);
-        }
     }
 
     /// The measured nodes in their order, each after the bends on its way.
@@ -187,35 +122,25 @@ impl<'a> Build<'a> {
 
     /// A branch that ends at the piece of wood `end`.
     fn on_wood(&mut self, branch: usize, end: usize) {
-        let mut way = Vec::new();
-        let mut at = end;
-        while self.place_of_wood[at].is_none() {
-            way.push(at);
-            match self.wood.nodes[at].parent {
-                Some(parent) => at = parent,
-                None => break,
-            }
-        }
-        way.reverse();
-        let mut parent = self.place_of_wood[at].unwrap_or(NodeId(0));
+        let way = self.way_to(end);
+        let mut parent = way.from;
         // It may leave a part of its carrier that is not on the way to that one's end.
         let is_own = |piece: &usize| self.labels.branch[*piece] == branch;
-        let (own, carrier): (Vec<usize>, Vec<usize>) = way.into_iter().partition(is_own);
+        let (own, carrier): (Vec<usize>, Vec<usize>) = way.pieces.into_iter().partition(is_own);
         for piece in carrier {
             parent = self.push_side(piece, parent);
         }
-        let mut depth = self.nodes[parent.index()].position.z;
+        let mut depth = self.tree.nodes[parent.index()].position.z;
         let pushed = way_of(self.old, branch);
-        let whole_px: f64 = own.iter().map(|piece| self.length_px(*piece)).sum();
-        // A branch that is shorter than it was thought to be was pushed too far.
-        let scale = (whole_px / pushed.norm().max(f64::MIN_POSITIVE)).min(1.0);
+        let seen_px: f64 = own.iter().map(|piece| self.length_px(*piece)).sum();
+        let unseen_px = self.unseen_px(branch, end);
+        let whole_px = seen_px + unseen_px;
         for &piece in &own {
-            // Evenly from where it begins to its end.
-            let share = scale * self.length_px(piece) / whole_px.max(f64::MIN_POSITIVE);
+            let share = share_of_push(&pushed, self.length_px(piece), whole_px);
             depth += share * pushed.z;
-            let node = if piece == end {
+            let node = if piece == end && unseen_px == 0.0 {
                 let old = &self.old.nodes[branch];
-                self.place_of[branch] = Some(NodeId(self.nodes.len() as u32));
+                self.place_of[branch] = Some(NodeId(self.tree.nodes.len() as u32));
                 Node {
                     parent: Some(parent),
                     position: self.position(piece, depth),
@@ -224,26 +149,104 @@ impl<'a> Build<'a> {
             } else {
                 self.traced(branch, piece, parent, depth)
             };
-            parent = self.push(node, branch, Some(piece), share);
+            parent = self.push(node, branch, piece, share);
+        }
+        if unseen_px > 0.0 {
+            let share = share_of_push(&pushed, unseen_px, whole_px);
+            let end = self.old.nodes[branch].position;
+            let end = Point3::new(end.x, end.y, depth + share * pushed.z);
+            self.push_straight(branch, parent, end, share);
         }
         self.bind_bends(branch);
+    }
+
+    /// The wood that is not in the tree yet, up to and with a piece.
+    fn way_to(&self, piece: usize) -> Way {
+        let mut pieces = Vec::new();
+        let mut at = Some(piece);
+        while let Some(piece) = at.filter(|piece| self.place_of_wood[*piece].is_none()) {
+            pieces.push(piece);
+            at = self.wood.nodes[piece].parent;
+        }
+        pieces.reverse();
+        let from = at.and_then(|piece| self.place_of_wood[piece]);
+        Way {
+            from: from.unwrap_or(NodeId(0)),
+            pieces,
+        }
+    }
+
+    /// How far a branch goes on straight, unseen, from the last of its wood to its own end, px: 0
+    /// where it ends on its wood. It goes on where most of the points on it, and on the branches
+    /// that it carries and none of whose wood is seen, are nearer to that way than to its wood; but
+    /// it does not turn back.
+    fn unseen_px(&self, branch: usize, end: usize) -> f64 {
+        let from = self.wood.nodes[end].position_px;
+        let to = self.old.image_from_model(&self.old.nodes[branch].position);
+        let parent = self.wood.nodes[end].parent.unwrap_or(0);
+        let arrives = from - self.wood.nodes[parent].position_px;
+        if arrives.dot(&(to - from)) <= 0.0 {
+            return 0.0;
+        }
+        let (mut beyond, mut on_wood) = (0, 0);
+        for point in self.points {
+            if !self.enters_from(point.node, branch) {
+                continue;
+            }
+            if distance_to_segment(point.rest_px, from, to) < self.off_wood_px(branch, point) {
+                beyond += 1;
+            } else {
+                on_wood += 1;
+            }
+        }
+        if beyond > on_wood {
+            (to - from).norm()
+        } else {
+            0.0
+        }
+    }
+
+    /// Whether a node of the old tree is `branch`, or is carried by it with no wood seen between.
+    fn enters_from(&self, node: NodeId, branch: usize) -> bool {
+        for here in std::iter::once(node).chain(self.old.ancestors(node)) {
+            if here.index() == branch {
+                return true;
+            }
+            if self.labels.end_of[here.index()].is_some() {
+                return false;
+            }
+        }
+        false
+    }
+
+    /// Distance of a point from the wood of `branch`, px.
+    fn off_wood_px(&self, branch: usize, point: &PointOn) -> f64 {
+        let mut least_px = f64::INFINITY;
+        for (piece, node) in self.wood.nodes.iter().enumerate() {
+            if let Some(parent) = node.parent.filter(|_| self.labels.branch[piece] == branch) {
+                let from = self.wood.nodes[parent].position_px;
+                let off_px = distance_to_segment(point.rest_px, from, node.position_px);
+                least_px = least_px.min(off_px);
+            }
+        }
+        least_px
     }
 
     /// A piece of wood that is a rigid part of the branch that it leaves. How deep it reaches
     /// nobody has seen: it stays as deep as its fork.
     fn push_side(&mut self, piece: usize, parent: NodeId) -> NodeId {
         // What leaves the foot belongs to the trunk.
-        let branch = self.branch_of[parent.index()].max(1);
-        let depth = self.nodes[parent.index()].position.z;
+        let branch = self.tree.branch_of[parent.index()].max(1);
+        let depth = self.tree.nodes[parent.index()].position.z;
         let node = self.traced(branch, piece, parent, depth);
-        self.push(node, branch, Some(piece), 0.0)
+        self.push(node, branch, piece, 0.0)
     }
 
     /// The bends of a branch were made before its end was.
     fn bind_bends(&mut self, branch: usize) {
         let end = self.place_of[branch];
-        for (i, node) in self.nodes.iter_mut().enumerate() {
-            if self.branch_of[i] == branch && Some(NodeId(i as u32)) != end && i > 0 {
+        for (i, node) in self.tree.nodes.iter_mut().enumerate() {
+            if self.tree.branch_of[i] == branch && Some(NodeId(i as u32)) != end && i > 0 {
                 node.moves_with = end;
             }
         }
@@ -257,9 +260,8 @@ impl<'a> Build<'a> {
     }
 
     fn position(&self, piece: usize, depth: f64) -> Point3<f64> {
-        let at = self.wood.nodes[piece].position_px;
-        let foot = self.old.foot_px;
-        Point3::new(at.x - foot.x, foot.y - at.y, depth)
+        let at = self.from_foot(self.wood.nodes[piece].position_px);
+        Point3::new(at.x, at.y, depth)
     }
 
     fn traced(&self, branch: usize, piece: usize, parent: NodeId, depth: f64) -> Node {
@@ -277,41 +279,144 @@ impl<'a> Build<'a> {
         }
     }
 
-    fn push(&mut self, node: Node, branch: usize, piece: Option<usize>, share: f64) -> NodeId {
-        let place = NodeId(self.nodes.len() as u32);
-        self.nodes.push(node);
-        self.branch_of.push(branch);
-        let radius_px = piece.map(|piece| self.wood.nodes[piece].radius_px);
-        self.seen_px.push(radius_px.filter(|px| *px > 0.0));
-        self.share.push(share);
-        if let Some(piece) = piece {
-            self.place_of_wood[piece] = Some(place);
-        }
+    /// A node at the end of a piece of wood.
+    fn push(&mut self, node: Node, branch: usize, piece: usize, share: f64) -> NodeId {
+        let radius_px = Some(self.wood.nodes[piece].radius_px).filter(|px| *px > 0.0);
+        let place = self.tree.push(node, branch, share, radius_px);
+        self.place_of_wood[piece] = Some(place);
         place
     }
 
-    /// A branch none of whose wood is seen: it leaves the branch that carries it where its points
+    /// A branch that has no wood of its own: it leaves the wood that most of its points are on,
+    /// whichever branch has that, and where they are on none, the branch that carries it where they
     /// are nearest to that.
     fn off_wood(&mut self, branch: usize) {
         let old = &self.old.nodes[branch];
         let carrier = old.parent.map_or(0, NodeId::index);
-        let nearest = self.nearest_on(carrier, branch);
-        let parent = self.without_fold(nearest, old.position);
+        let begin = match self.wood_under(branch) {
+            Some(piece) => self.reach(piece, branch),
+            None => self.nearest_on(carrier, branch),
+        };
+        let parent = self.without_fold(begin, old.position);
+        self.push_straight(branch, parent, old.position, 1.0);
+        self.bind_bends(branch);
+    }
+
+    /// A branch, or the part of it that is not seen, goes straight to its end, with a joint
+    /// wherever one that it carries leaves it before. `share` is that of its push.
+    fn push_straight(&mut self, branch: usize, from: NodeId, end: Point3<f64>, share: f64) {
+        let begin = self.tree.nodes[from.index()].position;
+        let old = &self.old.nodes[branch];
+        let (mut parent, mut done) = (from, 0.0);
+        for at in self.joints(branch, begin.xy(), end.xy()) {
+            let joint = Node {
+                name: NodeName(0),
+                parent: Some(parent),
+                position: begin + at * (end - begin),
+                n_tracks: 0,
+                ..old.clone()
+            };
+            parent = self.tree.push(joint, branch, share * (at - done), None);
+            done = at;
+        }
         let node = Node {
             parent: Some(parent),
+            position: end,
             ..old.clone()
         };
-        let place = self.push(node, branch, None, 1.0);
+        let place = self.tree.push(node, branch, share * (1.0 - done), None);
         self.place_of[branch] = Some(place);
+    }
+
+    /// Where the branches that a straight one carries, and whose wood is not seen either, leave it:
+    /// shares of its length, ascending. A branch leaves where its points are nearest, but not
+    /// beyond the place from which it would have to turn back.
+    fn joints(&self, branch: usize, begin: Point2<f64>, end: Point2<f64>) -> Vec<f64> {
+        let way = end - begin;
+        let length_px = way.norm();
+        let share = |at: Point2<f64>| (at - begin).dot(&way) / (length_px * length_px);
+        let mut shares: Vec<f64> = Vec::new();
+        for carried in branch + 1..self.old.measured() {
+            let is_carried = self.old.nodes[carried].parent.map(NodeId::index) == Some(branch);
+            if !is_carried || !self.is_unseen(carried) {
+                continue;
+            }
+            let mut most = share(self.old.nodes[carried].position.xy());
+            let mut least_px = f64::INFINITY;
+            let mut nearest = most;
+            for point in self.points.iter().filter(|p| self.is_on(p.node, carried)) {
+                let at = Point2::from(self.from_foot(point.rest_px));
+                let off_px = distance_to_segment(at, begin, end);
+                if off_px < least_px {
+                    (least_px, nearest) = (off_px, share(at));
+                }
+            }
+            most = most.min(nearest);
+            shares.push(most);
+        }
+        shares.sort_by(f64::total_cmp);
+        let apart = JOINT_PX * f64::from(self.old.image_size.width) / 640.0 / length_px;
+        let mut joints: Vec<f64> = Vec::new();
+        for share in shares {
+            let last = joints.last().copied().unwrap_or(0.0);
+            if share - last >= apart && 1.0 - share >= apart {
+                joints.push(share);
+            }
+        }
+        joints
+    }
+
+    /// Whether a branch has no wood of its own, and its points are on that of no other.
+    fn is_unseen(&self, branch: usize) -> bool {
+        self.labels.end_of[branch].is_none() && self.wood_under(branch).is_none()
+    }
+
+    /// A place of the picture from the foot, to the right and up, px.
+    fn from_foot(&self, at_px: Point2<f64>) -> Vector2<f64> {
+        Vector2::new(at_px.x - self.old.foot_px.x, self.old.foot_px.y - at_px.y)
+    }
+
+    /// The piece of wood that bears most points of a branch, where most of these are on wood.
+    fn wood_under(&self, branch: usize) -> Option<usize> {
+        let mut on_piece = vec![0; self.wood.nodes.len()];
+        let (mut on_wood, mut off_wood) = (0, 0);
+        for point in self.points {
+            if point.node.index() != branch {
+                continue;
+            }
+            match self.wood.piece_at(point.rest_px, self.old.image_size) {
+                Some(piece) => {
+                    on_wood += 1;
+                    on_piece[piece] += 1;
+                }
+                None => off_wood += 1,
+            }
+        }
+        let most = (0..on_piece.len()).max_by_key(|piece| on_piece[*piece])?;
+        (on_wood > off_wood).then_some(most)
+    }
+
+    /// The node of a piece of wood, or of the last below it that is there already or that a branch
+    /// before `branch` has: that becomes side wood.
+    fn reach(&mut self, piece: usize, branch: usize) -> NodeId {
+        let way = self.way_to(piece);
+        let mut place = way.from;
+        for piece in way.pieces {
+            if self.labels.branch[piece] > branch {
+                break;
+            }
+            place = self.push_side(piece, place);
+        }
+        place
     }
 
     /// `begin`, or the nearest place below it from which a straight branch to `end` does not turn
     /// back on what it leaves.
     fn without_fold(&self, begin: NodeId, end: Point3<f64>) -> NodeId {
         let mut at = begin;
-        while let Some(below) = self.nodes[at.index()].parent {
-            let here = self.nodes[at.index()].position;
-            let arrives = here - self.nodes[below.index()].position;
+        while let Some(below) = self.tree.nodes[at.index()].parent {
+            let here = self.tree.nodes[at.index()].position;
+            let arrives = here - self.tree.nodes[below.index()].position;
             if arrives.xy().dot(&(end - here).xy()) > 0.0 {
                 return at;
             }
@@ -326,8 +431,8 @@ impl<'a> Build<'a> {
         let end = self.place_of[carrier].unwrap_or(NodeId(0));
         let mut nearest = end;
         let mut least_px = f64::INFINITY;
-        for (i, node) in self.nodes.iter().enumerate() {
-            if self.branch_of[i] != carrier || i == 0 {
+        for (i, node) in self.tree.nodes.iter().enumerate() {
+            if self.tree.branch_of[i] != carrier || i == 0 {
                 continue;
             }
             let at_px = self.old.image_from_model(&node.position);
@@ -363,7 +468,7 @@ impl<'a> Build<'a> {
     /// One more than what carries it; side wood one above its branch.
     fn set_levels(&mut self) {
         let mut skeleton = Skeleton {
-            nodes: std::mem::take(&mut self.nodes),
+            nodes: std::mem::take(&mut self.tree.nodes),
             ..self.old.clone()
         };
         let mut levels: Vec<u8> = vec![0; skeleton.nodes.len()];
@@ -380,21 +485,21 @@ impl<'a> Build<'a> {
         for (node, level) in skeleton.nodes.iter_mut().zip(levels) {
             node.level = level;
         }
-        self.nodes = skeleton.nodes;
+        self.tree.nodes = skeleton.nodes;
     }
 
-    /// Gives the traced nodes names: those of the nearest traced nodes of the tree before, where
+    /// Gives the bends and the side wood names: those of the nearest ones of the tree before, where
     /// they are in the same place.
     fn name(&mut self, names: &mut Names) {
         let reach_px = SAME_PX * f64::from(self.old.image_size.width) / 640.0;
         let mut before: Vec<(NodeName, Point3<f64>)> = Vec::new();
         for node in names.prior.iter().flat_map(|prior| &prior.nodes) {
-            if node.kind == NodeKind::Traced && node.copy_of.is_none() {
+            if node.moves_with.is_some() && node.copy_of.is_none() {
                 before.push((node.name, node.position));
             }
         }
-        for node in &mut self.nodes {
-            if node.kind != NodeKind::Traced {
+        for node in &mut self.tree.nodes {
+            if node.moves_with.is_none() {
                 continue;
             }
             let distance = |at: &Point3<f64>| (at.xy() - node.position.xy()).norm();
@@ -409,103 +514,6 @@ impl<'a> Build<'a> {
             }
         }
     }
-
-    /// The copies, each along the wood of its original turned into its plane.
-    fn copies(&mut self, names: &mut Names) {
-        let measured = self.nodes.len();
-        let old_copies: Vec<usize> = (self.old.measured()..self.old.nodes.len()).collect();
-        let mut planes: Vec<f64> = Vec::new();
-        for &copy in &old_copies {
-            let angle = self.old.nodes[copy].plane_angle;
-            if !planes.contains(&angle) {
-                planes.push(angle);
-            }
-        }
-        for plane_angle in planes {
-            let mut ways: Vec<Option<CopyWay>> = vec![None; self.old.measured()];
-            for &copy in &old_copies {
-                let node = &self.old.nodes[copy];
-                if let (Some(original), true) = (node.copy_of, node.plane_angle == plane_angle) {
-                    ways[original.index()] = Some(CopyWay::of(self.old, copy, original));
-                }
-            }
-            self.copy_to_plane(plane_angle, measured, &ways, names);
-        }
-    }
-
-    fn copy_to_plane(
-        &mut self,
-        plane_angle: f64,
-        measured: usize,
-        ways: &[Option<CopyWay>],
-        names: &mut Names,
-    ) {
-        let mut copy_of: Vec<Option<NodeId>> = vec![None; measured];
-        for original in 1..measured {
-            let Some(copied) = ways[self.branch_of[original]] else {
-                continue;
-            };
-            let node = self.nodes[original].clone();
-            let Some(parent) = node.parent else { continue };
-            let way = node.position - self.nodes[parent.index()].position;
-            let on = copy_of[parent.index()].unwrap_or(parent);
-            let is_mover = node.moves_with.is_none();
-            let copy = Node {
-                name: if is_mover { copied.name } else { names.take() },
-                parent: Some(on),
-                position: self.nodes[on.index()].position
-                    + copied.into_plane * way
-                    + self.share[original] * copied.pushed,
-                n_tracks: 0,
-                copy_of: Some(NodeId(original as u32)),
-                plane_angle,
-                ..node
-            };
-            let place = self.push(copy, self.branch_of[original], None, 0.0);
-            self.seen_px[place.index()] = self.seen_px[original];
-            copy_of[original] = Some(place);
-        }
-        for copy in copy_of.iter().flatten() {
-            let mover = self.nodes[copy.index()].moves_with;
-            self.nodes[copy.index()].moves_with = mover.and_then(|m| copy_of[m.index()]);
-        }
-    }
-}
-
-/// How a copy stands to its original.
-#[derive(Clone, Copy, Debug)]
-struct CopyWay {
-    name: NodeName,
-    into_plane: UnitQuaternion<f64>,
-    /// By how much its end was pushed out of the plane.
-    pushed: Vector3<f64>,
-}
-
-impl CopyWay {
-    fn of(skeleton: &Skeleton, copy: usize, original: NodeId) -> Self {
-        let node = &skeleton.nodes[copy];
-        let into_plane = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), node.plane_angle);
-        let turned = into_plane * way_of(skeleton, original.index());
-        Self {
-            name: node.name,
-            into_plane,
-            pushed: way_of(skeleton, copy) - turned,
-        }
-    }
-}
-
-/// From a node's parent to the node.
-fn way_of(skeleton: &Skeleton, node: usize) -> Vector3<f64> {
-    let node = &skeleton.nodes[node];
-    let parent = node.parent.map(|p| skeleton.nodes[p.index()].position);
-    parent.map_or_else(Vector3::zeros, |parent| node.position - parent)
-}
-
-impl Names<'_> {
-    fn take(&mut self) -> NodeName {
-        self.next += 1;
-        NodeName(self.next - 1)
-    }
 }
 
 #[cfg(test)]
@@ -517,17 +525,9 @@ mod tests {
 
     fn node(name: u32, parent: Option<u32>, at: [f64; 3], copy_of: Option<u32>) -> Node {
         Node {
-            name: NodeName(name),
-            parent: parent.map(NodeId),
-            level: parent.map_or(0, |p| if p == 0 { 1 } else { 2 }),
-            position: at.into(),
-            radius: 1.0,
-            n_tracks: 9,
-            certainty: 0.5,
             copy_of: copy_of.map(NodeId),
             plane_angle: copy_of.map_or(0.0, |_| 1.0),
-            moves_with: None,
-            kind: Default::default(),
+            ..Node::made_up(name, parent, at)
         }
     }
 
@@ -549,11 +549,7 @@ mod tests {
     }
 
     fn piece(parent: Option<usize>, x: f64, y: f64) -> WoodNode {
-        WoodNode {
-            parent,
-            position_px: Point2::new(FOOT.x + x, FOOT.y - y),
-            radius_px: 5.0,
-        }
+        WoodNode::made_up(parent, FOOT.x + x, FOOT.y - y)
     }
 
     /// The right limb leaves the trunk below its top and has a bend and a twig; the left one leaves
@@ -680,6 +676,58 @@ mod tests {
             parent.position.x == 0.0 && parent.position.y >= 60.0,
             "{parent:?}"
         );
+    }
+
+    /// Leaves hide all but the lowest wood.
+    #[test]
+    fn a_trunk_that_is_seen_in_part_goes_on_to_its_fork() {
+        let mut wood = wood();
+        wood.nodes.truncate(2);
+        let tree = along_wood(&straight(), &wood, &points(), &mut names(None)).skeleton;
+        let places = tree.foot_and_branches();
+        let trunk = &tree.nodes[places[1].index()];
+        assert_eq!(trunk.position, straight().nodes[1].position);
+        // The right limb's points begin above the bend, the left one's beside the fork.
+        let joint = &tree.nodes[trunk.parent.expect("a joint").index()];
+        assert_eq!(joint.kind, NodeKind::Measured);
+        assert_eq!(joint.moves_with, Some(places[1]));
+        assert!((joint.position.y - 70.0).abs() < 1.0, "{joint:?}");
+        let bend = &tree.nodes[joint.parent.expect("a bend").index()];
+        assert_eq!((bend.kind, bend.position.y), (NodeKind::Traced, 60.0));
+        let parent = |branch: usize| tree.nodes[places[branch].index()].parent;
+        assert_eq!((parent(2), parent(3)), (trunk.parent, Some(places[1])));
+    }
+
+    /// It hangs on the same branch as its neighbours then, and not on what carries them all.
+    #[test]
+    fn a_branch_that_would_turn_back_leaves_a_straight_one_before_its_end() {
+        let mut straight = straight();
+        straight.nodes.truncate(4);
+        // Beyond the middle of the left limb, downwards.
+        straight
+            .nodes
+            .push(node(4, Some(3), [-75.0, 120.0, 0.0], None));
+        let mut points = points();
+        for k in 0..5 {
+            let down = 4.0 * f64::from(k);
+            points.push(PointOn {
+                node: NodeId(4),
+                rest_px: Point2::new(FOOT.x - 75.0, FOOT.y - 140.0 + down),
+            });
+        }
+        let mut wood = wood();
+        wood.nodes.pop();
+        let tree = along_wood(&straight, &wood, &points, &mut names(None)).skeleton;
+        let places = tree.foot_and_branches();
+        let [left, hanging] = [3, 4].map(|branch: usize| &tree.nodes[places[branch].index()]);
+        assert_eq!(hanging.parent, left.parent);
+        assert_eq!(tree.moving_parent(places[4]), Some(places[3]));
+        let joint = tree.nodes[hanging.parent.expect("a joint").index()].position;
+        let (arrives, leaves) = (
+            joint - Point3::new(0.0, 100.0, 0.0),
+            hanging.position - joint,
+        );
+        assert!(arrives.xy().dot(&leaves.xy()) >= 0.0, "{joint}");
     }
 
     #[test]

@@ -6,8 +6,8 @@
 //! which the motion has brought it, and a pixel of the background at its own place. Where the
 //! picture is plain both are true, and nothing is said.
 
-use super::Shot;
 use super::field::Spread;
+use super::{Shot, colour_mat};
 use crate::cancel::CancelToken;
 use crate::model::{Rgb, Size};
 use crate::signal::median;
@@ -102,11 +102,8 @@ fn noise_of(stays: &[Vec<f32>], moves: &[Vec<f32>]) -> f32 {
 
 /// The picture in single precision.
 fn float_picture(picture: &Rgb) -> opencv::Result<Mat> {
-    let (rows, cols) = (picture.size.height as i32, picture.size.width as i32);
-    let bytes = Mat::new_rows_cols_with_data(rows, 3 * cols, &picture.pixels)?;
-    let bytes = bytes.reshape(3, rows)?;
     let mut float = Mat::default();
-    bytes.convert_to(&mut float, opencv::core::CV_32F, 1.0, 0.0)?;
+    colour_mat(picture)?.convert_to(&mut float, opencv::core::CV_32F, 1.0, 0.0)?;
     Ok(float)
 }
 

@@ -1,16 +1,19 @@
 //! Which pixels of the picture at rest are wood: colour mixtures and a graph cut (Tan et al. 2008
 //! sect. 2.1; OpenCV's `grabCut`), whose seeds are what moves with the tree and is a ridge.
 
-use super::TrunkFoot;
 use super::evidence::Evidence;
+use super::{Stroke, colour_mat};
 use crate::cancel::CancelToken;
-use crate::model::{Luma, Rgb, Size};
-use nalgebra::{Matrix3, Vector3};
-use opencv::core::{Mat, Point, Rect, Size as CvSize};
+use crate::model::{Foot, Luma, Rgb, Size, bounds_px};
+#[cfg(test)]
+use crate::signal::distance_to_segment;
+use nalgebra::{Matrix3, Point2, Vector3};
+use opencv::core::{CV_8U, CV_32S, Mat, Point, Rect, Scalar, Size as CvSize, Vector};
 use opencv::imgproc::{
-    COLOR_RGB2BGR, GC_BGD, GC_EVAL, GC_EVAL_FREEZE_MODEL, GC_FGD, GC_INIT_WITH_MASK, GC_PR_BGD,
-    GC_PR_FGD, INTER_CUBIC, INTER_LINEAR, MORPH_BLACKHAT, MORPH_ELLIPSE, MORPH_OPEN, MORPH_TOPHAT,
-    cvt_color_def, gaussian_blur_def, get_structuring_element, grab_cut, morphology_ex_def, resize,
+    COLOR_RGB2BGR, GC_BGD, GC_EVAL_FREEZE_MODEL, GC_FGD, GC_INIT_WITH_MASK, GC_PR_BGD, GC_PR_FGD,
+    INTER_CUBIC, INTER_LINEAR, LINE_8, MORPH_BLACKHAT, MORPH_ELLIPSE, MORPH_OPEN, MORPH_TOPHAT,
+    connected_components, cvt_color_def, gaussian_blur_def, get_structuring_element, grab_cut,
+    morphology_ex_def, polylines, resize,
 };
 use opencv::prelude::*;
 
@@ -23,19 +26,17 @@ const TREE: f32 = 0.15;
 const STILL: f32 = -0.03;
 /// Largest width of a ridge, px at 640 px picture width.
 const RIDGE_PX: f64 = 15.0;
-/// Least width of a limb that is told from leaves, px at 640 px picture width.
+/// Least width of a limb that can be distinguished from leaves, px at 640 px picture width.
 const LIMB_PX: f64 = 4.0;
 /// Wood is darker than what stands behind it, unless its ridges are so many times as high the other
 /// way.
 const BRIGHT: f64 = 1.5;
 /// Share of the threshold between ridges and the rest (Otsu) from which on a pixel may be a ridge.
 const RIDGE: f64 = 0.5;
-/// Rounds of colour mixtures and graph cut.
-const ROUNDS: i32 = 3;
 /// Light that is added to a pixel's before its share of green is taken: dark pixels count as grey.
 const DARK: f32 = 30.0;
 /// No leaf is less green than this, see [`greenness`].
-const GREEN: f64 = 112.0;
+const GREEN: f64 = 125.0;
 /// A tree is in leaf where so great a share of what moves is leaves.
 const IN_LEAF: f64 = 0.25;
 
@@ -52,6 +53,44 @@ pub struct WoodMask {
 }
 
 impl WoodMask {
+    /// The place in the mask of one in the picture, px.
+    pub fn to_mask(&self, at_px: Point2<f64>) -> Point2<f64> {
+        let scale = f64::from(self.scale);
+        at_px.map(|x| (x + 0.5) * scale - 0.5)
+    }
+
+    /// The place in the picture of one in the mask, px.
+    pub fn to_picture(&self, at: Point2<f64>) -> Point2<f64> {
+        let scale = f64::from(self.scale);
+        at.map(|x| (x + 0.5) / scale - 0.5)
+    }
+
+    /// Half the width of wood in the picture whose middle is `inside` from the nearest pixel beside
+    /// it, px.
+    pub fn radius_px(&self, inside: f32) -> f64 {
+        // The edge lies half a pixel beyond the last pixel of the wood.
+        f64::from((inside - 0.5).max(0.0)) / f64::from(self.scale)
+    }
+
+    /// Place of a pixel of the mask.
+    pub fn place(&self, pixel: usize) -> Point2<f64> {
+        let width = self.size.width as usize;
+        Point2::new((pixel % width) as f64, (pixel / width) as f64)
+    }
+
+    /// The pixel of the mask at a place; `None` outside.
+    pub fn pixel(&self, at: Point2<f64>) -> Option<usize> {
+        let (u, v) = (at.x.round(), at.y.round());
+        let is_in = (0.0..f64::from(self.size.width)).contains(&u)
+            && (0.0..f64::from(self.size.height)).contains(&v);
+        is_in.then(|| v as usize * self.size.width as usize + u as usize)
+    }
+
+    /// Whether there is wood at a place of the mask.
+    pub fn holds(&self, at: Point2<f64>) -> bool {
+        self.pixel(at).is_some_and(|pixel| self.mask[pixel] != 0)
+    }
+
     /// The mask at the size of the picture.
     pub fn at_picture_size(&self, size: Size) -> Luma {
         let (width, scale) = (self.size.width as usize, self.scale as usize);
@@ -65,15 +104,17 @@ impl WoodMask {
     }
 }
 
-/// Finds the wood within `region` (one byte a pixel of the picture, 0 outside). What is as green as
-/// leaves is none. A bare tree is told from what stands behind it by its ridges as well.
+/// Finds the wood within `region` (one byte a pixel of the picture, 0 outside). Pixels as green as
+/// leaves are excluded. A bare tree is separated from what stands behind it by its ridges as well.
+/// What is on one of the `strokes` is wood, and shows the colour of bark.
 ///
 /// # Errors
 /// OpenCV fails.
 pub fn wood_mask(
     evidence: &Evidence,
     region: &[u8],
-    foot: TrunkFoot,
+    foot: Foot,
+    strokes: &[Stroke],
     cancel: &CancelToken,
 ) -> opencv::Result<WoodMask> {
     let size = evidence.rest.size;
@@ -86,7 +127,7 @@ pub fn wood_mask(
         moves: vec![false; large.area()],
         in_leaf: false,
     };
-    let Some(bounds) = bounds(region, size) else {
+    let Some(bounds) = Part::holding(region, size) else {
         return Ok(out);
     };
     let rest = enlarged_picture(&evidence.rest, large)?;
@@ -98,32 +139,30 @@ pub fn wood_mask(
     let leaves = Leaves::of(&rest, &out.moves)?;
     out.in_leaf = leaves.share >= IN_LEAF;
     let low = Part::above_foot(foot, bounds, size).enlarged(scale);
-    let is_trunk = low_trunk(&rest, low, &leaves, large)?;
+    let mut is_trunk = low_trunk(&rest, low, &leaves, large)?;
+    let is_stroke = drawn(strokes, large, scale)?;
+    for (is_trunk, is_stroke) in is_trunk.iter_mut().zip(&is_stroke) {
+        *is_trunk |= is_stroke;
+    }
     let is_limb = limbs(&rest, &tree, &leaves, &is_trunk, large)?;
     let is_ridge = match out.in_leaf {
         true => vec![false; large.area()],
         false => ridges(&rest, &out.moves, large)?,
     };
-    let mut seeds = vec![GC_BGD as u8; large.area()];
-    for (i, seed) in seeds.iter_mut().enumerate() {
-        if region[i] == 0 || tree[i] < STILL {
-            continue;
-        }
-        *seed = if is_trunk[i] || is_limb[i] && out.moves[i] && !out.in_leaf {
-            GC_FGD as u8
-        } else if out.moves[i] && leaves.is_leaf[i] {
-            GC_BGD as u8
-        } else if is_limb[i] || is_ridge[i] && out.moves[i] {
-            GC_PR_FGD as u8
-        } else {
-            GC_PR_BGD as u8
-        };
-    }
-    let n_wood = seeds.iter().filter(|seed| is_wood(**seed)).count();
-    let n_other = seeds.iter().filter(|s| **s == GC_BGD as u8).count();
-    if n_wood < LEAST_SEEDS || n_other < LEAST_SEEDS {
+    let clues = Clues {
+        region: &region,
+        tree: &tree,
+        moves: &out.moves,
+        is_leaf: &leaves.is_leaf,
+        in_leaf: out.in_leaf,
+        is_stroke: &is_stroke,
+        is_trunk: &is_trunk,
+        is_limb: &is_limb,
+        is_ridge: &is_ridge,
+    };
+    let Some(mut seeds) = clues.seeds() else {
         return Ok(out);
-    }
+    };
     cut(
         &rest,
         &mut seeds,
@@ -136,7 +175,58 @@ pub fn wood_mask(
             *mask = 255;
         }
     }
+    fill_holes(&mut out.mask, large)?;
     Ok(out)
+}
+
+/// What the seeds are chosen by; the slices have one entry a pixel, row by row.
+struct Clues<'a> {
+    /// 0 where no wood is looked for.
+    region: &'a [u8],
+    /// Evidence of the tree, as in [`Evidence::tree`].
+    tree: &'a [f32],
+    /// Moves with the tree.
+    moves: &'a [bool],
+    is_leaf: &'a [bool],
+    /// Whether the tree is in leaf.
+    in_leaf: bool,
+    /// Drawn by the user as wood.
+    is_stroke: &'a [bool],
+    /// On the low trunk by its colour, or on a stroke.
+    is_trunk: &'a [bool],
+    is_limb: &'a [bool],
+    is_ridge: &'a [bool],
+}
+
+impl Clues<'_> {
+    /// The labels that the cut begins with; `None` where wood or the rest has too few for a colour
+    /// mixture.
+    fn seeds(&self) -> Option<Vec<u8>> {
+        let seeds: Vec<u8> = (0..self.region.len()).map(|i| self.seed(i) as u8).collect();
+        let n_wood = seeds.iter().filter(|seed| is_wood(**seed)).count();
+        let n_other = seeds.iter().filter(|s| **s == GC_BGD as u8).count();
+        (n_wood >= LEAST_SEEDS && n_other >= LEAST_SEEDS).then_some(seeds)
+    }
+
+    /// The label of pixel `i`.
+    fn seed(&self, i: usize) -> i32 {
+        if self.is_stroke[i] {
+            return GC_FGD;
+        }
+        if self.region[i] == 0 || self.tree[i] < STILL {
+            return GC_BGD;
+        }
+        let moves = self.moves[i];
+        if self.is_trunk[i] || self.is_limb[i] && (moves || self.in_leaf) {
+            GC_FGD
+        } else if moves && self.is_leaf[i] {
+            GC_BGD
+        } else if self.is_limb[i] || self.is_ridge[i] && moves {
+            GC_PR_FGD
+        } else {
+            GC_PR_BGD
+        }
+    }
 }
 
 /// Whether a label of the cut is wood, for sure or likely.
@@ -146,12 +236,16 @@ fn is_wood(label: u8) -> bool {
 
 /// The trunk is looked for by its colour over so great a share of the tree's height above the foot.
 const TRUNK_HEIGHT: f64 = 0.08;
-/// Bark has the colours of the low trunk within so many deviations, to which so much is added for
-/// other light, grey levels.
+/// Bark has the colours of the low trunk within so many deviations, to which such a share of the
+/// picture's contrast is added for other light.
 const BARK_DEVIATIONS: f64 = 3.0;
-const BARK_NOISE: f64 = 10.0;
+const BARK_NOISE: f64 = 0.2;
+/// Bark in the shade of the crown is darker than that of the low trunk by no more than this factor.
+const SHADE: f64 = 0.5;
 /// A colour is the trunk's if it is so many times as frequent there as beside it.
 const TRUNK_COLOUR: f64 = 2.0;
+/// Width of a stroke, px.
+const STROKE_PX: i32 = 2;
 /// Fewer pixels than this make no colour mixture.
 const LEAST_SEEDS: usize = 64;
 /// Room about the region that is shown to the graph cut, px.
@@ -167,8 +261,19 @@ struct Part {
 }
 
 impl Part {
+    /// The smallest part that holds all of the region; `None` where it is empty.
+    fn holding(region: &[u8], size: Size) -> Option<Self> {
+        let [left, top, last_u, last_v] = bounds_px(region, size)?;
+        Some(Self {
+            left,
+            top,
+            right: last_u + 1,
+            bottom: last_v + 1,
+        })
+    }
+
     /// Where the lowest part of the trunk is.
-    fn above_foot(foot: TrunkFoot, tree: Part, size: Size) -> Self {
+    fn above_foot(foot: Foot, tree: Part, size: Size) -> Self {
         let foot_px = foot.position_px;
         let height = TRUNK_HEIGHT * f64::from(tree.bottom - tree.top);
         let half_width = foot.half_width_px;
@@ -217,32 +322,6 @@ impl Part {
     }
 }
 
-/// The smallest part that holds all of the region; `None` where it is empty.
-fn bounds(region: &[u8], size: Size) -> Option<Part> {
-    let width = size.width as usize;
-    let mut part: Option<Part> = None;
-    for (i, _) in region
-        .iter()
-        .enumerate()
-        .filter(|(_, inside)| **inside != 0)
-    {
-        let (u, v) = ((i % width) as u32, (i / width) as u32);
-        let before = part.unwrap_or(Part {
-            left: u,
-            top: v,
-            right: u + 1,
-            bottom: v + 1,
-        });
-        part = Some(Part {
-            left: before.left.min(u),
-            top: before.top.min(v),
-            right: before.right.max(u + 1),
-            bottom: before.bottom.max(v + 1),
-        });
-    }
-    part
-}
-
 /// Mixtures and cut; `seeds` become the labels.
 fn cut(
     rest: &Mat,
@@ -259,7 +338,8 @@ fn cut(
     let (mut wood, mut other) = (Mat::default(), Mat::default());
     let whole = Rect::default();
     opencv::core::set_rng_seed(0)?;
-    // The first mixtures are those of the seeds alone: half of what nothing is known of is wood.
+    // The mixtures are those of the seeds alone: half of what nothing is known of is wood. Mixtures
+    // of what was cut, and another cut, change nothing.
     let (known, mut of_known) = known_pixels(&picture, &inner)?;
     grab_cut(
         &known,
@@ -270,17 +350,11 @@ fn cut(
         0,
         GC_INIT_WITH_MASK,
     )?;
-    for round in 0..ROUNDS {
-        if cancel.is_cancelled() {
-            break;
-        }
-        let mode = if round == 0 {
-            GC_EVAL_FREEZE_MODEL
-        } else {
-            GC_EVAL
-        };
-        grab_cut(&picture, &mut inner, whole, &mut other, &mut wood, 1, mode)?;
+    if cancel.is_cancelled() {
+        return Ok(());
     }
+    let mode = GC_EVAL_FREEZE_MODEL;
+    grab_cut(&picture, &mut inner, whole, &mut other, &mut wood, 1, mode)?;
     let mut target = labels.roi_mut(part)?;
     inner.copy_to(&mut target)?;
     drop(target);
@@ -305,11 +379,8 @@ fn known_pixels(picture: &Mat, labels: &Mat) -> opencv::Result<(Mat, Mat)> {
 
 /// The picture at the larger size, blue first, as OpenCV has it.
 fn enlarged_picture(picture: &Rgb, large: Size) -> opencv::Result<Mat> {
-    let (rows, cols) = (picture.size.height as i32, picture.size.width as i32);
-    let bytes = Mat::new_rows_cols_with_data(rows, 3 * cols, &picture.pixels)?;
-    let bytes = bytes.reshape(3, rows)?;
     let mut bgr = Mat::default();
-    cvt_color_def(&bytes, &mut bgr, COLOR_RGB2BGR)?;
+    cvt_color_def(&colour_mat(picture)?, &mut bgr, COLOR_RGB2BGR)?;
     let mut out = Mat::default();
     resize(&bgr, &mut out, cv_size(large), 0.0, 0.0, INTER_CUBIC)?;
     Ok(out)
@@ -341,6 +412,34 @@ fn enlarged_region(region: &[u8], size: Size, scale: u32) -> Vec<u8> {
     out
 }
 
+/// Which pixels of the larger picture the strokes are drawn on.
+fn drawn(strokes: &[Stroke], large: Size, scale: u32) -> opencv::Result<Vec<bool>> {
+    let mut mask = Mat::zeros(large.height as i32, large.width as i32, CV_8U)?.to_mat()?;
+    for stroke in strokes {
+        let mut corners = Vector::<Point>::new();
+        for corner in stroke {
+            let within = |x: f64, most: u32| {
+                (x * f64::from(scale)).round().clamp(0.0, f64::from(most)) as i32
+            };
+            corners.push(Point::new(
+                within(corner.x, large.width),
+                within(corner.y, large.height),
+            ));
+        }
+        let white = Scalar::all(1.0);
+        polylines(
+            &mut mask,
+            &corners,
+            false,
+            white,
+            STROKE_PX * scale as i32,
+            LINE_8,
+            0,
+        )?;
+    }
+    Ok(mask.data_bytes()?.iter().map(|m| *m != 0).collect())
+}
+
 /// Which pixels have the colours of the low trunk, are no leaves and rather move than stand still,
 /// as far as they are joined to some that surely move (hysteresis, Canny 1986); none where the
 /// trunk is not seen.
@@ -352,7 +451,7 @@ fn limbs(
     size: Size,
 ) -> opencv::Result<Vec<bool>> {
     let pixels = rest.data_typed::<opencv::core::Vec3b>()?;
-    let Some(bark) = BarkColour::of(pixels, is_trunk) else {
+    let Some(bark) = BarkColour::of(pixels, is_trunk, BARK_NOISE * contrast(pixels)) else {
         return Ok(vec![false; pixels.len()]);
     };
     let mut mask = Vec::with_capacity(pixels.len());
@@ -363,7 +462,7 @@ fn limbs(
     let wide: Vec<u8> = wide(&mask, size)?.into_iter().map(u8::from).collect();
     let mat = Mat::new_rows_cols_with_data(size.height as i32, size.width as i32, &wide)?;
     let mut parts = Mat::default();
-    let n_parts = opencv::imgproc::connected_components(&mat, &mut parts, 8, opencv::core::CV_32S)?;
+    let n_parts = connected_components(&mat, &mut parts, 8, CV_32S)?;
     let parts = parts.data_typed::<i32>()?;
     let mut is_sure = vec![false; n_parts.max(1) as usize];
     for (i, part) in parts.iter().enumerate() {
@@ -382,7 +481,7 @@ struct BarkColour {
 
 impl BarkColour {
     /// That of the pixels on the trunk; `None` where there are too few.
-    fn of(pixels: &[opencv::core::Vec3b], is_trunk: &[bool]) -> Option<Self> {
+    fn of(pixels: &[opencv::core::Vec3b], is_trunk: &[bool], noise: f64) -> Option<Self> {
         let mut colours = Vec::new();
         for (pixel, _) in pixels.iter().zip(is_trunk).filter(|(_, on)| **on) {
             colours.push(colour(pixel));
@@ -392,7 +491,7 @@ impl BarkColour {
         }
         let count = colours.len() as f64;
         let mean = colours.iter().sum::<Vector3<f64>>() / count;
-        let mut covariance = BARK_NOISE.powi(2) * Matrix3::identity();
+        let mut covariance = noise.powi(2) * Matrix3::identity();
         for colour in &colours {
             let off = colour - mean;
             covariance += off * off.transpose() / count;
@@ -401,21 +500,38 @@ impl BarkColour {
         Some(Self { mean, precision })
     }
 
+    /// Whether a pixel has the colour of bark, in the light or in the shade.
     fn is_like(&self, pixel: &opencv::core::Vec3b) -> bool {
-        let off = colour(pixel) - self.mean;
+        let colour = colour(pixel);
+        let light = colour.dot(&self.mean) / self.mean.norm_squared().max(f64::MIN_POSITIVE);
+        let off = colour - light.clamp(SHADE, 1.0) * self.mean;
         off.dot(&(self.precision * off)) <= BARK_DEVIATIONS.powi(2)
     }
+}
+
+/// Deviation of a picture's colours from their mean, grey levels.
+fn contrast(pixels: &[opencv::core::Vec3b]) -> f64 {
+    let mut sum = Vector3::zeros();
+    let mut squares = 0.0;
+    for pixel in pixels {
+        sum += colour(pixel);
+        squares += colour(pixel).norm_squared();
+    }
+    let count = pixels.len().max(1) as f64;
+    let variance = squares / count - (sum / count).norm_squared();
+    // Of one component.
+    (variance / 3.0).max(0.0).sqrt()
 }
 
 fn colour(pixel: &opencv::core::Vec3b) -> Vector3<f64> {
     Vector3::from(pixel.0.map(f64::from))
 }
 
-/// What a disc of [`LIMB_PX`] fits into (opening): in leaf, thin wood cannot be told from the mixed
-/// colours at the edges of leaves.
+/// What a disc of [`LIMB_PX`] fits into (opening): in leaf, thin wood cannot be distinguished from
+/// the mixed colours at the edges of leaves.
 fn wide(mask: &[u8], size: Size) -> opencv::Result<Vec<bool>> {
     let mat = Mat::new_rows_cols_with_data(size.height as i32, size.width as i32, mask)?;
-    let side = (LIMB_PX * f64::from(size.width) / 640.0).round() as i32 | 1;
+    let side = limb_width(size).round() as i32 | 1;
     let middle = Point::new(-1, -1);
     let disc = get_structuring_element(MORPH_ELLIPSE, CvSize::new(side, side), middle)?;
     let mut out = Mat::default();
@@ -423,8 +539,34 @@ fn wide(mask: &[u8], size: Size) -> opencv::Result<Vec<bool>> {
     Ok(out.data_bytes()?.iter().map(|m| *m != 0).collect())
 }
 
-/// Which pixels are on a ridge that is narrower than [`RIDGE_PX`]. Whether wood is darker or brighter
-/// than what stands behind it is told by what moves.
+/// [`LIMB_PX`] in a picture of this size, px.
+fn limb_width(size: Size) -> f64 {
+    LIMB_PX * f64::from(size.width) / 640.0
+}
+
+/// Makes the holes of a mask wood that are no larger than half a limb is wide: a knot, or a light on
+/// the bark. The widths of limbs would be measured too small beside them.
+fn fill_holes(mask: &mut [u8], size: Size) -> opencv::Result<()> {
+    let inverse: Vec<u8> = mask.iter().map(|m| 255 - m).collect();
+    let mat = Mat::new_rows_cols_with_data(size.height as i32, size.width as i32, &inverse)?;
+    let mut parts = Mat::default();
+    let n_parts = connected_components(&mat, &mut parts, 4, CV_32S)?;
+    let parts = parts.data_typed::<i32>()?;
+    let mut area = vec![0_usize; n_parts.max(1) as usize];
+    for part in parts {
+        area[*part as usize] += 1;
+    }
+    let most = (0.5 * limb_width(size)).powi(2) as usize;
+    for (mask, part) in mask.iter_mut().zip(parts) {
+        if area[*part as usize] <= most {
+            *mask = 255;
+        }
+    }
+    Ok(())
+}
+
+/// Which pixels are on a ridge that is narrower than [`RIDGE_PX`]. Whether wood is darker or
+/// brighter than what stands behind it is estimated from the pixels that move.
 fn ridges(rest: &Mat, moves: &[bool], size: Size) -> opencv::Result<Vec<bool>> {
     let width_px = RIDGE_PX * f64::from(size.width) / 640.0;
     let mut grey = Mat::default();
@@ -596,4 +738,52 @@ fn greenness(pixel: &opencv::core::Vec3b) -> u8 {
     let [blue, green, red] = pixel.0.map(f32::from);
     let share = (2.0 * green - red - blue) / (red + green + blue + DARK);
     (100.0 + 200.0 * share).clamp(0.0, 255.0) as u8
+}
+
+#[cfg(test)]
+impl WoodMask {
+    /// Wood within `radius` of lines.
+    pub fn made_up(size: Size, lines: &[[Point2<f64>; 2]], radius: f64) -> Self {
+        let mut wood = Self {
+            size,
+            scale: 1,
+            mask: vec![0; size.area()],
+            moves: vec![false; size.area()],
+            in_leaf: false,
+        };
+        for pixel in 0..size.area() {
+            let at = wood.place(pixel);
+            let mut lines = lines.iter();
+            if lines.any(|[a, b]| distance_to_segment(at, *a, *b) <= radius) {
+                wood.mask[pixel] = 255;
+            }
+        }
+        wood
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use opencv::core::Vec3b;
+
+    #[test]
+    fn bark_in_the_shade_is_bark_and_brighter_or_other_colours_are_not() {
+        let mut trunk = Vec::new();
+        for k in 0..200_u8 {
+            let rough = k % 9;
+            trunk.push(Vec3b::from([88 + rough, 106 + rough, 120 + rough]));
+        }
+        let bark = BarkColour::of(&trunk, &vec![true; trunk.len()], 10.0).expect("enough pixels");
+        for (colour, expected, name) in [
+            ([92, 110, 124], true, "lit"),
+            ([52, 62, 70], true, "in the shade"),
+            ([14, 16, 18], false, "black"),
+            ([140, 165, 185], false, "brighter"),
+            ([60, 110, 70], false, "grass"),
+        ] {
+            assert_eq!(bark.is_like(&Vec3b::from(colour)), expected, "{name}");
+        }
+        assert!(BarkColour::of(&trunk[..10], &[true; 10], 10.0).is_none());
+    }
 }

@@ -1,23 +1,29 @@
 //! Which pixels are wood, and the branches that they draw (Tan et al. 2008 sect. 2).
 //!
 //! The paper has one photograph and the user's strokes. Here the film's motion is in their place:
-//! [`evidence`] averages the tree over frames that are carried back to rest, and tells what moves
-//! with it from what stands behind; [`mask`] tells wood from the rest by colour; [`paths`] draws
-//! the centre lines.
+//! [`steady`] takes the camera's motion out of the frames; [`evidence`] averages the tree over
+//! frames that are carried back to rest, and separates what moves with it from what stands behind;
+//! [`mask`] classifies pixels as wood or not by colour; [`paths`], or [`circles`] as in the paper,
+//! draw the centre lines. Strokes help where colour does not.
 
+mod circles;
 mod evidence;
 mod field;
 mod mask;
 mod paths;
+mod steady;
 
 use crate::cancel::CancelToken;
-use crate::model::{BranchGraph, Luma, Outline, Rgb};
+use crate::config::TraceBy;
+use crate::model::{BranchGraph, Foot, Luma, Outline, Rgb};
+use crate::signal::median;
 use evidence::evidence;
 use field::Spread;
 use nalgebra::{Point2, Vector2};
 use opencv::core::{Mat, Size as CvSize};
 use opencv::imgproc::{MORPH_ELLIPSE, dilate_def, get_structuring_element};
 use opencv::prelude::*;
+use steady::{SteadyShot, steadied};
 
 /// Fewer frames than this show no motion to judge by.
 pub const LEAST_SHOTS: usize = 8;
@@ -30,8 +36,7 @@ const FAR_SHARE: f64 = 0.99;
 
 /// Which of some frames to look at, the stillest first. `motions` holds how far from their rest
 /// places the points are in each; only these frames have to be decoded. Empty where there are fewer
-/// than
-/// [`LEAST_SHOTS`].
+/// than [`LEAST_SHOTS`].
 pub fn choose(motions: &[Displacements]) -> Vec<usize> {
     let mut by_motion: Vec<(f64, usize)> = Vec::with_capacity(motions.len());
     for (k, displacements) in motions.iter().enumerate() {
@@ -42,7 +47,7 @@ pub fn choose(motions: &[Displacements]) -> Vec<usize> {
         return Vec::new();
     }
     let (at_rest, others) = by_motion.split_at(AT_REST.min(by_motion.len() / 3));
-    // Those with more motion than most tell more.
+    // Frames with more motion than most hold more evidence.
     let moved = &others[others.len().saturating_sub(MOVED.max(others.len() / 2))..];
     let n = moved.len().min(MOVED);
     let spread = (0..n).map(|k| &moved[k * moved.len() / n]);
@@ -55,7 +60,7 @@ pub type Displacements = Vec<Option<Vector2<f64>>>;
 /// Median displacement of the points, px; `None` where none was seen.
 fn motion_px(displacements: &Displacements) -> Option<f64> {
     let seen = displacements.iter().flatten();
-    crate::signal::median(seen.map(|d| d.norm()).collect(), f64::total_cmp)
+    median(seen.map(|d| d.norm()).collect(), f64::total_cmp)
 }
 
 /// A frame in colour, and how far from its rest place each followed point was in it.
@@ -75,6 +80,9 @@ pub struct Wood {
     pub mask: Luma,
 }
 
+/// A line that the user drew along a branch, px.
+pub type Stroke = Vec<Point2<f64>>;
+
 /// What to look for wood in.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
@@ -83,15 +91,9 @@ pub struct View<'a> {
     /// Rest places of the followed points, px.
     pub rest_px: &'a [Point2<f64>],
     pub outline: &'a Outline,
-    pub foot: TrunkFoot,
-}
-
-/// Where the trunk leaves the ground.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TrunkFoot {
-    pub position_px: Point2<f64>,
-    /// Half of the most that the trunk may be wide there, px.
-    pub half_width_px: f64,
+    pub foot: Foot,
+    pub strokes: &'a [Stroke],
+    pub trace_by: TraceBy,
 }
 
 /// Finds the wood. `None` where there are too few frames, or none is seen, and where `cancel` ends
@@ -106,17 +108,23 @@ pub fn find(view: View, cancel: &CancelToken) -> opencv::Result<Option<Wood>> {
     if view.shots.len() < LEAST_SHOTS || !view.shots.iter().all(|shot| is_usable(&shot)) {
         return Ok(None);
     }
-    let Some(spread) = Spread::new(size, view.rest_px, view.foot.position_px) else {
+    let region = widened(view.outline, farthest_px(view.shots))?;
+    let mut steady = steadied(view.shots, view.rest_px, &region, cancel)?;
+    let n_rest = AT_REST.min(steady.len() / 3);
+    let rest_px = settle(&mut steady, n_rest, view.rest_px);
+    let Some(spread) = Spread::new(size, &rest_px, view.foot.position_px) else {
         return Ok(None);
     };
-    let shots = view.shots;
-    let evidence = evidence(shots, AT_REST.min(shots.len() / 3), &spread, cancel)?;
-    let region = widened(view.outline, farthest_px(shots))?;
-    let mask = mask::wood_mask(&evidence, &region, view.foot, cancel)?;
+    let shots: Vec<Shot> = steady.iter().map(SteadyShot::as_shot).collect();
+    let evidence = evidence(&shots, n_rest, &spread, cancel)?;
+    let mask = mask::wood_mask(&evidence, &region, view.foot, view.strokes, cancel)?;
     if cancel.is_cancelled() {
         return Ok(None);
     }
-    let branches = paths::branches(&mask, view.foot.position_px)?;
+    let branches = match view.trace_by {
+        TraceBy::Paths => paths::branches(&mask, view.foot.position_px)?,
+        TraceBy::Circles => circles::branches(&mask, view.foot.position_px)?,
+    };
     tracing::debug!(
         shots = shots.len(),
         pixels = mask.mask.iter().filter(|m| **m != 0).count(),
@@ -132,6 +140,35 @@ pub fn find(view: View, cancel: &CancelToken) -> opencv::Result<Option<Wood>> {
         rest: evidence.rest,
         mask: mask.at_picture_size(size),
     }))
+}
+
+/// Where the points are in the stillest shots, the first `n_rest`; the displacements of all shots
+/// become those from there. After a release, the median place of a point is a pixel off the one
+/// where it comes to rest, and what stands still would seem to have moved by that.
+fn settle(shots: &mut [SteadyShot], n_rest: usize, rest_px: &[Point2<f64>]) -> Vec<Point2<f64>> {
+    let mut settled_px = Vec::with_capacity(rest_px.len());
+    for (k, rest) in rest_px.iter().enumerate() {
+        let stillest = shots[..n_rest].iter();
+        let off = median_vector(stillest.filter_map(|shot| shot.displacements[k]));
+        for shot in &mut *shots {
+            if let Some(displacement) = &mut shot.displacements[k] {
+                *displacement -= off;
+            }
+        }
+        settled_px.push(rest + off);
+    }
+    settled_px
+}
+
+/// The median of each component; 0 of none.
+fn median_vector(vectors: impl Iterator<Item = Vector2<f64>>) -> Vector2<f64> {
+    let (mut across, mut down) = (Vec::new(), Vec::new());
+    for vector in vectors {
+        across.push(vector.x);
+        down.push(vector.y);
+    }
+    let middle = |values| median(values, f64::total_cmp).unwrap_or(0.0);
+    Vector2::new(middle(across), middle(down))
 }
 
 /// How far points go from their rest places, px.
@@ -159,10 +196,18 @@ fn widened(outline: &Outline, by_px: f64) -> opencv::Result<Vec<u8>> {
     Ok(out.data_bytes()?.to_vec())
 }
 
+/// A picture as OpenCV has it, red first.
+fn colour_mat(picture: &Rgb) -> opencv::Result<Mat> {
+    let (rows, cols) = (picture.size.height as i32, picture.size.width as i32);
+    let bytes = Mat::new_rows_cols_with_data(rows, 3 * cols, &picture.pixels)?;
+    bytes.reshape(3, rows)?.try_clone()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::model::Size;
+    use crate::signal::distance_to_segment;
 
     const SIZE: Size = Size {
         width: 320,
@@ -177,7 +222,9 @@ mod tests {
         for i in 0..SIZE.area() {
             let (u, v) = ((i % 320) as f64, (i / 320) as f64);
             let at = turned(Point2::new(u, v), -angle);
-            let is_wood = limbs().iter().any(|[a, b]| off(at, *a, *b) <= 4.0);
+            let is_wood = limbs()
+                .iter()
+                .any(|[a, b]| distance_to_segment(at, *a, *b) <= 4.0);
             let is_window = (u as i32 / 12) % 3 == 0 && (v as i32 / 12) % 3 == 0;
             let level = if is_wood || is_window { 60 } else { 170 };
             let grain = crate::random::seed_of_part(noise, i as u64) % 9;
@@ -194,12 +241,6 @@ mod tests {
             [top, Point2::new(100.0, 30.0)],
             [top, Point2::new(230.0, 40.0)],
         ]
-    }
-
-    fn off(at: Point2<f64>, from: Point2<f64>, to: Point2<f64>) -> f64 {
-        let along = to - from;
-        let share = ((at - from).dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
-        (at - (from + share * along)).norm()
     }
 
     fn turned(at: Point2<f64>, angle: f64) -> Point2<f64> {
@@ -223,7 +264,7 @@ mod tests {
         }
     }
 
-    fn found(swing: f64, cancel: &CancelToken) -> Option<Wood> {
+    fn found(swing: f64, strokes: &[Stroke], cancel: &CancelToken) -> Option<Wood> {
         let rest_px = followed();
         let angles: Vec<f64> = (0..16)
             .map(|k| swing * f64::from(k % 8 - 4) / 4.0)
@@ -250,22 +291,26 @@ mod tests {
             shots: &shots,
             rest_px: &rest_px,
             outline: &whole(),
-            foot: TrunkFoot {
+            foot: Foot {
                 position_px: FOOT,
                 half_width_px: 10.0,
             },
+            strokes,
+            trace_by: TraceBy::Paths,
         };
         find(view, cancel).expect("opencv")
     }
 
-    /// What a single picture cannot tell: windows as dark as the tree stand still while it sways.
+    /// What a single picture cannot show: windows as dark as the tree stand still while it sways.
     #[test]
-    fn a_swaying_tree_is_told_from_dark_windows_behind_it() {
-        let wood = found(0.05, &CancelToken::new()).expect("wood");
+    fn a_swaying_tree_is_distinguished_from_dark_windows_behind_it() {
+        let wood = found(0.05, &[], &CancelToken::new()).expect("wood");
         let (mut on, mut all) = (0, 0);
         for (i, mask) in wood.mask.pixels.iter().enumerate() {
             let at = Point2::new((i % 320) as f64, (i / 320) as f64);
-            let is_wood = limbs().iter().any(|[a, b]| off(at, *a, *b) <= 6.0);
+            let is_wood = limbs()
+                .iter()
+                .any(|[a, b]| distance_to_segment(at, *a, *b) <= 6.0);
             all += usize::from(*mask != 0);
             on += usize::from(*mask != 0 && is_wood);
         }
@@ -281,11 +326,45 @@ mod tests {
         assert!((180.0..420.0).contains(&length_px), "{:?}", wood.branches);
     }
 
+    /// A tree that hardly moves shows little of itself; what the user draws is wood all the same.
+    #[test]
+    fn what_the_user_draws_is_wood() {
+        let stroke = vec![Point2::new(160.0, 150.0), Point2::new(260.0, 150.0)];
+        let on_stroke = |wood: Wood| {
+            let pixels = (180..250).map(|u| wood.mask.pixels[150 * SIZE.width as usize + u]);
+            pixels.filter(|mask| *mask != 0).count()
+        };
+        let never = CancelToken::new();
+        let without = on_stroke(found(0.05, &[], &never).expect("wood"));
+        let with = on_stroke(found(0.05, &[stroke], &never).expect("wood"));
+        assert!(without < 10 && with == 70, "{without} {with}");
+    }
+
+    #[test]
+    fn points_rest_where_they_are_in_the_stillest_shots() {
+        let off = Vector2::new(0.8, -0.3);
+        let picture = Rgb {
+            size: Size::new(1, 1),
+            pixels: vec![0; 3],
+        };
+        let shot = |displacement| SteadyShot {
+            picture: picture.clone(),
+            displacements: vec![displacement, None],
+        };
+        let moved = Vector2::new(9.0, 2.0);
+        let mut shots = [Some(off), None, Some(off), Some(off + moved)].map(shot);
+        let rest_px = settle(&mut shots, 3, &[Point2::new(5.0, 5.0), Point2::origin()]);
+        assert_eq!(rest_px, [Point2::new(5.8, 4.7), Point2::origin()]);
+        assert_eq!(shots[0].displacements[0], Some(Vector2::zeros()));
+        let last = shots[3].displacements[0].expect("seen");
+        assert!((last - moved).norm() < 1e-9);
+    }
+
     #[test]
     fn work_that_is_not_wanted_any_more_finds_nothing() {
         let cancel = CancelToken::new();
         cancel.cancel();
-        assert!(found(0.05, &cancel).is_none());
+        assert!(found(0.05, &[], &cancel).is_none());
     }
 
     #[test]

@@ -3,8 +3,8 @@
 //! "TEASAR").
 
 use super::mask::WoodMask;
-use crate::model::{BranchGraph, WoodNode};
-use crate::signal::median;
+use crate::model::{BranchGraph, Size, WoodNode};
+use crate::signal::{distance_to_segment, median};
 use nalgebra::Point2;
 use opencv::core::Mat;
 use opencv::imgproc::{
@@ -47,23 +47,15 @@ const FOOT_SHARE: f64 = 0.3;
 /// OpenCV fails.
 pub fn branches(wood: &WoodMask, foot_px: Point2<f64>) -> opencv::Result<BranchGraph> {
     let grid = Grid::of(wood)?;
-    let scale = f64::from(wood.scale);
-    let foot = grid.nearest(to_mask(foot_px, scale));
+    let foot = grid.nearest(wood.to_mask(foot_px));
     let ways = Ways::from(&grid, foot);
     let tracks = tips_first(&grid, &ways);
-    Ok(graph(&grid, &tracks, foot_px, scale))
-}
-
-fn to_mask(at_px: Point2<f64>, scale: f64) -> Point2<f64> {
-    Point2::new((at_px.x + 0.5) * scale - 0.5, (at_px.y + 0.5) * scale - 0.5)
-}
-
-fn to_picture(at: Point2<f64>, scale: f64) -> Point2<f64> {
-    Point2::new((at.x + 0.5) / scale - 0.5, (at.y + 0.5) / scale - 0.5)
+    Ok(graph(&grid, &tracks, foot_px))
 }
 
 /// The mask as a graph of pixels.
-struct Grid {
+struct Grid<'a> {
+    wood: &'a WoodMask,
     width: usize,
     height: usize,
     /// Distance from the edge of the wood, px; 0 outside.
@@ -74,15 +66,14 @@ struct Grid {
     cost: Vec<f32>,
 }
 
-impl Grid {
-    fn of(wood: &WoodMask) -> opencv::Result<Self> {
-        let (rows, cols) = (wood.size.height as i32, wood.size.width as i32);
-        let inside = distances(&wood.mask, rows, cols)?;
+impl<'a> Grid<'a> {
+    fn of(wood: &'a WoodMask) -> opencv::Result<Self> {
+        let inside = distances(&wood.mask, wood.size)?;
         let inverse: Vec<u8> = wood.mask.iter().map(|m| 255 - m).collect();
-        let outside = distances(&inverse, rows, cols)?;
+        let outside = distances(&inverse, wood.size)?;
         let near = outside.iter().map(|outside| *outside <= REACH_PX);
         let passable = near.zip(&wood.moves).map(|(near, moves)| near || *moves);
-        let middle = dilated(&inside, rows, cols)?;
+        let middle = dilated(&inside, wood.size)?;
         let mut cost = Vec::with_capacity(inside.len());
         for (inside, middle) in inside.iter().zip(&middle) {
             cost.push(if *inside > 0.0 {
@@ -92,8 +83,9 @@ impl Grid {
             });
         }
         Ok(Self {
-            width: cols as usize,
-            height: rows as usize,
+            wood,
+            width: wood.size.width as usize,
+            height: wood.size.height as usize,
             inside,
             passable: passable.collect(),
             cost,
@@ -108,7 +100,7 @@ impl Grid {
     }
 
     fn place(&self, pixel: usize) -> Point2<f64> {
-        Point2::new((pixel % self.width) as f64, (pixel / self.width) as f64)
+        self.wood.place(pixel)
     }
 
     /// The pixels about `pixel`, and the length of the step to each.
@@ -145,17 +137,17 @@ struct Neighbour {
     step: f32,
 }
 
-/// Distance of every pixel of a mask from its edge, px.
-fn distances(mask: &[u8], rows: i32, cols: i32) -> opencv::Result<Vec<f32>> {
-    let mat = Mat::new_rows_cols_with_data(rows, cols, mask)?;
+/// Distance of every pixel of a mask from its edge, px; 0 outside.
+pub fn distances(mask: &[u8], size: Size) -> opencv::Result<Vec<f32>> {
+    let mat = Mat::new_rows_cols_with_data(size.height as i32, size.width as i32, mask)?;
     let mut out = Mat::default();
     distance_transform_def(&mat, &mut out, DIST_L2, DIST_MASK_5)?;
     Ok(out.data_typed::<f32>()?.to_vec())
 }
 
 /// The greatest value about every pixel.
-fn dilated(values: &[f32], rows: i32, cols: i32) -> opencv::Result<Vec<f32>> {
-    let mat = Mat::new_rows_cols_with_data(rows, cols, values)?;
+fn dilated(values: &[f32], size: Size) -> opencv::Result<Vec<f32>> {
+    let mat = Mat::new_rows_cols_with_data(size.height as i32, size.width as i32, values)?;
     let side = opencv::core::Size::new(MIDDLE_WITHIN_PX, MIDDLE_WITHIN_PX);
     let middle = opencv::core::Point::new(-1, -1);
     let disc = get_structuring_element(MORPH_ELLIPSE, side, middle)?;
@@ -305,13 +297,13 @@ struct Sample {
 }
 
 /// Evens the tracks out, draws them by few pieces, and joins them.
-fn graph(grid: &Grid, tracks: &[Track], foot_px: Point2<f64>, scale: f64) -> BranchGraph {
+fn graph(grid: &Grid, tracks: &[Track], foot_px: Point2<f64>) -> BranchGraph {
     let mut graph = BranchGraph::default();
     // The branch of every pixel that is on one, and its place along it.
     let mut lines: Vec<Vec<Sample>> = Vec::with_capacity(tracks.len());
     let mut branch_at = std::collections::BTreeMap::new();
     for (b, track) in tracks.iter().enumerate() {
-        let mut line = evened(grid, track, scale);
+        let mut line = evened(grid, track);
         let leaves = track.pixels.first().and_then(|p| branch_at.get(p));
         if let (Some(&Along { branch, index }), Some(first)) = (leaves, line.first_mut()) {
             let on: &Vec<Sample> = &lines[branch];
@@ -369,7 +361,7 @@ fn median_radius(samples: &[Sample]) -> f64 {
 }
 
 /// The centre line of a track, evened out along it; its ends stay.
-fn evened(grid: &Grid, track: &Track, scale: f64) -> Vec<Sample> {
+fn evened(grid: &Grid, track: &Track) -> Vec<Sample> {
     let n = track.pixels.len();
     let reach = (3.0 * EVENED_PX) as usize;
     let mut line = Vec::with_capacity(n);
@@ -383,11 +375,9 @@ fn evened(grid: &Grid, track: &Track, scale: f64) -> Vec<Sample> {
             sum += weight * grid.place(track.pixels[k]).coords;
             weights += weight;
         }
-        // The edge lies half a pixel beyond the last pixel of the wood.
-        let inside = (grid.inside[track.pixels[i]] - 0.5).max(0.0);
         line.push(Sample {
-            at_px: to_picture(Point2::from(sum / weights), scale),
-            radius_px: f64::from(inside) / scale,
+            at_px: grid.wood.to_picture(Point2::from(sum / weights)),
+            radius_px: grid.wood.radius_px(grid.inside[track.pixels[i]]),
         });
     }
     line
@@ -412,7 +402,7 @@ fn keep_between(line: &[Sample], from: usize, to: usize, kept: &mut Vec<usize>) 
     let mut farthest: Option<usize> = None;
     let mut most_px = STRAIGHT_PX;
     for k in from + 1..to {
-        let off_px = off_line(line[k].at_px, line[from].at_px, line[to].at_px);
+        let off_px = distance_to_segment(line[k].at_px, line[from].at_px, line[to].at_px);
         if off_px > most_px {
             (farthest, most_px) = (Some(k), off_px);
         }
@@ -424,17 +414,9 @@ fn keep_between(line: &[Sample], from: usize, to: usize, kept: &mut Vec<usize>) 
     }
 }
 
-/// Distance of a place from the piece of a line between two others.
-fn off_line(at: Point2<f64>, from: Point2<f64>, to: Point2<f64>) -> f64 {
-    let along = to - from;
-    let share = (at - from).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE);
-    (at - (from + share.clamp(0.0, 1.0) * along)).norm()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Size;
     use nalgebra::distance;
 
     const SIZE: Size = Size {
@@ -443,22 +425,8 @@ mod tests {
     };
     const FOOT: Point2<f64> = Point2::new(100.0, 230.0);
 
-    /// Wood within `radius` of the lines from each place to the next.
     fn mask(lines: &[[Point2<f64>; 2]], radius: f64) -> WoodMask {
-        let mut mask = vec![0; SIZE.area()];
-        for (i, pixel) in mask.iter_mut().enumerate() {
-            let at = Point2::new((i % 200) as f64, (i / 200) as f64);
-            if lines.iter().any(|[a, b]| off_line(at, *a, *b) <= radius) {
-                *pixel = 255;
-            }
-        }
-        WoodMask {
-            size: SIZE,
-            scale: 1,
-            moves: vec![false; mask.len()],
-            mask,
-            in_leaf: false,
-        }
+        WoodMask::made_up(SIZE, lines, radius)
     }
 
     /// A trunk that forks into two limbs.
@@ -496,7 +464,7 @@ mod tests {
             let lines = fork();
             let off = lines
                 .iter()
-                .map(|[a, b]| off_line(node.position_px, *a, *b));
+                .map(|[a, b]| distance_to_segment(node.position_px, *a, *b));
             // A tip reaches to the round end of its limb.
             let most = if tips.contains(&i) { 5.0 } else { 2.0 };
             assert!(off.fold(f64::INFINITY, f64::min) < most, "{node:?}");
