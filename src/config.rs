@@ -18,7 +18,7 @@ pub use setting::{Choice, Effect, Range, Section, Setting};
 pub use settings::{
     Accumulate, Affinity, Backend, Camera, CameraFormat, Config, Detect, Dynamics, EnvelopeKind,
     Excited, Export, Hierarchy, Leader, LeafShow, Leaves, Motion, MotionMethod, Outline, SECTIONS,
-    Shape, Skeleton, Track, Wind, Wood,
+    Shape, Skeleton, TraceBy, Track, Wind, Wood,
 };
 
 use std::time::Duration;

@@ -1,44 +1,18 @@
-//! The shipped recording filmed with the skeleton along the wood: the tree in the capture is the one in
-//! the film, and every command reads it.
+//! The shipped recording filmed with the skeleton along the wood: the tree in the capture is the one
+//! in the film, and every command reads it.
+
+mod support;
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 
-const CLIP: &str = "recordings/sparse_winter.mkv";
-const OUTLINE: &str = "recordings/sparse_winter.outline.json";
-
-fn arborcam(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_arborcam"))
+fn arborcam(args: &[&str]) {
+    let output = Command::new(env!("CARGO_BIN_EXE_arborcam"))
         .args(args)
         .output()
-        .expect("arborcam")
-}
-
-fn done(args: &[&str]) -> Output {
-    let output = arborcam(args);
+        .expect("arborcam");
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{args:?}: {said}");
-    output
-}
-
-fn replayed(dir: &Path) -> String {
-    let config = dir.join("along_wood.toml");
-    std::fs::write(&config, "[skeleton]\nalong_wood = true\n").expect("a file");
-    let out = dir.join("tree").display().to_string();
-    let config = config.display().to_string();
-    done(&[
-        "replay",
-        CLIP,
-        "--fast",
-        "--headless",
-        "--outline",
-        OUTLINE,
-        "--config",
-        &config,
-        "--out",
-        &out,
-    ]);
-    out
 }
 
 /// A row of `nodes.csv`.
@@ -50,8 +24,8 @@ struct Row {
     at_px: [f64; 2],
 }
 
-fn rows(capture: &str) -> Vec<Row> {
-    let text = std::fs::read_to_string(Path::new(capture).join("nodes.csv")).expect("nodes.csv");
+fn rows(capture: &Path) -> Vec<Row> {
+    let text = std::fs::read_to_string(capture.join("nodes.csv")).expect("nodes.csv");
     let mut lines = text.lines();
     let head: Vec<&str> = lines.next().expect("a head").split(',').collect();
     let column = |name: &str| head.iter().position(|h| *h == name).expect("a column");
@@ -74,8 +48,9 @@ fn rows(capture: &str) -> Vec<Row> {
 #[test]
 fn the_skeleton_runs_along_the_wood_and_the_capture_is_whole() {
     let dir = tempfile::tempdir().expect("tempdir");
-    let capture = replayed(dir.path());
-    let rows = rows(&capture);
+    let tree = support::replayed();
+    let capture = tree.to_str().expect("a path");
+    let rows = rows(tree);
     let traced: Vec<&Row> = rows.iter().filter(|r| r.kind == "traced").collect();
     assert!(traced.len() >= 40, "{} traced nodes", traced.len());
     assert!(traced.iter().all(|r| !r.moves_with.is_empty()));
@@ -97,16 +72,16 @@ fn the_skeleton_runs_along_the_wood_and_the_capture_is_whole() {
     assert!(lengths[lengths.len() / 2] < 30.0, "{lengths:?}");
 
     let glb = dir.path().join("again.glb").display().to_string();
-    done(&["export", &capture, "--format", "glb", "--out", &glb]);
+    arborcam(&["export", capture, "--format", "glb", "--out", &glb]);
     let bytes = |path: &Path| std::fs::read(path).expect("a file");
-    assert!(bytes(Path::new(&glb)) == bytes(&Path::new(&capture).join("tree.glb")));
-    done(&["analyze", &capture]);
+    assert!(bytes(Path::new(&glb)) == bytes(&tree.join("tree.glb")));
+    arborcam(&["analyze", capture]);
     let picture = dir.path().join("tree.png").display().to_string();
-    done(&["render", &capture, "--out", &picture]);
+    arborcam(&["render", capture, "--out", &picture]);
     let wind = dir.path().join("wind.glb").display().to_string();
-    done(&[
+    arborcam(&[
         "animate",
-        &capture,
+        capture,
         "--wind",
         "4",
         "--seconds",

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 const MAY_USE: &[(&str, &[&str])] = &[
     ("bounds", &[]),
     ("cancel", &[]),
-    ("model", &[]),
+    ("model", &["signal"]),
     ("config", &[]),
     // The crates that read cameras panic; the hook that gives the terminal back must know what is
     // caught.
@@ -21,11 +21,14 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ),
     ("outline", &["model", "config", "signal"]),
     ("track", &["model", "config", "signal"]),
-    ("wood", &["model", "signal"]),
+    ("wood", &["model", "config", "signal"]),
     ("hierarchy", &["model", "config", "signal"]),
     ("skeleton", &["model", "config"]),
     // The flat node that is stood up in space.
-    ("shape", &["model", "config", "skeleton::Node2d", "random"]),
+    (
+        "shape",
+        &["model", "config", "signal", "skeleton::Node2d", "random"],
+    ),
     // Limbs become meshes, and leaves stand on them.
     ("geometry", &["model", "config", "shape", "random"]),
     ("motion", &["model", "config", "signal"]),

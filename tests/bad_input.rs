@@ -455,6 +455,24 @@ const CASES: &[Case] = &[
         Nothing,
     ),
     (
+        "replay {f}/clip.mkv --branch-stroke {f}/trunk-other.json",
+        BAD_USAGE,
+        &["--branch-stroke", "1280x720", "640x360", "draw it"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --branch-stroke {f}/trunk-point.json",
+        BAD_USAGE,
+        &["--branch-stroke", "at least two points"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --branch-stroke {f}/none.json",
+        BAD_USAGE,
+        &["--branch-stroke", "none.json", "give a file"],
+        Nothing,
+    ),
+    (
         "replay {f}/clip.mkv --trunk {f}/words.json",
         BAD_USAGE,
         &["words.json", "polyline_px"],

@@ -8,6 +8,7 @@ use arborcam::outline::{AutoOutline, Found};
 use nalgebra::Point2;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::io::Write;
 use std::path::PathBuf;
 use std::process::Command;
 use std::sync::OnceLock;
@@ -399,7 +400,24 @@ fn capture_json_says_what_was_seen() {
 
 #[test]
 fn the_stream_is_what_the_capture_says() {
-    let (motion, names, capture) = (made().motion(), made().nodes(), made().capture());
+    // Built early, so that a refinement comes while the film lasts.
+    let mut early = tempfile::NamedTempFile::new().expect("a file");
+    early
+        .write_all(b"[accumulate]\nmin_s = 5.0\n")
+        .expect("written");
+    let early = early.path().to_str().expect("a path");
+    let made = replay(
+        &[],
+        &[
+            "--outline",
+            OUTLINE,
+            "--stream",
+            "ndjson",
+            "--config",
+            early,
+        ],
+    );
+    let (motion, names, capture) = (made.motion(), made.nodes(), made.capture());
     let nodes = names.len();
     let frame = |key: &str| {
         capture
@@ -414,7 +432,7 @@ fn the_stream_is_what_the_capture_says() {
     );
     assert_eq!(capture["refinement"]["count"], 1);
     let (mut kept_names, mut measured_names) = (0, 0);
-    let lines: Vec<serde_json::Value> = made()
+    let lines: Vec<serde_json::Value> = made
         .stream
         .lines()
         .map(|l| serde_json::from_str(l).unwrap_or_else(|e| panic!("{l}: {e}")))

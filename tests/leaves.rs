@@ -545,10 +545,9 @@ fn the_oak_has_the_density_of_its_first_frame() {
     };
     let [ours, small, large] = better_than_chance(&still, Some(&pose), &leaf);
     println!("oak: ours {ours:.3}, chance near the branches {small:.3}, far {large:.3}, {found:?}");
-    assert!(
-        ours >= 0.9 && ours > small + 0.05 && ours > large + 0.05,
-        "{ours} {small} {large}"
-    );
+    // Half of what chance misses: it misses little where the crown is full.
+    let missed = 0.5 * (1.0 - small.max(large));
+    assert!(ours >= 0.9 && 1.0 - ours < missed, "{ours} {small} {large}");
 }
 
 /// The shipped recording is a bare tree, and stays one.

@@ -508,7 +508,7 @@ fn a_replay_of_a_recording_is_the_run_that_made_it() {
     for topic in ["/camera/image", "/tree/points", "/tree/tracks"] {
         assert_eq!(message_count(&summary, topic), 330, "{topic}");
     }
-    // The tree as it was built, and as it was refined.
+    // The tree as it was built, and along its wood.
     assert_eq!(message_count(&summary, "/tree/outline"), 1);
     assert_eq!(message_count(&summary, "/tree/skeleton"), 2);
     let scenes = message_count(&summary, "/tree/scene");

@@ -99,6 +99,9 @@ fn the_front_view_lies_over_the_filmed_frame() {
         .filter(|(i, _)| !children[*i].is_empty())
     {
         let [u, v] = captured.skeleton.image_from_model(&joint.position).into();
+        if !(0.0..640.0).contains(&u) || !(0.0..360.0).contains(&v) {
+            continue;
+        }
         let covered = (-3..=3).any(|dy| {
             (-3..=3).any(|dx| {
                 let (x, y) = (

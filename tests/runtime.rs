@@ -562,8 +562,8 @@ fn a_stop_right_after_a_refinement_is_written_by_the_newest_tree() {
     for planned in [false, true] {
         let dir = tempfile::tempdir().expect("tempdir");
         let out = dir.path().join("out");
-        // The refinement comes after 5.5 s; a trial may last until 6 s after it.
-        let (source, gate) = gated(240);
+        // The refinement comes after 8.3 s; a trial may last until 6 s after it.
+        let (source, gate) = gated(280);
         let mut job = job(Some(support::outline()), Some(&out));
         (job.config.accumulate.min_s, job.config.accumulate.threshold) = (4.0, 0.2);
         let running = runtime::start(source, job).expect("start");
@@ -574,7 +574,7 @@ fn a_stop_right_after_a_refinement_is_written_by_the_newest_tree() {
         let shown = loop {
             assert!(begun.elapsed() < HANGS, "the model hangs");
             std::thread::sleep(Duration::from_millis(5));
-            if let Some(shown) = running.latest().filter(|s| s.frame >= 239) {
+            if let Some(shown) = running.latest().filter(|s| s.frame >= 279) {
                 break shown;
             }
         };

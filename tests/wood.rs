@@ -3,7 +3,7 @@
 mod synthetic;
 
 use arborcam::config::Wood;
-use arborcam::geometry::cylinders;
+use arborcam::geometry::cylinders_by_branch;
 use arborcam::model::{NodeId, Skeleton};
 use arborcam::shape::{CURL_BOUND, Limb, PIPE_EXPONENTS, TIP_RADIUS_PX, limbs, thicken};
 use nalgebra::Point3;
@@ -354,7 +354,7 @@ fn the_same_seed_gives_the_same_tree_and_another_seed_another_one_on_the_same_br
 fn cylinders_join_and_number_branches_from_the_trunk_up() {
     let skeleton = synthetic::tree(4, 1);
     let all = synthetic::limbs_of(&skeleton, &Wood::default());
-    let table = cylinders(&all);
+    let table = cylinders_by_branch(&all, &skeleton);
     let length: f64 = table.iter().map(|c| (c.end - c.start).norm()).sum();
     let wood: f64 = all.iter().map(Limb::length).sum();
     assert!((length - wood).abs() < 1e-6 * wood);
@@ -378,7 +378,7 @@ fn cylinders_join_and_number_branches_from_the_trunk_up() {
             "cylinder {k} begins beside its parent"
         );
     }
-    assert!(cylinders(&[]).is_empty());
+    assert!(cylinders_by_branch(&[], &skeleton).is_empty());
 }
 
 /// As a limb of segments bends in the wind: a hinge, or a crease where two branches meet, would be

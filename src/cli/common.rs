@@ -4,6 +4,7 @@ use super::camera::CameraArgs;
 use super::command_error::CommandError;
 use super::scale::ScaleArgs;
 use super::shape::ShapeArgs;
+use super::strokes::StrokeArgs;
 use crate::config::{Config, ConfigError};
 use crate::outline::OutlineSpec;
 use anyhow::anyhow;
@@ -38,6 +39,8 @@ pub struct Common {
     pub scale: ScaleArgs,
     #[command(flatten)]
     pub shape: ShapeArgs,
+    #[command(flatten)]
+    pub strokes: StrokeArgs,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -55,6 +58,7 @@ impl Common {
         Config::default().layered(self.config.as_deref(), |config| {
             self.scale.set(config);
             self.shape.set(config);
+            self.strokes.set(config);
             if let Some(camera) = camera {
                 camera.set(&mut config.camera);
             }

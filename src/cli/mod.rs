@@ -11,7 +11,7 @@ mod doctor;
 mod export;
 mod finish;
 mod hangup;
-
+mod line;
 mod output;
 mod play;
 mod record;
@@ -23,6 +23,7 @@ mod service;
 mod session;
 mod shape;
 mod stop;
+mod strokes;
 mod supervisor;
 mod tree;
 mod unused;

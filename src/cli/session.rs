@@ -120,6 +120,7 @@ fn job(
     let info = source.describe();
     common.shape.check_size(info.size)?;
     common.scale.check_size(info.size)?;
+    common.strokes.check_size(info.size)?;
     let outline = match &common.outline {
         OutlineSpec::Auto => None,
         OutlineSpec::File(path) => {

@@ -1,11 +1,11 @@
 //! Options for the shape of the tree: its trunk and the envelope of its branches.
 
 use super::command_error::CommandError;
+use super::line::Line;
 use crate::config::{Config, EnvelopeKind, Leader};
 use crate::model::Size;
 use anyhow::anyhow;
 use clap::Args;
-use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 /// Shape options of `capture`, `replay` and the commands that read a capture.
@@ -67,15 +67,8 @@ impl ShapeArgs {
     /// It was drawn on one of another size.
     pub fn check_size(&self, size: Size) -> Result<(), CommandError> {
         match &self.trunk {
-            Some(Trunk::Drawn(line)) if Size::new(line.width, line.height) != size => {
-                Err(CommandError::BadUsage(anyhow!(
-                    "--trunk is for a picture of {}x{}, this one is {size}; draw it on a frame of \
-                     this clip",
-                    line.width,
-                    line.height
-                )))
-            }
-            _ => Ok(()),
+            Some(Trunk::Drawn(line)) => line.check_size("--trunk", size),
+            Some(Trunk::Auto) | None => Ok(()),
         }
     }
 }
@@ -87,26 +80,13 @@ enum Trunk {
     Drawn(Line),
 }
 
-/// A line in a picture of the given size.
-#[derive(Clone, Debug, Deserialize)]
-struct Line {
-    width: u32,
-    height: u32,
-    /// Points of the line (u, v), px; after reading in order from the foot upwards.
-    polyline_px: Vec<[f64; 2]>,
-}
-
 impl Trunk {
     fn parse(text: &str) -> Result<Self, String> {
         if text == "auto" {
             return Ok(Self::Auto);
         }
         let bytes = std::fs::read(text).map_err(|e| format!("{e}; give a file, or auto"))?;
-        let mut line: Line = serde_json::from_slice(&bytes)
-            .map_err(|e| format!("{e}; it must hold width, height and polyline_px"))?;
-        if line.polyline_px.iter().flatten().any(|x| !x.is_finite()) {
-            return Err("polyline_px holds what is no number".into());
-        }
+        let mut line = Line::of_json(&bytes)?;
         let [first, .., last] = line.polyline_px[..] else {
             return Err("polyline_px needs at least two points".into());
         };

@@ -135,3 +135,14 @@ impl SettingValue for Vec<[f64; 2]> {
         format!("{self:?}")
     }
 }
+
+/// Lines in a picture, px.
+impl SettingValue for Vec<Vec<[f64; 2]>> {
+    fn number(&self) -> Option<f64> {
+        None
+    }
+
+    fn as_toml(&self) -> String {
+        format!("{self:?}")
+    }
+}

@@ -147,7 +147,12 @@ settings! {
         fold: f64 [0 to 0.95] = 0.4;
         /// Looks for the wood that the frames show, and lets the skeleton run along it. Where none
         /// is seen, the skeleton is that of the motion alone.
-        along_wood: bool = false;
+        along_wood: bool = true;
+        /// How branches are traced in the wood that is seen.
+        trace_by: TraceBy = TraceBy::Paths;
+        /// Lines along branches that the user drew, px of the picture; `--branch-stroke FILE` adds
+        /// one.
+        strokes_px: Vec<Vec<[f64; 2]>> = Vec::new();
     }
 
     /// The skeleton in space: what the camera does not see is estimated (Li 2011 sect. 3).
@@ -282,8 +287,8 @@ settings! {
         trunk_hz: f64 [0.02 to 10] = 0.7;
         /// Damping ratio where the capture has none. More if the tree sways for too long.
         damping_ratio: f64 [0.001 to 1] = 0.06;
-        /// How far a branch leans against its parent in steady wind of force 6, degrees; the median.
-        /// Less if the tree bends too much in the wind, more if it bends too little.
+        /// How far a branch leans against its parent in steady wind of force 6, degrees; the
+        /// median. Less if the tree bends too much in the wind, more if it bends too little.
         bend_deg: f64 [0.01 to 20] = 1.5;
         /// Largest rotation of a branch against its parent, degrees.
         max_bend_deg: f64 [1 to 80] = 40.0;
@@ -334,6 +339,16 @@ choice! {
         Path = "path",
         /// normalised cuts on distance and velocity correlation, as in the papers
         Zeng = "zeng",
+    }
+}
+
+choice! {
+    /// How branches are traced.
+    TraceBy {
+        /// the cheapest paths through the middle of the wood, Sato et al. 2000
+        Paths = "paths",
+        /// a circle that is moved along the wood, Tan et al. 2008 sect. 2.2
+        Circles = "circles",
     }
 }
 
