@@ -260,7 +260,7 @@ impl<'a> Build<'a> {
     }
 
     fn position(&self, piece: usize, depth: f64) -> Point3<f64> {
-        let at = self.from_foot(self.wood.nodes[piece].position_px);
+        let at = self.model_from_image(self.wood.nodes[piece].position_px);
         Point3::new(at.x, at.y, depth)
     }
 
@@ -345,7 +345,7 @@ impl<'a> Build<'a> {
             let mut least_px = f64::INFINITY;
             let mut nearest = most;
             for point in self.points.iter().filter(|p| self.is_on(p.node, carried)) {
-                let at = Point2::from(self.from_foot(point.rest_px));
+                let at = Point2::from(self.model_from_image(point.rest_px));
                 let off_px = distance_to_segment(at, begin, end);
                 if off_px < least_px {
                     (least_px, nearest) = (off_px, share(at));
@@ -372,7 +372,7 @@ impl<'a> Build<'a> {
     }
 
     /// A place of the picture from the foot, to the right and up, px.
-    fn from_foot(&self, at_px: Point2<f64>) -> Vector2<f64> {
+    fn model_from_image(&self, at_px: Point2<f64>) -> Vector2<f64> {
         Vector2::new(at_px.x - self.old.foot_px.x, self.old.foot_px.y - at_px.y)
     }
 
