@@ -36,7 +36,8 @@ export class Choice {
       if (!down || Math.hypot(e.clientX - down[0], e.clientY - down[1]) > 6) return;
       const box = canvas.getBoundingClientRect();
       const found = this.nearest(e.clientX - box.left, e.clientY - box.top, box, camera);
-      this.set(found ? found.id : null);
+      // A bend belongs to the branch that it moves with.
+      this.set(found ? (found.moves_with ?? found.id) : null);
     });
   }
 
