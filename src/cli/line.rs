@@ -24,6 +24,8 @@ impl Line {
         Self::of_json(&bytes)
     }
 
+    /// The line that a JSON file of these bytes holds.
+    ///
     /// # Errors
     /// It is of another form, or holds no line.
     pub fn of_json(bytes: &[u8]) -> Result<Self, String> {

@@ -87,11 +87,10 @@ impl Trunk {
         }
         let bytes = std::fs::read(text).map_err(|e| format!("{e}; give a file, or auto"))?;
         let mut line = Line::of_json(&bytes)?;
-        let [first, .., last] = line.polyline_px[..] else {
-            return Err("polyline_px needs at least two points".into());
-        };
-        // v grows downwards: this line was drawn from the top.
-        if first[1] < last[1] {
+        // v grows downwards: such a line was drawn from the top.
+        if let [first, .., last] = line.polyline_px[..]
+            && first[1] < last[1]
+        {
             line.polyline_px.reverse();
         }
         Ok(Self::Drawn(line))

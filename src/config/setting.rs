@@ -125,19 +125,8 @@ impl SettingValue for bool {
     }
 }
 
-/// Points of a picture, px.
-impl SettingValue for Vec<[f64; 2]> {
-    fn number(&self) -> Option<f64> {
-        None
-    }
-
-    fn as_toml(&self) -> String {
-        format!("{self:?}")
-    }
-}
-
-/// Lines in a picture, px.
-impl SettingValue for Vec<Vec<[f64; 2]>> {
+/// Points of a picture, or lines of them, px.
+impl<T: std::fmt::Debug> SettingValue for Vec<T> {
     fn number(&self) -> Option<f64> {
         None
     }

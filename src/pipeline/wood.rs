@@ -14,8 +14,8 @@ use std::collections::BTreeMap;
 const SEEN_SHARE: f64 = 0.5;
 
 /// Looks for the wood of the tree whose joints `skeleton` has, in the frames of `film` whose points
-/// are in `window`, as `settings` say. `None` where frames cannot be decoded, or show no wood, and where `cancel` ends
-/// the work before.
+/// are in `window`, as `settings` say. `None` where frames cannot be decoded, or show no wood, and
+/// where `cancel` ends the work before.
 pub fn find_wood(
     film: &FilmLog,
     window: LogWindow,

@@ -79,6 +79,8 @@ struct Build<'a> {
     labels: &'a Labels,
     points: &'a [PointOn],
     tree: BentTree,
+    /// By measured node of the old tree: the piece of wood that bears most points of its branch.
+    under: Vec<Option<usize>>,
     /// Where each measured node of the old tree stands in the new one.
     place_of: Vec<Option<NodeId>>,
     /// Where each piece of wood ends in the new tree.
@@ -98,6 +100,7 @@ impl<'a> Build<'a> {
             labels,
             points,
             tree: BentTree::on_foot_of(old),
+            under: wood_under(old, wood, points),
             place_of: vec![None; old.measured()],
             place_of_wood: vec![None; wood.nodes.len()],
         };
@@ -293,7 +296,7 @@ impl<'a> Build<'a> {
     fn off_wood(&mut self, branch: usize) {
         let old = &self.old.nodes[branch];
         let carrier = old.parent.map_or(0, NodeId::index);
-        let begin = match self.wood_under(branch) {
+        let begin = match self.under[branch] {
             Some(piece) => self.reach(piece, branch),
             None => self.nearest_on(carrier, branch),
         };
@@ -341,7 +344,7 @@ impl<'a> Build<'a> {
             if !is_carried || !self.is_unseen(carried) {
                 continue;
             }
-            let mut most = share(self.old.nodes[carried].position.xy());
+            let most = share(self.old.nodes[carried].position.xy());
             let mut least_px = f64::INFINITY;
             let mut nearest = most;
             for point in self.points.iter().filter(|p| self.is_on(p.node, carried)) {
@@ -351,8 +354,7 @@ impl<'a> Build<'a> {
                     (least_px, nearest) = (off_px, share(at));
                 }
             }
-            most = most.min(nearest);
-            shares.push(most);
+            shares.push(most.min(nearest));
         }
         shares.sort_by(f64::total_cmp);
         let apart = JOINT_PX * f64::from(self.old.image_size.width) / 640.0 / length_px;
@@ -368,32 +370,12 @@ impl<'a> Build<'a> {
 
     /// Whether a branch has no wood of its own, and its points are on that of no other.
     fn is_unseen(&self, branch: usize) -> bool {
-        self.labels.end_of[branch].is_none() && self.wood_under(branch).is_none()
+        self.labels.end_of[branch].is_none() && self.under[branch].is_none()
     }
 
     /// A place of the picture from the foot, to the right and up, px.
     fn model_from_image(&self, at_px: Point2<f64>) -> Vector2<f64> {
         Vector2::new(at_px.x - self.old.foot_px.x, self.old.foot_px.y - at_px.y)
-    }
-
-    /// The piece of wood that bears most points of a branch, where most of these are on wood.
-    fn wood_under(&self, branch: usize) -> Option<usize> {
-        let mut on_piece = vec![0; self.wood.nodes.len()];
-        let (mut on_wood, mut off_wood) = (0, 0);
-        for point in self.points {
-            if point.node.index() != branch {
-                continue;
-            }
-            match self.wood.piece_at(point.rest_px, self.old.image_size) {
-                Some(piece) => {
-                    on_wood += 1;
-                    on_piece[piece] += 1;
-                }
-                None => off_wood += 1,
-            }
-        }
-        let most = (0..on_piece.len()).max_by_key(|piece| on_piece[*piece])?;
-        (on_wood > off_wood).then_some(most)
     }
 
     /// The node of a piece of wood, or of the last below it that is there already or that a branch
@@ -514,6 +496,31 @@ impl<'a> Build<'a> {
             }
         }
     }
+}
+
+/// The piece of wood that bears most points of each measured node's branch; `None` where most of
+/// these are on none.
+fn wood_under(old: &Skeleton, wood: &BranchGraph, points: &[PointOn]) -> Vec<Option<usize>> {
+    let mut pieces: Vec<Vec<Option<usize>>> = vec![Vec::new(); old.measured()];
+    for point in points {
+        let piece = wood.piece_at(point.rest_px, old.image_size);
+        if let Some(of_branch) = pieces.get_mut(point.node.index()) {
+            of_branch.push(piece);
+        }
+    }
+    let n_pieces = wood.nodes.len();
+    pieces.iter().map(|of| most_borne(of, n_pieces)).collect()
+}
+
+/// The piece that most points are on, where most of them are on one; the last of several.
+fn most_borne(of_points: &[Option<usize>], n_pieces: usize) -> Option<usize> {
+    let mut on_piece = vec![0; n_pieces];
+    for piece in of_points.iter().flatten() {
+        on_piece[*piece] += 1;
+    }
+    let on_wood: usize = on_piece.iter().sum();
+    let most = (0..n_pieces).max_by_key(|piece| on_piece[*piece])?;
+    (2 * on_wood > of_points.len()).then_some(most)
 }
 
 #[cfg(test)]

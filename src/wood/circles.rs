@@ -85,10 +85,8 @@ impl Tracer<'_> {
         while let Some(current) = next.pop_front() {
             let at = centres[current].at;
             for crossing in self.crossings(at) {
-                let is_near = |other: &Centre| {
-                    other.at != at && distance(&other.at, &crossing) < VISITED * self.radius
-                };
-                if !centres.iter().any(is_near) && self.is_joined(at, crossing) {
+                let is_visited = self.is_visited(crossing, current, &centres);
+                if !is_visited && self.is_joined(at, crossing) {
                     next.push_back(centres.len());
                     centres.push(Centre {
                         at: crossing,
@@ -98,6 +96,12 @@ impl Tracer<'_> {
             }
         }
         centres
+    }
+
+    /// Whether a place is near to the centre of a circle other than that of number `but`.
+    fn is_visited(&self, at: Point2<f64>, but: usize, centres: &[Centre]) -> bool {
+        let mut others = (0..centres.len()).filter(|other| *other != but);
+        others.any(|other| distance(&centres[other].at, &at) < VISITED * self.radius)
     }
 
     /// The middles of the arcs of wood on the circle about a centre.
@@ -134,12 +138,10 @@ impl Tracer<'_> {
 
 /// The tree without the joints at which nothing forks and the branch hardly turns.
 fn without_straight(centres: &[Centre]) -> Vec<Centre> {
-    let mut n_from = vec![0; centres.len()];
-    let mut only_next: Vec<Option<usize>> = vec![None; centres.len()];
+    let mut found_on: Vec<Vec<usize>> = vec![Vec::new(); centres.len()];
     for (i, centre) in centres.iter().enumerate() {
         if let Some(from) = centre.from {
-            n_from[from] += 1;
-            only_next[from] = Some(i);
+            found_on[from].push(i);
         }
     }
     let mut kept: Vec<Centre> = Vec::with_capacity(centres.len());
@@ -147,11 +149,10 @@ fn without_straight(centres: &[Centre]) -> Vec<Centre> {
     let mut place: Vec<usize> = Vec::with_capacity(centres.len());
     for (i, centre) in centres.iter().enumerate() {
         let from = centre.from.map(|from| place[from]);
-        let next = only_next[i].filter(|_| n_from[i] == 1);
-        let is_straight = match (from, next) {
-            (Some(from), Some(next)) => {
+        let is_straight = match (from, &found_on[i][..]) {
+            (Some(from), [next]) => {
                 let arrives = centre.at - kept[from].at;
-                let leaves = centres[next].at - centre.at;
+                let leaves = centres[*next].at - centre.at;
                 arrives.angle(&leaves).to_degrees() < LEAST_TURN_DEG
             }
             _ => false,

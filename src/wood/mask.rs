@@ -5,8 +5,6 @@ use super::evidence::Evidence;
 use super::{Stroke, colour_mat};
 use crate::cancel::CancelToken;
 use crate::model::{Foot, Luma, Rgb, Size, bounds_px};
-#[cfg(test)]
-use crate::signal::distance_to_segment;
 use nalgebra::{Matrix3, Point2, Vector3};
 use opencv::core::{CV_8U, CV_32S, Mat, Point, Rect, Scalar, Size as CvSize, Vector};
 use opencv::imgproc::{
@@ -460,17 +458,13 @@ fn limbs(
         mask.push(u8::from(is_trunk[i] || is_bark && tree[i] > -STILL));
     }
     let wide: Vec<u8> = wide(&mask, size)?.into_iter().map(u8::from).collect();
-    let mat = Mat::new_rows_cols_with_data(size.height as i32, size.width as i32, &wide)?;
-    let mut parts = Mat::default();
-    let n_parts = connected_components(&mat, &mut parts, 8, CV_32S)?;
-    let parts = parts.data_typed::<i32>()?;
-    let mut is_sure = vec![false; n_parts.max(1) as usize];
-    for (i, part) in parts.iter().enumerate() {
-        is_sure[*part as usize] |= is_trunk[i] || tree[i] > TREE;
+    let parts = Parts::of(&wide, size, 8)?;
+    let mut is_sure = vec![false; parts.count];
+    for (i, part) in parts.of_pixel.iter().enumerate() {
+        is_sure[*part] |= is_trunk[i] || tree[i] > TREE;
     }
-    // Part 0 is all that is not in the mask.
-    is_sure[0] = false;
-    Ok(parts.iter().map(|part| is_sure[*part as usize]).collect())
+    is_sure[Parts::OUTSIDE] = false;
+    Ok(parts.of_pixel.iter().map(|part| is_sure[*part]).collect())
 }
 
 /// The colour of bark, as a normal distribution.
@@ -548,21 +542,42 @@ fn limb_width(size: Size) -> f64 {
 /// the bark. The widths of limbs would be measured too small beside them.
 fn fill_holes(mask: &mut [u8], size: Size) -> opencv::Result<()> {
     let inverse: Vec<u8> = mask.iter().map(|m| 255 - m).collect();
-    let mat = Mat::new_rows_cols_with_data(size.height as i32, size.width as i32, &inverse)?;
-    let mut parts = Mat::default();
-    let n_parts = connected_components(&mat, &mut parts, 4, CV_32S)?;
-    let parts = parts.data_typed::<i32>()?;
-    let mut area = vec![0_usize; n_parts.max(1) as usize];
-    for part in parts {
-        area[*part as usize] += 1;
+    let parts = Parts::of(&inverse, size, 4)?;
+    let mut area = vec![0_usize; parts.count];
+    for part in &parts.of_pixel {
+        area[*part] += 1;
     }
     let most = (0.5 * limb_width(size)).powi(2) as usize;
-    for (mask, part) in mask.iter_mut().zip(parts) {
-        if area[*part as usize] <= most {
+    for (mask, part) in mask.iter_mut().zip(&parts.of_pixel) {
+        if area[*part] <= most {
             *mask = 255;
         }
     }
     Ok(())
+}
+
+/// The parts of a mask whose pixels are joined.
+struct Parts {
+    /// Number of each pixel's part, row by row.
+    of_pixel: Vec<usize>,
+    count: usize,
+}
+
+impl Parts {
+    /// Number of what is not in the mask.
+    const OUTSIDE: usize = 0;
+
+    /// Pixels are joined to their 4 or 8 neighbours, as `connectivity` says.
+    fn of(mask: &[u8], size: Size, connectivity: i32) -> opencv::Result<Self> {
+        let mat = Mat::new_rows_cols_with_data(size.height as i32, size.width as i32, mask)?;
+        let mut parts = Mat::default();
+        let count = connected_components(&mat, &mut parts, connectivity, CV_32S)?;
+        let of_pixel = parts.data_typed::<i32>()?.iter();
+        Ok(Self {
+            of_pixel: of_pixel.map(|part| *part as usize).collect(),
+            count: count.max(1) as usize,
+        })
+    }
 }
 
 /// Which pixels are on a ridge that is narrower than [`RIDGE_PX`]. Whether wood is darker or
@@ -754,7 +769,7 @@ impl WoodMask {
         for pixel in 0..size.area() {
             let at = wood.place(pixel);
             let mut lines = lines.iter();
-            if lines.any(|[a, b]| distance_to_segment(at, *a, *b) <= radius) {
+            if lines.any(|[a, b]| crate::signal::distance_to_segment(at, *a, *b) <= radius) {
                 wood.mask[pixel] = 255;
             }
         }
