@@ -71,6 +71,25 @@ impl BranchGraph {
         nearest
     }
 
+    /// The graph of some of its nodes; what is carried by one that is not kept is not kept either.
+    pub fn of_nodes(&self, is_kept: &[bool]) -> Self {
+        let mut place_of: Vec<Option<usize>> = Vec::with_capacity(self.nodes.len());
+        let mut nodes: Vec<WoodNode> = Vec::new();
+        for (node, is_kept) in self.nodes.iter().zip(is_kept) {
+            let parent = node.parent.map(|parent| place_of[parent]);
+            if !is_kept || parent == Some(None) {
+                place_of.push(None);
+                continue;
+            }
+            place_of.push(Some(nodes.len()));
+            nodes.push(WoodNode {
+                parent: parent.flatten(),
+                ..node.clone()
+            });
+        }
+        Self { nodes }
+    }
+
     /// Children of every node.
     pub fn children(&self) -> Vec<Vec<usize>> {
         let mut children = vec![Vec::new(); self.nodes.len()];
@@ -96,6 +115,15 @@ mod tests {
             WoodNode::made_up(Some(1), 140.0, 70.0),
         ];
         BranchGraph { nodes }
+    }
+
+    #[test]
+    fn what_a_lost_node_carries_is_lost_with_it() {
+        let kept = fork().of_nodes(&[true, true, false, true]);
+        assert_eq!(kept.nodes.len(), 3);
+        assert_eq!(kept.nodes[2].parent, Some(1));
+        assert_eq!(kept.nodes[2].position_px, fork().nodes[3].position_px);
+        assert_eq!(fork().of_nodes(&[true, false, true, true]).nodes.len(), 1);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Pictures, as the camera delivered them and as the tracker wants them.
 
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector3};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -180,6 +180,27 @@ impl Rgb {
     pub fn at(&self, u: u32, v: u32) -> [u8; 3] {
         let i = 3 * (v as usize * self.size.width as usize + u as usize);
         [self.pixels[i], self.pixels[i + 1], self.pixels[i + 2]]
+    }
+
+    /// The colour between the pixels about a place, bilinear, 0 to 255; `None` outside.
+    pub fn interpolated(&self, at_px: Point2<f64>) -> Option<Vector3<f64>> {
+        let (right, down) = (
+            f64::from(self.size.width) - 1.0,
+            f64::from(self.size.height) - 1.0,
+        );
+        if !((0.0..=right).contains(&at_px.x) && (0.0..=down).contains(&at_px.y)) {
+            return None;
+        }
+        let (u, v) = (at_px.x as u32, at_px.y as u32);
+        let (to_right, to_down) = (at_px.x.fract(), at_px.y.fract());
+        let (next_u, next_v) = (
+            (u + 1).min(self.size.width - 1),
+            (v + 1).min(self.size.height - 1),
+        );
+        let colour = |u, v| Vector3::from(self.at(u, v).map(f64::from));
+        let above = colour(u, v).lerp(&colour(next_u, v), to_right);
+        let below = colour(u, next_v).lerp(&colour(next_u, next_v), to_right);
+        Some(above.lerp(&below, to_down))
     }
 }
 

@@ -28,6 +28,10 @@ const SAME_PX: f64 = 8.0;
 /// picture width.
 const JOINT_PX: f64 = 4.0;
 
+/// A branch that ends beside a piece of wood ends on it after this share of its length at least: it
+/// needs a length to turn.
+const LEAST_SHARE: f64 = 0.3;
+
 /// `skeleton`, whose branches are straight, along the `wood`. Its measured nodes keep their order
 /// among themselves.
 pub(super) fn along_wood(
@@ -70,6 +74,13 @@ struct Way {
     /// The node that the first leaves.
     from: NodeId,
     pieces: Vec<usize>,
+}
+
+/// A place on wood beside the end of a branch.
+struct Beside {
+    /// The node from which the piece of wood comes.
+    from: usize,
+    at_px: Point2<f64>,
 }
 
 /// Puts the new tree together from branches and wood.
@@ -295,6 +306,15 @@ impl<'a> Build<'a> {
     /// are nearest to that.
     fn off_wood(&mut self, branch: usize) {
         let old = &self.old.nodes[branch];
+        if let Some(beside) = self.beside(branch) {
+            let parent = self.reach(beside.from, branch);
+            let begin = self.tree.nodes[parent.index()].position;
+            let at = self.model_from_image(beside.at_px);
+            let depth = begin.z + way_of(self.old, branch).z;
+            self.push_straight(branch, parent, Point3::new(at.x, at.y, depth), 1.0);
+            self.bind_bends(branch);
+            return;
+        }
         let carrier = old.parent.map_or(0, NodeId::index);
         let begin = match self.under[branch] {
             Some(piece) => self.reach(piece, branch),
@@ -303,6 +323,24 @@ impl<'a> Build<'a> {
         let parent = self.without_fold(begin, old.position);
         self.push_straight(branch, parent, old.position, 1.0);
         self.bind_bends(branch);
+    }
+
+    /// The wood that a branch without wood of its own ends beside, if it does: it then ends on it,
+    /// for the middle of its points is off the middle of the limb that they are on.
+    fn beside(&self, branch: usize) -> Option<Beside> {
+        let piece = self.under[branch]?;
+        let end_px = self.old.image_from_model(&self.old.nodes[branch].position);
+        if self.wood.piece_at(end_px, self.old.image_size)? != piece {
+            return None;
+        }
+        let from = self.wood.nodes[piece].parent?;
+        let from_px = self.wood.nodes[from].position_px;
+        let way = self.wood.nodes[piece].position_px - from_px;
+        let share = (end_px - from_px).dot(&way) / way.norm_squared();
+        Some(Beside {
+            from,
+            at_px: from_px + share.clamp(LEAST_SHARE, 1.0) * way,
+        })
     }
 
     /// A branch, or the part of it that is not seen, goes straight to its end, with a joint

@@ -1,16 +1,18 @@
-//! Which pixels of the picture at rest are wood: colour mixtures and a graph cut (Tan et al. 2008
-//! sect. 2.1; OpenCV's `grabCut`), whose seeds are what moves with the tree and is a ridge.
+//! Which pixels of the picture at rest are wood: a graph cut (Tan et al. 2008 sect. 2.1) whose data
+//! terms are what the motion says of a pixel, its colour, held against mixtures of colours, and
+//! whether it is on a ridge.
 
+use super::cut::{PAIRS, SURE, least_cut, neighbour};
 use super::evidence::Evidence;
+use super::mixture::{Mixtures, Seed};
 use super::{Stroke, colour_mat};
 use crate::cancel::CancelToken;
 use crate::model::{Foot, Luma, Rgb, Size, bounds_px};
 use nalgebra::{Matrix3, Point2, Vector3};
-use opencv::core::{CV_8U, CV_32S, Mat, Point, Rect, Scalar, Size as CvSize, Vector};
+use opencv::core::{CV_8U, CV_32S, Mat, Point, Scalar, Size as CvSize, Vec3b, Vector};
 use opencv::imgproc::{
-    COLOR_RGB2BGR, GC_BGD, GC_EVAL_FREEZE_MODEL, GC_FGD, GC_INIT_WITH_MASK, GC_PR_BGD, GC_PR_FGD,
-    INTER_CUBIC, INTER_LINEAR, LINE_8, MORPH_BLACKHAT, MORPH_ELLIPSE, MORPH_OPEN, MORPH_TOPHAT,
-    connected_components, cvt_color_def, gaussian_blur_def, get_structuring_element, grab_cut,
+    COLOR_RGB2BGR, INTER_CUBIC, INTER_LINEAR, LINE_8, MORPH_BLACKHAT, MORPH_ELLIPSE, MORPH_OPEN,
+    MORPH_TOPHAT, connected_components, cvt_color_def, gaussian_blur_def, get_structuring_element,
     morphology_ex_def, polylines, resize,
 };
 use opencv::prelude::*;
@@ -23,7 +25,7 @@ const EVENED_PX: f64 = 0.7;
 const TREE: f32 = 0.15;
 const STILL: f32 = -0.03;
 /// Largest width of a ridge, px at 640 px picture width.
-const RIDGE_PX: f64 = 15.0;
+const RIDGE_PX: f64 = 25.0;
 /// Least width of a limb that can be distinguished from leaves, px at 640 px picture width.
 const LIMB_PX: f64 = 4.0;
 /// Wood is darker than what stands behind it, unless its ridges are so many times as high the other
@@ -37,6 +39,23 @@ const DARK: f32 = 30.0;
 const GREEN: f64 = 125.0;
 /// A tree is in leaf where so great a share of what moves is leaves.
 const IN_LEAF: f64 = 0.25;
+
+/// Odds of wood where the evidence is 1, and by how much they fall where it is -1; no evidence
+/// that a pixel stands still counts more than the last. By the truth of 18 made films: where the
+/// tree is told from a still background by much, the odds are higher yet.
+const MOVING_ODDS: f32 = 8.0;
+const STILL_ODDS: f32 = 50.0;
+const MOST_STILL_ODDS: f32 = 8.0;
+/// No colour counts more than this: mixtures are sure of what they have not seen.
+const COLOUR_ODDS: f32 = 4.0;
+/// Odds of wood on a ridge, elsewhere, and where ridges are not looked for: most pixels are none.
+const RIDGE_ODDS: f32 = 0.0;
+const PLAIN_ODDS: f32 = -4.0;
+const LEAFY_ODDS: f32 = -3.0;
+/// What the colour of leaves takes from the odds.
+const LEAF_ODDS: f32 = 4.0;
+/// What it costs at most that neighbours differ, in the same measure.
+const LINK: f32 = 5.0;
 
 /// The wood of the picture at rest.
 pub struct WoodMask {
@@ -158,26 +177,24 @@ pub fn wood_mask(
         is_limb: &is_limb,
         is_ridge: &is_ridge,
     };
-    let Some(mut seeds) = clues.seeds() else {
+    let pixels = rest.data_typed::<Vec3b>()?;
+    let seeds = clues.seeds(bounds.enlarged(scale), large);
+    let Some(mixtures) = Mixtures::of(pixels, &seeds)? else {
         return Ok(out);
     };
-    cut(
-        &rest,
-        &mut seeds,
-        large,
-        bounds.scaled(scale, large),
-        cancel,
-    )?;
-    for (mask, seed) in out.mask.iter_mut().zip(&seeds) {
-        if is_wood(*seed) {
-            *mask = 255;
-        }
+    let odds = clues.odds(pixels, &mixtures);
+    let links = links(pixels, &region, large);
+    let Some(is_wood) = least_cut(large, &odds, &links, cancel) else {
+        return Ok(out);
+    };
+    for (mask, is_wood) in out.mask.iter_mut().zip(is_wood) {
+        *mask = if is_wood { 255 } else { 0 };
     }
     fill_holes(&mut out.mask, large)?;
     Ok(out)
 }
 
-/// What the seeds are chosen by; the slices have one entry a pixel, row by row.
+/// What is known of the pixels; the slices have one entry for each, row by row.
 struct Clues<'a> {
     /// 0 where no wood is looked for.
     region: &'a [u8],
@@ -197,39 +214,101 @@ struct Clues<'a> {
 }
 
 impl Clues<'_> {
-    /// The labels that the cut begins with; `None` where wood or the rest has too few for a colour
-    /// mixture.
-    fn seeds(&self) -> Option<Vec<u8>> {
-        let seeds: Vec<u8> = (0..self.region.len()).map(|i| self.seed(i) as u8).collect();
-        let n_wood = seeds.iter().filter(|seed| is_wood(**seed)).count();
-        let n_other = seeds.iter().filter(|s| **s == GC_BGD as u8).count();
-        (n_wood >= LEAST_SEEDS && n_other >= LEAST_SEEDS).then_some(seeds)
+    /// Which pixels within `bounds` show the colours of wood, and which those of all else.
+    fn seeds(&self, bounds: Part, size: Size) -> Vec<Seed> {
+        let mut seeds = Vec::with_capacity(self.region.len());
+        for i in 0..self.region.len() {
+            let (u, v) = (i as u32 % size.width, i as u32 / size.width);
+            seeds.push(if bounds.holds(u, v) {
+                self.seed(i)
+            } else {
+                Seed::Unknown
+            });
+        }
+        seeds
     }
 
-    /// The label of pixel `i`.
-    fn seed(&self, i: usize) -> i32 {
-        if self.is_stroke[i] {
-            return GC_FGD;
-        }
-        if self.region[i] == 0 || self.tree[i] < STILL {
-            return GC_BGD;
-        }
+    fn seed(&self, i: usize) -> Seed {
         let moves = self.moves[i];
-        if self.is_trunk[i] || self.is_limb[i] && (moves || self.in_leaf) {
-            GC_FGD
+        if self.is_stroke[i] {
+            Seed::Wood
+        } else if self.region[i] == 0 || self.tree[i] < STILL {
+            Seed::Other
+        } else if self.is_trunk[i] || self.is_limb[i] && (moves || self.in_leaf) {
+            Seed::Wood
         } else if moves && self.is_leaf[i] {
-            GC_BGD
+            Seed::Other
         } else if self.is_limb[i] || self.is_ridge[i] && moves {
-            GC_PR_FGD
+            Seed::Wood
         } else {
-            GC_PR_BGD
+            Seed::Unknown
         }
+    }
+
+    /// The odds of wood, as logarithms: those of what is known add up, as if each were known alone.
+    fn odds(&self, pixels: &[Vec3b], mixtures: &Mixtures) -> Vec<f32> {
+        let mut odds = Vec::with_capacity(pixels.len());
+        for (i, pixel) in pixels.iter().enumerate() {
+            odds.push(if self.is_trunk[i] {
+                SURE
+            } else if self.region[i] == 0 {
+                0.0
+            } else {
+                let by_colour = mixtures.odds_of_wood(pixel) as f32;
+                self.odds_by_motion(i)
+                    + self.odds_by_shape(i)
+                    + by_colour.clamp(-COLOUR_ODDS, COLOUR_ODDS)
+            });
+        }
+        odds
+    }
+
+    fn odds_by_motion(&self, i: usize) -> f32 {
+        let evidence = self.tree[i];
+        if evidence > 0.0 {
+            MOVING_ODDS * evidence
+        } else {
+            (STILL_ODDS * evidence).max(-MOST_STILL_ODDS)
+        }
+    }
+
+    /// Before anything else is known.
+    fn odds_by_shape(&self, i: usize) -> f32 {
+        let by_ridge = match (self.in_leaf, self.is_ridge[i]) {
+            (true, _) => LEAFY_ODDS,
+            (false, true) => RIDGE_ODDS,
+            (false, false) => PLAIN_ODDS,
+        };
+        by_ridge - if self.is_leaf[i] { LEAF_ODDS } else { 0.0 }
     }
 }
 
-/// Whether a label of the cut is wood, for sure or likely.
-fn is_wood(label: u8) -> bool {
-    [GC_FGD, GC_PR_FGD].contains(&i32::from(label))
+/// What it costs that neighbours differ: little where their colours do (Boykov and Jolly 2001).
+/// Nothing links what is beyond the region.
+fn links(pixels: &[Vec3b], region: &[u8], size: Size) -> Vec<[f32; PAIRS]> {
+    let is_linked = |i: usize, next: usize| region[i] != 0 && region[next] != 0;
+    let (mut sum, mut count) = (0.0, 0_usize);
+    let mut apart = vec![[None; PAIRS]; pixels.len()];
+    for (i, apart) in apart.iter_mut().enumerate() {
+        for (pair, apart) in apart.iter_mut().enumerate() {
+            let next = neighbour(i, pair, size).filter(|next| is_linked(i, *next));
+            *apart = next.map(|next| (colour(&pixels[i]) - colour(&pixels[next])).norm_squared());
+            sum += apart.unwrap_or(0.0);
+            count += usize::from(apart.is_some());
+        }
+    }
+    let mean = (sum / count.max(1) as f64).max(f64::MIN_POSITIVE);
+    let mut links = Vec::with_capacity(pixels.len());
+    for apart in apart {
+        let mut of_pixel = [0.0; PAIRS];
+        for (pair, apart) in apart.into_iter().enumerate() {
+            let length = if pair % 2 == 1 { f64::sqrt(2.0) } else { 1.0 };
+            let link = |apart: f64| f64::from(LINK) / length * (-apart / (2.0 * mean)).exp();
+            of_pixel[pair] = apart.map_or(0.0, link) as f32;
+        }
+        links.push(of_pixel);
+    }
+    links
 }
 
 /// The trunk is looked for by its colour over so great a share of the tree's height above the foot.
@@ -244,10 +323,8 @@ const SHADE: f64 = 0.5;
 const TRUNK_COLOUR: f64 = 2.0;
 /// Width of a stroke, px.
 const STROKE_PX: i32 = 2;
-/// Fewer pixels than this make no colour mixture.
-const LEAST_SEEDS: usize = 64;
-/// Room about the region that is shown to the graph cut, px.
-const MARGIN_PX: u32 = 8;
+/// Fewer pixels than this show no colour of bark.
+const LEAST_BARK: usize = 64;
 
 /// A part of a picture, the ends not included, px.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -304,75 +381,6 @@ impl Part {
     fn holds(self, u: u32, v: u32) -> bool {
         (self.left..self.right).contains(&u) && (self.top..self.bottom).contains(&v)
     }
-
-    /// The same in a picture `scale` times as large, with some room about it.
-    fn scaled(self, scale: u32, size: Size) -> Rect {
-        let left = (scale * self.left).saturating_sub(MARGIN_PX);
-        let top = (scale * self.top).saturating_sub(MARGIN_PX);
-        let right = (scale * self.right + MARGIN_PX).min(size.width);
-        let bottom = (scale * self.bottom + MARGIN_PX).min(size.height);
-        Rect::new(
-            left as i32,
-            top as i32,
-            (right - left) as i32,
-            (bottom - top) as i32,
-        )
-    }
-}
-
-/// Mixtures and cut; `seeds` become the labels.
-fn cut(
-    rest: &Mat,
-    seeds: &mut [u8],
-    size: Size,
-    part: Rect,
-    cancel: &CancelToken,
-) -> opencv::Result<()> {
-    let (rows, cols) = (size.height as i32, size.width as i32);
-    let mut labels = Mat::new_rows_cols_with_data(rows, cols, &*seeds)?.clone_pointee();
-    // Only the part about the tree: the time grows with the number of pixels.
-    let picture = rest.roi(part)?.clone_pointee();
-    let mut inner = labels.roi(part)?.clone_pointee();
-    let (mut wood, mut other) = (Mat::default(), Mat::default());
-    let whole = Rect::default();
-    opencv::core::set_rng_seed(0)?;
-    // The mixtures are those of the seeds alone: half of what nothing is known of is wood. Mixtures
-    // of what was cut, and another cut, change nothing.
-    let (known, mut of_known) = known_pixels(&picture, &inner)?;
-    grab_cut(
-        &known,
-        &mut of_known,
-        whole,
-        &mut other,
-        &mut wood,
-        0,
-        GC_INIT_WITH_MASK,
-    )?;
-    if cancel.is_cancelled() {
-        return Ok(());
-    }
-    let mode = GC_EVAL_FREEZE_MODEL;
-    grab_cut(&picture, &mut inner, whole, &mut other, &mut wood, 1, mode)?;
-    let mut target = labels.roi_mut(part)?;
-    inner.copy_to(&mut target)?;
-    drop(target);
-    seeds.copy_from_slice(labels.data_bytes()?);
-    Ok(())
-}
-
-/// The pixels that are seeds, in one row, with their labels.
-fn known_pixels(picture: &Mat, labels: &Mat) -> opencv::Result<(Mat, Mat)> {
-    let (pixels, labels) = (picture.data_typed()?, labels.data_bytes()?);
-    let mut known: Vec<opencv::core::Vec3b> = Vec::new();
-    let mut of_known = Vec::new();
-    for (pixel, label) in pixels.iter().zip(labels) {
-        if i32::from(*label) != GC_PR_BGD {
-            known.push(*pixel);
-            of_known.push(*label);
-        }
-    }
-    let known = Mat::from_slice(&known)?.clone_pointee();
-    Ok((known, Mat::from_slice(&of_known)?.clone_pointee()))
 }
 
 /// The picture at the larger size, blue first, as OpenCV has it.
@@ -448,7 +456,7 @@ fn limbs(
     is_trunk: &[bool],
     size: Size,
 ) -> opencv::Result<Vec<bool>> {
-    let pixels = rest.data_typed::<opencv::core::Vec3b>()?;
+    let pixels = rest.data_typed::<Vec3b>()?;
     let Some(bark) = BarkColour::of(pixels, is_trunk, BARK_NOISE * contrast(pixels)) else {
         return Ok(vec![false; pixels.len()]);
     };
@@ -475,12 +483,12 @@ struct BarkColour {
 
 impl BarkColour {
     /// That of the pixels on the trunk; `None` where there are too few.
-    fn of(pixels: &[opencv::core::Vec3b], is_trunk: &[bool], noise: f64) -> Option<Self> {
+    fn of(pixels: &[Vec3b], is_trunk: &[bool], noise: f64) -> Option<Self> {
         let mut colours = Vec::new();
         for (pixel, _) in pixels.iter().zip(is_trunk).filter(|(_, on)| **on) {
             colours.push(colour(pixel));
         }
-        if colours.len() < LEAST_SEEDS {
+        if colours.len() < LEAST_BARK {
             return None;
         }
         let count = colours.len() as f64;
@@ -495,7 +503,7 @@ impl BarkColour {
     }
 
     /// Whether a pixel has the colour of bark, in the light or in the shade.
-    fn is_like(&self, pixel: &opencv::core::Vec3b) -> bool {
+    fn is_like(&self, pixel: &Vec3b) -> bool {
         let colour = colour(pixel);
         let light = colour.dot(&self.mean) / self.mean.norm_squared().max(f64::MIN_POSITIVE);
         let off = colour - light.clamp(SHADE, 1.0) * self.mean;
@@ -504,7 +512,7 @@ impl BarkColour {
 }
 
 /// Deviation of a picture's colours from their mean, grey levels.
-fn contrast(pixels: &[opencv::core::Vec3b]) -> f64 {
+fn contrast(pixels: &[Vec3b]) -> f64 {
     let mut sum = Vector3::zeros();
     let mut squares = 0.0;
     for pixel in pixels {
@@ -517,7 +525,7 @@ fn contrast(pixels: &[opencv::core::Vec3b]) -> f64 {
     (variance / 3.0).max(0.0).sqrt()
 }
 
-fn colour(pixel: &opencv::core::Vec3b) -> Vector3<f64> {
+fn colour(pixel: &Vec3b) -> Vector3<f64> {
     Vector3::from(pixel.0.map(f64::from))
 }
 
@@ -659,7 +667,7 @@ fn otsu(histogram: &[u32; 256]) -> f64 {
 /// The pixels of `low` whose colours are found there much more often than beside it, and are not
 /// those of leaves: the lowest part of a trunk hardly moves.
 fn low_trunk(rest: &Mat, low: Part, leaves: &Leaves, size: Size) -> opencv::Result<Vec<bool>> {
-    let pixels = rest.data_typed::<opencv::core::Vec3b>()?;
+    let pixels = rest.data_typed::<Vec3b>()?;
     let (mut within, mut beside) = (Colours::default(), Colours::default());
     for (i, pixel) in pixels.iter().enumerate() {
         let (u, v) = (i as u32 % size.width, i as u32 / size.width);
@@ -694,17 +702,17 @@ impl Default for Colours {
 }
 
 impl Colours {
-    fn bin(pixel: &opencv::core::Vec3b) -> usize {
+    fn bin(pixel: &Vec3b) -> usize {
         let [blue, green, red] = pixel.0.map(|c| usize::from(c >> 4));
         (blue << 8) | (green << 4) | red
     }
 
-    fn add(&mut self, pixel: &opencv::core::Vec3b) {
+    fn add(&mut self, pixel: &Vec3b) {
         self.counts[Self::bin(pixel)] += 1;
         self.all += 1;
     }
 
-    fn share(&self, pixel: &opencv::core::Vec3b) -> f64 {
+    fn share(&self, pixel: &Vec3b) -> f64 {
         f64::from(self.counts[Self::bin(pixel)]) / f64::from(self.all.max(1))
     }
 }
@@ -730,7 +738,7 @@ impl Leaves {
     fn of(rest: &Mat, moves: &[bool]) -> opencv::Result<Self> {
         let mut evened = Mat::default();
         gaussian_blur_def(rest, &mut evened, CvSize::new(0, 0), 1.0)?;
-        let pixels = evened.data_typed::<opencv::core::Vec3b>()?;
+        let pixels = evened.data_typed::<Vec3b>()?;
         let green: Vec<u8> = pixels.iter().map(greenness).collect();
         let least = otsu(&histogram(&green, moves)).max(GREEN);
         let is_leaf: Vec<bool> = green.iter().map(|g| f64::from(*g) > least).collect();
@@ -749,7 +757,7 @@ impl Leaves {
 
 /// How much green exceeds the mean of red and blue, 100 where it does not, 200 more for all of the
 /// light.
-fn greenness(pixel: &opencv::core::Vec3b) -> u8 {
+fn greenness(pixel: &Vec3b) -> u8 {
     let [blue, green, red] = pixel.0.map(f32::from);
     let share = (2.0 * green - red - blue) / (red + green + blue + DARK);
     (100.0 + 200.0 * share).clamp(0.0, 255.0) as u8
@@ -780,7 +788,6 @@ impl WoodMask {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use opencv::core::Vec3b;
 
     #[test]
     fn bark_in_the_shade_is_bark_and_brighter_or_other_colours_are_not() {

@@ -7,9 +7,12 @@
 //! draw the centre lines. Strokes help where colour does not.
 
 mod circles;
+mod cut;
 mod evidence;
+mod faint;
 mod field;
 mod mask;
+mod mixture;
 mod paths;
 mod steady;
 
@@ -124,6 +127,11 @@ pub fn find(view: View, cancel: &CancelToken) -> opencv::Result<Option<Wood>> {
     let branches = match view.trace_by {
         TraceBy::Paths => paths::branches(&mask, view.foot.position_px)?,
         TraceBy::Circles => circles::branches(&mask, view.foot.position_px)?,
+    };
+    // In leaf, what stands behind a twig is leaves, of all lights.
+    let branches = match mask.in_leaf {
+        true => branches,
+        false => faint::without_faint(branches, &evidence.rest),
     };
     tracing::debug!(
         shots = shots.len(),

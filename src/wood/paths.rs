@@ -22,10 +22,14 @@ const MIDDLE_WITHIN_PX: i32 = 21;
 /// A step over a gap costs so much. No gap is wider than twice the reach unless what is in it moves
 /// with the tree.
 const GAP: f32 = 12.0;
-const REACH_PX: f32 = 6.0;
+const REACH_PX: f32 = 8.0;
 /// A branch explains the wood within so many of its radii, and so many pixels.
 const EXPLAINED_RADII: f32 = 1.3;
 const EXPLAINED_PX: f32 = 2.0;
+/// The trunk's widest place within this share of the picture's height above the foot tells how far
+/// its roots reach, in radii.
+const ROOT_SHARE: f64 = 0.08;
+const ROOT_RADII: f32 = 1.5;
 /// A branch is longer than so many radii of what it leaves, and than so many pixels; what is
 /// shorter is the rough edge of a limb.
 const LEAST_RADII: f32 = 1.5;
@@ -236,7 +240,11 @@ fn tips_first(grid: &Grid, ways: &Ways) -> Vec<Track> {
             continue;
         }
         let pixels = way_to(tip, ways, &on_branch);
-        explain(grid, &pixels, &mut explained);
+        let radii = match tracks.is_empty() {
+            true => radii_from_foot(grid, &pixels),
+            false => radii(grid, &pixels),
+        };
+        explain(grid, &pixels, &radii, &mut explained);
         if is_branch(grid, &pixels) {
             pixels.iter().for_each(|&p| on_branch[p] = true);
             tracks.push(Track { pixels });
@@ -257,10 +265,28 @@ fn way_to(tip: usize, ways: &Ways, on_branch: &[bool]) -> Vec<usize> {
     pixels
 }
 
+/// Half the width of the wood at every pixel of a way, px.
+fn radii(grid: &Grid, pixels: &[usize]) -> Vec<f32> {
+    pixels.iter().map(|&pixel| grid.inside[pixel]).collect()
+}
+
+/// The same of the first way, which begins at the foot: where the trunk ends, it is no narrower
+/// than above, and its roots are no branches.
+fn radii_from_foot(grid: &Grid, pixels: &[usize]) -> Vec<f32> {
+    let mut radii = radii(grid, pixels);
+    let low = (ROOT_SHARE * grid.height as f64) as usize;
+    let widest = (0..radii.len().min(low)).max_by(|a, b| radii[*a].total_cmp(&radii[*b]));
+    if let Some(widest) = widest {
+        let root = ROOT_RADII * radii[widest];
+        radii[..widest].fill(root);
+    }
+    radii
+}
+
 /// Marks the wood about a way.
-fn explain(grid: &Grid, pixels: &[usize], explained: &mut [bool]) {
-    for &pixel in pixels {
-        let radius = EXPLAINED_RADII * grid.inside[pixel] + EXPLAINED_PX;
+fn explain(grid: &Grid, pixels: &[usize], radii: &[f32], explained: &mut [bool]) {
+    for (&pixel, radius) in pixels.iter().zip(radii) {
+        let radius = EXPLAINED_RADII * radius + EXPLAINED_PX;
         let (u, v) = (pixel % grid.width, pixel / grid.width);
         let reach = radius as usize;
         for v2 in v.saturating_sub(reach)..=(v + reach).min(grid.height - 1) {
