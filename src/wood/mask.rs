@@ -190,7 +190,7 @@ pub fn wood_mask(
     for (mask, is_wood) in out.mask.iter_mut().zip(is_wood) {
         *mask = if is_wood { 255 } else { 0 };
     }
-    fill_holes(&mut out.mask, large)?;
+    without_specks(&mut out.mask, large)?;
     Ok(out)
 }
 
@@ -546,20 +546,19 @@ fn limb_width(size: Size) -> f64 {
     LIMB_PX * f64::from(size.width) / 640.0
 }
 
-/// Makes the holes of a mask wood that are no larger than half a limb is wide: a knot, or a light on
-/// the bark. The widths of limbs would be measured too small beside them.
-fn fill_holes(mask: &mut [u8], size: Size) -> opencv::Result<()> {
-    let inverse: Vec<u8> = mask.iter().map(|m| 255 - m).collect();
-    let parts = Parts::of(&inverse, size, 4)?;
-    let mut area = vec![0_usize; parts.count];
-    for part in &parts.of_pixel {
-        area[*part] += 1;
-    }
+/// Makes the holes of a mask wood that are no larger than half a limb is wide, as a knot or a light
+/// on the bark is: the widths of limbs would be measured too small beside them. Wood of that size
+/// that is joined to no other is none.
+fn without_specks(mask: &mut [u8], size: Size) -> opencv::Result<()> {
     let most = (0.5 * limb_width(size)).powi(2) as usize;
-    for (mask, part) in mask.iter_mut().zip(&parts.of_pixel) {
-        if area[*part] <= most {
-            *mask = 255;
-        }
+    let holes: Vec<u8> = mask.iter().map(|m| 255 - m).collect();
+    let is_hole = Parts::of(&holes, size, 4)?.no_larger_than(most);
+    for (mask, is_hole) in mask.iter_mut().zip(is_hole) {
+        *mask = if is_hole { 255 } else { *mask };
+    }
+    let is_speck = Parts::of(mask, size, 8)?.no_larger_than(most);
+    for (mask, is_speck) in mask.iter_mut().zip(is_speck) {
+        *mask = if is_speck { 0 } else { *mask };
     }
     Ok(())
 }
@@ -585,6 +584,17 @@ impl Parts {
             of_pixel: of_pixel.map(|part| *part as usize).collect(),
             count: count.max(1) as usize,
         })
+    }
+
+    /// Whether each pixel is in a part of at most so many pixels.
+    fn no_larger_than(&self, most: usize) -> Vec<bool> {
+        let mut area = vec![0_usize; self.count];
+        for part in &self.of_pixel {
+            area[*part] += 1;
+        }
+        let parts = self.of_pixel.iter();
+        let is_small = |part: &usize| *part != Self::OUTSIDE && area[*part] <= most;
+        parts.map(is_small).collect()
     }
 }
 
