@@ -11,7 +11,7 @@ mod tube;
 mod wood;
 
 pub use cylinders::{Cylinder, cylinders_by_branch};
-pub use dressed::Dressed;
+pub use dressed::{Bark, BarkSource, Dressed};
 pub use foliage::{Foliage, FoliageGroup};
 pub use leaves::{
     LeafView, Sampling, Season, Template, TemplateFault, TemplateMesh, density_match, foliage,
