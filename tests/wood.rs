@@ -4,7 +4,7 @@ mod synthetic;
 
 use arborcam::config::Wood;
 use arborcam::geometry::cylinders_by_branch;
-use arborcam::model::{NodeId, Skeleton};
+use arborcam::model::{NodeId, NodeKind, Skeleton};
 use arborcam::shape::{CURL_BOUND, Limb, PIPE_EXPONENTS, TIP_RADIUS_PX, limbs, thicken};
 use nalgebra::Point3;
 
@@ -446,4 +446,20 @@ fn a_bent_branch_is_the_elastic_line_of_a_beam_and_meets_the_next_without_a_crea
         "a crease of {} degrees",
         crease.to_degrees()
     );
+}
+
+/// What is known of a tree before its widths are measured does not hang on what they will be.
+#[test]
+fn wood_that_was_traced_is_thickened_by_pipes_as_all_other() {
+    let mut plain = synthetic::tree(3, 2);
+    let mut traced = plain.clone();
+    for node in traced.nodes.iter_mut().skip(1) {
+        node.kind = NodeKind::Traced;
+    }
+    for tree in [&mut plain, &mut traced] {
+        thicken(tree, 12.0, &anywhere, &Wood::default(), 1);
+    }
+    let radii = |tree: &Skeleton| tree.nodes.iter().map(|n| n.radius).collect::<Vec<f64>>();
+    assert_eq!(radii(&traced), radii(&plain));
+    assert!(radii(&traced).iter().any(|px| *px < 6.0));
 }
