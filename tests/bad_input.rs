@@ -275,6 +275,8 @@ fn check(name: &str, run: &Run, output: &Output, status: i32, says: &[&str], lef
                 .map(|e| e.file_name().to_string_lossy().into())
                 .collect()
         });
+        // There only where the film shows a trunk.
+        names.retain(|name| name != "bark.png");
         names.sort();
         names
     };

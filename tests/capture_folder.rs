@@ -573,6 +573,42 @@ fn the_stream_tells_the_sway_once_a_second() {
     }
 }
 
+/// The bark in the files has the colour of the filmed trunk, not that of the snow beside it.
+#[test]
+fn bark_has_the_colour_of_the_filmed_trunk() {
+    // The lower trunk stands still, and is 17 px wide about column 325.
+    let film = picture("frame.jpg");
+    let trunk = image::imageops::crop_imm(&film, 320, 292, 10, 28).to_image();
+    let snow = image::imageops::crop_imm(&film, 280, 300, 20, 20).to_image();
+    let bark = picture("bark.png");
+    let [wanted, snow, found] = [&trunk, &snow, &bark].map(mean);
+    for ((found, wanted), snow) in found.iter().zip(wanted).zip(snow) {
+        assert!((found - wanted).abs() < 8.0, "{found} of {wanted}");
+        assert!((found - snow).abs() > 20.0, "{found}, snow {snow}");
+    }
+    assert_eq!(made().capture()["bark"]["file"], "bark.png");
+    let file = fs::read(made().out().join("tree.glb")).expect("a model");
+    let model = gltf::Gltf::from_slice(&file).expect("glTF").document;
+    let material = model.materials().find(|m| m.name() == Some("bark"));
+    let look = material.expect("bark").pbr_metallic_roughness();
+    // The tile is sRGB, and nothing is multiplied with it.
+    assert_eq!(look.base_color_factor(), [1.0; 4]);
+    assert!(look.base_color_texture().is_some());
+}
+
+fn picture(name: &str) -> image::RgbImage {
+    let picture = image::open(made().out().join(name));
+    picture.expect("a picture").into_rgb8()
+}
+
+fn mean(picture: &image::RgbImage) -> [f64; 3] {
+    let mut sum = [0.0; 3];
+    for pixel in picture.pixels() {
+        (0..3).for_each(|k| sum[k] += f64::from(pixel.0[k]));
+    }
+    sum.map(|s| s / f64::from(picture.width() * picture.height()))
+}
+
 /// The same clip gives the same bytes, however the threads happen to run.
 #[test]
 fn a_replay_is_reproducible_to_the_byte() {
@@ -597,6 +633,7 @@ fn a_replay_is_reproducible_to_the_byte() {
         "motion.csv",
         "tree.glb",
         "frame.jpg",
+        "bark.png",
     ] {
         let [a, b] = [made(), &again].map(|r| fs::read(r.out().join(name)).expect("file"));
         assert!(a == b, "{name} differs from one run to the next");

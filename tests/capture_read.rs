@@ -472,7 +472,7 @@ mod fuzz {
         /// Whatever happened to the bytes, the program says so or goes on; it does not fall.
         #[test]
         fn no_damage_makes_the_reader_fall(
-            name in prop::sample::select(vec!["nodes.csv", "motion.csv", "capture.json", "tree.glb", "frame.jpg"]),
+            name in prop::sample::select(vec!["nodes.csv", "motion.csv", "capture.json", "tree.glb", "frame.jpg", "bark.png"]),
             at in prop::collection::vec(0.0..1.0f64, 1..6),
             with in prop::sample::select(vec![b',', b'\n', b'"', b'9', b'-', b'e', 0u8, 0xff]),
             cut in prop::option::of(0.0..1.0f64),

@@ -967,6 +967,7 @@ fn a_tree_that_was_not_filmed_is_written_read_and_exported() {
             timing: Timing::default(),
             model: Some(ModelNote::of(&tree, metres_per_px)),
             picture: None,
+            bark: None,
             build: None,
             refinement: None,
             animation: None,
@@ -974,6 +975,7 @@ fn a_tree_that_was_not_filmed_is_written_read_and_exported() {
         };
         note.config.export.metres_per_px = metres_per_px;
         let draft = Draft {
+            bark: None,
             note,
             skeleton: &tree,
             picture: None,

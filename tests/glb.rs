@@ -6,7 +6,7 @@ mod synthetic;
 use arborcam::config::Config;
 use arborcam::export::ExportError;
 use arborcam::export::gltf::{KEY_TOLERANCE_PX, Model, glb};
-use arborcam::geometry::{Dressed, Mesh};
+use arborcam::geometry::{Bark, Dressed, Mesh};
 use arborcam::model::{JointPose, Node, NodeId, Pose, Rgb, Skeleton};
 use arborcam::pipeline::{Seen, dress};
 use gltf::animation::util::ReadOutputs;
@@ -38,7 +38,10 @@ fn write(
 fn wooden(mesh: &Mesh) -> Dressed {
     Dressed {
         wood: vec![mesh.clone()],
-        bark_rgb: [110, 86, 60],
+        bark: Bark {
+            rgb: [110, 86, 60],
+            ..Bark::default()
+        },
         ..Dressed::default()
     }
 }
@@ -433,7 +436,7 @@ fn the_bark_has_the_colour_of_the_trunk() {
         outline: Some(&outline),
         ..Seen::default()
     };
-    assert_eq!(dress(&skeleton, seen, &Config::default()).bark_rgb, brown);
+    assert_eq!(dress(&skeleton, seen, &Config::default()).bark.rgb, brown);
     assert_eq!(
         dress(
             &skeleton,
@@ -443,11 +446,14 @@ fn the_bark_has_the_colour_of_the_trunk() {
             },
             &Config::default()
         )
-        .bark_rgb,
+        .bark
+        .rgb,
         brown
     );
     assert_ne!(
-        dress(&skeleton, Seen::default(), &Config::default()).bark_rgb,
+        dress(&skeleton, Seen::default(), &Config::default())
+            .bark
+            .rgb,
         brown,
         "where nothing is seen, a plain one"
     );

@@ -9,7 +9,7 @@ mod tools;
 
 use arborcam::config::Config;
 use arborcam::export::gltf::{KEY_TOLERANCE_PX, Model, glb, gltf_files};
-use arborcam::geometry::{Dressed, Foliage, Mesh, bare_wood};
+use arborcam::geometry::{Bark, Dressed, Foliage, Mesh, bare_wood};
 use arborcam::model::{Pose, Skeleton};
 use arborcam::pipeline::{Seen, dress};
 use serde_json::{Value, json};
@@ -22,7 +22,10 @@ fn dressed(skeleton: &Skeleton, levels: usize, foliage: Foliage) -> Dressed {
     Dressed {
         wood: (0..levels).map(wood).collect(),
         foliage,
-        bark_rgb: [110, 86, 60],
+        bark: Bark {
+            rgb: [110, 86, 60],
+            ..Bark::default()
+        },
         ..Dressed::default()
     }
 }

@@ -4,12 +4,12 @@
 mod still;
 mod synthetic;
 
-use arborcam::config::{Config, Leaves};
+use arborcam::config::{Config, LeafShow, Leaves};
 use arborcam::export::ExportError;
 use arborcam::export::gltf::{KEY_TOLERANCE_PX, Model, glb};
 use arborcam::export::still::{obj_files, ply};
 use arborcam::geometry::{Dressed, Foliage, LeafView, Template, TemplateMesh, foliage};
-use arborcam::model::{Rgb, Skeleton};
+use arborcam::model::{Outline, Rgb, Skeleton};
 use arborcam::pipeline::{Seen, dress};
 use nalgebra::Vector3;
 use serde_json::Value;
@@ -346,4 +346,86 @@ fn before_blue_leaves_are_green() {
             assert!(share < 0.01, "{name}: {share}");
         }
     }
+}
+
+/// How bright some colours are.
+#[derive(Debug, Default)]
+struct Brightness {
+    levels: Vec<f64>,
+}
+
+impl Brightness {
+    fn mean(&self) -> f64 {
+        self.levels.iter().sum::<f64>() / self.levels.len() as f64
+    }
+
+    fn deviation(&self) -> f64 {
+        let squares = self.levels.iter().map(|l| (l - self.mean()).powi(2));
+        (squares.sum::<f64>() / self.levels.len() as f64).sqrt()
+    }
+}
+
+/// Where a tree that is cut to a shape goes beyond the filmed crown its leaves are as bright and as
+/// various as within, and the crown's dark side is not seen in it.
+#[test]
+fn a_tree_that_is_cut_has_the_same_light_all_over() {
+    let mut still = still(true);
+    let size = still.picture.size;
+    let (width, middle) = (size.width as usize, size.height as usize / 2);
+    for row in still.picture.pixels[3 * width * middle..].chunks_exact_mut(3) {
+        let [r, g, b] = [row[0], row[1], row[2]];
+        if g > r && g > b {
+            row.iter_mut().for_each(|c| *c /= 2);
+        }
+    }
+    let all = Outline {
+        mask: vec![255; size.area()],
+        ..still.outline.clone()
+    };
+    let seen = Seen {
+        picture: Some(&still.picture),
+        outline: Some(&still.outline),
+        cut_to: Some(&all),
+        ..Seen::default()
+    };
+    let dressed = dress(&still.skeleton, seen, &Config::default());
+    let [mut within, mut beyond, mut below] = [(); 3].map(|()| Brightness::default());
+    for group in &dressed.foliage.groups {
+        for (place, colour) in group.mesh.positions.iter().zip(&group.colours) {
+            let place = nalgebra::Point3::from(place.map(f64::from));
+            let at = still.skeleton.image_from_model(&place);
+            let level = colour.map(f64::from).iter().sum::<f64>() / 3.0;
+            let of = match still.outline.contains(at.x, at.y) {
+                false => &mut beyond,
+                true if at.y > middle as f64 => &mut below,
+                true => &mut within,
+            };
+            of.levels.push(level);
+        }
+    }
+    for other in [&beyond, &below] {
+        let off = (other.mean() - within.mean()).abs();
+        assert!(other.levels.len() > 1000 && within.levels.len() > 1000);
+        assert!(off < 4.0, "{} and {}", other.mean(), within.mean());
+        let share = other.deviation() / within.deviation();
+        assert!((0.8..1.25).contains(&share), "{share}");
+    }
+}
+
+/// A film of a bare tree shows no colours of leaves: those on request are green before any sky.
+#[test]
+fn leaves_of_a_tree_that_was_filmed_bare_have_no_colour_of_the_sky() {
+    let still = still(false);
+    let mut config = Config::default();
+    config.leaves.show = LeafShow::On;
+    let seen = Seen {
+        picture: Some(&still.picture),
+        outline: Some(&still.outline),
+        ..Seen::default()
+    };
+    let leaves = dress(&still.skeleton, seen, &config).foliage;
+    let colours = leaves.groups.iter().flat_map(|g| g.colours.clone());
+    let colours: Vec<[u8; 3]> = colours.collect();
+    assert!(!colours.is_empty());
+    assert!(colours.iter().all(|[r, g, b]| g > r && r > b));
 }

@@ -424,7 +424,7 @@ fn a_shape_is_full_in_the_picture_that_is_drawn_of_it() {
                     .texture
                     .as_ref()
                     .and_then(|(_, bytes)| draw::Texture::read(bytes)),
-                ..draw::Model::bare(skeleton, &dressed.wood[0], dressed.bark_rgb)
+                ..draw::Model::bare(skeleton, &dressed.wood[0], dressed.bark.rgb)
             };
             let camera = draw::Camera::of_film(skeleton, shape.size);
             let picture = draw::picture(&model.posed(None, &[]), &camera, &draw::Look::default());

@@ -4,7 +4,7 @@ mod synthetic;
 
 use arborcam::config::Wood;
 use arborcam::geometry::cylinders_by_branch;
-use arborcam::model::{NodeId, Skeleton};
+use arborcam::model::{NodeId, NodeKind, Skeleton};
 use arborcam::shape::{CURL_BOUND, Limb, PIPE_EXPONENTS, TIP_RADIUS_PX, limbs, thicken};
 use nalgebra::Point3;
 
@@ -446,4 +446,19 @@ fn a_bent_branch_is_the_elastic_line_of_a_beam_and_meets_the_next_without_a_crea
         "a crease of {} degrees",
         crease.to_degrees()
     );
+}
+
+/// The radii that its nodes had before do not count.
+#[test]
+fn wood_that_was_traced_is_thickened_by_pipes_as_all_other() {
+    let mut tree = synthetic::tree(3, 2);
+    for node in tree.nodes.iter_mut().skip(1) {
+        node.kind = NodeKind::Traced;
+    }
+    thicken(&mut tree, 12.0, &anywhere, &Wood::default(), 1);
+    let children = tree.children();
+    for (node, children) in tree.nodes.iter().zip(&children).skip(1) {
+        let is_tip = children.is_empty();
+        assert!(!is_tip || node.radius < 6.0, "{} px at a tip", node.radius);
+    }
 }

@@ -2,8 +2,9 @@
 //! and writes it; everything that is made from it is a view (see `export`).
 //!
 //! `capture.json` says what was filmed and how, `nodes.csv` holds the whole model, `frame.jpg` one
-//! picture of it. A tree that was filmed has `tracks.csv`, the points, and `motion.csv`, the poses.
+//! picture of it, `bark.png` its bark. A tree that was filmed has `tracks.csv`, the points, and `motion.csv`, the poses.
 
+mod bark;
 mod error;
 mod motion;
 mod nodes;
@@ -15,6 +16,7 @@ mod table;
 mod tracks;
 mod wood;
 
+pub use bark::{BARK_FILE, png};
 pub use error::DocumentError;
 pub use motion::{MOTION_HEADER, MotionCsv};
 pub use nodes::{NODES_HEADER, nodes};
@@ -29,7 +31,9 @@ pub use wood::{WOOD_FILE, read_wood, wood_csv};
 use crate::bounds::Bounds;
 use crate::config::Config;
 use crate::dynamics::Film;
-use crate::model::{Outline, Picture, Pose, Size, Skeleton, Swaying, Unidentified, WoodSeen};
+use crate::model::{
+    BranchGraph, Outline, Picture, Pose, Rgb, Size, Skeleton, Swaying, Unidentified, WoodSeen,
+};
 use crate::motion::PoseEstimator;
 use motion::PoseReader;
 use nalgebra::Point2;
@@ -54,6 +58,8 @@ pub struct Document {
     pub picture: Option<Picture>,
     pub pose_in_picture: Option<Pose>,
     pub outline: Option<Outline>,
+    /// The bark of the filmed trunk as a tile, see [`BranchGraph::bark`].
+    pub bark: Option<Arc<Rgb>>,
     /// What the user should know: parts that are missing. One sentence each.
     pub warnings: Vec<String>,
 }
@@ -100,11 +106,13 @@ impl Document {
         let model = model(dir, &note)?;
         let nodes = nodes::read(dir, model, size(&note))?;
         let picture = note.picture.as_ref().map(|p| picture::bytes(dir, p));
-        Self::of_parts(dir, note, nodes, picture)
+        let mut document = Self::of_parts(dir, note, nodes, picture)?;
+        document.bark = document.bark_in_folder();
+        Ok(document)
     }
 
-    /// The document that would be read from a folder to which these were written; without poses.
-    /// `picture_jpg` is the file that the note speaks of.
+    /// The document that would be read from a folder to which these were written; without poses
+    /// and bark. `picture_jpg` is the file that the note speaks of.
     ///
     /// # Errors
     /// The tree cannot be read back, as it is empty or reaches too far.
@@ -143,6 +151,7 @@ impl Document {
             picture: None,
             pose_in_picture: None,
             outline: None,
+            bark: None,
             warnings: Vec::new(),
         };
         document.picture = document.picture_of(picture_jpg);
@@ -164,6 +173,18 @@ impl Document {
             Err(why) => {
                 self.warnings
                     .push(format!("the picture of the capture is left out: {why}"));
+                None
+            }
+        }
+    }
+
+    fn bark_in_folder(&mut self) -> Option<Arc<Rgb>> {
+        self.note.bark.as_ref()?;
+        match bark::read(&self.dir) {
+            Ok(bark) => Some(Arc::new(bark)),
+            Err(why) => {
+                self.warnings
+                    .push(format!("the bark of the capture is left out: {why}"));
                 None
             }
         }
@@ -348,12 +369,26 @@ impl Begun {
             picture::decoded(&bytes, picture, size(&note)).ok()
         });
         let noted = note.outline.as_ref();
+        let mut wood = read_wood(dir).unwrap_or_default();
+        if let Ok(bark) = bark::read(dir) {
+            show_bark(&mut wood, &Arc::new(bark));
+        }
         Ok(Self {
             picture,
             outline: noted.and_then(|noted| outline(noted).ok()),
-            wood: read_wood(dir).unwrap_or_default(),
+            wood,
             note,
         })
+    }
+}
+
+/// The wood with its bark, which the table does not hold.
+fn show_bark(seen: &mut WoodSeen, bark: &Arc<Rgb>) {
+    for wood in seen.values_mut() {
+        *wood = Arc::new(BranchGraph {
+            bark: Some(bark.clone()),
+            ..BranchGraph::clone(wood)
+        });
     }
 }
 

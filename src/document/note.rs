@@ -37,6 +37,8 @@ pub struct CaptureNote {
     pub outline: Option<OutlineNote>,
     /// `None` where nothing was tracked, or no frame could be decoded in colour.
     pub picture: Option<PictureNote>,
+    /// `None` where no trunk was seen: the bark's colour is a guess then.
+    pub bark: Option<BarkNote>,
     /// `None` if the capture ended before the tree was built.
     pub build: Option<Build>,
     /// `None` if the tree is the one that was built first.
@@ -91,6 +93,12 @@ pub struct PictureNote {
     pub file: String,
     pub frame: u64,
     pub time_s: f64,
+}
+
+/// The bark of the filmed trunk as a tile in the folder.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct BarkNote {
+    pub file: String,
 }
 
 /// When and on what the tree was first built.

@@ -88,9 +88,11 @@ mod tests {
                 WoodNode::made_up(Some(0), 101.123_456_789, 150.0),
                 WoodNode::made_up(Some(0), 90.0, 120.0),
             ],
+            bark: None,
         };
         let later = BranchGraph {
             nodes: vec![WoodNode::made_up(None, 0.1 + 0.2, 1.0 / 3.0)],
+            bark: None,
         };
         let seen = WoodSeen::from([(90, Arc::new(wood)), (170, Arc::new(later))]);
         let text = wood_csv(&seen).expect("a table");

@@ -14,6 +14,8 @@ pub struct Model<'a> {
     pub wood: &'a Mesh,
     /// Colour of the wood (sRGB).
     pub bark_rgb: [u8; 3],
+    /// Its bark in place of that, once round a limb and as far along it as it is round.
+    pub bark: Option<Texture>,
     /// Colour of each branch instead, by node index; may be empty.
     pub branch_rgb: &'a [[u8; 3]],
     pub foliage: &'a Foliage,
@@ -51,6 +53,7 @@ impl<'a> Model<'a> {
             skeleton,
             wood,
             bark_rgb,
+            bark: None,
             branch_rgb: &[],
             foliage: &NONE,
             leaf: None,
@@ -62,8 +65,12 @@ impl<'a> Model<'a> {
     pub fn posed(&self, pose: Option<&Pose>, sway: &[LeafSwing]) -> Posed<'_> {
         let joints = Joints::new(self.skeleton, pose);
         let (positions, normals) = joints.wood(self.wood);
-        let colours = match self.branch_rgb {
-            [] => vec![self.bark_rgb; positions.len()],
+        let bark = self.bark.as_ref();
+        let bark = bark.filter(|_| self.branch_rgb.is_empty());
+        let colours = match (self.branch_rgb, bark) {
+            // The tile has the colour.
+            ([], Some(_)) => vec![[255; 3]; positions.len()],
+            ([], None) => vec![self.bark_rgb; positions.len()],
             _ => self
                 .wood
                 .joints
@@ -78,7 +85,7 @@ impl<'a> Model<'a> {
             colours,
             uvs,
             indices,
-            texture: None,
+            texture: bark.filter(|_| uvs.len() == self.wood.positions.len()),
             two_sided: false,
         }];
         for (i, group) in self.foliage.groups.iter().enumerate() {

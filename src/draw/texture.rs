@@ -1,5 +1,7 @@
 //! Pictures on leaves and bark.
 
+use crate::model::{Rgb, Size};
+
 /// A decoded texture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
@@ -35,6 +37,20 @@ impl Texture {
             width,
             height,
             rgba: rgba.into_raw(),
+        })
+    }
+
+    /// A picture without a transparent part; `None` of none.
+    pub fn of(picture: &Rgb) -> Option<Self> {
+        let Size { width, height } = picture.size;
+        let mut rgba = Vec::with_capacity(4 * picture.size.area());
+        for pixel in picture.pixels.chunks_exact(3) {
+            rgba.extend([pixel[0], pixel[1], pixel[2], u8::MAX]);
+        }
+        (!rgba.is_empty() && rgba.len() == 4 * picture.size.area()).then_some(Self {
+            width: width as usize,
+            height: height as usize,
+            rgba,
         })
     }
 

@@ -221,7 +221,7 @@ fn push_wood(
     let Some(mesh) = look.wood else {
         return Ok(Vec::new());
     };
-    let material = bark(root, buffer, model.dressed);
+    let material = bark(root, buffer, &model.dressed.bark)?;
     let material = root.push(material);
     let what = Skinned::wood(mesh, material, skin);
     Ok(vec![push_mesh(root, buffer, model, what)?])

@@ -2,7 +2,9 @@
 
 use super::ExportError;
 use super::gltf_buffer::BufferBuilder;
-use crate::geometry::Dressed;
+use super::gltf_model::raw;
+use crate::document::png;
+use crate::geometry::Bark;
 use gltf_json::image::MimeType;
 use gltf_json::material::{
     AlphaCutoff, AlphaMode, Material, PbrBaseColorFactor, PbrMetallicRoughness, StrengthFactor,
@@ -10,6 +12,7 @@ use gltf_json::material::{
 use gltf_json::texture::{Info, MagFilter, MinFilter, Sampler, Texture, WrappingMode};
 use gltf_json::validation::Checked::Valid;
 use gltf_json::{Image, Index, Root};
+use serde_json::json;
 
 /// glTF colours are linear, those of a picture are not (sRGB transfer function, IEC 61966-2-1). 0
 /// to 1.
@@ -22,13 +25,20 @@ pub(super) fn linear(channel: u8) -> f32 {
     }
 }
 
-/// One colour (sRGB), or the filmed bark, a tile that is repeated.
-pub(super) fn bark(root: &mut Root, buffer: &mut BufferBuilder, dressed: &Dressed) -> Material {
-    let [mut r, mut g, mut b] = dressed.bark_rgb.map(linear);
+/// One colour (sRGB), or the filmed bark, a tile that is repeated. `extras` say where it comes from.
+///
+/// # Errors
+/// The tile is no picture.
+pub(super) fn bark(
+    root: &mut Root,
+    buffer: &mut BufferBuilder,
+    bark: &Bark,
+) -> Result<Material, ExportError> {
+    let [mut r, mut g, mut b] = bark.rgb.map(linear);
     let mut texture = None;
-    if let Some(png) = &dressed.bark_png {
+    if let Some(tile) = &bark.tile {
         // In the buffer always: it is small.
-        let view = buffer.view(root, png.iter().copied(), None);
+        let view = buffer.view(root, png(tile)?.into_iter(), None);
         let source = root.push(Image {
             buffer_view: Some(view),
             mime_type: Some(MimeType("image/png".to_owned())),
@@ -47,8 +57,9 @@ pub(super) fn bark(root: &mut Root, buffer: &mut BufferBuilder, dressed: &Dresse
             extras: None,
         });
     }
-    Material {
+    Ok(Material {
         name: Some("bark".to_string()),
+        extras: raw(&json!({ "colour_from": bark.source.word() }))?,
         pbr_metallic_roughness: PbrMetallicRoughness {
             base_color_factor: PbrBaseColorFactor([r, g, b, 1.0]),
             base_color_texture: texture,
@@ -57,7 +68,7 @@ pub(super) fn bark(root: &mut Root, buffer: &mut BufferBuilder, dressed: &Dresse
             ..PbrMetallicRoughness::default()
         },
         ..Material::default()
-    }
+    })
 }
 
 /// How the picture of a leaf goes into the file.

@@ -31,7 +31,7 @@ impl Part<'_> {
 /// # Errors
 /// A position is no number, or there is nothing to draw.
 fn parts(dressed: &Dressed) -> Result<Vec<Part<'_>>, ExportError> {
-    let bark = std::slice::from_ref(&dressed.bark_rgb);
+    let bark = std::slice::from_ref(&dressed.bark.rgb);
     let wood = dressed.wood.first().map(|mesh| Part {
         name: WOOD.into(),
         mesh,
@@ -105,7 +105,7 @@ pub fn obj_files(
         (format!("{stem}_leaf.{ending}"), bytes.clone())
     });
     let mut materials = String::new();
-    push_material(&mut materials, "bark", dressed.bark_rgb, None);
+    push_material(&mut materials, "bark", dressed.bark.rgb, None);
     if parts.iter().any(|p| p.name != WOOD) {
         let file = texture.as_ref().map(|(name, _)| name.as_str());
         push_material(&mut materials, "leaf", mean_colour(dressed), file);

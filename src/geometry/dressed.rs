@@ -2,7 +2,9 @@
 
 use super::foliage::Foliage;
 use super::mesh::Mesh;
+use crate::model::Rgb;
 use crate::shape::Limb;
+use std::sync::Arc;
 
 /// Everything that is drawn of a tree at rest.
 #[derive(Clone, Debug, Default)]
@@ -11,11 +13,41 @@ pub struct Dressed {
     /// The wood in falling levels of detail, at least one; all on the joints of the same skeleton.
     pub wood: Vec<Mesh>,
     pub foliage: Foliage,
-    /// Colour of the bark as in a picture (sRGB).
-    pub bark_rgb: [u8; 3],
-    /// The filmed bark as a tile that repeats without a seam, PNG: once round a limb, and as far
-    /// along it as it is round. `None` where the film shows too little of the trunk.
-    pub bark_png: Option<Vec<u8>>,
+    pub bark: Bark,
+}
+
+/// How the wood looks.
+#[derive(Clone, Debug, Default)]
+pub struct Bark {
+    /// Mean colour as in a picture (sRGB).
+    pub rgb: [u8; 3],
+    /// The filmed bark, see [`BranchGraph::bark`](crate::model::BranchGraph); `None` where the film
+    /// shows no trunk.
+    pub tile: Option<Arc<Rgb>>,
+    pub source: BarkSource,
+}
+
+/// Where the colour of the bark comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BarkSource {
+    /// The pixels of the filmed trunk.
+    Trunk,
+    /// A guess: where the trunk should be in the picture, as no wood was seen.
+    Picture,
+    /// Nothing was seen.
+    #[default]
+    Nowhere,
+}
+
+impl BarkSource {
+    /// One word for files.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Trunk => "trunk",
+            Self::Picture => "guess",
+            Self::Nowhere => "none",
+        }
+    }
 }
 
 impl Dressed {

@@ -11,11 +11,11 @@ mod tube;
 mod wood;
 
 pub use cylinders::{Cylinder, cylinders_by_branch};
-pub use dressed::Dressed;
+pub use dressed::{Bark, BarkSource, Dressed};
 pub use foliage::{Foliage, FoliageGroup};
 pub use leaves::{
-    LeafView, Sampling, Season, Template, TemplateFault, TemplateMesh, density_match, foliage,
-    foliage_by, leaf_cover, season, within_leaves,
+    LeafColours, LeafView, Sampling, Season, Template, TemplateFault, TemplateMesh, density_match,
+    foliage, foliage_by, leaf_cover, season, within_leaves,
 };
 pub use mesh::Mesh;
 pub use wood::{LEVELS, bare_wood, wood, wood_levels};

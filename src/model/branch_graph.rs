@@ -1,6 +1,6 @@
 //! The wood that pictures show, as centre lines.
 
-use super::Size;
+use super::{Rgb, Size};
 use crate::signal::distance_to_segment;
 use nalgebra::Point2;
 use std::collections::BTreeMap;
@@ -42,6 +42,9 @@ pub type WoodSeen = BTreeMap<u64, Arc<BranchGraph>>;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BranchGraph {
     pub nodes: Vec<WoodNode>,
+    /// The trunk's bark as a tile that repeats without a seam (sRGB): once round a limb, and as far
+    /// along it as it is round. One texel where only its colour is seen, `None` where no trunk is.
+    pub bark: Option<Arc<Rgb>>,
 }
 
 impl BranchGraph {
@@ -87,7 +90,10 @@ impl BranchGraph {
                 ..node.clone()
             });
         }
-        Self { nodes }
+        Self {
+            nodes,
+            bark: self.bark.clone(),
+        }
     }
 
     /// Children of every node.
@@ -114,7 +120,7 @@ mod tests {
             WoodNode::made_up(Some(1), 60.0, 70.0),
             WoodNode::made_up(Some(1), 140.0, 70.0),
         ];
-        BranchGraph { nodes }
+        BranchGraph { nodes, bark: None }
     }
 
     #[test]

@@ -202,6 +202,18 @@ impl Rgb {
         let below = colour(u, next_v).lerp(&colour(next_u, next_v), to_right);
         Some(above.lerp(&below, to_down))
     }
+
+    /// Mean of each channel (sRGB); `None` of no pixel.
+    pub fn mean(&self) -> Option<[u8; 3]> {
+        let mut sum = [0_u64; 3];
+        for pixel in self.pixels.chunks_exact(3) {
+            for (sum, channel) in sum.iter_mut().zip(pixel) {
+                *sum += u64::from(*channel);
+            }
+        }
+        let count = self.pixels.len() as u64 / 3;
+        (count > 0).then(|| sum.map(|sum| ((sum + count / 2) / count) as u8))
+    }
 }
 
 /// A whole frame in colour, which is kept.

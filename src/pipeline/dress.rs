@@ -37,8 +37,6 @@ pub fn dress(skeleton: &Skeleton, seen: Seen, config: &Config) -> Dressed {
         limbs = in_leaf.wood(limbs, skeleton, &seen);
     }
     let wood = wood_levels(&limbs, config.wood.triangles as usize);
-    let bark = bark::colour(&seen, skeleton);
-    let bark_png = bark.and_then(|rgb| bark::tile(&seen, skeleton, rgb));
     let foliage = in_leaf
         .map(|l| l.foliage(&limbs, skeleton, &seen, &config.leaves, seed))
         .unwrap_or_default();
@@ -46,7 +44,6 @@ pub fn dress(skeleton: &Skeleton, seen: Seen, config: &Config) -> Dressed {
         limbs,
         wood,
         foliage,
-        bark_rgb: bark.unwrap_or(bark::PLAIN),
-        bark_png,
+        bark: bark::of(&seen, skeleton),
     }
 }

@@ -5,7 +5,7 @@
 use super::seeds::seeds;
 use super::seen::Seen;
 use crate::config::{self, LeafShow};
-use crate::geometry::{self, Foliage, LeafView, Template};
+use crate::geometry::{self, Foliage, LeafColours, LeafView, Template};
 use crate::model::{Luma, Outline, Rgb, Skeleton};
 use crate::shape::Limb;
 use nalgebra::Point2;
@@ -92,6 +92,16 @@ impl InLeaf {
         geometry::foliage(limbs, skeleton, &self.view(seen), template, settings, seed)
     }
 
+    fn colours(&self, seen: &Seen) -> LeafColours {
+        if !self.filmed {
+            LeafColours::Plain
+        } else if seen.cut_to.is_some() {
+            LeafColours::Anywhere
+        } else {
+            LeafColours::InPlace
+        }
+    }
+
     fn view<'a>(&'a self, seen: &Seen<'a>) -> LeafView<'a> {
         let &Seen {
             picture, outline, ..
@@ -103,6 +113,7 @@ impl InLeaf {
             outline,
             pose,
             density: self.density.as_ref(),
+            colours: self.colours(seen),
             seeds: &self.seeds,
         }
     }

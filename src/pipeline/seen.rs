@@ -2,6 +2,7 @@
 
 use crate::geometry::Template;
 use crate::model::{Luma, Outline, Pose, Rgb};
+use std::sync::Arc;
 
 /// What the film shows of the tree apart from its motion.
 #[derive(Clone, Copy, Debug, Default)]
@@ -13,6 +14,8 @@ pub struct Seen<'a> {
     /// The drawn shape, in the picture, that the tree was cut to. It stands in the tree's place at
     /// rest.
     pub cut_to: Option<&'a Outline>,
+    /// The bark of the filmed trunk as a tile, see [`BranchGraph::bark`](crate::model::BranchGraph).
+    pub bark: Option<&'a Arc<Rgb>>,
     /// A leaf of the user's own, and a drawn density of the leaves, which goes before the
     /// picture's.
     pub leaf: Option<&'a Template>,

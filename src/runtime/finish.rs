@@ -6,16 +6,17 @@ use super::meter::Histogram;
 use super::shared::{Failure, Shared};
 use crate::config::Config;
 use crate::document::note::{
-    Build, ModelNote, OutlineNote, PictureNote, Quality as QualityNote, Refinement, Software,
-    Source, json,
+    BarkNote, Build, ModelNote, OutlineNote, PictureNote, Quality as QualityNote, Refinement,
+    Software, Source, json,
 };
 use crate::document::{
-    CaptureNote, MotionCsv, PICTURE_FILE, SCHEMA_VERSION, TracksCsv, jpeg, nodes,
+    BARK_FILE, CaptureNote, MotionCsv, PICTURE_FILE, SCHEMA_VERSION, TracksCsv, jpeg, nodes,
 };
 use crate::dynamics::{Depth, Film};
 use crate::files::OutputFolder;
 use crate::model::{
-    Outline, Picture, Pose, Skeleton, Tentative, Timing, TrackLog, TrackSet, Unidentified, WoodSeen,
+    Outline, Picture, Pose, Rgb, Skeleton, Tentative, Timing, TrackLog, TrackSet, Unidentified,
+    WoodSeen,
 };
 use crate::recording::TrackFileReader;
 use crate::solve::{Model, with_modes};
@@ -173,9 +174,15 @@ fn draft(job: &CaptureJob, done: &Done, poses: Vec<Pose>) -> Result<DocumentWrit
         note,
         skeleton: &tree.skeleton,
         picture: job.picture.as_ref(),
+        bark: bark_of(tree),
         poses,
         pose_in_picture: done.pose_in_picture.as_ref(),
     })?)
+}
+
+/// The bark that the film shows of a tree.
+fn bark_of(tree: &Model) -> Option<&Arc<Rgb>> {
+    tree.wood.as_ref()?.bark.as_ref()
 }
 
 /// Says how many branches were not analysed because the end was wanted.
@@ -293,6 +300,9 @@ pub(super) fn describe(
             file: PICTURE_FILE.into(),
             frame: p.frame,
             time_s: p.time_s,
+        }),
+        bark: tree.and_then(bark_of).map(|_| BarkNote {
+            file: BARK_FILE.into(),
         }),
         build: tree.map(first_build),
         refinement: tree.and_then(refinement),

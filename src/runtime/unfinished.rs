@@ -10,7 +10,9 @@ use super::shared::{Failure, Shared};
 use super::status::{median_error_px, median_fb_error_px};
 use crate::cancel::CancelToken;
 use crate::document::note::json;
-use crate::document::{Begun, CaptureNote, PICTURE_FILE, WOOD_FILE, jpeg, wood_csv};
+use crate::document::{
+    BARK_FILE, Begun, CaptureNote, PICTURE_FILE, WOOD_FILE, jpeg, png, wood_csv,
+};
 use crate::model::{FormatNote, Size, WoodSeen};
 use crate::pipeline::{BackEnd, Followed};
 use crate::recording::{SpaceReserve, TrackFile, TrackFileReader};
@@ -94,6 +96,7 @@ impl Unfinished {
         self.kept = None;
         if std::mem::take(&mut self.kept_wood) > 0 {
             std::fs::remove_file(self.dir.join(WOOD_FILE)).map_err(Failure::Log)?;
+            self.remove_bark()?;
         }
         TrackFile::create(&self.dir.join(LOG_FILE)).map_err(Failure::Log)
     }
@@ -130,9 +133,26 @@ impl Unfinished {
     pub fn keep_wood(&mut self, wood: &WoodSeen) -> Result<(), Failure> {
         if wood.len() > self.kept_wood {
             self.replace(WOOD_FILE, &wood_csv(wood)?)?;
+            self.keep_bark(wood)?;
             self.kept_wood = wood.len();
         }
         Ok(())
+    }
+
+    /// The bark of the newest wood, or none where that shows none.
+    fn keep_bark(&self, wood: &WoodSeen) -> Result<(), Failure> {
+        let newest = wood.values().next_back();
+        match newest.and_then(|wood| wood.bark.as_ref()) {
+            Some(bark) => self.replace(BARK_FILE, &png(bark)?),
+            None => self.remove_bark(),
+        }
+    }
+
+    fn remove_bark(&self) -> Result<(), Failure> {
+        match std::fs::remove_file(self.dir.join(BARK_FILE)) {
+            Err(e) if e.kind() != io::ErrorKind::NotFound => Err(Failure::Log(e)),
+            _ => Ok(()),
+        }
     }
 
     fn replace(&self, name: &str, bytes: &[u8]) -> Result<(), Failure> {

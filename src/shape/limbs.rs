@@ -1,7 +1,7 @@
 //! All wood of a tree: its branches, then twigs, then how thick they are.
 
 use super::branches::branches;
-use super::limb::Limb;
+use super::limb::{Grown, Limb};
 use super::radius;
 use super::twigs::{self, GrowthConstraint};
 use crate::config;
@@ -20,12 +20,25 @@ pub fn limbs(
     wood: &config::Wood,
     seed: u64,
 ) -> Vec<Limb> {
-    let mut grown = branches(skeleton, wood.curl, seed);
-    twigs::add(&mut grown, skeleton, room, wood, seed);
     let trunk_px = skeleton.nodes.get(1).map_or(0.0, |top| top.radius);
-    radius::by_pipes(&mut grown, skeleton, trunk_px);
+    let mut grown = piped(skeleton, trunk_px, room, wood, seed);
     radius::as_seen(&mut grown, skeleton);
     grown.into_iter().map(|g| g.limb).collect()
+}
+
+/// The same as thick as the pipe model says for a trunk of this radius, px, whatever radii the nodes
+/// have.
+fn piped(
+    skeleton: &Skeleton,
+    trunk_px: f64,
+    room: GrowthConstraint,
+    wood: &config::Wood,
+    seed: u64,
+) -> Vec<Grown> {
+    let mut grown = branches(skeleton, wood.curl, seed);
+    twigs::add(&mut grown, skeleton, room, wood, seed);
+    radius::by_pipes(&mut grown, skeleton, trunk_px);
+    grown
 }
 
 /// Gives every node the radius (px) of the branch that ends there, at the middle of its length:
@@ -43,7 +56,8 @@ pub fn thicken(
     for node in &mut skeleton.nodes {
         node.radius = trunk_px;
     }
-    for limb in limbs(skeleton, room, wood, seed).iter().filter(|l| !l.twig) {
+    let grown = piped(skeleton, trunk_px, room, wood, seed);
+    for limb in grown.iter().map(|g| &g.limb).filter(|l| !l.twig) {
         let Some(node) = skeleton.nodes.get_mut(limb.node.index()) else {
             continue;
         };

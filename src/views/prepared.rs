@@ -125,6 +125,7 @@ impl PreparedTree {
             pose: posed.pose_in_picture.as_ref(),
             outline: document.outline.as_ref(),
             cut_to: posed.cut_to.as_ref(),
+            bark: document.bark.as_ref(),
             leaf: leaf.as_ref(),
             density: density.as_ref(),
         };

@@ -84,7 +84,8 @@ impl<'a> Studio<'a> {
                 file: "motion.csv",
             }));
         }
-        let mut model = Model::bare(&tree.skeleton, wood, tree.dressed.bark_rgb);
+        let mut model = Model::bare(&tree.skeleton, wood, tree.dressed.bark.rgb);
+        model.bark = tree.dressed.bark.tile.as_deref().and_then(Texture::of);
         if !shot.bare {
             model.foliage = &tree.dressed.foliage;
             let texture = model.foliage.texture.as_ref();

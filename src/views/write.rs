@@ -3,11 +3,12 @@
 
 use super::{PrepareError, PreparedTree, TreeOptions};
 use crate::document::note::{CaptureNote, json};
-use crate::document::{Document, PICTURE_FILE, jpeg};
+use crate::document::{BARK_FILE, Document, PICTURE_FILE, jpeg, png};
 use crate::export::gltf::glb;
 use crate::files::{OutputFolder, WriteError, replace};
-use crate::model::{Picture, Pose, Skeleton, Swaying};
+use crate::model::{Picture, Pose, Rgb, Skeleton, Swaying};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// Name of the model's file.
@@ -22,6 +23,8 @@ pub struct Draft<'a> {
     pub skeleton: &'a Skeleton,
     /// What the note's picture is; the note must have one then.
     pub picture: Option<&'a Picture>,
+    /// What the note's bark is; the note must have one then.
+    pub bark: Option<&'a Arc<Rgb>>,
     /// The end of the film in the order of time, `export.animation_s` and a second more; none for a
     /// tree that was not filmed.
     pub poses: Vec<Pose>,
@@ -52,6 +55,8 @@ impl DocumentWriter {
             draft.pose_in_picture,
             config.export.animation_s,
         );
+        // A PNG gives back what was put in.
+        document.bark = draft.bark.cloned();
         let options = TreeOptions {
             config,
             ..TreeOptions::default()
@@ -62,7 +67,7 @@ impl DocumentWriter {
         })
     }
 
-    /// Writes `nodes.csv`, `tree.glb`, the picture and `capture.json` with these `warnings`. `sway`
+    /// Writes `nodes.csv`, `tree.glb`, the picture, the bark and `capture.json` with these `warnings`. `sway`
     /// is by node index.
     ///
     /// # Errors
@@ -79,6 +84,9 @@ impl DocumentWriter {
         folder.write(MODEL_FILE, &model)?;
         if let Some(bytes) = &self.picture_jpg {
             folder.write(PICTURE_FILE, bytes)?;
+        }
+        if let Some(bark) = &self.tree.document.bark {
+            folder.write(BARK_FILE, &png(bark)?)?;
         }
         let note = CaptureNote {
             animation: Some(animation),

@@ -424,7 +424,7 @@ mod tests {
         let is_left = |pixel: usize| pixel % 40 < 20;
         let mut odds = Vec::new();
         for pixel in 0..size.area() {
-            let wrong = seed_of_part(1, pixel as u64) % 5 == 0;
+            let wrong = seed_of_part(1, pixel as u64).is_multiple_of(5);
             odds.push(if is_left(pixel) != wrong { 1.0 } else { -1.0 });
         }
         let links = vec![[1.0; PAIRS]; size.area()];

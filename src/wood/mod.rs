@@ -4,8 +4,9 @@
 //! [`steady`] takes the camera's motion out of the frames; [`evidence`] averages the tree over
 //! frames that are carried back to rest, and separates what moves with it from what stands behind;
 //! [`mask`] classifies pixels as wood or not by colour; [`paths`], or [`circles`] as in the paper,
-//! draw the centre lines. Strokes help where colour does not.
+//! draw the centre lines; [`bark`] unrolls the trunk. Strokes help where colour does not.
 
+mod bark;
 mod circles;
 mod cut;
 mod evidence;
@@ -26,6 +27,7 @@ use nalgebra::{Point2, Vector2};
 use opencv::core::{Mat, Size as CvSize};
 use opencv::imgproc::{MORPH_ELLIPSE, dilate_def, get_structuring_element};
 use opencv::prelude::*;
+use std::sync::Arc;
 use steady::{SteadyShot, steadied};
 
 /// Fewer frames than this show no motion to judge by.
@@ -124,14 +126,14 @@ pub fn find(view: View, cancel: &CancelToken) -> opencv::Result<Option<Wood>> {
     if cancel.is_cancelled() {
         return Ok(None);
     }
-    let branches = match view.trace_by {
+    let traced = match view.trace_by {
         TraceBy::Paths => paths::branches(&mask, view.foot.position_px)?,
         TraceBy::Circles => circles::branches(&mask, view.foot.position_px)?,
     };
     // In leaf, what stands behind a twig is leaves, of all lights.
-    let branches = match mask.in_leaf {
-        true => branches,
-        false => faint::without_faint(branches, &evidence.rest),
+    let mut branches = match mask.in_leaf {
+        true => traced,
+        false => faint::without_faint(traced, &evidence.rest),
     };
     tracing::debug!(
         shots = shots.len(),
@@ -143,10 +145,12 @@ pub fn find(view: View, cancel: &CancelToken) -> opencv::Result<Option<Wood>> {
     if branches.nodes.len() < 2 {
         return Ok(None);
     }
+    let mask = mask.at_picture_size(size);
+    branches.bark = bark::tile(&evidence.rest, &mask, &branches).map(Arc::new);
     Ok(Some(Wood {
         branches,
         rest: evidence.rest,
-        mask: mask.at_picture_size(size),
+        mask,
     }))
 }
 

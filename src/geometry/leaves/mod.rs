@@ -27,7 +27,7 @@ mod wood;
 pub use beyond::within_leaves;
 pub use season::{Season, season};
 pub use template::{Template, TemplateFault, TemplateMesh};
-pub use view::{LeafView, Sampling};
+pub use view::{LeafColours, LeafView, Sampling};
 
 use super::foliage::Foliage;
 use crate::config;

@@ -32,7 +32,8 @@ const HIDING: f32 = 0.4;
 /// A cluster that is put on a branch stands so far beside it at most, as a share of the tree's
 /// height.
 const ASIDE: f64 = 0.02;
-/// A leaf stands so far before or behind its branch at most, as a share of the tree's height.
+/// A leaf stands so far before or behind its branch at most, as a share of the tree's height; where
+/// the crown is thin less, by its density.
 const DEEPEST: f64 = 1.0 / 15.0;
 /// The crown's emptiest places are looked for in cubes of so many cluster sizes.
 const CUBE: f64 = 1.5;
@@ -278,22 +279,25 @@ impl LeafPlacer<'_> {
         } = sight;
         let attachment = &self.attachments.all[i];
         let grid = &self.target.grid;
-        let far = (distance / grid.length(1.0).max(1e-9)).min(DEEPEST * self.height);
+        // A crown is as thin from front to back where it is thin or ends in the picture: leaves that
+        // stood far before it there would hang beside the tree, seen from the side.
+        let share = self.density_at(cell).map_or(0.0, f64::from).clamp(0.0, 1.0);
+        let deepest = share * DEEPEST * self.height;
+        let far = (distance / grid.length(1.0).max(1e-9)).min(deepest);
         // Off the bark at least, on the side that it is lit from or not.
         let off = far * work.random.random::<f64>() + attachment.radius + 0.2 * size;
         let depth = match side {
             Side::Front => attachment.depth + off,
             Side::Back => attachment.depth - off,
             Side::Before(wood) => {
-                let clear = wood + 0.5 * DEEPEST * self.height + 0.5 * size;
+                let clear = wood + 0.5 * deepest + 0.5 * size;
                 let nearest = attachment.depth + off;
-                let farthest = nearest.max(attachment.depth + DEEPEST * self.height + size);
+                let farthest = nearest.max(attachment.depth + deepest + size);
                 clear.clamp(nearest, farthest)
             }
         };
         let posed = grid.model_at(cell, depth);
         // At the crown's border a whole cluster would stand out of it.
-        let share = self.density_at(cell).map_or(0.0, f64::from);
         let varied = 1.0 + 0.15 * work.random.random_range(-1.0..1.0);
         let size = size * (0.5 + 0.6 * share).clamp(0.5, 1.1) * varied;
         let centre = attachment.carried.to_rest(&posed);

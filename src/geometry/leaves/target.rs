@@ -4,8 +4,9 @@ use super::canvas::{Canvas, Grid, luma};
 use super::colours::{Shares, shares, smooth_step};
 use super::density::{SCALE, smoothed};
 use super::mixture::Mixture;
-use super::view::{LeafView, PLAIN};
+use super::view::{LeafColours, LeafView, PLAIN};
 use crate::model::Skeleton;
+use crate::random::seed_of_part;
 use nalgebra::{Point2, Vector2};
 
 /// Share of leaf from which on a cell's colour is that of leaves.
@@ -37,6 +38,9 @@ pub(super) struct Target {
     pub sigma: f64,
     /// Colours with how much they are of leaves alone; empty without a picture.
     colours: Vec<([u8; 3], f32)>,
+    /// The cells that have colours of leaves, where any leaf may have the colour of any of them;
+    /// else none.
+    palette: Vec<usize>,
     mean: [u8; 3],
     /// Half of the leaves are darker (Li 2011 app. B.1).
     middle_luma: f64,
@@ -61,11 +65,18 @@ impl Target {
         let sigma = grid.length(SCALE * height);
         let density = smoothed(&wanted, grid.size.width as usize, sigma);
         let colours = match (canvas, shares) {
-            (Some(canvas), Some(shares)) => leaf_colours(&canvas, &shares),
+            (Some(canvas), Some(shares)) if view.colours != LeafColours::Plain => {
+                leaf_colours(&canvas, &shares)
+            }
             _ => Vec::new(),
         };
         let lumas = Lumas::of(&colours);
+        let palette = match view.colours {
+            LeafColours::Anywhere => leafy(&colours),
+            LeafColours::InPlace | LeafColours::Plain => Vec::new(),
+        };
         Some(Self {
+            palette,
             grid,
             wanted,
             density,
@@ -87,6 +98,7 @@ impl Target {
             wanted: none,
             sigma: 1.0,
             colours: Vec::new(),
+            palette: Vec::new(),
             mean: PLAIN,
             middle_luma: 0.0,
             mean_luma: 0.0,
@@ -99,6 +111,7 @@ impl Target {
         if self.colours.is_empty() {
             return self.mean;
         }
+        let cell = self.seen_for(cell);
         let (w, h) = (self.grid.size.width as i64, self.grid.size.height as i64);
         let (u, v, radius) = (
             cell.x.round() as i64,
@@ -115,6 +128,26 @@ impl Target {
         found.unwrap_or(self.mean)
     }
 
+    /// The cell whose colour a leaf in another one has. Of a tree that was given another shape it is
+    /// any that shows leaves: in their own places the old crown with its light and shade would be
+    /// seen in the new one, and all beside it would be of one colour.
+    fn seen_for(&self, cell: Point2<f64>) -> Point2<f64> {
+        let count = self.palette.len() as u64;
+        if count == 0 {
+            return cell;
+        }
+        let width = self.grid.size.width as usize;
+        let seen = self.palette[(self.chance_at(cell) % count) as usize];
+        Point2::new((seen % width) as f64, (seen / width) as f64)
+    }
+
+    /// A number by chance, the same for all that lies in a cell.
+    fn chance_at(&self, cell: Point2<f64>) -> u64 {
+        let width = i64::from(self.grid.size.width);
+        let place = cell.y.round() as i64 * width + cell.x.round() as i64;
+        seed_of_part(0, place as u64)
+    }
+
     /// The colour around a cell with its light and shade softened, channels 0 to 255.
     pub fn soft_colour(&self, cell: Point2<f64>, radius: f64) -> [f64; 3] {
         let colour = self.colour(cell, radius);
@@ -127,8 +160,11 @@ impl Target {
         colour.map(|c| f64::from(c) * share)
     }
 
-    /// Whether a leaf seen there is of the brighter half.
+    /// Whether a leaf seen there is of the brighter half; by chance where no colours are known.
     pub fn is_bright(&self, cell: Point2<f64>) -> bool {
+        if self.colours.is_empty() {
+            return self.chance_at(cell).is_multiple_of(2);
+        }
         luma(self.colour(cell, 1.0)) > self.middle_luma
     }
 }
@@ -155,6 +191,12 @@ fn leaf_colours(canvas: &Canvas, shares: &Shares) -> Vec<([u8; 3], f32)> {
     without_background(&mut colours, &shares.beside);
     without_strangers(&mut colours);
     colours
+}
+
+/// The cells that have colours of leaves.
+fn leafy(colours: &[([u8; 3], f32)]) -> Vec<usize> {
+    let cells = colours.iter().enumerate();
+    cells.filter(|(_, c)| c.1 > 0.5).map(|(i, _)| i).collect()
 }
 
 /// How bright the leaves are.

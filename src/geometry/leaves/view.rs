@@ -16,8 +16,22 @@ pub struct LeafView<'a> {
     /// A drawn density that goes before the picture's: white is covered with leaves. Of any size,
     /// for the whole picture.
     pub density: Option<&'a Luma>,
+    pub colours: LeafColours,
     /// Corners in the picture, px, strongest first.
     pub seeds: &'a [Point2<f32>],
+}
+
+/// Which colours leaves have.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LeafColours {
+    /// Those that the picture shows in their places.
+    #[default]
+    InPlace,
+    /// Of any leaves in the picture, by chance: the tree was given another shape than it has there,
+    /// and its leaves are not those that are seen in their places.
+    Anywhere,
+    /// One colour: the picture shows no leaves.
+    Plain,
 }
 
 /// How places are found for leaves.

@@ -143,14 +143,19 @@ fn branches(state: &State, skeleton: &Skeleton, theme: Theme) -> Vec<BranchLine>
     copies
 }
 
+/// What a user who pulls the tree has to know before.
+const BEFORE_PULL: &str = "begin to film before the pull, so that it is seen at rest";
+
+/// What the tree waits for; until it is built, with what makes it a good one.
 fn reason(s: &Snapshot) -> String {
-    match s.phase {
-        Phase::Outline => "waits for the outline; o draws one".to_owned(),
-        Phase::Detect => "waits for points".to_owned(),
-        Phase::Accumulate => "waits for enough motion; b builds now".to_owned(),
-        Phase::Build => "is being built".to_owned(),
-        Phase::Live => "no tree".to_owned(),
-    }
+    let reason = match s.phase {
+        Phase::Outline => "waits for the outline; o draws one",
+        Phase::Detect => "waits for points",
+        Phase::Accumulate => "waits for enough motion; b builds now",
+        Phase::Build => return "is being built".to_owned(),
+        Phase::Live => return "no tree".to_owned(),
+    };
+    format!("{reason}\n{BEFORE_PULL}")
 }
 
 /// Extent of the tree at rest in a view: taken from the pose, the scale would breathe with the
