@@ -122,7 +122,7 @@ def replay(program, folder, capture):
 
 def compare(film, capture):
     nodes = {row["node_id"]: row for row in rows(capture / "nodes.csv")}
-    points = followed_points(film, capture / "tracks.csv")
+    points = followed_points(film, capture)
     on_branch = Counter(branch for branch, _ in points)
     targets = {b for b, n in on_branch.items() if n >= BRANCH_POINTS}
     # A node holds its own points and those of all nodes that it carries.
@@ -150,10 +150,13 @@ def compare(film, capture):
     return told
 
 
-def followed_points(film, tracks_csv):
+def followed_points(film, capture):
     """(true branch, captured node or "") of each point that counts; the node is the last that it was put to."""
     births, last_node = {}, {}
-    for row in sorted(rows(tracks_csv), key=lambda row: int(row["frame"])):
+    # The sway is that of all points, those that were left out of the tree among them.
+    tables = [table for name in ("tracks.csv", "left_out.csv") if (table := capture / name).is_file()]
+    seen = [row for table in tables for row in rows(table)]
+    for row in sorted(seen, key=lambda row: int(row["frame"])):
         births.setdefault(row["track_id"], row)
         if row["node_id"]:
             last_node[row["track_id"]] = row["node_id"]

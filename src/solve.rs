@@ -23,9 +23,9 @@ use crate::cancel::CancelToken;
 use crate::config::Config;
 use crate::dynamics::{Depth, Film, analyse};
 use crate::hierarchy::{self, Evidence};
-use crate::model::{BranchGraph, Foot, Outline, TrackLog, TrackTable};
+use crate::model::{BranchGraph, Foot, Outline, TrackId, TrackLog, TrackTable};
 use refine::Refinement;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Fewer moving points than this make no tree, whatever is asked.
@@ -52,6 +52,7 @@ pub fn solve(
         let evidence = refinement.evidence()?;
         let (table, moment) = (&refinement.table, refinement.moment);
         let new = build(table, evidence, &prior.outline, config, moment)?;
+        let new = without_doubtful(new, log, &prior.left_out, config);
         return refinement.better(new, cancel);
     }
     let window = log.last(config.accumulate.window_s);
@@ -63,7 +64,23 @@ pub fn solve(
         forced: !is_enough,
         ..Moment::of(window)?
     };
-    build(&table, evidence, outline, config, moment)
+    let model = build(&table, evidence, outline, config, moment)?;
+    Some(without_doubtful(model, log, &BTreeSet::new(), config))
+}
+
+/// The model with the points left out that the film shows to be off their places, and those that
+/// were `before`.
+fn without_doubtful(
+    model: Model,
+    log: &TrackLog,
+    before: &BTreeSet<TrackId>,
+    config: &Config,
+) -> Model {
+    let window = log.last(config.accumulate.window_s);
+    Model {
+        left_out: hierarchy::left_out(window, before, &config.accumulate),
+        ..model
+    }
 }
 
 /// The model with its modes: how its branches sway in `film`, whose points are on the nodes of the
@@ -163,6 +180,7 @@ fn build(
         plain: skeleton.clone(),
         skeleton,
         sub_branches: Vec::new(),
+        left_out: BTreeSet::new(),
         wood: None,
         modes: Vec::new(),
         outline: outline.clone(),

@@ -53,6 +53,24 @@ fn captured(name: &str) -> (TempDir, PathBuf) {
     (dir, to)
 }
 
+/// The tables of points: of the tree, and left out of it.
+const POINTS: [&str; 2] = ["tracks.csv", "left_out.csv"];
+
+/// Changes the tables of points in `dir` as texts.
+fn change_points(dir: &Path, change: impl Fn(&str) -> String) {
+    for table in POINTS {
+        let text = fs::read_to_string(dir.join(table)).expect(table);
+        fs::write(dir.join(table), change(&text)).expect(table);
+    }
+}
+
+/// Changes the tables of points in `dir` cell by cell.
+fn edit_points(dir: &Path, change: impl Fn(&str, &str) -> String) {
+    for table in POINTS {
+        edit(&dir.join(table), &change);
+    }
+}
+
 /// Changes a table cell by cell: `change` gets the column's name and the text.
 fn edit(file: &Path, change: impl Fn(&str, &str) -> String) {
     let text = fs::read_to_string(file).expect("table");
@@ -330,7 +348,7 @@ fn again(dir: &Path, to: &Path, slower: f64) {
         "x" | "y" => format!("{:.4}", 1.25 * number(cell)),
         _ => cell.into(),
     });
-    edit(&to.join("tracks.csv"), |name, cell| match name {
+    edit_points(to, |name, cell| match name {
         "node_id" => renamed(cell),
         "time_s" => time(cell),
         "u_px" | "v_px" => format!("{:.3}", 0.5 * number(cell) + 100.0),
@@ -552,8 +570,7 @@ fn damaged_tracks_give_reasons_and_no_numbers() {
     ];
     for (name, change) in cases {
         let (_dir, dir) = captured(name);
-        let text = fs::read_to_string(dir.join("tracks.csv")).expect("tracks");
-        fs::write(dir.join("tracks.csv"), change(&text)).expect("tracks");
+        change_points(&dir, change);
         let page = dir.with_file_name("page.html");
         let told = told(&[&dir], &["--report", &page.display().to_string()]);
         assert!(answered(&told).is_empty(), "{name}: {:?}", answered(&told));
@@ -574,7 +591,7 @@ fn a_tree_of_one_branch_is_a_tree() {
         text.lines().take(3).collect::<Vec<_>>().join("\n") + "\n",
     )
     .expect("nodes");
-    edit(&dir.join("tracks.csv"), |name, cell| {
+    edit_points(&dir, |name, cell| {
         if name == "node_id" && !cell.is_empty() {
             "1".into()
         } else {
@@ -611,7 +628,7 @@ fn captures_that_may_be_of_one_tree_or_of_two_are_not_compared_by_a_guess() {
             cell.into()
         }
     };
-    edit(&other.join("tracks.csv"), pole);
+    edit_points(&other, pole);
     fs::remove_file(other.join("motion.csv")).expect("remove");
     let page = first.with_file_name("page.html");
     let output = analyze(
@@ -1074,23 +1091,24 @@ fn where_nothing_can_be_written_the_table_is_printed_all_the_same() {
 
 /// The film again and again: its analysis takes a while.
 fn prolong(dir: &Path, times: u32, every_s: f64) {
-    let text = fs::read_to_string(dir.join("tracks.csv")).expect("tracks");
-    let (header, rows) = text.split_once('\n').expect("header");
-    let lap = |k: u32| {
-        let row = move |line: &str| {
-            let cells: Vec<&str> = line.split(',').collect();
-            let time_s = cells[2].parse::<f64>().expect("time") + every_s * f64::from(k);
-            format!(
-                "{},{},{time_s:.6},{}\n",
-                cells[0],
-                cells[1],
-                cells[3..].join(",")
-            )
+    change_points(dir, |text| {
+        let (header, rows) = text.split_once('\n').expect("header");
+        let lap = |k: u32| {
+            let row = move |line: &str| {
+                let cells: Vec<&str> = line.split(',').collect();
+                let time_s = cells[2].parse::<f64>().expect("time") + every_s * f64::from(k);
+                format!(
+                    "{},{},{time_s:.6},{}\n",
+                    cells[0],
+                    cells[1],
+                    cells[3..].join(",")
+                )
+            };
+            rows.lines().map(row).collect::<String>()
         };
-        rows.lines().map(row).collect::<String>()
-    };
-    let all: String = (0..times).map(lap).collect();
-    fs::write(dir.join("tracks.csv"), format!("{header}\n{all}")).expect("tracks");
+        let all: String = (0..times).map(lap).collect();
+        format!("{header}\n{all}")
+    });
 }
 
 fn lasts(dir: &Path, seconds: u32) {

@@ -322,10 +322,22 @@ fn tracks_belong_to_nodes_that_exist_and_keep_their_ids() {
         "{bound} of {} observations belong to a node",
         tracks.len()
     );
-    assert_eq!(
-        Some(last.len() as u64),
-        made().capture()["quality"]["tracks_total"].as_u64()
-    );
+    // No point is in both tables, and all that were followed are in one.
+    let mut left_out = BTreeSet::new();
+    for row in made().rows("left_out.csv", "track_id,frame,time_s,u_px,v_px,node_id") {
+        let id = index(&row[0]);
+        assert!(!last.contains_key(&id), "{row:?}");
+        assert!(
+            row[5].is_empty() || measured.contains(row[5].as_str()),
+            "{row:?}"
+        );
+        left_out.insert(id);
+    }
+    let quality = &capture["quality"];
+    let (all, out) = (last.len() + left_out.len(), left_out.len());
+    assert_eq!(Some(all as u64), quality["tracks_total"].as_u64());
+    assert_eq!(Some(out as u64), quality["tracks_left_out"].as_u64());
+    assert!(out > 0, "a quarter of those that move");
 }
 
 #[test]
@@ -629,6 +641,7 @@ fn a_replay_is_reproducible_to_the_byte() {
     for name in [
         "capture.json",
         "tracks.csv",
+        "left_out.csv",
         "nodes.csv",
         "motion.csv",
         "tree.glb",

@@ -145,9 +145,15 @@ fn csv_is_the_tables_and_cylinders_that_join() {
     let (_dir, out) = exported("csv", "tables", &[]);
     assert_eq!(
         names_in(&out),
-        ["cylinders.csv", "motion.csv", "nodes.csv", "tracks.csv"]
+        [
+            "cylinders.csv",
+            "left_out.csv",
+            "motion.csv",
+            "nodes.csv",
+            "tracks.csv"
+        ]
     );
-    for name in ["motion.csv", "nodes.csv", "tracks.csv"] {
+    for name in ["left_out.csv", "motion.csv", "nodes.csv", "tracks.csv"] {
         assert!(
             fs::read(out.join(name)).expect(name) == fs::read(made().join(name)).expect(name),
             "{name} differs"

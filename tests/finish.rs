@@ -13,7 +13,7 @@ use tempfile::TempDir;
 
 /// What has not happened after so long will not.
 const HANGS: Duration = Duration::from_secs(60);
-const TABLES: [&str; 3] = ["tracks.csv", "nodes.csv", "motion.csv"];
+const TABLES: [&str; 4] = ["tracks.csv", "left_out.csv", "nodes.csv", "motion.csv"];
 
 /// A replay in a process of its own.
 struct Run {

@@ -494,7 +494,13 @@ fn a_replay_of_a_recording_is_the_run_that_made_it() {
         &second,
         None,
     );
-    for name in ["tracks.csv", "nodes.csv", "motion.csv", "tree.glb"] {
+    for name in [
+        "tracks.csv",
+        "left_out.csv",
+        "nodes.csv",
+        "motion.csv",
+        "tree.glb",
+    ] {
         let [live, again] = [&first, &second].map(|dir| std::fs::read(dir.join(name)));
         assert!(live.expect(name) == again.expect(name), "{name} differs");
     }

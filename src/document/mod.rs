@@ -25,7 +25,7 @@ pub use number::push as push_number;
 pub use picture::{PICTURE_FILE, jpeg};
 pub use sway::Columns;
 pub use table::{TableWriter, unit};
-pub use tracks::{TRACKS_HEADER, TracksCsv, tracks_of};
+pub use tracks::{LEFT_OUT_FILE, TRACKS_FILE, TRACKS_HEADER, TracksCsv, tracks_of};
 pub use wood::{WOOD_FILE, read_wood, wood_csv};
 
 use crate::bounds::Bounds;
@@ -213,7 +213,7 @@ impl Document {
 
     /// Whether the points that were followed are in the folder.
     pub fn has_tracks(&self) -> bool {
-        self.dir.join(tracks::FILE).exists()
+        self.dir.join(TRACKS_FILE).exists()
     }
 
     /// The frame of the picture.
@@ -279,7 +279,7 @@ impl Document {
     /// `tracks.csv` is missing or damaged.
     pub fn tracked_within(&self, window_s: f64, within_s: Bounds) -> Result<Film, DocumentError> {
         if !self.has_tracks() {
-            return Err(self.no_film(tracks::FILE));
+            return Err(self.no_film(TRACKS_FILE));
         }
         tracks::read_film(&self.dir, &self.skeleton, window_s, within_s)
     }

@@ -137,6 +137,9 @@ pub struct Quality {
     /// Candidates that turned out not to be points that can be followed; they are not in the
     /// tables.
     pub tracks_rejected: u64,
+    /// Points that the film shows to be off their places; they are in a table of their own.
+    #[serde(default)]
+    pub tracks_left_out: u64,
     pub tracks_alive_end: u64,
     /// Distance by which tracking forward and back misses the start, px.
     pub median_fb_error_px: Option<f64>,

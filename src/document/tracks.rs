@@ -1,4 +1,5 @@
-//! `tracks.csv`: every point in every frame in which it was seen.
+//! `tracks.csv`: every point in every frame in which it was seen; `left_out.csv`: the same of those
+//! that were left out of the tree.
 
 use super::error::DocumentError;
 use super::table::{TableReader, TableWriter};
@@ -9,22 +10,34 @@ use crate::model::{NodeId, NodeName, Observation, Skeleton, TrackId, TrackLog, T
 use csv::{ReaderBuilder, StringRecord, Writer};
 use nalgebra::Point2;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-pub(super) const FILE: &str = "tracks.csv";
+/// The name of the table.
+pub const TRACKS_FILE: &str = "tracks.csv";
+/// The points that were left out of the tree, in a table like that of the others.
+pub const LEFT_OUT_FILE: &str = "left_out.csv";
 pub const TRACKS_HEADER: &str = "track_id,frame,time_s,u_px,v_px,node_id";
 const COLUMNS: [&str; 6] = ["track_id", "frame", "time_s", "u_px", "v_px", "node_id"];
 
-/// Writes `tracks.csv`.
+/// Writes `tracks.csv` or `left_out.csv`.
 pub struct TracksCsv<W: Write>(TableWriter<W>);
 
 impl<W: Write> TracksCsv<W> {
     /// # Errors
     /// The header cannot be written.
     pub fn new(out: W) -> Result<Self, WriteError> {
-        TableWriter::new(FILE, TRACKS_HEADER, out).map(Self)
+        TableWriter::new(TRACKS_FILE, TRACKS_HEADER, out).map(Self)
+    }
+
+    /// The table of the points that were left out of the tree.
+    ///
+    /// # Errors
+    /// The header cannot be written.
+    pub fn of_left_out(out: W) -> Result<Self, WriteError> {
+        TableWriter::new(LEFT_OUT_FILE, TRACKS_HEADER, out).map(Self)
     }
 
     /// One point in one frame; `node` is the deepest one that it belongs to.
@@ -74,86 +87,145 @@ impl<W: Write> TracksCsv<W> {
 
 /// The points of the last `window_s` seconds of what lies between two times, s, in the document in
 /// `dir`, on the nodes of
-/// `skeleton`; a point is on the node that its last row says. The table goes by row by row, so that
-/// a long capture takes no more room than what is kept of it; that needs its rows in order of time.
+/// `skeleton`, those that were left out of the tree among them; a point is on the node that its last
+/// row says. The tables go by row by row, so that a long capture takes no more room than what is
+/// kept of it; that needs their rows in order of time.
 ///
 /// # Errors
-/// The table is missing or damaged, or its times run backwards.
+/// A table is missing or damaged, or its times run backwards.
 pub(super) fn read_film(
     dir: &Path,
     skeleton: &Skeleton,
     window_s: f64,
     within_s: Bounds,
 ) -> Result<Film, DocumentError> {
-    let mut table = TableReader::open(dir, FILE, COLUMNS)?;
-    let by_name: BTreeMap<NodeName, NodeId> = skeleton
-        .nodes
-        .iter()
-        .enumerate()
-        .map(|(i, n)| (n.name, NodeId(i as u32)))
-        .collect();
+    let nodes = skeleton.nodes.iter().zip(0..);
+    let by_name: BTreeMap<NodeName, NodeId> = nodes.map(|(n, i)| (n.name, NodeId(i))).collect();
+    let mut tables = vec![TracksReader::open(dir, TRACKS_FILE, &by_name)?];
+    // Older captures have left nothing out.
+    if dir.join(LEFT_OUT_FILE).exists() {
+        tables.push(TracksReader::open(dir, LEFT_OUT_FILE, &by_name)?);
+    }
     let mut node_of: BTreeMap<TrackId, NodeId> = BTreeMap::new();
     let mut log = TrackLog::new(window_s);
-    let (mut frame_s, mut observations) = (f64::NEG_INFINITY, Vec::new());
-    while table.next()? {
-        let id = TrackId(table.whole(0, "track_id")?);
-        let time_s = table.number(2, "time_s")?;
-        // In any other order every row would be a frame of its own, with room for all points.
-        if time_s < frame_s {
-            let what =
-                "rows of one frame stand together, in order of time; sort the table by frame";
-            return Err(table.bad(format!(
-                "time_s is {time_s}, after {frame_s} in the row before: {what}"
-            )));
+    loop {
+        let times_s = tables.iter().filter_map(|t| Some(t.next.as_ref()?.time_s));
+        let Some(time_s) = times_s.min_by(f64::total_cmp) else {
+            break;
+        };
+        let mut observations = Vec::new();
+        for table in &mut tables {
+            while let Some(row) = table.take_at(time_s)? {
+                if within_s.contains(time_s) {
+                    observations.push(row.observation);
+                }
+                if let Some(node) = row.node {
+                    node_of.insert(row.observation.id, node);
+                }
+            }
         }
-        if time_s > frame_s {
-            push(&mut log, frame_s, &mut observations);
-            frame_s = time_s;
-        }
-        // A point that is nowhere has no place, as it was not seen.
-        let [u_px, v_px] = [table.cell(3), table.cell(4)].map(|c| c.parse().unwrap_or(f32::NAN));
-        if within_s.contains(time_s) {
-            observations.push(Observation {
-                id,
-                u_px,
-                v_px,
-                fb_error_px: 0.0,
-                error_px: None,
-                confirmed: true,
-            });
-        }
-        if !table.cell(5).is_empty() {
-            let name = NodeName(table.whole(5, "node_id")?);
-            let node = by_name
-                .get(&name)
-                .ok_or_else(|| table.bad(format!("there is no node {}", name.0)))?;
-            node_of.insert(id, *node);
-        }
+        push(&mut log, time_s, observations);
     }
-    push(&mut log, frame_s, &mut observations);
     Ok(Film::from_log(log.all(), skeleton, |id| {
         node_of.get(&id).copied()
     }))
 }
 
+/// Reads a table of points row by row.
+struct TracksReader<'a> {
+    table: TableReader<File, 6>,
+    by_name: &'a BTreeMap<NodeName, NodeId>,
+    next: Option<TrackRow>,
+}
+
+/// One point in one frame.
+struct TrackRow {
+    time_s: f64,
+    observation: Observation,
+    node: Option<NodeId>,
+}
+
+impl<'a> TracksReader<'a> {
+    fn open(
+        dir: &Path,
+        file: &'static str,
+        by_name: &'a BTreeMap<NodeName, NodeId>,
+    ) -> Result<Self, DocumentError> {
+        let mut reader = Self {
+            table: TableReader::open(dir, file, COLUMNS)?,
+            by_name,
+            next: None,
+        };
+        reader.next = reader.read()?;
+        Ok(reader)
+    }
+
+    /// The next row, if it is of this time, s.
+    fn take_at(&mut self, time_s: f64) -> Result<Option<TrackRow>, DocumentError> {
+        if self.next.as_ref().is_none_or(|row| row.time_s != time_s) {
+            return Ok(None);
+        }
+        let following = self.read()?;
+        // In any other order every row would be a frame of its own, with room for all points.
+        if let Some(row) = following.as_ref().filter(|row| row.time_s < time_s) {
+            let what =
+                "rows of one frame stand together, in order of time; sort the table by frame";
+            return Err(self.table.bad(format!(
+                "time_s is {}, after {time_s} in the row before: {what}",
+                row.time_s
+            )));
+        }
+        Ok(std::mem::replace(&mut self.next, following))
+    }
+
+    fn read(&mut self) -> Result<Option<TrackRow>, DocumentError> {
+        let table = &mut self.table;
+        if !table.next()? {
+            return Ok(None);
+        }
+        // A point that is nowhere has no place, as it was not seen.
+        let [u_px, v_px] = [table.cell(3), table.cell(4)].map(|c| c.parse().unwrap_or(f32::NAN));
+        let mut row = TrackRow {
+            time_s: table.number(2, "time_s")?,
+            observation: Observation {
+                id: TrackId(table.whole(0, "track_id")?),
+                u_px,
+                v_px,
+                fb_error_px: 0.0,
+                error_px: None,
+                confirmed: true,
+            },
+            node: None,
+        };
+        if !table.cell(5).is_empty() {
+            let name = NodeName(table.whole(5, "node_id")?);
+            let node = self.by_name.get(&name).copied();
+            let node = node.ok_or_else(|| table.bad(format!("there is no node {}", name.0)))?;
+            row.node = Some(node);
+        }
+        Ok(Some(row))
+    }
+}
+
 /// Hands a frame's points over; a frame without any was not filmed.
-fn push(log: &mut TrackLog, time_s: f64, observations: &mut Vec<Observation>) {
+fn push(log: &mut TrackLog, time_s: f64, observations: Vec<Observation>) {
     if !observations.is_empty() {
         log.push(TrackSet {
             time_s,
-            observations: std::mem::take(observations),
+            observations,
             ..TrackSet::default()
         });
     }
 }
 
-/// Copies `tracks.csv` of the document in `from`; a point whose node is not among `nodes` any more
-/// is written without one, as points that move nothing are.
+/// Copies the table of points `file` of the document in `from`; a point whose node is not among
+/// `nodes` any more is written without one, as points on no branch are.
 ///
 /// # Errors
 /// The table cannot be read, or not be written to its end; `stop` was set meanwhile.
 pub fn tracks_of(
     folder: &OutputFolder,
+    file: &'static str,
     from: &Path,
     nodes: &BTreeSet<NodeName>,
     stop: &AtomicBool,
@@ -161,13 +233,13 @@ pub fn tracks_of(
     let mut table = ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
-        .from_path(from.join(FILE))
-        .map_err(|e| explain(folder, e))?;
-    let mut out = Writer::from_writer(folder.file(FILE)?);
+        .from_path(from.join(file))
+        .map_err(|e| explain(folder, file, e))?;
+    let mut out = Writer::from_writer(folder.file(file)?);
     let (mut row, mut column) = (StringRecord::new(), None);
     while table
         .read_record(&mut row)
-        .map_err(|e| explain(folder, e))?
+        .map_err(|e| explain(folder, file, e))?
     {
         if stop.load(Ordering::SeqCst) {
             return Err(WriteError::Stopped);
@@ -180,9 +252,10 @@ pub fn tracks_of(
         let gone = row.get(at).is_some_and(|cell| is_gone(cell, nodes));
         let cells = row.iter().enumerate();
         let cells = cells.map(|(i, cell)| if gone && i == at { "" } else { cell });
-        out.write_record(cells).map_err(|e| explain(folder, e))?;
+        out.write_record(cells)
+            .map_err(|e| explain(folder, file, e))?;
     }
-    out.flush().map_err(|e| folder.explain(FILE, 0, e))
+    out.flush().map_err(|e| folder.explain(file, 0, e))
 }
 
 /// Whether a cell names a node that is not among `nodes`.
@@ -191,12 +264,12 @@ fn is_gone(cell: &str, nodes: &BTreeSet<NodeName>) -> bool {
     name.is_ok_and(|name| !nodes.contains(&name))
 }
 
-fn explain(folder: &OutputFolder, e: csv::Error) -> WriteError {
+fn explain(folder: &OutputFolder, file: &'static str, e: csv::Error) -> WriteError {
     match e.into_kind() {
-        csv::ErrorKind::Io(e) => folder.explain(FILE, 0, e),
+        csv::ErrorKind::Io(e) => folder.explain(file, 0, e),
         other => {
-            let what = format!("tracks.csv of the capture is damaged ({other:?})");
-            folder.explain(FILE, 0, io::Error::other(what))
+            let what = format!("{file} of the capture is damaged ({other:?})");
+            folder.explain(file, 0, io::Error::other(what))
         }
     }
 }
@@ -204,22 +277,66 @@ fn explain(folder: &OutputFolder, e: csv::Error) -> WriteError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::{Node, Size};
     use std::fs;
+
+    /// The sway is that of all points.
+    #[test]
+    fn points_that_were_left_out_are_read_with_the_others() {
+        let dir = tempfile::tempdir().unwrap();
+        let write = |file, rows: &str| {
+            fs::write(dir.path().join(file), format!("{TRACKS_HEADER}\n{rows}")).unwrap();
+        };
+        let skeleton = Skeleton {
+            nodes: vec![
+                Node::made_up(0, None, [0.0; 3]),
+                Node::made_up(7, Some(0), [0.0, 9.0, 0.0]),
+            ],
+            foot_px: Point2::origin(),
+            image_size: Size::new(64, 48),
+        };
+        let read = || read_film(dir.path(), &skeleton, 60.0, Bounds::new(0.0, 60.0));
+        write(TRACKS_FILE, "1,0,0,3.5,4,7\n1,1,0.1,3,4,7\n1,3,0.3,3,5,7\n");
+        let older = read().unwrap();
+        assert_eq!((older.times_s.len(), older.tracks.len()), (3, 1));
+        write(LEFT_OUT_FILE, "2,0,0,8,9,7\n2,2,0.2,8,8,7\n");
+        let film = read().unwrap();
+        assert_eq!(film.times_s, [0.0, 0.1, 0.2, 0.3]);
+        let seen = |k: usize| film.tracks[k].at_px.iter().map(|p| p.x.is_finite());
+        assert!(seen(0).eq([true, true, false, true]));
+        assert!(seen(1).eq([true, false, true, false]));
+        write(LEFT_OUT_FILE, "2,2,0.2,8,8,7\n2,0,0,8,9,7\n");
+        let reordered = read().unwrap_err().to_string();
+        assert!(reordered.contains(LEFT_OUT_FILE), "{reordered}");
+    }
 
     #[test]
     fn points_of_branches_that_are_gone_have_none() {
         let dir = tempfile::tempdir().unwrap();
         let text = "track_id,frame,time_s,u_px,v_px,node_id\n1,0,0,3.5,4,7\n2,0,0,3,4,8\n3,0,0,3,4,\n1,1,0.1,3,4,7\n";
-        fs::write(dir.path().join(FILE), text).unwrap();
+        fs::write(dir.path().join(TRACKS_FILE), text).unwrap();
         let folder = OutputFolder::create(&dir.path().join("out")).unwrap();
         let nodes = BTreeSet::from([NodeName(0), NodeName(8)]);
-        tracks_of(&folder, dir.path(), &nodes, &AtomicBool::new(false)).unwrap();
-        let written = fs::read_to_string(folder.path(FILE)).unwrap();
+        tracks_of(
+            &folder,
+            TRACKS_FILE,
+            dir.path(),
+            &nodes,
+            &AtomicBool::new(false),
+        )
+        .unwrap();
+        let written = fs::read_to_string(folder.path(TRACKS_FILE)).unwrap();
         assert_eq!(written, text.replace("4,7\n", "4,\n"));
-        fs::write(dir.path().join(FILE), [b'a', 0xff, b'\n']).unwrap();
-        let damaged = tracks_of(&folder, dir.path(), &nodes, &AtomicBool::new(false))
-            .unwrap_err()
-            .to_string();
+        fs::write(dir.path().join(TRACKS_FILE), [b'a', 0xff, b'\n']).unwrap();
+        let damaged = tracks_of(
+            &folder,
+            TRACKS_FILE,
+            dir.path(),
+            &nodes,
+            &AtomicBool::new(false),
+        )
+        .unwrap_err()
+        .to_string();
         assert!(
             damaged.contains("damaged") && !damaged.contains('\n'),
             "{damaged}"

@@ -48,9 +48,7 @@ pub struct Evidence {
 
 /// Judges the tracks of `table`.
 pub fn evidence(table: &TrackTable, settings: &Accumulate) -> Evidence {
-    let snr: Vec<f64> = (0..table.ids.len())
-        .map(|i| displacement_px(table, i) / noise_px(table, i))
-        .collect();
+    let snr: Vec<f64> = (0..table.ids.len()).map(|i| snr(table, i)).collect();
     let moving: Vec<usize> = (0..snr.len())
         .filter(|&i| snr[i] > settings.moving_snr)
         .collect();
@@ -73,6 +71,16 @@ pub fn evidence(table: &TrackTable, settings: &Accumulate) -> Evidence {
         sway,
         moving,
     }
+}
+
+/// Whether the point of a row moves, and is not only shaken by noise.
+pub(super) fn moves(table: &TrackTable, row: usize, settings: &Accumulate) -> bool {
+    snr(table, row) > settings.moving_snr
+}
+
+/// Displacement over tracking noise.
+fn snr(table: &TrackTable, row: usize) -> f64 {
+    displacement_px(table, row) / noise_px(table, row)
 }
 
 /// Root mean square distance of a track from its mean position, px.

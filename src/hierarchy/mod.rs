@@ -12,6 +12,7 @@ mod cut;
 mod dendrogram;
 mod ends;
 mod lanczos;
+mod left_out;
 mod linkage;
 mod ncut;
 mod path;
@@ -24,6 +25,7 @@ mod table;
 mod zeng;
 
 pub use accumulate::{COMPARE_HZ, Evidence, evidence};
+pub use left_out::left_out;
 pub use ncut::{Cut, normalised_cut};
 pub use persist::persisting;
 pub use rest::rest_position_px;

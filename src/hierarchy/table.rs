@@ -4,7 +4,7 @@ use super::accumulate::COMPARE_HZ;
 use crate::model::{LogWindow, TrackId, TrackSet, TrackTable};
 use crate::signal::median;
 use nalgebra::Point2;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Share of a step by which frames may come early: sensor times jitter, and a step of three frames
 /// is to stay one of three.
@@ -17,11 +17,28 @@ pub fn table(window: LogWindow) -> TrackTable {
     let Some(newest) = frames.last() else {
         return TrackTable::default();
     };
-    let row: BTreeMap<TrackId, usize> = newest
-        .counted()
-        .enumerate()
-        .map(|(i, o)| (o.id, i))
-        .collect();
+    table_of(&frames, newest.counted().map(|o| o.id).collect())
+}
+
+/// The same of all tracks that count in any frame, those that have been lost since among them.
+pub(super) fn every_track(window: LogWindow) -> TrackTable {
+    let frames = spaced_frames(window, 1.0 / COMPARE_HZ);
+    let any_passed = frames
+        .iter()
+        .any(|set| set.observations.iter().any(|o| o.confirmed));
+    let mut ids = BTreeSet::new();
+    for set in &frames {
+        let counting = set
+            .observations
+            .iter()
+            .filter(|o| o.confirmed || !any_passed);
+        ids.extend(counting.map(|o| o.id));
+    }
+    table_of(&frames, ids)
+}
+
+fn table_of(frames: &[&TrackSet], ids: BTreeSet<TrackId>) -> TrackTable {
+    let row: BTreeMap<TrackId, usize> = ids.into_iter().zip(0..).collect();
     let mut positions = vec![vec![None; frames.len()]; row.len()];
     let mut errors = vec![Vec::new(); row.len()];
     for (f, set) in frames.iter().enumerate() {

@@ -3,7 +3,7 @@
 use super::local::{self, Nearby};
 use crate::model::{MotionHierarchy, NodeId, Skeleton, TrackId, TrackSet};
 use nalgebra::Point2;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A later track is given to the nearest tip only within so many times the mean distance between
 /// tips.
@@ -21,6 +21,8 @@ struct Bound {
 /// Tracks bound to the measured nodes of a skeleton.
 pub struct Binding {
     tracks: BTreeMap<TrackId, Option<Bound>>,
+    /// Those that move nothing, bound or not.
+    left_out: BTreeSet<TrackId>,
     /// Of each measured node the one in which the branch ends that carries it; `None` for those
     /// that move with another one.
     parents: Vec<Option<NodeId>>,
@@ -72,6 +74,7 @@ impl Binding {
         Self {
             reach_px: REACH * mean_gap(&tips, &rest),
             tracks,
+            left_out: BTreeSet::new(),
             parents,
             collected: vec![Vec::new(); nodes.len()],
             rest_px: rest,
@@ -86,6 +89,11 @@ impl Binding {
         for (&id, &(node, rest_px)) in tracks {
             self.tracks.insert(id, Some(Bound { node, rest_px }));
         }
+    }
+
+    /// Tracks that move nothing from now on. They stay on their nodes.
+    pub fn leave_out(&mut self, tracks: &BTreeSet<TrackId>) {
+        self.left_out.extend(tracks);
     }
 
     /// Every bound track with its deepest node and its rest place, px; those that have been lost
@@ -169,6 +177,9 @@ impl Binding {
             let Some(Some(bound)) = self.tracks.get(&o.id) else {
                 continue;
             };
+            if self.left_out.contains(&o.id) {
+                continue;
+            }
             let displacement = o.at_px() - bound.rest_px;
             let mut at = Some(bound.node);
             while let Some(node) = at {
@@ -200,4 +211,59 @@ fn mean_gap(tips: &[NodeId], rest_px: &[Point2<f64>]) -> f64 {
 
 fn distance(a: Point2<f64>, b: Point2<f64>) -> f64 {
     (a.x - b.x).hypot(a.y - b.y)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Cluster, Node, Observation, Size};
+
+    /// Two points on one branch; the second goes astray.
+    #[test]
+    fn points_that_are_left_out_move_nothing_and_stay_on_their_node() {
+        let skeleton = Skeleton {
+            nodes: vec![
+                Node::made_up(0, None, [0.0; 3]),
+                Node::made_up(1, Some(0), [0.0, 40.0, 0.0]),
+            ],
+            foot_px: Point2::new(100.0, 100.0),
+            image_size: Size::new(200, 150),
+        };
+        let ids = [TrackId(3), TrackId(4)];
+        let hierarchy = MotionHierarchy {
+            clusters: vec![Cluster {
+                parent: None,
+                level: 0,
+                members: ids.to_vec(),
+                centroid_px: Point2::new(100.0, 60.0),
+                end_px: None,
+                certainty: 0.0,
+            }],
+        };
+        let rest_px = Point2::new(100.0, 60.0);
+        let rest = ids.map(|id| (id, rest_px)).into();
+        let set = TrackSet {
+            observations: vec![at(ids[0], 101.0), at(ids[1], 120.0)],
+            ..TrackSet::default()
+        };
+        let mut binding = Binding::new(&hierarchy, &rest, &skeleton);
+        let pulled = binding.targets_px(&set)[1].expect("seen");
+        assert!(pulled.x > 102.0, "{pulled}");
+        binding.leave_out(&BTreeSet::from([ids[1]]));
+        let target = binding.targets_px(&set)[1].expect("seen");
+        assert!((target.x - 101.0).abs() < 1e-6, "{target}");
+        assert_eq!(binding.node_of(ids[1]), Some(NodeId(1)));
+        assert_eq!(binding.bound().count(), 2);
+    }
+
+    fn at(id: TrackId, u_px: f32) -> Observation {
+        Observation {
+            id,
+            u_px,
+            v_px: 60.0,
+            fb_error_px: 0.0,
+            error_px: None,
+            confirmed: true,
+        }
+    }
 }

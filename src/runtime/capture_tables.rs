@@ -1,10 +1,10 @@
-//! `tracks.csv` and `motion.csv`, written from the log as far as it goes.
+//! `tracks.csv`, `left_out.csv` and `motion.csv`, written from the log as far as it goes.
 
 use super::meter::Histogram;
 use super::shared::Failure;
 use crate::cancel::CancelToken;
 use crate::config::Config;
-use crate::document::{MotionCsv, TracksCsv};
+use crate::document::{LEFT_OUT_FILE, MotionCsv, TRACKS_FILE, TracksCsv};
 use crate::files::OutputFolder;
 use crate::model::{LONGEST_TRIAL_S, Pose, TrackId, TrackLog, TrackSet};
 use crate::pipeline::PoseReplay;
@@ -20,13 +20,15 @@ use std::sync::Arc;
 /// by the times as they are written.
 const SLACK_S: f64 = 1.0;
 
-/// Both tables as far as they are written. What is in them does not depend on when and in how many
+/// The tables as far as they are written. What is in them does not depend on when and in how many
 /// pieces that is done.
 pub struct CaptureTables {
     folder: OutputFolder,
     replay: PoseReplay,
     motion: MotionCsv<BufWriter<File>>,
     tracks: TracksCsv<BufWriter<File>>,
+    /// The points that the model leaves out.
+    left_out: TracksCsv<BufWriter<File>>,
     sets: Option<Sets>,
     /// Sets whose poses are written and whose points are not yet: some of those may still be on
     /// trial.
@@ -55,7 +57,7 @@ enum EarlyRows {
     Written,
 }
 
-/// What is left when both tables are complete.
+/// What is left when the tables are complete.
 pub struct Done {
     pub folder: OutputFolder,
     /// Knows the node of every track.
@@ -68,7 +70,7 @@ pub struct Done {
 }
 
 impl CaptureTables {
-    /// Begins both files in what becomes the folder `dir`; `pictured` is the frame of the capture's
+    /// Begins the files in what becomes the folder `dir`; `pictured` is the frame of the capture's
     /// picture.
     ///
     /// # Errors
@@ -85,12 +87,14 @@ impl CaptureTables {
             &model.skeleton,
             config.export.metres_per_px,
         )?;
-        let tracks = TracksCsv::new(folder.file("tracks.csv")?)?;
+        let tracks = TracksCsv::new(folder.file(TRACKS_FILE)?)?;
+        let left_out = TracksCsv::of_left_out(folder.file(LEFT_OUT_FILE)?)?;
         Ok(Self {
             folder,
             replay: PoseReplay::new(model, config),
             motion,
             tracks,
+            left_out,
             sets: None,
             undecided: TrackLog::new(LONGEST_TRIAL_S),
             rejected: BTreeSet::new(),
@@ -132,12 +136,12 @@ impl CaptureTables {
         Ok(())
     }
 
-    /// Size of both files up to now, bytes.
+    /// Size of the files up to now, bytes.
     pub fn bytes(&self) -> u64 {
         self.folder.bytes()
     }
 
-    /// Ends both tables, the last rows of which are those that [`catch_up`](Self::catch_up) has
+    /// Ends the tables, the last rows of which are those that [`catch_up`](Self::catch_up) has
     /// written.
     ///
     /// # Errors
@@ -151,6 +155,7 @@ impl CaptureTables {
             self.decided_rows(log, cancel)?;
         }
         self.tracks.finish()?;
+        self.left_out.finish()?;
         self.motion.finish()?;
         Ok(Done {
             folder: self.folder,
@@ -163,7 +168,17 @@ impl CaptureTables {
 
     /// The points of a frame in which it is decided which are kept.
     fn rows(&mut self, set: &TrackSet) -> Result<(), Failure> {
-        Ok(self.tracks.set(set, |id| self.replay.node_name_of(id))?)
+        for o in &set.observations {
+            let is_left_out = self.replay.model().left_out.contains(&o.id);
+            let table = if is_left_out {
+                &mut self.left_out
+            } else {
+                &mut self.tracks
+            };
+            let node = self.replay.node_name_of(o.id);
+            table.row(o.id, set.frame, set.time_s, o.at_px(), node)?;
+        }
+        Ok(())
     }
 
     fn pose(&mut self, set: &TrackSet) -> Result<(), Failure> {

@@ -64,6 +64,7 @@ impl Quality {
         QualityNote {
             tracks_total: self.tracks_total(),
             tracks_rejected: self.rejected,
+            tracks_left_out: tree.map_or(0, |tree| tree.left_out.len() as u64),
             tracks_alive_end: self.alive,
             median_fb_error_px: self.fb_error_px.median(),
             median_error_px: self.error_px.median(),

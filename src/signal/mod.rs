@@ -6,6 +6,7 @@ pub mod extension;
 pub mod gram;
 pub mod interpolation;
 pub mod least_squares;
+mod local_affine;
 pub mod principal;
 pub mod qr;
 pub mod reflection;
@@ -14,6 +15,7 @@ pub mod statistics;
 pub mod variable_projection;
 pub mod vectors;
 
+pub use local_affine::{Fit, Witness, local_affine};
 pub use principal::along_principal_direction;
 pub use segments::{distance_to_segment, segments_cross};
 pub use statistics::median;

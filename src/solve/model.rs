@@ -15,7 +15,7 @@ use crate::motion::Binding;
 use crate::shape::PushFigures;
 use crate::skeleton;
 use nalgebra::Point2;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// A tree as far as film has shown it: immutable, and replaced by a newer version as a whole.
@@ -35,6 +35,9 @@ pub struct Model {
     /// Tracks that the tree was not built from, with node and rest place, px: those of an older
     /// tree, and those that were found since.
     pub joined: BTreeMap<TrackId, (NodeId, Point2<f64>)>,
+    /// Tracks that the film shows to be off their places: they move nothing. Which branches there
+    /// are, and how they sway, is told by all tracks all the same.
+    pub left_out: BTreeSet<TrackId>,
     /// The wood that the pictures show, where it was looked for and found; the skeleton runs along
     /// it.
     pub wood: Option<Arc<BranchGraph>>,
@@ -106,6 +109,7 @@ impl Model {
         let places = skeleton.foot_and_branches();
         binding.inherit(&moved_to(&self.joined, &places));
         binding.inherit(&moved_to(&self.on_sub_branches(), &places));
+        binding.leave_out(&self.left_out);
         binding
     }
 

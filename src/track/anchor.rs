@@ -5,11 +5,11 @@
 //! it.
 
 use super::flow::{Flow, OpticalFlow, Pyramid};
-use super::neighbours::Fit;
 use super::point::Point;
 use super::register::{Patch, Registration, UPRIGHT};
 use crate::config::Track;
 use crate::model::Luma;
+use crate::signal::Fit;
 use nalgebra::{Point2, distance};
 
 /// Pictures kept to put points back on; the oldest but the first gives way.

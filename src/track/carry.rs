@@ -1,8 +1,9 @@
 //! Points that are not seen are carried along by those around them that are.
 
-use super::neighbours::{self, Fit, NEIGHBOURS, Witness};
+use super::neighbours::NEIGHBOURS;
 use super::point::Point;
 use crate::model::TrackId;
+use crate::signal::{Fit, Witness, local_affine};
 use nalgebra::Point2;
 
 /// How the surroundings of each point have moved, by the places that its neighbours have now; of
@@ -24,7 +25,7 @@ pub fn neighbour_fits(points: &[Point], every: u32, frame: u64) -> Vec<Option<Fi
                 .filter_map(|(id, then_px)| seen.witness(*id, *then_px, p.born_px))
                 .take(NEIGHBOURS),
         );
-        fits.push(neighbours::fit(&witnesses));
+        fits.push(local_affine(&witnesses));
     }
     fits
 }

@@ -18,11 +18,11 @@ pub use detect::Detector;
 
 use crate::config::{Detect, Track};
 use crate::model::{Frame, Observation, Outline, TrackId, TrackSet};
+use crate::signal::Fit;
 use anchor::Anchors;
 use carry::{carry_hidden, neighbour_fits};
 use flow::{Flow, OpticalFlow, Pyramid};
 use nalgebra::{Point2, distance};
-use neighbours::Fit;
 use point::{Point, Record, Trial};
 use regain::Gaps;
 use trial::Selection;

@@ -1,8 +1,8 @@
 //! One followed point and what is known of it.
 
-use super::neighbours::Fit;
 use super::register::Patch;
 use crate::model::TrackId;
+use crate::signal::Fit;
 use nalgebra::{Point2, distance};
 
 /// Share that one more comparison has at least in a [`Record`].

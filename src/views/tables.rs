@@ -1,7 +1,7 @@
 //! The tables of a prepared tree, and its wood as cylinders.
 
 use super::{PrepareError, PreparedTree};
-use crate::document::{MotionCsv, nodes, tracks_of};
+use crate::document::{LEFT_OUT_FILE, MotionCsv, TRACKS_FILE, nodes, tracks_of};
 use crate::export::cylinders::cylinders;
 use crate::files::{OutputFolder, WriteError};
 use crate::geometry::cylinders_by_branch;
@@ -66,11 +66,20 @@ impl PreparedTree {
         let own = &self.document.skeleton;
         // Nothing was measured on copies.
         let mut measured = own.nodes[..own.measured()].iter();
-        if measured.all(|n| names.contains(&n.name)) {
-            folder.copy("tracks.csv", &self.document.dir, stop)
-        } else {
-            tracks_of(folder, &self.document.dir, &names, stop)
+        let all_there = measured.all(|n| names.contains(&n.name));
+        let dir = &self.document.dir;
+        for file in [TRACKS_FILE, LEFT_OUT_FILE] {
+            // Older captures have left nothing out.
+            if !dir.join(file).exists() {
+                continue;
+            }
+            if all_there {
+                folder.copy(file, dir, stop)?;
+            } else {
+                tracks_of(folder, file, dir, &names, stop)?;
+            }
         }
+        Ok(())
     }
 
     fn write_motion(&self, folder: &OutputFolder, stop: &AtomicBool) -> Result<(), PrepareError> {

@@ -72,13 +72,13 @@ fn model(config: &Config) -> Arc<Model> {
     Arc::new(model.expect("a tree"))
 }
 
-/// Both tables, after `write` has written what it wanted of them.
+/// The tables, after `write` has written what it wanted of them.
 fn written(
     log: &TrackFileReader,
     model: &Arc<Model>,
     config: &Config,
     write: impl FnOnce(&mut CaptureTables),
-) -> [Vec<u8>; 2] {
+) -> [Vec<u8>; 3] {
     let dir = tempfile::tempdir().expect("tempdir");
     let mut tables =
         CaptureTables::create(&dir.path().join("out"), model, config, None).expect("tables");
@@ -86,7 +86,8 @@ fn written(
     let cancel = CancelToken::new();
     tables.catch_up(log, &cancel).expect("rows");
     let done = tables.finish(log, &cancel).expect("rows");
-    ["tracks.csv", "motion.csv"].map(|name| std::fs::read(done.folder.path(name)).expect(name))
+    ["tracks.csv", "left_out.csv", "motion.csv"]
+        .map(|name| std::fs::read(done.folder.path(name)).expect(name))
 }
 
 #[test]
@@ -98,9 +99,12 @@ fn tables_that_were_cut_anywhere_are_those_written_at_once() {
     let log = file.reader().expect("file");
 
     let whole = written(&log, &model, &config, |_| ());
-    let rows = whole[0].iter().filter(|b| **b == b'\n').count();
+    let rows = |table: usize| whole[table].iter().filter(|b| **b == b'\n').count();
     let per_frame = LIMBS.len() * POINTS_PER_LIMB as usize - 1;
-    assert_eq!(rows, 1 + per_frame * FRAMES as usize);
+    let n_out = model.left_out.len();
+    assert!(n_out > 0, "some points are left out");
+    assert_eq!(rows(0), 1 + (per_frame - n_out) * FRAMES as usize);
+    assert_eq!(rows(1), 1 + n_out * FRAMES as usize);
 
     let (mut early, mut late) = (0, 0);
     let cut = written(&log, &model, &config, |tables| {
