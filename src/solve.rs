@@ -8,6 +8,7 @@ mod along_wood;
 mod bent_tree;
 mod in_depth;
 mod labels;
+mod least_wood;
 mod lift;
 mod model;
 mod refine;

@@ -924,7 +924,14 @@ fn a_tree_whose_film_was_removed_is_exported_drawn_and_moved_by_wind() {
     let dir = tempfile::tempdir().expect("tempdir");
     let bare = dir.path().join("bare");
     fs::create_dir(&bare).expect("folder");
-    for name in ["capture.json", "nodes.csv", "frame.jpg", "tree.glb"] {
+    let kept = [
+        "capture.json",
+        "nodes.csv",
+        "frame.jpg",
+        "bark.png",
+        "tree.glb",
+    ];
+    for name in kept {
         fs::copy(made().join(name), bare.join(name)).expect("copy");
     }
     goes_without_a_film(&bare, true);

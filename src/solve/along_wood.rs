@@ -9,6 +9,7 @@
 
 use super::bent_tree::{BentTree, Names, share_of_push, way_of};
 use super::labels::{Labels, label};
+use super::least_wood;
 use crate::model::{BranchGraph, Node, NodeId, NodeKind, NodeName, Skeleton};
 use crate::signal::distance_to_segment;
 use nalgebra::{Point2, Point3, Vector2};
@@ -49,6 +50,7 @@ pub(super) fn along_wood(
     let labels = label(skeleton, wood, points);
     let mut build = Build::new(skeleton, wood, &labels, points);
     build.measured();
+    build.settle_unseen();
     build.side_wood();
     build.set_levels();
     build.name(names);
@@ -96,6 +98,8 @@ struct Build<'a> {
     place_of: Vec<Option<NodeId>>,
     /// Where each piece of wood ends in the new tree.
     place_of_wood: Vec<Option<NodeId>>,
+    /// Nodes of the new tree to which no wood is seen.
+    unseen: Vec<usize>,
 }
 
 impl<'a> Build<'a> {
@@ -114,6 +118,7 @@ impl<'a> Build<'a> {
             under: wood_under(old, wood, points),
             place_of: vec![None; old.measured()],
             place_of_wood: vec![None; wood.nodes.len()],
+            unseen: Vec::new(),
         };
         if let Some(foot) = build.place_of.first_mut() {
             *foot = Some(NodeId(0));
@@ -169,7 +174,7 @@ impl<'a> Build<'a> {
             let share = share_of_push(&pushed, unseen_px, whole_px);
             let end = self.old.nodes[branch].position;
             let end = Point3::new(end.x, end.y, depth + share * pushed.z);
-            self.push_straight(branch, parent, end, share);
+            self.push_unseen(branch, parent, end, share);
         }
         self.bind_bends(branch);
     }
@@ -321,7 +326,7 @@ impl<'a> Build<'a> {
             None => self.nearest_on(carrier, branch),
         };
         let parent = self.without_fold(begin, old.position);
-        self.push_straight(branch, parent, old.position, 1.0);
+        self.push_unseen(branch, parent, old.position, 1.0);
         self.bind_bends(branch);
     }
 
@@ -341,6 +346,26 @@ impl<'a> Build<'a> {
             from,
             at_px: from_px + share.clamp(LEAST_SHARE, 1.0) * way,
         })
+    }
+
+    /// A branch, or the part of it, whose wood is not seen.
+    fn push_unseen(&mut self, branch: usize, from: NodeId, end: Point3<f64>, share: f64) {
+        let first = self.tree.nodes.len();
+        self.push_straight(branch, from, end, share);
+        self.unseen.extend(first..self.tree.nodes.len());
+    }
+
+    /// Forks that are not seen stand where the tree needs least wood; tips stay.
+    fn settle_unseen(&mut self) {
+        let mut bears = vec![false; self.tree.nodes.len()];
+        for node in &self.tree.nodes {
+            if let Some(parent) = node.parent {
+                bears[parent.index()] = true;
+            }
+        }
+        self.unseen.retain(|node| bears[*node]);
+        let least = JOINT_PX * f64::from(self.old.image_size.width) / 640.0;
+        least_wood::settle(&mut self.tree.nodes, &self.unseen, least);
     }
 
     /// A branch, or the part of it that is not seen, goes straight to its end, with a joint
