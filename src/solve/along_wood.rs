@@ -9,7 +9,7 @@
 
 use super::bent_tree::{BentTree, Names, share_of_push, way_of};
 use super::labels::{Labels, label};
-use super::least_wood;
+use super::least_wood::{Free, settle};
 use crate::model::{BranchGraph, Node, NodeId, NodeKind, NodeName, Skeleton};
 use crate::signal::distance_to_segment;
 use nalgebra::{Point2, Point3, Vector2};
@@ -363,9 +363,16 @@ impl<'a> Build<'a> {
                 bears[parent.index()] = true;
             }
         }
-        self.unseen.retain(|node| bears[*node]);
+        let mut free = Vec::new();
+        for &node in self.unseen.iter().filter(|node| bears[**node]) {
+            let branch = self.tree.branch_of[node];
+            let is_end = self.place_of[branch].map(NodeId::index) == Some(node);
+            let is_own = |p: &&PointOn| is_end && p.node.index() == branch;
+            let own = self.points.iter().filter(is_own).count() as u32;
+            free.push(Free { node, own });
+        }
         let least = JOINT_PX * f64::from(self.old.image_size.width) / 640.0;
-        least_wood::settle(&mut self.tree.nodes, &self.unseen, least);
+        settle(&mut self.tree.nodes, &free, least);
     }
 
     /// A branch, or the part of it that is not seen, goes straight to its end, with a joint
@@ -756,16 +763,38 @@ mod tests {
         let tree = along_wood(&straight(), &wood, &points(), &mut names(None)).skeleton;
         let places = tree.foot_and_branches();
         let trunk = &tree.nodes[places[1].index()];
-        assert_eq!(trunk.position, straight().nodes[1].position);
-        // The right limb's points begin above the bend, the left one's beside the fork.
+        // Its own points hold it.
+        let off = (trunk.position - straight().nodes[1].position).norm();
+        assert!(off < 1.0, "{trunk:?}");
+        // The right limb's points begin above the bend, the left one's beside the fork. The limb
+        // draws the joint a little to its side.
         let joint = &tree.nodes[trunk.parent.expect("a joint").index()];
         assert_eq!(joint.kind, NodeKind::Measured);
         assert_eq!(joint.moves_with, Some(places[1]));
-        assert!((joint.position.y - 70.0).abs() < 1.0, "{joint:?}");
+        assert!((65.0..71.0).contains(&joint.position.y), "{joint:?}");
+        assert!((0.0..5.0).contains(&joint.position.x), "{joint:?}");
         let bend = &tree.nodes[joint.parent.expect("a bend").index()];
         assert_eq!((bend.kind, bend.position.y), (NodeKind::Traced, 60.0));
         let parent = |branch: usize| tree.nodes[places[branch].index()].parent;
         assert_eq!((parent(2), parent(3)), (trunk.parent, Some(places[1])));
+    }
+
+    /// With no points of its own, a fork goes where its limbs take least wood.
+    #[test]
+    fn an_unseen_fork_without_points_stands_lower_where_its_limbs_part_wide() {
+        let mut wood = wood();
+        wood.nodes.truncate(2);
+        let mut points = points();
+        points.retain(|p| p.node != NodeId(1));
+        let tree = along_wood(&straight(), &wood, &points, &mut names(None)).skeleton;
+        let places = tree.foot_and_branches();
+        let trunk = &tree.nodes[places[1].index()];
+        assert!((61.0..97.0).contains(&trunk.position.y), "{trunk:?}");
+        let tips = [2, 3].map(|branch: usize| tree.nodes[places[branch].index()].position);
+        assert_eq!(
+            tips,
+            [2, 3].map(|branch: usize| straight().nodes[branch].position)
+        );
     }
 
     /// It hangs on the same branch as its neighbours then, and not on what carries them all.

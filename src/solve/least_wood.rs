@@ -10,6 +10,14 @@ const PIPES: f64 = 2.5;
 const MOST_ROUNDS: usize = 300;
 const SETTLED_PX: f64 = 0.02;
 
+/// A node whose place is not seen.
+pub(super) struct Free {
+    pub node: usize,
+    /// Points of the limb that ends in the node itself, not of what it bears: they hold the node
+    /// where it is, as a limb of so many would.
+    pub own: u32,
+}
+
 /// Moves the nodes in `free` so that the limbs between them and their neighbours have the least
 /// volume: the sum of lengths, each times the area of its limb (Murray 1926: the geometry of
 /// branching). The area follows from the number of points that a limb bears. Distances below
@@ -17,8 +25,15 @@ const SETTLED_PX: f64 = 0.02;
 ///
 /// For a fork alone that is the weighted Fermat point, and all forks in turn are moved there step by
 /// step (Weiszfeld 1937).
-pub(super) fn settle(nodes: &mut [Node], free: &[usize], least: f64) {
+pub(super) fn settle(nodes: &mut [Node], free: &[Free], least: f64) {
     let areas = areas(nodes);
+    let mut held = Vec::with_capacity(free.len());
+    for Free { node, own } in free {
+        held.push(Joined {
+            at: nodes[*node].position,
+            area: area(f64::from(*own)),
+        });
+    }
     let mut children: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
     for (i, node) in nodes.iter().enumerate() {
         if let Some(parent) = node.parent {
@@ -27,7 +42,7 @@ pub(super) fn settle(nodes: &mut [Node], free: &[usize], least: f64) {
     }
     for _ in 0..MOST_ROUNDS {
         let mut farthest: f64 = 0.0;
-        for &fork in free {
+        for (&Free { node: fork, .. }, &held) in free.iter().zip(&held) {
             let Some(parent) = nodes[fork].parent else {
                 continue;
             };
@@ -41,7 +56,7 @@ pub(super) fn settle(nodes: &mut [Node], free: &[usize], least: f64) {
             });
             let to = between(
                 nodes[fork].position,
-                std::iter::once(below).chain(above),
+                [below, held].into_iter().chain(above),
                 least,
             );
             farthest = farthest.max((to - nodes[fork].position).norm());
@@ -54,6 +69,7 @@ pub(super) fn settle(nodes: &mut [Node], free: &[usize], least: f64) {
 }
 
 /// The end of a limb at whose other end a fork is.
+#[derive(Clone, Copy, Debug)]
 struct Joined {
     at: Point3<f64>,
     area: f64,
@@ -76,12 +92,17 @@ fn areas(nodes: &[Node]) -> Vec<f64> {
     let mut areas = vec![0.0; nodes.len()];
     for (i, node) in nodes.iter().enumerate().rev() {
         let borne = f64::from(node.n_tracks).max(above[i]).max(1.0);
-        areas[i] = borne.powf(2.0 / PIPES);
+        areas[i] = area(borne);
         if let Some(parent) = node.parent {
             above[parent.index()] += borne;
         }
     }
     areas
+}
+
+/// Area of a limb that bears so many points.
+fn area(points: f64) -> f64 {
+    points.powf(2.0 / PIPES)
 }
 
 #[cfg(test)]
@@ -107,7 +128,7 @@ mod tests {
             node(Some(1), [-50.0, 100.0, 0.0], 8),
             node(Some(1), [50.0, 100.0, 0.0], 8),
         ];
-        settle(&mut nodes, &[1], 0.1);
+        settle(&mut nodes, &[Free { node: 1, own: 0 }], 0.1);
         let fork = nodes[1].position;
         assert!(fork.x.abs() < 0.1 && fork.y > 10.0, "{fork}");
         let [left, right] = [2, 3].map(|i: usize| (nodes[i].position - fork).normalize());
@@ -126,7 +147,7 @@ mod tests {
             node(Some(1), [-90.0, 10.0, 0.0], 8),
             node(Some(1), [90.0, 10.0, 0.0], 8),
         ];
-        settle(&mut nodes, &[1], 4.0);
+        settle(&mut nodes, &[Free { node: 1, own: 0 }], 4.0);
         let height = nodes[1].position.y;
         assert!((0.1..4.0).contains(&height), "{height}");
     }

@@ -144,7 +144,7 @@ fn branches(state: &State, skeleton: &Skeleton, theme: Theme) -> Vec<BranchLine>
 }
 
 /// What a user who pulls the tree has to know before.
-const BEFORE_PULL: &str = "begin to film before the pull, so that it is seen at rest";
+const BEFORE_PULL: &str = "begin to film before the pull";
 
 /// What the tree waits for; until it is built, with what makes it a good one.
 fn reason(s: &Snapshot) -> String {
