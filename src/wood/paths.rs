@@ -53,7 +53,7 @@ pub fn branches(wood: &WoodMask, foot_px: Point2<f64>) -> opencv::Result<BranchG
     let grid = Grid::of(wood)?;
     let foot = grid.nearest(wood.to_mask(foot_px));
     let ways = Ways::from(&grid, foot);
-    let tracks = tips_first(&grid, &ways);
+    let tracks = tips_first(&grid, &ways, foot);
     Ok(graph(&grid, &tracks, foot_px))
 }
 
@@ -227,9 +227,13 @@ struct Track {
     pixels: Vec<usize>,
 }
 
-/// All branches, the farthest tips first.
-fn tips_first(grid: &Grid, ways: &Ways) -> Vec<Track> {
-    let is_tip = |pixel: &usize| grid.inside[*pixel] > 0.0 && ways.cost[*pixel].is_finite();
+/// All branches, the farthest tips first. What does not reach above the foot is roots, or lies on
+/// the ground.
+fn tips_first(grid: &Grid, ways: &Ways, foot: usize) -> Vec<Track> {
+    let is_tip = |pixel: &usize| {
+        let is_above = pixel / grid.width < foot / grid.width;
+        is_above && grid.inside[*pixel] > 0.0 && ways.cost[*pixel].is_finite()
+    };
     let mut tips: Vec<usize> = (0..grid.cost.len()).filter(is_tip).collect();
     tips.sort_by(|a, b| ways.cost[*b].total_cmp(&ways.cost[*a]));
     let mut explained = vec![false; grid.cost.len()];
@@ -529,6 +533,15 @@ mod tests {
         };
         assert!(highest(branches(&still, FOOT).expect("opencv")) > 100.0);
         assert!(highest(branches(&moving, FOOT).expect("opencv")) < 30.0);
+    }
+
+    #[test]
+    fn what_lies_on_the_ground_is_no_branch() {
+        let low = Point2::new(70.0, 239.0);
+        let lines = [[FOOT, Point2::new(100.0, 30.0)], [FOOT, low]];
+        let graph = branches(&mask(&lines, 4.0), FOOT).expect("opencv");
+        let tips = graph.children().iter().filter(|c| c.is_empty()).count();
+        assert_eq!(tips, 1, "{graph:?}");
     }
 
     #[test]
