@@ -8,6 +8,7 @@
 
 mod bark;
 mod circles;
+mod crossings;
 mod cut;
 mod evidence;
 mod faint;

@@ -2,6 +2,7 @@
 //! cheapest way to the foot through the middle of the wood is a branch (Sato et al. 2000,
 //! "TEASAR").
 
+use super::crossings::taken_apart;
 use super::mask::WoodMask;
 use crate::model::{BranchGraph, Size, WoodNode};
 use crate::signal::{distance_to_segment, median};
@@ -53,17 +54,17 @@ pub fn branches(wood: &WoodMask, foot_px: Point2<f64>) -> opencv::Result<BranchG
     let grid = Grid::of(wood)?;
     let foot = grid.nearest(wood.to_mask(foot_px));
     let ways = Ways::from(&grid, foot);
-    let tracks = tips_first(&grid, &ways, foot);
+    let tracks = taken_apart(&grid, tips_first(&grid, &ways, foot));
     Ok(graph(&grid, &tracks, foot_px))
 }
 
 /// The mask as a graph of pixels.
-struct Grid<'a> {
+pub(super) struct Grid<'a> {
     wood: &'a WoodMask,
     width: usize,
     height: usize,
     /// Distance from the edge of the wood, px; 0 outside.
-    inside: Vec<f32>,
+    pub inside: Vec<f32>,
     /// Whether a way may lead there: wood, what is near to it, and what moves with the tree.
     passable: Vec<bool>,
     /// Of a step in the pixel.
@@ -97,13 +98,13 @@ impl<'a> Grid<'a> {
     }
 
     /// The pixel nearest to a place.
-    fn nearest(&self, at: Point2<f64>) -> usize {
+    pub fn nearest(&self, at: Point2<f64>) -> usize {
         let u = at.x.round().clamp(0.0, (self.width - 1) as f64) as usize;
         let v = at.y.round().clamp(0.0, (self.height - 1) as f64) as usize;
         v * self.width + u
     }
 
-    fn place(&self, pixel: usize) -> Point2<f64> {
+    pub fn place(&self, pixel: usize) -> Point2<f64> {
         self.wood.place(pixel)
     }
 
@@ -223,8 +224,8 @@ impl Ways {
 
 /// A branch as pixels from where it leaves an earlier one to its tip; the first also belongs to
 /// that.
-struct Track {
-    pixels: Vec<usize>,
+pub(super) struct Track {
+    pub pixels: Vec<usize>,
 }
 
 /// All branches, the farthest tips first. What does not reach above the foot is roots, or lies on
