@@ -50,11 +50,11 @@ pub(super) fn along_wood(
     let labels = label(skeleton, wood, points);
     let mut build = Build::new(skeleton, wood, &labels, points);
     build.measured();
-    build.settle_unseen();
     build.side_wood();
     build.set_levels();
-    build.name(names);
     build.tree.copy_into_planes(skeleton, names);
+    build.settle_unseen();
+    build.name(names);
     Joined {
         skeleton: Skeleton {
             nodes: build.tree.nodes,
@@ -355,7 +355,7 @@ impl<'a> Build<'a> {
         self.unseen.extend(first..self.tree.nodes.len());
     }
 
-    /// Forks that are not seen stand where the tree needs least wood; tips stay.
+    /// Forks that are not seen stand where the tree needs least wood, copies as well; tips stay.
     fn settle_unseen(&mut self) {
         let mut bears = vec![false; self.tree.nodes.len()];
         for node in &self.tree.nodes {
@@ -363,10 +363,18 @@ impl<'a> Build<'a> {
                 bears[parent.index()] = true;
             }
         }
+        let mut is_unseen = vec![false; self.tree.nodes.len()];
+        for node in &self.unseen {
+            is_unseen[*node] = true;
+        }
         let mut free = Vec::new();
-        for &node in self.unseen.iter().filter(|node| bears[**node]) {
+        for (node, bears) in bears.into_iter().enumerate() {
+            let of = self.tree.nodes[node].copy_of.map_or(node, NodeId::index);
+            if !bears || !is_unseen[of] {
+                continue;
+            }
             let branch = self.tree.branch_of[node];
-            let is_end = self.place_of[branch].map(NodeId::index) == Some(node);
+            let is_end = self.place_of[branch].map(NodeId::index) == Some(of);
             let is_own = |p: &&PointOn| is_end && p.node.index() == branch;
             let own = self.points.iter().filter(is_own).count() as u32;
             free.push(Free { node, own });
@@ -551,7 +559,7 @@ impl<'a> Build<'a> {
             }
         }
         for node in &mut self.tree.nodes {
-            if node.moves_with.is_none() {
+            if node.moves_with.is_none() || node.copy_of.is_some() {
                 continue;
             }
             let distance = |at: &Point3<f64>| (at.xy() - node.position.xy()).norm();

@@ -1,6 +1,6 @@
 //! Where limbs run that nobody sees: their forks stand so that the tree needs least wood.
 
-use crate::model::Node;
+use crate::model::{Node, NodeId};
 use nalgebra::{Point3, Vector3};
 
 /// A limb is as thick as all that it bears together, its radius to this power (da Vinci's rule has
@@ -36,8 +36,8 @@ pub(super) fn settle(nodes: &mut [Node], free: &[Free], least: f64) {
     }
     let mut children: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
     for (i, node) in nodes.iter().enumerate() {
-        if let Some(parent) = node.parent {
-            children[parent.index()].push(i);
+        if let Some(bears) = borne_by(nodes, node) {
+            children[bears].push(i);
         }
     }
     for _ in 0..MOST_ROUNDS {
@@ -86,18 +86,27 @@ fn between(fork: Point3<f64>, ends: impl Iterator<Item = Joined>, least: f64) ->
     Point3::from(sum / weights)
 }
 
-/// Area of the limb that ends in each node, that of one which bears a single point being 1.
+/// Area of the limb that ends in each node, that of one which bears a single point being 1. A copy
+/// bears what its original does.
 fn areas(nodes: &[Node]) -> Vec<f64> {
     let mut above = vec![0.0; nodes.len()];
     let mut areas = vec![0.0; nodes.len()];
     for (i, node) in nodes.iter().enumerate().rev() {
-        let borne = f64::from(node.n_tracks).max(above[i]).max(1.0);
+        let original = node.copy_of.map_or(node, |of| &nodes[of.index()]);
+        let borne = f64::from(original.n_tracks).max(above[i]).max(1.0);
         areas[i] = area(borne);
-        if let Some(parent) = node.parent {
-            above[parent.index()] += borne;
+        if let Some(bears) = borne_by(nodes, node) {
+            above[bears] += borne;
         }
     }
     areas
+}
+
+/// The parent of a node, if both are copies or neither is: what was filmed does not turn to the
+/// copies that hang on it.
+fn borne_by(nodes: &[Node], node: &Node) -> Option<usize> {
+    let parent = node.parent.map(NodeId::index)?;
+    (nodes[parent].copy_of.is_some() == node.copy_of.is_some()).then_some(parent)
 }
 
 /// Area of a limb that bears so many points.
@@ -108,7 +117,6 @@ fn area(points: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::NodeId;
 
     fn node(parent: Option<u32>, at: [f64; 3], n_tracks: u32) -> Node {
         Node {
