@@ -286,27 +286,28 @@ impl Clues<'_> {
 /// What it costs that neighbours differ: little where their colours do (Boykov and Jolly 2001).
 /// Nothing links what is beyond the region.
 fn links(pixels: &[Vec3b], region: &[u8], size: Size) -> Vec<[f32; PAIRS]> {
-    let is_linked = |i: usize, next: usize| region[i] != 0 && region[next] != 0;
+    let apart = |i: usize, pair: usize| {
+        let next = neighbour(i, pair, size).filter(|next| region[i] != 0 && region[*next] != 0)?;
+        Some((colour(&pixels[i]) - colour(&pixels[next])).norm_squared())
+    };
     let (mut sum, mut count) = (0.0, 0_usize);
-    let mut apart = vec![[None; PAIRS]; pixels.len()];
-    for (i, apart) in apart.iter_mut().enumerate() {
-        for (pair, apart) in apart.iter_mut().enumerate() {
-            let next = neighbour(i, pair, size).filter(|next| is_linked(i, *next));
-            *apart = next.map(|next| (colour(&pixels[i]) - colour(&pixels[next])).norm_squared());
-            sum += apart.unwrap_or(0.0);
-            count += usize::from(apart.is_some());
-        }
+    let within = (0..pixels.len()).filter(|i| region[*i] != 0);
+    for apart in within.flat_map(|i| (0..PAIRS).filter_map(move |pair| apart(i, pair))) {
+        sum += apart;
+        count += 1;
     }
     let mean = (sum / count.max(1) as f64).max(f64::MIN_POSITIVE);
-    let mut links = Vec::with_capacity(pixels.len());
-    for apart in apart {
-        let mut of_pixel = [0.0; PAIRS];
-        for (pair, apart) in apart.into_iter().enumerate() {
+    let mut links = vec![[0.0; PAIRS]; pixels.len()];
+    for (i, links) in links
+        .iter_mut()
+        .enumerate()
+        .filter(|(i, _)| region[*i] != 0)
+    {
+        for (pair, link) in links.iter_mut().enumerate() {
             let length = if pair % 2 == 1 { f64::sqrt(2.0) } else { 1.0 };
-            let link = |apart: f64| f64::from(LINK) / length * (-apart / (2.0 * mean)).exp();
-            of_pixel[pair] = apart.map_or(0.0, link) as f32;
+            let most = f64::from(LINK) / length;
+            *link = apart(i, pair).map_or(0.0, |apart| most * (-apart / (2.0 * mean)).exp()) as f32;
         }
-        links.push(of_pixel);
     }
     links
 }
