@@ -2,7 +2,8 @@
 //! and writes it; everything that is made from it is a view (see `export`).
 //!
 //! `capture.json` says what was filmed and how, `nodes.csv` holds the whole model, `frame.jpg` one
-//! picture of it, `bark.png` its bark. A tree that was filmed has `tracks.csv`, the points, and `motion.csv`, the poses.
+//! picture of it, `bark.png` its bark. A tree that was filmed has `tracks.csv` and `left_out.csv`, the
+//! points, and `motion.csv`, the poses.
 
 mod bark;
 mod error;

@@ -22,10 +22,10 @@ const SHARE: f64 = 0.25;
 /// Never so many that fewer are left that move: twice what evidence of motion needs to count in
 /// full.
 const LEAST_LEFT: usize = 64;
-/// A point's place is told by so many that move most like it, of so many nearest.
+/// A point's place follows from so many that move most like it, of so many nearest.
 const ALIKE: usize = 16;
 const NEAREST: usize = 32;
-/// Frames, evenly spread over the film, in which places are told; more say the same at a higher
+/// Frames, evenly spread over the film, in which places are estimated; more say the same at a higher
 /// price.
 const FRAMES: usize = 40;
 /// Points seen in fewer frames of the table are not judged: that is a second.

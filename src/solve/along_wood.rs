@@ -13,6 +13,7 @@ use super::least_wood::{Free, settle};
 use crate::model::{BranchGraph, Node, NodeId, NodeKind, NodeName, Skeleton};
 use crate::signal::distance_to_segment;
 use nalgebra::{Point2, Point3, Vector2};
+use std::collections::BTreeSet;
 
 /// A followed point on its branch.
 #[derive(Clone, Copy, Debug)]
@@ -99,7 +100,7 @@ struct Build<'a> {
     /// Where each piece of wood ends in the new tree.
     place_of_wood: Vec<Option<NodeId>>,
     /// Nodes of the new tree to which no wood is seen.
-    unseen: Vec<usize>,
+    unseen: BTreeSet<usize>,
 }
 
 impl<'a> Build<'a> {
@@ -118,7 +119,7 @@ impl<'a> Build<'a> {
             under: wood_under(old, wood, points),
             place_of: vec![None; old.measured()],
             place_of_wood: vec![None; wood.nodes.len()],
-            unseen: Vec::new(),
+            unseen: BTreeSet::new(),
         };
         if let Some(foot) = build.place_of.first_mut() {
             *foot = Some(NodeId(0));
@@ -363,14 +364,10 @@ impl<'a> Build<'a> {
                 bears[parent.index()] = true;
             }
         }
-        let mut is_unseen = vec![false; self.tree.nodes.len()];
-        for node in &self.unseen {
-            is_unseen[*node] = true;
-        }
         let mut free = Vec::new();
         for (node, bears) in bears.into_iter().enumerate() {
             let of = self.tree.nodes[node].copy_of.map_or(node, NodeId::index);
-            if !bears || !is_unseen[of] {
+            if !bears || !self.unseen.contains(&of) {
                 continue;
             }
             let branch = self.tree.branch_of[node];
@@ -379,8 +376,13 @@ impl<'a> Build<'a> {
             let own = self.points.iter().filter(is_own).count() as u32;
             free.push(Free { node, own });
         }
-        let least = JOINT_PX * f64::from(self.old.image_size.width) / 640.0;
+        let least = self.joint_px();
         settle(&mut self.tree.nodes, &free, least);
+    }
+
+    /// [`JOINT_PX`] in this picture, px.
+    fn joint_px(&self) -> f64 {
+        JOINT_PX * f64::from(self.old.image_size.width) / 640.0
     }
 
     /// A branch, or the part of it that is not seen, goes straight to its end, with a joint
@@ -435,7 +437,7 @@ impl<'a> Build<'a> {
             shares.push(most.min(nearest));
         }
         shares.sort_by(f64::total_cmp);
-        let apart = JOINT_PX * f64::from(self.old.image_size.width) / 640.0 / length_px;
+        let apart = self.joint_px() / length_px;
         let mut joints: Vec<f64> = Vec::new();
         for share in shares {
             let last = joints.last().copied().unwrap_or(0.0);

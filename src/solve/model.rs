@@ -36,7 +36,7 @@ pub struct Model {
     /// tree, and those that were found since.
     pub joined: BTreeMap<TrackId, (NodeId, Point2<f64>)>,
     /// Tracks that the film shows to be off their places: they move nothing. Which branches there
-    /// are, and how they sway, is told by all tracks all the same.
+    /// are, and how they sway, follows from all tracks all the same.
     pub left_out: BTreeSet<TrackId>,
     /// The wood that the pictures show, where it was looked for and found; the skeleton runs along
     /// it.

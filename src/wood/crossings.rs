@@ -32,8 +32,15 @@ const MOST_TURN: f64 = 0.7;
 /// bears others comes before them.
 pub(super) fn taken_apart(grid: &Grid, tracks: Vec<Track>) -> Vec<Track> {
     let mut tracks = tracks;
-    for track in 0..tracks.len() {
-        go_straight(grid, &mut tracks, track);
+    let mut carriers = carriers(&tracks);
+    for branch in 0..tracks.len() {
+        let Some(leaves) = carriers[branch] else {
+            continue;
+        };
+        if turns_less(grid, &tracks, branch, leaves) {
+            change_upper_parts(&mut tracks, branch, leaves);
+            carriers = self::carriers(&tracks);
+        }
     }
     while let Some(crossing) = find(grid, &tracks) {
         join(&mut tracks, crossing);
@@ -41,25 +48,23 @@ pub(super) fn taken_apart(grid: &Grid, tracks: Vec<Track>) -> Vec<Track> {
     carriers_first(tracks)
 }
 
-/// Where a branch leaves a limb that turns by more there than from itself into the branch, the two
-/// change their upper parts.
-fn go_straight(grid: &Grid, tracks: &mut [Track], branch: usize) {
-    let Some(leaves) = carriers(tracks)[branch] else {
-        return;
+/// Whether a limb turns by more, where a branch leaves it, than from itself into the branch.
+fn turns_less(grid: &Grid, tracks: &[Track], branch: usize, leaves: OnTrack) -> bool {
+    let Some(fork) = Fork::of(grid, tracks, branch, leaves) else {
+        return false;
     };
-    let (limb, fork) = (leaves.track, leaves.index);
-    let Some(of_branch) = Fork::of(grid, tracks, branch, limb, fork) else {
-        return;
-    };
-    let over = OVER_RADII * of_branch.radius + OVER_PX;
-    let came = way_back(grid, &tracks[limb].pixels[..=fork], over);
-    let goes = way(grid, tracks[limb].pixels[fork..].iter(), over);
+    let limb = &tracks[leaves.track].pixels;
+    let came = way_back(grid, &limb[..=leaves.index], over(fork.radius));
+    let goes = way(grid, limb[leaves.index..].iter(), over(fork.radius));
     let of_limb = came.zip(goes).map(|(came, goes)| came.angle(&goes));
-    if of_limb.is_some_and(|turn| turn > of_branch.turn) {
-        let upper = tracks[limb].pixels.split_off(fork);
-        let other = std::mem::replace(&mut tracks[branch].pixels, upper);
-        tracks[limb].pixels.extend(other);
-    }
+    of_limb.is_some_and(|turn| turn > fork.turn)
+}
+
+/// Makes a branch the upper part of the limb that it leaves, and that the branch.
+fn change_upper_parts(tracks: &mut [Track], branch: usize, leaves: OnTrack) {
+    let upper = tracks[leaves.track].pixels.split_off(leaves.index);
+    let other = std::mem::replace(&mut tracks[branch].pixels, upper);
+    tracks[leaves.track].pixels.extend(other);
 }
 
 /// A branch that ends at a crossing, and what goes on from it.
@@ -90,7 +95,7 @@ fn find(grid: &Grid, tracks: &[Track]) -> Option<Crossing> {
         let Some(leaves) = carriers[goes_on] else {
             continue;
         };
-        let Some(fork) = Fork::of(grid, tracks, goes_on, leaves.track, leaves.index) else {
+        let Some(fork) = Fork::of(grid, tracks, goes_on, leaves) else {
             continue;
         };
         for ends in &endings {
@@ -166,8 +171,8 @@ fn meet(grid: &Grid, a: &Track, b: &Track) -> bool {
     if apart > MEET_RADII * radius + MEET_PX {
         return false;
     }
-    let over = OVER_RADII * radius + OVER_PX;
-    let ways = way_back(grid, &a.pixels, over).zip(way_back(grid, &b.pixels, over));
+    let came = |track: &Track| way_back(grid, &track.pixels, over(radius));
+    let ways = came(a).zip(came(b));
     ways.is_some_and(|(a, b)| a.angle(&-b) < MOST_TURN)
 }
 
@@ -185,22 +190,15 @@ struct Fork<'a> {
 }
 
 impl<'a> Fork<'a> {
-    fn of(
-        grid: &Grid,
-        tracks: &'a [Track],
-        branch: usize,
-        limb: usize,
-        index: usize,
-    ) -> Option<Self> {
-        let (track, limb) = (&tracks[branch], &tracks[limb]);
+    fn of(grid: &Grid, tracks: &'a [Track], branch: usize, leaves: OnTrack) -> Option<Self> {
+        let (track, limb) = (&tracks[branch], &tracks[leaves.track]);
         let fork = grid.place(track.pixels[0]);
         let radius = f64::from(grid.inside[track.pixels[0]]);
         let on_limb = ON_LIMB_RADII * radius + ON_LIMB_PX;
         let is_beyond = |pixel: &usize| (grid.place(*pixel) - fork).norm() > on_limb;
         let beyond = track.pixels.iter().position(is_beyond)?;
-        let over = OVER_RADII * radius + OVER_PX;
-        let way = way(grid, track.pixels[beyond..].iter(), over)?;
-        let came = way_back(grid, &limb.pixels[..=index], over)?;
+        let way = way(grid, track.pixels[beyond..].iter(), over(radius))?;
+        let came = way_back(grid, &limb.pixels[..=leaves.index], over(radius))?;
         Some(Self {
             track,
             radius,
@@ -219,13 +217,18 @@ impl<'a> Fork<'a> {
         if (grid.place(self.track.pixels[0]) - end).norm() > beside {
             return None;
         }
-        let came = way_back(grid, other, OVER_RADII * self.radius + OVER_PX)?;
-        let over = grid.place(self.track.pixels[self.beyond]) - end;
-        let count = over.norm().ceil().max(1.0);
-        let mut between = (0..=count as usize).map(|k| end + over * (k as f64 / count));
+        let came = way_back(grid, other, over(self.radius))?;
+        let across = grid.place(self.track.pixels[self.beyond]) - end;
+        let count = across.norm().ceil().max(1.0);
+        let mut between = (0..=count as usize).map(|k| end + across * (k as f64 / count));
         let is_wood = between.all(|at| grid.inside[grid.nearest(at)] > 0.0);
-        is_wood.then(|| came.angle(&self.way).max(came.angle(&over)))
+        is_wood.then(|| came.angle(&self.way).max(came.angle(&across)))
     }
+}
+
+/// Over how much of a way its direction is taken, beside a limb of this radius, px.
+fn over(radius: f64) -> f64 {
+    OVER_RADII * radius + OVER_PX
 }
 
 /// From the first of some pixels to the last that is within `reach` of it; `None` where that is
@@ -266,13 +269,16 @@ fn carriers(tracks: &[Track]) -> Vec<Option<OnTrack>> {
     first.map(|pixel| on.get(pixel?).copied()).collect()
 }
 
+/// A track, what carries it, and so on down to the foot. A ring would be a fault; it is not followed
+/// round for ever.
+fn down(carriers: &[Option<OnTrack>], track: usize) -> impl Iterator<Item = usize> {
+    let carrier = |t: &usize| carriers[*t].map(|leaves| leaves.track);
+    std::iter::successors(Some(track), carrier).take(carriers.len() + 1)
+}
+
 /// Whether a track is another one, or is carried by it.
 fn is_carried(carriers: &[Option<OnTrack>], track: usize, by: usize) -> bool {
-    let up = |t: &usize| carriers[*t].map(|leaves| leaves.track);
-    // A ring would be a fault; it is not followed round for ever.
-    std::iter::successors(Some(track), up)
-        .take(carriers.len() + 1)
-        .any(|t| t == by)
+    down(carriers, track).any(|t| t == by)
 }
 
 /// The first pixel of a track that another leaves.
@@ -309,15 +315,9 @@ fn join(tracks: &mut Vec<Track>, crossing: Crossing) {
 /// The same tracks in such an order that each comes after what it leaves.
 fn carriers_first(tracks: Vec<Track>) -> Vec<Track> {
     let carriers = carriers(&tracks);
-    let depth = |track: usize| {
-        let up = |t: &usize| carriers[*t].map(|leaves| leaves.track);
-        std::iter::successors(Some(track), up)
-            .take(carriers.len() + 1)
-            .count()
-    };
     let mut ordered: Vec<(usize, Track)> = Vec::with_capacity(tracks.len());
     for (number, track) in tracks.into_iter().enumerate() {
-        ordered.push((depth(number), track));
+        ordered.push((down(&carriers, number).count(), track));
     }
     ordered.sort_by_key(|(depth, _)| *depth);
     ordered.into_iter().map(|(_, track)| track).collect()

@@ -1,4 +1,4 @@
-//! Twigs that are too faint to be told from noise. A twig that is narrower than a pixel changes
+//! Twigs that are too faint to be distinguished from noise. A twig that is narrower than a pixel changes
 //! the light of what stands behind it by its share of the pixel: its width is the sum of these
 //! shares across it.
 
@@ -20,7 +20,8 @@ const BESIDE_PX: f64 = 2.0;
 const BEHIND_PX: f64 = 3.0;
 /// Distance between the places that are looked at, across and along, px.
 const STEP_PX: f64 = 0.5;
-/// Where bark differs from what stands behind it by less than this, grey levels, nothing is told.
+/// Where bark differs from what stands behind it by less than this, grey levels, no width is
+/// estimated.
 const LEAST_CONTRAST: f64 = 10.0;
 
 /// `graph` without the twigs at its ends that are too faint in `picture`, from which it was traced.

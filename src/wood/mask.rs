@@ -42,7 +42,7 @@ const IN_LEAF: f64 = 0.25;
 
 /// Odds of wood where the evidence is 1, and by how much they fall where it is -1; no evidence
 /// that a pixel stands still counts more than the last. By the truth of 18 made films: where the
-/// tree is told from a still background by much, the odds are higher yet.
+/// tree differs much from a still background, the odds are higher yet.
 const MOVING_ODDS: f32 = 8.0;
 const STILL_ODDS: f32 = 50.0;
 const MOST_STILL_ODDS: f32 = 8.0;
