@@ -205,24 +205,42 @@ fn an_absence_is_a_gap_of_its_true_length_and_no_loss() {
     assert_eq!(losses.totals().reconciled, 0);
 }
 
+/// Losses at random and times that jitter, both by `seed`: the numbers are exact, and the times
+/// right but for a tenth.
+fn check_random_losses(seed: u64, percent: u64) -> Result<(), TestCaseError> {
+    let hash = |n: u64, salt: u64| {
+        let mut x = n.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ seed ^ salt;
+        x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        x ^ (x >> 31)
+    };
+    let lost = |n: u64| hash(n, 1) % 100 < percent;
+    let jitter = |n: u64| (hash(n, 2) % 1000) as f64 / 3000.0 - 1.0 / 6.0;
+    let camera = Camera {
+        lost: &lost,
+        jitter: &jitter,
+        ..STEADY
+    };
+    let (totals, truth, _) = run(&camera, 600);
+    prop_assert_eq!(totals.by_sequence, Some(truth));
+    prop_assert_eq!(totals.reconciled, truth);
+    let off = totals.by_time.abs_diff(truth);
+    prop_assert!(off * 10 <= truth + 20, "{} of {}", totals.by_time, truth);
+    Ok(())
+}
+
+/// Where so many frames are lost one after another that few steps of one frame are among sixteen,
+/// the rate is still known.
+#[test]
+fn a_run_of_losses_is_no_slower_rate() -> Result<(), TestCaseError> {
+    check_random_losses(1_780_979_539_560_061_337, 37)
+}
+
 proptest! {
-    /// Up to 40 % lost at random, and times off by up to a sixth of an interval: the numbers are
-    /// exact, and the times right but for a tenth.
+    /// Up to 40 % lost at random, and times off by up to a sixth of an interval.
     #[test]
     fn random_losses_are_counted_both_ways(seed in any::<u64>(), percent in 0..41u64) {
-        let hash = |n: u64, salt: u64| {
-            let mut x = n.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ seed ^ salt;
-            x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-            x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-            x ^ (x >> 31)
-        };
-        let lost = |n: u64| hash(n, 1) % 100 < percent;
-        let jitter = |n: u64| (hash(n, 2) % 1000) as f64 / 3000.0 - 1.0 / 6.0;
-        let (totals, truth, _) = run(&Camera { lost: &lost, jitter: &jitter, ..STEADY }, 600);
-        prop_assert_eq!(totals.by_sequence, Some(truth));
-        prop_assert_eq!(totals.reconciled, truth);
-        let off = totals.by_time.abs_diff(truth);
-        prop_assert!(off * 10 <= truth + 20, "{} of {}", totals.by_time, truth);
+        check_random_losses(seed, percent)?;
     }
 
     /// Whatever comes, nothing panics, the index only grows, and no count goes back.
