@@ -159,6 +159,14 @@ fn a_value_out_of_range_is_refused_with_what_is_allowed() {
             "skeleton.fold = 1 is out of range; allowed: 0 to 0.95",
         ),
         (
+            "[skeleton]\nstrokes_px = [[[1.0, 2.0], [3.0, 4.0]], [[1.0, 2.0]]]",
+            "skeleton.strokes_px = 1 is out of range; allowed: at least two points in each line",
+        ),
+        (
+            "[skeleton]\nstrokes_px = [[[1.0, 2.0], [3.0, inf]]]",
+            "skeleton.strokes_px = inf is out of range; allowed: finite numbers",
+        ),
+        (
             "[wood]\ntwig_px = -1.0",
             "wood.twig_px = -1 is out of range; allowed: 0 (no twigs) to 500",
         ),

@@ -1,6 +1,8 @@
 //! The pipeline on threads: the same result as without them, wishes honoured, losses counted, and
 //! an end in any case.
 
+#[path = "support/strokes.rs"]
+mod strokes;
 mod support;
 
 use arborcam::cancel::CancelToken;
@@ -19,6 +21,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
+use strokes::{ACROSS, ALONG_SKY, covered};
 use support::{SIZE, recording};
 
 /// A run that has not ended after so long hangs.
@@ -450,6 +453,66 @@ fn a_new_outline_is_used_and_a_bad_one_is_refused_in_words() {
         summary.tree.expect("a tree").outline.bounds_px(),
         Some([240, 0, 480, 250])
     );
+}
+
+/// Lines along branches that come after the last refinement. The name of the capture is taken
+/// meanwhile, so that the run cannot write it: what is finished from its log has them, too.
+#[test]
+fn strokes_are_used_shown_kept_and_finished_with() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("out");
+    let (source, gate) = gated(200);
+    let mut job = job(Some(support::outline()), Some(&out));
+    (job.config.accumulate.min_s, job.config.accumulate.threshold) = (4.0, 0.2);
+    job.config.accumulate.refine_s = 0.0;
+    let running = runtime::start(source, job).expect("start");
+    gate.reached
+        .recv_timeout(HANGS)
+        .expect("the gate is reached");
+    let [across, along_sky] = [ACROSS, ALONG_SKY].map(|s| s.map(Point2::from).to_vec());
+    for wish in [
+        Control::AddStroke(across),
+        Control::AddStroke(vec![Point2::new(10.0, 10.0)]),
+        Control::AddStroke(along_sky),
+        Control::TakeBackStroke,
+    ] {
+        running.send(wish);
+    }
+    gate.open.send(()).expect("the source waits");
+    std::fs::create_dir(&out).expect("folder");
+    let begun = Instant::now();
+    let shown = loop {
+        assert!(begun.elapsed() < HANGS, "the model hangs");
+        std::thread::sleep(Duration::from_millis(5));
+        if let Some(shown) = running.latest().filter(|s| s.frame > 200) {
+            break shown.strokes_px.clone();
+        }
+    };
+    assert_eq!(shown, [ACROSS.to_vec()]);
+    let (summary, failure, warnings) = ended(running);
+    assert!(matches!(failure, Some(Failure::Kept { .. })), "{failure:?}");
+    let refused = |w: &String| w.contains("at least two points");
+    assert!(
+        warnings.iter().any(refused) && warnings.len() == 1,
+        "{warnings:?}"
+    );
+    let tree = summary.expect("a summary").tree.expect("a tree");
+    assert!(covered(&tree, ACROSS) >= 7 && tree.refinements == 1);
+
+    std::fs::remove_dir(&out).expect("folder");
+    let written = runtime::finish_unfinished(&out, &CancelToken::new()).expect("finished");
+    let finished = written.tree.expect("a tree");
+    assert_eq!(
+        (finished.frame, finished.refinements),
+        (tree.frame, tree.refinements)
+    );
+    assert_eq!(finished.skeleton.nodes, tree.skeleton.nodes);
+    let capture: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(out.join("capture.json")).expect("capture.json"))
+            .expect("json");
+    let kept = &capture["config"]["skeleton"]["strokes_px"];
+    assert_eq!(*kept, serde_json::json!([ACROSS]));
+    assert_eq!(tracks(&out).first().map(|t| t.1), Some(0));
 }
 
 /// The strokes of `tests/matting` lie on a part of the first frame; from the first frame on the

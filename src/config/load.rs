@@ -135,8 +135,30 @@ impl Config {
                 allowed: "an odd number",
             });
         }
-        Ok(())
+        check_strokes(&self.skeleton.strokes_px)
     }
+}
+
+/// Refuses lines along branches that do not lead from one place to another.
+///
+/// # Errors
+/// One has fewer than two points, or one that is not finite.
+pub fn check_strokes(strokes_px: &[Vec<[f64; 2]>]) -> Result<(), ConfigError> {
+    let refused = |value, allowed| ConfigError::OutOfRange {
+        key: "skeleton.strokes_px",
+        value,
+        allowed,
+    };
+    for stroke in strokes_px {
+        if stroke.len() < 2 {
+            let n_points = stroke.len() as f64;
+            return Err(refused(n_points, "at least two points in each line"));
+        }
+        if let Some(at) = stroke.iter().flatten().find(|at| !at.is_finite()) {
+            return Err(refused(*at, "finite numbers"));
+        }
+    }
+    Ok(())
 }
 
 fn check_range(setting: &Setting, value: f64) -> Result<(), ConfigError> {

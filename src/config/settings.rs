@@ -150,8 +150,8 @@ settings! {
         along_wood: bool = true;
         /// How branches are traced in the wood that is seen.
         trace_by: TraceBy = TraceBy::Paths;
-        /// Lines along branches that the user drew, px of the picture; `--branch-stroke FILE` adds
-        /// one.
+        /// Lines along branches that the user drew, px of the picture, each of at least two points;
+        /// `--branch-stroke FILE` adds one, and so does key s.
         strokes_px: Vec<Vec<[f64; 2]>> = Vec::new();
     }
 

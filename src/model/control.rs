@@ -7,6 +7,11 @@ use nalgebra::Point2;
 pub enum Control {
     /// Use this polygon (px, at least three points) as the outline and start again from here.
     SetOutline(Vec<Point2<f64>>),
+    /// A line along a branch (px, at least two points), beside those that there are: from now on
+    /// the wood is looked for with it. Points and tree are kept.
+    AddStroke(Vec<Point2<f64>>),
+    /// Do without the line along a branch that came last.
+    TakeBackStroke,
     /// Build the tree from the motion seen so far.
     BuildNow,
     /// Forget tracks and tree, keep the outline rule, start again.

@@ -125,6 +125,8 @@ pub struct Snapshot {
     pub image_size: Option<Size>,
     pub preview: Option<Arc<Rgb>>,
     pub outline_px: Vec<Point2<i32>>,
+    /// Lines along branches that the user drew, px.
+    pub strokes_px: Vec<Vec<[f64; 2]>>,
     /// Points of this frame, px, each with the number of its main branch, `None` before the tree is
     /// built.
     pub points: Vec<(Point2<f32>, Option<u8>)>,

@@ -4,7 +4,7 @@ use super::film_log::FilmLog;
 use super::pose_tracker::{PoseTracker, Targets};
 use super::refiner::{Refiner, SolveJob, Taken};
 use crate::cancel::CancelToken;
-use crate::config::Config;
+use crate::config::{Config, ConfigError, check_strokes};
 use crate::hierarchy::{self, Evidence};
 use crate::model::{Outline, Phase, Pose, RawFrame, Rgb, TrackLog, TrackSet, WoodSeen};
 use crate::motion::Binding;
@@ -199,7 +199,7 @@ impl BackEnd {
             refiner.seek_wood(&self.log, &self.film, &tracker, &self.config);
         }
         self.tracker = Some(tracker);
-        self.refiner = Some(refiner).filter(|r| !r.is_over());
+        self.refiner = Some(refiner);
         before
     }
 
@@ -209,8 +209,14 @@ impl BackEnd {
         let (Some(mut refiner), Some(standing)) = (self.refiner.take(), &self.tracker) else {
             return Vec::new();
         };
+        // In a log without frames, wood that was found with this one was looked for then: no
+        // schedule says when the user drew.
+        let newest = self.log.all().newest().map(|set| set.frame);
+        if self.film.frames().is_empty() && newest.is_some_and(|f| self.film.has_wood_of(f)) {
+            refiner.ask();
+        }
         let taken = refiner.step(&self.log, &self.film, standing, &self.config);
-        self.refiner = Some(refiner).filter(|r| !r.is_over());
+        self.refiner = Some(refiner);
         let Some(Taken { tracker, before }) = taken else {
             return Vec::new();
         };
@@ -246,6 +252,46 @@ impl BackEnd {
         }
     }
 
+    /// The lines along branches that the wood is looked for with, px.
+    pub fn strokes_px(&self) -> &[Vec<[f64; 2]>] {
+        &self.config.skeleton.strokes_px
+    }
+
+    /// Looks for the wood with one more line along a branch, px; again and soon, where there is a
+    /// tree. [`job`](Self::job) is another one then. Points and tree are kept.
+    ///
+    /// # Errors
+    /// It leads from no place to another.
+    pub fn add_stroke(&mut self, stroke_px: Vec<[f64; 2]>) -> Result<(), ConfigError> {
+        check_strokes(std::slice::from_ref(&stroke_px))?;
+        self.config.skeleton.strokes_px.push(stroke_px);
+        self.seek_wood_again();
+        Ok(())
+    }
+
+    /// The same without the line that came last; `false` where there is none.
+    pub fn take_back_stroke(&mut self) -> bool {
+        let had_one = self.config.skeleton.strokes_px.pop().is_some();
+        if had_one {
+            self.seek_wood_again();
+        }
+        had_one
+    }
+
+    fn seek_wood_again(&mut self) {
+        if let Some(refiner) = &mut self.refiner
+            && self.config.skeleton.along_wood
+        {
+            refiner.ask();
+        }
+    }
+
+    /// Whether there is a tree along wood that is still to be looked for with what the user drew.
+    pub fn has_unused_strokes(&self) -> bool {
+        let has_wood = self.model().is_some_and(|model| model.wood.is_some());
+        has_wood && self.refiner.as_ref().is_some_and(Refiner::seeks_wood)
+    }
+
     /// Build with the next frame, whatever the measure says.
     pub fn build_now(&mut self) {
         self.build_now = true;
@@ -257,8 +303,9 @@ impl BackEnd {
     }
 
     /// No more frames: if nothing has been built, builds from what there is, unless that is next to
-    /// nothing; and a tree that was never refined gets the sub-branches that a refinement would put
-    /// on it, if there is enough motion in what is remembered, and `cancel` does not end it before.
+    /// nothing. The wood is looked for where that is still due. A tree that was never refined gets
+    /// the sub-branches that a refinement would put on it, if there is enough motion in what is
+    /// remembered. `cancel` ends both before.
     pub fn finish(&mut self, cancel: &CancelToken) {
         self.log.close();
         if self.tracker.is_none() && !self.log.all().is_empty() {
@@ -268,9 +315,11 @@ impl BackEnd {
                 self.build();
             }
         }
-        let refiner = self.refiner.as_mut();
-        if let Some(model) = refiner.and_then(|refiner| refiner.end(cancel)) {
-            self.take(PoseTracker::new(Arc::new(model), &self.config));
+        if let (Some(refiner), Some(standing)) = (&mut self.refiner, &self.tracker) {
+            refiner.begin_asked(&self.log, &self.film, standing, &self.config);
+            if let Some(model) = refiner.end(cancel) {
+                self.take(PoseTracker::new(Arc::new(model), &self.config));
+            }
         }
         self.identify_sub_branches(cancel);
     }

@@ -80,6 +80,11 @@ impl FilmLog {
         Some(wood)
     }
 
+    /// Whether wood was found with `frame`.
+    pub fn has_wood_of(&self, frame: u64) -> bool {
+        self.wood.contains_key(&frame)
+    }
+
     /// Remembers what was found with `frame`.
     pub fn note_wood(&mut self, frame: u64, wood: Arc<BranchGraph>) {
         self.wood.entry(frame).or_insert(wood);

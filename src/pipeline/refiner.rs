@@ -46,6 +46,9 @@ enum Aim {
     Wood,
     /// The tree from all that was seen since.
     Refinement,
+    /// The same, as the user has drawn along branches: along wood that is looked for with what he
+    /// drew, even where the tree stays what it is.
+    Strokes,
 }
 
 impl SolveJob {
@@ -88,12 +91,13 @@ impl SolveJob {
                 let wood = self.wood(cancel)?;
                 Some(with_wood(&self.prior, Some(wood), None, &self.config))
             }
-            Aim::Refinement => self.refined(cancel),
+            Aim::Refinement | Aim::Strokes => self.refined(cancel),
         }
     }
 
     /// The model from all that was seen. It runs along the wood that the kept frames show; where
-    /// none was found yet and some is now, the prior model along that is the better one.
+    /// none was found yet and some is now, or it was looked for in another way, the prior model
+    /// along that is the better one.
     fn refined(&self, cancel: &CancelToken) -> Option<Model> {
         let solved = solve(
             &self.log,
@@ -106,9 +110,10 @@ impl SolveJob {
             return None;
         }
         let wood = self.wood(cancel);
+        let is_other_wood = self.prior.wood.is_none() || self.aim == Aim::Strokes;
         let model = match solved {
             Some(model) => model,
-            None if self.prior.wood.is_none() && wood.is_some() => self.followed_anew()?,
+            None if is_other_wood && wood.is_some() => self.followed_anew()?,
             None => return None,
         };
         let wood = wood.or_else(|| self.prior.wood.clone());
@@ -123,6 +128,7 @@ impl SolveJob {
             followed_from: first.frame,
             frame: newest.frame,
             time_s: newest.time_s,
+            shown_from: newest.frame,
             refinements: self.prior.refinements + 1,
             kept: self.prior.plain.measured(),
             ..self.prior.clone()
@@ -173,8 +179,11 @@ pub(super) struct Refiner {
     built_s: f64,
     span_s: f64,
     stage: Stage,
-    /// The first tree's wood is being looked for, or the tree along it followed.
+    /// Wood is being looked for that the tree is not to end without, or the tree along it followed:
+    /// the first tree's, or that with what the user has drawn.
     seeks_wood: bool,
+    /// The user has drawn, and the wood is still to be looked for with it.
+    is_asked: bool,
 }
 
 enum Stage {
@@ -216,6 +225,7 @@ impl Refiner {
             span_s: span_s.max(LEAST_SPAN_S),
             stage: Stage::Over,
             seeks_wood: false,
+            is_asked: false,
         };
         refiner.wait(built_s, config);
         refiner
@@ -233,9 +243,35 @@ impl Refiner {
         self.seeks_wood = true;
     }
 
-    /// Whether the first tree's wood is being looked for, or the tree along it followed.
+    /// Whether wood is looked for that the tree is not to end without: the first tree's, or that
+    /// with what the user has drawn.
     pub fn seeks_wood(&self) -> bool {
-        self.seeks_wood
+        self.seeks_wood || self.is_asked
+    }
+
+    /// Has the wood looked for again from the next frame on: the user has drawn along branches.
+    pub fn ask(&mut self) {
+        self.is_asked = true;
+    }
+
+    /// Begins what was [asked](Self::ask) for, if anything was, in place of what is being worked
+    /// out without it.
+    pub fn begin_asked(
+        &mut self,
+        log: &TrackLog,
+        film: &FilmLog,
+        standing: &PoseTracker,
+        config: &Config,
+    ) {
+        if !std::mem::take(&mut self.is_asked) {
+            return;
+        }
+        let aim = match &self.stage {
+            Stage::Solving(solving) if solving.job.aim == Aim::Wood => Aim::Wood,
+            _ => Aim::Strokes,
+        };
+        self.solve(SolveJob::new(aim, log, film, standing, config));
+        self.seeks_wood = true;
     }
 
     fn solve(&mut self, job: SolveJob) {
@@ -247,13 +283,8 @@ impl Refiner {
         });
     }
 
-    /// No more refinements: the model stays as it is.
-    pub fn is_over(&self) -> bool {
-        matches!(self.stage, Stage::Over)
-    }
-
-    /// No more frames: the first tree along its wood, if that has not taken effect yet, and
-    /// `cancel` does not end the work before.
+    /// No more frames: the tree along wood that it is not to end without, if that has not taken
+    /// effect yet, and `cancel` does not end the work before.
     pub fn end(&mut self, cancel: &CancelToken) -> Option<Model> {
         let stage = std::mem::replace(&mut self.stage, Stage::Over);
         if !self.seeks_wood {
@@ -299,6 +330,10 @@ impl Refiner {
         config: &Config,
     ) -> Option<Taken> {
         let now_s = log.all().newest()?.time_s;
+        // To follow a new model takes only some frames.
+        if !matches!(self.stage, Stage::Following(_)) {
+            self.begin_asked(log, film, standing, config);
+        }
         match std::mem::replace(&mut self.stage, Stage::Over) {
             Stage::Waiting(due_s) if now_s >= due_s => {
                 let aim = Aim::Refinement;

@@ -69,6 +69,8 @@ impl Announced {
         self.wood = sight;
         match sight {
             WoodSight::Sought if ended => shared.warn(TOO_SHORT_FOR_WOOD.into()),
+            // It is being looked for again.
+            WoodSight::Sought if !was_told => shared.withdraw(NO_WOOD),
             WoodSight::NotSeen if !was_told => shared.warn(NO_WOOD.into()),
             WoodSight::Seen if !was_told => {
                 shared.withdraw(NO_WOOD);

@@ -18,6 +18,7 @@ use super::table_writer::TableWriter;
 use super::track_thread::ToModel;
 use super::unfinished::Unfinished;
 use crate::cancel::CancelToken;
+use crate::config::Config;
 use crate::model::{Phase, Picture, Pose, SwayNow};
 use crate::pipeline::{BackEnd, Followed, Moved};
 use crate::recording::TrackFile;
@@ -42,6 +43,10 @@ const TABLES_EVERY_S: f64 = 1.0;
 /// For so long a disk that is full is tried again, and at this interval.
 const FULL_DISK_FOR: Duration = Duration::from_secs(20);
 const FULL_DISK_EVERY: Duration = Duration::from_millis(500);
+
+/// The warning where the end came before the wood was looked for with what the user drew.
+const STROKES_TOO_LATE: &str = "the line along a branch that was drawn or taken back last came too \
+                                late: the end was wanted before the wood was looked for again";
 
 /// State of the thread.
 pub struct ModelThread {
@@ -154,6 +159,12 @@ impl ModelThread {
                 self.restart();
                 *last = None;
             }
+            ToModel::AddStroke(stroke_px) => match self.back.add_stroke(stroke_px) {
+                Ok(()) => self.strokes_changed(),
+                Err(e) => self.shared.warn(e.to_string()),
+            },
+            ToModel::TakeBackStroke if self.back.take_back_stroke() => self.strokes_changed(),
+            ToModel::TakeBackStroke => self.shared.tell("there is no line to take back".into()),
             ToModel::BuildNow if self.back.model().is_some() => {
                 self.shared
                     .tell("the tree is built already; r starts again".into());
@@ -165,6 +176,24 @@ impl ModelThread {
             }
             ToModel::Export => self.export_now(),
         }
+    }
+
+    /// The user has drawn a line along a branch, or taken one back.
+    fn strokes_changed(&mut self) {
+        // What is being worked out is without it.
+        self.refining.give_up();
+        let lines = match self.back.strokes_px().len() {
+            0 => "no line along a branch".to_owned(),
+            1 => "1 line along a branch".to_owned(),
+            n => format!("{n} lines along branches"),
+        };
+        self.shared.tell(
+            match (self.job.config.skeleton.along_wood, self.back.model()) {
+                (false, _) => format!("{lines}; not used: skeleton.along_wood is false"),
+                (true, None) => format!("{lines}; the wood is looked for with the tree"),
+                (true, Some(_)) => format!("{lines}; the wood is looked for again"),
+            },
+        );
     }
 
     /// Forgets tracks and tree.
@@ -194,6 +223,9 @@ impl ModelThread {
         // No frame is left that could need what is under way.
         self.refining.give_up();
         self.back.finish(&self.shared.pulse.optional_work);
+        if self.back.has_unused_strokes() {
+            self.shared.warn(STROKES_TOO_LATE.into());
+        }
         self.announce();
         self.show(None, true);
         self.finish()
@@ -386,15 +418,20 @@ impl ModelThread {
             tracks: file.reader().map_err(Failure::Log)?,
             log: self.back.log().clone(),
             wood: self.back.wood().clone(),
-            config: self
-                .shared
-                .reloaded()
-                .unwrap_or_else(|| self.job.config.clone()),
+            config: self.effective_config(),
             info: self.info.clone(),
             quality: self.quality.clone(),
             picture: self.picture.clone(),
             shared: self.shared.clone(),
         })
+    }
+
+    /// The settings as they are by now: reloaded, and with what the user drew.
+    fn effective_config(&self) -> Config {
+        let reloaded = self.shared.reloaded();
+        let mut config = reloaded.unwrap_or_else(|| self.job.config.clone());
+        config.skeleton.strokes_px = self.back.strokes_px().to_vec();
+        config
     }
 
     /// Writes the capture as it is now beside the final one, in the background: frames go on.

@@ -177,6 +177,9 @@ impl Status {
                 .map(|o| Point2::new(o.u_px, o.v_px))
                 .collect();
         }
+        if s.strokes_px != back.strokes_px() {
+            s.strokes_px = back.strokes_px().to_vec();
+        }
         s.sensor_rate_hz = self.sensor.rate_hz();
         s.work_rate_hz = self.work.rate_hz();
         s.latency_p50_ms = self.latency_ms.percentile(0.5);

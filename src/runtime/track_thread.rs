@@ -33,6 +33,9 @@ pub enum ToModel {
     },
     /// Start again.
     Restart,
+    /// One more line along a branch, px.
+    AddStroke(Vec<[f64; 2]>),
+    TakeBackStroke,
     BuildNow,
     Export,
 }
@@ -113,6 +116,11 @@ impl<'a> TrackThread<'a> {
                     .shared
                     .warn("no picture has arrived yet that an outline could be drawn on".into()),
             },
+            Control::AddStroke(points_px) => {
+                let stroke_px = points_px.into_iter().map(Into::into).collect();
+                self.pass_on(ToModel::AddStroke(stroke_px));
+            }
+            Control::TakeBackStroke => drop(self.pass_on(ToModel::TakeBackStroke)),
             Control::Restart => self.restart(None),
             Control::BuildNow => drop(self.pass_on(ToModel::BuildNow)),
             Control::Export => drop(self.pass_on(ToModel::Export)),

@@ -1,16 +1,19 @@
 //! The picture with what is known about it drawn on top, whatever the way in which it reaches the
 //! screen.
 
-use super::drawing::Drawing;
+use super::drawing::{Drawing, Subject};
 use super::placed::Placed;
 use super::raster::{Raster, walk};
 use super::theme::Theme;
 use crate::model::{Size, Snapshot};
 use nalgebra::{Point2, Vector2};
 
-const OUTLINE: [u8; 3] = [0xff, 0xd8, 0x30];
-const DRAWN: [u8; 3] = [0xff, 0x40, 0xff];
-const CURSOR: [u8; 3] = [0xff, 0xff, 0xff];
+pub(super) const OUTLINE: [u8; 3] = [0xff, 0xd8, 0x30];
+pub(super) const DRAWN: [u8; 3] = [0xff, 0x40, 0xff];
+pub(super) const CURSOR: [u8; 3] = [0xff, 0xff, 0xff];
+/// Lines along branches; no branch, nor the outline, has this colour or this letter.
+pub(super) const STROKE: [u8; 3] = [0x80, 0xff, 0xff];
+const STROKE_LETTER: char = '*';
 /// How far points on trial cover the picture, as a share of the others.
 const FAINT: f64 = 0.4;
 
@@ -22,8 +25,8 @@ pub fn image_size(snapshot: &Snapshot) -> Option<Size> {
     (size.area() > 0).then_some(size)
 }
 
-/// Picture, outline and points, or while the user draws the polygon drawn so far instead of the
-/// points.
+/// Picture, outline, points and lines along branches; while the user draws, what he has drawn so
+/// far instead of all that would hide the tree.
 pub fn picture(
     snapshot: &Snapshot,
     drawing: Option<&Drawing>,
@@ -34,23 +37,19 @@ pub fn picture(
     let fine = (placed.dots.width / 320) as i64;
     // In a coarse picture the points lie side by side and would hide the tree.
     let cover = if placed.dots.width < 100 { 0.6 } else { 1.0 };
-    let marked = !snapshot.points.is_empty() || drawing.is_some();
+    let strokes = strokes(snapshot, drawing);
+    let marked = !snapshot.points.is_empty() || !strokes.is_empty() || drawing.is_some();
     if marked {
         // The points must stand out from a sunlit tree.
         raster.darken(0.3);
     }
     if let Some(drawing) = drawing {
-        draw_polygon(&mut raster, drawing, placed, fine);
+        draw_strokes(&mut raster, &strokes, placed, fine);
+        draw_drawing(&mut raster, drawing, placed, fine);
         return Some(raster);
     }
-    for [a, b] in edges(&outline(snapshot), true) {
-        raster.line(
-            placed.dot_from_pixel(a),
-            placed.dot_from_pixel(b),
-            fine / 2,
-            OUTLINE,
-        );
-    }
+    let outline_px = outline(snapshot);
+    draw_line(&mut raster, &outline_px, true, placed, fine / 2, OUTLINE);
     let on_trial = theme.branch_rgb(None);
     for p in &snapshot.candidates_px {
         let pixel = p.map(f64::from);
@@ -61,20 +60,36 @@ pub fn picture(
         let colour = theme.branch_rgb(*branch);
         mark(&mut raster, placed, pixel, fine, colour, cover);
     }
+    draw_strokes(&mut raster, &strokes, placed, fine);
     Some(raster)
 }
 
-/// The polygon that the user draws, its corners, and the keyboard's cursor.
-fn draw_polygon(raster: &mut Raster, drawing: &Drawing, placed: &Placed, fine: i64) {
-    let points = drawing.points_px();
-    for [a, b] in edges(points, points.len() >= 3) {
-        raster.line(
-            placed.dot_from_pixel(a),
-            placed.dot_from_pixel(b),
-            fine,
-            DRAWN,
-        );
+/// Lines along branches.
+fn draw_strokes(raster: &mut Raster, strokes: &[Vec<Point2<f64>>], placed: &Placed, fine: i64) {
+    for stroke in strokes {
+        draw_line(raster, stroke, false, placed, fine / 2, STROKE);
     }
+}
+
+/// A line through `points`, `2 * radius + 1` dots thick.
+fn draw_line(
+    raster: &mut Raster,
+    points: &[Point2<f64>],
+    closed: bool,
+    placed: &Placed,
+    radius: i64,
+    colour: [u8; 3],
+) {
+    for [a, b] in edges(points, closed) {
+        let (from, to) = (placed.dot_from_pixel(a), placed.dot_from_pixel(b));
+        raster.line(from, to, radius, colour);
+    }
+}
+
+/// What the user draws, its corners, and the keyboard's cursor.
+fn draw_drawing(raster: &mut Raster, drawing: &Drawing, placed: &Placed, fine: i64) {
+    let points = drawing.points_px();
+    draw_line(raster, points, drawing.is_closed(), placed, fine, DRAWN);
     for p in points {
         // In a coarse picture a corner with a border would hide what it is set on.
         if fine > 0 {
@@ -88,7 +103,7 @@ fn draw_polygon(raster: &mut Raster, drawing: &Drawing, placed: &Placed, fine: i
 }
 
 /// The same as letters, for terminals without colour: a cell is dark or bright, `#` the outline,
-/// digits main branches.
+/// `*` a line along a branch, digits main branches.
 pub fn letters(
     snapshot: &Snapshot,
     drawing: Option<&Drawing>,
@@ -100,6 +115,7 @@ pub fn letters(
         cells,
         rows: shades(&Raster::scaled(snapshot.preview.as_deref()?, cells)?),
     };
+    let strokes = strokes(snapshot, drawing);
     let Some(drawing) = drawing else {
         for [a, b] in edges(&outline(snapshot), true) {
             letters.line(a, b, '#');
@@ -111,13 +127,18 @@ pub fn letters(
             let letter = branch.map_or('o', |b| (b'0' + b % 8) as char);
             letters.point(p.map(f64::from), letter);
         }
+        letters.strokes(&strokes);
         return Some(letters.rows);
     };
-    let polygon = drawing.points_px();
-    for [a, b] in edges(polygon, polygon.len() >= 3) {
-        letters.line(a, b, '#');
+    letters.strokes(&strokes);
+    let letter = match drawing.subject() {
+        Subject::Outline => '#',
+        Subject::Branch => STROKE_LETTER,
+    };
+    for [a, b] in edges(drawing.points_px(), drawing.is_closed()) {
+        letters.line(a, b, letter);
     }
-    for p in polygon {
+    for p in drawing.points_px() {
         letters.point(*p, 'O');
     }
     if let Some(cursor) = drawing.cursor_px() {
@@ -163,6 +184,12 @@ impl Letters<'_> {
         });
     }
 
+    fn strokes(&mut self, strokes: &[Vec<Point2<f64>>]) {
+        for [a, b] in strokes.iter().flat_map(|stroke| edges(stroke, false)) {
+            self.line(a, b, STROKE_LETTER);
+        }
+    }
+
     /// The cell that shows a pixel, with fractions.
     fn cell(&self, pixel: Point2<f64>) -> Point2<f64> {
         let dot = self.placed.dot_from_pixel(pixel);
@@ -173,6 +200,15 @@ impl Letters<'_> {
 
 fn outline(snapshot: &Snapshot) -> Vec<Point2<f64>> {
     snapshot.outline_px.iter().map(|p| p.cast()).collect()
+}
+
+/// Lines along branches, but for while an outline is drawn: they would hide its tree.
+fn strokes(snapshot: &Snapshot, drawing: Option<&Drawing>) -> Vec<Vec<Point2<f64>>> {
+    if drawing.is_some_and(|drawing| drawing.subject() == Subject::Outline) {
+        return Vec::new();
+    }
+    let points = |stroke: &Vec<[f64; 2]>| stroke.iter().map(|p| Point2::from(*p)).collect();
+    snapshot.strokes_px.iter().map(points).collect()
 }
 
 /// Neighbouring points, the last with the first too if the line is closed.

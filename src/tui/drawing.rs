@@ -1,15 +1,48 @@
-//! An outline while the user draws it.
+//! What the user draws on the picture, while he draws it: an outline, or a line along a branch.
 
 use nalgebra::Point2;
+
+/// What is drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Subject {
+    /// The tree's outline, a polygon.
+    #[default]
+    Outline,
+    /// A line along a branch.
+    Branch,
+}
+
+impl Subject {
+    /// What is drawn, in a few words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Subject::Outline => "the outline",
+            Subject::Branch => "a line along a branch",
+        }
+    }
+}
 
 /// Points set so far, in picture pixels, and the keyboard's cursor once an arrow key was used.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Drawing {
+    subject: Subject,
     points_px: Vec<Point2<f64>>,
     cursor_px: Option<Point2<f64>>,
 }
 
 impl Drawing {
+    /// A drawing of `subject` without a point.
+    pub fn of(subject: Subject) -> Self {
+        Self {
+            subject,
+            ..Self::default()
+        }
+    }
+
+    pub fn subject(&self) -> Subject {
+        self.subject
+    }
+
     /// The corners set so far.
     pub fn points_px(&self) -> &[Point2<f64>] {
         &self.points_px
@@ -37,11 +70,26 @@ impl Drawing {
         self.points_px.pop().is_some()
     }
 
-    /// The finished polygon, not repeating its first point.
+    /// Whether the last corner is joined to the first.
+    pub fn is_closed(&self) -> bool {
+        self.subject == Subject::Outline && self.points_px.len() >= 3
+    }
+
+    /// The finished polygon, not repeating its first point, or the finished line.
     ///
     /// # Errors
     /// What is wrong with it, for the user to read.
-    pub fn close(&self) -> Result<Vec<Point2<f64>>, &'static str> {
+    pub fn finish(&self) -> Result<Vec<Point2<f64>>, &'static str> {
+        match self.subject {
+            Subject::Outline => self.polygon(),
+            Subject::Branch if self.points_px.len() < 2 => {
+                Err("A line needs at least 2 points; go on, or leave with Esc.")
+            }
+            Subject::Branch => Ok(self.points_px.clone()),
+        }
+    }
+
+    fn polygon(&self) -> Result<Vec<Point2<f64>>, &'static str> {
         let mut polygon = self.points_px.clone();
         // A click on the first corner is a natural way to say "closed".
         if polygon.len() > 1 && polygon.first() == polygon.last() {
@@ -112,47 +160,63 @@ mod tests {
     use super::*;
 
     #[test]
-    fn closes_what_encloses_something() {
-        let cases: [(&str, &[[f64; 2]], bool); 9] = [
-            ("nothing", &[], false),
-            ("a line", &[[0.0, 0.0], [9.0, 9.0]], false),
-            ("a triangle", &[[0.0, 0.0], [9.0, 0.0], [0.0, 9.0]], true),
+    fn an_outline_encloses_something_and_a_line_has_two_ends() {
+        // Whether the points make an outline, and whether a line.
+        let cases: [(&str, &[[f64; 2]], bool, bool); 11] = [
+            ("nothing", &[], false, false),
+            ("a point", &[[4.0, 4.0]], false, false),
+            ("a point twice", &[[4.0, 4.0], [4.0, 4.0]], false, false),
+            ("a line", &[[0.0, 0.0], [9.0, 9.0]], false, true),
+            (
+                "a triangle",
+                &[[0.0, 0.0], [9.0, 0.0], [0.0, 9.0]],
+                true,
+                true,
+            ),
             (
                 "there and back",
                 &[[0.0, 0.0], [9.0, 0.0], [4.0, 0.0]],
                 false,
+                true,
             ),
             (
                 "a bow tie",
                 &[[0.0, 0.0], [9.0, 9.0], [9.0, 0.0], [0.0, 9.0]],
                 false,
+                true,
             ),
             (
                 "a straight run in a side",
                 &[[0.0, 0.0], [4.0, 0.0], [9.0, 0.0], [9.0, 9.0], [0.0, 9.0]],
+                true,
                 true,
             ),
             (
                 "a notch",
                 &[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [5.0, 2.0], [0.0, 9.0]],
                 true,
+                true,
             ),
             (
                 "a corner on a side",
                 &[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [5.0, 0.0], [0.0, 9.0]],
                 false,
+                true,
             ),
             (
                 "closed by hand",
                 &[[0.0, 0.0], [9.0, 0.0], [0.0, 9.0], [0.0, 0.0]],
                 true,
+                true,
             ),
         ];
-        for (name, points, good) in cases {
-            let mut drawing = Drawing::default();
-            points.iter().for_each(|p| drawing.add(Point2::from(*p)));
-            let closed = drawing.close();
-            assert_eq!(closed.is_ok(), good, "{name}: {closed:?}");
+        for (name, points, outline, line) in cases {
+            for (subject, good) in [(Subject::Outline, outline), (Subject::Branch, line)] {
+                let mut drawing = Drawing::of(subject);
+                points.iter().for_each(|p| drawing.add(Point2::from(*p)));
+                let finished = drawing.finish();
+                assert_eq!(finished.is_ok(), good, "{name}, {subject:?}: {finished:?}");
+            }
         }
     }
 }

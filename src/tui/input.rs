@@ -1,9 +1,10 @@
 //! Keys and mouse: what is bound to what, as tables, and what it does.
 
-use super::drawing::Drawing;
+use super::drawing::{Drawing, Subject};
 use super::placed::Placed;
 use super::state::State;
 use crate::model::Control;
+use nalgebra::Point2;
 use ratatui::crossterm::event::{
     Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers, MouseButton, MouseEventKind,
 };
@@ -13,7 +14,7 @@ use ratatui::crossterm::event::{
 pub enum Action {
     Help,
     Pause,
-    Outline,
+    Draw(Subject),
     Build,
     Restart,
     Export,
@@ -27,10 +28,10 @@ pub enum Action {
     Camera,
 }
 
-/// What a key does while an outline is drawn.
+/// What a key does while the user draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stroke {
-    Close,
+pub enum DrawingAction {
+    Finish,
     TakeBack,
     Leave,
     Set,
@@ -65,7 +66,7 @@ pub const fn bind<A>(
 }
 
 /// Keys while watching; those without a short name repeat what another one does.
-pub const WATCHING: [Binding<Action>; 17] = [
+pub const WATCHING: [Binding<Action>; 18] = [
     bind(
         KeyCode::Char('?'),
         "?",
@@ -92,7 +93,7 @@ pub const WATCHING: [Binding<Action>; 17] = [
         "o",
         "outline",
         "draws the tree's outline by mouse or keyboard",
-        Action::Outline,
+        Action::Draw(Subject::Outline),
     ),
     bind(
         KeyCode::Char('b'),
@@ -130,6 +131,13 @@ pub const WATCHING: [Binding<Action>; 17] = [
         Action::Turn(-1),
     ),
     bind(KeyCode::Char('m'), "m", "mesh", "", Action::Mesh),
+    bind(
+        KeyCode::Char('s'),
+        "s",
+        "stroke",
+        "draws a line along a branch whose wood is not found",
+        Action::Draw(Subject::Branch),
+    ),
     bind(KeyCode::Char('l'), "", "", "", Action::Turn(1)),
     bind(KeyCode::Char('k'), "", "", "", Action::Choose(-1)),
     bind(KeyCode::Left, "", "", "", Action::Turn(-1)),
@@ -140,50 +148,57 @@ pub const WATCHING: [Binding<Action>; 17] = [
 ];
 
 /// Keys while drawing; those without a short name are in the help only.
-pub const DRAWING: [Binding<Stroke>; 12] = [
+pub const DRAWING: [Binding<DrawingAction>; 12] = [
     bind(
         KeyCode::Enter,
         "Enter",
-        "close",
-        "closes the outline and starts with it",
-        Stroke::Close,
+        "done",
+        "closes the outline and starts with it, or takes the line",
+        DrawingAction::Finish,
     ),
     bind(
         KeyCode::Backspace,
         "Bksp",
         "back",
-        "takes the last point back",
-        Stroke::TakeBack,
+        "takes the last point back, or the last line along a branch",
+        DrawingAction::TakeBack,
     ),
     bind(
         KeyCode::Esc,
         "Esc",
         "leave",
         "leaves everything as it was",
-        Stroke::Leave,
+        DrawingAction::Leave,
     ),
     bind(
         KeyCode::Char(' '),
         "space",
         "set",
         "sets a point at the cross",
-        Stroke::Set,
+        DrawingAction::Set,
     ),
     bind(
         KeyCode::Left,
         "arrows",
         "move",
         "move the cross by a cell; H J K L by eight",
-        Stroke::Move(-1, 0),
+        DrawingAction::Move(-1, 0),
     ),
-    bind(KeyCode::Right, "", "", "", Stroke::Move(1, 0)),
-    bind(KeyCode::Up, "", "", "", Stroke::Move(0, -1)),
-    bind(KeyCode::Down, "", "", "", Stroke::Move(0, 1)),
-    bind(KeyCode::Char('H'), "", "", "", Stroke::Move(-8, 0)),
-    bind(KeyCode::Char('L'), "", "", "", Stroke::Move(8, 0)),
-    bind(KeyCode::Char('K'), "", "", "", Stroke::Move(0, -8)),
-    bind(KeyCode::Char('J'), "", "", "", Stroke::Move(0, 8)),
+    bind(KeyCode::Right, "", "", "", DrawingAction::Move(1, 0)),
+    bind(KeyCode::Up, "", "", "", DrawingAction::Move(0, -1)),
+    bind(KeyCode::Down, "", "", "", DrawingAction::Move(0, 1)),
+    bind(KeyCode::Char('H'), "", "", "", DrawingAction::Move(-8, 0)),
+    bind(KeyCode::Char('L'), "", "", "", DrawingAction::Move(8, 0)),
+    bind(KeyCode::Char('K'), "", "", "", DrawingAction::Move(0, -8)),
+    bind(KeyCode::Char('J'), "", "", "", DrawingAction::Move(0, 8)),
 ];
+
+/// Whether a key begins a drawing while the capture is watched.
+pub fn draws(key: KeyCode) -> bool {
+    WATCHING
+        .iter()
+        .any(|b| b.key == key && matches!(b.action, Action::Draw(_)))
+}
 
 /// Takes one event; `placed` is where the preview lies on the screen. Returns what the capture is
 /// to do.
@@ -222,19 +237,26 @@ fn press(key: &KeyEvent, state: &mut State, placed: Option<&Placed>) -> Option<C
         state.drawing = Some(drawing);
     }
     let bound = WATCHING.iter().find(|b| b.key == key.code)?;
-    // A slip must not end or restart the capture of someone who is setting points.
-    let ends_it = matches!(
-        bound.action,
-        Action::Quit | Action::Build | Action::Restart | Action::Export
-    );
-    if state.drawing.is_some() && ends_it {
-        let key = bound.shown;
+    if let Some(subject) = state.drawing.as_ref().map(Drawing::subject)
+        && waits(bound.action, subject)
+    {
+        let (key, name) = (bound.shown, subject.name());
         state.say(format!(
-            "{key} waits: the outline is being drawn; Enter closes it, Esc leaves it (Ctrl-C ends)."
+            "{key} waits: {name} is being drawn; Enter takes it, Esc leaves it (Ctrl-C ends)."
         ));
         return None;
     }
     act(bound.action, state)
+}
+
+/// Whether an action waits until `subject` is drawn: a slip must not end or restart the capture of
+/// someone who is setting points, nor lose the points.
+fn waits(action: Action, subject: Subject) -> bool {
+    match action {
+        Action::Quit | Action::Build | Action::Restart | Action::Export => true,
+        Action::Draw(other) => other != subject,
+        _ => false,
+    }
 }
 
 fn act(action: Action, state: &mut State) -> Option<Control> {
@@ -251,8 +273,8 @@ fn act(action: Action, state: &mut State) -> Option<Control> {
             state.help = !state.help;
             return None;
         }
-        Action::Outline => {
-            begin_drawing(state);
+        Action::Draw(subject) => {
+            begin_drawing(subject, state);
             return None;
         }
         Action::Turn(steps) => {
@@ -288,13 +310,13 @@ fn act(action: Action, state: &mut State) -> Option<Control> {
     Some(control)
 }
 
-fn begin_drawing(state: &mut State) {
+fn begin_drawing(subject: Subject, state: &mut State) {
     if state.snapshot.preview.is_none() {
         state.say("There is no picture yet to draw on.");
         return;
     }
     state.help = false;
-    state.drawing.get_or_insert_with(Drawing::default);
+    state.drawing.get_or_insert_with(|| Drawing::of(subject));
 }
 
 fn click(column: u16, row: u16, state: &mut State, placed: Option<&Placed>) {
@@ -306,38 +328,62 @@ fn click(column: u16, row: u16, state: &mut State, placed: Option<&Placed>) {
 }
 
 fn draw(
-    stroke: Stroke,
+    action: DrawingAction,
     mut drawing: Drawing,
     state: &mut State,
     placed: Option<&Placed>,
 ) -> Option<Control> {
-    match stroke {
-        Stroke::Leave => {
-            state.say("Left drawing; the outline is as it was.");
+    match action {
+        DrawingAction::Leave => {
+            state.say("Left drawing; everything is as it was.");
             return None;
         }
-        Stroke::Close => match drawing.close() {
-            Ok(polygon) => {
-                state.say(format!(
-                    "Starting with your outline of {} points.",
-                    polygon.len()
-                ));
-                return Some(Control::SetOutline(polygon));
-            }
+        DrawingAction::Finish => match drawing.finish() {
+            Ok(points_px) => return Some(use_drawn(drawing.subject(), points_px, state)),
             Err(why) => state.say(why),
         },
-        Stroke::TakeBack => {
-            if !drawing.take_back() {
-                state.say("No point is left to take back; Esc leaves.");
-            }
+        DrawingAction::TakeBack => {
+            let subject = drawing.subject();
+            let had_point = drawing.take_back();
+            state.drawing = Some(drawing);
+            return if had_point {
+                None
+            } else {
+                take_back_line(subject, state)
+            };
         }
-        Stroke::Set => match drawing.cursor_px() {
+        DrawingAction::Set => match drawing.cursor_px() {
             Some(pixel) => drawing.add(pixel),
             None => move_cursor(&mut drawing, placed, 0, 0),
         },
-        Stroke::Move(right, down) => move_cursor(&mut drawing, placed, right, down),
+        DrawingAction::Move(right, down) => move_cursor(&mut drawing, placed, right, down),
     }
     state.drawing = Some(drawing);
+    None
+}
+
+/// What is made of a finished drawing.
+fn use_drawn(subject: Subject, points_px: Vec<Point2<f64>>, state: &mut State) -> Control {
+    let n = points_px.len();
+    match subject {
+        Subject::Outline => {
+            state.say(format!("Starting with your outline of {n} points."));
+            Control::SetOutline(points_px)
+        }
+        Subject::Branch => {
+            state.say(format!("Asked to look for wood along your {n} points."));
+            Control::AddStroke(points_px)
+        }
+    }
+}
+
+/// Where no point is left in a line along a branch, the line before it goes.
+fn take_back_line(subject: Subject, state: &mut State) -> Option<Control> {
+    if subject == Subject::Branch && !state.snapshot.strokes_px.is_empty() {
+        state.say("Asked to take the last line back.");
+        return Some(Control::TakeBackStroke);
+    }
+    state.say("No point is left to take back; Esc leaves.");
     None
 }
 

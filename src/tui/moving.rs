@@ -1,7 +1,7 @@
 //! The screen of a tree that is made to move: the tree from two sides, what moves it, and the keys
 //! that change that.
 
-use super::input::{Binding, bind};
+use super::input::{Binding, bind, draws};
 use super::opened::Opened;
 use super::panels::{messages, skeleton};
 use super::state::State;
@@ -19,6 +19,9 @@ use std::time::{Duration, Instant};
 
 /// However long a redraw took: the tree goes on where it was.
 const LONGEST_S: f64 = 0.2;
+
+/// The answer to keys that draw on a picture.
+const NO_PICTURE: &str = "There is no picture here to draw on: draw in capture or replay.";
 
 /// What moves a tree while it is watched.
 pub trait Moving {
@@ -131,6 +134,7 @@ impl Stage {
 
     /// Lets time pass for the tree, unless it is paused.
     pub fn go_on(&mut self, moving: &mut dyn Moving, elapsed_s: f64) {
+        self.state.tick();
         let pose = moving.pose(if self.paused { 0.0 } else { elapsed_s });
         self.state.take(Arc::new(Snapshot {
             pose: Some(Arc::new(pose)),
@@ -153,6 +157,7 @@ impl Stage {
             Some(Action::Change(command)) => moving.change(command),
             Some(Action::Turn(steps)) => self.state.turn(steps.into()),
             Some(Action::Mesh) => self.state.switch_mesh(),
+            None if draws(key.code) => self.state.say(NO_PICTURE),
             None => {}
         }
         true
@@ -171,6 +176,10 @@ impl Stage {
             line,
         );
         skeleton::render(frame, &self.state, tree, theme);
+        if self.state.messages().next().is_some() {
+            messages::render(frame, &self.state, keys, theme);
+            return;
+        }
         messages::key_line(frame, KEYS.iter().map(|b| (b.shown, b.short)), keys, theme);
     }
 }

@@ -32,7 +32,7 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
     lines.push(Line::styled("What is shown of a branch", theme.faint()));
     lines.extend(MEANINGS.map(|(shown, help)| row(shown, help, theme)));
     let mut drawing = vec![
-        Line::styled("While an outline is drawn", theme.faint()),
+        Line::styled("While an outline or a line is drawn", theme.faint()),
         row("click", "sets a point", theme),
     ];
     drawing.extend(

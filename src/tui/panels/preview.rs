@@ -85,7 +85,8 @@ impl Preview {
 pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme, preview: &mut Preview) {
     let title = match &state.drawing {
         Some(drawing) => format!(
-            "Picture: draw the outline, {} set",
+            "Picture: draw {}, {} set",
+            drawing.subject().name(),
             drawing.points_px().len()
         ),
         None => "Picture".to_owned(),

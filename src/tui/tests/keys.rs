@@ -6,6 +6,7 @@ use crate::model::{NodeName, Phase, Size, Snapshot};
 use crate::tui::input::handle;
 use crate::tui::placed::Placed;
 use crate::tui::state::State;
+use nalgebra::Point2;
 use ratatui::crossterm::event::{
     Event, KeyCode, KeyEvent, KeyModifiers, MouseButton, MouseEvent, MouseEventKind,
 };
@@ -120,6 +121,107 @@ fn clicks_make_a_polygon_of_the_pixels_below_them() {
 }
 
 #[test]
+fn a_line_along_a_branch_is_sent_as_it_was_drawn() {
+    let (enter, right) = (key(KeyCode::Enter), key(KeyCode::Right));
+    for (points, line) in [
+        (
+            vec![click(3, 4), click(66, 4), click(35, 21)],
+            vec![[4.5, 9.5], [634.5, 9.5], [324.5, 349.5]],
+        ),
+        // The cross begins in the middle.
+        (
+            vec![letter(' '), letter(' '), right, letter('K'), letter(' ')],
+            vec![[324.5, 189.5], [334.5, 29.5]],
+        ),
+    ] {
+        let mut events = vec![letter('s')];
+        events.extend(points);
+        events.push(enter.clone());
+        let run = play(Some(wide()), &events);
+        let line: Vec<Point2<f64>> = line.into_iter().map(Into::into).collect();
+        assert_eq!(run.sent, [Control::AddStroke(line)]);
+        assert_eq!(run.state.drawing, None);
+        assert!(newest(&run.state).contains("wood along your"));
+    }
+}
+
+#[test]
+fn a_line_along_a_branch_is_drawn_until_it_is_good_or_left() {
+    let (a, b) = (click(13, 1), click(44, 1));
+    let (enter, esc, back) = (
+        key(KeyCode::Enter),
+        key(KeyCode::Esc),
+        key(KeyCode::Backspace),
+    );
+    // Points left in the drawing, and what the user reads last.
+    for (events, points, told) in [
+        (vec![enter.clone()], Some(0), "at least 2 points"),
+        (
+            vec![a.clone(), a.clone(), enter.clone()],
+            Some(1),
+            "at least 2 points",
+        ),
+        (
+            vec![a.clone(), b.clone(), back.clone(), enter],
+            Some(1),
+            "at least 2 points",
+        ),
+        (vec![back], Some(0), "No point is left"),
+        (vec![click(12, 5)], Some(0), "outside the picture"),
+        (vec![a.clone(), b.clone(), esc], None, "Left drawing"),
+        (
+            vec![a.clone(), letter('q')],
+            Some(1),
+            "q waits: a line along a branch is being drawn",
+        ),
+        // What is drawn is not thrown away for another drawing.
+        (
+            vec![a.clone(), letter('o')],
+            Some(1),
+            "o waits: a line along a branch is being drawn",
+        ),
+        (vec![a.clone(), letter('s'), b], Some(2), "Gathering"),
+    ] {
+        let events: Vec<Event> = std::iter::once(letter('s')).chain(events).collect();
+        let run = play(Some(narrow()), &events);
+        let left = run.state.drawing.as_ref().map(|d| d.points_px().len());
+        assert_eq!(left, points, "{events:?}");
+        assert!(run.sent.is_empty(), "{events:?}");
+        let last = newest(&run.state);
+        assert!(last.contains(told), "{last:?} after {events:?}");
+    }
+    let run = play(Some(narrow()), &[letter('o'), a, letter('s')]);
+    let last = newest(&run.state);
+    assert!(last.contains("s waits: the outline"), "{last}");
+}
+
+#[test]
+fn backspace_takes_the_last_line_back_when_no_point_is_left() {
+    let back = key(KeyCode::Backspace);
+    for (begins, points, sent) in [
+        ('s', 0, vec![Control::TakeBackStroke]),
+        ('s', 1, vec![]),
+        ('o', 0, vec![]),
+    ] {
+        let mut state = State::default();
+        state.take(Arc::new(Snapshot {
+            strokes_px: vec![vec![[1.0, 2.0], [3.0, 4.0]]],
+            ..snapshot(Phase::Live)
+        }));
+        let mut events = vec![letter(begins)];
+        events.extend((0..points).map(|_| click(13, 1)));
+        events.push(back.clone());
+        let placed = narrow();
+        let found: Vec<Control> = events
+            .iter()
+            .filter_map(|e| handle(e, &mut state, Some(&placed)))
+            .collect();
+        assert_eq!(found, sent, "{begins} and {points} points");
+        assert!(state.drawing.is_some(), "he goes on drawing");
+    }
+}
+
+#[test]
 fn drawing_stays_until_it_is_good_or_left() {
     let (a, b, c) = (click(13, 1), click(44, 1), click(29, 9));
     let (enter, esc, back) = (
@@ -178,7 +280,7 @@ fn drawing_stays_until_it_is_good_or_left() {
             vec![a.clone(), letter('q')],
             Some(1),
             0,
-            "Enter closes it, Esc leaves it",
+            "the outline is being drawn; Enter takes it, Esc leaves it",
         ),
         (vec![a.clone(), ctrl('c')], None, 1, "writing"),
     ] {
@@ -224,10 +326,12 @@ fn the_keyboard_reaches_what_the_mouse_reaches() {
 
 #[test]
 fn there_is_no_drawing_without_a_picture() {
-    let mut state = State::default();
-    assert_eq!(handle(&letter('o'), &mut state, None), None);
-    assert_eq!(state.drawing, None);
-    assert!(state.messages().any(|m| m.contains("no picture yet")));
+    for begins in ['o', 's'] {
+        let mut state = State::default();
+        assert_eq!(handle(&letter(begins), &mut state, None), None);
+        assert_eq!(state.drawing, None);
+        assert!(state.messages().any(|m| m.contains("no picture yet")));
+    }
     // A picture that is there but not on the screen, as in too small a window.
     let run = play(
         None,

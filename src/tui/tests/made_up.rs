@@ -283,6 +283,11 @@ pub fn huge() -> Snapshot {
     ];
     let (low, high) = (i32::MIN, i32::MAX);
     s.outline_px = vec![[low, high].into(), [high; 2].into(), [0, low].into()];
+    s.strokes_px = vec![
+        vec![],
+        vec![[f64::NAN; 2], [1e300, -1e300]],
+        vec![[0.0; 2]; 9],
+    ];
     s.messages = vec!["word ".repeat(200), "x".repeat(500)];
     s.branches = (0..5000)
         .map(|node| BranchRow {

@@ -111,3 +111,33 @@ fn keys_change_the_wind_and_pause_holds_the_tree() {
         KeyModifiers::CONTROL
     ));
 }
+
+#[test]
+fn keys_that_draw_are_answered_where_there_is_no_picture() {
+    for key in ['o', 's'] {
+        let mut puppet = puppet();
+        let mut stage = Stage::new(&puppet);
+        stage.go_on(&mut puppet, 0.1);
+        let shown = |stage: &Stage| {
+            let mut terminal = Terminal::new(TestBackend::new(80, 24)).unwrap();
+            terminal
+                .draw(|frame| stage.render(frame, "", Theme::new(Depth::None)))
+                .unwrap();
+            terminal.backend().to_string()
+        };
+        assert!(shown(&stage).contains("q quit"));
+        press(
+            &mut stage,
+            &mut puppet,
+            KeyCode::Char(key),
+            KeyModifiers::NONE,
+        );
+        assert!(
+            shown(&stage).contains("no picture here to draw on"),
+            "{key}"
+        );
+        // The keys are back after some seconds.
+        (0..1000).for_each(|_| stage.go_on(&mut puppet, 0.0));
+        assert!(shown(&stage).contains("q quit"));
+    }
+}

@@ -2,6 +2,8 @@
 
 use super::made_up::{huge, snapshot};
 use crate::model::{CameraState, Phase, Rgb, Size, Skeleton, Snapshot, Unidentified};
+use crate::tui::compose;
+use crate::tui::drawing::{Drawing, Subject};
 use crate::tui::graphics::Graphics;
 use crate::tui::panels::preview::Preview;
 use crate::tui::screen;
@@ -73,6 +75,7 @@ fn cases() -> Vec<(&'static str, State)> {
     polygon.set_cursor(Point2::new(320.0, 180.0));
     drawing.say("That is outside the picture.");
     cases.push(("drawing", drawing));
+    cases.extend(stroke_cases());
     cases.extend(camera_cases());
     let mut quitting = state(Snapshot {
         paused: true,
@@ -82,6 +85,24 @@ fn cases() -> Vec<(&'static str, State)> {
     quitting.say("Ending; writing the capture…");
     cases.push(("quitting", quitting));
     cases
+}
+
+/// Lines along branches, and another one being drawn.
+fn stroke_cases() -> [(&'static str, State); 2] {
+    let strokes_px = vec![
+        vec![[320.0, 330.0], [310.0, 200.0], [240.0, 90.0]],
+        vec![[310.0, 200.0], [400.0, 120.0]],
+    ];
+    let drawn = Snapshot {
+        strokes_px,
+        ..snapshot(Phase::Live)
+    };
+    let mut drawing = state(drawn.clone());
+    let line = drawing.drawing.insert(Drawing::of(Subject::Branch));
+    line.add(Point2::new(330.0, 250.0));
+    line.add(Point2::new(500.0, 200.0));
+    line.set_cursor(Point2::new(560.0, 150.0));
+    [("strokes", state(drawn)), ("drawing_stroke", drawing)]
 }
 
 /// A camera that has gone, and one that is too slow.
@@ -314,6 +335,27 @@ fn branches_are_coloured_alike_in_picture_table_and_tree() {
             symbols.iter().any(|s| braille.contains(s)),
             "tree, branch {branch}"
         );
+    }
+}
+
+/// Whoever draws must see which line is his, on terminals with few colours, too.
+#[test]
+fn lines_along_branches_have_a_colour_of_their_own() {
+    for depth in [Depth::True, Depth::Indexed] {
+        let theme = Theme::new(depth);
+        let own = theme.colour(compose::STROKE);
+        let branches = (0..8).map(|b| theme.branch(Some(b)));
+        let others = [compose::OUTLINE, compose::DRAWN, compose::CURSOR].map(|c| theme.colour(c));
+        assert!(branches.chain(others).all(|c| c != own), "{depth:?}");
+        let shows = |state: &State| {
+            let screen = drawn(state, depth, 120, 40);
+            let mut cells = screen.buffer().content.iter();
+            cells.any(|c| c.fg == own || c.bg == own)
+        };
+        assert!(!shows(&state(snapshot(Phase::Live))));
+        for (name, state) in stroke_cases() {
+            assert!(shows(&state), "{name}, {depth:?}");
+        }
     }
 }
 

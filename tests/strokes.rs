@@ -1,0 +1,89 @@
+//! Lines along branches that come while it films: the wood is looked for again with them, and
+//! nothing starts anew.
+
+#[path = "support/strokes.rs"]
+mod strokes;
+mod support;
+
+use arborcam::config::Config;
+use arborcam::pipeline::Pipeline;
+use arborcam::solve::Model;
+use std::sync::Arc;
+use strokes::{ACROSS, ALONG_SKY, covered};
+
+/// A run on the recording in which the tree is built after 4 s, along its wood 2 s later, and never
+/// refined by itself.
+fn pipeline() -> Pipeline {
+    let mut config = Config::default();
+    (config.accumulate.min_s, config.accumulate.threshold) = (4.0, 0.2);
+    config.accumulate.refine_s = 0.0;
+    Pipeline::new(&config, Some(support::outline())).expect("decoder")
+}
+
+fn film(pipeline: &mut Pipeline, frames: std::ops::Range<usize>) {
+    for k in frames {
+        pipeline.step(&support::timed(k)).expect("picture");
+    }
+}
+
+fn model(pipeline: &Pipeline) -> &Model {
+    pipeline.back.model().expect("a tree")
+}
+
+#[test]
+fn a_stroke_that_comes_when_no_refinement_is_left_is_used_and_can_be_taken_back() {
+    let mut pipeline = pipeline();
+    film(&mut pipeline, 0..200);
+    let before = model(&pipeline).clone();
+    assert!(before.wood.is_some() && pipeline.back.job().is_none());
+    assert_eq!(covered(&before, ACROSS), 0);
+
+    for stroke in [ACROSS, ALONG_SKY] {
+        pipeline.back.add_stroke(stroke.to_vec()).expect("a line");
+    }
+    film(&mut pipeline, 200..290);
+    let with = model(&pipeline).clone();
+    assert!(covered(&with, ACROSS) >= 7, "{}", covered(&with, ACROSS));
+    assert_eq!((before.refinements, with.refinements), (0, 1));
+    assert_eq!((with.first, with.frame), (before.first, 200));
+    let oldest = pipeline.back.log().all().first().expect("tracks");
+    assert_eq!(oldest.frame, 0, "points are followed on");
+
+    // One that comes too late for the film is used at its end.
+    assert!(pipeline.back.take_back_stroke() && pipeline.back.take_back_stroke());
+    assert!(!pipeline.back.take_back_stroke() && pipeline.back.has_unused_strokes());
+    film(&mut pipeline, 290..300);
+    pipeline.finish();
+    assert_eq!(covered(model(&pipeline), ACROSS), 0);
+    assert_eq!(model(&pipeline).refinements, 2);
+    assert!(!pipeline.back.has_unused_strokes());
+}
+
+#[test]
+fn a_stroke_that_comes_while_the_first_wood_is_looked_for_is_used_at_once() {
+    let mut pipeline = pipeline();
+    film(&mut pipeline, 0..150);
+    let dropped = pipeline.back.job().expect("the wood is looked for").clone();
+    pipeline.back.add_stroke(ACROSS.to_vec()).expect("a line");
+    film(&mut pipeline, 150..151);
+    let job = pipeline.back.job().expect("it is looked for again");
+    assert!(!Arc::ptr_eq(job, &dropped));
+    film(&mut pipeline, 151..240);
+    assert!(covered(model(&pipeline), ACROSS) >= 7);
+    assert_eq!(
+        model(&pipeline).refinements,
+        0,
+        "it is still the first tree"
+    );
+}
+
+#[test]
+fn strokes_outlive_a_restart_and_no_line_is_none() {
+    let mut pipeline = pipeline();
+    pipeline.back.add_stroke(ACROSS.to_vec()).expect("a line");
+    for bad in [vec![], vec![[4.0, 4.0]], vec![[4.0, f64::NAN], [9.0, 9.0]]] {
+        assert!(pipeline.back.add_stroke(bad).is_err());
+    }
+    pipeline.back.restart();
+    assert_eq!(pipeline.back.strokes_px(), [ACROSS.to_vec()]);
+}
