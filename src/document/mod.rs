@@ -33,7 +33,7 @@ use crate::bounds::Bounds;
 use crate::config::Config;
 use crate::dynamics::Film;
 use crate::model::{
-    BranchGraph, Outline, Picture, Pose, Rgb, Size, Skeleton, Swaying, Unidentified, WoodSeen,
+    Outline, Picture, Pose, Rgb, Size, Skeleton, Swaying, Unidentified, Wood, WoodSeen,
 };
 use crate::motion::PoseEstimator;
 use motion::PoseReader;
@@ -59,7 +59,7 @@ pub struct Document {
     pub picture: Option<Picture>,
     pub pose_in_picture: Option<Pose>,
     pub outline: Option<Outline>,
-    /// The bark of the filmed trunk as a tile, see [`BranchGraph::bark`].
+    /// The bark of the filmed trunk as a tile, see [`Wood::bark`].
     pub bark: Option<Arc<Rgb>>,
     /// What the user should know: parts that are missing. One sentence each.
     pub warnings: Vec<String>,
@@ -386,9 +386,9 @@ impl Begun {
 /// The wood with its bark, which the table does not hold.
 fn show_bark(seen: &mut WoodSeen, bark: &Arc<Rgb>) {
     for wood in seen.values_mut() {
-        *wood = Arc::new(BranchGraph {
+        *wood = Arc::new(Wood {
             bark: Some(bark.clone()),
-            ..BranchGraph::clone(wood)
+            ..Wood::clone(wood)
         });
     }
 }

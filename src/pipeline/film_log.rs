@@ -1,6 +1,6 @@
 //! Frames as they came, kept for their colours, and the wood that was found in them.
 
-use crate::model::{BranchGraph, RawFrame, TrackSet, WoodSeen};
+use crate::model::{RawFrame, TrackSet, Wood, WoodSeen};
 use crate::random::seed_of_part;
 use std::sync::Arc;
 
@@ -75,13 +75,13 @@ impl FilmLog {
     }
 
     /// That which was found with `frame`, or last before it.
-    pub fn wood_by(&self, frame: u64) -> Option<&Arc<BranchGraph>> {
+    pub fn wood_by(&self, frame: u64) -> Option<&Arc<Wood>> {
         let (_, wood) = self.wood.range(..=frame).next_back()?;
         Some(wood)
     }
 
     /// Remembers what was found with `frame`.
-    pub fn note_wood(&mut self, frame: u64, wood: Arc<BranchGraph>) {
+    pub fn note_wood(&mut self, frame: u64, wood: Arc<Wood>) {
         self.wood.entry(frame).or_insert(wood);
     }
 

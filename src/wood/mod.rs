@@ -20,7 +20,7 @@ mod steady;
 
 use crate::cancel::CancelToken;
 use crate::config::TraceBy;
-use crate::model::{BranchGraph, Foot, Luma, Outline, Rgb};
+use crate::model::{Foot, Luma, Outline, Rgb, Wood};
 use crate::signal::median;
 use evidence::evidence;
 use field::Spread;
@@ -76,10 +76,10 @@ pub struct Shot<'a> {
     pub displacements: &'a Displacements,
 }
 
-/// The wood that a film shows.
+/// What a film shows of the tree's wood.
 #[derive(Clone, Debug)]
-pub struct Wood {
-    pub branches: BranchGraph,
+pub struct Found {
+    pub wood: Wood,
     /// The tree at rest; what stands behind it is blurred.
     pub rest: Rgb,
     /// 255 is wood, at the size of the picture.
@@ -107,7 +107,7 @@ pub struct View<'a> {
 ///
 /// # Errors
 /// OpenCV fails.
-pub fn find(view: View, cancel: &CancelToken) -> opencv::Result<Option<Wood>> {
+pub fn find(view: View, cancel: &CancelToken) -> opencv::Result<Option<Found>> {
     let size = view.outline.size;
     let is_usable =
         |shot: &&Shot| shot.picture.size == size && shot.picture.pixels.len() == 3 * size.area();
@@ -132,7 +132,7 @@ pub fn find(view: View, cancel: &CancelToken) -> opencv::Result<Option<Wood>> {
         TraceBy::Circles => circles::branches(&mask, view.foot.position_px)?,
     };
     // In leaf, what stands behind a twig is leaves, of all lights.
-    let mut branches = match mask.in_leaf {
+    let branches = match mask.in_leaf {
         true => traced,
         false => faint::without_faint(traced, &evidence.rest),
     };
@@ -147,9 +147,9 @@ pub fn find(view: View, cancel: &CancelToken) -> opencv::Result<Option<Wood>> {
         return Ok(None);
     }
     let mask = mask.at_picture_size(size);
-    branches.bark = bark::tile(&evidence.rest, &mask, &branches).map(Arc::new);
-    Ok(Some(Wood {
-        branches,
+    let bark = bark::tile(&evidence.rest, &mask, &branches).map(Arc::new);
+    Ok(Some(Found {
+        wood: Wood { branches, bark },
         rest: evidence.rest,
         mask,
     }))
@@ -277,7 +277,7 @@ mod tests {
         }
     }
 
-    fn found(swing: f64, strokes: &[Stroke], cancel: &CancelToken) -> Option<Wood> {
+    fn found(swing: f64, strokes: &[Stroke], cancel: &CancelToken) -> Option<Found> {
         let rest_px = followed();
         let angles: Vec<f64> = (0..16)
             .map(|k| swing * f64::from(k % 8 - 4) / 4.0)
@@ -317,9 +317,9 @@ mod tests {
     /// What a single picture cannot show: windows as dark as the tree stand still while it sways.
     #[test]
     fn a_swaying_tree_is_distinguished_from_dark_windows_behind_it() {
-        let wood = found(0.05, &[], &CancelToken::new()).expect("wood");
+        let found = found(0.05, &[], &CancelToken::new()).expect("wood");
         let (mut on, mut all) = (0, 0);
-        for (i, mask) in wood.mask.pixels.iter().enumerate() {
+        for (i, mask) in found.mask.pixels.iter().enumerate() {
             let at = Point2::new((i % 320) as f64, (i / 320) as f64);
             let is_wood = limbs()
                 .iter()
@@ -328,23 +328,19 @@ mod tests {
             on += usize::from(*mask != 0 && is_wood);
         }
         assert!(all > 1500 && on as f64 > 0.93 * all as f64, "{on} of {all}");
-        let tips = wood
-            .branches
-            .children()
-            .iter()
-            .filter(|c| c.is_empty())
-            .count();
-        assert!((2..=3).contains(&tips), "{:?}", wood.branches);
-        let length_px = wood.branches.length_px();
-        assert!((180.0..420.0).contains(&length_px), "{:?}", wood.branches);
+        let branches = &found.wood.branches;
+        let tips = branches.children().iter().filter(|c| c.is_empty()).count();
+        assert!((2..=3).contains(&tips), "{branches:?}");
+        let length_px = branches.length_px();
+        assert!((180.0..420.0).contains(&length_px), "{branches:?}");
     }
 
     /// A tree that hardly moves shows little of itself; what the user draws is wood all the same.
     #[test]
     fn what_the_user_draws_is_wood() {
         let stroke = vec![Point2::new(160.0, 150.0), Point2::new(260.0, 150.0)];
-        let on_stroke = |wood: Wood| {
-            let pixels = (180..250).map(|u| wood.mask.pixels[150 * SIZE.width as usize + u]);
+        let on_stroke = |found: Found| {
+            let pixels = (180..250).map(|u| found.mask.pixels[150 * SIZE.width as usize + u]);
             pixels.filter(|mask| *mask != 0).count()
         };
         let never = CancelToken::new();
