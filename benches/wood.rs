@@ -1,9 +1,10 @@
 //! The wood that a clip shows: `cargo bench --bench wood -- CLIP OUT`, with `video.mkv` and
-//! `outline.json` in the folder CLIP. Prints the time that it takes, and writes `mask.png`,
-//! `rest.png` and `branches.csv` to OUT.
+//! `outline.json` in the folder CLIP. Prints the time that it takes, and writes `wood.png`,
+//! `leaves.png`, `rest.png` and `branches.csv` to OUT.
 
 use arborcam::cancel::CancelToken;
 use arborcam::config::{self, Config};
+use arborcam::document::grey_png;
 use arborcam::model::{Outline, TimedFrame};
 use arborcam::outline::{self, Given};
 use arborcam::pipeline::{FilmLog, Pipeline, find_wood};
@@ -76,14 +77,10 @@ fn look(clip: &Path, out: &Path) {
         image::ColorType::Rgb8,
     )
     .expect("rest.png");
-    image::save_buffer(
-        out.join("mask.png"),
-        &found.mask.pixels,
-        size.width,
-        size.height,
-        image::ColorType::L8,
-    )
-    .expect("mask.png");
+    let masks = found.wood.masks.as_ref().expect("masks");
+    for (name, mask) in [("wood.png", &masks.wood), ("leaves.png", &masks.leaves)] {
+        std::fs::write(out.join(name), grey_png(mask).expect(name)).expect(name);
+    }
     let mut table = String::from("node,parent,u_px,v_px,radius_px\n");
     for (k, node) in found.wood.branches.nodes.iter().enumerate() {
         let parent = node.parent.map_or(String::new(), |p| p.to_string());

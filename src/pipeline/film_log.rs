@@ -80,9 +80,18 @@ impl FilmLog {
         Some(wood)
     }
 
-    /// Remembers what was found with `frame`.
+    /// Remembers what was found with `frame`. The masks of earlier wood are forgotten: those of a
+    /// long film would fill the memory.
     pub fn note_wood(&mut self, frame: u64, wood: Arc<Wood>) {
         self.wood.entry(frame).or_insert(wood);
+        for older in self.wood.values_mut().rev().skip(1) {
+            if older.masks.is_some() {
+                *older = Arc::new(Wood {
+                    masks: None,
+                    ..Wood::clone(older)
+                });
+            }
+        }
     }
 
     /// Takes what was found in this film when its frames were there.
@@ -129,6 +138,28 @@ mod tests {
         let mut again = FilmLog::new(20.0);
         filmed(&mut again, 0..3000, 10);
         assert_eq!(kept(&again), frames);
+    }
+
+    #[test]
+    fn masks_are_remembered_of_the_newest_wood_alone() {
+        let mask = crate::model::Luma {
+            size: Size::new(1, 1),
+            pixels: vec![9],
+        };
+        let wood = Arc::new(Wood {
+            masks: Some(Arc::new(crate::model::Masks {
+                wood: mask.clone(),
+                leaves: mask,
+            })),
+            ..Wood::default()
+        });
+        let mut log = FilmLog::new(20.0);
+        // A refinement that finds none goes on with what it had.
+        for frame in [90, 120, 170] {
+            log.note_wood(frame, wood.clone());
+        }
+        let has_masks: Vec<bool> = log.wood().values().map(|w| w.masks.is_some()).collect();
+        assert_eq!(has_masks, [false, false, true]);
     }
 
     #[test]

@@ -7,7 +7,7 @@ use super::evidence::Evidence;
 use super::mixture::{Mixtures, Seed};
 use super::{Stroke, colour_mat};
 use crate::cancel::CancelToken;
-use crate::model::{Foot, Luma, Rgb, Size, bounds_px};
+use crate::model::{Foot, Rgb, Size, bounds_px};
 use nalgebra::{Matrix3, Point2, Vector3};
 use opencv::core::{CV_8U, CV_32S, Mat, Point, Scalar, Size as CvSize, Vec3b, Vector};
 use opencv::imgproc::{
@@ -64,8 +64,13 @@ pub struct WoodMask {
     pub scale: u32,
     /// Row by row, 255 is wood.
     pub mask: Vec<u8>,
+    /// Row by row, the odds of wood that the cut was made by, as logarithms; negative infinity
+    /// where no wood is looked for.
+    pub odds: Vec<f32>,
     /// Row by row, whether it moves with the tree.
     pub moves: Vec<bool>,
+    /// Row by row, whether it is as green as leaves.
+    pub is_leaf: Vec<bool>,
     pub in_leaf: bool,
 }
 
@@ -108,16 +113,12 @@ impl WoodMask {
         self.pixel(at).is_some_and(|pixel| self.mask[pixel] != 0)
     }
 
-    /// The mask at the size of the picture.
-    pub fn at_picture_size(&self, size: Size) -> Luma {
+    /// The pixels of the mask that are pixel `i` of the picture, which is of this `size`.
+    pub fn pixels_of(&self, i: usize, size: Size) -> impl Iterator<Item = usize> + Clone + use<> {
         let (width, scale) = (self.size.width as usize, self.scale as usize);
-        let mut pixels = Vec::with_capacity(size.area());
-        for v in 0..size.height as usize {
-            for u in 0..size.width as usize {
-                pixels.push(self.mask[scale * v * width + scale * u]);
-            }
-        }
-        Luma { size, pixels }
+        let (u, v) = (i % size.width as usize, i / size.width as usize);
+        let first = scale * v * width + scale * u;
+        (0..scale * scale).map(move |k| first + k / scale * width + k % scale)
     }
 }
 
@@ -141,7 +142,9 @@ pub fn wood_mask(
         size: large,
         scale,
         mask: vec![0; large.area()],
+        odds: vec![f32::NEG_INFINITY; large.area()],
         moves: vec![false; large.area()],
+        is_leaf: vec![false; large.area()],
         in_leaf: false,
     };
     let Some(bounds) = Part::holding(region, size) else {
@@ -191,6 +194,11 @@ pub fn wood_mask(
         *mask = if is_wood { 255 } else { 0 };
     }
     without_specks(&mut out.mask, large)?;
+    let is_sought = |i: usize| region[i] != 0 || is_trunk[i];
+    for (i, odds) in odds.into_iter().enumerate().filter(|(i, _)| is_sought(*i)) {
+        out.odds[i] = odds;
+    }
+    out.is_leaf = leaves.is_leaf;
     Ok(out)
 }
 
@@ -782,7 +790,9 @@ impl WoodMask {
             size,
             scale: 1,
             mask: vec![0; size.area()],
+            odds: vec![f32::NEG_INFINITY; size.area()],
             moves: vec![false; size.area()],
+            is_leaf: vec![false; size.area()],
             in_leaf: false,
         };
         for pixel in 0..size.area() {
