@@ -401,10 +401,7 @@ mod tests {
             position_px: Point2::new(20.0, 40.0),
             radius_px: 1.0,
         });
-        BranchGraph {
-            nodes,
-            ..BranchGraph::default()
-        }
+        BranchGraph { nodes }
     }
 
     /// Mean colour of the pixels of wood (sRGB).
