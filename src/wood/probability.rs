@@ -50,15 +50,16 @@ pub fn masks(wood: &WoodMask, evidence: &Evidence) -> opencv::Result<Masks> {
     of_leaves.reserve_exact(size.area());
     for i in 0..size.area() {
         let pixels = wood.pixels_of(i, size);
-        let is_sought = pixels.clone().any(|pixel| wood.odds[pixel].is_finite());
+        if pixels.clone().all(|pixel| wood.odds[pixel].is_infinite()) {
+            of_wood.push(0);
+            of_leaves.push(0);
+            continue;
+        }
         let is_wood = probability_of_wood(wood, pixels);
         let other = 1.0 - f32::from(is_wood) / 255.0;
         let leaf = odds_of_leaf(tree[i], about[i], green[i]);
         of_wood.push(is_wood);
-        of_leaves.push(match is_sought {
-            true => byte(other * sigmoid(leaf)),
-            false => 0,
-        });
+        of_leaves.push(byte(other * sigmoid(leaf)));
     }
     Ok(Masks {
         wood: Luma {
