@@ -160,7 +160,7 @@ pub fn wood_mask(
     out.in_leaf = leaves.share >= IN_LEAF;
     let low = Part::above_foot(foot, bounds, size).enlarged(scale);
     let mut is_trunk = low_trunk(&rest, low, &leaves, large)?;
-    let is_stroke = drawn(strokes, large, scale)?;
+    let is_stroke = drawn(strokes, &out)?;
     for (is_trunk, is_stroke) in is_trunk.iter_mut().zip(&is_stroke) {
         *is_trunk |= is_stroke;
     }
@@ -427,19 +427,16 @@ fn enlarged_region(region: &[u8], size: Size, scale: u32) -> Vec<u8> {
     out
 }
 
-/// Which pixels of the larger picture the strokes are drawn on.
-fn drawn(strokes: &[Stroke], large: Size, scale: u32) -> opencv::Result<Vec<bool>> {
-    let mut mask = Mat::zeros(large.height as i32, large.width as i32, CV_8U)?.to_mat()?;
+/// Which pixels of the mask `wood` the strokes are drawn on.
+fn drawn(strokes: &[Stroke], wood: &WoodMask) -> opencv::Result<Vec<bool>> {
+    let (rows, cols) = (wood.size.height as i32, wood.size.width as i32);
+    let mut mask = Mat::zeros(rows, cols, CV_8U)?.to_mat()?;
+    let within = |at: f64, most: i32| at.round().clamp(0.0, f64::from(most)) as i32;
     for stroke in strokes {
         let mut corners = Vector::<Point>::new();
         for corner in stroke {
-            let within = |x: f64, most: u32| {
-                (x * f64::from(scale)).round().clamp(0.0, f64::from(most)) as i32
-            };
-            corners.push(Point::new(
-                within(corner.x, large.width),
-                within(corner.y, large.height),
-            ));
+            let at = wood.to_mask(*corner);
+            corners.push(Point::new(within(at.x, cols), within(at.y, rows)));
         }
         let white = Scalar::all(1.0);
         polylines(
@@ -447,7 +444,7 @@ fn drawn(strokes: &[Stroke], large: Size, scale: u32) -> opencv::Result<Vec<bool
             &corners,
             false,
             white,
-            STROKE_PX * scale as i32,
+            STROKE_PX * wood.scale as i32,
             LINE_8,
             0,
         )?;
