@@ -1,9 +1,10 @@
 //! The wood that a clip shows: `cargo bench --bench wood -- CLIP OUT`, with `video.mkv` and
-//! `outline.json` in the folder CLIP. Prints the time that it takes, and writes `mask.png`,
-//! `rest.png` and `branches.csv` to OUT.
+//! `outline.json` in the folder CLIP. Prints the time that it takes, and writes `wood.png`,
+//! `leaves.png`, `rest.png` and `branches.csv` to OUT.
 
 use arborcam::cancel::CancelToken;
 use arborcam::config::{self, Config};
+use arborcam::document::grey_png;
 use arborcam::model::{Outline, TimedFrame};
 use arborcam::outline::{self, Given};
 use arborcam::pipeline::{FilmLog, Pipeline, find_wood};
@@ -61,31 +62,27 @@ fn look(clip: &Path, out: &Path) {
     let began = Instant::now();
     let never = CancelToken::new();
     let settings = &config.skeleton;
-    let wood = find_wood(&log, window, &outline, &model.plain, settings, &never);
+    let found = find_wood(&log, window, &outline, &model.plain, settings, &never);
     let took_s = began.elapsed().as_secs_f64();
-    let Some(wood) = wood else {
+    let Some(found) = found else {
         println!("wood: none seen, {took_s:.2} s");
         return;
     };
-    let size = wood.rest.size;
+    let size = found.rest.size;
     image::save_buffer(
         out.join("rest.png"),
-        &wood.rest.pixels,
+        &found.rest.pixels,
         size.width,
         size.height,
         image::ColorType::Rgb8,
     )
     .expect("rest.png");
-    image::save_buffer(
-        out.join("mask.png"),
-        &wood.mask.pixels,
-        size.width,
-        size.height,
-        image::ColorType::L8,
-    )
-    .expect("mask.png");
+    let masks = found.wood.masks.as_ref().expect("masks");
+    for (name, mask) in [("wood.png", &masks.wood), ("leaves.png", &masks.leaves)] {
+        std::fs::write(out.join(name), grey_png(mask).expect(name)).expect(name);
+    }
     let mut table = String::from("node,parent,u_px,v_px,radius_px\n");
-    for (k, node) in wood.branches.nodes.iter().enumerate() {
+    for (k, node) in found.wood.branches.nodes.iter().enumerate() {
         let parent = node.parent.map_or(String::new(), |p| p.to_string());
         let (at, radius) = (node.position_px, node.radius_px);
         let _ = writeln!(table, "{k},{parent},{},{},{radius}", at.x, at.y);
@@ -93,8 +90,8 @@ fn look(clip: &Path, out: &Path) {
     std::fs::write(out.join("branches.csv"), table).expect("branches.csv");
     println!(
         "wood: {} nodes, {:.0} px of branches, {took_s:.2} s",
-        wood.branches.nodes.len(),
-        wood.branches.length_px()
+        found.wood.branches.nodes.len(),
+        found.wood.branches.length_px()
     );
 }
 

@@ -19,6 +19,10 @@ Films in wind are never at rest: there the mean pose is the truth, too, and its 
   turns          the same in space, for each kind of node, and of how many joints
   side_fullness  least area of the whole model's silhouette over all directions of view, 15 degrees apart, by the front's
   quarters       share of the drawn points around the trunk towards front, right, back and left
+  wood_mask      precision and recall of the mask in the capture's wood.png, by how much of each pixel shows wood; leaf_mask: of
+                 leaves.png
+  wood_sure      how much wood the pixels have, inside of the region looked at, whose stated probability is 0 to 0.2, 0.2 to 0.4,
+                 ... 0.8 to 1, each after the mean of what is stated; leaf_sure: of leaves
   nodes, seen_px how many nodes of each kind, and the length of seen edges
 
 True branches are those whose mean radius is 0.7 px or more: thinner ones cannot be told from noise. Joints count whose two
@@ -38,6 +42,8 @@ SEEN, OUTLINED = ("measured", "traced", "shoot"), ("measured", "traced")
 NEAR_PX, ALONG_DEG, TURN_DEG, SHORTEST_PX, THINNEST_PX = 4.0, 30.0, 90.0, 3.0, 0.7
 FINE, SHIFT = 4, 4
 VIEWS_DEG = range(0, 180, 15)
+MASKS, MOST_OUTSIDE = {"wood": "wood.png", "leaf": "leaves.png"}, 127
+PROBABILITIES = np.linspace(0, 1, 6)
 
 
 @dataclass
@@ -182,6 +188,7 @@ def figures(film, capture):
         ratio = radius_ratios(seen, film.line_in_sight(shape))
         told["radius_err" + suffix] = float(np.median(np.abs(ratio - 1))) if len(ratio) else None
         told["radius_bias" + suffix] = float(np.median(ratio)) if len(ratio) else None
+        told |= {name + suffix: value for name, value in mask_figures(film, capture, suffix).items()}
     flat = [angle for node, angle in capture.joints(capture.place_px) if capture.rows[node]["kind"] in SEEN]
     told["hairpins"] = share_above(flat)
     told["turns"] = {}
@@ -272,6 +279,22 @@ def read_mask(path):
 def iou(mask, other):
     either = (mask | other).sum()
     return float((mask & other).sum() / either) if either else None
+
+
+def mask_figures(film, capture, suffix):
+    told, files = {}, [(film.folder / Path(name).with_stem(Path(name).stem + suffix), capture.folder / name) for name in MASKS.values()]
+    if not all(file.is_file() for pair in files for file in pair):
+        return told
+    shares, stated = ([cv2.imread(str(file), cv2.IMREAD_GRAYSCALE) / 255 for file in side] for side in zip(*files))
+    is_looked_at = (stated[0] > 0) | (stated[1] > 0)
+    for name, share, said in zip(MASKS, shares, stated):
+        is_in = said > MOST_OUTSIDE / 255
+        told[name + "_mask"] = [float(share[is_in].mean()) if is_in.any() else None, float(share[is_in].sum() / max(share.sum(), 1))]
+        told[name + "_sure"] = []
+        for low, high in zip(PROBABILITIES[:-1], PROBABILITIES[1:]):
+            there = is_looked_at & (said >= low) & ((said < high) | (high == 1))
+            told[name + "_sure"] += [[float(x[there].mean()) for x in (said, share)] if there.any() else None]
+    return told
 
 
 class Mesh:

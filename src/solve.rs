@@ -24,7 +24,7 @@ use crate::cancel::CancelToken;
 use crate::config::Config;
 use crate::dynamics::{Depth, Film, analyse};
 use crate::hierarchy::{self, Evidence};
-use crate::model::{BranchGraph, Foot, Outline, TrackId, TrackLog, TrackTable};
+use crate::model::{Foot, Outline, TrackId, TrackLog, TrackTable, Wood};
 use refine::Refinement;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -105,7 +105,7 @@ pub fn with_modes(
 /// `prior` model of the same tree, bends that are in the same places keep its names.
 pub fn with_wood(
     model: &Model,
-    wood: Option<Arc<BranchGraph>>,
+    wood: Option<Arc<Wood>>,
     prior: Option<&Model>,
     config: &Config,
 ) -> Model {

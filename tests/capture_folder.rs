@@ -609,6 +609,36 @@ fn bark_has_the_colour_of_the_filmed_trunk() {
     assert!(look.base_color_texture().is_some());
 }
 
+/// The masks lie on the film: the trunk is wood, the snow beside it is not, and no leaves are there.
+#[test]
+fn masks_show_the_wood_of_a_bare_tree() {
+    let [frame, wood, leaves] = ["frame.jpg", "wood.png", "leaves.png"].map(picture);
+    for mask in [&wood, &leaves] {
+        assert_eq!(mask.dimensions(), frame.dimensions());
+    }
+    let in_mask = |mask: &image::RgbImage, u, v, width, height| {
+        let part = image::imageops::crop_imm(mask, u, v, width, height);
+        let pixels = part.to_image();
+        pixels.pixels().filter(|p| p.0[0] > 127).count()
+    };
+    let on_trunk = in_mask(&wood, 321, 270, 8, 20);
+    assert!(on_trunk > 120, "{on_trunk} of 160 pixels of the trunk");
+    let on_snow = in_mask(&wood, 280, 300, 20, 20);
+    assert!(on_snow == 0, "{on_snow} pixels of snow");
+    let (width, height) = leaves.dimensions();
+    let n_leaves = in_mask(&leaves, 0, 0, width, height);
+    let n_wood = in_mask(&wood, 0, 0, width, height);
+    assert!(
+        100 * n_leaves < n_wood,
+        "{n_leaves} of leaves, {n_wood} of wood"
+    );
+    let note = &made().capture()["masks"];
+    assert_eq!(
+        (&note["wood"], &note["leaves"]),
+        (&"wood.png".into(), &"leaves.png".into())
+    );
+}
+
 fn picture(name: &str) -> image::RgbImage {
     let picture = image::open(made().out().join(name));
     picture.expect("a picture").into_rgb8()
@@ -648,6 +678,8 @@ fn a_replay_is_reproducible_to_the_byte() {
         "tree.glb",
         "frame.jpg",
         "bark.png",
+        "wood.png",
+        "leaves.png",
     ] {
         let [a, b] = [made(), &again].map(|r| fs::read(r.out().join(name)).expect("file"));
         assert!(a == b, "{name} differs from one run to the next");

@@ -461,6 +461,40 @@ fn a_film_without_a_tree_is_no_damage() {
     assert!(matches!(error, DocumentError::NoTree { .. }), "{error}");
 }
 
+/// A mask that cannot be read costs itself, and the user is told in a line.
+#[test]
+fn damaged_masks_are_left_out_with_a_line() {
+    let small = image::GrayImage::new(7, 5);
+    let mut other_size = std::io::Cursor::new(Vec::new());
+    let png = image::ImageFormat::Png;
+    small.write_to(&mut other_size, png).expect("a PNG");
+    for (name, bytes, word) in [
+        ("wood.png", Some(b"no picture".to_vec()), "wood.png: "),
+        (
+            "leaves.png",
+            Some(other_size.into_inner()),
+            "leaves.png is 7x5",
+        ),
+        ("leaves.png", None, "leaves.png: "),
+    ] {
+        let dir = copy_of(replayed());
+        let whole = Document::read(dir.path(), WHOLE).expect("whole");
+        assert!(whole.masks.is_some() && whole.warnings.is_empty());
+        let file = dir.path().join(name);
+        match bytes {
+            Some(bytes) => fs::write(file, bytes).expect("written"),
+            None => fs::remove_file(file).expect("removed"),
+        }
+        let read = Document::read(dir.path(), WHOLE).expect("the tree is there");
+        assert!(read.masks.is_none() && read.bark.is_some());
+        let [line] = &read.warnings[..] else {
+            panic!("{word}: {:?}", read.warnings);
+        };
+        let told = format!("the masks of the capture are left out: {word}");
+        assert!(line.starts_with(&told) && !line.contains('\n'), "{line}");
+    }
+}
+
 mod fuzz {
     use super::*;
     use arborcam::config::{Config, EnvelopeKind, LeafShow, Leaves, Shape};
@@ -476,13 +510,13 @@ mod fuzz {
         /// Whatever happened to the bytes, the program says so or goes on; it does not fall.
         #[test]
         fn no_damage_makes_the_reader_fall(
-            name in prop::sample::select(vec!["nodes.csv", "motion.csv", "capture.json", "tree.glb", "frame.jpg", "bark.png"]),
+            name in prop::sample::select(vec!["nodes.csv", "motion.csv", "capture.json", "tree.glb", "frame.jpg", "bark.png", "wood.png", "leaves.png"]),
             at in prop::collection::vec(0.0..1.0f64, 1..6),
             with in prop::sample::select(vec![b',', b'\n', b'"', b'9', b'-', b'e', 0u8, 0xff]),
             cut in prop::option::of(0.0..1.0f64),
         ) {
-            // Only where wood was looked for there is bark.
-            let dir = copy_of(if name == "bark.png" { replayed() } else { made() });
+            // Only where wood was looked for there is a picture of it.
+            let dir = copy_of(if name.ends_with("png") { replayed() } else { made() });
             let file = dir.path().join(name);
             let mut bytes = fs::read(&file).expect("read");
             // The front of a large file is as good as all of it, and read faster.

@@ -929,6 +929,8 @@ fn a_tree_whose_film_was_removed_is_exported_drawn_and_moved_by_wind() {
         "nodes.csv",
         "frame.jpg",
         "bark.png",
+        "wood.png",
+        "leaves.png",
         "tree.glb",
     ];
     for name in kept {
@@ -981,6 +983,7 @@ fn a_tree_that_was_not_filmed_is_written_read_and_exported() {
             model: Some(ModelNote::of(&tree, metres_per_px)),
             picture: None,
             bark: None,
+            masks: None,
             build: None,
             refinement: None,
             animation: None,
@@ -989,6 +992,7 @@ fn a_tree_that_was_not_filmed_is_written_read_and_exported() {
         note.config.export.metres_per_px = metres_per_px;
         let draft = Draft {
             bark: None,
+            masks: None,
             note,
             skeleton: &tree,
             picture: None,

@@ -2,28 +2,33 @@
 //! and writes it; everything that is made from it is a view (see `export`).
 //!
 //! `capture.json` says what was filmed and how, `nodes.csv` holds the whole model, `frame.jpg` one
-//! picture of it, `bark.png` its bark. A tree that was filmed has `tracks.csv` and `left_out.csv`, the
+//! picture of it, `bark.png` its bark, `wood.png` and `leaves.png` which pixels are wood and leaves.
+//! A tree that was filmed has `tracks.csv` and `left_out.csv`, the
 //! points, and `motion.csv`, the poses.
 
 mod bark;
 mod error;
+mod masks;
 mod motion;
 mod nodes;
 pub mod note;
 mod number;
 mod picture;
+mod png;
 mod sway;
 mod table;
 mod tracks;
 mod wood;
 
-pub use bark::{BARK_FILE, png};
+pub use bark::BARK_FILE;
 pub use error::DocumentError;
+pub use masks::{LEAVES_MASK_FILE, WOOD_MASK_FILE};
 pub use motion::{MOTION_HEADER, MotionCsv};
 pub use nodes::{NODES_HEADER, nodes};
 pub use note::{CaptureNote, SCHEMA_VERSION};
 pub use number::push as push_number;
 pub use picture::{PICTURE_FILE, jpeg};
+pub use png::{grey_png, png};
 pub use sway::Columns;
 pub use table::{TableWriter, unit};
 pub use tracks::{LEFT_OUT_FILE, TRACKS_FILE, TRACKS_HEADER, TracksCsv, tracks_of};
@@ -33,7 +38,7 @@ use crate::bounds::Bounds;
 use crate::config::Config;
 use crate::dynamics::Film;
 use crate::model::{
-    BranchGraph, Outline, Picture, Pose, Rgb, Size, Skeleton, Swaying, Unidentified, WoodSeen,
+    Masks, Outline, Picture, Pose, Rgb, Size, Skeleton, Swaying, Unidentified, Wood, WoodSeen,
 };
 use crate::motion::PoseEstimator;
 use motion::PoseReader;
@@ -59,8 +64,10 @@ pub struct Document {
     pub picture: Option<Picture>,
     pub pose_in_picture: Option<Pose>,
     pub outline: Option<Outline>,
-    /// The bark of the filmed trunk as a tile, see [`BranchGraph::bark`].
+    /// The bark of the filmed trunk as a tile, see [`Wood::bark`].
     pub bark: Option<Arc<Rgb>>,
+    /// Which pixels of the picture at rest are wood, and which are leaves.
+    pub masks: Option<Arc<Masks>>,
     /// What the user should know: parts that are missing. One sentence each.
     pub warnings: Vec<String>,
 }
@@ -109,11 +116,12 @@ impl Document {
         let picture = note.picture.as_ref().map(|p| picture::bytes(dir, p));
         let mut document = Self::of_parts(dir, note, nodes, picture)?;
         document.bark = document.bark_in_folder();
+        document.masks = document.masks_in_folder();
         Ok(document)
     }
 
-    /// The document that would be read from a folder to which these were written; without poses
-    /// and bark. `picture_jpg` is the file that the note speaks of.
+    /// The document that would be read from a folder to which these were written; without poses,
+    /// bark and masks. `picture_jpg` is the file that the note speaks of.
     ///
     /// # Errors
     /// The tree cannot be read back, as it is empty or reaches too far.
@@ -153,6 +161,7 @@ impl Document {
             pose_in_picture: None,
             outline: None,
             bark: None,
+            masks: None,
             warnings: Vec::new(),
         };
         document.picture = document.picture_of(picture_jpg);
@@ -186,6 +195,18 @@ impl Document {
             Err(why) => {
                 self.warnings
                     .push(format!("the bark of the capture is left out: {why}"));
+                None
+            }
+        }
+    }
+
+    fn masks_in_folder(&mut self) -> Option<Arc<Masks>> {
+        self.note.masks.as_ref()?;
+        match masks::read(&self.dir, size(&self.note)) {
+            Ok(masks) => Some(Arc::new(masks)),
+            Err(why) => {
+                self.warnings
+                    .push(format!("the masks of the capture are left out: {why}"));
                 None
             }
         }
@@ -374,6 +395,16 @@ impl Begun {
         if let Ok(bark) = bark::read(dir) {
             show_bark(&mut wood, &Arc::new(bark));
         }
+        // They were kept of the newest wood alone.
+        if let Some(mut newest) = wood.last_entry()
+            && let Ok(masks) = masks::read(dir, size(&note))
+        {
+            let wood = Wood {
+                masks: Some(Arc::new(masks)),
+                ..Wood::clone(newest.get())
+            };
+            newest.insert(Arc::new(wood));
+        }
         Ok(Self {
             picture,
             outline: noted.and_then(|noted| outline(noted).ok()),
@@ -386,9 +417,9 @@ impl Begun {
 /// The wood with its bark, which the table does not hold.
 fn show_bark(seen: &mut WoodSeen, bark: &Arc<Rgb>) {
     for wood in seen.values_mut() {
-        *wood = Arc::new(BranchGraph {
+        *wood = Arc::new(Wood {
             bark: Some(bark.clone()),
-            ..BranchGraph::clone(wood)
+            ..Wood::clone(wood)
         });
     }
 }

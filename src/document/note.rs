@@ -39,6 +39,8 @@ pub struct CaptureNote {
     pub picture: Option<PictureNote>,
     /// `None` where no trunk was seen: the bark's colour is a guess then.
     pub bark: Option<BarkNote>,
+    /// `None` where no wood was seen.
+    pub masks: Option<MasksNote>,
     /// `None` if the capture ended before the tree was built.
     pub build: Option<Build>,
     /// `None` if the tree is the one that was built first.
@@ -99,6 +101,13 @@ pub struct PictureNote {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BarkNote {
     pub file: String,
+}
+
+/// The masks of wood and leaves in the folder.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MasksNote {
+    pub wood: String,
+    pub leaves: String,
 }
 
 /// When and on what the tree was first built.

@@ -3,7 +3,7 @@
 use super::error::DocumentError;
 use super::table::{TableReader, TableWriter};
 use crate::files::WriteError;
-use crate::model::{BranchGraph, FARTHEST_PX, WoodNode, WoodSeen};
+use crate::model::{BranchGraph, FARTHEST_PX, Wood, WoodNode, WoodSeen};
 use nalgebra::Point2;
 use std::path::Path;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ const COLUMNS: [&str; 5] = ["frame", "parent", "u_px", "v_px", "radius_px"];
 pub fn wood_csv(seen: &WoodSeen) -> Result<Vec<u8>, WriteError> {
     let mut table = TableWriter::new(WOOD_FILE, HEADER, Vec::new())?;
     for (frame, wood) in seen {
-        for node in &wood.nodes {
+        for node in &wood.branches.nodes {
             table.count(*frame);
             match node.parent {
                 Some(parent) => table.count(parent as u64),
@@ -36,7 +36,7 @@ pub fn wood_csv(seen: &WoodSeen) -> Result<Vec<u8>, WriteError> {
     table.finish()
 }
 
-/// Reads the table in `dir`.
+/// Reads the table in `dir`: the branches alone.
 ///
 /// # Errors
 /// It is missing or damaged, or a row's parent does not stand before it.
@@ -64,10 +64,15 @@ pub fn read_wood(dir: &Path) -> Result<WoodSeen, DocumentError> {
         }
         wood.nodes.push(node);
     }
-    let graphs = graphs
-        .into_iter()
-        .map(|(frame, wood)| (frame, Arc::new(wood)));
-    Ok(graphs.collect())
+    let mut seen = WoodSeen::new();
+    for (frame, branches) in graphs {
+        let wood = Wood {
+            branches,
+            ..Wood::default()
+        };
+        seen.insert(frame, Arc::new(wood));
+    }
+    Ok(seen)
 }
 
 #[cfg(test)]
@@ -82,19 +87,19 @@ mod tests {
 
     #[test]
     fn what_was_written_is_read() {
-        let wood = BranchGraph {
-            nodes: vec![
-                WoodNode::made_up(None, 100.0, 200.5),
-                WoodNode::made_up(Some(0), 101.123_456_789, 150.0),
-                WoodNode::made_up(Some(0), 90.0, 120.0),
-            ],
-            bark: None,
+        let of = |nodes| {
+            Arc::new(Wood {
+                branches: BranchGraph { nodes },
+                ..Wood::default()
+            })
         };
-        let later = BranchGraph {
-            nodes: vec![WoodNode::made_up(None, 0.1 + 0.2, 1.0 / 3.0)],
-            bark: None,
-        };
-        let seen = WoodSeen::from([(90, Arc::new(wood)), (170, Arc::new(later))]);
+        let wood = of(vec![
+            WoodNode::made_up(None, 100.0, 200.5),
+            WoodNode::made_up(Some(0), 101.123_456_789, 150.0),
+            WoodNode::made_up(Some(0), 90.0, 120.0),
+        ]);
+        let later = of(vec![WoodNode::made_up(None, 0.1 + 0.2, 1.0 / 3.0)]);
+        let seen = WoodSeen::from([(90, wood), (170, later)]);
         let text = wood_csv(&seen).expect("a table");
         assert_eq!(read(&text).expect("wood"), seen);
     }

@@ -21,7 +21,7 @@ pub struct Dressed {
 pub struct Bark {
     /// Mean colour as in a picture (sRGB).
     pub rgb: [u8; 3],
-    /// The filmed bark, see [`BranchGraph::bark`](crate::model::BranchGraph); `None` where the film
+    /// The filmed bark, see [`Wood::bark`](crate::model::Wood); `None` where the film
     /// shows no trunk.
     pub tile: Option<Arc<Rgb>>,
     pub source: BarkSource,

@@ -1,10 +1,8 @@
 //! The wood that pictures show, as centre lines.
 
-use super::{Rgb, Size};
+use super::Size;
 use crate::signal::distance_to_segment;
 use nalgebra::Point2;
-use std::collections::BTreeMap;
-use std::sync::Arc;
 
 /// A place is on a piece of wood within so many of its radii, and so many pixels at 640 px picture
 /// width.
@@ -34,17 +32,11 @@ impl WoodNode {
     }
 }
 
-/// The wood that was found while a film went on, by the newest frame that was looked at.
-pub type WoodSeen = BTreeMap<u64, Arc<BranchGraph>>;
-
 /// The branches that a picture shows, joined to one tree: nodes with parents before children, the
 /// first is the trunk's foot.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BranchGraph {
     pub nodes: Vec<WoodNode>,
-    /// The trunk's bark as a tile that repeats without a seam (sRGB): once round a limb, and as far
-    /// along it as it is round. One texel where only its colour is seen, `None` where no trunk is.
-    pub bark: Option<Arc<Rgb>>,
 }
 
 impl BranchGraph {
@@ -90,10 +82,7 @@ impl BranchGraph {
                 ..node.clone()
             });
         }
-        Self {
-            nodes,
-            bark: self.bark.clone(),
-        }
+        Self { nodes }
     }
 
     /// Children of every node.
@@ -120,7 +109,7 @@ mod tests {
             WoodNode::made_up(Some(1), 60.0, 70.0),
             WoodNode::made_up(Some(1), 140.0, 70.0),
         ];
-        BranchGraph { nodes, bark: None }
+        BranchGraph { nodes }
     }
 
     #[test]

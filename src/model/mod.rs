@@ -23,9 +23,10 @@ mod timing;
 mod track;
 mod track_log;
 mod track_table;
+mod wood;
 
 pub use botany::{BotanicalBranch, BotanicalBranches, TREE, TRUNK};
-pub use branch_graph::{BranchGraph, WoodNode, WoodSeen};
+pub use branch_graph::{BranchGraph, WoodNode};
 pub use control::Control;
 pub use foot::Foot;
 pub use frame::{
@@ -45,3 +46,4 @@ pub use timing::{Gap, GapCause, MAX_GAPS, Timing};
 pub use track::{LONGEST_TRIAL_S, Observation, TrackId, TrackSet};
 pub use track_log::{LogWindow, Tentative, TrackLog};
 pub use track_table::TrackTable;
+pub use wood::{Masks, Wood, WoodSeen};

@@ -1,6 +1,6 @@
 //! Frames as they came, kept for their colours, and the wood that was found in them.
 
-use crate::model::{BranchGraph, RawFrame, TrackSet, WoodSeen};
+use crate::model::{RawFrame, TrackSet, Wood, WoodSeen};
 use crate::random::seed_of_part;
 use std::sync::Arc;
 
@@ -75,7 +75,7 @@ impl FilmLog {
     }
 
     /// That which was found with `frame`, or last before it.
-    pub fn wood_by(&self, frame: u64) -> Option<&Arc<BranchGraph>> {
+    pub fn wood_by(&self, frame: u64) -> Option<&Arc<Wood>> {
         let (_, wood) = self.wood.range(..=frame).next_back()?;
         Some(wood)
     }
@@ -85,9 +85,18 @@ impl FilmLog {
         self.wood.contains_key(&frame)
     }
 
-    /// Remembers what was found with `frame`.
-    pub fn note_wood(&mut self, frame: u64, wood: Arc<BranchGraph>) {
+    /// Remembers what was found with `frame`. The masks of earlier wood are forgotten: those of a
+    /// long film would fill the memory.
+    pub fn note_wood(&mut self, frame: u64, wood: Arc<Wood>) {
         self.wood.entry(frame).or_insert(wood);
+        for older in self.wood.values_mut().rev().skip(1) {
+            if older.masks.is_some() {
+                *older = Arc::new(Wood {
+                    masks: None,
+                    ..Wood::clone(older)
+                });
+            }
+        }
     }
 
     /// Takes what was found in this film when its frames were there.
@@ -134,6 +143,28 @@ mod tests {
         let mut again = FilmLog::new(20.0);
         filmed(&mut again, 0..3000, 10);
         assert_eq!(kept(&again), frames);
+    }
+
+    #[test]
+    fn masks_are_remembered_of_the_newest_wood_alone() {
+        let mask = crate::model::Luma {
+            size: Size::new(1, 1),
+            pixels: vec![9],
+        };
+        let wood = Arc::new(Wood {
+            masks: Some(Arc::new(crate::model::Masks {
+                wood: mask.clone(),
+                leaves: mask,
+            })),
+            ..Wood::default()
+        });
+        let mut log = FilmLog::new(20.0);
+        // A refinement that finds none goes on with what it had.
+        for frame in [90, 120, 170] {
+            log.note_wood(frame, wood.clone());
+        }
+        let has_masks: Vec<bool> = log.wood().values().map(|w| w.masks.is_some()).collect();
+        assert_eq!(has_masks, [false, false, true]);
     }
 
     #[test]

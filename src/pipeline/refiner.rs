@@ -7,7 +7,7 @@ use super::pose_tracker::{PoseTracker, Targets};
 use super::wood::find_wood;
 use crate::cancel::CancelToken;
 use crate::config::{self, Config};
-use crate::model::{BranchGraph, LogWindow, Outline, Pose, Skeleton, TrackLog};
+use crate::model::{LogWindow, Outline, Pose, Skeleton, TrackLog, Wood};
 use crate::solve::{Model, solve, with_wood};
 use std::sync::Arc;
 
@@ -136,7 +136,7 @@ impl SolveJob {
     }
 
     /// The wood that the kept frames show; where they are gone, what was found in them.
-    fn wood(&self, cancel: &CancelToken) -> Option<Arc<BranchGraph>> {
+    fn wood(&self, cancel: &CancelToken) -> Option<Arc<Wood>> {
         if self.film.frames().is_empty() {
             let newest = self.log.all().newest()?;
             return self.film.wood_by(newest.frame).cloned();
@@ -144,32 +144,32 @@ impl SolveJob {
         let window = self.log.last(self.config.accumulate.window_s);
         let prior = &self.prior.plain;
         let settings = &self.config.skeleton;
-        branches_in(&self.film, window, &self.outline, prior, settings, cancel).map(Arc::new)
+        wood_in(&self.film, window, &self.outline, prior, settings, cancel).map(Arc::new)
     }
 }
 
 #[cfg(all(feature = "camera", feature = "opencv"))]
-fn branches_in(
+fn wood_in(
     film: &FilmLog,
     window: LogWindow,
     outline: &Outline,
     prior: &Skeleton,
     settings: &config::Skeleton,
     cancel: &CancelToken,
-) -> Option<BranchGraph> {
-    Some(find_wood(film, window, outline, prior, settings, cancel)?.branches)
+) -> Option<Wood> {
+    Some(find_wood(film, window, outline, prior, settings, cancel)?.wood)
 }
 
 /// Frames are decoded by the camera's crates and looked at by OpenCV. Without them no wood is seen.
 #[cfg(not(all(feature = "camera", feature = "opencv")))]
-fn branches_in(
+fn wood_in(
     _film: &FilmLog,
     _window: LogWindow,
     _outline: &Outline,
     _prior: &Skeleton,
     _settings: &config::Skeleton,
     _cancel: &CancelToken,
-) -> Option<BranchGraph> {
+) -> Option<Wood> {
     None
 }
 

@@ -14,7 +14,7 @@ pub struct Seen<'a> {
     /// The drawn shape, in the picture, that the tree was cut to. It stands in the tree's place at
     /// rest.
     pub cut_to: Option<&'a Outline>,
-    /// The bark of the filmed trunk as a tile, see [`BranchGraph::bark`](crate::model::BranchGraph).
+    /// The bark of the filmed trunk as a tile, see [`Wood::bark`](crate::model::Wood).
     pub bark: Option<&'a Arc<Rgb>>,
     /// A leaf of the user's own, and a drawn density of the leaves, which goes before the
     /// picture's.

@@ -6,7 +6,7 @@ use crate::config;
 use crate::hierarchy;
 use crate::model::{Foot, LogWindow, Outline, Rgb, Skeleton, TrackId, TrackSet};
 use crate::source::Decoder;
-use crate::wood::{self, Displacements, Shot, Stroke, View, Wood};
+use crate::wood::{self, Displacements, Found, Shot, Stroke, View};
 use nalgebra::Point2;
 use std::collections::BTreeMap;
 
@@ -23,7 +23,7 @@ pub fn find_wood(
     skeleton: &Skeleton,
     settings: &config::Skeleton,
     cancel: &CancelToken,
-) -> Option<Wood> {
+) -> Option<Found> {
     let rest = rest_places(window);
     let mut frames = Vec::new();
     let mut motions = Vec::new();

@@ -6,17 +6,18 @@ use super::meter::Histogram;
 use super::shared::{Failure, Shared};
 use crate::config::Config;
 use crate::document::note::{
-    BarkNote, Build, ModelNote, OutlineNote, PictureNote, Quality as QualityNote, Refinement,
-    Software, Source, json,
+    BarkNote, Build, MasksNote, ModelNote, OutlineNote, PictureNote, Quality as QualityNote,
+    Refinement, Software, Source, json,
 };
 use crate::document::{
-    BARK_FILE, CaptureNote, MotionCsv, PICTURE_FILE, SCHEMA_VERSION, TracksCsv, jpeg, nodes,
+    BARK_FILE, CaptureNote, LEAVES_MASK_FILE, MotionCsv, PICTURE_FILE, SCHEMA_VERSION, TracksCsv,
+    WOOD_MASK_FILE, jpeg, nodes,
 };
 use crate::dynamics::{Depth, Film};
 use crate::files::OutputFolder;
 use crate::model::{
-    Outline, Picture, Pose, Rgb, Skeleton, Tentative, Timing, TrackLog, TrackSet, Unidentified,
-    WoodSeen,
+    Masks, Outline, Picture, Pose, Rgb, Skeleton, Tentative, Timing, TrackLog, TrackSet,
+    Unidentified, WoodSeen,
 };
 use crate::recording::TrackFileReader;
 use crate::solve::{Model, with_modes};
@@ -176,6 +177,7 @@ fn draft(job: &CaptureJob, done: &Done, poses: Vec<Pose>) -> Result<DocumentWrit
         skeleton: &tree.skeleton,
         picture: job.picture.as_ref(),
         bark: bark_of(tree),
+        masks: masks_of(tree),
         poses,
         pose_in_picture: done.pose_in_picture.as_ref(),
     })?)
@@ -184,6 +186,11 @@ fn draft(job: &CaptureJob, done: &Done, poses: Vec<Pose>) -> Result<DocumentWrit
 /// The bark that the film shows of a tree.
 fn bark_of(tree: &Model) -> Option<&Arc<Rgb>> {
     tree.wood.as_ref()?.bark.as_ref()
+}
+
+/// Which pixels of the film are a tree's wood and leaves.
+fn masks_of(tree: &Model) -> Option<&Arc<Masks>> {
+    tree.wood.as_ref()?.masks.as_ref()
 }
 
 /// Says how many branches were not analysed because the end was wanted.
@@ -304,6 +311,10 @@ pub(super) fn describe(
         }),
         bark: tree.and_then(bark_of).map(|_| BarkNote {
             file: BARK_FILE.into(),
+        }),
+        masks: tree.and_then(masks_of).map(|_| MasksNote {
+            wood: WOOD_MASK_FILE.into(),
+            leaves: LEAVES_MASK_FILE.into(),
         }),
         build: tree.map(first_build),
         refinement: tree.and_then(refinement),

@@ -11,7 +11,8 @@ use super::status::{median_error_px, median_fb_error_px};
 use crate::cancel::CancelToken;
 use crate::document::note::json;
 use crate::document::{
-    BARK_FILE, Begun, CaptureNote, PICTURE_FILE, WOOD_FILE, jpeg, png, wood_csv,
+    BARK_FILE, Begun, CaptureNote, LEAVES_MASK_FILE, PICTURE_FILE, WOOD_FILE, WOOD_MASK_FILE,
+    grey_png, jpeg, png, wood_csv,
 };
 use crate::model::{FormatNote, Size, WoodSeen};
 use crate::pipeline::{BackEnd, Followed};
@@ -96,7 +97,9 @@ impl Unfinished {
         self.kept = None;
         if std::mem::take(&mut self.kept_wood) > 0 {
             std::fs::remove_file(self.dir.join(WOOD_FILE)).map_err(Failure::Log)?;
-            self.remove_bark()?;
+            for picture in [BARK_FILE, WOOD_MASK_FILE, LEAVES_MASK_FILE] {
+                self.remove_file(picture)?;
+            }
         }
         TrackFile::create(&self.dir.join(LOG_FILE)).map_err(Failure::Log)
     }
@@ -133,23 +136,32 @@ impl Unfinished {
     pub fn keep_wood(&mut self, wood: &WoodSeen) -> Result<(), Failure> {
         if wood.len() > self.kept_wood {
             self.replace(WOOD_FILE, &wood_csv(wood)?)?;
-            self.keep_bark(wood)?;
+            self.keep_pictures(wood)?;
             self.kept_wood = wood.len();
         }
         Ok(())
     }
 
-    /// The bark of the newest wood, or none where that shows none.
-    fn keep_bark(&self, wood: &WoodSeen) -> Result<(), Failure> {
-        let newest = wood.values().next_back();
-        match newest.and_then(|wood| wood.bark.as_ref()) {
-            Some(bark) => self.replace(BARK_FILE, &png(bark)?),
-            None => self.remove_bark(),
+    /// Bark and masks of the newest wood, or none where that has none.
+    fn keep_pictures(&self, wood: &WoodSeen) -> Result<(), Failure> {
+        let Some(newest) = wood.values().next_back() else {
+            return Ok(());
+        };
+        match &newest.bark {
+            Some(bark) => self.replace(BARK_FILE, &png(bark)?)?,
+            None => self.remove_file(BARK_FILE)?,
         }
+        let Some(masks) = &newest.masks else {
+            self.remove_file(WOOD_MASK_FILE)?;
+            return self.remove_file(LEAVES_MASK_FILE);
+        };
+        self.replace(WOOD_MASK_FILE, &grey_png(&masks.wood)?)?;
+        self.replace(LEAVES_MASK_FILE, &grey_png(&masks.leaves)?)
     }
 
-    fn remove_bark(&self) -> Result<(), Failure> {
-        match std::fs::remove_file(self.dir.join(BARK_FILE)) {
+    /// Removes a file, if it is there.
+    fn remove_file(&self, name: &str) -> Result<(), Failure> {
+        match std::fs::remove_file(self.dir.join(name)) {
             Err(e) if e.kind() != io::ErrorKind::NotFound => Err(Failure::Log(e)),
             _ => Ok(()),
         }

@@ -651,7 +651,7 @@ mod tests {
             piece(Some(3), 90.0, 80.0),
             piece(Some(2), -85.0, 165.0),
         ];
-        BranchGraph { nodes, bark: None }
+        BranchGraph { nodes }
     }
 
     fn points() -> Vec<PointOn> {

@@ -8,8 +8,7 @@ use super::taper::taper;
 use crate::config::Config;
 use crate::hierarchy::Evidence;
 use crate::model::{
-    BranchGraph, LogWindow, MotionHierarchy, NodeId, Outline, Skeleton, Swaying, TrackId,
-    TrackTable,
+    LogWindow, MotionHierarchy, NodeId, Outline, Skeleton, Swaying, TrackId, TrackTable, Wood,
 };
 use crate::motion::Binding;
 use crate::shape::PushFigures;
@@ -40,7 +39,7 @@ pub struct Model {
     pub left_out: BTreeSet<TrackId>,
     /// The wood that the pictures show, where it was looked for and found; the skeleton runs along
     /// it.
-    pub wood: Option<Arc<BranchGraph>>,
+    pub wood: Option<Arc<Wood>>,
     pub outline: Arc<Outline>,
     /// The tracks that it was built from, and what they are worth.
     pub table: Arc<TrackTable>,
@@ -171,12 +170,7 @@ impl Model {
 
     /// The same tree along the wood that pictures show. Traced nodes go on as those of `before`
     /// that are in their places.
-    pub(super) fn set_wood(
-        &mut self,
-        wood: Option<Arc<BranchGraph>>,
-        before: &Skeleton,
-        config: &Config,
-    ) {
+    pub(super) fn set_wood(&mut self, wood: Option<Arc<Wood>>, before: &Skeleton, config: &Config) {
         self.wood = wood;
         self.assemble(before, config);
     }
@@ -198,7 +192,7 @@ impl Model {
             next: self.names,
             prior: Some(before),
         };
-        let mut joined = along_wood(&straight, &wood, &points, &mut names);
+        let mut joined = along_wood(&straight, &wood.branches, &points, &mut names);
         self.names = names.next;
         assign_radii(&mut joined.skeleton, &self.outline, config);
         // Radii that are seen go before those of the pipe model, and a width that the user gives

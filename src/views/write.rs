@@ -3,10 +3,12 @@
 
 use super::{PrepareError, PreparedTree, TreeOptions};
 use crate::document::note::{CaptureNote, json};
-use crate::document::{BARK_FILE, Document, PICTURE_FILE, jpeg, png};
+use crate::document::{
+    BARK_FILE, Document, LEAVES_MASK_FILE, PICTURE_FILE, WOOD_MASK_FILE, grey_png, jpeg, png,
+};
 use crate::export::gltf::glb;
 use crate::files::{OutputFolder, WriteError, replace};
-use crate::model::{Picture, Pose, Rgb, Skeleton, Swaying};
+use crate::model::{Masks, Picture, Pose, Rgb, Skeleton, Swaying};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -25,6 +27,8 @@ pub struct Draft<'a> {
     pub picture: Option<&'a Picture>,
     /// What the note's bark is; the note must have one then.
     pub bark: Option<&'a Arc<Rgb>>,
+    /// What the note's masks are; the note must have them then.
+    pub masks: Option<&'a Arc<Masks>>,
     /// The end of the film in the order of time, `export.animation_s` and a second more; none for a
     /// tree that was not filmed.
     pub poses: Vec<Pose>,
@@ -57,6 +61,7 @@ impl DocumentWriter {
         );
         // A PNG gives back what was put in.
         document.bark = draft.bark.cloned();
+        document.masks = draft.masks.cloned();
         let options = TreeOptions {
             config,
             ..TreeOptions::default()
@@ -67,8 +72,8 @@ impl DocumentWriter {
         })
     }
 
-    /// Writes `nodes.csv`, `tree.glb`, the picture, the bark and `capture.json` with these `warnings`. `sway`
-    /// is by node index.
+    /// Writes `nodes.csv`, `tree.glb`, the picture, the bark, the masks and `capture.json` with these
+    /// `warnings`. `sway` is by node index.
     ///
     /// # Errors
     /// A file cannot be written, or the tree is none for a model's file.
@@ -87,6 +92,10 @@ impl DocumentWriter {
         }
         if let Some(bark) = &self.tree.document.bark {
             folder.write(BARK_FILE, &png(bark)?)?;
+        }
+        if let Some(masks) = &self.tree.document.masks {
+            folder.write(WOOD_MASK_FILE, &grey_png(&masks.wood)?)?;
+            folder.write(LEAVES_MASK_FILE, &grey_png(&masks.leaves)?)?;
         }
         let note = CaptureNote {
             animation: Some(animation),

@@ -1,7 +1,7 @@
 //! The bark of the filmed trunk: the picture is projected on the trunk, which is unrolled, as far as
 //! it is seen, to a tile that repeats without a seam.
 
-use crate::model::{BranchGraph, Luma, Rgb, Size, WoodNode};
+use crate::model::{BranchGraph, Luma, Masks, Rgb, Size, WoodNode};
 use crate::signal::statistics::quantile;
 use nalgebra::{Point2, Vector2, Vector3};
 use std::f64::consts::{PI, TAU};
@@ -37,7 +37,7 @@ const PATCH: u32 = 64;
 /// Share of the texels that are taken for another thing than bark, at either end of brightness.
 const STANDS_OUT: f64 = 0.05;
 
-/// The bark that the picture of `rest` shows where `mask` is wood (255), as a tile that repeats
+/// The bark that the picture of `rest` shows where `mask` is wood ([`Masks::wood`]), as a tile that repeats
 /// without a seam: once round a limb, and as far along it as it is round. Its mean colour (sRGB) is
 /// that of the filmed trunk. It is one texel where the trunk is too thin to show more than a
 /// colour; `None` where no trunk is seen.
@@ -194,7 +194,10 @@ impl Filmed<'_> {
             return false;
         }
         let i = at.y as usize * size.width as usize + at.x as usize;
-        self.mask.pixels.get(i).is_some_and(|m| *m != 0)
+        self.mask
+            .pixels
+            .get(i)
+            .is_some_and(|m| *m > Masks::MOST_OUTSIDE)
     }
 
     /// Colour between pixels; `None` off the wood.
@@ -398,10 +401,7 @@ mod tests {
             position_px: Point2::new(20.0, 40.0),
             radius_px: 1.0,
         });
-        BranchGraph {
-            nodes,
-            ..BranchGraph::default()
-        }
+        BranchGraph { nodes }
     }
 
     /// Mean colour of the pixels of wood (sRGB).

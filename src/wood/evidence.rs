@@ -124,9 +124,9 @@ fn carried_back(
     let width = size.width as usize;
     let mut from_u = Vec::with_capacity(field.len());
     let mut from_v = Vec::with_capacity(field.len());
-    for (i, moved) in field.iter().enumerate() {
-        from_u.push((i % width) as f32 + moved.x);
-        from_v.push((i / width) as f32 + moved.y);
+    for (v, row) in field.chunks_exact(width).enumerate() {
+        from_u.extend(row.iter().enumerate().map(|(u, moved)| u as f32 + moved.x));
+        from_v.extend(row.iter().map(|moved| v as f32 + moved.y));
     }
     let from_u = Mat::new_rows_cols_with_data(rows, cols, &from_u)?;
     let from_v = Mat::new_rows_cols_with_data(rows, cols, &from_v)?;
@@ -151,10 +151,14 @@ fn median_picture(pictures: &[Mat], size: Size) -> opencv::Result<Rgb> {
         colours.push(picture.data_typed()?);
     }
     let mut pixels = Vec::with_capacity(3 * size.area());
+    // One for all pixels: there are millions of medians of six values.
+    let mut values = Vec::with_capacity(colours.len());
     for i in 0..size.area() {
         for c in 0..3 {
-            let values = colours.iter().map(|picture| picture[i][c]).collect();
-            let median = median(values, f32::total_cmp).unwrap_or(0.0);
+            values.clear();
+            values.extend(colours.iter().map(|picture| picture[i][c]));
+            values.sort_unstable_by(f32::total_cmp);
+            let median = values.get(values.len() / 2).copied().unwrap_or(0.0);
             pixels.push(median.round().clamp(0.0, 255.0) as u8);
         }
     }

@@ -174,7 +174,6 @@ mod tests {
                 node(Some(3), 140.0, 12.0, 0.8),
                 node(Some(2), 20.0, 28.0, 0.8),
             ],
-            bark: None,
         }
     }
 

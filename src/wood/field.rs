@@ -20,7 +20,6 @@ const ROUNDS: usize = 3;
 pub struct Spread {
     size: Size,
     columns: usize,
-    rows: usize,
     /// The nearest points of every place, row by row.
     nearest: Vec<Vec<Near>>,
 }
@@ -53,7 +52,6 @@ impl Spread {
         Some(Self {
             size,
             columns,
-            rows,
             nearest,
         })
     }
@@ -74,25 +72,32 @@ impl Spread {
         let (width, height) = (self.size.width as usize, self.size.height as usize);
         let mut field = Vec::with_capacity(width * height);
         for v in 0..height {
-            for u in 0..width {
-                field.push(self.interpolated(&at_places, u, v));
+            let first = v / STEP_PX * self.columns;
+            let (above, below) = at_places[first..].split_at(self.columns);
+            let down = (v % STEP_PX) as f32 / STEP_PX as f32;
+            for (column, u) in (0..width).step_by(STEP_PX).enumerate() {
+                let corners = [
+                    above[column],
+                    above[column + 1],
+                    below[column],
+                    below[column + 1],
+                ];
+                for step in 0..STEP_PX.min(width - u) {
+                    let right = step as f32 / STEP_PX as f32;
+                    field.push(interpolated(&corners, right, down));
+                }
             }
         }
         field
     }
+}
 
-    /// Bilinear interpolation at a pixel.
-    fn interpolated(&self, at_places: &[Vector2<f32>], u: usize, v: usize) -> Vector2<f32> {
-        let (column, row) = (u / STEP_PX, v / STEP_PX);
-        debug_assert!(row + 1 < self.rows);
-        let right = (u % STEP_PX) as f32 / STEP_PX as f32;
-        let down = (v % STEP_PX) as f32 / STEP_PX as f32;
-        let first = row * self.columns + column;
-        let above = at_places[first].lerp(&at_places[first + 1], right);
-        let first = first + self.columns;
-        let below = at_places[first].lerp(&at_places[first + 1], right);
-        above.lerp(&below, down)
-    }
+/// Bilinear interpolation between the `corners` of a cell, at left and right above, left and right
+/// below; `right` and `down` are shares of its side.
+fn interpolated(corners: &[Vector2<f32>; 4], right: f32, down: f32) -> Vector2<f32> {
+    let above = corners[0].lerp(&corners[1], right);
+    let below = corners[2].lerp(&corners[3], right);
+    above.lerp(&below, down)
 }
 
 /// The nearest points to a place, and how much each counts.

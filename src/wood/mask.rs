@@ -7,7 +7,7 @@ use super::evidence::Evidence;
 use super::mixture::{Mixtures, Seed};
 use super::{Stroke, colour_mat};
 use crate::cancel::CancelToken;
-use crate::model::{Foot, Luma, Rgb, Size, bounds_px};
+use crate::model::{Foot, Rgb, Size, bounds_px};
 use nalgebra::{Matrix3, Point2, Vector3};
 use opencv::core::{CV_8U, CV_32S, Mat, Point, Scalar, Size as CvSize, Vec3b, Vector};
 use opencv::imgproc::{
@@ -64,8 +64,13 @@ pub struct WoodMask {
     pub scale: u32,
     /// Row by row, 255 is wood.
     pub mask: Vec<u8>,
+    /// Row by row, the odds of wood that the cut was made by, as logarithms; negative infinity
+    /// where no wood is looked for.
+    pub odds: Vec<f32>,
     /// Row by row, whether it moves with the tree.
     pub moves: Vec<bool>,
+    /// Row by row, whether it is as green as leaves.
+    pub is_leaf: Vec<bool>,
     pub in_leaf: bool,
 }
 
@@ -108,16 +113,12 @@ impl WoodMask {
         self.pixel(at).is_some_and(|pixel| self.mask[pixel] != 0)
     }
 
-    /// The mask at the size of the picture.
-    pub fn at_picture_size(&self, size: Size) -> Luma {
+    /// The pixels of the mask that are pixel `i` of the picture, which is of this `size`.
+    pub fn pixels_of(&self, i: usize, size: Size) -> impl Iterator<Item = usize> + Clone + use<> {
         let (width, scale) = (self.size.width as usize, self.scale as usize);
-        let mut pixels = Vec::with_capacity(size.area());
-        for v in 0..size.height as usize {
-            for u in 0..size.width as usize {
-                pixels.push(self.mask[scale * v * width + scale * u]);
-            }
-        }
-        Luma { size, pixels }
+        let (u, v) = (i % size.width as usize, i / size.width as usize);
+        let first = scale * v * width + scale * u;
+        (0..scale * scale).map(move |k| first + k / scale * width + k % scale)
     }
 }
 
@@ -141,7 +142,9 @@ pub fn wood_mask(
         size: large,
         scale,
         mask: vec![0; large.area()],
+        odds: vec![f32::NEG_INFINITY; large.area()],
         moves: vec![false; large.area()],
+        is_leaf: vec![false; large.area()],
         in_leaf: false,
     };
     let Some(bounds) = Part::holding(region, size) else {
@@ -157,7 +160,7 @@ pub fn wood_mask(
     out.in_leaf = leaves.share >= IN_LEAF;
     let low = Part::above_foot(foot, bounds, size).enlarged(scale);
     let mut is_trunk = low_trunk(&rest, low, &leaves, large)?;
-    let is_stroke = drawn(strokes, large, scale)?;
+    let is_stroke = drawn(strokes, &out)?;
     for (is_trunk, is_stroke) in is_trunk.iter_mut().zip(&is_stroke) {
         *is_trunk |= is_stroke;
     }
@@ -191,6 +194,11 @@ pub fn wood_mask(
         *mask = if is_wood { 255 } else { 0 };
     }
     without_specks(&mut out.mask, large)?;
+    let is_sought = |i: usize| region[i] != 0 || is_trunk[i];
+    for (i, odds) in odds.into_iter().enumerate().filter(|(i, _)| is_sought(*i)) {
+        out.odds[i] = odds;
+    }
+    out.is_leaf = leaves.is_leaf;
     Ok(out)
 }
 
@@ -419,19 +427,16 @@ fn enlarged_region(region: &[u8], size: Size, scale: u32) -> Vec<u8> {
     out
 }
 
-/// Which pixels of the larger picture the strokes are drawn on.
-fn drawn(strokes: &[Stroke], large: Size, scale: u32) -> opencv::Result<Vec<bool>> {
-    let mut mask = Mat::zeros(large.height as i32, large.width as i32, CV_8U)?.to_mat()?;
+/// Which pixels of the mask `wood` the strokes are drawn on.
+fn drawn(strokes: &[Stroke], wood: &WoodMask) -> opencv::Result<Vec<bool>> {
+    let (rows, cols) = (wood.size.height as i32, wood.size.width as i32);
+    let mut mask = Mat::zeros(rows, cols, CV_8U)?.to_mat()?;
+    let within = |at: f64, most: i32| at.round().clamp(0.0, f64::from(most)) as i32;
     for stroke in strokes {
         let mut corners = Vector::<Point>::new();
         for corner in stroke {
-            let within = |x: f64, most: u32| {
-                (x * f64::from(scale)).round().clamp(0.0, f64::from(most)) as i32
-            };
-            corners.push(Point::new(
-                within(corner.x, large.width),
-                within(corner.y, large.height),
-            ));
+            let at = wood.to_mask(*corner);
+            corners.push(Point::new(within(at.x, cols), within(at.y, rows)));
         }
         let white = Scalar::all(1.0);
         polylines(
@@ -439,7 +444,7 @@ fn drawn(strokes: &[Stroke], large: Size, scale: u32) -> opencv::Result<Vec<bool
             &corners,
             false,
             white,
-            STROKE_PX * scale as i32,
+            STROKE_PX * wood.scale as i32,
             LINE_8,
             0,
         )?;
@@ -782,7 +787,9 @@ impl WoodMask {
             size,
             scale: 1,
             mask: vec![0; size.area()],
+            odds: vec![f32::NEG_INFINITY; size.area()],
             moves: vec![false; size.area()],
+            is_leaf: vec![false; size.area()],
             in_leaf: false,
         };
         for pixel in 0..size.area() {

@@ -4,7 +4,7 @@
 //! [`steady`] takes the camera's motion out of the frames; [`evidence`] averages the tree over
 //! frames that are carried back to rest, and separates what moves with it from what stands behind;
 //! [`mask`] classifies pixels as wood or not by colour; [`paths`], or [`circles`] as in the paper,
-//! draw the centre lines; [`bark`] unrolls the trunk. Strokes help where colour does not.
+//! draw the centre lines; [`probability`] says how sure each pixel is; [`bark`] unrolls the trunk. Strokes help where colour does not.
 
 mod bark;
 mod circles;
@@ -16,11 +16,12 @@ mod field;
 mod mask;
 mod mixture;
 mod paths;
+mod probability;
 mod steady;
 
 use crate::cancel::CancelToken;
 use crate::config::TraceBy;
-use crate::model::{BranchGraph, Foot, Luma, Outline, Rgb};
+use crate::model::{Foot, Outline, Rgb, Wood};
 use crate::signal::median;
 use evidence::evidence;
 use field::Spread;
@@ -76,14 +77,12 @@ pub struct Shot<'a> {
     pub displacements: &'a Displacements,
 }
 
-/// The wood that a film shows.
+/// What a film shows of the tree's wood.
 #[derive(Clone, Debug)]
-pub struct Wood {
-    pub branches: BranchGraph,
+pub struct Found {
+    pub wood: Wood,
     /// The tree at rest; what stands behind it is blurred.
     pub rest: Rgb,
-    /// 255 is wood, at the size of the picture.
-    pub mask: Luma,
 }
 
 /// A line that the user drew along a branch, px.
@@ -107,7 +106,7 @@ pub struct View<'a> {
 ///
 /// # Errors
 /// OpenCV fails.
-pub fn find(view: View, cancel: &CancelToken) -> opencv::Result<Option<Wood>> {
+pub fn find(view: View, cancel: &CancelToken) -> opencv::Result<Option<Found>> {
     let size = view.outline.size;
     let is_usable =
         |shot: &&Shot| shot.picture.size == size && shot.picture.pixels.len() == 3 * size.area();
@@ -132,7 +131,7 @@ pub fn find(view: View, cancel: &CancelToken) -> opencv::Result<Option<Wood>> {
         TraceBy::Circles => circles::branches(&mask, view.foot.position_px)?,
     };
     // In leaf, what stands behind a twig is leaves, of all lights.
-    let mut branches = match mask.in_leaf {
+    let branches = match mask.in_leaf {
         true => traced,
         false => faint::without_faint(traced, &evidence.rest),
     };
@@ -146,12 +145,15 @@ pub fn find(view: View, cancel: &CancelToken) -> opencv::Result<Option<Wood>> {
     if branches.nodes.len() < 2 {
         return Ok(None);
     }
-    let mask = mask.at_picture_size(size);
-    branches.bark = bark::tile(&evidence.rest, &mask, &branches).map(Arc::new);
-    Ok(Some(Wood {
-        branches,
+    let masks = probability::masks(&mask, &evidence)?;
+    let bark = bark::tile(&evidence.rest, &masks.wood, &branches);
+    Ok(Some(Found {
+        wood: Wood {
+            branches,
+            bark: bark.map(Arc::new),
+            masks: Some(Arc::new(masks)),
+        },
         rest: evidence.rest,
-        mask,
     }))
 }
 
@@ -219,7 +221,7 @@ fn colour_mat(picture: &Rgb) -> opencv::Result<Mat> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Size;
+    use crate::model::{Masks, Size};
     use crate::signal::distance_to_segment;
 
     const SIZE: Size = Size {
@@ -277,7 +279,11 @@ mod tests {
         }
     }
 
-    fn found(swing: f64, strokes: &[Stroke], cancel: &CancelToken) -> Option<Wood> {
+    fn masks(found: &Found) -> &Masks {
+        found.wood.masks.as_deref().expect("masks")
+    }
+
+    fn found(swing: f64, strokes: &[Stroke], cancel: &CancelToken) -> Option<Found> {
         let rest_px = followed();
         let angles: Vec<f64> = (0..16)
             .map(|k| swing * f64::from(k % 8 - 4) / 4.0)
@@ -317,35 +323,33 @@ mod tests {
     /// What a single picture cannot show: windows as dark as the tree stand still while it sways.
     #[test]
     fn a_swaying_tree_is_distinguished_from_dark_windows_behind_it() {
-        let wood = found(0.05, &[], &CancelToken::new()).expect("wood");
+        let found = found(0.05, &[], &CancelToken::new()).expect("wood");
         let (mut on, mut all) = (0, 0);
-        for (i, mask) in wood.mask.pixels.iter().enumerate() {
+        for (i, wood) in masks(&found).wood.pixels.iter().enumerate() {
+            let is_in_mask = *wood > Masks::MOST_OUTSIDE;
             let at = Point2::new((i % 320) as f64, (i / 320) as f64);
             let is_wood = limbs()
                 .iter()
                 .any(|[a, b]| distance_to_segment(at, *a, *b) <= 6.0);
-            all += usize::from(*mask != 0);
-            on += usize::from(*mask != 0 && is_wood);
+            all += usize::from(is_in_mask);
+            on += usize::from(is_in_mask && is_wood);
         }
         assert!(all > 1500 && on as f64 > 0.93 * all as f64, "{on} of {all}");
-        let tips = wood
-            .branches
-            .children()
-            .iter()
-            .filter(|c| c.is_empty())
-            .count();
-        assert!((2..=3).contains(&tips), "{:?}", wood.branches);
-        let length_px = wood.branches.length_px();
-        assert!((180.0..420.0).contains(&length_px), "{:?}", wood.branches);
+        let branches = &found.wood.branches;
+        let tips = branches.children().iter().filter(|c| c.is_empty()).count();
+        assert!((2..=3).contains(&tips), "{branches:?}");
+        let length_px = branches.length_px();
+        assert!((180.0..420.0).contains(&length_px), "{branches:?}");
     }
 
     /// A tree that hardly moves shows little of itself; what the user draws is wood all the same.
     #[test]
     fn what_the_user_draws_is_wood() {
         let stroke = vec![Point2::new(160.0, 150.0), Point2::new(260.0, 150.0)];
-        let on_stroke = |wood: Wood| {
-            let pixels = (180..250).map(|u| wood.mask.pixels[150 * SIZE.width as usize + u]);
-            pixels.filter(|mask| *mask != 0).count()
+        let on_stroke = |found: Found| {
+            let row = &masks(&found).wood.pixels[150 * SIZE.width as usize..];
+            let pixels = row[180..250].iter();
+            pixels.filter(|wood| **wood > Masks::MOST_OUTSIDE).count()
         };
         let never = CancelToken::new();
         let without = on_stroke(found(0.05, &[], &never).expect("wood"));

@@ -61,8 +61,6 @@ pub fn branches(wood: &WoodMask, foot_px: Point2<f64>) -> opencv::Result<BranchG
 /// The mask as a graph of pixels.
 pub(super) struct Grid<'a> {
     wood: &'a WoodMask,
-    width: usize,
-    height: usize,
     /// Distance from the edge of the wood, px; 0 outside.
     pub inside: Vec<f32>,
     /// Whether a way may lead there: wood, what is near to it, and what moves with the tree.
@@ -89,19 +87,25 @@ impl<'a> Grid<'a> {
         }
         Ok(Self {
             wood,
-            width: wood.size.width as usize,
-            height: wood.size.height as usize,
             inside,
             passable: passable.collect(),
             cost,
         })
     }
 
+    fn width(&self) -> usize {
+        self.wood.size.width as usize
+    }
+
+    fn height(&self) -> usize {
+        self.wood.size.height as usize
+    }
+
     /// The pixel nearest to a place.
     pub fn nearest(&self, at: Point2<f64>) -> usize {
-        let u = at.x.round().clamp(0.0, (self.width - 1) as f64) as usize;
-        let v = at.y.round().clamp(0.0, (self.height - 1) as f64) as usize;
-        v * self.width + u
+        let u = at.x.round().clamp(0.0, (self.width() - 1) as f64) as usize;
+        let v = at.y.round().clamp(0.0, (self.height() - 1) as f64) as usize;
+        v * self.width() + u
     }
 
     pub fn place(&self, pixel: usize) -> Point2<f64> {
@@ -120,8 +124,11 @@ impl<'a> Grid<'a> {
             (0, 1),
             (1, 1),
         ];
-        let (u, v) = ((pixel % self.width) as isize, (pixel / self.width) as isize);
-        let (width, height) = (self.width as isize, self.height as isize);
+        let (u, v) = (
+            (pixel % self.width()) as isize,
+            (pixel / self.width()) as isize,
+        );
+        let (width, height) = (self.width() as isize, self.height() as isize);
         AROUND.into_iter().filter_map(move |(du, dv)| {
             let (u, v) = (u + du, v + dv);
             let is_in = (0..width).contains(&u) && (0..height).contains(&v);
@@ -196,7 +203,7 @@ impl Ways {
             cost: vec![f32::INFINITY; grid.cost.len()],
             from: (0..grid.cost.len()).collect(),
         };
-        let about_foot_px = FOOT_SHARE * grid.height as f64;
+        let about_foot_px = FOOT_SHARE * grid.height() as f64;
         let foot_at = grid.place(foot);
         let mut heap = BinaryHeap::from([Reached {
             cost: 0.0,
@@ -232,7 +239,7 @@ pub(super) struct Track {
 /// the ground.
 fn tips_first(grid: &Grid, ways: &Ways, foot: usize) -> Vec<Track> {
     let is_tip = |pixel: &usize| {
-        let is_above = pixel / grid.width < foot / grid.width;
+        let is_above = pixel / grid.width() < foot / grid.width();
         is_above && grid.inside[*pixel] > 0.0 && ways.cost[*pixel].is_finite()
     };
     let mut tips: Vec<usize> = (0..grid.cost.len()).filter(is_tip).collect();
@@ -279,7 +286,7 @@ fn radii(grid: &Grid, pixels: &[usize]) -> Vec<f32> {
 /// than above, and its roots are no branches.
 fn radii_from_foot(grid: &Grid, pixels: &[usize]) -> Vec<f32> {
     let mut radii = radii(grid, pixels);
-    let low = (ROOT_SHARE * grid.height as f64) as usize;
+    let low = (ROOT_SHARE * grid.height() as f64) as usize;
     let widest = (0..radii.len().min(low)).max_by(|a, b| radii[*a].total_cmp(&radii[*b]));
     if let Some(widest) = widest {
         let root = ROOT_RADII * radii[widest];
@@ -292,13 +299,13 @@ fn radii_from_foot(grid: &Grid, pixels: &[usize]) -> Vec<f32> {
 fn explain(grid: &Grid, pixels: &[usize], radii: &[f32], explained: &mut [bool]) {
     for (&pixel, radius) in pixels.iter().zip(radii) {
         let radius = EXPLAINED_RADII * radius + EXPLAINED_PX;
-        let (u, v) = (pixel % grid.width, pixel / grid.width);
+        let (u, v) = (pixel % grid.width(), pixel / grid.width());
         let reach = radius as usize;
-        for v2 in v.saturating_sub(reach)..=(v + reach).min(grid.height - 1) {
-            for u2 in u.saturating_sub(reach)..=(u + reach).min(grid.width - 1) {
+        for v2 in v.saturating_sub(reach)..=(v + reach).min(grid.height() - 1) {
+            for u2 in u.saturating_sub(reach)..=(u + reach).min(grid.width() - 1) {
                 let (du, dv) = (u2 as f32 - u as f32, v2 as f32 - v as f32);
                 if du * du + dv * dv <= radius * radius {
-                    explained[v2 * grid.width + u2] = true;
+                    explained[v2 * grid.width() + u2] = true;
                 }
             }
         }

@@ -14,7 +14,7 @@ const BESIDE_PX: f64 = 2.0;
 
 /// On how many of 19 places on `stroke` the tree has wood.
 pub fn covered(model: &Model, stroke: [[f64; 2]; 2]) -> usize {
-    let wood = model.wood.as_ref().expect("wood");
+    let wood = &model.wood.as_ref().expect("wood").branches;
     let [from, to] = stroke.map(Point2::from);
     let is_on_wood = |at: &Point2<f64>| {
         let mut pieces = wood.nodes.iter().filter_map(|node| {

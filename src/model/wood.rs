@@ -1,0 +1,35 @@
+//! The wood that pictures show.
+
+use super::{BranchGraph, Luma, Rgb};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// The wood of a tree, as the pictures of a film show it at rest.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Wood {
+    pub branches: BranchGraph,
+    /// The trunk's bark as a tile that repeats without a seam (sRGB): once round a limb, and as far
+    /// along it as it is round. One texel where only its colour is seen, `None` where no trunk is.
+    pub bark: Option<Arc<Rgb>>,
+    /// Which pixels are wood, and which are leaves; of wood that was found long ago they are not
+    /// remembered.
+    pub masks: Option<Arc<Masks>>,
+}
+
+/// How sure it is that each pixel of the picture at rest, from which the camera's motion has been
+/// taken off, is wood, and that it is a leaf: the probability, 255 is 1. Both have the size of the
+/// picture, and no pixel has more than 255 in both together. Beyond the outline, widened by how far
+/// the tree sways, both are 0.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Masks {
+    pub wood: Luma,
+    pub leaves: Luma,
+}
+
+impl Masks {
+    /// The greatest value of a pixel that is not in the mask.
+    pub const MOST_OUTSIDE: u8 = 127;
+}
+
+/// The wood that was found while a film went on, by the newest frame that was looked at.
+pub type WoodSeen = BTreeMap<u64, Arc<Wood>>;
