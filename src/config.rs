@@ -11,7 +11,7 @@ mod reload;
 mod setting;
 mod settings;
 
-pub use load::{ConfigError, check_strokes};
+pub use load::{ConfigError, STROKE_POINTS, check_strokes};
 pub use reference::{default_file, help, tables};
 pub use reload::{Change, effect};
 pub use setting::{Choice, Effect, Range, Section, Setting};

@@ -2,6 +2,7 @@
 
 use super::setting::Setting;
 use super::settings::{Config, SECTIONS};
+use std::ops::Range;
 use std::path::Path;
 
 /// Why a configuration was not taken; the text names file, line and key.
@@ -139,26 +140,39 @@ impl Config {
     }
 }
 
-/// Refuses lines along branches that do not lead from one place to another.
+/// Points that a line along a branch has at least, and at most; and so many lines are taken.
+pub const STROKE_POINTS: Range<usize> = 2..1001;
+const MAX_STROKES: usize = 200;
+
+/// Refuses lines along branches that do not lead from one place to another, and more than a user
+/// can have drawn.
 ///
 /// # Errors
-/// One has fewer than two points, or one that is not finite.
+/// One has fewer than two points or more than a thousand, or one that is not finite; or there are
+/// more than 200.
 pub fn check_strokes(strokes_px: &[Vec<[f64; 2]>]) -> Result<(), ConfigError> {
-    let refused = |value, allowed| ConfigError::OutOfRange {
-        key: "skeleton.strokes_px",
-        value,
-        allowed,
-    };
+    if strokes_px.len() > MAX_STROKES {
+        let lines = strokes_px.len() as f64;
+        return Err(refused_strokes(lines, "at most 200 lines"));
+    }
     for stroke in strokes_px {
-        if stroke.len() < 2 {
-            let n_points = stroke.len() as f64;
-            return Err(refused(n_points, "at least two points in each line"));
+        if !STROKE_POINTS.contains(&stroke.len()) {
+            let points = stroke.len() as f64;
+            return Err(refused_strokes(points, "2 to 1000 points in each line"));
         }
         if let Some(at) = stroke.iter().flatten().find(|at| !at.is_finite()) {
-            return Err(refused(*at, "finite numbers"));
+            return Err(refused_strokes(*at, "finite numbers"));
         }
     }
     Ok(())
+}
+
+fn refused_strokes(value: f64, allowed: &'static str) -> ConfigError {
+    ConfigError::OutOfRange {
+        key: "skeleton.strokes_px",
+        value,
+        allowed,
+    }
 }
 
 fn check_range(setting: &Setting, value: f64) -> Result<(), ConfigError> {

@@ -38,7 +38,7 @@ use crate::bounds::Bounds;
 use crate::config::Config;
 use crate::dynamics::Film;
 use crate::model::{
-    Masks, Outline, Picture, Pose, Rgb, Size, Skeleton, Swaying, Unidentified, Wood, WoodSeen,
+    Outline, Picture, Pose, Rgb, Size, Skeleton, Swaying, Unidentified, Wood, WoodSeen,
 };
 use crate::motion::PoseEstimator;
 use motion::PoseReader;
@@ -66,8 +66,6 @@ pub struct Document {
     pub outline: Option<Outline>,
     /// The bark of the filmed trunk as a tile, see [`Wood::bark`].
     pub bark: Option<Arc<Rgb>>,
-    /// Which pixels of the picture at rest are wood, and which are leaves.
-    pub masks: Option<Arc<Masks>>,
     /// What the user should know: parts that are missing. One sentence each.
     pub warnings: Vec<String>,
 }
@@ -116,12 +114,11 @@ impl Document {
         let picture = note.picture.as_ref().map(|p| picture::bytes(dir, p));
         let mut document = Self::of_parts(dir, note, nodes, picture)?;
         document.bark = document.bark_in_folder();
-        document.masks = document.masks_in_folder();
         Ok(document)
     }
 
-    /// The document that would be read from a folder to which these were written; without poses,
-    /// bark and masks. `picture_jpg` is the file that the note speaks of.
+    /// The document that would be read from a folder to which these were written; without poses
+    /// and bark. `picture_jpg` is the file that the note speaks of.
     ///
     /// # Errors
     /// The tree cannot be read back, as it is empty or reaches too far.
@@ -161,7 +158,6 @@ impl Document {
             pose_in_picture: None,
             outline: None,
             bark: None,
-            masks: None,
             warnings: Vec::new(),
         };
         document.picture = document.picture_of(picture_jpg);
@@ -195,18 +191,6 @@ impl Document {
             Err(why) => {
                 self.warnings
                     .push(format!("the bark of the capture is left out: {why}"));
-                None
-            }
-        }
-    }
-
-    fn masks_in_folder(&mut self) -> Option<Arc<Masks>> {
-        self.note.masks.as_ref()?;
-        match masks::read(&self.dir, size(&self.note)) {
-            Ok(masks) => Some(Arc::new(masks)),
-            Err(why) => {
-                self.warnings
-                    .push(format!("the masks of the capture are left out: {why}"));
                 None
             }
         }

@@ -2,7 +2,7 @@
 //! that a replay gives the same file.
 
 use super::error::DocumentError;
-use crate::config::Config;
+use crate::config::{Config, STROKE_POINTS};
 use crate::files::WriteError;
 use crate::model::Timing;
 use serde::{Deserialize, Serialize};
@@ -255,7 +255,10 @@ pub(super) fn parse(file: &Path, text: &[u8]) -> Result<CaptureNote, DocumentErr
             what: format!("schema_version {version}"),
         });
     }
-    let note: CaptureNote = serde_json::from_value(value).map_err(|e| unread(file, e))?;
+    let mut note: CaptureNote = serde_json::from_value(value).map_err(|e| unread(file, e))?;
+    // They led to nothing, and former versions let them pass.
+    let strokes_px = &mut note.config.skeleton.strokes_px;
+    strokes_px.retain(|stroke| STROKE_POINTS.contains(&stroke.len()));
     note.check()
         .map_err(|what| DocumentError::note(file, what))?;
     Ok(note)

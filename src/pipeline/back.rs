@@ -315,13 +315,23 @@ impl BackEnd {
                 self.build();
             }
         }
+        // A tree that is there already is not given up for one that may not come.
+        if self.refiner.as_ref().is_some_and(Refiner::is_following) {
+            self.end_refinement(cancel);
+        }
         if let (Some(refiner), Some(standing)) = (&mut self.refiner, &self.tracker) {
             refiner.begin_asked(&self.log, &self.film, standing, &self.config);
-            if let Some(model) = refiner.end(cancel) {
-                self.take(PoseTracker::new(Arc::new(model), &self.config));
-            }
         }
+        self.end_refinement(cancel);
         self.identify_sub_branches(cancel);
+    }
+
+    /// Takes what the end is not to come without.
+    fn end_refinement(&mut self, cancel: &CancelToken) {
+        let refiner = self.refiner.as_mut();
+        if let Some(model) = refiner.and_then(|refiner| refiner.end(cancel)) {
+            self.take(PoseTracker::new(Arc::new(model), &self.config));
+        }
     }
 
     /// A new model takes effect.

@@ -249,6 +249,11 @@ impl Refiner {
         self.seeks_wood || self.is_asked
     }
 
+    /// Whether a new tree is there, and its pose is being followed.
+    pub fn is_following(&self) -> bool {
+        matches!(self.stage, Stage::Following(_))
+    }
+
     /// Has the wood looked for again from the next frame on: the user has drawn along branches.
     pub fn ask(&mut self) {
         self.is_asked = true;

@@ -9,7 +9,7 @@
 use crate::model::{Gap, GapCause};
 use std::collections::VecDeque;
 
-/// Steps on either side of the one that is judged, a second of film: of sixteen, with two frames in
+/// Steps on either side of the one that is judged: of sixteen, with two frames in
 /// five lost, now and then so few are of one frame that the rate is taken for half of what it is.
 const AROUND: usize = 32;
 /// Fewer steps than this say nothing of the rate.

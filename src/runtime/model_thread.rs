@@ -180,8 +180,10 @@ impl ModelThread {
 
     /// The user has drawn a line along a branch, or taken one back.
     fn strokes_changed(&mut self) {
-        // What is being worked out is without it.
-        self.refining.give_up();
+        if self.job.config.skeleton.along_wood {
+            // What is being worked out is without it.
+            self.refining.give_up();
+        }
         let lines = match self.back.strokes_px().len() {
             0 => "no line along a branch".to_owned(),
             1 => "1 line along a branch".to_owned(),
@@ -191,7 +193,9 @@ impl ModelThread {
             match (self.job.config.skeleton.along_wood, self.back.model()) {
                 (false, _) => format!("{lines}; not used: skeleton.along_wood is false"),
                 (true, None) => format!("{lines}; the wood is looked for with the tree"),
-                (true, Some(_)) => format!("{lines}; the wood is looked for again"),
+                (true, Some(_)) => {
+                    format!("{lines}; the wood is looked for again with the next frames")
+                }
             },
         );
     }

@@ -50,8 +50,10 @@ impl Refining {
             Some(Err(Missing::NotReady)) => return back.put_off_model(time_s),
             Some(Ok(model)) => back.put_model(model),
             // What has failed once would fail again; the standing tree has to do.
-            Some(Err(Missing::Failed | Missing::NotWanted)) => back.put_model(None),
-            None if is_in_a_hurry => back.put_model(None),
+            Some(Err(Missing::Failed)) => back.put_model(None),
+            // At the end it is known what came too late.
+            Some(Err(Missing::NotWanted)) => back.put_off_model(time_s),
+            None if is_in_a_hurry => back.put_off_model(time_s),
             None if live => back.put_off_model(time_s),
             None => {}
         }

@@ -14,7 +14,7 @@ use crate::document::{
     BARK_FILE, Begun, CaptureNote, LEAVES_MASK_FILE, PICTURE_FILE, WOOD_FILE, WOOD_MASK_FILE,
     grey_png, jpeg, png, wood_csv,
 };
-use crate::model::{FormatNote, Size, WoodSeen};
+use crate::model::{FormatNote, Masks, Size, WoodSeen};
 use crate::pipeline::{BackEnd, Followed};
 use crate::recording::{SpaceReserve, TrackFile, TrackFileReader};
 use crate::source::SourceInfo;
@@ -117,7 +117,8 @@ impl Unfinished {
     pub fn keep(&mut self, job: &CaptureJob, written_bytes: u64) -> Result<(), Failure> {
         self.kept = Some(Instant::now());
         let results = RESULTS_PER_LOG * job.tracks.bytes().map_err(Failure::Log)?;
-        let missing = LEAST_RESERVE + results.saturating_sub(written_bytes);
+        let masks = newest_masks(&job.wood).map_or(0, |masks| 2 * masks.wood.size.area() as u64);
+        let missing = LEAST_RESERVE + masks + results.saturating_sub(written_bytes);
         self.reserve.grow_to(missing).map_err(Failure::Log)?;
         let note = json(&finish::describe(job, None, None))?;
         self.replace(NOTE_FILE, &note)?;
@@ -135,6 +136,9 @@ impl Unfinished {
     /// The disk is full, or whatever else the file system says.
     pub fn keep_wood(&mut self, wood: &WoodSeen) -> Result<(), Failure> {
         if wood.len() > self.kept_wood {
+            // After a crash there may be none, but none of other wood.
+            self.remove_file(WOOD_MASK_FILE)?;
+            self.remove_file(LEAVES_MASK_FILE)?;
             self.replace(WOOD_FILE, &wood_csv(wood)?)?;
             self.keep_pictures(wood)?;
             self.kept_wood = wood.len();
@@ -152,8 +156,7 @@ impl Unfinished {
             None => self.remove_file(BARK_FILE)?,
         }
         let Some(masks) = &newest.masks else {
-            self.remove_file(WOOD_MASK_FILE)?;
-            return self.remove_file(LEAVES_MASK_FILE);
+            return Ok(());
         };
         self.replace(WOOD_MASK_FILE, &grey_png(&masks.wood)?)?;
         self.replace(LEAVES_MASK_FILE, &grey_png(&masks.leaves)?)
@@ -188,6 +191,11 @@ impl Unfinished {
     pub fn dir(&self) -> &Path {
         &self.dir
     }
+}
+
+/// The masks of the newest wood.
+fn newest_masks(wood: &WoodSeen) -> Option<&Masks> {
+    wood.values().next_back()?.masks.as_deref()
 }
 
 /// Completes the capture `out` from what its run has left.

@@ -131,6 +131,7 @@ impl<'a> Refinement<'a> {
             followed_from: self.moment.followed_from,
             frame: self.moment.frame,
             time_s: self.moment.time_s,
+            shown_from: self.moment.frame,
             refinements: prior.refinements + 1,
             kept: prior.plain.measured(),
             joined: self.bound.clone(),

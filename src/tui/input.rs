@@ -316,13 +316,17 @@ fn begin_drawing(subject: Subject, state: &mut State) {
         return;
     }
     state.help = false;
+    state.unsay();
     state.drawing.get_or_insert_with(|| Drawing::of(subject));
 }
 
 fn click(column: u16, row: u16, state: &mut State, placed: Option<&Placed>) {
     let pixel = placed.and_then(|p| p.pixel_at(column, row));
     match (&mut state.drawing, pixel) {
-        (Some(drawing), Some(pixel)) => drawing.add(pixel),
+        (Some(drawing), Some(pixel)) => {
+            drawing.add(pixel);
+            state.unsay();
+        }
         _ => state.say("That is outside the picture."),
     }
 }
@@ -353,7 +357,10 @@ fn draw(
             };
         }
         DrawingAction::Set => match drawing.cursor_px() {
-            Some(pixel) => drawing.add(pixel),
+            Some(pixel) => {
+                drawing.add(pixel);
+                state.unsay();
+            }
             None => move_cursor(&mut drawing, placed, 0, 0),
         },
         DrawingAction::Move(right, down) => move_cursor(&mut drawing, placed, right, down),

@@ -97,6 +97,11 @@ impl State {
         self.notice = Some((text.into(), NOTICE_TICKS));
     }
 
+    /// What was told is no longer so.
+    pub fn unsay(&mut self) {
+        self.notice = None;
+    }
+
     /// One redraw has passed.
     pub fn tick(&mut self) {
         if let Some((_, left)) = &mut self.notice {

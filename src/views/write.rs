@@ -42,6 +42,7 @@ pub struct Draft<'a> {
 pub struct DocumentWriter {
     tree: PreparedTree,
     picture_jpg: Option<Vec<u8>>,
+    masks: Option<Arc<Masks>>,
 }
 
 impl DocumentWriter {
@@ -61,7 +62,6 @@ impl DocumentWriter {
         );
         // A PNG gives back what was put in.
         document.bark = draft.bark.cloned();
-        document.masks = draft.masks.cloned();
         let options = TreeOptions {
             config,
             ..TreeOptions::default()
@@ -69,11 +69,12 @@ impl DocumentWriter {
         Ok(Self {
             tree: PreparedTree::new(document, options)?,
             picture_jpg,
+            masks: draft.masks.cloned(),
         })
     }
 
-    /// Writes `nodes.csv`, `tree.glb`, the picture, the bark, the masks and `capture.json` with these
-    /// `warnings`. `sway` is by node index.
+    /// Writes `nodes.csv`, `tree.glb`, the picture, the bark, the masks and `capture.json` with
+    /// these `warnings`. `sway` is by node index.
     ///
     /// # Errors
     /// A file cannot be written, or the tree is none for a model's file.
@@ -93,7 +94,7 @@ impl DocumentWriter {
         if let Some(bark) = &self.tree.document.bark {
             folder.write(BARK_FILE, &png(bark)?)?;
         }
-        if let Some(masks) = &self.tree.document.masks {
+        if let Some(masks) = &self.masks {
             folder.write(WOOD_MASK_FILE, &grey_png(&masks.wood)?)?;
             folder.write(LEAVES_MASK_FILE, &grey_png(&masks.leaves)?)?;
         }

@@ -24,6 +24,8 @@ const EVENED_PX: f64 = 0.7;
 /// Evidence above which a pixel is taken to be tree, and below which to stand still.
 const TREE: f32 = 0.15;
 const STILL: f32 = -0.03;
+/// Strokes are drawn no farther than this from the first pixel, px: whole numbers hold it.
+const FARTHEST: f64 = 30_000.0;
 /// Largest width of a ridge, px at 640 px picture width.
 const RIDGE_PX: f64 = 25.0;
 /// Least width of a limb that can be distinguished from leaves, px at 640 px picture width.
@@ -431,12 +433,12 @@ fn enlarged_region(region: &[u8], size: Size, scale: u32) -> Vec<u8> {
 fn drawn(strokes: &[Stroke], wood: &WoodMask) -> opencv::Result<Vec<bool>> {
     let (rows, cols) = (wood.size.height as i32, wood.size.width as i32);
     let mut mask = Mat::zeros(rows, cols, CV_8U)?.to_mat()?;
-    let within = |at: f64, most: i32| at.round().clamp(0.0, f64::from(most)) as i32;
     for stroke in strokes {
         let mut corners = Vector::<Point>::new();
         for corner in stroke {
             let at = wood.to_mask(*corner);
-            corners.push(Point::new(within(at.x, cols), within(at.y, rows)));
+            let [u, v] = [at.x, at.y].map(|c| c.round().clamp(-FARTHEST, FARTHEST) as i32);
+            corners.push(Point::new(u, v));
         }
         let white = Scalar::all(1.0);
         polylines(
