@@ -57,6 +57,7 @@ fn some_problem(chance: &mut Chance, ours: bool) -> Problem {
         sigma_shape: (10.0 + 20.0 * chance.even()).to_radians(),
         sigma_depth: ours.then_some(2f64.to_radians()),
         sigma_lean: ours.then_some(0.3),
+        sigma_turn: ours.then_some(0.3),
         max_step,
         max_total,
     }
@@ -212,6 +213,39 @@ fn targets_px(tree: &Skeleton, angle: f64) -> Vec<Option<Point2<f64>>> {
         .to_vec()
 }
 
+/// In leaf, forks that nobody sees may lie a few pixels apart, and the limb that carries them bends:
+/// no turn of such a piece brings its points to where they are seen, and a right angle in it would
+/// throw about the whole of what it carries.
+#[test]
+fn a_short_piece_does_not_turn_round_for_what_is_out_of_its_reach() {
+    let top = Point3::new(0.0, 100.0, 0.0);
+    let fork = top + Vector3::new(2.0, 2.0, 0.0);
+    let nodes = vec![
+        node(0, None, Point3::origin()),
+        node(1, Some(0), top),
+        node(2, Some(1), fork),
+        node(3, Some(2), fork + Vector3::new(60.0, 70.0, 0.0)),
+    ];
+    let tree = Arc::new(Skeleton { nodes, ..tree() });
+    let places = tree.nodes.iter();
+    let mut targets: Vec<Option<Point2<f64>>> = places
+        .map(|node| Some(tree.image_from_model(&node.position)))
+        .collect();
+    for at in targets[2..].iter_mut().flatten() {
+        at.x -= 15.0;
+    }
+    let mut estimator = PoseEstimator::new(tree.clone(), &Motion::default());
+    let pose = estimator.step(0, 0.0, &targets);
+    let piece_deg = own(&tree, &pose, 2).angle().to_degrees();
+    assert!(piece_deg < 25.0, "{piece_deg} degrees");
+    let seen = tree.image_from_model(&pose.joints[3].position);
+    let off_px = distance(&seen, &targets[3].expect("a target"));
+    assert!(
+        off_px < 4.0,
+        "the branch on it makes up for it: {off_px} px"
+    );
+}
+
 /// By how much the branch turns, degrees, after so many missing frames in which it was turned by
 /// 0.8 radians.
 fn turned_by(frames_missing: u64) -> f64 {
@@ -252,6 +286,7 @@ fn spin(max_total: f64) -> (f64, f64) {
         sigma_shape: 0.3,
         sigma_depth: None,
         sigma_lean: None,
+        sigma_turn: None,
         max_step: 20f64.to_radians(),
         max_total,
     };

@@ -405,6 +405,7 @@ fn problem(target: Option<Vector2<f64>>) -> Problem {
         sigma_shape: 0.3,
         sigma_depth: None,
         sigma_lean: None,
+        sigma_turn: None,
         max_step: 0.2,
         max_total: 0.5,
     }

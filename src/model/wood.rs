@@ -19,7 +19,7 @@ pub struct Wood {
 /// How sure it is that each pixel of the picture at rest, from which the camera's motion has been
 /// taken off, is wood, and that it is a leaf: the probability, 255 is 1. Both have the size of the
 /// picture, and no pixel has more than 255 in both together. Beyond the outline, widened by how far
-/// the tree sways, both are 0.
+/// the tree sways, both are 0, but for the low trunk and lines that the user drew.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Masks {
     pub wood: Luma,

@@ -21,7 +21,7 @@ pub use probabilistic::Problem;
 
 use crate::config::{Motion, MotionMethod};
 use crate::model::{JointPose, MovingBranch, Node, NodeId, Pose, Skeleton};
-use nalgebra::{Point2, Unit, UnitQuaternion, UnitVector3, Vector3};
+use nalgebra::{Point2, Unit, UnitQuaternion, UnitVector3, Vector3, distance};
 use rotation::shortest_rotation;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -204,6 +204,10 @@ impl PoseEstimator {
         if branch.length < 1e-6 {
             return branch.direction;
         }
+        // The base is off by this at least, and no turn of the branch is to make up for that.
+        let out_of_reach_px = target.map_or(0.0, |t| {
+            (distance(&t, &base.position.xy()) - branch.length).max(0.0)
+        });
         match self.settings.method {
             MotionMethod::Probabilistic => Problem {
                 parent_rotation: base.rotation,
@@ -212,12 +216,13 @@ impl PoseEstimator {
                 parent_direction: branch.parent_direction,
                 rest_direction: branch.direction,
                 previous_direction: previous.unwrap_or(branch.direction),
-                sigma_track_px: self.settings.sigma_track_px,
+                sigma_track_px: self.settings.sigma_track_px.hypot(out_of_reach_px),
                 sigma_shape: branch.sigma_shape,
                 // The first frame has none before it.
                 sigma_depth: previous
                     .map(|_| self.settings.depth_rate_deg_s.to_radians() * elapsed_s),
                 sigma_lean: Some(LEAN * branch.sigma_shape),
+                sigma_turn: Some(branch.sigma_shape),
                 max_step: previous.map_or(PI, |p| {
                     self.largest_step(p.angle(&branch.direction), elapsed_s)
                 }),

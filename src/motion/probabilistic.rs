@@ -26,6 +26,9 @@ pub struct Problem {
     /// Standard deviation of the same component's difference from that at rest; `None`: as the
     /// paper has it.
     pub sigma_lean: Option<f64>,
+    /// Standard deviation of how far the direction has turned from that at rest, as a distance on
+    /// the unit sphere; `None`: as the paper has it.
+    pub sigma_turn: Option<f64>,
     /// Largest angle from the previous direction, and from the rest direction, radians; outside the
     /// prior is 0.
     pub max_step: f64,
@@ -35,7 +38,7 @@ pub struct Problem {
 impl Problem {
     /// Minus the logarithm of the posterior of eq. 7, up to a constant, for a direction within the
     /// bounds: half the squares of (y' - x') / sigma_track of eq. 8 and (alpha - alpha(1)) /
-    /// sigma_shape of eq. 10, and two terms of our own.
+    /// sigma_shape of eq. 10, and three terms of our own.
     ///
     /// The picture hardly shows how far a branch leans towards the viewer, so that a tenth of a
     /// pixel of tracking noise moves it by pixels in depth. The paper's uniform prior lets that
@@ -43,7 +46,10 @@ impl Problem {
     /// depth, and in depth only, holds it still and takes nothing from what the film shows. And a
     /// branch that has lain across the line of sight could go on to its own mirror image and stay
     /// there: eq. 8 cannot tell the two apart, and eq. 10 only as far as the parent leans. A prior
-    /// on the depth itself can.
+    /// on the depth itself can. Eq. 10 is the same all round the parent: a piece of two pixels, which
+    /// the tracks can turn by a few, would go over to the parent's other side for nothing, and all
+    /// that it carries with it. A prior on the turn itself holds it; a branch that the tracks see
+    /// to turn does not feel it.
     pub fn cost(&self, d: &UnitVector3<f64>) -> f64 {
         let y = self.parent_rotation * d.into_inner();
         let track = self.target.map_or(0.0, |t| {
@@ -58,7 +64,10 @@ impl Problem {
         let lean = self.sigma_lean.map_or(0.0, |sigma| {
             (y.z - self.depth_of(&self.rest_direction)) / sigma
         });
-        0.5 * (track + shape * shape + depth * depth + lean * lean)
+        let turn = self.sigma_turn.map_or(0.0, |sigma| {
+            (d.into_inner() - self.rest_direction.into_inner()).norm() / sigma
+        });
+        0.5 * (track + shape * shape + depth * depth + lean * lean + turn * turn)
     }
 
     /// Component of a direction along the line of sight, to the viewer.

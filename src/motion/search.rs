@@ -76,6 +76,8 @@ struct Search {
     per_track: f64,
     per_shape: f64,
     per_depth: f64,
+    /// One over the standard deviation of the turn from rest; 0 for no prior on it.
+    per_turn: f64,
     /// The depth that the priors on it make most probable, as a sine.
     depth: f64,
     max_step: f64,
@@ -94,12 +96,14 @@ struct Off {
     track: Vector2<f64>,
     shape: f64,
     depth: f64,
+    turn: Vector3<f64>,
 }
 
 impl Off {
     /// Minus the logarithm of the posterior, up to a constant.
     fn cost(&self) -> f64 {
-        0.5 * (self.track.norm_squared() + self.shape * self.shape + self.depth * self.depth)
+        let [track, turn] = [self.track.norm_squared(), self.turn.norm_squared()];
+        0.5 * (track + self.shape * self.shape + self.depth * self.depth + turn)
     }
 }
 
@@ -124,6 +128,7 @@ impl Search {
             per_track: 1.0 / problem.sigma_track_px,
             per_shape: 1.0 / problem.sigma_shape,
             per_depth: (rate + lean).sqrt(),
+            per_turn: weight(problem.sigma_turn).sqrt(),
             depth: (rate * previous.z + lean * rest.z) / (rate + lean).max(f64::MIN_POSITIVE),
             max_step: problem.max_step,
             max_total: problem.max_total,
@@ -138,6 +143,7 @@ impl Search {
                 (angle - parent.rest_angle) * self.per_shape
             }),
             depth: (d.z - self.depth) * self.per_depth,
+            turn: (d.into_inner() - self.rest.into_inner()) * self.per_turn,
         }
     }
 
@@ -170,16 +176,17 @@ impl Search {
                 _ => (0.0, 0.0),
             };
             let (pull, stiffness) = (off.depth * self.per_depth, self.per_depth * self.per_depth);
+            let (back, per_turn) = (off.turn * self.per_turn, self.per_turn * self.per_turn);
             // The sphere bends away from its tangents: where the target is out of reach that is
             // most of the slope's change.
             let bend = -(off.track.dot(&d.xy()) * scale + pull * d.z);
             let bend = bend.max(0.0);
             let mixed = ta.dot(&tb) + sa * sb + a.z * b.z * stiffness;
-            let aa = ta.norm_squared() + sa * sa + a.z * a.z * stiffness + bend;
-            let bb = tb.norm_squared() + sb * sb + b.z * b.z * stiffness + bend;
+            let aa = ta.norm_squared() + sa * sa + a.z * a.z * stiffness + per_turn + bend;
+            let bb = tb.norm_squared() + sb * sb + b.z * b.z * stiffness + per_turn + bend;
             let gradient = Vector2::new(
-                ta.dot(&off.track) + sa * off.shape + a.z * pull,
-                tb.dot(&off.track) + sb * off.shape + b.z * pull,
+                ta.dot(&off.track) + sa * off.shape + a.z * pull + a.dot(&back),
+                tb.dot(&off.track) + sb * off.shape + b.z * pull + b.dot(&back),
             );
             let more = damping * (aa + bb).max(1e-9);
             let determinant = (aa + more) * (bb + more) - mixed * mixed;
