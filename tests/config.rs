@@ -160,7 +160,7 @@ fn a_value_out_of_range_is_refused_with_what_is_allowed() {
         ),
         (
             "[skeleton]\nstrokes_px = [[[1.0, 2.0], [3.0, 4.0]], [[1.0, 2.0]]]",
-            "skeleton.strokes_px = 1 is out of range; allowed: at least two points in each line",
+            "skeleton.strokes_px = 1 is out of range; allowed: 2 to 1000 points in each line",
         ),
         (
             "[skeleton]\nstrokes_px = [[[1.0, 2.0], [3.0, inf]]]",
