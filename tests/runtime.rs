@@ -491,7 +491,7 @@ fn strokes_are_used_shown_kept_and_finished_with() {
     assert_eq!(shown, [ACROSS.to_vec()]);
     let (summary, failure, warnings) = ended(running);
     assert!(matches!(failure, Some(Failure::Kept { .. })), "{failure:?}");
-    let refused = |w: &String| w.contains("at least two points");
+    let refused = |w: &String| w.contains("2 to 1000 points in each line");
     assert!(
         warnings.iter().any(refused) && warnings.len() == 1,
         "{warnings:?}"
