@@ -20,6 +20,18 @@ fn pipeline() -> Pipeline {
     Pipeline::new(&config, Some(support::outline())).expect("decoder")
 }
 
+/// More could not be read back with the capture.
+#[test]
+fn no_more_lines_are_taken_than_a_capture_holds() {
+    let mut back = pipeline().back;
+    for _ in 0..200 {
+        back.add_stroke(ACROSS.to_vec()).expect("taken");
+    }
+    let refused = back.add_stroke(ALONG_SKY.to_vec()).expect_err("too many");
+    assert!(refused.to_string().contains("at most 200 lines"));
+    assert_eq!(back.strokes_px(), vec![ACROSS.to_vec(); 200]);
+}
+
 fn film(pipeline: &mut Pipeline, frames: std::ops::Range<usize>) {
     for k in frames {
         pipeline.step(&support::timed(k)).expect("picture");

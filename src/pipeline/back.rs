@@ -261,10 +261,14 @@ impl BackEnd {
     /// tree. [`job`](Self::job) is another one then. Points and tree are kept.
     ///
     /// # Errors
-    /// It leads from no place to another.
+    /// It leads from no place to another, or there are too many. Nothing is changed then.
     pub fn add_stroke(&mut self, stroke_px: Vec<[f64; 2]>) -> Result<(), ConfigError> {
-        check_strokes(std::slice::from_ref(&stroke_px))?;
-        self.config.skeleton.strokes_px.push(stroke_px);
+        let strokes_px = &mut self.config.skeleton.strokes_px;
+        strokes_px.push(stroke_px);
+        if let Err(e) = check_strokes(strokes_px) {
+            strokes_px.pop();
+            return Err(e);
+        }
         self.seek_wood_again();
         Ok(())
     }
