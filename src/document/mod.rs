@@ -3,8 +3,8 @@
 //!
 //! `capture.json` says what was filmed and how, `nodes.csv` holds the whole model, `frame.jpg` one
 //! picture of it, `bark.png` its bark, `wood.png` and `leaves.png` which pixels are wood and leaves.
-//! A tree that was filmed has `tracks.csv` and `left_out.csv`, the
-//! points, and `motion.csv`, the poses.
+//! A tree that was filmed has `tracks.csv` and `left_out.csv`, the points, and `motion.csv`, the
+//! poses.
 
 mod bark;
 mod error;

@@ -5,6 +5,11 @@ use std::cmp::Ordering;
 /// The middle of `values` by `order`, which must be total: of an even number the upper of the two;
 /// `None` of none.
 pub fn median<T: Copy>(mut values: Vec<T>, order: impl Fn(&T, &T) -> Ordering) -> Option<T> {
+    median_in_place(&mut values, order)
+}
+
+/// The same of values that may be put into another order.
+pub fn median_in_place<T: Copy>(values: &mut [T], order: impl Fn(&T, &T) -> Ordering) -> Option<T> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, order).1)
 }

@@ -37,10 +37,10 @@ const PATCH: u32 = 64;
 /// Share of the texels that are taken for another thing than bark, at either end of brightness.
 const STANDS_OUT: f64 = 0.05;
 
-/// The bark that the picture of `rest` shows where `mask` is wood ([`Masks::wood`]), as a tile that repeats
-/// without a seam: once round a limb, and as far along it as it is round. Its mean colour (sRGB) is
-/// that of the filmed trunk. It is one texel where the trunk is too thin to show more than a
-/// colour; `None` where no trunk is seen.
+/// The bark that the picture of `rest` shows where `mask` is wood ([`Masks::wood`]), as a tile that
+/// repeats without a seam: once round a limb, and as far along it as it is round. Its mean colour
+/// (sRGB) is that of the filmed trunk. It is one texel where the trunk is too thin to show more than
+/// a colour; `None` where no trunk is seen.
 pub(super) fn tile(rest: &Rgb, mask: &Luma, branches: &BranchGraph) -> Option<Rgb> {
     let filmed = Filmed { rest, mask };
     let sections = lowest(filmed.sections(&trunk(branches)));

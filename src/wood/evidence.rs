@@ -7,13 +7,14 @@
 //! picture is plain both are true, and nothing is said.
 
 use super::field::Spread;
-use super::{Shot, colour_mat};
+use super::{Shot, blurred, colour_mat};
 use crate::cancel::CancelToken;
 use crate::model::{Rgb, Size};
 use crate::signal::median;
+use crate::signal::statistics::median_in_place;
 use nalgebra::Vector2;
-use opencv::core::{BORDER_REPLICATE, Mat, Scalar, Size as CvSize, Vec3f};
-use opencv::imgproc::{INTER_CUBIC, INTER_LINEAR, gaussian_blur_def, remap};
+use opencv::core::{BORDER_REPLICATE, Mat, Scalar, Vec3f};
+use opencv::imgproc::{INTER_CUBIC, INTER_LINEAR, remap};
 use opencv::prelude::*;
 
 /// Pictures are blurred by so much before they are compared, px: a motion is a tenth of a pixel
@@ -58,7 +59,7 @@ pub fn evidence(
         warped.push(carried_back(&picture, &field, size, INTER_CUBIC)?);
     }
     let rest = median_picture(&warped, size)?;
-    let rest_blurred = blurred(&float_picture(&rest)?)?;
+    let rest_blurred = blurred(&float_picture(&rest)?, BLUR_PX)?;
     let mut stays = Vec::with_capacity(moved.len());
     let mut moves = Vec::with_capacity(moved.len());
     for shot in moved {
@@ -66,7 +67,7 @@ pub fn evidence(
             break;
         }
         let field = spread.displacements(shot.displacements);
-        let picture = blurred(&float_picture(shot.picture)?)?;
+        let picture = blurred(&float_picture(shot.picture)?, BLUR_PX)?;
         let carried = carried_back(&picture, &field, size, INTER_LINEAR)?;
         stays.push(differences(&picture, &rest_blurred)?);
         moves.push(differences(&carried, &rest_blurred)?);
@@ -105,12 +106,6 @@ fn float_picture(picture: &Rgb) -> opencv::Result<Mat> {
     let mut float = Mat::default();
     colour_mat(picture)?.convert_to(&mut float, opencv::core::CV_32F, 1.0, 0.0)?;
     Ok(float)
-}
-
-fn blurred(picture: &Mat) -> opencv::Result<Mat> {
-    let mut out = Mat::default();
-    gaussian_blur_def(picture, &mut out, CvSize::new(0, 0), BLUR_PX)?;
-    Ok(out)
 }
 
 /// The picture with every pixel where it is at rest.
@@ -157,8 +152,7 @@ fn median_picture(pictures: &[Mat], size: Size) -> opencv::Result<Rgb> {
         for c in 0..3 {
             values.clear();
             values.extend(colours.iter().map(|picture| picture[i][c]));
-            values.sort_unstable_by(f32::total_cmp);
-            let median = values.get(values.len() / 2).copied().unwrap_or(0.0);
+            let median = median_in_place(&mut values, f32::total_cmp).unwrap_or(0.0);
             pixels.push(median.round().clamp(0.0, 255.0) as u8);
         }
     }

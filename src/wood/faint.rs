@@ -1,6 +1,6 @@
-//! Twigs that are too faint to be distinguished from noise. A twig that is narrower than a pixel changes
-//! the light of what stands behind it by its share of the pixel: its width is the sum of these
-//! shares across it.
+//! Twigs that are too faint to be distinguished from noise. A twig that is narrower than a pixel
+//! changes the light of what stands behind it by its share of the pixel: its width is the sum of
+//! these shares across it.
 
 use crate::model::{BranchGraph, Rgb};
 use crate::signal::median;

@@ -5,15 +5,15 @@
 use super::cut::{PAIRS, SURE, least_cut, neighbour};
 use super::evidence::Evidence;
 use super::mixture::{Mixtures, Seed};
-use super::{Stroke, colour_mat};
+use super::{Stroke, blurred, colour_mat};
 use crate::cancel::CancelToken;
 use crate::model::{Foot, Rgb, Size, bounds_px};
 use nalgebra::{Matrix3, Point2, Vector3};
 use opencv::core::{CV_8U, CV_32S, Mat, Point, Scalar, Size as CvSize, Vec3b, Vector};
 use opencv::imgproc::{
     COLOR_RGB2BGR, INTER_CUBIC, INTER_LINEAR, LINE_8, MORPH_BLACKHAT, MORPH_ELLIPSE, MORPH_OPEN,
-    MORPH_TOPHAT, connected_components, cvt_color_def, gaussian_blur_def, get_structuring_element,
-    morphology_ex_def, polylines, resize,
+    MORPH_TOPHAT, connected_components, cvt_color_def, get_structuring_element, morphology_ex_def,
+    polylines, resize,
 };
 use opencv::prelude::*;
 
@@ -409,8 +409,7 @@ fn cv_size(size: Size) -> CvSize {
 
 fn enlarged_evidence(tree: &[f32], size: Size, large: Size) -> opencv::Result<Vec<f32>> {
     let mat = Mat::new_rows_cols_with_data(size.height as i32, size.width as i32, tree)?;
-    let mut evened = Mat::default();
-    gaussian_blur_def(&mat, &mut evened, CvSize::new(0, 0), EVENED_PX)?;
+    let evened = blurred(&mat, EVENED_PX)?;
     let mut out = Mat::default();
     resize(&evened, &mut out, cv_size(large), 0.0, 0.0, INTER_LINEAR)?;
     Ok(out.data_typed::<f32>()?.to_vec())
@@ -754,8 +753,7 @@ struct Leaves {
 impl Leaves {
     /// The greener of two groups of pixels (Otsu), as far as it is green.
     fn of(rest: &Mat, moves: &[bool]) -> opencv::Result<Self> {
-        let mut evened = Mat::default();
-        gaussian_blur_def(rest, &mut evened, CvSize::new(0, 0), 1.0)?;
+        let evened = blurred(rest, 1.0)?;
         let pixels = evened.data_typed::<Vec3b>()?;
         let green: Vec<u8> = pixels.iter().map(greenness).collect();
         let least = otsu(&histogram(&green, moves)).max(GREEN);

@@ -4,7 +4,8 @@
 //! [`steady`] takes the camera's motion out of the frames; [`evidence`] averages the tree over
 //! frames that are carried back to rest, and separates what moves with it from what stands behind;
 //! [`mask`] classifies pixels as wood or not by colour; [`paths`], or [`circles`] as in the paper,
-//! draw the centre lines; [`probability`] says how sure each pixel is; [`bark`] unrolls the trunk. Strokes help where colour does not.
+//! draw the centre lines; [`probability`] says how sure each pixel is; [`bark`] unrolls the trunk.
+//! Strokes help where colour does not.
 
 mod bark;
 mod circles;
@@ -26,8 +27,8 @@ use crate::signal::median;
 use evidence::evidence;
 use field::Spread;
 use nalgebra::{Point2, Vector2};
-use opencv::core::{Mat, Size as CvSize};
-use opencv::imgproc::{MORPH_ELLIPSE, dilate_def, get_structuring_element};
+use opencv::core::{Mat, Size as CvSize, ToInputArray};
+use opencv::imgproc::{MORPH_ELLIPSE, dilate_def, gaussian_blur_def, get_structuring_element};
 use opencv::prelude::*;
 use std::sync::Arc;
 use steady::{SteadyShot, steadied};
@@ -209,6 +210,13 @@ fn widened(outline: &Outline, by_px: f64) -> opencv::Result<Vec<u8>> {
     let mut out = Mat::default();
     dilate_def(&mask, &mut out, &disc)?;
     Ok(out.data_bytes()?.to_vec())
+}
+
+/// A picture blurred by a Gaussian with this standard deviation, px.
+fn blurred(picture: &impl ToInputArray, sigma_px: f64) -> opencv::Result<Mat> {
+    let mut out = Mat::default();
+    gaussian_blur_def(picture, &mut out, CvSize::new(0, 0), sigma_px)?;
+    Ok(out)
 }
 
 /// A picture as OpenCV has it, red first.

@@ -4,11 +4,11 @@
 //! The figures are those that fit the truth of 19 made films best; `docs/method.md` says how well
 //! the probabilities hold on others.
 
+use super::blurred;
 use super::evidence::Evidence;
 use super::mask::WoodMask;
 use crate::model::{Luma, Masks, Size};
-use opencv::core::{Mat, Size as CvSize};
-use opencv::imgproc::gaussian_blur_def;
+use opencv::core::Mat;
 use opencv::prelude::*;
 
 /// The odds of wood add up as if each clue were known alone. They are not: so much of the sum is
@@ -125,9 +125,7 @@ fn share_of_leaves(wood: &WoodMask, size: Size) -> Vec<f32> {
 fn evened(values: &[f32], size: Size, by_px: f64) -> opencv::Result<Vec<f32>> {
     let mat = Mat::new_rows_cols_with_data(size.height as i32, size.width as i32, values)?;
     let by_px = by_px * f64::from(size.width) / 640.0;
-    let mut out = Mat::default();
-    gaussian_blur_def(&mat, &mut out, CvSize::new(0, 0), by_px)?;
-    Ok(out.data_typed::<f32>()?.to_vec())
+    Ok(blurred(&mat, by_px)?.data_typed::<f32>()?.to_vec())
 }
 
 fn sigmoid(odds: f32) -> f32 {

@@ -338,7 +338,7 @@ fn branches_are_coloured_alike_in_picture_table_and_tree() {
     }
 }
 
-/// Whoever draws must see which line is his, on terminals with few colours, too.
+/// A user who draws must see which line is his, on terminals with few colours, too.
 #[test]
 fn lines_along_branches_have_a_colour_of_their_own() {
     for depth in [Depth::True, Depth::Indexed] {
