@@ -183,14 +183,14 @@ def sheet(wood, capture, front, side, out):
     film = Image.open(rest if rest.is_file() else capture / note["picture"]["file"]).convert("RGB")
     is_found = (wood / "branches.csv").is_file()
     none = Image.new("RGB", film.size, GROUND)
-    mask = Image.open(wood / "mask.png").convert("RGB") if is_found else none
+    mask = Image.open(wood / "wood.png").convert("RGB") if is_found else none
     traced = on_film(film, graph(rows(wood / "branches.csv"), "node", "parent")) if is_found else none
     seen = [n for n in rows(capture / "nodes.csv") if n["kind"] in KIND_COLOURS]
     skeleton = on_film(film, graph(seen, "node_id", "parent_id"))
     models = [ImageOps.pad(Image.open(name).convert("RGB"), film.size, color="white") for name in (front, side)]
     missing = "" if is_found else ": none was found"
     moment = "film at rest" if rest.is_file() else "film, first frame"
-    top = [(film, moment), (mask, "wood" + missing), (traced, "traced branches" + missing)]
+    top = [(film, moment), (mask, "probability of wood" + missing), (traced, "traced branches" + missing)]
     kinds = ", ".join(f"{kind} {sum(n['kind'] == kind for n in seen)}" for kind in KIND_COLOURS)
     low = [(skeleton, "skeleton: " + kinds), (models[0], "model from the front"), (models[1], "from the side")]
     canvas = Image.new("RGB", (3 * film.width, 2 * film.height), GROUND)
