@@ -21,10 +21,11 @@ pub use model::{First, Model, Moment};
 pub use sub_branches::SubBranch;
 
 use crate::cancel::CancelToken;
-use crate::config::Config;
+use crate::config::{Config, Leader};
 use crate::dynamics::{Depth, Film, analyse};
 use crate::hierarchy::{self, Evidence};
 use crate::model::{Foot, Outline, TrackId, TrackLog, TrackTable, Wood};
+use nalgebra::Point2;
 use refine::Refinement;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -141,6 +142,17 @@ fn crown_u(table: &TrackTable, moving: &[usize]) -> Option<f64> {
     (!moving.is_empty()).then(|| sum / moving.len() as f64)
 }
 
+/// The foot of the tree: where the line begins that was drawn along the trunk, or where the outline
+/// has it.
+fn foot(outline: &Outline, crown_u: Option<f64>, config: &Config) -> Foot {
+    let found = Foot::of(outline, crown_u);
+    if config.shape.leader != Leader::Drawn {
+        return found;
+    }
+    let line = config.shape.leader_px.iter().copied().map(Point2::from);
+    found.at_drawn_trunk(&line.collect::<Vec<_>>())
+}
+
 /// Hierarchy, 2D skeleton, 3D skeleton. `None` if too few points move.
 fn build(
     table: &Arc<TrackTable>,
@@ -152,12 +164,13 @@ fn build(
     if evidence.moving.len() < LEAST_MOVING {
         return None;
     }
-    let foot_px = Foot::of(outline, crown_u(table, &evidence.moving)).position_px;
+    let foot = foot(outline, crown_u(table, &evidence.moving), config);
+    let foot_px = foot.position_px;
     let hierarchy = hierarchy::build(table, &evidence.moving, foot_px, &config.hierarchy);
     if hierarchy.members().len() < LEAST_MOVING {
         return None;
     }
-    let skeleton = Arc::new(lift_to_3d(&hierarchy, outline, config));
+    let skeleton = Arc::new(lift_to_3d(&hierarchy, foot_px, outline, config));
     let mut rest_px = BTreeMap::new();
     for (row, id) in table.ids.iter().enumerate() {
         rest_px.insert(*id, hierarchy::rest_position_px(table, row));
@@ -185,6 +198,7 @@ fn build(
         wood: None,
         modes: Vec::new(),
         outline: outline.clone(),
+        foot,
         followed_from: moment.followed_from,
         frame: moment.frame,
         time_s: moment.time_s,

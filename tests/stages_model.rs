@@ -132,7 +132,7 @@ fn hierarchy_of_seven() -> MotionHierarchy {
 fn flat() -> Vec<Node2d> {
     skeleton::build(
         &hierarchy_of_seven(),
-        &outline(),
+        Foot::of(&outline(), Some(100.0)).position_px,
         &config::Skeleton::default(),
     )
 }

@@ -28,7 +28,7 @@ mod wood;
 pub use botany::{BotanicalBranch, BotanicalBranches, TREE, TRUNK};
 pub use branch_graph::{BranchGraph, WoodNode};
 pub use control::Control;
-pub use foot::Foot;
+pub use foot::{Foot, FootBasis};
 pub use frame::{
     Frame, Luma, Picture, PixelFormat, RawFrame, Rgb, Size, TimedFrame, nanoseconds, seconds,
 };

@@ -28,6 +28,12 @@ impl Outline {
         }
     }
 
+    /// Whether the pixel in column `u` and row `v` is tree; outside the picture none is.
+    pub fn has(&self, u: u32, v: u32) -> bool {
+        let at = v as usize * self.size.width as usize + u as usize;
+        u < self.size.width && self.mask.get(at).is_some_and(|&m| m != 0)
+    }
+
     /// Smallest box `[u_min, v_min, u_max, v_max]` that holds the region, `None` if it is empty.
     pub fn bounds_px(&self) -> Option<[u32; 4]> {
         bounds_px(&self.mask, self.size)

@@ -1,6 +1,7 @@
 //! What is said when a tree comes into effect.
 
 use super::shared::Shared;
+use crate::model::FootBasis;
 use crate::pipeline::WoodSight;
 use crate::solve::Model;
 use std::sync::Arc;
@@ -8,6 +9,13 @@ use std::sync::Arc;
 /// The warning of a tree in whose film no wood is seen.
 const NO_WOOD: &str = "no wood is seen in the film (leaves, night, fog, or a background of the \
                        wood's colour): the tree is that of the motion alone";
+/// That of a tree whose trunk ends at the picture's lower edge.
+const FOOT_CUT_OFF: &str = "the foot of the trunk is not in the picture: the tree is taken to stand \
+                            on the picture's lower edge, and sways about that; film it whole";
+/// That of a tree whose outline has no trunk.
+const FOOT_GUESSED: &str = "the foot of the trunk is a guess, below the middle of the crown: draw \
+                            the outline with the foot as its lowest edge, or a line along the \
+                            trunk (--trunk FILE)";
 /// That of one whose wood was not looked for to the end.
 const TOO_SHORT_FOR_WOOD: &str = "the wood was not looked for, as the end was wanted: the tree is \
                                   that of the motion alone";
@@ -55,6 +63,11 @@ impl Announced {
             self.warned
                 .iter()
                 .for_each(|warning| shared.warn(warning.clone()));
+            match tree.foot.basis {
+                FootBasis::CutOff => shared.warn(FOOT_CUT_OFF.into()),
+                FootBasis::Guessed => shared.warn(FOOT_GUESSED.into()),
+                FootBasis::Outline | FootBasis::Drawn => {}
+            }
             let (points, time_s) = (tree.evidence.moving.len(), tree.time_s);
             tracing::info!(
                 "tree built at {time_s:.1} s: {nodes} nodes from {points} moving points"

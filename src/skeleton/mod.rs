@@ -1,7 +1,7 @@
 //! From the motion hierarchy to a flat skeleton in the picture (Li 2011 app. A).
 
 use crate::config;
-use crate::model::{ClusterId, Foot, MotionHierarchy, Outline};
+use crate::model::{ClusterId, MotionHierarchy};
 use nalgebra::Point2;
 
 /// Node of the skeleton in the picture; the branch runs from the parent to it.
@@ -18,22 +18,21 @@ pub struct Node2d {
     pub certainty: f32,
 }
 
-/// The 2D skeleton T' of Li 2011. Node 0 is the foot, node k + 1 belongs to cluster k.
+/// The 2D skeleton T' of Li 2011. Node 0 is the foot, at `foot_px`, node k + 1 belongs to cluster
+/// k.
 ///
 /// A node is where its cluster's branch ends; where that is not known, at the centroid, folded as
 /// in the paper.
 pub fn build(
     hierarchy: &MotionHierarchy,
-    outline: &Outline,
+    foot_px: Point2<f64>,
     settings: &config::Skeleton,
 ) -> Vec<Node2d> {
-    let crown_u = hierarchy.clusters.first().map(|all| all.centroid_px.x);
-    let position_px = Foot::of(outline, crown_u).position_px;
     let foot = Node2d {
         parent: None,
         level: 0,
         cluster: None,
-        position_px,
+        position_px: foot_px,
         certainty: 0.0,
     };
     let mut nodes = vec![foot];

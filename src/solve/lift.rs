@@ -3,13 +3,19 @@
 use crate::config::Config;
 use crate::model::{Foot, MotionHierarchy, Outline, Skeleton};
 use crate::{shape, skeleton};
+use nalgebra::Point2;
 
 /// Share of the outline's width at the foot that is trunk, where none can be measured above it.
 const TRUNK_SHARE: f64 = 0.5;
 
-/// Hierarchy to tree in space, with its thickness.
-pub fn lift_to_3d(hierarchy: &MotionHierarchy, outline: &Outline, config: &Config) -> Skeleton {
-    let (flat, tracks) = flat(hierarchy, outline, config);
+/// Hierarchy to tree in space, with its thickness; the foot of its trunk is at `foot_px`.
+pub fn lift_to_3d(
+    hierarchy: &MotionHierarchy,
+    foot_px: Point2<f64>,
+    outline: &Outline,
+    config: &Config,
+) -> Skeleton {
+    let (flat, tracks) = flat(hierarchy, foot_px, config);
     let mut skeleton = shape::build(&flat, &tracks, outline, &config.shape);
     assign_radii(&mut skeleton, outline, config);
     skeleton
@@ -18,10 +24,10 @@ pub fn lift_to_3d(hierarchy: &MotionHierarchy, outline: &Outline, config: &Confi
 /// The skeleton in the picture, and the number of points on every node.
 pub(super) fn flat(
     hierarchy: &MotionHierarchy,
-    outline: &Outline,
+    foot_px: Point2<f64>,
     config: &Config,
 ) -> (Vec<skeleton::Node2d>, Vec<u32>) {
-    let flat = skeleton::build(hierarchy, outline, &config.skeleton);
+    let flat = skeleton::build(hierarchy, foot_px, &config.skeleton);
     let mut n_tracks = Vec::with_capacity(flat.len());
     for node in &flat {
         // The foot carries all.

@@ -8,7 +8,7 @@ use super::taper::taper;
 use crate::config::Config;
 use crate::hierarchy::Evidence;
 use crate::model::{
-    LogWindow, MotionHierarchy, NodeId, Outline, Skeleton, Swaying, TrackId, TrackTable, Wood,
+    Foot, LogWindow, MotionHierarchy, NodeId, Outline, Skeleton, Swaying, TrackId, TrackTable, Wood,
 };
 use crate::motion::Binding;
 use crate::shape::PushFigures;
@@ -41,6 +41,8 @@ pub struct Model {
     /// it.
     pub wood: Option<Arc<Wood>>,
     pub outline: Arc<Outline>,
+    /// The foot of its trunk: that of a capture's first tree stays.
+    pub foot: Foot,
     /// The tracks that it was built from, and what they are worth.
     pub table: Arc<TrackTable>,
     pub evidence: Evidence,
@@ -206,26 +208,13 @@ impl Model {
     /// The skeleton in the picture that it was pushed into space from, with the number of points on
     /// every node.
     pub fn flat(&self, config: &Config) -> (Vec<skeleton::Node2d>, Vec<u32>) {
-        flat(&self.hierarchy, &self.outline, config)
-    }
-
-    /// The same with its foot at `foot_px`: that of a capture's first tree stays.
-    pub(super) fn flat_on(
-        &self,
-        foot_px: Point2<f64>,
-        config: &Config,
-    ) -> (Vec<skeleton::Node2d>, Vec<u32>) {
-        let (mut flat, tracks) = self.flat(config);
-        if let Some(foot) = flat.first_mut() {
-            foot.position_px = foot_px;
-        }
-        (flat, tracks)
+        flat(&self.hierarchy, self.foot.position_px, config)
     }
 
     /// How well its push fills the envelope, and how likely its angles are, beside the one-sided
     /// ways; without sub-branches, which are not pushed.
     pub fn push_figures(&self, config: &Config) -> PushFigures {
-        let (flat, tracks) = self.flat_on(self.plain.foot_px, config);
+        let (flat, tracks) = self.flat(config);
         PushFigures::of(&self.plain, &flat, &tracks, &self.outline, &config.shape)
     }
 }

@@ -197,9 +197,10 @@ impl<'a> Refinement<'a> {
     fn adopt(&self, model: &mut Model) {
         let old = &self.prior.plain;
         let matches = self.match_measured_nodes(model);
+        model.foot = self.prior.foot;
         let anew = on_foot((*model.plain).clone(), old.foot_px);
         let twins = twins(&anew, old, &matches);
-        let (flat, tracks) = model.flat_on(old.foot_px, self.config);
+        let (flat, tracks) = model.flat(self.config);
         let prototype = Prototype::of(&flat, &tracks, &model.outline, &self.config.shape);
         let (mut skeleton, _) = go_on(&anew, old, &twins, &prototype, &self.config.shape);
         // Twigs, and with them the pipes, follow from how far the branches reach.
