@@ -182,7 +182,7 @@ fn build(
         moving: evidence.moving.len(),
         forced: moment.forced,
     };
-    Some(Model {
+    let mut model = Model {
         rest_px,
         hierarchy,
         table: table.clone(),
@@ -192,7 +192,7 @@ fn build(
         kept: 0,
         joined: BTreeMap::new(),
         plain: skeleton.clone(),
-        skeleton,
+        skeleton: skeleton.clone(),
         sub_branches: Vec::new(),
         left_out: BTreeSet::new(),
         wood: None,
@@ -205,5 +205,7 @@ fn build(
         shown_from: moment.frame,
         evidence,
         forced: moment.forced,
-    })
+    };
+    model.assemble(&skeleton, config);
+    Some(model)
 }

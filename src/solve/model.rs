@@ -5,10 +5,11 @@ use super::bent_tree::Names;
 use super::lift::{assign_radii, flat};
 use super::sub_branches::{self, SubBranch};
 use super::taper::taper;
-use crate::config::Config;
+use crate::config::{Affinity, Config};
 use crate::hierarchy::Evidence;
 use crate::model::{
-    Foot, LogWindow, MotionHierarchy, NodeId, Outline, Skeleton, Swaying, TrackId, TrackTable, Wood,
+    BranchGraph, Foot, LogWindow, MotionHierarchy, NodeId, Outline, Skeleton, Swaying, TrackId,
+    TrackTable, Wood,
 };
 use crate::motion::Binding;
 use crate::shape::PushFigures;
@@ -178,13 +179,18 @@ impl Model {
     }
 
     /// The skeleton from its parts: the hierarchy in space, the sub-branches, the wood.
-    fn assemble(&mut self, before: &Skeleton, config: &Config) {
+    pub(super) fn assemble(&mut self, before: &Skeleton, config: &Config) {
         self.modes.clear();
         let mut straight = sub_branches::with(&self.plain, &self.sub_branches);
-        let Some(wood) = self.wood.clone() else {
-            assign_radii(&mut straight, &self.outline, config);
-            self.skeleton = Arc::new(straight);
-            return;
+        let none_seen = BranchGraph::default();
+        let branches = match &self.wood {
+            Some(wood) => &wood.branches,
+            None if is_joined_without_wood(config) => &none_seen,
+            None => {
+                assign_radii(&mut straight, &self.outline, config);
+                self.skeleton = Arc::new(straight);
+                return;
+            }
         };
         let mut points = Vec::new();
         for (_, node, rest_px) in self.binding_on(&straight).bound() {
@@ -194,7 +200,7 @@ impl Model {
             next: self.names,
             prior: Some(before),
         };
-        let mut joined = along_wood(&straight, &wood.branches, &points, &mut names);
+        let mut joined = along_wood(&straight, branches, &points, &mut names);
         self.names = names.next;
         assign_radii(&mut joined.skeleton, &self.outline, config);
         // Radii that are seen go before those of the pipe model, and a width that the user gives
@@ -217,6 +223,12 @@ impl Model {
         let (flat, tracks) = self.flat(config);
         PushFigures::of(&self.plain, &flat, &tracks, &self.outline, &config.shape)
     }
+}
+
+/// Whether branches leave each other where the motion has them, with joints, where no wood is seen
+/// either. The paper's own hierarchy has forks at centroids of halves, and no places for that.
+fn is_joined_without_wood(config: &Config) -> bool {
+    config.skeleton.along_wood && config.hierarchy.affinity == Affinity::Path
 }
 
 /// Points on nodes of the straight tree, on those of another form of it.
