@@ -229,7 +229,7 @@ fn colour_mat(picture: &Rgb) -> opencv::Result<Mat> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Masks, Size};
+    use crate::model::{FootBasis, Masks, Size};
     use crate::signal::distance_to_segment;
 
     const SIZE: Size = Size {
@@ -321,6 +321,7 @@ mod tests {
             foot: Foot {
                 position_px: FOOT,
                 half_width_px: 10.0,
+                basis: FootBasis::Outline,
             },
             strokes,
             trace_by: TraceBy::Paths,
