@@ -145,8 +145,8 @@ settings! {
     skeleton: Skeleton, TREE {
         /// A branching is drawn towards its parent by this share of the way.
         fold: f64 [0 to 0.95] = 0.4;
-        /// Looks for the wood that the frames show, and lets the skeleton run along it. Where none
-        /// is seen, the skeleton is that of the motion alone.
+        /// Looks for the wood that the frames show, and lets the skeleton run along it. false for
+        /// straight branches between the forks of the motion alone.
         along_wood: bool = true;
         /// How branches are traced in the wood that is seen.
         trace_by: TraceBy = TraceBy::Paths;
