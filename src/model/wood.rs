@@ -31,5 +31,17 @@ impl Masks {
     pub const MOST_OUTSIDE: u8 = 127;
 }
 
+/// Whether the wood of a tree is seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum WoodSight {
+    /// There is no tree yet, or nobody wants to know.
+    #[default]
+    NotSought,
+    /// It is being looked for.
+    Sought,
+    Seen,
+    NotSeen,
+}
+
 /// The wood that was found while a film went on, by the newest frame that was looked at.
 pub type WoodSeen = BTreeMap<u64, Arc<Wood>>;

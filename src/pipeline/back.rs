@@ -6,7 +6,7 @@ use super::refiner::{Refiner, SolveJob, Taken};
 use crate::cancel::CancelToken;
 use crate::config::{Config, ConfigError, check_strokes};
 use crate::hierarchy::{self, Evidence};
-use crate::model::{Outline, Phase, Pose, RawFrame, Rgb, TrackLog, TrackSet, WoodSeen};
+use crate::model::{Outline, Phase, Pose, RawFrame, Rgb, TrackLog, TrackSet, WoodSeen, WoodSight};
 use crate::motion::Binding;
 use crate::solve::{Model, identify_sub_branches, solve};
 use std::sync::Arc;
@@ -69,18 +69,6 @@ enum Why {
     Enough,
     /// The user asked.
     Asked,
-}
-
-/// Whether the wood of the tree is seen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum WoodSight {
-    /// There is no tree yet, or nobody wants to know.
-    #[default]
-    NotSought,
-    /// It is being looked for.
-    Sought,
-    Seen,
-    NotSeen,
 }
 
 impl BackEnd {

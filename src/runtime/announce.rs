@@ -1,7 +1,7 @@
 //! What is said when a tree comes into effect.
 
 use super::shared::Shared;
-use crate::pipeline::WoodSight;
+use crate::model::WoodSight;
 use crate::solve::Model;
 use std::sync::Arc;
 

@@ -27,6 +27,7 @@ mod state;
 mod tests;
 mod theme;
 mod tty;
+mod wood;
 
 pub use abilities::{Abilities, abilities, columns};
 pub use graphics::Preview;

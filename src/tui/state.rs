@@ -1,8 +1,8 @@
 //! What the screen remembers between two redraws.
 
-use super::drawing::Drawing;
+use super::drawing::{Drawing, Subject};
 use super::solid::Solid;
-use crate::model::{NodeName, Snapshot};
+use crate::model::{BranchGraph, NodeName, Snapshot};
 use std::sync::Arc;
 
 /// Redraws for which the screen's own notice stays, about six seconds.
@@ -27,6 +27,8 @@ pub struct State {
     pub turned: u16,
     /// The tree's wood, while it is shown instead of its lines.
     pub solid: Option<Solid>,
+    /// The wood that was found is shown in the picture, also while no line is drawn.
+    pub wood: bool,
     /// The branch that the user has chosen, and its row when he did.
     chosen: Option<(NodeName, usize)>,
     /// The chosen branch is looked at, where there is no room for it beside all else.
@@ -71,6 +73,18 @@ impl State {
                     .map_or_else(Solid::default, |s| Solid::default().followed_by(s)),
             ),
         };
+    }
+
+    /// The lines of the wood that was found, as far as they are shown in the picture; while an
+    /// outline is drawn they would hide its tree.
+    pub fn shown_wood(&self) -> Option<&BranchGraph> {
+        let is_shown = match self.drawing.as_ref().map(Drawing::subject) {
+            Some(Subject::Branch) => true,
+            Some(Subject::Outline) => false,
+            None => self.wood,
+        };
+        let wood = self.snapshot.wood.as_ref().filter(|_| is_shown)?;
+        Some(&wood.branches)
     }
 
     /// Row of the chosen branch; one that is gone with a refinement leaves its row to another.

@@ -74,7 +74,7 @@ fn keys_send_what_they_say() {
         ("?b", vec![BuildNow]),
         // While drawing, space sets a point, and a slip does nothing to the capture.
         ("o ebrq", vec![]),
-        ("hlmjk", vec![]),
+        ("hlmwwjk", vec![]),
     ] {
         let events: Vec<Event> = letters.chars().map(letter).collect();
         assert_eq!(play(Some(wide()), &events).sent, expected, "{letters}");
@@ -181,6 +181,7 @@ fn a_line_along_a_branch_is_drawn_until_it_is_good_or_left() {
             "o waits: a line along a branch is being drawn",
         ),
         (vec![a.clone(), letter('s'), b], Some(2), "Gathering"),
+        (vec![a.clone(), letter('s')], Some(1), "wood that was found"),
     ] {
         let events: Vec<Event> = std::iter::once(letter('s')).chain(events).collect();
         let run = play(Some(narrow()), &events);
