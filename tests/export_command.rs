@@ -929,6 +929,7 @@ fn a_tree_whose_film_was_removed_is_exported_drawn_and_moved_by_wind() {
         "nodes.csv",
         "frame.jpg",
         "bark.png",
+        "rest.png",
         "wood.png",
         "leaves.png",
         "tree.glb",
@@ -992,7 +993,7 @@ fn a_tree_that_was_not_filmed_is_written_read_and_exported() {
         note.config.export.metres_per_px = metres_per_px;
         let draft = Draft {
             bark: None,
-            masks: None,
+            at_rest: None,
             note,
             skeleton: &tree,
             picture: None,

@@ -2,13 +2,13 @@
 //! and writes it; everything that is made from it is a view (see `export`).
 //!
 //! `capture.json` says what was filmed and how, `nodes.csv` holds the whole model, `frame.jpg` one
-//! picture of it, `bark.png` its bark, `wood.png` and `leaves.png` which pixels are wood and leaves.
-//! A tree that was filmed has `tracks.csv` and `left_out.csv`, the points, and `motion.csv`, the
-//! poses.
+//! picture of it, `bark.png` its bark, `rest.png` the tree at rest, `wood.png` and `leaves.png` which
+//! of its pixels are wood and leaves. A tree that was filmed has `tracks.csv` and `left_out.csv`, the
+//! points, and `motion.csv`, the poses.
 
+mod at_rest;
 mod bark;
 mod error;
-mod masks;
 mod motion;
 mod nodes;
 pub mod note;
@@ -20,9 +20,9 @@ mod table;
 mod tracks;
 mod wood;
 
+pub use at_rest::{LEAVES_MASK_FILE, REST_FILE, WOOD_MASK_FILE, at_rest_files};
 pub use bark::BARK_FILE;
 pub use error::DocumentError;
-pub use masks::{LEAVES_MASK_FILE, WOOD_MASK_FILE};
 pub use motion::{MOTION_HEADER, MotionCsv};
 pub use nodes::{NODES_HEADER, nodes};
 pub use note::{CaptureNote, SCHEMA_VERSION};
@@ -381,10 +381,10 @@ impl Begun {
         }
         // They were kept of the newest wood alone.
         if let Some(mut newest) = wood.last_entry()
-            && let Ok(masks) = masks::read(dir, size(&note))
+            && let Ok(at_rest) = at_rest::read(dir, size(&note))
         {
             let wood = Wood {
-                masks: Some(Arc::new(masks)),
+                at_rest: Some(Arc::new(at_rest)),
                 ..Wood::clone(newest.get())
             };
             newest.insert(Arc::new(wood));

@@ -157,7 +157,7 @@ fn wood_in(
     settings: &config::Skeleton,
     cancel: &CancelToken,
 ) -> Option<Wood> {
-    Some(find_wood(film, window, outline, prior, settings, cancel)?.wood)
+    find_wood(film, window, outline, prior, settings, cancel)
 }
 
 /// Frames are decoded by the camera's crates and looked at by OpenCV. Without them no wood is seen.

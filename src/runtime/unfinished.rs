@@ -11,10 +11,10 @@ use super::status::{median_error_px, median_fb_error_px};
 use crate::cancel::CancelToken;
 use crate::document::note::json;
 use crate::document::{
-    BARK_FILE, Begun, CaptureNote, LEAVES_MASK_FILE, PICTURE_FILE, WOOD_FILE, WOOD_MASK_FILE,
-    grey_png, jpeg, png, wood_csv,
+    BARK_FILE, Begun, CaptureNote, LEAVES_MASK_FILE, PICTURE_FILE, REST_FILE, WOOD_FILE,
+    WOOD_MASK_FILE, at_rest_files, jpeg, png, wood_csv,
 };
-use crate::model::{FormatNote, Masks, Size, WoodSeen};
+use crate::model::{AtRest, FormatNote, Size, WoodSeen};
 use crate::pipeline::{BackEnd, Followed};
 use crate::recording::{SpaceReserve, TrackFile, TrackFileReader};
 use crate::source::SourceInfo;
@@ -33,6 +33,10 @@ const RESERVE_FILE: &str = "reserve";
 const KEPT_EVERY: Duration = Duration::from_millis(500);
 /// Space that is held back for the results of the shortest film, bytes: the model, the picture.
 const LEAST_RESERVE: u64 = 8 << 20;
+/// The pictures of the tree at rest: none is of use without the others.
+const AT_REST_FILES: [&str; 3] = [REST_FILE, WOOD_MASK_FILE, LEAVES_MASK_FILE];
+/// Size of those pictures, not compressed: one in colour and two in grey.
+const AT_REST_BYTES_PER_PIXEL: u64 = 5;
 /// Size of the results beside that of the log: both tables are text.
 const RESULTS_PER_LOG: u64 = 4;
 
@@ -97,9 +101,8 @@ impl Unfinished {
         self.kept = None;
         if std::mem::take(&mut self.kept_wood) > 0 {
             std::fs::remove_file(self.dir.join(WOOD_FILE)).map_err(Failure::Log)?;
-            for picture in [BARK_FILE, WOOD_MASK_FILE, LEAVES_MASK_FILE] {
-                self.remove_file(picture)?;
-            }
+            self.remove_file(BARK_FILE)?;
+            self.remove_at_rest()?;
         }
         TrackFile::create(&self.dir.join(LOG_FILE)).map_err(Failure::Log)
     }
@@ -117,8 +120,10 @@ impl Unfinished {
     pub fn keep(&mut self, job: &CaptureJob, written_bytes: u64) -> Result<(), Failure> {
         self.kept = Some(Instant::now());
         let results = RESULTS_PER_LOG * job.tracks.bytes().map_err(Failure::Log)?;
-        let masks = newest_masks(&job.wood).map_or(0, |masks| 2 * masks.wood.size.area() as u64);
-        let missing = LEAST_RESERVE + masks + results.saturating_sub(written_bytes);
+        let at_rest = newest_at_rest(&job.wood).map_or(0, |at_rest| {
+            AT_REST_BYTES_PER_PIXEL * at_rest.picture.size.area() as u64
+        });
+        let missing = LEAST_RESERVE + at_rest + results.saturating_sub(written_bytes);
         self.reserve.grow_to(missing).map_err(Failure::Log)?;
         let note = json(&finish::describe(job, None, None))?;
         self.replace(NOTE_FILE, &note)?;
@@ -137,8 +142,7 @@ impl Unfinished {
     pub fn keep_wood(&mut self, wood: &WoodSeen) -> Result<(), Failure> {
         if wood.len() > self.kept_wood {
             // After a crash there may be none, but none of other wood.
-            self.remove_file(WOOD_MASK_FILE)?;
-            self.remove_file(LEAVES_MASK_FILE)?;
+            self.remove_at_rest()?;
             self.replace(WOOD_FILE, &wood_csv(wood)?)?;
             self.keep_pictures(wood)?;
             self.kept_wood = wood.len();
@@ -146,7 +150,7 @@ impl Unfinished {
         Ok(())
     }
 
-    /// Bark and masks of the newest wood, or none where that has none.
+    /// Bark and pictures at rest of the newest wood, or none where that has none.
     fn keep_pictures(&self, wood: &WoodSeen) -> Result<(), Failure> {
         let Some(newest) = wood.values().next_back() else {
             return Ok(());
@@ -155,11 +159,19 @@ impl Unfinished {
             Some(bark) => self.replace(BARK_FILE, &png(bark)?)?,
             None => self.remove_file(BARK_FILE)?,
         }
-        let Some(masks) = &newest.masks else {
+        let Some(at_rest) = &newest.at_rest else {
             return Ok(());
         };
-        self.replace(WOOD_MASK_FILE, &grey_png(&masks.wood)?)?;
-        self.replace(LEAVES_MASK_FILE, &grey_png(&masks.leaves)?)
+        for file in at_rest_files(at_rest)? {
+            self.replace(file.name, &file.bytes)?;
+        }
+        Ok(())
+    }
+
+    fn remove_at_rest(&self) -> Result<(), Failure> {
+        AT_REST_FILES
+            .into_iter()
+            .try_for_each(|name| self.remove_file(name))
     }
 
     /// Removes a file, if it is there.
@@ -193,9 +205,9 @@ impl Unfinished {
     }
 }
 
-/// The masks of the newest wood.
-fn newest_masks(wood: &WoodSeen) -> Option<&Masks> {
-    wood.values().next_back()?.masks.as_deref()
+/// What the newest wood was found in.
+fn newest_at_rest(wood: &WoodSeen) -> Option<&AtRest> {
+    wood.values().next_back()?.at_rest.as_deref()
 }
 
 /// Completes the capture `out` from what its run has left.
