@@ -499,6 +499,9 @@ fn strokes_are_used_shown_kept_and_finished_with() {
     let tree = summary.expect("a summary").tree.expect("a tree");
     assert!(covered(&tree, ACROSS) >= 7 && tree.refinements == 1);
 
+    let asked = dir.path().join("out.unfinished/asked.csv");
+    let asked = std::fs::read_to_string(asked).expect("when lines were drawn");
+    assert!(asked.starts_with("frame\n") && asked.lines().count() > 1);
     std::fs::remove_dir(&out).expect("folder");
     let written = runtime::finish_unfinished(&out, &CancelToken::new()).expect("finished");
     let finished = written.tree.expect("a tree");

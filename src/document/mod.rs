@@ -6,6 +6,7 @@
 //! of its pixels are wood and leaves. A tree that was filmed has `tracks.csv` and `left_out.csv`, the
 //! points, and `motion.csv`, the poses.
 
+mod asked;
 mod at_rest;
 mod bark;
 mod error;
@@ -20,6 +21,7 @@ mod table;
 mod tracks;
 mod wood;
 
+pub use asked::{ASKED_FILE, asked_csv, read_asked};
 pub use at_rest::{LEAVES_MASK_FILE, REST_FILE, WOOD_MASK_FILE, at_rest_files};
 pub use bark::BARK_FILE;
 pub use error::DocumentError;
@@ -45,6 +47,7 @@ use motion::PoseReader;
 use nalgebra::Point2;
 use nodes::NodesRead;
 use note::{ModelNote, OutlineNote};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -361,10 +364,12 @@ pub struct Begun {
     pub picture: Option<Picture>,
     pub outline: Option<Outline>,
     pub wood: WoodSeen,
+    /// After which frames the wood was to be looked for again.
+    pub asked: BTreeSet<u64>,
 }
 
 impl Begun {
-    /// Reads it from `dir`. A picture, an outline or wood that cannot be read is left out.
+    /// Reads it from `dir`. What cannot be read beside `capture.json` is left out.
     ///
     /// # Errors
     /// There is no `capture.json`, it is damaged, or was written by a newer version.
@@ -393,6 +398,7 @@ impl Begun {
             picture,
             outline: noted.and_then(|noted| outline(noted).ok()),
             wood,
+            asked: read_asked(dir).unwrap_or_default(),
             note,
         })
     }

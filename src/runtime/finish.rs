@@ -92,6 +92,8 @@ pub struct CaptureJob {
     pub log: TrackLog,
     /// The wood that was found in its frames.
     pub wood: WoodSeen,
+    /// After which of them it was to be looked for again, as the user had drawn.
+    pub asked: BTreeSet<u64>,
     pub config: Config,
     pub info: SourceInfo,
     pub quality: Quality,

@@ -11,8 +11,8 @@ use super::status::{median_error_px, median_fb_error_px};
 use crate::cancel::CancelToken;
 use crate::document::note::json;
 use crate::document::{
-    BARK_FILE, Begun, CaptureNote, LEAVES_MASK_FILE, PICTURE_FILE, REST_FILE, WOOD_FILE,
-    WOOD_MASK_FILE, at_rest_files, jpeg, png, wood_csv,
+    ASKED_FILE, BARK_FILE, Begun, CaptureNote, LEAVES_MASK_FILE, PICTURE_FILE, REST_FILE,
+    WOOD_FILE, WOOD_MASK_FILE, asked_csv, at_rest_files, jpeg, png, wood_csv,
 };
 use crate::model::{AtRest, FormatNote, Size, WoodSeen};
 use crate::pipeline::{BackEnd, Followed};
@@ -48,6 +48,8 @@ pub struct Unfinished {
     picture_is_kept: bool,
     /// How much of the wood that was found is on disk.
     kept_wood: usize,
+    /// How many times are on disk at which it was to be looked for again.
+    kept_asked: usize,
 }
 
 /// Where the capture `out` lies until it is written.
@@ -82,6 +84,7 @@ impl Unfinished {
                     kept: None,
                     picture_is_kept: false,
                     kept_wood: 0,
+                    kept_asked: 0,
                 };
                 Ok((unfinished, log))
             }
@@ -104,6 +107,8 @@ impl Unfinished {
             self.remove_file(BARK_FILE)?;
             self.remove_at_rest()?;
         }
+        self.kept_asked = 0;
+        self.remove_file(ASKED_FILE)?;
         TrackFile::create(&self.dir.join(LOG_FILE)).map_err(Failure::Log)
     }
 
@@ -131,15 +136,20 @@ impl Unfinished {
             self.replace(PICTURE_FILE, &jpeg(&picture.rgb)?)?;
             self.picture_is_kept = true;
         }
-        self.keep_wood(&job.wood)
+        self.keep_wood(job)
     }
 
-    /// Brings to disk the wood that was found. The frames are not kept, and with them it would be
-    /// lost.
+    /// Brings to disk the wood that was found, and when the user had it looked for again. The
+    /// frames are not kept, and with them it would be lost.
     ///
     /// # Errors
     /// The disk is full, or whatever else the file system says.
-    pub fn keep_wood(&mut self, wood: &WoodSeen) -> Result<(), Failure> {
+    pub fn keep_wood(&mut self, job: &CaptureJob) -> Result<(), Failure> {
+        let (wood, asked) = (&job.wood, &job.asked);
+        if asked.len() > self.kept_asked {
+            self.replace(ASKED_FILE, &asked_csv(asked)?)?;
+            self.kept_asked = asked.len();
+        }
         if wood.len() > self.kept_wood {
             // After a crash there may be none, but none of other wood.
             self.remove_at_rest()?;
@@ -226,6 +236,7 @@ pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Fa
         picture,
         outline,
         wood,
+        asked,
     } = Begun::read(&dir).map_err(|e| Failure::DamagedUnfinished {
         dir: dir.clone(),
         what: e.to_string(),
@@ -235,6 +246,7 @@ pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Fa
     let shared = Arc::new(Shared::restored(&note.timing, &note.warnings));
     let mut back = BackEnd::new(&note.config);
     back.put_wood(wood);
+    back.put_asked(asked);
     let mut quality = Quality::default();
     for set in tracks.sets() {
         if cancel.is_cancelled() {
@@ -263,6 +275,7 @@ pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Fa
         tracks,
         log: back.log().clone(),
         wood: back.wood().clone(),
+        asked: back.asked().clone(),
         info,
         config: note.config,
         quality,
