@@ -120,6 +120,7 @@ fn job(outline: Option<Outline>, out: Option<&Path>) -> Job {
         config: Config::default(),
         outline: outline.map(Given::Region),
         pace: Pace::Fast,
+        length_s: None,
         stream: None,
         out: out.map(Path::to_path_buf),
         record: None,
@@ -453,6 +454,20 @@ fn a_new_outline_is_used_and_a_bad_one_is_refused_in_words() {
         summary.tree.expect("a tree").outline.bounds_px(),
         Some([240, 0, 480, 250])
     );
+}
+
+/// A replay does not depend on how fast the machine is: it ends with the same frame every time.
+#[test]
+fn a_replay_ends_after_the_length_that_was_asked_for() {
+    for (length_s, frames) in [(1.0, 31), (1.01, 32), (2.5, 76)] {
+        let job = Job {
+            length_s: Some(length_s),
+            ..job(Some(support::outline()), None)
+        };
+        let (summary, failure, _) = run(fake(false, |n| Ok(frame(n))), job);
+        assert!(failure.is_none(), "{failure:?}");
+        assert_eq!(summary.expect("a summary").frames, frames, "{length_s} s");
+    }
 }
 
 /// Lines along branches that come after the last refinement. The name of the capture is taken
