@@ -87,6 +87,10 @@ impl tui::Session for CaptureSupervisor<'_> {
         self.running.send(control);
     }
 
+    fn warn(&mut self, warning: &str) {
+        self.running.warn(warning);
+    }
+
     fn finished(&self) -> bool {
         self.running.finished()
     }

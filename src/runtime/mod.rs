@@ -205,6 +205,11 @@ impl Running {
         self.shared.take_news()
     }
 
+    /// Tells something that only the screen knows.
+    pub fn warn(&self, warning: &str) {
+        self.shared.warn(warning.to_owned());
+    }
+
     /// What there is to be told so far.
     pub fn warnings(&self) -> Vec<String> {
         self.shared.warnings()

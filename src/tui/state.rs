@@ -8,6 +8,10 @@ use std::sync::Arc;
 /// Redraws for which the screen's own notice stays, about six seconds.
 const NOTICE_TICKS: u32 = 120;
 
+/// The warning where the film ended while a line was drawn.
+const LINE_LOST: &str = "the film ended before the line along a branch was finished with Enter: it \
+                         is not used";
+
 /// One press of a key turns the tree by so much.
 pub const TURN_DEGREES: u16 = 15;
 const TURNS: u16 = 360 / TURN_DEGREES;
@@ -55,6 +59,16 @@ impl State {
                     .map_or_else(Solid::default, |s| solid.followed_by(s)),
             );
         }
+    }
+
+    /// Where the film has ended, the wood is not looked for along what is being drawn: leaves it,
+    /// and gives what is to be said of a line with points.
+    pub fn leave_drawing_at_end(&mut self) -> Option<&'static str> {
+        if !self.snapshot.ended || self.drawing.as_ref()?.subject() != Subject::Branch {
+            return None;
+        }
+        let line = self.drawing.take()?;
+        (!line.points_px().is_empty()).then_some(LINE_LOST)
     }
 
     /// Walks round the tree by some steps.

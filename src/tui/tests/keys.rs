@@ -196,6 +196,39 @@ fn a_line_along_a_branch_is_drawn_until_it_is_good_or_left() {
     assert!(last.contains("s waits: the outline"), "{last}");
 }
 
+/// Nothing is lost in silence: a line that is not finished when the film ends is told of.
+#[test]
+fn a_line_that_is_drawn_when_the_film_ends_is_left_and_told_of() {
+    for (keys, clicks, ended, is_left, is_told) in [
+        ("s", 2, true, true, true),
+        ("s", 1, true, true, true),
+        ("s", 0, true, true, false),
+        ("s", 2, false, false, false),
+        ("o", 2, true, false, false),
+        ("", 0, true, true, false),
+    ] {
+        let mut events: Vec<Event> = keys.chars().map(letter).collect();
+        events.extend((0..clicks).map(|k| click(13 + k, 1)));
+        let mut state = play(Some(narrow()), &events).state;
+        state.take(Arc::new(Snapshot {
+            ended,
+            ..snapshot(Phase::Live)
+        }));
+        let told = state.leave_drawing_at_end();
+        assert_eq!(
+            told.is_some(),
+            is_told,
+            "{keys:?}, {clicks} points: {told:?}"
+        );
+        assert_eq!(
+            state.drawing.is_none(),
+            is_left,
+            "{keys:?}, {clicks} points"
+        );
+        assert_eq!(state.leave_drawing_at_end(), None, "it is told once");
+    }
+}
+
 #[test]
 fn backspace_takes_the_last_line_back_when_no_point_is_left() {
     let back = key(KeyCode::Backspace);

@@ -156,6 +156,17 @@ fn camera_cases() -> [(&'static str, State); 2] {
     [("away", state(away)), ("slow", state(slow))]
 }
 
+/// While a line is drawn, q does not end; what is said in too small a window is true then, too.
+#[test]
+fn a_window_that_is_too_small_tells_a_key_that_ends() {
+    for (_, state) in stroke_cases() {
+        let screen = drawn(&state, Depth::None, 40, 10).to_string();
+        let text = screen.replace(['"', '\n'], " ");
+        let words: Vec<&str> = text.split_whitespace().collect();
+        assert!(words.join(" ").contains("Ctrl-C ends"), "{screen}");
+    }
+}
+
 #[test]
 fn looks_as_reviewed() {
     for (name, state) in cases() {
