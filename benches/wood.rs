@@ -4,7 +4,7 @@
 
 use arborcam::cancel::CancelToken;
 use arborcam::config::{self, Config};
-use arborcam::document::grey_png;
+use arborcam::document::at_rest_files;
 use arborcam::model::{Outline, TimedFrame};
 use arborcam::outline::{self, Given};
 use arborcam::pipeline::{FilmLog, Pipeline, find_wood};
@@ -68,21 +68,12 @@ fn look(clip: &Path, out: &Path) {
         println!("wood: none seen, {took_s:.2} s");
         return;
     };
-    let size = found.rest.size;
-    image::save_buffer(
-        out.join("rest.png"),
-        &found.rest.pixels,
-        size.width,
-        size.height,
-        image::ColorType::Rgb8,
-    )
-    .expect("rest.png");
-    let masks = found.wood.masks.as_ref().expect("masks");
-    for (name, mask) in [("wood.png", &masks.wood), ("leaves.png", &masks.leaves)] {
-        std::fs::write(out.join(name), grey_png(mask).expect(name)).expect(name);
+    let at_rest = found.at_rest.as_ref().expect("pictures at rest");
+    for file in at_rest_files(at_rest).expect("files") {
+        std::fs::write(out.join(file.name), file.bytes).expect(file.name);
     }
     let mut table = String::from("node,parent,u_px,v_px,radius_px\n");
-    for (k, node) in found.wood.branches.nodes.iter().enumerate() {
+    for (k, node) in found.branches.nodes.iter().enumerate() {
         let parent = node.parent.map_or(String::new(), |p| p.to_string());
         let (at, radius) = (node.position_px, node.radius_px);
         let _ = writeln!(table, "{k},{parent},{},{},{radius}", at.x, at.y);
@@ -90,8 +81,8 @@ fn look(clip: &Path, out: &Path) {
     std::fs::write(out.join("branches.csv"), table).expect("branches.csv");
     println!(
         "wood: {} nodes, {:.0} px of branches, {took_s:.2} s",
-        found.wood.branches.nodes.len(),
-        found.wood.branches.length_px()
+        found.branches.nodes.len(),
+        found.branches.length_px()
     );
 }
 

@@ -27,7 +27,7 @@ mod sway;
 #[cfg(all(feature = "camera", feature = "opencv"))]
 mod wood;
 
-pub use back::{BackEnd, Followed, Moved, WoodSight};
+pub use back::{BackEnd, Followed, Moved};
 #[cfg(feature = "camera")]
 pub use decode::{DecodeStage, Undecoded};
 pub use dress::{dress, flutter};

@@ -613,8 +613,8 @@ fn bark_has_the_colour_of_the_filmed_trunk() {
 #[test]
 fn masks_show_the_wood_of_a_bare_tree() {
     let [frame, wood, leaves] = ["frame.jpg", "wood.png", "leaves.png"].map(picture);
-    for mask in [&wood, &leaves] {
-        assert_eq!(mask.dimensions(), frame.dimensions());
+    for other in [&wood, &leaves, &picture("rest.png")] {
+        assert_eq!(other.dimensions(), frame.dimensions());
     }
     let in_mask = |mask: &image::RgbImage, u, v, width, height| {
         let part = image::imageops::crop_imm(mask, u, v, width, height);
@@ -633,10 +633,30 @@ fn masks_show_the_wood_of_a_bare_tree() {
         "{n_leaves} of leaves, {n_wood} of wood"
     );
     let note = &made().capture()["masks"];
-    assert_eq!(
-        (&note["wood"], &note["leaves"]),
-        (&"wood.png".into(), &"leaves.png".into())
-    );
+    let expected = serde_json::json!({
+        "wood": "wood.png", "leaves": "leaves.png", "rest": "rest.png",
+    });
+    assert_eq!(*note, expected);
+}
+
+/// In the first frame the tree is pulled aside; the wood lies on the picture of it at rest.
+#[test]
+fn the_masks_lie_on_the_picture_of_the_tree_at_rest() {
+    let [frame, rest, wood] = ["frame.jpg", "rest.png", "wood.png"].map(picture);
+    // Mean level of the surest wood of the crown: bare wood before a bright sky.
+    let level = |picture: &image::RgbImage| {
+        let mut sum = 0.0;
+        let mut n = 0.0;
+        for (pixel, mask) in picture.pixels().zip(wood.pixels()).take(640 * 200) {
+            if mask.0[0] > 240 {
+                sum += pixel.0.map(f64::from).iter().sum::<f64>() / 3.0;
+                n += 1.0;
+            }
+        }
+        sum / n
+    };
+    let [at_first, at_rest] = [&frame, &rest].map(level);
+    assert!(at_rest + 10.0 < at_first, "{at_rest} and {at_first}");
 }
 
 fn picture(name: &str) -> image::RgbImage {
@@ -678,6 +698,7 @@ fn a_replay_is_reproducible_to_the_byte() {
         "tree.glb",
         "frame.jpg",
         "bark.png",
+        "rest.png",
         "wood.png",
         "leaves.png",
     ] {

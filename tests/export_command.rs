@@ -203,6 +203,25 @@ fn csv_is_the_tables_and_cylinders_that_join() {
     }
 }
 
+/// Both have a picture of the leaf beside them, and nothing is overwritten.
+#[test]
+fn a_tree_in_leaf_is_exported_as_gltf_and_obj_of_one_name() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    for format in ["gltf", "obj"] {
+        let out = dir.path().join(format!("oak.{format}"));
+        let output = export(made(), format, &out, &["--leaves", "on"]);
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{told}");
+    }
+    let names = names_in(dir.path()).join(" ");
+    assert_eq!(
+        names,
+        "oak.bin oak.gltf oak.mtl oak.obj oak_leaf.png oak_obj_leaf.png"
+    );
+    let materials = fs::read_to_string(dir.path().join("oak.mtl")).expect("materials");
+    assert!(materials.contains("oak_obj_leaf.png"), "{materials}");
+}
+
 #[test]
 fn the_still_tree_opens_as_obj_and_ply() {
     let (_, triangles) = look(
@@ -929,6 +948,7 @@ fn a_tree_whose_film_was_removed_is_exported_drawn_and_moved_by_wind() {
         "nodes.csv",
         "frame.jpg",
         "bark.png",
+        "rest.png",
         "wood.png",
         "leaves.png",
         "tree.glb",
@@ -992,7 +1012,7 @@ fn a_tree_that_was_not_filmed_is_written_read_and_exported() {
         note.config.export.metres_per_px = metres_per_px;
         let draft = Draft {
             bark: None,
-            masks: None,
+            at_rest: None,
             note,
             skeleton: &tree,
             picture: None,

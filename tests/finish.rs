@@ -14,6 +14,7 @@ use tempfile::TempDir;
 /// What has not happened after so long will not.
 const HANGS: Duration = Duration::from_secs(60);
 const TABLES: [&str; 4] = ["tracks.csv", "left_out.csv", "nodes.csv", "motion.csv"];
+const PICTURES: [&str; 4] = ["bark.png", "rest.png", "wood.png", "leaves.png"];
 
 /// A replay in a process of its own.
 struct Run {
@@ -143,7 +144,7 @@ fn a_finished_log_is_the_capture_of_the_run() {
 
     let (_whole_dir, whole) = temporary();
     assert!(Run::start(&whole, &["--fast"]).end().status.success());
-    for file in TABLES.iter().chain(&["bark.png", "wood.png", "leaves.png"]) {
+    for file in TABLES.iter().chain(&PICTURES) {
         let [a, b] = [&out, &whole].map(|dir| fs::read(dir.join(file)).expect(file));
         assert!(a == b, "{file} differs");
     }

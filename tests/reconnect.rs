@@ -209,6 +209,7 @@ fn job(out: Option<&Path>) -> Job {
         config: Config::default(),
         outline: Some(support::outline().into()),
         pace: Pace::Live,
+        length_s: None,
         stream: None,
         out: out.map(Path::to_path_buf),
         record: None,

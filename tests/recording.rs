@@ -442,6 +442,7 @@ fn run(source: Box<dyn Source>, out: &Path, record: Option<RecordTo>) -> runtime
         config: Config::default(),
         outline: Some(support::outline().into()),
         pace: Pace::Fast,
+        length_s: None,
         stream: None,
         out: Some(out.to_owned()),
         record,

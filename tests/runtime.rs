@@ -120,6 +120,7 @@ fn job(outline: Option<Outline>, out: Option<&Path>) -> Job {
         config: Config::default(),
         outline: outline.map(Given::Region),
         pace: Pace::Fast,
+        length_s: None,
         stream: None,
         out: out.map(Path::to_path_buf),
         record: None,
@@ -455,6 +456,20 @@ fn a_new_outline_is_used_and_a_bad_one_is_refused_in_words() {
     );
 }
 
+/// A replay does not depend on how fast the machine is: it ends with the same frame every time.
+#[test]
+fn a_replay_ends_after_the_length_that_was_asked_for() {
+    for (length_s, frames) in [(1.0, 31), (1.01, 32), (2.5, 76)] {
+        let job = Job {
+            length_s: Some(length_s),
+            ..job(Some(support::outline()), None)
+        };
+        let (summary, failure, _) = run(fake(false, |n| Ok(frame(n))), job);
+        assert!(failure.is_none(), "{failure:?}");
+        assert_eq!(summary.expect("a summary").frames, frames, "{length_s} s");
+    }
+}
+
 /// Lines along branches that come after the last refinement. The name of the capture is taken
 /// meanwhile, so that the run cannot write it: what is finished from its log has them, too.
 #[test]
@@ -499,6 +514,9 @@ fn strokes_are_used_shown_kept_and_finished_with() {
     let tree = summary.expect("a summary").tree.expect("a tree");
     assert!(covered(&tree, ACROSS) >= 7 && tree.refinements == 1);
 
+    let asked = dir.path().join("out.unfinished/asked.csv");
+    let asked = std::fs::read_to_string(asked).expect("when lines were drawn");
+    assert!(asked.starts_with("frame\n") && asked.lines().count() > 1);
     std::fs::remove_dir(&out).expect("folder");
     let written = runtime::finish_unfinished(&out, &CancelToken::new()).expect("finished");
     let finished = written.tree.expect("a tree");

@@ -5,10 +5,13 @@
 mod strokes;
 mod support;
 
+use arborcam::cancel::CancelToken;
 use arborcam::config::Config;
-use arborcam::pipeline::Pipeline;
+use arborcam::model::{BranchGraph, Node, RawFrame};
+use arborcam::pipeline::{BackEnd, Followed, Pipeline};
 use arborcam::solve::Model;
-use std::sync::Arc;
+use std::collections::BTreeSet;
+use std::sync::{Arc, OnceLock};
 use strokes::{ACROSS, ALONG_SKY, covered};
 
 /// A run on the recording in which the tree is built after 4 s, along its wood 2 s later, and never
@@ -87,6 +90,115 @@ fn a_stroke_that_comes_while_the_first_wood_is_looked_for_is_used_at_once() {
         0,
         "it is still the first tree"
     );
+}
+
+/// A run in which a line is drawn after some frames of the recording, and the tree is refined by
+/// itself, too. `raw_of` is what is kept of a frame.
+fn run(drawn_after: &[u64], raw_of: impl Fn(&Followed) -> Option<Arc<RawFrame>>) -> BackEnd {
+    let mut config = Config::default();
+    (config.accumulate.min_s, config.accumulate.threshold) = (4.0, 0.2);
+    let mut back = BackEnd::new(&config);
+    for followed in followed() {
+        back.step(Followed {
+            raw: raw_of(followed),
+            ..followed.clone()
+        });
+        if drawn_after.contains(&followed.tracks.frame) {
+            back.add_stroke(ACROSS.to_vec()).expect("a line");
+        }
+    }
+    back.finish(&CancelToken::new());
+    back
+}
+
+/// What `arborcam finish` makes of that run's log, told that lines were drawn after these frames.
+fn finished(run: &BackEnd, asked: BTreeSet<u64>) -> BackEnd {
+    let mut config = Config::default();
+    (config.accumulate.min_s, config.accumulate.threshold) = (4.0, 0.2);
+    config.skeleton.strokes_px = run.strokes_px().to_vec();
+    let mut back = BackEnd::new(&config);
+    back.put_wood(run.wood().clone());
+    back.put_asked(asked);
+    for followed in followed() {
+        back.step(Followed {
+            raw: None,
+            ..followed.clone()
+        });
+    }
+    back.finish(&CancelToken::new());
+    back
+}
+
+/// Every frame of the recording as it comes to the back end.
+fn followed() -> &'static [Followed] {
+    static FOLLOWED: OnceLock<Vec<Followed>> = OnceLock::new();
+    FOLLOWED.get_or_init(|| {
+        let mut pipeline = pipeline();
+        let mut all = Vec::new();
+        for k in 0..support::recording().len() {
+            let frame = pipeline.decode.step(&support::timed(k), None);
+            all.extend(pipeline.front.step(frame.expect("picture")));
+        }
+        all.extend(pipeline.front.flush());
+        all
+    })
+}
+
+/// A frame that cannot be decoded: no wood is found in it.
+fn unreadable(followed: &Followed) -> Option<Arc<RawFrame>> {
+    let raw = RawFrame {
+        bytes: vec![0; 9],
+        ..RawFrame::clone(followed.raw.as_ref()?)
+    };
+    Some(Arc::new(raw))
+}
+
+/// What of a model the files of its capture depend on.
+#[derive(Debug, PartialEq)]
+struct Told {
+    frame: u64,
+    shown_from: u64,
+    followed_from: u64,
+    refinements: u32,
+    wood: Option<BranchGraph>,
+    nodes: Vec<Node>,
+}
+
+fn told(back: &BackEnd) -> Told {
+    let model = back.model().expect("a tree");
+    Told {
+        frame: model.frame,
+        shown_from: model.shown_from,
+        followed_from: model.followed_from,
+        refinements: model.refinements,
+        wood: model.wood.as_ref().map(|wood| wood.branches.clone()),
+        nodes: model.skeleton.nodes.clone(),
+    }
+}
+
+/// When lines were drawn does not follow from the wood that was found, where none was, or only
+/// that of the first tree.
+#[test]
+fn a_log_is_finished_as_its_run_whenever_lines_were_drawn() {
+    let readable = |followed: &Followed| followed.raw.clone();
+    // Whether it can be known by other means.
+    for (name, run, is_known) in [
+        ("the first wood is sought", run(&[175], readable), false),
+        ("nothing is found", run(&[200], unreadable), false),
+        ("at the end", run(&[329], readable), true),
+        ("twice", run(&[170, 215], readable), true),
+    ] {
+        assert!(!run.asked().is_empty(), "{name}");
+        let finished_as_told = finished(&run, run.asked().clone());
+        assert_eq!(told(&finished_as_told), told(&run), "{name}");
+        if !is_known {
+            let untold = finished(&run, BTreeSet::new());
+            assert!(
+                told(&untold) != told(&run),
+                "{name}: it makes no difference"
+            );
+        }
+    }
 }
 
 #[test]

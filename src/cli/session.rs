@@ -70,7 +70,6 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), CommandError> {
         running: &running,
         reload,
         service,
-        end_s: common.for_s.unwrap_or(f64::INFINITY),
     };
     let watched = if headless {
         supervisor.watch(&stop);
@@ -131,6 +130,7 @@ fn job(
         config,
         outline,
         pace: plan.pace(info.live),
+        length_s: common.for_s,
         stream: common.stream.map(|_| Box::new(std::io::stdout()) as _),
         out: common.out.clone(),
         record: plan.record.target(source),

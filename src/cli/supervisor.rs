@@ -1,5 +1,4 @@
-//! Supervises a running capture, with or without a screen: its length, its settings, its service
-//! manager.
+//! Supervises a running capture, with or without a screen: its settings, its service manager.
 
 use super::command_error::CommandError;
 use super::hangup::Reload;
@@ -19,8 +18,6 @@ pub struct CaptureSupervisor<'a> {
     pub running: &'a Running,
     pub reload: Reload<'a>,
     pub service: Option<Service>,
-    /// Sensor time at which the capture ends, s from its begin.
-    pub end_s: f64,
 }
 
 impl CaptureSupervisor<'_> {
@@ -58,13 +55,10 @@ impl CaptureSupervisor<'_> {
         shown.map_err(CommandError::bad_usage)
     }
 
-    /// Checks the length, the settings and the service manager; returns the newest state if it is
+    /// Checks the settings and the service manager; returns the newest state if it is
     /// new.
     fn check(&mut self) -> Option<Arc<Snapshot>> {
         let snapshot = self.running.latest();
-        if snapshot.as_ref().is_some_and(|s| s.time_s >= self.end_s) {
-            self.running.end();
-        }
         if self.reload.is_requested() {
             self.reload_settings();
         }
@@ -91,6 +85,10 @@ impl tui::Session for CaptureSupervisor<'_> {
 
     fn send(&mut self, control: Control) {
         self.running.send(control);
+    }
+
+    fn warn(&mut self, warning: &str) {
+        self.running.warn(warning);
     }
 
     fn finished(&self) -> bool {

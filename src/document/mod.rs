@@ -2,13 +2,14 @@
 //! and writes it; everything that is made from it is a view (see `export`).
 //!
 //! `capture.json` says what was filmed and how, `nodes.csv` holds the whole model, `frame.jpg` one
-//! picture of it, `bark.png` its bark, `wood.png` and `leaves.png` which pixels are wood and leaves.
-//! A tree that was filmed has `tracks.csv` and `left_out.csv`, the points, and `motion.csv`, the
-//! poses.
+//! picture of it, `bark.png` its bark, `rest.png` the tree at rest, `wood.png` and `leaves.png` which
+//! of its pixels are wood and leaves. A tree that was filmed has `tracks.csv` and `left_out.csv`, the
+//! points, and `motion.csv`, the poses.
 
+mod asked;
+mod at_rest;
 mod bark;
 mod error;
-mod masks;
 mod motion;
 mod nodes;
 pub mod note;
@@ -20,9 +21,10 @@ mod table;
 mod tracks;
 mod wood;
 
+pub use asked::{ASKED_FILE, asked_csv, read_asked};
+pub use at_rest::{LEAVES_MASK_FILE, REST_FILE, WOOD_MASK_FILE, at_rest_files};
 pub use bark::BARK_FILE;
 pub use error::DocumentError;
-pub use masks::{LEAVES_MASK_FILE, WOOD_MASK_FILE};
 pub use motion::{MOTION_HEADER, MotionCsv};
 pub use nodes::{NODES_HEADER, nodes};
 pub use note::{CaptureNote, SCHEMA_VERSION};
@@ -45,6 +47,7 @@ use motion::PoseReader;
 use nalgebra::Point2;
 use nodes::NodesRead;
 use note::{ModelNote, OutlineNote};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -361,10 +364,12 @@ pub struct Begun {
     pub picture: Option<Picture>,
     pub outline: Option<Outline>,
     pub wood: WoodSeen,
+    /// After which frames the wood was to be looked for again.
+    pub asked: BTreeSet<u64>,
 }
 
 impl Begun {
-    /// Reads it from `dir`. A picture, an outline or wood that cannot be read is left out.
+    /// Reads it from `dir`. What cannot be read beside `capture.json` is left out.
     ///
     /// # Errors
     /// There is no `capture.json`, it is damaged, or was written by a newer version.
@@ -381,10 +386,10 @@ impl Begun {
         }
         // They were kept of the newest wood alone.
         if let Some(mut newest) = wood.last_entry()
-            && let Ok(masks) = masks::read(dir, size(&note))
+            && let Ok(at_rest) = at_rest::read(dir, size(&note))
         {
             let wood = Wood {
-                masks: Some(Arc::new(masks)),
+                at_rest: Some(Arc::new(at_rest)),
                 ..Wood::clone(newest.get())
             };
             newest.insert(Arc::new(wood));
@@ -393,6 +398,7 @@ impl Begun {
             picture,
             outline: noted.and_then(|noted| outline(noted).ok()),
             wood,
+            asked: read_asked(dir).unwrap_or_default(),
             note,
         })
     }

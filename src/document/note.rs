@@ -103,11 +103,15 @@ pub struct BarkNote {
     pub file: String,
 }
 
-/// The masks of wood and leaves in the folder.
+/// The masks of wood and leaves in the folder, and the picture of the tree at rest on which they
+/// lie.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MasksNote {
     pub wood: String,
     pub leaves: String,
+    /// Empty in captures of before there was one.
+    #[serde(default)]
+    pub rest: String,
 }
 
 /// When and on what the tree was first built.

@@ -102,7 +102,8 @@ pub fn obj_files(
     }
     let texture = dressed.foliage.texture.as_ref().map(|(kind, bytes)| {
         let ending = if *kind == "image/png" { "png" } else { "jpg" };
-        (format!("{stem}_leaf.{ending}"), bytes.clone())
+        // One beside it of the same name may be a glTF's.
+        (format!("{stem}_obj_leaf.{ending}"), bytes.clone())
     });
     let mut materials = String::new();
     push_material(&mut materials, "bark", dressed.bark.rgb, None);

@@ -85,6 +85,15 @@ impl BranchGraph {
         Self { nodes }
     }
 
+    /// How many branches end somewhere.
+    pub fn tips(&self) -> usize {
+        let children = self.children();
+        children
+            .iter()
+            .filter(|children| children.is_empty())
+            .count()
+    }
+
     /// Children of every node.
     pub fn children(&self) -> Vec<Vec<usize>> {
         let mut children = vec![Vec::new(); self.nodes.len()];
@@ -139,5 +148,6 @@ mod tests {
     fn all_pieces_together_have_a_length() {
         assert!((fork().length_px() - 200.0).abs() < 1e-9);
         assert_eq!(fork().children(), [vec![1], vec![2, 3], vec![], vec![]]);
+        assert_eq!(fork().tips(), 2);
     }
 }

@@ -46,4 +46,4 @@ pub use timing::{Gap, GapCause, MAX_GAPS, Timing};
 pub use track::{LONGEST_TRIAL_S, Observation, TrackId, TrackSet};
 pub use track_log::{LogWindow, Tentative, TrackLog};
 pub use track_table::TrackTable;
-pub use wood::{Masks, Wood, WoodSeen};
+pub use wood::{AtRest, Masks, Wood, WoodSeen, WoodSight};

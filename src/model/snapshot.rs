@@ -1,7 +1,7 @@
 //! What the screen shows of a running capture: one immutable picture of its state, replaced, never
 //! changed.
 
-use super::{Angles, NodeName, Pose, Rgb, Size, Skeleton, SwayNow};
+use super::{Angles, NodeName, Pose, Rgb, Size, Skeleton, SwayNow, Wood, WoodSight};
 use nalgebra::Point2;
 use std::sync::Arc;
 
@@ -134,6 +134,9 @@ pub struct Snapshot {
     pub candidates_px: Vec<Point2<f32>>,
     pub skeleton: Option<Arc<Skeleton>>,
     pub pose: Option<Arc<Pose>>,
+    /// The wood that the film shows, and whether it was looked for.
+    pub wood: Option<Arc<Wood>>,
+    pub wood_sight: WoodSight,
     /// Main branch of every node of the skeleton, by node index; the same numbers as in `points`.
     pub node_colour: Arc<Vec<Option<u8>>>,
     /// What the pieces of the tree are called, by node index: `trunk`, `limb_1.2`, ...

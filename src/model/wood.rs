@@ -1,5 +1,7 @@
 //! The wood that pictures show.
 
+#[cfg(test)]
+use super::Size;
 use super::{BranchGraph, Luma, Rgb};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -11,14 +13,42 @@ pub struct Wood {
     /// The trunk's bark as a tile that repeats without a seam (sRGB): once round a limb, and as far
     /// along it as it is round. One texel where only its colour is seen, `None` where no trunk is.
     pub bark: Option<Arc<Rgb>>,
-    /// Which pixels are wood, and which are leaves; of wood that was found long ago they are not
-    /// remembered.
-    pub masks: Option<Arc<Masks>>,
+    /// What it was found in; of wood that was found long ago it is not remembered.
+    pub at_rest: Option<Arc<AtRest>>,
 }
 
-/// How sure it is that each pixel of the picture at rest, from which the camera's motion has been
-/// taken off, is wood, and that it is a leaf: the probability, 255 is 1. Both have the size of the
-/// picture, and no pixel has more than 255 in both together. Beyond the outline, widened by how far
+/// The picture of the tree at rest, made of its stillest frames, from which the camera's motion has
+/// been taken off; and what its pixels show. All have the size of the film.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AtRest {
+    /// What stands behind the tree is blurred.
+    pub picture: Rgb,
+    pub masks: Masks,
+}
+
+#[cfg(test)]
+impl AtRest {
+    /// Three grey pictures for tests.
+    pub(crate) fn made_up(size: Size) -> Self {
+        let mask = |level| Luma {
+            size,
+            pixels: vec![level; size.area()],
+        };
+        Self {
+            picture: Rgb {
+                size,
+                pixels: vec![90; 3 * size.area()],
+            },
+            masks: Masks {
+                wood: mask(200),
+                leaves: mask(9),
+            },
+        }
+    }
+}
+
+/// How sure it is that each pixel of the picture at rest is wood, and that it is a leaf: the
+/// probability, 255 is 1. No pixel has more than 255 in both together. Beyond the outline, widened by how far
 /// the tree sways, both are 0, but for the low trunk and lines that the user drew.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Masks {
@@ -29,6 +59,18 @@ pub struct Masks {
 impl Masks {
     /// The greatest value of a pixel that is not in the mask.
     pub const MOST_OUTSIDE: u8 = 127;
+}
+
+/// Whether the wood of a tree is seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum WoodSight {
+    /// There is no tree yet, or nobody wants to know.
+    #[default]
+    NotSought,
+    /// It is being looked for.
+    Sought,
+    Seen,
+    NotSeen,
 }
 
 /// The wood that was found while a film went on, by the newest frame that was looked at.

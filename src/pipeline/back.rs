@@ -6,9 +6,10 @@ use super::refiner::{Refiner, SolveJob, Taken};
 use crate::cancel::CancelToken;
 use crate::config::{Config, ConfigError, check_strokes};
 use crate::hierarchy::{self, Evidence};
-use crate::model::{Outline, Phase, Pose, RawFrame, Rgb, TrackLog, TrackSet, WoodSeen};
+use crate::model::{Outline, Phase, Pose, RawFrame, Rgb, TrackLog, TrackSet, WoodSeen, WoodSight};
 use crate::motion::Binding;
 use crate::solve::{Model, identify_sub_branches, solve};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -60,6 +61,10 @@ pub struct BackEnd {
     building: Option<Why>,
     /// A build was asked for, and there was too little to build from.
     refused: bool,
+    /// The newest frame each time that the wood was to be looked for again.
+    asked: BTreeSet<u64>,
+    /// The same of the run whose log is worked off, as far as it is still to come.
+    to_ask: BTreeSet<u64>,
 }
 
 /// What a build is due to.
@@ -69,18 +74,6 @@ enum Why {
     Enough,
     /// The user asked.
     Asked,
-}
-
-/// Whether the wood of the tree is seen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum WoodSight {
-    /// There is no tree yet, or nobody wants to know.
-    #[default]
-    NotSought,
-    /// It is being looked for.
-    Sought,
-    Seen,
-    NotSeen,
 }
 
 impl BackEnd {
@@ -97,6 +90,8 @@ impl BackEnd {
             build_now: false,
             building: None,
             refused: false,
+            asked: BTreeSet::new(),
+            to_ask: BTreeSet::new(),
         }
     }
 
@@ -113,6 +108,7 @@ impl BackEnd {
         if let Some(raw) = raw {
             self.film.push(raw, &tracks);
         }
+        self.ask_as_then(Some(tracks.frame));
         self.log.push(tracks.clone());
         let before = match self.tracker {
             Some(_) => self.refine(),
@@ -209,8 +205,8 @@ impl BackEnd {
         let (Some(mut refiner), Some(standing)) = (self.refiner.take(), &self.tracker) else {
             return Vec::new();
         };
-        // In a log without frames, wood that was found with this one was looked for then: no
-        // schedule says when the user drew.
+        // In a log without frames, wood that was found with this one was looked for then: a camera's
+        // run was late where its clock said so.
         let newest = self.log.all().newest().map(|set| set.frame);
         if self.film.frames().is_empty() && newest.is_some_and(|f| self.film.has_wood_of(f)) {
             refiner.ask();
@@ -287,6 +283,27 @@ impl BackEnd {
             && self.config.skeleton.along_wood
         {
             refiner.ask();
+            let newest = self.log.all().newest().map(|set| set.frame);
+            self.asked.extend(newest);
+        }
+    }
+
+    /// After which frames the wood was to be looked for again, as the user had drawn.
+    pub fn asked(&self) -> &BTreeSet<u64> {
+        &self.asked
+    }
+
+    /// Takes those of the run whose log is worked off: the wood is looked for again when it was
+    /// then.
+    pub fn put_asked(&mut self, asked: BTreeSet<u64>) {
+        self.to_ask = asked;
+    }
+
+    /// Asks for what the run had asked for before the frame `next`, or after its last one.
+    fn ask_as_then(&mut self, next: Option<u64>) {
+        let later = next.map_or(BTreeSet::new(), |next| self.to_ask.split_off(&next));
+        if !std::mem::replace(&mut self.to_ask, later).is_empty() {
+            self.seek_wood_again();
         }
     }
 
@@ -311,6 +328,7 @@ impl BackEnd {
     /// the sub-branches that a refinement would put on it, if there is enough motion in what is
     /// remembered. `cancel` ends both before.
     pub fn finish(&mut self, cancel: &CancelToken) {
+        self.ask_as_then(None);
         self.log.close();
         if self.tracker.is_none() && !self.log.all().is_empty() {
             self.judge();

@@ -85,14 +85,14 @@ impl FilmLog {
         self.wood.contains_key(&frame)
     }
 
-    /// Remembers what was found with `frame`. The masks of earlier wood are forgotten: those of a
-    /// long film would fill the memory.
+    /// Remembers what was found with `frame`. What earlier wood was found in is forgotten: that
+    /// of a long film would fill the memory.
     pub fn note_wood(&mut self, frame: u64, wood: Arc<Wood>) {
         self.wood.entry(frame).or_insert(wood);
         for older in self.wood.values_mut().rev().skip(1) {
-            if older.masks.is_some() {
+            if older.at_rest.is_some() {
                 *older = Arc::new(Wood {
-                    masks: None,
+                    at_rest: None,
                     ..Wood::clone(older)
                 });
             }
@@ -108,7 +108,7 @@ impl FilmLog {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{PixelFormat, Size};
+    use crate::model::{AtRest, PixelFormat, Size};
 
     fn filmed(log: &mut FilmLog, frames: std::ops::Range<u64>, bytes: usize) {
         let raw = Arc::new(RawFrame {
@@ -146,16 +146,9 @@ mod tests {
     }
 
     #[test]
-    fn masks_are_remembered_of_the_newest_wood_alone() {
-        let mask = crate::model::Luma {
-            size: Size::new(1, 1),
-            pixels: vec![9],
-        };
+    fn pictures_are_remembered_of_the_newest_wood_alone() {
         let wood = Arc::new(Wood {
-            masks: Some(Arc::new(crate::model::Masks {
-                wood: mask.clone(),
-                leaves: mask,
-            })),
+            at_rest: Some(Arc::new(AtRest::made_up(Size::new(1, 1)))),
             ..Wood::default()
         });
         let mut log = FilmLog::new(20.0);
@@ -163,8 +156,9 @@ mod tests {
         for frame in [90, 120, 170] {
             log.note_wood(frame, wood.clone());
         }
-        let has_masks: Vec<bool> = log.wood().values().map(|w| w.masks.is_some()).collect();
-        assert_eq!(has_masks, [false, false, true]);
+        let wood = log.wood().values();
+        let has_pictures: Vec<bool> = wood.map(|w| w.at_rest.is_some()).collect();
+        assert_eq!(has_pictures, [false, false, true]);
     }
 
     #[test]

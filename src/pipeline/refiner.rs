@@ -138,13 +138,22 @@ impl SolveJob {
     /// The wood that the kept frames show; where they are gone, what was found in them.
     fn wood(&self, cancel: &CancelToken) -> Option<Arc<Wood>> {
         if self.film.frames().is_empty() {
-            let newest = self.log.all().newest()?;
-            return self.film.wood_by(newest.frame).cloned();
+            return self.wood_found_then();
         }
         let window = self.log.last(self.config.accumulate.window_s);
         let prior = &self.prior.plain;
         let settings = &self.config.skeleton;
         wood_in(&self.film, window, &self.outline, prior, settings, cancel).map(Arc::new)
+    }
+
+    /// Of a log without frames: the wood that was found when they were there. The prior tree's own
+    /// is none that was found anew, unless it was found with the newest frame.
+    fn wood_found_then(&self) -> Option<Arc<Wood>> {
+        let newest = self.log.all().newest()?.frame;
+        let wood = self.film.wood_by(newest)?;
+        let standing = self.prior.wood.as_ref();
+        let is_new = standing.is_none_or(|standing| standing.branches != wood.branches);
+        (is_new || self.film.has_wood_of(newest)).then(|| wood.clone())
     }
 }
 
@@ -157,7 +166,7 @@ fn wood_in(
     settings: &config::Skeleton,
     cancel: &CancelToken,
 ) -> Option<Wood> {
-    Some(find_wood(film, window, outline, prior, settings, cancel)?.wood)
+    find_wood(film, window, outline, prior, settings, cancel)
 }
 
 /// Frames are decoded by the camera's crates and looked at by OpenCV. Without them no wood is seen.

@@ -4,9 +4,9 @@ use super::film_log::{FilmLog, KeptFrame};
 use crate::cancel::CancelToken;
 use crate::config;
 use crate::hierarchy;
-use crate::model::{Foot, LogWindow, Outline, Rgb, Skeleton, TrackId, TrackSet};
+use crate::model::{Foot, LogWindow, Outline, Rgb, Skeleton, TrackId, TrackSet, Wood};
 use crate::source::Decoder;
-use crate::wood::{self, Displacements, Found, Shot, Stroke, View};
+use crate::wood::{self, Displacements, Shot, Stroke, View};
 use nalgebra::Point2;
 use std::collections::BTreeMap;
 
@@ -23,7 +23,7 @@ pub fn find_wood(
     skeleton: &Skeleton,
     settings: &config::Skeleton,
     cancel: &CancelToken,
-) -> Option<Found> {
+) -> Option<Wood> {
     let rest = rest_places(window);
     let mut frames = Vec::new();
     let mut motions = Vec::new();

@@ -1,8 +1,7 @@
 //! What is said when a tree comes into effect.
 
 use super::shared::Shared;
-use crate::model::FootBasis;
-use crate::pipeline::WoodSight;
+use crate::model::{FootBasis, WoodSight};
 use crate::solve::Model;
 use std::sync::Arc;
 

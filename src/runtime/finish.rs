@@ -10,13 +10,13 @@ use crate::document::note::{
     Refinement, Software, Source, json,
 };
 use crate::document::{
-    BARK_FILE, CaptureNote, LEAVES_MASK_FILE, MotionCsv, PICTURE_FILE, SCHEMA_VERSION, TracksCsv,
-    WOOD_MASK_FILE, jpeg, nodes,
+    BARK_FILE, CaptureNote, LEAVES_MASK_FILE, MotionCsv, PICTURE_FILE, REST_FILE, SCHEMA_VERSION,
+    TracksCsv, WOOD_MASK_FILE, jpeg, nodes,
 };
 use crate::dynamics::{Depth, Film};
 use crate::files::OutputFolder;
 use crate::model::{
-    Masks, Outline, Picture, Pose, Rgb, Skeleton, Tentative, Timing, TrackLog, TrackSet,
+    AtRest, Outline, Picture, Pose, Rgb, Skeleton, Tentative, Timing, TrackLog, TrackSet,
     Unidentified, WoodSeen,
 };
 use crate::recording::TrackFileReader;
@@ -92,6 +92,8 @@ pub struct CaptureJob {
     pub log: TrackLog,
     /// The wood that was found in its frames.
     pub wood: WoodSeen,
+    /// After which of them it was to be looked for again, as the user had drawn.
+    pub asked: BTreeSet<u64>,
     pub config: Config,
     pub info: SourceInfo,
     pub quality: Quality,
@@ -177,7 +179,7 @@ fn draft(job: &CaptureJob, done: &Done, poses: Vec<Pose>) -> Result<DocumentWrit
         skeleton: &tree.skeleton,
         picture: job.picture.as_ref(),
         bark: bark_of(tree),
-        masks: masks_of(tree),
+        at_rest: at_rest_of(tree),
         poses,
         pose_in_picture: done.pose_in_picture.as_ref(),
     })?)
@@ -188,9 +190,9 @@ fn bark_of(tree: &Model) -> Option<&Arc<Rgb>> {
     tree.wood.as_ref()?.bark.as_ref()
 }
 
-/// Which pixels of the film are a tree's wood and leaves.
-fn masks_of(tree: &Model) -> Option<&Arc<Masks>> {
-    tree.wood.as_ref()?.masks.as_ref()
+/// The tree at rest, and which pixels are its wood and leaves.
+fn at_rest_of(tree: &Model) -> Option<&Arc<AtRest>> {
+    tree.wood.as_ref()?.at_rest.as_ref()
 }
 
 /// Says how many branches were not analysed because the end was wanted.
@@ -312,9 +314,10 @@ pub(super) fn describe(
         bark: tree.and_then(bark_of).map(|_| BarkNote {
             file: BARK_FILE.into(),
         }),
-        masks: tree.and_then(masks_of).map(|_| MasksNote {
+        masks: tree.and_then(at_rest_of).map(|_| MasksNote {
             wood: WOOD_MASK_FILE.into(),
             leaves: LEAVES_MASK_FILE.into(),
+            rest: REST_FILE.into(),
         }),
         build: tree.map(first_build),
         refinement: tree.and_then(refinement),

@@ -17,6 +17,8 @@ pub struct Job {
     /// `None` finds it by motion.
     pub outline: Option<Given>,
     pub pace: Pace,
+    /// Length of film after which it ends, s.
+    pub length_s: Option<f64>,
     /// Gets a JSON line per pose.
     pub stream: Option<Box<dyn Write + Send>>,
     /// Folder of the capture; must not exist.

@@ -97,7 +97,7 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
     let (region, scribbles) = parted(job.outline.take());
     let decode = DecodeStage::new(info.live, job.preview_every).map_err(Failure::NoDecoder)?;
     let front = FrontEnd::new(&job.config, region);
-    let (pace, camera) = (job.pace, job.config.camera.clone());
+    let (pace, length_s, camera) = (job.pace, job.length_s, job.config.camera.clone());
 
     let recording = match job.record.take() {
         Some(to) => Some(recorder_thread::start(to, info.live, &shared)?),
@@ -129,7 +129,9 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
             into: frames_in,
             out_of: frames_out,
         };
-        let run = move || source_thread::run(source, pace, camera, queue, recorder, &shared);
+        let run = move || {
+            source_thread::run(source, pace, length_s, camera, queue, recorder, &shared);
+        };
         spawn("source", run)?
     };
     Ok(Running {
@@ -201,6 +203,11 @@ impl Running {
     /// itself.
     pub fn news(&self) -> Vec<String> {
         self.shared.take_news()
+    }
+
+    /// Tells something that only the screen knows.
+    pub fn warn(&self, warning: &str) {
+        self.shared.warn(warning.to_owned());
     }
 
     /// What there is to be told so far.

@@ -422,6 +422,7 @@ impl ModelThread {
             tracks: file.reader().map_err(Failure::Log)?,
             log: self.back.log().clone(),
             wood: self.back.wood().clone(),
+            asked: self.back.asked().clone(),
             config: self.effective_config(),
             info: self.info.clone(),
             quality: self.quality.clone(),
@@ -506,7 +507,7 @@ impl ModelThread {
     fn write_once(&mut self, out: &Path) -> Result<Written, Failure> {
         let job = self.capture_job()?;
         if let Some(unfinished) = &mut self.unfinished {
-            unfinished.keep_wood(&job.wood)?;
+            unfinished.keep_wood(&job)?;
         }
         let is_current =
             |tables: &TableWriter| job.tree.as_ref().is_some_and(|model| tables.is_of(model));

@@ -50,7 +50,8 @@ pub fn record(source: Box<dyn Source>, job: RecordJob) -> Result<RunningRecord, 
                 into: frames_in,
                 out_of: frames_out,
             };
-            source_thread::run(source, job.pace, job.camera, queue, Some(recorder), &shared);
+            let (pace, recorder) = (job.pace, Some(recorder));
+            source_thread::run(source, pace, None, job.camera, queue, recorder, &shared);
         };
         spawn("source", run)?
     };

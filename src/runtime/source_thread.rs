@@ -38,10 +38,12 @@ pub struct Queue {
     pub out_of: Receiver<TimedFrame>,
 }
 
-/// Runs until the source ends or fails for good, or `shared.stop` is set.
+/// Runs until the source ends or fails for good, `length_s` of film have come, or `shared.stop` is
+/// set.
 pub fn run(
     mut source: Box<dyn Source>,
     pace: Pace,
+    length_s: Option<f64>,
     mut camera: config::Camera,
     queue: Queue,
     recorder: Option<Recorder>,
@@ -52,6 +54,7 @@ pub fn run(
     let live = pace == Pace::Live;
     let mut feed = Feed {
         pace,
+        length_s: length_s.unwrap_or(f64::INFINITY),
         queue,
         recorder,
         shared,
@@ -97,6 +100,8 @@ pub fn run(
 /// Frames on their way from the source to the tracker.
 struct Feed<'a> {
     pace: Pace,
+    /// The first frame that is so long after the first one of all is the last, s.
+    length_s: f64,
     queue: Queue,
     recorder: Option<Recorder>,
     shared: &'a Shared,
@@ -167,8 +172,14 @@ impl Feed<'_> {
         timed
     }
 
+    /// `false` when no further frame is wanted.
+    fn hand_on(&mut self, timed: TimedFrame) -> bool {
+        let is_last = timed.time_s >= self.length_s;
+        self.give_to_tracker(timed) && !is_last
+    }
+
     /// `false` when nobody takes frames any more.
-    fn hand_on(&mut self, mut timed: TimedFrame) -> bool {
+    fn give_to_tracker(&mut self, mut timed: TimedFrame) -> bool {
         if self.pace == Pace::Recorded {
             self.wait_for(&timed);
             timed.received = Instant::now();

@@ -180,6 +180,8 @@ impl Status {
         if s.strokes_px != back.strokes_px() {
             s.strokes_px = back.strokes_px().to_vec();
         }
+        s.wood = back.model().and_then(|model| model.wood.clone());
+        s.wood_sight = back.wood_sight();
         s.sensor_rate_hz = self.sensor.rate_hz();
         s.work_rate_hz = self.work.rate_hz();
         s.latency_p50_ms = self.latency_ms.percentile(0.5);

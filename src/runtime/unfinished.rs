@@ -11,10 +11,10 @@ use super::status::{median_error_px, median_fb_error_px};
 use crate::cancel::CancelToken;
 use crate::document::note::json;
 use crate::document::{
-    BARK_FILE, Begun, CaptureNote, LEAVES_MASK_FILE, PICTURE_FILE, WOOD_FILE, WOOD_MASK_FILE,
-    grey_png, jpeg, png, wood_csv,
+    ASKED_FILE, BARK_FILE, Begun, CaptureNote, LEAVES_MASK_FILE, PICTURE_FILE, REST_FILE,
+    WOOD_FILE, WOOD_MASK_FILE, asked_csv, at_rest_files, jpeg, png, wood_csv,
 };
-use crate::model::{FormatNote, Masks, Size, WoodSeen};
+use crate::model::{AtRest, FormatNote, Size, WoodSeen};
 use crate::pipeline::{BackEnd, Followed};
 use crate::recording::{SpaceReserve, TrackFile, TrackFileReader};
 use crate::source::SourceInfo;
@@ -33,6 +33,10 @@ const RESERVE_FILE: &str = "reserve";
 const KEPT_EVERY: Duration = Duration::from_millis(500);
 /// Space that is held back for the results of the shortest film, bytes: the model, the picture.
 const LEAST_RESERVE: u64 = 8 << 20;
+/// The pictures of the tree at rest: none is of use without the others.
+const AT_REST_FILES: [&str; 3] = [REST_FILE, WOOD_MASK_FILE, LEAVES_MASK_FILE];
+/// Size of those pictures, not compressed: one in colour and two in grey.
+const AT_REST_BYTES_PER_PIXEL: u64 = 5;
 /// Size of the results beside that of the log: both tables are text.
 const RESULTS_PER_LOG: u64 = 4;
 
@@ -44,6 +48,8 @@ pub struct Unfinished {
     picture_is_kept: bool,
     /// How much of the wood that was found is on disk.
     kept_wood: usize,
+    /// How many times are on disk at which it was to be looked for again.
+    kept_asked: usize,
 }
 
 /// Where the capture `out` lies until it is written.
@@ -78,6 +84,7 @@ impl Unfinished {
                     kept: None,
                     picture_is_kept: false,
                     kept_wood: 0,
+                    kept_asked: 0,
                 };
                 Ok((unfinished, log))
             }
@@ -97,10 +104,11 @@ impl Unfinished {
         self.kept = None;
         if std::mem::take(&mut self.kept_wood) > 0 {
             std::fs::remove_file(self.dir.join(WOOD_FILE)).map_err(Failure::Log)?;
-            for picture in [BARK_FILE, WOOD_MASK_FILE, LEAVES_MASK_FILE] {
-                self.remove_file(picture)?;
-            }
+            self.remove_file(BARK_FILE)?;
+            self.remove_at_rest()?;
         }
+        self.kept_asked = 0;
+        self.remove_file(ASKED_FILE)?;
         TrackFile::create(&self.dir.join(LOG_FILE)).map_err(Failure::Log)
     }
 
@@ -117,8 +125,10 @@ impl Unfinished {
     pub fn keep(&mut self, job: &CaptureJob, written_bytes: u64) -> Result<(), Failure> {
         self.kept = Some(Instant::now());
         let results = RESULTS_PER_LOG * job.tracks.bytes().map_err(Failure::Log)?;
-        let masks = newest_masks(&job.wood).map_or(0, |masks| 2 * masks.wood.size.area() as u64);
-        let missing = LEAST_RESERVE + masks + results.saturating_sub(written_bytes);
+        let at_rest = newest_at_rest(&job.wood).map_or(0, |at_rest| {
+            AT_REST_BYTES_PER_PIXEL * at_rest.picture.size.area() as u64
+        });
+        let missing = LEAST_RESERVE + at_rest + results.saturating_sub(written_bytes);
         self.reserve.grow_to(missing).map_err(Failure::Log)?;
         let note = json(&finish::describe(job, None, None))?;
         self.replace(NOTE_FILE, &note)?;
@@ -126,19 +136,23 @@ impl Unfinished {
             self.replace(PICTURE_FILE, &jpeg(&picture.rgb)?)?;
             self.picture_is_kept = true;
         }
-        self.keep_wood(&job.wood)
+        self.keep_wood(job)
     }
 
-    /// Brings to disk the wood that was found. The frames are not kept, and with them it would be
-    /// lost.
+    /// Brings to disk the wood that was found, and when the user had it looked for again. The
+    /// frames are not kept, and with them it would be lost.
     ///
     /// # Errors
     /// The disk is full, or whatever else the file system says.
-    pub fn keep_wood(&mut self, wood: &WoodSeen) -> Result<(), Failure> {
+    pub fn keep_wood(&mut self, job: &CaptureJob) -> Result<(), Failure> {
+        let (wood, asked) = (&job.wood, &job.asked);
+        if asked.len() > self.kept_asked {
+            self.replace(ASKED_FILE, &asked_csv(asked)?)?;
+            self.kept_asked = asked.len();
+        }
         if wood.len() > self.kept_wood {
             // After a crash there may be none, but none of other wood.
-            self.remove_file(WOOD_MASK_FILE)?;
-            self.remove_file(LEAVES_MASK_FILE)?;
+            self.remove_at_rest()?;
             self.replace(WOOD_FILE, &wood_csv(wood)?)?;
             self.keep_pictures(wood)?;
             self.kept_wood = wood.len();
@@ -146,7 +160,7 @@ impl Unfinished {
         Ok(())
     }
 
-    /// Bark and masks of the newest wood, or none where that has none.
+    /// Bark and pictures at rest of the newest wood, or none where that has none.
     fn keep_pictures(&self, wood: &WoodSeen) -> Result<(), Failure> {
         let Some(newest) = wood.values().next_back() else {
             return Ok(());
@@ -155,11 +169,19 @@ impl Unfinished {
             Some(bark) => self.replace(BARK_FILE, &png(bark)?)?,
             None => self.remove_file(BARK_FILE)?,
         }
-        let Some(masks) = &newest.masks else {
+        let Some(at_rest) = &newest.at_rest else {
             return Ok(());
         };
-        self.replace(WOOD_MASK_FILE, &grey_png(&masks.wood)?)?;
-        self.replace(LEAVES_MASK_FILE, &grey_png(&masks.leaves)?)
+        for file in at_rest_files(at_rest)? {
+            self.replace(file.name, &file.bytes)?;
+        }
+        Ok(())
+    }
+
+    fn remove_at_rest(&self) -> Result<(), Failure> {
+        AT_REST_FILES
+            .into_iter()
+            .try_for_each(|name| self.remove_file(name))
     }
 
     /// Removes a file, if it is there.
@@ -193,9 +215,9 @@ impl Unfinished {
     }
 }
 
-/// The masks of the newest wood.
-fn newest_masks(wood: &WoodSeen) -> Option<&Masks> {
-    wood.values().next_back()?.masks.as_deref()
+/// What the newest wood was found in.
+fn newest_at_rest(wood: &WoodSeen) -> Option<&AtRest> {
+    wood.values().next_back()?.at_rest.as_deref()
 }
 
 /// Completes the capture `out` from what its run has left.
@@ -214,6 +236,7 @@ pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Fa
         picture,
         outline,
         wood,
+        asked,
     } = Begun::read(&dir).map_err(|e| Failure::DamagedUnfinished {
         dir: dir.clone(),
         what: e.to_string(),
@@ -223,6 +246,7 @@ pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Fa
     let shared = Arc::new(Shared::restored(&note.timing, &note.warnings));
     let mut back = BackEnd::new(&note.config);
     back.put_wood(wood);
+    back.put_asked(asked);
     let mut quality = Quality::default();
     for set in tracks.sets() {
         if cancel.is_cancelled() {
@@ -251,6 +275,7 @@ pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Fa
         tracks,
         log: back.log().clone(),
         wood: back.wood().clone(),
+        asked: back.asked().clone(),
         info,
         config: note.config,
         quality,

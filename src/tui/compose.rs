@@ -4,8 +4,9 @@
 use super::drawing::{Drawing, Subject};
 use super::placed::Placed;
 use super::raster::{Raster, walk};
+use super::state::State;
 use super::theme::Theme;
-use crate::model::{Size, Snapshot};
+use crate::model::{BranchGraph, Size, Snapshot};
 use nalgebra::{Point2, Vector2};
 
 pub(super) const OUTLINE: [u8; 3] = [0xff, 0xd8, 0x30];
@@ -14,6 +15,9 @@ pub(super) const CURSOR: [u8; 3] = [0xff, 0xff, 0xff];
 /// Lines along branches; no branch, nor the outline, has this colour or this letter.
 pub(super) const STROKE: [u8; 3] = [0x80, 0xff, 0xff];
 const STROKE_LETTER: char = '*';
+/// The wood that was found: as far from the colours of leaves and sky as from those above.
+pub(super) const WOOD: [u8; 3] = [0xff, 0xb0, 0x78];
+const WOOD_LETTER: char = 'w';
 /// How far points on trial cover the picture, as a share of the others.
 const FAINT: f64 = 0.4;
 
@@ -25,25 +29,24 @@ pub fn image_size(snapshot: &Snapshot) -> Option<Size> {
     (size.area() > 0).then_some(size)
 }
 
-/// Picture, outline, points and lines along branches; while the user draws, what he has drawn so
-/// far instead of all that would hide the tree.
-pub fn picture(
-    snapshot: &Snapshot,
-    drawing: Option<&Drawing>,
-    placed: &Placed,
-    theme: Theme,
-) -> Option<Raster> {
+/// Picture, outline, points, wood and lines along branches; while the user draws, what he has drawn
+/// so far instead of all that would hide the tree.
+pub fn picture(state: &State, placed: &Placed, theme: Theme) -> Option<Raster> {
+    let (snapshot, drawing) = (&*state.snapshot, state.drawing.as_ref());
     let mut raster = Raster::scaled(snapshot.preview.as_deref()?, placed.dots)?;
     let fine = (placed.dots.width / 320) as i64;
     // In a coarse picture the points lie side by side and would hide the tree.
     let cover = if placed.dots.width < 100 { 0.6 } else { 1.0 };
     let strokes = strokes(snapshot, drawing);
-    let marked = !snapshot.points.is_empty() || !strokes.is_empty() || drawing.is_some();
+    let wood = state.shown_wood();
+    let marked =
+        !snapshot.points.is_empty() || !strokes.is_empty() || wood.is_some() || drawing.is_some();
     if marked {
         // The points must stand out from a sunlit tree.
         raster.darken(0.3);
     }
     if let Some(drawing) = drawing {
+        draw_wood(&mut raster, wood, placed, fine);
         draw_strokes(&mut raster, &strokes, placed, fine);
         draw_drawing(&mut raster, drawing, placed, fine);
         return Some(raster);
@@ -60,8 +63,16 @@ pub fn picture(
         let colour = theme.branch_rgb(*branch);
         mark(&mut raster, placed, pixel, fine, colour, cover);
     }
+    draw_wood(&mut raster, wood, placed, fine);
     draw_strokes(&mut raster, &strokes, placed, fine);
     Some(raster)
+}
+
+/// The middle lines of the wood that was found.
+fn draw_wood(raster: &mut Raster, wood: Option<&BranchGraph>, placed: &Placed, fine: i64) {
+    for piece in wood.into_iter().flat_map(pieces) {
+        draw_line(raster, &piece, false, placed, fine / 2, WOOD);
+    }
 }
 
 /// Lines along branches.
@@ -103,12 +114,9 @@ fn draw_drawing(raster: &mut Raster, drawing: &Drawing, placed: &Placed, fine: i
 }
 
 /// The same as letters, for terminals without colour: a cell is dark or bright, `#` the outline,
-/// `*` a line along a branch, digits main branches.
-pub fn letters(
-    snapshot: &Snapshot,
-    drawing: Option<&Drawing>,
-    placed: &Placed,
-) -> Option<Vec<Vec<char>>> {
+/// `w` wood that was found, `*` a line along a branch, digits main branches.
+pub fn letters(state: &State, placed: &Placed) -> Option<Vec<Vec<char>>> {
+    let (snapshot, drawing) = (&*state.snapshot, state.drawing.as_ref());
     let cells = Size::new(placed.area.width as u32, placed.area.height as u32);
     let mut letters = Letters {
         placed,
@@ -127,9 +135,11 @@ pub fn letters(
             let letter = branch.map_or('o', |b| (b'0' + b % 8) as char);
             letters.point(p.map(f64::from), letter);
         }
+        letters.wood(state.shown_wood());
         letters.strokes(&strokes);
         return Some(letters.rows);
     };
+    letters.wood(state.shown_wood());
     letters.strokes(&strokes);
     let letter = match drawing.subject() {
         Subject::Outline => '#',
@@ -184,6 +194,12 @@ impl Letters<'_> {
         });
     }
 
+    fn wood(&mut self, wood: Option<&BranchGraph>) {
+        for [a, b] in wood.into_iter().flat_map(pieces) {
+            self.line(a, b, WOOD_LETTER);
+        }
+    }
+
     fn strokes(&mut self, strokes: &[Vec<Point2<f64>>]) {
         for [a, b] in strokes.iter().flat_map(|stroke| edges(stroke, false)) {
             self.line(a, b, STROKE_LETTER);
@@ -209,6 +225,14 @@ fn strokes(snapshot: &Snapshot, drawing: Option<&Drawing>) -> Vec<Vec<Point2<f64
     }
     let points = |stroke: &Vec<[f64; 2]>| stroke.iter().map(|p| Point2::from(*p)).collect();
     snapshot.strokes_px.iter().map(points).collect()
+}
+
+/// The pieces between the nodes of wood.
+fn pieces(wood: &BranchGraph) -> impl Iterator<Item = [Point2<f64>; 2]> + '_ {
+    wood.nodes.iter().filter_map(|node| {
+        let parent = wood.nodes.get(node.parent?)?;
+        Some([parent.position_px, node.position_px])
+    })
 }
 
 /// Neighbouring points, the last with the first too if the line is closed.

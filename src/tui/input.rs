@@ -3,6 +3,7 @@
 use super::drawing::{Drawing, Subject};
 use super::placed::Placed;
 use super::state::State;
+use super::wood;
 use crate::model::Control;
 use nalgebra::Point2;
 use ratatui::crossterm::event::{
@@ -22,6 +23,8 @@ pub enum Action {
     /// To the left or to the right.
     Turn(i8),
     Mesh,
+    /// The wood that was found, in the picture.
+    Wood,
     /// The branch so many rows farther down.
     Choose(i8),
     /// Looks away from the chosen branch.
@@ -66,7 +69,7 @@ pub const fn bind<A>(
 }
 
 /// Keys while watching; those without a short name repeat what another one does.
-pub const WATCHING: [Binding<Action>; 18] = [
+pub const WATCHING: [Binding<Action>; 19] = [
     bind(
         KeyCode::Char('?'),
         "?",
@@ -135,9 +138,10 @@ pub const WATCHING: [Binding<Action>; 18] = [
         KeyCode::Char('s'),
         "s",
         "stroke",
-        "draws a line along a branch whose wood is not found",
+        "draws a line along a branch; w shows the wood that was found",
         Action::Draw(Subject::Branch),
     ),
+    bind(KeyCode::Char('w'), "w", "wood", "", Action::Wood),
     bind(KeyCode::Char('l'), "", "", "", Action::Turn(1)),
     bind(KeyCode::Char('k'), "", "", "", Action::Choose(-1)),
     bind(KeyCode::Left, "", "", "", Action::Turn(-1)),
@@ -262,7 +266,12 @@ fn waits(action: Action, subject: Subject) -> bool {
 fn act(action: Action, state: &mut State) -> Option<Control> {
     let looks = matches!(
         action,
-        Action::Help | Action::Turn(_) | Action::Mesh | Action::Choose(_) | Action::Camera
+        Action::Help
+            | Action::Turn(_)
+            | Action::Mesh
+            | Action::Wood
+            | Action::Choose(_)
+            | Action::Camera
     );
     if state.quitting && !looks {
         state.say("Still writing the capture…");
@@ -283,6 +292,14 @@ fn act(action: Action, state: &mut State) -> Option<Control> {
         }
         Action::Mesh => {
             state.switch_mesh();
+            return None;
+        }
+        Action::Wood => {
+            state.wood = !state.wood;
+            match state.wood {
+                true => state.say(wood::told(&state.snapshot)),
+                false => state.unsay(),
+            }
             return None;
         }
         Action::Choose(rows) => {
@@ -316,7 +333,10 @@ fn begin_drawing(subject: Subject, state: &mut State) {
         return;
     }
     state.help = false;
-    state.unsay();
+    match subject {
+        Subject::Outline => state.unsay(),
+        Subject::Branch => state.say(wood::told(&state.snapshot)),
+    }
     state.drawing.get_or_insert_with(|| Drawing::of(subject));
 }
 

@@ -27,6 +27,7 @@ mod state;
 mod tests;
 mod theme;
 mod tty;
+mod wood;
 
 pub use abilities::{Abilities, abilities, columns};
 pub use graphics::Preview;
@@ -59,6 +60,8 @@ pub trait Session {
     fn latest(&mut self) -> Option<Arc<Snapshot>>;
     /// Passes on what the user wants.
     fn send(&mut self, command: Control);
+    /// Passes on what the capture does not know of, so that it outlives the screen.
+    fn warn(&mut self, warning: &str);
     /// The capture has ended (source over and files written, or failed): the screen is left.
     fn finished(&self) -> bool;
 }
@@ -90,6 +93,9 @@ pub fn run(session: &mut dyn Session, options: Options, stop: &AtomicBool) -> Re
     while !session.finished() {
         if let Some(snapshot) = session.latest() {
             state.take(snapshot);
+            if let Some(lost) = state.leave_drawing_at_end() {
+                session.warn(lost);
+            }
         }
         let gone = stop.load(Ordering::SeqCst) || screen.step(&mut state, session).is_none();
         if gone {

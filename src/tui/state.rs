@@ -1,12 +1,16 @@
 //! What the screen remembers between two redraws.
 
-use super::drawing::Drawing;
+use super::drawing::{Drawing, Subject};
 use super::solid::Solid;
-use crate::model::{NodeName, Snapshot};
+use crate::model::{BranchGraph, NodeName, Snapshot};
 use std::sync::Arc;
 
 /// Redraws for which the screen's own notice stays, about six seconds.
 const NOTICE_TICKS: u32 = 120;
+
+/// The warning where the film ended while a line was drawn.
+const LINE_LOST: &str = "the film ended before the line along a branch was finished with Enter: it \
+                         is not used";
 
 /// One press of a key turns the tree by so much.
 pub const TURN_DEGREES: u16 = 15;
@@ -27,6 +31,8 @@ pub struct State {
     pub turned: u16,
     /// The tree's wood, while it is shown instead of its lines.
     pub solid: Option<Solid>,
+    /// The wood that was found is shown in the picture, also while no line is drawn.
+    pub wood: bool,
     /// The branch that the user has chosen, and its row when he did.
     chosen: Option<(NodeName, usize)>,
     /// The chosen branch is looked at, where there is no room for it beside all else.
@@ -55,6 +61,16 @@ impl State {
         }
     }
 
+    /// Where the film has ended, the wood is not looked for along what is being drawn: leaves it,
+    /// and gives what is to be said of a line with points.
+    pub fn leave_drawing_at_end(&mut self) -> Option<&'static str> {
+        if !self.snapshot.ended || self.drawing.as_ref()?.subject() != Subject::Branch {
+            return None;
+        }
+        let line = self.drawing.take()?;
+        (!line.points_px().is_empty()).then_some(LINE_LOST)
+    }
+
     /// Walks round the tree by some steps.
     pub fn turn(&mut self, steps: i16) {
         self.turned = (self.turned as i16 + steps).rem_euclid(TURNS as i16) as u16;
@@ -71,6 +87,18 @@ impl State {
                     .map_or_else(Solid::default, |s| Solid::default().followed_by(s)),
             ),
         };
+    }
+
+    /// The lines of the wood that was found, as far as they are shown in the picture; while an
+    /// outline is drawn they would hide its tree.
+    pub fn shown_wood(&self) -> Option<&BranchGraph> {
+        let is_shown = match self.drawing.as_ref().map(Drawing::subject) {
+            Some(Subject::Branch) => true,
+            Some(Subject::Outline) => false,
+            None => self.wood,
+        };
+        let wood = self.snapshot.wood.as_ref().filter(|_| is_shown)?;
+        Some(&wood.branches)
     }
 
     /// Row of the chosen branch; one that is gone with a refinement leaves its row to another.

@@ -3,12 +3,10 @@
 
 use super::{PrepareError, PreparedTree, TreeOptions};
 use crate::document::note::{CaptureNote, json};
-use crate::document::{
-    BARK_FILE, Document, LEAVES_MASK_FILE, PICTURE_FILE, WOOD_MASK_FILE, grey_png, jpeg, png,
-};
+use crate::document::{BARK_FILE, Document, PICTURE_FILE, at_rest_files, jpeg, png};
 use crate::export::gltf::glb;
 use crate::files::{OutputFolder, WriteError, replace};
-use crate::model::{Masks, Picture, Pose, Rgb, Skeleton, Swaying};
+use crate::model::{AtRest, Picture, Pose, Rgb, Skeleton, Swaying};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -27,8 +25,8 @@ pub struct Draft<'a> {
     pub picture: Option<&'a Picture>,
     /// What the note's bark is; the note must have one then.
     pub bark: Option<&'a Arc<Rgb>>,
-    /// What the note's masks are; the note must have them then.
-    pub masks: Option<&'a Arc<Masks>>,
+    /// What the note's masks are and lie on; the note must have them then.
+    pub at_rest: Option<&'a Arc<AtRest>>,
     /// The end of the film in the order of time, `export.animation_s` and a second more; none for a
     /// tree that was not filmed.
     pub poses: Vec<Pose>,
@@ -42,7 +40,7 @@ pub struct Draft<'a> {
 pub struct DocumentWriter {
     tree: PreparedTree,
     picture_jpg: Option<Vec<u8>>,
-    masks: Option<Arc<Masks>>,
+    at_rest: Option<Arc<AtRest>>,
 }
 
 impl DocumentWriter {
@@ -69,11 +67,11 @@ impl DocumentWriter {
         Ok(Self {
             tree: PreparedTree::new(document, options)?,
             picture_jpg,
-            masks: draft.masks.cloned(),
+            at_rest: draft.at_rest.cloned(),
         })
     }
 
-    /// Writes `nodes.csv`, `tree.glb`, the picture, the bark, the masks and `capture.json` with
+    /// Writes `nodes.csv`, `tree.glb`, the pictures, the bark, the masks and `capture.json` with
     /// these `warnings`. `sway` is by node index.
     ///
     /// # Errors
@@ -94,9 +92,10 @@ impl DocumentWriter {
         if let Some(bark) = &self.tree.document.bark {
             folder.write(BARK_FILE, &png(bark)?)?;
         }
-        if let Some(masks) = &self.masks {
-            folder.write(WOOD_MASK_FILE, &grey_png(&masks.wood)?)?;
-            folder.write(LEAVES_MASK_FILE, &grey_png(&masks.leaves)?)?;
+        if let Some(at_rest) = &self.at_rest {
+            for file in at_rest_files(at_rest)? {
+                folder.write(file.name, &file.bytes)?;
+            }
         }
         let note = CaptureNote {
             animation: Some(animation),

@@ -22,7 +22,7 @@ mod steady;
 
 use crate::cancel::CancelToken;
 use crate::config::TraceBy;
-use crate::model::{Foot, Outline, Rgb, Wood};
+use crate::model::{AtRest, Foot, Outline, Rgb, Wood};
 use crate::signal::median;
 use evidence::evidence;
 use field::Spread;
@@ -78,14 +78,6 @@ pub struct Shot<'a> {
     pub displacements: &'a Displacements,
 }
 
-/// What a film shows of the tree's wood.
-#[derive(Clone, Debug)]
-pub struct Found {
-    pub wood: Wood,
-    /// The tree at rest; what stands behind it is blurred.
-    pub rest: Rgb,
-}
-
 /// A line that the user drew along a branch, px.
 pub type Stroke = Vec<Point2<f64>>;
 
@@ -107,7 +99,7 @@ pub struct View<'a> {
 ///
 /// # Errors
 /// OpenCV fails.
-pub fn find(view: View, cancel: &CancelToken) -> opencv::Result<Option<Found>> {
+pub fn find(view: View, cancel: &CancelToken) -> opencv::Result<Option<Wood>> {
     let size = view.outline.size;
     let is_usable =
         |shot: &&Shot| shot.picture.size == size && shot.picture.pixels.len() == 3 * size.area();
@@ -148,13 +140,14 @@ pub fn find(view: View, cancel: &CancelToken) -> opencv::Result<Option<Found>> {
     }
     let masks = probability::masks(&mask, &evidence)?;
     let bark = bark::tile(&evidence.rest, &masks.wood, &branches);
-    Ok(Some(Found {
-        wood: Wood {
-            branches,
-            bark: bark.map(Arc::new),
-            masks: Some(Arc::new(masks)),
-        },
-        rest: evidence.rest,
+    let at_rest = AtRest {
+        picture: evidence.rest,
+        masks,
+    };
+    Ok(Some(Wood {
+        branches,
+        bark: bark.map(Arc::new),
+        at_rest: Some(Arc::new(at_rest)),
     }))
 }
 
@@ -287,11 +280,11 @@ mod tests {
         }
     }
 
-    fn masks(found: &Found) -> &Masks {
-        found.wood.masks.as_deref().expect("masks")
+    fn masks(found: &Wood) -> &Masks {
+        &found.at_rest.as_deref().expect("masks").masks
     }
 
-    fn found(swing: f64, strokes: &[Stroke], cancel: &CancelToken) -> Option<Found> {
+    fn found(swing: f64, strokes: &[Stroke], cancel: &CancelToken) -> Option<Wood> {
         let rest_px = followed();
         let angles: Vec<f64> = (0..16)
             .map(|k| swing * f64::from(k % 8 - 4) / 4.0)
@@ -344,7 +337,7 @@ mod tests {
             on += usize::from(is_in_mask && is_wood);
         }
         assert!(all > 1500 && on as f64 > 0.93 * all as f64, "{on} of {all}");
-        let branches = &found.wood.branches;
+        let branches = &found.branches;
         let tips = branches.children().iter().filter(|c| c.is_empty()).count();
         assert!((2..=3).contains(&tips), "{branches:?}");
         let length_px = branches.length_px();
@@ -355,7 +348,7 @@ mod tests {
     #[test]
     fn what_the_user_draws_is_wood() {
         let stroke = vec![Point2::new(160.0, 150.0), Point2::new(260.0, 150.0)];
-        let on_stroke = |found: Found| {
+        let on_stroke = |found: Wood| {
             let row = &masks(&found).wood.pixels[150 * SIZE.width as usize..];
             let pixels = row[180..250].iter();
             pixels.filter(|wood| **wood > Masks::MOST_OUTSIDE).count()

@@ -65,10 +65,11 @@ fn row(key: &'static str, help: &'static str, theme: Theme) -> Line<'static> {
     ])
 }
 
-/// What is said in a window in which nothing can be shown.
+/// What is said in a window in which nothing can be shown. While the user draws, `q` waits.
 pub fn too_small(frame: &mut Frame, area: Rect) {
     let (width, height) = SMALLEST;
-    let text = format!("arborcam needs {width}x{height} characters; enlarge the window. q ends.");
+    let text =
+        format!("arborcam needs {width}x{height} characters; enlarge the window. Ctrl-C ends.");
     let lines: Vec<Line> = crate::tui::format::wrap(&text, area.width as usize)
         .into_iter()
         .map(Line::from)

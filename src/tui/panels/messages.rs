@@ -82,7 +82,7 @@ pub fn keys(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
 fn is_useful(action: Action, state: &State) -> bool {
     match action {
         Action::Build => state.snapshot.skeleton.is_none(),
-        Action::Turn(_) | Action::Mesh => state.snapshot.skeleton.is_some(),
+        Action::Turn(_) | Action::Mesh | Action::Wood => state.snapshot.skeleton.is_some(),
         Action::Choose(_) => !state.snapshot.branches.is_empty(),
         _ => true,
     }

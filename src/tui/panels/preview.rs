@@ -41,6 +41,8 @@ struct Sent {
     placed: Placed,
     snapshot: Arc<Snapshot>,
     drawing: Option<Drawing>,
+    /// Whether the wood that was found is shown in it.
+    wood: bool,
 }
 
 impl std::fmt::Debug for Sent {
@@ -110,13 +112,13 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme, previe
         waiting(frame, inner, &reason(&state.snapshot), theme);
         return;
     };
-    let drawing = state.drawing.as_ref();
     let drawn = match kind {
-        Kind::Letters => compose::letters(&state.snapshot, drawing, &placed)
-            .map(|rows| letters(frame, &rows, placed.area, theme)),
+        Kind::Letters => {
+            compose::letters(state, &placed).map(|rows| letters(frame, &rows, placed.area, theme))
+        }
         Kind::HalfBlocks => {
             preview.sent = None;
-            compose::picture(&state.snapshot, drawing, &placed, theme)
+            compose::picture(state, &placed, theme)
                 .map(|raster| half_blocks(frame, &raster, placed.area, theme))
         }
         Kind::Kitty | Kind::Sixel | Kind::Iterm2 => sent(frame, state, &placed, theme, preview),
@@ -135,12 +137,14 @@ fn sent(
     preview: &mut Preview,
 ) -> Option<()> {
     let stale = preview.sent.as_ref().is_none_or(|old| {
-        let other = !Arc::ptr_eq(&old.snapshot, &state.snapshot) || old.drawing != state.drawing;
+        let other = !Arc::ptr_eq(&old.snapshot, &state.snapshot)
+            || old.drawing != state.drawing
+            || old.wood != state.wood;
         let due = preview.next_at.is_none_or(|at| Instant::now() >= at);
         old.placed != *placed || (other && due)
     });
     if stale {
-        let raster = compose::picture(&state.snapshot, state.drawing.as_ref(), placed, theme)?;
+        let raster = compose::picture(state, placed, theme)?;
         let protocol = preview.graphics.encode(raster, placed.area.as_size())?;
         let (snapshot, drawing) = (state.snapshot.clone(), state.drawing.clone());
         preview.sent = Some(Sent {
@@ -148,6 +152,7 @@ fn sent(
             placed: *placed,
             snapshot,
             drawing,
+            wood: state.wood,
         });
         preview.fresh = true;
     }

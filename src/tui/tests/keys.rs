@@ -74,7 +74,7 @@ fn keys_send_what_they_say() {
         ("?b", vec![BuildNow]),
         // While drawing, space sets a point, and a slip does nothing to the capture.
         ("o ebrq", vec![]),
-        ("hlmjk", vec![]),
+        ("hlmwwjk", vec![]),
     ] {
         let events: Vec<Event> = letters.chars().map(letter).collect();
         assert_eq!(play(Some(wide()), &events).sent, expected, "{letters}");
@@ -181,6 +181,7 @@ fn a_line_along_a_branch_is_drawn_until_it_is_good_or_left() {
             "o waits: a line along a branch is being drawn",
         ),
         (vec![a.clone(), letter('s'), b], Some(2), "Gathering"),
+        (vec![a.clone(), letter('s')], Some(1), "wood that was found"),
     ] {
         let events: Vec<Event> = std::iter::once(letter('s')).chain(events).collect();
         let run = play(Some(narrow()), &events);
@@ -193,6 +194,39 @@ fn a_line_along_a_branch_is_drawn_until_it_is_good_or_left() {
     let run = play(Some(narrow()), &[letter('o'), a, letter('s')]);
     let last = newest(&run.state);
     assert!(last.contains("s waits: the outline"), "{last}");
+}
+
+/// Nothing is lost in silence: a line that is not finished when the film ends is told of.
+#[test]
+fn a_line_that_is_drawn_when_the_film_ends_is_left_and_told_of() {
+    for (keys, clicks, ended, is_left, is_told) in [
+        ("s", 2, true, true, true),
+        ("s", 1, true, true, true),
+        ("s", 0, true, true, false),
+        ("s", 2, false, false, false),
+        ("o", 2, true, false, false),
+        ("", 0, true, true, false),
+    ] {
+        let mut events: Vec<Event> = keys.chars().map(letter).collect();
+        events.extend((0..clicks).map(|k| click(13 + k, 1)));
+        let mut state = play(Some(narrow()), &events).state;
+        state.take(Arc::new(Snapshot {
+            ended,
+            ..snapshot(Phase::Live)
+        }));
+        let told = state.leave_drawing_at_end();
+        assert_eq!(
+            told.is_some(),
+            is_told,
+            "{keys:?}, {clicks} points: {told:?}"
+        );
+        assert_eq!(
+            state.drawing.is_none(),
+            is_left,
+            "{keys:?}, {clicks} points"
+        );
+        assert_eq!(state.leave_drawing_at_end(), None, "it is told once");
+    }
 }
 
 #[test]

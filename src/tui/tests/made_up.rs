@@ -1,9 +1,9 @@
 //! States of a capture that never was.
 
 use crate::model::{
-    AngleSpectrum, Angles, BranchRow, BranchSway, Excitation, FormatNote, Interval, JointPose,
-    Node, NodeId, NodeName, Phase, Pose, Rgb, Size, Skeleton, Snapshot, Sway, SwayNow,
-    Unidentified,
+    AngleSpectrum, Angles, BranchGraph, BranchRow, BranchSway, Excitation, FormatNote, Interval,
+    JointPose, Node, NodeId, NodeName, Phase, Pose, Rgb, Size, Skeleton, Snapshot, Sway, SwayNow,
+    Unidentified, Wood, WoodNode, WoodSight,
 };
 use nalgebra::{Point2, UnitQuaternion, Vector3};
 use std::sync::Arc;
@@ -93,6 +93,20 @@ fn reached(now: Phase, phase: Phase) -> bool {
     order[0] >= order[1]
 }
 
+/// Wood that forks: a trunk that leaves to two sides.
+pub fn wood() -> Arc<Wood> {
+    let nodes = vec![
+        WoodNode::made_up(None, 320.0, 340.0),
+        WoodNode::made_up(Some(0), 320.0, 220.0),
+        WoodNode::made_up(Some(1), 250.0, 120.0),
+        WoodNode::made_up(Some(1), 380.0, 60.0),
+    ];
+    Arc::new(Wood {
+        branches: BranchGraph { nodes },
+        ..Wood::default()
+    })
+}
+
 /// A state in this phase; what a phase has not reached yet is empty.
 pub fn snapshot(phase: Phase) -> Snapshot {
     let mut s = Snapshot {
@@ -157,6 +171,7 @@ fn add_tree(s: &mut Snapshot) {
     for ((_, branch), i) in s.points.iter_mut().zip(0..) {
         *branch = Some(i % 3);
     }
+    (s.wood, s.wood_sight) = (Some(wood()), WoodSight::Seen);
     s.sway = Some(Arc::new(sway()));
     s.angles = angles();
     s.pose = Some(Arc::new(pose(&skeleton)));
@@ -288,6 +303,7 @@ pub fn huge() -> Snapshot {
         vec![[f64::NAN; 2], [1e300, -1e300]],
         vec![[0.0; 2]; 9],
     ];
+    s.wood = Some(Arc::new(huge_wood()));
     s.messages = vec!["word ".repeat(200), "x".repeat(500)];
     s.branches = (0..5000)
         .map(|node| BranchRow {
@@ -315,6 +331,19 @@ pub fn huge() -> Snapshot {
     }));
     s.show_tree(Arc::new(broken_skeleton()));
     s
+}
+
+fn huge_wood() -> Wood {
+    let nodes = vec![
+        WoodNode::made_up(None, f64::NAN, 1e300),
+        WoodNode::made_up(Some(0), -1e300, 0.0),
+        WoodNode::made_up(Some(usize::MAX), 9.0, 9.0),
+        WoodNode::made_up(Some(1), 320.0, f64::INFINITY),
+    ];
+    Wood {
+        branches: BranchGraph { nodes },
+        ..Wood::default()
+    }
 }
 
 fn broken_skeleton() -> Skeleton {

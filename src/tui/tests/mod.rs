@@ -1,6 +1,6 @@
 //! The screen against made-up but realistic states.
 
 mod keys;
-mod made_up;
+pub mod made_up;
 mod moving;
 mod screens;

@@ -1,10 +1,11 @@
 //! What the whole screen looks like, and that nothing brings it down.
 
 use super::made_up::{huge, snapshot};
-use crate::model::{CameraState, Phase, Rgb, Size, Skeleton, Snapshot, Unidentified};
+use crate::model::{CameraState, Phase, Rgb, Size, Skeleton, Snapshot, Unidentified, WoodSight};
 use crate::tui::compose;
 use crate::tui::drawing::{Drawing, Subject};
 use crate::tui::graphics::Graphics;
+use crate::tui::input::handle;
 use crate::tui::panels::preview::Preview;
 use crate::tui::screen;
 use crate::tui::state::State;
@@ -12,6 +13,7 @@ use crate::tui::theme::{Depth, Theme};
 use nalgebra::Point2;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
+use ratatui::crossterm::event::{Event, KeyCode};
 use ratatui::style::Color;
 use std::sync::Arc;
 
@@ -76,6 +78,7 @@ fn cases() -> Vec<(&'static str, State)> {
     drawing.say("That is outside the picture.");
     cases.push(("drawing", drawing));
     cases.extend(stroke_cases());
+    cases.extend(wood_cases());
     cases.extend(camera_cases());
     let mut quitting = state(Snapshot {
         paused: true,
@@ -105,6 +108,29 @@ fn stroke_cases() -> [(&'static str, State); 2] {
     [("strokes", state(drawn)), ("drawing_stroke", drawing)]
 }
 
+/// The wood that was found: with the points, while a line is drawn, and where there is none.
+fn wood_cases() -> [(&'static str, State); 4] {
+    let after = |keys: &str, snapshot: Snapshot| {
+        let mut state = state(snapshot);
+        for key in keys.chars() {
+            let event = Event::Key(KeyCode::Char(key).into());
+            assert_eq!(handle(&event, &mut state, None), None);
+        }
+        state
+    };
+    let none = Snapshot {
+        wood: None,
+        wood_sight: WoodSight::NotSeen,
+        ..snapshot(Phase::Live)
+    };
+    [
+        ("wood", after("w", snapshot(Phase::Live))),
+        ("wood_hidden", after("ww", snapshot(Phase::Live))),
+        ("wood_drawing", after("s", snapshot(Phase::Live))),
+        ("wood_none", after("s", none)),
+    ]
+}
+
 /// A camera that has gone, and one that is too slow.
 fn camera_cases() -> [(&'static str, State); 2] {
     let away = CameraState {
@@ -128,6 +154,17 @@ fn camera_cases() -> [(&'static str, State); 2] {
         ..snapshot(Phase::Live)
     };
     [("away", state(away)), ("slow", state(slow))]
+}
+
+/// While a line is drawn, q does not end; what is said in too small a window is true then, too.
+#[test]
+fn a_window_that_is_too_small_tells_a_key_that_ends() {
+    for (_, state) in stroke_cases() {
+        let screen = drawn(&state, Depth::None, 40, 10).to_string();
+        let text = screen.replace(['"', '\n'], " ");
+        let words: Vec<&str> = text.split_whitespace().collect();
+        assert!(words.join(" ").contains("Ctrl-C ends"), "{screen}");
+    }
 }
 
 #[test]
@@ -342,21 +379,56 @@ fn branches_are_coloured_alike_in_picture_table_and_tree() {
 #[test]
 fn lines_along_branches_have_a_colour_of_their_own() {
     for depth in [Depth::True, Depth::Indexed] {
-        let theme = Theme::new(depth);
-        let own = theme.colour(compose::STROKE);
-        let branches = (0..8).map(|b| theme.branch(Some(b)));
-        let others = [compose::OUTLINE, compose::DRAWN, compose::CURSOR].map(|c| theme.colour(c));
-        assert!(branches.chain(others).all(|c| c != own), "{depth:?}");
-        let shows = |state: &State| {
-            let screen = drawn(state, depth, 120, 40);
-            let mut cells = screen.buffer().content.iter();
-            cells.any(|c| c.fg == own || c.bg == own)
-        };
-        assert!(!shows(&state(snapshot(Phase::Live))));
+        assert_own_colour(compose::STROKE, depth);
+        assert!(!shows(
+            &state(snapshot(Phase::Live)),
+            compose::STROKE,
+            depth
+        ));
         for (name, state) in stroke_cases() {
-            assert!(shows(&state), "{name}, {depth:?}");
+            assert!(shows(&state, compose::STROKE, depth), "{name}, {depth:?}");
         }
     }
+}
+
+/// Whoever draws must see where wood was found, and others only if they ask for it.
+#[test]
+fn the_wood_that_was_found_is_shown_while_a_line_is_drawn_and_by_its_key() {
+    let mut outline = state(snapshot(Phase::Live));
+    (outline.wood, outline.drawing) = (true, Some(Drawing::of(Subject::Outline)));
+    for depth in [Depth::True, Depth::Indexed] {
+        assert_own_colour(compose::WOOD, depth);
+        let shown = wood_cases().map(|(_, state)| shows(&state, compose::WOOD, depth));
+        assert_eq!(shown, [true, false, true, false], "{depth:?}");
+        assert!(
+            !shows(&outline, compose::WOOD, depth),
+            "it would hide the tree"
+        );
+    }
+}
+
+/// No branch and nothing else that is drawn has this colour.
+fn assert_own_colour(rgb: [u8; 3], depth: Depth) {
+    let theme = Theme::new(depth);
+    let branches = (0..8).map(|b| theme.branch(Some(b)));
+    let drawn = [
+        compose::OUTLINE,
+        compose::DRAWN,
+        compose::CURSOR,
+        compose::STROKE,
+        compose::WOOD,
+    ];
+    let others = drawn.into_iter().filter(|other| *other != rgb);
+    let mut others = branches.chain(others.map(|other| theme.colour(other)));
+    assert!(others.all(|c| c != theme.colour(rgb)), "{depth:?}");
+}
+
+/// Whether something on the screen has this colour.
+fn shows(state: &State, rgb: [u8; 3], depth: Depth) -> bool {
+    let own = Theme::new(depth).colour(rgb);
+    let screen = drawn(state, depth, 120, 40);
+    let mut cells = screen.buffer().content.iter();
+    cells.any(|c| c.fg == own || c.bg == own)
 }
 
 #[test]
