@@ -150,7 +150,7 @@ fn foot(outline: &Outline, crown_u: Option<f64>, config: &Config) -> Foot {
         return found;
     }
     let line = config.shape.leader_px.iter().copied().map(Point2::from);
-    found.at_drawn_trunk(&line.collect::<Vec<_>>())
+    found.at_drawn_trunk(&line.collect::<Vec<_>>(), outline.size)
 }
 
 /// Hierarchy, 2D skeleton, 3D skeleton. `None` if too few points move.

@@ -1,6 +1,6 @@
 //! Where the trunk leaves the ground.
 
-use super::Outline;
+use super::{Outline, Size};
 use nalgebra::Point2;
 
 /// No trunk is thicker than this share of the tree's height.
@@ -75,10 +75,11 @@ impl Foot {
         }
     }
 
-    /// The same at the lower end of the line that the user drew along the trunk, where there is
-    /// one.
-    pub fn at_drawn_trunk(self, line_px: &[Point2<f64>]) -> Self {
+    /// The same at the lower end of the line that the user drew along the trunk, where that is in
+    /// the `picture`.
+    pub fn at_drawn_trunk(self, line_px: &[Point2<f64>], picture: Size) -> Self {
         let ends = line_px.first().into_iter().chain(line_px.last());
+        let ends = ends.filter(|end| picture.contains(**end));
         let Some(lower) = ends.max_by(|a, b| a.y.total_cmp(&b.y)) else {
             return self;
         };
@@ -140,7 +141,6 @@ fn low_parts(outline: &Outline, from: u32) -> Vec<LowPart> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Size;
 
     const SIZE: Size = Size {
         width: 100,
@@ -206,10 +206,13 @@ mod tests {
         let found = Foot::of(&outline(&[CROWN, TRUNK]), None);
         let line = [Point2::new(35.0, 97.0), Point2::new(40.0, 70.0)];
         for line in [line, [line[1], line[0]]] {
-            let foot = found.at_drawn_trunk(&line);
+            let foot = found.at_drawn_trunk(&line, SIZE);
             assert_eq!(foot.position_px, Point2::new(35.0, 97.0));
             assert_eq!(foot.basis, FootBasis::Drawn);
         }
-        assert_eq!(found.at_drawn_trunk(&[]), found);
+        let nowhere = [Point2::new(f64::NAN, 90.0), Point2::new(1e300, -5.0)];
+        for line in [&[][..], &nowhere] {
+            assert_eq!(found.at_drawn_trunk(line, SIZE), found);
+        }
     }
 }
