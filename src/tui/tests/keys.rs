@@ -196,7 +196,7 @@ fn a_line_along_a_branch_is_drawn_until_it_is_good_or_left() {
     assert!(last.contains("s waits: the outline"), "{last}");
 }
 
-/// Nothing is lost in silence: a line that is not finished when the film ends is told of.
+/// Nothing is lost in silence: a line that is not finished when the film ends is reported.
 #[test]
 fn a_line_that_is_drawn_when_the_film_ends_is_left_and_told_of() {
     for (keys, clicks, ended, is_left, is_told) in [
@@ -225,7 +225,7 @@ fn a_line_that_is_drawn_when_the_film_ends_is_left_and_told_of() {
             is_left,
             "{keys:?}, {clicks} points"
         );
-        assert_eq!(state.leave_drawing_at_end(), None, "it is told once");
+        assert_eq!(state.leave_drawing_at_end(), None, "it is reported once");
     }
 }
 

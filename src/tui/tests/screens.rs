@@ -391,7 +391,7 @@ fn lines_along_branches_have_a_colour_of_their_own() {
     }
 }
 
-/// Whoever draws must see where wood was found, and others only if they ask for it.
+/// A user who draws must see where wood was found, others only if they ask for it.
 #[test]
 fn the_wood_that_was_found_is_shown_while_a_line_is_drawn_and_by_its_key() {
     let mut outline = state(snapshot(Phase::Live));
