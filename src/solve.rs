@@ -6,6 +6,7 @@
 
 mod along_wood;
 mod bent_tree;
+mod clear;
 mod in_depth;
 mod labels;
 mod least_wood;
@@ -25,6 +26,7 @@ use crate::config::{Config, Leader};
 use crate::dynamics::{Depth, Film, analyse};
 use crate::hierarchy::{self, Evidence};
 use crate::model::{Foot, Outline, TrackId, TrackLog, TrackTable, Wood};
+use clear::Turns;
 use nalgebra::Point2;
 use refine::Refinement;
 use std::collections::{BTreeMap, BTreeSet};
@@ -66,7 +68,9 @@ pub fn solve(
         forced: !is_enough,
         ..Moment::of(window)?
     };
-    let model = build(&table, evidence, outline, config, moment)?;
+    let mut model = build(&table, evidence, outline, config, moment)?;
+    let before = model.skeleton.clone();
+    model.assemble(&before, config);
     Some(without_doubtful(model, log, &BTreeSet::new(), config))
 }
 
@@ -111,12 +115,20 @@ pub fn with_wood(
     config: &Config,
 ) -> Model {
     let mut model = model.clone();
-    if wood.is_none() && model.wood.is_none() {
-        return model;
-    }
+    model.turns = turns_before(&model, wood.is_some(), prior);
     let before = prior.map_or_else(|| model.skeleton.clone(), |prior| prior.skeleton.clone());
     model.set_wood(wood, &before, config);
     model
+}
+
+/// How the copies were turned of which `model` with its wood is the next version. With the first
+/// wood that is seen the whole tree is another one.
+fn turns_before(model: &Model, has_wood: bool, prior: Option<&Model>) -> Turns {
+    let before = prior.unwrap_or(model);
+    if has_wood && before.wood.is_none() {
+        return Turns::new();
+    }
+    before.turns.clone()
 }
 
 /// The prior model with the sub-branches that its frequencies identify by now; `None` where they
@@ -153,7 +165,7 @@ fn foot(outline: &Outline, crown_u: Option<f64>, config: &Config) -> Foot {
     found.at_drawn_trunk(&line.collect::<Vec<_>>(), outline.size)
 }
 
-/// Hierarchy, 2D skeleton, 3D skeleton. `None` if too few points move.
+/// Hierarchy, 2D skeleton, 3D skeleton with straight branches. `None` if too few points move.
 fn build(
     table: &Arc<TrackTable>,
     evidence: Evidence,
@@ -182,7 +194,7 @@ fn build(
         moving: evidence.moving.len(),
         forced: moment.forced,
     };
-    let mut model = Model {
+    Some(Model {
         rest_px,
         hierarchy,
         table: table.clone(),
@@ -192,7 +204,8 @@ fn build(
         kept: 0,
         joined: BTreeMap::new(),
         plain: skeleton.clone(),
-        skeleton: skeleton.clone(),
+        skeleton,
+        turns: Turns::new(),
         sub_branches: Vec::new(),
         left_out: BTreeSet::new(),
         wood: None,
@@ -205,7 +218,5 @@ fn build(
         shown_from: moment.frame,
         evidence,
         forced: moment.forced,
-    };
-    model.assemble(&skeleton, config);
-    Some(model)
+    })
 }

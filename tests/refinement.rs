@@ -1,13 +1,18 @@
 //! The tree is refined while filming goes on, and nobody who looks on is thrown off by it.
 
+#[path = "support/chance.rs"]
+mod chance;
 mod support;
 
 use arborcam::cancel::CancelToken;
 use arborcam::config::Config;
-use arborcam::model::{NodeName, Pose};
+use arborcam::model::{NodeName, Observation, Outline, Pose, Size, TrackId, TrackSet};
 use arborcam::pipeline::{BackEnd, Followed, Pipeline, PoseReplay};
 use arborcam::solve::Model;
+use chance::Chance;
+use nalgebra::Point2;
 use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::TAU;
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
@@ -16,7 +21,7 @@ use std::time::Instant;
 struct Run {
     /// Model and pose after each frame.
     frames: Vec<(Arc<Model>, Arc<Pose>)>,
-    sets: Vec<arborcam::model::TrackSet>,
+    sets: Vec<TrackSet>,
     config: Config,
 }
 
@@ -445,4 +450,62 @@ fn a_refinement_that_is_late_is_taken_when_it_is_there() {
         }
     }
     panic!("no refinement");
+}
+
+fn stem_outline() -> Outline {
+    let stem = [[310.0, 340.0], [330.0, 340.0], [330.0, 20.0], [310.0, 20.0]].map(Point2::from);
+    let size = Size {
+        width: 640,
+        height: 360,
+    };
+    arborcam::outline::from_polygon(&stem, size).expect("outline")
+}
+
+/// Points up a stem that sways as a whole at 0.8 Hz, farther towards its top, with half a pixel of
+/// noise.
+fn swaying_stem(frame: u64, time_s: f64) -> TrackSet {
+    let mut chance = Chance::new(frame);
+    let observation = |id: u32| {
+        let height = f64::from(id) / 47.0;
+        let sway_px = 12.0 * height * height * (TAU * 0.8 * time_s).sin();
+        let side_px = f64::from(id % 3 * 4) - 4.0 + chance.between(-0.5, 0.5);
+        Observation {
+            id: TrackId(id),
+            u_px: (320.0 + side_px + sway_px) as f32,
+            v_px: (330.0 - 300.0 * height) as f32,
+            fb_error_px: 0.02,
+            error_px: None,
+            confirmed: true,
+        }
+    };
+    TrackSet {
+        frame,
+        time_s,
+        observations: (0..48).map(observation).collect(),
+        ..TrackSet::default()
+    }
+}
+
+/// A stem says nothing that the outline does not: the tree waits for branches, but not for ever.
+#[test]
+fn a_stem_alone_is_a_tree_after_twice_the_time() {
+    let mut back = BackEnd::new(&Config::default());
+    let mut built_s = None;
+    for frame in 0..600u32 {
+        let time_s = f64::from(frame) / 30.0;
+        back.step(Followed {
+            tracks: swaying_stem(frame.into(), time_s),
+            outline: Arc::new(stem_outline()),
+            preview: None,
+            raw: None,
+            received: Instant::now(),
+        });
+        if let (Some(tree), None) = (back.model(), built_s) {
+            assert_eq!(tree.hierarchy.clusters.len(), 1, "{:?}", tree.hierarchy);
+            built_s = Some(time_s);
+        }
+    }
+    let built_s = built_s.expect("a tree");
+    let twice_s = 2.0 * Config::default().accumulate.min_s;
+    assert!((twice_s..twice_s + 1.1).contains(&built_s), "{built_s}");
 }

@@ -17,6 +17,9 @@ use std::time::Instant;
 const JUDGE_EVERY_S: f64 = 0.5;
 /// At the end of the frames no tree is built from less evidence than this (accumulation measure).
 pub const LEAST_MEASURE: f64 = 0.1;
+/// A stem without branches is a tree after so many times `accumulate.min_s`: until then some more
+/// film may tell its branches apart.
+const STEM_SPANS: f64 = 2.0;
 
 /// A frame that has been through the front end.
 #[derive(Clone, Debug)]
@@ -153,7 +156,7 @@ impl BackEnd {
             "evidence"
         );
         if let Some(why) = self.building.take() {
-            let before = self.build();
+            let before = self.build(why);
             self.refused = why == Why::Asked && self.tracker.is_none();
             return before;
         }
@@ -174,7 +177,7 @@ impl BackEnd {
     }
 
     /// Builds, and follows the pose through the remembered frames; gives their poses and targets.
-    fn build(&mut self) -> Vec<(Pose, Targets)> {
+    fn build(&mut self, why: Why) -> Vec<(Pose, Targets)> {
         let Some(outline) = &self.outline else {
             return Vec::new();
         };
@@ -182,6 +185,12 @@ impl BackEnd {
             return Vec::new();
         };
         let window = self.log.last(self.config.accumulate.window_s);
+        let is_stem = model.hierarchy.clusters.len() < 2;
+        let settings = &self.config.accumulate;
+        let wait_s = (STEM_SPANS * settings.min_s).min(0.9 * settings.window_s);
+        if why == Why::Enough && is_stem && window.span_s() < wait_s {
+            return Vec::new();
+        }
         let mut refiner = Refiner::new(model.time_s, window.span_s(), &self.config);
         let mut tracker = PoseTracker::new(Arc::new(model), &self.config);
         // The pose is followed from the first remembered frame, so that it does not jump where the
@@ -334,7 +343,7 @@ impl BackEnd {
             self.judge();
             let asked = self.build_now || self.building.is_some();
             if asked || self.evidence.measure >= LEAST_MEASURE {
-                self.build();
+                self.build(Why::Asked);
             }
         }
         // A tree that is there already is not given up for one that may not come.

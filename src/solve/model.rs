@@ -2,6 +2,7 @@
 
 use super::along_wood::{PointOn, along_wood};
 use super::bent_tree::Names;
+use super::clear::{Turns, clear_of_filmed};
 use super::lift::{assign_radii, flat};
 use super::sub_branches::{self, SubBranch};
 use super::taper::taper;
@@ -26,6 +27,8 @@ pub struct Model {
     pub plain: Arc<Skeleton>,
     /// The same with the sub-branches: the tree as it is shown and written.
     pub skeleton: Arc<Skeleton>,
+    /// How copies were turned to pass beside filmed limbs.
+    pub turns: Turns,
     /// Branches that only their frequency tells; their nodes come after those of the hierarchy.
     pub sub_branches: Vec<SubBranch>,
     /// How each measured branch sways, by node; empty while nobody has asked for it.
@@ -178,9 +181,16 @@ impl Model {
         self.assemble(before, config);
     }
 
-    /// The skeleton from its parts: the hierarchy in space, the sub-branches, the wood.
+    /// The skeleton from its parts: the hierarchy in space, the sub-branches, the wood. Traced nodes
+    /// go on as those of `before` that are in their places.
     pub(super) fn assemble(&mut self, before: &Skeleton, config: &Config) {
         self.modes.clear();
+        let mut skeleton = self.joined_parts(before, config);
+        self.turns = clear_of_filmed(&mut skeleton, &self.turns);
+        self.skeleton = Arc::new(skeleton);
+    }
+
+    fn joined_parts(&mut self, before: &Skeleton, config: &Config) -> Skeleton {
         let mut straight = sub_branches::with(&self.plain, &self.sub_branches);
         let none_seen = BranchGraph::default();
         let branches = match &self.wood {
@@ -188,8 +198,7 @@ impl Model {
             None if is_joined_without_wood(config) => &none_seen,
             None => {
                 assign_radii(&mut straight, &self.outline, config);
-                self.skeleton = Arc::new(straight);
-                return;
+                return straight;
             }
         };
         let mut points = Vec::new();
@@ -208,7 +217,7 @@ impl Model {
         if config.wood.trunk_width_px <= 0.0 {
             taper(&mut joined.skeleton.nodes, &joined.seen_px);
         }
-        self.skeleton = Arc::new(joined.skeleton);
+        joined.skeleton
     }
 
     /// The skeleton in the picture that it was pushed into space from, with the number of points on

@@ -215,6 +215,7 @@ impl<'a> Refinement<'a> {
         model.joined = self.inherited(model, &matches);
         model.plain = Arc::new(skeleton);
         model.skeleton = model.plain.clone();
+        model.turns = self.prior.turns.clone();
         model.first = self.prior.first;
         model.refinements = self.prior.refinements + 1;
     }
