@@ -5,6 +5,7 @@
 //! I/O, starts no threads and reads no clock.
 
 mod along_wood;
+mod at_rest;
 mod bent_tree;
 mod clear;
 mod in_depth;
@@ -26,6 +27,7 @@ use crate::config::{Config, Leader};
 use crate::dynamics::{Depth, Film, analyse};
 use crate::hierarchy::{self, Evidence};
 use crate::model::{Foot, Outline, TrackId, TrackLog, TrackTable, Wood};
+use at_rest::at_rest;
 use clear::Turns;
 use nalgebra::Point2;
 use refine::Refinement;
@@ -55,7 +57,7 @@ pub fn solve(
         let refinement = Refinement::of(log, prior, config)?;
         let evidence = refinement.evidence()?;
         let (table, moment) = (&refinement.table, refinement.moment);
-        let new = build(table, evidence, &prior.outline, config, moment)?;
+        let new = build(table, evidence, &prior.outline, prior.foot, config, moment)?;
         let new = without_doubtful(new, log, &prior.left_out, config);
         return refinement.better(new, cancel);
     }
@@ -68,7 +70,10 @@ pub fn solve(
         forced: !is_enough,
         ..Moment::of(window)?
     };
-    let mut model = build(&table, evidence, outline, config, moment)?;
+    let foot = foot(outline, crown_u(&table, &evidence.moving), config);
+    let moving = &evidence.moving;
+    let outline = at_rest(outline, log, &table, moving, foot.position_px);
+    let mut model = build(&table, evidence, &Arc::new(outline), foot, config, moment)?;
     let before = model.skeleton.clone();
     model.assemble(&before, config);
     Some(without_doubtful(model, log, &BTreeSet::new(), config))
@@ -170,13 +175,13 @@ fn build(
     table: &Arc<TrackTable>,
     evidence: Evidence,
     outline: &Arc<Outline>,
+    foot: Foot,
     config: &Config,
     moment: Moment,
 ) -> Option<Model> {
     if evidence.moving.len() < LEAST_MOVING {
         return None;
     }
-    let foot = foot(outline, crown_u(table, &evidence.moving), config);
     let foot_px = foot.position_px;
     let hierarchy = hierarchy::build(table, &evidence.moving, foot_px, &config.hierarchy);
     if hierarchy.members().len() < LEAST_MOVING {

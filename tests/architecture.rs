@@ -21,7 +21,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ),
     ("outline", &["model", "config", "signal"]),
     ("track", &["model", "config", "signal"]),
-    ("wood", &["model", "config", "signal"]),
+    // Pictures are carried to the rest pose.
+    ("wood", &["model", "config", "signal", "motion::Spread"]),
     ("hierarchy", &["model", "config", "signal"]),
     ("skeleton", &["model", "config"]),
     // The flat node that is stood up in space.

@@ -67,6 +67,8 @@ pub struct Document {
     pub picture: Option<Picture>,
     pub pose_in_picture: Option<Pose>,
     pub outline: Option<Outline>,
+    /// The outline where the tree rests; that of the first picture where no other is known.
+    pub outline_at_rest: Option<Outline>,
     /// The bark of the filmed trunk as a tile, see [`Wood::bark`].
     pub bark: Option<Arc<Rgb>>,
     /// What the user should know: parts that are missing. One sentence each.
@@ -160,11 +162,13 @@ impl Document {
             picture: None,
             pose_in_picture: None,
             outline: None,
+            outline_at_rest: None,
             bark: None,
             warnings: Vec::new(),
         };
         document.picture = document.picture_of(picture_jpg);
         document.outline = document.outline_of();
+        document.outline_at_rest = document.at_rest_of().or_else(|| document.outline.clone());
         Ok(document)
     }
 
@@ -199,8 +203,15 @@ impl Document {
         }
     }
 
+    /// A polygon that crosses itself, as a carried one may, is none.
+    fn at_rest_of(&self) -> Option<Outline> {
+        let noted = self.note.outline.as_ref()?;
+        outline(noted, &noted.rest_polygon_px).ok()
+    }
+
     fn outline_of(&mut self) -> Option<Outline> {
-        match outline(self.note.outline.as_ref()?) {
+        let noted = self.note.outline.as_ref()?;
+        match outline(noted, &noted.polygon_px) {
             Ok(outline) => Some(outline),
             Err(why) => {
                 self.warnings
@@ -396,7 +407,7 @@ impl Begun {
         }
         Ok(Self {
             picture,
-            outline: noted.and_then(|noted| outline(noted).ok()),
+            outline: noted.and_then(|noted| outline(noted, &noted.polygon_px).ok()),
             wood,
             asked: read_asked(dir).unwrap_or_default(),
             note,
@@ -427,18 +438,15 @@ fn model<'a>(dir: &Path, note: &'a CaptureNote) -> Result<&'a ModelNote, Documen
 }
 
 #[cfg(feature = "opencv")]
-fn outline(note: &OutlineNote) -> Result<Outline, String> {
-    let corners_px: Vec<Point2<f64>> = note
-        .polygon_px
-        .iter()
-        .map(|p| p.map(f64::from).into())
-        .collect();
+fn outline(note: &OutlineNote, polygon_px: &[[i32; 2]]) -> Result<Outline, String> {
+    let corners = polygon_px.iter().map(|p| p.map(f64::from).into());
+    let corners_px: Vec<Point2<f64>> = corners.collect();
     let size = Size::new(note.width, note.height);
     crate::outline::from_polygon(&corners_px, size).map_err(|e| e.to_string())
 }
 
 /// The mask of a polygon is filled by OpenCV.
 #[cfg(not(feature = "opencv"))]
-fn outline(_note: &OutlineNote) -> Result<Outline, String> {
+fn outline(_note: &OutlineNote, _polygon_px: &[[i32; 2]]) -> Result<Outline, String> {
     Err("this build has no OpenCV".into())
 }

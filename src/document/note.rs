@@ -87,6 +87,10 @@ pub struct OutlineNote {
     pub width: u32,
     pub height: u32,
     pub polygon_px: Vec<[i32; 2]>,
+    /// The same where the tree rests: in the first picture it may have been pulled aside. Empty
+    /// without a tree.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rest_polygon_px: Vec<[i32; 2]>,
 }
 
 /// The picture in the folder: the first frame that was tracked, whole.

@@ -14,6 +14,8 @@ use std::sync::Arc;
 pub struct TrackLog {
     remembered_s: f64,
     sets: VecDeque<Arc<TrackSet>>,
+    /// Nothing that was pushed has been given back yet.
+    is_whole: bool,
     tentative: Tentative,
 }
 
@@ -23,6 +25,7 @@ impl TrackLog {
         Self {
             remembered_s,
             sets: VecDeque::new(),
+            is_whole: true,
             tentative: Tentative::default(),
         }
     }
@@ -35,6 +38,7 @@ impl TrackLog {
         let oldest_s = set.time_s - self.remembered_s;
         self.sets.push_back(Arc::new(set));
         let n_old = self.sets.iter().take_while(|s| s.time_s < oldest_s).count();
+        self.is_whole &= n_old == 0;
         self.sets.drain(..n_old).collect()
     }
 
@@ -48,7 +52,14 @@ impl TrackLog {
 
     /// Gives back all sets that are held, oldest first.
     pub fn drain(&mut self) -> Vec<Arc<TrackSet>> {
+        self.is_whole &= self.sets.is_empty();
         self.sets.drain(..).collect()
+    }
+
+    /// The set of the first frame that was ever pushed, while it is held.
+    pub fn first_of_film(&self) -> Option<&TrackSet> {
+        let first = self.sets.front().filter(|_| self.is_whole)?;
+        Some(first)
     }
 
     fn remove(&mut self, ids: &BTreeSet<TrackId>) {

@@ -12,12 +12,14 @@ mod probabilistic;
 mod recover;
 mod rotation;
 mod search;
+mod spread;
 
 pub use between::between;
 pub use binding::Binding;
 pub use deterministic::direction as deterministic_direction;
 pub use flutter::flutter;
 pub use probabilistic::Problem;
+pub use spread::Spread;
 
 use crate::config::{Motion, MotionMethod};
 use crate::model::{JointPose, MovingBranch, Node, NodeId, Pose, Skeleton};

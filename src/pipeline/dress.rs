@@ -27,7 +27,7 @@ pub fn dress(skeleton: &Skeleton, seen: Seen, config: &Config) -> Dressed {
         Some(shape) => room(skeleton, Some(shape), Silhouette::Drawn),
         None => room(
             skeleton,
-            seen.outline,
+            seen.outline_at_rest,
             Silhouette::Filmed(config.shape.envelope),
         ),
     };

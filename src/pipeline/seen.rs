@@ -11,6 +11,8 @@ pub struct Seen<'a> {
     pub picture: Option<&'a Rgb>,
     pub pose: Option<&'a Pose>,
     pub outline: Option<&'a Outline>,
+    /// The outline where the tree rests.
+    pub outline_at_rest: Option<&'a Outline>,
     /// The drawn shape, in the picture, that the tree was cut to. It stands in the tree's place at
     /// rest.
     pub cut_to: Option<&'a Outline>,

@@ -305,6 +305,7 @@ pub(super) fn describe(
             width: o.size.width,
             height: o.size.height,
             polygon_px: o.polygon_px.iter().map(|p| (*p).into()).collect(),
+            rest_polygon_px: tree.map_or(Vec::new(), rest_polygon_px),
         }),
         picture: job.picture.as_ref().map(|p| PictureNote {
             file: PICTURE_FILE.into(),
@@ -358,6 +359,11 @@ fn timing(job: &CaptureJob) -> Timing {
         duration_s,
         ..job.shared.gaps()
     }
+}
+
+fn rest_polygon_px(tree: &Model) -> Vec<[i32; 2]> {
+    let polygon_px = tree.outline.polygon_px.iter();
+    polygon_px.map(|p| (*p).into()).collect()
 }
 
 /// What the user should know before trusting the result.

@@ -124,6 +124,7 @@ impl PreparedTree {
             picture: document.picture.as_ref().map(|p| &*p.rgb),
             pose: posed.pose_in_picture.as_ref(),
             outline: document.outline.as_ref(),
+            outline_at_rest: document.outline_at_rest.as_ref(),
             cut_to: posed.cut_to.as_ref(),
             bark: document.bark.as_ref(),
             leaf: leaf.as_ref(),
@@ -355,7 +356,7 @@ fn sway_of_cut(sway: &[Swaying], topiary: &Topiary) -> Vec<Swaying> {
 
 fn outline_of(document: &Document) -> Result<&Outline, PrepareError> {
     document
-        .outline
+        .outline_at_rest
         .as_ref()
         .ok_or_else(|| PrepareError::NoOutline {
             dir: document.dir.clone(),

@@ -6,10 +6,10 @@
 //! which the motion has brought it, and a pixel of the background at its own place. Where the
 //! picture is plain both are true, and nothing is said.
 
-use super::field::Spread;
 use super::{Shot, blurred, colour_mat};
 use crate::cancel::CancelToken;
 use crate::model::{Rgb, Size};
+use crate::motion::Spread;
 use crate::signal::median;
 use crate::signal::statistics::median_in_place;
 use nalgebra::Vector2;
