@@ -57,7 +57,7 @@ pub fn solve(
         let refinement = Refinement::of(log, prior, config)?;
         let evidence = refinement.evidence()?;
         let (table, moment) = (&refinement.table, refinement.moment);
-        let new = build(table, evidence, &prior.outline, prior.foot, config, moment)?;
+        let new = build(table, evidence, Stand::of(prior), config, moment)?;
         let new = without_doubtful(new, log, &prior.left_out, config);
         return refinement.better(new, cancel);
     }
@@ -70,10 +70,8 @@ pub fn solve(
         forced: !is_enough,
         ..Moment::of(window)?
     };
-    let foot = foot(outline, crown_u(&table, &evidence.moving), config);
-    let moving = &evidence.moving;
-    let outline = at_rest(outline, log, &table, moving, foot.position_px);
-    let mut model = build(&table, evidence, &Arc::new(outline), foot, config, moment)?;
+    let stand = Stand::find(outline, log, &table, &evidence.moving, config);
+    let mut model = build(&table, evidence, stand, config, moment)?;
     let before = model.skeleton.clone();
     model.assemble(&before, config);
     Some(without_doubtful(model, log, &BTreeSet::new(), config))
@@ -170,24 +168,56 @@ fn foot(outline: &Outline, crown_u: Option<f64>, config: &Config) -> Foot {
     found.at_drawn_trunk(&line.collect::<Vec<_>>(), outline.size)
 }
 
+/// Where a tree stands in the picture.
+struct Stand {
+    outline: Arc<Outline>,
+    at_rest: Arc<Outline>,
+    foot: Foot,
+}
+
+impl Stand {
+    fn find(
+        outline: &Arc<Outline>,
+        log: &TrackLog,
+        table: &TrackTable,
+        moving: &[usize],
+        config: &Config,
+    ) -> Self {
+        let foot = foot(outline, crown_u(table, moving), config);
+        let at_rest = at_rest(outline, log, table, moving, foot.position_px);
+        Self {
+            outline: outline.clone(),
+            at_rest: Arc::new(at_rest),
+            foot,
+        }
+    }
+
+    fn of(prior: &Model) -> Self {
+        Self {
+            outline: prior.outline.clone(),
+            at_rest: prior.outline_at_rest.clone(),
+            foot: prior.foot,
+        }
+    }
+}
+
 /// Hierarchy, 2D skeleton, 3D skeleton with straight branches. `None` if too few points move.
 fn build(
     table: &Arc<TrackTable>,
     evidence: Evidence,
-    outline: &Arc<Outline>,
-    foot: Foot,
+    stand: Stand,
     config: &Config,
     moment: Moment,
 ) -> Option<Model> {
     if evidence.moving.len() < LEAST_MOVING {
         return None;
     }
-    let foot_px = foot.position_px;
+    let foot_px = stand.foot.position_px;
     let hierarchy = hierarchy::build(table, &evidence.moving, foot_px, &config.hierarchy);
     if hierarchy.members().len() < LEAST_MOVING {
         return None;
     }
-    let skeleton = Arc::new(lift_to_3d(&hierarchy, foot_px, outline, config));
+    let skeleton = Arc::new(lift_to_3d(&hierarchy, foot_px, &stand.at_rest, config));
     let mut rest_px = BTreeMap::new();
     for (row, id) in table.ids.iter().enumerate() {
         rest_px.insert(*id, hierarchy::rest_position_px(table, row));
@@ -215,8 +245,9 @@ fn build(
         left_out: BTreeSet::new(),
         wood: None,
         modes: Vec::new(),
-        outline: outline.clone(),
-        foot,
+        outline: stand.outline,
+        outline_at_rest: stand.at_rest,
+        foot: stand.foot,
         followed_from: moment.followed_from,
         frame: moment.frame,
         time_s: moment.time_s,

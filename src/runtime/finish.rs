@@ -362,7 +362,7 @@ fn timing(job: &CaptureJob) -> Timing {
 }
 
 fn rest_polygon_px(tree: &Model) -> Vec<[i32; 2]> {
-    let polygon_px = tree.outline.polygon_px.iter();
+    let polygon_px = tree.outline_at_rest.polygon_px.iter();
     polygon_px.map(|p| (*p).into()).collect()
 }
 

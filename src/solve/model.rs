@@ -45,6 +45,8 @@ pub struct Model {
     /// it.
     pub wood: Option<Arc<Wood>>,
     pub outline: Arc<Outline>,
+    /// The outline where the tree rests: that of a capture's first tree stays.
+    pub outline_at_rest: Arc<Outline>,
     /// The foot of its trunk: that of a capture's first tree stays.
     pub foot: Foot,
     /// The tracks that it was built from, and what they are worth.
@@ -197,7 +199,7 @@ impl Model {
             Some(wood) => &wood.branches,
             None if is_joined_without_wood(config) => &none_seen,
             None => {
-                assign_radii(&mut straight, &self.outline, config);
+                assign_radii(&mut straight, &self.outline_at_rest, config);
                 return straight;
             }
         };
@@ -211,7 +213,7 @@ impl Model {
         };
         let mut joined = along_wood(&straight, branches, &points, &mut names);
         self.names = names.next;
-        assign_radii(&mut joined.skeleton, &self.outline, config);
+        assign_radii(&mut joined.skeleton, &self.outline_at_rest, config);
         // Radii that are seen go before those of the pipe model, and a width that the user gives
         // before both.
         if config.wood.trunk_width_px <= 0.0 {
@@ -230,7 +232,13 @@ impl Model {
     /// ways; without sub-branches, which are not pushed.
     pub fn push_figures(&self, config: &Config) -> PushFigures {
         let (flat, tracks) = self.flat(config);
-        PushFigures::of(&self.plain, &flat, &tracks, &self.outline, &config.shape)
+        PushFigures::of(
+            &self.plain,
+            &flat,
+            &tracks,
+            &self.outline_at_rest,
+            &config.shape,
+        )
     }
 }
 

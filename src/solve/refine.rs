@@ -201,10 +201,10 @@ impl<'a> Refinement<'a> {
         let anew = on_foot((*model.plain).clone(), old.foot_px);
         let twins = twins(&anew, old, &matches);
         let (flat, tracks) = model.flat(self.config);
-        let prototype = Prototype::of(&flat, &tracks, &model.outline, &self.config.shape);
+        let prototype = Prototype::of(&flat, &tracks, &model.outline_at_rest, &self.config.shape);
         let (mut skeleton, _) = go_on(&anew, old, &twins, &prototype, &self.config.shape);
         // Twigs, and with them the pipes, follow from how far the branches reach.
-        assign_radii(&mut skeleton, &model.outline, self.config);
+        assign_radii(&mut skeleton, &model.outline_at_rest, self.config);
         model.names = self.prior.names;
         for (node, twin) in skeleton.nodes.iter_mut().zip(&twins) {
             let known = twin.and_then(|t| old.name_of(t.old));

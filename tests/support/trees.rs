@@ -48,7 +48,7 @@ impl Flat {
             name,
             nodes,
             tracks,
-            outline: (*tree.outline).clone(),
+            outline: (*tree.outline_at_rest).clone(),
         }
     }
 
