@@ -27,7 +27,7 @@ pub fn dress(skeleton: &Skeleton, seen: Seen, config: &Config) -> Dressed {
         Some(shape) => room(skeleton, Some(shape), Silhouette::Drawn),
         None => room(
             skeleton,
-            seen.outline_at_rest,
+            seen.outline_at_rest.or(seen.outline),
             Silhouette::Filmed(config.shape.envelope),
         ),
     };

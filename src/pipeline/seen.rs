@@ -11,7 +11,7 @@ pub struct Seen<'a> {
     pub picture: Option<&'a Rgb>,
     pub pose: Option<&'a Pose>,
     pub outline: Option<&'a Outline>,
-    /// The outline where the tree rests.
+    /// The outline where the tree rests; `None` where it is not known, as without motion.
     pub outline_at_rest: Option<&'a Outline>,
     /// The drawn shape, in the picture, that the tree was cut to. It stands in the tree's place at
     /// rest.
