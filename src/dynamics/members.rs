@@ -39,6 +39,11 @@ pub(super) fn members(tree: &BranchTree, film: &Film) -> Vec<Vec<usize>> {
 impl Points {
     /// Of those of `tracks` that were seen for long enough, in the film's frames from `from` on.
     pub fn of(film: &Film, tracks: &[usize], from: usize) -> Self {
+        Self::up_to(MAX_POINTS, film, tracks, from)
+    }
+
+    /// The same, of at most so many points.
+    pub fn up_to(most: usize, film: &Film, tracks: &[usize], from: usize) -> Self {
         let rows = film.times_s.len() - from;
         let least = ((MIN_SEEN_SHARE * rows as f64) as usize).max(MIN_SEEN_FRAMES);
         let (mut all, mut whole) = (Vec::new(), Vec::new());
@@ -55,7 +60,7 @@ impl Points {
         if whole.len() >= ENOUGH_WHOLE && 2 * whole.len() >= all.len() {
             all = whole;
         }
-        let tracks = evenly_chosen(&all, MAX_POINTS);
+        let tracks = evenly_chosen(&all, most);
         let mut signals = Vec::with_capacity(2 * tracks.len());
         for &k in &tracks {
             signals.extend(centred(&film.tracks[k].at_px[from..]));

@@ -1,5 +1,6 @@
 //! What the motion says of the tree: angles between branches, and how each branch sways.
 
+mod ambient;
 mod angle;
 mod branch_tree;
 mod branches;
@@ -19,6 +20,7 @@ mod release;
 mod sandwich;
 mod signals;
 mod spectrum;
+mod subspace;
 mod sway;
 mod swing;
 mod wind;

@@ -6,6 +6,7 @@
 //! noise. The likelihood of that sum tells frequency and damping, at the real times
 //! (`driven_oscillators.rs`). It is the branch's own if its points move with it as one swing.
 
+use super::ambient;
 use super::branch_tree::BranchTree;
 use super::branches::{
     BranchEstimator, BranchInFilm, BranchMode, Estimate, LnDeviations, SearchLimits,
@@ -113,6 +114,7 @@ pub(super) fn sways(
     cancel: &CancelToken,
 ) -> Vec<Swaying> {
     let mut estimator = InWind {
+        trunk: trunk(tree, members),
         tree,
         film,
         members,
@@ -121,6 +123,14 @@ pub(super) fn sways(
         cancel,
     };
     from_the_trunk_up(tree, members, cancel, &mut estimator)
+}
+
+/// The branch on the foot that most points are on or above.
+fn trunk(tree: &BranchTree, members: &[Vec<usize>]) -> NodeId {
+    let branches = (1..members.len() as u32).map(NodeId);
+    let on_foot = branches.filter(|b| tree.branches[b.index()].parent == Some(NodeId(0)));
+    let largest = on_foot.max_by_key(|b| (members[b.index()].len(), std::cmp::Reverse(*b)));
+    largest.unwrap_or(NodeId(1))
 }
 
 /// What the analysis of a branch leaves for those on it.
@@ -133,6 +143,7 @@ enum Known {
 }
 
 struct InWind<'a> {
+    trunk: NodeId,
     tree: &'a BranchTree,
     film: &'a Film,
     members: &'a [Vec<usize>],
@@ -151,6 +162,18 @@ struct Speaking {
 
 impl BranchEstimator for InWind<'_> {
     fn estimate(&mut self, branch: &BranchInFilm) -> Swaying {
+        let told = self.from_own_points(branch);
+        if branch.node == self.trunk {
+            self.or_fundamental(branch, told)
+        } else {
+            told
+        }
+    }
+}
+
+impl InWind<'_> {
+    /// The sway of a branch from its points and those of its carrier.
+    fn from_own_points(&mut self, branch: &BranchInFilm) -> Swaying {
         let speaking = self.speaking(branch.node, branch.tracks);
         let points = Points::of(self.film, &speaking.tracks, 0);
         if points.tracks.len() < MIN_POINTS {
@@ -182,6 +205,46 @@ impl BranchEstimator for InWind<'_> {
 }
 
 impl InWind<'_> {
+    /// The trunk's sway: `told`, if all points at once tell the same or nothing. The trunk's own
+    /// points tell it more exactly, but where they are few a limb's sway is taken for its own.
+    fn or_fundamental(&mut self, branch: &BranchInFilm, told: Swaying) -> Swaying {
+        let Some((mode, sway)) = self.fundamental(branch) else {
+            return told;
+        };
+        if let (Ok(_), Known::Mode(own)) = (&told, self.known[branch.node.index()])
+            && is_of_ancestor(&own, &[mode])
+        {
+            return told;
+        }
+        self.known[branch.node.index()] = Known::Mode(mode);
+        Ok(sway)
+    }
+
+    /// The sway of the whole tree from all points at once; `None` where these do not tell it. It is
+    /// the one answer that every film should give, and may be twice as uncertain as others.
+    fn fundamental(&self, branch: &BranchInFilm) -> Option<(BranchMode, Sway)> {
+        let every = self.frames_per_mean();
+        let within_hz = self.frequencies_hz(every);
+        let found = ambient::fundamental(self.film, branch.tracks, every, within_hz, self.cancel);
+        let oscillator = found.ok().filter(|o| !o.at_limit)?;
+        let mode = OWN_POINTS.mode_of(&oscillator);
+        if !mode.is_within(MAX_CI_TO_SERVE * self.limits.max_relative_ci)
+            || self
+                .limits
+                .may_be_aliased(mode.mode.frequency_hz, self.film)
+        {
+            return None;
+        }
+        let points = Points::up_to(ambient::MOST_POINTS, self.film, branch.tracks, 0);
+        let sway = Sway {
+            frequency_hz: mode.frequency_hz(),
+            damping_ratio: mode.damping_ratio(),
+            excitation: Excitation::Wind,
+            amplitude_deg: self.amplitude_deg(branch, &points, oscillator.variance),
+        };
+        Some((mode, sway))
+    }
+
     /// Those of a branch's points that are on none of the branches that it carries, if they are
     /// enough, else all.
     fn speaking(&self, node: NodeId, tracks: &[usize]) -> Speaking {
