@@ -70,34 +70,33 @@ impl Spread {
             at_places.push(robust_mean(near, displacements).cast::<f32>());
         }
         let (width, height) = (self.size.width as usize, self.size.height as usize);
+        let places = at_places.chunks_exact(self.columns);
+        let rows: Vec<Vec<Vector2<f32>>> = places.map(|row| stretched(row, width)).collect();
         let mut field = Vec::with_capacity(width * height);
         for v in 0..height {
-            let first = v / STEP_PX * self.columns;
-            let (above, below) = at_places[first..].split_at(self.columns);
+            let (above, below) = (&rows[v / STEP_PX], &rows[v / STEP_PX + 1]);
             let down = (v % STEP_PX) as f32 / STEP_PX as f32;
-            for (column, u) in (0..width).step_by(STEP_PX).enumerate() {
-                let corners = [
-                    above[column],
-                    above[column + 1],
-                    below[column],
-                    below[column + 1],
-                ];
-                for step in 0..STEP_PX.min(width - u) {
-                    let right = step as f32 / STEP_PX as f32;
-                    field.push(interpolated(&corners, right, down));
-                }
-            }
+            let between = above.iter().zip(below);
+            field.extend(between.map(|(above, below)| interpolated(*above, *below, down)));
         }
         field
     }
 }
 
-/// Bilinear interpolation between the `corners` of a cell, at left and right above, left and right
-/// below; `right` and `down` are shares of its side.
-fn interpolated(corners: &[Vector2<f32>; 4], right: f32, down: f32) -> Vector2<f32> {
-    let above = corners[0].lerp(&corners[1], right);
-    let below = corners[2].lerp(&corners[3], right);
-    above.lerp(&below, down)
+/// The motion at a row of places, interpolated for each of `width` pixels.
+fn stretched(places: &[Vector2<f32>], width: usize) -> Vec<Vector2<f32>> {
+    let mut row = Vec::with_capacity(width);
+    for u in 0..width {
+        let right = (u % STEP_PX) as f32 / STEP_PX as f32;
+        let left = u / STEP_PX;
+        row.push(interpolated(places[left], places[left + 1], right));
+    }
+    row
+}
+
+/// Linear interpolation, by the share `to` of the way from `a` to `b`.
+fn interpolated(a: Vector2<f32>, b: Vector2<f32>, to: f32) -> Vector2<f32> {
+    a * (1.0 - to) + b * to
 }
 
 /// The nearest points to a place, and how much each counts.
@@ -125,25 +124,39 @@ fn nearest_points(place: Point2<f64>, rest_px: &[Point2<f64>], foot_px: Point2<f
 
 /// Mean displacement in which points that move otherwise than most hardly count.
 fn robust_mean(near: &[Near], displacements: &[Option<Vector2<f64>>]) -> Vector2<f64> {
-    let mut mean: Option<Vector2<f64>> = None;
-    for _ in 0..=ROUNDS {
-        let (mut sum, mut weights) = (Vector2::zeros(), 0.0);
-        for near in near {
-            let Some(displacement) = displacements.get(near.point).copied().flatten() else {
-                continue;
-            };
-            let displacement = near.share * displacement;
-            let apart = mean.map_or(0.0, |mean| (displacement - mean).norm() / APART_PX);
-            let weight = near.weight / (1.0 + apart * apart);
-            sum += weight * displacement;
-            weights += weight;
+    // Points that were not seen weigh nothing.
+    let mut moved = [Vector2::zeros(); NEAREST];
+    let mut by_distance = [0.0; NEAREST];
+    for (k, near) in near.iter().enumerate() {
+        if let Some(displacement) = displacements.get(near.point).copied().flatten() {
+            moved[k] = near.share * displacement;
+            by_distance[k] = near.weight;
         }
-        if weights <= 0.0 {
-            return Vector2::zeros();
-        }
-        mean = Some(sum / weights);
     }
-    mean.unwrap_or_else(Vector2::zeros)
+    let mut mean = weighted_mean(&moved, &by_distance);
+    for _ in 0..ROUNDS {
+        let mut weights = by_distance;
+        for (weight, moved) in weights.iter_mut().zip(&moved) {
+            let apart = (moved - mean).norm() / APART_PX;
+            *weight /= 1.0 + apart * apart;
+        }
+        mean = weighted_mean(&moved, &weights);
+    }
+    mean
+}
+
+/// 0 where nothing has a weight.
+fn weighted_mean(vectors: &[Vector2<f64>], weights: &[f64]) -> Vector2<f64> {
+    let (mut sum, mut all) = (Vector2::zeros(), 0.0);
+    for (vector, weight) in vectors.iter().zip(weights) {
+        sum += *weight * vector;
+        all += weight;
+    }
+    if all > 0.0 {
+        sum / all
+    } else {
+        Vector2::zeros()
+    }
 }
 
 #[cfg(test)]

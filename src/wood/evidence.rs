@@ -11,7 +11,6 @@ use crate::cancel::CancelToken;
 use crate::model::{Rgb, Size};
 use crate::motion::Spread;
 use crate::signal::median;
-use crate::signal::statistics::median_in_place;
 use nalgebra::Vector2;
 use opencv::core::{BORDER_REPLICATE, Mat, Scalar, Vec3f};
 use opencv::imgproc::{INTER_CUBIC, INTER_LINEAR, remap};
@@ -141,22 +140,35 @@ fn carried_back(
 
 /// The median of every colour of every pixel.
 fn median_picture(pictures: &[Mat], size: Size) -> opencv::Result<Rgb> {
-    let mut colours: Vec<&[Vec3f]> = Vec::with_capacity(pictures.len());
-    for picture in pictures {
-        colours.push(picture.data_typed()?);
-    }
     let mut pixels = Vec::with_capacity(3 * size.area());
-    // One for all pixels: there are millions of medians of six values.
-    let mut values = Vec::with_capacity(colours.len());
-    for i in 0..size.area() {
-        for c in 0..3 {
-            values.clear();
-            values.extend(colours.iter().map(|picture| picture[i][c]));
-            let median = median_in_place(&mut values, f32::total_cmp).unwrap_or(0.0);
-            pixels.push(median.round().clamp(0.0, 255.0) as u8);
+    for v in 0..size.height as i32 {
+        let mut rows: Vec<Vec<Vec3f>> = Vec::with_capacity(pictures.len());
+        for picture in pictures {
+            rows.push(picture.at_row(v)?.to_vec());
+        }
+        for pixel in median_row(&mut rows) {
+            pixels.extend(pixel.0.map(|colour| (colour + 0.5) as u8));
         }
     }
+    pixels.resize(3 * size.area(), 0);
     Ok(Rgb { size, pixels })
+}
+
+/// The median of `rows` at each of their places: the greatest values are carried to the last rows
+/// (bubble sort), at all places at once. Nothing of no rows.
+fn median_row(rows: &mut [Vec<Vec3f>]) -> &[Vec3f] {
+    let middle = rows.len() / 2;
+    for last in (middle.max(1)..rows.len()).rev() {
+        for k in 0..last {
+            let (lower, upper) = rows.split_at_mut(k + 1);
+            for (a, b) in lower[k].iter_mut().zip(&mut upper[0]) {
+                for (a, b) in a.0.iter_mut().zip(&mut b.0) {
+                    (*a, *b) = (a.min(*b), a.max(*b));
+                }
+            }
+        }
+    }
+    rows.get(middle).map_or(&[], Vec::as_slice)
 }
 
 /// Length of the difference of two pictures in every pixel.
@@ -168,4 +180,24 @@ fn differences(a: &Mat, b: &Mat) -> opencv::Result<Vec<f32>> {
 fn length_between(a: &Vec3f, b: &Vec3f) -> f32 {
     let squares = a.iter().zip(b.iter()).map(|(a, b)| (a - b) * (a - b));
     squares.sum::<f32>().sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_of_rows_is_that_of_each_place() {
+        let value = |row: u64, at: u64| (crate::random::seed_of_part(row, at) % 99) as f32;
+        for count in 1..7 {
+            let row = |k: u64| (0..20).map(|at| Vec3f::all(value(k, at))).collect();
+            let mut rows: Vec<Vec<Vec3f>> = (0..count).map(row).collect();
+            for (at, found) in (0..).zip(median_row(&mut rows)) {
+                let values = (0..count).map(|k| value(k, at)).collect();
+                let expected = median(values, f32::total_cmp).expect("values");
+                assert_eq!(*found, Vec3f::all(expected), "{count} rows");
+            }
+        }
+        assert!(median_row(&mut []).is_empty());
+    }
 }

@@ -9,7 +9,7 @@ use super::{Stroke, blurred, colour_mat};
 use crate::cancel::CancelToken;
 use crate::model::{Foot, Rgb, Size, bounds_px};
 use nalgebra::{Matrix3, Point2, Vector3};
-use opencv::core::{CV_8U, CV_32S, Mat, Point, Scalar, Size as CvSize, Vec3b, Vector};
+use opencv::core::{CV_8U, CV_32S, Mat, Point, Rect, Scalar, Size as CvSize, Vec3b, Vector};
 use opencv::imgproc::{
     COLOR_RGB2BGR, INTER_CUBIC, INTER_LINEAR, LINE_8, MORPH_BLACKHAT, MORPH_ELLIPSE, MORPH_OPEN,
     MORPH_TOPHAT, connected_components, cvt_color_def, get_structuring_element, morphology_ex_def,
@@ -169,7 +169,7 @@ pub fn wood_mask(
     let is_limb = limbs(&rest, &tree, &leaves, &is_trunk, large)?;
     let is_ridge = match out.in_leaf {
         true => vec![false; large.area()],
-        false => ridges(&rest, &out.moves, large)?,
+        false => ridges(&rest, bounds.enlarged(scale), &out.moves, large)?,
     };
     let clues = Clues {
         region: &region,
@@ -380,6 +380,22 @@ impl Part {
             right: scale * self.right,
             bottom: scale * self.bottom,
         }
+    }
+
+    /// The same and all that is no farther from it than `by_px`, as far as there is a picture.
+    fn widened(self, by_px: u32, size: Size) -> Self {
+        Self {
+            left: self.left.saturating_sub(by_px),
+            top: self.top.saturating_sub(by_px),
+            right: (self.right + by_px).min(size.width),
+            bottom: (self.bottom + by_px).min(size.height),
+        }
+    }
+
+    fn as_rect(self) -> Rect {
+        let [left, top, right, bottom] =
+            [self.left, self.top, self.right, self.bottom].map(|px| px as i32);
+        Rect::new(left, top, right - left, bottom - top)
     }
 
     /// Whether it is as high as `v`, and not farther off to the side than its own width.
@@ -605,17 +621,20 @@ impl Parts {
     }
 }
 
-/// Which pixels are on a ridge that is narrower than [`RIDGE_PX`]. Whether wood is darker or
-/// brighter than what stands behind it is estimated from the pixels that move.
-fn ridges(rest: &Mat, moves: &[bool], size: Size) -> opencv::Result<Vec<bool>> {
+/// Which pixels within `bounds` are on a ridge that is narrower than [`RIDGE_PX`]. Whether wood is
+/// darker or brighter than what stands behind it is estimated from the pixels that move.
+fn ridges(rest: &Mat, bounds: Part, moves: &[bool], size: Size) -> opencv::Result<Vec<bool>> {
     let width_px = RIDGE_PX * f64::from(size.width) / 640.0;
     let mut grey = Mat::default();
     cvt_color_def(rest, &mut grey, opencv::imgproc::COLOR_BGR2GRAY)?;
     let side = (width_px.round() as i32) | 1;
     let middle = Point::new(-1, -1);
     let disc = get_structuring_element(MORPH_ELLIPSE, CvSize::new(side, side), middle)?;
-    let dark = Ridges::of(&grey, MORPH_BLACKHAT, &disc, moves)?;
-    let bright = Ridges::of(&grey, MORPH_TOPHAT, &disc, moves)?;
+    // The second of the two steps looks so far beyond the bounds at what the first made.
+    let part = bounds.widened(side as u32 / 2, size).as_rect();
+    let ridges = |operation| Ridges::of(&grey, part, operation, &disc, moves, size);
+    let dark = ridges(MORPH_BLACKHAT)?;
+    let bright = ridges(MORPH_TOPHAT)?;
     let ridges = if bright.mean > BRIGHT * dark.mean {
         bright
     } else {
@@ -633,10 +652,17 @@ struct Ridges {
 }
 
 impl Ridges {
-    fn of(grey: &Mat, operation: i32, disc: &Mat, moves: &[bool]) -> opencv::Result<Self> {
+    fn of(
+        grey: &Mat,
+        part: Rect,
+        operation: i32,
+        disc: &Mat,
+        moves: &[bool],
+        size: Size,
+    ) -> opencv::Result<Self> {
         let mut height = Mat::default();
-        morphology_ex_def(grey, &mut height, operation, disc)?;
-        let height = height.data_bytes()?.to_vec();
+        morphology_ex_def(&grey.roi(part)?, &mut height, operation, disc)?;
+        let height = pasted(height.data_bytes()?, part, size);
         let histogram = histogram(&height, moves);
         Ok(Self {
             height,
@@ -650,6 +676,17 @@ impl Ridges {
         let high = self.height.iter().map(|h| f64::from(*h) > least);
         high.collect()
     }
+}
+
+/// Values of a picture of this size, row by row, that are those of `part` in `at`, and 0 elsewhere.
+fn pasted(part: &[u8], at: Rect, size: Size) -> Vec<u8> {
+    let mut whole = vec![0; size.area()];
+    let (left, width) = (at.x as usize, at.width as usize);
+    let rows = whole.chunks_exact_mut(size.width as usize);
+    for (row, part) in rows.skip(at.y as usize).zip(part.chunks_exact(width)) {
+        row[left..left + width].copy_from_slice(part);
+    }
+    whole
 }
 
 /// Mean of the values that a histogram counts.

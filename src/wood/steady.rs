@@ -9,22 +9,22 @@ use crate::model::{Rgb, Size};
 use nalgebra::{Isometry2, Point2, Translation2, UnitComplex, Vector2};
 use opencv::core::{
     BORDER_REPLICATE, Mat, Point2f, Scalar, Size as CvSize, TermCriteria, TermCriteria_COUNT,
-    TermCriteria_EPS, Vector,
+    TermCriteria_EPS, Vector, no_array,
 };
 use opencv::imgproc::{
     COLOR_RGB2GRAY, INTER_CUBIC, WARP_INVERSE_MAP, cvt_color_def, good_features_to_track,
     warp_affine,
 };
 use opencv::prelude::*;
-use opencv::video::calc_optical_flow_pyr_lk;
+use opencv::video::{build_optical_flow_pyramid_def, calc_optical_flow_pyr_lk};
 
 /// Points of the background that are followed from one shot to the next, at most; how far apart they
 /// are, px; and how clear a corner they are, as a share of the clearest one.
 const POINTS: i32 = 400;
 const APART_PX: f64 = 6.0;
 const CLEAR: f64 = 0.01;
-/// Side of the window in which they are compared, px, and how often the picture is halved.
-const WINDOW_PX: i32 = 15;
+/// The window in which they are compared, px, and how often the picture is halved.
+const WINDOW: CvSize = CvSize::new(15, 15);
 const LEVELS: i32 = 3;
 /// A point that comes back this far from where it began was lost, px.
 const BACK_PX: f64 = 0.5;
@@ -144,7 +144,7 @@ struct Background<'a> {
     region: &'a [u8],
     /// Mean of each colour, grey levels; `None` where there is no background.
     light: Option<[f64; 3]>,
-    grey: Mat,
+    pyramid: Vector<Mat>,
     /// Where it has corners.
     corners: Vector<Point2f>,
 }
@@ -170,7 +170,7 @@ impl<'a> Background<'a> {
         Ok(Self {
             region,
             light: light(picture, region),
-            grey,
+            pyramid: pyramid(&grey)?,
             corners,
         })
     }
@@ -180,9 +180,9 @@ impl<'a> Background<'a> {
         if self.corners.len() < LEAST_POINTS {
             return Ok(CameraMotion::identity());
         }
-        let other = grey(picture)?;
-        let there = followed(&self.grey, &other, &self.corners)?;
-        let back = followed(&other, &self.grey, &there)?;
+        let other = pyramid(&grey(picture)?)?;
+        let there = followed(&self.pyramid, &other, &self.corners)?;
+        let back = followed(&other, &self.pyramid, &there)?;
         let mut pairs = Vec::with_capacity(self.corners.len());
         for ((from, to), back) in self.corners.iter().zip(&there).zip(&back) {
             let pair = Pair {
@@ -240,12 +240,22 @@ fn grey(picture: &Rgb) -> opencv::Result<Mat> {
     Ok(grey)
 }
 
+/// A grey picture in all the sizes in which points are followed, each with its gradients.
+fn pyramid(grey: &Mat) -> opencv::Result<Vector<Mat>> {
+    let mut pyramid = Vector::new();
+    build_optical_flow_pyramid_def(grey, &mut pyramid, WINDOW, LEVELS)?;
+    Ok(pyramid)
+}
+
 /// Where points of one picture are in another (Lucas and Kanade 1981); those that are lost are
 /// anywhere.
-fn followed(from: &Mat, to: &Mat, points: &Vector<Point2f>) -> opencv::Result<Vector<Point2f>> {
+fn followed(
+    from: &Vector<Mat>,
+    to: &Vector<Mat>,
+    points: &Vector<Point2f>,
+) -> opencv::Result<Vector<Point2f>> {
     let mut there = Vector::new();
-    let (mut status, mut error) = (Vector::<u8>::new(), Vector::<f32>::new());
-    let window = CvSize::new(WINDOW_PX, WINDOW_PX);
+    let mut status = Vector::<u8>::new();
     let until = TermCriteria::new(TermCriteria_COUNT + TermCriteria_EPS, 30, 0.01)?;
     calc_optical_flow_pyr_lk(
         from,
@@ -253,8 +263,8 @@ fn followed(from: &Mat, to: &Mat, points: &Vector<Point2f>) -> opencv::Result<Ve
         points,
         &mut there,
         &mut status,
-        &mut error,
-        window,
+        &mut no_array(),
+        WINDOW,
         LEVELS,
         until,
         0,
