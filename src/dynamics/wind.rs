@@ -24,6 +24,7 @@ use crate::model::{Excitation, NodeId, Sway, Swaying, Unidentified};
 use crate::signal::principal::{PrincipalComponents, along};
 use crate::signal::qr::Qr;
 use crate::signal::vectors::dot;
+use nalgebra::Point2;
 use std::cell::RefCell;
 
 /// Points of a branch and of its carrier that are needed.
@@ -115,6 +116,7 @@ pub(super) fn sways(
 ) -> Vec<Swaying> {
     let mut estimator = InWind {
         trunk: trunk(tree, members),
+        fundamental: None,
         tree,
         film,
         members,
@@ -122,6 +124,7 @@ pub(super) fn sways(
         known: vec![Known::Nothing; members.len()],
         cancel,
     };
+    estimator.fundamental = estimator.whole_tree();
     from_the_trunk_up(tree, members, cancel, &mut estimator)
 }
 
@@ -144,6 +147,8 @@ enum Known {
 
 struct InWind<'a> {
     trunk: NodeId,
+    /// The sway of the whole tree, where all points at once tell it.
+    fundamental: Option<(BranchMode, Sway)>,
     tree: &'a BranchTree,
     film: &'a Film,
     members: &'a [Vec<usize>],
@@ -208,7 +213,7 @@ impl InWind<'_> {
     /// The trunk's sway: `told`, if all points at once tell the same or nothing. The trunk's own
     /// points tell it more exactly, but where they are few a limb's sway is taken for its own.
     fn or_fundamental(&mut self, branch: &BranchInFilm, told: Swaying) -> Swaying {
-        let Some((mode, sway)) = self.fundamental(branch) else {
+        let Some((mode, sway)) = self.fundamental.clone() else {
             return told;
         };
         if let (Ok(_), Known::Mode(own)) = (&told, self.known[branch.node.index()])
@@ -222,10 +227,12 @@ impl InWind<'_> {
 
     /// The sway of the whole tree from all points at once; `None` where these do not tell it. It is
     /// the one answer that every film should give, and may be twice as uncertain as others.
-    fn fundamental(&self, branch: &BranchInFilm) -> Option<(BranchMode, Sway)> {
+    fn whole_tree(&self) -> Option<(BranchMode, Sway)> {
+        let tracks = self.members.get(self.trunk.index())?;
+        let base_px = self.tree.branches.get(self.trunk.index())?.base_px;
         let every = self.frames_per_mean();
         let within_hz = self.frequencies_hz(every);
-        let found = ambient::fundamental(self.film, branch.tracks, every, within_hz, self.cancel);
+        let found = ambient::fundamental(self.film, tracks, every, within_hz, self.cancel);
         let oscillator = found.ok().filter(|o| !o.at_limit)?;
         let mode = OWN_POINTS.mode_of(&oscillator);
         if !mode.is_within(MAX_CI_TO_SERVE * self.limits.max_relative_ci)
@@ -235,12 +242,12 @@ impl InWind<'_> {
         {
             return None;
         }
-        let points = Points::up_to(ambient::MOST_POINTS, self.film, branch.tracks, 0);
+        let points = Points::up_to(ambient::MOST_POINTS, self.film, tracks, 0);
         let sway = Sway {
             frequency_hz: mode.frequency_hz(),
             damping_ratio: mode.damping_ratio(),
             excitation: Excitation::Wind,
-            amplitude_deg: self.amplitude_deg(branch, &points, oscillator.variance),
+            amplitude_deg: self.amplitude_deg(base_px, &points, oscillator.variance),
         };
         Some((mode, sway))
     }
@@ -272,9 +279,17 @@ impl InWind<'_> {
         of_carrier.filter(|k| !branch.tracks.contains(k)).collect()
     }
 
-    /// The modes of the nearest ancestors that have one.
-    fn ancestors(&self, node: NodeId) -> Vec<BranchMode> {
+    /// The modes of the nearest ancestors that have one. What stands beside the trunk on the foot,
+    /// by a skeleton that need not be right, may well be carried by it.
+    fn ancestors(&self, branch: &BranchInFilm) -> Vec<BranchMode> {
+        let node = branch.node;
         let mut out = Vec::new();
+        if let Some((whole_tree, _)) = &self.fundamental
+            && branch.is_on_foot()
+            && node != self.trunk
+        {
+            out.push(*whole_tree);
+        }
         for above in self.tree.carriers(node) {
             if let Known::Mode(mode) = self.known[above.index()] {
                 out.push(mode);
@@ -298,7 +313,7 @@ impl InWind<'_> {
         if frames.len() < MIN_FRAMES {
             return Err(Unidentified::TooShort);
         }
-        let ancestors = self.ancestors(branch.node);
+        let ancestors = self.ancestors(branch);
         let motion = OwnMotion::of(points, carrier, &frames)?;
         let problem = Problem {
             times: Times::new(frames.iter().map(|of| self.film.mean_s(of)).collect()),
@@ -335,7 +350,7 @@ impl InWind<'_> {
             frequency_hz: mode.frequency_hz(),
             damping_ratio: mode.damping_ratio().filter(|_| has_damping),
             excitation: Excitation::Wind,
-            amplitude_deg: self.amplitude_deg(branch, points, found[k].variance),
+            amplitude_deg: self.amplitude_deg(branch.base_px, points, found[k].variance),
         };
         let sway = if mode.is_within(max_relative_ci) {
             Ok(sway)
@@ -371,11 +386,11 @@ impl InWind<'_> {
     }
 
     /// Of an oscillator of this variance in all of the points together, px².
-    fn amplitude_deg(&self, branch: &BranchInFilm, points: &Points, variance: f64) -> f64 {
+    fn amplitude_deg(&self, base_px: Point2<f64>, points: &Points, variance: f64) -> f64 {
         let mut arms = 0.0;
         for &k in &points.tracks {
             let at_px = mean_px(&self.film.tracks[k].at_px);
-            arms += (at_px - branch.base_px).norm_squared();
+            arms += (at_px - base_px).norm_squared();
         }
         (2.0 * variance).sqrt().atan2(arms.sqrt()).to_degrees()
     }
