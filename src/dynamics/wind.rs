@@ -167,7 +167,7 @@ struct Speaking {
 
 impl BranchEstimator for InWind<'_> {
     fn estimate(&mut self, branch: &BranchInFilm) -> Swaying {
-        let told = self.from_own_points(branch);
+        let told = self.by_own_points(branch);
         if branch.node == self.trunk {
             self.or_fundamental(branch, told)
         } else {
@@ -178,7 +178,7 @@ impl BranchEstimator for InWind<'_> {
 
 impl InWind<'_> {
     /// The sway of a branch from its points and those of its carrier.
-    fn from_own_points(&mut self, branch: &BranchInFilm) -> Swaying {
+    fn by_own_points(&mut self, branch: &BranchInFilm) -> Swaying {
         let speaking = self.speaking(branch.node, branch.tracks);
         let points = Points::of(self.film, &speaking.tracks, 0);
         if points.tracks.len() < MIN_POINTS {
@@ -213,7 +213,7 @@ impl InWind<'_> {
     /// The trunk's sway: `told`, if all points at once tell the same or nothing. The trunk's own
     /// points tell it more exactly, but where they are few a limb's sway is taken for its own.
     fn or_fundamental(&mut self, branch: &BranchInFilm, told: Swaying) -> Swaying {
-        let Some((mode, sway)) = self.fundamental.clone() else {
+        let Some((mode, sway)) = self.fundamental else {
             return told;
         };
         if let (Ok(_), Known::Mode(own)) = (&told, self.known[branch.node.index()])
