@@ -162,11 +162,9 @@ mod tests {
             let (is, was) = (middle_of_row(&rest, v), middle_of_row(&drawn, v));
             assert!((is - 60.0).abs() < 3.0, "row {v}: {was} to {is}");
         }
-        assert!(
-            (rest.polygon_px[0].x - 80).abs() <= 2,
-            "{:?}",
-            rest.polygon_px
-        );
+        // Above the highest points the field goes no farther than they do.
+        let corner = rest.polygon_px[0];
+        assert!((corner.x - 80).abs() <= 3, "{corner}");
     }
 
     #[test]
