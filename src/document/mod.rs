@@ -67,7 +67,7 @@ pub struct Document {
     pub picture: Option<Picture>,
     pub pose_in_picture: Option<Pose>,
     pub outline: Option<Outline>,
-    /// The outline where the tree rests; that of the first picture where no other is known.
+    /// The outline where the tree rests, where that is known.
     pub outline_at_rest: Option<Outline>,
     /// The bark of the filmed trunk as a tile, see [`Wood::bark`].
     pub bark: Option<Arc<Rgb>>,
@@ -168,7 +168,7 @@ impl Document {
         };
         document.picture = document.picture_of(picture_jpg);
         document.outline = document.outline_of();
-        document.outline_at_rest = document.at_rest_of().or_else(|| document.outline.clone());
+        document.outline_at_rest = document.at_rest_of();
         Ok(document)
     }
 

@@ -4,18 +4,17 @@
 //! near which frequencies modes are (`subspace.rs`); their number, frequencies, damping ratios,
 //! shapes and how sure these are then follow from the likelihood of the Fourier coefficients about
 //! the lowest one (Bayesian operational modal analysis: Au 2011, 2012; Whittle 1951). Modes as near
-//! to each other as a trunk's and a limb's are told apart by their shapes.
+//! to each other as a trunk's and a limb's differ in their shapes.
 
 use super::branches::LnDeviations;
 use super::decay::{Mode, USUAL_DAMPING, damping_penalty};
-use super::driven_oscillators::Oscillator;
+use super::driven_oscillators::{DAMPING, Oscillator};
 use super::film::Film;
-use super::gap_free::{GapFree, enough_seen};
+use super::gap_free::GapFree;
 use super::members::Points;
 use super::subspace::stable_frequencies_hz;
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
-use crate::model::Unidentified;
 use crate::signal::bfgs::{curvature, minimum};
 use crate::signal::principal::{PrincipalComponents, along};
 use nalgebra::{Complex, DMatrix, SMatrix, SVector, SymmetricEigen};
@@ -38,7 +37,6 @@ const NEXT_MODE: f64 = 1.15;
 /// gains less than this.
 const SEARCHES: usize = 4;
 const LEAST_GAIN: f64 = 0.1;
-const DAMPING: Bounds = Bounds::new(0.003, 0.4);
 /// The likelihood is flat in a direction with less curvature than this. Of a parameter that is known
 /// no more than such a share of its square lies in flat directions.
 const FLAT: f64 = 1e-3;
@@ -46,32 +44,24 @@ const MOST_FLAT: f64 = 0.01;
 
 type Coefficient = SVector<Complex<f64>, MOTIONS>;
 
-/// The lowest mode of the points `tracks` in `film`, looked for `within_hz`, in means of `every`
-/// frames; the reason where there is none.
+/// The lowest mode of `points` in `frames` of `film`, each some neighbours taken together, looked
+/// for `within_hz`. `None` where none is found, and where `cancel` ends the work before.
 pub(super) fn fundamental(
     film: &Film,
-    tracks: &[usize],
-    every: usize,
+    points: &Points,
+    frames: &[Vec<usize>],
     within_hz: Bounds,
     cancel: &CancelToken,
-) -> Result<Oscillator, Unidentified> {
-    let points = Points::up_to(MOST_POINTS, film, tracks, 0);
+) -> Option<Oscillator> {
     if 2 * points.tracks.len() < SUBSPACE_MOTIONS {
-        return Err(Unidentified::NotMeasured);
+        return None;
     }
-    let mut frames = film.neighbours(0..film.times_s.len(), every);
-    frames.retain(|of| enough_seen(&points, of));
     let times_s: Vec<f64> = frames.iter().map(|of| film.mean_s(of)).collect();
-    let motions = Motions::of(&GapFree::of(&points, &frames));
-    let (Some(first), Some(last)) = (times_s.first(), times_s.last()) else {
-        return Err(Unidentified::TooShort);
-    };
-    let span_s = last - first;
+    let motions = Motions::of(&GapFree::of(points, frames));
+    let span_s = times_s.last()? - times_s.first()?;
     let step_s = span_s / times_s.len().max(2).saturating_sub(1) as f64;
     let modes_hz = stable_frequencies_hz(&motions.along, step_s, within_hz);
-    let Some(&lowest_hz) = modes_hz.first() else {
-        return Err(Unidentified::NoOscillation);
-    };
+    let lowest_hz = modes_hz.first()?;
     let band_hz = Bounds::new(
         (BAND.lo * lowest_hz).max(LEAST_PERIODS / span_s),
         BAND.hi * lowest_hz,
@@ -82,7 +72,7 @@ pub(super) fn fundamental(
     for count in 1..=MOST_MODES {
         for start in starts(&in_band, count) {
             if cancel.is_cancelled() {
-                return Err(Unidentified::NotInTime);
+                return None;
             }
             let fit = band.fit(&start, band_hz, cancel);
             if best.as_ref().is_none_or(|b| fit.criterion < b.criterion) {
@@ -90,25 +80,21 @@ pub(super) fn fundamental(
             }
         }
     }
-    let lowest = best.and_then(|fit| band.lowest(&fit, &motions.scales));
-    lowest.ok_or(Unidentified::NoOscillation)
+    band.lowest(&best?, &motions.scales)
 }
 
 /// Where the search for `count` modes begins, Hz.
 fn starts(stable_hz: &[f64], count: usize) -> Vec<Vec<f64>> {
-    let mut of_stable: Vec<f64> = stable_hz.iter().copied().take(count).collect();
-    let mut even = vec![stable_hz[0]];
-    while of_stable.len() < count {
-        of_stable.push(NEXT_MODE * of_stable[of_stable.len() - 1]);
+    let mut starts = Vec::new();
+    for known in [count.min(stable_hz.len()), 1] {
+        let mut start = stable_hz[..known].to_vec();
+        while start.len() < count {
+            start.push(NEXT_MODE * start[start.len() - 1]);
+        }
+        starts.push(start);
     }
-    while even.len() < count {
-        even.push(NEXT_MODE * even[even.len() - 1]);
-    }
-    if even == of_stable {
-        vec![even]
-    } else {
-        vec![of_stable, even]
-    }
+    starts.dedup();
+    starts
 }
 
 /// The principal motions of some points, each divided by the square root of its size: the small
@@ -177,14 +163,10 @@ impl<'a> Parameters<'a> {
         let (ln_dampings, rest) = rest.split_at(modes);
         let (shapes, rest) = rest.split_at(modes * MOTIONS);
         let (forces, noise) = rest.split_at(modes * modes);
-        let unit = |shape: &[f64]| {
-            let shape = SVector::<f64, MOTIONS>::from_column_slice(shape);
-            shape / shape.norm().max(f64::MIN_POSITIVE)
-        };
         Self {
             ln_frequencies,
             ln_dampings,
-            shapes: shapes.chunks_exact(MOTIONS).map(unit).collect(),
+            shapes: shapes.chunks_exact(MOTIONS).map(unit_shape).collect(),
             forces,
             noise: noise[0].exp(),
         }
@@ -206,6 +188,12 @@ impl<'a> Parameters<'a> {
         let damping = self.ln_dampings[mode].exp();
         Complex::new(1.0 - ratio * ratio, 2.0 * damping * ratio).inv()
     }
+}
+
+/// A shape of length 1.
+fn unit_shape(shape: &[f64]) -> SVector<f64, MOTIONS> {
+    let shape = SVector::<f64, MOTIONS>::from_column_slice(shape);
+    shape / shape.norm().max(f64::MIN_POSITIVE)
 }
 
 impl Band {
@@ -355,8 +343,7 @@ impl Band {
         for (shape, scale) in parameters.shapes[mode].iter().zip(scales) {
             variance += (shape * scale * self.scale).powi(2) * force * response;
         }
-        let at_limit =
-            DAMPING.map(f64::ln).lo >= ln_damping || DAMPING.map(f64::ln).hi <= ln_damping;
+        let ln_dampings = DAMPING.map(f64::ln);
         Some(Oscillator {
             mode: Mode {
                 frequency_hz,
@@ -367,7 +354,7 @@ impl Band {
                 damping: ln_damping_sd,
             },
             variance,
-            at_limit,
+            at_limit: ln_dampings.lo >= ln_damping || ln_dampings.hi <= ln_damping,
         })
     }
 }
@@ -377,6 +364,10 @@ impl Band {
 /// search has not reached the top, are left as they are; `None` where these parameters are among
 /// them.
 fn deviations(sharpness: DMatrix<f64>, of: [usize; 2]) -> Option<[f64; 2]> {
+    // The likelihood may end beside the place that was found.
+    if !sharpness.iter().all(|x| x.is_finite()) {
+        return None;
+    }
     let eigen = SymmetricEigen::new(sharpness);
     let mut variances = [0.0; 2];
     let mut flat = [0.0; 2];

@@ -19,7 +19,7 @@ const MAX_NEW: usize = 3;
 /// How often the gusts of a wind forget themselves, 1/s, at the least and at the most, which is
 /// white noise to a tree.
 const GUSTS_PER_S: Bounds = Bounds::new(0.1, 60.0);
-const DAMPING: Bounds = Bounds::new(0.003, 0.4);
+pub(super) const DAMPING: Bounds = Bounds::new(0.003, 0.4);
 /// Likelihoods that are kept: a step in a number that only one motion has leaves the other's as it
 /// was.
 const MAX_KEPT: usize = 64;

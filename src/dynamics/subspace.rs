@@ -79,7 +79,7 @@ fn poles_by_order(
         for b in 0..rows {
             hankel
                 .view_mut((a * n, b * n), (n, n))
-                .copy_from(&lagged[a + b + 1 - usize::from(a + b + 1 == 2 * rows)]);
+                .copy_from(&lagged[a + b + 1]);
         }
     }
     let Some((left, sizes)) = left_singular(hankel) else {

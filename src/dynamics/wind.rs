@@ -230,10 +230,12 @@ impl InWind<'_> {
     fn whole_tree(&self) -> Option<(BranchMode, Sway)> {
         let tracks = self.members.get(self.trunk.index())?;
         let base_px = self.tree.branches.get(self.trunk.index())?.base_px;
+        let points = Points::up_to(ambient::MOST_POINTS, self.film, tracks, 0);
         let every = self.frames_per_mean();
+        let frames = self.frames_with(&[&points], every).ok()?;
         let within_hz = self.frequencies_hz(every);
-        let found = ambient::fundamental(self.film, tracks, every, within_hz, self.cancel);
-        let oscillator = found.ok().filter(|o| !o.at_limit)?;
+        let found = ambient::fundamental(self.film, &points, &frames, within_hz, self.cancel);
+        let oscillator = found.filter(|o| !o.at_limit)?;
         let mode = OWN_POINTS.mode_of(&oscillator);
         if !mode.is_within(MAX_CI_TO_SERVE * self.limits.max_relative_ci)
             || self
@@ -242,7 +244,6 @@ impl InWind<'_> {
         {
             return None;
         }
-        let points = Points::up_to(ambient::MOST_POINTS, self.film, tracks, 0);
         let sway = Sway {
             frequency_hz: mode.frequency_hz(),
             damping_ratio: mode.damping_ratio(),
@@ -308,11 +309,7 @@ impl InWind<'_> {
         criteria: &AcceptanceCriteria,
     ) -> Result<Estimate, Unidentified> {
         let every = self.frames_per_mean();
-        let mut frames = self.film.neighbours(0..self.film.times_s.len(), every);
-        frames.retain(|of| enough_seen(points, of) && enough_seen(carrier, of));
-        if frames.len() < MIN_FRAMES {
-            return Err(Unidentified::TooShort);
-        }
+        let frames = self.frames_with(&[points, carrier], every)?;
         let ancestors = self.ancestors(branch);
         let motion = OwnMotion::of(points, carrier, &frames)?;
         let problem = Problem {
@@ -358,6 +355,20 @@ impl InWind<'_> {
             Err(Unidentified::TooUncertain)
         };
         Ok(Estimate { mode, sway })
+    }
+
+    /// The frames that show all of these points well enough, by `every` neighbours.
+    fn frames_with(
+        &self,
+        points: &[&Points],
+        every: usize,
+    ) -> Result<Vec<Vec<usize>>, Unidentified> {
+        let mut frames = self.film.neighbours(0..self.film.times_s.len(), every);
+        frames.retain(|of| points.iter().all(|points| enough_seen(points, of)));
+        if frames.len() < MIN_FRAMES {
+            return Err(Unidentified::TooShort);
+        }
+        Ok(frames)
     }
 
     /// Neighbouring frames that are taken together.

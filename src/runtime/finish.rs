@@ -304,8 +304,8 @@ pub(super) fn describe(
             frame: job.quality.first.map_or(0, |(frame, _)| frame),
             width: o.size.width,
             height: o.size.height,
-            polygon_px: o.polygon_px.iter().map(|p| (*p).into()).collect(),
-            rest_polygon_px: tree.map_or(Vec::new(), rest_polygon_px),
+            polygon_px: corners_px(o),
+            rest_polygon_px: tree.map_or(Vec::new(), |tree| corners_px(&tree.outline_at_rest)),
         }),
         picture: job.picture.as_ref().map(|p| PictureNote {
             file: PICTURE_FILE.into(),
@@ -361,9 +361,8 @@ fn timing(job: &CaptureJob) -> Timing {
     }
 }
 
-fn rest_polygon_px(tree: &Model) -> Vec<[i32; 2]> {
-    let polygon_px = tree.outline_at_rest.polygon_px.iter();
-    polygon_px.map(|p| (*p).into()).collect()
+fn corners_px(outline: &Outline) -> Vec<[i32; 2]> {
+    outline.polygon_px.iter().map(|p| (*p).into()).collect()
 }
 
 /// What the user should know before trusting the result.

@@ -2,7 +2,7 @@
 //! pulled aside or blown over.
 
 use crate::hierarchy::rest_position_px;
-use crate::model::{Outline, TrackLog, TrackTable};
+use crate::model::{Outline, Size, TrackLog, TrackTable};
 use crate::motion::Spread;
 use nalgebra::{Point2, Vector2};
 
@@ -37,18 +37,18 @@ pub(super) fn at_rest(
     let field = spread.displacements(&displacements);
     Outline {
         size: outline.size,
-        mask: carried(&outline.mask, &field, outline),
+        mask: carried(&outline.mask, &field, outline.size),
         matte: outline
             .matte
             .as_ref()
-            .map(|matte| carried(matte, &field, outline)),
+            .map(|matte| carried(matte, &field, outline.size)),
         polygon_px: polygon_at_rest(outline, &field),
     }
 }
 
-/// A picture of the outline's size, each pixel from where it was displaced to by `field`.
-fn carried(picture: &[u8], field: &[Vector2<f32>], outline: &Outline) -> Vec<u8> {
-    let (width, height) = (outline.size.width as usize, outline.size.height as usize);
+/// A picture of this size, each pixel from where it was displaced to by `field`.
+fn carried(picture: &[u8], field: &[Vector2<f32>], size: Size) -> Vec<u8> {
+    let (width, height) = (size.width as usize, size.height as usize);
     let mut out = Vec::with_capacity(picture.len());
     for v in 0..height {
         for u in 0..width {
@@ -86,7 +86,7 @@ fn polygon_at_rest(outline: &Outline, field: &[Vector2<f32>]) -> Vec<Point2<i32>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Observation, Size, TrackId, TrackSet};
+    use crate::model::{Observation, TrackId, TrackSet};
 
     const SIZE: Size = Size {
         width: 120,

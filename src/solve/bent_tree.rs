@@ -104,7 +104,7 @@ impl BentTree {
 }
 
 /// The angles of the planes that a tree has copies in, in the order of the copies.
-fn plane_angles(straight: &Skeleton) -> Vec<f64> {
+pub(super) fn plane_angles(straight: &Skeleton) -> Vec<f64> {
     let mut angles: Vec<f64> = Vec::new();
     for copy in &straight.nodes[straight.measured()..] {
         if !angles.contains(&copy.plane_angle) {

@@ -1,5 +1,6 @@
 //! Copies that would go through filmed limbs stand beside them.
 
+use super::bent_tree::{plane_angles, way_of};
 use crate::model::{Node, NodeId, NodeName, Skeleton};
 use nalgebra::{Point3, Rotation3, Unit, UnitVector3, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
@@ -27,7 +28,8 @@ pub type Turns = BTreeMap<NodeName, Turn>;
 /// about the vertical goes along, so that it moves as its original does in its own direction.
 pub(super) fn clear_of_filmed(skeleton: &mut Skeleton, before: &Turns) -> Turns {
     let measured = skeleton.measured();
-    let most = most_turn(&skeleton.nodes[measured..]);
+    let copies = plane_angles(skeleton).len();
+    let most = 0.5 * PI / (copies + 1) as f64;
     let reach_px = REACH * f64::from(skeleton.image_size.width);
     let filmed = Filmed::of(&skeleton.nodes[..measured]);
     let mut turns = Turns::new();
@@ -47,17 +49,6 @@ pub(super) fn clear_of_filmed(skeleton: &mut Skeleton, before: &Turns) -> Turns 
         turns.insert(name, turn);
     }
     turns
-}
-
-/// Half of the angle between two planes, radians.
-fn most_turn(copies: &[Node]) -> f64 {
-    let mut planes: Vec<f64> = Vec::new();
-    for copy in copies {
-        if !planes.contains(&copy.plane_angle) {
-            planes.push(copy.plane_angle);
-        }
-    }
-    0.5 * PI / (planes.len() + 1) as f64
 }
 
 /// A turn about an axis.
@@ -143,17 +134,19 @@ fn nearest(a: &Piece, b: &Piece) -> (Point3<f64>, Point3<f64>) {
         along_a.dot(&along_b),
     );
     let (a_between, b_between) = (along_a.dot(&between), along_b.dot(&between));
-    let share = |numerator: f64, denominator: f64| {
-        if denominator > 0.0 {
-            (numerator / denominator).clamp(0.0, 1.0)
-        } else {
-            0.0
-        }
-    };
     let on_a = share(ab * b_between - bb * a_between, aa * bb - ab * ab);
     let on_b = share(ab * on_a + b_between, bb);
     let on_a = share(ab * on_b - a_between, aa);
     (a.from + on_a * along_a, b.from + on_b * along_b)
+}
+
+/// A place on a piece, as a share of its length; its begin where the quotient is none.
+fn share(numerator: f64, denominator: f64) -> f64 {
+    if denominator > 0.0 {
+        (numerator / denominator).clamp(0.0, 1.0)
+    } else {
+        0.0
+    }
 }
 
 /// The limbs that were filmed.
@@ -195,7 +188,7 @@ impl Borne {
         Self {
             fork: all[on].position,
             clear_px: FORK_RADII * all[on].radius,
-            below: Piece::of(all, on).map_or(Vector3::zeros(), |below| below.to - below.from),
+            below: way_of(skeleton, on),
             pieces: nodes.iter().filter_map(|&i| Piece::of(all, i)).collect(),
             nodes,
         }

@@ -355,9 +355,9 @@ fn sway_of_cut(sway: &[Swaying], topiary: &Topiary) -> Vec<Swaying> {
 }
 
 fn outline_of(document: &Document) -> Result<&Outline, PrepareError> {
-    document
-        .outline_at_rest
-        .as_ref()
+    let at_rest = document.outline_at_rest.as_ref();
+    at_rest
+        .or(document.outline.as_ref())
         .ok_or_else(|| PrepareError::NoOutline {
             dir: document.dir.clone(),
         })
