@@ -22,8 +22,8 @@ fn the_tree_is_as_full_as_by_the_envelope_alone_and_as_plausible_as_by_the_angle
         name: "another",
         ..Flat::generated_by(levels, seed, wild)
     });
-    let mut plausibilities = Vec::new();
-    for tree in Flat::all().into_iter().chain(others) {
+    let trees = Flat::all().into_iter().map(Flat::in_drawn_outline);
+    for tree in trees.chain(others) {
         let settings = config::Shape::default();
         let built = build(&tree, &settings);
         let figures = PushFigures::of(&built, &tree.nodes, &tree.tracks, &tree.outline, &settings);
@@ -34,13 +34,11 @@ fn the_tree_is_as_full_as_by_the_envelope_alone_and_as_plausible_as_by_the_angle
         );
         let wanted = if tree.name == "another" { 0.9 } else { 0.95 };
         assert!(filling >= wanted, "{}: filling {filling:.3}", tree.name);
-        // One tree says little of this: of 21 films it is 0.65 to 1.5, in the mean 1.01.
         assert!(
-            plausibility >= 0.8,
+            plausibility >= wanted,
             "{}: plausibility {plausibility:.3}",
             tree.name
         );
-        plausibilities.push(plausibility);
         // Neither of the two is good at what the other is for, or there were nothing to fuse.
         let (d, p) = (figures.distance_px, figures.angle_likelihood);
         assert!(
@@ -55,12 +53,23 @@ fn the_tree_is_as_full_as_by_the_envelope_alone_and_as_plausible_as_by_the_angle
             tree.name
         );
     }
-    let mean = plausibilities.iter().sum::<f64>() / plausibilities.len() as f64;
-    assert!(mean >= 0.9, "plausibilities {plausibilities:?}");
 }
 
 fn build(tree: &Flat, settings: &config::Shape) -> Skeleton {
     shape::build(&tree.nodes, &tree.tracks, &tree.outline, settings)
+}
+
+/// A capture is pushed within the outline where the tree rests. There it fills it as well; how
+/// plausible one tree's angles are varies more (of 21 films 0.65 to 1.5, in the mean 1.01).
+#[test]
+fn the_tree_is_full_within_its_outline_at_rest() {
+    let flat = Flat::shipped();
+    let settings = config::Shape::default();
+    let built = build(&flat, &settings);
+    let figures = PushFigures::of(&built, &flat.nodes, &flat.tracks, &flat.outline, &settings);
+    let (filling, plausibility) = (figures.filling(), figures.plausibility());
+    assert!(filling >= 0.95, "filling {filling:.3}");
+    assert!(plausibility >= 0.8, "plausibility {plausibility:.3}");
 }
 
 /// The side of a trunk, twice the same tree: nobody may be able to tell a run from the one before.

@@ -108,6 +108,21 @@ impl Flat {
         }
     }
 
+    /// The same in the outline that was drawn, in a picture in which the tree need not rest.
+    pub fn in_drawn_outline(self) -> Self {
+        let file = match self.name {
+            "sparse_winter" => Some(super::support::OUTLINE.into()),
+            "oak_release" => oak_clip().map(|[_, outline]| outline),
+            _ => None,
+        };
+        let Some(file) = file else { return self };
+        let given = outline::load(&file, self.outline.size).expect("outline");
+        let Given::Region(outline) = given else {
+            panic!("a polygon")
+        };
+        Self { outline, ..self }
+    }
+
     pub fn all() -> Vec<Self> {
         let mut all = vec![Self::generated(6), Self::shipped()];
         all.extend(Self::oak());
