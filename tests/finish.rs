@@ -269,7 +269,7 @@ fn what_cannot_be_finished_is_refused_with_a_reason() {
     refused("nothing to finish");
     fs::write(unfinished.join("tracks.log"), "no log at all").expect("file");
     refused("no track log");
-    fs::write(unfinished.join("tracks.log"), b"arborlog\x01\0\0\0").expect("file");
+    fs::write(unfinished.join("tracks.log"), b"arborlog\x02\0\0\0").expect("file");
     refused("cannot be finished");
     fs::write(unfinished.join("capture.json"), "{}").expect("file");
     refused("cannot be finished");

@@ -2,7 +2,7 @@
 //! (scripts/matting-fixture.py).
 
 use arborcam::config::Detect;
-use arborcam::model::{Luma, Outline, Rgb, Size};
+use arborcam::model::{CameraMotion, Luma, Outline, Rgb, Size};
 use arborcam::outline::{self, Given, Mark, Scribbles};
 use arborcam::track::Detector;
 use nalgebra::Point2;
@@ -123,7 +123,7 @@ fn detect(outline: &Outline) -> Vec<Point2<f32>> {
         border_px: 20.0,
         ..Detect::default()
     };
-    Detector::new(&settings, outline).detect(&luma(&picture()), &[], 400)
+    Detector::new(&settings, outline).detect(&luma(&picture()), &[], 400, &CameraMotion::default())
 }
 
 #[test]

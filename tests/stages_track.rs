@@ -371,9 +371,7 @@ fn log(amplitude_px: f64, seconds: f64) -> TrackLog {
             frame: k,
             time_s,
             observations: (0..60).map(|i| observation(i, k, amplitude_px)).collect(),
-            lost: 0,
-            born: 0,
-            rejected: Vec::new(),
+            ..TrackSet::default()
         });
     }
     log

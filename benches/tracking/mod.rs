@@ -8,7 +8,7 @@
 use crate::support;
 use crate::truth::{self, Places, Truth};
 use arborcam::config::{Config, Detect};
-use arborcam::model::{Frame, Luma, Outline, TrackId};
+use arborcam::model::{CameraMotion, Frame, Luma, Outline, TrackId};
 use arborcam::outline::whole;
 use arborcam::source::{self, Decoder};
 use arborcam::track::{Detector, Tracker};
@@ -171,8 +171,9 @@ fn detection(clip: &Path) -> f64 {
         .luma(&raw, &mut luma)
         .expect("picture");
     let detector = Detector::new(&settings.detect, &whole(luma.size));
+    let still = CameraMotion::default();
     (0..20)
-        .map(|_| timed_ms(|| detector.detect(&luma, &[], 800)).0)
+        .map(|_| timed_ms(|| detector.detect(&luma, &[], 800, &still)).0)
         .fold(f64::MAX, f64::min)
 }
 
@@ -204,6 +205,7 @@ fn textbook() -> Places {
         &before,
         &[],
         2 * settings.detect.points as usize,
+        &CameraMotion::default(),
     );
     let mut ids: Vec<TrackId> = (0..points.len() as u32).map(TrackId).collect();
     let mut places = Places::new();

@@ -87,6 +87,8 @@ settings! {
         anchor_every: u32 = 2;
         /// Least normalised cross-correlation with that picture for the point to be put back on it.
         anchor_ncc: f64 [0 to 1] = 0.6;
+        /// Whether the camera's own motion, by what stands still around the outline, is taken off.
+        steady: bool = true;
         /// A point that is hidden moves with its neighbours for this time before it is given up, s.
         coast_s: f64 [0 to 60] = 5.0;
     }

@@ -4,11 +4,12 @@
 //! `capture.json` says what was filmed and how, `nodes.csv` holds the whole model, `frame.jpg` one
 //! picture of it, `bark.png` its bark, `rest.png` the tree at rest, `wood.png` and `leaves.png` which
 //! of its pixels are wood and leaves. A tree that was filmed has `tracks.csv` and `left_out.csv`, the
-//! points, and `motion.csv`, the poses.
+//! points, `motion.csv`, the poses, and `camera.csv`, how the camera itself moved.
 
 mod asked;
 mod at_rest;
 mod bark;
+mod camera;
 mod error;
 mod motion;
 mod nodes;
@@ -24,6 +25,7 @@ mod wood;
 pub use asked::{ASKED_FILE, asked_csv, read_asked};
 pub use at_rest::{LEAVES_MASK_FILE, REST_FILE, WOOD_MASK_FILE, at_rest_files};
 pub use bark::BARK_FILE;
+pub use camera::{CAMERA_FILE, CAMERA_HEADER, CameraCsv};
 pub use error::DocumentError;
 pub use motion::{MOTION_HEADER, MotionCsv};
 pub use nodes::{NODES_HEADER, nodes};

@@ -165,6 +165,18 @@ pub struct Quality {
     /// median over the points.
     pub median_error_px: Option<f64>,
     pub lost_per_s: Option<f64>,
+    /// How much the camera trembled where the tree is, px (root mean square), and at what
+    /// frequency most, Hz. It is taken off the tree's motion.
+    #[serde(default)]
+    pub camera_shake_px: Option<f64>,
+    #[serde(default)]
+    pub camera_shake_hz: Option<f64>,
+    /// Shares of the frames in which what stands still around the tree showed the camera's motion,
+    /// and of those in which that was lost, as the camera was turned, zoomed or covered, 0 to 1.
+    #[serde(default)]
+    pub camera_seen_share: Option<f64>,
+    #[serde(default)]
+    pub camera_lost_share: Option<f64>,
     /// How sure the forks of the tree are, 0 to 1: the median over the forks.
     pub median_certainty: Option<f64>,
     /// Median distance between where the points put a node in the picture and where the 3D pose

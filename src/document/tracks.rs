@@ -1,12 +1,15 @@
-//! `tracks.csv`: every point in every frame in which it was seen; `left_out.csv`: the same of those
+//! `tracks.csv`: every point in every frame in which it was seen, where it was filmed; `left_out.csv`: the same of those
 //! that were left out of the tree.
 
+use super::camera::CameraReader;
 use super::error::DocumentError;
 use super::table::{TableReader, TableWriter};
 use crate::bounds::Bounds;
 use crate::dynamics::Film;
 use crate::files::{OutputFolder, WriteError};
-use crate::model::{NodeId, NodeName, Observation, Skeleton, TrackId, TrackLog, TrackSet};
+use crate::model::{
+    CameraMotion, NodeId, NodeName, Observation, Skeleton, TrackId, TrackLog, TrackSet,
+};
 use csv::{ReaderBuilder, StringRecord, Writer};
 use nalgebra::Point2;
 use std::collections::{BTreeMap, BTreeSet};
@@ -40,7 +43,7 @@ impl<W: Write> TracksCsv<W> {
         TableWriter::new(LEFT_OUT_FILE, TRACKS_HEADER, out).map(Self)
     }
 
-    /// One point in one frame; `node` is the deepest one that it belongs to.
+    /// One point in one frame, where it was filmed; `node` is the deepest one that it belongs to.
     ///
     /// # Errors
     /// The row cannot be written.
@@ -49,13 +52,13 @@ impl<W: Write> TracksCsv<W> {
         track: TrackId,
         frame: u64,
         time_s: f64,
-        position_px: Point2<f64>,
+        filmed_px: Point2<f64>,
         node: Option<NodeName>,
     ) -> Result<(), WriteError> {
         self.0.count(track.0);
         self.0.count(frame);
         self.0.number(time_s, 6);
-        position_px.iter().for_each(|x| self.0.number(*x, 3));
+        filmed_px.iter().for_each(|x| self.0.number(*x, 3));
         self.0.id(node);
         self.0.end_row()
     }
@@ -70,7 +73,7 @@ impl<W: Write> TracksCsv<W> {
         node_of: impl Fn(TrackId) -> Option<NodeName>,
     ) -> Result<(), WriteError> {
         for o in &set.observations {
-            self.row(o.id, set.frame, set.time_s, o.at_px(), node_of(o.id))?;
+            self.row(o.id, set.frame, set.time_s, set.filmed_px(o), node_of(o.id))?;
         }
         Ok(())
     }
@@ -106,6 +109,7 @@ pub(super) fn read_film(
     if dir.join(LEFT_OUT_FILE).exists() {
         tables.push(TracksReader::open(dir, LEFT_OUT_FILE, &by_name)?);
     }
+    let mut camera = CameraReader::open(dir, skeleton.image_size)?;
     let mut node_of: BTreeMap<TrackId, NodeId> = BTreeMap::new();
     let mut log = TrackLog::new(window_s);
     loop {
@@ -113,11 +117,15 @@ pub(super) fn read_film(
         let Some(time_s) = times_s.min_by(f64::total_cmp) else {
             break;
         };
+        let camera = match &mut camera {
+            Some(camera) => camera.at(time_s)?,
+            None => CameraMotion::default(),
+        };
         let mut observations = Vec::new();
         for table in &mut tables {
             while let Some(row) = table.take_at(time_s)? {
                 if within_s.contains(time_s) {
-                    observations.push(row.observation);
+                    observations.push(row.seen_by(&camera));
                 }
                 if let Some(node) = row.node {
                     node_of.insert(row.observation.id, node);
@@ -141,8 +149,21 @@ struct TracksReader<'a> {
 /// One point in one frame.
 struct TrackRow {
     time_s: f64,
+    /// Where it was filmed.
     observation: Observation,
     node: Option<NodeId>,
+}
+
+impl TrackRow {
+    /// The point without the camera's motion.
+    fn seen_by(&self, camera: &CameraMotion) -> Observation {
+        let steady_px = camera.steady_px(self.observation.at_px()).cast::<f32>();
+        Observation {
+            u_px: steady_px.x,
+            v_px: steady_px.y,
+            ..self.observation
+        }
+    }
 }
 
 impl<'a> TracksReader<'a> {

@@ -6,6 +6,7 @@
 
 mod botany;
 mod branch_graph;
+mod camera_motion;
 mod control;
 mod foot;
 mod frame;
@@ -27,6 +28,7 @@ mod wood;
 
 pub use botany::{BotanicalBranch, BotanicalBranches, TREE, TRUNK};
 pub use branch_graph::{BranchGraph, WoodNode};
+pub use camera_motion::{Agreement, Background, CameraMotion};
 pub use control::Control;
 pub use foot::{Foot, FootBasis};
 pub use frame::{

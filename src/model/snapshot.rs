@@ -1,7 +1,7 @@
 //! What the screen shows of a running capture: one immutable picture of its state, replaced, never
 //! changed.
 
-use super::{Angles, NodeName, Pose, Rgb, Size, Skeleton, SwayNow, Wood, WoodSight};
+use super::{Angles, Background, NodeName, Pose, Rgb, Size, Skeleton, SwayNow, Wood, WoodSight};
 use nalgebra::Point2;
 use std::sync::Arc;
 
@@ -103,6 +103,12 @@ pub struct Snapshot {
     pub sensor_rate_hz: f64,
     pub work_rate_hz: f64,
     pub camera: CameraState,
+    /// How the camera's own motion is known in this frame; `None` before the first one.
+    pub background: Option<Background>,
+    /// By how much it trembled in the last seconds, px, and at what frequency, Hz; `None` while that
+    /// is not known.
+    pub shake_px: Option<f64>,
+    pub shake_hz: Option<f64>,
     /// Frames lost before us (what is to be believed of both counts), between camera and tracker,
     /// undecodable, and not shown.
     pub lost_in_camera: u64,

@@ -1,5 +1,6 @@
 //! Points followed from frame to frame.
 
+use super::CameraMotion;
 use nalgebra::Point2;
 
 /// Names one tracked point for good: an id is never given to a second point.
@@ -11,7 +12,7 @@ pub struct TrackId(pub u32);
 /// rows are written only after a build.
 pub const LONGEST_TRIAL_S: f64 = 6.0;
 
-/// One point as seen in one frame.
+/// One point as seen in one frame, at its steady place, see [`CameraMotion`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
     pub id: TrackId,
@@ -28,7 +29,7 @@ pub struct Observation {
 }
 
 impl Observation {
-    /// Its place in the picture, px.
+    /// Its steady place, px.
     pub fn at_px(&self) -> Point2<f64> {
         Point2::new(self.u_px, self.v_px).cast()
     }
@@ -40,6 +41,8 @@ pub struct TrackSet {
     /// Frame index and sensor time of the picture.
     pub frame: u64,
     pub time_s: f64,
+    /// The camera's motion, which is taken off the observations.
+    pub camera: CameraMotion,
     pub observations: Vec<Observation>,
     /// Points given up in this frame, and points newly detected in it.
     pub lost: u32,
@@ -49,6 +52,11 @@ pub struct TrackSet {
 }
 
 impl TrackSet {
+    /// Where a point was filmed in this frame, px.
+    pub fn filmed_px(&self, observation: &Observation) -> Point2<f64> {
+        self.camera.filmed_px(observation.at_px())
+    }
+
     /// The points that count: those that have passed their trial, or all while none has.
     pub fn counted(&self) -> impl Iterator<Item = &Observation> {
         let passed = self.observations.iter().any(|o| o.confirmed);

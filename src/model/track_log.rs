@@ -1,6 +1,6 @@
 //! The one store of points over time.
 
-use super::{Observation, TrackId, TrackSet};
+use super::{Background, Observation, TrackId, TrackSet};
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
@@ -31,10 +31,15 @@ impl TrackLog {
     }
 
     /// Takes the set of the next frame. Gives back the sets that have become too old, oldest first;
-    /// where more than [`LONGEST_TRIAL_S`](super::LONGEST_TRIAL_S) is remembered they are final.
+    /// where more than [`LONGEST_TRIAL_S`](super::LONGEST_TRIAL_S) is remembered they are final. A
+    /// set of a camera that has lost its background shows nothing: it is not kept, and what is
+    /// remembered grows no older by it.
     pub fn push(&mut self, set: TrackSet) -> Vec<Arc<TrackSet>> {
         self.tentative.note(&set);
         self.remove(&set.rejected.iter().copied().collect());
+        if set.camera.background == Background::Lost {
+            return Vec::new();
+        }
         let oldest_s = set.time_s - self.remembered_s;
         self.sets.push_back(Arc::new(set));
         let n_old = self.sets.iter().take_while(|s| s.time_s < oldest_s).count();
@@ -241,6 +246,27 @@ mod tests {
         assert_eq!(before.all().newest().map(ids), Some(vec![0, 1]));
         assert_eq!(log.last(1.0).first().map(ids), Some(vec![0]));
         assert_eq!((log.last(1.0).len(), log.last(1.0).span_s()), (11, 1.0));
+    }
+
+    /// A camera that is turned away shows no tree that stands still.
+    #[test]
+    fn frames_of_a_camera_that_is_turned_away_do_not_count() {
+        let mut log = TrackLog::new(10.0);
+        (0..50).for_each(|k| drop(log.push(set(k))));
+        for k in 50..500 {
+            let mut away = set(k);
+            away.observations.clear();
+            away.camera.background = Background::Lost;
+            assert!(log.push(away).is_empty());
+        }
+        assert_eq!(log.all().len(), 50);
+        assert_eq!(
+            log.all().newest().map(ids),
+            Some(vec![0]),
+            "1 was rejected meanwhile"
+        );
+        log.push(set(500));
+        assert_eq!(log.all().newest().map(ids), Some(vec![0, 2, 3]));
     }
 
     #[test]

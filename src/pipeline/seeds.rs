@@ -1,7 +1,7 @@
 //! Where a picture shows leaves: one seed for each.
 
 use crate::config;
-use crate::model::{Luma, Outline, Rgb};
+use crate::model::{CameraMotion, Luma, Outline, Rgb};
 use crate::track::Detector;
 use nalgebra::Point2;
 
@@ -26,7 +26,8 @@ pub fn seeds(picture: &Rgb, outline: &Outline, count: u32) -> Vec<Point2<f32>> {
         size: picture.size,
         pixels: picture.pixels.chunks_exact(3).map(grey).collect(),
     };
-    Detector::new(&detect, outline).detect(&luma, &[], count as usize)
+    let camera = CameraMotion::default();
+    Detector::new(&detect, outline).detect(&luma, &[], count as usize, &camera)
 }
 
 /// Luma of a pixel of red, green and blue (ITU-R BT.601), 0 to 255.

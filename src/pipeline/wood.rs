@@ -26,10 +26,12 @@ pub fn find_wood(
 ) -> Option<Wood> {
     let rest = rest_places(window);
     let mut frames = Vec::new();
+    let mut cameras = Vec::new();
     let mut motions = Vec::new();
     for kept in film.frames() {
         if let Some(tracks) = window.sets().find(|set| set.frame == kept.frame) {
             frames.push(kept);
+            cameras.push(tracks.camera);
             motions.push(displacements(tracks, &rest));
         }
     }
@@ -40,14 +42,15 @@ pub fn find_wood(
             return None;
         }
         if let Some(picture) = in_colour(frames[k], &mut decoder, outline) {
-            pictures.push((picture, &motions[k]));
+            pictures.push((picture, k));
         }
     }
     let mut shots = Vec::with_capacity(pictures.len());
-    for (picture, displacements) in &pictures {
+    for (picture, k) in &pictures {
         shots.push(Shot {
             picture,
-            displacements,
+            displacements: &motions[*k],
+            camera: cameras[*k],
         });
     }
     let rest_px: Vec<Point2<f64>> = rest.values().copied().collect();

@@ -1,7 +1,7 @@
 //! Outline, points, tree and poses as messages that viewers know how to draw.
 
 use super::wire::Message;
-use crate::model::{NodeId, Observation, Outline, Pose, Skeleton, TrackSet};
+use crate::model::{CameraMotion, NodeId, Outline, Pose, Skeleton, TrackSet};
 use nalgebra::Point2;
 use serde::Serialize;
 
@@ -23,7 +23,8 @@ pub(super) fn outline(outline: &Outline, time_ns: u64, into: &mut Vec<u8>) {
 }
 
 pub(super) fn points(tracks: &TrackSet, time_ns: u64, into: &mut Vec<u8>) {
-    let points = tracks.observations.iter().map(Observation::at_px);
+    let observations = tracks.observations.iter();
+    let points = observations.map(|o| tracks.filmed_px(o));
     annotation(POINTS, points, POINT_COLOUR, 4.0, time_ns, into);
 }
 
@@ -124,6 +125,7 @@ struct TracksJson {
     id: Vec<u32>,
     u_px: Vec<f32>,
     v_px: Vec<f32>,
+    camera: CameraJson,
     fb_error_px: Vec<f32>,
     error_px: Vec<Option<f32>>,
     confirmed: Vec<bool>,
@@ -133,6 +135,7 @@ struct TracksJson {
 /// The points with their names: annotations have none.
 pub(super) fn tracks_json(tracks: &TrackSet, into: &mut Vec<u8>) -> Result<(), serde_json::Error> {
     let o = &tracks.observations;
+    let filmed_px: Vec<Point2<f32>> = o.iter().map(|o| tracks.filmed_px(o).cast()).collect();
     into.clear();
     serde_json::to_writer(
         into,
@@ -142,14 +145,40 @@ pub(super) fn tracks_json(tracks: &TrackSet, into: &mut Vec<u8>) -> Result<(), s
             lost: tracks.lost,
             born: tracks.born,
             id: o.iter().map(|o| o.id.0).collect(),
-            u_px: o.iter().map(|o| o.u_px).collect(),
-            v_px: o.iter().map(|o| o.v_px).collect(),
+            u_px: filmed_px.iter().map(|at| at.x).collect(),
+            v_px: filmed_px.iter().map(|at| at.y).collect(),
+            camera: CameraJson::of(&tracks.camera),
             fb_error_px: o.iter().map(|o| o.fb_error_px).collect(),
             error_px: o.iter().map(|o| o.error_px).collect(),
             confirmed: o.iter().map(|o| o.confirmed).collect(),
             rejected: tracks.rejected.iter().map(|id| id.0).collect(),
         },
     )
+}
+
+/// The camera's motion: what stands still at a place in the first frame was filmed at `scale` times
+/// that, turned about the picture's corner, and shifted.
+#[derive(Serialize)]
+struct CameraJson {
+    shift_u_px: f64,
+    shift_v_px: f64,
+    roll_deg: f64,
+    scale: f64,
+    sd_px: Option<f64>,
+}
+
+impl CameraJson {
+    fn of(camera: &CameraMotion) -> Self {
+        let motion = &camera.filmed_from_steady;
+        let shift_px = motion.isometry.translation.vector;
+        Self {
+            shift_u_px: shift_px.x,
+            shift_v_px: shift_px.y,
+            roll_deg: motion.isometry.rotation.angle().to_degrees(),
+            scale: motion.scaling(),
+            sd_px: camera.sd_px(),
+        }
+    }
 }
 
 #[derive(Serialize)]

@@ -5,7 +5,8 @@
 //! checksum and its bytes; a file that was cut anywhere is read up to its last whole record. All
 //! numbers are little-endian.
 
-use crate::model::{Observation, TrackId, TrackSet};
+use crate::model::{Agreement, Background, CameraMotion, Observation, TrackId, TrackSet};
+use nalgebra::{Similarity2, Vector2};
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::os::unix::fs::FileExt;
@@ -13,11 +14,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// What the file begins with: its kind and version.
-const MARK: [u8; 12] = *b"arborlog\x01\0\0\0";
+const MARK: [u8; 12] = *b"arborlog\x02\0\0\0";
 /// Bytes of the length and the checksum before each set.
 const RECORD_HEAD: usize = 4 + 4;
-/// Bytes of the head of a set (frame, time, lost, born, two counts) and of one observation.
+/// Bytes of the head of a set (frame, time, lost, born, two counts), of the camera's motion (shift,
+/// turn, scale and how well it is known), and of one observation.
 const HEAD: usize = 8 + 8 + 4 + 4 + 4 + 4;
+const CAMERA: usize = 7 * 8;
 const OBSERVATION: usize = 21;
 /// A longer record is damage, bytes: some millions of points in one frame.
 const LONGEST_RECORD: u32 = 1 << 28;
@@ -269,6 +272,7 @@ fn encode(set: &TrackSet, out: &mut Vec<u8>) {
     out.extend(set.born.to_le_bytes());
     out.extend((set.observations.len() as u32).to_le_bytes());
     out.extend((set.rejected.len() as u32).to_le_bytes());
+    encode_camera(&set.camera, out);
     for o in &set.observations {
         out.extend(o.id.0.to_le_bytes());
         let error_px = o.error_px.unwrap_or(f32::NAN);
@@ -282,9 +286,61 @@ fn encode(set: &TrackSet, out: &mut Vec<u8>) {
     }
 }
 
+/// What is written where the background says nothing.
+const NOT_SEEN: Agreement = Agreement {
+    sd_px: f64::NAN,
+    inliers: 0,
+    rms_px: f64::NAN,
+};
+
+fn encode_camera(camera: &CameraMotion, out: &mut Vec<u8>) {
+    let motion = &camera.filmed_from_steady;
+    let shift_px = motion.isometry.translation.vector;
+    let turn = motion.isometry.rotation.angle();
+    for x in [shift_px.x, shift_px.y, turn, motion.scaling()] {
+        out.extend(x.to_le_bytes());
+    }
+    let Agreement {
+        sd_px,
+        inliers,
+        rms_px,
+    } = match camera.background {
+        Background::Seen(agreement) => agreement,
+        Background::Unclear => NOT_SEEN,
+        Background::Lost => Agreement {
+            sd_px: f64::INFINITY,
+            ..NOT_SEEN
+        },
+    };
+    out.extend(sd_px.to_le_bytes());
+    out.extend(u64::from(inliers).to_le_bytes());
+    out.extend(rms_px.to_le_bytes());
+}
+
+/// `None` where there is no such motion.
+fn decode_camera(bytes: &[u8]) -> Option<CameraMotion> {
+    let [u_px, v_px, turn, scale, sd_px, rms_px] =
+        [0, 8, 16, 24, 32, 48].map(|at| f64::from_bits(u64_at(bytes, at)));
+    let inliers = u32::try_from(u64_at(bytes, 40)).ok()?;
+    let is_motion = scale > 0.0 && [u_px, v_px, turn, scale].iter().all(|x| x.is_finite());
+    is_motion.then(|| CameraMotion {
+        filmed_from_steady: Similarity2::new(Vector2::new(u_px, v_px), turn, scale),
+        background: match sd_px {
+            sd_px if sd_px.is_nan() => Background::Unclear,
+            f64::INFINITY => Background::Lost,
+            sd_px => Background::Seen(Agreement {
+                sd_px,
+                inliers,
+                rms_px,
+            }),
+        },
+    })
+}
+
 /// `None` where the counts do not fit the length.
 fn decode(bytes: &[u8]) -> Option<TrackSet> {
     let (head, rest) = bytes.split_at_checked(HEAD)?;
+    let (camera, rest) = rest.split_at_checked(CAMERA)?;
     let n_observations = u32_at(head, 24) as usize;
     let n_rejected = u32_at(head, 28) as usize;
     let (observations, rejected) =
@@ -295,6 +351,7 @@ fn decode(bytes: &[u8]) -> Option<TrackSet> {
     Some(TrackSet {
         frame: u64_at(head, 0),
         time_s: f64::from_bits(u64_at(head, 8)),
+        camera: decode_camera(camera)?,
         lost: u32_at(head, 16),
         born: u32_at(head, 20),
         observations: observations
@@ -332,6 +389,9 @@ fn u64_at(bytes: &[u8], at: usize) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Point2;
+
+    const CORNER: Point2<f64> = Point2::new(1280.0, 720.0);
 
     fn set(frame: u64, n: u32) -> TrackSet {
         let at = |k: u32| Observation {
@@ -347,6 +407,18 @@ mod tests {
         TrackSet {
             frame,
             time_s: frame as f64 / 30.0,
+            camera: CameraMotion {
+                filmed_from_steady: Similarity2::new(Vector2::new(1.5, frame as f64), 0.01, 1.1),
+                background: match frame % 3 {
+                    0 => Background::Seen(Agreement {
+                        sd_px: 0.01,
+                        inliers: 120,
+                        rms_px: 0.1,
+                    }),
+                    1 => Background::Unclear,
+                    _ => Background::Lost,
+                },
+            },
             observations,
             lost: 2,
             born: n,
@@ -362,6 +434,8 @@ mod tests {
         let sets: Vec<TrackSet> = (0..2000).map(|f| set(f, (f % 7) as u32 * 10)).collect();
         let same = |a: &TrackSet, b: &TrackSet| {
             (a.frame, a.time_s, a.lost, a.born) == (b.frame, b.time_s, b.lost, b.born)
+                && a.camera.background == b.camera.background
+                && (a.camera.filmed_px(CORNER) - b.camera.filmed_px(CORNER)).norm() < 1e-9
                 && (&a.observations, &a.rejected) == (&b.observations, &b.rejected)
         };
         let check = |reader: TrackFileReader, n: usize| {

@@ -1,7 +1,8 @@
 //! What is said when a tree comes into effect.
 
+use super::shaking::ShakeMeter;
 use super::shared::Shared;
-use crate::model::{FootBasis, WoodSight};
+use crate::model::{Background, FootBasis, TrackSet, WoodSight};
 use crate::solve::Model;
 use std::sync::Arc;
 
@@ -19,6 +20,16 @@ const FOOT_GUESSED: &str = "the foot of the trunk is a guess, below the middle o
 const TOO_SHORT_FOR_WOOD: &str = "the wood was not looked for, as the end was wanted: the tree is \
                                   that of the motion alone";
 
+/// The warning where the camera's own motion is not known.
+const CAMERA_UNCLEAR: &str = "nothing around the outline shows how the camera moves: what it shakes \
+                              cannot be separated from the tree's sway; use a firm tripod, and film \
+                              more of the ground and of what stands still";
+/// It is given after so much film, s, if the motion is known in less than this share of it.
+const CAMERA_JUDGED_S: f64 = 3.0;
+const CAMERA_KNOWN: f64 = 0.5;
+/// A camera that trembles by less than this is not spoken of, px.
+const SHAKE_PX: f64 = 0.5;
+
 /// The tree that was last told of.
 #[derive(Default)]
 pub struct Announced {
@@ -26,6 +37,12 @@ pub struct Announced {
     /// The warning that the first one was worth little.
     warned: Option<String>,
     wood: WoodSight,
+    /// The warning that the camera was turned away.
+    lost: Option<String>,
+    is_unclear: bool,
+    shakes: bool,
+    /// Time of the first frame, s.
+    begun_s: Option<f64>,
 }
 
 impl Announced {
@@ -92,6 +109,51 @@ impl Announced {
             _ => {}
         }
     }
+}
+
+impl Announced {
+    /// Tells of the camera's own motion, up to the frame of `tracks`.
+    pub fn tell_of_camera(&mut self, tracks: &TrackSet, meter: &ShakeMeter, shared: &Shared) {
+        let time_s = tracks.time_s;
+        let begun_s = *self.begun_s.get_or_insert(time_s);
+        if tracks.camera.background == Background::Lost {
+            if self.lost.is_none() {
+                let warning = camera_lost(time_s);
+                shared.warn(warning.clone());
+                self.lost = Some(warning);
+            }
+        } else if self.lost.take().is_some() {
+            shared.tell(format!("the camera is back where it was at {time_s:.1} s"));
+        }
+        let is_unclear =
+            time_s - begun_s >= CAMERA_JUDGED_S && meter.so_far().seen_share < CAMERA_KNOWN;
+        if is_unclear != self.is_unclear && self.lost.is_none() {
+            self.is_unclear = is_unclear;
+            match is_unclear {
+                true => shared.warn(CAMERA_UNCLEAR.into()),
+                false => shared.withdraw(CAMERA_UNCLEAR),
+            }
+        }
+        if let Some(shake) = meter.newest().filter(|shake| shake.rms_px >= SHAKE_PX)
+            && !self.shakes
+        {
+            self.shakes = true;
+            let hz = shake.frequency_hz.map(|hz| format!(" at {hz:.1} Hz"));
+            shared.tell(format!(
+                "the camera trembles by {:.1} px{}: that is taken off",
+                shake.rms_px,
+                hz.unwrap_or_default()
+            ));
+        }
+    }
+}
+
+/// The warning of a camera that looks elsewhere, or sees nothing.
+fn camera_lost(time_s: f64) -> String {
+    format!(
+        "the camera was turned, zoomed, refocused or covered at {time_s:.1} s: what it films from \
+         then on does not count; point it back, or start again"
+    )
 }
 
 /// The warning that goes with a tree that was asked for before the measure had reached `threshold`.

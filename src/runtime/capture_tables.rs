@@ -1,10 +1,10 @@
-//! `tracks.csv`, `left_out.csv` and `motion.csv`, written from the log as far as it goes.
+//! `tracks.csv`, `left_out.csv`, `motion.csv` and `camera.csv`, written from the log as far as it goes.
 
 use super::meter::Histogram;
 use super::shared::Failure;
 use crate::cancel::CancelToken;
 use crate::config::Config;
-use crate::document::{LEFT_OUT_FILE, MotionCsv, TRACKS_FILE, TracksCsv};
+use crate::document::{CAMERA_FILE, CameraCsv, LEFT_OUT_FILE, MotionCsv, TRACKS_FILE, TracksCsv};
 use crate::files::OutputFolder;
 use crate::model::{LONGEST_TRIAL_S, Pose, TrackId, TrackLog, TrackSet};
 use crate::pipeline::PoseReplay;
@@ -26,6 +26,7 @@ pub struct CaptureTables {
     folder: OutputFolder,
     replay: PoseReplay,
     motion: MotionCsv<BufWriter<File>>,
+    camera: CameraCsv<BufWriter<File>>,
     tracks: TracksCsv<BufWriter<File>>,
     /// The points that the model leaves out.
     left_out: TracksCsv<BufWriter<File>>,
@@ -87,12 +88,14 @@ impl CaptureTables {
             &model.skeleton,
             config.export.metres_per_px,
         )?;
+        let camera = CameraCsv::new(folder.file(CAMERA_FILE)?, model.skeleton.image_size)?;
         let tracks = TracksCsv::new(folder.file(TRACKS_FILE)?)?;
         let left_out = TracksCsv::of_left_out(folder.file(LEFT_OUT_FILE)?)?;
         Ok(Self {
             folder,
             replay: PoseReplay::new(model, config),
             motion,
+            camera,
             tracks,
             left_out,
             sets: None,
@@ -157,6 +160,7 @@ impl CaptureTables {
         self.tracks.finish()?;
         self.left_out.finish()?;
         self.motion.finish()?;
+        self.camera.finish()?;
         Ok(Done {
             folder: self.folder,
             replay: self.replay,
@@ -176,7 +180,7 @@ impl CaptureTables {
                 &mut self.tracks
             };
             let node = self.replay.node_name_of(o.id);
-            table.row(o.id, set.frame, set.time_s, o.at_px(), node)?;
+            table.row(o.id, set.frame, set.time_s, set.filmed_px(o), node)?;
         }
         Ok(())
     }
@@ -184,6 +188,7 @@ impl CaptureTables {
     fn pose(&mut self, set: &TrackSet) -> Result<(), Failure> {
         let (pose, targets_px) = self.replay.step(set);
         self.motion.pose(&pose)?;
+        self.camera.set(set)?;
         // The foot is where it is by definition.
         for (joint, target) in pose.joints.iter().zip(&targets_px).skip(1) {
             if let Some(t) = target {

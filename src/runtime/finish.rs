@@ -3,6 +3,7 @@
 use super::announce::little_motion;
 use super::capture_tables::{CaptureTables, Done};
 use super::meter::Histogram;
+use super::shaking::ShakeMeter;
 use super::shared::{Failure, Shared};
 use crate::config::Config;
 use crate::document::note::{
@@ -41,12 +42,14 @@ pub struct Quality {
     last_s: f64,
     fb_error_px: Histogram,
     error_px: Histogram,
+    shaking: ShakeMeter,
 }
 
 impl Quality {
     /// Takes the tracks of a frame and the medians of their forward-backward and of their expected
     /// error, px.
     pub fn note(&mut self, tracks: &TrackSet, fb_error_px: f64, error_px: Option<f64>) {
+        self.shaking.note(tracks);
         self.rejected += tracks.rejected.len() as u64;
         self.on_trial.note(tracks);
         self.born += u64::from(tracks.born);
@@ -62,7 +65,12 @@ impl Quality {
 
     fn figures(&self, tree: Option<&Model>) -> QualityNote {
         let tracked_s = self.last_s - self.first.map_or(self.last_s, |(_, s)| s);
+        let shaking = self.shaking.so_far();
         QualityNote {
+            camera_shake_px: shaking.rms_px,
+            camera_shake_hz: shaking.frequency_hz,
+            camera_seen_share: Some(shaking.seen_share),
+            camera_lost_share: Some(shaking.lost_share),
             tracks_total: self.tracks_total(),
             tracks_rejected: self.rejected,
             tracks_left_out: tree.map_or(0, |tree| tree.left_out.len() as u64),
@@ -73,6 +81,11 @@ impl Quality {
             median_certainty: tree.and_then(|tree| tree.hierarchy.median_certainty()),
             median_reprojection_px: None,
         }
+    }
+
+    /// How the camera moved.
+    pub fn shaking(&self) -> &ShakeMeter {
+        &self.shaking
     }
 
     /// Points followed that count: those that have passed their trial, or all while none has.

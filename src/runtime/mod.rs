@@ -29,6 +29,7 @@ mod reconnect;
 mod record;
 mod recorder_thread;
 mod refining;
+mod shaking;
 mod shared;
 mod source_thread;
 mod spawn;

@@ -257,6 +257,9 @@ impl ModelThread {
         let tracks = &moved.tracks;
         self.quality
             .note(tracks, median_fb_error_px(tracks), median_error_px(tracks));
+        self.announced
+            .tell_of_camera(tracks, self.quality.shaking(), &self.shared);
+        self.status.shakes(self.quality.shaking().newest());
         if let Some((recorder, _)) = &self.recorder {
             recorder.found(|| Found {
                 tracks: moved.tracks.clone(),

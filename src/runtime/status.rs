@@ -3,6 +3,7 @@
 use super::meter::Recent;
 use super::shared::Shared;
 use super::sway_watch::SwayWatch;
+use crate::dynamics::Shake;
 use crate::model::{
     BranchRow, FormatNote, NodeId, Observation, Phase, Rgb, Size, Skeleton, Snapshot, SwayNow,
     TrackSet,
@@ -131,11 +132,19 @@ impl Status {
         (s.frame, s.time_s, s.fb_error_px) = (moved.tracks.frame, time_s, error_px);
         s.error_px = median_error_px(&moved.tracks);
         s.tracks_alive = moved.tracks.counted().count() as u32;
+        s.background = Some(moved.tracks.camera.background);
         s.image_size = Some(moved.outline.size);
         s.pose.clone_from(&moved.pose);
         if let Some(preview) = &moved.preview {
             s.preview = Some(preview.clone());
         }
+    }
+
+    /// How the camera trembles.
+    pub fn shakes(&mut self, shake: Option<Shake>) {
+        let s = &mut self.snapshot;
+        s.shake_px = shake.map(|shake| shake.rms_px);
+        s.shake_hz = shake.and_then(|shake| shake.frequency_hz);
     }
 
     /// An answer of the sway takes effect, if there is one.
@@ -158,8 +167,10 @@ impl Status {
             (s.sway_at_end, s.sway_passed_over) = (sway.is_at_end(), sway.passed_over());
         }
         if let Some(moved) = moved {
-            if s.outline_px != moved.outline.polygon_px {
-                s.outline_px.clone_from(&moved.outline.polygon_px);
+            s.outline_px.clear();
+            for corner in &moved.outline.polygon_px {
+                let filmed_px = moved.tracks.camera.filmed_px(corner.cast());
+                s.outline_px.push(filmed_px.map(|px| px.round() as i32));
             }
             let colour = |id| {
                 back.binding()
@@ -170,11 +181,11 @@ impl Status {
                 moved.tracks.observations.iter().partition(|o| o.confirmed);
             s.points = passed
                 .into_iter()
-                .map(|o| (Point2::new(o.u_px, o.v_px), colour(o.id)))
+                .map(|o| (moved.tracks.filmed_px(o).cast(), colour(o.id)))
                 .collect();
             s.candidates_px = on_trial
                 .into_iter()
-                .map(|o| Point2::new(o.u_px, o.v_px))
+                .map(|o| moved.tracks.filmed_px(o).cast())
                 .collect();
         }
         if s.strokes_px != back.strokes_px() {

@@ -1,7 +1,7 @@
 //! Harris corners inside the outline, none on its border (Li 2011 app. A, Zeng 2015 sect. 5.3.2).
 
 use crate::config::Detect;
-use crate::model::{Luma, Outline};
+use crate::model::{CameraMotion, Luma, Outline};
 use nalgebra::Point2;
 use opencv::core::{
     BORDER_CONSTANT, Mat, Point, Point2f, Rect, Scalar, Size as CvSize, ToInputArray, Vector,
@@ -57,15 +57,40 @@ impl Detector {
 
     /// At most `wanted` corners (px), strongest first, at the minimum distance from `taken`; as
     /// they are candidates, of which the better half is kept, twice as many find place side by
-    /// side.
-    pub fn detect(&self, luma: &Luma, taken: &[Point2<f32>], wanted: usize) -> Vec<Point2<f32>> {
+    /// side. The outline goes along with the camera.
+    pub fn detect(
+        &self,
+        luma: &Luma,
+        taken: &[Point2<f32>],
+        wanted: usize,
+        camera: &CameraMotion,
+    ) -> Vec<Point2<f32>> {
         if self.roi.area() == 0 || wanted == 0 {
             return Vec::new();
         }
-        self.corners(luma, taken, wanted).unwrap_or_else(|e| {
-            tracing::error!("corner detection in a {} picture: {e}", luma.size);
-            Vec::new()
-        })
+        self.corners(luma, taken, wanted, camera)
+            .unwrap_or_else(|e| {
+                tracing::error!("corner detection in a {} picture: {e}", luma.size);
+                Vec::new()
+            })
+    }
+
+    /// Where a corner may lie, and its box, shifted by whole pixels as the camera has moved what
+    /// stands in the middle of it, as far as that is in the picture.
+    fn moved_with(&self, camera: &CameraMotion, luma: &Luma) -> opencv::Result<(Mat, Rect)> {
+        let middle = Point2::new(
+            f64::from(self.roi.x) + 0.5 * f64::from(self.roi.width),
+            f64::from(self.roi.y) + 0.5 * f64::from(self.roi.height),
+        );
+        let shift = (camera.filmed_px(middle) - middle).map(|px| px.round() as i32);
+        let moved = self.roi + Point::new(shift.x, shift.y);
+        let picture = Rect::new(0, 0, luma.size.width as i32, luma.size.height as i32);
+        let roi = moved & picture;
+        if roi.area() == 0 {
+            return Ok((Mat::default(), Rect::default()));
+        }
+        let seen = roi - Point::new(moved.x, moved.y);
+        Ok((Mat::roi(&self.allowed, seen)?.try_clone()?, roi))
     }
 
     fn candidate_distance_px(&self) -> f64 {
@@ -77,13 +102,14 @@ impl Detector {
         luma: &Luma,
         taken: &[Point2<f32>],
         wanted: usize,
+        camera: &CameraMotion,
     ) -> opencv::Result<Vec<Point2<f32>>> {
-        let mut mask = self.allowed.clone();
+        let (mut mask, roi) = self.moved_with(camera, luma)?;
+        if roi.area() == 0 {
+            return Ok(Vec::new());
+        }
         for p in taken {
-            let centre = Point::new(
-                p.x.round() as i32 - self.roi.x,
-                p.y.round() as i32 - self.roi.y,
-            );
+            let centre = Point::new(p.x.round() as i32 - roi.x, p.y.round() as i32 - roi.y);
             let radius = self.min_distance_px.round() as i32;
             circle(
                 &mut mask,
@@ -100,7 +126,7 @@ impl Detector {
             luma.size.width as i32,
             &luma.pixels,
         )?;
-        let crop = Mat::roi(&picture, self.roi)?;
+        let crop = Mat::roi(&picture, roi)?;
         let mut corners: Vector<Point2f> = Vector::new();
         good_features_to_track_with_gradient(
             &crop,
@@ -114,7 +140,7 @@ impl Detector {
             true,
             HARRIS_K,
         )?;
-        let (left, top) = (self.roi.x as f32, self.roi.y as f32);
+        let (left, top) = (roi.x as f32, roi.y as f32);
         Ok(corners
             .iter()
             .map(|c| Point2::new(c.x + left, c.y + top))

@@ -1,10 +1,11 @@
 //! Points inside the outline, followed from frame to frame.
 //!
-//! Each frame: flow forward and back; a point that does not lead back to its start is carried along
+//! Each frame: the camera's motion by what stands still; flow forward and back; a point that does not lead back to its start is carried along
 //! by its neighbours for a while; a part of the points is put back on its first patch; lost points
 //! are replaced. Ids are never used twice.
 
 mod anchor;
+mod background;
 mod carry;
 mod detect;
 mod flow;
@@ -17,9 +18,10 @@ mod trial;
 pub use detect::Detector;
 
 use crate::config::{Detect, Track};
-use crate::model::{Frame, Observation, Outline, TrackId, TrackSet};
+use crate::model::{self, CameraMotion, Frame, Observation, Outline, TrackId, TrackSet};
 use crate::signal::Fit;
 use anchor::Anchors;
+use background::Background;
 use carry::{carry_hidden, neighbour_fits};
 use flow::{Flow, OpticalFlow, Pyramid};
 use nalgebra::{Point2, distance};
@@ -41,6 +43,7 @@ pub struct Tracker {
     detector: Detector,
     flow: OpticalFlow,
     anchors: Anchors,
+    background: Background,
     previous: Pyramid,
     present: Pyramid,
     /// Ordered by id.
@@ -72,6 +75,7 @@ impl Tracker {
             detector: Detector::new(detect, outline),
             flow: OpticalFlow::new(track.window_px),
             anchors: Anchors::new(track),
+            background: Background::around(outline),
             previous: Pyramid::default(),
             present: Pyramid::default(),
             points: Vec::new(),
@@ -95,6 +99,7 @@ impl Tracker {
         std::mem::swap(&mut self.previous, &mut self.present);
         self.present
             .rebuild(&frame.luma, self.settings.window_px, self.settings.levels);
+        let camera = self.camera(frame);
         let before = self.points.len();
         let mut rejected = Vec::new();
         let regaining = self.gaps.regaining(frame.time_s);
@@ -109,22 +114,38 @@ impl Tracker {
             self.give_up(frame, &mut rejected);
         }
         let lost = (before - self.points.len() - rejected.len()) as u32;
-        rejected.extend(self.selection.judge(&mut self.points, frame.time_s));
+        rejected.extend(
+            self.selection
+                .judge(&mut self.points, frame.time_s, &camera),
+        );
         let born = if self.refill_due(frame.time_s) {
-            self.refill(frame)
+            self.refill(frame, &camera)
         } else {
             0
         };
         self.frames += 1;
-        let seen = self.points.iter().filter(|p| p.coasting == 0);
+        let counts = camera.background != model::Background::Lost;
+        let seen = self.points.iter().filter(|p| counts && p.coasting == 0);
         TrackSet {
             frame: frame.index,
             time_s: frame.time_s,
-            observations: seen.map(observation).collect(),
+            camera,
+            observations: seen.map(|p| observation(p, &camera)).collect(),
             lost,
             born,
             rejected,
         }
+    }
+
+    /// The camera's motion in `frame`, whose pyramid is made.
+    fn camera(&mut self, frame: &Frame) -> CameraMotion {
+        if !self.settings.steady {
+            return CameraMotion::default();
+        }
+        let levels = self.settings.levels;
+        let (previous, present) = (&self.previous, &self.present);
+        self.background
+            .step(frame, previous, present, levels, &mut self.flow)
     }
 
     /// Drops the points that were not seen for too long or have left the picture; those on trial
@@ -217,14 +238,16 @@ impl Tracker {
     }
 
     /// Detects points where there are none; returns how many.
-    fn refill(&mut self, frame: &Frame) -> u32 {
+    fn refill(&mut self, frame: &Frame, camera: &CameraMotion) -> u32 {
         self.detected_s = frame.time_s;
         let taken: Vec<Point2<f32>> = self.points.iter().map(|p| p.now_px).collect();
         // Without comparisons nothing would be known of them at the end of a trial.
         let on_trial = self.settings.anchor_every > 0;
         let share = if on_trial { trial::CANDIDATES } else { 1 };
         let missing = self.wanted.saturating_sub(self.points.len());
-        let found = self.detector.detect(&frame.luma, &taken, share * missing);
+        let found = self
+            .detector
+            .detect(&frame.luma, &taken, share * missing, camera);
         if found.is_empty() {
             return 0;
         }
@@ -243,6 +266,7 @@ impl Tracker {
                 id: TrackId(self.next_id),
                 keyframe,
                 born_px: *at,
+                born_steady_px: camera.steady_px(at.cast()).cast(),
                 now_px: *at,
                 patch: self.anchors.patch(&frame.luma, *at),
                 fb_error_px: 0.0,
@@ -264,11 +288,12 @@ impl Tracker {
     }
 }
 
-fn observation(p: &Point) -> Observation {
+fn observation(p: &Point, camera: &CameraMotion) -> Observation {
+    let steady_px = camera.steady_px(p.now_px.cast()).cast::<f32>();
     Observation {
         id: p.id,
-        u_px: p.now_px.x,
-        v_px: p.now_px.y,
+        u_px: steady_px.x,
+        v_px: steady_px.y,
         fb_error_px: p.fb_error_px,
         error_px: p.record.error_px(),
         confirmed: p.trial.is_none(),

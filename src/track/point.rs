@@ -30,6 +30,8 @@ pub struct Point {
     /// Number of the keyframe in which it was detected; the keyframe itself may be gone.
     pub keyframe: u32,
     pub born_px: Point2<f32>,
+    /// The same without the camera's motion.
+    pub born_steady_px: Point2<f32>,
     pub now_px: Point2<f32>,
     /// What it looked like.
     pub patch: Patch,

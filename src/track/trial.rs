@@ -6,7 +6,7 @@
 //! told from the others; while the tree moves, they can.
 
 use super::point::Point;
-use crate::model::{LONGEST_TRIAL_S, TrackId};
+use crate::model::{CameraMotion, LONGEST_TRIAL_S, TrackId};
 use nalgebra::distance;
 use std::collections::BTreeSet;
 
@@ -79,11 +79,16 @@ impl Selection {
     }
 
     /// Ends the trial if it is time; gives the points that are dropped for it, by id.
-    pub fn judge(&mut self, points: &mut Vec<Point>, time_s: f64) -> Vec<TrackId> {
+    pub fn judge(
+        &mut self,
+        points: &mut Vec<Point>,
+        time_s: f64,
+        camera: &CameraMotion,
+    ) -> Vec<TrackId> {
         let Some(trial_round) = &mut self.trial_round else {
             return Vec::new();
         };
-        if !trial_round.over(time_s, &distances_from_start(points)) {
+        if !trial_round.over(time_s, &distances_from_start(points, camera)) {
             return Vec::new();
         }
         let on_trial = trial_round.started;
@@ -124,13 +129,13 @@ impl Selection {
     }
 }
 
-/// How far the points on trial are from where they were found, px, in ascending order; notes the
-/// largest of each.
-fn distances_from_start(points: &mut [Point]) -> Vec<f32> {
+/// How far the points on trial are from where they were found, px, in ascending order, without the
+/// camera's motion; notes the largest of each.
+fn distances_from_start(points: &mut [Point], camera: &CameraMotion) -> Vec<f32> {
     let mut away_px: Vec<f32> = Vec::new();
     for p in points {
         if let Some(trial) = &mut p.trial {
-            let reach_px = distance(&p.now_px, &p.born_px);
+            let reach_px = distance(&camera.steady_px(p.now_px.cast()).cast(), &p.born_steady_px);
             trial.reach_px = trial.reach_px.max(reach_px);
             away_px.push(reach_px);
         }

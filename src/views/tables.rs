@@ -1,7 +1,7 @@
 //! The tables of a prepared tree, and its wood as cylinders.
 
 use super::{PrepareError, PreparedTree};
-use crate::document::{LEFT_OUT_FILE, MotionCsv, TRACKS_FILE, nodes, tracks_of};
+use crate::document::{CAMERA_FILE, LEFT_OUT_FILE, MotionCsv, TRACKS_FILE, nodes, tracks_of};
 use crate::export::cylinders::cylinders;
 use crate::files::{OutputFolder, WriteError};
 use crate::geometry::cylinders_by_branch;
@@ -68,6 +68,10 @@ impl PreparedTree {
         let mut measured = own.nodes[..own.measured()].iter();
         let all_there = measured.all(|n| names.contains(&n.name));
         let dir = &self.document.dir;
+        // Older captures have none.
+        if dir.join(CAMERA_FILE).exists() {
+            folder.copy(CAMERA_FILE, dir, stop)?;
+        }
         for file in [TRACKS_FILE, LEFT_OUT_FILE] {
             // Older captures have left nothing out.
             if !dir.join(file).exists() {

@@ -21,7 +21,7 @@ mod steady;
 
 use crate::cancel::CancelToken;
 use crate::config::TraceBy;
-use crate::model::{AtRest, Foot, Outline, Rgb, Wood};
+use crate::model::{AtRest, CameraMotion, Foot, Outline, Rgb, Wood};
 use crate::motion::Spread;
 use crate::signal::median;
 use evidence::evidence;
@@ -74,7 +74,10 @@ fn motion_px(displacements: &Displacements) -> Option<f64> {
 #[derive(Clone, Debug)]
 pub struct Shot<'a> {
     pub picture: &'a Rgb,
+    /// Without the camera's motion.
     pub displacements: &'a Displacements,
+    /// The camera's motion, which the picture has.
+    pub camera: CameraMotion,
 }
 
 /// A line that the user drew along a branch, px.
@@ -302,6 +305,7 @@ mod tests {
         let shots: Vec<Shot> = chosen
             .iter()
             .map(|&k| Shot {
+                camera: CameraMotion::default(),
                 picture: &pictures[k],
                 displacements: &motions[k],
             })

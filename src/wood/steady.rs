@@ -3,37 +3,14 @@
 //! A motion of one pixel distinguishes the tree from what stands still: on a tripod that trembles,
 //! or under an exposure that follows the clouds, the ground would seem to move as well.
 
-use super::{Displacements, Shot, colour_mat, median_vector};
+use super::{Displacements, Shot, colour_mat};
 use crate::cancel::CancelToken;
-use crate::model::{Rgb, Size};
-use nalgebra::{Isometry2, Point2, Translation2, UnitComplex, Vector2};
-use opencv::core::{
-    BORDER_REPLICATE, Mat, Point2f, Scalar, Size as CvSize, TermCriteria, TermCriteria_COUNT,
-    TermCriteria_EPS, Vector, no_array,
-};
-use opencv::imgproc::{
-    COLOR_RGB2GRAY, INTER_CUBIC, WARP_INVERSE_MAP, cvt_color_def, good_features_to_track,
-    warp_affine,
-};
+use crate::model::{CameraMotion, Rgb};
+use nalgebra::Point2;
+use opencv::core::{BORDER_REPLICATE, Mat, Scalar, Size as CvSize};
+use opencv::imgproc::{INTER_CUBIC, WARP_INVERSE_MAP, warp_affine};
 use opencv::prelude::*;
-use opencv::video::{build_optical_flow_pyramid_def, calc_optical_flow_pyr_lk};
 
-/// Points of the background that are followed from one shot to the next, at most; how far apart they
-/// are, px; and how clear a corner they are, as a share of the clearest one.
-const POINTS: i32 = 400;
-const APART_PX: f64 = 6.0;
-const CLEAR: f64 = 0.01;
-/// The window in which they are compared, px, and how often the picture is halved.
-const WINDOW: CvSize = CvSize::new(15, 15);
-const LEVELS: i32 = 3;
-/// A point that comes back this far from where it began was lost, px.
-const BACK_PX: f64 = 0.5;
-/// Points agree on a motion that they miss by no more than this, px.
-const AGREE_PX: f64 = 0.5;
-/// Rounds of reweighting.
-const ROUNDS: usize = 10;
-/// Fewer points than this, or than half of those that were followed, say nothing of the camera.
-const LEAST_POINTS: usize = 12;
 /// A camera that moves by less than this, px, is left alone: a picture that is carried back by a
 /// part of a pixel becomes softer.
 const LEAST_PX: f64 = 0.25;
@@ -52,14 +29,13 @@ impl SteadyShot {
         Shot {
             picture: &self.picture,
             displacements: &self.displacements,
+            camera: CameraMotion::default(),
         }
     }
 }
 
-/// Takes the camera's motion and the change of light out of `shots`. They are taken from the
-/// background, what `region` (row by row, 0 outside) does not hold: the shift and turn on which most
-/// of its corners agree, and how bright it is. Where it has too few corners, or they move each its
-/// own way, the shots stay where they are.
+/// Takes the camera's motion and the change of light out of `shots`. The light is that of the
+/// background, what `region` (row by row, 0 outside) does not hold.
 ///
 /// # Errors
 /// OpenCV fails.
@@ -72,130 +48,49 @@ pub fn steadied(
     let Some(first) = shots.first() else {
         return Ok(Vec::new());
     };
-    let background = Background::of(first.picture, region)?;
-    let (mut pictures, mut motions) = (Vec::new(), Vec::new());
+    let background = Surroundings {
+        region,
+        light: light(first.picture, region),
+    };
+    let mut steady = Vec::with_capacity(shots.len());
     for shot in shots {
         if cancel.is_cancelled() {
             break;
         }
         let mut picture = shot.picture.clone();
-        // The light first: corners are followed by their grey levels.
         background.relight(&mut picture);
-        motions.push(background.motion_to(&picture)?);
-        pictures.push(picture);
-    }
-    let to_mean = mean(&motions).inverse();
-    let mut steady = Vec::with_capacity(pictures.len());
-    for ((shot, picture), motion) in shots.iter().zip(pictures).zip(&motions) {
-        let motion = motion * to_mean;
-        steady.push(if farthest_px(&motion, first.picture.size) < LEAST_PX {
+        steady.push(if shot.camera.farthest_px(picture.size) < LEAST_PX {
             SteadyShot {
                 picture,
-                displacements: shot.displacements.clone(),
+                displacements: as_filmed(shot, rest_px),
             }
         } else {
             SteadyShot {
-                picture: without_motion(&picture, &motion)?,
-                displacements: displacements_without(&motion, rest_px, shot.displacements),
+                picture: without_motion(&picture, &shot.camera)?,
+                displacements: shot.displacements.clone(),
             }
         });
     }
     Ok(steady)
 }
 
-/// Where what stands still is in a picture, by its place in another one, px.
-type CameraMotion = Isometry2<f64>;
-
-/// The mean of small motions.
-fn mean(motions: &[CameraMotion]) -> CameraMotion {
-    let (mut shift, mut angle) = (Vector2::zeros(), 0.0);
-    for motion in motions {
-        shift += motion.translation.vector;
-        angle += motion.rotation.angle();
+/// The displacements with the camera's motion, as a picture has them that is left as it is.
+fn as_filmed(shot: &Shot, rest_px: &[Point2<f64>]) -> Displacements {
+    let mut filmed = Displacements::with_capacity(rest_px.len());
+    for (rest, moved) in rest_px.iter().zip(shot.displacements) {
+        filmed.push(moved.map(|moved| shot.camera.filmed_px(rest + moved) - rest));
     }
-    let count = motions.len().max(1) as f64;
-    CameraMotion::new(shift / count, angle / count)
-}
-
-/// How far the corners of a picture move, px.
-fn farthest_px(motion: &CameraMotion, size: Size) -> f64 {
-    let (width, height) = (f64::from(size.width), f64::from(size.height));
-    let mut farthest_px: f64 = 0.0;
-    for (u, v) in [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)] {
-        let corner = Point2::new(u, v);
-        farthest_px = farthest_px.max((motion * corner - corner).norm());
-    }
-    farthest_px
-}
-
-fn displacements_without(
-    motion: &CameraMotion,
-    rest_px: &[Point2<f64>],
-    displacements: &Displacements,
-) -> Displacements {
-    let back = motion.inverse();
-    let displaced = rest_px.iter().zip(displacements);
-    let still = displaced.map(|(rest, moved)| Some(back * (rest + (*moved)?) - rest));
-    still.collect()
+    filmed
 }
 
 /// What stands still in a picture.
-struct Background<'a> {
+struct Surroundings<'a> {
     region: &'a [u8],
     /// Mean of each colour, grey levels; `None` where there is no background.
     light: Option<[f64; 3]>,
-    pyramid: Vector<Mat>,
-    /// Where it has corners.
-    corners: Vector<Point2f>,
 }
 
-impl<'a> Background<'a> {
-    fn of(picture: &Rgb, region: &'a [u8]) -> opencv::Result<Self> {
-        let size = picture.size;
-        let outside: Vec<u8> = region.iter().map(|r| 255 * u8::from(*r == 0)).collect();
-        let mask = Mat::new_rows_cols_with_data(size.height as i32, size.width as i32, &outside)?;
-        let grey = grey(picture)?;
-        let mut corners = Vector::new();
-        good_features_to_track(
-            &grey,
-            &mut corners,
-            POINTS,
-            CLEAR,
-            APART_PX,
-            &mask,
-            3,
-            false,
-            0.04,
-        )?;
-        Ok(Self {
-            region,
-            light: light(picture, region),
-            pyramid: pyramid(&grey)?,
-            corners,
-        })
-    }
-
-    /// Where it is in another picture; no motion where that cannot be told.
-    fn motion_to(&self, picture: &Rgb) -> opencv::Result<CameraMotion> {
-        if self.corners.len() < LEAST_POINTS {
-            return Ok(CameraMotion::identity());
-        }
-        let other = pyramid(&grey(picture)?)?;
-        let there = followed(&self.pyramid, &other, &self.corners)?;
-        let back = followed(&other, &self.pyramid, &there)?;
-        let mut pairs = Vec::with_capacity(self.corners.len());
-        for ((from, to), back) in self.corners.iter().zip(&there).zip(&back) {
-            let pair = Pair {
-                from: point(from),
-                to: point(to),
-            };
-            if (point(back) - pair.from).norm() <= BACK_PX {
-                pairs.push(pair);
-            }
-        }
-        Ok(rigid(&pairs).unwrap_or_else(CameraMotion::identity))
-    }
-
+impl Surroundings<'_> {
     /// Gives a picture the light of this one.
     fn relight(&self, picture: &mut Rgb) {
         let (Some(own), Some(other)) = (self.light, light(picture, self.region)) else {
@@ -234,98 +129,9 @@ fn light(picture: &Rgb, region: &[u8]) -> Option<[f64; 3]> {
     (n > 0).then(|| sum.map(|sum| sum as f64 / n as f64))
 }
 
-fn grey(picture: &Rgb) -> opencv::Result<Mat> {
-    let mut grey = Mat::default();
-    cvt_color_def(&colour_mat(picture)?, &mut grey, COLOR_RGB2GRAY)?;
-    Ok(grey)
-}
-
-/// A grey picture in all the sizes in which points are followed, each with its gradients.
-fn pyramid(grey: &Mat) -> opencv::Result<Vector<Mat>> {
-    let mut pyramid = Vector::new();
-    build_optical_flow_pyramid_def(grey, &mut pyramid, WINDOW, LEVELS)?;
-    Ok(pyramid)
-}
-
-/// Where points of one picture are in another (Lucas and Kanade 1981); those that are lost are
-/// anywhere.
-fn followed(
-    from: &Vector<Mat>,
-    to: &Vector<Mat>,
-    points: &Vector<Point2f>,
-) -> opencv::Result<Vector<Point2f>> {
-    let mut there = Vector::new();
-    let mut status = Vector::<u8>::new();
-    let until = TermCriteria::new(TermCriteria_COUNT + TermCriteria_EPS, 30, 0.01)?;
-    calc_optical_flow_pyr_lk(
-        from,
-        to,
-        points,
-        &mut there,
-        &mut status,
-        &mut no_array(),
-        WINDOW,
-        LEVELS,
-        until,
-        0,
-        1e-4,
-    )?;
-    Ok(there)
-}
-
-fn point(at: Point2f) -> Point2<f64> {
-    Point2::new(f64::from(at.x), f64::from(at.y))
-}
-
-/// A point in two pictures, px.
-#[derive(Clone, Copy, Debug)]
-struct Pair {
-    from: Point2<f64>,
-    to: Point2<f64>,
-}
-
-/// The shift and turn on which most pairs agree (least squares, reweighted: Holland and Welsch
-/// 1977); `None` where most do not.
-fn rigid(pairs: &[Pair]) -> Option<CameraMotion> {
-    let shift = median_vector(pairs.iter().map(|pair| pair.to - pair.from));
-    let mut motion = CameraMotion::new(shift, 0.0);
-    for _ in 0..ROUNDS {
-        motion = weighted_rigid(pairs, &motion);
-    }
-    let agree = pairs
-        .iter()
-        .filter(|pair| miss_px(pair, &motion) <= AGREE_PX);
-    let n_agree = agree.count();
-    (n_agree >= LEAST_POINTS && 2 * n_agree >= pairs.len()).then_some(motion)
-}
-
-fn miss_px(pair: &Pair, motion: &CameraMotion) -> f64 {
-    (motion * pair.from - pair.to).norm()
-}
-
-/// The motion of least squares, where pairs that `before` misses count less (Cauchy's weights).
-fn weighted_rigid(pairs: &[Pair], before: &CameraMotion) -> CameraMotion {
-    let weight = |pair: &Pair| 1.0 / (1.0 + (miss_px(pair, before) / AGREE_PX).powi(2));
-    let (mut from, mut to, mut weights) = (Vector2::zeros(), Vector2::zeros(), 0.0);
-    for pair in pairs {
-        from += weight(pair) * pair.from.coords;
-        to += weight(pair) * pair.to.coords;
-        weights += weight(pair);
-    }
-    let (from, to) = (from / weights, to / weights);
-    let (mut along, mut across) = (0.0, 0.0);
-    for pair in pairs {
-        let (a, b) = (pair.from.coords - from, pair.to.coords - to);
-        along += weight(pair) * a.dot(&b);
-        across += weight(pair) * a.perp(&b);
-    }
-    let rotation = UnitComplex::from_angle(across.atan2(along));
-    CameraMotion::from_parts(Translation2::from(to - rotation * from), rotation)
-}
-
-/// The picture with what stands still in its mean place.
-fn without_motion(picture: &Rgb, motion: &CameraMotion) -> opencv::Result<Rgb> {
-    let affine = motion.to_homogeneous();
+/// The picture with what stands still in its steady place.
+fn without_motion(picture: &Rgb, camera: &CameraMotion) -> opencv::Result<Rgb> {
+    let affine = camera.filmed_from_steady.to_homogeneous();
     let rows: Vec<f64> = affine.transpose().iter().copied().take(6).collect();
     let affine = Mat::new_rows_cols_with_data(2, 3, &rows)?;
     let mut steady = Mat::default();
@@ -350,6 +156,8 @@ fn without_motion(picture: &Rgb, motion: &CameraMotion) -> opencv::Result<Rgb> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::{Agreement, Background, Size};
+    use nalgebra::{Similarity2, Vector2};
 
     const SIZE: Size = Size {
         width: 160,
@@ -377,34 +185,38 @@ mod tests {
         region
     }
 
-    fn steady(pictures: &[Rgb], displacements: &[Displacements]) -> Vec<SteadyShot> {
-        let mut shots = Vec::new();
-        for (picture, displacements) in pictures.iter().zip(displacements) {
-            shots.push(Shot {
-                picture,
-                displacements,
-            });
-        }
+    fn steady(shots: &[Shot]) -> Vec<SteadyShot> {
         let rest_px = [Point2::new(80.0, 50.0), Point2::new(70.0, 20.0)];
-        steadied(&shots, &rest_px, &region(), &CancelToken::new()).expect("OpenCV")
+        steadied(shots, &rest_px, &region(), &CancelToken::new()).expect("OpenCV")
+    }
+
+    fn shifted(shift: Vector2<f64>) -> CameraMotion {
+        CameraMotion {
+            filmed_from_steady: Similarity2::new(shift, 0.0, 1.0),
+            background: Background::Seen(Agreement::default()),
+        }
     }
 
     #[test]
     fn a_trembling_camera_and_passing_clouds_are_taken_out() {
         let shift = Vector2::new(1.6, -1.0);
         let pictures = [ground(Vector2::zeros(), 1.0), ground(shift, 1.3)];
-        let sway = Vector2::new(4.0, 0.5);
-        let displacements = [
-            vec![Some(Vector2::zeros()), None],
-            vec![Some(shift + sway), None],
-        ];
-        let steady = steady(&pictures, &displacements);
-        // Both stand where the camera was on average.
-        for (shot, expected) in steady.iter().zip([0.5 * shift, sway + 0.5 * shift]) {
-            let moved = shot.displacements[0].expect("seen");
-            assert!((moved - expected).norm() < 0.1, "{moved} {expected}");
-            assert_eq!(shot.displacements[1], None);
+        let displacements = vec![Some(Vector2::new(4.0, 0.5)), None];
+        let cameras = [shifted(Vector2::zeros()), shifted(shift)];
+        let mut shots = Vec::new();
+        for (picture, camera) in pictures.iter().zip(cameras) {
+            shots.push(Shot {
+                picture,
+                displacements: &displacements,
+                camera,
+            });
         }
+        let steady = steady(&shots);
+        assert!(
+            steady
+                .iter()
+                .all(|shot| shot.displacements == displacements)
+        );
         let (a, b) = (&steady[0].picture.pixels, &steady[1].picture.pixels);
         let inner = |i: &usize| {
             let (u, v) = (i / 3 % SIZE.width as usize, i / 3 / SIZE.width as usize);
@@ -417,41 +229,21 @@ mod tests {
         assert!(off.is_some_and(|off| off <= 12), "{off:?}");
     }
 
-    /// The corners of a shadow move, but most corners do not.
+    /// A picture that is not carried back has its points where they were filmed.
     #[test]
-    fn a_shadow_that_wanders_over_the_ground_is_no_motion_of_the_camera() {
-        let mut pictures = Vec::new();
-        for left in [0, 6] {
-            let mut picture = ground(Vector2::zeros(), 1.0);
-            for (i, pixel) in picture.pixels.chunks_exact_mut(3).enumerate() {
-                let (u, v) = (i % SIZE.width as usize, i / SIZE.width as usize);
-                if (left + 4..left + 34).contains(&u) && (20..80).contains(&v) {
-                    pixel.iter_mut().for_each(|colour| *colour /= 2);
-                }
-            }
-            pictures.push(picture);
-        }
-        let displacements = vec![vec![Some(Vector2::zeros()), None]; 2];
-        for shot in steady(&pictures, &displacements) {
-            assert_eq!(shot.displacements[0], Some(Vector2::zeros()));
-        }
-    }
-
-    #[test]
-    fn a_steady_camera_and_a_plain_background_are_left_alone() {
-        let still = ground(Vector2::zeros(), 1.0);
-        let plain = Rgb {
-            size: SIZE,
-            pixels: vec![140; 3 * SIZE.area()],
+    fn a_camera_that_hardly_moves_is_left_alone() {
+        let picture = ground(Vector2::zeros(), 1.0);
+        let displacements = vec![Some(Vector2::new(3.0, 1.0)), None];
+        let shot = Shot {
+            picture: &picture,
+            displacements: &displacements,
+            camera: shifted(Vector2::new(0.1, 0.0)),
         };
-        for picture in [still, plain] {
-            let displacements = vec![vec![Some(Vector2::new(3.0, 1.0)), None]; 2];
-            for shot in steady(&[picture.clone(), picture.clone()], &displacements) {
-                assert_eq!(shot.picture.pixels, picture.pixels);
-                let moved = shot.displacements[0].expect("seen");
-                assert!((moved - Vector2::new(3.0, 1.0)).norm() < 1e-9);
-            }
+        for shot in steady(&[shot.clone(), shot]) {
+            assert_eq!(shot.picture.pixels, picture.pixels);
+            let moved = shot.displacements[0].expect("seen");
+            assert!((moved - Vector2::new(3.1, 1.0)).norm() < 1e-9, "{moved}");
         }
-        assert!(steady(&[], &[]).is_empty());
+        assert!(steady(&[]).is_empty());
     }
 }

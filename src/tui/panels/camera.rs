@@ -1,7 +1,7 @@
 //! What was asked of the camera, what it gives, and what is lost on the way.
 
 use super::titled;
-use crate::model::Snapshot;
+use crate::model::{Background, Snapshot};
 use crate::tui::format::{count, millis, value};
 use crate::tui::state::State;
 use crate::tui::theme::Theme;
@@ -10,15 +10,14 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-/// Seven lines; where there is no room for all, the last ones tell only of losses that seldom
-/// happen.
+/// A camera that trembles by so much is marked, px.
+const STRONG_SHAKE_PX: f64 = 0.5;
+
+/// At most seven lines; where there is no room for all, the last one tells only of losses that
+/// seldom happen.
 pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
     let s = &state.snapshot;
     let inner = titled(frame, area, "Camera", theme);
-    let numbers = match s.camera.lost_by_sequence {
-        Some(n) => loss("numbers", n, theme),
-        None => vec![Span::raw("numbers "), Span::styled("–", theme.faint())],
-    };
     let broken = s
         .undecodable
         .saturating_add(s.camera.damaged)
@@ -27,26 +26,44 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         Span::styled(format!("p50 {}", millis(s.latency_p50_ms)), theme.strong()),
         Span::raw(format!("  p99 {}", millis(s.latency_p99_ms))),
     ];
-    let lost = beside(
-        loss("camera", s.lost_in_camera, theme),
-        loss("queue", s.dropped_before_tracker, theme),
-    );
-    let useless = beside(
-        loss("broken", broken, theme),
-        loss("unshown", s.not_shown, theme),
+    let lost = losses(
+        &[
+            ("camera", s.lost_in_camera),
+            ("queue", s.dropped_before_tracker),
+            ("broken", broken),
+        ],
+        theme,
     );
     // Both counts of what was lost before us: by the driver's numbers, where it has them, and by
     // the times.
-    let counted = beside(numbers, loss("times", s.camera.lost_by_time, theme));
-    let lines = vec![
+    let seldom = losses(
+        &[
+            ("unshown", s.not_shown),
+            ("numbers", s.camera.lost_by_sequence.unwrap_or(0)),
+            ("times", s.camera.lost_by_time),
+        ],
+        theme,
+    );
+    let mut lines = vec![
         row("asked", vec![or_dash(&s.format.asked)], theme),
         row("given", vec![given(s, theme)], theme),
         row("rate", rate(s, theme), theme),
         row("delay", delay, theme),
-        row("lost", lost, theme),
-        row("", useless, theme),
-        row("", counted, theme),
+        row("shake", shake(s, theme), theme),
     ];
+    match (lost.is_empty(), seldom.is_empty()) {
+        (true, true) => lines.push(row(
+            "lost",
+            vec![Span::styled("nothing", theme.faint())],
+            theme,
+        )),
+        (false, true) => lines.push(row("lost", lost, theme)),
+        (true, false) => lines.push(row("lost", seldom, theme)),
+        (false, false) => {
+            lines.push(row("lost", lost, theme));
+            lines.push(row("", seldom, theme));
+        }
+    }
     frame.render_widget(Paragraph::new(lines), inner);
 }
 
@@ -90,18 +107,40 @@ fn rate(s: &Snapshot, theme: Theme) -> Vec<Span<'static>> {
     ]
 }
 
-/// A count that ought to be 0.
-fn loss(name: &'static str, n: u64, theme: Theme) -> Vec<Span<'static>> {
-    let style = if n > 0 {
-        theme.warning()
-    } else {
-        theme.faint()
+/// By how much the camera itself trembles, and how fast.
+fn shake(s: &Snapshot, theme: Theme) -> Vec<Span<'static>> {
+    let words = match (s.background, s.shake_px) {
+        (Some(Background::Lost), _) => return vec![Span::styled("turned away", theme.warning())],
+        (Some(Background::Unclear), _) => return vec![Span::styled("not known", theme.warning())],
+        (None, _) | (_, None) => return vec![Span::raw("–")],
+        (Some(Background::Seen(_)), Some(px)) => match s.shake_hz {
+            Some(hz) => format!("{} px  {} Hz", value(px), value(hz)),
+            None => format!("{} px", value(px)),
+        },
     };
-    vec![Span::raw(format!("{name} ")), Span::styled(count(n), style)]
+    let is_strong = s.shake_px.is_some_and(|px| px >= STRONG_SHAKE_PX);
+    vec![Span::styled(
+        words,
+        if is_strong {
+            theme.warning()
+        } else {
+            theme.strong()
+        },
+    )]
 }
 
-fn beside(mut left: Vec<Span<'static>>, right: Vec<Span<'static>>) -> Vec<Span<'static>> {
-    left.push(Span::raw("  "));
-    left.extend(right);
-    left
+/// Counts that ought to be 0, those of them that are not.
+fn losses(counts: &[(&'static str, u64)], theme: Theme) -> Vec<Span<'static>> {
+    let mut spans = Vec::new();
+    for (name, n) in counts {
+        if *n == 0 {
+            continue;
+        }
+        if !spans.is_empty() {
+            spans.push(Span::raw("  "));
+        }
+        spans.push(Span::raw(format!("{name} ")));
+        spans.push(Span::styled(count(*n), theme.warning()));
+    }
+    spans
 }

@@ -1,9 +1,9 @@
 //! States of a capture that never was.
 
 use crate::model::{
-    AngleSpectrum, Angles, BranchGraph, BranchRow, BranchSway, Excitation, FormatNote, Interval,
-    JointPose, Node, NodeId, NodeName, Phase, Pose, Rgb, Size, Skeleton, Snapshot, Sway, SwayNow,
-    Unidentified, Wood, WoodNode, WoodSight,
+    Agreement, AngleSpectrum, Angles, Background, BranchGraph, BranchRow, BranchSway, Excitation,
+    FormatNote, Interval, JointPose, Node, NodeId, NodeName, Phase, Pose, Rgb, Size, Skeleton,
+    Snapshot, Sway, SwayNow, Unidentified, Wood, WoodNode, WoodSight,
 };
 use nalgebra::{Point2, UnitQuaternion, Vector3};
 use std::sync::Arc;
@@ -123,6 +123,9 @@ pub fn snapshot(phase: Phase) -> Snapshot {
         work_rate_hz: 29.93,
         lost_in_camera: 3,
         not_shown: 45,
+        background: Some(Background::Seen(Agreement::default())),
+        shake_px: Some(0.63),
+        shake_hz: Some(2.2),
         latency_p50_ms: 21.4,
         latency_p99_ms: 48.0,
         image_size: Some(Size::new(640, 360)),

@@ -1,0 +1,92 @@
+//! How the camera moved in the film, gathered frame by frame.
+
+use crate::dynamics::{Shake, shake};
+use crate::model::{Background, TrackSet};
+use nalgebra::{Point2, Vector2};
+
+/// The film is looked at in pieces of so long, s: what moves slower is no shake.
+const PIECE_S: f64 = 5.0;
+
+/// Gathers the camera's motion. Memory is bounded.
+#[derive(Clone, Debug, Default)]
+pub struct ShakeMeter {
+    times_s: Vec<f64>,
+    shifts_px: Vec<Vector2<f64>>,
+    newest: Option<Shake>,
+    strongest: Option<Shake>,
+    pieces: u32,
+    sum_square_px2: f64,
+    frames: u64,
+    seen: u64,
+    lost: u64,
+}
+
+/// How the camera moved in all of the film.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Shaking {
+    /// Root mean square of its trembling where the tree is, px, and the frequency at which it
+    /// trembled most; `None` for less than five seconds in which it was known.
+    pub rms_px: Option<f64>,
+    pub frequency_hz: Option<f64>,
+    /// Shares of the frames in which the background showed it, and in which that was lost, 0 to 1.
+    pub seen_share: f64,
+    pub lost_share: f64,
+}
+
+impl ShakeMeter {
+    /// Takes the next frame.
+    pub fn note(&mut self, tracks: &TrackSet) {
+        self.frames += 1;
+        self.lost += u64::from(tracks.camera.background == Background::Lost);
+        if tracks.camera.sd_px().is_none() {
+            return;
+        }
+        self.seen += 1;
+        let middle = middle(tracks);
+        self.times_s.push(tracks.time_s);
+        self.shifts_px
+            .push(tracks.camera.filmed_px(middle) - middle);
+        let begun_s = self.times_s.first().copied().unwrap_or(tracks.time_s);
+        if tracks.time_s - begun_s >= PIECE_S {
+            self.end_piece();
+        }
+    }
+
+    fn end_piece(&mut self) {
+        let piece = shake(&self.times_s, &self.shifts_px);
+        self.times_s.clear();
+        self.shifts_px.clear();
+        self.pieces += 1;
+        self.sum_square_px2 += piece.rms_px.powi(2);
+        if self.strongest.is_none_or(|s| piece.rms_px > s.rms_px) {
+            self.strongest = Some(piece);
+        }
+        self.newest = Some(piece);
+    }
+
+    /// In the last whole five seconds.
+    pub fn newest(&self) -> Option<Shake> {
+        self.newest
+    }
+
+    /// In the film so far.
+    pub fn so_far(&self) -> Shaking {
+        let frames = self.frames.max(1) as f64;
+        let mean_square = self.sum_square_px2 / f64::from(self.pieces.max(1));
+        Shaking {
+            rms_px: (self.pieces > 0).then(|| mean_square.sqrt()),
+            frequency_hz: self.strongest.and_then(|piece| piece.frequency_hz),
+            seen_share: self.seen as f64 / frames,
+            lost_share: self.lost as f64 / frames,
+        }
+    }
+}
+
+/// The middle of the points, at their steady places, px.
+fn middle(tracks: &TrackSet) -> Point2<f64> {
+    let mut sum = Vector2::zeros();
+    for observation in &tracks.observations {
+        sum += observation.at_px().coords;
+    }
+    Point2::from(sum / tracks.observations.len().max(1) as f64)
+}
