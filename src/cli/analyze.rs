@@ -175,6 +175,7 @@ fn analyse_capture(
     let study = Study::of(&Given {
         name,
         source: &document.note.source.name,
+        origin: &document.note.origin(),
         skeleton: &skeleton,
         film: &film,
         poses: &poses,

@@ -8,7 +8,7 @@ use crate::dynamics::{
     angle_to_parent_deg, spectrum,
 };
 use crate::model::{
-    BotanicalBranches, Excitation, NodeId, Pose, Skeleton, Sway, Swaying, Unidentified,
+    BotanicalBranches, Excitation, NodeId, Origin, Pose, Skeleton, Sway, Swaying, Unidentified,
 };
 use nalgebra::{Point2, Vector2, distance};
 
@@ -25,6 +25,8 @@ pub struct Given<'a> {
     pub name: &'a str,
     /// What was filmed: the name of the source.
     pub source: &'a str,
+    /// When it was filmed, and what the user noted.
+    pub origin: &'a Origin,
     pub skeleton: &'a Skeleton,
     /// The points that were analysed, and poses of the same time; none where `motion.csv` is
     /// missing.
@@ -51,6 +53,8 @@ pub struct Study {
     pub name: String,
     /// What was filmed, without the folders that it lies in.
     pub source: String,
+    /// When it was filmed, and what the user noted.
+    pub origin: Origin,
     /// Size of the picture, px.
     pub size: [u32; 2],
     /// First and last frame that were analysed, s since the first of the capture, and how many
@@ -160,6 +164,7 @@ impl Study {
         let mut study = Self {
             name: given.name.into(),
             source: source.into(),
+            origin: given.origin.clone(),
             size: [skeleton.image_size.width, skeleton.image_size.height],
             span_s: ends,
             frames: times.len(),

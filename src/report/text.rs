@@ -30,6 +30,10 @@ fn one(study: &Study, columns: Option<usize>) -> String {
         words::frames(study),
         words::gaps(study)
     );
+    let origin = study.origin.lines();
+    if !origin.is_empty() {
+        top += &format!("{}\n", origin.join(", "));
+    }
     top += &format!("{}\n", words::excitation(study));
     let (answers, all) = (study.answers(), words::number_of(branches.len(), "branch"));
     top += &format!(

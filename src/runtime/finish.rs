@@ -16,7 +16,7 @@ use crate::document::{
 use crate::dynamics::{Depth, Film};
 use crate::files::OutputFolder;
 use crate::model::{
-    AtRest, Outline, Picture, Pose, Rgb, Skeleton, Tentative, Timing, TrackLog, TrackSet,
+    AtRest, Origin, Outline, Picture, Pose, Rgb, Skeleton, Tentative, Timing, TrackLog, TrackSet,
     Unidentified, WoodSeen,
 };
 use crate::recording::TrackFileReader;
@@ -287,10 +287,12 @@ pub(super) fn describe(
     tree: Option<&Model>,
     model: Option<ModelNote>,
 ) -> CaptureNote {
+    let Origin { captured_at, notes } = job.shared.origin();
     CaptureNote {
         schema_version: SCHEMA_VERSION,
         software: Software::default(),
-        captured_at: None,
+        captured_at,
+        notes,
         source: Source {
             name: job.info.name.clone(),
             format_asked: job.info.format.asked.clone(),

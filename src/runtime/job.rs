@@ -4,6 +4,7 @@ use super::finish::Written;
 use super::recorder_thread::{RecordTo, Recorded};
 use super::source_thread::Pace;
 use crate::config::Config;
+use crate::model::UserNotes;
 use crate::outline::Given;
 use crate::solve::Model;
 use std::io::Write;
@@ -25,6 +26,8 @@ pub struct Job {
     pub out: Option<PathBuf>,
     /// Recording of the frames and of what is found in them.
     pub record: Option<RecordTo>,
+    /// What the user notes on the film, for all files of the capture.
+    pub notes: UserNotes,
     /// Time between two pictures for the screen; `None` where there is none.
     pub preview_every: Option<Duration>,
 }
