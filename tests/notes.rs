@@ -1,4 +1,4 @@
-//! When a film was made and what its user noted: through all files of a capture.
+//! When a film was made, what its user noted and what it is worth: through all files of a capture.
 
 mod support;
 
@@ -63,7 +63,7 @@ fn date_and_notes_go_from_the_film_into_every_file() {
     let noted = ["--note", "species=Quercus", "--note", "site=north meadow"];
     let place = ["--record", text(&recording), "--out", text(&first)];
     let all = [&["replay", text(&clip)], &fast[..], &noted, &place].concat();
-    said(&all);
+    let (_, err) = said(&all);
     let told = capture(&first);
     assert_eq!(told["captured_at"], FILMED);
     let notes = json!({"species": "Quercus", "site": "north meadow"});
@@ -73,6 +73,15 @@ fn date_and_notes_go_from_the_film_into_every_file() {
         (&model["captured_at"], &model["notes"]),
         (&json!(FILMED), &notes)
     );
+    // The verdict is in the file and in the closing lines, in the same words.
+    let reasons = told["verdict"]["reasons"].as_array().expect("reasons");
+    let grade = told["verdict"]["grade"].as_str().expect("a grade");
+    let line = err.lines().find_map(|l| l.strip_prefix("verdict: "));
+    let line = line.expect("a verdict");
+    assert!(line.starts_with(grade), "{line}");
+    for reason in reasons {
+        assert!(line.contains(reason.as_str().expect("text")), "{line}");
+    }
 
     // A recording knows both, whenever it is replayed; what is given anew takes precedence.
     let noted = ["--note", "wind=3bft", "--note", "site=south meadow"];
@@ -127,7 +136,10 @@ fn date_and_notes_go_from_the_film_into_every_file() {
         "--report",
         text(&report),
     ]);
-    assert!(table.contains("species: Tilia"), "{table}");
+    assert!(
+        table.contains("species: Tilia") && table.contains("verdict: "),
+        "{table}"
+    );
     let page = fs::read_to_string(&report).expect("a page");
     assert!(page.contains("<dt>species</dt><dd>Tilia</dd>") && page.contains(FILMED));
     assert_eq!(extras(&again.join("tree.glb"))["notes"], notes);

@@ -176,6 +176,7 @@ fn analyse_capture(
         name,
         source: &document.note.source.name,
         origin: &document.note.origin(),
+        verdict: document.note.verdict.as_ref(),
         skeleton: &skeleton,
         film: &film,
         poses: &poses,

@@ -268,6 +268,9 @@ fn closing_lines(s: &Summary) -> Vec<String> {
     if let Some(tree) = &s.tree {
         lines.push(tree_line(tree));
     }
+    if let Some(verdict) = &s.verdict {
+        lines.push(format!("verdict: {}", verdict.line()));
+    }
     if let Some(written) = &s.written {
         let dir = written.dir.display();
         lines.push(match written.tree.is_some() {

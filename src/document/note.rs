@@ -4,7 +4,7 @@
 use super::error::DocumentError;
 use crate::config::{Config, STROKE_POINTS};
 use crate::files::WriteError;
-use crate::model::{LocalTime, Origin, Timing, UserNotes};
+use crate::model::{LocalTime, Origin, Timing, UserNotes, Verdict};
 use serde::{Deserialize, Serialize};
 use std::io::ErrorKind;
 use std::path::Path;
@@ -48,6 +48,9 @@ pub struct CaptureNote {
     /// `None` if the tree is the one that was built first.
     pub refinement: Option<Refinement>,
     pub quality: Quality,
+    /// What the capture is worth, why, and what to do; `None` in those of before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<Verdict>,
     pub model: Option<ModelNote>,
     pub animation: Option<AnimationNote>,
     /// What the user should know before trusting the result, one sentence each.

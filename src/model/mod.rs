@@ -26,6 +26,7 @@ mod track;
 mod track_log;
 mod track_table;
 mod user_notes;
+mod verdict;
 mod wood;
 
 pub use botany::{BotanicalBranch, BotanicalBranches, TREE, TRUNK};
@@ -52,4 +53,5 @@ pub use track::{LONGEST_TRIAL_S, Observation, TrackId, TrackSet};
 pub use track_log::{LogWindow, Tentative, TrackLog};
 pub use track_table::TrackTable;
 pub use user_notes::{NoteError, UserNote, UserNotes};
+pub use verdict::{CaptureFacts, Grade, PointFacts, Shake, SwayFacts, Verdict};
 pub use wood::{AtRest, Masks, Wood, WoodSeen, WoodSight};

@@ -123,6 +123,9 @@ fn facts(study: &Study) -> String {
             "none given".into()
         },
     ));
+    if let Some(verdict) = &study.verdict {
+        rows.push(("Verdict", verdict.line()));
+    }
     if let Some(at) = study.origin.captured_at {
         rows.push(("Filmed at", at.to_string()));
     }

@@ -9,6 +9,7 @@ use crate::dynamics::{
 };
 use crate::model::{
     BotanicalBranches, Excitation, NodeId, Origin, Pose, Skeleton, Sway, Swaying, Unidentified,
+    Verdict,
 };
 use nalgebra::{Point2, Vector2, distance};
 
@@ -27,6 +28,8 @@ pub struct Given<'a> {
     pub source: &'a str,
     /// When it was filmed, and what the user noted.
     pub origin: &'a Origin,
+    /// What the capture was found to be worth.
+    pub verdict: Option<&'a Verdict>,
     pub skeleton: &'a Skeleton,
     /// The points that were analysed, and poses of the same time; none where `motion.csv` is
     /// missing.
@@ -55,6 +58,8 @@ pub struct Study {
     pub source: String,
     /// When it was filmed, and what the user noted.
     pub origin: Origin,
+    /// What the capture was found to be worth; `None` where nobody judged.
+    pub verdict: Option<Verdict>,
     /// Size of the picture, px.
     pub size: [u32; 2],
     /// First and last frame that were analysed, s since the first of the capture, and how many
@@ -165,6 +170,7 @@ impl Study {
             name: given.name.into(),
             source: source.into(),
             origin: given.origin.clone(),
+            verdict: given.verdict.cloned(),
             size: [skeleton.image_size.width, skeleton.image_size.height],
             span_s: ends,
             frames: times.len(),

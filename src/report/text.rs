@@ -34,6 +34,9 @@ fn one(study: &Study, columns: Option<usize>) -> String {
     if !origin.is_empty() {
         top += &format!("{}\n", origin.join(", "));
     }
+    if let Some(verdict) = &study.verdict {
+        top += &format!("verdict: {}\n", verdict.line());
+    }
     top += &format!("{}\n", words::excitation(study));
     let (answers, all) = (study.answers(), words::number_of(branches.len(), "branch"));
     top += &format!(

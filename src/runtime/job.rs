@@ -4,7 +4,7 @@ use super::finish::Written;
 use super::recorder_thread::{RecordTo, Recorded};
 use super::source_thread::Pace;
 use crate::config::Config;
-use crate::model::UserNotes;
+use crate::model::{UserNotes, Verdict};
 use crate::outline::Given;
 use crate::solve::Model;
 use std::io::Write;
@@ -50,6 +50,8 @@ pub struct Summary {
     /// The one that was written, or where nothing was, the last one.
     pub tree: Option<Arc<Model>>,
     pub written: Option<Written>,
+    /// What it is worth; `None` where nothing was filmed.
+    pub verdict: Option<Verdict>,
     pub recorded: Option<Recorded>,
     /// Frames that should have been recorded and were not.
     pub not_recorded: u64,

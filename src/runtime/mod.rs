@@ -17,6 +17,7 @@ mod capture_tables;
 mod finish;
 mod first_picture;
 mod job;
+mod judge;
 mod latest;
 mod losses;
 mod meter;

@@ -6,7 +6,7 @@ use crate::document::note::{CaptureNote, json};
 use crate::document::{BARK_FILE, Document, PICTURE_FILE, at_rest_files, jpeg, png};
 use crate::export::gltf::glb;
 use crate::files::{OutputFolder, WriteError, replace};
-use crate::model::{AtRest, Picture, Pose, Rgb, Skeleton, Swaying, UserNotes};
+use crate::model::{AtRest, Picture, Pose, Rgb, Skeleton, Swaying, UserNotes, Verdict};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -74,7 +74,7 @@ impl DocumentWriter {
     }
 
     /// Writes `nodes.csv`, `tree.glb`, the pictures, the bark, the masks and `capture.json` with
-    /// these `warnings`. `sway` is by node index.
+    /// these `warnings` and this `verdict`. `sway` is by node index.
     ///
     /// # Errors
     /// A file cannot be written, or the tree is none for a model's file.
@@ -83,6 +83,7 @@ impl DocumentWriter {
         folder: &OutputFolder,
         sway: &[Swaying],
         warnings: Vec<String>,
+        verdict: Option<Verdict>,
     ) -> Result<(), PrepareError> {
         self.tree.take_sway(sway);
         folder.write("nodes.csv", &self.tree.document.nodes_csv()?)?;
@@ -102,6 +103,7 @@ impl DocumentWriter {
         let note = CaptureNote {
             animation: Some(animation),
             warnings,
+            verdict,
             ..self.tree.document.note
         };
         folder.write(NOTE_FILE, &json(&note)?)?;
@@ -115,8 +117,8 @@ impl DocumentWriter {
 /// `dir` is there already, a file cannot be written, or the tree is none for a model's file.
 pub fn write_document(dir: &Path, draft: Draft, sway: &[Swaying]) -> Result<PathBuf, PrepareError> {
     let folder = OutputFolder::create(dir)?;
-    let warnings = draft.note.warnings.clone();
-    DocumentWriter::new(draft)?.write(&folder, sway, warnings)?;
+    let (warnings, verdict) = (draft.note.warnings.clone(), draft.note.verdict.clone());
+    DocumentWriter::new(draft)?.write(&folder, sway, warnings, verdict)?;
     Ok(folder.publish()?)
 }
 
