@@ -238,6 +238,8 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ),
     // When a recording began, for those who look for it in a calendar.
     ("SystemTime", &["runtime"]),
+    ("ZonedDateTime::now", &["runtime"]),
+    ("jiff::", &["model", "runtime"]),
 ];
 
 /// A source file without its tests and its comments.

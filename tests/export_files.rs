@@ -169,6 +169,7 @@ fn a_capture_reads_back_as_it_was_written_and_is_the_same_every_time() {
         schema_version: SCHEMA_VERSION,
         software: Default::default(),
         captured_at: None,
+        notes: Default::default(),
         source: Default::default(),
         timing,
         config: Config::default(),
@@ -182,6 +183,7 @@ fn a_capture_reads_back_as_it_was_written_and_is_the_same_every_time() {
             median_fb_error_px: Some(0.05),
             ..Quality::default()
         },
+        verdict: None,
         model: Some(ModelNote::of(&skeleton, 0.004)),
         animation: None,
         warnings: vec!["the camera dropped 3 frames".into()],

@@ -140,10 +140,10 @@ fn the_normals_of_leaves_agree_with_their_winding_in_every_file() {
         .map(|g| triangles(&g.mesh))
         .sum();
     let (bytes, _) = glb(&model(&still.skeleton, &dressed)).expect("GLB");
-    let objects = obj_files(&dressed, "tree", 0.0).expect("OBJ");
+    let objects = obj_files(&dressed, "tree", 0.0, &[]).expect("OBJ");
     let (_, obj) = objects.last().expect("files");
     let obj = String::from_utf8_lossy(obj);
-    let ply = ply(&dressed, 0.02).expect("PLY");
+    let ply = ply(&dressed, 0.02, &[]).expect("PLY");
     let found = [
         in_glb(&bytes),
         in_obj(&obj),

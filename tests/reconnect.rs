@@ -213,6 +213,7 @@ fn job(out: Option<&Path>) -> Job {
         stream: None,
         out: out.map(Path::to_path_buf),
         record: None,
+        notes: Default::default(),
         preview_every: Some(Duration::from_secs(2)),
     }
 }

@@ -446,6 +446,7 @@ fn run(source: Box<dyn Source>, out: &Path, record: Option<RecordTo>) -> runtime
         stream: None,
         out: Some(out.to_owned()),
         record,
+        notes: Default::default(),
         preview_every: Some(Duration::from_secs(2)),
     };
     let (summary, failure) = runtime::start(source, job).expect("start").join();

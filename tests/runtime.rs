@@ -8,7 +8,8 @@ mod support;
 use arborcam::cancel::CancelToken;
 use arborcam::config::{Config, Dynamics};
 use arborcam::model::{
-    Control, FormatNote, NodeName, Outline, PixelFormat, RawFrame, Size, SwayNow, Swaying,
+    Control, FormatNote, LocalTime, NodeName, Outline, PixelFormat, RawFrame, Size, SwayNow,
+    Swaying,
 };
 use arborcam::outline::{Given, Mark, Scribbles};
 use arborcam::pipeline::Pipeline;
@@ -124,6 +125,7 @@ fn job(outline: Option<Outline>, out: Option<&Path>) -> Job {
         stream: None,
         out: out.map(Path::to_path_buf),
         record: None,
+        notes: Default::default(),
         preview_every: Some(Duration::from_secs(2)),
     }
 }
@@ -745,6 +747,10 @@ fn a_camera_that_is_too_fast_loses_frames_and_says_how_many() {
     let capture: serde_json::Value =
         serde_json::from_slice(&std::fs::read(out.join("capture.json")).expect("capture.json"))
             .expect("json");
+    // It is filmed now, in the time zone of here.
+    let at = capture["captured_at"].as_str().expect("when it was filmed");
+    let at: LocalTime = at.parse().expect("a moment");
+    assert!(at.year() >= 2025, "{at}");
     let dropped = capture["timing"]["frames_dropped_tracker"]
         .as_u64()
         .expect("count");

@@ -95,6 +95,8 @@ fn one_node() -> String {
     let data = Data {
         source: String::new(),
         software: "arborcam".into(),
+        captured_at: None,
+        notes: Default::default(),
         metres_per_px: 0.0,
         image: [64, 48],
         foot_px: [32.0, 40.0],

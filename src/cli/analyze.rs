@@ -175,6 +175,8 @@ fn analyse_capture(
     let study = Study::of(&Given {
         name,
         source: &document.note.source.name,
+        origin: &document.note.origin(),
+        verdict: document.note.verdict.as_ref(),
         skeleton: &skeleton,
         film: &film,
         poses: &poses,

@@ -2,6 +2,7 @@
 
 use super::camera::CameraArgs;
 use super::command_error::CommandError;
+use super::notes::NoteArgs;
 use super::scale::ScaleArgs;
 use super::shape::ShapeArgs;
 use super::strokes::StrokeArgs;
@@ -41,6 +42,8 @@ pub struct Common {
     pub shape: ShapeArgs,
     #[command(flatten)]
     pub strokes: StrokeArgs,
+    #[command(flatten)]
+    pub notes: NoteArgs,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -138,11 +138,12 @@ fn files(
     target: &Target,
 ) -> Result<Vec<NamedBytes>, ExportError> {
     let (stem, metres_per_px) = (target.stem(), model.metres_per_px);
+    let about = tree.document.note.origin().lines();
     let bytes = match format {
         Format::Gltf => return gltf_files(model, &stem).map(|(files, _)| files),
-        Format::Obj => return obj_files(&tree.dressed, &stem, metres_per_px),
+        Format::Obj => return obj_files(&tree.dressed, &stem, metres_per_px, &about),
         Format::Html => tree.page(model, &stem)?,
-        Format::Ply => ply(&tree.dressed, metres_per_px)?,
+        Format::Ply => ply(&tree.dressed, metres_per_px, &about)?,
         Format::Glb | Format::Csv => glb(model)?.0,
     };
     Ok(vec![(target.name(), bytes)])

@@ -12,6 +12,8 @@ mod export;
 mod finish;
 mod hangup;
 mod line;
+mod note;
+mod notes;
 mod output;
 mod play;
 mod record;
@@ -61,6 +63,8 @@ enum Command {
     /// Animate the tree of a capture in simulated wind, pull and release it, or magnify its filmed
     /// motion.
     Animate(animate::AnimateArgs),
+    /// Note species, site, wind and the like on a capture, or print what is noted on it.
+    Note(note::NoteCommandArgs),
     /// Complete a capture whose run was ended by a crash or a full disk.
     Finish(finish::FinishArgs),
     /// List the connected cameras.
@@ -91,6 +95,7 @@ fn run(command: &Command) -> Result<(), CommandError> {
         Command::Export(args) => export::run(args),
         Command::Analyze(args) => analyze::run(args),
         Command::Animate(args) => animate::run(args),
+        Command::Note(args) => note::run(args),
         Command::Finish(args) => finish::run(args),
         Command::Devices(args) => devices::run(args),
         Command::Doctor(args) => doctor::run(args),

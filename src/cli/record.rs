@@ -3,6 +3,7 @@
 use super::camera::CameraArgs;
 use super::command_error::CommandError;
 use super::hangup::SighupAction;
+use super::notes::NoteArgs;
 use super::output::eprint_line;
 use super::recording::{self, LimitArgs, parse_time_ns};
 use super::session::{init_log, stop_on_signals, warn_of_other_format};
@@ -30,6 +31,8 @@ pub struct RecordArgs {
     camera: CameraArgs,
     #[command(flatten)]
     limits: LimitArgs,
+    #[command(flatten)]
+    notes: NoteArgs,
     /// Settings that differ from the defaults (TOML; see config/arborcam.toml); only `[camera]` is
     /// used.
     #[arg(long, value_name = "FILE")]
@@ -40,10 +43,12 @@ pub fn run(args: &RecordArgs) -> Result<(), CommandError> {
     let config = Config::default().layered(args.config.as_deref(), |config| {
         args.camera.set(&mut config.camera);
     })?;
+    args.notes.check()?;
     recording::check_new_file(&args.file)?;
     let source =
         runtime::open(&args.device, &config.camera, None).map_err(CommandError::no_input)?;
     let info = source.describe();
+    let notes = args.notes.over(&*source)?;
     let stop = stop_on_signals(SighupAction::ends_this_process())?;
     init_log(true);
     warn_of_other_format(&info);
@@ -53,7 +58,7 @@ pub fn run(args: &RecordArgs) -> Result<(), CommandError> {
         Pace::Recorded
     };
     let job = RecordJob {
-        to: recording::target(&args.file, args.limits.limits(), &*source),
+        to: recording::target(&args.file, args.limits.limits(), &*source, &notes),
         pace,
         camera: config.camera,
     };

@@ -1,6 +1,7 @@
 //! Options, checks and the closing line of the commands that record.
 
 use super::command_error::CommandError;
+use crate::model::{Origin, UserNotes};
 use crate::recording::{Head, Limits, RecordingError};
 use crate::runtime::{QUEUE_BYTES, RecordTo, Recorded};
 use crate::source::Source;
@@ -53,16 +54,16 @@ impl RecordOption {
         }
     }
 
-    /// Where to record frames of `source` to; `None` without `--record`.
-    pub fn target(&self, source: &dyn Source) -> Option<RecordTo> {
+    /// Where to record frames of `source` with these notes to; `None` without `--record`.
+    pub fn target(&self, source: &dyn Source, notes: &UserNotes) -> Option<RecordTo> {
         self.record
             .as_ref()
-            .map(|path| target(path, self.limits.limits(), source))
+            .map(|path| target(path, self.limits.limits(), source, notes))
     }
 }
 
 /// Where to record frames of `source` to, with the metadata of the recording.
-pub fn target(path: &Path, limits: Limits, source: &dyn Source) -> RecordTo {
+pub fn target(path: &Path, limits: Limits, source: &dyn Source, notes: &UserNotes) -> RecordTo {
     let info = source.describe();
     let head = Head {
         source: info.name,
@@ -70,6 +71,10 @@ pub fn target(path: &Path, limits: Limits, source: &dyn Source) -> RecordTo {
         size: Some(info.size),
         nominal_rate_hz: info.nominal_rate_hz,
         clock: source.health().clock.name().into(),
+        origin: Origin {
+            notes: notes.clone(),
+            ..source.origin()
+        },
     };
     RecordTo {
         path: path.to_owned(),

@@ -94,6 +94,7 @@ fn check_arguments(common: &Common, plan: &Plan, headless: bool) -> Result<(), C
         ));
     }
     common.shape.reject_image_envelope()?;
+    common.notes.check()?;
     if let Some(dir) = &common.out {
         // Created only as a test; dropping it removes it.
         OutputFolder::create(dir).map_err(CommandError::failed)?;
@@ -126,6 +127,7 @@ fn job(
             Some(outline::load(path, info.size).map_err(CommandError::bad_usage)?)
         }
     };
+    let notes = common.notes.over(source)?;
     Ok(Job {
         config,
         outline,
@@ -133,7 +135,8 @@ fn job(
         length_s: common.for_s,
         stream: common.stream.map(|_| Box::new(std::io::stdout()) as _),
         out: common.out.clone(),
-        record: plan.record.target(source),
+        record: plan.record.target(source, &notes),
+        notes,
         preview_every: (!headless).then_some(PREVIEW_SCREEN),
     })
 }
@@ -264,6 +267,9 @@ fn closing_lines(s: &Summary) -> Vec<String> {
     )];
     if let Some(tree) = &s.tree {
         lines.push(tree_line(tree));
+    }
+    if let Some(verdict) = &s.verdict {
+        lines.push(format!("verdict: {}", verdict.line()));
     }
     if let Some(written) = &s.written {
         let dir = written.dir.display();

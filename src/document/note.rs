@@ -1,10 +1,10 @@
-//! `capture.json`: what was filmed, with what, how well; written and read. No date of today, so
-//! that a replay gives the same file.
+//! `capture.json`: what was filmed, when, with what, how well; written and read. No date of today,
+//! so that a replay gives the same file.
 
 use super::error::DocumentError;
 use crate::config::{Config, STROKE_POINTS};
 use crate::files::WriteError;
-use crate::model::Timing;
+use crate::model::{LocalTime, Origin, Timing, UserNotes, Verdict};
 use serde::{Deserialize, Serialize};
 use std::io::ErrorKind;
 use std::path::Path;
@@ -25,10 +25,12 @@ pub const SCHEMA_VERSION: u32 = 1;
 pub struct CaptureNote {
     pub schema_version: u32,
     pub software: Software,
-    /// When the capture began, RFC 3339, if the caller wants it in the file; a replay leaves it
-    /// out.
+    /// When the first frame was filmed; `None` where the source does not know.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub captured_at: Option<String>,
+    pub captured_at: Option<LocalTime>,
+    /// What the user noted.
+    #[serde(default, skip_serializing_if = "UserNotes::is_empty")]
+    pub notes: UserNotes,
     pub source: Source,
     pub timing: Timing,
     /// The whole effective configuration: defaults, file and command line together.
@@ -46,6 +48,9 @@ pub struct CaptureNote {
     /// `None` if the tree is the one that was built first.
     pub refinement: Option<Refinement>,
     pub quality: Quality,
+    /// What the capture is worth, why, and what to do; `None` in those of before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<Verdict>,
     pub model: Option<ModelNote>,
     pub animation: Option<AnimationNote>,
     /// What the user should know before trusting the result, one sentence each.
@@ -297,6 +302,14 @@ fn unread(file: &Path, e: serde_json::Error) -> DocumentError {
 }
 
 impl CaptureNote {
+    /// When the film was made, and what the user noted on it.
+    pub fn origin(&self) -> Origin {
+        Origin {
+            captured_at: self.captured_at,
+            notes: self.notes.clone(),
+        }
+    }
+
     /// What is wrong with its numbers.
     fn check(&self) -> Result<(), String> {
         self.config.check().map_err(|e| e.to_string())?;

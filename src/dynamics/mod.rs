@@ -31,6 +31,6 @@ pub use decay::{Mode, Start};
 pub use film::{Film, FilmTrack, NOT_SEEN};
 pub use modal::{Shoot, shoots};
 pub use release::{Onset, fades_as_a_free_decay};
-pub use shake::{Shake, shake};
+pub use shake::shake;
 pub use spectrum::{HalfPower, Spectrum, spectrum};
 pub use sway::{Analysis, Depth, LEAST_PERIODS, analyse};

@@ -1,6 +1,7 @@
 //! How much the camera trembles, and how fast.
 
 use super::spectrum::spectrum;
+use crate::model::Shake;
 use crate::signal::statistics::rms;
 use nalgebra::Vector2;
 
@@ -8,15 +9,6 @@ use nalgebra::Vector2;
 const SLOWEST_HZ: f64 = 0.3;
 /// A camera that trembles less than this has no frequency, px: it is the noise of its measurement.
 const LEAST_PX: f64 = 0.05;
-
-/// How the camera trembled in a stretch of film, without its drift.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shake {
-    /// Root mean square of its displacement, px.
-    pub rms_px: f64,
-    /// Where it has most power; `None` where it hardly trembles, or the film is too short.
-    pub frequency_hz: Option<f64>,
-}
 
 /// The shake in `shifts_px`, the displacements of the picture at growing `times_s`. A straight line
 /// in time is taken off as drift.

@@ -9,7 +9,7 @@ use super::gltf_look::{LeafPicture, bark, leaf};
 use super::gltf_mesh::{Skinned, push_mesh, push_skin};
 use super::gltf_model::raw;
 use super::joints::Moving;
-use crate::document::note::{AnimationNote, Software};
+use crate::document::note::{AnimationNote, CaptureNote, Software};
 use crate::geometry::{Dressed, FoliageGroup, LEVELS, Mesh};
 use crate::model::{NodeId, Pose, TREE};
 use gltf_json::{Asset, Index, Node, Root, Scene, Skin};
@@ -18,15 +18,23 @@ use std::borrow::Cow;
 
 pub use super::gltf_model::{KEY_TOLERANCE_PX, Model};
 
-/// Where the model comes from, for the file's own notes.
-pub fn provenance(source: &str, software: &Software, poses: &[Pose]) -> Value {
-    json!({
+/// Where the model comes from, for the file's own notes: the capture, and the program that writes
+/// it.
+pub fn provenance(capture: &CaptureNote, software: &Software, poses: &[Pose]) -> Value {
+    let mut provenance = json!({
         "software": software,
-        "source": source,
+        "source": capture.source.name,
         "first_frame": poses.first().map(|p| p.frame),
         "frames": poses.len(),
         "measured": "front view: tracked points; depth and copied planes: estimated (Li et al. 2011)",
-    })
+    });
+    if let Some(at) = capture.captured_at {
+        provenance["captured_at"] = at.to_string().into();
+    }
+    if !capture.notes.is_empty() {
+        provenance["notes"] = json!(capture.notes);
+    }
+    provenance
 }
 
 /// How many levels of detail there are.

@@ -150,6 +150,8 @@ mod tests {
         Data {
             source: source.into(),
             software: "arborcam".into(),
+            captured_at: None,
+            notes: Default::default(),
             metres_per_px: 0.0,
             image: [4, 3],
             foot_px: [2.0, 2.0],

@@ -2,7 +2,9 @@
 
 use crate::document::{CaptureNote, Columns};
 use crate::dynamics::angle_to_parent_deg;
-use crate::model::{BotanicalBranches, MAIN_BRANCH_RGB, NodeId, Pose, Skeleton, Swaying};
+use crate::model::{
+    BotanicalBranches, LocalTime, MAIN_BRANCH_RGB, NodeId, Pose, Skeleton, Swaying, UserNotes,
+};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
@@ -14,6 +16,9 @@ pub struct Data {
     pub source: String,
     /// Name and version of the program that filmed it.
     pub software: String,
+    /// When it was filmed, where that is known, and what the user noted.
+    pub captured_at: Option<LocalTime>,
+    pub notes: UserNotes,
     /// Metres in a pixel of the model's file; 0 where it is in pixels.
     pub metres_per_px: f64,
     /// Width and height of the picture, px.
@@ -86,6 +91,8 @@ impl Data {
         Self {
             source: source.to_owned(),
             software: format!("{} {}", capture.software.name, capture.software.version),
+            captured_at: capture.captured_at,
+            notes: capture.notes.clone(),
             metres_per_px,
             image: [size.width, size.height],
             foot_px: skeleton.foot_px.into(),

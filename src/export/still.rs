@@ -81,7 +81,15 @@ fn scale(metres_per_px: f64) -> f64 {
     }
 }
 
-/// `STEM.mtl`, the texture of the leaves where there is one, and `STEM.obj`, in this order.
+/// The first lines of a file as comments that begin with `mark`.
+fn comments(mark: &str, about: &[String]) -> String {
+    let program = concat!("arborcam ", env!("CARGO_PKG_VERSION"));
+    let lines = std::iter::once(program).chain(about.iter().map(String::as_str));
+    lines.map(|line| format!("{mark} {line}\n")).collect()
+}
+
+/// `STEM.mtl`, the texture of the leaves where there is one, and `STEM.obj`, in this order. `about`
+/// is what is said of the tree, lines of comment.
 ///
 /// # Errors
 /// There is nothing to draw, or it is no number.
@@ -89,12 +97,10 @@ pub fn obj_files(
     dressed: &Dressed,
     stem: &str,
     metres_per_px: f64,
+    about: &[String],
 ) -> Result<Vec<NamedBytes>, ExportError> {
     let parts = parts(dressed)?;
-    let mut text = format!(
-        "# arborcam {}\nmtllib {stem}.mtl\n",
-        env!("CARGO_PKG_VERSION")
-    );
+    let mut text = format!("{}mtllib {stem}.mtl\n", comments("#", about));
     let mut before = 1;
     for part in &parts {
         push_part(&mut text, part, metres_per_px, before);
@@ -176,11 +182,15 @@ fn mean_colour(dressed: &Dressed) -> [u8; 3] {
     sum.map(|s| (s / n.max(1)) as u8)
 }
 
-/// One binary PLY with places, normals and colours.
+/// One binary PLY with places, normals and colours, and what is said of the tree as comments.
 ///
 /// # Errors
 /// As of [`obj_files`].
-pub fn ply(dressed: &Dressed, metres_per_px: f64) -> Result<Vec<u8>, ExportError> {
+pub fn ply(
+    dressed: &Dressed,
+    metres_per_px: f64,
+    about: &[String],
+) -> Result<Vec<u8>, ExportError> {
     let parts = parts(dressed)?;
     let scale = scale(metres_per_px);
     let vertices: usize = parts.iter().map(|p| p.mesh.positions.len()).sum();
@@ -192,9 +202,9 @@ pub fn ply(dressed: &Dressed, metres_per_px: f64) -> Result<Vec<u8>, ExportError
         .map(|c| format!("property uchar {c}\n"))
         .concat();
     let head = format!(
-        "ply\nformat binary_little_endian 1.0\ncomment arborcam {}\nelement vertex {vertices}\n{floats}{colours}\
+        "ply\nformat binary_little_endian 1.0\n{}element vertex {vertices}\n{floats}{colours}\
          element face {faces}\nproperty list uchar int vertex_indices\nend_header\n",
-        env!("CARGO_PKG_VERSION")
+        comments("comment", about)
     );
     let mut bytes = head.into_bytes();
     bytes.reserve(27 * vertices + 13 * faces);

@@ -1,7 +1,8 @@
 //! The one store of points over time.
 
 use super::{Background, Observation, TrackId, TrackSet};
-use std::collections::{BTreeSet, VecDeque};
+use nalgebra::Vector2;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 /// The followed points of the last seconds, frame by frame.
@@ -128,6 +129,46 @@ impl<'a> LogWindow<'a> {
             (Some(first), Some(newest)) => newest.time_s - first.time_s,
             _ => 0.0,
         }
+    }
+}
+
+/// A point that was seen in fewer frames says nothing of how far it moves.
+const LEAST_SEEN: u32 = 10;
+
+impl LogWindow<'_> {
+    /// How far each point moves, px, in no order: the amplitude of the sine with the same mean
+    /// square about its mean place.
+    pub fn amplitudes_px(&self) -> Vec<f64> {
+        let mut points: BTreeMap<TrackId, Places> = BTreeMap::new();
+        for set in self.sets() {
+            for o in &set.observations {
+                let at_px = Vector2::new(o.u_px, o.v_px).cast();
+                points.entry(o.id).or_default().add(at_px);
+            }
+        }
+        let seen = points.values().filter(|places| places.n >= LEAST_SEEN);
+        seen.map(Places::amplitude_px).collect()
+    }
+}
+
+/// Mean and spread of the places of a point, by Welford's recursion.
+#[derive(Clone, Copy, Debug, Default)]
+struct Places {
+    n: u32,
+    mean_px: Vector2<f64>,
+    sum_of_squares: f64,
+}
+
+impl Places {
+    fn add(&mut self, at_px: Vector2<f64>) {
+        self.n += 1;
+        let off = at_px - self.mean_px;
+        self.mean_px += off / f64::from(self.n);
+        self.sum_of_squares += off.dot(&(at_px - self.mean_px));
+    }
+
+    fn amplitude_px(&self) -> f64 {
+        (2.0 * self.sum_of_squares / f64::from(self.n)).sqrt()
     }
 }
 
@@ -267,6 +308,26 @@ mod tests {
         );
         log.push(set(500));
         assert_eq!(log.all().newest().map(ids), Some(vec![0, 2, 3]));
+    }
+
+    #[test]
+    fn a_point_moves_as_far_as_the_sine_with_its_mean_square() {
+        let mut log = TrackLog::new(60.0);
+        for k in 0..200 {
+            let mut moving = observation(1, true);
+            moving.u_px = 300.0 + 2.5 * (0.1 * std::f32::consts::TAU * k as f32).sin();
+            let mut seen = vec![observation(0, true), moving];
+            // Too short to say anything.
+            seen.extend((k < 5).then(|| observation(2, true)));
+            log.push(TrackSet {
+                time_s: k as f64 / 10.0,
+                observations: seen,
+                ..TrackSet::default()
+            });
+        }
+        let amplitudes_px = log.all().amplitudes_px();
+        assert_eq!(amplitudes_px.len(), 2);
+        assert!(amplitudes_px[0] == 0.0 && (amplitudes_px[1] - 2.5).abs() < 1e-3);
     }
 
     #[test]

@@ -4,9 +4,11 @@ use super::cursor::Cursor;
 use super::error::RecordingError;
 use super::image::{Picture, decode};
 use super::schema::{
-    ABOUT, COMPRESSED_IMAGE, COUNTED, FIRST_SEQUENCE, RAW_IMAGE, SEQUENCE, SHIFT_NS,
+    ABOUT, CAPTURED_AT, CLOCK, COMPRESSED_IMAGE, COUNTED, FILE_CLOCK, FIRST_SEQUENCE, NOTE,
+    RAW_IMAGE, SEQUENCE, SHIFT_NS,
 };
 use super::walk::{Walk, read_up_to};
+use crate::model::{LocalTime, Origin, UserNote, UserNotes};
 use mcap::records::op;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -41,6 +43,8 @@ pub struct Reader<R = File> {
     others: BTreeSet<String>,
     counts: BTreeMap<u16, u64>,
     sequence: Option<u64>,
+    /// The first picture's time by the calendar, ns since 1970, in a file of ours.
+    first_log_ns: Option<i64>,
     unreadable: u64,
     broken: Option<String>,
 }
@@ -83,6 +87,7 @@ impl<R: Read + Seek> Reader<R> {
             others: BTreeSet::new(),
             counts: BTreeMap::new(),
             sequence: None,
+            first_log_ns: None,
             unreadable: 0,
             broken: None,
         };
@@ -110,6 +115,35 @@ impl<R: Read + Seek> Reader<R> {
     /// What the recording says of itself; complete from the first picture on.
     pub fn about(&self) -> &About {
         &self.about
+    }
+
+    /// When it was filmed and what the user noted; complete from the first picture on.
+    pub fn origin(&self) -> Origin {
+        let said = self.about.get(CAPTURED_AT).and_then(|at| at.parse().ok());
+        Origin {
+            captured_at: said.or_else(|| self.filmed_at()),
+            notes: self.notes(),
+        }
+    }
+
+    /// When a camera has filmed the first picture, by a recording that does not say it in words:
+    /// without the time zone.
+    fn filmed_at(&self) -> Option<LocalTime> {
+        self.about.get(CLOCK).filter(|clock| *clock != FILE_CLOCK)?;
+        LocalTime::from_unix_ns(self.first_log_ns?)
+    }
+
+    /// The notes in it, but for those that are none: anybody may have written the file.
+    fn notes(&self) -> UserNotes {
+        let mut notes = UserNotes::default();
+        for (key, value) in &self.about {
+            let note = key.strip_prefix(NOTE).map(|key| UserNote::new(key, value));
+            if let Some(Ok(note)) = note {
+                // Those beyond the most that there may be are left out, too.
+                let _ = notes.put(note);
+            }
+        }
+        notes
     }
 
     /// Pictures in the file, if it was ended properly.
@@ -181,6 +215,9 @@ impl<R: Read + Seek> Reader<R> {
                 .filter(|ns| *ns != 0)
                 .or(i64::try_from(head.log_ns).ok())?,
         };
+        if counted.is_some() && self.first_log_ns.is_none() {
+            self.first_log_ns = i64::try_from(head.log_ns).ok();
+        }
         let sequence = (counted == Some(true)).then(|| self.whole_sequence(head.number));
         self.sequence = sequence.or(self.sequence);
         Some(Picture {

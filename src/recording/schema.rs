@@ -41,6 +41,12 @@ pub(super) const UNCOUNTED: &str = "none";
 pub(super) const ABOUT: &str = "arborcam";
 pub(super) const SHIFT_NS: &str = "publish_time_minus_sensor_time_ns";
 pub(super) const FIRST_SEQUENCE: &str = "first_sequence";
+pub(super) const CLOCK: &str = "clock";
+/// [`CLOCK`] where the frames are those of a file, which were not filmed when they were recorded.
+pub(super) const FILE_CLOCK: &str = "file";
+pub(super) const CAPTURED_AT: &str = "captured_at";
+/// Begins the keys of the user's notes.
+pub(super) const NOTE: &str = "note.";
 
 fn protobuf(topic: &'static str, schema: &'static str, definition: &'static [u8]) -> Channel {
     Channel {

@@ -1,10 +1,12 @@
 //! A recording: one file, or several in turn where a limit is set. Each file stands on its own.
 
 use super::error::RecordingError;
-use super::schema::{FIRST_SEQUENCE, SHIFT_NS, Topic};
+use super::schema::{CAPTURED_AT, CLOCK, FIRST_SEQUENCE, NOTE, SHIFT_NS, Topic};
 use super::writer::{Times, Writer};
 use super::{image, scene};
-use crate::model::{FormatNote, Outline, Pose, RawFrame, Size, Skeleton, TrackSet, nanoseconds};
+use crate::model::{
+    FormatNote, LocalTime, Origin, Outline, Pose, RawFrame, Size, Skeleton, TrackSet, nanoseconds,
+};
 use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -23,6 +25,9 @@ pub struct Head {
     pub nominal_rate_hz: Option<f64>,
     /// What the frames' times come from, e.g. `monotonic`, `file`.
     pub clock: String,
+    /// Of a camera, when the first frame was filmed is known only with that frame, see
+    /// [`Series::set_captured_at`].
+    pub origin: Origin,
 }
 
 /// When a file is ended and the next one begun.
@@ -151,6 +156,11 @@ impl Series {
         self.writer.path()
     }
 
+    /// Says when the first frame was filmed; to be said before that frame.
+    pub fn set_captured_at(&mut self, at: LocalTime) {
+        self.head.origin.captured_at = Some(at);
+    }
+
     /// Appends a frame; `index` is its place in the capture, by which results name it.
     ///
     /// # Errors
@@ -219,7 +229,7 @@ impl Series {
             ("fourcc", first.format.fourcc().to_owned()),
             ("width", size.width.to_string()),
             ("height", size.height.to_string()),
-            ("clock", head.clock.clone()),
+            (CLOCK, head.clock.clone()),
             (
                 "log_time_minus_sensor_time_ns",
                 clock.log_minus_sensor_ns.to_string(),
@@ -233,9 +243,18 @@ impl Series {
         if let Some(number) = first.sequence {
             entries.push((FIRST_SEQUENCE, number.to_string()));
         }
+        if let Some(at) = head.origin.captured_at {
+            // Each file says when its own first frame was filmed.
+            let sensor_ns = nanoseconds(first.sensor_time_s);
+            let at = at.later_by_ns(sensor_ns.saturating_sub(clock.start_ns));
+            entries.push((CAPTURED_AT, at.to_string()));
+        }
+        let notes = head.origin.notes.iter();
+        let notes = notes.map(|(key, value)| (format!("{NOTE}{key}"), value.to_owned()));
         let entries = entries.into_iter();
         let entries: BTreeMap<String, String> = entries
             .map(|(key, value)| (key.to_owned(), value))
+            .chain(notes)
             .collect();
         self.writer.about(entries)?;
         let times = clock.times(nanoseconds(first.sensor_time_s));

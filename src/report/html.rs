@@ -123,6 +123,14 @@ fn facts(study: &Study) -> String {
             "none given".into()
         },
     ));
+    if let Some(verdict) = &study.verdict {
+        rows.push(("Verdict", verdict.line()));
+    }
+    if let Some(at) = study.origin.captured_at {
+        rows.push(("Filmed at", at.to_string()));
+    }
+    let own = study.origin.notes.iter();
+    rows.extend(own.map(|(key, value)| (key, value.to_owned())));
     rows.extend(study.notes.iter().map(|note| ("Note", note.clone())));
     let mut list = String::new();
     for (name, text) in &rows {

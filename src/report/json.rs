@@ -26,6 +26,9 @@ fn capture(study: &Study) -> Value {
     json!({
         "name": study.name,
         "source": study.source,
+        "captured_at": study.origin.captured_at,
+        "user_notes": study.origin.notes,
+        "verdict": study.verdict,
         "from_s": study.span_s.lo,
         "to_s": study.span_s.hi,
         "frames": study.frames,

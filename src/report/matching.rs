@@ -209,6 +209,8 @@ mod tests {
         Study {
             name: String::new(),
             source: String::new(),
+            origin: Default::default(),
+            verdict: None,
             size: [640, 360],
             span_s: Bounds::new(0.0, 1.0),
             frames: 30,

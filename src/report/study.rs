@@ -8,7 +8,8 @@ use crate::dynamics::{
     angle_to_parent_deg, spectrum,
 };
 use crate::model::{
-    BotanicalBranches, Excitation, NodeId, Pose, Skeleton, Sway, Swaying, Unidentified,
+    BotanicalBranches, Excitation, NodeId, Origin, Pose, Skeleton, Sway, Swaying, Unidentified,
+    Verdict,
 };
 use nalgebra::{Point2, Vector2, distance};
 
@@ -25,6 +26,10 @@ pub struct Given<'a> {
     pub name: &'a str,
     /// What was filmed: the name of the source.
     pub source: &'a str,
+    /// When it was filmed, and what the user noted.
+    pub origin: &'a Origin,
+    /// What the capture was found to be worth.
+    pub verdict: Option<&'a Verdict>,
     pub skeleton: &'a Skeleton,
     /// The points that were analysed, and poses of the same time; none where `motion.csv` is
     /// missing.
@@ -51,6 +56,10 @@ pub struct Study {
     pub name: String,
     /// What was filmed, without the folders that it lies in.
     pub source: String,
+    /// When it was filmed, and what the user noted.
+    pub origin: Origin,
+    /// What the capture was found to be worth; `None` where nobody judged.
+    pub verdict: Option<Verdict>,
     /// Size of the picture, px.
     pub size: [u32; 2],
     /// First and last frame that were analysed, s since the first of the capture, and how many
@@ -160,6 +169,8 @@ impl Study {
         let mut study = Self {
             name: given.name.into(),
             source: source.into(),
+            origin: given.origin.clone(),
+            verdict: given.verdict.cloned(),
             size: [skeleton.image_size.width, skeleton.image_size.height],
             span_s: ends,
             frames: times.len(),

@@ -30,6 +30,13 @@ fn one(study: &Study, columns: Option<usize>) -> String {
         words::frames(study),
         words::gaps(study)
     );
+    let origin = study.origin.lines();
+    if !origin.is_empty() {
+        top += &format!("{}\n", origin.join(", "));
+    }
+    if let Some(verdict) = &study.verdict {
+        top += &format!("verdict: {}\n", verdict.line());
+    }
     top += &format!("{}\n", words::excitation(study));
     let (answers, all) = (study.answers(), words::number_of(branches.len(), "branch"));
     top += &format!(

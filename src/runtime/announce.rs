@@ -26,7 +26,7 @@ const CAMERA_UNCLEAR: &str = "nothing around the outline shows how the camera mo
                               more of the ground and of what stands still";
 /// It is given after so much film, s, if the motion is known in less than this share of it.
 const CAMERA_JUDGED_S: f64 = 3.0;
-const CAMERA_KNOWN: f64 = 0.5;
+pub const CAMERA_KNOWN: f64 = 0.5;
 /// A camera that trembles by less than this is not spoken of, px.
 const SHAKE_PX: f64 = 0.5;
 

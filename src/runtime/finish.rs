@@ -2,6 +2,7 @@
 
 use super::announce::little_motion;
 use super::capture_tables::{CaptureTables, Done};
+use super::judge::verdict;
 use super::meter::Histogram;
 use super::shaking::ShakeMeter;
 use super::shared::{Failure, Shared};
@@ -17,8 +18,8 @@ use crate::document::{
 use crate::dynamics::{Depth, Film};
 use crate::files::OutputFolder;
 use crate::model::{
-    AtRest, Outline, Picture, Pose, Rgb, Skeleton, Tentative, Timing, TrackLog, TrackSet,
-    Unidentified, WoodSeen,
+    AtRest, Origin, Outline, Picture, Pose, Rgb, Skeleton, Tentative, Timing, TrackLog, TrackSet,
+    Unidentified, Verdict, WoodSeen,
 };
 use crate::recording::TrackFileReader;
 use crate::solve::{Model, with_modes};
@@ -63,12 +64,13 @@ impl Quality {
         }
     }
 
-    fn figures(&self, tree: Option<&Model>) -> QualityNote {
+    /// The figures as the capture has them.
+    pub(super) fn figures(&self, tree: Option<&Model>) -> QualityNote {
         let tracked_s = self.last_s - self.first.map_or(self.last_s, |(_, s)| s);
         let shaking = self.shaking.so_far();
         QualityNote {
-            camera_shake_px: shaking.rms_px,
-            camera_shake_hz: shaking.frequency_hz,
+            camera_shake_px: shaking.shake.map(|shake| shake.rms_px),
+            camera_shake_hz: shaking.shake.and_then(|shake| shake.frequency_hz),
             camera_seen_share: Some(shaking.seen_share),
             camera_lost_share: Some(shaking.lost_share),
             tracks_total: self.tracks_total(),
@@ -120,6 +122,7 @@ pub struct Written {
     pub dir: PathBuf,
     /// The model of its files.
     pub tree: Option<Arc<Model>>,
+    pub verdict: Verdict,
 }
 
 /// Writes the capture to `dir`, which appears only when it is complete.
@@ -161,11 +164,13 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
     );
     warn_of_unanalysed(job, &model);
     let warnings = warnings(job, Some(&model));
-    writer?.write(&done.folder, &model.modes, warnings)?;
+    let verdict = verdict(job, Some(&model));
+    writer?.write(&done.folder, &model.modes, warnings, Some(verdict.clone()))?;
     let dir = done.folder.publish()?;
     Ok(Written {
         dir,
         tree: Some(Arc::new(model)),
+        verdict,
     })
 }
 
@@ -256,16 +261,25 @@ fn without_tree(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
     });
     nodes(folder.file("nodes.csv")?, &foot_only, &[], metres_per_px)?;
     MotionCsv::new(folder.file("motion.csv")?, &foot_only, metres_per_px)?.finish()?;
-    describe_without_tree(job, &folder)?;
+    let verdict = verdict(job, None);
+    describe_without_tree(job, &folder, &verdict)?;
     let dir = folder.publish()?;
-    Ok(Written { dir, tree: None })
+    let tree = None;
+    Ok(Written { dir, tree, verdict })
 }
 
-fn describe_without_tree(job: &CaptureJob, folder: &OutputFolder) -> Result<(), Failure> {
+fn describe_without_tree(
+    job: &CaptureJob,
+    folder: &OutputFolder,
+    verdict: &Verdict,
+) -> Result<(), Failure> {
     if let Some(picture) = &job.picture {
         folder.write(PICTURE_FILE, &jpeg(&picture.rgb)?)?;
     }
-    let note = describe(job, None, None);
+    let note = CaptureNote {
+        verdict: Some(verdict.clone()),
+        ..describe(job, None, None)
+    };
     Ok(folder.write("capture.json", &json(&note)?)?)
 }
 
@@ -300,10 +314,12 @@ pub(super) fn describe(
     tree: Option<&Model>,
     model: Option<ModelNote>,
 ) -> CaptureNote {
+    let Origin { captured_at, notes } = job.shared.origin();
     CaptureNote {
         schema_version: SCHEMA_VERSION,
         software: Software::default(),
-        captured_at: None,
+        captured_at,
+        notes,
         source: Source {
             name: job.info.name.clone(),
             format_asked: job.info.format.asked.clone(),
@@ -336,6 +352,7 @@ pub(super) fn describe(
         build: tree.map(first_build),
         refinement: tree.and_then(refinement),
         quality: job.quality.figures(tree),
+        verdict: None,
         model,
         animation: None,
         warnings: warnings(job, tree),
@@ -346,7 +363,8 @@ fn count(counter: &AtomicU64) -> u64 {
     counter.load(Ordering::Relaxed)
 }
 
-fn timing(job: &CaptureJob) -> Timing {
+/// The frames of a capture in time.
+pub(super) fn timing(job: &CaptureJob) -> Timing {
     let counts = &job.shared.counts;
     let (seen, duration_s) = (count(&counts.seen), job.shared.last_time_s());
     let camera = job.shared.camera_state();

@@ -4,6 +4,7 @@ use super::finish::Written;
 use super::recorder_thread::{RecordTo, Recorded};
 use super::source_thread::Pace;
 use crate::config::Config;
+use crate::model::{UserNotes, Verdict};
 use crate::outline::Given;
 use crate::solve::Model;
 use std::io::Write;
@@ -25,6 +26,8 @@ pub struct Job {
     pub out: Option<PathBuf>,
     /// Recording of the frames and of what is found in them.
     pub record: Option<RecordTo>,
+    /// What the user notes on the film, for all files of the capture.
+    pub notes: UserNotes,
     /// Time between two pictures for the screen; `None` where there is none.
     pub preview_every: Option<Duration>,
 }
@@ -47,6 +50,8 @@ pub struct Summary {
     /// The one that was written, or where nothing was, the last one.
     pub tree: Option<Arc<Model>>,
     pub written: Option<Written>,
+    /// What it is worth; `None` where nothing was filmed.
+    pub verdict: Option<Verdict>,
     pub recorded: Option<Recorded>,
     /// Frames that should have been recorded and were not.
     pub not_recorded: u64,

@@ -17,6 +17,7 @@ mod capture_tables;
 mod finish;
 mod first_picture;
 mod job;
+mod judge;
 mod latest;
 mod losses;
 mod meter;
@@ -54,7 +55,7 @@ pub use unfinished::{finish_unfinished, unfinished_dir};
 pub use watched::open;
 
 use crate::config::Config;
-use crate::model::{Control, Outline, Snapshot};
+use crate::model::{Control, Origin, Outline, Snapshot};
 use crate::outline::{Given, Scribbles};
 use crate::pipeline::{DecodeStage, FrontEnd};
 use crate::source::Source;
@@ -90,6 +91,10 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
     let limit = job.config.camera.time_limit();
     let source = Watched::if_live(source, limit).map_err(Failure::Thread)?;
     let shared = Arc::new(Shared::default());
+    shared.set_origin(Origin {
+        captured_at: source.origin().captured_at,
+        notes: job.notes.clone(),
+    });
     let info = source.describe();
     let (frames_in, frames_out) = bounded(FRAME_QUEUE);
     let (model_in, model_out) = bounded(MODEL_QUEUE);

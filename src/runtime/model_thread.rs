@@ -6,6 +6,7 @@ use super::background::{Background, Beside, Pending};
 use super::capture_tables::CaptureTables;
 use super::finish::{self, CaptureJob, Quality, Written};
 use super::job::{Job, Summary};
+use super::judge::verdict;
 use super::pulse::Worker;
 use super::recorder_thread::{Found, Recorded, Recorder};
 use super::refining::Refining;
@@ -19,7 +20,7 @@ use super::track_thread::ToModel;
 use super::unfinished::Unfinished;
 use crate::cancel::CancelToken;
 use crate::config::Config;
-use crate::model::{Phase, Picture, Pose, SwayNow};
+use crate::model::{Phase, Picture, Pose, SwayNow, Verdict};
 use crate::pipeline::{BackEnd, Followed, Moved};
 use crate::recording::TrackFile;
 use crate::solve::{LEAST_MOVING, Model};
@@ -521,6 +522,14 @@ impl ModelThread {
         }
     }
 
+    /// What a capture is worth of which nothing was written: without the sway, which is analysed
+    /// for the files.
+    fn verdict_unwritten(&mut self) -> Option<Verdict> {
+        let job = self.capture_job().ok()?;
+        let is_filmed = self.shared.counts.seen.load(Ordering::Relaxed) > 0;
+        is_filmed.then(|| verdict(&job, job.tree.as_deref()))
+    }
+
     fn finish(&mut self) -> Summary {
         // The source has gone; with this end of the queue the recorder works off what is left and
         // ends its file. Only then it is known what is missing in it.
@@ -545,7 +554,12 @@ impl ModelThread {
                 None
             }
         };
+        let verdict = match &written {
+            Some(written) => Some(written.verdict.clone()),
+            None => self.verdict_unwritten(),
+        };
         Summary {
+            verdict,
             frames: seen,
             tracks_total: self.quality.tracks_total(),
             moving: self.back.evidence().moving.len(),

@@ -35,6 +35,7 @@ pub struct RunningRecord {
 pub fn record(source: Box<dyn Source>, job: RecordJob) -> Result<RunningRecord, Failure> {
     let source = Watched::if_live(source, job.camera.time_limit()).map_err(Failure::Thread)?;
     let shared = Arc::new(Shared::default());
+    shared.set_origin(source.origin());
     let (recorder, recording) = recorder_thread::start(job.to, source.describe().live, &shared)?;
     let (frames_in, frames_out) = bounded::<TimedFrame>(FRAME_QUEUE);
     // Nobody looks at the frames; the source hands them on as ever.

@@ -236,6 +236,11 @@ impl Thread {
         self.oldest.get_or_insert_with(Instant::now);
         match item {
             Item::Frame(raw, index) => {
+                if let Some(at) = self.shared.origin().captured_at
+                    && self.series.frames() == 0
+                {
+                    self.series.set_captured_at(at);
+                }
                 let done = if self.broken {
                     Ok(())
                 } else {

@@ -1,7 +1,7 @@
 //! How the camera moved in the film, gathered frame by frame.
 
-use crate::dynamics::{Shake, shake};
-use crate::model::{Background, TrackSet};
+use crate::dynamics::shake;
+use crate::model::{Background, Shake, TrackSet};
 use nalgebra::{Point2, Vector2};
 
 /// The film is looked at in pieces of so long, s: what moves slower is no shake.
@@ -19,25 +19,32 @@ pub struct ShakeMeter {
     frames: u64,
     seen: u64,
     lost: u64,
+    lost_since_s: Option<f64>,
 }
 
 /// How the camera moved in all of the film.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Shaking {
-    /// Root mean square of its trembling where the tree is, px, and the frequency at which it
-    /// trembled most; `None` for less than five seconds in which it was known.
-    pub rms_px: Option<f64>,
-    pub frequency_hz: Option<f64>,
+    /// Its trembling where the tree is, at the frequency at which it trembled most; `None` for less
+    /// than five seconds in which it was known.
+    pub shake: Option<Shake>,
     /// Shares of the frames in which the background showed it, and in which that was lost, 0 to 1.
     pub seen_share: f64,
     pub lost_share: f64,
+    /// Since when it is lost, s; `None` where it is not at the end.
+    pub lost_since_s: Option<f64>,
 }
 
 impl ShakeMeter {
     /// Takes the next frame.
     pub fn note(&mut self, tracks: &TrackSet) {
         self.frames += 1;
-        self.lost += u64::from(tracks.camera.background == Background::Lost);
+        if tracks.camera.background == Background::Lost {
+            self.lost += 1;
+            self.lost_since_s.get_or_insert(tracks.time_s);
+        } else {
+            self.lost_since_s = None;
+        }
         if tracks.camera.sd_px().is_none() {
             return;
         }
@@ -74,10 +81,13 @@ impl ShakeMeter {
         let frames = self.frames.max(1) as f64;
         let mean_square = self.sum_square_px2 / f64::from(self.pieces.max(1));
         Shaking {
-            rms_px: (self.pieces > 0).then(|| mean_square.sqrt()),
-            frequency_hz: self.strongest.and_then(|piece| piece.frequency_hz),
+            shake: self.strongest.map(|strongest| Shake {
+                rms_px: mean_square.sqrt(),
+                frequency_hz: strongest.frequency_hz,
+            }),
             seen_share: self.seen as f64 / frames,
             lost_share: self.lost as f64 / frames,
+            lost_since_s: self.lost_since_s,
         }
     }
 }

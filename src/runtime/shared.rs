@@ -4,7 +4,7 @@ use super::latest::Latest;
 use super::pulse::Pulse;
 use crate::config::Config;
 use crate::files::WriteError;
-use crate::model::{CameraState, Gap, Snapshot, Timing};
+use crate::model::{CameraState, Gap, LocalTime, Origin, Snapshot, Timing};
 use crate::recording::RecordingError;
 use crate::source::{ClockKind, DecodeError, SourceError};
 use crate::views::PrepareError;
@@ -121,6 +121,7 @@ pub struct Shared {
     /// A piece of work in the background has panicked.
     pub panicked: AtomicBool,
     last_time_s: Mutex<f64>,
+    origin: Mutex<Origin>,
     reloaded: Mutex<Reloaded>,
     camera: Mutex<CameraState>,
     news: Mutex<Vec<String>>,
@@ -136,8 +137,9 @@ struct Reloaded {
 
 impl Shared {
     /// The state that a run has left in its note.
-    pub fn restored(timing: &Timing, warnings: &[String]) -> Self {
+    pub fn restored(timing: &Timing, warnings: &[String], origin: Origin) -> Self {
         let shared = Self::default();
+        shared.set_origin(origin);
         let counts = &shared.counts;
         for (count, value) in [
             (&counts.seen, timing.frames_seen),
@@ -383,6 +385,26 @@ impl Shared {
             .last_time_s
             .lock()
             .unwrap_or_else(PoisonError::into_inner) = time_s;
+    }
+
+    /// When the film was made and what the user noted on it.
+    pub fn origin(&self) -> Origin {
+        self.origin
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
+    }
+
+    pub fn set_origin(&self, origin: Origin) {
+        *self.origin.lock().unwrap_or_else(PoisonError::into_inner) = origin;
+    }
+
+    /// The first frame of a camera came now.
+    pub fn begins_at(&self, now: LocalTime) {
+        self.origin
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .captured_at = Some(now);
     }
 
     /// Sensor time of the newest frame, s since the first.

@@ -10,9 +10,10 @@ use super::reconnect::{self, Waited};
 use super::recorder_thread::Recorder;
 use super::shared::{Failure, Shared};
 use crate::config;
-use crate::model::{Gap, GapCause, RawFrame, TimedFrame, nanoseconds, seconds};
+use crate::model::{Gap, GapCause, LocalTime, RawFrame, TimedFrame, nanoseconds, seconds};
 use crate::source::{Source, SourceError};
 use crossbeam_channel::{Receiver, Sender, TrySendError};
+use jiff::ZonedDateTime;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -54,6 +55,7 @@ pub fn run(
     let live = pace == Pace::Live;
     let mut feed = Feed {
         pace,
+        is_camera: info.live,
         length_s: length_s.unwrap_or(f64::INFINITY),
         queue,
         recorder,
@@ -100,6 +102,8 @@ pub fn run(
 /// Frames on their way from the source to the tracker.
 struct Feed<'a> {
     pace: Pace,
+    /// What it delivers is filmed now.
+    is_camera: bool,
     /// The first frame that is so long after the first one of all is the last, s.
     length_s: f64,
     queue: Queue,
@@ -147,6 +151,9 @@ impl Feed<'_> {
         // A recording keeps whole nanoseconds; what is worked with must be what is kept, whatever
         // the source gave.
         raw.sensor_time_s = seconds(nanoseconds(raw.sensor_time_s));
+        if self.is_camera && self.first_time_s.is_none() {
+            self.shared.begins_at(LocalTime::from(ZonedDateTime::now()));
+        }
         let first_s = *self.first_time_s.get_or_insert(raw.sensor_time_s);
         let time_s = raw.sensor_time_s - first_s;
         let health = source.health();

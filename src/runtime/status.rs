@@ -3,10 +3,9 @@
 use super::meter::Recent;
 use super::shared::Shared;
 use super::sway_watch::SwayWatch;
-use crate::dynamics::Shake;
 use crate::model::{
-    BranchRow, FormatNote, NodeId, Observation, Phase, Rgb, Size, Skeleton, Snapshot, SwayNow,
-    TrackSet,
+    BranchRow, FormatNote, NodeId, Observation, Phase, Rgb, Shake, Size, Skeleton, Snapshot,
+    SwayNow, TrackSet,
 };
 use crate::pipeline::{BackEnd, Moved, Targets};
 use crate::signal::median;

@@ -243,7 +243,8 @@ pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Fa
     })?;
     let info = info_of(&note);
     let outline = Arc::new(outline.unwrap_or_else(|| crate::outline::whole(info.size)));
-    let shared = Arc::new(Shared::restored(&note.timing, &note.warnings));
+    let shared = Shared::restored(&note.timing, &note.warnings, note.origin());
+    let shared = Arc::new(shared);
     let mut back = BackEnd::new(&note.config);
     back.put_wood(wood);
     back.put_asked(asked);

@@ -3,7 +3,7 @@
 use super::clock::ClockKind;
 use super::error::SourceError;
 use crate::config;
-use crate::model::{FormatNote, RawFrame, Size};
+use crate::model::{FormatNote, Origin, RawFrame, Size};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -47,6 +47,12 @@ pub trait Source: Send {
     fn next_frame(&mut self) -> Result<Option<RawFrame>, SourceError>;
 
     fn describe(&self) -> SourceInfo;
+
+    /// What a file says of the making of its film. A camera knows nothing of it: its first frame
+    /// is from now.
+    fn origin(&self) -> Origin {
+        Origin::default()
+    }
 
     /// A source that may wait long gives up, and returns `None`, soon after this has been set.
     fn stop_when(&mut self, _stop: Arc<AtomicBool>) {}

@@ -1,6 +1,7 @@
 //! What a video file says of itself, by ffprobe.
 
 use super::error::SourceError;
+use crate::model::LocalTime;
 use std::ffi::OsString;
 use std::io::Read;
 use std::path::Path;
@@ -9,6 +10,12 @@ use std::process::{Command, Stdio};
 /// Up to this length every packet is counted; a longer file would make the user wait for a mere
 /// progress bar.
 const COUNTED_BYTES: u64 = 128 << 20;
+
+/// Where a file says when it was filmed: QuickTime's own tag has the time zone, the other is in
+/// UTC.
+const CREATION_TAGS: [&str; 2] = ["com.apple.quicktime.creationdate", "creation_time"];
+/// A clock that was never set counts from 1904, 1970 or 1980; what says so says nothing.
+const UNSET_CLOCK_YEAR: i16 = 1980;
 
 /// The first video stream of a file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -22,6 +29,8 @@ pub(super) struct Probe {
     /// The file is shorter than its head says; only AVI is looked at, of the others ffmpeg itself
     /// says so.
     pub cut: bool,
+    /// When it was filmed, where the file says so.
+    pub created_at: Option<LocalTime>,
 }
 
 /// `file:` before the name: neither a leading dash nor a colon in it then means anything to ffmpeg.
@@ -93,7 +102,7 @@ fn ffprobe(path: &Path, program: &str, counts: bool) -> Command {
         ])
         .args([
             "-show_entries",
-            "format=format_name,nb_streams,duration,start_time",
+            "format=format_name,nb_streams,duration,start_time:format_tags",
             "-i",
         ])
         .arg(file_url(path))
@@ -124,6 +133,7 @@ fn first_stream(said: &serde_json::Value, cut: bool) -> Result<Probe, &'static s
         frames: frames.map(|n| n as u64),
         cut,
         duration_s: duration_s(stream, format),
+        created_at: created_at(&[&format["tags"], &stream["tags"]]),
     })
 }
 
@@ -141,6 +151,16 @@ fn look_into(path: &Path) -> std::io::Result<(u64, bool)> {
         _ => return Ok((length, false)),
     };
     Ok((length, promised == 0 || promised + 8 > length))
+}
+
+/// When the film was made, by the first of its tags that says so.
+fn created_at(tags: &[&serde_json::Value]) -> Option<LocalTime> {
+    let named = CREATION_TAGS
+        .iter()
+        .flat_map(|name| tags.iter().map(|tags| &tags[*name]));
+    named
+        .filter_map(|tag| tag.as_str()?.parse().ok())
+        .find(|at: &LocalTime| at.year() > UNSET_CLOCK_YEAR)
 }
 
 fn number(value: &serde_json::Value) -> Option<f64> {
@@ -174,4 +194,38 @@ fn tagged_s(stream: &serde_json::Value) -> Option<f64> {
     let minutes: f64 = parts.next()?.parse().ok()?;
     let seconds: f64 = parts.next()?.parse().ok()?;
     Some(3600.0 * hours + 60.0 * minutes + seconds)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn the_time_of_filming_is_what_the_file_says_and_no_unset_clock() {
+        let (apple, plain) = ("com.apple.quicktime.creationdate", "creation_time");
+        let filmed = "2023-05-03T12:07:12.000000Z";
+        for (format, stream, expected) in [
+            (json!({}), json!({}), None),
+            (
+                json!({plain: filmed, apple: "2023-05-03T14:07:12+0200"}),
+                json!({}),
+                Some("2023-05-03T14:07:12.000+02:00"),
+            ),
+            (
+                json!(null),
+                json!({plain: filmed}),
+                Some("2023-05-03T12:07:12.000+00:00"),
+            ),
+            (
+                json!({plain: "1970-01-01T00:00:00.000000Z"}),
+                json!({}),
+                None,
+            ),
+            (json!({plain: "some day"}), json!({}), None),
+        ] {
+            let at = created_at(&[&format, &stream]).map(|at| at.to_string());
+            assert_eq!(at.as_deref(), expected, "{format} {stream}");
+        }
+    }
 }

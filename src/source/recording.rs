@@ -3,7 +3,7 @@
 use super::error::SourceError;
 use super::images::picture;
 use super::interface::{Source, SourceInfo};
-use crate::model::{FormatNote, PixelFormat, RawFrame, Size, seconds};
+use crate::model::{FormatNote, Origin, PixelFormat, RawFrame, Size, seconds};
 use crate::recording::{Encoding, Picture, Reader, RecordingError};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -164,6 +164,10 @@ impl Source for Recording {
             frames_total: self.reader.pictures_total(),
             live: false,
         }
+    }
+
+    fn origin(&self) -> Origin {
+        self.reader.origin()
     }
 
     fn warnings(&mut self) -> Vec<String> {

@@ -12,7 +12,7 @@ use super::error::SourceError;
 use super::interface::{Source, SourceInfo};
 use super::probe::{Probe, file_url, probe, ratio, spawn_error};
 use crate::ffmpeg::{Ffmpeg, plain};
-use crate::model::{FormatNote, PixelFormat, RawFrame, Size, nanoseconds, seconds};
+use crate::model::{FormatNote, Origin, PixelFormat, RawFrame, Size, nanoseconds, seconds};
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, PipeReader, Read};
 use std::path::{Path, PathBuf};
@@ -278,6 +278,13 @@ impl Source for Video {
             nominal_rate_hz: self.probe.rate_hz,
             frames_total: self.probe.frames,
             live: false,
+        }
+    }
+
+    fn origin(&self) -> Origin {
+        Origin {
+            captured_at: self.probe.created_at,
+            ..Origin::default()
         }
     }
 

@@ -132,11 +132,7 @@ impl PreparedTree {
         };
         let dressed = dress(&posed.skeleton, seen, &config);
         let flutter = flutter(&dressed, &posed.poses, &posed.skeleton, &config);
-        let provenance = provenance(
-            &document.note.source.name,
-            &Software::default(),
-            &posed.poses,
-        );
+        let provenance = provenance(&document.note, &Software::default(), &posed.poses);
         let mut tree = Self {
             scale: ScaleFrom::Measured,
             node_extras: posed.sway.iter().map(extras).collect(),
@@ -198,8 +194,7 @@ impl PreparedTree {
         } else {
             flutter(&self.dressed, &poses, &self.skeleton, &self.config)
         };
-        let source = &self.document.note.source.name;
-        self.provenance = provenance(source, &Software::default(), &poses);
+        self.provenance = provenance(&self.document.note, &Software::default(), &poses);
         if let Some(notes) = self.provenance.as_object_mut() {
             notes.insert("animated".into(), what);
         }

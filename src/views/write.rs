@@ -6,13 +6,15 @@ use crate::document::note::{CaptureNote, json};
 use crate::document::{BARK_FILE, Document, PICTURE_FILE, at_rest_files, jpeg, png};
 use crate::export::gltf::glb;
 use crate::files::{OutputFolder, WriteError, replace};
-use crate::model::{AtRest, Picture, Pose, Rgb, Skeleton, Swaying};
+use crate::model::{AtRest, Picture, Pose, Rgb, Skeleton, Swaying, UserNotes, Verdict};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// Name of the model's file.
 const MODEL_FILE: &str = "tree.glb";
+/// Name of the note on the whole.
+const NOTE_FILE: &str = "capture.json";
 
 /// A tree that is to become a document.
 #[derive(Clone, Debug)]
@@ -72,7 +74,7 @@ impl DocumentWriter {
     }
 
     /// Writes `nodes.csv`, `tree.glb`, the pictures, the bark, the masks and `capture.json` with
-    /// these `warnings`. `sway` is by node index.
+    /// these `warnings` and this `verdict`. `sway` is by node index.
     ///
     /// # Errors
     /// A file cannot be written, or the tree is none for a model's file.
@@ -81,6 +83,7 @@ impl DocumentWriter {
         folder: &OutputFolder,
         sway: &[Swaying],
         warnings: Vec<String>,
+        verdict: Option<Verdict>,
     ) -> Result<(), PrepareError> {
         self.tree.take_sway(sway);
         folder.write("nodes.csv", &self.tree.document.nodes_csv()?)?;
@@ -100,9 +103,10 @@ impl DocumentWriter {
         let note = CaptureNote {
             animation: Some(animation),
             warnings,
+            verdict,
             ..self.tree.document.note
         };
-        folder.write("capture.json", &json(&note)?)?;
+        folder.write(NOTE_FILE, &json(&note)?)?;
         Ok(())
     }
 }
@@ -113,8 +117,8 @@ impl DocumentWriter {
 /// `dir` is there already, a file cannot be written, or the tree is none for a model's file.
 pub fn write_document(dir: &Path, draft: Draft, sway: &[Swaying]) -> Result<PathBuf, PrepareError> {
     let folder = OutputFolder::create(dir)?;
-    let warnings = draft.note.warnings.clone();
-    DocumentWriter::new(draft)?.write(&folder, sway, warnings)?;
+    let (warnings, verdict) = (draft.note.warnings.clone(), draft.note.verdict.clone());
+    DocumentWriter::new(draft)?.write(&folder, sway, warnings, verdict)?;
     Ok(folder.publish()?)
 }
 
@@ -125,22 +129,50 @@ pub fn write_document(dir: &Path, draft: Draft, sway: &[Swaying]) -> Result<Path
 /// The document cannot be read; a file cannot be written, or it was stopped. A file is as it was or
 /// new, never half-written.
 pub fn update(dir: &Path, sway: &[Swaying], stop: &AtomicBool) -> Result<(), PrepareError> {
-    let config = Document::note(dir)?.config;
-    let document = Document::read(dir, config.export.animation_s)?;
-    let options = TreeOptions {
-        config,
-        ..TreeOptions::default()
-    };
-    let mut tree = PreparedTree::new(document, options)?;
+    let mut tree = as_it_is(Document::note(dir)?, dir)?;
     tree.take_sway(sway);
     let table = tree.document.nodes_csv()?;
     let (model, _) = glb(&tree.model())?;
     put(&dir.join("nodes.csv"), &table, stop)?;
-    let file = dir.join(MODEL_FILE);
-    if std::fs::symlink_metadata(&file).is_ok() {
-        put(&file, &model, stop)?;
+    if has_model(dir) {
+        put(&dir.join(MODEL_FILE), &model, stop)?;
     }
     Ok(())
+}
+
+/// Puts other notes of the user into the document in `dir`: into `capture.json`, and into the
+/// model's file where there is one.
+///
+/// # Errors
+/// As of [`update`].
+pub fn put_notes(dir: &Path, notes: &UserNotes, stop: &AtomicBool) -> Result<(), PrepareError> {
+    let note = CaptureNote {
+        notes: notes.clone(),
+        ..Document::note(dir)?
+    };
+    let text = json(&note)?;
+    if has_model(dir) {
+        let (model, _) = glb(&as_it_is(note, dir)?.model())?;
+        put(&dir.join(MODEL_FILE), &model, stop)?;
+    }
+    put(&dir.join(NOTE_FILE), &text, stop)?;
+    Ok(())
+}
+
+/// The tree of the document in `dir` with its own settings, but for what `note` says otherwise.
+fn as_it_is(note: CaptureNote, dir: &Path) -> Result<PreparedTree, PrepareError> {
+    let config = note.config.clone();
+    let mut document = Document::read(dir, config.export.animation_s)?;
+    document.note = note;
+    let options = TreeOptions {
+        config,
+        ..TreeOptions::default()
+    };
+    PreparedTree::new(document, options)
+}
+
+fn has_model(dir: &Path) -> bool {
+    std::fs::symlink_metadata(dir.join(MODEL_FILE)).is_ok()
 }
 
 /// Replaces a file, unless it holds these bytes already.

@@ -28,6 +28,8 @@ function describe(data) {
   const parts = [
     `${measured} ${measured === 1 ? "branch" : "branches"}${copies ? `, ${copies} copies` : ""}`,
     data.source,
+    data.captured_at,
+    ...Object.entries(data.notes).map(([key, value]) => `${key}: ${value}`),
   ];
   at("about").textContent = parts.filter(Boolean).join(" · ");
   at("made").textContent = `${data.software}, from ${data.image[0]} × ${data.image[1]} pixels.`;

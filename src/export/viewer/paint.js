@@ -16,8 +16,9 @@ function onRamp(share) {
 }
 
 const NUMBERS = {
-  frequency: { title: "Frequency", unit: "Hz", of: (sway) => sway.hz },
-  amplitude: { title: "Amplitude", unit: "°", of: (sway) => sway.amplitude },
+  // A peak of the spectrum is no frequency of the branch: only what was identified has a colour.
+  frequency: { title: "Frequency", unit: "Hz", without: "not identified", of: (sway) => (sway.identified ? sway.hz : null) },
+  amplitude: { title: "Amplitude", unit: "°", without: "none found", of: (sway) => sway.amplitude },
 };
 
 export class Paint {
@@ -57,7 +58,7 @@ export class Paint {
     };
   }
 
-  describe({ title, unit }, range, someUnknown) {
+  describe({ title, unit, without }, range, someUnknown) {
     const say = (tag, className, text = "") => {
       const element = document.createElement(tag);
       element.className = className;
@@ -77,7 +78,7 @@ export class Paint {
       const line = say("div", "");
       const box = say("span", "none");
       box.style.background = `#${UNKNOWN.getHexString()}`;
-      line.append(box, "none found");
+      line.append(box, without);
       this.legend.append(line);
     }
   }
