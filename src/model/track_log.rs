@@ -33,12 +33,13 @@ impl TrackLog {
 
     /// Takes the set of the next frame. Gives back the sets that have become too old, oldest first;
     /// where more than [`LONGEST_TRIAL_S`](super::LONGEST_TRIAL_S) is remembered they are final. A
-    /// set of a camera that has lost its background shows nothing: it is not kept, and what is
-    /// remembered grows no older by it.
+    /// set of a camera that has lost its background shows nothing: it is not kept, nor are those
+    /// before it in which that was not seen any more, and what is remembered grows no older by it.
     pub fn push(&mut self, set: TrackSet) -> Vec<Arc<TrackSet>> {
         self.tentative.note(&set);
         self.remove(&set.rejected.iter().copied().collect());
         if set.camera.background == Background::Lost {
+            self.forget_unclear();
             return Vec::new();
         }
         let oldest_s = set.time_s - self.remembered_s;
@@ -46,6 +47,14 @@ impl TrackLog {
         let n_old = self.sets.iter().take_while(|s| s.time_s < oldest_s).count();
         self.is_whole &= n_old == 0;
         self.sets.drain(..n_old).collect()
+    }
+
+    /// Forgets the newest sets as far as their background was unclear.
+    fn forget_unclear(&mut self) {
+        let is_unclear = |set: &Arc<TrackSet>| set.camera.background == Background::Unclear;
+        while self.sets.back().is_some_and(is_unclear) {
+            self.sets.pop_back();
+        }
     }
 
     /// There are no more frames: points that are still on trial do not count. Gives back which
@@ -206,7 +215,7 @@ impl Tentative {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::LONGEST_TRIAL_S;
+    use crate::model::{Agreement, LONGEST_TRIAL_S};
 
     fn observation(id: u32, confirmed: bool) -> Observation {
         Observation {
@@ -293,14 +302,21 @@ mod tests {
     #[test]
     fn frames_of_a_camera_that_is_turned_away_do_not_count() {
         let mut log = TrackLog::new(10.0);
-        (0..50).for_each(|k| drop(log.push(set(k))));
+        for k in 0..50 {
+            let mut seen = set(k);
+            // The last second before it is lost it is not seen.
+            if k < 40 {
+                seen.camera.background = Background::Seen(Agreement::default());
+            }
+            log.push(seen);
+        }
         for k in 50..500 {
             let mut away = set(k);
             away.observations.clear();
             away.camera.background = Background::Lost;
             assert!(log.push(away).is_empty());
         }
-        assert_eq!(log.all().len(), 50);
+        assert_eq!(log.all().len(), 40);
         assert_eq!(
             log.all().newest().map(ids),
             Some(vec![0]),

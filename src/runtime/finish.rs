@@ -18,8 +18,8 @@ use crate::document::{
 use crate::dynamics::{Depth, Film};
 use crate::files::OutputFolder;
 use crate::model::{
-    AtRest, Origin, Outline, Picture, Pose, Rgb, Skeleton, Tentative, Timing, TrackLog, TrackSet,
-    Unidentified, Verdict, WoodSeen,
+    AtRest, Background, Origin, Outline, Picture, Pose, Rgb, Skeleton, Tentative, Timing, TrackLog,
+    TrackSet, Unidentified, Verdict, WoodSeen,
 };
 use crate::recording::TrackFileReader;
 use crate::solve::{Model, with_modes};
@@ -55,7 +55,9 @@ impl Quality {
         self.on_trial.note(tracks);
         self.born += u64::from(tracks.born);
         self.lost += u64::from(tracks.lost);
-        self.alive = tracks.counted().count() as u64;
+        if tracks.camera.background != Background::Lost {
+            self.alive = tracks.counted().count() as u64;
+        }
         self.first.get_or_insert((tracks.frame, tracks.time_s));
         self.last_s = tracks.time_s;
         self.fb_error_px.add(fb_error_px);

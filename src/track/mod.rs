@@ -114,17 +114,20 @@ impl Tracker {
             self.give_up(frame, &mut rejected);
         }
         let lost = (before - self.points.len() - rejected.len()) as u32;
-        rejected.extend(
-            self.selection
-                .judge(&mut self.points, frame.time_s, &camera),
-        );
-        let born = if self.refill_due(frame.time_s) {
+        // Where the camera looks elsewhere nothing is to be learned of the points.
+        let counts = camera.background != model::Background::Lost;
+        if counts {
+            let judged = self
+                .selection
+                .judge(&mut self.points, frame.time_s, &camera);
+            rejected.extend(judged);
+        }
+        let born = if counts && self.refill_due(frame.time_s) {
             self.refill(frame, &camera)
         } else {
             0
         };
         self.frames += 1;
-        let counts = camera.background != model::Background::Lost;
         let seen = self.points.iter().filter(|p| counts && p.coasting == 0);
         TrackSet {
             frame: frame.index,
