@@ -225,7 +225,13 @@ impl FreeDecay<'_> {
             if !fitted.may_be_own(index, parts) {
                 continue;
             }
-            let Some(common) = common_to_points(&fitted.factors, index) else {
+            // On the trunk low points move little, and still have its sway.
+            let least_size = if fitted.ancestors == 0 {
+                0.0
+            } else {
+                MIN_SIZE_OF_QUARTER
+            };
+            let Some(common) = common_to_points(&fitted.factors, index, least_size) else {
                 continue;
             };
             let candidate = Candidate {
@@ -302,6 +308,8 @@ impl FreeDecay<'_> {
         points: &Points,
         parts: &[Vec<usize>],
     ) -> Result<LnDeviations, Unidentified> {
+        // The trunk carries every point: parts at odds make it less sure, but leave it its sway.
+        let is_trunk = fitted.ancestors == 0;
         let known = fitted.priors_of_others(m, spread);
         let mode = &fitted.fit.modes[m];
         let halves = if parts.is_empty() {
@@ -321,7 +329,7 @@ impl FreeDecay<'_> {
             };
             let off = there.modes[m].ln_frequency_ratio(mode);
             let sd = spread[2 * m].hypot(ln_sd.frequency);
-            if off.abs() > PART_FREQ_TOLERANCE + PART_FREQ_SIGMAS * sd {
+            if !is_trunk && off.abs() > PART_FREQ_TOLERANCE + PART_FREQ_SIGMAS * sd {
                 return Err(Unidentified::NoOscillation);
             }
             count += 1.0;
@@ -527,8 +535,9 @@ struct Common {
     significance: f64,
 }
 
-/// If mode `m` is common to the points.
-fn common_to_points(factors: &[Vec<Factor>], m: usize) -> Option<Common> {
+/// If mode `m` is common to the points, and the quarter that has least of it has `least_size` of the
+/// mean.
+fn common_to_points(factors: &[Vec<Factor>], m: usize, least_size: f64) -> Option<Common> {
     let (mut significances, mut sizes) = (Vec::new(), Vec::new());
     for uv in factors.chunks(2) {
         significances.push(uv.iter().map(|f| f[m].significance).sum::<f64>().sqrt());
@@ -536,7 +545,7 @@ fn common_to_points(factors: &[Vec<Factor>], m: usize) -> Option<Common> {
     }
     let have = significances.iter().filter(|s| **s > MIN_SIGNIFICANCE);
     let share = have.count() as f64 / sizes.len() as f64;
-    let least_size = MIN_SIZE_OF_QUARTER * rms(sizes.iter().copied());
+    let least_size = least_size * rms(sizes.iter().copied());
     if share < MIN_POINTS_SHARE || quantile(sizes, 0.25)? < least_size {
         return None;
     }
