@@ -282,6 +282,7 @@ fn check(name: &str, run: &Run, output: &Output, status: i32, says: &[&str], lef
         names
     };
     let tables = [
+        "camera.csv",
         "capture.json",
         "frame.jpg",
         "motion.csv",

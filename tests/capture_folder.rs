@@ -340,6 +340,30 @@ fn tracks_belong_to_nodes_that_exist_and_keep_their_ids() {
     assert!(out > 0, "a quarter of those that move");
 }
 
+/// The clip was filmed from a tripod that stands still.
+#[test]
+fn the_camera_s_motion_has_a_row_for_each_frame() {
+    let header = "frame,time_s,dx_px,dy_px,roll_deg,scale,inliers,rms_px,sd_px,background";
+    let rows = made().rows("camera.csv", header);
+    assert_eq!(rows.len(), 330);
+    for row in &rows {
+        assert_eq!(row[9], "seen", "{row:?}");
+        assert!(index(&row[6]) >= 100, "{row:?}");
+        for shift in &row[2..4] {
+            let shift_px: f64 = shift.parse().expect("number");
+            assert!(shift_px.abs() < 0.05, "{row:?}");
+        }
+    }
+    let capture = made().capture();
+    let quality = &capture["quality"];
+    assert_eq!(quality["camera_seen_share"].as_f64(), Some(1.0));
+    assert!(
+        quality["camera_shake_px"]
+            .as_f64()
+            .is_some_and(|px| px < 0.02)
+    );
+}
+
 #[test]
 fn the_model_opens_with_skin_and_animation() {
     let bytes = fs::read(made().out().join("tree.glb")).expect("tree.glb");

@@ -146,6 +146,7 @@ fn csv_is_the_tables_and_cylinders_that_join() {
     assert_eq!(
         names_in(&out),
         [
+            "camera.csv",
             "cylinders.csv",
             "left_out.csv",
             "motion.csv",
@@ -153,7 +154,13 @@ fn csv_is_the_tables_and_cylinders_that_join() {
             "tracks.csv"
         ]
     );
-    for name in ["left_out.csv", "motion.csv", "nodes.csv", "tracks.csv"] {
+    for name in [
+        "camera.csv",
+        "left_out.csv",
+        "motion.csv",
+        "nodes.csv",
+        "tracks.csv",
+    ] {
         assert!(
             fs::read(out.join(name)).expect(name) == fs::read(made().join(name)).expect(name),
             "{name} differs"

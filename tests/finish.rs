@@ -13,7 +13,13 @@ use tempfile::TempDir;
 
 /// What has not happened after so long will not.
 const HANGS: Duration = Duration::from_secs(60);
-const TABLES: [&str; 4] = ["tracks.csv", "left_out.csv", "nodes.csv", "motion.csv"];
+const TABLES: [&str; 5] = [
+    "tracks.csv",
+    "camera.csv",
+    "left_out.csv",
+    "nodes.csv",
+    "motion.csv",
+];
 const PICTURES: [&str; 4] = ["bark.png", "rest.png", "wood.png", "leaves.png"];
 
 /// A replay in a process of its own.

@@ -24,7 +24,8 @@ const TOO_SHORT_FOR_WOOD: &str = "the wood was not looked for, as the end was wa
 const CAMERA_UNCLEAR: &str = "nothing around the outline shows how the camera moves: what it shakes \
                               cannot be separated from the tree's sway; use a firm tripod, and film \
                               more of the ground and of what stands still";
-/// It is given after so much film, s, if the motion is known in less than this share of it.
+/// It is given with the tree, after so much film, s, if the motion is known in less than this share
+/// of it.
 const CAMERA_JUDGED_S: f64 = 3.0;
 pub const CAMERA_KNOWN: f64 = 0.5;
 /// A camera that trembles by less than this is not spoken of, px.
@@ -125,8 +126,8 @@ impl Announced {
         } else if self.lost.take().is_some() {
             shared.tell(format!("the camera is back where it was at {time_s:.1} s"));
         }
-        let is_unclear =
-            time_s - begun_s >= CAMERA_JUDGED_S && meter.so_far().seen_share < CAMERA_KNOWN;
+        let is_judged = self.tree.is_some() && time_s - begun_s >= CAMERA_JUDGED_S;
+        let is_unclear = is_judged && meter.so_far().seen_share < CAMERA_KNOWN;
         if is_unclear != self.is_unclear && self.lost.is_none() {
             self.is_unclear = is_unclear;
             match is_unclear {

@@ -12,8 +12,8 @@ use crate::document::note::{
     Refinement, Software, Source, json,
 };
 use crate::document::{
-    BARK_FILE, CaptureNote, LEAVES_MASK_FILE, MotionCsv, PICTURE_FILE, REST_FILE, SCHEMA_VERSION,
-    TracksCsv, WOOD_MASK_FILE, jpeg, nodes,
+    BARK_FILE, CAMERA_FILE, CameraCsv, CaptureNote, LEAVES_MASK_FILE, MotionCsv, PICTURE_FILE,
+    REST_FILE, SCHEMA_VERSION, TracksCsv, WOOD_MASK_FILE, jpeg, nodes,
 };
 use crate::dynamics::{Depth, Film};
 use crate::files::OutputFolder;
@@ -255,7 +255,8 @@ fn beside<A: Send, B>(
 fn without_tree(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
     let folder = OutputFolder::create(dir)?;
     let metres_per_px = job.config.export.metres_per_px;
-    write_tracks(job, TracksCsv::new(folder.file("tracks.csv")?)?)?;
+    let camera = CameraCsv::new(folder.file(CAMERA_FILE)?, job.info.size)?;
+    write_tracks(job, TracksCsv::new(folder.file("tracks.csv")?)?, camera)?;
     let foot_only = Arc::new(Skeleton {
         nodes: Vec::new(),
         foot_px: Point2::origin(),
@@ -285,10 +286,12 @@ fn describe_without_tree(
     Ok(folder.write("capture.json", &json(&note)?)?)
 }
 
-/// The points of a film in which no tree was built: those that have passed their trial.
+/// The points of a film in which no tree was built, those that have passed their trial, and the
+/// camera's motion.
 fn write_tracks(
     job: &CaptureJob,
     mut table: TracksCsv<impl std::io::Write>,
+    mut camera: CameraCsv<impl std::io::Write>,
 ) -> Result<(), Failure> {
     // Which points are void is known for sure only at the end: where the tree did not move, a trial
     // may last for long.
@@ -302,10 +305,12 @@ fn write_tracks(
     rejected.extend(tentative.void());
     for set in job.tracks.sets() {
         let mut set = set.map_err(Failure::Log)?;
+        camera.set(&set)?;
         set.observations.retain(|o| !rejected.contains(&o.id));
         table.set(&set, |_| None)?;
         job.shared.pulse.wrote();
     }
+    camera.finish()?;
     table.finish()?;
     Ok(())
 }

@@ -14,7 +14,7 @@ use ratatui::widgets::Paragraph;
 const STRONG_SHAKE_PX: f64 = 0.5;
 
 /// At most seven lines; where there is no room for all, the last one tells only of losses that
-/// seldom happen.
+/// seldom happen. While nothing is lost one word says so.
 pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
     let s = &state.snapshot;
     let inner = titled(frame, area, "Camera", theme);
@@ -26,24 +26,6 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         Span::styled(format!("p50 {}", millis(s.latency_p50_ms)), theme.strong()),
         Span::raw(format!("  p99 {}", millis(s.latency_p99_ms))),
     ];
-    let lost = losses(
-        &[
-            ("camera", s.lost_in_camera),
-            ("queue", s.dropped_before_tracker),
-            ("broken", broken),
-        ],
-        theme,
-    );
-    // Both counts of what was lost before us: by the driver's numbers, where it has them, and by
-    // the times.
-    let seldom = losses(
-        &[
-            ("unshown", s.not_shown),
-            ("numbers", s.camera.lost_by_sequence.unwrap_or(0)),
-            ("times", s.camera.lost_by_time),
-        ],
-        theme,
-    );
     let mut lines = vec![
         row("asked", vec![or_dash(&s.format.asked)], theme),
         row("given", vec![given(s, theme)], theme),
@@ -51,18 +33,24 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         row("delay", delay, theme),
         row("shake", shake(s, theme), theme),
     ];
-    match (lost.is_empty(), seldom.is_empty()) {
-        (true, true) => lines.push(row(
-            "lost",
-            vec![Span::styled("nothing", theme.faint())],
-            theme,
-        )),
-        (false, true) => lines.push(row("lost", lost, theme)),
-        (true, false) => lines.push(row("lost", seldom, theme)),
-        (false, false) => {
-            lines.push(row("lost", lost, theme));
-            lines.push(row("", seldom, theme));
-        }
+    let counts = [
+        s.lost_in_camera,
+        s.dropped_before_tracker,
+        broken,
+        s.not_shown,
+    ];
+    if counts == [0; 4] {
+        let nothing = Span::styled("nothing", theme.faint());
+        lines.push(row("lost", vec![nothing], theme));
+    } else {
+        let [camera, queue, broken, unshown] = counts;
+        let lost = beside(loss("camera", camera, theme), loss("queue", queue, theme));
+        let useless = beside(
+            loss("broken", broken, theme),
+            loss("unshown", unshown, theme),
+        );
+        lines.push(row("lost", lost, theme));
+        lines.push(row("", useless, theme));
     }
     frame.render_widget(Paragraph::new(lines), inner);
 }
@@ -129,18 +117,18 @@ fn shake(s: &Snapshot, theme: Theme) -> Vec<Span<'static>> {
     )]
 }
 
-/// Counts that ought to be 0, those of them that are not.
-fn losses(counts: &[(&'static str, u64)], theme: Theme) -> Vec<Span<'static>> {
-    let mut spans = Vec::new();
-    for (name, n) in counts {
-        if *n == 0 {
-            continue;
-        }
-        if !spans.is_empty() {
-            spans.push(Span::raw("  "));
-        }
-        spans.push(Span::raw(format!("{name} ")));
-        spans.push(Span::styled(count(*n), theme.warning()));
-    }
-    spans
+/// A count that ought to be 0.
+fn loss(name: &'static str, n: u64, theme: Theme) -> Vec<Span<'static>> {
+    let style = if n > 0 {
+        theme.warning()
+    } else {
+        theme.faint()
+    };
+    vec![Span::raw(format!("{name} ")), Span::styled(count(n), style)]
+}
+
+fn beside(mut left: Vec<Span<'static>>, right: Vec<Span<'static>>) -> Vec<Span<'static>> {
+    left.push(Span::raw("  "));
+    left.extend(right);
+    left
 }
