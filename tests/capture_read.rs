@@ -599,6 +599,19 @@ mod fuzz {
         }
     }
 
+    /// Places for twigs are as far apart as the shortest one is long.
+    #[test]
+    fn twigs_of_next_to_no_length_take_no_more_room() {
+        let read = Document::read(made(), 0.2).expect("a capture");
+        for twig_px in [1e-300, 1e-6] {
+            let mut config = read.note.config.clone();
+            config.wood.twig_px = twig_px;
+            config.wood.triangles = 2000;
+            config.leaves.show = LeafShow::Off;
+            exported(&read, &read.skeleton, &read.poses, &config);
+        }
+    }
+
     /// To a model that opens, or to a refusal of one line.
     fn exported(read: &Document, skeleton: &Skeleton, poses: &[Pose], config: &Config) {
         let seen = Seen {

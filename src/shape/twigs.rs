@@ -23,6 +23,10 @@ const SPACING: f64 = 0.4;
 const LONGEST: f64 = 0.2;
 /// Places about a branch that are tried before a twig that would leave the envelope is given up.
 const TRIES: u32 = 5;
+/// Places along one limb, and places that wait in all: a branch of a damaged table may be a million
+/// times as long as the shortest twig. Trees have some hundreds and some ten thousands.
+const MOST_PLACES: u64 = 1 << 16;
+const MOST_BUDS: usize = 1 << 20;
 /// Angle from twig to twig about their branch: the golden angle, in which buds stand.
 const GOLDEN: f64 = PI * 0.763_932_022_500_210_3;
 
@@ -149,14 +153,14 @@ impl Maker<'_> {
         let mut random = generator(seed, 0);
         let mut turn = random.random_range(0.0..TAU);
         let mut way_px = 0.15 * length_px;
-        for k in 0.. {
+        for k in 0..MOST_PLACES {
             let above_px = length_px - way_px + beyond_px;
             let reach_px = (self.branching.ratio(&mut random) * above_px)
                 .min(self.longest_px * random.random_range(0.7..1.0));
             way_px += (SPACING * reach_px).max(0.4 * self.least_px) * random.random_range(0.5..1.5);
             turn += GOLDEN + random.random_range(-0.4..0.4);
             let shaded = random.random::<f64>() < above_px / host.whole_px;
-            if way_px >= length_px {
+            if way_px >= length_px || into.len() >= MOST_BUDS {
                 break;
             }
             if reach_px >= self.least_px && !shaded {
