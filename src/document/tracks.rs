@@ -1,5 +1,5 @@
-//! `tracks.csv`: every point in every frame in which it was seen, where it was filmed; `left_out.csv`: the same of those
-//! that were left out of the tree.
+//! `tracks.csv`: every point in every frame in which it was seen, where it was filmed;
+//! `left_out.csv`: the same of those that were left out of the tree.
 
 use super::camera::CameraReader;
 use super::error::DocumentError;

@@ -167,7 +167,7 @@ impl FreeDecay<'_> {
             .ok_or(Unidentified::TooUncertain)?;
         let ln_sd = fitted.deviations_with_one_more(chosen.index, &spread);
         let ln_sd = self.checked_by_parts(&fitted, chosen.index, &spread, ln_sd, points, &parts)?;
-        if fitted.ancestors == 0 {
+        if fitted.has_no_ancestors() {
             self.learn_release(&fitted.fit, &spread);
         }
         let mode = BranchMode {
@@ -226,7 +226,7 @@ impl FreeDecay<'_> {
                 continue;
             }
             // On the trunk low points move little, and still have its sway.
-            let least_size = if fitted.ancestors == 0 {
+            let least_size = if fitted.has_no_ancestors() {
                 0.0
             } else {
                 MIN_SIZE_OF_QUARTER
@@ -237,7 +237,7 @@ impl FreeDecay<'_> {
             let candidate = Candidate {
                 index,
                 // The trunk carries every point: there is nothing it could be mixed up with.
-                is_one_swing: fitted.ancestors == 0
+                is_one_swing: fitted.has_no_ancestors()
                     || arms.one_swing(&fitted.factors, index) >= MIN_COLLINEARITY,
                 is_new: !self.is_doubted(node, &fitted.fit.modes[index]),
                 common,
@@ -309,7 +309,7 @@ impl FreeDecay<'_> {
         parts: &[Vec<usize>],
     ) -> Result<LnDeviations, Unidentified> {
         // The trunk carries every point: parts at odds make it less sure, but leave it its sway.
-        let is_trunk = fitted.ancestors == 0;
+        let is_trunk = fitted.has_no_ancestors();
         let known = fitted.priors_of_others(m, spread);
         let mode = &fitted.fit.modes[m];
         let halves = if parts.is_empty() {
@@ -409,6 +409,11 @@ impl FittedModes {
         while out.fit.modes.len() < out.ancestors + MAX_NEW_MODES && out.add_mode(largest_px) {}
         out.factors = out.signals.factors(&out.fit, points.signals.len());
         out
+    }
+
+    /// Whether no mode of an ancestor is known, as on the trunk.
+    fn has_no_ancestors(&self) -> bool {
+        self.ancestors == 0
     }
 
     /// Whether one more mode is worth it, and was taken.

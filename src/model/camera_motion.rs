@@ -1,6 +1,5 @@
 //! How the camera itself moved.
 
-use super::Size;
 use nalgebra::{Point2, Similarity2};
 
 /// Where the camera looks in one frame, against the frame in which points were first followed.
@@ -66,14 +65,9 @@ impl CameraMotion {
         }
     }
 
-    /// How far the corners of a picture are moved at most, px.
-    pub fn farthest_px(&self, size: Size) -> f64 {
-        let (width, height) = (f64::from(size.width), f64::from(size.height));
-        let mut farthest_px: f64 = 0.0;
-        for (u, v) in [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)] {
-            let corner = Point2::new(u, v);
-            farthest_px = farthest_px.max((self.filmed_px(corner) - corner).norm());
-        }
-        farthest_px
+    /// How far some places are moved at most, px.
+    pub fn farthest_px(&self, steady_px: &[Point2<f64>]) -> f64 {
+        let moved_px = steady_px.iter().map(|at| (self.filmed_px(*at) - at).norm());
+        moved_px.fold(0.0, f64::max)
     }
 }

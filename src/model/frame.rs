@@ -21,6 +21,13 @@ impl Size {
         self.width as usize * self.height as usize
     }
 
+    /// Its corners, px.
+    pub fn corners_px(self) -> [Point2<f64>; 4] {
+        let (width, height) = (f64::from(self.width), f64::from(self.height));
+        let corners = [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)];
+        corners.map(|(u, v)| Point2::new(u, v))
+    }
+
     /// Whether the pixel whose centre is nearest to `at_px` lies in the picture.
     pub fn contains(self, at_px: Point2<f64>) -> bool {
         at_px.x >= -0.5

@@ -1,7 +1,9 @@
 //! What the screen shows of a running capture: one immutable picture of its state, replaced, never
 //! changed.
 
-use super::{Angles, Background, NodeName, Pose, Rgb, Size, Skeleton, SwayNow, Wood, WoodSight};
+use super::{
+    Angles, Background, NodeName, Pose, Rgb, Shake, Size, Skeleton, SwayNow, Wood, WoodSight,
+};
 use nalgebra::Point2;
 use std::sync::Arc;
 
@@ -105,10 +107,8 @@ pub struct Snapshot {
     pub camera: CameraState,
     /// How the camera's own motion is known in this frame; `None` before the first one.
     pub background: Option<Background>,
-    /// By how much it trembled in the last seconds, px, and at what frequency, Hz; `None` while that
-    /// is not known.
-    pub shake_px: Option<f64>,
-    pub shake_hz: Option<f64>,
+    /// How it trembled in the last seconds; `None` while that is not known.
+    pub shake: Option<Shake>,
     /// Frames lost before us (what is to be believed of both counts), between camera and tracker,
     /// undecodable, and not shown.
     pub lost_in_camera: u64,

@@ -3,7 +3,7 @@
 use super::FootBasis;
 use serde::{Deserialize, Serialize};
 
-/// The sway of a branch is told well from so many of its periods: in wind, the 95 % interval of a
+/// The sway of a branch is identified well from so many of its periods: in wind, the 95 % interval of a
 /// branch with 2 % of damping is then some 5 % to either side.
 const PERIODS_NEEDED: f64 = 10.0;
 /// What is to be filmed where no frequency is known, s: ten periods at 0.33 Hz, the slowest sway of
@@ -25,7 +25,7 @@ const FAIR_AMPLITUDE_PX: f64 = 1.0;
 /// Frames for each period of the fastest sway that is asked for: two by Nyquist, half a one more
 /// as frames are not evenly spaced.
 const FRAMES_PER_PERIOD: f64 = 2.5;
-/// With fewer frames a second not even a trunk (up to 2 Hz) is told, and points jump too far from
+/// With fewer frames a second not even a trunk (up to 2 Hz) is identified, and points jump too far from
 /// frame to frame to be followed.
 const POOR_RATE_HZ: f64 = 5.0;
 
@@ -99,6 +99,13 @@ pub struct Shake {
     pub rms_px: f64,
     /// The strongest frequency in it, Hz, if one stands out.
     pub frequency_hz: Option<f64>,
+}
+
+impl Shake {
+    /// Whether it shakes as much as small branches move.
+    pub fn is_strong(&self) -> bool {
+        self.rms_px >= FAIR_SHAKE_PX
+    }
 }
 
 /// What a capture is worth.
@@ -458,7 +465,7 @@ mod tests {
             "fair, because: foot cut off. To do: film the whole tree with its foot",
         );
         check(
-            "only branches are told",
+            "only branches are identified",
             |f| f.sway = sway(3, None),
             "fair, because: the trunk's frequency not identified. To do: film longer, or pull the \
              tree and release it",

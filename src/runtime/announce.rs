@@ -2,7 +2,7 @@
 
 use super::shaking::ShakeMeter;
 use super::shared::Shared;
-use crate::model::{Background, FootBasis, TrackSet, WoodSight};
+use crate::model::{Background, FootBasis, Shake, TrackSet, WoodSight};
 use crate::solve::Model;
 use std::sync::Arc;
 
@@ -24,12 +24,8 @@ const TOO_SHORT_FOR_WOOD: &str = "the wood was not looked for, as the end was wa
 const CAMERA_UNCLEAR: &str = "nothing around the outline shows how the camera moves: what it shakes \
                               cannot be separated from the tree's sway; use a firm tripod, and film \
                               more of the ground and of what stands still";
-/// It is given with the tree, after so much film, s, if the motion is known in less than this share
-/// of it.
+/// It is given with the tree, after so much film, s.
 const CAMERA_JUDGED_S: f64 = 3.0;
-pub const CAMERA_KNOWN: f64 = 0.5;
-/// A camera that trembles by less than this is not spoken of, px.
-const SHAKE_PX: f64 = 0.5;
 
 /// The tree that was last told of.
 #[derive(Default)]
@@ -38,8 +34,8 @@ pub struct Announced {
     /// The warning that the first one was worth little.
     warned: Option<String>,
     wood: WoodSight,
-    /// The warning that the camera was turned away.
-    lost: Option<String>,
+    /// What was said of the camera: that it looks elsewhere, is not known, trembles.
+    is_lost: bool,
     is_unclear: bool,
     shakes: bool,
     /// Time of the first frame, s.
@@ -113,29 +109,28 @@ impl Announced {
 }
 
 impl Announced {
-    /// Tells of the camera's own motion, up to the frame of `tracks`.
+    /// Says how the camera itself moves, up to the frame of `tracks`.
     pub fn tell_of_camera(&mut self, tracks: &TrackSet, meter: &ShakeMeter, shared: &Shared) {
         let time_s = tracks.time_s;
         let begun_s = *self.begun_s.get_or_insert(time_s);
-        if tracks.camera.background == Background::Lost {
-            if self.lost.is_none() {
-                let warning = camera_lost(time_s);
-                shared.warn(warning.clone());
-                self.lost = Some(warning);
+        let is_lost = tracks.camera.background == Background::Lost;
+        if is_lost != self.is_lost {
+            self.is_lost = is_lost;
+            match is_lost {
+                true => shared.warn(camera_lost(time_s)),
+                false => shared.tell(format!("the camera is back where it was at {time_s:.1} s")),
             }
-        } else if self.lost.take().is_some() {
-            shared.tell(format!("the camera is back where it was at {time_s:.1} s"));
         }
         let is_judged = self.tree.is_some() && time_s - begun_s >= CAMERA_JUDGED_S;
-        let is_unclear = is_judged && meter.so_far().seen_share < CAMERA_KNOWN;
-        if is_unclear != self.is_unclear && self.lost.is_none() {
+        let is_unclear = is_judged && !meter.so_far().is_known();
+        if is_unclear != self.is_unclear && !is_lost {
             self.is_unclear = is_unclear;
             match is_unclear {
                 true => shared.warn(CAMERA_UNCLEAR.into()),
                 false => shared.withdraw(CAMERA_UNCLEAR),
             }
         }
-        if let Some(shake) = meter.newest().filter(|shake| shake.rms_px >= SHAKE_PX)
+        if let Some(shake) = meter.newest().filter(Shake::is_strong)
             && !self.shakes
         {
             self.shakes = true;

@@ -1,6 +1,5 @@
 //! What a capture is judged by: the facts of one that is at its end.
 
-use super::announce::CAMERA_KNOWN;
 use super::finish::{CaptureJob, timing};
 use crate::model::{
     CaptureFacts, PointFacts, Rgb, Skeleton, SwayFacts, Swaying, Unidentified, Verdict,
@@ -40,7 +39,7 @@ fn facts(job: &CaptureJob, tree: Option<&Model>) -> CaptureFacts {
         foot: tree.map(|tree| tree.foot.basis),
         sway: tree.and_then(|tree| sway(&tree.skeleton, &tree.modes)),
         shake: shaking.shake,
-        is_camera_unknown: shaking.seen_share < CAMERA_KNOWN,
+        is_camera_unknown: !shaking.is_known(),
         camera_moved_at_s: shaking.lost_since_s,
     }
 }

@@ -236,8 +236,8 @@ impl Thread {
         self.oldest.get_or_insert_with(Instant::now);
         match item {
             Item::Frame(raw, index) => {
-                if let Some(at) = self.shared.origin().captured_at
-                    && self.series.frames() == 0
+                if self.series.frames() == 0
+                    && let Some(at) = self.shared.origin().captured_at
                 {
                     self.series.set_captured_at(at);
                 }

@@ -6,6 +6,8 @@ use nalgebra::{Point2, Vector2};
 
 /// The film is looked at in pieces of so long, s: what moves slower is no shake.
 const PIECE_S: f64 = 5.0;
+/// A camera whose motion is known in a smaller share of the frames is not known.
+const KNOWN: f64 = 0.5;
 
 /// Gathers the camera's motion. Memory is bounded.
 #[derive(Clone, Debug, Default)]
@@ -33,6 +35,13 @@ pub struct Shaking {
     pub lost_share: f64,
     /// Since when it is lost, s; `None` where it is not at the end.
     pub lost_since_s: Option<f64>,
+}
+
+impl Shaking {
+    /// Whether what stands still around the tree shows how the camera moves.
+    pub fn is_known(&self) -> bool {
+        self.seen_share >= KNOWN
+    }
 }
 
 impl ShakeMeter {

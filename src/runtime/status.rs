@@ -141,9 +141,7 @@ impl Status {
 
     /// How the camera trembles.
     pub fn shakes(&mut self, shake: Option<Shake>) {
-        let s = &mut self.snapshot;
-        s.shake_px = shake.map(|shake| shake.rms_px);
-        s.shake_hz = shake.and_then(|shake| shake.frequency_hz);
+        self.snapshot.shake = shake;
     }
 
     /// An answer of the sway takes effect, if there is one.

@@ -1,5 +1,6 @@
 //! Order statistics, and the noise in a signal.
 
+use nalgebra::Vector2;
 use std::cmp::Ordering;
 
 /// The middle of `values` by `order`, which must be total: of an even number the upper of the two;
@@ -12,6 +13,17 @@ pub fn median<T: Copy>(mut values: Vec<T>, order: impl Fn(&T, &T) -> Ordering) -
 pub fn median_in_place<T: Copy>(values: &mut [T], order: impl Fn(&T, &T) -> Ordering) -> Option<T> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, order).1)
+}
+
+/// The median of each component; 0 of none.
+pub fn median_vector(vectors: impl Iterator<Item = Vector2<f64>>) -> Vector2<f64> {
+    let (mut across, mut down) = (Vec::new(), Vec::new());
+    for vector in vectors {
+        across.push(vector.x);
+        down.push(vector.y);
+    }
+    let middle = |values| median(values, f64::total_cmp).unwrap_or(0.0);
+    Vector2::new(middle(across), middle(down))
 }
 
 /// The value that `n` of `values` come before in growing order; `None` where there are not so many.

@@ -8,7 +8,7 @@ use super::flow::{Flow, OpticalFlow, Pyramid};
 use super::register::{Patch, Registration};
 use crate::model::{self, Agreement, CameraMotion, Frame, Luma, Outline};
 use crate::signal::median;
-use crate::signal::statistics::rms;
+use crate::signal::statistics::{median_vector, rms};
 use nalgebra::{Matrix2x4, Matrix4, Point2, Similarity2, UnitComplex, Vector2, Vector4, distance};
 use opencv::core::{CV_8UC1, Mat, Point, Point2f, Rect, Scalar, Size as CvSize, Vector};
 use opencv::imgproc::{
@@ -89,8 +89,8 @@ struct Sight {
 }
 
 impl Sight {
-    /// Takes whether it is seen in its place in a frame; whether it is lost.
-    fn is_lost(&mut self, is_seen: bool, time_s: f64) -> bool {
+    /// Takes whether it is seen in its place in a frame; gives whether it is lost.
+    fn note(&mut self, is_seen: bool, time_s: f64) -> bool {
         if is_seen {
             self.first_s.get_or_insert(time_s);
             self.last_s = time_s;
@@ -163,8 +163,8 @@ impl Background {
     ) -> CameraMotion {
         if self.sought_s.is_none() {
             self.seek(&frame.luma, frame.time_s);
-            let has_enough = self.corners.len() >= LEAST_CORNERS;
-            if has_enough && !self.sight.is_lost(true, frame.time_s) {
+            if self.corners.len() >= LEAST_CORNERS {
+                self.sight.note(true, frame.time_s);
                 self.motion.background = model::Background::Seen(Agreement {
                     inliers: self.corners.len() as u32,
                     ..Agreement::default()
@@ -185,9 +185,9 @@ impl Background {
             self.motion.filmed_from_steady = agreed.filmed_from_steady;
         }
         let far_px = FAR * f64::from(frame.luma.size.width);
-        let is_far = self.outline.farthest_px(&self.motion) > far_px;
+        let is_far = self.motion.farthest_px(&self.outline.corners_px) > far_px;
         let is_seen = agreed.is_some() && !is_far;
-        self.motion.background = match (self.sight.is_lost(is_seen, frame.time_s), agreed) {
+        self.motion.background = match (self.sight.note(is_seen, frame.time_s), agreed) {
             (true, _) => model::Background::Lost,
             (false, Some(agreed)) => model::Background::Seen(agreed.agreement),
             (false, None) => model::Background::Unclear,
@@ -278,15 +278,6 @@ impl Background {
 }
 
 impl Wide {
-    /// How far the camera has moved the outline, px.
-    fn farthest_px(&self, motion: &CameraMotion) -> f64 {
-        let mut farthest_px: f64 = 0.0;
-        for corner in self.corners_px {
-            farthest_px = farthest_px.max((motion.filmed_px(corner) - corner).norm());
-        }
-        farthest_px
-    }
-
     /// Clear corners where the tree cannot be, px.
     fn corners_outside(
         &self,
@@ -297,7 +288,10 @@ impl Wide {
         let picture = Mat::new_rows_cols_with_data(rows, cols, &luma.pixels)?;
         let tree = Mat::new_rows_cols_with_data(rows, cols, &self.mask)?;
         // Where the outline is in this picture, within what the camera has moved.
-        let moved_px = motion.farthest_px(luma.size).min(f64::from(cols)).ceil() as i32;
+        let moved_px = motion
+            .farthest_px(&luma.size.corners_px())
+            .min(f64::from(cols))
+            .ceil() as i32;
         let radius = (OFF_OUTLINE * f64::from(cols)).ceil() as i32 + moved_px;
         let side = 2 * radius + 1;
         let square =
@@ -343,7 +337,7 @@ fn agreed(pairs: &[Pair], agree_px: f64, places_px: &[Point2<f64>]) -> Option<Ag
     if pairs.len() < LEAST_CORNERS {
         return None;
     }
-    let shift = median_shift(pairs)?;
+    let shift = median_vector(pairs.iter().map(|pair| pair.filmed_px - pair.steady_px));
     let mut motion = Similarity2::new(shift, 0.0, 1.0);
     let mut fitted = None;
     let mut sd_px = LEAST_SD_PX;
@@ -369,20 +363,6 @@ fn agreed(pairs: &[Pair], agree_px: f64, places_px: &[Point2<f64>]) -> Option<Ag
             rms_px: rms(agreeing),
         },
     })
-}
-
-/// Median of how far the pairs have moved, px.
-fn median_shift(pairs: &[Pair]) -> Option<Vector2<f64>> {
-    let moved = |axis: usize| -> Vec<f64> {
-        pairs
-            .iter()
-            .map(|pair| pair.filmed_px[axis] - pair.steady_px[axis])
-            .collect()
-    };
-    Some(Vector2::new(
-        median(moved(0), f64::total_cmp)?,
-        median(moved(1), f64::total_cmp)?,
-    ))
 }
 
 /// What a motion misses a pair by, px.

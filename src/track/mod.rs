@@ -1,8 +1,8 @@
 //! Points inside the outline, followed from frame to frame.
 //!
-//! Each frame: the camera's motion by what stands still; flow forward and back; a point that does not lead back to its start is carried along
-//! by its neighbours for a while; a part of the points is put back on its first patch; lost points
-//! are replaced. Ids are never used twice.
+//! Each frame: the camera's motion by what stands still; flow forward and back; a point that does
+//! not lead back to its start is carried along by its neighbours for a while; a part of the points
+//! is put back on its first patch; lost points are replaced. Ids are never used twice.
 
 mod anchor;
 mod background;

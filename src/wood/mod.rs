@@ -24,6 +24,7 @@ use crate::config::TraceBy;
 use crate::model::{AtRest, CameraMotion, Foot, Outline, Rgb, Wood};
 use crate::motion::Spread;
 use crate::signal::median;
+use crate::signal::statistics::median_vector;
 use evidence::evidence;
 use nalgebra::{Point2, Vector2};
 use opencv::core::{Mat, Size as CvSize, ToInputArray};
@@ -169,17 +170,6 @@ fn settle(shots: &mut [SteadyShot], n_rest: usize, rest_px: &[Point2<f64>]) -> V
         settled_px.push(rest + off);
     }
     settled_px
-}
-
-/// The median of each component; 0 of none.
-fn median_vector(vectors: impl Iterator<Item = Vector2<f64>>) -> Vector2<f64> {
-    let (mut across, mut down) = (Vec::new(), Vec::new());
-    for vector in vectors {
-        across.push(vector.x);
-        down.push(vector.y);
-    }
-    let middle = |values| median(values, f64::total_cmp).unwrap_or(0.0);
-    Vector2::new(middle(across), middle(down))
 }
 
 /// How far points go from their rest places, px.

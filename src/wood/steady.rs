@@ -59,7 +59,8 @@ pub fn steadied(
         }
         let mut picture = shot.picture.clone();
         background.relight(&mut picture);
-        steady.push(if shot.camera.farthest_px(picture.size) < LEAST_PX {
+        let moved_px = shot.camera.farthest_px(&picture.size.corners_px());
+        steady.push(if moved_px < LEAST_PX {
             SteadyShot {
                 picture,
                 displacements: as_filmed(shot, rest_px),

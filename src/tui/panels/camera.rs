@@ -10,9 +10,6 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-/// A camera that trembles by so much is marked, px.
-const STRONG_SHAKE_PX: f64 = 0.5;
-
 /// At most seven lines; where there is no room for all, the last one tells only of losses that
 /// seldom happen. While nothing is lost one word says so.
 pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
@@ -97,24 +94,22 @@ fn rate(s: &Snapshot, theme: Theme) -> Vec<Span<'static>> {
 
 /// By how much the camera itself trembles, and how fast.
 fn shake(s: &Snapshot, theme: Theme) -> Vec<Span<'static>> {
-    let words = match (s.background, s.shake_px) {
+    let shake = match (s.background, s.shake) {
         (Some(Background::Lost), _) => return vec![Span::styled("turned away", theme.warning())],
         (Some(Background::Unclear), _) => return vec![Span::styled("not known", theme.warning())],
         (None, _) | (_, None) => return vec![Span::raw("–")],
-        (Some(Background::Seen(_)), Some(px)) => match s.shake_hz {
-            Some(hz) => format!("{} px  {} Hz", value(px), value(hz)),
-            None => format!("{} px", value(px)),
-        },
+        (Some(Background::Seen(_)), Some(shake)) => shake,
     };
-    let is_strong = s.shake_px.is_some_and(|px| px >= STRONG_SHAKE_PX);
-    vec![Span::styled(
-        words,
-        if is_strong {
-            theme.warning()
-        } else {
-            theme.strong()
-        },
-    )]
+    let mut words = format!("{} px", value(shake.rms_px));
+    if let Some(hz) = shake.frequency_hz {
+        words += &format!("  {} Hz", value(hz));
+    }
+    let style = if shake.is_strong() {
+        theme.warning()
+    } else {
+        theme.strong()
+    };
+    vec![Span::styled(words, style)]
 }
 
 /// A count that ought to be 0.

@@ -2,8 +2,8 @@
 
 use crate::model::{
     Agreement, AngleSpectrum, Angles, Background, BranchGraph, BranchRow, BranchSway, Excitation,
-    FormatNote, Interval, JointPose, Node, NodeId, NodeName, Phase, Pose, Rgb, Size, Skeleton,
-    Snapshot, Sway, SwayNow, Unidentified, Wood, WoodNode, WoodSight,
+    FormatNote, Interval, JointPose, Node, NodeId, NodeName, Phase, Pose, Rgb, Shake, Size,
+    Skeleton, Snapshot, Sway, SwayNow, Unidentified, Wood, WoodNode, WoodSight,
 };
 use nalgebra::{Point2, UnitQuaternion, Vector3};
 use std::sync::Arc;
@@ -124,8 +124,10 @@ pub fn snapshot(phase: Phase) -> Snapshot {
         lost_in_camera: 3,
         not_shown: 45,
         background: Some(Background::Seen(Agreement::default())),
-        shake_px: Some(0.63),
-        shake_hz: Some(2.2),
+        shake: Some(Shake {
+            rms_px: 0.63,
+            frequency_hz: Some(2.2),
+        }),
         latency_p50_ms: 21.4,
         latency_p99_ms: 48.0,
         image_size: Some(Size::new(640, 360)),
