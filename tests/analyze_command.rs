@@ -241,6 +241,44 @@ fn the_answers_stand_in_the_table_in_json_and_in_the_capture() {
     );
 }
 
+/// `capture.json` of a capture.
+fn note(dir: &Path) -> Value {
+    let text = fs::read(dir.join("capture.json")).expect("capture.json");
+    serde_json::from_slice(&text).expect("JSON")
+}
+
+/// A capture whose frequencies were not found when it was made is judged by those that are found
+/// now; one of which it is not known what it was judged by keeps what it has.
+#[test]
+fn an_update_judges_anew() {
+    let (_dir, dir) = captured("tree");
+    let made = note(&dir);
+    let mut old = made.clone();
+    old["verdict"] = serde_json::json!({
+        "grade": "poor", "reasons": ["no frequency identified"], "advice": []
+    });
+    old["judged_by"]["sway"] = Value::Null;
+    let put = |note: &Value| {
+        fs::write(dir.join("capture.json"), note.to_string()).expect("capture.json");
+    };
+    put(&old);
+    let unasked = told(&[&dir], &[]);
+    assert_eq!(unasked["captures"][0]["verdict"], old["verdict"]);
+    assert_eq!(note(&dir), old);
+    let updated = told(&[&dir], &["--update"]);
+    let renewed = note(&dir);
+    assert_eq!(renewed["verdict"], made["verdict"]);
+    assert_eq!(updated["captures"][0]["verdict"], made["verdict"]);
+    let [found, known] =
+        [&renewed, &made].map(|note| number(&note["judged_by"]["sway"]["trunk_hz"]));
+    assert!((found / known - 1.0).abs() < 0.01, "{found} Hz, {known} Hz");
+
+    old.as_object_mut().expect("object").remove("judged_by");
+    put(&old);
+    told(&[&dir], &["--update"]);
+    assert_eq!(note(&dir), old);
+}
+
 #[test]
 fn the_part_of_the_film_and_its_cause_can_be_chosen() {
     let (_dir, dir) = captured("tree");
@@ -703,7 +741,9 @@ fn the_model_in_the_capture_is_made_anew_with_the_answers() {
         .collect();
     assert_eq!((before.len(), changed[0]), (after.len(), "nodes.csv"));
     assert!(
-        changed[1..].iter().all(|name| *name == "tree.glb"),
+        changed[1..]
+            .iter()
+            .all(|name| ["capture.json", "tree.glb"].contains(name)),
         "{changed:?}"
     );
     analyze(&[&dir], &["--update", "--excitation", "wind"]);

@@ -545,6 +545,35 @@ fn the_frequencies_are_those_of_the_tree() {
     );
 }
 
+/// The stream says what the film is worth so far, with the first line and whenever that is another
+/// verdict, at most once a second.
+#[test]
+fn the_stream_says_what_the_film_is_worth() {
+    let mut told: Vec<(f64, serde_json::Value)> = Vec::new();
+    for (i, line) in made().stream.lines().enumerate() {
+        let line: serde_json::Value = serde_json::from_str(line).expect("json");
+        let Some(verdict) = line.get("verdict") else {
+            assert!(i > 0, "the first line has none");
+            continue;
+        };
+        let time_s = line["time_s"].as_f64().expect("a time");
+        if let Some((last_s, last)) = told.last() {
+            assert!(time_s - last_s > 0.99, "{last_s} s and {time_s} s");
+            assert_ne!(last, verdict, "said twice");
+        }
+        told.push((time_s, verdict.clone()));
+    }
+    let note = made().capture();
+    assert!(told.len() > 1, "{told:?}");
+    for (_, verdict) in &told {
+        let grade = verdict["grade"].as_str().expect("a grade");
+        assert!(["good", "fair", "poor"].contains(&grade), "{verdict}");
+    }
+    // The last one is of the same film but for its last second.
+    let (_, last) = told.last().expect("a verdict");
+    assert_eq!(last["grade"], note["verdict"]["grade"], "{last} {note}");
+}
+
 /// Once a second the stream says how the branches sway, by the names and with the units of the
 /// files.
 #[test]

@@ -184,6 +184,7 @@ fn a_capture_reads_back_as_it_was_written_and_is_the_same_every_time() {
             ..Quality::default()
         },
         verdict: None,
+        judged_by: None,
         model: Some(ModelNote::of(&skeleton, 0.004)),
         animation: None,
         warnings: vec!["the camera dropped 3 frames".into()],

@@ -172,11 +172,13 @@ fn analyse_capture(
         .flat_map(|o| &o.polygon_px)
         .map(|p| Point2::from(*p))
         .collect();
+    let renewed = document.note.judgement_with(&skeleton, &analysis.sway);
+    let renewed = renewed.filter(|_| args.update).map(|j| j.verdict);
     let study = Study::of(&Given {
         name,
         source: &document.note.source.name,
         origin: &document.note.origin(),
-        verdict: document.note.verdict.as_ref(),
+        verdict: renewed.as_ref().or(document.note.verdict.as_ref()),
         skeleton: &skeleton,
         film: &film,
         poses: &poses,

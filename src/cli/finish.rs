@@ -18,7 +18,7 @@ pub fn run(args: &FinishArgs) -> Result<(), CommandError> {
     // DIR.unfinished is removed only when the capture is complete: a signal may end this any time.
     let _stop = Stop::on_signals()?;
     let written = runtime::finish_unfinished(&args.dir, &CancelToken::new())?;
-    eprint_line(&format!("verdict: {}", written.verdict.line()));
+    eprint_line(&written.verdict.labelled_line());
     let dir = written.dir.display();
     match &written.tree {
         Some(model) => eprint_line(&format!(

@@ -14,6 +14,9 @@ const NOTIFY_INTERVAL: Duration = Duration::from_secs(1);
 /// The manager's time limit for start or stop is extended by this with every notification.
 const EXTENSION: Duration = Duration::from_secs(30);
 
+/// Longest text of the verdict in the line of status, characters.
+const VERDICT_LENGTH: usize = 100;
+
 /// Connection to the service manager.
 pub struct Service {
     watchdog: Option<Duration>,
@@ -139,5 +142,9 @@ fn status(s: &Snapshot) -> String {
         "frame {}, {:.1} a second, {lost} lost, {} points",
         s.frame, s.sensor_rate_hz, s.tracks_alive
     );
-    format!("{}: {frames}", s.phase.name())
+    let status = format!("{}: {frames}", s.phase.name());
+    match &s.verdict {
+        Some(verdict) => format!("{status}; {}", verdict.line_within(VERDICT_LENGTH)),
+        None => status,
+    }
 }

@@ -269,7 +269,7 @@ fn closing_lines(s: &Summary) -> Vec<String> {
         lines.push(tree_line(tree));
     }
     if let Some(verdict) = &s.verdict {
-        lines.push(format!("verdict: {}", verdict.line()));
+        lines.push(verdict.labelled_line());
     }
     if let Some(written) = &s.written {
         let dir = written.dir.display();

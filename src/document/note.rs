@@ -4,7 +4,10 @@
 use super::error::DocumentError;
 use crate::config::{Config, STROKE_POINTS};
 use crate::files::WriteError;
-use crate::model::{LocalTime, Origin, Timing, UserNotes, Verdict};
+use crate::model::{
+    CaptureFacts, Judgement, LocalTime, Origin, Skeleton, SwayFacts, Swaying, Timing, UserNotes,
+    Verdict,
+};
 use serde::{Deserialize, Serialize};
 use std::io::ErrorKind;
 use std::path::Path;
@@ -51,6 +54,9 @@ pub struct CaptureNote {
     /// What the capture is worth, why, and what to do; `None` in those of before.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub verdict: Option<Verdict>,
+    /// What that rests on: with other answers on the sway it can be judged anew.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub judged_by: Option<CaptureFacts>,
     pub model: Option<ModelNote>,
     pub animation: Option<AnimationNote>,
     /// What the user should know before trusting the result, one sentence each.
@@ -302,6 +308,22 @@ fn unread(file: &Path, e: serde_json::Error) -> DocumentError {
 }
 
 impl CaptureNote {
+    /// What the capture is worth by other answers on its sway, by node index; `None` where it is
+    /// not known what it was judged by.
+    pub fn judgement_with(&self, skeleton: &Skeleton, sway: &[Swaying]) -> Option<Judgement> {
+        let facts = self.judged_by.clone()?;
+        Some(Judgement::of(CaptureFacts {
+            sway: SwayFacts::of(skeleton, sway),
+            ..facts
+        }))
+    }
+
+    /// Takes what the capture was found to be worth.
+    pub fn take_judgement(&mut self, judgement: Judgement) {
+        self.verdict = Some(judgement.verdict);
+        self.judged_by = Some(judgement.facts);
+    }
+
     /// When the film was made, and what the user noted on it.
     pub fn origin(&self) -> Origin {
         Origin {

@@ -2,6 +2,7 @@
 
 use super::{Outline, Size};
 use nalgebra::Point2;
+use serde::{Deserialize, Serialize};
 
 /// No trunk is thicker than this share of the tree's height.
 const THICKEST_TRUNK: f64 = 0.12;
@@ -19,7 +20,8 @@ pub struct Foot {
 }
 
 /// What the place of a foot rests on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum FootBasis {
     /// The outline ends there, as narrow as a trunk.
     Outline,

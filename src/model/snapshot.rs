@@ -2,7 +2,8 @@
 //! changed.
 
 use super::{
-    Angles, Background, NodeName, Pose, Rgb, Shake, Size, Skeleton, SwayNow, Wood, WoodSight,
+    Angles, Background, NodeName, Pose, Rgb, Shake, Size, Skeleton, SwayNow, Verdict, Wood,
+    WoodSight,
 };
 use nalgebra::Point2;
 use std::sync::Arc;
@@ -86,14 +87,30 @@ pub struct BranchRow {
     pub amplitude_px: f64,
 }
 
+/// What has still to be seen before there is a tree, and before there are frequencies.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StillNeeded {
+    /// Fewer points move than a tree is made of.
+    pub motion: bool,
+    /// Film before the tree can be built, however much moves, s.
+    pub before_tree_s: f64,
+    /// Film before every branch that moves should have a frequency, s.
+    pub for_sway_s: f64,
+}
+
 /// State of a capture after some frame.
 #[derive(Clone, Debug, Default)]
 pub struct Snapshot {
     pub source: String,
     pub format: FormatNote,
     pub phase: Phase,
-    /// Progress of the phase, 0 to 1; in `Accumulate` the accumulation measure.
+    /// Progress of the phase, 0 to 1; in `Accumulate` the share of the motion that the tree takes.
     pub progress: f64,
+    pub still_needed: StillNeeded,
+    /// What the capture would be worth if it ended now; `None` while no second of it was followed.
+    pub verdict: Option<Arc<Verdict>>,
+    /// The source is a camera: what is in front of it can be changed.
+    pub is_live: bool,
     /// What the program wants to tell, newest last; e.g. why nothing is built yet.
     pub messages: Vec<String>,
     pub frame: u64,
@@ -159,6 +176,8 @@ pub struct Snapshot {
     pub paused: bool,
     /// The source has ended or the user has quit: what is shown is the last state.
     pub ended: bool,
+    /// The disk is full, and the capture is written when there is room.
+    pub waits_for_room: bool,
 }
 
 impl Snapshot {

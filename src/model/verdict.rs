@@ -1,112 +1,7 @@
 //! What a capture is worth, in plain words: good, fair or poor, why, and what to do.
 
-use super::FootBasis;
+use super::CaptureFacts;
 use serde::{Deserialize, Serialize};
-
-/// The sway of a branch is identified well from so many of its periods: in wind, the 95 % interval of a
-/// branch with 2 % of damping is then some 5 % to either side.
-const PERIODS_NEEDED: f64 = 10.0;
-/// What is to be filmed where no frequency is known, s: ten periods at 0.33 Hz, the slowest sway of
-/// a full-grown tree.
-const NEEDED_S: f64 = 30.0;
-/// Below this share of the length that is needed a film is poor: two or three periods tell a
-/// release, and no wind.
-const POOR_SHARE: f64 = 0.4;
-/// Half a second is not missed.
-const LENGTH_SLACK_S: f64 = 0.5;
-
-/// Below this amplitude, px, motion is that of the noise of tracking (0.03 to 0.1 px) as much as of
-/// the tree.
-const POOR_AMPLITUDE_PX: f64 = 0.3;
-/// Below this one, px, the noise is more than a tenth of the motion, and small branches drown in
-/// it.
-const FAIR_AMPLITUDE_PX: f64 = 1.0;
-
-/// Frames for each period of the fastest sway that is asked for: two by Nyquist, half a one more
-/// as frames are not evenly spaced.
-const FRAMES_PER_PERIOD: f64 = 2.5;
-/// With fewer frames a second not even a trunk (up to 2 Hz) is identified, and points jump too far from
-/// frame to frame to be followed.
-const POOR_RATE_HZ: f64 = 5.0;
-
-/// Points that are followed for less, s, are lost before a branch has swayed to and fro ten times.
-const FAIR_LIFE_S: f64 = 15.0;
-/// The same for one period of a slow tree and what a point needs to pass its trial, s.
-const POOR_LIFE_S: f64 = 5.0;
-
-/// Mean grey, of 255, below which a picture is mostly black: what is seen in it is the sensor's
-/// noise.
-const POOR_GREY: f64 = 16.0;
-/// The same where bark and twigs have a few grey levels only.
-const FAIR_GREY: f64 = 35.0;
-
-/// A camera that shakes by more, px, shakes as much as small branches move.
-const FAIR_SHAKE_PX: f64 = 0.5;
-/// By more than this the background leaves the places at which it is compared.
-const POOR_SHAKE_PX: f64 = 5.0;
-
-/// What is known of a capture when it is judged.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct CaptureFacts {
-    /// How far points move, px: amplitude of a quarter of them or more; `None` where none was
-    /// followed.
-    pub amplitude_px: Option<f64>,
-    /// Length of the film, s.
-    pub filmed_s: f64,
-    /// Frames a second by their own times.
-    pub rate_hz: Option<f64>,
-    /// Highest frequency that is looked for, Hz.
-    pub highest_hz: f64,
-    pub points: PointFacts,
-    /// Mean grey of the picture, 0 to 255.
-    pub brightness: Option<f64>,
-    /// `None` without a tree.
-    pub foot: Option<FootBasis>,
-    /// `None` where it was not analysed to the end.
-    pub sway: Option<SwayFacts>,
-    /// How the camera shakes; `None` where that is not known.
-    pub shake: Option<Shake>,
-    /// Nothing around the tree shows how it moves.
-    pub is_camera_unknown: bool,
-    /// Since when the camera looks elsewhere, s since the first frame; `None` where it does not, or
-    /// where that is not known.
-    pub camera_moved_at_s: Option<f64>,
-}
-
-/// How the points were followed.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PointFacts {
-    pub followed: u64,
-    /// How many of them were still followed at the end.
-    pub alive: u64,
-    pub lost_per_s: Option<f64>,
-}
-
-/// What the sway was found to be.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SwayFacts {
-    /// Branches that were analysed, and those with a frequency.
-    pub branches: usize,
-    pub identified: usize,
-    /// The trunk's own frequency, Hz.
-    pub trunk_hz: Option<f64>,
-}
-
-/// How a camera shakes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shake {
-    /// Root mean square, px.
-    pub rms_px: f64,
-    /// The strongest frequency in it, Hz, if one stands out.
-    pub frequency_hz: Option<f64>,
-}
-
-impl Shake {
-    /// Whether it shakes as much as small branches move.
-    pub fn is_strong(&self) -> bool {
-        self.rms_px >= FAIR_SHAKE_PX
-    }
-}
 
 /// What a capture is worth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -130,11 +25,27 @@ pub struct Verdict {
     pub advice: Vec<String>,
 }
 
+/// A verdict, and what it rests on.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Judgement {
+    pub verdict: Verdict,
+    pub facts: CaptureFacts,
+}
+
 /// One thing that is not as it should be.
-struct Finding {
-    grade: Grade,
-    reason: String,
-    advice: String,
+pub(super) struct Finding {
+    pub grade: Grade,
+    pub reason: String,
+    /// Empty where it follows from the others.
+    pub advice: String,
+}
+
+impl Judgement {
+    /// Judges a capture.
+    pub fn of(facts: CaptureFacts) -> Self {
+        let verdict = Verdict::of(&facts);
+        Self { verdict, facts }
+    }
 }
 
 impl Grade {
@@ -148,7 +59,7 @@ impl Grade {
     }
 
     /// The grade of a value of which more is better; `None` is good.
-    fn of(value: f64, fair: f64, poor: f64) -> Option<Self> {
+    pub(super) fn of(value: f64, fair: f64, poor: f64) -> Option<Self> {
         if value < poor {
             Some(Self::Poor)
         } else if value < fair {
@@ -162,28 +73,12 @@ impl Grade {
 impl Verdict {
     /// Judges a capture.
     pub fn of(facts: &CaptureFacts) -> Self {
-        let found = [
-            facts.camera_moved(),
-            facts.shakes(),
-            facts.hides_shake(),
-            facts.is_dark(),
-            facts.has_few_frames(),
-            facts.moves_little(),
-            facts.is_short(),
-            facts.loses_points(),
-            facts.has_no_foot(),
-        ];
-        let mut findings: Vec<Finding> = found.into_iter().flatten().collect();
-        let sway = facts.tells_no_sway(findings.is_empty());
-        findings.extend(sway);
-        // The order of equals stays: causes come before what follows from them.
-        findings.sort_by_key(|finding| std::cmp::Reverse(finding.grade));
         let mut verdict = Self::default();
         for Finding {
             grade,
             reason,
             advice,
-        } in findings
+        } in facts.findings()
         {
             verdict.grade = verdict.grade.max(grade);
             verdict.reasons.push(reason);
@@ -206,156 +101,47 @@ impl Verdict {
         }
         format!("{because}. To do: {}", self.advice.join("; "))
     }
-}
 
-impl CaptureFacts {
-    /// What had to be filmed, s.
-    fn needed_s(&self) -> f64 {
-        let known_hz = self.sway.and_then(|sway| sway.trunk_hz);
-        known_hz.map_or(NEEDED_S, |hz| {
-            (PERIODS_NEEDED / hz.max(f64::MIN_POSITIVE)).min(NEEDED_S)
-        })
+    /// The same as a line of its own, for terminals and tables.
+    pub fn labelled_line(&self) -> String {
+        format!("verdict: {}", self.line())
     }
 
-    fn camera_moved(&self) -> Option<Finding> {
-        let at_s = self.camera_moved_at_s?;
-        Some(Finding {
-            grade: Grade::Fair,
-            reason: format!("camera moved at {at_s:.1} s"),
-            advice: "fix the camera and film again".into(),
-        })
-    }
-
-    fn shakes(&self) -> Option<Finding> {
-        let Shake {
-            rms_px,
-            frequency_hz,
-        } = self.shake?;
-        let grade = Grade::of(-rms_px, -FAIR_SHAKE_PX, -POOR_SHAKE_PX)?;
-        let at = frequency_hz.map_or(String::new(), |hz| format!(" at {hz:.1} Hz"));
-        Some(Finding {
-            grade,
-            reason: format!("shakes {rms_px:.1} px{at}"),
-            advice: "shelter the camera from wind and load the tripod".into(),
-        })
-    }
-
-    fn hides_shake(&self) -> Option<Finding> {
-        self.is_camera_unknown.then(|| Finding {
-            grade: Grade::Fair,
-            reason: "nothing around the tree shows how the camera moves".into(),
-            advice: "film more of the ground and of what stands still".into(),
-        })
-    }
-
-    fn is_dark(&self) -> Option<Finding> {
-        let grade = Grade::of(self.brightness?, FAIR_GREY, POOR_GREY)?;
-        Some(Finding {
-            grade,
-            reason: "too dark".into(),
-            advice: "film with more light".into(),
-        })
-    }
-
-    fn has_few_frames(&self) -> Option<Finding> {
-        let rate_hz = self.rate_hz?;
-        let wanted_hz = FRAMES_PER_PERIOD * self.highest_hz;
-        let grade = Grade::of(rate_hz, wanted_hz, POOR_RATE_HZ.min(wanted_hz))?;
-        Some(Finding {
-            grade,
-            reason: format!("{rate_hz:.1} frames/s are too few"),
-            advice: format!("film with {:.0} frames/s or more", wanted_hz.ceil()),
-        })
-    }
-
-    fn moves_little(&self) -> Option<Finding> {
-        let amplitude_px = self.amplitude_px?;
-        let grade = Grade::of(amplitude_px, FAIR_AMPLITUDE_PX, POOR_AMPLITUDE_PX)?;
-        Some(Finding {
-            grade,
-            reason: format!("moves by {amplitude_px:.1} px only"),
-            advice: "come nearer, or film in more wind".into(),
-        })
-    }
-
-    fn is_short(&self) -> Option<Finding> {
-        let needed_s = self.needed_s();
-        let missing_s = needed_s - self.filmed_s;
-        if missing_s < LENGTH_SLACK_S {
-            return None;
+    /// As much of it as fits `room` columns, what matters most before all else: the grade, the
+    /// worst reason, what to do first; how many further reasons there are stands for those.
+    pub fn line_within(&self, room: usize) -> String {
+        let grade = self.grade.word();
+        let Some(worst) = self.reasons.first() else {
+            return grade.chars().take(room).collect();
+        };
+        let all = format!("{grade}: {}", self.reasons.join("; "));
+        let further = match self.reasons.len() - 1 {
+            0 => String::new(),
+            n => format!(" (+{n})"),
+        };
+        let first = format!("{grade}: {worst}{further}");
+        let mut lines = Vec::new();
+        if let Some(advice) = self.advice.first() {
+            lines.push(format!("{all}. To do: {}", self.advice.join("; ")));
+            lines.push(format!("{all}. To do: {advice}"));
+            lines.push(format!("{first}. To do: {advice}"));
         }
-        let grade = Grade::of(self.filmed_s, needed_s, POOR_SHARE * needed_s)?;
-        Some(Finding {
-            grade,
-            reason: format!("{:.0} of {needed_s:.0} s filmed", self.filmed_s),
-            advice: format!("film {:.0} s more", missing_s.ceil()),
-        })
-    }
-
-    fn loses_points(&self) -> Option<Finding> {
-        let PointFacts {
-            followed,
-            alive,
-            lost_per_s,
-        } = self.points;
-        // Where as many are found as are lost, a point is followed for so long in the mean.
-        let life_s = alive as f64 / lost_per_s.filter(|lost| *lost > 0.0)?;
-        let grade = Grade::of(life_s, FAIR_LIFE_S, POOR_LIFE_S)?;
-        let lost = followed.saturating_sub(alive);
-        Some(Finding {
-            grade,
-            reason: format!("{lost} of {followed} points lost"),
-            advice: "keep people and traffic out of the view, and focus and exposure fixed".into(),
-        })
-    }
-
-    fn has_no_foot(&self) -> Option<Finding> {
-        let (reason, advice) = match self.foot? {
-            FootBasis::CutOff => ("foot cut off", "film the whole tree with its foot"),
-            FootBasis::Guessed => ("foot is a guess", "draw the outline down to the foot"),
-            FootBasis::Outline | FootBasis::Drawn => return None,
-        };
-        Some(Finding {
-            grade: Grade::Fair,
-            reason: reason.into(),
-            advice: advice.into(),
-        })
-    }
-
-    /// A tree or a frequency that was not found; what to do about it is said by its causes, where
-    /// there are some.
-    fn tells_no_sway(&self, no_cause: bool) -> Option<Finding> {
-        let (grade, reason) = match (self.foot, self.sway) {
-            (None, _) => (Grade::Poor, "no tree found"),
-            (Some(_), None) => return None,
-            (Some(_), Some(sway)) if sway.identified == 0 && sway.branches > 0 => {
-                (Grade::Poor, "no frequency identified")
-            }
-            (Some(_), Some(sway)) if sway.trunk_hz.is_none() && sway.branches > 0 => {
-                (Grade::Fair, "the trunk's frequency not identified")
-            }
-            _ => return None,
-        };
-        let advice = if no_cause {
-            "film longer, or pull the tree and release it"
-        } else {
-            ""
-        };
-        Some(Finding {
-            grade,
-            reason: reason.into(),
-            advice: advice.into(),
-        })
+        lines.extend([all, first, format!("{grade}: {worst}")]);
+        let fits = |line: &String| line.chars().count() <= room;
+        let whole = lines.into_iter().find(fits);
+        whole.unwrap_or_else(|| grade.chars().take(room).collect())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::{FootBasis, PointFacts, Shake, SwayFacts};
 
     /// A minute in good wind, all of it told.
     fn good() -> CaptureFacts {
         CaptureFacts {
+            is_filming: false,
             amplitude_px: Some(4.0),
             filmed_s: 60.0,
             rate_hz: Some(30.0),
@@ -476,6 +262,11 @@ mod tests {
             "poor, because: no tree found. To do: film longer, or pull the tree and release it",
         );
         check(
+            "no tree yet",
+            |f| (f.foot, f.sway, f.filmed_s, f.is_filming) = (None, None, 9.0, true),
+            "poor, because: 9 of 30 s filmed; no tree yet. To do: film 21 s more",
+        );
+        check(
             "a tripod in the wind",
             |f| {
                 f.shake = Some(Shake {
@@ -498,10 +289,41 @@ mod tests {
     #[test]
     fn what_is_not_known_is_no_reason() {
         let unknown = CaptureFacts {
-            filmed_s: NEEDED_S,
+            filmed_s: 30.0,
             foot: Some(FootBasis::Outline),
             ..CaptureFacts::default()
         };
         assert_eq!(Verdict::of(&unknown), Verdict::default());
+    }
+
+    /// A line of a narrow screen says the grade, then the worst reason, then what to do about it.
+    #[test]
+    fn a_short_line_says_what_matters_most() {
+        let verdict = Verdict {
+            grade: Grade::Poor,
+            reasons: vec!["too dark".into(), "9 of 30 s filmed".into()],
+            advice: vec!["film with more light".into(), "film 21 s more".into()],
+        };
+        for (room, expected) in [
+            (
+                90,
+                "poor: too dark; 9 of 30 s filmed. To do: film with more light; film 21 s more",
+            ),
+            (
+                70,
+                "poor: too dark; 9 of 30 s filmed. To do: film with more light",
+            ),
+            (50, "poor: too dark (+1). To do: film with more light"),
+            (40, "poor: too dark; 9 of 30 s filmed"),
+            (19, "poor: too dark (+1)"),
+            (18, "poor: too dark"),
+            (13, "poor"),
+            (2, "po"),
+            (0, ""),
+        ] {
+            assert_eq!(verdict.line_within(room), expected);
+        }
+        assert_eq!(Verdict::default().line_within(80), "good");
+        assert_eq!(Verdict::default().labelled_line(), "verdict: good");
     }
 }

@@ -6,9 +6,11 @@ use super::refiner::{Refiner, SolveJob, Taken};
 use crate::cancel::CancelToken;
 use crate::config::{Config, ConfigError, check_strokes};
 use crate::hierarchy::{self, Evidence};
-use crate::model::{Outline, Phase, Pose, RawFrame, Rgb, TrackLog, TrackSet, WoodSeen, WoodSight};
+use crate::model::{
+    Outline, Phase, Pose, RawFrame, Rgb, StillNeeded, TrackLog, TrackSet, WoodSeen, WoodSight,
+};
 use crate::motion::Binding;
-use crate::solve::{Model, identify_sub_branches, solve};
+use crate::solve::{LEAST_MOVING, Model, identify_sub_branches, solve};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Instant;
@@ -454,7 +456,27 @@ impl BackEnd {
             Some(_) => (Phase::Live, 1.0),
             None if self.log.all().len() < 2 => (Phase::Detect, 0.0),
             None if self.building.is_some() => (Phase::Build, 1.0),
-            None => (Phase::Accumulate, self.evidence.measure),
+            None => (Phase::Accumulate, self.gathered()),
+        }
+    }
+
+    /// Share of the motion that has been seen of that which the tree takes, 0 to 1.
+    fn gathered(&self) -> f64 {
+        let threshold = self.config.accumulate.threshold.max(f64::MIN_POSITIVE);
+        (self.evidence.measure / threshold).min(1.0)
+    }
+
+    /// What the tree still waits for; nothing where it stands.
+    pub fn still_needed(&self) -> StillNeeded {
+        if self.tracker.is_some() {
+            return StillNeeded::default();
+        }
+        let settings = &self.config.accumulate;
+        let seen_s = self.log.last(settings.window_s).span_s();
+        StillNeeded {
+            motion: self.evidence.moving.len() < LEAST_MOVING,
+            before_tree_s: (settings.min_s - seen_s).max(0.0),
+            for_sway_s: 0.0,
         }
     }
 }

@@ -35,7 +35,7 @@ fn one(study: &Study, columns: Option<usize>) -> String {
         top += &format!("{}\n", origin.join(", "));
     }
     if let Some(verdict) = &study.verdict {
-        top += &format!("verdict: {}\n", verdict.line());
+        top += &format!("{}\n", verdict.labelled_line());
     }
     top += &format!("{}\n", words::excitation(study));
     let (answers, all) = (study.answers(), words::number_of(branches.len(), "branch"));

@@ -2,7 +2,7 @@
 
 use super::announce::little_motion;
 use super::capture_tables::{CaptureTables, Done};
-use super::judge::verdict;
+use super::judge::judge;
 use super::meter::Histogram;
 use super::shaking::ShakeMeter;
 use super::shared::{Failure, Shared};
@@ -35,6 +35,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 #[derive(Clone, Debug, Default)]
 pub struct Quality {
     born: u64,
+    frames: u64,
     rejected: u64,
     on_trial: Tentative,
     lost: u64,
@@ -51,6 +52,7 @@ impl Quality {
     /// error, px.
     pub fn note(&mut self, tracks: &TrackSet, fb_error_px: f64, error_px: Option<f64>) {
         self.shaking.note(tracks);
+        self.frames += 1;
         self.rejected += tracks.rejected.len() as u64;
         self.on_trial.note(tracks);
         self.born += u64::from(tracks.born);
@@ -68,7 +70,6 @@ impl Quality {
 
     /// The figures as the capture has them.
     pub(super) fn figures(&self, tree: Option<&Model>) -> QualityNote {
-        let tracked_s = self.last_s - self.first.map_or(self.last_s, |(_, s)| s);
         let shaking = self.shaking.so_far();
         QualityNote {
             camera_shake_px: shaking.shake.map(|shake| shake.rms_px),
@@ -81,10 +82,36 @@ impl Quality {
             tracks_alive_end: self.alive,
             median_fb_error_px: self.fb_error_px.median(),
             median_error_px: self.error_px.median(),
-            lost_per_s: (tracked_s > 0.0).then(|| self.lost as f64 / tracked_s),
+            lost_per_s: self.lost_per_s(),
             median_certainty: tree.and_then(|tree| tree.hierarchy.median_certainty()),
             median_reprojection_px: None,
         }
+    }
+
+    /// Points lost a second.
+    pub fn lost_per_s(&self) -> Option<f64> {
+        let followed_s = self.followed_s();
+        (followed_s > 0.0).then(|| self.lost as f64 / followed_s)
+    }
+
+    /// Frames in which points were followed.
+    pub fn frames(&self) -> u64 {
+        self.frames
+    }
+
+    /// Time from the first of them to the last, s.
+    pub fn followed_s(&self) -> f64 {
+        self.last_s - self.first.map_or(self.last_s, |(_, s)| s)
+    }
+
+    /// Time of the last one, s since the first of the film.
+    pub fn last_s(&self) -> f64 {
+        self.last_s
+    }
+
+    /// Points that were still followed in it.
+    pub fn tracks_alive(&self) -> u64 {
+        self.alive
     }
 
     /// How the camera moved.
@@ -166,8 +193,9 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
     );
     warn_of_unanalysed(job, &model);
     let warnings = warnings(job, Some(&model));
-    let verdict = verdict(job, Some(&model));
-    writer?.write(&done.folder, &model.modes, warnings, Some(verdict.clone()))?;
+    let judgement = judge(job, Some(&model));
+    let verdict = judgement.verdict.clone();
+    writer?.write(&done.folder, &model.modes, warnings, Some(judgement))?;
     let dir = done.folder.publish()?;
     Ok(Written {
         dir,
@@ -264,26 +292,25 @@ fn without_tree(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
     });
     nodes(folder.file("nodes.csv")?, &foot_only, &[], metres_per_px)?;
     MotionCsv::new(folder.file("motion.csv")?, &foot_only, metres_per_px)?.finish()?;
-    let verdict = verdict(job, None);
-    describe_without_tree(job, &folder, &verdict)?;
+    let judgement = judge(job, None);
+    let verdict = judgement.verdict.clone();
+    let mut note = describe(job, None, None);
+    note.take_judgement(judgement);
+    write_without_tree(job, &folder, &note)?;
     let dir = folder.publish()?;
     let tree = None;
     Ok(Written { dir, tree, verdict })
 }
 
-fn describe_without_tree(
+fn write_without_tree(
     job: &CaptureJob,
     folder: &OutputFolder,
-    verdict: &Verdict,
+    note: &CaptureNote,
 ) -> Result<(), Failure> {
     if let Some(picture) = &job.picture {
         folder.write(PICTURE_FILE, &jpeg(&picture.rgb)?)?;
     }
-    let note = CaptureNote {
-        verdict: Some(verdict.clone()),
-        ..describe(job, None, None)
-    };
-    Ok(folder.write("capture.json", &json(&note)?)?)
+    Ok(folder.write("capture.json", &json(note)?)?)
 }
 
 /// The points of a film in which no tree was built, those that have passed their trial, and the
@@ -360,6 +387,7 @@ pub(super) fn describe(
         refinement: tree.and_then(refinement),
         quality: job.quality.figures(tree),
         verdict: None,
+        judged_by: None,
         model,
         animation: None,
         warnings: warnings(job, tree),

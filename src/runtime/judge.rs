@@ -1,9 +1,8 @@
-//! What a capture is judged by: the facts of one that is at its end.
+//! What a capture is judged by: the facts of one that is at its end, or goes on.
 
-use super::finish::{CaptureJob, timing};
-use crate::model::{
-    CaptureFacts, PointFacts, Rgb, Skeleton, SwayFacts, Swaying, Unidentified, Verdict,
-};
+use super::finish::{CaptureJob, Quality, timing};
+use crate::config::Dynamics;
+use crate::model::{CaptureFacts, FootBasis, Judgement, Picture, PointFacts, SwayFacts, TrackLog};
 use crate::signal::statistics::quantile;
 use crate::solve::Model;
 
@@ -11,62 +10,78 @@ use crate::solve::Model;
 /// most of the points and hardly move, the quarter farthest out tells the sway.
 const QUIETER: f64 = 0.75;
 
-/// Level of the trunk.
-const TRUNK: u8 = 1;
+/// A film that is judged.
+pub struct JudgedFilm<'a> {
+    pub is_filming: bool,
+    pub length: FilmLength,
+    pub quality: &'a Quality,
+    /// Its last seconds.
+    pub log: &'a TrackLog,
+    pub settings: &'a Dynamics,
+    /// Mean grey of the picture, 0 to 255.
+    pub brightness: Option<f64>,
+    /// `None` without a tree.
+    pub foot: Option<FootBasis>,
+    pub sway: Option<SwayFacts>,
+}
+
+/// How long it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FilmLength {
+    /// Without the time in which the camera was away, s.
+    pub seconds: f64,
+    /// Frames a second by their own times.
+    pub rate_hz: Option<f64>,
+}
+
+impl JudgedFilm<'_> {
+    /// What it is judged by.
+    pub fn facts(&self) -> CaptureFacts {
+        let shaking = self.quality.shaking().so_far();
+        let amplitudes_px = self.log.last(self.settings.window_s).amplitudes_px();
+        CaptureFacts {
+            is_filming: self.is_filming,
+            amplitude_px: quantile(amplitudes_px, QUIETER),
+            filmed_s: self.length.seconds * (1.0 - shaking.lost_share),
+            rate_hz: self.length.rate_hz,
+            highest_hz: self.settings.highest_hz,
+            points: PointFacts {
+                followed: self.quality.tracks_total(),
+                alive: self.quality.tracks_alive(),
+                lost_per_s: self.quality.lost_per_s(),
+            },
+            brightness: self.brightness,
+            foot: self.foot,
+            sway: self.sway,
+            shake: shaking.shake,
+            is_camera_unknown: !shaking.is_known(),
+            camera_moved_at_s: shaking.lost_since_s,
+        }
+    }
+}
 
 /// What a capture is worth whose tree is `tree`, with its sway where that was analysed.
-pub fn verdict(job: &CaptureJob, tree: Option<&Model>) -> Verdict {
-    Verdict::of(&facts(job, tree))
-}
-
-fn facts(job: &CaptureJob, tree: Option<&Model>) -> CaptureFacts {
-    let (timing, quality) = (timing(job), job.quality.figures(tree));
-    let shaking = job.quality.shaking().so_far();
-    let mut log = job.log.clone();
-    log.close();
-    let amplitudes_px = log.last(job.config.dynamics.window_s).amplitudes_px();
-    CaptureFacts {
-        amplitude_px: quantile(amplitudes_px, QUIETER),
-        filmed_s: (timing.duration_s - timing.away_s) * (1.0 - shaking.lost_share),
-        rate_hz: timing.measured_rate_hz,
-        highest_hz: job.config.dynamics.highest_hz,
-        points: PointFacts {
-            followed: quality.tracks_total,
-            alive: quality.tracks_alive_end,
-            lost_per_s: quality.lost_per_s,
+pub fn judge(job: &CaptureJob, tree: Option<&Model>) -> Judgement {
+    let timing = timing(job);
+    let film = JudgedFilm {
+        is_filming: false,
+        length: FilmLength {
+            seconds: timing.duration_s - timing.away_s,
+            rate_hz: timing.measured_rate_hz,
         },
-        brightness: job.picture.as_ref().and_then(|p| mean_grey(&p.rgb)),
+        quality: &job.quality,
+        log: &job.log,
+        settings: &job.config.dynamics,
+        brightness: job.picture.as_ref().and_then(mean_grey),
         foot: tree.map(|tree| tree.foot.basis),
-        sway: tree.and_then(|tree| sway(&tree.skeleton, &tree.modes)),
-        shake: shaking.shake,
-        is_camera_unknown: !shaking.is_known(),
-        camera_moved_at_s: shaking.lost_since_s,
-    }
-}
-
-/// What was found of the sway, by node index; `None` where some of it was not looked at.
-fn sway(skeleton: &Skeleton, modes: &[Swaying]) -> Option<SwayFacts> {
-    let mut facts = SwayFacts::default();
-    for node in skeleton.measured_branches() {
-        match modes.get(node.index())? {
-            Err(Unidentified::NotInTime) => return None,
-            Err(Unidentified::NotMeasured) => continue,
-            Err(_) => {}
-            Ok(sway) => {
-                facts.identified += 1;
-                if skeleton.nodes[node.index()].level == TRUNK {
-                    facts.trunk_hz = Some(sway.frequency_hz.value);
-                }
-            }
-        }
-        facts.branches += 1;
-    }
-    Some(facts)
+        sway: tree.and_then(|tree| SwayFacts::of(&tree.skeleton, &tree.modes)),
+    };
+    Judgement::of(film.facts())
 }
 
 /// Mean grey of a picture, 0 to 255; `None` without a pixel.
-fn mean_grey(rgb: &Rgb) -> Option<f64> {
-    let sum: u64 = rgb.pixels.iter().map(|value| u64::from(*value)).sum();
-    let values = rgb.pixels.len();
-    (values > 0).then(|| sum as f64 / values as f64)
+pub fn mean_grey(picture: &Picture) -> Option<f64> {
+    let pixels = &picture.rgb.pixels;
+    let sum: u64 = pixels.iter().map(|value| u64::from(*value)).sum();
+    (!pixels.is_empty()).then(|| sum as f64 / pixels.len() as f64)
 }

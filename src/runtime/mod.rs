@@ -19,6 +19,7 @@ mod first_picture;
 mod job;
 mod judge;
 mod latest;
+mod live_verdict;
 mod losses;
 mod meter;
 mod model_thread;

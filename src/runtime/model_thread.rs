@@ -6,7 +6,8 @@ use super::background::{Background, Beside, Pending};
 use super::capture_tables::CaptureTables;
 use super::finish::{self, CaptureJob, Quality, Written};
 use super::job::{Job, Summary};
-use super::judge::verdict;
+use super::judge::judge;
+use super::live_verdict::LiveVerdict;
 use super::pulse::Worker;
 use super::recorder_thread::{Found, Recorded, Recorder};
 use super::refining::Refining;
@@ -64,6 +65,7 @@ pub struct ModelThread {
     refining: Refining,
     /// Only where somebody looks: a screen, or a reader of the stream.
     sway: Option<SwayWatch>,
+    verdict: LiveVerdict,
     /// Sensor time up to which the tables have been asked for, s.
     tables_s: f64,
     picture: Option<Picture>,
@@ -84,7 +86,7 @@ impl ModelThread {
         beside: Beside,
         recorder: Option<(Recorder, JoinHandle<Recorded>)>,
     ) -> Self {
-        let status = Status::new(info.name.clone(), info.format.clone(), info.frames_total);
+        let status = Status::new(&info);
         let back = BackEnd::new(&job.config);
         let Beside { background, sway } = beside;
         let waits = job.pace == Pace::Fast;
@@ -103,6 +105,7 @@ impl ModelThread {
             tables: None,
             refining,
             sway,
+            verdict: LiveVerdict::default(),
             tables_s: f64::NEG_INFINITY,
             picture: None,
             quality: Quality::default(),
@@ -143,7 +146,10 @@ impl ModelThread {
     /// Takes a message of the tracker; `last` is the newest frame that was posed.
     fn handle(&mut self, message: ToModel, last: &mut Option<Moved>) {
         match message {
-            ToModel::Picture(picture) => self.picture = Some(picture),
+            ToModel::Picture(picture) => {
+                self.verdict.see(&picture);
+                self.picture = Some(picture);
+            }
             ToModel::Followed(followed) => *last = Some(self.step(followed)),
             ToModel::Searching {
                 progress,
@@ -210,6 +216,7 @@ impl ModelThread {
         if let Some(sway) = &mut self.sway {
             sway.restart();
         }
+        self.verdict.restart();
         self.tables_s = f64::NEG_INFINITY;
         self.new_log();
         self.quality = Quality::default();
@@ -275,6 +282,13 @@ impl ModelThread {
             .sway
             .as_mut()
             .and_then(|sway| sway.step(&moved, &self.back));
+        self.verdict.take_sway(sway.clone());
+        self.verdict.step(
+            &self.quality,
+            &self.back,
+            &self.job.config.dynamics,
+            &self.shared.camera_state(),
+        );
         if let Some(pose) = &moved.pose {
             self.stream(pose, sway.as_deref());
         }
@@ -284,7 +298,7 @@ impl ModelThread {
                 "no tree yet: {moving} points move, and {LEAST_MOVING} that agree must"
             ));
         }
-        self.status.moved(&moved, &self.back);
+        self.status.moved(&moved, &self.back, &self.verdict);
         self.status.sways(sway);
         self.announce();
         self.show(Some(&moved), self.back.phase().0 == Phase::Build);
@@ -343,13 +357,16 @@ impl ModelThread {
         let Some(tree) = self.back.model() else {
             return;
         };
-        let lost = self.info.live.then_some(&*self.shared);
+        let verdict = self.verdict.take_unsaid();
         let line = stream::line(
             pose,
             &tree.skeleton,
             self.job.config.export.metres_per_px,
-            sway,
-            lost,
+            &stream::Beside {
+                sway,
+                verdict: verdict.as_deref(),
+                lost: self.info.live.then_some(&*self.shared),
+            },
         );
         if let Err(e) = out.write_all(line.as_bytes()).and_then(|()| out.flush()) {
             // The reader has gone (`| head`): nobody listens any more, and that ends the capture in
@@ -497,12 +514,14 @@ impl ModelThread {
         loop {
             let written = self.write_once(out);
             let is_full = matches!(&written, Err(e) if e.is_full_disk());
+            self.shared.waits_for_room.store(is_full, Ordering::Relaxed);
             if !is_full || Instant::now() >= until {
                 return written;
             }
             self.shared
                 .warn("the disk is full; the capture is written when there is room".into());
             self.shared.pulse.wrote();
+            self.show(None, true);
             std::thread::sleep(FULL_DISK_EVERY);
         }
     }
@@ -527,7 +546,7 @@ impl ModelThread {
     fn verdict_unwritten(&mut self) -> Option<Verdict> {
         let job = self.capture_job().ok()?;
         let is_filmed = self.shared.counts.seen.load(Ordering::Relaxed) > 0;
-        is_filmed.then(|| verdict(&job, job.tree.as_deref()))
+        is_filmed.then(|| judge(&job, job.tree.as_deref()).verdict)
     }
 
     fn finish(&mut self) -> Summary {

@@ -106,6 +106,8 @@ pub struct Shared {
     pub hurry: AtomicBool,
     pub paused: AtomicBool,
     pub ended: AtomicBool,
+    /// The disk is full, and the capture is written when there is room.
+    pub waits_for_room: AtomicBool,
     /// There is a recorder.
     pub recording: AtomicBool,
     /// It can write no more; frames are counted as missing from here on.

@@ -1,15 +1,17 @@
 //! Gathers from the stream of poses what the screen shows.
 
+use super::live_verdict::LiveVerdict;
 use super::meter::Recent;
 use super::shared::Shared;
 use super::sway_watch::SwayWatch;
 use crate::model::{
-    BranchRow, FormatNote, NodeId, Observation, Phase, Rgb, Shake, Size, Skeleton, Snapshot,
+    BranchRow, NodeId, Observation, Phase, Rgb, Shake, Size, Skeleton, Snapshot, StillNeeded,
     SwayNow, TrackSet,
 };
 use crate::pipeline::{BackEnd, Moved, Targets};
 use crate::signal::median;
 use crate::solve::Model;
+use crate::source::SourceInfo;
 use nalgebra::Point2;
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -47,14 +49,19 @@ pub struct Status {
 }
 
 impl Status {
-    pub fn new(source: String, format: FormatNote, frames_total: Option<u64>) -> Self {
+    pub fn new(info: &SourceInfo) -> Self {
+        Self::with(Snapshot {
+            source: info.name.clone(),
+            format: info.format.clone(),
+            frames_total: info.frames_total,
+            is_live: info.live,
+            ..Snapshot::default()
+        })
+    }
+
+    fn with(snapshot: Snapshot) -> Self {
         Self {
-            snapshot: Snapshot {
-                source,
-                format,
-                frames_total,
-                ..Snapshot::default()
-            },
+            snapshot,
             started: Instant::now(),
             newest_s: None,
             sensor: Recent::new(RATE_S),
@@ -76,7 +83,13 @@ impl Status {
         let kept = std::mem::take(&mut self.snapshot);
         *self = Self {
             started: self.started,
-            ..Self::new(kept.source, kept.format, kept.frames_total)
+            ..Self::with(Snapshot {
+                source: kept.source,
+                format: kept.format,
+                frames_total: kept.frames_total,
+                is_live: kept.is_live,
+                ..Snapshot::default()
+            })
         };
     }
 
@@ -108,7 +121,7 @@ impl Status {
     }
 
     /// A frame is done.
-    pub fn moved(&mut self, moved: &Moved, back: &BackEnd) {
+    pub fn moved(&mut self, moved: &Moved, back: &BackEnd, verdict: &LiveVerdict) {
         let now_s = self.started.elapsed().as_secs_f64();
         let time_s = moved.tracks.time_s;
         self.arrived(time_s);
@@ -128,6 +141,11 @@ impl Status {
         }
         let s = &mut self.snapshot;
         (s.phase, s.progress) = back.phase();
+        s.still_needed = StillNeeded {
+            for_sway_s: verdict.missing_s(),
+            ..back.still_needed()
+        };
+        s.verdict = verdict.newest().cloned();
         (s.frame, s.time_s, s.fb_error_px) = (moved.tracks.frame, time_s, error_px);
         s.error_px = median_error_px(&moved.tracks);
         s.tracks_alive = moved.tracks.counted().count() as u32;
@@ -211,6 +229,7 @@ impl Status {
         });
         s.paused = shared.paused.load(Ordering::Relaxed);
         s.ended = shared.ended.load(Ordering::Relaxed);
+        s.waits_for_room = shared.waits_for_room.load(Ordering::Relaxed);
         s.messages = shared.messages();
         Arc::new(s.clone())
     }

@@ -1,21 +1,25 @@
 //! A line of the stream of poses: JSON, one line a frame.
 
 use super::shared::Shared;
-use crate::model::{BranchSway, NodeName, Pose, Skeleton, SwayNow};
+use crate::model::{BranchSway, NodeName, Pose, Skeleton, SwayNow, Verdict};
 use std::fmt::Write;
 use std::sync::atomic::Ordering;
 
+/// What a line has beside the pose.
+#[derive(Default)]
+pub struct Beside<'a> {
+    /// An answer of the sway that takes effect with this frame.
+    pub sway: Option<&'a SwayNow>,
+    /// What the capture is worth, where that is another verdict than before.
+    pub verdict: Option<&'a Verdict>,
+    /// What was lost so far; of a file nothing is, so that two replays give the same.
+    pub lost: Option<&'a Shared>,
+}
+
 /// `{"frame":…,"time_s":…,"nodes":[[id,x,y,z],…]}` and a line feed: the measured nodes, model axes,
-/// in px or, where
-/// `metres_per_px` is not 0, in metres. In the frame with which an answer of the sway takes effect
-/// `"sway":{…}` follows, and with a camera what was lost so far.
-pub fn line(
-    pose: &Pose,
-    skeleton: &Skeleton,
-    metres_per_px: f64,
-    sway: Option<&SwayNow>,
-    lost: Option<&Shared>,
-) -> String {
+/// in px or, where `metres_per_px` is not 0, in metres. After them `"sway":{…}`, `"verdict":{…}` and
+/// the counts of what was lost, as far as they are there.
+pub fn line(pose: &Pose, skeleton: &Skeleton, metres_per_px: f64, beside: &Beside) -> String {
     let measured = &skeleton.nodes[..skeleton.measured()];
     let scale = if metres_per_px > 0.0 {
         metres_per_px
@@ -31,10 +35,14 @@ pub fn line(
         "{{\"frame\":{},\"time_s\":{:.6},\"nodes\":{nodes}",
         pose.frame, pose.time_s
     );
-    if let Some(sway) = sway {
+    if let Some(sway) = beside.sway {
         line.push_str(&told(sway));
     }
-    if let Some(shared) = lost {
+    // It has nothing that could not be written as JSON.
+    if let Some(Ok(verdict)) = beside.verdict.map(serde_json::to_string) {
+        let _ = write!(line, ",\"verdict\":{verdict}");
+    }
+    if let Some(shared) = beside.lost {
         line.push_str(&counts(shared));
     }
     line.push_str("}\n");
@@ -96,8 +104,7 @@ fn of_branch(name: NodeName, branch: &BranchSway) -> String {
     text
 }
 
-/// What was lost until now, for the stream of a camera. A file's stream has none, so that two
-/// replays give the same.
+/// What was lost until now, for the stream of a camera.
 fn counts(shared: &Shared) -> String {
     let c = shared.camera_state();
     let by_sequence = c
@@ -115,7 +122,7 @@ fn counts(shared: &Shared) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Excitation, Size, Sway, Unidentified};
+    use crate::model::{Excitation, Grade, Size, Sway, Unidentified};
     use nalgebra::Point2;
     use serde_json::{Value, json};
 
@@ -170,13 +177,25 @@ mod tests {
             joints: Vec::new(),
         };
         let shared = Shared::default();
-        let of = |sway, lost| -> Value {
-            serde_json::from_str(&line(&pose, &skeleton, 0.0, sway, lost)).unwrap()
+        let of = |beside: Beside| -> Value {
+            serde_json::from_str(&line(&pose, &skeleton, 0.0, &beside)).unwrap()
         };
-        let told = &of(Some(&sway), Some(&shared));
+        let told = &of(Beside {
+            sway: Some(&sway),
+            verdict: Some(&Verdict {
+                grade: Grade::Fair,
+                reasons: vec!["too \"dark\"".into()],
+                advice: Vec::new(),
+            }),
+            lost: Some(&shared),
+        });
         assert_eq!(
             (&told["sway"]["excitation"], &told["dropped"]),
             (&Value::Null, &json!(0))
+        );
+        assert_eq!(
+            told["verdict"],
+            json!({"grade": "fair", "reasons": ["too \"dark\""], "advice": []})
         );
         assert_eq!(
             told["sway"]["branches"],
@@ -190,7 +209,7 @@ mod tests {
             ])
         );
         assert_eq!(
-            of(None, None),
+            of(Beside::default()),
             json!({"frame": 330, "time_s": 11.0, "nodes": []})
         );
     }

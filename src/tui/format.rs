@@ -103,6 +103,24 @@ pub fn keep_end(text: &str, room: usize) -> String {
     }
 }
 
+/// The beginning of a text that is too long.
+pub fn keep_begin(text: &str, room: usize) -> String {
+    if width(text) <= room {
+        return text.to_owned();
+    }
+    let mut kept = String::new();
+    for c in text.chars() {
+        if width(&kept) + width(c.encode_utf8(&mut [0; 4])) + 1 > room {
+            break;
+        }
+        kept.push(c);
+    }
+    if room > 0 {
+        kept.push('…');
+    }
+    kept
+}
+
 /// Breaks a text at spaces into lines of at most `room` columns; a word longer than that is broken
 /// where it must.
 pub fn wrap(text: &str, room: usize) -> Vec<String> {
@@ -218,6 +236,15 @@ mod tests {
             ("abc", 0, ""),
         ] {
             assert_eq!(keep_end(text, room), kept);
+        }
+        for (text, room, kept) in [
+            ("one two", 7, "one two"),
+            ("one two", 6, "one t…"),
+            ("木木木", 4, "木…"),
+            ("one", 1, "…"),
+            ("one", 0, ""),
+        ] {
+            assert_eq!(keep_begin(text, room), kept);
         }
     }
 }

@@ -12,6 +12,7 @@ pub const SMALLEST: (u16, u16) = (60, 16);
 pub struct Areas {
     pub header: Rect,
     pub phase: Rect,
+    pub guide: Rect,
     pub preview: Rect,
     pub branches: Rect,
     /// Not where the branch takes their place.
@@ -19,6 +20,7 @@ pub struct Areas {
     /// The chosen branch.
     pub branch: Option<Rect>,
     pub skeleton: Rect,
+    pub verdict: Rect,
     pub messages: Rect,
     pub keys: Rect,
 }
@@ -62,11 +64,18 @@ impl Areas {
             return None;
         }
         let roomy = window.height >= 32;
-        let [header, phase, body, messages, keys] = Layout::vertical([
+        let message_rows = match window.height {
+            0..20 => 1,
+            20..32 => 2,
+            32.. => 4,
+        };
+        let [header, phase, guide, body, verdict, messages, keys] = Layout::vertical([
+            Constraint::Length(1),
             Constraint::Length(1),
             Constraint::Length(1),
             Constraint::Min(1),
-            Constraint::Length(if roomy { 4 } else { 2 }),
+            Constraint::Length(1),
+            Constraint::Length(message_rows),
             Constraint::Length(1),
         ])
         .areas(window);
@@ -83,11 +92,13 @@ impl Areas {
         Some(Self {
             header,
             phase,
+            guide,
             preview,
             branches,
             camera_and_tracks: right.camera_and_tracks,
             branch: right.branch,
             skeleton: right.skeleton,
+            verdict,
             messages,
             keys,
         })
@@ -116,7 +127,11 @@ struct RightColumn {
 
 impl RightColumn {
     fn new(right: Rect, roomy: bool, view: BranchView) -> Self {
-        let camera = if right.height < 16 { 6 } else { 8 };
+        let camera = match right.height {
+            0..16 => 6,
+            16..20 => 7,
+            20.. => 8,
+        };
         let short = 3;
         let beside = right
             .height
@@ -186,7 +201,8 @@ mod tests {
                     "{width}x{height}"
                 );
                 let mut all = vec![
-                    a.header, a.phase, a.preview, a.branches, a.skeleton, a.messages, a.keys,
+                    a.header, a.phase, a.guide, a.preview, a.branches, a.skeleton, a.verdict,
+                    a.messages, a.keys,
                 ];
                 all.extend(a.camera_and_tracks.into_iter().flatten().chain(a.branch));
                 for (i, one) in all.iter().enumerate() {

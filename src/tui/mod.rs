@@ -6,6 +6,7 @@
 //! capture has ended.
 
 mod abilities;
+mod awaited;
 mod compose;
 mod drawing;
 mod format;

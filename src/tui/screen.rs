@@ -3,7 +3,8 @@
 use super::layout::{Areas, BranchView};
 use super::panels::preview::Preview;
 use super::panels::{
-    branch, branches, camera, header, help, messages, phase, preview, skeleton, tracks,
+    branch, branches, camera, guide, header, help, messages, phase, preview, skeleton, tracks,
+    verdict,
 };
 use super::state::State;
 use super::theme::Theme;
@@ -24,6 +25,7 @@ pub fn render(frame: &mut Frame, state: &State, theme: Theme, picture: &mut Prev
     };
     header::render(frame, state, areas.header, theme);
     phase::render(frame, state, areas.phase, theme);
+    guide::render(frame, state, areas.guide, theme);
     preview::render(frame, state, areas.preview, theme, picture);
     branches::render(frame, state, areas.branches, theme);
     if let Some([camera, tracks]) = areas.camera_and_tracks {
@@ -34,6 +36,7 @@ pub fn render(frame: &mut Frame, state: &State, theme: Theme, picture: &mut Prev
         branch::render(frame, state, area, theme);
     }
     skeleton::render(frame, state, areas.skeleton, theme);
+    verdict::render(frame, state, areas.verdict, theme);
     messages::render(frame, state, areas.messages, theme);
     messages::keys(frame, state, areas.keys, theme);
     if state.help {

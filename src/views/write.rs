@@ -6,7 +6,7 @@ use crate::document::note::{CaptureNote, json};
 use crate::document::{BARK_FILE, Document, PICTURE_FILE, at_rest_files, jpeg, png};
 use crate::export::gltf::glb;
 use crate::files::{OutputFolder, WriteError, replace};
-use crate::model::{AtRest, Picture, Pose, Rgb, Skeleton, Swaying, UserNotes, Verdict};
+use crate::model::{AtRest, Judgement, Picture, Pose, Rgb, Skeleton, Swaying, UserNotes};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -74,7 +74,7 @@ impl DocumentWriter {
     }
 
     /// Writes `nodes.csv`, `tree.glb`, the pictures, the bark, the masks and `capture.json` with
-    /// these `warnings` and this `verdict`. `sway` is by node index.
+    /// these `warnings` and this `judgement`. `sway` is by node index.
     ///
     /// # Errors
     /// A file cannot be written, or the tree is none for a model's file.
@@ -83,7 +83,7 @@ impl DocumentWriter {
         folder: &OutputFolder,
         sway: &[Swaying],
         warnings: Vec<String>,
-        verdict: Option<Verdict>,
+        judgement: Option<Judgement>,
     ) -> Result<(), PrepareError> {
         self.tree.take_sway(sway);
         folder.write("nodes.csv", &self.tree.document.nodes_csv()?)?;
@@ -100,12 +100,14 @@ impl DocumentWriter {
                 folder.write(file.name, &file.bytes)?;
             }
         }
-        let note = CaptureNote {
+        let mut note = CaptureNote {
             animation: Some(animation),
             warnings,
-            verdict,
             ..self.tree.document.note
         };
+        if let Some(judgement) = judgement {
+            note.take_judgement(judgement);
+        }
         folder.write(NOTE_FILE, &json(&note)?)?;
         Ok(())
     }
@@ -117,13 +119,14 @@ impl DocumentWriter {
 /// `dir` is there already, a file cannot be written, or the tree is none for a model's file.
 pub fn write_document(dir: &Path, draft: Draft, sway: &[Swaying]) -> Result<PathBuf, PrepareError> {
     let folder = OutputFolder::create(dir)?;
-    let (warnings, verdict) = (draft.note.warnings.clone(), draft.note.verdict.clone());
-    DocumentWriter::new(draft)?.write(&folder, sway, warnings, verdict)?;
+    let warnings = draft.note.warnings.clone();
+    DocumentWriter::new(draft)?.write(&folder, sway, warnings, None)?;
     Ok(folder.publish()?)
 }
 
-/// Puts other answers on the sway, by node index, into the document in `dir`: into `nodes.csv`, and
-/// into the model's file where there is one.
+/// Puts other answers on the sway, by node index, into the document in `dir`: into `nodes.csv`,
+/// into the model's file where there is one, and into what the capture was found to be worth where
+/// it is known what that rests on.
 ///
 /// # Errors
 /// The document cannot be read; a file cannot be written, or it was stopped. A file is as it was or
@@ -136,6 +139,11 @@ pub fn update(dir: &Path, sway: &[Swaying], stop: &AtomicBool) -> Result<(), Pre
     put(&dir.join("nodes.csv"), &table, stop)?;
     if has_model(dir) {
         put(&dir.join(MODEL_FILE), &model, stop)?;
+    }
+    let Document { note, skeleton, .. } = &mut tree.document;
+    if let Some(judgement) = note.judgement_with(skeleton, sway) {
+        note.take_judgement(judgement);
+        put(&dir.join(NOTE_FILE), &json(note)?, stop)?;
     }
     Ok(())
 }

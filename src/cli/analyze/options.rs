@@ -22,8 +22,8 @@ pub struct AnalyzeArgs {
     /// Also write a page with plots (HTML, in one file); the file must not exist.
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
-    /// Write the results to the captures, to nodes.csv and tree.glb. Without it nothing is written
-    /// to a capture.
+    /// Write the results to the captures, to nodes.csv and tree.glb, and judge them anew in
+    /// capture.json. Without it nothing is written to a capture.
     #[arg(long)]
     pub update: bool,
     /// Excitation of the tree; `auto` decides by the motion.

@@ -3,6 +3,7 @@
 pub mod branch;
 pub mod branches;
 pub mod camera;
+pub mod guide;
 pub mod header;
 pub mod help;
 pub mod messages;
@@ -10,6 +11,7 @@ pub mod phase;
 pub mod preview;
 pub mod skeleton;
 pub mod tracks;
+pub mod verdict;
 
 use super::theme::Theme;
 use ratatui::Frame;

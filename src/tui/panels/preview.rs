@@ -2,6 +2,7 @@
 
 use super::{titled, waiting};
 use crate::model::{Size, Snapshot};
+use crate::tui::awaited::awaited;
 use crate::tui::compose;
 use crate::tui::drawing::Drawing;
 use crate::tui::graphics::{Graphics, Kind};
@@ -109,7 +110,7 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme, previe
     preview.placed = Preview::image(state).and_then(|image| Placed::fit(image, inner, cell_dots));
     let Some(placed) = preview.placed else {
         preview.sent = None;
-        waiting(frame, inner, &reason(&state.snapshot), theme);
+        waiting(frame, inner, &reason(state), theme);
         return;
     };
     let drawn = match kind {
@@ -190,10 +191,9 @@ fn letters(frame: &mut Frame, rows: &[Vec<char>], area: Rect, theme: Theme) {
     }
 }
 
-fn reason(snapshot: &Snapshot) -> String {
-    match (&snapshot.preview, snapshot.source.is_empty()) {
-        (Some(_), _) => "this picture cannot be shown".to_owned(),
-        (None, true) => "waits for the source to open".to_owned(),
-        (None, false) => format!("waits for the first picture from {}", snapshot.source),
+fn reason(state: &State) -> String {
+    match &state.snapshot.preview {
+        Some(_) => "this picture cannot be shown".to_owned(),
+        None => awaited(state).text,
     }
 }

@@ -18,7 +18,7 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
     let s = &state.snapshot;
     let Some(skeleton) = s.skeleton.as_deref().filter(|k| k.nodes.len() > 1) else {
         let inner = titled(frame, area, "Tree", theme);
-        waiting(frame, inner, &reason(s), theme);
+        waiting(frame, inner, reason(s), theme);
         return;
     };
     let degrees = [0, 90].map(|more| (state.turned * TURN_DEGREES + more) % 360);
@@ -143,19 +143,14 @@ fn branches(state: &State, skeleton: &Skeleton, theme: Theme) -> Vec<BranchLine>
     copies
 }
 
-/// What a user who pulls the tree has to know before.
-const BEFORE_PULL: &str = "begin to film before the pull";
-
-/// What the tree waits for; until it is built, with what makes it a good one.
-fn reason(s: &Snapshot) -> String {
-    let reason = match s.phase {
-        Phase::Outline => "waits for the outline; o draws one",
-        Phase::Detect => "waits for points",
-        Phase::Accumulate => "waits for enough motion; b builds now",
-        Phase::Build => return "is being built".to_owned(),
-        Phase::Live => return "no tree".to_owned(),
-    };
-    format!("{reason}\n{BEFORE_PULL}")
+/// Why none is shown. Until it is built, with what a user who pulls the tree has to know before;
+/// what is awaited is said above.
+fn reason(s: &Snapshot) -> &'static str {
+    match s.phase {
+        Phase::Live => "no tree",
+        _ if s.is_live => "shown once it is built\nbegin to film before the pull",
+        _ => "shown once it is built",
+    }
 }
 
 /// Extent of the tree at rest in a view: taken from the pose, the scale would breathe with the

@@ -2,8 +2,8 @@
 
 use crate::model::{
     Agreement, AngleSpectrum, Angles, Background, BranchGraph, BranchRow, BranchSway, Excitation,
-    FormatNote, Interval, JointPose, Node, NodeId, NodeName, Phase, Pose, Rgb, Shake, Size,
-    Skeleton, Snapshot, Sway, SwayNow, Unidentified, Wood, WoodNode, WoodSight,
+    FormatNote, Grade, Interval, JointPose, Node, NodeId, NodeName, Phase, Pose, Rgb, Shake, Size,
+    Skeleton, Snapshot, Sway, SwayNow, Unidentified, Verdict, Wood, WoodNode, WoodSight,
 };
 use nalgebra::{Point2, UnitQuaternion, Vector3};
 use std::sync::Arc;
@@ -117,6 +117,8 @@ pub fn snapshot(phase: Phase) -> Snapshot {
         },
         phase,
         progress: 0.62,
+        is_live: true,
+        verdict: Some(Arc::new(verdict())),
         frame: 1234,
         time_s: 41.1,
         sensor_rate_hz: 29.97,
@@ -150,6 +152,22 @@ pub fn snapshot(phase: Phase) -> Snapshot {
         add_tree(&mut s);
     }
     s
+}
+
+/// What is not as it should be in a short film of little motion.
+fn verdict() -> Verdict {
+    Verdict {
+        grade: Grade::Poor,
+        reasons: vec![
+            "no frequency identified".to_owned(),
+            "moves by 0.4 px only".to_owned(),
+            "12 of 30 s filmed".to_owned(),
+        ],
+        advice: vec![
+            "come nearer, or film in more wind".to_owned(),
+            "film 18 s more".to_owned(),
+        ],
+    }
 }
 
 /// Points that are followed and how well.
@@ -310,6 +328,11 @@ pub fn huge() -> Snapshot {
     ];
     s.wood = Some(Arc::new(huge_wood()));
     s.messages = vec!["word ".repeat(200), "x".repeat(500)];
+    s.verdict = Some(Arc::new(Verdict {
+        grade: Grade::Fair,
+        reasons: vec!["木".repeat(60); 9],
+        advice: vec!["木".repeat(20)],
+    }));
     s.branches = (0..5000)
         .map(|node| BranchRow {
             node: NodeName(u32::MAX - node),

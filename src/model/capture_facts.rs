@@ -1,0 +1,309 @@
+//! What is known of a capture when it is judged, and what of it is not as it should be.
+
+use super::verdict::{Finding, Grade};
+use super::{FootBasis, Skeleton, Swaying, Unidentified};
+use serde::{Deserialize, Serialize};
+
+/// The sway of a branch is identified well from so many of its periods: in wind, the 95 % interval of a
+/// branch with 2 % of damping is then some 5 % to either side.
+const PERIODS_NEEDED: f64 = 10.0;
+/// What is to be filmed where no frequency is known, s: ten periods at 0.33 Hz, the slowest sway of
+/// a full-grown tree.
+const NEEDED_S: f64 = 30.0;
+/// Below this share of the length that is needed a film is poor: two or three periods tell a
+/// release, and no wind.
+const POOR_SHARE: f64 = 0.4;
+/// Half a second is not missed.
+const LENGTH_SLACK_S: f64 = 0.5;
+
+/// Level of the trunk.
+const TRUNK_LEVEL: u8 = 1;
+
+/// Below this amplitude, px, motion is that of the noise of tracking (0.03 to 0.1 px) as much as of
+/// the tree.
+const POOR_AMPLITUDE_PX: f64 = 0.3;
+/// Below this one, px, the noise is more than a tenth of the motion, and small branches drown in
+/// it.
+const FAIR_AMPLITUDE_PX: f64 = 1.0;
+
+/// Frames for each period of the fastest sway that is asked for: two by Nyquist, half a one more
+/// as frames are not evenly spaced.
+const FRAMES_PER_PERIOD: f64 = 2.5;
+/// With fewer frames a second not even a trunk (up to 2 Hz) is identified, and points jump too far from
+/// frame to frame to be followed.
+const POOR_RATE_HZ: f64 = 5.0;
+
+/// Points that are followed for less, s, are lost before a branch has swayed to and fro ten times.
+const FAIR_LIFE_S: f64 = 15.0;
+/// The same for one period of a slow tree and what a point needs to pass its trial, s.
+const POOR_LIFE_S: f64 = 5.0;
+
+/// Mean grey, of 255, below which a picture is mostly black: what is seen in it is the sensor's
+/// noise.
+const POOR_GREY: f64 = 16.0;
+/// The same where bark and twigs have a few grey levels only.
+const FAIR_GREY: f64 = 35.0;
+
+/// A camera that shakes by more, px, shakes as much as small branches move.
+const FAIR_SHAKE_PX: f64 = 0.5;
+/// By more than this the background leaves the places at which it is compared.
+const POOR_SHAKE_PX: f64 = 5.0;
+
+/// What is known of a capture when it is judged.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CaptureFacts {
+    /// More may come: what is not there yet is not called missing.
+    #[serde(skip)]
+    pub is_filming: bool,
+    /// How far points move, px: amplitude of a quarter of them or more; `None` where none was
+    /// followed.
+    pub amplitude_px: Option<f64>,
+    /// Length of the film, s.
+    pub filmed_s: f64,
+    /// Frames a second by their own times.
+    pub rate_hz: Option<f64>,
+    /// Highest frequency that is looked for, Hz.
+    pub highest_hz: f64,
+    pub points: PointFacts,
+    /// Mean grey of the picture, 0 to 255.
+    pub brightness: Option<f64>,
+    /// `None` without a tree.
+    pub foot: Option<FootBasis>,
+    /// `None` where it was not analysed to the end.
+    pub sway: Option<SwayFacts>,
+    /// How the camera shakes; `None` where that is not known.
+    pub shake: Option<Shake>,
+    /// Nothing around the tree shows how it moves.
+    pub is_camera_unknown: bool,
+    /// Since when the camera looks elsewhere, s since the first frame; `None` where it does not, or
+    /// where that is not known.
+    pub camera_moved_at_s: Option<f64>,
+}
+
+/// How the points were followed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PointFacts {
+    pub followed: u64,
+    /// How many of them were still followed at the end.
+    pub alive: u64,
+    pub lost_per_s: Option<f64>,
+}
+
+/// What the sway was found to be.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SwayFacts {
+    /// Branches that were analysed, and those with a frequency.
+    pub branches: usize,
+    pub identified: usize,
+    /// The trunk's own frequency, Hz.
+    pub trunk_hz: Option<f64>,
+}
+
+/// How a camera shakes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Shake {
+    /// Root mean square, px.
+    pub rms_px: f64,
+    /// The strongest frequency in it, Hz, if one stands out.
+    pub frequency_hz: Option<f64>,
+}
+
+impl Shake {
+    /// Whether it shakes as much as small branches move.
+    pub fn is_strong(&self) -> bool {
+        self.rms_px >= FAIR_SHAKE_PX
+    }
+}
+
+impl SwayFacts {
+    /// What was found of the sway, by node index; `None` where some of it was not looked at.
+    pub fn of(skeleton: &Skeleton, modes: &[Swaying]) -> Option<Self> {
+        let mut facts = Self::default();
+        for node in skeleton.measured_branches() {
+            match modes.get(node.index())? {
+                Err(Unidentified::NotInTime) => return None,
+                Err(Unidentified::NotMeasured) => continue,
+                Err(_) => {}
+                Ok(sway) => {
+                    facts.identified += 1;
+                    if skeleton.nodes[node.index()].level == TRUNK_LEVEL {
+                        facts.trunk_hz = Some(sway.frequency_hz.value);
+                    }
+                }
+            }
+            facts.branches += 1;
+        }
+        Some(facts)
+    }
+}
+
+impl CaptureFacts {
+    /// All that is not as it should be, the worst first.
+    pub(super) fn findings(&self) -> Vec<Finding> {
+        let found = [
+            self.camera_moved(),
+            self.shakes(),
+            self.hides_shake(),
+            self.is_dark(),
+            self.has_few_frames(),
+            self.moves_little(),
+            self.is_short(),
+            self.loses_points(),
+            self.has_no_foot(),
+        ];
+        let mut findings: Vec<Finding> = found.into_iter().flatten().collect();
+        let sway = self.tells_no_sway(findings.is_empty());
+        findings.extend(sway);
+        // The order of equals stays: causes come before what follows from them.
+        findings.sort_by_key(|finding| std::cmp::Reverse(finding.grade));
+        findings
+    }
+
+    /// What is still to be filmed for the frequencies of the branches, s; 0 where nothing is.
+    pub fn missing_s(&self) -> f64 {
+        let missing_s = self.needed_s() - self.filmed_s;
+        if missing_s < LENGTH_SLACK_S {
+            return 0.0;
+        }
+        missing_s
+    }
+
+    /// What had to be filmed, s.
+    fn needed_s(&self) -> f64 {
+        let known_hz = self.sway.and_then(|sway| sway.trunk_hz);
+        known_hz.map_or(NEEDED_S, |hz| {
+            (PERIODS_NEEDED / hz.max(f64::MIN_POSITIVE)).min(NEEDED_S)
+        })
+    }
+
+    fn camera_moved(&self) -> Option<Finding> {
+        let at_s = self.camera_moved_at_s?;
+        Some(Finding {
+            grade: Grade::Fair,
+            reason: format!("camera moved at {at_s:.1} s"),
+            advice: "fix the camera and film again".into(),
+        })
+    }
+
+    fn shakes(&self) -> Option<Finding> {
+        let Shake {
+            rms_px,
+            frequency_hz,
+        } = self.shake?;
+        let grade = Grade::of(-rms_px, -FAIR_SHAKE_PX, -POOR_SHAKE_PX)?;
+        let at = frequency_hz.map_or(String::new(), |hz| format!(" at {hz:.1} Hz"));
+        Some(Finding {
+            grade,
+            reason: format!("shakes {rms_px:.1} px{at}"),
+            advice: "shelter the camera from wind and load the tripod".into(),
+        })
+    }
+
+    fn hides_shake(&self) -> Option<Finding> {
+        self.is_camera_unknown.then(|| Finding {
+            grade: Grade::Fair,
+            reason: "nothing around the tree shows how the camera moves".into(),
+            advice: "film more of the ground and of what stands still".into(),
+        })
+    }
+
+    fn is_dark(&self) -> Option<Finding> {
+        let grade = Grade::of(self.brightness?, FAIR_GREY, POOR_GREY)?;
+        Some(Finding {
+            grade,
+            reason: "too dark".into(),
+            advice: "film with more light".into(),
+        })
+    }
+
+    fn has_few_frames(&self) -> Option<Finding> {
+        let rate_hz = self.rate_hz?;
+        let wanted_hz = FRAMES_PER_PERIOD * self.highest_hz;
+        let grade = Grade::of(rate_hz, wanted_hz, POOR_RATE_HZ.min(wanted_hz))?;
+        Some(Finding {
+            grade,
+            reason: format!("{rate_hz:.1} frames/s are too few"),
+            advice: format!("film with {:.0} frames/s or more", wanted_hz.ceil()),
+        })
+    }
+
+    fn moves_little(&self) -> Option<Finding> {
+        let amplitude_px = self.amplitude_px?;
+        let grade = Grade::of(amplitude_px, FAIR_AMPLITUDE_PX, POOR_AMPLITUDE_PX)?;
+        Some(Finding {
+            grade,
+            reason: format!("moves by {amplitude_px:.1} px only"),
+            advice: "come nearer, or film in more wind".into(),
+        })
+    }
+
+    fn is_short(&self) -> Option<Finding> {
+        let (needed_s, missing_s) = (self.needed_s(), self.missing_s());
+        if missing_s <= 0.0 {
+            return None;
+        }
+        let grade = Grade::of(self.filmed_s, needed_s, POOR_SHARE * needed_s)?;
+        Some(Finding {
+            grade,
+            reason: format!("{:.0} of {needed_s:.0} s filmed", self.filmed_s),
+            advice: format!("film {:.0} s more", missing_s.ceil()),
+        })
+    }
+
+    fn loses_points(&self) -> Option<Finding> {
+        let PointFacts {
+            followed,
+            alive,
+            lost_per_s,
+        } = self.points;
+        // Where as many are found as are lost, a point is followed for so long in the mean.
+        let life_s = alive as f64 / lost_per_s.filter(|lost| *lost > 0.0)?;
+        let grade = Grade::of(life_s, FAIR_LIFE_S, POOR_LIFE_S)?;
+        let lost = followed.saturating_sub(alive);
+        Some(Finding {
+            grade,
+            reason: format!("{lost} of {followed} points lost"),
+            advice: "keep people and traffic out of the view, and focus and exposure fixed".into(),
+        })
+    }
+
+    fn has_no_foot(&self) -> Option<Finding> {
+        let (reason, advice) = match self.foot? {
+            FootBasis::CutOff => ("foot cut off", "film the whole tree with its foot"),
+            FootBasis::Guessed => ("foot is a guess", "draw the outline down to the foot"),
+            FootBasis::Outline | FootBasis::Drawn => return None,
+        };
+        Some(Finding {
+            grade: Grade::Fair,
+            reason: reason.into(),
+            advice: advice.into(),
+        })
+    }
+
+    /// A tree or a frequency that was not found; what to do about it is said by its causes, where
+    /// there are some.
+    fn tells_no_sway(&self, no_cause: bool) -> Option<Finding> {
+        let (grade, reason) = match (self.foot, self.sway) {
+            (None, _) if self.is_filming => (Grade::Poor, "no tree yet"),
+            (None, _) => (Grade::Poor, "no tree found"),
+            (Some(_), None) => return None,
+            (Some(_), Some(sway)) if sway.identified == 0 && sway.branches > 0 => {
+                (Grade::Poor, "no frequency identified")
+            }
+            (Some(_), Some(sway)) if sway.trunk_hz.is_none() && sway.branches > 0 => {
+                (Grade::Fair, "the trunk's frequency not identified")
+            }
+            _ => return None,
+        };
+        let advice = if no_cause {
+            "film longer, or pull the tree and release it"
+        } else {
+            ""
+        };
+        Some(Finding {
+            grade,
+            reason: reason.into(),
+            advice: advice.into(),
+        })
+    }
+}
