@@ -108,7 +108,7 @@ impl Verdict {
     }
 
     /// As much of it as fits `room` columns, what matters most before all else: the grade, the
-    /// worst reason, what to do first; how many further reasons there are stands for those.
+    /// worst reason, after an arrow what to do first; how many further reasons there are stands for those.
     pub fn line_within(&self, room: usize) -> String {
         let grade = self.grade.word();
         let Some(worst) = self.reasons.first() else {
@@ -122,9 +122,9 @@ impl Verdict {
         let first = format!("{grade}: {worst}{further}");
         let mut lines = Vec::new();
         if let Some(advice) = self.advice.first() {
-            lines.push(format!("{all}. To do: {}", self.advice.join("; ")));
-            lines.push(format!("{all}. To do: {advice}"));
-            lines.push(format!("{first}. To do: {advice}"));
+            lines.push(format!("{all} → {}", self.advice.join("; ")));
+            lines.push(format!("{all} → {advice}"));
+            lines.push(format!("{first} → {advice}"));
         }
         lines.extend([all, first, format!("{grade}: {worst}")]);
         let fits = |line: &String| line.chars().count() <= room;
@@ -307,14 +307,14 @@ mod tests {
         for (room, expected) in [
             (
                 90,
-                "poor: too dark; 9 of 30 s filmed. To do: film with more light; film 21 s more",
+                "poor: too dark; 9 of 30 s filmed → film with more light; film 21 s more",
             ),
             (
                 70,
-                "poor: too dark; 9 of 30 s filmed. To do: film with more light",
+                "poor: too dark; 9 of 30 s filmed → film with more light",
             ),
-            (50, "poor: too dark (+1). To do: film with more light"),
-            (40, "poor: too dark; 9 of 30 s filmed"),
+            (42, "poor: too dark (+1) → film with more light"),
+            (41, "poor: too dark; 9 of 30 s filmed"),
             (19, "poor: too dark (+1)"),
             (18, "poor: too dark"),
             (13, "poor"),

@@ -18,6 +18,7 @@ const EVERY_S: f64 = 1.0;
 #[derive(Default)]
 pub struct LiveVerdict {
     judged_s: Option<f64>,
+    had_tree: bool,
     brightness: Option<f64>,
     sway: Option<Arc<SwayNow>>,
     newest: Option<Arc<Verdict>>,
@@ -37,7 +38,8 @@ impl LiveVerdict {
         self.sway = sway.or(self.sway.take());
     }
 
-    /// Judges anew where a second of film has passed. `camera`: when it was away.
+    /// Judges anew where a second of film has passed, or the tree was built. `camera`: when it was
+    /// away.
     pub fn step(
         &mut self,
         quality: &Quality,
@@ -47,11 +49,14 @@ impl LiveVerdict {
     ) {
         let time_s = quality.last_s();
         let judged_s = *self.judged_s.get_or_insert(time_s);
-        if time_s - judged_s < EVERY_S {
+        let model = back.model();
+        // A tree that is shown must not be called missing.
+        let is_built = model.is_some() && !self.had_tree;
+        if time_s - judged_s < EVERY_S && !is_built {
             return;
         }
         self.judged_s = Some(time_s);
-        let model = back.model();
+        self.had_tree = model.is_some();
         let film = JudgedFilm {
             is_filming: true,
             length: length_so_far(quality, camera),

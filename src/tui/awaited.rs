@@ -89,8 +89,8 @@ fn of_accumulation(s: &Snapshot) -> String {
     if needed.motion {
         return "waiting for the tree to move in the film".into();
     }
-    // What is no number is shown as nothing seen.
-    let percent = (100.0 * s.progress.clamp(0.0, 1.0)).floor() as u32;
+    // As the gauge shows it; what is no number is nothing seen.
+    let percent = (100.0 * s.progress.clamp(0.0, 1.0)).round() as u32;
     if percent < 100 {
         let until = if s.is_live {
             "let it move"
@@ -108,30 +108,26 @@ fn of_accumulation(s: &Snapshot) -> String {
 
 /// The tree stands.
 fn of_live(s: &Snapshot) -> String {
-    if s.still_needed.for_sway_s > 0.0 {
-        let left = seconds(s.still_needed.for_sway_s);
-        return if s.is_live {
-            format!("the tree is there: film {left} more for the branches' frequencies")
-        } else {
-            format!("the tree is there: {left} more are needed for frequencies")
-        };
-    }
+    let left_s = s.still_needed.for_sway_s;
+    let left = (s.is_live && left_s > 0.0).then(|| seconds(left_s));
     if s.sway_at_end {
-        return "the tree is there: frequencies are told at the end".into();
+        let more = left.map_or(String::new(), |left| format!("film {left} more; "));
+        return format!("the tree is there: {more}frequencies come at the end");
     }
-    let Some(sway) = &s.sway else {
-        return "the tree is there: its frequencies are being looked for".into();
-    };
-    let all = sway.branches.values().filter(|b| is_measured(b)).count();
-    let known = sway.branches.values().filter(|b| b.swaying.is_ok()).count();
-    match (known, s.is_live) {
-        (0, true) => "no frequency yet: pull the tree and release it, or film on in wind".into(),
-        (0, false) => "no frequency yet".into(),
-        (_, true) if known < all => {
-            format!("{known} of {all} branches have a frequency: film on for more, or q ends")
+    let branches = s.sway.iter().flat_map(|sway| sway.branches.values());
+    let all = branches.clone().filter(|b| is_measured(b)).count();
+    let known = branches.filter(|b| b.swaying.is_ok()).count();
+    let have = format!("{known} of {all} branches have a frequency");
+    match left {
+        Some(left) if known > 0 => format!("{have}: film {left} more for better ones"),
+        Some(left) => format!("the tree is there: film {left} more for the branches' frequencies"),
+        None if known > 0 && s.is_live => format!("{have}: q ends"),
+        None if known > 0 => have,
+        None if all == 0 => "the tree is there: its frequencies are being looked for".into(),
+        None if s.is_live => {
+            "no frequency yet: pull the tree and release it, or film on in wind".into()
         }
-        (_, true) => format!("all {all} branches have a frequency: q ends"),
-        (_, false) => format!("{known} of {all} branches have a frequency"),
+        None => "the tree is there: no branch has a frequency yet".into(),
     }
 }
 
@@ -217,9 +213,13 @@ mod tests {
             sway: Some(Arc::new(known)),
             ..live(0.0)
         };
-        let at_end = Snapshot {
+        let [at_end, short_at_end] = [0.0, 3.9].map(|left_s| Snapshot {
             sway_at_end: true,
-            ..live(0.0)
+            ..live(left_s)
+        });
+        let short = Snapshot {
+            sway: None,
+            ..live(17.2)
         };
         let moving = StillNeeded::default();
         let still = StillNeeded {
@@ -243,7 +243,7 @@ mod tests {
         let detect = "looking for points to follow in the outline";
         let stem = "one stem shows so far: waiting for branches that move, or b builds now";
         let built_soon = "enough motion is seen: the tree is built in 3 s, or b builds now";
-        let told_at_end = "the tree is there: frequencies are told at the end";
+        let told_at_end = "the tree is there: frequencies come at the end";
         let sought = "the tree is there: its frequencies are being looked for";
         let case = |name, snapshot, live, replayed| Case {
             name,
@@ -275,7 +275,7 @@ mod tests {
             ),
             case(
                 "moving",
-                accumulating(0.629, moving),
+                accumulating(0.624, moving),
                 "62 % of the motion needed is seen: let it move, or b builds now",
                 "62 % of the motion needed is seen: more comes, or b builds now",
             ),
@@ -296,8 +296,20 @@ mod tests {
             case(
                 "short",
                 live(17.2),
+                "3 of 9 branches have a frequency: film 18 s more for better ones",
+                "3 of 9 branches have a frequency",
+            ),
+            case(
+                "short without an answer",
+                short,
                 "the tree is there: film 18 s more for the branches' frequencies",
-                "the tree is there: 18 s more are needed for frequencies",
+                sought,
+            ),
+            case(
+                "short, at end",
+                short_at_end,
+                "the tree is there: film 4 s more; frequencies come at the end",
+                told_at_end,
             ),
             case("at end", at_end, told_at_end, told_at_end),
             case("no answer", no_sway, sought, sought),
@@ -305,18 +317,18 @@ mod tests {
                 "no frequency",
                 unknown,
                 "no frequency yet: pull the tree and release it, or film on in wind",
-                "no frequency yet",
+                "the tree is there: no branch has a frequency yet",
             ),
             case(
                 "some frequencies",
                 live(0.0),
-                "3 of 9 branches have a frequency: film on for more, or q ends",
+                "3 of 9 branches have a frequency: q ends",
                 "3 of 9 branches have a frequency",
             ),
             case(
                 "all frequencies",
                 known,
-                "all 3 branches have a frequency: q ends",
+                "3 of 3 branches have a frequency: q ends",
                 "3 of 3 branches have a frequency",
             ),
         ]
@@ -333,7 +345,10 @@ mod tests {
         {
             let mut state = of(snapshot.clone());
             check(name, &state, live);
-            state.take(Arc::new(snapshot));
+            state.take(Arc::new(Snapshot {
+                is_live: false,
+                ..snapshot
+            }));
             check(name, &state, replayed);
         }
         for phase in Phase::ALL {

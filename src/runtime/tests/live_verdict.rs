@@ -101,7 +101,7 @@ fn the_verdict_follows_what_is_filmed() {
     film.film(11.6);
     assert_eq!(
         film.line(),
-        "poor, because: 12 of 30 s filmed; no tree yet. To do: film 18 s more"
+        "poor, because: no tree yet; 12 of 30 s filmed. To do: film 18 s more"
     );
     assert_eq!(film.verdict.missing_s(), 18.0);
     film.film(20.0);
