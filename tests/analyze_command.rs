@@ -739,11 +739,10 @@ fn the_model_in_the_capture_is_made_anew_with_the_answers() {
         .filter(|(a, b)| a != b)
         .map(|(a, _)| a.0.as_str())
         .collect();
-    assert_eq!((before.len(), changed[0]), (after.len(), "nodes.csv"));
+    assert_eq!(before.len(), after.len());
+    let may_change = ["capture.json", "nodes.csv", "tree.glb"];
     assert!(
-        changed[1..]
-            .iter()
-            .all(|name| ["capture.json", "tree.glb"].contains(name)),
+        changed.contains(&"nodes.csv") && changed.iter().all(|name| may_change.contains(name)),
         "{changed:?}"
     );
     analyze(&[&dir], &["--update", "--excitation", "wind"]);

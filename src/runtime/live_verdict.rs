@@ -75,7 +75,7 @@ impl LiveVerdict {
     }
 
     /// What the newest answer says of the branches that the tree has now.
-    fn sway_facts(&self, model: &Model) -> Option<SwayFacts> {
+    pub fn sway_facts(&self, model: &Model) -> Option<SwayFacts> {
         let sway = self.sway.as_deref()?;
         let mut modes = Vec::with_capacity(model.skeleton.nodes.len());
         for node in &model.skeleton.nodes {

@@ -21,7 +21,7 @@ use super::track_thread::ToModel;
 use super::unfinished::Unfinished;
 use crate::cancel::CancelToken;
 use crate::config::Config;
-use crate::model::{Phase, Picture, Pose, SwayNow, Verdict};
+use crate::model::{CaptureFacts, Phase, Picture, Pose, SwayNow, Verdict};
 use crate::pipeline::{BackEnd, Followed, Moved};
 use crate::recording::TrackFile;
 use crate::solve::{LEAST_MOVING, Model};
@@ -541,12 +541,17 @@ impl ModelThread {
         }
     }
 
-    /// What a capture is worth of which nothing was written: without the sway, which is analysed
-    /// for the files.
+    /// What a capture is worth of which nothing was written. As the sway is analysed anew for the
+    /// files only, it is judged by the newest answer from while it was filmed, if there is one.
     fn verdict_unwritten(&mut self) -> Option<Verdict> {
         let job = self.capture_job().ok()?;
-        let is_filmed = self.shared.counts.seen.load(Ordering::Relaxed) > 0;
-        is_filmed.then(|| judge(&job, job.tree.as_deref()).verdict)
+        if self.shared.counts.seen.load(Ordering::Relaxed) == 0 {
+            return None;
+        }
+        let tree = job.tree.as_deref();
+        let judged = judge(&job, tree).facts;
+        let sway = tree.and_then(|tree| self.verdict.sway_facts(tree));
+        Some(Verdict::of(&CaptureFacts { sway, ..judged }))
     }
 
     fn finish(&mut self) -> Summary {

@@ -121,7 +121,7 @@ fn of_live(s: &Snapshot) -> String {
     match left {
         Some(left) if known > 0 => format!("{have}: film {left} more for better ones"),
         Some(left) => format!("the tree is there: film {left} more for the branches' frequencies"),
-        None if known > 0 && s.is_live => format!("{have}: q ends"),
+        None if known > 0 && s.is_live => format!("{have}: film on for more, or q ends"),
         None if known > 0 => have,
         None if all == 0 => "the tree is there: its frequencies are being looked for".into(),
         None if s.is_live => {
@@ -322,13 +322,13 @@ mod tests {
             case(
                 "some frequencies",
                 live(0.0),
-                "3 of 9 branches have a frequency: q ends",
+                "3 of 9 branches have a frequency: film on for more, or q ends",
                 "3 of 9 branches have a frequency",
             ),
             case(
                 "all frequencies",
                 known,
-                "3 of 3 branches have a frequency: q ends",
+                "3 of 3 branches have a frequency: film on for more, or q ends",
                 "3 of 3 branches have a frequency",
             ),
         ]

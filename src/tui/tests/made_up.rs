@@ -118,7 +118,6 @@ pub fn snapshot(phase: Phase) -> Snapshot {
         phase,
         progress: 0.62,
         is_live: true,
-        verdict: Some(Arc::new(verdict())),
         frame: 1234,
         time_s: 41.1,
         sensor_rate_hz: 29.97,
@@ -159,13 +158,14 @@ fn verdict() -> Verdict {
     Verdict {
         grade: Grade::Poor,
         reasons: vec![
-            "no frequency identified".to_owned(),
-            "moves by 0.4 px only".to_owned(),
+            "moves by 0.2 px only".to_owned(),
             "12 of 30 s filmed".to_owned(),
+            "foot cut off".to_owned(),
         ],
         advice: vec![
             "come nearer, or film in more wind".to_owned(),
             "film 18 s more".to_owned(),
+            "film the whole tree with its foot".to_owned(),
         ],
     }
 }
@@ -173,6 +173,7 @@ fn verdict() -> Verdict {
 /// Points that are followed and how well.
 fn add_points(s: &mut Snapshot) {
     s.tracks_alive = 312;
+    s.verdict = Some(Arc::new(verdict()));
     s.lost_per_s = 0.4;
     s.fb_error_px = 0.12;
     s.error_px = Some(0.94);
