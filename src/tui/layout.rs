@@ -48,7 +48,7 @@ impl BranchView {
 
 /// Rows of the chosen branch beside all else, and rows that the tree must keep then.
 const BRANCH_ROWS: u16 = 12;
-const TREE_ROWS: u16 = 9;
+const TREE_ROWS: u16 = 8;
 
 impl Areas {
     /// Divides the window, giving the picture the height that it needs; `None` for a window that is
