@@ -84,8 +84,7 @@ fn branch(study: &Study, branch: &Branch) -> Value {
 
 fn compared(studies: &[Study], comparison: &Comparison) -> Value {
     let rows: Vec<Value> = comparison
-        .rows
-        .iter()
+        .rows_of_first()
         .map(|row| compared_row(studies, row))
         .collect();
     let (mut found_again, mut not_matched) = (Map::new(), Map::new());
@@ -113,10 +112,10 @@ fn compared_row(studies: &[Study], row: &Row) -> Value {
 
 /// A branch of the first capture in capture `k`.
 fn compared_cell(studies: &[Study], row: &Row, k: usize) -> Value {
-    let found = k.checked_sub(1).and_then(|k| row.others.get(k));
-    let off = match found {
-        Some(Match::Found { off, .. }) => Some(*off),
-        _ => None,
+    let found = row.matches.get(k);
+    let (off, by) = match found {
+        Some(Match::Found { off, by, .. }) => (Some(*off), Some(by.word())),
+        _ => (None, None),
     };
     let first = row.sway(studies, 0).filter(|_| k > 0);
     let both = first.zip(row.sway(studies, k));
@@ -124,6 +123,7 @@ fn compared_cell(studies: &[Study], row: &Row, k: usize) -> Value {
         "capture": studies[k].name,
         "node_id": row.branch(studies, k).map(|b| b.name),
         "unclear": matches!(found, Some(Match::Unclear)),
+        "matched_by": by,
         "off": off,
         "frequency_change_percent": both.and_then(|(a, b)| Change::of_frequency(&a, &b)).map(|c| change(&c)),
         "damping_change_percent": both.and_then(|(a, b)| Change::of_damping(&a, &b)).map(|c| change(&c)),

@@ -14,6 +14,8 @@ mod pieces;
 mod plot;
 mod released;
 mod study;
+#[cfg(test)]
+mod tests;
 mod text;
 mod values;
 mod words;
@@ -22,7 +24,7 @@ pub use compare::{Change, Comparison, Row, compare};
 pub use html::page;
 pub use json::json;
 pub use levels::{Growth, Level, Spread, growth, levels};
-pub use matching::{Match, matched};
+pub use matching::{Landmark, Match, Matched, MatchedBy, View, matched};
 pub use released::hints;
 pub use study::{Branch, Gap, Given, Study};
 pub use text::text;

@@ -111,6 +111,10 @@ pub struct Branch {
     /// above it.
     pub base_from_foot_px: Point2<f64>,
     pub tip_from_foot_px: Point2<f64>,
+    /// Where the points on it and on all that it carries lie on average, in the same way, and their
+    /// root mean square distance from there. No numbers where there are none.
+    pub centre_from_foot_px: Point2<f64>,
+    pub spread_px: f64,
     pub sway: Swaying,
     /// Amplitude of the branch's own oscillation in its angle to the one that carries it, degrees;
     /// no number where unknown.
@@ -189,13 +193,18 @@ impl Study {
             notes: given.notes.to_vec(),
         };
         let botanical = skeleton.botanical_branches();
+        let clouds = point_clouds(skeleton, film);
         for node in skeleton.measured_branches() {
             let sway = analysis
                 .sway
                 .get(node.index())
                 .copied()
                 .unwrap_or(Err(Unidentified::NotMeasured));
-            let branch = branch(given, &botanical, node, sway, study.used_s);
+            let mut branch = branch(given, &botanical, node, sway, study.used_s);
+            if let Some(cloud) = clouds.get(node.index()) {
+                branch.centre_from_foot_px = cloud.centre();
+                branch.spread_px = cloud.spread();
+            }
             study.branches.push(branch);
         }
         study
@@ -217,6 +226,15 @@ impl Study {
             .iter()
             .map(|b| b.tip_from_foot_px.coords.norm())
             .fold(0.0, f64::max)
+    }
+
+    /// Which branch is the trunk: of those that nothing carries, the one with most points.
+    pub fn trunk(&self) -> Option<usize> {
+        let branches = self.branches.iter().enumerate();
+        let stems = branches.filter(|(_, b)| b.parent.is_none());
+        // Of as many points the first.
+        let most = stems.max_by_key(|(i, b)| (b.points, std::cmp::Reverse(*i)));
+        most.map(|(i, _)| i)
     }
 
     /// The branch of a number.
@@ -296,6 +314,8 @@ fn branch(
         points: own.n_tracks,
         base_from_foot_px: base,
         tip_from_foot_px: tip,
+        centre_from_foot_px: Point2::new(f64::NAN, f64::NAN),
+        spread_px: f64::NAN,
         sway,
         amplitude_deg,
         by_points_deg,
@@ -308,6 +328,61 @@ fn branch(
         spectrum,
         reference,
     }
+}
+
+/// Where the points of a branch lie: how many, the sum of their places, px to the right and up from
+/// the foot, and that of the squares of their distances from it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Cloud {
+    points: f64,
+    sum: Vector2<f64>,
+    squares: f64,
+}
+
+impl Cloud {
+    fn add(&mut self, other: Self) {
+        self.points += other.points;
+        self.sum += other.sum;
+        self.squares += other.squares;
+    }
+
+    fn centre(&self) -> Point2<f64> {
+        Point2::from(self.sum / self.points)
+    }
+
+    fn spread(&self) -> f64 {
+        let square = self.squares / self.points - self.centre().coords.norm_squared();
+        // Of one point it is 0, and may come out less.
+        if square < 0.0 { 0.0 } else { square.sqrt() }
+    }
+}
+
+/// The points on every node and on all that it carries, by their mean places in the film.
+fn point_clouds(skeleton: &Skeleton, film: &Film) -> Vec<Cloud> {
+    let mut clouds = vec![Cloud::default(); skeleton.nodes.len()];
+    for track in &film.tracks {
+        let seen = track.at_px.iter().filter(|p| p.x.is_finite());
+        let frames = seen.clone().count() as f64;
+        let sum: Vector2<f64> = seen.map(|p| p - skeleton.foot_px).sum();
+        let place = Vector2::new(sum.x, -sum.y) / frames;
+        if let Some(cloud) = clouds.get_mut(track.node.index())
+            && frames > 0.0
+        {
+            cloud.add(Cloud {
+                points: 1.0,
+                sum: place,
+                squares: place.norm_squared(),
+            });
+        }
+    }
+    // Parents stand before their children.
+    for i in (1..clouds.len()).rev() {
+        if let Some(parent) = skeleton.nodes[i].parent {
+            let own = clouds[i];
+            clouds[parent.index()].add(own);
+        }
+    }
+    clouds
 }
 
 /// Where a node is at rest, px to the right and up from the foot.
@@ -428,6 +503,37 @@ mod tests {
         ] {
             assert!(agreed(points, angle).is_nan(), "{points} and {angle}");
         }
+    }
+
+    /// Points at these places, px.
+    fn cloud(places: &[[f64; 2]]) -> Cloud {
+        let mut cloud = Cloud::default();
+        for place in places {
+            let place = Vector2::from(*place);
+            cloud.add(Cloud {
+                points: 1.0,
+                sum: place,
+                squares: place.norm_squared(),
+            });
+        }
+        cloud
+    }
+
+    #[test]
+    fn the_points_of_a_branch_have_a_centre_and_a_spread() {
+        let mut all = cloud(&[[10.0, 103.0], [10.0, 97.0]]);
+        assert_eq!(
+            (all.centre(), all.spread()),
+            (Point2::new(10.0, 100.0), 3.0)
+        );
+        all.add(cloud(&[[7.0, 100.0], [13.0, 100.0]]));
+        assert_eq!(
+            (all.centre(), all.spread()),
+            (Point2::new(10.0, 100.0), 3.0)
+        );
+        // Squares that are not quite even must not make it no number.
+        assert!(cloud(&[[0.1, 0.7]]).spread() < 1e-6);
+        assert!(cloud(&[]).spread().is_nan() && cloud(&[]).centre().x.is_nan());
     }
 
     /// Pieces of 20 s cannot tell a sway of 20 s from drift, however many minutes of wind there

@@ -26,7 +26,9 @@ pub fn compared_part(studies: &[Study], comparison: &Comparison) -> String {
     if one_tree {
         out += &not_matched(studies, comparison);
     }
-    let told = comparison.rows.iter().filter(|row| row.is_told(studies));
+    let told = comparison
+        .rows_of_first()
+        .filter(|row| row.is_told(studies));
     let rows: Vec<&Row> = told.collect();
     let mut plots = String::new();
     if one_tree {
@@ -124,7 +126,7 @@ fn table(studies: &[Study], comparison: &Comparison) -> String {
     let against = ["frequency", "damping"].map(|what| format!("{what},<br>against {first}"));
     let head = [&head[..], &against].concat();
     let (mut rows, mut untold) = (String::new(), Vec::new());
-    for row in &comparison.rows {
+    for row in comparison.rows_of_first() {
         if row.is_told(studies) {
             rows.extend((0..studies.len()).map(|k| table_row(studies, row, k)));
         } else {

@@ -15,8 +15,9 @@ pub fn compared(studies: &[Study], comparison: &Comparison, columns: Option<usiz
         return out;
     }
     out.push('\n');
-    let (told, untold): (Vec<&Row>, Vec<&Row>) =
-        comparison.rows.iter().partition(|row| row.is_told(studies));
+    let (told, untold): (Vec<&Row>, Vec<&Row>) = comparison
+        .rows_of_first()
+        .partition(|row| row.is_told(studies));
     let mut rows = Vec::with_capacity(told.len() * studies.len());
     for row in told {
         rows.extend((0..studies.len()).map(|k| (row, k)));
@@ -109,7 +110,7 @@ pub fn heading(studies: &[Study], comparison: &Comparison) -> String {
     let by = if comparison.said {
         "as --trees says"
     } else {
-        "judged by the places of their branches, which --trees overrides"
+        "judged by places and frequencies of their branches, which --trees overrides"
     };
     format!(
         "Compared with {} as {what} ({by}; {found})",
@@ -173,7 +174,7 @@ fn across(studies: &[Study], row: &Row, k: usize, values: &[Value]) -> Vec<Strin
 
 /// Why a branch of the first capture stands for nothing in capture `k`.
 pub fn lost(row: &Row, k: usize) -> &'static str {
-    match k.checked_sub(1).and_then(|k| row.others.get(k)) {
+    match row.matches.get(k) {
         Some(Match::Unclear) => "unclear which",
         _ => "not found",
     }
@@ -186,8 +187,8 @@ pub fn unmatched(studies: &[Study], comparison: &Comparison, other: usize) -> St
         return String::new();
     };
     let (mut missing, mut unclear) = (Vec::new(), Vec::new());
-    for row in &comparison.rows {
-        match row.others.get(other) {
+    for row in comparison.rows_of_first() {
+        match row.matches.get(other + 1) {
             Some(Match::Missing) => missing.push(row.name),
             Some(Match::Unclear) => unclear.push(row.name),
             _ => {}
