@@ -3,6 +3,7 @@
 mod support;
 
 use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::os::fd::FromRawFd;
@@ -466,6 +467,107 @@ fn told_of_two(a: &Path, b: &Path) -> Value {
     told(&[a, b], &["--trees", "different"])
 }
 
+/// The table of `--csv`, each row by the names of its columns.
+fn tidy(dirs: &[&Path], more: &[&str]) -> Vec<BTreeMap<String, String>> {
+    let output = analyze(dirs, &[more, &["--csv"]].concat());
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{more:?}: {error}");
+    let mut reader = csv::Reader::from_reader(&output.stdout[..]);
+    reader.deserialize().map(|row| row.expect("row")).collect()
+}
+
+/// One table for statistics: the same branch has the same number in all captures, wherever its
+/// number differs from capture to capture.
+#[test]
+fn several_captures_are_one_tidy_table() {
+    let (_dir, first) = captured("hard, \"first\"");
+    let (gentle, slow) = (first.with_file_name("gentle"), first.with_file_name("slow"));
+    again(&first, &gentle, 1.0);
+    again(&first, &slow, 1.1);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
+    command.arg("note").arg(&slow);
+    let noted = command.args(["site=meadow, \"north\"", "wind=3"]).output();
+    assert!(noted.expect("arborcam").status.success());
+    let rows = tidy(&[&first, &gentle, &slow], &[]);
+    let of = |name: &str| -> Vec<&BTreeMap<String, String>> {
+        rows.iter().filter(|row| row["capture"] == name).collect()
+    };
+    let hard = of("hard, \"first\"");
+    assert_eq!(rows.len(), 3 * hard.len());
+    let told = told(&[&first], &[]);
+    assert_eq!(hard.len(), branches(&told).len());
+    for (row, branch) in hard.iter().zip(branches(&told)) {
+        assert_eq!(row["node_id"], branch["node_id"].to_string());
+        let written = row["frequency_hz"].parse::<f64>().ok();
+        let expected = branch["frequency_hz"]["value"].as_f64();
+        assert_eq!(written.is_some(), expected.is_some(), "{row:?}");
+        assert!(
+            written
+                .zip(expected)
+                .is_none_or(|(w, e)| (w - e).abs() < 1e-5)
+        );
+        assert_eq!(row["unidentified"].is_empty(), written.is_some(), "{row:?}");
+    }
+    let by_id: BTreeMap<&str, &str> = hard
+        .iter()
+        .map(|row| (&*row["tree_branch"], &*row["node_id"]))
+        .collect();
+    assert_eq!(by_id.len(), hard.len());
+    let (mut compared, mut matched) = (0, 0);
+    for row in of("gentle").into_iter().chain(of("slow")) {
+        let is_slow = row["capture"] == "slow";
+        assert_eq!(
+            row["note_site"],
+            if is_slow { "meadow, \"north\"" } else { "" }
+        );
+        let Some(first_id) = by_id.get(&*row["tree_branch"]) else {
+            assert_eq!(row["matched_by"], "none");
+            continue;
+        };
+        matched += 1;
+        assert_ne!(row["matched_by"], "none", "{row:?}");
+        let first_id: u32 = first_id.parse().expect("number");
+        let renamed = if first_id < 2 {
+            first_id
+        } else {
+            first_id + 300
+        };
+        assert_eq!(row["node_id"], renamed.to_string());
+        if row["matched_by"] == "trunk" {
+            assert_eq!((&*row["tree_branch"], &*row["parent_id"]), ("1", ""));
+        }
+        if let Ok(ratio) = row["frequency_to_first"].parse::<f64>() {
+            let expected = if is_slow { 1.0 / 1.1 } else { 1.0 };
+            assert!((ratio - expected).abs() < 0.01, "{row:?}");
+            compared += 1;
+        }
+    }
+    assert!(
+        10 * matched > 8 * 2 * hard.len(),
+        "{matched} of {} matched",
+        2 * hard.len()
+    );
+    assert!(compared >= 6, "{compared} frequencies compared");
+}
+
+/// One capture is a table, too, and so is one that is given twice.
+#[test]
+fn a_capture_alone_and_one_given_twice_are_tables() {
+    let (_dir, dir) = captured("tree");
+    let one = tidy(&[&dir], &[]);
+    assert!(one.iter().all(|row| row["frequency_to_first"].is_empty()));
+    let ids: BTreeSet<&str> = one.iter().map(|row| &*row["tree_branch"]).collect();
+    assert_eq!(ids.len(), one.len());
+    let twice = tidy(&[&dir, &dir], &["--trees", "same"]);
+    let (a, b) = twice.split_at(one.len());
+    assert_eq!((&*a[0]["capture"], &*b[0]["capture"]), ("tree", "tree#2"));
+    for (a, b) in a.iter().zip(b) {
+        assert_eq!(a["tree_branch"], b["tree_branch"]);
+        assert_ne!(b["matched_by"], "none");
+        assert!(b["frequency_hz"].is_empty() || b["frequency_to_first"] == "1");
+    }
+}
+
 /// Every element is closed where it must be, so that a browser shows what was meant.
 fn well_formed(html: &str) {
     let mut open: Vec<&str> = Vec::new();
@@ -690,6 +792,9 @@ fn captures_that_may_be_of_one_tree_or_of_two_are_not_compared_by_a_guess() {
         text.contains("Not compared with tree") && !text.contains("frequency against"),
         "{text}"
     );
+    let rows = tidy(&[&first, &other], &[]);
+    let matched = rows.iter().filter(|row| row["matched_by"] != "none");
+    assert_eq!(matched.count(), 2, "the trunks alone");
     let html = fs::read_to_string(page).expect("report");
     assert!(html.contains("Not compared with tree") && !html.contains("called there"));
     well_formed(&html);
@@ -1006,6 +1111,18 @@ fn bad_input_gets_a_line_and_the_right_status() {
             "rows of one frame stand together, in order of time",
         ),
         (vec![&dir, &dir], vec![], BAD_USAGE, "is given twice"),
+        (
+            vec![&dir],
+            vec!["--csv", "--json"],
+            BAD_USAGE,
+            "cannot be used with",
+        ),
+        (
+            vec![&dir, &empty],
+            vec!["--csv"],
+            NO_INPUT,
+            "empty is no capture",
+        ),
         (
             vec![&dir],
             vec!["--from", "5", "--to", "5"],

@@ -123,8 +123,18 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "draw", "signal",
         ],
     ),
-    // Told from what the sway was told from, and drawn beside it.
-    ("report", &["model", "dynamics", "signal"]),
+    // Told from what the sway was told from, and drawn beside it; its table for statistics is
+    // written as those of a document.
+    (
+        "report",
+        &[
+            "model",
+            "dynamics",
+            "signal",
+            "files",
+            "document::TableWriter",
+        ],
+    ),
     // The screen draws outlines, and refuses the crossing ones as a file would be. It draws the
     // tree's wood too, a coarse mesh that only it needs.
     (

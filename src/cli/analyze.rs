@@ -14,7 +14,7 @@ use crate::dynamics::{Depth, Film, analyse};
 use crate::export::picture::data_address;
 use crate::files::refuse_taken;
 use crate::model::{Excitation, Pose, Skeleton, Swaying};
-use crate::report::{Comparison, Given, Study, compare, hints, json, page, text};
+use crate::report::{Comparison, Given, Study, compare, csv, hints, json, page, text};
 use crate::tui::columns;
 use crate::views::update;
 use anyhow::anyhow;
@@ -51,13 +51,10 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), CommandError> {
         results.push(analysis.sway);
     }
     let comparison = compare(&studies, args.trees.same());
-    if comparison.as_ref().is_some_and(|c| c.same_tree.is_none()) {
-        eprint_line(
-            "arborcam: warning: nothing is compared: it cannot be told whether these are films of \
-             one tree; say --trees same or different",
-        );
+    if let Some(warning) = comparison.as_ref().and_then(|c| warning(args, c)) {
+        eprint_line(&format!("arborcam: warning: {warning}"));
     }
-    print(&table(args, &studies, comparison.as_ref()))?;
+    print(&table(args, &studies, comparison.as_ref())?)?;
     let stop = stop.while_writing();
     let mut failures = Vec::new();
     if args.update {
@@ -70,6 +67,26 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), CommandError> {
         failures.extend(report(path, html, stop).err());
     }
     combined(failures)
+}
+
+/// What the user should know of a comparison that is less than it could be. The CSV table does not
+/// say by itself what was taken for one tree.
+fn warning(args: &AnalyzeArgs, comparison: &Comparison) -> Option<&'static str> {
+    match comparison.same_tree {
+        None if args.csv => Some(
+            "only the trunks are matched: it cannot be told whether these are films of one tree; \
+             say --trees same or different",
+        ),
+        None => Some(
+            "nothing is compared: it cannot be told whether these are films of one tree; say \
+             --trees same or different",
+        ),
+        Some(false) if args.csv && !comparison.said => Some(
+            "only the trunks are matched: by the places of their branches these are films of \
+             different trees; if they are of one, say --trees same",
+        ),
+        Some(_) => None,
+    }
 }
 
 /// Reads the trees of all captures before the first one is analysed: a mistyped name is reported at
@@ -85,12 +102,19 @@ fn read_documents(args: &AnalyzeArgs) -> Result<Vec<Document>, CommandError> {
 }
 
 /// The text for standard output.
-fn table(args: &AnalyzeArgs, studies: &[Study], comparison: Option<&Comparison>) -> String {
-    if args.json {
-        format!("{}\n", json(studies, comparison))
-    } else {
-        text(studies, comparison, columns().map(usize::from))
+fn table(
+    args: &AnalyzeArgs,
+    studies: &[Study],
+    comparison: Option<&Comparison>,
+) -> Result<String, CommandError> {
+    if args.csv {
+        let bytes = csv(studies, comparison)?;
+        return Ok(String::from_utf8_lossy(&bytes).into_owned());
     }
+    if args.json {
+        return Ok(format!("{}\n", json(studies, comparison)));
+    }
+    Ok(text(studies, comparison, columns().map(usize::from)))
 }
 
 /// Writes the report, and prints where.
@@ -310,17 +334,22 @@ impl Drop for Progress {
     }
 }
 
-/// Names of the captures: the ends of their paths, as short as possible, but all different.
+/// Names of the captures: the ends of their paths, as short as possible, but all different. A
+/// folder that is given again has its turn after its name.
 fn names(dirs: &[PathBuf]) -> Vec<String> {
     let all: Vec<Vec<String>> = dirs.iter().map(|dir| parts(dir)).collect();
     let longest = all.iter().map(Vec::len).max().unwrap_or(1);
     let mut names = Vec::with_capacity(all.len());
-    for own in &all {
+    for (k, own) in all.iter().enumerate() {
         let mut length = 1;
         while length < longest && is_shared(&all, own, length) {
             length += 1;
         }
-        names.push(end(own, length));
+        let before = all[..k].iter().filter(|other| *other == own).count();
+        names.push(match before {
+            0 => end(own, length),
+            n => format!("{}#{}", end(own, length), n + 1),
+        });
     }
     names
 }
@@ -339,12 +368,10 @@ fn end(parts: &[String], length: usize) -> String {
     parts[parts.len().saturating_sub(length)..].join("/")
 }
 
-/// Whether several paths have the same last `length` components as `own`.
+/// Whether another path has the same last `length` components as `own`.
 fn is_shared(all: &[Vec<String>], own: &[String], length: usize) -> bool {
-    let same = all
-        .iter()
-        .filter(|other| end(other, length) == end(own, length));
-    same.count() > 1
+    all.iter()
+        .any(|other| other != own && end(other, length) == end(own, length))
 }
 
 #[cfg(test)]
@@ -363,5 +390,9 @@ mod tests {
             ["calm/oak", "storm/oak", "elm"]
         );
         assert_eq!(names_of(&["/x/oak"]), ["oak"]);
+        assert_eq!(
+            names_of(&["/x/oak", "/y/elm", "/x/oak"]),
+            ["oak", "elm", "oak#2"]
+        );
     }
 }

@@ -1,6 +1,6 @@
-//! What a film says of a tree's sway, for people and programs: a table as text, JSON, and one
-//! HTML page with plots after Hu et al. (figs. 3, 6, 7, 9 to 12 and 15). Pure: what goes in
-//! is analysed already, what comes out is text.
+//! What a film says of a tree's sway, for people and programs: a table as text, JSON, a tidy table
+//! (CSV), and one HTML page with plots after Hu et al. (figs. 3, 6, 7, 9 to 12 and 15). Pure: what
+//! goes in is analysed already, what comes out is text.
 
 mod columns;
 mod compare;
@@ -17,6 +17,7 @@ mod study;
 #[cfg(test)]
 mod tests;
 mod text;
+mod tidy;
 mod values;
 mod words;
 
@@ -28,3 +29,4 @@ pub use matching::{Landmark, Match, Matched, MatchedBy, View, matched};
 pub use released::hints;
 pub use study::{Branch, Gap, Given, Study};
 pub use text::text;
+pub use tidy::csv;

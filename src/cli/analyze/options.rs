@@ -19,6 +19,10 @@ pub struct AnalyzeArgs {
     /// Print JSON.
     #[arg(long)]
     pub json: bool,
+    /// Print one CSV table of all captures: a row for each capture and branch, the same tree_branch
+    /// for the same branch.
+    #[arg(long, conflicts_with = "json")]
+    pub csv: bool,
     /// Also write a page with plots (HTML, in one file); the file must not exist.
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
@@ -76,11 +80,12 @@ impl AnalyzeArgs {
     /// Checks combinations of options, which clap cannot.
     ///
     /// # Errors
-    /// A folder is given twice; the film would end before it begins; the report has no name.
+    /// A folder is given twice, unless its rows are wanted twice; the film would end before it
+    /// begins; the report has no name.
     pub fn check(&self) -> Result<(), CommandError> {
         let mut seen = BTreeSet::new();
         for dir in &self.dirs {
-            if !seen.insert(dir.canonicalize().unwrap_or_else(|_| dir.clone())) {
+            if !self.csv && !seen.insert(dir.canonicalize().unwrap_or_else(|_| dir.clone())) {
                 return bad_usage(format!(
                     "{} is given twice; give every capture once",
                     dir.display()
