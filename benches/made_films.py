@@ -18,10 +18,11 @@ Writes to OUT_DIR/NAME, 640x360 at 30 frames/s:
   grid.npz       up to 2500 surface points seen in frame 0: pix0 (K, 2), branch (K), pos_2d (frames, K, 2), px
 
 Pixels: the centre of the top left one is (0, 0), u right, v down. Metres: x right, y up, z towards the viewer, foot at 0.
---bad makes a film hard, and may be given several times. The tree and its motion are those of the seed without it:
+--bad makes a film hard, and may be given several times. The tree and its motion are those of the seed without it, and all
+truth is that of the camera and the tree at the beginning of the film:
 BAD_KINDS
 
-The steps are in made_films/: tree, motion, surface, scenery, bad_input, picture, truth. A tree is drawn as thousands of
+The steps are in made_films/: tree, motion, surface, scenery, bad_input (with bad_camera and walker), picture, truth. A tree is drawn as thousands of
 small coloured facets that ride on its branches, four times too large and averaged down, so that it moves by parts of a
 pixel: the centroid of a drawn facet is within about 0.03 px of where it should be. No cast shadows, no motion blur, no
 exposure changes.
@@ -40,7 +41,7 @@ DEFAULT_SECONDS = {"release": 11.0, "held": 11.0, "wind": 14.0}
 
 
 def main():
-    kinds = "\n".join(f"  {kind:<14} {what}" for kind, what in bad_input.KINDS.items())
+    kinds = "\n".join(f"  {kind:<15} {what}" for kind, what in bad_input.KINDS.items())
     about = __doc__.replace("BAD_KINDS", kinds)
     parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out_dir", type=Path)
@@ -59,6 +60,7 @@ def make(folder, seed, leafy, mode, frames, bad_kinds):
     rng, bad = np.random.default_rng(seed), bad_input.BadInput(bad_kinds, leafy)
     branches, pull_direction = tree.grow(rng, leafy)
     theta_rad, drive = motion.sway(rng, branches, mode, np.arange(frames) / picture.FPS)
+    theta_rad = bad.sways(theta_rad)
     pose = motion.Pose(branches, theta_rad)
     camera = picture.Camera.framing(rng, pose.points_m)
     skin = bad.more_leaves(seed, branches, pose, surface.cover(rng, branches, pose, leafy))

@@ -1,4 +1,5 @@
-"""What makes a film hard: things behind, before and on the tree, and bad light. Pixels; colours blue, green, red.
+"""What makes a film hard: things behind, before and on the tree, bad light, a camera that moves. Pixels; colours blue, green,
+red.
 
 Chance is drawn from a generator of its own: tree, motion and noise of a seed are the same with and without these.
 """
@@ -7,7 +8,7 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
-from . import motion, picture, scenery, surface, tree
+from . import bad_camera, motion, picture, scenery, surface, tree, walker
 from .picture import FINE, FPS, HEIGHT, WIDTH
 
 KINDS = {
@@ -19,7 +20,18 @@ KINDS = {
     "full_foliage": "leaves on all branches and the trunk, so that hardly any wood is seen",
     "night": "an eighth of the light, the camera's noise as before",
     "fog": "a seventh of the contrast, the rest is grey",
+    "no_background": "one colour behind the tree: no sky, no houses, no ground",
+    "no_tree": "what stands behind the tree, and no tree",
+    "calm": "a tree that stands still",
+    "walker": "a person who walks through in front of the tree, and back",
+    "exposure": "an exposure that the camera changes all the time",
+    "banding": "bands of light and dark that roll through the picture, as lamps on the mains make them",
+    **bad_camera.KINDS,
 }
+# Each kind's chance is by its place in this list, so that a new kind, at its end, changes no film of another.
+WITH_CHANCE = ["brown_wall", "fence", "fog", "full_foliage", "night", "second_tree", "shadow", "wire", "no_background", "walker",
+               "exposure", "hand_held"]
+EXPOSURE_DEPTH, BAND_DEPTH, BAND_HZ, BANDS = 0.35, 0.25, 2.1, 1.5
 SHADE_LEAST, SHADE_PX_S, SHADE_SWAY_PX, SHADE_SWAY_HZ = 0.5, 12.0, 25.0, 0.35
 CROWN_LEAVES, TRUNK_LEAVES = 5000, 1500
 
@@ -40,6 +52,9 @@ class BadInput:
     wires: list = field(default_factory=list)  # (N, 2) lines in pixels
     wire_px: float = 2.2
     shade: np.ndarray = None  # share of the light that is left, repeated sideways without a seam
+    walks: walker.Walker = None
+    exposure_hz: float = 0.0
+    moves: bad_camera.Moves = None
 
     def more_leaves(self, seed, branches, pose, skin):
         if "full_foliage" not in self.kinds:
@@ -52,6 +67,13 @@ class BadInput:
     def set_up(self, seed, background, skin, camera, frames):
         """Paints what stands still behind the tree into the background, and makes what moves."""
         bark_bgr = skin.colour[~skin.two_sided].mean(axis=0)
+        self.moves = bad_camera.Moves(self.kinds, frames / FPS, own_rng(seed, "hand_held"))
+        if "no_background" in self.kinds:
+            background[:] = own_rng(seed, "no_background").uniform(170, 225) * np.array([1.0, 0.97, 0.94])
+        if "walker" in self.kinds:
+            self.walks = walker.Walker(own_rng(seed, "walker"), camera.px_per_m)
+        if "exposure" in self.kinds:
+            self.exposure_hz = own_rng(seed, "exposure").uniform(0.25, 0.9)
         if "brown_wall" in self.kinds:
             wall(own_rng(seed, "brown_wall"), background, bark_bgr)
         if "fence" in self.kinds:
@@ -63,8 +85,23 @@ class BadInput:
         if "shadow" in self.kinds:
             self.shade = shade(own_rng(seed, "shadow"))
 
-    def before_tree(self, canvas):
-        """Draws what hangs in front on the fine canvas."""
+    def sways(self, theta_rad):
+        """The angles of the tree's branches, of which a calm tree has none."""
+        return 0 * theta_rad if "calm" in self.kinds else theta_rad
+
+    def trees(self, skin, pose, camera):
+        """What is drawn, from back to front."""
+        own = [] if "no_tree" in self.kinds else [OtherTree(skin, pose, camera)]
+        return self.behind + own
+
+    def reaches_everywhere(self):
+        """Whether more of the picture changes than where trees are."""
+        return self.walks is not None or "no_tree" in self.kinds
+
+    def before_tree(self, canvas, time_s=None):
+        """Draws what hangs in front on the fine canvas, and at a time who walks there."""
+        if time_s is not None and self.walks is not None:
+            self.walks.draw(canvas, time_s)
         for line in self.wires:
             fixed = np.round(((line + 0.5) * FINE - 0.5) * (1 << picture.SHIFT)).astype(np.int32)
             cv2.polylines(canvas, [fixed], False, (48, 45, 45), round(self.wire_px * FINE), cv2.LINE_8, picture.SHIFT)
@@ -76,7 +113,13 @@ class BadInput:
         return canvas[..., 0] < 255
 
     def light(self, image, time_s):
-        """The frame as this light shows it."""
+        """The frame as the camera shows it in this light."""
+        image = self.moves.seen(image, time_s)
+        if self.exposure_hz:
+            image = image * np.exp(EXPOSURE_DEPTH * np.sin(2 * np.pi * self.exposure_hz * time_s))
+        if "banding" in self.kinds:
+            phase = BANDS * np.arange(HEIGHT) / HEIGHT - BAND_HZ * time_s
+            image = image * (1 + BAND_DEPTH * np.sin(2 * np.pi * phase))[:, None, None]
         if self.shade is not None:
             shift = SHADE_PX_S * time_s + SHADE_SWAY_PX * np.sin(2 * np.pi * SHADE_SWAY_HZ * time_s)
             moved = cv2.warpAffine(self.shade, np.float32([[1, 0, shift % (2 * WIDTH)], [0, 1, 0]]), (WIDTH, HEIGHT),
@@ -91,7 +134,7 @@ class BadInput:
 
 def own_rng(seed, kind):
     """A generator for one kind, whatever others the film has."""
-    return np.random.default_rng([seed, sorted(KINDS).index(kind)])
+    return np.random.default_rng([seed, WITH_CHANCE.index(kind)])
 
 
 def wall(rng, img, bark_bgr):

@@ -76,7 +76,7 @@ class Film:
 
 def film(path, rng, background, surface, pose, camera, frames, bad_input):
     """Write the film. Only the part of the picture that a tree ever reaches is drawn anew in each frame."""
-    trees = [(t.skin, t.pose, t.camera) for t in bad_input.behind] + [(surface, pose, camera)]
+    trees = [(t.skin, t.pose, t.camera) for t in bad_input.trees(surface, pose, camera)]
     colours = [[tuple(map(float, c)) for c in np.clip(skin.colour, 0, 255)] for skin, _, _ in trees]
     clean, out = fine_canvas(background), Film(path, rng)
     image = np.clip(background, 0, 255).astype(np.float32)
@@ -85,14 +85,16 @@ def film(path, rng, background, surface, pose, camera, frames, bad_input):
         image = cv2.resize(clean, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA).astype(np.float32)
     canvas = clean.copy()
     reaches = [reach_px(pose, camera) for _, pose, camera in trees]
+    if bad_input.reaches_everywhere():
+        reaches.append(((0, 0), (WIDTH, HEIGHT)))
     x0, y0 = np.min([low for low, _ in reaches], axis=0)
     x1, y1 = np.max([high for _, high in reaches], axis=0)
     box = np.s_[FINE * y0 : FINE * y1, FINE * x0 : FINE * x1]
     for f in range(frames):
         canvas[box] = clean[box]
         for (skin, pose, camera), colour in zip(trees, colours):
-            draw(canvas, skin, skin.vertices_m(pose, f, f / FPS), camera, colour)
-        bad_input.before_tree(canvas)
+            draw(canvas, skin, bad_input.moves.vertices_m(skin, pose, camera, f), camera, colour)
+        bad_input.before_tree(canvas, f / FPS)
         image[y0:y1, x0:x1] = cv2.resize(canvas[box], (x1 - x0, y1 - y0), interpolation=cv2.INTER_AREA)
         out.add(bad_input.light(image, f / FPS))
     out.close()

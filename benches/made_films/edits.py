@@ -1,0 +1,52 @@
+"""What is done to a film after it was filmed: parts left out, frames left out, another film behind it, a file cut short.
+
+Frames are never encoded anew. Each function reads the video of one folder and writes that of another; seconds.
+"""
+import subprocess
+
+from .picture import FPS
+
+CUT_S = (5.0, 7.0)  # what a jump cut leaves out
+JOINED_S = 6.0  # where another film goes on
+TRUNCATED_SHARE, HEAD_BYTES = 0.7, 1500
+# Which frames a camera leaves out whose exposure grows longer and shorter: between none and four of ten.
+DROPPED = r"gt(mod(n*0.618034\,1)\,0.8+0.2*cos(n/60))"
+
+
+def jump_cut(video, out):
+    """Two seconds are left out, and the times run on."""
+    first, last = (round(t * FPS) for t in CUT_S)
+    copy(video, out, rf"noise=drop='between(n\,{first}\,{last - 1})',setts=ts=N/{FPS}/TB")
+
+
+def variable_rate(video, out):
+    """Frames are left out, at times more of them than at others; the others keep their times."""
+    copy(video, out, f"noise=drop='{DROPPED}'")
+
+
+def joined(video, other, out):
+    """The film goes on as another one."""
+    parts = [ffmpeg("-i", video, "-t", f"{JOINED_S}", "-c", "copy", "-f", "mjpeg", "-"),
+             ffmpeg("-ss", f"{JOINED_S}", "-i", other, "-c", "copy", "-f", "mjpeg", "-")]
+    ffmpeg("-f", "mjpeg", "-framerate", f"{FPS}", "-i", "-", "-c", "copy", out, given=b"".join(parts))
+
+
+def truncated(video, out):
+    """The file ends in the middle of a frame."""
+    whole = video.read_bytes()
+    out.write_bytes(whole[: round(TRUNCATED_SHARE * len(whole))])
+
+
+def head_only(video, out):
+    """The file ends before its first frame does."""
+    out.write_bytes(video.read_bytes()[:HEAD_BYTES])
+
+
+def copy(video, out, filters):
+    ffmpeg("-i", video, "-c", "copy", "-bsf:v", filters, out)
+
+
+def ffmpeg(*arguments, given=None):
+    """What it writes to its standard output."""
+    done = subprocess.run(["ffmpeg", "-v", "error", "-y", *arguments], input=given, stdout=subprocess.PIPE, check=True)
+    return done.stdout
