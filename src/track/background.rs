@@ -7,9 +7,9 @@
 use super::flow::{Flow, OpticalFlow, Pyramid};
 use super::register::{Patch, Registration};
 use crate::model::{self, Agreement, CameraMotion, Frame, Luma, Outline};
-use crate::signal::median;
-use crate::signal::statistics::{median_vector, rms};
-use nalgebra::{Matrix2x4, Matrix4, Point2, Similarity2, UnitComplex, Vector2, Vector4, distance};
+use crate::signal::statistics::rms;
+use crate::signal::{CommonMotion, Pair};
+use nalgebra::{Point2, Similarity2, distance};
 use opencv::core::{CV_8UC1, Mat, Point, Point2f, Rect, Scalar, Size as CvSize, Vector};
 use opencv::imgproc::{
     FILLED, LINE_8, MORPH_RECT, dilate_def, get_structuring_element, good_features_to_track,
@@ -34,20 +34,14 @@ const LEAST_NCC: f32 = 0.8;
 const NEAR_PX: f32 = 3.0;
 /// If so small a share is found, the camera has jumped: optical flow says where to look.
 const FEW: f64 = 0.5;
-/// Rounds of reweighting (Holland and Welsch 1977), and the tuning constant of Cauchy's weights,
-/// which keeps 95 % efficiency on normal errors.
-const ROUNDS: usize = 12;
-const CAUCHY: f64 = 2.385;
-/// Median absolute deviation of a normal distribution times this is its standard deviation.
-const SD_PER_MAD: f64 = 1.4826;
-/// The least standard deviation of a corner's place, px: patches are found no more exactly.
-const LEAST_SD_PX: f64 = 0.02;
 /// Corners agree on a motion that they miss by no more than this share of the picture's width:
 /// 0.5 px of 640.
 const AGREE: f64 = 0.5 / 640.0;
-/// Fewer corners than this, or than this share of those that were found, say nothing of the camera.
+/// Fewer corners than this, or than these shares of those that were found and of those that were
+/// looked for, say nothing of the camera: a lens cap or fog lets some through.
 const LEAST_CORNERS: usize = 12;
 const LEAST_AGREE: f64 = 0.5;
+const LEAST_FOUND: f64 = 0.15;
 /// A motion that is less sure than this within the outline is none, px: corners on one side of the
 /// tree alone do not say what happens on the other.
 const LARGEST_SD_PX: f64 = 0.3;
@@ -117,13 +111,6 @@ struct Corner {
     patch: Patch,
 }
 
-/// A corner that was found in a picture.
-#[derive(Clone, Copy, Debug)]
-struct Pair {
-    steady_px: Point2<f64>,
-    filmed_px: Point2<f64>,
-}
-
 /// The outline as far as it matters here.
 struct Wide {
     /// Where the tree may be, row by row; 0 elsewhere.
@@ -180,7 +167,8 @@ impl Background {
             }
         }
         let agree_px = AGREE * f64::from(frame.luma.size.width);
-        let agreed = agreed(&pairs, agree_px, &self.outline.corners_px);
+        let sought = self.corners.len();
+        let agreed = agreed(&pairs, sought, agree_px, &self.outline.corners_px);
         if let Some(agreed) = agreed {
             self.motion.filmed_from_steady = agreed.filmed_from_steady;
         }
@@ -214,8 +202,8 @@ impl Background {
             let is_near = distance(&found.at_px, &start_px) <= NEAR_PX;
             if found.converged && found.ncc >= LEAST_NCC && is_near {
                 pairs.push(Pair {
-                    steady_px: corner.steady_px,
-                    filmed_px: found.at_px.cast(),
+                    from_px: corner.steady_px,
+                    to_px: found.at_px.cast(),
                 });
             }
         }
@@ -245,14 +233,15 @@ impl Background {
         for (corner, flow) in self.corners.iter().zip(to.iter()) {
             if flow.found {
                 pairs.push(Pair {
-                    steady_px: corner.steady_px,
-                    filmed_px: flow.to.cast(),
+                    from_px: corner.steady_px,
+                    to_px: flow.to.cast(),
                 });
             }
         }
         // Where to look is known well enough within twice the reach of a patch.
         let agree_px = 2.0 * AGREE * f64::from(frame.luma.size.width);
-        let agreed = agreed(&pairs, agree_px, &self.outline.corners_px)?;
+        let sought = self.corners.len();
+        let agreed = agreed(&pairs, sought, agree_px, &self.outline.corners_px)?;
         Some(agreed.filmed_from_steady)
     }
 
@@ -330,33 +319,29 @@ struct Agreed {
     agreement: Agreement,
 }
 
-/// The similarity on which most pairs agree to `agree_px` (least squares, reweighted), and its
-/// standard deviation at the worst of `places_px`; `None` where most do not agree, or it is too
-/// unsure.
-fn agreed(pairs: &[Pair], agree_px: f64, places_px: &[Point2<f64>]) -> Option<Agreed> {
-    if pairs.len() < LEAST_CORNERS {
+/// The similarity on which most pairs, of `sought` that there may be, agree to `agree_px` (least
+/// squares, reweighted), and its standard deviation at the worst of `places_px`; `None` where most
+/// do not agree, or it is too unsure.
+fn agreed(
+    pairs: &[Pair],
+    sought: usize,
+    agree_px: f64,
+    places_px: &[Point2<f64>],
+) -> Option<Agreed> {
+    let least = (LEAST_FOUND * sought as f64).max(LEAST_CORNERS as f64);
+    if (pairs.len() as f64) < least {
         return None;
     }
-    let shift = median_vector(pairs.iter().map(|pair| pair.filmed_px - pair.steady_px));
-    let mut motion = Similarity2::new(shift, 0.0, 1.0);
-    let mut fitted = None;
-    let mut sd_px = LEAST_SD_PX;
-    for _ in 0..ROUNDS {
-        sd_px = corner_sd_px(pairs, &motion)?;
-        let fit = Fitted::to(pairs, &motion, sd_px)?;
-        motion = fit.motion;
-        fitted = Some(fit);
-    }
-    let fitted = fitted?;
-    let misses_px = pairs.iter().map(|pair| miss_px(pair, &motion).norm());
+    let common = CommonMotion::of(pairs)?;
+    let misses_px = pairs.iter().map(|pair| pair.miss_px(&common.motion).norm());
     let agreeing: Vec<f64> = misses_px.filter(|px| *px <= agree_px).collect();
     let n_agree = agreeing.len();
-    if n_agree < LEAST_CORNERS || (n_agree as f64) < LEAST_AGREE * pairs.len() as f64 {
+    if (n_agree as f64) < least.max(LEAST_AGREE * pairs.len() as f64) {
         return None;
     }
-    let sd_px = sd_px * fitted.worst_sd(places_px);
+    let sd_px = common.worst_sd_px(places_px);
     (sd_px <= LARGEST_SD_PX).then_some(Agreed {
-        filmed_from_steady: motion,
+        filmed_from_steady: common.motion,
         agreement: Agreement {
             sd_px,
             inliers: n_agree as u32,
@@ -365,85 +350,11 @@ fn agreed(pairs: &[Pair], agree_px: f64, places_px: &[Point2<f64>]) -> Option<Ag
     })
 }
 
-/// What a motion misses a pair by, px.
-fn miss_px(pair: &Pair, motion: &Similarity2<f64>) -> Vector2<f64> {
-    motion * pair.steady_px - pair.filmed_px
-}
-
-/// Standard deviation of a corner's coordinate about a motion, px, from the median.
-fn corner_sd_px(pairs: &[Pair], motion: &Similarity2<f64>) -> Option<f64> {
-    let mut misses = Vec::with_capacity(2 * pairs.len());
-    for pair in pairs {
-        let miss = miss_px(pair, motion);
-        misses.extend([miss.x.abs(), miss.y.abs()]);
-    }
-    let mad = median(misses, f64::total_cmp)?;
-    Some((SD_PER_MAD * mad).max(LEAST_SD_PX))
-}
-
-/// A similarity of weighted least squares: u' = a u - b v + c, v' = b u + a v + d.
-struct Fitted {
-    motion: Similarity2<f64>,
-    /// Where places are counted from, px.
-    centre: Vector2<f64>,
-    /// Covariance of a, b, c, d for corners of variance 1.
-    covariance: Matrix4<f64>,
-}
-
-impl Fitted {
-    /// Pairs that `before` misses by much for corners of this deviation count less. `None` where
-    /// all lie in one place.
-    fn to(pairs: &[Pair], before: &Similarity2<f64>, sd_px: f64) -> Option<Self> {
-        let count = pairs.len() as f64;
-        let centre = pairs
-            .iter()
-            .map(|p| p.steady_px.coords)
-            .sum::<Vector2<f64>>()
-            / count;
-        let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
-        for pair in pairs {
-            let miss = miss_px(pair, before).norm() / (CAUCHY * sd_px);
-            let weight = 1.0 / (1.0 + miss * miss);
-            let rows = rows(pair.steady_px.coords - centre);
-            normal += weight * rows.transpose() * rows;
-            right += weight * rows.transpose() * pair.filmed_px.coords;
-        }
-        let inverse = normal.cholesky()?.inverse();
-        let [a, b, c, d]: [f64; 4] = (inverse * right).into();
-        let scale = a.hypot(b);
-        if !(scale > 0.0 && scale.is_finite()) {
-            return None;
-        }
-        let rotation = UnitComplex::from_angle(b.atan2(a));
-        let shift = Vector2::new(c, d) - scale * (rotation * centre);
-        Some(Self {
-            motion: Similarity2::from_parts(shift.into(), rotation, scale),
-            centre,
-            covariance: inverse,
-        })
-    }
-
-    /// Standard deviation at the worst of some places, for corners of deviation 1.
-    fn worst_sd(&self, places_px: &[Point2<f64>]) -> f64 {
-        let mut worst: f64 = 0.0;
-        for place in places_px {
-            let rows = rows(place.coords - self.centre);
-            let variance = (rows * self.covariance * rows.transpose()).symmetric_eigenvalues();
-            worst = worst.max(variance.max());
-        }
-        worst.sqrt()
-    }
-}
-
-/// What a, b, c, d do to the place `at`.
-fn rows(at: Vector2<f64>) -> Matrix2x4<f64> {
-    Matrix2x4::new(at.x, -at.y, 1.0, 0.0, at.y, at.x, 0.0, 1.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::random::{Generator, generator};
+    use nalgebra::Vector2;
     use rand::RngExt;
 
     /// Corners all over a picture, found to 0.05 px.
@@ -457,8 +368,8 @@ mod tests {
             let noise =
                 0.17 * Vector2::new(random.random::<f64>() - 0.5, random.random::<f64>() - 0.5);
             pairs.push(Pair {
-                steady_px,
-                filmed_px: motion * steady_px + noise,
+                from_px: steady_px,
+                to_px: motion * steady_px + noise,
             });
         }
         pairs
@@ -477,9 +388,9 @@ mod tests {
             let mut pairs = pairs(150, &truth, &mut random);
             for pair in pairs.iter_mut().step_by(3) {
                 let own = Vector2::new(random.random::<f64>() - 0.5, random.random::<f64>() - 0.5);
-                pair.filmed_px += 12.0 * own;
+                pair.to_px += 12.0 * own;
             }
-            let found = agreed(&pairs, 0.5, &PLACES).expect("most agree");
+            let found = agreed(&pairs, 150, 0.5, &PLACES).expect("most agree");
             let off_px = PLACES.map(|at| (found.filmed_from_steady * at - truth * at).norm());
             let off_px = off_px[0].max(off_px[1]);
             assert!(off_px < 0.06, "{round}: {off_px}");
@@ -492,20 +403,23 @@ mod tests {
     fn few_corners_or_corners_at_odds_say_nothing() {
         let mut random = generator(6, 0);
         let truth = Similarity2::new(Vector2::new(1.0, 0.0), 0.0, 1.0);
-        assert!(agreed(&pairs(8, &truth, &mut random), 0.5, &PLACES).is_none());
+        assert!(agreed(&pairs(8, &truth, &mut random), 8, 0.5, &PLACES).is_none());
+        // A hand on the lens lets some through.
+        let some = pairs(30, &truth, &mut random);
+        assert!(agreed(&some, 300, 0.5, &PLACES).is_none());
+        assert!(agreed(&some, 100, 0.5, &PLACES).is_some());
         let mut at_odds = pairs(100, &truth, &mut random);
         for pair in &mut at_odds {
             let own = Vector2::new(random.random::<f64>() - 0.5, random.random::<f64>() - 0.5);
-            pair.filmed_px += 12.0 * own;
+            pair.to_px += 12.0 * own;
         }
-        assert!(agreed(&at_odds, 0.5, &PLACES).is_none());
+        assert!(agreed(&at_odds, 100, 0.5, &PLACES).is_none());
         // All in one corner of the picture: what is far from it is not known.
         let mut aside = pairs(14, &truth, &mut random);
         for pair in &mut aside {
-            pair.steady_px = Point2::origin() + 0.02 * pair.steady_px.coords;
-            pair.filmed_px =
-                truth * pair.steady_px + Vector2::new(random.random::<f64>() - 0.5, 0.0);
+            pair.from_px = Point2::origin() + 0.02 * pair.from_px.coords;
+            pair.to_px = truth * pair.from_px + Vector2::new(random.random::<f64>() - 0.5, 0.0);
         }
-        assert!(agreed(&aside, 0.5, &PLACES).is_none());
+        assert!(agreed(&aside, 14, 0.5, &PLACES).is_none());
     }
 }
