@@ -44,7 +44,8 @@ pub const LEAST_MOVING: usize = 16;
 /// comes about only if it is borne out by the motion at least as well; where it is not, the prior
 /// with the sub-branches that are identified by now may be the answer.
 ///
-/// `None` where fewer than [`LEAST_MOVING`] points move, where a prior model stays the better one,
+/// `None` where fewer than [`LEAST_MOVING`] points move, or all of them as a camera moves them,
+/// where a prior model stays the better one,
 /// or where `cancel` ends the work before.
 pub fn solve(
     log: &TrackLog,
@@ -62,8 +63,8 @@ pub fn solve(
         return refinement.better(new, cancel);
     }
     let window = log.last(config.accumulate.window_s);
-    let table = Arc::new(hierarchy::table(window));
-    let evidence = hierarchy::evidence(&table, &config.accumulate);
+    let (table, evidence) = hierarchy::seen(window, &config.accumulate);
+    let table = Arc::new(table);
     let is_enough = evidence.measure >= config.accumulate.threshold
         && window.span_s() >= config.accumulate.min_s;
     let moment = Moment {

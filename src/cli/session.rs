@@ -253,7 +253,7 @@ fn no_tree(s: &Summary) -> anyhow::Error {
         );
     }
     anyhow!(
-        "no tree: {} points moved, and at least {} must; wait for wind, come nearer, keep the \
+        "no tree: {} points moved by themselves, and at least {} must; wait for wind, come nearer, keep the \
          camera still, or draw the outline closer (--outline)",
         s.moving,
         crate::solve::LEAST_MOVING

@@ -1,8 +1,10 @@
 //! When enough motion has been seen to build the tree, judged from the tracks alone.
 
+use super::own_motion::is_cameras;
 use super::signals::Signals;
+use super::table::table;
 use crate::config::Accumulate;
-use crate::model::TrackTable;
+use crate::model::{LogWindow, TrackTable};
 use crate::signal::{along_principal_direction, median};
 use nalgebra::{Point2, Vector2};
 
@@ -44,6 +46,17 @@ pub struct Evidence {
     pub sway: f64,
     /// Rows of the table whose points move.
     pub moving: Vec<usize>,
+}
+
+/// The tracks that count in the newest frame of `window`, judged. What moves as one picture, while
+/// nothing shows how the camera moves, is the camera's motion and no evidence of a tree.
+pub fn seen(window: LogWindow, settings: &Accumulate) -> (TrackTable, Evidence) {
+    let table = table(window);
+    let mut evidence = evidence(&table, settings);
+    if is_cameras(window, &table, &evidence.moving, settings) {
+        evidence = Evidence::default();
+    }
+    (table, evidence)
 }
 
 /// Judges the tracks of `table`.
@@ -101,7 +114,7 @@ fn displacement_px(table: &TrackTable, row: usize) -> f64 {
 }
 
 /// What tracking itself admits: the median forward-backward error, not less than the floor.
-fn noise_px(table: &TrackTable, row: usize) -> f64 {
+pub(super) fn noise_px(table: &TrackTable, row: usize) -> f64 {
     f64::from(table.fb_errors_px[row]).max(NOISE_FLOOR_PX)
 }
 

@@ -15,6 +15,7 @@ mod lanczos;
 mod left_out;
 mod linkage;
 mod ncut;
+mod own_motion;
 mod path;
 mod persist;
 mod rest;
@@ -24,7 +25,7 @@ mod support;
 mod table;
 mod zeng;
 
-pub use accumulate::{COMPARE_HZ, Evidence, evidence};
+pub use accumulate::{COMPARE_HZ, Evidence, evidence, seen};
 pub use left_out::left_out;
 pub use ncut::{Cut, normalised_cut};
 pub use persist::persisting;

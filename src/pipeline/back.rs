@@ -174,8 +174,8 @@ impl BackEnd {
 
     /// Judges what is remembered.
     fn judge(&mut self) {
-        let table = hierarchy::table(self.log.last(self.config.accumulate.window_s));
-        self.evidence = hierarchy::evidence(&table, &self.config.accumulate);
+        let window = self.log.last(self.config.accumulate.window_s);
+        (_, self.evidence) = hierarchy::seen(window, &self.config.accumulate);
     }
 
     /// Builds, and follows the pose through the remembered frames; gives their poses and targets.
