@@ -106,6 +106,7 @@ pub fn with_modes(
     let analysis = analyse(&model.skeleton, film, &config.dynamics, depth, cancel);
     Model {
         modes: analysis.sway,
+        tree_modes: analysis.modes,
         ..model.clone()
     }
 }
@@ -246,6 +247,7 @@ fn build(
         left_out: BTreeSet::new(),
         wood: None,
         modes: Vec::new(),
+        tree_modes: Vec::new(),
         outline: stand.outline,
         outline_at_rest: stand.at_rest,
         foot: stand.foot,

@@ -289,7 +289,7 @@ fn check(name: &str, run: &Run, output: &Output, status: i32, says: &[&str], lef
         "nodes.csv",
         "tracks.csv",
     ];
-    let mut of_a_tree = [&tables[..], &["left_out.csv", "tree.glb"]].concat();
+    let mut of_a_tree = [&tables[..], &["left_out.csv", "modes.csv", "tree.glb"]].concat();
     of_a_tree.sort_unstable();
     match left {
         Nothing if entries.is_empty() => {}

@@ -340,6 +340,38 @@ fn tracks_belong_to_nodes_that_exist_and_keep_their_ids() {
     assert!(out > 0, "a quarter of those that move");
 }
 
+/// Every answer of a branch is a mode of the tree, and none is there twice.
+#[test]
+fn the_modes_of_the_tree_hold_those_of_its_branches() {
+    let header = "mode,frequency_hz,frequency_lo_hz,frequency_hi_hz,damping_ratio,damping_lo,\
+                  damping_hi,excitation,amplitude_deg,collinearity,n_points,node_id,branch,energy";
+    let rows = made().rows("modes.csv", header);
+    assert!(!rows.is_empty());
+    let mut of_nodes: Vec<u32> = Vec::new();
+    let mut slowest_hz = 0.0;
+    for row in &rows {
+        let frequency_hz: f64 = row[1].parse().expect("number");
+        assert!(frequency_hz >= slowest_hz, "{row:?}");
+        slowest_hz = frequency_hz;
+        assert!(index(&row[10]) >= 4, "{row:?}");
+        if !row[11].is_empty() {
+            of_nodes.push(index(&row[11]) as u32);
+        }
+        let shares = row[13].split("; ").filter_map(|s| s.split(' ').nth(1));
+        let sum: f64 = shares.filter_map(|s| s.parse::<f64>().ok()).sum();
+        assert!((sum - 1.0).abs() < 0.05, "{row:?}");
+    }
+    let nodes = made().rows("nodes.csv", arborcam::document::NODES_HEADER);
+    let mut known: Vec<u32> = nodes
+        .iter()
+        .filter(|row| row[16] == "true" && row[20] != "copy")
+        .map(|row| index(&row[0]) as u32)
+        .collect();
+    known.sort_unstable();
+    of_nodes.sort_unstable();
+    assert_eq!(of_nodes, known);
+}
+
 /// The clip was filmed from a tripod that stands still.
 #[test]
 fn the_camera_s_motion_has_a_row_for_each_frame() {

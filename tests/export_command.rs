@@ -149,6 +149,7 @@ fn csv_is_the_tables_and_cylinders_that_join() {
             "camera.csv",
             "cylinders.csv",
             "left_out.csv",
+            "modes.csv",
             "motion.csv",
             "nodes.csv",
             "tracks.csv"
@@ -157,6 +158,7 @@ fn csv_is_the_tables_and_cylinders_that_join() {
     for name in [
         "camera.csv",
         "left_out.csv",
+        "modes.csv",
         "motion.csv",
         "nodes.csv",
         "tracks.csv",

@@ -13,10 +13,10 @@ use crate::document::{Document, DocumentError};
 use crate::dynamics::{Depth, Film, analyse};
 use crate::export::picture::data_address;
 use crate::files::refuse_taken;
-use crate::model::{Excitation, Pose, Skeleton, Swaying};
+use crate::model::{Excitation, Pose, Skeleton, Swaying, TreeMode};
 use crate::report::{Comparison, Given, Study, compare, csv, hints, json, page, text};
 use crate::tui::columns;
-use crate::views::update;
+use crate::views::{SwayFound, update};
 use anyhow::anyhow;
 use nalgebra::Point2;
 pub use options::AnalyzeArgs;
@@ -34,6 +34,8 @@ struct CaptureAnalysis {
     study: Study,
     /// The results for its tables, by node index.
     sway: Vec<Swaying>,
+    /// Those of the whole tree.
+    modes: Vec<TreeMode>,
 }
 
 pub fn run(args: &AnalyzeArgs) -> Result<(), CommandError> {
@@ -48,7 +50,7 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), CommandError> {
     for (document, name) in documents.iter().zip(&names) {
         let analysis = analyse_capture(args, document, name)?;
         studies.push(analysis.study);
-        results.push(analysis.sway);
+        results.push((analysis.sway, analysis.modes));
     }
     let comparison = compare(&studies, args.trees.same());
     if let Some(warning) = comparison.as_ref().and_then(|c| warning(args, c)) {
@@ -58,8 +60,9 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), CommandError> {
     let stop = stop.while_writing();
     let mut failures = Vec::new();
     if args.update {
-        for (dir, sway) in args.dirs.iter().zip(&results) {
-            failures.extend(update(dir, sway, stop).err().map(CommandError::from));
+        for (dir, (sway, modes)) in args.dirs.iter().zip(&results) {
+            let found = SwayFound { sway, modes };
+            failures.extend(update(dir, found, stop).err().map(CommandError::from));
         }
     }
     if let Some(path) = &args.report {
@@ -215,6 +218,7 @@ fn analyse_capture(
         notes: &notes.all,
     });
     Ok(CaptureAnalysis {
+        modes: analysis.modes.clone(),
         sway: with_amplitudes(&skeleton, analysis.sway, &study),
         study,
     })

@@ -4,13 +4,15 @@
 //! `capture.json` says what was filmed and how, `nodes.csv` holds the whole model, `frame.jpg` one
 //! picture of it, `bark.png` its bark, `rest.png` the tree at rest, `wood.png` and `leaves.png` which
 //! of its pixels are wood and leaves. A tree that was filmed has `tracks.csv` and `left_out.csv`, the
-//! points, `motion.csv`, the poses, and `camera.csv`, how the camera itself moved.
+//! points, `motion.csv`, the poses, `camera.csv`, how the camera itself moved, and `modes.csv`, the
+//! modes of the whole tree.
 
 mod asked;
 mod at_rest;
 mod bark;
 mod camera;
 mod error;
+mod modes;
 mod motion;
 mod nodes;
 pub mod note;
@@ -27,6 +29,7 @@ pub use at_rest::{LEAVES_MASK_FILE, REST_FILE, WOOD_MASK_FILE, at_rest_files};
 pub use bark::BARK_FILE;
 pub use camera::{CAMERA_FILE, CAMERA_HEADER, CameraCsv};
 pub use error::DocumentError;
+pub use modes::{MODES_FILE, modes};
 pub use motion::{MOTION_HEADER, MotionCsv};
 pub use nodes::{NODES_HEADER, nodes};
 pub use note::{CaptureNote, SCHEMA_VERSION};

@@ -12,10 +12,10 @@ use super::driven_oscillators::{DAMPING, Oscillator};
 use super::film::Film;
 use super::gap_free::GapFree;
 use super::members::Points;
-use super::subspace::stable_frequencies_hz;
+use super::subspace::{LAGS_S, stable_poles};
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
-use crate::signal::bfgs::{curvature, minimum};
+use crate::signal::bfgs::{ByDifferences, Stopping, curvature, minimum};
 use crate::signal::principal::{PrincipalComponents, along};
 use nalgebra::{Complex, DMatrix, SMatrix, SVector, SymmetricEigen};
 use std::f64::consts::{PI, TAU};
@@ -37,6 +37,12 @@ const NEXT_MODE: f64 = 1.15;
 /// gains less than this.
 const SEARCHES: usize = 4;
 const LEAST_GAIN: f64 = 0.1;
+/// When one search is done.
+const STOPPING: Stopping = Stopping {
+    max_steps: 60,
+    small_steps: 1,
+    min_gain: 1e-2,
+};
 /// The likelihood is flat in a direction with less curvature than this. Of a parameter that is known
 /// no more than such a share of its square lies in flat directions.
 const FLAT: f64 = 1e-3;
@@ -60,7 +66,8 @@ pub(super) fn fundamental(
     let motions = Motions::of(&GapFree::of(points, frames));
     let span_s = times_s.last()? - times_s.first()?;
     let step_s = span_s / times_s.len().max(2).saturating_sub(1) as f64;
-    let modes_hz = stable_frequencies_hz(&motions.along, step_s, within_hz);
+    let poles = stable_poles(&motions.along, step_s, within_hz, &LAGS_S);
+    let modes_hz: Vec<f64> = poles.iter().map(|p| p.frequency_hz).collect();
     let lowest_hz = modes_hz.first()?;
     let band_hz = Bounds::new(
         (BAND.lo * lowest_hz).max(LEAST_PERIODS / span_s),
@@ -290,7 +297,13 @@ impl Band {
         bounds[modes..2 * modes].fill(DAMPING.map(f64::ln));
         let mut cost = f64::INFINITY;
         for _ in 0..SEARCHES {
-            let (next, value) = minimum(|x| self.cost(modes, x), &x, &bounds, cancel);
+            let (next, value) = minimum(
+                &ByDifferences(|x: &[f64]| self.cost(modes, x)),
+                &x,
+                &bounds,
+                &STOPPING,
+                cancel,
+            );
             let gain = cost - value;
             (x, cost) = (next, value);
             if gain < LEAST_GAIN {

@@ -96,13 +96,18 @@ impl BranchTree {
         self.branch_of.get(node.index()).copied()
     }
 
+    /// Values of all branches by measured node; `none` for what moves with another node.
+    pub fn values_by_node<T: Copy>(&self, values: &[T], none: T) -> Vec<T> {
+        let mut out = vec![none; self.branch_of.len()];
+        for (branch, value) in self.branches.iter().zip(values) {
+            out[branch.node.index()] = *value;
+        }
+        out
+    }
+
     /// The answers for all branches by measured node. There is none for what moves with another
     /// node.
     pub fn by_node(&self, sways: &[Swaying]) -> Vec<Swaying> {
-        let mut out = vec![Err(Unidentified::NotMeasured); self.branch_of.len()];
-        for (branch, sway) in self.branches.iter().zip(sways) {
-            out[branch.node.index()] = *sway;
-        }
-        out
+        self.values_by_node(sways, Err(Unidentified::NotMeasured))
     }
 }

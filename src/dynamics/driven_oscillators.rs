@@ -8,7 +8,7 @@ use super::filter::Filter;
 use super::periodogram::{Observed, Periodogram, excess_hz};
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
-use crate::signal::bfgs::{curvature, minimum};
+use crate::signal::bfgs::{ByDifferences, Stopping, curvature, minimum};
 use crate::signal::vectors::dot;
 use nalgebra::DMatrix;
 use std::cell::RefCell;
@@ -20,6 +20,12 @@ const MAX_NEW: usize = 3;
 /// white noise to a tree.
 const GUSTS_PER_S: Bounds = Bounds::new(0.1, 60.0);
 pub(super) const DAMPING: Bounds = Bounds::new(0.003, 0.4);
+/// When the search for the likeliest is done.
+const STOPPING: Stopping = Stopping {
+    max_steps: 60,
+    small_steps: 1,
+    min_gain: 1e-2,
+};
 /// Likelihoods that are kept: a step in a number that only one motion has leaves the other's as it
 /// was.
 const MAX_KEPT: usize = 64;
@@ -155,7 +161,13 @@ impl Problem {
         let scale = Scale::of(left);
         let start = self.start(&scale, noise);
         let mut bounds = self.bounds(&scale);
-        let (x, mut value) = minimum(|x| self.cost(x), &start, &bounds, cancel);
+        let (x, mut value) = minimum(
+            &ByDifferences(|x: &[f64]| self.cost(x)),
+            &start,
+            &bounds,
+            &STOPPING,
+            cancel,
+        );
         let mut found = Fitted {
             problem: self,
             x,
@@ -190,7 +202,13 @@ impl Problem {
             x.extend(scale.ln_variances.iter().map(|v| v - 1.0));
             bounds.extend([frequencies_hz.map(f64::ln), DAMPING.map(f64::ln)]);
             bounds.extend(scale.ln_variances.iter().map(|_| scale.bounds()));
-            let (x, there) = minimum(|x| self.cost(x), &x, &bounds, cancel);
+            let (x, there) = minimum(
+                &ByDifferences(|x: &[f64]| self.cost(x)),
+                &x,
+                &bounds,
+                &STOPPING,
+                cancel,
+            );
             if there + penalty >= value {
                 break;
             }

@@ -7,8 +7,10 @@ use crate::bounds::Bounds;
 use nalgebra::DMatrix;
 use std::f64::consts::TAU;
 
-/// Lags up to which covariances are used, s, each in turn: what is a mode is one by all.
-const LAGS_S: [f64; 3] = [1.2, 1.6, 2.2];
+/// Lags up to which covariances are used, s, each in turn: what is a mode is one by all. One alone
+/// takes a quarter of the time.
+pub(super) const LAGS_S: [f64; 3] = [1.2, 1.6, 2.2];
+pub(super) const ONE_LAG_S: [f64; 1] = [1.6];
 /// Orders of the system, and their step.
 const LEAST_ORDER: usize = 4;
 const MOST_ORDER: usize = 42;
@@ -20,8 +22,16 @@ const NEAR_DAMPING: f64 = 0.3;
 const LEAST_DAMPING: f64 = 0.01;
 /// No mode of a tree is damped more than this.
 const MOST_DAMPING: f64 = 0.3;
-/// A mode is met with in so many orders, of all lags together.
-const LEAST_MET: usize = 8;
+/// A mode is met with in so many orders by each lag, in the mean.
+const LEAST_MET: f64 = 2.5;
+
+/// A pole that stays from order to order.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct StablePole {
+    pub frequency_hz: f64,
+    /// Orders that it was met with in, of all lags together.
+    pub met: usize,
+}
 
 /// Frequency, Hz, and damping ratio of one pole.
 #[derive(Clone, Copy, Debug)]
@@ -30,15 +40,16 @@ struct Pole {
     damping: f64,
 }
 
-/// The frequencies of modes, ascending, Hz. `channels` are motions without gaps, of mean 0 and of
-/// like size, `step_s` apart.
-pub(super) fn stable_frequencies_hz(
+/// The poles of modes, by frequency, from covariances up to each of `lags_s`. `channels` are motions
+/// without gaps, of mean 0 and of like size, `step_s` apart.
+pub(super) fn stable_poles(
     channels: &[Vec<f64>],
     step_s: f64,
     within_hz: Bounds,
-) -> Vec<f64> {
+    lags_s: &[f64],
+) -> Vec<StablePole> {
     let mut stable_hz: Vec<f64> = Vec::new();
-    for lag_s in LAGS_S {
+    for lag_s in lags_s {
         let rows = (lag_s / step_s).round().max(2.0) as usize;
         let mut before: Vec<Pole> = Vec::new();
         for poles in poles_by_order(channels, rows, step_s, within_hz) {
@@ -49,8 +60,14 @@ pub(super) fn stable_frequencies_hz(
     }
     stable_hz.sort_unstable_by(f64::total_cmp);
     let groups = stable_hz.chunk_by(|a, b| b - a < NEAR_FREQUENCY * b);
-    let modes = groups.filter(|group| group.len() >= LEAST_MET);
-    modes.map(|group| group[group.len() / 2]).collect()
+    let least = LEAST_MET * lags_s.len() as f64;
+    let modes = groups.filter(|group| group.len() as f64 >= least);
+    modes
+        .map(|group| StablePole {
+            frequency_hz: group[group.len() / 2],
+            met: group.len(),
+        })
+        .collect()
 }
 
 fn is_same(a: &Pole, b: &Pole) -> bool {
@@ -176,16 +193,17 @@ mod tests {
             channels.push(channel.collect::<Vec<f64>>());
         }
         let within_hz = Bounds::new(0.1, 5.0);
-        let found_hz = stable_frequencies_hz(&channels, STEP_S, within_hz);
+        let found = stable_poles(&channels, STEP_S, within_hz, &LAGS_S);
+        let found_hz: Vec<f64> = found.iter().map(|p| p.frequency_hz).collect();
         assert!((found_hz[0] - 0.6).abs() < 0.03, "{found_hz:?}");
         assert!(
             found_hz.iter().any(|f| (f - 1.4).abs() < 0.06),
             "{found_hz:?}"
         );
-        assert!(stable_frequencies_hz(&[], STEP_S, within_hz).is_empty());
+        assert!(stable_poles(&[], STEP_S, within_hz, &LAGS_S).is_empty());
         let still = vec![vec![0.0; 900]; 4];
-        assert!(stable_frequencies_hz(&still, STEP_S, within_hz).is_empty());
+        assert!(stable_poles(&still, STEP_S, within_hz, &LAGS_S).is_empty());
         let short = vec![vec![1.0; 20]; 4];
-        assert!(stable_frequencies_hz(&short, STEP_S, within_hz).is_empty());
+        assert!(stable_poles(&short, STEP_S, within_hz, &LAGS_S).is_empty());
     }
 }

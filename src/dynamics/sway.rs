@@ -6,12 +6,15 @@ use super::film::Film;
 use super::free_decay;
 use super::members::members;
 use super::modal;
+use super::point_modes::{PointModes, Shoot, is_open};
 use super::release::{Onset, onset};
+use super::tree_modes;
+use super::whole_tree::modes_of_tree;
 use super::wind;
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::config::{Dynamics, Excited};
-use crate::model::{Excitation, Skeleton, Swaying, Unidentified};
+use crate::model::{Excitation, Skeleton, Swaying, TreeMode, Unidentified};
 use std::borrow::Cow;
 
 /// Fewer frames than this say nothing.
@@ -34,6 +37,8 @@ pub struct Analysis {
     /// By measured node; copies sway as their originals, and what moves with another node has no
     /// sway of its own.
     pub sway: Vec<Swaying>,
+    /// The modes that are known, the slowest first.
+    pub modes: Vec<TreeMode>,
     /// What made the tree sway; `None` where there is too little film to tell.
     pub onset: Option<Onset>,
     /// When it was released, s, where that was more than once: the answers are of one of them, the
@@ -54,30 +59,50 @@ pub fn analyse(
 ) -> Analysis {
     let tree = BranchTree::of(skeleton);
     let film = tree.film(film);
-    let UsableFilm {
-        members,
-        onset,
-        releases_s,
-        limits,
-        film,
-    } = match UsableFilm::of(&tree, &film, config, cancel) {
+    let usable = match UsableFilm::of(&tree, &film, config, cancel) {
         Ok(usable) => usable,
         Err(reason) => return without_answers(&tree, &film, reason),
     };
-    let sway = match onset.excitation {
-        Excitation::Wind => wind::sways(&tree, &film, &members, &limits, cancel),
-        Excitation::Release => {
-            let mut sways = free_decay::sways(&tree, &film, &members, &onset, &limits, cancel);
-            if depth == Depth::Full {
-                modal::answer(&tree, &film, &onset, &limits, &mut sways, cancel);
+    let mut sways = usable.one_by_one(&tree, cancel);
+    let mut found = None;
+    if depth == Depth::Full && sways.iter().any(is_open) {
+        found = usable.all_at_once(&tree, &sways, cancel);
+        match &found {
+            Some(modes) => modes.answer(&tree, &mut sways),
+            None if cancel.is_cancelled() => {
+                for sway in sways.iter_mut().filter(|s| is_open(s)) {
+                    *sway = Err(Unidentified::NotInTime);
+                }
             }
-            sways
+            None => {}
         }
-    };
+    }
+    let UsableFilm { film, members, .. } = &usable;
     Analysis {
-        sway: tree.by_node(&sway),
-        onset: Some(onset),
-        releases_s,
+        modes: modes_of_tree(&tree, film, members, &sways, found.as_ref()),
+        sway: tree.by_node(&sways),
+        onset: Some(usable.onset),
+        releases_s: usable.releases_s,
+    }
+}
+
+/// The branches that a film shows beyond those of `skeleton`, at most one for every point; none
+/// where the film carries too little, or where `cancel` ends it before.
+pub fn shoots(
+    skeleton: &Skeleton,
+    film: &Film,
+    config: &Dynamics,
+    cancel: &CancelToken,
+) -> Vec<Shoot> {
+    let tree = BranchTree::of(skeleton);
+    let film = tree.film(film);
+    let Ok(usable) = UsableFilm::of(&tree, &film, config, cancel) else {
+        return Vec::new();
+    };
+    let sways = usable.one_by_one(&tree, cancel);
+    match usable.all_at_once(&tree, &sways, cancel) {
+        Some(modes) => modes.shoots(&tree, &usable.film, &sways),
+        None => Vec::new(),
     }
 }
 
@@ -93,6 +118,7 @@ fn without_answers(tree: &BranchTree, film: &Film, reason: Unidentified) -> Anal
     }
     Analysis {
         sway: tree.by_node(&sway),
+        modes: Vec::new(),
         onset: None,
         releases_s: Vec::new(),
     }
@@ -110,6 +136,42 @@ pub(super) struct UsableFilm<'a> {
 }
 
 impl<'a> UsableFilm<'a> {
+    /// The sway of one branch after the other, from the trunk up.
+    fn one_by_one(&self, tree: &BranchTree, cancel: &CancelToken) -> Vec<Swaying> {
+        let Self {
+            film,
+            members,
+            onset,
+            limits,
+            ..
+        } = self;
+        match onset.excitation {
+            Excitation::Wind => wind::sways(tree, film, members, limits, cancel),
+            Excitation::Release => free_decay::sways(tree, film, members, onset, limits, cancel),
+        }
+    }
+
+    /// The modes of all points; `None` where there is too little to tell them, or where `cancel`
+    /// ends the work before.
+    fn all_at_once(
+        &self,
+        tree: &BranchTree,
+        sways: &[Swaying],
+        cancel: &CancelToken,
+    ) -> Option<PointModes> {
+        let Self {
+            film,
+            members,
+            onset,
+            limits,
+            ..
+        } = self;
+        match onset.excitation {
+            Excitation::Wind => tree_modes::point_modes(tree, film, members, limits, cancel),
+            Excitation::Release => modal::point_modes(tree, film, onset, limits, sways, cancel),
+        }
+    }
+
     /// An error where there is too little film, or `cancel` ends the work before.
     pub fn of(
         tree: &BranchTree,

@@ -13,12 +13,13 @@ use super::branches::{
     from_the_trunk_up,
 };
 use super::celerite::Times;
+use super::decay::Mode;
 use super::driven_oscillators::{Fitted, Oscillator, Problem};
 use super::film::Film;
-use super::gap_free::{GapFree, enough_seen};
+use super::gap_free::GapFree;
 use super::members::{Points, mean_px};
+use super::sampling::Sampling;
 use super::swing::rank_one_fraction;
-use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::model::{Excitation, NodeId, Sway, Swaying, Unidentified};
 use crate::signal::principal::{PrincipalComponents, along};
@@ -38,16 +39,6 @@ const MAX_ANCESTORS: usize = 2;
 const MAX_CARRIED_MOTIONS: usize = 4;
 const MIN_VARIANCE_OVER_NOISE: f64 = 10.0;
 const MIN_SECOND_VARIANCE: f64 = 0.02;
-/// Frames a period of the highest frequency beyond which neighbours are taken together as their
-/// mean: they cost time and tell little.
-const FRAMES_PER_PERIOD: f64 = 3.0;
-/// Longer films, in frames that are left, are thinned to so many a second, if there are as many;
-/// and frequencies are looked for up to this share of the rate. A mean over neighbours hides what
-/// is faster, and does not show it as something slower.
-const LONG_FILM_FRAMES: usize = 900;
-const LONG_FILM_HZ: f64 = 7.5;
-const MAX_FREQ_OF_RATE: f64 = 0.3;
-const MIN_FRAMES: usize = 48;
 /// Motion that is taken for noise, px.
 const NOISE_PX: f64 = 0.15;
 /// Variance of the trunk's oscillator at least, as a share of the largest in the whole tree's
@@ -97,11 +88,11 @@ const SHARED_POINTS: AcceptanceCriteria = AcceptanceCriteria {
 };
 
 impl AcceptanceCriteria {
-    /// An oscillator as a branch's mode, with the standard deviations that are believed.
-    fn mode_of(&self, oscillator: &Oscillator) -> BranchMode {
+    /// An oscillation as a branch's mode, with the standard deviations that are believed.
+    fn mode_of(&self, mode: Mode, ln_sd: &LnDeviations) -> BranchMode {
         BranchMode {
-            mode: oscillator.mode,
-            ln_sd: oscillator.ln_sd.inflated(CI_INFLATION, &self.min_ln_sd),
+            mode,
+            ln_sd: ln_sd.inflated(CI_INFLATION, &self.min_ln_sd),
         }
     }
 }
@@ -119,6 +110,7 @@ pub(super) fn sways(
         fundamental: None,
         tree,
         film,
+        sampling: Sampling::of(film, limits),
         members,
         limits,
         known: vec![Known::Nothing; members.len()],
@@ -151,6 +143,7 @@ struct InWind<'a> {
     fundamental: Option<(BranchMode, Sway)>,
     tree: &'a BranchTree,
     film: &'a Film,
+    sampling: Sampling<'a>,
     members: &'a [Vec<usize>],
     limits: &'a SearchLimits,
     /// By branch.
@@ -231,12 +224,11 @@ impl InWind<'_> {
         let tracks = self.members.get(self.trunk.index())?;
         let base_px = self.tree.branches.get(self.trunk.index())?.base_px;
         let points = Points::up_to(ambient::MOST_POINTS, self.film, tracks, 0);
-        let every = self.frames_per_mean();
-        let frames = self.frames_with(&[&points], every).ok()?;
-        let within_hz = self.frequencies_hz(every);
+        let frames = self.sampling.frames_with(&[&points]).ok()?;
+        let within_hz = self.sampling.frequencies_hz;
         let found = ambient::fundamental(self.film, &points, &frames, within_hz, self.cancel);
-        let oscillator = found.filter(|o| !o.at_limit)?;
-        let mode = OWN_POINTS.mode_of(&oscillator);
+        let found = found.filter(|o| !o.at_limit)?;
+        let mode = OWN_POINTS.mode_of(found.mode, &found.ln_sd);
         if !mode.is_within(MAX_CI_TO_SERVE * self.limits.max_relative_ci)
             || self
                 .limits
@@ -248,7 +240,7 @@ impl InWind<'_> {
             frequency_hz: mode.frequency_hz(),
             damping_ratio: mode.damping_ratio(),
             excitation: Excitation::Wind,
-            amplitude_deg: self.amplitude_deg(base_px, &points, oscillator.variance),
+            amplitude_deg: self.amplitude_deg(base_px, &points, found.variance),
         };
         Some((mode, sway))
     }
@@ -308,8 +300,7 @@ impl InWind<'_> {
         carrier: &Points,
         criteria: &AcceptanceCriteria,
     ) -> Result<Estimate, Unidentified> {
-        let every = self.frames_per_mean();
-        let frames = self.frames_with(&[points, carrier], every)?;
+        let frames = self.sampling.frames_with(&[points, carrier])?;
         let ancestors = self.ancestors(branch);
         let motion = OwnMotion::of(points, carrier, &frames)?;
         let problem = Problem {
@@ -321,14 +312,14 @@ impl InWind<'_> {
             had: RefCell::default(),
         };
         let left = motion.along_directions(&motion.own);
-        let frequencies_hz = self.frequencies_hz(every);
+        let frequencies_hz = self.sampling.frequencies_hz;
         let fitted = problem.fit(&left, motion.noise, frequencies_hz, self.cancel);
         if self.cancel.is_cancelled() {
             return Err(Unidentified::NotInTime);
         }
         let found = fitted.oscillators();
         let k = own_oscillator(&found, &ancestors, criteria)?;
-        let mode = criteria.mode_of(&found[k]);
+        let mode = criteria.mode_of(found[k].mode, &found[k].ln_sd);
         let max_relative_ci = self.limits.max_relative_ci;
         if found[k].ln_sd.frequency <= 0.0 || !mode.is_within(MAX_CI_TO_SERVE * max_relative_ci) {
             return Err(Unidentified::TooUncertain);
@@ -355,45 +346,6 @@ impl InWind<'_> {
             Err(Unidentified::TooUncertain)
         };
         Ok(Estimate { mode, sway })
-    }
-
-    /// The frames that show all of these points well enough, by `every` neighbours.
-    fn frames_with(
-        &self,
-        points: &[&Points],
-        every: usize,
-    ) -> Result<Vec<Vec<usize>>, Unidentified> {
-        let mut frames = self.film.neighbours(0..self.film.times_s.len(), every);
-        frames.retain(|of| points.iter().all(|points| enough_seen(points, of)));
-        if frames.len() < MIN_FRAMES {
-            return Err(Unidentified::TooShort);
-        }
-        Ok(frames)
-    }
-
-    /// Neighbouring frames that are taken together.
-    fn frames_per_mean(&self) -> usize {
-        let fine = self.nearest_to_rate(FRAMES_PER_PERIOD * self.limits.highest_hz);
-        if self.film.times_s.len() / fine > LONG_FILM_FRAMES {
-            self.nearest_to_rate(LONG_FILM_HZ).max(fine)
-        } else {
-            fine
-        }
-    }
-
-    /// Frames whose means come at about this rate.
-    fn nearest_to_rate(&self, rate_hz: f64) -> usize {
-        self.film.frames_per_period(rate_hz).round().max(1.0) as usize
-    }
-
-    /// Frequencies that are looked for in means of so many frames.
-    fn frequencies_hz(&self, every: usize) -> Bounds {
-        let frequencies_hz = self.limits.frequencies_hz;
-        if every == 1 {
-            return frequencies_hz;
-        }
-        let of_rate = MAX_FREQ_OF_RATE / (every as f64 * self.film.step_s());
-        Bounds::new(frequencies_hz.lo, frequencies_hz.hi.min(of_rate))
     }
 
     /// Of an oscillator of this variance in all of the points together, px².
@@ -504,12 +456,15 @@ fn own_oscillator(
         if found[k].at_limit {
             continue;
         }
-        if !is_of_ancestor(&criteria.mode_of(&found[k]), ancestors) {
+        if !is_of_ancestor(&criteria.mode_of(found[k].mode, &found[k].ln_sd), ancestors) {
             return Ok(k);
         }
     }
     for oscillator in found.iter().filter(|o| !o.at_limit) {
-        if is_of_ancestor(&criteria.mode_of(oscillator), ancestors) {
+        if is_of_ancestor(
+            &criteria.mode_of(oscillator.mode, &oscillator.ln_sd),
+            ancestors,
+        ) {
             reason = Unidentified::AncestorsSway;
         }
     }

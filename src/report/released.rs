@@ -104,6 +104,7 @@ mod tests {
         };
         Analysis {
             sway: Vec::new(),
+            modes: Vec::new(),
             onset: Some(onset),
             releases_s: Vec::new(),
         }

@@ -24,7 +24,7 @@ use crate::model::{
 use crate::recording::TrackFileReader;
 use crate::solve::{Model, with_modes};
 use crate::source::SourceInfo;
-use crate::views::{DocumentWriter, Draft};
+use crate::views::{DocumentWriter, Draft, SwayFound};
 use nalgebra::Point2;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -195,7 +195,11 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
     let warnings = warnings(job, Some(&model));
     let judgement = judge(job, Some(&model));
     let verdict = judgement.verdict.clone();
-    writer?.write(&done.folder, &model.modes, warnings, Some(judgement))?;
+    let found = SwayFound {
+        sway: &model.modes,
+        modes: &model.tree_modes,
+    };
+    writer?.write(&done.folder, found, warnings, Some(judgement))?;
     let dir = done.folder.publish()?;
     Ok(Written {
         dir,

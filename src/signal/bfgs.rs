@@ -4,7 +4,6 @@ use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use nalgebra::{DMatrix, DVector};
 
-const MAX_STEPS: usize = 60;
 /// Ever shorter steps in one direction that are tried, each this share of the one before.
 const TRIES: usize = 12;
 const SHORTER: f64 = 0.4;
@@ -13,39 +12,74 @@ const FIRST_INVERSE: f64 = 0.1;
 /// Step of the differences: the functions are logarithms of likelihoods, which are known to some
 /// 1e-9.
 const DIFFERENCE: f64 = 1e-4;
-/// Change of the function at which it is done.
-const MIN_GAIN: f64 = 1e-2;
 /// Step of the second differences.
 const SECOND_DIFFERENCE: f64 = 1e-2;
 
-/// Minimum of `f` near `from` within `bounds`, by BFGS (Broyden, Fletcher, Goldfarb and Shanno
-/// 1970) with differences: the place and the value, or how far it has come when `cancel` ends it.
+/// What is to be as small as possible.
+pub trait Cost {
+    fn value(&self, x: &[f64]) -> f64;
+
+    /// The value, and its first derivatives.
+    fn value_and_slopes(&self, x: &[f64]) -> (f64, DVector<f64>);
+}
+
+/// A function whose derivatives are not known: they are found by differences.
+pub struct ByDifferences<F>(pub F);
+
+impl<F: Fn(&[f64]) -> f64> Cost for ByDifferences<F> {
+    fn value(&self, x: &[f64]) -> f64 {
+        self.0(x)
+    }
+
+    fn value_and_slopes(&self, x: &[f64]) -> (f64, DVector<f64>) {
+        let value = self.0(x);
+        (value, slopes_by_differences(&self.0, x, value))
+    }
+}
+
+/// When a search is done.
+#[derive(Clone, Copy, Debug)]
+pub struct Stopping {
+    pub max_steps: usize,
+    /// Steps that gain less than [`min_gain`](Self::min_gain), one after the other.
+    pub small_steps: usize,
+    pub min_gain: f64,
+}
+
+/// Minimum of `cost` near `from` within `bounds`, by BFGS (Broyden, Fletcher, Goldfarb and Shanno
+/// 1970): the place and the value, or how far it has come when `cancel` ends it.
 pub fn minimum(
-    f: impl Fn(&[f64]) -> f64,
+    cost: &impl Cost,
     from: &[f64],
     bounds: &[Bounds],
+    stopping: &Stopping,
     cancel: &CancelToken,
 ) -> (Vec<f64>, f64) {
     let n = from.len();
     let mut x = from.to_vec();
     clamp(&mut x, bounds);
-    let mut value = f(&x);
+    let (mut value, mut slopes) = cost.value_and_slopes(&x);
     let mut inverse = DMatrix::<f64>::identity(n, n) * FIRST_INVERSE;
-    let mut gradient = slope(&f, &x, value);
-    for _ in 0..MAX_STEPS {
+    let mut small_steps = 0;
+    for _ in 0..stopping.max_steps {
         if cancel.is_cancelled() {
             break;
         }
-        let direction = descent(&mut inverse, &gradient);
-        let Some((next, next_value)) = line_search(&f, &x, value, &direction, bounds) else {
+        let direction = descent(&mut inverse, &slopes);
+        let Some(next) = line_search(cost, &x, value, &direction, bounds) else {
             break;
         };
-        let next_gradient = slope(&f, &next, next_value);
+        let (next_value, next_slopes) = cost.value_and_slopes(&next);
         let moved = DVector::from_iterator(n, next.iter().zip(&x).map(|(a, b)| a - b));
-        update(&mut inverse, &moved, &(&next_gradient - &gradient));
+        update(&mut inverse, &moved, &(&next_slopes - &slopes));
         let gain = value - next_value;
-        (x, value, gradient) = (next, next_value, next_gradient);
-        if gain < MIN_GAIN {
+        (x, value, slopes) = (next, next_value, next_slopes);
+        small_steps = if gain < stopping.min_gain {
+            small_steps + 1
+        } else {
+            0
+        };
+        if small_steps >= stopping.small_steps {
             break;
         }
     }
@@ -75,12 +109,12 @@ fn descent(inverse: &mut DMatrix<f64>, gradient: &DVector<f64>) -> DVector<f64> 
 
 /// The first place along `direction` that is lower.
 fn line_search(
-    f: &impl Fn(&[f64]) -> f64,
+    cost: &impl Cost,
     x: &[f64],
     value: f64,
     direction: &DVector<f64>,
     bounds: &[Bounds],
-) -> Option<(Vec<f64>, f64)> {
+) -> Option<Vec<f64>> {
     let mut share = 1.0;
     for _ in 0..TRIES {
         let mut next = x.to_vec();
@@ -88,9 +122,8 @@ fn line_search(
             *x += share * d;
         }
         clamp(&mut next, bounds);
-        let next_value = f(&next);
-        if next_value < value {
-            return Some((next, next_value));
+        if cost.value(&next) < value {
+            return Some(next);
         }
         share *= SHORTER;
     }
@@ -108,7 +141,7 @@ fn update(inverse: &mut DMatrix<f64>, moved: &DVector<f64>, turned: &DVector<f64
     *inverse = &a * &*inverse * a.transpose() + moved * moved.transpose() / product;
 }
 
-fn slope(f: &impl Fn(&[f64]) -> f64, x: &[f64], value: f64) -> DVector<f64> {
+fn slopes_by_differences(f: &impl Fn(&[f64]) -> f64, x: &[f64], value: f64) -> DVector<f64> {
     let mut out = DVector::zeros(x.len());
     for i in 0..x.len() {
         let mut there = x.to_vec();
@@ -153,9 +186,31 @@ pub fn curvature(f: impl Fn(&[f64]) -> f64, x: &[f64]) -> DMatrix<f64> {
     h
 }
 
+/// Second derivatives at `x` of a function whose first ones are known.
+pub fn curvature_of_slopes(cost: &impl Cost, x: &[f64]) -> DMatrix<f64> {
+    let n = x.len();
+    let mut h = DMatrix::zeros(n, n);
+    for i in 0..n {
+        let sides = [DIFFERENCE, -DIFFERENCE].map(|by| {
+            let mut there = x.to_vec();
+            there[i] += by;
+            cost.value_and_slopes(&there).1
+        });
+        let second = (&sides[0] - &sides[1]) / (2.0 * DIFFERENCE);
+        h.set_column(i, &second);
+    }
+    (&h + h.transpose()) * 0.5
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const STOPPING: Stopping = Stopping {
+        max_steps: 60,
+        small_steps: 1,
+        min_gain: 1e-2,
+    };
 
     fn bent_valley(x: &[f64]) -> f64 {
         30.0 * (x[1] - x[0] * x[0]).powi(2) + (1.0 - x[0]).powi(2)
@@ -165,9 +220,10 @@ mod tests {
     fn a_bent_valley_is_followed_to_its_lowest_place() {
         let cancel = CancelToken::new();
         let (x, value) = minimum(
-            bent_valley,
+            &ByDifferences(bent_valley),
             &[-1.0, 1.0],
             &[Bounds::new(-3.0, 3.0); 2],
+            &STOPPING,
             &cancel,
         );
         assert!(value < 1e-2 && (x[0] - 1.0).abs() < 0.1, "{x:?}: {value}");
@@ -176,6 +232,8 @@ mod tests {
             (h[(0, 0)] - 242.0).abs() < 1.0 && (h[(1, 1)] - 60.0).abs() < 0.1,
             "{h}"
         );
+        let by_slopes = curvature_of_slopes(&ByDifferences(bent_valley), &[1.0, 1.0]);
+        assert!((by_slopes - &h).amax() < 1.0, "{h}");
     }
 
     #[test]
@@ -183,9 +241,10 @@ mod tests {
         let cancel = CancelToken::new();
         cancel.cancel();
         let (x, value) = minimum(
-            bent_valley,
+            &ByDifferences(bent_valley),
             &[-1.0, 1.0],
             &[Bounds::new(-3.0, 3.0); 2],
+            &STOPPING,
             &cancel,
         );
         assert_eq!((x, value), (vec![-1.0, 1.0], 4.0));

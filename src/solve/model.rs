@@ -10,7 +10,7 @@ use crate::config::{Affinity, Config};
 use crate::hierarchy::Evidence;
 use crate::model::{
     BranchGraph, Foot, LogWindow, MotionHierarchy, NodeId, Outline, Skeleton, Swaying, TrackId,
-    TrackTable, Wood,
+    TrackTable, TreeMode, Wood,
 };
 use crate::motion::Binding;
 use crate::shape::PushFigures;
@@ -33,6 +33,8 @@ pub struct Model {
     pub sub_branches: Vec<SubBranch>,
     /// How each measured branch sways, by node; empty while nobody has asked for it.
     pub modes: Vec<Swaying>,
+    /// The modes of the whole tree; empty likewise.
+    pub tree_modes: Vec<TreeMode>,
     /// Rest position of every track that was there when the tree was built, px.
     pub rest_px: BTreeMap<TrackId, Point2<f64>>,
     /// Tracks that the tree was not built from, with node and rest place, px: those of an older
@@ -187,6 +189,7 @@ impl Model {
     /// go on as those of `before` that are in their places.
     pub(super) fn assemble(&mut self, before: &Skeleton, config: &Config) {
         self.modes.clear();
+        self.tree_modes.clear();
         let mut skeleton = self.joined_parts(before, config);
         self.turns = clear_of_filmed(&mut skeleton, &self.turns);
         self.skeleton = Arc::new(skeleton);

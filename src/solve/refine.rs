@@ -24,6 +24,8 @@ const ERRORS: f64 = 2.0;
 /// A prior model held against what has been seen since.
 pub(super) struct Refinement<'a> {
     pub table: Arc<TrackTable>,
+    /// As much film as sway is analysed in: sub-branches are identified by theirs.
+    of_sway: TrackTable,
     prior: &'a Model,
     /// Every track that the prior model knows, with its deepest node that is no sub-branch and its
     /// rest place, px.
@@ -43,6 +45,7 @@ impl<'a> Refinement<'a> {
         }
         Some(Self {
             table: Arc::new(hierarchy::table(window)),
+            of_sway: hierarchy::table(log.last(config.dynamics.window_s)),
             prior,
             bound,
             config,
@@ -80,7 +83,7 @@ impl<'a> Refinement<'a> {
         self.adopt(&mut new);
         let binding = new.binding();
         let found = sub_branches::identify(
-            &self.table,
+            &self.of_sway,
             &new.plain,
             |id| binding.node_of(id),
             &self.config.dynamics,
@@ -115,7 +118,7 @@ impl<'a> Refinement<'a> {
     fn with_other_sub_branches(&self, cancel: &CancelToken) -> Option<Model> {
         let prior = self.prior;
         let found = sub_branches::identify(
-            &self.table,
+            &self.of_sway,
             &prior.plain,
             |id| Some(self.bound.get(&id)?.0),
             &self.config.dynamics,

@@ -13,4 +13,4 @@ pub use error::PrepareError;
 pub use prepared::{PreparedTree, TreeOptions};
 pub use studio::{FilmPlace, Shot, Studio, VIDEO_S};
 pub use tables::TablesWritten;
-pub use write::{DocumentWriter, Draft, put_notes, update, write_document};
+pub use write::{DocumentWriter, Draft, SwayFound, put_notes, update, write_document};

@@ -1,7 +1,9 @@
 //! The tables of a prepared tree, and its wood as cylinders.
 
 use super::{PrepareError, PreparedTree};
-use crate::document::{CAMERA_FILE, LEFT_OUT_FILE, MotionCsv, TRACKS_FILE, nodes, tracks_of};
+use crate::document::{
+    CAMERA_FILE, LEFT_OUT_FILE, MODES_FILE, MotionCsv, TRACKS_FILE, nodes, tracks_of,
+};
 use crate::export::cylinders::cylinders;
 use crate::files::{OutputFolder, WriteError};
 use crate::geometry::cylinders_by_branch;
@@ -42,6 +44,7 @@ impl PreparedTree {
                 self.config.export.metres_per_px,
             )?;
         }
+        self.write_modes(&folder, stop)?;
         self.write_motion(&folder, stop)?;
         let rows = cylinders_by_branch(&self.dressed.limbs, &self.skeleton);
         let metres_per_px = self.config.export.metres_per_px;
@@ -84,6 +87,16 @@ impl PreparedTree {
             }
         }
         Ok(())
+    }
+
+    /// A capture made before there was such a table has none, and that of another tree would be
+    /// another one.
+    fn write_modes(&self, folder: &OutputFolder, stop: &AtomicBool) -> Result<(), WriteError> {
+        let dir = &self.document.dir;
+        if self.reshaped || !dir.join(MODES_FILE).exists() {
+            return Ok(());
+        }
+        folder.copy(MODES_FILE, dir, stop)
     }
 
     fn write_motion(&self, folder: &OutputFolder, stop: &AtomicBool) -> Result<(), PrepareError> {

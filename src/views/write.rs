@@ -3,10 +3,12 @@
 
 use super::{PrepareError, PreparedTree, TreeOptions};
 use crate::document::note::{CaptureNote, json};
-use crate::document::{BARK_FILE, Document, PICTURE_FILE, at_rest_files, jpeg, png};
+use crate::document::{
+    BARK_FILE, Document, MODES_FILE, PICTURE_FILE, at_rest_files, jpeg, modes, png,
+};
 use crate::export::gltf::glb;
 use crate::files::{OutputFolder, WriteError, replace};
-use crate::model::{AtRest, Judgement, Picture, Pose, Rgb, Skeleton, Swaying, UserNotes};
+use crate::model::{AtRest, Judgement, Picture, Pose, Rgb, Skeleton, Swaying, TreeMode, UserNotes};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -33,6 +35,15 @@ pub struct Draft<'a> {
     /// tree that was not filmed.
     pub poses: Vec<Pose>,
     pub pose_in_picture: Option<&'a Pose>,
+}
+
+/// What an analysis found.
+#[derive(Clone, Copy, Debug)]
+pub struct SwayFound<'a> {
+    /// By node index.
+    pub sway: &'a [Swaying],
+    /// Those of the whole tree, the slowest first.
+    pub modes: &'a [TreeMode],
 }
 
 /// A document on its way to the disk.
@@ -73,20 +84,25 @@ impl DocumentWriter {
         })
     }
 
-    /// Writes `nodes.csv`, `tree.glb`, the pictures, the bark, the masks and `capture.json` with
-    /// these `warnings` and this `judgement`. `sway` is by node index.
+    /// Writes `nodes.csv`, of a film `modes.csv`, `tree.glb`, the pictures, the bark, the masks and `capture.json` with
+    /// these `warnings` and this `judgement`.
     ///
     /// # Errors
     /// A file cannot be written, or the tree is none for a model's file.
     pub fn write(
         mut self,
         folder: &OutputFolder,
-        sway: &[Swaying],
+        found: SwayFound,
         warnings: Vec<String>,
         judgement: Option<Judgement>,
     ) -> Result<(), PrepareError> {
-        self.tree.take_sway(sway);
-        folder.write("nodes.csv", &self.tree.document.nodes_csv()?)?;
+        self.tree.take_sway(found.sway);
+        let document = &self.tree.document;
+        folder.write("nodes.csv", &document.nodes_csv()?)?;
+        if document.note.timing.frames_seen > 0 {
+            let table = modes(Vec::new(), &document.skeleton, found.modes)?;
+            folder.write(MODES_FILE, &table)?;
+        }
         let (model, animation) = glb(&self.tree.model())?;
         folder.write(MODEL_FILE, &model)?;
         if let Some(bytes) = &self.picture_jpg {
@@ -120,28 +136,31 @@ impl DocumentWriter {
 pub fn write_document(dir: &Path, draft: Draft, sway: &[Swaying]) -> Result<PathBuf, PrepareError> {
     let folder = OutputFolder::create(dir)?;
     let warnings = draft.note.warnings.clone();
-    DocumentWriter::new(draft)?.write(&folder, sway, warnings, None)?;
+    let found = SwayFound { sway, modes: &[] };
+    DocumentWriter::new(draft)?.write(&folder, found, warnings, None)?;
     Ok(folder.publish()?)
 }
 
-/// Puts other answers on the sway, by node index, into the document in `dir`: into `nodes.csv`,
+/// Puts other answers on the sway into the document in `dir`: into `nodes.csv` and `modes.csv`,
 /// into the model's file where there is one, and into what the capture was found to be worth where
 /// it is known what that rests on.
 ///
 /// # Errors
 /// The document cannot be read; a file cannot be written, or it was stopped. A file is as it was or
 /// new, never half-written.
-pub fn update(dir: &Path, sway: &[Swaying], stop: &AtomicBool) -> Result<(), PrepareError> {
+pub fn update(dir: &Path, found: SwayFound, stop: &AtomicBool) -> Result<(), PrepareError> {
     let mut tree = as_it_is(Document::note(dir)?, dir)?;
-    tree.take_sway(sway);
+    tree.take_sway(found.sway);
+    let of_modes = modes(Vec::new(), &tree.document.skeleton, found.modes)?;
     let table = tree.document.nodes_csv()?;
     let (model, _) = glb(&tree.model())?;
     put(&dir.join("nodes.csv"), &table, stop)?;
+    put(&dir.join(MODES_FILE), &of_modes, stop)?;
     if has_model(dir) {
         put(&dir.join(MODEL_FILE), &model, stop)?;
     }
     let Document { note, skeleton, .. } = &mut tree.document;
-    if let Some(judgement) = note.judgement_with(skeleton, sway) {
+    if let Some(judgement) = note.judgement_with(skeleton, found.sway) {
         note.take_judgement(judgement);
         put(&dir.join(NOTE_FILE), &json(note)?, stop)?;
     }

@@ -6,29 +6,27 @@
 //! and no others; modes are fitted together, points may go to another branch, branches come off
 //! others, as long as what the film shows becomes likelier by more than what it costs. What comes
 //! out answers for the captured branches that have mostly the same points, and had no answer; and
-//! it separates branches that were captured as one with another ([`shoots`]).
+//! it separates branches that were captured as one with another (point_modes.rs).
 
 mod moves;
 mod points;
 mod read;
 mod refit;
 mod search;
-mod shoots;
 mod tree;
 
 use super::branch_tree::BranchTree;
 use super::branches::{BELOW_NYQUIST, BranchMode, LnDeviations, SearchLimits};
-use super::decay::{Mode, USUAL_DAMPING};
 use super::film::Film;
 use super::free_decay::MIN_PERIODS;
+use super::point_modes::{PointMode, PointModes, mode_of};
 use super::release::Onset;
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
-use crate::model::{Excitation, NodeId, Sway, Swaying, Unidentified};
+use crate::model::{Excitation, NodeId, Sway, Swaying};
 use points::ThinnedFilm;
 use read::ModeEstimate;
 use search::MIN_POINTS;
-pub use shoots::{Shoot, shoots};
 use tree::{Branch, Decay, Tree};
 
 /// A mode is clear if its points gain so much by it, each (but for a quarter of them) and together;
@@ -39,10 +37,8 @@ const MIN_GAIN_TOGETHER: f64 = 120.0;
 const MAX_LN_FREQUENCY_SD: f64 = 0.009;
 const MAX_JACKKNIFE_SD: f64 = 0.0045;
 const MAX_DAMPING: f64 = 0.15;
-/// It is a captured branch's own if it is in so much of its points, and so much of the points that
-/// have it are on that.
+/// It is a captured branch's own if it is in so much of its points.
 const MIN_SHARE_OF_BRANCH: f64 = 0.75;
-const MIN_SHARE_OF_MODE: f64 = 0.6;
 /// A mode that is no farther from a carrier's than this share is the carrier's. Somewhat more than
 /// one branch at a time needs (free_decay.rs): these frequencies are known less well.
 const CARRIER_FREQ_TOLERANCE: f64 = 0.012;
@@ -54,166 +50,68 @@ const MIN_LN_SD: LnDeviations = LnDeviations {
     damping: 0.1,
 };
 
-/// Answers for branches of `sways` that have none, by all points at once.
-pub(super) fn answer(
+/// The modes of all points at once, from the captured tree with the answers of `sways`; `None` where
+/// too little is seen, or `cancel` ends it before.
+pub(super) fn point_modes(
     tree: &BranchTree,
     film: &Film,
     onset: &Onset,
     limits: &SearchLimits,
-    sways: &mut [Swaying],
+    sways: &[Swaying],
     cancel: &CancelToken,
-) {
-    if !sways.iter().any(is_open) {
-        return;
+) -> Option<PointModes> {
+    // All points have the trunk's sway: without it nothing is sure.
+    if !sways.get(1).is_some_and(Result::is_ok) {
+        return None;
     }
-    let Some(solution) = ModalSolution::of(tree, film, onset, limits, sways, cancel) else {
-        if cancel.is_cancelled() {
-            for sway in sways.iter_mut().filter(|s| is_open(s)) {
-                *sway = Err(Unidentified::NotInTime);
-            }
-        }
-        return;
-    };
-    for b in 2..sways.len() {
-        if !is_open(&sways[b]) {
-            continue;
-        }
-        let carriers = known_modes(tree.carriers(NodeId(b as u32)), sways);
-        let estimate = solution.estimate_of(b, &carriers);
-        if let Some(sway) = estimate.and_then(|e| e.sway(limits)) {
-            sways[b] = Ok(sway);
+    let thinned = ThinnedFilm::of(film, onset);
+    let span_s = thinned.span_s();
+    if thinned.points.len() < MIN_POINTS || span_s <= 0.0 {
+        return None;
+    }
+    let below_nyquist_hz = 0.5 * BELOW_NYQUIST * thinned.rate_hz();
+    let frequencies_hz = Bounds::new(
+        MIN_PERIODS / span_s,
+        below_nyquist_hz.min(limits.frequencies_hz.hi),
+    );
+    if frequencies_hz.is_empty() {
+        return None;
+    }
+    let ThinnedFilm {
+        times_s,
+        points,
+        tracks,
+    } = thinned;
+    let decay = Decay::new(times_s, onset.start, frequencies_hz, points);
+    let nodes = tracks.iter().map(|&k| film.tracks[k].node);
+    let branch_of: Vec<usize> = nodes.map(NodeId::index).collect();
+    let captured = captured(tree, sways, &decay, branch_of);
+    let as_tracks = |points: &[usize]| points.iter().map(|p| tracks[*p]).collect::<Vec<_>>();
+    let on = (0..sways.len()).map(|b| as_tracks(&captured.all(b)));
+    let on = on.collect();
+    let mut modes = Vec::new();
+    for estimate in captured.grown(cancel)?.estimates() {
+        if estimate.is_clear()
+            && estimate.mode.frequency_hz * span_s > MIN_PERIODS
+            && !limits.may_be_aliased(estimate.mode.frequency_hz, film)
+        {
+            modes.push(PointMode {
+                mode: estimate.mode,
+                tracks: as_tracks(&estimate.points),
+                clearness: estimate.gain_together(),
+                same_within: CARRIER_FREQ_TOLERANCE,
+                sway: estimate.sway(),
+                is_sure: estimate.branch_mode().is_within(limits.max_relative_ci),
+                collinearity: estimate.collinearity,
+                pivot_px: estimate.base_px,
+            });
         }
     }
-}
-
-/// Whether a branch has no answer, but might have one.
-fn is_open(sway: &Swaying) -> bool {
-    matches!(
-        sway,
-        Err(Unidentified::NoOscillation | Unidentified::AncestorsSway | Unidentified::TooUncertain)
-    )
-}
-
-/// The mode that an answer stands for.
-fn mode_of(sway: &Sway) -> Mode {
-    Mode {
-        frequency_hz: sway.frequency_hz.value,
-        damping: sway.damping_ratio.map_or(USUAL_DAMPING, |d| d.value),
-    }
-}
-
-/// Of those of some branches that have an answer.
-fn known_modes(branches: impl Iterator<Item = NodeId>, sways: &[Swaying]) -> Vec<Mode> {
-    let known = branches.filter_map(|b| sways[b.index()].as_ref().ok());
-    known.map(mode_of).collect()
-}
-
-/// Whether a mode is the same as one of its carriers'.
-fn is_of_carrier(mode: &Mode, carriers: &[Mode]) -> bool {
-    let mut carriers = carriers.iter();
-    carriers.any(|c| c.has_frequency_of(mode, CARRIER_FREQ_TOLERANCE))
-}
-
-/// What the points say of all branches at once.
-struct ModalSolution {
-    /// The branches that can be told.
-    estimates: Vec<ModeEstimate>,
-    /// The points on every captured branch and on what it carries, in order.
-    on: Vec<Vec<usize>>,
-    /// Of every point: the captured branch that it is on, and its track of the film.
-    branch_of: Vec<usize>,
-    tracks: Vec<usize>,
-}
-
-impl ModalSolution {
-    /// `None` where too little is seen, or `cancel` ends it before.
-    fn of(
-        tree: &BranchTree,
-        film: &Film,
-        onset: &Onset,
-        limits: &SearchLimits,
-        sways: &[Swaying],
-        cancel: &CancelToken,
-    ) -> Option<Self> {
-        // All points have the trunk's sway: without it nothing is sure.
-        if !sways.get(1).is_some_and(Result::is_ok) {
-            return None;
-        }
-        let thinned = ThinnedFilm::of(film, onset);
-        let span_s = thinned.span_s();
-        if thinned.points.len() < MIN_POINTS || span_s <= 0.0 {
-            return None;
-        }
-        let below_nyquist_hz = 0.5 * BELOW_NYQUIST * thinned.rate_hz();
-        let frequencies_hz = Bounds::new(
-            MIN_PERIODS / span_s,
-            below_nyquist_hz.min(limits.frequencies_hz.hi),
-        );
-        if frequencies_hz.is_empty() {
-            return None;
-        }
-        let ThinnedFilm {
-            times_s,
-            points,
-            tracks,
-        } = thinned;
-        let decay = Decay::new(times_s, onset.start, frequencies_hz, points);
-        let nodes = tracks.iter().map(|&k| film.tracks[k].node);
-        let branch_of: Vec<usize> = nodes.map(NodeId::index).collect();
-        let captured = captured(tree, sways, &decay, branch_of.clone());
-        let on: Vec<Vec<usize>> = (0..sways.len()).map(|b| captured.all(b)).collect();
-        let tree = captured.grown(cancel)?;
-        let mut estimates = tree.estimates();
-        estimates.retain(|e| {
-            e.is_clear()
-                && e.mode.frequency_hz * span_s > MIN_PERIODS
-                && !limits.may_be_aliased(e.mode.frequency_hz, film)
-        });
-        Some(Self {
-            estimates,
-            on,
-            branch_of,
-            tracks,
-        })
-    }
-
-    /// Points of an estimate that are on captured branch `b`.
-    fn points_on(&self, b: usize, estimate: &ModeEstimate) -> usize {
-        let mut on = 0;
-        for point in &estimate.points {
-            on += usize::from(self.on[b].binary_search(point).is_ok());
-        }
-        on
-    }
-
-    /// How alike the points of an estimate and those of captured branch `b` are, 0 to 1, if they
-    /// are of one branch.
-    fn similarity(&self, b: usize, estimate: &ModeEstimate) -> Option<f64> {
-        let both = self.points_on(b, estimate);
-        let (here, there) = (self.on[b].len() as f64, estimate.points.len() as f64);
-        let share = both as f64;
-        let is_one = both >= MIN_POINTS
-            && share >= MIN_SHARE_OF_BRANCH * here
-            && share >= MIN_SHARE_OF_MODE * there;
-        is_one.then(|| share / (here + there - share))
-    }
-
-    /// The estimate that is most likely captured branch `b`'s.
-    fn estimate_of(&self, b: usize, carriers: &[Mode]) -> Option<&ModeEstimate> {
-        let mut best: Option<(f64, &ModeEstimate)> = None;
-        for estimate in &self.estimates {
-            let Some(similarity) = self.similarity(b, estimate) else {
-                continue;
-            };
-            if is_of_carrier(&estimate.mode, carriers) {
-                continue;
-            }
-            if best.is_none_or(|(most, _)| similarity >= most) {
-                best = Some((similarity, estimate));
-            }
-        }
-        best.map(|(_, estimate)| estimate)
-    }
+    Some(PointModes {
+        modes,
+        on,
+        min_share_of_branch: MIN_SHARE_OF_BRANCH,
+    })
 }
 
 impl ModeEstimate {
@@ -229,17 +127,21 @@ impl ModeEstimate {
             && self.mode.damping <= MAX_DAMPING
     }
 
-    fn sway(&self, limits: &SearchLimits) -> Option<Sway> {
-        let mode = BranchMode {
+    fn branch_mode(&self) -> BranchMode {
+        BranchMode {
             mode: self.mode,
             ln_sd: self.ln_sd.inflated(CI_INFLATION, &MIN_LN_SD),
-        };
-        mode.is_within(limits.max_relative_ci).then(|| Sway {
+        }
+    }
+
+    fn sway(&self) -> Sway {
+        let mode = self.branch_mode();
+        Sway {
             frequency_hz: mode.frequency_hz(),
             damping_ratio: mode.damping_ratio(),
             excitation: Excitation::Release,
             amplitude_deg: self.amplitude_deg,
-        })
+        }
     }
 }
 
@@ -278,7 +180,7 @@ mod tests {
     use super::*;
     use crate::config::Dynamics;
     use crate::dynamics::sway::UsableFilm;
-    use crate::dynamics::{Depth, FilmTrack, analyse, free_decay};
+    use crate::dynamics::{Depth, FilmTrack, analyse, free_decay, shoots};
     use crate::model::{Node, Size, Skeleton};
     use crate::random::Generator;
     use nalgebra::Point2;
@@ -386,16 +288,12 @@ mod tests {
             return Vec::new();
         };
         let sways = free_decay::sways(&tree, &film, &members, &onset, &limits, &cancel);
-        let Some(solution) = ModalSolution::of(&tree, &film, &onset, &limits, &sways, &cancel)
-        else {
+        let Some(found) = point_modes(&tree, &film, &onset, &limits, &sways, &cancel) else {
             return Vec::new();
         };
-        let own = solution
-            .estimates
-            .iter()
-            .filter(|e| e.points.len() < solution.on[2].len());
+        let own = found.modes.iter().map(|mode| mode.tracks.clone());
         let mut groups: Vec<Vec<usize>> = own
-            .map(|r| r.points.iter().map(|&p| solution.tracks[p]).collect())
+            .filter(|tracks| tracks.len() < found.on[2].len())
             .collect();
         groups.sort();
         groups

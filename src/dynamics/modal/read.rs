@@ -35,6 +35,10 @@ pub(super) struct ModeEstimate {
     /// What the quarter of them that gains least by the mode gains at most.
     pub gain: f64,
     pub amplitude_deg: f64,
+    /// How much of the points' motion is one swing, 0 to 1.
+    pub collinearity: f64,
+    /// Where the branch begins, px.
+    pub base_px: Point2<f64>,
 }
 
 /// What one point has of a mode.
@@ -85,6 +89,8 @@ impl Tree<'_> {
             points,
             gain: nth_smallest(gains, shares.len() / 4)?,
             amplitude_deg: arms.amplitude_deg(&factors, 0),
+            collinearity: arms.one_swing(&factors, 0),
+            base_px,
         })
     }
 

@@ -1,0 +1,659 @@
+//! Modes that wind drives, from the Fourier coefficients of a few motions in one band.
+//!
+//! Bayesian operational modal analysis (Au 2011, 2012): a mode is an oscillator with a real shape;
+//! gusts drive the modes, in part the same ones; what is left is white. The likelihood of the
+//! coefficients is Whittle's (1951). It tells how many modes there are, their frequencies, damping
+//! ratios and shapes, and by its curvature how sure these are.
+
+use super::branches::LnDeviations;
+use super::decay::{LN_DAMPING_WEIGHT, Mode, USUAL_DAMPING, damping_penalty};
+use super::driven_oscillators::DAMPING;
+use crate::bounds::Bounds;
+use crate::cancel::CancelToken;
+use crate::signal::bfgs::{Cost, Stopping, curvature_of_slopes, minimum};
+use nalgebra::{Complex, DMatrix, DVector, SMatrix, SVector, SymmetricEigen};
+use std::f64::consts::PI;
+
+/// Motions that the likelihood is of.
+pub(super) const MOTIONS: usize = 6;
+/// Power of gusts falls with frequency by this exponent (Kolmogorov 1941).
+const GUST_EXPONENT: f64 = -5.0 / 3.0;
+/// Of Schwarz's penalty this share is asked of a mode: modes near each other would be one by all of
+/// it. Found on made films (docs/dynamics.md).
+const PENALTY_SHARE: f64 = 0.5;
+/// Power of the noise that the search begins with, as a share of the mean of the motions.
+const FIRST_NOISE: f64 = 0.01;
+/// When the search is done.
+const STOPPING: Stopping = Stopping {
+    max_steps: 300,
+    small_steps: 3,
+    min_gain: 1e-4,
+};
+/// The likelihood is flat in a direction with less curvature than this. Of a parameter that is known
+/// no more than such a share of its square lies in flat directions.
+const FLAT: f64 = 1e-3;
+const MOST_FLAT: f64 = 0.01;
+
+type Coefficient = SVector<Complex<f64>, MOTIONS>;
+/// What a mode does to each motion of a band, of length 1.
+pub(super) type Shape = SVector<f64, MOTIONS>;
+
+/// Fourier coefficients of many motions.
+pub(super) struct Spectrum {
+    pub frequencies_hz: Vec<f64>,
+    /// By frequency; the square of each is the power density, px²/Hz.
+    pub coefficients: Vec<DVector<Complex<f64>>>,
+}
+
+/// The [`MOTIONS`] largest motions of a spectrum in a band.
+pub(super) struct Band {
+    frequencies_hz: Vec<f64>,
+    /// All together have a mean square of 1.
+    coefficients: Vec<Coefficient>,
+    /// Square root of the power of the gusts at every frequency, as a share of that in the middle.
+    gusts: Vec<f64>,
+    /// Each motion of the spectrum by those of the band, px.
+    by_motion: DMatrix<f64>,
+    /// Directions of the band's motions among the spectrum's, divided by their scales.
+    onto: DMatrix<f64>,
+    within_hz: Bounds,
+}
+
+/// Where the search for a mode begins.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Start {
+    pub frequency_hz: f64,
+    pub shape: Shape,
+}
+
+/// What is known of one mode.
+#[derive(Clone, Debug)]
+pub(super) struct DrivenMode {
+    pub mode: Mode,
+    /// By the curvature of the likelihood.
+    pub ln_sd: LnDeviations,
+    /// Whether it stands where the search ends.
+    pub at_limit: bool,
+    /// What it does to every motion of the spectrum: root of the mean square, with a sign, px.
+    pub motions_px: DVector<f64>,
+}
+
+/// A fit of some modes.
+#[derive(Clone)]
+pub(super) struct Fit {
+    modes: usize,
+    x: Vec<f64>,
+    cost: f64,
+}
+
+/// The parameters of a fit.
+struct Parameters<'a> {
+    ln_frequencies: &'a [f64],
+    ln_dampings: &'a [f64],
+    /// By mode, of any length.
+    shapes: &'a [f64],
+    /// What drives the modes: the lower triangle of a factor of its spectral matrix, the diagonal
+    /// first, then by row, real and imaginary parts.
+    forces: &'a [f64],
+    noise: f64,
+}
+
+impl<'a> Parameters<'a> {
+    fn of(modes: usize, x: &'a [f64]) -> Self {
+        let (ln_frequencies, rest) = x.split_at(modes);
+        let (ln_dampings, rest) = rest.split_at(modes);
+        let (shapes, rest) = rest.split_at(modes * MOTIONS);
+        let (forces, noise) = rest.split_at(modes * modes);
+        Self {
+            ln_frequencies,
+            ln_dampings,
+            shapes,
+            forces,
+            noise: noise[0].exp(),
+        }
+    }
+
+    fn shape(&self, mode: usize) -> Shape {
+        let shape = Shape::from_column_slice(&self.shapes[mode * MOTIONS..(mode + 1) * MOTIONS]);
+        shape / self.length(mode)
+    }
+
+    fn length(&self, mode: usize) -> f64 {
+        let shape = &self.shapes[mode * MOTIONS..(mode + 1) * MOTIONS];
+        let squares: f64 = shape.iter().map(|s| s * s).sum();
+        squares.sqrt().max(f64::MIN_POSITIVE)
+    }
+
+    /// Row `row` and column `column` of the factor.
+    fn force(&self, row: usize, column: usize) -> Complex<f64> {
+        if row == column {
+            return Complex::new(self.forces[row], 0.0);
+        }
+        let at = force_at(self.ln_frequencies.len(), row, column);
+        Complex::new(self.forces[at], self.forces[at + 1])
+    }
+
+    fn mode(&self, mode: usize) -> Mode {
+        Mode {
+            frequency_hz: self.ln_frequencies[mode].exp(),
+            damping: self.ln_dampings[mode].exp(),
+        }
+    }
+}
+
+/// Place of a factor beside the diagonal among the forces.
+fn force_at(modes: usize, row: usize, column: usize) -> usize {
+    modes + row * (row - 1) + 2 * column
+}
+
+/// Response of a mode's displacement to a force, in that to a steady one, with its derivatives by
+/// the logarithms of frequency and damping ratio.
+struct Response {
+    value: Complex<f64>,
+    by_ln_frequency: Complex<f64>,
+    by_ln_damping: Complex<f64>,
+}
+
+impl Response {
+    fn of(mode: &Mode, frequency_hz: f64) -> Self {
+        let ratio = frequency_hz / mode.frequency_hz;
+        let damped = Complex::new(0.0, 2.0 * mode.damping * ratio);
+        let value = (Complex::from(1.0 - ratio * ratio) + damped).inv();
+        let square = value * value;
+        Self {
+            value,
+            by_ln_frequency: square * (damped - 2.0 * ratio * ratio),
+            by_ln_damping: -square * damped,
+        }
+    }
+}
+
+impl Band {
+    /// `None` where the band has too few frequencies for one mode.
+    pub fn of(spectrum: &Spectrum, within_hz: Bounds) -> Option<Self> {
+        let frequencies = spectrum.frequencies_hz.iter().enumerate();
+        let inside: Vec<usize> = frequencies
+            .filter(|(_, f)| within_hz.contains(**f))
+            .map(|(k, _)| k)
+            .collect();
+        let motions = spectrum.coefficients.first()?.len();
+        if inside.len() < MOTIONS || motions < MOTIONS {
+            return None;
+        }
+        let mut products = DMatrix::<f64>::zeros(motions, motions);
+        for &k in &inside {
+            let coefficient = &spectrum.coefficients[k];
+            for part in [coefficient.map(|c| c.re), coefficient.map(|c| c.im)] {
+                products.ger(1.0, &part, &part, 1.0);
+            }
+        }
+        let eigen = SymmetricEigen::new(products);
+        let mut order: Vec<usize> = (0..motions).collect();
+        order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+        let mut by_motion = DMatrix::zeros(motions, MOTIONS);
+        let mut onto = DMatrix::zeros(MOTIONS, motions);
+        for (i, &k) in order.iter().take(MOTIONS).enumerate() {
+            // Each by the square root of its size: the small ones tell near modes apart, but are
+            // the noisier ones.
+            let scale = eigen.eigenvalues[k].max(0.0).powf(0.25);
+            let scale = scale.max(f64::MIN_POSITIVE);
+            let direction = eigen.eigenvectors.column(k);
+            by_motion.set_column(i, &(direction * scale));
+            onto.set_row(i, &(direction.transpose() / scale));
+        }
+        let middle_hz = (within_hz.lo * within_hz.hi).sqrt();
+        let complex_onto = onto.map(Complex::from);
+        let mut band = Self {
+            frequencies_hz: Vec::with_capacity(inside.len()),
+            coefficients: Vec::with_capacity(inside.len()),
+            gusts: Vec::with_capacity(inside.len()),
+            by_motion,
+            onto,
+            within_hz,
+        };
+        for k in inside {
+            let frequency_hz = spectrum.frequencies_hz[k];
+            let coefficient = &complex_onto * &spectrum.coefficients[k];
+            band.frequencies_hz.push(frequency_hz);
+            band.gusts
+                .push((frequency_hz / middle_hz).powf(0.5 * GUST_EXPONENT));
+            band.coefficients
+                .push(Coefficient::from_column_slice(coefficient.as_slice()));
+        }
+        band.scale_to_one();
+        Some(band)
+    }
+
+    fn scale_to_one(&mut self) {
+        let squares: f64 = self.coefficients.iter().map(|c| c.norm_squared()).sum();
+        let scale = (squares / self.values()).sqrt().max(f64::MIN_POSITIVE);
+        for coefficient in &mut self.coefficients {
+            *coefficient /= Complex::from(scale);
+        }
+        self.by_motion *= scale;
+        self.onto /= scale;
+    }
+
+    fn values(&self) -> f64 {
+        (self.coefficients.len() * MOTIONS) as f64
+    }
+
+    /// A shape of the spectrum's motions in those of the band; `None` for one that is not in them.
+    pub fn shape_of(&self, motions: &DVector<f64>) -> Option<Shape> {
+        let shape = &self.onto * motions;
+        let shape = Shape::from_column_slice(shape.as_slice());
+        shape.try_normalize(f64::MIN_POSITIVE)
+    }
+
+    /// The shape in which most moves near a frequency.
+    pub fn shape_near(&self, frequency_hz: f64) -> Shape {
+        let mut order: Vec<usize> = (0..self.coefficients.len()).collect();
+        let distance = |k: &usize| (self.frequencies_hz[*k] - frequency_hz).abs();
+        order.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let mut products = SMatrix::<f64, MOTIONS, MOTIONS>::zeros();
+        for k in order.iter().take(4) {
+            let coefficient = &self.coefficients[*k];
+            products += (coefficient * coefficient.adjoint()).map(|c| c.re);
+        }
+        let eigen = SymmetricEigen::new(products);
+        eigen
+            .eigenvectors
+            .column(eigen.eigenvalues.imax())
+            .into_owned()
+    }
+
+    /// Where along a shape, and across those of `others`, most moves, Hz.
+    pub fn peak_hz(&self, shape: &Shape, others: &[Shape]) -> f64 {
+        let mut along = *shape;
+        let mut basis: Vec<Shape> = Vec::new();
+        for other in others {
+            let mut rest = *other;
+            for b in &basis {
+                rest -= b * b.dot(other);
+            }
+            basis.extend(rest.try_normalize(1e-6));
+        }
+        for b in &basis {
+            along -= b * b.dot(shape);
+        }
+        let along = along.map(Complex::from);
+        let powers = self
+            .coefficients
+            .iter()
+            .zip(&self.gusts)
+            .map(|(c, g)| along.dot(c).norm_sqr() / (g * g));
+        let powers: Vec<f64> = powers.collect();
+        // Of three neighbours together: single coefficients are chance.
+        let mut best = (0, f64::NEG_INFINITY);
+        for k in 0..powers.len() {
+            let near = &powers[k.saturating_sub(1)..(k + 2).min(powers.len())];
+            let mean = near.iter().sum::<f64>() / near.len() as f64;
+            if mean > best.1 {
+                best = (k, mean);
+            }
+        }
+        self.frequencies_hz[best.0]
+    }
+
+    /// The likeliest modes, from these starts on; modes that gain too little are left out.
+    pub fn fit(&self, starts: &[Start], cancel: &CancelToken) -> Fit {
+        let mut fit = self.search(self.first(starts), starts.len(), cancel);
+        while fit.modes > 1 && !cancel.is_cancelled() {
+            let fewer = (0..fit.modes).map(|m| {
+                let without = self.without(&fit, m);
+                self.search(without, fit.modes - 1, cancel)
+            });
+            let Some(best) = fewer.min_by(|a, b| a.cost.total_cmp(&b.cost)) else {
+                break;
+            };
+            if self.criterion(&best) >= self.criterion(&fit) {
+                break;
+            }
+            fit = best;
+        }
+        fit
+    }
+
+    /// Of Schwarz (1978), with a share of the penalty.
+    fn criterion(&self, fit: &Fit) -> f64 {
+        // A shape's length says nothing.
+        let parameters = (fit.x.len() - fit.modes) as f64;
+        2.0 * fit.cost + PENALTY_SHARE * parameters * self.values().ln()
+    }
+
+    fn first(&self, starts: &[Start]) -> Vec<f64> {
+        let modes = starts.len();
+        let mut x: Vec<f64> = starts.iter().map(|s| s.frequency_hz.ln()).collect();
+        x.extend(vec![USUAL_DAMPING.ln(); modes]);
+        let mut forces = vec![0.0; modes * modes];
+        for (start, force) in starts.iter().zip(&mut forces) {
+            x.extend(start.shape.iter());
+            let nearest = self
+                .frequencies_hz
+                .partition_point(|f| *f < start.frequency_hz);
+            let nearest = nearest.min(self.coefficients.len() - 1);
+            let along = self.coefficients[nearest].norm().max(0.1);
+            *force = along * 2.0 * USUAL_DAMPING;
+        }
+        x.extend(forces);
+        x.push(FIRST_NOISE.ln());
+        x
+    }
+
+    /// The parameters without mode `out`: the forces on the others stay what they are.
+    fn without(&self, fit: &Fit, out: usize) -> Vec<f64> {
+        let parameters = Parameters::of(fit.modes, &fit.x);
+        let kept: Vec<usize> = (0..fit.modes).filter(|m| *m != out).collect();
+        let mut factor = DMatrix::<Complex<f64>>::zeros(kept.len(), fit.modes);
+        for (row, &m) in kept.iter().enumerate() {
+            for column in 0..=m {
+                factor[(row, column)] = parameters.force(m, column);
+            }
+        }
+        let product = &factor * factor.adjoint();
+        let mut forces = vec![0.0; kept.len() * kept.len()];
+        for (i, force) in forces.iter_mut().take(kept.len()).enumerate() {
+            *force = product[(i, i)].re.sqrt();
+        }
+        if let Some(cholesky) = product.cholesky() {
+            let l = cholesky.l();
+            for row in 0..kept.len() {
+                forces[row] = l[(row, row)].re;
+                for column in 0..row {
+                    let at = force_at(kept.len(), row, column);
+                    forces[at] = l[(row, column)].re;
+                    forces[at + 1] = l[(row, column)].im;
+                }
+            }
+        }
+        let mut x: Vec<f64> = kept.iter().map(|m| parameters.ln_frequencies[*m]).collect();
+        x.extend(kept.iter().map(|m| parameters.ln_dampings[*m]));
+        for &m in &kept {
+            x.extend(parameters.shape(m).iter());
+        }
+        x.extend(forces);
+        x.push(parameters.noise.ln());
+        x
+    }
+
+    fn search(&self, from: Vec<f64>, modes: usize, cancel: &CancelToken) -> Fit {
+        let any = Bounds::new(-1e3, 1e3);
+        let mut bounds = vec![any; from.len()];
+        bounds[..modes].fill(self.within_hz.map(f64::ln));
+        bounds[modes..2 * modes].fill(DAMPING.map(f64::ln));
+        let cost = BandCost { band: self, modes };
+        let (x, cost) = minimum(&cost, &from, &bounds, &STOPPING, cancel);
+        Fit { modes, x, cost }
+    }
+
+    /// What is known of the modes of a fit; those that the likelihood has no top for are left out.
+    pub fn modes(&self, fit: &Fit) -> Vec<DrivenMode> {
+        let parameters = Parameters::of(fit.modes, &fit.x);
+        let cost = BandCost {
+            band: self,
+            modes: fit.modes,
+        };
+        let sharpness = curvature_of_slopes(&cost, &fit.x);
+        let Some(known) = Known::of(sharpness) else {
+            return Vec::new();
+        };
+        let mut out = Vec::with_capacity(fit.modes);
+        for m in 0..fit.modes {
+            let deviations = (known.deviation(m), known.deviation(fit.modes + m));
+            let (Some(frequency), Some(damping)) = deviations else {
+                continue;
+            };
+            let mode = parameters.mode(m);
+            let mut force = 0.0;
+            for column in 0..=m {
+                force += parameters.force(m, column).norm_sqr();
+            }
+            let gust = self.gust_at(mode.frequency_hz);
+            // The integral of the squared response over all frequencies.
+            let response = PI * mode.frequency_hz / (4.0 * mode.damping);
+            let rms = (force * gust * gust * response).sqrt();
+            let shape = DVector::from_column_slice(parameters.shape(m).as_slice());
+            let limits = DAMPING.map(f64::ln);
+            let ln_damping = parameters.ln_dampings[m];
+            let within = self.within_hz.map(f64::ln);
+            let ln_frequency = parameters.ln_frequencies[m];
+            out.push(DrivenMode {
+                mode,
+                ln_sd: LnDeviations { frequency, damping },
+                at_limit: !is_inside(ln_damping, limits) || !is_inside(ln_frequency, within),
+                motions_px: &self.by_motion * shape * rms,
+            });
+        }
+        out
+    }
+
+    fn gust_at(&self, frequency_hz: f64) -> f64 {
+        let middle_hz = (self.within_hz.lo * self.within_hz.hi).sqrt();
+        (frequency_hz / middle_hz).powf(0.5 * GUST_EXPONENT)
+    }
+}
+
+fn is_inside(x: f64, limits: Bounds) -> bool {
+    limits.lo < x && x < limits.hi
+}
+
+/// Minus the logarithm of the likelihood of some modes, with the prior on the damping.
+struct BandCost<'a> {
+    band: &'a Band,
+    modes: usize,
+}
+
+/// The expected spectral matrix of the motions at one frequency, and what it is made of.
+struct Expected {
+    /// By mode.
+    responses: Vec<Response>,
+    /// What each part of the forces moves: the motions' expected products are the sum of theirs,
+    /// and the noise.
+    moved: Vec<Coefficient>,
+    matrix: SMatrix<Complex<f64>, MOTIONS, MOTIONS>,
+}
+
+impl BandCost<'_> {
+    fn expected(&self, parameters: &Parameters, shapes: &[Shape], k: usize) -> Expected {
+        let (frequency_hz, gust) = (self.band.frequencies_hz[k], self.band.gusts[k]);
+        let mut responses = Vec::with_capacity(self.modes);
+        for m in 0..self.modes {
+            responses.push(Response::of(&parameters.mode(m), frequency_hz));
+        }
+        let noise = Complex::from(parameters.noise);
+        let mut matrix = SMatrix::from_diagonal_element(noise);
+        let mut moved = Vec::with_capacity(self.modes);
+        for column in 0..self.modes {
+            let mut by_part = Coefficient::zeros();
+            for row in column..self.modes {
+                let by = responses[row].value * parameters.force(row, column) * gust;
+                by_part += shapes[row].map(|s| by * s);
+            }
+            matrix += by_part * by_part.adjoint();
+            moved.push(by_part);
+        }
+        Expected {
+            responses,
+            moved,
+            matrix,
+        }
+    }
+
+    fn prior(parameters: &Parameters) -> f64 {
+        let dampings = parameters.ln_dampings.iter();
+        dampings.map(|d| 0.5 * damping_penalty(*d)).sum()
+    }
+}
+
+impl Cost for BandCost<'_> {
+    fn value(&self, x: &[f64]) -> f64 {
+        let parameters = Parameters::of(self.modes, x);
+        let shapes: Vec<Shape> = (0..self.modes).map(|m| parameters.shape(m)).collect();
+        let mut cost = Self::prior(&parameters);
+        for (k, coefficient) in self.band.coefficients.iter().enumerate() {
+            let expected = self.expected(&parameters, &shapes, k);
+            let Some(factored) = expected.matrix.cholesky() else {
+                return f64::INFINITY;
+            };
+            let factor = factored.l_dirty();
+            for i in 0..MOTIONS {
+                cost += 2.0 * factor[(i, i)].re.ln();
+            }
+            let Some(white) = factor.solve_lower_triangular(coefficient) else {
+                return f64::INFINITY;
+            };
+            cost += white.norm_squared();
+        }
+        cost
+    }
+
+    /// With E the expected matrix and G = E⁻¹ - E⁻¹zzᴴE⁻¹, a change dE changes the cost by tr(G dE).
+    fn value_and_slopes(&self, x: &[f64]) -> (f64, DVector<f64>) {
+        let modes = self.modes;
+        let parameters = Parameters::of(modes, x);
+        let shapes: Vec<Shape> = (0..modes).map(|m| parameters.shape(m)).collect();
+        let mut cost = Self::prior(&parameters);
+        let mut slopes = DVector::zeros(x.len());
+        let first_force = 2 * modes + modes * MOTIONS;
+        let mut of_shapes = vec![Shape::zeros(); modes];
+        for (m, ln_damping) in parameters.ln_dampings.iter().enumerate() {
+            slopes[modes + m] += LN_DAMPING_WEIGHT * (ln_damping - USUAL_DAMPING.ln());
+        }
+        for (k, coefficient) in self.band.coefficients.iter().enumerate() {
+            let gust = self.band.gusts[k];
+            let expected = self.expected(&parameters, &shapes, k);
+            let Some(factored) = expected.matrix.cholesky() else {
+                return (f64::INFINITY, slopes);
+            };
+            for i in 0..MOTIONS {
+                cost += 2.0 * factored.l_dirty()[(i, i)].re.ln();
+            }
+            let white = factored.solve(coefficient);
+            cost += coefficient.dotc(&white).re;
+            let by_matrix = factored.inverse() - white * white.adjoint();
+            slopes[x.len() - 1] += parameters.noise * by_matrix.trace().re;
+            for column in 0..modes {
+                let by_moved = by_matrix * expected.moved[column];
+                for row in column..modes {
+                    let response = &expected.responses[row];
+                    let force = parameters.force(row, column) * gust;
+                    of_shapes[row] +=
+                        by_moved.map(|u| 2.0 * (response.value * force * u.conj()).re);
+                    let mut on_shape = Complex::from(0.0);
+                    for (u, s) in by_moved.iter().zip(&shapes[row]) {
+                        on_shape += u.conj() * *s;
+                    }
+                    let by_response = 2.0 * on_shape * force;
+                    slopes[row] += (by_response * response.by_ln_frequency).re;
+                    slopes[modes + row] += (by_response * response.by_ln_damping).re;
+                    let by_force = 2.0 * on_shape * response.value * gust;
+                    if row == column {
+                        slopes[first_force + row] += by_force.re;
+                    } else {
+                        let at = first_force + force_at(modes, row, column);
+                        slopes[at] += by_force.re;
+                        slopes[at + 1] -= by_force.im;
+                    }
+                }
+            }
+        }
+        for (m, by_shape) in of_shapes.iter().enumerate() {
+            // Along itself a shape changes nothing: its length is 1.
+            let across = by_shape - shapes[m] * shapes[m].dot(by_shape);
+            let across = across / parameters.length(m);
+            let at = 2 * modes + m * MOTIONS;
+            slopes
+                .rows_mut(at, MOTIONS)
+                .copy_from_slice(across.as_slice());
+        }
+        (cost, slopes)
+    }
+}
+
+/// How sure parameters are by the curvature of minus the logarithm of a likelihood in all of them.
+/// Directions in which it is flat, as the length of a shape is, or in which the search has not
+/// reached the top, are left as they are.
+struct Known(SymmetricEigen<f64, nalgebra::Dyn>);
+
+impl Known {
+    fn of(sharpness: DMatrix<f64>) -> Option<Self> {
+        // The likelihood may end beside the place that was found.
+        let is_finite = sharpness.iter().all(|x| x.is_finite());
+        is_finite.then(|| Self(SymmetricEigen::new(sharpness)))
+    }
+
+    /// Standard deviation; `None` where the likelihood is flat.
+    fn deviation(&self, parameter: usize) -> Option<f64> {
+        let (mut variance, mut flat) = (0.0, 0.0);
+        let directions = self.0.eigenvectors.column_iter();
+        for (value, direction) in self.0.eigenvalues.iter().zip(directions) {
+            let share = direction[parameter].powi(2);
+            if *value > FLAT {
+                variance += share / value;
+            } else {
+                flat += share;
+            }
+        }
+        (flat < MOST_FLAT).then(|| variance.sqrt())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::generator;
+    use rand::RngExt;
+
+    /// A minute of a spectrum of chance.
+    fn band() -> Band {
+        let mut random = generator(7, 0);
+        let mut spectrum = Spectrum {
+            frequencies_hz: Vec::new(),
+            coefficients: Vec::new(),
+        };
+        for k in 20..80 {
+            spectrum.frequencies_hz.push(f64::from(k) / 60.0);
+            let mut values = Vec::new();
+            for motion in 0..8 {
+                let size = 1.0 / (1.0 + motion as f64);
+                let mut part = || size * random.random_range(-1.0..1.0);
+                values.push(Complex::new(part(), part()));
+            }
+            spectrum.coefficients.push(DVector::from_vec(values));
+        }
+        Band::of(&spectrum, Bounds::new(0.4, 1.2)).expect("a band")
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_cost() {
+        let band = band();
+        let start = |frequency_hz: f64| Start {
+            frequency_hz,
+            shape: band.shape_near(frequency_hz),
+        };
+        let mut x = band.first(&[start(0.6), start(0.7), start(0.95)]);
+        for (i, x) in x.iter_mut().enumerate() {
+            *x += 0.1 * (i as f64 * 1.7).sin();
+        }
+        let cost = BandCost {
+            band: &band,
+            modes: 3,
+        };
+        let (value, slopes) = cost.value_and_slopes(&x);
+        assert!((value - cost.value(&x)).abs() < 1e-9 * value.abs());
+        for i in 0..x.len() {
+            let sides = [1e-5, -1e-5].map(|by| {
+                let mut there = x.clone();
+                there[i] += by;
+                cost.value(&there)
+            });
+            let difference = (sides[0] - sides[1]) / 2e-5;
+            let off = (difference - slopes[i]).abs();
+            assert!(
+                off < 1e-4 * (1.0 + difference.abs()),
+                "{i}: {difference}, not {}",
+                slopes[i]
+            );
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! The principal motions of some points, and their spectrum.
+
+use super::driven_modes::Spectrum;
+use super::film::Film;
+use super::gap_free::GapFree;
+use super::members::Points;
+use crate::bounds::Bounds;
+use crate::signal::principal::{PrincipalComponents, along};
+use nalgebra::{Complex, DVector, Vector2};
+use std::f64::consts::TAU;
+
+/// Motions that are kept at most, and those that a subspace is of.
+const MOST: usize = 24;
+const OF_SUBSPACE: usize = 8;
+
+/// The few motions that those of many points are made of.
+pub(super) struct Motions {
+    times_s: Vec<f64>,
+    /// Of mean 0, px.
+    along: Vec<Vec<f64>>,
+    variances: Vec<f64>,
+    /// Of length 1, in all signals at once: u and v of each point in turn.
+    directions: Vec<Vec<f64>>,
+}
+
+impl Motions {
+    /// Of `points` in `frames` of `film`, each some neighbours taken together.
+    pub fn of(film: &Film, points: &Points, frames: &[Vec<usize>]) -> Self {
+        let signals = GapFree::of(points, frames).signals;
+        let mut principal = PrincipalComponents::of_signals(&signals);
+        principal.directions.truncate(MOST);
+        principal.variances.truncate(MOST);
+        let mut motions = Vec::with_capacity(principal.directions.len());
+        for direction in &principal.directions {
+            let mut motion = along(&signals, direction);
+            let mean = motion.iter().sum::<f64>() / motion.len().max(1) as f64;
+            motion.iter_mut().for_each(|x| *x -= mean);
+            motions.push(motion);
+        }
+        Self {
+            times_s: frames.iter().map(|of| film.mean_s(of)).collect(),
+            along: motions,
+            variances: principal.variances,
+            directions: principal.directions,
+        }
+    }
+
+    pub fn span_s(&self) -> f64 {
+        let ends = self.times_s.first().zip(self.times_s.last());
+        ends.map_or(0.0, |(first, last)| last - first)
+    }
+
+    /// Mean time from one value to the next, s.
+    pub fn step_s(&self) -> f64 {
+        self.span_s() / self.times_s.len().max(2).saturating_sub(1) as f64
+    }
+
+    /// The largest, each divided by the square root of its size: the small ones tell near modes
+    /// apart, but are the noisier ones.
+    pub fn of_like_size(&self) -> Vec<Vec<f64>> {
+        let mut out = Vec::with_capacity(OF_SUBSPACE);
+        for (motion, variance) in self.along.iter().zip(&self.variances).take(OF_SUBSPACE) {
+            let scale = variance.powf(0.25).max(f64::MIN_POSITIVE);
+            out.push(motion.iter().map(|x| x / scale).collect());
+        }
+        out
+    }
+
+    /// Fourier coefficients at whole numbers of periods.
+    pub fn spectrum(&self, within_hz: Bounds) -> Spectrum {
+        let span_s = self.span_s();
+        let density = (2.0 * span_s).sqrt() / self.times_s.len().max(1) as f64;
+        let first = (within_hz.lo * span_s).ceil() as usize;
+        let last = (within_hz.hi * span_s).floor() as usize;
+        let mut out = Spectrum {
+            frequencies_hz: Vec::new(),
+            coefficients: Vec::new(),
+        };
+        for k in first..=last {
+            let frequency_hz = k as f64 / span_s;
+            let mut coefficient = DVector::zeros(self.along.len());
+            for (frame, time_s) in self.times_s.iter().enumerate() {
+                let turn = Complex::from_polar(density, -TAU * frequency_hz * time_s);
+                for (sum, motion) in coefficient.iter_mut().zip(&self.along) {
+                    *sum += turn * motion[frame];
+                }
+            }
+            out.frequencies_hz.push(frequency_hz);
+            out.coefficients.push(coefficient);
+        }
+        out
+    }
+
+    /// What sizes of the motions are in the points.
+    pub fn in_points(&self, sizes: &DVector<f64>) -> Vec<Vector2<f64>> {
+        let signals = self.directions.first().map_or(0, Vec::len);
+        let mut out = vec![Vector2::zeros(); signals / 2];
+        for (direction, size) in self.directions.iter().zip(sizes.iter()) {
+            for (sum, at) in out.iter_mut().zip(direction.chunks_exact(2)) {
+                *sum += *size * Vector2::new(at[0], at[1]);
+            }
+        }
+        out
+    }
+
+    /// What of displacements of the points is in the motions.
+    pub fn sizes_of(&self, moved: &[Vector2<f64>]) -> DVector<f64> {
+        let mut out = DVector::zeros(self.directions.len());
+        for (size, direction) in out.iter_mut().zip(&self.directions) {
+            for (at, moved) in direction.chunks_exact(2).zip(moved) {
+                *size += at[0] * moved.x + at[1] * moved.y;
+            }
+        }
+        out
+    }
+}

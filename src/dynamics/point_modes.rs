@@ -1,0 +1,189 @@
+//! Modes with the points that have them, and the branches that these points are.
+//!
+//! Whichever way modes were found: one that is in most points of a captured branch, and in few
+//! others, is that branch's own; one that is in some points of a branch only is that of a branch
+//! that the tree lacks.
+
+use super::branch_tree::BranchTree;
+use super::decay::{Mode, USUAL_DAMPING};
+use super::film::Film;
+use crate::model::{NodeId, Sway, Swaying, Unidentified};
+use nalgebra::Point2;
+
+/// A mode is a captured branch's own if it is in so many of its points at least, and if so much of
+/// the points that have it are on that.
+const MIN_POINTS: usize = 4;
+const MIN_SHARE_OF_MODE: f64 = 0.6;
+/// A shoot is on the captured branch that has this share of its points, and begins with those that
+/// are on no branch of that.
+const MIN_SHARE_ON_CARRIER: f64 = 0.75;
+const MIN_SHARE_OF_ITS_OWN: f64 = 0.6;
+/// Points that one must have. Nothing but its mode tells of it, and four agree by chance more often
+/// than five.
+const MIN_POINTS_OF_SHOOT: usize = 5;
+
+/// A branch of its own on a captured one that is not known to fork there: some of its points have a
+/// mode in common that the others have not.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shoot {
+    /// The captured branch that carries it.
+    pub on: NodeId,
+    /// Its points, as indices of the film's tracks, in order.
+    pub tracks: Vec<usize>,
+}
+
+/// A mode and the points that it moves as one swing.
+#[derive(Clone, Debug)]
+pub(super) struct PointMode {
+    pub mode: Mode,
+    /// As indices of the film's tracks, in order.
+    pub tracks: Vec<usize>,
+    /// The clearest are believed first.
+    pub clearness: f64,
+    /// A frequency that is no farther from a carrier's than this share is the carrier's.
+    pub same_within: f64,
+    /// As the answer for a branch, if it is sure enough for one.
+    pub sway: Sway,
+    pub is_sure: bool,
+    /// How much of its motion is one swing of these points, 0 to 1.
+    pub collinearity: f64,
+    /// The place that it turns them about, px.
+    pub pivot_px: Point2<f64>,
+}
+
+/// All modes that were found, and the captured tree.
+pub(super) struct PointModes {
+    pub modes: Vec<PointMode>,
+    /// Points on every captured branch and on what it carries, in order, of those that were looked
+    /// at.
+    pub on: Vec<Vec<usize>>,
+    /// Share of a captured branch's points that its own mode is in.
+    pub min_share_of_branch: f64,
+}
+
+/// Whether a branch has no answer, but might have one.
+pub(super) fn is_open(sway: &Swaying) -> bool {
+    matches!(
+        sway,
+        Err(Unidentified::NoOscillation | Unidentified::AncestorsSway | Unidentified::TooUncertain)
+    )
+}
+
+/// The mode that an answer stands for.
+pub(super) fn mode_of(sway: &Sway) -> Mode {
+    Mode {
+        frequency_hz: sway.frequency_hz.value,
+        damping: sway.damping_ratio.map_or(USUAL_DAMPING, |d| d.value),
+    }
+}
+
+/// Of those of some branches that have an answer.
+fn known_modes(branches: impl Iterator<Item = NodeId>, sways: &[Swaying]) -> Vec<Mode> {
+    let known = branches.filter_map(|b| sways[b.index()].as_ref().ok());
+    known.map(mode_of).collect()
+}
+
+impl PointMode {
+    fn is_of_carrier(&self, carriers: &[Mode]) -> bool {
+        let mut carriers = carriers.iter();
+        carriers.any(|c| c.has_frequency_of(&self.mode, self.same_within))
+    }
+}
+
+impl PointModes {
+    /// Answers for the branches of `sways`, but for the trunk, that have none.
+    pub fn answer(&self, tree: &BranchTree, sways: &mut [Swaying]) {
+        for b in 2..sways.len() {
+            if !is_open(&sways[b]) {
+                continue;
+            }
+            let carriers = known_modes(tree.carriers(NodeId(b as u32)), sways);
+            let mode = self.mode_of(b, &carriers);
+            if let Some(mode) = mode.filter(|mode| mode.is_sure) {
+                sways[b] = Ok(mode.sway);
+            }
+        }
+    }
+
+    /// The branches that the tree lacks, at most one for every point. The clearest takes them first.
+    pub fn shoots(&self, tree: &BranchTree, film: &Film, sways: &[Swaying]) -> Vec<Shoot> {
+        let mut modes: Vec<&PointMode> = self.modes.iter().collect();
+        modes.sort_by(|a, b| b.clearness.total_cmp(&a.clearness));
+        let mut taken = vec![false; film.tracks.len()];
+        let mut out = Vec::new();
+        for mode in modes {
+            let Some(on) = self.carrier_of(mode) else {
+                continue;
+            };
+            let branch = NodeId(on as u32);
+            let own = mode.tracks.iter().copied();
+            let own: Vec<usize> = own
+                .filter(|&k| film.tracks[k].node == branch && !taken[k])
+                .collect();
+            let least = MIN_SHARE_OF_ITS_OWN * mode.tracks.len() as f64;
+            if own.len() < MIN_POINTS_OF_SHOOT || (own.len() as f64) < least {
+                continue;
+            }
+            let carriers = std::iter::once(branch).chain(tree.carriers(branch));
+            if mode.is_of_carrier(&known_modes(carriers, sways)) {
+                continue;
+            }
+            for &k in &own {
+                taken[k] = true;
+            }
+            out.push(Shoot {
+                on: tree.branches[on].node,
+                tracks: own,
+            });
+        }
+        out
+    }
+
+    /// The smallest captured branch that has most of a mode's points; `None` where there is none,
+    /// or the mode is that of a captured branch.
+    fn carrier_of(&self, mode: &PointMode) -> Option<usize> {
+        let captured = 1..self.on.len();
+        if captured.clone().any(|b| self.similarity(b, mode).is_some()) {
+            return None;
+        }
+        let least = MIN_SHARE_ON_CARRIER * mode.tracks.len() as f64;
+        captured
+            .filter(|&b| self.points_on(b, mode) as f64 >= least)
+            .min_by_key(|&b| self.on[b].len())
+    }
+
+    /// Points of a mode that are on captured branch `b`.
+    fn points_on(&self, b: usize, mode: &PointMode) -> usize {
+        let on = mode.tracks.iter();
+        on.filter(|k| self.on[b].binary_search(k).is_ok()).count()
+    }
+
+    /// How alike the points of a mode and those of captured branch `b` are, 0 to 1, if they are of
+    /// one branch.
+    fn similarity(&self, b: usize, mode: &PointMode) -> Option<f64> {
+        let both = self.points_on(b, mode);
+        let (here, there) = (self.on[b].len() as f64, mode.tracks.len() as f64);
+        let share = both as f64;
+        let is_one = both >= MIN_POINTS
+            && share >= self.min_share_of_branch * here
+            && share >= MIN_SHARE_OF_MODE * there;
+        is_one.then(|| share / (here + there - share))
+    }
+
+    /// The mode that is most likely captured branch `b`'s.
+    fn mode_of(&self, b: usize, carriers: &[Mode]) -> Option<&PointMode> {
+        let mut best: Option<(f64, &PointMode)> = None;
+        for mode in &self.modes {
+            let Some(similarity) = self.similarity(b, mode) else {
+                continue;
+            };
+            if mode.is_of_carrier(carriers) {
+                continue;
+            }
+            if best.is_none_or(|(most, _)| similarity >= most) {
+                best = Some((similarity, mode));
+            }
+        }
+        best.map(|(_, mode)| mode)
+    }
+}
