@@ -13,11 +13,6 @@ const DOUBTFUL: f32 = 0.5;
 /// it, and there again from that share on.
 const HIDDEN: f32 = 0.2;
 const THERE_AGAIN: f32 = 0.8;
-/// It is hidden, too, where it looks less like it by so many standard deviations than is usual, if
-/// that is known from so many comparisons: the coat of somebody who walks by is as much like bark as
-/// a leaf is like itself.
-const OUTLIER_SD: f32 = 4.0;
-const COMPARISONS_KNOWN: u32 = 10;
 /// The same where there are no neighbours to confirm the place: the share of what is usual, and not
 /// less than is asked of all.
 const SURELY_THERE: f32 = 0.9;
@@ -56,7 +51,7 @@ pub struct Point {
 impl Point {
     /// Weight of its motion in what it says of a neighbour's, above 0 to 1.
     pub fn weight(&self) -> f64 {
-        f64::from(((self.record.usual_ncc() - DOUBTFUL) / (1.0 - DOUBTFUL)).clamp(0.02, 1.0))
+        f64::from(((self.usual_ncc() - DOUBTFUL) / (1.0 - DOUBTFUL)).clamp(0.02, 1.0))
     }
 
     /// Whether it is compared with its first patch in frame `frame`, where each is in one of
@@ -67,23 +62,27 @@ impl Point {
 
     /// Correlation below which something else is before it.
     pub fn hidden_below(&self) -> f32 {
-        let usual = self.record.usual_ncc();
-        let unlikely = self.record.unlikely_ncc().min(THERE_AGAIN * usual);
-        unlikely.max(HIDDEN * usual)
+        HIDDEN * self.usual_ncc()
     }
 
     /// Correlation above which it is found again. Not more than `enough`, for foliage never looks
-    /// the same twice, unless it is known to look the same; but not less than nearly usual where it
-    /// is hidden and the place is not `confirmed` by its neighbours.
+    /// the same twice; but not less than nearly usual where it is hidden and the place is not
+    /// `confirmed` by its neighbours.
     pub fn found_above(&self, enough: f32, confirmed: bool) -> f32 {
-        let (usual, is_hidden) = (self.record.usual_ncc(), self.coasting > 0);
-        if is_hidden && !confirmed {
-            return enough.max(SURELY_THERE * usual);
+        let usual = self.usual_ncc();
+        if self.coasting > 0 && !confirmed {
+            enough.max(SURELY_THERE * usual)
+        } else {
+            enough.min(THERE_AGAIN * usual)
         }
-        // What neighbours confirm may be what all of them go along with.
-        let share = if is_hidden { SURELY_THERE } else { THERE_AGAIN };
-        let unlikely = self.record.unlikely_ncc().min(share * usual);
-        unlikely.max(enough.min(THERE_AGAIN * usual))
+    }
+
+    fn usual_ncc(&self) -> f32 {
+        if self.record.comparisons == 0 {
+            1.0
+        } else {
+            self.record.mean_ncc
+        }
     }
 
     /// Where its neighbours say that it is, px.
@@ -115,7 +114,6 @@ pub struct Record {
     comparisons: u32,
     /// Mean correlation with its first patch, -1 to 1.
     mean_ncc: f32,
-    ncc_variance: f32,
     /// Mean logarithm of its distance from where the neighbours say that it is.
     ln_apart: f32,
 }
@@ -125,26 +123,8 @@ impl Record {
     fn note(&mut self, ncc: f32, apart_px: f32, newest: f32) {
         self.comparisons = self.comparisons.saturating_add(1);
         let share = (1.0 / self.comparisons as f32).max(newest);
-        let off = ncc - self.mean_ncc;
-        self.mean_ncc += share * off;
-        self.ncc_variance = (1.0 - share) * (self.ncc_variance + share * off * off);
+        self.mean_ncc += share * (ncc - self.mean_ncc);
         self.ln_apart += share * ((apart_px + APART_FLOOR_PX).ln() - self.ln_apart);
-    }
-
-    fn usual_ncc(&self) -> f32 {
-        if self.comparisons == 0 {
-            1.0
-        } else {
-            self.mean_ncc
-        }
-    }
-
-    /// Correlation that is too low to be by chance; of a point of which little is known none is.
-    fn unlikely_ncc(&self) -> f32 {
-        if self.comparisons < COMPARISONS_KNOWN {
-            return f32::MIN;
-        }
-        self.mean_ncc - OUTLIER_SD * self.ncc_variance.sqrt()
     }
 
     /// How far the point is expected to be from the one that it was (median), px; `None` before the
@@ -152,29 +132,5 @@ impl Record {
     pub fn error_px(&self) -> Option<f32> {
         (self.comparisons > 0)
             .then(|| ERROR_PX * (PER_NCC * self.mean_ncc + 0.5 * self.ln_apart).exp())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The record of a point whose correlation goes up and down by `swing` about `mean`.
-    fn record(mean: f32, swing: f32, comparisons: u32) -> Record {
-        let mut record = Record::default();
-        for k in 0..comparisons {
-            let up = if k % 2 == 0 { swing } else { -swing };
-            record.note(mean + up, 0.1, NEWEST);
-        }
-        record
-    }
-
-    #[test]
-    fn bark_that_looks_like_something_else_is_hidden_and_foliage_may_look_like_anything() {
-        let bark = record(0.95, 0.02, 40);
-        assert!((0.83..0.90).contains(&bark.unlikely_ncc()), "{bark:?}");
-        let leaf = record(0.5, 0.2, 40);
-        assert!(leaf.unlikely_ncc() < 0.0, "{leaf:?}");
-        assert_eq!(record(0.95, 0.02, 5).unlikely_ncc(), f32::MIN);
     }
 }
