@@ -850,7 +850,7 @@ fn the_model_in_the_capture_is_made_anew_with_the_answers() {
         .map(|(a, _)| a.0.as_str())
         .collect();
     assert_eq!(before.len(), after.len());
-    let may_change = ["capture.json", "nodes.csv", "tree.glb"];
+    let may_change = ["capture.json", "modes.csv", "nodes.csv", "tree.glb"];
     assert!(
         changed.contains(&"nodes.csv") && changed.iter().all(|name| may_change.contains(name)),
         "{changed:?}"

@@ -415,8 +415,8 @@ mod tests {
         let cancel = CancelToken::new();
         let found = point_modes(&tree, &film, &members, &limits, &cancel).expect("modes");
         for (frequency_hz, points) in [(0.6, 20), (1.3, 8)] {
-            let near = |m: &&PointMode| (m.mode.frequency_hz / frequency_hz - 1.0).abs() < 0.05;
-            let mode = found.modes.iter().find(near);
+            let holds = |m: &&PointMode| m.sway.frequency_hz.holds(frequency_hz);
+            let mode = found.modes.iter().find(holds);
             let mode = mode.unwrap_or_else(|| panic!("{frequency_hz} Hz: {:?}", found.modes));
             let off = mode.tracks.len().abs_diff(points);
             assert!(off <= 2, "{frequency_hz} Hz: {:?}", mode.tracks);
