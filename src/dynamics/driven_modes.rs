@@ -12,7 +12,7 @@ use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::signal::bfgs::{Cost, Stopping, curvature_of_slopes, minimum};
 use nalgebra::{Complex, DMatrix, DVector, SMatrix, SVector, SymmetricEigen};
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 /// Motions that the likelihood is of.
 pub(super) const MOTIONS: usize = 6;
@@ -34,7 +34,7 @@ const STOPPING: Stopping = Stopping {
 const FLAT: f64 = 1e-3;
 const MOST_FLAT: f64 = 0.01;
 
-type Coefficient = SVector<Complex<f64>, MOTIONS>;
+pub(super) type Coefficient = SVector<Complex<f64>, MOTIONS>;
 /// What a mode does to each motion of a band, of length 1.
 pub(super) type Shape = SVector<f64, MOTIONS>;
 
@@ -45,13 +45,46 @@ pub(super) struct Spectrum {
     pub coefficients: Vec<DVector<Complex<f64>>>,
 }
 
+impl Spectrum {
+    /// Of motions at `times_s`, at whole numbers of periods.
+    pub fn of(motions: &[Vec<f64>], times_s: &[f64], within_hz: Bounds) -> Self {
+        let ends = times_s.first().zip(times_s.last());
+        let span_s = ends.map_or(0.0, |(first, last)| last - first);
+        let density = (2.0 * span_s).sqrt() / times_s.len().max(1) as f64;
+        let first = (within_hz.lo * span_s).ceil() as usize;
+        let last = (within_hz.hi * span_s).floor() as usize;
+        let mut out = Self {
+            frequencies_hz: Vec::new(),
+            coefficients: Vec::new(),
+        };
+        for k in first..=last {
+            let frequency_hz = k as f64 / span_s;
+            let mut coefficient = DVector::zeros(motions.len());
+            for (frame, time_s) in times_s.iter().enumerate() {
+                let turn = Complex::from_polar(density, -TAU * frequency_hz * time_s);
+                for (sum, motion) in coefficient.iter_mut().zip(motions) {
+                    *sum += turn * motion[frame];
+                }
+            }
+            out.frequencies_hz.push(frequency_hz);
+            out.coefficients.push(coefficient);
+        }
+        out
+    }
+}
+
+/// What a likelihood is of: coefficients of [`MOTIONS`] motions, and the gusts that drive them.
+pub(super) struct Observed {
+    pub frequencies_hz: Vec<f64>,
+    pub coefficients: Vec<Coefficient>,
+    /// Square root of the power of the gusts at every frequency.
+    pub gusts: Vec<f64>,
+}
+
 /// The [`MOTIONS`] largest motions of a spectrum in a band.
 pub(super) struct Band {
-    frequencies_hz: Vec<f64>,
-    /// All together have a mean square of 1.
-    coefficients: Vec<Coefficient>,
-    /// Square root of the power of the gusts at every frequency, as a share of that in the middle.
-    gusts: Vec<f64>,
+    /// The gusts are a share of those in the middle.
+    observed: Observed,
     /// Each motion of the spectrum by those of the band, px.
     by_motion: DMatrix<f64>,
     /// Directions of the band's motions among the spectrum's, divided by their scales.
@@ -87,9 +120,9 @@ pub(super) struct Fit {
 }
 
 /// The parameters of a fit.
-struct Parameters<'a> {
-    ln_frequencies: &'a [f64],
-    ln_dampings: &'a [f64],
+pub(super) struct Parameters<'a> {
+    pub ln_frequencies: &'a [f64],
+    pub ln_dampings: &'a [f64],
     /// By mode, of any length.
     shapes: &'a [f64],
     /// What drives the modes: the lower triangle of a factor of its spectral matrix, the diagonal
@@ -99,7 +132,7 @@ struct Parameters<'a> {
 }
 
 impl<'a> Parameters<'a> {
-    fn of(modes: usize, x: &'a [f64]) -> Self {
+    pub fn of(modes: usize, x: &'a [f64]) -> Self {
         let (ln_frequencies, rest) = x.split_at(modes);
         let (ln_dampings, rest) = rest.split_at(modes);
         let (shapes, rest) = rest.split_at(modes * MOTIONS);
@@ -113,15 +146,26 @@ impl<'a> Parameters<'a> {
         }
     }
 
-    fn shape(&self, mode: usize) -> Shape {
-        let shape = Shape::from_column_slice(&self.shapes[mode * MOTIONS..(mode + 1) * MOTIONS]);
-        shape / self.length(mode)
+    pub fn shape(&self, mode: usize) -> Shape {
+        self.shape_of_any_length(mode) / self.length(mode)
     }
 
     fn length(&self, mode: usize) -> f64 {
-        let shape = &self.shapes[mode * MOTIONS..(mode + 1) * MOTIONS];
-        let squares: f64 = shape.iter().map(|s| s * s).sum();
-        squares.sqrt().max(f64::MIN_POSITIVE)
+        let length = self.shape_of_any_length(mode).norm();
+        length.max(f64::MIN_POSITIVE)
+    }
+
+    fn shape_of_any_length(&self, mode: usize) -> Shape {
+        Shape::from_column_slice(&self.shapes[mode * MOTIONS..(mode + 1) * MOTIONS])
+    }
+
+    /// Power of the force that drives a mode, where the gusts are 1.
+    pub fn power(&self, mode: usize) -> f64 {
+        let mut power = 0.0;
+        for column in 0..=mode {
+            power += self.force(mode, column).norm_sqr();
+        }
+        power
     }
 
     /// Row `row` and column `column` of the factor.
@@ -133,7 +177,7 @@ impl<'a> Parameters<'a> {
         Complex::new(self.forces[at], self.forces[at + 1])
     }
 
-    fn mode(&self, mode: usize) -> Mode {
+    pub fn mode(&self, mode: usize) -> Mode {
         Mode {
             frequency_hz: self.ln_frequencies[mode].exp(),
             damping: self.ln_dampings[mode].exp(),
@@ -165,6 +209,48 @@ impl Response {
             by_ln_frequency: square * (damped - 2.0 * ratio * ratio),
             by_ln_damping: -square * damped,
         }
+    }
+}
+
+/// The integral over all frequencies of the square of a mode's response to a force.
+pub(super) fn integral_of_response(mode: &Mode) -> f64 {
+    PI * mode.frequency_hz / (4.0 * mode.damping)
+}
+
+impl Observed {
+    /// Divides the coefficients so that all together have a mean square of 1, and gives by what.
+    pub fn scale_to_one(&mut self) -> f64 {
+        let squares: f64 = self.coefficients.iter().map(|c| c.norm_squared()).sum();
+        let scale = (squares / self.values()).sqrt().max(f64::MIN_POSITIVE);
+        for coefficient in &mut self.coefficients {
+            *coefficient /= Complex::from(scale);
+        }
+        scale
+    }
+
+    /// Number of the values that they are.
+    pub fn values(&self) -> f64 {
+        (self.coefficients.len() * MOTIONS).max(1) as f64
+    }
+
+    /// The places of all frequencies, those nearest to one first.
+    pub fn nearest_to(&self, frequency_hz: f64) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..self.coefficients.len()).collect();
+        let distance = |k: &usize| (self.frequencies_hz[*k] - frequency_hz).abs();
+        order.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        order
+    }
+
+    /// The shape in which most moves near a frequency.
+    pub fn shape_near(&self, frequency_hz: f64) -> Shape {
+        let mut products = SMatrix::<f64, MOTIONS, MOTIONS>::zeros();
+        for k in self.nearest_to(frequency_hz).iter().take(4) {
+            let coefficient = &self.coefficients[*k];
+            products += (coefficient * coefficient.adjoint()).map(|c| c.re);
+        }
+        let eigen = SymmetricEigen::new(products);
+        let largest = eigen.eigenvalues.imax();
+        eigen.eigenvectors.column(largest).into_owned()
     }
 }
 
@@ -201,41 +287,27 @@ impl Band {
             by_motion.set_column(i, &(direction * scale));
             onto.set_row(i, &(direction.transpose() / scale));
         }
-        let middle_hz = (within_hz.lo * within_hz.hi).sqrt();
         let complex_onto = onto.map(Complex::from);
-        let mut band = Self {
+        let mut observed = Observed {
             frequencies_hz: Vec::with_capacity(inside.len()),
             coefficients: Vec::with_capacity(inside.len()),
             gusts: Vec::with_capacity(inside.len()),
-            by_motion,
-            onto,
-            within_hz,
         };
         for k in inside {
             let frequency_hz = spectrum.frequencies_hz[k];
             let coefficient = &complex_onto * &spectrum.coefficients[k];
-            band.frequencies_hz.push(frequency_hz);
-            band.gusts
-                .push((frequency_hz / middle_hz).powf(0.5 * GUST_EXPONENT));
-            band.coefficients
-                .push(Coefficient::from_column_slice(coefficient.as_slice()));
+            observed.frequencies_hz.push(frequency_hz);
+            observed.gusts.push(gust(frequency_hz, within_hz));
+            let coefficient = Coefficient::from_column_slice(coefficient.as_slice());
+            observed.coefficients.push(coefficient);
         }
-        band.scale_to_one();
-        Some(band)
-    }
-
-    fn scale_to_one(&mut self) {
-        let squares: f64 = self.coefficients.iter().map(|c| c.norm_squared()).sum();
-        let scale = (squares / self.values()).sqrt().max(f64::MIN_POSITIVE);
-        for coefficient in &mut self.coefficients {
-            *coefficient /= Complex::from(scale);
-        }
-        self.by_motion *= scale;
-        self.onto /= scale;
-    }
-
-    fn values(&self) -> f64 {
-        (self.coefficients.len() * MOTIONS) as f64
+        let scale = observed.scale_to_one();
+        Some(Self {
+            observed,
+            by_motion: by_motion * scale,
+            onto: onto / scale,
+            within_hz,
+        })
     }
 
     /// A shape of the spectrum's motions in those of the band; `None` for one that is not in them.
@@ -247,19 +319,7 @@ impl Band {
 
     /// The shape in which most moves near a frequency.
     pub fn shape_near(&self, frequency_hz: f64) -> Shape {
-        let mut order: Vec<usize> = (0..self.coefficients.len()).collect();
-        let distance = |k: &usize| (self.frequencies_hz[*k] - frequency_hz).abs();
-        order.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
-        let mut products = SMatrix::<f64, MOTIONS, MOTIONS>::zeros();
-        for k in order.iter().take(4) {
-            let coefficient = &self.coefficients[*k];
-            products += (coefficient * coefficient.adjoint()).map(|c| c.re);
-        }
-        let eigen = SymmetricEigen::new(products);
-        eigen
-            .eigenvectors
-            .column(eigen.eigenvalues.imax())
-            .into_owned()
+        self.observed.shape_near(frequency_hz)
     }
 
     /// Where along a shape, and across those of `others`, most moves, Hz.
@@ -277,10 +337,9 @@ impl Band {
             along -= b * b.dot(shape);
         }
         let along = along.map(Complex::from);
-        let powers = self
-            .coefficients
-            .iter()
-            .zip(&self.gusts)
+        let observed = self.observed.coefficients.iter();
+        let powers = observed
+            .zip(&self.observed.gusts)
             .map(|(c, g)| along.dot(c).norm_sqr() / (g * g));
         let powers: Vec<f64> = powers.collect();
         // Of three neighbours together: single coefficients are chance.
@@ -292,7 +351,7 @@ impl Band {
                 best = (k, mean);
             }
         }
-        self.frequencies_hz[best.0]
+        self.observed.frequencies_hz[best.0]
     }
 
     /// The likeliest modes, from these starts on; modes that gain too little are left out.
@@ -318,7 +377,7 @@ impl Band {
     fn criterion(&self, fit: &Fit) -> f64 {
         // A shape's length says nothing.
         let parameters = (fit.x.len() - fit.modes) as f64;
-        2.0 * fit.cost + PENALTY_SHARE * parameters * self.values().ln()
+        2.0 * fit.cost + PENALTY_SHARE * parameters * self.observed.values().ln()
     }
 
     fn first(&self, starts: &[Start]) -> Vec<f64> {
@@ -328,11 +387,14 @@ impl Band {
         let mut forces = vec![0.0; modes * modes];
         for (start, force) in starts.iter().zip(&mut forces) {
             x.extend(start.shape.iter());
-            let nearest = self
-                .frequencies_hz
-                .partition_point(|f| *f < start.frequency_hz);
-            let nearest = nearest.min(self.coefficients.len() - 1);
-            let along = self.coefficients[nearest].norm().max(0.1);
+            let Observed {
+                frequencies_hz,
+                coefficients,
+                ..
+            } = &self.observed;
+            let next = frequencies_hz.partition_point(|f| *f < start.frequency_hz);
+            let next = next.min(coefficients.len() - 1);
+            let along = coefficients[next].norm().max(0.1);
             *force = along * 2.0 * USUAL_DAMPING;
         }
         x.extend(forces);
@@ -381,7 +443,10 @@ impl Band {
         let mut bounds = vec![any; from.len()];
         bounds[..modes].fill(self.within_hz.map(f64::ln));
         bounds[modes..2 * modes].fill(DAMPING.map(f64::ln));
-        let cost = BandCost { band: self, modes };
+        let cost = Likelihood {
+            observed: &self.observed,
+            modes,
+        };
         let (x, cost) = minimum(&cost, &from, &bounds, &STOPPING, cancel);
         Fit { modes, x, cost }
     }
@@ -389,8 +454,8 @@ impl Band {
     /// What is known of the modes of a fit; those that the likelihood has no top for are left out.
     pub fn modes(&self, fit: &Fit) -> Vec<DrivenMode> {
         let parameters = Parameters::of(fit.modes, &fit.x);
-        let cost = BandCost {
-            band: self,
+        let cost = Likelihood {
+            observed: &self.observed,
             modes: fit.modes,
         };
         let sharpness = curvature_of_slopes(&cost, &fit.x);
@@ -404,14 +469,9 @@ impl Band {
                 continue;
             };
             let mode = parameters.mode(m);
-            let mut force = 0.0;
-            for column in 0..=m {
-                force += parameters.force(m, column).norm_sqr();
-            }
-            let gust = self.gust_at(mode.frequency_hz);
-            // The integral of the squared response over all frequencies.
-            let response = PI * mode.frequency_hz / (4.0 * mode.damping);
-            let rms = (force * gust * gust * response).sqrt();
+            let gust = gust(mode.frequency_hz, self.within_hz);
+            let response = integral_of_response(&mode);
+            let rms = (parameters.power(m) * gust * gust * response).sqrt();
             let shape = DVector::from_column_slice(parameters.shape(m).as_slice());
             let limits = DAMPING.map(f64::ln);
             let ln_damping = parameters.ln_dampings[m];
@@ -426,11 +486,12 @@ impl Band {
         }
         out
     }
+}
 
-    fn gust_at(&self, frequency_hz: f64) -> f64 {
-        let middle_hz = (self.within_hz.lo * self.within_hz.hi).sqrt();
-        (frequency_hz / middle_hz).powf(0.5 * GUST_EXPONENT)
-    }
+/// Square root of the power of gusts at a frequency, as a share of that in the middle of a band.
+fn gust(frequency_hz: f64, within_hz: Bounds) -> f64 {
+    let middle_hz = (within_hz.lo * within_hz.hi).sqrt();
+    (frequency_hz / middle_hz).powf(0.5 * GUST_EXPONENT)
 }
 
 fn is_inside(x: f64, limits: Bounds) -> bool {
@@ -438,9 +499,9 @@ fn is_inside(x: f64, limits: Bounds) -> bool {
 }
 
 /// Minus the logarithm of the likelihood of some modes, with the prior on the damping.
-struct BandCost<'a> {
-    band: &'a Band,
-    modes: usize,
+pub(super) struct Likelihood<'a> {
+    pub observed: &'a Observed,
+    pub modes: usize,
 }
 
 /// The expected spectral matrix of the motions at one frequency, and what it is made of.
@@ -453,9 +514,9 @@ struct Expected {
     matrix: SMatrix<Complex<f64>, MOTIONS, MOTIONS>,
 }
 
-impl BandCost<'_> {
+impl Likelihood<'_> {
     fn expected(&self, parameters: &Parameters, shapes: &[Shape], k: usize) -> Expected {
-        let (frequency_hz, gust) = (self.band.frequencies_hz[k], self.band.gusts[k]);
+        let (frequency_hz, gust) = (self.observed.frequencies_hz[k], self.observed.gusts[k]);
         let mut responses = Vec::with_capacity(self.modes);
         for m in 0..self.modes {
             responses.push(Response::of(&parameters.mode(m), frequency_hz));
@@ -485,12 +546,12 @@ impl BandCost<'_> {
     }
 }
 
-impl Cost for BandCost<'_> {
+impl Cost for Likelihood<'_> {
     fn value(&self, x: &[f64]) -> f64 {
         let parameters = Parameters::of(self.modes, x);
         let shapes: Vec<Shape> = (0..self.modes).map(|m| parameters.shape(m)).collect();
         let mut cost = Self::prior(&parameters);
-        for (k, coefficient) in self.band.coefficients.iter().enumerate() {
+        for (k, coefficient) in self.observed.coefficients.iter().enumerate() {
             let expected = self.expected(&parameters, &shapes, k);
             let Some(factored) = expected.matrix.cholesky() else {
                 return f64::INFINITY;
@@ -519,8 +580,8 @@ impl Cost for BandCost<'_> {
         for (m, ln_damping) in parameters.ln_dampings.iter().enumerate() {
             slopes[modes + m] += LN_DAMPING_WEIGHT * (ln_damping - USUAL_DAMPING.ln());
         }
-        for (k, coefficient) in self.band.coefficients.iter().enumerate() {
-            let gust = self.band.gusts[k];
+        for (k, coefficient) in self.observed.coefficients.iter().enumerate() {
+            let gust = self.observed.gusts[k];
             let expected = self.expected(&parameters, &shapes, k);
             let Some(factored) = expected.matrix.cholesky() else {
                 return (f64::INFINITY, slopes);
@@ -573,17 +634,17 @@ impl Cost for BandCost<'_> {
 /// How sure parameters are by the curvature of minus the logarithm of a likelihood in all of them.
 /// Directions in which it is flat, as the length of a shape is, or in which the search has not
 /// reached the top, are left as they are.
-struct Known(SymmetricEigen<f64, nalgebra::Dyn>);
+pub(super) struct Known(SymmetricEigen<f64, nalgebra::Dyn>);
 
 impl Known {
-    fn of(sharpness: DMatrix<f64>) -> Option<Self> {
+    pub fn of(sharpness: DMatrix<f64>) -> Option<Self> {
         // The likelihood may end beside the place that was found.
         let is_finite = sharpness.iter().all(|x| x.is_finite());
         is_finite.then(|| Self(SymmetricEigen::new(sharpness)))
     }
 
     /// Standard deviation; `None` where the likelihood is flat.
-    fn deviation(&self, parameter: usize) -> Option<f64> {
+    pub fn deviation(&self, parameter: usize) -> Option<f64> {
         let (mut variance, mut flat) = (0.0, 0.0);
         let directions = self.0.eigenvectors.column_iter();
         for (value, direction) in self.0.eigenvalues.iter().zip(directions) {
@@ -635,8 +696,8 @@ mod tests {
         for (i, x) in x.iter_mut().enumerate() {
             *x += 0.1 * (i as f64 * 1.7).sin();
         }
-        let cost = BandCost {
-            band: &band,
+        let cost = Likelihood {
+            observed: &band.observed,
             modes: 3,
         };
         let (value, slopes) = cost.value_and_slopes(&x);

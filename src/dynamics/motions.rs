@@ -6,16 +6,15 @@ use super::gap_free::GapFree;
 use super::members::Points;
 use crate::bounds::Bounds;
 use crate::signal::principal::{PrincipalComponents, along};
-use nalgebra::{Complex, DVector, Vector2};
-use std::f64::consts::TAU;
+use nalgebra::{DVector, Vector2};
 
 /// Motions that are kept at most, and those that a subspace is of.
 const MOST: usize = 24;
-const OF_SUBSPACE: usize = 8;
+pub(super) const OF_SUBSPACE: usize = 8;
 
 /// The few motions that those of many points are made of.
 pub(super) struct Motions {
-    times_s: Vec<f64>,
+    pub times_s: Vec<f64>,
     /// Of mean 0, px.
     along: Vec<Vec<f64>>,
     variances: Vec<f64>,
@@ -59,36 +58,21 @@ impl Motions {
     /// apart, but are the noisier ones.
     pub fn of_like_size(&self) -> Vec<Vec<f64>> {
         let mut out = Vec::with_capacity(OF_SUBSPACE);
-        for (motion, variance) in self.along.iter().zip(&self.variances).take(OF_SUBSPACE) {
-            let scale = variance.powf(0.25).max(f64::MIN_POSITIVE);
+        for (motion, scale) in self.along.iter().zip(self.scales()).take(OF_SUBSPACE) {
             out.push(motion.iter().map(|x| x / scale).collect());
         }
         out
     }
 
+    /// What [`of_like_size`](Self::of_like_size) divides each motion by, px.
+    pub fn scales(&self) -> impl Iterator<Item = f64> {
+        let variances = self.variances.iter();
+        variances.map(|v| v.powf(0.25).max(f64::MIN_POSITIVE))
+    }
+
     /// Fourier coefficients at whole numbers of periods.
     pub fn spectrum(&self, within_hz: Bounds) -> Spectrum {
-        let span_s = self.span_s();
-        let density = (2.0 * span_s).sqrt() / self.times_s.len().max(1) as f64;
-        let first = (within_hz.lo * span_s).ceil() as usize;
-        let last = (within_hz.hi * span_s).floor() as usize;
-        let mut out = Spectrum {
-            frequencies_hz: Vec::new(),
-            coefficients: Vec::new(),
-        };
-        for k in first..=last {
-            let frequency_hz = k as f64 / span_s;
-            let mut coefficient = DVector::zeros(self.along.len());
-            for (frame, time_s) in self.times_s.iter().enumerate() {
-                let turn = Complex::from_polar(density, -TAU * frequency_hz * time_s);
-                for (sum, motion) in coefficient.iter_mut().zip(&self.along) {
-                    *sum += turn * motion[frame];
-                }
-            }
-            out.frequencies_hz.push(frequency_hz);
-            out.coefficients.push(coefficient);
-        }
-        out
+        Spectrum::of(&self.along, &self.times_s, within_hz)
     }
 
     /// What sizes of the motions are in the points.
