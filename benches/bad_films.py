@@ -28,11 +28,10 @@ wrong ones than the clean film of the same tree.
 Exit status: 0 all as expected, 1 not. Needs what made_films.py needs.
 """
 import argparse, csv, json, re, shutil, subprocess, sys, tempfile
-from collections import defaultdict
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from films_told import RIGHT_WITHIN, Film, branch_of, climb, relative_error, rows
+from films_told import RIGHT_WITHIN, Film, branch_of, by_node, found_points, relative_error, rows
 from made_films import bad_camera, edits
 from made_films.picture import FPS
 
@@ -259,10 +258,7 @@ def replay(program, out_dir, name, seed):
 def answers(film, case, capture):
     """Every frequency that a capture gives, held against the truth."""
     nodes = {row["node_id"]: row for row in rows(capture / "nodes.csv")}
-    of_node = defaultdict(list)
-    for place, node in points(film, case, capture):
-        for n in climb(node, lambda n: nodes[n]["parent_id"], nodes):
-            of_node[n].append(place)
+    of_node = by_node(points(film, case, capture), nodes)
     judged = []
     for node, row in nodes.items():
         if row["identifiable"] == "true" and row["frequency_hz"] and row.get("kind") != "copy":
@@ -292,17 +288,10 @@ def is_near(film, branch, hz):
 
 def points(film, case, capture):
     """(place, node) of each followed point that was found while the truth is known; the node is the last it was put to."""
-    births, last_node = {}, {}
-    tables = [table for name in ("tracks.csv", "left_out.csv") if (table := capture / name).is_file()]
-    seen = [row for table in tables for row in rows(table)]
-    for row in sorted(seen, key=lambda row: int(row["frame"])):
-        births.setdefault(row["track_id"], row)
-        if row["node_id"]:
-            last_node[row["track_id"]] = row["node_id"]
-    for track, birth in births.items():
+    for birth, node in found_points(capture):
         if float(birth["time_s"]) <= case.known_s:
             if (place := place_of(film, birth)) is not None:
-                yield place, last_node.get(track, "")
+                yield place, node
 
 
 def place_of(film, birth):

@@ -21,14 +21,14 @@ together with --trees same, in the order given. A line for each tree and one for
   same       share of these whose interval of the ratio holds 1, which is the truth
 
 Shares are parts of 1; '-' is nothing to take them of. --captures keeps the captures in a folder and takes those that are
-there. Exit status: 0 done, 1 PROGRAM failed on a tree (the others are told), 2 nothing run. Needs numpy and scipy.
+there. Exit status: 0 done, 1 PROGRAM failed on a tree (the others are printed), 2 nothing run. Needs numpy and scipy.
 """
 import argparse, csv, io, json, shutil, subprocess, sys, tempfile
 from collections import Counter, defaultdict
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from films_told import FILM_FILES, Film, ReplayFailed, branch_of, climb, followed_points, replay, rows
+from films_told import FILM_FILES, Film, ReplayFailed, branch_of, by_node, followed_points, replay, rows
 
 WAYS = ["trunk", "place", "mode"]
 ALIKE = 0.5
@@ -118,10 +118,7 @@ def of_tree(program, films, captures):
 def true_nodes(film, capture):
     """Every node that holds a point."""
     nodes = {row["node_id"]: row for row in rows(capture / "nodes.csv")}
-    of_node = defaultdict(list)
-    for branch, node in followed_points(film, capture):
-        for n in climb(node, lambda n: nodes[n]["parent_id"], nodes):
-            of_node[n].append(branch)
+    of_node = by_node(followed_points(film, capture), nodes)
     return {node: Node(branch_of(film, branches), Counter(branches)) for node, branches in of_node.items()}
 
 

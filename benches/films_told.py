@@ -125,11 +125,7 @@ def compare(film, capture):
     points = followed_points(film, capture)
     on_branch = Counter(branch for branch, _ in points)
     targets = {b for b, n in on_branch.items() if n >= BRANCH_POINTS}
-    # A node holds its own points and those of all nodes that it carries.
-    of_node = defaultdict(list)
-    for branch, node in points:
-        for n in climb(node, lambda n: nodes[n]["parent_id"], nodes):
-            of_node[n].append(branch)
+    of_node = by_node(points, nodes)
 
     told, best = Told(branches=len(targets)), {}
     for node, branches in of_node.items():
@@ -150,8 +146,17 @@ def compare(film, capture):
     return told
 
 
-def followed_points(film, capture):
-    """(true branch, captured node or "") of each point that counts; the node is the last that it was put to."""
+def by_node(points, nodes):
+    """What (what, node) points say, by node: each holds its own points and those of all nodes that it carries."""
+    of_node = defaultdict(list)
+    for what, node in points:
+        for n in climb(node, lambda n: nodes[n]["parent_id"], nodes):
+            of_node[n].append(what)
+    return of_node
+
+
+def found_points(capture):
+    """(row of its birth, captured node or "") of each point; the node is the last that it was put to."""
     births, last_node = {}, {}
     # The sway is that of all points, those that were left out of the tree among them.
     tables = [table for name in ("tracks.csv", "left_out.csv") if (table := capture / name).is_file()]
@@ -160,12 +165,17 @@ def followed_points(film, capture):
         births.setdefault(row["track_id"], row)
         if row["node_id"]:
             last_node[row["track_id"]] = row["node_id"]
+    return [(birth, last_node.get(track, "")) for track, birth in births.items()]
+
+
+def followed_points(film, capture):
+    """(true branch, captured node or "") of each point that counts."""
     points = []
-    for track, birth in births.items():
+    for birth, node in found_points(capture):
         if int(birth["frame"]) <= LAST_BIRTH_FRAME:
             branch = film.branch_at(int(birth["frame"]), [float(birth["u_px"]), float(birth["v_px"])])
             if branch is not None:
-                points.append((branch, last_node.get(track, "")))
+                points.append((branch, node))
     return points
 
 

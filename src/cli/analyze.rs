@@ -218,7 +218,7 @@ fn analyse_capture(
         notes: &notes.all,
     });
     Ok(CaptureAnalysis {
-        modes: analysis.modes.clone(),
+        modes: analysis.modes,
         sway: with_amplitudes(&skeleton, analysis.sway, &study),
         study,
     })

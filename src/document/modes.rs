@@ -3,7 +3,7 @@
 use super::sway::Columns;
 use super::table::TableWriter;
 use crate::files::WriteError;
-use crate::model::{NodeId, Skeleton, TreeMode};
+use crate::model::{BotanicalBranches, NodeId, Skeleton, TreeMode};
 use std::collections::BTreeMap;
 use std::io::Write;
 
@@ -36,15 +36,14 @@ pub fn modes<W: Write>(out: W, skeleton: &Skeleton, modes: &[TreeMode]) -> Resul
         table.count(mode.points as u64);
         table.id(mode.node.and_then(|node| skeleton.name_of(node)));
         table.text(&mode.node.map_or(String::new(), |node| branches.name(node)));
-        table.text(&energy(skeleton, mode));
+        table.text(&energy(&branches, mode));
         table.end_row()?;
     }
     table.finish()
 }
 
 /// Shares of a mode's energy by limb, with all that it carries.
-fn energy(skeleton: &Skeleton, mode: &TreeMode) -> String {
-    let branches = skeleton.botanical_branches();
+fn energy(branches: &BotanicalBranches, mode: &TreeMode) -> String {
     let mut by_limb: BTreeMap<usize, f64> = BTreeMap::new();
     for node in (0..mode.motion_px2.len() as u32).map(NodeId) {
         let mut limb = branches.of(node);

@@ -102,6 +102,17 @@ pub(super) fn evenly_chosen(all: &[usize], most: usize) -> Vec<usize> {
     (0..n).map(|i| all[i * all.len() / n]).collect()
 }
 
+/// How many of some points are among `others`, which are in order.
+pub(super) fn count_among(points: &[usize], others: &[usize]) -> usize {
+    let is_among = |k: &&usize| others.binary_search(k).is_ok();
+    points.iter().filter(is_among).count()
+}
+
+/// Share of some points that are among `others`, which are in order.
+pub(super) fn share_among(points: &[usize], others: &[usize]) -> f64 {
+    count_among(points, others) as f64 / points.len() as f64
+}
+
 /// Number of frames in which a point was seen.
 pub(super) fn count_seen(at_px: &[Point2<f64>]) -> usize {
     at_px.iter().filter(|p| is_seen(p)).count()

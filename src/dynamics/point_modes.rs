@@ -7,6 +7,7 @@
 use super::branch_tree::BranchTree;
 use super::decay::{Mode, USUAL_DAMPING};
 use super::film::Film;
+use super::members::count_among;
 use crate::model::{NodeId, Sway, Swaying, Unidentified};
 use nalgebra::Point2;
 
@@ -18,7 +19,7 @@ const MIN_SHARE_OF_MODE: f64 = 0.6;
 /// are on no branch of that.
 const MIN_SHARE_ON_CARRIER: f64 = 0.75;
 const MIN_SHARE_OF_ITS_OWN: f64 = 0.6;
-/// Points that one must have. Nothing but its mode tells of it, and four agree by chance more often
+/// Points that one must have. Nothing but its mode shows it, and four agree by chance more often
 /// than five.
 const MIN_POINTS_OF_SHOOT: usize = 5;
 
@@ -148,20 +149,14 @@ impl PointModes {
         }
         let least = MIN_SHARE_ON_CARRIER * mode.tracks.len() as f64;
         captured
-            .filter(|&b| self.points_on(b, mode) as f64 >= least)
+            .filter(|&b| count_among(&mode.tracks, &self.on[b]) as f64 >= least)
             .min_by_key(|&b| self.on[b].len())
-    }
-
-    /// Points of a mode that are on captured branch `b`.
-    fn points_on(&self, b: usize, mode: &PointMode) -> usize {
-        let on = mode.tracks.iter();
-        on.filter(|k| self.on[b].binary_search(k).is_ok()).count()
     }
 
     /// How alike the points of a mode and those of captured branch `b` are, 0 to 1, if they are of
     /// one branch.
     fn similarity(&self, b: usize, mode: &PointMode) -> Option<f64> {
-        let both = self.points_on(b, mode);
+        let both = count_among(&mode.tracks, &self.on[b]);
         let (here, there) = (self.on[b].len() as f64, mode.tracks.len() as f64);
         let share = both as f64;
         let is_one = both >= MIN_POINTS

@@ -138,16 +138,12 @@ pub(super) struct UsableFilm<'a> {
 impl<'a> UsableFilm<'a> {
     /// The sway of one branch after the other, from the trunk up.
     fn one_by_one(&self, tree: &BranchTree, cancel: &CancelToken) -> Vec<Swaying> {
-        let Self {
-            film,
-            members,
-            onset,
-            limits,
-            ..
-        } = self;
-        match onset.excitation {
-            Excitation::Wind => wind::sways(tree, film, members, limits, cancel),
-            Excitation::Release => free_decay::sways(tree, film, members, onset, limits, cancel),
+        let (film, limits) = (&self.film, &self.limits);
+        match self.onset.excitation {
+            Excitation::Wind => wind::sways(tree, film, &self.members, limits, cancel),
+            Excitation::Release => {
+                free_decay::sways(tree, film, &self.members, &self.onset, limits, cancel)
+            }
         }
     }
 
@@ -159,16 +155,12 @@ impl<'a> UsableFilm<'a> {
         sways: &[Swaying],
         cancel: &CancelToken,
     ) -> Option<PointModes> {
-        let Self {
-            film,
-            members,
-            onset,
-            limits,
-            ..
-        } = self;
-        match onset.excitation {
-            Excitation::Wind => tree_modes::point_modes(tree, film, members, limits, cancel),
-            Excitation::Release => modal::point_modes(tree, film, onset, limits, sways, cancel),
+        let (film, limits) = (&self.film, &self.limits);
+        match self.onset.excitation {
+            Excitation::Wind => tree_modes::point_modes(tree, film, &self.members, limits, cancel),
+            Excitation::Release => {
+                modal::point_modes(tree, film, &self.onset, limits, sways, cancel)
+            }
         }
     }
 

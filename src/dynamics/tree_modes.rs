@@ -8,6 +8,7 @@ use super::branch_tree::BranchTree;
 use super::branches::{BranchMode, LnDeviations, SearchLimits};
 use super::film::Film;
 use super::local_modes::{LocalMode, local_modes, views_of_branches, views_of_modes};
+use super::members::share_among;
 use super::point_modes::{PointMode, PointModes};
 use super::sampling::Sampling;
 use crate::bounds::Bounds;
@@ -249,11 +250,7 @@ fn together(group: &[Seen], first: &Seen) -> Option<FoundMode> {
 
 impl FoundMode {
     fn is_badly_seen(&self, clearer: &FoundMode) -> bool {
-        let inside = self
-            .tracks
-            .iter()
-            .filter(|k| clearer.tracks.binary_search(k).is_ok());
-        let share = inside.count() as f64 / self.tracks.len() as f64;
+        let share = share_among(&self.tracks, &clearer.tracks);
         let sd = self
             .mode
             .ln_sd
@@ -268,12 +265,8 @@ impl FoundMode {
 
     /// Whether most of another mode's points swing in this one, too, and more besides.
     pub fn carries(&self, other: &FoundMode) -> bool {
-        let inside = other
-            .tracks
-            .iter()
-            .filter(|k| self.tracks.binary_search(k).is_ok());
-        let share = inside.count() as f64 / other.tracks.len() as f64;
-        share >= SHARE_ON_CARRIER && self.tracks.len() > other.tracks.len()
+        share_among(&other.tracks, &self.tracks) >= SHARE_ON_CARRIER
+            && self.tracks.len() > other.tracks.len()
     }
 
     fn point_mode(&self, max_relative_ci: f64) -> PointMode {

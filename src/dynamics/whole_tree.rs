@@ -3,7 +3,7 @@
 
 use super::branch_tree::BranchTree;
 use super::film::Film;
-use super::members::mean_px;
+use super::members::{mean_px, share_among};
 use super::point_modes::{PointMode, PointModes};
 use crate::model::{NodeId, Sway, Swaying, TreeMode};
 use nalgebra::Point2;
@@ -63,11 +63,8 @@ pub(super) fn modes_of_tree(
 }
 
 fn is_known(mode: &PointMode, known: &Swing) -> bool {
-    let inside = mode.tracks.iter();
-    let inside = inside.filter(|k| known.tracks.binary_search(k).is_ok());
     let ratio = known.sway.frequency_hz.value / mode.mode.frequency_hz;
-    inside.count() as f64 >= SHARE_IN_KNOWN * mode.tracks.len() as f64
-        && ratio.ln().abs() < mode.same_within
+    share_among(&mode.tracks, known.tracks) >= SHARE_IN_KNOWN && ratio.ln().abs() < mode.same_within
 }
 
 impl Swing<'_> {

@@ -94,7 +94,7 @@ impl TreeBranches {
         Self { ids, matches }
     }
 
-    /// What the first capture tells of a branch of the tree.
+    /// How a branch of the tree sways by the first capture.
     fn first_sway(&self, studies: &[Study], id: u32) -> Option<Sway> {
         let branch = self.ids.first()?.iter().position(|own| *own == id)?;
         studies.first()?.branches.get(branch)?.known()

@@ -24,8 +24,7 @@ const ERRORS: f64 = 2.0;
 /// A prior model held against what has been seen since.
 pub(super) struct Refinement<'a> {
     pub table: Arc<TrackTable>,
-    /// As much film as sway is analysed in: sub-branches are identified by theirs.
-    of_sway: TrackTable,
+    log: &'a TrackLog,
     prior: &'a Model,
     /// Every track that the prior model knows, with its deepest node that is no sub-branch and its
     /// rest place, px.
@@ -36,7 +35,7 @@ pub(super) struct Refinement<'a> {
 
 impl<'a> Refinement<'a> {
     /// `None` where nothing is remembered.
-    pub fn of(log: &TrackLog, prior: &'a Model, config: &'a Config) -> Option<Self> {
+    pub fn of(log: &'a TrackLog, prior: &'a Model, config: &'a Config) -> Option<Self> {
         let window = log.last(config.accumulate.window_s);
         let moment = Moment::of(window)?;
         let mut bound = BTreeMap::new();
@@ -45,7 +44,7 @@ impl<'a> Refinement<'a> {
         }
         Some(Self {
             table: Arc::new(hierarchy::table(window)),
-            of_sway: hierarchy::table(log.last(config.dynamics.window_s)),
+            log,
             prior,
             bound,
             config,
@@ -82,13 +81,7 @@ impl<'a> Refinement<'a> {
         }
         self.adopt(&mut new);
         let binding = new.binding();
-        let found = sub_branches::identify(
-            &self.of_sway,
-            &new.plain,
-            |id| binding.node_of(id),
-            &self.config.dynamics,
-            cancel,
-        );
+        let found = self.identify(&new.plain, |id| binding.node_of(id), cancel);
         self.put_on(&mut new, found);
         Some(new)
     }
@@ -117,13 +110,7 @@ impl<'a> Refinement<'a> {
 
     fn with_other_sub_branches(&self, cancel: &CancelToken) -> Option<Model> {
         let prior = self.prior;
-        let found = sub_branches::identify(
-            &self.of_sway,
-            &prior.plain,
-            |id| Some(self.bound.get(&id)?.0),
-            &self.config.dynamics,
-            cancel,
-        );
+        let found = self.identify(&prior.plain, |id| Some(self.bound.get(&id)?.0), cancel);
         if cancel.is_cancelled() || points_of(&found) == points_of(&prior.sub_branches) {
             return None;
         }
@@ -149,6 +136,19 @@ impl<'a> Refinement<'a> {
         }
         self.put_on(&mut model, found);
         Some(model)
+    }
+
+    /// The sub-branches that as much film shows as sway is analysed in; `node_of` says on which
+    /// node of `skeleton` a point is.
+    fn identify(
+        &self,
+        skeleton: &Skeleton,
+        node_of: impl Fn(TrackId) -> Option<NodeId>,
+        cancel: &CancelToken,
+    ) -> Vec<SubBranch> {
+        let settings = &self.config.dynamics;
+        let table = hierarchy::table(self.log.last(settings.window_s));
+        sub_branches::identify(&table, skeleton, node_of, settings, cancel)
     }
 
     /// Puts sub-branches on `model`. Those that the prior one has on the same branch keep their

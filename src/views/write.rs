@@ -84,8 +84,8 @@ impl DocumentWriter {
         })
     }
 
-    /// Writes `nodes.csv`, of a film `modes.csv`, `tree.glb`, the pictures, the bark, the masks and `capture.json` with
-    /// these `warnings` and this `judgement`.
+    /// Writes `nodes.csv`, of a film `modes.csv`, `tree.glb`, the pictures, the bark, the masks and
+    /// `capture.json` with these `warnings` and this `judgement`.
     ///
     /// # Errors
     /// A file cannot be written, or the tree is none for a model's file.
