@@ -344,7 +344,8 @@ fn tracks_belong_to_nodes_that_exist_and_keep_their_ids() {
 #[test]
 fn the_modes_of_the_tree_hold_those_of_its_branches() {
     let header = "mode,frequency_hz,frequency_lo_hz,frequency_hi_hz,damping_ratio,damping_lo,\
-                  damping_hi,excitation,amplitude_deg,collinearity,n_points,node_id,branch,energy";
+                  damping_hi,excitation,amplitude_deg,collinearity,n_points,node_id,branch,energy,\
+                  motion_px2";
     let rows = made().rows("modes.csv", header);
     assert!(!rows.is_empty());
     let mut of_nodes: Vec<u32> = Vec::new();
@@ -360,6 +361,10 @@ fn the_modes_of_the_tree_hold_those_of_its_branches() {
         let shares = row[13].split("; ").filter_map(|s| s.split(' ').nth(1));
         let sum: f64 = shares.filter_map(|s| s.parse::<f64>().ok()).sum();
         assert!((sum - 1.0).abs() < 0.05, "{row:?}");
+        for pair in row[14].split("; ") {
+            let (node, px2) = pair.split_once(' ').expect("node and motion");
+            assert!(index(node) > 0 && number(px2) > 0.0, "{row:?}");
+        }
     }
     let nodes = made().rows("nodes.csv", arborcam::document::NODES_HEADER);
     let mut known: Vec<u32> = nodes

@@ -45,7 +45,7 @@ use crate::bounds::Bounds;
 use crate::config::Config;
 use crate::dynamics::Film;
 use crate::model::{
-    Outline, Picture, Pose, Rgb, Size, Skeleton, Swaying, Unidentified, Wood, WoodSeen,
+    Outline, Picture, Pose, Rgb, Size, Skeleton, Swaying, TreeMode, Unidentified, Wood, WoodSeen,
 };
 use crate::motion::PoseEstimator;
 use motion::PoseReader;
@@ -65,6 +65,8 @@ pub struct Document {
     pub skeleton: Arc<Skeleton>,
     /// How the nodes sway, by node index.
     pub sway: Vec<Swaying>,
+    /// The modes of the whole tree, the slowest first; none where they were not read.
+    pub modes: Vec<TreeMode>,
     /// Poses of the end of the film, by frame; at most as long as was asked for. None where the
     /// tree was not filmed.
     pub poses: Vec<Pose>,
@@ -96,6 +98,7 @@ impl Document {
     /// The folder is no document or holds no tree, or one of its tables is missing or damaged.
     pub fn read(dir: &Path, animation_s: f64) -> Result<Self, DocumentError> {
         let mut document = Self::tree(dir)?;
+        document.modes = document.modes_in_folder();
         if !document.has_motion() {
             let filmed = document.note.animation.is_some_and(|a| a.frames > 0);
             document.warnings.extend(
@@ -113,7 +116,7 @@ impl Document {
         Ok(document)
     }
 
-    /// The same without any pose.
+    /// The same without poses and modes: an analysis finds them anew.
     ///
     /// # Errors
     /// The folder is no document or holds no tree, or `nodes.csv` is missing or damaged.
@@ -163,6 +166,7 @@ impl Document {
             note,
             skeleton: Arc::new(nodes.skeleton),
             sway: nodes.sway,
+            modes: Vec::new(),
             poses: Vec::new(),
             picture: None,
             pose_in_picture: None,
@@ -192,6 +196,17 @@ impl Document {
                 self.warnings
                     .push(format!("the picture of the capture is left out: {why}"));
                 None
+            }
+        }
+    }
+
+    fn modes_in_folder(&mut self) -> Vec<TreeMode> {
+        match modes::read(&self.dir, &self.skeleton) {
+            Ok(modes) => modes,
+            Err(why) => {
+                let warning = format!("the modes of the whole tree are left out: {why}");
+                self.warnings.push(warning);
+                Vec::new()
             }
         }
     }
@@ -282,6 +297,24 @@ impl Document {
             let read = sway::read(std::array::from_fn(|c| cells[c].as_str()));
             *own = read.unwrap_or(Err(Unidentified::NotMeasured));
         }
+    }
+
+    /// Takes the modes of an analysis, as reading them back would give them.
+    ///
+    /// # Errors
+    /// They cannot be read back.
+    pub fn take_modes(&mut self, found: &[TreeMode]) -> Result<(), DocumentError> {
+        let table = modes(Vec::new(), &self.skeleton, found)?;
+        self.modes = modes::read_from(&table, &self.skeleton)?;
+        Ok(())
+    }
+
+    /// The text of `modes.csv`; the same bytes as were read, where nothing was changed.
+    ///
+    /// # Errors
+    /// None in practice: it is written to memory.
+    pub fn modes_csv(&self) -> Result<Vec<u8>, DocumentError> {
+        Ok(modes(Vec::new(), &self.skeleton, &self.modes)?)
     }
 
     /// The text of `nodes.csv`; the same bytes as were read, where nothing was changed.

@@ -46,6 +46,18 @@ impl BotanicalBranches {
         self.all.get(self.of(node)).map_or(0, |b| b.order)
     }
 
+    /// The place among all of the limb that a node is on or is carried by; the trunk for a node of
+    /// the trunk.
+    pub fn limb(&self, node: NodeId) -> usize {
+        let mut limb = self.of(node);
+        while let Some(carrier) = self.all.get(limb).and_then(|b| b.carrier)
+            && carrier != 0
+        {
+            limb = carrier;
+        }
+        limb
+    }
+
     /// The name of a node's branch: `trunk`, `limb_1`, `limb_1.2`, ...
     pub fn name(&self, node: NodeId) -> String {
         let mut numbers: Vec<String> = Vec::new();

@@ -1,6 +1,11 @@
 //! Modes of a whole tree.
 
-use super::{NodeId, Sway};
+use super::{BotanicalBranches, NodeId, Sway};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// A limb with less of a mode's energy is not named.
+const LEAST_ENERGY: f64 = 0.005;
 
 /// A mode of the whole tree: one frequency and damping, and the points that swing in it.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,14 +23,48 @@ pub struct TreeMode {
     pub motion_px2: Vec<f64>,
 }
 
+/// Share of a mode's kinetic energy in a limb with all that it carries, or in the trunk alone.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LimbEnergy {
+    /// `trunk`, `limb_1`, ...
+    pub limb: String,
+    /// 0 to 1.
+    #[serde(serialize_with = "super::rounded::to_3")]
+    pub share: f64,
+}
+
 impl TreeMode {
+    /// Squares of the swing of the points on a node, px².
+    pub fn motion_px2(&self, node: NodeId) -> f64 {
+        self.motion_px2.get(node.index()).copied().unwrap_or(0.0)
+    }
+
     /// Share of its kinetic energy that is in the points on a node, all points of like mass.
     pub fn energy(&self, node: NodeId) -> f64 {
         let all: f64 = self.motion_px2.iter().sum();
         if all > 0.0 {
-            self.motion_px2.get(node.index()).map_or(0.0, |m| m / all)
+            self.motion_px2(node) / all
         } else {
             0.0
         }
+    }
+
+    /// Shares of its energy in trunk and limbs, the largest first; without those that are hardly
+    /// any.
+    pub fn energy_by_limb(&self, branches: &BotanicalBranches) -> Vec<LimbEnergy> {
+        let mut by_limb: BTreeMap<usize, f64> = BTreeMap::new();
+        for node in (0..self.motion_px2.len() as u32).map(NodeId) {
+            *by_limb.entry(branches.limb(node)).or_default() += self.energy(node);
+        }
+        let mut shares: Vec<LimbEnergy> = Vec::with_capacity(by_limb.len());
+        for (limb, share) in by_limb {
+            let tip = branches.all.get(limb).and_then(|b| b.nodes.last());
+            if let Some(tip) = tip.filter(|_| share >= LEAST_ENERGY) {
+                let limb = branches.name(*tip);
+                shares.push(LimbEnergy { limb, share });
+            }
+        }
+        shares.sort_by(|a, b| b.share.total_cmp(&a.share));
+        shares
     }
 }
