@@ -114,6 +114,76 @@ fn the_glb_is_the_captures_own() {
     assert!(known >= 4, "{known} branches have an answer");
 }
 
+/// The model has the modes of the table; of one that is damaged none, with a warning that says
+/// where.
+#[test]
+fn the_modes_of_the_table_are_in_the_model() {
+    let rows = fs::read_to_string(made().join("modes.csv")).expect("modes");
+    let (_dir, out) = exported("glb", "tree.glb", &[]);
+    let modes = modes_of(&fs::read(out).expect("model"));
+    assert_eq!(
+        modes.as_array().map(Vec::len),
+        Some(rows.lines().count() - 1)
+    );
+    for (mode, row) in modes
+        .as_array()
+        .into_iter()
+        .flatten()
+        .zip(rows.lines().skip(1))
+    {
+        let cells: Vec<&str> = row.split(',').collect();
+        for (name, cell) in [
+            ("frequency_hz", 1),
+            ("frequency_lo_hz", 2),
+            ("amplitude_deg", 8),
+        ] {
+            assert_eq!(mode[name].as_f64(), cells[cell].parse().ok(), "{row}");
+        }
+        let energy = mode["energy"].as_array().expect("energy");
+        let shares = energy.iter().map(|e| {
+            format!(
+                "{} {:.2}",
+                text(&e["limb"]),
+                e["share"].as_f64().unwrap_or(f64::NAN)
+            )
+        });
+        assert_eq!(shares.collect::<Vec<_>>().join("; "), cells[13], "{row}");
+    }
+
+    let dir = tempfile::tempdir().expect("tempdir");
+    let (damaged, table) = (
+        dir.path().join("damaged"),
+        rows.replacen("\n1,", "\n1,x", 1),
+    );
+    fs::create_dir(&damaged).expect("folder");
+    for file in fs::read_dir(made()).expect("capture").flatten() {
+        fs::copy(file.path(), damaged.join(file.file_name())).expect("copy");
+    }
+    fs::write(damaged.join("modes.csv"), table).expect("table");
+    let output = export(&damaged, "glb", Path::new("-"), &[]);
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{told}");
+    assert!(
+        told.contains("the modes of the whole tree are left out")
+            && told.contains("modes.csv, line 2"),
+        "{told}"
+    );
+    assert!(modes_of(&output.stdout).is_null());
+}
+
+fn text(value: &serde_json::Value) -> &str {
+    value.as_str().unwrap_or_default()
+}
+
+/// What a model's own notes say of the modes of the tree.
+fn modes_of(glb: &[u8]) -> serde_json::Value {
+    let model = gltf::Gltf::from_slice(glb).expect("a valid file");
+    let json = model.document.into_json();
+    let extras = json.asset.extras.expect("extras");
+    let notes: serde_json::Value = serde_json::from_str(extras.get()).expect("json");
+    notes["modes"].clone()
+}
+
 #[test]
 fn gltf_lies_beside_its_parts_whatever_it_is_called() {
     let (dir, out) = exported("gltf", "my tree, 100%.gltf", &[]);

@@ -90,6 +90,8 @@ fn one_node() -> String {
         n_tracks: 0,
         end: [0.0; 3],
         sway: None,
+        why: None,
+        participation: Vec::new(),
         angle_deg: None,
     };
     let data = Data {
@@ -106,6 +108,7 @@ fn one_node() -> String {
         times_s: Vec::new(),
         main_branch_rgb: arborcam::model::MAIN_BRANCH_RGB,
         branches: vec![branch],
+        modes: Vec::new(),
     };
     let mut json =
         br#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"name":"tree","extras":{"node_id":0}}]}"#.to_vec();

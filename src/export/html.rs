@@ -3,7 +3,7 @@
 //! The page's code lies in `src/export/viewer/` and is put into the program by `build.rs`; here the
 //! tree is put into it.
 
-pub use super::html_data::{Branch, Data};
+pub use super::html_data::{Branch, Data, Sways};
 
 use super::ExportError;
 use crate::document::jpeg;
@@ -161,6 +161,7 @@ mod tests {
             times_s: Vec::new(),
             main_branch_rgb: crate::model::MAIN_BRANCH_RGB,
             branches: Vec::new(),
+            modes: Vec::new(),
         }
     }
 

@@ -3,7 +3,8 @@
 use crate::document::{CaptureNote, Columns};
 use crate::dynamics::angle_to_parent_deg;
 use crate::model::{
-    BotanicalBranches, LocalTime, MAIN_BRANCH_RGB, NodeId, Pose, Skeleton, Swaying, UserNotes,
+    BotanicalBranches, LocalTime, MAIN_BRANCH_RGB, ModeSummary, NodeId, Participation, Pose,
+    Skeleton, Swaying, TreeMode, UserNotes, participation, reason,
 };
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -36,6 +37,17 @@ pub struct Data {
     pub main_branch_rgb: [[u8; 3]; MAIN_BRANCH_RGB.len()],
     /// Parents before children, the first without a parent: the foot.
     pub branches: Vec<Branch>,
+    /// The modes of the whole tree, the slowest first.
+    pub modes: Vec<ModeSummary>,
+}
+
+/// How a tree sways.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sways<'a> {
+    /// By node index, as for `nodes.csv`; may be shorter than the skeleton.
+    pub of_nodes: &'a [Swaying],
+    /// The modes of the whole tree, the slowest first.
+    pub modes: &'a [TreeMode],
 }
 
 /// A branch, named as its end is in `nodes.csv` and in the model's file.
@@ -59,6 +71,10 @@ pub struct Branch {
     pub end: [f64; 3],
     /// What was identified of its sway; numbers that are not known are `null`.
     pub sway: Option<Columns>,
+    /// Of a measured branch without a frequency of its own: why, in words, and the modes of the
+    /// tree that it moves with, the largest share first.
+    pub why: Option<String>,
+    pub participation: Vec<Participation>,
     /// Angle to the parent branch at every one of [`Data::times_s`]: hundredths of a degree as
     /// 16-bit integers, little endian, in base64; the lowest integer stands for one that is not
     /// known. `None` for the foot and for copies.
@@ -66,14 +82,13 @@ pub struct Branch {
 }
 
 impl Data {
-    /// The page's facts. `poses` are those of the animation in the order of time; `sway` is by node
-    /// index, as for `nodes.csv`, and may be shorter than the skeleton; `metres_per_px` is that of
-    /// the model's file.
+    /// The page's facts. `poses` are those of the animation in the order of time; `metres_per_px` is
+    /// that of the model's file.
     pub fn of(
         capture: &CaptureNote,
         skeleton: &Skeleton,
         poses: &[Pose],
-        sway: &[Swaying],
+        sway: &Sways,
         metres_per_px: f64,
     ) -> Self {
         let size = skeleton.image_size;
@@ -108,11 +123,12 @@ impl Data {
                 .collect(),
             main_branch_rgb: MAIN_BRANCH_RGB,
             branches: branches(skeleton, poses, sway),
+            modes: ModeSummary::all(sway.modes, skeleton),
         }
     }
 }
 
-fn branches(skeleton: &Skeleton, poses: &[Pose], sway: &[Swaying]) -> Vec<Branch> {
+fn branches(skeleton: &Skeleton, poses: &[Pose], sway: &Sways) -> Vec<Branch> {
     let facts = Facts {
         skeleton,
         botanical: &skeleton.botanical_branches(),
@@ -131,7 +147,7 @@ struct Facts<'a> {
     /// By node.
     main_branches: &'a [Option<u8>],
     poses: &'a [Pose],
-    sway: &'a [Swaying],
+    sway: &'a Sways<'a>,
 }
 
 impl Facts<'_> {
@@ -140,6 +156,12 @@ impl Facts<'_> {
         let node = &self.skeleton.nodes[i];
         let moves = node.parent.is_some() && node.moves_with.is_none();
         let measured = moves && node.copy_of.is_none();
+        let sway = self.sway.of_nodes.get(i);
+        let unknown = sway.and_then(|s| s.err()).filter(|_| measured);
+        let participation = match unknown {
+            Some(_) => participation(self.sway.modes, self.botanical, id),
+            None => Vec::new(),
+        };
         Branch {
             id: node.name.0,
             name: self.botanical.piece_name(id),
@@ -151,7 +173,9 @@ impl Facts<'_> {
             main_branch: self.main_branches[i],
             n_tracks: node.n_tracks,
             end: [node.position.x, node.position.y, node.position.z].map(|x| rounded(x, 1e4)),
-            sway: self.sway.get(i).filter(|s| s.is_ok()).map(Columns::of),
+            sway: sway.filter(|s| s.is_ok()).map(Columns::of),
+            why: unknown.map(|why| reason(why, &participation)),
+            participation,
             angle_deg: measured
                 .then(|| packed(&angle_to_parent_deg(self.skeleton, self.poses, id))),
         }
@@ -209,7 +233,7 @@ mod tests {
             foot_px: [0.0; 2].into(),
             image_size: Size::new(64, 48),
         };
-        let page = branches(&skeleton, &[], &[]);
+        let page = branches(&skeleton, &[], &Sways::default());
         let page: Vec<Option<u8>> = page.iter().map(|b| b.main_branch).collect();
         let mut screen = Snapshot::default();
         screen.show_tree(Arc::new(skeleton));

@@ -1,11 +1,30 @@
 //! What a model's file says of a branch's sway.
 
-use crate::model::Swaying;
+use crate::model::{NodeId, Skeleton, Swaying, TreeMode, participation};
 use serde_json::{Map, Value, json};
+
+/// For the `extras` of the joints of a tree, by node index: what is known of each one's sway, and
+/// the modes of the tree that it moves with where it has no frequency of its own.
+pub fn joint_extras(skeleton: &Skeleton, sway: &[Swaying], modes: &[TreeMode]) -> Vec<Value> {
+    let branches = skeleton.botanical_branches();
+    let mut all = Vec::with_capacity(sway.len());
+    for (node, sway) in (0..).map(NodeId).zip(sway) {
+        let mut own = extras(sway);
+        let moves_with = match sway {
+            Ok(_) => Vec::new(),
+            Err(_) => participation(modes, &branches, node),
+        };
+        if !moves_with.is_empty() {
+            own["participation"] = json!(moves_with);
+        }
+        all.push(own);
+    }
+    all
+}
 
 /// For the `extras` of a joint: what is known of its sway, with 95 % intervals; nothing for one
 /// that was not measured.
-pub fn extras(sway: &Swaying) -> Value {
+fn extras(sway: &Swaying) -> Value {
     let mut all = Map::new();
     let mut put = |name: &str, value: f64, lo: f64, hi: f64| {
         if value.is_finite() && lo.is_finite() && hi.is_finite() {

@@ -1,18 +1,20 @@
 //! A document's tree as it is wanted: of another shape, cut, in leaf, moved otherwise.
 
-use super::PrepareError;
 use super::loops::looped_flutter;
+use super::{PrepareError, SwayFound};
 use crate::config::Config;
 use crate::document::note::Software;
 use crate::document::{Document, DocumentError, Reposer};
 use crate::export::gltf::{KEY_TOLERANCE_PX, Model, glb, provenance};
-use crate::export::sway::extras;
+use crate::export::sway::joint_extras;
 use crate::export::{ExportError, html};
 use crate::geometry::{Dressed, Template};
-use crate::model::{LeafSwing, Luma, Outline, Pose, Skeleton, Swaying, Unidentified};
+use crate::model::{
+    LeafSwing, Luma, ModeSummary, Outline, Pose, Skeleton, Swaying, TreeMode, Unidentified,
+};
 use crate::pipeline::{MOST_RESHAPED, Seen, cut_to, dress, flutter, reshape};
 use crate::shape::{Cut, Drawn, Topiary};
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::sync::Arc;
 
 /// What may be changed of a document's tree.
@@ -44,6 +46,8 @@ pub struct PreparedTree {
     pub flutter: Vec<Vec<LeafSwing>>,
     /// What is known of the sway of every node.
     pub sway: Vec<Swaying>,
+    /// The modes of the whole tree; none of a tree that differs from the one in the tables.
+    pub modes: Vec<TreeMode>,
     /// Whether it differs from the tree in the tables.
     pub reshaped: bool,
     /// What the drawn shape did to it.
@@ -133,9 +137,14 @@ impl PreparedTree {
         let dressed = dress(&posed.skeleton, seen, &config);
         let flutter = flutter(&dressed, &posed.poses, &posed.skeleton, &config);
         let provenance = provenance(&document.note, &Software::default(), &posed.poses);
+        let modes = match changed {
+            true => Vec::new(),
+            false => document.modes.clone(),
+        };
         let mut tree = Self {
             scale: ScaleFrom::Measured,
-            node_extras: posed.sway.iter().map(extras).collect(),
+            node_extras: joint_extras(&posed.skeleton, &posed.sway, &modes),
+            modes,
             reshaped: changed,
             document,
             config,
@@ -150,6 +159,7 @@ impl PreparedTree {
             transforms: posed.transforms,
         };
         tree.note_scale();
+        tree.note_modes();
         Ok(tree)
     }
 
@@ -178,12 +188,32 @@ impl PreparedTree {
         }
     }
 
+    /// Puts the modes of the whole tree into the file's own notes.
+    fn note_modes(&mut self) {
+        let Some(notes) = self.provenance.as_object_mut() else {
+            return;
+        };
+        if self.modes.is_empty() {
+            notes.remove("modes");
+        } else {
+            let modes = ModeSummary::all(&self.modes, &self.skeleton);
+            notes.insert("modes".into(), json!(modes));
+        }
+    }
+
     /// Takes other answers on the sway than those of the document, as reading them back would give
-    /// them. Only for a tree of the document's own shape: it is by node index.
-    pub fn take_sway(&mut self, sway: &[Swaying]) {
-        self.document.take_sway(sway);
+    /// them. Only for a tree of the document's own shape: they are by node index.
+    ///
+    /// # Errors
+    /// The modes cannot be read back.
+    pub fn take_sway(&mut self, found: SwayFound) -> Result<(), PrepareError> {
+        self.document.take_sway(found.sway);
+        self.document.take_modes(found.modes)?;
         self.sway.clone_from(&self.document.sway);
-        self.node_extras = self.sway.iter().map(extras).collect();
+        self.modes.clone_from(&self.document.modes);
+        self.node_extras = joint_extras(&self.skeleton, &self.sway, &self.modes);
+        self.note_modes();
+        Ok(())
     }
 
     /// Takes other poses than those of the film, at even times; `looped`: the last is the first
@@ -199,6 +229,7 @@ impl PreparedTree {
             notes.insert("animated".into(), what);
         }
         self.note_scale();
+        self.note_modes();
         self.poses = poses;
     }
 
@@ -258,7 +289,10 @@ impl PreparedTree {
             &self.document.note,
             &self.skeleton,
             &self.poses,
-            &self.sway,
+            &html::Sways {
+                of_nodes: &self.sway,
+                modes: &self.modes,
+            },
             self.config.export.metres_per_px,
         );
         let picture = self.document.picture.as_ref().map(|p| &*p.rgb);

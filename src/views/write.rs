@@ -3,11 +3,9 @@
 
 use super::{PrepareError, PreparedTree, TreeOptions};
 use crate::document::note::{CaptureNote, json};
-use crate::document::{
-    BARK_FILE, Document, MODES_FILE, PICTURE_FILE, at_rest_files, jpeg, modes, png,
-};
+use crate::document::{BARK_FILE, Document, MODES_FILE, PICTURE_FILE, at_rest_files, jpeg, png};
 use crate::export::gltf::glb;
-use crate::files::{OutputFolder, WriteError, replace};
+use crate::files::{OutputFolder, WriteError, replace, write_files};
 use crate::model::{AtRest, Judgement, Picture, Pose, Rgb, Skeleton, Swaying, TreeMode, UserNotes};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -96,12 +94,11 @@ impl DocumentWriter {
         warnings: Vec<String>,
         judgement: Option<Judgement>,
     ) -> Result<(), PrepareError> {
-        self.tree.take_sway(found.sway);
+        self.tree.take_sway(found)?;
         let document = &self.tree.document;
         folder.write("nodes.csv", &document.nodes_csv()?)?;
         if document.note.timing.frames_seen > 0 {
-            let table = modes(Vec::new(), &document.skeleton, found.modes)?;
-            folder.write(MODES_FILE, &table)?;
+            folder.write(MODES_FILE, &document.modes_csv()?)?;
         }
         let (model, animation) = glb(&self.tree.model())?;
         folder.write(MODEL_FILE, &model)?;
@@ -150,8 +147,8 @@ pub fn write_document(dir: &Path, draft: Draft, sway: &[Swaying]) -> Result<Path
 /// new, never half-written.
 pub fn update(dir: &Path, found: SwayFound, stop: &AtomicBool) -> Result<(), PrepareError> {
     let mut tree = as_it_is(Document::note(dir)?, dir)?;
-    tree.take_sway(found.sway);
-    let of_modes = modes(Vec::new(), &tree.document.skeleton, found.modes)?;
+    tree.take_sway(found)?;
+    let of_modes = tree.document.modes_csv()?;
     let table = tree.document.nodes_csv()?;
     let (model, _) = glb(&tree.model())?;
     put(&dir.join("nodes.csv"), &table, stop)?;
@@ -199,13 +196,23 @@ fn as_it_is(note: CaptureNote, dir: &Path) -> Result<PreparedTree, PrepareError>
 }
 
 fn has_model(dir: &Path) -> bool {
-    std::fs::symlink_metadata(dir.join(MODEL_FILE)).is_ok()
+    is_there(&dir.join(MODEL_FILE))
 }
 
-/// Replaces a file, unless it holds these bytes already.
+/// Whether there is a file of this name, or a link.
+fn is_there(file: &Path) -> bool {
+    std::fs::symlink_metadata(file).is_ok()
+}
+
+/// Replaces a file, unless it holds these bytes already; writes it where it is not there, as
+/// `modes.csv` in a capture that was made before there was such a table.
 fn put(file: &Path, bytes: &[u8], stop: &AtomicBool) -> Result<(), WriteError> {
     if std::fs::read(file).is_ok_and(|old| old == bytes) {
         return Ok(());
+    }
+    if let (false, Some(dir), Some(name)) = (is_there(file), file.parent(), file.file_name()) {
+        let name = name.to_string_lossy().into_owned();
+        return write_files(dir, &[(name, bytes.to_vec())], stop);
     }
     replace(file, bytes, stop)
 }

@@ -12,7 +12,7 @@ const file = (name) => join(process.argv[2], name);
 const glb = readFileSync(file("tree.glb"));
 const outline = JSON.parse(readFileSync(file("outline.json"), "utf8"));
 const title = readFileSync(file("title.txt"), "utf8");
-const nodes = JSON.parse(glb.subarray(20, 20 + glb.readUInt32LE(12)).toString()).nodes;
+const { nodes, asset } = JSON.parse(glb.subarray(20, 20 + glb.readUInt32LE(12)).toString());
 const leafy = nodes.some((n) => /^leaves/.test(n.name));
 
 let failed = 0;
@@ -185,6 +185,22 @@ await check("a branch of the list shows its plots", async () => {
   const facts = await page.locator("#facts").textContent();
   hold(/Frequency/.test(facts) && /Amplitude\d/.test(facts), facts);
   return `${values.length} measured branches; ${facts}`;
+});
+
+await check("the modes are those of the model, and a branch says with which it moves", async () => {
+  const { modes } = asset.extras;
+  await page.locator("#modes summary").click();
+  const shown = await page.locator("#modes tbody tr").evaluateAll((rows) => rows.map((row) => row.textContent));
+  hold(shown.length === modes.length && modes.length > 2, `${shown.length} rows of ${modes.length} modes`);
+  for (const [k, mode] of modes.entries()) {
+    hold(shown[k].startsWith(mode.frequency_hz.toFixed(2)) && shown[k].includes(mode.branch ?? "–"), shown[k]);
+  }
+  const mover = nodes.find((n) => n.extras?.participation).extras;
+  await page.getByLabel("Branch", { exact: true }).selectOption(String(mover.node_id));
+  const facts = await page.locator("#facts").textContent();
+  hold(facts.includes(`(${mover.participation[0].frequency_hz.toFixed(2)} Hz)`), facts);
+  await page.locator("#modes summary").click();
+  return `${shown.length} modes; ${facts}`;
 });
 
 await check("a copy shows the plots of the branch that it repeats", async () => {

@@ -22,6 +22,7 @@ export function facts(branch, sway) {
       rows.push(["Damping", known.damping_ratio.toFixed(3), interval(known.damping_lo, known.damping_hi, 3)]);
     }
   } else {
+    if (original.why) rows.push(["Identified", "none", ` ${original.why}`]);
     rows.push(["Frequency", sway.hz === null ? "–" : `${sway.hz.toFixed(2)} Hz`, sway.hz === null ? " none stands out" : " peak"]);
   }
   rows.push(["Amplitude", sway.amplitude === null ? "–" : `${sway.amplitude.toFixed(2)}°`, ""]);

@@ -3,6 +3,7 @@ import { Choice } from "./choice.js";
 import { readData, readModel, readPicture } from "./data.js";
 import { Film, rectangle } from "./film.js";
 import { listen } from "./keys.js";
+import { fillModes } from "./modes.js";
 import { Paint } from "./paint.js";
 import { Panel } from "./panel.js";
 import { Player } from "./player.js";
@@ -90,6 +91,7 @@ function viewButtons(views) {
 async function open() {
   const data = readData();
   describe(data);
+  fillModes(at("modes"), data.modes);
   const model = await readModel();
   offerDownload(model, data.title);
   let stage;
