@@ -869,6 +869,62 @@ fn the_model_in_the_capture_is_made_anew_with_the_answers() {
     assert!(made.stdout == model, "the model is not that of `export`");
 }
 
+/// The modes of the tree are the same in the JSON, in the table of the capture and in its model; a
+/// branch without a frequency of its own says with which of them it moves.
+#[test]
+fn the_modes_stand_in_the_answers_in_the_capture_and_in_its_model() {
+    let (_dir, dir) = captured("tree");
+    // Older captures have none.
+    fs::remove_file(dir.join("modes.csv")).expect("remove");
+    let page = dir.with_file_name("modes.html");
+    let shown = page.display().to_string();
+    let told = told(&[&dir], &["--update", "--report", &shown]);
+    let capture = &told["captures"][0];
+    let modes = capture["modes"].as_array().expect("modes");
+    let table = fs::read_to_string(dir.join("modes.csv")).expect("table");
+    let rows: Vec<Vec<&str>> = table
+        .lines()
+        .skip(1)
+        .map(|row| row.split(',').collect())
+        .collect();
+    assert_eq!(modes.len(), rows.len());
+    assert!(modes.len() >= 3, "{modes:?}");
+    for (mode, row) in modes.iter().zip(&rows) {
+        assert_eq!(mode["mode"].to_string(), row[0]);
+        assert_eq!(mode["frequency_hz"].as_f64(), row[1].parse().ok());
+        assert_eq!(mode["n_points"].to_string(), row[10]);
+        assert_eq!(mode["branch"].as_str().unwrap_or_default(), row[12]);
+    }
+    let model = gltf::Gltf::open(dir.join("tree.glb")).expect("model");
+    let json = model.document.into_json();
+    let asset: Value =
+        serde_json::from_str(json.asset.extras.expect("extras").get()).expect("json");
+    assert_eq!(&asset["modes"], &capture["modes"]);
+
+    let html = fs::read_to_string(page).expect("report");
+    let text = String::from_utf8(analyze(&[&dir], &[]).stdout).expect("text");
+    assert!(html.contains("Modes of the whole tree") && text.contains("modes of the whole tree"));
+    let mut explained = 0;
+    for branch in branches(&told) {
+        let moves_with = branch["participation"].as_array().expect("participation");
+        let shares = moves_with.iter().map(|p| number(&p["share"]));
+        assert!(shares.sum::<f64>() <= 1.001, "{branch}");
+        for one in moves_with {
+            let mode = &modes[one["mode"].as_u64().expect("number") as usize - 1];
+            assert_eq!(one["frequency_hz"], mode["frequency_hz"], "{branch}");
+            assert_eq!(one["branch"], mode["branch"], "{branch}");
+        }
+        let why = branch["why"].as_str().unwrap_or_default();
+        if let (Some(most), false) = (moves_with.first(), why.is_empty()) {
+            let hz = format!("({:.2} Hz)", number(&most["frequency_hz"]));
+            assert!(why.contains("moves with") && why.contains(&hz), "{branch}");
+            assert!(html.contains(why) && text.contains(why), "{why}");
+            explained += 1;
+        }
+    }
+    assert!(explained > 0, "{told}");
+}
+
 /// A capture from somebody else may hold links to files of the user: none of them is written
 /// through, whatever it is called.
 #[test]

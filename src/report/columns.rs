@@ -1,6 +1,10 @@
 //! Tables of letters, as wide as there is room for.
 
-/// A table that may be narrowed. A row may end early with words that are as long as they like.
+/// Words that end a row early go on in lines of their own rather than in less room than this.
+const LEAST_WORDS: usize = 48;
+
+/// A table that may be narrowed. A row may end early with words that are as long as they like: they
+/// are broken where there is no room for them.
 pub struct Table {
     columns: Vec<Column>,
     rows: Vec<Row>,
@@ -41,7 +45,7 @@ impl Table {
     pub fn within(mut self, width: Option<usize>) -> (String, Vec<String>) {
         let mut without = Vec::new();
         loop {
-            let text = self.text();
+            let text = self.text(width);
             let widest = text
                 .lines()
                 .map(|line| line.chars().count())
@@ -67,7 +71,7 @@ impl Table {
     }
 
     /// Columns that are as wide as what stands in them, to the right.
-    fn text(&self) -> String {
+    fn text(&self, room: Option<usize>) -> String {
         let heads = Row {
             cells: self.columns.iter().map(|c| c.head.clone()).collect(),
             ends_early: false,
@@ -81,28 +85,30 @@ impl Table {
             cells.max().unwrap_or(0)
         };
         let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
-        let line = |row: &&Row| {
-            let cell = |(c, cell): (usize, &String)| {
-                let width = widths
-                    .get(c)
-                    .filter(|_| c < row.in_columns())
-                    .copied()
-                    .unwrap_or(0);
-                format!(
-                    "{}{cell}",
-                    " ".repeat(width.saturating_sub(cell.chars().count()))
-                )
-            };
-            let cells: Vec<String> = row.cells.iter().enumerate().map(cell).collect();
-            format!("  {}\n", cells.join("  ").trim_end())
-        };
-        rows.iter().map(line).collect()
+        rows.iter().map(|row| row.line(&widths, room)).collect()
     }
 }
 
 impl Row {
     fn in_columns(&self) -> usize {
         self.cells.len() - usize::from(self.ends_early && !self.cells.is_empty())
+    }
+
+    /// The cells in columns of these widths; words that end it early within `room`.
+    fn line(&self, widths: &[usize], room: Option<usize>) -> String {
+        let (in_columns, words) = self.cells.split_at(self.in_columns());
+        let mut line = String::new();
+        for (cell, width) in in_columns.iter().zip(widths) {
+            let free = width.saturating_sub(cell.chars().count());
+            line += &format!("  {}{cell}", " ".repeat(free));
+        }
+        for words in words {
+            let indent = line.chars().count() + 2;
+            let room = room.map(|room| room.saturating_sub(indent).max(LEAST_WORDS));
+            let onward = format!("\n{}", " ".repeat(indent));
+            line += &format!("  {}", wrapped(words, room).replace('\n', &onward));
+        }
+        format!("{}\n", line.trim_end())
     }
 }
 
@@ -162,6 +168,21 @@ mod tests {
             "      12    none: too short\n",
         );
         assert_eq!(text, narrow);
+    }
+
+    #[test]
+    fn words_that_end_a_row_go_on_below_where_they_began() {
+        let mut table = Table::new(&[("branch", 0), ("frequency", 0), ("damping", 0)]);
+        let words =
+            "  none: no mode of its own: moves with trunk (0.70 Hz) by 60 %, a mode of 1.20 Hz";
+        table.push(vec!["limb_1".into(), words.into()]);
+        let (text, _) = table.within(Some(60));
+        let onward = concat!(
+            "  branch  frequency  damping\n",
+            "  limb_1    none: no mode of its own: moves with trunk (0.70\n",
+            "              Hz) by 60 %, a mode of 1.20 Hz\n",
+        );
+        assert_eq!(text, onward);
     }
 
     #[test]

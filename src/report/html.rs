@@ -1,7 +1,7 @@
 //! The page: one HTML file that needs no network, no script and no other file.
 
 use super::compare::Comparison;
-use super::page::{branch_part, compared_part, levels_part, not_said, table_part};
+use super::page::{branch_part, compared_part, levels_part, modes_part, not_said, table_part};
 use super::plot::{Map, escaped, map};
 use super::study::Study;
 use super::words;
@@ -79,6 +79,7 @@ fn one(k: usize, study: &Study, several: bool) -> String {
          <span>The dashed line is the region that was tracked.</span>{unnamed}</figcaption></figure>"
     );
     out += &table_part(study);
+    out += &modes_part(study);
     out += &levels_part(study);
     out += &not_said(study);
     if study.answers() > 0 {
@@ -162,6 +163,10 @@ the move of that place. Where the two are more than 1.5 times apart, the film do
 branch sways, and there is a dash. In wind, and without poses, it comes from the points alone: in wind the \
 square root of 2 times the root mean square. <b>End</b> is what it makes at the branch's end, in the \
 picture.</p>\
+<p>A <b>mode</b> is one frequency at which points of the whole tree swing together; where they are those of \
+one branch, it is that branch's own. Its energy is shared out to trunk and limbs by how far their points swing \
+in it, all points of like mass. A branch without a frequency of its own moves with the modes of others: behind \
+each stands its share of the squares of that motion.</p>\
 <p><b>Peak</b> and <b>half-power damping</b> (Hu et al., equation 6) are what the largest peak of the \
 angle's spectrum says. They are for reference. A short film's peak is as wide as one over its length, so \
 that this damping is too high, and the largest peak may be that of a parent branch or of the whole tree. Of \

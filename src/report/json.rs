@@ -51,6 +51,7 @@ fn capture(study: &Study) -> Value {
             "frequency": growth(study, |s| Some(s.frequency_hz.value)).map(grown),
             "damping": growth(study, |s| s.damping_ratio.map(|d| d.value)).map(grown),
         },
+        "modes": study.modes,
         "notes": study.notes,
     })
 }
@@ -78,7 +79,8 @@ fn branch(study: &Study, branch: &Branch) -> Value {
         "spectrum_peak_hz": branch.reference.map(|r| r.peak_hz),
         "half_power_damping": branch.reference.map(|r| r.damping_ratio),
         "unidentified": branch.sway.err().map(Unidentified::word),
-        "why": branch.sway.err().map(|why| why.to_string()),
+        "why": branch.why(),
+        "participation": branch.participation,
     })
 }
 

@@ -3,11 +3,13 @@
 mod branch;
 mod compared;
 mod levels;
+mod modes;
 mod table;
 
 pub use branch::branch_part;
 pub use compared::compared_part;
 pub use levels::levels_part;
+pub use modes::modes_part;
 pub use table::{not_said, table_part};
 
 use super::plot::escaped;

@@ -8,8 +8,8 @@ use crate::dynamics::{
     angle_to_parent_deg, spectrum,
 };
 use crate::model::{
-    BotanicalBranches, Excitation, NodeId, Origin, Pose, Skeleton, Sway, Swaying, Unidentified,
-    Verdict,
+    BotanicalBranches, Excitation, ModeSummary, NodeId, Origin, Participation, Pose, Skeleton,
+    Sway, Swaying, Unidentified, Verdict, participation, reason,
 };
 use nalgebra::{Point2, Vector2, distance};
 
@@ -81,6 +81,8 @@ pub struct Study {
     pub outline_px: Vec<Point2<i32>>,
     pub picture: Option<String>,
     pub branches: Vec<Branch>,
+    /// The modes of the whole tree, the slowest first.
+    pub modes: Vec<ModeSummary>,
     pub notes: Vec<String>,
 }
 
@@ -116,6 +118,8 @@ pub struct Branch {
     pub centre_from_foot_px: Point2<f64>,
     pub spread_px: f64,
     pub sway: Swaying,
+    /// The modes of the tree in which its points swing, the largest share first.
+    pub participation: Vec<Participation>,
     /// Amplitude of the branch's own oscillation in its angle to the one that carries it, degrees;
     /// no number where unknown.
     pub amplitude_deg: f64,
@@ -190,6 +194,7 @@ impl Study {
             outline_px: given.outline_px.to_vec(),
             picture: given.picture.map(str::to_owned),
             branches: Vec::new(),
+            modes: ModeSummary::all(&analysis.modes, skeleton),
             notes: given.notes.to_vec(),
         };
         let botanical = skeleton.botanical_branches();
@@ -252,6 +257,12 @@ impl Branch {
     /// What is known of its sway.
     pub fn known(&self) -> Option<Sway> {
         self.sway.ok()
+    }
+
+    /// Why it has no frequency of its own, and with which modes of the tree it moves; `None` where
+    /// it has one.
+    pub fn why(&self) -> Option<String> {
+        self.sway.err().map(|why| reason(why, &self.participation))
     }
 
     /// Its length in the picture at rest, px.
@@ -317,6 +328,7 @@ fn branch(
         centre_from_foot_px: Point2::new(f64::NAN, f64::NAN),
         spread_px: f64::NAN,
         sway,
+        participation: participation(&given.analysis.modes, botanical, node),
         amplitude_deg,
         by_points_deg,
         in_angle_deg,

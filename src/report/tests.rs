@@ -29,6 +29,7 @@ pub fn study(tips: &[Point2<f64>]) -> Study {
         centre_from_foot_px: *tip,
         spread_px: 0.0,
         sway: Err(Unidentified::TooShort),
+        participation: Vec::new(),
         amplitude_deg: f64::NAN,
         by_points_deg: f64::NAN,
         in_angle_deg: f64::NAN,
@@ -58,6 +59,7 @@ pub fn study(tips: &[Point2<f64>]) -> Study {
         outline_px: Vec::new(),
         picture: None,
         branches: branches.collect(),
+        modes: Vec::new(),
         notes: Vec::new(),
     }
 }

@@ -8,6 +8,7 @@ use super::levels::{Growth, Level, Spread, growth, levels};
 use super::study::{Branch, Study};
 use super::values::{interval, number, percent, spread};
 use super::words;
+use crate::model::ModeSummary;
 pub use compared::{heading, lost, unmatched};
 
 /// Everything as text, a table a capture, and what compares them; for a terminal of `columns`, if
@@ -72,6 +73,9 @@ fn one(study: &Study, columns: Option<usize>) -> String {
         wrapped(&top, columns),
         wrapped(&notes, columns)
     );
+    if !study.modes.is_empty() {
+        out += &mode_table(&study.modes, columns);
+    }
     let by_level = levels(study);
     if by_level.iter().any(|l| l.answers > 0) {
         out += &level_table(&by_level, columns);
@@ -99,7 +103,7 @@ fn row(study: &Study, branch: &Branch) -> Vec<String> {
         branch.points.to_string(),
     ];
     match branch.sway {
-        Err(why) => row.push(format!("  none: {why}")),
+        Err(_) => row.push(format!("  none: {}", branch.why().unwrap_or_default())),
         Ok(sway) => {
             row.push(interval(&sway.frequency_hz, 3));
             row.push(
@@ -119,6 +123,50 @@ fn row(study: &Study, branch: &Branch) -> Vec<String> {
         }
     }
     row
+}
+
+/// The heads of the table of modes, and how soon each can be spared.
+pub const MODE_HEADS: [(&str, u8); 8] = [
+    ("mode", 0),
+    ("frequency, Hz", 0),
+    ("damping ratio", 0),
+    ("collinearity", 3),
+    ("points", 2),
+    ("node", 1),
+    ("branch", 0),
+    ("energy", 1),
+];
+/// Trunk and limbs whose share of a mode's energy is printed.
+const LIMBS_OF_MODE: usize = 3;
+
+fn mode_table(modes: &[ModeSummary], columns: Option<usize>) -> String {
+    let mut table = Table::new(&MODE_HEADS);
+    for mode in modes {
+        table.push(mode_cells(mode).to_vec());
+    }
+    let (table, without) = table.within(columns);
+    let notes = "  modes of the whole tree; branch: the one whose own mode it is, - where the tree \
+                 lacks it; energy: the largest shares of trunk and limbs\n";
+    format!(
+        "{table}{}\n",
+        wrapped(&format!("{notes}{}", left_out(&without)), columns)
+    )
+}
+
+/// A row of the table of modes, by [`MODE_HEADS`].
+pub fn mode_cells(mode: &ModeSummary) -> [String; 8] {
+    [
+        mode.mode.to_string(),
+        interval(&mode.sway.frequency_hz, 3),
+        mode.sway
+            .damping_ratio
+            .map_or("unknown".into(), |d| interval(&d, 3)),
+        number(mode.collinearity.unwrap_or(f64::NAN), 2),
+        mode.points.to_string(),
+        mode.node.map_or("-".into(), |node| node.0.to_string()),
+        mode.branch.clone().unwrap_or("-".into()),
+        mode.energy_words(LIMBS_OF_MODE),
+    ]
 }
 
 fn level_table(levels: &[Level], columns: Option<usize>) -> String {

@@ -33,9 +33,10 @@ pub fn branch_part(study: &Study, branch: &Branch) -> String {
                 plots(study, branch)
             )
         }
-        Err(why) => {
+        Err(_) => {
             format!(
-                "<details id=\"{id}\"><summary>{head}: {why}</summary>{}</details>",
+                "<details id=\"{id}\"><summary>{head}: {}</summary>{}</details>",
+                branch.why().unwrap_or_default(),
                 plots(study, branch)
             )
         }

@@ -46,9 +46,10 @@ fn row(study: &Study, branch: &Branch, columns: usize) -> String {
     let place = [branch.level.to_string(), parent, branch.points.to_string()];
     let first = cells("td", "n", &[name, branch.piece.clone()]) + &cells("td", "n less", &place);
     let rest = match branch.sway {
-        Err(why) => format!(
-            "<td class=\"why\" colspan=\"{}\"><span>none: {why}</span></td>",
-            columns - 5
+        Err(_) => format!(
+            "<td class=\"why\" colspan=\"{}\"><span>none: {}</span></td>",
+            columns - 5,
+            branch.why().unwrap_or_default()
         ),
         Ok(sway) => {
             let mut rest = vec![
