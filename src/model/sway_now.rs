@@ -1,6 +1,6 @@
 //! What is reported of the sway while it films.
 
-use super::{Excitation, NodeName, Swaying};
+use super::{Excitation, ModeSummary, NodeName, Participation, Swaying};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -17,6 +17,9 @@ pub struct AngleSpectrum {
 #[derive(Clone, Debug, PartialEq)]
 pub struct BranchSway {
     pub swaying: Swaying,
+    /// Where it has no frequency of its own: the modes of the tree that it moves with, the largest
+    /// share first.
+    pub moves_with: Vec<Participation>,
     /// `None` where its angle was not seen for long enough.
     pub spectrum: Option<AngleSpectrum>,
 }
@@ -31,6 +34,8 @@ pub struct SwayNow {
     /// What made the tree sway; `None` where there is too little film to tell.
     pub excitation: Option<Excitation>,
     pub branches: BTreeMap<NodeName, BranchSway>,
+    /// The modes of the whole tree, the slowest first.
+    pub modes: Vec<ModeSummary>,
 }
 
 /// The angles of the branches to those that carry them, frame by frame, oldest first.

@@ -6,7 +6,8 @@ use crate::cancel::CancelToken;
 use crate::config::Dynamics;
 use crate::dynamics::{Depth, Film, analyse, spectrum};
 use crate::model::{
-    AngleSpectrum, Angles, BranchSway, NodeId, NodeName, Skeleton, SwayNow, TrackId, TrackLog,
+    AngleSpectrum, Angles, BranchSway, ModeSummary, NodeId, NodeName, Skeleton, SwayNow, TrackId,
+    TrackLog, participation,
 };
 use crate::solve::Model;
 use std::collections::BTreeMap;
@@ -110,11 +111,17 @@ impl SwayJob {
         let film = Film::from_log(window, &self.skeleton, |id| self.nodes.get(&id).copied());
         let analysis = analyse(&self.skeleton, &film, &self.settings, Depth::Quick, cancel);
         let mut branches = BTreeMap::new();
-        for (node, swaying) in self.skeleton.nodes.iter().zip(&analysis.sway) {
+        let botanical = self.skeleton.botanical_branches();
+        let nodes = (0..).map(NodeId).zip(&self.skeleton.nodes);
+        for ((id, node), swaying) in nodes.zip(&analysis.sway) {
             // The foot is no branch, and what moves with another node is none of its own.
             if self.angles.nodes.contains(&node.name) {
                 let sway = BranchSway {
                     swaying: *swaying,
+                    moves_with: match swaying {
+                        Ok(_) => Vec::new(),
+                        Err(_) => participation(&analysis.modes, &botanical, id),
+                    },
                     spectrum: self.spectrum_of(node.name),
                 };
                 branches.insert(node.name, sway);
@@ -126,6 +133,7 @@ impl SwayJob {
             span_s: film.span_s(),
             excitation: analysis.onset.map(|o| o.excitation),
             branches,
+            modes: ModeSummary::all(&analysis.modes, &self.skeleton),
         }
     }
 

@@ -2,8 +2,14 @@
 
 use super::shared::Shared;
 use crate::model::{BranchSway, NodeName, Pose, Skeleton, SwayNow, Verdict};
+use serde::Serialize;
 use std::fmt::Write;
 use std::sync::atomic::Ordering;
+
+/// The most modes of the tree in a line: the slowest, so that a line stays short.
+const MOST_MODES: usize = 20;
+/// The most of them that are named for a branch.
+const MOST_MODES_OF_BRANCH: usize = 3;
 
 /// What a line has beside the pose.
 #[derive(Default)]
@@ -63,11 +69,15 @@ fn told(sway: &SwayNow) -> String {
     let excitation = sway
         .excitation
         .map_or_else(|| "null".to_owned(), |e| format!("\"{}\"", e.word()));
-    format!(
+    let mut text = format!(
         ",\"sway\":{{\"frame\":{},\"time_s\":{:.6},\"span_s\":{:.3},\
-         \"excitation\":{excitation},\"branches\":{branches}}}",
+         \"excitation\":{excitation},\"branches\":{branches}",
         sway.frame, sway.time_s, sway.span_s
-    )
+    );
+    let most = sway.modes.len().min(MOST_MODES);
+    push_json(&mut text, "modes", &sway.modes[..most]);
+    text.push('}');
+    text
 }
 
 fn of_branch(name: NodeName, branch: &BranchSway) -> String {
@@ -98,10 +108,22 @@ fn of_branch(name: NodeName, branch: &BranchSway) -> String {
             }
             let _ = write!(text, ",\"excitation\":\"{}\"", sway.excitation.word());
         }
-        Err(why) => drop(write!(text, ",\"unidentified\":\"{}\"", why.word())),
+        Err(why) => {
+            let _ = write!(text, ",\"unidentified\":\"{}\"", why.word());
+            let most = branch.moves_with.len().min(MOST_MODES_OF_BRANCH);
+            push_json(&mut text, "participation", &branch.moves_with[..most]);
+        }
     }
     text.push('}');
     text
+}
+
+/// Appends a list; nothing for an empty one.
+fn push_json<T: Serialize>(text: &mut String, name: &str, list: &[T]) {
+    // It has nothing that could not be written as JSON.
+    if let (false, Ok(json)) = (list.is_empty(), serde_json::to_string(list)) {
+        let _ = write!(text, ",\"{name}\":{json}");
+    }
 }
 
 /// What was lost until now, for the stream of a camera.
@@ -122,7 +144,7 @@ fn counts(shared: &Shared) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Excitation, Grade, Size, Sway, Unidentified};
+    use crate::model::{Excitation, Grade, ModeSummary, Participation, Size, Sway, Unidentified};
     use nalgebra::Point2;
     use serde_json::{Value, json};
 
@@ -132,6 +154,7 @@ mod tests {
                 NodeName(name),
                 BranchSway {
                     swaying,
+                    moves_with: Vec::new(),
                     spectrum: None,
                 },
             )
@@ -142,7 +165,74 @@ mod tests {
             span_s: 9.5,
             excitation: None,
             branches: branches.into_iter().map(branch).collect(),
+            modes: Vec::new(),
         }
+    }
+
+    fn line_with(sway: &SwayNow) -> Value {
+        let skeleton = Skeleton {
+            nodes: Vec::new(),
+            foot_px: Point2::origin(),
+            image_size: Size::new(64, 64),
+        };
+        let pose = Pose {
+            frame: 330,
+            time_s: 11.0,
+            joints: Vec::new(),
+        };
+        let beside = Beside {
+            sway: Some(sway),
+            ..Beside::default()
+        };
+        serde_json::from_str(&line(&pose, &skeleton, 0.0, &beside)).expect("json")
+    }
+
+    /// A tree of very many modes makes no line that is longer without end.
+    #[test]
+    fn modes_and_what_moves_with_them_are_told_in_short() {
+        let frequency_hz = crate::model::Interval {
+            value: 0.7,
+            lo: 0.6,
+            hi: 0.8,
+        };
+        let mode = ModeSummary {
+            mode: 1,
+            sway: Sway {
+                frequency_hz,
+                damping_ratio: None,
+                excitation: Excitation::Wind,
+                amplitude_deg: f64::NAN,
+            },
+            collinearity: None,
+            points: 9,
+            node: Some(NodeName(4)),
+            branch: Some("limb_1".into()),
+            energy: Vec::new(),
+        };
+        let moves_with = Participation {
+            mode: 1,
+            frequency_hz: 0.7,
+            branch: mode.branch.clone(),
+            share: 0.6,
+        };
+        let mut sway = swaying(vec![
+            (4, Err(Unidentified::AncestorsSway)),
+            (5, Err(Unidentified::TooShort)),
+        ]);
+        let branch = sway.branches.get_mut(&NodeName(4)).expect("branch");
+        branch.moves_with = vec![moves_with; 9];
+        sway.modes = vec![mode; 999];
+        let told = &line_with(&sway)["sway"];
+        let modes = told["modes"].as_array().expect("modes");
+        assert_eq!(modes.len(), MOST_MODES);
+        assert_eq!(modes[0]["branch"], "limb_1");
+        let of_branch = &told["branches"][0]["participation"];
+        assert_eq!(of_branch.as_array().map(Vec::len), Some(3));
+        assert_eq!(
+            of_branch[0],
+            json!({"mode": 1, "frequency_hz": 0.7, "branch": "limb_1", "share": 0.6})
+        );
+        assert!(told["branches"][1].get("participation").is_none());
     }
 
     /// Whatever is not known is left out: a reader must never meet a number that is none.

@@ -45,6 +45,11 @@ impl SwayWatch {
         found
             .branches
             .retain(|name, _| there.iter().any(|n| n.name == *name));
+        for mode in &mut found.modes {
+            if !there.iter().any(|n| Some(n.name) == mode.node) {
+                mode.forget_branch();
+            }
+        }
         Some(Arc::new(found))
     }
 

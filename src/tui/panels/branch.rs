@@ -2,7 +2,7 @@
 
 use super::{titled, waiting};
 use crate::bounds::Bounds;
-use crate::model::{BranchRow, BranchSway, Interval, Snapshot};
+use crate::model::{BranchRow, BranchSway, Interval, Snapshot, reason};
 use crate::tui::format::{clock, count, plus_minus, value, wrap};
 use crate::tui::plot;
 use crate::tui::state::State;
@@ -72,7 +72,7 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
 
 fn told(s: &Snapshot, answer: Option<&BranchSway>, width: u16, theme: Theme) -> Vec<Line<'static>> {
     let width = width.saturating_sub(2) as usize;
-    let sway = match answer.map(|a| a.swaying) {
+    let sway = match answer {
         None if s.sway_at_end => {
             return words(
                 "how it sways is found at the end (dynamics.every_s is 0)",
@@ -80,8 +80,13 @@ fn told(s: &Snapshot, answer: Option<&BranchSway>, width: u16, theme: Theme) -> 
             );
         }
         None => return words("how it sways: being looked at", width),
-        Some(Err(why)) => return words(&format!("no frequency: {why}"), width),
-        Some(Ok(sway)) => sway,
+        Some(answer) => match answer.swaying {
+            Err(why) => {
+                let why = reason(why, &answer.moves_with);
+                return words(&format!("no frequency: {why}"), width);
+            }
+            Ok(sway) => sway,
+        },
     };
     let damping = match &sway.damping_ratio {
         Some(damping) => row("damping", plus_minus(damping), "", theme),

@@ -1,8 +1,8 @@
 //! The table of branches.
 
 use super::{titled, waiting};
-use crate::model::{BranchRow, Phase, Snapshot, Unidentified};
-use crate::tui::format::{count, plus_minus, value};
+use crate::model::{BranchRow, Participation, Phase, Snapshot, Unidentified};
+use crate::tui::format::{count, plus_minus, value, width};
 use crate::tui::state::State;
 use crate::tui::theme::Theme;
 use ratatui::Frame;
@@ -20,6 +20,10 @@ const SURE: usize = 13;
 const COLUMNS: [(&str, usize); 2] = [("pts", 5), ("ampl/px", 7)];
 /// A narrower table has the name and the sway alone.
 const ALL_FROM: u16 = 56;
+/// Columns that stay free about a title, and between it and the modes.
+const AROUND_TITLE: usize = 5;
+/// Stands behind the frequencies of the modes.
+const HZ: &str = " Hz";
 /// With so many lines one can be spared for the names of the columns.
 const NAMED_FROM: usize = 4;
 
@@ -38,7 +42,13 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         return;
     }
     let tables = Tables::new(total, state.chosen().min(total - 1), area);
-    let title = tables.title();
+    let mut title = tables.title();
+    if tables.named_below {
+        let room = usize::from(area.width).saturating_sub(width(&title) + AROUND_TITLE);
+        let modes = modes(s, room);
+        title += if modes.is_empty() { "" } else { "; " };
+        title += &modes;
+    }
     let inner = titled(frame, area, &title, theme);
     let [head, below] = Layout::vertical([
         Constraint::Length(u16::from(tables.named_below)),
@@ -154,12 +164,8 @@ fn shortened(name: &str, most: usize) -> String {
 /// Frequency and damping with half their intervals, or why there are none.
 fn sway(s: &Snapshot, b: &BranchRow, theme: Theme) -> (String, Style) {
     const WIDTH: usize = 2 * (SURE + 1);
-    match s
-        .sway
-        .as_ref()
-        .and_then(|sway| sway.branches.get(&b.node))
-        .map(|branch| branch.swaying)
-    {
+    let branch = s.sway.as_ref().and_then(|s| s.branches.get(&b.node));
+    match branch.map(|branch| branch.swaying) {
         Some(Ok(sway)) => {
             let damping = sway
                 .damping_ratio
@@ -172,14 +178,27 @@ fn sway(s: &Snapshot, b: &BranchRow, theme: Theme) -> (String, Style) {
                 theme.strong(),
             )
         }
-        Some(Err(why)) => (format!("{:>WIDTH$}", in_short(why)), theme.faint()),
+        Some(Err(why)) => {
+            let moves_with = branch.map_or(&[][..], |branch| &branch.moves_with);
+            let why = in_short(why, moves_with, WIDTH - 1);
+            (format!("{why:>WIDTH$}"), theme.faint())
+        }
         None => (format!(" {:>SURE$} {:>SURE$}", "–", "–"), theme.faint()),
     }
 }
 
-/// Two or three words; the branch's own panel has them all.
-fn in_short(why: Unidentified) -> &'static str {
-    match why {
+/// Two or three words of at most so many letters; the branch's own panel has them all.
+fn in_short(why: Unidentified, moves_with: &[Participation], room: usize) -> String {
+    if why == Unidentified::AncestorsSway
+        && let Some(most) = moves_with.first()
+    {
+        let words = format!("with {most}");
+        if width(&words) <= room {
+            return words;
+        }
+        return format!("with {} Hz", value(most.frequency_hz));
+    }
+    let words = match why {
         Unidentified::NotMeasured => "not measured",
         Unidentified::TooShort => "film too short",
         Unidentified::TooLittleMotion => "too little motion",
@@ -188,6 +207,24 @@ fn in_short(why: Unidentified) -> &'static str {
         Unidentified::NoOscillation => "no oscillation",
         Unidentified::TooUncertain => "too uncertain",
         Unidentified::NotInTime => "not in time",
+    };
+    words.to_owned()
+}
+
+/// The frequencies of the tree's modes, as many as there is room for.
+fn modes(s: &Snapshot, room: usize) -> String {
+    let mut text = String::new();
+    for mode in s.sway.iter().flat_map(|sway| &sway.modes) {
+        let gap = if text.is_empty() { "modes at " } else { ", " };
+        let longer = format!("{text}{gap}{}", value(mode.sway.frequency_hz.value));
+        if width(&longer) + HZ.len() > room {
+            break;
+        }
+        text = longer;
+    }
+    match text.is_empty() {
+        true => text,
+        false => text + HZ,
     }
 }
 

@@ -2,8 +2,9 @@
 
 use crate::model::{
     Agreement, AngleSpectrum, Angles, Background, BranchGraph, BranchRow, BranchSway, Excitation,
-    FormatNote, Grade, Interval, JointPose, Node, NodeId, NodeName, Phase, Pose, Rgb, Shake, Size,
-    Skeleton, Snapshot, Sway, SwayNow, Unidentified, Verdict, Wood, WoodNode, WoodSight,
+    FormatNote, Grade, Interval, JointPose, ModeSummary, Node, NodeId, NodeName, Participation,
+    Phase, Pose, Rgb, Shake, Size, Skeleton, Snapshot, Sway, SwayNow, Unidentified, Verdict, Wood,
+    WoodNode, WoodSight,
 };
 use nalgebra::{Point2, UnitQuaternion, Vector3};
 use std::sync::Arc;
@@ -223,6 +224,36 @@ pub fn sway() -> SwayNow {
         branches: (1..11)
             .map(|node| (NodeName(node), branch_sway(node)))
             .collect(),
+        modes: (1..4).map(mode).collect(),
+    }
+}
+
+/// Those of the trunk and of a limb, and one of a branch that the tree lacks.
+fn mode(number: u32) -> ModeSummary {
+    let branch = ["trunk", "limb_1"].get(number as usize - 1);
+    ModeSummary {
+        mode: number as usize,
+        sway: known_sway(number),
+        collinearity: Some(0.97),
+        points: 40,
+        node: branch.map(|_| NodeName(number)),
+        branch: branch.map(|branch| (*branch).to_owned()),
+        energy: Vec::new(),
+    }
+}
+
+/// That of a branch which moves with the trunk, and with a limb.
+pub fn moves_with() -> Vec<Participation> {
+    vec![part_in(2, 0.75), part_in(1, 0.25)]
+}
+
+fn part_in(number: u32, share: f64) -> Participation {
+    let mode = mode(number);
+    Participation {
+        mode: mode.mode,
+        frequency_hz: mode.sway.frequency_hz.value,
+        branch: mode.branch,
+        share,
     }
 }
 
@@ -245,6 +276,10 @@ fn branch_sway(node: u32) -> BranchSway {
     };
     BranchSway {
         swaying,
+        moves_with: match swaying {
+            Err(Unidentified::AncestorsSway) => moves_with(),
+            _ => Vec::new(),
+        },
         spectrum: Some(spectrum),
     }
 }
@@ -400,10 +435,19 @@ fn huge_sway() -> SwayNow {
         bin_hz: 0.0,
         amplitude_deg: vec![f32::NAN, f32::INFINITY, -1.0],
     };
+    sway.modes = vec![
+        ModeSummary {
+            sway: all,
+            branch: Some("limb_1.".repeat(99)),
+            ..mode(1)
+        };
+        5000
+    ];
     sway.branches = [(
         NodeName(u32::MAX),
         BranchSway {
             swaying: Ok(all),
+            moves_with: Vec::new(),
             spectrum: Some(spectrum),
         },
     )]

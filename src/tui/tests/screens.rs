@@ -1,7 +1,9 @@
 //! What the whole screen looks like, and that nothing brings it down.
 
 use super::made_up::{huge, snapshot};
-use crate::model::{CameraState, Phase, Rgb, Size, Skeleton, Snapshot, Unidentified, WoodSight};
+use crate::model::{
+    CameraState, Phase, Rgb, Size, Skeleton, Snapshot, Unidentified, WoodSight, reason,
+};
 use crate::tui::compose;
 use crate::tui::drawing::{Drawing, Subject};
 use crate::tui::graphics::Graphics;
@@ -304,7 +306,11 @@ fn an_unknown_sway_is_told_by_its_reason() {
                 .collect::<Vec<_>>()
                 .join(" ")
                 .replace("\" ", "");
-            let told = format!("no frequency: {why}");
+            let moves_with = match why {
+                Unidentified::AncestorsSway => super::made_up::moves_with(),
+                _ => Vec::new(),
+            };
+            let told = format!("no frequency: {}", reason(why, &moves_with));
             let words = told.split(' ').collect::<Vec<_>>();
             let at = text
                 .find("no frequency:")
